@@ -32,6 +32,7 @@ Json group_json(const GroupLosses& group) {
     sizes.push_back({{"texelDssim", floats_json(t.texel_dssim)},
                      {"coded", losses_json(t.coded)},
                      {"preview", losses_json(t.preview)},
+                     {"finer", losses_json(t.finer)},
                      {"coarser", losses_json(t.coarser)}});
   return {{"group", enum_name(group.group)}, {"sizes", std::move(sizes)}};
 }
@@ -70,6 +71,7 @@ TextureLosses read_texture_losses(const JsonAt& at) {
   }
   t.coded = read_losses(at["coded"], t.texel_dssim.size());
   t.preview = read_losses(at["preview"], 1);
+  t.finer = read_losses(at["finer"], at["finer"]["flip"].array(0, kMaxFinerLevels + 1));
   t.coarser = read_losses(at["coarser"], at["coarser"]["flip"].array(0, kMaxCoarserLevels));
   return t;
 }

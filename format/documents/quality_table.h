@@ -43,13 +43,19 @@ struct TextureLosses {
   /// Mean of 1 - SSIM of the group's texels over the object's surface, rising, > 0; one per sampled rung. Of
   /// the planes that a client shows at that height (mip_choice.h).
   std::vector<float> texel_dssim;
-  PictureLosses coded;    // per texel_dssim
+  /// Per texel_dssim. `flip` is what coding adds to the mips' own loss: together with finer.flip[0], by
+  /// QualityTable::exponent, it is the picture's. The others are the picture's.
+  PictureLosses coded;
   PictureLosses preview;  // one: with the previews of all the group's textures
+  /// With the source's texels of the planes shown at that height, then of mips that are 1, 2 .. levels finer;
+  /// 0 to kMaxFinerLevels + 1 of them. `flip` does not rise. A client shows such texels where a rung loses
+  /// nothing: they may still be coarser than what the source shows there.
+  PictureLosses finer;
   /// With the source's texels of mips that are 1, 2 .. levels coarser than the planes shown at that height.
   PictureLosses coarser;
   template <class S, class A>
   static void archive(S& s, A& a) {
-    a(s.texel_dssim, s.coded, s.preview, s.coarser);
+    a(s.texel_dssim, s.coded, s.preview, s.finer, s.coarser);
   }
   friend bool operator==(const TextureLosses&, const TextureLosses&) = default;
 };
@@ -86,7 +92,8 @@ struct QualityTable {
 
 /// The least displayed height at which a scale is compared with S_0 for ManifestScale::display_px_flip, px.
 inline constexpr double kLeastSwitchPx = 32;
-inline constexpr std::size_t kMaxQualitySizes = 8, kMaxQualitySamples = 100, kMaxCoarserLevels = 8;
+inline constexpr std::size_t kMaxQualitySizes = 8, kMaxQualitySamples = 100, kMaxCoarserLevels = 8,
+                             kMaxFinerLevels = 8;
 
 std::string write_quality(const QualityTable& table);           // canonical JSON
 QualityTable read_quality(std::span<const std::uint8_t> json);  // strict; FormatError

@@ -10,6 +10,7 @@ namespace {
 
 constexpr double kLeastFlip = 1e-6;                    // what logarithms take for 0
 constexpr double kFlattest = 0.25, kSteepest = 1;      // of the lines that go on before the first sample
+constexpr double kOneSample = 0.5;                     // slope of the line through a single one
 constexpr double kLeastDssim = 1e-9, kMostFlip = 1.0;  // 0 of texels is 0 of the picture
 
 /// Two neighbours on an axis and the way between them.
@@ -69,7 +70,11 @@ GroupCurve::GroupCurve(const QualityTable& table, PlaneGroup group, double displ
       curve.log_dssim.push_back(portable::log(static_cast<double>(losses.texel_dssim[k])));
       curve.log_flip.push_back(portable::log(least));
     }
-    curve.coarser = losses.coarser.flip;
+    const std::vector<float>&finer = losses.finer.flip, &coarser = losses.coarser.flip;
+    curve.finest_level = finer.empty() ? 0 : 1 - static_cast<double>(finer.size());
+    curve.mips.assign(finer.rbegin(), finer.rend());
+    if (finer.empty()) curve.mips.push_back(0);
+    curve.mips.insert(curve.mips.end(), coarser.begin(), coarser.end());
     curve.preview =
         std::min(kMostFlip, static_cast<double>(losses.preview.flip[0]) * beyond_sizes(table, displayed_px));
     curves_.push_back(std::move(curve));
@@ -79,7 +84,7 @@ GroupCurve::GroupCurve(const QualityTable& table, PlaneGroup group, double displ
 double GroupCurve::Curve::at(double texel_dssim) const {
   const double x = portable::log(texel_dssim);
   const std::size_t n = log_dssim.size();
-  if (n == 1) return portable::exp(log_flip[0] + kSteepest * (x - log_dssim[0]));
+  if (n == 1) return portable::exp(log_flip[0] + kOneSample * (x - log_dssim[0]));
   std::size_t i = 0;
   while (i + 2 < n && log_dssim[i + 1] < x) ++i;
   double slope = (log_flip[i + 1] - log_flip[i]) / (log_dssim[i + 1] - log_dssim[i]);
@@ -87,20 +92,19 @@ double GroupCurve::Curve::at(double texel_dssim) const {
   return portable::exp(log_flip[i] + slope * (x - log_dssim[i]));
 }
 
-double GroupCurve::Curve::at_level(double levels) const {
-  const auto value = [&](std::size_t i) {
-    return i == 0 || coarser.empty() ? 0.0 : static_cast<double>(coarser[std::min(i, coarser.size()) - 1]);
-  };
-  const double whole = std::floor(std::clamp(levels, 0.0, static_cast<double>(kMaxCoarserLevels)));
+double GroupCurve::Curve::at_level(double level) const {
+  const double at = std::clamp(level - finest_level, 0.0, static_cast<double>(mips.size() - 1));
+  const double whole = std::floor(at);
   const auto i = static_cast<std::size_t>(whole);
-  return mixed(value(i), value(i + 1), std::clamp(levels - whole, 0.0, 1.0));
+  return mixed(mips[i], mips[std::min(i + 1, mips.size() - 1)], at - whole);
 }
 
 double GroupCurve::coded(double texel_dssim, const TexelGrowth& growth) const {
   if (!(texel_dssim > kLeastDssim)) return 0;
   if (curves_.empty()) return std::min(texel_dssim, kMostFlip);
   const auto at = [&](std::size_t i) {
-    const double grown = growth[i] == 0 ? 1 : portable::pow(kLossPerDoubling, growth[i]);
+    const double per_level = growth[i] < 0 ? kLossPerHalving : kLossPerDoubling;
+    const double grown = growth[i] == 0 ? 1 : portable::pow(per_level, growth[i]);
     return curves_[i].at(texel_dssim) * grown;
   };
   return std::min(kMostFlip, mixed(at(0), at(1), part_));
@@ -110,9 +114,12 @@ double GroupCurve::preview() const {
   return curves_.empty() ? kMostFlip : mixed(curves_[0].preview, curves_[1].preview, part_);
 }
 
-double GroupCurve::coarser(const TexelGrowth& growth) const {
+double GroupCurve::halved(const TexelGrowth& growth, std::uint32_t mip) const {
   if (curves_.empty()) return 0;
-  return mixed(curves_[0].at_level(growth[0]), curves_[1].at_level(growth[1]), part_);
+  const auto at = [&](std::size_t i) {
+    return std::max(0.0, curves_[i].at_level(growth[i]) - curves_[i].at_level(growth[i] - mip));
+  };
+  return mixed(at(0), at(1), part_);
 }
 
 double geometry_flip(const QualityTable& table, double displayed_px, double scale) {

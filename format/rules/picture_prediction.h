@@ -21,28 +21,31 @@ SizesAround sizes_around(const QualityTable& table, double displayed_px);
 using TexelGrowth = std::array<double, 2>;
 
 /// What textures of one group lose at one displayed height. A group that the table does not have loses its
-/// texels' 1 - SSIM, and nothing by coarser mips.
+/// texels' 1 - SSIM, and nothing by its mips.
 class GroupCurve {
  public:
   GroupCurve(const QualityTable& table, PlaneGroup group, double displayed_px);
-  /// FLIP where the texels lose `texel_dssim` >= 0: 0 for 0, along straight lines through the samples'
-  /// logarithms, which go on before the first and behind the last sample. Twice as large texels lose
-  /// kLossPerDoubling times as much. 0..1, not falling.
+  /// What rungs add where the texels lose `texel_dssim` >= 0: FLIP, 0 for 0, along straight lines through the
+  /// samples' logarithms, which go on before the first and behind the last sample. Twice as large texels lose
+  /// kLossPerDoubling times as much, and half as large ones 1 / kLossPerHalving of it: what coarse quantisers
+  /// take, finer texels do not bring back. 0..1, not falling.
   double coded(double texel_dssim, const TexelGrowth& growth = {}) const;
   /// FLIP where all textures of the group show their previews. Without the group 1.
   double preview() const;
-  /// FLIP of the source's texels in mips with so much larger texels, between whole levels linear. 0 where
-  /// they are not larger; behind the last sampled level its value.
-  double coarser(const TexelGrowth& growth) const;
-  static constexpr double kLossPerDoubling = 1.6;
+  /// FLIP of the source's texels in a plane that is the source's, halved `mip` times. Between whole levels of
+  /// growth linear, outside of the sampled ones the nearest one's; less what texels of full size, so much
+  /// smaller, would have. 0 for full size.
+  double halved(const TexelGrowth& growth, std::uint32_t mip) const;
+  static constexpr double kLossPerDoubling = 1.6, kLossPerHalving = 1.25;
 
  private:
   struct Curve {
     std::vector<double> log_dssim, log_flip;
-    std::vector<float> coarser;
+    std::vector<double> mips;  // from the finest sampled level on; the last is the coarsest
+    double finest_level = 0;   // of mips[0], beside the planes that were sampled: <= 0
     double preview = 0;
     double at(double texel_dssim) const;
-    double at_level(double levels) const;
+    double at_level(double level) const;
   };
   std::vector<Curve> curves_;  // none, one, or those of the two heights around
   double part_ = 0;            // of the second one

@@ -171,9 +171,9 @@ void predict(PackageReader& package, const TextureLoader& loader, const std::vec
   std::vector<std::int32_t> rungs;
   for (const ListedFragment& listed : list.fragments)
     rungs.push_back(loader.held(listed.plane, listed.fragment));
-  const TextureParts parts = parts_of(list, rungs);
-  f.texture_flip = texture_flip(package.quality(), parts);
-  f.flip = picture_flip(package.quality(), options.displayed_px, f.scale, parts);
+  const PerGroup losses = losses_of(list, rungs);
+  f.texture_flip = texture_flip(package.quality(), losses);
+  f.flip = picture_flip(package.quality(), options.displayed_px, f.scale, losses);
 }
 
 void fetch_textures(const FetchArguments& a, const DeliveryRequest& request, const HttpOptions& http,

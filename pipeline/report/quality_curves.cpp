@@ -21,21 +21,20 @@ std::uint64_t texture_bytes(PackageReader& package, const std::vector<PlaneChoic
   return bytes;
 }
 
-TextureParts texture_parts(TextureLoss& loss, const std::vector<PlaneChoice>& planes, std::size_t way) {
-  TextureParts parts;
+PerGroup texture_losses(TextureLoss& loss, const std::vector<PlaneChoice>& planes, std::size_t way) {
+  PerGroup losses{};
   const PerGroup weights = loss.weights(planes);
   for (const PlaneChoice& choice : planes) {
     const auto group = static_cast<std::size_t>(loss.group_of(choice.plane));
     const TextureLoss::Plane& plane = loss.plane(choice.plane);
     const std::size_t fragments = plane.weights.size();
     if (fragments == 0 || !(weights[group] > 0)) continue;
-    const std::size_t at = std::min(way, plane.coded.size() / fragments - 1);
+    const std::size_t at = std::min(way, plane.shown.size() / fragments - 1);
     for (std::size_t f = 0; f < fragments; ++f)
-      parts.coded[group] +=
-          static_cast<double>(plane.weights[f]) * plane.coded[at * fragments + f] / weights[group];
+      losses[group] +=
+          static_cast<double>(plane.weights[f]) * plane.shown[at * fragments + f] / weights[group];
   }
-  parts.coarser = loss.coarser(planes);
-  return parts;
+  return losses;
 }
 
 std::size_t most_rungs(PackageReader& package) {
@@ -71,9 +70,9 @@ std::vector<QualityCurves> quality_curves(PackageReader& package, int budgets) {
     for (std::size_t k = 0; k < m.scales.size(); ++k) {
       std::vector<QualityPoint>& points = curves.scales.emplace_back();
       for (std::size_t way = 0; way <= most_rungs(package); ++way) {
-        const TextureParts parts = texture_parts(loss, planes, way);
+        const PerGroup losses = texture_losses(loss, planes, way);
         points.push_back({m.scales[k].scale, fixed[k] + texture_bytes(package, planes, way),
-                          picture_flip(package.quality(), displayed_px, m.scales[k].scale, parts)});
+                          picture_flip(package.quality(), displayed_px, m.scales[k].scale, losses)});
         least = std::min(least, points.back().bytes);
         most = std::max(most, points.back().bytes);
       }

@@ -96,6 +96,20 @@ double texel_level(const TextureData& data, const PlanesOfGroup& group, const Di
   return total > 0 ? sum / total : 0;
 }
 
+std::vector<ShownMip> shown_mips(const TextureData& data, const PlanesOfGroup& group,
+                                 const Display& display) {
+  std::vector<ShownMip> out;
+  double total = 0;
+  for (const std::uint32_t p : group.planes) {
+    double surface = 0;
+    for (const float s : data.tables.planes[p].surface_fraction) surface += static_cast<double>(s);
+    out.push_back({data.fragments.planes[shown_plane(data, p, display)].mip, surface});
+    total += surface;
+  }
+  for (ShownMip& m : out) m.part = total > 0 ? m.part / total : 0;
+  return out;
+}
+
 std::vector<Knot> sample_knots(const TextureData& data, const PlanesOfGroup& group, int samples,
                                const Display& display) {
   std::vector<std::uint32_t> planes;

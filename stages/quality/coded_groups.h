@@ -36,6 +36,13 @@ std::uint32_t shown_plane(const TextureData& data, std::uint32_t full_size, cons
 /// show of the group, by their surface.
 double texel_level(const TextureData& data, const PlanesOfGroup& group, const Display& display);
 
+/// A part of the group's surface, and the mip that clients show there.
+struct ShownMip {
+  std::uint32_t mip = 0;
+  double part = 0;  // of 1; all 0 for a group without a surface
+};
+std::vector<ShownMip> shown_mips(const TextureData& data, const PlanesOfGroup& group, const Display& display);
+
 /// From the highest rung to the lowest. `samples` rungs of the first plane's ladder,
 /// first and last among them (one: the last); the others have the rung whose quality is nearest.
 std::vector<Knot> sample_knots(const TextureData& data, const PlanesOfGroup& group, int samples,

@@ -20,6 +20,7 @@ using quality::find_shown;
 using quality::fit_exponent;
 using quality::frame_object;
 using quality::GroupCells;
+using quality::GroupPictures;
 using quality::Loss;
 using quality::Losses;
 using quality::losses_of;
@@ -168,7 +169,7 @@ std::vector<SizeCells> render_heights(const TextureSampler& sampler, const Quali
 /// What the knots of all groups and the scales lose at one size, rendered or not.
 struct RawLosses {
   PictureLosses geometry;
-  std::vector<PictureLosses> coded, preview, coarser;  // per group
+  std::vector<GroupPictures> groups;
 };
 std::vector<RawLosses> raw_losses(const std::vector<SizeCells>& sizes) {
   std::vector<RawLosses> out;
@@ -185,13 +186,13 @@ std::vector<RawLosses> raw_losses(const std::vector<SizeCells>& sizes) {
                           below ? out[i - 1].geometry : PictureLosses{});
     for (std::size_t g = 0; g < sizes[i].groups.size(); ++g) {
       const GroupCells& group = sizes[i].groups[g];
-      raw.coded.push_back(
-          losses(group.coded, below ? &below->groups[g].coded : nullptr,
-                 below ? along_curve(group, below->groups[g], out[i - 1].coded[g]) : PictureLosses{}, true));
-      raw.preview.push_back(losses(group.preview, below ? &below->groups[g].preview : nullptr,
-                                   below ? out[i - 1].preview[g] : PictureLosses{}));
-      raw.coarser.push_back(losses(group.coarser, below ? &below->groups[g].coarser : nullptr,
-                                   below ? out[i - 1].coarser[g] : PictureLosses{}));
+      const GroupCells* cells = below ? &below->groups[g] : nullptr;
+      const GroupPictures smaller = below ? out[i - 1].groups[g] : GroupPictures{};
+      raw.groups.push_back({losses(group.coded, cells ? &cells->coded : nullptr,
+                                   cells ? along_curve(group, *cells, smaller.coded) : PictureLosses{}, true),
+                            losses(group.preview, cells ? &cells->preview : nullptr, smaller.preview),
+                            losses(group.finer, cells ? &cells->finer : nullptr, smaller.finer),
+                            losses(group.coarser, cells ? &cells->coarser : nullptr, smaller.coarser)});
     }
     out.push_back(std::move(raw));
   }
@@ -206,9 +207,6 @@ void fill_table(const std::vector<SizeCells>& sizes, const std::vector<PlanesOfG
   for (std::size_t i = 0; i < sizes.size(); ++i) {
     table.sizes_px.push_back(static_cast<std::uint32_t>(std::lround(sizes[i].displayed_px)));
     table.geometry.push_back(raw[i].geometry);
-    for (std::size_t g = 0; g < groups.size(); ++g)
-      table.groups[g].sizes.push_back(
-          texture_losses(sizes[i].groups[g].knots, raw[i].coded[g], raw[i].preview[g], raw[i].coarser[g]));
     for (const TogetherCell& cell : sizes[i].together) {
       TogetherLoss& sample = together.emplace_back();
       sample.measured = pooled(cell.losses).flip.mean();
@@ -219,10 +217,13 @@ void fill_table(const std::vector<SizeCells>& sizes, const std::vector<PlanesOfG
       };
       add(sizes[i].geometry[cell.scale], raw[i].geometry.flip[cell.scale]);
       for (std::size_t g = 0; g < groups.size(); ++g)
-        add(sizes[i].groups[g].coded[cell.knots[g]], raw[i].coded[g].flip[cell.knots[g]]);
+        add(sizes[i].groups[g].coded[cell.knots[g]], raw[i].groups[g].coded.flip[cell.knots[g]]);
     }
   }
   fit_exponent(together, table);
+  for (std::size_t i = 0; i < sizes.size(); ++i)
+    for (std::size_t g = 0; g < groups.size(); ++g)
+      table.groups[g].sizes.push_back(texture_losses(sizes[i].groups[g], raw[i].groups[g], table.exponent));
 }
 
 }  // namespace
@@ -253,7 +254,8 @@ MeasuredQuality measure_quality(const NestedScales& scales, const PerceptualValu
   studio.frame = seen.frame;
   studio.environment = studio_environment(context);
   for (std::size_t t = 0; t < shown.textures.size(); ++t)
-    studio.textures.push_back(source_texture(data, shown.textures[t], seen.first_levels[t], context));
+    studio.textures.push_back(source_texture(
+        data, shown.textures[t], shown.textures[t].with_mips ? seen.first_levels[t] : 0, context));
 
   const TextureSampler sampler{data, shown, groups, options.rung_samples,
                                surface_area_of(scales.mesh, scales.scales[0].triangles)};

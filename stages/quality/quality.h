@@ -11,7 +11,7 @@
 
 namespace texmesh {
 
-inline constexpr int kQualityVersion = 9;
+inline constexpr int kQualityVersion = 10;
 
 struct QualityOptions {
   int views = 4;

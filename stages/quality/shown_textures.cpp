@@ -62,16 +62,22 @@ ShownTextures find_shown(const std::vector<Material>& materials, const Fragments
     for (std::size_t t = 0; t < shown.textures.size(); ++t)
       if (shown.textures[t].plane == *plane && shown.textures[t].srgb == srgb)
         return static_cast<std::int32_t>(t);
-    shown.textures.push_back({*plane, plane_of(fragments, ref.image, true), srgb});
+    shown.textures.push_back({*plane, plane_of(fragments, ref.image, true), srgb, true});
     return static_cast<std::int32_t>(shown.textures.size() - 1);
   };
   for (const Material& m : materials)
     shown.materials.push_back(render_material(m, [&](const TextureRef& ref, TextureUse use) {
       return shows(m, use) ? texture_of(ref, is_srgb(use)) : -1;
     }));
-  // The small pictures stand for larger ones, in which a sampler without mips would not have to flicker.
+  shown.sampled = shown.materials;
+  // Of scales, small pictures stand for larger ones, in which a sampler without mips would not have to
+  // flicker.
   for (RenderMaterial& m : shown.materials)
-    for (TextureSlot& slot : m.textures) slot.min_filter = MinFilter::kTrilinear;
+    for (TextureSlot& slot : m.textures) {
+      if (slot.texture >= 0 && slot.min_filter != MinFilter::kTrilinear)
+        shown.textures[static_cast<std::size_t>(slot.texture)].with_mips = false;
+      slot.min_filter = MinFilter::kTrilinear;
+    }
   return shown;
 }
 

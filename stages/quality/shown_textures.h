@@ -1,5 +1,6 @@
 #pragma once
 // Inside the room only: which textures show, and what of them pictures of one size need.
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -17,16 +18,18 @@ struct ShownTexture {
   std::uint32_t plane = 0;  // index into Fragments::planes
   std::optional<std::uint32_t> alpha;
   bool srgb = false;
+  bool with_mips = true;  // false where a sampler of the source's reads level 0 alone
 };
 
 struct ShownTextures {
   std::vector<ShownTexture> textures;
-  std::vector<RenderMaterial> materials;  // their slots count `textures`
+  std::vector<RenderMaterial> materials;  // their slots count `textures`, and read all with mips
+  std::vector<RenderMaterial> sampled;    // the same, as the source's samplers read
+  bool with_mips() const { return std::ranges::all_of(textures, &ShownTexture::with_mips); }
 };
 
 /// What the reference renderer reads. References to coordinates that the mesh does not have, all but the base
-/// colour of unlit materials, and the emission of materials that emit nothing do not show. All textures are
-/// read with mips, whatever the sampler says.
+/// colour of unlit materials, and the emission of materials that emit nothing do not show.
 ShownTextures find_shown(const std::vector<Material>& materials, const Fragments& fragments,
                          const Mesh& mesh);
 

@@ -45,20 +45,30 @@ class SizeShots {
     return out;
   }
 
-  /// The source's mips, `levels` coarser than those of the group's planes at this size.
-  Replaced coarser(const GroupCells& group, std::uint32_t levels) {
+  /// The source's mips, `levels` coarser than those of the group's planes at this size, or finer where below
+  /// 0. Textures of which pictures show nothing finer stay the source's.
+  Replaced mips(const GroupCells& group, int levels) {
     Replaced out(source_, -1);
     for (std::size_t t = 0; t < source_; ++t)
       for (const PlaneRung& r : group.knots[0].rungs) {
         const TexturePlane& plane = sampler_.data.fragments.planes[r.plane];
         if ((plane.mip > 0 ? plane.base : r.plane) != sampler_.shown.textures[t].plane) continue;
-        out[t] = add(coarser_texture(studio_.textures[t], plane.mip + levels));
+        const int level = static_cast<int>(plane.mip) + levels;
+        if (level > static_cast<int>(studio_.textures[t].first_level))
+          out[t] = add(coarser_texture(studio_.textures[t], static_cast<std::uint32_t>(level)));
       }
     return out;
   }
 
   Replaced none() const { return Replaced(source_, -1); }
 
+  /// A scale with the source's texels, all read with mips.
+  void take_scale(std::size_t scale, Losses& to, ViewPart views) {
+    scale_shots_.push_back({scale, &sampler_.shown.materials, views});
+    scales_.push_back(&to);
+  }
+
+  /// Textures, as samplers read them.
   void take(std::size_t scale, const Replaced& replaced, Losses& to, ViewPart views) {
     const bool changes =
         scale > 0 || std::any_of(replaced.begin(), replaced.end(), [](auto t) { return t >= 0; });
@@ -66,19 +76,28 @@ class SizeShots {
       to.assign(static_cast<std::size_t>(studio_.views.views), {});  // as the reference
       return;
     }
-    materials_.push_back(materials_with(sampler_.shown.materials, replaced));
+    materials_.push_back(materials_with(sampler_.shown.sampled, replaced));
     shots_.push_back({scale, &materials_.back(), views});
     to_.push_back(&to);
   }
 
   void render(double displayed_px, bool with_ssim) {
-    std::vector<Losses> losses =
-        take_shots(studio_, sampler_.shown.materials, displayed_px, shots_, with_ssim, context_);
-    for (std::size_t i = 0; i < to_.size(); ++i) *to_[i] = std::move(losses[i]);
+    if (sampler_.shown.with_mips()) {  // one reference serves both
+      shots_.insert(shots_.end(), scale_shots_.begin(), scale_shots_.end());
+      to_.insert(to_.end(), scales_.begin(), scales_.end());
+    } else {
+      take(sampler_.shown.materials, displayed_px, with_ssim, scale_shots_, scales_);
+    }
+    take(sampler_.shown.sampled, displayed_px, with_ssim, shots_, to_);
     studio_.textures.resize(source_);
   }
 
  private:
+  void take(const Materials& source, double displayed_px, bool with_ssim, const std::vector<Shot>& shots,
+            const std::vector<Losses*>& to) {
+    std::vector<Losses> losses = take_shots(studio_, source, displayed_px, shots, with_ssim, context_);
+    for (std::size_t i = 0; i < to.size(); ++i) *to[i] = std::move(losses[i]);
+  }
   std::int32_t add(RenderTexture texture) {
     studio_.textures.push_back(std::move(texture));
     return static_cast<std::int32_t>(studio_.textures.size() - 1);
@@ -89,8 +108,8 @@ class SizeShots {
   const RunContext& context_;
   std::size_t source_;
   std::deque<Materials> materials_;
-  std::vector<Shot> shots_;
-  std::vector<Losses*> to_;
+  std::vector<Shot> shots_, scale_shots_;
+  std::vector<Losses*> to_, scales_;
 };
 
 /// Short ladders have no other rung.
@@ -99,21 +118,28 @@ bool repeats(const Knot& knot, const Knot& before) {
                             [](const PlaneRung& a, const PlaneRung& b) { return a.rung == b.rung; });
 }
 
-/// The knots that are rendered: all, at the half the lowest rung, at the largest none.
-bool is_sampled(std::size_t knot, std::size_t knots, std::size_t rank) {
-  return rank == 0 || (rank == 1 && knot + 1 == knots);
+/// The knots that are rendered: all, at the half the lowest rung, at the largest none. Without mips losses do
+/// not follow from smaller sizes.
+bool is_sampled(const TextureSampler& sampler, std::size_t knot, std::size_t knots, std::size_t rank) {
+  return rank == 0 || !sampler.shown.with_mips() || (rank == 1 && knot + 1 == knots);
 }
 
+/// Levels of source's texels that are rendered.
+struct MipSamples {
+  std::size_t finer = 0, coarser = 0;
+};
 /// Mips change as much by height as from plane to plane, so they are rendered once, and again where a texture
 /// has no finer plane for the larger height.
-std::size_t coarser_samples(const TextureSampler& sampler, std::size_t rank, const Display& display,
-                            const PlanesOfGroup& group) {
-  if (rank != 1) return rank == 0 ? kCoarserLevels : 0;
+MipSamples mip_samples(const TextureSampler& sampler, std::size_t rank, const Display& display,
+                       const PlanesOfGroup& group) {
+  if (rank == 0 || !sampler.shown.with_mips()) return {kFinerLevels + 1, kCoarserLevels};
+  if (rank != 1) return {};
   Display smaller = display;
   smaller.displayed_px /= 2;
-  return std::ranges::any_of(group.planes, [&](std::uint32_t p) {
+  const bool again = std::ranges::any_of(group.planes, [&](std::uint32_t p) {
     return shown_plane(sampler.data, p, smaller) == shown_plane(sampler.data, p, display);
   });
+  return again ? MipSamples{1, 1} : MipSamples{};
 }
 
 /// Scales of the samples that tell how losses add up, and whether their textures have the lowest rung or one
@@ -165,23 +191,27 @@ void add_group(const TextureSampler& sampler, std::size_t rank, const Display& d
   group.knots = sample_knots(sampler.data, planes, sampler.rung_samples, display);
   group.texel_level = texel_level(sampler.data, planes, display);
   const std::size_t knots = group.knots.size();
+  group.mips = shown_mips(sampler.data, planes, display);
   group.coded.resize(knots);
   coded.assign(knots, shots.none());
+  group.finer.resize(kFinerLevels + 1);
   group.coarser.resize(kCoarserLevels);
   for (std::size_t k = 0; k < knots; ++k) {
     if (k > 0 && repeats(group.knots[k], group.knots[k - 1])) {
       coded[k] = coded[k - 1];
       continue;
     }
-    if (!is_sampled(k, knots, rank)) continue;
+    if (!is_sampled(sampler, k, knots, rank)) continue;
     coded[k] = shots.coded(group, k);
     shots.take(0, coded[k], group.coded[k], coded_views(rank));
   }
   group.preview.resize(1);
   shots.take(0, shots.previews(planes), group.preview[0], coded_views(rank));
-  for (std::size_t l = 0; l < coarser_samples(sampler, rank, display, planes); ++l)
-    shots.take(0, shots.coarser(group, static_cast<std::uint32_t>(l + 1)), group.coarser[l],
-               other_views(rank));
+  const MipSamples mips = mip_samples(sampler, rank, display, planes);
+  for (std::size_t l = 0; l < mips.finer; ++l)
+    shots.take(0, shots.mips(group, -static_cast<int>(l)), group.finer[l], coded_views(rank));
+  for (std::size_t l = 0; l < mips.coarser; ++l)
+    shots.take(0, shots.mips(group, static_cast<int>(l) + 1), group.coarser[l], other_views(rank));
 }
 
 void add_textures(const TextureSampler& sampler, std::size_t rank, const Studio& studio, SizeCells& cells,
@@ -213,7 +243,7 @@ void render_size(const TextureSampler& sampler, const SizeTask& task, Studio& st
   SizeShots shots(sampler, studio, context);
   cells.geometry.resize(studio.scenes.size());
   for (std::size_t k = 1; k < task.scales.size(); ++k)
-    if (task.scales[k]) shots.take(k, shots.none(), cells.geometry[k], *task.scales[k]);
+    if (task.scales[k]) shots.take_scale(k, cells.geometry[k], *task.scales[k]);
   if (task.rank && !sampler.groups.empty()) add_textures(sampler, *task.rank, studio, cells, shots);
   shots.render(cells.displayed_px, task.rank.has_value());
   for (GroupCells& group : cells.groups)

@@ -21,9 +21,11 @@ struct TogetherCell {
 struct GroupCells {
   std::vector<Knot> knots;
   double texel_level = 0;  // texel_level() of the planes
-  Cells coded;             // per knot
-  Cells preview;           // one
-  Cells coarser;           // 1, 2 .. levels
+  std::vector<ShownMip> mips;
+  Cells coded;    // per knot
+  Cells preview;  // one
+  Cells finer;    // 0, 1, 2 .. levels
+  Cells coarser;  // 1, 2 .. levels
 };
 
 struct SizeCells {
@@ -33,7 +35,7 @@ struct SizeCells {
   std::vector<TogetherCell> together;
 };
 
-inline constexpr std::size_t kCoarserLevels = 2;
+inline constexpr std::size_t kCoarserLevels = 2, kFinerLevels = 4;
 
 /// What the textures of one size are made from.
 struct TextureSampler {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "format/base/portable_math.h"
 #include "format/rules/picture_prediction.h"
 
 namespace texmesh::quality {
@@ -23,6 +24,16 @@ double predicted_flip(const GroupCurve& curve, const Knot& knot) {
 
 void make_rising(std::vector<float>& values) {
   for (std::size_t i = 1; i < values.size(); ++i) values[i] = std::max(values[i], values[i - 1]);
+}
+
+/// From the finest level to the coarsest.
+void make_mips_rising(TextureLosses& losses) {
+  std::vector<float>&finer = losses.finer.flip, &coarser = losses.coarser.flip;
+  std::vector<float> all(finer.rbegin(), finer.rend());
+  all.insert(all.end(), coarser.begin(), coarser.end());
+  make_rising(all);
+  for (std::size_t i = 0; i < finer.size(); ++i) finer[i] = all[finer.size() - 1 - i];
+  std::copy(all.end() - static_cast<std::ptrdiff_t>(coarser.size()), all.end(), coarser.begin());
 }
 
 /// Indices of the knots that stay. Rungs may lose the same.
@@ -49,6 +60,26 @@ GroupCurve curve_of(TextureLosses losses) {
   return {table, PlaneGroup::kColour, 1};
 }
 
+/// What the group's mips lose by themselves, as clients read it.
+double mip_loss(const GroupCells& group, const TextureLosses& losses) {
+  double sum = 0;
+  const GroupCurve curve = curve_of(losses);
+  for (const ShownMip& m : group.mips) sum += m.part * curve.halved({}, m.mip);
+  return sum;
+}
+
+/// What coding adds to that. Knots rise. Little coding is lost in what its mips lose, so that the first knots
+/// say no more than how much it is at most.
+void take_off(double mips, double exponent, TextureLosses& losses) {
+  std::vector<float>& flip = losses.coded.flip;
+  for (float& f : flip) {
+    const double left = portable::pow(static_cast<double>(f), exponent) - portable::pow(mips, exponent);
+    f = static_cast<float>(left > 0 ? portable::pow(left, 1 / exponent) : 0);
+  }
+  for (std::size_t i = flip.size() - 1; i-- > 0;)
+    flip[i] = std::max(flip[i], flip[i + 1] * (losses.texel_dssim[i] / losses.texel_dssim[i + 1]));
+}
+
 }  // namespace
 
 PictureLosses along_curve(const GroupCells& larger, const GroupCells& smaller, const PictureLosses& losses) {
@@ -69,12 +100,14 @@ PictureLosses along_curve(const GroupCells& larger, const GroupCells& smaller, c
   return out;
 }
 
-TextureLosses texture_losses(const std::vector<Knot>& knots, const PictureLosses& coded,
-                             PictureLosses preview, PictureLosses coarser) {
+TextureLosses texture_losses(const GroupCells& group, GroupPictures pictures, float exponent) {
+  const std::vector<Knot>& knots = group.knots;
+  const PictureLosses& coded = pictures.coded;
   TextureLosses out;
-  out.preview = std::move(preview);
-  out.coarser = std::move(coarser);
-  make_rising(out.coarser.flip);
+  out.preview = std::move(pictures.preview);
+  out.finer = std::move(pictures.finer);
+  out.coarser = std::move(pictures.coarser);
+  make_mips_rising(out);
   std::vector<std::size_t> kept = rising_knots(knots);
   const bool nothing = kept.empty();
   if (nothing) kept.push_back(knots.size() - 1);
@@ -85,6 +118,8 @@ TextureLosses texture_losses(const std::vector<Knot>& knots, const PictureLosses
     out.coded.dssim.push_back(coded.dssim[k]);
   }
   make_rising(out.coded.flip);
+  const double mips = mip_loss(group, out);
+  if (mips > 0) take_off(mips, static_cast<double>(exponent), out);
   const std::vector<float> measured = out.coded.flip;
   for (int step = 0; step < 3 && !nothing; ++step) {
     const GroupCurve curve = curve_of(out);

@@ -8,11 +8,15 @@ namespace texmesh::quality {
 /// clients read, for texels as large on the screen as those of the larger size.
 PictureLosses along_curve(const GroupCells& larger, const GroupCells& smaller, const PictureLosses& losses);
 
-/// `coded` per knot of the group, `coarser` per level. Knots by rising 1 - SSIM, those that repeat one are
-/// left out. FLIP rises, and is scaled so that the weighted mean over fragments of GroupCurve::coded() comes
-/// as near as three steps of iteration bring it.
-TextureLosses texture_losses(const std::vector<Knot>& knots, const PictureLosses& coded,
-                             PictureLosses preview, PictureLosses coarser);
+/// What the pictures of one group and size lose.
+struct GroupPictures {
+  PictureLosses coded, preview, finer, coarser;  // as in GroupCells
+};
+/// The table's part of a group and a size. Knots by rising 1 - SSIM, those that repeat one are left out. Of a
+/// knot's FLIP its mips' own is taken off, by the exponent. What is left rises, at most as fast as 1 - SSIM
+/// does, and is scaled so that the weighted mean over fragments of GroupCurve::coded() comes as near as three
+/// steps of iteration bring it.
+TextureLosses texture_losses(const GroupCells& group, GroupPictures pictures, float exponent);
 
 /// What the table's parts say of a sample, and what was measured.
 struct TogetherLoss {

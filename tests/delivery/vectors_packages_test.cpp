@@ -115,8 +115,6 @@ Json plane_tables(const PlaneTables& t, std::uint32_t plane) {
           {"budget_rungs", rd}};
 }
 
-Json parts_json(const TextureParts& parts) { return {{"coded", parts.coded}, {"coarser", parts.coarser}}; }
-
 Json planes_json(const std::vector<PlaneChoice>& planes) {
   Json shown = Json::array();
   for (const PlaneChoice& p : planes) shown.push_back({p.base, p.plane});
@@ -132,8 +130,8 @@ Json budgets(PackageReader& package, const ListOptions& options) {
                    {"group_weights", b.list.group_weights},
                    {"rungs", b.rungs},
                    {"bytes", b.bytes},
-                   {"parts", parts_json(b.parts)},
-                   {"texture_flip", texture_flip(package.quality(), b.parts)},
+                   {"losses", b.losses},
+                   {"texture_flip", texture_flip(package.quality(), b.losses)},
                    {"flip", b.flip}});
   }
   return out;
@@ -144,13 +142,14 @@ Json curves(const QualityTable& table, double displayed_px) {
   Json groups = Json::array(), scales = Json::array();
   for (const PlaneGroup group : {PlaneGroup::kColour, PlaneGroup::kNormal, PlaneGroup::kData}) {
     const GroupCurve curve(table, group, displayed_px);
-    Json coded = Json::array(), coarser = Json::array();
+    Json coded = Json::array(), mips = Json::array();
     for (const double dssim : {0.0, 1e-5, 0.001, 0.01, 0.07, 0.4, 1.9})
       for (const double growth : {0.0, -0.5, 1.25})
         coded.push_back({dssim, growth, curve.coded(dssim, {growth, growth / 2})});
-    for (const double growth : {-0.5, 0.0, 0.25, 1.0, 2.5, 7.0})
-      coarser.push_back({growth, curve.coarser({growth, growth / 2})});
-    groups.push_back({{"group", enum_name(group)}, {"dssim_growth_flip", coded}, {"growth_flip", coarser}});
+    for (const double growth : {-2.5, -0.5, 0.0, 0.25, 1.0, 2.5, 7.0})
+      for (const std::uint32_t mip : {0u, 1u, 3u})
+        mips.push_back({growth, mip, curve.halved({growth, growth / 2}, mip)});
+    groups.push_back({{"group", enum_name(group)}, {"dssim_growth_flip", coded}, {"growth_mip_flip", mips}});
   }
   for (const double scale : {0.0, 1.5, 4.0, 30.0})
     scales.push_back({scale, geometry_flip(table, displayed_px, scale)});
@@ -178,7 +177,6 @@ Json lists(PackageReader& package) {
                    {"fragments", fragments},
                    {"offers", offers_json(list.offers)},
                    {"preview_loss", list.preview_loss},
-                   {"coarser", list.coarser},
                    {"budgets", budgets(package, o)}});
   }
   return out;

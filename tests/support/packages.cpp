@@ -273,6 +273,7 @@ PackageParts make_package_parts() {
   const TextureLosses colours{{0.125f, 0.5f},
                               {{0.05f, 0.2f}, {0.1f, 0.4f}, {0.02f, 0.1f}},
                               {{0.2f}, {0.4f}, {0.1f}},
+                              {{0.04f, 0}, {0.08f, 0}, {0.02f, 0}},
                               {{0.1f}, {0.2f}, {0.05f}}};
   p.quality = {2, {256}, {0, 5}, {scales}, {{PlaneGroup::kColour, {colours}}}, 1, 0};
   p.provenance = make_provenance();

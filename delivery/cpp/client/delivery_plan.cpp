@@ -45,10 +45,10 @@ void rate_textures(PackageReader& package, const FragmentList& list, DeliveryPla
 }
 
 void predict(PackageReader& package, double displayed_px, const FragmentList& list, DeliveryPlan& plan) {
-  const TextureParts parts = parts_of(list, plan.textures.rungs);
+  const PerGroup losses = losses_of(list, plan.textures.rungs);
   plan.group_weights = list.group_weights;
-  plan.texture_flip = texture_flip(package.quality(), parts);
-  plan.flip = picture_flip(package.quality(), displayed_px, plan.scale, parts);
+  plan.texture_flip = texture_flip(package.quality(), losses);
+  plan.flip = picture_flip(package.quality(), displayed_px, plan.scale, losses);
 }
 
 /// Bytes of begin .. end behind those that the first request has brought.

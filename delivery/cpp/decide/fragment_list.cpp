@@ -31,12 +31,12 @@ void add_fragment(const PlaneTables& t, const TextureLoss::Plane& losses, const 
   const std::size_t fragments = t.fragment_count();
   bool shows_more = false;
   for (std::size_t way = 0; way <= t.rung_count(); ++way) {
-    const double coded = losses.coded[way * fragments + f];
-    o.loss.push_back(entry.group_weight * share * coded);
-    shows_more = shows_more || coded < losses.coded[f];
+    const double shown = losses.shown[way * fragments + f];
+    o.loss.push_back(entry.group_weight * share * shown);
+    shows_more = shows_more || shown < losses.shown[f];
   }
   if (!shows_more) {
-    list.preview_loss[static_cast<std::size_t>(entry.group)] += share * losses.coded[f];
+    list.preview_loss[static_cast<std::size_t>(entry.group)] += share * losses.shown[f];
     return;
   }
   o.eta *= o.loss[0] - *std::ranges::min_element(o.loss);
@@ -90,18 +90,17 @@ FragmentList fragment_list(TextureLoss& loss, const std::vector<PlaneChoice>& pl
     add_plane(loss, {p.plane, group, surface[g] > 0 ? surface[g] : 1, options.group_weights[g]}, options,
               list);
   }
-  list.coarser = loss.coarser(planes);
   return list;
 }
 
-TextureParts parts_of(const FragmentList& list, std::span<const std::int32_t> rungs) {
+PerGroup losses_of(const FragmentList& list, std::span<const std::int32_t> rungs) {
   PerGroup weighted{};
   for (std::size_t i = 0; i < list.offers.size(); ++i)
     weighted[static_cast<std::size_t>(list.groups[i])] +=
         list.offers[i].loss[static_cast<std::size_t>(rungs[i] + 1)];
-  TextureParts parts{list.preview_loss, list.coarser};
-  for (std::size_t g = 0; g < kPlaneGroups; ++g) parts.coded[g] += weighted[g] / list.group_weights[g];
-  return parts;
+  PerGroup losses = list.preview_loss;
+  for (std::size_t g = 0; g < kPlaneGroups; ++g) losses[g] += weighted[g] / list.group_weights[g];
+  return losses;
 }
 
 }  // namespace texmesh

@@ -17,8 +17,8 @@ struct ListedFragment {
 /// The F-list of a package at a scale: the stored fragments of all chosen planes in one list (thesis ch. 4).
 /// Fragments that look no better at any rung than in the preview (1 - SSIM of the tables) are left out.
 ///
-/// A fragment's losses are its part of what its group of planes loses in lit pictures of the display
-/// (TextureParts::coded), times the group's weight: share of the group's surface x FLIP of an object that
+/// A fragment's losses are its part of what its group of planes loses in lit pictures of the display,
+/// times the group's weight: share of the group's surface x FLIP of an object that
 /// looks all over like the fragment. Eta is feature density x what showing the fragment saves of that.
 struct FragmentList {
   std::vector<FragmentOffer> offers;
@@ -26,7 +26,6 @@ struct FragmentList {
   std::vector<PlaneGroup> groups;         // by offer
   PerGroup group_weights{1, 1, 1};        // ListOptions::group_weights
   PerGroup preview_loss{};                // of the fragments left out, as the preview shows them, unweighted
-  PerGroup coarser{};                     // TextureParts::coarser
 };
 
 struct ListOptions {
@@ -43,7 +42,7 @@ FragmentList fragment_list(PackageReader& package, const std::vector<PlaneChoice
 FragmentList fragment_list(TextureLoss& loss, const std::vector<PlaneChoice>& planes,
                            const ListOptions& options);
 
-/// What is lost where the offers have these rungs; -1 = skipped.
-TextureParts parts_of(const FragmentList& list, std::span<const std::int32_t> rungs);
+/// What each group loses where the offers have these rungs; -1 = skipped.
+PerGroup losses_of(const FragmentList& list, std::span<const std::int32_t> rungs);
 
 }  // namespace texmesh

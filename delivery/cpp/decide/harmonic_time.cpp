@@ -369,10 +369,12 @@ void HarmonicTimePlan::finish(HtcStep& step, double now_s, bool sample) {
   double first_issued_s = step.issued_s;
   for (const std::size_t i : waiting_) first_issued_s = std::min(first_issued_s, steps_[i].issued_s);
   std::erase(waiting_, step_of_offer_[step.offer]);
-  if (sample) throughput_.add(step.bytes, now_s - std::max(last_done_s_, first_issued_s + options_.rtt_s));
-  last_done_s_ = now_s;
   --in_flight_;
   in_flight_bytes_ -= step.bytes;
+  if (sample)
+    throughput_.add(step.bytes, now_s - std::max(last_done_s_, first_issued_s + options_.rtt_s),
+                    {in_flight_, in_flight_bytes_});
+  last_done_s_ = now_s;
   spread(step.residual_s);
 }
 

@@ -1,6 +1,8 @@
 #include "delivery/cpp/decide/texture_budget.h"
 
 #include <algorithm>
+#include <optional>
+#include <set>
 
 #include "format/base/portable_math.h"
 #include "format/rules/rate_distortion.h"
@@ -8,7 +10,8 @@
 namespace texmesh {
 namespace {
 
-constexpr int kMostCoarser = 4;  // levels below the display's that are tried
+constexpr int kMostCoarser = 4, kMostFiner = 4;  // levels beside the display's that are tried
+constexpr double kWorthwhileFlip = 1e-4;         // that finer planes must save
 constexpr int kReweightings = 2;
 constexpr double kLossUnit = 1099511627776.0;  // 2^40: losses as spend_bytes counts them
 constexpr double kLeastWeight = 1e-3;          // of a group beside the others
@@ -32,8 +35,8 @@ TextureBudget spend_on(TextureLoss& loss, std::vector<PlaneChoice> planes, const
     out.rungs.push_back(static_cast<std::int32_t>(ways[i]) - 1);
     out.bytes += curves[i].bytes[ways[i]];
   }
-  out.parts = parts_of(out.list, out.rungs);
-  out.flip = picture_flip(loss.package().quality(), options.displayed_px, options.scale, out.parts);
+  out.losses = losses_of(out.list, out.rungs);
+  out.flip = picture_flip(loss.package().quality(), options.displayed_px, options.scale, out.losses);
   out.planes = std::move(planes);
   return out;
 }
@@ -43,21 +46,73 @@ PerGroup slopes(const QualityTable& table, const TextureBudget& at) {
   PerGroup slopes{1, 1, 1};
   for (std::size_t g = 0; g < kPlaneGroups; ++g)
     if (at.flip > 0)
-      slopes[g] = std::max(kLeastWeight, portable::pow(std::max(at.parts.coded[g] / at.flip, 1e-9),
+      slopes[g] = std::max(kLeastWeight, portable::pow(std::max(at.losses[g] / at.flip, 1e-9),
                                                        static_cast<double>(table.exponent) - 1));
   return slopes;
 }
 
-/// Of all groups together, then of each that the package has.
-std::vector<Levels> coarser_steps(const PerGroup& surface) {
-  std::vector<Levels> steps{{1, 1, 1}};
-  for (std::size_t g = 0; g < kPlaneGroups; ++g) {
-    Levels step{};
-    step[g] = 1;
-    if (surface[g] > 0) steps.push_back(step);
+/// One level coarser, of all groups together, then of each that the package has; then one level finer.
+std::vector<Levels> level_steps(const PerGroup& surface) {
+  std::vector<Levels> steps;
+  for (const int by : {1, -1}) {
+    steps.push_back({by, by, by});
+    for (std::size_t g = 0; g < kPlaneGroups; ++g) {
+      Levels step{};
+      step[g] = by;
+      if (surface[g] > 0) steps.push_back(step);
+    }
   }
   return steps;
 }
+
+/// Planes of groups and the levels that they stand for. Levels beyond the ladder's ends stand for the same
+/// planes.
+class LevelSearch {
+ public:
+  LevelSearch(TextureLoss& loss, const ListOptions& options, std::uint64_t bytes)
+      : loss_(loss), options_(options), bytes_(bytes) {
+    best_ = *spend({});
+  }
+
+  /// Downhill: the best of all steps, until none is better.
+  TextureBudget find() {
+    const std::vector<Levels> steps = level_steps(loss_.weights(best_.planes));
+    for (bool better = true; better;) {
+      better = false;
+      const Levels from = at_;
+      for (const Levels& step : steps) better = take(from, step) || better;
+    }
+    return std::move(best_);
+  }
+
+ private:
+  bool take(const Levels& from, const Levels& step) {
+    Levels to = from;
+    for (std::size_t g = 0; g < kPlaneGroups; ++g) to[g] += step[g];
+    if (std::ranges::max(to) > kMostCoarser || std::ranges::min(to) < -kMostFiner) return false;
+    std::optional<TextureBudget> now = spend(to);
+    const double most = best_.flip - (std::ranges::min(step) < 0 ? kWorthwhileFlip : 0);
+    if (!now || now->flip >= most) return false;
+    best_ = std::move(*now);
+    at_ = to;
+    return true;
+  }
+  /// Nothing where these planes were tried.
+  std::optional<TextureBudget> spend(const Levels& levels) {
+    std::vector<PlaneChoice> planes = planes_for_display(loss_.package(), options_.displayed_px, levels);
+    std::vector<std::uint32_t> shown;
+    for (const PlaneChoice& p : planes) shown.push_back(p.plane);
+    if (!tried_.insert(std::move(shown)).second) return std::nullopt;
+    return spend_on(loss_, std::move(planes), options_, bytes_);
+  }
+
+  TextureLoss& loss_;
+  const ListOptions& options_;
+  std::uint64_t bytes_;
+  Levels at_{};
+  TextureBudget best_;
+  std::set<std::vector<std::uint32_t>> tried_;
+};
 
 }  // namespace
 
@@ -68,26 +123,7 @@ TextureBudget texture_for_budget(PackageReader& package, const ListOptions& opti
 
 TextureBudget texture_for_budget(TextureLoss& loss, const ListOptions& options, std::uint64_t bytes) {
   PackageReader& package = loss.package();
-  const auto spend = [&](const Levels& levels) {
-    return spend_on(loss, planes_coarser(package, options.displayed_px, levels), options, bytes);
-  };
-  Levels at{};
-  TextureBudget best = spend(at);
-  const std::vector<Levels> steps = coarser_steps(loss.weights(best.planes));
-  for (bool better = true; better;) {  // downhill; every step makes something coarser
-    better = false;
-    const Levels from = at;
-    for (const Levels& step : steps) {
-      Levels to = from;
-      for (std::size_t g = 0; g < kPlaneGroups; ++g) to[g] += step[g];
-      if (std::ranges::max(to) > kMostCoarser) continue;
-      TextureBudget now = spend(to);
-      if (now.flip >= best.flip) continue;
-      best = std::move(now);
-      at = to;
-      better = true;
-    }
-  }
+  TextureBudget best = LevelSearch(loss, options, bytes).find();
   ListOptions weighted = options;
   for (int i = 0; i < kReweightings && package.quality().exponent > 1; ++i) {
     weighted.group_weights = slopes(package.quality(), best);

@@ -12,13 +12,14 @@ struct TextureBudget {
   FragmentList list;
   std::vector<std::int32_t> rungs;  // by offer; -1 = skipped
   std::uint64_t bytes = 0;          // of fragments, at most the budget
-  TextureParts parts;               // what is lost
+  PerGroup losses{};                // of each group by itself
   double flip = 0;                  // of the picture with the scale
 };
 
-/// Chooses between the planes for the display and their mips, so that few bytes are not spread over too many
-/// texels, and spends the bytes on fragments by rate and distortion (spend_bytes). What counts is the FLIP
-/// that is predicted of the picture with ListOptions::scale.
+/// Chooses between the planes for the display and coarser and finer ones, so that few bytes are not spread
+/// over too many texels, and bytes that are left show what a mean of texels per pixel hides. Spends the bytes
+/// on fragments by rate and distortion (spend_bytes). What counts is the FLIP that is predicted of the
+/// picture with ListOptions::scale. Finer planes, which take memory, must look better, not only as good.
 ///
 /// Bytes are first spent by the sum of the groups' losses (ListOptions::group_weights = 1). Losses add up as
 /// QualityTable::exponent says, so the groups' weights become those of that sum's slope where the bytes were

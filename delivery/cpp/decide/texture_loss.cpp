@@ -26,13 +26,10 @@ double level_for_display(PackageReader& package, std::uint32_t base, double disp
   return std::max(0.0, signed_level(package, base, displayed_px));
 }
 
-double combined(const QualityTable& table, double geometry, const TextureParts& parts) {
-  std::vector<double> losses{geometry};
-  for (std::size_t g = 0; g < kPlaneGroups; ++g) {
-    losses.push_back(parts.coded[g]);
-    losses.push_back(parts.coarser[g]);
-  }
-  return combined_flip(table, losses);
+double combined(const QualityTable& table, double geometry, const PerGroup& losses) {
+  std::vector<double> all{geometry};
+  all.insert(all.end(), losses.begin(), losses.end());
+  return combined_flip(table, all);
 }
 
 }  // namespace
@@ -43,8 +40,8 @@ std::vector<PlaneChoice> full_size(PackageReader& package) {
   return planes;
 }
 
-std::vector<PlaneChoice> planes_coarser(PackageReader& package, double displayed_px,
-                                        const std::array<int, kPlaneGroups>& levels) {
+std::vector<PlaneChoice> planes_for_display(PackageReader& package, double displayed_px,
+                                            const std::array<int, kPlaneGroups>& levels) {
   std::vector<PlaneChoice> planes = full_size(package);
   for (PlaneChoice& choice : planes) {
     const auto group = static_cast<std::size_t>(group_of(package.textures()[choice.base].role));
@@ -54,16 +51,10 @@ std::vector<PlaneChoice> planes_coarser(PackageReader& package, double displayed
   return planes;
 }
 
-std::vector<PlaneChoice> planes_for_display(PackageReader& package, double displayed_px) {
-  return planes_coarser(package, displayed_px, {});
-}
+double texture_flip(const QualityTable& table, const PerGroup& losses) { return combined(table, 0, losses); }
 
-double texture_flip(const QualityTable& table, const TextureParts& parts) {
-  return combined(table, 0, parts);
-}
-
-double picture_flip(const QualityTable& table, double displayed_px, int scale, const TextureParts& parts) {
-  return combined(table, geometry_flip(table, displayed_px, scale), parts);
+double picture_flip(const QualityTable& table, double displayed_px, int scale, const PerGroup& losses) {
+  return combined(table, geometry_flip(table, displayed_px, scale), losses);
 }
 
 TextureLoss::TextureLoss(PackageReader& package, double displayed_px)
@@ -124,15 +115,18 @@ const TextureLoss::Plane& TextureLoss::plane(std::uint32_t plane) {
   const TexelGrowth growth = this->growth(plane);
   const std::size_t fragments = t.fragment_count();
   out.weights = surface_weights(t);
-  out.coded.resize((t.rung_count() + 1) * fragments);
+  out.shown.resize((t.rung_count() + 1) * fragments);
+  const double mip = curve.halved(growth, package_.textures()[plane].mip);
   const double mean = preview_mean(plane), preview = preview_loss(plane);
   for (const std::uint16_t f : t.order) {
     out.weight += static_cast<double>(out.weights[f]);
-    out.coded[f] =
+    out.shown[f] =
         mean > 0 ? std::min(1.0, preview * (curve.coded(static_cast<double>(t.skip_dssim[f])) / mean)) : 0;
-    for (std::size_t r = 0; r < t.rung_count(); ++r)
-      out.coded[(r + 1) * fragments + f] =
-          curve.coded(static_cast<double>(t.dssim[r * fragments + f]), growth);
+    for (std::size_t r = 0; r < t.rung_count(); ++r) {
+      const double coded = curve.coded(static_cast<double>(t.dssim[r * fragments + f]), growth);
+      out.shown[(r + 1) * fragments + f] =
+          mip > 0 ? combined_flip(package_.quality(), std::array{coded, mip}) : coded;
+    }
   }
   return out;
 }
@@ -155,18 +149,6 @@ TexelGrowth TextureLoss::growth(std::uint32_t plane) {
     out[i] = here - (textures[plane_at_level(textures, base, level)].mip - level);
   }
   return out;
-}
-
-PerGroup TextureLoss::coarser(const std::vector<PlaneChoice>& planes) {
-  PerGroup loss{}, weights = this->weights(planes);
-  for (const PlaneChoice& p : planes) {
-    const auto group = static_cast<std::size_t>(group_of(p.plane));
-    if (!(weights[group] > 0)) continue;
-    TexelGrowth halvings = growth(p.plane);  // a plane of full size has lost none
-    for (double& h : halvings) h = std::min(h, static_cast<double>(package_.textures()[p.plane].mip));
-    loss[group] += plane(p.plane).weight / weights[group] * curves_[group].coarser(halvings);
-  }
-  return loss;
 }
 
 }  // namespace texmesh

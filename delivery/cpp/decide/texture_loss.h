@@ -19,25 +19,19 @@ struct PlaneChoice {
 std::vector<PlaneChoice> full_size(PackageReader& package);
 /// The smallest mips that still have a texel for every pixel where the object is displayed `displayed_px`
 /// high (device pixels): by the texels and the share of the surface of each texture, and the surface that the
-/// object shows at most. A finer mip is never chosen, however many bytes are left.
-std::vector<PlaneChoice> planes_for_display(PackageReader& package, double displayed_px);
+/// object shows at most. That is a mean: where texels are dense in one place and sparse in another, finer
+/// mips still show more. Each group's planes are `levels` coarser than that, or finer where below 0, as far
+/// as there are any.
+std::vector<PlaneChoice> planes_for_display(PackageReader& package, double displayed_px,
+                                            const std::array<int, kPlaneGroups>& levels = {});
 
 /// A number for each group of planes, by PlaneGroup.
 using PerGroup = std::array<double, kPlaneGroups>;
-/// The same, with each group's planes so many mips coarser than planes_for_display(), as far as there are
-/// any.
-std::vector<PlaneChoice> planes_coarser(PackageReader& package, double displayed_px,
-                                        const std::array<int, kPlaneGroups>& levels);
 
-/// What textures lose in lit pictures: FLIP of each group by itself, on S_0.
-struct TextureParts {
-  PerGroup coded{};    // because of their rungs
-  PerGroup coarser{};  // because their mips are coarser than those for the display
-};
 /// FLIP of the textures alone, and of a scale with them: 0 = equal to S_0 with the source's texels, 1 = as
-/// different as can be.
-double texture_flip(const QualityTable& table, const TextureParts& parts);
-double picture_flip(const QualityTable& table, double displayed_px, int scale, const TextureParts& parts);
+/// different as can be. `losses`: what the textures of each group lose by themselves, on S_0.
+double texture_flip(const QualityTable& table, const PerGroup& losses);
+double picture_flip(const QualityTable& table, double displayed_px, int scale, const PerGroup& losses);
 
 /// What fragments lose in lit pictures of one displayed height, by the package's quality table.
 class TextureLoss {
@@ -49,14 +43,14 @@ class TextureLoss {
   struct Plane {
     std::vector<float> weights;  // [F] surface_weights()
     double weight = 0;           // of the stored fragments together
-    std::vector<double> coded;   // [(rungs + 1) * F], index way * F + fragment; way 0 shows the preview
+    /// [(rungs + 1) * F], index way * F + fragment; way 0 shows the preview, others lose by their mip and
+    /// by their rung.
+    std::vector<double> shown;
   };
   PlaneGroup group_of(std::uint32_t plane) const;
   const Plane& plane(std::uint32_t plane);
   /// The weight of each group's stored fragments.
   PerGroup weights(const std::vector<PlaneChoice>& planes);
-  /// TextureParts::coarser, as the mean over each group's surface.
-  PerGroup coarser(const std::vector<PlaneChoice>& planes);
   /// How much larger the plane's texels are at this height than those that the quality table sampled.
   TexelGrowth growth(std::uint32_t plane);
   double displayed_px() const { return displayed_px_; }

@@ -9,19 +9,26 @@ constexpr double kLeastSeconds = 1e-9;
 }  // namespace
 
 Throughput::Throughput(const ThroughputOptions& options)
-    : options_(options), ring_(kRing), ewma_(options.initial_bytes_s) {}
+    : options_(options),
+      ring_(kRing),
+      ewma_(options.initial_bytes_s),
+      start_bytes_s_(options.initial_bytes_s) {}
 
-void Throughput::add(double bytes, double seconds) {
+void Throughput::add(double bytes, double seconds, const OtherTransfers& others) {
   const Sample sample{bytes, std::max(seconds, kLeastSeconds)};
   ring_[count_++ % kRing] = sample;
   const Sample before = sums_.empty() ? Sample{} : sums_.back();
   sums_.push_back({before.bytes + sample.bytes, before.seconds + sample.seconds});
+  starting_ = starting_ && count_ <= others.count;
+  const Sample all = sums_.back();
+  start_bytes_s_ =
+      std::clamp(options_.initial_bytes_s, all.bytes / all.seconds, (all.bytes + others.bytes) / all.seconds);
   const double weight = options_.ewma * std::min(1.0, bytes / options_.small_bytes);
   ewma_ += weight * (sample.bytes / sample.seconds - ewma_);
 }
 
 double Throughput::bytes_s() const {
-  if (count_ == 0) return options_.initial_bytes_s;
+  if (starting_) return start_bytes_s_;
   switch (options_.estimator) {
     case Estimator::kLast:
       return recent_bytes_s(1);
@@ -35,7 +42,7 @@ double Throughput::bytes_s() const {
 
 double Throughput::recent_bytes_s(std::size_t samples) const {
   const std::size_t n = std::min({samples, count_, kRing});
-  if (n == 0) return options_.initial_bytes_s;
+  if (n == 0 || starting_) return start_bytes_s_;
   double bytes = 0, seconds = 0;
   for (std::size_t i = 1; i <= n; ++i) {
     const Sample& s = ring_[(count_ - i) % kRing];

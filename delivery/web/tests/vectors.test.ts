@@ -148,11 +148,12 @@ function checkTables(table: t.PlaneTables, v: Json): void {
 }
 
 function checkCurves(quality: t.QualityTable, displayedPx: number, v: Json): void {
-  for (const { group, dssim_growth_flip, growth_flip } of v.groups) {
+  for (const { group, dssim_growth_flip, growth_mip_flip } of v.groups) {
     const curve = new t.GroupCurve(quality, group, displayedPx);
     for (const [dssim, growth, flip] of dssim_growth_flip)
       expectBits([curve.coded(dssim, [growth, growth / 2])], [flip], `${group} of ${dssim}, ${growth} doublings`);
-    for (const [growth, flip] of growth_flip) expectBits([curve.coarser([growth, growth / 2])], [flip], `${group}, ${growth} doublings`);
+    for (const [growth, mip, flip] of growth_mip_flip)
+      expectBits([curve.halved([growth, growth / 2], mip)], [flip], `${group}, ${growth} doublings, mip ${mip}`);
   }
   for (const [scale, flip] of v.scale_flip) expectBits([t.geometryFlip(quality, displayedPx, scale)], [flip], `scale ${scale}`);
 }
@@ -169,15 +170,15 @@ async function checkList(reader: t.PackageReader, v: Json): Promise<void> {
     for (const name of Object.keys(o))
       expectBits([(list.offers[i] as Json)[name]].flat(), [o[name]].flat(), `offer ${i}: ${name}`);
   });
-  expectBits([...list.previewLoss, ...list.coarser], [...v.preview_loss, ...v.coarser], 'losses');
+  expectBits(list.previewLoss, v.preview_loss, 'losses');
   for (const b of v.budgets) {
     const budget = t.textureForBudget(data, displayedPx, { scale: v.scale }, b.budget_bytes);
     const what = `budget of ${b.budget_bytes}`;
     expect(budget.planes.map((p) => [p.base, p.plane])).toEqual(b.planes);
     expectBits(budget.list.groupWeights, b.group_weights, what);
     expectBits(budget.rungs, b.rungs, what);
-    expectBits([...budget.parts.coded, ...budget.parts.coarser], [...b.parts.coded, ...b.parts.coarser], what);
-    expectBits([budget.bytes, t.textureFlip(data.quality, budget.parts), budget.flip], [b.bytes, b.texture_flip, b.flip], what);
+    expectBits(budget.losses, b.losses, what);
+    expectBits([budget.bytes, t.textureFlip(data.quality, budget.losses), budget.flip], [b.bytes, b.texture_flip, b.flip], what);
   }
 }
 

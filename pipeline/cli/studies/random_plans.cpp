@@ -45,7 +45,7 @@ DeliveryPlan drawn_link(PackageReader& package, Random& random, DeliveryRequest&
 DeliveryPlan drawn_mix(PackageReader& package, Random& random, DeliveryRequest& request) {
   std::array<int, kPlaneGroups> levels{};
   for (int& level : levels) level = static_cast<int>(random.below(3));
-  const std::vector<PlaneChoice> planes = planes_coarser(package, request.displayed_px, levels);
+  const std::vector<PlaneChoice> planes = planes_for_display(package, request.displayed_px, levels);
   ListOptions options;
   options.scale = request.scale;
   options.displayed_px = request.displayed_px;
@@ -70,9 +70,9 @@ DeliveryPlan plan_of(PackageReader& package, const DeliveryRequest& request, int
   const FragmentList list = list_of(package, request, plan);
   for (std::size_t i = 0; i < rungs.size(); ++i)
     if (rungs[i] >= 0) plan.texture_bytes += list.offers[i].bytes[static_cast<std::size_t>(rungs[i])];
-  const TextureParts parts = parts_of(list, rungs);
-  plan.texture_flip = texture_flip(package.quality(), parts);
-  plan.flip = picture_flip(package.quality(), request.displayed_px, scale, parts);
+  const PerGroup losses = losses_of(list, rungs);
+  plan.texture_flip = texture_flip(package.quality(), losses);
+  plan.flip = picture_flip(package.quality(), request.displayed_px, scale, losses);
   return plan;
 }
 

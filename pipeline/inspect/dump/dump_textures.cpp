@@ -116,6 +116,8 @@ std::string groups_text(const QualityTable& q) {
       for (std::size_t k = 0; k < t.texel_dssim.size(); ++k)
         add(group, q.sizes_px[i], {"coded", fraction(t.texel_dssim[k])}, t.coded, k);
       add(group, q.sizes_px[i], {"previews", ""}, t.preview, 0);
+      for (std::size_t l = 0; l < t.finer.size(); ++l)
+        add(group, q.sizes_px[i], {l == 0 ? "mips" : fmt::format("{} mips finer", l), ""}, t.finer, l);
       for (std::size_t l = 0; l < t.coarser.size(); ++l)
         add(group, q.sizes_px[i], {fmt::format("{} mips coarser", l + 1), ""}, t.coarser, l);
     }

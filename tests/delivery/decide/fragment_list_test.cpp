@@ -53,23 +53,22 @@ TEST(FragmentList, LeavesToThePreviewWhatNoRungShowsBetter) {
 
   const TextureBudget budget = texture_for_budget(package, {}, 1 << 20);
   EXPECT_EQ(budget.rungs, std::vector<std::int32_t>{0}) << "the upper rung shows no more";
-  EXPECT_NEAR(budget.parts.coded[0], kLarger * curve.coded(0.25) * w[0] / all + list.preview_loss[0], 1e-6);
-  EXPECT_EQ(budget.flip, combined_flip(package.quality(), budget.parts.coded)) << "S_0 loses nothing";
+  EXPECT_NEAR(budget.losses[0], kLarger * curve.coded(0.25) * w[0] / all + list.preview_loss[0], 1e-6);
+  EXPECT_EQ(budget.flip, combined_flip(package.quality(), budget.losses)) << "S_0 loses nothing";
 }
 
 TEST(FragmentList, OffersAddUpToWhatTheGroupLoses) {
   PackageReader package = open_with({0.5f, 0.5f, 0.5f, 0});
   const FragmentList list = fragment_list(package, full_size(package), {});
   const GroupCurve curve(package.quality(), PlaneGroup::kColour, 1000);
-  EXPECT_NEAR(parts_of(list, std::vector<std::int32_t>{-1, -1, -1}).coded[0], kLarger * curve.coded(0.5),
-              1e-6);
-  EXPECT_NEAR(parts_of(list, std::vector<std::int32_t>{1, 1, 1}).coded[0], kLarger * curve.coded(0.25), 1e-6);
+  EXPECT_NEAR(losses_of(list, std::vector<std::int32_t>{-1, -1, -1})[0], kLarger * curve.coded(0.5), 1e-6);
+  EXPECT_NEAR(losses_of(list, std::vector<std::int32_t>{1, 1, 1})[0], kLarger * curve.coded(0.25), 1e-6);
 
   ListOptions light;
   light.group_weights = {0.5, 1, 1};
   const FragmentList half = fragment_list(package, full_size(package), light);
   EXPECT_NEAR(half.offers[0].loss[0], list.offers[0].loss[0] / 2, 1e-12);
-  EXPECT_NEAR(parts_of(half, std::vector<std::int32_t>{1, 1, 1}).coded[0], kLarger * curve.coded(0.25), 1e-6)
+  EXPECT_NEAR(losses_of(half, std::vector<std::int32_t>{1, 1, 1})[0], kLarger * curve.coded(0.25), 1e-6)
       << "weights change what is bought, not what is lost";
 }
 

@@ -112,6 +112,22 @@ TEST(HarmonicTime, MeetsItsLimitOnAnySteadyLink) {
   }
 }
 
+TEST(HarmonicTime, TheFirstOfTwoInFlightSaysNothingAgainstTheLink) {
+  const std::vector<FragmentOffer> offers = some_offers(40);
+  HtcOptions o;
+  o.time_limit_s = 10;
+  o.throughput.initial_bytes_s = planned(offers) / 10;
+  HarmonicTimePlan plan(offers, o);
+  const HtcStep first = *plan.next(0);
+  const HtcStep second = *plan.next(0);
+  ASSERT_EQ(plan.next(0), nullptr);
+  // Both have half of the link.
+  const double smaller = std::min(first.bytes, second.bytes);
+  plan.completed(first.bytes < second.bytes ? first.offer : second.offer,
+                 2 * smaller / o.throughput.initial_bytes_s);
+  EXPECT_DOUBLE_EQ(plan.throughput_bytes_s(), o.throughput.initial_bytes_s);
+}
+
 TEST(HarmonicTime, ATenfoldDropIsMetByTheBottomOfTheLadderAndSkips) {
   const std::vector<FragmentOffer> offers = some_offers(256);
   const double limit = planned(offers) / 1e4;

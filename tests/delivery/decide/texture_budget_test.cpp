@@ -29,9 +29,12 @@ PackageReader open_pair(float normal_part, float exponent = 1) {
   parts.manifest.plane_count = 2;
   parts.quality.exponent = exponent;
   parts.quality.sizes_px = {1000};
-  const TextureLosses colour{{0.0625f, 0.5f}, losses({0.05f, 0.4f}), losses({0.4f}), {}};
-  const TextureLosses normal{
-      {0.0625f, 0.5f}, losses({0.05f * normal_part, 0.4f * normal_part}), losses({0.4f * normal_part}), {}};
+  const TextureLosses colour{{0.0625f, 0.5f}, losses({0.05f, 0.4f}), losses({0.4f}), {}, {}};
+  const TextureLosses normal{{0.0625f, 0.5f},
+                             losses({0.05f * normal_part, 0.4f * normal_part}),
+                             losses({0.4f * normal_part}),
+                             {},
+                             {}};
   parts.quality.groups = {{PlaneGroup::kColour, {colour}}, {PlaneGroup::kNormal, {normal}}};
   return PackageReader(open_container(memory_source(parts.build())));
 }
@@ -86,7 +89,7 @@ TEST(TextureBudget, AnExponentWeighsGroupsByTheirSlopes) {
     return texture_for_budget(linear, alike, half_of_all(linear));
   }();
   EXPECT_EQ(sum.list.group_weights, (PerGroup{1, 1, 1}));
-  EXPECT_LE(budget.flip, picture_flip(package.quality(), alike.displayed_px, 0, sum.parts) + 1e-12)
+  EXPECT_LE(budget.flip, picture_flip(package.quality(), alike.displayed_px, 0, sum.losses) + 1e-12)
       << "never worse than bytes spent by the plain sum";
 }
 
@@ -96,7 +99,7 @@ TEST(TextureBudget, PictureAddsTheScale) {
   coarse.scale = 5;
   const TextureBudget budget = texture_for_budget(package, coarse, 1 << 20);
   const QualityTable& table = package.quality();
-  const double texture = texture_flip(table, budget.parts), scale = geometry_flip(table, 1000, 5);
+  const double texture = texture_flip(table, budget.losses), scale = geometry_flip(table, 1000, 5);
   EXPECT_NEAR(budget.flip * budget.flip, texture * texture + scale * scale, 1e-12);
 }
 

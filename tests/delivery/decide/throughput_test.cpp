@@ -20,6 +20,20 @@ TEST(Throughput, IsBeta0UntilThereIsASample) {
   }
 }
 
+TEST(Throughput, WhatElseIsUnderWayHasItsPartOfTheFirstSeconds) {
+  for (const Estimator e : {Estimator::kLast, Estimator::kHarmonic, Estimator::kEwma}) {
+    // Two of 500 bytes share a link: after a second one has ended, and nearly all of the other has come.
+    for (const auto& [beta0, estimate] : {std::pair{100, 500}, {800, 800}, {5000, 1000}}) {
+      Throughput t({e, 2, 0.5, 100, static_cast<double>(beta0)});
+      t.add(500, 1, {1, 500});
+      EXPECT_EQ(t.bytes_s(), estimate);
+      EXPECT_EQ(t.recent_bytes_s(10), estimate);
+      t.add(500, 0.25, {1, 700});
+      EXPECT_EQ(t.recent_bytes_s(10), 800) << "more have ended than are under way";
+    }
+  }
+}
+
 TEST(Throughput, EstimatorsWeighSamplesAsTheySay) {
   EXPECT_DOUBLE_EQ(of({{500, 1}, {900, 3}}, Estimator::kLast).bytes_s(), 300);
   EXPECT_DOUBLE_EQ(of({{9, 9}, {500, 1}, {900, 3}}, Estimator::kHarmonic).bytes_s(), 350);

@@ -19,8 +19,9 @@ PictureLosses losses(std::vector<float> flip) { return {flip, flip, flip}; }
 QualityTable make_table() {
   QualityTable t{6, {64, 256}, {0, 4, 9}, {}, {}, 1.5f, 0.0625f};
   t.geometry = {losses({0, 0.1f, 0.2f}), losses({0, 0.125f, 0.3f})};
-  const TextureLosses small{{0.01f, 0.1f}, losses({0.02f, 0.07f}), losses({0.06f}), losses({0.05f})};
-  const TextureLosses large{{0.02f, 0.2f}, losses({0.03f, 0.09f}), losses({0.08f}), losses({})};
+  const TextureLosses small{
+      {0.01f, 0.1f}, losses({0.02f, 0.07f}), losses({0.06f}), losses({0.02f, 0.01f, 0}), losses({0.05f})};
+  const TextureLosses large{{0.02f, 0.2f}, losses({0.03f, 0.09f}), losses({0.08f}), losses({}), losses({})};
   t.groups = {{PlaneGroup::kColour, {small, large}}, {PlaneGroup::kData, {large, small}}};
   return t;
 }

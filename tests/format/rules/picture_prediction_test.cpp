@@ -13,10 +13,16 @@ PictureLosses losses(std::vector<float> flip) { return {flip, flip, flip}; }
 QualityTable make_table(float exponent = 1) {
   QualityTable t{1, {64, 1024}, {0, 4, 8}, {}, {}, exponent, 0};
   t.geometry = {losses({0, 0.125f, 0.25f}), losses({0, 0.25f, 0.5f})};
-  const TextureLosses small{
-      {0.015625f, 0.25f}, losses({0.03125f, 0.125f}), losses({0.125f}), losses({0.0625f, 0.125f})};
-  const TextureLosses large{
-      {0.015625f, 0.25f}, losses({0.0625f, 0.25f}), losses({0.375f}), losses({0.125f, 0.25f})};
+  const TextureLosses small{{0.015625f, 0.25f},
+                            losses({0.03125f, 0.125f}),
+                            losses({0.125f}),
+                            losses({0.03125f, 0.015625f, 0}),
+                            losses({0.0625f, 0.125f})};
+  const TextureLosses large{{0.015625f, 0.25f},
+                            losses({0.0625f, 0.25f}),
+                            losses({0.375f}),
+                            losses({0.0625f, 0.03125f, 0}),
+                            losses({0.125f, 0.25f})};
   t.groups = {{PlaneGroup::kColour, {small, large}}};
   return t;
 }
@@ -28,16 +34,20 @@ TEST(GroupCurve, GoesThroughTheSamples) {
   EXPECT_NEAR(at64.coded(0.25), 0.125, 1e-12);
   EXPECT_NEAR(at1024.coded(0.25), 0.25, 1e-12);
   EXPECT_NEAR(at64.coded(0.0625), 0.0625, 1e-12) << "half the way in logarithms";
-  EXPECT_EQ(at64.coarser({1, 1}), 0.0625);
-  EXPECT_EQ(at64.coarser({1.5, 1.5}), 0.09375);
-  EXPECT_EQ(at64.coarser({3, 3}), 0.125) << "the last level's";
+  EXPECT_EQ(at64.halved({0, 0}, 4), 0.03125);
+  EXPECT_EQ(at64.halved({-1, -1}, 4), 0.015625);
+  EXPECT_EQ(at64.halved({-2, -2}, 4), 0);
+  EXPECT_EQ(at64.halved({-9, -9}, 4), 0) << "the finest level's";
+  EXPECT_EQ(at64.halved({1, 1}, 4), 0.0625);
+  EXPECT_EQ(at64.halved({1.5, 1.5}, 4), 0.09375);
+  EXPECT_EQ(at64.halved({3, 3}, 8), 0.125) << "the last level's";
 }
 
 TEST(GroupCurve, NothingLostIsNothing) {
   const GroupCurve curve(make_table(), PlaneGroup::kColour, 300);
   EXPECT_EQ(curve.coded(0), 0);
-  EXPECT_EQ(curve.coarser({0, 0}), 0);
-  EXPECT_EQ(curve.coarser({-1, -2}), 0) << "finer mips lose nothing";
+  for (const double growth : {-3.0, 0.0, 2.0})
+    EXPECT_EQ(curve.halved({growth, growth}, 0), 0) << "full size is the source's";
   EXPECT_EQ(curve.coded(0, {3, 3}), 0);
 }
 
@@ -53,9 +63,14 @@ TEST(GroupCurve, RisesWithDssimAndLevels) {
       before = now;
     }
     before = 0;
-    for (double level = 0; level < 10; level += 0.125) {
-      EXPECT_GE(curve.coarser({level, level}), before);
-      before = curve.coarser({level, level});
+    for (double level = -4; level < 10; level += 0.125) {
+      EXPECT_GE(curve.halved({level, level}, 20), before);
+      before = curve.halved({level, level}, 20);
+    }
+    before = 0;
+    for (std::uint32_t mip = 0; mip < 8; ++mip) {
+      EXPECT_GE(curve.halved({0.5, 0.5}, mip), before) << "of more texels less is lost";
+      before = curve.halved({0.5, 0.5}, mip);
     }
   }
 }
@@ -63,7 +78,7 @@ TEST(GroupCurve, RisesWithDssimAndLevels) {
 TEST(GroupCurve, HeightsBetweenAreLinearInTheLogarithm) {
   const QualityTable t = make_table();
   EXPECT_NEAR(GroupCurve(t, PlaneGroup::kColour, 256).coded(0.25), (0.125 + 0.25) / 2, 1e-12);
-  EXPECT_NEAR(GroupCurve(t, PlaneGroup::kColour, 256).coarser({1, 1}), (0.0625 + 0.125) / 2, 1e-12);
+  EXPECT_NEAR(GroupCurve(t, PlaneGroup::kColour, 256).halved({1, 1}, 4), (0.0625 + 0.125) / 2, 1e-12);
   EXPECT_NEAR(GroupCurve(t, PlaneGroup::kColour, 8).coded(0.25), 0.125, 1e-12) << "the nearest height";
   EXPECT_NEAR(GroupCurve(t, PlaneGroup::kColour, 9999).coded(0.25), 0.25, 1e-12);
 }
@@ -73,11 +88,12 @@ TEST(GroupCurve, LargerTexelsLoseMore) {
   constexpr double k = GroupCurve::kLossPerDoubling;
   const GroupCurve at64(t, PlaneGroup::kColour, 64), between(t, PlaneGroup::kColour, 256);
   EXPECT_NEAR(at64.coded(0.015625, {1, 1}), k * 0.03125, 1e-12);
-  EXPECT_NEAR(at64.coded(0.015625, {-1, -1}), 0.03125 / k, 1e-12);
+  EXPECT_NEAR(at64.coded(0.015625, {-1, -1}), 0.03125 / GroupCurve::kLossPerHalving, 1e-12);
   EXPECT_NEAR(at64.coded(0.015625, {2, 2}), k * k * 0.03125, 1e-12);
   EXPECT_EQ(at64.coded(0.25, {20, 20}), 1) << "as different as can be";
   EXPECT_NEAR(between.coded(0.25, {1, 0}), (k * 0.125 + 0.25) / 2, 1e-12) << "each height has its own";
-  EXPECT_NEAR(between.coarser({1, 0}), 0.0625 / 2, 1e-12);
+  EXPECT_NEAR(between.halved({1, 0}, 4), (0.0625 + 0.0625) / 2, 1e-12);
+  EXPECT_NEAR(between.halved({1, 0}, 1), (0.03125 + 0.03125) / 2, 1e-12) << "less than full size loses";
 }
 
 TEST(GroupCurve, PreviewsAreThoseOfTheHeight) {
@@ -105,15 +121,15 @@ TEST(GroupCurve, GroupsThatTheTableDoesNotHaveLoseTheirTexels) {
   const GroupCurve curve(make_table(), PlaneGroup::kNormal, 300);
   EXPECT_EQ(curve.coded(0.375), 0.375);
   EXPECT_EQ(curve.coded(1.5), 1);
-  EXPECT_EQ(curve.coarser({2, 2}), 0);
+  EXPECT_EQ(curve.halved({2, 2}, 2), 0);
 }
 
 TEST(GroupCurve, OneSampleIsALine) {
   QualityTable t = make_table();
-  for (TextureLosses& l : t.groups[0].sizes) l = {{0.25f}, losses({0.125f}), losses({0}), {}};
+  for (TextureLosses& l : t.groups[0].sizes) l = {{0.25f}, losses({0.125f}), losses({0}), {}, {}};
   const GroupCurve curve(t, PlaneGroup::kColour, 64);
   EXPECT_NEAR(curve.coded(0.25), 0.125, 1e-12);
-  EXPECT_NEAR(curve.coded(0.125), 0.0625, 1e-12);
+  EXPECT_NEAR(curve.coded(0.0625), 0.0625, 1e-12);
 }
 
 TEST(GeometryFlip, BetweenScalesAndHeights) {

@@ -118,6 +118,8 @@ TEST(Quality, TableHasKeptScalesSizesAndGroups) {
     EXPECT_GE(losses.texel_dssim.size(), 2u);
     EXPECT_EQ(losses.preview.size(), 1u);
     EXPECT_EQ(losses.coarser.size(), 2u);
+    EXPECT_EQ(losses.finer.size(), 5u);
+    EXPECT_TRUE(std::ranges::is_sorted(losses.finer.flip, std::greater<>()));
   }
   EXPECT_EQ(read_quality(std::vector<std::uint8_t>([&] {
               const std::string json = write_quality(t);

@@ -4,7 +4,7 @@ import { bytesToShow, fragmentCount } from '../format/tables';
 import { etaOf, meanEta, qualityOf } from './allocation';
 import { FragmentOffer } from './plan_types';
 import { interpolatedBytes } from './size_curve';
-import { PerGroup, PlaneChoice, TextureLoss, TextureParts, everyGroup, groupIndex, tablesOf } from './texture_loss';
+import { PerGroup, PlaneChoice, TextureLoss, everyGroup, groupIndex, tablesOf } from './texture_loss';
 
 /** Plane and fragment of an offer of the list. */
 export interface ListedFragment {
@@ -13,7 +13,7 @@ export interface ListedFragment {
 }
 /**
  * The F-list of a package at a scale: the stored fragments of all chosen planes in one list (thesis ch. 4). A fragment's losses are
- * its part of what its group of planes loses in lit pictures (TextureParts.coded), times the group's weight.
+ * its part of what its group of planes loses in lit pictures, times the group's weight.
  */
 export interface FragmentList {
   offers: FragmentOffer[];
@@ -24,8 +24,6 @@ export interface FragmentList {
   groupWeights: PerGroup;
   /** Loss of fragments that are not in the list because no rung shows more than the preview; unweighted. */
   previewLoss: PerGroup;
-  /** TextureParts.coarser */
-  coarser: PerGroup;
 }
 /** Options of fragmentList. */
 export interface ListOptions {
@@ -47,7 +45,7 @@ function addPlane(loss: TextureLoss, plane: number, surface: number, options: Li
   const { data } = loss;
   const t = tablesOf(data, plane);
   const group = groupIndex(data, plane);
-  const { weights, coded } = loss.plane(plane);
+  const { weights, shown: losses } = loss.plane(plane);
   const row = data.manifest.scales.findIndex((s) => s.scale === options.scale);
   if (row < 0) throw new InputError('', `scale ${options.scale}`, 'a scale of the package', 'none');
   const eta = etaOf(t, row);
@@ -60,16 +58,16 @@ function addPlane(loss: TextureLoss, plane: number, surface: number, options: Li
     const bytes = rungs.map((r) => bytesToShow(t, r, f));
     if (!bytes.every((b) => b > 0 && b <= 0xffffffff)) continue;
     const share = weights[f] / surface;
-    const shown = [coded[f], ...rungs.map((r) => coded[(r + 1) * fragmentCount(t) + f])];
+    const shown = [losses[f], ...rungs.map((r) => losses[(r + 1) * fragmentCount(t) + f])];
     if (!shown.some((c) => c < shown[0])) {
       previewLoss[group] += share * shown[0];
       continue;
     }
-    const losses = shown.map((c) => options.groupWeights[group] * share * c);
+    const weighted = shown.map((c) => options.groupWeights[group] * share * c);
     list.fragments.push({ plane, fragment: f });
     list.groups.push(group);
     const plannedBytes = Math.max(1, interpolatedBytes(t, f, quality[f]));
-    list.offers.push({ bytes, loss: losses, eta: eta[f] * (losses[0] - Math.min(...losses)), plannedBytes, lowRung, highRung });
+    list.offers.push({ bytes, loss: weighted, eta: eta[f] * (weighted[0] - Math.min(...weighted)), plannedBytes, lowRung, highRung });
   }
 }
 
@@ -85,17 +83,16 @@ export function fragmentList(
 ): FragmentList {
   const all = { ...defaultListOptions, ...options };
   const previewLoss: [number, number, number] = [0, 0, 0];
-  const list = { offers: [], fragments: [], groups: [], groupWeights: all.groupWeights, previewLoss, coarser: loss.coarser(planes) };
+  const list = { offers: [], fragments: [], groups: [], groupWeights: all.groupWeights, previewLoss };
   const weights = loss.weights(planes);
   // A group without any surface loses nothing, whatever its rungs.
   for (const { plane } of planes) addPlane(loss, plane, weights[groupIndex(data, plane)] || 1, all, list, previewLoss);
   return list;
 }
 
-/** What is lost where the offers have these rungs; -1 = skipped. */
-export function partsOf({ offers, groups, groupWeights, previewLoss, coarser }: FragmentList, rungs: ArrayLike<number>): TextureParts {
+/** Loss of each group where the offers have these rungs; -1 = skipped. */
+export function lossesOf({ offers, groups, groupWeights, previewLoss }: FragmentList, rungs: ArrayLike<number>): PerGroup {
   const weighted = [0, 0, 0];
   offers.forEach(({ loss }, i) => (weighted[groups[i]] += loss[rungs[i] + 1]));
-  const coded = previewLoss.map((loss, g) => loss + weighted[g] / groupWeights[g]) as unknown as PerGroup;
-  return { coded, coarser };
+  return previewLoss.map((loss, g) => loss + weighted[g] / groupWeights[g]) as unknown as PerGroup;
 }

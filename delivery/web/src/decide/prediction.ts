@@ -7,9 +7,10 @@ import { exp, log, pow } from './portable_math';
 
 const leastFlip = 1e-6; // what logarithms take for 0
 const leastDssim = 1e-9;
-const mostLevels = 8;
 /** Twice as large texels lose so many times as much. */
 const lossPerDoubling = 1.6;
+/** Half as large ones lose so much less. */
+const lossPerHalving = 1.25;
 
 const mixed = (a: number, b: number, part: number): number => (1 - part) * a + part * b;
 
@@ -37,29 +38,33 @@ function beyondSizes({ sizesPx }: QualityTable, displayedPx: number): number {
 class Curve {
   private readonly logDssim_: number[];
   private readonly logFlip_: number[];
-  private readonly coarser_: Float32Array;
+  /** Loss of mips from the finest sampled level on, and the level of the first. */
+  private readonly mips_: number[];
+  private readonly finestLevel_: number;
   readonly preview: number;
 
-  constructor({ texelDssim, coded, preview, coarser }: TextureLosses, beyond: number) {
+  constructor({ texelDssim, coded, preview, finer, coarser }: TextureLosses, beyond: number) {
     let least = leastFlip;
     this.logDssim_ = [...texelDssim].map(log);
     this.logFlip_ = [...coded.flip].map((flip) => log((least = Math.max(least, flip))));
-    this.coarser_ = coarser.flip;
+    const shown = finer.flip.length > 0 ? [...finer.flip].reverse() : [0];
+    this.mips_ = [...shown, ...coarser.flip];
+    this.finestLevel_ = 1 - shown.length;
     this.preview = Math.min(1, preview.flip[0] * beyond);
   }
   at(logDssim: number): number {
     const [x, y] = [this.logDssim_, this.logFlip_];
     let i = 0;
-    if (x.length === 1) return exp(y[0] + (logDssim - x[0]));
+    if (x.length === 1) return exp(y[0] + 0.5 * (logDssim - x[0]));
     while (i + 2 < x.length && x[i + 1] < logDssim) ++i;
     const slope = (y[i + 1] - y[i]) / (x[i + 1] - x[i]);
     return exp(y[i] + (logDssim < x[0] ? clamp(slope, 0.25, 1) : slope) * (logDssim - x[i]));
   }
-  atLevel(levels: number): number {
-    const values = this.coarser_;
-    const value = (i: number): number => (i === 0 ? 0 : (values[Math.min(i, values.length) - 1] ?? 0));
-    const whole = Math.floor(clamp(levels, 0, mostLevels));
-    return mixed(value(whole), value(whole + 1), clamp(levels - whole, 0, 1));
+  atLevel(level: number): number {
+    const mips = this.mips_;
+    const at = clamp(level - this.finestLevel_, 0, mips.length - 1);
+    const whole = Math.floor(at);
+    return mixed(mips[whole], mips[Math.min(whole + 1, mips.length - 1)], at - whole);
   }
 }
 
@@ -83,13 +88,13 @@ export class GroupCurve {
     this.curves_ = sizes ? [new Curve(sizes[first], beyond), new Curve(sizes[second], beyond)] : [];
     this.part_ = part;
   }
-  /** FLIP where the texels' 1 - SSIM is `dssim`. */
+  /** FLIP that rungs add where the texels' 1 - SSIM is `dssim`. */
   coded(dssim: number, growth: TexelGrowth = [0, 0]): number {
     if (!(dssim > leastDssim)) return 0;
     const [first, second] = this.curves_;
     if (!first) return Math.min(1, dssim);
     const x = log(dssim);
-    const [a, b] = [first, second].map((curve, i) => curve.at(x) * (growth[i] === 0 ? 1 : pow(lossPerDoubling, growth[i])));
+    const [a, b] = [first, second].map((curve, i) => curve.at(x) * (growth[i] === 0 ? 1 : pow(growth[i] < 0 ? lossPerHalving : lossPerDoubling, growth[i])));
     return Math.min(1, mixed(a, b, this.part_));
   }
   /** FLIP where all textures of the group show their previews. */
@@ -97,10 +102,11 @@ export class GroupCurve {
     const [first, second] = this.curves_;
     return first ? mixed(first.preview, second.preview, this.part_) : 1;
   }
-  /** FLIP of the source's texels in mips with so much larger ones. */
-  coarser(growth: TexelGrowth): number {
+  /** FLIP of the source's texels, halved `mip` times; 0 for full size. */
+  halved(growth: TexelGrowth, mip: number): number {
     const [first, second] = this.curves_;
-    return first ? mixed(first.atLevel(growth[0]), second.atLevel(growth[1]), this.part_) : 0;
+    const at = (curve: Curve, level: number): number => Math.max(0, curve.atLevel(level) - curve.atLevel(level - mip));
+    return first ? mixed(at(first, growth[0]), at(second, growth[1]), this.part_) : 0;
   }
 }
 

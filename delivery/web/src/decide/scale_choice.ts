@@ -1,5 +1,5 @@
 import { PackageData } from '../format/package_data';
-import { FragmentList, partsOf } from './fragment_list';
+import { FragmentList, lossesOf } from './fragment_list';
 import type { TimePlanOptions } from './plan_types';
 import { geometryFlip } from './prediction';
 import { Simulated, simulate } from './simulation';
@@ -43,10 +43,10 @@ function* texturesInTime(loss: TextureLoss, request: InTimeRequest, scale: numbe
   const { list, planes } = spent!;
   const played = simulate(list.offers, plan, { bytesS: linkBytesS, rttS, connections: request.connections });
   yield;
-  const parts = partsOf(list, played.rungs);
+  const losses = lossesOf(list, played.rungs);
   const { data: { quality }, displayedPx } = loss;
-  const flip = pictureFlip(quality, displayedPx, scale, parts);
-  return { scale, planes, list, flip, textureFlip: textureFlip(quality, parts), late: timeLimitS <= 0, ...played };
+  const flip = pictureFlip(quality, displayedPx, scale, losses);
+  return { scale, planes, list, flip, textureFlip: textureFlip(quality, losses), late: timeLimitS <= 0, ...played };
 }
 
 /**

@@ -1,16 +1,19 @@
 import type { PackageData } from '../format/package_data';
 import type { QualityTable } from '../format/quality_table';
-import { FragmentList, ListOptions, fragmentList, partsOf } from './fragment_list';
+import { FragmentList, ListOptions, fragmentList, lossesOf } from './fragment_list';
 import { sumOf } from './numbers';
 import { pow } from './portable_math';
 import { spendBytes } from './rate_distortion';
 import { bytesAtRung } from './rung_choice';
-import { PerGroup, PlaneChoice, TextureLoss, TextureParts, everyGroup, pictureFlip, planesForDisplay } from './texture_loss';
+import { PerGroup, PlaneChoice, TextureLoss, everyGroup, pictureFlip, planesForDisplay } from './texture_loss';
 
 // delivery/cpp/decide/texture_budget.cpp, bit for bit.
 
-/** Levels below the display's that are tried. */
+/** Levels beside the display's that are tried. */
 const mostCoarser = 4;
+const mostFiner = 4;
+/** FLIP that finer planes have to save. */
+const worthwhile = 1e-4;
 const reweightings = 2;
 /** Losses as spendBytes counts them. */
 const lossUnit = 2 ** 40;
@@ -23,8 +26,8 @@ export interface TextureSpending {
   list: FragmentList;
   /** Rungs by offer; -1 = skipped. */
   rungs: number[];
-  /** What is lost. */
-  parts: TextureParts;
+  /** Of each group by itself. */
+  losses: PerGroup;
   /** Of the picture with the scale. */
   flip: number;
 }
@@ -36,34 +39,42 @@ function spendOn(loss: TextureLoss, planes: PlaneChoice[], options: SpendingOpti
   const list = fragmentList(data, planes, { ...options, displayedPx }, loss);
   const curves = list.offers.map((f) => ({ bytes: [0, ...f.bytes], loss: f.loss.map((l) => Math.floor(l * lossUnit)) }));
   const rungs = spendBytes(curves, budget).map((way) => way - 1);
-  const parts = partsOf(list, rungs);
-  return { planes, list, rungs, parts, flip: pictureFlip(data.quality, displayedPx, options.scale, parts) };
+  const losses = lossesOf(list, rungs);
+  return { planes, list, rungs, losses, flip: pictureFlip(data.quality, displayedPx, options.scale, losses) };
 }
 
 /** The slopes of the predicted FLIP by the groups' losses. */
-function slopesOf({ exponent }: QualityTable, { flip, parts }: TextureSpending): PerGroup {
+function slopesOf({ exponent }: QualityTable, { flip, losses }: TextureSpending): PerGroup {
   if (!(flip > 0)) return everyGroup(1);
-  return parts.coded.map((coded) => Math.max(leastWeight, pow(Math.max(coded / flip, 1e-9), exponent - 1))) as unknown as PerGroup;
+  return losses.map((loss) => Math.max(leastWeight, pow(Math.max(loss / flip, 1e-9), exponent - 1))) as unknown as PerGroup;
 }
 
 /** The steps of textureForBudget, so that a page can breathe between them; the last value is the result. */
 export function* budgetSteps(loss: TextureLoss, options: SpendingOptions, bytes: number): Generator<TextureSpending> {
   const { data, displayedPx } = loss;
-  const spend = (levels: PerGroup): TextureSpending => spendOn(loss, planesForDisplay(data, displayedPx, levels), options, bytes);
+  const spend = (planes: PlaneChoice[]): TextureSpending => spendOn(loss, planes, options, bytes);
   let from: PerGroup | undefined = everyGroup(0);
-  let best = spend(from);
-  // All groups together, then each that the package has.
-  const steps: number[][] = [[1, 1, 1], ...loss.weights(best.planes).flatMap((w, g) => (w > 0 ? [everyGroup(0).map((_, i) => +(i === g))] : []))];
+  let best = spend(planesForDisplay(data, displayedPx));
+  // Levels beyond the ladder's ends stand for the same planes.
+  const nameOf = (planes: PlaneChoice[]): string => planes.map((p) => p.plane).join();
+  const tried = new Set([nameOf(best.planes)]);
+  // One level coarser, of all groups together, then of each that the package has; then one level finer.
+  const groups = [everyGroup(1), ...loss.weights(best.planes).flatMap((w, g) => (w > 0 ? [everyGroup(0).map((_, i) => +(i === g))] : []))];
+  const steps = [1, -1].flatMap((by) => groups.map((step) => step.map((one) => by * one)));
   while (from) {
-    // Downhill; every step makes something coarser.
+    // Downhill.
     const at: PerGroup = from;
     from = undefined;
     for (const step of steps) {
       const to = at.map((level, g) => level + step[g]) as unknown as PerGroup;
-      if (Math.max(...to) > mostCoarser) continue;
+      const planes = planesForDisplay(data, displayedPx, to);
+      const name = nameOf(planes);
+      if (Math.max(...to) > mostCoarser || Math.min(...to) < -mostFiner || tried.has(name)) continue;
+      tried.add(name);
       yield best;
-      const now = spend(to);
-      if (now.flip >= best.flip) continue;
+      const now = spend(planes);
+      // Finer planes take memory: they have to look better, not only as good.
+      if (now.flip >= best.flip - (Math.min(...step) < 0 ? worthwhile : 0)) continue;
       best = now;
       from = to;
     }
@@ -84,8 +95,8 @@ export interface TextureBudget extends TextureSpending {
 }
 
 /**
- * Chooses between the planes for the display and their mips, so that few bytes are not spread over texels that they
- * cannot make good; fragments share the bytes by rate and distortion. What counts is the FLIP that is predicted of the picture. Needs
+ * Chooses between the planes for the display and coarser and finer ones, so that few bytes are not spread over texels that they
+ * cannot make good, and bytes that are left are not lost; fragments share the bytes by rate and distortion. What counts is the FLIP that is predicted of the picture. Needs
  * the tables of all planes.
  */
 export function textureForBudget(data: PackageData, displayedPx: number, options: SpendingOptions, bytes: number): TextureBudget {

@@ -22,14 +22,6 @@ export type PerGroup = readonly [colour: number, normal: number, data: number];
 /** Of every group the same. */
 export const everyGroup = (value: number): PerGroup => [value, value, value];
 
-/** What textures lose in lit pictures: FLIP of each group by itself, on S_0. */
-export interface TextureParts {
-  /** Because of their rungs. */
-  coded: PerGroup;
-  /** Because their mips are coarser than those for the display. */
-  coarser: PerGroup;
-}
-
 const ln2 = 0.693147180559945309417;
 
 /** Tables of a plane that were read; InputError where they were not. */
@@ -70,7 +62,7 @@ function planeAtLevel({ textures }: PackageData, base: number, level: number): n
 
 /**
  * The smallest mips that still have a texel for every pixel where the object is displayed `displayedPx` high (device
- * px), or by group so many `levels` coarser. Needs the tables of the full-size planes.
+ * px), or by group so many `levels` coarser, or finer where below 0. Needs the tables of the full-size planes.
  */
 export function planesForDisplay(data: PackageData, displayedPx: number, levels: PerGroup = everyGroup(0)): PlaneChoice[] {
   return fullSize(data.textures).map(({ base }) => {
@@ -79,16 +71,13 @@ export function planesForDisplay(data: PackageData, displayedPx: number, levels:
   });
 }
 
-const combined = (table: QualityTable, geometry: number, { coded, coarser }: TextureParts): number =>
-  combinedFlip(table, [geometry, ...coded.flatMap((loss, g) => [loss, coarser[g]])]);
-
-/** FLIP of the textures alone: 0 = equal to S_0 with the source's texels. */
-export function textureFlip(table: QualityTable, parts: TextureParts): number {
-  return combined(table, 0, parts);
+/** FLIP of the textures alone: 0 = equal to S_0 with the source's texels. `losses`: of each group by itself, on S_0. */
+export function textureFlip(table: QualityTable, losses: PerGroup): number {
+  return combinedFlip(table, [0, ...losses]);
 }
 /** FLIP of a scale with textures. */
-export function pictureFlip(table: QualityTable, displayedPx: number, scale: number, parts: TextureParts): number {
-  return combined(table, geometryFlip(table, displayedPx, scale), parts);
+export function pictureFlip(table: QualityTable, displayedPx: number, scale: number, losses: PerGroup): number {
+  return combinedFlip(table, [geometryFlip(table, displayedPx, scale), ...losses]);
 }
 
 /** Of a plane: FLIP of an object that looks all over like one fragment. */
@@ -97,8 +86,8 @@ interface PlaneLoss {
   weights: Float32Array;
   /** Of the stored fragments together. */
   weight: number;
-  /** [(rungs + 1) * F], index way * F + fragment; way 0 shows the preview. */
-  coded: Float64Array;
+  /** [(rungs + 1) * F], index way * F + fragment; way 0 shows the preview, others lose by their mip and their rung. */
+  shown: Float64Array;
 }
 
 /** What fragments lose in lit pictures of one displayed height, by the package's quality table. */
@@ -124,14 +113,16 @@ export class TextureLoss {
     const weights = surfaceWeights(t);
     const fragments = fragmentCount(t);
     const growth = this.growth_(plane);
-    const coded = new Float64Array((t.rungQuality.length + 1) * fragments);
+    const shown = new Float64Array((t.rungQuality.length + 1) * fragments);
+    const mip = curve.halved(growth, this.data.textures[plane].mip);
+    const withMip = (coded: number): number => (mip > 0 ? combinedFlip(this.data.quality, [coded, mip]) : coded);
     const mean = this.previewMean_(plane);
     const preview = this.previewLoss_(plane);
     for (const f of t.order) {
-      coded[f] = mean > 0 ? Math.min(1, preview * (curve.coded(t.skipDssim[f]) / mean)) : 0;
-      for (let r = 0; r < t.rungQuality.length; ++r) coded[(r + 1) * fragments + f] = curve.coded(t.dssim[r * fragments + f], growth);
+      shown[f] = mean > 0 ? Math.min(1, preview * (curve.coded(t.skipDssim[f]) / mean)) : 0;
+      for (let r = 0; r < t.rungQuality.length; ++r) shown[(r + 1) * fragments + f] = withMip(curve.coded(t.dssim[r * fragments + f], growth));
     }
-    return { weights, weight: sumOf([...t.order].map((f) => weights[f])), coded };
+    return { weights, weight: sumOf([...t.order].map((f) => weights[f])), shown };
   }
   /** What skipped fragments are to each other: the mean over the plane's surface of what the group's curve says of their texels. */
   private previewMean_(plane: number): number {
@@ -184,18 +175,6 @@ export class TextureLoss {
     for (const { plane } of planes) weights[groupIndex(this.data, plane)] += this.plane(plane).weight;
     return weights;
   }
-  /** TextureParts.coarser, as the mean over each group's surface. */
-  coarser(planes: readonly PlaneChoice[]): PerGroup {
-    const loss: [number, number, number] = [0, 0, 0];
-    const weights = this.weights(planes);
-    for (const { plane } of planes) {
-      const group = groupIndex(this.data, plane);
-      const { mip } = this.data.textures[plane];
-      const [first, second] = this.growth_(plane).map((growth) => Math.min(growth, mip)); // a plane of full size has lost none
-      if (weights[group] > 0) loss[group] += (this.plane(plane).weight / weights[group]) * this.curves_[group].coarser([first, second]);
-    }
-    return loss;
-  }
 }
 
 /** A texture as it is shown: the rung of each fragment, row by row; -1 = the preview. */
@@ -209,12 +188,12 @@ export interface ShownTexture extends PlaneChoice {
 export function shownFlip(data: PackageData, displayedPx: number, scale: number, planes: readonly ShownTexture[]): number {
   const loss = new TextureLoss(data, displayedPx);
   const surface = loss.weights(planes);
-  const coded: [number, number, number] = [0, 0, 0];
+  const all: [number, number, number] = [0, 0, 0];
   for (const { plane, rungs } of planes) {
-    const { weights, coded: losses } = loss.plane(plane);
+    const { weights, shown } = loss.plane(plane);
     const t = tablesOf(data, plane);
     const group = groupIndex(data, plane);
-    for (const f of t.order) coded[group] += (weights[f] / (surface[group] || 1)) * losses[((rungs[f] ?? -1) + 1) * fragmentCount(t) + f];
+    for (const f of t.order) all[group] += (weights[f] / (surface[group] || 1)) * shown[((rungs[f] ?? -1) + 1) * fragmentCount(t) + f];
   }
-  return pictureFlip(data.quality, displayedPx, scale, { coded, coarser: loss.coarser(planes) });
+  return pictureFlip(data.quality, displayedPx, scale, all);
 }

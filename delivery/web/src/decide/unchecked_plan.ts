@@ -102,9 +102,10 @@ export class UncheckedPlan {
     step.doneS = nowS;
     step.spacingS = Math.max(0, nowS - Math.max(this.lastDoneS_, latencyS));
     // The link was idle only while no answer could have been on its way.
-    if (well) rate.add(step.bytes, nowS - Math.max(this.lastDoneS_, this.inFlight_[0].issuedS + rttS));
-    else step.rung = -1;
+    const seconds = nowS - Math.max(this.lastDoneS_, this.inFlight_[0].issuedS + rttS);
     this.inFlight_.splice(this.inFlight_.indexOf(step), 1);
+    if (well) rate.add(step.bytes, seconds, this.inFlight_.length, this.inFlightBytes_());
+    else step.rung = -1;
     this.lastDoneS_ = nowS;
     this.spread_((step.residualS = step.thetaS - step.spacingS));
   }

@@ -27,9 +27,12 @@ export interface PictureLosses {
 export interface TextureLosses {
   /** Mean of 1 - SSIM of the group's texels over the object's surface, rising, > 0; a sample each. */
   texelDssim: Float32Array;
+  /** A sample each; `flip` is what coding adds to finer.flip[0], by the exponent. */
   coded: PictureLosses;
   /** One: with the previews of all the group's textures. */
   preview: PictureLosses;
+  /** With the source's texels of the planes for that height, then of mips that are 1, 2 .. levels finer. */
+  finer: PictureLosses;
   /** With the source's texels of mips that are 1, 2 .. levels coarser than those for that height. */
   coarser: PictureLosses;
 }
@@ -77,9 +80,9 @@ function readTexture(at: JsonAt): TextureLosses {
     if (!(v > before)) one.fail('a rising number above 0', v);
     return (before = v);
   }));
-  const coarser = at.at('coarser');
+  const mips = (one: JsonAt, most: number): PictureLosses => readLosses(one, one.at('flip').array(0, most));
   const coded = readLosses(at.at('coded'), texelDssim.length);
-  return { texelDssim, coded, preview: readLosses(at.at('preview'), 1), coarser: readLosses(coarser, coarser.at('flip').array(0, 8)) };
+  return { texelDssim, coded, preview: readLosses(at.at('preview'), 1), finer: mips(at.at('finer'), 9), coarser: mips(at.at('coarser'), 8) };
 }
 
 /** Reads quality.json, strictly; FormatError names the place in the document. */

@@ -1,7 +1,11 @@
 /** Throughput of a connection, or of several, from transfers that have ended: delivery/cpp/decide/throughput.h. */
 export interface TransferRate {
-  /** `seconds`: since the end of the transfer before, latency taken off; less than 1 ns counts as 1 ns. */
-  add(bytes: number, seconds: number): void;
+  /**
+   * `seconds`: since the end of the transfer before, latency taken off; less than 1 ns counts as 1 ns. `others`: how many transfers are
+   * still under way, and their bytes. Until more transfers have ended than are under way, beta_0 is the estimate, as far as beta_0 lies
+   * between what the link has given with nothing of the others and with all of the others.
+   */
+  add(bytes: number, seconds: number, others?: number, othersBytes?: number): void;
   /** Bytes over seconds of at most so many samples (default 10). */
   recentBytesS(samples?: number): number;
   /** The mean of the last `seconds` > 0 of transfers; time before the first transfer counts with beta_0. */
@@ -14,19 +18,25 @@ const none = { allBytes: 0, allSeconds: 0 };
 /** `initialBytesS` is beta_0, until there is a sample; > 0. */
 export function transferRate(initialBytesS: number): TransferRate {
   const ended: { bytes: number; seconds: number; allBytes: number; allSeconds: number }[] = []; // all: up to each
+  let starting = true;
+  let startBytesS = initialBytesS;
   return {
-    add(bytes, duration) {
+    add(bytes, duration, others = 0, othersBytes = 0) {
       const seconds = Math.max(duration, leastSeconds);
       const { allBytes, allSeconds } = ended.at(-1) ?? none;
-      ended.push({ bytes, seconds, allBytes: allBytes + bytes, allSeconds: allSeconds + seconds });
+      const all = { bytes, seconds, allBytes: allBytes + bytes, allSeconds: allSeconds + seconds };
+      ended.push(all);
+      starting &&= ended.length <= others;
+      startBytesS = Math.min(Math.max(initialBytesS, all.allBytes / all.allSeconds), (all.allBytes + othersBytes) / all.allSeconds);
     },
     recentBytesS(samples = 10) {
+      if (starting) return startBytesS;
       let [bytes, seconds] = [0, 0];
       for (const sample of ended.slice(-samples).reverse()) {
         bytes += sample.bytes;
         seconds += sample.seconds;
       }
-      return seconds > 0 ? bytes / seconds : initialBytesS;
+      return bytes / seconds;
     },
     meanBytesS(seconds) {
       const { allBytes, allSeconds } = ended.at(-1) ?? none;
@@ -74,14 +84,17 @@ const mostSamples = 64;
 export class Throughput implements TransferRate {
   private readonly rate_: TransferRate;
   private mean_: number;
+  private ended_ = 0;
+  private starting_ = true;
 
   constructor(private readonly options_: ThroughputOptions = defaultThroughput) {
     this.rate_ = transferRate(options_.initialBytesS);
     this.mean_ = options_.initialBytesS;
   }
 
-  add(bytes: number, seconds: number): void {
-    this.rate_.add(bytes, seconds);
+  add(bytes: number, seconds: number, others = 0, othersBytes = 0): void {
+    this.rate_.add(bytes, seconds, others, othersBytes);
+    this.starting_ &&= ++this.ended_ <= others;
     const weight = this.options_.ewma * Math.min(1, bytes / this.options_.smallBytes);
     this.mean_ += weight * (bytes / Math.max(seconds, leastSeconds) - this.mean_);
   }
@@ -89,7 +102,7 @@ export class Throughput implements TransferRate {
   /** Bytes per second by the estimator chosen. */
   bytesS(): number {
     const { estimator, samples } = this.options_;
-    if (estimator === 'ewma') return this.mean_;
+    if (estimator === 'ewma' && !this.starting_) return this.mean_;
     return this.recentBytesS(estimator === 'last' ? 1 : Math.max(samples, 1));
   }
   recentBytesS(samples = defaultThroughput.samples): number {

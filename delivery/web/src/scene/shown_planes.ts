@@ -15,18 +15,16 @@ function planesFor({ options, view }: LoadContext, data: PackageData, displayedP
   return options.fullSize ? fullSize(data.textures) : planesForDisplay(data, displayedPx);
 }
 
-/** Reads the data for decisions about textures, with the tables of the planes that this display may need, or all tables where they are small. */
+/** Reads the data for decisions about textures: all tables where they are small or a time limit leaves a choice, else those for this display. */
 export async function readPlaneData(load: LoadContext, scales: ScaleSource): Promise<PackageData> {
   const { reader, pool, signal } = load;
   pool.start();
   const [whole] = await Promise.all([reader.prefetchDocuments(signal), scales.openStream()]);
-  if (whole) return reader.data(undefined, signal);
-  const all = await reader.textures(signal);
-  const base = [...Array(fullSizePlanes(all)).keys()];
+  // A short time may ask for coarser planes than the display's, a long one for finer ones.
+  if (whole || Number.isFinite(load.limitS)) return reader.data(undefined, signal);
+  const base = [...Array(fullSizePlanes(await reader.textures(signal))).keys()];
   const shown = planesFor(load, await reader.data(base, signal));
-  // A short time may ask for the mips below, too.
-  const mayBeAskedFor = (t: TextureInfo): boolean => shown.some((c) => t.mip > 0 && t.base === c.base && t.mip >= all[c.plane].mip);
-  return reader.data([...base, ...all.flatMap((t, p) => (mayBeAskedFor(t) ? [p] : []))], signal);
+  return reader.data([...base, ...shown.map((c) => c.plane)], signal);
 }
 
 /** Which planes show the textures of a load: choosing them, and showing them. */
