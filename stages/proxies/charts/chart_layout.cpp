@@ -20,7 +20,7 @@ constexpr double kMostRatio = 3;
 }  // namespace
 
 ChartLayout::ChartLayout(const ProxySurface& surface)
-    : surface_(surface), vertex_of_(surface.positions.size(), kNoIndex) {
+    : surface_(surface), number_of_(3 * surface.triangles.size(), kNoIndex) {
   for (std::uint32_t t = 0; t < surface.triangles.size(); ++t) {
     own_.emplace_back(
         std::array{corner_position(3 * t), corner_position(3 * t + 1), corner_position(3 * t + 2)});
@@ -36,16 +36,17 @@ void ChartLayout::project(std::span<const std::uint32_t> triangles, Vec3d area_n
 }
 
 /// Gives the disk's vertices numbers, fills disk_, and returns how many vertices there are.
-std::size_t ChartLayout::number_vertices(std::span<const std::uint32_t> triangles) {
+std::size_t ChartLayout::number_vertices(std::span<const std::uint32_t> triangles,
+                                         const std::vector<std::uint32_t>& vertices) {
   std::uint32_t count = 0;
   disk_.clear();
   disk_own_.clear();
   for (const std::uint32_t t : triangles) {
     Triangle numbered;
     for (std::size_t k = 0; k < 3; ++k) {
-      std::uint32_t& vertex = vertex_of_[surface_.triangles[t][k]];
-      if (vertex == kNoIndex) vertex = count++;
-      numbered[k] = vertex;
+      std::uint32_t& number = number_of_[vertices[3 * std::size_t{t} + k]];
+      if (number == kNoIndex) number = count++;
+      numbered[k] = number;
     }
     disk_.push_back(numbered);
     disk_own_.push_back(own_[t]);
@@ -64,26 +65,27 @@ std::uint32_t ChartLayout::farthest(std::span<const std::uint32_t> border, Vec3d
   return best;
 }
 
-bool ChartLayout::unfold(std::span<const std::uint32_t> triangles, std::span<const std::uint32_t> border) {
-  const std::size_t count = number_vertices(triangles);
+bool ChartLayout::unfold(std::span<const std::uint32_t> triangles, std::span<const std::uint32_t> border,
+                         const std::vector<std::uint32_t>& vertices) {
+  const std::size_t count = number_vertices(triangles, vertices);
   const std::uint32_t a = farthest(border, corner_position(border[0]));
   const std::uint32_t b = farthest(border, corner_position(a));
-  const auto vertex = [&](std::uint32_t c) { return vertex_of_[surface_.triangles[c / 3][c % 3]]; };
+  const auto number = [&](std::uint32_t c) { return number_of_[vertices[c]]; };
   const double distance = length(corner_position(b) - corner_position(a));
   std::vector<Vec2d> found;
-  if (vertex(a) != vertex(b))
-    found = conformal_map(disk_, disk_own_, count, {vertex(a), vertex(b)}, distance);
+  if (number(a) != number(b))
+    found = conformal_map(disk_, disk_own_, count, {number(a), number(b)}, distance);
   if (!found.empty())
     for (const std::uint32_t t : triangles)
-      for (std::uint32_t c = 3 * t; c < 3 * t + 3; ++c) tried_[c] = found[vertex(c)];
+      for (std::uint32_t c = 3 * t; c < 3 * t + 3; ++c) tried_[c] = found[number(c)];
   for (const std::uint32_t t : triangles)
-    for (const std::uint32_t p : surface_.triangles[t]) vertex_of_[p] = kNoIndex;
+    for (std::uint32_t c = 3 * t; c < 3 * t + 3; ++c) number_of_[vertices[c]] = kNoIndex;
   return !found.empty();
 }
 
 /// Checks the places tried and gives the chart its area.
 bool ChartLayout::is_sound(std::span<const std::uint32_t> triangles, std::span<const std::uint32_t> border,
-                           double most_stretch) {
+                           const std::vector<std::uint32_t>& vertices, double most_stretch) {
   double area = 0, flat_area = 0, stretch = 0, least2 = 1e300, largest2 = 0;
   for (const std::uint32_t t : triangles) {
     const FlatStretch s = flat_stretch(own_[t], &tried_[3 * std::size_t{t}]);
@@ -98,7 +100,7 @@ bool ChartLayout::is_sound(std::span<const std::uint32_t> triangles, std::span<c
   if (!(stretch <= most_stretch * most_stretch * area * scale2)) return false;
   if (least2 * scale2 * kMostRatio * kMostRatio < 1 || largest2 * scale2 > kMostRatio * kMostRatio)
     return false;
-  if (!border_is_simple(surface_, border, tried_)) return false;
+  if (!border_is_simple(border, vertices, tried_)) return false;
   const double scale = std::sqrt(scale2);
   for (const std::uint32_t t : triangles)
     for (std::size_t c = 3 * std::size_t{t}; c < 3 * std::size_t{t} + 3; ++c) tried_[c] = tried_[c] * scale;
@@ -106,12 +108,12 @@ bool ChartLayout::is_sound(std::span<const std::uint32_t> triangles, std::span<c
 }
 
 bool ChartLayout::try_disk(std::span<const std::uint32_t> triangles, std::span<const std::uint32_t> border,
-                           Vec3d area_normal) {
+                           const std::vector<std::uint32_t>& vertices, Vec3d area_normal) {
   project(triangles, area_normal);
-  if (is_sound(triangles, border, kProjectionStretch)) return true;
-  if (unfold(triangles, border) && is_sound(triangles, border, kMostStretch)) return true;
+  if (is_sound(triangles, border, vertices, kProjectionStretch)) return true;
+  if (unfold(triangles, border, vertices) && is_sound(triangles, border, vertices, kMostStretch)) return true;
   project(triangles, area_normal);
-  return is_sound(triangles, border, kMostStretch);
+  return is_sound(triangles, border, vertices, kMostStretch);
 }
 
 void ChartLayout::keep_tried(std::span<const std::uint32_t> triangles) {

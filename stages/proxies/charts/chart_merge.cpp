@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <span>
 #include <utility>
 
@@ -20,10 +21,7 @@ constexpr std::size_t kMostSheets = 64;
 }  // namespace
 
 ChartMerge::ChartMerge(const ProxySurface& surface)
-    : surface_(surface),
-      queue_(surface.triangles.size()),
-      layout_(surface),
-      marks_(surface.positions.size(), 0) {
+    : surface_(surface), queue_(surface.triangles.size()), layout_(surface) {
   measure_triangles();
   find_opposites();
   start_charts();
@@ -73,6 +71,10 @@ void ChartMerge::start_charts() {
   const auto count = static_cast<std::uint32_t>(surface_.triangles.size());
   charts_.resize(count);
   shared_lengths_.assign(count, 0);
+  vertices_.resize(3 * std::size_t{count});
+  std::iota(vertices_.begin(), vertices_.end(), 0);
+  glued_.assign(vertices_.size(), 0);
+  renamed_.assign(vertices_.size(), kNoIndex);
   for (std::uint32_t t = 0; t < count; ++t) {
     chart_of_.push_back(t);
     const double perimeter = lengths_[3 * t] + lengths_[3 * t + 1] + lengths_[3 * t + 2];
@@ -93,7 +95,7 @@ void ChartMerge::queue_neighbours(std::uint32_t chart, bool later_ones_only) {
   for (const std::uint32_t h : charts_[chart].border) {
     if (opposites_[h] == kNoIndex) continue;
     const std::uint32_t other = chart_of_[opposites_[h] / 3];
-    if (later_ones_only && other < chart) continue;
+    if (other == chart || (later_ones_only && other < chart)) continue;  // a cut inside the chart
     if (shared_lengths_[other] == 0) neighbours_.push_back(other);
     shared_lengths_[other] += lengths_[h];
   }
@@ -102,32 +104,70 @@ void ChartMerge::queue_neighbours(std::uint32_t chart, bool later_ones_only) {
                 merge_cost(charts_[chart], charts_[other], std::exchange(shared_lengths_[other], 0)));
 }
 
-/// Two disks make a disk when what they share is one path of both borders: one corner more than edges. Sheets
-/// that meet elsewhere, be it in a corner inside one of them, do not count as one.
-bool ChartMerge::makes_disk(std::uint32_t a, std::uint32_t b) {
-  round_ += 3;
-  const std::uint32_t inside = round_ - 2, on_border = round_ - 1, shared = round_;
-  for (const std::uint32_t t : charts_[a].triangles)
-    for (const std::uint32_t p : surface_.triangles[t]) marks_[p] = inside;
-  std::size_t shared_edges = 0, shared_corners = 0;
-  for (const std::uint32_t h : charts_[a].border) {
-    marks_[start_of(h)] = on_border;
-    shared_edges += opposites_[h] != kNoIndex && chart_of_[opposites_[h] / 3] == b;
+/// Half-edges of a whose opposites are b's, one after the other on both borders: the longest such path. Disks
+/// that are glued along one path make a disk, whatever else they share. Empty when they share a whole border.
+std::vector<std::uint32_t> ChartMerge::longest_common_path(std::uint32_t a, std::uint32_t b) const {
+  std::vector<std::uint32_t> shared;
+  for (const std::uint32_t h : charts_[a].border)
+    if (opposites_[h] != kNoIndex && chart_of_[opposites_[h] / 3] == b) shared.push_back(h);
+  std::sort(shared.begin(), shared.end(),
+            [&](std::uint32_t g, std::uint32_t h) { return vertices_[g] < vertices_[h]; });
+  const auto following = [&](std::uint32_t h) {
+    const std::uint32_t end = vertices_[next_corner(h)];
+    const auto at = std::lower_bound(shared.begin(), shared.end(), end,
+                                     [&](std::uint32_t g, std::uint32_t v) { return vertices_[g] < v; });
+    if (at == shared.end() || vertices_[*at] != end) return kNoIndex;
+    return vertices_[next_corner(opposites_[*at])] == vertices_[opposites_[h]] ? *at : kNoIndex;
+  };
+  std::vector<std::uint32_t> starts = shared;
+  for (const std::uint32_t h : shared)
+    if (const std::uint32_t next = following(h); next != kNoIndex) std::erase(starts, next);
+  std::sort(starts.begin(), starts.end());
+  std::vector<std::uint32_t> best;
+  double longest = 0;
+  for (const std::uint32_t start : starts) {
+    std::vector<std::uint32_t> path;
+    double path_length = 0;
+    for (std::uint32_t h = start; h != kNoIndex; h = following(h)) {
+      path.push_back(h);
+      path_length += lengths_[h];
+    }
+    if (path_length > longest) longest = path_length, best = std::move(path);
   }
-  for (const std::uint32_t h : charts_[b].border)
-    if (std::uint32_t& mark = marks_[start_of(h)]; mark == on_border) mark = shared, ++shared_corners;
-  if (shared_corners != shared_edges + 1) return false;
-  return std::all_of(charts_[b].triangles.begin(), charts_[b].triangles.end(), [&](std::uint32_t t) {
-    return std::all_of(surface_.triangles[t].begin(), surface_.triangles[t].end(),
-                       [&](std::uint32_t p) { return marks_[p] != inside && marks_[p] != on_border; });
-  });
+  if (best.empty()) return best;
+  // A path that comes back to its beginning on one of the borders would leave a ring, or a sphere.
+  const std::uint32_t first = best.front(), last = best.back();
+  if (vertices_[first] == vertices_[next_corner(last)] ||
+      vertices_[next_corner(opposites_[first])] == vertices_[opposites_[last]])
+    best.pop_back();
+  return best;
 }
 
-std::vector<std::uint32_t> ChartMerge::joint_border(std::uint32_t a, std::uint32_t b) const {
+/// Gives the corners of `triangles`, which lie on the other side of the path, the vertices of this side.
+void ChartMerge::glue(std::span<const std::uint32_t> path, std::span<const std::uint32_t> triangles) {
+  std::vector<std::uint32_t> old;
+  const auto rename = [&](std::uint32_t from, std::uint32_t to) {
+    renamed_[from] = to;
+    old.push_back(from);
+  };
+  for (const std::uint32_t h : path) {
+    rename(vertices_[next_corner(opposites_[h])], vertices_[h]);
+    rename(vertices_[opposites_[h]], vertices_[next_corner(h)]);
+  }
+  for (const std::uint32_t t : triangles)
+    for (std::uint32_t c = 3 * t; c < 3 * t + 3; ++c)
+      if (renamed_[vertices_[c]] != kNoIndex) vertices_[c] = renamed_[vertices_[c]];
+  for (const std::uint32_t v : old) renamed_[v] = kNoIndex;
+}
+
+std::vector<std::uint32_t> ChartMerge::joint_border(std::uint32_t a, std::uint32_t b,
+                                                    std::span<const std::uint32_t> path) {
+  for (const std::uint32_t h : path) glued_[h] = glued_[opposites_[h]] = 1;
   std::vector<std::uint32_t> border;
-  for (const auto& [from, to] : {std::pair{a, b}, std::pair{b, a}})
-    for (const std::uint32_t h : charts_[from].border)
-      if (opposites_[h] == kNoIndex || chart_of_[opposites_[h] / 3] != to) border.push_back(h);
+  for (const std::uint32_t chart : {a, b})
+    for (const std::uint32_t h : charts_[chart].border)
+      if (!glued_[h]) border.push_back(h);
+  for (const std::uint32_t h : path) glued_[h] = glued_[opposites_[h]] = 0;
   return border;
 }
 
@@ -135,10 +175,17 @@ bool ChartMerge::try_merge(std::uint32_t a, std::uint32_t b) {
   if (charts_[a].triangles.size() < charts_[b].triangles.size()) std::swap(a, b);
   GrowingChart& into = charts_[a];
   GrowingChart& from = charts_[b];
-  if (!makes_disk(a, b)) return false;
-  std::vector<std::uint32_t> border = joint_border(a, b), triangles = into.triangles;
+  const std::vector<std::uint32_t> path = longest_common_path(a, b);
+  if (path.empty()) return false;  // they close around each other
+  std::vector<std::uint32_t> border = joint_border(a, b, path), triangles = into.triangles, before;
   triangles.insert(triangles.end(), from.triangles.begin(), from.triangles.end());
-  if (!layout_.try_disk(triangles, border, into.area_normal + from.area_normal)) return false;
+  for (const std::uint32_t t : from.triangles)
+    before.insert(before.end(), &vertices_[3 * t], &vertices_[3 * t] + 3);
+  glue(path, from.triangles);
+  if (!layout_.try_disk(triangles, border, vertices_, into.area_normal + from.area_normal)) {
+    for (std::size_t i = 0; i < before.size(); ++i) vertices_[3 * from.triangles[i / 3] + i % 3] = before[i];
+    return false;
+  }
   layout_.keep_tried(triangles);
   into.border = std::move(border);
   into.area_normal = into.area_normal + from.area_normal;

@@ -27,6 +27,8 @@ class ChartMerge {
   void run(const RunContext& context);
   const std::vector<GrowingChart>& charts() const { return charts_; }
   const ChartLayout& layout() const { return layout_; }
+  /// Per corner 3 t + k: corners that are one vertex of a chart have one number, below 3 times the triangles.
+  const std::vector<std::uint32_t>& vertices() const { return vertices_; }
 
  private:
   void measure_triangles();
@@ -35,9 +37,11 @@ class ChartMerge {
   void start_charts();
   void queue_neighbours(std::uint32_t chart, bool later_ones_only);
   double merge_cost(const GrowingChart& a, const GrowingChart& b, double shared_length) const;
-  bool makes_disk(std::uint32_t a, std::uint32_t b);
+  std::vector<std::uint32_t> longest_common_path(std::uint32_t a, std::uint32_t b) const;
+  void glue(std::span<const std::uint32_t> path, std::span<const std::uint32_t> triangles);
   bool try_merge(std::uint32_t a, std::uint32_t b);
-  std::vector<std::uint32_t> joint_border(std::uint32_t a, std::uint32_t b) const;
+  std::vector<std::uint32_t> joint_border(std::uint32_t a, std::uint32_t b,
+                                          std::span<const std::uint32_t> path);
   std::uint32_t start_of(std::uint32_t half_edge) const {
     return surface_.triangles[half_edge / 3][half_edge % 3];
   }
@@ -51,10 +55,11 @@ class ChartMerge {
   std::vector<GrowingChart> charts_;
   PairQueue queue_;
   ChartLayout layout_;
-  std::vector<std::uint32_t> marks_;    // per position: the last round that has marked it
-  std::vector<double> shared_lengths_;  // per chart; 0 between calls
+  std::vector<std::uint32_t> vertices_;  // per corner: corners that are one vertex of a chart have one number
+  std::vector<std::uint8_t> glued_;      // per half-edge: 1 on the path in hand
+  std::vector<std::uint32_t> renamed_;   // per vertex: its new number, or kNoIndex
+  std::vector<double> shared_lengths_;   // per chart; 0 between calls
   std::vector<std::uint32_t> neighbours_;
-  std::uint32_t round_ = 0;
 };
 
 }  // namespace texmesh

@@ -13,12 +13,12 @@ namespace {
 
 struct BorderSegment {
   Vec2d from, to;
-  std::uint32_t from_position = 0, to_position = 0;
+  std::uint32_t from_vertex = 0, to_vertex = 0;
   double left() const { return std::min(from.x, to.x); }
   double right() const { return std::max(from.x, to.x); }
   bool shares_end(const BorderSegment& o) const {
-    return from_position == o.from_position || from_position == o.to_position ||
-           to_position == o.from_position || to_position == o.to_position;
+    return from_vertex == o.from_vertex || from_vertex == o.to_vertex || to_vertex == o.from_vertex ||
+           to_vertex == o.to_vertex;
   }
 };
 
@@ -78,17 +78,16 @@ FlatStretch flat_stretch(const OwnPlane& own, const Vec2d* p) {
   return {largest2, largest2 > 0 ? determinant * determinant / largest2 : 0, determinant * own.area()};
 }
 
-bool border_is_simple(const ProxySurface& surface, std::span<const std::uint32_t> half_edges,
+bool border_is_simple(std::span<const std::uint32_t> half_edges, const std::vector<std::uint32_t>& vertices,
                       const std::vector<Vec2d>& places) {
   std::vector<BorderSegment> segments;
   segments.reserve(half_edges.size());
   for (const std::uint32_t h : half_edges) {
     const std::uint32_t next = next_corner(h);
-    segments.push_back(
-        {places[h], places[next], surface.triangles[h / 3][h % 3], surface.triangles[next / 3][next % 3]});
+    segments.push_back({places[h], places[next], vertices[h], vertices[next]});
   }
   std::sort(segments.begin(), segments.end(), [](const BorderSegment& a, const BorderSegment& b) {
-    return a.left() != b.left() ? a.left() < b.left() : a.from_position < b.from_position;
+    return a.left() != b.left() ? a.left() < b.left() : a.from_vertex < b.from_vertex;
   });
   for (std::size_t i = 0; i < segments.size(); ++i)
     for (std::size_t j = i + 1; j < segments.size() && segments[j].left() <= segments[i].right(); ++j)

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "format/base/vec.h"
-#include "stages/proxies/atlas_mesh.h"
 
 namespace texmesh {
 
@@ -33,9 +32,10 @@ struct FlatStretch {
 };
 FlatStretch flat_stretch(const OwnPlane& own, const Vec2d* places);
 
-/// Half-edges 3 t + k, which are a chart's border, do not meet in the plane but at common corners; `places`:
-/// per corner 3 t + k. With no triangle flipped, this says that no two triangles of a disk overlap.
-bool border_is_simple(const ProxySurface& surface, std::span<const std::uint32_t> half_edges,
+/// Half-edges 3 t + k, which are a chart's border, do not meet in the plane but at common vertices.
+/// `vertices` and `places`: per corner 3 t + k. With no triangle flipped, this says that no two triangles of
+/// a disk overlap.
+bool border_is_simple(std::span<const std::uint32_t> half_edges, const std::vector<std::uint32_t>& vertices,
                       const std::vector<Vec2d>& places);
 
 /// The unit vector along one side of the smallest box around the points; {1, 0} when they have no extent.

@@ -47,6 +47,13 @@ SurfaceCharts segment_charts(const ProxySurface& surface, const RunContext& cont
     }
     out.chart_of[t] = number[chart_of[t]];
   }
+  out.vertex_of.resize(out.plane.size());
+  std::vector<std::uint32_t> vertex(out.plane.size(), kNoIndex);
+  for (std::size_t c = 0; c < out.plane.size(); ++c) {
+    std::uint32_t& renumbered = vertex[merge.vertices()[c]];
+    if (renumbered == kNoIndex) renumbered = out.vertex_count++;
+    out.vertex_of[c] = renumbered;
+  }
   return out;
 }
 

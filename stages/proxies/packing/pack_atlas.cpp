@@ -206,23 +206,16 @@ std::optional<AtlasMesh> pack_atlas(const ProxySurface& surface, const SurfaceCh
   mesh.chart_count = charts.chart_count;
   mesh.width_px = width_px, mesh.height_px = height_px, mesh.gutter_px = gutter_px;
   mesh.triangles.resize(surface.triangles.size());
-  // Corners by chart, then by position: those of one chart at one position are one vertex.
-  std::vector<std::uint32_t> corners(3 * surface.triangles.size());
-  std::iota(corners.begin(), corners.end(), 0);
-  const auto key = [&](std::uint32_t c) {
-    return std::pair{charts.chart_of[c / 3], surface.triangles[c / 3][c % 3]};
-  };
-  std::sort(corners.begin(), corners.end(),
-            [&](std::uint32_t a, std::uint32_t b) { return key(a) != key(b) ? key(a) < key(b) : a < b; });
-  for (std::size_t i = 0; i < corners.size(); ++i) {
-    const std::uint32_t c = corners[i];
-    if (i == 0 || key(c) != key(corners[i - 1])) {
-      const Vec2d p = packing.texel(c, (*placed)[charts.chart_of[c / 3]]);
-      mesh.position_of.push_back(surface.triangles[c / 3][c % 3]);
-      mesh.positions.push_back(surface.positions[mesh.position_of.back()]);
-      mesh.uvs.push_back({static_cast<float>(p.x / width_px), static_cast<float>(p.y / height_px)});
-    }
-    mesh.triangles[c / 3][c % 3] = static_cast<std::uint32_t>(mesh.positions.size() - 1);
+  mesh.positions.resize(charts.vertex_count);
+  mesh.uvs.resize(charts.vertex_count);
+  mesh.position_of.resize(charts.vertex_count);
+  for (std::size_t c = 0; c < charts.vertex_of.size(); ++c) {
+    const std::uint32_t vertex = charts.vertex_of[c];
+    const Vec2d p = packing.texel(c, (*placed)[charts.chart_of[c / 3]]);
+    mesh.triangles[c / 3][c % 3] = vertex;
+    mesh.position_of[vertex] = surface.triangles[c / 3][c % 3];
+    mesh.positions[vertex] = surface.positions[mesh.position_of[vertex]];
+    mesh.uvs[vertex] = {static_cast<float>(p.x / width_px), static_cast<float>(p.y / height_px)};
   }
   return mesh;
 }

@@ -28,7 +28,12 @@ void expect_sound(const ProxySurface& s, const SurfaceCharts& charts) {
   ASSERT_EQ(charts.chart_of.size(), s.triangles.size());
   ASSERT_EQ(charts.plane.size(), 3 * s.triangles.size());
   ASSERT_EQ(charts.size.size(), charts.chart_count);
-  std::map<std::pair<std::uint32_t, std::uint32_t>, Vec2d> place;
+  struct Vertex {
+    std::uint32_t chart, position;
+    Vec2d place;
+    bool operator==(const Vertex&) const = default;
+  };
+  std::map<std::uint32_t, Vertex> vertices;
   std::vector<double> area(charts.chart_count, 0), flat_area(area), stretch(area);
   std::vector<std::uint32_t> group(charts.chart_count, kNoIndex);
   std::uint32_t seen = 0;
@@ -39,8 +44,8 @@ void expect_sound(const ProxySurface& s, const SurfaceCharts& charts) {
     EXPECT_EQ(group[c], s.group[t]);
     for (std::size_t k = 0; k < 3; ++k) {
       const Vec2d p = charts.plane[3 * t + k];
-      const auto [at, fresh] = place.try_emplace({c, s.triangles[t][k]}, p);
-      EXPECT_EQ(at->second, p);
+      const Vertex vertex{c, s.triangles[t][k], p};
+      EXPECT_TRUE(vertices.try_emplace(charts.vertex_of[3 * t + k], vertex).first->second == vertex);
       EXPECT_TRUE(p.x >= 0 && p.x <= charts.size[c].x && p.y >= 0 && p.y <= charts.size[c].y);
     }
     const OwnPlane own(corners_of(s, t));
@@ -52,6 +57,8 @@ void expect_sound(const ProxySurface& s, const SurfaceCharts& charts) {
     stretch[c] += own.area() * (1 / f.least2 + 1 / f.largest2) / 2;
   }
   EXPECT_EQ(seen, charts.chart_count);
+  EXPECT_EQ(vertices.size(), charts.vertex_count);
+  EXPECT_TRUE(vertices.empty() || vertices.rbegin()->first + 1 == charts.vertex_count);
   for (std::uint32_t c = 0; c < charts.chart_count; ++c) {
     EXPECT_NEAR(flat_area[c] / area[c], 1, 1e-6);
     EXPECT_LE(std::sqrt(stretch[c] / area[c]), 1.2501);
@@ -79,15 +86,16 @@ void expect_no_overlap(const ProxySurface& s, const SurfaceCharts& charts) {
 
 TEST(SegmentCharts, SurfacesOfManyKindsBecomeSoundCharts) {
   testing::Random random{9};
-  const std::vector<Soup> soups{soup_of(testing::bumpy_sphere(16, 32, 0.2f)),
-                                testing::torus(20, 12),
-                                soup_of(testing::sheet(12, 0.3f)),
-                                testing::moebius_strip(24),
-                                testing::book(7),
-                                soup_of(testing::cube()),
-                                soup_of(testing::sliver_sheet(10)),
-                                soup_of(testing::dust(30, 0.1f)),
-                                soup_of(testing::random_soup(random, 40, 300))};
+  std::vector<Soup> soups{soup_of(testing::bumpy_sphere(16, 32, 0.2f)),
+                          testing::torus(20, 12),
+                          soup_of(testing::sheet(12, 0.3f)),
+                          testing::moebius_strip(24),
+                          testing::book(7),
+                          soup_of(testing::cube()),
+                          soup_of(testing::sliver_sheet(10)),
+                          soup_of(testing::dust(30, 0.1f)),
+                          soup_of(testing::random_soup(random, 40, 300))};
+  for (int i = 0; i < 12; ++i) soups.push_back(soup_of(testing::random_soup(random, 9, 60, 3)));
   for (const Soup& soup : soups) {
     const ProxySurface s = soup.surface();
     const SurfaceCharts charts = segment_charts(s, RunContext{});
@@ -119,6 +127,17 @@ TEST(SegmentCharts, PleatsUnfoldWithoutStretch) {
   }
 }
 
+TEST(SegmentCharts, ATubeIsCutAndUnrolled) {
+  const ProxySurface s = testing::quad_rows(3, 12, [](std::uint32_t i, std::uint32_t j) {
+                           const double a = 6.283185307179586 * (j % 12) / 12;
+                           return to_float(Vec3d{std::cos(a), std::sin(a), 0.7 * i});
+                         }).surface();
+  ASSERT_EQ(s.positions.size(), 48u);
+  const SurfaceCharts charts = segment_charts(s, RunContext{});
+  EXPECT_EQ(charts.chart_count, 1u);
+  EXPECT_EQ(charts.vertex_count, 52u);  // the cut's positions have two vertices each
+}
+
 TEST(SegmentCharts, ACubeIsTwoChartsAtMost) {
   const ProxySurface s = soup_of(testing::cube()).surface();
   EXPECT_LE(segment_charts(s, RunContext{}).chart_count, 2u);
@@ -144,7 +163,7 @@ TEST(SegmentCharts, GroupsAndComponentsStayApart) {
   EXPECT_EQ(segment_charts(two.surface(), RunContext{}).chart_count, 2u);
 }
 
-TEST(SegmentCharts, SheetsThatMeetInAPointAreNoDisk) {
+TEST(SegmentCharts, SheetsThatMeetInAPointStayApart) {
   const Soup bow{{{0, 0, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}, {-1, -1, 0}}, {{0, 1, 2}, {0, 3, 4}}, {}};
   EXPECT_EQ(segment_charts(bow.surface(), RunContext{}).chart_count, 2u);
 }
@@ -168,6 +187,7 @@ TEST(SegmentCharts, TwoRunsGiveTheSameBytes) {
   EXPECT_EQ(a.chart_of, b.chart_of);
   EXPECT_EQ(a.plane, b.plane);
   EXPECT_EQ(a.size, b.size);
+  EXPECT_EQ(a.vertex_of, b.vertex_of);
 }
 
 TEST(SegmentCharts, NothingIsNoChart) {
