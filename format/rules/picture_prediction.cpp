@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kLeastFlip = 1e-6;                    // what logarithms take for 0
 constexpr double kFlattest = 0.25, kSteepest = 1;      // of the lines that go on before the first sample
-constexpr double kOneSample = 0.5;                     // slope of the line through a single one
+constexpr double kBehindOneSample = 0.5;               // slope of the line that goes on behind a single one
 constexpr double kLeastDssim = 1e-9, kMostFlip = 1.0;  // 0 of texels is 0 of the picture
 
 /// Two neighbours on an axis and the way between them.
@@ -84,7 +84,10 @@ GroupCurve::GroupCurve(const QualityTable& table, PlaneGroup group, double displ
 double GroupCurve::Curve::at(double texel_dssim) const {
   const double x = portable::log(texel_dssim);
   const std::size_t n = log_dssim.size();
-  if (n == 1) return portable::exp(log_flip[0] + kOneSample * (x - log_dssim[0]));
+  if (n == 1) {
+    const double from = x - log_dssim[0];
+    return portable::exp(log_flip[0] + (from < 0 ? kSteepest : kBehindOneSample) * from);
+  }
   std::size_t i = 0;
   while (i + 2 < n && log_dssim[i + 1] < x) ++i;
   double slope = (log_flip[i + 1] - log_flip[i]) / (log_dssim[i + 1] - log_dssim[i]);
@@ -93,10 +96,11 @@ double GroupCurve::Curve::at(double texel_dssim) const {
 }
 
 double GroupCurve::Curve::at_level(double level) const {
-  const double at = std::clamp(level - finest_level, 0.0, static_cast<double>(mips.size() - 1));
-  const double whole = std::floor(at);
-  const auto i = static_cast<std::size_t>(whole);
-  return mixed(mips[i], mips[std::min(i + 1, mips.size() - 1)], at - whole);
+  if (mips.size() == 1) return mips[0];
+  const double at = std::max(0.0, level - finest_level);
+  const double first = std::min(std::floor(at), static_cast<double>(mips.size() - 2));
+  const auto i = static_cast<std::size_t>(first);
+  return mixed(mips[i], mips[i + 1], at - first);
 }
 
 double GroupCurve::coded(double texel_dssim, const TexelGrowth& growth) const {
@@ -117,7 +121,8 @@ double GroupCurve::preview() const {
 double GroupCurve::halved(const TexelGrowth& growth, std::uint32_t mip) const {
   if (curves_.empty()) return 0;
   const auto at = [&](std::size_t i) {
-    return std::max(0.0, curves_[i].at_level(growth[i]) - curves_[i].at_level(growth[i] - mip));
+    const double lost = curves_[i].at_level(growth[i]) - curves_[i].at_level(growth[i] - mip);
+    return std::clamp(lost, 0.0, kMostFlip);
   };
   return mixed(at(0), at(1), part_);
 }

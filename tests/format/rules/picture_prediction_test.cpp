@@ -40,7 +40,8 @@ TEST(GroupCurve, GoesThroughTheSamples) {
   EXPECT_EQ(at64.halved({-9, -9}, 4), 0) << "the finest level's";
   EXPECT_EQ(at64.halved({1, 1}, 4), 0.0625);
   EXPECT_EQ(at64.halved({1.5, 1.5}, 4), 0.09375);
-  EXPECT_EQ(at64.halved({3, 3}, 8), 0.125) << "the last level's";
+  EXPECT_EQ(at64.halved({3, 3}, 8), 0.1875) << "goes on behind the last level";
+  EXPECT_EQ(at64.halved({99, 99}, 200), 1);
 }
 
 TEST(GroupCurve, NothingLostIsNothing) {
@@ -129,7 +130,8 @@ TEST(GroupCurve, OneSampleIsALine) {
   for (TextureLosses& l : t.groups[0].sizes) l = {{0.25f}, losses({0.125f}), losses({0}), {}, {}};
   const GroupCurve curve(t, PlaneGroup::kColour, 64);
   EXPECT_NEAR(curve.coded(0.25), 0.125, 1e-12);
-  EXPECT_NEAR(curve.coded(0.0625), 0.0625, 1e-12);
+  EXPECT_NEAR(curve.coded(0.0625), 0.125 / 4, 1e-12);
+  EXPECT_NEAR(curve.coded(1), 0.125 * 2, 1e-12) << "above it less steep";
 }
 
 TEST(GeometryFlip, BetweenScalesAndHeights) {

@@ -55,16 +55,17 @@ class Curve {
   at(logDssim: number): number {
     const [x, y] = [this.logDssim_, this.logFlip_];
     let i = 0;
-    if (x.length === 1) return exp(y[0] + 0.5 * (logDssim - x[0]));
+    if (x.length === 1) return exp(y[0] + (logDssim < x[0] ? 1 : 0.5) * (logDssim - x[0]));
     while (i + 2 < x.length && x[i + 1] < logDssim) ++i;
     const slope = (y[i + 1] - y[i]) / (x[i + 1] - x[i]);
     return exp(y[i] + (logDssim < x[0] ? clamp(slope, 0.25, 1) : slope) * (logDssim - x[i]));
   }
   atLevel(level: number): number {
     const mips = this.mips_;
-    const at = clamp(level - this.finestLevel_, 0, mips.length - 1);
-    const whole = Math.floor(at);
-    return mixed(mips[whole], mips[Math.min(whole + 1, mips.length - 1)], at - whole);
+    if (mips.length === 1) return mips[0];
+    const at = Math.max(0, level - this.finestLevel_);
+    const first = Math.min(Math.floor(at), mips.length - 2);
+    return mixed(mips[first], mips[first + 1], at - first);
   }
 }
 
@@ -105,7 +106,7 @@ export class GroupCurve {
   /** FLIP of the source's texels, halved `mip` times; 0 for full size. */
   halved(growth: TexelGrowth, mip: number): number {
     const [first, second] = this.curves_;
-    const at = (curve: Curve, level: number): number => Math.max(0, curve.atLevel(level) - curve.atLevel(level - mip));
+    const at = (curve: Curve, level: number): number => clamp(curve.atLevel(level) - curve.atLevel(level - mip), 0, 1);
     return first ? mixed(at(first, growth[0]), at(second, growth[1]), this.part_) : 0;
   }
 }

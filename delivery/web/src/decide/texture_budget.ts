@@ -10,8 +10,7 @@ import { PerGroup, PlaneChoice, TextureLoss, everyGroup, pictureFlip, planesForD
 // delivery/cpp/decide/texture_budget.cpp, bit for bit.
 
 /** Levels beside the display's that are tried. */
-const mostCoarser = 4;
-const mostFiner = 4;
+const mostLevels = 4;
 /** FLIP that finer planes have to save. */
 const worthwhile = 1e-4;
 const reweightings = 2;
@@ -56,11 +55,11 @@ export function* budgetSteps(loss: TextureLoss, options: SpendingOptions, bytes:
   let from: PerGroup | undefined = everyGroup(0);
   let best = spend(planesForDisplay(data, displayedPx));
   // Levels beyond the ladder's ends stand for the same planes.
-  const nameOf = (planes: PlaneChoice[]): string => planes.map((p) => p.plane).join();
+  const nameOf = (planes: PlaneChoice[]): string => `${planes.map((p) => p.plane)}`;
   const tried = new Set([nameOf(best.planes)]);
   // One level coarser, of all groups together, then of each that the package has; then one level finer.
   const groups = [everyGroup(1), ...loss.weights(best.planes).flatMap((w, g) => (w > 0 ? [everyGroup(0).map((_, i) => +(i === g))] : []))];
-  const steps = [1, -1].flatMap((by) => groups.map((step) => step.map((one) => by * one)));
+  const steps = [...groups, ...groups.map((step) => step.map((one) => -one))];
   while (from) {
     // Downhill.
     const at: PerGroup = from;
@@ -69,12 +68,12 @@ export function* budgetSteps(loss: TextureLoss, options: SpendingOptions, bytes:
       const to = at.map((level, g) => level + step[g]) as unknown as PerGroup;
       const planes = planesForDisplay(data, displayedPx, to);
       const name = nameOf(planes);
-      if (Math.max(...to) > mostCoarser || Math.min(...to) < -mostFiner || tried.has(name)) continue;
+      if (to.some((level) => Math.abs(level) > mostLevels) || tried.has(name)) continue;
       tried.add(name);
       yield best;
       const now = spend(planes);
       // Finer planes take memory: they have to look better, not only as good.
-      if (now.flip >= best.flip - (Math.min(...step) < 0 ? worthwhile : 0)) continue;
+      if (now.flip >= best.flip - (step[0] + step[1] + step[2] < 0 ? worthwhile : 0)) continue;
       best = now;
       from = to;
     }
