@@ -459,9 +459,9 @@ def read_quality(data, m, textures):
             require(rises([0] + [check(s, "texelDssim", "number", 0, 2, "Q01") for s in samples]), "Q01", "texelDssim")
             check_losses(take(losses, "coded", "object"), len(samples))
             check_losses(take(losses, "preview", "object"), 1)
-            for name, most in (("finer", 9), ("coarser", 8)):
+            for name, least, most in (("finer", 1, 9), ("coarser", 0, 8)):
                 mips = take(losses, name, "object")
-                check_losses(mips, len(take(mips, "flip", "list", 0, most, "Q01")))
+                check_losses(mips, len(take(mips, "flip", "list", least, most, "Q01")))
     heights = m["scales"]["displayPxFlip"][1:]
     require(all(h <= sizes[-1] * (1 + 1e-5) for h in heights), "M13", "displayPxFlip beyond the pictures")
     names = [group["group"] for group in groups]

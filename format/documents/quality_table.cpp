@@ -71,7 +71,7 @@ TextureLosses read_texture_losses(const JsonAt& at) {
   }
   t.coded = read_losses(at["coded"], t.texel_dssim.size());
   t.preview = read_losses(at["preview"], 1);
-  t.finer = read_losses(at["finer"], at["finer"]["flip"].array(0, kMaxFinerLevels + 1));
+  t.finer = read_losses(at["finer"], at["finer"]["flip"].array(1, kMaxFinerLevels + 1));
   t.coarser = read_losses(at["coarser"], at["coarser"]["flip"].array(0, kMaxCoarserLevels));
   return t;
 }

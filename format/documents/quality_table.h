@@ -48,7 +48,7 @@ struct TextureLosses {
   PictureLosses coded;
   PictureLosses preview;  // one: with the previews of all the group's textures
   /// With the source's texels of the planes shown at that height, then of mips that are 1, 2 .. levels finer;
-  /// 0 to kMaxFinerLevels + 1 of them. `flip` does not rise. A client shows such texels where a rung loses
+  /// 1 to kMaxFinerLevels + 1 of them. `flip` does not rise. A client shows such texels where a rung loses
   /// nothing: they may still be coarser than what the source shows there.
   PictureLosses finer;
   /// With the source's texels of mips that are 1, 2 .. levels coarser than the planes shown at that height.

@@ -43,7 +43,8 @@ struct QualityOptions {
 /// - Pictures: perspective, 4 x 4 samples a pixel. The camera frames the object's bounding sphere. The
 ///   displayed height is the length on screen that O_V has at the sphere's centre. All maps of the material
 ///   show that the renderer knows: base colour with alpha, metallic-roughness, normal, occlusion, emission;
-///   all of them read with mips, whatever the sampler says.
+///   all of them read with mips, whatever the sampler says, where scales are compared, and as the source's
+///   samplers read where textures are.
 /// - Heights: largest_px, and all that are sqrt(2) apart below it, down to kLeastSwitchPx. The table's sizes
 ///   are the largest, its half and its quarter.
 /// - Switch sizes: a scale passes a height when in every view the mean of FLIP is at most flip_mean and its
@@ -59,14 +60,15 @@ struct QualityOptions {
 ///   other one and the coarsest; at the largest those that still pass and the coarsest. The others follow by
 ///   the ratio to the size below, linear between the neighbours in the list of scales.
 /// - Groups: one group's planes are coded, the others have the source's texels. At the least size
-///   `rung_samples` of the ladder are rendered, first and last among them, and mips that are 1 and 2 levels
-///   coarser; at the half the lowest rung, and one coarser level of textures that have no finer plane for it.
-///   Previews are rendered at all sizes. Other rungs follow along the curve of the size below, by
-///   GroupCurve::kLossPerDoubling where texels are larger on the screen, and by the ratio to it where both
-///   were rendered; the highest rung's ratio is 1. Planes are those that a client shows at the size
-///   (format/rules/mip_choice.h). Planes of one group have the rung whose quality is nearest to that of the
-///   group's first plane. FLIP of knots is scaled so that the mean over fragments of GroupCurve::coded() is
-///   what was measured for whole planes.
+///   `rung_samples` of the ladder are rendered, first and last among them, and the source's mips: those
+///   that are shown, up to 4 levels finer and 2 coarser; at the half the lowest rung, and one coarser level
+///   of textures that have no finer plane for it. Previews are rendered at all sizes. Other rungs follow
+///   along the curve of the size below, by GroupCurve::kLossPerDoubling where texels are larger on the
+///   screen, and by the ratio to it where both were rendered; the highest rung's ratio is 1. Of a model
+///   with a sampler that reads level 0 alone, all of this is rendered at every size. Planes are those that
+///   a client shows at the size (format/rules/mip_choice.h). Planes of one group have the rung whose
+///   quality is nearest to that of the group's first plane. FLIP of knots is scaled so that the mean over
+///   fragments of GroupCurve::coded() is what was measured for whole planes.
 /// - Exponent and error: of the samples with a coarser scale and all groups coded, 4 at the least size and 1
 ///   at the half, the exponent that predicts best.
 /// - Where S_0 covers next to nothing of the pictures (a scan and a stray triangle a thousand times its size

@@ -10,8 +10,7 @@
 namespace texmesh {
 namespace {
 
-constexpr int kMostCoarser = 4, kMostFiner = 4;  // levels beside the display's that are tried
-constexpr double kWorthwhileFlip = 1e-4;         // that finer planes must save
+constexpr double kWorthwhileFlip = 1e-4;  // that finer planes must save
 constexpr int kReweightings = 2;
 constexpr double kLossUnit = 1099511627776.0;  // 2^40: losses as spend_bytes counts them
 constexpr double kLeastWeight = 1e-3;          // of a group beside the others
@@ -51,22 +50,18 @@ PerGroup slopes(const QualityTable& table, const TextureBudget& at) {
   return slopes;
 }
 
-/// One level coarser, of all groups together, then of each that the package has; then one level finer.
-std::vector<Levels> level_steps(const PerGroup& surface) {
+/// One level coarser, of all groups together, then of each; then one level finer.
+std::vector<Levels> level_steps() {
   std::vector<Levels> steps;
   for (const int by : {1, -1}) {
     steps.push_back({by, by, by});
-    for (std::size_t g = 0; g < kPlaneGroups; ++g) {
-      Levels step{};
-      step[g] = by;
-      if (surface[g] > 0) steps.push_back(step);
-    }
+    for (std::size_t g = 0; g < kPlaneGroups; ++g) steps.push_back({}), steps.back()[g] = by;
   }
   return steps;
 }
 
-/// Planes of groups and the levels that they stand for. Levels beyond the ladder's ends stand for the same
-/// planes.
+/// Looks for the levels whose planes look best. Levels beyond the ladder's ends, and those of groups that the
+/// package does not have, stand for planes that were tried.
 class LevelSearch {
  public:
   LevelSearch(TextureLoss& loss, const ListOptions& options, std::uint64_t bytes)
@@ -76,7 +71,7 @@ class LevelSearch {
 
   /// Downhill: the best of all steps, until none is better.
   TextureBudget find() {
-    const std::vector<Levels> steps = level_steps(loss_.weights(best_.planes));
+    const std::vector<Levels> steps = level_steps();
     for (bool better = true; better;) {
       better = false;
       const Levels from = at_;
@@ -89,7 +84,6 @@ class LevelSearch {
   bool take(const Levels& from, const Levels& step) {
     Levels to = from;
     for (std::size_t g = 0; g < kPlaneGroups; ++g) to[g] += step[g];
-    if (std::ranges::max(to) > kMostCoarser || std::ranges::min(to) < -kMostFiner) return false;
     std::optional<TextureBudget> now = spend(to);
     const double most = best_.flip - (std::ranges::min(step) < 0 ? kWorthwhileFlip : 0);
     if (!now || now->flip >= most) return false;

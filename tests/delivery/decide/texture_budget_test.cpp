@@ -29,11 +29,11 @@ PackageReader open_pair(float normal_part, float exponent = 1) {
   parts.manifest.plane_count = 2;
   parts.quality.exponent = exponent;
   parts.quality.sizes_px = {1000};
-  const TextureLosses colour{{0.0625f, 0.5f}, losses({0.05f, 0.4f}), losses({0.4f}), {}, {}};
+  const TextureLosses colour{{0.0625f, 0.5f}, losses({0.05f, 0.4f}), losses({0.4f}), losses({0}), {}};
   const TextureLosses normal{{0.0625f, 0.5f},
                              losses({0.05f * normal_part, 0.4f * normal_part}),
                              losses({0.4f * normal_part}),
-                             {},
+                             losses({0}),
                              {}};
   parts.quality.groups = {{PlaneGroup::kColour, {colour}}, {PlaneGroup::kNormal, {normal}}};
   return PackageReader(open_container(memory_source(parts.build())));

@@ -21,7 +21,8 @@ QualityTable make_table() {
   t.geometry = {losses({0, 0.1f, 0.2f}), losses({0, 0.125f, 0.3f})};
   const TextureLosses small{
       {0.01f, 0.1f}, losses({0.02f, 0.07f}), losses({0.06f}), losses({0.02f, 0.01f, 0}), losses({0.05f})};
-  const TextureLosses large{{0.02f, 0.2f}, losses({0.03f, 0.09f}), losses({0.08f}), losses({}), losses({})};
+  const TextureLosses large{
+      {0.02f, 0.2f}, losses({0.03f, 0.09f}), losses({0.08f}), losses({0.0625f}), losses({})};
   t.groups = {{PlaneGroup::kColour, {small, large}}, {PlaneGroup::kData, {large, small}}};
   return t;
 }

@@ -38,18 +38,17 @@ function beyondSizes({ sizesPx }: QualityTable, displayedPx: number): number {
 class Curve {
   private readonly logDssim_: number[];
   private readonly logFlip_: number[];
-  /** Loss of mips from the finest sampled level on, and the level of the first. */
+  /** Loss of mips from the finest sampled level on, and how many levels finer than the planes shown the first is. */
   private readonly mips_: number[];
-  private readonly finestLevel_: number;
+  private readonly finer_: number;
   readonly preview: number;
 
   constructor({ texelDssim, coded, preview, finer, coarser }: TextureLosses, beyond: number) {
     let least = leastFlip;
     this.logDssim_ = [...texelDssim].map(log);
     this.logFlip_ = [...coded.flip].map((flip) => log((least = Math.max(least, flip))));
-    const shown = finer.flip.length > 0 ? [...finer.flip].reverse() : [0];
-    this.mips_ = [...shown, ...coarser.flip];
-    this.finestLevel_ = 1 - shown.length;
+    this.mips_ = [...[...finer.flip].reverse(), ...coarser.flip];
+    this.finer_ = finer.flip.length - 1;
     this.preview = Math.min(1, preview.flip[0] * beyond);
   }
   at(logDssim: number): number {
@@ -62,8 +61,8 @@ class Curve {
   }
   atLevel(level: number): number {
     const mips = this.mips_;
-    if (mips.length === 1) return mips[0];
-    const at = Math.max(0, level - this.finestLevel_);
+    if (mips.length < 2) return mips[0];
+    const at = Math.max(0, level + this.finer_);
     const first = Math.min(Math.floor(at), mips.length - 2);
     return mixed(mips[first], mips[first + 1], at - first);
   }

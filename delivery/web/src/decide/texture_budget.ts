@@ -9,8 +9,6 @@ import { PerGroup, PlaneChoice, TextureLoss, everyGroup, pictureFlip, planesForD
 
 // delivery/cpp/decide/texture_budget.cpp, bit for bit.
 
-/** Levels beside the display's that are tried. */
-const mostLevels = 4;
 /** FLIP that finer planes have to save. */
 const worthwhile = 1e-4;
 const reweightings = 2;
@@ -51,29 +49,29 @@ function slopesOf({ exponent }: QualityTable, { flip, losses }: TextureSpending)
 /** The steps of textureForBudget, so that a page can breathe between them; the last value is the result. */
 export function* budgetSteps(loss: TextureLoss, options: SpendingOptions, bytes: number): Generator<TextureSpending> {
   const { data, displayedPx } = loss;
-  const spend = (planes: PlaneChoice[]): TextureSpending => spendOn(loss, planes, options, bytes);
+  const tried = new Set<string>();
+  /** undefined: these planes were tried. Levels beyond the ladder's ends stand for the same planes. */
+  const spend = (levels: PerGroup): TextureSpending | undefined => {
+    const planes = planesForDisplay(data, displayedPx, levels);
+    const name = `${planes.map((p) => p.plane)}`;
+    if (tried.has(name)) return undefined;
+    tried.add(name);
+    return spendOn(loss, planes, options, bytes);
+  };
   let from: PerGroup | undefined = everyGroup(0);
-  let best = spend(planesForDisplay(data, displayedPx));
-  // Levels beyond the ladder's ends stand for the same planes.
-  const nameOf = (planes: PlaneChoice[]): string => `${planes.map((p) => p.plane)}`;
-  const tried = new Set([nameOf(best.planes)]);
-  // One level coarser, of all groups together, then of each that the package has; then one level finer.
-  const groups = [everyGroup(1), ...loss.weights(best.planes).flatMap((w, g) => (w > 0 ? [everyGroup(0).map((_, i) => +(i === g))] : []))];
-  const steps = [...groups, ...groups.map((step) => step.map((one) => -one))];
+  let best = spend(from)!;
+  // One level coarser, of all groups together, then of each; then one level finer.
+  const steps = [1, -1].flatMap((by) => [[by, by, by], [by, 0, 0], [0, by, 0], [0, 0, by]]);
   while (from) {
     // Downhill.
     const at: PerGroup = from;
     from = undefined;
     for (const step of steps) {
       const to = at.map((level, g) => level + step[g]) as unknown as PerGroup;
-      const planes = planesForDisplay(data, displayedPx, to);
-      const name = nameOf(planes);
-      if (to.some((level) => Math.abs(level) > mostLevels) || tried.has(name)) continue;
-      tried.add(name);
       yield best;
-      const now = spend(planes);
+      const now = spend(to);
       // Finer planes take memory: they have to look better, not only as good.
-      if (now.flip >= best.flip - (step[0] + step[1] + step[2] < 0 ? worthwhile : 0)) continue;
+      if (!now || now.flip >= best.flip - (step.includes(-1) ? worthwhile : 0)) continue;
       best = now;
       from = to;
     }

@@ -80,9 +80,9 @@ function readTexture(at: JsonAt): TextureLosses {
     if (!(v > before)) one.fail('a rising number above 0', v);
     return (before = v);
   }));
-  const mips = (one: JsonAt, most: number): PictureLosses => readLosses(one, one.at('flip').array(0, most));
+  const mips = (one: JsonAt, least: number): PictureLosses => readLosses(one, one.at('flip').array(least, 8 + least));
   const coded = readLosses(at.at('coded'), texelDssim.length);
-  return { texelDssim, coded, preview: readLosses(at.at('preview'), 1), finer: mips(at.at('finer'), 9), coarser: mips(at.at('coarser'), 8) };
+  return { texelDssim, coded, preview: readLosses(at.at('preview'), 1), finer: mips(at.at('finer'), 1), coarser: mips(at.at('coarser'), 0) };
 }
 
 /** Reads quality.json, strictly; FormatError names the place in the document. */

@@ -1,6 +1,6 @@
 import { fullSize, planesForDisplay, type PlaneChoice } from '../decide/texture_loss';
 import { InputError, throwIfAborted } from '../format/errors';
-import { fullSizePlanes, mostPreviewPx } from '../format/layout';
+import { mostPreviewPx } from '../format/layout';
 import type { PackageData } from '../format/package_data';
 import { type TextureInfo } from '../format/textures';
 import type { Levels } from '../worker/protocol';
@@ -22,9 +22,9 @@ export async function readPlaneData(load: LoadContext, scales: ScaleSource): Pro
   const [whole] = await Promise.all([reader.prefetchDocuments(signal), scales.openStream()]);
   // A short time may ask for coarser planes than the display's, a long one for finer ones.
   if (whole || Number.isFinite(load.limitS)) return reader.data(undefined, signal);
-  const base = [...Array(fullSizePlanes(await reader.textures(signal))).keys()];
-  const shown = planesFor(load, await reader.data(base, signal));
-  return reader.data([...base, ...shown.map((c) => c.plane)], signal);
+  const base = fullSize(await reader.textures(signal)).map((c) => c.plane);
+  const shown = planesFor(load, await reader.data(base, signal)).map((c) => c.plane);
+  return reader.data([...base, ...shown], signal);
 }
 
 /** Which planes show the textures of a load: choosing them, and showing them. */
