@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <utility>
 
 #include "stages/ladder/rung_loss.h"
@@ -13,6 +14,8 @@ namespace {
 // A rung with a tenth of a texture's bytes must lower the loss of loads by so many tenths of this part.
 constexpr double kGain = 0.05;
 constexpr double kLeastLoads = 0.01;
+// Of a JPEG's bytes.
+constexpr double kMostOfJpeg = 1.9;
 
 /// Indices of the rungs that `keep` marks, with those that they lean on.
 std::vector<std::size_t> kept_indices(std::vector<std::uint8_t> keep, bool incremental) {
@@ -26,15 +29,24 @@ std::vector<std::size_t> kept_indices(std::vector<std::uint8_t> keep, bool incre
 
 }  // namespace
 
+double most_bytes(const TexturePlane& base, const std::vector<Image>& images) {
+  if (images.empty() || images[base.image].format != ImageFormat::kJpeg)
+    return std::numeric_limits<double>::infinity();
+  return kMostOfJpeg * static_cast<double>(images[base.image].bytes.size());
+}
+
 std::vector<std::vector<std::size_t>> choose_rungs(const Fragments& fragments,
                                                    const std::vector<Pixels>& pixels,
                                                    const std::vector<PlaneLadder>& sample,
-                                                   const Previews& previews, const RunContext& context) {
+                                                   const Previews& previews, const std::vector<Image>& images,
+                                                   const RunContext& context) {
   RunContext quiet = context;
   quiet.progress = nullptr;
   std::vector<TextureWays> textures;
-  for (std::size_t base = 0; base < fragments.planes.size() && fragments.planes[base].mip == 0; ++base)
+  for (std::size_t base = 0; base < fragments.planes.size() && fragments.planes[base].mip == 0; ++base) {
     textures.push_back(measure_ways(fragments, pixels, sample, base, previews.planes[base].file, quiet));
+    textures.back().most_bytes = most_bytes(fragments.planes[base], images);
+  }
   const auto keep = pairs_worth_storing(textures, texture_loads(), kGain, kLeastLoads);
   std::vector<std::vector<std::size_t>> kept(sample.size());
   for (std::size_t base = 0; base < textures.size(); ++base) {

@@ -2,6 +2,7 @@
 // Inside the ladder only.
 #include <vector>
 
+#include "format/model/model.h"
 #include "stages/base/run_context.h"
 #include "stages/data/fragments.h"
 #include "stages/data/ladder.h"
@@ -13,11 +14,18 @@ namespace texmesh {
 /// The rungs that are worth storing, by plane: rising indices into the rungs of `sample`, which holds at
 /// least the fragments of choice_sample() at every candidate rung, of full-size planes and mips. What
 /// pairs_worth_storing() keeps of 1,000 simulated loads of all textures together; the rung of a
-/// source's coefficients always. Incremental codecs need every rung below one that is kept. `previews` are
-/// those of all full-size planes. Same result for any thread count.
+/// source's coefficients always. All rungs of a texture whose image is a JPEG, mips and tables included, take
+/// at most 1.9 times the image's bytes, where that leaves one rung of each plane; of a ladder that lacks
+/// fragments this holds for the bytes that measure_ways() expects. `images` as in encode_ladder().
+/// Incremental codecs need every rung below one that is kept. `previews` are those of all full-size planes.
+/// Same result for any thread count.
 std::vector<std::vector<std::size_t>> choose_rungs(const Fragments& fragments,
                                                    const std::vector<Pixels>& pixels,
                                                    const std::vector<PlaneLadder>& sample,
-                                                   const Previews& previews, const RunContext& context);
+                                                   const Previews& previews, const std::vector<Image>& images,
+                                                   const RunContext& context);
+
+/// What all rungs of the texture of plane `base` may take together.
+double most_bytes(const TexturePlane& base, const std::vector<Image>& images);
 
 }  // namespace texmesh

@@ -101,7 +101,6 @@ std::vector<PlaneLadder> empty_ladders(const std::vector<TrainedPlane>& trained,
   std::vector<PlaneLadder> planes(trained.size());
   for (std::size_t p = 0; p < planes.size(); ++p) {
     planes[p].codec = trained[p].codec->id();
-    planes[p].knots = trained[p].knots;
     planes[p].source_rung = trained[p].source_rung;
     if (work[p].wanted.empty()) {
       planes[p].rungs = std::move(work[p].known);

@@ -19,7 +19,6 @@ struct TrainedPlane {
   PlaneCoding coding;
   std::unique_ptr<TextureCodec> codec;
   std::vector<CodecRung> rungs;
-  SizeKnots knots;
   SourceCodec source;        // without its codec, which is the one above
   bool source_rung = false;  // the last rung has the source's coefficients
 };

@@ -87,7 +87,11 @@ PlaneCoding coding_of(const TexturePlane& plane, Codec codec, const LadderOption
   coding.channels = plane.channels;
   coding.fragment_width_px = plane.fragment_width_px;
   coding.fragment_height_px = plane.fragment_height_px;
-  coding.subsampling = is_colour(plane.role) ? options.subsampling : Subsampling::k444;
+  // A mip's texels have the chroma of several of the source's. With it halved, a mip of a turtle takes twice
+  // the bytes for the same FLIP.
+  coding.subsampling = is_colour(plane.role) && (plane.mip == 0 || codec != Codec::kJpeg)
+                           ? options.subsampling
+                           : Subsampling::k444;
   coding.qualities = ladder_rungs(plane.role, options);
   if (codec == Codec::kJpegProgressive && is_colour(plane.role))
     coding.qualities = {options.progressive_quality};
@@ -140,18 +144,18 @@ std::vector<std::vector<std::size_t>> all_rungs(const std::vector<TrainedPlane>&
   return out;
 }
 
-/// Knots of full-size colours, between the rungs that are kept.
+/// Knots of full-size colours, between the rungs that are stored.
 void measure_knots(const Fragments& fragments, const std::vector<Pixels>& pixels,
-                   const LadderOptions& options, const std::vector<std::vector<std::size_t>>& kept,
-                   std::vector<TrainedPlane>& trained, const RunContext& context) {
-  for (std::size_t p = 0; p < trained.size(); ++p) {
+                   const LadderOptions& options, const std::vector<TrainedPlane>& trained,
+                   std::vector<PlaneLadder>& planes, const RunContext& context) {
+  for (std::size_t p = 0; p < planes.size(); ++p) {
     const TexturePlane& plane = fragments.planes[p];
-    if (trained[p].codec->id() != Codec::kJpeg || !is_colour(plane.role) || plane.mip > 0) continue;
+    if (planes[p].codec != Codec::kJpeg || !is_colour(plane.role) || plane.mip > 0) continue;
     PlaneCoding coding = trained[p].coding;
     coding.qualities.clear();
-    for (const std::size_t r : kept[p]) coding.qualities.push_back(trained[p].rungs[r].quality);
-    trained[p].knots =
-        trained[p].source_rung
+    for (const LadderRung& rung : planes[p].rungs) coding.qualities.push_back(rung.quality);
+    planes[p].knots =
+        planes[p].source_rung
             ? size_knots(coding.qualities, trained[p].source.bits)
             : measure_size_knots(coding, size_sample(plane, pixels[p], options.uncovered), context);
   }
@@ -173,29 +177,6 @@ std::vector<PlaneWork> sample_work(const Fragments& fragments, const std::vector
   return work;
 }
 
-/// Of the fragments that the rung holds.
-double bytes_per_texel(const TexturePlane& plane, const LadderRung& rung) {
-  double texels = 0;
-  for (std::size_t f = 0; f < plane.fragment_count(); ++f)
-    if (!fragment_stream(rung, f).empty()) texels += plane.covered_texels[f];
-  return texels > 0 ? static_cast<double>(rung.data.size()) / texels : 0;
-}
-
-/// Takes rungs out of mips that pay much more for a texel than the source does, whose own coefficients are
-/// there to be shown. Scans whose mips went up to quality 97 took 0.6 to 1.6 times the bytes of their source
-/// for mips alone. The lowest rungs are left, one of each plane at least.
-void leave_heavy_mips_out(const Fragments& fragments, std::vector<PlaneLadder>& sample) {
-  constexpr double kMost = 1.4, kMoreByMip = 1.4;  // of the top's bytes .35, .12 and .04
-  for (std::size_t p = 0; p < sample.size(); ++p) {
-    const TexturePlane& plane = fragments.planes[p];
-    if (plane.mip == 0 || !sample[plane.base].source_rung) continue;
-    double most = kMost * bytes_per_texel(fragments.planes[plane.base], sample[plane.base].rungs.back());
-    for (std::uint32_t m = 1; m < plane.mip; ++m) most *= kMoreByMip;
-    std::vector<LadderRung>& of_mip = sample[p].rungs;
-    while (of_mip.size() > 1 && bytes_per_texel(plane, of_mip.back()) > most) of_mip.pop_back();
-  }
-}
-
 bool holds_all(const TexturePlane& plane, const PlaneLadder& ladder) {
   for (std::size_t f = 0; f < plane.fragment_count(); ++f)
     if (plane.covered_texels[f] > 0 && fragment_stream(ladder.rungs[0], f).empty()) return false;
@@ -213,6 +194,28 @@ std::vector<PlaneWork> whole_work(const Fragments& fragments, std::vector<PlaneL
     work[p].rungs = std::move(kept[p]);
   }
   return work;
+}
+
+/// Whether all rungs of some texture take more than they may.
+bool take_too_much(const Fragments& fragments, const std::vector<PlaneLadder>& planes,
+                   const std::vector<Image>& images) {
+  std::vector<double> bytes(planes.size());
+  for (std::size_t p = 0; p < planes.size(); ++p)
+    for (const LadderRung& rung : planes[p].rungs)
+      bytes[fragments.planes[p].mip > 0 ? fragments.planes[p].base : p] +=
+          static_cast<double>(rung.data.size() + rung.table_stream.size());
+  for (std::size_t p = 0; p < planes.size(); ++p)
+    if (bytes[p] > 0 && bytes[p] > most_bytes(fragments.planes[p], images)) return true;
+  return false;
+}
+
+/// Leaves only the rungs of these indices.
+void keep_rungs(const std::vector<std::vector<std::size_t>>& kept, std::vector<PlaneLadder>& planes) {
+  for (std::size_t p = 0; p < planes.size(); ++p) {
+    std::vector<LadderRung> rungs;
+    for (const std::size_t r : kept[p]) rungs.push_back(std::move(planes[p].rungs[r]));
+    planes[p].rungs = std::move(rungs);
+  }
 }
 
 std::string hundredths(double x) {
@@ -257,12 +260,12 @@ Ladder encode_ladder(const Fragments& fragments, const std::vector<Pixels>& pixe
   std::vector<PlaneLadder> sample =
       encode(sample_work(fragments, trained, options.prune), {kTrained, kSampled});
   auto kept = all_rungs(trained);
-  if (options.prune) {
-    leave_heavy_mips_out(fragments, sample);
-    kept = choose_rungs(fragments, pixels, sample, previews, context);
-  }
-  measure_knots(fragments, pixels, options, kept, trained, context);
+  if (options.prune) kept = choose_rungs(fragments, pixels, sample, previews, images, context);
   ladder.planes = encode(whole_work(fragments, std::move(sample), std::move(kept)), {kChosen, 1});
+  // What a sample lets expect of a texture's bytes is some hundredths off.
+  if (options.prune && take_too_much(fragments, ladder.planes, images))
+    keep_rungs(choose_rungs(fragments, pixels, ladder.planes, previews, images, context), ladder.planes);
+  measure_knots(fragments, pixels, options, trained, ladder.planes, context);
   for (std::size_t p = 0; p < fragments.planes.size(); ++p)
     finish_plane(fragments.planes[p], pixels[p], images, trained[p], options, ladder.planes[p], ladder.notes);
   return ladder;

@@ -32,17 +32,24 @@ struct Vertex {
 };
 using Hull = std::vector<Vertex>;
 
-/// The lower hull of loss over bytes where a level is wanted: from the preview on along the kept pairs.
-Hull hull_of(const TextureWays& texture, const std::vector<std::uint8_t>& keep, std::size_t level) {
-  Hull hull{{kPreview, 0, texture.preview_loss[level]}};
+/// Levels of a texture, the last one included.
+struct Levels {
+  std::size_t first = 0, last = 0;
+};
+
+/// The lower hull of loss over bytes where a level is wanted: from the preview on along the kept pairs of
+/// some levels.
+Hull hull_of(const TextureWays& texture, const std::vector<std::uint8_t>& keep, std::size_t wanted,
+             Levels levels) {
+  Hull hull{{kPreview, 0, texture.preview_loss[wanted]}};
   for (;;) {
     const Vertex at = hull.back();
     Vertex best;
     double steepest = 0;
     for (std::size_t k = 0; k < texture.pairs.size(); ++k) {
       const RungPair& pair = texture.pairs[k];
-      if (!keep[k] || pair.level < level) continue;
-      const Vertex to{k, static_cast<double>(pair.bytes), pair.loss[level]};
+      if (!keep[k] || pair.level < levels.first || pair.level > levels.last) continue;
+      const Vertex to{k, static_cast<double>(pair.bytes), pair.loss[wanted]};
       if (to.bytes <= at.bytes || to.loss >= at.loss) continue;
       const double slope = (at.loss - to.loss) / (to.bytes - at.bytes);
       if (slope > steepest || (slope == steepest && to.bytes > best.bytes)) steepest = slope, best = to;
@@ -50,6 +57,15 @@ Hull hull_of(const TextureWays& texture, const std::vector<std::uint8_t>& keep, 
     if (best.pair == kPreview) return hull;
     hull.push_back(best);
   }
+}
+
+/// Those of the wanted level and of each coarser one.
+std::vector<Hull> hulls_of(const TextureWays& texture, const std::vector<std::uint8_t>& keep,
+                           std::size_t wanted) {
+  std::vector<Hull> out;
+  for (std::size_t level = wanted; level < texture.preview_loss.size(); ++level)
+    out.push_back(hull_of(texture, keep, wanted, {level, level}));
+  return out;
 }
 
 /// The vertex at or behind which so many bytes end.
@@ -67,10 +83,19 @@ double loss_at(const Hull& hull, double bytes) {
   return a.loss + (b.loss - a.loss) * ((bytes - a.bytes) / (b.bytes - a.bytes));
 }
 
+/// The hull that loses least with so many bytes: clients show one level of a texture.
+std::size_t best_of(const std::vector<Hull>& hulls, double bytes) {
+  std::size_t best = 0;
+  for (std::size_t k = 1; k < hulls.size(); ++k)
+    if (loss_at(hulls[k], bytes) < loss_at(hulls[best], bytes)) best = k;
+  return best;
+}
+
+/// The level of the display has 1 to 2 texels a pixel, and this one twice as many.
 std::size_t wanted_level(const TextureWays& texture, double displayed_px) {
   std::size_t level = 0;
   while (level + 1 < texture.preview_loss.size() &&
-         texture.texels_across >= displayed_px * static_cast<double>(std::uint64_t{2} << level))
+         texture.texels_across >= displayed_px * static_cast<double>(std::uint64_t{4} << level))
     ++level;
   return level;
 }
@@ -102,7 +127,7 @@ using BytesByPrice = std::array<double, kPrices>;
 
 BytesByPrice bytes_by_price(const TextureWays& texture, const std::vector<std::uint8_t>& keep,
                             std::size_t level) {
-  const Hull hull = hull_of(texture, keep, level);
+  const Hull hull = hull_of(texture, keep, level, {level, texture.preview_loss.size() - 1});
   BytesByPrice out{};
   std::size_t at = 0;
   for (std::size_t k = 0; k < kPrices; ++k) {
@@ -159,27 +184,52 @@ struct Worth {
   double rise = 0;   // of the loss without it, summed over loads, in parts of the whole ladder's loss
 };
 
-/// `whole`: the texture's hulls with all pairs, by level.
+/// The hulls of a texture where a level is wanted.
+struct LevelHulls {
+  std::vector<Hull> hulls;                 // of each level
+  std::vector<std::vector<Hull>> without;  // the same without that vertex, by hull and vertex
+};
+
+LevelHulls level_hulls(const TextureWays& texture, const std::vector<std::uint8_t>& keep,
+                       std::size_t wanted) {
+  LevelHulls out{hulls_of(texture, keep, wanted), {}};
+  for (std::size_t h = 0; h < out.hulls.size(); ++h) {
+    std::vector<Hull>& without = out.without.emplace_back(out.hulls[h].size());
+    for (std::size_t v = 1; v < without.size(); ++v) {
+      std::vector<std::uint8_t> others = keep;
+      others[out.hulls[h][v].pair] = 0;
+      without[v] = hull_of(texture, others, wanted, {wanted + h, wanted + h});
+    }
+  }
+  return out;
+}
+
+/// The loss of so many bytes without a vertex of a hull.
+double loss_without(const LevelHulls& at, std::size_t hull, std::size_t vertex, double bytes) {
+  double least = loss_at(at.without[hull][vertex], bytes);
+  for (std::size_t h = 0; h < at.hulls.size(); ++h)
+    if (h != hull) least = std::min(least, loss_at(at.hulls[h], bytes));
+  return least;
+}
+
+/// `whole`: the texture's hulls with all pairs, by wanted level.
 std::vector<Worth> worth_of(const TextureWays& texture, const std::vector<std::uint8_t>& keep,
-                            const GivenBytes& given, const std::vector<Hull>& whole) {
+                            const GivenBytes& given, const std::vector<std::vector<Hull>>& whole) {
   std::vector<Worth> out(texture.pairs.size());
   for (std::size_t level = 0; level < given.size(); ++level) {
     if (given[level].empty()) continue;
-    const Hull hull = hull_of(texture, keep, level);
-    std::vector<Hull> without(hull.size());
-    for (std::size_t v = 1; v < hull.size(); ++v) {
-      std::vector<std::uint8_t> others = keep;
-      others[hull[v].pair] = 0;
-      without[v] = hull_of(texture, others, level);
-    }
+    const LevelHulls now = level_hulls(texture, keep, level);
     for (const double bytes : given[level]) {
-      const double loss = loss_at(hull, bytes), unit = loss_at(whole[level], bytes) + kUnseen;
+      const std::size_t h = best_of(now.hulls, bytes);
+      const Hull& hull = now.hulls[h];
+      const double loss = loss_at(hull, bytes),
+                   unit = loss_at(whole[level][best_of(whole[level], bytes)], bytes) + kUnseen;
       const std::size_t k = segment_of(hull, bytes), last = std::min(k + 1, hull.size() - 1);
       for (std::size_t v = std::max<std::size_t>(k, 1); v <= last; ++v) {
         if (v > k && bytes <= hull[k].bytes) continue;  // all fragments are at the vertex before
         Worth& worth = out[hull[v].pair];
         worth.loads += 1;
-        worth.rise += (loss_at(without[v], bytes) - loss) / unit;
+        worth.rise += (loss_without(now, h, v, bytes) - loss) / unit;
       }
     }
   }
@@ -192,18 +242,26 @@ struct Asked {
   double rise_per_byte = 0;  // Worth::rise
 };
 
+bool takes_too_much(const TextureWays& texture, const std::vector<std::uint8_t>& keep) {
+  double bytes = 0;
+  for (std::size_t k = 0; k < keep.size(); ++k)
+    if (keep[k]) bytes += static_cast<double>(texture.pairs[k].bytes);
+  return bytes > texture.most_bytes;
+}
+
 /// The pair to go next; kPreview for none. Fixed pairs and the last one of every level stay.
 std::size_t next_to_go(const TextureWays& texture, const std::vector<std::uint8_t>& keep,
                        const std::vector<Worth>& worth, const Asked& asked) {
   std::vector<std::size_t> of_level(texture.preview_loss.size());
   for (std::size_t k = 0; k < keep.size(); ++k) of_level[texture.pairs[k].level] += keep[k];
+  const bool too_much = takes_too_much(texture, keep);
   std::size_t next = kPreview;
   double least = 0;
   for (std::size_t k = 0; k < keep.size(); ++k) {
     const RungPair& pair = texture.pairs[k];
     if (!keep[k] || pair.fixed || of_level[pair.level] < 2) continue;
     const double per_byte = worth[k].rise / static_cast<double>(std::max<std::uint64_t>(pair.bytes, 1));
-    if (worth[k].loads >= asked.loads && per_byte >= asked.rise_per_byte) continue;
+    if (!too_much && worth[k].loads >= asked.loads && per_byte >= asked.rise_per_byte) continue;
     if (next == kPreview || per_byte < least) next = k, least = per_byte;
   }
   return next;
@@ -212,8 +270,8 @@ std::size_t next_to_go(const TextureWays& texture, const std::vector<std::uint8_
 /// `keep` of one texture without what is not worth its bytes.
 void drop_pairs(const TextureWays& texture, const GivenBytes& given, const Asked& asked,
                 std::vector<std::uint8_t>& keep) {
-  std::vector<Hull> whole;
-  for (std::size_t level = 0; level < given.size(); ++level) whole.push_back(hull_of(texture, keep, level));
+  std::vector<std::vector<Hull>> whole;
+  for (std::size_t level = 0; level < given.size(); ++level) whole.push_back(hulls_of(texture, keep, level));
   for (;;) {
     const std::size_t next = next_to_go(texture, keep, worth_of(texture, keep, given, whole), asked);
     if (next == kPreview) return;

@@ -2,6 +2,7 @@
 // Inside the ladder only: which ways of storing a texture are worth their bytes.
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 namespace texmesh {
@@ -20,6 +21,7 @@ struct TextureWays {
   double texels_across = 0;          // of full size, along the height of an object that looks like a ball
   std::vector<double> preview_loss;  // [levels], as RungPair::loss; the preview takes no bytes
   std::vector<RungPair> pairs;       // by (level, rung)
+  double most_bytes = std::numeric_limits<double>::infinity();  // that all stored pairs may take together
 };
 
 /// What a load is to textures.
@@ -31,14 +33,15 @@ struct TextureLoad {
 /// Of ordinary_loads() (format/rules).
 std::vector<TextureLoad> texture_loads();
 
-/// Which pairs are worth storing, by texture and pair, 1 or 0. In every load each texture is wanted at the
-/// level of the display, and is shown by pairs of that level or of coarser ones, along the lower hull of loss
-/// over bytes that begins at the preview: some fragments at one vertex, the others at the next one. The
-/// load's bytes are shared at one price, in loss x surface, for all textures. First the pairs go that lose no
-/// less than the preview. Then, one by one, that pair goes whose removal raises the loss least for its bytes,
-/// while the removal raises the mean over loads by less than `gain` times the pair's share of the texture's
-/// most bytes, or while less than `least_share` of the loads choose the pair. Fixed pairs stay, and one of
-/// each level. Pure; same result anywhere.
+/// Which pairs are worth storing, by texture and pair, 1 or 0. In every load each texture is wanted at one
+/// level finer than the display has, which clients take where bytes are left, and is shown by one level, that
+/// or a coarser one: along the lower hull of loss over bytes of its pairs, which begins at the preview, some
+/// fragments at one vertex, the others at the next one. The load's bytes are shared at one price, in
+/// loss x surface, for all textures. First the pairs go that lose no less than the preview. Then, one by one,
+/// that pair goes whose removal raises the loss least for its bytes, while the removal raises the mean over
+/// loads by less than `gain` times the pair's share of the texture's most bytes, or while less than
+/// `least_share` of the loads choose the pair, or while all pairs take more than TextureWays::most_bytes.
+/// Fixed pairs stay, and one of each level. Pure; same result anywhere.
 std::vector<std::vector<std::uint8_t>> pairs_worth_storing(const std::vector<TextureWays>& textures,
                                                            const std::vector<TextureLoad>& loads, double gain,
                                                            double least_share);

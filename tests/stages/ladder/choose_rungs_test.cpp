@@ -70,7 +70,7 @@ TEST(ChooseRungs, TheSourcesOwnCoefficientsStay) {
   ladder.planes[0].rungs.back().offset = ladder.planes[0].rungs[0].offset;
   ladder.planes[0].rungs.back().table_stream = ladder.planes[0].rungs[0].table_stream;
   const auto kept =
-      choose_rungs(chain.fragments, chain.pixels, ladder.planes, chain.previews(), RunContext{});
+      choose_rungs(chain.fragments, chain.pixels, ladder.planes, chain.previews(), {}, RunContext{});
   EXPECT_EQ(kept[0].back(), kAll - 1);
   EXPECT_GT(kept[0].size(), 1u);
 }
@@ -86,7 +86,7 @@ TEST(ChooseRungs, IncrementalLaddersHaveNoGaps) {
     for (LadderRung& rung : plane.rungs) rung.data.clear(), rung.offset.assign(whole.offset.size(), 0);
   }
   for (const auto& rungs :
-       choose_rungs(chain.fragments, chain.pixels, ladder.planes, chain.previews(), RunContext{})) {
+       choose_rungs(chain.fragments, chain.pixels, ladder.planes, chain.previews(), {}, RunContext{})) {
     std::vector<std::size_t> want(rungs.size());
     std::iota(want.begin(), want.end(), std::size_t{0});
     EXPECT_EQ(rungs, want);
