@@ -334,7 +334,8 @@ def check_entry_order(paths, m, textures):
     order += [f"preview/{p:03}.jpg" for p in planes] + ladder + meshes[done:]
     others = set(paths) - set(order) - {"provenance.json", CREDENTIAL}
     order += sorted(others) + ["provenance.json", CREDENTIAL]
-    expected = [p for p in order if p in paths]
+    there = set(paths)
+    expected = [p for p in order if p in there]
     require(paths == expected, "E04", "order of entries")
 
 

@@ -71,8 +71,11 @@ class Layout:
         self.count += 1
 
     def finish(self, before_end=b""):
-        at, size = len(self.data), len(self.central)
-        end = struct.pack("<IHHHHIIH", 0x06054B50, 0, 0, self.count, self.count, size, at, 0)
+        at, size, few = len(self.data), len(self.central), min(self.count, 0xFFFF)
+        if few == 0xFFFF:
+            before_end += struct.pack("<IQHHIIQQQQ", 0x06064B50, 44, 45, 45, 0, 0, self.count, self.count, size, at)
+            before_end += struct.pack("<IIQI", 0x07064B50, 0, at + size, 1)
+        end = struct.pack("<IHHHHIIH", 0x06054B50, 0, 0, few, few, size, at, 0)
         return bytes(self.data + self.central + before_end + end)
 
 

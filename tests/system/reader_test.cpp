@@ -274,6 +274,39 @@ TEST_F(SecondReader, ClientsRefuseByTheRuleThatIsBroken) {
   }
 }
 
+TEST_F(SecondReader, ReadsAContainerWithAZip64EndRecord) {
+  const fs::path tests = kSource / "tests" / "golden";
+  const std::string package = folder / "zip64.texmesh";
+  ASSERT_EQ(testing::run_command(
+                {python, (tests / "make_zip64").string(), (tests / "v2.0-webp.texmesh").string(), package})
+                .exit_code,
+            0);
+  const CommandResult result = run({"verify", package});
+  EXPECT_EQ(result.exit_code, 0) << result.output;
+  const VerifyReport report = verify_package(*open_store(package), {});
+  for (const Finding& f : report.findings) ADD_FAILURE() << to_string(f);
+  EXPECT_EQ(report.entries, 65535u);
+}
+
+TEST_F(SecondReader, FindsDamageEverywhere) {
+  const std::string whole = testing::read_text((kSource / "tests" / "golden" / "v2.0-webp.texmesh").string());
+  std::vector<std::string> arguments{"verify"};
+  const auto add = [&](const std::string& bytes) {
+    arguments.push_back(folder / std::to_string(arguments.size()) + ".texmesh");
+    testing::write_text(arguments.back(), bytes);
+  };
+  for (std::size_t at = 0; at < whole.size(); at += 499) {
+    add(whole.substr(0, at));
+    std::string flipped = whole;
+    flipped[at] = static_cast<char>(flipped[at] ^ 0x20);
+    add(flipped);
+  }
+  const std::string told = run(arguments).output;
+  for (std::size_t k = 1; k < arguments.size(); ++k)
+    EXPECT_NE(told.find(arguments[k] + ": refused: "), std::string::npos)
+        << arguments[k] << told.substr(0, 400);
+}
+
 TEST_F(SecondReader, ReadsTheTreeAsWell) {
   const std::string texmesh = TEXMESH_BINARY;
   for (const std::string& golden : golden_packages()) {

@@ -1,4 +1,4 @@
-import { readFileSync } from 'node:fs';
+import { readFileSync, readdirSync } from 'node:fs';
 import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 
@@ -14,6 +14,8 @@ export function readText(path: string): string {
 /** A golden package (tests/golden). */
 export const golden = (name: string): Uint8Array => readBytes(`tests/golden/${name}.texmesh`);
 export const goldenNames = ['v2.0-scan'] as const;
+/** All golden packages: one for each feature besides. */
+export const goldenSet = readdirSync(join(root, 'tests/golden')).filter((file) => file.endsWith('.texmesh')).map((file) => file.slice(0, -8));
 
 /** Doubles with the same bits, NaN and signed zeros told apart. */
 export function sameBits(a: number, b: number): boolean {
