@@ -21,6 +21,8 @@ const kPackages = {
   mask: {sheet: {alphaMode: 'MASK'}, options: ['--rungs', '20,60,90']},
   // What shows little but its surroundings.
   metal: {sheet: {alphaMode: 'OPAQUE', metal: true}, options: ['--rungs', '20,60,90']},
+  // Two proxies: scales of its own with a small texture, as meshopt codes meshes.
+  proxied: {scan: ['--triangles', '30000', '--texture', '1024', '--charts', '30'], options: ['--rungs', '20,50,85'], proxies: [[300, 64], [2000, 128]]},
   // No texture at all: colours of vertices.
   colours: {scan: ['--triangles', '1500', '--texture', '0', '--charts', '4'], ending: 'ply', options: []},
 };
@@ -33,6 +35,21 @@ function extractScales(file, name) {
     run(env.texmesh, 'extract', file, '--scale', `${scale}`, '--recentre', '-o', path.join(packages, 'scales', `${name}-s${scale}.glb`));
 }
 
+/** A package with proxies, from the same scan compiled with another mesh codec. */
+function addProxies(file, scan, proxies) {
+  const [coded, plain] = ['coded', 'plain'].map((what) => file.replace('.texmesh', `-${what}.texmesh`));
+  run(env.texmesh, 'compile', scan, '-o', coded, ...kQuick, '--rungs', '50', '--mesh-codec', 'meshopt');
+  const {scales} = JSON.parse(run(env.texmesh, 'dump', coded, 'scales', '--json'));
+  const glbs = proxies.map(([triangles, px], k) => {
+    const {scale} = scales.findLast((s) => s.triangles >= triangles) ?? scales[0];
+    run(env.texmesh, 'extract', coded, '--scale', `${scale}`, '--display', `${px}`, '--recentre', '-o', `${file}.${k}.glb`);
+    return `${file}.${k}.glb`;
+  });
+  fs.renameSync(file, plain);
+  run('python3', path.join(env.source, 'tests/golden/add_proxies'), plain, file, '0', ...glbs);
+  for (const used of [coded, plain, ...glbs]) fs.rmSync(used);
+}
+
 export function makePackages() {
   fs.mkdirSync(packages, {recursive: true});
   const newest = Math.max(fs.statSync(env.texmesh).mtimeMs, fs.statSync(path.join(path.dirname(env.texmesh), 'texmesh-core')).mtimeMs);
@@ -43,6 +60,7 @@ export function makePackages() {
     if (p.sheet) fs.writeFileSync(scan, sheetGlb(p.sheet));
     else run(env.makeScan, '-o', scan, ...p.scan);
     run(env.texmesh, 'compile', scan, '-o', file, ...kQuick, ...p.options);
+    if (p.proxies) addProxies(file, scan, p.proxies);
     if (!p.sheet) fs.rmSync(scan);
     run(env.texmesh, 'unpack', file, '-o', path.join(packages, name), '--force');
     if (name === 'maps') extractScales(file, name);

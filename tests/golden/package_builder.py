@@ -32,6 +32,15 @@ def glb_of(gltf, binary):
     return struct.pack("<III", 0x46546C67, 2, 12 + len(parts)) + parts
 
 
+def counts_of(glb):
+    """Triangles and vertices of a GLB."""
+    gltf = json.loads(glb[20 : 20 + struct.unpack("<I", glb[12:16])[0]])
+    primitives = [p for m in gltf["meshes"] for p in m["primitives"]]
+    counts = [[gltf["accessors"][p["indices"]]["count"] // 3, gltf["accessors"][p["attributes"]["POSITION"]]["count"]]
+              for p in primitives]
+    return [sum(column) for column in zip(*counts)]
+
+
 def triangle_glb(low, high):
     """One triangle between two corners of a box, without material."""
     places = [low, [high[0], low[1], high[2]], high]
@@ -147,18 +156,28 @@ class Parts:
             columns["bytes"][k] = columns["bytes"][k] if k in self.prefixes else len(data)
             columns["sha256"][k] = sha(data[: columns["bytes"][k]])
 
-    def add_proxy(self):
-        """A proxy of one triangle at its place in the order."""
-        bounds = self.manifest["bounds"]
+    def add_proxies(self, glbs, flip, sizes=(128, 512), texture_px=0):
+        """Proxies, smallest first, at their places in the order; `flip` by proxy and size, P95 is three times that."""
         coarsest = f"mesh/s{self.manifest['scales']['scale'][-1]:02}.glb"
+        proxies = {f"proxies/{k:02}.glb": glb for k, glb in enumerate(glbs)}
+        first, *larger = proxies
         mesh, places = self.entries.pop(coarsest), {}
         for path, data in self.entries.items():
             places[path] = data
-            places |= {"proxies/00.glb": triangle_glb(bounds["min"], bounds["max"])} if path == "manifest.json" else {}
-            places |= {coarsest: mesh} if path == "tables.bin" else {}
+            places |= {first: proxies[first]} if path == "manifest.json" else {}
+            places |= {coarsest: mesh, **{p: proxies[p] for p in larger}} if path == "tables.bin" else {}
         self.entries = places
-        self.manifest["proxies"] = {"sizesPx": [128, 512], "offset": [64], "bytes": [1], "sha256": ["0" * 64],
-                                    "triangles": [1], "vertices": [3], "texturePx": [0], "flip": [[0.1, 0.2]], "flipP95": [[0.3, 0.4]]}
+        counts = [counts_of(glb) for glb in glbs]
+        n = len(glbs)
+        self.manifest["proxies"] = {
+            "sizesPx": list(sizes), "offset": [64] * n, "bytes": [1] * n, "sha256": ["0" * 64] * n,
+            "triangles": [t for t, _ in counts], "vertices": [v for _, v in counts], "texturePx": [texture_px] * n,
+            "flip": [list(f) for f in flip], "flipP95": [[min(1, 3 * x) for x in f] for f in flip]}
+
+    def add_proxy(self):
+        """A proxy of one triangle."""
+        bounds = self.manifest["bounds"]
+        self.add_proxies([triangle_glb(bounds["min"], bounds["max"])], [[0.1, 0.2]])
 
     def pack(self):
         while True:

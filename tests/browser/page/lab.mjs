@@ -126,7 +126,7 @@ function report(id) {
     error: run.error, events: run.events, endedAt: run.endedAt,
     requests: run.requests.map((r) => ({...r, started: r.started - run.t0 / 1000, firstByte: r.firstByte - run.t0 / 1000, ended: r.ended - run.t0 / 1000})),
     state: s && {
-      phase: s.phase, scale: s.scale, wantedScale: s.wantedScale, displayedPx: s.displayedPx, bytes: s.bytes, pending: s.pending, rttS: s.rttS,
+      phase: s.phase, scale: s.scale, proxy: s.proxy, wantedScale: s.wantedScale, displayedPx: s.displayedPx, bytes: s.bytes, pending: s.pending, rttS: s.rttS,
       planes: s.planes.map((p) => ({base: p.base, plane: p.plane, role: p.role, widthPx: p.widthPx, heightPx: p.heightPx, rungs: [...p.rungs]})),
     },
     longTasks: longTasks.filter((t) => t.start >= run.t0).map((t) => ({...t, start: (t.start - run.t0) / 1000})),
