@@ -91,6 +91,7 @@ inline std::vector<std::uint8_t> make_package(std::uint32_t planes, std::size_t 
                        {{{0.125f, 0.5f},
                          {{0.005f, 0.02f}, {0.01f, 0.04f}, {0.002f, 0.01f}},
                          {{1}, {1}, {1}},
+                         {{0}, {0}, {0}},
                          {{}, {}, {}}}}}};
   const auto text = [](const std::string& s) { return std::vector<std::uint8_t>(s.begin(), s.end()); };
   entries.push_back({kTablesPath, write_tables(tables)});
