@@ -112,10 +112,12 @@ void check_proxy(const Manifest& m, const ManifestProxy& proxy, std::span<const 
   const GlbFacts facts = check_glb(glb, entry, findings, GlbRules::kStandalone);
   findings.name_rule(before, "G13");
   if (findings.list().size() != before) return;  // counts of a broken file say nothing
-  findings.require_equal<std::uint64_t>(proxy.triangles, facts.triangles, {"mesh-counts", "G14"}, entry, "triangles");
-  findings.require_equal<std::uint64_t>(proxy.vertices, facts.vertices, {"mesh-counts", "G14"}, entry, "vertices");
-  findings.require_equal<std::uint64_t>(proxy.texture_px, facts.largest_image_px, {"mesh-images", "G14"}, entry,
-                                        "longest side of its textures");
+  findings.require_equal<std::uint64_t>(proxy.triangles, facts.triangles, {"mesh-counts", "G14"}, entry,
+                                        "triangles");
+  findings.require_equal<std::uint64_t>(proxy.vertices, facts.vertices, {"mesh-counts", "G14"}, entry,
+                                        "vertices");
+  findings.require_equal<std::uint64_t>(proxy.texture_px, facts.largest_image_px, {"mesh-images", "G14"},
+                                        entry, "longest side of its textures");
   findings.require(facts.codec != "draco", {"mesh-codec", "G15"}, entry, "", "a mesh that needs no Draco",
                    facts.codec);
   check_bounds(m, facts, entry, "G14", findings);
