@@ -102,12 +102,13 @@ struct Inputs {
     tables.planes.push_back(std::move(t));
   }
 
-  Poster poster;  // none
+  Poster poster;    // none
+  Proxies proxies;  // none
   About about;
 
   Bytes assemble() const {
     return assemble_package(scales, perceptual, images, fragments, ladder, previews, tables, thesis, files,
-                            quality, poster, about, 0.1, "{\"texmesh\":\"test\"}", options, {});
+                            quality, poster, proxies, about, 0.1, "{\"texmesh\":\"test\"}", options, {});
   }
 };
 
