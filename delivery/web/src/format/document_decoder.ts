@@ -13,7 +13,7 @@ export const decodeHere = (async (name, ...args: unknown[]) => {
   try {
     return await (documents[name] as (...of: unknown[]) => unknown)(...args);
   } catch (error) {
-    const { name: kind, file, place, expected, found } = error as FormatError;
-    throw kind === 'FormatError' ? new FormatError(file, place, expected, found) : error;
+    const { name: kind, file, place, expected, found, rule } = error as FormatError;
+    throw kind === 'FormatError' ? new FormatError(file, place, expected, found, rule) : error;
   }
 }) as DocumentDecoder;

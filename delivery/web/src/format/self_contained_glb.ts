@@ -41,13 +41,13 @@ const previewUri = /^\.\.\/preview\/\d{3,5}\.jpg$/;
  * URIs of previews, since nobody asks for them. Pictures in the GLB, which loaders decode, must be no larger than previews. FormatError
  * otherwise.
  */
-export function requireSelfContained(glb: Uint8Array, placeholders = false): void {
+export function requireSelfContained(glb: Uint8Array, placeholders = false, rule = placeholders ? 'G06' : 'G05'): void {
   const { json, bytes } = partsOfGlb(glb);
   const { buffers = [], images = [] } = json;
   require(Array.isArray(buffers) && Array.isArray(images) && [...buffers, ...images].every((item) => item), 'G01', 'lists of buffers and images');
   const mayName = (uri: unknown): boolean => placeholders && typeof uri === 'string' && previewUri.test(uri);
   const inside = images.filter(({ uri }) => !mayName(uri));
-  require([...buffers, ...inside].every(({ uri }) => uri === undefined), placeholders ? 'G06' : 'G05', 'buffers and images within the file');
+  require([...buffers, ...inside].every(({ uri }) => uri === undefined), rule, 'buffers and images within the file');
   for (const { bufferView = -1 } of inside) {
     const { buffer, byteOffset: at = 0, byteLength: length = 0, extensions } = json.bufferViews?.[bufferView] ?? {};
     require(buffer === 0 && !extensions && Number.isInteger(at) && at >= 0, 'G05', 'pictures as they are');

@@ -1,4 +1,4 @@
-import { type FragmentList, partsOf } from '../decide/fragment_list';
+import { type FragmentList, lossesOf } from '../decide/fragment_list';
 import { clamp } from '../decide/numbers';
 import { throughputOf } from '../decide/request_groups';
 import { proxyLoss } from '../decide/proxy_choice';
@@ -113,8 +113,8 @@ export class TextureLoad {
     const { list_: list, scale_: scale, planes_: planes, load_: { view: { display: { heightPx } }, reader: { manifest } } } = this;
     if (!list || !scale.held || scale.shown < 0) return;
     this.lookedS_ = nowS();
-    const parts = partsOf(list, list.fragments.map((f) => planes.rungOf(f)));
-    const flip = pictureFlip(planes.data.quality, heightPx, scale.shown, parts);
+    const losses = lossesOf(list, list.fragments.map((f) => planes.rungOf(f)));
+    const flip = pictureFlip(planes.data.quality, heightPx, scale.shown, losses);
     if (flip <= proxyLoss(manifest, scale.proxy.shown, heightPx).flip) scale.release();
   }
   private releaseInTime_(): void {

@@ -1,6 +1,6 @@
 import { concat } from '../bytes';
 import { decodeAttributes, decodeTriangles } from './meshopt';
-import { partsOfGlb, requireOfMesh as require, requireSelfContained } from '../self_contained_glb';
+import { partsOfGlb, requireOfMesh, requireSelfContained } from '../self_contained_glb';
 
 const extension = 'EXT_meshopt_compression';
 /** A proxy's mesh takes no more memory. */
@@ -27,6 +27,9 @@ interface Gltf {
   extensionsRequired?: string[];
 }
 
+function require(good: unknown, what: string): asserts good {
+  requireOfMesh(good, 'G15', what);
+}
 const isSize = (n: unknown): n is number => Number.isInteger(n) && (n as number) >= 0 && (n as number) <= mostBytes;
 
 /** What a buffer view has, decoded. */
@@ -71,6 +74,6 @@ export function plainGlb(glb: Uint8Array): Uint8Array {
   const heads = [[0x46546c67, 2, 28 + text.length + blanks.length + end, text.length + blanks.length, 0x4e4f534a], [end, 0x004e4942]];
   const [head, binary] = heads.map((words) => new Uint8Array(Uint32Array.from(words).buffer));
   const plain = concat([head, text, blanks, binary, ...parts]);
-  requireSelfContained(plain);
+  requireSelfContained(plain, false, 'G13');
   return plain;
 }
