@@ -34,17 +34,17 @@ struct ProxiesOptions {
 /// The whole object in small files: coarse meshes with atlases of their own, whose textures are baked from
 /// S_0 with the source's texels.
 /// - Mesh: simplification without regard to the source's charts, one run for all sizes; new charts, packed
-/// into
-///   one square. Triangles of one class of materials (unlit or lit, single- or double-sided, opaque, mask or
-///   blend) become one material.
+///   into one square. Triangles of one class of materials (unlit or lit, single- or double-sided, opaque,
+///   mask or blend) become one material.
 /// - Maps: base colour; a lit material's occlusion, half of it, is multiplied into the base colour until the
 ///   size pays for a map of occlusion, roughness and metal; a normal map from the same size on; emission
 ///   where something glows. Vertex colours and factors are in the texels.
 /// - File: GLB by EXT_meshopt_compression and KHR_mesh_quantization, JPEG inside, or WebP where there is
-/// alpha.
-///   It is at most 2 % larger than its size asks for.
+///   alpha. It is at most 2 % larger than its size asks for.
 /// - Losses: FLIP of lit pictures beside S_0's (stages/render in the studio's light) at three displayed
 ///   heights, where the height is that of the bounding box's longest side.
+/// - Automatic choice: sizes from the first on at which a scale with the source's atlas looks better are left
+///   out.
 /// Sizes that get no proxy have a note that says why; no model fails because of its proxies. `pixels` are
 /// fill_planes()'s. Same bytes for any thread count and machine.
 Proxies make_proxies(const NestedScales& scales, const std::vector<Material>& materials,
