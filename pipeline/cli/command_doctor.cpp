@@ -90,7 +90,7 @@ void add_doctor_command(Command& app) {
   add_limits(c, args->limits);
   c.examples(
       "  texmesh doctor scan.glb                                      figures and what to do\n"
-      "  texmesh doctor scan.glb --max-charts 500 --min-cover 0.5     fails a bad atlas before it is published\n"
+      "  texmesh doctor scan.glb --max-charts 500 --min-cover 0.5     refuses a bad atlas in CI\n"
       "  texmesh doctor scan.texmesh --json                           the same of a package's finest scale\n"
       "  texmesh debug scan.glb --what atlas -o atlas.png             the charts as a picture");
   c.notes(

@@ -194,7 +194,7 @@ void GlbDocument::load_buffers() {
     const std::uint64_t bytes = number(buffers[i], "byteLength", 0, place);
     buffer_bytes_.push_back(bytes);
     if (buffers[i].find("uri") != buffers[i].end())
-      fail({"glb-reference", "G06"}, place + "/uri", "no file beside the GLB", "a uri");
+      fail({"glb-reference", standalone_ ? "G13" : "G06"}, place + "/uri", "no file beside the GLB", "a uri");
     if (i == 0 && (bytes > binary_.size() || binary_.size() - bytes > 3))
       fail("glb-container", place + "/byteLength",
            "the BIN chunk's " + std::to_string(binary_.size()) + " bytes, or up to 3 less",

@@ -85,15 +85,15 @@ std::vector<Refusal> refusals() {
       {"R7", "preview/000.jpg", renamed(preview_path(0), "preview/009.jpg")},
       {"R7", "texture/0/r01.pack", renamed(rung_path(0, 1), rung_path(0, 9))},
       {"R7", "texture/0/tables.pack", renamed(table_streams_path(0), "texture/0/tables_pack")},
-      {"R8", "grid and rungs", built([](PackageParts& p) {
+      {"R8", "the grid of textures.json", built([](PackageParts& p) {
          p.textures[0].fragment_width_px = 64;
          p.textures[0].columns = 1;
        })},
-      {"R8", "grid and rungs", built([](PackageParts& p) {
+      {"R8", "the grid of textures.json", built([](PackageParts& p) {
          p.textures[0].fragment_height_px = 48;
          p.textures[0].rows = 1;
        })},
-      {"R9", "grid and rungs", built([](PackageParts& p) {
+      {"R9", "the rungs of textures.json", built([](PackageParts& p) {
          p.textures[0].rung_quality = {20, 71};
        })},
       {"R10", "tables of the codec", built([](PackageParts& p) { p.tables.planes[0].incremental = true; })},

@@ -31,9 +31,9 @@ TEST(ParseJson, SaysWhereASyntaxErrorIs) {
 }
 
 TEST(ParseJson, ManySmallObjectsTakeLinearTime) {  // in square time this would be hours
-  std::string text = "[{}";
+  std::string text = R"({"all":[{})";
   for (int i = 1; i < 500'000; ++i) text += ",{}";
-  EXPECT_EQ(parse(text + "]").size(), 500'000u);
+  EXPECT_EQ(parse(text + "]}")["all"].size(), 500'000u);
 }
 
 }  // namespace

@@ -98,9 +98,9 @@ TEST(RungValue, EveryLevelKeepsAPair) {
 }
 
 TEST(RungValue, SmallDisplaysWantTheMip) {
-  // 4 texels for a pixel of the largest display: always a mip of level 1 or more.
+  // More than 4 texels across a pixel of the largest display: always a mip of level 1 or more.
   TextureWays one = texture({{500'000, 0.1}, {5'000'000, 0.01}});
-  one.texels_across = 4000;
+  one.texels_across = 8000;
   one.preview_loss.push_back(0.4);
   one.pairs.push_back({1, 0, 300'000, {0.3, 0.1}, false});
   one.pairs.push_back({1, 1, 1'500'000, {0.25, 0.01}, false});
