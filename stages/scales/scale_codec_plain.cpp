@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "format/base/box.h"
-#include "format/base/errors.h"
+#include "stages/gltf/meshopt_streams.h"
 #include "stages/scales/scale_codecs.h"
 
 namespace texmesh {
@@ -81,22 +81,19 @@ class PlainPrimitive {
     const int target = is_index ? kElementArrayBuffer : kArrayBuffer;
     if (coding_.options.mesh_codec != MeshCodec::kMeshopt)
       return writer_.add_view(s.bytes, is_index ? 0 : s.stride, target);
-    std::vector<std::uint8_t> packed(is_index ? meshopt_encodeIndexBufferBound(s.count, n_)
-                                              : meshopt_encodeVertexBufferBound(s.count, s.stride));
-    const std::size_t size =
-        is_index
-            ? meshopt_encodeIndexBuffer(packed.data(), packed.size(), primitive_.indices.data(), s.count)
-            : meshopt_encodeVertexBuffer(packed.data(), packed.size(), s.bytes.data(), s.count, s.stride);
-    if (size == 0) throw StageError("scales", "meshopt", "a compressed stream", "nothing");
-    packed.resize(size);
+    const std::vector<std::uint8_t> packed = is_index
+                                                 ? meshopt_triangles(primitive_.indices, n_, "scales")
+                                                 : meshopt_attributes(s.bytes, s.count, s.stride, "scales");
     const std::size_t offset = writer_.add_bytes(packed);
     Json view{{"buffer", 1}, {"byteOffset", fallback_bytes_}, {"byteLength", s.bytes.size()}};
     if (!is_index) view["byteStride"] = s.stride;
     view["target"] = target;
-    view["extensions"]["EXT_meshopt_compression"] = {
-        {"buffer", 0},        {"byteOffset", offset},
-        {"byteLength", size}, {"byteStride", s.stride},
-        {"count", s.count},   {"mode", is_index ? "TRIANGLES" : "ATTRIBUTES"}};
+    view["extensions"]["EXT_meshopt_compression"] = {{"buffer", 0},
+                                                     {"byteOffset", offset},
+                                                     {"byteLength", packed.size()},
+                                                     {"byteStride", s.stride},
+                                                     {"count", s.count},
+                                                     {"mode", is_index ? "TRIANGLES" : "ATTRIBUTES"}};
     fallback_bytes_ += (s.bytes.size() + 3) / 4 * 4;
     writer_.use_extension("EXT_meshopt_compression", true);
     return writer_.add_json_view(std::move(view));

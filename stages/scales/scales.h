@@ -14,7 +14,7 @@
 
 namespace texmesh {
 
-inline constexpr int kScalesVersion = 7;
+inline constexpr int kScalesVersion = 8;
 
 enum class MeshCodec : std::uint8_t { kDraco, kMeshopt, kQuantized, kNone };
 template <>

@@ -10,7 +10,7 @@
 namespace texmesh {
 namespace {
 
-constexpr double kWorthwhileFlip = 1e-4;  // that finer planes must save
+constexpr double kWorthwhileFlip = 2e-3;  // that finer planes must save: nobody sees less
 constexpr int kReweightings = 2;
 constexpr double kLossUnit = 1099511627776.0;  // 2^40: losses as spend_bytes counts them
 constexpr double kLeastWeight = 1e-3;          // of a group beside the others

@@ -7,8 +7,8 @@
 #include <cstring>
 
 #include "format/base/box.h"
-#include "format/base/errors.h"
 #include "format/base/no_index.h"
+#include "stages/gltf/meshopt_streams.h"
 
 namespace texmesh::proxies {
 namespace {
@@ -87,21 +87,13 @@ MeshStream attribute_stream(const std::vector<std::uint32_t>& vertices, const Va
     const std::array<T, N> element = value(vertices[i]);
     std::memcpy(raw.data() + i * out.stride, element.data(), sizeof element);
   }
-  out.packed.resize(meshopt_encodeVertexBufferBound(out.count, out.stride));
-  const std::size_t size =
-      meshopt_encodeVertexBuffer(out.packed.data(), out.packed.size(), raw.data(), out.count, out.stride);
-  if (size == 0) throw StageError("proxies", "meshopt", "a compressed stream", "nothing");
-  out.packed.resize(size);
+  out.packed = meshopt_attributes(raw, out.count, out.stride, "proxies");
   return out;
 }
 
 MeshStream index_stream(const GroupMesh& group) {
   MeshStream out{{}, group.vertices.size() > 65535 ? 4u : 2u, group.indices.size()};
-  out.packed.resize(meshopt_encodeIndexBufferBound(out.count, group.vertices.size()));
-  const std::size_t size =
-      meshopt_encodeIndexBuffer(out.packed.data(), out.packed.size(), group.indices.data(), out.count);
-  if (size == 0) throw StageError("proxies", "meshopt", "a compressed stream", "nothing");
-  out.packed.resize(size);
+  out.packed = meshopt_triangles(group.indices, group.vertices.size(), "proxies");
   return out;
 }
 

@@ -87,7 +87,8 @@ TEST_F(DoctorCommand, NotANumberAsATextureCoordinateIsSaid) {
              "mtllib m.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt nan 0\nvt 0 1\nf 1/1 2/2 3/3\n");
   const CommandResult r = texmesh({"doctor", model});
   EXPECT_EQ(r.exit_code, 0) << r.errors;
-  EXPECT_NE(r.errors.find("1 texture coordinate with NaN or infinity set to 0"), std::string::npos) << r.errors;
+  EXPECT_NE(r.errors.find("1 texture coordinate with NaN or infinity set to 0"), std::string::npos)
+      << r.errors;
 }
 
 }  // namespace

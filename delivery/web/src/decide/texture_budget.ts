@@ -10,7 +10,7 @@ import { PerGroup, PlaneChoice, TextureLoss, everyGroup, pictureFlip, planesForD
 // delivery/cpp/decide/texture_budget.cpp, bit for bit.
 
 /** FLIP that finer planes have to save. */
-const worthwhile = 1e-4;
+const worthwhile = 2e-3;
 const reweightings = 2;
 /** Losses as spendBytes counts them. */
 const lossUnit = 2 ** 40;
