@@ -22,7 +22,12 @@ struct DoctorArguments {
 };
 
 AtlasDiagnosis diagnose_input(const std::string& path, const RunContext& context) {
-  if (!is_package(path)) return diagnose_atlases(atlas_subject(path, context), context);
+  if (!is_package(path)) {
+    const auto subject = atlas_subject(path, context);
+    for (const Note& n : subject.notes)
+      if (n.severity == Severity::kWarning) std::cerr << "warning: " << n.code << ": " << n.text << '\n';
+    return diagnose_atlases(subject, context);
+  }
   PackageReader package(open_store(path));
   return diagnose_atlases(atlas_subject(package, context), context);
 }

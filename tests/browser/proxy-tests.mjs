@@ -40,11 +40,11 @@ test('a proxy that is enough for the display is shown after one request', async 
 
 test('a proxy gives way to scales without an empty frame, and in the same place', async () => {
   const b = await common();
-  const r = await loaded(b, null, proxied(b.url), {frames: 1, load: {time: 4}});
+  const r = await loaded(b, null, proxied(b.url), {frames: 1, px: 400, load: {time: 4}});
   check(!r.error, JSON.stringify(r.error));
   check(first(r)?.proxy === 0, JSON.stringify(first(r)));
   const scale = r.events.find((e) => e.name === 'scale');
-  check(scale && scale.at > first(r).at, 'no scale behind the proxy');
+  check(scale && scale.at > first(r).at, `no scale behind the proxy: ${JSON.stringify(r.events.map(({name, at, scale: s}) => [name, at, s]))}`);
   check(r.state.proxy === -1 && r.state.scale >= 0, JSON.stringify(r.state));
   // Every frame since the first picture covers the object: as many pixels, around the same middle.
   const seen = await lab(r.page, (i) => {
