@@ -34,9 +34,9 @@ describe('golden packages are read to their end', () => {
     execFileSync(python, ['-B', reader, 'mesh', join(root, `tests/golden/${name}.texmesh`), '--raw', '-o', out]);
     expect(rawNumbers(splits.mesh)).toBe(readFileSync(out, 'utf8'));
   });
-  it.skipIf(spawnSync('python3', ['--version']).status !== 0)('with a ZIP64 end record', async () => {
-    const out = join(folder, 'zip64.texmesh');
-    execFileSync('python3', [join(root, 'tests/golden/make_zip64'), join(root, 'tests/golden/v2.0-webp.texmesh'), out]);
+  it.skipIf(spawnSync('python3', ['--version']).status !== 0)('of a later minor version, with a ZIP64 end record', async () => {
+    const out = join(folder, 'later.texmesh');
+    execFileSync('python3', [join(root, 'tests/golden/make_later'), join(root, 'tests/golden/v2.0-webp.texmesh'), out]);
     await readAll(readFileSync(out));
   });
 });

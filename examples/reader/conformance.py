@@ -1,68 +1,129 @@
-"""Rules of format/SPEC.md over the JSON documents of a package: what texmesh_reader.py refuses by. A breach raises
-Refused with the rule's name."""
+"""Rules of format/SPEC.md that a viewer need not check: the container byte for byte, documents field by field, what GLBs and
+heads of JPEGs say. `texmesh_reader.py verify` runs them over whole packages. A breach raises Refused with the rule's name."""
+import io
 import json
+import os
 import re
 import struct
+import zlib
 
 import numpy as np
+from PIL import Image
 
-MAX32 = 0xFFFFFFFF
+from texmesh_reader import CREDENTIAL, MAX32, Cursor, Model, Refused, decode_image, is_path, parse_json, require, rises, sha
+
+MAX16 = 0xFFFF
 CODEC_FEATURE = {"jpeg": None, "jpeg-progressive": "codec-jpeg-progressive", "webp": "codec-webp"}
-CREDENTIAL = "META-INF/content_credential.c2pa"
 GROUPS = ("colour", "normal", "data")
 
 
-class Refused(Exception):
-    """A rule that the package breaks."""
+# Section 2: container and tree ------------------------------------------------------------------------
 
 
-def require(good, rule, what):
-    if not good:
-        raise Refused(f"{rule}: {what}")
+def local_header(path, size, crc, at):
+    big = size >= MAX32
+    extra = struct.pack("<HHQQ", 1, 16, size, size) if big else b""
+    gap = -(at + 30 + len(path) + len(extra)) % 64
+    gap += 64 if 0 < gap < 6 else 0
+    if gap:
+        extra += struct.pack("<HHH", 0xD935, gap - 4, 64) + bytes(gap - 6)
+    shown = MAX32 if big else size
+    return (
+        struct.pack("<IHHHHHIIIHH", 0x04034B50, 45 if big else 10, 0, 0, 0, 0x21, crc, shown, shown,
+                    len(path), len(extra)) + path.encode() + extra
+    )
 
 
-class Cursor:
-    """Little-endian numbers, one after the other; what is missing breaks `rule`."""
+def central_header(path, size, crc, at):
+    big, far = size >= MAX32, at >= MAX32
+    body = (struct.pack("<QQ", size, size) if big else b"") + (struct.pack("<Q", at) if far else b"")
+    extra = struct.pack("<HH", 1, len(body)) + body if body else b""
+    version, shown = 45 if body else 10, MAX32 if big else size
+    return (
+        struct.pack("<IHHHHHHIIIHHHHHII", 0x02014B50, version, version, 0, 0, 0, 0x21, crc, shown, shown,
+                    len(path), len(extra), 0, 0, 0, 0, min(at, MAX32)) + path.encode() + extra
+    )
 
-    def __init__(self, data, rule, what):
-        self.data, self.at, self.rule, self.what = data, 0, rule, what
 
-    def raw(self, count):
-        require(count <= len(self.data) - self.at, self.rule, f"{self.what} ends early")
-        self.at += count
-        return self.data[self.at - count : self.at]
+def end_record(count, size, at):
+    out = b""
+    if count >= MAX16 or size >= MAX32 or at >= MAX32:
+        out = struct.pack("<IQHHIIQQQQ", 0x06064B50, 44, 45, 45, 0, 0, count, count, size, at)
+        out += struct.pack("<IIQI", 0x07064B50, 0, at + size, 1)
+    few = min(count, MAX16)
+    return out + struct.pack("<IHHHHIIH", 0x06054B50, 0, 0, few, few, min(size, MAX32), min(at, MAX32), 0)
 
-    def get(self, code):
-        values = struct.unpack("<" + code, self.raw(struct.calcsize("<" + code)))
-        return values[0] if len(values) == 1 else values
 
-    def array(self, dtype, count):
-        return np.frombuffer(self.raw(np.dtype(dtype).itemsize * count), dtype)
+def list_tree(root):
+    """{path: (None, bytes, None)}"""
+    entries = {}
+    for folder, _, files in os.walk(root):
+        for file in files:
+            full = os.path.join(folder, file)
+            path = os.path.relpath(full, root).replace(os.sep, "/")
+            if path != "fragments.json" and not re.fullmatch(r"texture/\d+/r\d\d+/\d+\.(jpg|webp)", path):
+                entries[path] = (None, os.path.getsize(full), None)
+    return entries
 
-    def whole(self, width, count):
-        """`count` numbers of `width` bytes."""
-        digits = self.array("u1", width * count).reshape(count, width).astype(np.uint64)
-        return (digits << (8 * np.arange(width, dtype=np.uint64))).sum(axis=1, dtype=np.uint64).astype(np.int64)
 
-    def varint(self):
-        value = shift = 0
-        while True:
-            byte = self.get("B")
-            value |= (byte & 127) << shift
-            shift += 7
-            if byte < 128:
-                require(value <= MAX32 and (byte or shift == 7), "S06", "a varint in its shortest form")
-                return value
-            require(shift < 35, "S06", "a varint below 2^32")
-
-    def finish(self):
-        require(self.at == len(self.data), self.rule, f"{self.what} has further bytes")
+def list_container(name):
+    """{path: (offset, bytes, CRC-32)}; every byte outside of entries is what it must be."""
+    size = os.path.getsize(name)
+    with open(name, "rb") as f:
+        f.seek(max(0, size - 98))
+        tail = f.read()
+        require(len(tail) >= 22 and tail[-22:-14] == b"PK\5\6" + bytes(4), "K01", "no end record at the end")
+        count, length, at = struct.unpack("<HII", tail[-12:-2])
+        if MAX16 == count or MAX32 in (length, at):
+            require(len(tail) == 98, "K10", "no ZIP64 end record")
+            count, length, at = struct.unpack("<QQQ", tail[32:56])
+        end = end_record(count, length, at)
+        is_zip64 = len(end) > 22 or tail[-42:-38] == b"PK\6\7"
+        require(tail[-len(end):] == end, "K10" if is_zip64 else "K01", "the end record")
+        require(at + length + len(end) == size, "K01", "bytes of no entry, or too few")
+        f.seek(at)
+        directory = Cursor(f.read(length), "K01", "the central directory")
+        entries, here = {}, 0
+        for _ in range(count):
+            begin = directory.at
+            fields = directory.get("IHHHHHHIIIHHHHHII")
+            path, extra = directory.raw(fields[10]).decode("latin-1"), directory.raw(fields[11])
+            crc, bytes_, header = fields[7], fields[9], fields[16]
+            if MAX32 in (bytes_, header):
+                more = Cursor(extra, "K08", f"the ZIP64 record of {path}")
+                more.raw(4)
+                bytes_ = more.get("QQ")[0] if bytes_ == MAX32 else bytes_
+                header = more.get("Q") if header == MAX32 else header
+            require(is_path(path), "K05", f"path {path!r}")
+            require(path not in entries, "K06", f"{path} twice")
+            found, expected = directory.data[begin : directory.at], central_header(path, bytes_, crc, header)
+            rule = "K08" if found[30:32] != expected[30:32] else "K09" if fields[1] == fields[2] == 45 else "K02"
+            require(found == expected, rule, f"the central header of {path}")
+            require(header == here, "K01", f"a gap before {path}")
+            expected = local_header(path, bytes_, crc, here)
+            f.seek(here)
+            found = f.read(len(expected))
+            lengths = struct.unpack("<HH", found[26:30]) if len(found) >= 30 else (0, 0)
+            is_aligned = (here + 30 + sum(lengths)) % 64 == 0
+            rule = "K03" if not is_aligned else "K04" if found[:26] == expected[:26] else "K02"
+            require(found == expected, rule, f"the local header of {path}")
+            entries[path] = (here + len(expected), bytes_, crc)
+            here += len(expected) + bytes_
+            require(here <= at, "K01", f"{path} goes beyond the central directory")
+        directory.finish()
+        require(here == at, "K01", "bytes before the central directory")
+    folders = {p[:i] for p in entries for i, c in enumerate(p) if c == "/"}
+    require(not folders & set(entries), "K06", "a path is a folder of another")
+    first = next(iter(entries), None)
+    require(first == "manifest.json", "K11", f"the first entry is {first}")
+    require(64 + entries[first][1] <= 16384, "K12", "the manifest ends beyond 16,384 bytes")
+    return entries
 
 
 # Section 4: JSON --------------------------------------------------------------------------------------
 
 
-def parse_json(data, most, what, free=()):
+def parse_strictly(data, most, what, free=()):
     def unique(pairs):
         names = [name for name, _ in pairs]
         require(len(set(names)) == len(names), "J10", f"{what}: a name twice")
@@ -82,14 +143,9 @@ def parse_json(data, most, what, free=()):
             for member in value:
                 walk(member, depth + 1, is_free)
 
-    require(len(data) <= most, "L09", f"{what}: more than {most} bytes")
-    try:
-        document = json.loads(data.decode("utf-8"), object_pairs_hook=unique,
-                              parse_constant=lambda name: require(False, "J01", name))
-        walk(document, 1, False)
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-        raise Refused(f"J01: {what}: {error}") from error
-    require(isinstance(document, dict), "J01", f"{what}: not an object")
+    document = parse_json(data, most, what)
+    json.loads(data, object_pairs_hook=unique, parse_constant=lambda name: require(False, "J01", name))
+    walk(document, 1, False)
     return document
 
 
@@ -115,19 +171,12 @@ def take(document, name, kind, low=0, high=2**53, rule="J04"):
     return check(document[name], name, kind, low, high, rule)
 
 
-def rises(values):
-    return all(a < b for a, b in zip(values, values[1:]))
-
-
 # Section 5: manifest ----------------------------------------------------------------------------------
 
 
-def read_manifest(data):
-    m = parse_json(data, 16384, "manifest.json")
-    require(m.get("format") == "texmesh", "M01", "format")
+def check_manifest(m):
     version = take(m, "version", "object", rule="M01")
-    major = take(version, "major", "int", rule="M01")
-    require(major == 2, "W03", f"format {major} is not known; a model of format 1 has to be compiled again")
+    take(version, "major", "int", rule="M01")
     take(version, "minor", "int", rule="M01")
     for name in take(m, "requiredFeatures", "list", 0, 100):
         require(name in CODEC_FEATURE.values() and name, "M02", f"unknown feature {name}")
@@ -150,7 +199,6 @@ def read_manifest(data):
     check_steps(m)
     if "proxies" in m:
         check_proxies(take(m, "proxies", "object"))
-    return m
 
 
 def check_offset(offset):
@@ -240,9 +288,8 @@ def check_steps(m):
 # Section 7: textures ---------------------------------------------------------------------------------
 
 
-def read_textures(data, m):
-    textures = take(parse_json(data, 32 << 20, "textures.json"), "textures", "list", 0, 10000)
-    require(len(textures) == m["planeCount"], "R04", "number of planes in textures.json")
+def check_planes(textures, m):
+    check(textures, "textures", "list", 0, 10000)
     full, before = [], (-1, 0)
     for p, t in enumerate(textures):
         check(t, "texture", "object")
@@ -282,14 +329,46 @@ def read_textures(data, m):
         require(all(t[s] == base[s] for s in same), "X07", f"mip {p} and its base")
     images = [(t["image"], t["role"] == "alpha", t.get("mip", 0)) for t in textures]
     require(len(set(images)) == len(images), "X08", "two planes of one image")
-    return textures
 
 
 def group_of(role):
-    return "normal" if role == "normal" else "colour" if role in (
-        "base-colour", "emissive", "alpha", "colour") else "data"
+    return "normal" if role == "normal" else "data" if role in ("data", "occlusion-roughness-metallic") else "colour"
 
 
+# Section 8: tables ------------------------------------------------------------------------------------
+
+
+def check_section(t, texture):
+    """What a viewer does not need of a section that texmesh_reader.py has read."""
+    width, log_width, low, high = t["parameters"].tolist()
+    require(0 <= width <= 100 and 0 <= log_width <= 4 and 1 <= low <= high <= 100, "T04", "parameters of the allocation")
+    for name, most in (("mse", 65025), ("dssim", 2), ("preview", 2)):
+        require((t[name] <= 0x7BFF).all() and (t[name].view("<f2") <= np.float32(most)).all(), "T04", name)
+    for values, most in ((t["surface"], 1), (t["middle"], 100)):
+        require(np.isfinite(values).all() and (values >= 0).all() and (values <= most).all(), "T04", "a float")
+    require(t["quality"].tolist() == texture["rungQuality"], "R09", "rung qualities")
+    for values, w in zip((t["size"], t["features"]), t["widths"]):
+        require(w == max(1, (int(values.max(initial=0)).bit_length() + 7) // 8), "T08", "width of numbers")
+    check_knots(t["knots"].tolist(), t["positions"].tolist(), t["quality"].tolist())
+    texels = texture["fragmentWidthPx"] * texture["fragmentHeightPx"]
+    require(((t["covered"] > 0) & (t["covered"] <= texels)).all(), "T11", "covered texels")
+    require(float(t["surface"].sum(dtype=np.float64)) <= 1.001, "T11", "surface")
+    check_order(t)
+
+
+def check_knots(knots, positions, qualities):
+    require(rises(knots) and all(qualities[0] < q < qualities[-1] and q not in qualities for q in knots), "T08", "knots")
+    between = [sum(rung < q for rung in qualities) for q in knots]
+    for a in range(1, len(knots)):
+        require(between[a] != between[a - 1] or positions[a] >= positions[a - 1], "T08", "positions of knots")
+
+
+def check_order(t):
+    features = t["features"][0].astype(np.float64)
+    spread = features.max(initial=0) - features.min(initial=features.max(initial=0))
+    eta = np.float32((features - features.min(initial=features.max(initial=0))) / spread) if spread else features * 0
+    keys = list(zip(-eta, -t["surface"], t["order"].tolist()))
+    require(keys == sorted(keys), "T12", "order of importance")
 
 
 # Section 3: entries ----------------------------------------------------------------------------------
@@ -442,7 +521,7 @@ def check_losses(losses, count, low_first=False):
 
 
 def read_quality(data, m, textures):
-    q = parse_json(data, 4 << 20, "quality.json")
+    q = parse_strictly(data, 4 << 20, "quality.json")
     take(q, "views", "int", 1, 10000, "Q01")
     sizes = take(q, "sizesPx", "list", 1, 8, "Q01")
     require(rises([check(s, "sizesPx", "int", 1, 65536, "Q01") for s in sizes]), "Q01", "sizesPx rise")
@@ -477,7 +556,7 @@ ABOUT_PAIRS = {"identifiers": ("scheme", "value"), "dates": ("event", "text")}
 
 
 def read_about(data, m):
-    about = parse_json(data, 262144, "about.json", ("source",))
+    about = parse_strictly(data, 262144, "about.json", ("source",))
     for name, most in ABOUT_TEXTS.items():
         if name in about:
             check(about[name], name, "text", 1, most, "B01")
@@ -537,3 +616,146 @@ def check_thesis(data, m, textures, tables=None):
             require(totals.max() <= 2**53, "O05", "D")
         s.finish()
     c.finish()
+
+
+def decode_source(data, t, plane):
+    formats = {"jpg": "JPEG", "png": "PNG", "tif": "TIFF", "webp": "WEBP"}
+    if t["source"] in formats:  # Pillow does not read EXR
+        try:
+            image = Image.open(io.BytesIO(data), formats=(formats[t["source"]],))
+            require(image.size == (t["widthPx"], t["heightPx"]), "O02", f"source of plane {plane}: {image.size}")
+            image.load()
+        except (OSError, SyntaxError, ValueError) as error:
+            raise Refused(f"O02: source of plane {plane}: {error}") from error
+
+
+# Whole packages ---------------------------------------------------------------------------------------
+
+
+class CheckedModel(Model):
+    """Reads as texmesh_reader.py does, and checks everything on the way."""
+
+    def __init__(self, name):
+        super().__init__(name)
+        for t, texture in zip(self.tables, self.textures):
+            check_section(t, texture)
+
+    def open(self, name):
+        self.listing = list_tree(name) if os.path.isdir(name) else list_container(name)
+        require("index.bin" in self.listing, "E01", "no entry index.bin")
+        return super().open(name)
+
+    def parse(self, data, most, what):
+        return parse_strictly(data, most, what)
+
+    def whole(self, path):
+        """The bytes of an entry where the container has it."""
+        require(path in self.listing, "E01", f"no entry {path}")
+        return self.package.read(path, *self.listing[path][:2])
+
+    def check_manifest(self):
+        check_manifest(self.manifest)
+
+    def check_index(self):
+        self.check_references()
+
+    def check_textures(self):
+        check_planes(self.textures, self.manifest)
+        for path in needed_paths(self.manifest, self.textures):
+            rule = "R07" if path.startswith(("texture/", "preview/", "source/")) else "E01"
+            require(path in self.listing and (path in self.index or path == "index.bin"), rule, f"no entry {path}")
+
+    def check_references(self):
+        m, columns = self.manifest, self.manifest["scales"]
+        stream = m.get("stream")
+        named = {path: m[name] for name, path in (FIXED | OPTIONAL).items() if name in m}
+        for s, at, size, digest in zip(*(columns[c] for c in ("scale", "offset", "bytes", "sha256"))):
+            if not stream or at != stream["offset"]:
+                named[f"mesh/s{s:02}.glb"] = {"offset": at, "bytes": size, "sha256": digest}
+        proxies = m.get("proxies", {"offset": [], "bytes": [], "sha256": []})
+        for path, *ref in zip(proxy_paths(m), *(proxies[c] for c in ("offset", "bytes", "sha256"))):
+            named[path] = dict(zip(("offset", "bytes", "sha256"), ref))
+        for path, ref in named.items():
+            require(path in self.index, "R03", f"{path} is not in the index")
+            expected = self.index[path]
+            found = (ref["offset"], ref["bytes"], ref.get("sha256", expected[2]))
+            require(found == expected, "R03", f"the manifest's {path}")
+
+    def verify(self):
+        m = self.manifest
+        places = {"manifest.json": None, "index.bin": None, CREDENTIAL: None}
+        for path, (offset, size, crc) in self.listing.items():
+            require(path in self.index or path in places, "I08", f"{path} is not in the index")
+            if path in self.index and offset is not None:
+                require((offset, size) == self.index[path][:2], "I08", f"place of {path}")
+            data = self.whole(path)
+            require(crc in (None, zlib.crc32(data)), "K07", f"CRC-32 of {path}")
+            require(path not in self.index or sha(data) == self.index[path][2], "I08", f"digest of {path}")
+        for path in self.index:
+            require(path in self.listing, "I08", f"no entry {path}")
+        known = set(needed_paths(m, self.textures)) | set(places)
+        for path in self.listing:
+            require(path in known or m["version"]["minor"] > 0, "E03", f"unknown entry {path}")
+        if not self.package.is_tree:
+            check_entry_order(list(self.listing), m, self.textures)
+        read_quality(self.whole("quality.json"), m, self.textures)
+        read_about(self.whole("about.json"), m)
+        parse_strictly(self.whole("provenance.json"), 64 << 20, "provenance.json")
+        if "thesis" in m:
+            check_thesis(self.whole("thesis.bin"), m, self.textures, self.tables)
+        if "poster" in m:
+            decode_image(self.whole("poster.jpg"), m["poster"]["widthPx"], m["poster"]["heightPx"], 3, "O01", "poster")
+        for plane, t in enumerate(self.textures):
+            if "mip" not in t:
+                check_jpeg_head(self.whole(f"preview/{plane:03}.jpg"), f"preview {plane}")
+                self.preview(plane)
+            if "source" in t:
+                decode_source(self.whole(f"source/{plane:03}.{t['source']}"), t, plane)
+            if t["codec"] != "webp":
+                streams = self.table_streams(plane)
+                for stream in streams:
+                    check_jpeg_head(stream, f"table stream of plane {plane}")
+                if t.get("sourceRung"):
+                    check_source_rung(t, streams, plane)
+            for rung in range(len(t["rungQuality"])):
+                for _ in self.fragments(plane, rung):
+                    pass
+        coarsest = f"mesh/s{m['scales']['scale'][-1]:02}.glb"
+        for path, triangles in zip(proxy_paths(m), m.get("proxies", {}).get("triangles", [])):
+            check_proxy(self.whole(path), path, triangles)
+        glbs = {}
+        for path in (path for path in self.index if path.endswith(".glb") and path.startswith("mesh/")):
+            glbs[int(path[6:8])] = check_glb(self.whole(path), path, path == coarsest, self.textures, self.whole)
+        if "stream" in m:
+            self.verify_stream(len(glbs[0].get("materials", [])))
+        check_shared(glbs, m)
+
+    def verify_stream(self, materials):
+        columns, (splits, data) = self.manifest["scales"], self.stream()
+        last = self.manifest["stream"]["headBytes"] + sum(sum(b["parts"]) for b in splits.head["blocks"])
+        require(last == len(data), "S08", "the last block does not end with the stream")
+        require(all(g[0] < max(1, materials) for g in splits.head["groups"]), "S23", "a material that the GLBs lack")
+        for end in splits.scale_ends(data):
+            require(end["scale"] in columns["scale"], "S21", f"scale {end['scale']} of the stream")
+            k = columns["scale"].index(end["scale"])
+            require(end["triangles"] == columns["triangles"][k], "S21", f"triangles of scale {end['scale']}")
+            if columns["offset"][k] == self.manifest["stream"]["offset"]:
+                require(columns["vertices"][k] == end["wedges"], "M16", f"vertices of scale {end['scale']}")
+                require(columns["bytes"][k] == end["bytes"], "M20", f"prefix of scale {end['scale']}")
+                require(columns["sha256"][k] == sha(data[: end["bytes"]]), "M17", f"prefix of scale {end['scale']}")
+
+
+def verify(names):
+    """Whether no package breaks a rule."""
+    good = True
+    for name in names:
+        try:
+            CheckedModel(name).verify()
+            print(f"{name}: no rule broken")
+        except Refused as refused:
+            print(f"{name}: refused: {refused}")
+            good = False
+        except (KeyError, TypeError, ValueError) as error:
+            print(f"{name}: refused: J04: {error!r}")
+            good = False
+    return good
