@@ -5,6 +5,7 @@ import { OpenOptions, PackageReader } from './http/package_reader';
 import type { LoadOptions, LoadedModel } from './scene/api';
 import { loadModel } from './scene/load';
 import { PoolOptions, WorkerPool } from './worker/pool';
+import type { SharedWorkers } from './worker/shared_workers';
 
 export { FormatError, InputError, TexmeshError } from './format/errors';
 export type * from './reader';
@@ -24,6 +25,8 @@ export class TexmeshPackage extends PackageReader {
   private loaded_ = false;
   /** Workers for documents, until a load has the pool. */
   pool?: WorkerPool;
+  /** Workers that loads use together with those of other packages; left out: workers of their own. */
+  shared?: SharedWorkers;
 
   /**
    * Shows the package in a scene: at once at its coarsest, then as well as time and display allow. The time of the first load
@@ -41,7 +44,7 @@ export class TexmeshPackage extends PackageReader {
     let { pool } = this;
     if (!pool || pool.isUnavailable || options.workerUrl || options.decode) {
       pool?.dispose();
-      pool = new WorkerPool(options);
+      pool = new WorkerPool({ ...options, shared: this.shared });
     } else pool.grow(options.workers);
     this.pool = pool; // until a load has the pool: options may be refused
     this.decodeDocument = pool.decodeDocument;
@@ -66,11 +69,12 @@ export class TexmeshPackage extends PackageReader {
  * Opens a package: one request of 44 KiB, which brings most first pictures along. `url` is that of a .texmesh file, or of the folder that `texmesh unpack` made
  * of one, ending in a slash. InputError when the server does not deliver, FormatError when it is no package.
  */
-export async function open(url: string, options: OpenOptions & Pick<PoolOptions, 'workerUrl' | 'decode'> = {}): Promise<TexmeshPackage> {
+export async function open(url: string, options: OpenOptions & Omit<PoolOptions, 'workers'> = {}): Promise<TexmeshPackage> {
   const pool = new WorkerPool({ ...options, workers: 1 }); // the worker starts while the manifest comes
   try {
     const opened = await TexmeshPackage.openUrl(url, options, pool.decodeDocument);
     opened.pool = pool;
+    opened.shared = options.shared;
     return opened;
   } catch (error) {
     pool.dispose();

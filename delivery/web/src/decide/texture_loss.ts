@@ -107,6 +107,10 @@ export class TextureLoss {
     if (!loss) this.planes_.set(plane, (loss = this.measure_(plane)));
     return loss;
   }
+  /** What a mip loses of the source's texels; 0 for full size. Needs the tables of the full-size plane alone. */
+  mip(plane: number): number {
+    return this.curves_[groupIndex(this.data, plane)].halved(this.growth_(plane), this.data.textures[plane].mip);
+  }
   private measure_(plane: number): PlaneLoss {
     const t = tablesOf(this.data, plane);
     const curve = this.curves_[groupIndex(this.data, plane)];
@@ -114,7 +118,7 @@ export class TextureLoss {
     const fragments = fragmentCount(t);
     const growth = this.growth_(plane);
     const shown = new Float64Array((t.rungQuality.length + 1) * fragments);
-    const mip = curve.halved(growth, this.data.textures[plane].mip);
+    const mip = this.mip(plane);
     const withMip = (coded: number): number => (mip > 0 ? combinedFlip(this.data.quality, [coded, mip]) : coded);
     const mean = this.previewMean_(plane);
     const preview = this.previewLoss_(plane);

@@ -20,6 +20,14 @@ export interface GltfLoaderLike {
   parseAsync(data: ArrayBuffer, path: string): Promise<unknown>;
 }
 
+/** A model's turn at the link. */
+export interface Turn {
+  /** From now on; Infinity: no limit. */
+  seconds: number;
+  /** What the link is expected to carry, bytes per second; left out: what the model's own transfers have shown. */
+  bytesS?: number;
+}
+
 /** Options of TexmeshPackage.load. */
 export interface LoadOptions {
   /** The renderer of the scene: textures are composed in the renderer's context. */
@@ -64,6 +72,16 @@ export interface LoadOptions {
   decode?: DecodeHere;
   /** Workers that decode images. Default: 2 to 4 by the number of cores. */
   workers?: number;
+  /**
+   * Asked once the first picture stands; the timed part begins when the answer comes, and lasts as long as the answer says. So several
+   * models of a page have the link one after the other. `time` counts where this is left out.
+   */
+  turn?: () => Promise<Turn>;
+  /**
+   * Bytes that textures and meshes may take on the GPU: textures get coarser mips, meshes coarser scales, until all fits or nothing is
+   * coarser. Left out: no limit.
+   */
+  memoryBytes?: number | (() => number);
   /** Cancels the load, as LoadedModel.cancel does. */
   signal?: AbortSignal;
 }
@@ -166,6 +184,8 @@ export interface LoadState {
   displayedPx: number;
   /** Textures that are being composed, in no order. */
   planes: readonly ComposedPlane[];
+  /** Bytes that the meshes and textures of the load take on the GPU, mip levels included. */
+  gpuBytes: number;
   /** Bytes received by this package so far. */
   bytes: number;
   /** Estimate of the throughput now; 0: nothing is known yet. */

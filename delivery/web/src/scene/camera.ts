@@ -1,4 +1,4 @@
-import { Box3, Camera, Object3D, OrthographicCamera, Vector2, Vector3, WebGLRenderer } from 'three';
+import { Box3, Camera, Object3D, OrthographicCamera, type Vector2Like, Vector3 } from 'three';
 import type { Display } from './api';
 import type { Manifest } from '../format/manifest';
 import { sampleTriangles } from './scale_parts';
@@ -6,11 +6,10 @@ import { sampleTriangles } from './scale_parts';
 /** Triangles whose first corners are looked at. */
 const mostPoints = 600;
 
-/** How a camera shows the object: displayed height in device px, and the visible part of the object (Fig. 7.5). */
-export function displayOf(manifest: Manifest, object: Object3D, camera: Camera, renderer: WebGLRenderer): Display {
+/** How a camera shows the object in a picture of `size` device px: displayed height, and the visible part of the object (Fig. 7.5). */
+export function displayOf(manifest: Manifest, object: Object3D, camera: Camera, size: Vector2Like): Display {
   object.updateWorldMatrix(true, true);
   camera.updateWorldMatrix(true, false);
-  const size = renderer.getDrawingBufferSize(new Vector2());
   const box = new Box3(new Vector3(...manifest.boundsMin), new Vector3(...manifest.boundsMax));
   const height = manifest.objectHeight * object.matrixWorld.getMaxScaleOnAxis();
   const eye = new Vector3().setFromMatrixPosition(camera.matrixWorld);

@@ -6,6 +6,7 @@ import type { PackageReader } from '../http/package_reader';
 import type { WorkerPool } from '../worker/pool';
 import type { LoadOptions, LoadState, LoadedModel } from './api';
 import { LoadContext } from './load_context';
+import { gpuBytes } from './memory/gpu_bytes';
 import { ScaleSource } from './scale_source';
 import { ShownScale } from './shown_scale';
 import type { TextureLoad } from './texture_load';
@@ -95,6 +96,7 @@ class ModelLoad {
       wantedScale: this.scale_.wanted,
       displayedPx: view.display.heightPx,
       planes: this.textures?.planes() ?? [],
+      gpuBytes: gpuBytes(this.scale_.objects(), this.materials, this.textures?.planes() ?? []),
       bytes: client.received,
       throughputBytesS: this.textures?.throughputBytesS() ?? beta0,
       rttS: client.rttS,
@@ -132,6 +134,7 @@ class ModelLoad {
   }
   private async showInTime_(): Promise<void> {
     const { context } = this;
+    await context.turn();
     if (await this.showServing_()) {
       context.emit('deadline', { limit: context.limitS, actual: context.elapsedS(), skipped: 0 });
       return this.rest_();

@@ -1,5 +1,5 @@
-import { type Camera, Group } from 'three';
-import { InputError, isAbort, throwIfAborted } from '../format/errors';
+import { type Camera, Group, Vector2 } from 'three';
+import { InputError, abortError, isAbort, throwIfAborted } from '../format/errors';
 import { nowS } from '../http/clock';
 import type { PackageReader } from '../http/package_reader';
 import type { WorkerPool } from '../worker/pool';
@@ -27,12 +27,15 @@ export class LoadContext {
   /** The object in the scene. */
   readonly object = new Group();
   readonly events = new Emitter<LoadEvents>();
-  readonly limitS: number;
+  /** Seconds from the load's start to the end of its timed part. */
+  limitS: number;
   phase: LoadPhase = 'first-picture';
   override: Override;
   view: { display: Display; camera?: Camera };
   /** Throughput that the first transfers have shown. */
   beta0 = 0;
+  /** Throughput that whoever gave the load its turn expects; 0: nobody has said. */
+  expectedBytesS = 0;
   expectedBytes = 0;
   private lastView_ = '';
   private readonly abort_ = new AbortController();
@@ -66,6 +69,22 @@ export class LoadContext {
   /** Seconds since the load's start. */
   elapsedS(): number {
     return nowS() - this.startS_;
+  }
+
+  /** The timed part begins when whoever gives turns says so. */
+  async turn(): Promise<void> {
+    const { options: { turn }, signal } = this;
+    if (!turn) return;
+    const cancelled = new Promise<never>((_, end) => signal.addEventListener('abort', () => end(abortError()), { once: true }));
+    const { seconds, bytesS = 0 } = await Promise.race([turn(), cancelled]);
+    throwIfAborted(signal);
+    this.limitS = this.elapsedS() + seconds;
+    this.expectedBytesS = bytesS;
+  }
+  /** Bytes that the load may take on the GPU. */
+  get memoryBytes(): number {
+    const { memoryBytes = Infinity } = this.options;
+    return typeof memoryBytes === 'function' ? memoryBytes() : memoryBytes;
   }
 
   // ---- events
@@ -120,7 +139,7 @@ export class LoadContext {
   private displayFrom_(camera?: Camera): Display {
     const { options: { display, renderer }, object } = this;
     const said = typeof display === 'function' ? display() : display;
-    const shown = said ?? (camera ? displayOf(this.reader.manifest, object, camera, renderer) : defaultHeightPx);
+    const shown = said ?? (camera ? displayOf(this.reader.manifest, object, camera, renderer.getDrawingBufferSize(new Vector2())) : defaultHeightPx);
     return typeof shown === 'number' ? { heightPx: shown } : shown;
   }
 }

@@ -81,6 +81,10 @@ export class ScaleSource {
   shape(scale: number): Object3D | undefined {
     return this.shapes_.get(scale);
   }
+  /** All scales that are there. */
+  all(): Object3D[] {
+    return [...new Set(this.shapes_.values())];
+  }
   dispose(): void {
     this.shapes_.forEach(disposeGeometries);
     if (this.first_) disposeGeometries(this.first_.scene);

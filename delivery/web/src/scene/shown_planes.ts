@@ -1,4 +1,5 @@
-import { fullSize, planesForDisplay, type PlaneChoice } from '../decide/texture_loss';
+import { planesWithin, scaleBytes } from '../decide/gpu_memory';
+import { TextureLoss, fullSize, planesForDisplay, type PlaneChoice } from '../decide/texture_loss';
 import { InputError, throwIfAborted } from '../format/errors';
 import { mostPreviewPx } from '../format/layout';
 import type { PackageData } from '../format/package_data';
@@ -86,11 +87,14 @@ export class ShownPlanes {
   forDisplay(): PlaneChoice[] {
     return planesFor(this.load_, this.data);
   }
-  /** Planes that the GPU can hold: a mip where the plane is too large; without such a mip the picture of the mesh stays. */
-  fitting(choices: readonly PlaneChoice[]): PlaneChoice[] {
+  /**
+   * Planes that the GPU can hold: a mip where the plane is too large; without such a mip the picture of the mesh stays. Beside a scale
+   * they fit the memory that there is.
+   */
+  fitting(choices: readonly PlaneChoice[], scale: number): PlaneChoice[] {
     const most = this.load_.options.renderer.capabilities.maxTextureSize;
     const fits = (t: TextureInfo): boolean => Math.max(t.widthPx, t.heightPx) <= most;
-    return choices.flatMap(({ base, plane }) => {
+    return this.withinMemory_(choices, scale).flatMap(({ base, plane }) => {
       // Mips stand in falling order of their size.
       const taken = fits(this.textures[plane]) ? plane : this.textures.findIndex((t) => t.mip > 0 && t.base === base && fits(t));
       if (taken >= 0) return [{ base, plane: taken }];
@@ -98,11 +102,19 @@ export class ShownPlanes {
       return [];
     });
   }
+  private withinMemory_(choices: readonly PlaneChoice[], scale: number): readonly PlaneChoice[] {
+    const { memoryBytes, reader: { manifest }, view } = this.load_;
+    if (memoryBytes === Infinity) return choices;
+    const mesh = manifest.scales.find((s) => s.scale === scale);
+    return planesWithin(new TextureLoss(this.data, view.display.heightPx), choices, memoryBytes - (mesh ? scaleBytes(mesh) : 0));
+  }
   /** Planes with more texels where the view has come nearer; never planes with fewer, as the texels are there already. */
-  finer(): PlaneChoice[] {
+  finer(scale: number): PlaneChoice[] {
     const { planes } = this.set_;
     const wanted = planesFor(this.load_, this.data, this.load_.view.display.heightPx / hysteresis).filter((c) => planes.has(c.base));
-    return this.fitting(wanted).filter((c) => planes.get(c.base)!.widthPx < this.textures[c.plane].widthPx);
+    const larger = (a: number, b: number): number => (this.textures[a].widthPx > this.textures[b].widthPx ? a : b);
+    const all = wanted.map(({ base, plane }) => ({ base, plane: larger(plane, planes.get(base)!.plane) }));
+    return this.fitting(all, scale).filter((c) => planes.get(c.base)!.widthPx < this.textures[c.plane].widthPx);
   }
   /** Reads the tables of these planes, too. */
   async readTables(planes: readonly number[]): Promise<void> {

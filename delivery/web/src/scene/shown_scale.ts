@@ -90,6 +90,10 @@ export class ShownScale {
     if (!object.parent) this.scene_.add(object);
     this.load_.emit('scale', { scale: shown, triangles: reader.manifest.scales.find((s) => s.scale === shown)!.triangles });
   }
+  /** Scales that are there, and the proxy. */
+  objects(): Object3D[] {
+    return [...this.source_.all(), ...this.proxy.objects];
+  }
   /** The scale takes the proxy's place in one turn of the page. */
   release(): void {
     this.place_();

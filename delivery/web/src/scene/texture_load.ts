@@ -1,6 +1,7 @@
 import { type FragmentList, lossesOf } from '../decide/fragment_list';
 import { clamp } from '../decide/numbers';
 import { throughputOf } from '../decide/request_groups';
+import { scaleWithin } from '../decide/gpu_memory';
 import { proxyLoss } from '../decide/proxy_choice';
 import { choiceInTime } from '../decide/scale_choice';
 import { type PlaneChoice, pictureFlip } from '../decide/texture_loss';
@@ -86,7 +87,7 @@ export class TextureLoad {
   async timedPart(): Promise<void> {
     const { load_: load, planes_: planes, fetching_: fetching } = this;
     const { reader, options, signal } = load;
-    load.beta0 = options.beta0BytesS || throughputOf(reader.requests, reader.client.latencyS);
+    load.beta0 = load.expectedBytesS || options.beta0BytesS || throughputOf(reader.requests, reader.client.latencyS);
     const { scale, planes: chosen } = await this.choice_();
     if (scale !== this.scale_.shown) load.enter('mesh');
     const meshBytes = this.source_.bytesOf(scale);
@@ -94,7 +95,7 @@ export class TextureLoad {
     // Picture and fragments stand without the mesh, too.
     const meshShown = mesh.shown.catch((error: unknown) => this.scale_.lost(error, scale));
     // Coverage that no material asks for is not fetched.
-    const choices = planes.fitting(chosen).filter(({ base }) => planes.textures[base].role !== 'alpha' || planes.isUsed(base));
+    const choices = planes.fitting(chosen, scale).filter(({ base }) => planes.textures[base].role !== 'alpha' || planes.isUsed(base));
     const [{ shown }] = await Promise.all([planes.show(choices), fetching.transfers.prepare(choices.map((c) => c.plane), signal)]);
     // A mesh that takes less than a round trip leaves the link to the textures. A longer one is waited for; coarser scales show on its way.
     if (meshBytes > load.beta0 * reader.client.latencyS) await Promise.race([mesh.arrived, this.timer_(meshShare)]);
@@ -140,8 +141,8 @@ export class TextureLoad {
   }
   /** The scale that is enough at a displayed height. */
   private scaleFor_(heightPx: number, part: VisiblePart | undefined): number {
-    const { options: { rule }, reader } = this.load_;
-    return selectScale(reader.manifest, heightPx, part, rule);
+    const { options: { rule }, memoryBytes, reader: { manifest } } = this.load_;
+    return scaleWithin(manifest.scales, selectScale(manifest, heightPx, part, rule), memoryBytes);
   }
   /** Scale and planes for the display, or those that look best in the time. */
   private async choice_(): Promise<{ scale: number; planes: PlaneChoice[] }> {
@@ -185,7 +186,7 @@ export class TextureLoad {
     await this.fetching_.composed();
   }
   private async showFinerPlanes_(): Promise<void> {
-    const finer = this.planes_.finer();
+    const finer = this.planes_.finer(Math.max(this.scale_.shown, 0));
     if (finer.length === 0) return;
     const asked = finer.map((c) => c.plane);
     await this.planes_.readTables(asked);

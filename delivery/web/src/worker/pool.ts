@@ -1,5 +1,6 @@
 import type { DocumentDecoder } from '../format/document_decoder';
 import { FormatError, abortError } from '../format/errors';
+import { type Helper, type SharedWorkers, type WorkerEvents, startWorker } from './shared_workers';
 import type {
   DecodeRequest, EnlargeRequest, Levels, SplitInfo, SplitUpdate, WorkerAnswer, WorkerRequest,
 } from './protocol';
@@ -34,18 +35,14 @@ function inBuffersOfItsOwn(value: unknown): unknown {
 
 /** Does the work of workers on the page's own thread: `handle` of texmesh/worker. */
 export type DecodeHere = (request: WorkerRequest) => Promise<[unknown, Transferable[]]>;
-/** A worker, or the main thread where there is none. */
-interface Helper {
-  postMessage(request: WorkerRequest & { id: number }): void;
-  terminate(): void;
-}
-
 /** See LoadOptions. */
 export interface PoolOptions {
   workers?: number;
   workerUrl?: string | URL;
   /** Decodes instead of workers. */
   decode?: DecodeHere;
+  /** Workers that other pools use, too, instead of workers of one's own. */
+  shared?: SharedWorkers;
 }
 
 /** Workers that decode documents, images and vertex splits. */
@@ -60,8 +57,10 @@ export class WorkerPool {
   private hasAnswered_ = false; // a worker has answered
   private lastId_ = 0;
   private ended_ = false;
+  private readonly firstShared_: number;
 
   constructor(private readonly options_: PoolOptions = {}) {
+    this.firstShared_ = options_.shared?.nextPool() ?? 0;
     this.onThisThread_ = options_.decode !== undefined || typeof Worker === 'undefined';
     this.grow(options_.workers);
   }
@@ -105,6 +104,7 @@ export class WorkerPool {
     return this.jobs_.size;
   }
   dispose(): void {
+    if (this.options_.shared) for (const job of queue) if (job.pool === this && job.request.op === 'split-close') this.post(job); // or the worker keeps the stream
     this.ended_ = true;
     this.helpers_.forEach((h) => h.terminate());
     queue = queue.filter((job) => job.pool !== this);
@@ -158,16 +158,10 @@ export class WorkerPool {
   // ---- workers
 
   private startWorker_(index: number): Helper {
-    const { workerUrl } = this.options_;
+    const { shared, workerUrl } = this.options_;
+    const events: WorkerEvents = { answered: (answer) => this.answered_(answer), broke: () => this.replace_(index) };
     try {
-      // Bundlers see a worker that is written so.
-      const worker = workerUrl ? new Worker(workerUrl, { type: 'module' }) : new Worker(new URL('./worker.js', import.meta.url), { type: 'module' });
-      worker.onmessage = (event: MessageEvent<WorkerAnswer>) => this.answered_(event.data);
-      worker.onerror = (event) => {
-        event.preventDefault();
-        this.replace_(index);
-      };
-      return worker;
+      return shared?.helper(this.firstShared_ + index, events) ?? startWorker(workerUrl, events);
     } catch {
       return this.startHere_(); // a page whose policy forbids workers
     }

@@ -1,4 +1,4 @@
-import { BoxGeometry, BufferGeometry, Group, Mesh, MeshStandardMaterial, Scene, Texture, WebGLRenderer } from 'three';
+import { BoxGeometry, BufferGeometry, Group, Mesh, MeshStandardMaterial, Scene, Texture, type Vector2, WebGLRenderer } from 'three';
 import { samePrefix } from '../../src/format/bytes';
 import type { LoadEvents, LoadOptions, LoadedModel } from '../../src/scene/api';
 import { FormatError, TexmeshPackage } from '../../src/open';
@@ -13,7 +13,7 @@ import { FakeServer } from './fake_server';
 /** What was uploaded, in its order: the first bytes of the stream. */
 export type Uploads = string[];
 
-function fakeRenderer(uploads: Uploads): WebGLRenderer {
+export function fakeRenderer(uploads: Uploads): WebGLRenderer {
   const textures = new Map<Texture, { __webglTexture: object }>();
   const gl = new Proxy({} as Record<string, unknown>, {
     get: (_, name: string) => {
@@ -29,7 +29,7 @@ function fakeRenderer(uploads: Uploads): WebGLRenderer {
   };
   return {
     getContext: () => gl, initTexture: of, properties: { get: of }, state: { bindTexture: () => undefined },
-    capabilities: { maxTextureSize: 1 << 14 }, compile: () => undefined,
+    capabilities: { maxTextureSize: 1 << 14 }, compile: () => undefined, getDrawingBufferSize: (v: Vector2) => v.set(1000, 1000),
   } as unknown as WebGLRenderer;
 }
 

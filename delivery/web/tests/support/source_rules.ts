@@ -11,6 +11,7 @@ export const roomsBelow: Record<string, readonly string[]> = {
   worker: ['format'],
   decide: ['format', 'http'],
   scene: ['format', 'http', 'worker', 'decide'],
+  page: ['format', 'http', 'decide', 'scene'],
 };
 
 /** Lines of a function, of a class, of a file, of the median file, and files in a folder. */

@@ -18,6 +18,9 @@ export class ShownProxy {
   get materials() {
     return this.object_ ? materialsOf(this.object_) : [];
   }
+  get objects(): Object3D[] {
+    return this.object_ ? [this.object_] : [];
+  }
   /** Loads a proxy, then puts it in place of the one before, in one turn of the page. */
   async show(proxy: number): Promise<void> {
     const { load_: load, scene_: scene } = this;

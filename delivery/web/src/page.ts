@@ -1,0 +1,245 @@
+import type { WebGLRenderer } from 'three';
+import { nowS } from './http/clock';
+import { type TexmeshPackage, open } from './open';
+import { nextStep } from './page/model_queue';
+import { type Host, type OpenHow, PageModel, type PageModelOptions } from './page/page_model';
+import { Painter } from './page/painter';
+import { defaultMemoryBytes, linkBytesS, shareOf, turnS } from './page/schedule';
+import { Visibility } from './page/visibility';
+import type { GltfLoaderLike, Turn } from './scene/api';
+import { Emitter } from './scene/events';
+import { SharedWorkers } from './worker/shared_workers';
+
+export type * from './page/page_model';
+export type { Orbit } from './page/framing';
+
+/** Options of a TexmeshPage. */
+export interface PageOptions {
+  /** See LoadOptions. */
+  gltfLoader: () => GltfLoaderLike;
+  /** Draws all models; left out: a renderer of the page's own. */
+  renderer?: WebGLRenderer;
+  /** Seconds from the first model that comes to a quiet page until all that is seen is as good as the time allows. Default 5. */
+  time?: number;
+  /** Bytes that all models may take on the GPU. Default: by the device. */
+  memoryBytes?: number;
+  /** Packages that are opened at once. Default 6, the connections that a browser has for a server. */
+  openAtOnce?: number;
+  /** Workers of all models. Default: 2 to 4 by the number of cores. */
+  workers?: number;
+  /** Address of worker.js, where that file does not stand beside the library. */
+  workerUrl?: string | URL;
+}
+/** Events of a page. */
+export interface PageEvents {
+  /** All models that are seen have their first pictures: seconds since the page became busy. */
+  'first-pictures': { at: number; seconds: number; models: number };
+  /** Every model that is seen has had its turn: the limit and the actual time. */
+  deadline: { at: number; limit: number; actual: number };
+  /** Models were released or loaded: bytes on the GPU. */
+  memory: { at: number; gpuBytes: number; limitBytes: number };
+}
+
+/**
+ * Any number of packages on one page: one time limit, one link, one limit of memory and one graphics context for all. What is seen comes
+ * first, then what is close by; models far from the screen are released and keep their last picture.
+ */
+export class TexmeshPage {
+  /** Most bytes on the GPU. */
+  readonly memoryBytes: number;
+  private readonly models_ = new Map<Element, PageModel>();
+  private readonly painter_: Painter;
+  private readonly workers_: SharedWorkers;
+  private readonly visibility_: Visibility;
+  private readonly events_ = new Emitter<PageEvents>();
+  private readonly turns_ = new Map<PageModel, (turn: Turn) => void>();
+  private readonly dirty_ = new Set<PageModel>();
+  private refining_?: PageModel;
+  private startS_ = 0;
+  private said_ = { pictures: true, deadline: true };
+  private frame_ = 0;
+  private advancing_ = false;
+  private disposed_ = false;
+
+  /** InputError of a load where an option has a value that it cannot have. */
+  constructor(private readonly options_: PageOptions) {
+    const { hardwareConcurrency: cores = 2 } = globalThis.navigator ?? {};
+    this.memoryBytes = options_.memoryBytes ?? deviceMemoryBytes();
+    this.painter_ = new Painter(options_.renderer);
+    this.workers_ = new SharedWorkers(options_.workers ?? Math.min(4, Math.max(2, cores - 1)), options_.workerUrl);
+    this.visibility_ = new Visibility((canvas, resized) => this.placeChanged_(canvas, resized));
+  }
+
+  /** Shows a package on a canvas, as soon as the canvas is seen. A canvas that has a model gets the new one instead. */
+  add(canvas: HTMLCanvasElement, url: string, options: PageModelOptions = {}): PageModel {
+    this.models_.get(canvas)?.remove();
+    const model = new PageModel(this.host_, canvas, url, options);
+    this.models_.set(canvas, model);
+    this.visibility_.follow(canvas, model.place);
+    this.advance_();
+    return model;
+  }
+  /** All models, in the order in which they were added. */
+  get models(): PageModel[] {
+    return [...this.models_.values()];
+  }
+  /** Bytes on the GPU now. */
+  get gpuBytes(): number {
+    return this.models.reduce((sum, m) => sum + m.gpuBytes, 0);
+  }
+  /** Calls the listener at every such event; gives a function that ends the calls. */
+  on<K extends keyof PageEvents>(name: K, listener: (event: PageEvents[K]) => void): () => void {
+    return this.events_.on(name, listener);
+  }
+  /** The user looks at this model (or at none): it comes first from now on. */
+  regard(model?: PageModel): void {
+    for (const m of this.models) m.place.regarded = m === model;
+    this.advance_();
+  }
+  /** Removes all models and frees the graphics context and the workers. */
+  dispose(): void {
+    this.disposed_ = true;
+    for (const model of this.models) model.remove();
+    cancelAnimationFrame(this.frame_);
+    this.visibility_.dispose();
+    this.workers_.dispose();
+    this.painter_.dispose();
+    this.events_.clear();
+  }
+
+  // ---- what models ask for
+
+  private readonly host_: Host = {
+    open: (url: string, options: OpenHow): Promise<TexmeshPackage> => open(url, { ...options, shared: this.workers_, workerUrl: this.options_.workerUrl }),
+    loadOptions: () => ({ renderer: this.painter_.renderer, gltfLoader: this.options_.gltfLoader, workers: 2 }),
+    memoryBytes: (model) => this.memoryOf_(model),
+    turn: (model) =>
+      new Promise((given) => {
+        this.turns_.set(model, given);
+        this.advance_();
+      }),
+    changed: () => this.advance_(),
+    redraw: (model) => this.redraw_(model),
+    forget: (model) => {
+      this.models_.delete(model.canvas);
+      this.visibility_.forget(model.canvas);
+      this.dropped_(model);
+      this.advance_();
+    },
+  };
+  /** What is seen has nearly all of the memory; what is only close by has a picture. */
+  private memoryOf_(model: PageModel): number {
+    const areas = this.models.filter((m) => m.place.visible || m === model).map((m) => m.place.areaPx);
+    return this.memoryBytes * shareOf(model.place.areaPx, areas);
+  }
+  private dropped_(model: PageModel): void {
+    this.turns_.delete(model);
+    this.dirty_.delete(model);
+    if (this.refining_ === model) this.refining_ = undefined;
+  }
+
+  // ---- one step after the other
+
+  private advance_(): void {
+    if (this.advancing_ || this.disposed_) return;
+    this.advancing_ = true;
+    // In a turn of its own: what is added or comes into view together is decided together.
+    queueMicrotask(() => {
+      this.advancing_ = false;
+      if (this.disposed_) return;
+      this.beginPeriod_();
+      for (let step = this.nextStep_(); step; step = this.nextStep_()) this.take_(step);
+      this.tell_();
+    });
+  }
+  private nextStep_(): ReturnType<typeof nextStep> {
+    return nextStep({
+      models: this.models, openAtOnce: this.options_.openAtOnce ?? 6, askedForTurn: new Set(this.turns_.keys()), refining: this.refining_,
+      isNear: ({ canvas }) => this.visibility_.isNear(canvas),
+    });
+  }
+  private take_(step: NonNullable<ReturnType<typeof nextStep>>): void {
+    const { model } = step;
+    if (step.what === 'open') void model.begin();
+    else if (step.what === 'release') {
+      this.dropped_(model);
+      model.release();
+    } else if (step.what === 'turn') this.giveTurn_(model, step.among);
+    else {
+      this.refining_ = model;
+      void model.refine().then(() => {
+        if (this.refining_ === model) this.refining_ = undefined;
+        this.advance_();
+      });
+    }
+  }
+  private giveTurn_(model: PageModel, among: readonly PageModel[]): void {
+    const given = this.turns_.get(model)!;
+    this.turns_.delete(model);
+    const leftS = this.startS_ + this.limitS_ - nowS();
+    const areas = among.map((m) => m.place.areaPx);
+    const records = this.models.flatMap((m) => m.package?.requests ?? []);
+    model.phase = 'turn'; // at once: nobody else has it
+    given({ seconds: turnS(leftS, model.place.areaPx, areas), bytesS: linkBytesS(records, nowS()) || undefined });
+  }
+  private get limitS_(): number {
+    return this.options_.time ?? 5;
+  }
+  private get waiting_(): PageModel[] {
+    return this.models.filter((m) => m.place.visible && ['waiting', 'released', 'opening', 'first-picture', 'turn'].includes(m.phase));
+  }
+  /** Time counts from the first model that comes to a page where nothing is under way. */
+  private beginPeriod_(): void {
+    if (this.waiting_.length === 0 || !this.said_.deadline) return;
+    this.startS_ = nowS();
+    this.said_ = { pictures: false, deadline: false };
+  }
+  private tell_(): void {
+    const { waiting_: waiting, said_: said } = this;
+    const seconds = nowS() - this.startS_;
+    const seen = this.models.filter((m) => m.place.visible);
+    if (!said.pictures && !seen.some((m) => ['waiting', 'released', 'opening'].includes(m.phase))) {
+      said.pictures = true;
+      this.events_.emit('first-pictures', { seconds, models: seen.length });
+    }
+    if (said.deadline || waiting.length > 0) return;
+    said.deadline = true;
+    this.events_.emit('deadline', { limit: this.limitS_, actual: seconds });
+    this.events_.emit('memory', { gpuBytes: this.gpuBytes, limitBytes: this.memoryBytes });
+  }
+
+  // ---- pictures
+
+  private placeChanged_(canvas: Element, resized: boolean): void {
+    const model = this.models_.get(canvas);
+    if (!model) return;
+    if (resized) {
+      model.camera.aspect = model.canvas.width / model.canvas.height;
+      model.camera.updateProjectionMatrix();
+      model.moved();
+    } else this.redraw_(model);
+    this.advance_();
+  }
+  private redraw_(model: PageModel): void {
+    this.dirty_.add(model);
+    this.frame_ ||= requestAnimationFrame(() => {
+      this.frame_ = 0;
+      this.paint_();
+    });
+  }
+  private paint_(): void {
+    for (const model of this.dirty_) {
+      if (!model.load || model.phase === 'opening') continue; // begin() asks again
+      if (!model.place.visible) continue; // coming into view asks again
+      model.load.update(model.camera);
+      if (this.painter_.draw(model.scene, model.camera, model.canvas)) model.painted();
+    }
+    this.dirty_.clear();
+  }
+}
+
+function deviceMemoryBytes(): number {
+  const { deviceMemory, maxTouchPoints = 0 } = (globalThis.navigator ?? {}) as Partial<Navigator> & { deviceMemory?: number };
+  const { width = 1920, height = 1080 } = globalThis.screen ?? {};
+  return defaultMemoryBytes({ deviceMemoryGb: deviceMemory, screenPx: width * height, touch: maxTouchPoints > 0 });
+}

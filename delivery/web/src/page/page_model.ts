@@ -1,0 +1,237 @@
+import { DirectionalLight, HemisphereLight, type Object3D, PerspectiveCamera, Scene } from 'three';
+import { isAbort } from '../format/errors';
+import type { OpenOptions, PackageReader } from '../http/package_reader';
+import type { LoadEvents, LoadOptions, LoadedModel, Turn } from '../scene/api';
+import { displayOf } from '../scene/camera';
+import { Emitter } from '../scene/events';
+import { type Orbit, defaultOrbit, frame } from './framing';
+import type { Place } from './schedule';
+
+/** A package that can be shown: TexmeshPackage. */
+export interface ShowablePackage extends PackageReader {
+  /** See TexmeshPackage. */
+  load(scene: Object3D, options: LoadOptions): LoadedModel;
+}
+/** What a model of a page is doing: it waits to be opened, for its first picture, for its turn; has its turn; is shown; was released because nobody sees it. */
+export type ModelPhase = 'waiting' | 'opening' | 'first-picture' | 'turn' | 'shown' | 'released' | 'failed' | 'removed';
+
+/** Events of a model of a page. */
+export interface PageModelEvents {
+  /** Another phase. */
+  phase: { at: number; phase: ModelPhase };
+  /** The package is open: its manifest can be read. */
+  open: { at: number; package: ShowablePackage };
+  /** The first picture is on the canvas. */
+  'first-picture': { at: number; bytes: number };
+  /** More bytes. */
+  progress: LoadEvents['progress'];
+  /** The model's turn is over: what the time allowed is there. */
+  loaded: { at: number };
+  /** Something went wrong; fatal: nothing more comes of this model until retry(). */
+  error: { at: number; fatal: boolean; message: string; error: unknown };
+}
+/** How a package is opened. */
+export type OpenHow = OpenOptions & { decode?: LoadOptions['decode'] };
+/** Options of one model of a page. */
+export interface PageModelOptions {
+  /** Camera; left out: one that sees the whole object. */
+  camera?: PerspectiveCamera;
+  /** Where the camera of one's own stands when the package is open. */
+  orbit?: Orbit;
+  /** Options of the package's opening: mirrors, mode and so on. */
+  open?: OpenHow;
+  /** Options of the load that the page does not see to itself. */
+  load?: Pick<LoadOptions, 'policy' | 'order' | 'rule' | 'meshes' | 'refineTo' | 'fullSize' | 'decode'>;
+  /** Changes the scene of the model once its first picture is there, e.g. its light. */
+  dress?: (scene: Scene, load: LoadedModel) => void;
+}
+/** What a model asks of its page. */
+export interface Host {
+  open(url: string, options: OpenHow): Promise<ShowablePackage>;
+  loadOptions(): Pick<LoadOptions, 'renderer' | 'gltfLoader' | 'workers' | 'workerUrl'>;
+  memoryBytes(model: PageModel): number;
+  /** Resolves when it is the model's turn. */
+  turn(model: PageModel): Promise<Turn>;
+  /** Something has changed that the page may act upon. */
+  changed(model: PageModel): void;
+  /** The picture is to be drawn anew. */
+  redraw(model: PageModel): void;
+  forget(model: PageModel): void;
+}
+
+/** One package on one canvas of a page. */
+export class PageModel {
+  readonly scene = new Scene();
+  readonly camera: PerspectiveCamera;
+  readonly place: Place = { visible: false, regarded: false, areaPx: 0, distancePx: 0 };
+  phase: ModelPhase = 'waiting';
+  package?: ShowablePackage;
+  load?: LoadedModel;
+  /** All that the display can show is there. */
+  complete = false;
+  /** Resolves when the first picture is on the canvas; rejects when the package cannot be had or is removed before. */
+  readonly firstPicture: Promise<void>;
+  private readonly events_ = new Emitter<PageModelEvents>();
+  private abort_ = new AbortController();
+  private settle_!: { shown: () => void; failed: (error: unknown) => void };
+
+  constructor(
+    private readonly host_: Host,
+    readonly canvas: HTMLCanvasElement,
+    readonly url: string,
+    private readonly options_: PageModelOptions,
+  ) {
+    this.camera = options_.camera ?? new PerspectiveCamera(32, 1, 0.01, 100);
+    const lamp = new DirectionalLight(0xffffff, 2.2);
+    lamp.position.set(-0.5, 0.7, 1);
+    this.camera.add(lamp, lamp.target);
+    this.scene.add(new HemisphereLight(0xffffff, 0xd8d4cc, 3), this.camera);
+    this.firstPicture = new Promise((shown, failed) => (this.settle_ = { shown, failed }));
+    this.firstPicture.catch(() => undefined);
+  }
+
+  /** Calls the listener at every such event; gives a function that ends the calls. */
+  on<K extends keyof PageModelEvents>(name: K, listener: (event: PageModelEvents[K]) => void): () => void {
+    return this.events_.on(name, listener);
+  }
+  /** Bytes on the GPU. */
+  get gpuBytes(): number {
+    return this.load?.state.gpuBytes ?? 0;
+  }
+  /** To be called when the camera has moved. */
+  moved(): void {
+    this.load?.update(this.camera);
+    this.host_.redraw(this);
+    this.host_.changed(this);
+  }
+  /** The camera sees the whole object, as its canvas is now. */
+  frame(orbit: Orbit = this.options_.orbit ?? defaultOrbit): void {
+    if (!this.package) return;
+    const { manifest } = this.package;
+    this.camera.aspect = this.canvas.width / Math.max(1, this.canvas.height);
+    frame(this.camera, manifest.boundsMin, manifest.boundsMax, orbit);
+    this.moved();
+  }
+  /** After a failure: waits to be opened once more. */
+  retry(): void {
+    if (this.phase !== 'failed') return;
+    this.end_();
+    this.package?.dispose();
+    this.package = undefined;
+    this.enter_('waiting');
+  }
+  /** Takes the model from the page and frees all that it has. */
+  remove(): void {
+    if (this.phase === 'removed') return;
+    this.end_();
+    this.package?.dispose();
+    this.package = undefined;
+    this.enter_('removed');
+    this.settle_.failed(new DOMException('The model was removed', 'AbortError'));
+    this.events_.clear();
+    this.host_.forget(this);
+  }
+
+  // ---- for the page
+
+  /** Opens the package and shows its first picture. Errors are told, not thrown. */
+  async begin(): Promise<void> {
+    this.enter_('opening');
+    const { signal } = (this.abort_ = new AbortController());
+    try {
+      if (!this.package) {
+        const opened = await this.host_.open(this.url, { ...this.options_.open, signal });
+        if (signal.aborted) return opened.dispose();
+        this.package = opened;
+        if (!this.options_.camera) this.frame();
+        this.events_.emit('open', { package: opened });
+      }
+      this.startLoad_(this.package, signal);
+      await this.load!.firstPicture;
+      if (signal.aborted) return;
+      this.options_.dress?.(this.scene, this.load!);
+      this.enter_('first-picture');
+      this.host_.redraw(this);
+    } catch (error) {
+      if (!signal.aborted) this.fail_(error);
+    }
+  }
+  /** Fetches what the display can show beyond the model's turn. */
+  async refine(): Promise<void> {
+    const { load } = this;
+    try {
+      await load?.refine();
+    } catch (error) {
+      if (!isAbort(error)) this.say_(error, false);
+    }
+    if (this.load === load) this.complete = true;
+  }
+  /** Frees everything but the package's documents and the picture on the canvas. */
+  release(): void {
+    this.end_();
+    this.enter_('released');
+  }
+  /** The first picture is on the canvas. */
+  painted(): void {
+    if (this.phase !== 'first-picture') return;
+    this.events_.emit('first-picture', { bytes: this.package?.client.received ?? 0 });
+    this.settle_.shown();
+  }
+  get isBusy(): boolean {
+    return this.phase === 'opening' || this.phase === 'turn';
+  }
+
+  private startLoad_(pkg: ShowablePackage, signal: AbortSignal): void {
+    const { host_: host, camera } = this;
+    const load = pkg.load(this.scene, {
+      meshes: 'auto', ...this.options_.load, ...host.loadOptions(), camera, signal, time: Infinity, autoRefine: false,
+      display: () => this.display_(pkg),
+      memoryBytes: () => host.memoryBytes(this),
+      turn: async () => {
+        const turn = await host.turn(this);
+        this.enter_('turn');
+        return turn;
+      },
+    });
+    this.load = load;
+    this.complete = false;
+    const redraw = (): void => host.redraw(this);
+    for (const name of ['scale', 'plane', 'fragment', 'context'] as const) load.on(name, redraw);
+    load.on('progress', (event) => this.events_.emit('progress', event));
+    load.on('error', ({ fatal, error }) => !fatal && this.say_(error, false)); // a fatal one ends `done`, too
+    load.done.then(
+      () => {
+        if (this.load !== load) return;
+        this.enter_('shown');
+        this.events_.emit('loaded', {});
+      },
+      (error: unknown) => this.load === load && !isAbort(error) && this.fail_(error),
+    );
+  }
+  private display_(pkg: ShowablePackage): ReturnType<typeof displayOf> | number {
+    const { canvas, load } = this;
+    return load ? displayOf(pkg.manifest, load.object, this.camera, { x: canvas.width, y: canvas.height }) : Math.max(1, canvas.height);
+  }
+  private enter_(phase: ModelPhase): void {
+    this.phase = phase;
+    this.events_.emit('phase', { phase });
+    this.host_.changed(this);
+  }
+  private say_(error: unknown, fatal: boolean): void {
+    this.events_.emit('error', { fatal, error, message: error instanceof Error ? error.message : String(error) });
+  }
+  private fail_(error: unknown): void {
+    if (this.phase === 'failed' || this.phase === 'removed') return;
+    this.end_();
+    this.say_(error, true);
+    this.settle_.failed(error);
+    this.enter_('failed');
+  }
+  private end_(): void {
+    this.abort_.abort();
+    const { load } = this;
+    this.load = undefined;
+    load?.dispose();
+  }
+}
+
