@@ -1,11 +1,11 @@
-// Every export and every member of scene/api.d.ts has a comment: fails and names those without. After a build; part of check-types.
+// Every export and every member of the interfaces of scene/api, page and page/page_model has a comment: fails and names those without. After a build; part of check-types.
 //   node docs.mjs [DIST/TYPES]
 import { join } from 'node:path';
 import ts from 'typescript';
 
 const types = process.argv[2] ?? 'dist/types';
 const file = (name) => join(types, `${name}.d.ts`);
-const entries = ['index', 'open', 'reader', 'worker'];
+const entries = ['index', 'open', 'page', 'reader', 'worker'];
 const node = ts.ModuleKind.NodeNext;
 const program = ts.createProgram(entries.map(file), { module: node, moduleResolution: ts.ModuleResolutionKind.NodeNext, skipLibCheck: true });
 const checker = program.getTypeChecker();
@@ -19,7 +19,7 @@ for (const entry of entries)
     const own = e.flags & ts.SymbolFlags.Alias ? checker.getAliasedSymbol(e) : e;
     if (!whole && !said(own)) bare.add(e.name);
   }
-ts.forEachChild(program.getSourceFile(file('scene/api')), (d) => {
+for (const api of ['scene/api', 'page/page_model', 'page']) ts.forEachChild(program.getSourceFile(file(api)), (d) => {
   for (const m of ts.isInterfaceDeclaration(d) ? d.members : []) {
     ++seen;
     if (ts.getJSDocCommentsAndTags(m).length === 0) bare.add(`${d.name.text}.${m.name?.getText()}`);

@@ -47,8 +47,11 @@ export interface PageModelOptions {
 }
 /** What a model asks of its page. */
 export interface Host {
+  /** Opens a package with the page's workers. */
   open(url: string, options: OpenHow): Promise<ShowablePackage>;
+  /** What all loads have in common. */
   loadOptions(): Pick<LoadOptions, 'renderer' | 'gltfLoader' | 'workers' | 'workerUrl'>;
+  /** Bytes that the model may take on the GPU. */
   memoryBytes(model: PageModel): number;
   /** Resolves when it is the model's turn. */
   turn(model: PageModel): Promise<Turn>;
@@ -56,6 +59,7 @@ export interface Host {
   changed(model: PageModel): void;
   /** The picture is to be drawn anew. */
   redraw(model: PageModel): void;
+  /** The model was removed. */
   forget(model: PageModel): void;
 }
 

@@ -1,5 +1,6 @@
 import { describe, expect, it } from 'vitest';
-import { planesWithin, scaleBytes, scaleWithin, textureBytes } from '../../src/decide/gpu_memory';
+import { planesWithin, scaleWithin } from '../../src/decide/gpu_memory';
+import { scaleBytes, textureBytes } from '../../src/decide/gpu_size';
 import { TextureLoss, fullSize } from '../../src/decide/texture_loss';
 import { setUp } from '../support/transferring';
 
