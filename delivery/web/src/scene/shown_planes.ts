@@ -1,5 +1,5 @@
-import { planesWithin } from '../decide/gpu_memory';
-import { scaleBytes } from '../decide/gpu_size';
+import { planesWithin } from '../decide/memory/gpu_memory';
+import { scaleBytes } from '../decide/memory/gpu_size';
 import { TextureLoss, fullSize, planesForDisplay, type PlaneChoice } from '../decide/texture_loss';
 import { InputError, throwIfAborted } from '../format/errors';
 import { mostPreviewPx } from '../format/layout';

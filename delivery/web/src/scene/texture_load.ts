@@ -1,7 +1,7 @@
 import { type FragmentList, lossesOf } from '../decide/fragment_list';
 import { clamp } from '../decide/numbers';
 import { throughputOf } from '../decide/request_groups';
-import { scaleWithin } from '../decide/gpu_memory';
+import { scaleWithin } from '../decide/memory/gpu_memory';
 import { proxyLoss } from '../decide/proxy_choice';
 import { choiceInTime } from '../decide/scale_choice';
 import { type PlaneChoice, pictureFlip } from '../decide/texture_loss';

@@ -1,5 +1,5 @@
 import { type BufferAttribute, type InterleavedBufferAttribute, LinearFilter, type Material, type Object3D, type Texture } from 'three';
-import { textureBytes } from '../../decide/gpu_size';
+import { textureBytes } from '../../decide/memory/gpu_size';
 import { meshesOf, texturesOf } from '../scale_parts';
 
 /** Bytes that shapes, and the textures of materials and of composed planes, take on the GPU once they have been drawn. What is shared counts once. */

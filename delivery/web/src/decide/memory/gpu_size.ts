@@ -1,4 +1,4 @@
-import type { ManifestScale } from '../format/manifest';
+import type { ManifestScale } from '../../format/manifest';
 
 // What choices take on the GPU: textures are RGBA of 8 bits with all their mip levels.
 

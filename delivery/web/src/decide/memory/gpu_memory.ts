@@ -1,6 +1,6 @@
-import type { ManifestScale } from '../format/manifest';
+import type { ManifestScale } from '../../format/manifest';
 import { scaleBytes, textureBytes } from './gpu_size';
-import { type PlaneChoice, type TextureLoss, groupIndex } from './texture_loss';
+import { type PlaneChoice, type TextureLoss, groupIndex } from '../texture_loss';
 
 // What fits into the GPU's memory.
 
