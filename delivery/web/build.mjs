@@ -1,13 +1,14 @@
 // Bundles the library: dist/texmesh.js (everything; three.js stays outside), dist/open.js (to show packages), dist/page.js (many on one page), dist/reader.js
-// (without three.js), dist/worker.js. Each entry stands alone: the parts that an entry loads by import() belong to that entry.
+// (without three.js), dist/worker.js, dist/viewer/ (an element by one script tag, with three.js inside). Each entry stands alone: the parts that an entry loads by import() belong to that entry.
 //   node build.mjs               builds
 //   node build.mjs --types       after tsc: names files in full in dist/types, as Node.js resolves them
 //   node build.mjs --license     copies the project's LICENSE here, for npm pack
 //   node build.mjs --check-size  builds in memory; fails where an application would pay more than it may
-import { transform } from 'esbuild';
+import { build, transform } from 'esbuild';
 import { copyFileSync, existsSync, mkdirSync, readFileSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
 import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
+import { createRequire } from 'node:module';
 import { gzipSync } from 'node:zlib';
 import { rollup } from 'rollup';
 
@@ -19,7 +20,7 @@ const entries = { texmesh: 'index', open: 'open', page: 'page', reader: 'reader'
  * Gzip bytes of texmesh/open that an application may have to load, three.js and the worker apart: before the first picture; with
  * every part that is ever loaded. Then the same of `texmesh`, and the worker with the decoders.
  */
-const most = { first: 20 * 1024, all: 45 * 1024, texmesh: 36 * 1024, texmeshAll: 50 * 1024, page: 24 * 1024, pageAll: 50 * 1024, worker: 21 * 1024 };
+const most = { first: 20 * 1024, all: 45 * 1024, texmesh: 36 * 1024, texmeshAll: 50 * 1024, page: 24 * 1024, pageAll: 50 * 1024, viewer: 180 * 1024, worker: 21 * 1024 };
 
 /**
  * Workers decode documents. Where there are none, the page itself loads the workers' file, which has mostly come already: nothing is
@@ -43,6 +44,34 @@ const typescript = {
     file.endsWith('.ts') ? transform(readFileSync(file, 'utf8'), { loader: 'ts', target: 'es2022', sourcemap: 'external', sourcefile: file }) : null,
   renderChunk: (code) => transform(code, { minify: true, format: 'esm', target: 'es2022', sourcemap: 'external', ...mangled }),
 };
+
+/** The element with three.js and its decoders inside: dist/viewer/. Gives the outputs by their names. */
+async function viewer(write) {
+  const worker = { name: 'documents-of-workers', setup: (b) => b.onResolve({ filter: /^\.\/documents$/ }, () => ({ path: './worker.js', external: true })) };
+  const { outputFiles, metafile } = await build({
+    entryPoints: { 'texmesh-viewer': join(here, 'src', 'viewer.ts') }, outdir: join(dist, 'viewer'), chunkNames: 'viewer-[name]-[hash]',
+    bundle: true, splitting: true, format: 'esm', minify: true, target: 'es2022', legalComments: 'linked', write: false, metafile: true,
+    absWorkingDir: here, plugins: [worker], ...mangled,
+  });
+  if (write) {
+    const to = join(dist, 'viewer');
+    mkdirSync(join(to, 'draco'), { recursive: true });
+    for (const { path, contents } of outputFiles) writeFileSync(path, contents);
+    copyFileSync(join(dist, 'worker.js'), join(to, 'worker.js'));
+    const three = dirname(dirname(createRequire(import.meta.url).resolve('three')));
+    for (const file of ['draco_decoder.wasm', 'draco_wasm_wrapper.js']) copyFileSync(join(three, 'examples/jsm/libs/draco/gltf', file), join(to, 'draco', file));
+  }
+  return { outputFiles, metafile };
+}
+/** Gzip bytes that the element needs before it can show anything. */
+async function viewerSize() {
+  const { outputFiles, metafile } = await viewer(false);
+  const bytesOf = (name) => gzipSync(outputFiles.find(({ path }) => path.endsWith(`/${name}`)).contents, { level: 9 }).length;
+  const atOnce = new Set(['texmesh-viewer.js']);
+  for (const name of atOnce)
+    for (const { path, kind } of metafile.outputs[`dist/viewer/${name}`].imports) if (kind === 'import-statement' && !path.endsWith('worker.js')) atOnce.add(path.split('/').at(-1));
+  return [...atOnce].reduce((sum, name) => sum + bytesOf(name), 0);
+}
 
 async function bundled(entry) {
   const bundle = await rollup({
@@ -86,6 +115,7 @@ if (process.argv.includes('--check-size')) {
   say('  and every part that is ever loaded', texmesh.all, most.texmeshAll);
   say('texmesh/page, until the first pictures', page.first, most.page);
   say('  and every part that is ever loaded', page.all, most.pageAll);
+  say('the element, three.js inside', await viewerSize(), most.viewer);
   say('worker: the decoders', worker.all, most.worker);
   process.exit(good ? 0 : 1);
 }
@@ -111,3 +141,4 @@ for (const entry of Object.keys(entries)) {
   await bundle.write(output);
   await bundle.close();
 }
+await viewer(true);

@@ -11,6 +11,7 @@ import './application-tests.mjs';
 import './display-tests.mjs';
 import './limits-tests.mjs';
 import './materials-tests.mjs';
+import './page-tests.mjs';
 import './proxy-tests.mjs';
 import './render-tests.mjs';
 import './size-tests.mjs';

@@ -79,6 +79,10 @@ export class TexmeshPage {
     this.advance_();
     return model;
   }
+  /** Draws all models. */
+  get renderer(): WebGLRenderer {
+    return this.painter_.renderer;
+  }
   /** All models, in the order in which they were added. */
   get models(): PageModel[] {
     return [...this.models_.values()];

@@ -12,6 +12,7 @@ export const roomsBelow: Record<string, readonly string[]> = {
   decide: ['format', 'http'],
   scene: ['format', 'http', 'worker', 'decide'],
   page: ['format', 'http', 'decide', 'scene'],
+  element: ['format', 'page'],
 };
 
 /** Lines of a function, of a class, of a file, of the median file, and files in a folder. */

@@ -1,0 +1,41 @@
+// What the element says to people, and what its attributes mean.
+
+import { type Orbit, defaultOrbit } from '../page/framing';
+
+/** Bytes as people read them. */
+export function bytesInWords(n: number): string {
+  if (!Number.isFinite(n) || n < 0) return '';
+  const [unit, name] = n < 999.5e3 ? [1e3, 'kB'] : [1e6, 'MB'];
+  const value = n / unit;
+  return `${value < 9.95 ? value.toFixed(1).replace('.0', '') : value.toFixed(0)} ${name}`;
+}
+/** Seconds as people read them. */
+export const secondsInWords = (s: number): string => (s < 1 ? 'under a second' : s < 9.5 ? `about ${Math.round(s)} s` : `about ${Math.round(s / 5) * 5} s`);
+
+/** What a click costs: bytes of the first picture, of all that may follow (0: nobody has said), and the link's bytes per second (0: nobody knows). */
+export function offerInWords(firstBytes: number, allBytes: number, linkBytesS: number): string {
+  const wait = linkBytesS > 0 ? `, ${secondsInWords(firstBytes / linkBytesS)}` : '';
+  const more = allBytes > firstBytes ? `; up to ${bytesInWords(allBytes)} in all` : '';
+  return `${bytesInWords(firstBytes)}${wait}${more}`;
+}
+
+/** "28deg 72deg 105%" or parts of it, as model-viewer writes them: round the vertical axis, from the axis, distance. What cannot be read is the default's. */
+export function orbitOf(text: string | null): Orbit {
+  const [theta, phi, distance] = (text ?? '').trim().split(/\s+/).filter(Boolean);
+  const degrees = (said: string | undefined, otherwise: number): number => {
+    const found = /^(-?\d+(?:\.\d+)?)(deg|rad)$/.exec(said ?? '');
+    return found ? Number(found[1]) * (found[2] === 'rad' ? 180 / Math.PI : 1) : otherwise;
+  };
+  const share = /^(\d+(?:\.\d+)?)%$/.exec(distance ?? '');
+  return {
+    thetaDegrees: degrees(theta, defaultOrbit.thetaDegrees),
+    phiDegrees: Math.min(179, Math.max(1, degrees(phi, defaultOrbit.phiDegrees))),
+    distance: share ? Math.min(20, Math.max(0.05, Number(share[1]) / 100)) : defaultOrbit.distance,
+  };
+}
+
+/** A number that an attribute says, within bounds; `otherwise` where it says none. */
+export function numberOf(text: string | null, otherwise: number, least: number, most: number): number {
+  const value = text === null || text.trim() === '' ? NaN : Number(text);
+  return Number.isFinite(value) ? Math.min(most, Math.max(least, value)) : otherwise;
+}

@@ -1,0 +1,37 @@
+// One script tag: defines <texmesh-viewer>. three.js and its decoders are inside; worker.js and draco/ stand beside this file.
+import { HemisphereLight, type Material, type Mesh, PMREMGenerator, type Scene, type Texture } from 'three';
+import { DRACOLoader } from 'three/addons/loaders/DRACOLoader.js';
+import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
+import { MeshoptDecoder } from 'three/addons/libs/meshopt_decoder.module.js';
+import { texmeshViewerElement } from './element/texmesh_viewer';
+import { TexmeshPage } from './page';
+
+let shared: TexmeshPage | undefined;
+let surroundings: Texture | undefined;
+const draco = new DRACOLoader().setDecoderPath(new URL('./draco/', import.meta.url).href).setWorkerLimit(1);
+
+/** The page that all elements of a document share. */
+export function texmeshPage(): TexmeshPage {
+  return (shared ??= new TexmeshPage({
+    gltfLoader: () => new GLTFLoader().setDRACOLoader(draco).setMeshoptDecoder(MeshoptDecoder),
+    workerUrl: new URL('./worker.js', import.meta.url),
+  }));
+}
+
+/** Metals get a room to mirror: under lamps alone they are black. */
+async function surroundMetals(scene: Scene): Promise<void> {
+  let metallic = false;
+  scene.traverse((o) => {
+    for (const m of [(o as Mesh).material].flat() as (Material & { metalness?: number })[]) metallic ||= (m?.metalness ?? 0) > 0.5;
+  });
+  if (!metallic || scene.environment) return;
+  const { RoomEnvironment } = await import('three/addons/environments/RoomEnvironment.js');
+  surroundings ??= new PMREMGenerator(texmeshPage().renderer).fromScene(new RoomEnvironment(), 0.04).texture;
+  scene.environment = surroundings;
+  for (const o of [...scene.children]) if (o instanceof HemisphereLight) o.intensity = 1;
+  const model = texmeshPage().models.find((m) => m.scene === scene);
+  model?.moved();
+}
+
+if (!customElements.get('texmesh-viewer'))
+  customElements.define('texmesh-viewer', texmeshViewerElement({ page: texmeshPage, dress: (scene) => void surroundMetals(scene) }));
