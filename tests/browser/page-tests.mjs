@@ -128,7 +128,7 @@ test('one package of twenty that cannot be had, an element of no height, one rem
 
 test('the element: poster and price before the click, Save-Data, keys, rights, no motion where none is wanted', async () => {
   const saving = () => Object.defineProperty(navigator, 'connection', {value: {saveData: true, downlink: 2}, configurable: true});
-  const text = html('<texmesh-viewer src="/packages/maps.texmesh" alt="a statue" poster="data:image/gif;base64,R0lGODlhAQABAAAAACw=" bytes="2500000" camera-controls auto-rotate></texmesh-viewer>');
+  const text = html('<texmesh-viewer src="/packages/maps.texmesh" alt="a statue" poster="data:image/gif;base64,R0lGODlhAQABAAAAACH5BAEKAAEALAAAAAABAAEAAAICTAEAOw==" bytes="2500000" camera-controls auto-rotate></texmesh-viewer>');
   await onPage(text, async (page, server) => {
     const element = page.locator('texmesh-viewer');
     const offered = await element.evaluate((e) => e.shadowRoot.querySelector('button.box').innerText);
@@ -139,6 +139,8 @@ test('the element: poster and price before the click, Save-Data, keys, rights, n
     await page.keyboard.press('Tab'); // the button
     await page.keyboard.press('Enter');
     await page.waitForFunction(() => document.querySelector('texmesh-viewer').loaded, null, {timeout: 30000});
+    await page.waitForTimeout(50);
+    check(await element.evaluate((e) => getComputedStyle(e.shadowRoot.querySelector('.poster')).opacity) === '0', 'the poster stays before the object');
     const angle = () => element.evaluate((e) => Math.atan2(e.model.camera.position.x, e.model.camera.position.z));
     const [at, still] = [await angle(), await page.waitForTimeout(300).then(angle)];
     check(at === still, 'it rotates though no motion is wanted');

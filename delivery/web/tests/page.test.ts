@@ -60,6 +60,7 @@ describe('a page', () => {
       const { how, server } = options();
       const [here, far] = [canvas(0), canvas(7)];
       const [a, b] = [page.add(here, hosts[0], how), page.add(far, hosts[1], how)];
+      await a.firstPicture;
       expect(await until(() => a.phase === 'shown' && a.complete)).toBe(true);
       expect(b.phase).toBe('waiting');
       expect(server.log.every((l) => l.url === hosts[0])).toBe(true);

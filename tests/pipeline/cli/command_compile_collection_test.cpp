@@ -290,7 +290,7 @@ void interrupt(const std::string& folder, const std::string& profile, const std:
   const std::string script =
       "set -m; '" TEXMESH_BINARY "' compile '" + folder + "/in' -o '" + folder + "/out' --cache '" + folder +
       "/cache' --profile '" + profile + "' --jobs 2 >'" + folder +
-      "/log' 2>&1 & p=$!; for ((i = 0; i < 600; ++i)); do [[ -e '" + folder + "/out/a.texmesh' && -e '" +
+      "/log' 2>&1 & p=$!; for ((i = 0; i < 2400; ++i)); do [[ -e '" + folder + "/out/a.texmesh' && -e '" +
       folder + "/out/b.texmesh' ]] && break; sleep 0.05; done; sleep 0.3; s=$(date +%s%N); kill -" + signal +
       " " + (whole_group ? "-- -$p" : "$p") +
       "; wait $p; c=$?; e=$(date +%s%N); left=$(pgrep -c -g $p); "

@@ -76,6 +76,7 @@ export class PageModel {
   /** Resolves when the first picture is on the canvas; rejects when the package cannot be had or is removed before. */
   readonly firstPicture: Promise<void>;
   private readonly events_ = new Emitter<PageModelEvents>();
+  private unpainted_ = false; // the first picture waits for a frame
   private abort_ = new AbortController();
   private settle_!: { shown: () => void; failed: (error: unknown) => void };
 
@@ -154,6 +155,7 @@ export class PageModel {
       await this.load!.firstPicture;
       if (signal.aborted) return;
       this.options_.dress?.(this.scene, this.load!);
+      this.unpainted_ = true;
       this.enter_('first-picture');
       this.host_.redraw(this);
     } catch (error) {
@@ -177,7 +179,8 @@ export class PageModel {
   }
   /** The first picture is on the canvas. */
   painted(): void {
-    if (this.phase !== 'first-picture') return;
+    if (!this.unpainted_ || !this.load) return;
+    this.unpainted_ = false;
     this.events_.emit('first-picture', { bytes: this.package?.client.received ?? 0 });
     this.settle_.shown();
   }
