@@ -3,7 +3,7 @@ import { HemisphereLight, type Material, type Mesh, PMREMGenerator, type Scene, 
 import { DRACOLoader } from 'three/addons/loaders/DRACOLoader.js';
 import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
 import { MeshoptDecoder } from 'three/addons/libs/meshopt_decoder.module.js';
-import { texmeshViewerElement } from './element/texmesh_viewer';
+import { TexmeshViewer } from './element/texmesh_viewer';
 import { TexmeshPage } from './page';
 
 let shared: TexmeshPage | undefined;
@@ -33,5 +33,5 @@ async function surroundMetals(scene: Scene): Promise<void> {
   model?.moved();
 }
 
-if (!customElements.get('texmesh-viewer'))
-  customElements.define('texmesh-viewer', texmeshViewerElement({ page: texmeshPage, dress: (scene) => void surroundMetals(scene) }));
+TexmeshViewer.host = { page: texmeshPage, dress: (scene) => void surroundMetals(scene) };
+if (!customElements.get('texmesh-viewer')) customElements.define('texmesh-viewer', TexmeshViewer);

@@ -39,194 +39,193 @@ interface Connection {
 }
 const connection = (): Connection => (navigator as { connection?: Connection }).connection ?? {};
 
-/** The class of <texmesh-viewer>, for a page that `host` makes once. */
-export function texmeshViewerElement(host: ElementHost): CustomElementConstructor {
-  return class TexmeshViewer extends HTMLElement {
-    static readonly observedAttributes = ['src', 'alt', 'poster', 'camera-controls', 'camera-orbit', 'auto-rotate', 'reveal', 'bytes', 'touch-action'];
-    private readonly root_ = this.attachShadow({ mode: 'open' });
-    private readonly parts_: Record<'canvas' | 'poster' | 'bar' | 'reveal' | 'error' | 'rights', HTMLElement>;
-    private model_?: PageModel;
-    private input_?: OrbitInput;
-    private revealed_ = false;
-    private rotating_ = 0;
+/** <texmesh-viewer>; `host` is to be set before the element is defined. */
+export class TexmeshViewer extends HTMLElement {
+  static host: ElementHost;
+  static readonly observedAttributes = ['src', 'alt', 'poster', 'camera-controls', 'camera-orbit', 'auto-rotate', 'reveal', 'bytes', 'touch-action'];
+  private readonly root_ = this.attachShadow({ mode: 'open' });
+  private readonly parts_: Record<'canvas' | 'poster' | 'bar' | 'reveal' | 'error' | 'rights', HTMLElement>;
+  private model_?: PageModel;
+  private input_?: OrbitInput;
+  private revealed_ = false;
+  private rotating_ = 0;
 
-    constructor() {
-      super();
-      this.root_.innerHTML = template;
-      const part = (selector: string): HTMLElement => this.root_.querySelector(selector)!;
-      this.parts_ = { canvas: part('canvas'), poster: part('.poster'), bar: part('.bar'), reveal: part('button.box'), error: part('div.box'), rights: part('.rights') };
-      this.parts_.reveal.onclick = () => this.dismissPoster();
-      const { canvas } = this.parts_;
-      for (const name of ['pointerenter', 'focus']) canvas.addEventListener(name, () => this.model_ && host.page().regard(this.model_));
-      for (const name of ['pointerleave', 'blur']) canvas.addEventListener(name, () => this.model_ && host.page().regard(undefined));
-    }
+  constructor() {
+    super();
+    this.root_.innerHTML = template;
+    const part = (selector: string): HTMLElement => this.root_.querySelector(selector)!;
+    this.parts_ = { canvas: part('canvas'), poster: part('.poster'), bar: part('.bar'), reveal: part('button.box'), error: part('div.box'), rights: part('.rights') };
+    this.parts_.reveal.onclick = () => this.dismissPoster();
+    const { canvas } = this.parts_;
+    for (const name of ['pointerenter', 'focus']) canvas.addEventListener(name, () => this.model_ && TexmeshViewer.host.page().regard(this.model_));
+    for (const name of ['pointerleave', 'blur']) canvas.addEventListener(name, () => this.model_ && TexmeshViewer.host.page().regard(undefined));
+  }
 
-    /** Whether what the time allowed is there. */
-    get loaded(): boolean {
-      return this.model_?.phase === 'shown';
-    }
-    /** The model on the page; undefined before it is revealed. */
-    get model(): PageModel | undefined {
-      return this.model_;
-    }
-    get src(): string {
-      return this.getAttribute('src') ?? '';
-    }
-    set src(url: string) {
-      this.setAttribute('src', url);
-    }
-    /** Begins to load what `reveal="manual"` or the browser's Save-Data has held back. */
-    dismissPoster(): void {
-      this.revealed_ = true;
+  /** Whether what the time allowed is there. */
+  get loaded(): boolean {
+    return this.model_?.phase === 'shown';
+  }
+  /** The model on the page; undefined before it is revealed. */
+  get model(): PageModel | undefined {
+    return this.model_;
+  }
+  get src(): string {
+    return this.getAttribute('src') ?? '';
+  }
+  set src(url: string) {
+    this.setAttribute('src', url);
+  }
+  /** Begins to load what `reveal="manual"` or the browser's Save-Data has held back. */
+  dismissPoster(): void {
+    this.revealed_ = true;
+    this.start_();
+  }
+
+  connectedCallback(): void {
+    this.describe_();
+    this.start_();
+  }
+  disconnectedCallback(): void {
+    // An element that is moved is there again before the microtask.
+    queueMicrotask(() => !this.isConnected && this.stop_());
+  }
+  attributeChangedCallback(name: string, before: string | null, now: string | null): void {
+    if (before === now || !this.isConnected) return;
+    this.describe_();
+    if (name === 'src') {
+      this.stop_();
+      this.revealed_ = false;
       this.start_();
-    }
+    } else if (name === 'reveal') this.start_();
+    else if (name === 'camera-orbit') this.input_?.reset(orbitOf(now));
+    else if (name === 'auto-rotate') this.rotate_();
+    else if (name === 'camera-controls') this.controls_();
+  }
 
-    connectedCallback(): void {
-      this.describe_();
-      this.start_();
-    }
-    disconnectedCallback(): void {
-      // An element that is moved is there again before the microtask.
-      queueMicrotask(() => !this.isConnected && this.stop_());
-    }
-    attributeChangedCallback(name: string, before: string | null, now: string | null): void {
-      if (before === now || !this.isConnected) return;
-      this.describe_();
-      if (name === 'src') {
-        this.stop_();
-        this.revealed_ = false;
-        this.start_();
-      } else if (name === 'reveal') this.start_();
-      else if (name === 'camera-orbit') this.input_?.reset(orbitOf(now));
-      else if (name === 'auto-rotate') this.rotate_();
-      else if (name === 'camera-controls') this.controls_();
-    }
+  // ---- what stands there
 
-    // ---- what stands there
+  private describe_(): void {
+    const { canvas, poster, reveal } = this.parts_;
+    canvas.setAttribute('aria-label', this.getAttribute('alt') ?? '');
+    canvas.style.touchAction = this.getAttribute('touch-action') ?? '';
+    const url = this.getAttribute('poster');
+    const slot = poster.firstElementChild!;
+    if (url && !(slot.firstElementChild as HTMLImageElement | null)?.src.endsWith(url)) {
+      const image = Object.assign(document.createElement('img'), { src: url, alt: '', loading: 'lazy' });
+      slot.replaceChildren(image);
+    } else if (!url) slot.replaceChildren();
+    const allBytes = numberOf(this.getAttribute('bytes'), 0, 0, 1e12);
+    const linkBytesS = (connection().downlink ?? 0) * bytesPerMegabit;
+    reveal.querySelector('small')!.textContent = offerInWords(startBytes, allBytes, linkBytesS);
+  }
+  private get waits_(): boolean {
+    return !this.revealed_ && (this.getAttribute('reveal') === 'manual' || connection().saveData === true);
+  }
+  private start_(): void {
+    const { reveal, canvas } = this.parts_;
+    if (this.model_ || !this.isConnected || !this.src) return;
+    reveal.hidden = !this.waits_;
+    if (this.waits_) return;
+    try {
+      this.follow_(TexmeshViewer.host.page().add(canvas as HTMLCanvasElement, new URL(this.src, document.baseURI).href, { dress: (scene) => TexmeshViewer.host.dress(scene) }));
+    } catch (error) {
+      this.fail_(error instanceof Error ? error.message : String(error), false);
+    }
+  }
+  private stop_(): void {
+    cancelAnimationFrame(this.rotating_);
+    this.rotating_ = 0;
+    this.input_?.dispose();
+    this.model_?.remove();
+    this.input_ = this.model_ = undefined;
+    const { poster, bar, error, rights } = this.parts_;
+    poster.classList.remove('gone');
+    bar.hidden = error.hidden = true;
+    rights.replaceChildren();
+  }
 
-    private describe_(): void {
-      const { canvas, poster, reveal } = this.parts_;
-      canvas.setAttribute('aria-label', this.getAttribute('alt') ?? '');
-      canvas.style.touchAction = this.getAttribute('touch-action') ?? '';
-      const url = this.getAttribute('poster');
-      const slot = poster.firstElementChild!;
-      if (url && !(slot.firstElementChild as HTMLImageElement | null)?.src.endsWith(url)) {
-        const image = Object.assign(document.createElement('img'), { src: url, alt: '', loading: 'lazy' });
-        slot.replaceChildren(image);
-      } else if (!url) slot.replaceChildren();
-      const allBytes = numberOf(this.getAttribute('bytes'), 0, 0, 1e12);
-      const linkBytesS = (connection().downlink ?? 0) * bytesPerMegabit;
-      reveal.querySelector('small')!.textContent = offerInWords(startBytes, allBytes, linkBytesS);
-    }
-    private get waits_(): boolean {
-      return !this.revealed_ && (this.getAttribute('reveal') === 'manual' || connection().saveData === true);
-    }
-    private start_(): void {
-      const { reveal, canvas } = this.parts_;
-      if (this.model_ || !this.isConnected || !this.src) return;
-      reveal.hidden = !this.waits_;
-      if (this.waits_) return;
-      try {
-        this.follow_(host.page().add(canvas as HTMLCanvasElement, new URL(this.src, document.baseURI).href, { dress: (scene) => host.dress(scene) }));
-      } catch (error) {
-        this.fail_(error instanceof Error ? error.message : String(error), false);
-      }
-    }
-    private stop_(): void {
-      cancelAnimationFrame(this.rotating_);
-      this.rotating_ = 0;
-      this.input_?.dispose();
-      this.model_?.remove();
-      this.input_ = this.model_ = undefined;
-      const { poster, bar, error, rights } = this.parts_;
-      poster.classList.remove('gone');
-      bar.hidden = error.hidden = true;
-      rights.replaceChildren();
-    }
+  // ---- the model's course
 
-    // ---- the model's course
+  private follow_(model: PageModel): void {
+    const { bar, poster } = this.parts_;
+    this.model_ = model;
+    const tell = (name: string, detail: object = {}): void => void this.dispatchEvent(new CustomEvent(name, { detail }));
+    model.on('open', () => this.controls_());
+    model.on('first-picture', () => {
+      poster.classList.add('gone');
+      tell('poster-dismissed');
+      tell('model-visibility', { visible: true });
+      this.rotate_();
+    });
+    model.on('progress', ({ bytes, bytesExpected }) => {
+      const totalProgress = bytesExpected > 0 ? Math.min(1, bytes / bytesExpected) : 0;
+      bar.style.width = `${100 * totalProgress}%`;
+      bar.setAttribute('aria-valuenow', (100 * totalProgress).toFixed(0));
+      tell('progress', { totalProgress });
+    });
+    model.on('phase', ({ phase }) => (bar.hidden = phase !== 'opening' && phase !== 'turn'));
+    model.on('loaded', () => {
+      void this.showRights_(model.package);
+      tell('load', { url: model.url });
+    });
+    model.on('error', ({ fatal, message }) => {
+      tell('error', { type: 'loadfailure', fatal, message });
+      if (fatal) this.fail_(message, true);
+    });
+  }
+  private fail_(message: string, again: boolean): void {
+    const { error } = this.parts_;
+    const button = Object.assign(document.createElement('button'), { textContent: 'Try again', hidden: !again });
+    button.onclick = () => {
+      error.hidden = true;
+      this.model_?.retry();
+    };
+    error.replaceChildren(message, document.createElement('br'), button);
+    error.hidden = false;
+  }
+  private async showRights_(pkg?: ShowablePackage): Promise<void> {
+    const about = await pkg?.about().catch(() => undefined);
+    if (!about || !this.isConnected || pkg !== this.model_?.package) return;
+    const { attribution, creator, licence, licenceUrl } = about;
+    const link = licence && licenceUrl ? Object.assign(document.createElement('a'), { href: licenceUrl, textContent: licence, rel: 'license noopener' }) : (licence ?? '');
+    const by = attribution ?? creator ?? '';
+    this.parts_.rights.replaceChildren(...[by, by && licence ? ' · ' : '', link].filter((part) => part !== ''));
+  }
 
-    private follow_(model: PageModel): void {
-      const { bar, poster } = this.parts_;
-      this.model_ = model;
-      const tell = (name: string, detail: object = {}): void => void this.dispatchEvent(new CustomEvent(name, { detail }));
-      model.on('open', () => this.controls_());
-      model.on('first-picture', () => {
-        poster.classList.add('gone');
-        tell('poster-dismissed');
-        tell('model-visibility', { visible: true });
-        this.rotate_();
-      });
-      model.on('progress', ({ bytes, bytesExpected }) => {
-        const totalProgress = bytesExpected > 0 ? Math.min(1, bytes / bytesExpected) : 0;
-        bar.style.width = `${100 * totalProgress}%`;
-        bar.setAttribute('aria-valuenow', (100 * totalProgress).toFixed(0));
-        tell('progress', { totalProgress });
-      });
-      model.on('phase', ({ phase }) => (bar.hidden = phase !== 'opening' && phase !== 'turn'));
-      model.on('loaded', () => {
-        void this.showRights_(model.package);
-        tell('load', { url: model.url });
-      });
-      model.on('error', ({ fatal, message }) => {
-        tell('error', { type: 'loadfailure', fatal, message });
-        if (fatal) this.fail_(message, true);
-      });
-    }
-    private fail_(message: string, again: boolean): void {
-      const { error } = this.parts_;
-      const button = Object.assign(document.createElement('button'), { textContent: 'Try again', hidden: !again });
-      button.onclick = () => {
-        error.hidden = true;
-        this.model_?.retry();
-      };
-      error.replaceChildren(message, document.createElement('br'), button);
-      error.hidden = false;
-    }
-    private async showRights_(pkg?: ShowablePackage): Promise<void> {
-      const about = await pkg?.about().catch(() => undefined);
-      if (!about || !this.isConnected || pkg !== this.model_?.package) return;
-      const { attribution, creator, licence, licenceUrl } = about;
-      const link = licence && licenceUrl ? Object.assign(document.createElement('a'), { href: licenceUrl, textContent: licence, rel: 'license noopener' }) : (licence ?? '');
-      const by = attribution ?? creator ?? '';
-      this.parts_.rights.replaceChildren(...[by, by && licence ? ' · ' : '', link].filter((part) => part !== ''));
-    }
+  // ---- the camera
 
-    // ---- the camera
-
-    private controls_(): void {
-      const { model_: model, parts_: { canvas } } = this;
-      if (!model?.package) return;
-      this.input_?.dispose();
-      this.input_ = undefined;
-      const orbit = orbitOf(this.getAttribute('camera-orbit'));
-      model.frame(orbit);
-      if (this.hasAttribute('camera-controls')) this.input_ = new OrbitInput(canvas, orbit, () => this.look_(this.input_!.orbit));
-    }
-    private look_(orbit: Parameters<typeof frame>[3]): void {
+  private controls_(): void {
+    const { model_: model, parts_: { canvas } } = this;
+    if (!model?.package) return;
+    this.input_?.dispose();
+    this.input_ = undefined;
+    const orbit = orbitOf(this.getAttribute('camera-orbit'));
+    model.frame(orbit);
+    if (this.hasAttribute('camera-controls')) this.input_ = new OrbitInput(canvas, orbit, () => this.look_(this.input_!.orbit));
+  }
+  private look_(orbit: Parameters<typeof frame>[3]): void {
+    const { model_: model } = this;
+    if (!model?.package) return;
+    const { boundsMin, boundsMax } = model.package.manifest;
+    frame(model.camera, boundsMin, boundsMax, orbit);
+    model.moved();
+  }
+  /** Turns the object while nobody holds it; not for people who want no motion. */
+  private rotate_(): void {
+    cancelAnimationFrame(this.rotating_);
+    if (!this.hasAttribute('auto-rotate') || matchMedia('(prefers-reduced-motion: reduce)').matches) return;
+    const own = this.input_ ?? { orbit: orbitOf(this.getAttribute('camera-orbit')), isHeld: false };
+    let before = performance.now();
+    const step = (now: number): void => {
       const { model_: model } = this;
-      if (!model?.package) return;
-      const { boundsMin, boundsMax } = model.package.manifest;
-      frame(model.camera, boundsMin, boundsMax, orbit);
-      model.moved();
-    }
-    /** Turns the object while nobody holds it; not for people who want no motion. */
-    private rotate_(): void {
-      cancelAnimationFrame(this.rotating_);
-      if (!this.hasAttribute('auto-rotate') || matchMedia('(prefers-reduced-motion: reduce)').matches) return;
-      const own = this.input_ ?? { orbit: orbitOf(this.getAttribute('camera-orbit')), isHeld: false };
-      let before = performance.now();
-      const step = (now: number): void => {
-        const { model_: model } = this;
-        if (!model || model.phase === 'removed') return;
-        if (!own.isHeld && model.place.visible) {
-          own.orbit = { ...own.orbit, thetaDegrees: (own.orbit.thetaDegrees + (rotationDegreesS * Math.min(100, now - before)) / 1000) % 360 };
-          this.look_(own.orbit);
-        }
-        before = now;
-        this.rotating_ = requestAnimationFrame(step);
-      };
+      if (!model || model.phase === 'removed') return;
+      if (!own.isHeld && model.place.visible) {
+        own.orbit = { ...own.orbit, thetaDegrees: (own.orbit.thetaDegrees + (rotationDegreesS * Math.min(100, now - before)) / 1000) % 360 };
+        this.look_(own.orbit);
+      }
+      before = now;
       this.rotating_ = requestAnimationFrame(step);
-    }
-  };
+    };
+    this.rotating_ = requestAnimationFrame(step);
+  }
 }
