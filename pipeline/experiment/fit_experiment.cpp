@@ -94,7 +94,7 @@ std::vector<double> sizes_of(const std::vector<const ExperimentResults*>& kept) 
 }
 
 std::string bounds_text(const Estimate& e, int digits) {
-  return fmt::format("{:.{}f} ({:.{}f} to {:.{}f})", e.value, digits, e.low, digits, e.high, digits);
+  return fmt::format("{:.{}f}, 95 % from {:.{}f} to {:.{}f}", e.value, digits, e.low, digits, e.high, digits);
 }
 
 std::string distance_text(const ExperimentFit& fit) {
@@ -130,7 +130,8 @@ void judge_line(ExperimentFit& fit) {
 
 std::string found_text(const ExperimentFit& fit) {
   if (fit.found)
-    return fmt::format("75 % of the answers are right at a change of {}.", bounds_text(fit.jnd, 4));
+    return fmt::format("75 % of the answers are right at a change of {}, shown {:g} px high.",
+                       bounds_text(fit.jnd, 4), fit.reference_px);
   const std::vector<LevelCount>& c = fit.study.pooled.counts;
   const auto share = [](const LevelCount& l) { return 100.0 * l.right / l.answers; };
   return fmt::format(

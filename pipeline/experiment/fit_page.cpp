@@ -22,8 +22,8 @@ std::string condition_plot(const ConditionFit& fit, double displayed_px) {
   plot.x_name = "change [%]";
   plot.y_name = "right answers [%]";
   plot.x_low = 100 * low / 1.2, plot.x_high = 100 * high * 1.2, plot.y_high = 100;
-  PlotSeries answers{"answers", "a", {}, false, false, true},
-      sigmoid{"sigmoid", "a", {}, false, false, false}, line{"line", "b", {}, false, true, false},
+  PlotSeries answers{"", "a", {}, false, false, true},
+      sigmoid{"answers and sigmoid", "a", {}, false, false, false}, line{"line", "b", {}, false, true, false},
       quarter{"75 %", "q", {}, false, true, false};
   for (const LevelCount& c : fit.counts)
     answers.points.emplace_back(100 * c.level, 100.0 * c.right / c.answers);

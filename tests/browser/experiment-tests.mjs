@@ -262,7 +262,7 @@ test('experiment: the page on desktop and phone, by day and by night', async () 
       await picture('display');
       await measure(at, cssPxPerMm);
       await shown(page, 1);
-      await readable('#trial h1', '.keys', '#count');
+      await readable('#trial h1', name === 'phone' ? '.taps' : '.keys', '#count');
       await picture('trial');
       const small = await page.evaluate(() => [...document.querySelectorAll('button, input')].filter((b) => {
         const {width, height} = b.getBoundingClientRect();

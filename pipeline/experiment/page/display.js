@@ -42,6 +42,7 @@ export function measureDisplay(design, $) {
   const cardMm = upright ? kCardMm.short : kCardMm.long;
   $('edge').textContent = upright ? 'the short side of the card' : 'the long side of the card';
   const slider = $('width');
+  slider.max = Math.min(1000, window.innerWidth - 32);
   slider.value = Math.round((cardMm * 96) / 25.4);
   let found;
   const update = () => {

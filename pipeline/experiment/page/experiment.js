@@ -31,7 +31,7 @@ const newName = () => `j-${[...crypto.getRandomValues(new Uint8Array(6))].map((n
 /** Consent and name; resolves with {judge, kept}: kept are answers to go on with, or null. */
 function welcome(design) {
   const trials = design.orders[0].length;
-  $('length').textContent = `${trials} choices, about ${Math.max(1, Math.round((trials * 5) / 60))} minutes.`;
+  $('length').textContent = `${trials} choices, about ${Math.max(2, Math.round((trials * 5) / 60))} minutes.`;
   showText($('consent'), design.consent);
   const kept = keptResults(design);
   const open = kept && kept.answers.length > 0 && kept.answers.length < trials;
