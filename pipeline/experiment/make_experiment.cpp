@@ -42,19 +42,6 @@ std::uint32_t frame_px(const StimulusSet& set, double displayed_px) {
   return static_cast<std::uint32_t>(std::min(std::ceil(displayed_px * per_px), 1e9));
 }
 
-void check_frames(const ExperimentDesign& design) {
-  const auto views = static_cast<std::uint32_t>(design.options.views);
-  for (const ExperimentCondition& c : design.conditions) {
-    if (c.frame_px > kMostFramePx)
-      throw InputError("--sizes", "", fmt::format("a picture of at most {} px", kMostFramePx),
-                       fmt::format("{} px for a displayed size of {:g} px", c.frame_px, c.displayed_px));
-    if (c.frame_px * views > kMostStripPx)
-      throw InputError("--views", "",
-                       fmt::format("at most {} views of {} px", kMostStripPx / c.frame_px, c.frame_px),
-                       std::to_string(views));
-  }
-}
-
 /// All views side by side.
 Pixels render_strip(const StimulusSet& set, const StimulusSet::Shown& shown, int views, std::uint32_t side_px,
                     const RenderEnvironment& environment, const RunContext& context) {
@@ -184,14 +171,28 @@ std::vector<std::uint8_t> padded_png(const std::vector<std::uint8_t>& png, std::
   return out;
 }
 
+void check_pictures(const ExperimentOptions& options, const StimulusSet& stimuli) {
+  const auto views = static_cast<std::uint32_t>(options.views);
+  for (const double px : options.sizes_px) {
+    const std::uint32_t side_px = frame_px(stimuli, px);
+    if (side_px > kMostFramePx)
+      throw InputError("--sizes", "", fmt::format("a picture of at most {} px", kMostFramePx),
+                       fmt::format("{} px for a displayed size of {:g} px", side_px, px));
+    if (side_px * views > kMostStripPx)
+      throw InputError("--views", "",
+                       fmt::format("at most {} views of {} px", kMostStripPx / side_px, side_px),
+                       std::to_string(views));
+  }
+}
+
 Experiment make_experiment(const ExperimentOptions& options, const StimulusSet& stimuli,
                            const RunContext& context) {
+  check_pictures(options, stimuli);
   Experiment experiment;
   ExperimentDesign& design = experiment.design;
   design.options = options;
   design.levels = stimuli.levels;
   for (const double px : options.sizes_px) design.conditions.push_back({px, frame_px(stimuli, px)});
-  check_frames(design);
   const RenderEnvironment environment = studio_environment(context);
   design.background = background_of(environment);
   plan_trials(design);

@@ -24,10 +24,12 @@ struct Experiment {
 /// Longest side of a strip of views, px: what browsers decode everywhere.
 inline constexpr std::uint32_t kMostStripPx = 16384;
 
+/// InputError naming the option, --sizes or --views, when a picture would be too large.
+void check_pictures(const ExperimentOptions& options, const StimulusSet& stimuli);
+
 /// Renders every stimulus with the reference renderer in the light of all measurements, from `views`
 /// directions around it, side by side in one picture. Pictures of one size have equal sides and equal lengths
-/// in bytes. InputError {option} where a picture would be too large. Same bytes for any thread count and
-/// machine.
+/// in bytes. Errors as check_pictures(). Same bytes for any thread count and machine.
 Experiment make_experiment(const ExperimentOptions& options, const StimulusSet& stimuli,
                            const RunContext& context);
 

@@ -169,6 +169,11 @@ int run_make(const MakeArguments& args) {
   std::optional<PackageReader> package;
   if (options.kind == StimulusKind::kMesh) package.emplace(open_store(args.package));
   const StimulusSet stimuli = package ? package_stimuli(*package, context) : shape_stimuli(options);
+  try {
+    check_pictures(options, stimuli);
+  } catch (const InputError& e) {
+    throw UsageError(e.file(), e.place(), e.expected(), e.found());
+  }
   const Experiment experiment = make_experiment(options, stimuli, context);
   write_experiment(experiment, args.folder);
   print_experiment(args, experiment);

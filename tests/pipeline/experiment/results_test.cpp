@@ -80,7 +80,7 @@ TEST(Results, NumbersOutOfRangeAreRefusedWhereTheyStand) {
   EXPECT_EQ(refused(with("/display/extra", 1)), "/display");
   EXPECT_NE(refused(with("/extra", 1)), "none");
   EXPECT_EQ(refused(with("/answers", 5)), "/answers");
-  EXPECT_EQ(refused(with("/answers/0", 5)), "/answers/0/trial");
+  EXPECT_EQ(refused(with("/answers/0", 5)), "/answers/0");
 }
 
 TEST(Results, EveryFieldMustBeThere) {
