@@ -158,6 +158,19 @@ TEST_F(ExperimentCommand, ExitCodes) {
   EXPECT_EQ(experiment({}).exit_code, 2);
 }
 
+TEST_F(ExperimentCommand, AProfileOutOfRangeIsAUsageErrorThatNamesTheField) {
+  for (const auto& [field, profile] : std::vector<std::pair<std::string, std::string>>{
+           {"/jnd", R"({"version":1,"jnd":7})"},
+           {"/reference_px", R"({"version":1,"jnd":0.1,"reference_px":0})"},
+           {"/distance_exponent", R"({"version":1,"jnd":0.1,"distance_exponent":-1})"}}) {
+    write_text(folder_ / "p.json", profile);
+    const CommandResult r = run_command({TEXMESH_BINARY, "compile", folder_ / "none.glb", "-o",
+                                         folder_ / "x.texmesh", "--jnd-profile", folder_ / "p.json"});
+    EXPECT_EQ(r.exit_code, 2);
+    EXPECT_NE(r.errors.find("p.json: " + field + ": expected a number in"), std::string::npos) << r.errors;
+  }
+}
+
 TEST_F(ExperimentCommand, AnswersAreComparedWithTheDesign) {
   ASSERT_EQ(experiment({"make", "--stimuli", "quadrics", "--sizes", "20", "--views", "1", "--objects", "1",
                         "-o", folder_ / "e"})
