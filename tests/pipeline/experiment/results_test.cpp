@@ -106,6 +106,19 @@ TEST(Results, ATrialIsAnsweredOnce) {
   EXPECT_EQ(refused(many.dump()), "/answers");
 }
 
+TEST(Results, AnyBytesAreReadOrRefused) {
+  const std::string good = good_text();
+  SplitMix random(3);
+  int refusals = 0;
+  for (int k = 0; k < 3000; ++k) {
+    std::string text = good;
+    for (std::size_t n = 1 + random.below(3); n > 0; --n)
+      text[random.below(text.size())] = static_cast<char>(random.below(256));
+    refusals += refused(text) != "none";  // any other exception fails the test
+  }
+  EXPECT_GT(refusals, 2000);
+}
+
 TEST(Results, WhatIsNoDocument) {
   const std::string good = good_text();
   for (std::size_t cut = 0; cut + 3 < good.size(); cut += 97)
