@@ -17,6 +17,7 @@ void add_doctor_command(Command& app);
 void add_render_command(Command& app);
 void add_report_command(Command& app);
 void add_study_command(Command& app);
+void add_experiment_command(Command& app);
 void add_plan_command(Command& app);
 void add_check_command(Command& app);  // command_plan.cpp
 void add_simulate_command(Command& app);

@@ -33,6 +33,7 @@ void add_commands(Command& program) {
   add_simulate_command(program);
   program.group("Measure the method");
   add_study_command(program);
+  add_experiment_command(program);
 }
 
 }  // namespace

@@ -20,6 +20,7 @@ struct ProfileField {
 };
 constexpr ProfileField kFields[]{{"jnd", "perceptual_values.jnd"},
                                  {"reference_px", "perceptual_values.jnd_reference_px"},
+                                 {"distance_exponent", "perceptual_values.jnd_distance_exponent"},
                                  {"statistic", "perceptual_values.statistic"}};
 
 Json parse(std::span<const std::uint8_t> json, const std::string& file) {
@@ -64,6 +65,7 @@ void read_jnd_profile(CompileOptions& options, std::span<const std::uint8_t> jso
     if (!root.contains(name)) throw InputError(file, std::string("/") + name, "a value", "none");
   if (root["version"] != 1) throw InputError(file, "/version", "1", root["version"].dump().substr(0, 60));
   CompileOptions changed = options;
+  changed.perceptual_values.jnd_distance_exponent = 0;
   for (const auto& [name, value] : root.items()) {
     if (name == "version" || name == "$schema") continue;
     const auto* field = std::find_if(std::begin(kFields), std::end(kFields),

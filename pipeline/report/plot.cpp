@@ -51,7 +51,9 @@ class Canvas {
           "<path class=\"grid\" d=\"M{0:.1f} {1}v{2}\"/><text class=\"quiet mid\" x=\"{0:.1f}\" "
           "y=\"{3}\">{4}</text>\n",
           x(v), kTop, kPlotHeight + 5, kTop + kPlotHeight + 20,
-          bytes ? short_bytes(v) : fmt::format("{:.0f}", v));
+          bytes   ? short_bytes(v)
+          : v < 1 ? fmt::format("{:g}", v)
+                  : fmt::format("{:.0f}", v));
     return svg + fmt::format("<text class=\"quiet end\" x=\"{}\" y=\"{}\">{}</text>\n", kLeft + kPlotWidth,
                              kHeight - 8, markup_escaped(plot_.x_name));
   }

@@ -36,9 +36,8 @@ struct PerceptualValues {
   // not differ from S_0.
   std::vector<float> display_px_edge;   // [k]: O_V / E_S, the height that the scale's edges match, px
   std::vector<float> display_px_error;  // [k]: the height up to which the scale's p95 error is <= 1 px, px
-  // [k]: the height in px up to which the statistic's value against S_0 stays under the JND of that height. A
-  // change of the surface subtends more when the object is shown larger, so the relative change that is just
-  // noticeable at D px is taken as jnd * jnd_reference_px / D.
+  // [k]: the height D in px up to which the statistic's value against S_0 stays under the change that is just
+  // noticeable there, jnd * (jnd_reference_px / D)^exponent. With an exponent of 0: any height or none (0).
   std::vector<float> display_px_jnd;
   float object_height = 0;  // O_V: the longest side of the bounding box, object units
   template <class S, class A>

@@ -203,6 +203,19 @@ float height_px(double numerator, double denominator) {
   return static_cast<float>(std::min<double>(px, kAnyHeightPx));
 }
 
+/// The height up to which a scale of that value passes for S_0: where jnd (reference / height)^exponent is
+/// the value.
+float jnd_height_px(const PerceptualValuesOptions& options, double value) {
+  const double exponent = options.jnd_distance_exponent;
+  if (exponent == 1 || !(value > 0)) return height_px(options.jnd_reference_px * options.jnd, value);
+  if (exponent == 0) return value < options.jnd ? kAnyHeightPx : 0;
+  // pow() would overflow for exponents near 0.
+  const double log_height =
+      portable::log(options.jnd_reference_px) + portable::log(options.jnd / value) / exponent;
+  return log_height > portable::log(kAnyHeightPx) ? kAnyHeightPx
+                                                  : static_cast<float>(portable::exp(log_height));
+}
+
 void find_displayed_heights(const NestedScales& scales, const std::vector<double>& error,
                             const PerceptualValuesOptions& options, const std::vector<float>& value,
                             const RunContext& context, PerceptualValues& out) {
@@ -215,7 +228,7 @@ void find_displayed_heights(const NestedScales& scales, const std::vector<double
   for (std::size_t k = 0; k < scales.scales.size(); ++k) {
     out.display_px_edge.push_back(height_px(out.object_height, edge[k]));
     out.display_px_error.push_back(height_px(out.object_height, error[k]));
-    out.display_px_jnd.push_back(height_px(options.jnd_reference_px * options.jnd, value[k]));
+    out.display_px_jnd.push_back(jnd_height_px(options, static_cast<double>(value[k])));
     if (k == 0) continue;
     for (std::vector<float>* px : {&out.display_px_edge, &out.display_px_error, &out.display_px_jnd})
       (*px)[k] = std::min((*px)[k], (*px)[k - 1]);

@@ -28,6 +28,7 @@ inline constexpr double kJndReferencePx = 512;
 struct PerceptualValuesOptions {
   double jnd = 0.10;
   double jnd_reference_px = kJndReferencePx;
+  double jnd_distance_exponent = 1;  // what is just noticeable at D px: jnd (jnd_reference_px / D)^exponent
   PerceptualStatistic statistic = PerceptualStatistic::kP95;
   int samples = 4000;          // the percentiles' ranks are within 0.5 % then
   int kept_scales = 8;         // beside S_0 and the major ones
@@ -37,6 +38,10 @@ struct PerceptualValuesOptions {
     v("jnd", s.jnd, Range{0.001, 1}, "just-noticeable relative change of the distance to the skeleton");
     v("jnd_reference_px", s.jnd_reference_px, Range{1, 100000},
       "displayed height of the object in px at which that difference is just noticeable");
+    v("jnd_distance_exponent", s.jnd_distance_exponent, Range{0, 2},
+      "e of the change that is just noticeable at D px: jnd x (jnd_reference_px / D)^e. 0 = the same at "
+      "every "
+      "distance, as the thesis prints; 1 is a guess until judges have been asked (docs/experiments.md)");
     v("statistic", s.statistic,
       "what decides about major scales: p95 of the relative distance, or the thesis's average, "
       "conservative (largest) and aggressive (smallest) change of the skeleton distance");

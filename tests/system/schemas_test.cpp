@@ -22,6 +22,8 @@
 #include "pipeline/compile/jnd_profile.h"
 #include "pipeline/compile/options.h"
 #include "pipeline/compile/profile.h"
+#include "pipeline/experiment/design.h"
+#include "pipeline/experiment/results.h"
 #include "pipeline/import/range/range_scan_document.h"
 #include "pipeline/inspect/fragment_files.h"
 #include "pipeline/inspect/provenance.h"
@@ -61,6 +63,8 @@ const std::map<std::string, Reader>& readers() {
          CompileOptions options;
          read_jnd_profile(options, bytes_of(s), "jnd.json");
        }},
+      {"experiment-design.v1", [](const std::string& s) { read_design(bytes_of(s), "design.json"); }},
+      {"experiment-results.v1", [](const std::string& s) { read_results(bytes_of(s), "results.json"); }},
       {"profile.v1", [](const std::string& s) {
          CompileOptions options;
          read_profile(options, s, "profile.json");

@@ -4,6 +4,7 @@
 #include <array>
 
 #include "format/base/portable_math.h"
+#include "stages/base/split_mix.h"
 
 namespace texmesh {
 namespace {
@@ -11,23 +12,10 @@ namespace {
 constexpr double kLeastDrawnBytes = 50e3, kMostDrawnBytes = 8e6;
 constexpr std::array<double, 5> kHeights{256, 362, 512, 724, 1024};
 
-/// Numbers in 0..1 by SplitMix64 (Steele, Lea, Flood 2014): the same on every machine.
-class Random {
- public:
-  explicit Random(std::uint64_t seed) : state_(seed) {}
-  double next() {
-    std::uint64_t z = (state_ += 0x9e3779b97f4a7c15ull);
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
-    return static_cast<double>((z ^ (z >> 31)) >> 11) / 9007199254740992.0;
-  }
-  std::size_t below(std::size_t n) { return static_cast<std::size_t>(next() * static_cast<double>(n)); }
-  /// Even in the logarithm.
-  double between(double low, double high) { return low * portable::exp(next() * portable::log(high / low)); }
-
- private:
-  std::uint64_t state_;
-};
+/// Even in the logarithm.
+double log_between(SplitMix& random, double low, double high) {
+  return low * portable::exp(random.next() * portable::log(high / low));
+}
 
 double all_bytes(PackageReader& package) {
   double all = kLeastDrawnBytes;
@@ -35,14 +23,14 @@ double all_bytes(PackageReader& package) {
   return std::min(all, kMostDrawnBytes);
 }
 
-DeliveryPlan drawn_link(PackageReader& package, Random& random, DeliveryRequest& request) {
-  request.network.link = BandwidthTrace::constant(random.between(20e3, 2e6));
-  request.network.rtt_s = random.between(0.01, 0.2);
-  request.time_limit_s = random.between(2, 20);
+DeliveryPlan drawn_link(PackageReader& package, SplitMix& random, DeliveryRequest& request) {
+  request.network.link = BandwidthTrace::constant(log_between(random, 20e3, 2e6));
+  request.network.rtt_s = log_between(random, 0.01, 0.2);
+  request.time_limit_s = log_between(random, 2, 20);
   return plan_delivery(package, request);
 }
 
-DeliveryPlan drawn_mix(PackageReader& package, Random& random, DeliveryRequest& request) {
+DeliveryPlan drawn_mix(PackageReader& package, SplitMix& random, DeliveryRequest& request) {
   std::array<int, kPlaneGroups> levels{};
   for (int& level : levels) level = static_cast<int>(random.below(3));
   const std::vector<PlaneChoice> planes = planes_for_display(package, request.displayed_px, levels);
@@ -77,7 +65,7 @@ DeliveryPlan plan_of(PackageReader& package, const DeliveryRequest& request, int
 }
 
 std::vector<DrawnPlan> draw_plans(PackageReader& package, int count, std::uint64_t seed) {
-  Random random(seed);
+  SplitMix random(seed);
   const double most_bytes = all_bytes(package);
   const std::vector<ManifestScale>& scales = package.manifest().scales;
   std::vector<DrawnPlan> out;
@@ -93,7 +81,7 @@ std::vector<DrawnPlan> draw_plans(PackageReader& package, int count, std::uint64
           drawn.kind == DrawnKind::kMix
               ? drawn_mix(package, random, request)
               : plan_budget(package, request,
-                            static_cast<std::uint64_t>(random.between(kLeastDrawnBytes, most_bytes)));
+                            static_cast<std::uint64_t>(log_between(random, kLeastDrawnBytes, most_bytes)));
     }
     out.push_back(std::move(drawn));
   }

@@ -29,6 +29,15 @@ TEST(JndProfile, AbsentFieldsKeepTheirValues) {
   EXPECT_EQ(options.perceptual_values.jnd_reference_px, kJndReferencePx);
 }
 
+TEST(JndProfile, HoldsAtEveryDistanceUnlessItSaysOtherwise) {
+  CompileOptions options;
+  EXPECT_EQ(options.perceptual_values.jnd_distance_exponent, 1);
+  read(options, R"({"version":1,"jnd":0.2})");
+  EXPECT_EQ(options.perceptual_values.jnd_distance_exponent, 0);
+  read(options, R"({"version":1,"jnd":0.2,"distance_exponent":0.75})");
+  EXPECT_EQ(options.perceptual_values.jnd_distance_exponent, 0.75);
+}
+
 TEST(JndProfile, ErrorsNameThePlaceAndChangeNothing) {
   const auto place = [](const std::string& json) -> std::string {
     CompileOptions options;
@@ -44,6 +53,8 @@ TEST(JndProfile, ErrorsNameThePlaceAndChangeNothing) {
   EXPECT_EQ(place(R"({"version":1,"jnd":0.3,"reference_px":0})"), "/reference_px");
   EXPECT_EQ(place(R"({"version":1,"jnd":2})"), "/jnd");
   EXPECT_EQ(place(R"({"version":1,"jnd":0.3,"statistic":5})"), "/statistic");
+  EXPECT_EQ(place(R"({"version":1,"jnd":0.3,"distance_exponent":2.1})"), "/distance_exponent");
+  EXPECT_EQ(place(R"({"version":1,"jnd":0.3,"distance_exponent":-1})"), "/distance_exponent");
   EXPECT_EQ(place(R"({"version":1,"jnd":0.3,"x":1})"), "/x");
   EXPECT_EQ(place(R"({"version":1,"jnd":0.3,"title":[1]})"), "/title");
   EXPECT_NE(place("{"), "none");

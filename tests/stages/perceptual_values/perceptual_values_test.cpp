@@ -208,6 +208,28 @@ TEST(PerceptualValues, CumulativeTableIsTheRootOfTheSumOfSquares) {
   EXPECT_THROW(cumulative_table(step, PerceptualStatistic::kP95), StageError);
 }
 
+TEST(PerceptualValues, TheExponentSaysHowTheJndFollowsTheDistance) {
+  const NestedScales scales = make_scales(testing::bumpy_sphere(32, 48, 0.15f), 12);
+  const Skeleton skeleton = centre_skeleton(scales.mesh);
+  const auto measure = [&](double exponent) {
+    return measure_perceptual_values(scales, skeleton, {.jnd = 0.05, .jnd_distance_exponent = exponent},
+                                     kOneThread);
+  };
+  const PerceptualValues printed = measure(0), guess = measure(1), root = measure(0.5), tiny = measure(1e-9);
+  EXPECT_EQ(printed.major, guess.major);
+  std::size_t enough = 0;
+  for (std::size_t k = 1; k < scales.scales.size(); ++k) {
+    const double value = static_cast<double>(guess.p95[k]);
+    if (!(value > 0)) continue;
+    EXPECT_EQ(printed.display_px_jnd[k], value < 0.05 ? kAnyHeightPx : 0) << k;
+    EXPECT_NEAR(root.display_px_jnd[k] / (512 * (0.05 / value) * (0.05 / value)), 1, 1e-5) << k;
+    EXPECT_EQ(tiny.display_px_jnd[k], printed.display_px_jnd[k]) << k;
+    enough += value < 0.05;
+  }
+  EXPECT_GT(enough, 0u);
+  EXPECT_LT(enough + 1, scales.scales.size());
+}
+
 TEST(PerceptualValues, StrategiesDecideMajorsAndHeights) {
   const NestedScales scales = make_scales(testing::bumpy_sphere(32, 48, 0.15f), 12);
   const Skeleton skeleton = centre_skeleton(scales.mesh);
