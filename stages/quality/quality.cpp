@@ -38,6 +38,7 @@ using quality::texture_losses;
 using quality::TextureData;
 using quality::TextureSampler;
 using quality::TextureSizes;
+using quality::Together;
 using quality::TogetherCell;
 using quality::TogetherLoss;
 using quality::ViewPart;
@@ -216,8 +217,15 @@ void fill_table(const std::vector<SizeCells>& sizes, const std::vector<PlanesOfG
                                              : pooled(alone, cell.losses).flip.mean());
       };
       add(sizes[i].geometry[cell.scale], raw[i].geometry.flip[cell.scale]);
-      for (std::size_t g = 0; g < groups.size(); ++g)
-        add(sizes[i].groups[g].coded[cell.knots[g]], raw[i].groups[g].coded.flip[cell.knots[g]]);
+      for (std::size_t g = 0; g < groups.size(); ++g) {
+        const auto cells = cell.shown == Together::kCoded     ? &GroupCells::coded
+                           : cell.shown == Together::kCoarser ? &GroupCells::coarser
+                                                              : &GroupCells::preview;
+        const auto pictures = cell.shown == Together::kCoded     ? &GroupPictures::coded
+                              : cell.shown == Together::kCoarser ? &GroupPictures::coarser
+                                                                 : &GroupPictures::preview;
+        add((sizes[i].groups[g].*cells).back(), (raw[i].groups[g].*pictures).flip.back());
+      }
     }
   }
   fit_exponent(together, table);
@@ -229,14 +237,14 @@ void fill_table(const std::vector<SizeCells>& sizes, const std::vector<PlanesOfG
 }  // namespace
 
 MeasuredQuality measure_quality(const NestedScales& scales, const PerceptualValues& perceptual,
-                                const std::vector<Material>& materials, const Fragments& fragments,
-                                const std::vector<Pixels>& pixels, const Ladder& ladder,
-                                const Previews& previews, const PackageTables& tables,
+                                const std::vector<Material>& materials, const std::vector<Image>& images,
+                                const Fragments& fragments, const std::vector<Pixels>& pixels,
+                                const Ladder& ladder, const Previews& previews, const PackageTables& tables,
                                 const QualityOptions& options, const RunContext& context) {
   if (scales.mesh.positions.empty()) throw StageError("quality", "S_0", "positions", "none");
   const KeptScales kept = kept_scales(scales, perceptual, context);
   const ShownTextures shown = find_shown(materials, fragments, scales.mesh);
-  const TextureData data = texture_data(fragments, pixels, ladder, previews, tables);
+  const TextureData data = texture_data(images, fragments, pixels, ladder, previews, tables);
   const std::vector<PlanesOfGroup> groups = find_groups(shown, fragments);
   MeasuredQuality result;
   Studio studio;

@@ -78,9 +78,9 @@ struct QualityOptions {
 ///   no measured difference: all losses are 0, all scales pass everywhere, and a warning says so.
 /// StageError when S_0 has no extent. Same bytes for any thread count and machine.
 MeasuredQuality measure_quality(const NestedScales& scales, const PerceptualValues& perceptual,
-                                const std::vector<Material>& materials, const Fragments& fragments,
-                                const std::vector<Pixels>& pixels, const Ladder& ladder,
-                                const Previews& previews, const PackageTables& tables,
+                                const std::vector<Material>& materials, const std::vector<Image>& images,
+                                const Fragments& fragments, const std::vector<Pixels>& pixels,
+                                const Ladder& ladder, const Previews& previews, const PackageTables& tables,
                                 const QualityOptions& options, const RunContext& context);
 
 }  // namespace texmesh

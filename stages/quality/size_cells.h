@@ -11,10 +11,11 @@ namespace texmesh::quality {
 /// What pictures of one list lose; an element without losses was not rendered.
 using Cells = std::vector<Losses>;
 
-/// A coarser scale with all groups coded.
+/// How all groups are shown together: at their last knot, in the coarsest mips, by previews.
+enum class Together : std::uint8_t { kCoded, kCoarser, kPreview };
 struct TogetherCell {
   std::size_t scale = 0;
-  std::vector<std::size_t> knots;  // per group
+  Together shown = Together::kCoded;
   Losses losses;
 };
 
