@@ -21,12 +21,14 @@ using quality::fit_exponent;
 using quality::frame_object;
 using quality::GroupCells;
 using quality::GroupPictures;
+using quality::lend_knots;
 using quality::Loss;
 using quality::Losses;
 using quality::losses_of;
 using quality::PlanesOfGroup;
 using quality::pooled;
 using quality::render_size;
+using quality::ShownMip;
 using quality::ShownTexture;
 using quality::ShownTextures;
 using quality::SizeCells;
@@ -145,7 +147,7 @@ std::vector<std::optional<ViewPart>> rendered_scales(const std::vector<std::uint
     if (alive[k] || !height.rank) continue;
     if (*height.rank == 0) out[k] = ViewPart::kAll;
     if (*height.rank == 1 && (n - 1 - k) % 2 == 0) out[k] = ViewPart::kLarge;
-    if (*height.rank == 2 && k + 1 == n) out[k] = ViewPart::kLargest;
+    if (*height.rank == 2 && (k == 1 || k + 1 == n)) out[k] = ViewPart::kLargest;
   }
   return out;
 }
@@ -167,33 +169,55 @@ std::vector<SizeCells> render_heights(const TextureSampler& sampler, const Quali
   return table_cells;
 }
 
+/// What a group's finer mips of the smaller size lose, in the order of the larger one: there as many of them
+/// are left as its planes are finer. The first is that of the planes that are shown.
+PictureLosses with_fewer_levels(const PictureLosses& finer, const GroupCells& smaller,
+                                const GroupCells& larger) {
+  const auto mean_mip = [](const GroupCells& group) {
+    double sum = 0;
+    for (const ShownMip& m : group.mips) sum += m.part * m.mip;
+    return sum;
+  };
+  const auto fewer = static_cast<std::size_t>(std::lround(std::max(0.0, mean_mip(smaller) - mean_mip(larger))));
+  PictureLosses out = finer;
+  for (const auto list : {&PictureLosses::flip, &PictureLosses::flip_p95, &PictureLosses::dssim})
+    for (std::size_t l = 1; l < finer.size(); ++l)
+      (out.*list)[l] = (finer.*list)[std::min(l + fewer, finer.size() - 1)];
+  return out;
+}
+
 /// What the knots of all groups and the scales lose at one size, rendered or not.
 struct RawLosses {
   PictureLosses geometry;
   std::vector<GroupPictures> groups;
 };
+
+GroupPictures group_pictures(const GroupCells& group, const GroupCells& smaller,
+                             const GroupPictures& measured) {
+  const auto follow = [](const Cells& cells, const SmallerSize& below) { return losses_of(cells, &below); };
+  return {follow(group.coded,
+                 {smaller.coded, measured.coded, along_curve(group, smaller, measured.coded), true}),
+          follow(group.preview, {smaller.preview, measured.preview, measured.preview}),
+          follow(group.finer,
+                 {smaller.finer, measured.finer, with_fewer_levels(measured.finer, smaller, group)}),
+          follow(group.coarser, {smaller.coarser, measured.coarser, measured.coarser})};
+}
+
 std::vector<RawLosses> raw_losses(const std::vector<SizeCells>& sizes) {
   std::vector<RawLosses> out;
   for (std::size_t i = 0; i < sizes.size(); ++i) {
-    const auto losses = [&](const Cells& cells, const Cells* smaller_cells, PictureLosses smaller,
-                            bool first_follows = false) {
-      if (!smaller_cells) return losses_of(cells, nullptr);
-      const SmallerSize below{*smaller_cells, std::move(smaller), first_follows};
-      return losses_of(cells, &below);
-    };
-    const SizeCells* below = i > 0 ? &sizes[i - 1] : nullptr;
     RawLosses raw;
-    raw.geometry = losses(sizes[i].geometry, below ? &below->geometry : nullptr,
-                          below ? out[i - 1].geometry : PictureLosses{});
-    for (std::size_t g = 0; g < sizes[i].groups.size(); ++g) {
-      const GroupCells& group = sizes[i].groups[g];
-      const GroupCells* cells = below ? &below->groups[g] : nullptr;
-      const GroupPictures smaller = below ? out[i - 1].groups[g] : GroupPictures{};
-      raw.groups.push_back({losses(group.coded, cells ? &cells->coded : nullptr,
-                                   cells ? along_curve(group, *cells, smaller.coded) : PictureLosses{}, true),
-                            losses(group.preview, cells ? &cells->preview : nullptr, smaller.preview),
-                            losses(group.finer, cells ? &cells->finer : nullptr, smaller.finer),
-                            losses(group.coarser, cells ? &cells->coarser : nullptr, smaller.coarser)});
+    if (i == 0) {
+      raw.geometry = losses_of(sizes[i].geometry, nullptr);
+      for (const GroupCells& g : sizes[i].groups)
+        raw.groups.push_back({losses_of(g.coded, nullptr), losses_of(g.preview, nullptr),
+                              losses_of(g.finer, nullptr), losses_of(g.coarser, nullptr)});
+    } else {
+      const SmallerSize below{sizes[i - 1].geometry, out[i - 1].geometry, out[i - 1].geometry};
+      raw.geometry = losses_of(sizes[i].geometry, &below);
+      for (std::size_t g = 0; g < sizes[i].groups.size(); ++g)
+        raw.groups.push_back(
+            group_pictures(sizes[i].groups[g], sizes[i - 1].groups[g], out[i - 1].groups[g]));
     }
     out.push_back(std::move(raw));
   }
@@ -229,9 +253,14 @@ void fill_table(const std::vector<SizeCells>& sizes, const std::vector<PlanesOfG
     }
   }
   fit_exponent(together, table);
-  for (std::size_t i = 0; i < sizes.size(); ++i)
-    for (std::size_t g = 0; g < groups.size(); ++g)
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    std::vector<double> texel_level;
+    for (std::size_t i = 0; i < sizes.size(); ++i) {
       table.groups[g].sizes.push_back(texture_losses(sizes[i].groups[g], raw[i].groups[g], table.exponent));
+      texel_level.push_back(sizes[i].groups[g].texel_level);
+    }
+    lend_knots(texel_level, table.groups[g].sizes);
+  }
 }
 
 }  // namespace

@@ -165,11 +165,22 @@ RenderTexture preview_texture(const TextureData& data, const ShownTexture& shown
   return render_texture(std::move(image), shown.srgb, 0, context);
 }
 
+RenderTexture best_texture(const TextureData& data, const ShownTexture& shown, std::uint32_t first_level,
+                           const RunContext& context) {
+  const auto best = [&](std::uint32_t p) {
+    const std::uint32_t plane = plane_towards(data, p, first_level);
+    return PlaneRung{plane, data.ladder.planes[plane].rungs.size() - 1};
+  };
+  std::optional<PlaneRung> alpha;
+  if (shown.alpha) alpha = best(*shown.alpha);
+  return coded_texture(data, shown, best(shown.plane), alpha, first_level, context);
+}
+
 bool shows_source(const TextureData& data, const ShownTexture& shown, std::uint32_t first_level) {
   const auto is_source = [&](std::uint32_t plane) {
     return plane_towards(data, plane, first_level) == plane && data.ladder.planes[plane].source_rung;
   };
-  return is_source(shown.plane) && (!shown.alpha || is_source(*shown.alpha));
+  return is_source(shown.plane);
 }
 
 }  // namespace texmesh::quality

@@ -48,13 +48,12 @@ class SizeShots {
   }
 
   /// Mips that are not coded, `levels` coarser than those of the group's planes at this size, or finer where
-  /// below 0. Textures of which a client has the source's texels stay the source's.
+  /// below 0; of full size the source's texels, where a rung has them.
   Replaced mips(const GroupCells& group, int levels) {
     Replaced out(source_, -1);
     for (const MipShown& mip : mips_shown(group, levels)) out[mip.texture] = uncoded(mip);
     return out;
   }
-  bool are_source(const GroupCells& group, int levels) const { return mips_shown(group, levels).empty(); }
 
   Replaced none() const { return Replaced(source_, -1); }
   static bool is_source(const Replaced& replaced) {
@@ -106,9 +105,9 @@ class SizeShots {
   struct MipShown {
     std::size_t texture;
     std::uint32_t level;
+    bool is_source;  // the full size has a rung with the source's texels
     auto operator<=>(const MipShown&) const = default;
   };
-  /// Those that look other than the source's.
   std::vector<MipShown> mips_shown(const GroupCells& group, int levels) const {
     std::vector<MipShown> out;
     for (std::size_t t = 0; t < source_; ++t) {
@@ -118,8 +117,8 @@ class SizeShots {
         const TexturePlane& plane = sampler_.data.fragments.planes[r.plane];
         if ((plane.mip > 0 ? plane.base : r.plane) != shown.plane) continue;
         const auto level = static_cast<std::uint32_t>(std::max(0, static_cast<int>(plane.mip) + levels));
-        if (level > asked_for || !shows_source(sampler_.data, shown, level))
-          out.push_back({t, std::max(level, asked_for)});
+        const bool is_source = shows_source(sampler_.data, shown, level);
+        out.push_back({t, std::max(level, asked_for), is_source});
       }
     }
     return out;
@@ -127,9 +126,10 @@ class SizeShots {
   /// A texture's plane from that level on, made when it is first asked for.
   std::int32_t uncoded(const MipShown& mip) {
     const auto [found, is_new] = uncoded_.try_emplace(mip, -1);
+    const ShownTexture& shown = sampler_.shown.textures[mip.texture];
     if (is_new)
-      found->second =
-          add(uncoded_texture(sampler_.data, sampler_.shown.textures[mip.texture], mip.level, context_));
+      found->second = add(mip.is_source ? best_texture(sampler_.data, shown, mip.level, context_)
+                                        : uncoded_texture(sampler_.data, shown, mip.level, context_));
     return found->second;
   }
   void take(const Materials& source, double displayed_px, bool with_ssim, const std::vector<Shot>& shots,
@@ -160,10 +160,12 @@ bool repeats(const Knot& knot, const Knot& before) {
                             [](const PlaneRung& a, const PlaneRung& b) { return a.rung == b.rung; });
 }
 
-/// The knots that are rendered: all, at the half the lowest rung, at the largest none. Without mips losses do
-/// not follow from smaller sizes.
-bool is_sampled(const TextureSampler& sampler, std::size_t knot, std::size_t knots, std::size_t rank) {
-  return rank == 0 || !sampler.shown.with_mips() || (rank == 1 && knot + 1 == knots);
+/// The knots that are rendered: all, at larger sizes that of the lowest rung. Without mips losses do not
+/// follow from smaller sizes.
+bool is_sampled(const TextureSampler& sampler, const std::vector<Knot>& knots, std::size_t knot,
+                std::size_t rank) {
+  if (knot > 0 && repeats(knots[knot], knots[knot - 1])) return false;
+  return rank == 0 || !sampler.shown.with_mips() || repeats(knots[knot], knots.back());
 }
 
 /// Levels of source's texels that are rendered.
@@ -175,7 +177,6 @@ struct MipSamples {
 MipSamples mip_samples(const TextureSampler& sampler, std::size_t rank, const Display& display,
                        const PlanesOfGroup& group) {
   if (rank == 0 || !sampler.shown.with_mips()) return {kFinerLevels + 1, kCoarserLevels};
-  if (rank != 1) return {1, 0};
   Display smaller = display;
   smaller.displayed_px /= 2;
   const bool again = std::ranges::any_of(group.planes, [&](std::uint32_t p) {
@@ -243,8 +244,7 @@ TogetherTextures add_group(const TextureSampler& sampler, std::size_t rank, cons
   group.finer.resize(kFinerLevels + 1);
   group.coarser.resize(kCoarserLevels);
   for (std::size_t k = 0; k < knots; ++k) {
-    if (k > 0 && repeats(group.knots[k], group.knots[k - 1])) continue;
-    if (!is_sampled(sampler, k, knots, rank)) continue;
+    if (!is_sampled(sampler, group.knots, k, rank)) continue;
     coded = shots.coded(group, k);
     shots.take(0, coded, group.coded[k], coded_views(rank));
   }
@@ -252,9 +252,8 @@ TogetherTextures add_group(const TextureSampler& sampler, std::size_t rank, cons
   const Replaced preview = shots.previews(planes);
   shots.take(0, preview, group.preview[0], coded_views(rank));
   const MipSamples mips = mip_samples(sampler, rank, display, planes);
-  for (std::size_t l = 0; l < group.finer.size(); ++l)
-    if (const int finer = -static_cast<int>(l); l < mips.finer || shots.are_source(group, finer))
-      shots.take(0, shots.mips(group, finer), group.finer[l], coded_views(rank));
+  for (std::size_t l = 0; l < mips.finer; ++l)
+    shots.take(0, shots.mips(group, -static_cast<int>(l)), group.finer[l], coded_views(rank));
   for (std::size_t l = 0; l < mips.coarser; ++l)
     shots.take(0, shots.mips(group, static_cast<int>(l) + 1), group.coarser[l], other_views(rank));
   const bool coarsest = mips.coarser == kCoarserLevels;
@@ -304,13 +303,12 @@ PictureLosses losses_of(const Cells& cells, const SmallerSize* smaller) {
     std::vector<std::optional<double>> found(cells.size()), ratio(cells.size());
     for (std::size_t i = 0; i < cells.size(); ++i) {
       if (cells[i].empty()) continue;
-      const Loss all = pooled(cells[i]);
-      found[i] = value_of(all, kind);
-      if (!smaller || all.flip.pixels == 0) continue;  // as the reference: not rendered, so nobody's neighbour
+      found[i] = value_of(pooled(cells[i]), kind);
+      if (!smaller) continue;
       // Fewer views than at the size below: as far as these were like all of them there.
       if (const Losses& there = smaller->cells[i]; !there.empty()) {
         const double same = value_of(pooled(there, cells[i]), kind);
-        if (same > kNothing) *found[i] *= value_of(pooled(there), kind) / same;
+        if (same > kNothing) *found[i] *= static_cast<double>((smaller->measured.*kLists[kind])[i]) / same;
       }
       if (below(i) > kNothing) ratio[i] = *found[i] / below(i);
     }

@@ -18,6 +18,10 @@ struct GroupPictures {
 /// steps of iteration bring it.
 TextureLosses texture_losses(const GroupCells& group, GroupPictures pictures, float exponent);
 
+/// Gives each size the knots of the others that lie far from all of its own: mips have few rungs, and clients
+/// show others there, too. Losses as for texels as large on the screen as there. `texel_level` per size.
+void lend_knots(const std::vector<double>& texel_level, std::vector<TextureLosses>& sizes);
+
 /// What the table's parts say of a sample, and what was measured.
 struct TogetherLoss {
   std::vector<double> parts;
