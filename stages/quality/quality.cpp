@@ -14,6 +14,7 @@ namespace {
 using quality::along_curve;
 using quality::Cells;
 using quality::choose_views;
+using quality::coarser_along;
 using quality::Coverage;
 using quality::find_groups;
 using quality::find_shown;
@@ -169,19 +170,21 @@ std::vector<SizeCells> render_heights(const TextureSampler& sampler, const Quali
   return table_cells;
 }
 
-/// What a group's finer mips of the smaller size lose, in the order of the larger one: there as many of them
-/// are left as its planes are finer. The first is that of the planes that are shown.
-PictureLosses with_fewer_levels(const PictureLosses& finer, const GroupCells& smaller,
-                                const GroupCells& larger) {
-  const auto mean_mip = [](const GroupCells& group) {
-    double sum = 0;
-    for (const ShownMip& m : group.mips) sum += m.part * m.mip;
-    return sum;
-  };
-  const auto fewer = static_cast<std::size_t>(std::lround(std::max(0.0, mean_mip(smaller) - mean_mip(larger))));
+double mean_mip(const GroupCells& group) {
+  double sum = 0;
+  for (const ShownMip& m : group.mips) sum += m.part * m.mip;
+  return sum;
+}
+
+/// What finer mips of the smaller size lose, in the order of the larger one: full size, which may have the
+/// source's texels, comes as many levels earlier there as its planes are finer.
+PictureLosses finer_along(const PictureLosses& finer, const GroupCells& smaller, const GroupCells& larger) {
+  const auto whole = [](double x) { return static_cast<std::size_t>(std::lround(std::max(0.0, x))); };
+  const std::size_t full_size = whole(mean_mip(larger)),
+                    fewer = whole(mean_mip(smaller) - mean_mip(larger));
   PictureLosses out = finer;
   for (const auto list : {&PictureLosses::flip, &PictureLosses::flip_p95, &PictureLosses::dssim})
-    for (std::size_t l = 1; l < finer.size(); ++l)
+    for (std::size_t l = full_size; l < finer.size(); ++l)
       (out.*list)[l] = (finer.*list)[std::min(l + fewer, finer.size() - 1)];
   return out;
 }
@@ -199,8 +202,8 @@ GroupPictures group_pictures(const GroupCells& group, const GroupCells& smaller,
                  {smaller.coded, measured.coded, along_curve(group, smaller, measured.coded), true}),
           follow(group.preview, {smaller.preview, measured.preview, measured.preview}),
           follow(group.finer,
-                 {smaller.finer, measured.finer, with_fewer_levels(measured.finer, smaller, group)}),
-          follow(group.coarser, {smaller.coarser, measured.coarser, measured.coarser})};
+                 {smaller.finer, measured.finer, finer_along(measured.finer, smaller, group)}),
+          follow(group.coarser, {smaller.coarser, measured.coarser, coarser_along(group, smaller, measured)})};
 }
 
 std::vector<RawLosses> raw_losses(const std::vector<SizeCells>& sizes) {

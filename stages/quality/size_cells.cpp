@@ -172,14 +172,14 @@ bool is_sampled(const TextureSampler& sampler, const std::vector<Knot>& knots, s
 struct MipSamples {
   std::size_t finer = 0, coarser = 0;
 };
-/// Mips change as much by height as from plane to plane, so they are rendered once, and again where a texture
-/// has no finer plane for the larger height.
+/// At larger heights the planes that are shown, and the next coarser ones where textures have no finer planes
+/// for them, and once for all.
 MipSamples mip_samples(const TextureSampler& sampler, std::size_t rank, const Display& display,
                        const PlanesOfGroup& group) {
   if (rank == 0 || !sampler.shown.with_mips()) return {kFinerLevels + 1, kCoarserLevels};
   Display smaller = display;
   smaller.displayed_px /= 2;
-  const bool again = std::ranges::any_of(group.planes, [&](std::uint32_t p) {
+  const bool again = rank == 1 || std::ranges::any_of(group.planes, [&](std::uint32_t p) {
     return shown_plane(sampler.data, p, smaller) == shown_plane(sampler.data, p, display);
   });
   return {1, again ? std::size_t{1} : 0};

@@ -100,6 +100,28 @@ PictureLosses along_curve(const GroupCells& larger, const GroupCells& smaller, c
   return out;
 }
 
+PictureLosses coarser_along(const GroupCells& larger, const GroupCells& smaller,
+                            const GroupPictures& losses) {
+  constexpr std::uint32_t kAnyMip = 1000;
+  const double growth = std::max(0.0, larger.texel_level - smaller.texel_level);
+  PictureLosses out = losses.coarser;
+  for (const auto list : {&PictureLosses::flip, &PictureLosses::flip_p95, &PictureLosses::dssim}) {
+    TextureLosses read;
+    read.texel_dssim = {1};
+    read.coded.flip = {1};  // not read
+    read.finer.flip = losses.finer.*list;
+    read.coarser.flip = losses.coarser.*list;
+    make_mips_rising(read);
+    const GroupCurve curve = curve_of(std::move(read));
+    const auto at = [&](double level) { return curve.halved({level, level}, kAnyMip); };
+    for (std::size_t l = 0; l < out.size(); ++l) {
+      const double level = static_cast<double>(l + 1);
+      (out.*list)[l] = static_cast<float>(std::clamp(at(level + growth) - at(growth) + at(0), 0.0, 1.0));
+    }
+  }
+  return out;
+}
+
 TextureLosses texture_losses(const GroupCells& group, GroupPictures pictures, float exponent) {
   const std::vector<Knot>& knots = group.knots;
   const PictureLosses& coded = pictures.coded;
