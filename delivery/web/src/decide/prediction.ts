@@ -41,7 +41,6 @@ class Curve {
   /** Loss of mips from the finest sampled level on, and how many levels finer than the planes shown the first is. */
   private readonly mips_: number[];
   private readonly finer_: number;
-  readonly finest: number;
   readonly preview: number;
 
   constructor({ texelDssim, coded, preview, finer, coarser }: TextureLosses, beyond: number) {
@@ -49,7 +48,6 @@ class Curve {
     this.logDssim_ = [...texelDssim].map(log);
     this.logFlip_ = [...coded.flip].map((flip) => log((least = Math.max(least, flip))));
     this.mips_ = [...[...finer.flip].reverse(), ...coarser.flip];
-    this.finest = this.mips_[0];
     this.finer_ = finer.flip.length - 1;
     this.preview = Math.min(1, preview.flip[0] * beyond);
   }
@@ -107,7 +105,7 @@ export class GroupCurve {
   /** FLIP of the texels that rungs code, halved `mip` times; for full size that of the finest sampled level. */
   halved(growth: TexelGrowth, mip: number): number {
     const [first, second] = this.curves_;
-    const at = (curve: Curve, level: number): number => clamp(curve.atLevel(level) - Math.max(0, curve.atLevel(level - mip) - curve.finest), 0, 1);
+    const at = (curve: Curve, level: number): number => clamp(curve.atLevel(level) - Math.max(0, curve.atLevel(level - mip) - curve.atLevel(-99)), 0, 1);
     return first ? mixed(at(first, growth[0]), at(second, growth[1]), this.part_) : 0;
   }
 }
