@@ -98,6 +98,10 @@ std::vector<StageLibrary> libraries(std::initializer_list<const char*> names) {
   return all;
 }
 
+/// Those that decode images and fragments of every kind.
+constexpr std::initializer_list<const char*> kImageLibraries{"libjpeg-turbo", "libpng", "libwebp",
+                                                             "openimageio"};
+
 /// make_stage() for a plain function, which has no state of its own: options that are not declared cannot
 /// reach it.
 template <class Read, class Made, class Declared, class Result, class... Parameter>
@@ -155,8 +159,7 @@ std::vector<Stage> stage_table(const CompileOptions& o) {
       stage({"quality", kQualityVersion, "scales, rungs -> losses of lit pictures, switch sizes"},
             inputs(kNestedScales, kPerceptualValues, kMaterials, kImages, kFragments, kFilledPlanes, kLadder,
                    kPreviews, kTables),
-            outputs(kQuality), read_of(o, o.quality), {"libjpeg-turbo", "libpng", "libwebp", "openimageio"},
-            measure_pictures),
+            outputs(kQuality), read_of(o, o.quality), kImageLibraries, measure_pictures),
       stage({"poster", kPosterVersion, "S_0 with the source's texels -> a picture of the object"},
             inputs(kNestedScales, kMaterials, kFragments, kFilledPlanes), outputs(kPoster),
             read_of(o, o.poster), {"libjpeg-turbo"}, make_poster),

@@ -180,8 +180,7 @@ double mean_mip(const GroupCells& group) {
 /// source's texels, comes as many levels earlier there as its planes are finer.
 PictureLosses finer_along(const PictureLosses& finer, const GroupCells& smaller, const GroupCells& larger) {
   const auto whole = [](double x) { return static_cast<std::size_t>(std::lround(std::max(0.0, x))); };
-  const std::size_t full_size = whole(mean_mip(larger)),
-                    fewer = whole(mean_mip(smaller) - mean_mip(larger));
+  const std::size_t full_size = whole(mean_mip(larger)), fewer = whole(mean_mip(smaller) - mean_mip(larger));
   PictureLosses out = finer;
   for (const auto list : {&PictureLosses::flip, &PictureLosses::flip_p95, &PictureLosses::dssim})
     for (std::size_t l = full_size; l < finer.size(); ++l)
@@ -198,12 +197,11 @@ struct RawLosses {
 GroupPictures group_pictures(const GroupCells& group, const GroupCells& smaller,
                              const GroupPictures& measured) {
   const auto follow = [](const Cells& cells, const SmallerSize& below) { return losses_of(cells, &below); };
-  return {follow(group.coded,
-                 {smaller.coded, measured.coded, along_curve(group, smaller, measured.coded), true}),
-          follow(group.preview, {smaller.preview, measured.preview, measured.preview}),
-          follow(group.finer,
-                 {smaller.finer, measured.finer, finer_along(measured.finer, smaller, group)}),
-          follow(group.coarser, {smaller.coarser, measured.coarser, coarser_along(group, smaller, measured)})};
+  return {
+      follow(group.coded, {smaller.coded, measured.coded, along_curve(group, smaller, measured.coded), true}),
+      follow(group.preview, {smaller.preview, measured.preview, measured.preview}),
+      follow(group.finer, {smaller.finer, measured.finer, finer_along(measured.finer, smaller, group)}),
+      follow(group.coarser, {smaller.coarser, measured.coarser, coarser_along(group, smaller, measured)})};
 }
 
 std::vector<RawLosses> raw_losses(const std::vector<SizeCells>& sizes) {

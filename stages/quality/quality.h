@@ -37,8 +37,8 @@ struct QualityOptions {
 };
 
 /// Renders kept scales and sampled rungs with the reference renderer (stages/render), in the studio's light,
-/// and compares each picture with that of S_0 and the source's images, over the pixels that either covers. The
-/// reference is what viewers of the source show: its mips mix what no chart covers into charts' borders.
+/// and compares each picture with that of S_0 and the source's images, over the pixels that either covers.
+/// The reference is what viewers of the source show: its mips mix what no chart covers into charts' borders.
 /// FLIP as published (stages/measure/flip.h) and SSIM of luma (stages/measure/image_compare.h). Means and
 /// percentiles are of the pixels of all views together.
 /// - Pictures: perspective, 4 x 4 samples a pixel. The camera frames the object's bounding sphere. The
@@ -58,8 +58,8 @@ struct QualityOptions {
 ///   0.8 where fewer than 6 do: the worst of 12 is up to 1.24 times the worse of two. Losses of fewer views
 ///   than at the size below are corrected by what these views were among all there.
 /// - Geometry: at the least size all scales are rendered; at the half those that still pass, every second
-///   other one and the coarsest; at the largest those that still pass, the finest and the coarsest. The others
-///   follow by the ratio to the size below, linear between the neighbours in the list of scales.
+///   other one and the coarsest; at the largest those that still pass, the finest and the coarsest. The
+///   others follow by the ratio to the size below, linear between the neighbours in the list of scales.
 /// - Groups: one group's planes are coded, the others have the source's texels. At the least size
 ///   `rung_samples` of the ladder are rendered, first and last among them, and planes without coding: those
 ///   that are shown, up to 4 levels finer and 2 coarser; of full size the source's rung, where there is one.
@@ -73,7 +73,8 @@ struct QualityOptions {
 ///   a client shows at the size (format/rules/mip_choice.h). Planes of one group have the rung whose
 ///   quality is nearest to that of the group's first plane. FLIP of knots is scaled so that the mean over
 ///   fragments of GroupCurve::coded() is what was measured for whole planes.
-/// - Exponent and error: of samples with all groups changed, on S_0 and on coarser scales, with the lowest rung,
+/// - Exponent and error: of samples with all groups changed, on S_0 and on coarser scales, with the lowest
+/// rung,
 ///   the coarsest mips or the previews, 7 at the least size and 1 at the half, the exponent that predicts
 ///   best.
 /// - Where S_0 covers next to nothing of the pictures (a scan and a stray triangle a thousand times its size

@@ -118,9 +118,9 @@ RenderTexture source_texture(const TextureData& data, const ShownTexture& shown,
   const TexturePlane& plane = data.fragments.planes[shown.plane];
   if (plane.image >= data.images.size())
     throw StageError("quality", "images", "image " + std::to_string(plane.image), "none");
-  return render_texture(decode_image(data.images[plane.image],
-                                     shown.srgb ? FloatEncoding::kSrgb : FloatEncoding::kAsIs),
-                        shown.srgb, whole_level(plane, first_level), context);
+  return render_texture(
+      decode_image(data.images[plane.image], shown.srgb ? FloatEncoding::kSrgb : FloatEncoding::kAsIs),
+      shown.srgb, whole_level(plane, first_level), context);
 }
 
 RenderTexture uncoded_texture(const TextureData& data, const ShownTexture& shown, std::uint32_t first_level,

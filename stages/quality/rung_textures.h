@@ -31,8 +31,8 @@ TextureData texture_data(const std::vector<Image>& images, const Fragments& frag
                          const std::vector<Pixels>& pixels, const Ladder& ladder, const Previews& previews,
                          const PackageTables& tables);
 
-/// The source's image, as viewers of the source show it. Mips finer than `first_level` are not kept. Throws as
-/// decode_image().
+/// The source's image, as viewers of the source show it. Mips finer than `first_level` are not kept. Throws
+/// as decode_image().
 RenderTexture source_texture(const TextureData& data, const ShownTexture& shown, std::uint32_t first_level,
                              const RunContext& context);
 

@@ -180,8 +180,8 @@ MipSamples mip_samples(const TextureSampler& sampler, std::size_t rank, const Di
   Display smaller = display;
   smaller.displayed_px /= 2;
   const bool again = rank == 1 || std::ranges::any_of(group.planes, [&](std::uint32_t p) {
-    return shown_plane(sampler.data, p, smaller) == shown_plane(sampler.data, p, display);
-  });
+                       return shown_plane(sampler.data, p, smaller) == shown_plane(sampler.data, p, display);
+                     });
   return {1, again ? std::size_t{1} : 0};
 }
 

@@ -66,7 +66,8 @@ struct SmallerSize {
   bool first_follows = false;     // the first cell is as at the smaller size, where it was not rendered
 };
 /// Losses of a list of cells. Those with fewer views than at the size below are corrected by what these views
-/// were there beside the cell's losses. Those that were not rendered follow by the ratio of rendered neighbours.
+/// were there beside the cell's losses. Those that were not rendered follow by the ratio of rendered
+/// neighbours.
 PictureLosses losses_of(const Cells& cells, const SmallerSize* smaller);
 
 }  // namespace texmesh::quality

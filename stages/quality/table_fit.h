@@ -12,8 +12,8 @@ struct GroupPictures {
 /// What `losses`, those per knot of `smaller`, would be for the knots of a larger size: along the curve that
 /// clients read, for texels as large on the screen as those of the larger size.
 PictureLosses along_curve(const GroupCells& larger, const GroupCells& smaller, const PictureLosses& losses);
-/// The same of coarser mips: where there are no finer planes for the larger size, its mips are as large on the
-/// screen as coarser ones of the smaller size, and lose less by what full size has become coarser.
+/// The same of coarser mips: where there are no finer planes for the larger size, its mips are as large on
+/// the screen as coarser ones of the smaller size, and lose less by what full size has become coarser.
 PictureLosses coarser_along(const GroupCells& larger, const GroupCells& smaller, const GroupPictures& losses);
 
 /// The table's part of a group and a size. Knots by rising 1 - SSIM, those that repeat one are left out. Of a
