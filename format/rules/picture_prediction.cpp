@@ -121,8 +121,9 @@ double GroupCurve::preview() const {
 double GroupCurve::halved(const TexelGrowth& growth, std::uint32_t mip) const {
   if (curves_.empty()) return 0;
   const auto at = [&](std::size_t i) {
-    const double lost = curves_[i].at_level(growth[i]) - curves_[i].at_level(growth[i] - mip);
-    return std::clamp(lost, 0.0, kMostFlip);
+    const Curve& c = curves_[i];
+    const double full_size = c.at_level(growth[i] - mip) - c.mips.front();
+    return std::clamp(c.at_level(growth[i]) - std::max(0.0, full_size), 0.0, kMostFlip);
   };
   return mixed(at(0), at(1), part_);
 }

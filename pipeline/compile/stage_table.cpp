@@ -63,11 +63,12 @@ Results<PackageTables, ThesisTables> measure_fragments(const Fragments& fragment
 }
 
 Results<MeasuredQuality> measure_pictures(const NestedScales& scales, const PerceptualValues& perceptual,
-                                          const Materials& materials, const Fragments& fragments,
-                                          const Planes& planes, const Ladder& ladder,
-                                          const Previews& previews, const PackageTables& tables,
-                                          const QualityOptions& options, const RunContext& context) {
-  MeasuredQuality measured = measure_quality(scales, perceptual, materials, fragments, planes, ladder,
+                                          const Materials& materials, const Images& images,
+                                          const Fragments& fragments, const Planes& planes,
+                                          const Ladder& ladder, const Previews& previews,
+                                          const PackageTables& tables, const QualityOptions& options,
+                                          const RunContext& context) {
+  MeasuredQuality measured = measure_quality(scales, perceptual, materials, images, fragments, planes, ladder,
                                              previews, tables, options, context);
   Notes notes = measured.notes;
   return {std::move(measured), std::move(notes)};
@@ -96,6 +97,10 @@ std::vector<StageLibrary> libraries(std::initializer_list<const char*> names) {
   for (const char* name : names) all.push_back({name, library_versions().at(name)});
   return all;
 }
+
+/// Those that decode images and fragments of every kind.
+constexpr std::initializer_list<const char*> kImageLibraries{"libjpeg-turbo", "libpng", "libwebp",
+                                                             "openimageio"};
 
 /// make_stage() for a plain function, which has no state of its own: options that are not declared cannot
 /// reach it.
@@ -152,9 +157,9 @@ std::vector<Stage> stage_table(const CompileOptions& o) {
             outputs(kScaleFiles), read_of(o, o.scales), {"draco", "libjpeg-turbo", "meshoptimizer", "zlib"},
             write_scales),
       stage({"quality", kQualityVersion, "scales, rungs -> losses of lit pictures, switch sizes"},
-            inputs(kNestedScales, kPerceptualValues, kMaterials, kFragments, kFilledPlanes, kLadder,
+            inputs(kNestedScales, kPerceptualValues, kMaterials, kImages, kFragments, kFilledPlanes, kLadder,
                    kPreviews, kTables),
-            outputs(kQuality), read_of(o, o.quality), {"libjpeg-turbo", "libwebp"}, measure_pictures),
+            outputs(kQuality), read_of(o, o.quality), kImageLibraries, measure_pictures),
       stage({"poster", kPosterVersion, "S_0 with the source's texels -> a picture of the object"},
             inputs(kNestedScales, kMaterials, kFragments, kFilledPlanes), outputs(kPoster),
             read_of(o, o.poster), {"libjpeg-turbo"}, make_poster),

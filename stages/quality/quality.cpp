@@ -14,6 +14,7 @@ namespace {
 using quality::along_curve;
 using quality::Cells;
 using quality::choose_views;
+using quality::coarser_along;
 using quality::Coverage;
 using quality::find_groups;
 using quality::find_shown;
@@ -21,12 +22,14 @@ using quality::fit_exponent;
 using quality::frame_object;
 using quality::GroupCells;
 using quality::GroupPictures;
+using quality::lend_knots;
 using quality::Loss;
 using quality::Losses;
 using quality::losses_of;
 using quality::PlanesOfGroup;
 using quality::pooled;
 using quality::render_size;
+using quality::ShownMip;
 using quality::ShownTexture;
 using quality::ShownTextures;
 using quality::SizeCells;
@@ -38,6 +41,7 @@ using quality::texture_losses;
 using quality::TextureData;
 using quality::TextureSampler;
 using quality::TextureSizes;
+using quality::Together;
 using quality::TogetherCell;
 using quality::TogetherLoss;
 using quality::ViewPart;
@@ -144,7 +148,7 @@ std::vector<std::optional<ViewPart>> rendered_scales(const std::vector<std::uint
     if (alive[k] || !height.rank) continue;
     if (*height.rank == 0) out[k] = ViewPart::kAll;
     if (*height.rank == 1 && (n - 1 - k) % 2 == 0) out[k] = ViewPart::kLarge;
-    if (*height.rank == 2 && k + 1 == n) out[k] = ViewPart::kLargest;
+    if (*height.rank == 2 && (k == 1 || k + 1 == n)) out[k] = ViewPart::kLargest;
   }
   return out;
 }
@@ -166,33 +170,55 @@ std::vector<SizeCells> render_heights(const TextureSampler& sampler, const Quali
   return table_cells;
 }
 
+double mean_mip(const GroupCells& group) {
+  double sum = 0;
+  for (const ShownMip& m : group.mips) sum += m.part * m.mip;
+  return sum;
+}
+
+/// What finer mips of the smaller size lose, in the order of the larger one: full size, which may have the
+/// source's texels, comes as many levels earlier there as its planes are finer.
+PictureLosses finer_along(const PictureLosses& finer, const GroupCells& smaller, const GroupCells& larger) {
+  const auto whole = [](double x) { return static_cast<std::size_t>(std::lround(std::max(0.0, x))); };
+  const std::size_t full_size = whole(mean_mip(larger)), fewer = whole(mean_mip(smaller) - mean_mip(larger));
+  PictureLosses out = finer;
+  for (const auto list : {&PictureLosses::flip, &PictureLosses::flip_p95, &PictureLosses::dssim})
+    for (std::size_t l = full_size; l < finer.size(); ++l)
+      (out.*list)[l] = (finer.*list)[std::min(l + fewer, finer.size() - 1)];
+  return out;
+}
+
 /// What the knots of all groups and the scales lose at one size, rendered or not.
 struct RawLosses {
   PictureLosses geometry;
   std::vector<GroupPictures> groups;
 };
+
+GroupPictures group_pictures(const GroupCells& group, const GroupCells& smaller,
+                             const GroupPictures& measured) {
+  const auto follow = [](const Cells& cells, const SmallerSize& below) { return losses_of(cells, &below); };
+  return {
+      follow(group.coded, {smaller.coded, measured.coded, along_curve(group, smaller, measured.coded), true}),
+      follow(group.preview, {smaller.preview, measured.preview, measured.preview}),
+      follow(group.finer, {smaller.finer, measured.finer, finer_along(measured.finer, smaller, group)}),
+      follow(group.coarser, {smaller.coarser, measured.coarser, coarser_along(group, smaller, measured)})};
+}
+
 std::vector<RawLosses> raw_losses(const std::vector<SizeCells>& sizes) {
   std::vector<RawLosses> out;
   for (std::size_t i = 0; i < sizes.size(); ++i) {
-    const auto losses = [&](const Cells& cells, const Cells* smaller_cells, PictureLosses smaller,
-                            bool first_follows = false) {
-      if (!smaller_cells) return losses_of(cells, nullptr);
-      const SmallerSize below{*smaller_cells, std::move(smaller), first_follows};
-      return losses_of(cells, &below);
-    };
-    const SizeCells* below = i > 0 ? &sizes[i - 1] : nullptr;
     RawLosses raw;
-    raw.geometry = losses(sizes[i].geometry, below ? &below->geometry : nullptr,
-                          below ? out[i - 1].geometry : PictureLosses{});
-    for (std::size_t g = 0; g < sizes[i].groups.size(); ++g) {
-      const GroupCells& group = sizes[i].groups[g];
-      const GroupCells* cells = below ? &below->groups[g] : nullptr;
-      const GroupPictures smaller = below ? out[i - 1].groups[g] : GroupPictures{};
-      raw.groups.push_back({losses(group.coded, cells ? &cells->coded : nullptr,
-                                   cells ? along_curve(group, *cells, smaller.coded) : PictureLosses{}, true),
-                            losses(group.preview, cells ? &cells->preview : nullptr, smaller.preview),
-                            losses(group.finer, cells ? &cells->finer : nullptr, smaller.finer),
-                            losses(group.coarser, cells ? &cells->coarser : nullptr, smaller.coarser)});
+    if (i == 0) {
+      raw.geometry = losses_of(sizes[i].geometry, nullptr);
+      for (const GroupCells& g : sizes[i].groups)
+        raw.groups.push_back({losses_of(g.coded, nullptr), losses_of(g.preview, nullptr),
+                              losses_of(g.finer, nullptr), losses_of(g.coarser, nullptr)});
+    } else {
+      const SmallerSize below{sizes[i - 1].geometry, out[i - 1].geometry, out[i - 1].geometry};
+      raw.geometry = losses_of(sizes[i].geometry, &below);
+      for (std::size_t g = 0; g < sizes[i].groups.size(); ++g)
+        raw.groups.push_back(
+            group_pictures(sizes[i].groups[g], sizes[i - 1].groups[g], out[i - 1].groups[g]));
     }
     out.push_back(std::move(raw));
   }
@@ -216,27 +242,39 @@ void fill_table(const std::vector<SizeCells>& sizes, const std::vector<PlanesOfG
                                              : pooled(alone, cell.losses).flip.mean());
       };
       add(sizes[i].geometry[cell.scale], raw[i].geometry.flip[cell.scale]);
-      for (std::size_t g = 0; g < groups.size(); ++g)
-        add(sizes[i].groups[g].coded[cell.knots[g]], raw[i].groups[g].coded.flip[cell.knots[g]]);
+      for (std::size_t g = 0; g < groups.size(); ++g) {
+        const auto cells = cell.shown == Together::kCoded     ? &GroupCells::coded
+                           : cell.shown == Together::kCoarser ? &GroupCells::coarser
+                                                              : &GroupCells::preview;
+        const auto pictures = cell.shown == Together::kCoded     ? &GroupPictures::coded
+                              : cell.shown == Together::kCoarser ? &GroupPictures::coarser
+                                                                 : &GroupPictures::preview;
+        add((sizes[i].groups[g].*cells).back(), (raw[i].groups[g].*pictures).flip.back());
+      }
     }
   }
   fit_exponent(together, table);
-  for (std::size_t i = 0; i < sizes.size(); ++i)
-    for (std::size_t g = 0; g < groups.size(); ++g)
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    std::vector<double> texel_level;
+    for (std::size_t i = 0; i < sizes.size(); ++i) {
       table.groups[g].sizes.push_back(texture_losses(sizes[i].groups[g], raw[i].groups[g], table.exponent));
+      texel_level.push_back(sizes[i].groups[g].texel_level);
+    }
+    lend_knots(texel_level, table.groups[g].sizes);
+  }
 }
 
 }  // namespace
 
 MeasuredQuality measure_quality(const NestedScales& scales, const PerceptualValues& perceptual,
-                                const std::vector<Material>& materials, const Fragments& fragments,
-                                const std::vector<Pixels>& pixels, const Ladder& ladder,
-                                const Previews& previews, const PackageTables& tables,
+                                const std::vector<Material>& materials, const std::vector<Image>& images,
+                                const Fragments& fragments, const std::vector<Pixels>& pixels,
+                                const Ladder& ladder, const Previews& previews, const PackageTables& tables,
                                 const QualityOptions& options, const RunContext& context) {
   if (scales.mesh.positions.empty()) throw StageError("quality", "S_0", "positions", "none");
   const KeptScales kept = kept_scales(scales, perceptual, context);
   const ShownTextures shown = find_shown(materials, fragments, scales.mesh);
-  const TextureData data = texture_data(fragments, pixels, ladder, previews, tables);
+  const TextureData data = texture_data(images, fragments, pixels, ladder, previews, tables);
   const std::vector<PlanesOfGroup> groups = find_groups(shown, fragments);
   MeasuredQuality result;
   Studio studio;

@@ -11,7 +11,7 @@
 
 namespace texmesh {
 
-inline constexpr int kQualityVersion = 10;
+inline constexpr int kQualityVersion = 11;
 
 struct QualityOptions {
   int views = 4;
@@ -37,7 +37,8 @@ struct QualityOptions {
 };
 
 /// Renders kept scales and sampled rungs with the reference renderer (stages/render), in the studio's light,
-/// and compares each picture with that of S_0 and the source's texels, over the pixels that either covers:
+/// and compares each picture with that of S_0 and the source's images, over the pixels that either covers.
+/// The reference is what viewers of the source show: its mips mix what no chart covers into charts' borders.
 /// FLIP as published (stages/measure/flip.h) and SSIM of luma (stages/measure/image_compare.h). Means and
 /// percentiles are of the pixels of all views together.
 /// - Pictures: perspective, 4 x 4 samples a pixel. The camera frames the object's bounding sphere. The
@@ -57,30 +58,36 @@ struct QualityOptions {
 ///   0.8 where fewer than 6 do: the worst of 12 is up to 1.24 times the worse of two. Losses of fewer views
 ///   than at the size below are corrected by what these views were among all there.
 /// - Geometry: at the least size all scales are rendered; at the half those that still pass, every second
-///   other one and the coarsest; at the largest those that still pass and the coarsest. The others follow by
-///   the ratio to the size below, linear between the neighbours in the list of scales.
+///   other one and the coarsest; at the largest those that still pass, the finest and the coarsest. The
+///   others follow by the ratio to the size below, linear between the neighbours in the list of scales.
 /// - Groups: one group's planes are coded, the others have the source's texels. At the least size
-///   `rung_samples` of the ladder are rendered, first and last among them, and the source's mips: those
-///   that are shown, up to 4 levels finer and 2 coarser; at the half the lowest rung, and one coarser level
-///   of textures that have no finer plane for it. Previews are rendered at all sizes. Other rungs follow
+///   `rung_samples` of the ladder are rendered, first and last among them, and planes without coding: those
+///   that are shown, up to 4 levels finer and 2 coarser; of full size the source's rung, where there is one.
+///   At larger sizes the lowest rung and the planes that are shown are rendered, and one coarser level of
+///   these: at the half always, at the largest of textures that have no finer plane for it. Previews are
+///   rendered at all sizes. Other rungs follow
 ///   along the curve of the size below, by GroupCurve::kLossPerDoubling where texels are larger on the
-///   screen, and by the ratio to it where both were rendered; the highest rung's ratio is 1. Of a model
+///   screen, and by the ratio to it where both were rendered; the highest rung's ratio is 1. Each size has
+///   the knots of the others that lie far from its own: mips have few rungs. Of a model
 ///   with a sampler that reads level 0 alone, all of this is rendered at every size. Planes are those that
 ///   a client shows at the size (format/rules/mip_choice.h). Planes of one group have the rung whose
 ///   quality is nearest to that of the group's first plane. FLIP of knots is scaled so that the mean over
 ///   fragments of GroupCurve::coded() is what was measured for whole planes.
-/// - Exponent and error: of the samples with a coarser scale and all groups coded, 4 at the least size and 1
-///   at the half, the exponent that predicts best.
+/// - Exponent and error: of samples with all groups changed, on S_0 and on coarser scales, with the lowest
+/// rung,
+///   the coarsest mips or the previews, 7 at the least size and 1 at the half, the exponent that predicts
+///   best.
 /// - Where S_0 covers next to nothing of the pictures (a scan and a stray triangle a thousand times its size
 ///   away), they show the place in which nearly all positions lie, and a warning says what they leave out.
 ///   Heights are then that place's.
 /// - What shows in no picture at all (a thread thinner than a sample, specks, an alpha of 0 everywhere) has
 ///   no measured difference: all losses are 0, all scales pass everywhere, and a warning says so.
-/// StageError when S_0 has no extent. Same bytes for any thread count and machine.
+/// `images` are the model's. InputError for an image that does not decode, StageError for one that is missing
+/// and when S_0 has no extent. Same bytes for any thread count and machine.
 MeasuredQuality measure_quality(const NestedScales& scales, const PerceptualValues& perceptual,
-                                const std::vector<Material>& materials, const Fragments& fragments,
-                                const std::vector<Pixels>& pixels, const Ladder& ladder,
-                                const Previews& previews, const PackageTables& tables,
+                                const std::vector<Material>& materials, const std::vector<Image>& images,
+                                const Fragments& fragments, const std::vector<Pixels>& pixels,
+                                const Ladder& ladder, const Previews& previews, const PackageTables& tables,
                                 const QualityOptions& options, const RunContext& context);
 
 }  // namespace texmesh

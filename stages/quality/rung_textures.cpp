@@ -1,10 +1,13 @@
 #include "stages/quality/rung_textures.h"
 
 #include <algorithm>
+#include <string>
 
 #include "format/rules/mip_choice.h"
 #include "stages/base/parallel.h"
+#include "stages/data/stage.h"
 #include "stages/fragment_codec/decode_rung.h"
+#include "stages/image/decode_image.h"
 #include "stages/jpeg/jpeg.h"
 
 namespace texmesh::quality {
@@ -69,15 +72,20 @@ std::uint32_t plane_towards(const TextureData& data, std::uint32_t plane, std::u
   return plane_at_level(data.infos, plane, static_cast<double>(level));
 }
 
-/// An empty texture with room for its first level, at most one that has whole texels along both axes.
+/// That level, at most the last one with whole texels along both axes.
+std::uint32_t whole_level(const TexturePlane& full_size, std::uint32_t level) {
+  while (std::min(full_size.width_px, full_size.height_px) >> level == 0) --level;
+  return level;
+}
+
+/// An empty texture with room for its first level.
 RenderTexture empty_texture(const TexturePlane& full_size, const ShownTexture& shown,
                             std::uint32_t first_level) {
   RenderTexture texture;
   texture.width_px = full_size.width_px;
   texture.height_px = full_size.height_px;
   texture.srgb = shown.srgb;
-  texture.first_level = first_level;
-  while (std::min(full_size.width_px, full_size.height_px) >> texture.first_level == 0) --texture.first_level;
+  texture.first_level = whole_level(full_size, first_level);
   Pixels& level = texture.levels.emplace_back();
   level.width_px = full_size.width_px >> texture.first_level;
   level.height_px = full_size.height_px >> texture.first_level;
@@ -93,9 +101,10 @@ Pixels decoded_preview(const TextureData& data, std::uint32_t plane) {
 
 }  // namespace
 
-TextureData texture_data(const Fragments& fragments, const std::vector<Pixels>& pixels, const Ladder& ladder,
-                         const Previews& previews, const PackageTables& tables) {
-  TextureData data{fragments, pixels, ladder, previews, tables, {}};
+TextureData texture_data(const std::vector<Image>& images, const Fragments& fragments,
+                         const std::vector<Pixels>& pixels, const Ladder& ladder, const Previews& previews,
+                         const PackageTables& tables) {
+  TextureData data{images, fragments, pixels, ladder, previews, tables, {}};
   for (const TexturePlane& plane : fragments.planes) {
     TextureInfo& info = data.infos.emplace_back();
     info.mip = plane.mip;
@@ -106,6 +115,16 @@ TextureData texture_data(const Fragments& fragments, const std::vector<Pixels>& 
 
 RenderTexture source_texture(const TextureData& data, const ShownTexture& shown, std::uint32_t first_level,
                              const RunContext& context) {
+  const TexturePlane& plane = data.fragments.planes[shown.plane];
+  if (plane.image >= data.images.size())
+    throw StageError("quality", "images", "image " + std::to_string(plane.image), "none");
+  return render_texture(
+      decode_image(data.images[plane.image], shown.srgb ? FloatEncoding::kSrgb : FloatEncoding::kAsIs),
+      shown.srgb, whole_level(plane, first_level), context);
+}
+
+RenderTexture uncoded_texture(const TextureData& data, const ShownTexture& shown, std::uint32_t first_level,
+                              const RunContext& context) {
   RenderTexture texture = empty_texture(data.fragments.planes[shown.plane], shown, first_level);
   Pixels& level = texture.levels[0];
   const std::uint32_t colours = level.channels - (shown.alpha ? 1 : 0), first = texture.first_level;
@@ -146,12 +165,22 @@ RenderTexture preview_texture(const TextureData& data, const ShownTexture& shown
   return render_texture(std::move(image), shown.srgb, 0, context);
 }
 
-RenderTexture coarser_texture(const RenderTexture& source, std::uint32_t first_level) {
-  RenderTexture out{source.width_px, source.height_px, source.srgb, first_level, {}};
-  const auto last = source.first_level + static_cast<std::uint32_t>(source.levels.size()) - 1;
-  out.first_level = std::clamp(first_level, source.first_level, last);
-  out.levels.assign(source.levels.begin() + (out.first_level - source.first_level), source.levels.end());
-  return out;
+RenderTexture best_texture(const TextureData& data, const ShownTexture& shown, std::uint32_t first_level,
+                           const RunContext& context) {
+  const auto best = [&](std::uint32_t p) {
+    const std::uint32_t plane = plane_towards(data, p, first_level);
+    return PlaneRung{plane, data.ladder.planes[plane].rungs.size() - 1};
+  };
+  std::optional<PlaneRung> alpha;
+  if (shown.alpha) alpha = best(*shown.alpha);
+  return coded_texture(data, shown, best(shown.plane), alpha, first_level, context);
+}
+
+bool shows_source(const TextureData& data, const ShownTexture& shown, std::uint32_t first_level) {
+  const auto is_source = [&](std::uint32_t plane) {
+    return plane_towards(data, plane, first_level) == plane && data.ladder.planes[plane].source_rung;
+  };
+  return is_source(shown.plane);
 }
 
 }  // namespace texmesh::quality

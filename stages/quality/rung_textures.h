@@ -7,6 +7,7 @@
 #include "format/documents/quality_table.h"
 #include "format/documents/tables.h"
 #include "format/documents/textures.h"
+#include "format/model/model.h"
 #include "stages/base/run_context.h"
 #include "stages/data/ladder.h"
 #include "stages/data/pixels.h"
@@ -18,6 +19,7 @@ namespace texmesh::quality {
 
 /// What textures are made of. All of one model.
 struct TextureData {
+  const std::vector<Image>& images;
   const Fragments& fragments;
   const std::vector<Pixels>& pixels;
   const Ladder& ladder;
@@ -25,10 +27,12 @@ struct TextureData {
   const PackageTables& tables;
   std::vector<TextureInfo> infos;  // of the planes: mip and base alone
 };
-TextureData texture_data(const Fragments& fragments, const std::vector<Pixels>& pixels, const Ladder& ladder,
-                         const Previews& previews, const PackageTables& tables);
+TextureData texture_data(const std::vector<Image>& images, const Fragments& fragments,
+                         const std::vector<Pixels>& pixels, const Ladder& ladder, const Previews& previews,
+                         const PackageTables& tables);
 
-/// The source's texels. Mips finer than `first_level` are not kept.
+/// The source's image, as viewers of the source show it. Mips finer than `first_level` are not kept. Throws
+/// as decode_image().
 RenderTexture source_texture(const TextureData& data, const ShownTexture& shown, std::uint32_t first_level,
                              const RunContext& context);
 
@@ -46,7 +50,14 @@ RenderTexture coded_texture(const TextureData& data, const ShownTexture& shown, 
 /// The preview alone, as it is shown before anything else is there.
 RenderTexture preview_texture(const TextureData& data, const ShownTexture& shown, const RunContext& context);
 
-/// The source's mips from that one on.
-RenderTexture coarser_texture(const RenderTexture& source, std::uint32_t first_level);
+/// What the ladder codes, without coding: the pixels of the plane that clients show from that level on. What
+/// no chart covers is filled there, so that charts' borders look other than in the source's mips.
+RenderTexture uncoded_texture(const TextureData& data, const ShownTexture& shown, std::uint32_t first_level,
+                              const RunContext& context);
+/// The last rung of the plane that clients show from that level on.
+RenderTexture best_texture(const TextureData& data, const ShownTexture& shown, std::uint32_t first_level,
+                           const RunContext& context);
+/// Whether that rung has the source's own texels.
+bool shows_source(const TextureData& data, const ShownTexture& shown, std::uint32_t first_level);
 
 }  // namespace texmesh::quality

@@ -1,8 +1,10 @@
 #include "stages/quality/size_cells.h"
 
 #include <algorithm>
+#include <array>
 #include <deque>
 #include <functional>
+#include <map>
 
 namespace texmesh::quality {
 namespace {
@@ -45,22 +47,18 @@ class SizeShots {
     return out;
   }
 
-  /// The source's mips, `levels` coarser than those of the group's planes at this size, or finer where below
-  /// 0. Textures of which pictures show nothing finer stay the source's.
+  /// Mips that are not coded, `levels` coarser than those of the group's planes at this size, or finer where
+  /// below 0; of full size the source's texels, where a rung has them.
   Replaced mips(const GroupCells& group, int levels) {
     Replaced out(source_, -1);
-    for (std::size_t t = 0; t < source_; ++t)
-      for (const PlaneRung& r : group.knots[0].rungs) {
-        const TexturePlane& plane = sampler_.data.fragments.planes[r.plane];
-        if ((plane.mip > 0 ? plane.base : r.plane) != sampler_.shown.textures[t].plane) continue;
-        const int level = static_cast<int>(plane.mip) + levels;
-        if (level > static_cast<int>(studio_.textures[t].first_level))
-          out[t] = add(coarser_texture(studio_.textures[t], static_cast<std::uint32_t>(level)));
-      }
+    for (const MipShown& mip : mips_shown(group, levels)) out[mip.texture] = uncoded(mip);
     return out;
   }
 
   Replaced none() const { return Replaced(source_, -1); }
+  static bool is_source(const Replaced& replaced) {
+    return std::ranges::all_of(replaced, [](std::int32_t t) { return t < 0; });
+  }
 
   /// A scale with the source's texels, all read with mips.
   void take_scale(std::size_t scale, Losses& to, ViewPart views) {
@@ -70,12 +68,16 @@ class SizeShots {
 
   /// Textures, as samplers read them.
   void take(std::size_t scale, const Replaced& replaced, Losses& to, ViewPart views) {
-    const bool changes =
-        scale > 0 || std::any_of(replaced.begin(), replaced.end(), [](auto t) { return t >= 0; });
-    if (!changes) {
+    if (scale == 0 && is_source(replaced)) {
       to.assign(static_cast<std::size_t>(studio_.views.views), {});  // as the reference
       return;
     }
+    for (const Taken& taken : taken_)
+      if (taken.scale == scale && taken.views == views && taken.replaced == replaced) {
+        repeated_.push_back({taken.to, &to});
+        return;
+      }
+    taken_.push_back({scale, replaced, views, &to});
     materials_.push_back(materials_with(sampler_.shown.sampled, replaced));
     shots_.push_back({scale, &materials_.back(), views});
     to_.push_back(&to);
@@ -89,10 +91,47 @@ class SizeShots {
       take(sampler_.shown.materials, displayed_px, with_ssim, scale_shots_, scales_);
     }
     take(sampler_.shown.sampled, displayed_px, with_ssim, shots_, to_);
+    for (const auto& [from, to] : repeated_) *to = *from;
     studio_.textures.resize(source_);
   }
 
  private:
+  struct Taken {
+    std::size_t scale;
+    Replaced replaced;
+    ViewPart views;
+    const Losses* to;
+  };
+  struct MipShown {
+    std::size_t texture;
+    std::uint32_t level;
+    bool is_source;  // the full size has a rung with the source's texels
+    auto operator<=>(const MipShown&) const = default;
+  };
+  std::vector<MipShown> mips_shown(const GroupCells& group, int levels) const {
+    std::vector<MipShown> out;
+    for (std::size_t t = 0; t < source_; ++t) {
+      const ShownTexture& shown = sampler_.shown.textures[t];
+      const std::uint32_t asked_for = studio_.textures[t].first_level;
+      for (const PlaneRung& r : group.knots[0].rungs) {
+        const TexturePlane& plane = sampler_.data.fragments.planes[r.plane];
+        if ((plane.mip > 0 ? plane.base : r.plane) != shown.plane) continue;
+        const auto level = static_cast<std::uint32_t>(std::max(0, static_cast<int>(plane.mip) + levels));
+        const bool is_source = shows_source(sampler_.data, shown, level);
+        out.push_back({t, std::max(level, asked_for), is_source});
+      }
+    }
+    return out;
+  }
+  /// A texture's plane from that level on, made when it is first asked for.
+  std::int32_t uncoded(const MipShown& mip) {
+    const auto [found, is_new] = uncoded_.try_emplace(mip, -1);
+    const ShownTexture& shown = sampler_.shown.textures[mip.texture];
+    if (is_new)
+      found->second = add(mip.is_source ? best_texture(sampler_.data, shown, mip.level, context_)
+                                        : uncoded_texture(sampler_.data, shown, mip.level, context_));
+    return found->second;
+  }
   void take(const Materials& source, double displayed_px, bool with_ssim, const std::vector<Shot>& shots,
             const std::vector<Losses*>& to) {
     std::vector<Losses> losses = take_shots(studio_, source, displayed_px, shots, with_ssim, context_);
@@ -107,7 +146,10 @@ class SizeShots {
   Studio& studio_;
   const RunContext& context_;
   std::size_t source_;
+  std::map<MipShown, std::int32_t> uncoded_;
   std::deque<Materials> materials_;
+  std::vector<Taken> taken_;
+  std::vector<std::pair<const Losses*, Losses*>> repeated_;
   std::vector<Shot> shots_, scale_shots_;
   std::vector<Losses*> to_, scales_;
 };
@@ -118,41 +160,44 @@ bool repeats(const Knot& knot, const Knot& before) {
                             [](const PlaneRung& a, const PlaneRung& b) { return a.rung == b.rung; });
 }
 
-/// The knots that are rendered: all, at the half the lowest rung, at the largest none. Without mips losses do
-/// not follow from smaller sizes.
-bool is_sampled(const TextureSampler& sampler, std::size_t knot, std::size_t knots, std::size_t rank) {
-  return rank == 0 || !sampler.shown.with_mips() || (rank == 1 && knot + 1 == knots);
+/// The knots that are rendered: all, at larger sizes that of the lowest rung. Without mips losses do not
+/// follow from smaller sizes.
+bool is_sampled(const TextureSampler& sampler, const std::vector<Knot>& knots, std::size_t knot,
+                std::size_t rank) {
+  if (knot > 0 && repeats(knots[knot], knots[knot - 1])) return false;
+  return rank == 0 || !sampler.shown.with_mips() || repeats(knots[knot], knots.back());
 }
 
 /// Levels of source's texels that are rendered.
 struct MipSamples {
   std::size_t finer = 0, coarser = 0;
 };
-/// Mips change as much by height as from plane to plane, so they are rendered once, and again where a texture
-/// has no finer plane for the larger height.
+/// At larger heights the planes that are shown, and the next coarser ones where textures have no finer planes
+/// for them, and once for all.
 MipSamples mip_samples(const TextureSampler& sampler, std::size_t rank, const Display& display,
                        const PlanesOfGroup& group) {
   if (rank == 0 || !sampler.shown.with_mips()) return {kFinerLevels + 1, kCoarserLevels};
-  if (rank != 1) return {};
   Display smaller = display;
   smaller.displayed_px /= 2;
-  const bool again = std::ranges::any_of(group.planes, [&](std::uint32_t p) {
-    return shown_plane(sampler.data, p, smaller) == shown_plane(sampler.data, p, display);
-  });
-  return again ? MipSamples{1, 1} : MipSamples{};
+  const bool again = rank == 1 || std::ranges::any_of(group.planes, [&](std::uint32_t p) {
+                       return shown_plane(sampler.data, p, smaller) == shown_plane(sampler.data, p, display);
+                     });
+  return {1, again ? std::size_t{1} : 0};
 }
 
-/// Scales of the samples that tell how losses add up, and whether their textures have the lowest rung or one
-/// in the middle.
+/// The samples that tell how losses add up: parts that lose little and much.
 struct TogetherSample {
   std::size_t scale;
-  bool lowest;
+  Together shown;
 };
 std::vector<TogetherSample> together_samples(std::size_t scales, std::size_t rank) {
-  if (scales < 2) return {};
-  const std::size_t near = 1 + (scales - 1) / 3, far = std::min(scales - 1, 1 + 2 * (scales - 1) / 3);
-  if (rank == 0) return {{near, true}, {near, false}, {far, true}, {far, false}};
-  if (rank == 1) return {{near, true}};
+  using enum Together;
+  const std::size_t near = std::min(scales - 1, 1 + (scales - 1) / 3),
+                    far = std::min(scales - 1, 1 + 2 * (scales - 1) / 3);
+  if (rank == 0)
+    return {{0, kCoarser},    {0, kPreview},   {near, kCoded}, {near, kCoarser},
+            {near, kPreview}, {far, kCoarser}, {far, kPreview}};
+  if (rank == 1) return {{near, kCoded}};
   return {};
 }
 
@@ -185,53 +230,52 @@ ViewPart coded_views(std::size_t rank) { return rank == 0 ? ViewPart::kAll : Vie
 /// Of what is compared with coded planes.
 ViewPart other_views(std::size_t rank) { return rank == 0 ? ViewPart::kLarge : ViewPart::kLargest; }
 
-void add_group(const TextureSampler& sampler, std::size_t rank, const Display& display,
-               const PlanesOfGroup& planes, GroupCells& group, std::vector<Replaced>& coded,
-               SizeShots& shots) {
+/// A group's textures in each way of Together.
+using TogetherTextures = std::array<Replaced, 3>;
+
+TogetherTextures add_group(const TextureSampler& sampler, std::size_t rank, const Display& display,
+                           const PlanesOfGroup& planes, GroupCells& group, SizeShots& shots) {
   group.knots = sample_knots(sampler.data, planes, sampler.rung_samples, display);
   group.texel_level = texel_level(sampler.data, planes, display);
   const std::size_t knots = group.knots.size();
   group.mips = shown_mips(sampler.data, planes, display);
   group.coded.resize(knots);
-  coded.assign(knots, shots.none());
+  Replaced coded = shots.none();
   group.finer.resize(kFinerLevels + 1);
   group.coarser.resize(kCoarserLevels);
   for (std::size_t k = 0; k < knots; ++k) {
-    if (k > 0 && repeats(group.knots[k], group.knots[k - 1])) {
-      coded[k] = coded[k - 1];
-      continue;
-    }
-    if (!is_sampled(sampler, k, knots, rank)) continue;
-    coded[k] = shots.coded(group, k);
-    shots.take(0, coded[k], group.coded[k], coded_views(rank));
+    if (!is_sampled(sampler, group.knots, k, rank)) continue;
+    coded = shots.coded(group, k);
+    shots.take(0, coded, group.coded[k], coded_views(rank));
   }
   group.preview.resize(1);
-  shots.take(0, shots.previews(planes), group.preview[0], coded_views(rank));
+  const Replaced preview = shots.previews(planes);
+  shots.take(0, preview, group.preview[0], coded_views(rank));
   const MipSamples mips = mip_samples(sampler, rank, display, planes);
   for (std::size_t l = 0; l < mips.finer; ++l)
     shots.take(0, shots.mips(group, -static_cast<int>(l)), group.finer[l], coded_views(rank));
   for (std::size_t l = 0; l < mips.coarser; ++l)
     shots.take(0, shots.mips(group, static_cast<int>(l) + 1), group.coarser[l], other_views(rank));
+  const bool coarsest = mips.coarser == kCoarserLevels;
+  return {coded, coarsest ? shots.mips(group, static_cast<int>(kCoarserLevels)) : shots.none(), preview};
 }
 
 void add_textures(const TextureSampler& sampler, std::size_t rank, const Studio& studio, SizeCells& cells,
                   SizeShots& shots) {
   const Display display{sampler.surface_area, studio.frame.extent, cells.displayed_px};
   cells.groups.resize(sampler.groups.size());
-  std::vector<std::vector<Replaced>> coded(cells.groups.size());
+  std::vector<TogetherTextures> textures;
   for (std::size_t g = 0; g < cells.groups.size(); ++g)
-    add_group(sampler, rank, display, sampler.groups[g], cells.groups[g], coded[g], shots);
+    textures.push_back(add_group(sampler, rank, display, sampler.groups[g], cells.groups[g], shots));
   const std::vector<TogetherSample> samples = together_samples(studio.scenes.size(), rank);
   cells.together.resize(samples.size());  // shots hold places in it
   for (std::size_t i = 0; i < samples.size(); ++i) {
     TogetherCell& cell = cells.together[i];
     cell.scale = samples[i].scale;
+    cell.shown = samples[i].shown;
     Replaced all = shots.none();
-    for (std::size_t g = 0; g < cells.groups.size(); ++g) {
-      const std::size_t lowest = cells.groups[g].knots.size() - 1;
-      cell.knots.push_back(samples[i].lowest ? lowest : lowest / 2);
-      all = both(std::move(all), coded[g][cell.knots[g]]);
-    }
+    for (const TogetherTextures& of : textures)
+      all = both(std::move(all), of[static_cast<std::size_t>(cell.shown)]);
     shots.take(cell.scale, all, cell.losses, other_views(rank));
   }
 }
@@ -264,7 +308,7 @@ PictureLosses losses_of(const Cells& cells, const SmallerSize* smaller) {
       // Fewer views than at the size below: as far as these were like all of them there.
       if (const Losses& there = smaller->cells[i]; !there.empty()) {
         const double same = value_of(pooled(there, cells[i]), kind);
-        if (same > kNothing) *found[i] *= value_of(pooled(there), kind) / same;
+        if (same > kNothing) *found[i] *= static_cast<double>((smaller->measured.*kLists[kind])[i]) / same;
       }
       if (below(i) > kNothing) ratio[i] = *found[i] / below(i);
     }

@@ -11,10 +11,11 @@ namespace texmesh::quality {
 /// What pictures of one list lose; an element without losses was not rendered.
 using Cells = std::vector<Losses>;
 
-/// A coarser scale with all groups coded.
+/// How all groups are shown together: at their last knot, in the coarsest mips, by previews.
+enum class Together : std::uint8_t { kCoded, kCoarser, kPreview };
 struct TogetherCell {
   std::size_t scale = 0;
-  std::vector<std::size_t> knots;  // per group
+  Together shown = Together::kCoded;
   Losses losses;
 };
 
@@ -60,11 +61,13 @@ void render_size(const TextureSampler& sampler, const SizeTask& task, Studio& st
 /// Losses of a list of cells at the size below, and what they say of cells that were not rendered.
 struct SmallerSize {
   const Cells& cells;
-  PictureLosses losses;        // per cell of the larger size: what the smaller one would have
-  bool first_follows = false;  // the first cell is as at the smaller size, where it was not rendered
+  const PictureLosses& measured;  // losses_of() them
+  PictureLosses losses;           // per cell of the larger size: what the smaller one would have
+  bool first_follows = false;     // the first cell is as at the smaller size, where it was not rendered
 };
 /// Losses of a list of cells. Those with fewer views than at the size below are corrected by what these views
-/// were among all there. Those that were not rendered follow by the ratio of rendered neighbours.
+/// were there beside the cell's losses. Those that were not rendered follow by the ratio of rendered
+/// neighbours.
 PictureLosses losses_of(const Cells& cells, const SmallerSize* smaller);
 
 }  // namespace texmesh::quality

@@ -100,6 +100,28 @@ PictureLosses along_curve(const GroupCells& larger, const GroupCells& smaller, c
   return out;
 }
 
+PictureLosses coarser_along(const GroupCells& larger, const GroupCells& smaller,
+                            const GroupPictures& losses) {
+  constexpr std::uint32_t kAnyMip = 1000;
+  const double growth = std::max(0.0, larger.texel_level - smaller.texel_level);
+  PictureLosses out = losses.coarser;
+  for (const auto list : {&PictureLosses::flip, &PictureLosses::flip_p95, &PictureLosses::dssim}) {
+    TextureLosses read;
+    read.texel_dssim = {1};
+    read.coded.flip = {1};  // not read
+    read.finer.flip = losses.finer.*list;
+    read.coarser.flip = losses.coarser.*list;
+    make_mips_rising(read);
+    const GroupCurve curve = curve_of(std::move(read));
+    const auto at = [&](double level) { return curve.halved({level, level}, kAnyMip); };
+    for (std::size_t l = 0; l < out.size(); ++l) {
+      const double level = static_cast<double>(l + 1);
+      (out.*list)[l] = static_cast<float>(std::clamp(at(level + growth) - at(growth) + at(0), 0.0, 1.0));
+    }
+  }
+  return out;
+}
+
 TextureLosses texture_losses(const GroupCells& group, GroupPictures pictures, float exponent) {
   const std::vector<Knot>& knots = group.knots;
   const PictureLosses& coded = pictures.coded;
@@ -132,6 +154,34 @@ TextureLosses texture_losses(const GroupCells& group, GroupPictures pictures, fl
     make_rising(out.coded.flip);
   }
   return out;
+}
+
+void lend_knots(const std::vector<double>& texel_level, std::vector<TextureLosses>& sizes) {
+  constexpr float kFar = 1.5f;
+  const std::vector<TextureLosses> own = sizes;
+  for (std::size_t i = 0; i < sizes.size(); ++i) {
+    TextureLosses& to = sizes[i];
+    // Of larger sizes first: there the ladder has more rungs.
+    for (std::size_t from = own.size(); from-- > 0;) {
+      if (from == i) continue;
+      const double growth = texel_level[i] - texel_level[from];
+      const double per_level = growth < 0 ? GroupCurve::kLossPerHalving : GroupCurve::kLossPerDoubling;
+      const auto factor = static_cast<float>(portable::pow(per_level, growth));
+      const TextureLosses& losses = own[from];
+      for (std::size_t k = 0; k < losses.texel_dssim.size(); ++k) {
+        const float dssim = losses.texel_dssim[k];
+        const auto is_near = [&](float d) { return d < kFar * dssim && dssim < kFar * d; };
+        if (!(losses.coded.flip[k] > 0) || std::ranges::any_of(to.texel_dssim, is_near)) continue;
+        const auto at = std::ranges::lower_bound(to.texel_dssim, dssim) - to.texel_dssim.begin();
+        to.texel_dssim.insert(to.texel_dssim.begin() + at, dssim);
+        for (const auto list : {&PictureLosses::flip, &PictureLosses::flip_p95, &PictureLosses::dssim}) {
+          std::vector<float>& values = to.coded.*list;
+          values.insert(values.begin() + at, std::min(1.0f, factor * (losses.coded.*list)[k]));
+        }
+      }
+    }
+    make_rising(to.coded.flip);
+  }
 }
 
 void fit_exponent(const std::vector<TogetherLoss>& samples, QualityTable& table) {

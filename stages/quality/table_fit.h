@@ -4,19 +4,27 @@
 
 namespace texmesh::quality {
 
-/// What `losses`, those per knot of `smaller`, would be for the knots of a larger size: along the curve that
-/// clients read, for texels as large on the screen as those of the larger size.
-PictureLosses along_curve(const GroupCells& larger, const GroupCells& smaller, const PictureLosses& losses);
-
 /// What the pictures of one group and size lose.
 struct GroupPictures {
   PictureLosses coded, preview, finer, coarser;  // as in GroupCells
 };
+
+/// What `losses`, those per knot of `smaller`, would be for the knots of a larger size: along the curve that
+/// clients read, for texels as large on the screen as those of the larger size.
+PictureLosses along_curve(const GroupCells& larger, const GroupCells& smaller, const PictureLosses& losses);
+/// The same of coarser mips: where there are no finer planes for the larger size, its mips are as large on
+/// the screen as coarser ones of the smaller size, and lose less by what full size has become coarser.
+PictureLosses coarser_along(const GroupCells& larger, const GroupCells& smaller, const GroupPictures& losses);
+
 /// The table's part of a group and a size. Knots by rising 1 - SSIM, those that repeat one are left out. Of a
 /// knot's FLIP its mips' own is taken off, by the exponent. What is left rises, at most as fast as 1 - SSIM
 /// does, and is scaled so that the weighted mean over fragments of GroupCurve::coded() comes as near as three
 /// steps of iteration bring it.
 TextureLosses texture_losses(const GroupCells& group, GroupPictures pictures, float exponent);
+
+/// Gives each size the knots of the others that lie far from all of its own: mips have few rungs, and clients
+/// show others there, too. Losses as for texels as large on the screen as there. `texel_level` per size.
+void lend_knots(const std::vector<double>& texel_level, std::vector<TextureLosses>& sizes);
 
 /// What the table's parts say of a sample, and what was measured.
 struct TogetherLoss {

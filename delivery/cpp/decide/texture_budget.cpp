@@ -75,6 +75,7 @@ class LevelSearch {
     for (bool better = true; better;) {
       better = false;
       const Levels from = at_;
+      without_finer_ = best_.flip;
       for (const Levels& step : steps) better = take(from, step) || better;
     }
     return std::move(best_);
@@ -85,10 +86,13 @@ class LevelSearch {
     Levels to = from;
     for (std::size_t g = 0; g < kPlaneGroups; ++g) to[g] += step[g];
     std::optional<TextureBudget> now = spend(to);
-    const double most = best_.flip - (std::ranges::min(step) < 0 ? kWorthwhileFlip : 0);
-    if (!now || now->flip >= most) return false;
+    if (!now || now->flip >= best_.flip) return false;
+    const bool is_finer = std::ranges::min(step) < 0;
+    // Beside each other, finer planes need not save that much.
+    if (is_finer && now->flip >= without_finer_ - kWorthwhileFlip) return false;
     best_ = std::move(*now);
     at_ = to;
+    if (!is_finer) without_finer_ = best_.flip;
     return true;
   }
   /// Nothing where these planes were tried.
@@ -104,6 +108,7 @@ class LevelSearch {
   const ListOptions& options_;
   std::uint64_t bytes_;
   Levels at_{};
+  double without_finer_ = 0;  // FLIP that this round's steps to finer planes start from
   TextureBudget best_;
   std::set<std::vector<std::uint32_t>> tried_;
 };

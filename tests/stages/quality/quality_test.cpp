@@ -8,6 +8,8 @@
 #include "format/documents/manifest.h"
 #include "format/rules/picture_prediction.h"
 #include "stages/base/run_context.h"
+#include "stages/image/decode_image.h"
+#include "stages/image/png_writer.h"
 #include "stages/ladder/ladder.h"
 #include "stages/lut/lut.h"
 #include "stages/previews/previews.h"
@@ -25,6 +27,7 @@ struct Sample {
   NestedScales scales;
   PerceptualValues perceptual;
   std::vector<Material> materials{Material{}};
+  std::vector<Image> images;
   Fragments fragments;
   std::vector<Pixels> pixels;
   Ladder ladder;
@@ -46,9 +49,20 @@ NestedScale every(int n, int step, int number) {
   return s;
 }
 
-/// What the stages before this one make of planes and pixels.
+/// The pixels without what pads them to whole fragments.
+Image image_of(const TexturePlane& plane, const Pixels& pixels) {
+  Pixels out{plane.width_px, plane.height_px, pixels.channels, {}};
+  for (std::uint32_t y = 0; y < plane.height_px; ++y)
+    out.data.insert(out.data.end(), pixels.at(0, y), pixels.at(plane.width_px - 1, y) + pixels.channels);
+  return probe_image("texture.png", write_png(out), {});
+}
+
+/// What the stages before this one make of planes and pixels, whose images look the same.
 void encode(Sample& s) {
   const RunContext context;
+  s.images.clear();
+  for (std::size_t p = 0; p < s.pixels.size(); ++p)
+    s.images.push_back(image_of(s.fragments.planes[p], s.pixels[p]));
   s.previews = make_previews(s.fragments, s.pixels, {}, context);
   s.ladder = encode_ladder(s.fragments, s.pixels, s.previews, {}, testing::all_rungs(), context);
   s.tables = build_tables(s.fragments, s.pixels, predict_quality(s.fragments, s.pixels, {}, context),
@@ -91,8 +105,8 @@ Sample sample_sheet(bool textured) {
 MeasuredQuality measure_all(const Sample& s, const QualityOptions& options, int threads = 1) {
   RunContext context;
   context.threads = threads;
-  return measure_quality(s.scales, s.perceptual, s.materials, s.fragments, s.pixels, s.ladder, s.previews,
-                         s.tables, options, context);
+  return measure_quality(s.scales, s.perceptual, s.materials, s.images, s.fragments, s.pixels, s.ladder,
+                         s.previews, s.tables, options, context);
 }
 /// Small, so that tests are quick.
 QualityOptions small_options() {
@@ -224,6 +238,35 @@ TEST(Quality, FragmentsThatNoRungStoresStayAsTheSource) {
   const PictureLosses& coded = t.groups[0].sizes[0].coded;
   EXPECT_EQ(coded.flip.front(), 0);
   EXPECT_EQ(coded.dssim.front(), 0);
+}
+
+TEST(Quality, TheReferenceIsTheSourcesImage) {
+  Sample s = sample_sheet(true);
+  Pixels bright = s.pixels[0];
+  for (std::uint8_t& x : bright.data) x = static_cast<std::uint8_t>(std::min(255, x + 40));
+  s.images[0] = image_of(s.fragments.planes[0], bright);
+  const TextureLosses filled = measure(s).groups[0].sizes[0];
+  EXPECT_GT(filled.finer.flip.front(), 0.02f) << "what is filled otherwise shows";
+  EXPECT_EQ(filled.finer.flip.back(), filled.finer.flip.front()) << "in all mips";
+}
+
+TEST(Quality, FullSizeIsTheRungOfTheSourcesTexels) {
+  Sample s = sample_sheet(true);
+  const TextureLosses filled = measure(s).groups[0].sizes[0];
+  EXPECT_EQ(filled.finer.flip.back(), 0) << "pixels are the image's";
+  EXPECT_GT(filled.coarser.flip.front(), 0);
+  s.ladder.planes[0].source_rung = true;
+  const TextureLosses coded = measure(s).groups[0].sizes[0];
+  EXPECT_GT(coded.finer.flip.back(), 0) << "what the last rung loses";
+  EXPECT_LT(coded.finer.flip.back(), coded.coded.flip.back());
+}
+
+TEST(Quality, ImagesThatAreMissingOrBrokenAreErrors) {
+  Sample s = sample_sheet(true);
+  s.images[0].bytes.resize(s.images[0].bytes.size() / 2);
+  EXPECT_THROW(measure(s), InputError);
+  s.images.clear();
+  EXPECT_THROW(measure(s), StageError);
 }
 
 TEST(Quality, VertexColoursShow) {

@@ -102,10 +102,10 @@ export class GroupCurve {
     const [first, second] = this.curves_;
     return first ? mixed(first.preview, second.preview, this.part_) : 1;
   }
-  /** FLIP of the source's texels, halved `mip` times; 0 for full size. */
+  /** FLIP of the texels that rungs code, halved `mip` times; for full size that of the finest sampled level. */
   halved(growth: TexelGrowth, mip: number): number {
     const [first, second] = this.curves_;
-    const at = (curve: Curve, level: number): number => clamp(curve.atLevel(level) - curve.atLevel(level - mip), 0, 1);
+    const at = (curve: Curve, level: number): number => clamp(curve.atLevel(level) - Math.max(0, curve.atLevel(level - mip) - curve.atLevel(-99)), 0, 1);
     return first ? mixed(at(first, growth[0]), at(second, growth[1]), this.part_) : 0;
   }
 }

@@ -66,13 +66,16 @@ export function* budgetSteps(loss: TextureLoss, options: SpendingOptions, bytes:
     // Downhill.
     const at: PerGroup = from;
     from = undefined;
+    let withoutFiner = best.flip;
     for (const step of steps) {
       const to = at.map((level, g) => level + step[g]) as unknown as PerGroup;
       yield best;
       const now = spend(to);
-      // Finer planes take memory: they have to look better, not only as good.
-      if (!now || now.flip >= best.flip - (step.includes(-1) ? worthwhile : 0)) continue;
+      // Finer planes take memory: they have to look better, not only as good, but not so much better than each other.
+      const finer = step.includes(-1);
+      if (!now || now.flip >= best.flip || (finer && now.flip >= withoutFiner - worthwhile)) continue;
       best = now;
+      if (!finer) withoutFiner = now.flip;
       from = to;
     }
   }
