@@ -34,6 +34,13 @@ ByteSplit split_for(int bytes) {
   ByteSplit out;
   out.maps.normal = out.maps.orm = bytes >= kMapsPayFrom;
   out.mesh_share = 0.6;
+  out.mesh.draco = bytes >= kMapsPayFrom;
+  out.mesh.position_bits = bytes < 30000 ? 10 : 12;
+  if(getenv("PB")) out.mesh.position_bits=atoi(getenv("PB"));
+  if(getenv("NB")) out.mesh.normal_bits=atoi(getenv("NB"));
+  if(getenv("MS")) out.mesh_share=atof(getenv("MS"));
+  if(getenv("ORM")) out.maps.orm=atoi(getenv("ORM"));
+  if(getenv("NRM")) out.maps.normal=atoi(getenv("NRM"));
   return out;
 }
 

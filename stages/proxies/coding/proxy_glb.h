@@ -9,11 +9,10 @@
 
 namespace texmesh::proxies {
 
-/// A coded picture: JPEG, or WebP where there is alpha.
+/// A coded picture: lossy WebP.
 struct ProxyImage {
   Bytes file;
   std::uint32_t width_px = 0, height_px = 0;
-  bool webp = false;
 };
 
 /// All that one material reads; what is not there is a factor. All groups share the pictures.

@@ -4,8 +4,7 @@
 #include <cmath>
 
 #include "format/base/errors.h"
-#include "stages/jpeg/jpeg.h"
-#include "stages/proxies/coding/webp_alpha.h"
+#include "stages/proxies/coding/webp_picture.h"
 #include "stages/render/shade.h"
 
 namespace texmesh::proxies {
@@ -34,6 +33,24 @@ Pixels plain_pixels(const std::vector<Vec3f>& values, std::uint32_t width_px, st
   return out;
 }
 
+/// Means of 2 x 2; sides of one stay.
+Pixels halved(const Pixels& fine) {
+  Pixels out{std::max(fine.width_px / 2, 1u), std::max(fine.height_px / 2, 1u), fine.channels, {}};
+  out.data.reserve(std::size_t{out.width_px} * out.height_px * out.channels);
+  const auto at = [&](std::uint32_t x, std::uint32_t y, std::uint32_t k) -> int {
+    x = std::min(x, fine.width_px - 1), y = std::min(y, fine.height_px - 1);
+    return fine.data[(std::size_t{y} * fine.width_px + x) * fine.channels + k];
+  };
+  for (std::uint32_t y = 0; y < out.height_px; ++y)
+    for (std::uint32_t x = 0; x < out.width_px; ++x)
+      for (std::uint32_t k = 0; k < out.channels; ++k) {
+        const int sum = at(2 * x, 2 * y, k) + at(2 * x + 1, 2 * y, k) + at(2 * x, 2 * y + 1, k) +
+                        at(2 * x + 1, 2 * y + 1, k);
+        out.data.push_back(static_cast<std::uint8_t>((sum + 2) / 4));
+      }
+  return out;
+}
+
 Pixels with_alpha(const Pixels& rgb, const std::vector<float>& alpha) {
   Pixels out{rgb.width_px, rgb.height_px, 4, {}};
   for (std::size_t i = 0; i < alpha.size(); ++i) {
@@ -43,23 +60,18 @@ Pixels with_alpha(const Pixels& rgb, const std::vector<float>& alpha) {
   return out;
 }
 
-ProxyImage code_jpeg(const Pixels& pixels, int quality, Subsampling subsampling) {
-  return {encode_jpeg(pixels, std::clamp(quality, 1, 100), subsampling), pixels.width_px, pixels.height_px,
-          false};
+ProxyImage code_picture(const Pixels& pixels, int quality) {
+  return {encode_webp(pixels, std::clamp(quality, 0, 100)), pixels.width_px, pixels.height_px};
 }
 
 ProxyPictures code_at(const MapPixels& maps, int quality) {
   ProxyPictures out;
   out.metallic = maps.metallic, out.roughness = maps.roughness, out.emissive = maps.emissive;
-  if (maps.base_colour.channels == 4)
-    out.base_colour = {encode_webp_alpha(maps.base_colour, quality), maps.base_colour.width_px,
-                       maps.base_colour.height_px, true};
-  else
-    out.base_colour = code_jpeg(maps.base_colour, quality, Subsampling::k420);
-  if (maps.choice.orm) out.orm = code_jpeg(maps.orm, quality - kOrmQualityBelow, Subsampling::k444);
-  if (maps.choice.normal)
-    out.normal = code_jpeg(maps.normal, quality + kNormalQualityAbove, Subsampling::k444);
-  if (!maps.emission.data.empty()) out.emission = code_jpeg(maps.emission, quality, Subsampling::k420);
+  out.base_colour = code_picture(maps.base_colour, quality);
+  const char* oq=getenv("OQ"),*nq=getenv("NQ");
+  if (maps.choice.orm) out.orm = code_picture(maps.orm, quality + (oq?atoi(oq):-kOrmQualityBelow));
+  if (maps.choice.normal) out.normal = code_picture(maps.normal, quality + (nq?atoi(nq):kNormalQualityAbove));
+  if (!maps.emission.data.empty()) out.emission = code_picture(maps.emission, quality);
   return out;
 }
 
@@ -76,7 +88,10 @@ MapPixels map_pixels(const BakedMaps& maps, const MapChoice& choice) {
   out.base_colour = srgb_pixels(base, w, h);
   if (maps.has_alpha) out.base_colour = with_alpha(out.base_colour, maps.alpha);
   out.roughness = maps.mean_orm.y, out.metallic = maps.mean_orm.z;
-  if (choice.orm) out.orm = plain_pixels(maps.occlusion_roughness_metallic, w, h, false);
+  if (choice.orm) {
+    out.orm = plain_pixels(maps.occlusion_roughness_metallic, w, h, false);
+    for(int i=0;i<(getenv("OD")?atoi(getenv("OD")):1);++i) out.orm = halved(out.orm);
+  }
   if (choice.normal) out.normal = plain_pixels(maps.normal, w, h, true);
   if (!maps.has_emission) return out;
   std::vector<Vec3f> emission = maps.emission;

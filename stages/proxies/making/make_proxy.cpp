@@ -17,8 +17,6 @@ constexpr double kCover = 0.58;                                         // of an
 constexpr double kColourBits = 2.0, kNormalBits = 1.4, kOrmBits = 0.9;  // a covered texel
 constexpr std::size_t kSamples = 400000;
 
-int position_bits(std::uint64_t target_bytes) { return target_bytes < 30000 ? 11 : 12; }
-
 /// The side of a square texture whose maps cost so many bytes.
 std::uint32_t texture_side(double bytes, const MapChoice& maps) {
   const double bits = kColourBits + (maps.normal ? kNormalBits : 0) + (maps.orm ? kOrmBits : 0);
@@ -44,7 +42,7 @@ struct CodedAtlas {
 };
 
 std::optional<CodedAtlas> code_atlas(const ProxyWorkshop& shop, const ChartedSurface& charted,
-                                     std::uint32_t side_px, std::uint64_t target_bytes,
+                                     std::uint32_t side_px, const MeshCoding& coding,
                                      const RunContext& context) {
   auto atlas = pack(charted, side_px, context);
   if (!atlas) return std::nullopt;
@@ -52,7 +50,7 @@ std::optional<CodedAtlas> code_atlas(const ProxyWorkshop& shop, const ChartedSur
   out.normals = sampled_normals(out.atlas, shop.source, context);
   std::vector<bool> lit;
   for (const MaterialGroup& g : shop.groups.groups) lit.push_back(!g.unlit);
-  out.mesh = code_mesh(out.atlas, out.normals, lit, position_bits(target_bytes));
+  out.mesh = code_mesh(out.atlas, out.normals, lit, coding);
   return out;
 }
 
@@ -69,9 +67,9 @@ std::vector<ProxyTexture> textures_of(const ProxyPictures& pictures) {
 }
 
 MadeProxy finish(const ProxyWorkshop& shop, const CodedAtlas& coded, std::uint64_t target_bytes,
-                 const MapChoice& choice, const RunContext& context) {
+                 const ByteSplit& split, const RunContext& context) {
   const std::vector<MaterialGroup>& groups = shop.groups.groups;
-  const MapPixels maps = map_pixels(bake(coded.atlas, coded.normals, shop.source, kSamples, context), choice);
+  const MapPixels maps = map_pixels(bake(coded.atlas, coded.normals, shop.source, kSamples, context), split.maps);
   const double left = static_cast<double>(target_bytes) - static_cast<double>(coded.mesh.bytes());
   ProxyPictures pictures = code_pictures(maps, static_cast<std::size_t>(std::max(left - kJsonBytes, 0.0)));
   MadeProxy out;
@@ -82,8 +80,7 @@ MadeProxy finish(const ProxyWorkshop& shop, const CodedAtlas& coded, std::uint64
     out.proxy.vertices += static_cast<std::uint32_t>(g.vertices());
   }
   out.proxy.textures = textures_of(pictures);
-  out.shown = shown_proxy(coded.atlas, rounded_mesh(coded.atlas, coded.normals, position_bits(target_bytes)),
-                          groups, pictures);
+  out.shown = shown_proxy(coded.atlas, rounded_mesh(coded.atlas, coded.normals, split.mesh), groups, pictures);
   return out;
 }
 
@@ -115,19 +112,20 @@ std::optional<MadeProxy> ProxyWorkshop::make(std::uint64_t target_bytes, const B
                                              const RunContext& context) {
   const auto target = static_cast<double>(target_bytes);
   const double mesh_bytes = split.mesh_share * target;
-  const std::uint32_t side_px = texture_side(target - mesh_bytes - kJsonBytes, split.maps);
+  const std::uint32_t side_px = getenv("SIDE")?atoi(getenv("SIDE")):texture_side(target - mesh_bytes - kJsonBytes, split.maps);
   std::optional<CodedAtlas> coded;
+  double bytes_per_triangle = split.mesh.draco ? 3.4 : 9.5;
   // The bytes of a triangle are known once one mesh is coded; the second try is the last.
-  for (int attempt = 0; attempt < 2; ++attempt) {
+  for (int attempt = 0; attempt < 3; ++attempt) {
     const ChartedSurface* charted = surfaces.at_most(mesh_bytes / bytes_per_triangle, context);
     if (!charted) return std::nullopt;
-    coded = code_atlas(*this, *charted, side_px, target_bytes, context);
+    coded = code_atlas(*this, *charted, side_px, split.mesh, context);
     if (!coded || coded->mesh.groups.empty()) return std::nullopt;
     const auto bytes = static_cast<double>(coded->mesh.bytes());
     bytes_per_triangle = bytes / static_cast<double>(charted->surface.triangles.size());
     if (bytes <= 1.1 * mesh_bytes && bytes >= 0.8 * mesh_bytes) break;
   }
-  MadeProxy made = finish(*this, *coded, target_bytes, split.maps, context);
+  MadeProxy made = finish(*this, *coded, target_bytes, split, context);
   if (static_cast<double>(made.proxy.glb.size()) > kOver * target) return std::nullopt;
   return made;
 }

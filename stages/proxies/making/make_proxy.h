@@ -13,6 +13,7 @@ namespace texmesh::proxies {
 struct ByteSplit {
   double mesh_share = 0.6;  // of the file
   MapChoice maps;
+  MeshCoding mesh;
 };
 
 /// A coarse surface with its charts.
@@ -45,7 +46,6 @@ struct ProxyWorkshop {
   const BakeSource& source;
   const MaterialGroups& groups;
   SurfaceLadder& surfaces;
-  double bytes_per_triangle = 8;  // of coded meshes; learnt from the last one made
 
   /// At most 2 % above `target_bytes`; nothing where no surface fits.
   std::optional<MadeProxy> make(std::uint64_t target_bytes, const ByteSplit& split,

@@ -4,17 +4,15 @@
 #include <cmath>
 
 #include "format/base/box.h"
-#include "stages/jpeg/jpeg.h"
-#include "stages/proxies/coding/webp_alpha.h"
+#include "stages/proxies/coding/webp_picture.h"
 
 namespace texmesh::proxies {
 namespace {
 
 constexpr int kViews = 6;
-constexpr std::uint64_t kMostPixels = std::uint64_t{1} << 26;
 
 RenderTexture decoded(const ProxyImage& image, bool srgb, const RunContext& context) {
-  return render_texture(image.webp ? decode_webp_alpha(image.file) : decode_jpeg(image.file, kMostPixels),
+  return render_texture(decode_webp_picture(image.file),
                         srgb, 0, context);
 }
 

@@ -6,7 +6,7 @@
 
 #include "stages/gltf/check_glb.h"
 #include "stages/proxies/coding/proxy_pictures.h"
-#include "stages/proxies/coding/webp_alpha.h"
+#include "stages/proxies/coding/webp_picture.h"
 #include "tests/stages/proxies/atlas_fixtures.h"
 #include "tests/support/meshes.h"
 
@@ -115,11 +115,11 @@ TEST(ProxyMesh, TrianglesThatTheGridFlattensGo) {
   EXPECT_EQ(mesh.groups[0].vertices(), 4u);
 }
 
-TEST(WebpAlpha, AlphaComesBack) {
+TEST(WebpPicture, AlphaComesBack) {
   Pixels rgba{8, 8, 4, {}};
   for (std::uint32_t i = 0; i < 64; ++i)
     rgba.data.insert(rgba.data.end(), {200, 100, 50, i < 32 ? std::uint8_t{255} : std::uint8_t{0}});
-  const Pixels back = decode_webp_alpha(encode_webp_alpha(rgba, 80));
+  const Pixels back = decode_webp_picture(encode_webp(rgba, 80));
   ASSERT_EQ(back.data.size(), rgba.data.size());
   EXPECT_EQ(back.data[3], 255);
   EXPECT_EQ(back.data[63 * 4 + 3], 0);
