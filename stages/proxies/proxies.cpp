@@ -11,16 +11,19 @@ namespace texmesh {
 namespace {
 
 using proxies::BakeSource;
-using proxies::ByteSplit;
+using proxies::BakedProxy;
 using proxies::find_groups;
 using proxies::MadeProxy;
 using proxies::MaterialGroups;
+using proxies::ProxyForm;
 using proxies::ProxyStudio;
 using proxies::ProxyWorkshop;
 using proxies::SurfaceLadder;
 
 constexpr std::uint32_t kLeastTriangles = 60;
 constexpr double kLeastBytesPerTriangle = 4;
+constexpr double kFirstMeshShare = 0.7, kMeshShare = 0.65;
+constexpr int kFineFrom = 100000, kNormalMapPaysFrom = 100000;  // bytes
 
 /// Source textures need not be finer than what a proxy and the pictures show of them.
 std::uint32_t least_side_px(const std::vector<Material>& materials) {
@@ -29,18 +32,12 @@ std::uint32_t least_side_px(const std::vector<Material>& materials) {
   return used > 64 ? 256 : used > 24 ? 512 : used > 8 ? 1024 : 2048;
 }
 
-ByteSplit split_for(int bytes) {
-  constexpr int kMapsPayFrom = 45000;
-  ByteSplit out;
-  out.maps.normal = out.maps.orm = bytes >= kMapsPayFrom;
-  out.mesh_share = 0.6;
-  out.mesh.draco = bytes >= kMapsPayFrom;
-  out.mesh.position_bits = bytes < 30000 ? 10 : 12;
-  if(getenv("PB")) out.mesh.position_bits=atoi(getenv("PB"));
-  if(getenv("NB")) out.mesh.normal_bits=atoi(getenv("NB"));
-  if(getenv("MS")) out.mesh_share=atof(getenv("MS"));
-  if(getenv("ORM")) out.maps.orm=atoi(getenv("ORM"));
-  if(getenv("NRM")) out.maps.normal=atoi(getenv("NRM"));
+/// What the first try of a size is made of.
+ProxyForm first_form(int bytes, bool first) {
+  ProxyForm out;
+  out.maps.orm = true;
+  out.mesh_share = first ? kFirstMeshShare : kMeshShare;
+  out.coding = {!first, bytes < kFineFrom ? 11 : 12};
   return out;
 }
 
@@ -58,12 +55,12 @@ class ProxyRun {
         shown_(shown),
         mode_(options.mode),
         surfaces_(mesh, groups, kLeastTriangles, most_triangles(mesh, options), context),
-        shop_{source, groups, surfaces_},
+        shop_(source, groups, surfaces_),
         studio_(mesh, shown, context) {}
 
   /// Whether larger sizes are worth a try.
   bool add(int bytes, Proxies& out, const RunContext& context) {
-    std::optional<MadeProxy> made = shop_.make(static_cast<std::uint64_t>(bytes), split_for(bytes), context);
+    std::optional<MadeProxy> made = best_of(bytes, out.proxies.empty(), context);
     if (!made) {
       note_none(out.notes, bytes, "mesh and pictures do not fit");
       return true;
@@ -86,6 +83,42 @@ class ProxyRun {
   }
 
  private:
+  struct Candidate {
+    std::optional<MadeProxy> made;
+    ProxyForm form;
+    double flip = 1e9;
+  };
+  void compete(const BakedProxy& baked, std::uint64_t bytes, const ProxyForm& form, Candidate& best,
+               const RunContext& context) {
+    std::optional<MadeProxy> made = shop_.finish(baked, bytes, form);
+    if (!made) return;
+    const double flip = studio_.flip_of(made->shown, context);
+    if (!best.made || flip < best.flip) best = {std::move(made), form, flip};
+  }
+
+  /// Normals, flat triangles and a normal map compete on one bake. Where triangles need no normals, or the
+  /// texture is too fine or too coarse for its bytes, a second bake follows.
+  std::optional<MadeProxy> best_of(int bytes, bool first, const RunContext& context) {
+    const auto target = static_cast<std::uint64_t>(bytes);
+    Candidate best;
+    ProxyForm form = first_form(bytes, first);
+    const auto baked = shop_.bake(bytes, form, context);
+    if (!baked) return std::nullopt;
+    compete(*baked, target, form, best, context);
+    ProxyForm flat = form;
+    flat.normals = false;
+    compete(*baked, target, flat, best, context);
+    if (bytes >= kNormalMapPaysFrom) {
+      ProxyForm mapped = form;
+      mapped.maps.normal = true;
+      compete(*baked, target, mapped, best, context);
+    }
+    if (first && best.made && !best.form.normals)
+      if (const auto again = shop_.bake(bytes, best.form, context))
+        compete(*again, target, best.form, best, context);
+    return std::move(best.made);
+  }
+
   static std::uint32_t most_triangles(const Mesh& mesh, const ProxiesOptions& options) {
     return static_cast<std::uint32_t>(std::min<double>(options.sizes.back() / kLeastBytesPerTriangle,
                                                        static_cast<double>(mesh.triangles.size())));

@@ -16,13 +16,12 @@ struct DracoInput {
   std::vector<std::uint32_t> indices;
   Vec3f origin;  // of the positions' grid
   float range = 1;
-  int position_bits = 12, normal_bits = 8, uv_bits = 12;  // uvs: of 0..1
+  int position_bits = 12, uv_bits = 12;  // uvs: of 0..1
 };
 
 struct DracoGroup {
   Bytes stream;                        // empty: none
   std::array<std::uint32_t, 3> ids{};  // of positions, normals, uvs in the stream
-  bool has_normals = false;
   std::size_t triangles = 0, vertices = 0;  // as a decoder gives them
 };
 /// Edgebreaker, each attribute with seams of its own, so positions are stored once. StageError when Draco

@@ -2,7 +2,6 @@
 
 #include <array>
 #include <nlohmann/json.hpp>
-#include <string_view>
 
 #include "stages/gltf/glb_writer.h"
 
@@ -47,43 +46,41 @@ class ProxyWriter {
   /// Whether positions and coordinates are places of grids, which node and textures scale.
   bool is_quantised() const { return fallback_bytes_ > 0; }
 
-  std::size_t view(const MeshStream& s, const char* mode, const char* filter = nullptr) {
-    const bool is_index = std::string_view(mode) == "TRIANGLES";
-    Json coded{{"buffer", 0},
-               {"byteOffset", writer_.add_bytes(s.packed)},
-               {"byteLength", s.packed.size()},
-               {"byteStride", s.stride},
-               {"count", s.count},
-               {"mode", mode}};
-    if (filter) coded["filter"] = filter;
+  std::size_t view(const MeshStream& s, bool is_index) {
     Json view{{"buffer", 1}, {"byteOffset", fallback_bytes_}, {"byteLength", s.count * s.stride}};
     if (!is_index) view["byteStride"] = s.stride;
-    view["extensions"]["EXT_meshopt_compression"] = std::move(coded);
+    view["extensions"]["EXT_meshopt_compression"] = {{"buffer", 0},
+                                                     {"byteOffset", writer_.add_bytes(s.packed)},
+                                                     {"byteLength", s.packed.size()},
+                                                     {"byteStride", s.stride},
+                                                     {"count", s.count},
+                                                     {"mode", is_index ? "TRIANGLES" : "ATTRIBUTES"}};
     fallback_bytes_ += (s.count * s.stride + 3) / 4 * 4;
     return writer_.add_json_view(std::move(view));
   }
   Json primitive(const CodedGroup& g) {
-    constexpr std::size_t kUvOffset = 8;
-    const std::size_t places = view(g.places, "ATTRIBUTES");
+    constexpr std::size_t kUvOffset = 8, kNormalOffset = 12;
+    const std::size_t vertices = view(g.vertex_stream, false), n = g.vertices();
     Json attributes;
-    attributes["POSITION"] = writer_.add_accessor({{"bufferView", places},
+    attributes["POSITION"] = writer_.add_accessor({{"bufferView", vertices},
                                                    {"componentType", kUnsignedShort},
-                                                   {"count", g.places.count},
+                                                   {"count", n},
                                                    {"type", "VEC3"},
                                                    {"min", g.least},
                                                    {"max", g.most}});
-    attributes["TEXCOORD_0"] = writer_.add_accessor({{"bufferView", places},
-                                                     {"byteOffset", kUvOffset},
-                                                     {"componentType", kUnsignedShort},
-                                                     {"count", g.places.count},
-                                                     {"type", "VEC2"}});
-    if (g.normals.count > 0)
-      attributes["NORMAL"] = writer_.add_accessor({{"bufferView", view(g.normals, "ATTRIBUTES", "OCTAHEDRAL")},
+    if (g.has_normals)
+      attributes["NORMAL"] = writer_.add_accessor({{"bufferView", vertices},
+                                                   {"byteOffset", kNormalOffset},
                                                    {"componentType", kByte},
                                                    {"normalized", true},
-                                                   {"count", g.normals.count},
+                                                   {"count", n},
                                                    {"type", "VEC3"}});
-    Json indices{{"bufferView", view(g.indices, "TRIANGLES")},
+    attributes["TEXCOORD_0"] = writer_.add_accessor({{"bufferView", vertices},
+                                                     {"byteOffset", kUvOffset},
+                                                     {"componentType", kUnsignedShort},
+                                                     {"count", n},
+                                                     {"type", "VEC2"}});
+    Json indices{{"bufferView", view(g.indices, true)},
                  {"componentType", g.indices.stride == 2 ? kUnsignedShort : kUnsignedInt},
                  {"count", g.indices.count},
                  {"type", "SCALAR"}};
@@ -108,7 +105,7 @@ class ProxyWriter {
                                                    {"min", place(g.least)},
                                                    {"max", place(g.most)}});
     ids["POSITION"] = g.draco.ids[0];
-    if (g.draco.has_normals) {
+    if (g.has_normals) {
       attributes["NORMAL"] = empty_accessor(kFloat, n, "VEC3");
       ids["NORMAL"] = g.draco.ids[1];
     }

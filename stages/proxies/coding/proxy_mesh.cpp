@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
 #include "format/base/box.h"
 #include "format/base/no_index.h"
@@ -67,29 +66,8 @@ UvGrid make_uv_grid(const AtlasMesh& mesh, bool draco) {
   return {{steps(mesh.width_px), steps(mesh.height_px)}};
 }
 
-/// The lower half of the octahedron is folded over the upper one (Meyer et al. 2010). The third number stands
-/// for 1.
-std::array<std::int8_t, 4> octahedral(Vec3f n, int bits) {
-  const auto one = static_cast<float>((1 << (bits - 1)) - 1);
-  const float sum = std::fabs(n.x) + std::fabs(n.y) + std::fabs(n.z);
-  const float scale = sum > 0 ? 1 / sum : 0;
-  float x = n.x * scale, y = n.y * scale;
-  if (n.z < 0) {
-    const float folded = (1 - std::fabs(y)) * (x < 0 ? -1.0f : 1.0f);
-    y = (1 - std::fabs(x)) * (y < 0 ? -1.0f : 1.0f);
-    x = folded;
-  }
-  const auto whole = [&](float v) { return static_cast<std::int8_t>(std::floor(v * one + 0.5f)); };
-  return {whole(x), whole(y), static_cast<std::int8_t>(one), 0};
-}
-
-Vec3f normal_of(const std::array<std::int8_t, 4>& coded) {
-  float x = coded[0], y = coded[1];
-  const float z = static_cast<float>(coded[2]) - std::fabs(x) - std::fabs(y);
-  const float t = std::min(z, 0.0f);
-  x += x >= 0 ? t : -t;
-  y += y >= 0 ? t : -t;
-  return normalized(Vec3f{x, y, z});
+std::uint8_t signed8(float x) {
+  return static_cast<std::uint8_t>(static_cast<int>(std::floor(std::clamp(x, -1.0f, 1.0f) * 127 + 0.5f)));
 }
 
 /// Vertices and triangles of one group, in the order of first use by cache-friendly strips.
@@ -123,19 +101,6 @@ GroupMesh group_mesh(const AtlasMesh& mesh, std::uint32_t group, const PositionG
   for (std::size_t i = 0; i < remap.size(); ++i) vertices[remap[i]] = out.vertices[i];
   for (std::uint32_t& i : ordered) i = remap[i];
   return {std::move(vertices), std::move(ordered)};
-}
-
-template <class T, std::size_t N, class Value>
-MeshStream attribute_stream(const std::vector<std::uint32_t>& vertices, const Value& value) {
-  static_assert(sizeof(T) * N % 4 == 0);
-  MeshStream out{{}, sizeof(T) * N, vertices.size()};
-  std::vector<std::uint8_t> raw(out.stride * out.count);
-  for (std::size_t i = 0; i < vertices.size(); ++i) {
-    const std::array<T, N> element = value(vertices[i]);
-    std::memcpy(raw.data() + i * out.stride, element.data(), sizeof element);
-  }
-  out.packed = meshopt_attributes(raw, out.count, out.stride, "proxies");
-  return out;
 }
 
 MeshStream index_stream(const GroupMesh& group) {
@@ -179,17 +144,25 @@ class GroupCoder {
 
  private:
   void code_meshopt(const GroupMesh& group, const std::vector<Vec3f>& normals, CodedGroup& out) const {
-    out.places = attribute_stream<std::uint16_t, 6>(group.vertices, [&](std::uint32_t v) {
+    out.has_normals = !normals.empty();
+    std::vector<std::uint8_t> raw;
+    const auto put16 = [&](std::uint32_t x) {
+      raw.push_back(static_cast<std::uint8_t>(x));
+      raw.push_back(static_cast<std::uint8_t>(x >> 8));
+    };
+    for (const std::uint32_t v : group.vertices) {
       const std::array<std::uint32_t, 3> at = grid_.places(mesh_.positions[v]);
       extend(out, at);
-      const auto u16 = [](std::uint32_t x) { return static_cast<std::uint16_t>(x); };
-      return std::array<std::uint16_t, 6>{
-          u16(at[0]), u16(at[1]), u16(at[2]), 0, u16(uv_grid_.place(mesh_.uvs[v].x, 0)),
-          u16(uv_grid_.place(mesh_.uvs[v].y, 1))};
-    });
-    if (!normals.empty())
-      out.normals = attribute_stream<std::int8_t, 4>(
-          group.vertices, [&](std::uint32_t v) { return octahedral(normals[v], coding_.normal_bits); });
+      for (const std::uint32_t x : {at[0], at[1], at[2], 0u}) put16(x);
+      put16(uv_grid_.place(mesh_.uvs[v].x, 0));
+      put16(uv_grid_.place(mesh_.uvs[v].y, 1));
+      if (!out.has_normals) continue;
+      const Vec3f n = normals[v];
+      raw.insert(raw.end(), {signed8(n.x), signed8(n.y), signed8(n.z), 0});
+    }
+    out.vertex_stream = {{}, out.has_normals ? 16u : 12u, group.vertices.size()};
+    out.vertex_stream.packed =
+        meshopt_attributes(raw, out.vertex_stream.count, out.vertex_stream.stride, "proxies");
     out.indices = index_stream(group);
   }
 
@@ -206,7 +179,7 @@ class GroupCoder {
     input.origin = grid_.origin;
     input.range = grid_.step * static_cast<float>(grid_.last);
     input.position_bits = coding_.position_bits;
-    input.normal_bits = coding_.normal_bits;
+    out.has_normals = !normals.empty();
     input.uv_bits = uv_bits(mesh_);
     out.draco = code_draco_group(input);
   }
@@ -222,7 +195,7 @@ class GroupCoder {
 std::size_t CodedMesh::bytes() const {
   std::size_t sum = 0;
   for (const CodedGroup& g : groups)
-    sum += g.draco.stream.size() + g.places.packed.size() + g.normals.packed.size() + g.indices.packed.size();
+    sum += g.draco.stream.size() + g.vertex_stream.packed.size() + g.indices.packed.size();
   return sum;
 }
 
@@ -245,7 +218,11 @@ RoundedMesh rounded_mesh(const AtlasMesh& mesh, const std::vector<Vec3f>& normal
   RoundedMesh out;
   for (const Vec3f p : mesh.positions)
     out.positions.push_back(position_at(coder.grid(), coder.grid().places(p)));
-  for (const Vec3f n : normals) out.normals.push_back(normal_of(octahedral(n, coding.normal_bits)));
+  const auto component = [](float x) {
+    return static_cast<float>(static_cast<std::int8_t>(signed8(x)));
+  };
+  for (const Vec3f n : normals)
+    out.normals.push_back(normalized(Vec3f{component(n.x), component(n.y), component(n.z)}));
   const Vec2f step = coder.uv_grid().step();
   for (const Vec2f uv : mesh.uvs)
     out.uvs.push_back({static_cast<float>(coder.uv_grid().place(uv.x, 0)) * step.x,

@@ -21,20 +21,21 @@ struct MeshStream {
 struct MeshCoding {
   bool draco = false;
   int position_bits = 12;  // 4..16, along the longest side of the box
-  int normal_bits = 8;     // 4..8, of each octahedral number
 };
 
 /// The triangles of one group.
 struct CodedGroup {
   std::uint32_t group = 0;
-  MeshStream places;   // three u16 on the positions' grid, two bytes of 0, two u16 on the coordinates' grid
-  MeshStream normals;  // octahedral, as the extension's filter has it; empty where there are none
+  bool has_normals = false;
+  /// Per vertex three u16 on the positions' grid, two bytes of 0, two u16 on the coordinates' grid; with
+  /// normals three i8, normalised, and a byte of 0.
+  MeshStream vertex_stream;
   MeshStream indices;  // u16 or u32
-  DracoGroup draco;    // instead of all of these, where its stream is not empty
+  DracoGroup draco;    // instead of both, where its stream is not empty
   std::array<std::uint32_t, 3> least{}, most{};  // of the positions
   bool is_draco() const { return !draco.stream.empty(); }
   std::size_t triangles() const { return is_draco() ? draco.triangles : indices.count / 3; }
-  std::size_t vertices() const { return is_draco() ? draco.vertices : places.count; }
+  std::size_t vertices() const { return is_draco() ? draco.vertices : vertex_stream.count; }
 };
 
 /// position = origin + step * grid place; of meshopt, uv = uv_step * grid place.

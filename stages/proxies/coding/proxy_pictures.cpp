@@ -33,24 +33,6 @@ Pixels plain_pixels(const std::vector<Vec3f>& values, std::uint32_t width_px, st
   return out;
 }
 
-/// Means of 2 x 2; sides of one stay.
-Pixels halved(const Pixels& fine) {
-  Pixels out{std::max(fine.width_px / 2, 1u), std::max(fine.height_px / 2, 1u), fine.channels, {}};
-  out.data.reserve(std::size_t{out.width_px} * out.height_px * out.channels);
-  const auto at = [&](std::uint32_t x, std::uint32_t y, std::uint32_t k) -> int {
-    x = std::min(x, fine.width_px - 1), y = std::min(y, fine.height_px - 1);
-    return fine.data[(std::size_t{y} * fine.width_px + x) * fine.channels + k];
-  };
-  for (std::uint32_t y = 0; y < out.height_px; ++y)
-    for (std::uint32_t x = 0; x < out.width_px; ++x)
-      for (std::uint32_t k = 0; k < out.channels; ++k) {
-        const int sum = at(2 * x, 2 * y, k) + at(2 * x + 1, 2 * y, k) + at(2 * x, 2 * y + 1, k) +
-                        at(2 * x + 1, 2 * y + 1, k);
-        out.data.push_back(static_cast<std::uint8_t>((sum + 2) / 4));
-      }
-  return out;
-}
-
 Pixels with_alpha(const Pixels& rgb, const std::vector<float>& alpha) {
   Pixels out{rgb.width_px, rgb.height_px, 4, {}};
   for (std::size_t i = 0; i < alpha.size(); ++i) {
@@ -67,10 +49,10 @@ ProxyImage code_picture(const Pixels& pixels, int quality) {
 ProxyPictures code_at(const MapPixels& maps, int quality) {
   ProxyPictures out;
   out.metallic = maps.metallic, out.roughness = maps.roughness, out.emissive = maps.emissive;
+  out.quality = quality;
   out.base_colour = code_picture(maps.base_colour, quality);
-  const char* oq=getenv("OQ"),*nq=getenv("NQ");
-  if (maps.choice.orm) out.orm = code_picture(maps.orm, quality + (oq?atoi(oq):-kOrmQualityBelow));
-  if (maps.choice.normal) out.normal = code_picture(maps.normal, quality + (nq?atoi(nq):kNormalQualityAbove));
+  if (maps.choice.orm) out.orm = code_picture(maps.orm, quality - kOrmQualityBelow);
+  if (maps.choice.normal) out.normal = code_picture(maps.normal, quality + kNormalQualityAbove);
   if (!maps.emission.data.empty()) out.emission = code_picture(maps.emission, quality);
   return out;
 }
@@ -80,18 +62,20 @@ ProxyPictures code_at(const MapPixels& maps, int quality) {
 MapPixels map_pixels(const BakedMaps& maps, const MapChoice& choice) {
   MapPixels out;
   out.choice = choice;
+  // A map of one value says no more than a factor.
+  constexpr float kSame = 1.5f / 255;
+  bool varies = false;
+  for (int k = 0; k < 3; ++k) varies = varies || maps.most_orm[k] - maps.least_orm[k] > kSame;
+  out.choice.orm = choice.orm && (varies || maps.mean_orm.x < 1 - kSame);
   const std::uint32_t w = maps.width_px, h = maps.height_px;
   std::vector<Vec3f> base = maps.base_colour;
-  if (!choice.orm)
+  if (!out.choice.orm)
     for (std::size_t i = 0; i < base.size(); ++i)
       base[i] = base[i] * (1 - kOcclusionInColour * (1 - maps.occlusion_roughness_metallic[i].x));
   out.base_colour = srgb_pixels(base, w, h);
   if (maps.has_alpha) out.base_colour = with_alpha(out.base_colour, maps.alpha);
   out.roughness = maps.mean_orm.y, out.metallic = maps.mean_orm.z;
-  if (choice.orm) {
-    out.orm = plain_pixels(maps.occlusion_roughness_metallic, w, h, false);
-    for(int i=0;i<(getenv("OD")?atoi(getenv("OD")):1);++i) out.orm = halved(out.orm);
-  }
+  if (out.choice.orm) out.orm = plain_pixels(maps.occlusion_roughness_metallic, w, h, false);
   if (choice.normal) out.normal = plain_pixels(maps.normal, w, h, true);
   if (!maps.has_emission) return out;
   std::vector<Vec3f> emission = maps.emission;

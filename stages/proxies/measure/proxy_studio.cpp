@@ -97,6 +97,11 @@ FlipSum ProxyStudio::compare(const RenderScene& scene, const std::vector<RenderT
   return sum;
 }
 
+double ProxyStudio::flip_of(const ShownModel& model, const RunContext& context) {
+  const RenderScene scene = render_scene(model.mesh, model.shown.materials, model.shown.textures.size());
+  return compare(scene, model.shown.textures, kMiddle, context).mean();
+}
+
 std::vector<ProxyPictureLoss> ProxyStudio::losses(const ShownModel& model, const RunContext& context) {
   std::vector<ProxyPictureLoss> out;
   const RenderScene scene = render_scene(model.mesh, model.shown.materials, model.shown.textures.size());

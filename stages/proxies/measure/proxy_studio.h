@@ -33,6 +33,8 @@ class ProxyStudio {
   /// At one of the displayed heights.
   FlipSum compare(const RenderScene& scene, const std::vector<RenderTexture>& textures, std::size_t size,
                   const RunContext& context);
+  /// Mean at the middle height.
+  double flip_of(const ShownModel& model, const RunContext& context);
   /// At all of them.
   std::vector<ProxyPictureLoss> losses(const ShownModel& model, const RunContext& context);
 
