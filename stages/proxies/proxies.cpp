@@ -54,13 +54,17 @@ class ProxyRun {
       : scales_(scales),
         shown_(shown),
         mode_(options.mode),
+        mapped_(std::ranges::any_of(shown.materials, [](const RenderMaterial& m) {
+          return !m.unlit && m.slot(TextureUse::kNormal).texture >= 0;
+        })),
         surfaces_(mesh, groups, kLeastTriangles, most_triangles(mesh, options), context),
         shop_(source, groups, surfaces_),
         studio_(mesh, shown, context) {}
 
   /// Whether larger sizes are worth a try.
   bool add(int bytes, Proxies& out, const RunContext& context) {
-    std::optional<MadeProxy> made = best_of(bytes, out.proxies.empty(), context);
+    Candidate best = best_of(bytes, out.proxies.empty(), context);
+    std::optional<MadeProxy>& made = best.made;
     if (!made) {
       note_none(out.notes, bytes, "mesh and pictures do not fit");
       return true;
@@ -69,7 +73,7 @@ class ProxyRun {
       note_none(out.notes, bytes, "the whole object takes fewer");
       return false;
     }
-    made->proxy.losses = studio_.losses(made->shown, context);
+    made->proxy.losses = studio_.losses(made->shown, best.flip, context);
     if (mode_ == ProxyMode::kAuto) {
       const auto rival = rival_flip(scales_, shown_, made->proxy.glb.size(), studio_, context);
       if (rival && *rival <= made->proxy.losses[ProxyStudio::kMiddle].flip_mean) {
@@ -86,37 +90,37 @@ class ProxyRun {
   struct Candidate {
     std::optional<MadeProxy> made;
     ProxyForm form;
-    double flip = 1e9;
+    FlipSum flip;  // at the middle height
   };
   void compete(const BakedProxy& baked, std::uint64_t bytes, const ProxyForm& form, Candidate& best,
                const RunContext& context) {
     std::optional<MadeProxy> made = shop_.finish(baked, bytes, form);
     if (!made) return;
-    const double flip = studio_.flip_of(made->shown, context);
-    if (!best.made || flip < best.flip) best = {std::move(made), form, flip};
+    const FlipSum flip = studio_.at_middle(made->shown, context);
+    if (!best.made || flip.mean() < best.flip.mean()) best = {std::move(made), form, flip};
   }
 
-  /// Normals, flat triangles and a normal map compete on one bake. Where triangles need no normals, or the
-  /// texture is too fine or too coarse for its bytes, a second bake follows.
-  std::optional<MadeProxy> best_of(int bytes, bool first, const RunContext& context) {
+  /// Normals, flat triangles and a normal map compete on one bake. Where triangles of the first size need no
+  /// normals, a second bake has more of them.
+  Candidate best_of(int bytes, bool first, const RunContext& context) {
     const auto target = static_cast<std::uint64_t>(bytes);
     Candidate best;
     ProxyForm form = first_form(bytes, first);
     const auto baked = shop_.bake(bytes, form, context);
-    if (!baked) return std::nullopt;
-    compete(*baked, target, form, best, context);
-    ProxyForm flat = form;
-    flat.normals = false;
-    compete(*baked, target, flat, best, context);
-    if (bytes >= kNormalMapPaysFrom) {
+    if (!baked) return best;
+    if (mapped_ && bytes >= kNormalMapPaysFrom) {
       ProxyForm mapped = form;
       mapped.maps.normal = true;
       compete(*baked, target, mapped, best, context);
     }
-    if (first && best.made && !best.form.normals)
-      if (const auto again = shop_.bake(bytes, best.form, context))
-        compete(*again, target, best.form, best, context);
-    return std::move(best.made);
+    compete(*baked, target, form, best, context);
+    form.normals = false;
+    if (first || flat_) compete(*baked, target, form, best, context);
+    if (best.made) shop_.learn(best.made->quality);
+    flat_ = best.made && !best.form.normals;
+    if (first && flat_)
+      if (const auto again = shop_.bake(bytes, form, context)) compete(*again, target, form, best, context);
+    return best;
   }
 
   static std::uint32_t most_triangles(const Mesh& mesh, const ProxiesOptions& options) {
@@ -126,6 +130,8 @@ class ProxyRun {
   const NestedScales& scales_;
   const ShownMaterials& shown_;
   ProxyMode mode_;
+  bool mapped_;        // a source material has a normal map
+  bool flat_ = false;  // the last proxy needs no normals
   SurfaceLadder surfaces_;
   ProxyWorkshop shop_;
   ProxyStudio studio_;

@@ -12,6 +12,7 @@ namespace {
 
 constexpr float kOcclusionInColour = 0.5f;
 constexpr int kLeastQuality = 5, kMostQuality = 95;
+constexpr double kFull = 0.975;  // of the bytes: more is not worth another run of the encoder
 // Normals and plain numbers need finer steps than colours for the same look.
 constexpr int kNormalQualityAbove = 10, kOrmQualityBelow = 5;
 
@@ -93,8 +94,10 @@ ProxyPictures code_pictures(const MapPixels& maps, std::size_t max_bytes) {
   for (int low = kLeastQuality + 1, high = kMostQuality; low <= high;) {
     const int quality = (low + high) / 2;
     ProxyPictures coded = code_at(maps, quality);
-    if (coded.bytes() <= max_bytes) {
+    const std::size_t bytes = coded.bytes();
+    if (bytes <= max_bytes) {
       best = std::move(coded);
+      if (static_cast<double>(bytes) >= kFull * static_cast<double>(max_bytes)) break;
       low = quality + 1;
     } else {
       high = quality - 1;

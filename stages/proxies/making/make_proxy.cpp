@@ -12,7 +12,7 @@ namespace {
 constexpr double kJsonBytes = 1900;  // of a GLB with one material, and the heads of its pictures
 constexpr double kOver = 1.02;       // of the bytes asked for
 constexpr std::uint32_t kGutterPx = 1;
-constexpr std::uint32_t kTexelStep = 32, kLeastTexels = 32, kMostTexels = 2048;
+constexpr std::uint32_t kTexelStep = 32, kLeastTexels = 32, kMostTexels = 1024;
 constexpr double kCover = 0.58;  // of an atlas' texels
 // Of a covered texel at a quality of 50 or so; textures that take fewer or more teach it.
 constexpr double kColourBits = 2.4, kOrmBits = 1.6;
@@ -142,9 +142,12 @@ std::optional<MadeProxy> ProxyWorkshop::finish(const BakedProxy& baked, std::uin
   out.shown = shown_proxy(baked.atlas,
                           rounded_mesh(baked.atlas, form.normals ? baked.normals : none, form.coding), groups,
                           pictures);
-  if (out.quality >= kFewBitsFrom) texel_bits_ *= kFewBits;
-  if (out.quality <= kManyBitsTo) texel_bits_ *= kManyBits;
   return out;
+}
+
+void ProxyWorkshop::learn(int quality) {
+  if (quality >= kFewBitsFrom) texel_bits_ *= kFewBits;
+  if (quality <= kManyBitsTo) texel_bits_ *= kManyBits;
 }
 
 }  // namespace texmesh::proxies

@@ -62,6 +62,8 @@ class ProxyWorkshop {
   std::optional<BakedProxy> bake(double target_bytes, const ProxyForm& form, const RunContext& context);
   /// At most 2 % above `target_bytes`, or nothing. `form` may differ from the one baked for.
   std::optional<MadeProxy> finish(const BakedProxy& baked, std::uint64_t target_bytes, const ProxyForm& form);
+  /// The quality that a size's textures came to says how large those of the next one can be.
+  void learn(int quality);
 
  private:
   std::uint32_t texture_side(double bytes) const;

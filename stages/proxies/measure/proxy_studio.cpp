@@ -97,16 +97,16 @@ FlipSum ProxyStudio::compare(const RenderScene& scene, const std::vector<RenderT
   return sum;
 }
 
-double ProxyStudio::flip_of(const ShownModel& model, const RunContext& context) {
+FlipSum ProxyStudio::at_middle(const ShownModel& model, const RunContext& context) {
   const RenderScene scene = render_scene(model.mesh, model.shown.materials, model.shown.textures.size());
-  return compare(scene, model.shown.textures, kMiddle, context).mean();
+  return compare(scene, model.shown.textures, kMiddle, context);
 }
 
-std::vector<ProxyPictureLoss> ProxyStudio::losses(const ShownModel& model, const RunContext& context) {
+std::vector<ProxyPictureLoss> ProxyStudio::losses(const ShownModel& model, const FlipSum& middle, const RunContext& context) {
   std::vector<ProxyPictureLoss> out;
   const RenderScene scene = render_scene(model.mesh, model.shown.materials, model.shown.textures.size());
   for (std::size_t size = 0; size < kDisplayedPx.size(); ++size) {
-    const FlipSum flip = compare(scene, model.shown.textures, size, context);
+    const FlipSum flip = size == kMiddle ? middle : compare(scene, model.shown.textures, size, context);
     out.push_back({kDisplayedPx[size], flip.mean(), flip.percentile(0.95)});
   }
   return out;
