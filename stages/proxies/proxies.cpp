@@ -22,7 +22,7 @@ using proxies::SurfaceLadder;
 
 constexpr std::uint32_t kLeastTriangles = 60;
 constexpr double kLeastBytesPerTriangle = 4;
-constexpr double kFirstMeshShare = 0.7, kMeshShare = 0.65;
+constexpr double kFirstMeshShare = 0.7, kMeshShare = 0.65, kLargeMeshShare = 0.55;
 constexpr int kFineFrom = 100000, kNormalMapPaysFrom = 100000;  // bytes
 
 /// Source textures need not be finer than what a proxy and the pictures show of them.
@@ -36,7 +36,7 @@ std::uint32_t least_side_px(const std::vector<Material>& materials) {
 ProxyForm first_form(int bytes, bool first) {
   ProxyForm out;
   out.maps.orm = true;
-  out.mesh_share = first ? kFirstMeshShare : kMeshShare;
+  out.mesh_share = first ? kFirstMeshShare : bytes < kFineFrom ? kMeshShare : kLargeMeshShare;
   out.coding = {!first, bytes < kFineFrom ? 11 : 12};
   return out;
 }

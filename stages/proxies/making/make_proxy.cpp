@@ -19,6 +19,8 @@ constexpr double kColourBits = 2.4, kOrmBits = 1.6;
 constexpr int kFewBitsFrom = 80, kManyBitsTo = 25;  // qualities
 constexpr double kFewBits = 0.55, kManyBits = 1.5;
 constexpr double kMeshoptBytes = 9.5, kDracoBytes = 3.2;  // of a triangle, until one mesh is coded
+constexpr int kAttempts = 3;
+constexpr double kLeastMiss = 0.7, kMostMiss = 1.1;  // of a mesh' bytes: textures take what is left
 constexpr std::size_t kSamples = 400000;
 
 /// Packs at the side, or at the least larger one that holds the charts.
@@ -91,8 +93,8 @@ std::optional<BakedProxy> ProxyWorkshop::coded(double mesh_bytes, std::uint32_t 
   if (of_triangle == 0) of_triangle = form.coding.draco ? kDracoBytes : kMeshoptBytes;
   std::optional<BakedProxy> out;
   const ChartedSurface* last = nullptr;
-  // The bytes of a triangle are known once one mesh is coded; the third try is the last.
-  for (int attempt = 0; attempt < 3; ++attempt) {
+  // The bytes of a triangle are known once one mesh is coded.
+  for (int attempt = 0; attempt < kAttempts; ++attempt) {
     const ChartedSurface* charted = surfaces_.at_most(mesh_bytes / of_triangle, context);
     if (!charted) return std::nullopt;
     if (charted == last) break;
@@ -106,7 +108,7 @@ std::optional<BakedProxy> ProxyWorkshop::coded(double mesh_bytes, std::uint32_t 
     if (mesh.groups.empty()) return std::nullopt;
     const auto bytes = static_cast<double>(mesh.bytes());
     of_triangle = bytes / static_cast<double>(charted->surface.triangles.size());
-    if (bytes <= 1.1 * mesh_bytes && bytes >= 0.8 * mesh_bytes) break;
+    if (bytes <= kMostMiss * mesh_bytes && bytes >= kLeastMiss * mesh_bytes) break;
   }
   return out;
 }

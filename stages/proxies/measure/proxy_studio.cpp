@@ -9,7 +9,7 @@
 namespace texmesh::proxies {
 namespace {
 
-constexpr int kViews = 6;
+constexpr int kViews = 4;
 
 RenderTexture decoded(const ProxyImage& image, bool srgb, const RunContext& context) {
   return render_texture(decode_webp_picture(image.file),
