@@ -10,8 +10,8 @@
 namespace texmesh {
 namespace {
 
-using proxies::BakeSource;
 using proxies::BakedProxy;
+using proxies::BakeSource;
 using proxies::find_groups;
 using proxies::MadeProxy;
 using proxies::MaterialGroups;
@@ -54,9 +54,9 @@ class ProxyRun {
       : scales_(scales),
         shown_(shown),
         mode_(options.mode),
-        mapped_(std::ranges::any_of(shown.materials, [](const RenderMaterial& m) {
-          return !m.unlit && m.slot(TextureUse::kNormal).texture >= 0;
-        })),
+        mapped_(std::ranges::any_of(
+            shown.materials,
+            [](const RenderMaterial& m) { return !m.unlit && m.slot(TextureUse::kNormal).texture >= 0; })),
         surfaces_(mesh, groups, kLeastTriangles, most_triangles(mesh, options), context),
         shop_(source, groups, surfaces_),
         studio_(mesh, shown, context) {}
@@ -145,6 +145,12 @@ Proxies make_proxies(const NestedScales& scales, const std::vector<Material>& ma
   Proxies out;
   if (options.mode == ProxyMode::kNone || options.sizes.empty()) return out;
   if (scales.scales.empty()) throw StageError("proxies", "scales", "S_0", "none");
+  if (options.mode == ProxyMode::kAuto &&
+      proxies::whole_mesh_is_small(scales, static_cast<std::uint64_t>(options.sizes.front()))) {
+    note_none(out.notes, options.sizes.front(),
+              "S_0's mesh takes few of them, so the source's atlas can stay");
+    return out;
+  }
   RunContext inner = context;
   inner.progress = nullptr;
   const Mesh mesh = extract_scale(scales, scales.scales.front());

@@ -11,8 +11,8 @@ namespace {
 
 using Weights = std::array<double, 3>;
 
-/// Places of a triangle, evenly spread: the middles of a subdivision's upright triangles. Small triangles need
-/// fewer.
+/// Places of a triangle, evenly spread: the middles of a subdivision's upright triangles. Small triangles
+/// need fewer.
 std::vector<Weights> places_of_triangles(std::size_t triangles) {
   constexpr std::size_t kManyTriangles = 3000;
   const int n = triangles < kManyTriangles ? 4 : 2;

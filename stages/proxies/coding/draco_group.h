@@ -20,8 +20,8 @@ struct DracoInput {
 };
 
 struct DracoGroup {
-  Bytes stream;                        // empty: none
-  std::array<std::uint32_t, 3> ids{};  // of positions, normals, uvs in the stream
+  Bytes stream;                             // empty: none
+  std::array<std::uint32_t, 3> ids{};       // of positions, normals, uvs in the stream
   std::size_t triangles = 0, vertices = 0;  // as a decoder gives them
 };
 /// Edgebreaker, each attribute with seams of its own, so positions are stored once. StageError when Draco

@@ -135,7 +135,8 @@ class ProxyWriter {
       writer_.array("textures").push_back(std::move(texture));
     }
     Json out{{"index", *texture_[slot]}};
-    if (is_quantised()) out["extensions"]["KHR_texture_transform"] = {{"scale", numbers({uv_step_.x, uv_step_.y})}};
+    if (is_quantised())
+      out["extensions"]["KHR_texture_transform"] = {{"scale", numbers({uv_step_.x, uv_step_.y})}};
     return out;
   }
 

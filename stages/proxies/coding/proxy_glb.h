@@ -22,7 +22,7 @@ struct ProxyPictures {
   std::optional<ProxyImage> normal, emission;
   float metallic = 0, roughness = 1;  // where there is no `orm`
   Vec3f emissive;                     // what emission is to be multiplied by
-  int quality = 0;  // that of the base colour, 0..100
+  int quality = 0;                    // that of the base colour, 0..100
   std::size_t bytes() const;
 };
 

@@ -218,9 +218,7 @@ RoundedMesh rounded_mesh(const AtlasMesh& mesh, const std::vector<Vec3f>& normal
   RoundedMesh out;
   for (const Vec3f p : mesh.positions)
     out.positions.push_back(position_at(coder.grid(), coder.grid().places(p)));
-  const auto component = [](float x) {
-    return static_cast<float>(static_cast<std::int8_t>(signed8(x)));
-  };
+  const auto component = [](float x) { return static_cast<float>(static_cast<std::int8_t>(signed8(x))); };
   for (const Vec3f n : normals)
     out.normals.push_back(normalized(Vec3f{component(n.x), component(n.y), component(n.z)}));
   const Vec2f step = coder.uv_grid().step();

@@ -30,8 +30,8 @@ struct CodedGroup {
   /// Per vertex three u16 on the positions' grid, two bytes of 0, two u16 on the coordinates' grid; with
   /// normals three i8, normalised, and a byte of 0.
   MeshStream vertex_stream;
-  MeshStream indices;  // u16 or u32
-  DracoGroup draco;    // instead of both, where its stream is not empty
+  MeshStream indices;                            // u16 or u32
+  DracoGroup draco;                              // instead of both, where its stream is not empty
   std::array<std::uint32_t, 3> least{}, most{};  // of the positions
   bool is_draco() const { return !draco.stream.empty(); }
   std::size_t triangles() const { return is_draco() ? draco.triangles : indices.count / 3; }

@@ -11,7 +11,7 @@ namespace texmesh::proxies {
 namespace {
 
 constexpr float kOcclusionInColour = 0.5f;
-constexpr int kLeastQuality = 5, kMostQuality = 95;
+constexpr int kLeastQuality = 1, kMostQuality = 95;
 constexpr double kFull = 0.975;  // of the bytes: more is not worth another run of the encoder
 // Normals and plain numbers need finer steps than colours for the same look.
 constexpr int kNormalQualityAbove = 10, kOrmQualityBelow = 5;

@@ -31,8 +31,7 @@ Bytes encode_webp(const Pixels& pixels, int quality) {
   picture.custom_ptr = &memory;
   const auto import = pixels.channels == 4 ? WebPPictureImportRGBA : WebPPictureImportRGB;
   const auto stride = static_cast<int>(pixels.width_px * pixels.channels);
-  const bool coded =
-      import(&picture, pixels.data.data(), stride) != 0 && WebPEncode(&config, &picture) != 0;
+  const bool coded = import(&picture, pixels.data.data(), stride) != 0 && WebPEncode(&config, &picture) != 0;
   const int error = picture.error_code;
   WebPPictureFree(&picture);
   Bytes out;

@@ -9,7 +9,7 @@
 namespace texmesh::proxies {
 namespace {
 
-constexpr double kJsonBytes = 1900;  // of a GLB with one material, and the heads of its pictures
+constexpr double kJsonBytes = 1900;  // about, of a GLB with one material
 constexpr double kOver = 1.02;       // of the bytes asked for
 constexpr std::uint32_t kGutterPx = 1;
 constexpr std::uint32_t kTexelStep = 32, kLeastTexels = 32, kMostTexels = 1024;
@@ -37,6 +37,17 @@ std::vector<bool> with_normals(const MaterialGroups& groups, bool normals) {
   std::vector<bool> out;
   for (const MaterialGroup& g : groups.groups) out.push_back(normals && !g.unlit);
   return out;
+}
+
+/// All of the file that is neither mesh nor picture; offsets of pictures take a few digits more.
+double frame_bytes(const CodedMesh& mesh, const std::vector<MaterialGroup>& groups, const MapPixels& maps) {
+  constexpr double kDigits = 40;
+  ProxyPictures none;
+  none.metallic = maps.metallic, none.roughness = maps.roughness, none.emissive = maps.emissive;
+  if (maps.choice.orm) none.orm.emplace();
+  if (maps.choice.normal) none.normal.emplace();
+  if (!maps.emission.data.empty()) none.emission.emplace();
+  return static_cast<double>(proxy_glb(mesh, groups, none).size()) + kDigits;
 }
 
 std::vector<ProxyTexture> textures_of(const ProxyPictures& pictures) {
@@ -104,7 +115,8 @@ std::optional<BakedProxy> ProxyWorkshop::coded(double mesh_bytes, std::uint32_t 
     out.emplace();
     out->atlas = std::move(*atlas);
     out->normals = sampled_normals(out->atlas, source_, context);
-    const CodedMesh mesh = code_mesh(out->atlas, out->normals, with_normals(groups_, form.normals), form.coding);
+    const CodedMesh mesh =
+        code_mesh(out->atlas, out->normals, with_normals(groups_, form.normals), form.coding);
     if (mesh.groups.empty()) return std::nullopt;
     const auto bytes = static_cast<double>(mesh.bytes());
     of_triangle = bytes / static_cast<double>(charted->surface.triangles.size());
@@ -127,7 +139,7 @@ std::optional<MadeProxy> ProxyWorkshop::finish(const BakedProxy& baked, std::uin
   const MapPixels maps = map_pixels(baked.maps, form.maps);
   const CodedMesh mesh =
       code_mesh(baked.atlas, baked.normals, with_normals(groups_, form.normals), form.coding);
-  const double left = static_cast<double>(target_bytes) - static_cast<double>(mesh.bytes()) - kJsonBytes;
+  const double left = static_cast<double>(target_bytes) - frame_bytes(mesh, groups, maps);
   const ProxyPictures pictures = code_pictures(maps, static_cast<std::size_t>(std::max(left, 0.0)));
   MadeProxy out;
   out.quality = pictures.quality;
@@ -141,9 +153,9 @@ std::optional<MadeProxy> ProxyWorkshop::finish(const BakedProxy& baked, std::uin
   }
   out.proxy.textures = textures_of(pictures);
   const std::vector<Vec3f> none;
-  out.shown = shown_proxy(baked.atlas,
-                          rounded_mesh(baked.atlas, form.normals ? baked.normals : none, form.coding), groups,
-                          pictures);
+  out.shown =
+      shown_proxy(baked.atlas, rounded_mesh(baked.atlas, form.normals ? baked.normals : none, form.coding),
+                  groups, pictures);
   return out;
 }
 

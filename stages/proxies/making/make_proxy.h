@@ -73,7 +73,7 @@ class ProxyWorkshop {
   const BakeSource& source_;
   const MaterialGroups& groups_;
   SurfaceLadder& surfaces_;
-  double texel_bits_ = 1;                                           // times those of an ordinary texture
+  double texel_bits_ = 1;                                      // times those of an ordinary texture
   std::array<std::array<double, 2>, 2> bytes_per_triangle_{};  // by Draco, by normals; 0 = not known
 };
 

@@ -12,8 +12,7 @@ namespace {
 constexpr int kViews = 4;
 
 RenderTexture decoded(const ProxyImage& image, bool srgb, const RunContext& context) {
-  return render_texture(decode_webp_picture(image.file),
-                        srgb, 0, context);
+  return render_texture(decode_webp_picture(image.file), srgb, 0, context);
 }
 
 RenderMaterial proxy_material(const MaterialGroup& group, const ProxyPictures& pictures) {
@@ -102,7 +101,8 @@ FlipSum ProxyStudio::at_middle(const ShownModel& model, const RunContext& contex
   return compare(scene, model.shown.textures, kMiddle, context);
 }
 
-std::vector<ProxyPictureLoss> ProxyStudio::losses(const ShownModel& model, const FlipSum& middle, const RunContext& context) {
+std::vector<ProxyPictureLoss> ProxyStudio::losses(const ShownModel& model, const FlipSum& middle,
+                                                  const RunContext& context) {
   std::vector<ProxyPictureLoss> out;
   const RenderScene scene = render_scene(model.mesh, model.shown.materials, model.shown.textures.size());
   for (std::size_t size = 0; size < kDisplayedPx.size(); ++size) {

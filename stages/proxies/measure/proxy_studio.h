@@ -35,7 +35,8 @@ class ProxyStudio {
                   const RunContext& context);
   FlipSum at_middle(const ShownModel& model, const RunContext& context);
   /// At all of them, of which the middle one is known.
-  std::vector<ProxyPictureLoss> losses(const ShownModel& model, const FlipSum& middle, const RunContext& context);
+  std::vector<ProxyPictureLoss> losses(const ShownModel& model, const FlipSum& middle,
+                                       const RunContext& context);
 
  private:
   struct View {
