@@ -165,7 +165,7 @@ std::vector<Stage> stage_table(const CompileOptions& o) {
             read_of(o, o.poster), {"libjpeg-turbo"}, make_poster),
       stage({"proxies", kProxiesVersion, "S_0 -> small GLBs with atlases and textures of their own"},
             inputs(kNestedScales, kMaterials, kFragments, kFilledPlanes), outputs(kProxies),
-            read_of(o, o.proxies), {"libjpeg-turbo", "libwebp", "meshoptimizer"}, bake_proxies),
+            read_of(o, o.proxies), {"draco", "libwebp", "meshoptimizer"}, bake_proxies),
       stage({"package", kPackageVersion, "everything -> the container"},
             inputs(kNestedScales, kPerceptualValues, kImages, kFragments, kLadder, kPreviews, kTables,
                    kThesisTables, kScaleFiles, kQuality, kPoster, kProxies, kSourceAbout, kProvenance),

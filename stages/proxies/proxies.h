@@ -10,7 +10,7 @@
 
 namespace texmesh {
 
-inline constexpr int kProxiesVersion = 1;
+inline constexpr int kProxiesVersion = 2;
 
 /// kAuto: only those that beat what the source's atlas gives for the same bytes.
 enum class ProxyMode : std::uint8_t { kNone, kAuto, kAlways };
@@ -36,11 +36,12 @@ struct ProxiesOptions {
 /// - Mesh: simplification without regard to the source's charts, one run for all sizes; new charts, packed
 ///   into one square. Triangles of one class of materials (unlit or lit, single- or double-sided, opaque,
 ///   mask or blend) become one material.
-/// - Maps: base colour; a lit material's occlusion, half of it, is multiplied into the base colour until the
-///   size pays for a map of occlusion, roughness and metal; a normal map from the same size on; emission
-///   where something glows. Vertex colours and factors are in the texels.
-/// - File: GLB by EXT_meshopt_compression and KHR_mesh_quantization, JPEG inside, or WebP where there is
-///   alpha. It is at most 2 % larger than its size asks for.
+/// - Maps: base colour; occlusion, roughness and metal where they vary; from 100 kB on a normal map where it
+///   looks better; emission where something glows. Vertex colours and factors are in the texels.
+/// - Normals of vertices are there where pictures with them look better than flat triangles.
+/// - File: GLB with WebP inside. The smallest one, which clients show before they have a decoder, is coded by
+///   EXT_meshopt_compression, KHR_mesh_quantization and KHR_texture_transform, larger ones by
+///   KHR_draco_mesh_compression. It is at most 2 % larger than its size asks for.
 /// - Losses: FLIP of lit pictures beside S_0's (stages/render in the studio's light) at three displayed
 ///   heights, where the height is that of the bounding box's longest side.
 /// - Automatic choice: sizes from the first on at which a scale with the source's atlas looks better are left

@@ -179,12 +179,17 @@ class Baker {
 void finish_maps(BakedMaps& maps) {
   double count = 0;
   Vec3d sum;
+  maps.least_orm = {1, 1, 1};
   for (std::size_t i = 0; i < maps.covered.size(); ++i) {
     if (!maps.covered[i]) continue;
     count += 1;
-    sum = sum + to_double(maps.occlusion_roughness_metallic[i]);
-    const Vec3f e = maps.emission[i];
-    for (int k = 0; k < 3; ++k) maps.most_emission[k] = std::max(maps.most_emission[k], e[k]);
+    const Vec3f orm = maps.occlusion_roughness_metallic[i], e = maps.emission[i];
+    sum = sum + to_double(orm);
+    for (int k = 0; k < 3; ++k) {
+      maps.least_orm[k] = std::min(maps.least_orm[k], orm[k]);
+      maps.most_orm[k] = std::max(maps.most_orm[k], orm[k]);
+      maps.most_emission[k] = std::max(maps.most_emission[k], e[k]);
+    }
     maps.has_alpha = maps.has_alpha || maps.alpha[i] < 0.999f;
   }
   maps.mean_orm = count > 0 ? to_float(sum * (1 / count)) : Vec3f{1, 1, 0};

@@ -22,9 +22,9 @@ struct BakedMaps {
   std::vector<Vec3f> occlusion_roughness_metallic;  // as the channels of glTF's ORM textures
   std::vector<Vec3f> normal;                        // tangent space, unit, +Y up
   std::vector<float> alpha;
-  std::vector<std::uint8_t> covered;  // 1 = a chart shows here
-  Vec3f mean_orm;                     // over covered texels
-  Vec3f most_emission;                // largest of each channel over all texels
+  std::vector<std::uint8_t> covered;    // 1 = a chart shows here
+  Vec3f mean_orm, least_orm, most_orm;  // over covered texels
+  Vec3f most_emission;                  // largest of each channel over all texels
   bool has_alpha = false, has_emission = false;
 };
 

@@ -9,15 +9,19 @@
 namespace texmesh::proxies {
 namespace {
 
-// Places of a triangle, evenly spread: the middles of a 4 x 4 subdivision's upright triangles.
-constexpr std::array<std::array<double, 3>, 10> kPlaces = [] {
-  std::array<std::array<double, 3>, 10> out{};
-  std::size_t n = 0;
-  for (int i = 0; i < 4; ++i)
-    for (int j = 0; i + j < 4; ++j)
-      out[n++] = {(i + 1.0 / 3) / 4, (j + 1.0 / 3) / 4, (3 - i - j + 1.0 / 3) / 4};
+using Weights = std::array<double, 3>;
+
+/// Places of a triangle, evenly spread: the middles of a subdivision's upright triangles. Small triangles
+/// need fewer.
+std::vector<Weights> places_of_triangles(std::size_t triangles) {
+  constexpr std::size_t kManyTriangles = 3000;
+  const int n = triangles < kManyTriangles ? 4 : 2;
+  std::vector<Weights> out;
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; i + j < n; ++j)
+      out.push_back({(i + 1.0 / 3) / n, (j + 1.0 / 3) / n, (n - 1 - i - j + 1.0 / 3) / n});
   return out;
-}();
+}
 
 using CornerSums = std::array<Vec3d, 3>;
 
@@ -27,14 +31,14 @@ Vec3d face_vector(const AtlasMesh& mesh, const Triangle& t) {
 }
 
 CornerSums sums_of(const AtlasMesh& mesh, std::size_t triangle, const std::vector<Vec3d>& smooth,
-                   const BakeSource& source) {
+                   const std::vector<Weights>& places, const BakeSource& source) {
   const Triangle& t = mesh.triangles[triangle];
   const Vec3d face = face_vector(mesh, t);
   const double area = length(face);
   CornerSums out{};
   if (!(area > 0)) return out;
   std::optional<SurfacePlace> guess;
-  for (const std::array<double, 3>& w : kPlaces) {
+  for (const Weights& w : places) {
     Vec3d p, normal;
     for (std::size_t k = 0; k < 3; ++k) {
       p = p + to_double(mesh.positions[t[k]]) * w[k];
@@ -45,7 +49,7 @@ CornerSums sums_of(const AtlasMesh& mesh, std::size_t triangle, const std::vecto
     const auto place = source.find(mesh.group_of[triangle], p, normal, guess);
     if (!place) continue;
     guess = place;
-    const double footprint = std::sqrt(area / (2 * kPlaces.size()));
+    const double footprint = std::sqrt(area / (2 * static_cast<double>(places.size())));
     const Vec3d n = to_double(source.sample(*place, footprint).normal);
     if (dot(n, face) > 0)
       for (std::size_t k = 0; k < 3; ++k) out[k] = out[k] + n * (w[k] * w[k] * area);
@@ -77,9 +81,10 @@ std::vector<Vec3f> sampled_normals(const AtlasMesh& mesh, const BakeSource& sour
   std::vector<Vec3d> smooth(shared.size());
   for (std::size_t v = 0; v < shared.size(); ++v) smooth[v] = normalized(face_sum[shared[v]]);
 
+  const std::vector<Weights> places = places_of_triangles(mesh.triangles.size());
   std::vector<CornerSums> sums(mesh.triangles.size());
   parallel_for(context, sums.size(), 64, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t t = begin; t < end; ++t) sums[t] = sums_of(mesh, t, smooth, source);
+    for (std::size_t t = begin; t < end; ++t) sums[t] = sums_of(mesh, t, smooth, places, source);
   });
   std::vector<Vec3d> total(shared.size());
   for (std::size_t t = 0; t < sums.size(); ++t)

@@ -9,25 +9,28 @@ namespace texmesh::proxies {
 namespace {
 
 using Json = GlbWriter::Json;
-constexpr int kArrayBuffer = 34962, kElementArrayBuffer = 34963;
-constexpr int kByte = 5120, kUnsignedShort = 5123, kUnsignedInt = 5125;
+constexpr int kByte = 5120, kUnsignedShort = 5123, kUnsignedInt = 5125, kFloat = 5126;
 
 class ProxyWriter {
  public:
   Bytes write(const CodedMesh& mesh, const std::vector<MaterialGroup>& groups,
               const ProxyPictures& pictures) {
-    writer_.use_extension("EXT_meshopt_compression", true);
-    writer_.use_extension("KHR_mesh_quantization", true);
+    uv_step_ = mesh.uv_step;
     Json primitives = Json::array();
     for (const CodedGroup& g : mesh.groups) {
-      primitives.push_back(primitive(g));
+      primitives.push_back(g.is_draco() ? draco_primitive(g, mesh) : primitive(g));
       primitives.back()["material"] = writer_.array("materials").size();
       writer_.array("materials").push_back(material(groups.at(g.group), pictures));
     }
     writer_.array("meshes").push_back({{"primitives", std::move(primitives)}});
     Json node{{"mesh", 0}};
-    node["translation"] = numbers({mesh.origin.x, mesh.origin.y, mesh.origin.z});
-    node["scale"] = numbers({mesh.step, mesh.step, mesh.step});
+    if (is_quantised()) {
+      writer_.use_extension("EXT_meshopt_compression", true);
+      writer_.use_extension("KHR_mesh_quantization", true);
+      writer_.use_extension("KHR_texture_transform", true);
+      node["translation"] = numbers({mesh.origin.x, mesh.origin.y, mesh.origin.z});
+      node["scale"] = numbers({mesh.step, mesh.step, mesh.step});
+    }
     writer_.array("nodes").push_back(std::move(node));
     writer_.set_fallback_buffer(fallback_bytes_);
     return writer_.finish();
@@ -40,13 +43,14 @@ class ProxyWriter {
     return out;
   }
 
+  /// Whether positions and coordinates are places of grids, which node and textures scale.
+  bool is_quantised() const { return fallback_bytes_ > 0; }
+
   std::size_t view(const MeshStream& s, bool is_index) {
-    const std::size_t offset = writer_.add_bytes(s.packed);
     Json view{{"buffer", 1}, {"byteOffset", fallback_bytes_}, {"byteLength", s.count * s.stride}};
     if (!is_index) view["byteStride"] = s.stride;
-    view["target"] = is_index ? kElementArrayBuffer : kArrayBuffer;
     view["extensions"]["EXT_meshopt_compression"] = {{"buffer", 0},
-                                                     {"byteOffset", offset},
+                                                     {"byteOffset", writer_.add_bytes(s.packed)},
                                                      {"byteLength", s.packed.size()},
                                                      {"byteStride", s.stride},
                                                      {"count", s.count},
@@ -54,29 +58,65 @@ class ProxyWriter {
     fallback_bytes_ += (s.count * s.stride + 3) / 4 * 4;
     return writer_.add_json_view(std::move(view));
   }
-  std::size_t accessor(const MeshStream& s, int type, const char* shape, bool normalized) {
-    Json json{{"bufferView", view(s, false)}, {"componentType", type}};
-    if (normalized) json["normalized"] = true;
-    json["count"] = s.count;
-    json["type"] = shape;
-    return writer_.add_accessor(std::move(json));
-  }
   Json primitive(const CodedGroup& g) {
+    constexpr std::size_t kUvOffset = 8, kNormalOffset = 12;
+    const std::size_t vertices = view(g.vertex_stream, false), n = g.vertices();
     Json attributes;
-    Json positions{{"bufferView", view(g.positions, false)},
-                   {"componentType", kUnsignedShort},
-                   {"count", g.positions.count},
-                   {"type", "VEC3"},
-                   {"min", g.least},
-                   {"max", g.most}};
-    attributes["POSITION"] = writer_.add_accessor(std::move(positions));
-    if (g.normals.count > 0) attributes["NORMAL"] = accessor(g.normals, kByte, "VEC3", true);
-    attributes["TEXCOORD_0"] = accessor(g.uvs, kUnsignedShort, "VEC2", true);
+    attributes["POSITION"] = writer_.add_accessor({{"bufferView", vertices},
+                                                   {"componentType", kUnsignedShort},
+                                                   {"count", n},
+                                                   {"type", "VEC3"},
+                                                   {"min", g.least},
+                                                   {"max", g.most}});
+    if (g.has_normals)
+      attributes["NORMAL"] = writer_.add_accessor({{"bufferView", vertices},
+                                                   {"byteOffset", kNormalOffset},
+                                                   {"componentType", kByte},
+                                                   {"normalized", true},
+                                                   {"count", n},
+                                                   {"type", "VEC3"}});
+    attributes["TEXCOORD_0"] = writer_.add_accessor({{"bufferView", vertices},
+                                                     {"byteOffset", kUvOffset},
+                                                     {"componentType", kUnsignedShort},
+                                                     {"count", n},
+                                                     {"type", "VEC2"}});
     Json indices{{"bufferView", view(g.indices, true)},
                  {"componentType", g.indices.stride == 2 ? kUnsignedShort : kUnsignedInt},
                  {"count", g.indices.count},
                  {"type", "SCALAR"}};
     return {{"attributes", std::move(attributes)}, {"indices", writer_.add_accessor(std::move(indices))}};
+  }
+
+  std::size_t empty_accessor(int type, std::size_t count, const char* shape) {
+    return writer_.add_accessor({{"componentType", type}, {"count", count}, {"type", shape}});
+  }
+  Json draco_primitive(const CodedGroup& g, const CodedMesh& mesh) {
+    writer_.use_extension("KHR_draco_mesh_compression", true);
+    const auto place = [&](const std::array<std::uint32_t, 3>& at) {
+      const Vec3f p{static_cast<float>(at[0]), static_cast<float>(at[1]), static_cast<float>(at[2])};
+      const Vec3f q = mesh.origin + p * mesh.step;
+      return numbers({q.x, q.y, q.z});
+    };
+    const std::size_t n = g.vertices();
+    Json attributes, ids;
+    attributes["POSITION"] = writer_.add_accessor({{"componentType", kFloat},
+                                                   {"count", n},
+                                                   {"type", "VEC3"},
+                                                   {"min", place(g.least)},
+                                                   {"max", place(g.most)}});
+    ids["POSITION"] = g.draco.ids[0];
+    if (g.has_normals) {
+      attributes["NORMAL"] = empty_accessor(kFloat, n, "VEC3");
+      ids["NORMAL"] = g.draco.ids[1];
+    }
+    attributes["TEXCOORD_0"] = empty_accessor(kFloat, n, "VEC2");
+    ids["TEXCOORD_0"] = g.draco.ids[2];
+    Json out{
+        {"attributes", std::move(attributes)},
+        {"indices", empty_accessor(n > 65535 ? kUnsignedInt : kUnsignedShort, 3 * g.triangles(), "SCALAR")}};
+    out["extensions"]["KHR_draco_mesh_compression"] = {{"bufferView", writer_.add_view(g.draco.stream)},
+                                                       {"attributes", std::move(ids)}};
+    return out;
   }
 
   /// Of one picture the same texture for all materials.
@@ -87,18 +127,17 @@ class ProxyWriter {
         samplers.push_back({{"magFilter", 9729}, {"minFilter", 9987}, {"wrapS", 33071}, {"wrapT", 33071}});
       Json texture{{"sampler", 0}};
       const std::size_t source = writer_.array("images").size();
-      if (image.webp) {
-        texture["extensions"]["EXT_texture_webp"]["source"] = source;
-        writer_.use_extension("EXT_texture_webp", true);
-      } else {
-        texture["source"] = source;
-      }
-      writer_.array("images").push_back({{"bufferView", writer_.add_view(image.file)},
-                                         {"mimeType", image.webp ? "image/webp" : "image/jpeg"}});
+      texture["extensions"]["EXT_texture_webp"]["source"] = source;
+      writer_.use_extension("EXT_texture_webp", true);
+      writer_.array("images").push_back(
+          {{"bufferView", writer_.add_view(image.file)}, {"mimeType", "image/webp"}});
       texture_[slot] = writer_.array("textures").size();
       writer_.array("textures").push_back(std::move(texture));
     }
-    return {{"index", *texture_[slot]}};
+    Json out{{"index", *texture_[slot]}};
+    if (is_quantised())
+      out["extensions"]["KHR_texture_transform"] = {{"scale", numbers({uv_step_.x, uv_step_.y})}};
+    return out;
   }
 
   Json material(const MaterialGroup& group, const ProxyPictures& pictures) {
@@ -132,6 +171,7 @@ class ProxyWriter {
 
   GlbWriter writer_;
   std::size_t fallback_bytes_ = 0;
+  Vec2f uv_step_;
   std::array<std::optional<std::size_t>, 4> texture_;
 };
 

@@ -9,11 +9,10 @@
 
 namespace texmesh::proxies {
 
-/// A coded picture: JPEG, or WebP where there is alpha.
+/// A coded picture: lossy WebP.
 struct ProxyImage {
   Bytes file;
   std::uint32_t width_px = 0, height_px = 0;
-  bool webp = false;
 };
 
 /// All that one material reads; what is not there is a factor. All groups share the pictures.
@@ -23,6 +22,7 @@ struct ProxyPictures {
   std::optional<ProxyImage> normal, emission;
   float metallic = 0, roughness = 1;  // where there is no `orm`
   Vec3f emissive;                     // what emission is to be multiplied by
+  int quality = 0;                    // that of the base colour, 0..100
   std::size_t bytes() const;
 };
 

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
 #include "format/base/box.h"
 #include "format/base/no_index.h"
@@ -38,11 +37,37 @@ PositionGrid make_position_grid(const AtlasMesh& mesh, int bits) {
   return grid;
 }
 
-std::uint16_t unit16(float x) {
-  return static_cast<std::uint16_t>(std::floor(std::clamp(x, 0.0f, 1.0f) * 65535 + 0.5f));
+// Coordinates need not be finer than this part of a texel.
+constexpr std::uint32_t kStepsPerTexel = 4;
+
+/// Places from 0 to 1 along both axes.
+struct UvGrid {
+  std::array<std::uint32_t, 2> last{};
+  std::uint32_t place(float x, std::size_t axis) const {
+    return static_cast<std::uint32_t>(
+        std::floor(std::clamp(x, 0.0f, 1.0f) * static_cast<float>(last[axis]) + 0.5f));
+  }
+  Vec2f step() const { return {1 / static_cast<float>(last[0]), 1 / static_cast<float>(last[1])}; }
+};
+
+int uv_bits(const AtlasMesh& mesh) {
+  int bits = 6;
+  while (bits < 16 && (std::uint32_t{1} << bits) < kStepsPerTexel * std::max(mesh.width_px, mesh.height_px))
+    ++bits;
+  return bits;
 }
-std::int8_t signed8(float x) {
-  return static_cast<std::int8_t>(std::floor(std::clamp(x, -1.0f, 1.0f) * 127 + 0.5f));
+
+UvGrid make_uv_grid(const AtlasMesh& mesh, bool draco) {
+  if (draco) {
+    const std::uint32_t last = (std::uint32_t{1} << uv_bits(mesh)) - 1;
+    return {{last, last}};
+  }
+  const auto steps = [](std::uint32_t texels) { return std::clamp(kStepsPerTexel * texels, 1u, 65535u); };
+  return {{steps(mesh.width_px), steps(mesh.height_px)}};
+}
+
+std::uint8_t signed8(float x) {
+  return static_cast<std::uint8_t>(static_cast<int>(std::floor(std::clamp(x, -1.0f, 1.0f) * 127 + 0.5f)));
 }
 
 /// Vertices and triangles of one group, in the order of first use by cache-friendly strips.
@@ -78,86 +103,128 @@ GroupMesh group_mesh(const AtlasMesh& mesh, std::uint32_t group, const PositionG
   return {std::move(vertices), std::move(ordered)};
 }
 
-template <class T, std::size_t N, class Value>
-MeshStream attribute_stream(const std::vector<std::uint32_t>& vertices, const Value& value) {
-  static_assert(sizeof(T) * N % 4 == 0);
-  MeshStream out{{}, sizeof(T) * N, vertices.size()};
-  std::vector<std::uint8_t> raw(out.stride * out.count);
-  for (std::size_t i = 0; i < vertices.size(); ++i) {
-    const std::array<T, N> element = value(vertices[i]);
-    std::memcpy(raw.data() + i * out.stride, element.data(), sizeof element);
-  }
-  out.packed = meshopt_attributes(raw, out.count, out.stride, "proxies");
-  return out;
-}
-
 MeshStream index_stream(const GroupMesh& group) {
   MeshStream out{{}, group.vertices.size() > 65535 ? 4u : 2u, group.indices.size()};
   out.packed = meshopt_triangles(group.indices, group.vertices.size(), "proxies");
   return out;
 }
 
-CodedGroup code_group(const AtlasMesh& mesh, const std::vector<Vec3f>& normals, const GroupMesh& group,
-                      const PositionGrid& grid) {
-  CodedGroup out;
-  out.least.fill(grid.last);
-  out.positions = attribute_stream<std::uint16_t, 4>(group.vertices, [&](std::uint32_t v) {
-    const std::array<std::uint32_t, 3> at = grid.places(mesh.positions[v]);
-    for (std::size_t k = 0; k < 3; ++k) {
-      out.least[k] = std::min(out.least[k], at[k]);
-      out.most[k] = std::max(out.most[k], at[k]);
-    }
-    return std::array<std::uint16_t, 4>{static_cast<std::uint16_t>(at[0]), static_cast<std::uint16_t>(at[1]),
-                                        static_cast<std::uint16_t>(at[2]), 0};
-  });
-  if (!normals.empty())
-    out.normals = attribute_stream<std::int8_t, 4>(group.vertices, [&](std::uint32_t v) {
-      const Vec3f n = normals[v];
-      return std::array<std::int8_t, 4>{signed8(n.x), signed8(n.y), signed8(n.z), 0};
-    });
-  out.uvs = attribute_stream<std::uint16_t, 2>(group.vertices, [&](std::uint32_t v) {
-    return std::array<std::uint16_t, 2>{unit16(mesh.uvs[v].x), unit16(mesh.uvs[v].y)};
-  });
-  out.indices = index_stream(group);
-  return out;
+Vec3f position_at(const PositionGrid& grid, const std::array<std::uint32_t, 3>& at) {
+  const Vec3f place{static_cast<float>(at[0]), static_cast<float>(at[1]), static_cast<float>(at[2])};
+  return grid.origin + place * grid.step;
 }
+
+void extend(CodedGroup& group, const std::array<std::uint32_t, 3>& at) {
+  for (std::size_t k = 0; k < 3; ++k) {
+    group.least[k] = std::min(group.least[k], at[k]);
+    group.most[k] = std::max(group.most[k], at[k]);
+  }
+}
+
+/// All that the groups of a mesh share.
+class GroupCoder {
+ public:
+  GroupCoder(const AtlasMesh& mesh, const MeshCoding& coding)
+      : mesh_(mesh),
+        coding_(coding),
+        grid_(make_position_grid(mesh, coding.position_bits)),
+        uv_grid_(make_uv_grid(mesh, coding.draco)) {}
+
+  const PositionGrid& grid() const { return grid_; }
+  const UvGrid& uv_grid() const { return uv_grid_; }
+  CodedGroup code(const GroupMesh& group, const std::vector<Vec3f>& normals) const {
+    CodedGroup out;
+    out.least.fill(grid_.last);
+    if (coding_.draco)
+      code_draco(group, normals, out);
+    else
+      code_meshopt(group, normals, out);
+    return out;
+  }
+
+ private:
+  void code_meshopt(const GroupMesh& group, const std::vector<Vec3f>& normals, CodedGroup& out) const {
+    out.has_normals = !normals.empty();
+    std::vector<std::uint8_t> raw;
+    const auto put16 = [&](std::uint32_t x) {
+      raw.push_back(static_cast<std::uint8_t>(x));
+      raw.push_back(static_cast<std::uint8_t>(x >> 8));
+    };
+    for (const std::uint32_t v : group.vertices) {
+      const std::array<std::uint32_t, 3> at = grid_.places(mesh_.positions[v]);
+      extend(out, at);
+      for (const std::uint32_t x : {at[0], at[1], at[2], 0u}) put16(x);
+      put16(uv_grid_.place(mesh_.uvs[v].x, 0));
+      put16(uv_grid_.place(mesh_.uvs[v].y, 1));
+      if (!out.has_normals) continue;
+      const Vec3f n = normals[v];
+      raw.insert(raw.end(), {signed8(n.x), signed8(n.y), signed8(n.z), 0});
+    }
+    out.vertex_stream = {{}, out.has_normals ? 16u : 12u, group.vertices.size()};
+    out.vertex_stream.packed =
+        meshopt_attributes(raw, out.vertex_stream.count, out.vertex_stream.stride, "proxies");
+    out.indices = index_stream(group);
+  }
+
+  void code_draco(const GroupMesh& group, const std::vector<Vec3f>& normals, CodedGroup& out) const {
+    DracoInput input;
+    for (const std::uint32_t v : group.vertices) {
+      const std::array<std::uint32_t, 3> at = grid_.places(mesh_.positions[v]);
+      extend(out, at);
+      input.positions.push_back(position_at(grid_, at));
+      if (!normals.empty()) input.normals.push_back(normals[v]);
+      input.uvs.push_back(mesh_.uvs[v]);
+    }
+    input.indices = group.indices;
+    input.origin = grid_.origin;
+    input.range = grid_.step * static_cast<float>(grid_.last);
+    input.position_bits = coding_.position_bits;
+    out.has_normals = !normals.empty();
+    input.uv_bits = uv_bits(mesh_);
+    out.draco = code_draco_group(input);
+  }
+
+  const AtlasMesh& mesh_;
+  const MeshCoding& coding_;
+  PositionGrid grid_;
+  UvGrid uv_grid_;
+};
 
 }  // namespace
 
 std::size_t CodedMesh::bytes() const {
   std::size_t sum = 0;
   for (const CodedGroup& g : groups)
-    for (const MeshStream* s : {&g.positions, &g.normals, &g.uvs, &g.indices}) sum += s->packed.size();
+    sum += g.draco.stream.size() + g.vertex_stream.packed.size() + g.indices.packed.size();
   return sum;
 }
 
 CodedMesh code_mesh(const AtlasMesh& mesh, const std::vector<Vec3f>& normals,
-                    const std::vector<bool>& with_normals, int position_bits) {
-  const PositionGrid grid = make_position_grid(mesh, position_bits);
-  CodedMesh out{grid.origin, grid.step, {}};
+                    const std::vector<bool>& with_normals, const MeshCoding& coding) {
+  const GroupCoder coder(mesh, coding);
+  CodedMesh out{coder.grid().origin, coder.grid().step, coder.uv_grid().step(), {}};
   const std::vector<Vec3f> none;
   for (std::uint32_t g = 0; g < with_normals.size(); ++g) {
-    const GroupMesh group = group_mesh(mesh, g, grid);
+    const GroupMesh group = group_mesh(mesh, g, coder.grid());
     if (group.indices.empty()) continue;
-    out.groups.push_back(code_group(mesh, with_normals[g] ? normals : none, group, grid));
+    out.groups.push_back(coder.code(group, with_normals[g] ? normals : none));
     out.groups.back().group = g;
   }
   return out;
 }
 
-RoundedMesh rounded_mesh(const AtlasMesh& mesh, const std::vector<Vec3f>& normals, int position_bits) {
-  const PositionGrid grid = make_position_grid(mesh, position_bits);
+RoundedMesh rounded_mesh(const AtlasMesh& mesh, const std::vector<Vec3f>& normals, const MeshCoding& coding) {
+  const GroupCoder coder(mesh, coding);
   RoundedMesh out;
-  for (const Vec3f p : mesh.positions) {
-    const std::array<std::uint32_t, 3> at = grid.places(p);
-    const Vec3f place{static_cast<float>(at[0]), static_cast<float>(at[1]), static_cast<float>(at[2])};
-    out.positions.push_back(grid.origin + place * grid.step);
-  }
+  for (const Vec3f p : mesh.positions)
+    out.positions.push_back(position_at(coder.grid(), coder.grid().places(p)));
+  const auto component = [](float x) { return static_cast<float>(static_cast<std::int8_t>(signed8(x))); };
   for (const Vec3f n : normals)
-    out.normals.push_back(normalized(Vec3f{static_cast<float>(signed8(n.x)), static_cast<float>(signed8(n.y)),
-                                           static_cast<float>(signed8(n.z))}));
+    out.normals.push_back(normalized(Vec3f{component(n.x), component(n.y), component(n.z)}));
+  const Vec2f step = coder.uv_grid().step();
   for (const Vec2f uv : mesh.uvs)
-    out.uvs.push_back({static_cast<float>(unit16(uv.x)) / 65535, static_cast<float>(unit16(uv.y)) / 65535});
+    out.uvs.push_back({static_cast<float>(coder.uv_grid().place(uv.x, 0)) * step.x,
+                       static_cast<float>(coder.uv_grid().place(uv.y, 1)) * step.y});
   return out;
 }
 

@@ -4,15 +4,15 @@
 #include <cmath>
 
 #include "format/base/errors.h"
-#include "stages/jpeg/jpeg.h"
-#include "stages/proxies/coding/webp_alpha.h"
+#include "stages/proxies/coding/webp_picture.h"
 #include "stages/render/shade.h"
 
 namespace texmesh::proxies {
 namespace {
 
 constexpr float kOcclusionInColour = 0.5f;
-constexpr int kLeastQuality = 5, kMostQuality = 95;
+constexpr int kLeastQuality = 1, kMostQuality = 95;
+constexpr double kFull = 0.975;  // of the bytes: more is not worth another run of the encoder
 // Normals and plain numbers need finer steps than colours for the same look.
 constexpr int kNormalQualityAbove = 10, kOrmQualityBelow = 5;
 
@@ -43,23 +43,18 @@ Pixels with_alpha(const Pixels& rgb, const std::vector<float>& alpha) {
   return out;
 }
 
-ProxyImage code_jpeg(const Pixels& pixels, int quality, Subsampling subsampling) {
-  return {encode_jpeg(pixels, std::clamp(quality, 1, 100), subsampling), pixels.width_px, pixels.height_px,
-          false};
+ProxyImage code_picture(const Pixels& pixels, int quality) {
+  return {encode_webp(pixels, std::clamp(quality, 0, 100)), pixels.width_px, pixels.height_px};
 }
 
 ProxyPictures code_at(const MapPixels& maps, int quality) {
   ProxyPictures out;
   out.metallic = maps.metallic, out.roughness = maps.roughness, out.emissive = maps.emissive;
-  if (maps.base_colour.channels == 4)
-    out.base_colour = {encode_webp_alpha(maps.base_colour, quality), maps.base_colour.width_px,
-                       maps.base_colour.height_px, true};
-  else
-    out.base_colour = code_jpeg(maps.base_colour, quality, Subsampling::k420);
-  if (maps.choice.orm) out.orm = code_jpeg(maps.orm, quality - kOrmQualityBelow, Subsampling::k444);
-  if (maps.choice.normal)
-    out.normal = code_jpeg(maps.normal, quality + kNormalQualityAbove, Subsampling::k444);
-  if (!maps.emission.data.empty()) out.emission = code_jpeg(maps.emission, quality, Subsampling::k420);
+  out.quality = quality;
+  out.base_colour = code_picture(maps.base_colour, quality);
+  if (maps.choice.orm) out.orm = code_picture(maps.orm, quality - kOrmQualityBelow);
+  if (maps.choice.normal) out.normal = code_picture(maps.normal, quality + kNormalQualityAbove);
+  if (!maps.emission.data.empty()) out.emission = code_picture(maps.emission, quality);
   return out;
 }
 
@@ -68,15 +63,20 @@ ProxyPictures code_at(const MapPixels& maps, int quality) {
 MapPixels map_pixels(const BakedMaps& maps, const MapChoice& choice) {
   MapPixels out;
   out.choice = choice;
+  // A map of one value says no more than a factor.
+  constexpr float kSame = 1.5f / 255;
+  bool varies = false;
+  for (int k = 0; k < 3; ++k) varies = varies || maps.most_orm[k] - maps.least_orm[k] > kSame;
+  out.choice.orm = choice.orm && (varies || maps.mean_orm.x < 1 - kSame);
   const std::uint32_t w = maps.width_px, h = maps.height_px;
   std::vector<Vec3f> base = maps.base_colour;
-  if (!choice.orm)
+  if (!out.choice.orm)
     for (std::size_t i = 0; i < base.size(); ++i)
       base[i] = base[i] * (1 - kOcclusionInColour * (1 - maps.occlusion_roughness_metallic[i].x));
   out.base_colour = srgb_pixels(base, w, h);
   if (maps.has_alpha) out.base_colour = with_alpha(out.base_colour, maps.alpha);
   out.roughness = maps.mean_orm.y, out.metallic = maps.mean_orm.z;
-  if (choice.orm) out.orm = plain_pixels(maps.occlusion_roughness_metallic, w, h, false);
+  if (out.choice.orm) out.orm = plain_pixels(maps.occlusion_roughness_metallic, w, h, false);
   if (choice.normal) out.normal = plain_pixels(maps.normal, w, h, true);
   if (!maps.has_emission) return out;
   std::vector<Vec3f> emission = maps.emission;
@@ -94,8 +94,10 @@ ProxyPictures code_pictures(const MapPixels& maps, std::size_t max_bytes) {
   for (int low = kLeastQuality + 1, high = kMostQuality; low <= high;) {
     const int quality = (low + high) / 2;
     ProxyPictures coded = code_at(maps, quality);
-    if (coded.bytes() <= max_bytes) {
+    const std::size_t bytes = coded.bytes();
+    if (bytes <= max_bytes) {
       best = std::move(coded);
+      if (static_cast<double>(bytes) >= kFull * static_cast<double>(max_bytes)) break;
       low = quality + 1;
     } else {
       high = quality - 1;

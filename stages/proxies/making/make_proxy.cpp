@@ -9,23 +9,19 @@
 namespace texmesh::proxies {
 namespace {
 
-constexpr double kJsonBytes = 2200;  // of a GLB with one material, and the heads of its pictures
+constexpr double kJsonBytes = 1900;  // about, of a GLB with one material
 constexpr double kOver = 1.02;       // of the bytes asked for
 constexpr std::uint32_t kGutterPx = 1;
-constexpr std::uint32_t kTexelStep = 32, kLeastTexels = 32, kMostTexels = 2048;
-constexpr double kCover = 0.58;                                         // of an atlas' texels
-constexpr double kColourBits = 2.0, kNormalBits = 1.4, kOrmBits = 0.9;  // a covered texel
+constexpr std::uint32_t kTexelStep = 32, kLeastTexels = 32, kMostTexels = 1024;
+constexpr double kCover = 0.58;  // of an atlas' texels
+// Of a covered texel at a quality of 50 or so; textures that take fewer or more teach it.
+constexpr double kColourBits = 2.4, kOrmBits = 1.6;
+constexpr int kFewBitsFrom = 80, kManyBitsTo = 25;  // qualities
+constexpr double kFewBits = 0.55, kManyBits = 1.5;
+constexpr double kMeshoptBytes = 9.5, kDracoBytes = 3.2;  // of a triangle, until one mesh is coded
+constexpr int kAttempts = 3;
+constexpr double kLeastMiss = 0.7, kMostMiss = 1.1;  // of a mesh' bytes: textures take what is left
 constexpr std::size_t kSamples = 400000;
-
-int position_bits(std::uint64_t target_bytes) { return target_bytes < 30000 ? 11 : 12; }
-
-/// The side of a square texture whose maps cost so many bytes.
-std::uint32_t texture_side(double bytes, const MapChoice& maps) {
-  const double bits = kColourBits + (maps.normal ? kNormalBits : 0) + (maps.orm ? kOrmBits : 0);
-  const double side = std::sqrt(std::max(bytes, 1.0) * 8 / (bits * kCover));
-  const auto steps = static_cast<std::uint32_t>(std::clamp(side / kTexelStep + 0.5, 1.0, 64.0));
-  return std::clamp(steps * kTexelStep, kLeastTexels, kMostTexels);
-}
 
 /// Packs at the side, or at the least larger one that holds the charts.
 std::optional<AtlasMesh> pack(const ChartedSurface& charted, std::uint32_t side_px,
@@ -37,23 +33,21 @@ std::optional<AtlasMesh> pack(const ChartedSurface& charted, std::uint32_t side_
   return std::nullopt;
 }
 
-struct CodedAtlas {
-  AtlasMesh atlas;
-  std::vector<Vec3f> normals;
-  CodedMesh mesh;
-};
-
-std::optional<CodedAtlas> code_atlas(const ProxyWorkshop& shop, const ChartedSurface& charted,
-                                     std::uint32_t side_px, std::uint64_t target_bytes,
-                                     const RunContext& context) {
-  auto atlas = pack(charted, side_px, context);
-  if (!atlas) return std::nullopt;
-  CodedAtlas out{std::move(*atlas), {}, {}};
-  out.normals = sampled_normals(out.atlas, shop.source, context);
-  std::vector<bool> lit;
-  for (const MaterialGroup& g : shop.groups.groups) lit.push_back(!g.unlit);
-  out.mesh = code_mesh(out.atlas, out.normals, lit, position_bits(target_bytes));
+std::vector<bool> with_normals(const MaterialGroups& groups, bool normals) {
+  std::vector<bool> out;
+  for (const MaterialGroup& g : groups.groups) out.push_back(normals && !g.unlit);
   return out;
+}
+
+/// All of the file that is neither mesh nor picture; offsets of pictures take a few digits more.
+double frame_bytes(const CodedMesh& mesh, const std::vector<MaterialGroup>& groups, const MapPixels& maps) {
+  constexpr double kDigits = 40;
+  ProxyPictures none;
+  none.metallic = maps.metallic, none.roughness = maps.roughness, none.emissive = maps.emissive;
+  if (maps.choice.orm) none.orm.emplace();
+  if (maps.choice.normal) none.normal.emplace();
+  if (!maps.emission.data.empty()) none.emission.emplace();
+  return static_cast<double>(proxy_glb(mesh, groups, none).size()) + kDigits;
 }
 
 std::vector<ProxyTexture> textures_of(const ProxyPictures& pictures) {
@@ -68,30 +62,11 @@ std::vector<ProxyTexture> textures_of(const ProxyPictures& pictures) {
   return out;
 }
 
-MadeProxy finish(const ProxyWorkshop& shop, const CodedAtlas& coded, std::uint64_t target_bytes,
-                 const MapChoice& choice, const RunContext& context) {
-  const std::vector<MaterialGroup>& groups = shop.groups.groups;
-  const MapPixels maps = map_pixels(bake(coded.atlas, coded.normals, shop.source, kSamples, context), choice);
-  const double left = static_cast<double>(target_bytes) - static_cast<double>(coded.mesh.bytes());
-  ProxyPictures pictures = code_pictures(maps, static_cast<std::size_t>(std::max(left - kJsonBytes, 0.0)));
-  MadeProxy out;
-  out.proxy.glb = proxy_glb(coded.mesh, groups, pictures);
-  out.proxy.target_bytes = target_bytes;
-  for (const CodedGroup& g : coded.mesh.groups) {
-    out.proxy.triangles += static_cast<std::uint32_t>(g.triangles());
-    out.proxy.vertices += static_cast<std::uint32_t>(g.vertices());
-  }
-  out.proxy.textures = textures_of(pictures);
-  out.shown = shown_proxy(coded.atlas, rounded_mesh(coded.atlas, coded.normals, position_bits(target_bytes)),
-                          groups, pictures);
-  return out;
-}
-
 }  // namespace
 
 SurfaceLadder::SurfaceLadder(const Mesh& mesh, const MaterialGroups& groups, std::uint32_t least,
                              std::uint32_t most, const RunContext& context) {
-  constexpr double kStep = 0.84;
+  constexpr double kStep = 0.88;
   std::vector<std::uint32_t> counts;
   for (double count = most; count >= least; count *= kStep)
     counts.push_back(static_cast<std::uint32_t>(count));
@@ -111,25 +86,82 @@ const ChartedSurface* SurfaceLadder::at_most(double triangles, const RunContext&
   return &*charted_[i];
 }
 
-std::optional<MadeProxy> ProxyWorkshop::make(std::uint64_t target_bytes, const ByteSplit& split,
-                                             const RunContext& context) {
-  const auto target = static_cast<double>(target_bytes);
-  const double mesh_bytes = split.mesh_share * target;
-  const std::uint32_t side_px = texture_side(target - mesh_bytes - kJsonBytes, split.maps);
-  std::optional<CodedAtlas> coded;
-  // The bytes of a triangle are known once one mesh is coded; the second try is the last.
-  for (int attempt = 0; attempt < 2; ++attempt) {
-    const ChartedSurface* charted = surfaces.at_most(mesh_bytes / bytes_per_triangle, context);
+ProxyWorkshop::ProxyWorkshop(const BakeSource& source, const MaterialGroups& groups, SurfaceLadder& surfaces)
+    : source_(source), groups_(groups), surfaces_(surfaces) {}
+
+/// The side of a square texture whose maps cost so many bytes.
+std::uint32_t ProxyWorkshop::texture_side(double bytes) const {
+  const double bits = (kColourBits + kOrmBits) * texel_bits_;
+  const double side = std::sqrt(std::max(bytes, 1.0) * 8 / (bits * kCover));
+  const auto steps = static_cast<std::uint32_t>(std::clamp(side / kTexelStep + 0.5, 1.0, 64.0));
+  return std::clamp(steps * kTexelStep, kLeastTexels, kMostTexels);
+}
+
+/// A packed surface whose mesh takes about so many bytes.
+std::optional<BakedProxy> ProxyWorkshop::coded(double mesh_bytes, std::uint32_t side_px,
+                                               const ProxyForm& form, const RunContext& context) {
+  double& of_triangle = bytes_per_triangle_[form.coding.draco ? 1 : 0][form.normals ? 1 : 0];
+  if (of_triangle == 0) of_triangle = form.coding.draco ? kDracoBytes : kMeshoptBytes;
+  std::optional<BakedProxy> out;
+  const ChartedSurface* last = nullptr;
+  // The bytes of a triangle are known once one mesh is coded.
+  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+    const ChartedSurface* charted = surfaces_.at_most(mesh_bytes / of_triangle, context);
     if (!charted) return std::nullopt;
-    coded = code_atlas(*this, *charted, side_px, target_bytes, context);
-    if (!coded || coded->mesh.groups.empty()) return std::nullopt;
-    const auto bytes = static_cast<double>(coded->mesh.bytes());
-    bytes_per_triangle = bytes / static_cast<double>(charted->surface.triangles.size());
-    if (bytes <= 1.1 * mesh_bytes && bytes >= 0.8 * mesh_bytes) break;
+    if (charted == last) break;
+    last = charted;
+    auto atlas = pack(*charted, side_px, context);
+    if (!atlas) return std::nullopt;
+    out.emplace();
+    out->atlas = std::move(*atlas);
+    out->normals = sampled_normals(out->atlas, source_, context);
+    const CodedMesh mesh =
+        code_mesh(out->atlas, out->normals, with_normals(groups_, form.normals), form.coding);
+    if (mesh.groups.empty()) return std::nullopt;
+    const auto bytes = static_cast<double>(mesh.bytes());
+    of_triangle = bytes / static_cast<double>(charted->surface.triangles.size());
+    if (bytes <= kMostMiss * mesh_bytes && bytes >= kLeastMiss * mesh_bytes) break;
   }
-  MadeProxy made = finish(*this, *coded, target_bytes, split.maps, context);
-  if (static_cast<double>(made.proxy.glb.size()) > kOver * target) return std::nullopt;
-  return made;
+  return out;
+}
+
+std::optional<BakedProxy> ProxyWorkshop::bake(double target_bytes, const ProxyForm& form,
+                                              const RunContext& context) {
+  const double mesh_bytes = form.mesh_share * target_bytes;
+  auto out = coded(mesh_bytes, texture_side(target_bytes - mesh_bytes - kJsonBytes), form, context);
+  if (out) out->maps = proxies::bake(out->atlas, out->normals, source_, kSamples, context);
+  return out;
+}
+
+std::optional<MadeProxy> ProxyWorkshop::finish(const BakedProxy& baked, std::uint64_t target_bytes,
+                                               const ProxyForm& form) {
+  const std::vector<MaterialGroup>& groups = groups_.groups;
+  const MapPixels maps = map_pixels(baked.maps, form.maps);
+  const CodedMesh mesh =
+      code_mesh(baked.atlas, baked.normals, with_normals(groups_, form.normals), form.coding);
+  const double left = static_cast<double>(target_bytes) - frame_bytes(mesh, groups, maps);
+  const ProxyPictures pictures = code_pictures(maps, static_cast<std::size_t>(std::max(left, 0.0)));
+  MadeProxy out;
+  out.quality = pictures.quality;
+  out.proxy.glb = proxy_glb(mesh, groups, pictures);
+  if (static_cast<double>(out.proxy.glb.size()) > kOver * static_cast<double>(target_bytes))
+    return std::nullopt;
+  out.proxy.target_bytes = target_bytes;
+  for (const CodedGroup& g : mesh.groups) {
+    out.proxy.triangles += static_cast<std::uint32_t>(g.triangles());
+    out.proxy.vertices += static_cast<std::uint32_t>(g.vertices());
+  }
+  out.proxy.textures = textures_of(pictures);
+  const std::vector<Vec3f> none;
+  out.shown =
+      shown_proxy(baked.atlas, rounded_mesh(baked.atlas, form.normals ? baked.normals : none, form.coding),
+                  groups, pictures);
+  return out;
+}
+
+void ProxyWorkshop::learn(int quality) {
+  if (quality >= kFewBitsFrom) texel_bits_ *= kFewBits;
+  if (quality <= kManyBitsTo) texel_bits_ *= kManyBits;
 }
 
 }  // namespace texmesh::proxies

@@ -1,18 +1,22 @@
 #pragma once
 // Inside the room only: one proxy of a given number of bytes.
+#include <array>
 #include <optional>
 #include <vector>
 
+#include "stages/proxies/bake/bake.h"
 #include "stages/proxies/charts/segment_charts.h"
 #include "stages/proxies/coding/proxy_pictures.h"
 #include "stages/proxies/measure/proxy_studio.h"
 
 namespace texmesh::proxies {
 
-/// How bytes are shared, and which maps there are. Fitted, see split_for().
-struct ByteSplit {
+/// What a proxy is made of. Fitted, see forms_of().
+struct ProxyForm {
   double mesh_share = 0.6;  // of the file
   MapChoice maps;
+  MeshCoding coding;
+  bool normals = true;  // of vertices; without, triangles are flat
 };
 
 /// A coarse surface with its charts.
@@ -35,21 +39,42 @@ class SurfaceLadder {
   std::vector<std::optional<ChartedSurface>> charted_;
 };
 
+/// All of a proxy that bytes do not depend on.
+struct BakedProxy {
+  AtlasMesh atlas;
+  std::vector<Vec3f> normals;
+  BakedMaps maps;
+};
+
 struct MadeProxy {
   Proxy proxy;       // without losses
   ShownModel shown;  // what it looks like
+  int quality = 0;   // of the pictures
 };
 
-/// What all proxies of a model are made from.
-struct ProxyWorkshop {
-  const BakeSource& source;
-  const MaterialGroups& groups;
-  SurfaceLadder& surfaces;
-  double bytes_per_triangle = 8;  // of coded meshes; learnt from the last one made
+/// Makes the proxies of a model, and learns from each what the next one's parts will cost.
+class ProxyWorkshop {
+ public:
+  /// All must outlive the workshop.
+  ProxyWorkshop(const BakeSource& source, const MaterialGroups& groups, SurfaceLadder& surfaces);
 
-  /// At most 2 % above `target_bytes`; nothing where no surface fits.
-  std::optional<MadeProxy> make(std::uint64_t target_bytes, const ByteSplit& split,
-                                const RunContext& context);
+  /// Nothing where no triangle is left or charts cannot be packed.
+  std::optional<BakedProxy> bake(double target_bytes, const ProxyForm& form, const RunContext& context);
+  /// At most 2 % above `target_bytes`, or nothing. `form` may differ from the one baked for.
+  std::optional<MadeProxy> finish(const BakedProxy& baked, std::uint64_t target_bytes, const ProxyForm& form);
+  /// The quality that a size's textures came to says how large those of the next one can be.
+  void learn(int quality);
+
+ private:
+  std::uint32_t texture_side(double bytes) const;
+  std::optional<BakedProxy> coded(double mesh_bytes, std::uint32_t side_px, const ProxyForm& form,
+                                  const RunContext& context);
+
+  const BakeSource& source_;
+  const MaterialGroups& groups_;
+  SurfaceLadder& surfaces_;
+  double texel_bits_ = 1;                                      // times those of an ordinary texture
+  std::array<std::array<double, 2>, 2> bytes_per_triangle_{};  // by Draco, by normals; 0 = not known
 };
 
 }  // namespace texmesh::proxies

@@ -46,6 +46,12 @@ std::vector<RenderTexture> affordable(const std::vector<RenderTexture>& textures
 
 }  // namespace
 
+bool whole_mesh_is_small(const NestedScales& scales, std::uint64_t bytes) {
+  constexpr double kSmall = 0.4;
+  std::vector<std::uint8_t> used;
+  return mesh_bytes(scales, 0, used) <= kSmall * static_cast<double>(bytes);
+}
+
 std::optional<double> rival_flip(const NestedScales& scales, const ShownMaterials& shown, std::uint64_t bytes,
                                  ProxyStudio& studio, const RunContext& context) {
   const auto all = static_cast<double>(bytes);

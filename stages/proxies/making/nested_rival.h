@@ -13,4 +13,8 @@ namespace texmesh::proxies {
 std::optional<double> rival_flip(const NestedScales& scales, const ShownMaterials& shown, std::uint64_t bytes,
                                  ProxyStudio& studio, const RunContext& context);
 
+/// Whether S_0's whole mesh, coded, leaves most of the bytes to the source's textures. Then no atlas of
+/// a proxy's own can win.
+bool whole_mesh_is_small(const NestedScales& scales, std::uint64_t bytes);
+
 }  // namespace texmesh::proxies

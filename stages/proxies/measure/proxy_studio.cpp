@@ -4,18 +4,15 @@
 #include <cmath>
 
 #include "format/base/box.h"
-#include "stages/jpeg/jpeg.h"
-#include "stages/proxies/coding/webp_alpha.h"
+#include "stages/proxies/coding/webp_picture.h"
 
 namespace texmesh::proxies {
 namespace {
 
-constexpr int kViews = 6;
-constexpr std::uint64_t kMostPixels = std::uint64_t{1} << 26;
+constexpr int kViews = 4;
 
 RenderTexture decoded(const ProxyImage& image, bool srgb, const RunContext& context) {
-  return render_texture(image.webp ? decode_webp_alpha(image.file) : decode_jpeg(image.file, kMostPixels),
-                        srgb, 0, context);
+  return render_texture(decode_webp_picture(image.file), srgb, 0, context);
 }
 
 RenderMaterial proxy_material(const MaterialGroup& group, const ProxyPictures& pictures) {
@@ -99,11 +96,17 @@ FlipSum ProxyStudio::compare(const RenderScene& scene, const std::vector<RenderT
   return sum;
 }
 
-std::vector<ProxyPictureLoss> ProxyStudio::losses(const ShownModel& model, const RunContext& context) {
+FlipSum ProxyStudio::at_middle(const ShownModel& model, const RunContext& context) {
+  const RenderScene scene = render_scene(model.mesh, model.shown.materials, model.shown.textures.size());
+  return compare(scene, model.shown.textures, kMiddle, context);
+}
+
+std::vector<ProxyPictureLoss> ProxyStudio::losses(const ShownModel& model, const FlipSum& middle,
+                                                  const RunContext& context) {
   std::vector<ProxyPictureLoss> out;
   const RenderScene scene = render_scene(model.mesh, model.shown.materials, model.shown.textures.size());
   for (std::size_t size = 0; size < kDisplayedPx.size(); ++size) {
-    const FlipSum flip = compare(scene, model.shown.textures, size, context);
+    const FlipSum flip = size == kMiddle ? middle : compare(scene, model.shown.textures, size, context);
     out.push_back({kDisplayedPx[size], flip.mean(), flip.percentile(0.95)});
   }
   return out;

@@ -33,8 +33,10 @@ class ProxyStudio {
   /// At one of the displayed heights.
   FlipSum compare(const RenderScene& scene, const std::vector<RenderTexture>& textures, std::size_t size,
                   const RunContext& context);
-  /// At all of them.
-  std::vector<ProxyPictureLoss> losses(const ShownModel& model, const RunContext& context);
+  FlipSum at_middle(const ShownModel& model, const RunContext& context);
+  /// At all of them, of which the middle one is known.
+  std::vector<ProxyPictureLoss> losses(const ShownModel& model, const FlipSum& middle,
+                                       const RunContext& context);
 
  private:
   struct View {

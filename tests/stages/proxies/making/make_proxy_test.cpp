@@ -32,18 +32,45 @@ TEST(SurfaceLadder, GivesTheFinestSurfaceThatIsCoarseEnough) {
   EXPECT_EQ(w.surfaces.at_most(1000, {}), w.surfaces.at_most(1000, {})) << "charts are made once";
 }
 
+std::optional<MadeProxy> make(Workshop& w, int bytes, const ProxyForm& form) {
+  const auto baked = w.shop.bake(bytes, form, {});
+  return baked ? w.shop.finish(*baked, static_cast<std::uint64_t>(bytes), form) : std::nullopt;
+}
+
 TEST(ProxyWorkshop, MoreOfTheBytesForTheMeshMeanMoreTrianglesAndFewerTexels) {
   Workshop w{testing::bumpy_sphere(60, 120)};
-  const auto little = w.shop.make(20000, {0.4, {}}, {}), much = w.shop.make(20000, {0.7, {}}, {});
+  const auto little = make(w, 20000, {0.4, {}, {}, true}), much = make(w, 20000, {0.7, {}, {}, true});
   ASSERT_TRUE(little && much);
   EXPECT_GT(much->proxy.triangles, little->proxy.triangles);
   EXPECT_LT(much->proxy.textures[0].width_px, little->proxy.textures[0].width_px);
   for (const auto& made : {little, much}) EXPECT_LE(made->proxy.glb.size(), 20400u);
 }
 
+TEST(ProxyWorkshop, DracoAndFlatTrianglesHoldMoreTrianglesInTheSameBytes) {
+  Workshop w{testing::bumpy_sphere(100, 200)};
+  const ProxyForm meshopt{0.6, {}, {false, 12}, true}, draco{0.6, {}, {true, 12}, true},
+      flat{0.6, {}, {false, 12}, false};
+  const auto by_meshopt = make(w, 20000, meshopt), by_draco = make(w, 20000, draco),
+             no_normals = make(w, 20000, flat);
+  ASSERT_TRUE(by_meshopt && by_draco && no_normals);
+  EXPECT_GT(by_draco->proxy.triangles, by_meshopt->proxy.triangles * 3 / 2);
+  EXPECT_GT(no_normals->proxy.triangles, by_meshopt->proxy.triangles);
+  EXPECT_TRUE(no_normals->shown.mesh.normals.empty());
+}
+
+TEST(ProxyWorkshop, QualitiesTeachTheNextTexturesSide) {
+  Workshop w{testing::bumpy_sphere(60, 120)};
+  const ProxyForm form{0.5, {}, {}, true};
+  const auto before = make(w, 20000, form);
+  w.shop.learn(90);
+  const auto after = make(w, 20000, form);
+  ASSERT_TRUE(before && after);
+  EXPECT_GT(after->proxy.textures[0].width_px, before->proxy.textures[0].width_px);
+}
+
 TEST(ProxyWorkshop, NothingWhereEvenTheCoarsestDoesNotFit) {
   Workshop w{testing::bumpy_sphere(30, 60)};
-  EXPECT_FALSE(w.shop.make(1500, {}, {}));
+  EXPECT_FALSE(make(w, 1500, {}));
 }
 
 }  // namespace

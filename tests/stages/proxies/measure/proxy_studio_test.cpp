@@ -20,13 +20,14 @@ ShownModel plain_model(const Mesh& mesh, Vec4f colour) {
 TEST(ProxyStudio, S0ItselfHasNoLossAndAnotherColourHasOne) {
   const ShownModel source = plain_model(testing::sphere(20, 40), {0.5f, 0.5f, 0.5f, 1});
   ProxyStudio studio(source.mesh, source.shown, {});
-  const std::vector<ProxyPictureLoss> same = studio.losses(source, {});
+  const std::vector<ProxyPictureLoss> same = studio.losses(source, studio.at_middle(source, {}), {});
   ASSERT_EQ(same.size(), ProxyStudio::kDisplayedPx.size());
   for (const ProxyPictureLoss& loss : same) {
     EXPECT_EQ(loss.flip_mean, 0);
     EXPECT_EQ(loss.flip_p95, 0);
   }
-  for (const ProxyPictureLoss& loss : studio.losses(plain_model(source.mesh, {1, 0, 0, 1}), {})) {
+  const ShownModel red = plain_model(source.mesh, {1, 0, 0, 1});
+  for (const ProxyPictureLoss& loss : studio.losses(red, studio.at_middle(red, {}), {})) {
     EXPECT_GT(loss.flip_mean, 0.2);
     EXPECT_GE(loss.flip_p95, loss.flip_mean);
   }
@@ -47,10 +48,11 @@ TEST(ProxyStudio, AProxyIsShownAsItsFileSaysIt) {
   maps.normal.assign(16, {0, 0, 1});
   maps.alpha.assign(16, 1);
   maps.covered.assign(16, 1);
-  maps.mean_orm = {1, 0.25f, 0.75f};
+  maps.mean_orm = maps.least_orm = {1, 0.25f, 0.75f};
+  maps.most_orm = {1, 0.5f, 0.75f};
   const MaterialGroup group{false, true, AlphaMode::kOpaque};
   const auto shown = [&](const MapChoice& choice) {
-    return shown_proxy(atlas, rounded_mesh(atlas, std::vector<Vec3f>(3, {0, 0, 1}), 12), {group},
+    return shown_proxy(atlas, rounded_mesh(atlas, std::vector<Vec3f>(3, {0, 0, 1}), {}), {group},
                        code_pictures(map_pixels(maps, choice), 100000));
   };
   const ShownModel plain = shown({false, false});

@@ -1,4 +1,4 @@
-#include "stages/proxies/coding/webp_alpha.h"
+#include "stages/proxies/coding/webp_picture.h"
 
 #include <webp/decode.h>
 #include <webp/encode.h>
@@ -8,8 +8,13 @@
 #include "format/base/errors.h"
 
 namespace texmesh::proxies {
+namespace {
 
-Bytes encode_webp_alpha(const Pixels& rgba, int quality) {
+constexpr int kMethod = 4;
+
+}  // namespace
+
+Bytes encode_webp(const Pixels& pixels, int quality) {
   WebPConfig config;
   WebPPicture picture;
   if (!WebPConfigInit(&config) || !WebPPictureInit(&picture))
@@ -17,14 +22,16 @@ Bytes encode_webp_alpha(const Pixels& rgba, int quality) {
   config.quality = static_cast<float>(quality);
   config.alpha_quality = quality;
   config.thread_level = 0;
-  picture.width = static_cast<int>(rgba.width_px);
-  picture.height = static_cast<int>(rgba.height_px);
+  config.method = kMethod;
+  picture.width = static_cast<int>(pixels.width_px);
+  picture.height = static_cast<int>(pixels.height_px);
   WebPMemoryWriter memory;
   WebPMemoryWriterInit(&memory);
   picture.writer = WebPMemoryWrite;
   picture.custom_ptr = &memory;
-  const bool coded = WebPPictureImportRGBA(&picture, rgba.data.data(), static_cast<int>(rgba.width_px * 4)) &&
-                     WebPEncode(&config, &picture);
+  const auto import = pixels.channels == 4 ? WebPPictureImportRGBA : WebPPictureImportRGB;
+  const auto stride = static_cast<int>(pixels.width_px * pixels.channels);
+  const bool coded = import(&picture, pixels.data.data(), stride) != 0 && WebPEncode(&config, &picture) != 0;
   const int error = picture.error_code;
   WebPPictureFree(&picture);
   Bytes out;
@@ -35,7 +42,7 @@ Bytes encode_webp_alpha(const Pixels& rgba, int quality) {
   return out;
 }
 
-Pixels decode_webp_alpha(const Bytes& file) {
+Pixels decode_webp_picture(const Bytes& file) {
   int width = 0, height = 0;
   if (!WebPGetInfo(file.data(), file.size(), &width, &height))
     throw StageError("proxies", "WebP", "a file", std::to_string(file.size()) + " bytes");
