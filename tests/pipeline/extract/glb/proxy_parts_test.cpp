@@ -103,8 +103,8 @@ TEST(ProxyParts, WithoutDataItsMeansStandAndOcclusionIsInTheColours) {
   const std::vector<ProxyMap> maps = parts->maps(choice);
   ASSERT_EQ(maps.size(), 2u);
   EXPECT_EQ(maps[1].use, Use::kEmission);
-  // 200 is .578 of light; of that 1 - .5 (1 - .2) = .6 is left, which is 158.
-  EXPECT_EQ(maps[0].pixels.data[0], 158);
+  // 200 is .578 of light; of that 1 - .5 (1 - .2) = .6 is left, .347, which is 159.
+  EXPECT_EQ(maps[0].pixels.data[0], 159);
 }
 
 TEST(ProxyParts, PicturesTakeAnyShare) {
