@@ -10,6 +10,7 @@
 #include "pipeline/extract/budget/budget_search.h"
 #include "pipeline/extract/budget/proxy_search.h"
 #include "pipeline/extract/glb/joined_jpeg.h"
+#include "pipeline/extract/glb/plain_file.h"
 #include "pipeline/extract/glb/scale_file.h"
 #include "pipeline/extract/glb/standalone_glb.h"
 #include "pipeline/extract/glb/texture_source.h"
@@ -127,6 +128,7 @@ Extracted extract_whole(PackageReader& package, const ExtractRequest& request, c
   if (request.lods) file.begin_levels(screen_coverage_of(m, out.scale));
   for (std::size_t l = 1; l < out.levels.size(); ++l)
     file.add_level(scale_file(package, out.levels[l], context), screen_coverage_of(m, out.levels[l]));
+  if (request.plain) file = plain_file(file, mesh_path(out.scale), context);
   if (!request.recentre) file.move_to(m.origin);
   const std::map<std::uint32_t, std::uint32_t> planes = shown_planes(package, request);
   const std::vector<std::uint32_t> used = file.source_images();
@@ -147,7 +149,7 @@ Extracted extract_whole(PackageReader& package, const ExtractRequest& request, c
 }  // namespace
 
 Extracted extract_model(PackageReader& package, const ExtractRequest& request, const RunContext& context) {
-  if (request.proxy) return extract_proxy(package, request, *request.proxy);
+  if (request.proxy) return extract_proxy(package, request, *request.proxy, context);
   if (request.bytes == 0) return extract_whole(package, request, context);
   Extracted out = extract_bytes(package, request, context);
   if (about_within(package.about(), request.bytes / kAboutShare) != package.about())

@@ -9,6 +9,7 @@
 #include "format/container/layout.h"
 #include "pipeline/about/gltf_about.h"
 #include "pipeline/extract/budget/quality_search.h"
+#include "pipeline/extract/glb/plain_file.h"
 #include "pipeline/extract/glb/proxy_parts.h"
 #include "pipeline/import/import.h"
 #include "pipeline/io/file_resolver.h"
@@ -45,7 +46,7 @@ class ProxySearch {
   void run() {
     const auto count = static_cast<std::uint32_t>(source_.package.manifest().proxies.size());
     for (std::uint32_t k = 0; k < count; ++k) {
-      Extracted whole = extract_proxy(source_.package, source_.request, k);
+      Extracted whole = extract_proxy(source_.package, source_.request, k, source_.context);
       measure(source_.package.proxy_glb(k), whole);
       if (fits(whole) || !(whole.difference < best_.difference || !fits(best_)))
         offer(std::move(whole));  // what is made of it looks no better
@@ -200,10 +201,12 @@ class ProxySearch {
 
 }  // namespace
 
-Extracted extract_proxy(PackageReader& package, const ExtractRequest& request, std::uint32_t proxy) {
+Extracted extract_proxy(PackageReader& package, const ExtractRequest& request, std::uint32_t proxy,
+                        const RunContext& context) {
   const Manifest& m = package.manifest();
   const Bytes glb = package.proxy_glb(proxy);  // refuses a proxy that is not there
   StandaloneGlb file(glb, proxy_path(proxy), GlbRules::kStandalone);
+  if (request.plain) file = plain_file(file, proxy_path(proxy), context);
   if (!request.recentre) file.move_to(m.origin);
   file.set_about(request.bytes > 0 ? about_within(package.about(), request.bytes / kAboutShare)
                                    : package.about());

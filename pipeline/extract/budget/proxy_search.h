@@ -6,7 +6,8 @@ namespace texmesh {
 
 /// A proxy as the package has it, moved and described as the request wants it. InputError for a proxy that
 /// is not there.
-Extracted extract_proxy(PackageReader& package, const ExtractRequest& request, std::uint32_t proxy);
+Extracted extract_proxy(PackageReader& package, const ExtractRequest& request, std::uint32_t proxy,
+                        const RunContext& context);
 
 /// Replaces `found`, a file of a scale for source.request.bytes, by one of a proxy where that one's whole lit
 /// pictures are nearer to the package's best, or where only that one keeps within the bytes. A proxy of too

@@ -4,12 +4,12 @@
 #include <array>
 #include <nlohmann/json.hpp>
 
-#include "format/base/bounded_json.h"
 #include "format/base/box.h"
 #include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "format/base/srgb.h"
 #include "format/split/split_stream.h"
+#include "pipeline/extract/glb/glb_chunks.h"
 #include "pipeline/extract/glb/texture_source.h"
 #include "pipeline/import/import.h"
 #include "pipeline/io/file_resolver.h"
@@ -24,26 +24,6 @@ using Use = ProxyMap::Use;
 constexpr float kOcclusionInColour = 0.5f;  // as stages/proxies has it
 constexpr int kUncodedBits = 20;            // of positions, before they are coded as a file asks for
 constexpr std::uint32_t kLeastMapSide = 4;
-
-struct Chunks {
-  Json root;
-  Bytes binary;
-};
-
-/// Of a file that StandaloneGlb has checked.
-Chunks chunks_of(std::span<const std::uint8_t> glb, const std::string& entry) {
-  BytesIn in({glb.data(), glb.size()}, entry);
-  in.raw(12);
-  const std::uint32_t json_bytes = in.u32();
-  in.u32();
-  Chunks out{parse_bounded_json(in.raw(json_bytes), entry), {}};
-  if (in.left() == 0) return out;
-  const std::uint32_t binary_bytes = in.u32();
-  in.u32();
-  const auto binary = in.raw(binary_bytes);
-  out.binary.assign(binary.begin(), binary.end());
-  return out;
-}
 
 struct Slot {
   const char* parent;  // "" = the material itself
@@ -205,7 +185,7 @@ std::optional<ProxyParts> ProxyParts::read(std::span<const std::uint8_t> glb, co
   StandaloneGlb(glb, entry, GlbRules::kStandalone);  // checks it
   ProxyParts out;
   out.entry_ = entry;
-  Chunks chunks = chunks_of(glb, entry);
+  GlbChunks chunks = glb_chunks(glb, entry);
   if (!chunks.root.contains("materials")) return std::nullopt;
   out.maps_ = maps_in(chunks.root, chunks.binary);
   NoFiles none;
@@ -240,7 +220,7 @@ StandaloneGlb ProxyParts::file(const ProxyMapChoice& choice, const DracoSteps& s
                                const RunContext& context) const {
   StandaloneGlb coded = uncoded(model_.mesh, entry_);
   coded.recode(steps, nullptr, context);
-  Chunks chunks = chunks_of(coded.finish(), entry_);
+  GlbChunks chunks = glb_chunks(coded.finish(), entry_);
   Json root = materials_of(choice);
   keep_used(root);
   for (Json& image : root["images"]) image["bufferView"] = chunks.root["bufferViews"].size();

@@ -96,6 +96,7 @@ StandaloneGlb::StandaloneGlb(const StandaloneGlb& other)
       fallback_bytes_(other.fallback_bytes_),
       level_node_(other.level_node_) {}
 StandaloneGlb::StandaloneGlb(StandaloneGlb&& other) noexcept = default;
+StandaloneGlb& StandaloneGlb::operator=(StandaloneGlb&& other) noexcept = default;
 StandaloneGlb::~StandaloneGlb() = default;
 
 StandaloneGlb::StandaloneGlb(std::span<const std::uint8_t> glb, std::string entry, GlbRules rules)

@@ -24,7 +24,7 @@ class StandaloneGlb {
   StandaloneGlb(const StandaloneGlb& other);
   StandaloneGlb(StandaloneGlb&& other) noexcept;
   StandaloneGlb& operator=(const StandaloneGlb&) = delete;
-  StandaloneGlb& operator=(StandaloneGlb&&) = delete;
+  StandaloneGlb& operator=(StandaloneGlb&& other) noexcept;
   ~StandaloneGlb();
 
   /// Source images that the file's images stand for ("texture/<number>"), in the file's order.
