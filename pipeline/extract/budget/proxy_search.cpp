@@ -9,6 +9,7 @@
 #include "format/container/layout.h"
 #include "pipeline/about/gltf_about.h"
 #include "pipeline/extract/budget/quality_search.h"
+#include "pipeline/extract/glb/glb_chunks.h"
 #include "pipeline/extract/glb/plain_file.h"
 #include "pipeline/extract/glb/proxy_parts.h"
 #include "pipeline/import/import.h"
@@ -48,7 +49,9 @@ class ProxySearch {
     for (std::uint32_t k = 0; k < count; ++k) {
       Extracted whole = extract_proxy(source_.package, source_.request, k, source_.context);
       measure(source_.package.proxy_glb(k), whole);
-      if (fits(whole) || !(whole.difference < best_.difference || !fits(best_)))
+      if (!is_wanted_kind(k))
+        offer_smaller(k, whole);
+      else if (fits(whole) || !(whole.difference < best_.difference || !fits(best_)))
         offer(std::move(whole));  // what is made of it looks no better
       else
         offer_smaller(k, whole);
@@ -57,6 +60,17 @@ class ProxySearch {
 
  private:
   bool fits(const Extracted& file) const { return file.glb.size() <= source_.request.bytes; }
+
+  /// Whether the proxy's own images are of the format that is asked for.
+  bool is_wanted_kind(std::uint32_t proxy) const {
+    const ExtractImages wanted = source_.request.images;
+    if (wanted == ExtractImages::kAuto) return true;
+    const GlbChunks chunks = glb_chunks(source_.package.proxy_glb(proxy), proxy_path(proxy));
+    const char* mime = mime_type_of(wanted == ExtractImages::kWebp ? FileImage::kWebp : FileImage::kJpeg);
+    const auto images = chunks.root.value("images", nlohmann::ordered_json::array());
+    return std::ranges::all_of(images,
+                               [&](const auto& image) { return image.value("mimeType", "") == mime; });
+  }
 
   void measure(const Bytes& glb, Extracted& file) {
     NoFiles none;
@@ -158,7 +172,9 @@ class ProxySearch {
     rows.clear();
     for (const ProxyMap& map : maps) {
       const auto k = static_cast<std::uint32_t>(rows.size());
-      const FileImage format = map.pixels.channels == 4 ? FileImage::kWebp : trial.format;
+      const FileImage format = map.pixels.channels < 4                          ? trial.format
+                               : source_.request.images == ExtractImages::kJpeg ? FileImage::kPng
+                                                                                : FileImage::kWebp;
       const double q = quality_of(map, quality);
       const bool numbers = map.averaging() != Averaging::kLight;
       out[k] = {format, encode_image(map.pixels, {format, q, numbers, false, true})};

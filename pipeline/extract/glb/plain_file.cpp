@@ -61,11 +61,12 @@ Json moved_image(Json image, const GlbChunks& from, GlbChunks& to) {
 }  // namespace
 
 StandaloneGlb plain_file(const StandaloneGlb& file, const std::string& entry, const RunContext& context) {
-  const GlbChunks from = glb_chunks(file.finish(), entry);
+  GlbChunks from = glb_chunks(file.finish(), entry);
+  Mesh flat = read_model(file, entry, context).mesh;
+  const bool baked = bake_texture_scale(from.root, flat);
   ScalesOptions options;
   options.mesh_codec = MeshCodec::kNone;
-  GlbChunks to = glb_chunks(
-      write_streamed_scale(read_model(file, entry, context).mesh, SplitStreamHead{}, options), entry);
+  GlbChunks to = glb_chunks(write_streamed_scale(flat, SplitStreamHead{}, options), entry);
   const std::vector<std::size_t> materials = used_materials(from.root);
   for (Json& mesh : to.root["meshes"])
     for (Json& p : mesh["primitives"])
@@ -89,6 +90,7 @@ StandaloneGlb plain_file(const StandaloneGlb& file, const std::string& entry, co
   for (const char* extension : {"KHR_draco_mesh_compression", "EXT_meshopt_compression",
                                 "KHR_mesh_quantization", "EXT_texture_webp", "EXT_mesh_features"})
     forget(root, extension);
+  if (baked) forget(root, "KHR_texture_transform");
   for (const char* list : {"images", "textures"})
     if (root[list].empty()) root.erase(list);
   pad_to_four(to.binary, 0);

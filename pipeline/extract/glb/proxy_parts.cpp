@@ -190,7 +190,8 @@ std::optional<ProxyParts> ProxyParts::read(std::span<const std::uint8_t> glb, co
   out.maps_ = maps_in(chunks.root, chunks.binary);
   NoFiles none;
   out.model_ = import_gltf(entry, glb, none, {}, context).model;
-  if (!is_simple(chunks.root, out.maps_) || out.model_.materials.size() != chunks.root["materials"].size())
+  if (!is_simple(chunks.root, out.maps_) || out.model_.materials.size() != chunks.root["materials"].size() ||
+      !bake_texture_scale(chunks.root, out.model_.mesh))
     return std::nullopt;
   for (const char* list : {"bufferViews", "accessors", "meshes", "buffers"}) chunks.root.erase(list);
   out.json_ = chunks.root.dump();

@@ -120,6 +120,37 @@ TEST(ProxyParts, PicturesTakeAnyShare) {
   EXPECT_EQ(smaller_map(map, 0.1).width_px, 2u);
 }
 
+/// all_maps() whose coordinates count texels, with a transform that brings them back to 0..1.
+GltfBuilder scaled_coordinates() {
+  GltfBuilder b = all_maps();
+  b.json["accessors"][1]["bufferView"] = b.view_of(std::vector<float>{0, 16, 16, 16, 16, 0, 0, 0});
+  nlohmann::json& m = b.json["materials"][0];
+  for (nlohmann::json* slot : {&m["normalTexture"], &m["occlusionTexture"], &m["emissiveTexture"],
+                               &m["pbrMetallicRoughness"]["baseColorTexture"],
+                               &m["pbrMetallicRoughness"]["metallicRoughnessTexture"]})
+    (*slot)["extensions"]["KHR_texture_transform"]["scale"] = {0.0625, 0.0625};
+  b.json["extensionsUsed"] = {"KHR_texture_transform"};
+  return b;
+}
+
+TEST(ProxyParts, AScaleOfTextureCoordinatesIsInTheCoordinates) {
+  const auto parts = ProxyParts::read(scaled_coordinates().glb(), "proxy", {});
+  ASSERT_TRUE(parts);
+  const Bytes glb = parts->file({}, kSteps, {}).finish();
+  expect_valid(glb);
+  const Model m = imported(glb);
+  EXPECT_TRUE(m.materials[0].base_colour_texture.transform.is_identity());
+  float most = 0;
+  for (const Vec2f uv : m.mesh.uv0) most = std::max(most, uv.x);
+  EXPECT_NEAR(most, 1, 0.01);
+  GltfBuilder mixed = scaled_coordinates();
+  mixed.json["materials"][0]["normalTexture"].erase("extensions");
+  EXPECT_FALSE(ProxyParts::read(mixed.glb(), "proxy", {}));
+  GltfBuilder moved = scaled_coordinates();
+  moved.json["materials"][0]["normalTexture"]["extensions"]["KHR_texture_transform"]["offset"] = {0.5, 0};
+  EXPECT_FALSE(ProxyParts::read(moved.glb(), "proxy", {}));
+}
+
 TEST(ProxyParts, WhatCannotBeTakenApartIsLeft) {
   GltfBuilder two_nodes = all_maps();
   two_nodes.json["scenes"][0]["nodes"].push_back(two_nodes.node({{"mesh", 0}}));
