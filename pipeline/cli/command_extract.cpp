@@ -18,7 +18,7 @@ struct ExtractArguments {
   std::string package, output, bytes, rung = "max", images = "auto";
   int scale = -1, proxy = -1, jobs = 0;
   double display_px = 0;
-  bool recentre = false, lods = false, json = false;
+  bool recentre = false, lods = false, plain = false, json = false;
 };
 
 std::uint32_t rung_of(const std::string& text) {
@@ -40,6 +40,8 @@ ExtractRequest request_of(const ExtractArguments& a) {
   r.display_px = a.display_px;
   r.recentre = a.recentre;
   r.lods = a.lods;
+  r.plain = a.plain;
+  if (a.plain && a.images == "webp") throw UsageError("--plain", "", "--image-format jpeg or png", "webp");
   if (a.images == "jpeg") r.images = ExtractImages::kJpeg;
   if (a.images == "webp") r.images = ExtractImages::kWebp;
   if (a.images == "png") r.images = ExtractImages::kPng;
@@ -92,9 +94,16 @@ void add_extract_options(Command& c, ExtractArguments& args) {
       .one_of({"auto", "jpeg", "webp", "png"})
       .value_name("FORMAT")
       .shows_default();
-  c.flag("--lods", args.lods,
-         "All major scales from the chosen one on as levels of detail of one file (MSFT_lod), which share "
-         "textures");
+  const Option lods = c.flag(
+      "--lods", args.lods,
+      "All major scales from the chosen one on as levels of detail of one file (MSFT_lod), which share "
+      "textures");
+  c.flag(
+       "--plain", args.plain,
+       "Meshes as floats and images as JPEG or PNG, without extensions that compress: for programs that read "
+       "glTF 2.0 alone, such as Debian 12's Blender and F3D")
+      .excludes(bytes)
+      .excludes(lods);
   c.flag("--recentre", args.recentre,
          "Leave the model near 0, in the frame of the package's meshes; default: where the source has it");
   add_jobs_option(c, args.jobs);
@@ -116,9 +125,9 @@ void add_extract_command(Command& app) {
       "--bytes chooses scale, size of the textures and their quality together: candidates are rendered lit, "
       "as texmesh render does, and compared with the package's best (FLIP). Colours, normals, roughness and "
       "the other maps get bytes for what they change in the picture, and the file is filled up to the last "
-      "2 %. A proxy of the package is taken where it looks better. Many triangles with a small texture nearly always look better than the reverse.\n"
-      "Meshes stay Draco coded (KHR_draco_mesh_compression), and WebP needs EXT_texture_webp. For viewers "
-      "without them use --image-format jpeg and packages compiled with --mesh-codec none.\n"
+      "2 %. A proxy of the package, made smaller where it has to be, is taken where it looks better. Many triangles with a small texture nearly always look better than the reverse.\n"
+      "Meshes stay Draco coded (KHR_draco_mesh_compression), a whole proxy's is coded by meshopt "
+      "(EXT_meshopt_compression), and WebP needs EXT_texture_webp. For programs without them use --plain.\n"
       "Exit code: 0, 1 when the package is damaged or the GLB cannot be written, 2 usage, 4 when the "
       "package cannot give a file within 2 % below --bytes (extract writes the nearest possible file then), "
       "unless the file has all that the package holds of a source of JPEGs.");

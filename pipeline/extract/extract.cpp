@@ -5,11 +5,12 @@
 
 #include "delivery/cpp/decide/fragment_list.h"
 #include "format/container/layout.h"
-#include "format/rules/proxy_choice.h"
 #include "format/rules/viewing.h"
 #include "pipeline/about/gltf_about.h"
 #include "pipeline/extract/budget/budget_search.h"
+#include "pipeline/extract/budget/proxy_search.h"
 #include "pipeline/extract/glb/joined_jpeg.h"
+#include "pipeline/extract/glb/plain_file.h"
 #include "pipeline/extract/glb/scale_file.h"
 #include "pipeline/extract/glb/standalone_glb.h"
 #include "pipeline/extract/glb/texture_source.h"
@@ -127,6 +128,7 @@ Extracted extract_whole(PackageReader& package, const ExtractRequest& request, c
   if (request.lods) file.begin_levels(screen_coverage_of(m, out.scale));
   for (std::size_t l = 1; l < out.levels.size(); ++l)
     file.add_level(scale_file(package, out.levels[l], context), screen_coverage_of(m, out.levels[l]));
+  if (request.plain) file = plain_file(file, mesh_path(out.scale), context);
   if (!request.recentre) file.move_to(m.origin);
   const std::map<std::uint32_t, std::uint32_t> planes = shown_planes(package, request);
   const std::vector<std::uint32_t> used = file.source_images();
@@ -144,48 +146,12 @@ Extracted extract_whole(PackageReader& package, const ExtractRequest& request, c
   return out;
 }
 
-Extracted extract_proxy(PackageReader& package, const ExtractRequest& request, std::uint32_t proxy) {
-  const Manifest& m = package.manifest();
-  StandaloneGlb file(package.proxy_glb(proxy), proxy_path(proxy));  // refuses a proxy that is not there
-  if (!request.recentre) file.move_to(m.origin);
-  file.set_about(package.about());
-  Extracted out;
-  out.scale = m.scales.back().scale;
-  out.levels = {out.scale};
-  out.proxy = proxy;
-  out.triangles = m.proxies[proxy].triangles;
-  out.glb = file.finish();
-  out.mesh_bytes = out.glb.size();
-  return out;
-}
-
-/// The proxy that looks better than `found` in the bytes that are asked for, or that keeps within them where
-/// `found` does not.
-Extracted or_better_proxy(PackageReader& package, const ExtractRequest& request, Extracted found) {
-  if (request.scale || request.lods || request.images != ExtractImages::kAuto) return found;
-  const Manifest& m = package.manifest();
-  const double displayed_px = request.display_px > 0 ? request.display_px : kBudgetDisplayPx;
-  for (std::uint32_t k = 0; k < m.proxies.size(); ++k) {
-    const double flip = proxy_loss(m, k, displayed_px).flip;
-    if (found.glb.size() <= request.bytes && flip >= found.difference) continue;
-    Extracted proxy = extract_proxy(package, request, k);
-    if (proxy.glb.size() > request.bytes) break;
-    proxy.difference = proxy.mesh_difference = flip;
-    proxy.views = found.views;
-    proxy.side_px = found.side_px;
-    proxy.notes.emplace_back(
-        "a proxy looks better in these bytes than any scale; its difference is the manifest's");
-    found = std::move(proxy);
-  }
-  return found;
-}
-
 }  // namespace
 
 Extracted extract_model(PackageReader& package, const ExtractRequest& request, const RunContext& context) {
-  if (request.proxy) return extract_proxy(package, request, *request.proxy);
+  if (request.proxy) return extract_proxy(package, request, *request.proxy, context);
   if (request.bytes == 0) return extract_whole(package, request, context);
-  Extracted out = or_better_proxy(package, request, extract_bytes(package, request, context));
+  Extracted out = extract_bytes(package, request, context);
   if (about_within(package.about(), request.bytes / kAboutShare) != package.about())
     out.notes.emplace_back("the file is too small for all that is known of the object; see dump PKG about");
   return out;

@@ -58,4 +58,10 @@ class FileResolver : public Resolver {
 std::vector<std::uint8_t> read_input_file(const std::filesystem::path& path, std::uint64_t max_bytes,
                                           FileStamp* stamp = nullptr);
 
+/// For models that have everything inside.
+class NoFiles : public Resolver {
+ public:
+  std::optional<Bytes> read(const std::string&, std::uint64_t) override { return std::nullopt; }
+};
+
 }  // namespace texmesh

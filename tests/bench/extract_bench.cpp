@@ -24,6 +24,7 @@
 #include "format/base/srgb.h"
 #include "pipeline/extract/extract.h"
 #include "pipeline/import/import.h"
+#include "pipeline/io/file_resolver.h"
 #include "pipeline/render/picture_sheet.h"
 #include "pipeline/render/rendered_model.h"
 #include "stages/measure/flip.h"
@@ -37,10 +38,6 @@ Bytes read_bytes(const fs::path& path) {
   std::ifstream in(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), {}};
 }
-
-class NoFiles : public Resolver {
-  std::optional<Bytes> read(const std::string&, std::uint64_t) override { return std::nullopt; }
-};
 
 double mean_level(const Picture& picture) {
   double sum = 0;

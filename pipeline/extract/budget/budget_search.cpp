@@ -7,6 +7,7 @@
 #include "pipeline/extract/budget/budget_file.h"
 #include "pipeline/extract/budget/budget_source.h"
 #include "pipeline/extract/budget/mesh_candidates.h"
+#include "pipeline/extract/budget/proxy_search.h"
 #include "pipeline/extract/glb/standalone_glb.h"
 
 namespace texmesh {
@@ -28,6 +29,8 @@ class BudgetSearch {
         coder_(source_),
         curves_(source_, coder_),
         filler_(source_, coder_) {}
+
+  BudgetSource& source() { return source_; }
 
   Extracted run() {
     curves_.measure(static_cast<double>(source_.request.bytes) -
@@ -225,7 +228,10 @@ double screen_coverage_of(const Manifest& manifest, int scale) {
 }
 
 Extracted extract_bytes(PackageReader& package, const ExtractRequest& request, const RunContext& context) {
-  return BudgetSearch(package, request, context).run();
+  BudgetSearch search(package, request, context);
+  Extracted out = search.run();
+  offer_proxies(search.source(), out);
+  return out;
 }
 
 }  // namespace texmesh

@@ -13,8 +13,9 @@ double screen_coverage_of(const Manifest& manifest, int scale);
 /// mesh, size and quality of every texture are chosen together, by lit pictures (stages/render, the studio's
 /// light), so that each map gets bytes for what it changes in them. Small windows of the pictures, one
 /// texture changed at a time, tell what bytes are worth; the mesh is chosen by what it and its textures lose
-/// together; the whole pictures of the file give the difference that is reported. InputError for a scale that
-/// is not there. Same bytes for any number of threads.
+/// together; the whole pictures of the file give the difference that is reported. Where a proxy of the
+/// package, made smaller where it must be, looks better in whole pictures, the file is of that proxy
+/// (offer_proxies()). InputError for a scale that is not there. Same bytes for any number of threads.
 Extracted extract_bytes(PackageReader& package, const ExtractRequest& request, const RunContext& context);
 
 }  // namespace texmesh

@@ -27,6 +27,7 @@ struct ExtractRequest {
   double display_px = 0;  // displayed height, device px; 0 = not said (with `bytes`: kBudgetDisplayPx)
   ExtractImages images = ExtractImages::kAuto;
   bool recentre = false;  // the frame of the package's meshes instead of the source's coordinates
+  bool plain = false;     // no extension that compresses (plain_file()); not with `bytes` or `lods`
   bool lods = false;      // all major scales and the one chosen, as MSFT_lod
 };
 
@@ -42,18 +43,19 @@ struct ExtractedImage {
 struct Extracted {
   std::vector<std::uint8_t> glb;
   int scale = 0;                                // the finest in the file; of a proxy the package's coarsest
-  std::optional<std::uint32_t> proxy;           // the file is this proxy
+  std::optional<std::uint32_t> proxy;           // the file is this proxy, or made of it
   std::vector<int> levels;                      // with lods: all, finest first
-  std::uint64_t triangles = 0, mesh_bytes = 0;  // mesh_bytes: everything but images; all of a proxy
+  std::uint64_t triangles = 0, mesh_bytes = 0;  // mesh_bytes: everything but images; all of a whole proxy
   std::vector<ExtractedImage> images;
   /// With `bytes`: FLIP of the file's lit pictures against those of the package's best, 0 = equal, measured
-  /// from `views` directions at `side_px`; -1 without. Of a proxy: as the manifest says.
+  /// from `views` directions at `side_px`; -1 without.
   double difference = -1;
   double mesh_difference = -1;  // the same with the best textures instead: what the mesh alone costs
   int views = 0;
   std::uint32_t side_px = 0;
   /// With `bytes`: whether the file has at most `bytes`, and at least 98 % of them or all that the package
-  /// has of the source. If not, it is the nearest that the package can give.
+  /// has of the source, or is a proxy that looks better than any such file. If not, it is the nearest that
+  /// the package can give.
   bool within = true;
   std::vector<std::string> notes;
 };

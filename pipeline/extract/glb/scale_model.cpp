@@ -5,16 +5,9 @@
 #include "format/base/bytes.h"
 #include "pipeline/extract/glb/standalone_glb.h"
 #include "pipeline/import/import.h"
+#include "pipeline/io/file_resolver.h"
 
 namespace texmesh {
-namespace {
-
-class NoFiles : public Resolver {
-  std::optional<Bytes> read(const std::string&, std::uint64_t) override { return std::nullopt; }
-};
-
-}  // namespace
-
 Model read_model(StandaloneGlb file, const std::string& entry, const RunContext& context) {
   std::map<std::uint32_t, FileImageData> images;
   for (const std::uint32_t i : file.source_images()) {

@@ -9,7 +9,6 @@
 #include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "pipeline/about/gltf_about.h"
-#include "stages/gltf/check_glb.h"
 #include "stages/gltf/glb_container.h"
 #include "stages/gltf/glb_writer.h"
 
@@ -70,9 +69,9 @@ Json vector_json(Vec3f v) {
   return Json::array({GlbWriter::shortest(v.x), GlbWriter::shortest(v.y), GlbWriter::shortest(v.z)});
 }
 
-void require_valid(std::span<const std::uint8_t> glb, const std::string& entry) {
+void require_valid(std::span<const std::uint8_t> glb, const std::string& entry, GlbRules rules) {
   Findings findings;
-  check_glb(glb, entry, findings);
+  check_glb(glb, entry, findings, rules);
   if (findings.empty()) return;
   const Finding& f = findings.list().front();
   throw FormatError(f.entry, f.field, f.expected, f.found);
@@ -97,11 +96,12 @@ StandaloneGlb::StandaloneGlb(const StandaloneGlb& other)
       fallback_bytes_(other.fallback_bytes_),
       level_node_(other.level_node_) {}
 StandaloneGlb::StandaloneGlb(StandaloneGlb&& other) noexcept = default;
+StandaloneGlb& StandaloneGlb::operator=(StandaloneGlb&& other) noexcept = default;
 StandaloneGlb::~StandaloneGlb() = default;
 
-StandaloneGlb::StandaloneGlb(std::span<const std::uint8_t> glb, std::string entry)
+StandaloneGlb::StandaloneGlb(std::span<const std::uint8_t> glb, std::string entry, GlbRules rules)
     : entry_(std::move(entry)), document_(std::make_unique<Document>()) {
-  require_valid(glb, entry_);
+  require_valid(glb, entry_, rules);
   constexpr std::size_t kHeader = 12, kChunk = 8;
   const std::size_t json_bytes = read_u32(glb, kHeader);
   document_->root = parse_bounded_json(glb.subspan(kHeader + kChunk, json_bytes), entry_, kMaxJsonDepth);

@@ -9,6 +9,7 @@
 #include "format/documents/about.h"
 #include "pipeline/extract/glb/draco_recode.h"
 #include "pipeline/extract/glb/image_codecs.h"
+#include "stages/gltf/check_glb.h"
 #include "stages/scales/scales.h"
 
 namespace texmesh {
@@ -17,12 +18,13 @@ namespace texmesh {
 /// detail. Materials, nodes, names, extras and extensions stay as they are.
 class StandaloneGlb {
  public:
-  /// Checks the whole file first (check_glb.h). `entry` is for messages. FormatError.
-  StandaloneGlb(std::span<const std::uint8_t> glb, std::string entry);
+  /// Checks the whole file first (check_glb.h), by the rules of a package's meshes; those of a standalone
+  /// file are a proxy's. `entry` is for messages. FormatError.
+  StandaloneGlb(std::span<const std::uint8_t> glb, std::string entry, GlbRules rules = GlbRules::kPackage);
   StandaloneGlb(const StandaloneGlb& other);
   StandaloneGlb(StandaloneGlb&& other) noexcept;
   StandaloneGlb& operator=(const StandaloneGlb&) = delete;
-  StandaloneGlb& operator=(StandaloneGlb&&) = delete;
+  StandaloneGlb& operator=(StandaloneGlb&& other) noexcept;
   ~StandaloneGlb();
 
   /// Source images that the file's images stand for ("texture/<number>"), in the file's order.

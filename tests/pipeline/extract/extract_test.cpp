@@ -84,27 +84,6 @@ TEST(ExtractModel, AProxyIsWrittenAsItIs) {
   EXPECT_THROW(extract_model(without, r, {}), InputError);
 }
 
-TEST(ExtractModel, BytesTakeTheProxyThatLooksBetter) {
-  testing::PackageParts parts = make_package_parts();
-  testing::add_proxies(parts);
-  for (ManifestProxy& p : parts.manifest.proxies) p.flip = {0, 0};  // as if it were the source
-  const Bytes bytes = parts.build();
-  PackageReader package = open(bytes);
-  const std::uint64_t whole = package.manifest().proxies[0].glb.bytes + 2000;
-  const Extracted found = extract_model(package, budget(whole), {});
-  EXPECT_EQ(found.proxy, 0u);
-  EXPECT_TRUE(found.within);
-  EXPECT_LE(found.glb.size(), whole);
-  EXPECT_EQ(found.difference, 0);
-  ExtractRequest by_scale = budget(whole);
-  by_scale.scale = 5;
-  EXPECT_EQ(extract_model(package, by_scale, {}).proxy, std::nullopt);
-  for (ManifestProxy& p : parts.manifest.proxies) p.flip = {1, 1};
-  const Bytes worse_bytes = parts.build();
-  PackageReader worse = open(worse_bytes);
-  EXPECT_EQ(extract_model(worse, budget(60'000), {}).proxy, std::nullopt);
-}
-
 TEST(ExtractModel, TheBestRungAsPngIsThePlanePutTogetherAgain) {
   ExtractRequest r;
   r.scale = 0;
