@@ -106,7 +106,7 @@ PlaneTables make_tables(const TexturePlane& plane, const PlaneLadder& ladder) {
 PlaneThesis make_thesis(const PlaneTables& t) {
   PlaneThesis out;
   for (auto* v : {&out.z, &out.i, &out.zeta, &out.m, &out.vqp}) *v = {0.25f, 0.5f, 0.75f, 0};
-  out.models.assign(4, {300, 0.5f, 0.98f});
+  out.models = {{300, 0.5f, 0.98f}, {300, 0.5f, 0.98f}, {300, 0.5f, 0.98f}, {}};
   for (std::size_t scale = 0; scale <= 5; ++scale) {
     out.quality.push_back(80 - 8 * static_cast<float>(scale));
     for (int g = 0; g <= 20; ++g)

@@ -17,7 +17,7 @@ ThesisTables small_thesis() {
   t.models = {{300, 0.4f, 0.97f}, {}};
   t.quality = {80, 60, 40};
   for (std::uint64_t k = 0; k < 3 * kGammaSteps; ++k) t.total_bytes.push_back(70000 + 13 * k);
-  return {{t, {}, t}};
+  return {{t, {}, t}, {}};
 }
 
 TEST(ThesisTables, RoundTrip) {

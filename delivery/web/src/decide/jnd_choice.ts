@@ -2,6 +2,7 @@ import type { PerceptualTable } from '../format/thesis_tables';
 
 // A client's own just-noticeable difference on the values of thesis.bin: format/rules/jnd_choice.cpp, bit for bit.
 
+/** What says how much two scales differ: the distance of their surfaces, or the thesis's strategies (7.2). */
 export type PerceptualStatistic = 'p95' | 'average' | 'conservative' | 'aggressive';
 /** How collapses of several scale changes count together: root of the sum of squares, or against the vertex that is left. */
 export type ChainRule = 'root-of-squares' | 'survivor';

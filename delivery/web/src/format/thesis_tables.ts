@@ -47,6 +47,7 @@ export interface PerceptualTable {
   chainLeast: Float32Array;
 }
 
+/** thesis.bin: by texture plane, and the perceptual table where there is one. */
 export interface ThesisTables {
   planes: PlaneThesis[];
   perceptual?: PerceptualTable;

@@ -1,5 +1,6 @@
 import { describe, expect, it } from 'vitest';
-import { type Manifest, type PerceptualTable, type TextureInfo, chainedValues, coarsestAlike, majorRows, modelledBytes, modelledQuality, pairValues, parseThesis, refineTo } from '../../src/reader';
+import type { Manifest, TextureInfo } from '../../src/reader';
+import { type PerceptualTable, chainedValues, coarsestAlike, majorRows, modelledBytes, modelledQuality, pairValues, parseThesis, refineTo } from '../../src/thesis_tables';
 
 // Two planes of 2 and 1 fragments; scales 0 and 5 are stored, the chain has 0, 2 and 5.
 const manifest = { version: { major: 2, minor: 0 }, scales: [{ scale: 0 }, { scale: 5 }] } as Manifest;
@@ -68,7 +69,7 @@ describe('a JND of the client', () => {
   it('chains by the root of the sum of squares', () => {
     const value = chainedValues(table71);
     expect(value[2]).toBeCloseTo(0.0581244, 6);
-    expect(value[5]).toBeCloseTo(0.11163, 5);
+    expect(value[5]).toBeCloseTo(0.11158, 5);
     expect(value[3 * 6 + 4]).toBe(Math.fround(0.0468));
     expect(value[4 * 6 + 3]).toBe(0);
   });

@@ -1,6 +1,7 @@
 import { requireSelfContained } from '../../src/format/self_contained_glb';
 import { SplitStreamReader } from '../../src/format/splits/split_stream';
-import { PackageReader, readThesis } from '../../src/reader';
+import { PackageReader } from '../../src/reader';
+import { readThesis } from '../../src/thesis_tables';
 
 /** Reads all that a client may ever read of a package; gives the mesh that the stream ends with. */
 export async function readAll(bytes: Uint8Array): Promise<SplitStreamReader | undefined> {
