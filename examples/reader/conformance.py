@@ -581,6 +581,26 @@ def read_about(data, m):
     return about
 
 
+def check_perceptual(s, m):
+    rows, *zeros = s.get("BBBB")
+    require(zeros == [0, 0, 0], "W05", "reserved bytes of the perceptual table")
+    require(1 <= rows <= 100, "O05", f"{rows} scales")
+    scales = s.array("u1", rows).tolist()
+    require(scales[0] == 0 and rises(scales) and scales[-1] < 100, "O05", "scale numbers")
+    triangles, collapses = s.array("<u4", rows), s.array("<u4", rows)
+    require(collapses[0] == 0, "O05", "collapses of S_0")
+    values, p95 = s.array("<f4", 4 * rows), s.array("<f4", rows * (rows - 1) // 2)
+    for v in (values, p95, s.array("<f4", 3 * len(p95))):
+        require(((v >= 0) & (v <= 1e30)).all(), "O05", "perceptual values")
+    s.finish()
+    columns = m["scales"]
+    for k, scale in enumerate(columns["scale"]):
+        require(scale in scales, "R16", f"scale {scale} in the perceptual table")
+        row = scales.index(scale)
+        require(triangles[row] == columns["triangles"][k], "O06", f"triangles of scale {scale}")
+        require(k == 0 or abs(p95[row - 1] - columns["p95"][k]) <= 1e-5 * columns["p95"][k], "O06", f"p95 of scale {scale}")
+
+
 def check_thesis(data, m, textures, tables=None):
     c = Cursor(data, "O04", "thesis.bin")
     require(c.raw(4) == b"TXTH", "O04", "magic")
@@ -593,6 +613,9 @@ def check_thesis(data, m, textures, tables=None):
     require(rises([s[:2] for s in directory]), "O04", "order of sections")
     for kind, plane, size in directory:
         s = Cursor(c.raw(size), "O05", f"section {kind} of plane {plane}")
+        if kind == 4:
+            require(plane == MAX32, "O05", f"a perceptual table of plane {plane}")
+            check_perceptual(s, m)
         if kind not in (1, 2, 3):
             continue
         require(plane < len(textures), "R16", f"plane {plane}")
@@ -601,8 +624,8 @@ def check_thesis(data, m, textures, tables=None):
             require(s.get("I") == fragments, "R16", f"fragments of plane {plane}")
             s.array("<u2", 5 * fragments)
         elif kind == 2:
-            model = s.array("<f4", 5)
-            require((np.abs(model) <= 1e30).all(), "O05", "size model")
+            require(s.get("I") == fragments, "R16", f"size models of plane {plane}")
+            require((np.abs(s.array("<f4", 3 * fragments)) <= 1e30).all(), "O05", "size models")
         else:
             scales, width, zero = s.get("BBH")
             require(zero == 0, "W05", "reserved bytes of a section")

@@ -17,9 +17,9 @@ namespace {
 const std::string kThesisFile = kThesisPath;
 constexpr std::string_view kThesisMagic = "TXTH";
 constexpr std::uint32_t kPredictorsId = 1, kSizeModelId = 2, kGammaTableId = 3, kPerceptualTableId = 4;
-constexpr std::uint32_t kMostFragments = 65535, kMostChainScales = 100;
+constexpr std::uint32_t kMostFragments = 65535, kWholePackage = 0xffffffff;
 constexpr std::uint64_t kMostTotalBytes = std::uint64_t{1} << 53;
-constexpr std::size_t kSectionRecord = 12, kModelBytes = 20;
+constexpr std::size_t kSectionRecord = 12, kModelBytes = 12;
 constexpr float kLargestModelValue = 1e30f;
 // How far rounding may carry a predictor out of 0..1 before the writer calls it an error.
 constexpr float kPredictorRounding = 1e-4f;
@@ -44,8 +44,8 @@ void require_values(const std::vector<float>& values, float lo, float hi, const 
       fail_thesis(place, std::to_string(lo) + " to " + std::to_string(hi), std::to_string(v));
 }
 
-std::array<float SizeModel::*, 5> model_values() {
-  return {&SizeModel::a, &SizeModel::b, &SizeModel::r, &SizeModel::correlation, &SizeModel::error};
+std::array<float SizeModel::*, 3> model_values() {
+  return {&SizeModel::a, &SizeModel::b, &SizeModel::correlation};
 }
 
 void check_thesis_plane(const PlaneThesis& t, float rounding, const std::string& place) {
@@ -54,8 +54,11 @@ void check_thesis_plane(const PlaneThesis& t, float rounding, const std::string&
       fail_thesis(place + "predictors", "five of each fragment", std::to_string((t.*predictor).size()));
     require_values(t.*predictor, -rounding, 1 + rounding, place + "predictors");
   }
-  for (const auto value : model_values())
-    require_values({t.model.*value}, -kLargestModelValue, kLargestModelValue, place + "size model");
+  if (t.models.size() > kMostFragments)
+    fail_thesis(place + "size models", "at most 65535", std::to_string(t.models.size()));
+  for (const SizeModel& model : t.models)
+    for (const auto value : model_values())
+      require_values({model.*value}, -kLargestModelValue, kLargestModelValue, place + "size models");
   if (t.quality.size() > kMostChainScales || t.total_bytes.size() != t.quality.size() * kGammaSteps)
     fail_thesis(place + "Gamma table", "at most 100 scales of 21 sizes",
                 std::to_string(t.total_bytes.size()) + " sizes");
@@ -81,7 +84,9 @@ Bytes predictors_section(const PlaneThesis& t) {
 
 Bytes size_model_section(const PlaneThesis& t) {
   BytesOut out;
-  for (const auto value : model_values()) out.f32(t.model.*value);
+  out.u32(t.models.size());
+  for (const auto value : model_values())
+    for (const SizeModel& model : t.models) out.f32(model.*value);
   return out.finish();
 }
 
@@ -104,10 +109,13 @@ void read_predictors(BytesIn& in, PlaneThesis& t) {
     for (std::uint32_t f = 0; f < fragments; ++f) (t.*predictor).push_back(from_unit16(in.u16()));
 }
 
-void read_size_model(BytesIn& in, PlaneThesis& t) {
-  if (in.left() < kModelBytes) in.fail("20 bytes", std::to_string(in.left()));
-  for (const auto value : model_values()) t.model.*value = in.f32();
-  if (t.model == SizeModel{}) in.fail("a fitted model", "zeros");
+void read_size_models(BytesIn& in, PlaneThesis& t) {
+  const std::uint32_t fragments = in.u32();
+  if (fragments == 0 || fragments > kMostFragments || in.left() < fragments * kModelBytes)
+    in.fail("models of 1 to 65535 fragments", std::to_string(fragments));
+  t.models.resize(fragments);
+  for (const auto value : model_values())
+    for (SizeModel& model : t.models) model.*value = in.f32();
 }
 
 void read_gamma_table(BytesIn& in, int minor, PlaneThesis& t) {
@@ -121,7 +129,15 @@ void read_gamma_table(BytesIn& in, int minor, PlaneThesis& t) {
   if (width != bytes_width(t.total_bytes)) in.fail("the least width that holds the values", "another");
 }
 
-void read_thesis_section(const ThesisSection& section, int minor, ThesisTables& tables) {
+void read_package_section(const ThesisSection& section, int minor, ThesisTables& tables) {
+  if (section.plane != kWholePackage)
+    fail_thesis("perceptual table", "one of the package", "plane " + std::to_string(section.plane));
+  BytesIn in(section.bytes, kThesisFile + ": perceptual table");
+  tables.perceptual = read_perceptual_section(in, minor <= kFormatMinor);
+  if (minor <= kFormatMinor) in.finish();
+}
+
+void read_plane_section(const ThesisSection& section, int minor, ThesisTables& tables) {
   const std::string place = "plane " + std::to_string(section.plane) + ", ";
   if (section.plane >= kMaxPackagePlanes)
     throw RuleError("R16", kThesisFile, "section " + std::to_string(section.id), "a plane",
@@ -130,7 +146,7 @@ void read_thesis_section(const ThesisSection& section, int minor, ThesisTables& 
   PlaneThesis& plane = tables.planes[section.plane];
   BytesIn in(section.bytes, kThesisFile + ": " + place + "section " + std::to_string(section.id));
   if (section.id == kPredictorsId) read_predictors(in, plane);
-  if (section.id == kSizeModelId) read_size_model(in, plane);
+  if (section.id == kSizeModelId) read_size_models(in, plane);
   if (section.id == kGammaTableId) read_gamma_table(in, minor, plane);
   if (minor <= kFormatMinor) in.finish();
 }
@@ -143,9 +159,11 @@ std::vector<std::uint8_t> write_thesis(const ThesisTables& tables) {
     const PlaneThesis& t = tables.planes[p];
     check_thesis_plane(t, kPredictorRounding, "plane " + std::to_string(p) + ", ");
     if (!t.z.empty()) sections.push_back({kPredictorsId, p, predictors_section(t)});
-    if (t.model != SizeModel{}) sections.push_back({kSizeModelId, p, size_model_section(t)});
+    if (!t.models.empty()) sections.push_back({kSizeModelId, p, size_model_section(t)});
     if (!t.quality.empty()) sections.push_back({kGammaTableId, p, gamma_table_section(t)});
   }
+  if (!tables.perceptual.empty())
+    sections.push_back({kPerceptualTableId, kWholePackage, write_perceptual_section(tables.perceptual)});
   std::ranges::sort(sections, {}, [](const ThesisSection& s) { return std::tuple(s.id, s.plane); });
   BytesOut head, data;
   write_entry_start(head, kThesisMagic);
@@ -178,9 +196,12 @@ static ThesisFile read_sections(ByteSpan bytes) {
     if (section.id == 0 || (k > 0 && now <= last)) in.fail("sections by id and plane", "another order");
     last = now;
     const ByteSpan part = data.raw(in.u32());
-    if (section.id >= kPerceptualTableId) continue;
+    if (section.id > kPerceptualTableId) continue;
     section.bytes.assign(part.begin(), part.end());
-    under_rule("O05", [&] { read_thesis_section(section, file.minor, file.tables); });
+    under_rule("O05", [&] {
+      const auto read = section.id == kPerceptualTableId ? read_package_section : read_plane_section;
+      read(section, file.minor, file.tables);
+    });
   }
   data.finish();
   for (std::size_t p = 0; p < file.tables.planes.size(); ++p)

@@ -4,19 +4,21 @@
 #include <span>
 #include <vector>
 
+#include "format/documents/perceptual_table.h"
+
 namespace texmesh {
 
 /// Values of Gamma that tables hold sizes for: 0, 0.05 .. 1.
 inline constexpr std::size_t kGammaSteps = 21;
 
-/// S = A R^Q + c with exponent B from (8.8), fitted over the plane's rungs (thesis 8.6-8.8). All 0 where
+/// S = A (100 p)^(B Q) of one fragment (thesis 8.5): bytes S at quality Q in 0..1, p its VQP. All 0 where
 /// nothing was fitted.
 struct SizeModel {
-  float a = 0, b = 0, r = 0, correlation = 0;
-  float error = 0;  // mean |S' - S| / S
+  float a = 0, b = 0;
+  float correlation = 0;  // of Q and log S
   template <class S, class A>
   static void archive(S& s, A& a) {
-    a(s.a, s.b, s.r, s.correlation, s.error);
+    a(s.a, s.b, s.correlation);
   }
   friend bool operator==(const SizeModel&, const SizeModel&) = default;
 };
@@ -26,21 +28,23 @@ struct SizeModel {
 struct PlaneThesis {
   // [F], 0..1, stored as multiples of 1 / 65535; 0 for fragments that are not stored
   std::vector<float> z, i, zeta, m, vqp;
-  SizeModel model;
-  std::vector<float> quality;  // [M]: Q_i
+  std::vector<SizeModel> models;  // [F]
+  std::vector<float> quality;     // [M]: Q_i
   // [M * 21]: D_i(Gamma), Gamma = 0, 0.05 .. 1: bytes of the plane at the rungs nearest to q_i(x, y)
   std::vector<std::uint64_t> total_bytes;
   template <class S, class A>
   static void archive(S& s, A& a) {
-    a(s.z, s.i, s.zeta, s.m, s.vqp, s.model, s.quality, s.total_bytes);
+    a(s.z, s.i, s.zeta, s.m, s.vqp, s.models, s.quality, s.total_bytes);
   }
 };
 
 struct ThesisTables {
   std::vector<PlaneThesis> planes;
+  PerceptualTable perceptual;
+  bool empty() const { return planes.empty() && perceptual.empty(); }
   template <class S, class A>
   static void archive(S& s, A& a) {
-    a(s.planes);
+    a(s.planes, s.perceptual);
   }
 };
 

@@ -48,7 +48,7 @@ void add_dump_command(Command& app) {
        "PART", args->part,
        "summary: bounds, scales, textures, bytes by kind, options. scales: the meshes and when each is "
        "enough. fragments: the texture's grid, importance and sizes. ladder: the rungs' bytes and "
-       "distortion. tables: size model, allocation, measured quality. atlas: charts of the textures and what they "
+       "distortion. tables: size model, allocation, measured quality. perceptual: how much scales differ, the thesis's Tables 7.1 and 7.2. atlas: charts of the textures and what they "
        "cost, as texmesh doctor has it; measured from S_0, which takes a moment. entries: every file with offset and "
        "digest. about: title, licence, unit and all else that is said about the object. provenance: inputs, options, versions. all: everything")
       .one_of_explained({kDumpParts.begin(), kDumpParts.end()})

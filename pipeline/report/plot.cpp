@@ -30,18 +30,25 @@ double round_step(double span, int parts) {
 class Canvas {
  public:
   explicit Canvas(const Plot& plot) : plot_(plot) {
-    step_ = round_step(plot.y_high > 0 ? plot.y_high : 1, 5);
-    top_value_ = step_ * std::ceil((plot.y_high > 0 ? plot.y_high : 1) / step_ - 1e-9);
+    const double high = plot.y_high > 0 ? plot.y_high : plot.y_low < 0 ? 0 : 1;
+    step_ = round_step(high - plot.y_low, 5);
+    top_value_ = step_ * std::ceil(high / step_ - 1e-9);
+    low_value_ = step_ * std::floor(plot.y_low / step_ + 1e-9);
   }
   double x(double v) const {
+    const double inside = std::clamp(v, plot_.x_low, plot_.x_high);
+    if (plot_.linear_x) return kLeft + kPlotWidth * (inside - plot_.x_low) / (plot_.x_high - plot_.x_low);
     const double low = portable::log(plot_.x_low), high = portable::log(plot_.x_high);
-    const double at = (portable::log(std::clamp(v, plot_.x_low, plot_.x_high)) - low) / (high - low);
-    return kLeft + kPlotWidth * at;
+    return kLeft + kPlotWidth * (portable::log(inside) - low) / (high - low);
   }
-  double y(double v) const { return kTop + kPlotHeight * (1 - std::clamp(v, 0.0, top_value_) / top_value_); }
+  double y(double v) const {
+    const double at = (std::clamp(v, low_value_, top_value_) - low_value_) / (top_value_ - low_value_);
+    return kTop + kPlotHeight * (1 - at);
+  }
   std::string axes(bool bytes) const {
     std::string svg;
-    for (int i = 0; i * step_ <= top_value_ * (1 + 1e-9); ++i)
+    const auto lowest = static_cast<int>(std::floor(low_value_ / step_ + 0.5));
+    for (int i = lowest; i * step_ <= top_value_ + 1e-9 * step_; ++i)
       svg += fmt::format(
           "<path class=\"grid\" d=\"M{} {:.1f}h{}\"/><text class=\"quiet end\" x=\"{}\" "
           "y=\"{:.1f}\">{:.4g}</text>\n",
@@ -51,9 +58,9 @@ class Canvas {
           "<path class=\"grid\" d=\"M{0:.1f} {1}v{2}\"/><text class=\"quiet mid\" x=\"{0:.1f}\" "
           "y=\"{3}\">{4}</text>\n",
           x(v), kTop, kPlotHeight + 5, kTop + kPlotHeight + 20,
-          bytes   ? short_bytes(v)
-          : v < 1 ? fmt::format("{:g}", v)
-                  : fmt::format("{:.0f}", v));
+          bytes                     ? short_bytes(v)
+          : plot_.linear_x || v < 1 ? fmt::format("{:.4g}", v)
+                                    : fmt::format("{:.0f}", v));
     return svg + fmt::format("<text class=\"quiet end\" x=\"{}\" y=\"{}\">{}</text>\n", kLeft + kPlotWidth,
                              kHeight - 8, markup_escaped(plot_.x_name));
   }
@@ -74,6 +81,7 @@ class Canvas {
  private:
   /// 1, 2 and 5 times powers of ten; powers alone where there are many.
   std::vector<double> ticks() const {
+    if (plot_.linear_x) return even_ticks();
     const bool many = plot_.x_high / plot_.x_low > 3000;
     std::vector<double> out;
     for (int power = -3; power <= 12; ++power)
@@ -86,8 +94,15 @@ class Canvas {
       }
     return out;
   }
+  std::vector<double> even_ticks() const {
+    const double step = round_step(plot_.x_high - plot_.x_low, 10);
+    std::vector<double> out;
+    for (double i = std::ceil(plot_.x_low / step - 1e-9); i * step <= plot_.x_high + 1e-9 * step; ++i)
+      out.push_back(i * step + 0.0);  // never -0
+    return out;
+  }
   const Plot& plot_;
-  double step_ = 1, top_value_ = 1;
+  double step_ = 1, top_value_ = 1, low_value_ = 0;
 };
 
 std::string legend(const std::vector<PlotSeries>& series, double top) {

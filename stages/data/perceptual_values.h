@@ -24,6 +24,9 @@ struct CollapseStatistics {
 struct PerceptualValues {
   std::vector<CollapseStatistics> step;  // [k]: the change from k - 1 to k; [0] is all zero
   std::vector<float> p95, p99;           // [i * n + j]: of S_i's points against S_j for j > i; else 0
+  // [i * n + j], j > i, else 0: rho over all collapses from S_i to S_j, each against the vertex that is left
+  // in S_j.
+  std::vector<float> chain_average, chain_largest, chain_least;
   // [k]: 1 = the last scale of its tier. A tier begins behind S_0 or behind the last major scale. It ends
   // before the value against that scale reaches the JND, or with its first scale where that is beyond the JND
   // already.
@@ -42,8 +45,8 @@ struct PerceptualValues {
   float object_height = 0;  // O_V: the longest side of the bounding box, object units
   template <class S, class A>
   static void archive(S& s, A& a) {
-    a(s.step, s.p95, s.p99, s.major, s.kept, s.display_px_edge, s.display_px_error, s.display_px_jnd,
-      s.object_height);
+    a(s.step, s.p95, s.p99, s.chain_average, s.chain_largest, s.chain_least, s.major, s.kept,
+      s.display_px_edge, s.display_px_error, s.display_px_jnd, s.object_height);
   }
 };
 

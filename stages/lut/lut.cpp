@@ -119,8 +119,8 @@ std::vector<std::uint16_t> importance_order(const TexturePlane& plane) {
 }
 
 /// What the thesis's policy reads of a plane whose tables are there.
-PlaneThesis describe_thesis(const PlanePredictors& predictors, const TexturePlane& plane,
-                            const PlaneLadder& ladder, const PlaneTables& tables) {
+PlaneThesis describe_thesis(const PlanePredictors& predictors, const PlaneLadder& ladder,
+                            const PlaneTables& tables) {
   PlaneThesis out;
   out.z = predictors.z;
   out.i = predictors.i;
@@ -131,8 +131,7 @@ PlaneThesis describe_thesis(const PlanePredictors& predictors, const TexturePlan
   for (std::size_t scale = 0; scale < tables.scale_count(); ++scale)
     for (std::size_t g = 0; g < kGammaSteps; ++g)  // with rd, too: that is what rungs_of() then spends
       out.total_bytes.push_back(bytes_asked_for(tables, scale, static_cast<double>(g) / (kGammaSteps - 1)));
-  out.model =
-      fit_size_model(ladder, plane.fragment_width_px, plane.fragment_height_px, tables, predictors.vqp);
+  out.models = fit_size_models(ladder, tables, predictors.vqp);
   return out;
 }
 
@@ -167,8 +166,7 @@ LutTables build_tables(const Fragments& fragments, const std::vector<Pixels>& pi
   out.thesis.planes.resize(tables.size());
   parallel_for(context, tables.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t p = begin; p < end; ++p)
-      out.thesis.planes[p] =
-          describe_thesis(predictors.planes[p], fragments.planes[p], ladder.planes[p], tables[p]);
+      out.thesis.planes[p] = describe_thesis(predictors.planes[p], ladder.planes[p], tables[p]);
   });
   return out;
 }

@@ -13,7 +13,7 @@
 
 namespace texmesh {
 
-inline constexpr int kLutVersion = 8;
+inline constexpr int kLutVersion = 9;
 
 enum class Allocation : std::uint8_t { kThesis, kLog, kRd };
 template <>
@@ -64,7 +64,7 @@ struct LutTables {
 /// - The order of falling importance: eta of scale 0, then surface, then index.
 /// - Q_i, and for the thesis D_i over 21 values of Gamma: bytes of the fragments' streams, table streams not
 ///   counted. With `allocate = rd` they are the bytes of log, which rungs_of() spends.
-/// - For the thesis the predictors, and the size model (stages/lut/size_model.h).
+/// - For the thesis the predictors, and the size models (stages/lut/size_model.h).
 /// `pixels` are fill_planes()'s, `previews` make_previews()'s. Throws StageError for parts that do not fit
 /// each other, FormatError for a stream that does not decode. Same result for any thread count.
 LutTables build_tables(const Fragments& fragments, const std::vector<Pixels>& pixels,

@@ -104,6 +104,29 @@ std::vector<ManifestScale> describe_scales(const NestedScales& scales, const Per
   return result;
 }
 
+/// What `perceptual` says of any two scales, as thesis.bin has it.
+PerceptualTable describe_perceptual(const NestedScales& scales, const PerceptualValues& perceptual) {
+  PerceptualTable t;
+  const std::size_t n = scales.scales.size();
+  if (perceptual.step.size() != n || perceptual.chain_average.size() != n * n)
+    fail("perceptual values", std::to_string(n) + " scales", std::to_string(perceptual.step.size()));
+  for (std::size_t i = 0; i < n; ++i) {
+    const CollapseStatistics& step = perceptual.step[i];
+    t.scale.push_back(static_cast<std::uint8_t>(scales.scales[i].scale));
+    t.triangles.push_back(static_cast<std::uint32_t>(scales.scales[i].triangles.size()));
+    t.collapses.push_back(step.collapses);
+    t.average.push_back(step.mean), t.largest.push_back(step.max), t.least.push_back(step.min);
+    t.deviation.push_back(step.deviation);
+    for (std::size_t j = i + 1; j < n; ++j) {
+      t.p95.push_back(perceptual.p95[i * n + j]);
+      t.chain_average.push_back(perceptual.chain_average[i * n + j]);
+      t.chain_largest.push_back(perceptual.chain_largest[i * n + j]);
+      t.chain_least.push_back(perceptual.chain_least[i * n + j]);
+    }
+  }
+  return t;
+}
+
 double surface_area(const Mesh& mesh, const NestedScale& scale) {
   double area = 0;
   for (const Triangle& t : scale.triangles) {
@@ -264,7 +287,7 @@ std::vector<std::uint8_t> assemble_package(const NestedScales& scales, const Per
   std::vector<TextureInfo> textures;
   std::vector<PackageEntry> entries;
   entries.push_back({kTablesPath, write_tables(select_scales(tables, stored_rows(manifest, tables)))});
-  if (!thesis.planes.empty()) entries.push_back({kThesisPath, write_thesis(thesis)});
+  entries.push_back({kThesisPath, write_thesis({thesis.planes, describe_perceptual(scales, perceptual)})});
   entries.push_back({kQualityPath, to_bytes(write_quality(quality.table))});
   entries.push_back({kProvenancePath, to_bytes(provenance_json)});
   entries.push_back({kAboutPath, to_bytes(write_about(about))});

@@ -19,7 +19,7 @@
 
 namespace texmesh {
 
-inline constexpr int kPackageVersion = 5;
+inline constexpr int kPackageVersion = 6;
 
 struct PackageOptions {
   std::string title, meta;
@@ -34,11 +34,11 @@ struct PackageOptions {
 /// Describes the model in a manifest, packs every rung's fragments by importance, and lays out the container
 /// (format/documents/package_writer.h). Throws StageError when the stages' results do not belong together,
 /// FormatError when the title or a value breaks a rule of the format. `tables` and `thesis` have a row for
-/// every scale of the chain. A pure function of its inputs: nothing runs in parallel here. `source` is what
-/// the source says about itself: about.json is that with options.meta and options.title over it.
-/// asset.copyright of the scales' files is the source's own, so that they stay as they are when options.meta
-/// changes. `provenance_json` is made by the pipeline (options, input digests, stage versions; no dates,
-/// hosts or paths).
+/// every scale of the chain; the perceptual table of thesis.bin is made here. A pure function of its inputs:
+/// nothing runs in parallel here. `source` is what the source says about itself: about.json is that with
+/// options.meta and options.title over it. asset.copyright of the scales' files is the source's own, so that
+/// they stay as they are when options.meta changes. `provenance_json` is made by the pipeline (options, input
+/// digests, stage versions; no dates, hosts or paths).
 std::vector<std::uint8_t> assemble_package(const NestedScales& scales, const PerceptualValues& perceptual,
                                            const std::vector<Image>& images, const Fragments& fragments,
                                            const Ladder& ladder, const Previews& previews,

@@ -9,6 +9,7 @@
 #include "format/base/errors.h"
 #include "format/base/no_index.h"
 #include "format/base/portable_math.h"
+#include "format/rules/jnd_choice.h"
 #include "stages/base/parallel.h"
 #include "stages/geometry/distance.h"
 
@@ -49,19 +50,54 @@ double percentile(std::vector<double>& values, double percent) {
   return *at;
 }
 
-/// Table 7.1: one scale change.
-CollapseStatistics collapse_statistics(const NestedScales& scales, std::size_t k, const Skeleton& skeleton,
-                                       std::vector<std::uint32_t>& survivor) {
-  const std::size_t begin = scales.scales[k - 1].collapse_count, end = scales.scales[k].collapse_count;
+/// rho of a removed vertex against the one that is left.
+double collapse_value(const Skeleton& skeleton, std::uint32_t removed, std::uint32_t left) {
+  return std::fabs(static_cast<double>(skeleton.distance[removed]) - skeleton.distance[left]) /
+         skeleton.radius[left];
+}
+
+/// Per position of S_0: the one that stands for it at scale k.
+std::vector<std::uint32_t> survivors_at(const NestedScales& scales, std::size_t k) {
+  std::vector<std::uint32_t> survivor(scales.mesh.positions.size());
+  for (std::size_t p = 0; p < survivor.size(); ++p) survivor[p] = static_cast<std::uint32_t>(p);
   // Backwards, so that a chain's end is known before the links that lead to it.
-  for (std::size_t i = end; i-- > begin;)
-    survivor[scales.collapses[i].from] = survivor[scales.collapses[i].to];
+  for (std::size_t c = scales.scales[k].collapse_count; c-- > 0;)
+    survivor[scales.collapses[c].from] = survivor[scales.collapses[c].to];
+  return survivor;
+}
+
+/// The column of scale j of the tables of chains.
+void chain_statistics(const NestedScales& scales, std::size_t j, const Skeleton& skeleton,
+                      PerceptualValues& out) {
+  const std::size_t n = scales.scales.size();
+  const std::vector<std::uint32_t> survivor = survivors_at(scales, j);
+  double sum = 0, least = 0, most = 0;
+  std::size_t count = 0;
+  for (std::size_t k = j; k > 0; --k) {
+    for (std::size_t c = scales.scales[k - 1].collapse_count; c < scales.scales[k].collapse_count; ++c) {
+      const std::uint32_t removed = scales.collapses[c].from;
+      const double rho = collapse_value(skeleton, removed, survivor[removed]);
+      sum += rho;
+      least = count == 0 ? rho : std::min(least, rho);
+      most = std::max(most, rho);
+      ++count;
+    }
+    const std::size_t at = (k - 1) * n + j;
+    out.chain_average[at] = static_cast<float>(sum / static_cast<double>(std::max<std::size_t>(count, 1)));
+    out.chain_largest[at] = static_cast<float>(most);
+    out.chain_least[at] = static_cast<float>(least);
+  }
+}
+
+/// Table 7.1: one scale change.
+CollapseStatistics collapse_statistics(const NestedScales& scales, std::size_t k, const Skeleton& skeleton) {
+  const std::size_t begin = scales.scales[k - 1].collapse_count, end = scales.scales[k].collapse_count;
+  const std::vector<std::uint32_t> survivor = survivors_at(scales, k);
   CollapseStatistics out;
   double sum = 0, squares = 0, least = 0, most = 0;
   for (std::size_t i = begin; i < end; ++i) {
-    const std::uint32_t removed = scales.collapses[i].from, left = survivor[removed];
-    const double rho = std::fabs(static_cast<double>(skeleton.distance[removed]) - skeleton.distance[left]) /
-                       skeleton.radius[left];
+    const std::uint32_t removed = scales.collapses[i].from;
+    const double rho = collapse_value(skeleton, removed, survivor[removed]);
     sum += rho, squares += rho * rho;
     least = i == begin ? rho : std::min(least, rho);
     most = std::max(most, rho);
@@ -139,16 +175,6 @@ std::vector<double> compare_scales(const NestedScales& scales, const Skeleton& s
     }
   });
   return error;
-}
-
-void find_majors(const std::vector<float>& value, std::size_t n, double jnd,
-                 std::vector<std::uint8_t>& major) {
-  for (std::size_t i = 0; i + 1 < n;) {
-    std::size_t last = i + 1;
-    while (last + 1 < n && value[i * n + last] < jnd && value[i * n + last + 1] < jnd) ++last;
-    major[last] = 1;
-    i = last;
-  }
 }
 
 /// Of kept scales with nearly the same number of triangles only the finest stays, and the coarsest of all.
@@ -235,9 +261,9 @@ void find_displayed_heights(const NestedScales& scales, const std::vector<double
   }
 }
 
-double strategy_value(const CollapseStatistics& s, PerceptualStatistic strategy) {
-  if (strategy == PerceptualStatistic::kConservative) return static_cast<double>(s.max);
-  return static_cast<double>(strategy == PerceptualStatistic::kAggressive ? s.min : s.mean);
+float strategy_value(const CollapseStatistics& s, PerceptualStatistic strategy) {
+  if (strategy == PerceptualStatistic::kConservative) return s.max;
+  return strategy == PerceptualStatistic::kAggressive ? s.min : s.mean;
 }
 
 }  // namespace
@@ -247,17 +273,9 @@ std::vector<float> cumulative_table(const std::vector<CollapseStatistics>& step,
   if (strategy == PerceptualStatistic::kP95)
     throw StageError("perceptual_values", "statistic", "average, conservative or aggressive",
                      std::string(enum_name(strategy)));
-  const std::size_t n = step.size();
-  std::vector<float> table(n * n, 0);
-  for (std::size_t i = 0; i < n; ++i) {
-    double squares = 0;
-    for (std::size_t j = i + 1; j < n; ++j) {
-      const double value = strategy_value(step[j], strategy);
-      squares += value * value;
-      table[i * n + j] = static_cast<float>(std::sqrt(squares));
-    }
-  }
-  return table;
+  std::vector<float> values;
+  for (const CollapseStatistics& s : step) values.push_back(strategy_value(s, strategy));
+  return chained_values(values);
 }
 
 std::vector<float> value_table(const PerceptualValues& values, PerceptualStatistic statistic) {
@@ -275,14 +293,16 @@ PerceptualValues measure_perceptual_values(const NestedScales& scales, const Ske
   PerceptualValues out;
   out.step.resize(n);
   out.p95.assign(n * n, 0), out.p99.assign(n * n, 0);
-  out.major.assign(n, 0);
-  std::vector<std::uint32_t> survivor(positions);
-  for (std::size_t p = 0; p < positions; ++p) survivor[p] = static_cast<std::uint32_t>(p);
-  for (std::size_t k = 1; k < n; ++k) out.step[k] = collapse_statistics(scales, k, skeleton, survivor);
+  for (std::vector<float>* chain : {&out.chain_average, &out.chain_largest, &out.chain_least})
+    chain->assign(n * n, 0);
+  for (std::size_t k = 1; k < n; ++k) {
+    out.step[k] = collapse_statistics(scales, k, skeleton);
+    chain_statistics(scales, k, skeleton, out);
+  }
   const std::vector<double> error =
       compare_scales(scales, skeleton, static_cast<std::size_t>(options.samples), context, out);
   const std::vector<float> value = value_table(out, options.statistic);
-  find_majors(value, n, options.jnd, out.major);
+  out.major = major_rows(value, n, options.jnd);
   choose_kept(scales, options.kept_scales, out);
   find_displayed_heights(scales, error, options, value, context, out);
   return out;

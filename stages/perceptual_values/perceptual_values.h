@@ -1,8 +1,7 @@
 #pragma once
-#include <cstdint>
-#include <string_view>
 #include <vector>
 
+#include "format/documents/perceptual_table.h"
 #include "stages/data/nested_scales.h"
 #include "stages/data/perceptual_values.h"
 #include "stages/data/skeleton.h"
@@ -10,16 +9,7 @@
 
 namespace texmesh {
 
-inline constexpr int kPerceptualValuesVersion = 3;
-
-/// Which table decides what is just noticeable. kP95: the relative distance between two scales. The
-/// others are the thesis's strategies (7.2) over the collapses of a scale change, accumulated (Table 7.2):
-/// average, conservative = the largest change, aggressive = the smallest one.
-enum class PerceptualStatistic : std::uint8_t { kP95, kAverage, kConservative, kAggressive };
-template <>
-struct EnumNames<PerceptualStatistic> {
-  static constexpr std::array<std::string_view, 4> names{"p95", "average", "conservative", "aggressive"};
-};
+inline constexpr int kPerceptualValuesVersion = 4;
 
 /// Displayed height in px at which judges' JND holds by default: the thesis's stimuli stood side by side on
 /// monitors of 1024..1280 px (Table 7.3; Fig. 7.14 speaks of 90..170 px from skeleton to surface).

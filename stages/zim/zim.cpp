@@ -22,20 +22,21 @@ double sum_of_weights(const ZimOptions& options) {
   return sum;
 }
 
+void check_plane(const TexturePlane& plane, const Pixels& pixels, std::size_t p) {
+  if (pixels.width_px < plane.width_px || pixels.height_px < plane.height_px ||
+      pixels.channels != plane.channels ||
+      pixels.data.size() != std::size_t{pixels.width_px} * pixels.height_px * plane.channels ||
+      plane.covered_texels.size() != plane.fragment_count() || plane.eta.size() < plane.fragment_count() ||
+      plane.coverage.size() != coverage_size_bytes(plane.width_px, plane.height_px))
+    fail("plane " + std::to_string(p), "pixels, coverage and counts that fit each other",
+         std::to_string(pixels.width_px) + " x " + std::to_string(pixels.height_px));
+}
+
 void check(const Fragments& fragments, const std::vector<Pixels>& pixels, const ZimOptions& options) {
   sum_of_weights(options);
   if (pixels.size() != fragments.planes.size())
     fail("pixels", std::to_string(fragments.planes.size()) + " planes", std::to_string(pixels.size()));
-  for (std::size_t p = 0; p < pixels.size(); ++p) {
-    const TexturePlane& plane = fragments.planes[p];
-    if (pixels[p].width_px < plane.width_px || pixels[p].height_px < plane.height_px ||
-        pixels[p].channels != plane.channels ||
-        pixels[p].data.size() != std::size_t{pixels[p].width_px} * pixels[p].height_px * plane.channels ||
-        plane.covered_texels.size() != plane.fragment_count() || plane.eta.size() < plane.fragment_count() ||
-        plane.coverage.size() != coverage_size_bytes(plane.width_px, plane.height_px))
-      fail("plane " + std::to_string(p), "pixels, coverage and counts that fit each other",
-           std::to_string(pixels[p].width_px) + " x " + std::to_string(pixels[p].height_px));
-  }
+  for (std::size_t p = 0; p < pixels.size(); ++p) check_plane(fragments.planes[p], pixels[p], p);
 }
 
 /// Sums over the covered texels of one fragment. At most 2^32 texels of 255: squares fit 64 bits.
@@ -66,6 +67,12 @@ class FragmentReader {
         }
       }
     return out;
+  }
+  /// Whether two texels are both covered and differ.
+  bool differ(std::uint32_t x, std::uint32_t y, std::uint32_t u, std::uint32_t v) const {
+    Sums sums;
+    if (mask_.covered(x, y)) add_pair(x, y, u, v, sums);
+    return sums.different > 0;
   }
 
  private:
@@ -170,6 +177,21 @@ Predictors predict_quality(const Fragments& fragments, const std::vector<Pixels>
     });
     predictors.vqp = visual_quality(plane, predictors, options);
     context.report(static_cast<double>(p + 1) / static_cast<double>(out.planes.size()));
+  }
+  return out;
+}
+
+std::vector<std::uint8_t> differing_texels(const TexturePlane& plane, const Pixels& pixels,
+                                           const ZimOptions& options) {
+  check_plane(plane, pixels, 0);
+  const FragmentReader reader(plane, pixels, options.difference);
+  std::vector<std::uint8_t> out(std::size_t{plane.width_px} * plane.height_px, 0);
+  for (std::size_t f = 0; f < plane.fragment_count(); ++f) {
+    const TexelRectangle at = fragment_rectangle(plane, f);
+    for (std::uint32_t y = at.top_px; y + 1 < at.bottom_px(); ++y)
+      for (std::uint32_t x = at.left_px; x + 1 < at.right_px(); ++x)
+        out[std::size_t{y} * plane.width_px + x] =
+            reader.differ(x, y, x + 1, y) || reader.differ(x, y, x, y + 1);
   }
   return out;
 }

@@ -32,4 +32,9 @@ struct ZimOptions {
 Predictors predict_quality(const Fragments& fragments, const std::vector<Pixels>& pixels,
                            const ZimOptions& options, const RunContext& context);
 
+/// The thesis's picture of zeta (Fig. 8.3), row by row over the plane: 1 where a covered texel differs from
+/// its east or south neighbour in the same fragment, else 0. `pixels` are the plane's. StageError as above.
+std::vector<std::uint8_t> differing_texels(const TexturePlane& plane, const Pixels& pixels,
+                                           const ZimOptions& options);
+
 }  // namespace texmesh

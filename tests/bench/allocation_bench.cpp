@@ -4,7 +4,7 @@
 //     stored), at equal surface-weighted 1 - SSIM
 //   allocation_bench MODEL ...
 //     sizes: table against streams; error of sizes between the rungs, against a second ladder of just those
-//     qualities; the model S = A R^Q + c
+//     qualities; the model S = A (100 p)^(B Q)
 // Every figure is a ratio or an error within one run.
 #include <fmt/format.h>
 
@@ -14,6 +14,7 @@
 
 #include "delivery/cpp/package/package_reader.h"
 #include "format/rules/size_curve.h"
+#include "format/rules/size_model.h"
 #include "stages/fill/fill.h"
 #include "stages/ladder/ladder.h"
 #include "stages/lut/lut.h"
@@ -67,6 +68,7 @@ struct Errors {
   std::vector<double> all;
   void add(double e) { sum += e, worst = std::max(worst, e), all.push_back(e); }
   std::string text() {
+    if (all.empty()) return "     -      -      -";
     std::sort(all.begin(), all.end());
     const auto n = static_cast<double>(all.size());
     return fmt::format("{:6.2f} {:6.2f} {:6.2f}", 100 * sum / n, 100 * all[all.size() * 95 / 100],
@@ -89,7 +91,8 @@ void print_sizes(const std::string& path) {
   const auto [tables, thesis] =
       build_tables(model.fragments, pixels, predictors, ladder, previews, {}, context);
   Errors at_rungs, inside, whole, without_knots;
-  double correlation = 1, model_error = 0;
+  Errors modelled;
+  double correlation = 1;
   for (const std::size_t p : shown) {
     const PlaneTables& t = tables.planes[p];
     for (std::size_t r = 0; r < t.rung_count(); ++r)
@@ -112,12 +115,20 @@ void print_sizes(const std::string& path) {
       whole.add(std::fabs(guess - real) / real);
       without_knots.add(std::fabs(plain_guess - real) / real);
     }
-    correlation = std::min(correlation, static_cast<double>(thesis.planes[p].model.correlation));
-    model_error = std::max(model_error, static_cast<double>(thesis.planes[p].model.error));
+    for (const std::uint16_t f : t.order) {
+      const SizeModel& fitted = thesis.planes[p].models[f];
+      if (fitted == SizeModel{}) continue;
+      correlation = std::min(correlation, static_cast<double>(fitted.correlation));
+      for (std::size_t r = 0; r < t.rung_count(); ++r) {
+        const double bytes = t.size_bytes[r * t.fragment_count() + f];
+        const double vqp = static_cast<double>(thesis.planes[p].vqp[f]);
+        modelled.add(std::fabs(modelled_bytes(fitted, vqp, t.rung_quality[r] / 100.0) - bytes) / bytes);
+      }
+    }
   }
-  std::cout << fmt::format("{:<26} {:6.2f}   {}   {}   {}   {:7.4f} {:7.1f}\n", model_name(path),
+  std::cout << fmt::format("{:<26} {:6.2f}   {}   {}   {}   {:7.4f}   {}\n", model_name(path),
                            100 * at_rungs.worst, inside.text(), whole.text(), without_knots.text(),
-                           correlation, 100 * model_error);
+                           correlation, modelled.text());
 }
 
 }  // namespace
@@ -147,7 +158,7 @@ int main(int argc, char** argv) {
     if (!models.empty())
       std::cout
           << "size errors in %, of fragments and of whole textures: at rungs | between: mean, p95, worst | "
-             "whole: mean, p95, worst | the same without knots | model: correlation, error\n";
+             "whole: mean, p95, worst | the same without knots | model: least correlation; mean, p95, worst\n";
     for (const std::string& path : models) print_sizes(path);
   } catch (const std::exception& e) {
     std::cerr << e.what() << '\n';

@@ -106,13 +106,31 @@ PlaneTables make_tables(const TexturePlane& plane, const PlaneLadder& ladder) {
 PlaneThesis make_thesis(const PlaneTables& t) {
   PlaneThesis out;
   for (auto* v : {&out.z, &out.i, &out.zeta, &out.m, &out.vqp}) *v = {0.25f, 0.5f, 0.75f, 0};
-  out.model = {300, 0.5f, 1.02f, 0.98f, 0.05f};
+  out.models = {{300, 0.5f, 0.98f}, {300, 0.5f, 0.98f}, {300, 0.5f, 0.98f}, {}};
   for (std::size_t scale = 0; scale <= 5; ++scale) {
     out.quality.push_back(80 - 8 * static_cast<float>(scale));
     for (int g = 0; g <= 20; ++g)
       out.total_bytes.push_back(scale % 5 == 0 ? bytes_asked_for(t, scale / 5, g / 20.0) : 1000);
   }
   return out;
+}
+
+/// Of the chain S_0 to S_5, of which S_0 and S_5 are stored.
+PerceptualTable make_perceptual() {
+  PerceptualTable t;
+  for (std::uint8_t k = 0; k <= 5; ++k) {
+    t.scale.push_back(k);
+    t.triangles.push_back(static_cast<std::uint32_t>(k == 0   ? fine_mesh().triangles.size()
+                                                     : k == 5 ? coarse_mesh().triangles.size()
+                                                              : 100u));
+    t.collapses.push_back(k == 0 ? 0 : 7);
+    for (auto* v : {&t.average, &t.largest, &t.least, &t.deviation}) v->push_back(k == 0 ? 0 : 0.03f);
+    for (std::uint8_t j = static_cast<std::uint8_t>(k + 1); j <= 5; ++j) {
+      t.p95.push_back(0.01f * static_cast<float>(j - k));
+      for (auto* v : {&t.chain_average, &t.chain_largest, &t.chain_least}) v->push_back(0.02f);
+    }
+  }
+  return t;
 }
 
 json make_provenance() {
@@ -139,6 +157,7 @@ void add_texture(PackageParts& p) {
   const PlanePreview preview = make_previews(fragments, pixels, {}, {}).planes.at(0);
   p.tables.planes = {make_tables(plane, ladder)};
   p.thesis.planes = {make_thesis(p.tables.planes[0])};
+  p.thesis.perceptual = make_perceptual();
   p.streams[preview_path(0)] = preview.file;
   for (std::uint32_t r = 0; r < 2; ++r) {
     const LadderRung& rung = ladder.rungs[r];
@@ -299,7 +318,7 @@ Bytes PackageParts::build() const {
   const auto bytes_of = [](const std::string& s) { return Bytes(s.begin(), s.end()); };
   std::vector<PackageEntry> entries;
   entries.push_back({kTablesPath, write_tables(tables)});
-  if (!thesis.planes.empty()) entries.push_back({kThesisPath, write_thesis(thesis)});
+  if (!thesis.empty()) entries.push_back({kThesisPath, write_thesis(thesis)});
   entries.push_back({kQualityPath, bytes_of(write_quality(quality))});
   entries.push_back({kProvenancePath, bytes_of(provenance.dump())});
   About said = about;

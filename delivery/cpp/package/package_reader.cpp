@@ -190,8 +190,18 @@ const PackageTables& PackageReader::tables() {
 }
 
 const PlaneThesis* PackageReader::plane_thesis(std::size_t plane) {
+  const ThesisTables* tables = thesis();
+  return tables && plane < tables->planes.size() ? &tables->planes[plane] : nullptr;
+}
+
+const PerceptualTable* PackageReader::perceptual_table() {
+  const ThesisTables* tables = thesis();
+  return tables && !tables->perceptual.empty() ? &tables->perceptual : nullptr;
+}
+
+const ThesisTables* PackageReader::thesis() {
   if (!thesis_ && manifest_.thesis) thesis_ = read_thesis_entry();
-  return thesis_ && plane < thesis_->planes.size() ? &thesis_->planes[plane] : nullptr;
+  return thesis_ ? &*thesis_ : nullptr;
 }
 
 ThesisTables PackageReader::read_thesis_entry() {
@@ -208,8 +218,15 @@ ThesisTables PackageReader::read_thesis_entry() {
     require(p < textures().size(), p, "planes of the package");
     require(t.z.empty() || t.z.size() == std::size_t{textures()[p].columns} * textures()[p].rows, p,
             "predictors of the plane's fragments");
+    require(t.models.empty() || t.models.size() == std::size_t{textures()[p].columns} * textures()[p].rows, p,
+            "size models of the plane's fragments");
     require(t.quality.empty() || t.quality.size() > last_scale, p, "sizes of all scales");
   }
+  if (const PerceptualTable& perceptual = file.tables.perceptual; !perceptual.empty())
+    for (const ManifestScale& s : manifest_.scales)
+      if (!std::ranges::binary_search(perceptual.scale, s.scale))
+        throw RuleError("R16", store_->name(), std::string(kThesisPath) + ", perceptual table",
+                        "scale " + std::to_string(s.scale), "none");
   return std::move(file.tables);
 }
 

@@ -68,6 +68,8 @@ class PackageReader {
   /// What the thesis's policy reads of a plane, from thesis.bin; nullptr where the package says nothing of
   /// it.
   const PlaneThesis* plane_thesis(std::size_t plane);
+  /// How much any two scales differ, from thesis.bin; nullptr where the package does not say.
+  const PerceptualTable* perceptual_table();
 
   std::vector<std::uint8_t> entry(const EntryRef& ref);
   std::vector<std::uint8_t> entry(const std::string& path) { return entry(find(path)); }
@@ -101,6 +103,7 @@ class PackageReader {
   std::vector<std::uint8_t> read_paged(const PagedRef& ref);
   void require_head(const PagedRef& ref, std::uint64_t head_bytes) const;
   void require_minor(const std::string& path, int minor) const;
+  const ThesisTables* thesis();
   ThesisTables read_thesis_entry();
   void check_plane(std::size_t plane, const PlaneTables& tables);
   const TextureInfo& texture(std::uint32_t plane);

@@ -71,9 +71,17 @@ struct Table42Row {
   double worst_percent = 0;                                     // its largest
   double trace_deviation_percent = 0, trace_worst_percent = 0;  // traces by time: cv 0.3, 0.1 s, rho 0.9
   double mean_loss = 0;
+  double surplus_percent = 0;  // Pi, with its sign, of the limit: mean over the seeds
+  double lambda_s = 0;         // Lambda: mean of dT_k of all fragments but the last, mean over the seeds
 };
-std::vector<Table42Row> table_4_2(const HtcOptions& options, int seeds = 20);
-/// The list of that table: sizes at ten rungs as photographs have them, made by code.
-std::vector<FragmentOffer> table_4_2_offers();
+/// Qualities of the table's rungs: kTen = 10, 20 .. 100; kFine = steps of 5, and finer ones where bytes grow
+/// fastest. The limits of quality are 40 and 100, as the thesis's.
+enum class Table42Rungs : std::uint8_t { kTen, kFine };
+std::vector<Table42Row> table_4_2(const HtcOptions& options, int seeds = 20,
+                                  Table42Rungs rungs = Table42Rungs::kFine);
+/// The list of that table: sizes as photographs have them, made by code.
+std::vector<FragmentOffer> table_4_2_offers(Table42Rungs rungs = Table42Rungs::kFine);
+/// Lambda of a run in which every fragment was transferred, s.
+double lambda_of(const SimulationResult& result);
 
 }  // namespace texmesh

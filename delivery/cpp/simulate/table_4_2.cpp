@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "delivery/cpp/simulate/simulation.h"
 #include "format/base/portable_math.h"
@@ -10,9 +11,16 @@ namespace {
 constexpr std::size_t kFragments = 256;
 constexpr double kListBytes = 418e3, kLinkBytes_s = 41.68e3;
 constexpr double kQuality = 80, kWidth = 60;  // Q_i and dQ of Eq. 3.2
+constexpr int kTenRungs[] = {10, 20, 30, 40, 50, 60, 70, 80, 90, 100};
 // Steps of 5 as in the thesis's tables, finer where bytes grow fastest: between 95 and 100 they double.
-constexpr int kRungs[] = {5,  10, 15, 20, 25, 30, 35, 40, 45, 50, 55, 60, 65,
-                          70, 75, 80, 85, 90, 92, 94, 95, 96, 97, 98, 99, 100};
+constexpr int kFineRungs[] = {5,  10, 15, 20, 25, 30, 35, 40, 45, 50, 55, 60, 65,
+                              70, 75, 80, 85, 90, 92, 94, 95, 96, 97, 98, 99, 100};
+constexpr int kLowestQuality = 40;
+
+std::span<const int> qualities_of(Table42Rungs rungs) {
+  if (rungs == Table42Rungs::kTen) return kTenRungs;
+  return kFineRungs;
+}
 
 /// IJG's scale of the quantisers, 1 at quality 50.
 double quantiser_scale(double quality) {
@@ -24,7 +32,8 @@ double relative_loss(double quality) { return 0.03 * portable::pow(quantiser_sca
 
 }  // namespace
 
-std::vector<FragmentOffer> table_4_2_offers() {
+std::vector<FragmentOffer> table_4_2_offers(Table42Rungs rungs) {
+  const std::span<const int> qualities = qualities_of(rungs);
   TraceRandom random(42);
   std::vector<FragmentOffer> offers(kFragments);
   std::vector<double> base(kFragments);
@@ -45,18 +54,24 @@ std::vector<FragmentOffer> table_4_2_offers() {
     const double unit = kListBytes / total;
     f.planned_bytes *= unit;
     f.loss.push_back(0.4 / kFragments);
-    for (const int q : kRungs) {
+    for (const int q : qualities) {
       f.bytes.push_back(
           static_cast<std::uint32_t>(std::max(1.0, std::floor(base[i] * unit * relative_bytes(q) + 0.5))));
       f.loss.push_back(relative_loss(q) / kFragments);
     }
-    f.low_rung = 7;  // the thesis's limits are 40 and 100
+    f.low_rung = static_cast<std::uint16_t>(std::ranges::find(qualities, kLowestQuality) - qualities.begin());
   }
   return offers;
 }
 
-std::vector<Table42Row> table_4_2(const HtcOptions& base, int seeds) {
-  const std::vector<FragmentOffer> offers = table_4_2_offers();
+double lambda_of(const SimulationResult& result) {
+  double sum = 0;
+  for (std::size_t k = 0; k + 1 < result.steps.size(); ++k) sum += result.steps[k].residual_s;
+  return sum / static_cast<double>(std::max<std::size_t>(result.steps.size(), 2) - 1);
+}
+
+std::vector<Table42Row> table_4_2(const HtcOptions& base, int seeds, Table42Rungs rungs) {
+  const std::vector<FragmentOffer> offers = table_4_2_offers(rungs);
   std::vector<Table42Row> rows;
   for (int beta0 = 20; beta0 <= 53; beta0 += 3) {
     Table42Row row;
@@ -80,6 +95,8 @@ std::vector<Table42Row> table_4_2(const HtcOptions& base, int seeds) {
       row.worst_percent = std::max(row.worst_percent, d);
       row.trace_worst_percent = std::max(row.trace_worst_percent, t);
       row.mean_loss += by_sample.loss / seeds;
+      row.surplus_percent += by_sample.deviation_percent / seeds;
+      row.lambda_s += lambda_of(by_sample) / seeds;
     }
     rows.push_back(row);
   }

@@ -11,6 +11,7 @@ void add_study_command(Command& app) {
   add_quality_study(c);
   add_prediction_study(c);
   add_rungs_study(c);
+  add_thesis_study(c);
 }
 
 }  // namespace texmesh

@@ -16,14 +16,16 @@ enum class DumpPart : std::uint8_t {
   kFragments,
   kLadder,
   kTables,
+  kPerceptual,
   kAtlas,
   kEntries,
   kAbout,
   kProvenance,
   kAll
 };
-inline constexpr std::array<std::string_view, 10> kDumpParts{
-    "summary", "scales", "fragments", "ladder", "tables", "atlas", "entries", "about", "provenance", "all"};
+inline constexpr std::array<std::string_view, 11> kDumpParts{"summary", "scales",     "fragments", "ladder",
+                                                             "tables",  "perceptual", "atlas",     "entries",
+                                                             "about",   "provenance", "all"};
 
 /// A page about one part of a package for people: aligned tables, units in the headers, bytes in decimal
 /// units. With `gamma` (0..1) `tables` are at it instead of the default Gamma, with every fragment's

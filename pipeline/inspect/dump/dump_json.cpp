@@ -6,6 +6,7 @@
 #include "format/rules/viewing.h"
 #include "pipeline/inspect/atlas/atlas_report.h"
 #include "pipeline/inspect/dump/dump.h"
+#include "pipeline/inspect/dump/dump_perceptual.h"
 #include "pipeline/inspect/dump/package_figures.h"
 #include "pipeline/inspect/provenance.h"
 
@@ -168,6 +169,11 @@ Json fragment_json(const PlaneTables& t, const PlaneThesis* thesis, std::size_t 
                   {"i", thesis->i[i]},
                   {"zeta", thesis->zeta[i]},
                   {"m", thesis->m[i]}});
+  if (thesis && i < thesis->models.size()) {
+    const SizeModel& model = thesis->models[i];
+    if (model != SizeModel{})
+      j["size_model"] = {{"a", model.a}, {"b", model.b}, {"correlation", model.correlation}};
+  }
   return j;
 }
 
@@ -233,9 +239,8 @@ Json allocation_json(const PlaneTables& t, int scale, std::size_t row, std::opti
           {"fragment_rung", rungs}, {"fragment_bytes", bytes}};
 }
 
-/// The size model, and D_i(Gamma) of all scales of the chain.
+/// D_i(Gamma) of all scales of the chain.
 Json thesis_json(const PlaneThesis& thesis) {
-  const SizeModel& model = thesis.model;
   Json scales = Json::array();
   for (std::size_t s = 0; s < thesis.quality.size(); ++s) {
     const auto begin = thesis.total_bytes.begin() + static_cast<std::ptrdiff_t>(s * kGammaSteps);
@@ -244,13 +249,7 @@ Json thesis_json(const PlaneThesis& thesis) {
                       {"total_bytes",
                        std::vector<std::uint64_t>(begin, begin + static_cast<std::ptrdiff_t>(kGammaSteps))}});
   }
-  return {{"size_model",
-           {{"a", model.a},
-            {"b", model.b},
-            {"r", model.r},
-            {"correlation", model.correlation},
-            {"error", model.error}}},
-          {"chain", scales}};
+  return {{"chain", scales}};
 }
 
 Json tables_json(PackageReader& p, std::optional<double> gamma) {
@@ -312,6 +311,8 @@ Json part_json(PackageReader& p, DumpPart part, std::optional<double> gamma) {
       return ladder_json(p);
     case DumpPart::kTables:
       return tables_json(p, gamma);
+    case DumpPart::kPerceptual:
+      return perceptual_json(p);
     case DumpPart::kAtlas:
       return {{"atlas", atlas_json(diagnose_atlases(atlas_subject(p, {}), {}))}};
     case DumpPart::kEntries:

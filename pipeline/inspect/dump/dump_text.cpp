@@ -4,6 +4,7 @@
 
 #include "pipeline/inspect/atlas/atlas_report.h"
 #include "pipeline/inspect/dump/dump.h"
+#include "pipeline/inspect/dump/dump_perceptual.h"
 #include "pipeline/inspect/dump/dump_summary.h"
 #include "pipeline/inspect/dump/dump_textures.h"
 #include "pipeline/inspect/provenance.h"
@@ -85,6 +86,8 @@ std::string part_text(PackageReader& p, DumpPart part, std::optional<double> gam
       return ladder_text(p);
     case DumpPart::kTables:
       return tables_text(p, gamma);
+    case DumpPart::kPerceptual:
+      return perceptual_text(p);
     case DumpPart::kAtlas:
       return atlas_text(diagnose_atlases(atlas_subject(p, {}), {}));
     case DumpPart::kEntries:

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <iterator>
 
 #include "format/documents/tables.h"
 #include "format/rules/allocation.h"
@@ -70,14 +71,24 @@ std::string gamma_text(const PlaneTables& t, const std::vector<ManifestScale>& s
          table.text();
 }
 
+/// The middle one of the fitted models' values.
+double median_of(const std::vector<SizeModel>& models, float SizeModel::*value) {
+  std::vector<float> values;
+  for (const SizeModel& m : models) values.push_back(m.*value);
+  std::ranges::sort(values);
+  return static_cast<double>(values[values.size() / 2]);
+}
+
 std::string size_model_text(const PlaneThesis* thesis) {
-  if (!thesis || thesis->model == SizeModel{}) return "  no size model\n";
-  const SizeModel& model = thesis->model;
-  return fmt::format("  size model S = A R^Q + c: A {}, B {}, R {}; correlation {}, mean error {} %\n",
-                     shortest(static_cast<double>(model.a)), shortest(static_cast<double>(model.b)),
-                     shortest(static_cast<double>(model.r), 6),
-                     fixed(static_cast<double>(model.correlation), 4),
-                     percent(static_cast<double>(model.error)));
+  std::vector<SizeModel> models;
+  if (thesis)
+    std::ranges::copy_if(thesis->models, std::back_inserter(models),
+                         [](const SizeModel& m) { return m != SizeModel{}; });
+  if (models.empty()) return "  no size model\n";
+  return fmt::format(
+      "  size model S = A (100 VQP)^(B Q) of {} fragments: medians A {}, B {}, correlation {}\n",
+      models.size(), shortest(median_of(models, &SizeModel::a)), shortest(median_of(models, &SizeModel::b)),
+      fixed(median_of(models, &SizeModel::correlation), 4));
 }
 
 std::string fraction(float value) { return fixed(static_cast<double>(value), 4); }

@@ -1,3 +1,6 @@
+#include <algorithm>
+#include <cmath>
+
 #include "format/container/layout.h"
 #include "format/rules/allocation.h"
 #include "pipeline/inspect/verify/verify_checks.h"
@@ -26,10 +29,30 @@ void check_gamma_table(const Manifest& m, const PlaneTables& t, const PlaneThesi
   }
 }
 
+/// Scales that are stored stand in the table as the manifest has them; measured figures of the manifest have
+/// six digits.
+void check_perceptual(const Manifest& m, const PerceptualTable& table, Findings& findings) {
+  for (const ManifestScale& s : m.scales) {
+    const auto at = std::ranges::find(table.scale, s.scale);
+    const std::string scale = "scale " + std::to_string(s.scale);
+    if (!findings.require(at != table.scale.end(), {"thesis", "R16"}, kThesisPath, "perceptual table", scale,
+                          "none"))
+      return;
+    const auto row = static_cast<std::size_t>(at - table.scale.begin());
+    findings.require_equal<std::uint64_t>(s.triangles, table.triangles[row], {"thesis", "O06"}, kThesisPath,
+                                          scale + ", triangles");
+    if (row == 0) continue;
+    const auto p95 = static_cast<double>(table.p95[pair_index(table.scale.size(), 0, row)]);
+    findings.require(std::abs(p95 - s.p95) <= 1e-5 * s.p95, {"thesis", "O06"}, kThesisPath, scale + ", p95",
+                     std::to_string(s.p95), std::to_string(p95));
+  }
+}
+
 }  // namespace
 
 void check_thesis(const Manifest& m, const PackageTables& tables, const ThesisTables& thesis,
                   Findings& findings) {
+  if (!thesis.perceptual.empty()) check_perceptual(m, thesis.perceptual, findings);
   for (std::size_t p = 0; p < thesis.planes.size(); ++p) {
     const PlaneThesis& plane = thesis.planes[p];
     const std::string place = "plane " + std::to_string(p) + ", ";
@@ -40,6 +63,9 @@ void check_thesis(const Manifest& m, const PackageTables& tables, const ThesisTa
     if (!plane.z.empty())
       findings.require_equal<std::uint64_t>(t.fragment_count(), plane.z.size(), {"thesis", "R16"},
                                             kThesisPath, place + "fragments");
+    if (!plane.models.empty())
+      findings.require_equal<std::uint64_t>(t.fragment_count(), plane.models.size(), {"thesis", "R16"},
+                                            kThesisPath, place + "size models");
     if (!plane.quality.empty() && t.scale_count() == m.scales.size())
       check_gamma_table(m, t, plane, place, findings);
   }

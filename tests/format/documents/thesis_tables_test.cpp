@@ -14,16 +14,16 @@ namespace {
 ThesisTables small_thesis() {
   PlaneThesis t;
   t.z = {0.25f, 0.5f}, t.i = {0, 1}, t.zeta = {0.125f, 0}, t.m = {1, 0.75f}, t.vqp = {0.3f, 0.7f};
-  t.model = {300, 0.4f, 1.03f, 0.97f, 0.15f};
+  t.models = {{300, 0.4f, 0.97f}, {}};
   t.quality = {80, 60, 40};
   for (std::uint64_t k = 0; k < 3 * kGammaSteps; ++k) t.total_bytes.push_back(70000 + 13 * k);
-  return {{t, {}, t}};
+  return {{t, {}, t}, {}};
 }
 
 TEST(ThesisTables, RoundTrip) {
   const Bytes bytes = write_thesis(small_thesis());
   // Head, 6 sections, predictors, model, and sizes of 3 bytes.
-  EXPECT_EQ(bytes.size(), 16u + 6 * 12 + 2 * ((4 + 20) + 20 + (4 + 12 + 3 * 63)));
+  EXPECT_EQ(bytes.size(), 16u + 6 * 12 + 2 * ((4 + 20) + (4 + 24) + (4 + 12 + 3 * 63)));
   const ThesisFile back = read_thesis(bytes);
   EXPECT_EQ(back.minor, 0);
   EXPECT_EQ(write_thesis(back.tables), bytes);
@@ -31,7 +31,7 @@ TEST(ThesisTables, RoundTrip) {
   EXPECT_TRUE(back.tables.planes[1].z.empty() && back.tables.planes[1].quality.empty());
   const PlaneThesis a = small_thesis().planes[2];
   const PlaneThesis& b = back.tables.planes[2];
-  EXPECT_EQ(b.model, a.model);
+  EXPECT_EQ(b.models, a.models);
   EXPECT_EQ(b.quality, a.quality);
   EXPECT_EQ(b.total_bytes, a.total_bytes);
   for (std::size_t f = 0; f < 2; ++f) {
@@ -72,8 +72,8 @@ TEST(ThesisTables, FlippedBitsAreRefusedOrInRange) {
 
 TEST(ThesisTables, SectionsOfUnknownIdsAreSkipped) {
   Bytes bytes = write_thesis({});
-  bytes[8] = 1;  // one section: id 4, of no plane, 5 bytes
-  for (const int b : {4, 0, 0, 0, 0xff, 0xff, 0xff, 0xff, 5, 0, 0, 0, 1, 2, 3, 4, 5})
+  bytes[8] = 1;  // one section: id 5, of no plane, 5 bytes
+  for (const int b : {5, 0, 0, 0, 0xff, 0xff, 0xff, 0xff, 5, 0, 0, 0, 1, 2, 3, 4, 5})
     bytes.push_back(static_cast<std::uint8_t>(b));
   EXPECT_TRUE(read_thesis(bytes).tables.planes.empty());
   bytes[16] = 0xff;
@@ -134,7 +134,7 @@ TEST(ThesisTables, WriterRefusesBadTables) {
   refused([](PlaneThesis& t) { t.z[0] = 1.5f; });
   refused([](PlaneThesis& t) { t.vqp[0] = std::numeric_limits<float>::quiet_NaN(); });
   refused([](PlaneThesis& t) { t.m.pop_back(); });
-  refused([](PlaneThesis& t) { t.model.r = std::numeric_limits<float>::infinity(); });
+  refused([](PlaneThesis& t) { t.models[1].b = std::numeric_limits<float>::infinity(); });
   refused([](PlaneThesis& t) { t.quality[0] = 101; });
   refused([](PlaneThesis& t) { t.quality.pop_back(); });
   refused([](PlaneThesis& t) { t.total_bytes.pop_back(); });

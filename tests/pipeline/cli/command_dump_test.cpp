@@ -58,8 +58,8 @@ TEST_F(CliInspect, EveryCodecIsUnpackedAndPackedAgain) {
 }
 
 TEST_F(CliInspect, DumpShowsEveryPart) {
-  for (const char* part :
-       {"summary", "scales", "fragments", "ladder", "tables", "entries", "about", "provenance", "all"}) {
+  for (const char* part : {"summary", "scales", "fragments", "ladder", "tables", "perceptual", "entries",
+                           "about", "provenance", "all"}) {
     const CommandResult text = texmesh({"dump", kGolden, part}),
                         data = texmesh({"dump", kGolden, part, "--json"});
     EXPECT_EQ(text.exit_code, 0) << part << text.errors;

@@ -39,6 +39,21 @@ TEST(Plot, AnEmptyPlotHasAxes) {
   EXPECT_EQ(plot.svg().find("nan"), std::string::npos);
 }
 
+TEST(Plot, ALinearAxisMayGoBelowZero) {
+  Plot plot;
+  plot.x_name = "samples";
+  plot.x_low = 0, plot.x_high = 100, plot.y_low = -1, plot.y_high = 3, plot.linear_x = true;
+  plot.series.push_back({"line", "a", {{0, -1}, {50, 0}, {100, 3}}, false, false, false, false});
+  const std::string svg = plot.svg();
+  EXPECT_EQ(tag_fault(svg), "");
+  for (const char* label : {">-1</text>", ">3</text>", ">0</text>", ">50</text>", ">100</text>"})
+    EXPECT_NE(svg.find(label), std::string::npos) << label;
+  EXPECT_EQ(svg.find(">-0</text>"), std::string::npos);
+  // 760 px wide with 58 and 16 left free: 50 of 100 lies at 58 + 686 / 2 = 401; 0 of -1..3 at 30 + 280 * 3 /
+  // 4 = 240.
+  EXPECT_NE(svg.find("M58.0 310.0L401.0 240.0L744.0 30.0"), std::string::npos) << svg;
+}
+
 TEST(Plot, BytesForPeople) {
   EXPECT_EQ(short_bytes(12), "12 B");
   EXPECT_EQ(short_bytes(340000), "340 kB");

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "format/rules/size_model.h"
 #include "tests/stages/lut/lut_scene.h"
 #include "tests/support/all_rungs.h"
 
@@ -12,97 +13,69 @@ namespace {
 
 using namespace testing;  // NOLINT: fixtures
 
-TEST(SizeModel, FitsAndIsAbsentForOneRung) {
-  const PlaneTables t = build(make_scene()).planes[0];
-  const PlaneThesis thesis = thesis_of(make_scene());
-  const SizeModel& model = thesis.model;
-  EXPECT_GT(model.correlation, 0.95f);
-  EXPECT_LT(model.error, 0.2f);
-  EXPECT_GT(model.r, 1.0f);
-  double predictor = 0;
-  for (std::uint16_t f : t.order) predictor += thesis.vqp[f] / static_cast<double>(t.order.size());
-  EXPECT_NEAR(model.b, std::log(model.r) / std::log(100 * predictor), 1e-4);
-  // Nine fragments of 32 x 48 texels in 4:2:0: 36 blocks of two bits each, SOI and EOI.
-  const double constant = 9 * (4 + 36.0 / 4);
-  double error = 0;
-  for (std::size_t r = 2; r < 9; ++r) {  // of quality 10 to 95
-    double size = 0;
-    for (std::size_t f = 0; f < t.fragment_count(); ++f) size += t.size_bytes[r * t.fragment_count() + f];
-    error += std::fabs(model.a * std::pow(model.r, t.rung_quality[r]) + constant - size) / size / 7;
-  }
-  EXPECT_NEAR(model.error, error, 1e-3);
+/// Two fragments with sizes at the given qualities; the second is not stored.
+PlaneTables tables_of(const std::vector<std::uint8_t>& quality, const std::vector<std::uint32_t>& bytes) {
+  PlaneTables t;
+  t.columns = 2, t.rows = 1;
+  t.rung_quality = quality;
+  t.order = {0};
+  for (const std::uint32_t b : bytes) t.size_bytes.push_back(b), t.size_bytes.push_back(0);
+  return t;
+}
+PlaneLadder ladder_of(std::size_t rungs) {
+  PlaneLadder ladder;
+  ladder.rungs.resize(rungs);
+  return ladder;
+}
 
-  LadderOptions one = testing::all_rungs();
-  one.rungs = {50};
-  EXPECT_EQ(thesis_of(make_scene(one)).model, SizeModel{});
+TEST(SizeModel, FitsAnExponentialExactly) {
+  // 500 * 16^Q is 1000, 2000, 4000 at Q = 1/4, 1/2, 3/4.
+  const SizeModel model =
+      fit_size_models(ladder_of(3), tables_of({25, 50, 75}, {1000, 2000, 4000}), {0.16f, 0.5f})[0];
+  EXPECT_NEAR(model.a, 500, 1e-3);
+  EXPECT_NEAR(model.b, 1, 1e-6);  // log 16 / log(100 * .16)
+  EXPECT_NEAR(model.correlation, 1, 1e-6);
+  EXPECT_NEAR(modelled_bytes(model, 0.16, 0.5), 2000, 0.1);
+  EXPECT_NEAR(modelled_quality(model, 0.16, 4000), 0.75, 1e-5);
+}
+
+TEST(SizeModel, IsOfFragmentsThatAreStoredAndHaveAPredictor) {
+  const PlaneTables t = tables_of({25, 50, 75}, {1000, 2000, 4000});
+  EXPECT_EQ(fit_size_models(ladder_of(3), t, {0.5f, 0.5f})[1], SizeModel{}) << "not stored";
+  EXPECT_EQ(fit_size_models(ladder_of(3), t, {0, 0})[0], SizeModel{});
+  EXPECT_EQ(fit_size_models(ladder_of(3), t, {0.019f, 0})[0], SizeModel{});
+  EXPECT_NE(fit_size_models(ladder_of(3), t, {0.021f, 0})[0], SizeModel{});
+  EXPECT_EQ(fit_size_models(ladder_of(1), tables_of({50}, {700}), {0.5f, 0})[0], SizeModel{});
+  EXPECT_EQ(fit_size_models(ladder_of(2), tables_of({50, 60}, {700, 700}), {0.5f, 0})[0], SizeModel{});
 }
 
 TEST(SizeModel, IsNotFittedOnTheSourcesCoefficients) {
-  LadderOptions options = testing::all_rungs();
-  options.rungs = {50, 60, 100};  // two within the model's range: all are taken that may be
-  Scene s = make_scene(options);
-  EXPECT_GT(thesis_of(s).model.error, 0.01f);
-  s.ladder.planes[0].source_rung = true;
-  const SizeModel model = thesis_of(s).model;
-  EXPECT_NEAR(model.error, 0, 1e-5) << "two points have a curve through both";
-  EXPECT_NEAR(model.correlation, 1, 1e-6);
+  PlaneLadder ladder = ladder_of(3);
+  ladder.source_rung = true;
+  const SizeModel model =
+      fit_size_models(ladder, tables_of({25, 50, 90}, {1000, 2000, 900000}), {0.16f, 0})[0];
+  EXPECT_NEAR(model.a, 500, 1e-3);
+  EXPECT_NEAR(model.b, 1, 1e-6);
 }
 
-TEST(SizeModel, ConstantBytesAreTheCodecs) {
-  const Scene s = make_scene();
-  EXPECT_EQ(constant_bytes(s.ladder.planes[0], 32, 48), 4 + 36 / 4.0);  // 4:2:0
-  EXPECT_EQ(constant_bytes(s.ladder.planes[1], 32, 48), 4 + 24 / 4.0);  // grey
-  LadderOptions options = testing::all_rungs();
-  options.subsampling = Subsampling::k444;
-  EXPECT_EQ(constant_bytes(make_scene(options).ladder.planes[0], 32, 48), 4 + 72 / 4.0);
-  PlaneLadder other = s.ladder.planes[0];
-  other.codec = Codec::kWebp;
-  EXPECT_EQ(constant_bytes(other, 32, 48), 30);
-  other.codec = Codec::kJpegProgressive;
-  EXPECT_EQ(constant_bytes(other, 32, 48), 0);
-  other = s.ladder.planes[0];
-  std::vector<std::uint8_t>& tables = other.rungs[0].table_stream;
-  while (!tables.empty()) {  // cut anywhere: some number of blocks, nothing read beyond the end
-    tables.pop_back();
-    EXPECT_GE(constant_bytes(other, 32, 48), 4);
-  }
-  EXPECT_EQ(constant_bytes(other, 32, 48), 4 + 24 / 4.0);
-}
-
-/// Of quality and ln(bytes - c), over the rungs that the model is fitted on.
-double correlation_with(const PlaneTables& t, double constant) {
-  double q = 0, s = 0, qq = 0, qs = 0, ss = 0;
-  constexpr std::size_t kFirst = 2, kLast = 8;
-  const double n = kLast - kFirst + 1;
-  for (std::size_t r = kFirst; r <= kLast; ++r) {
-    double size = -constant;
-    for (std::size_t f = 0; f < t.fragment_count(); ++f) size += t.size_bytes[r * t.fragment_count() + f];
-    const double x = t.rung_quality[r], y = std::log(size);
-    q += x / n, s += y / n, qq += x * x / n, qs += x * y / n, ss += y * y / n;
-  }
-  return (qs - q * s) / std::sqrt((qq - q * q) * (ss - s * s));
-}
-
-TEST(SizeModel, HoldsForBlurredTextures) {  // whose blocks' shortest codes are most of the bytes
-  Scene s = make_scene();
-  Random random{5};
-  for (Pixels& pixels : s.pixels)
-    for (std::uint32_t y = 0; y < pixels.height_px; ++y)
-      for (std::uint32_t x = 0; x < pixels.width_px; ++x)
-        for (std::uint32_t c = 0; c < pixels.channels; ++c)
-          pixels.data[(std::size_t{y} * pixels.width_px + x) * pixels.channels + c] =
-              static_cast<std::uint8_t>(100 + (x + y) / 9 + (random.next() % 40 == 0 ? 3 : 0));
-  s.ladder = encode_ladder(s.fragments, s.pixels, {}, {}, testing::all_rungs(), {});
-  s.previews = make_previews(s.fragments, s.pixels, {}, {});
-  const auto [tables, thesis] = build_all(s);
-  for (std::size_t p = 0; p < tables.planes.size(); ++p) {
-    const PlaneTables& t = tables.planes[p];
-    const double constant = constant_bytes(s.ladder.planes[p], 32, 48), count = t.order.size();
-    for (const std::uint16_t f : t.order) EXPECT_LT(t.size_bytes[f], 2 * constant) << "the case is this one";
-    const float correlation = thesis.planes[p].model.correlation;
-    EXPECT_NEAR(correlation, correlation_with(t, constant * count), 1e-5);
-    EXPECT_GT(correlation, correlation_with(t, 4 * count) + 0.03) << "SOI and EOI alone";
-  }
+TEST(SizeModel, StandsInTheTablesOfEveryFragment) {
+  const Scene scene = make_scene();
+  const LutTables made = build_all(scene);
+  const PlaneThesis& thesis = made.thesis.planes[0];
+  EXPECT_EQ(thesis.models,
+            fit_size_models(scene.ladder.planes[0], made.tables.planes[0], scene.predictors.planes[0].vqp));
+  std::size_t fitted = 0;
+  for (const SizeModel& model : thesis.models)
+    if (model != SizeModel{}) {
+      ++fitted;
+      EXPECT_GT(model.correlation, 0.9f);
+      EXPECT_GT(model.a, 0);
+      EXPECT_GT(model.b, 0);
+    }
+  EXPECT_GT(fitted, 4u);
+  LadderOptions one = testing::all_rungs();
+  one.rungs = {50};
+  for (const SizeModel& model : thesis_of(make_scene(one)).models) EXPECT_EQ(model, SizeModel{});
 }
 
 }  // namespace

@@ -51,6 +51,9 @@ struct Inputs {
     }
     perceptual.p95 = {0, 0.05f, 0.2f, 0, 0, 0.15f, 0, 0, 0};
     perceptual.p99 = {0, 0.06f, 0.3f, 0, 0, 0.25f, 0, 0, 0};
+    perceptual.step.resize(3);
+    for (auto* chain : {&perceptual.chain_average, &perceptual.chain_largest, &perceptual.chain_least})
+      chain->assign(9, 0.02f);
     perceptual.major = {1, 0, 1};
     perceptual.kept = {1, 1, 1};
     perceptual.display_px_edge = {3e9f, 400, 100};
@@ -324,7 +327,10 @@ TEST(Package, TablesHaveTheRowsOfTheStoredScales) {
   ASSERT_TRUE(m.thesis.has_value());
   EXPECT_EQ(read_thesis(part(package, *m.thesis)).tables.planes[1].quality, all);
   EXPECT_GT(m.thesis->offset, m.scales.back().glb.offset);
-  EXPECT_FALSE(manifest_of(Inputs(0).assemble()).thesis.has_value());
+  const Bytes untextured = Inputs(0).assemble();
+  const ThesisTables none = read_thesis(part(untextured, *manifest_of(untextured).thesis)).tables;
+  EXPECT_TRUE(none.planes.empty());
+  EXPECT_FALSE(none.perceptual.empty());
 
   Inputs few(1);
   few.tables.planes[0] = select_scales(few.tables, {0, 1, 2, 3}).planes[0];

@@ -230,6 +230,32 @@ TEST(PerceptualValues, TheExponentSaysHowTheJndFollowsTheDistance) {
   EXPECT_LT(enough + 1, scales.scales.size());
 }
 
+TEST(PerceptualValues, ChainsCountEveryVertexAgainstTheOneThatIsLeft) {
+  const NestedScales scales = make_scales(testing::bumpy_sphere(24, 36, 0.15f), 6);
+  const Skeleton skeleton = centre_skeleton(scales.mesh);
+  const PerceptualValues values = measure_perceptual_values(scales, skeleton, {}, kOneThread);
+  const std::size_t n = scales.scales.size();
+  ASSERT_GE(n, 4u);
+  for (std::size_t i = 0; i < n; ++i)
+    for (std::size_t j = i + 1; j < n; ++j) {
+      double sum = 0, most = 0, count = 0;
+      for (std::size_t c = scales.scales[i].collapse_count; c < scales.scales[j].collapse_count; ++c) {
+        std::uint32_t left = scales.collapses[c].to;  // follows the chain link by link
+        for (std::size_t d = c + 1; d < scales.scales[j].collapse_count; ++d)
+          if (scales.collapses[d].from == left) left = scales.collapses[d].to;
+        const double rho = std::fabs(static_cast<double>(skeleton.distance[scales.collapses[c].from]) -
+                                     skeleton.distance[left]) /
+                           skeleton.radius[left];
+        sum += rho, most = std::max(most, rho), ++count;
+      }
+      EXPECT_NEAR(values.chain_average[i * n + j], sum / count, 1e-6) << i << " " << j;
+      EXPECT_FLOAT_EQ(values.chain_largest[i * n + j], static_cast<float>(most));
+      EXPECT_LE(values.chain_least[i * n + j], values.chain_average[i * n + j]);
+      EXPECT_EQ(values.chain_average[j * n + i], 0);
+    }
+  for (std::size_t k = 1; k < n; ++k) EXPECT_EQ(values.chain_average[(k - 1) * n + k], values.step[k].mean);
+}
+
 TEST(PerceptualValues, StrategiesDecideMajorsAndHeights) {
   const NestedScales scales = make_scales(testing::bumpy_sphere(32, 48, 0.15f), 12);
   const Skeleton skeleton = centre_skeleton(scales.mesh);

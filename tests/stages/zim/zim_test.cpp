@@ -166,6 +166,21 @@ TEST(Zim, WeightsAreRelativeToTheirSum) {
   EXPECT_FLOAT_EQ(right(0, 0.5, 0, 0), 1.0f);
 }
 
+TEST(Zim, DifferingTexelsAreThoseOfThePairs) {
+  // Left flat; right stripes of two columns: every second column differs from its east neighbour.
+  const Plane p = make_plane(1, [](auto x, auto, auto) { return x < 16 ? 51 : x / 2 % 2 * 100; });
+  const std::vector<std::uint8_t> map = differing_texels(p.fragments.planes[0], p.pixels[0], {});
+  ASSERT_EQ(map.size(), 32u * 16);
+  for (std::uint32_t y = 0; y < 16; ++y)
+    for (std::uint32_t x = 0; x < 32; ++x)
+      EXPECT_EQ(map[y * 32 + x], x >= 16 && x % 2 == 1 && x < 31 && y < 15) << x << " " << y;
+  // One pair a marked texel: 7 of 15 texels of a row, of two pairs each.
+  EXPECT_FLOAT_EQ(predict(p).zeta[1], 7.0f / 30);
+  Plane bad = p;
+  bad.pixels[0].data.pop_back();
+  EXPECT_THROW(differing_texels(bad.fragments.planes[0], bad.pixels[0], {}), StageError);
+}
+
 TEST(Zim, SameResultForAnyNumberOfThreadsAndBadInputIsRefused) {
   Random random{8};
   Plane p = make_plane(3, [&](auto, auto, auto) { return random.next() % 256; });

@@ -117,7 +117,7 @@ export interface Manifest {
   provenance: EntryRef;
   about: EntryRef;
   stream?: StreamRef;
-  /** thesis.bin, which this client does not read. */
+  /** thesis.bin: see readThesis. */
   thesis?: EntryRef;
   poster?: PosterRef;
 }

@@ -1,6 +1,7 @@
 import { requireSelfContained } from '../../src/format/self_contained_glb';
 import { SplitStreamReader } from '../../src/format/splits/split_stream';
 import { PackageReader } from '../../src/reader';
+import { readThesis } from '../../src/thesis_tables';
 
 /** Reads all that a client may ever read of a package; gives the mesh that the stream ends with. */
 export async function readAll(bytes: Uint8Array): Promise<SplitStreamReader | undefined> {
@@ -9,6 +10,7 @@ export async function readAll(bytes: Uint8Array): Promise<SplitStreamReader | un
   await reader.index();
   await reader.quality();
   await reader.about();
+  await readThesis(reader);
   const coarsest = reader.manifest.scales.at(-1)!.scale;
   for (const { scale, glb } of reader.manifest.scales) if (glb.path.endsWith('.glb')) requireSelfContained(await reader.scaleGlb(scale), scale !== coarsest);
   const textures = await reader.textures();

@@ -98,7 +98,7 @@ TEST(RungFigures, WeighQualityByTexelsAndBySurface) {
 }
 
 TEST_F(Dump, TablesGiveTheModelAndTheAllocation) {
-  EXPECT_TRUE(says(DumpPart::kTables, "A 300, B 0.5, R 1.02; correlation 0.9800, mean error 5.0 %"))
+  EXPECT_TRUE(says(DumpPart::kTables, "of 3 fragments: medians A 300, B 0.5, correlation 0.9800"))
       << text(DumpPart::kTables);
   const Json j = dump_json(package, DumpPart::kTables);
   const Json& scale = j["tables"][0]["scales"][0];
@@ -135,6 +135,23 @@ TEST_F(Dump, TablesAtAnyGammaAreThoseOfTheLibrary) {
   EXPECT_NE(dump_json(package, DumpPart::kTables, 0.0), dump_json(package, DumpPart::kTables, 1.0));
 }
 
+/// The fixture's chain is S_0 to S_5: every step .03, p95 .01 a step, chains .02.
+TEST_F(Dump, PerceptualHasTheThesissTables) {
+  const std::string page = text(DumpPart::kPerceptual);
+  EXPECT_NE(page.find("(Table 7.1)"), std::string::npos) << page;
+  EXPECT_NE(page.find("  0.0500   0.0671"), std::string::npos) << "p95, and .03 sqrt(5): " << page;
+  const Json j = dump_json(package, DumpPart::kPerceptual)["perceptual"];
+  EXPECT_EQ(j["jnd"], package.manifest().jnd);
+  ASSERT_EQ(j["steps"].size(), 6u);
+  EXPECT_EQ(j["steps"][5]["triangles"], package.manifest().scales[1].triangles);
+  ASSERT_EQ(j["values"].size(), 7u);
+  for (const Json& by : j["values"]) EXPECT_EQ(by["pairs"].size(), 15u) << by["by"];
+  EXPECT_EQ(j["values"][0]["by"], "p95");
+  EXPECT_EQ(j["values"][0]["pairs"][4]["to"], 5);
+  EXPECT_NEAR(j["values"][1]["pairs"][4]["value"].get<double>(), 0.067082, 1e-6);
+  EXPECT_EQ(j["values"][2]["pairs"][4]["value"], 0.02f);
+}
+
 TEST_F(Dump, EntriesStandInContainerOrder) {
   const Json entries = dump_json(package, DumpPart::kEntries)["entries"];
   const auto listed = package.store().list();
@@ -149,7 +166,8 @@ TEST_F(Dump, EntriesStandInContainerOrder) {
 
 TEST_F(Dump, AllJoinsTheParts) {
   const Json all = dump_json(package, DumpPart::kAll);
-  for (const char* member : {"package", "scales", "fragments", "ladder", "tables", "entries", "provenance"})
+  for (const char* member :
+       {"package", "scales", "fragments", "ladder", "tables", "perceptual", "entries", "provenance"})
     EXPECT_TRUE(all.contains(member)) << member;
   EXPECT_GT(text(DumpPart::kAll).size(), text(DumpPart::kSummary).size());
 }

@@ -197,7 +197,7 @@ TEST(Verify, EntryCrc) {
 /// The package with its entries in another order or with others among them; digests and offsets fit.
 Bytes rearranged(const std::function<void(std::vector<std::pair<std::string, Bytes>>&)>& change,
                  bool reindex) {
-  const Bytes package = built_with([](PackageParts& p) { p.thesis.planes.clear(); });
+  const Bytes package = built_with([](PackageParts& p) { p.thesis = {}; });
   PackagePatcher old(package);
   std::vector<std::pair<std::string, Bytes>> entries;
   const auto source = memory_source(package);
@@ -316,7 +316,7 @@ TEST(Verify, TablesAgainstTextures) {
                       "tables-rungs", kTablesPath));
   EXPECT_TRUE(catches(built_with([](PackageParts& p) {
                         p.tables = select_scales(p.tables, {0});
-                        p.thesis.planes.clear();
+                        p.thesis = {};
                       }),
                       "tables-scales", kTablesPath));
   EXPECT_TRUE(catches(built_with([](PackageParts& p) { p.tables.planes[0].size_bytes[0] += 1; }),
@@ -358,11 +358,15 @@ TEST(Verify, ThesisTables) {
     for (auto* v : {&t.z, &t.i, &t.zeta, &t.m, &t.vqp}) v->pop_back();
   }));
   EXPECT_TRUE(caught([](PackageParts& p) { p.thesis.planes.push_back(p.thesis.planes[0]); }));
+  EXPECT_TRUE(caught([](PackageParts& p) { p.thesis.planes[0].models.pop_back(); }));
+  EXPECT_TRUE(caught([](PackageParts& p) { p.thesis.perceptual.triangles[5] += 1; }));
+  EXPECT_TRUE(caught([](PackageParts& p) { p.thesis.perceptual.p95[pair_index(6, 0, 5)] *= 1.001f; }));
+  EXPECT_TRUE(caught([](PackageParts& p) { p.thesis.perceptual.scale[5] = 6; }));
   // Sizes of a scale that is not stored are the writer's; so is whether there is such an entry.
   EXPECT_EQ(
       all_of(verify(built_with([](PackageParts& p) { p.thesis.planes[0].total_bytes[kGammaSteps] += 1; }))),
       "");
-  EXPECT_EQ(all_of(verify(built_with([](PackageParts& p) { p.thesis.planes.clear(); }))), "");
+  EXPECT_EQ(all_of(verify(built_with([](PackageParts& p) { p.thesis = {}; }))), "");
 }
 
 TEST(Verify, Quality) {

@@ -1,0 +1,35 @@
+#include <gtest/gtest.h>
+
+#include "pipeline/thesis/exhibits.h"
+#include "tests/pipeline/thesis/exhibit_rows.h"
+
+namespace texmesh {
+namespace {
+
+using namespace testing;  // NOLINT: fixtures
+
+TEST(FragmentExhibits, TablesOfSizes) {
+  const std::vector<Exhibit> made = fragment_exhibits({});
+  expect_sound(made);
+  const Exhibit& e = exhibit_of(made, "3.1");
+  ASSERT_EQ(e.tables[0].rows.size(), 13u);
+  EXPECT_NEAR(number_at(e, 0, 0, 8), 0.5177, 1e-4);  // 293 of 566 KB
+  EXPECT_NEAR(number_at(e, 0, 1, 8), 1.5172, 1e-4);  // 44 of 29 KB
+  for (std::size_t k = 0; k < 13; ++k) {
+    EXPECT_NEAR(number_at(e, 0, k, 9), number_at(e, 0, k, 6) / number_at(e, 0, k, 4), 1e-9);
+    const double side = number_at(e, 0, k, 1), fragments = side * side / 256;
+    EXPECT_GT(number_at(e, 0, k, 6), 0.6 * fragments) << "a complete JPEG has 0.6 kB of headers";
+  }
+  EXPECT_EQ(e.verdict, Verdict::kNotConfirmed);
+  const Exhibit& cut = exhibit_of(made, "fig-3.5");
+  std::size_t rows_of_one = 0;
+  for (std::size_t k = 0; k < cut.tables[0].rows.size(); ++k)
+    if (number_at(cut, 0, k, 1) == 1) {
+      ++rows_of_one;
+      EXPECT_EQ(number_at(cut, 0, k, 5), 1) << "one fragment is the file";
+    }
+  EXPECT_EQ(rows_of_one, 4u);
+}
+
+}  // namespace
+}  // namespace texmesh
