@@ -233,5 +233,43 @@ TEST(RangeScan, RanksTellOrderFromDisorder) {
   EXPECT_LT(spearman(self, reversed), 0.3);
 }
 
+/// A cone whose relief has the same wavelength on the surface nowhere: its rows are scans of their own, each
+/// with its phi.
+TEST(RangeScan, SpacingByRowIsThatOfTheRowsRadius) {
+  RangeGrid narrow;
+  narrow.columns = 240;
+  narrow.rows = 1;
+  narrow.alpha_step_rad = static_cast<float>(2 * portable::kPi / 240);
+  narrow.y_step = 1;
+  for (std::uint32_t x = 0; x < 240; ++x) {
+    narrow.radius.push_back(
+        static_cast<float>(1 + 0.05 * portable::sin(9 * 2 * portable::kPi * x / 240 + 0.1)));
+    narrow.position.push_back(x);
+  }
+  SsfOptions by_row;
+  by_row.range_spacing = RangeSpacing::kRow;
+  // Where all rows have one radius, both are the same.
+  EXPECT_EQ(bytes(filter_range_scan(narrow, 240, by_row, RunContext{})),
+            bytes(filter_range_scan(narrow, 240, {}, RunContext{})));
+  RangeGrid cone = narrow;
+  cone.rows = 12;
+  cone.radius.clear(), cone.position.clear();
+  for (std::uint32_t i = 0; i < 240 * 12; ++i) {
+    const float widest = 1 + static_cast<float>(i / 240);  // 1 to 12
+    cone.radius.push_back(narrow.radius[i % 240] * widest);
+    cone.position.push_back(i);
+  }
+  const ScaleMap mean = filter_range_scan(cone, 240 * 12, {}, RunContext{}),
+                 row = filter_range_scan(cone, 240 * 12, by_row, RunContext{});
+  const auto persistence = [](const ScaleMap& map, std::size_t y) {
+    std::size_t sum = 0;
+    for (std::size_t x = 0; x < 240; ++x) sum += map.persistence[y * 240 + x];
+    return sum;
+  };
+  // The same angle is twelve times as long on the widest row: the relief lives on to larger scales there.
+  EXPECT_GT(persistence(row, 11), persistence(row, 1));
+  EXPECT_NE(mean.persistence, row.persistence);
+}
+
 }  // namespace
 }  // namespace texmesh
