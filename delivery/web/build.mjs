@@ -1,5 +1,5 @@
 // Bundles the library: dist/texmesh.js (everything; three.js stays outside), dist/open.js (to show packages), dist/reader.js
-// (without three.js), dist/worker.js. Each entry stands alone: the parts that an entry loads by import() belong to that entry.
+// (without three.js), dist/thesis.js (chapter 4 as printed), dist/worker.js. Each entry stands alone: the parts that an entry loads by import() belong to that entry.
 //   node build.mjs               builds
 //   node build.mjs --types       after tsc: names files in full in dist/types, as Node.js resolves them
 //   node build.mjs --license     copies the project's LICENSE here, for npm pack
@@ -14,7 +14,7 @@ import { rollup } from 'rollup';
 const here = dirname(fileURLToPath(import.meta.url));
 const dist = join(here, 'dist');
 /** Source files of the entries. */
-const entries = { texmesh: 'index', open: 'open', reader: 'reader', worker: 'worker' };
+const entries = { texmesh: 'index', open: 'open', reader: 'reader', thesis: 'thesis', worker: 'worker' };
 /**
  * Gzip bytes of texmesh/open that an application may have to load, three.js and the worker apart: before the first picture; with
  * every part that is ever loaded. Then the same of `texmesh`, and the worker with the decoders.

@@ -193,6 +193,7 @@ Json plans(PackageReader& package) {
           r.displayed_px = px;
           r.time_limit_s = limit_s;
           r.htc.policy = policy;
+          if (policy == Policy::kThesis) r = as_printed(r);
           r.network.link = BandwidthTrace::constant(bytes_s);
           r.network.rtt_s = bytes_s > 1e5 ? 0.01 : 0.05;
           const DeliveryPlan p = plan_delivery(package, r);
