@@ -290,8 +290,9 @@ void add_compile_options(Command& c, CompileArguments& args) {
       .required()
       .value_name("OUTPUT");
   c.option("--profile", args.profile,
-           "JSON file of options (schemas/profile.v1.schema.json); flags win over the file")
-      .value_name("FILE");
+           "JSON file of options (schemas/profile.v1.schema.json), or the name of an installed one: thesis = "
+           "chapters 2 to 8 as printed. Flags win over the file")
+      .value_name("FILE|NAME");
   c.option(
        "--jnd-profile", args.jnd_profile,
        "JSON file of what judges could just tell (schemas/jnd-profile.v1.schema.json). The file wins over "
@@ -313,6 +314,7 @@ int run_compile(CompileArguments& args) {
   BatchPlan plan;
   try {
     read_meta_file(args);
+    if (!args.profile.empty()) args.profile = profile_file(args.profile);
     const PlanRequest request = plan_request(args);
     settings = run_settings(args);
     plan = plan_batch(request);

@@ -12,6 +12,7 @@ import './display-tests.mjs';
 import './limits-tests.mjs';
 import './materials-tests.mjs';
 import './proxy-tests.mjs';
+import './thesis-tests.mjs';
 import './render-tests.mjs';
 import './size-tests.mjs';
 import './viewer-tests.mjs';
