@@ -32,7 +32,7 @@ constexpr double kBurstVariation = 0.5, kBurstCorrelation = 0.9, kBurstStep_s = 
 
 struct MethodArguments {
   std::string input, thesis, against, time = "5", bandwidth = "2Mbit/s", rtt = "0";
-  std::vector<double> displays_px{150, 300, 600, 1000};
+  std::vector<int> displays_px{150, 300, 600, 1000};
   int views = 4, jobs = 0;
   CacheChoice cache;
   bool json = false;
@@ -102,7 +102,7 @@ std::string compiled(const MethodArguments& args, const fs::path& folder, const 
   return request.output;
 }
 
-DeliveryRequest request_of(const MethodArguments& args, const System& system, double displayed_px) {
+DeliveryRequest method_request(const MethodArguments& args, const System& system, double displayed_px) {
   DeliveryRequest r;
   r.displayed_px = displayed_px;
   r.time_limit_s = parse_duration(args.time, "--time");
@@ -154,8 +154,8 @@ SystemFigures figures_of(const MethodArguments& args, const System& system) {
   for (const EntryRef& e : package.index()) out.package_bytes += e.bytes;
   for (const ManifestScale& s : package.manifest().scales) out.scales.push_back(s.scale);
   out.steps = step_function(package.manifest().scales, system.printed ? StepRule::kJnd : StepRule::kFlip);
-  for (const double px : args.displays_px)
-    out.rows.push_back(method_row(package, pictures, request_of(args, system, px)));
+  for (const int px : args.displays_px)
+    out.rows.push_back(method_row(package, pictures, method_request(args, system, px)));
   return out;
 }
 
@@ -237,7 +237,7 @@ int study_method_of(const MethodArguments& args) {
   return kExitOk;
 }
 
-void add_method_options(Command& c, MethodArguments& args) {
+void add_method_arguments(Command& c, MethodArguments& args) {
   c.option("INPUT", args.input,
            "A model, which is compiled twice, by default and with --profile thesis; or a package, which both "
            "systems read")
@@ -248,7 +248,7 @@ void add_method_options(Command& c, MethodArguments& args) {
       .value_name("MODEL");
   c.option("--display", args.displays_px, "Displayed heights, px")
       .separated_by(',')
-      .number_in(16, 2048)
+      .integer_in(16, 2048)
       .shows_default();
   c.option("--time", args.time, "Time limit from the first request on").value_name("TIME").shows_default();
   c.option("--bandwidth", args.bandwidth, "Throughput of the link; the mean of the bursty ones")
@@ -266,7 +266,7 @@ void add_method_options(Command& c, MethodArguments& args) {
 void add_method_study(Command& study) {
   auto args = std::make_shared<MethodArguments>();
   Command c = study.add("method", "The thesis as printed beside texmesh's defaults, on one model");
-  add_method_options(c, *args);
+  add_method_arguments(c, *args);
   c.examples(
       "  texmesh study method turtle.glb --display 300,1000\n"
       "  texmesh study method turtle.texmesh --thesis printed.texmesh --against turtle.glb --json");
