@@ -290,9 +290,9 @@ void add_compile_options(Command& c, CompileArguments& args) {
       .required()
       .value_name("OUTPUT");
   c.option("--profile", args.profile,
-           "JSON file of options (schemas/profile.v1.schema.json), or the name of an installed one: thesis = "
-           "chapters 2 to 8 as printed. Flags win over the file")
-      .value_name("FILE|NAME");
+           "JSON file of options (schemas/profile.v1.schema.json), or thesis = chapters 2 to 8 as printed; "
+           "flags win")
+      .value_name("FILE");
   c.option(
        "--jnd-profile", args.jnd_profile,
        "JSON file of what judges could just tell (schemas/jnd-profile.v1.schema.json). The file wins over "
