@@ -233,42 +233,35 @@ TEST(RangeScan, RanksTellOrderFromDisorder) {
   EXPECT_LT(spearman(self, reversed), 0.3);
 }
 
-/// A cone whose relief has the same wavelength on the surface nowhere: its rows are scans of their own, each
-/// with its phi.
+/// Two turned rings with the same relief by angle, one six times as wide, too far apart to smooth each other.
 TEST(RangeScan, SpacingByRowIsThatOfTheRowsRadius) {
-  RangeGrid narrow;
-  narrow.columns = 240;
-  narrow.rows = 1;
-  narrow.alpha_step_rad = static_cast<float>(2 * portable::kPi / 240);
-  narrow.y_step = 1;
-  for (std::uint32_t x = 0; x < 240; ++x) {
-    narrow.radius.push_back(
-        static_cast<float>(1 + 0.05 * portable::sin(9 * 2 * portable::kPi * x / 240 + 0.1)));
-    narrow.position.push_back(x);
-  }
-  SsfOptions by_row;
-  by_row.range_spacing = RangeSpacing::kRow;
-  // Where all rows have one radius, both are the same.
-  EXPECT_EQ(bytes(filter_range_scan(narrow, 240, by_row, RunContext{})),
-            bytes(filter_range_scan(narrow, 240, {}, RunContext{})));
-  RangeGrid cone = narrow;
-  cone.rows = 12;
-  cone.radius.clear(), cone.position.clear();
-  for (std::uint32_t i = 0; i < 240 * 12; ++i) {
-    const float widest = 1 + static_cast<float>(i / 240);  // 1 to 12
-    cone.radius.push_back(narrow.radius[i % 240] * widest);
-    cone.position.push_back(i);
-  }
-  const ScaleMap mean = filter_range_scan(cone, 240 * 12, {}, RunContext{}),
-                 row = filter_range_scan(cone, 240 * 12, by_row, RunContext{});
-  const auto persistence = [](const ScaleMap& map, std::size_t y) {
-    std::size_t sum = 0;
-    for (std::size_t x = 0; x < 240; ++x) sum += map.persistence[y * 240 + x];
+  constexpr std::uint32_t kColumns = 240, kRing = 6, kGap = 130, kRows = 2 * kRing + kGap;
+  RangeGrid g;
+  g.columns = kColumns;
+  g.rows = kRows;
+  g.full_turn = true;
+  g.alpha_step_rad = static_cast<float>(2 * portable::kPi / kColumns);
+  g.y_step = 0.05f;
+  for (std::uint32_t y = 0; y < kRows; ++y)
+    for (std::uint32_t x = 0; x < kColumns; ++x) {
+      const double a = 2 * portable::kPi * (x + 0.5) / kColumns, widest = y < kRing ? 1 : 6;
+      const double relief = 1 + 0.05 * portable::sin(3 * a) + 0.02 * portable::sin(30 * a);
+      g.radius.push_back(y < kRing || y >= kRing + kGap ? static_cast<float>(widest * relief) : 0.0f);
+      g.position.push_back(y * kColumns + x);
+    }
+  SsfOptions options;
+  const auto persistence = [](const ScaleMap& map, std::uint32_t row) {
+    double sum = 0;
+    for (std::size_t x = 0; x < kColumns; ++x) sum += map.persistence[row * kColumns + x];
     return sum;
   };
-  // The same angle is twelve times as long on the widest row: the relief lives on to larger scales there.
-  EXPECT_GT(persistence(row, 11), persistence(row, 1));
-  EXPECT_NE(mean.persistence, row.persistence);
+  const ScaleMap mean = filter_range_scan(g, kColumns * kRows, options, RunContext{});
+  EXPECT_NEAR(persistence(mean, 2) / persistence(mean, kRows - 3), 1, 0.05)
+      << "by the mean they are the same";
+  options.range_spacing = RangeSpacing::kRow;
+  const ScaleMap row = filter_range_scan(g, kColumns * kRows, options, RunContext{});
+  EXPECT_GT(persistence(row, kRows - 3), 1.3 * persistence(row, 2))
+      << "the wide one's relief is six times as long";
 }
 
 }  // namespace
