@@ -145,6 +145,11 @@ function checkTables(table: t.PlaneTables, v: Json): void {
   const bent = { ...table, knotQuality: v.knots.quality, knotPosition: v.knots.position };
   for (const [fragment, quality, bytes] of v.knots.fragment_quality_bytes)
     expectBits([t.interpolatedBytes(bent, fragment, quality)], [bytes], `bytes of ${fragment} at ${quality}, knots`);
+  const { vqp, gamma, quality, rungs } = v.by_predictors;
+  const predicted = { ...table, allocation: 3, vqp: Float32Array.from(vqp) };
+  expectBits([t.meanEta(predicted, 0)], [gamma], 'mean of VQP');
+  expectBits(t.qualityOf(predicted, 0, gamma), quality, 'quality by VQP');
+  expectBits(t.rungsOf(predicted, 0, gamma), rungs, 'rungs by VQP');
   for (const [budget, rungs] of v.budget_rungs) expectBits(t.allocateRd(table, budget), rungs, `budget ${budget}`);
 }
 
