@@ -49,6 +49,7 @@ if(TEXMESH_COMPILER)
   install(TARGETS texmesh EXPORT texmeshTool RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
   install(TARGETS texmesh-core RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/texmesh)
   install(DIRECTORY ${PROJECT_BINARY_DIR}/viewer/ DESTINATION ${CMAKE_INSTALL_DATADIR}/texmesh/viewer OPTIONAL)
+  install(DIRECTORY profiles/ DESTINATION ${CMAKE_INSTALL_DATADIR}/texmesh/profiles)
   install(EXPORT texmeshTool NAMESPACE texmesh:: DESTINATION ${texmesh_cmake_dir} FILE texmeshTool.cmake)
 endif()
 install(DIRECTORY schemas/ DESTINATION ${CMAKE_INSTALL_DATADIR}/texmesh/schemas FILES_MATCHING PATTERN *.schema.json

@@ -1,5 +1,7 @@
-// Bundles the library: dist/texmesh.js (everything; three.js stays outside), dist/open.js (to show packages), dist/page.js (many on one page), dist/reader.js
-// (without three.js), dist/thesis-tables.js (readThesis), dist/worker.js, dist/viewer/ (an element by one script tag, with three.js inside). Each entry stands alone: the parts that an entry loads by import() belong to that entry.
+// Bundles the library: dist/texmesh.js (everything; three.js stays outside), dist/open.js (to show packages), dist/page.js (many on one
+// page), dist/reader.js (without three.js), dist/thesis.js (chapter 4 as printed), dist/thesis-tables.js (readThesis), dist/worker.js,
+// dist/viewer/ (an element by one script tag, with three.js inside). Each entry stands alone: the parts that an entry loads by import()
+// belong to that entry.
 //   node build.mjs               builds
 //   node build.mjs --types       after tsc: names files in full in dist/types, as Node.js resolves them
 //   node build.mjs --license     copies the project's LICENSE here, for npm pack
@@ -15,7 +17,9 @@ import { rollup } from 'rollup';
 const here = dirname(fileURLToPath(import.meta.url));
 const dist = join(here, 'dist');
 /** Source files of the entries. */
-const entries = { texmesh: 'index', open: 'open', page: 'page', reader: 'reader', 'thesis-tables': 'thesis_tables', worker: 'worker' };
+const entries = {
+  texmesh: 'index', open: 'open', page: 'page', reader: 'reader', thesis: 'thesis', 'thesis-tables': 'thesis_tables', worker: 'worker',
+};
 /**
  * Gzip bytes of texmesh/open that an application may have to load, three.js and the worker apart: before the first picture; with
  * every part that is ever loaded. Then the same of `texmesh`, and the worker with the decoders.

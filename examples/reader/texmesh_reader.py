@@ -206,13 +206,14 @@ def read_section(c, texture, m):
     require((columns, rows) == (texture["columns"], texture["rows"]), "R08", "grid")
     require(n == len(m["scales"]["scale"]), "R11", f"{n} rows")
     require(1 <= r <= 100 and 1 <= ws <= 4 and 1 <= wf <= 3, "T03", "counts and widths")
-    require(allocation <= 2, "T13", f"allocation {allocation}")
+    require(allocation <= 3, "T13", f"allocation {allocation}")
     require(is_new or (flags <= 1 and zero == 0), "W05", "reserved bits")
     require((flags & 1) == (texture["codec"] == "jpeg-progressive"), "R10", "incremental")
     t = {"incremental": flags & 1, "widths": (ws, wf), "parameters": c.array("<f4", 4)}
     listed = c.get("I")
     require(listed <= columns * rows, "T03", f"{listed} listed fragments")
     rest = 2 * listed + r * 5 + k * 3 + r * listed * (ws + 12) + listed * 10 + n * listed * wf + n * 4
+    rest += 2 * listed * (allocation == 3)
     require(len(c.data) >= c.at + rest and (is_new or len(c.data) == c.at + rest), "T03", f"{len(c.data)} bytes")
     t |= {"order": c.array("<u2", listed), "quality": c.array("u1", r), "tables": c.array("<u4", r),
           "knots": c.array("u1", k), "positions": c.array("<u2", k),
@@ -220,7 +221,8 @@ def read_section(c, texture, m):
           "digest": c.array("u1", r * listed * 8).reshape(r, listed, 8),
           "mse": c.array("<u2", r * listed), "dssim": c.array("<u2", r * listed), "preview": c.array("<u2", listed),
           "covered": c.array("<u4", listed), "surface": c.array("<f4", listed),
-          "features": c.whole(wf, n * listed).reshape(n, listed), "middle": c.array("<f4", n)}
+          "features": c.whole(wf, n * listed).reshape(n, listed), "middle": c.array("<f4", n),
+          "vqp": c.array("<u2", listed if allocation == 3 else 0)}
     require(listed == len(set(t["order"].tolist())) and (t["order"] < columns * rows).all(), "T05", "order")
     require((t["size"] > 0).all(), "T06", "a size of 0")
     return t

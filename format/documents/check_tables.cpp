@@ -52,6 +52,7 @@ void check_counts(const PlaneTables& t, const std::string& place) {
   require_count(t.covered_texels, f, place + "/covered_texels");
   require_count(t.surface_fraction, f, place + "/surface_fraction");
   require_count(t.features, n * f, place + "/features");
+  require_count(t.vqp, t.allocation == kByVqp ? f : 0, place + "/vqp");
 }
 
 void check_shape(const PlaneTables& t, const std::string& place) {
@@ -73,7 +74,8 @@ void check_shape(const PlaneTables& t, const std::string& place) {
 }
 
 void check_parameters(const PlaneTables& t, const std::string& place) {
-  require_tables(t.allocation <= 2, "T13", place + "/allocation", "0, 1 or 2", std::to_string(t.allocation));
+  require_tables(t.allocation <= kByVqp, "T13", place + "/allocation", "0 to 3",
+                 std::to_string(t.allocation));
   require_range({t.quality_width}, 0, 100, place + "/quality_width");
   require_range({t.log_width}, 0, 4, place + "/log_width");
   require_range({t.quality_max}, 1, 100, place + "/quality_max");
@@ -130,6 +132,7 @@ void check_plane(const PlaneTables& t, float rounding, const std::string& place)
   check_knots(t, place);
   require_range(t.surface_fraction, 0, 1 + rounding, place + "/surface_fraction");
   require_range(t.quality, 0, 100, place + "/quality");
+  require_range(t.vqp, 0, 1, place + "/vqp");
   for (const std::uint32_t f : t.features)
     require_tables(f < kFeatureLimit, "T03", place + "/features", "less than 2^24", std::to_string(f));
   check_fragment_order(t, place);

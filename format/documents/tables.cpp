@@ -32,12 +32,13 @@ constexpr std::uint8_t kIncremental = 1;  // flag
 /// What a section's first fields say of the rest.
 struct SectionCounts {
   std::uint64_t scales = 0, rungs = 0, knots = 0, listed = 0;
+  bool vqp = false;
   int size_width = 1, feature_width = 1;
   std::uint64_t bytes() const {
     const auto size_bytes = static_cast<std::uint64_t>(size_width),
                feature_bytes = static_cast<std::uint64_t>(feature_width);
     return kSectionFixed + listed * 2 + rungs * 5 + knots * 3 + rungs * listed * (size_bytes + 8 + 2 + 2) +
-           listed * (2 + 4 + 4) + scales * listed * feature_bytes + scales * 4;
+           listed * (2 + 4 + 4) + scales * listed * feature_bytes + scales * 4 + (vqp ? listed * 2 : 0);
   }
 };
 
@@ -82,6 +83,7 @@ Bytes write_section(const PlaneTables& t) {
   for_each_listed(t, 1, [&](std::size_t k) { out.f32(std::min(t.surface_fraction[k], 1.0f)); });
   for (const auto v : features) out.number(v, feature_width);
   for (const auto v : t.quality) out.f32(v);
+  if (t.allocation == kByVqp) for_each_listed(t, 1, [&](std::size_t k) { out.u16(to_unit16(t.vqp[k])); });
   return out.finish();
 }
 
@@ -133,6 +135,7 @@ void read_arrays(BytesIn& in, PlaneTables& t, const SectionCounts& counts) {
   fill_listed(t.features, counts.scales,
               [&] { return static_cast<std::uint32_t>(in.number(counts.feature_width)); });
   fill(t.quality, counts.scales, [&] { return in.f32(); });
+  if (counts.vqp) fill_listed(t.vqp, 1, [&] { return from_unit16(in.u16()); });
 }
 
 /// The fields in front of a section's arrays. All counts are small afterwards, so that no product of them
@@ -145,6 +148,7 @@ SectionCounts read_section_start(BytesIn& in, PlaneTables& t, int minor) {
   counts.rungs = in.u8();
   counts.size_width = in.u8(), counts.feature_width = in.u8();
   t.allocation = in.u8();
+  counts.vqp = t.allocation == kByVqp;
   const std::uint8_t flags = in.u8();
   counts.knots = in.u8();
   if (const auto reserved = in.u8(); (flags > kIncremental || reserved != 0) && minor <= kFormatMinor)

@@ -8,6 +8,9 @@
 
 namespace texmesh {
 
+/// PlaneTables::allocation where VQP takes the place of eta.
+inline constexpr std::uint8_t kByVqp = 3;
+
 /// Tables of one texture plane. F = columns * rows fragments (row by row from the top left), R rungs (rising
 /// quality, rung 0 here is the lowest stored one; "skipped" has no entry), N feature scales: in a package
 /// those that its manifest has, in its order; from stage `lut` all of the chain, by scale number.
@@ -37,9 +40,12 @@ struct PlaneTables {
   std::vector<std::uint32_t> features;  // f_i < 2^24
   // [N]:
   std::vector<float> quality;  // Q_i
-  // 0 thesis (3.2), 1 log-quantiser, 2 rate-distortion within the bytes of 1; with the widths and clip used:
+  // 0 thesis (3.2), 1 log-quantiser, 2 rate-distortion within the bytes of 1, 3 thesis with VQP in eta's
+  // place (8.3); with the widths and clip used:
   std::uint8_t allocation = 1;
   float quality_width = 60, log_width = 0.7f, quality_min = 5, quality_max = 97;
+  // [F], 0..1, stored as multiples of 1 / 65535: p of (8.4) where the allocation is 3, else empty
+  std::vector<float> vqp;
 
   std::size_t fragment_count() const { return static_cast<std::size_t>(columns) * rows; }
   std::size_t rung_count() const { return rung_quality.size(); }
@@ -48,7 +54,7 @@ struct PlaneTables {
   static void archive(S& s, A& a) {
     a(s.columns, s.rows, s.incremental, s.rung_quality, s.table_bytes, s.order, s.size_bytes, s.digest, s.mse,
       s.dssim, s.skip_dssim, s.covered_texels, s.surface_fraction, s.knot_quality, s.knot_position,
-      s.features, s.quality, s.allocation, s.quality_width, s.log_width, s.quality_min, s.quality_max);
+      s.features, s.quality, s.allocation, s.quality_width, s.log_width, s.quality_min, s.quality_max, s.vqp);
   }
 };
 

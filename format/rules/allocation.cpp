@@ -27,6 +27,7 @@ double quality_of_scale(double scale) { return scale > 1 ? 50 / scale : 100 - 50
 double log_quantiser(double quality) { return -portable::log(ijg_scale(quality)); }
 
 std::vector<float> eta_of(const PlaneTables& tables, std::size_t row) {
+  if (tables.allocation == kByVqp) return tables.vqp;
   const std::size_t n = tables.fragment_count();
   const std::uint32_t* features = tables.features.data() + row * n;
   std::uint32_t lo = 0xffffffffu, hi = 0;
@@ -62,7 +63,7 @@ std::vector<float> quality_of(const PlaneTables& tables, std::size_t row, double
   for (float& value : result) {
     const double away = static_cast<double>(value) - gamma;
     const double q =
-        tables.allocation == 0
+        tables.allocation == 0 || tables.allocation == kByVqp
             ? middle + away * static_cast<double>(tables.quality_width)
             : quality_of_scale(portable::exp(-(g + away * static_cast<double>(tables.log_width))));
     value = std::clamp(static_cast<float>(q), tables.quality_min, tables.quality_max);
@@ -97,7 +98,7 @@ std::vector<std::int16_t> rungs_of(const PlaneTables& tables, std::size_t row, d
   std::vector<std::int16_t> rungs(tables.fragment_count(), kSkipped);
   for (const std::uint16_t f : tables.order)
     rungs[f] = static_cast<std::int16_t>(nearest_rung(tables, static_cast<double>(quality[f])));
-  return tables.allocation < 2 ? rungs : allocate_rd(tables, sum_of(bytes_of(tables, rungs)));
+  return tables.allocation != 2 ? rungs : allocate_rd(tables, sum_of(bytes_of(tables, rungs)));
 }
 
 std::vector<std::uint32_t> bytes_of(const PlaneTables& tables, const std::vector<std::int16_t>& rungs) {

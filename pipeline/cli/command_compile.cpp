@@ -290,7 +290,8 @@ void add_compile_options(Command& c, CompileArguments& args) {
       .required()
       .value_name("OUTPUT");
   c.option("--profile", args.profile,
-           "JSON file of options (schemas/profile.v1.schema.json); flags win over the file")
+           "JSON file of options (schemas/profile.v1.schema.json), or thesis = chapters 2 to 8 as printed; "
+           "flags win")
       .value_name("FILE");
   c.option(
        "--jnd-profile", args.jnd_profile,
@@ -313,6 +314,7 @@ int run_compile(CompileArguments& args) {
   BatchPlan plan;
   try {
     read_meta_file(args);
+    if (!args.profile.empty()) args.profile = profile_file(args.profile);
     const PlanRequest request = plan_request(args);
     settings = run_settings(args);
     plan = plan_batch(request);

@@ -37,8 +37,9 @@ bool is_png(const std::string& path) { return path.ends_with(".png") || path.end
 CompileOptions gather_options(const DebugArguments& args) {
   CompileOptions options;
   if (!args.profile.empty()) {
-    const auto bytes = read_input_file(args.profile, 1 << 20);
-    read_profile(options, std::string(bytes.begin(), bytes.end()), args.profile);
+    const std::string file = profile_file(args.profile);
+    const auto bytes = read_input_file(file, 1 << 20);
+    read_profile(options, std::string(bytes.begin(), bytes.end()), file);
   }
   std::vector<OptionField> fields = list_options(options);
   for (const std::string& setting : args.settings) {

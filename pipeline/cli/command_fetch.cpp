@@ -176,6 +176,22 @@ void predict(PackageReader& package, const TextureLoader& loader, const std::vec
   f.flip = picture_flip(package.quality(), options.displayed_px, f.scale, losses);
 }
 
+/// The textures for the time, and in `load.list` how they are listed.
+std::vector<PlaneChoice> choose_textures(PackageReader& package, LoadOptions& load) {
+  const double budget_bytes = load.htc.time_limit_s * load.htc.throughput.initial_bytes_s;
+  if (load.htc.policy == Policy::kThesis) {
+    TextureLoss loss(package, load.list.displayed_px);
+    ThesisTextures as_printed = thesis_textures(loss, load.list, budget_bytes);
+    load.list = as_printed.options;
+    load.group_bytes = 0;  // fragment by fragment
+    return std::move(as_printed.planes);
+  }
+  const TextureBudget budget =
+      texture_for_budget(package, load.list, static_cast<std::uint64_t>(budget_bytes));
+  load.list.group_weights = budget.list.group_weights;
+  return budget.planes;
+}
+
 void fetch_textures(const FetchArguments& a, const DeliveryRequest& request, const HttpOptions& http,
                     PackageReader& package, Clock::time_point start, double bytes_s, FetchedFiles& writer,
                     Fetched& f) {
@@ -190,11 +206,7 @@ void fetch_textures(const FetchArguments& a, const DeliveryRequest& request, con
   load.htc.time_limit_s = std::max(1e-3, request.time_limit_s - f.mesh_s);
   load.htc.throughput.initial_bytes_s = bytes_s;
   load.group_bytes = group_bytes(load.htc.throughput.initial_bytes_s, f.rtt_s, load.htc.time_limit_s);
-  const auto budget_bytes =
-      static_cast<std::uint64_t>(load.htc.time_limit_s * load.htc.throughput.initial_bytes_s);
-  const TextureBudget budget = texture_for_budget(package, load.list, budget_bytes);
-  const std::vector<PlaneChoice>& planes = budget.planes;
-  load.list.group_weights = budget.list.group_weights;
+  const std::vector<PlaneChoice> planes = choose_textures(package, load);
   load.cancelled = http.cancelled;
   load.on_fragment = [&](const LoadedFragment& fragment) { writer.add(fragment); };
   f.load = loader.load(planes, load);
@@ -223,7 +235,8 @@ Fetched fetch(const FetchArguments& a) {
     return request.beta0_bytes_s > 0 ? request.beta0_bytes_s : moved.bytes_s(f.place.bytes_s);
   };
   FetchedFiles writer(package, a.output);
-  const bool proxies = !package.manifest().proxies.empty() && request.scale < 0;
+  const bool proxies =
+      !package.manifest().proxies.empty() && request.scale < 0 && request.htc.policy != Policy::kThesis;
   if (proxies) {
     fetch_proxy(package, 0, writer, f, moved);
     f.first_picture_s = seconds_since(start);

@@ -1,6 +1,7 @@
 #include "pipeline/compile/profile.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "format/base/bounded_json.h"
@@ -12,6 +13,7 @@ namespace texmesh {
 namespace {
 
 using Json = nlohmann::ordered_json;
+namespace fs = std::filesystem;
 
 Json parse_profile_text(const std::string& json, const std::string& file_name) {
   if (json.size() > 1 << 20)
@@ -47,6 +49,25 @@ void read_profile(CompileOptions& options, const std::string& json, const std::s
     }
   }
   check_options(options, file_name);
+}
+
+std::string profile_file(const std::string& wanted) {
+  std::error_code error;
+  if (wanted.find_first_of("/.") != std::string::npos || fs::exists(wanted, error)) return wanted;
+  const fs::path folder = fs::read_symlink("/proc/self/exe", error).parent_path();
+  std::vector<std::string> names;
+  for (const char* beside : {"../profiles", "../share/texmesh/profiles", "../../share/texmesh/profiles"}) {
+    const fs::path profiles = (folder / beside).lexically_normal();
+    const fs::path file = profiles / (wanted + ".json");
+    if (fs::is_regular_file(file, error)) return file.string();
+    for (const fs::directory_entry& entry : fs::directory_iterator(profiles, error))
+      if (entry.path().extension() == ".json") names.push_back(entry.path().stem().string());
+  }
+  std::sort(names.begin(), names.end());
+  std::string known;
+  for (const std::string& name : names) known += (known.empty() ? "" : ", ") + name;
+  throw InputError(wanted, "", "a file, or the name of a profile that is installed",
+                   known.empty() ? "none" : known);
 }
 
 std::string write_profile(const CompileOptions& options) {

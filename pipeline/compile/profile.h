@@ -10,6 +10,11 @@ struct CompileOptions;
 /// throw InputError{file_name, JSON pointer, ...}.
 void read_profile(CompileOptions& options, const std::string& json, const std::string& file_name);
 
+/// The file of a profile: `wanted` where there is such a file or it has a slash or a dot, else NAME.json of
+/// profiles/ beside the executable's folder (a build tree) or of share/texmesh/profiles of an installation.
+/// InputError with the names that there are.
+std::string profile_file(const std::string& wanted);
+
 /// Every option as a profile. Of resolved options: what provenance records, and what a worker gets.
 std::string write_profile(const CompileOptions& options);
 

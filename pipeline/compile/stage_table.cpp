@@ -42,6 +42,13 @@ ScaleMap filter_scales(const ImportedMesh& import, const ConditionedMesh& mesh, 
   return filter_range_scan(grid, mesh.mesh.positions.size(), options, context);
 }
 
+/// R(v) in curvature's place.
+ScaleMap filter_radius(const ImportedMesh& import, const ConditionedMesh& mesh, const Skeleton& skeleton,
+                       const SsfOptions& options, const RunContext& context) {
+  if (import.range.columns > 0) return filter_scales(import, mesh, options, context);
+  return filter_skeleton_distance(mesh, skeleton, options, context);
+}
+
 Planes fill_fragments(const Fragments& fragments, const Images& images, Fill fill, LadderMode mode,
                       Uncovered uncovered, const RunContext& context) {
   const PartBlocks part =
@@ -110,6 +117,17 @@ Stage stage(StageTitle title, Read read, Made made, Declared declared,
   return make_stage(std::move(title), read, made, std::move(declared), libraries(used_libraries), function);
 }
 
+/// Waits for the skeleton only where R(v) is the signal.
+Stage scale_space_stage(const CompileOptions& o) {
+  const StageTitle title{"ssf", kSsfVersion,
+                         "mesh -> scale map: the highest scale at which a vertex is a feature"};
+  if (o.ssf.signal == ScaleSignal::kRadius)
+    return stage(title, inputs(kImportedMesh, kConditionedMesh, kSkeleton), outputs(kScaleMap),
+                 read_of(o, o.ssf), {}, filter_radius);
+  return stage(title, inputs(kImportedMesh, kConditionedMesh), outputs(kScaleMap), read_of(o, o.ssf), {},
+               filter_scales);
+}
+
 }  // namespace
 
 std::vector<Stage> stage_table(const CompileOptions& o) {
@@ -123,9 +141,7 @@ std::vector<Stage> stage_table(const CompileOptions& o) {
       stage({"skeletonization", kSkeletonizationVersion, "mesh -> curve skeleton, R(v)"},
             inputs(kConditionedMesh), outputs(kSkeleton), read_of(o, o.skeletonization),
             {"cgal", "meshoptimizer"}, skeletonize),
-      stage({"ssf", kSsfVersion, "mesh -> scale map: the highest scale at which a vertex is a feature"},
-            inputs(kImportedMesh, kConditionedMesh), outputs(kScaleMap), read_of(o, o.ssf), {},
-            filter_scales),
+      scale_space_stage(o),
       stage({"simplification", kSimplificationVersion, "mesh, scale map -> collapse sequence, nested scales"},
             inputs(kConditionedMesh, kScaleMap), outputs(kNestedScales), read_of(o, o.simplification), {},
             simplify),

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "format/base/sha256.h"
+#include "format/base/unit16.h"
 #include "format/rules/allocation.h"
 #include "stages/base/parallel.h"
 #include "stages/image/check_pixels.h"
@@ -75,8 +76,8 @@ double least_quality(TextureRole role, const LutOptions& options) {
 }
 
 /// Everything that is copied or follows from the options.
-PlaneTables start_plane(const TexturePlane& plane, const PlaneLadder& ladder, std::uint32_t scales,
-                        const LutOptions& options) {
+PlaneTables start_plane(const TexturePlane& plane, const PlanePredictors& predictors,
+                        const PlaneLadder& ladder, std::uint32_t scales, const LutOptions& options) {
   PlaneTables out;
   out.columns = plane.columns;
   out.rows = plane.rows;
@@ -104,15 +105,18 @@ PlaneTables start_plane(const TexturePlane& plane, const PlaneLadder& ladder, st
   out.log_width = static_cast<float>(options.log_width);
   out.quality_min = static_cast<float>(least_quality(plane.role, options));
   out.quality_max = static_cast<float>(options.quality_max);
+  if (options.allocate == Allocation::kVqp)  // as the file stores it, so that every reader decides the same
+    for (const float p : predictors.vqp) out.vqp.push_back(from_unit16(to_unit16(p)));
   return out;
 }
 
-std::vector<std::uint16_t> importance_order(const TexturePlane& plane) {
+std::vector<std::uint16_t> importance_order(const TexturePlane& plane, const std::vector<float>& vqp) {
+  const std::vector<float>& importance = vqp.empty() ? plane.eta : vqp;
   std::vector<std::uint16_t> order;
   for (std::size_t f = 0; f < plane.fragment_count(); ++f)
     if (plane.covered_texels[f] > 0) order.push_back(static_cast<std::uint16_t>(f));
   std::stable_sort(order.begin(), order.end(), [&](std::uint16_t a, std::uint16_t b) {
-    if (plane.eta[a] != plane.eta[b]) return plane.eta[a] > plane.eta[b];
+    if (importance[a] != importance[b]) return importance[a] > importance[b];
     return plane.surface_fraction[a] > plane.surface_fraction[b];
   });
   return order;
@@ -150,9 +154,9 @@ LutTables build_tables(const Fragments& fragments, const std::vector<Pixels>& pi
   }
   std::vector<std::pair<std::size_t, std::size_t>> tasks;  // plane, fragment
   for (std::size_t p = 0; p < fragments.planes.size(); ++p) {
-    tables.push_back(start_plane(fragments.planes[p], ladder.planes[p],
+    tables.push_back(start_plane(fragments.planes[p], predictors.planes[p], ladder.planes[p],
                                  static_cast<std::uint32_t>(fragments.scales), options));
-    tables[p].order = importance_order(fragments.planes[p]);
+    tables[p].order = importance_order(fragments.planes[p], tables[p].vqp);
     for (std::uint16_t f : tables[p].order) tasks.emplace_back(p, f);
   }
   std::atomic<std::size_t> done{0};

@@ -15,10 +15,10 @@ namespace texmesh {
 
 inline constexpr int kLutVersion = 9;
 
-enum class Allocation : std::uint8_t { kThesis, kLog, kRd };
+enum class Allocation : std::uint8_t { kThesis, kLog, kRd, kVqp };
 template <>
 struct EnumNames<Allocation> {
-  static constexpr std::array<std::string_view, 3> names{"thesis", "log", "rd"};
+  static constexpr std::array<std::string_view, 4> names{"thesis", "log", "rd", "vqp"};
 };
 
 struct LutOptions {
@@ -31,7 +31,8 @@ struct LutOptions {
   template <class S, class V>
   static void fields(S& s, V&& v) {
     v("allocate", s.allocate,
-      "how bytes are shared among fragments: thesis = equation 3.2 in quality; log = the same in the "
+      "how bytes are shared among fragments: thesis = equation 3.2 in quality; vqp = the same by VQP (8.4) in "
+      "the place of feature density; log = the same in the "
       "logarithm of the quantiser; rd = the bytes of log, spent where they save most visible error (1 - "
       "SSIM x surface)");
     v("quality_fine", s.quality_fine, Range{1, 100}, "Q_i asked for at S_0");
@@ -61,7 +62,7 @@ struct LutTables {
 /// - Per rung and fragment: the exact bytes, the digest, MSE and 1 - SSIM over covered texels, of luma, or of
 ///   every channel of data.
 /// - Per fragment 1 - SSIM of the preview, scaled up bilinearly, for where no rung is shown.
-/// - The order of falling importance: eta of scale 0, then surface, then index.
+/// - The order of falling importance: eta of scale 0, with `allocate = vqp` VQP, then surface, then index.
 /// - Q_i, and for the thesis D_i over 21 values of Gamma: bytes of the fragments' streams, table streams not
 ///   counted. With `allocate = rd` they are the bytes of log, which rungs_of() spends.
 /// - For the thesis the predictors, and the size models (stages/lut/size_model.h).

@@ -199,6 +199,7 @@ void choose_kept(const NestedScales& scales, int kept_scales, PerceptualValues& 
   const std::size_t n = scales.scales.size();
   out.kept = out.major;
   out.kept[0] = out.kept[n - 1] = 1;
+  if (kept_scales == 0) return;
   auto log_triangles = [&](std::size_t k) {
     return portable::log(static_cast<double>(scales.scales[k].triangles.size()));
   };
@@ -261,6 +262,24 @@ void find_displayed_heights(const NestedScales& scales, const std::vector<double
   }
 }
 
+/// 7.5 and 7.6 as printed: a tier, from behind one major scale to the next, is shown as its last scale at
+/// every size at which O_V / E_S matches one of the tier best. S_0's tier is all that cannot be told from
+/// S_0.
+void step_by_majors(double jnd, const std::vector<float>& value, PerceptualValues& out) {
+  const std::size_t n = out.major.size();
+  std::size_t begin = 0;  // the major scale before, or S_0
+  for (std::size_t k = 1; k < n; ++k) {
+    if (!out.major[k]) continue;
+    const double nearest =
+        std::sqrt(double{out.display_px_edge[begin]} * double{out.display_px_edge[begin + 1]});
+    const bool as_s0 = begin == 0 && double{value[k]} < jnd;
+    const auto limit = as_s0 ? kAnyHeightPx : static_cast<float>(std::min<double>(nearest, kAnyHeightPx));
+    for (std::size_t i = begin + 1; i <= k; ++i)
+      out.display_px_jnd[i] = std::min(limit, out.display_px_jnd[i - 1]);
+    begin = k;
+  }
+}
+
 float strategy_value(const CollapseStatistics& s, PerceptualStatistic strategy) {
   if (strategy == PerceptualStatistic::kConservative) return s.max;
   return strategy == PerceptualStatistic::kAggressive ? s.min : s.mean;
@@ -305,6 +324,7 @@ PerceptualValues measure_perceptual_values(const NestedScales& scales, const Ske
   out.major = major_rows(value, n, options.jnd);
   choose_kept(scales, options.kept_scales, out);
   find_displayed_heights(scales, error, options, value, context, out);
+  if (options.steps == StepsBy::kMajors) step_by_majors(options.jnd, value, out);
   return out;
 }
 

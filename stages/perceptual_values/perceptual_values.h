@@ -11,6 +11,15 @@ namespace texmesh {
 
 inline constexpr int kPerceptualValuesVersion = 4;
 
+/// What makes the step function of the JND. kScales: every kept scale, by its distance from S_0. kMajors: as
+/// printed (7.5, 7.6): the displayed size chooses a scale by O_V / E_S, the JND, whatever the distance, puts
+/// its tier's major scale in its place.
+enum class StepsBy : std::uint8_t { kScales, kMajors };
+template <>
+struct EnumNames<StepsBy> {
+  static constexpr std::array<std::string_view, 2> names{"scales", "majors"};
+};
+
 /// Displayed height in px at which judges' JND holds by default: the thesis's stimuli stood side by side on
 /// monitors of 1024..1280 px (Table 7.3; Fig. 7.14 speaks of 90..170 px from skeleton to surface).
 inline constexpr double kJndReferencePx = 512;
@@ -20,6 +29,7 @@ struct PerceptualValuesOptions {
   double jnd_reference_px = kJndReferencePx;
   double jnd_distance_exponent = 1;  // what is just noticeable at D px: jnd (jnd_reference_px / D)^exponent
   PerceptualStatistic statistic = PerceptualStatistic::kP95;
+  StepsBy steps = StepsBy::kScales;
   int samples = 4000;          // the percentiles' ranks are within 0.5 % then
   int kept_scales = 8;         // beside S_0 and the major ones
   double edge_percentile = 5;  // gives E_S of the O_V / E_S rule; 0 = the shortest edge
@@ -35,9 +45,13 @@ struct PerceptualValuesOptions {
     v("statistic", s.statistic,
       "what decides about major scales: p95 of the relative distance, or the thesis's average, "
       "conservative (largest) and aggressive (smallest) change of the skeleton distance");
+    v("steps", s.steps,
+      "what makes the JND's step function: scales = each kept scale, by jnd and jnd_reference_px; majors = the "
+      "major scales, each for the sizes at which O_V / E_S asks for a scale of its tier");
     v("samples", s.samples, Range{100, 1000000}, "points compared per pair of scales");
-    v("kept_scales", s.kept_scales, Range{1, 40},
-      "scales a package holds, about; steps of about 2x between them");
+    v("kept_scales", s.kept_scales, Range{0, 40},
+      "scales a package holds, about; steps of about 2x between them. 0 = S_0, the major scales and the "
+      "coarsest alone");
     v("edge_percentile", s.edge_percentile, Range{0, 50},
       "percentile of the edge lengths that counts as shortest edge");
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 
 #include "format/base/no_index.h"
@@ -54,6 +55,13 @@ std::vector<std::uint32_t> vertex_targets(const ScaleMap& scale_map, const Simpl
   }
   soften_falls(target);
   return target;
+}
+
+/// Chapters 3 and 7 bound neither the error of a scale nor the shift of its texture.
+SimplificationOptions without_bounds_of_thesis(SimplificationOptions options) {
+  if (options.order == CollapseOrder::kThesis)
+    options.max_error = options.max_shift = std::numeric_limits<double>::max();
+  return options;
 }
 
 std::string stop_reason(CollapseStop stop, const SimplificationOptions& options) {
@@ -134,7 +142,8 @@ void drop_far_scales(NestedScales& result, double limit) {
 }  // namespace
 
 NestedScales simplify(const ConditionedMesh& mesh, const ScaleMap& scale_map,
-                      const SimplificationOptions& options, const RunContext& context) {
+                      const SimplificationOptions& asked, const RunContext& context) {
+  const SimplificationOptions options = without_bounds_of_thesis(asked);
   if (scale_map.persistence.size() != mesh.mesh.positions.size())
     throw StageError("simplification", "scale map", std::to_string(mesh.mesh.positions.size()) + " positions",
                      std::to_string(scale_map.persistence.size()));

@@ -11,7 +11,7 @@
 
 namespace texmesh {
 
-inline constexpr int kSimplificationVersion = 6;
+inline constexpr int kSimplificationVersion = 7;
 
 enum class CollapseOrder : std::uint8_t { kTexmesh, kThesis };
 template <>
@@ -56,7 +56,7 @@ struct SimplificationOptions {
     v("boundary_weight", s.boundary_weight, Range{0, 1000}, "weight of open borders");
     v("max_error", s.max_error, Range{0.0001, 1},
       "no scale deviates by more than this fraction of the diagonal; a component that vanishes deviates by "
-      "its size");
+      "its size; order thesis has no such bound");
     v("max_shift", s.max_shift, Range{0.0001, 1},
       "no collapse shifts the texture by more than this fraction of the diagonal");
     v("coarsest", s.coarsest, Range{0.0001, 1},
@@ -72,6 +72,7 @@ struct SimplificationOptions {
 /// - A collapse needs a consistent wedge map and the link condition, and turns no normal or UV triangle over,
 ///   in every set of texture coordinates that its material uses. The set of the base colour has the quadric
 ///   and max_shift.
+/// - Order thesis removes down to the scale map's numbers, whatever the error and the shift of the texture.
 /// - Border vertices move along the border only, seams along the seam, twins together.
 /// About 5 us per removed vertex on one core. StageError when the scale map is of another mesh.
 /// Deterministic: among equals the place along a space-filling curve decides.

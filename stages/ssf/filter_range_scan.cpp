@@ -26,10 +26,11 @@ struct Grid {
   std::size_t index(std::uint32_t x, std::uint32_t y) const { return std::size_t{y} * columns + x; }
 };
 
-/// One axis of the grid, with its step measured in object units: the roots of phi and psi of (2.4).
+/// One axis of the grid, with its step measured in object units: the roots of phi and psi of (2.4). One step
+/// for all rows, or one for each.
 struct Axis {
   bool vertical = false;
-  double step = 0;
+  std::vector<double> step;
 };
 
 Grid read_grid(const RangeGrid& range) {
@@ -76,19 +77,27 @@ Kernel make_kernel(double sigma, double step, double window, std::uint32_t size)
   return k;
 }
 
+/// One for all rows, or one for each.
+std::vector<Kernel> make_kernels(double sigma, const Axis& axis, double window, std::uint32_t size) {
+  std::vector<Kernel> kernels;
+  for (const double step : axis.step) kernels.push_back(make_kernel(sigma, step, window, size));
+  return kernels;
+}
+
 /// sum_u w(u) (f(x + u) - f(x)) over the samples there are; `smooth` adds f(x) and makes up for weights that
 /// are missing at borders and holes.
-Grid filter(const Grid& in, const Axis& axis, const std::vector<double>& weight, bool smooth,
-            const RunContext& context) {
+Grid filter(const Grid& in, const Axis& axis, const std::vector<Kernel>& kernels,
+            std::vector<double> Kernel::*part, bool smooth, const RunContext& context) {
   Grid out = in;
   const auto size = static_cast<std::int64_t>(axis.vertical ? in.rows : in.columns);
-  const auto reach = static_cast<std::int64_t>(weight.size()) - 1;
   const auto wrap = [&](std::int64_t at) {
     if (in.periodic && !axis.vertical) return (at % size + size) % size;
     return at < 0 || at >= size ? std::int64_t{-1} : at;
   };
   parallel_for(context, in.rows, 4, [&](std::size_t begin, std::size_t end) {
-    for (auto y = static_cast<std::uint32_t>(begin); y < end; ++y)
+    for (auto y = static_cast<std::uint32_t>(begin); y < end; ++y) {
+      const std::vector<double>& weight = kernels[kernels.size() > 1 ? y : 0].*part;
+      const auto reach = static_cast<std::int64_t>(weight.size()) - 1;
       for (std::uint32_t x = 0; x < in.columns; ++x) {
         const std::size_t i = in.index(x, y);
         if (!in.valid[i]) continue;
@@ -105,6 +114,7 @@ Grid filter(const Grid& in, const Axis& axis, const std::vector<double>& weight,
         }
         out.value[i] = smooth ? in.value[i] + sum / used : sum;
       }
+    }
   });
   return out;
 }
@@ -117,11 +127,14 @@ struct Response {
 /// G(alpha) G''(y).
 Response response_at(const Grid& grid, const Axis& alpha, const Axis& y, double sigma, double window,
                      const RunContext& context) {
-  const Kernel a = make_kernel(sigma, alpha.step, window, grid.columns),
-               b = make_kernel(sigma, y.step, window, grid.rows);
-  const Grid along = filter(grid, alpha, a.gauss, true, context);
-  Response r{filter(along, y, b.gauss, true, context), filter(along, y, b.derivative, false, context)};
-  const Grid across = filter(filter(grid, y, b.gauss, true, context), alpha, a.derivative, false, context);
+  const std::vector<Kernel> a = make_kernels(sigma, alpha, window, grid.columns),
+                            b = make_kernels(sigma, y, window, grid.rows);
+  const auto smoothed = [&](const Grid& in, const Axis& axis, const std::vector<Kernel>& kernels) {
+    return filter(in, axis, kernels, &Kernel::gauss, true, context);
+  };
+  const Grid along = smoothed(grid, alpha, a);
+  Response r{smoothed(along, y, b), filter(along, y, b, &Kernel::derivative, false, context)};
+  const Grid across = filter(smoothed(grid, y, b), alpha, a, &Kernel::derivative, false, context);
   for (std::size_t i = 0; i < across.value.size(); ++i) r.curvature.value[i] += across.value[i];
   return r;
 }
@@ -201,12 +214,26 @@ class RangeFilter {
         ++count;
       }
     const double radius = count > 0 ? sum / count : 1;
-    alpha_ = {false, range_.alpha_step_rad * radius};
-    y_ = {true, double{range_.y_step}};
+    alpha_ = {false, alpha_steps(radius)};
+    y_ = {true, {double{range_.y_step}}};
     const double height = range_.y_step * static_cast<double>(range_.rows);
-    sigma_min_ = grid_.rows > 1 ? 0.5 * (alpha_.step + y_.step) : alpha_.step;
+    const double alpha_step = range_.alpha_step_rad * radius;
+    sigma_min_ = grid_.rows > 1 ? 0.5 * (alpha_step + double{range_.y_step}) : alpha_step;
     sigma_max_ = std::max(options_.sigma_max * std::sqrt(8 * largest_ * largest_ + height * height),
                           1.01 * sigma_min_);
+  }
+
+  /// By the scan's mean radius, or by each row's where the row has any sample.
+  std::vector<double> alpha_steps(double mean_radius) const {
+    if (options_.range_spacing == RangeSpacing::kMean) return {range_.alpha_step_rad * mean_radius};
+    std::vector<double> steps;
+    for (std::uint32_t y = 0; y < grid_.rows; ++y) {
+      double sum = 0, count = 0;
+      for (std::uint32_t x = 0; x < grid_.columns; ++x)
+        if (grid_.valid[grid_.index(x, y)]) sum += grid_.value[grid_.index(x, y)], ++count;
+      steps.push_back(range_.alpha_step_rad * (count > 0 ? sum / count : mean_radius));
+    }
+    return steps;
   }
 
   void filter_scales() {

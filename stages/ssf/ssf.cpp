@@ -107,7 +107,9 @@ Layout make_layout(const ConditionedMesh& mesh) {
   return layout;
 }
 
-SurfaceComponent cut_out(const ConditionedMesh& mesh, const Layout& layout, std::size_t c) {
+/// `radius`: R(v) of the mesh's positions, empty where curvature is the signal.
+SurfaceComponent cut_out(const ConditionedMesh& mesh, const Layout& layout, std::size_t c,
+                         const std::vector<float>& radius) {
   const Mesh& m = mesh.mesh;
   SurfaceComponent out;
   out.mean_edge = layout.mean_edge[c];
@@ -120,6 +122,8 @@ SurfaceComponent cut_out(const ConditionedMesh& mesh, const Layout& layout, std:
   out.points.reserve(layout.size(c));
   for (std::size_t v = 0; v < layout.size(c); ++v)
     out.points.push_back((to_double(m.positions[position[v]]) - centre) * (1 / out.mean_edge));
+  for (std::size_t v = 0; v < layout.size(c) && !radius.empty(); ++v)
+    out.radius.push_back(static_cast<double>(radius[position[v]]) / out.mean_edge);
   out.noise = largest * 0x1p-24 / out.mean_edge;
   const std::size_t triangles = layout.first_triangle[c + 1] - layout.first_triangle[c];
   out.corners.reserve(3 * triangles);
@@ -144,8 +148,9 @@ struct Totals {
 
 class MeshFilter {
  public:
-  MeshFilter(const ConditionedMesh& mesh, const SsfOptions& options, const RunContext& context)
-      : mesh_(mesh), options_(options), context_(context), layout_(make_layout(mesh)) {
+  MeshFilter(const ConditionedMesh& mesh, const std::vector<float>& radius, const SsfOptions& options,
+             const RunContext& context)
+      : mesh_(mesh), radius_(radius), options_(options), context_(context), layout_(make_layout(mesh)) {
     const auto entries = static_cast<std::size_t>(options.scales) + 1;
     map_.scales = options.scales;
     map_.sigma.assign(entries, 0);
@@ -185,7 +190,7 @@ class MeshFilter {
   }
 
   void filter_largest(std::size_t c) {
-    const ComponentScales s = filter_component(cut_out(mesh_, layout_, c), {}, options_, context_);
+    const ComponentScales s = filter_component(cut_out(mesh_, layout_, c, radius_), {}, options_, context_);
     whole_sigma_ = s.sigma;
     std::copy(s.sigma.begin(), s.sigma.end(), map_.sigma.begin() + 1);
     map_.convergence = s.convergence;
@@ -203,7 +208,7 @@ class MeshFilter {
         continue;
       }
       const ComponentScales s =
-          filter_component(cut_out(mesh_, layout_, c), whole_sigma_, options_, context_);
+          filter_component(cut_out(mesh_, layout_, c, radius_), whole_sigma_, options_, context_);
       totals_.add(s);
       place(c, s);
       count(s);
@@ -221,8 +226,8 @@ class MeshFilter {
       std::vector<ComponentScales> done(std::min(kBatch, small.size() - batch));
       parallel_for(context_, done.size(), 1, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
-          done[i] =
-              filter_component(cut_out(mesh_, layout_, small[batch + i]), whole_sigma_, options_, alone);
+          done[i] = filter_component(cut_out(mesh_, layout_, small[batch + i], radius_), whole_sigma_,
+                                     options_, alone);
           place(small[batch + i], done[i]);
           done[i].persistence = done[i].crossing = {};
         }
@@ -259,6 +264,7 @@ class MeshFilter {
   }
 
   const ConditionedMesh& mesh_;
+  const std::vector<float>& radius_;
   const SsfOptions& options_;
   const RunContext& context_;
   Layout layout_;
@@ -274,7 +280,7 @@ SurfaceComponent largest_surface(const ConditionedMesh& mesh) {
   std::size_t best = 0;
   for (std::size_t c = 1; c < layout.component_count(); ++c)
     if (layout.size(c) > layout.size(best)) best = c;
-  return cut_out(mesh, layout, best);
+  return cut_out(mesh, layout, best, {});
 }
 
 double feature_spacing(double sigma, const SsfOptions& options) {
@@ -283,7 +289,16 @@ double feature_spacing(double sigma, const SsfOptions& options) {
 
 ScaleMap filter_scale_space(const ConditionedMesh& mesh, const SsfOptions& options,
                             const RunContext& context) {
-  return MeshFilter(mesh, options, context).run();
+  const std::vector<float> by_curvature;
+  return MeshFilter(mesh, by_curvature, options, context).run();
+}
+
+ScaleMap filter_skeleton_distance(const ConditionedMesh& mesh, const Skeleton& skeleton,
+                                  const SsfOptions& options, const RunContext& context) {
+  if (skeleton.distance.size() != mesh.mesh.positions.size())
+    throw StageError("ssf", "skeleton", std::to_string(mesh.mesh.positions.size()) + " positions",
+                     std::to_string(skeleton.distance.size()));
+  return MeshFilter(mesh, skeleton.distance, options, context).run();
 }
 
 }  // namespace texmesh

@@ -1,18 +1,35 @@
 #pragma once
 #include <cstdint>
+#include <string_view>
 #include <vector>
 
 #include "format/model/model.h"
 #include "stages/data/conditioned_mesh.h"
 #include "stages/data/scale_map.h"
+#include "stages/data/skeleton.h"
 #include "stages/data/stage.h"
 
 namespace texmesh {
 
-inline constexpr int kSsfVersion = 3;
+inline constexpr int kSsfVersion = 4;
+
+/// What meshes are filtered by: the curvature of positions, or R(v) as the thesis has it (7.2).
+enum class ScaleSignal : std::uint8_t { kCurvature, kRadius };
+template <>
+struct EnumNames<ScaleSignal> {
+  static constexpr std::array<std::string_view, 2> names{"curvature", "radius"};
+};
+/// Where phi and psi of (2.4) are taken in a range scan: of the scan's mean radius, or of each row's.
+enum class RangeSpacing : std::uint8_t { kMean, kRow };
+template <>
+struct EnumNames<RangeSpacing> {
+  static constexpr std::array<std::string_view, 2> names{"mean", "row"};
+};
 
 struct SsfOptions {
   int scales = 20;
+  ScaleSignal signal = ScaleSignal::kCurvature;
+  RangeSpacing range_spacing = RangeSpacing::kMean;
   double sigma_max = 0.15;
   double convergence = 0.3;  // eps_conv
   double band = 2.75;        // C_i = t_i (H(sigma_i) - H(band * sigma_i))
@@ -26,6 +43,11 @@ struct SsfOptions {
   template <class S, class V>
   static void fields(S& s, V&& v) {
     v("scales", s.scales, Range{1, 40}, "smoothed copies beside the original");
+    v("signal", s.signal,
+      "meshes: curvature = band-passed mean curvature; radius = R(v), the distance to the skeleton, whose "
+      "Laplacian of Gaussian has its zero crossings marked, as the thesis has it");
+    v("range_spacing", s.range_spacing,
+      "range scans: phi and psi by the mean radius of the scan, or of each row");
     v("sigma_max", s.sigma_max, Range{0.01, 0.5}, "largest sigma, as a fraction of a component's diagonal");
     v("convergence", s.convergence, Range{0, 1},
       "sigma stops growing where the signal's range falls below this fraction");
@@ -57,6 +79,13 @@ struct SsfOptions {
 ScaleMap filter_scale_space(const ConditionedMesh& mesh, const SsfOptions& options,
                             const RunContext& context);
 
+/// The same of R(v) (thesis 7.2): the Laplacian of Gaussian of the distance to the skeleton. Feature points
+/// are its zero crossings alone, without a contrast rule beyond rounding: persistence equals crossing, and
+/// nothing is subtracted. phi and psi (2.4) are those of every place: the Laplacian is that of the mesh's own
+/// metric. A component converges where the range of R has. StageError when the skeleton is of another mesh.
+ScaleMap filter_skeleton_distance(const ConditionedMesh& mesh, const Skeleton& skeleton,
+                                  const SsfOptions& options, const RunContext& context);
+
 /// The distance that feature points of a scale keep from one another on the coarser levels: 0.8 sigma /
 /// error_ratio, in the unit of sigma.
 double feature_spacing(double sigma, const SsfOptions& options);
@@ -69,7 +98,8 @@ RangeGrid grid_on_conditioned(const RangeGrid& grid, std::size_t source_position
 
 /// Faithful filtering of a cylindrical range scan (thesis 2.2-2.4): separable Gaussian and LoG on r(alpha,
 /// y), periodic in alpha when the grid is a full turn, windows cut off at `window` sigma.
-/// - Sigma is a length on the surface, so that unequal spacing along alpha and y counts (phi, psi). It runs
+/// - Sigma is a length on the surface, so that unequal spacing along alpha and y counts (phi, psi), see
+///   SsfOptions::range_spacing. It runs
 ///   from the mean spacing to sigma_max of the object's diagonal, or to the first sigma at which max - min of
 ///   the smoothed radius falls below `convergence` of S_0's.
 /// - Feature points are zero crossings alone and have no contrast rule: persistence equals crossing.

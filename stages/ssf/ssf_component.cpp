@@ -45,12 +45,19 @@ class FeatureFinder {
   /// shrinks) and would leave convex shapes without zero crossings above mid scale. `least` stands in for its
   /// rms where that is lower.
   FeatureFinder(const HeatLevel& level, std::vector<float> g, double sigma, double least, double contrast)
-      : level_(level), g_(std::move(g)), sigma_(sigma) {
+      : FeatureFinder(level, std::move(g), sigma) {
     double sum = 0;
     for (float x : g_) sum += double{x};
     const auto mean = static_cast<float>(sum / static_cast<double>(g_.size()));
     threshold_ = contrast * std::max(rms(g_), least);
     for (float& x : g_) x -= mean;
+  }
+
+  /// As it is; `noise`: what differences in it are rounding.
+  static FeatureFinder as_printed(const HeatLevel& level, std::vector<float> g, double sigma, double noise) {
+    FeatureFinder finder(level, std::move(g), sigma);
+    finder.threshold_ = noise;
+    return finder;
   }
 
   /// 1-ring extrema, and zero crossings at the endpoint that is closer to zero, both with the contrast rule;
@@ -65,6 +72,9 @@ class FeatureFinder {
   }
 
  private:
+  FeatureFinder(const HeatLevel& level, std::vector<float> g, double sigma)
+      : level_(level), g_(std::move(g)), sigma_(sigma) {}
+
   std::uint8_t feature_kind(std::uint32_t v) const {
     const HeatOperator& graph = level_.laplacian;
     bool highest = true, lowest = true, crossing = false;
@@ -112,6 +122,14 @@ class FeatureFinder {
   double sigma_, threshold_ = 0;
 };
 
+/// What heat smooths: the positions, or R(v) in the first coordinate.
+std::vector<Vec3d> signal_of(const SurfaceComponent& component) {
+  if (component.radius.empty()) return component.points;
+  std::vector<Vec3d> signal;
+  for (const double r : component.radius) signal.push_back({r, 0, 0});
+  return signal;
+}
+
 /// The signal on one level and what the next one takes over.
 struct LevelState {
   HeatLevel level;
@@ -130,7 +148,8 @@ class ComponentFilter {
         options_(options),
         context_(context),
         scales_(static_cast<std::size_t>(options.scales)),
-        range_(bounding_box(component_.points).longest_side()) {}
+        signal_(signal_of(component_)),
+        range_(bounding_box(signal_).longest_side()) {}
 
   ComponentScales run() {
     double sigma_max = options_.sigma_max * component_.diagonal / component_.mean_edge;
@@ -181,7 +200,7 @@ class ComponentFilter {
     LevelState state;
     state.level = finest_level(component_.points, component_.corners, 1, options_.rate_cap);
     out_.capped = state.level.laplacian.capped;
-    state.points = component_.points;
+    state.points = signal_;
     state.vertex = state.level.vertex;
     if (out_.capped <= kManyCapped) return state;
     out_.clustered = true;
@@ -274,6 +293,7 @@ class ComponentFilter {
   /// the two sides of a sheet would cancel out. On coarser levels triangles turn to the side of the vertex's
   /// normal before, which also stands where no triangle is left.
   std::vector<Vec3f> normals_of(const LevelState& state, std::span<const Vec3d> smoothed) const {
+    if (by_radius()) return std::vector<Vec3f>(state.points.size(), Vec3f{1, 0, 0});  // where R stands
     const std::vector<std::uint32_t>& corners = state.level.corners;
     const std::span<const Vec3d> points = smoothed.empty() ? std::span<const Vec3d>(state.points) : smoothed;
     const std::vector<Vec3f>& before = state.normals;
@@ -308,17 +328,27 @@ class ComponentFilter {
     return curvature;
   }
 
-  void mark(const LevelState& state, std::size_t scale, const std::vector<float>& fine,
-            const std::vector<float>& coarse) {
+  bool by_radius() const { return !component_.radius.empty(); }
+
+  FeatureFinder finder_of(const LevelState& state, std::size_t scale, const std::vector<float>& fine,
+                          const std::vector<float>& coarse) const {
+    const double noise = kNoiseFactor * component_.noise, sigma = ladder_.sigma[scale];
+    if (by_radius()) return FeatureFinder::as_printed(state.level, fine, sigma, noise);
     const auto ratio = static_cast<float>(ladder_.time[scale] / ladder_.time[scale + ladder_.band]);
     std::vector<float> g(fine.size());
     for (std::size_t v = 0; v < g.size(); ++v) g[v] = fine[v] - ratio * coarse[v];
-    const double least = std::max(kNoiseFactor * component_.noise, kBaseShare * rms(fine));
+    const double least = std::max(noise, kBaseShare * rms(fine));
+    return FeatureFinder(state.level, std::move(g), sigma, least, options_.contrast);
+  }
+
+  void mark(const LevelState& state, std::size_t scale, const std::vector<float>& fine,
+            const std::vector<float>& coarse) {
     const std::vector<std::uint8_t> found =
-        FeatureFinder(state.level, std::move(g), ladder_.sigma[scale], least, options_.contrast)
+        finder_of(state, scale, fine, coarse)
             .find(seed_radius(ladder_.sigma[scale], options_.error_ratio), context_);
+    const int counted = by_radius() ? kCrossing : kExtremum | kCrossing;
     for (std::size_t v = 0; v < found.size(); ++v) {
-      if (!found[v]) continue;
+      if (!(found[v] & counted)) continue;
       out_.persistence[state.vertex[v]] = static_cast<std::uint8_t>(scale + 1);
       if (!(found[v] & kCrossing)) continue;
       out_.crossing[state.vertex[v]] = static_cast<std::uint8_t>(scale + 1);
@@ -331,6 +361,7 @@ class ComponentFilter {
   const SsfOptions& options_;
   const RunContext& context_;
   std::size_t scales_, last_ = 0;  // scales from last_ on cannot count
+  std::vector<Vec3d> signal_;
   double range_;
   SigmaLadder ladder_;
   ComponentScales out_;

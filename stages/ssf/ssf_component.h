@@ -18,6 +18,7 @@ struct SurfaceComponent {
   std::vector<bool> fan_of_position;
   double mean_edge = 0, diagonal = 0;  // object units
   double noise = 0;                    // rounding of the stored coordinates, in units of the mean edge
+  std::vector<double> radius;          // R(v) in units of the mean edge; empty: filtered by curvature
 };
 
 /// The component of most positions, cut out of a mesh along a Morton curve.

@@ -6,6 +6,8 @@
 
 #include "stages/base/parallel.h"
 #include "stages/data/coverage.h"
+#include "stages/fragment_codec/decode_rung.h"
+#include "stages/jpeg/jpeg.h"
 #include "stages/jpeg/jpeg_coder.h"
 #include "stages/ladder/ladder.h"
 
@@ -89,6 +91,29 @@ FileSizes file_sizes(const Pixels& pixels, const PixelWindow& window, int qualit
           optimised.complete(window).size()};
 }
 
+/// What decoding once takes.
+template <class Decode>
+double decode_s(const std::function<double()>& clock_s, const Decode& decode) {
+  const double start_s = clock_s();
+  decode();
+  return clock_s() - start_s;
+}
+
+double file_decode_s(const Pixels& pixels, int quality, const FragmentStudyOptions& options) {
+  JpegCoder coder({pixels.channels, quality, options.subsampling});
+  const std::vector<std::uint8_t> file =
+      coder.complete(window_of(pixels, {0, 0, pixels.width_px, pixels.height_px}));
+  return decode_s(options.clock_s, [&] { decode_jpeg(file, pixels.data.size()); });
+}
+
+double fragments_decode_s(const PlaneLadder& ladder, std::size_t rung, const TexturePlane& plane,
+                          const FragmentStudyOptions& options) {
+  const std::uint64_t texels = std::uint64_t{plane.fragment_width_px} * plane.fragment_height_px;
+  return decode_s(options.clock_s, [&] {
+    for (std::size_t f = 0; f < plane.fragment_count(); ++f) decode_fragment(ladder, rung, f, texels);
+  });
+}
+
 /// Rows of one grid. `whole`: sizes of the image in one file, by quality.
 std::vector<FragmentStudyRow> study_grid(const Pixels& image, int grid, const std::vector<FileSizes>& whole,
                                          const FragmentStudyOptions& options, const RunContext& context) {
@@ -121,6 +146,8 @@ std::vector<FragmentStudyRow> study_grid(const Pixels& image, int grid, const st
                          whole[q].optimised,
                          0,
                          0,
+                         0,
+                         0,
                          0};
     for (std::size_t f = 0; f < count; ++f) {
       row.sum_standard += files[q * count + f].standard;
@@ -128,6 +155,10 @@ std::vector<FragmentStudyRow> study_grid(const Pixels& image, int grid, const st
     }
     const LadderRung& rung = ladder.planes[0].rungs[q];
     row.sum_shared = rung.data.size() + rung.table_stream.size();
+    if (options.clock_s) {
+      row.file_decode_s = file_decode_s(image, options.qualities[q], options);
+      row.fragments_decode_s = fragments_decode_s(ladder.planes[0], q, plane, options);
+    }
     rows.push_back(row);
   }
   return rows;

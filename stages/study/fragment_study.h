@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "stages/base/run_context.h"
@@ -13,6 +14,8 @@ struct FragmentStudyOptions {
   std::vector<int> grids{2, 4, 8, 16};                      // fragments in a row and in a column, 1..64
   std::vector<int> qualities{10, 20, 40, 60, 80, 90, 100};  // IJG, strictly rising, at most 16
   Subsampling subsampling = Subsampling::k420;
+  /// Seconds of CPU that this thread has taken; empty: decoding is not timed.
+  std::function<double()> clock_s{};
 };
 
 /// One grid at one quality; bytes. "Standard" files have the Huffman tables of ISO 10918-1 annex K.3 and a
@@ -24,13 +27,17 @@ struct FragmentStudyRow {
   std::uint32_t fragment_width_px = 0, fragment_height_px = 0;
   std::uint64_t file_standard = 0, file_optimised = 0;                // the whole image in one file
   std::uint64_t sum_standard = 0, sum_optimised = 0, sum_shared = 0;  // of the columns * rows fragments
+  // Seconds of one thread, where a clock is given: of the image as one file with tables of its own, and of
+  // all fragments as packages hold them, each made a whole file again. The only figures that differ from run
+  // to run.
+  double file_decode_s = 0, fragments_decode_s = 0;
 };
 
 /// By grid, then quality, as the options list them; a grid that is listed twice counts once. Fragments have
 /// sides that are multiples of 16 and at least image side / grid, the image's edges repeated to fill them
 /// ("the entire texture is adjusted so that there is no partial fragment"), and there are as many as the
 /// image reaches into. `pixels` have 1 or 3 channels. Throws StageError for options or pixels outside these
-/// ranges. Same result for any thread count.
+/// ranges. Same result for any thread count, times apart.
 std::vector<FragmentStudyRow> study_fragments(const Pixels& pixels, const FragmentStudyOptions& options,
                                               const RunContext& context);
 

@@ -23,6 +23,8 @@ const kPackages = {
   metal: {sheet: {alphaMode: 'OPAQUE', metal: true}, options: ['--rungs', '20,60,90']},
   // Two proxies: scales of its own with a small texture, as meshopt codes meshes.
   proxied: {scan: ['--triangles', '30000', '--texture', '1024', '--charts', '30'], options: ['--rungs', '20,50,85'], proxies: [[300, 64], [2000, 128]]},
+  // The thesis as printed.
+  printed: {scan: ['--triangles', '4000', '--texture', '1024', '--charts', '12'], options: ['--profile', 'thesis', '--rungs', '10,30,60,90']},
   // No texture at all: colours of vertices.
   colours: {scan: ['--triangles', '1500', '--texture', '0', '--charts', '4'], ending: 'ply', options: []},
 };

@@ -14,6 +14,7 @@ import './limits-tests.mjs';
 import './materials-tests.mjs';
 import './page-tests.mjs';
 import './proxy-tests.mjs';
+import './thesis-tests.mjs';
 import './render-tests.mjs';
 import './size-tests.mjs';
 import './viewer-tests.mjs';

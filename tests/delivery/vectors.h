@@ -21,11 +21,10 @@ inline const std::string kRoot = TEXMESH_SOURCE_DIR;
 
 // ---- names of options, as in the files
 
-inline const std::map<Policy, const char*> kPolicies{{Policy::kHtc, "htc"},
-                                                     {Policy::kGuard, "guard"},
-                                                     {Policy::kPrice, "price"},
-                                                     {Policy::kProportional, "proportional"},
-                                                     {Policy::kStatic, "static"}};
+inline const std::map<Policy, const char*> kPolicies{
+    {Policy::kHtc, "htc"},       {Policy::kGuard, "guard"},
+    {Policy::kPrice, "price"},   {Policy::kProportional, "proportional"},
+    {Policy::kStatic, "static"}, {Policy::kThesis, "thesis"}};
 inline const std::map<HtcOrder, const char*> kOrders{
     {HtcOrder::kCredit, "credit"}, {HtcOrder::kBeta0, "beta0"}, {HtcOrder::kFinest, "finest"}};
 inline const std::map<Estimator, const char*> kEstimators{

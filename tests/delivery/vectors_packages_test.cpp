@@ -86,6 +86,17 @@ Json sizes_along_knots(PlaneTables t) {
   return {{"quality", t.knot_quality}, {"position", t.knot_position}, {"fragment_quality_bytes", sizes}};
 }
 
+/// Qualities where the tables go by VQP.
+Json by_predictors(PlaneTables t) {
+  t.allocation = kByVqp;
+  for (std::size_t f = 0; f < t.fragment_count(); ++f)
+    t.vqp.push_back(t.covered_texels[f] > 0 ? static_cast<float>(f * 7 % 11) / 16 : 0);
+  return {{"vqp", t.vqp},
+          {"gamma", mean_eta(t, 0)},
+          {"quality", quality_of(t, 0, mean_eta(t, 0))},
+          {"rungs", rungs_of(t, 0, mean_eta(t, 0))}};
+}
+
 Json plane_tables(const PlaneTables& t, std::uint32_t plane) {
   Json scales = Json::array();
   for (const std::size_t row : {std::size_t{0}, t.scale_count() / 2, t.scale_count() - 1}) {
@@ -112,6 +123,7 @@ Json plane_tables(const PlaneTables& t, std::uint32_t plane) {
           {"scales", scales},
           {"fragment_quality_bytes", sizes},
           {"knots", sizes_along_knots(t)},
+          {"by_predictors", by_predictors(t)},
           {"budget_rungs", rd}};
 }
 
@@ -193,6 +205,7 @@ Json plans(PackageReader& package) {
           r.displayed_px = px;
           r.time_limit_s = limit_s;
           r.htc.policy = policy;
+          if (policy == Policy::kThesis) r = as_printed(r);
           r.network.link = BandwidthTrace::constant(bytes_s);
           r.network.rtt_s = bytes_s > 1e5 ? 0.01 : 0.05;
           const DeliveryPlan p = plan_delivery(package, r);

@@ -124,6 +124,23 @@ ListOptions list_options(const DeliveryRequest& request, int scale) {
   return options;
 }
 
+/// What the policy spends its bytes on.
+struct ChosenTextures {
+  std::vector<PlaneChoice> planes;
+  FragmentList list;
+  double gamma = -1;
+};
+
+ChosenTextures choose_textures(TextureLoss& loss, const DeliveryRequest& request, const ListOptions& options,
+                               double bytes) {
+  if (request.htc.policy == Policy::kThesis) {
+    ThesisTextures printed = thesis_textures(loss, options, bytes);
+    return {std::move(printed.planes), std::move(printed.list), printed.options.gamma};
+  }
+  TextureBudget budget = texture_for_budget(loss, options, static_cast<std::uint64_t>(bytes));
+  return {std::move(budget.planes), std::move(budget.list), options.gamma};
+}
+
 DeliveryPlan plan_at_scale(TextureLoss& loss, const DeliveryRequest& request, int scale) {
   PackageReader& package = loss.package();
   const Manifest& m = package.manifest();
@@ -140,11 +157,12 @@ DeliveryPlan plan_at_scale(TextureLoss& loss, const DeliveryRequest& request, in
   htc.rtt_s = request.network.rtt_s;
   htc.throughput.initial_bytes_s =
       request.beta0_bytes_s > 0 ? request.beta0_bytes_s : shown_throughput(plan, manifest_s, htc.rtt_s);
-  const TextureBudget budget = texture_for_budget(
-      loss, list_options(request, scale),
-      static_cast<std::uint64_t>(std::max(0.0, htc.time_limit_s) * htc.throughput.initial_bytes_s));
-  plan.planes = budget.planes;
-  const FragmentList& list = budget.list;
+  const ChosenTextures chosen =
+      choose_textures(loss, request, list_options(request, scale),
+                      std::max(0.0, htc.time_limit_s) * htc.throughput.initial_bytes_s);
+  plan.planes = chosen.planes;
+  plan.gamma = chosen.gamma;
+  const FragmentList& list = chosen.list;
   if (htc.time_limit_s <= 0) {
     plan.warnings.push_back("no time is left for textures: previews are shown");
     plan.textures.rungs.assign(list.offers.size(), -1);
@@ -185,21 +203,43 @@ int wanted_scale(PackageReader& package, const DeliveryRequest& request) {
   return scale_at(step_function(package.manifest().scales, request.rule), request.displayed_px);
 }
 
+DeliveryRequest as_printed(DeliveryRequest request) {
+  request.rule = StepRule::kJnd;
+  request.htc.policy = Policy::kThesis;
+  request.htc.order = HtcOrder::kBeta0;
+  request.htc.throughput.estimator = Estimator::kLast;
+  request.htc.window = 1;
+  request.htc.hard_limits = true;
+  return request;
+}
+
+ThesisTextures thesis_textures(TextureLoss& loss, const ListOptions& options, double bytes) {
+  ThesisTextures out{full_size(loss.package()), options, {}};
+  out.options.thesis = true;
+  out.options.gamma = gamma_for_bytes(loss.package(), out.planes, options.scale, bytes);
+  out.list = fragment_list(loss, out.planes, out.options);
+  return out;
+}
+
 FragmentList list_of(PackageReader& package, const DeliveryRequest& request, const DeliveryPlan& plan) {
   ListOptions options = list_options(request, plan.scale);
   options.group_weights = plan.group_weights;
+  options.gamma = plan.gamma;
+  options.thesis = plan.gamma >= 0;
   return fragment_list(package, plan.planes, options);
 }
 
 DeliveryPlan plan_delivery(PackageReader& package, const DeliveryRequest& request) {
   const Manifest& m = package.manifest();
-  if (std::optional<DeliveryPlan> serving = serving_plan(m, request)) return *serving;
+  const bool printed = request.htc.policy == Policy::kThesis, only = request.scale >= 0 || printed;
+  if (!printed)
+    if (std::optional<DeliveryPlan> serving = serving_plan(m, request)) return *serving;
   const int wanted = wanted_scale(package, request);
   TextureLoss loss(package, request.displayed_px);
   DeliveryPlan best;
   bool first = true;
   for (const ManifestScale& s : m.scales) {
-    if (s.scale < wanted || (request.scale >= 0 && s.scale != wanted)) continue;
+    if (s.scale < wanted || (only && s.scale != wanted)) continue;
     // A mesh that comes too late is no picture in the time.
     const bool needed = first || best.mesh_s >= request.time_limit_s;
     const double most = best.flip - kWorthwhileFlip;
@@ -209,7 +249,7 @@ DeliveryPlan plan_delivery(PackageReader& package, const DeliveryRequest& reques
     first = false;
   }
   if (first) package.scale_index(wanted);  // says which there are
-  for (std::size_t k = 0; k < m.proxies.size() && request.scale < 0; ++k) {
+  for (std::size_t k = 0; k < m.proxies.size() && !only; ++k) {
     DeliveryPlan plan = timed_plan_of_proxy(m, request, k);
     const bool needed = best.mesh_s >= request.time_limit_s && plan.mesh_s < best.mesh_s;
     const bool in_time = plan.mesh_s < request.time_limit_s;

@@ -21,6 +21,10 @@ struct DeliveryRequest {
   NetworkOptions network;
 };
 
+/// The request with chapters 4 and 7 as printed: Policy::kThesis, the JND's rule, the next fragment by
+/// beta_0, the last transfer's throughput, one request at a time, hard limits.
+DeliveryRequest as_printed(DeliveryRequest request);
+
 /// What a viewer will get. The time of a part that never comes, because every server dies before, is
 /// +infinity.
 struct DeliveryPlan {
@@ -42,6 +46,7 @@ struct DeliveryPlan {
   double flip = 0;
   double texture_flip = 0;          // what it would be of S_0 with these textures
   PerGroup group_weights{1, 1, 1};  // ListOptions::group_weights of the list that `textures` is about
+  double gamma = -1;                // ListOptions::gamma of that list
   std::vector<std::string> warnings;
   std::uint64_t bytes() const {
     return bootstrap_bytes + first_picture_bytes + mesh_bytes + table_bytes + texture_bytes;
@@ -52,8 +57,19 @@ struct DeliveryPlan {
 /// its place where the rule's mesh comes too late, or where simulations of both scales show that the coarser
 /// one gives the better picture in the time. A proxy that cannot be told from S_0 at the displayed height, or
 /// that looks better than what scales give in the time, takes the place of all; not where the request says a
-/// scale, and not the former where it asks for another rule than kFlip. Deterministic.
+/// scale, and not the former where it asks for another rule than kFlip.
+/// With Policy::kThesis it is as printed: the rule's scale and no other, all textures at full size, the list
+/// whose D_i(Gamma) is T_0 beta_0. Deterministic.
 DeliveryPlan plan_delivery(PackageReader& package, const DeliveryRequest& request);
+/// Chapter 4's textures for so many bytes: all at full size, and the list whose D_i(Gamma) comes to that.
+/// `options.scale` and `options.displayed_px` count.
+struct ThesisTextures {
+  std::vector<PlaneChoice> planes;
+  ListOptions options;  // of `list`
+  FragmentList list;
+};
+ThesisTextures thesis_textures(TextureLoss& loss, const ListOptions& options, double bytes);
+
 /// The scale and the textures that look best in so many bytes, whatever the time and the rule: a scale that
 /// passes for S_0 still differs from it, and bytes that are left may go into a finer one. Mesh first, then
 /// texture, or a proxy and nothing else. Where nothing fits: the least that the package has, with a warning.

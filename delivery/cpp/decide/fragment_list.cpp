@@ -1,12 +1,15 @@
 #include "delivery/cpp/decide/fragment_list.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "format/rules/allocation.h"
 #include "format/rules/size_curve.h"
 
 namespace texmesh {
 namespace {
+
+constexpr int kGammaBisections = 20;
 
 /// Rungs of a plane whose quality is within the limits, as near as there are any.
 std::uint16_t limit_rung(const PlaneTables& t, double quality, bool low) {
@@ -23,6 +26,7 @@ struct PlaneEntry {
   std::uint32_t plane = 0;
   PlaneGroup group = PlaneGroup::kColour;
   double group_surface = 0, group_weight = 1;
+  bool thesis = false;
 };
 
 void add_fragment(const PlaneTables& t, const TextureLoss::Plane& losses, const PlaneEntry& entry,
@@ -35,14 +39,39 @@ void add_fragment(const PlaneTables& t, const TextureLoss::Plane& losses, const 
     o.loss.push_back(entry.group_weight * share * shown);
     shows_more = shows_more || shown < losses.shown[f];
   }
-  if (!shows_more) {
+  if (!shows_more && !entry.thesis) {
     list.preview_loss[static_cast<std::size_t>(entry.group)] += share * losses.shown[f];
     return;
   }
-  o.eta *= o.loss[0] - *std::ranges::min_element(o.loss);
+  if (!entry.thesis) o.eta *= o.loss[0] - *std::ranges::min_element(o.loss);
   list.fragments.push_back({entry.plane, f});
   list.groups.push_back(entry.group);
   list.offers.push_back(std::move(o));
+}
+
+struct QualityLimits {
+  double low = 0, high = 100;
+};
+
+/// dQ is the tolerance on both sides of Q_i (3.3.3).
+QualityLimits quality_limits(const PlaneTables& t, std::size_t row, const ListOptions& options) {
+  QualityLimits limits{options.quality_low, options.quality_high};
+  if (!options.thesis) return limits;
+  const auto middle = static_cast<double>(t.quality[row]), width = static_cast<double>(t.quality_width);
+  limits.low = std::max(limits.low, middle - width);
+  limits.high = std::min(limits.high, middle + width);
+  return limits;
+}
+
+/// F-bar, the fragment nearest to Gamma, is sent at Q_i itself.
+void give_middle_quality(PackageReader& package, int scale, FragmentList& list) {
+  const auto nearest =
+      std::ranges::min_element(list.offers, {}, [](const FragmentOffer& f) { return std::abs(f.eta); });
+  if (nearest == list.offers.end()) return;
+  const auto [plane, fragment] = list.fragments[static_cast<std::size_t>(nearest - list.offers.begin())];
+  const PlaneTables& t = package.tables().planes[plane];
+  const auto middle = static_cast<double>(t.quality[package.scale_index(scale)]);
+  nearest->planned_bytes = std::max(1.0, interpolated_bytes(t, fragment, middle));
 }
 
 void add_plane(TextureLoss& loss, const PlaneEntry& entry, const ListOptions& options, FragmentList& list) {
@@ -50,9 +79,10 @@ void add_plane(TextureLoss& loss, const PlaneEntry& entry, const ListOptions& op
   const PlaneTables& t = loss.package().tables().planes[entry.plane];
   const std::size_t row = loss.package().scale_index(options.scale);
   const std::vector<float> eta = eta_of(t, row);
-  const std::vector<float> quality = quality_of(t, row, options.gamma < 0 ? mean_eta(t, row) : options.gamma);
-  const std::uint16_t low = limit_rung(t, options.quality_low, true),
-                      high = limit_rung(t, options.quality_high, false);
+  const double gamma = options.gamma < 0 ? mean_eta(t, row) : options.gamma;
+  const std::vector<float> quality = quality_of(t, row, gamma);
+  const QualityLimits limits = quality_limits(t, row, options);
+  const std::uint16_t low = limit_rung(t, limits.low, true), high = limit_rung(t, limits.high, false);
   for (const std::uint16_t f : t.order) {
     FragmentOffer o;
     bool stored = true;
@@ -62,7 +92,7 @@ void add_plane(TextureLoss& loss, const PlaneEntry& entry, const ListOptions& op
       o.bytes.push_back(static_cast<std::uint32_t>(bytes));
     }
     if (!stored) continue;
-    o.eta = eta[f];
+    o.eta = options.thesis ? static_cast<double>(eta[f]) - gamma : static_cast<double>(eta[f]);
     o.planned_bytes = std::max(1.0, interpolated_bytes(t, f, quality[f]));
     o.low_rung = std::min(low, high);
     o.high_rung = high;
@@ -87,10 +117,35 @@ FragmentList fragment_list(TextureLoss& loss, const std::vector<PlaneChoice>& pl
     const PlaneGroup group = loss.group_of(p.plane);
     const auto g = static_cast<std::size_t>(group);
     // A group without any surface loses nothing, whatever its rungs.
-    add_plane(loss, {p.plane, group, surface[g] > 0 ? surface[g] : 1, options.group_weights[g]}, options,
-              list);
+    add_plane(loss,
+              {p.plane, group, surface[g] > 0 ? surface[g] : 1, options.group_weights[g], options.thesis},
+              options, list);
   }
+  if (options.thesis) give_middle_quality(loss.package(), options.scale, list);
   return list;
+}
+
+double gamma_for_bytes(PackageReader& package, const std::vector<PlaneChoice>& planes, int scale,
+                       double bytes) {
+  const std::size_t row = package.scale_index(scale);
+  const auto bytes_at = [&](double gamma) {
+    double sum = 0;
+    for (const PlaneChoice& p : planes) {
+      const PlaneTables& t = package.tables().planes[p.plane];
+      const std::vector<float> quality = quality_of(t, row, gamma);
+      for (const std::uint16_t f : t.order)
+        sum += std::max(1.0, interpolated_bytes(t, f, static_cast<double>(quality[f])));
+    }
+    return sum;
+  };
+  double low = 0, high = 1;
+  if (bytes_at(low) <= bytes) return low;
+  if (bytes_at(high) >= bytes) return high;
+  for (int i = 0; i < kGammaBisections; ++i) {
+    const double middle = (low + high) / 2;
+    (bytes_at(middle) > bytes ? low : high) = middle;
+  }
+  return high;
 }
 
 PerGroup losses_of(const FragmentList& list, std::span<const std::int32_t> rungs) {

@@ -35,12 +35,22 @@ struct ListOptions {
   double quality_low = 5, quality_high = 97;  // limits, see HtcOptions::hard_limits
   /// > 0: what a group's losses weigh beside the others', see TextureBudget.
   PerGroup group_weights{1, 1, 1};
+  // true: chapter 4's list as printed, for Policy::kThesis. Every stored fragment is in the list, whatever it
+  // saves; eta is that of (3.1), or VQP where the tables go by it, less Gamma; F-bar, whose eta is nearest
+  // Gamma, gets Q_i; the limits are Q_i - dQ and Q_i + dQ within quality_low and quality_high.
+  bool thesis = false;
 };
 FragmentList fragment_list(PackageReader& package, const std::vector<PlaneChoice>& planes,
                            const ListOptions& options);
 /// `loss` is for options.displayed_px.
 FragmentList fragment_list(TextureLoss& loss, const std::vector<PlaneChoice>& planes,
                            const ListOptions& options);
+
+/// The Gamma whose list comes to so many bytes, D_i(Gamma) = D_1 = T_0 beta_0, by bisection over the sizes
+/// that the tables tell of q_i(x, y): 0 where even that list has fewer, 1 where even that has more. All
+/// textures have the same Gamma.
+double gamma_for_bytes(PackageReader& package, const std::vector<PlaneChoice>& planes, int scale,
+                       double bytes);
 
 /// What each group loses where the offers have these rungs; -1 = skipped.
 PerGroup losses_of(const FragmentList& list, std::span<const std::int32_t> rungs);

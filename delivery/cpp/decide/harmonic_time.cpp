@@ -47,11 +47,12 @@ std::vector<double> harmonic_numbers(std::size_t n) {
   return h;
 }
 
-/// The fragment with eta nearest the mean (ties: the first).
-std::uint32_t mean_fragment(const std::vector<FragmentOffer>& offers) {
+/// F-bar: the fragment with eta nearest the mean, or nearest Gamma where etas count from Gamma (ties: the
+/// first).
+std::uint32_t mean_fragment(const std::vector<FragmentOffer>& offers, bool from_gamma) {
   double sum = 0;
   for (const FragmentOffer& f : offers) sum += f.eta;
-  const double mean = sum / static_cast<double>(std::max<std::size_t>(offers.size(), 1));
+  const double mean = from_gamma ? 0 : sum / static_cast<double>(std::max<std::size_t>(offers.size(), 1));
   std::uint32_t best = 0;
   for (std::uint32_t i = 1; i < offers.size(); ++i)
     if (std::abs(offers[i].eta - mean) < std::abs(offers[best].eta - mean)) best = i;
@@ -98,7 +99,7 @@ HarmonicTimePlan::HarmonicTimePlan(std::vector<FragmentOffer> offers, const HtcO
   step_of_offer_.assign(n, n);
   taken_.assign(n, false);
   right_ = static_cast<std::uint32_t>(n);
-  mean_ = mean_fragment(offers_);
+  mean_ = mean_fragment(offers_, options_.policy == Policy::kThesis);
   planned_.reserve(n);
   for (const FragmentOffer& f : offers_) {
     planned_.push_back(f.planned_bytes);
@@ -227,7 +228,9 @@ void HarmonicTimePlan::remove_from_list(std::uint32_t offer) {
 }
 
 double HarmonicTimePlan::theta_of(std::uint32_t offer) const {
-  return (options_.time_limit_s - latency_s_) * (planned_[offer] / planned_total_);
+  const double first_list_bytes = options_.time_limit_s * options_.throughput.initial_bytes_s;  // D_1
+  const double whole = options_.policy == Policy::kThesis ? first_list_bytes : planned_total_;
+  return (options_.time_limit_s - latency_s_) * (planned_[offer] / whole);
 }
 
 // credit_i: the share 1 / (chi zeta), chi = 2 for the position after the last issued one, of every dT so far.
@@ -280,13 +283,14 @@ double HarmonicTimePlan::target_of(std::uint32_t offer, double theta_s, double n
       return planned * proportional_share(now_s, throughput_bytes_s());
     case Policy::kHtc:
     case Policy::kGuard:
+    case Policy::kThesis:
       break;
   }
   if (steps_.empty()) return planned;  // F-bar has the quality Q_i
   // Alone in flight it has to wait for a round trip first.
   const double wait = options_.window == 1 ? options_.rtt_s : 0;
   const double target = throughput_bytes_s() * (theta_s - wait);
-  if (options_.policy == Policy::kHtc) return target;
+  if (options_.policy != Policy::kGuard) return target;
   const double even = planned * proportional_share(now_s, lasting_bytes_s(now_s));
   return std::clamp(target, even / options_.guard, even * options_.guard);
 }

@@ -25,7 +25,9 @@ namespace texmesh {
 /// - kPrice: one price of bytes, in units of loss, that rises when the plan is late.
 /// - kProportional: planned sizes scaled by the time left over the bytes left.
 /// - kStatic: the planned sizes, whatever happens.
-enum class Policy : std::uint8_t { kHtc, kGuard, kPrice, kProportional, kStatic };
+/// - kThesis: kHtc with (4.1) and (4.2) as printed, theta_g = T_0 d_g / D_1, D_1 = T_0 beta_0. Offers are
+///   those of thesis_list(), whose etas count from Gamma: F-bar is the offer whose eta is nearest to 0.
+enum class Policy : std::uint8_t { kHtc, kGuard, kPrice, kProportional, kStatic, kThesis };
 /// Which end of the list is next. kCredit: by the sign of the next credit (negative: the finest fragment,
 /// positive: the coarsest). kBeta0: by the last throughput against beta_0. kFinest: always the finest.
 enum class HtcOrder : std::uint8_t { kCredit, kBeta0, kFinest };

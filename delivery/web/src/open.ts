@@ -13,7 +13,7 @@ export type * from './scene/api';
 
 /** Names that options may have; the library chooses options that are left out. */
 const names = {
-  policy: ['guard', 'htc', 'htca', 'price', 'proportional', 'static'],
+  policy: ['guard', 'htc', 'htca', 'price', 'proportional', 'static', 'thesis'],
   order: ['credit', 'beta0', 'finest'],
   rule: ['flip', 'jnd', 'error', 'edge'],
   meshes: ['glb', 'stream', 'auto'],
@@ -49,7 +49,9 @@ export class TexmeshPackage extends PackageReader {
     this.pool = pool; // until a load has the pool: options may be refused
     this.decodeDocument = pool.decodeDocument;
     const forget = (): void => void this.loads_.delete(load);
-    const load = loadModel(this, scene, { ...options, policy }, pool, this.loaded_ ? nowS() : this.openedS, forget);
+    const printed = policy === 'thesis';
+    const { rule = printed ? 'jnd' : undefined, order = printed ? 'beta0' : undefined } = options;
+    const load = loadModel(this, scene, { ...options, policy, rule, order }, pool, this.loaded_ ? nowS() : this.openedS, forget);
     this.pool = undefined;
     this.loaded_ = true;
     this.loads_.add(load);

@@ -18,7 +18,6 @@ export * from './decide/size_curve';
 export * from './decide/viewing';
 export * from './http/throughput';
 export * from './decide/harmonic_time';
-export * from './decide/htc_theorem';
 export * from './decide/upgrades';
 export * from './decide/texture_loss';
 export * from './decide/fragment_list';

@@ -15,7 +15,7 @@ describe('a load', () => {
   const pkg = async (server: FakeServer): Promise<TexmeshPackage> => TexmeshPackage.openUrl(url, { fetch: server.fetch, ...quick });
   it('takes every policy by its names, and no other', async () => {
     const opened = await pkg(range());
-    for (const policy of ['guard', 'htc', 'htca', 'price', 'proportional', 'static', undefined] as const)
+    for (const policy of ['guard', 'htc', 'htca', 'price', 'proportional', 'static', 'thesis', undefined] as const)
       opened.load(new Scene(), { ...options, policy }).dispose();
     expect(() => opened.load(new Scene(), { ...options, policy: 'foo' as 'htc' })).toThrow(InputError);
   });

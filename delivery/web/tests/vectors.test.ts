@@ -2,6 +2,7 @@ import { readdirSync } from 'node:fs';
 import { join } from 'node:path';
 import { describe, expect, it } from 'vitest';
 import * as t from '../src/reader';
+import { asPrinted, theoremOf } from '../src/thesis';
 import { SplitStreamReader } from '../src/format/splits/split_stream';
 import { readBytes, readText, root, sameBits } from './support/files';
 
@@ -97,7 +98,7 @@ function runPlan(cases: Json[]): void {
       expectBits([plan.throughputBytesS(), plan.surplusS, plan.unspentS], [r.throughputBytesS, r.surplusS, r.unspentS], 'end');
       expect(plan.tooShortForRtt).toBe(r.tooShortForRtt);
       if (r.theorem) {
-        const theorem: Json = t.theoremOf(plan);
+        const theorem: Json = theoremOf(plan);
         for (const name of Object.keys(r.theorem)) expectBits([theorem[name]], [r.theorem[name]], name);
       }
     });
@@ -144,6 +145,11 @@ function checkTables(table: t.PlaneTables, v: Json): void {
   const bent = { ...table, knotQuality: v.knots.quality, knotPosition: v.knots.position };
   for (const [fragment, quality, bytes] of v.knots.fragment_quality_bytes)
     expectBits([t.interpolatedBytes(bent, fragment, quality)], [bytes], `bytes of ${fragment} at ${quality}, knots`);
+  const { vqp, gamma, quality, rungs } = v.by_predictors;
+  const predicted = { ...table, allocation: 3, vqp: Float32Array.from(vqp) };
+  expectBits([t.meanEta(predicted, 0)], [gamma], 'mean of VQP');
+  expectBits(t.qualityOf(predicted, 0, gamma), quality, 'quality by VQP');
+  expectBits(t.rungsOf(predicted, 0, gamma), rungs, 'rungs by VQP');
   for (const [budget, rungs] of v.budget_rungs) expectBits(t.allocateRd(table, budget), rungs, `budget ${budget}`);
 }
 
@@ -185,13 +191,14 @@ async function checkList(reader: t.PackageReader, v: Json): Promise<void> {
 /** Scale, planes and rungs that a time and a link leave. */
 async function checkPlan(reader: t.PackageReader, v: Json): Promise<void> {
   const base = t.defaultDeliveryRequest();
-  const request: t.DeliveryRequest = {
+  const asked: t.DeliveryRequest = {
     ...base,
     displayedPx: v.displayed_px,
     timeLimitS: v.time_limit_s,
     htc: { ...base.htc, policy: v.policy },
     link: { ...base.link, bytesS: v.bytes_s, rttS: v.rtt_s },
   };
+  const request = v.policy === 'thesis' ? asPrinted(asked) : asked;
   const data = await reader.data();
   expect(t.wantedScale(data.manifest, request)).toBe(v.wanted_scale);
   const p = t.planDelivery(data, request)!;

@@ -29,7 +29,7 @@ describe("the viewer's line about rights", () => {
 
 describe("the viewer's choices", () => {
   it('are policies that the library has', () => {
-    expect(kPolicies.map(([p]) => p).sort()).toEqual(['guard', 'htc', 'price', 'proportional', 'static']);
+    expect(kPolicies.map(([p]) => p).sort()).toEqual(['guard', 'htc', 'price', 'proportional', 'static', 'thesis']);
     for (const [policy] of kPolicies) expect(at(`policy=${policy}`).policy).toBe(policy);
     expect(at('policy=htca').policy).toBe('htc');
     for (const other of ['', 'policy=foo', 'policy=']) expect(at(other).policy).toBe('guard');

@@ -18,7 +18,7 @@ const kCaps: [string, number][] = [
 ];
 export const kPolicies: [Policy, string][] = [
   ['htc', 'harmonic time (HTCA)'], ['guard', 'harmonic, guarded'], ['price', 'price of bytes'], ['proportional', 'proportional'],
-  ['static', 'static'],
+  ['static', 'static'], ['thesis', 'as printed (thesis)'],
 ];
 
 /** The bandwidths to choose from, `bytesPerSecond` among them. */

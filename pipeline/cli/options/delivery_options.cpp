@@ -58,11 +58,14 @@ Option add_scale_option(Command& c, DeliveryArguments& a) {
 
 Option add_policy_option(Command& c, DeliveryArguments& a) {
   return c
-      .option("--policy", a.policy,
-              "htca = the thesis's method; guard = htca around the plan of least loss, with sizes within a "
-              "factor of 1.5 of that plan's share; price = one price of bytes, which rises when the transfer "
-              "is late; proportional = planned sizes scaled by the time left; static = planned sizes, always")
-      .one_of_explained({"htca", "guard", "price", "proportional", "static"})
+      .option(
+          "--policy", a.policy,
+          "htca = the thesis's method; guard = htca around the plan of least loss, with sizes within a "
+          "factor of 1.5 of that plan's share; price = one price of bytes, which rises when the transfer "
+          "is late; proportional = planned sizes scaled by the time left; static = planned sizes, always; "
+          "thesis = chapters 4 and 7 as printed: htca with --rule jnd, --order beta0, --window 1 and "
+          "--hard-limits, textures at full size, the list that T_0 beta_0 pays")
+      .one_of_explained({"htca", "guard", "price", "proportional", "static", "thesis"})
       .value_name("NAME")
       .shows_default();
 }
@@ -120,10 +123,9 @@ void add_method_options(Command& c, DeliveryArguments& a) {
   add_policy_option(c, a).rare();
   c.option("--order", a.order,
            "Next fragment: credit = by the sign of the credit; beta0 = by the throughput, as first "
-           "published; finest = always the finest")
+           "published; finest = always the finest. Default: credit, and beta0 with --policy thesis")
       .one_of_explained({"credit", "beta0", "finest"})
       .value_name("NAME")
-      .shows_default()
       .rare();
   c.option("--estimator", a.estimator,
            "Throughput: last = of the last transfer; harmonic = harmonic mean of several; ewma = mean that "
@@ -148,10 +150,9 @@ void add_method_options(Command& c, DeliveryArguments& a) {
        "--rule", a.rule,
        "Which scale is enough: flip = by lit pictures, which compile has compared with those of the finest "
        "scale; jnd = by the just-noticeable difference; error = by an error of one pixel; edge = by edges of "
-       "one pixel")
+       "one pixel. Default: flip, and jnd with --policy thesis")
       .one_of_explained({"flip", "jnd", "error", "edge"})
       .value_name("NAME")
-      .shows_default()
       .rare();
 }
 
@@ -179,10 +180,12 @@ DeliveryRequest delivery_request(const DeliveryArguments& a) {
   r.displayed_px =
       a.distance > 0 ? std::clamp(displayed_height_px(1, a.distance, a.camera), 1.0, 1e6) : a.display_px;
   r.scale = a.scale;
-  r.rule = choice<StepRule>(a.rule, {{"flip", StepRule::kFlip},
-                                     {"jnd", StepRule::kJnd},
-                                     {"error", StepRule::kError},
-                                     {"edge", StepRule::kEdge}});
+  if (a.policy == "thesis") r = as_printed(r);
+  if (!a.rule.empty())
+    r.rule = choice<StepRule>(a.rule, {{"flip", StepRule::kFlip},
+                                       {"jnd", StepRule::kJnd},
+                                       {"error", StepRule::kError},
+                                       {"edge", StepRule::kEdge}});
   r.time_limit_s = parse_duration(a.time, "--time");
   if (!(r.time_limit_s > 0)) throw UsageError("--time", "", "a time above 0", a.time);
   if (a.needs_link && a.bandwidth.empty() && a.trace.empty())
@@ -204,18 +207,21 @@ DeliveryRequest delivery_request(const DeliveryArguments& a) {
                                            {"guard", Policy::kGuard},
                                            {"price", Policy::kPrice},
                                            {"proportional", Policy::kProportional},
-                                           {"static", Policy::kStatic}});
-  r.htc.order = choice<HtcOrder>(
-      a.order, {{"credit", HtcOrder::kCredit}, {"beta0", HtcOrder::kBeta0}, {"finest", HtcOrder::kFinest}});
-  const bool last = r.htc.policy == Policy::kHtc || r.htc.policy == Policy::kGuard;
+                                           {"static", Policy::kStatic},
+                                           {"thesis", Policy::kThesis}});
+  if (!a.order.empty())
+    r.htc.order = choice<HtcOrder>(
+        a.order, {{"credit", HtcOrder::kCredit}, {"beta0", HtcOrder::kBeta0}, {"finest", HtcOrder::kFinest}});
+  const bool harmonic = r.htc.policy == Policy::kPrice || r.htc.policy == Policy::kProportional ||
+                        r.htc.policy == Policy::kStatic;
   r.htc.throughput.estimator = a.estimator == "auto"
-                                   ? (last ? Estimator::kLast : Estimator::kHarmonic)
+                                   ? (harmonic ? Estimator::kHarmonic : Estimator::kLast)
                                    : choice<Estimator>(a.estimator, {{"last", Estimator::kLast},
                                                                      {"harmonic", Estimator::kHarmonic},
                                                                      {"ewma", Estimator::kEwma}});
   r.htc.throughput.samples = a.samples;
-  r.htc.window = a.window;
-  r.htc.hard_limits = a.hard_limits;
+  if (a.window > 0) r.htc.window = a.window;
+  if (a.hard_limits) r.htc.hard_limits = true;
   if (!a.beta0.empty()) r.beta0_bytes_s = parse_bandwidth(a.beta0, "--beta0");
   return r;
 }

@@ -9,6 +9,7 @@ void add_study_command(Command& app) {
   c.needs_command();
   add_fragments_study(c);
   add_quality_study(c);
+  add_method_study(c);
   add_prediction_study(c);
   add_rungs_study(c);
   add_thesis_study(c);

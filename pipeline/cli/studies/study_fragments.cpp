@@ -1,5 +1,6 @@
 // texmesh study fragments: the sum of a texture's fragments against one file.
 #include <fmt/format.h>
+#include <time.h>
 
 #include <iostream>
 #include <memory>
@@ -32,8 +33,18 @@ struct FragmentArguments {
   std::vector<int> grids = FragmentStudyOptions{}.grids, qualities = FragmentStudyOptions{}.qualities;
   std::string subsampling = "420", csv;
   int jobs = 0;
-  bool json = false;
+  bool decode = false, json = false;
 };
+
+/// CPU time of this thread, s: a busy machine says less of it than of the wall's.
+double thread_s() {
+  timespec t{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+/// "12.3 ms", "" where nothing was timed.
+std::string milliseconds(double seconds) { return seconds > 0 ? fmt::format("{:.1f}", 1000 * seconds) : ""; }
 
 struct StudiedImage {
   std::string path;
@@ -60,7 +71,7 @@ std::string fragment_text(const StudiedImage& image) {
   TextTable table;
   for (const char* header :
        {"n", "fragments", "fragment px", "quality", "file std kB", "file opt kB", "sum std kB", "over std %",
-        "sum opt kB", "over opt %", "shared kB", "over std %", "over opt %"})
+        "sum opt kB", "over opt %", "shared kB", "over std %", "over opt %", "file ms", "fragments ms"})
     table.column(header);
   std::size_t within = 0, large = 0, large_within = 0;
   for (const FragmentStudyRow& r : image.rows) {
@@ -69,7 +80,8 @@ std::string fragment_text(const StudiedImage& image) {
                kilobytes(r.file_standard), kilobytes(r.file_optimised), kilobytes(r.sum_standard),
                more_than(r.sum_standard, r.file_standard), kilobytes(r.sum_optimised),
                more_than(r.sum_optimised, r.file_optimised), kilobytes(r.sum_shared),
-               more_than(r.sum_shared, r.file_standard), more_than(r.sum_shared, r.file_optimised)});
+               more_than(r.sum_shared, r.file_standard), more_than(r.sum_shared, r.file_optimised),
+               milliseconds(r.file_decode_s), milliseconds(r.fragments_decode_s)});
     const bool good = r.sum_shared <= r.file_standard;
     const bool is_large = std::min(r.fragment_width_px, r.fragment_height_px) >= 128;
     within += good, large += is_large, large_within += good && is_large;
@@ -84,17 +96,22 @@ std::string fragment_text(const StudiedImage& image) {
 }
 
 Json fragment_json(const FragmentStudyRow& r) {
-  return {{"grid", r.grid},
-          {"columns", r.columns},
-          {"rows", r.rows},
-          {"fragment_width_px", r.fragment_width_px},
-          {"fragment_height_px", r.fragment_height_px},
-          {"quality", r.quality},
-          {"file_standard", r.file_standard},
-          {"file_optimised", r.file_optimised},
-          {"sum_standard", r.sum_standard},
-          {"sum_optimised", r.sum_optimised},
-          {"sum_shared", r.sum_shared}};
+  Json j{{"grid", r.grid},
+         {"columns", r.columns},
+         {"rows", r.rows},
+         {"fragment_width_px", r.fragment_width_px},
+         {"fragment_height_px", r.fragment_height_px},
+         {"quality", r.quality},
+         {"file_standard", r.file_standard},
+         {"file_optimised", r.file_optimised},
+         {"sum_standard", r.sum_standard},
+         {"sum_optimised", r.sum_optimised},
+         {"sum_shared", r.sum_shared}};
+  if (r.file_decode_s > 0) {
+    j["file_decode_s"] = r.file_decode_s;
+    j["fragments_decode_s"] = r.fragments_decode_s;
+  }
+  return j;
 }
 
 /// RFC 4180: a name in quotes where it needs them.
@@ -119,8 +136,9 @@ std::string fragment_csv(const std::vector<StudiedImage>& images) {
 }
 
 void run_fragments(const FragmentArguments& args) {
-  FragmentStudyOptions options{args.grids, args.qualities,
-                               args.subsampling == "444" ? Subsampling::k444 : Subsampling::k420};
+  FragmentStudyOptions options{
+      args.grids, args.qualities, args.subsampling == "444" ? Subsampling::k444 : Subsampling::k420, {}};
+  if (args.decode) options.clock_s = thread_s;
   if (!args.csv.empty()) check_output_file(args.csv);  // not after the study
   std::vector<StudiedImage> studied;
   Json list = Json::array();
@@ -167,6 +185,9 @@ void add_fragment_options(Command& c, FragmentArguments& args) {
       .one_of({"420", "444"})
       .value_name("NAME")
       .shows_default();
+  c.flag(
+      "--decode", args.decode,
+      "Time decoding, too, in CPU time of one thread: one file against all fragments, each made a whole file again");
   c.option("--csv", args.csv, "Write the figures, in bytes, to this file as well").value_name("FILE");
   add_jobs_option(c, args.jobs);
   c.flag("--json", args.json, "Print one JSON object");

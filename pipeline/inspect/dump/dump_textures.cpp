@@ -221,7 +221,8 @@ std::string tables_text(PackageReader& p, std::optional<double> gamma) {
     s += size_model_text(p.plane_thesis(k));
     s += fmt::format(
         "  allocation {}, width {}, q within {} .. {}; D_i at {}, then by Gamma\n", allocation_name(t),
-        shortest(static_cast<double>(t.allocation == 0 ? t.quality_width : t.log_width)),
+        shortest(
+            static_cast<double>(t.allocation == 0 || t.allocation == kByVqp ? t.quality_width : t.log_width)),
         shortest(static_cast<double>(t.quality_min)), shortest(static_cast<double>(t.quality_max)),
         gamma ? "the Gamma asked for" : "the default Gamma");
     s += allocation_text(t, p.manifest().scales, gamma) +

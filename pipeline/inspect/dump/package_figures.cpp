@@ -121,7 +121,7 @@ AllocationFigures allocation_figures(const PlaneTables& t, std::size_t row, std:
 }
 
 std::string allocation_name(const PlaneTables& t) {
-  return t.allocation == 0 ? "thesis" : t.allocation == 1 ? "log" : "rd";
+  return t.allocation == 0 ? "thesis" : t.allocation == 1 ? "log" : t.allocation == 2 ? "rd" : "vqp";
 }
 
 }  // namespace texmesh

@@ -10,6 +10,7 @@
 #include "format/base/errors.h"
 #include "format/rules/allocation.h"
 #include "format/rules/rate_distortion.h"
+#include "format/rules/size_curve.h"
 #include "tests/support/packages.h"
 
 namespace texmesh {
@@ -96,6 +97,73 @@ TEST(FragmentList, NothingIsFetchedWhereThePreviewsShowMost) {
   EXPECT_EQ(plan.texture_bytes, 0u);
   const GroupCurve curve(package.quality(), PlaneGroup::kColour, request.displayed_px);
   EXPECT_NEAR(plan.texture_flip, kLarger * curve.coded(0.125), 1e-6);
+}
+
+double planned_bytes_of(const FragmentList& list) {
+  double sum = 0;
+  for (const FragmentOffer& f : list.offers) sum += f.planned_bytes;
+  return sum;
+}
+
+TEST(FragmentList, AsPrintedHoldsEveryFragmentAndCountsEtaFromGamma) {
+  PackageReader package = open_with({0.125f, 0.125f, 0.125f, 0});  // no rung shows more than the preview
+  ListOptions options;
+  options.thesis = true;
+  options.gamma = 0.4;
+  const FragmentList list = fragment_list(package, full_size(package), options);
+  const PlaneTables& t = package.tables().planes[0];
+  ASSERT_EQ(list.offers.size(), t.order.size());
+  const std::vector<float> eta = eta_of(t, 0), quality = quality_of(t, 0, 0.4);
+  std::size_t nearest = 0;
+  for (std::size_t i = 0; i < list.offers.size(); ++i) {
+    EXPECT_NEAR(list.offers[i].eta, eta[list.fragments[i].fragment] - 0.4, 1e-7);
+    if (std::abs(list.offers[i].eta) < std::abs(list.offers[nearest].eta)) nearest = i;
+  }
+  for (std::size_t i = 0; i < list.offers.size(); ++i) {
+    const std::uint32_t f = list.fragments[i].fragment;
+    const double asked = i == nearest ? t.quality[0] : quality[f];  // F-bar has Q_i itself
+    EXPECT_NEAR(list.offers[i].planned_bytes, interpolated_bytes(t, f, asked), 1e-9) << i;
+  }
+}
+
+TEST(FragmentList, GammaIsThatOfTheListThatComesToTheBytes) {
+  PackageReader package = open_with({0.5f, 0.5f, 0.5f, 0});
+  const std::vector<PlaneChoice> planes = full_size(package);
+  ListOptions options;
+  options.thesis = true;
+  const auto bytes_at = [&](double gamma) {
+    const PlaneTables& t = package.tables().planes[0];
+    const std::vector<float> quality = quality_of(t, 0, gamma);
+    double sum = 0;
+    for (const std::uint16_t f : t.order) sum += interpolated_bytes(t, f, quality[f]);
+    return sum;
+  };
+  const double most = bytes_at(0), least = bytes_at(1);
+  ASSERT_GT(most, least);
+  EXPECT_EQ(gamma_for_bytes(package, planes, 0, most + 1), 0);
+  EXPECT_EQ(gamma_for_bytes(package, planes, 0, least - 1), 1);
+  const double middle = (most + least) / 2;
+  EXPECT_NEAR(bytes_at(gamma_for_bytes(package, planes, 0, middle)), middle, 1e-3 * middle);
+  EXPECT_THROW(gamma_for_bytes(package, planes, 1, middle), InputError) << "no scale";
+}
+
+TEST(FragmentList, ThePolicyTakesTheRulesScaleAtFullSizeAndTheListThatTimePays) {
+  PackageReader package = open_with({0.5f, 0.5f, 0.5f, 0});
+  DeliveryRequest request = as_printed({});
+  EXPECT_EQ(request.rule, StepRule::kJnd);
+  EXPECT_EQ(request.htc.window, 1);
+  EXPECT_TRUE(request.htc.hard_limits);
+  request.network.link = BandwidthTrace::constant(1e6);
+  const DeliveryPlan plan = plan_delivery(package, request);
+  EXPECT_EQ(plan.scale, wanted_scale(package, request));
+  EXPECT_EQ(plan.planes.size(), 1u);
+  EXPECT_EQ(plan.planes[0].plane, 0u);
+  EXPECT_EQ(plan.textures.skipped, 0u);
+  EXPECT_GE(plan.gamma, 0);
+  EXPECT_EQ(list_of(package, request, plan).offers.size(), plan.textures.rungs.size());
+  EXPECT_EQ(plan.textures.steps[0].target_bytes,
+            list_of(package, request, plan).offers[plan.textures.steps[0].offer].planned_bytes);
+  EXPECT_GT(planned_bytes_of(list_of(package, request, plan)), 0);
 }
 
 }  // namespace

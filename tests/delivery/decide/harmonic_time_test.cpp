@@ -355,5 +355,49 @@ TEST(Throughput, Estimators) {
   EXPECT_TRUE(std::isfinite(small.bytes_s()));
 }
 
+/// (4.1) to (4.8) by hand: four fragments, rungs so fine that every size can be had.
+TEST(HarmonicTime, AsPrintedTheTimesAreThoseOfTheBytesAtBeta0) {
+  std::vector<FragmentOffer> offers(4);
+  const double etas[]{0.5, 0.1, -0.05, -0.4}, sizes[]{400, 300, 200, 100};
+  for (std::size_t i = 0; i < 4; ++i) {
+    offers[i].eta = etas[i];  // less Gamma: offer 2 is F-bar
+    offers[i].planned_bytes = sizes[i];
+    offers[i].loss.push_back(1);
+    for (std::uint32_t b = 1; b <= 2000; ++b) offers[i].bytes.push_back(b), offers[i].loss.push_back(0.5);
+  }
+  HtcOptions o = serial(10, 100);  // D_1 = 1000
+  o.policy = Policy::kThesis;
+  o.order = HtcOrder::kBeta0;
+  o.hard_limits = true;
+  HarmonicTimePlan plan(offers, o);
+  const HtcStep* first = plan.next(0);
+  ASSERT_NE(first, nullptr);
+  EXPECT_EQ(first->offer, 2u);
+  EXPECT_EQ(first->bytes, 200u);
+  EXPECT_NEAR(first->theta_s, 2, 1e-12);  // d_1 / beta_0
+  plan.completed(2, 2.5);                 // beta_1 = 80: late by 0.5 s
+  const HtcStep* second = plan.next(2.5);
+  EXPECT_EQ(second->offer, 0u) << "beta_1 <= beta_0: the leftmost";
+  const double zeta = 1.0 / 2 + 1.0 / 3 + 1.0 / 4;
+  EXPECT_NEAR(second->theta_s, 4 - 0.5 / (2 * zeta), 1e-12);
+  EXPECT_EQ(second->bytes, static_cast<std::uint32_t>(std::lround(80 * second->theta_s)));
+  const double gamma_2 = 2;  // beta_2 is above beta_0
+  plan.completed(0, 2.5 + gamma_2);
+  const HtcStep* third = plan.next(2.5 + gamma_2);
+  EXPECT_EQ(third->offer, 3u) << "beta_2 > beta_0: the rightmost";
+  const double credit = -0.5 / (3 * zeta) + (second->theta_s - gamma_2) / (2 * (1.0 / 2 + 1.0 / 3));
+  EXPECT_NEAR(third->theta_s, 1 + credit, 1e-12);
+}
+
+TEST(HarmonicTime, AsPrintedAListThatDoesNotMatchLeavesTime) {
+  const std::vector<FragmentOffer> offers = some_offers(40);
+  const double rate = 2 * planned(offers) / 10;  // the link could carry twice the list
+  HtcOptions o = serial(10, rate);
+  o.policy = Policy::kThesis;
+  EXPECT_NEAR(constant_run(offers, o, rate), 5, 0.5);
+  o.policy = Policy::kHtc;
+  EXPECT_NEAR(constant_run(offers, o, rate), 10, 0.5);
+}
+
 }  // namespace
 }  // namespace texmesh

@@ -278,5 +278,23 @@ TEST(Tables, ReaderTakesNoFractionAboveOne) {
   EXPECT_NO_THROW(read_tables(bytes));
 }
 
+TEST(Tables, PredictorsStandBehindTheRestWhereQualityGoesByThem) {
+  PlaneTables t = make_tables(3, 2, 2, 2);
+  const std::size_t without = write_tables({{t}}).size();
+  t.allocation = kByVqp;
+  EXPECT_THROW(write_tables({{t}}), FormatError) << "none";
+  t.vqp = {0, 1, 0.25f, 0.5f, 0.75f, 0};
+  const Bytes bytes = write_tables({{t}});
+  EXPECT_EQ(bytes.size(), without + 2 * t.order.size());
+  const PlaneTables back = read_tables(bytes).planes[0];
+  for (std::size_t f = 0; f < 6; ++f) EXPECT_NEAR(back.vqp[f], t.vqp[f], 1e-5) << f;
+  EXPECT_EQ(write_tables({{back}}), bytes);
+  t.vqp[2] = 1.5f;
+  EXPECT_THROW(write_tables({{t}}), FormatError);
+  t.vqp[2] = 0.5f;
+  t.allocation = 0;
+  EXPECT_THROW(write_tables({{t}}), FormatError) << "nobody reads them";
+}
+
 }  // namespace
 }  // namespace texmesh

@@ -75,5 +75,17 @@ TEST(Allocation, NearestRungInLogQuantiserSpace) {
   EXPECT_EQ(nearest_rung(t, 5), 0u);
 }
 
+TEST(Allocation, PredictorsTakeEtasPlace) {
+  PlaneTables t = allocation_case(kByVqp);
+  t.vqp = {0.25f, 1, 0.5f, 0};
+  for (const std::size_t row : {0u, 1u}) EXPECT_EQ(eta_of(t, row), t.vqp);
+  EXPECT_NEAR(mean_eta(t, 0), 1.75 / 3, 1e-7);
+  const auto q = quality_of(t, 0, 0.5);
+  EXPECT_FLOAT_EQ(q[0], 65);  // 80 + (0.25 - 0.5) 60
+  EXPECT_FLOAT_EQ(q[1], 97);  // 110, clipped
+  EXPECT_FLOAT_EQ(q[2], 80);
+  EXPECT_FLOAT_EQ(quality_of(t, 1, 0.5)[0], 25);
+}
+
 }  // namespace
 }  // namespace texmesh

@@ -93,15 +93,17 @@ TEST(Lut, NoChannelOfDataStandsForAnother) {
 
 TEST(Lut, OrderQualityAndTotals) {
   const Scene s = make_scene();
-  for (const Allocation allocate : {Allocation::kLog, Allocation::kThesis, Allocation::kRd}) {
+  for (const Allocation allocate :
+       {Allocation::kLog, Allocation::kThesis, Allocation::kRd, Allocation::kVqp}) {
     LutOptions options;
     options.allocate = allocate;
     const PlaneTables t = build(s, options).planes[0];
     const TexturePlane& plane = s.fragments.planes[0];
+    const std::vector<float>& importance = allocate == Allocation::kVqp ? t.vqp : plane.eta;
     EXPECT_EQ(t.order.size(), 9u);
     for (std::size_t k = 1; k < t.order.size(); ++k) {
       const auto key = [&](std::uint16_t f) {
-        return std::tuple(-plane.eta[f], -plane.surface_fraction[f], f);
+        return std::tuple(-importance[f], -plane.surface_fraction[f], f);
       };
       EXPECT_LT(key(t.order[k - 1]), key(t.order[k]));
     }
@@ -296,6 +298,22 @@ TEST(Lut, EmptyAndUnfitInput) {
   EXPECT_TRUE(none.planes[0].order.empty());
   EXPECT_EQ(thesis_of(s).total_bytes[0], 0u);
   EXPECT_NO_THROW(write_tables(none));
+}
+
+TEST(Lut, PredictorsAssignQualityAsTheFileStoresThem) {
+  const Scene s = make_scene();
+  LutOptions options;
+  options.allocate = Allocation::kVqp;
+  const PlaneTables t = build(s, options).planes[0];
+  ASSERT_EQ(t.vqp.size(), t.fragment_count());
+  for (std::size_t f = 0; f < t.fragment_count(); ++f)
+    EXPECT_NEAR(t.vqp[f], s.predictors.planes[0].vqp[f], 1.0 / 65535);
+  const double gamma = mean_eta(t, 1);
+  const std::vector<float> q = quality_of(t, 1, gamma);
+  for (const std::uint16_t f : t.order)
+    EXPECT_FLOAT_EQ(q[f], std::clamp(static_cast<float>(60 + (t.vqp[f] - gamma) * 60), 5.0f, 97.0f));
+  EXPECT_EQ(read_tables(write_tables({{t}})).planes[0].vqp, t.vqp);
+  EXPECT_TRUE(build(s).planes[0].vqp.empty());
 }
 
 }  // namespace

@@ -309,5 +309,34 @@ TEST(PerceptualValues, DistancesAgreeWithPlainSearches) {
   }
 }
 
+/// 7.5 and 7.6: every size shows a major scale, that of the tier of the scale that O_V / E_S asks for.
+TEST(PerceptualValues, MajorsMakeTheStepFunctionWhateverTheDistance) {
+  const NestedScales scales = make_scales(testing::bumpy_sphere(32, 48, 0.15f), 12);
+  const Skeleton skeleton = centre_skeleton(scales.mesh);
+  PerceptualValuesOptions options{.jnd = 0.02, .statistic = PerceptualStatistic::kConservative};
+  options.steps = StepsBy::kMajors;
+  options.kept_scales = 0;
+  const PerceptualValues v = measure_perceptual_values(scales, skeleton, options, kOneThread);
+  const std::size_t n = v.major.size();
+  std::size_t begin = 0, tiers = 0;
+  for (std::size_t k = 1; k < n; ++k) {
+    EXPECT_EQ(v.kept[k], v.major[k] || k == n - 1) << "minor scales are not stored";
+    if (!v.major[k]) continue;
+    ++tiers;
+    const double edges = std::sqrt(double{v.display_px_edge[begin]} * v.display_px_edge[begin + 1]);
+    if (begin > 0) EXPECT_NEAR(v.display_px_jnd[k] / edges, 1, 1e-5) << k;
+    for (std::size_t i = begin + 1; i < k; ++i) EXPECT_EQ(v.display_px_jnd[i], v.display_px_jnd[k]) << i;
+    EXPECT_LE(v.display_px_jnd[k], v.display_px_jnd[k - 1]);
+    begin = k;
+  }
+  ASSERT_GE(tiers, 2u);
+  options.jnd_reference_px = 4096;
+  const PerceptualValues far = measure_perceptual_values(scales, skeleton, options, kOneThread);
+  EXPECT_EQ(far.display_px_jnd, v.display_px_jnd) << "independent of the distance";
+  options.jnd = 1;  // nothing is noticeable: the coarsest scale at any size
+  const PerceptualValues blind = measure_perceptual_values(scales, skeleton, options, kOneThread);
+  EXPECT_EQ(blind.display_px_jnd.back(), kAnyHeightPx);
+}
+
 }  // namespace
 }  // namespace texmesh

@@ -322,5 +322,16 @@ TEST(Simplification, RefusesAScaleMapOfAnotherMesh) {
   EXPECT_THROW(simplify(mesh, random_scale_map(7), {}, kOneThread), StageError);
 }
 
+TEST(Simplification, TheThesisKnowsNoBoundOfTheError) {
+  const ConditionedMesh mesh = condition(bumpy_sphere(40, 60, 0.08f));
+  SimplificationOptions tight{.order = CollapseOrder::kThesis, .max_error = 0.0001, .max_shift = 0.0001};
+  const NestedScales bounded = run(mesh, tight);
+  tight.max_error = tight.max_shift = 1;
+  const NestedScales free = run(mesh, tight);
+  ASSERT_EQ(bounded.scales.size(), free.scales.size());
+  EXPECT_EQ(bounded.scales.back().position_count, free.scales.back().position_count);
+  EXPECT_GT(bounded.scales.back().error_max, 0.0001f * 3);
+}
+
 }  // namespace
 }  // namespace texmesh

@@ -233,5 +233,36 @@ TEST(RangeScan, RanksTellOrderFromDisorder) {
   EXPECT_LT(spearman(self, reversed), 0.3);
 }
 
+/// Two turned rings with the same relief by angle, one six times as wide, too far apart to smooth each other.
+TEST(RangeScan, SpacingByRowIsThatOfTheRowsRadius) {
+  constexpr std::uint32_t kColumns = 240, kRing = 6, kGap = 130, kRows = 2 * kRing + kGap;
+  RangeGrid g;
+  g.columns = kColumns;
+  g.rows = kRows;
+  g.full_turn = true;
+  g.alpha_step_rad = static_cast<float>(2 * portable::kPi / kColumns);
+  g.y_step = 0.05f;
+  for (std::uint32_t y = 0; y < kRows; ++y)
+    for (std::uint32_t x = 0; x < kColumns; ++x) {
+      const double a = 2 * portable::kPi * (x + 0.5) / kColumns, widest = y < kRing ? 1 : 6;
+      const double relief = 1 + 0.05 * portable::sin(3 * a) + 0.02 * portable::sin(30 * a);
+      g.radius.push_back(y < kRing || y >= kRing + kGap ? static_cast<float>(widest * relief) : 0.0f);
+      g.position.push_back(y * kColumns + x);
+    }
+  SsfOptions options;
+  const auto persistence = [](const ScaleMap& map, std::uint32_t row) {
+    double sum = 0;
+    for (std::size_t x = 0; x < kColumns; ++x) sum += map.persistence[row * kColumns + x];
+    return sum;
+  };
+  const ScaleMap mean = filter_range_scan(g, kColumns * kRows, options, RunContext{});
+  EXPECT_NEAR(persistence(mean, 2) / persistence(mean, kRows - 3), 1, 0.05)
+      << "by the mean they are the same";
+  options.range_spacing = RangeSpacing::kRow;
+  const ScaleMap row = filter_range_scan(g, kColumns * kRows, options, RunContext{});
+  EXPECT_GT(persistence(row, kRows - 3), 1.3 * persistence(row, 2))
+      << "the wide one's relief is six times as long";
+}
+
 }  // namespace
 }  // namespace texmesh

@@ -178,5 +178,51 @@ TEST(Ssf, SigmaEndsWhereTheSurfaceHasConverged) {
   EXPECT_LT(whole.convergence[20], 0.5f * ended.convergence[20]);
 }
 
+/// R(v) of a body of revolution about the y axis.
+Skeleton axis_of(const ConditionedMesh& mesh) {
+  Skeleton s;
+  for (const Vec3f p : mesh.mesh.positions) s.distance.push_back(std::hypot(p.x, p.z));
+  s.radius = s.distance;
+  return s;
+}
+
+/// r = 1 + a sin 6 alpha: the Laplacian of Gaussian of R is zero where sin 6 alpha is, at k pi / 6.
+TEST(SsfOfTheRadius, MarksTheZeroCrossingsOfAKnownRelief) {
+  RangeGrid g;
+  g.columns = 180;
+  g.rows = 30;
+  g.alpha_step_rad = static_cast<float>(2 * portable::kPi / g.columns);
+  g.y_step = 0.035f;
+  for (std::uint32_t i = 0; i < g.columns * g.rows; ++i) {
+    const double a = double{g.alpha_step_rad} * (i % g.columns + 0.5);  // no sample on a crossing
+    g.radius.push_back(static_cast<float>(1 + 0.05 * portable::sin(6 * a)));
+    g.position.push_back(i);
+  }
+  const ConditionedMesh mesh = conditioned(mesh_of(g));
+  SsfOptions options;
+  options.scales = 6;
+  options.signal = ScaleSignal::kRadius;
+  const ScaleMap map = filter_skeleton_distance(mesh, axis_of(mesh), options, RunContext{});
+  EXPECT_EQ(map.persistence, map.crossing) << "zero crossings alone";
+  std::size_t marked = 0, near = 0;
+  for (std::size_t p = 0; p < map.crossing.size(); ++p) {
+    const std::uint32_t at = mesh.position_source[p], row = at / g.columns;
+    if (map.crossing[p] < 2 || row < 8 || row >= 22) continue;  // open borders bend the response
+    ++marked;
+    const double steps = 6 * (at % g.columns + 0.5) / g.columns * 2;  // in k pi / 6
+    near += std::abs(steps - std::round(steps)) * 15 <= 1;            // within a sample
+  }
+  EXPECT_GE(marked, 12u * 12);
+  EXPECT_GE(near, marked * 95 / 100);
+  RunContext eight;
+  eight.threads = 8;
+  EXPECT_EQ(bytes(filter_skeleton_distance(mesh, axis_of(mesh), options, eight)), bytes(map));
+}
+
+TEST(SsfOfTheRadius, RefusesTheSkeletonOfAnotherMesh) {
+  const ConditionedMesh mesh = conditioned(testing::sphere(12, 16));
+  EXPECT_THROW(filter_skeleton_distance(mesh, {}, {}, RunContext{}), StageError);
+}
+
 }  // namespace
 }  // namespace texmesh

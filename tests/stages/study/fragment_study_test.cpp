@@ -123,5 +123,20 @@ TEST(FragmentStudy, BadOptionsAreRefused) {
   EXPECT_THROW(study({}, {}), StageError);
 }
 
+TEST(FragmentStudy, ADecodeIsTimedByTheClockThatIsGiven) {
+  Pixels image{64, 48, 3, {}};
+  for (std::size_t k = 0; k < image.width_px * image.height_px * 3u; ++k)
+    image.data.push_back(static_cast<std::uint8_t>(k * 7 % 251));
+  FragmentStudyOptions options{{2}, {30, 80}};
+  EXPECT_EQ(study_fragments(image, options, {})[0].file_decode_s, 0) << "no clock";
+  double now = 0;
+  options.clock_s = [&] { return now += 1; };
+  for (const FragmentStudyRow& row : study_fragments(image, options, {})) {
+    EXPECT_EQ(row.file_decode_s, 1);
+    EXPECT_EQ(row.fragments_decode_s, 1);
+  }
+  EXPECT_EQ(now, 8);
+}
+
 }  // namespace
 }  // namespace texmesh

@@ -13,8 +13,9 @@ export function logQuantiser(quality: number): number {
 
 const qualityOfScale = (scale: number): number => (scale > 1 ? 50 / scale : 100 - 50 * scale);
 
-/** eta_i (3.1) of one scale, by its row: feature counts min-max over covered fragments; 0 for the others. [F] */
+/** eta_i (3.1) of one scale, by its row: feature counts min-max over covered fragments; 0 for the others. With allocation 3 VQP. [F] */
 export function etaOf(t: PlaneTables, row: number): Float32Array {
+  if (t.allocation === 3) return t.vqp.slice();
   const covered = positive(t.coveredTexels);
   const features = (f: number): number => t.features[row * fragmentCount(t) + f];
   const rising = covered.map(features).sort((a, b) => a - b);
@@ -36,7 +37,7 @@ export function qualityOf(t: PlaneTables, row: number, gamma: number): Float32Ar
   const g = logQuantiser(middle);
   for (let f = 0; f < result.length; ++f) {
     const away = result[f] - gamma;
-    const q = t.allocation === 0 ? middle + away * t.qualityWidth : qualityOfScale(exp(-(g + away * t.logWidth)));
+    const q = t.allocation % 3 === 0 ? middle + away * t.qualityWidth : qualityOfScale(exp(-(g + away * t.logWidth)));
     result[f] = clamp(Math.fround(q), t.qualityMin, t.qualityMax);
   }
   return result;
@@ -66,5 +67,5 @@ export function rungsOf(t: PlaneTables, row: number, gamma: number): Int16Array 
     rungs[f] = nearestRung(t, quality[f]);
     bytes += bytesToShow(t, rungs[f], f);
   }
-  return t.allocation < 2 ? rungs : allocateRd(t, bytes);
+  return t.allocation !== 2 ? rungs : allocateRd(t, bytes);
 }

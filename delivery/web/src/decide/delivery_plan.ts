@@ -4,7 +4,7 @@ import type { PackageData } from '../format/package_data';
 import { HtcOptions, defaultHtcOptions, planOptions } from './harmonic_time';
 import { LinkOptions, fetchedS } from './network_model';
 import { beyondStart, proxyBytesBeyondStart, proxyLoss, servingProxy } from './proxy_choice';
-import { InTime, choiceInTime, worthwhile } from './scale_choice';
+import { InTime, type InTimeRequest, choiceInTime, worthwhile } from './scale_choice';
 import { everyGroup } from './texture_loss';
 import { StepRule, selectScale } from './viewing';
 
@@ -22,6 +22,8 @@ export interface DeliveryRequest {
   /** Its time limit, round trip and first throughput are set from the others. */
   htc: HtcOptions;
   link: LinkOptions;
+  /** The policy thesis: see asPrinted() of texmesh/thesis. */
+  textures?: InTimeRequest['textures'];
 }
 /** 1000 px, 5 s, 100 kB/s. */
 export function defaultDeliveryRequest(): DeliveryRequest {
@@ -87,14 +89,16 @@ export function planDelivery(data: PackageData, request: DeliveryRequest): Deliv
   const { manifest } = data;
   const { link, displayedPx } = request;
   const { scale, rule, timeLimitS } = request;
-  const serving = scale < 0 && rule === 'flip' ? servingProxy(manifest, displayedPx) : -1;
+  const { textures } = request;
+  const only = scale >= 0 || !!textures;
+  const serving = !only && rule === 'flip' ? servingProxy(manifest, displayedPx) : -1;
   if (serving >= 0) {
     const plan = planOfProxy(manifest, request, serving);
     if (plan.completeS <= timeLimitS) return plan;
   }
   const wanted = wantedScale(manifest, request);
   const steps = choiceInTime(data, {
-    displayedPx, wanted, only: request.scale >= 0, connections: link.connections,
+    displayedPx, wanted, only, textures, connections: link.connections,
     afterMesh: (scale) => {
       const { moved, manifestS, meshS } = timesOf(manifest, link, scale);
       // Where the first request has brought all, that request shows the throughput.
@@ -111,7 +115,7 @@ export function planDelivery(data: PackageData, request: DeliveryRequest): Deliv
   if (!best) return undefined;
   const { moved, firstPictureS, meshS } = timesOf(manifest, link, best.scale);
   let plan: DeliveryPlan = { ...best, fixedBytes: firstBytes(manifest) + moved, firstPictureS, meshS, completeS: meshS + best.endS };
-  if (scale < 0)
+  if (!only)
     manifest.proxies.forEach((_, k) => {
       const other = planOfProxy(manifest, request, k);
       const needed = plan.meshS >= timeLimitS && other.meshS < plan.meshS;

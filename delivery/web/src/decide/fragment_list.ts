@@ -36,6 +36,8 @@ export interface ListOptions {
   qualityHigh: number;
   /** What a group's losses weigh beside the others', > 0. */
   groupWeights: PerGroup;
+  /** Chapter 4's list as printed, where the policy is thesis: makes it of a list of all fragments, ordered by feature density alone. */
+  printed?: (data: PackageData, list: FragmentList, options: ListOptions) => void;
 }
 /** S_0 at 1000 px, the mean of eta, the qualities of delivery/cpp. */
 export const defaultListOptions: ListOptions = { scale: 0, displayedPx: 1000, gamma: -1, qualityLow: 5, qualityHigh: 97, groupWeights: everyGroup(1) };
@@ -50,6 +52,7 @@ function addPlane(loss: TextureLoss, plane: number, surface: number, options: Li
   if (row < 0) throw new InputError('', `scale ${options.scale}`, 'a scale of the package', 'none');
   const eta = etaOf(t, row);
   const quality = qualityOf(t, row, options.gamma < 0 ? meanEta(t, row) : options.gamma);
+  const { printed } = options;
   // Rungs whose quality is within the limits, as near as there are any.
   const rungs = [...t.rungQuality.keys()];
   const highRung = Math.max(t.rungQuality.filter((q) => q <= options.qualityHigh).length - 1, 0);
@@ -59,7 +62,7 @@ function addPlane(loss: TextureLoss, plane: number, surface: number, options: Li
     if (!bytes.every((b) => b > 0 && b <= 0xffffffff)) continue;
     const share = weights[f] / surface;
     const shown = [losses[f], ...rungs.map((r) => losses[(r + 1) * fragmentCount(t) + f])];
-    if (!shown.some((c) => c < shown[0])) {
+    if (!printed && !shown.some((c) => c < shown[0])) {
       previewLoss[group] += share * shown[0];
       continue;
     }
@@ -67,7 +70,7 @@ function addPlane(loss: TextureLoss, plane: number, surface: number, options: Li
     list.fragments.push({ plane, fragment: f });
     list.groups.push(group);
     const plannedBytes = Math.max(1, interpolatedBytes(t, f, quality[f]));
-    list.offers.push({ bytes, loss: weighted, eta: eta[f] * (weighted[0] - Math.min(...weighted)), plannedBytes, lowRung, highRung });
+    list.offers.push({ bytes, loss: weighted, eta: eta[f] * (printed ? 1 : weighted[0] - Math.min(...weighted)), plannedBytes, lowRung, highRung });
   }
 }
 
@@ -83,10 +86,11 @@ export function fragmentList(
 ): FragmentList {
   const all = { ...defaultListOptions, ...options };
   const previewLoss: [number, number, number] = [0, 0, 0];
-  const list = { offers: [], fragments: [], groups: [], groupWeights: all.groupWeights, previewLoss };
+  const list: FragmentList = { offers: [], fragments: [], groups: [], groupWeights: all.groupWeights, previewLoss };
   const weights = loss.weights(planes);
   // A group without any surface loses nothing, whatever its rungs.
   for (const { plane } of planes) addPlane(loss, plane, weights[groupIndex(data, plane)] || 1, all, list, previewLoss);
+  all.printed?.(data, list, all);
   return list;
 }
 

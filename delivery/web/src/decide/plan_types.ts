@@ -19,9 +19,10 @@ export interface FragmentOffer {
  * How rungs are chosen. htc: the method. guard: the method over the plan of least loss instead of Eq. 3.2's, with
  * sizes kept within a factor of that plan's share of what the link gives in the time left. price: one price of bytes in
  * units of loss that rises when the plan is late. proportional: sizes scaled by what is left of time over what is left
- * to send. static: the planned sizes, whatever happens.
+ * to send. static: the planned sizes, whatever happens. thesis: htc with times as printed, T_0 d_g / (T_0 beta_0), whose etas count from
+ * Gamma, so that the fragment with eta nearest 0 comes first.
  */
-export type Policy = 'htc' | 'guard' | 'price' | 'proportional' | 'static';
+export type Policy = 'htc' | 'guard' | 'price' | 'proportional' | 'static' | 'thesis';
 /** Which end of the list is next: by the sign of the next credit, by the last throughput against beta_0, or the finest. */
 export type HtcOrder = 'credit' | 'beta0' | 'finest';
 

@@ -30,9 +30,9 @@ export function cheapestRung({ bytes, loss, highRung }: FragmentOffer, low: numb
 /** Bytes at a rung; 0 where the fragment is skipped. */
 export const bytesAtRung = (f: FragmentOffer, rung: number): number => (rung < 0 ? 0 : f.bytes[rung]);
 
-/** The fragment with eta nearest the mean (ties: the first). */
-export function meanOffer(offers: readonly FragmentOffer[]): number {
-  const mean = sumOf(offers.map((f) => f.eta)) / offers.length;
+/** The fragment with eta nearest the mean, or nearest 0 where etas count from Gamma (ties: the first). */
+export function meanOffer(offers: readonly FragmentOffer[], fromGamma: boolean): number {
+  const mean = fromGamma ? 0 : sumOf(offers.map((f) => f.eta)) / offers.length;
   const away = (i: number): number => Math.abs(offers[i].eta - mean);
   return offers.reduce((best, _, i) => (away(i) < away(best) ? i : best), 0);
 }

@@ -31,15 +31,17 @@ export interface InTimeRequest {
   connections: number;
   /** When a scale's mesh is chosen: the plan of what comes after it (limit <= 0: no time is left), and the link that is supposed. */
   afterMesh(scale: number): { plan: TimePlanOptions; linkBytesS: number };
+  /** Chooses what bytes are spent on in the place of rate and distortion. */
+  textures?: (loss: TextureLoss, scale: number, bytes: number) => { planes: PlaneChoice[]; list: FragmentList };
 }
 
 /** Textures beside one scale; the generator gives the page a turn between its steps. */
 function* texturesInTime(loss: TextureLoss, request: InTimeRequest, scale: number): Generator<void, InTime> {
   const { plan, linkBytesS } = request.afterMesh(scale);
   const { timeLimitS, initialBytesS, rttS } = plan;
-  const budget = Math.floor(Math.max(0, timeLimitS) * initialBytesS);
-  let spent: TextureSpending | undefined;
-  for (spent of budgetSteps(loss, { scale }, budget)) yield;
+  const bytes = Math.max(0, timeLimitS) * initialBytesS;
+  let spent: Pick<TextureSpending, 'list' | 'planes'> | undefined = request.textures?.(loss, scale, bytes);
+  if (!spent) for (spent of budgetSteps(loss, { scale }, Math.floor(bytes))) yield;
   const { list, planes } = spent!;
   const played = simulate(list.offers, plan, { bytesS: linkBytesS, rttS, connections: request.connections });
   yield;

@@ -130,7 +130,7 @@ export class UncheckedPlan {
   private chooseOffer_(creditS: number): number {
     const { policy, order, initialBytesS } = this.options_;
     const byPrice = policy === 'price';
-    if (this.steps.length === 0 && !byPrice) return meanOffer(this.offers_);
+    if (this.steps.length === 0 && !byPrice) return meanOffer(this.offers_, policy === 'thesis');
     const finest = byPrice || order === 'finest' || (order === 'credit' ? creditS <= 0 : this.throughputBytesS() <= initialBytesS);
     return this.remaining_.at(finest ? 0 : -1)!;
   }
@@ -139,8 +139,9 @@ export class UncheckedPlan {
 
   /** theta_g */
   private thetaOf_(offer: number): number {
-    const { timeLimitS, latencyS } = this.options_;
-    return (timeLimitS - latencyS) * (this.planned_.each[offer] / this.planned_.total);
+    const { policy, timeLimitS, latencyS, initialBytesS } = this.options_;
+    const all = policy === 'thesis' ? timeLimitS * initialBytesS : this.planned_.total;
+    return (timeLimitS - latencyS) * (this.planned_.each[offer] / all);
   }
   /** Credit of the position after the last issued one, from the residuals so far. */
   private creditS_(): number {
@@ -198,7 +199,7 @@ export class UncheckedPlan {
     if (policy === 'proportional') return this.proportionalShare_(offer, this.throughputBytesS());
     if (policy === 'static' || policy === 'price' || this.steps.length === 0) return this.planned_.each[offer]; // F-bar has the quality Q_i
     const target = this.throughputBytesS() * (thetaS - waitS);
-    if (policy === 'htc') return target;
+    if (policy !== 'guard') return target;
     const even = this.proportionalShare_(offer, this.lastingBytesS_());
     return clamp(target, even / guard, even * guard);
   }

@@ -92,6 +92,7 @@ function readArrays(input: BytesIn, t: PlaneTables, c: Counts): void {
   t.surfaceFraction = listed(new Float32Array(f), () => input.f32());
   t.features = listed(new Uint32Array(c.scales * f), () => input.number(c.feature));
   t.quality = fill(new Float32Array(c.scales), () => input.f32());
+  if (t.allocation === 3) t.vqp = listed(new Float32Array(f), () => input.u16() / 65535);
 }
 
 function emptyTables(): PlaneTables {
@@ -101,7 +102,7 @@ function emptyTables(): PlaneTables {
     rungQuality: new Uint8Array(0), tableBytes: new Uint32Array(0), sizeBytes: new Uint32Array(0),
     digest: new Uint8Array(0), mse: none, dssim: none, coveredTexels: new Uint32Array(0), surfaceFraction: none,
     order: new Uint16Array(0), skipDssim: none, knotQuality: new Uint8Array(0), knotPosition: none,
-    features: new Uint32Array(0), quality: none, allocation: 1,
+    features: new Uint32Array(0), quality: none, allocation: 1, vqp: none,
     qualityWidth: 60, logWidth: 0.7, qualityMin: 5, qualityMax: 97,
   };
 }
@@ -166,7 +167,7 @@ function readStart(input: BytesIn, t: PlaneTables, minor: number): Counts {
     input.fail('1 to 65535 fragments');
   const good = c.scales > 0 && c.scales <= mostScales && c.rungs > 0 && c.rungs <= mostRungs && c.listed <= columns * rows;
   if (!good) input.fail('counts in their ranges');
-  if (t.allocation > 2) input.fail('allocation 0 to 2', t.allocation, 'T13');
+  if (t.allocation > 3) input.fail('allocation 0 to 3', t.allocation, 'T13');
   const cells = columns * rows * (5 * c.rungs + c.scales);
   if (cells > mostCells) input.fail('at most 2^24 cells', cells, 'L02');
   if (c.size < 1 || c.size > 4 || c.feature < 1 || c.feature > 3)
@@ -179,7 +180,7 @@ export function parseTablesSection(bytes: Uint8Array, minor: number, place: stri
   const input = new BytesIn(bytes, `${file}: ${place}`, 'T03');
   const t = emptyTables();
   const counts = readStart(input, t, minor);
-  const expected = sectionBytes(counts);
+  const expected = sectionBytes(counts) + (t.allocation === 3 ? 2 * counts.listed : 0);
   if (bytes.length < expected) input.fail(`${expected} bytes`, bytes.length);
   readArrays(input, t, counts);
   if (minor <= formatMinor) input.finish();

@@ -35,8 +35,10 @@ export interface PlaneTables {
   features: Uint32Array;
   /** [N] quality Q_i. */
   quality: Float32Array;
-  /** 0 thesis (3.2), 1 log-quantiser, 2 rate-distortion within the bytes of 1. */
+  /** 0 thesis (3.2), 1 log-quantiser, 2 rate-distortion within the bytes of 1, 3 thesis with VQP in eta's place. */
   allocation: number;
+  /** [F] VQP (8.4) where the allocation is 3, else empty. */
+  vqp: Float32Array;
   qualityWidth: number;
   logWidth: number;
   qualityMin: number;

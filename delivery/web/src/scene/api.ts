@@ -46,7 +46,10 @@ export interface LoadOptions {
    * Infinity: no limit, everything that the display can show. Default 5.
    */
   time?: number;
-  /** Policy that spends the time; htca is another name of htc. Default guard. */
+  /**
+   * Policy that spends the time; htca is another name of htc. thesis is chapters 4 and 7 as printed: rule jnd, order beta0, one request at
+   * a time, textures at full size. Default guard.
+   */
   policy?: Policy | 'htca';
   /** Which fragment of the plan is fetched next. Default credit. */
   order?: HtcOrder;

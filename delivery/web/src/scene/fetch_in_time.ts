@@ -1,7 +1,9 @@
 import type { FragmentList } from '../decide/fragment_list';
 import type { HtcStep, Policy, TimePlanOptions } from '../decide/plan_types';
 import { type GroupedList, groupBytes, groupedList } from '../decide/request_groups';
+import type * as Printed from '../decide/thesis_list';
 import { UncheckedPlan } from '../decide/unchecked_plan';
+import { transferRate } from '../http/throughput';
 import type { FragmentFetch } from './fragment_fetch';
 import { upgradeWishes } from './fragment_wishes';
 import type { LoadContext } from './load_context';
@@ -17,15 +19,12 @@ const leastRest = 0.004;
 /** Share of the bytes promised by the throughput that a request may count on. */
 const certain = 0.85;
 
-/** Options of the plan for fragments in so many seconds. */
-export function timePlanOptions({ options, reader, beta0 }: LoadContext, timeLimitS: number): TimePlanOptions {
-  const { policy, order = 'credit' } = options;
-  return { policy: policy as Policy, order, timeLimitS, rttS: reader.client.latencyS, initialBytesS: Math.max(1, beta0) };
-}
-
 /** Fetches fragments by Harmonic Time Compensation: group by group, so that the last one comes at the limit. */
 export class FetchInTime {
   private plan_?: UncheckedPlan;
+
+  /** Policy thesis. */
+  printed?: typeof Printed;
 
   constructor(
     private readonly load_: LoadContext,
@@ -40,18 +39,25 @@ export class FetchInTime {
     return this.load_.limitS - this.load_.elapsedS();
   }
 
+  /** Options of the plan for fragments in so many seconds. */
+  planOptions(timeLimitS: number): TimePlanOptions {
+    const { options: { policy, order = 'credit' }, reader: { client: { latencyS: rttS } }, beta0 } = this.load_;
+    const initialBytesS = Math.max(1, beta0);
+    return { policy: policy as Policy, order, timeLimitS, rttS, initialBytesS, ...this.printed?.printedPlan(transferRate(initialBytesS), rttS) };
+  }
+
   async run(fragments: FragmentList, timeLimitS: number): Promise<void> {
     const { load_: load, fetching_: fetching } = this;
     const whole = fetching.wholeRungs();
-    const bytesEach = whole ? Infinity : groupBytes(load.beta0, load.reader.client.latencyS, timeLimitS);
+    const bytesEach = whole ? Infinity : this.printed ? 0 : groupBytes(load.beta0, load.reader.client.latencyS, timeLimitS);
     const list = groupedList(fragments, bytesEach, load.beta0 * timeLimitS);
-    const plan = (this.plan_ = new UncheckedPlan(list.offers, timePlanOptions(load, timeLimitS)));
+    const plan = (this.plan_ = new UncheckedPlan(list.offers, this.planOptions(timeLimitS)));
     const hooks = {
       decided: (step: HtcStep): void => this.decided_(step, list),
       lost: (wish: Wish, error: unknown): void => fetching.lost(wish, error),
     };
     await playPlan(plan, list, fetching.transfers, load.signal, timeLimitS + mostLate * load.limitS, hooks);
-    if (!fetching.wholeRungs()) await this.spendRest_(fragments, plan);
+    if (!fetching.wholeRungs() && !this.printed) await this.spendRest_(fragments, plan);
   }
   private decided_(s: HtcStep, { groups, offers }: GroupedList): void {
     const group = groups[s.offer];

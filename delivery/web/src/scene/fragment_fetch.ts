@@ -1,6 +1,5 @@
 import type { Mesh } from 'three';
-import { type FragmentList, fragmentList } from '../decide/fragment_list';
-import { type PerGroup, everyGroup } from '../decide/texture_loss';
+import { type FragmentList, type ListOptions, fragmentList } from '../decide/fragment_list';
 import { isAbort, throwIfAborted } from '../format/errors';
 import { sleepS } from '../http/clock';
 import type { Levels } from '../worker/protocol';
@@ -18,8 +17,8 @@ const gapBytes = 1024;
 export class FragmentFetch {
   readonly fates = new FragmentFates();
   readonly transfers: Transfers;
-  /** What each group's losses weigh beside the others'. */
-  groupWeights: PerGroup = everyGroup(1);
+  /** How fragments are listed besides scale and display. */
+  listOptions: Partial<ListOptions> = {};
 
   constructor(
     private readonly load_: LoadContext,
@@ -57,7 +56,7 @@ export class FragmentFetch {
       await sleepS(0); // the page goes on in between
       seen.set(plane, this.shares_(plane));
     }
-    const list = fragmentList(planes.data, planes.all(), { scale, displayedPx: view.display.heightPx, groupWeights: this.groupWeights });
+    const list = fragmentList(planes.data, planes.all(), { scale, displayedPx: view.display.heightPx, ...this.listOptions });
     list.offers.forEach((offer, i) => {
       const { plane, fragment } = list.fragments[i];
       offer.bytes = offer.bytes.map((b, r) => transfers.bytesOf(plane, r, fragment) || b);

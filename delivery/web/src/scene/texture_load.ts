@@ -1,4 +1,4 @@
-import { type FragmentList, lossesOf } from '../decide/fragment_list';
+import { type FragmentList, type ListOptions, lossesOf } from '../decide/fragment_list';
 import { clamp } from '../decide/numbers';
 import { throughputOf } from '../decide/request_groups';
 import { scaleWithin } from '../decide/memory/gpu_memory';
@@ -9,7 +9,7 @@ import { type VisiblePart, selectScale } from '../decide/viewing';
 import { throwIfAborted } from '../format/errors';
 import { nowS, sleepS } from '../http/clock';
 import type { PlaneComposer } from './composer';
-import { FetchInTime, composeS, timePlanOptions } from './fetch_in_time';
+import { FetchInTime, composeS } from './fetch_in_time';
 import { FragmentFetch, requestBytes } from './fragment_fetch';
 import { allWishes, bestWishes } from './fragment_wishes';
 import type { LoadContext } from './load_context';
@@ -88,6 +88,7 @@ export class TextureLoad {
     const { load_: load, planes_: planes, fetching_: fetching } = this;
     const { reader, options, signal } = load;
     load.beta0 = load.expectedBytesS || options.beta0BytesS || throughputOf(reader.requests, reader.client.latencyS);
+    if (options.policy === 'thesis') this.inTime_.printed = await import('../decide/thesis_list');
     const { scale, planes: chosen } = await this.choice_();
     if (scale !== this.scale_.shown) load.enter('mesh');
     const meshBytes = this.source_.bytesOf(scale);
@@ -153,14 +154,21 @@ export class TextureLoad {
     /** Seconds that so many bytes of mesh take when nothing shares the link. */
     const meshS = (bytes: number): number => (bytes > 0 ? bytes / beta0 + client.latencyS : 0);
     const limitAfterMeshS = (scale: number): number => this.inTime_.leftS() - composeS - meshS(this.source_.bytesOf(scale));
+    const { printed } = this.inTime_;
+    let listed: Partial<ListOptions> | undefined;
+    const spend = printed && ((...of: Parameters<typeof printed.thesisTextures>) => {
+      const textures = printed.thesisTextures(...of);
+      listed = textures.options;
+      return textures;
+    });
     const steps = choiceInTime(planes.data, {
-      displayedPx: display.heightPx, wanted, only: override.scale !== undefined, connections: client.options.connections,
-      afterMesh: (scale) => ({ plan: timePlanOptions(load, limitAfterMeshS(scale)), linkBytesS: beta0 }),
+      displayedPx: display.heightPx, wanted, only: override.scale !== undefined || !!printed, textures: spend, connections: client.options.connections,
+      afterMesh: (scale) => ({ plan: this.inTime_.planOptions(limitAfterMeshS(scale)), linkBytesS: beta0 }),
     });
     for (;;) {
       const { done, value } = steps.next();
       if (done) {
-        fetching.groupWeights = value!.list.groupWeights;
+        fetching.listOptions = listed ?? { groupWeights: value!.list.groupWeights };
         return value!;
       }
       await sleepS(0); // the page goes on meanwhile

@@ -1,0 +1,118 @@
+// --profile thesis and --policy thesis: compiled, planned, checked and fetched as programs.
+#include <gtest/gtest.h>
+#include <httplib.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "tests/support/command.h"
+#include "tests/support/schema.h"
+
+namespace texmesh::testing {
+namespace {
+
+using Json = nlohmann::json;
+
+CommandResult texmesh(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), TEXMESH_BINARY);
+  return run_command(arguments);
+}
+Json json_of(std::vector<std::string> arguments) {
+  arguments.push_back("--json");
+  const CommandResult r = texmesh(arguments);
+  EXPECT_EQ(r.exit_code, 0) << r.errors;
+  return Json::parse(r.output);
+}
+
+struct ThesisProfile : ::testing::Test {
+  static void SetUpTestSuite() {
+    folder = new TemporaryFolder;
+    scan = *folder / "scan.glb";
+    package = *folder / "scan.texmesh";
+    ASSERT_EQ(run_command(
+                  {TEXMESH_MAKE_SCAN, "--triangles", "2500", "--texture", "512", "--charts", "8", "-o", scan})
+                  .exit_code,
+              0);
+    const CommandResult r = texmesh({"compile", scan, "-o", package, "--profile", "thesis", "--no-cache",
+                                     "--quiet", "--quality.views", "1", "--quality.largest_px", "128"});
+    ASSERT_EQ(r.exit_code, 0) << r.errors;
+  }
+  static void TearDownTestSuite() { delete folder; }
+  static inline TemporaryFolder* folder = nullptr;
+  static inline std::string scan, package;
+};
+
+TEST_F(ThesisProfile, MakesThePackageOfChapters2To8) {
+  EXPECT_EQ(texmesh({"verify", package}).exit_code, 0);
+  const Json provenance = json_of({"dump", package, "provenance"});
+  const std::string text = provenance.dump();
+  for (const char* option : {"\"order\":\"thesis\"", "\"signal\":\"radius\"", "\"allocate\":\"vqp\"",
+                             "\"steps\":\"majors\"", "\"statistic\":\"average\""})
+    EXPECT_NE(text.find(option), std::string::npos) << option;
+  const Json scales = json_of({"dump", package, "scales"})["scales"];
+  ASSERT_GE(scales.size(), 2u);
+  for (std::size_t k = 1; k < scales.size(); ++k)
+    EXPECT_TRUE(scales[k]["major"]) << "minor scales are not stored";
+}
+
+TEST_F(ThesisProfile, IsPlannedSimulatedAndCheckedByThePolicy) {
+  const std::vector<std::string> request{package,  "--time",   "3",     "--bandwidth",
+                                         "60kB/s", "--policy", "thesis"};
+  const auto with = [&](std::vector<std::string> more) {
+    more.insert(more.end(), request.begin(), request.end());
+    return more;
+  };
+  const Json plan = json_of(with({"plan"}));
+  EXPECT_TRUE(follows_schema(plan, "plan.v1"));
+  EXPECT_EQ(plan["skipped"], 0) << "limits are hard";
+  for (const Json& plane : plan["planes"]) EXPECT_EQ(plane["plane"], plane["texture"]) << "full size";
+  const Json played = json_of(with({"simulate"}));
+  EXPECT_TRUE(follows_schema(played, "simulate.v1"));
+  EXPECT_EQ(json_of(with({"check", "--max-flip", "1"}))["scale"], plan["scale"]);
+  // One request at a time: the next one is issued when the one before has come.
+  const CommandResult csv = texmesh(with({"simulate", "--csv"}));
+  EXPECT_EQ(csv.exit_code, 0) << csv.errors;
+  EXPECT_EQ(texmesh(with({"plan", "--rule", "flip", "--order", "credit"})).exit_code, 0)
+      << "parts may be others";
+}
+
+TEST_F(ThesisProfile, IsFetchedByThePolicy) {
+  httplib::Server server;
+  server.set_mount_point("/", std::filesystem::path(package).parent_path().string());
+  const int port = server.bind_to_any_port("127.0.0.1");
+  std::thread serving([&] { server.listen_after_bind(); });
+  const std::string url = "http://127.0.0.1:" + std::to_string(port) + "/scan.texmesh";
+  const Json fetched = json_of({"fetch", url, "--time", "4", "--policy", "thesis"});
+  server.stop();
+  serving.join();
+  EXPECT_EQ(fetched["skipped"], 0);
+  EXPECT_EQ(fetched["given_up"], 0);
+  EXPECT_EQ(fetched["requests"], fetched["fragments"]) << "fragment by fragment";
+}
+
+TEST_F(ThesisProfile, NamesThatAreNotInstalledAreUsage) {
+  const CommandResult r = texmesh({"compile", scan, "-o", *folder / "x.texmesh", "--profile", "museum"});
+  EXPECT_EQ(r.exit_code, 2);
+  EXPECT_NE(r.errors.find("thesis"), std::string::npos) << "says which there are: " << r.errors;
+  EXPECT_EQ(texmesh({"plan", package, "--bandwidth", "1MB/s", "--policy", "printed"}).exit_code, 2);
+}
+
+TEST_F(ThesisProfile, StandsBesideTheDefaultsInOneTable) {
+  const Json study = json_of({"study", "method", package, "--display", "100", "--views", "1"})["method"];
+  ASSERT_EQ(study.size(), 2u);
+  EXPECT_EQ(study[0]["system"], "texmesh");
+  EXPECT_EQ(study[1]["system"], "thesis");
+  for (const Json& system : study) {
+    ASSERT_EQ(system["rows"].size(), 1u);
+    const Json& row = system["rows"][0];
+    EXPECT_GT(row["bytes"], 0);
+    EXPECT_GE(row["rendered_flip"], 0);
+    EXPECT_LE(row["rendered_flip"], 1);
+  }
+  EXPECT_EQ(texmesh({"study", "method", scan, "--thesis", package}).exit_code, 2);
+}
+
+}  // namespace
+}  // namespace texmesh::testing
