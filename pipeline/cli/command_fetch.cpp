@@ -15,8 +15,10 @@
 #include "format/rules/proxy_choice.h"
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/fetched_files.h"
+#include "pipeline/cli/link_watch.h"
 #include "pipeline/cli/options/command_line.h"
 #include "pipeline/cli/options/delivery_options.h"
+#include "pipeline/cli/options/probe_options.h"
 #include "pipeline/cli/options/units.h"
 #include "pipeline/extract/glb/scale_file.h"
 #include "pipeline/io/exit_codes.h"
@@ -30,8 +32,9 @@ using Clock = std::chrono::steady_clock;
 
 struct FetchArguments {
   DeliveryArguments delivery;
+  ProbeArguments probe;
   std::vector<std::string> mirrors;
-  std::string refine = "0", output;
+  std::string refine = "0", output, record, history;
   bool whole_rungs = false, json = false;
 };
 
@@ -52,6 +55,7 @@ struct Fetched {
   LoadReport load;
   std::optional<LoadReport> refined;
   double texture_flip = 0, flip = 0;  // predicted of what has come
+  std::vector<std::string> urls;      // in the order of load.mirrors
 };
 
 /// What has moved so far and in which time, without the round trips.
@@ -149,20 +153,26 @@ HttpOptions http_options(double time_limit_s) {
   return http;
 }
 
+std::vector<std::string> all_urls(const FetchArguments& a) {
+  std::vector<std::string> urls{a.delivery.package};
+  urls.insert(urls.end(), a.mirrors.begin(), a.mirrors.end());
+  return urls;
+}
+
 /// From where the package is, and its mirrors.
-std::unique_ptr<Transport> fragment_transport(const FetchArguments& a, const HttpPlace& place,
-                                              const HttpOptions& http, PackageStore& store) {
+std::unique_ptr<Transport> fragment_transport(const FetchArguments& a, const HttpOptions& http,
+                                              PackageStore& store, Fetched& f) {
+  const HttpPlace& place = f.place;
+  f.urls = {place.url};
   if (place.in_memory) return open_transport(store);
   TransportOptions options;
   options.http = http;
   options.connections = a.delivery.connections;
-  std::vector<std::string> all{a.delivery.package};
-  all.insert(all.end(), a.mirrors.begin(), a.mirrors.end());
-  std::vector<std::string> mirrors{place.url};
+  const std::vector<std::string> all = all_urls(a);
   for (std::size_t i = 0; i < all.size(); ++i)
-    if (i != place.mirror) mirrors.push_back(all[i]);
+    if (i != place.mirror) f.urls.push_back(all[i]);
   if (!place.etag.empty()) options.etags[place.url] = place.etag;
-  return open_transport(mirrors, options);
+  return open_transport(f.urls, options);
 }
 
 void predict(PackageReader& package, const TextureLoader& loader, const std::vector<PlaneChoice>& planes,
@@ -178,10 +188,11 @@ void predict(PackageReader& package, const TextureLoader& loader, const std::vec
 
 void fetch_textures(const FetchArguments& a, const DeliveryRequest& request, const HttpOptions& http,
                     PackageReader& package, Clock::time_point start, double bytes_s, FetchedFiles& writer,
-                    Fetched& f) {
+                    LinkWatch& watch, Fetched& f) {
   f.whole_rungs = a.whole_rungs || !f.place.ranges;
-  const auto transport = fragment_transport(a, f.place, http, package.store());
-  TextureLoader loader(package, *transport, f.whole_rungs);
+  const auto transport = fragment_transport(a, http, package.store(), f);
+  const bool network = !f.place.in_memory && f.place.ranges;
+  TextureLoader loader(package, watch.monitored(*transport, package, network, f.rtt_s), f.whole_rungs);
   LoadOptions load;
   load.list.scale = f.scale;
   load.list.displayed_px = request.displayed_px;
@@ -206,21 +217,27 @@ void fetch_textures(const FetchArguments& a, const DeliveryRequest& request, con
   predict(package, loader, planes, load.list, f);
 }
 
-Fetched fetch(const FetchArguments& a) {
+/// Bytes per second of all that was fetched.
+double mean_bytes_s(const Fetched& f, Moved moved) {
+  const double textures_s = f.end_s - f.mesh_s;
+  if (f.load.transfer.bytes > 0 && textures_s > 0) moved.add(f.load.transfer.bytes, textures_s, f.rtt_s);
+  return moved.bytes_s(f.place.bytes_s);
+}
+
+Fetched fetch(const FetchArguments& a, LinkWatch& watch) {
   const DeliveryRequest request = delivery_request(a.delivery);
-  const HttpOptions http = http_options(request.time_limit_s);
-  std::vector<std::string> mirrors{a.delivery.package};
-  mirrors.insert(mirrors.end(), a.mirrors.begin(), a.mirrors.end());
+  const HttpOptions http = watch.watched(http_options(request.time_limit_s));
   Fetched f;
   Moved moved;
   const auto start = Clock::now();
-  auto opened = open_urls(mirrors, http);
+  auto opened = open_urls(all_urls(a), http);
   const HttpStore& server = *opened;
   PackageReader package(std::move(opened));
   f.place = server.place();
   f.rtt_s = request.network.rtt_s > 0 ? request.network.rtt_s : f.place.rtt_s;
   const auto bytes_s = [&] {
-    return request.beta0_bytes_s > 0 ? request.beta0_bytes_s : moved.bytes_s(f.place.bytes_s);
+    return request.beta0_bytes_s > 0 ? request.beta0_bytes_s
+                                     : watch.beta0(f.place.url, moved.bytes_s(f.place.bytes_s));
   };
   FetchedFiles writer(package, a.output);
   const bool proxies = !package.manifest().proxies.empty() && request.scale < 0;
@@ -236,13 +253,60 @@ Fetched fetch(const FetchArguments& a) {
   }
   if (f.proxy) {
     end_with_proxy(package, request.displayed_px, start, writer, f, moved);
+    watch.finish({f.place.url}, f.load, f.rtt_s, mean_bytes_s(f, moved));
     return f;
   }
   writer.write_entry(mesh_path(f.scale), fetch_mesh(package, f, moved));
   f.mesh_s = seconds_since(start);
   f.place = server.place();
-  fetch_textures(a, request, http, package, start, bytes_s(), writer, f);
+  fetch_textures(a, request, http, package, start, bytes_s(), writer, watch, f);
+  watch.finish(f.urls, f.load, f.rtt_s, mean_bytes_s(f, moved));
   return f;
+}
+
+/// What the link has shown: shares of servers, test packets, a recording.
+void add_link_json(const Fetched& f, const LinkWatch& watch, Json& j) {
+  if (f.load.mirrors.size() > 1) {
+    Json servers = Json::array();
+    for (std::size_t i = 0; i < f.load.mirrors.size(); ++i) {
+      const MirrorShare& m = f.load.mirrors[i];
+      servers.push_back({{"url", shown_url(f.urls[i])},
+                         {"requests", m.requests},
+                         {"bytes", m.bytes},
+                         {"bytes_s", m.bytes_s}});
+      if (!m.dropped.empty()) servers.back()["dropped"] = m.dropped;
+    }
+    j["servers"] = servers;
+  }
+  if (watch.probes()) {
+    Json samples = Json::array();
+    for (const BandwidthSample& s : watch.monitor().samples())
+      samples.push_back({{"time_s", s.time_s},
+                         {"packet_bytes", s.packet_bytes},
+                         {"seconds", s.seconds},
+                         {"bytes_s", s.bytes_s}});
+    j["probes"] = {
+        {"packets", watch.monitor().sent()}, {"bytes", watch.monitor().sent_bytes()}, {"samples", samples}};
+  }
+}
+
+void print_link(const Fetched& f, const LinkWatch& watch) {
+  for (std::size_t i = 0; i < f.load.mirrors.size() && f.load.mirrors.size() > 1; ++i) {
+    const MirrorShare& m = f.load.mirrors[i];
+    std::cout << fmt::format("  {}: {} requests, {} bytes, {:.0f} kB/s{}\n", shown_url(f.urls[i]), m.requests,
+                             grouped(m.bytes), m.bytes_s / 1e3,
+                             m.dropped.empty() ? "" : "; dropped: " + m.dropped);
+  }
+  if (watch.probes()) {
+    const BandwidthMonitor& monitor = watch.monitor();
+    std::cout << fmt::format("{} test packets with {} bytes beside the textures, {} arrived", monitor.sent(),
+                             grouped(monitor.sent_bytes()), monitor.samples().size());
+    if (!monitor.samples().empty())
+      std::cout << fmt::format("; the last one: {:.0f} kB/s", monitor.samples().back().bytes_s / 1e3);
+    std::cout << '\n';
+  }
+  if (watch.recorded_steps() > 0)
+    std::cout << fmt::format("recorded the link in {} steps\n", watch.recorded_steps());
 }
 
 Json fetch_json(const Fetched& f, double limit_s) {
@@ -308,18 +372,24 @@ int run_fetch(FetchArguments& args) {
   });
   args.delivery.needs_link = false;
   const double limit_s = parse_duration(args.delivery.time, "--time");
+  LinkWatch watch(args.record, args.history, probe_options(args.probe));
+  if (!watch.problem().empty()) std::cerr << "warning: no historic average: " << watch.problem() << '\n';
   Fetched f;
   try {
-    f = fetch(args);
+    f = fetch(args, watch);
   } catch (const InputError&) {
     if (interrupted == 0) throw;
     std::cerr << "interrupted\n";
     return 130;
   }
-  if (args.json)
-    std::cout << fetch_json(f, limit_s).dump() << '\n';
-  else
+  if (args.json) {
+    Json j = fetch_json(f, limit_s);
+    add_link_json(f, watch, j);
+    std::cout << j.dump() << '\n';
+  } else {
     print_fetched(f, limit_s);
+    print_link(f, watch);
+  }
   return f.load.cancelled ? 130 : f.load.given_up > 0 ? kExitDifferent : kExitOk;
 }
 
@@ -346,6 +416,16 @@ void add_fetch_options(Command& c, FetchArguments& args) {
   add_policy_option(c, d).rare();
   add_window_option(c, d).rare();
   c.option("--connections", d.connections, "Connections per server").integer_in(1, 64).shows_default().rare();
+  c.option("--record", args.record, "Write the link's throughput as a trace for simulate --trace")
+      .value_name("FILE")
+      .rare();
+  c.option(
+       "--history", args.history,
+       "File that keeps each host's average throughput from run to run, the first guess of the next; state "
+       "= links.json in the user's state folder (default: none is kept)")
+      .value_name("FILE")
+      .rare();
+  add_probe_options(c, args.probe);
   c.flag("--whole-rungs", args.whole_rungs,
          "Ask for all fragments of a texture at once, as of servers without ranges")
       .rare();
@@ -361,8 +441,9 @@ void add_fetch_command(Command& app) {
       "  texmesh fetch https://host/bust.texmesh --time 4 --display 800\n"
       "  texmesh fetch https://a/bust.texmesh --mirror https://b/bust.texmesh --time 2 --refine 10 -o got");
   c.notes(
-      "fetch checks every fragment against its digest. What a server fails to deliver, fetch asks of "
-      "another server. The package is read from the first server that answers. A server that knows no "
+      "fetch checks every fragment against its digest. The fragments of a texture are dealt to the servers by "
+      "their speed. A server whose bytes are wrong is dropped; what a server fails to deliver, fetch asks of "
+      "another one. A folder (URL with a slash) may lack some of the files. The package is read from the first server that answers. A server that knows no "
       "ranges is asked for whole rungs of the tree beside the container.\n"
       "Exit code: 0, 1 when the package cannot be read, 2 usage, 4 when fragments were given up, 130 when "
       "interrupted.");

@@ -7,6 +7,7 @@
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/options/command_line.h"
 #include "pipeline/cli/options/delivery_options.h"
+#include "pipeline/cli/options/probe_options.h"
 #include "pipeline/inspect/simulation_plot.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"
@@ -21,6 +22,7 @@ constexpr int kPlotSamples = 400;
 
 struct SimulateArguments : DeliveryArguments {
   std::string table, plot;
+  ProbeArguments probe;
   bool theorem = false, csv = false;
   int seeds = 20;
 };
@@ -176,6 +178,48 @@ std::vector<double> qualities_of(PackageReader& package, const DeliveryPlan& pla
   return qualities;
 }
 
+/// How the test packets did: their mean relative error against the link, and bytes.
+double mean_probe_error(const SimulationResult& r, const BandwidthTrace& link, double start_s) {
+  double sum = 0;
+  for (const BandwidthSample& s : r.samples) {
+    const double to = start_s + s.time_s, truth = link.mean(to - s.seconds, to);
+    if (truth > 0) sum += std::abs(s.bytes_s / truth - 1);
+  }
+  return r.samples.empty() ? 0 : sum / static_cast<double>(r.samples.size());
+}
+
+void add_link_json(const DeliveryPlan& p, const BandwidthTrace& link, Json& j) {
+  const SimulationResult& r = p.textures;
+  if (r.mirrors.size() > 1) {
+    Json servers = Json::array();
+    for (const MirrorShare& m : r.mirrors) {
+      servers.push_back({{"requests", m.requests}, {"bytes", m.bytes}, {"bytes_s", m.bytes_s}});
+      if (!m.dropped.empty()) servers.back()["dropped"] = m.dropped;
+    }
+    j["servers"] = servers;
+  }
+  if (r.probes > 0)
+    j["probes"] = {{"packets", r.probes},
+                   {"bytes", r.probe_bytes},
+                   {"arrived", r.samples.size()},
+                   {"mean_error", mean_probe_error(r, link, p.mesh_s)}};
+}
+
+std::string link_text(const DeliveryPlan& p, const BandwidthTrace& link) {
+  const SimulationResult& r = p.textures;
+  std::string text;
+  for (std::size_t i = 0; i < r.mirrors.size() && r.mirrors.size() > 1; ++i) {
+    const MirrorShare& m = r.mirrors[i];
+    text +=
+        fmt::format("  server {}: {} requests, {} bytes, {:.0f} kB/s{}\n", i + 1, m.requests,
+                    grouped(m.bytes), m.bytes_s / 1e3, m.dropped.empty() ? "" : "; dropped: " + m.dropped);
+  }
+  if (r.probes > 0)
+    text += fmt::format("{} test packets with {} bytes beside the textures; mean error {:.1f} %\n", r.probes,
+                        grouped(r.probe_bytes), 100 * mean_probe_error(r, link, p.mesh_s));
+  return text;
+}
+
 /// The whole counts from the first request on, the rest is of the textures alone (the thesis's T_0).
 Json result_json(const DeliveryPlan& p, double limit_s) {
   const SimulationResult& r = p.textures;
@@ -231,7 +275,8 @@ std::string result_text(const DeliveryPlan& p, double limit_s) {
 }
 
 void simulate_package(const SimulateArguments& a) {
-  const DeliveryRequest request = delivery_request(a);
+  DeliveryRequest request = delivery_request(a);
+  request.probe = probe_options(a.probe);
   PackageReader package(open_store(a.package));
   const DeliveryPlan plan = plan_delivery(package, request);
   const FragmentList list = list_of(package, request, plan);
@@ -253,10 +298,12 @@ void simulate_package(const SimulateArguments& a) {
     return;
   }
   if (a.json) {
-    std::cout << result_json(plan, request.time_limit_s).dump() << '\n';
+    Json j = result_json(plan, request.time_limit_s);
+    add_link_json(plan, request.network.link, j);
+    std::cout << j.dump() << '\n';
     return;
   }
-  std::cout << result_text(plan, request.time_limit_s);
+  std::cout << result_text(plan, request.time_limit_s) << link_text(plan, request.network.link);
   for (const std::string& w : plan.warnings) std::cout << "warning: " << w << '\n';
 }
 
@@ -292,6 +339,7 @@ void add_simulate_command(Command& app) {
   auto args = std::make_shared<SimulateArguments>();
   Command c = app.add("simulate", "Play a transfer over a model of a network");
   add_delivery_options(c, *args, false);
+  add_probe_options(c, args->probe);
   add_output_options(c, *args);
   c.examples(
       "  texmesh simulate bust.texmesh --time 5 --bandwidth 2Mbit/s --rtt 50 --policy htca\n"

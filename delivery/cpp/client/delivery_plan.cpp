@@ -25,6 +25,7 @@ NetworkOptions shifted(NetworkOptions network, double by_s) {
   for (MirrorModel& m : network.mirrors) {
     m.rate = shifted(m.rate, by_s);
     m.dead_from_s = std::max(0.0, m.dead_from_s - by_s);
+    m.lies_from_s = std::max(0.0, m.lies_from_s - by_s);
   }
   return network;
 }
@@ -138,6 +139,7 @@ DeliveryPlan plan_at_scale(TextureLoss& loss, const DeliveryRequest& request, in
   HtcOptions htc = request.htc;
   htc.time_limit_s = request.time_limit_s - plan.mesh_s;
   htc.rtt_s = request.network.rtt_s;
+  htc.sites = static_cast<int>(std::clamp<std::size_t>(request.network.mirrors.size(), 1, 64));
   htc.throughput.initial_bytes_s =
       request.beta0_bytes_s > 0 ? request.beta0_bytes_s : shown_throughput(plan, manifest_s, htc.rtt_s);
   const TextureBudget budget = texture_for_budget(
@@ -156,7 +158,7 @@ DeliveryPlan plan_at_scale(TextureLoss& loss, const DeliveryRequest& request, in
       plan.warnings.push_back(
           "less than 30 round trips are left for textures: the limit may be missed by more than 2 %");
     const NetworkOptions network = without_dead_mirrors(request.network, plan.mesh_s);
-    plan.textures = simulate(list.offers, htc, shifted(network, plan.mesh_s));
+    plan.textures = simulate(list.offers, htc, shifted(network, plan.mesh_s), request.probe);
     plan.complete_s = plan.mesh_s + plan.textures.end_s;
   }
   plan.texture_bytes = plan.textures.bytes;

@@ -19,6 +19,7 @@ struct DeliveryRequest {
   double beta0_bytes_s = 0;  // first guess of the throughput; 0 = what the mesh's transfer has shown
   HtcOptions htc;            // policy, order, window ..: its time limit and beta_0 are set from the others
   NetworkOptions network;
+  ProbeOptions probe;  // test packets beside the textures
 };
 
 /// What a viewer will get. The time of a part that never comes, because every server dies before, is
