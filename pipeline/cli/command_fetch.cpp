@@ -1,10 +1,7 @@
-#include <fmt/format.h>
 #include <chrono>
 #include <csignal>
 #include <iostream>
-#include <map>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "delivery/cpp/client/texture_loader.h"
@@ -14,20 +11,19 @@
 #include "format/container/layout.h"
 #include "format/rules/proxy_choice.h"
 #include "pipeline/cli/commands.h"
+#include "pipeline/cli/fetch/fetched.h"
+#include "pipeline/cli/fetch/link_watch.h"
 #include "pipeline/cli/fetched_files.h"
-#include "pipeline/cli/link_watch.h"
 #include "pipeline/cli/options/command_line.h"
 #include "pipeline/cli/options/delivery_options.h"
 #include "pipeline/cli/options/probe_options.h"
 #include "pipeline/cli/options/units.h"
 #include "pipeline/extract/glb/scale_file.h"
 #include "pipeline/io/exit_codes.h"
-#include "pipeline/io/text_table.h"
 
 namespace texmesh {
 namespace {
 
-using Json = nlohmann::ordered_json;
 using Clock = std::chrono::steady_clock;
 
 struct FetchArguments {
@@ -43,20 +39,6 @@ volatile std::sig_atomic_t interrupted = 0;
 double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
-
-/// What the transfer came to.
-struct Fetched {
-  int scale = 0;
-  std::optional<std::uint32_t> proxy;  // shown instead of the scale
-  double rtt_s = 0, first_picture_s = 0, mesh_s = 0, end_s = 0;
-  std::uint64_t mesh_bytes = 0, texture_bytes = 0;  // mesh: the documents and the first picture, too
-  HttpPlace place;
-  bool whole_rungs = false;
-  LoadReport load;
-  std::optional<LoadReport> refined;
-  double texture_flip = 0, flip = 0;  // predicted of what has come
-  std::vector<std::string> urls;      // in the order of load.mirrors
-};
 
 /// What has moved so far and in which time, without the round trips.
 struct Moved {
@@ -264,107 +246,6 @@ Fetched fetch(const FetchArguments& a, LinkWatch& watch) {
   return f;
 }
 
-/// What the link has shown: shares of servers, test packets, a recording.
-void add_link_json(const Fetched& f, const LinkWatch& watch, Json& j) {
-  if (f.load.mirrors.size() > 1) {
-    Json servers = Json::array();
-    for (std::size_t i = 0; i < f.load.mirrors.size(); ++i) {
-      const MirrorShare& m = f.load.mirrors[i];
-      servers.push_back({{"url", shown_url(f.urls[i])},
-                         {"requests", m.requests},
-                         {"bytes", m.bytes},
-                         {"bytes_s", m.bytes_s}});
-      if (!m.dropped.empty()) servers.back()["dropped"] = m.dropped;
-    }
-    j["servers"] = servers;
-  }
-  if (watch.probes()) {
-    Json samples = Json::array();
-    for (const BandwidthSample& s : watch.monitor().samples())
-      samples.push_back({{"time_s", s.time_s},
-                         {"packet_bytes", s.packet_bytes},
-                         {"seconds", s.seconds},
-                         {"bytes_s", s.bytes_s}});
-    j["probes"] = {
-        {"packets", watch.monitor().sent()}, {"bytes", watch.monitor().sent_bytes()}, {"samples", samples}};
-  }
-}
-
-void print_link(const Fetched& f, const LinkWatch& watch) {
-  for (std::size_t i = 0; i < f.load.mirrors.size() && f.load.mirrors.size() > 1; ++i) {
-    const MirrorShare& m = f.load.mirrors[i];
-    std::cout << fmt::format("  {}: {} requests, {} bytes, {:.0f} kB/s{}\n", shown_url(f.urls[i]), m.requests,
-                             grouped(m.bytes), m.bytes_s / 1e3,
-                             m.dropped.empty() ? "" : "; dropped: " + m.dropped);
-  }
-  if (watch.probes()) {
-    const BandwidthMonitor& monitor = watch.monitor();
-    std::cout << fmt::format("{} test packets with {} bytes beside the textures, {} arrived", monitor.sent(),
-                             grouped(monitor.sent_bytes()), monitor.samples().size());
-    if (!monitor.samples().empty())
-      std::cout << fmt::format("; the last one: {:.0f} kB/s", monitor.samples().back().bytes_s / 1e3);
-    std::cout << '\n';
-  }
-  if (watch.recorded_steps() > 0)
-    std::cout << fmt::format("recorded the link in {} steps\n", watch.recorded_steps());
-}
-
-Json fetch_json(const Fetched& f, double limit_s) {
-  Json j{{"version", 1},
-         {"scale", f.scale},
-         {"rtt_s", f.rtt_s},
-         {"url", shown_url(f.place.url)},
-         {"whole_rungs", f.whole_rungs},
-         {"first_picture_s", f.first_picture_s},
-         {"mesh_s", f.mesh_s},
-         {"end_s", f.end_s},
-         {"deviation_percent", 100 * (limit_s - f.end_s) / limit_s},
-         {"mesh_bytes", f.mesh_bytes},
-         {"texture_bytes", f.texture_bytes},
-         {"requests", f.load.transfer.steps.size()},
-         {"fragments", f.load.fragments},
-         {"skipped", f.load.skipped},
-         {"given_up", f.load.given_up},
-         {"problems", f.load.problems},
-         {"cancelled", f.load.cancelled},
-         {"texture_flip", f.texture_flip},
-         {"flip", f.flip}};
-  if (f.proxy) j["proxy"] = *f.proxy;
-  if (f.refined)
-    j["refined"] = {{"seconds", f.refined->transfer.end_s}, {"bytes", f.refined->transfer.bytes}};
-  return j;
-}
-
-void print_fetched(const Fetched& f, double limit_s) {
-  if (f.proxy) {
-    std::cout << fmt::format(
-        "{}: first picture after {:.3f} s, {} after {:.3f} s ({} bytes); round trip {:.1f} ms\n"
-        "predicted FLIP {:.4f} (0 = equal to the source): nothing else is needed\n",
-        shown_url(f.place.url), f.first_picture_s, proxy_path(*f.proxy), f.mesh_s, grouped(f.mesh_bytes),
-        1000 * f.rtt_s, f.flip);
-    return;
-  }
-  std::cout << fmt::format(
-      "{}: first picture and tables after {:.3f} s, S_{} after {:.3f} s ({} bytes); round trip {:.1f} ms\n"
-      "textures after {:.3f} s: {:+.2f} % of the limit of {:.2f} s, {} bytes in {} fragments, {} skipped, {} "
-      "given up\n",
-      shown_url(f.place.url), f.first_picture_s, f.scale, f.mesh_s, grouped(f.mesh_bytes), 1000 * f.rtt_s,
-      f.end_s, 100 * (limit_s - f.end_s) / limit_s, limit_s, grouped(f.load.transfer.bytes), f.load.fragments,
-      f.load.skipped, f.load.given_up);
-  if (f.place.in_memory)
-    std::cout << "the server knows no ranges and has no tree: the whole container was fetched\n";
-  else if (f.whole_rungs)
-    std::cout << "whole rungs: all fragments of a texture at once\n";
-  for (const auto& [why, count] : f.load.problems) std::cout << fmt::format("  {} x {}\n", count, why);
-  if (f.refined)
-    std::cout << fmt::format("refined for {:.3f} s with {} bytes{}\n", f.refined->transfer.end_s,
-                             grouped(f.refined->transfer.bytes),
-                             f.refined->out_of_time ? ", until its time was over" : "");
-  std::cout << fmt::format(
-      "predicted FLIP {:.4f} (0 = equal to the source), {:.4f} by the textures alone{}\n", f.flip,
-      f.texture_flip, f.load.cancelled ? "; cancelled" : "");
-}
-
 int run_fetch(FetchArguments& args) {
   std::signal(SIGINT, [](int) {
     interrupted = 1;
@@ -382,14 +263,7 @@ int run_fetch(FetchArguments& args) {
     std::cerr << "interrupted\n";
     return 130;
   }
-  if (args.json) {
-    Json j = fetch_json(f, limit_s);
-    add_link_json(f, watch, j);
-    std::cout << j.dump() << '\n';
-  } else {
-    print_fetched(f, limit_s);
-    print_link(f, watch);
-  }
+  std::cout << (args.json ? fetched_json(f, watch, limit_s) : fetched_text(f, watch, limit_s));
   return f.load.cancelled ? 130 : f.load.given_up > 0 ? kExitDifferent : kExitOk;
 }
 

@@ -9,7 +9,8 @@ namespace {
 constexpr double kMostChange = 8;  // of size and interval, from where they began
 constexpr double kLeastBytes = 64, kMostBytes = 1 << 24;
 constexpr double kLeastInterval_s = 0.01, kMostInterval_s = 3600;
-constexpr double kLeastPacket_s = 1e-4;  // what comes in one burst says little
+constexpr double kLeastPacket_s = 1e-4;
+constexpr double kLeastShare = 0.2;  // of a packet's time: what comes in one burst says little of the link
 
 /// Not for NaN either.
 bool within(double x, double least, double most) { return x >= least && x <= most; }
@@ -41,7 +42,7 @@ std::uint64_t BandwidthMonitor::send(double now_s) {
 void BandwidthMonitor::arrived(double now_s, double rtt_s, double moved_bytes) {
   under_way_ = false;
   const double packet = static_cast<double>(static_cast<std::uint64_t>(packet_bytes_));
-  const double seconds = std::max(kLeastPacket_s, now_s - sent_s_ - rtt_s);
+  const double seconds = std::max({kLeastPacket_s, kLeastShare * (now_s - sent_s_), now_s - sent_s_ - rtt_s});
   samples_.push_back({now_s, packet, seconds, std::max(packet, moved_bytes) / seconds});
   if (options_.mode != ProbeMode::kAdaptive) return;
   const double factor = samples_.back().bytes_s < options_.threshold_bytes_s ? 0.5 : 2;

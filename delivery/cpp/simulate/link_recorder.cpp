@@ -33,7 +33,7 @@ class TraceSteps {
     bytes_ += bytes;
   }
   BandwidthTrace finish() {
-    if (busy_s_ > 0 || trace_.time_s.empty()) push();
+    if (busy_s_ >= kLeastBusy * step_s_ || trace_.time_s.empty()) push();
     while (trace_.bytes_s.size() > 1 && trace_.bytes_s.back() <= 0) {
       trace_.time_s.pop_back();
       trace_.bytes_s.pop_back();

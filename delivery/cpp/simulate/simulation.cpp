@@ -75,8 +75,9 @@ class ModelTransport final : public Transport {
     model_.cancel(number);
   }
   double received(std::uint32_t number) override {
-    const auto left = model_.bytes_left(number);
-    return left ? parts_[number].bytes - *left : 0;
+    const auto part = parts_.find(number);
+    if (part == parts_.end()) return 0;
+    return part->second.bytes - model_.bytes_left(number).value_or(part->second.left);
   }
   std::optional<Outcome> wait(double until_s) override {
     const auto arrival = model_.advance(until_s);
@@ -147,6 +148,30 @@ SimulationResult simulate(std::vector<FragmentOffer> offers, const HtcOptions& o
 NetworkOptions without_dead_mirrors(NetworkOptions network, double now_s) {
   const auto dead = [now_s](const MirrorModel& m) { return m.dead_from_s + kFoundDead_s <= now_s; };
   if (!std::ranges::all_of(network.mirrors, dead)) std::erase_if(network.mirrors, dead);
+  return network;
+}
+
+namespace {
+
+BandwidthTrace trace_from(const BandwidthTrace& trace, double by_s) {
+  BandwidthTrace out{{0}, {trace.at(by_s)}};
+  for (std::size_t i = 0; i < trace.time_s.size(); ++i)
+    if (trace.time_s[i] > by_s) {
+      out.time_s.push_back(trace.time_s[i] - by_s);
+      out.bytes_s.push_back(trace.bytes_s[i]);
+    }
+  return out;
+}
+
+}  // namespace
+
+NetworkOptions network_from(NetworkOptions network, double by_s) {
+  network.link = trace_from(network.link, by_s);
+  for (MirrorModel& m : network.mirrors) {
+    m.rate = trace_from(m.rate, by_s);
+    m.dead_from_s = std::max(0.0, m.dead_from_s - by_s);
+    m.lies_from_s = std::max(0.0, m.lies_from_s - by_s);
+  }
   return network;
 }
 

@@ -41,6 +41,8 @@ SimulationResult simulate(std::vector<FragmentOffer> offers, const HtcOptions& o
                           const NetworkOptions& network, const ProbeOptions& probe = {});
 /// The network without the mirrors that a client has found dead by then, unless that is all of them.
 NetworkOptions without_dead_mirrors(NetworkOptions network, double now_s);
+/// The network as it is from `by_s` on: its times count from there.
+NetworkOptions network_from(NetworkOptions network, double by_s);
 /// Time at which so many bytes asked for at `from_s` are complete on an otherwise idle network, from
 /// whichever of its mirrors answers; +infinity when none does.
 double fetched_s(const NetworkOptions& network, double from_s, std::uint64_t bytes);

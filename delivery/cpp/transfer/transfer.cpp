@@ -49,6 +49,8 @@ class Mirrors {
   }
   /// The request is no longer its.
   void released(std::uint32_t m, double bytes) { mirrors_[m].owed_bytes -= bytes; }
+  /// It delivers, but not in the time that was expected.
+  void slow(std::uint32_t m, double bytes, double seconds) { mirrors_[m].throughput.add(bytes, seconds); }
   /// It is left alone while another answers.
   void failed(std::uint32_t m) {
     mirrors_[m].alive = false;
@@ -212,8 +214,8 @@ class TransferRun {
     const double expected = mirrors_.asked(a.mirror, bytes);
     a.patience_s = std::max({kLeastRetry_s, kLeastRetryRtts * options_.rtt_s, kRetryFactor * expected});
     a.at_s = now_s;
-    a.received = 0;
-    a.mixed = transport_.received(a.request.number) > 0;
+    a.received = transport_.received(a.request.number);
+    a.mixed = a.received > 0;
     ++a.tries;
     transport_.start(a.request, a.mirror);
     asked_[a.request.number] = std::move(a);
@@ -321,10 +323,28 @@ class TransferRun {
       late.push_back(a);
     }
     for (Asked& a : late) {
+      const double come = transport_.received(a.request.number) - a.received;
+      if (come >= kProgressBytes) {
+        move_elsewhere(std::move(a), come);
+        continue;
+      }
       transport_.cancel(a.request.number);
       asked_.erase(a.request.number);
       retry_or_give_up(std::move(a), "no answer in time");
     }
+  }
+  /// A mirror that is slower than was thought keeps what it can deliver: by its new estimate it gets less.
+  void move_elsewhere(Asked a, double come) {
+    const auto beside =
+        std::ranges::count_if(asked_, [&](const auto& other) { return other.second.mirror == a.mirror; });
+    mirrors_.slow(a.mirror, come * static_cast<double>(beside), transport_.now_s() - a.at_s);
+    transport_.cancel(a.request.number);
+    asked_.erase(a.request.number);
+    mirrors_.released(a.mirror, static_cast<double>(a.request.bytes));
+    ++end_.problems["too slow, asked elsewhere"];
+    --a.tries;
+    const std::uint32_t from = a.mirror;
+    ask(std::move(a), from);
   }
 
   RequestSource& source_;

@@ -103,9 +103,10 @@ struct TransferEnd {
 /// - A mirror that lies (bytes of another digest) is dropped, and all that it still owes goes to others. It
 /// is
 ///   asked again only where there is no other.
-/// - A mirror is late when it has delivered nothing for four times the expected time (at least 8 round trips
-///   and half a second). Its requests go to another mirror, and it is left alone as long as another answers.
-///   When no mirror is left, all are tried again.
+/// - A request is late when it is not there after four times the expected time (at least 8 round trips and
+///   half a second) while another mirror delivers. It goes to another mirror. A mirror that has brought
+///   nothing of it is left alone as long as another answers; one that has brought a part is slower than was
+///   thought, and gets less from then on. When no mirror is left, all are tried again.
 /// - A mirror that is busy is asked again after a pause that grows, or after the pause that the mirror names.
 /// - Every request ends: it arrives, or is given up after its tries or when nothing can arrive any more. The
 ///   source hears of every end.

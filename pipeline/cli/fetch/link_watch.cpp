@@ -1,4 +1,4 @@
-#include "pipeline/cli/link_watch.h"
+#include "pipeline/cli/fetch/link_watch.h"
 
 #include <fmt/format.h>
 #include <algorithm>
