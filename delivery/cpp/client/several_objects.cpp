@@ -4,6 +4,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "format/rules/proxy_choice.h"
+
 namespace texmesh {
 namespace {
 
@@ -22,6 +24,26 @@ DeliveryRequest request_for(const DeliveryRequest& page, const PageObject& objec
   return r;
 }
 
+/// Nothing but what the first requests bring.
+void keep_first_picture(const PageObject& object, const DeliveryRequest& request, DeliveryPlan& p) {
+  PackageReader& package = *object.package;
+  const Manifest& m = package.manifest();
+  p.scale = m.scales.back().scale;
+  p.mesh_bytes = p.table_bytes = p.texture_bytes = 0;
+  p.textures = {};
+  if (!m.proxies.empty()) {
+    p.proxy = 0;
+    p.flip = p.texture_flip = proxy_loss(m, 0, object.displayed_px).flip;
+    return;
+  }
+  p.proxy.reset();
+  p.planes = full_size(package);
+  const FragmentList list = list_of(package, request, p);
+  const PerGroup losses = losses_of(list, std::vector<std::int32_t>(list.offers.size(), -1));
+  p.texture_flip = texture_flip(package.quality(), losses);
+  p.flip = picture_flip(package.quality(), object.displayed_px, p.scale, losses);
+}
+
 /// The fragments of all objects in one list.
 struct PageList {
   std::vector<FragmentList> lists;    // of each object; empty where a proxy is shown
@@ -33,7 +55,7 @@ PageList page_list(const std::vector<PageObject>& objects, const DeliveryRequest
   PageList page;
   for (std::size_t i = 0; i < objects.size(); ++i) {
     page.lists.emplace_back();
-    if (plan.objects[i].proxy) continue;
+    if (plan.objects[i].proxy || plan.first_picture_only[i]) continue;
     page.lists[i] = list_of(*objects[i].package, request_for(request, objects[i], share[i]), plan.objects[i]);
     for (FragmentOffer offer : page.lists[i].offers) {
       for (double& loss : offer.loss) loss *= share[i];
@@ -90,10 +112,11 @@ void predict_objects(const std::vector<PageObject>& objects, const PageList& pag
   std::size_t at = 0;
   for (std::size_t i = 0; i < objects.size(); ++i) {
     DeliveryPlan& p = plan.objects[i];
+    const bool picture_only = plan.first_picture_only[i];
     p.first_picture_s = plan.first_pictures_s;
-    p.mesh_s = plan.meshes_s;
-    p.complete_s = p.proxy ? plan.meshes_s : plan.complete_s;
-    if (p.proxy) continue;
+    p.mesh_s = picture_only ? plan.first_pictures_s : plan.meshes_s;
+    p.complete_s = picture_only || p.proxy ? p.mesh_s : plan.complete_s;
+    if (picture_only || p.proxy) continue;
     const std::size_t count = page.lists[i].fragments.size();
     const auto first = plan.textures.rungs.begin() + static_cast<std::ptrdiff_t>(at);
     p.textures.rungs.assign(first, first + static_cast<std::ptrdiff_t>(count));
@@ -124,7 +147,10 @@ PagePlan plan_page(const std::vector<PageObject>& objects, const DeliveryRequest
   for (const PageObject& o : objects) share.push_back(o.displayed_px * o.displayed_px / area);
   PagePlan plan;
   for (std::size_t i = 0; i < objects.size(); ++i) {
-    plan.objects.push_back(plan_delivery(*objects[i].package, request_for(request, objects[i], share[i])));
+    const DeliveryRequest mine = request_for(request, objects[i], share[i]);
+    plan.objects.push_back(plan_delivery(*objects[i].package, mine));
+    plan.first_picture_only.push_back(!(plan.objects[i].mesh_s < request.time_limit_s));
+    if (plan.first_picture_only[i]) keep_first_picture(objects[i], mine, plan.objects[i]);
     plan.alone_flip.push_back(plan.objects[i].flip);
     plan.alone_mean_flip += share[i] * plan.objects[i].flip;
   }

@@ -16,6 +16,7 @@ struct PageObject {
 struct PagePlan {
   /// Of each object: scale or proxy, planes, bytes, predicted FLIP. Times are the page's.
   std::vector<DeliveryPlan> objects;
+  std::vector<bool> first_picture_only;  // what more there is would not come in time with the object's part
   /// The objects one by one, each with its part of the link to itself: the same choices and the same limit.
   std::vector<double> alone_flip;
   double first_pictures_s = 0, meshes_s = 0, complete_s = 0;
@@ -26,9 +27,10 @@ struct PagePlan {
 
 /// First pictures of all objects come first, then the meshes and tables of all, then the fragments of all in
 /// one list with one limit: a fragment's losses count by the square of its object's displayed height. What
-/// each object should be (scale or proxy, planes) is planned with that part of the link. All packages come
-/// over the same link; request.displayed_px and request.scale are those of the objects.
-/// std::invalid_argument for no object. Deterministic.
+/// each object should be (scale or proxy, planes) is planned with that part of the link. Where the object's
+/// mesh would come too late so, its first picture stays, and its part is the others'. All packages come over
+/// the same link; request.displayed_px and request.scale are those of the objects. std::invalid_argument for
+/// no object. Deterministic.
 PagePlan plan_page(const std::vector<PageObject>& objects, const DeliveryRequest& request);
 
 }  // namespace texmesh
