@@ -1,10 +1,7 @@
-#include <fmt/format.h>
 #include <chrono>
 #include <csignal>
 #include <iostream>
-#include <map>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "delivery/cpp/client/texture_loader.h"
@@ -14,24 +11,26 @@
 #include "format/container/layout.h"
 #include "format/rules/proxy_choice.h"
 #include "pipeline/cli/commands.h"
+#include "pipeline/cli/fetch/fetched.h"
+#include "pipeline/cli/fetch/link_watch.h"
 #include "pipeline/cli/fetched_files.h"
 #include "pipeline/cli/options/command_line.h"
 #include "pipeline/cli/options/delivery_options.h"
+#include "pipeline/cli/options/probe_options.h"
 #include "pipeline/cli/options/units.h"
 #include "pipeline/extract/glb/scale_file.h"
 #include "pipeline/io/exit_codes.h"
-#include "pipeline/io/text_table.h"
 
 namespace texmesh {
 namespace {
 
-using Json = nlohmann::ordered_json;
 using Clock = std::chrono::steady_clock;
 
 struct FetchArguments {
   DeliveryArguments delivery;
+  ProbeArguments probe;
   std::vector<std::string> mirrors;
-  std::string refine = "0", output;
+  std::string refine = "0", output, record, history;
   bool whole_rungs = false, json = false;
 };
 
@@ -40,19 +39,6 @@ volatile std::sig_atomic_t interrupted = 0;
 double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
-
-/// What the transfer came to.
-struct Fetched {
-  int scale = 0;
-  std::optional<std::uint32_t> proxy;  // shown instead of the scale
-  double rtt_s = 0, first_picture_s = 0, mesh_s = 0, end_s = 0;
-  std::uint64_t mesh_bytes = 0, texture_bytes = 0;  // mesh: the documents and the first picture, too
-  HttpPlace place;
-  bool whole_rungs = false;
-  LoadReport load;
-  std::optional<LoadReport> refined;
-  double texture_flip = 0, flip = 0;  // predicted of what has come
-};
 
 /// What has moved so far and in which time, without the round trips.
 struct Moved {
@@ -149,20 +135,26 @@ HttpOptions http_options(double time_limit_s) {
   return http;
 }
 
+std::vector<std::string> all_urls(const FetchArguments& a) {
+  std::vector<std::string> urls{a.delivery.package};
+  urls.insert(urls.end(), a.mirrors.begin(), a.mirrors.end());
+  return urls;
+}
+
 /// From where the package is, and its mirrors.
-std::unique_ptr<Transport> fragment_transport(const FetchArguments& a, const HttpPlace& place,
-                                              const HttpOptions& http, PackageStore& store) {
+std::unique_ptr<Transport> fragment_transport(const FetchArguments& a, const HttpOptions& http,
+                                              PackageStore& store, Fetched& f) {
+  const HttpPlace& place = f.place;
+  f.urls = {place.url};
   if (place.in_memory) return open_transport(store);
   TransportOptions options;
   options.http = http;
   options.connections = a.delivery.connections;
-  std::vector<std::string> all{a.delivery.package};
-  all.insert(all.end(), a.mirrors.begin(), a.mirrors.end());
-  std::vector<std::string> mirrors{place.url};
+  const std::vector<std::string> all = all_urls(a);
   for (std::size_t i = 0; i < all.size(); ++i)
-    if (i != place.mirror) mirrors.push_back(all[i]);
+    if (i != place.mirror) f.urls.push_back(all[i]);
   if (!place.etag.empty()) options.etags[place.url] = place.etag;
-  return open_transport(mirrors, options);
+  return open_transport(f.urls, options);
 }
 
 void predict(PackageReader& package, const TextureLoader& loader, const std::vector<PlaneChoice>& planes,
@@ -194,10 +186,11 @@ std::vector<PlaneChoice> choose_textures(PackageReader& package, LoadOptions& lo
 
 void fetch_textures(const FetchArguments& a, const DeliveryRequest& request, const HttpOptions& http,
                     PackageReader& package, Clock::time_point start, double bytes_s, FetchedFiles& writer,
-                    Fetched& f) {
+                    LinkWatch& watch, Fetched& f) {
   f.whole_rungs = a.whole_rungs || !f.place.ranges;
-  const auto transport = fragment_transport(a, f.place, http, package.store());
-  TextureLoader loader(package, *transport, f.whole_rungs);
+  const auto transport = fragment_transport(a, http, package.store(), f);
+  const bool network = !f.place.in_memory && f.place.ranges;
+  TextureLoader loader(package, watch.monitored(*transport, package, network, f.rtt_s), f.whole_rungs);
   LoadOptions load;
   load.list.scale = f.scale;
   load.list.displayed_px = request.displayed_px;
@@ -218,21 +211,27 @@ void fetch_textures(const FetchArguments& a, const DeliveryRequest& request, con
   predict(package, loader, planes, load.list, f);
 }
 
-Fetched fetch(const FetchArguments& a) {
+/// Bytes per second of all that was fetched.
+double mean_bytes_s(const Fetched& f, Moved moved) {
+  const double textures_s = f.end_s - f.mesh_s;
+  if (f.load.transfer.bytes > 0 && textures_s > 0) moved.add(f.load.transfer.bytes, textures_s, f.rtt_s);
+  return moved.bytes_s(f.place.bytes_s);
+}
+
+Fetched fetch(const FetchArguments& a, LinkWatch& watch) {
   const DeliveryRequest request = delivery_request(a.delivery);
-  const HttpOptions http = http_options(request.time_limit_s);
-  std::vector<std::string> mirrors{a.delivery.package};
-  mirrors.insert(mirrors.end(), a.mirrors.begin(), a.mirrors.end());
+  const HttpOptions http = watch.watched(http_options(request.time_limit_s));
   Fetched f;
   Moved moved;
   const auto start = Clock::now();
-  auto opened = open_urls(mirrors, http);
+  auto opened = open_urls(all_urls(a), http);
   const HttpStore& server = *opened;
   PackageReader package(std::move(opened));
   f.place = server.place();
   f.rtt_s = request.network.rtt_s > 0 ? request.network.rtt_s : f.place.rtt_s;
   const auto bytes_s = [&] {
-    return request.beta0_bytes_s > 0 ? request.beta0_bytes_s : moved.bytes_s(f.place.bytes_s);
+    return request.beta0_bytes_s > 0 ? request.beta0_bytes_s
+                                     : watch.beta0(f.place.url, moved.bytes_s(f.place.bytes_s));
   };
   FetchedFiles writer(package, a.output);
   const bool proxies =
@@ -249,69 +248,15 @@ Fetched fetch(const FetchArguments& a) {
   }
   if (f.proxy) {
     end_with_proxy(package, request.displayed_px, start, writer, f, moved);
+    watch.finish({f.place.url}, f.load, f.rtt_s, mean_bytes_s(f, moved));
     return f;
   }
   writer.write_entry(mesh_path(f.scale), fetch_mesh(package, f, moved));
   f.mesh_s = seconds_since(start);
   f.place = server.place();
-  fetch_textures(a, request, http, package, start, bytes_s(), writer, f);
+  fetch_textures(a, request, http, package, start, bytes_s(), writer, watch, f);
+  watch.finish(f.urls, f.load, f.rtt_s, mean_bytes_s(f, moved));
   return f;
-}
-
-Json fetch_json(const Fetched& f, double limit_s) {
-  Json j{{"version", 1},
-         {"scale", f.scale},
-         {"rtt_s", f.rtt_s},
-         {"url", shown_url(f.place.url)},
-         {"whole_rungs", f.whole_rungs},
-         {"first_picture_s", f.first_picture_s},
-         {"mesh_s", f.mesh_s},
-         {"end_s", f.end_s},
-         {"deviation_percent", 100 * (limit_s - f.end_s) / limit_s},
-         {"mesh_bytes", f.mesh_bytes},
-         {"texture_bytes", f.texture_bytes},
-         {"requests", f.load.transfer.steps.size()},
-         {"fragments", f.load.fragments},
-         {"skipped", f.load.skipped},
-         {"given_up", f.load.given_up},
-         {"problems", f.load.problems},
-         {"cancelled", f.load.cancelled},
-         {"texture_flip", f.texture_flip},
-         {"flip", f.flip}};
-  if (f.proxy) j["proxy"] = *f.proxy;
-  if (f.refined)
-    j["refined"] = {{"seconds", f.refined->transfer.end_s}, {"bytes", f.refined->transfer.bytes}};
-  return j;
-}
-
-void print_fetched(const Fetched& f, double limit_s) {
-  if (f.proxy) {
-    std::cout << fmt::format(
-        "{}: first picture after {:.3f} s, {} after {:.3f} s ({} bytes); round trip {:.1f} ms\n"
-        "predicted FLIP {:.4f} (0 = equal to the source): nothing else is needed\n",
-        shown_url(f.place.url), f.first_picture_s, proxy_path(*f.proxy), f.mesh_s, grouped(f.mesh_bytes),
-        1000 * f.rtt_s, f.flip);
-    return;
-  }
-  std::cout << fmt::format(
-      "{}: first picture and tables after {:.3f} s, S_{} after {:.3f} s ({} bytes); round trip {:.1f} ms\n"
-      "textures after {:.3f} s: {:+.2f} % of the limit of {:.2f} s, {} bytes in {} fragments, {} skipped, {} "
-      "given up\n",
-      shown_url(f.place.url), f.first_picture_s, f.scale, f.mesh_s, grouped(f.mesh_bytes), 1000 * f.rtt_s,
-      f.end_s, 100 * (limit_s - f.end_s) / limit_s, limit_s, grouped(f.load.transfer.bytes), f.load.fragments,
-      f.load.skipped, f.load.given_up);
-  if (f.place.in_memory)
-    std::cout << "the server knows no ranges and has no tree: the whole container was fetched\n";
-  else if (f.whole_rungs)
-    std::cout << "whole rungs: all fragments of a texture at once\n";
-  for (const auto& [why, count] : f.load.problems) std::cout << fmt::format("  {} x {}\n", count, why);
-  if (f.refined)
-    std::cout << fmt::format("refined for {:.3f} s with {} bytes{}\n", f.refined->transfer.end_s,
-                             grouped(f.refined->transfer.bytes),
-                             f.refined->out_of_time ? ", until its time was over" : "");
-  std::cout << fmt::format(
-      "predicted FLIP {:.4f} (0 = equal to the source), {:.4f} by the textures alone{}\n", f.flip,
-      f.texture_flip, f.load.cancelled ? "; cancelled" : "");
 }
 
 int run_fetch(FetchArguments& args) {
@@ -321,18 +266,17 @@ int run_fetch(FetchArguments& args) {
   });
   args.delivery.needs_link = false;
   const double limit_s = parse_duration(args.delivery.time, "--time");
+  LinkWatch watch(args.record, args.history, probe_options(args.probe));
+  if (!watch.problem().empty()) std::cerr << "warning: no historic average: " << watch.problem() << '\n';
   Fetched f;
   try {
-    f = fetch(args);
+    f = fetch(args, watch);
   } catch (const InputError&) {
     if (interrupted == 0) throw;
     std::cerr << "interrupted\n";
     return 130;
   }
-  if (args.json)
-    std::cout << fetch_json(f, limit_s).dump() << '\n';
-  else
-    print_fetched(f, limit_s);
+  std::cout << (args.json ? fetched_json(f, watch, limit_s) : fetched_text(f, watch, limit_s));
   return f.load.cancelled ? 130 : f.load.given_up > 0 ? kExitDifferent : kExitOk;
 }
 
@@ -359,6 +303,16 @@ void add_fetch_options(Command& c, FetchArguments& args) {
   add_policy_option(c, d).rare();
   add_window_option(c, d).rare();
   c.option("--connections", d.connections, "Connections per server").integer_in(1, 64).shows_default().rare();
+  c.option("--record", args.record, "Write the link's throughput as a trace for simulate --trace")
+      .value_name("FILE")
+      .rare();
+  c.option(
+       "--history", args.history,
+       "File that keeps each host's average throughput from run to run, the first guess of the next; state "
+       "= links.json in the user's state folder (default: none is kept)")
+      .value_name("FILE")
+      .rare();
+  add_probe_options(c, args.probe);
   c.flag("--whole-rungs", args.whole_rungs,
          "Ask for all fragments of a texture at once, as of servers without ranges")
       .rare();
@@ -374,8 +328,9 @@ void add_fetch_command(Command& app) {
       "  texmesh fetch https://host/bust.texmesh --time 4 --display 800\n"
       "  texmesh fetch https://a/bust.texmesh --mirror https://b/bust.texmesh --time 2 --refine 10 -o got");
   c.notes(
-      "fetch checks every fragment against its digest. What a server fails to deliver, fetch asks of "
-      "another server. The package is read from the first server that answers. A server that knows no "
+      "fetch checks every fragment against its digest. The fragments of a texture are dealt to the servers by "
+      "their speed. A server whose bytes are wrong is dropped; what a server fails to deliver, fetch asks of "
+      "another one. A folder (URL with a slash) may lack some of the files. The package is read from the first server that answers. A server that knows no "
       "ranges is asked for whole rungs of the tree beside the container.\n"
       "Exit code: 0, 1 when the package cannot be read, 2 usage, 4 when fragments were given up, 130 when "
       "interrupted.");

@@ -2,11 +2,16 @@
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "delivery/cpp/decide/htc_theorem.h"
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/options/command_line.h"
 #include "pipeline/cli/options/delivery_options.h"
+#include "pipeline/cli/options/probe_options.h"
+#include "pipeline/cli/simulate/lost_packets.h"
+#include "pipeline/cli/simulate/simulated_link.h"
+#include "pipeline/cli/simulate/simulated_page.h"
 #include "pipeline/inspect/simulation_plot.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"
@@ -20,7 +25,10 @@ using Json = nlohmann::ordered_json;
 constexpr int kPlotSamples = 400;
 
 struct SimulateArguments : DeliveryArguments {
-  std::string table, plot;
+  std::string table, plot, picture;
+  ProbeArguments probe;
+  std::vector<std::string> beside;
+  bool no_repeat = false;
   bool theorem = false, csv = false;
   int seeds = 20;
 };
@@ -230,8 +238,33 @@ std::string result_text(const DeliveryPlan& p, double limit_s) {
                     grouped(r.bytes), r.rungs.size(), r.skipped, p.mean_quality, p.worst_quality, p.flip);
 }
 
+/// Lost packets that nobody sends again take no time, but what was in them.
+void simulate_lost_packets(const SimulateArguments& a, DeliveryRequest request) {
+  const double loss = std::exchange(request.network.loss, 0);
+  if (!(loss > 0)) throw UsageError("--no-repeat", "", "--loss above 0", "none");
+  if (!a.picture.empty()) check_output_file(a.picture);
+  PackageReader package(open_store(a.package));
+  const DeliveryPlan plan = plan_delivery(package, request);
+  const FragmentList list = plan.proxy ? FragmentList{} : list_of(package, request, plan);
+  const LostPacketsTable table = lost_packets(package, plan, list, request, loss, request.network.seed);
+  if (!a.picture.empty())
+    write_output_file(a.picture, lost_packets_picture(package, plan.scale, loss, request.network.seed));
+  std::cout << (a.json  ? lost_packets_json(table)
+                : a.csv ? lost_packets_csv(table)
+                        : lost_packets_text(table));
+}
+
 void simulate_package(const SimulateArguments& a) {
-  const DeliveryRequest request = delivery_request(a);
+  DeliveryRequest request = delivery_request(a);
+  request.probe = probe_options(a.probe);
+  if (a.no_repeat) {
+    simulate_lost_packets(a, request);
+    return;
+  }
+  if (!a.beside.empty()) {
+    std::cout << simulated_page(a.package, a.beside, request, a.json);
+    return;
+  }
   PackageReader package(open_store(a.package));
   const DeliveryPlan plan = plan_delivery(package, request);
   const FragmentList list = list_of(package, request, plan);
@@ -253,10 +286,12 @@ void simulate_package(const SimulateArguments& a) {
     return;
   }
   if (a.json) {
-    std::cout << result_json(plan, request.time_limit_s).dump() << '\n';
+    Json j = result_json(plan, request.time_limit_s);
+    add_simulated_link(plan, request.network.link, j);
+    std::cout << j.dump() << '\n';
     return;
   }
-  std::cout << result_text(plan, request.time_limit_s);
+  std::cout << result_text(plan, request.time_limit_s) << simulated_link_text(plan, request.network.link);
   for (const std::string& w : plan.warnings) std::cout << "warning: " << w << '\n';
 }
 
@@ -270,6 +305,23 @@ int run_simulate(const SimulateArguments& args) {
   if (args.theorem) print_theorem(args);
   if (!experiment) simulate_package(args);
   return kExitOk;
+}
+
+void add_play_options(Command& c, SimulateArguments& args) {
+  Option beside =
+      c.option(
+           "--beside", args.beside,
+           "Another package that shares link and time limit, and its displayed height in px; may be given "
+           "again")
+          .value_name("PKG[,PX]");
+  c.flag("--no-repeat", args.no_repeat,
+         "Packets of --loss are not sent again: a table of what that costs mesh and textures "
+         "(HTTP sends them again)")
+      .excludes(beside);
+  c.option("--picture", args.picture,
+           "With --no-repeat: a PNG of the mesh as it should be, with lost points at the mean of their "
+           "neighbours, and by their texture coordinates")
+      .value_name("FILE");
 }
 
 void add_output_options(Command& c, SimulateArguments& args) {
@@ -292,11 +344,15 @@ void add_simulate_command(Command& app) {
   auto args = std::make_shared<SimulateArguments>();
   Command c = app.add("simulate", "Play a transfer over a model of a network");
   add_delivery_options(c, *args, false);
+  add_probe_options(c, args->probe);
+  add_play_options(c, *args);
   add_output_options(c, *args);
   c.examples(
       "  texmesh simulate bust.texmesh --time 5 --bandwidth 2Mbit/s --rtt 50 --policy htca\n"
       "  texmesh simulate bust.texmesh --time 5 --trace monday.csv --policy price --plot monday.svg\n"
       "  texmesh simulate bust.texmesh --bandwidth 2Mbit/s --mirror 1Mbit/s --mirror 1Mbit/s,dead=2s\n"
+      "  texmesh simulate bust.texmesh --display 600 --beside vase.texmesh,200 --time 3 --bandwidth 4Mbit/s\n"
+      "  texmesh simulate bust.texmesh --bandwidth 2Mbit/s --loss 0.05 --no-repeat --picture lost.png\n"
       "  texmesh simulate --table 4.2 --json");
   c.notes(
       "The deviation is of the time limit: positive when the transfer ended early. --table and --theorem "

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <functional>
 
+#include "delivery/cpp/decide/acuity.h"
 #include "delivery/cpp/decide/htc_theorem.h"
 #include "delivery/cpp/decide/upgrades.h"
 #include "delivery/cpp/simulate/network_model.h"
@@ -220,6 +221,8 @@ Json portable_math() {
   add(
       "pow of 0.37", [](double x) { return portable::pow(0.37, x); }, -3, 3);
   add("log_quantiser", log_quantiser, 1, 100);
+  add("acuity", acuity_at, 0, 30);
+  add("gaze_weight", gaze_weight, 0, 30);
   return cases;
 }
 

@@ -10,25 +10,6 @@ namespace {
 
 constexpr double kWorthwhileFlip = 1e-4;  // a coarser scale must look better, not only as good
 
-BandwidthTrace shifted(const BandwidthTrace& trace, double by_s) {
-  BandwidthTrace out{{0}, {trace.at(by_s)}};
-  for (std::size_t i = 0; i < trace.time_s.size(); ++i)
-    if (trace.time_s[i] > by_s) {
-      out.time_s.push_back(trace.time_s[i] - by_s);
-      out.bytes_s.push_back(trace.bytes_s[i]);
-    }
-  return out;
-}
-
-NetworkOptions shifted(NetworkOptions network, double by_s) {
-  network.link = shifted(network.link, by_s);
-  for (MirrorModel& m : network.mirrors) {
-    m.rate = shifted(m.rate, by_s);
-    m.dead_from_s = std::max(0.0, m.dead_from_s - by_s);
-  }
-  return network;
-}
-
 void rate_textures(PackageReader& package, const FragmentList& list, DeliveryPlan& plan) {
   double weight = 0, mean = 0;
   plan.worst_quality = list.offers.empty() ? 100 : 1e9;
@@ -155,6 +136,7 @@ DeliveryPlan plan_at_scale(TextureLoss& loss, const DeliveryRequest& request, in
   HtcOptions htc = request.htc;
   htc.time_limit_s = request.time_limit_s - plan.mesh_s;
   htc.rtt_s = request.network.rtt_s;
+  htc.sites = static_cast<int>(std::clamp<std::size_t>(request.network.mirrors.size(), 1, 64));
   htc.throughput.initial_bytes_s =
       request.beta0_bytes_s > 0 ? request.beta0_bytes_s : shown_throughput(plan, manifest_s, htc.rtt_s);
   const ChosenTextures chosen =
@@ -174,7 +156,7 @@ DeliveryPlan plan_at_scale(TextureLoss& loss, const DeliveryRequest& request, in
       plan.warnings.push_back(
           "less than 30 round trips are left for textures: the limit may be missed by more than 2 %");
     const NetworkOptions network = without_dead_mirrors(request.network, plan.mesh_s);
-    plan.textures = simulate(list.offers, htc, shifted(network, plan.mesh_s));
+    plan.textures = simulate(list.offers, htc, network_from(network, plan.mesh_s), request.probe);
     plan.complete_s = plan.mesh_s + plan.textures.end_s;
   }
   plan.texture_bytes = plan.textures.bytes;

@@ -19,6 +19,7 @@ struct DeliveryRequest {
   double beta0_bytes_s = 0;  // first guess of the throughput; 0 = what the mesh's transfer has shown
   HtcOptions htc;            // policy, order, window ..: its time limit and beta_0 are set from the others
   NetworkOptions network;
+  ProbeOptions probe;  // test packets beside the textures
 };
 
 /// The request with chapters 4 and 7 as printed: Policy::kThesis, the JND's rule, the next fragment by

@@ -124,6 +124,7 @@ LoadReport report_of(const TransferEnd& end) {
   report.cancelled = end.cancelled;
   report.out_of_time = end.out_of_time;
   report.problems = end.problems;
+  report.mirrors = end.mirrors;
   if (end.out_of_time && end.unfinished > 0)
     report.problems["not there when the time was over"] = end.unfinished;
   return report;
@@ -265,7 +266,9 @@ LoadReport TextureLoader::load(const std::vector<PlaneChoice>& planes, const Loa
         join_neighbours(std::move(wanted), options.group_bytes, initial_bytes_s * options.htc.time_limit_s);
   std::vector<FragmentOffer> offers;
   for (const Wanted& w : wanted) offers.push_back(w.offer);
-  HarmonicTimePlan plan(std::move(offers), options.htc);
+  HtcOptions htc = options.htc;
+  htc.sites = static_cast<int>(std::clamp<std::size_t>(transport_.mirrors(), 1, 64));
+  HarmonicTimePlan plan(std::move(offers), htc);
   const double start_s = transport_.now_s();
   PlanSource source(
       plan, start_s,

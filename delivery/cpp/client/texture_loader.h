@@ -41,6 +41,7 @@ struct LoadReport {
   std::uint32_t skipped = 0;                      // of them, by decision
   std::uint32_t given_up = 0;                     // fragments that no mirror delivered, or not in time
   std::map<std::string, std::uint32_t> problems;  // why requests failed, and how many, tries included
+  std::vector<MirrorShare> mirrors;               // in the transport's order
 };
 
 /// Bytes that one request should bring: so many that the link is not idle between two answers, and so few

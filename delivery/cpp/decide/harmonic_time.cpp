@@ -31,6 +31,7 @@ void check(const std::vector<FragmentOffer>& offers, const HtcOptions& o) {
   require(o.throughput.initial_bytes_s > 0, "HarmonicTimePlan: initial throughput > 0");
   require(o.rtt_s >= 0 && o.rtt_s < 1e4, "HarmonicTimePlan: round trip in [0, 1e4) s");
   require(o.window >= 0 && o.max_in_flight >= 1 && o.guard > 1, "HarmonicTimePlan: window, guard");
+  require(o.sites >= 1 && o.sites <= 64, "HarmonicTimePlan: sites");
   for (const FragmentOffer& f : offers) {
     require(!f.bytes.empty() && f.loss.size() == f.bytes.size() + 1,
             "FragmentOffer: a loss per rung and one more");
@@ -155,7 +156,8 @@ double HarmonicTimePlan::throughput_bytes_s() const {
 
 bool HarmonicTimePlan::window_open(double now_s) const {
   if (options_.window > 0) return in_flight_ < static_cast<std::uint32_t>(options_.window);
-  if (in_flight_ < 2) return true;
+  const std::uint32_t least = 2 * static_cast<std::uint32_t>(options_.sites);
+  if (in_flight_ < least) return true;
   if (in_flight_ >= static_cast<std::uint32_t>(options_.max_in_flight)) return false;
   // What is in flight takes all the time that is left: what is asked for now could only be late.
   const double left_s = options_.time_limit_s - now_s;
@@ -164,7 +166,7 @@ bool HarmonicTimePlan::window_open(double now_s) const {
   // is little time, and those are received side by side and late.
   const double fragment_bytes = planned_total_ / static_cast<double>(offers_.size());
   const double trip_bytes = throughput_.recent_bytes_s(kTripSamples) * options_.rtt_s;
-  return in_flight_ < 2 + kWindowFactor * trip_bytes / fragment_bytes;
+  return in_flight_ < least + kWindowFactor * trip_bytes / fragment_bytes;
 }
 
 const HtcStep* HarmonicTimePlan::next(double now_s) {

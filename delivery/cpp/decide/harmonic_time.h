@@ -38,7 +38,8 @@ struct HtcOptions {
   double time_limit_s = 5;  // T_0, of the fragments alone: mesh and preview have their own time before
   ThroughputOptions throughput{Estimator::kLast, 10, 0.2, 4000, 1e5};  // initial_bytes_s is beta_0
   double rtt_s = 0;                                                    // round trip, measured or told
-  int window = 0;  // requests in flight; 0 = until 1.5 x throughput x round trip, at least 2
+  int window = 0;  // requests in flight; 0 = until 1.5 x throughput x round trip, at least 2 a site
+  int sites = 1;   // servers that the fragments are spread over, 1 .. 64
   int max_in_flight = 64;
   // true: no rung below low_rung and no fragment skipped, as in the thesis. false: the same while there is
   // time enough, then rungs down to the lowest, then skipping. A rung that loses as much as skipping is never

@@ -24,6 +24,7 @@ BandwidthTrace read_trace_csv(std::string_view text, const std::string& name);
 struct MirrorModel {
   BandwidthTrace rate = BandwidthTrace::constant(1e12);  // of its own, on top of the client's link
   double dead_from_s = 1e300;
+  double lies_from_s = 1e300;  // what it delivers from then on is wrong
 };
 struct NetworkOptions {
   BandwidthTrace link;  // of the client, shared by everything in flight

@@ -6,7 +6,7 @@
 #include <map>
 #include <utility>
 
-#include "delivery/cpp/transfer/transfer.h"
+#include "delivery/cpp/transfer/monitored_transport.h"
 #include "format/base/portable_math.h"
 
 namespace texmesh {
@@ -56,28 +56,41 @@ constexpr double kFoundDead_s = 0.5;  // what transfer() waits for an answer at 
 /// A model of a network as a transport.
 class ModelTransport final : public Transport {
  public:
-  explicit ModelTransport(const NetworkOptions& network)
-      : model_(network), mirrors_(network.mirrors.size()) {}
-  std::size_t mirrors() const override { return mirrors_; }
+  explicit ModelTransport(const NetworkOptions& network) : model_(network), mirrors_(network.mirrors) {}
+  std::size_t mirrors() const override { return mirrors_.size(); }
   double now_s() override { return model_.now_s(); }
   void start(const TransferRequest& request, std::uint32_t mirror) override {
     Part& part = parts_[request.number];
-    if (part.left <= 0) part = {static_cast<double>(request.bytes), static_cast<double>(request.bytes)};
+    if (part.left <= 0)
+      part = {static_cast<double>(request.bytes), static_cast<double>(request.bytes), mirror};
+    part.mirror = mirror;
     model_.request(request.number, mirror, part.left);
+  }
+  void forget(std::uint32_t number) override {
+    model_.cancel(number);
+    parts_.erase(number);
   }
   void cancel(std::uint32_t number) override {
     if (const auto left = model_.bytes_left(number)) parts_[number].left = *left;
     model_.cancel(number);
   }
   double received(std::uint32_t number) override {
-    const auto left = model_.bytes_left(number);
-    return left ? parts_[number].bytes - *left : 0;
+    const auto part = parts_.find(number);
+    if (part == parts_.end()) return 0;
+    return part->second.bytes - model_.bytes_left(number).value_or(part->second.left);
   }
   std::optional<Outcome> wait(double until_s) override {
     const auto arrival = model_.advance(until_s);
     if (!arrival) return std::nullopt;
-    parts_.erase(arrival->request);
-    return Outcome{arrival->request, arrival->time_s, true, {}, {}, 0, false};
+    Outcome outcome{arrival->request, arrival->time_s, true, {}, {}, 0, false};
+    const auto part = parts_.find(arrival->request);
+    if (mirrors_[part->second.mirror].lies_from_s <= arrival->time_s) {
+      outcome.good = false;
+      outcome.lied = true;
+      outcome.problem = "bytes of another digest";
+    }
+    parts_.erase(part);
+    return outcome;
   }
   void move_to(double time_s) {
     while (model_.now_s() < time_s) model_.advance(time_s);
@@ -86,9 +99,10 @@ class ModelTransport final : public Transport {
  private:
   struct Part {
     double bytes = 0, left = 0;
+    std::uint32_t mirror = 0;
   };
   NetworkModel model_;
-  std::size_t mirrors_;
+  std::vector<MirrorModel> mirrors_;
   std::map<std::uint32_t, Part> parts_;  // by request, of what is still to come
 };
 
@@ -112,9 +126,11 @@ class OneRequest final : public RequestSource {
 }  // namespace
 
 SimulationResult simulate(std::vector<FragmentOffer> offers, const HtcOptions& options,
-                          const NetworkOptions& network) {
+                          const NetworkOptions& network, const ProbeOptions& probe) {
   HarmonicTimePlan plan(std::move(offers), options);
-  ModelTransport transport(network);
+  ModelTransport model(network);
+  BandwidthMonitor monitor(probe);
+  MonitoredTransport transport(model, monitor, network.rtt_s);
   PlanSource source(plan);
   TransferOptions how;
   how.rtt_s = network.rtt_s;
@@ -122,12 +138,40 @@ SimulationResult simulate(std::vector<FragmentOffer> offers, const HtcOptions& o
   const TransferEnd end = transfer(source, transport, how);
   SimulationResult result = result_of(plan, options.time_limit_s, end.given_up > 0 ? kNotInTime : end.last_s);
   result.never = end.given_up > 0;
+  result.mirrors = end.mirrors;
+  result.samples = monitor.samples();
+  result.probes = monitor.sent();
+  result.probe_bytes = monitor.sent_bytes();
   return result;
 }
 
 NetworkOptions without_dead_mirrors(NetworkOptions network, double now_s) {
   const auto dead = [now_s](const MirrorModel& m) { return m.dead_from_s + kFoundDead_s <= now_s; };
   if (!std::ranges::all_of(network.mirrors, dead)) std::erase_if(network.mirrors, dead);
+  return network;
+}
+
+namespace {
+
+BandwidthTrace trace_from(const BandwidthTrace& trace, double by_s) {
+  BandwidthTrace out{{0}, {trace.at(by_s)}};
+  for (std::size_t i = 0; i < trace.time_s.size(); ++i)
+    if (trace.time_s[i] > by_s) {
+      out.time_s.push_back(trace.time_s[i] - by_s);
+      out.bytes_s.push_back(trace.bytes_s[i]);
+    }
+  return out;
+}
+
+}  // namespace
+
+NetworkOptions network_from(NetworkOptions network, double by_s) {
+  network.link = trace_from(network.link, by_s);
+  for (MirrorModel& m : network.mirrors) {
+    m.rate = trace_from(m.rate, by_s);
+    m.dead_from_s = std::max(0.0, m.dead_from_s - by_s);
+    m.lies_from_s = std::max(0.0, m.lies_from_s - by_s);
+  }
   return network;
 }
 

@@ -3,8 +3,10 @@
 #include <functional>
 #include <vector>
 
+#include "delivery/cpp/decide/bandwidth_monitor.h"
 #include "delivery/cpp/decide/harmonic_time.h"
 #include "delivery/cpp/simulate/network_model.h"
+#include "delivery/cpp/transfer/transfer.h"
 
 namespace texmesh {
 
@@ -23,16 +25,24 @@ struct SimulationResult {
   double loss = 0, planned_loss = 0;
   std::vector<HtcStep> steps;
   std::vector<std::int32_t> rungs;  // by offer
+  std::vector<MirrorShare> mirrors;
+  // Of the monitor, where there was one; its bytes are not among `bytes`.
+  std::vector<BandwidthSample> samples;
+  std::uint32_t probes = 0;
+  std::uint64_t probe_bytes = 0;
 };
 
 /// What became of a plan that has ended, or was left, at `end_s`.
 SimulationResult result_of(const HarmonicTimePlan& plan, double limit_s, double end_s);
 
-/// Plays the plan over the network model, as transfer() runs it over a network.
+/// Plays the plan over the network model, as transfer() runs it over a network, with a monitor's test packets
+/// beside it. The plan hears of throughput from its own transfers alone.
 SimulationResult simulate(std::vector<FragmentOffer> offers, const HtcOptions& options,
-                          const NetworkOptions& network);
+                          const NetworkOptions& network, const ProbeOptions& probe = {});
 /// The network without the mirrors that a client has found dead by then, unless that is all of them.
 NetworkOptions without_dead_mirrors(NetworkOptions network, double now_s);
+/// The network as it is from `by_s` on: its times count from there.
+NetworkOptions network_from(NetworkOptions network, double by_s);
 /// Time at which so many bytes asked for at `from_s` are complete on an otherwise idle network, from
 /// whichever of its mirrors answers; +infinity when none does.
 double fetched_s(const NetworkOptions& network, double from_s, std::uint64_t bytes);

@@ -66,6 +66,11 @@ class HttpTransport final : public Transport {
     stop(number);
   }
 
+  void forget(std::uint32_t number) override {
+    cancel(number);
+    open_.erase(number);
+  }
+
   double received(std::uint32_t number) override {
     const auto it = open_.find(number);
     if (it == open_.end()) return 0;
@@ -188,6 +193,7 @@ class HttpTransport final : public Transport {
       return false;
     }
     outcome.problem = a.timed_out ? "timeout (" + describe_answer(a) + ")" : describe_answer(a);
+    outcome.absent = mirror.tree && (a.status == 404 || a.status == 410);
     if (a.status == 200) {
       outcome.for_good = true;
       outcome.problem = mirror.tree || is_same_file(a, mirror.etag, mirror.total)

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 #include <utility>
 
 namespace texmesh {
@@ -11,6 +12,7 @@ constexpr double kRetryFactor = 4, kLeastRetryRtts = 8, kLeastRetry_s = 0.5;
 constexpr double kProgressBytes = 1024;  // a try that brings as much does not count
 constexpr double kAskCancelled_s = 0.1;
 constexpr double kFirstPause_s = 0.1, kMostPause_s = 5;
+constexpr const char* kLie = "bytes of another digest";
 
 /// Which mirror delivers first, by what each has delivered so far and has to deliver yet.
 class Mirrors {
@@ -20,11 +22,13 @@ class Mirrors {
     options.initial_bytes_s = initial_bytes_s;
     for (std::size_t m = 0; m < count; ++m) mirrors_.push_back({Throughput(options)});
   }
-  /// Nothing when all of them have failed for good. `but`: the one that has just failed, unless it is
+  using Lacks = std::function<bool(std::uint32_t mirror)>;
+  /// Nothing when all that have it have failed for good. `but`: the one that has just failed, unless it is
   /// the only one.
-  std::optional<std::uint32_t> choose(double bytes, std::optional<std::uint32_t> but, double now_s) const {
-    std::optional<std::uint32_t> best = best_of(bytes, but, now_s);
-    if (!best && but) best = best_of(bytes, {}, now_s);
+  std::optional<std::uint32_t> choose(double bytes, std::optional<std::uint32_t> but, double now_s,
+                                      const Lacks& lacks) const {
+    std::optional<std::uint32_t> best = best_of(bytes, but, now_s, lacks);
+    if (!best && but) best = best_of(bytes, {}, now_s, lacks);
     return best;
   }
   /// When it may be asked.
@@ -40,14 +44,37 @@ class Mirrors {
     mirror.owed_bytes -= bytes;
     mirror.failures = 0;
     mirror.has_delivered = true;
+    ++mirror.share.requests;
+    mirror.share.bytes += static_cast<std::uint64_t>(bytes);
   }
+  /// The request is no longer its.
+  void released(std::uint32_t m, double bytes) { mirrors_[m].owed_bytes -= bytes; }
+  /// It delivers, but not in the time that was expected.
+  void slow(std::uint32_t m, double bytes, double seconds) { mirrors_[m].throughput.add(bytes, seconds); }
   /// It is left alone while another answers.
-  void failed(std::uint32_t m, double bytes, bool for_good) {
-    mirrors_[m].owed_bytes -= bytes;
+  void failed(std::uint32_t m) {
     mirrors_[m].alive = false;
-    mirrors_[m].gone |= for_good;
-    if (std::ranges::none_of(mirrors_, &Mirror::alive))
-      for (Mirror& mirror : mirrors_) mirror.alive = !mirror.gone;
+    revive();
+  }
+  /// It is asked no more; a liar only where there is no other.
+  void drop(std::uint32_t m, const std::string& why, bool lied) {
+    mirrors_[m].alive = false;
+    (lied ? mirrors_[m].liar : mirrors_[m].gone) = true;
+    mirrors_[m].share.dropped = why;
+    revive();
+  }
+  bool another_is_alive(std::uint32_t but) const {
+    for (std::size_t m = 0; m < mirrors_.size(); ++m)
+      if (m != but && mirrors_[m].alive) return true;
+    return false;
+  }
+  std::vector<MirrorShare> shares() const {
+    std::vector<MirrorShare> out;
+    for (const Mirror& m : mirrors_) {
+      out.push_back(m.share);
+      out.back().bytes_s = m.throughput.bytes_s();
+    }
+    return out;
   }
   /// It is asked again no sooner than after a pause: its own, or one that grows from failure to failure.
   void pause(std::uint32_t m, double now_s, double wait_s) {
@@ -67,14 +94,26 @@ class Mirrors {
     Throughput throughput;
     double owed_bytes = 0, last_s = 0, ready_s = 0;
     int failures = 0;
-    bool alive = true, gone = false, has_delivered = false;
+    bool alive = true, gone = false, liar = false, has_delivered = false;
+    MirrorShare share{};
   };
-  std::optional<std::uint32_t> best_of(double bytes, std::optional<std::uint32_t> but, double now_s) const {
+  /// Where none is left, those are asked again that may still deliver, liars last.
+  void revive() {
+    for (const bool liars : {false, true}) {
+      if (std::ranges::any_of(mirrors_, &Mirror::alive)) return;
+      for (Mirror& mirror : mirrors_) {
+        mirror.alive = !mirror.gone && (liars || !mirror.liar);
+        if (mirror.alive) mirror.share.dropped.clear();
+      }
+    }
+  }
+  std::optional<std::uint32_t> best_of(double bytes, std::optional<std::uint32_t> but, double now_s,
+                                       const Lacks& lacks) const {
     std::optional<std::uint32_t> best;
     double best_s = 0;
     for (std::size_t m = 0; m < mirrors_.size(); ++m) {
       const Mirror& mirror = mirrors_[m];
-      if (!mirror.alive || (but && *but == m)) continue;
+      if (!mirror.alive || (but && *but == m) || lacks(static_cast<std::uint32_t>(m))) continue;
       const double s =
           (mirror.owed_bytes + bytes) / mirror.throughput.bytes_s() + std::max(0.0, mirror.ready_s - now_s);
       if (!best || s < best_s) best = static_cast<std::uint32_t>(m), best_s = s;
@@ -91,6 +130,7 @@ struct Asked {
   int tries = 0;
   double received = 0;  // when last looked at
   double kept = 0;      // by the transport, of tries that broke
+  bool mixed = false;   // kept bytes may be another mirror's
 };
 
 class TransferRun {
@@ -102,6 +142,13 @@ class TransferRun {
         mirrors_(transport.mirrors(), options.initial_bytes_s) {}
 
   TransferEnd run() {
+    TransferEnd end = run_to_end();
+    end.mirrors = mirrors_.shares();
+    return end;
+  }
+
+ private:
+  TransferEnd run_to_end() {
     while (!source_.finished()) {
       if (over()) return stop();
       start_waiting();
@@ -119,8 +166,6 @@ class TransferRun {
     }
     return end_;
   }
-
- private:
   bool over() {
     end_.cancelled = options_.cancelled && options_.cancelled();
     end_.out_of_time = transport_.now_s() > options_.until_s;
@@ -139,7 +184,7 @@ class TransferRun {
     const auto dead = std::exchange(asked_, {});
     for (const auto& [number, a] : dead) {
       transport_.cancel(number);
-      mirrors_.failed(a.mirror, static_cast<double>(a.request.bytes), false);
+      mirrors_.released(a.mirror, static_cast<double>(a.request.bytes));
       give_up(a, "no answer");
     }
   }
@@ -153,9 +198,11 @@ class TransferRun {
   void ask(Asked a, std::optional<std::uint32_t> but) {
     const double now_s = transport_.now_s();
     const auto bytes = static_cast<double>(a.request.bytes);
-    const auto mirror = mirrors_.choose(bytes, but, now_s);
+    const auto mirror = mirrors_.choose(bytes, but, now_s, [&](std::uint32_t m) {
+      return lacking_.contains({m, entry_of(a)});
+    });
     if (!mirror) {
-      give_up(a, "no server is left");
+      give_up(a, "no server is left that has it");
       return;
     }
     a.mirror = *mirror;
@@ -167,7 +214,8 @@ class TransferRun {
     const double expected = mirrors_.asked(a.mirror, bytes);
     a.patience_s = std::max({kLeastRetry_s, kLeastRetryRtts * options_.rtt_s, kRetryFactor * expected});
     a.at_s = now_s;
-    a.received = 0;
+    a.received = transport_.received(a.request.number);
+    a.mixed = a.received > 0;
     ++a.tries;
     transport_.start(a.request, a.mirror);
     asked_[a.request.number] = std::move(a);
@@ -204,12 +252,49 @@ class TransferRun {
       end_.last_s = outcome.time_s;
       return;
     }
-    const std::string why = outcome.good ? "bytes of another digest" : outcome.problem;
+    const std::string why = outcome.good ? kLie : outcome.problem;
     if (outcome.wait_s > 0) mirrors_.pause(a.mirror, outcome.time_s, outcome.wait_s);
-    retry_or_give_up(std::move(a), why, outcome.for_good);
+    if (outcome.absent) {
+      note_lacking(std::move(a), why);
+      return;
+    }
+    const bool lied = outcome.lied || (outcome.good && !a.mixed);
+    if (lied) transport_.forget(a.request.number);
+    const bool drop = outcome.for_good || lied;
+    const std::uint32_t by = a.mirror;
+    if (drop) mirrors_.drop(by, why, lied);
+    retry_or_give_up(std::move(a), why);
+    if (drop && mirrors_.another_is_alive(by)) deal_anew(by, lied);
   }
-  void retry_or_give_up(Asked a, const std::string& why, bool for_good) {
-    mirrors_.failed(a.mirror, static_cast<double>(a.request.bytes), for_good);
+  /// Another mirror may have the entry: that is no failure.
+  void note_lacking(Asked a, const std::string& why) {
+    const std::uint32_t by = a.mirror;
+    mirrors_.released(by, static_cast<double>(a.request.bytes));
+    lacking_.insert({by, entry_of(a)});
+    ++end_.problems[why];
+    --a.tries;
+    ask(std::move(a), by);
+  }
+  /// What a dropped mirror still owes goes to the others. What a liar has brought of it counts for nothing.
+  void deal_anew(std::uint32_t mirror, bool lied) {
+    std::vector<Asked> owed;
+    for (const auto& [number, a] : asked_)
+      if (a.mirror == mirror) owed.push_back(a);
+    for (Asked& a : owed) {
+      lied ? transport_.forget(a.request.number) : transport_.cancel(a.request.number);
+      asked_.erase(a.request.number);
+      mirrors_.released(mirror, static_cast<double>(a.request.bytes));
+      --a.tries;
+      ask(std::move(a), mirror);
+    }
+  }
+  /// By which mirrors are told apart that have it: the first entry; models have requests alone.
+  static std::uint64_t entry_of(const Asked& a) {
+    return a.request.parts.empty() ? a.request.number : a.request.parts.front().entry.offset;
+  }
+  void retry_or_give_up(Asked a, const std::string& why) {
+    mirrors_.released(a.mirror, static_cast<double>(a.request.bytes));
+    mirrors_.failed(a.mirror);
     if (const double kept = transport_.received(a.request.number); kept >= a.kept + kProgressBytes) {
       a.kept = kept;
       a.tries = 0;
@@ -238,10 +323,28 @@ class TransferRun {
       late.push_back(a);
     }
     for (Asked& a : late) {
+      const double come = transport_.received(a.request.number) - a.received;
+      if (come >= kProgressBytes) {
+        move_elsewhere(std::move(a), come);
+        continue;
+      }
       transport_.cancel(a.request.number);
       asked_.erase(a.request.number);
-      retry_or_give_up(std::move(a), "no answer in time", false);
+      retry_or_give_up(std::move(a), "no answer in time");
     }
+  }
+  /// A mirror that is slower than was thought keeps what it can deliver: by its new estimate it gets less.
+  void move_elsewhere(Asked a, double come) {
+    const auto beside =
+        std::ranges::count_if(asked_, [&](const auto& other) { return other.second.mirror == a.mirror; });
+    mirrors_.slow(a.mirror, come * static_cast<double>(beside), transport_.now_s() - a.at_s);
+    transport_.cancel(a.request.number);
+    asked_.erase(a.request.number);
+    mirrors_.released(a.mirror, static_cast<double>(a.request.bytes));
+    ++end_.problems["too slow, asked elsewhere"];
+    --a.tries;
+    const std::uint32_t from = a.mirror;
+    ask(std::move(a), from);
   }
 
   RequestSource& source_;
@@ -249,7 +352,8 @@ class TransferRun {
   TransferOptions options_;
   Mirrors mirrors_;
   std::map<std::uint32_t, Asked> asked_;
-  std::vector<Asked> waiting_;  // for the end of their mirror's pause, at_s
+  std::vector<Asked> waiting_;                                 // for the end of their mirror's pause, at_s
+  std::set<std::pair<std::uint32_t, std::uint64_t>> lacking_;  // mirror and entry
   TransferEnd end_;
 };
 

@@ -35,6 +35,8 @@ class Transport {
     std::string problem;                           // why not good, in a few words
     double wait_s = 0;      // above 0: the mirror is to be left alone, at least for so long (429, 5xx)
     bool for_good = false;  // the mirror will never deliver: has another file by now, knows no ranges
+    bool absent = false;    // the mirror does not have this entry; it may have others
+    bool lied = false;      // of models: the bytes are wrong
   };
   virtual ~Transport() = default;
   virtual std::size_t mirrors() const = 0;  // at least one
@@ -43,6 +45,8 @@ class Transport {
   virtual void start(const TransferRequest& request, std::uint32_t mirror) = 0;
   /// Ends a request, whether its outcome is there or not.
   virtual void cancel(std::uint32_t number) = 0;
+  /// The same, and drops what the request has brought so far.
+  virtual void forget(std::uint32_t number) { cancel(number); }
   /// Bytes of a request that have come so far: the request is under way, or broke and keeps them.
   virtual double received(std::uint32_t) { return 0; }
   /// The outcome that comes first; nothing when `until_s` comes before. When no request can ever end:
@@ -74,6 +78,13 @@ struct TransferOptions {
   double until_s = kForEver_s;      // nothing is asked for or waited for after this
   std::function<bool()> cancelled;  // asked after every event and every tenth of a second
 };
+/// What a mirror has brought of a transfer.
+struct MirrorShare {
+  std::uint32_t requests = 0;
+  std::uint64_t bytes = 0;
+  double bytes_s = 0;   // as it is expected to go on; the guess where it has brought nothing
+  std::string dropped;  // why it is asked no more; "" = it is
+};
 struct TransferEnd {
   double last_s = 0;                              // when the last request arrived
   bool cancelled = false;                         // by cancelled(): what was under way is cancelled
@@ -81,13 +92,21 @@ struct TransferEnd {
   bool dead = false;                              // nothing that was under way could ever arrive
   std::uint32_t given_up = 0, unfinished = 0;     // requests after their tries; those under way at the end
   std::map<std::string, std::uint32_t> problems;  // why tries failed, and how many
+  std::vector<MirrorShare> mirrors;
 };
 
 /// Runs until the source has finished.
-/// - A request goes to the mirror that is expected to deliver first.
-/// - A mirror is late when it has delivered nothing for four times the expected time (at least 8 round trips
-///   and half a second). Its requests go to another mirror, and it is left alone as long as another answers.
-///   When no mirror is left, all are tried again.
+/// - A request goes to the mirror that is expected to deliver first, by what each has delivered and has to
+///   deliver yet. So the requests of one texture are spread over the mirrors by their speed.
+/// - A mirror that lacks an entry is not asked for that entry again; a package may be spread over mirrors of
+///   which none has all of it.
+/// - A mirror that lies (bytes of another digest) is dropped, and all that it still owes goes to others. It
+/// is
+///   asked again only where there is no other.
+/// - A request is late when it is not there after four times the expected time (at least 8 round trips and
+///   half a second) while another mirror delivers. It goes to another mirror. A mirror that has brought
+///   nothing of it is left alone as long as another answers; one that has brought a part is slower than was
+///   thought, and gets less from then on. When no mirror is left, all are tried again.
 /// - A mirror that is busy is asked again after a pause that grows, or after the pause that the mirror names.
 /// - Every request ends: it arrives, or is given up after its tries or when nothing can arrive any more. The
 ///   source hears of every end.

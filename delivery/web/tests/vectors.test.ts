@@ -1,6 +1,7 @@
 import { readdirSync } from 'node:fs';
 import { join } from 'node:path';
 import { describe, expect, it } from 'vitest';
+import { acuityAt, gazeWeight } from '../src/decide/acuity';
 import * as t from '../src/reader';
 import { asPrinted, theoremOf } from '../src/thesis';
 import { SplitStreamReader } from '../src/format/splits/split_stream';
@@ -28,6 +29,8 @@ function runMath(cases: Json[]): void {
   const functions: Record<string, (x: number) => number> = {
     ...t.portable,
     log_quantiser: t.logQuantiser,
+    acuity: acuityAt,
+    gaze_weight: gazeWeight,
     'pow of 0.37': (y: number) => t.portable.pow(0.37, y),
   } as never;
   for (const c of cases)

@@ -25,15 +25,16 @@ std::string read_file(const std::string& path) {
   return text.str();
 }
 
-/// "2Mbit/s" or "2Mbit/s,dead=3.5s".
+/// "2Mbit/s", "2Mbit/s,dead=3.5s", "2Mbit/s,lies=0s".
 MirrorModel mirror_of(const std::string& text) {
   MirrorModel m;
   const std::size_t comma = text.find(',');
   m.rate = BandwidthTrace::constant(parse_bandwidth(text.substr(0, comma), "--mirror"));
   if (comma == std::string::npos) return m;
   const std::string rest = text.substr(comma + 1);
-  if (!rest.starts_with("dead=")) throw UsageError("--mirror", "", "RATE or RATE,dead=SECONDS", text);
-  m.dead_from_s = parse_duration(rest.substr(5), "--mirror");
+  const bool dies = rest.starts_with("dead="), lies = rest.starts_with("lies=");
+  if (!dies && !lies) throw UsageError("--mirror", "", "RATE, RATE,dead=SECONDS or RATE,lies=SECONDS", text);
+  (dies ? m.dead_from_s : m.lies_from_s) = parse_duration(rest.substr(5), "--mirror");
   return m;
 }
 
@@ -106,7 +107,8 @@ void add_link_options(Command& c, DeliveryArguments& a) {
       .value_name("TIME")
       .shows_default();
   c.option("--mirror", a.mirrors,
-           "A server's own rate, 2Mbit/s, or 2Mbit/s,dead=3s; several times for several servers")
+           "A server's own rate, 2Mbit/s; with ,dead=3s it dies then, with ,lies=3s its bytes are wrong from "
+           "then on; several times for several servers")
       .value_name("RATE");
   c.option("--connections", a.connections, "Connections per server")
       .integer_in(1, 1000)

@@ -89,6 +89,45 @@ TEST(HarmonicTime, EveryFragmentIsDecidedOnceAndTheMeanOneFirst) {
   }
 }
 
+TEST(HarmonicTime, CreditsOfOneRunAreThoseWorkedByHand) {
+  // Four fragments of 1000 bytes, a second each at beta_0. Algorithm 4.1 on paper:
+  // k = 1: the mean one (eta 0.6) at 800 bytes/s takes 1.25 s. dT = -1/4, zeta = 1/2 + 1/3 + 1/4 = 13/12.
+  // k = 2: credit -1/4 / (2 x 13/12) = -3/26 < 0, so the finest. theta = 23/26, beta = 800: 707.7 bytes, 700
+  //        is nearest. At 1000 bytes/s 0.7 s: dT = 12/65, zeta = 1/2 + 1/3 = 5/6.
+  // k = 3: credit -1/4 / (3 x 13/12) + 12/65 / (2 x 5/6) = 11/325 > 0, so the coarsest. theta = 336/325, 1000
+  //        bytes, at 500 bytes/s 2 s: dT = -314/325, zeta = 1/2.
+  // k = 4: credit -1/4 / (4 x 13/12) + 12/65 / (3 x 5/6) - 314/325 / (2 x 1/2) = -19/20. theta = 1/20: 25 of
+  //        the 500 bytes/s, so the lowest rung, at 1000 bytes/s 0.1 s: dT = -1/20 = Pi.
+  std::vector<FragmentOffer> offers(4);
+  const double etas[]{0.9, 0.6, 0.3, 0.1};
+  for (std::size_t i = 0; i < 4; ++i) {
+    offers[i].eta = etas[i];
+    offers[i].planned_bytes = 1000;
+    offers[i].loss.push_back(1);
+    for (std::uint32_t r = 1; r <= 20; ++r) {
+      offers[i].bytes.push_back(100 * r);
+      offers[i].loss.push_back(1.0 / (1 + r));
+    }
+  }
+  HtcOptions o = serial(4, 1000);
+  o.hard_limits = true;
+  const double rates[]{800, 1000, 500, 1000};
+  const SimulationResult r = simulate_samples(offers, o, [&](std::size_t k, double) { return rates[k - 1]; });
+  ASSERT_EQ(r.steps.size(), 4u);
+  const std::uint32_t order[]{1, 0, 3, 2}, bytes[]{1000, 700, 1000, 100};
+  const double credit[]{0, -3.0 / 26, 11.0 / 325, -19.0 / 20},
+      residual[]{-1.0 / 4, 12.0 / 65, -314.0 / 325, -1.0 / 20};
+  for (std::size_t k = 0; k < 4; ++k) {
+    EXPECT_EQ(r.steps[k].offer, order[k]) << k;
+    EXPECT_EQ(r.steps[k].bytes, bytes[k]) << k;
+    EXPECT_NEAR(r.steps[k].credit_s, credit[k], 1e-12) << k;
+    EXPECT_NEAR(r.steps[k].theta_s, 1 + credit[k], 1e-12) << k;
+    EXPECT_NEAR(r.steps[k].residual_s, residual[k], 1e-12) << k;
+  }
+  EXPECT_NEAR(r.end_s, 4.05, 1e-12);
+  EXPECT_NEAR(r.deviation_percent, -1.25, 1e-9);
+}
+
 TEST(HarmonicTime, OrderFollowsTheSignOfTheCredit) {
   const std::vector<FragmentOffer> offers = some_offers(40);
   const auto second = [&](double rate) {

@@ -155,10 +155,21 @@ TEST(Table42, IsReproduced) {
     EXPECT_NEAR(rows[i].static_percent, 100 * (1 - rows[i].beta0_kb_s / 41.68), 1e-9);
     EXPECT_NEAR(rows[i].static_percent, published[i],
                 i == 9 ? 0.9 : 0.6);  // the thesis's 47 KB/s is off by 0.8
-    if (rows[i].beta0_kb_s < 32) continue;
-    EXPECT_LE(rows[i].deviation_percent, 0.1) << rows[i].beta0_kb_s;
+    // Printed are 0.399 at 20 kB/s, 0.010 at 35 and -0.090 at 53.
+    EXPECT_LE(rows[i].deviation_percent, rows[i].beta0_kb_s < 32 ? 0.15 : 0.1) << rows[i].beta0_kb_s;
     EXPECT_LE(rows[i].worst_percent, 1.0) << rows[i].beta0_kb_s;
   }
+}
+
+TEST(Table42, ThePublishedOrderMissesTheFirstRows) {
+  HtcOptions o;
+  o.hard_limits = true;
+  o.order = HtcOrder::kBeta0;
+  const std::vector<Table42Row> rows = table_4_2(o);
+  // The method page says 10.8, 8.5 and 4.7 % where .40, .35 and .28 are printed.
+  const double ours[]{10.8, 8.5, 4.7};
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(rows[i].deviation_percent, ours[i], 0.1) << i;
+  for (std::size_t i = 5; i < rows.size(); ++i) EXPECT_LE(rows[i].deviation_percent, 0.5) << i;
 }
 
 }  // namespace

@@ -254,5 +254,89 @@ TEST(Transfer, WrongBytesAreNamed) {
   EXPECT_EQ(end.problems.at("bytes of another digest"), 3u);
 }
 
+TEST(Transfer, ALiarIsDroppedAndWhatItOwesIsDealtAnew) {
+  std::vector<MirrorModel> mirrors{mirror(1e5), mirror(1e5), mirror(2e5)};
+  mirrors[1].lies_from_s = 1;
+  HtcOptions o = options();
+  o.sites = 3;
+  o.throughput.initial_bytes_s = 4e5;
+  const SimulationResult r = simulate(table_4_2_offers(), o, network(mirrors));
+  EXPECT_EQ(r.given_up, 0u);
+  EXPECT_LT(r.late_s, 0.3);
+  ASSERT_EQ(r.mirrors.size(), 3u);
+  EXPECT_GT(r.mirrors[1].requests, 0u);  // before it began to lie
+  EXPECT_EQ(r.mirrors[1].dropped, "bytes of another digest");
+  EXPECT_LT(r.mirrors[1].bytes, 1.2e5);
+  EXPECT_EQ(r.mirrors[0].dropped + r.mirrors[2].dropped, "");
+  std::uint64_t bytes = 0;
+  for (const MirrorShare& m : r.mirrors) bytes += m.bytes;
+  EXPECT_EQ(bytes, r.bytes);
+}
+
+TEST(Transfer, ALiarAloneIsAskedUntilItsTriesAreOver) {
+  MirrorModel liar = mirror(1e6);
+  liar.lies_from_s = 0;
+  const SimulationResult r = simulate(table_4_2_offers(), options(), network({liar}));
+  EXPECT_TRUE(r.never);
+  EXPECT_EQ(r.bytes, 0u);
+}
+
+TEST(Transfer, FragmentsAreDealtToSitesByTheirSpeed) {
+  HtcOptions o = options();
+  o.sites = 3;
+  const SimulationResult r =
+      simulate(table_4_2_offers(), o, network({mirror(1e5), mirror(2e5), mirror(4e5)}));
+  ASSERT_EQ(r.mirrors.size(), 3u);
+  const double all = static_cast<double>(r.bytes);
+  EXPECT_NEAR(static_cast<double>(r.mirrors[0].bytes) / all, 1.0 / 7, 0.06);
+  EXPECT_NEAR(static_cast<double>(r.mirrors[1].bytes) / all, 2.0 / 7, 0.06);
+  EXPECT_NEAR(static_cast<double>(r.mirrors[2].bytes) / all, 4.0 / 7, 0.08);
+  // Together they are nearly as fast as one that has all their throughput.
+  const SimulationResult one = simulate(table_4_2_offers(), options(), network({mirror(7e5)}));
+  EXPECT_LT(r.end_s, 1.15 * one.end_s);
+}
+
+/// One request after the other, each of another entry.
+class Entries final : public RequestSource {
+ public:
+  explicit Entries(std::uint32_t count) : count_(count) {}
+  std::optional<TransferRequest> next(double) override {
+    if (at_ > done_ || at_ == count_) return std::nullopt;
+    const EntryRef entry{"entry", 1000ull * (at_ / 2), 1000, {}};  // two requests an entry
+    return TransferRequest{at_++, 100, {{entry, {0, 100}}}};
+  }
+  bool arrived(const Transport::Outcome&) override { return ++done_, true; }
+  void failed(std::uint32_t, double) override { ++done_, ++lost; }
+  bool finished() const override { return done_ == count_; }
+  std::uint32_t lost = 0;
+
+ private:
+  std::uint32_t count_, at_ = 0, done_ = 0;
+};
+
+TEST(Transfer, AMirrorThatLacksAnEntryIsNotAskedForItAgain) {
+  // Mirror 0 has the entries of requests 0 .. 3, mirror 1 those from 2 on; nobody has the last one.
+  Script script(2, [](const TransferRequest& r, std::uint32_t mirror, int) {
+    Transport::Outcome o{r.number, 0.01, true, {}, {}, 0, false};
+    const bool has = r.number < 8 && (mirror == 0 ? r.number < 4 : r.number >= 2);
+    o.good = has;
+    o.absent = !has;
+    if (!has) o.problem = "status 404";
+    return std::optional(o);
+  });
+  Entries source(10);
+  const TransferEnd end = transfer(source, script, {});
+  EXPECT_EQ(source.lost, 2u);
+  EXPECT_EQ(end.given_up, 2u);
+  std::map<std::pair<std::uint32_t, std::uint32_t>, int> asked;  // by mirror and entry
+  for (const Script::Started& s : script.started) ++asked[{s.mirror, s.number / 2}];
+  for (const auto& [key, count] : asked) {
+    const auto [mirror, entry] = key;
+    const bool has = entry < 4 && (mirror == 0 ? entry < 2 : entry >= 1);
+    EXPECT_LE(count, has ? 2 : 1) << mirror << ' ' << entry;
+  }
+  for (const MirrorShare& m : end.mirrors) EXPECT_EQ(m.dropped, "");
+}
+
 }  // namespace
 }  // namespace texmesh

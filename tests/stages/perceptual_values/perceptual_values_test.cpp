@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <numeric>
 
 #include "format/base/archive.h"
 #include "stages/base/run_context.h"
@@ -115,6 +116,42 @@ TEST(PerceptualValues, MajorsAreTheLastOfTheirTier) {
   };
   EXPECT_EQ(majors(1.0), 1);
   EXPECT_GE(majors(0.005), 3);
+}
+
+TEST(PerceptualValues, TableOfTheNutcrackerMakesS4Major) {
+  // Table 7.1: averages of two collapses each, one a half over the average and one a half under it.
+  const float average[]{0.0410f, 0.0412f, 0.0478f, 0.0468f, 0.0678f};
+  NestedScales scales;
+  scales.mesh = testing::sphere(8, 12);
+  Skeleton skeleton = centre_skeleton(scales.mesh);
+  skeleton.distance.assign(scales.mesh.positions.size(), 1);
+  skeleton.radius = skeleton.distance;
+  NestedScale scale;
+  scale.triangles = scales.mesh.triangles;
+  scale.triangle_source.resize(scale.triangles.size());
+  std::iota(scale.triangle_source.begin(), scale.triangle_source.end(), 0u);
+  scale.position_count = static_cast<std::uint32_t>(scales.mesh.positions.size());
+  scales.scales.push_back(scale);
+  for (std::uint32_t k = 0; k < 5; ++k) {
+    for (const float part : {0.5f, 1.5f}) {
+      const auto from = static_cast<std::uint32_t>(scales.collapses.size());
+      scales.collapses.push_back({from, 40, 0});
+      skeleton.distance[from] = 1 + part * average[k];
+    }
+    scale.scale = static_cast<int>(k) + 1;
+    scale.collapse_count = static_cast<std::uint32_t>(scales.collapses.size());
+    scales.scales.push_back(scale);
+  }
+  const auto majors = [&](PerceptualStatistic statistic) {
+    return measure_perceptual_values(scales, skeleton, {.jnd = 0.10, .statistic = statistic}, kOneThread)
+        .major;
+  };
+  // Table 7.2: the change from S_0 to S_4 is below 0.10, that to S_5 is not. The thesis names S_4
+  // (Fig. 7.13).
+  EXPECT_EQ(majors(PerceptualStatistic::kAverage), (std::vector<std::uint8_t>{0, 0, 0, 0, 1, 1}));
+  // By the largest changes S_3 is too far from S_0, by the least ones nothing is.
+  EXPECT_EQ(majors(PerceptualStatistic::kConservative), (std::vector<std::uint8_t>{0, 0, 1, 1, 1, 1}));
+  EXPECT_EQ(majors(PerceptualStatistic::kAggressive), (std::vector<std::uint8_t>{0, 0, 0, 0, 0, 1}));
 }
 
 TEST(PerceptualValues, KeepsAboutAsManyScalesAsAsked) {

@@ -8,8 +8,10 @@
 #include <set>
 
 #include "format/base/archive.h"
+#include "format/base/portable_math.h"
 #include "stages/base/run_context.h"
 #include "tests/stages/simplification/simplification_checks.h"
+#include "tests/support/hostile_meshes.h"
 #include "tests/support/meshes.h"
 
 namespace texmesh {
@@ -244,6 +246,36 @@ TEST(Simplification, QuadricsBeatTheLiteralThesisOrder) {
       EXPECT_LT(map.persistence[thesis.collapses[applied].from], s.scale);
   EXPECT_LT(ours.scales[3].error_rms, thesis.scales[3].error_rms);
   expect_sound(run(mesh, {.persistence_weight = 0}));
+}
+
+/// A hexagon whose middle has been moved a third of the way towards one of its corners.
+Mesh hexagon_around(std::uint32_t near) {
+  std::vector<Vec3f> points;
+  std::vector<Triangle> triangles;
+  for (std::uint32_t i = 0; i < 6; ++i) {
+    const double a = 2 * portable::kPi * i / 6;
+    points.push_back(to_float(Vec3d{portable::cos(a), portable::sin(a), 0}));
+    triangles.push_back({6, i, (i + 1) % 6});
+  }
+  points.push_back(points[near] * (1 / 3.0f));
+  return bare_mesh(std::move(points), std::move(triangles));
+}
+
+TEST(Simplification, ThesisOrderMergesIntoTheClosestNeighbour) {
+  for (std::uint32_t near = 0; near < 6; ++near) {
+    const ConditionedMesh mesh = condition(hexagon_around(near));
+    ASSERT_EQ(mesh.mesh.positions.size(), 7u);
+    ScaleMap map;
+    map.scales = 1;
+    map.persistence = {1, 1, 1, 1, 1, 1, 0};
+    const NestedScales scales = simplify(
+        mesh, map,
+        {.order = CollapseOrder::kThesis, .max_error = 1, .min_triangles = 1, .coarsest_vertices = 0},
+        kOneThread);
+    ASSERT_EQ(scales.collapses.size(), 1u);
+    EXPECT_EQ(mesh.position_source[scales.collapses[0].from], 6u);
+    EXPECT_EQ(mesh.position_source[scales.collapses[0].to], near);
+  }
 }
 
 TEST(Simplification, PersistentVerticesStayLonger) {

@@ -58,6 +58,34 @@ TEST(RangeScan, CrossingsFallWithTheScale) {
   EXPECT_EQ(map.persistence, map.crossing);
 }
 
+/// r = 1 + a sin 6 alpha over a full turn, in one row.
+RangeGrid six_waves(std::uint32_t columns, double amplitude) {
+  RangeGrid g;
+  g.columns = columns;
+  g.rows = 1;
+  g.alpha_step_rad = static_cast<float>(2 * portable::kPi / columns);
+  g.y_step = 1;
+  for (std::uint32_t x = 0; x < columns; ++x) {
+    // Every crossing has one nearest sample, a quarter of a step behind it.
+    const double a = 2 * portable::kPi * (x + 0.25) / columns;
+    g.radius.push_back(static_cast<float>(1 + amplitude * portable::sin(6 * a)));
+    g.position.push_back(x);
+  }
+  return g;
+}
+
+TEST(RangeScan, CrossingsOfASineAreWhereTheyMustBe) {
+  // Any even filter leaves the sine a sine: its crossings stay at alpha = k pi / 6, at every scale. (Twice as
+  // many columns would bring the narrowest filter's response near what rounding makes of radii in floats.)
+  constexpr std::uint32_t kColumns = 360, kApart = kColumns / 12;
+  for (const double amplitude : {0.02, 0.2}) {
+    const ScaleMap map = filter_range_scan(six_waves(kColumns, amplitude), kColumns, {}, RunContext{});
+    for (std::uint32_t x = 0; x < kColumns; ++x)
+      EXPECT_EQ(map.crossing[x], x % kApart == 0 ? map.scales : 0) << x;
+    for (int i = 1; i <= map.scales; ++i) EXPECT_EQ(map.crossings_at[static_cast<std::size_t>(i)], 12u) << i;
+  }
+}
+
 TEST(RangeScan, PlainCylinderHasNone) {
   RangeGrid g = relief_grid(64, 40, 0);
   const ScaleMap map = filter_range_scan(g, 64 * 40, {}, RunContext{});

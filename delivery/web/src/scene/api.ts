@@ -12,6 +12,16 @@ export interface Display {
   part?: VisiblePart;
 }
 
+/** Where somebody looks. */
+export interface Gaze {
+  /** Place in the picture, -1 (left) to 1 (right). */
+  x: number;
+  /** -1 (bottom) to 1 (top). */
+  y: number;
+  /** Device pixels that one degree of the visual field has on this screen. Default 40: 96 to the inch at 60 cm. */
+  pxPerDegree?: number;
+}
+
 /** The methods of GLTFLoader (three/addons) that this library uses. */
 export interface GltfLoaderLike {
   /** Adds an extension of the loader. */
@@ -39,6 +49,11 @@ export interface LoadOptions {
   gltfLoader: () => GltfLoaderLike;
   /** Camera that looks at the object; scale and textures follow the camera's view, see LoadedModel.update. */
   camera?: Camera;
+  /**
+   * Where somebody looks, asked before every list of fragments (an eye tracker, the pointer): what lies beside counts less, by the acuity
+   * of the eye. Needs a camera. Left out: the whole picture counts alike.
+   */
+  gaze?: () => Gaze | undefined;
   /** Displayed height in device px, or a function that gives the height; stands in for the camera. Default 1000. */
   display?: number | Display | (() => number | Display);
   /**

@@ -47,30 +47,38 @@ export class FragmentFetch {
 
   /**
    * The list of the fragments of the planes shown, with the bytes that fetching takes. A fragment's losses count by the share that the
-   * camera sees, and by `unseen` at least.
+   * camera sees, and by `unseen` at least; with a gaze, by the acuity of the eye, too.
    */
   async listOf(scale: number, unseen: number): Promise<FragmentList> {
-    const { planes, transfers, load_: { view } } = this;
+    const { planes, transfers, load_: { view, options, object } } = this;
     const seen = new Map<number, Float32Array | undefined>();
+    const looked = new Map<number, Float32Array>();
+    const gaze = view.camera && options.gaze?.();
+    const gazeWeights = gaze && (await import('./gaze/gaze_weights')).gazeWeights;
     for (const { plane } of planes.all()) {
       await sleepS(0); // the page goes on in between
       seen.set(plane, this.shares_(plane));
+      if (gazeWeights) looked.set(plane, gazeWeights(planes.textures[plane], object, view.camera!, options.renderer, gaze, this.showsOf_(plane)));
     }
     const list = fragmentList(planes.data, planes.all(), { scale, displayedPx: view.display.heightPx, ...this.listOptions });
     list.offers.forEach((offer, i) => {
       const { plane, fragment } = list.fragments[i];
       offer.bytes = offer.bytes.map((b, r) => transfers.bytesOf(plane, r, fragment) || b);
-      offer.loss = offer.loss.map((l) => l * Math.max(unseen, seen.get(plane)?.[fragment] ?? 1));
+      const attention = looked.get(plane)?.[fragment] ?? 1;
+      offer.loss = offer.loss.map((l) => l * attention * Math.max(unseen, seen.get(plane)?.[fragment] ?? 1));
+      offer.eta *= attention;
     });
     return list;
   }
   /** Share of each fragment that the camera sees; undefined without a camera. */
   private shares_(plane: number): Float32Array | undefined {
-    const { materials, view, object } = this.load_;
-    const info = this.planes.textures[plane];
-    const slots = materials.slots.filter((s) => s.image === info.image);
-    const shows = (mesh: Mesh): boolean => [mesh.material].flat().some((m) => slots.some((s) => s.material === m));
-    return view.camera && seenShares(info, object, view.camera, shows);
+    const { view, object } = this.load_;
+    return view.camera && seenShares(this.planes.textures[plane], object, view.camera, this.showsOf_(plane));
+  }
+  /** Whether a mesh has the plane's image. */
+  private showsOf_(plane: number): (mesh: Mesh) => boolean {
+    const slots = this.load_.materials.slots.filter((s) => s.image === this.planes.textures[plane].image);
+    return (mesh) => [mesh.material].flat().some((m) => slots.some((s) => s.material === m));
   }
 
   /** Fetches fragments; gives the number that have come. */

@@ -5,25 +5,30 @@ import type { TextureInfo } from '../format/textures';
 /** Triangles looked at per model: enough to tell which fragments are seen. */
 const mostSamples = 6000;
 
+/** The fragment at texture coordinates. */
+export function fragmentAt({ columns, rows, widthPx, heightPx, fragmentWidthPx, fragmentHeightPx }: TextureInfo, uv: { x: number; y: number }): number {
+  const cell = (part: number, px: number, whole: number, count: number): number =>
+    Math.min(count - 1, Math.floor(((part - Math.floor(part)) * whole) / px));
+  return cell(uv.y, fragmentHeightPx, heightPx, rows) * columns + cell(uv.x, fragmentWidthPx, widthPx, columns);
+}
+
 /**
  * Share of each fragment's surface that the camera sees, from a sample of the triangles. Seen: within the camera's frustum and turned to
  * the camera, by the material's side. `shows`: whether a mesh has the plane's image, by texture coordinates of set 0. [fragments]
  */
 export function seenShares(plane: TextureInfo, object: Object3D, camera: Camera, shows: (mesh: Mesh) => boolean): Float32Array {
-  const { columns, rows, widthPx, heightPx, fragmentWidthPx, fragmentHeightPx } = plane;
+  const { columns, rows } = plane;
   const seen = new Float32Array(columns * rows);
   const all = new Float32Array(columns * rows);
   object.updateWorldMatrix(true, true);
   const eye = new Vector3().setFromMatrixPosition(camera.matrixWorld);
   const frustum = new Frustum().setFromProjectionMatrix(new Matrix4().multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse));
   const [at, uv, middle] = [new Triangle(), new Triangle(), new Vector3()];
-  const cell = (part: number, px: number, whole: number, count: number): number =>
-    Math.min(count - 1, Math.floor(((part - Math.floor(part)) * whole) / px));
   sampleTriangles(object, mostSamples, (mesh, places) => {
     const { geometry: { attributes }, matrixWorld } = mesh;
     if (!attributes.uv || !shows(mesh)) return;
     uv.setFromAttributeAndIndices(attributes.uv, ...places).getMidpoint(middle);
-    const f = cell(middle.y, fragmentHeightPx, heightPx, rows) * columns + cell(middle.x, fragmentWidthPx, widthPx, columns);
+    const f = fragmentAt(plane, middle);
     at.setFromAttributeAndIndices(attributes.position, ...places);
     const corners = [at.a, at.b, at.c].map((p) => p.applyMatrix4(matrixWorld));
     const area = at.getArea();
