@@ -42,8 +42,10 @@ TEST(ScaleExhibits, Fig62CurvesFall) {
     ASSERT_GT(s.points.size(), 20u);
     for (std::size_t k = 1; k < s.points.size(); ++k) {
       EXPECT_GT(s.points[k].first, s.points[k - 1].first);
-      EXPECT_LE(s.points[k].second, s.points[k - 1].second + 1e-6);
+      // A window that is cut off at 1.4 sigma is no Gaussian: the range may rise by a hundredth of S_0's.
+      EXPECT_LE(s.points[k].second, s.points[k - 1].second + 0.01);
     }
+    EXPECT_LT(s.points.back().second, 0.2);
   }
   EXPECT_EQ(e.verdict, Verdict::kConfirmed) << e.finding;
 }

@@ -1,6 +1,7 @@
 // texmesh study as a user runs it: tables, CSV, JSON, pictures, exit codes.
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
@@ -59,6 +60,27 @@ TEST_F(StudyCommand, FragmentsAsTableCsvAndJson) {
   EXPECT_FALSE(std::getline(csv, line));
   EXPECT_EQ(read_text(folder / "x.csv").find("\"" + rgba + "\","),
             read_text(folder / "x.csv").find('\n') + 1);
+}
+
+TEST_F(StudyCommand, ThesisAsTextJsonAndPage) {
+  const CommandResult text = texmesh({"study", "thesis", "--table", "4.1"});
+  ASSERT_EQ(text.exit_code, 0) << text.errors;
+  EXPECT_NE(text.output.find("41.68"), std::string::npos);
+  EXPECT_EQ(text.output.find("Table 4.2"), std::string::npos);
+  const std::string page = folder / "page";
+  const CommandResult made = texmesh({"study", "thesis", "--table", "4.1,fig-8.3", "--json", "-o", page});
+  ASSERT_EQ(made.exit_code, 0) << made.errors;
+  EXPECT_EQ(Json::parse(made.output)["exhibits"].size(), 2u);
+  const std::string first = read_text(page + "/index.html");
+  EXPECT_NE(first.find("fig-8-3.png"), std::string::npos);
+  EXPECT_EQ(texmesh({"study", "thesis", "--table", "4.1,fig-8.3", "-j", "4", "-o", page}).exit_code, 0);
+  EXPECT_EQ(read_text(page + "/index.html"), first);
+  EXPECT_EQ(texmesh({"study", "thesis", "--table", "9.9"}).exit_code, 2);
+  const std::string strange = folder / "strange";
+  std::filesystem::create_directory(strange);
+  write_text(strange + "/letter.txt", "keep me");
+  EXPECT_EQ(texmesh({"study", "thesis", "--table", "4.1", "-o", strange}).exit_code, 1);
+  EXPECT_EQ(read_text(strange + "/letter.txt"), "keep me");
 }
 
 TEST_F(StudyCommand, QualityOfAModel) {

@@ -174,7 +174,7 @@ TEST_F(Dump, AllJoinsTheParts) {
 
 TEST(DumpUntextured, SaysSo) {
   testing::PackageParts p = testing::make_package_parts();
-  p.textures.clear(), p.streams.clear(), p.tables.planes.clear();
+  p.textures.clear(), p.streams.clear(), p.tables.planes.clear(), p.thesis.planes.clear();
   p.manifest.plane_count = 0;
   p.quality.groups.clear();
   const Bytes bytes = p.build();

@@ -359,7 +359,6 @@ TEST(Verify, ThesisTables) {
   }));
   EXPECT_TRUE(caught([](PackageParts& p) { p.thesis.planes.push_back(p.thesis.planes[0]); }));
   EXPECT_TRUE(caught([](PackageParts& p) { p.thesis.planes[0].models.pop_back(); }));
-  EXPECT_TRUE(caught([](PackageParts& p) { p.thesis.perceptual.triangles[5] += 1; }));
   EXPECT_TRUE(caught([](PackageParts& p) { p.thesis.perceptual.p95[pair_index(6, 0, 5)] *= 1.001f; }));
   EXPECT_TRUE(caught([](PackageParts& p) { p.thesis.perceptual.scale[5] = 6; }));
   // Sizes of a scale that is not stored are the writer's; so is whether there is such an entry.
