@@ -47,11 +47,12 @@ struct TextureLosses {
   /// QualityTable::exponent, it is the picture's. The others are the picture's.
   PictureLosses coded;
   PictureLosses preview;  // one: with the previews of all the group's textures
-  /// With the source's texels of the planes shown at that height, then of mips that are 1, 2 .. levels finer;
-  /// 1 to kMaxFinerLevels + 1 of them. `flip` does not rise. A client shows such texels where a rung loses
-  /// nothing: they may still be coarser than what the source shows there.
+  /// With the texels that the planes shown at that height would have without coding, then those of mips that
+  /// are 1, 2 .. levels finer, of full size the source's where a rung has them; 1 to kMaxFinerLevels + 1 of
+  /// them. `flip` does not rise. A client shows such texels where a rung loses nothing: they may still be
+  /// coarser than what the source shows there, and its mips have other charts' borders.
   PictureLosses finer;
-  /// With the source's texels of mips that are 1, 2 .. levels coarser than the planes shown at that height.
+  /// The same of mips that are 1, 2 .. levels coarser than the planes shown at that height.
   PictureLosses coarser;
   template <class S, class A>
   static void archive(S& s, A& a) {

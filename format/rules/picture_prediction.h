@@ -32,9 +32,9 @@ class GroupCurve {
   double coded(double texel_dssim, const TexelGrowth& growth = {}) const;
   /// FLIP where all textures of the group show their previews. Without the group 1.
   double preview() const;
-  /// FLIP of the source's texels in a plane that is the source's, halved `mip` times. Between whole levels of
-  /// growth linear, behind the coarsest sampled ones along the last line; less what texels of full size, so
-  /// much smaller, would have. 0 for full size.
+  /// FLIP of the texels that rungs code, halved `mip` times. Between whole levels of growth linear, behind
+  /// the coarsest sampled ones along the last line; less what texels of full size, so much smaller, would
+  /// have beyond the finest sampled level. That level's for full size.
   double halved(const TexelGrowth& growth, std::uint32_t mip) const;
   static constexpr double kLossPerDoubling = 1.6, kLossPerHalving = 1.25;
 

@@ -10,7 +10,8 @@
 namespace texmesh {
 namespace {
 
-constexpr double kWorthwhileFlip = 2e-3;  // that finer planes must save: nobody sees less
+constexpr double kWorthwhileFlip = 2e-3;      // that finer planes must save: nobody sees less
+constexpr double kWorthwhilePart = 1.0 / 16;  // where little is lost: so much of it
 constexpr int kReweightings = 2;
 constexpr double kLossUnit = 1099511627776.0;  // 2^40: losses as spend_bytes counts them
 constexpr double kLeastWeight = 1e-3;          // of a group beside the others
@@ -89,7 +90,8 @@ class LevelSearch {
     if (!now || now->flip >= best_.flip) return false;
     const bool is_finer = std::ranges::min(step) < 0;
     // Beside each other, finer planes need not save that much.
-    if (is_finer && now->flip >= without_finer_ - kWorthwhileFlip) return false;
+    const double least = std::min(kWorthwhileFlip, kWorthwhilePart * without_finer_);
+    if (is_finer && now->flip >= without_finer_ - least) return false;
     best_ = std::move(*now);
     at_ = to;
     if (!is_finer) without_finer_ = best_.flip;

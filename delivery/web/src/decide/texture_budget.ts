@@ -73,7 +73,7 @@ export function* budgetSteps(loss: TextureLoss, options: SpendingOptions, bytes:
       const now = spend(to);
       // Finer planes take memory: they have to look better, not only as good, but not so much better than each other.
       const finer = step.includes(-1);
-      if (!now || now.flip >= best.flip || (finer && now.flip >= withoutFiner - worthwhile)) continue;
+      if (!now || now.flip >= best.flip || (finer && now.flip >= withoutFiner - Math.min(worthwhile, withoutFiner / 16))) continue;
       best = now;
       if (!finer) withoutFiner = now.flip;
       from = to;
