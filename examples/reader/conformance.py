@@ -367,6 +367,8 @@ def check_order(t):
     features = t["features"][0].astype(np.float64)
     spread = features.max(initial=0) - features.min(initial=features.max(initial=0))
     eta = np.float32((features - features.min(initial=features.max(initial=0))) / spread) if spread else features * 0
+    if len(t["vqp"]):
+        eta = t["vqp"] / 65535
     keys = list(zip(-eta, -t["surface"], t["order"].tolist()))
     require(keys == sorted(keys), "T12", "order of importance")
 
