@@ -50,6 +50,25 @@ struct PageList {
   std::vector<FragmentOffer> offers;  // one list behind the other, losses weighted
 };
 
+/// How much the object's FLIP grows with what each group loses, where its own plan would leave it: losses of
+/// different objects are compared by that.
+PerGroup slopes(PackageReader& package, const PageObject& object, const FragmentList& list,
+                const DeliveryPlan& plan) {
+  constexpr double kStep = 0.01;
+  const PerGroup losses = losses_of(list, plan.textures.rungs);
+  const auto flip = [&](const PerGroup& l) {
+    return picture_flip(package.quality(), object.displayed_px, plan.scale, l);
+  };
+  PerGroup slope{};
+  for (std::size_t g = 0; g < kPlaneGroups; ++g) {
+    PerGroup more = losses;
+    const double step = std::max(kStep * losses[g], 1e-5);
+    more[g] += step;
+    slope[g] = std::max((flip(more) - flip(losses)) / step, 1e-6);
+  }
+  return slope;
+}
+
 PageList page_list(const std::vector<PageObject>& objects, const DeliveryRequest& request,
                    const std::vector<double>& share, const PagePlan& plan) {
   PageList page;
@@ -57,9 +76,14 @@ PageList page_list(const std::vector<PageObject>& objects, const DeliveryRequest
     page.lists.emplace_back();
     if (plan.objects[i].proxy || plan.first_picture_only[i]) continue;
     page.lists[i] = list_of(*objects[i].package, request_for(request, objects[i], share[i]), plan.objects[i]);
-    for (FragmentOffer offer : page.lists[i].offers) {
-      for (double& loss : offer.loss) loss *= share[i];
-      offer.eta *= share[i];
+    const FragmentList& list = page.lists[i];
+    const PerGroup slope = slopes(*objects[i].package, objects[i], list, plan.objects[i]);
+    for (std::size_t k = 0; k < list.offers.size(); ++k) {
+      const auto group = static_cast<std::size_t>(list.groups[k]);
+      const double weight = share[i] * slope[group] / list.group_weights[group];
+      FragmentOffer offer = list.offers[k];
+      for (double& loss : offer.loss) loss *= weight;
+      offer.eta *= weight;
       page.offers.push_back(std::move(offer));
     }
   }

@@ -8,7 +8,7 @@
 #include "delivery/cpp/package/http_store.h"
 #include "delivery/cpp/simulate/link_recorder.h"
 #include "delivery/cpp/transfer/monitored_transport.h"
-#include "pipeline/io/link_history.h"
+#include "pipeline/cli/fetch/link_history.h"
 
 namespace texmesh {
 

@@ -1,4 +1,4 @@
-#include "pipeline/io/link_history.h"
+#include "pipeline/cli/fetch/link_history.h"
 
 #include <algorithm>
 #include <cstdlib>

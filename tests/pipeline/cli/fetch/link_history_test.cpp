@@ -1,5 +1,5 @@
 // Averages of hosts from run to run, and files that are no such thing.
-#include "pipeline/io/link_history.h"
+#include "pipeline/cli/fetch/link_history.h"
 
 #include <gtest/gtest.h>
 
