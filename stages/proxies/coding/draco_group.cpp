@@ -7,8 +7,6 @@
 #include <charconv>
 #include <string>
 
-#include "format/base/errors.h"
-
 namespace texmesh::proxies {
 namespace {
 
@@ -42,10 +40,6 @@ void round_to(draco::ExpertEncoder& encoder, int id, int bits, const std::string
   encoder.options().SetAttributeOptions(id, options);
 }
 
-[[noreturn]] void fail(std::string expected, std::string found) {
-  throw StageError("proxies", "draco", std::move(expected), std::move(found));
-}
-
 }  // namespace
 
 DracoGroup code_draco_group(const DracoInput& input) {
@@ -61,7 +55,7 @@ DracoGroup code_draco_group(const DracoInput& input) {
   const int normal =
       input.normals.empty() ? -1 : add_vertices(mesh, draco::GeometryAttribute::NORMAL, input.normals);
   const int uv = add_vertices(mesh, draco::GeometryAttribute::TEX_COORD, input.uvs);
-  if (!mesh.DeduplicateAttributeValues()) fail("attributes without repeats", "a failure");
+  if (!mesh.DeduplicateAttributeValues()) return {};
   mesh.DeduplicatePointIds();
   draco::ExpertEncoder encoder(mesh);
   encoder.SetSpeedOptions(kSpeed, kSpeed);
@@ -71,8 +65,7 @@ DracoGroup code_draco_group(const DracoInput& input) {
   round_to(encoder, uv, input.uv_bits, "0 0 ", 1);
   if (normal >= 0) encoder.SetAttributeQuantization(normal, kNormalBits);
   draco::EncoderBuffer buffer;
-  const draco::Status status = encoder.EncodeToBuffer(&buffer);
-  if (!status.ok()) fail("a stream", status.error_msg_string());
+  if (!encoder.EncodeToBuffer(&buffer).ok()) return {};
   DracoGroup out;
   out.stream.assign(buffer.data(), buffer.data() + buffer.size());
   out.ids = {mesh.attribute(position)->unique_id(), normal >= 0 ? mesh.attribute(normal)->unique_id() : 0,
@@ -81,7 +74,7 @@ DracoGroup code_draco_group(const DracoInput& input) {
   draco::DecoderBuffer bytes;
   bytes.Init(buffer.data(), buffer.size());
   const auto decoded = draco::Decoder().DecodeMeshFromBuffer(&bytes);
-  if (!decoded.ok()) fail("a stream that decodes", decoded.status().error_msg_string());
+  if (!decoded.ok()) return {};
   out.triangles = decoded.value()->num_faces();
   out.vertices = decoded.value()->num_points();
   return out;

@@ -24,8 +24,8 @@ struct DracoGroup {
   std::array<std::uint32_t, 3> ids{};       // of positions, normals, uvs in the stream
   std::size_t triangles = 0, vertices = 0;  // as a decoder gives them
 };
-/// Edgebreaker, each attribute with seams of its own, so positions are stored once. StageError when Draco
-/// refuses.
+/// Edgebreaker, each attribute with seams of its own, so positions are stored once. No stream where Draco
+/// refuses the mesh.
 DracoGroup code_draco_group(const DracoInput& input);
 
 }  // namespace texmesh::proxies

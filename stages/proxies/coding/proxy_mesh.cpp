@@ -209,6 +209,9 @@ CodedMesh code_mesh(const AtlasMesh& mesh, const std::vector<Vec3f>& normals,
     if (group.indices.empty()) continue;
     out.groups.push_back(coder.code(group, with_normals[g] ? normals : none));
     out.groups.back().group = g;
+    // Draco's positions and meshopt's places cannot share a node.
+    if (coding.draco && !out.groups.back().is_draco())
+      return code_mesh(mesh, normals, with_normals, {false, coding.position_bits});
   }
   return out;
 }

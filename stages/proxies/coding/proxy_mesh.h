@@ -49,6 +49,7 @@ struct CodedMesh {
 
 /// `normals`: per vertex, unit; empty for none. `with_normals`: per group. Triangles with two corners in one
 /// place of the grid go. No group is left where nothing is left.
+/// What Draco refuses is coded by meshopt.
 CodedMesh code_mesh(const AtlasMesh& mesh, const std::vector<Vec3f>& normals,
                     const std::vector<bool>& with_normals, const MeshCoding& coding);
 

@@ -162,6 +162,8 @@ TEST(Proxies, HardModelsHaveAProxyOrANote) {
       {"220 materials", many_materials()},
       {"alpha mask", masked()},
       {"open sheet", textured(testing::sheet(30))},
+      {"blended sheet", changed(textured(testing::sheet(30)),
+                                [](ProxyModel& m) { m.materials[0].alpha_mode = AlphaMode::kBlend; })},
       {"no coordinates", changed(sphere, [](ProxyModel& m) { m.mesh.uv0.clear(); })},
       {"coordinates without area", changed(sphere,
                                            [](ProxyModel& m) {
@@ -188,7 +190,26 @@ TEST(Proxies, HardModelsHaveAProxyOrANote) {
                               for (Vec3f& p : m.mesh.positions) p = {1, 1, 1};
                             })},
       {"many pebbles", textured(testing::side_by_side(std::vector<Mesh>(200, testing::cube())))}};
-  for (const auto& [what, model] : models) expect_sound(proxies_of(model), what);
+  for (const auto& [what, model] : models)
+    expect_sound(proxies_of(model, {ProxyMode::kAlways, {8000, 20000}}), what);
+}
+
+TEST(Proxies, TheFirstNeedsNoDracoAndLargerOnesDo) {
+  const Proxies made =
+      proxies_of(textured(testing::bumpy_sphere(40, 80)), {ProxyMode::kAlways, {10000, 25000}});
+  ASSERT_EQ(made.proxies.size(), 2u);
+  const auto codec = [](const Proxy& proxy) {
+    Findings findings;
+    return check_glb(proxy.glb, "proxy", findings, GlbRules::kStandalone).codec;
+  };
+  EXPECT_EQ(codec(made.proxies[0]), "meshopt");
+  EXPECT_EQ(codec(made.proxies[1]), "draco");
+}
+
+TEST(Proxies, TinyMeshesKeepTheSourcesAtlas) {
+  const Proxies made = proxies_of(textured(testing::sphere(10, 20)), {ProxyMode::kAuto, {20000, 50000}});
+  EXPECT_TRUE(made.proxies.empty());
+  EXPECT_EQ(made.notes.size(), 1u);
 }
 
 TEST(Proxies, VertexColoursBecomeTexels) {

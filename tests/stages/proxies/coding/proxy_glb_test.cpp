@@ -115,14 +115,14 @@ TEST(ProxyGlb, GroupsAreMaterialsOverTheSamePictures) {
 
 TEST(ProxyPictures, FillTheBytesAndNoMore) {
   const MapPixels maps = map_pixels(noise_maps(128, false), {true, true});
-  for (const std::size_t bytes : {40000u, 80000u}) {
+  for (const std::size_t bytes : {30000u, 50000u}) {
     const ProxyPictures pictures = code_pictures(maps, bytes);
     EXPECT_LE(pictures.bytes(), bytes);
     EXPECT_GT(pictures.bytes(), bytes * 9 / 10);
   }
   const std::size_t least = code_pictures(maps, 0).bytes();
   EXPECT_GT(least, 0u);
-  EXPECT_LT(least, 40000u);
+  EXPECT_LT(least, 30000u);
 }
 
 TEST(ProxyPictures, HalfOfTheOcclusionIsInTheColourWhereItHasNoMap) {
