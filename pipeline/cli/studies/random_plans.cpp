@@ -4,6 +4,7 @@
 #include <array>
 
 #include "format/base/portable_math.h"
+#include "format/rules/split_mix.h"
 
 namespace texmesh {
 namespace {
@@ -11,22 +12,16 @@ namespace {
 constexpr double kLeastDrawnBytes = 50e3, kMostDrawnBytes = 8e6;
 constexpr std::array<double, 5> kHeights{256, 362, 512, 724, 1024};
 
-/// Numbers in 0..1 by SplitMix64 (Steele, Lea, Flood 2014): the same on every machine.
 class Random {
  public:
-  explicit Random(std::uint64_t seed) : state_(seed) {}
-  double next() {
-    std::uint64_t z = (state_ += 0x9e3779b97f4a7c15ull);
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
-    return static_cast<double>((z ^ (z >> 31)) >> 11) / 9007199254740992.0;
-  }
+  explicit Random(std::uint64_t seed) : numbers_(seed) {}
+  double next() { return numbers_.unit(); }
   std::size_t below(std::size_t n) { return static_cast<std::size_t>(next() * static_cast<double>(n)); }
   /// Even in the logarithm.
   double between(double low, double high) { return low * portable::exp(next() * portable::log(high / low)); }
 
  private:
-  std::uint64_t state_;
+  SplitMix64 numbers_;
 };
 
 double all_bytes(PackageReader& package) {
