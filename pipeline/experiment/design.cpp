@@ -10,7 +10,7 @@
 #include "format/base/errors.h"
 #include "format/base/json_fields.h"
 #include "format/base/sha256.h"
-#include "stages/base/split_mix.h"
+#include "format/rules/split_mix.h"
 
 namespace texmesh {
 namespace {

@@ -14,7 +14,7 @@
 #include "pipeline/experiment/page_files.h"
 #include "pipeline/io/markup.h"
 #include "pipeline/io/new_folder.h"
-#include "stages/base/split_mix.h"
+#include "format/rules/split_mix.h"
 #include "stages/image/png_writer.h"
 #include "stages/measure/render_view.h"
 #include "stages/render/shade.h"

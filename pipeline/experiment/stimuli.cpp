@@ -7,7 +7,7 @@
 #include "format/base/errors.h"
 #include "format/base/portable_math.h"
 #include "pipeline/extract/package_model.h"
-#include "stages/base/split_mix.h"
+#include "format/rules/split_mix.h"
 
 namespace texmesh {
 namespace {

@@ -8,12 +8,12 @@
 #include "format/rules/viewing.h"
 #include "pipeline/about/gltf_about.h"
 #include "pipeline/extract/budget/budget_search.h"
-#include "pipeline/extract/budget/proxy_search.h"
 #include "pipeline/extract/glb/joined_jpeg.h"
 #include "pipeline/extract/glb/plain_file.h"
 #include "pipeline/extract/glb/scale_file.h"
 #include "pipeline/extract/glb/standalone_glb.h"
 #include "pipeline/extract/glb/texture_source.h"
+#include "pipeline/extract/proxy/proxy_search.h"
 
 namespace texmesh {
 namespace {

@@ -80,7 +80,7 @@ Report make_report(PackageReader& package, const ReportOptions& options, const R
   if (source)
     body += source_section(pictures, *source, package.manifest().origin - source->mesh.origin, report);
   body += curve_section(package, report) + bytes_section(package) + fragment_section(package, report) +
-          step_section(package) + method_section(package, report) + "</main>\n";
+          step_section(package) + proxy_section(package) + method_section(package, report) + "</main>\n";
   const std::string page = html_page(report.title, body);
   report.files.front().bytes.assign(page.begin(), page.end());
   return report;

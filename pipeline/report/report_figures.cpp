@@ -6,6 +6,7 @@
 #include <set>
 
 #include "format/container/layout.h"
+#include "format/rules/proxy_choice.h"
 #include "pipeline/inspect/dump/package_figures.h"
 #include "pipeline/io/markup.h"
 #include "pipeline/report/fragment_maps.h"
@@ -207,6 +208,27 @@ std::string step_section(PackageReader& package) {
                           px(s.display_px_flip), px(s.display_px_jnd), px(s.display_px_error),
                           px(s.display_px_edge), steps.contains(s.scale) ? "yes" : ""});
   return html_section("steps", "Step function", step_plot(m) + table.html());
+}
+
+std::string proxy_section(PackageReader& package) {
+  const Manifest& m = package.manifest();
+  if (m.proxies.empty()) return "";
+  HtmlTable table;
+  table.caption = "Proxies: the whole object in one file each, with an atlas of its own.";
+  table.header = {"Proxy", "Bytes", "Triangles", "Vertices", "Texture, px"};
+  for (const double px : m.proxy_sizes_px) table.header.push_back(fmt::format("FLIP at {:.0f} px", px));
+  for (std::size_t k = 0; k < m.proxies.size(); ++k) {
+    const ManifestProxy& p = m.proxies[k];
+    table.rows.push_back({std::to_string(k), thin_grouped(p.glb.bytes), thin_grouped(p.triangles),
+                          thin_grouped(p.vertices), std::to_string(p.texture_px)});
+    for (std::size_t i = 0; i < m.proxy_sizes_px.size(); ++i)
+      table.rows.back().push_back(fmt::format("{:.3f}, P95 {:.3f}", p.flip[i], p.flip_p95[i]));
+  }
+  std::string body = fmt::format(
+      "<p>A viewer shows the smallest proxy first: after {} of the package. Where a proxy's mean FLIP is at most "
+      "{:g} and its 95th percentile at most {:g}, nothing else is read.</p>\n",
+      short_bytes(static_cast<double>(start_bytes(m))), kSameFlip, kSameFlipP95);
+  return html_section("proxies", "Proxies", body + table.html());
 }
 
 }  // namespace texmesh

@@ -107,8 +107,10 @@ std::string header_section(PackageReader& package, Report& report) {
                                  {"bytes", "Bytes by kind"},
                                  {"fragments", "Fragments"},
                                  {"steps", "Step function"},
+                                 {"proxies", "Proxies"},
                                  {"method", "Method"}})
-    if (report.source || std::string_view(id) != "source")
+    if ((report.source || std::string_view(id) != "source") &&
+        (!m.proxies.empty() || std::string_view(id) != "proxies"))
       out += fmt::format("<li><a href=\"#{}\">{}</a></li>", id, name);
   out += "</ul></nav>\n</div>\n";
   if (m.poster) {

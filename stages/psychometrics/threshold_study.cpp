@@ -8,7 +8,7 @@
 
 #include "format/base/portable_math.h"
 #include "stages/base/parallel.h"
-#include "stages/base/split_mix.h"
+#include "format/rules/split_mix.h"
 
 namespace texmesh {
 namespace {

@@ -1,4 +1,4 @@
-// The figures of the browser client, measured here and printed as a table. Sections by name: first ssim deadline compose blocked
+// The figures of the browser client, measured here and printed as a table. Sections by name: first proxies ssim deadline compose blocked
 // viewer shots; all without one. Wants TEXMESH_DATA, the folder with the real scans, and keeps what it compiles of them in
 // TEXMESH_FIGURE_PACKAGES. The machine should have nothing else to do.
 import {execFileSync} from 'node:child_process';
@@ -76,6 +76,41 @@ async function firstPictures() {
     row(`first picture, ${name}: round trips`, roundTrips, '<= 2', roundTrips <= 2);
     row(`first picture, ${name}: package bytes`, Math.round(bytes), '<= 60 000', bytes <= 60000);
     row(`first picture, ${name}: seconds at 2 Mbit/s, 40 ms`, shown.at.toFixed(2), '', true);
+    await page.close();
+  }
+}
+
+/** The picture that a load showed at a time, a PNG; nothing before the first one. */
+const pictureAt = (page, id, at) => lab(page, ([i, seconds]) => {
+  const frame = window.lab.loads[i].frames.filter((f) => f.at <= seconds).at(-1);
+  if (!frame) return null;
+  const side = Math.sqrt(frame.data.length / 4);
+  const canvas = document.createElement('canvas');
+  canvas.width = canvas.height = side;
+  canvas.getContext('2d').putImageData(new ImageData(new Uint8ClampedArray(frame.data), side, side), 0, 0);
+  return canvas.toDataURL('image/png').split(',')[1];
+}, [id, at]);
+
+/** The first picture of packages with proxies, and what was shown when. TEXMESH_FIGURE_PROXIES names packages of the folder, by commas. */
+async function proxiesFirst() {
+  for (const name of (process.env.TEXMESH_FIGURE_PROXIES ?? Object.keys(kScans).join(',')).split(',')) {
+    const page = await readyPage(name);
+    const id = await load(page, name, {frames: 1, load: {time: 4, autoRefine: false}});
+    const r = await finished(page, id);
+    const shown = r.events.find((e) => e.name === 'first-picture');
+    const {roundTrips, bytes} = waitedFor(r.requests, shown.at);
+    const {px, flip} = await lab(page, (i) => {
+      const {proxies, proxySizesPx} = window.lab.loads[i].pkg.manifest;
+      return {px: proxySizesPx?.at(-1), flip: proxies?.[0]?.flip.at(-1)};
+    }, id);
+    row(`proxy first, ${name}: round trips`, roundTrips, '<= 1', roundTrips <= 1 && shown.proxy === 0);
+    row(`proxy first, ${name}: package bytes`, Math.round(bytes), '<= 45 056', bytes <= 45056);
+    row(`proxy first, ${name}: seconds at 2 Mbit/s, 40 ms`, shown.at.toFixed(2), '', true);
+    row(`proxy first, ${name}: lit FLIP beside S_0 at ${px} px`, flip?.toFixed(3), '', true);
+    for (const at of [0.1, 0.3, 1, 4]) {
+      const picture = await pictureAt(page, id, at);
+      if (picture) fs.writeFileSync(path.join(pictures, `${name}-${at}s.png`), Buffer.from(picture, 'base64'));
+    }
     await page.close();
   }
 }
@@ -285,7 +320,7 @@ async function viewerTasks() {
 
 try {
   packagesOfScans();
-  for (const [name, body] of Object.entries({first: firstPictures, ssim: timeToQuality, deadline: deadlines, compose: composing, blocked, viewer: viewerTasks, shots}))
+  for (const [name, body] of Object.entries({first: firstPictures, proxies: proxiesFirst, ssim: timeToQuality, deadline: deadlines, compose: composing, blocked, viewer: viewerTasks, shots}))
     if (wants(name)) await body();
 } finally {
   await browser.close();

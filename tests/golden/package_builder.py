@@ -157,12 +157,14 @@ class Parts:
             columns["sha256"][k] = sha(data[: columns["bytes"][k]])
 
     def add_proxies(self, glbs, flip, sizes=(128, 512), texture_px=0):
-        """Proxies, smallest first, at their places in the order; `flip` by proxy and size, P95 is three times that."""
+        """These proxies and no others, smallest first, at their places in the order; `flip` by proxy and size, P95 is three times that."""
         coarsest = f"mesh/s{self.manifest['scales']['scale'][-1]:02}.glb"
         proxies = {f"proxies/{k:02}.glb": glb for k, glb in enumerate(glbs)}
         first, *larger = proxies
         mesh, places = self.entries.pop(coarsest), {}
         for path, data in self.entries.items():
+            if path.startswith("proxies/"):
+                continue
             places[path] = data
             places |= {first: proxies[first]} if path == "manifest.json" else {}
             places |= {coarsest: mesh, **{p: proxies[p] for p in larger}} if path == "tables.bin" else {}

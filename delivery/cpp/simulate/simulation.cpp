@@ -216,14 +216,7 @@ SimulationResult simulate_serial_trace(std::vector<FragmentOffer> offers, const 
   return simulate(std::move(offers), serial, network);
 }
 
-double TraceRandom::uniform() {
-  state_ += 0x9e3779b97f4a7c15ull;
-  std::uint64_t z = state_;
-  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
-  z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
-  z ^= z >> 31;
-  return (static_cast<double>(z >> 11) + 1.0) / 9007199254740992.0;
-}
+double TraceRandom::uniform() { return numbers_.next() + 1 / 9007199254740992.0; }
 
 double TraceRandom::normal() {
   const double u = uniform(), v = uniform();

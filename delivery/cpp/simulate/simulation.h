@@ -7,6 +7,7 @@
 #include "delivery/cpp/decide/harmonic_time.h"
 #include "delivery/cpp/simulate/network_model.h"
 #include "delivery/cpp/transfer/transfer.h"
+#include "format/rules/split_mix.h"
 
 namespace texmesh {
 
@@ -55,16 +56,16 @@ SimulationResult simulate_samples(std::vector<FragmentOffer> offers, const HtcOp
 SimulationResult simulate_serial_trace(std::vector<FragmentOffer> offers, const HtcOptions& options,
                                        const BandwidthTrace& trace);
 
-/// Deterministic random numbers for traces: SplitMix64, normal values by Box and Muller
+/// Deterministic random numbers for traces: even ones by SplitMix64, normal values by Box and Muller
 /// with portable functions.
 class TraceRandom {
  public:
-  explicit TraceRandom(std::uint64_t seed) : state_(seed) {}
+  explicit TraceRandom(std::uint64_t seed) : numbers_(seed) {}
   double uniform();  // (0, 1]
   double normal();
 
  private:
-  std::uint64_t state_;
+  SplitMix numbers_;
 };
 /// A trace with steps of step_s whose logarithm is an AR(1) process: mean and coefficient of variation as
 /// asked for, correlation rho between neighbours.

@@ -4,7 +4,7 @@
 #include <array>
 
 #include "format/base/portable_math.h"
-#include "stages/base/split_mix.h"
+#include "format/rules/split_mix.h"
 
 namespace texmesh {
 namespace {

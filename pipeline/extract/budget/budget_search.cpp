@@ -7,8 +7,8 @@
 #include "pipeline/extract/budget/budget_file.h"
 #include "pipeline/extract/budget/budget_source.h"
 #include "pipeline/extract/budget/mesh_candidates.h"
-#include "pipeline/extract/budget/proxy_search.h"
 #include "pipeline/extract/glb/standalone_glb.h"
+#include "pipeline/extract/proxy/proxy_search.h"
 
 namespace texmesh {
 namespace {

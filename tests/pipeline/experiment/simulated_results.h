@@ -5,7 +5,7 @@
 
 #include "pipeline/experiment/design.h"
 #include "pipeline/experiment/results.h"
-#include "stages/base/split_mix.h"
+#include "format/rules/split_mix.h"
 
 namespace texmesh::testing {
 

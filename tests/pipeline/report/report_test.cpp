@@ -108,6 +108,18 @@ TEST(Report, SaysWhatTheSwitchSizesAre) {
   EXPECT_NE(page_of(failing).find(markup_escaped(failing.verdict)), std::string::npos);
 }
 
+TEST(Report, ProxiesHaveASectionWhereThereAreAny) {
+  PackageParts parts = parts_with_poster();
+  add_proxies(parts);
+  const std::string page = page_of(report_of(parts.build())), without = page_of(report_of(sample()));
+  EXPECT_EQ(tag_fault(page), "");
+  for (const char* text :
+       {"id=\"proxies\"", "href=\"#proxies\"", "FLIP at 128 px", "FLIP at 512 px", "0.060, P95 0.200"}) {
+    EXPECT_NE(page.find(text), std::string::npos) << text;
+    EXPECT_EQ(without.find(text), std::string::npos) << text;
+  }
+}
+
 TEST(Report, CurvesFallWithBytes) {
   const Report report = report_of(sample());
   ASSERT_FALSE(report.curves.empty());

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "stages/base/split_mix.h"
+#include "format/rules/split_mix.h"
 
 namespace texmesh {
 namespace {

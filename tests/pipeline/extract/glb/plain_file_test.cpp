@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/extract/extract.h"
-#include "pipeline/extract/glb/proxy_parts.h"
+#include "pipeline/extract/proxy/proxy_parts.h"
 #include "pipeline/import/import.h"
 #include "pipeline/io/file_resolver.h"
 #include "stages/gltf/check_glb.h"

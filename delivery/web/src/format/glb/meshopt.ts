@@ -3,7 +3,7 @@ import { FormatError } from '../errors';
 // Bitstreams of EXT_meshopt_compression without filters: attributes (version 0) and triangles (version 1).
 
 function fail(): never {
-  throw new FormatError('proxy', '', 'a stream of meshopt', 'something else');
+  throw new FormatError('proxy', '', 'a stream of meshopt', 'something else', 'G15');
 }
 
 /** Reads bytes up to an end. */

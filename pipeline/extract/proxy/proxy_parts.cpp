@@ -1,4 +1,4 @@
-#include "pipeline/extract/glb/proxy_parts.h"
+#include "pipeline/extract/proxy/proxy_parts.h"
 
 #include <algorithm>
 #include <array>

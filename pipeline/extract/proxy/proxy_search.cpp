@@ -1,4 +1,4 @@
-#include "pipeline/extract/budget/proxy_search.h"
+#include "pipeline/extract/proxy/proxy_search.h"
 
 #include <algorithm>
 #include <map>
@@ -11,7 +11,7 @@
 #include "pipeline/extract/budget/quality_search.h"
 #include "pipeline/extract/glb/glb_chunks.h"
 #include "pipeline/extract/glb/plain_file.h"
-#include "pipeline/extract/glb/proxy_parts.h"
+#include "pipeline/extract/proxy/proxy_parts.h"
 #include "pipeline/import/import.h"
 #include "pipeline/io/file_resolver.h"
 #include "pipeline/render/rendered_model.h"

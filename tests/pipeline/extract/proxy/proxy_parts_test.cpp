@@ -1,5 +1,5 @@
 // Proxies taken apart: coarser meshes, smaller pictures, maps left out.
-#include "pipeline/extract/glb/proxy_parts.h"
+#include "pipeline/extract/proxy/proxy_parts.h"
 
 #include <gtest/gtest.h>
 

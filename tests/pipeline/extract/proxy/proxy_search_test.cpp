@@ -1,5 +1,5 @@
 // extract --bytes on packages with proxies: files between their sizes, chosen by lit pictures.
-#include "pipeline/extract/budget/proxy_search.h"
+#include "pipeline/extract/proxy/proxy_search.h"
 
 #include <gtest/gtest.h>
 
