@@ -1,5 +1,6 @@
 #include "stages/ladder/choose_rungs.h"
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -30,15 +31,19 @@ std::vector<std::size_t> kept_indices(std::vector<std::uint8_t> keep, bool incre
   return out;
 }
 
-/// Fixes the rung that stands for a source without loss.
+/// Fixes the rung that stands for a source without loss. The others are judged as if it were not there: it
+/// has two to three times the bytes of the next one, beside which too many of the others would seem cheap.
 void fix_finest(const TexturePlane& base, const PlaneLadder& ladder, const std::vector<Image>& images,
                 TextureWays& texture) {
   if (images.empty() || !is_lossless(images[base.image])) return;
   const double most = kMostOfLossless * static_cast<double>(images[base.image].bytes.size());
-  for (RungPair& pair : texture.pairs)
-    if (pair.level == 0 && ladder.rungs[pair.rung].quality == kFinestQuality &&
-        static_cast<double>(pair.bytes) <= most)
+  for (RungPair& pair : texture.pairs) {
+    const bool finest = pair.level == 0 && ladder.rungs[pair.rung].quality == kFinestQuality;
+    if (finest && static_cast<double>(pair.bytes) <= most)
       pair.fixed = true;
+    else
+      texture.whole_bytes = std::max(texture.whole_bytes, pair.bytes);
+  }
 }
 
 }  // namespace
