@@ -2,6 +2,7 @@
 // fragments have in common stands in the rung's table stream. Fragments with uncovered texels are coded by
 // MaskedJpeg, all others by libjpeg.
 #include <functional>
+#include <optional>
 
 #include "stages/base/parallel.h"
 #include "stages/fragment_codec/codec_list.h"
@@ -22,6 +23,11 @@ HuffmanTable table_for(const std::array<std::uint64_t, 256>& count,
   return make_huffman_table(symbols, weights);
 }
 
+/// Of rising qualities, how many have one kind but for the quality: all below the finest.
+std::size_t rungs_alike(std::span<const int> qualities) {
+  return qualities.size() - (!qualities.empty() && qualities.back() == kFinestQuality ? 1 : 0);
+}
+
 class JpegCodec : public TextureCodec {
  public:
   explicit JpegCodec(const PlaneCoding& plane) : plane_(plane) {}
@@ -36,7 +42,7 @@ class JpegCodec : public TextureCodec {
     for_each(context, rungs.size(), [&](std::size_t r) { training[r] = train_plainly(r, whole, part); });
     if (!part.empty()) count_masked(part, context, training);
     for_each(context, rungs.size(), [&](std::size_t r) {
-      JpegCoder coder(jpeg_kind(plane_, plane_.qualities[r]));
+      JpegCoder coder(kind_of(r));
       huffman_tables_[r] = sample.empty() ? coder.tables() : tables_for(coder, training[r].counts);
       coder.use_tables(huffman_tables_[r]);
       rungs[r] = {plane_.qualities[r],
@@ -56,6 +62,8 @@ class JpegCodec : public TextureCodec {
     SymbolCounts counts;
   };
 
+  JpegKind kind_of(std::size_t rung) const { return baseline_kind(plane_, plane_.qualities[rung]); }
+
   static void for_each(const RunContext& context, std::size_t count,
                        const std::function<void(std::size_t)>& body) {
     parallel_for(context, count, 1, [&](std::size_t begin, std::size_t end) {
@@ -74,7 +82,7 @@ class JpegCodec : public TextureCodec {
   /// symbols: those of plain blocks for a start.
   Training train_plainly(std::size_t r, std::span<const PixelWindow> whole,
                          std::span<const PixelWindow> part) const {
-    const JpegKind kind = jpeg_kind(plane_, plane_.qualities[r]);
+    const JpegKind kind = kind_of(r);
     JpegCoder coder(kind);
     Training out;
     out.counts.resize(coder.tables().size());
@@ -94,7 +102,12 @@ class JpegCodec : public TextureCodec {
     std::vector<std::vector<SymbolCounts>> counts(part.size());
     for_each(context, part.size(), [&](std::size_t w) {
       counts[w].assign(rungs.size(), SymbolCounts(training[0].counts.size()));
-      MaskedJpeg(jpeg_kind(plane_, plane_.qualities[0])).count_symbols(part[w], rungs, counts[w]);
+      const std::size_t alike = rungs_alike(plane_.qualities);
+      const std::span<const MaskedRung> all(rungs);
+      const std::span<SymbolCounts> into(counts[w]);
+      if (alike > 0) MaskedJpeg(kind_of(0)).count_symbols(part[w], all.first(alike), into.first(alike));
+      if (alike < rungs.size())
+        MaskedJpeg(kind_of(alike)).count_symbols(part[w], all.subspan(alike), into.subspan(alike));
     });
     for (const auto& window : counts)
       for (std::size_t r = 0; r < window.size(); ++r)
@@ -104,27 +117,38 @@ class JpegCodec : public TextureCodec {
 
   class Encoder : public FragmentEncoder {
    public:
-    Encoder(const JpegCodec& codec, std::span<const std::size_t> rungs)
-        : masked_(jpeg_kind(codec.plane_, codec.plane_.qualities[0])) {
+    Encoder(const JpegCodec& codec, std::span<const std::size_t> rungs) {
+      std::vector<int> qualities;
       for (std::size_t k = 0; k < (rungs.empty() ? codec.huffman_tables_.size() : rungs.size()); ++k) {
         const std::size_t r = rungs.empty() ? k : rungs[k];
-        const JpegKind kind = jpeg_kind(codec.plane_, codec.plane_.qualities[r]);
+        const JpegKind kind = codec.kind_of(r);
+        qualities.push_back(kind.quality);
         coders_.push_back(std::make_unique<JpegCoder>(kind));
         coders_.back()->use_tables(codec.huffman_tables_[r]);
         rungs_.push_back(masked_rung(kind, coders_.back()->quantisers(), codec.huffman_tables_[r]));
+        if (k == 0) masked_.emplace(kind);
       }
+      alike_ = rungs_alike(qualities);
+      if (alike_ > 0 && alike_ < rungs_.size()) finest_.emplace(baseline_kind(codec.plane_, kFinestQuality));
     }
     // Rung after rung of one fragment, so that its pixels stay in the cache; rung by rung costs a quarter
     // more.
     void encode(const PixelWindow& fragment, std::span<std::vector<std::uint8_t>> streams) override {
-      if (!wholly_covered(fragment)) return masked_.append_bodies(fragment, rungs_, streams);
-      for (std::size_t r = 0; r < coders_.size(); ++r) coders_[r]->append_body(fragment, streams[r]);
+      if (wholly_covered(fragment)) {
+        for (std::size_t r = 0; r < coders_.size(); ++r) coders_[r]->append_body(fragment, streams[r]);
+        return;
+      }
+      const std::span<const MaskedRung> rungs(rungs_);
+      if (!finest_) return masked_->append_bodies(fragment, rungs, streams);
+      masked_->append_bodies(fragment, rungs.first(alike_), streams.first(alike_));
+      finest_->append_bodies(fragment, rungs.subspan(alike_), streams.subspan(alike_));
     }
 
    private:
     std::vector<std::unique_ptr<JpegCoder>> coders_;
     std::vector<MaskedRung> rungs_;
-    MaskedJpeg masked_;
+    std::size_t alike_ = 0;
+    std::optional<MaskedJpeg> masked_, finest_;  // of the first rung's kind; of the last one where it differs
   };
 
   PlaneCoding plane_;

@@ -10,8 +10,10 @@ namespace texmesh {
 std::unique_ptr<TextureCodec> make_jpeg_codec(const PlaneCoding& plane);
 std::unique_ptr<TextureCodec> make_progressive_codec(const PlaneCoding& plane);
 std::unique_ptr<TextureCodec> make_webp_codec(const PlaneCoding& plane);
-/// How a plane's baseline JPEGs are coded.
+/// How a plane's JPEGs are coded.
 JpegKind jpeg_kind(const PlaneCoding& plane, int quality);
+/// Of baseline JPEGs, whose rungs need not be alike: at kFinestQuality three channels are coded as they are.
+JpegKind baseline_kind(const PlaneCoding& plane, int quality);
 
 Pixels decode_webp(std::span<const std::uint8_t> file, std::uint64_t max_pixels);
 

@@ -20,12 +20,10 @@ constexpr double kMostTimesLeastError = 2;
 constexpr int kComparedErrors = 9;
 constexpr double kNoError = 1e-9;
 
-// Two channels, whose reader rebuilds z, were measured on four PNG normal maps of 512 px: 12 to 17 % fewer
-// bytes at equal angles than channels apart. With z's quantisers four times as large, which no reader needs
-// to know, channels apart take 8 to 10 % fewer; what two channels save beyond that, 2 to 8 %, is not worth a
-// second way to read normals.
-constexpr CodingSpace kApart{true, Subsampling::k444};
-constexpr std::array<CodingSpace, 2> kOthers{{{false, Subsampling::k444}, {false, Subsampling::k420}}};
+// Two channels, whose reader rebuilds z, are not among them: docs/method.md, "Tried and not taken".
+constexpr CodingSpace kApart{true, Subsampling::k444, false};
+constexpr std::array<CodingSpace, 3> kOthers{
+    {{false, Subsampling::k444, false}, {false, Subsampling::k420, false}, {true, Subsampling::k444, true}}};
 
 /// Logarithms of a space's bits and errors, by quality.
 struct RateCurve {
@@ -78,6 +76,7 @@ RateCurve measure(DataKind kind, const CodingSpace& space, std::span<const Pixel
                   const RunContext& context) {
   JpegKind jpeg;
   jpeg.rgb = space.apart;
+  jpeg.coarse_last = space.coarse_last;
   jpeg.subsampling = space.subsampling;
   const std::vector<double> bits = jpeg_bits(jpeg, windows, kQualities, context);
   RateCurve out;
@@ -128,6 +127,7 @@ CodingSpace measure_coding_space(DataKind kind, std::span<const PixelWindow> sam
   CodingSpace best = kApart;
   double least = 0;
   for (const CodingSpace& space : kOthers) {
+    if (space.coarse_last && kind != DataKind::kVectors) continue;
     const double more = more_bits(measure(kind, space, windows, quiet), apart);
     if (more < least) best = space, least = more;
   }

@@ -14,6 +14,16 @@ JpegKind jpeg_kind(const PlaneCoding& plane, int quality) {
   kind.quality = quality;
   kind.subsampling = plane.apart ? Subsampling::k444 : plane.subsampling;
   kind.rgb = plane.channels == 3 && plane.apart;
+  kind.coarse_last = kind.rgb && plane.coarse_last;
+  return kind;
+}
+
+JpegKind baseline_kind(const PlaneCoding& plane, int quality) {
+  JpegKind kind = jpeg_kind(plane, quality);
+  if (quality < kFinestQuality || plane.channels != 3) return kind;
+  kind.subsampling = Subsampling::k444;
+  kind.rgb = true;
+  kind.coarse_last = false;
   return kind;
 }
 

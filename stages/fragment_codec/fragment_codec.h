@@ -12,11 +12,17 @@
 
 namespace texmesh {
 
+/// All quantisers are 1. Baseline JPEGs of this quality have their channels apart, because YCbCr, in whole
+/// numbers, loses more than these quantisers: on a helmet whose textures are PNGs half of the lit pictures'
+/// FLIP.
+inline constexpr int kFinestQuality = 100;
+
 /// What is coded: all fragments of one plane.
 struct PlaneCoding {
   std::uint32_t channels = 3;                                   // 1 or 3
   std::uint32_t fragment_width_px = 0, fragment_height_px = 0;  // multiples of 16
-  bool apart = false;                           // three channels are coded as they are; otherwise as YCbCr
+  bool apart = false;        // three channels are coded as they are; otherwise as YCbCr
+  bool coarse_last = false;  // with `apart`: the last channel is quantised more coarsely (JpegKind)
   Subsampling subsampling = Subsampling::k420;  // of YCbCr
   std::vector<int> qualities;                   // wanted rungs, IJG scale, strictly rising
 };

@@ -200,10 +200,18 @@ struct JpegCoder::State {
 
  private:
   /// Three channels of data are three different things, but there are two pairs of Huffman tables: the last
-  /// channel (z of a normal, metalness) differs most from the others. All are quantised like luma.
+  /// channel (z of a normal, metalness) differs most from the others. All are quantised like luma, or the
+  /// last one more coarsely.
   void use_second_tables_for_last() {
     info.comp_info[2].dc_tbl_no = info.comp_info[2].ac_tbl_no = 1;
-    info.quant_tbl_ptrs[1] = nullptr;
+    if (!kind.coarse_last) {
+      info.quant_tbl_ptrs[1] = nullptr;
+      return;
+    }
+    info.comp_info[2].quant_tbl_no = 1;
+    for (std::size_t k = 0; k < DCTSIZE2; ++k)
+      info.quant_tbl_ptrs[1]->quantval[k] = static_cast<UINT16>(
+          std::min(255u, kLastChannelTimes * unsigned{info.quant_tbl_ptrs[0]->quantval[k]}));
   }
 };
 

@@ -13,6 +13,8 @@
 
 namespace texmesh {
 
+inline constexpr unsigned kLastChannelTimes = 4;
+
 /// The kind of JPEG that a coder makes.
 struct JpegKind {
   std::uint32_t channels = 3;  // 1 or 3
@@ -23,6 +25,9 @@ struct JpegKind {
   /// YCbCr turns normals by 1.1 to 1.5 times as much and has 1.3 to 2 times the error in other data; 4:2:0
   /// 1.1 to 2.5 and 1.6 to 4.5 times.
   bool rgb = false;
+  /// With `rgb`: the last channel's quantisers are kLastChannelTimes those of the others. z of a normal says
+  /// little that x and y do not say.
+  bool coarse_last = false;
   bool progressive = false;  // deep successive approximation, see progressive_scans() in the .cpp
 };
 

@@ -1,10 +1,12 @@
 #include "stages/ladder/choose_rungs.h"
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <utility>
 
+#include "stages/fragment_codec/fragment_codec.h"
 #include "stages/ladder/rung_loss.h"
 #include "stages/ladder/rung_value.h"
 
@@ -16,6 +18,8 @@ constexpr double kGain = 0.05;
 constexpr double kLeastLoads = 0.01;
 // Of a JPEG's bytes.
 constexpr double kMostOfJpeg = 1.9;
+// Of the bytes of a source without loss, for its finest rung to stay whatever it is worth.
+constexpr double kMostOfLossless = 1.25;
 
 /// Indices of the rungs that `keep` marks, with those that they lean on.
 std::vector<std::size_t> kept_indices(std::vector<std::uint8_t> keep, bool incremental) {
@@ -27,7 +31,26 @@ std::vector<std::size_t> kept_indices(std::vector<std::uint8_t> keep, bool incre
   return out;
 }
 
+/// Fixes the rung that stands for a source without loss. The others are judged as if it were not there: it
+/// has two to three times the bytes of the next one, beside which too many of the others would seem cheap.
+void fix_finest(const TexturePlane& base, const PlaneLadder& ladder, const std::vector<Image>& images,
+                TextureWays& texture) {
+  if (images.empty() || !is_lossless(images[base.image])) return;
+  const double most = kMostOfLossless * static_cast<double>(images[base.image].bytes.size());
+  for (RungPair& pair : texture.pairs) {
+    const bool finest = pair.level == 0 && ladder.rungs[pair.rung].quality == kFinestQuality;
+    if (finest && static_cast<double>(pair.bytes) <= most)
+      pair.fixed = true;
+    else
+      texture.whole_bytes = std::max(texture.whole_bytes, pair.bytes);
+  }
+}
+
 }  // namespace
+
+bool is_lossless(const Image& image) {
+  return image.format != ImageFormat::kJpeg && image.format != ImageFormat::kWebp;
+}
 
 double most_bytes(const TexturePlane& base, const std::vector<Image>& images) {
   if (images.empty() || images[base.image].format != ImageFormat::kJpeg)
@@ -46,6 +69,7 @@ std::vector<std::vector<std::size_t>> choose_rungs(const Fragments& fragments,
   for (std::size_t base = 0; base < fragments.planes.size() && fragments.planes[base].mip == 0; ++base) {
     textures.push_back(measure_ways(fragments, pixels, sample, base, previews.planes[base].file, quiet));
     textures.back().most_bytes = most_bytes(fragments.planes[base], images);
+    fix_finest(fragments.planes[base], sample[base], images, textures.back());
   }
   const auto keep = pairs_worth_storing(textures, texture_loads(), kGain, kLeastLoads);
   std::vector<std::vector<std::size_t>> kept(sample.size());

@@ -14,8 +14,9 @@ namespace texmesh {
 /// The rungs that are worth storing, by plane: rising indices into the rungs of `sample`, which holds at
 /// least the fragments of choice_sample() at every candidate rung, of full-size planes and mips. What
 /// pairs_worth_storing() keeps of 1,000 simulated loads of all textures together; the rung of a
-/// source's coefficients always. All rungs of a texture whose image is a JPEG, mips and tables included, take
-/// at most 1.9 times the image's bytes, where that leaves one rung of each plane; of a ladder that lacks
+/// source's coefficients always, and of the finest quality of a source without loss where this takes at most
+/// 1.25 times the source's bytes. All rungs of a texture whose image is a JPEG, mips and tables included,
+/// take at most 1.9 times the image's bytes, where that leaves one rung of each plane; of a ladder that lacks
 /// fragments this holds for the bytes that measure_ways() expects. `images` as in encode_ladder().
 /// Incremental codecs need every rung below one that is kept. `previews` are those of all full-size planes.
 /// Same result for any thread count.
@@ -24,6 +25,9 @@ std::vector<std::vector<std::size_t>> choose_rungs(const Fragments& fragments,
                                                    const std::vector<PlaneLadder>& sample,
                                                    const Previews& previews, const std::vector<Image>& images,
                                                    const RunContext& context);
+
+/// Whether an image's texels were never coded with a loss, as far as its format tells.
+bool is_lossless(const Image& image);
 
 /// What all rungs of the texture of plane `base` may take together.
 double most_bytes(const TexturePlane& base, const std::vector<Image>& images);

@@ -98,6 +98,14 @@ PlaneCoding coding_of(const TexturePlane& plane, Codec codec, const LadderOption
   return coding;
 }
 
+/// Adds the rung that stands for a source without loss.
+void add_finest(const TexturePlane& plane, const std::vector<Image>& images, const LadderOptions& options,
+                PlaneCoding& coding) {
+  if (options.prune && options.mode == LadderMode::kJpeg && plane.mip == 0 && !images.empty() &&
+      is_lossless(images[plane.image]) && coding.qualities.back() < kFinestQuality)
+    coding.qualities.push_back(kFinestQuality);
+}
+
 /// The space of three channels of data, by what a sample of their pixels shows.
 void choose_space(const TexturePlane& plane, const Pixels& pixels, Uncovered uncovered, PlaneCoding& coding,
                   const RunContext& context) {
@@ -107,6 +115,7 @@ void choose_space(const TexturePlane& plane, const Pixels& pixels, Uncovered unc
                            size_sample(plane, pixels, uncovered), context);
   coding.apart = space.apart;
   coding.subsampling = space.subsampling;
+  coding.coarse_last = space.coarse_last;
 }
 
 /// The codecs of all planes, trained on samples of their pixels.
@@ -126,6 +135,7 @@ std::vector<TrainedPlane> train_planes(const Fragments& fragments, const std::ve
       trained.source_rung = true;
     } else {
       choose_space(plane, pixels[p], options.uncovered, trained.coding, context);
+      add_finest(plane, images, options, trained.coding);
       trained.codec = make_texture_codec(codec, trained.coding);
     }
     trained.rungs = trained.codec->train(

@@ -299,8 +299,9 @@ std::vector<std::vector<std::uint8_t>> pairs_worth_storing(const std::vector<Tex
   const std::vector<GivenBytes> given = share_loads(textures, keep, loads);
   const auto count = static_cast<double>(loads.size());
   for (std::size_t t = 0; t < textures.size(); ++t) {
-    std::uint64_t most = 1;
-    for (const RungPair& pair : textures[t].pairs) most = std::max(most, pair.bytes);
+    std::uint64_t most = std::max<std::uint64_t>(textures[t].whole_bytes, 1);
+    if (textures[t].whole_bytes == 0)
+      for (const RungPair& pair : textures[t].pairs) most = std::max(most, pair.bytes);
     drop_pairs(textures[t], given[t], {least_share * count, gain * count / static_cast<double>(most)},
                keep[t]);
   }

@@ -21,6 +21,7 @@ struct TextureWays {
   double texels_across = 0;          // of full size, along the height of an object that looks like a ball
   std::vector<double> preview_loss;  // [levels], as RungPair::loss; the preview takes no bytes
   std::vector<RungPair> pairs;       // by (level, rung)
+  std::uint64_t whole_bytes = 0;     // by which pairs are judged; 0: those of the largest pair
   double most_bytes = std::numeric_limits<double>::infinity();  // that all stored pairs may take together
 };
 
@@ -39,7 +40,7 @@ std::vector<TextureLoad> texture_loads();
 /// fragments at one vertex, the others at the next one. The load's bytes are shared at one price, in
 /// loss x surface, for all textures. First the pairs go that lose no less than the preview. Then, one by one,
 /// that pair goes whose removal raises the loss least for its bytes, while the removal raises the mean over
-/// loads by less than `gain` times the pair's share of the texture's most bytes, or while less than
+/// loads by less than `gain` times the pair's share of TextureWays::whole_bytes, or while less than
 /// `least_share` of the loads choose the pair, or while all pairs take more than TextureWays::most_bytes.
 /// Fixed pairs stay, and one of each level. Pure; same result anywhere.
 std::vector<std::vector<std::uint8_t>> pairs_worth_storing(const std::vector<TextureWays>& textures,

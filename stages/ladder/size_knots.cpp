@@ -17,6 +17,10 @@ SizeKnots measure_size_knots(const PlaneCoding& plane, std::span<const PixelWind
   kind.subsampling = plane.subsampling;
   std::vector<double> bits(101);
   std::ranges::copy(jpeg_bits(kind, sample, qualities, context), bits.begin() + qualities.front());
+  if (qualities.back() == kFinestQuality && plane.channels == 3) {
+    kind.rgb = true;
+    bits.back() = jpeg_bits(kind, sample, std::span(&kFinestQuality, 1), context).front();
+  }
   return size_knots(plane.qualities, bits);
 }
 

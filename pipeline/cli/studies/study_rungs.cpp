@@ -5,6 +5,7 @@
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <span>
 
 #include "delivery/cpp/client/delivery_plan.h"
 #include "format/rules/ordinary_loads.h"
@@ -28,6 +29,7 @@ struct RungArguments {
 
 /// How often loads show a plane, and its rungs.
 struct PlaneUse {
+  bool ends_with_source = false;  // its last rung stands for the source and is stored whatever loads choose
   std::size_t loads = 0;
   std::vector<std::size_t> chosen;  // by rung: loads in which some fragment has it
 };
@@ -53,8 +55,12 @@ void count_plan(const FragmentList& list, const DeliveryPlan& plan, std::vector<
 PackageUse play_loads(const std::string& path, const RungArguments& args) {
   PackageReader package(open_store(path));
   PackageUse out{path, {}, 0};
-  for (const PlaneTables& tables : package.tables().planes)
-    out.planes.push_back({0, std::vector<std::size_t>(tables.rung_count())});
+  for (std::size_t p = 0; p < package.textures().size(); ++p) {
+    const TextureInfo& info = package.textures()[p];
+    const PlaneTables& tables = package.tables().planes[p];
+    const bool finest = info.mip == 0 && tables.rung_quality.back() == 100;
+    out.planes.push_back({info.source_rung || finest, 0, std::vector<std::size_t>(tables.rung_count())});
+  }
   const std::vector<OrdinaryLoad> loads = ordinary_loads(static_cast<std::size_t>(args.loads));
   for (const OrdinaryLoad& load : loads) {
     DeliveryRequest request;
@@ -69,12 +75,17 @@ PackageUse play_loads(const std::string& path, const RungArguments& args) {
   return out;
 }
 
-/// Rungs that less than a hundredth of the loads choose.
+/// Rungs that less than a hundredth of the loads choose, but for the only one of a plane and for one that
+/// stands for the source.
 std::size_t rare_rungs(const PackageUse& use, int loads) {
   std::size_t count = 0;
-  for (const PlaneUse& plane : use.planes)
+  for (const PlaneUse& plane : use.planes) {
+    if (plane.chosen.size() < 2) continue;
+    const std::span<const std::size_t> chosen(plane.chosen.data(),
+                                              plane.chosen.size() - (plane.ends_with_source ? 1 : 0));
     count += static_cast<std::size_t>(std::ranges::count_if(
-        plane.chosen, [&](std::size_t chosen) { return 100 * chosen < static_cast<std::size_t>(loads); }));
+        chosen, [&](std::size_t n) { return 100 * n < static_cast<std::size_t>(loads); }));
+  }
   return count;
 }
 
@@ -104,7 +115,8 @@ std::string uses_text(PackageReader& package, const PackageUse& use, int loads) 
     }
   }
   return fmt::format(
-      "{}\n{}{} of {} rungs are chosen in less than 1 % of {} loads; mean predicted FLIP {:.4f}\n",
+      "{}\n{}{} of {} rungs are chosen in less than 1 % of {} loads, but for those of sources and the only ones "
+      "of planes; mean predicted FLIP {:.4f}\n",
       use.package, table.text(), rare_rungs(use, loads), all_rungs_of(use), loads, use.flip);
 }
 

@@ -188,6 +188,7 @@ void check_provenance(const Manifest& m, const std::vector<TextureInfo>& texture
     if (!rungs.is_array() || codec_traits(textures[k].codec).incremental) continue;
     if (textures[k].source_rung) continue;  // its qualities follow from the source
     for (const int q : textures[k].rung_quality) {
+      if (q == 100 && textures[k].mip == 0) continue;  // stands for a source without loss
       findings.require(std::find(rungs.begin(), rungs.end(), q) != rungs.end(), {"provenance", "O03"},
                        kProvenancePath, "/options/ladder/" + name,
                        "rung " + std::to_string(q) + " of plane " + std::to_string(k), rungs.dump());

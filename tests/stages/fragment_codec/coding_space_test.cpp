@@ -86,7 +86,9 @@ TEST(CodingSpace, VectorsGoByTheirAngle) {
       const double z = std::sqrt(std::max(0.0, 1 - u * u - v * v));
       for (const double n : {u, v, z}) map.data.push_back(byte(n * 127));
     }
-  EXPECT_EQ(space_of(map, DataKind::kVectors).apart, true);
+  EXPECT_TRUE(space_of(map, DataKind::kVectors).apart);
+  EXPECT_TRUE(space_of(map, DataKind::kVectors).coarse_last);  // z follows from x and y
+  EXPECT_FALSE(space_of(map).coarse_last);
 }
 
 TEST(CodingSpace, NothingIsKnownOfAnEmptySample) {

