@@ -11,7 +11,7 @@ namespace texmesh::proxies {
 namespace {
 
 constexpr int kSpeed = 3;       // slower ones gain less than 1 % on small meshes
-constexpr int kNormalBits = 8;  // 7 take 2 % of the mesh's bytes less and look worse
+constexpr int kNormalBits = 8;
 
 template <class Element>
 int add_vertices(draco::Mesh& mesh, draco::GeometryAttribute::Type type, const std::vector<Element>& values) {
