@@ -11,10 +11,10 @@
 
 #include "format/base/errors.h"
 #include "format/base/portable_math.h"
+#include "format/rules/split_mix.h"
 #include "pipeline/experiment/page_files.h"
 #include "pipeline/io/markup.h"
 #include "pipeline/io/new_folder.h"
-#include "format/rules/split_mix.h"
 #include "stages/image/png_writer.h"
 #include "stages/measure/render_view.h"
 #include "stages/render/shade.h"

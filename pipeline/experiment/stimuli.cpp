@@ -6,8 +6,8 @@
 #include "format/base/box.h"
 #include "format/base/errors.h"
 #include "format/base/portable_math.h"
-#include "pipeline/extract/package_model.h"
 #include "format/rules/split_mix.h"
+#include "pipeline/extract/package_model.h"
 
 namespace texmesh {
 namespace {

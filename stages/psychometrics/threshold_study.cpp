@@ -7,8 +7,8 @@
 #include <stdexcept>
 
 #include "format/base/portable_math.h"
-#include "stages/base/parallel.h"
 #include "format/rules/split_mix.h"
+#include "stages/base/parallel.h"
 
 namespace texmesh {
 namespace {

@@ -17,7 +17,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::uintmax_t kMostFileBytes = 512 * 1024;
 constexpr int kMostLoads = 1'000'000, kMemory = 16;
-constexpr double kLeastRate = 1, kMostRate = 1e12;
+constexpr double kLeastRate = 1, kMostRecordedBytes_s = 1e12;
 constexpr std::size_t kMostName = 260;
 
 bool is_host(const std::string& name) {
@@ -43,7 +43,7 @@ std::string read_small_file(const std::string& path) {
 }  // namespace
 
 bool LinkHistory::good(const Host& h) {
-  return is_host(h.name) && h.bytes_s >= kLeastRate && h.bytes_s <= kMostRate && h.loads >= 1 &&
+  return is_host(h.name) && h.bytes_s >= kLeastRate && h.bytes_s <= kMostRecordedBytes_s && h.loads >= 1 &&
          h.loads <= kMostLoads;
 }
 

@@ -10,7 +10,7 @@
 namespace texmesh::proxies {
 namespace {
 
-constexpr int kSpeed = 3;       // slower ones gain less than 1 % on small meshes
+constexpr int kSpeed = 3;  // slower ones gain less than 1 % on small meshes
 constexpr int kNormalBits = 8;
 
 template <class Element>

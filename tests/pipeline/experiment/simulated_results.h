@@ -3,9 +3,9 @@
 #include <string>
 #include <vector>
 
+#include "format/rules/split_mix.h"
 #include "pipeline/experiment/design.h"
 #include "pipeline/experiment/results.h"
-#include "format/rules/split_mix.h"
 
 namespace texmesh::testing {
 
