@@ -213,9 +213,13 @@ inline std::vector<std::vector<std::uint8_t>> make_corpus() {
   ThesisTables thesis;
   PlaneThesis& said = thesis.planes.emplace_back();
   said.z = said.i = said.zeta = said.m = said.vqp = {0.5f, 1};
-  said.model = {300, 0.5f, 1.02f, 0.98f, 0.05f};
+  said.models.assign(2, {300, 0.5f, 0.98f});
   said.quality = {80, 40};
   said.total_bytes.assign(2 * kGammaSteps, 70000);
+  PerceptualTable& chain = thesis.perceptual;
+  chain.scale = {0, 2}, chain.triangles = {1260, 700}, chain.collapses = {0, 280};
+  chain.average = {0, 0.04f}, chain.largest = {0, 0.2f}, chain.least = {0, 0}, chain.deviation = {0, 0.03f};
+  chain.p95 = {0.05f}, chain.chain_average = {0.04f}, chain.chain_largest = {0.2f}, chain.chain_least = {0};
   corpus.push_back(tagged(10, write_thesis(thesis)));
   corpus.push_back(tagged(11, as_bytes(R"({"title":"A","licence":"MIT","licenceUrl":"https://a.b/",
     "identifiers":[{"scheme":"doi","value":"1"}],"unit":{"name":"m","metres":1},"upAxis":"y",
