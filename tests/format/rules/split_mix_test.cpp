@@ -16,13 +16,13 @@ TEST(SplitMix64, GivesThePublishedNumbers) {
 TEST(SplitMix64, UnitsAreEvenBetween0And1) {
   SplitMix64 random(1);
   double sum = 0;
-  for (int i = 0; i < 10000; ++i) {
+  for (int i = 0; i < 100000; ++i) {
     const double x = random.unit();
     ASSERT_GE(x, 0);
     ASSERT_LT(x, 1);
     sum += x;
   }
-  EXPECT_NEAR(sum / 10000, 0.5, 0.01);
+  EXPECT_NEAR(sum / 100000, 0.5, 0.01);
 }
 
 }  // namespace
