@@ -16,13 +16,13 @@ TEST(SplitMix, GivesThePublishedNumbers) {
 TEST(SplitMix, UnitsAreEvenBetween0And1) {
   SplitMix random(1);
   double sum = 0;
-  for (int i = 0; i < 10000; ++i) {
+  for (int i = 0; i < 100000; ++i) {
     const double x = random.next();
     ASSERT_GE(x, 0);
     ASSERT_LT(x, 1);
     sum += x;
   }
-  EXPECT_NEAR(sum / 10000, 0.5, 0.01);
+  EXPECT_NEAR(sum / 100000, 0.5, 0.01);
 }
 
 }  // namespace
