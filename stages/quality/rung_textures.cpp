@@ -165,10 +165,10 @@ RenderTexture preview_texture(const TextureData& data, const ShownTexture& shown
   return render_texture(std::move(image), shown.srgb, 0, context);
 }
 
-RenderTexture best_texture(const TextureData& data, const ShownTexture& shown, std::uint32_t first_level,
-                           const RunContext& context) {
+RenderTexture best_texture(const TextureData& data, const ShownTexture& shown, std::uint32_t plane_level,
+                           std::uint32_t first_level, const RunContext& context) {
   const auto best = [&](std::uint32_t p) {
-    const std::uint32_t plane = plane_towards(data, p, first_level);
+    const std::uint32_t plane = plane_towards(data, p, plane_level);
     return PlaneRung{plane, data.ladder.planes[plane].rungs.size() - 1};
   };
   std::optional<PlaneRung> alpha;

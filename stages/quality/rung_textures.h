@@ -54,9 +54,10 @@ RenderTexture preview_texture(const TextureData& data, const ShownTexture& shown
 /// no chart covers is filled there, so that charts' borders look other than in the source's mips.
 RenderTexture uncoded_texture(const TextureData& data, const ShownTexture& shown, std::uint32_t first_level,
                               const RunContext& context);
-/// The last rung of the plane that clients show from that level on.
-RenderTexture best_texture(const TextureData& data, const ShownTexture& shown, std::uint32_t first_level,
-                           const RunContext& context);
+/// The last rung of the plane that clients show from `plane_level` on. Mips finer than `first_level` are not
+/// kept.
+RenderTexture best_texture(const TextureData& data, const ShownTexture& shown, std::uint32_t plane_level,
+                           std::uint32_t first_level, const RunContext& context);
 /// Whether that rung has the source's own texels.
 bool shows_source(const TextureData& data, const ShownTexture& shown, std::uint32_t first_level);
 

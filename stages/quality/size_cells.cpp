@@ -128,7 +128,7 @@ class SizeShots {
     const auto [found, is_new] = uncoded_.try_emplace(mip, -1);
     const ShownTexture& shown = sampler_.shown.textures[mip.texture];
     if (is_new)
-      found->second = add(mip.is_source ? best_texture(sampler_.data, shown, mip.level, context_)
+      found->second = add(mip.is_source ? best_texture(sampler_.data, shown, 0, mip.level, context_)
                                         : uncoded_texture(sampler_.data, shown, mip.level, context_));
     return found->second;
   }

@@ -60,7 +60,10 @@ const refusals: [string, string, (m: Mutant) => void, ((manifest: Json) => void)
     const { sizes } = places(s);
     s.setUint8(sizes, s.getUint8(sizes) ^ 1);
   }],
-  ['R14', "the manifest's scales", (m) => m.json('quality.json', (d) => (d.scales[d.scales.length - 1] += 1))],
+  ['R14', "the manifest's scales", (m) => m.json('quality.json', (d) => {
+    d.scales[d.scales.length - 1] += 1;
+    for (const g of d.groups) for (const s of g.sizes) s.finer.dssim.fill(0); // makes room
+  })],
   ['R15', 'those of the planes', (m) => m.json('quality.json', (d) => d.groups.pop())],
 ];
 

@@ -1,7 +1,7 @@
 import type { FragmentList } from '../decide/fragment_list';
 import type { HtcStep, Policy, TimePlanOptions } from '../decide/plan_types';
 import { type GroupedList, groupBytes, groupedList } from '../decide/request_groups';
-import type * as Printed from '../decide/thesis_list';
+import type * as Printed from '../decide/thesis/thesis_list';
 import { UncheckedPlan } from '../decide/unchecked_plan';
 import { transferRate } from '../http/throughput';
 import type { FragmentFetch } from './fragment_fetch';

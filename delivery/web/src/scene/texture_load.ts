@@ -88,7 +88,7 @@ export class TextureLoad {
     const { load_: load, planes_: planes, fetching_: fetching } = this;
     const { reader, options, signal } = load;
     load.beta0 = load.expectedBytesS || options.beta0BytesS || throughputOf(reader.requests, reader.client.latencyS);
-    if (options.policy === 'thesis') this.inTime_.printed = await import('../decide/thesis_list');
+    if (options.policy === 'thesis') this.inTime_.printed = await import('../decide/thesis/thesis_list');
     const { scale, planes: chosen } = await this.choice_();
     if (scale !== this.scale_.shown) load.enter('mesh');
     const meshBytes = this.source_.bytesOf(scale);

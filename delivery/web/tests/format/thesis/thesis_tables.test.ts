@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
-import type { Manifest, TextureInfo } from '../../src/reader';
-import { type PerceptualTable, chainedValues, coarsestAlike, majorRows, modelledBytes, modelledQuality, pairValues, parseThesis, refineTo } from '../../src/thesis_tables';
+import type { Manifest, TextureInfo } from '../../../src/reader';
+import { type PerceptualTable, chainedValues, coarsestAlike, majorRows, modelledBytes, modelledQuality, pairValues, parseThesis, refineTo } from '../../../src/thesis_tables';
 
 // Two planes of 2 and 1 fragments; scales 0 and 5 are stored, the chain has 0, 2 and 5.
 const manifest = { version: { major: 2, minor: 0 }, scales: [{ scale: 0 }, { scale: 5 }] } as Manifest;

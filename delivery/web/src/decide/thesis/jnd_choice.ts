@@ -1,4 +1,4 @@
-import type { PerceptualTable } from '../format/thesis_tables';
+import type { PerceptualTable } from '../../format/thesis/thesis_tables';
 
 // A client's own just-noticeable difference on the values of thesis.bin: format/rules/jnd_choice.cpp, bit for bit.
 

@@ -1,12 +1,12 @@
-import type { PackageData } from '../format/package_data';
-import type { TransferRate } from '../http/throughput';
-import { qualityOf } from './allocation';
-import type { DeliveryRequest } from './delivery_plan';
-import { type FragmentList, type ListOptions, fragmentList } from './fragment_list';
-import type { FragmentOffer, TimePlanOptions } from './plan_types';
-import { meanOffer } from './rung_choice';
-import { interpolatedBytes } from './size_curve';
-import { type PlaneChoice, type TextureLoss, fullSize, tablesOf } from './texture_loss';
+import type { PackageData } from '../../format/package_data';
+import type { TransferRate } from '../../http/throughput';
+import { qualityOf } from '../allocation';
+import type { DeliveryRequest } from '../delivery_plan';
+import { type FragmentList, type ListOptions, fragmentList } from '../fragment_list';
+import type { FragmentOffer, TimePlanOptions } from '../plan_types';
+import { meanOffer } from '../rung_choice';
+import { interpolatedBytes } from '../size_curve';
+import { type PlaneChoice, type TextureLoss, fullSize, tablesOf } from '../texture_loss';
 
 // Chapter 4 as printed: gamma_for_bytes, thesis_textures and as_printed of delivery/cpp, bit for bit.
 

@@ -1,5 +1,5 @@
-import type { PlaneThesis } from '../format/thesis_tables';
-import { exp, log } from './portable_math';
+import type { PlaneThesis } from '../../format/thesis/thesis_tables';
+import { exp, log } from '../portable_math';
 
 // The thesis's size model of a fragment (8.5 to 8.9): format/rules/size_model.cpp, bit for bit.
 

@@ -1,5 +1,5 @@
-import type { HarmonicTimePlan } from './harmonic_time';
-import { log } from './portable_math';
+import type { HarmonicTimePlan } from '../harmonic_time';
+import { log } from '../portable_math';
 
 /** The bounds of the thesis for a finished serial run, and what really holds (Appendix A). */
 export interface HtcTheorem {
