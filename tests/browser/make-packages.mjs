@@ -2,7 +2,7 @@
 import {env, fs, packages, path, run} from './browser.mjs';
 import {sheetGlb} from './sheet.mjs';
 
-const kQuick = ['--no-cache', '--quiet', '--quality.views', '1', '--quality.largest_px', '128'];
+const kQuick = ['--no-cache', '--quiet', '--quality.views', '1', '--quality.largest_px', '512'];
 
 /** Names and what they are made of. */
 const kPackages = {
