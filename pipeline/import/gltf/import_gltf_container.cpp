@@ -3,11 +3,11 @@
 
 #include "format/base/bounded_json.h"
 #include "pipeline/import/gltf/import_gltf_parts.h"
+#include "stages/gltf/glb_container.h"
 
 namespace texmesh::gltf {
 namespace {
 
-constexpr std::uint32_t kJsonChunk = 0x4E4F534A, kBinChunk = 0x004E4942;
 constexpr std::size_t kHeaderBytes = 12, kChunkHeaderBytes = 8;
 constexpr int kMaxDepth = 64;
 // A value costs at most a few hundred bytes in the parsers; real scans have some thousands.
@@ -77,10 +77,10 @@ Container split_container(const Source& source, ByteSpan bytes) {
     }
     const ByteSpan chunk = bytes.subspan(at, chunk_bytes);
     if (!has_json) {
-      if (type != kJsonChunk) source.fail(place, "a JSON chunk first", "another type");
+      if (type != kGlbJsonChunk) source.fail(place, "a JSON chunk first", "another type");
       c.json = text_of(chunk);
       has_json = true;
-    } else if (type == kBinChunk) {
+    } else if (type == kGlbBinaryChunk) {
       c.bin = chunk;
     }
     at += chunk_bytes;
