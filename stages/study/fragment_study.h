@@ -14,6 +14,9 @@ struct FragmentStudyOptions {
   std::vector<int> grids{2, 4, 8, 16};                      // fragments in a row and in a column, 1..64
   std::vector<int> qualities{10, 20, 40, 60, 80, 90, 100};  // IJG, strictly rising, at most 16
   Subsampling subsampling = Subsampling::k420;
+  /// Files with tables of their own, too, which take as long to make as all the rest; without them their
+  /// sizes are 0.
+  bool optimised = true;
   /// Seconds of CPU that this thread has taken; empty: decoding is not timed.
   std::function<double()> clock_s{};
 };
