@@ -7,7 +7,7 @@
 #include "format/base/errors.h"
 #include "pipeline/compile/option_fields.h"
 #include "pipeline/compile/options.h"
-#include "pipeline/io/user_document.h"
+#include "pipeline/compile/user_document.h"
 
 namespace texmesh {
 namespace {

@@ -4,8 +4,8 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "pipeline/compile/user_document.h"
 #include "pipeline/experiment/design.h"
-#include "pipeline/io/user_document.h"
 
 namespace texmesh {
 namespace {

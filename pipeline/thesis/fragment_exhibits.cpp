@@ -88,7 +88,7 @@ Exhibit table_3_1(const RunContext& context) {
 }
 
 constexpr std::uint32_t kSides[] = {256, 512, 1024, 2048, 4096};
-constexpr int kMostGrid = 16;
+constexpr int kMostFragmentRow = 16;
 
 struct CutImage {
   std::uint32_t side_px;
@@ -108,8 +108,8 @@ std::vector<CutImage> cut_images(const RunContext& context) {
   std::vector<CutImage> out;
   for (const std::uint32_t side : kSides) {
     const Pixels pixels = made_texture(side, 1.2, 5, context);
-    const int printed = std::min(static_cast<int>(side) / 128, kMostGrid);
-    CutImage image{side, cut_texture(pixels, {1, 2, 4, 8, kMostGrid}, {100}, context),
+    const int printed = std::min(static_cast<int>(side) / 128, kMostFragmentRow);
+    CutImage image{side, cut_texture(pixels, {1, 2, 4, 8, kMostFragmentRow}, {100}, context),
                    cut_texture(pixels, {printed}, {10, 20, 40, 60, 80, 90}, context)};
     image.by_quality.push_back(*std::ranges::find(image.by_grid, printed, &FragmentStudyRow::grid));
     out.push_back(std::move(image));

@@ -7,7 +7,7 @@
 
 #include "format/base/portable_math.h"
 #include "pipeline/import/import.h"
-#include "pipeline/io/memory_files.h"
+#include "pipeline/import/memory_files.h"
 #include "stages/base/parallel.h"
 #include "stages/condition/condition.h"
 #include "stages/image/png_writer.h"

@@ -18,7 +18,7 @@
 #include "pipeline/inspect/debug/debug_input.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/file_resolver.h"
-#include "pipeline/io/scratch_folder.h"
+#include "pipeline/io/new_folder.h"
 #include "pipeline/io/text_table.h"
 
 namespace texmesh {
