@@ -15,6 +15,7 @@
 #include "pipeline/inspect/simulation_plot.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"
+#include "pipeline/io/text_bytes.h"
 #include "pipeline/io/text_table.h"
 
 namespace texmesh {
@@ -279,7 +280,7 @@ void simulate_package(const SimulateArguments& a) {
     const std::string svg = simulation_svg(plan.textures, qualities, link,
                                            fmt::format("{}: S_{}, textures within {:.2f} s, {}", a.package,
                                                        plan.scale, plan.textures.time_limit_s, a.policy));
-    write_output_file(a.plot, std::span(reinterpret_cast<const std::uint8_t*>(svg.data()), svg.size()));
+    write_output_file(a.plot, text_bytes(svg));
   }
   if (a.csv) {
     std::cout << steps_csv(plan, list, qualities);

@@ -7,6 +7,7 @@
 #include "format/base/errors.h"
 #include "pipeline/compile/option_fields.h"
 #include "pipeline/compile/options.h"
+#include "pipeline/compile/user_document.h"
 
 namespace texmesh {
 namespace {
@@ -27,11 +28,7 @@ Json parse(std::span<const std::uint8_t> json, const std::string& file) {
   if (json.size() > kMaxBytes)
     throw InputError(file, "", "at most " + std::to_string(kMaxBytes) + " bytes of JSON",
                      std::to_string(json.size()));
-  try {
-    return parse_bounded_json(json, file, 4);
-  } catch (const FormatError& e) {
-    throw InputError(file, e.place().empty() ? "/" : e.place(), e.expected(), e.found());
-  }
+  return read_document(file, [&] { return parse_bounded_json(json, file, 4); });
 }
 
 /// What people write down about an experiment; it changes nothing.

@@ -7,10 +7,10 @@
 #include <tuple>
 
 #include "format/base/bounded_json.h"
-#include "format/base/errors.h"
-#include "format/base/json_fields.h"
 #include "format/base/sha256.h"
 #include "format/rules/split_mix.h"
+#include "pipeline/compile/user_document.h"
+#include "pipeline/io/text_bytes.h"
 
 namespace texmesh {
 namespace {
@@ -122,8 +122,7 @@ Json design_json(const ExperimentDesign& design) {
 
 std::string id_of(const Json& without_id, const std::string& file) {
   const std::string text = dump_json(without_id, file);
-  return to_hex(sha256({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}))
-      .substr(0, kIdDigits);
+  return to_hex(sha256(text_bytes(text))).substr(0, kIdDigits);
 }
 
 DesignKey key_of(const nlohmann::json& root, const std::string& file) {
@@ -170,7 +169,7 @@ std::string write_design(ExperimentDesign& design) {
 }
 
 DesignKey read_design(std::span<const std::uint8_t> json, const std::string& file) {
-  try {
+  return read_document(file, [&] {
     const nlohmann::json checked = parse_json(json, file, kMaxDesignBytes);
     DesignKey key = key_of(checked, file);
     Json rest = parse_bounded_json(json, file, 8);
@@ -178,9 +177,7 @@ DesignKey read_design(std::span<const std::uint8_t> json, const std::string& fil
     if (const std::string id = id_of(rest, file); id != key.id)
       throw InputError(file, "/id", id + ", the digest of the rest", key.id + ": the design was changed");
     return key;
-  } catch (const FormatError& e) {
-    throw InputError(file, e.place().empty() ? "/" : e.place(), e.expected(), e.found());
-  }
+  });
 }
 
 }  // namespace texmesh

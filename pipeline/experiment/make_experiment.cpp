@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <map>
 
 #include "format/base/errors.h"
@@ -15,6 +14,7 @@
 #include "pipeline/experiment/page_files.h"
 #include "pipeline/io/markup.h"
 #include "pipeline/io/new_folder.h"
+#include "pipeline/render/picture_sheet.h"
 #include "stages/image/png_writer.h"
 #include "stages/measure/render_view.h"
 #include "stages/render/shade.h"
@@ -47,24 +47,20 @@ Pixels render_strip(const StimulusSet& set, const StimulusSet::Shown& shown, int
                     const RenderEnvironment& environment, const RunContext& context) {
   const auto width_px = side_px * static_cast<std::uint32_t>(views);
   Pixels strip{width_px, side_px, 3, std::vector<std::uint8_t>(std::size_t{width_px} * side_px * 3)};
-  const RenderScene scene =
-      render_scene(shown.model.mesh, shown.model.materials, shown.model.texture_images.size());
+  const RenderScene scene = shown.model.scene();
   for (int v = 0; v < views; ++v) {
     context.check_cancelled();
     const Visibility seen = look(scene, turn_camera(set, v, views), side_px, context);
     const Pixels view = encode_srgb(
         shade(scene, seen, shown.textures ? *shown.textures : shown.model.textures, environment, context));
-    for (std::uint32_t y = 0; y < side_px; ++y)
-      std::memcpy(
-          strip.data.data() + (std::size_t{y} * width_px + static_cast<std::uint32_t>(v) * side_px) * 3,
-          view.at(0, y), std::size_t{side_px} * 3);
+    paste(view, static_cast<std::uint32_t>(v) * side_px, 0, strip);
   }
   return strip;
 }
 
 std::string background_of(const RenderEnvironment& environment) {
-  const Pixels pixel = encode_srgb({1, {environment.background}, {0}});
-  return fmt::format("#{:02x}{:02x}{:02x}", pixel.data[0], pixel.data[1], pixel.data[2]);
+  const auto [red, green, blue] = background_colour(environment);
+  return fmt::format("#{:02x}{:02x}{:02x}", red, green, blue);
 }
 
 /// Files by name, of the trials' pictures.

@@ -4,8 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "format/base/errors.h"
-#include "format/base/json_fields.h"
+#include "pipeline/compile/user_document.h"
 #include "pipeline/experiment/design.h"
 
 namespace texmesh {
@@ -13,13 +12,6 @@ namespace {
 
 constexpr std::size_t kMaxName = 32;
 constexpr double kMostMs = 1e8;
-
-void check_names(const nlohmann::json& object, std::initializer_list<const char*> known, const JsonAt& at) {
-  if (!object.is_object()) return;  // what reads it says so
-  for (const auto& [name, value] : object.items())
-    if (std::ranges::find(known, name) == known.end())
-      at.fail("only known fields", "\"" + name.substr(0, 40) + "\"");
-}
 
 /// One of two words; true for the second.
 bool read_side(const JsonAt& at) {
@@ -36,10 +28,10 @@ std::string read_word(const JsonAt& at, std::size_t most, std::string_view chara
 }
 
 void check_display(const nlohmann::json& display, const JsonAt& at) {
-  check_names(display,
-              {"css_px_per_mm", "device_pixel_ratio", "zoom", "pixels_per_degree", "distance_mm", "layout",
-               "width_px", "height_px", "touch"},
-              at);
+  check_field_names(display,
+                    {"css_px_per_mm", "device_pixel_ratio", "zoom", "pixels_per_degree", "distance_mm",
+                     "layout", "width_px", "height_px", "touch"},
+                    at);
   at["css_px_per_mm"].number(0.1, 100);
   at["device_pixel_ratio"].number(0.1, 20);
   at["zoom"].integer(1, 100);
@@ -52,7 +44,7 @@ void check_display(const nlohmann::json& display, const JsonAt& at) {
 }
 
 ExperimentAnswer read_answer(const nlohmann::json& answer, const JsonAt& at, std::uint32_t trials) {
-  check_names(answer, {"trial", "displayed_px", "level", "catch", "side", "chosen", "ms", "late"}, at);
+  check_field_names(answer, {"trial", "displayed_px", "level", "catch", "side", "chosen", "ms", "late"}, at);
   ExperimentAnswer out;
   out.trial = static_cast<std::uint32_t>(at["trial"].integer(0, trials - 1));
   out.displayed_px = at["displayed_px"].number(1, 100000);
@@ -70,8 +62,8 @@ ExperimentResults results_of(const nlohmann::json& root, const std::string& file
                              kNames = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789._-";
   const JsonAt at(root, file);
   at["version"].integer(1, 1);
-  check_names(root, {"version", "design", "kind", "judge", "order", "date", "display", "trials", "answers"},
-              at);
+  check_field_names(
+      root, {"version", "design", "kind", "judge", "order", "date", "display", "trials", "answers"}, at);
   ExperimentResults out;
   out.file = file;
   out.design = read_word(at["design"], 16, kHex);
@@ -97,11 +89,7 @@ ExperimentResults results_of(const nlohmann::json& root, const std::string& file
 }  // namespace
 
 ExperimentResults read_results(std::span<const std::uint8_t> json, const std::string& file) {
-  try {
-    return results_of(parse_json(json, file, kMaxResultsBytes), file);
-  } catch (const FormatError& e) {
-    throw InputError(file, e.place().empty() ? "/" : e.place(), e.expected(), e.found());
-  }
+  return read_document(file, [&] { return results_of(parse_json(json, file, kMaxResultsBytes), file); });
 }
 
 }  // namespace texmesh

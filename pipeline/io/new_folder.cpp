@@ -96,4 +96,15 @@ void NewFolder::check_target() const {
     throw InputError(target_.string(), "", rule_.replaceable, "a folder with other files");
 }
 
+ScratchFolder::ScratchFolder(const std::string& name) {
+  std::string made = (fs::temp_directory_path() / (name + "-XXXXXX")).string();
+  if (!::mkdtemp(made.data())) throw InputError(made, "", "a folder that can be made", "an error");
+  path_ = made;
+}
+
+ScratchFolder::~ScratchFolder() {
+  std::error_code error;
+  fs::remove_all(path_, error);
+}
+
 }  // namespace texmesh

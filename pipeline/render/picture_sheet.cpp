@@ -9,20 +9,13 @@
 namespace texmesh {
 namespace {
 
-void paste(const Pixels& picture, const SheetView& view, Pixels& sheet) {
-  for (std::uint32_t y = 0; y < picture.height_px; ++y)
-    std::memcpy(
-        sheet.data.data() + (std::size_t{view.top_px + y} * sheet.width_px + view.left_px) * sheet.channels,
-        picture.at(0, y), std::size_t{picture.width_px} * picture.channels);
-}
-
 /// The whole sheet as if nothing stood on it.
 Pixels empty_sheet(std::uint32_t width_px, std::uint32_t height_px, const RenderEnvironment& environment) {
-  const Pixels colour = encode_srgb({1, {environment.background}, {0}});
+  const std::array<std::uint8_t, 3> colour = background_colour(environment);
   Pixels sheet{width_px, height_px, 3, {}};
   sheet.data.reserve(std::size_t{width_px} * height_px * 3);
   for (std::size_t i = 0; i < std::size_t{width_px} * height_px; ++i)
-    sheet.data.insert(sheet.data.end(), colour.data.begin(), colour.data.end());
+    sheet.data.insert(sheet.data.end(), colour.begin(), colour.end());
   return sheet;
 }
 
@@ -31,6 +24,17 @@ Pixels empty_sheet(std::uint32_t width_px, std::uint32_t height_px, const Render
 RenderEnvironment environment_of(RenderLight light, const RunContext& context) {
   if (light == RenderLight::kStudio) return studio_environment(context);
   return prepare_environment([](Vec3f) { return Vec3f{1, 1, 1}; }, KeyLight{}, context);
+}
+
+void paste(const Pixels& picture, std::uint32_t left_px, std::uint32_t top_px, Pixels& sheet) {
+  for (std::uint32_t y = 0; y < picture.height_px; ++y)
+    std::memcpy(sheet.data.data() + (std::size_t{top_px + y} * sheet.width_px + left_px) * sheet.channels,
+                picture.at(0, y), std::size_t{picture.width_px} * picture.channels);
+}
+
+std::array<std::uint8_t, 3> background_colour(const RenderEnvironment& environment) {
+  const Pixels pixel = encode_srgb({1, {environment.background}, {0}});
+  return {pixel.data[0], pixel.data[1], pixel.data[2]};
 }
 
 std::uint32_t sheet_columns(int count) {
@@ -61,7 +65,7 @@ PictureSheet render_sheet(const RenderedModel& model, const RenderEnvironment& e
         shade(scene, look(scene, view.camera, side_px, context), model.textures, environment, context);
     view.covered_px =
         static_cast<std::uint32_t>(std::count(picture.covered.begin(), picture.covered.end(), 1));
-    paste(encode_srgb(picture), view, sheet.pixels);
+    paste(encode_srgb(picture), view.left_px, view.top_px, sheet.pixels);
     sheet.views.push_back(view);
     context.report((k + 1.0) / count);
   }

@@ -1,4 +1,5 @@
 #pragma once
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -38,6 +39,12 @@ struct PictureSheet {
 /// bytes for any thread count.
 PictureSheet render_sheet(const RenderedModel& model, const RenderEnvironment& environment, int count,
                           std::uint32_t side_px, const RunContext& context);
+
+/// Copies `picture` into the sheet, which has as many channels and room for it there.
+void paste(const Pixels& picture, std::uint32_t left_px, std::uint32_t top_px, Pixels& sheet);
+
+/// What stands where nothing does, sRGB encoded.
+std::array<std::uint8_t, 3> background_colour(const RenderEnvironment& environment);
 
 /// How many views stand side by side.
 std::uint32_t sheet_columns(int count);

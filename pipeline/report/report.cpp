@@ -1,13 +1,10 @@
 #include "pipeline/report/report.h"
 
-#include <array>
-#include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/io/new_folder.h"
 #include "pipeline/report/html.h"
+#include "pipeline/report/report_folder.h"
 #include "pipeline/report/report_page.h"
 
 namespace texmesh {
@@ -16,19 +13,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kPage = "index.html";
 constexpr double kSourceHeight = 512;  // px at which the source stands beside S_0
-
-bool is_report(const fs::path& folder) {
-  std::ifstream page(folder / kPage, std::ios::binary);
-  std::array<char, kReportFirstLine.size()> head{};
-  page.read(head.data(), static_cast<std::streamsize>(head.size()));
-  return page && std::string_view(head.data(), head.size()) == kReportFirstLine;
-}
-
-FolderRule folder_rule() {
-  return {true, is_report, "", "an empty folder, an earlier report, or nothing yet"};
-}
 
 std::string last_name(const std::string& path) {
   const fs::path p(path);
@@ -74,7 +59,7 @@ Report make_report(PackageReader& package, const ReportOptions& options, const R
   report.verdict = switch_verdict(report.switches, options.limits, options.views);
   for (const SwitchSize& s : report.switches) report.holds = report.holds && s.holds(options.limits);
   report.curves = quality_curves(package, options.budgets);
-  report.files.push_back({kPage, {}});
+  report.files.push_back({kReportPage, {}});
   if (source) report.source = compare_source(package, pictures, *source, report);
   std::string body = header_section(package, report) + "<main>\n" + switch_section(pictures, report);
   if (source)
@@ -117,11 +102,11 @@ std::string report_json(const Report& report) {
 }
 
 void write_report(const Report& report, const std::string& folder) {
-  NewFolder out(folder, folder_rule());
+  NewFolder out(folder, report_folder_rule());
   for (const ReportFile& f : report.files) out.add(f.path, f.bytes);
   out.publish();
 }
 
-void check_report_folder(const std::string& folder) { NewFolder(folder, folder_rule()); }
+void check_report_folder(const std::string& folder) { NewFolder(folder, report_folder_rule()); }
 
 }  // namespace texmesh

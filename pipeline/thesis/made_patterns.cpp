@@ -6,7 +6,7 @@
 
 #include "format/base/portable_math.h"
 #include "pipeline/thesis/made_scans.h"
-#include "stages/data/coverage.h"
+#include "stages/study/covered_plane.h"
 
 namespace texmesh {
 namespace {
@@ -92,16 +92,8 @@ std::string pattern_name(std::size_t pattern) {
 }
 
 PatternPlane pattern_plane(const std::vector<std::size_t>& patterns, std::uint32_t columns) {
-  TexturePlane plane;
-  plane.columns = columns;
-  plane.rows = static_cast<std::uint32_t>(patterns.size()) / columns;
-  plane.fragment_width_px = plane.fragment_height_px = kPatternPx;
-  plane.width_px = plane.columns * kPatternPx, plane.height_px = plane.rows * kPatternPx;
-  plane.coverage.assign(coverage_size_bytes(plane.width_px, plane.height_px), 0xff);
-  plane.covered_texels.assign(plane.fragment_count(), kPatternPx * kPatternPx);
-  plane.surface_fraction.assign(plane.fragment_count(), 1.0f / static_cast<float>(plane.fragment_count()));
-  plane.features.assign(plane.fragment_count(), 0);
-  plane.eta.assign(plane.fragment_count(), 0);
+  TexturePlane plane =
+      covered_plane(columns, static_cast<std::uint32_t>(patterns.size()) / columns, kPatternPx, kPatternPx);
   Pixels pixels{plane.width_px, plane.height_px, 3, {}};
   for (std::uint32_t y = 0; y < plane.height_px; ++y)
     for (std::uint32_t x = 0; x < plane.width_px; ++x)

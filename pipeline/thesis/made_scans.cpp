@@ -2,12 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <nlohmann/json.hpp>
 #include <string>
 
 #include "format/base/portable_math.h"
 #include "pipeline/import/import.h"
+#include "pipeline/import/memory_files.h"
+#include "stages/base/parallel.h"
 #include "stages/condition/condition.h"
 #include "stages/image/png_writer.h"
 #include "stages/simplification/simplification.h"
@@ -72,17 +73,6 @@ double nutcracker_radius(double alpha, double h) {
   return r + 2 * rough(alpha, h, kShapeSeed + 1);
 }
 
-/// The files of one scan.
-class ScanFiles : public Resolver {
- public:
-  std::map<std::string, Bytes> files;
-  std::optional<Bytes> read(const std::string& uri, std::uint64_t) override {
-    const auto it = files.find(uri);
-    if (it == files.end()) return std::nullopt;
-    return it->second;
-  }
-};
-
 constexpr double kMostGrid = 65535;
 
 Bytes radius_file(MadeShape shape, std::uint32_t columns, std::uint32_t rows) {
@@ -120,27 +110,31 @@ double made_radius(MadeShape shape, double alpha, double height) {
   return shape == MadeShape::kHead ? head_radius(alpha, height) : nutcracker_radius(alpha, height);
 }
 
-Pixels made_texture(std::uint32_t side_px, double contrast, std::uint32_t seed) {
-  Pixels out{side_px, side_px, 3, {}};
-  out.data.reserve(std::size_t{side_px} * side_px * 3);
+Pixels made_texture(std::uint32_t side_px, double contrast, std::uint32_t seed, const RunContext& context) {
+  Pixels out{side_px, side_px, 3, std::vector<std::uint8_t>(std::size_t{side_px} * side_px * 3)};
   const double unit = 8.0 / side_px;
-  for (std::uint32_t y = 0; y < side_px; ++y)
+  const auto draw_row = [&](std::size_t y) {
+    std::uint8_t* to = out.data.data() + y * side_px * 3;
+    const double v = unit * static_cast<double>(y);
     for (std::uint32_t x = 0; x < side_px; ++x) {
       double value = 0, weight = 0.5;
       for (double f = 1; f * 8 < side_px; f *= 2, weight *= 0.62)
-        value +=
-            weight * (lattice_noise(f * unit * x, f * unit * y, seed + static_cast<std::uint32_t>(f)) - 0.5);
-      const double hue = lattice_noise(unit * x, unit * y, seed + 9999) - 0.5;
+        value += weight * (lattice_noise(f * unit * x, f * v, seed + static_cast<std::uint32_t>(f)) - 0.5);
+      const double hue = lattice_noise(unit * x, v, seed + 9999) - 0.5;
       for (const double tint : {0.22, 0.0, -0.22})
-        out.data.push_back(
-            static_cast<std::uint8_t>(std::clamp(128 + 255 * contrast * (value + tint * hue), 0.0, 255.0)));
+        *to++ =
+            static_cast<std::uint8_t>(std::clamp(128 + 255 * contrast * (value + tint * hue), 0.0, 255.0));
     }
+  };
+  parallel_for(context, side_px, 16, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t y = begin; y < end; ++y) draw_row(y);
+  });
   return out;
 }
 
 Model make_scan_model(MadeShape shape, std::uint32_t columns, std::uint32_t rows, std::uint32_t texture_px,
                       const RunContext& context) {
-  ScanFiles files;
+  MemoryFiles files;
   files.files["radius.pgm"] = radius_file(shape, columns, rows);
   nlohmann::json scan{{"version", 1},
                       {"type", "cylindrical-range-scan"},
@@ -148,7 +142,7 @@ Model make_scan_model(MadeShape shape, std::uint32_t columns, std::uint32_t rows
                       {"y_step", kObjectHeight_mm / (rows - 1)},
                       {"radius_scale", kLargestRadius_mm / kMostGrid}};
   if (texture_px > 0) {
-    files.files["colour.png"] = write_png(made_texture(texture_px, 1, 11));
+    files.files["colour.png"] = write_png(made_texture(texture_px, 1, 11, context));
     scan["texture"] = "colour.png";
   }
   const std::string text = scan.dump();

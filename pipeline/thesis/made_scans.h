@@ -32,8 +32,9 @@ struct MadeChain {
 };
 MadeChain thesis_chain(const Model& model, const RunContext& context);
 
-/// A picture of stone and paint with detail of all sizes, 0..255 in three channels. `contrast` 0..1.
-Pixels made_texture(std::uint32_t side_px, double contrast, std::uint32_t seed);
+/// A picture of stone and paint with detail of all sizes, 0..255 in three channels. `contrast` > 0; 1 just
+/// fills that range.
+Pixels made_texture(std::uint32_t side_px, double contrast, std::uint32_t seed, const RunContext& context);
 /// A deterministic number in 0..1.
 double lattice_noise(double x, double y, std::uint32_t seed);
 

@@ -140,8 +140,9 @@ double deviance_of(std::span<const LevelCount> counts, double fitted) {
   return std::max(0.0, 2 * (saturated - fitted));
 }
 
-/// One count a level, by level.
-std::vector<LevelCount> merged(std::span<const LevelCount> counts) {
+}  // namespace
+
+std::vector<LevelCount> merge_levels(std::span<const LevelCount> counts) {
   std::vector<LevelCount> sorted(counts.begin(), counts.end()), out;
   std::ranges::stable_sort(sorted, {}, &LevelCount::level);
   for (const LevelCount& c : sorted) {
@@ -154,8 +155,6 @@ std::vector<LevelCount> merged(std::span<const LevelCount> counts) {
   return out;
 }
 
-}  // namespace
-
 double Psychometric::share_right(double level) const {
   if (!(level > 0)) return 0.5;
   // The factor puts kThresholdShare, not the curve's middle, at the threshold.
@@ -165,7 +164,7 @@ double Psychometric::share_right(double level) const {
 
 PsychometricFit fit_psychometric(std::span<const LevelCount> counts) {
   check_counts(counts);
-  const std::vector<LevelCount> all = merged(counts);
+  const std::vector<LevelCount> all = merge_levels(counts);
   const double least = all.front().level, most = all.back().level;
   const Box box{{portable::log(least / 4), portable::log(0.5), 0},
                 {portable::log(most * 4), portable::log(20), kMostLapses}};

@@ -14,6 +14,9 @@ struct LevelCount {
   std::uint32_t answers = 0, right = 0;
 };
 
+/// One count a level, by level; levels without answers go.
+std::vector<LevelCount> merge_levels(std::span<const LevelCount> counts);
+
 /// The share of right answers that is the threshold, half-way between guessing and seeing (thesis 5.6).
 inline constexpr double kThresholdShare = 0.75;
 /// Share of answers that a judge gives wrong however large the change is; more is no lapse but a bad judge

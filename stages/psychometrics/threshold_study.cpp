@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <stdexcept>
 
 #include "format/base/portable_math.h"
@@ -16,18 +15,9 @@ namespace {
 using Counts = std::vector<LevelCount>;
 
 Counts summed(const std::vector<const Counts*>& parts) {
-  std::map<double, LevelCount> by_level;
-  for (const Counts* part : parts)
-    for (const LevelCount& c : *part) {
-      LevelCount& sum = by_level[c.level];
-      sum.level = c.level;
-      sum.answers += c.answers;
-      sum.right += c.right;
-    }
-  Counts out;
-  for (const auto& [level, count] : by_level)
-    if (count.answers > 0) out.push_back(count);
-  return out;
+  Counts all;
+  for (const Counts* part : parts) all.insert(all.end(), part->begin(), part->end());
+  return merge_levels(all);
 }
 
 std::vector<Counts> by_condition(const std::vector<const JudgeTable*>& judges, std::size_t conditions) {

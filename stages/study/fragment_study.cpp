@@ -2,14 +2,15 @@
 
 #include <algorithm>
 #include <cstring>
+#include <limits>
 #include <string>
 
 #include "stages/base/parallel.h"
-#include "stages/data/coverage.h"
 #include "stages/fragment_codec/decode_rung.h"
 #include "stages/jpeg/jpeg.h"
 #include "stages/jpeg/jpeg_coder.h"
 #include "stages/ladder/ladder.h"
+#include "stages/study/covered_plane.h"
 
 namespace texmesh {
 namespace {
@@ -42,21 +43,12 @@ struct CutImage {
 };
 
 CutImage cut_image(const Pixels& pixels, std::uint32_t grid) {
-  TexturePlane plane;
-  plane.channels = pixels.channels;
   const auto side = [&](std::uint32_t size) { return (size + grid * kBlock - 1) / (grid * kBlock) * kBlock; };
-  plane.fragment_width_px = side(pixels.width_px);
-  plane.fragment_height_px = side(pixels.height_px);
-  plane.columns = (pixels.width_px + plane.fragment_width_px - 1) / plane.fragment_width_px;
-  plane.rows = (pixels.height_px + plane.fragment_height_px - 1) / plane.fragment_height_px;
-  plane.width_px = plane.fragment_width_px * plane.columns;
-  plane.height_px = plane.fragment_height_px * plane.rows;
-  plane.coverage.assign(coverage_size_bytes(plane.width_px, plane.height_px), 0xff);
-  const std::size_t count = plane.fragment_count();
-  plane.covered_texels.assign(count, plane.fragment_width_px * plane.fragment_height_px);
-  plane.surface_fraction.assign(count, 1.0f / static_cast<float>(count));
-  plane.features.assign(count, 0);
-  plane.eta.assign(count, 0);
+  const auto count = [](std::uint32_t size, std::uint32_t of) { return (size + of - 1) / of; };
+  const std::uint32_t width_px = side(pixels.width_px), height_px = side(pixels.height_px);
+  TexturePlane plane = covered_plane(count(pixels.width_px, width_px), count(pixels.height_px, height_px),
+                                     width_px, height_px);
+  plane.channels = pixels.channels;
   Pixels whole{plane.width_px, plane.height_px, pixels.channels, {}};
   const std::size_t stride = std::size_t{whole.width_px} * whole.channels,
                     used = std::size_t{pixels.width_px} * pixels.channels;
@@ -81,22 +73,28 @@ struct FileSizes {
   std::uint64_t standard = 0, optimised = 0;
 };
 
-FileSizes file_sizes(const Pixels& pixels, const PixelWindow& window, int quality, Subsampling subsampling) {
-  const JpegKind kind{pixels.channels, quality, subsampling};
-  JpegCoder standard(kind), optimised(kind);
+FileSizes file_sizes(const Pixels& pixels, const PixelWindow& window, int quality,
+                     const FragmentStudyOptions& options) {
+  const JpegKind kind{pixels.channels, quality, options.subsampling};
+  JpegCoder standard(kind);
   std::vector<std::uint8_t> body;
   standard.append_body(window, body);
   return {standard.head_stream(window.width_px, window.height_px).size() + body.size() - kMarkersInCommon +
               kJfifHeader,
-          optimised.complete(window).size()};
+          options.optimised ? JpegCoder(kind).complete(window).size() : 0};
 }
 
-/// What decoding once takes.
+/// What decoding takes: the least of a few times, since caches are cold at first and other programs disturb.
 template <class Decode>
 double decode_s(const std::function<double()>& clock_s, const Decode& decode) {
-  const double start_s = clock_s();
-  decode();
-  return clock_s() - start_s;
+  constexpr int kTimes = 3;
+  double least_s = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < kTimes; ++k) {
+    const double start_s = clock_s();
+    decode();
+    least_s = std::min(least_s, clock_s() - start_s);
+  }
+  return least_s;
 }
 
 double file_decode_s(const Pixels& pixels, int quality, const FragmentStudyOptions& options) {
@@ -131,24 +129,16 @@ std::vector<FragmentStudyRow> study_grid(const Pixels& image, int grid, const st
   parallel_for(context, files.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t k = begin; k < end; ++k) {
       const PixelWindow window = window_of(cut.pixels[0], padded_fragment_rectangle(plane, k % count));
-      files[k] = file_sizes(cut.pixels[0], window, options.qualities[k / count], options.subsampling);
+      files[k] = file_sizes(cut.pixels[0], window, options.qualities[k / count], options);
     }
   });
   std::vector<FragmentStudyRow> rows;
   for (std::size_t q = 0; q < qualities; ++q) {
-    FragmentStudyRow row{grid,
-                         options.qualities[q],
-                         plane.columns,
-                         plane.rows,
-                         plane.fragment_width_px,
-                         plane.fragment_height_px,
-                         whole[q].standard,
-                         whole[q].optimised,
-                         0,
-                         0,
-                         0,
-                         0,
-                         0};
+    FragmentStudyRow row;
+    row.grid = grid, row.quality = options.qualities[q];
+    row.columns = plane.columns, row.rows = plane.rows;
+    row.fragment_width_px = plane.fragment_width_px, row.fragment_height_px = plane.fragment_height_px;
+    row.file_standard = whole[q].standard, row.file_optimised = whole[q].optimised;
     for (std::size_t f = 0; f < count; ++f) {
       row.sum_standard += files[q * count + f].standard;
       row.sum_optimised += files[q * count + f].optimised;
@@ -173,7 +163,7 @@ std::vector<FragmentStudyRow> study_fragments(const Pixels& pixels, const Fragme
   parallel_for(context, whole.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t q = begin; q < end; ++q)
       whole[q] = file_sizes(pixels, window_of(pixels, {0, 0, pixels.width_px, pixels.height_px}),
-                            options.qualities[q], options.subsampling);
+                            options.qualities[q], options);
   });
   std::vector<FragmentStudyRow> out;
   for (std::size_t g = 0; g < options.grids.size(); ++g) {

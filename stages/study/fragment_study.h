@@ -14,6 +14,9 @@ struct FragmentStudyOptions {
   std::vector<int> grids{2, 4, 8, 16};                      // fragments in a row and in a column, 1..64
   std::vector<int> qualities{10, 20, 40, 60, 80, 90, 100};  // IJG, strictly rising, at most 16
   Subsampling subsampling = Subsampling::k420;
+  /// Files with tables of their own, too, which take as long to make as all the rest; without them their
+  /// sizes are 0.
+  bool optimised = true;
   /// Seconds of CPU that this thread has taken; empty: decoding is not timed.
   std::function<double()> clock_s{};
 };
@@ -27,9 +30,9 @@ struct FragmentStudyRow {
   std::uint32_t fragment_width_px = 0, fragment_height_px = 0;
   std::uint64_t file_standard = 0, file_optimised = 0;                // the whole image in one file
   std::uint64_t sum_standard = 0, sum_optimised = 0, sum_shared = 0;  // of the columns * rows fragments
-  // Seconds of one thread, where a clock is given: of the image as one file with tables of its own, and of
-  // all fragments as packages hold them, each made a whole file again. The only figures that differ from run
-  // to run.
+  // Seconds of one thread, the least of three times, where a clock is given: of the image as one file with
+  // tables of its own, and of all fragments as packages hold them, each made a whole file again. The only
+  // figures that differ from run to run.
   double file_decode_s = 0, fragments_decode_s = 0;
 };
 

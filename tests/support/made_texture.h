@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "stages/base/run_context.h"
-#include "stages/data/coverage.h"
 #include "stages/data/fragments.h"
 #include "stages/data/pixels.h"
+#include "stages/study/covered_plane.h"
 
 namespace texmesh::testing {
 
@@ -54,18 +54,10 @@ struct Scene {
 /// Every fragment covered; the image is cut to whole fragments.
 inline Scene make_scene(Pixels image, std::uint32_t side) {
   Scene scene;
-  TexturePlane p;
+  TexturePlane p =
+      covered_plane(std::max(1u, image.width_px / side), std::max(1u, image.height_px / side), side, side);
   p.channels = image.channels;
-  p.fragment_width_px = p.fragment_height_px = side;
-  p.columns = std::max(1u, image.width_px / side);
-  p.rows = std::max(1u, image.height_px / side);
-  p.width_px = p.columns * side;
-  p.height_px = p.rows * side;
-  p.coverage.assign(coverage_size_bytes(p.width_px, p.height_px), 0xff);
-  p.covered_texels.assign(p.fragment_count(), side * side);
-  p.surface_fraction.assign(p.fragment_count(), 1.0f / static_cast<float>(p.fragment_count()));
   p.features.assign(p.fragment_count(), 1);
-  p.eta.assign(p.fragment_count(), 0);
   if (p.width_px != image.width_px || p.height_px != image.height_px) {
     Pixels cut{p.width_px, p.height_px, image.channels, {}};
     for (std::uint32_t y = 0; y < cut.height_px; ++y)

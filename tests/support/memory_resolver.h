@@ -1,28 +1,23 @@
 #pragma once
-#include <map>
 #include <string>
 #include <vector>
 
 #include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "pipeline/import/import.h"
+#include "pipeline/import/memory_files.h"
 
 namespace texmesh::testing {
 
 inline Bytes bytes_of(std::string_view text) { return {text.begin(), text.end()}; }
 
 /// Files in memory; remembers what was asked for.
-class MemoryResolver : public Resolver {
+class MemoryResolver : public MemoryFiles {
  public:
-  std::map<std::string, Bytes> files;
   std::vector<std::string> asked;
   std::optional<Bytes> read(const std::string& uri, std::uint64_t max_bytes) override {
     asked.push_back(uri);
-    const auto it = files.find(uri);
-    if (it == files.end()) return std::nullopt;
-    if (it->second.size() > max_bytes)
-      throw InputError(uri, "", "at most " + std::to_string(max_bytes) + " bytes", "more");
-    return it->second;
+    return MemoryFiles::read(uri, max_bytes);
   }
 };
 

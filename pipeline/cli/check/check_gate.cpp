@@ -7,6 +7,7 @@
 #include "pipeline/cli/options/delivery_options.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/markup.h"
+#include "pipeline/io/text_bytes.h"
 #include "pipeline/io/text_table.h"
 #include "pipeline/report/html.h"
 #include "pipeline/report/switch_sizes.h"
@@ -73,7 +74,7 @@ std::string gate_junit(const std::string& suite, const std::string& input,
 void write_gate_junit(const std::string& path, const std::string& suite, const std::string& input,
                       const std::vector<GateResult>& results) {
   const std::string xml = gate_junit(suite, input, results);
-  write_output_file(path, std::span(reinterpret_cast<const std::uint8_t*>(xml.data()), xml.size()));
+  write_output_file(path, text_bytes(xml));
 }
 
 std::vector<std::string> gate_failures(const std::vector<GateResult>& results) {

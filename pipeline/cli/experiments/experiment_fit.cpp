@@ -12,6 +12,7 @@
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/file_resolver.h"
+#include "pipeline/io/text_bytes.h"
 #include "pipeline/io/text_table.h"
 
 namespace texmesh {
@@ -53,7 +54,7 @@ std::optional<DesignKey> design_of(const std::string& path) {
 }
 
 void write_text(const std::string& path, const std::string& text) {
-  write_output_file(path, {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
+  write_output_file(path, text_bytes(text));
 }
 
 int run_fit(const FitArguments& args) {

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "format/container/layout.h"
+#include "pipeline/cli/fetch/server_share.h"
 #include "pipeline/io/text_table.h"
 
 namespace texmesh {
@@ -16,12 +17,8 @@ void add_link_json(const Fetched& f, const LinkWatch& watch, Json& j) {
   if (f.load.mirrors.size() > 1) {
     Json servers = Json::array();
     for (std::size_t i = 0; i < f.load.mirrors.size(); ++i) {
-      const MirrorShare& m = f.load.mirrors[i];
-      servers.push_back({{"url", shown_url(f.urls[i])},
-                         {"requests", m.requests},
-                         {"bytes", m.bytes},
-                         {"bytes_s", m.bytes_s}});
-      if (!m.dropped.empty()) servers.back()["dropped"] = m.dropped;
+      servers.push_back({{"url", shown_url(f.urls[i])}});
+      servers.back().update(server_json(f.load.mirrors[i]));
     }
     j["servers"] = servers;
   }
@@ -39,12 +36,9 @@ void add_link_json(const Fetched& f, const LinkWatch& watch, Json& j) {
 
 std::string link_text(const Fetched& f, const LinkWatch& watch) {
   std::string text;
-  for (std::size_t i = 0; i < f.load.mirrors.size() && f.load.mirrors.size() > 1; ++i) {
-    const MirrorShare& m = f.load.mirrors[i];
-    text +=
-        fmt::format("  {}: {} requests, {} bytes, {:.0f} kB/s{}\n", shown_url(f.urls[i]), m.requests,
-                    grouped(m.bytes), m.bytes_s / 1e3, m.dropped.empty() ? "" : "; dropped: " + m.dropped);
-  }
+  if (f.load.mirrors.size() > 1)
+    for (std::size_t i = 0; i < f.load.mirrors.size(); ++i)
+      text += server_text(shown_url(f.urls[i]), f.load.mirrors[i]);
   if (watch.probes()) {
     const BandwidthMonitor& monitor = watch.monitor();
     text += fmt::format("{} test packets with {} bytes beside the textures, {} arrived", monitor.sent(),

@@ -3,19 +3,21 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "format/base/errors.h"
+#include "pipeline/compile/user_document.h"
 #include "pipeline/io/atomic_file.h"
+#include "pipeline/io/file_resolver.h"
 #include "pipeline/io/resource_error.h"
+#include "pipeline/io/text_bytes.h"
 
 namespace texmesh {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr std::uintmax_t kMostFileBytes = 512 * 1024;
+constexpr std::uint64_t kMostFileBytes = 512 * 1024;
 constexpr int kMostLoads = 1'000'000, kMemory = 16;
 constexpr double kLeastRate = 1, kMostRecordedBytes_s = 1e12;
 constexpr std::size_t kMostName = 260;
@@ -25,19 +27,6 @@ bool is_host(const std::string& name) {
     return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') ||
            std::string_view(".-_:[]").find(c) != std::string_view::npos;
   });
-}
-
-std::string read_small_file(const std::string& path) {
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error)) throw InputError(path, "", "a regular file", "another");
-  std::ifstream in(path, std::ios::binary);
-  std::string text(static_cast<std::size_t>(kMostFileBytes) + 1, '\0');
-  in.read(text.data(), static_cast<std::streamsize>(text.size()));
-  if (in.bad() || (!in.eof() && in.fail())) throw InputError(path, "", "a readable file", "none");
-  text.resize(static_cast<std::size_t>(in.gcount()));
-  if (text.size() > kMostFileBytes)
-    throw InputError(path, "", "at most " + std::to_string(kMostFileBytes) + " bytes", "more");
-  return text;
 }
 
 }  // namespace
@@ -51,30 +40,23 @@ LinkHistory LinkHistory::read(const std::string& path) {
   LinkHistory history;
   std::error_code error;
   if (!std::filesystem::exists(std::filesystem::symlink_status(path, error))) return history;
-  const Json j = Json::parse(read_small_file(path), nullptr, false);
-  if (!j.is_object() || j.size() != 2 || j.value("version", Json()) != 1 || !j.contains("hosts") ||
-      !j["hosts"].is_array())
-    throw InputError(path, "", "a JSON object with version 1 and a list of hosts", "another document");
-  if (j["hosts"].size() > kMostHosts)
-    throw InputError(path, "hosts", "at most " + std::to_string(kMostHosts),
-                     std::to_string(j["hosts"].size()));
-  for (const Json& entry : j["hosts"]) {
-    const std::string place = "hosts[" + std::to_string(history.hosts_.size()) + "]";
-    Host host;
-    const bool shaped = entry.is_object() && entry.size() == 3 && entry.contains("host") &&
-                        entry["host"].is_string() && entry.contains("bytes_s") &&
-                        entry["bytes_s"].is_number() && entry.contains("loads") &&
-                        entry["loads"].is_number_integer();
-    if (shaped) {
-      host = {entry["host"].get<std::string>(), entry["bytes_s"].get<double>(), 0};
-      const auto loads = entry["loads"].get<std::int64_t>();
-      if (loads >= 1 && loads <= kMostLoads) host.loads = static_cast<int>(loads);
+  const std::vector<std::uint8_t> bytes = read_input_file(path, kMostFileBytes);
+  read_document(path, [&] {
+    const nlohmann::json document = parse_json(bytes, path, kMostFileBytes);
+    const JsonAt at(document, path);
+    at["version"].integer(1, 1);
+    const std::size_t count = at["hosts"].array(0, kMostHosts);
+    check_field_names(document, {"version", "hosts"}, at);
+    for (std::size_t k = 0; k < count; ++k) {
+      const JsonAt entry = at["hosts"][k];
+      Host host{entry["host"].text(kMostName), entry["bytes_s"].number(kLeastRate, kMostRecordedBytes_s),
+                static_cast<int>(entry["loads"].integer(1, kMostLoads))};
+      check_field_names(document["hosts"][k], {"host", "bytes_s", "loads"}, entry);
+      if (!is_host(host.name)) entry["host"].fail("a host", host.name);
+      if (history.average_bytes_s(host.name)) entry["host"].fail("a host once", host.name + " again");
+      history.hosts_.push_back(std::move(host));
     }
-    if (!good(host))
-      throw InputError(path, place, "host, bytes_s from 1 to 1e12 and loads", "something else");
-    if (history.average_bytes_s(host.name)) throw InputError(path, place, "a host once", "twice");
-    history.hosts_.push_back(std::move(host));
-  }
+  });
   return history;
 }
 
@@ -104,7 +86,7 @@ void LinkHistory::write(const std::string& path) const {
     std::filesystem::create_directories(folder, error);
     if (error) throw ResourceError(folder.string(), "", "a folder that can be made", error.message());
   }
-  write_file_atomically(path, std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
+  write_file_atomically(path, text_bytes(text));
 }
 
 std::string host_of_url(const std::string& url) {

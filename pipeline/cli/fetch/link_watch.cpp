@@ -5,6 +5,7 @@
 
 #include "format/base/errors.h"
 #include "pipeline/io/atomic_file.h"
+#include "pipeline/io/text_bytes.h"
 
 namespace texmesh {
 namespace {
@@ -85,7 +86,7 @@ void LinkWatch::finish(const std::vector<std::string>& urls, const LoadReport& l
     const std::string csv =
         trace_csv(*trace, fmt::format("recorded by texmesh fetch: {:.0f} bytes; round trip {:.1f} ms",
                                       recorder_.bytes(), 1000 * rtt_s));
-    write_output_file(record_, std::span(reinterpret_cast<const std::uint8_t*>(csv.data()), csv.size()));
+    write_output_file(record_, text_bytes(csv));
   }
   if (history_path_.empty()) return;
   const bool several = load.mirrors.size() > 1;

@@ -53,6 +53,12 @@ void add_time_option(Command& c, DeliveryArguments& a) {
       .shows_default();
 }
 
+void add_rtt_option(Command& c, DeliveryArguments& a) {
+  c.option("--rtt", a.rtt, "Round trip: 40 or 40ms are milliseconds, 0.04s seconds")
+      .value_name("TIME")
+      .shows_default();
+}
+
 Option add_scale_option(Command& c, DeliveryArguments& a) {
   return c.option("--scale", a.scale, "This scale instead of the scale that looks best").integer_in(0, 99);
 }
@@ -103,9 +109,7 @@ void add_link_options(Command& c, DeliveryArguments& a) {
   c.option("--trace", a.trace, "CSV of the link's throughput: lines of seconds,bytes per second")
       .value_name("FILE")
       .excludes(bandwidth);
-  c.option("--rtt", a.rtt, "Round trip: 40 or 40ms are milliseconds, 0.04s seconds")
-      .value_name("TIME")
-      .shows_default();
+  add_rtt_option(c, a);
   c.option("--mirror", a.mirrors,
            "A server's own rate, 2Mbit/s; with ,dead=3s it dies then, with ,lies=3s its bytes are wrong from "
            "then on; several times for several servers")

@@ -26,6 +26,7 @@ void add_delivery_options(Command& command, DeliveryArguments& args, bool packag
 // Single options of these, for commands that take some of them only.
 Option add_display_option(Command& command, DeliveryArguments& args);
 void add_time_option(Command& command, DeliveryArguments& args);
+void add_rtt_option(Command& command, DeliveryArguments& args);
 Option add_scale_option(Command& command, DeliveryArguments& args);
 Option add_policy_option(Command& command, DeliveryArguments& args);
 Option add_window_option(Command& command, DeliveryArguments& args);

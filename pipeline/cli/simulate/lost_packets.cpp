@@ -66,7 +66,7 @@ LostPacketsTable lost_packets(PackageReader& package, const DeliveryPlan& plan, 
   for (const double factor : {0.0, 0.5, 1.0, 2.0}) {
     LostPacketsRow row;
     row.loss = std::min(1.0, factor * loss);
-    const PacketLoss packets{row.loss, 1460, seed};
+    const PacketLoss packets{.loss = row.loss, .seed = seed};
     const LossyMesh texture = stream.decode(packets, SplitFill::kTexture);
     row.lost_points = texture.lost_points.size();
     row.neighbours_rms = point_errors(whole, stream.decode(packets, SplitFill::kNeighbours)).rms;
@@ -133,25 +133,17 @@ std::vector<std::uint8_t> lost_packets_picture(PackageReader& package, int scale
   material.metallic = 0;
   material.roughness = 0.6f;
   material.double_sided = true;
-  Pixels out;
+  Pixels out{3 * kSide_px, kSide_px, 3, std::vector<std::uint8_t>(std::size_t{9} * kSide_px * kSide_px)};
   BoundingSphere bounds;
   for (std::uint32_t k = 0; k < 3; ++k) {
-    const LossyMesh lossy =
-        stream.decode({k == 0 ? 0 : loss, 1460, seed}, k == 1 ? SplitFill::kNeighbours : SplitFill::kTexture);
+    const LossyMesh lossy = stream.decode({.loss = k == 0 ? 0 : loss, .seed = seed},
+                                          k == 1 ? SplitFill::kNeighbours : SplitFill::kTexture);
     Mesh mesh = condition_mesh(clay(stream.head, lossy.mesh), false, {}, context).mesh;
     RenderedModel model = untextured_model(std::move(mesh), {material});
     if (k == 0) bounds = model.bounds;
     model.bounds = bounds;  // one camera for all
     const Pixels view = render_sheet(model, light, 1, kSide_px, context).pixels;
-    if (k == 0) {
-      out = view;
-      out.width_px = 3 * view.width_px;
-      out.data.assign(3 * view.data.size(), 0);
-    }
-    const std::size_t row = view.data.size() / view.height_px;
-    for (std::uint32_t y = 0; y < view.height_px; ++y)
-      std::copy_n(view.data.begin() + static_cast<std::ptrdiff_t>(y * row), row,
-                  out.data.begin() + static_cast<std::ptrdiff_t>((3 * y + k) * row));
+    paste(view, k * kSide_px, 0, out);
   }
   return write_png(out);
 }

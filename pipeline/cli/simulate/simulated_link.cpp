@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <cmath>
 
+#include "pipeline/cli/fetch/server_share.h"
 #include "pipeline/io/text_table.h"
 
 namespace texmesh {
@@ -26,10 +27,7 @@ void add_simulated_link(const DeliveryPlan& p, const BandwidthTrace& link, Json&
   const SimulationResult& r = p.textures;
   if (r.mirrors.size() > 1) {
     Json servers = Json::array();
-    for (const MirrorShare& m : r.mirrors) {
-      servers.push_back({{"requests", m.requests}, {"bytes", m.bytes}, {"bytes_s", m.bytes_s}});
-      if (!m.dropped.empty()) servers.back()["dropped"] = m.dropped;
-    }
+    for (const MirrorShare& m : r.mirrors) servers.push_back(server_json(m));
     j["servers"] = servers;
   }
   if (r.probes > 0)
@@ -42,12 +40,9 @@ void add_simulated_link(const DeliveryPlan& p, const BandwidthTrace& link, Json&
 std::string simulated_link_text(const DeliveryPlan& p, const BandwidthTrace& link) {
   const SimulationResult& r = p.textures;
   std::string text;
-  for (std::size_t i = 0; i < r.mirrors.size() && r.mirrors.size() > 1; ++i) {
-    const MirrorShare& m = r.mirrors[i];
-    text +=
-        fmt::format("  server {}: {} requests, {} bytes, {:.0f} kB/s{}\n", i + 1, m.requests,
-                    grouped(m.bytes), m.bytes_s / 1e3, m.dropped.empty() ? "" : "; dropped: " + m.dropped);
-  }
+  if (r.mirrors.size() > 1)
+    for (std::size_t i = 0; i < r.mirrors.size(); ++i)
+      text += server_text(fmt::format("server {}", i + 1), r.mirrors[i]);
   if (r.probes > 0)
     text += fmt::format("{} test packets with {} bytes beside the textures; mean error {:.1f} %\n", r.probes,
                         grouped(r.probe_bytes), 100 * mean_probe_error(r, link, p.mesh_s));

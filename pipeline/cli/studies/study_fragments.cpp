@@ -12,6 +12,7 @@
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/file_resolver.h"
+#include "pipeline/io/text_bytes.h"
 #include "pipeline/io/text_table.h"
 #include "stages/image/decode_image.h"
 #include "stages/study/fragment_study.h"
@@ -136,8 +137,9 @@ std::string fragment_csv(const std::vector<StudiedImage>& images) {
 }
 
 void run_fragments(const FragmentArguments& args) {
-  FragmentStudyOptions options{
-      args.grids, args.qualities, args.subsampling == "444" ? Subsampling::k444 : Subsampling::k420, {}};
+  FragmentStudyOptions options;
+  options.grids = args.grids, options.qualities = args.qualities;
+  options.subsampling = args.subsampling == "444" ? Subsampling::k444 : Subsampling::k420;
   if (args.decode) options.clock_s = thread_s;
   if (!args.csv.empty()) check_output_file(args.csv);  // not after the study
   std::vector<StudiedImage> studied;
@@ -158,7 +160,7 @@ void run_fragments(const FragmentArguments& args) {
     std::cout << Json{{"fragments", list}}.dump(-1, ' ', false, Json::error_handler_t::replace) << '\n';
   if (!args.csv.empty()) {
     const std::string csv = fragment_csv(studied);
-    write_output_file(args.csv, {reinterpret_cast<const std::uint8_t*>(csv.data()), csv.size()});
+    write_output_file(args.csv, text_bytes(csv));
   }
 }
 

@@ -1,6 +1,5 @@
 // texmesh study method: the thesis as printed beside what texmesh does by default, on one model.
 #include <fmt/format.h>
-#include <stdlib.h>
 
 #include <cmath>
 #include <filesystem>
@@ -11,7 +10,7 @@
 #include "pipeline/cache/disk_store.h"
 #include "pipeline/cli/options/command_line.h"
 #include "pipeline/cli/options/common_options.h"
-#include "pipeline/cli/options/units.h"
+#include "pipeline/cli/options/delivery_options.h"
 #include "pipeline/cli/studies/studies.h"
 #include "pipeline/compile/compile_model.h"
 #include "pipeline/compile/profile.h"
@@ -19,6 +18,7 @@
 #include "pipeline/inspect/debug/debug_input.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/file_resolver.h"
+#include "pipeline/io/new_folder.h"
 #include "pipeline/io/text_table.h"
 
 namespace texmesh {
@@ -31,7 +31,8 @@ constexpr int kBurstyRuns = 10;
 constexpr double kBurstVariation = 0.5, kBurstCorrelation = 0.9, kBurstStep_s = 0.1;
 
 struct MethodArguments {
-  std::string input, thesis, against, time = "5", bandwidth = "2Mbit/s", rtt = "0";
+  std::string input, thesis, against;
+  DeliveryArguments delivery;  // time limit and link
   std::vector<int> displays_px{150, 300, 600, 1000};
   int views = 4, jobs = 0;
   CacheChoice cache;
@@ -66,26 +67,6 @@ struct SystemFigures {
   std::vector<MethodRow> rows;
 };
 
-/// A folder that goes with this object.
-class ScratchFolder {
- public:
-  ScratchFolder() {
-    std::string name = (fs::temp_directory_path() / "texmesh-method-XXXXXX").string();
-    if (!mkdtemp(name.data())) throw InputError(name, "", "a folder that can be made", "an error");
-    path_ = name;
-  }
-  ScratchFolder(const ScratchFolder&) = delete;
-  ScratchFolder& operator=(const ScratchFolder&) = delete;
-  ~ScratchFolder() {
-    std::error_code error;
-    fs::remove_all(path_, error);
-  }
-  const fs::path& path() const { return path_; }
-
- private:
-  fs::path path_;
-};
-
 std::string compiled(const MethodArguments& args, const fs::path& folder, const std::string& profile) {
   CompileRequest request;
   request.input = args.input;
@@ -102,17 +83,12 @@ std::string compiled(const MethodArguments& args, const fs::path& folder, const 
   return request.output;
 }
 
+/// What `plan` asks with these options, and with --policy thesis where the system is the printed one.
 DeliveryRequest method_request(const MethodArguments& args, const System& system, double displayed_px) {
-  DeliveryRequest r;
-  r.displayed_px = displayed_px;
-  r.time_limit_s = parse_duration(args.time, "--time");
-  if (!(r.time_limit_s > 0)) throw UsageError("study method: --time", "", "a time above 0", args.time);
-  const bool bare = args.rtt.find_first_not_of("0123456789.") == std::string::npos;
-  r.network.rtt_s = parse_duration(bare ? args.rtt + "ms" : args.rtt, "--rtt");
-  r.network.link = BandwidthTrace::constant(parse_bandwidth(args.bandwidth, "--bandwidth"));
-  r.htc.policy = Policy::kGuard;
-  r.htc.throughput.estimator = Estimator::kLast;
-  return system.printed ? as_printed(r) : r;
+  DeliveryArguments delivery = args.delivery;
+  delivery.display_px = displayed_px;
+  if (system.printed) delivery.policy = "thesis";
+  return delivery_request(delivery);
 }
 
 void play_bursts(PackageReader& package, DeliveryRequest request, double mean_bytes_s, MethodRow& row) {
@@ -230,7 +206,7 @@ int study_method_of(const MethodArguments& args) {
     throw UsageError("study method: --thesis", "", "a package in front of it", args.input);
   if (!package && !args.against.empty())
     throw UsageError("study method: --against", "", "a package in front of it", args.input);
-  const ScratchFolder scratch;
+  const ScratchFolder scratch("texmesh-method");
   std::vector<SystemFigures> all;
   for (const System& system : systems_of(args, scratch.path())) all.push_back(figures_of(args, system));
   std::cout << (args.json ? method_json(all).dump() + "\n" : method_text(all));
@@ -250,11 +226,12 @@ void add_method_arguments(Command& c, MethodArguments& args) {
       .separated_by(',')
       .integer_in(16, 2048)
       .shows_default();
-  c.option("--time", args.time, "Time limit from the first request on").value_name("TIME").shows_default();
-  c.option("--bandwidth", args.bandwidth, "Throughput of the link; the mean of the bursty ones")
+  add_time_option(c, args.delivery);
+  args.delivery.bandwidth = "2Mbit/s";
+  c.option("--bandwidth", args.delivery.bandwidth, "Throughput of the link; the mean of the bursty ones")
       .value_name("RATE")
       .shows_default();
-  c.option("--rtt", args.rtt, "Round trip: 40 or 40ms are milliseconds").value_name("TIME").shows_default();
+  add_rtt_option(c, args.delivery);
   c.option("--views", args.views, "Directions that are rendered").integer_in(1, 64).shows_default();
   add_jobs_option(c, args.jobs);
   add_cache_options(c, args.cache);

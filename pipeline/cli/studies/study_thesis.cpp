@@ -1,7 +1,5 @@
 // texmesh study thesis: the thesis's tables and figures, measured again.
-#include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -10,8 +8,8 @@
 #include "pipeline/cli/options/common_options.h"
 #include "pipeline/cli/studies/studies.h"
 #include "pipeline/io/exit_codes.h"
-#include "pipeline/io/new_folder.h"
-#include "pipeline/report/html.h"
+#include "pipeline/io/text_bytes.h"
+#include "pipeline/report/report_folder.h"
 #include "pipeline/thesis/exhibits.h"
 
 namespace texmesh {
@@ -31,24 +29,16 @@ std::vector<std::string> all_exhibit_ids() {
   return ids;
 }
 
-bool is_exhibit_page(const std::filesystem::path& folder) {
-  std::ifstream page(folder / "index.html", std::ios::binary);
-  std::string head(kReportFirstLine.size(), '\0');
-  page.read(head.data(), static_cast<std::streamsize>(head.size()));
-  return page && head == kReportFirstLine;
-}
-
 void write_page(const std::vector<Exhibit>& exhibits, const std::string& target) {
-  NewFolder folder(target, {true, is_exhibit_page, "a new folder, or one of an earlier page",
-                            "a folder of an earlier page or report"});
-  const std::string page = exhibits_html(exhibits);
-  folder.add("index.html", {reinterpret_cast<const std::uint8_t*>(page.data()), page.size()});
+  NewFolder folder(target, report_folder_rule());
+  folder.add(kReportPage, text_bytes(exhibits_html(exhibits)));
   for (const Exhibit& e : exhibits)
     for (const ExhibitPicture& p : e.pictures) folder.add(p.file, p.png);
   folder.publish();
 }
 
 int run_thesis(const ThesisArguments& args) {
+  if (!args.folder.empty()) NewFolder(args.folder, report_folder_rule());  // not after the work
   const std::vector<Exhibit> exhibits = make_exhibits(args.exhibits, context_of(args.jobs));
   if (!args.folder.empty()) write_page(exhibits, args.folder);
   if (args.json) {
@@ -57,7 +47,7 @@ int run_thesis(const ThesisArguments& args) {
     for (std::size_t k = 0; k < exhibits.size(); ++k)
       std::cout << (k ? "\n" : "") << exhibit_text(exhibits[k]);
   } else {
-    std::cout << (std::filesystem::path(args.folder) / "index.html").string() << '\n';
+    std::cout << (std::filesystem::path(args.folder) / kReportPage).string() << '\n';
   }
   return kExitOk;
 }

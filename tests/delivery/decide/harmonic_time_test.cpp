@@ -1,4 +1,4 @@
-// The plan of Harmonic Time Compensation: identities, limits, orders, policies, windows, upgrades.
+// The plan of Harmonic Time Compensation: identities, limits, orders, policies, windows.
 #include "delivery/cpp/decide/harmonic_time.h"
 
 #include <gtest/gtest.h>
@@ -9,28 +9,14 @@
 #include <stdexcept>
 
 #include "delivery/cpp/decide/htc_theorem.h"
-#include "delivery/cpp/decide/upgrades.h"
 #include "delivery/cpp/simulate/simulation.h"
+#include "tests/delivery/decide/some_offers.h"
 
 namespace texmesh {
 namespace {
 
-/// n fragments with falling eta; rungs of 100, 200, 400 .. bytes times a size of their own.
-std::vector<FragmentOffer> some_offers(std::size_t n, std::uint64_t seed = 1) {
-  TraceRandom random(seed);
-  std::vector<FragmentOffer> offers(n);
-  for (FragmentOffer& f : offers) {
-    const double size = 0.5 + random.uniform();
-    f.eta = random.uniform();
-    f.loss.push_back(1);
-    for (int r = 0; r < 8; ++r) {
-      f.bytes.push_back(static_cast<std::uint32_t>(100 * size * (1 << r)));
-      f.loss.push_back(0.5 / (1 << r));
-    }
-    f.planned_bytes = 800 * size;
-  }
-  return offers;
-}
+using testing::some_offers;
+
 double planned(const std::vector<FragmentOffer>& offers) {
   double sum = 0;
   for (const FragmentOffer& f : offers) sum += f.planned_bytes;
@@ -345,53 +331,6 @@ TEST(HarmonicTime, RefusesWhatItCannotPlan) {
   const std::uint32_t first = plan.next(0)->offer;
   plan.completed(first, 1);
   EXPECT_THROW(plan.completed(first, 2), std::invalid_argument);
-}
-
-TEST(HarmonicTime, UpgradesGoByGainPerByteAndEndAtTheTop) {
-  const std::vector<FragmentOffer> offers = some_offers(30);
-  std::vector<std::int32_t> rungs(30);
-  for (std::size_t i = 0; i < 30; ++i) rungs[i] = static_cast<std::int32_t>(i % 9) - 1;
-  for (const bool incremental : {false, true}) {
-    std::vector<std::int32_t> now = rungs;
-    for (const Upgrade& u : upgrades_in_order(offers, rungs, incremental)) {
-      EXPECT_GT(u.rung, now[u.offer]);
-      std::uint64_t bytes = 0;
-      for (std::int32_t r = incremental ? now[u.offer] + 1 : u.rung; r <= u.rung; ++r)
-        bytes += offers[u.offer].bytes[static_cast<std::size_t>(r)];
-      EXPECT_EQ(u.bytes, bytes);
-      now[u.offer] = u.rung;
-    }
-    for (const std::int32_t r : now) EXPECT_EQ(r, 7);
-  }
-}
-
-TEST(Throughput, Estimators) {
-  ThroughputOptions o;
-  o.initial_bytes_s = 100;
-  for (const Estimator e : {Estimator::kLast, Estimator::kHarmonic, Estimator::kEwma}) {
-    o.estimator = e;
-    EXPECT_EQ(Throughput(o).bytes_s(), 100);
-  }
-  o.estimator = Estimator::kHarmonic;
-  o.samples = 2;
-  Throughput t(o);
-  t.add(1000, 1);
-  t.add(1000, 1);
-  t.add(3000, 1);
-  EXPECT_DOUBLE_EQ(t.bytes_s(), 2000);
-  EXPECT_DOUBLE_EQ(t.recent_bytes_s(1), 3000);
-  EXPECT_DOUBLE_EQ(t.recent_bytes_s(100), 5000.0 / 3);
-  o.estimator = Estimator::kEwma;
-  o.ewma = 0.5;
-  o.small_bytes = 1000;
-  Throughput ewma(o);
-  ewma.add(1000, 1);
-  EXPECT_DOUBLE_EQ(ewma.bytes_s(), 550);
-  Throughput small(o);
-  small.add(100, 0.1);  // the same rate, a tenth of the weight
-  EXPECT_DOUBLE_EQ(small.bytes_s(), 145);
-  small.add(100, 0);  // no time at all is no infinite rate for ever
-  EXPECT_TRUE(std::isfinite(small.bytes_s()));
 }
 
 /// (4.1) to (4.8) by hand: four fragments, rungs so fine that every size can be had.

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 namespace texmesh {
 namespace {
 
@@ -49,6 +51,35 @@ TEST(Throughput, TheMeanOfATimeCutsTransfersWhereItBegins) {
   EXPECT_DOUBLE_EQ(t.mean_bytes_s(4), 750 / 4.0);
   EXPECT_DOUBLE_EQ(t.mean_bytes_s(8), (750 + 4 * 1000) / 8.0);  // before the first: beta_0
   EXPECT_GE(t.mean_bytes_s(1e-300), 0);
+}
+
+TEST(Throughput, Estimators) {
+  ThroughputOptions o;
+  o.initial_bytes_s = 100;
+  for (const Estimator e : {Estimator::kLast, Estimator::kHarmonic, Estimator::kEwma}) {
+    o.estimator = e;
+    EXPECT_EQ(Throughput(o).bytes_s(), 100);
+  }
+  o.estimator = Estimator::kHarmonic;
+  o.samples = 2;
+  Throughput t(o);
+  t.add(1000, 1);
+  t.add(1000, 1);
+  t.add(3000, 1);
+  EXPECT_DOUBLE_EQ(t.bytes_s(), 2000);
+  EXPECT_DOUBLE_EQ(t.recent_bytes_s(1), 3000);
+  EXPECT_DOUBLE_EQ(t.recent_bytes_s(100), 5000.0 / 3);
+  o.estimator = Estimator::kEwma;
+  o.ewma = 0.5;
+  o.small_bytes = 1000;
+  Throughput ewma(o);
+  ewma.add(1000, 1);
+  EXPECT_DOUBLE_EQ(ewma.bytes_s(), 550);
+  Throughput small(o);
+  small.add(100, 0.1);  // the same rate, a tenth of the weight
+  EXPECT_DOUBLE_EQ(small.bytes_s(), 145);
+  small.add(100, 0);  // no time at all is no infinite rate for ever
+  EXPECT_TRUE(std::isfinite(small.bytes_s()));
 }
 
 }  // namespace

@@ -28,7 +28,15 @@ TEST(FragmentExhibits, TablesOfSizes) {
       ++rows_of_one;
       EXPECT_EQ(number_at(cut, 0, k, 5), 1) << "one fragment is the file";
     }
-  EXPECT_EQ(rows_of_one, 4u);
+  EXPECT_EQ(rows_of_one, 5u);
+  const auto& rows = cut.tables[0].rows;
+  EXPECT_EQ(rows.size(), 5u * (5 + 6));
+  EXPECT_EQ(std::get<std::string>(rows.back()[0]), "4096");
+  for (std::size_t k = 0; k < rows.size(); ++k)
+    for (std::size_t other = 0; other < k; ++other)
+      EXPECT_FALSE(rows[k][0] == rows[other][0] && number_at(cut, 0, k, 1) == number_at(cut, 0, other, 1) &&
+                   number_at(cut, 0, k, 3) == number_at(cut, 0, other, 3))
+          << "a row stands there twice: " << k;
 }
 
 }  // namespace

@@ -2,121 +2,12 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <cmath>
-
-#include "format/documents/manifest.h"
-#include "format/rules/picture_prediction.h"
-#include "stages/base/run_context.h"
-#include "stages/image/decode_image.h"
-#include "stages/image/png_writer.h"
-#include "stages/ladder/ladder.h"
-#include "stages/lut/lut.h"
-#include "stages/previews/previews.h"
-#include "stages/zim/zim.h"
-#include "tests/support/all_rungs.h"
-#include "tests/support/meshes.h"
+#include "tests/stages/quality/quality_samples.h"
 
 namespace texmesh {
 namespace {
 
-/// A mesh of one textured material, coarser scales by leaving out vertices of the grid (not nested by
-/// collapses; the stage asks for triangles only), a texture of waves and grain, and a ladder made by the real
-/// encoder.
-struct Sample {
-  NestedScales scales;
-  PerceptualValues perceptual;
-  std::vector<Material> materials{Material{}};
-  std::vector<Image> images;
-  Fragments fragments;
-  std::vector<Pixels> pixels;
-  Ladder ladder;
-  Previews previews;
-  PackageTables tables;
-};
-
-// The sheet of n x n quads seen only at every `step`-th row and column.
-NestedScale every(int n, int step, int number) {
-  NestedScale s;
-  s.scale = number;
-  auto at = [&](int i, int j) { return static_cast<std::uint32_t>(j * (n + 1) + i); };
-  for (int j = 0; j < n; j += step)
-    for (int i = 0; i < n; i += step) {
-      s.triangles.push_back({at(i, j), at(i + step, j), at(i + step, j + step)});
-      s.triangles.push_back({at(i, j), at(i + step, j + step), at(i, j + step)});
-    }
-  s.triangle_source.assign(s.triangles.size(), 0);
-  return s;
-}
-
-/// The pixels without what pads them to whole fragments.
-Image image_of(const TexturePlane& plane, const Pixels& pixels) {
-  Pixels out{plane.width_px, plane.height_px, pixels.channels, {}};
-  for (std::uint32_t y = 0; y < plane.height_px; ++y)
-    out.data.insert(out.data.end(), pixels.at(0, y), pixels.at(plane.width_px - 1, y) + pixels.channels);
-  return probe_image("texture.png", write_png(out), {});
-}
-
-/// What the stages before this one make of planes and pixels, whose images look the same.
-void encode(Sample& s) {
-  const RunContext context;
-  s.images.clear();
-  for (std::size_t p = 0; p < s.pixels.size(); ++p)
-    s.images.push_back(image_of(s.fragments.planes[p], s.pixels[p]));
-  s.previews = make_previews(s.fragments, s.pixels, {}, context);
-  s.ladder = encode_ladder(s.fragments, s.pixels, s.previews, {}, testing::all_rungs(), context);
-  s.tables = build_tables(s.fragments, s.pixels, predict_quality(s.fragments, s.pixels, {}, context),
-                          s.ladder, s.previews, {}, context)
-                 .tables;
-}
-
-Sample sample_sheet(bool textured) {
-  Sample s;
-  constexpr int kQuads = 32;
-  s.scales.mesh = testing::sheet(kQuads, 0.2f);
-  for (int k = 0; k < 4; ++k) s.scales.scales.push_back(every(kQuads, 1 << k, 3 * k));
-  s.perceptual.kept = {1, 1, 0, 1};
-  s.perceptual.object_height = 1;
-  if (!textured) return s;
-
-  TexturePlane plane;
-  plane.width_px = plane.height_px = 256;
-  plane.fragment_width_px = plane.fragment_height_px = 128;
-  plane.columns = plane.rows = 2;
-  plane.coverage.assign(256 * 256 / 8, 0xff);
-  plane.covered_texels.assign(4, 128 * 128);
-  plane.surface_fraction.assign(4, 0.25f);
-  plane.features.assign(4, 1);
-  plane.eta.assign(4, 0.5f);
-  s.fragments.planes.push_back(plane);
-  s.materials[0].base_colour_texture.image = 0;
-  Pixels p{256, 256, 3, {}};
-  testing::Random random{7};
-  for (int y = 0; y < 256; ++y)
-    for (int x = 0; x < 256; ++x)
-      for (int c = 0; c < 3; ++c)
-        p.data.push_back(
-            static_cast<std::uint8_t>(90 + 60 * ((x / 8 + y / 12 + c) % 2) + 40 * random.uniform()));
-  s.pixels.push_back(std::move(p));
-  encode(s);
-  return s;
-}
-
-MeasuredQuality measure_all(const Sample& s, const QualityOptions& options, int threads = 1) {
-  RunContext context;
-  context.threads = threads;
-  return measure_quality(s.scales, s.perceptual, s.materials, s.images, s.fragments, s.pixels, s.ladder,
-                         s.previews, s.tables, options, context);
-}
-/// Small, so that tests are quick.
-QualityOptions small_options() {
-  QualityOptions options;
-  options.views = 3;
-  options.large_views = 2;
-  options.largest_px = 256;
-  return options;
-}
-QualityTable measure(const Sample& s) { return measure_all(s, small_options()).table; }
+using namespace testing;  // NOLINT: fixtures
 
 TEST(Quality, TableHasKeptScalesSizesAndGroups) {
   const QualityTable t = measure(sample_sheet(true));
@@ -299,32 +190,6 @@ TEST(Quality, GroupsAreMeasuredApart) {
   EXPECT_LT(t.groups[1].sizes[0].coarser.flip.back(), 1e-4f) << "flat stays flat";
 }
 
-TEST(Quality, PlanesThatDoNotShowLoseNothing) {
-  Sample s = sample_sheet(true);
-  std::swap(s.materials[0].base_colour_texture, s.materials[0].normal_texture);
-  s.fragments.planes[0].role = TextureRole::kNormal;
-  encode(s);
-  const QualityTable normals = measure(s);
-  ASSERT_EQ(normals.groups.size(), 1u);
-  EXPECT_GT(normals.groups[0].sizes[0].preview.flip[0], 0.02f) << "bad normals must show";
-  s.materials[0].unlit = true;
-  const QualityTable unseen = measure(s);
-  ASSERT_EQ(unseen.groups.size(), 1u);
-  for (const TextureLosses& losses : unseen.groups[0].sizes)
-    for (const auto* shown : {&losses.coded, &losses.preview})
-      for (const float x : shown->flip) EXPECT_EQ(x, 0);
-}
-
-TEST(Quality, WhatIsTransparentIsNotMeasured) {
-  Sample s = sample_sheet(true);
-  s.materials[0].alpha_mode = AlphaMode::kBlend;
-  s.materials[0].base_colour = {1, 1, 1, 0};
-  const MeasuredQuality m = measure_all(s, small_options());
-  for (const PictureLosses& g : m.table.geometry)
-    for (const float x : g.flip) EXPECT_EQ(x, 0);
-  EXPECT_EQ(m.display_px_flip.back(), 256);
-}
-
 TEST(Quality, SameForAnyNumberOfThreads) {
   const Sample s = sample_sheet(true);
   const MeasuredQuality one = measure_all(s, small_options(), 1), four = measure_all(s, small_options(), 4);
@@ -351,71 +216,6 @@ TEST(Quality, OneRungOneViewAndTexturesOfOnePixelDo) {
   const QualityTable t = measure(s);
   ASSERT_EQ(t.groups.size(), 1u);
   EXPECT_FALSE(write_quality(t).empty());
-}
-
-/// Adds a triangle of that side, so far away, to all scales.
-void add_stray(Sample& s, float away, float side) {
-  Mesh& m = s.scales.mesh;
-  const auto p = static_cast<std::uint32_t>(m.positions.size()),
-             w = static_cast<std::uint32_t>(m.wedge_count());
-  for (Vec3f corner : {Vec3f{0, 0, 0}, Vec3f{side, 0, 0}, Vec3f{0, side, side}}) {
-    m.wedge_position.push_back(static_cast<std::uint32_t>(m.positions.size()));
-    m.positions.push_back(Vec3f{away, away, 0} + corner);
-    if (!m.uv0.empty()) m.uv0.push_back({0.5f, 0.5f});
-    if (!m.normals.empty()) m.normals.push_back({0, 0, 1});
-  }
-  EXPECT_EQ(m.positions.size(), p + 3);
-  for (NestedScale& scale : s.scales.scales) {
-    scale.triangles.push_back({w, w + 1, w + 2});
-    scale.triangle_source.push_back(0);
-  }
-}
-
-TEST(Quality, AStrayTriangleFarAwayChangesLittle) {
-  const Sample alone = sample_sheet(false);
-  const MeasuredQuality want = measure_all(alone, small_options());
-  EXPECT_TRUE(want.notes.empty());
-  for (float away : {300.f, 1e5f}) {
-    SCOPED_TRACE(away);
-    Sample s = alone;
-    add_stray(s, away, 0.02f);
-    s.perceptual.object_height = away;
-    const MeasuredQuality m = measure_all(s, small_options());
-    EXPECT_GT(m.table.geometry[0].flip.back(), 0.3f * want.table.geometry[0].flip.back());
-    ASSERT_EQ(m.notes.size(), 1u);
-    EXPECT_EQ(m.notes[0].code, "far-outliers");
-    EXPECT_NE(m.notes[0].text.find("the 3 of "), std::string::npos) << m.notes[0].text;
-  }
-}
-
-TEST(Quality, WhatNoPictureShowsCountsAsEqual) {
-  Sample thread = sample_sheet(false);
-  for (Vec3f& p : thread.scales.mesh.positions) p = {1e-7f * p.x, p.y, 1e-7f * p.z};
-  Sample specks = sample_sheet(false);
-  specks.scales.scales.resize(2);
-  specks.perceptual.kept.resize(2);
-  for (NestedScale& scale : specks.scales.scales) scale.triangles.clear(), scale.triangle_source.clear();
-  specks.scales.mesh = Mesh{};
-  specks.scales.mesh.triangle_material = {0};
-  specks.scales.mesh.triangle_part = {0};
-  add_stray(specks, 1000, 0.01f);
-  add_stray(specks, -1000, 0.01f);
-  for (const Sample* s : {&thread, &specks}) {
-    const MeasuredQuality m = measure_all(*s, small_options());
-    for (const PictureLosses& g : m.table.geometry)
-      for (float x : g.flip) EXPECT_EQ(x, 0.f);
-    EXPECT_EQ(m.display_px_flip.back(), 256);
-    ASSERT_EQ(m.notes.size(), 1u);
-    EXPECT_EQ(m.notes[0].code, "quality-not-measured");
-  }
-}
-
-TEST(Quality, NothingToLookAtIsAnError) {
-  Sample s = sample_sheet(false);
-  for (Vec3f& p : s.scales.mesh.positions) p = {1, 2, 3};
-  EXPECT_THROW(measure(s), StageError);
-  s.scales.mesh.positions.clear();
-  EXPECT_THROW(measure(s), StageError);
 }
 
 }  // namespace
