@@ -107,6 +107,11 @@ TEST_F(SecondReader, FindsNothingInGoldenPackages) {
   }
 }
 
+TEST_F(SecondReader, FindsNothingInTheGoldenTree) {
+  const CommandResult result = check({(kSource / "tests" / "golden" / "v2.0-tree").string()});
+  EXPECT_EQ(result.exit_code, 0) << result.output;
+}
+
 TEST_F(SecondReader, DecodesVerticesBitForBit) {
   for (const std::string& path : golden_packages()) {
     PackageReader package(open_store(path));
