@@ -741,7 +741,7 @@ class CheckedModel(Model):
             if "source" in t:
                 decode_source(self.whole(f"source/{plane:03}.{t['source']}"), t, plane)
             if t["codec"] != "webp":
-                streams = self.table_streams(plane)
+                streams = self.pack(plane, "tables", "R12", self.tables[plane]["tables"])
                 for stream in streams:
                     check_jpeg_head(stream, f"table stream of plane {plane}")
                 if t.get("sourceRung"):

@@ -95,12 +95,10 @@ def read_pages(data, m, name, magic, code, rules):
     require([major, minor] == [m["version"]["major"], m["version"]["minor"]], "R01", f"version of {name}")
     require(count <= (len(data) - 16) // struct.calcsize("<" + code), head.rule, f"{count} records")
     records, pages = [head.get(code) for _ in range(count)], []
-    expected = m[name]["headBytes"], m[name]["headSha256"]
-    require((head.at, sha(data[: head.at])) == expected, "R02", f"head of {name}")
+    require((head.at, sha(data[: head.at])) == (m[name]["headBytes"], m[name]["headSha256"]), "R02", name)
     for *record, size, digest in records:
         pages.append((*record, Cursor(head.raw(size), rules[3], f"page {len(pages)} of {name}")))
-        good = hashlib.sha256(pages[-1][-1].data).digest() == digest
-        require(good, rules[2], f"digest of page {len(pages)} of {name}")
+        require(hashlib.sha256(pages[-1][-1].data).digest() == digest, rules[2], f"digest of {name}'s page")
     head.finish()
     return number, pages
 
@@ -205,8 +203,7 @@ class Model:
         m, major = self.manifest, self.manifest["version"]["major"]
         require(m.get("format") == "texmesh", "M01", "format")
         require(major == 2, "W03", f"format {major} is not known; a model of format 1: compile again")
-        unknown = set(m["requiredFeatures"]) - {"codec-jpeg-progressive", "codec-webp"}
-        require(not unknown, "M02", f"unknown features {unknown}")
+        require(set(m["requiredFeatures"]) <= {"codec-jpeg-progressive", "codec-webp"}, "M02", "features")
         self.check("manifest")
         data = self.read("index.bin", m["index"]["offset"], m["index"]["bytes"])
         require(sha(data) == m["index"]["sha256"], "R03", "digest of index.bin")
@@ -241,9 +238,6 @@ class Model:
         require(len(data) == sizes.sum(dtype=np.int64), rule, f"bytes of {name}.pack of plane {plane}")
         return cut(data, sizes)
 
-    def table_streams(self, plane):
-        return self.pack(plane, "tables", "R12", self.tables[plane]["tables"])
-
     def preview(self, plane):
         t = self.textures[plane]
         data = self.entry(f"preview/{t.get('base', plane):03}.jpg")
@@ -252,8 +246,9 @@ class Model:
     def fragments(self, plane, rung):
         """(fragment, image) of every listed fragment."""
         texture, t, streams = self.textures[plane], self.tables[plane], []
-        head = self.table_streams(plane)[0 if t["incremental"] else rung]
-        for r in range(0 if t["incremental"] else rung, rung + 1):
+        first = 0 if t["incremental"] else rung
+        head = self.pack(plane, "tables", "R12", t["tables"])[first]
+        for r in range(first, rung + 1):
             streams.append(self.pack(plane, f"r{r:02}", "R13", t["size"][r]))
             digests = [hashlib.sha256(stream).digest()[:8] for stream in streams[-1]]
             require(b"".join(digests) == t["digest"][r].tobytes(), "F03", f"digests of rung {r}")
@@ -314,10 +309,7 @@ class Bits:
         return bit
 
     def raw(self, count):
-        value = 0
-        for _ in range(count):
-            value = 2 * value + self.decide(2048)
-        return value
+        return sum(self.decide(2048) << k for k in reversed(range(count)))
 
 
 class Values(Bits):
@@ -345,9 +337,6 @@ class Values(Bits):
         v = (v << left) + self.raw(left)
         return 0 if at == 0 else -v if self.raw(1) else v
 
-    def same(self):
-        return self.is_there and self.bit(self.models[116])
-
     def value(self, guess, bits):
         most = (1 << bits) - 1
         return [clamp(g, 0, most) + (self.is_there and self.residual(c)) & most for c, g in enumerate(guess)]
@@ -360,10 +349,8 @@ class Splits:
         self.data, self.head_bytes = data, ref["headBytes"]
         self.read_head(Cursor(data, "S08", "the head of the stream"))
         require(sha(data[: self.head_bytes]) == ref["headSha256"], "R02", "headSha256 of the stream")
-        self.bits = self.kinds[0][1]
         self.places, self.around, self.point_of, self.values = [], [], [], []
-        self.wedge_of, self.groups_of, self.old, self.targets = [], [], {}, []
-        self.fresh = []  # FRESH; what stands in it is pending
+        self.wedge_of, self.groups_of, self.old, self.targets, self.fresh = [], [], {}, [], []
         self.last, self.steps, self.parent, self.child = 0, 0, None, None
         self.models = collections.defaultdict(lambda: [32768, 0])
 
@@ -397,8 +384,7 @@ class Splits:
         self.starts = c.array("u1", attributes + 1, 117).tolist()
         require(blocks <= len(c.data) // (attributes + 11), "S08", f"{blocks} blocks")
         for _ in range(blocks):
-            code, *parts = [c.varint() for _ in range(attributes + 3)]
-            count, is_patch = code >> 1, code & 1
+            (count, is_patch), *parts = divmod(c.varint(), 2), *(c.varint() for _ in range(attributes + 2))
             good = count >= 1 and (is_patch or count <= 4096) and sum(parts) >= count // 64
             require(good, "S07", "count of a block, or too few bytes for it")
             self.blocks.append((is_patch, count, parts, c.raw(8)))
@@ -418,15 +404,13 @@ class Splits:
 
     def step(self, count):
         self.steps += count
-        points, wedges, faces = len(self.places), len(self.point_of), len(self.groups_of)
-        require(self.steps <= (1 << 20) + 256 * (points + faces), "S20", "too many steps")
-        most = self.scales[-1]
-        good = points <= most["points"] and wedges <= most["wedges"] and faces <= most["faces"]
-        require(good, "S19", "too many points, wedges or faces")
+        made = {"points": len(self.places), "wedges": len(self.point_of), "faces": len(self.groups_of)}
+        require(all(made[n] <= self.scales[-1][n] for n in made), "S19", "too many points, wedges or faces")
+        require(self.steps <= (1 << 20) + 256 * (made["points"] + made["faces"]), "S20", "too many steps")
 
     def new_point(self, guess=None):
         self.around.append([])
-        self.places.append(self.parts[0].value(guess, self.bits) if guess else [0, 0, 0])
+        self.places.append(self.parts[0].value(guess, self.kinds[0][1]) if guess else [0, 0, 0])
         return len(self.places) - 1
 
     def new_wedge(self, point, copied=None):
@@ -524,7 +508,7 @@ class Splits:
             x = self.index(len(self.places), v, u)
             self.finish(x, self.connectivity.raw(1), None, None, None)
         near = [self.places[self.p(h, k)] for h in self.around[u] for k in (1, 2)]
-        self.places[u] = self.parts[0].value(mean(near or [self.places[v]]), self.bits)
+        self.places[u] = self.parts[0].value(mean(near or [self.places[v]]), self.kinds[0][1])
         self.fresh_wedges()
         self.parent = self.child = None
         return u
@@ -550,8 +534,8 @@ class Splits:
         found = known if self.b("target_expected", known is not None) else next(offered, None)
         if found is None:
             stays = any(w == wedge for h, w in self.old.items() if h not in self.moving)
-            is_copied = self.b("target_copied", stays)
-            found = self.new_wedge(self.child, list(self.values[wedge]) if is_copied else None)
+            copied = list(self.values[wedge]) if self.b("target_copied", stays) else None
+            found = self.new_wedge(self.child, copied)
         self.mapped.setdefault(wedge, found)
         return found
 
@@ -646,6 +630,7 @@ class Splits:
     # 11.9
 
     def fresh_wedges(self):
+        """What stands in FRESH is pending."""
         while self.fresh:
             w = self.fresh[0]
             corners = self.around[self.point_of[w]]
@@ -655,7 +640,7 @@ class Splits:
             beside = [n for n in beside if n not in self.fresh]
             for k, (kind, bits, _) in enumerate(self.kinds[1:]):
                 part = self.parts[k + 1]
-                if twin is not None and part.same():
+                if twin is not None and part.is_there and part.bit(part.models[116]):
                     self.values[w][k] = list(self.values[twin][k])
                     continue
                 if not beside and (twin is not None or self.parent is not None):
@@ -756,8 +741,7 @@ def run(options):
 
 
 def main():
-    form = argparse.RawDescriptionHelpFormatter
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=form)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("command", choices=("info", "picture", "mesh"))
     parser.add_argument("package")
     parser.add_argument("--plane", type=int, default=0)
@@ -768,10 +752,9 @@ def main():
     options = parser.parse_args()
     try:
         run(options)
-    except (Refused, OSError) as error:
-        sys.exit(f"{options.package}: refused: {error}")
-    except (KeyError, IndexError, TypeError, ValueError) as error:  # a field is missing, or of another type
-        sys.exit(f"{options.package}: refused: J04: {error!r}")
+    except (Refused, OSError, KeyError, IndexError, TypeError, ValueError) as error:
+        is_told = isinstance(error, (Refused, OSError))  # else a field is missing, or of another type
+        sys.exit(f"{options.package}: refused: {error if is_told else f'J04: {error!r}'}")
 
 
 if __name__ == "__main__":
