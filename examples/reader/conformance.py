@@ -1,18 +1,23 @@
-"""Rules of format/SPEC.md that a viewer need not check: the container byte for byte, documents field by field, what GLBs and
-heads of JPEGs say. `texmesh_reader.py verify` runs them over whole packages. A breach raises Refused with the rule's name."""
+#!/usr/bin/env python3
+"""Rules of format/SPEC.md over every byte: the container, documents field by field, what GLBs and heads of JPEGs say.
+
+  conformance.py PACKAGE...      says of each package which rule the package breaks first, by the rule's name
+"""
 import io
 import json
 import os
 import re
 import struct
+import sys
 import zlib
 
 import numpy as np
 from PIL import Image
 
-from texmesh_reader import CREDENTIAL, MAX32, Cursor, Model, Refused, decode_image, is_path, parse_json, require, rises, sha
+from texmesh_reader import MAX32, PATH, Cursor, Model, Refused, decode_image, parse_json, require, rises, sha
 
 MAX16 = 0xFFFF
+CREDENTIAL = "META-INF/content_credential.c2pa"
 CODEC_FEATURE = {"jpeg": None, "jpeg-progressive": "codec-jpeg-progressive", "webp": "codec-webp"}
 GROUPS = ("colour", "normal", "data")
 
@@ -94,7 +99,7 @@ def list_container(name):
                 more.raw(4)
                 bytes_ = more.get("QQ")[0] if bytes_ == MAX32 else bytes_
                 header = more.get("Q") if header == MAX32 else header
-            require(is_path(path), "K05", f"path {path!r}")
+            require(path == CREDENTIAL or PATH.fullmatch(path), "K05", f"path {path!r}")
             require(path not in entries, "K06", f"{path} twice")
             found, expected = directory.data[begin : directory.at], central_header(path, bytes_, crc, header)
             rule = "K08" if found[30:32] != expected[30:32] else "K09" if fields[1] == fields[2] == 45 else "K02"
@@ -636,7 +641,8 @@ def check_thesis(data, m, textures, tables=None):
             stored = [middle[k] for k in m["scales"]["scale"]]
             require(tables is None or stored == tables[plane]["middle"].tolist(), "O06", f"Q of plane {plane}")
             require(((middle >= 0) & (middle <= 100)).all(), "O05", "Q")
-            totals = s.whole(width, scales * 21)
+            digits = s.array("u1", scales * 21, width).astype(np.uint64)
+            totals = (digits << (8 * np.arange(width, dtype=np.uint64))).sum(axis=1, dtype=np.uint64)
             require(width == max(1, (int(totals.max()).bit_length() + 7) // 8), "O05", "width of D")
             require(totals.max() <= 2**53, "O05", "D")
         s.finish()
@@ -660,29 +666,27 @@ def decode_source(data, t, plane):
 class CheckedModel(Model):
     """Reads as texmesh_reader.py does, and checks everything on the way."""
 
+    parse = staticmethod(parse_strictly)
+
     def __init__(self, name):
+        self.listing = list_tree(name) if os.path.isdir(name) else list_container(name)
+        require("index.bin" in self.listing, "E01", "no entry index.bin")
         super().__init__(name)
         for t, texture in zip(self.tables, self.textures):
             check_section(t, texture)
 
-    def open(self, name):
-        self.listing = list_tree(name) if os.path.isdir(name) else list_container(name)
-        require("index.bin" in self.listing, "E01", "no entry index.bin")
-        return super().open(name)
-
-    def parse(self, data, most, what):
-        return parse_strictly(data, most, what)
-
     def whole(self, path):
         """The bytes of an entry where the container has it."""
         require(path in self.listing, "E01", f"no entry {path}")
-        return self.package.read(path, *self.listing[path][:2])
+        return self.read(path, *self.listing[path][:2])
 
-    def check_manifest(self):
-        check_manifest(self.manifest)
-
-    def check_index(self):
-        self.check_references()
+    def check(self, document):
+        if document == "manifest":
+            check_manifest(self.manifest)
+        elif document == "index":
+            self.check_references()
+        else:
+            self.check_textures()
 
     def check_textures(self):
         check_planes(self.textures, self.manifest)
@@ -721,7 +725,7 @@ class CheckedModel(Model):
         known = set(needed_paths(m, self.textures)) | set(places)
         for path in self.listing:
             require(path in known or m["version"]["minor"] > 0, "E03", f"unknown entry {path}")
-        if not self.package.is_tree:
+        if not self.is_tree:
             check_entry_order(list(self.listing), m, self.textures)
         read_quality(self.whole("quality.json"), m, self.textures)
         read_about(self.whole("about.json"), m)
@@ -737,7 +741,7 @@ class CheckedModel(Model):
             if "source" in t:
                 decode_source(self.whole(f"source/{plane:03}.{t['source']}"), t, plane)
             if t["codec"] != "webp":
-                streams = self.table_streams(plane)
+                streams = self.pack(plane, "tables", "R12", self.tables[plane]["tables"])
                 for stream in streams:
                     check_jpeg_head(stream, f"table stream of plane {plane}")
                 if t.get("sourceRung"):
@@ -756,18 +760,18 @@ class CheckedModel(Model):
         check_shared(glbs, m)
 
     def verify_stream(self, materials):
-        columns, (splits, data) = self.manifest["scales"], self.stream()
-        last = self.manifest["stream"]["headBytes"] + sum(sum(b["parts"]) for b in splits.head["blocks"])
-        require(last == len(data), "S08", "the last block does not end with the stream")
-        require(all(g[0] < max(1, materials) for g in splits.head["groups"]), "S23", "a material that the GLBs lack")
-        for end in splits.scale_ends(data):
+        columns, splits = self.manifest["scales"], self.stream()
+        last = splits.head_bytes + sum(sum(sizes) for _, _, sizes, _ in splits.blocks)
+        require(last == len(splits.data), "S08", "the last block does not end with the stream")
+        require(all(g[0] < max(1, materials) for g in splits.groups), "S23", "a material that the GLBs lack")
+        for end in splits.scale_ends():
             require(end["scale"] in columns["scale"], "S21", f"scale {end['scale']} of the stream")
             k = columns["scale"].index(end["scale"])
             require(end["triangles"] == columns["triangles"][k], "S21", f"triangles of scale {end['scale']}")
             if columns["offset"][k] == self.manifest["stream"]["offset"]:
                 require(columns["vertices"][k] == end["wedges"], "M16", f"vertices of scale {end['scale']}")
                 require(columns["bytes"][k] == end["bytes"], "M20", f"prefix of scale {end['scale']}")
-                require(columns["sha256"][k] == sha(data[: end["bytes"]]), "M17", f"prefix of scale {end['scale']}")
+                require(columns["sha256"][k] == sha(splits.data[: end["bytes"]]), "M17", f"prefix of scale {end['scale']}")
 
 
 def verify(names):
@@ -784,3 +788,7 @@ def verify(names):
             print(f"{name}: refused: J04: {error!r}")
             good = False
     return good
+
+
+if __name__ == "__main__":
+    sys.exit(0 if verify(sys.argv[1:]) else 1)

@@ -1,16 +1,17 @@
 #!/usr/bin/env python3
 """Reads texmesh packages of format 2, written from format/SPEC.md alone; rule names are those of that text.
 
-  texmesh_reader.py info PACKAGE                 what the package holds
-  texmesh_reader.py picture PACKAGE --plane P [--rung R] -o OUT.png
+  texmesh_reader.py info PACKAGE                                   digests, offsets and sizes of all entries
+  texmesh_reader.py picture PACKAGE [--plane P] [--rung R] -o OUT.png
   texmesh_reader.py mesh PACKAGE [--scale N] [--raw] -o OUT.obj
-  texmesh_reader.py verify PACKAGE...            every rule that conformance.py knows how to check
 
 PACKAGE is a container or the folder of a tree. Needs numpy and Pillow (Debian: python3-numpy python3-pil).
 """
 import argparse
+import collections
 import hashlib
 import io
+import itertools
 import json
 import os
 import re
@@ -21,7 +22,9 @@ import numpy as np
 from PIL import Image
 
 MAX32 = 0xFFFFFFFF
-CREDENTIAL = "META-INF/content_credential.c2pa"
+PATH = re.compile(r"(?!(.*/)?\.{0,2}(/|$))[a-z0-9._/-]{1,200}")  # no part is empty, . or ..
+PACK = re.compile(r"texture/(0|[1-9]\d*)/(tables|r\d\d|r[1-9]\d\d+)\.pack")
+SOI, EOI = b"\xff\xd8", b"\xff\xd9"
 
 
 class Refused(Exception):
@@ -41,6 +44,15 @@ def rises(values):
     return all(a < b for a, b in zip(values, values[1:]))
 
 
+def clamp(x, low, high):
+    return min(max(x, low), high)
+
+
+def cut(data, sizes):
+    ends = np.cumsum(sizes, dtype=np.int64).tolist()
+    return [data[end - int(size) : end] for end, size in zip(ends, sizes)]
+
+
 class Cursor:
     """Little-endian numbers, one after the other; what is missing breaks `rule`."""
 
@@ -56,128 +68,61 @@ class Cursor:
         values = struct.unpack("<" + code, self.raw(struct.calcsize("<" + code)))
         return values[0] if len(values) == 1 else values
 
-    def array(self, dtype, count):
-        return np.frombuffer(self.raw(np.dtype(dtype).itemsize * count), dtype)
-
-    def whole(self, width, count):
-        """`count` numbers of `width` bytes."""
-        digits = self.array("u1", width * count).reshape(count, width).astype(np.uint64)
-        return (digits << (8 * np.arange(width, dtype=np.uint64))).sum(axis=1, dtype=np.uint64).astype(np.int64)
+    def array(self, dtype, *shape):
+        return np.frombuffer(self.raw(np.dtype(dtype).itemsize * int(np.prod(shape))), dtype).reshape(shape)
 
     def varint(self):
-        value = shift = 0
-        while True:
-            byte = self.get("B")
-            value |= (byte & 127) << shift
-            shift += 7
-            if byte < 128:
-                require(value <= MAX32 and (byte or shift == 7), "S06", "a varint in its shortest form")
-                return value
-            require(shift < 35, "S06", "a varint below 2^32")
+        digits = [self.get("B")]
+        while digits[-1] > 127 and len(digits) < 6:
+            digits.append(self.get("B"))
+        value, is_shortest = sum((d & 127) << 7 * k for k, d in enumerate(digits)), 0 < digits[-1] < 128
+        require(value <= MAX32 and (is_shortest or digits == [0]), "S06", "a varint in its shortest form")
+        return value
 
     def finish(self):
         require(self.at == len(self.data), self.rule, f"{self.what} has further bytes")
 
 
-# Sections 2 and 4: bytes and documents ----------------------------------------------------------------
+# Sections 6 and 8: index and tables -------------------------------------------------------------------
 
 
-def is_path(path):
-    plain = len(path) <= 200 and re.fullmatch(r"[a-z0-9._/-]+", path) is not None
-    return path == CREDENTIAL or (plain and all(p not in ("", ".", "..") for p in path.split("/")))
-
-
-class Package:
-    """Bytes of a container by their offset, of a tree by their path."""
-
-    def __init__(self, name):
-        self.name, self.is_tree = name, os.path.isdir(name)
-        self.file = None if self.is_tree else open(name, "rb")
-
-    def manifest(self):
-        if self.is_tree:
-            with open(os.path.join(self.name, "manifest.json"), "rb") as file:
-                head = file.read(16385)
-            require(len(head) <= 16384, "K12", "a manifest of more than 16,384 bytes")
-            return head
-        head = self.file.read(16384)
-        require(head[:4] == b"PK\3\4" and head[30:43] == b"manifest.json", "K11", "no package")
-        end = 64 + struct.unpack("<I", head[22:26])[0]
-        require(end <= len(head), "K12", "the manifest ends beyond 16,384 bytes")
-        return head[64:end]
-
-    def read(self, path, offset, size):
-        if self.is_tree:
-            full, root = os.path.realpath(os.path.join(self.name, path)), os.path.realpath(self.name)
-            require(full.startswith(root + os.sep) and os.path.isfile(full), "E01", f"no file {path} in the tree")
-            with open(full, "rb") as file:
-                data = file.read(size + 1)
-        else:
-            self.file.seek(offset)
-            data = self.file.read(size)
-        require(len(data) == size, "I08", f"{path} has not {size} bytes")
-        return data
-
-
-def parse_json(data, most, what):
-    require(len(data) <= most, "L09", f"{what}: more than {most} bytes")
-    try:
-        document = json.loads(data.decode("utf-8"))
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-        raise Refused(f"J01: {what}: {error}") from error
-    require(isinstance(document, dict), "J01", f"{what}: not an object")
-    return document
-
-
-# Sections 6 to 8: index and tables --------------------------------------------------------------------
-
-
-def read_head(data, magic, m, letter):
-    head = Cursor(data, letter + "03" if letter == "I" else letter + "02", magic.decode())
-    require(head.raw(4) == magic, letter + "01", "magic")
-    version = head.get("HH")
-    require(version[0] == 2, "W03", f"{magic.decode()}: version {version[0]}")
-    require(version == (m["version"]["major"], m["version"]["minor"]), "R01", f"{magic.decode()}: version {version}")
-    return head
-
-
-def check_head(head, ref, what):
-    require(head.at == ref["headBytes"], "R02", f"headBytes of {what}")
-    require(sha(head.data[: head.at]) == ref["headSha256"], "R02", f"headSha256 of {what}")
-
-
-def plane_of(path):
-    found = re.fullmatch(r"texture/(0|[1-9]\d*)/(tables|r\d\d|r[1-9]\d\d+)\.pack", path)
-    return int(found[1]) if found else MAX32
+def read_pages(data, m, name, magic, code, rules):
+    """The head's last number and, for each page or section, its record of `code` and a cursor over it."""
+    head = Cursor(data, rules[1], name)
+    require(head.raw(4) == magic, rules[0], "magic")
+    major, minor, count, number = head.get("HHII")
+    require(major == 2, "W03", f"{name}: version {major}")
+    require([major, minor] == [m["version"]["major"], m["version"]["minor"]], "R01", f"version of {name}")
+    require(count <= (len(data) - 16) // struct.calcsize("<" + code), head.rule, f"{count} records")
+    records, pages = [head.get(code) for _ in range(count)], []
+    require((head.at, sha(data[: head.at])) == (m[name]["headBytes"], m[name]["headSha256"]), "R02", name)
+    for *record, size, digest in records:
+        pages.append((*record, Cursor(head.raw(size), rules[3], f"page {len(pages)} of {name}")))
+        require(hashlib.sha256(pages[-1][-1].data).digest() == digest, rules[2], f"digest of {name}'s page")
+    head.finish()
+    return number, pages
 
 
 def read_index(data, m):
     """{path: (offset, bytes, digest)}"""
-    head = read_head(data, b"TXMX", m, "I")
-    count, total = head.get("II")
-    require(1 <= count <= (len(data) - 16) // 44, "I03", "number of pages")
-    pages = [(*head.get("III"), head.raw(32)) for _ in range(count)]
-    check_head(head, m["index"], "the index")
-    planes = [page[0] for page in pages]
-    require(planes[0] == MAX32 and rises(planes[1:]) and MAX32 not in planes[1:], "I02", "planes of pages")
-    require(sum(page[1] for page in pages) == total, "I03", "number of entries")
+    total, pages = read_pages(data, m, "index", b"TXMX", "III32s", ("I01", "I03", "I04", "I04"))
+    require(pages and sum(entries for _, entries, _ in pages) == total, "I03", "number of pages or entries")
+    require(pages[0][0] == MAX32 and rises([p[0] for p in pages[1:]] + [MAX32]), "I02", "planes of pages")
     index = {}
-    for plane, entries, size, digest in pages:
-        body = head.raw(size)
-        require(hashlib.sha256(body).digest() == digest, "I04", f"digest of the page of plane {plane}")
-        page, end = Cursor(body, "I04", f"the page of plane {plane}"), 0
+    for plane, entries, page in pages:
+        end = 0
         for _ in range(entries):
-            offset, length = page.get("QQ")
-            digest = page.raw(32).hex()
-            path = page.raw(page.get("B")).decode("latin-1")
+            offset, length, digest, size = page.get("QQ32sB")
+            path = page.raw(size).decode("latin-1")
+            pack = PACK.fullmatch(path)
+            is_here = plane == (int(pack[1]) if pack else MAX32)
+            is_plain = PATH.fullmatch(path) and path not in ("manifest.json", "index.bin")
             require(offset % 64 == 0 and 0 < offset <= 2**53 >= length, "I05", f"place of {path}")
-            require(is_path(path) and plane_of(path) == plane, "I06", f"{path} on the page of plane {plane}")
-            require(path not in ("manifest.json", "index.bin", CREDENTIAL), "I06", path)
+            require(is_here and is_plain, "I06", f"{path} on the page of plane {plane}")
             require(path not in index and offset > end, "I07", f"order of {path}")
-            end, index[path] = offset + length, (offset, length, digest)
+            end, index[path] = offset + length, (offset, length, digest.hex())
         if m["version"]["minor"] == 0:
             page.finish()
-    head.finish()
     places = sorted(index.values())
     require(all(a[0] + a[1] < b[0] for a, b in zip(places, places[1:])), "I07", "entries overlap")
     return index
@@ -185,19 +130,10 @@ def read_index(data, m):
 
 def read_tables(data, m, textures):
     """Per plane a dict of arrays, as section 8 names them."""
-    head = read_head(data, b"TXMT", m, "T")
-    count, zero = head.get("II")
+    zero, sections = read_pages(data, m, "tables", b"TXMT", "I32s", ("T01", "T02", "T02", "T03"))
     require(zero == 0 or m["version"]["minor"], "T01", "reserved bytes of the head")
-    require(count == m["planeCount"], "R04", "number of planes in tables.bin")
-    sections = [(head.get("I"), head.raw(32)) for _ in range(count)]
-    check_head(head, m["tables"], "the tables")
-    planes = []
-    for p, (size, digest) in enumerate(sections):
-        body = head.raw(size)
-        require(hashlib.sha256(body).digest() == digest, "T02", f"digest of section {p}")
-        planes.append(read_section(Cursor(body, "T03", f"section {p}"), textures[p], m))
-    head.finish()
-    return planes
+    require(len(sections) == m["planeCount"], "R04", "number of planes in tables.bin")
+    return [read_section(section, texture, m) for (section,), texture in zip(sections, textures)]
 
 
 def read_section(c, texture, m):
@@ -212,35 +148,39 @@ def read_section(c, texture, m):
     t = {"incremental": flags & 1, "widths": (ws, wf), "parameters": c.array("<f4", 4)}
     listed = c.get("I")
     require(listed <= columns * rows, "T03", f"{listed} listed fragments")
-    rest = 2 * listed + r * 5 + k * 3 + r * listed * (ws + 12) + listed * 10 + n * listed * wf + n * 4
-    rest += 2 * listed * (allocation == 3)
-    require(len(c.data) >= c.at + rest and (is_new or len(c.data) == c.at + rest), "T03", f"{len(c.data)} bytes")
-    t |= {"order": c.array("<u2", listed), "quality": c.array("u1", r), "tables": c.array("<u4", r),
-          "knots": c.array("u1", k), "positions": c.array("<u2", k),
-          "size": c.whole(ws, r * listed).reshape(r, listed),
-          "digest": c.array("u1", r * listed * 8).reshape(r, listed, 8),
-          "mse": c.array("<u2", r * listed), "dssim": c.array("<u2", r * listed), "preview": c.array("<u2", listed),
-          "covered": c.array("<u4", listed), "surface": c.array("<f4", listed),
-          "features": c.whole(wf, n * listed).reshape(n, listed), "middle": c.array("<f4", n),
-          "vqp": c.array("<u2", listed if allocation == 3 else 0)}
-    require(listed == len(set(t["order"].tolist())) and (t["order"] < columns * rows).all(), "T05", "order")
+    layout = {"order": ("<u2", listed), "quality": ("u1", r), "tables": ("<u4", r), "knots": ("u1", k)}
+    layout |= {"positions": ("<u2", k), "size": ("u1", r, listed, ws), "digest": ("V8", r, listed)}
+    layout |= {"mse": ("<u2", r * listed), "dssim": ("<u2", r * listed), "preview": ("<u2", listed)}
+    layout |= {"covered": ("<u4", listed), "surface": ("<f4", listed), "features": ("u1", n, listed, wf)}
+    layout |= {"middle": ("<f4", n), "vqp": ("<u2", listed * (allocation == 3))}
+    rest = len(c.data) - c.at - sum(np.dtype(d).itemsize * int(np.prod(s)) for d, *s in layout.values())
+    require(rest == 0 or (is_new and rest > 0), "T03", f"{rest} bytes too many")
+    t |= {name: c.array(*form) for name, form in layout.items()}
+    for name in ("size", "features"):  # little-endian numbers of ws or wf bytes
+        t[name] = (t[name].astype(np.int64) << 8 * np.arange(t[name].shape[-1])).sum(axis=-1)
+    require(listed == len(np.unique(t["order"])) and (t["order"] < columns * rows).all(), "T05", "order")
     require((t["size"] > 0).all(), "T06", "a size of 0")
     return t
 
 
-# Section 9: fragments and pictures --------------------------------------------------------------------
+# Sections 2, 4, 5, 7 and 9: bytes, documents, pictures ------------------------------------------------
 
 
-def cut(data, sizes):
-    ends = np.cumsum(sizes.astype(np.int64)).tolist()
-    return [data[end - size : end] for end, size in zip(ends, sizes.tolist())]
+def parse_json(data, most, what):
+    require(len(data) <= most, "L09", f"{what}: more than {most} bytes")
+    try:
+        document = json.loads(data.decode("utf-8"))
+    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+        raise Refused(f"J01: {what}: {error}") from error
+    require(isinstance(document, dict), "J01", f"{what}: not an object")
+    return document
 
 
 def decode_image(data, width, height, channels, rule, what):
     try:
         image = Image.open(io.BytesIO(data), formats=("JPEG", "WEBP"))
-        require(image.size == (width, height), rule, f"{what}: {image.size}")
-        require(image.mode == ("L" if channels == 1 else "RGB"), rule, f"{what}: {image.mode}")
+        good = image.size == (width, height) and image.mode == ("L" if channels == 1 else "RGB")
+        require(good, rule, f"{what}: {image.size}, {image.mode}")
         image.load()
         return image
     except (OSError, SyntaxError, ValueError) as error:
@@ -248,80 +188,55 @@ def decode_image(data, width, height, channels, rule, what):
 
 
 class Model:
-    """A package with its documents. conformance.py fills in what the methods named check_... look for."""
+    """A package, container or tree, with its documents."""
+
+    parse = staticmethod(parse_json)
 
     def __init__(self, name):
-        self.package = self.open(name)
-        data = self.package.manifest()
+        self.name, self.is_tree = name, os.path.isdir(name)
+        data = self.read("manifest.json", 0, 16385)
+        if not self.is_tree:
+            require(data[:4] == b"PK\3\4" and data[30:43] == b"manifest.json", "K11", "no package")
+            data = data[64 : 64 + int.from_bytes(data[22:26], "little")]
+        require(64 + len(data) <= 16384, "K12", "the manifest ends beyond 16,384 bytes")
         self.id, self.manifest = sha(data), self.parse(data, 16384, "manifest.json")
-        m = self.manifest
+        m, major = self.manifest, self.manifest["version"]["major"]
         require(m.get("format") == "texmesh", "M01", "format")
-        major = m["version"]["major"]
-        require(major == 2, "W03", f"format {major} is not known; a model of format 1 has to be compiled again")
-        self.check_manifest()
-        ref = m["index"]
-        data = self.package.read("index.bin", ref["offset"], ref["bytes"])
-        require(sha(data) == ref["sha256"], "R03", "digest of index.bin")
+        require(major == 2, "W03", f"format {major} is not known; a model of format 1: compile again")
+        require(set(m["requiredFeatures"]) <= {"codec-jpeg-progressive", "codec-webp"}, "M02", "features")
+        self.check("manifest")
+        data = self.read("index.bin", m["index"]["offset"], m["index"]["bytes"])
+        require(sha(data) == m["index"]["sha256"], "R03", "digest of index.bin")
         self.index = read_index(data, m)
-        self.check_index()
+        self.check("index")
         self.textures = self.parse(self.entry("textures.json"), 32 << 20, "textures.json")["textures"]
         require(len(self.textures) == m["planeCount"], "R04", "number of planes in textures.json")
-        self.check_textures()
+        self.check("textures")
         self.tables = read_tables(self.entry("tables.bin"), m, self.textures)
 
-    def open(self, name):
-        return Package(name)
+    def check(self, document):
+        """conformance.py checks here, field by field, what has just been read."""
 
-    def parse(self, data, most, what):
-        return parse_json(data, most, what)
-
-    def check_manifest(self):
-        unknown = set(self.manifest["requiredFeatures"]) - {"codec-jpeg-progressive", "codec-webp"}
-        require(not unknown, "M02", f"unknown features {unknown}")
-
-    def check_index(self):
-        pass
-
-    def check_textures(self):
-        pass
+    def read(self, path, offset, size):
+        full, root = os.path.realpath(os.path.join(self.name, path)), os.path.realpath(self.name)
+        is_inside = full.startswith(root + os.sep) and os.path.isfile(full)
+        require(is_inside or not self.is_tree, "E01", f"no file {path} in the tree")
+        with open(full if self.is_tree else self.name, "rb") as file:
+            file.seek(0 if self.is_tree else offset)
+            return file.read(size)
 
     def entry(self, path):
-        """An entry, whose digest is that of the index."""
-        require(path in self.index, "R07" if path.startswith(("texture/", "preview/")) else "E01", f"no entry {path}")
+        rule = "R07" if path.startswith(("texture/", "preview/")) else "E01"
+        require(path in self.index, rule, f"no entry {path}")
         offset, size, digest = self.index[path]
-        data = self.package.read(path, offset, size)
+        data = self.read(path, offset, size)
         require(sha(data) == digest, "I08", f"digest of {path}")
         return data
 
     def pack(self, plane, name, rule, sizes):
         data = self.entry(f"texture/{plane}/{name}.pack")
-        require(len(data) == int(sizes.sum(dtype=np.int64)), rule, f"{name}.pack of plane {plane} has {len(data)} bytes")
+        require(len(data) == sizes.sum(dtype=np.int64), rule, f"bytes of {name}.pack of plane {plane}")
         return cut(data, sizes)
-
-    def table_streams(self, plane):
-        return self.pack(plane, "tables", "R12", self.tables[plane]["tables"])
-
-    def files(self, plane, rung):
-        """(fragment, complete file) of every listed fragment; digests are checked."""
-        t, codec, heads, streams = self.tables[plane], self.textures[plane]["codec"], self.table_streams(plane), []
-        for r in range(rung + 1) if t["incremental"] else [rung]:
-            streams.append(self.pack(plane, f"r{r:02}", "R13", t["size"][r]))
-            for k, stream in enumerate(streams[-1]):
-                good = hashlib.sha256(stream).digest()[:8] == t["digest"][r, k].tobytes()
-                require(good, "F03", f"digest of fragment {t['order'][k]} at rung {r} of plane {plane}")
-        for k, fragment in enumerate(t["order"].tolist()):
-            parts, head = [s[k] for s in streams], heads[0 if t["incremental"] else rung]
-            is_table = head[:2] == b"\xff\xd8" and head[-2:] == b"\xff\xd9"
-            if codec == "jpeg":
-                good = is_table and parts[0][:2] == b"\xff\xd8" and parts[0][-2:] == b"\xff\xd9"
-                require(good, "F05", f"fragment {fragment}: no SOI or EOI")
-                yield fragment, head[:-2] + parts[0][2:]
-            elif codec == "jpeg-progressive":
-                require(is_table and parts[-1][-1:] != b"\xff", "F06", "no SOI, or a stream that ends with FF")
-                yield fragment, head[:-2] + b"".join(parts) + b"\xff\xd9"
-            else:
-                require(parts[0][:4] == b"RIFF" and parts[0][8:12] == b"WEBP", "F07", f"fragment {fragment}: no WebP")
-                yield fragment, parts[0]
 
     def preview(self, plane):
         t = self.textures[plane]
@@ -329,14 +244,32 @@ class Model:
         return decode_image(data, t["previewWidthPx"], t["previewHeightPx"], t["channels"], "F16", "preview")
 
     def fragments(self, plane, rung):
-        t = self.textures[plane]
-        for fragment, file in self.files(plane, rung):
+        """(fragment, image) of every listed fragment."""
+        texture, t, streams = self.textures[plane], self.tables[plane], []
+        first = 0 if t["incremental"] else rung
+        head = self.pack(plane, "tables", "R12", t["tables"])[first]
+        for r in range(first, rung + 1):
+            streams.append(self.pack(plane, f"r{r:02}", "R13", t["size"][r]))
+            digests = [hashlib.sha256(stream).digest()[:8] for stream in streams[-1]]
+            require(b"".join(digests) == t["digest"][r].tobytes(), "F03", f"digests of rung {r}")
+        for fragment, *parts in zip(t["order"].tolist(), *streams):
+            one, has_table = parts[0], head.startswith(SOI) and head.endswith(EOI)
+            good, rule, file = {
+                "jpeg": (has_table and one[:2] == SOI and one[-2:] == EOI, "F05", head[:-2] + one[2:]),
+                "jpeg-progressive": (
+                    has_table and parts[-1][-1:] != b"\xff", "F06", head[:-2] + b"".join(parts) + EOI
+                ),
+                "webp": (one[:4] == b"RIFF" and one[8:12] == b"WEBP", "F07", one),
+            }.get(texture["codec"], (False, "X03", b""))
             what = f"fragment {fragment} at rung {rung} of plane {plane}"
-            yield fragment, decode_image(file, t["fragmentWidthPx"], t["fragmentHeightPx"], t["channels"], "F08", what)
+            require(good, rule, what)
+            sides = texture["fragmentWidthPx"], texture["fragmentHeightPx"]
+            yield fragment, decode_image(file, *sides, texture["channels"], "F08", what)
 
     def picture(self, plane, rung):
         """The plane at a rung; the preview where nothing is listed."""
         t = self.textures[plane]
+        rung = range(len(t["rungQuality"]))[rung]  # -1: the highest
         whole = self.preview(plane).resize((t["widthPx"], t["heightPx"]), Image.BILINEAR)
         for fragment, image in self.fragments(plane, rung):
             row, column = divmod(fragment, t["columns"])
@@ -345,75 +278,20 @@ class Model:
 
     def stream(self):
         require("stream" in self.manifest, "E01", "no split stream in this package")
-        data, ref = self.entry("mesh/stream.bin"), self.manifest["stream"]
-        head = read_stream_head(data)
-        require(head["bytes"] == ref["headBytes"], "S08", "headBytes of the stream")
-        require(sha(data[: head["bytes"]]) == ref["headSha256"], "R02", "headSha256 of the stream")
-        return Splits(head), data
+        return Splits(self.entry("mesh/stream.bin"), self.manifest["stream"])
 
 
 # Section 11: the stream of vertex splits; names are those of that text, written small -----------------
 
-COMPONENTS = (2, 2, 2, 4)  # of the attribute kinds
-
-
-def read_stream_head(data):
-    c = Cursor(data, "S08", "the head of the stream")
-    require(c.raw(4) == b"TXMS", "S01", "magic")
-    major, _, bits, attributes, scales, zero = c.get("HHBBBB")
-    require(major == 2, "S01", f"version {major} of the stream")
-    require(zero == 0, "S02", "a reserved byte")
-    groups, blocks = c.get("II")
-    require(1 <= bits <= 24, "S03", f"{bits} bits")
-    require(1 <= groups <= 65536 and 1 <= scales <= 100, "S05", "number of groups or scales")
-    head = {"bits": bits, "grid": read_grid(c, 3), "attributes": [], "blocks": []}
-    for _ in range(attributes):
-        kind, bits, zero = c.get("BBH")
-        require(kind <= 3 and all(a["kind"] < kind for a in head["attributes"]), "S03", f"attribute kind {kind}")
-        require((2 if kind == 2 else 1) <= bits <= 24, "S03", f"{bits} bits of kind {kind}")
-        require(zero == 0, "S02", "reserved bytes")
-        head["attributes"].append({"kind": kind, "bits": bits, "grid": read_grid(c, 2) if kind < 2 else None})
-    head["groups"] = [tuple(c.get("HH")) for _ in range(groups)]
-    head["scales"] = read_scales(c, scales, blocks)
-    head["models"] = [list(c.raw(117)) for _ in range(attributes + 1)]
-    require(blocks <= len(data) // (attributes + 11), "S08", f"{blocks} blocks")
-    for _ in range(blocks):
-        code, parts = c.varint(), [c.varint() for _ in range(attributes + 2)]
-        block = {"patch": code & 1, "count": code >> 1, "parts": parts, "digest": c.raw(8)}
-        require(block["count"] >= 1 and (block["patch"] or block["count"] <= 4096), "S07", "count of a block")
-        require(sum(parts) >= block["count"] // 64, "S07", "too few bytes for the count of a block")
-        head["blocks"].append(block)
-    head["bytes"] = c.at
-    return head
-
-
-def read_grid(c, axes):
-    values = c.array("<f4", axes + 1)
-    require(np.isfinite(values).all() and values[-1] > 0, "S04", "a grid")
-    return values
-
-
-def read_scales(c, count, blocks):
-    scales, number, sums = [], 256, [0, 0, 0, 0]
-    for _ in range(count):
-        scale, before = c.get("B"), sums
-        sums = [a + c.varint() for a in sums]
-        hidden = c.varint()
-        require(scale < number and max(sums) <= MAX32, "S05", f"scale {scale}")
-        require(before[0] < sums[0] <= blocks, "S05", "blocks of a scale")
-        require(sums[2] >= sums[1] and sums[3] >= max(1, hidden), "S05", "counts of a scale")
-        number = scale
-        scales.append(dict(zip(("scale", "blocks", "points", "wedges", "faces", "hidden"), (scale, *sums, hidden))))
-    require(number == 0 and sums[0] == blocks, "S05", "the last scale")
-    return scales
+COMPONENTS = {-1: 3, 0: 2, 1: 2, 2: 2, 3: 4}  # of the kinds of attributes; positions are kind -1 here
 
 
 class Bits:
-    """11.3: binary decisions."""
+    """11.3: binary decisions. A model is a list [p, n]."""
 
-    def __init__(self, data):
-        self.data, self.at = data, 4
-        self.code, self.range = int.from_bytes((data[:4] + bytes(4))[:4], "big"), MAX32
+    def __init__(self, data, limit):
+        self.data, self.at, self.limit, self.range = data, 4, limit, MAX32
+        self.code = int.from_bytes(data[:4].ljust(4, b"\0"), "big")
 
     def decide(self, odds):
         bound = (self.range >> 12) * odds
@@ -424,434 +302,372 @@ class Bits:
             self.at, self.range, self.code = self.at + 1, self.range << 8, (self.code << 8 | byte) & MAX32
         return bit
 
-    def bit(self, model, limit):
+    def bit(self, model):
         p, n = model
-        bit, w = self.decide(min(max(p >> 4, 1), 4095)), 65535 // (n + 2)
-        model[:] = p + ((65535 - p) * w >> 16) if bit else p - (p * w >> 16), min(n + 1, limit)
+        bit, w = self.decide(clamp(p >> 4, 1, 4095)), 65535 // (n + 2)
+        model[:] = p + ((65535 - p) * w >> 16) if bit else p - (p * w >> 16), min(n + 1, self.limit)
         return bit
 
     def raw(self, count):
-        value = 0
-        for _ in range(count):
-            value = 2 * value + self.decide(2048)
-        return value
+        return sum(self.decide(2048) << k for k in reversed(range(count)))
 
 
-class Part:
-    """11.4: the values of one part of a block."""
+class Values(Bits):
+    """11.4: a part of a block with values; a part of 0 bytes says nothing."""
 
     def __init__(self, data, start):
-        self.bits = Bits(data[1:]) if data else None
-        self.models, self.mean = [[256 * s, 24] for s in start], [2 * data[0]] * 4 if data else None
+        super().__init__(data[1:], 60)
+        self.is_there, self.models = len(data) > 0, [[256 * s, 24] for s in start]
+        self.mean = [2 * data[0]] * 4 if data else None
+
+    def longer(self, mean, length):
+        return self.bit(self.models[20 * (mean >> 2 & 3) + clamp(length - (mean >> 4) + 10, 0, 19)])
 
     def residual(self, c):
-        if not self.bits:
-            return 0
-        mean, bit = self.mean[c], self.bits.bit
-        quarter, middle = 20 * (mean >> 2 & 3), mean >> 4
-
-        def longer(length):
-            return bit(self.models[quarter + clamp(length - middle + 10, 0, 19)], 60)
-
-        at = clamp(middle - 2, 0, 25)
-        if longer(at):
-            at += 1
-            while at < 26 and longer(at):
-                at += 1
-        else:
-            while at > 0 and not longer(at - 1):
-                at -= 1
+        mean = self.mean[c]
+        at = clamp((mean >> 4) - 2, 0, 25)
+        up = self.longer(mean, at)
+        at += up
+        while (at < 26 if up else at > 0) and self.longer(mean, at if up else at - 1) == up:
+            at += 1 if up else -1
         self.mean[c] = mean + (16 * at - mean >> 3)
-        if at == 0:
-            return 0
-        left, v, k = at - 1, 1, min(at, 11)
-        if left > 0:
-            v, left = 2 * v + bit(self.models[80 + k], 60), left - 1
-        if left > 0:
-            v, left = 2 * v + bit(self.models[92 + 2 * k + (v & 1)], 60), left - 1
-        if left > 0:
-            v = (v << left) + self.bits.raw(left)
-        return -v if self.bits.raw(1) else v
+        v, k, left = 1, min(at, 11), max(at - 3, 0)
+        for first, step in ((80 + k, 0), (92 + 2 * k, 1))[: max(at - 1, 0)]:
+            v = 2 * v + self.bit(self.models[first + step * (v & 1)])
+        v = (v << left) + self.raw(left)
+        return 0 if at == 0 else -v if self.raw(1) else v
 
-    def same(self):
-        return self.bits and self.bits.bit(self.models[116], 60)
-
-    def value(self, guess, count, bits):
+    def value(self, guess, bits):
         most = (1 << bits) - 1
-        return [(clamp(guess[c], 0, most) + self.residual(c)) & most for c in range(count)]
-
-
-def models(*shape):
-    return [models(*shape[1:]) for _ in range(shape[0])] if shape else [32768, 0]
-
-
-def clamp(x, low, high):
-    return min(max(x, low), high)
-
-
-class Corner:
-    __slots__ = ("face", "corner", "a", "b", "wedge", "moves", "target")
-
-    def __init__(self, face, corner, a, b, wedge):
-        self.face, self.corner, self.a, self.b, self.wedge, self.moves = face, corner, a, b, wedge, False
+        return [clamp(g, 0, most) + (self.is_there and self.residual(c)) & most for c, g in enumerate(guess)]
 
 
 class Splits:
-    """The decoder: points, wedges, faces of the mesh so far."""
+    """The decoder. A corner is the number 3 * face + c."""
 
-    def __init__(self, head):
-        self.head, self.most = head, head["scales"][-1]
-        self.places, self.corners_of, self.wedge_point, self.values, self.pending = [], [], [], [], []
-        self.faces, self.face_group, self.fresh, self.corners, self.fans = [], [], [], [], []
-        self.last, self.steps, self.child, self.parent = 0, 0, None, None
-        shapes = {"ask": (14, 4, 2, 2), "first": (12, 2), "turn": (2, 2, 12, 5), "turn_back": (2, 2, 7, 8, 5),
-                  "turn_again": (2, 2), "target_expected": (2,), "target_copied": (2,), "listed": (),
-                  "more_faces": (4, 2), "flipped": (), "extra_face": (), "same_group": (), "beside_moving": (3,),
-                  "corner_expected": (3, 2), "seed_exists": (), "gate_open": (8, 8), "third_new": (8, 8),
-                  "third_left": (8, 8), "third_right": (), "patch_expected": (4,)}
-        self.m = {name: models(*shape) for name, shape in shapes.items()}
+    def __init__(self, data, ref):
+        self.data, self.head_bytes = data, ref["headBytes"]
+        self.read_head(Cursor(data, "S08", "the head of the stream"))
+        require(sha(data[: self.head_bytes]) == ref["headSha256"], "R02", "headSha256 of the stream")
+        self.places, self.around, self.point_of, self.values = [], [], [], []
+        self.wedge_of, self.groups_of, self.old, self.targets, self.fresh = [], [], {}, [], []
+        self.last, self.steps, self.parent, self.child = 0, 0, None, None
+        self.models = collections.defaultdict(lambda: [32768, 0])
+
+    # 11.2
+
+    def read_head(self, c):
+        require(c.raw(4) == b"TXMS", "S01", "magic")
+        major, _, bits, attributes, scales, zero, groups, blocks = c.get("HHBBBBII")
+        require(major == 2, "S01", f"version {major} of the stream")
+        require(zero == 0, "S02", "a reserved byte")
+        require(1 <= groups <= 65536 and 1 <= scales <= 100, "S05", "number of groups or scales")
+        self.kinds = [(-1, bits, c.array("<f4", 4))]
+        for _ in range(attributes):
+            kind, bits, zero = c.get("BBH")
+            require(self.kinds[-1][0] < kind <= 3, "S03", f"attribute kind {kind}")
+            require(zero == 0, "S02", "reserved bytes")
+            self.kinds.append((kind, bits, c.array("<f4", 3) if kind < 2 else np.ones(1)))
+        for kind, bits, grid in self.kinds:
+            require((2 if kind == 2 else 1) <= bits <= 24, "S03", f"{bits} bits of kind {kind}")
+            require(np.isfinite(grid).all() and grid[-1] > 0, "S04", "a grid")
+        self.groups, self.scales, self.blocks = [tuple(c.get("HH")) for _ in range(groups)], [], []
+        before = {"scale": 256, "blocks": 0, "points": 0, "wedges": 0, "faces": 0}
+        for _ in range(scales):
+            s = {"scale": c.get("B")} | {name: before[name] + c.varint() for name in list(before)[1:5]}
+            s["hidden"] = c.varint()
+            good = s["scale"] < before["scale"] and before["blocks"] < s["blocks"] <= blocks
+            good = good and s["wedges"] >= s["points"] and s["faces"] >= max(1, s["hidden"])
+            require(good and max(s.values()) <= MAX32, "S05", f"numbers of scale {s['scale']}")
+            self.scales.append(before := s)
+        require(before["scale"] == 0 and before["blocks"] == blocks, "S05", "the last scale")
+        self.starts = c.array("u1", attributes + 1, 117).tolist()
+        require(blocks <= len(c.data) // (attributes + 11), "S08", f"{blocks} blocks")
+        for _ in range(blocks):
+            (count, is_patch), *parts = divmod(c.varint(), 2), *(c.varint() for _ in range(attributes + 2))
+            good = count >= 1 and (is_patch or count <= 4096) and sum(parts) >= count // 64
+            require(good, "S07", "count of a block, or too few bytes for it")
+            self.blocks.append((is_patch, count, parts, c.raw(8)))
+        require(c.at == self.head_bytes, "S08", "headBytes of the stream")
 
     # 11.3, 11.5
 
-    def bit(self, model):
-        return self.connectivity.bit(model, 200)
+    def b(self, *model):
+        """B of a model, which is its name and its indices."""
+        return self.connectivity.bit(self.models[model])
 
-    def index(self, count):
+    def index(self, count, *others):
         v = self.connectivity.raw((count - 1).bit_length())
         require(v < count, "S19", f"number {v} of {count}")
+        require(v not in others, "S22", "a face with a point twice")
         return v
 
     def step(self, count):
         self.steps += count
-        require(self.steps <= (1 << 20) + 256 * (len(self.places) + len(self.faces)), "S20", "too many steps")
+        made = {"points": len(self.places), "wedges": len(self.point_of), "faces": len(self.groups_of)}
+        require(all(made[n] <= self.scales[-1][n] for n in made), "S19", "too many points, wedges or faces")
+        require(self.steps <= (1 << 20) + 256 * (made["points"] + made["faces"]), "S20", "too many steps")
 
-    def new_point(self):
-        require(len(self.places) < self.most["points"], "S19", "too many points")
-        self.places.append([0, 0, 0])
-        self.corners_of.append([])
+    def new_point(self, guess=None):
+        self.around.append([])
+        self.places.append(self.parts[0].value(guess, self.kinds[0][1]) if guess else [0, 0, 0])
         return len(self.places) - 1
 
-    def new_wedge(self, point, pending=True):
-        require(len(self.wedge_point) < self.most["wedges"], "S19", "too many wedges")
-        self.wedge_point.append(point)
-        self.values.append([[0] * COMPONENTS[a["kind"]] for a in self.head["attributes"]])
-        self.pending.append(pending)
-        self.fresh += [len(self.wedge_point) - 1] if pending else []
-        return len(self.wedge_point) - 1
+    def new_wedge(self, point, copied=None):
+        w = len(self.point_of)
+        self.point_of.append(point)
+        self.values.append(copied or [[0] * COMPONENTS[kind] for kind, *_ in self.kinds[1:]])
+        self.fresh += [w] if copied is None else []
+        self.targets += [w] if point == self.child else []
+        return w
 
-    def new_face(self, wedges, group):
-        require(len(self.faces) < self.most["faces"], "S19", "too many faces")
-        self.faces.append(list(wedges))
-        self.face_group.append(group)
-        for c, w in enumerate(wedges):
-            self.corners_of[self.wedge_point[w]].insert(0, (len(self.faces) - 1, c))
-        return len(self.faces) - 1
+    def new_face(self, wedges, beside):
+        is_same = beside is not None and self.b("same_group")
+        self.groups_of.append(self.groups_of[beside] if is_same else self.index(len(self.groups)))
+        for w in wedges:
+            self.around[self.point_of[w]].insert(0, len(self.wedge_of))
+            self.wedge_of.append(w)
 
-    def w(self, face, corner):
-        return self.faces[face][corner % 3]
+    def w(self, h, step=0):
+        return self.wedge_of[h - h % 3 + (h + step) % 3]
 
-    def p(self, face, corner):
-        return self.wedge_point[self.faces[face][corner % 3]]
+    def p(self, h, step=0):
+        return self.point_of[self.wedge_of[h - h % 3 + (h + step) % 3]]
 
     def gather(self, v):
-        self.step(len(self.corners_of[v]))
-        loose = [Corner(f, c, self.p(f, c + 1), self.p(f, c + 2), self.w(f, c)) for f, c in self.corners_of[v]]
-        by_a, ends, taken = {}, {x.b for x in loose}, set()
-        for x in reversed(loose):
-            by_a.setdefault(x.a, []).append(x)  # popped from the back: in order of the list
-        self.corners, self.fans = [], []
-        for x in [x for x in loose if x.a not in ends] + loose:
-            begin = len(self.corners)
-            while x and x not in taken:
-                taken.add(x)
-                self.corners.append(x)
-                follow = by_a.get(x.b, [])
-                while follow and follow[-1] in taken:
-                    follow.pop()
-                x = follow[-1] if follow else None
-            fan = self.corners[begin:]
-            self.fans += [(fan, fan[0].a == fan[-1].b)] if fan else []
+        """FANS with whether each is closed; CORNERS are the keys of `old`, whose values are their wedges."""
+        corners, taken, by_a, self.fans = self.around[v], set(), collections.defaultdict(list), []
+        self.step(len(corners))
+        for h in corners:
+            by_a[self.p(h, 1)].append(h)
+        ends, following = {self.p(h, 2) for h in corners}, {a: iter(list) for a, list in by_a.items()}
+        for h in [h for h in corners if self.p(h, 1) not in ends] + corners:
+            fan = []
+            while h is not None and h not in taken:
+                taken.add(h)
+                fan.append(h)
+                h = next((x for x in following.get(self.p(h, 2), ()) if x not in taken), None)
+            self.fans += [(fan, self.p(fan[0], 1) == self.p(fan[-1], 2))] if fan else []
+        self.old = {h: self.w(h) for fan, _ in self.fans for h in fan}
 
     # 11.6
 
-    def decode(self, stream, scale):
-        """Blocks up to a scale."""
-        require(any(end["scale"] == scale for end in self.scale_ends(stream)), "S21", f"no scale {scale} in the stream")
-
-    def scale_ends(self, stream):
+    def scale_ends(self):
         """Decodes scale after scale: what each has, and the bytes up to its end."""
-        at, done = self.head["bytes"], 0
-        for s in self.head["scales"]:
-            self.queue, self.queued, self.next = [], set(), 0
-            self.refusals, self.has_split, self.progress = {}, {}, 1
-            for block in self.head["blocks"][done : s["blocks"]]:
-                data = stream[at : at + sum(block["parts"])]
-                require(len(data) == sum(block["parts"]), "S08", "a block ends early")
-                require(hashlib.sha256(data).digest()[:8] == block["digest"], "S09", "digest of a block")
-                at += len(data)
-                self.decode_block(block, data)
-            done = s["blocks"]
-            found = len(self.places), len(self.wedge_point), len(self.faces), len(self.faces) - len(self.triangles())
-            expected = s["points"], s["wedges"], s["faces"], s["hidden"]
-            require(found == expected, "S19", f"scale {s['scale']}: {found} instead of {expected}")
-            yield {**s, "triangles": s["faces"] - s["hidden"], "bytes": at}
+        at, done = self.head_bytes, 0
+        for s in self.scales:
+            self.queue, self.refusals = collections.OrderedDict(), collections.Counter()
+            self.has_split, self.progress = set(), True
+            for is_patch, count, sizes, digest in self.blocks[done : s["blocks"]]:
+                data, at = self.data[at : at + sum(sizes)], at + sum(sizes)
+                require(at <= len(self.data), "S08", "a block ends early")
+                require(hashlib.sha256(data).digest()[:8] == digest, "S09", "digest of a block")
+                first, *parts = cut(data, sizes)
+                self.connectivity = Bits(first, 200)
+                self.parts = [Values(part, start) for part, start in zip(parts, self.starts)]
+                (self.patch if is_patch else self.split_block)(count)
+            done, hidden = s["blocks"], len(self.groups_of) - len(self.triangles())
+            found = [len(self.places), len(self.point_of), len(self.groups_of), hidden]
+            require(found == list(s.values())[2:], "S19", f"scale {s['scale']}: {found} instead of {s}")
+            yield s | {"triangles": s["faces"] - hidden, "bytes": at}
 
-    def decode_block(self, block, data):
-        first, *parts = cut(data, np.array(block["parts"]))
-        self.connectivity, left = Bits(first), block["count"]
-        self.parts = [Part(part, start) for part, start in zip(parts, self.head["models"])]
-        if block["patch"]:
-            self.gates, end = [], len(self.faces) + left
-            while len(self.faces) < end:
-                self.at_gate(*self.gates.pop()) if self.gates else self.seed()
-            return
-        while left:
-            v = self.ask()
+    def split_block(self, count):
+        while count:
+            if not self.queue:
+                require(self.progress and self.places, "S19", "no point splits")
+                self.progress, self.queue = False, self.queue.fromkeys(range(len(self.places)))
+            v, _ = self.queue.popitem(last=False)
             self.step(1)
-            asked = self.m["ask"][min(len(self.corners_of[v]), 13)][self.refusals.get(v, 0)][self.has_split.get(v, 0)]
-            self.last = self.bit(asked[self.last])
-            if not self.last:
-                self.refusals[v] = min(self.refusals.get(v, 0) + 1, 3)
-                continue
-            self.refusals[v], self.has_split[v], self.progress, left = 0, 1, 1, left - 1
-            u = self.split(v)
-            for point in (v, u, *(end for x in self.corners for end in (x.a, x.b))):
-                if point not in self.queued:
-                    self.queued.add(point)
-                    self.queue.append(point)
-
-    def ask(self):
-        if self.next == len(self.queue):
-            require(self.progress and self.places, "S19", "no point splits")
-            self.progress, self.next, self.queue = 0, 0, list(range(len(self.places)))
-            self.queued = set(self.queue)
-        self.next += 1
-        self.queued.discard(self.queue[self.next - 1])
-        return self.queue[self.next - 1]
+            degree, refusals = min(len(self.around[v]), 13), min(self.refusals[v], 3)
+            self.last = self.b("ask", degree, refusals, v in self.has_split, self.last)
+            self.refusals[v] = 0 if self.last else refusals + 1
+            if self.last:
+                self.has_split.add(v)
+                self.progress, count, u = True, count - 1, self.split(v)
+                self.queue |= dict.fromkeys([v, u, *(self.ends[h][k] for h in self.old for k in (0, 1))])
 
     # 11.7
 
     def split(self, v):
         self.gather(v)
         u = self.new_point()
-        self.parent, self.child, self.targets, self.fresh, self.mapped = v, u, [], [], {}
-        for k, (fan, closed) in enumerate(self.fans):
-            self.moves(fan, 0 if closed else 1, min(k, 1))
-        for x in self.corners:
-            if x.moves:
-                self.target(x)
-        self.corners_of[v], self.corners_of[u] = [], []
-        for x in self.corners:
-            if x.moves:
-                self.faces[x.face][x.corner] = x.target
-            self.corners_of[u if x.moves else v].append((x.face, x.corner))
-        for fan, closed in self.fans:
-            ring = ([fan[-1]] if closed else [None]) + fan + ([] if closed else [None])
+        self.parent, self.child, self.targets, self.mapped = v, u, [], {}
+        self.ends, self.moving = {h: (self.p(h, 1), self.p(h, 2)) for h in self.old}, {}
+        for k, (fan, is_closed) in enumerate(self.fans):
+            self.choose_moving(fan, is_closed, k > 0)
+        for h in self.moving:
+            self.moving[h] = self.target(self.old[h])
+        self.around[v], self.around[u] = [h for h in self.old if h not in self.moving], list(self.moving)
+        for h, w in self.moving.items():
+            self.wedge_of[h] = w
+        for fan, is_closed in self.fans:
+            ring = [fan[-1], *fan] if is_closed else [None, *fan, None]
             for last, following in zip(ring, ring[1:]):
                 self.edge(last, following)
-        while self.bit(self.m["extra_face"]):
-            x = self.index(len(self.places))
-            require(x not in (v, u), "S22", "a face with a point twice")
-            self.finish(x, self.connectivity.raw(1) == 1, None, None, None, 1, None)
-        near = [self.places[self.p(f, c + k)] for f, c in self.corners_of[u] for k in (1, 2)]
-        self.places[u] = self.parts[0].value(mean(near) if near else self.places[v], 3, self.head["bits"])
+        while self.b("extra_face"):
+            x = self.index(len(self.places), v, u)
+            self.finish(x, self.connectivity.raw(1), None, None, None)
+        near = [self.places[self.p(h, k)] for h in self.around[u] for k in (1, 2)]
+        self.places[u] = self.parts[0].value(mean(near or [self.places[v]]), self.kinds[0][1])
         self.fresh_wedges()
         self.parent = self.child = None
         return u
 
-    def moves(self, fan, is_open, later):
+    def choose_moving(self, fan, is_closed, later):
         side, turns, run, n = 0, 0, 0, len(fan)
-        for i, x in enumerate(fan):
-            turn, valence = 0, clamp(len(self.corners_of[x.a]), 4, 8) - 4
-            if i == 0:
-                side = self.bit(self.m["first"][min(n, 11)][later])
-            elif turns == 0:
-                turn = self.bit(self.m["turn"][is_open][side][min(n - i, 11)][valence])
-            elif turns == 1:
-                turn = self.bit(self.m["turn_back"][is_open][side][min(run, 7) - 1][clamp(n, 3, 10) - 3][valence])
-            else:
-                turn = self.bit(self.m["turn_again"][is_open][side])
-            if turn:
-                side, turns, run = 1 - side, turns + 1, 0
-            run += 1
-            x.moves = side == 1
+        for i, h in enumerate(fan):
+            valence = clamp(len(self.around[self.p(h, 1)]), 4, 8)
+            later_turns = (
+                ("turn", is_closed, side, min(n - i, 11), valence),
+                ("turn_back", is_closed, side, min(run, 7), clamp(n, 3, 10), valence),
+                ("turn_again", is_closed, side),
+            )
+            turn = self.b(*(later_turns[min(turns, 2)] if i else ("first", min(n, 11), later)))
+            side, turns, run = side ^ turn, turns + (turn if i else 0), 1 if turn else run + 1
+            if side:
+                self.moving[h] = None
 
-    def target(self, x):
-        known = 1 if x.wedge in self.mapped else 0
-        as_expected, x.target = self.bit(self.m["target_expected"][known]), None
-        if as_expected and known:
-            x.target = self.mapped[x.wedge]
-        elif not as_expected:
-            offered = (w for w in self.targets if not known or w != self.mapped[x.wedge])
-            x.target = next((w for w in offered if self.bit(self.m["listed"])), None)
-        if x.target is None:
-            lost = 0 if any(not y.moves and y.wedge == x.wedge for y in self.corners) else 1
-            copied = self.bit(self.m["target_copied"][lost])
-            x.target = self.new_wedge(self.child, not copied)
-            if copied:
-                self.values[x.target] = [list(value) for value in self.values[x.wedge]]
-            self.targets.append(x.target)
-        self.mapped.setdefault(x.wedge, x.target)
+    def target(self, wedge):
+        """The wedge at the child of a moving corner that had `wedge`."""
+        known = self.mapped.get(wedge)
+        offered = (w for w in self.targets if w != known and self.b("listed"))
+        found = known if self.b("target_expected", known is not None) else next(offered, None)
+        if found is None:
+            stays = any(w == wedge for h, w in self.old.items() if h not in self.moving)
+            copied = list(self.values[wedge]) if self.b("target_copied", stays) else None
+            found = self.new_wedge(self.child, copied)
+        self.mapped.setdefault(wedge, found)
+        return found
 
     def edge(self, last, following):
-        one, made = following or last, 0
-        x = following.a if following else last.b
-        kind = (1 if last.moves != following.moves else 0) if last and following else 3 if one.moves else 2
-        while self.bit(self.m["more_faces"][kind][min(made, 1)]):
+        """New faces between two neighbours of a fan, of which one may be missing."""
+        there = [h for h in (last, following) if h is not None]
+        sides, far = [h in self.moving for h in there], {last: 2} | {following: 1}  # far: the corner at x
+        kind = sides[0] != sides[1] if len(sides) == 2 else 2 + sides[0]
+        first, made = dict(zip(sides[::-1], there[::-1])), 0  # the first that moves, the first that stays
+        while self.b("more_faces", kind, made):
             self.step(1)
-            self.face(x, last, following)
-            made += 1
+            forward = self.b("flipped") != (sides[-1] == (following is not None))
+            made, seam, by_moving = 1, 0, True in first
+            if len(first) == 2:
+                differs = self.old[first[True]] != self.old[first[False]]
+                differs_far = len({self.w(h, far[h]) for h in there}) == 2
+                if differs or differs_far:
+                    seam, by_moving = 1, self.b("beside_moving", differs, differs_far)
+            y = first[by_moving]
+            child = self.moving[y] if by_moving else self.mapped.get(self.old[y])
+            self.finish(self.p(y, far[y]), forward, self.old[y], child, self.w(y, far[y]), seam, y // 3)
 
-    def face(self, x, last, following):
-        usual = following.moves if following else not last.moves
-        forward = (self.bit(self.m["flipped"]) == 1) != usual
-        moving = next((y for y in (last, following) if y and y.moves), None)
-        staying = next((y for y in (last, following) if y and not y.moves), None)
-
-        def far(y):
-            return self.w(y.face, y.corner + (1 if y is following else 2))
-
-        seam, by_moving = 0, moving is not None
-        if moving and staying:
-            differs, differs_far = moving.wedge != staying.wedge, far(moving) != far(staying)
-            if differs or differs_far:
-                seam = 1
-                by_moving = self.bit(self.m["beside_moving"][0 if not differs_far else 2 if differs else 1])
-        y = moving if by_moving else staying
-        child = y.target if by_moving else self.mapped.get(y.wedge)
-        self.finish(x, forward, y.wedge, child, far(y), seam, y.face)
-
-    def finish(self, x, forward, expected_v, expected_u, expected_x, seam, beside):
-        corners = zip((expected_v, expected_u, expected_x), self.m["corner_expected"], (self.parent, self.child, x))
-        wv, wu, wx = [self.wedge(expected, model[seam], p) for expected, model, p in corners]
-        self.new_face((wv, wx, wu) if forward else (wv, wu, wx), self.group(beside))
+    def finish(self, x, forward, expected_v, expected_u, expected_x, seam=1, beside=None):
+        wv = self.wedge(expected_v, ("corner_expected", 0, seam), self.parent)
+        wu = self.wedge(expected_u, ("corner_expected", 1, seam), self.child)
+        wx = self.wedge(expected_x, ("corner_expected", 2, seam), x)
+        self.new_face((wv, wx, wu) if forward else (wv, wu, wx), beside)
 
     def wedge(self, expected, model, p):
-        if expected is not None and self.bit(model):
+        if expected is not None and self.b(*model):
             return expected
-        lists = [x.wedge for x in self.corners] if p == self.parent else []
+        offered = list(self.old.values()) if p == self.parent else []
         if p == self.child:
-            lists += self.targets
+            offered += self.targets
         else:
-            self.step(len(self.corners_of[p]))
-            lists += [self.w(f, c) for f, c in self.corners_of[p]]
-        for w in dict.fromkeys(lists):  # each once, in order
-            if w != expected and self.bit(self.m["listed"]):
-                return w
-        w = self.new_wedge(p)
-        if p == self.child:
-            self.targets.append(w)
-        return w
-
-    def group(self, beside):
-        same = beside is not None and self.bit(self.m["same_group"])
-        return self.face_group[beside] if same else self.index(len(self.head["groups"]))
+            self.step(len(self.around[p]))
+            offered += [self.w(h) for h in self.around[p]]
+        found = next((w for w in dict.fromkeys(offered) if w != expected and self.b("listed")), None)
+        return self.new_wedge(p) if found is None else found
 
     # 11.8
 
+    def patch(self, count):
+        self.gates, end = [], len(self.groups_of) + count
+        while len(self.groups_of) < end:
+            self.at_gate(self.gates.pop()) if self.gates else self.seed()
+
+    def add(self, wedges, beside):
+        h = len(self.wedge_of)
+        self.new_face(wedges, beside)
+        self.fresh_wedges()
+        self.gates += [h, h + 1, h + 2]
+
     def seed(self):
-        self.fresh, points, wedges = [], [], []
+        points, wedges = [], []
         for k in range(3):
-            if self.places and self.bit(self.m["seed_exists"]):
-                p = self.index(len(self.places))
-                require(p not in points, "S22", "a face with a point twice")
-                points.append(p)
-                wedges.append(self.wedge(None, None, p))
+            if self.places and self.b("seed_exists"):
+                points.append(self.index(len(self.places), *points))
+                wedges.append(self.wedge(None, None, points[-1]))
             else:
                 before = points[0] if k else len(self.places) - 1
-                points.append(self.placed_point(self.places[before] if self.places else [0, 0, 0]))
+                points.append(self.new_point(self.places[before] if self.places else [0, 0, 0]))
                 wedges.append(self.new_wedge(points[-1]))
         self.add(wedges, None)
 
-    def placed_point(self, guess):
-        p = self.new_point()
-        self.places[p] = self.parts[0].value(guess, 3, self.head["bits"])
-        return p
-
-    def add(self, wedges, beside):
-        f = self.new_face(wedges, self.group(beside))
-        self.fresh_wedges()
-        self.gates += [(f, 0), (f, 1), (f, 2)]
-
     def fan_with(self, point, face):
         self.gather(point)
-        return next(fan for fan in self.fans if any(x.face == face for x in fan[0]))
+        return next(fan for fan in self.fans if any(h // 3 == face for h in fan[0]))
 
-    def at_gate(self, f, c):
-        a, b, d = self.p(f, c), self.p(f, c + 1), self.p(f, c + 2)
-        left, closed = self.fan_with(a, f)
-        if closed or left[0].face != f:
+    def at_gate(self, h):
+        a, b, d = (self.p(h, k) for k in range(3))
+        left, is_closed = self.fan_with(a, h // 3)
+        if is_closed or left[0] // 3 != h // 3:
             return
-        right, _ = self.fan_with(b, f)
-        sides = min(len(left), 8) - 1, min(len(right), 8) - 1
-        if not self.bit(self.m["gate_open"][sides[0]][sides[1]]):
+        right, _ = self.fan_with(b, h // 3)
+        sides, l, r = (min(len(left), 8), min(len(right), 8)), left[-1], right[0]
+        if not self.b("gate_open", *sides):
             return
-        self.fresh = []
-        wb = self.wedge(self.w(f, c + 1), self.m["patch_expected"][0], b)
-        wa = self.wedge(self.w(f, c), self.m["patch_expected"][1], a)
-        self.add((wb, wa, self.third(a, b, d, left[-1], right[0], *sides)), f)
-
-    def third(self, a, b, d, l, r, sl, sr):
-        if self.bit(self.m["third_new"][sl][sr]):
-            guess = [x + y - z for x, y, z in zip(self.places[a], self.places[b], self.places[d])]
-            return self.new_wedge(self.placed_point(guess))
-        if l.b != b and self.bit(self.m["third_left"][sl][sr]):
-            return self.wedge(self.w(l.face, l.corner + 2), self.m["patch_expected"][2], l.b)
-        if r.a != a and r.a != l.b and self.bit(self.m["third_right"]):
-            return self.wedge(self.w(r.face, r.corner + 1), self.m["patch_expected"][3], r.a)
-        p = self.index(len(self.places))
-        require(p not in (a, b), "S22", "a face with a point twice")
-        return self.wedge(None, None, p)
+        wb = self.wedge(self.w(h, 1), ("patch_expected", 0), b)
+        wa = self.wedge(self.w(h), ("patch_expected", 1), a)
+        if self.b("third_new", *sides):
+            guess = [x + y - z for x, y, z in zip(*(self.places[p] for p in (a, b, d)))]
+            third = self.new_wedge(self.new_point(guess))
+        elif self.p(l, 2) != b and self.b("third_left", *sides):
+            third = self.wedge(self.w(l, 2), ("patch_expected", 2), self.p(l, 2))
+        elif self.p(r, 1) not in (a, self.p(l, 2)) and self.b("third_right"):
+            third = self.wedge(self.w(r, 1), ("patch_expected", 3), self.p(r, 1))
+        else:
+            third = self.wedge(None, None, self.index(len(self.places), a, b))
+        self.add((wb, wa, third), h // 3)
 
     # 11.9
 
     def fresh_wedges(self):
-        for w in self.fresh:
-            p, twin, beside = self.wedge_point[w], None, []
-            self.step(len(self.corners_of[p]))
-            for f, c in self.corners_of[p]:
-                if self.w(f, c) == w:
-                    beside += [n for n in (self.w(f, c + 1), self.w(f, c + 2)) if not self.pending[n]]
-                elif twin is None and not self.pending[self.w(f, c)]:
-                    twin = self.w(f, c)
-            for k, a in enumerate(self.head["attributes"]):
-                part, count = self.parts[k + 1], COMPONENTS[a["kind"]]
-                if twin is not None and part.same():
+        """What stands in FRESH is pending."""
+        while self.fresh:
+            w = self.fresh[0]
+            corners = self.around[self.point_of[w]]
+            self.step(len(corners))
+            twin = next((self.w(h) for h in corners if self.w(h) not in self.fresh), None)
+            beside = [self.w(h, k) for h in corners if self.w(h) == w for k in (1, 2)]
+            beside = [n for n in beside if n not in self.fresh]
+            for k, (kind, bits, _) in enumerate(self.kinds[1:]):
+                part = self.parts[k + 1]
+                if twin is not None and part.is_there and part.bit(part.models[116]):
                     self.values[w][k] = list(self.values[twin][k])
                     continue
-                if not beside and twin is not None:
-                    beside = [twin]
-                elif not beside and self.parent is not None and self.corners:
-                    beside = [self.corners[0].wedge]
-                known = [self.values[n][k] for n in beside]
-                guess = [0] * count if not known else mean_normal(known, a["bits"]) if a["kind"] == 2 else mean(known)
-                self.values[w][k] = part.value(guess, count, a["bits"])
-            self.pending[w] = False
-        self.fresh = []
+                if not beside and (twin is not None or self.parent is not None):
+                    beside = [twin] if twin is not None else list(self.old.values())[:1]
+                known = [self.values[n][k] for n in beside] or [[0] * COMPONENTS[kind]]
+                guess = mean_normal(known, bits) if kind == 2 and beside else mean(known)
+                self.values[w][k] = part.value(guess, bits)
+            self.fresh.pop(0)
 
     # What was decoded, as numbers
 
     def triangles(self):
         """Numbers of the faces that show."""
-        place = [tuple(self.places[p]) for p in self.wedge_point]
-        return [f for f, face in enumerate(self.faces) if len({place[w] for w in face}) == 3]
+        corners = np.array(self.places)[np.array(self.point_of)[np.array(self.wedge_of)]].reshape(-1, 3, 3)
+        return np.flatnonzero((corners != np.roll(corners, 1, axis=1)).any(axis=2).all(axis=1)).tolist()
 
-    def positions(self):
-        return on_grid(self.places, self.head["grid"], self.head["bits"])
-
-    def attribute(self, k):
-        a, numbers = self.head["attributes"][k], [v[k] for v in self.values]
-        if a["kind"] < 2:
-            return on_grid(numbers, a["grid"], a["bits"])
-        if a["kind"] == 3:
-            return np.float32(numbers) / np.float32((1 << a["bits"]) - 1)
-        x = np.float32([octahedron(u, v, a["bits"]) for u, v in numbers])
+    def numbers(self, k):
+        """Positions (k = 0) or attribute k - 1 of every wedge, in binary32."""
+        kind, bits, grid = self.kinds[k]
+        whole = np.array([v[k - 1] for v in self.values] if k else [self.places[p] for p in self.point_of])
+        if kind == 3:
+            return np.float32(whole) / np.float32((1 << bits) - 1)
+        if kind < 2:
+            return np.float32(whole) * (grid[-1] / np.float32((1 << bits) - 1)) + grid[:-1]
+        x = np.float32(octahedron(whole, (1 << bits - 1) - 1))
         length = np.sqrt(x[:, 0] * x[:, 0] + x[:, 1] * x[:, 1] + x[:, 2] * x[:, 2])[:, None]
         return np.where(length > 0, x / np.where(length > 0, length, np.float32(1)), np.float32([0, 0, 1]))
-
-
-def on_grid(numbers, grid, bits):
-    return np.float32(numbers) * (grid[-1] / np.float32((1 << bits) - 1)) + grid[:-1]
 
 
 def mean(values):
@@ -859,109 +675,86 @@ def mean(values):
     return [(2 * sum(column) + n) // (2 * n) for column in zip(*values)]
 
 
-def fold(x, y, c):
-    return (c - abs(y)) * (-1 if x < 0 else 1), (c - abs(x)) * (-1 if y < 0 else 1)
+def folded(xy, c):
+    return (c - np.abs(xy[..., ::-1])) * np.where(xy < 0, -1, 1)
 
 
-def octahedron(u, v, bits):
-    c = (1 << (bits - 1)) - 1
-    x, y = u - c, v - c
-    z = c - abs(x) - abs(y)
-    return (*(fold(x, y, c) if z < 0 else (x, y)), z)
+def octahedron(uv, c):
+    xy = uv - c
+    z = c - np.abs(xy).sum(axis=1, keepdims=True)
+    return np.hstack([np.where(z < 0, folded(xy, c), xy), z])
 
 
 def mean_normal(values, bits):
-    c = (1 << (bits - 1)) - 1
-    x, y, z = (sum(column) for column in zip(*(octahedron(u, v, bits) for u, v in values)))
-    total = abs(x) + abs(y) + abs(z)
-    x, y = ((abs(s) * c // max(total, 1)) * (-1 if s < 0 else 1) for s in (x, y))
-    x, y = fold(x, y, c) if z < 0 else (x, y)
-    return x + c, y + c
+    c = (1 << bits - 1) - 1
+    total = octahedron(np.array(values), c).sum(axis=0)
+    xy = np.sign(total[:2]) * (np.abs(total[:2]) * c // max(np.abs(total).sum(), 1))
+    return ((folded(xy, c) if total[2] < 0 else xy) + c).tolist()
 
 
 # Commands ---------------------------------------------------------------------------------------------
 
 
-def show_info(model):
-    m = model.manifest
-    print(f"format {m['version']['major']}.{m['version']['minor']}, id {model.id}\ntitle {m['title']!r}")
-    for k, s in enumerate(m["scales"]["scale"]):
-        print(f"scale {s}: {m['scales']['triangles'][k]} triangles, {m['scales']['bytes'][k]} bytes")
-    for p, (t, tables) in enumerate(zip(model.textures, model.tables)):
-        print(f"plane {p}: {t['role']}, {t['widthPx']} x {t['heightPx']} px, {len(tables['order'])} fragments")
-        for r, quality in enumerate(t["rungQuality"]):
-            print(f"  rung {r}: quality {quality}, {tables['size'][r].sum()} bytes")
-    for path, (offset, size, digest) in model.index.items():
-        print(f"{digest} {offset} {size} {path}")
-
-
 def write_raw(splits, file):
     for place in splits.places:
         print("p", *place, file=file)
-    for point, values in zip(splits.wedge_point, splits.values):
+    for point, values in zip(splits.point_of, splits.values):
         print("w", point, *(number for value in values for number in value), file=file)
-    for face, group in zip(splits.faces, splits.face_group):
+    for face, group in zip(np.reshape(splits.wedge_of, (-1, 3)), splits.groups_of):
         print("f", *face, group, file=file)
 
 
 def write_obj(splits, file):
-    kinds = [a["kind"] for a in splits.head["attributes"]]
-    rows = splits.positions()[splits.wedge_point]
-    if 3 in kinds:
-        rows = np.hstack([rows, splits.attribute(kinds.index(3))[:, :3]])
-    for row in rows:
-        print("v", *(f"{x:.9g}" for x in row), file=file)
-    for u, v in splits.attribute(kinds.index(0)) if 0 in kinds else []:
-        print(f"vt {u:.9g} {1 - float(v):.17g}", file=file)  # v of OBJ grows upwards
-    for normal in splits.attribute(kinds.index(2)) if 2 in kinds else []:
-        print("vn", *(f"{x:.9g}" for x in normal), file=file)
-    form = "{0}" + ("/{0}" if 0 in kinds else "/" if 2 in kinds else "") + ("/{0}" if 2 in kinds else "")
-    before = None
-    for f in sorted(splits.triangles(), key=lambda f: splits.face_group[f]):
-        if splits.face_group[f] != before:
-            before = splits.face_group[f]
-            print("g material{}_part{}".format(*splits.head["groups"][before]), file=file)
-        print("f", *(form.format(w + 1) for w in splits.faces[f]), file=file)
+    kinds = {kind: k for k, (kind, *_) in enumerate(splits.kinds)}
+    columns = {"v": [splits.numbers(0)] + ([splits.numbers(kinds[3])[:, :3]] if 3 in kinds else [])}
+    if 0 in kinds:
+        columns["vt"] = [np.float64(splits.numbers(kinds[0])) * [1, -1] + [0, 1]]  # v of OBJ grows upwards
+    if 2 in kinds:
+        columns["vn"] = [splits.numbers(kinds[2])]
+    for name, parts in columns.items():
+        rows = np.hstack(parts)
+        np.savetxt(file, rows, name + (" %.17g" if name == "vt" else " %.9g") * rows.shape[1])
+    corner = {3: "{0}/{0}/{0}", 2: "{0}//{0}" if 2 in kinds else "{0}/{0}", 1: "{0}"}[len(columns)]
+    group_of = splits.groups_of.__getitem__
+    for group, faces in itertools.groupby(sorted(splits.triangles(), key=group_of), key=group_of):
+        print("g material{}_part{}".format(*splits.groups[group]), file=file)
+        for f in faces:
+            print("f", *(corner.format(w + 1) for w in splits.wedge_of[3 * f : 3 * f + 3]), file=file)
 
 
 def run(options):
-    model = Model(options.package[0])
+    model = Model(options.package)
     if options.command == "info":
-        return show_info(model)
-    if options.command == "mesh":
-        splits, data = model.stream()
-        splits.decode(data, options.scale)
+        print(f"id {model.id}")
+        for path, (offset, size, digest) in model.index.items():
+            print(digest, offset, size, path)
+    elif options.command == "mesh":
+        splits = model.stream()
+        is_there = any(end["scale"] == options.scale for end in splits.scale_ends())
+        require(is_there, "S21", f"no scale {options.scale} in the stream")
         with open(options.output, "w", encoding="ascii") as file:
-            return (write_raw if options.raw else write_obj)(splits, file)
-    rungs = len(model.textures[options.plane]["rungQuality"])
-    rung = rungs - 1 if options.rung is None else options.rung
-    if not -1 <= rung < rungs:
-        sys.exit(f"the plane has {rungs} rungs")
-    shown = model.preview(options.plane) if rung < 0 else model.picture(options.plane, rung)
-    return shown.save(options.output, format="PNG")
+            (write_raw if options.raw else write_obj)(splits, file)
+    else:
+        p, rung = options.plane, options.rung
+        shown = model.preview(p) if rung == "preview" else model.picture(p, int(rung))
+        shown.save(options.output, format="PNG")
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("command", choices=("info", "picture", "mesh", "verify"))
-    parser.add_argument("package", nargs="+")
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("command", choices=("info", "picture", "mesh"))
+    parser.add_argument("package")
     parser.add_argument("--plane", type=int, default=0)
-    parser.add_argument("--rung", type=int, help="default: the highest; -1: the preview alone")
+    parser.add_argument("--rung", default="-1", help="a number, or preview; default: the highest")
     parser.add_argument("--scale", type=int, default=0)
     parser.add_argument("--raw", action="store_true", help="whole numbers of points, wedges and faces")
-    parser.add_argument("-o", "--output")
+    parser.add_argument("-o", "--output", default="/dev/stdout")
     options = parser.parse_args()
-    if options.command in ("picture", "mesh") and not options.output:
-        parser.error("-o OUTPUT is missing")
-    if options.command == "verify":
-        import conformance
-        sys.exit(0 if conformance.verify(options.package) else 1)
     try:
         run(options)
-    except (Refused, OSError) as error:
-        sys.exit(f"{options.package[0]}: refused: {error}")
-    except (KeyError, IndexError, TypeError, ValueError) as error:  # a document without a field, or of another type
-        sys.exit(f"{options.package[0]}: refused: J04: {error!r}")
+    except (Refused, OSError, KeyError, IndexError, TypeError, ValueError) as error:
+        is_told = isinstance(error, (Refused, OSError))  # else a field is missing, or of another type
+        sys.exit(f"{options.package}: refused: {error if is_told else f'J04: {error!r}'}")
 
 
 if __name__ == "__main__":

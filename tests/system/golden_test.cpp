@@ -1,6 +1,7 @@
 // Packages of every format version stay readable for ever (tests/golden/README.md).
 #include <gtest/gtest.h>
 
+#include <array>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
@@ -86,6 +87,41 @@ INSTANTIATE_TEST_SUITE_P(All, Golden, ::testing::ValuesIn(golden_packages()), []
       name.begin(), name.end(), [](char c) { return !std::isalnum(static_cast<unsigned char>(c)); }, '_');
   return name;
 });
+
+// A change of a default can take the feature out of a package that `make` makes anew.
+TEST(GoldenPackages, ShowTheirFeatures) {
+  const auto open = [](const std::string& name) {
+    return PackageReader(open_store((kGolden / ("v2.0-" + name + ".texmesh")).string()));
+  };
+  const auto text_of = [&](const std::string& name, const std::string& entry) {
+    const std::vector<std::uint8_t> bytes = open(name).entry(entry);
+    return std::string(bytes.begin(), bytes.end());
+  };
+  const std::vector<std::array<std::string, 3>> features{
+      {"webp", "textures.json", R"("codec":"webp")"},
+      {"progressive", "textures.json", R"("codec":"jpeg-progressive")"},
+      {"requantised", "textures.json", R"("sourceRung":true)"},
+      {"png-normals", "textures.json", R"("role":"normal")"},
+      {"alpha", "textures.json", R"("role":"alpha")"},
+      {"source", "textures.json", R"("source":"png")"},
+      {"nodes", "mesh/s00.glb", R"("name":"middle")"},
+      {"part-names", "mesh/s00.glb", R"("partNames")"},
+      {"proxies", "proxies/01.glb", "KHR_draco_mesh_compression"},
+  };
+  for (const auto& [name, entry, text] : features)
+    EXPECT_NE(text_of(name, entry).find(text), std::string::npos) << name << ": " << text;
+  EXPECT_EQ(text_of("proxies", "proxies/00.glb").find("KHR_draco_mesh_compression"), std::string::npos);
+  EXPECT_EQ(open("planes").textures().size(), 220u);
+  EXPECT_GT(open("requantised").textures().front().rungs.size(), 1u);
+}
+
+TEST(GoldenPackages, TheTreeIsThatOfItsContainer) {
+  testing::TemporaryFolder folder;
+  const std::string tree = (kGolden / "v2.0-tree").string(), packed = folder / "packed.texmesh";
+  for (const Finding& f : verify_package(*open_store(tree), {}).findings) ADD_FAILURE() << to_string(f);
+  ASSERT_EQ(testing::run_command({TEXMESH_BINARY, "pack", tree, "-o", packed}).exit_code, 0);
+  EXPECT_TRUE(testing::read_text(packed) == testing::read_text((kGolden / "v2.0-webp.texmesh").string()));
+}
 
 TEST(GoldenPackages, ThePresentVersionHasOne) {
   const std::string prefix = "v" + std::to_string(kFormatMajor) + "." + std::to_string(kFormatMinor) + "-";

@@ -47,10 +47,15 @@ struct SecondReader : ::testing::Test {
     if (python.empty()) GTEST_SKIP() << "no Python with numpy and Pillow (python3-numpy, python3-pil)";
     if (golden_packages().empty()) GTEST_SKIP() << "no golden package of format 2";
   }
-  static CommandResult run(std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(),
-                     {python, (kSource / "examples" / "reader" / "texmesh_reader.py").string()});
+  static CommandResult run_script(const char* script, std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), {python, (kSource / "examples" / "reader" / script).string()});
     return testing::run_command(arguments, {"PYTHONDONTWRITEBYTECODE=1"});
+  }
+  static CommandResult run(std::vector<std::string> arguments) {
+    return run_script("texmesh_reader.py", std::move(arguments));
+  }
+  static CommandResult check(std::vector<std::string> packages) {
+    return run_script("conformance.py", std::move(packages));
   }
   static inline std::string python;
   TemporaryFolder folder;
@@ -97,9 +102,14 @@ std::vector<float> numbers_of(const std::string& obj, const std::string& kind) {
 
 TEST_F(SecondReader, FindsNothingInGoldenPackages) {
   for (const std::string& path : golden_packages()) {
-    const CommandResult result = run({"verify", path});
+    const CommandResult result = check({path});
     EXPECT_EQ(result.exit_code, 0) << result.output;
   }
+}
+
+TEST_F(SecondReader, FindsNothingInTheGoldenTree) {
+  const CommandResult result = check({(kSource / "tests" / "golden" / "v2.0-tree").string()});
+  EXPECT_EQ(result.exit_code, 0) << result.output;
 }
 
 TEST_F(SecondReader, DecodesVerticesBitForBit) {
@@ -215,10 +225,8 @@ std::vector<std::string> make_invalid_packages(const std::string& python, const 
 TEST_F(SecondReader, RefusesByTheRuleThatIsBrokenAndSoDoesVerify) {
   std::vector<std::string> arguments = make_invalid_packages(python, folder / "invalid");
   EXPECT_GT(arguments.size(), 150u);
-  arguments.insert(arguments.begin(), "verify");
-  const std::string told = run(arguments).output;
-  for (std::size_t k = 1; k < arguments.size(); ++k) {
-    const std::string& path = arguments[k];
+  const std::string told = check(arguments).output;
+  for (const std::string& path : arguments) {
     const std::string rule = fs::path(path).filename().string().substr(0, 3);
     const std::size_t line = told.find(path + ": ");
     EXPECT_NE(told.find(path + ": refused: " + rule + ": "), std::string::npos)
@@ -281,7 +289,7 @@ TEST_F(SecondReader, ReadsALaterMinorVersionWithAZip64EndRecord) {
                 {python, (tests / "make_later").string(), (tests / "v2.0-webp.texmesh").string(), package})
                 .exit_code,
             0);
-  const CommandResult result = run({"verify", package});
+  const CommandResult result = check({package});
   EXPECT_EQ(result.exit_code, 0) << result.output;
   const VerifyReport report = verify_package(*open_store(package), {});
   for (const Finding& f : report.findings) ADD_FAILURE() << to_string(f);
@@ -291,7 +299,7 @@ TEST_F(SecondReader, ReadsALaterMinorVersionWithAZip64EndRecord) {
 
 TEST_F(SecondReader, FindsDamageEverywhere) {
   const std::string whole = testing::read_text((kSource / "tests" / "golden" / "v2.0-webp.texmesh").string());
-  std::vector<std::string> arguments{"verify"};
+  std::vector<std::string> arguments;
   const auto add = [&](const std::string& bytes) {
     arguments.push_back(folder / std::to_string(arguments.size()) + ".texmesh");
     testing::write_text(arguments.back(), bytes);
@@ -302,10 +310,9 @@ TEST_F(SecondReader, FindsDamageEverywhere) {
     flipped[at] = static_cast<char>(flipped[at] ^ 0x20);
     add(flipped);
   }
-  const std::string told = run(arguments).output;
-  for (std::size_t k = 1; k < arguments.size(); ++k)
-    EXPECT_NE(told.find(arguments[k] + ": refused: "), std::string::npos)
-        << arguments[k] << told.substr(0, 400);
+  const std::string told = check(arguments).output;
+  for (const std::string& path : arguments)
+    EXPECT_NE(told.find(path + ": refused: "), std::string::npos) << path << told.substr(0, 400);
 }
 
 TEST_F(SecondReader, ReadsTheTreeAsWell) {
@@ -313,7 +320,7 @@ TEST_F(SecondReader, ReadsTheTreeAsWell) {
   for (const std::string& golden : golden_packages()) {
     const std::string tree = folder / fs::path(golden).stem().string();
     ASSERT_EQ(testing::run_command({texmesh, "unpack", golden, "-o", tree}).exit_code, 0);
-    EXPECT_EQ(run({"verify", tree}).exit_code, 0) << golden;
+    EXPECT_EQ(check({tree}).exit_code, 0) << golden;
     EXPECT_EQ(run({"mesh", tree, "--raw", "-o", folder / "tree.raw"}).exit_code, 0);
     EXPECT_EQ(run({"mesh", golden, "--raw", "-o", folder / "container.raw"}).exit_code, 0);
     EXPECT_EQ(testing::read_text(folder / "tree.raw"), testing::read_text(folder / "container.raw"))
