@@ -17,6 +17,7 @@ add_test(NAME house_links COMMAND ${house}/check_links ${PROJECT_SOURCE_DIR})
 add_test(NAME house_links_self_test COMMAND ${house}/check_links --self-test)
 add_test(NAME house_docs COMMAND ${house}/check_docs ${PROJECT_SOURCE_DIR} $<TARGET_FILE:texmesh>)
 add_test(NAME house_docs_self_test COMMAND ${house}/check_docs --self-test)
+add_test(NAME house_bench_run COMMAND ${house}/check_bench_run ${PROJECT_SOURCE_DIR})
 add_test(NAME house_tour_self_test COMMAND ${house}/check_tour --self-test)
 if(NOT TEXMESH_SANITIZE)  # an instrumented library would ask the same of its user
   add_test(NAME house_install COMMAND ${house}/check_install ${PROJECT_BINARY_DIR} ${CMAKE_CURRENT_SOURCE_DIR}/consumer

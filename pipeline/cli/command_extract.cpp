@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -6,6 +7,7 @@
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/options/command_line.h"
 #include "pipeline/cli/options/common_options.h"
+#include "pipeline/cli/options/percent_line.h"
 #include "pipeline/cli/options/units.h"
 #include "pipeline/extract/extract.h"
 #include "pipeline/io/atomic_file.h"
@@ -28,12 +30,37 @@ std::uint32_t rung_of(const std::string& text) {
   return static_cast<std::uint32_t>(std::stoul(text));
 }
 
+/// A number of bytes, as the user wrote it.
+struct AskedBytes {
+  std::string text;
+  std::uint64_t bytes = 0;
+};
+
+std::vector<AskedBytes> asked_bytes(const std::string& list) {
+  std::vector<AskedBytes> out;
+  for (std::size_t at = 0; at <= list.size() && !list.empty();) {
+    const std::size_t end = std::min(list.find(',', at), list.size());
+    AskedBytes one{list.substr(at, end - at), 0};
+    one.bytes = parse_bytes(one.text, "--bytes");
+    if (one.bytes == 0) throw UsageError("--bytes", "", "numbers above 0", list);
+    if (std::ranges::find(out, one.text, &AskedBytes::text) != out.end())
+      throw UsageError("--bytes", "", "every number once", list);
+    out.push_back(std::move(one));
+    at = end + 1;
+  }
+  return out;
+}
+
+/// bust.glb becomes bust-50kB.glb.
+std::string output_for(const std::string& output, const AskedBytes& asked) {
+  std::filesystem::path path(output);
+  const std::string ending = path.extension().string();
+  path.replace_extension();
+  return path.string() + "-" + asked.text + ending;
+}
+
 ExtractRequest request_of(const ExtractArguments& a) {
   ExtractRequest r;
-  if (!a.bytes.empty()) {
-    r.bytes = parse_bytes(a.bytes, "--bytes");
-    if (r.bytes == 0) throw UsageError("--bytes", "", "a number above 0", a.bytes);
-  }
   if (a.scale >= 0) r.scale = a.scale;
   if (a.proxy >= 0) r.proxy = static_cast<std::uint32_t>(a.proxy);
   r.rung = rung_of(a.rung);
@@ -48,16 +75,40 @@ ExtractRequest request_of(const ExtractArguments& a) {
   return r;
 }
 
-int run_extract(const ExtractArguments& args) {
-  const ExtractRequest request = request_of(args);
-  check_output_file(args.output);  // not after the search
-  PackageReader package(open_store(args.package));
-  const Extracted extracted = extract_model(package, request, context_of(args.jobs));
-  write_output_file(args.output, extracted.glb);
-  const std::string file = std::filesystem::path(args.output).filename().string();
+void write_extracted(const ExtractArguments& args, const Extracted& extracted, const ExtractRequest& request,
+                     const std::string& output) {
+  write_output_file(output, extracted.glb);
+  const std::string file = std::filesystem::path(output).filename().string();
   std::cout << (args.json ? extract_json(extracted, request, file) + "\n"
                           : extract_text(extracted, request, file));
-  return extracted.within ? kExitOk : kExitDifferent;
+}
+
+int run_extract(const ExtractArguments& args) {
+  ExtractRequest request = request_of(args);
+  const std::vector<AskedBytes> asked = asked_bytes(args.bytes);
+  std::vector<std::string> outputs;
+  std::vector<std::uint64_t> bytes;
+  for (const AskedBytes& one : asked) {
+    outputs.push_back(asked.size() > 1 ? output_for(args.output, one) : args.output);
+    bytes.push_back(one.bytes);
+  }
+  if (asked.empty()) outputs.push_back(args.output);
+  for (const std::string& output : outputs) check_output_file(output);  // not after the search
+  PackageReader package(open_store(args.package));
+  PercentLine progress("extract");
+  RunContext context = context_of(args.jobs);
+  context.progress = [&](double fraction) { progress.show(fraction); };
+  const std::vector<Extracted> files = asked.empty()
+                                           ? std::vector<Extracted>{extract_model(package, request, context)}
+                                           : extract_budgets(package, request, bytes, context);
+  progress.end();
+  bool within = true;
+  for (std::size_t k = 0; k < files.size(); ++k) {
+    if (!asked.empty()) request.bytes = bytes[k];
+    write_extracted(args, files[k], request, outputs[k]);
+    within = within && files[k].within;
+  }
+  return within ? kExitOk : kExitDifferent;
 }
 
 void add_extract_options(Command& c, ExtractArguments& args) {
@@ -65,8 +116,10 @@ void add_extract_options(Command& c, ExtractArguments& args) {
   c.option("-o,--output", args.output, "The GLB to write").required().value_name("GLB");
   const Option bytes =
       c.option("--bytes", args.bytes,
-               "The best-looking file of at most so many bytes, and at least 98 % of them: 500kB, 2MB")
-          .value_name("SIZE");
+               "The best-looking file of at most so many bytes, and at least 98 % of them: 500kB, 2MB. "
+               "Several (50kB,500kB) give a file each, bust-50kB.glb and bust-500kB.glb for -o bust.glb, and "
+               "share the search")
+          .value_name("SIZE[,SIZE...]");
   const Option scale =
       c.option("--scale", args.scale,
                "This scale (texmesh dump lists the scales); default: the scale that suits --display")
@@ -107,7 +160,9 @@ void add_extract_options(Command& c, ExtractArguments& args) {
   c.flag("--recentre", args.recentre,
          "Leave the model near 0, in the frame of the package's meshes; default: where the source has it");
   add_jobs_option(c, args.jobs);
-  c.flag("--json", args.json, "Print what was chosen as one JSON object (schemas/extract.v1.schema.json)");
+  c.flag(
+      "--json", args.json,
+      "Print what was chosen as one JSON object for each file, a line each (schemas/extract.v1.schema.json)");
 }
 
 }  // namespace
@@ -118,6 +173,7 @@ void add_extract_command(Command& app) {
   add_extract_options(c, *args);
   c.examples(
       "  texmesh extract bust.texmesh --bytes 500kB -o bust.glb\n"
+      "  texmesh extract bust.texmesh --bytes 50kB,100kB,500kB -o bust.glb\n"
       "  texmesh extract bust.texmesh --scale 0 --rung max --image-format png -o master.glb\n"
       "  texmesh extract https://host/bust.texmesh --display 800 -o bust.glb\n"
       "  texmesh extract bust.texmesh --lods --bytes 2MB -o bust.glb");

@@ -151,9 +151,16 @@ Extracted extract_whole(PackageReader& package, const ExtractRequest& request, c
 Extracted extract_model(PackageReader& package, const ExtractRequest& request, const RunContext& context) {
   if (request.proxy) return extract_proxy(package, request, *request.proxy, context);
   if (request.bytes == 0) return extract_whole(package, request, context);
-  Extracted out = extract_bytes(package, request, context);
-  if (about_within(package.about(), request.bytes / kAboutShare) != package.about())
-    out.notes.emplace_back("the file is too small for all that is known of the object; see dump PKG about");
+  return std::move(extract_budgets(package, request, {request.bytes}, context).front());
+}
+
+std::vector<Extracted> extract_budgets(PackageReader& package, const ExtractRequest& request,
+                                       const std::vector<std::uint64_t>& bytes, const RunContext& context) {
+  std::vector<Extracted> out = extract_bytes(package, request, bytes, context);
+  for (std::size_t k = 0; k < out.size(); ++k)
+    if (about_within(package.about(), bytes[k] / kAboutShare) != package.about())
+      out[k].notes.emplace_back(
+          "the file is too small for all that is known of the object; see dump PKG about");
   return out;
 }
 

@@ -1,5 +1,9 @@
 #include "pipeline/graph/graph_run.h"
 
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
+
 #include <algorithm>
 #include <stdexcept>
 #include <utility>
@@ -12,7 +16,15 @@
 namespace texmesh {
 namespace {
 constexpr int kMostThreads = 4;  // stages side by side: each has threads of its own
+
+/// What a stage has freed goes back to the system: the next stages ask for blocks of other sizes, and would
+/// find no place between those that are left (126 MB on a saxophone).
+void return_free_memory() {
+#ifdef __GLIBC__
+  ::malloc_trim(0);
+#endif
 }
+}  // namespace
 
 struct GraphRun::Parts {
   Parts(const std::vector<Stage>& all, Store& store_of_results, const RunContext& run_context,
@@ -94,6 +106,7 @@ Object GraphRun::run_object(const ArtefactName& wanted) {
       [&p](std::size_t i) {
         p.executor.bring_up_to_date(i);
         if (p.stages[i].stored) p.artefacts.release_inputs(p.stages[i]);
+        return_free_memory();
       });
   scheduler.run_all(std::clamp(p.context.threads, 1, kMostThreads));
   if (const auto left = scheduler.tasks_not_run(); !left.empty())

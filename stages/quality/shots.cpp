@@ -36,17 +36,16 @@ struct Task {
   bool with_ssim;
 
   /// One picture per list of materials.
-  std::vector<Picture> pictures(std::size_t scale, const PicturePlace& place,
-                                const std::vector<const Materials*>& materials,
-                                const RunContext& context) const {
+  PictureVariants pictures(std::size_t scale, const PicturePlace& place,
+                           const std::vector<const Materials*>& materials, const RunContext& context) const {
     RenderScene scene = studio.scenes[scale];
     scene.materials = materials.front();
     scene.texture_count = studio.textures.size();
     return shade_variants(scene, look(scene, place.camera, place.side_px, context), materials,
                           studio.textures, studio.environment, context);
   }
-  std::vector<Picture> pictures(const ScaleShots& of, const PicturePlace& place, bool with_source,
-                                const RunContext& context) const {
+  PictureVariants pictures(const ScaleShots& of, const PicturePlace& place, bool with_source,
+                           const RunContext& context) const {
     std::vector<const Materials*> materials;
     if (with_source) materials.push_back(&source);
     for (const std::size_t i : of.shots) materials.push_back(shots[i].materials);
@@ -72,18 +71,19 @@ struct Task {
       finest = std::move(*found);
       groups.erase(found);
     }
-    const std::vector<Picture> first = pictures(finest, place, true, context);
-    const Reference seen = reference(first.front());
+    const PictureVariants first = pictures(finest, place, true, context);
+    const Reference seen = reference(first.picture(0));
     parallel_for(context, finest.shots.size(), 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) out[finest.shots[i]][view] = compare(seen, first[i + 1]);
+      for (std::size_t i = begin; i < end; ++i)
+        out[finest.shots[i]][view] = compare(seen, first.picture(i + 1));
     });
     RunContext serial = context;
     serial.threads = 1;
     parallel_for(context, groups.size(), 1, [&](std::size_t begin, std::size_t end) {
       for (std::size_t g = begin; g < end; ++g) {
-        const std::vector<Picture> shown = pictures(groups[g], place, false, serial);
-        for (std::size_t i = 0; i < shown.size(); ++i)
-          out[groups[g].shots[i]][view] = compare(seen, shown[i]);
+        const PictureVariants shown = pictures(groups[g], place, false, serial);
+        for (std::size_t i = 0; i < shown.count(); ++i)
+          out[groups[g].shots[i]][view] = compare(seen, shown.picture(i));
       }
     });
   }

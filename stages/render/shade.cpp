@@ -60,16 +60,17 @@ class Samples {
 /// The fragments of one pixel at a time, in all variants.
 class PixelShader {
  public:
-  PixelShader(const render::FragmentShader& shader, std::vector<Picture>& pictures, Vec3f background)
+  PixelShader(const render::FragmentShader& shader, PictureVariants& pictures, Vec3f background)
       : shader_(shader),
         pictures_(pictures),
         background_(background),
-        colours_(pictures.size() * (kMaxLayers + kSamples)) {}
+        colours_(pictures.count() * (kMaxLayers + kSamples)) {}
 
+  /// `at` indexes the pictures' places.
   void shade(std::size_t at, std::span<const RenderFragment> fragments) {
-    const std::size_t variants = pictures_.size();
+    const std::size_t variants = pictures_.count();
     for (std::size_t i = 0; i < fragments.size(); ++i)
-      shader_.colours_of(static_cast<std::uint32_t>(at), fragments[i], scratch_,
+      shader_.colours_of(pictures_.places()[at], fragments[i], scratch_,
                          {colours_.data() + i * variants, variants});
     const bool layers = fragments.front().layer != 0;
     for (std::size_t v = 0; v < variants; ++v) {
@@ -82,7 +83,7 @@ class PixelShader {
 
  private:
   const FragmentColour& colour(std::size_t fragment, std::size_t variant) const {
-    return colours_[fragment * pictures_.size() + variant];
+    return colours_[fragment * pictures_.count() + variant];
   }
 
   /// Nothing can be seen through what the pixel shows.
@@ -94,8 +95,7 @@ class PixelShader {
       sum = sum + colour(i, variant).linear * share;
       left -= share;
     }
-    pictures_[variant].linear[at] = sum + background_ * left;
-    pictures_[variant].covered[at] = 1;
+    pictures_.set(variant, at, sum + background_ * left, true);
   }
 
   void put_layers(std::size_t at, std::span<const RenderFragment> fragments, std::size_t variant) {
@@ -111,12 +111,11 @@ class PixelShader {
       if (c.alpha > 0) samples.put_behind(fragments[i].mask, c.linear, c.alpha);
     }
     samples.put_behind((1u << kSamples) - 1, background_, 1);
-    pictures_[variant].linear[at] = samples.mean();
-    pictures_[variant].covered[at] = covered;
+    pictures_.set(variant, at, samples.mean(), covered);
   }
 
   const render::FragmentShader& shader_;
-  std::vector<Picture>& pictures_;
+  PictureVariants& pictures_;
   Vec3f background_;
   render::FragmentShader::Scratch scratch_;
   std::vector<FragmentColour> colours_;  // [fragment][variant]
@@ -124,25 +123,42 @@ class PixelShader {
 
 }  // namespace
 
-std::vector<Picture> shade_variants(const RenderScene& scene, const Visibility& visibility,
-                                    std::span<const std::vector<RenderMaterial>* const> variants,
-                                    const std::vector<RenderTexture>& textures,
-                                    const RenderEnvironment& environment, const RunContext& context) {
-  const render::FragmentShader shader(scene, visibility, variants, textures, environment);
-  const std::size_t pixels = static_cast<std::size_t>(visibility.side_px) * visibility.side_px;
-  std::vector<Picture> out(variants.size());
-  for (Picture& picture : out) {
-    picture.side_px = visibility.side_px;
-    picture.linear.assign(pixels, environment.background);
-    picture.covered.assign(pixels, 0);
+PictureVariants::PictureVariants(const Visibility& visibility, std::size_t count, Vec3f background)
+    : side_px_(visibility.side_px), background_(background) {
+  if (count == 0) return;
+  const std::vector<std::uint32_t>& first = visibility.first;
+  std::size_t shown = 0;
+  for (std::size_t i = 0; i + 1 < first.size(); ++i) shown += first[i] < first[i + 1];
+  places_.reserve(shown);
+  for (std::size_t i = 0; i + 1 < first.size(); ++i)
+    if (first[i] < first[i + 1]) places_.push_back(static_cast<std::uint32_t>(i));
+  shown_.assign(count, {std::vector<Vec3f>(shown), std::vector<std::uint8_t>(shown)});
+}
+
+Picture PictureVariants::picture(std::size_t variant) const {
+  const std::size_t pixels = static_cast<std::size_t>(side_px_) * side_px_;
+  const Shown& shown = shown_.at(variant);
+  Picture out{side_px_, std::vector<Vec3f>(pixels, background_), std::vector<std::uint8_t>(pixels)};
+  for (std::size_t i = 0; i < places_.size(); ++i) {
+    out.linear[places_[i]] = shown.linear[i];
+    out.covered[places_[i]] = shown.covered[i];
   }
-  if (out.empty()) return out;
-  parallel_for(context, pixels, 1024, [&](std::size_t begin, std::size_t end) {
+  return out;
+}
+
+PictureVariants shade_variants(const RenderScene& scene, const Visibility& visibility,
+                               std::span<const std::vector<RenderMaterial>* const> variants,
+                               const std::vector<RenderTexture>& textures,
+                               const RenderEnvironment& environment, const RunContext& context) {
+  const render::FragmentShader shader(scene, visibility, variants, textures, environment);
+  PictureVariants out(visibility, variants.size(), environment.background);
+  const std::vector<std::uint32_t>& places = out.places();
+  parallel_for(context, places.size(), 256, [&](std::size_t begin, std::size_t end) {
     PixelShader pixel(shader, out, environment.background);
-    for (std::size_t i = begin; i < end; ++i)
-      if (visibility.first[i] < visibility.first[i + 1])
-        pixel.shade(i, {visibility.fragments.data() + visibility.first[i],
-                        visibility.first[i + 1] - visibility.first[i]});
+    for (std::size_t i = begin; i < end; ++i) {
+      const std::uint32_t first = visibility.first[places[i]];
+      pixel.shade(i, {visibility.fragments.data() + first, visibility.first[places[i] + 1] - first});
+    }
   });
   return out;
 }
@@ -151,8 +167,7 @@ Picture shade(const RenderScene& scene, const Visibility& visibility,
               const std::vector<RenderTexture>& textures, const RenderEnvironment& environment,
               const RunContext& context) {
   const std::vector<RenderMaterial>* const materials = scene.materials;
-  return std::move(
-      shade_variants(scene, visibility, {&materials, 1}, textures, environment, context).front());
+  return shade_variants(scene, visibility, {&materials, 1}, textures, environment, context).picture(0);
 }
 
 Vec3f tone_mapped(Vec3f linear) {

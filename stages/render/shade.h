@@ -23,13 +23,43 @@ Picture shade(const RenderScene& scene, const Visibility& visibility,
               const std::vector<RenderTexture>& textures, const RenderEnvironment& environment,
               const RunContext& context);
 
+/// Several pictures of one view. Only the pixels that show something are kept, 13 bytes each a picture: a
+/// dozen whole pictures 1300 px high would take 260 MB.
+class PictureVariants {
+ public:
+  /// Pictures of the background alone, whose shown pixels are still to be set. `visibility` tells which
+  /// pixels show something.
+  PictureVariants(const Visibility& visibility, std::size_t count, Vec3f background);
+  std::size_t count() const { return shown_.size(); }
+  /// The whole picture.
+  Picture picture(std::size_t variant) const;
+
+  /// Places of the shown pixels in the pictures, rising.
+  const std::vector<std::uint32_t>& places() const { return places_; }
+  /// `at` indexes places(). Different threads may set different pixels.
+  void set(std::size_t variant, std::size_t at, Vec3f linear, bool covered) {
+    shown_[variant].linear[at] = linear;
+    shown_[variant].covered[at] = covered;
+  }
+
+ private:
+  struct Shown {
+    std::vector<Vec3f> linear;          // by place
+    std::vector<std::uint8_t> covered;  // the same
+  };
+  std::uint32_t side_px_;
+  Vec3f background_;
+  std::vector<std::uint32_t> places_;
+  std::vector<Shown> shown_;
+};
+
 /// shade() with each of several lists of materials, which differ from the scene's in the textures of their
 /// slots alone. Costs less, since what the pictures have in common is worked out once.
 /// std::invalid_argument for a list of another length.
-std::vector<Picture> shade_variants(const RenderScene& scene, const Visibility& visibility,
-                                    std::span<const std::vector<RenderMaterial>* const> variants,
-                                    const std::vector<RenderTexture>& textures,
-                                    const RenderEnvironment& environment, const RunContext& context);
+PictureVariants shade_variants(const RenderScene& scene, const Visibility& visibility,
+                               std::span<const std::vector<RenderMaterial>* const> variants,
+                               const std::vector<RenderTexture>& textures,
+                               const RenderEnvironment& environment, const RunContext& context);
 
 /// Khronos PBR Neutral of linear RGB >= 0, cut to 0..1.
 Vec3f tone_mapped(Vec3f linear);

@@ -1,7 +1,10 @@
 #include "pipeline/extract/budget/budget_search.h"
 
 #include <algorithm>
+#include <functional>
 #include <map>
+#include <memory>
+#include <numeric>
 #include <set>
 
 #include "pipeline/extract/budget/budget_file.h"
@@ -20,22 +23,44 @@ constexpr int kMeshTries = 12;
 constexpr double kSurely = 0.9;                         // of a loss that others tell
 constexpr double kUsualBytes = 3.5, kLeastBytes = 1.5;  // of a coded triangle
 
+/// What searches for several numbers of bytes share.
+struct SharedSearch {
+  SharedSearch(PackageReader& package, const ExtractRequest& request, bool for_several,
+               const RunContext& context)
+      : source(package, request, context),
+        meshes(source, for_several),
+        coder(source),
+        curves(source, coder),
+        proxies(source) {}
+  void set_bytes(std::uint64_t bytes) {
+    if (source.request.bytes == bytes) return;
+    source.request.bytes = bytes;
+    meshes.forget_all();
+  }
+  BudgetSource source;
+  MeshCandidates meshes;
+  ImageCoder coder;
+  LossCurves curves;
+  ProxyOffers proxies;
+};
+
 /// Scale, coding of the mesh and textures, chosen together by what files look like.
 class BudgetSearch {
  public:
-  BudgetSearch(PackageReader& package, const ExtractRequest& request, const RunContext& context)
-      : source_(package, request, context),
-        meshes_(source_),
-        coder_(source_),
-        curves_(source_, coder_),
+  explicit BudgetSearch(SharedSearch& shared)
+      : source_(shared.source),
+        meshes_(shared.meshes),
+        coder_(shared.coder),
+        curves_(shared.curves),
         filler_(source_, coder_) {}
 
-  BudgetSource& source() { return source_; }
-
-  Extracted run() {
+  /// `report`: parts of the way.
+  Extracted run(const std::function<void(double)>& report) {
     curves_.measure(static_cast<double>(source_.request.bytes) -
                     kUsualBytes * static_cast<double>(scales()[start().scale].triangles));
+    report(0.4);
     const MeshKey best = choose_mesh();
+    report(0.7);
     BudgetFile file = filler_.fill(meshes_.at(best), curves_.allocate(bytes_left(meshes_.at(best))));
     const MeshKey filled = filler_.fits(file) && !filler_.fills(file) ? fill_by_mesh(best, file) : best;
     return finish(filled, std::move(file));
@@ -186,7 +211,7 @@ class BudgetSearch {
     OtherTextures textures;
     for (std::size_t i = 0; i < source_.image_count(); ++i)
       textures.merge(coder_.shown_by(i, file.images.at(source_.image(i).image), source_.context));
-    const LitViews views(mesh.mesh, source_.cameras, source_.context);
+    const LitViews views(meshes_.mesh(key), source_.cameras, source_.context);
     std::vector<OtherTextures> changes;
     changes.emplace_back();  // none: what the mesh alone costs
     changes.push_back(std::move(textures));
@@ -198,10 +223,10 @@ class BudgetSearch {
     return out;
   }
 
-  BudgetSource source_;
-  MeshCandidates meshes_;
-  ImageCoder coder_;
-  LossCurves curves_;
+  BudgetSource& source_;
+  MeshCandidates& meshes_;
+  ImageCoder& coder_;
+  LossCurves& curves_;
   BudgetFiller filler_;
   std::set<MeshKey> seen_;
   std::map<MeshKey, double> geometry_;  // of meshes looked at: MeshCandidate::geometry
@@ -227,10 +252,32 @@ double screen_coverage_of(const Manifest& manifest, int scale) {
   return share * share;
 }
 
-Extracted extract_bytes(PackageReader& package, const ExtractRequest& request, const RunContext& context) {
-  BudgetSearch search(package, request, context);
-  Extracted out = search.run();
-  offer_proxies(search.source(), out);
+std::vector<Extracted> extract_bytes(PackageReader& package, const ExtractRequest& request,
+                                     const std::vector<std::uint64_t>& bytes, const RunContext& context) {
+  std::vector<std::size_t> order(bytes.size());  // rising: neighbours share most
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::stable_sort(order, {}, [&](std::size_t k) { return bytes[k]; });
+  std::vector<Extracted> out(bytes.size());
+  std::unique_ptr<SharedSearch> shared;
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const std::uint64_t wanted = bytes[order[i]];
+    const auto report = [&](double part) {
+      context.report((static_cast<double>(i) + part) / static_cast<double>(order.size()));
+    };
+    if (!shared || !shared->source.serves(wanted)) {
+      ExtractRequest one = request;
+      one.bytes = wanted;
+      shared.reset();  // before the next one needs the memory
+      shared = std::make_unique<SharedSearch>(package, one, bytes.size() > 1, context);
+    }
+    shared->set_bytes(wanted);
+    report(0.2);
+    Extracted& found = out[order[i]];
+    found = BudgetSearch(*shared).run(report);
+    report(0.9);
+    shared->proxies.offer(found);
+    report(1);
+  }
   return out;
 }
 

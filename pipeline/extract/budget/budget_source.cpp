@@ -20,6 +20,10 @@ constexpr int kWindowsPerView = 1;
 constexpr std::uint32_t kWindowPx = 80;
 constexpr double kFinestShown = 12;  // texels per pixel: pictures hardly read finer ones
 
+double most_texels(std::uint64_t bytes) {
+  return std::max(kTexelsPerByte * static_cast<double>(bytes), 65536.0);
+}
+
 double longest_side(const Mesh& mesh) {
   const double side = to_double(bounding_box(mesh.positions)).longest_side();
   return side > 0 ? side : 1;
@@ -40,7 +44,7 @@ BudgetSource::BudgetSource(PackageReader& from, const ExtractRequest& wishes, co
       context(run),
       display_px(wishes.display_px > 0 ? wishes.display_px : kBudgetDisplayPx),
       side_px(static_cast<std::uint32_t>(std::clamp(display_px, 64.0, 768.0))),
-      textures(from, std::max(kTexelsPerByte * static_cast<double>(wishes.bytes), 65536.0), run) {
+      textures(from, most_texels(wishes.bytes), run) {
   context.progress = nullptr;
   source = read_model(scale_file(package, 0, context), mesh_path(0), context);
   const BoundingSphere sphere = sphere_of(source.mesh);
@@ -60,6 +64,8 @@ BudgetSource::BudgetSource(PackageReader& from, const ExtractRequest& wishes, co
   finest_windows = std::make_unique<LitViews>(finest, windows, context);
   window_meter = std::make_unique<LitMeter>(*finest_windows, best_textures, environment, context);
 }
+
+bool BudgetSource::serves(std::uint64_t bytes) const { return textures.serves(most_texels(bytes)); }
 
 std::int32_t BudgetSource::shown_texture(const Model& model, const TextureRef& reference,
                                          TextureUse use) const {

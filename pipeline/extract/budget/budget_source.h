@@ -21,6 +21,8 @@ struct ShownTexture {
 /// with, and its textures. For .cpp files of this folder.
 struct BudgetSource {
   BudgetSource(PackageReader& package, const ExtractRequest& request, const RunContext& context);
+  /// Whether a source for so many bytes is the same but for request.bytes, which may be set then.
+  bool serves(std::uint64_t bytes) const;
 
   const PackageImage& image(std::size_t index) const { return textures.images()[index]; }
   std::size_t image_count() const { return textures.images().size(); }

@@ -1,4 +1,5 @@
 #pragma once
+#include <compare>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -19,7 +20,7 @@ struct TextureCoding {
   /// The package's own coefficients of the source, at full size: quality 100 is the source's own, of which
   /// less quality keeps less. What was never decoded loses nothing.
   bool stored = false;
-  friend bool operator==(const TextureCoding&, const TextureCoding&) = default;
+  friend auto operator<=>(const TextureCoding&, const TextureCoding&) = default;
 };
 
 /// What becomes of an image.

@@ -71,10 +71,9 @@ Picture LitViews::picture(std::size_t view, const std::vector<RenderTexture>& te
                environment, context);
 }
 
-std::vector<Picture> LitViews::pictures(std::size_t view, const std::vector<const Materials*>& materials,
-                                        const std::vector<RenderTexture>& textures,
-                                        const RenderEnvironment& environment,
-                                        const RunContext& context) const {
+PictureVariants LitViews::pictures(std::size_t view, const std::vector<const Materials*>& materials,
+                                   const std::vector<RenderTexture>& textures,
+                                   const RenderEnvironment& environment, const RunContext& context) const {
   return shade_variants(render_scene(mesh_->mesh, mesh_->materials, textures.size()), views_[view], materials,
                         textures, environment, context);
 }
@@ -144,10 +143,10 @@ std::vector<double> LitMeter::differences(const LitViews& views, const std::vect
   for (const Materials& m : materials) lists.push_back(&m);
   std::vector<double> sums(changes.size());
   for (std::size_t v = 0; v < reference_.size(); ++v) {
-    const std::vector<Picture> pictures = views.pictures(v, lists, all, environment_, context);
+    const PictureVariants pictures = views.pictures(v, lists, all, environment_, context);
     parallel_for(context, sums.size(), 1, [&](std::size_t begin, std::size_t end) {
       for (std::size_t k = begin; k < end; ++k)
-        sums[k] += weights_[v] * flip_of(reference_[v], prepare_flip(pictures[k + 1]));
+        sums[k] += weights_[v] * flip_of(reference_[v], prepare_flip(pictures.picture(k + 1)));
     });
   }
   return sums;

@@ -39,10 +39,9 @@ class LitViews {
   Picture picture(std::size_t view, const std::vector<RenderTexture>& textures,
                   const RenderEnvironment& environment, const RunContext& context) const;
   /// One per list of materials, which differ from the mesh's in the textures of their slots alone.
-  std::vector<Picture> pictures(std::size_t view,
-                                const std::vector<const std::vector<RenderMaterial>*>& materials,
-                                const std::vector<RenderTexture>& textures,
-                                const RenderEnvironment& environment, const RunContext& context) const;
+  PictureVariants pictures(std::size_t view, const std::vector<const std::vector<RenderMaterial>*>& materials,
+                           const std::vector<RenderTexture>& textures, const RenderEnvironment& environment,
+                           const RunContext& context) const;
 
  private:
   const LitMesh* mesh_;

@@ -106,8 +106,12 @@ class LossCurves::Trials {
 };
 
 void LossCurves::render(const std::vector<Trial>& trials) {
-  for (std::size_t first = 0; first < trials.size(); first += kTrialsAtOnce)
-    render_part({trials.data() + first, std::min(kTrialsAtOnce, trials.size() - first)});
+  std::vector<Trial> fresh;
+  for (const Trial& t : trials)
+    if (!measured_.contains(t.key())) fresh.push_back(t);
+  for (std::size_t first = 0; first < fresh.size(); first += kTrialsAtOnce)
+    render_part({fresh.data() + first, std::min(kTrialsAtOnce, fresh.size() - first)});
+  for (const Trial& t : trials) seen_[t.image].push_back(measured_.at(t.key()));
 }
 
 void LossCurves::render_part(std::span<const Trial> trials) {
@@ -134,7 +138,7 @@ void LossCurves::render_part(std::span<const Trial> trials) {
       *source_.finest_windows, source_.best_textures, std::move(textures), source_.context);
   for (std::size_t k = 0; k < trials.size(); ++k) {
     found[k].loss = joined(losses[k]);
-    seen_[trials[k].image].push_back(found[k]);
+    measured_[trials[k].key()] = found[k];
   }
 }
 

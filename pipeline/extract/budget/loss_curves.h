@@ -1,6 +1,8 @@
 #pragma once
 #include <cstddef>
+#include <map>
 #include <span>
+#include <tuple>
 #include <vector>
 
 #include "pipeline/extract/budget/image_coder.h"
@@ -32,17 +34,20 @@ struct Allocation {
 class LossCurves {
  public:
   LossCurves(BudgetSource& source, ImageCoder& coder) : source_(source), coder_(coder) {}
-  /// Measures files around what each image may get of `bytes` for all of them.
+  /// Measures files around what each image may get of `bytes` for all of them. What was measured for other
+  /// bytes is remembered and changes nothing but the time.
   void measure(double bytes);
   /// The least loss of at most `bytes`; the smallest files where nothing fits.
   Allocation allocate(double bytes) const;
 
  private:
+  using TrialKey = std::tuple<std::size_t, int, TextureCoding, double>;
   struct Trial {
     std::size_t image = 0;
     int step = 0;
     TextureCoding coding;
     double quality = 0;
+    TrialKey key() const { return {image, step, coding, quality}; }
   };
   /// The trials that are of use and new.
   class Trials;
@@ -57,6 +62,7 @@ class LossCurves {
   std::vector<double> group_losses(const Allocation& allocation) const;
   BudgetSource& source_;
   ImageCoder& coder_;
+  std::map<TrialKey, CodedImage> measured_;             // all that were ever rendered
   std::vector<std::vector<CodedImage>> seen_, curves_;  // by image; curves by rising bytes, convex
 };
 

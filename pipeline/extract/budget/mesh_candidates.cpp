@@ -50,27 +50,74 @@ std::unique_ptr<StandaloneGlb> MeshCandidates::recoded_scale(int scale, const Me
   return file;
 }
 
+int MeshCandidates::scale_of(const MeshKey& key) const {
+  return source_.package.manifest().scales[key.scale].scale;
+}
+
+std::vector<int> MeshCandidates::levels(const MeshKey& key) const {
+  if (!source_.request.lods) return {scale_of(key)};
+  return levels_of(source_.package.manifest(), scale_of(key));
+}
+
+std::unique_ptr<LitMesh> MeshCandidates::lit_mesh(const StandaloneGlb& file, const MeshKey& key) const {
+  Model model = read_model(file, mesh_path(scale_of(key)), source_.context);
+  return std::make_unique<LitMesh>(source_.lit_mesh(model));
+}
+
+const MeshCandidates::Shape& MeshCandidates::shape(const MeshKey& key) {
+  const auto [it, fresh] = shapes_.try_emplace(key);
+  Shape& s = it->second;
+  if (!fresh) return s;
+  const Manifest& m = source_.package.manifest();
+  const std::vector<int> all = levels(key);
+  std::unique_ptr<StandaloneGlb> file = recoded_scale(all[0], key);
+  s.mesh = lit_mesh(*file, key);
+  if (source_.request.lods) file->begin_levels(screen_coverage_of(m, all[0]));
+  for (std::size_t l = 1; l < all.size(); ++l)
+    file->add_level(*recoded_scale(all[l], key), screen_coverage_of(m, all[l]));
+  if (!source_.request.recentre) file->move_to(m.origin);
+  s.file = std::move(file);
+  const LitViews windows(*s.mesh, source_.windows, source_.context);
+  s.geometry = source_.window_meter->difference(windows, source_.best_textures, source_.context);
+  return s;
+}
+
 const MeshCandidate& MeshCandidates::at(const MeshKey& key) {
   const auto [it, fresh] = made_.try_emplace(key);
   MeshCandidate& c = it->second;
   if (!fresh) return c;
-  const Manifest& m = source_.package.manifest();
-  c.scale = m.scales[key.scale].scale;
-  c.triangles = m.scales[key.scale].triangles;
-  c.levels = source_.request.lods ? levels_of(m, c.scale) : std::vector<int>{c.scale};
-  std::unique_ptr<StandaloneGlb> file = recoded_scale(c.scale, key);
-  Model model = read_model(*file, mesh_path(c.scale), source_.context);
-  c.mesh = source_.lit_mesh(model);
-  if (source_.request.lods) file->begin_levels(screen_coverage_of(m, c.scale));
-  for (std::size_t l = 1; l < c.levels.size(); ++l)
-    file->add_level(*recoded_scale(c.levels[l], key), screen_coverage_of(m, c.levels[l]));
-  if (!source_.request.recentre) file->move_to(m.origin);
+  const Shape& s = shape(key);
+  c.scale = scale_of(key);
+  c.levels = levels(key);
+  c.triangles = source_.package.manifest().scales[key.scale].triangles;
+  c.geometry = s.geometry;
+  auto file = std::make_shared<StandaloneGlb>(*s.file);
   file->set_about(about_within(source_.package.about(), source_.request.bytes / kAboutShare));
   c.file = std::move(file);
   c.fixed_bytes = c.file_with({}).size();
-  c.windows = std::make_unique<LitViews>(c.mesh, source_.windows, source_.context);
-  c.geometry = source_.window_meter->difference(*c.windows, source_.best_textures, source_.context);
   return c;
+}
+
+const LitMesh& MeshCandidates::mesh(const MeshKey& key) {
+  shape(key);
+  Shape& s = shapes_.at(key);
+  if (!s.mesh) s.mesh = lit_mesh(*recoded_scale(scale_of(key), key), key);
+  return *s.mesh;
+}
+
+void MeshCandidates::forget(const MeshKey& key) {
+  made_.erase(key);
+  const auto it = shapes_.find(key);
+  if (it == shapes_.end()) return;
+  if (for_several_)
+    it->second.mesh.reset();
+  else
+    shapes_.erase(it);
+}
+
+void MeshCandidates::forget_all() {
+  made_.clear();
+  for (auto& [key, shape] : shapes_) shape.mesh.reset();
 }
 
 }  // namespace texmesh

@@ -27,8 +27,6 @@ struct MeshCandidate {
   std::vector<int> levels;
   std::uint64_t triangles = 0;
   std::shared_ptr<const StandaloneGlb> file;
-  LitMesh mesh;
-  std::unique_ptr<LitViews> windows;
   std::uint64_t fixed_bytes = 0;  // the file without its images' bytes
   double geometry = 0;            // difference with the best textures, in the windows
 
@@ -39,15 +37,33 @@ struct MeshCandidate {
 /// Makes candidates when they are first asked for, and keeps them until forget().
 class MeshCandidates {
  public:
-  explicit MeshCandidates(const BudgetSource& source) : source_(source) {}
+  /// `for_several`: coded meshes are kept for searches for other numbers of bytes.
+  explicit MeshCandidates(const BudgetSource& source, bool for_several = false)
+      : source_(source), for_several_(for_several) {}
   const MeshCandidate& at(const MeshKey& key);
-  void forget(const MeshKey& key) { made_.erase(key); }  // a candidate's pictures take tens of megabytes
+  /// The mesh as viewers show it.
+  const LitMesh& mesh(const MeshKey& key);
+  void forget(const MeshKey& key);  // a mesh takes tens of megabytes
+  /// Before a search for another number of bytes: BudgetSource::request has changed.
+  void forget_all();
 
  private:
+  /// What does not depend on the number of bytes.
+  struct Shape {
+    std::shared_ptr<const StandaloneGlb> file;  // without what is known of the object
+    std::unique_ptr<LitMesh> mesh;              // or null: to be made again
+    double geometry = 0;
+  };
   DracoSteps steps_of(const MeshKey& key) const;
+  int scale_of(const MeshKey& key) const;
+  std::vector<int> levels(const MeshKey& key) const;
   std::unique_ptr<StandaloneGlb> recoded_scale(int scale, const MeshKey& key) const;
+  std::unique_ptr<LitMesh> lit_mesh(const StandaloneGlb& file, const MeshKey& key) const;
+  const Shape& shape(const MeshKey& key);
   const BudgetSource& source_;
+  bool for_several_;
   std::map<MeshKey, MeshCandidate> made_;
+  std::map<MeshKey, Shape> shapes_;
 };
 
 }  // namespace texmesh

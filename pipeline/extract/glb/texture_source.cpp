@@ -66,10 +66,17 @@ std::vector<PackageImage> package_images(PackageReader& package) {
 TextureSource::TextureSource(PackageReader& package, double most_texels, const RunContext& context)
     : package_(package), context_(context), images_(package_images(package)) {
   context_.progress = nullptr;
+  first_level_ = halvings(most_texels);
+}
+
+/// How often sides of colours are halved.
+std::uint32_t TextureSource::halvings(double most_texels) const {
   double texels = 0;
   for (const PackageImage& i : images_)
     if (i.colours) texels += static_cast<double>(i.width_px) * i.height_px;
-  for (; texels > most_texels && first_level_ < 20; texels /= 4) ++first_level_;
+  std::uint32_t times = 0;
+  for (; texels > most_texels && times < 20; texels /= 4) ++times;
+  return times;
 }
 
 double TextureSource::largest_share(std::size_t index) {

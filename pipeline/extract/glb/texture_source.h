@@ -42,8 +42,11 @@ class TextureSource {
                 const std::vector<std::uint8_t>& coverage, float sharpening = kSharpening);
   /// Largest share of an image's sides, 0 .. 1, that texels() gives.
   double largest_share(std::size_t index);
+  /// Whether a source that allows so many texels gives the same ones.
+  bool serves(double most_texels) const { return halvings(most_texels) == first_level_; }
 
  private:
+  std::uint32_t halvings(double most_texels) const;
   const std::vector<Pixels>& levels(std::uint32_t plane, bool colours, Averaging kind);
   Pixels plane_texels(std::size_t index, std::uint32_t base, std::uint32_t width_px, std::uint32_t height_px,
                       const std::vector<std::uint8_t>& coverage, float sharpening);

@@ -42,13 +42,15 @@ struct ProxyTrial {
 
 class ProxySearch {
  public:
-  ProxySearch(BudgetSource& source, Extracted& found) : source_(source), best_(found) {}
+  /// `whole`: differences of proxies as they are, for those that are known.
+  ProxySearch(BudgetSource& source, std::map<std::uint32_t, double>& whole, Extracted& found)
+      : source_(source), whole_(whole), best_(found) {}
 
   void run() {
     const auto count = static_cast<std::uint32_t>(source_.package.manifest().proxies.size());
     for (std::uint32_t k = 0; k < count; ++k) {
       Extracted whole = extract_proxy(source_.package, source_.request, k, source_.context);
-      measure(source_.package.proxy_glb(k), whole);
+      measure_whole(k, whole);
       if (!is_wanted_kind(k))
         offer_smaller(k, whole);
       else if (fits(whole) || !(whole.difference < best_.difference || !fits(best_)))
@@ -72,16 +74,26 @@ class ProxySearch {
                                [&](const auto& image) { return image.value("mimeType", "") == mime; });
   }
 
+  void measure_whole(std::uint32_t proxy, Extracted& file) {
+    if (const auto known = whole_.find(proxy); known != whole_.end())
+      return set_difference(known->second, file);
+    measure(source_.package.proxy_glb(proxy), file);
+    whole_[proxy] = file.difference;
+  }
+
+  void set_difference(double difference, Extracted& file) const {
+    file.difference = file.mesh_difference = difference;
+    file.views = static_cast<int>(source_.cameras.size());
+    file.side_px = source_.side_px;
+  }
+
   void measure(const Bytes& glb, Extracted& file) {
     NoFiles none;
     RenderedModel model =
         rendered_model(import_gltf("proxy.glb", glb, none, {}, source_.context), source_.context);
     const LitMesh mesh{std::move(model.mesh), std::move(model.materials), model.textures.size()};
     const LitViews views(mesh, source_.cameras, source_.context);
-    file.difference = file.mesh_difference =
-        source_.whole_pictures().difference(views, model.textures, source_.context);
-    file.views = static_cast<int>(source_.cameras.size());
-    file.side_px = source_.side_px;
+    set_difference(source_.whole_pictures().difference(views, model.textures, source_.context), file);
   }
 
   bool better(const Extracted& a, const Extracted& b) const {
@@ -211,6 +223,7 @@ class ProxySearch {
   }
 
   BudgetSource& source_;
+  std::map<std::uint32_t, double>& whole_;
   Extracted& best_;
   std::map<std::tuple<bool, bool, int>, StandaloneGlb> files_;  // of one proxy: maps and bits
 };
@@ -236,9 +249,9 @@ Extracted extract_proxy(PackageReader& package, const ExtractRequest& request, s
   return out;
 }
 
-void offer_proxies(BudgetSource& source, Extracted& found) {
-  const ExtractRequest& r = source.request;
-  if (!r.scale && !r.lods && r.images != ExtractImages::kPng) ProxySearch(source, found).run();
+void ProxyOffers::offer(Extracted& found) {
+  const ExtractRequest& r = source_.request;
+  if (!r.scale && !r.lods && r.images != ExtractImages::kPng) ProxySearch(source_, whole_, found).run();
 }
 
 }  // namespace texmesh

@@ -1,4 +1,6 @@
 #pragma once
+#include <map>
+
 #include "pipeline/extract/budget/budget_source.h"
 #include "pipeline/extract/glb/extracted.h"
 
@@ -9,11 +11,21 @@ namespace texmesh {
 Extracted extract_proxy(PackageReader& package, const ExtractRequest& request, std::uint32_t proxy,
                         const RunContext& context);
 
-/// Replaces `found`, a file of a scale for source.request.bytes, by one of a proxy where that one's whole lit
-/// pictures are nearer to the package's best, or where only that one keeps within the bytes. A proxy of too
-/// many bytes gets its mesh coded by Draco, its pictures smaller or coded anew, and maps left out, until it
-/// fills the bytes. `found` stays where a scale, levels of detail or PNG is asked for. Same bytes for any
-/// thread count.
-void offer_proxies(BudgetSource& source, Extracted& found);
+/// Proxies for one or several numbers of bytes.
+class ProxyOffers {
+ public:
+  explicit ProxyOffers(BudgetSource& source) : source_(source) {}
+
+  /// Replaces `found`, a file of a scale for source.request.bytes, by one of a proxy where that one's whole
+  /// lit pictures are nearer to the package's best, or where only that one keeps within the bytes. A proxy of
+  /// too many bytes gets its mesh coded by Draco, its pictures smaller or coded anew, and maps left out,
+  /// until it fills the bytes. `found` stays where a scale, levels of detail or PNG is asked for. Same bytes
+  /// for any thread count.
+  void offer(Extracted& found);
+
+ private:
+  BudgetSource& source_;
+  std::map<std::uint32_t, double> whole_;  // differences of proxies as they are
+};
 
 }  // namespace texmesh

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "stages/gltf/check_glb.h"
 #include "tests/support/command.h"
@@ -55,6 +56,28 @@ TEST(CliExtract, BytesOutOfReachHaveAnExitCodeAndTheNearestFile) {
   EXPECT_EQ(small.exit_code, 4) << small.errors;
   EXPECT_NE(small.output.find("cannot be reached"), std::string::npos);
   expect_valid(out);
+}
+
+TEST(CliExtract, SeveralNumbersOfBytesGiveAFileEach) {
+  TemporaryFolder folder;
+  const CommandResult r =
+      extract({kGolden, "--bytes", "20kB,9000", "-o", folder / "a.b.glb", "--display", "64", "--json"});
+  ASSERT_TRUE(r.exit_code == 0 || r.exit_code == 4) << r.errors;
+  EXPECT_EQ(files_beneath(folder.path().string()),
+            (std::vector<std::string>{"a.b-20kB.glb", "a.b-9000.glb"}));
+  std::istringstream lines(r.output);
+  std::string line;
+  for (const auto& [name, bytes] : {std::pair{"a.b-20kB.glb", 20000u}, {"a.b-9000.glb", 9000u}}) {
+    ASSERT_TRUE(std::getline(lines, line));
+    const Json json = Json::parse(line);
+    EXPECT_EQ(json["file"], name);
+    EXPECT_EQ(json["asked_bytes"], bytes);
+    EXPECT_EQ(json["bytes"], std::filesystem::file_size(folder / name));
+    expect_valid(folder / name);
+  }
+  for (const std::string& bad : {"20kB,20kB", "20kB,", ",", "20kB,0", "20kB,x"})
+    EXPECT_EQ(extract({kGolden, "--bytes", bad, "-o", folder / "c.glb"}).exit_code, 2) << bad;
+  EXPECT_EQ(files_beneath(folder.path().string()).size(), 2u);
 }
 
 TEST(CliExtract, FaultsLeaveNoFile) {

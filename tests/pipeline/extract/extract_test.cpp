@@ -239,5 +239,49 @@ TEST(ExtractModel, ReportsAreJson) {
   EXPECT_NE(extract_text(extract(r), r, "a.glb").find("a.glb: "), std::string::npos);
 }
 
+TEST(ExtractBudgets, EveryFileIsTheOneThatItsNumberAloneGives) {
+  const Bytes with = package_with_proxies();
+  for (const Bytes* bytes : {&package_bytes(), &with}) {
+    // Out of order, twice the same search, too few bytes for anything, and more than there is.
+    const std::vector<std::uint64_t> numbers{9000, 2500, 4000, 10, 2600, 1000000};
+    PackageReader package = open(*bytes);
+    const std::vector<Extracted> together = extract_budgets(package, budget(0), numbers, {});
+    ASSERT_EQ(together.size(), numbers.size());
+    for (std::size_t k = 0; k < numbers.size(); ++k) {
+      PackageReader fresh = open(*bytes);
+      const Extracted alone = extract_model(fresh, budget(numbers[k]), {});
+      EXPECT_EQ(together[k].glb, alone.glb) << numbers[k];
+      EXPECT_EQ(together[k].difference, alone.difference) << numbers[k];
+      EXPECT_EQ(together[k].mesh_difference, alone.mesh_difference) << numbers[k];
+      EXPECT_EQ(together[k].within, alone.within) << numbers[k];
+      EXPECT_EQ(together[k].proxy, alone.proxy) << numbers[k];
+      EXPECT_EQ(together[k].notes, alone.notes) << numbers[k];
+    }
+  }
+}
+
+TEST(ExtractBudgets, LevelsOfDetailToo) {
+  const std::vector<std::uint64_t> numbers{6000, 12000};
+  PackageReader package = open(package_bytes());
+  ExtractRequest r = budget(0);
+  r.lods = true;
+  const std::vector<Extracted> together = extract_budgets(package, r, numbers, {});
+  for (std::size_t k = 0; k < numbers.size(); ++k) {
+    r.bytes = numbers[k];
+    EXPECT_EQ(together[k].glb, extract_model(package, r, {}).glb) << numbers[k];
+  }
+}
+
+TEST(ExtractBudgets, ProgressRisesToOne) {
+  PackageReader package = open(package_bytes());
+  std::vector<double> seen;
+  RunContext context;
+  context.progress = [&](double fraction) { seen.push_back(fraction); };
+  extract_budgets(package, budget(0), {3000, 5000}, context);
+  ASSERT_FALSE(seen.empty());
+  EXPECT_TRUE(std::ranges::is_sorted(seen));
+  EXPECT_EQ(seen.back(), 1);
+}
+
 }  // namespace
 }  // namespace texmesh

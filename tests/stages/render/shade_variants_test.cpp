@@ -70,13 +70,15 @@ void expect_as_alone(const SmallScene& scene, const std::vector<Materials>& vari
   const Visibility seen = look(shown, perspective_camera(camera_of(1, 4, {}, 1)), 24, {});
   std::vector<const Materials*> lists;
   for (const Materials& m : variants) lists.push_back(&m);
-  const std::vector<Picture> pictures = shade_variants(shown, seen, lists, scene.textures, studio, context);
-  ASSERT_EQ(pictures.size(), variants.size());
+  const PictureVariants pictures = shade_variants(shown, seen, lists, scene.textures, studio, context);
+  ASSERT_EQ(pictures.count(), variants.size());
   for (std::size_t v = 0; v < variants.size(); ++v) {
     const RenderScene alone = render_scene(scene.mesh, variants[v], scene.textures.size());
     const Picture expected = shade(alone, seen, scene.textures, studio, {});
-    EXPECT_EQ(pictures[v].linear, expected.linear) << v;
-    EXPECT_EQ(pictures[v].covered, expected.covered) << v;
+    const Picture picture = pictures.picture(v);
+    EXPECT_EQ(picture.side_px, expected.side_px);
+    EXPECT_EQ(picture.linear, expected.linear) << v;
+    EXPECT_EQ(picture.covered, expected.covered) << v;
   }
 }
 
@@ -113,7 +115,7 @@ TEST(ShadeVariants, OtherLengthsAreRefused) {
   const Materials two(2, scene.materials[0]);
   const std::vector<const Materials*> lists{&scene.materials, &two};
   EXPECT_THROW(shade_variants(shown, seen, lists, {}, studio_environment({}), {}), std::invalid_argument);
-  EXPECT_TRUE(shade_variants(shown, seen, {}, {}, studio_environment({}), {}).empty());
+  EXPECT_EQ(shade_variants(shown, seen, {}, {}, studio_environment({}), {}).count(), 0u);
 }
 
 }  // namespace
