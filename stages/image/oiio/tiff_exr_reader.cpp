@@ -1,4 +1,5 @@
-#include "stages/image/decode_tiff_exr.h"
+// The module texmesh_oiio.so: see stages/image/decode_tiff_exr.cpp.
+#include "stages/image/oiio/tiff_exr_reader.h"
 
 #include <algorithm>
 #include <memory>
@@ -142,17 +143,15 @@ std::vector<T> read_samples(const Image& image, OpenImage& open, OIIO::TypeDesc 
   return samples;
 }
 
-}  // namespace
-
-ImageHeader read_tiff_exr_header(const std::string& name, ImageFormat format, ByteSpan bytes,
-                                 const ImageLimits& limits) {
+ImageHeader read_header(const std::string& name, ImageFormat format, ByteSpan bytes,
+                        const ImageLimits& limits) {
   const OpenImage open = open_image(name, format, bytes);
   check_spec(name, open.spec, limits);
   return {static_cast<std::uint32_t>(open.spec.width), static_cast<std::uint32_t>(open.spec.height),
           static_cast<std::uint8_t>(colour_channels(open.spec, format)), bits_of(open.spec)};
 }
 
-StoredSamples decode_tiff_exr(const Image& image) {
+StoredSamples decode(const Image& image) {
   OpenImage open = open_checked(image);
   switch (bits_of(open.spec)) {
     case 8:
@@ -164,4 +163,11 @@ StoredSamples decode_tiff_exr(const Image& image) {
   }
 }
 
+constexpr TiffExrReader kReader{&read_header, &decode};
+
+}  // namespace
 }  // namespace texmesh
+
+__attribute__((visibility("default"))) const texmesh::TiffExrReader* texmesh_tiff_exr_reader_1() {
+  return &texmesh::kReader;
+}
