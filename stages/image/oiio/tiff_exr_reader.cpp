@@ -143,8 +143,8 @@ std::vector<T> read_samples(const Image& image, OpenImage& open, OIIO::TypeDesc 
   return samples;
 }
 
-ImageHeader read_header(const std::string& name, ImageFormat format, ByteSpan bytes,
-                        const ImageLimits& limits) {
+ImageHeader read_module_header(const std::string& name, ImageFormat format, ByteSpan bytes,
+                               const ImageLimits& limits) {
   const OpenImage open = open_image(name, format, bytes);
   check_spec(name, open.spec, limits);
   return {static_cast<std::uint32_t>(open.spec.width), static_cast<std::uint32_t>(open.spec.height),
@@ -163,7 +163,7 @@ StoredSamples decode(const Image& image) {
   }
 }
 
-constexpr TiffExrReader kReader{&read_header, &decode};
+constexpr TiffExrReader kReader{&read_module_header, &decode};
 
 }  // namespace
 }  // namespace texmesh
