@@ -1,7 +1,6 @@
 # make install, and what find_package(texmesh) finds. Component delivery (format, delivery: a client of packages) needs
 # OpenSSL, zlib, libcurl and nlohmann-json; component compiler (the stages and the pipeline as libraries) all the rest. The
 # texmesh command, where it was built, is texmesh::texmesh for texmesh_add_package().
-include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 set(texmesh_cmake_dir ${CMAKE_INSTALL_LIBDIR}/cmake/texmesh)
 
@@ -45,9 +44,10 @@ if(TEXMESH_COMPILER)
     "io/(file_request|file_resolver|file_stamp|resolver)\\.h" "compile/workers/worker\\.h" "batch/progress\\.h"
     "graph/(artefact|explanation|graph_run|key|option_text|stage|stage_observer|store)\\.h"
     "extract/glb/(extracted|image_codecs)\\.h" "render/plane_pixels\\.h")
-  install(FILES cmake/FindOpenImageIO.cmake cmake/FindWebP.cmake DESTINATION ${texmesh_cmake_dir})
+  install(FILES cmake/FindWebP.cmake DESTINATION ${texmesh_cmake_dir})
   install(TARGETS texmesh EXPORT texmeshTool RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
   install(TARGETS texmesh-core RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/texmesh)
+  install(TARGETS texmesh_oiio LIBRARY DESTINATION ${TEXMESH_MODULE_FOLDER})
   install(DIRECTORY ${PROJECT_BINARY_DIR}/viewer/ DESTINATION ${CMAKE_INSTALL_DATADIR}/texmesh/viewer OPTIONAL)
   install(DIRECTORY profiles/ DESTINATION ${CMAKE_INSTALL_DATADIR}/texmesh/profiles)
   install(EXPORT texmeshTool NAMESPACE texmesh:: DESTINATION ${texmesh_cmake_dir} FILE texmeshTool.cmake)

@@ -1,232 +1,153 @@
 #include "pipeline/batch/build_memo.h"
 
-#include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
+#include <set>
 
-#include "format/base/archive.h"
-#include "format/base/errors.h"
-#include "pipeline/cache/cache_files.h"
-#include "pipeline/io/atomic_file.h"
+#include "pipeline/io/file_stamp.h"
 
 namespace texmesh {
 namespace {
 
 namespace fs = std::filesystem;
-constexpr std::uint64_t kMemoVersion = 1;
-constexpr std::size_t kDigestBytes = 32;
 
-struct PackedFile {
-  std::string uri;
-  std::uint8_t found = 0;
-  Sha256 digest{};
-  std::uint64_t bytes = 0;
-  std::array<std::uint64_t, 3> identity{};
-  std::array<std::int64_t, 2> times{};
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.uri, s.found, s.digest, s.bytes, s.identity, s.times);
+/// Segments that are read without being merged. A cluster of some hundred nodes leaves as many in one pass.
+constexpr std::size_t kManySegments = 8;
+/// What a killed run has left is merged when nobody can be writing it any more.
+constexpr std::int64_t kAbandoned_ns = 86'400'000'000'000;
+
+std::vector<std::string> segment_paths(const std::string& folder) {
+  std::vector<std::string> paths;
+  std::error_code ec;
+  for (fs::directory_iterator it(folder, ec), end; !ec && it != end; it.increment(ec)) {
+    std::string path = it->path().string();
+    if (path.ends_with(".seg") || path.ends_with(".open")) paths.push_back(std::move(path));
   }
-};
-struct PackedKey {
-  std::string stage;
-  Sha256 key{};
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.stage, s.key);
-  }
-};
-struct PackedRecord {
-  Sha256 request{}, package_digest{};
-  std::uint8_t failed = 0;
-  std::int64_t looked_at_ns = 0;
-  std::vector<PackedFile> files;
-  std::vector<PackedKey> keys;
-  std::array<std::uint64_t, 3> package_identity{};
-  std::array<std::int64_t, 2> package_times{};
-  std::uint64_t package_bytes = 0, peak_memory_bytes = 0;
-  double seconds = 0;
-  std::vector<std::string> error;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.request, s.package_digest, s.failed, s.looked_at_ns, s.files, s.keys, s.package_identity,
-      s.package_times, s.package_bytes, s.peak_memory_bytes, s.seconds, s.error);
-  }
-};
-
-std::array<std::uint64_t, 3> identity(const FileStamp& s) { return {s.device, s.inode, s.bytes}; }
-std::array<std::int64_t, 2> times(const FileStamp& s) { return {s.modified_ns, s.changed_ns}; }
-FileStamp stamp(const std::array<std::uint64_t, 3>& id, const std::array<std::int64_t, 2>& t) {
-  return {id[0], id[1], id[2], t[0], t[1]};
-}
-
-std::vector<std::uint8_t> pack(const MemoRecord& r) {
-  PackedRecord p{r.request,
-                 r.package_digest,
-                 static_cast<std::uint8_t>(r.failed),
-                 r.looked_at_ns,
-                 {},
-                 {},
-                 identity(r.package_stamp),
-                 times(r.package_stamp),
-                 r.package_bytes,
-                 r.peak_memory_bytes,
-                 r.seconds,
-                 r.error};
-  for (const FileRequest& f : r.files)
-    p.files.push_back(
-        {f.uri, static_cast<std::uint8_t>(f.found), f.digest, f.bytes, identity(f.stamp), times(f.stamp)});
-  for (const auto& [stage, key] : r.keys) p.keys.push_back({stage, key});
-  return encode_artefact(p);
-}
-
-MemoRecord unpack(std::span<const std::uint8_t> bytes) {
-  const auto p = decode_artefact<PackedRecord>(bytes, "memo");
-  MemoRecord r;
-  r.request = p.request;
-  r.package_digest = p.package_digest;
-  r.failed = p.failed != 0;
-  r.looked_at_ns = p.looked_at_ns;
-  for (const PackedFile& f : p.files)
-    r.files.push_back({f.uri, f.found != 0, f.digest, f.bytes, stamp(f.identity, f.times)});
-  for (const PackedKey& k : p.keys) r.keys[k.stage] = k.key;
-  r.package_stamp = stamp(p.package_identity, p.package_times);
-  r.package_bytes = p.package_bytes;
-  r.peak_memory_bytes = p.peak_memory_bytes;
-  r.seconds = p.seconds;
-  r.error = p.error;
-  return r;
-}
-
-void put_u64(std::vector<std::uint8_t>& out, std::uint64_t v) {
-  for (int i = 0; i < 8; ++i) out.push_back(static_cast<std::uint8_t>(v >> (8 * i)));
-}
-std::uint64_t get_u64(const std::vector<std::uint8_t>& in, std::size_t at) {
-  std::uint64_t v = 0;
-  for (int i = 7; i >= 0; --i) v = v << 8 | in[at + static_cast<std::size_t>(i)];
-  return v;
-}
-
-/// Not through symbolic links: import does not follow them either.
-std::optional<FileStamp> look(const std::string& path, bool follow) {
-  struct stat s {};
-  if ((follow ? ::stat(path.c_str(), &s) : ::lstat(path.c_str(), &s)) != 0 || !S_ISREG(s.st_mode))
-    return std::nullopt;
-  return stamp_of(s);
-}
-
-/// The file at `path` still has these bytes.
-bool same_file(const std::string& path, bool follow, std::int64_t looked_at_ns, const Sha256& digest,
-               std::uint64_t bytes, FileStamp& known, bool& refreshed) {
-  const auto now = look(path, follow);
-  if (!now || now->bytes != bytes) return false;
-  if (*now == known && now->is_settled(looked_at_ns)) return true;
-  const auto content = read_whole(path, bytes);
-  if (!content || content->size() != bytes || sha256(*content) != digest) return false;
-  known = *now;
-  refreshed = true;
-  return true;
+  std::sort(paths.begin(), paths.end());
+  return paths;
 }
 
 }  // namespace
 
 BuildMemo::BuildMemo(const std::string& cache_folder, const std::string& outputs) {
   if (cache_folder.empty()) return;
-  Key name("memo", 1);
+  Key name("memo", 2);
   name.add("outputs", outputs);
-  path_ = cache_folder + "/memo/" + to_hex(name.digest()).substr(0, 32);
-  load();
+  folder_ = cache_folder + "/memo/" + to_hex(name.digest()).substr(0, 32);
+  writer_ = std::make_unique<MemoSegmentWriter>(folder_);
+  constexpr int kAttempts = 5;  // somebody merges segments between our listing and our reading
+  for (int i = 0; i < kAttempts && !read_all(); ++i) continue;
+  keep_latest();
 }
 
-/// File: version, then per record the lengths of name and record, name, record; then the digest of all that.
-void BuildMemo::load() {
-  index_.clear();
-  auto bytes = read_whole(path_);
-  if (!bytes) return;
-  const std::size_t end = bytes->size() - std::min(bytes->size(), kDigestBytes);
-  const Sha256 digest = sha256(std::span(*bytes).first(end));
-  was_damaged_ = bytes->size() < 8 + kDigestBytes ||
-                 !std::equal(digest.begin(), digest.end(), bytes->begin() + static_cast<std::ptrdiff_t>(end));
-  if (was_damaged_) return;
-  bytes_ = std::move(*bytes);
-  if (get_u64(bytes_, 0) != kMemoVersion) return;
-  for (std::size_t at = 8; at + 16 <= end;) {
-    const std::uint64_t name = get_u64(bytes_, at), record = get_u64(bytes_, at + 8);
-    if (name > end - at - 16 || record > end - at - 16 - name) return;
-    const std::string_view text(reinterpret_cast<const char*>(bytes_.data()) + at + 16, name);
-    index_[text] = {at + 16 + name, record};
-    at += 16 + name + record;
+BuildMemo::~BuildMemo() {
+  if (!writer_ || !wrote_) return;
+  merge();
+}
+
+/// False when a segment that was listed is gone.
+bool BuildMemo::read_all() {
+  segments_.clear();
+  places_.clear();
+  bool all = true;
+  for (const std::string& path : segment_paths(folder_)) {
+    const auto number = static_cast<std::uint32_t>(segments_.size());
+    auto segment = MemoSegment::read(path, [&](const MemoEntry& entry) {
+      places_.push_back({entry, number});
+    });
+    if (segment)
+      segments_.push_back(std::move(segment));
+    else
+      all = false;
   }
+  return all;
+}
+
+void BuildMemo::keep_latest() {
+  std::sort(places_.begin(), places_.end(), [](const Place& a, const Place& b) {
+    if (a.entry.name != b.entry.name) return a.entry.name < b.entry.name;
+    if (a.entry.looked_at_ns != b.entry.looked_at_ns) return a.entry.looked_at_ns > b.entry.looked_at_ns;
+    return std::pair(b.segment, b.entry.offset) < std::pair(a.segment, a.entry.offset);
+  });
+  const auto same = [](const Place& a, const Place& b) { return a.entry.name == b.entry.name; };
+  places_.erase(std::unique(places_.begin(), places_.end(), same), places_.end());
+}
+
+bool BuildMemo::was_damaged() const {
+  return std::any_of(segments_.begin(), segments_.end(), [](const auto& s) { return s->is_damaged(); });
+}
+
+const BuildMemo::Place* BuildMemo::place_of(const std::string& package) const {
+  const MemoName name = memo_name(package);
+  const auto at = std::lower_bound(places_.begin(), places_.end(), name,
+                                   [](const Place& p, const MemoName& n) { return p.entry.name < n; });
+  return at == places_.end() || at->entry.name != name ? nullptr : &*at;
 }
 
 bool BuildMemo::find(const std::string& package, MemoRecord& record) const {
-  std::span<const std::uint8_t> bytes;
-  if (const auto changed = changed_.find(package); changed != changed_.end()) {
-    bytes = changed->second;
-  } else {
-    const auto it = index_.find(package);
-    if (it == index_.end()) return false;
-    bytes = std::span(bytes_).subspan(it->second.first, it->second.second);
-  }
-  try {
-    record = unpack(bytes);
-    return true;
-  } catch (const FormatError&) {
-    return false;
-  }
+  const Place* const place = place_of(package);
+  if (!place) return false;
+  auto found = segments_[place->segment]->record(place->entry);
+  if (!found) return false;
+  record = std::move(*found);
+  return true;
+}
+
+StageKeys BuildMemo::keys(const std::string& package) const {
+  const Place* const place = place_of(package);
+  return place ? segments_[place->segment]->keys(place->entry) : StageKeys{};
 }
 
 void BuildMemo::set(const std::string& package, const MemoRecord& record) {
-  changed_[package] = pack(record);
+  if (!writer_) return;
+  writer_->add(memo_name(package), record);
+  wrote_ = true;
 }
 
-bool BuildMemo::save() {
-  if (path_.empty() || changed_.empty()) return true;
-  std::error_code ec;
-  fs::create_directories(fs::path(path_).parent_path(), ec);
-  const FileLock lock = FileLock::wait(path_ + ".lock", FileLock::Mode::kExclusive);
-  load();  // somebody else may have saved since
-  std::map<std::string_view, std::span<const std::uint8_t>> all;
-  for (const auto& [name, place] : index_) all[name] = std::span(bytes_).subspan(place.first, place.second);
-  for (const auto& [name, record] : changed_) all[name] = record;
-  std::vector<std::uint8_t> out;
-  put_u64(out, kMemoVersion);
-  for (const auto& [name, record] : all) {
-    put_u64(out, name.size());
-    put_u64(out, record.size());
-    out.insert(out.end(), name.begin(), name.end());
-    out.insert(out.end(), record.begin(), record.end());
+bool BuildMemo::save() { return !writer_ || writer_->flush(); }
+
+/// Which segments become one: the small ones, while each is at most as large as those before it together, so
+/// that a record is copied as often as the memo's size doubles. And what is damaged, or left by a killed run.
+std::vector<std::uint32_t> BuildMemo::segments_to_merge() const {
+  std::vector<std::uint32_t> finished, merged;
+  for (std::uint32_t i = 0; i < segments_.size(); ++i) {
+    const MemoSegment& s = *segments_[i];
+    const bool abandoned = s.modified_ns() < wall_clock_ns() - kAbandoned_ns;
+    if (s.is_damaged() || (!s.is_finished() && abandoned))
+      merged.push_back(i);
+    else if (s.is_finished())
+      finished.push_back(i);
   }
-  const Sha256 digest = sha256(out);
-  out.insert(out.end(), digest.begin(), digest.end());
-  try {
-    write_file_atomically(path_, out);
-    return true;
-  } catch (const InputError&) {
-    return false;
+  if (finished.size() < kManySegments) return merged;
+  std::sort(finished.begin(), finished.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return std::pair(segments_[a]->bytes(), a) < std::pair(segments_[b]->bytes(), b);
+  });
+  std::uint64_t before = 0;
+  for (std::size_t i = 0; i < finished.size(); ++i) {
+    if (i >= kManySegments / 2 && segments_[finished[i]]->bytes() > before) break;
+    before += segments_[finished[i]]->bytes();
+    merged.push_back(finished[i]);
   }
+  return merged;
 }
 
-bool still_holds(MemoRecord& record, const std::string& input, const std::string& output, bool& refreshed) {
-  refreshed = false;
-  const std::int64_t now_ns = wall_clock_ns();
-  const std::string folder = fs::path(input).parent_path().string();
-  for (FileRequest& f : record.files) {
-    const bool is_model = f.uri.empty();
-    const std::string path = is_model ? input : folder.empty() ? f.uri : folder + "/" + f.uri;
-    if (!f.found) {
-      if (look(path, false)) return false;
-      continue;
-    }
-    if (!same_file(path, is_model, record.looked_at_ns, f.digest, f.bytes, f.stamp, refreshed)) return false;
+/// Two runs may merge the same segments at the same time: both then hold all their records. A reader that has
+/// listed a segment before it was removed lists again.
+void BuildMemo::merge() {
+  const std::vector<std::uint32_t> chosen = segments_to_merge();
+  const std::set<std::uint32_t> merged(chosen.begin(), chosen.end());
+  for (const Place& place : places_) {
+    if (!merged.contains(place.segment)) continue;
+    // A later record may be in the new segment by now: the time tells which counts.
+    auto record = segments_[place.segment]->record(place.entry);
+    if (!record) continue;
+    record->keys = segments_[place.segment]->keys(place.entry);
+    writer_->add(place.entry.name, *record);
   }
-  if (!record.failed && !same_file(output, true, record.looked_at_ns, record.package_digest,
-                                   record.package_bytes, record.package_stamp, refreshed))
-    return false;
-  // What was settled before is so now; what was read just now was true at this moment.
-  if (refreshed) record.looked_at_ns = now_ns;
-  return !record.files.empty();
+  if (!writer_->finish()) return;
+  for (const std::uint32_t i : merged) ::unlink(segments_[i]->path().c_str());
 }
 
 }  // namespace texmesh

@@ -1,59 +1,60 @@
 #pragma once
 #include <cstdint>
-#include <map>
+#include <memory>
 #include <string>
-#include <string_view>
 #include <vector>
 
-#include "pipeline/graph/key.h"
-#include "pipeline/io/file_request.h"
+#include "pipeline/batch/memo/memo_record.h"
+#include "pipeline/batch/memo/memo_segment.h"
 
 namespace texmesh {
 
-/// What the last run left of one package: enough to see, by looking at files' stamps alone, that
-/// nothing has changed.
-struct MemoRecord {
-  Sha256 request{};  // of everything but files: options, strictness, tool
-  bool failed = false;
-  std::int64_t looked_at_ns = 0;  // when the stamps were true
-  std::vector<FileRequest> files;
-  FileStamp package_stamp;
-  Sha256 package_digest{};
-  std::uint64_t package_bytes = 0, peak_memory_bytes = 0;
-  double seconds = 0;
-  StageKeys keys;
-  std::vector<std::string> error;  // kind, file, place, expected, found, message; empty unless failed
-};
-
-/// The memos of the packages of one output folder (or of one single package), kept in the cache folder.
-/// Losing it costs looking every model over again in its child process, never a wrong result. Not
-/// thread-safe; save() merges with what other processes have saved meanwhile.
+/// The memos of the packages of one output folder (or of one single package): a folder of segments in the
+/// cache folder. Each run appends to a segment of its own, and every run reads all of them, so runs on
+/// several machines need no lock and wait for nothing. Of two records of a package the later one counts.
+/// Losing any of it costs looking models over again in their child processes, never a wrong result. Not
+/// thread-safe.
+///
+/// In memory: 56 bytes a record that was read. Written: what has changed; a run that has written something
+/// also merges segments of about the same size once there are many, so that a record is copied a few times in
+/// its life.
 class BuildMemo {
  public:
   /// `outputs`: absolute path of the output folder, or of the package where a run makes one only. Without a
   /// cache folder nothing is remembered.
   BuildMemo(const std::string& cache_folder, const std::string& outputs);
-  /// There was a memo, but not with its digest: nothing is remembered.
-  bool was_damaged() const { return was_damaged_; }
-  /// `package`: path of the package as the run names it.
+  /// Saves what is left to save, and merges.
+  ~BuildMemo();
+  BuildMemo(const BuildMemo&) = delete;
+  BuildMemo& operator=(const BuildMemo&) = delete;
+
+  /// Some segment has bytes without their digest: what they said is not remembered.
+  bool was_damaged() const;
+  /// `package`: its path within the output folder. Finds what had been saved when this object was made.
+  /// The record's keys are left out.
   bool find(const std::string& package, MemoRecord& record) const;
+  /// The keys of the record that find() finds.
+  StageKeys keys(const std::string& package) const;
   void set(const std::string& package, const MemoRecord& record);
-  /// False when it cannot be written.
+  /// Others can read from now on what was set. False when it cannot be written.
   bool save();
 
  private:
-  void load();
-  std::string path_;
-  bool was_damaged_ = false;
-  std::vector<std::uint8_t> bytes_;
-  std::map<std::string_view, std::pair<std::size_t, std::size_t>> index_;  // into bytes_: offset and length
-  std::map<std::string, std::vector<std::uint8_t>> changed_;
-};
+  struct Place {
+    MemoEntry entry;
+    std::uint32_t segment = 0;
+  };
+  bool read_all();
+  void keep_latest();
+  const Place* place_of(const std::string& package) const;
+  std::vector<std::uint32_t> segments_to_merge() const;
+  void merge();
 
-/// Whether every file is as the record says: the model at `input`, what it refers to beneath its folder, and,
-/// unless the record is of a failure, the package at `output`. A file whose stamp proves nothing (changed
-/// just before it was looked at, or touched since) is read and compared by digest; the record's stamps are
-/// then brought up to date and `refreshed` set.
-bool still_holds(MemoRecord& record, const std::string& input, const std::string& output, bool& refreshed);
+  std::string folder_;
+  std::vector<std::unique_ptr<MemoSegment>> segments_;
+  std::vector<Place> places_;  // by name, each once
+  std::unique_ptr<MemoSegmentWriter> writer_;
+  bool wrote_ = false;
+};
 
 }  // namespace texmesh

@@ -13,14 +13,6 @@ namespace fs = std::filesystem;
 constexpr std::uint64_t kBaseMemory_bytes = 300'000'000, kMemoryPerByte = 10;
 constexpr double kBaseSeconds = 1, kSecondsPerByte = 5e-7;
 
-/// Another build of the tool looks at every model again; the cache then says what has really changed.
-std::string tool_seed() {
-  const auto stamp = stamp_of(core_executable());
-  return stamp ? std::to_string(stamp->inode) + " " + std::to_string(stamp->bytes) + " " +
-                     std::to_string(stamp->modified_ns)
-               : "";
-}
-
 /// Failures that only another machine or another moment explains are not remembered.
 bool is_lasting(const WorkerReport& r) {
   return r.result == ModelResult::kFailed &&
@@ -33,8 +25,7 @@ JobSelection::JobSelection(const BatchPlan& plan, const RunSettings& settings)
     : plan_(plan),
       settings_(settings),
       memo_(settings.cache.folder, plan.outputs),
-      records_(plan.models.size()),
-      tool_seed_(tool_seed()) {}
+      tool_seed_(core_build()) {}
 
 const Sha256& JobSelection::request_of(const std::shared_ptr<const std::string>& profile) {
   const auto [it, fresh] = requests_.try_emplace(profile.get());
@@ -49,16 +40,21 @@ const Sha256& JobSelection::request_of(const std::shared_ptr<const std::string>&
 void JobSelection::select(std::vector<WorkerReport>& reports) {
   for (std::size_t i = 0; i < plan_.models.size(); ++i) {
     const PlannedModel& m = plan_.models[i];
-    MemoRecord& record = records_[i];
-    const bool remembered = memo_.find(m.output, record);
+    const std::string package = package_within(plan_, m);
+    MemoRecord record;
+    const bool remembered = memo_.find(package, record);
     bool refreshed = false;
     if (remembered && record.request == request_of(m.profile) && !(record.failed && settings_.retry_failed) &&
         still_holds(record, m.input, m.output, refreshed)) {
-      if (refreshed) memo_.set(m.output, record);
+      if (refreshed && !settings_.dry_run) {
+        record.keys = memo_.keys(package);
+        memo_.set(package, record);
+      }
       recall(record, reports[i]);
-      record = {};
       continue;
     }
+    if (remembered) record.keys = memo_.keys(package);
+    records_[i] = std::move(record);
     add_job(i, remembered);
   }
 }
@@ -140,7 +136,7 @@ void JobSelection::remember(std::size_t job, const WorkerReport& report) {
                     report.error_expected, report.error_found, report.error_message};
   }
   record.looked_at_ns = wall_clock_ns();
-  memo_.set(m.output, record);
+  memo_.set(package_within(plan_, m), record);
 }
 
 }  // namespace texmesh

@@ -38,7 +38,7 @@ class JobSelection {
   const BatchPlan& plan_;
   const RunSettings& settings_;
   BuildMemo memo_;
-  std::vector<MemoRecord> records_;  // of an earlier run, for the models that run again
+  std::map<std::size_t, MemoRecord> records_;  // of an earlier run, for the models that run again
   std::vector<WorkerJob> jobs_;
   std::vector<std::size_t> model_of_job_;
   std::map<const std::string*, Sha256> requests_;

@@ -105,9 +105,15 @@ BatchPlan plan_batch(const PlanRequest& request) {
     }
   }
   refuse_shared_outputs(plan);
+  plan.output_prefix = (fs::path(request.output) / "").string();
   drop_other_shards(plan, request);
   plan.outputs = fs::absolute(request.output).lexically_normal().string();
   return plan;
+}
+
+std::string package_within(const BatchPlan& plan, const PlannedModel& m) {
+  if (m.output.starts_with(plan.output_prefix)) return m.output.substr(plan.output_prefix.size());
+  return fs::path(m.output).filename().string();
 }
 
 }  // namespace texmesh

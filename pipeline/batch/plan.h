@@ -28,11 +28,15 @@ struct BatchPlan {
   std::vector<PlannedModel> models;
   std::vector<std::string> files;  // collections that were read: a make-style rule depends on them
   std::string outputs;  // absolute path of the output folder, or of the package where there can be one only
+  std::string output_prefix;  // what the models' outputs begin with: the output folder and a slash
 };
 
 /// Finds the models and their options. A model's shard depends on its package's path within the output
 /// folder alone, so that it stays when models come and go. InputError for what makes no sense, before
 /// anything is compiled.
 BatchPlan plan_batch(const PlanRequest& request);
+
+/// The path of a model's package within the output folder; its name where the run makes one package only.
+std::string package_within(const BatchPlan& plan, const PlannedModel& model);
 
 }  // namespace texmesh

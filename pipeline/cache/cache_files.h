@@ -13,7 +13,7 @@
 //   ac/<k[0:2]>/<key>        a record: the key's parts in the clear, the outputs' digests, its own digest
 //   cas/<d[0:2]>/<digest>    the bytes of an output
 //   notes/<k[0:2]>/<key>     small facts that are not results
-//   memo/<name>              what the last run of a collection left (pipeline/batch/build_memo.h)
+//   memo/<name>/<segment>    what runs of a collection have found out (pipeline/batch/build_memo.h)
 //   locks/<k[0:3]>           flock: held while a key that begins with these digits is computed
 //   locks/quarantine         flock: held while a damaged file is moved away
 //   gate                     flock: shared by lookups and puts of records and blobs, exclusive for pruning

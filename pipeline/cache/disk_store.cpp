@@ -16,6 +16,7 @@
 #include "pipeline/cache/prune.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/file_stamp.h"
+#include "pipeline/io/machine/owner_mark.h"
 
 namespace texmesh {
 namespace {
@@ -30,16 +31,15 @@ class LockClaim : public Claim {
   FileLock lock_;
 };
 
-/// running/<name>: locked while this process lives. The name may be taken by a process of the same number in
-/// another container, or by one that was killed; and pruning, which removes what nobody holds, may come
-/// between making the file and locking it.
+/// running/<name>: named after this process, and locked while it lives. Pruning, which removes what nobody
+/// holds and what no live process has made, may come between making the file and locking it.
 class RunningBuild {
  public:
   explicit RunningBuild(const std::string& folder) {
     static std::atomic<unsigned> counter{0};
     constexpr int kAttempts = 1000;
     for (int i = 0; i < kAttempts; ++i) {
-      path_ = folder + "/running/" + std::to_string(::getpid()) + "-" + std::to_string(counter++);
+      path_ = folder + "/running/" + owner_mark() + "-" + std::to_string(counter++);
       lock_ = FileLock::attempt(path_, FileLock::Mode::kExclusive);
       if (!lock_.held() && !lock_.busy()) return;  // locks do not work here
       if (!lock_.is_of(path_)) continue;

@@ -10,10 +10,12 @@
 #include <limits>
 #include <map>
 #include <set>
+#include <string_view>
 
 #include "pipeline/cache/cache_files.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/file_stamp.h"
+#include "pipeline/io/machine/owner_mark.h"
 
 namespace texmesh {
 namespace {
@@ -43,13 +45,21 @@ bool is_object_name(const std::string& name) {
   return from_hex(name, digest);
 }
 
+/// A build is over when nobody holds its file and, where locks may be granted to all, its process is gone.
+/// Names of another kind are not those of builds.
+bool build_is_over(const Entry& e) {
+  const std::string name = name_of(e);
+  const std::string_view mark = std::string_view(name).substr(0, name.rfind('-'));
+  return !is_owner_mark(mark) || !owner_may_live(mark, e.stamp.modified_ns);
+}
+
 /// Start of the oldest build that still runs; the largest time when none does. Forgets builds
 /// that were killed.
 std::int64_t oldest_running_ns(const std::string& folder, std::uint64_t* count = nullptr) {
   std::int64_t oldest = std::numeric_limits<std::int64_t>::max();
   for (const Entry& e : list(folder, "running")) {
     const FileLock lock = FileLock::attempt(e.path, FileLock::Mode::kExclusive);
-    if (lock.held()) {
+    if (lock.held() && build_is_over(e)) {
       if (lock.is_of(e.path)) ::unlink(e.path.c_str());
       continue;
     }

@@ -94,7 +94,7 @@ int verify(const CacheArguments& args) {
 
 void add_cache_command(Command& app) {
   auto args = std::make_shared<CacheArguments>();
-  Command c = app.add("cache", "Look at, prune or check the cache folder");
+  Command c = app.add("cache");
   c.needs_command();
   const auto add = [&](const char* name, const char* help, std::function<int(const CacheArguments&)> run) {
     Command command = c.add(name, help);

@@ -333,7 +333,7 @@ int run_compile(CompileArguments& args) {
 
 void add_compile_command(Command& app) {
   auto args = std::make_shared<CompileArguments>();
-  Command c = app.add("compile", "Compile textured scans into packages");
+  Command c = app.add("compile");
   add_compile_options(c, *args);
   c.examples(kExamples);
   c.notes(kNotes);

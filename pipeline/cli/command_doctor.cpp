@@ -85,7 +85,7 @@ void add_limits(Command& c, AtlasLimits& limits) {
 
 void add_doctor_command(Command& app) {
   auto args = std::make_shared<DoctorArguments>();
-  Command c = app.add("doctor", "Say what a model's texture atlas costs and what to do: a gate for CI, too");
+  Command c = app.add("doctor");
   c.option("INPUT", args->input,
            "A model that compile takes, or a package: a .texmesh file or a folder that unpack made")
       .required();

@@ -42,7 +42,7 @@ int run_dump(const DumpArguments& args) {
 
 void add_dump_command(Command& app) {
   auto args = std::make_shared<DumpArguments>();
-  Command c = app.add("dump", "Show what a package holds and why it is as large as it is");
+  Command c = app.add("dump");
   add_package_argument(c, args->package, false);
   c.option(
        "PART", args->part,

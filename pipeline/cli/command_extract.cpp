@@ -169,7 +169,7 @@ void add_extract_options(Command& c, ExtractArguments& args) {
 
 void add_extract_command(Command& app) {
   auto args = std::make_shared<ExtractArguments>();
-  Command c = app.add("extract", "Write one GLB that any viewer opens: a scale with whole textures");
+  Command c = app.add("extract");
   add_extract_options(c, *args);
   c.examples(
       "  texmesh extract bust.texmesh --bytes 500kB -o bust.glb\n"

@@ -14,8 +14,7 @@ void add_unpack_command(Command& app) {
     bool force = false;
   };
   auto args = std::make_shared<Arguments>();
-  Command c =
-      app.add("unpack", "Write a package's entries as files, for servers or tools that want a folder");
+  Command c = app.add("unpack");
   c.option("PACKAGE", args->package, "A .texmesh file").required();
   c.option("-o,--output", args->folder, "The folder to make; it must be empty or not exist")
       .required()
@@ -46,7 +45,7 @@ void add_pack_command(Command& app) {
     std::string folder, package;
   };
   auto args = std::make_shared<Arguments>();
-  Command c = app.add("pack", "Put an unpacked package together again, byte for byte");
+  Command c = app.add("pack");
   c.option("DIR", args->folder, "A folder that unpack made").required();
   c.option("-o,--output", args->package, "The .texmesh file to write").required().value_name("PKG");
   c.examples("  texmesh pack www/bust -o bust.texmesh");

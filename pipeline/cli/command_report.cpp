@@ -59,7 +59,7 @@ void add_options(Command& c, ReportArguments& args) {
 
 void add_report_command(Command& app) {
   auto args = std::make_shared<ReportArguments>();
-  Command c = app.add("report", "Write a page that shows what viewers of a package see");
+  Command c = app.add("report");
   add_options(c, *args);
   c.examples(
       "  texmesh report bust.texmesh -o report/\n"

@@ -63,7 +63,7 @@ void add_stages_command(Command& app) {
     bool json = false, dot = false, schema = false;
   };
   auto args = std::make_shared<Arguments>();
-  Command c = app.add("stages", "Print the graph of stages that compile runs");
+  Command c = app.add("stages");
   c.flag("--json", args->json, "Print JSON");
   c.flag("--dot", args->dot, "Print a Graphviz graph");
   c.flag("--profile-schema", args->schema, "Print the JSON schema of profiles, which are files of options");

@@ -67,7 +67,7 @@ void view(const ViewArguments& args) {
 
 void add_view_command(Command& app) {
   auto args = std::make_shared<ViewArguments>();
-  Command c = app.add("view", "Look at packages in a browser: serves the packages and the viewer");
+  Command c = app.add("view");
   c.option("PACKAGE", args->package,
            "A .texmesh file, a folder that unpack made, or a folder of packages to choose from")
       .required();

@@ -1,8 +1,7 @@
 // texmesh-core: every command and the workers. People call texmesh (main.cpp), which starts it.
-#include "format/container/format_version.h"
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/options/command_line.h"
-#include "pipeline/compile/library_versions.h"
+#include "pipeline/cli/program.h"
 #include "pipeline/compile/workers/worker_child.h"
 
 namespace texmesh {
@@ -45,15 +44,8 @@ int main(int argc, char** argv) {
     return worker_main();  // started by compile, see pipeline/compile/workers/worker_child.h
 
   CommandLine line(kProgramSummary);
-  line.version("texmesh " + tool_version() + ", package format " + std::to_string(kFormatMajor) + "." +
-               std::to_string(kFormatMinor));
+  describe_program(line);
   Command program = line.program();
-  program.examples(
-      "  texmesh compile scan.glb -o scan.texmesh     compile a model\n"
-      "  texmesh dump scan.texmesh                    see what is in the package\n"
-      "  texmesh verify scan.texmesh                  check every byte of the package\n"
-      "  texmesh view scan.texmesh                    look at the package in a browser");
-  program.notes("Every command explains itself: texmesh compile --help");
   add_commands(program);
   return line.run(argc, argv);
 }

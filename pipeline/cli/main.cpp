@@ -1,5 +1,5 @@
-// texmesh: compile and cache without the stages' libraries, whose loading alone takes longer than seeing that
-// a collection of a thousand models is up to date. Every other command is texmesh-core's.
+// texmesh: compile, cache, help and version without the stages' libraries, whose loading alone takes longer
+// than seeing that a collection of a thousand models is up to date. Every other command is texmesh-core's.
 #include <unistd.h>
 
 #include <cerrno>
@@ -8,6 +8,8 @@
 
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/options/command_line.h"
+#include "pipeline/cli/options/command_list.h"
+#include "pipeline/cli/program.h"
 #include "pipeline/io/core_path.h"
 #include "pipeline/io/exit_codes.h"
 
@@ -22,18 +24,31 @@ int start_core(char** argv) {
   return kExitModelFailed;
 }
 
+/// The program with the names of its commands, and nothing behind them.
+void describe_all(CommandLine& line) {
+  describe_program(line);
+  Command program = line.program();
+  for (const CommandSummary& command : kCommands) {
+    program.group(command.group);
+    program.add(command.name);
+  }
+}
+
 }  // namespace
 }  // namespace texmesh
 
 int main(int argc, char** argv) {
   using namespace texmesh;
   const std::string name = argc > 1 ? argv[1] : "";
-  if (name != "compile" && name != "cache") return start_core(argv);
+  const bool only_tells = argc == 2 && (name == "--version" || name == "--help" || name == "-h");
+  if (!only_tells && name != "compile" && name != "cache") return start_core(argv);
   CommandLine line(kProgramSummary);
   Command program = line.program();
   if (name == "compile")
     add_compile_command(program);
-  else
+  else if (name == "cache")
     add_cache_command(program);
+  else
+    describe_all(line);
   return line.run(argc, argv);
 }

@@ -37,6 +37,4 @@ const std::map<std::string, std::string>& library_versions() {
   return versions;
 }
 
-std::string tool_version() { return TEXMESH_VERSION; }
-
 }  // namespace texmesh

@@ -1,7 +1,6 @@
 #include "pipeline/io/atomic_file.h"
 
 #include <fcntl.h>
-#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -11,14 +10,20 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <optional>
+#include <string_view>
 #include <vector>
 
 #include "format/base/errors.h"
 #include "pipeline/io/descriptor.h"
+#include "pipeline/io/file_stamp.h"
+#include "pipeline/io/machine/owner_mark.h"
 #include "pipeline/io/resource_error.h"
 
 namespace texmesh {
 namespace {
+
+constexpr std::string_view kTemporaryMark = ".tmp-";
 
 [[noreturn]] void fail(const std::string& path, const char* step) {
   throw ResourceError(path, "", "a writable file", std::string(step) + ": " + std::strerror(errno));
@@ -47,45 +52,31 @@ std::string own_temporary(const std::string& path) {
   return temporary_name(path, counter++);
 }
 
-/// The descriptor's file still stands under this name.
-bool stands_at(int fd, const std::string& path) {
-  struct stat own {
-  }, there{};
-  return ::fstat(fd, &own) == 0 && ::lstat(path.c_str(), &there) == 0 && own.st_dev == there.st_dev &&
-         own.st_ino == there.st_ino;
-}
-
-/// An empty file under `temp`, locked, which is what tells it from one that a killed process left. -1 with
-/// errno; EEXIST when somebody else has it.
+/// A new, empty file. -1 with errno; EEXIST when there is a file of this name, whoever is at work on it.
 int open_temporary(const std::string& temp) {
-  constexpr int kAttempts = 100;  // each is lost only to a cleaner that has just removed the file
-  for (int i = 0; i < kAttempts; ++i) {
-    const int fd = ::open(temp.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
-    if (fd < 0) return -1;
-    const bool taken = ::flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
-    if (!taken && stands_at(fd, temp) && ::ftruncate(fd, 0) == 0) return fd;
-    const int error = taken ? EEXIST : errno;
-    const bool lost = !taken && !stands_at(fd, temp);
-    ::close(fd);
-    errno = error;
-    if (!lost) return -1;
-  }
-  errno = EEXIST;
-  return -1;
+  const int fd = ::open(temp.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW, 0666);
+  struct stat there {};
+  // A link that somebody has planted is no sign of another writer.
+  if (fd < 0 && errno == EEXIST)
+    errno = ::lstat(temp.c_str(), &there) == 0 && S_ISLNK(there.st_mode) ? ELOOP : EEXIST;
+  return fd;
 }
 
-/// What stands before ".tmp<digits>-<digits>"; "" when the name does not end so.
-std::string_view without_temporary_ending(std::string_view name) {
-  const std::size_t at = name.rfind(".tmp");
-  if (at == std::string_view::npos) return {};
-  std::string_view rest = name.substr(at + 4);
-  const std::size_t dash = rest.find('-');
-  const auto is_number = [](std::string_view s) {
-    return !s.empty() && s.find_first_not_of("0123456789") == std::string_view::npos;
-  };
-  if (dash == std::string_view::npos || !is_number(rest.substr(0, dash)) || !is_number(rest.substr(dash + 1)))
-    return {};
-  return name.substr(0, at);
+/// The parts of a temporary's name: what stands before ".tmp-", and its writer's mark.
+struct TemporaryName {
+  std::string_view stem, mark;
+};
+
+/// Nothing when the name is not temporary_name()'s.
+std::optional<TemporaryName> temporary_parts(std::string_view name) {
+  const std::size_t at = name.rfind(kTemporaryMark), dash = name.rfind('-');
+  if (at == std::string_view::npos || at == 0) return std::nullopt;
+  const std::size_t mark = at + kTemporaryMark.size();
+  const std::string_view number = name.substr(dash + 1);
+  if (dash <= mark || number.empty() || number.find_first_not_of("0123456789") != std::string_view::npos ||
+      !is_owner_mark(name.substr(mark, dash - mark)))
+    return std::nullopt;
+  return TemporaryName{name.substr(0, at), name.substr(mark, dash - mark)};
 }
 
 /// Follows symbolic links, dangling ones too. More than 40 of them lead nowhere, as for open().
@@ -107,7 +98,7 @@ std::string behind_links(const std::string& path) {
 }  // namespace
 
 std::string temporary_name(const std::string& path, std::size_t number) {
-  return path + ".tmp" + std::to_string(::getpid()) + "-" + std::to_string(number);
+  return path + std::string(kTemporaryMark) + owner_mark() + "-" + std::to_string(number);
 }
 
 void write_file_atomically(const std::string& path, std::span<const std::uint8_t> bytes,
@@ -122,7 +113,6 @@ void write_file_atomically(const std::string& path, std::span<const std::uint8_t
   try {
     write_all(d.get(), bytes, path);
     if (::fdatasync(d.get()) != 0) fail(path, "fdatasync");
-    // Under the lock: a cleaner must not take the finished file for one that was left.
     if (::rename(temp.c_str(), path.c_str()) != 0) fail(path, "rename");
   } catch (...) {
     ::unlink(temp.c_str());
@@ -164,10 +154,11 @@ void write_output_file(const std::string& path, std::span<const std::uint8_t> by
 }
 
 bool remove_stale_temporary(const std::string& path) {
-  if (without_temporary_ending(std::filesystem::path(path).filename().string()).empty()) return false;
-  const Descriptor d{::open(path.c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK)};
-  return d.get() >= 0 && ::flock(d.get(), LOCK_EX | LOCK_NB) == 0 && stands_at(d.get(), path) &&
-         ::unlink(path.c_str()) == 0;
+  const std::string name = std::filesystem::path(path).filename().string();
+  const auto parts = temporary_parts(name);
+  struct stat there {};
+  return parts && ::lstat(path.c_str(), &there) == 0 && S_ISREG(there.st_mode) &&
+         !owner_may_live(parts->mark, stamp_of(there).modified_ns) && ::unlink(path.c_str()) == 0;
 }
 
 std::size_t remove_stale_temporaries(const std::string& folder, const std::string& ending) {
@@ -176,8 +167,8 @@ std::size_t remove_stale_temporaries(const std::string& folder, const std::strin
   for (std::filesystem::directory_iterator it(folder.empty() ? "." : folder, ec), end; !ec && it != end;
        it.increment(ec)) {
     const std::string name = it->path().filename().string();
-    const std::string_view stem = without_temporary_ending(name);
-    if (!stem.empty() && stem.ends_with(ending)) found.push_back(it->path().string());
+    const auto parts = temporary_parts(name);
+    if (parts && parts->stem.ends_with(ending)) found.push_back(it->path().string());
   }
   return static_cast<std::size_t>(std::count_if(found.begin(), found.end(), remove_stale_temporary));
 }

@@ -10,8 +10,7 @@ namespace texmesh {
 /// whatever happens: temporary sibling, write, fdatasync, rename, fsync of the folder. On any failure the
 /// temporary is removed and ResourceError{path, "", "a writable file", reason} is thrown. `temporary` may
 /// name the sibling (a parent process that wants to remove it if this one is killed; should somebody else be
-/// writing a file of that name, another one is taken); "" makes a name of its own. The temporary is locked
-/// (flock) while it is written.
+/// writing a file of that name, another one is taken); "" makes a name of its own.
 void write_file_atomically(const std::string& path, std::span<const std::uint8_t> bytes,
                            const std::string& temporary = "");
 
@@ -28,11 +27,12 @@ void write_output_file(const std::string& path, std::span<const std::uint8_t> by
 /// do.
 void check_output_file(const std::string& path);
 
-/// The name of a temporary sibling of `path`; `number` tells those of one process apart.
+/// The name of a temporary sibling of `path`. It says which process of which machine writes it
+/// (owner_mark()); `number` tells those of one process apart.
 std::string temporary_name(const std::string& path, std::size_t number);
 
-/// Removes what a killed process has left of write_file_atomically: `path` must have a temporary's name and
-/// be locked by nobody. False when it was not removed.
+/// Removes what a killed process has left of write_file_atomically: `path` must have a temporary's name, and
+/// its writer must be gone (owner_may_live()). False when it was not removed.
 bool remove_stale_temporary(const std::string& path);
 
 /// The same for every file of a folder whose name without the temporary's ending ends with `ending`. Returns

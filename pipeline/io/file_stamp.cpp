@@ -1,5 +1,7 @@
 #include "pipeline/io/file_stamp.h"
 
+#include <sys/sysmacros.h>
+
 #include <ctime>
 
 namespace texmesh {
@@ -10,7 +12,10 @@ std::int64_t nanoseconds(const timespec& t) { return std::int64_t{t.tv_sec} * 1'
 }  // namespace
 
 FileStamp stamp_of(const struct stat& s) {
-  return {static_cast<std::uint64_t>(s.st_dev), static_cast<std::uint64_t>(s.st_ino),
+  // Numbers of major 0 belong to the mount: NFS gives the same file another one on every node and after every
+  // boot.
+  const bool of_mount = major(s.st_dev) == 0;
+  return {of_mount ? 0 : static_cast<std::uint64_t>(s.st_dev), static_cast<std::uint64_t>(s.st_ino),
           static_cast<std::uint64_t>(s.st_size), nanoseconds(s.st_mtim), nanoseconds(s.st_ctim)};
 }
 

@@ -8,7 +8,8 @@
 namespace texmesh {
 
 /// What tells, without reading a file, that it has not changed: device, inode, size, and the times of the
-/// last change of content and of inode, in nanoseconds since 1970.
+/// last change of content and of inode, in nanoseconds since 1970. Device is 0 where its number is that of a
+/// mount (NFS, overlay, tmpfs), which says nothing on another node.
 struct FileStamp {
   std::uint64_t device = 0, inode = 0, bytes = 0;
   std::int64_t modified_ns = 0, changed_ns = 0;

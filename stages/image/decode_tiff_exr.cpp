@@ -1,167 +1,51 @@
 #include "stages/image/decode_tiff_exr.h"
 
-#include <algorithm>
-#include <memory>
-#include <mutex>
-
-#include <OpenImageIO/filesystem.h>
-#include <OpenImageIO/imageio.h>
+#include <dlfcn.h>
 
 #include "format/base/errors.h"
+#include "stages/image/oiio/tiff_exr_reader.h"
 
 namespace texmesh {
 namespace {
 
-const char* reader_name(ImageFormat format) { return format == ImageFormat::kTiff ? "tiff" : "openexr"; }
+constexpr const char* kModule = "texmesh_oiio.so";
 
-// An image file opened by the reader of its format, in memory; keep the bytes alive.
-struct OpenImage {
-  std::unique_ptr<OIIO::Filesystem::IOMemReader> memory;
-  std::unique_ptr<OIIO::ImageInput> input;
-  OIIO::ImageSpec spec;
+struct ReaderModule {
+  const TiffExrReader* reader = nullptr;
+  std::string problem;
 };
 
-std::string reader_error(OIIO::ImageInput& input) {
-  std::string s = input.geterror();
-  // OpenImageIO repeats and ends messages with line feeds.
-  while (!s.empty() && (s.back() == '\n' || s.back() == ' ')) s.pop_back();
-  std::replace(s.begin(), s.end(), '\n', ' ');
-  return s.empty() ? "an error without a message" : s;
+// OpenImageIO brings 200 shared libraries with it. Loading them takes .2 s, and most models need none of
+// them.
+ReaderModule load_module() {
+  // By name alone: the run path of this program or library tells the folder. Never closed, since errors that
+  // the module throws outlive any call.
+  void* const module = ::dlopen(kModule, RTLD_NOW | RTLD_LOCAL);
+  if (module)
+    if (void* const symbol = ::dlsym(module, kTiffExrSymbol))
+      return {reinterpret_cast<const TiffExrReader* (*)()>(symbol)(), ""};
+  const char* const why = ::dlerror();
+  return {nullptr, why ? why : "an error without a message"};
 }
 
-OpenImage open_image(const std::string& name, ImageFormat format, ByteSpan bytes) {
-  static std::once_flag once;
-  std::call_once(once, [] {
-    // One model, one child process, --jobs of them: the pools of OpenImageIO and OpenEXR would only add
-    // threads.
-    OIIO::attribute("threads", 1);
-    OIIO::attribute("exr_threads", -1);
-  });
-  OpenImage open;
-  open.memory = std::make_unique<OIIO::Filesystem::IOMemReader>(bytes.data(), bytes.size());
-  open.input = OIIO::ImageInput::create(reader_name(format));
-  if (!open.input)
-    throw InputError(name, "", std::string("OpenImageIO's reader for ") + image_format_name(format), "none");
-  OIIO::ImageSpec config;
-  config.attribute("oiio:UnassociatedAlpha", 1);
-  open.input->set_ioproxy(open.memory.get());
-  if (!open.input->open("memory", open.spec, config))
-    throw InputError(name, "image header", std::string("a readable ") + image_format_name(format),
-                     reader_error(*open.input));
-  return open;
-}
-
-/// Of an EXR, whose channels have names: colours and their alpha come first, then Z, ids and others.
-std::uint32_t exr_channels(const OIIO::ImageSpec& spec) {
-  if (spec.alpha_channel == 1 || spec.alpha_channel == 3)
-    return static_cast<std::uint32_t>(spec.alpha_channel) + 1;
-  const bool grey = spec.nchannels < 3 || (spec.channelnames[0] == "Y" && spec.channelnames[1] != "RY" &&
-                                           spec.channelnames[1] != "BY");
-  return grey ? 1 : 3;
-}
-
-std::uint32_t colour_channels(const OIIO::ImageSpec& spec, ImageFormat format) {
-  if (format == ImageFormat::kExr && spec.nchannels > 0) return exr_channels(spec);
-  const auto n = static_cast<std::uint32_t>(std::max(spec.nchannels, 0));
-  if (n <= 4) return n;
-  return spec.alpha_channel == 3 ? 4 : 3;
-}
-
-std::uint8_t bits_of(const OIIO::ImageSpec& spec) {
-  switch (spec.format.basetype) {
-    case OIIO::TypeDesc::UINT8:
-      return 8;
-    case OIIO::TypeDesc::UINT16:
-      return 16;
-    default:
-      return 32;
-  }
-}
-
-void check_spec(const std::string& name, const OIIO::ImageSpec& spec, const ImageLimits& limits) {
-  check_image_size(name, static_cast<std::uint64_t>(std::max(spec.width, 0)),
-                   static_cast<std::uint64_t>(std::max(spec.height, 0)), limits);
-  if (spec.depth > 1) throw InputError(name, "image header", "a flat image", "a volume");
-  if (spec.deep) throw InputError(name, "image header", "a flat image", "deep data");
-  if (spec.nchannels < 1 || spec.nchannels > 64)
-    throw InputError(name, "image header", "1 to 64 channels", std::to_string(spec.nchannels));
-}
-
-/// No packer of TIFF or EXR shrinks a picture with any noise further. A header that claims more lies about
-/// the size, and is refused before memory is taken. (Deflate ends at 1032; the rest is for the newer
-/// packers.)
-void check_plausible(const Image& image) {
-  constexpr std::uint64_t kMostShrunk = 20000;
-  if (std::uint64_t{image.width_px} * image.height_px * image.channels / kMostShrunk <= image.bytes.size())
-    return;
-  throw InputError(image.name, "image header",
-                   "a size that its " + std::to_string(image.bytes.size()) + " bytes can hold",
-                   std::to_string(image.width_px) + " x " + std::to_string(image.height_px));
-}
-
-OpenImage open_checked(const Image& image) {
-  OpenImage open = open_image(image.name, image.format, image.bytes);
-  if (static_cast<std::uint32_t>(open.spec.width) != image.width_px ||
-      static_cast<std::uint32_t>(open.spec.height) != image.height_px ||
-      colour_channels(open.spec, image.format) != image.channels)
-    throw InputError(image.name, "image header", "the size that import had found", "another one");
-  check_plausible(image);
-  return open;
-}
-
-[[noreturn]] void fail_pixels(const Image& image, OpenImage& open, const std::string& place) {
-  throw InputError(image.name, place, std::string("a whole ") + image_format_name(image.format),
-                   reader_error(*open.input));
-}
-
-// The file's own samples as T. Errors of the reader, truncation included, are InputError and name the rows.
-template <class T>
-std::vector<T> read_samples(const Image& image, OpenImage& open, OIIO::TypeDesc type) {
-  const int channels = static_cast<int>(image.channels), height = static_cast<int>(image.height_px);
-  const std::size_t row = static_cast<std::size_t>(image.width_px) * image.channels;
-  std::vector<T> samples;
-  if (open.spec.tile_width > 0) {
-    samples.resize(row * image.height_px);
-    if (!open.input->read_image(0, 0, 0, channels, type, samples.data()) || open.input->has_error())
-      fail_pixels(image, open, "pixels");
-    return samples;
-  }
-  constexpr int kRows = 64;                // at once
-  samples.reserve(row * image.height_px);  // not touched before it is read
-  const int first = open.spec.y;           // the data window of an EXR may begin anywhere
-  for (int y = 0; y < height; y += kRows) {
-    const int end = std::min(height, y + kRows);
-    samples.resize(row * static_cast<std::size_t>(end));
-    T* to = samples.data() + row * static_cast<std::size_t>(y);
-    if (!open.input->read_scanlines(0, 0, first + y, first + end, 0, 0, channels, type, to) ||
-        open.input->has_error())
-      fail_pixels(
-          image, open,
-          "rows " + std::to_string(y) + " to " + std::to_string(end - 1) + " of " + std::to_string(height));
-  }
-  return samples;
+const TiffExrReader& reader_for(const std::string& name, ImageFormat format) {
+  static const ReaderModule module = load_module();
+  if (module.reader) return *module.reader;
+  throw InputError(name, "",
+                   std::string("a reader for ") + image_format_name(format) + ": " + kModule +
+                       ", which is installed with texmesh, and Debian's package libopenimageio2.4",
+                   module.problem);
 }
 
 }  // namespace
 
 ImageHeader read_tiff_exr_header(const std::string& name, ImageFormat format, ByteSpan bytes,
                                  const ImageLimits& limits) {
-  const OpenImage open = open_image(name, format, bytes);
-  check_spec(name, open.spec, limits);
-  return {static_cast<std::uint32_t>(open.spec.width), static_cast<std::uint32_t>(open.spec.height),
-          static_cast<std::uint8_t>(colour_channels(open.spec, format)), bits_of(open.spec)};
+  return reader_for(name, format).read_header(name, format, bytes, limits);
 }
 
 StoredSamples decode_tiff_exr(const Image& image) {
-  OpenImage open = open_checked(image);
-  switch (bits_of(open.spec)) {
-    case 8:
-      return read_samples<std::uint8_t>(image, open, OIIO::TypeDesc::UINT8);
-    case 16:
-      return read_samples<std::uint16_t>(image, open, OIIO::TypeDesc::UINT16);
-    default:
-      return read_samples<float>(image, open, OIIO::TypeDesc::FLOAT);
-  }
+  return reader_for(image.name, image.format).decode(image);
 }
 
 }  // namespace texmesh

@@ -1,5 +1,6 @@
 #pragma once
-// Inside stages: TIFF and EXR by OpenImageIO.
+// Inside stages: TIFF and EXR by OpenImageIO, which the module texmesh_oiio.so brings when it is first
+// needed.
 #include <cstdint>
 #include <string>
 #include <variant>
@@ -19,7 +20,8 @@ ImageHeader read_tiff_exr_header(const std::string& name, ImageFormat format, By
                                  const ImageLimits& limits);
 
 /// InputError when the file is damaged or truncated (with the rows), when it cannot hold what its header
-/// claims, and when its header is not the one that `image` was made from.
+/// claims, and when its header is not the one that `image` was made from. Both functions: InputError, with
+/// the name of Debian's package, where the module cannot be loaded.
 StoredSamples decode_tiff_exr(const Image& image);
 
 }  // namespace texmesh

@@ -1,7 +1,8 @@
 // What a run over many models costs beside the models' own work, as ratios and bounds within one run:
 //   batch_bench noop        1,000 models of which nothing has changed, against ninja's no-op over as many
-//   edges batch_bench throughput  16 mixed models with one process and with two batch_bench plan        a
-//   collection and a folder of 100,000 models up to the point where the first would start
+//   batch_bench throughput  16 mixed models with one process and with two
+//   batch_bench plan        a collection and a folder of 100,000 models, up to the first start
+//   batch_bench small       models of 2,000 triangles and one texture of 512 px: models a second
 #include <fcntl.h>
 #include <spawn.h>
 #include <sys/resource.h>
@@ -183,6 +184,15 @@ void plan(const Settings& s) {
   }
 }
 
+void small(const Settings& s) {
+  const std::string in = s.folder + "/small";
+  run({s.make_scan, "--many", std::to_string(s.models), "--triangles", "2000", "--texture", "512", "-o", in});
+  const Cost c = run({s.texmesh, "compile", in, "-o", s.folder + "/small-out", "--no-cache", "--jobs", "2"});
+  std::printf(
+      "%d models of 2,000 triangles and 512 px: %.2f s wall, %.2f s cpu; %.2f models/s, %.3f cpu s a model\n",
+      s.models, c.wall_s, c.cpu_s, s.models / c.wall_s, c.cpu_s / s.models);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -192,11 +202,12 @@ int main(int argc, char** argv) {
   app.add_option("--texmesh", settings.texmesh)->capture_default_str();
   app.add_option("--make-scan", settings.make_scan)->capture_default_str();
   app.add_option("--folder", settings.folder, "Working folder (default: a new one, removed at the end)");
-  app.add_option("--models", settings.models, "0 = 1,000 (noop), 100,000 (plan)");
+  app.add_option("--models", settings.models, "0 = 1,000 (noop, small), 100,000 (plan)");
   app.add_option("--repeat", settings.repeat)->capture_default_str();
   const auto* noop_command = app.add_subcommand("noop");
   const auto* throughput_command = app.add_subcommand("throughput");
   const auto* plan_command = app.add_subcommand("plan");
+  const auto* small_command = app.add_subcommand("small");
   CLI11_PARSE(app, argc, argv);
   const bool temporary = settings.folder.empty();
   if (temporary) {
@@ -208,5 +219,6 @@ int main(int argc, char** argv) {
   if (*noop_command) noop(settings);
   if (*throughput_command) throughput(settings);
   if (*plan_command) plan(settings);
+  if (*small_command) small(settings);
   if (temporary) fs::remove_all(settings.folder);
 }

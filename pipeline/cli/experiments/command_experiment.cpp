@@ -5,7 +5,7 @@
 namespace texmesh {
 
 void add_experiment_command(Command& app) {
-  Command c = app.add("experiment", "Ask judges what they can just tell, and fit their answers");
+  Command c = app.add("experiment");
   c.needs_command();
   add_make_experiment(c);
   add_fit_experiment(c);

@@ -1,10 +1,14 @@
 #include "pipeline/cli/options/command_line.h"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <filesystem>
 #include <iostream>
+#include <iterator>
 #include <optional>
+#include <stdexcept>
 
+#include "pipeline/cli/options/command_list.h"
 #include "pipeline/cli/options/help_text.h"
 #include "pipeline/io/exit_codes.h"
 
@@ -97,6 +101,13 @@ Command Command::add(const std::string& name, const std::string& summary) {
   CLI::App* command = app_->add_subcommand(name, summary);
   command->group(group_.empty() ? "Commands" : group_);
   return {command, *state_};
+}
+
+Command Command::add(const std::string& name) {
+  const auto* const command = std::find_if(std::begin(kCommands), std::end(kCommands),
+                                           [&](const CommandSummary& c) { return c.name == name; });
+  if (command == std::end(kCommands)) throw std::logic_error("command_list.h does not have " + name);
+  return add(name, command->text);
 }
 
 void Command::needs_command() { app_->require_subcommand(1); }

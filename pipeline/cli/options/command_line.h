@@ -55,6 +55,8 @@ class Command {
   /// Commands and options that are added from here on stand beneath this title in the help.
   void group(const std::string& title) { group_ = title; }
   Command add(const std::string& name, const std::string& summary);
+  /// A command of the program, with its summary of command_list.h.
+  Command add(const std::string& name);
   void needs_command();
 
   Option flag(const std::string& names, bool& value, const std::string& help);

@@ -5,7 +5,7 @@
 namespace texmesh {
 
 void add_study_command(Command& app) {
-  Command c = app.add("study", "Measure on your own data what the method promises");
+  Command c = app.add("study");
   c.needs_command();
   add_fragments_study(c);
   add_quality_study(c);

@@ -19,6 +19,7 @@
 #include "pipeline/compile/workers/worker_child.h"
 #include "pipeline/compile/workers/worker_messages.h"
 #include "pipeline/io/exit_codes.h"
+#include "pipeline/io/machine/owner_mark.h"
 #include "pipeline/io/resource_error.h"
 #include "pipeline/io/wire_text.h"
 
@@ -58,6 +59,7 @@ void limit(int resource, std::uint64_t value, std::uint64_t more = 0) {
 void apply_limits(const Json& job) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (::getppid() != job.value("parent", pid_t{0})) ::_exit(kExitInternal);  // it died before the line above
+  owner_mark();  // looks at the machine while this process may still look
   const rlimit no_core{0, 0};
   ::setrlimit(RLIMIT_CORE, &no_core);
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // sanitizers map terabytes of shadow

@@ -52,6 +52,14 @@ class Memo : public ::testing::Test {
     fs::remove(folder_ / "missing.jpg");
   }
 
+  std::string cache() const { return folder_ / "cache"; }
+  /// The files of every memo.
+  std::vector<std::string> segments() const {
+    std::vector<std::string> paths;
+    for (const std::string& f : testing::files_beneath(cache())) paths.push_back(cache() + "/" + f);
+    return paths;
+  }
+
   TemporaryFolder folder_;
   bool refreshed_ = false;
 };
@@ -65,16 +73,14 @@ TEST_F(Memo, GivesBackWhatWasSaved) {
   r.keys = {{"import", digest_of("i")}, {"package", digest_of("p")}};
   r.error = {"input", "model.obj", "line 3", "a number", "x", "model.obj: line 3: ..."};
   {
-    BuildMemo memo(folder_ / "cache", "/out");
-    memo.set("/out/a.texmesh", r);
-    MemoRecord unsaved;
-    EXPECT_TRUE(memo.find("/out/a.texmesh", unsaved));
+    BuildMemo memo(cache(), "/out");
+    memo.set("a.texmesh", r);
     EXPECT_TRUE(memo.save());
   }
-  const BuildMemo memo(folder_ / "cache", "/out");
+  const BuildMemo memo(cache(), "/out");
   EXPECT_FALSE(memo.was_damaged());
   MemoRecord back;
-  ASSERT_TRUE(memo.find("/out/a.texmesh", back));
+  ASSERT_TRUE(memo.find("a.texmesh", back));
   EXPECT_EQ(back.request, r.request);
   EXPECT_EQ(back.failed, r.failed);
   EXPECT_EQ(back.looked_at_ns, r.looked_at_ns);
@@ -83,7 +89,7 @@ TEST_F(Memo, GivesBackWhatWasSaved) {
   EXPECT_EQ(back.package_bytes, r.package_bytes);
   EXPECT_EQ(back.peak_memory_bytes, r.peak_memory_bytes);
   EXPECT_EQ(back.seconds, r.seconds);
-  EXPECT_EQ(back.keys, r.keys);
+  EXPECT_EQ(memo.keys("a.texmesh"), r.keys);
   EXPECT_EQ(back.error, r.error);
   ASSERT_EQ(back.files.size(), r.files.size());
   for (std::size_t i = 0; i < r.files.size(); ++i) {
@@ -93,41 +99,128 @@ TEST_F(Memo, GivesBackWhatWasSaved) {
     EXPECT_EQ(back.files[i].bytes, r.files[i].bytes);
     EXPECT_EQ(back.files[i].stamp, r.files[i].stamp);
   }
-  EXPECT_FALSE(memo.find("/out/b.texmesh", back));
-  EXPECT_FALSE(BuildMemo(folder_ / "cache", "/elsewhere").find("/out/a.texmesh", back));
+  EXPECT_FALSE(memo.find("b.texmesh", back));
+  EXPECT_FALSE(BuildMemo(cache(), "/elsewhere").find("a.texmesh", back));
 }
 
-TEST_F(Memo, KeepsWhatOthersHaveSavedMeanwhile) {
+TEST_F(Memo, EveryRunReadsWhatEveryOtherHasSaved) {
   MemoRecord r = record();
-  BuildMemo one(folder_ / "cache", "/out"), other(folder_ / "cache", "/out");
-  one.set("/out/a.texmesh", r);
-  other.set("/out/b.texmesh", r);
-  EXPECT_TRUE(one.save());
-  EXPECT_TRUE(other.save());
-  const BuildMemo both(folder_ / "cache", "/out");
-  EXPECT_TRUE(both.find("/out/a.texmesh", r));
-  EXPECT_TRUE(both.find("/out/b.texmesh", r));
+  {
+    BuildMemo one(cache(), "/out"), other(cache(), "/out");
+    one.set("a.texmesh", r);
+    other.set("b.texmesh", r);
+    EXPECT_TRUE(one.save());
+    EXPECT_TRUE(other.save());
+    const BuildMemo beside(cache(), "/out");  // both are still at work
+    EXPECT_FALSE(beside.was_damaged());
+    EXPECT_TRUE(beside.find("a.texmesh", r));
+    EXPECT_TRUE(beside.find("b.texmesh", r));
+  }
+  const BuildMemo after(cache(), "/out");
+  EXPECT_TRUE(after.find("a.texmesh", r));
+  EXPECT_TRUE(after.find("b.texmesh", r));
+}
+
+TEST_F(Memo, TheLaterRecordCountsWhoeverHasSavedItFirst) {
+  for (const bool later_first : {false, true}) {
+    MemoRecord early = record(), late = record();
+    early.seconds = 1;
+    late.seconds = 2;
+    late.looked_at_ns = early.looked_at_ns + 1;
+    const std::string out = later_first ? "/one" : "/other";
+    for (const MemoRecord* r : {later_first ? &late : &early, later_first ? &early : &late}) {
+      BuildMemo memo(cache(), out);
+      memo.set("a.texmesh", *r);
+      ASSERT_TRUE(memo.save());
+    }
+    MemoRecord found;
+    ASSERT_TRUE(BuildMemo(cache(), out).find("a.texmesh", found));
+    EXPECT_EQ(found.seconds, 2);
+  }
+}
+
+TEST_F(Memo, ManyRunsLeaveFewFilesAndEveryRecord) {
+  constexpr int kRuns = 100;
+  const MemoRecord r = record();
+  std::size_t most = 0;
+  for (int i = 0; i < kRuns; ++i) {
+    BuildMemo memo(cache(), "/out");
+    for (int j = 0; j < i % 7 + 1; ++j) {
+      MemoRecord mine = r;
+      mine.seconds = i;
+      mine.keys = {{"stage " + std::to_string(i % 3), digest_of(std::to_string(i))}};
+      mine.looked_at_ns += i;
+      memo.set(std::to_string(i * (j > 0)) + "-" + std::to_string(j), mine);
+    }
+    ASSERT_TRUE(memo.save());
+    most = std::max(most, segments().size());
+  }
+  EXPECT_LE(most, 24u);
+  const BuildMemo memo(cache(), "/out");
+  EXPECT_FALSE(memo.was_damaged());
+  for (int i = 0; i < kRuns; ++i)
+    for (int j = 0; j < i % 7 + 1; ++j) {
+      MemoRecord found;
+      ASSERT_TRUE(memo.find(std::to_string(i * (j > 0)) + "-" + std::to_string(j), found)) << i << " " << j;
+      if (j == 0) EXPECT_EQ(found.seconds, kRuns - 1);
+      if (j > 0) {
+        EXPECT_EQ(found.seconds, i);
+        EXPECT_EQ(memo.keys(std::to_string(i * (j > 0)) + "-" + std::to_string(j)),
+                  (StageKeys{{"stage " + std::to_string(i % 3), digest_of(std::to_string(i))}}));
+      }
+    }
+}
+
+TEST_F(Memo, ARunThatSavesNothingWritesNothing) {
+  { const BuildMemo memo(cache(), "/out"); }
+  EXPECT_TRUE(testing::files_beneath(cache()).empty());
+}
+
+TEST_F(Memo, ARunThatWasKilledLosesAtMostItsLastRecord) {
+  const MemoRecord r = record();
+  std::string open;
+  std::size_t one_record = 0;
+  {
+    BuildMemo memo(cache(), "/out");
+    memo.set("a.texmesh", r);
+    ASSERT_TRUE(memo.save());
+    open = segments().at(0);
+    one_record = fs::file_size(open);
+    memo.set("b.texmesh", r);
+    ASSERT_TRUE(memo.save());
+    const std::string good = testing::read_text(open);
+    testing::write_text(folder_ / "killed", good);
+  }
+  fs::remove_all(cache());
+  fs::create_directories(fs::path(open).parent_path());
+  const std::string good = testing::read_text(folder_ / "killed");
+  for (std::size_t bytes = 0; bytes <= good.size(); ++bytes) {
+    testing::write_text(open, good.substr(0, bytes));
+    const BuildMemo memo(cache(), "/out");
+    MemoRecord found;
+    ASSERT_FALSE(memo.was_damaged()) << bytes;
+    ASSERT_EQ(memo.find("a.texmesh", found), bytes >= one_record) << bytes;
+    ASSERT_EQ(memo.find("b.texmesh", found), bytes == good.size()) << bytes;
+  }
 }
 
 TEST_F(Memo, WithoutACacheNothingIsRemembered) {
   MemoRecord r = record();
   BuildMemo memo("", "/out");
-  memo.set("/out/a.texmesh", r);
+  memo.set("a.texmesh", r);
   EXPECT_TRUE(memo.save());
-  EXPECT_FALSE(BuildMemo("", "/out").find("/out/a.texmesh", r));
+  EXPECT_FALSE(BuildMemo("", "/out").find("a.texmesh", r));
 }
 
-TEST_F(Memo, EveryTruncationAndFlippedByteIsNoticedAndNothingIsBelieved) {
+TEST_F(Memo, EveryTruncationAndFlippedByteIsNoticedAndNothingWrongIsBelieved) {
   MemoRecord r = record();
   {
-    BuildMemo memo(folder_ / "cache", "/out");
-    memo.set("/out/a.texmesh", r);
+    BuildMemo memo(cache(), "/out");
+    memo.set("a.texmesh", r);
     ASSERT_TRUE(memo.save());
   }
-  std::string file;
-  for (const std::string& f : testing::files_beneath(folder_ / "cache"))
-    if (!f.ends_with(".lock")) file = folder_ / ("cache/" + f);
-  const std::string good = testing::read_text(file);
+  const std::string file = segments().at(0), good = testing::read_text(file);
+  ASSERT_TRUE(file.ends_with(".seg"));
   ASSERT_GT(good.size(), 200u);
   for (std::size_t i = 0; i < 2 * good.size(); ++i) {
     std::string bad = good;
@@ -136,14 +229,17 @@ TEST_F(Memo, EveryTruncationAndFlippedByteIsNoticedAndNothingIsBelieved) {
     else
       bad.resize(i - good.size());
     testing::write_text(file, bad);
-    const BuildMemo memo(folder_ / "cache", "/out");
+    const BuildMemo memo(cache(), "/out");
     ASSERT_TRUE(memo.was_damaged()) << i;
-    ASSERT_FALSE(memo.find("/out/a.texmesh", r)) << i;
+    if (memo.find("a.texmesh", r)) ASSERT_EQ(r.package_digest, record().package_digest) << i;
   }
-  BuildMemo memo(folder_ / "cache", "/out");
-  memo.set("/out/a.texmesh", r);
-  EXPECT_TRUE(memo.save());
-  EXPECT_FALSE(BuildMemo(folder_ / "cache", "/out").was_damaged());
+  {
+    BuildMemo memo(cache(), "/out");
+    memo.set("b.texmesh", r);
+    EXPECT_TRUE(memo.save());
+  }
+  EXPECT_FALSE(BuildMemo(cache(), "/out").was_damaged()) << "what is damaged is merged away";
+  EXPECT_TRUE(BuildMemo(cache(), "/out").find("b.texmesh", r));
 }
 
 TEST_F(Memo, HoldsWhileEveryFileIsAsItWas) {

@@ -11,6 +11,7 @@
 #include <set>
 #include <thread>
 
+#include "pipeline/io/machine/owner_mark.h"
 #include "tests/faults/fault_plan.h"
 #include "tests/support/small_builds.h"
 
@@ -230,6 +231,30 @@ TEST_F(Faults, TheDiskIsFullFromEveryCallOn) {
 
 TEST_F(Faults, AnInputOutputErrorAtEveryCall) {
   ASSERT_NO_FATAL_FAILURE(sweep_errors("eio", "Input/output error", 4));
+}
+
+/// Lustre with localflock, NFS with local_lock: every process gets every lock.
+TEST_F(Faults, LocksThatAreGrantedToAllCostNoPackage) {
+  constexpr int kModels = 3, kRuns = 3;
+  prepare(kModels, "1");
+  const Site site(models_, profile_, jobs_);
+  const std::string live = site.out() + "/scan_00000.texmesh.tmp-" + owner_mark() + "-0",
+                    elsewhere = site.out() + "/scan_00001.texmesh.tmp-node7-0123456789ab-1-0";
+  write_text(live, "somebody is writing this");
+  write_text(elsewhere, "so is another machine");
+  std::vector<std::thread> runs;
+  std::vector<CommandResult> results(kRuns);
+  for (int i = 0; i < kRuns; ++i)
+    runs.emplace_back([&, i] { results[i] = site.build({"LD_PRELOAD=" TEXMESH_GRANT_LOCKS}); });
+  for (std::thread& run : runs) run.join();
+  for (const CommandResult& r : results) EXPECT_EQ(r.exit_code, 0) << r.output << r.errors;
+  EXPECT_EQ(read_text(live), "somebody is writing this");
+  EXPECT_EQ(read_text(elsewhere), "so is another machine");
+  fs::remove(live);
+  fs::remove(elsewhere);
+  EXPECT_TRUE(site.packages() == reference_) << "other packages, or something beside them";
+  site.expect_sound_cache("locks granted to all");
+  expect_next_build_to_be_whole(site, "locks granted to all");
 }
 
 }  // namespace

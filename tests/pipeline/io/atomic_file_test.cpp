@@ -1,14 +1,19 @@
 #include "pipeline/io/atomic_file.h"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <thread>
 
 #include "format/base/bytes.h"
 #include "format/base/errors.h"
+#include "pipeline/io/machine/owner_mark.h"
 #include "tests/support/command.h"
 
 namespace texmesh {
@@ -69,6 +74,51 @@ TEST(AtomicFile, AFullDiskLeavesNothing) {
       write_file_atomically((folder.path() / "a").string(), bytes_of("x"), (folder.path() / "link").string()),
       InputError);
   EXPECT_FALSE(fs::exists(folder.path() / "a"));
+}
+
+/// A temporary of `file` with this writer's mark.
+std::string left_by(const std::string& file, const std::string& mark) {
+  const std::string path = file + ".tmp-" + mark + "-0";
+  testing::write_text(path, "half");
+  return path;
+}
+
+void make_old(const std::string& path, int days) {
+  const timespec time{::time(nullptr) - days * 86400, 0};
+  const timespec times[2] = {time, time};
+  ASSERT_EQ(::utimensat(AT_FDCWD, path.c_str(), times, 0), 0);
+}
+
+TEST(Temporaries, AreRemovedWhenTheirWriterIsGoneWhateverLocksSay) {
+  const TemporaryFolder folder;
+  const std::string package = folder / "a.texmesh", own = owner_mark();
+  const pid_t pid = ::fork();
+  if (pid == 0) ::_exit(0);
+  ::waitpid(pid, nullptr, 0);
+  const std::string live = left_by(package, own);
+  make_old(live, 3);
+  const std::string dead = left_by(package, own.substr(0, own.rfind('-') + 1) + std::to_string(pid));
+  const std::string elsewhere = left_by(package, "node7-0123456789ab-7");
+  const std::string old = left_by(package, "node8-0123456789ab-7");
+  make_old(old, 3);
+  const std::string other = left_by(folder / "a.json", "node8-0123456789ab-7");
+  make_old(other, 3);
+  testing::write_text(folder / "a.texmesh.tmp-mine", "a user's");
+  make_old(folder / "a.texmesh.tmp-mine", 3);
+  EXPECT_EQ(remove_stale_temporaries(folder.path().string(), ".texmesh"), 2u);
+  for (const std::string& kept : {live, elsewhere, other, folder / "a.texmesh.tmp-mine"})
+    EXPECT_TRUE(fs::exists(kept)) << kept;
+  EXPECT_FALSE(fs::exists(dead));
+  EXPECT_FALSE(fs::exists(old));
+}
+
+TEST(Temporaries, ANameThatSomebodyHasIsLeftToThem) {
+  const TemporaryFolder folder;
+  const std::string file = folder / "a", temporary = temporary_name(file, 0);
+  testing::write_text(temporary, "another writer's");
+  write_file_atomically(file, bytes_of("mine"), temporary);
+  EXPECT_EQ(testing::read_text(file), "mine");
+  EXPECT_EQ(testing::read_text(temporary), "another writer's");
 }
 
 }  // namespace

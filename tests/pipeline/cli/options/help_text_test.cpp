@@ -1,6 +1,7 @@
 // The help pages: short enough to read, whole where they say so, every option's text in one place.
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <regex>
 #include <sstream>
 
@@ -107,6 +108,17 @@ TEST(CommandHelp, RareOptionsAreInTheFullHelpAndWork) {
       run_command({TEXMESH_BINARY, "plan", TEXMESH_SOURCE_DIR "/tests/golden/v2.0-scan.texmesh", "--policy",
                    "htca", "--bandwidth", "2Mbit/s"});
   EXPECT_EQ(r.exit_code, 0) << r.errors;
+}
+
+// texmesh prints these by itself, without loading what the commands need.
+TEST(Help, TheProgramThatStartsQuicklyTellsWhatTheWholeProgramTells) {
+  const std::string core = (std::filesystem::path(TEXMESH_BINARY).parent_path() / "texmesh-core").string();
+  for (const char* option : {"--help", "-h", "--version"}) {
+    const CommandResult whole = run_command({core, option});
+    EXPECT_EQ(whole.exit_code, 0) << whole.errors;
+    EXPECT_FALSE(whole.output.empty());
+    EXPECT_EQ(run_command({TEXMESH_BINARY, option}).output, whole.output) << option;
+  }
 }
 
 }  // namespace

@@ -1,0 +1,231 @@
+#include "pipeline/batch/memo/memo_segment.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <numeric>
+
+#include "format/base/archive.h"
+#include "format/base/errors.h"
+#include "pipeline/io/file_stamp.h"
+#include "pipeline/io/machine/owner_mark.h"
+
+namespace texmesh {
+namespace {
+
+constexpr std::array<std::uint8_t, 8> kMagic{'T', 'X', 'M', 'E', 'M', 'O', 0, 2};
+constexpr std::size_t kMostBlockBytes = 8u << 20, kFullBlockBytes = 1u << 20;
+constexpr std::string_view kOpenEnding = ".open", kFinishedEnding = ".seg";
+
+struct BlockHead {
+  std::uint64_t bytes = 0;
+  Sha256 digest{};
+};
+constexpr std::size_t kHeadBytes = 8 + 32;
+
+struct Block {
+  std::vector<std::string> new_stages;
+  std::vector<MemoName> names;
+  std::vector<std::int64_t> times;
+  std::vector<std::uint32_t> sizes, key_sizes;
+  std::vector<std::uint8_t> records;
+  template <class S, class A>
+  static void archive(S& s, A& a) {
+    a(s.new_stages, s.names, s.times, s.sizes, s.key_sizes, s.records);
+  }
+};
+
+bool read_at(int fd, std::uint64_t at, std::span<std::uint8_t> to) {
+  while (!to.empty()) {
+    const ssize_t n = ::pread(fd, to.data(), to.size(), static_cast<off_t>(at));
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) return false;
+    at += static_cast<std::uint64_t>(n);
+    to = to.subspan(static_cast<std::size_t>(n));
+  }
+  return true;
+}
+
+bool write_to_end(int fd, std::span<const std::uint8_t> bytes) {
+  while (!bytes.empty()) {
+    const ssize_t n = ::write(fd, bytes.data(), bytes.size());
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) return false;
+    bytes = bytes.subspan(static_cast<std::size_t>(n));
+  }
+  return true;
+}
+
+BlockHead head_of(std::span<const std::uint8_t, kHeadBytes> bytes) {
+  BlockHead head;
+  std::memcpy(&head.bytes, bytes.data(), 8);
+  std::memcpy(head.digest.data(), bytes.data() + 8, 32);
+  return head;
+}
+
+}  // namespace
+
+MemoName memo_name(const std::string& package) {
+  const Sha256 digest = sha256({reinterpret_cast<const std::uint8_t*>(package.data()), package.size()});
+  MemoName name;
+  std::copy_n(digest.begin(), name.size(), name.begin());
+  return name;
+}
+
+bool MemoSegment::is_finished() const { return path_.ends_with(kFinishedEnding); }
+
+std::unique_ptr<MemoSegment> MemoSegment::read(const std::string& path,
+                                               const std::function<void(MemoEntry)>& entry) {
+  std::unique_ptr<MemoSegment> segment(new MemoSegment);
+  segment->path_ = path;
+  segment->file_.reset(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  struct stat s {};
+  if (segment->file_.get() < 0 || ::fstat(segment->file_.get(), &s) != 0 || !S_ISREG(s.st_mode))
+    return nullptr;
+  segment->bytes_ = static_cast<std::uint64_t>(s.st_size);
+  segment->modified_ns_ = stamp_of(s).modified_ns;
+  // Another machine may see the end of a file that grows as zeros.
+  segment->damaged_ = !segment->read_blocks(entry) && segment->is_finished();
+  return segment;
+}
+
+/// False where bytes are not what a writer of segments writes.
+bool MemoSegment::read_blocks(const std::function<void(MemoEntry)>& entry) {
+  std::array<std::uint8_t, kMagic.size()> magic{};
+  const bool cut = bytes_ < magic.size();
+  if (cut) return !is_finished();
+  if (!read_at(file_.get(), 0, magic) || magic != kMagic) return false;
+  bool last = false;
+  std::uint64_t at = magic.size();
+  while (!last && at + kHeadBytes <= bytes_) {
+    std::array<std::uint8_t, kHeadBytes> bytes;
+    if (!read_at(file_.get(), at, bytes)) return false;
+    const BlockHead head = head_of(bytes);
+    if (head.bytes > kMostBlockBytes) return false;
+    if (head.bytes > bytes_ - at - kHeadBytes) break;
+    std::vector<std::uint8_t> payload(static_cast<std::size_t>(head.bytes));
+    if (!read_at(file_.get(), at + kHeadBytes, payload) || sha256(payload) != head.digest) return false;
+    if (!tell_block(payload, at + kHeadBytes, entry, last)) return false;
+    at += kHeadBytes + head.bytes;
+  }
+  return is_finished() ? last && at == bytes_ : true;
+}
+
+bool MemoSegment::tell_block(std::span<const std::uint8_t> payload, std::uint64_t at,
+                             const std::function<void(MemoEntry)>& entry, bool& last) {
+  Block block;
+  try {
+    block = decode_artefact<Block>(payload, "memo");
+  } catch (const FormatError&) {
+    return false;
+  }
+  const auto sum = [](const std::vector<std::uint32_t>& sizes) {
+    return std::accumulate(sizes.begin(), sizes.end(), std::uint64_t{0});
+  };
+  const std::size_t count = block.names.size();
+  if (block.times.size() != count || block.sizes.size() != count || block.key_sizes.size() != count ||
+      sum(block.sizes) + sum(block.key_sizes) != block.records.size())
+    return false;
+  for (const std::string& stage : block.new_stages) stages_.number_of(stage);
+  std::uint64_t offset = at + payload.size() - block.records.size();  // the records are the payload's end
+  for (std::size_t i = 0; i < block.names.size(); ++i) {
+    entry({block.names[i], block.times[i], offset, block.sizes[i], block.key_sizes[i]});
+    offset += std::uint64_t{block.sizes[i]} + block.key_sizes[i];
+  }
+  last = block.names.empty();
+  return true;
+}
+
+std::optional<MemoRecord> MemoSegment::record(const MemoEntry& entry) const {
+  std::vector<std::uint8_t> bytes(entry.bytes);
+  if (!read_at(file_.get(), entry.offset, bytes)) return std::nullopt;
+  try {
+    return unpack_record(bytes);
+  } catch (const FormatError&) {
+    return std::nullopt;
+  }
+}
+
+StageKeys MemoSegment::keys(const MemoEntry& entry) const {
+  std::vector<std::uint8_t> bytes(entry.key_bytes);
+  if (!read_at(file_.get(), entry.offset + entry.bytes, bytes)) return {};
+  try {
+    return unpack_keys(bytes, stages_);
+  } catch (const FormatError&) {
+    return {};
+  }
+}
+
+void MemoSegmentWriter::add(const MemoName& name, const MemoRecord& record) {
+  const std::vector<std::uint8_t> bytes = pack_record(record), keys = pack_keys(record.keys, stages_);
+  const std::size_t size = bytes.size() + keys.size();
+  if (size > kMostBlockBytes / 2) return;  // a model of ten thousand files is looked at again
+  if (records_.size() + size > kFullBlockBytes) flush();
+  names_.push_back(name);
+  times_.push_back(record.looked_at_ns);
+  sizes_.push_back(static_cast<std::uint32_t>(bytes.size()));
+  key_sizes_.push_back(static_cast<std::uint32_t>(keys.size()));
+  records_.insert(records_.end(), bytes.begin(), bytes.end());
+  records_.insert(records_.end(), keys.begin(), keys.end());
+}
+
+bool MemoSegmentWriter::flush() {
+  if (names_.empty()) return !failed_;
+  const auto first_new = stages_.all().begin() + static_cast<std::ptrdiff_t>(stages_written_);
+  Block block{{first_new, stages_.all().end()},
+              std::move(names_),
+              std::move(times_),
+              std::move(sizes_),
+              std::move(key_sizes_),
+              std::move(records_)};
+  names_.clear(), times_.clear(), sizes_.clear(), key_sizes_.clear(), records_.clear();
+  stages_written_ = stages_.all().size();
+  return append(encode_artefact(block));
+}
+
+bool MemoSegmentWriter::append(std::span<const std::uint8_t> payload) {
+  if (failed_ || !open()) return failed_ = true, false;
+  std::vector<std::uint8_t> bytes(kHeadBytes);
+  const BlockHead head{payload.size(), sha256(payload)};
+  std::memcpy(bytes.data(), &head.bytes, 8);
+  std::memcpy(bytes.data() + 8, head.digest.data(), 32);
+  bytes.insert(bytes.end(), payload.begin(), payload.end());
+  failed_ = !write_to_end(file_.get(), bytes);
+  return !failed_;
+}
+
+/// Others wait for nothing: the name is this process's own.
+bool MemoSegmentWriter::open() {
+  static std::atomic<unsigned> counter{0};
+  if (file_.get() >= 0) return true;
+  std::error_code ec;
+  std::filesystem::create_directories(folder_, ec);
+  constexpr int kAttempts = 100;  // a process of this number may have written here before
+  for (int i = 0; i < kAttempts && file_.get() < 0; ++i) {
+    path_ = folder_ + "/" + std::to_string(wall_clock_ns()) + "-" + owner_mark() + "-" +
+            std::to_string(counter++) + std::string(kOpenEnding);
+    file_.reset(::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_APPEND | O_CLOEXEC | O_NOFOLLOW, 0666));
+    if (file_.get() < 0 && errno != EEXIST) return false;
+  }
+  return file_.get() >= 0 && write_to_end(file_.get(), kMagic);
+}
+
+bool MemoSegmentWriter::finish() {
+  flush();
+  if (file_.get() < 0 || failed_) return file_.reset(), false;
+  const bool ended = append(encode_artefact(Block{}));
+  file_.reset();
+  const std::string final_path =
+      path_.substr(0, path_.size() - kOpenEnding.size()) + std::string(kFinishedEnding);
+  if (!ended || ::rename(path_.c_str(), final_path.c_str()) != 0) return false;
+  path_ = final_path;
+  return true;
+}
+
+}  // namespace texmesh

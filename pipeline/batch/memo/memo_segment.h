@@ -1,0 +1,100 @@
+#pragma once
+// One file of a memo: blocks of records, appended by one process.
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "pipeline/batch/memo/memo_record.h"
+#include "pipeline/io/descriptor.h"
+
+namespace texmesh {
+
+/// A package: the first half of the SHA-256 of its path within the output folder.
+using MemoName = std::array<std::uint8_t, 16>;
+MemoName memo_name(const std::string& package);
+
+/// A packed record in a segment.
+struct MemoEntry {
+  MemoName name{};
+  std::int64_t looked_at_ns = 0;
+  std::uint64_t offset = 0;
+  std::uint32_t bytes = 0, key_bytes = 0;  // the keys stand behind the record
+};
+
+// File: 8 bytes of magic; then blocks of at most kMostBlockBytes:
+//   u64 size of the payload, SHA-256 of the payload, payload = archive of
+//   names of stages that are new in this block, names and times of the records, sizes of each and of its
+//   keys, all their bytes.
+// A finished file ends with a block without records, and its name with ".seg"; that of a file that is being
+// written ends with ".open", and what is cut off at its end is no damage.
+
+/// Reads a segment. Not thread-safe.
+class MemoSegment {
+ public:
+  /// Opens the file, checks every block, and tells of each record that a sound block holds. Nothing when
+  /// there is no such file (it has been merged into another), or when it cannot be opened.
+  static std::unique_ptr<MemoSegment> read(const std::string& path,
+                                           const std::function<void(MemoEntry)>& entry);
+
+  const std::string& path() const { return path_; }
+  std::uint64_t bytes() const { return bytes_; }
+  std::int64_t modified_ns() const { return modified_ns_; }
+  bool is_finished() const;
+  /// Not all of it was believed.
+  bool is_damaged() const { return damaged_; }
+  /// The record of an entry that read() told of, without its keys; nothing when the file has changed.
+  std::optional<MemoRecord> record(const MemoEntry& entry) const;
+  /// The record's keys; none when the file has changed.
+  StageKeys keys(const MemoEntry& entry) const;
+
+ private:
+  MemoSegment() = default;
+  bool read_blocks(const std::function<void(MemoEntry)>& entry);
+  bool tell_block(std::span<const std::uint8_t> payload, std::uint64_t at,
+                  const std::function<void(MemoEntry)>& entry, bool& last);
+  std::string path_;
+  Descriptor file_;
+  std::uint64_t bytes_ = 0;
+  std::int64_t modified_ns_ = 0;
+  bool damaged_ = false;
+  StageNames stages_;
+};
+
+/// Writes a segment of its own, which no other process writes. The file is made with the first record. Losing
+/// the end of it, when the machine stops, costs looking again: nothing waits for the disk.
+class MemoSegmentWriter {
+ public:
+  /// `folder`: of the memo.
+  explicit MemoSegmentWriter(std::string folder) : folder_(std::move(folder)) {}
+  MemoSegmentWriter(const MemoSegmentWriter&) = delete;
+  MemoSegmentWriter& operator=(const MemoSegmentWriter&) = delete;
+  ~MemoSegmentWriter() { finish(); }
+
+  /// Kept in memory until flush(), or until a block is full.
+  void add(const MemoName& name, const MemoRecord& record);
+  /// False when something cannot be written; nothing is written from then on.
+  bool flush();
+  /// Ends the file, under its final name. False when that fails, or when nothing was written.
+  bool finish();
+  const std::string& path() const { return path_; }
+
+ private:
+  bool open();
+  bool append(std::span<const std::uint8_t> payload);
+  std::string folder_, path_;  // of the file while it is written
+  Descriptor file_;
+  bool failed_ = false;
+  StageNames stages_;
+  std::size_t stages_written_ = 0;
+  std::vector<MemoName> names_;
+  std::vector<std::int64_t> times_;
+  std::vector<std::uint32_t> sizes_, key_sizes_;
+  std::vector<std::uint8_t> records_;
+};
+
+}  // namespace texmesh

@@ -1,0 +1,23 @@
+#include "pipeline/cli/program.h"
+
+#include <string>
+
+#include "format/container/format_version.h"
+#include "pipeline/cli/options/command_line.h"
+#include "pipeline/compile/library_versions.h"
+
+namespace texmesh {
+
+void describe_program(CommandLine& line) {
+  line.version("texmesh " + tool_version() + ", package format " + std::to_string(kFormatMajor) + "." +
+               std::to_string(kFormatMinor));
+  Command program = line.program();
+  program.examples(
+      "  texmesh compile scan.glb -o scan.texmesh     compile a model\n"
+      "  texmesh dump scan.texmesh                    see what is in the package\n"
+      "  texmesh verify scan.texmesh                  check every byte of the package\n"
+      "  texmesh view scan.texmesh                    look at the package in a browser");
+  program.notes("Every command explains itself: texmesh compile --help");
+}
+
+}  // namespace texmesh
