@@ -7,6 +7,7 @@
 #include <set>
 
 #include "format/base/errors.h"
+#include "pipeline/batch/fleet/run_summary.h"
 #include "pipeline/batch/job_selection.h"
 #include "pipeline/batch/write_reports.h"
 #include "pipeline/cache/disk_store.h"
@@ -108,6 +109,7 @@ class Batch {
     for (WorkerReport& r : reports) r.result = ModelResult::kCancelled;
     if (!stop) reports = run_workers(selection_.jobs(), settings_.pool, on_event, on_finish);
     for (std::size_t job = 0; job < reports.size(); ++job) {
+      selection_.tell_earlier_cost(job, reports[job]);
       reports_[selection_.model_of(job)] = reports[job];
       wrote_ = wrote_ || reports[job].stages_ran > 0;
     }
@@ -135,11 +137,13 @@ class Batch {
   }
 
   int exit_code(bool all_written) const {
-    int code = all_written ? kExitOk : kExitModelFailed;
-    for (const WorkerReport& r : reports_) {
-      if (r.result == ModelResult::kInternal) return kExitInternal;
-      if (!r.ok()) code = kExitModelFailed;
-    }
+    int code = all_written ? kExitOk : kExitTryAgain;
+    const bool stopped = settings_.pool.stop_on_failure &&
+                         std::any_of(reports_.begin(), reports_.end(),
+                                     [](const WorkerReport& r) { return r.result == ModelResult::kFailed; });
+    for (const WorkerReport& r : reports_)
+      if (!stopped || r.result != ModelResult::kCancelled)  // after --fail-fast: not asked to be tried again
+        code = graver_exit_code(code, exit_code_of(r.result, r.error_kind));
     return code;
   }
 

@@ -16,6 +16,7 @@
 #include "pipeline/cache/disk_store.h"
 #include "pipeline/compile/compile_model.h"
 #include "pipeline/compile/profile.h"
+#include "pipeline/compile/workers/sandbox/worker_rules.h"
 #include "pipeline/compile/workers/worker_child.h"
 #include "pipeline/compile/workers/worker_messages.h"
 #include "pipeline/io/exit_codes.h"
@@ -69,6 +70,25 @@ void apply_limits(const Json& job) {
   ::sigaction(SIGTERM, &action, nullptr);
   ::signal(SIGINT, SIG_IGN);   // the parent decides
   ::signal(SIGXFSZ, SIG_IGN);  // a file size limit is an error of write(), not a death
+}
+
+/// False where a sandbox is required and does not hold.
+bool enter_sandbox_of(const Json& job) {
+  const std::string mode = job.value("sandbox", "off");
+  if (mode == enum_name(SandboxMode::kOff)) return true;
+#if defined(__SANITIZE_ADDRESS__) || \
+    defined(__SANITIZE_THREAD__)  // they look into the process as a debugger does
+  return true;
+#else
+  WorkerPlaces places;
+  places.input = from_wire(job.at("input").get<std::string>());
+  places.cache = from_wire(job.at("cache").get<std::string>());
+  places.only_looks = job.at("forecast").get<bool>();
+  if (!places.only_looks) places.output = from_wire(job.at("output").get<std::string>());
+  for (const Json& layer : job.at("layers"))
+    if (layer.is_string()) places.layers.push_back(from_wire(layer.get<std::string>()));
+  return enter_sandbox(sandbox_rules(places)).complete() || mode != enum_name(SandboxMode::kRequire);
+#endif
 }
 
 StageObserver stage_events(EventWriter& events) {
@@ -219,6 +239,8 @@ int worker_main() {
   if (!job.is_object()) return kExitUsage;
   apply_limits(job);
   try {
+    if (!enter_sandbox_of(job))
+      throw ResourceError("sandbox", "", "bounds on files and calls", describe_sandbox(sandbox_support()));
     return compile(job, events);
   } catch (const ResourceError& e) {
     return report_error(events, "resource", e);
