@@ -1,6 +1,7 @@
 #include "pipeline/batch/run.h"
 
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
 #include <filesystem>
 #include <ostream>
@@ -13,6 +14,7 @@
 #include "pipeline/cache/disk_store.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"
+#include "pipeline/io/resource_error.h"
 
 namespace texmesh {
 namespace {
@@ -22,6 +24,13 @@ using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+/// A disk that is full now, a server that does not answer now: nothing is wrong with the path.
+bool is_of_the_moment(const std::error_code& ec) {
+  return ec == std::errc::no_space_on_device || ec == std::errc::io_error ||
+         ec == std::errc::too_many_files_open || ec == std::errc::not_enough_memory || ec.value() == EDQUOT ||
+         ec.value() == ESTALE;
 }
 
 class Batch {
@@ -55,6 +64,7 @@ class Batch {
       if (folder.empty() || !made.insert(folder).second) continue;
       std::error_code ec;
       fs::create_directories(folder, ec);
+      if (is_of_the_moment(ec)) throw ResourceError(folder, "", "an output folder", ec.message());
       if (ec) throw InputError(folder, "", "an output folder", ec.message());
     }
   }

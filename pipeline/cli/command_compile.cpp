@@ -25,6 +25,7 @@
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/file_resolver.h"
 #include "pipeline/io/machine/machine_share.h"
+#include "pipeline/io/resource_error.h"
 
 namespace texmesh {
 namespace {
@@ -340,7 +341,12 @@ int run_compile(CompileArguments& args) {
               << " of " << plan.models_in_collection << " models" << std::endl;
   if (settings.verbose && !args.json) std::cout << sandbox_line(settings.pool.limits.sandbox) << std::endl;
   settings.more_inputs.insert(settings.more_inputs.end(), plan.files.begin(), plan.files.end());
-  return run_batch(plan, settings, std::cout);
+  try {
+    return run_batch(plan, settings, std::cout);
+  } catch (const ResourceError& e) {
+    std::cerr << "texmesh compile: " << e.what() << '\n';
+    return kExitTryAgain;
+  }
 }
 
 }  // namespace
