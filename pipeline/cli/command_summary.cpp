@@ -45,7 +45,7 @@ int run_merge(const MergeArguments& args) {
     if (!path->empty()) check_output_file(*path);
   std::vector<SummaryFile> files;
   for (const std::string& file : args.files) files.push_back(open_summary(file));
-  const RunSummary merged = merge_summaries(files);
+  const RunSummary merged = merge_summaries(std::move(files));
   write_text_file(args.output, write_summary(merged));
   if (!args.junit.empty()) write_text_file(args.junit, write_junit(merged));
   write_page(merged, args);

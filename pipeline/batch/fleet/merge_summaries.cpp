@@ -69,10 +69,10 @@ int rank_of(const ModelSummary& m) {
 
 class Merger {
  public:
-  explicit Merger(const std::vector<SummaryFile>& files) : files_(files), split_(usual_split(files)) {}
+  explicit Merger(std::vector<SummaryFile> files) : files_(std::move(files)), split_(usual_split(files_)) {}
 
   RunSummary merge() {
-    for (const SummaryFile& f : files_)
+    for (SummaryFile& f : files_) {
       if (!f.summary)
         merged_.problems.push_back({f.file, f.kind, f.text});
       else if (is_foreign(*f.summary))
@@ -81,6 +81,8 @@ class Merger {
                                         " of another collection, or of this one before its files changed"});
       else
         add(f.file, *f.summary);
+      f.summary.reset();  // a million models stand in memory once
+    }
     name_missing();
     for (auto& [package, found] : models_) merged_.models.push_back(std::move(found.model));
     merged_.models_in_collection = merged_.models.size();
@@ -97,13 +99,16 @@ class Merger {
     return s.shard && (s.collection != split_.collection || s.shard->count != split_.shards);
   }
 
-  void add(const std::string& file, const RunSummary& s) {
+  void add(const std::string& file, RunSummary& s) {
+    const std::size_t models = s.models.size();
     std::map<std::string, std::size_t> doubles;  // by the file that had them first
-    for (const ModelSummary& m : s.models) {
-      const auto [at, is_new] = models_.try_emplace(m.package, Found{m, file});
-      if (is_new) continue;
-      ++doubles[at->second.file];
-      if (rank_of(m) < rank_of(at->second.model)) at->second.model = m;
+    for (ModelSummary& m : s.models) {
+      const auto [at, is_new] = models_.try_emplace(m.package);
+      if (is_new)
+        at->second.file = file;
+      else
+        ++doubles[at->second.file];
+      if (is_new || rank_of(m) < rank_of(at->second.model)) at->second.model = std::move(m);
     }
     for (const auto& [other, count] : doubles)
       merged_.problems.push_back(
@@ -111,7 +116,7 @@ class Merger {
     merged_.seconds += s.seconds;
     if (s.shard) seen_.insert(s.shard->index);
     if (s.parts.empty())
-      merged_.parts.push_back({file, s.shard, s.models.size(), s.seconds});
+      merged_.parts.push_back({file, s.shard, models, s.seconds});
     else
       merged_.parts.insert(merged_.parts.end(), s.parts.begin(), s.parts.end());
   }
@@ -127,7 +132,7 @@ class Merger {
            "no summary of shards " + ranges_text(missing) + " of " + std::to_string(split_.shards)});
   }
 
-  const std::vector<SummaryFile>& files_;
+  std::vector<SummaryFile> files_;
   Split split_;
   RunSummary merged_;
   std::map<std::string, Found> models_;  // by package
@@ -148,7 +153,7 @@ SummaryFile open_summary(const std::string& file) {
   }
 }
 
-RunSummary merge_summaries(const std::vector<SummaryFile>& files) { return Merger(files).merge(); }
+RunSummary merge_summaries(std::vector<SummaryFile> files) { return Merger(std::move(files)).merge(); }
 
 int exit_code_of(const RunSummary& merged) {
   int code = kExitOk;

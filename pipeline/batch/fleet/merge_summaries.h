@@ -24,7 +24,7 @@ SummaryFile open_summary(const std::string& file);
 ///   double        a file that reports packages which an earlier file reports, too
 ///   missing       shards that no file reports
 /// Equal files in equal order give equal bytes.
-RunSummary merge_summaries(const std::vector<SummaryFile>& files);
+RunSummary merge_summaries(std::vector<SummaryFile> files);
 
 /// Of a merged summary: that of its models, and kExitTryAgain where something is half-written or missing,
 /// kExitModelFailed where something is foreign.

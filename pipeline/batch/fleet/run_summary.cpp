@@ -172,26 +172,31 @@ RunSummary summarize_run(const BatchPlan& plan, const std::vector<WorkerReport>&
   return s;
 }
 
+/// One line a model: a million of them are never one JSON document in memory.
 std::string write_summary(const RunSummary& s) {
+  const auto line = [](const SummaryJson& j) {
+    return j.dump(-1, ' ', false, SummaryJson::error_handler_t::replace);
+  };
   const SummaryCounts c = count_results(s.models);
-  SummaryJson j{{"version", 1},           {"models", SummaryJson::array()},
-                {"compiled", c.compiled}, {"unchanged", c.unchanged},
-                {"failed", c.failed},     {"cancelled", c.cancelled},
-                {"seconds", s.seconds}};
-  if (s.shard) j["shard"] = shard_json(*s.shard);
+  SummaryJson head{{"version", 1},       {"compiled", c.compiled},   {"unchanged", c.unchanged},
+                   {"failed", c.failed}, {"cancelled", c.cancelled}, {"seconds", s.seconds}};
+  if (s.shard) head["shard"] = shard_json(*s.shard);
   if (!s.collection.empty()) {
-    j["models_in_collection"] = s.models_in_collection;
-    j["collection"] = s.collection;
+    head["models_in_collection"] = s.models_in_collection;
+    head["collection"] = s.collection;
   }
-  for (const ModelSummary& m : s.models) j["models"].push_back(model_json(m));
   for (const SummaryPart& p : s.parts) {
     SummaryJson part{{"file", p.file}, {"models", p.models}, {"seconds", p.seconds}};
     if (p.shard) part["shard"] = shard_json(*p.shard);
-    j["parts"].push_back(std::move(part));
+    head["parts"].push_back(std::move(part));
   }
   for (const SummaryProblem& p : s.problems)
-    j["problems"].push_back({{"file", p.file}, {"kind", p.kind}, {"text", p.text}});
-  return j.dump(1, ' ', false, SummaryJson::error_handler_t::replace) + "\n";
+    head["problems"].push_back({{"file", p.file}, {"kind", p.kind}, {"text", p.text}});
+  std::string out = line(head);
+  out.back() = ',';
+  out += "\n\"models\":[";
+  for (const ModelSummary& m : s.models) out += (&m == s.models.data() ? "\n" : ",\n") + line(model_json(m));
+  return out + "\n]}\n";
 }
 
 std::string write_junit(const RunSummary& s) {

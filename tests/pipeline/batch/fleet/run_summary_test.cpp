@@ -148,7 +148,7 @@ TEST(Summary, EveryTruncationIsNamedAsHalfWritten) {
   RunOfModels run;
   run.add("a", ModelResult::kOk, 1.5);
   const std::string text = write_summary(run.summary()), file = folder / "s.json";
-  for (std::size_t length = 0; length + 2 < text.size(); length += 7) {  // its last byte is a line break
+  for (std::size_t length = 0; length + 2 < text.size(); length += 7) {  // the last byte is a line break
     testing::write_text(file, text.substr(0, length));
     EXPECT_EQ(open_summary(file).kind, "half-written") << length;
   }
