@@ -29,7 +29,7 @@ void write_text_file(const std::string& path, const std::string& text) {
 }
 
 /// The page's pictures stand in a folder beside it: page.html, page-posters/00000.jpg.
-void write_page(const RunSummary& merged, const MergeArguments& args) {
+void write_collection_page(const RunSummary& merged, const MergeArguments& args) {
   if (args.html.empty()) return;
   const fs::path folder = fs::path(args.html).parent_path();
   const std::string posters = fs::path(args.html).stem().string() + "-posters";
@@ -48,7 +48,7 @@ int run_merge(const MergeArguments& args) {
   const RunSummary merged = merge_summaries(std::move(files));
   write_text_file(args.output, write_summary(merged));
   if (!args.junit.empty()) write_text_file(args.junit, write_junit(merged));
-  write_page(merged, args);
+  write_collection_page(merged, args);
   for (const SummaryProblem& p : merged.problems)
     std::cerr << "texmesh summary: " << p.kind << ": " << (p.file.empty() ? "" : p.file + ": ") << p.text
               << '\n';

@@ -72,14 +72,12 @@ void apply_limits(const Json& job) {
   ::signal(SIGXFSZ, SIG_IGN);  // a file size limit is an error of write(), not a death
 }
 
-/// False where a sandbox is required and does not hold.
-bool enter_sandbox_of(const Json& job) {
+/// ResourceError where a sandbox is required and does not hold: another machine may do.
+void enter_sandbox_of(const Json& job, EventWriter& events) {
   const std::string mode = job.value("sandbox", "off");
-  if (mode == enum_name(SandboxMode::kOff)) return true;
-#if defined(__SANITIZE_ADDRESS__) || \
-    defined(__SANITIZE_THREAD__)  // they look into the process as a debugger does
-  return true;
-#else
+  if (mode == enum_name(SandboxMode::kOff)) return;
+#if !defined(__SANITIZE_ADDRESS__) && \
+    !defined(__SANITIZE_THREAD__)  // they look into the process as debuggers do
   WorkerPlaces places;
   places.input = from_wire(job.at("input").get<std::string>());
   places.cache = from_wire(job.at("cache").get<std::string>());
@@ -87,7 +85,15 @@ bool enter_sandbox_of(const Json& job) {
   if (!places.only_looks) places.output = from_wire(job.at("output").get<std::string>());
   for (const Json& layer : job.at("layers"))
     if (layer.is_string()) places.layers.push_back(from_wire(layer.get<std::string>()));
-  return enter_sandbox(sandbox_rules(places)).complete() || mode != enum_name(SandboxMode::kRequire);
+  const SandboxSupport held = enter_sandbox(sandbox_rules(places));
+  if (held.complete()) return;
+  if (mode == enum_name(SandboxMode::kRequire))
+    throw ResourceError("sandbox", "", "bounds on files and calls", describe_sandbox(held));
+  events.write({{"event", "note"},
+                {"severity", "info"},
+                {"code", "sandbox-degraded"},
+                {"place", ""},
+                {"text", "the model's process has " + describe_sandbox(held)}});
 #endif
 }
 
@@ -239,8 +245,7 @@ int worker_main() {
   if (!job.is_object()) return kExitUsage;
   apply_limits(job);
   try {
-    if (!enter_sandbox_of(job))
-      throw ResourceError("sandbox", "", "bounds on files and calls", describe_sandbox(sandbox_support()));
+    enter_sandbox_of(job, events);
     return compile(job, events);
   } catch (const ResourceError& e) {
     return report_error(events, "resource", e);
