@@ -35,20 +35,26 @@ ModelList list_collection(PlanRequest request, int shards) {
   return list;
 }
 
+/// One line a model, as in summaries.
 std::string write_model_list(const ModelList& list) {
   using ListJson = nlohmann::ordered_json;
-  ListJson j{{"version", 1}, {"shards", list.shards}};
-  if (!list.collection.empty()) j["collection"] = list.collection;
-  j["collections"] = list.collections;
-  j["models"] = ListJson::array();
+  const auto line = [](const ListJson& j) {
+    return j.dump(-1, ' ', false, ListJson::error_handler_t::replace);
+  };
+  ListJson head{{"version", 1}, {"shards", list.shards}};
+  if (!list.collection.empty()) head["collection"] = list.collection;
+  head["collections"] = list.collections;
+  std::string out = line(head);
+  out.back() = ',';
+  out += "\n\"models\":[";
   for (const ListedModel& m : list.models)
-    j["models"].push_back({{"model", m.input},
-                           {"output", m.output},
-                           {"package", m.package},
-                           {"files", m.files},
-                           {"bytes", m.bytes},
-                           {"shard", m.shard}});
-  return j.dump(1, ' ', false, ListJson::error_handler_t::replace) + "\n";
+    out += (&m == list.models.data() ? "\n" : ",\n") + line({{"model", m.input},
+                                                             {"output", m.output},
+                                                             {"package", m.package},
+                                                             {"files", m.files},
+                                                             {"bytes", m.bytes},
+                                                             {"shard", m.shard}});
+  return out + "\n]}\n";
 }
 
 }  // namespace texmesh

@@ -73,7 +73,7 @@ void apply_limits(const Json& job) {
 }
 
 /// ResourceError where a sandbox is required and does not hold: another machine may do.
-void enter_sandbox_of(const Json& job, EventWriter& events) {
+void enter_sandbox_of(const Json& job, [[maybe_unused]] EventWriter& events) {
   const std::string mode = job.value("sandbox", "off");
   if (mode == enum_name(SandboxMode::kOff)) return;
 #if !defined(__SANITIZE_ADDRESS__) && \
