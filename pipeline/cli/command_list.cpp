@@ -51,6 +51,9 @@ void add_list_command(Command& app) {
       .integer_in(1, 1'000'000);
   c.option("--costs", args->costs, "As for compile --shard").value_name("FILE");
   c.flag("--json", args->json, "Print JSON (schemas/list.v1.schema.json)");
+  c.examples(
+      "  texmesh list scans/ -o packages/                      what compile would make\n"
+      "  texmesh list scans/ -o packages/ --shards 40 --json   for another engine");
   c.notes(
       "For Snakemake (examples/snakemake), Nextflow, make: names of packages, the files that each model names, "
       "and sizes. Nothing is compiled and no picture is opened.");

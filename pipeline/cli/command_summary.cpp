@@ -75,6 +75,7 @@ void add_summary_command(Command& app) {
               "Write a page: what went wrong first, then figures, then the packages with their posters")
       .value_name("FILE");
   merge.option("--posters", args->posters, "Most posters on the page").integer_in(0, 100'000).shows_default();
+  merge.examples("  texmesh summary merge report/*.json -o all.json --junit all.xml --html all.html");
   merge.notes(
       "Summaries that are half-written, foreign (of another collection) or double, and shards without one, are "
       "named.\n"
