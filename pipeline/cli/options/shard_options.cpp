@@ -10,10 +10,9 @@
 namespace texmesh {
 
 void add_shard_options(Command& c, std::string& shard, std::string& costs) {
-  c.option(
-       "--shard", shard,
-       "Compile only part I of the parts 0 .. N-1, which take about as long as each other. auto = the part "
-       "that Slurm, AWS Batch or Kubernetes give this task; auto/N where they do not tell N")
+  c.option("--shard", shard,
+           "Compile only part I of 0 .. N-1, which take about as long as each other. auto = the part of this "
+           "array task; auto/N where the engine tells no N")
       .value_name("I/N");
   c.option(
        "--costs", costs,
