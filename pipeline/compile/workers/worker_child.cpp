@@ -72,6 +72,11 @@ void apply_limits(const Json& job) {
   ::signal(SIGXFSZ, SIG_IGN);  // a file size limit is an error of write(), not a death
 }
 
+[[maybe_unused]] std::string real_program() {
+  std::error_code ec;
+  return std::filesystem::read_symlink("/proc/self/exe", ec).string();
+}
+
 /// ResourceError where a sandbox is required and does not hold: another machine may do.
 void enter_sandbox_of(const Json& job, [[maybe_unused]] EventWriter& events) {
   const std::string mode = job.value("sandbox", "off");
@@ -82,6 +87,7 @@ void enter_sandbox_of(const Json& job, [[maybe_unused]] EventWriter& events) {
   places.input = from_wire(job.at("input").get<std::string>());
   places.cache = from_wire(job.at("cache").get<std::string>());
   places.only_looks = job.at("forecast").get<bool>();
+  places.program = real_program();
   if (!places.only_looks) places.output = from_wire(job.at("output").get<std::string>());
   for (const Json& layer : job.at("layers"))
     if (layer.is_string()) places.layers.push_back(from_wire(layer.get<std::string>()));

@@ -101,9 +101,12 @@ TEST_F(Fleet, TheSandboxChangesNoByteAndSaysWhatHolds) {
   EXPECT_NE(bounded.output.find(complete ? "sandbox: files" : "sandbox, degraded: "), std::string::npos)
       << bounded.output;
   EXPECT_TRUE(packages_in(folder_ / "auto") == packages_in(folder_ / "off"));
+  // A library may have started a thread before the process bounds itself: then files are not bounded, and a
+  // note says so.
+  const bool held = complete && bounded.output.find("sandbox-degraded") == std::string::npos;
   const CommandResult required = compile({"--sandbox", "require"}, "required");
-  EXPECT_EQ(required.exit_code, complete ? 0 : 2) << required.output << required.errors;
-  if (complete) EXPECT_TRUE(packages_in(folder_ / "required") == packages_in(folder_ / "off"));
+  EXPECT_EQ(required.exit_code, held ? 0 : complete ? 75 : 2) << required.output << required.errors;
+  EXPECT_TRUE(packages_in(folder_ / "required") == packages_in(folder_ / (held ? "off" : "nothing")));
   EXPECT_EQ(compile({"--sandbox", "some"}).exit_code, 2);
 }
 
