@@ -2,6 +2,7 @@
 
 #include <filesystem>
 
+#include "pipeline/batch/fleet/shards.h"
 #include "pipeline/io/core_path.h"
 
 namespace texmesh {
@@ -9,9 +10,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What a model costs that was never compiled: measured on the sample scans, rounded up.
+/// The memory of a model that was never compiled: measured on the sample scans, rounded up.
 constexpr std::uint64_t kBaseMemory_bytes = 300'000'000, kMemoryPerByte = 10;
-constexpr double kBaseSeconds = 1, kSecondsPerByte = 5e-7;
 
 /// Failures that only another machine or another moment explains are not remembered.
 bool is_lasting(const WorkerReport& r) {
@@ -63,6 +63,7 @@ void JobSelection::recall(const MemoRecord& record, WorkerReport& r) {
   has_recalled_failure_ = has_recalled_failure_ || record.failed;
   r.result = record.failed ? ModelResult::kFailed : ModelResult::kUnchanged;
   r.package_bytes = record.package_bytes;
+  if (!record.failed) r.made_s = record.seconds, r.made_memory_bytes = record.peak_memory_bytes;
   if (!settings_.depfile.empty()) r.files = record.files;
   if (record.failed && record.error.size() == 6) {
     r.error_kind = record.error[0];
@@ -100,10 +101,17 @@ void JobSelection::add_job(std::size_t i, bool remembered) {
     const auto size = fs::file_size(m.input, ec);
     const std::uint64_t bytes = ec ? 0 : size;
     job.predicted_memory_bytes = kBaseMemory_bytes + kMemoryPerByte * bytes;
-    job.predicted_s = kBaseSeconds + kSecondsPerByte * static_cast<double>(bytes);
+    job.predicted_s = guessed_seconds(bytes);
   }
   jobs_.push_back(std::move(job));
   model_of_job_.push_back(i);
+}
+
+void JobSelection::tell_earlier_cost(std::size_t job, WorkerReport& report) const {
+  const MemoRecord& earlier = records_[model_of_job_[job]];
+  if (!report.ok() || earlier.failed || report.stages_ran >= report.stages_hit) return;
+  report.made_s = earlier.seconds;
+  report.made_memory_bytes = earlier.peak_memory_bytes;
 }
 
 void JobSelection::remember(std::size_t job, const WorkerReport& report) {

@@ -26,6 +26,8 @@ class JobSelection {
   bool has_recalled_failure() const { return has_recalled_failure_; }
 
   void remember(std::size_t job, const WorkerReport& report);
+  /// What the model took when its stages ran, for the report of a job that found most of them in the cache.
+  void tell_earlier_cost(std::size_t job, WorkerReport& report) const;
   bool memo_was_damaged() const { return memo_.was_damaged(); }
   /// False when the memo cannot be written.
   bool save_memo() { return memo_.save(); }

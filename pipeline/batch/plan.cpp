@@ -5,7 +5,6 @@
 #include <map>
 
 #include "format/base/errors.h"
-#include "format/base/sha256.h"
 #include "pipeline/batch/collection.h"
 #include "pipeline/batch/find_models.h"
 #include "pipeline/compile/options.h"
@@ -69,15 +68,23 @@ void refuse_shared_outputs(const BatchPlan& plan) {
   }
 }
 
+/// Costs are whole microseconds: sums of them do not depend on their order.
+std::uint64_t cost_us(const PlannedModel& m, const std::string& package, const PlanRequest& request) {
+  const auto known = request.costs_s.find(package);
+  if (known != request.costs_s.end()) return static_cast<std::uint64_t>(known->second * 1e6);
+  std::error_code ec;
+  const auto bytes = fs::file_size(m.input, ec);
+  return static_cast<std::uint64_t>(guessed_seconds(ec ? 0 : bytes) * 1e6);
+}
+
 void drop_other_shards(BatchPlan& plan, const PlanRequest& request) {
-  if (request.shards <= 1) return;
-  std::erase_if(plan.models, [&](const PlannedModel& m) {
-    const std::string name = fs::path(m.output).lexically_relative(request.output).generic_string();
-    const Sha256 digest = sha256({reinterpret_cast<const std::uint8_t*>(name.data()), name.size()});
-    std::uint64_t number = 0;
-    for (int i = 0; i < 8; ++i) number = number << 8 | digest[static_cast<std::size_t>(i)];
-    return number % static_cast<std::uint64_t>(request.shards) != static_cast<std::uint64_t>(request.shard);
-  });
+  plan.models_in_collection = plan.models.size();
+  plan.shard = request.shard;
+  if (request.shard.count <= 1) return;
+  const ShardSplit split = split_plan(plan, request, request.shard.count);
+  plan.collection = split.collection;
+  std::size_t i = 0;
+  std::erase_if(plan.models, [&](const PlannedModel&) { return split.shard_of[i++] != request.shard.index; });
 }
 
 }  // namespace
@@ -114,6 +121,19 @@ BatchPlan plan_batch(const PlanRequest& request) {
 std::string package_within(const BatchPlan& plan, const PlannedModel& m) {
   if (m.output.starts_with(plan.output_prefix)) return m.output.substr(plan.output_prefix.size());
   return fs::path(m.output).filename().string();
+}
+
+ShardSplit split_plan(const BatchPlan& plan, const PlanRequest& request, int shards) {
+  ShardSplit split;
+  std::vector<ModelCost> costs;
+  split.packages.reserve(plan.models.size());  // the costs point into it
+  for (const PlannedModel& m : plan.models) {
+    split.packages.push_back(package_within(plan, m));
+    costs.push_back({split.packages.back(), cost_us(m, split.packages.back(), request)});
+  }
+  split.collection = collection_digest(costs);
+  split.shard_of = balance_shards(costs, shards);
+  return split;
 }
 
 }  // namespace texmesh

@@ -1,8 +1,11 @@
 #pragma once
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
+
+#include "pipeline/batch/fleet/shards.h"
 
 namespace texmesh {
 
@@ -20,8 +23,8 @@ struct PlanRequest {
   std::string output;                                // package or folder
   std::shared_ptr<const CompileOptions> base;        // of the profile, not resolved; null = defaults
   std::function<void(CompileOptions&)> apply_flags;  // the command line's options, which win over everything
-  // This run's part: models whose package's name falls on `shard` of 0 .. shards - 1.
-  int shard = 0, shards = 1;
+  Shard shard;                                       // this run's part
+  std::map<std::string, double> costs_s;  // by package within the output folder: what models took before
 };
 
 struct BatchPlan {
@@ -29,14 +32,25 @@ struct BatchPlan {
   std::vector<std::string> files;  // collections that were read: a make-style rule depends on them
   std::string outputs;  // absolute path of the output folder, or of the package where there can be one only
   std::string output_prefix;  // what the models' outputs begin with: the output folder and a slash
+  Shard shard;
+  std::size_t models_in_collection = 0;  // of all shards
+  std::string collection;                // collection_digest() where there are several shards, else ""
 };
 
-/// Finds the models and their options. A model's shard depends on its package's path within the output
-/// folder alone, so that it stays when models come and go. InputError for what makes no sense, before
-/// anything is compiled.
+/// Finds the models and their options. Several shards are balanced by `costs_s`, and by the sizes of the
+/// models' files where a model is not among them: runs that see the same files and costs split the models
+/// alike. InputError for what makes no sense, before anything is compiled.
 BatchPlan plan_batch(const PlanRequest& request);
 
 /// The path of a model's package within the output folder; its name where the run makes one package only.
 std::string package_within(const BatchPlan& plan, const PlannedModel& model);
+
+/// How the models of a plan of the whole collection fall on shards.
+struct ShardSplit {
+  std::vector<std::string> packages;  // of each model: its package's path within the output folder
+  std::vector<int> shard_of;
+  std::string collection;  // collection_digest()
+};
+ShardSplit split_plan(const BatchPlan& plan, const PlanRequest& request, int shards);
 
 }  // namespace texmesh

@@ -7,35 +7,12 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/io/markup.h"
-
 namespace texmesh {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
 std::string dump(const Json& j) { return j.dump(1, ' ', false, Json::error_handler_t::replace) + "\n"; }
-
-/// Bytes that are no UTF-8 (a file name may hold any) become U+FFFD.
-std::string utf8(const std::string& text) {
-  return Json::parse(Json(text).dump(-1, ' ', false, Json::error_handler_t::replace)).get<std::string>();
-}
-
-Json model_json(const PlannedModel& m, const WorkerReport& r) {
-  Json j{{"model", m.name},
-         {"output", m.output},
-         {"result", enum_name(r.result)},
-         {"ran", r.ran},
-         {"bytes", r.package_bytes},
-         {"seconds", r.seconds},
-         {"peak_memory_bytes", r.peak_memory_bytes},
-         {"stages_ran", r.stages_ran},
-         {"stages_from_cache", r.stages_hit}};
-  if (!r.error_kind.empty())
-    j["error"] = {{"kind", r.error_kind},         {"file", r.error_file},   {"place", r.error_place},
-                  {"expected", r.error_expected}, {"found", r.error_found}, {"message", r.error_message}};
-  return j;
-}
 
 double microseconds(double s) { return std::round(s * 1e6); }
 
@@ -69,63 +46,6 @@ std::vector<int> threads_of(const std::vector<StageSpan>& spans) {
 }
 
 }  // namespace
-
-ResultCounts count_results(const std::vector<WorkerReport>& reports) {
-  ResultCounts c;
-  for (const WorkerReport& r : reports) switch (r.result) {
-      case ModelResult::kOk:
-        ++c.compiled;
-        break;
-      case ModelResult::kUnchanged:
-        ++c.unchanged;
-        break;
-      case ModelResult::kCancelled:
-        ++c.cancelled;
-        break;
-      default:
-        ++c.failed;
-    }
-  return c;
-}
-
-std::string write_summary(const std::vector<PlannedModel>& models, const std::vector<WorkerReport>& reports,
-                          double seconds) {
-  const ResultCounts c = count_results(reports);
-  Json j{
-      {"version", 1},       {"models", Json::array()},  {"compiled", c.compiled}, {"unchanged", c.unchanged},
-      {"failed", c.failed}, {"cancelled", c.cancelled}, {"seconds", seconds}};
-  for (std::size_t i = 0; i < models.size(); ++i) j["models"].push_back(model_json(models[i], reports[i]));
-  return dump(j);
-}
-
-std::string write_junit(const std::vector<PlannedModel>& models, const std::vector<WorkerReport>& reports,
-                        double seconds) {
-  const ResultCounts c = count_results(reports);
-  std::string out = fmt::format(
-      "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n"
-      "<testsuite name=\"texmesh compile\" tests=\"{}\" failures=\"{}\" errors=\"0\" skipped=\"{}\" "
-      "time=\"{:.3f}\">\n",
-      models.size(), c.failed, c.cancelled, seconds);
-  for (std::size_t i = 0; i < models.size(); ++i) {
-    const WorkerReport& r = reports[i];
-    out += fmt::format("<testcase classname=\"texmesh\" name=\"{}\" time=\"{:.3f}\"",
-                       markup_escaped(utf8(models[i].name)), r.seconds);
-    out += fmt::format(
-        ">\n<properties><property name=\"result\" value=\"{}\"/><property name=\"output\" value=\"{}\"/>"
-        "<property name=\"bytes\" value=\"{}\"/><property name=\"peak_memory_bytes\" value=\"{}\"/>"
-        "<property name=\"stages_ran\" value=\"{}\"/><property name=\"stages_from_cache\" value=\"{}\"/>"
-        "</properties>\n",
-        enum_name(r.result), markup_escaped(utf8(models[i].output)), r.package_bytes, r.peak_memory_bytes,
-        r.stages_ran, r.stages_hit);
-    if (r.result == ModelResult::kCancelled)
-      out += "<skipped message=\"not reached\"/>\n";
-    else if (!r.ok())
-      out += fmt::format("<failure type=\"{}\" message=\"{}\"/>\n", markup_escaped(r.error_kind),
-                         markup_escaped(utf8(r.error_message)));
-    out += "</testcase>\n";
-  }
-  return out + "</testsuite>\n</testsuites>\n";
-}
 
 std::string write_trace(const std::vector<PlannedModel>& models, const std::vector<WorkerReport>& reports) {
   Json events = Json::array();

@@ -1,17 +1,20 @@
 #include "pipeline/batch/run.h"
 
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
 #include <filesystem>
 #include <ostream>
 #include <set>
 
 #include "format/base/errors.h"
+#include "pipeline/batch/fleet/run_summary.h"
 #include "pipeline/batch/job_selection.h"
 #include "pipeline/batch/write_reports.h"
 #include "pipeline/cache/disk_store.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"
+#include "pipeline/io/resource_error.h"
 
 namespace texmesh {
 namespace {
@@ -21,6 +24,13 @@ using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+/// A disk that is full now, a server that does not answer now: nothing is wrong with the path.
+bool is_of_the_moment(const std::error_code& ec) {
+  return ec == std::errc::no_space_on_device || ec == std::errc::io_error ||
+         ec == std::errc::too_many_files_open || ec == std::errc::not_enough_memory || ec.value() == EDQUOT ||
+         ec.value() == ESTALE;
 }
 
 class Batch {
@@ -54,6 +64,7 @@ class Batch {
       if (folder.empty() || !made.insert(folder).second) continue;
       std::error_code ec;
       fs::create_directories(folder, ec);
+      if (is_of_the_moment(ec)) throw ResourceError(folder, "", "an output folder", ec.message());
       if (ec) throw InputError(folder, "", "an output folder", ec.message());
     }
   }
@@ -108,6 +119,7 @@ class Batch {
     for (WorkerReport& r : reports) r.result = ModelResult::kCancelled;
     if (!stop) reports = run_workers(selection_.jobs(), settings_.pool, on_event, on_finish);
     for (std::size_t job = 0; job < reports.size(); ++job) {
+      selection_.tell_earlier_cost(job, reports[job]);
       reports_[selection_.model_of(job)] = reports[job];
       wrote_ = wrote_ || reports[job].stages_ran > 0;
     }
@@ -135,11 +147,13 @@ class Batch {
   }
 
   int exit_code(bool all_written) const {
-    int code = all_written ? kExitOk : kExitModelFailed;
-    for (const WorkerReport& r : reports_) {
-      if (r.result == ModelResult::kInternal) return kExitInternal;
-      if (!r.ok()) code = kExitModelFailed;
-    }
+    int code = all_written ? kExitOk : kExitTryAgain;
+    const bool stopped = settings_.pool.stop_on_failure &&
+                         std::any_of(reports_.begin(), reports_.end(),
+                                     [](const WorkerReport& r) { return r.result == ModelResult::kFailed; });
+    for (const WorkerReport& r : reports_)
+      if (!stopped || r.result != ModelResult::kCancelled)  // after --fail-fast: not asked to be tried again
+        code = graver_exit_code(code, exit_code_of(r.result, r.error_kind));
     return code;
   }
 

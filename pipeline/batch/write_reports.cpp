@@ -9,6 +9,7 @@
 
 #include "format/base/errors.h"
 #include "pipeline/batch/depfile.h"
+#include "pipeline/batch/fleet/run_summary.h"
 #include "pipeline/batch/reports.h"
 #include "pipeline/io/atomic_file.h"
 
@@ -65,8 +66,8 @@ bool write_reports(const BatchPlan& plan, const RunSettings& settings,
       all_written = false;
     }
   };
-  write(settings.summary, [&] { return write_summary(plan.models, reports, seconds); });
-  write(settings.junit, [&] { return write_junit(plan.models, reports, seconds); });
+  write(settings.summary, [&] { return write_summary(summarize_run(plan, reports, seconds)); });
+  write(settings.junit, [&] { return write_junit(summarize_run(plan, reports, seconds)); });
   write(settings.trace, [&] { return write_trace(plan.models, reports); });
   if (settings.statistics && settings.mode != OutputMode::kJson) std::cout << write_statistics(reports);
   if (!settings.depfile.empty() && reports[0].ok())

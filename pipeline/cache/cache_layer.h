@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/cache/layer_rest.h"
 #include "pipeline/graph/store.h"
 
 namespace texmesh {
@@ -17,12 +18,20 @@ class CacheLayer {
   /// does not work.
   virtual std::optional<std::vector<std::uint8_t>> get(const char* kind, const Sha256& digest,
                                                        std::uint64_t max_bytes) = 0;
-  /// Only for layers that take results. Throws LayerError.
+  /// The layer holds an object of this many bytes under the digest. False also where it does not tell. Throws
+  /// LayerError.
+  virtual bool has(const char* /*kind*/, const Sha256& /*digest*/, std::uint64_t /*bytes*/) { return false; }
+  /// Only for layers that take results. Throws LayerError; LayerRefusal where the layer works but does not
+  /// take this.
   virtual void put(const char* kind, const Sha256& digest, std::span<const std::uint8_t> bytes) = 0;
 };
 
 class LayerError : public std::runtime_error {
   using std::runtime_error::runtime_error;
+};
+
+class LayerRefusal : public LayerError {
+  using LayerError::LayerError;
 };
 
 /// How long a build waits for a server.
@@ -38,12 +47,13 @@ LayerPatience patience_within(double limit_s);
 /// A folder laid out as a cache folder. A layer never writes to the folder.
 std::unique_ptr<CacheLayer> open_folder_layer(const std::string& folder);
 
-/// GET and PUT of URL/ac/<key> and URL/cas/<digest> (the paths of Bazel's remote caches; bazel-remote must be
-/// told not to validate action results; any WebDAV-like server does); notes stand under ac/ too. http and
-/// https only, no redirects; a layer that has failed once, or is slower than its patience allows, fails from
-/// then on without being asked. A credential in the URL (user:password@) never shows up in name() or
-/// messages. InputError for what is no such URL.
-std::unique_ptr<CacheLayer> open_http_layer(const std::string& url, const LayerPatience& patience = {});
+/// GET, HEAD and PUT of URL/ac/<key> and URL/cas/<digest> (the paths of Bazel's remote caches; bazel-remote
+/// must be told not to validate action results; any WebDAV-like server does); notes stand under ac/ too. http
+/// and https only, no redirects; a layer that has failed, or is slower than its patience allows, fails for a
+/// minute without being asked (LayerRest). A credential in the URL (user:password@) never shows up in name()
+/// or messages. InputError for what is no such URL.
+std::unique_ptr<CacheLayer> open_http_layer(const std::string& url, const LayerPatience& patience = {},
+                                            const LayerClock& clock = {});
 
 /// InputError for a text that names no layer. Touches no layer.
 void check_layer(const std::string& place);
@@ -58,10 +68,12 @@ enum class LayerUse : std::uint8_t {
 };
 
 /// The local store with layers behind it, which are asked in order when the local store misses. A layer that
-/// fails is left out for the rest of the process, with one event that holds the layer's number in `layers`. A
-/// null layer is left out from the beginning.
+/// fails is not asked for a minute, with one event that holds the layer's number in `layers`; one that
+/// refuses a result is given none for a minute, and asked all the same. A blob that a layer says it has is
+/// not put again, unless what came from there was damaged. A null layer is left out for good.
 std::unique_ptr<Store> layered_store(std::unique_ptr<Store> local,
-                                     std::vector<std::unique_ptr<CacheLayer>> layers, LayerUse use);
+                                     std::vector<std::unique_ptr<CacheLayer>> layers, LayerUse use,
+                                     const LayerClock& clock = {});
 
 /// The layers that TEXMESH_CACHE_LAYERS names, separated by blanks.
 std::vector<std::string> layers_from_environment();

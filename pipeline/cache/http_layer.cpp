@@ -57,7 +57,8 @@ struct Easy {
 
 class HttpLayer : public CacheLayer {
  public:
-  HttpLayer(std::string url, const LayerPatience& patience) : url_(std::move(url)), patience_(patience) {
+  HttpLayer(std::string url, const LayerPatience& patience, const LayerClock& clock)
+      : url_(std::move(url)), patience_(patience), rest_(clock) {
     while (url_.ends_with('/')) url_.pop_back();
     static std::once_flag once;
     std::call_once(once, [] { ::curl_global_init(CURL_GLOBAL_DEFAULT); });
@@ -81,6 +82,18 @@ class HttpLayer : public CacheLayer {
     return std::move(sink.bytes);
   }
 
+  /// A server that knows no HEAD, or tells no length, costs a PUT more.
+  bool has(const char* kind, const Sha256& digest, std::uint64_t bytes) override {
+    const std::lock_guard lock(mutex_);
+    prepare(kind, digest);
+    ::curl_easy_setopt(easy_.handle, CURLOPT_NOBODY, 1L);
+    const CURLcode rc = perform();
+    if (rc != CURLE_OK) fail(why(rc));
+    curl_off_t length = -1;
+    ::curl_easy_getinfo(easy_.handle, CURLINFO_CONTENT_LENGTH_DOWNLOAD_T, &length);
+    return status_code() == 200 && length >= 0 && static_cast<std::uint64_t>(length) == bytes;
+  }
+
   void put(const char* kind, const Sha256& digest, std::span<const std::uint8_t> bytes) override {
     const std::lock_guard lock(mutex_);
     Upload upload{bytes};
@@ -93,12 +106,12 @@ class HttpLayer : public CacheLayer {
     const CURLcode rc = perform();
     if (rc != CURLE_OK) fail(why(rc));
     if (const long status = status_code(); status < 200 || status > 299)
-      fail("status " + std::to_string(status) + " for a PUT");
+      throw LayerRefusal("status " + std::to_string(status) + " for a PUT");
   }
 
  private:
   void prepare(const char* kind, const Sha256& digest) {
-    if (!problem_.empty()) throw LayerError(problem_);  // another thread has waited for it already
+    if (rest_.holds()) throw LayerError(problem_);  // another thread has waited for it already
     const bool blob = std::string_view(kind) == "cas";
     const std::string url = url_ + (blob ? "/cas/" : "/ac/") + to_hex(digest);
     CURL* h = easy_.handle;
@@ -127,6 +140,7 @@ class HttpLayer : public CacheLayer {
 
   [[noreturn]] void fail(const std::string& problem) {
     problem_ = problem;
+    rest_.begin();
     throw LayerError(problem);
   }
 
@@ -138,6 +152,7 @@ class HttpLayer : public CacheLayer {
 
   std::string url_, problem_;
   LayerPatience patience_;
+  LayerRest rest_;
   double spent_s_ = 0;
   std::mutex mutex_;  // one connection
   Easy easy_;
@@ -145,9 +160,10 @@ class HttpLayer : public CacheLayer {
 
 }  // namespace
 
-std::unique_ptr<CacheLayer> open_http_layer(const std::string& url, const LayerPatience& patience) {
+std::unique_ptr<CacheLayer> open_http_layer(const std::string& url, const LayerPatience& patience,
+                                            const LayerClock& clock) {
   check_layer(url);
-  return std::make_unique<HttpLayer>(url, patience);
+  return std::make_unique<HttpLayer>(url, patience, clock);
 }
 
 }  // namespace texmesh

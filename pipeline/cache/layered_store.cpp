@@ -30,12 +30,12 @@ std::span<const std::uint8_t> bytes_of(const std::string& s) {
 
 class LayeredStore : public Store {
  public:
-  LayeredStore(std::unique_ptr<Store> local, std::vector<std::unique_ptr<CacheLayer>> layers, LayerUse use)
+  LayeredStore(std::unique_ptr<Store> local, std::vector<std::unique_ptr<CacheLayer>> layers, LayerUse use,
+               const LayerClock& clock)
       : local_(std::move(local)), use_(use) {
-    for (auto& l : layers) {
-      const bool works = l != nullptr;
-      layers_.push_back({std::move(l), works, static_cast<int>(layers_.size())});
-    }
+    for (auto& l : layers)
+      layers_.push_back(
+          {std::move(l), LayerRest(clock), LayerRest(clock), static_cast<int>(layers_.size()), {}});
   }
 
   std::optional<std::vector<StoredBlob>> find(const Sha256& key) override {
@@ -52,8 +52,10 @@ class LayeredStore : public Store {
   SharedBytes load(const StoredBlob& blob) override {
     if (SharedBytes bytes = local_->load(blob)) return bytes;
     for (Layer& layer : layers_)
-      if (auto bytes = get(layer, "cas", blob.digest, blob.bytes); bytes && is(blob, *bytes))
-        return std::make_shared<const std::vector<std::uint8_t>>(std::move(*bytes));
+      if (auto bytes = get(layer, "cas", blob.digest, blob.bytes)) {
+        if (is(blob, *bytes)) return std::make_shared<const std::vector<std::uint8_t>>(std::move(*bytes));
+        remember_damage(layer, blob.digest);
+      }
     return nullptr;
   }
 
@@ -64,9 +66,12 @@ class LayeredStore : public Store {
     for (const auto& [name, bytes] : outputs) record.outputs.push_back({name, sha256(*bytes), bytes->size()});
     const std::string text = write_record(record);
     for (Layer& layer : layers_)
-      guarded(layer, [&] {  // blobs first: a record must never name what is not there
-        for (std::size_t i = 0; i < outputs.size(); ++i)
-          layer.layer->put("cas", record.outputs[i].digest, *outputs[i].second);
+      give(layer, [&] {  // blobs first: a record must never name what is not there
+        for (std::size_t i = 0; i < outputs.size(); ++i) {
+          const Sha256& digest = record.outputs[i].digest;
+          if (was_damaged(layer, digest) || !layer.layer->has("cas", digest, outputs[i].second->size()))
+            layer.layer->put("cas", digest, *outputs[i].second);
+        }
         layer.layer->put("ac", key.digest(), bytes_of(text));
       });
     return kept;
@@ -98,7 +103,7 @@ class LayeredStore : public Store {
     const bool kept = local_->put_note(key, text);
     if (use_ == LayerUse::kUpload) {
       const std::string sealed = seal(text);
-      for (Layer& layer : layers_) guarded(layer, [&] { layer.layer->put("notes", key, bytes_of(sealed)); });
+      for (Layer& layer : layers_) give(layer, [&] { layer.layer->put("notes", key, bytes_of(sealed)); });
     }
     return kept;
   }
@@ -118,8 +123,9 @@ class LayeredStore : public Store {
  private:
   struct Layer {
     std::unique_ptr<CacheLayer> layer;  // null: does not work
-    bool works = true;
+    LayerRest asking, giving;           // after a failure; after a refusal
     int number = 0;
+    std::set<Sha256> damaged;  // blobs that it has, but not with their digests
   };
 
   bool is_rejected(const Sha256& key) {
@@ -131,19 +137,49 @@ class LayeredStore : public Store {
     return bytes.size() == blob.bytes && sha256(bytes) == blob.digest;
   }
 
+  void remember_damage(Layer& layer, const Sha256& digest) {
+    const std::lock_guard lock(mutex_);
+    layer.damaged.insert(digest);
+  }
+  bool was_damaged(const Layer& layer, const Sha256& digest) {
+    const std::lock_guard lock(mutex_);
+    return layer.damaged.contains(digest);
+  }
+
+  /// Puts something into a layer that may refuse it.
+  template <class F>
+  void give(Layer& layer, F&& f) {
+    {
+      const std::lock_guard lock(mutex_);
+      if (layer.giving.holds()) return;
+    }
+    guarded(layer, [&] {
+      try {
+        f();
+      } catch (const LayerRefusal& e) {
+        const std::lock_guard lock(mutex_);
+        if (!layer.giving.holds())
+          events_.push_back({"cache-not-written", layer.layer->name() + " takes no results: " + e.what() +
+                                                      "; it is read all the same"});
+        layer.giving.begin();
+      }
+    });
+  }
+
   template <class F>
   void guarded(Layer& layer, F&& f) {
     {
       const std::lock_guard lock(mutex_);
-      if (!layer.works) return;
+      if (!layer.layer || layer.asking.holds()) return;
     }
     try {
       f();
     } catch (const LayerError& e) {
       const std::lock_guard lock(mutex_);
-      if (std::exchange(layer.works, false))
+      if (!layer.asking.holds())
         events_.push_back(
             {"cache-layer-unreachable", layer.layer->name() + " is left out: " + e.what(), layer.number});
+      layer.asking.begin();
     }
   }
 
@@ -172,8 +208,10 @@ class LayeredStore : public Store {
       if (blob.bytes > kMaxBlobBytes) return std::nullopt;
       auto blob_bytes = get(layer, "cas", blob.digest, blob.bytes);
       if (!blob_bytes) return std::nullopt;
-      if (!is(blob, *blob_bytes))
+      if (!is(blob, *blob_bytes)) {
+        remember_damage(layer, blob.digest);
         return report_damaged(layer, "the result " + blob.name + ", which does not have its digest,");
+      }
       outputs.emplace_back(blob.name,
                            std::make_shared<const std::vector<std::uint8_t>>(std::move(*blob_bytes)));
     }
@@ -202,8 +240,9 @@ std::unique_ptr<CacheLayer> open_layer(const std::string& place, const LayerPati
 }
 
 std::unique_ptr<Store> layered_store(std::unique_ptr<Store> local,
-                                     std::vector<std::unique_ptr<CacheLayer>> layers, LayerUse use) {
-  return std::make_unique<LayeredStore>(std::move(local), std::move(layers), use);
+                                     std::vector<std::unique_ptr<CacheLayer>> layers, LayerUse use,
+                                     const LayerClock& clock) {
+  return std::make_unique<LayeredStore>(std::move(local), std::move(layers), use, clock);
 }
 
 }  // namespace texmesh

@@ -4,7 +4,6 @@
 #include <iostream>
 #include <map>
 #include <memory>
-#include <thread>
 
 #include "format/base/errors.h"
 #include "format/documents/about.h"
@@ -17,6 +16,7 @@
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/options/command_line.h"
 #include "pipeline/cli/options/common_options.h"
+#include "pipeline/cli/options/shard_options.h"
 #include "pipeline/cli/options/units.h"
 #include "pipeline/compile/jnd_profile.h"
 #include "pipeline/compile/option_fields.h"
@@ -24,6 +24,8 @@
 #include "pipeline/compile/profile.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/file_resolver.h"
+#include "pipeline/io/machine/machine_share.h"
+#include "pipeline/io/resource_error.h"
 
 namespace texmesh {
 namespace {
@@ -48,7 +50,8 @@ constexpr const char* kEverydayTitle = "What the package holds";
 
 struct CompileArguments {
   std::vector<std::string> inputs, layers;
-  std::string output, profile, jnd_profile, meta, memory, model_memory = "8GiB", shard;
+  std::string output, profile, jnd_profile, meta, memory, model_memory = "8GiB", shard, costs,
+                                                          sandbox = "auto";
   CacheChoice cache;
   std::string cache_size = "20GB", cache_age = "90d";
   int jobs = 0;
@@ -145,25 +148,24 @@ OutputMode output_mode(const CompileArguments& args) {
   return ::isatty(STDOUT_FILENO) ? OutputMode::kTerminal : OutputMode::kPlain;
 }
 
-/// "2/8" -> 2 of 0 .. 7.
-void read_shard(const std::string& text, PlanRequest& request) {
-  if (text.empty()) return;
-  int shard = -1, shards = 0, read = 0;
-  if (std::sscanf(text.c_str(), "%d/%d%n", &shard, &shards, &read) != 2 ||
-      read != static_cast<int>(text.size()) || shards < 1 || shards > 1'000'000 || shard < 0 ||
-      shard >= shards)
-    throw InputError("--shard", "", "I/N with I in 0 .. N - 1", text);
-  request.shard = shard;
-  request.shards = shards;
+/// Four fifths of what the process may use, unless the user says what there is to use.
+std::uint64_t memory_to_use(const std::string& text, const MachineShare& share) {
+  return text.empty() ? share.memory_bytes / 5 * 4 : parse_bytes(text, "--memory");
 }
 
-/// Four fifths of the machine's memory, unless the user says what there is to use.
-std::uint64_t memory_to_use(const std::string& text) {
-  if (!text.empty()) return parse_bytes(text, "--memory");
-  const long pages = ::sysconf(_SC_PHYS_PAGES), page_bytes = ::sysconf(_SC_PAGE_SIZE);
-  return pages > 0 && page_bytes > 0
-             ? static_cast<std::uint64_t>(pages) * static_cast<std::uint64_t>(page_bytes) / 5 * 4
-             : 0;
+SandboxMode sandbox_mode(const std::string& name) {
+  if (name == "off") return SandboxMode::kOff;
+  if (name == "auto") return SandboxMode::kAuto;
+  if (const SandboxSupport s = sandbox_support(); !s.complete())
+    throw InputError("--sandbox require", "", "bounds on files and calls", describe_sandbox(s));
+  return SandboxMode::kRequire;
+}
+
+/// What a verbose run says of the processes that it is going to start.
+std::string sandbox_line(SandboxMode mode) {
+  if (mode == SandboxMode::kOff) return "sandbox: off";
+  const SandboxSupport s = sandbox_support();
+  return std::string(s.complete() ? "sandbox: " : "sandbox, degraded: ") + describe_sandbox(s);
 }
 
 PlanRequest plan_request(const CompileArguments& args) {
@@ -174,16 +176,18 @@ PlanRequest plan_request(const CompileArguments& args) {
   request.apply_flags = [&args](CompileOptions& options) { apply_flags(args, options); };
   CompileOptions check = *request.base;  // wrong flags are an error even where there is nothing to compile
   apply_flags(args, check);
-  read_shard(args.shard, request);
+  request.shard = shard_option(args.shard);
+  request.costs_s = costs_option(args.costs);
   return request;
 }
 
 RunSettings run_settings(const CompileArguments& args) {
   RunSettings run = args.run;
-  run.pool.processors =
-      std::max(1, args.jobs > 0 ? args.jobs : static_cast<int>(std::thread::hardware_concurrency()));
-  run.pool.memory_bytes = memory_to_use(args.memory);
+  const MachineShare share = machine_share();
+  run.pool.processors = args.jobs > 0 ? args.jobs : share.processors;
+  run.pool.memory_bytes = memory_to_use(args.memory, share);
   run.pool.limits.memory_bytes = parse_bytes(args.model_memory, "--model-memory");
+  run.pool.limits.sandbox = sandbox_mode(args.sandbox);
   if (!args.cache.off) run.cache.folder = default_cache_folder(args.cache.folder);
   run.cache.layers = args.layers;
   for (std::string& layer : layers_from_environment()) run.cache.layers.push_back(std::move(layer));
@@ -201,8 +205,8 @@ void add_run_options(Command& c, CompileArguments& args) {
   c.group("Running");
   add_jobs_option(c, args.jobs);
   c.option("--memory", args.memory,
-           "Most memory of all models that run side by side, by what they took before (default: 4/5 of the "
-           "machine's). A model that needs more runs alone, see --model-memory")
+           "Most memory of all models that run side by side, by what they took before (default: 4/5 of what "
+           "machine, cgroup and Slurm allow). A model that needs more runs alone, see --model-memory")
       .value_name("SIZE")
       .rare();
   c.option("--model-memory", args.model_memory, "Most memory (address space) of one model's process")
@@ -213,10 +217,16 @@ void add_run_options(Command& c, CompileArguments& args) {
   c.option("--cpu-limit", run.pool.limits.cpu_s, "Most processor seconds for one model, 0 = no limit")
       .shows_default()
       .rare();
-  c.option("--shard", args.shard,
-           "Compile only part I of the parts 0 .. N-1. A model's part does not change when other models come "
-           "and go")
-      .value_name("I/N");
+  c.option(
+       "--sandbox", args.sandbox,
+       "What one model's process may touch: auto = the model's folder, its result and the cache, no other "
+       "programs, no network but cache layers, as far as the kernel can bound that; require = the same, and "
+       "nothing is compiled where it cannot; off")
+      .one_of_explained({"auto", "require", "off"})
+      .value_name("NAME")
+      .shows_default()
+      .rare();
+  add_shard_options(c, args.shard, args.costs);
   Option keep_going =
       c.flag("--keep-going", args.keep_going, "Compile the other models after a failure (default)").rare();
   c.flag("--fail-fast", run.pool.stop_on_failure, "Start no further model after a failure")
@@ -274,13 +284,14 @@ constexpr const char* kNotes =
     "More examples:\n"
     "  texmesh compile collection.json -o packages/ --junit report.xml\n"
     "  texmesh compile scans/ -o packages/ --dry-run            what would run, and why\n"
-    "  texmesh compile scans/ -o packages/ --shard $TASK/40     one of 40 machines' part\n"
+    "  texmesh compile scans/ -o packages/ --shard auto         an array task's part (examples/slurm)\n"
     "  texmesh compile bust.obj -o bust.texmesh --profile museum.json --rungs 8,18,53,86\n\n"
     "Every stage option can stand in a profile under the same name: "
     "{\"version\":1,\"ladder\":{\"rungs\":[8,18,53,86]}}.\n"
     "A package is made again only when its model, a file that the model refers to, an option or texmesh has "
     "changed. A model that fails leaves the package that was there before.\n"
-    "Exit code: 0 all well, 1 some model failed, 2 usage, 3 internal error.";
+    "Exit code: 0 all well, 1 some model failed, 2 usage, 3 internal error, 75 try again (cancelled, time, "
+    "memory, disk).";
 
 void add_compile_options(Command& c, CompileArguments& args) {
   c.option("INPUT", args.inputs,
@@ -325,8 +336,17 @@ int run_compile(CompileArguments& args) {
     std::cerr << "texmesh compile: " << e.what() << '\n';
     return kExitUsage;
   }
+  if (plan.shard.count > 1 && settings.mode != OutputMode::kJson && settings.mode != OutputMode::kQuiet)
+    std::cout << "shard " << plan.shard.index << " of " << plan.shard.count << ": " << plan.models.size()
+              << " of " << plan.models_in_collection << " models" << std::endl;
+  if (settings.verbose && !args.json) std::cout << sandbox_line(settings.pool.limits.sandbox) << std::endl;
   settings.more_inputs.insert(settings.more_inputs.end(), plan.files.begin(), plan.files.end());
-  return run_batch(plan, settings, std::cout);
+  try {
+    return run_batch(plan, settings, std::cout);
+  } catch (const ResourceError& e) {
+    std::cerr << "texmesh compile: " << e.what() << '\n';
+    return kExitTryAgain;
+  }
 }
 
 }  // namespace

@@ -7,6 +7,8 @@ class Command;
 // Each adds one command to the program, in command_NAME.cpp.
 void add_compile_command(Command& app);
 void add_cache_command(Command& app);
+void add_list_command(Command& app);
+void add_summary_command(Command& app);
 void add_dump_command(Command& app);
 void add_diff_command(Command& app);
 void add_verify_command(Command& app);

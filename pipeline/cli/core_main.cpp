@@ -1,7 +1,12 @@
 // texmesh-core: every command and the workers. People call texmesh (main.cpp), which starts it.
+#include <iostream>
+#include <set>
+#include <string>
+
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/options/command_line.h"
 #include "pipeline/cli/program.h"
+#include "pipeline/compile/workers/sandbox/sandbox.h"
 #include "pipeline/compile/workers/worker_child.h"
 
 namespace texmesh {
@@ -12,6 +17,8 @@ void add_commands(Command& program) {
   add_compile_command(program);
   add_stages_command(program);
   add_cache_command(program);
+  add_list_command(program);
+  add_summary_command(program);
   program.group("Look inside");
   add_view_command(program);
   add_dump_command(program);
@@ -35,6 +42,13 @@ void add_commands(Command& program) {
   add_experiment_command(program);
 }
 
+/// `--version --verbose` says what bounds a model's process on this machine.
+void print_sandbox_of_version(int argc, char** argv) {
+  const std::set<std::string> words(argv + 1, argv + argc);
+  if (words == std::set<std::string>{"--version", "--verbose"})
+    std::cout << "sandbox: " << describe_sandbox(sandbox_support()) << std::endl;
+}
+
 }  // namespace
 }  // namespace texmesh
 
@@ -43,6 +57,7 @@ int main(int argc, char** argv) {
   if (argc == 2 && std::string(argv[1]) == "worker")
     return worker_main();  // started by compile, see pipeline/compile/workers/worker_child.h
 
+  print_sandbox_of_version(argc, argv);
   CommandLine line(kProgramSummary);
   describe_program(line);
   Command program = line.program();

@@ -1,20 +1,19 @@
 #include "pipeline/cli/options/common_options.h"
 
-#include <algorithm>
-#include <thread>
-
 #include "pipeline/cli/options/command_line.h"
+#include "pipeline/io/machine/machine_share.h"
 #include "stages/base/run_context.h"
 
 namespace texmesh {
 
 Option add_jobs_option(Command& c, int& jobs) {
-  return c.option("-j,--jobs", jobs, "Processors to use; 0 = all (default)").integer_in(0, 1024);
+  return c.option("-j,--jobs", jobs, "Processors to use; 0 = all that this process may use (default)")
+      .integer_in(0, 1024);
 }
 
 RunContext context_of(int jobs) {
   RunContext context;
-  context.threads = std::max(1, jobs > 0 ? jobs : static_cast<int>(std::thread::hardware_concurrency()));
+  context.threads = jobs > 0 ? jobs : machine_share().processors;
   return context;
 }
 

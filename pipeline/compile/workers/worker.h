@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "format/base/fields.h"
+#include "pipeline/compile/workers/sandbox/sandbox.h"
 #include "pipeline/graph/key.h"
 #include "pipeline/io/file_request.h"
 
@@ -18,6 +19,7 @@ struct WorkerLimits {
   std::uint64_t memory_bytes = 8ull << 30;  // address space
   std::uint64_t cpu_s = 0;
   std::uint64_t wall_s = 3600;
+  SandboxMode sandbox = SandboxMode::kAuto;
 };
 
 /// Where results are kept.
@@ -63,6 +65,9 @@ struct WorkerReport {
   std::uint64_t package_bytes = 0, peak_memory_bytes = 0;
   Sha256 package_digest{};
   double seconds = 0;
+  // What the model took when its package was made, where this run did not make it; 0 = not known.
+  double made_s = 0;
+  std::uint64_t made_memory_bytes = 0;
   std::string error_kind, error_file, error_place, error_expected, error_found, error_message;
   int stages_ran = 0, stages_hit = 0;
   std::vector<FileRequest> files;  // as CompileOutcome; empty after a failure
@@ -91,7 +96,7 @@ struct PoolSettings {
 ///   the predicted peaks do not fit the memory; one always runs. The last jobs get the free processors as
 ///   threads.
 /// - A child that dies, hangs or exceeds its limits costs its own model only.
-/// - A cache layer that did not work for one child is not asked by children that start later.
+/// - A cache layer that did not work for one child is not asked by children that start within a minute.
 /// - SIGINT and SIGTERM end all children within two seconds and leave no temporary file. Jobs that had not
 ///   ended are kCancelled.
 std::vector<WorkerReport> run_workers(const std::vector<WorkerJob>& jobs, const PoolSettings& settings,

@@ -16,6 +16,7 @@
 #include "pipeline/cache/disk_store.h"
 #include "pipeline/compile/compile_model.h"
 #include "pipeline/compile/profile.h"
+#include "pipeline/compile/workers/sandbox/worker_rules.h"
 #include "pipeline/compile/workers/worker_child.h"
 #include "pipeline/compile/workers/worker_messages.h"
 #include "pipeline/io/exit_codes.h"
@@ -71,6 +72,37 @@ void apply_limits(const Json& job) {
   ::sigaction(SIGTERM, &action, nullptr);
   ::signal(SIGINT, SIG_IGN);   // the parent decides
   ::signal(SIGXFSZ, SIG_IGN);  // a file size limit is an error of write(), not a death
+}
+
+[[maybe_unused]] std::string real_program() {
+  std::error_code ec;
+  return std::filesystem::read_symlink("/proc/self/exe", ec).string();
+}
+
+/// ResourceError where a sandbox is required and does not hold: another machine may do.
+void enter_sandbox_of(const Json& job, [[maybe_unused]] EventWriter& events) {
+  const std::string mode = job.value("sandbox", "off");
+  if (mode == enum_name(SandboxMode::kOff)) return;
+#if !defined(__SANITIZE_ADDRESS__) && \
+    !defined(__SANITIZE_THREAD__)  // they look into the process as debuggers do
+  WorkerPlaces places;
+  places.input = from_wire(job.at("input").get<std::string>());
+  places.cache = from_wire(job.at("cache").get<std::string>());
+  places.only_looks = job.at("forecast").get<bool>();
+  places.program = real_program();
+  if (!places.only_looks) places.output = from_wire(job.at("output").get<std::string>());
+  for (const Json& layer : job.at("layers"))
+    if (layer.is_string()) places.layers.push_back(from_wire(layer.get<std::string>()));
+  const SandboxSupport held = enter_sandbox(sandbox_rules(places));
+  if (held.complete()) return;
+  if (mode == enum_name(SandboxMode::kRequire))
+    throw ResourceError("sandbox", "", "bounds on files and calls", describe_sandbox(held));
+  events.write({{"event", "note"},
+                {"severity", "info"},
+                {"code", "sandbox-degraded"},
+                {"place", ""},
+                {"text", "the model's process has " + describe_sandbox(held)}});
+#endif
 }
 
 StageObserver stage_events(EventWriter& events) {
@@ -221,6 +253,7 @@ int worker_main() {
   if (!job.is_object()) return kExitUsage;
   apply_limits(job);
   try {
+    enter_sandbox_of(job, events);
     return compile(job, events);
   } catch (const ResourceError& e) {
     return report_error(events, "resource", e);

@@ -69,7 +69,8 @@ std::string job_to_json(const WorkerJob& job, const std::string& temporary, cons
               {"threads", threads},
               {"wall_s", limits.wall_s},
               {"memory_bytes", limits.memory_bytes},
-              {"cpu_s", limits.cpu_s}}
+              {"cpu_s", limits.cpu_s},
+              {"sandbox", enum_name(limits.sandbox)}}
       .dump();
 }
 

@@ -9,11 +9,13 @@
 #include <chrono>
 #include <cstring>
 #include <filesystem>
+#include <map>
 #include <numeric>
 #include <optional>
 #include <set>
 
 #include "format/base/errors.h"
+#include "pipeline/cache/layer_rest.h"
 #include "pipeline/compile/workers/child_process.h"
 #include "pipeline/compile/workers/worker.h"
 #include "pipeline/compile/workers/worker_messages.h"
@@ -117,6 +119,10 @@ void finish_report(const Worker& worker, int status, const rusage& usage, const 
   } else if (WIFSIGNALED(status) && WTERMSIG(status) == SIGXCPU) {
     set_error(report, "resource", job, "at most " + std::to_string(limits.cpu_s) + " s of processor time",
               "a model that takes more");
+  } else if (WIFSIGNALED(status) &&
+             WTERMSIG(status) == SIGKILL) {  // what the kernel does when memory runs out
+    set_error(report, "resource", job, "a worker that finishes",
+              "that somebody killed it: out of memory, or an allocation that ended");
   } else {
     report.result = ModelResult::kInternal;
     const std::string how = WIFSIGNALED(status) ? std::string("signal ") + strsignal(WTERMSIG(status))
@@ -195,8 +201,10 @@ class WorkerPool {
     worker.job = index;
     worker.lane = free_lane();
     worker.temporary = job.output.empty() || job.forecast ? "" : temporary_name(job.output, index);
-    worker.process =
-        start_worker_process(job_to_json(job, worker.temporary, limits_, threads, layers_left_out_));
+    std::set<std::string> resting;
+    for (const auto& [layer, rest] : layers_left_out_)
+      if (rest.holds()) resting.insert(layer);
+    worker.process = start_worker_process(job_to_json(job, worker.temporary, limits_, threads, resting));
     reports_[index].lane = worker.lane;
     reports_[index].start_s = now_s();
     return worker;
@@ -226,7 +234,8 @@ class WorkerPool {
     const std::vector<std::string>& layers = jobs_[job].cache.layers;
     for (const int number : reports_[job].layers_left_out)
       if (number >= 0 && static_cast<std::size_t>(number) < layers.size())
-        layers_left_out_.insert(layers[static_cast<std::size_t>(number)]);
+        layers_left_out_[layers[static_cast<std::size_t>(number)]].begin();
+    reports_[job].layers_left_out.clear();  // the rest begins once
   }
 
   void enforce_wall_limit() {
@@ -283,7 +292,7 @@ class WorkerPool {
   std::vector<WorkerReport> reports_;
   std::vector<std::size_t> waiting_;
   std::vector<Worker> workers_;
-  std::set<std::string> layers_left_out_;
+  std::map<std::string, LayerRest> layers_left_out_;
   Clock::time_point start_ = Clock::now();
   std::optional<Clock::time_point> interrupted_at_;
 };

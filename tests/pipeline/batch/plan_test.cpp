@@ -106,8 +106,8 @@ class Plan : public ::testing::Test {
     PlanRequest request;
     for (const std::string& n : names) request.inputs.push_back(folder_ / n);
     request.output = folder_ / "out";
-    request.shard = shard;
-    request.shards = shards;
+    request.shard = {shard, shards};
+    request.costs_s = costs_s_;
     request.apply_flags = [](CompileOptions& o) { o.package.title = "by flag"; };
     return plan_batch(request);
   }
@@ -117,30 +117,43 @@ class Plan : public ::testing::Test {
     return all;
   }
   TemporaryFolder folder_;
+  std::map<std::string, double> costs_s_;
 };
 
-TEST_F(Plan, ShardsPartitionExactlyAndAModelKeepsItsShard) {
+TEST_F(Plan, ShardsPartitionExactlyAndAreBalancedBySize) {
   constexpr int kModels = 200, kShards = 7;
-  for (int i = 0; i < kModels; ++i) add("in/m" + std::to_string(i) + ".obj");
+  // A few large models and many small ones, as collections are: 2 MB stand for a second beside the first.
+  for (int i = 0; i < kModels; ++i)
+    add("in/m" + std::to_string(i) + ".obj", std::string(i % 20 == 0 ? 4'000'000 : 100, '#'));
   const auto whole = outputs(plan({"in"}));
   ASSERT_EQ(whole.size(), static_cast<std::size_t>(kModels));
   std::set<std::string> together;
-  std::map<std::string, int> shard_of;
-  for (int s = 0; s < kShards; ++s)
-    for (const std::string& o : outputs(plan({"in"}, s, kShards))) {
-      EXPECT_TRUE(together.insert(o).second) << o << " is in two shards";
-      shard_of[o] = s;
+  std::set<std::string> collections;
+  for (int s = 0; s < kShards; ++s) {
+    const BatchPlan p = plan({"in"}, s, kShards);
+    double seconds = 0;
+    for (const PlannedModel& m : p.models) {
+      EXPECT_TRUE(together.insert(m.output).second) << m.output << " is in two shards";
+      seconds += fs::file_size(m.input) > 1000 ? 3 : 1;
     }
+    EXPECT_NEAR(seconds, (190 + 10 * 3.) / kShards, 1.5) << s;
+    EXPECT_EQ(p.models_in_collection, whole.size());
+    EXPECT_EQ(p.shard, (Shard{s, kShards}));
+    collections.insert(p.collection);
+  }
   EXPECT_EQ(together, whole);
-  std::map<int, int> sizes;
-  for (const auto& [o, s] : shard_of) ++sizes[s];
-  for (int s = 0; s < kShards; ++s) EXPECT_GT(sizes[s], kModels / kShards / 3) << s;
-  // Others come and go.
-  for (int i = 0; i < kModels; i += 3) fs::remove(folder_ / ("in/m" + std::to_string(i) + ".obj"));
+  EXPECT_EQ(collections.size(), 1u);
+  // Tasks that see other files can tell by the digest.
   add("in/new.obj");
-  for (int s = 0; s < kShards; ++s)
-    for (const std::string& o : outputs(plan({"in"}, s, kShards)))
-      if (shard_of.contains(o)) EXPECT_EQ(shard_of[o], s) << o;
+  EXPECT_FALSE(collections.contains(plan({"in"}, 0, kShards).collection));
+}
+
+TEST_F(Plan, WhatModelsTookBeforeWinsOverTheirSizes) {
+  for (int i = 0; i < 9; ++i) add("in/m" + std::to_string(i) + ".obj");
+  costs_s_["m4.texmesh"] = 100;
+  int alone = 0;
+  for (int s = 0; s < 2; ++s) alone += plan({"in"}, s, 2).models.size() == 1;
+  EXPECT_EQ(alone, 1) << "the model that takes long has a shard of its own";
 }
 
 TEST_F(Plan, AShardDoesNotDependOnWhereTheOutputFolderIs) {
@@ -149,7 +162,7 @@ TEST_F(Plan, AShardDoesNotDependOnWhereTheOutputFolderIs) {
     PlanRequest request;
     request.inputs = {folder_ / "in"};
     request.output = output;
-    request.shards = 3;
+    request.shard = {0, 3};
     std::set<std::string> all;
     for (const PlannedModel& m : plan_batch(request).models) all.insert(fs::path(m.output).filename());
     return all;

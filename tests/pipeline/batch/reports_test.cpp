@@ -18,41 +18,6 @@ namespace texmesh {
 namespace {
 using Json = nlohmann::json;
 
-/// Reads XML as strictly as the reports need it: balanced elements, quoted attributes, no bare & or <.
-/// Returns how often each element occurs; "not well-formed" is among them when it is not.
-std::map<std::string, int> elements_of(const std::string& xml) {
-  std::map<std::string, int> count;
-  std::vector<std::string> open;
-  std::size_t at = xml.find("?>");
-  if (!xml.starts_with("<?xml ") || at == std::string::npos) return {{"not well-formed", 1}};
-  for (at += 2; at < xml.size();) {
-    if (xml[at] == '\n') {
-      ++at;
-      continue;
-    }
-    if (xml[at] != '<') return {{"not well-formed", static_cast<int>(at)}};
-    const bool closes = xml[at + 1] == '/';
-    std::size_t end = at + 1;
-    for (bool quoted = false; end < xml.size() && (quoted || xml[end] != '>'); ++end) {
-      if (xml[end] == '"') quoted = !quoted;
-      if (xml[end] == '<' || static_cast<unsigned char>(xml[end]) < 0x20) return {{"not well-formed", 2}};
-      if (xml[end] == '&' && xml.find(';', end) > end + 5) return {{"not well-formed", 3}};
-    }
-    const std::string tag = xml.substr(at + 1 + closes, end - at - 1 - closes);
-    const std::string name = tag.substr(0, tag.find_first_of(" /"));
-    if (closes) {
-      if (open.empty() || open.back() != name) return {{"not well-formed", 4}};
-      open.pop_back();
-    } else {
-      ++count[name];
-      if (tag.back() != '/') open.push_back(name);
-    }
-    at = end + 1;
-  }
-  if (!open.empty()) return {{"not well-formed", 5}};
-  return count;
-}
-
 struct FakeRun {
   std::vector<PlannedModel> models;
   std::vector<WorkerReport> reports;
@@ -70,59 +35,6 @@ struct FakeRun {
     return reports.back();
   }
 };
-
-/// Names and messages that break careless writers: quotes, markup, control characters, bytes that are no
-/// UTF-8.
-FakeRun ugly_run() {
-  FakeRun run;
-  WorkerReport& ok = run.add("a<b>&\"c\".obj", ModelResult::kOk, 0, 0, 1.5);
-  ok.package_bytes = 1234;
-  ok.peak_memory_bytes = 1 << 27;
-  ok.stages_ran = 3;
-  run.add("unchanged\n\x01.obj", ModelResult::kUnchanged).ran = false;
-  WorkerReport& bad = run.add("bad\xff\xfe.obj", ModelResult::kFailed, 1, 0.25, 0.5);
-  bad.error_kind = "input";
-  bad.error_message = "bad\xff.obj: line 1: expected <number>, found \"&\"\t\x02";
-  bad.error_file = bad.error_found = bad.error_message;
-  WorkerReport& dead = run.add("dead.obj", ModelResult::kInternal, 1, 1, 0.1);
-  dead.error_kind = "internal";
-  dead.error_message = "dead.obj: expected a worker that finishes, found signal Killed";
-  run.add("late.obj", ModelResult::kCancelled);
-  return run;
-}
-
-TEST(Summary, FollowsItsSchemaWhateverTheNames) {
-  const FakeRun run = ugly_run();
-  const Json summary = Json::parse(write_summary(run.models, run.reports, 2.5));
-  EXPECT_TRUE(testing::follows_schema(summary, "summary.v1"));
-  EXPECT_EQ(summary["models"].size(), 5u);
-  EXPECT_EQ(summary["compiled"], 1);
-  EXPECT_EQ(summary["unchanged"], 1);
-  EXPECT_EQ(summary["failed"], 2);
-  EXPECT_EQ(summary["cancelled"], 1);
-  EXPECT_EQ(summary["models"][0]["bytes"], 1234);
-  EXPECT_EQ(summary["models"][2]["error"]["kind"], "input");
-  EXPECT_FALSE(summary["models"][0].contains("error"));
-  EXPECT_TRUE(testing::follows_schema(Json::parse(write_summary({}, {}, 0)), "summary.v1"));
-}
-
-TEST(Junit, IsWellFormedAndCountsAsTheSummaryDoes) {
-  const FakeRun run = ugly_run();
-  const std::string xml = write_junit(run.models, run.reports, 2.5);
-  const auto elements = elements_of(xml);
-  EXPECT_EQ(elements, (std::map<std::string, int>{{"testsuites", 1},
-                                                  {"testsuite", 1},
-                                                  {"testcase", 5},
-                                                  {"failure", 2},
-                                                  {"skipped", 1},
-                                                  {"properties", 5},
-                                                  {"property", 30}}))
-      << xml;
-  EXPECT_NE(xml.find("tests=\"5\" failures=\"2\" errors=\"0\" skipped=\"1\""), std::string::npos) << xml;
-  EXPECT_NE(xml.find("a&lt;b&gt;&amp;&quot;c&quot;.obj"), std::string::npos) << xml;
-  EXPECT_EQ(elements_of("<?xml ?>\n<a><b></a></b>").count("not well-formed"), 1u);  // the reader itself
-  EXPECT_EQ(elements_of("<?xml ?>\n<a x=\"a&b\"/>").count("not well-formed"), 1u);
-}
 
 TEST(Trace, HasOneProcessPerLaneAndNothingOverlapsInAThread) {
   FakeRun run;

@@ -2,7 +2,9 @@
 #include <gtest/gtest.h>
 #include <httplib.h>
 
+#include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <filesystem>
 #include <mutex>
 #include <thread>
@@ -40,8 +42,9 @@ class Server {
     });
     server_.Put(".*", [this](const httplib::Request& request, httplib::Response& response) {
       const std::lock_guard lock(mutex_);
-      objects[request.path] = request.body;
-      response.status = 201;
+      ++puts;
+      response.status = put_status;
+      if (put_status == 201) objects[request.path] = request.body;
     });
     port_ = server_.bind_to_any_port("127.0.0.1");
     thread_ = std::thread([this] { server_.listen_after_bind(); });
@@ -54,7 +57,7 @@ class Server {
   std::string url() const { return "http://127.0.0.1:" + std::to_string(port_) + "/cache"; }
 
   std::map<std::string, std::string> objects;
-  std::atomic<int> status{200}, requests{0};
+  std::atomic<int> status{200}, put_status{201}, requests{0}, puts{0};  // HEAD counts among the requests
 
  private:
   httplib::Server server_;
@@ -63,11 +66,12 @@ class Server {
   std::thread thread_;
 };
 
-std::unique_ptr<Store> store_with(const std::string& url, const std::string& folder, bool upload) {
+std::unique_ptr<Store> store_with(const std::string& url, const std::string& folder, bool upload,
+                                  const LayerClock& clock = {}) {
   std::vector<std::unique_ptr<CacheLayer>> layers;
-  layers.push_back(open_layer(url));
+  layers.push_back(open_http_layer(url, {}, clock));
   return layered_store(open_disk_store(folder), std::move(layers),
-                       upload ? LayerUse::kUpload : LayerUse::kFetch);
+                       upload ? LayerUse::kUpload : LayerUse::kFetch, clock);
 }
 
 TEST(HttpLayer, WhatOneMachinePutsAnotherFinds) {
@@ -132,6 +136,90 @@ TEST(HttpLayer, AServerThatFailsIsLeftOutWithOneEvent) {
   EXPECT_EQ(events[0].code, "cache-layer-unreachable");
   EXPECT_NE(events[0].text.find("500"), std::string::npos);
   EXPECT_TRUE(store->find(key_of("a").digest()));
+}
+
+TEST(HttpLayer, ARefusedPutDoesNotEndGet) {
+  Server server;
+  const TemporaryFolder folder;
+  store_with(server.url(), folder / "first", true)->put(key_of("there"), {{"x", bytes_of("result")}});
+  for (const int refusal : {403, 405, 413, 507}) {
+    server.put_status = refusal;
+    server.puts = 0;
+    auto store = store_with(server.url(), folder / ("local" + std::to_string(refusal)), true);
+    EXPECT_TRUE(store->put(key_of("new"), {{"x", bytes_of("other")}}));
+    EXPECT_TRUE(store->put(key_of("newer"), {{"x", bytes_of("another")}}));
+    EXPECT_TRUE(store->find(key_of("there").digest())) << refusal;
+    EXPECT_EQ(server.puts, 1) << "nothing more is offered to a server that refuses";
+    const auto events = store->take_events();
+    ASSERT_EQ(events.size(), 1u) << refusal;
+    EXPECT_EQ(events[0].code, "cache-not-written");
+    EXPECT_NE(events[0].text.find(std::to_string(refusal)), std::string::npos) << events[0].text;
+    EXPECT_EQ(events[0].layer, -1) << "other models' processes go on asking";
+  }
+}
+
+/// A clock that a test turns.
+struct TurnedClock {
+  std::chrono::steady_clock::time_point now = std::chrono::steady_clock::now();
+  LayerClock clock() {
+    return [this] { return now; };
+  }
+};
+
+TEST(HttpLayer, AServerIsAskedAgainAfterAMinute) {
+  Server server;
+  const TemporaryFolder folder;
+  store_with(server.url(), folder / "first", true)->put(key_of("there"), {{"x", bytes_of("result")}});
+  TurnedClock time;
+  auto store = store_with(server.url(), folder / "local", true, time.clock());
+  server.status = 503;
+  EXPECT_FALSE(store->find(key_of("there").digest()));
+  server.status = 200;
+  time.now += std::chrono::seconds(59);
+  const int asked = server.requests;
+  EXPECT_FALSE(store->find(key_of("there").digest()));
+  EXPECT_EQ(server.requests, asked);
+  time.now += std::chrono::seconds(1);
+  EXPECT_TRUE(store->find(key_of("there").digest()));
+  EXPECT_EQ(store->take_events().size(), 1u);
+  // It fails again: told again, and left alone for another minute.
+  server.status = 503;
+  EXPECT_FALSE(store->find(key_of("b").digest()));
+  EXPECT_FALSE(store->find(key_of("c").digest()));
+  EXPECT_EQ(store->take_events().size(), 1u);
+  // One that refused is offered results again, too.
+  server.status = 200;
+  server.put_status = 403;
+  time.now += std::chrono::minutes(1);
+  store->put(key_of("d"), {{"x", bytes_of("1")}});
+  server.put_status = 201;
+  server.puts = 0;
+  store->put(key_of("e"), {{"x", bytes_of("2")}});
+  EXPECT_EQ(server.puts, 0);
+  time.now += std::chrono::minutes(1);
+  store->put(key_of("f"), {{"x", bytes_of("3")}});
+  EXPECT_EQ(server.puts, 2);  // blob and record
+}
+
+TEST(HttpLayer, WhatIsThereIsNotPutAgainUnlessItWasDamaged) {
+  Server server;
+  const TemporaryFolder folder;
+  store_with(server.url(), folder / "first", true)->put(key_of("a"), {{"x", bytes_of("result")}});
+  EXPECT_EQ(server.puts, 2);
+  server.puts = 0;
+  store_with(server.url(), folder / "second", true)->put(key_of("b"), {{"x", bytes_of("result")}});
+  EXPECT_EQ(server.puts, 1);  // the record: another key gave the same bytes
+  const auto blob = std::find_if(server.objects.begin(), server.objects.end(),
+                                 [](const auto& o) { return o.first.find("/cas/") != std::string::npos; });
+  ASSERT_NE(blob, server.objects.end());
+  const std::string good = blob->second;
+  for (const std::string& bad : {std::string("resulT"), std::string("res")}) {  // as long, and shorter
+    blob->second = bad;
+    auto store = store_with(server.url(), folder / ("local" + bad), true);
+    EXPECT_FALSE(store->find(key_of("a").digest()));
+    store->put(key_of("a"), {{"x", bytes_of("result")}});
+    EXPECT_EQ(blob->second, good) << "healed by the machine that found it damaged";
+  }
 }
 
 TEST(HttpLayer, NobodyThere) {

@@ -150,7 +150,7 @@ TEST_F(Collection, AnErrorOfTheMachineIsNotRemembered) {
   ASSERT_NO_FATAL_FAILURE(add_model("a", 1));
   fs::create_directories(folder_ / "out/a.texmesh/in the way");  // the package cannot take this name
   const CommandResult failed = compile();
-  EXPECT_EQ(failed.exit_code, 1) << failed.output;
+  EXPECT_EQ(failed.exit_code, 75) << failed.output;
   EXPECT_NE(failed.output.find("expected a writable file"), std::string::npos) << failed.output;
   fs::remove_all(folder_ / "out/a.texmesh");
   const CommandResult r = compile();
@@ -238,6 +238,9 @@ TEST_F(Collection, ShardsTogetherMakeEveryPackageOnce) {
   EXPECT_EQ(made, (std::multiset<std::string>{"a.obj", "b.obj", "c.obj"}));
   for (const char* wrong : {"3/3", "-1/3", "1", "1/0", "x/3", "1/3x"})
     EXPECT_EQ(compile({"--shard", wrong}).exit_code, 2) << wrong;
+  const CommandResult lost = compile({"--shard", "auto"});
+  EXPECT_EQ(lost.exit_code, 2);
+  EXPECT_NE(lost.errors.find("none of them set"), std::string::npos) << lost.errors;
 }
 
 TEST_F(Collection, AFileChangedWithItsTimePutBackIsSeen) {
@@ -296,7 +299,7 @@ void interrupt(const std::string& folder, const std::string& profile, const std:
       "; wait $p; c=$?; e=$(date +%s%N); left=$(pgrep -c -g $p); "
       "echo \"took $(((e - s) / 1000000)) left $left\"; exit $c";
   const CommandResult r = run_command({"bash", "-c", script});
-  EXPECT_EQ(r.exit_code, 1) << r.output << r.errors << read_text(folder + "/log");
+  EXPECT_EQ(r.exit_code, 75) << r.output << r.errors << read_text(folder + "/log");
   int took = -1, left = -1;
   ASSERT_EQ(std::sscanf(r.output.c_str(), "took %d left %d", &took, &left), 2) << r.output;
   EXPECT_LT(took, 2500) << "two seconds, and some for a busy machine";

@@ -176,7 +176,7 @@ class Faults : public ::testing::Test {
           ++silent, ++by_call[static_cast<int>((*counts).fired_call)];
       } else {
         ++failed;
-        EXPECT_EQ(r.exit_code, 1) << what << ": " << text;
+        EXPECT_EQ(r.exit_code, 75) << what << ": " << text;
         EXPECT_NE(text.find(reason), std::string::npos) << what << ": " << text;
         EXPECT_TRUE(text.find(site.out()) != std::string::npos ||
                     text.find(site.cache()) != std::string::npos)

@@ -221,7 +221,7 @@ TEST_F(CompileCommand, WallLimitIsAnErrorOfTheModel) {
   for (int limit_s = 1; limit_s <= 32 && !has_named_stages; limit_s *= 2) {
     const CommandResult r = texmesh({"compile", folder_ / "big.ply", "-o", folder_ / "x.texmesh",
                                      "--no-cache", "--timeout", std::to_string(limit_s)});
-    EXPECT_EQ(r.exit_code, 1);
+    EXPECT_EQ(r.exit_code, 75);
     const std::string limit = "expected at most " + std::to_string(limit_s) + " s";
     ASSERT_TRUE(std::regex_search(r.output, std::regex("big.ply: (running [a-z_, ]+: )?" + limit)))
         << r.output;
@@ -241,7 +241,7 @@ TEST_F(CompileCommand, TerminationEndsCleanlyWithinTwoSeconds) {
       "' --no-cache & p=$!; sleep 1; kill -TERM $p; s=$(date +%s%N); wait $p; c=$?; " +
       "e=$(date +%s%N); echo took $(( (e - s) / 1000000 )); exit $c";
   const CommandResult r = run_command({"bash", "-c", command});
-  EXPECT_EQ(r.exit_code, 1) << r.output << r.errors;
+  EXPECT_EQ(r.exit_code, 75) << r.output << r.errors;
   const std::size_t at = r.output.rfind("took ");
   ASSERT_NE(at, std::string::npos);
   EXPECT_LT(std::stoi(r.output.substr(at + 5)), 2500) << r.output;
@@ -253,7 +253,7 @@ TEST_F(CompileCommand, AFullDiskLeavesNothing) {
   const CommandResult r = run_command({"bash", "-c",
                                        std::string("ulimit -f 8; exec ") + TEXMESH_BINARY + " compile '" +
                                            scan() + "' -o '" + (folder_ / "x.texmesh") + "' --no-cache"});
-  EXPECT_EQ(r.exit_code, 1) << r.output;
+  EXPECT_EQ(r.exit_code, 75) << r.output;
   EXPECT_NE(r.output.find("writable file"), std::string::npos) << r.output;
   EXPECT_TRUE(files_beneath(folder_.path().string()).empty());
 }
@@ -265,7 +265,7 @@ TEST_F(CompileCommand, AFullTemporaryFileSystemLeavesNothing) {
   const CommandResult r = texmesh({"compile", scan(), "-o", folder_ / "small/x.texmesh", "--no-cache"});
   const auto left = files_beneath(folder_ / "small");
   ::umount((folder_ / "small").c_str());
-  EXPECT_EQ(r.exit_code, 1) << r.output;
+  EXPECT_EQ(r.exit_code, 75) << r.output;
   EXPECT_TRUE(left.empty());
 }
 

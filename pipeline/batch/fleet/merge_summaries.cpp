@@ -1,0 +1,168 @@
+#include "pipeline/batch/fleet/merge_summaries.h"
+
+#include <algorithm>
+#include <map>
+#include <set>
+
+#include "format/base/errors.h"
+#include "pipeline/io/exit_codes.h"
+#include "pipeline/io/file_resolver.h"
+
+namespace texmesh {
+namespace {
+
+constexpr std::uint64_t kMostSummaryBytes = 1ull << 32;
+
+/// The collection and number of shards that most files are of; of equally many the first file's.
+struct Split {
+  std::string collection;
+  int shards = 1;
+};
+
+Split usual_split(const std::vector<SummaryFile>& files) {
+  std::map<std::string, std::size_t> votes;
+  for (const SummaryFile& f : files)
+    if (f.summary && f.summary->shard) ++votes[f.summary->collection];
+  Split split;
+  std::size_t most = 0;
+  for (const SummaryFile& f : files)
+    if (f.summary && f.summary->shard && votes[f.summary->collection] > most) {
+      most = votes[f.summary->collection];
+      split = {f.summary->collection, f.summary->shard->count};
+    }
+  return split;
+}
+
+std::string shard_text(const Shard& s) {
+  return "shard " + std::to_string(s.index) + " of " + std::to_string(s.count);
+}
+
+/// "0, 3-5"
+std::string ranges_text(const std::vector<int>& numbers) {
+  std::string text;
+  for (std::size_t i = 0; i < numbers.size();) {
+    std::size_t end = i;
+    while (end + 1 < numbers.size() && numbers[end + 1] == numbers[end] + 1) ++end;
+    text += (text.empty() ? "" : ", ") + std::to_string(numbers[i]);
+    if (end > i) text += "-" + std::to_string(numbers[end]);
+    i = end + 1;
+  }
+  return text;
+}
+
+/// Less is better.
+int rank_of(const ModelSummary& m) {
+  switch (m.result) {
+    case ModelResult::kOk:
+      return 0;
+    case ModelResult::kUnchanged:
+      return 1;
+    case ModelResult::kFailed:
+      return 2;
+    case ModelResult::kInternal:
+      return 3;
+    case ModelResult::kCancelled:
+      break;
+  }
+  return 4;
+}
+
+class Merger {
+ public:
+  explicit Merger(std::vector<SummaryFile> files) : files_(std::move(files)), split_(usual_split(files_)) {}
+
+  RunSummary merge() {
+    for (SummaryFile& f : files_) {
+      if (!f.summary)
+        merged_.problems.push_back({f.file, f.kind, f.text});
+      else if (is_foreign(*f.summary))
+        merged_.problems.push_back({f.file, "foreign",
+                                    shard_text(*f.summary->shard) +
+                                        " of another collection, or of this one before its files changed"});
+      else
+        add(f.file, *f.summary);
+      f.summary.reset();  // a million models stand in memory once
+    }
+    name_missing();
+    for (auto& [package, found] : models_) merged_.models.push_back(std::move(found.model));
+    merged_.models_in_collection = merged_.models.size();
+    return std::move(merged_);
+  }
+
+ private:
+  struct Found {
+    ModelSummary model;
+    std::string file;
+  };
+
+  bool is_foreign(const RunSummary& s) const {
+    return s.shard && (s.collection != split_.collection || s.shard->count != split_.shards);
+  }
+
+  void add(const std::string& file, RunSummary& s) {
+    const std::size_t models = s.models.size();
+    std::map<std::string, std::size_t> doubles;  // by the file that had them first
+    for (ModelSummary& m : s.models) {
+      const auto [at, is_new] = models_.try_emplace(m.package);
+      if (is_new)
+        at->second.file = file;
+      else
+        ++doubles[at->second.file];
+      if (is_new || rank_of(m) < rank_of(at->second.model)) at->second.model = std::move(m);
+    }
+    for (const auto& [other, count] : doubles)
+      merged_.problems.push_back(
+          {file, "double", std::to_string(count) + " of its packages are those of " + other});
+    merged_.seconds += s.seconds;
+    if (s.shard) seen_.insert(s.shard->index);
+    if (s.parts.empty())
+      merged_.parts.push_back({file, s.shard, models, s.seconds});
+    else
+      merged_.parts.insert(merged_.parts.end(), s.parts.begin(), s.parts.end());
+  }
+
+  void name_missing() {
+    if (seen_.empty()) return;
+    std::vector<int> missing;
+    for (int i = 0; i < split_.shards; ++i)
+      if (!seen_.contains(i)) missing.push_back(i);
+    if (!missing.empty())
+      merged_.problems.push_back(
+          {"", "missing",
+           "no summary of shards " + ranges_text(missing) + " of " + std::to_string(split_.shards)});
+  }
+
+  std::vector<SummaryFile> files_;
+  Split split_;
+  RunSummary merged_;
+  std::map<std::string, Found> models_;  // by package
+  std::set<int> seen_;
+};
+
+}  // namespace
+
+SummaryFile open_summary(const std::string& file) {
+  try {
+    return {file, read_summary(read_input_file(file, kMostSummaryBytes), file), "", ""};
+  } catch (const FormatError& e) {
+    return {file, {}, "half-written", e.what()};
+  } catch (const InputError& e) {
+    // A file that is not there is as good as one that was never finished.
+    const bool there = !e.expected().starts_with("a readable") && !e.expected().starts_with("a regular");
+    return {file, {}, there ? "foreign" : "half-written", e.what()};
+  }
+}
+
+RunSummary merge_summaries(std::vector<SummaryFile> files) { return Merger(std::move(files)).merge(); }
+
+int exit_code_of(const RunSummary& merged) {
+  int code = kExitOk;
+  for (const ModelSummary& m : merged.models)
+    code = graver_exit_code(code, exit_code_of(m.result, m.error_kind));
+  for (const SummaryProblem& p : merged.problems)
+    if (p.kind != "double")
+      code = graver_exit_code(code, p.kind == "foreign" ? kExitModelFailed : kExitTryAgain);
+  return code;
+}
+
+}  // namespace texmesh

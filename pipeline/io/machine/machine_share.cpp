@@ -1,0 +1,121 @@
+#include "pipeline/io/machine/machine_share.h"
+
+#include <sched.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <sstream>
+#include <thread>
+#include <vector>
+
+namespace texmesh {
+namespace {
+
+/// The first two words of a file.
+std::pair<std::string, std::string> words_of(const std::string& path) {
+  std::ifstream in(path);
+  std::pair<std::string, std::string> words;
+  in >> words.first >> words.second;
+  return words;
+}
+
+std::optional<std::uint64_t> number_in(const std::string& text) {
+  std::uint64_t value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (text.empty() || error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return value;  // "max" and "-1" are none
+}
+
+class Shares {
+ public:
+  explicit Shares(const MachineView& view) : view_(view) {
+    share_.processors = std::max(1, view.processors);
+    share_.memory_bytes = view.memory_bytes;
+  }
+
+  MachineShare find() {
+    std::ifstream in(view_.root + "/proc/self/cgroup");
+    for (std::string line; std::getline(in, line);) {
+      const std::size_t first = line.find(':'), second = line.find(':', first + 1);
+      if (second == std::string::npos) continue;
+      const std::string controllers = "," + line.substr(first + 1, second - first - 1) + ",";
+      const std::string path = line.substr(second + 1);
+      if (controllers == ",,") look_at(view_.root + "/sys/fs/cgroup", path);
+      for (const char* controller : {"memory", "cpu"})
+        if (controllers.find("," + std::string(controller) + ",") != std::string::npos)
+          look_at(view_.root + "/sys/fs/cgroup/" + controller, path);
+    }
+    look_at_slurm();
+    return share_;
+  }
+
+ private:
+  /// A cgroup and those above it. In a container, whose path is the host's, only the mount's root is there.
+  void look_at(const std::string& mount, std::string path) {
+    for (;;) {
+      if (path == "/") path.clear();
+      const std::string folder = mount + path;
+      limit_memory(number_in(words_of(folder + "/memory.max").first));
+      limit_memory(number_in(words_of(folder + "/memory.limit_in_bytes").first));
+      const auto [quota, period] = words_of(folder + "/cpu.max");
+      limit_processors(number_in(quota), number_in(period));
+      limit_processors(number_in(words_of(folder + "/cpu.cfs_quota_us").first),
+                       number_in(words_of(folder + "/cpu.cfs_period_us").first));
+      if (path.empty()) return;
+      path.resize(std::min(path.rfind('/'), path.size() - 1));
+    }
+  }
+
+  void look_at_slurm() {
+    for (const char* name : {"SLURM_CPUS_PER_TASK", "SLURM_CPUS_ON_NODE"})
+      limit_processors(variable(name), 1);
+    constexpr std::uint64_t kMiB = 1 << 20, kMost = 1ull << 40;
+    const auto of_node = variable("SLURM_MEM_PER_NODE"), of_cpu = variable("SLURM_MEM_PER_CPU");
+    const auto processors = static_cast<std::uint64_t>(share_.processors);
+    if (of_node && *of_node > 0 && *of_node < kMost) limit_memory(*of_node * kMiB);
+    if (of_cpu && *of_cpu > 0 && *of_cpu < kMost) limit_memory(*of_cpu * processors * kMiB);
+  }
+
+  std::optional<std::uint64_t> variable(const char* name) const {
+    const char* text = view_.environment ? view_.environment(name) : nullptr;
+    return text ? number_in(text) : std::nullopt;
+  }
+
+  void limit_memory(std::optional<std::uint64_t> bytes) {
+    if (bytes && *bytes > 0)
+      share_.memory_bytes = share_.memory_bytes == 0 ? *bytes : std::min(share_.memory_bytes, *bytes);
+  }
+
+  void limit_processors(std::optional<std::uint64_t> quota, std::optional<std::uint64_t> period) {
+    if (!quota || !period || *quota == 0 || *period == 0) return;
+    const double processors = std::ceil(static_cast<double>(*quota) / static_cast<double>(*period));
+    if (processors < share_.processors) share_.processors = static_cast<int>(processors);
+  }
+
+  const MachineView& view_;
+  MachineShare share_;
+};
+
+}  // namespace
+
+MachineView this_machine() {
+  MachineView view;
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  view.processors = ::sched_getaffinity(0, sizeof set, &set) == 0
+                        ? CPU_COUNT(&set)
+                        : static_cast<int>(std::thread::hardware_concurrency());
+  const long pages = ::sysconf(_SC_PHYS_PAGES), page_bytes = ::sysconf(_SC_PAGE_SIZE);
+  if (pages > 0 && page_bytes > 0)
+    view.memory_bytes = static_cast<std::uint64_t>(pages) * static_cast<std::uint64_t>(page_bytes);
+  view.environment = [](const char* name) -> const char* { return std::getenv(name); };
+  return view;
+}
+
+MachineShare machine_share(const MachineView& view) { return Shares(view).find(); }
+
+}  // namespace texmesh
