@@ -8,6 +8,12 @@
 namespace texmesh {
 namespace {
 
+std::string version_details() {
+  std::string text;
+  for (const auto& [name, version] : library_versions()) text += name + " " + version + "\n";
+  return text + "compiler " + compiler_version();
+}
+
 void add_commands(Command& program) {
   program.group("Make packages");
   add_compile_command(program);
@@ -34,6 +40,7 @@ void add_commands(Command& program) {
   program.group("Measure the method");
   add_study_command(program);
   add_experiment_command(program);
+  add_completion_command(program);
 }
 
 }  // namespace
@@ -46,7 +53,8 @@ int main(int argc, char** argv) {
 
   CommandLine line(kProgramSummary);
   line.version("texmesh " + tool_version() + ", package format " + std::to_string(kFormatMajor) + "." +
-               std::to_string(kFormatMinor));
+                   std::to_string(kFormatMinor),
+               version_details());
   Command program = line.program();
   program.examples(
       "  texmesh compile scan.glb -o scan.texmesh     compile a model\n"
