@@ -45,14 +45,14 @@ if(TEXMESH_COMPILER)
     "graph/(artefact|explanation|graph_run|key|option_text|stage|stage_observer|store)\\.h"
     "extract/glb/(extracted|image_codecs)\\.h" "render/plane_pixels\\.h")
   install(FILES cmake/FindWebP.cmake DESTINATION ${texmesh_cmake_dir})
-  install(TARGETS texmesh EXPORT texmeshTool RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
-  install(TARGETS texmesh-core RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/texmesh)
-  install(TARGETS texmesh_oiio LIBRARY DESTINATION ${TEXMESH_MODULE_FOLDER})
-  install(DIRECTORY ${PROJECT_BINARY_DIR}/viewer/ DESTINATION ${CMAKE_INSTALL_DATADIR}/texmesh/viewer OPTIONAL)
-  install(DIRECTORY profiles/ DESTINATION ${CMAKE_INSTALL_DATADIR}/texmesh/profiles)
+  install(TARGETS texmesh EXPORT texmeshTool RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT tool)
+  install(TARGETS texmesh-core RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/texmesh COMPONENT tool)
+  install(TARGETS texmesh_oiio LIBRARY DESTINATION ${TEXMESH_MODULE_FOLDER} COMPONENT tool)
+  install(DIRECTORY ${PROJECT_BINARY_DIR}/viewer/ DESTINATION ${CMAKE_INSTALL_DATADIR}/texmesh/viewer COMPONENT tool OPTIONAL)
+  install(DIRECTORY profiles/ DESTINATION ${CMAKE_INSTALL_DATADIR}/texmesh/profiles COMPONENT tool)
   install(EXPORT texmeshTool NAMESPACE texmesh:: DESTINATION ${texmesh_cmake_dir} FILE texmeshTool.cmake)
 endif()
-install(DIRECTORY schemas/ DESTINATION ${CMAKE_INSTALL_DATADIR}/texmesh/schemas FILES_MATCHING PATTERN *.schema.json
+install(DIRECTORY schemas/ DESTINATION ${CMAKE_INSTALL_DATADIR}/texmesh/schemas COMPONENT tool FILES_MATCHING PATTERN *.schema.json
   PATTERN examples EXCLUDE)
 
 configure_package_config_file(cmake/texmeshConfig.cmake.in ${PROJECT_BINARY_DIR}/texmeshConfig.cmake
@@ -60,3 +60,6 @@ configure_package_config_file(cmake/texmeshConfig.cmake.in ${PROJECT_BINARY_DIR}
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/texmeshConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/texmeshConfig.cmake ${PROJECT_BINARY_DIR}/texmeshConfigVersion.cmake
   cmake/TexmeshAddPackage.cmake DESTINATION ${texmesh_cmake_dir})
+if(TEXMESH_COMPILER)
+  include(Supply)
+endif()

@@ -27,6 +27,16 @@ if(NOT TEXMESH_SANITIZE)
   add_test(NAME house_tour COMMAND ${house}/check_tour ${PROJECT_SOURCE_DIR}/README.md $<TARGET_FILE:texmesh>
     $<TARGET_FILE:make_scan> ${CMAKE_CURRENT_BINARY_DIR}/tour)
 endif()
+if(NOT TEXMESH_SANITIZE)
+  add_test(NAME house_supply COMMAND ${house}/check_supply ${PROJECT_BINARY_DIR} ${CMAKE_CURRENT_BINARY_DIR}/supply
+    ${CMAKE_COMMAND} ${CMAKE_CPACK_COMMAND} ${PROJECT_SOURCE_DIR}/tests/golden/v2.0-webp.texmesh)
+  set_tests_properties(house_supply PROPERTIES SKIP_RETURN_CODE 77)
+endif()
+if(NOT TEXMESH_SANITIZE)
+  add_test(NAME house_reproducible COMMAND ${house}/check_reproducible ${PROJECT_SOURCE_DIR}
+    ${CMAKE_CURRENT_BINARY_DIR}/reproducible ${CMAKE_COMMAND})
+  set_tests_properties(house_reproducible PROPERTIES TIMEOUT 7200)
+endif()
 add_test(NAME house_make_scan COMMAND ${house}/check_make_scan $<TARGET_FILE:make_scan> $<TARGET_FILE:texmesh>
   ${CMAKE_CURRENT_BINARY_DIR}/make_scan)
 add_test(NAME house_examples COMMAND ${house}/check_examples $<TARGET_FILE:texmesh> $<TARGET_FILE:make_scan>

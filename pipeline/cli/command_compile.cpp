@@ -99,6 +99,7 @@ void add_stage_option(Command& c, const OptionField& f, CompileArguments& args) 
   Option option = c.option(
       names, [&args, path = f.path()](const std::string& text) { args.options[path] = text; }, help_of(f));
   option.value_name(value_name_of(f)).rare();
+  if (const auto* e = std::get_if<EnumField>(&f.value)) option.offers({e->names.begin(), e->names.end()});
   if (is_short && !is_switch && it->second.everyday) option.everyday(kEverydayTitle);
   if (!is_short || !is_switch) return;
   c.flag(

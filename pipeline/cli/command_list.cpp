@@ -41,7 +41,7 @@ int run_list(const ListArguments& args) {
 
 void add_list_command(Command& app) {
   auto args = std::make_shared<ListArguments>();
-  Command c = app.add("list", "List the models of a collection with their packages and files");
+  Command c = app.add("list");
   c.option("INPUT", args->inputs, "Models, folders of models, or collections (.json), as compile takes them")
       .required();
   c.option("-o,--output", args->output, "Where the packages would go, as compile takes it")

@@ -63,7 +63,7 @@ int run_merge(const MergeArguments& args) {
 
 void add_summary_command(Command& app) {
   auto args = std::make_shared<MergeArguments>();
-  Command c = app.add("summary", "Merge the reports of many runs of compile into one");
+  Command c = app.add("summary");
   c.needs_command();
   Command merge = c.add("merge", "Merge what compile --summary wrote for each shard");
   merge.option("SUMMARY", args->files, "Files of compile --summary").required();

@@ -27,5 +27,6 @@ void add_fetch_command(Command& app);
 void add_view_command(Command& app);
 void add_extract_command(Command& app);
 void add_stages_command(Command& app);
+void add_completion_command(Command& app);
 
 }  // namespace texmesh

@@ -1,16 +1,22 @@
 // texmesh-core: every command and the workers. People call texmesh (main.cpp), which starts it.
-#include <iostream>
-#include <set>
 #include <string>
 
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/options/command_line.h"
 #include "pipeline/cli/program.h"
+#include "pipeline/compile/library_versions.h"
 #include "pipeline/compile/workers/sandbox/sandbox.h"
 #include "pipeline/compile/workers/worker_child.h"
 
 namespace texmesh {
 namespace {
+
+/// What reaches the bytes of packages, and what bounds a model's process on this machine.
+std::string version_details() {
+  std::string text;
+  for (const auto& [name, version] : library_versions()) text += name + " " + version + "\n";
+  return text + "compiler " + compiler_version() + "\nsandbox: " + describe_sandbox(sandbox_support());
+}
 
 void add_commands(Command& program) {
   program.group("Make packages");
@@ -40,13 +46,7 @@ void add_commands(Command& program) {
   program.group("Measure the method");
   add_study_command(program);
   add_experiment_command(program);
-}
-
-/// `--version --verbose` says what bounds a model's process on this machine.
-void print_sandbox_of_version(int argc, char** argv) {
-  const std::set<std::string> words(argv + 1, argv + argc);
-  if (words == std::set<std::string>{"--version", "--verbose"})
-    std::cout << "sandbox: " << describe_sandbox(sandbox_support()) << std::endl;
+  add_completion_command(program);
 }
 
 }  // namespace
@@ -57,9 +57,8 @@ int main(int argc, char** argv) {
   if (argc == 2 && std::string(argv[1]) == "worker")
     return worker_main();  // started by compile, see pipeline/compile/workers/worker_child.h
 
-  print_sandbox_of_version(argc, argv);
   CommandLine line(kProgramSummary);
-  describe_program(line);
+  describe_program(line, version_details);
   Command program = line.program();
   add_commands(program);
   return line.run(argc, argv);

@@ -26,7 +26,7 @@ int start_core(char** argv) {
 
 /// The program with the names of its commands, and nothing behind them.
 void describe_all(CommandLine& line) {
-  describe_program(line);
+  describe_program(line, [] { return std::string(); });  // core's: its libraries are not loaded here
   Command program = line.program();
   for (const CommandSummary& command : kCommands) {
     program.group(command.group);

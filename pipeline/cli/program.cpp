@@ -1,16 +1,15 @@
 #include "pipeline/cli/program.h"
 
-#include <string>
-
 #include "format/container/format_version.h"
 #include "pipeline/cli/options/command_line.h"
 #include "pipeline/compile/library_versions.h"
 
 namespace texmesh {
 
-void describe_program(CommandLine& line) {
+void describe_program(CommandLine& line, const std::function<std::string()>& version_details) {
   line.version("texmesh " + tool_version() + ", package format " + std::to_string(kFormatMajor) + "." +
-               std::to_string(kFormatMinor));
+               std::to_string(kFormatMinor),
+               version_details);
   Command program = line.program();
   program.examples(
       "  texmesh compile scan.glb -o scan.texmesh     compile a model\n"

@@ -1,10 +1,13 @@
 #pragma once
+#include <functional>
+#include <string>
 
 namespace texmesh {
 
 class CommandLine;
 
-/// What `texmesh --help` and `texmesh --version` say beside the list of commands.
-void describe_program(CommandLine& line);
+/// What `texmesh --help` and `texmesh --version` say beside the list of commands. `version_details` is called
+/// for `--version --verbose` alone.
+void describe_program(CommandLine& line, const std::function<std::string()>& version_details);
 
 }  // namespace texmesh

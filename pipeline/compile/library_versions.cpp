@@ -37,4 +37,12 @@ const std::map<std::string, std::string>& library_versions() {
   return versions;
 }
 
+std::string compiler_version() {
+#ifdef __clang__
+  return "clang " __clang_version__;
+#else
+  return "g++ " __VERSION__;
+#endif
+}
+
 }  // namespace texmesh

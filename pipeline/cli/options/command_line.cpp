@@ -10,6 +10,7 @@
 
 #include "pipeline/cli/options/command_list.h"
 #include "pipeline/cli/options/help_text.h"
+#include "pipeline/cli/options/shell_text.h"
 #include "pipeline/io/exit_codes.h"
 
 namespace texmesh {
@@ -74,6 +75,11 @@ Option& Option::one_of(const std::vector<std::string>& words) {
 
 Option& Option::one_of_explained(const std::vector<std::string>& words) {
   option_->check(CLI::IsMember(words).description(""));
+  return offers(words);
+}
+
+Option& Option::offers(const std::vector<std::string>& words) {
+  state_->help.words[option_] = words;
   return *this;
 }
 
@@ -111,6 +117,14 @@ Command Command::add(const std::string& name) {
 }
 
 void Command::needs_command() { app_->require_subcommand(1); }
+
+void Command::hidden() { app_->group(""); }
+
+std::string Command::shell_text(const std::string& form) const {
+  return form == "bash"  ? bash_completion(*app_, state_->help)
+         : form == "zsh" ? zsh_completion(*app_, state_->help)
+                         : manual_page(*app_, state_->help);
+}
 
 Option Command::flag(const std::string& names, bool& value, const std::string& help) {
   CLI::Option* option = app_->add_flag(names, value, help);
@@ -183,8 +197,11 @@ CommandLine::~CommandLine() = default;
 
 Command CommandLine::program() { return {app_.get(), *state_}; }
 
-void CommandLine::version(const std::string& text) {
-  app_->set_version_flag("--version", text, "Print the versions of texmesh and of its package format");
+void CommandLine::version(const std::string& text, const std::function<std::string()>& more) {
+  const auto told = [this, text, more] { return app_->count("--verbose") > 0 ? text + "\n" + more() : text; };
+  app_->set_version_flag("--version", told, "Print the versions of texmesh and of its package format");
+  const std::string help = "With --version: print libraries whose version changes bytes and what bounds a model's process, too";
+  app_->add_flag("--verbose", help);
 }
 
 /// Commands of which the short help leaves options out have a full help.

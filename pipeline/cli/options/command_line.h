@@ -35,6 +35,8 @@ class Option {
   Option& one_of(const std::vector<std::string>& words);
   /// One of these words, which the help's text explains.
   Option& one_of_explained(const std::vector<std::string>& words);
+  /// Words that shells offer for the value. Who takes the value checks it, and the help's text tells of them.
+  Option& offers(const std::vector<std::string>& words);
   Option& separated_by(char delimiter);
   Option& excludes(const Option& other);
   /// Only --help-all shows the option.
@@ -58,6 +60,8 @@ class Command {
   /// A command of the program, with its summary of command_list.h.
   Command add(const std::string& name);
   void needs_command();
+  /// No help and no shell tells of the command.
+  void hidden();
 
   Option flag(const std::string& names, bool& value, const std::string& help);
   Option flag(const std::string& names, std::function<void()> on_given, const std::string& help);
@@ -75,6 +79,8 @@ class Command {
   void examples(const std::string& lines);
   /// What the help ends with: paragraphs, one a line; lines that begin with a blank stay as they are.
   void notes(const std::string& text);
+  /// What shells and man know of the command and of all beneath it: form is bash, zsh or man (shell_text.h).
+  std::string shell_text(const std::string& form) const;
   /// What the command does, and the exit code of the process.
   void on_run(std::function<int()> run);
 
@@ -92,7 +98,8 @@ class CommandLine {
   CommandLine& operator=(const CommandLine&) = delete;
 
   Command program();
-  void version(const std::string& text);
+  /// --version prints `text`; with --verbose it prints what `more` gives behind it.
+  void version(const std::string& text, const std::function<std::string()>& more);
   /// Runs the command that the user chose. Errors are printed; their exit codes are those of exit_codes.h.
   int run(int argc, char** argv);
 

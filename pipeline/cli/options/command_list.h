@@ -13,6 +13,8 @@ inline constexpr CommandSummary kCommands[] = {
     {"Make packages", "compile", "Compile textured scans into packages"},
     {"Make packages", "stages", "Print the graph of stages that compile runs"},
     {"Make packages", "cache", "Look at, prune or check the cache folder"},
+    {"Make packages", "list", "List the models of a collection with their packages and files"},
+    {"Make packages", "summary", "Merge the reports of many runs of compile into one"},
     {"Look inside", "view", "Look at packages in a browser: serves the packages and the viewer"},
     {"Look inside", "dump", "Show what a package holds and why it is as large as it is"},
     {"Look inside", "verify", "Check every byte of packages: digests, documents, meshes, images"},

@@ -68,20 +68,12 @@ std::string option_names(const CLI::Option& o, bool short_only) {
   return names;
 }
 
-std::string description_of(const CLI::Option& o, const HelpNotes& notes) {
-  std::string text = o.get_description();
-  if (const auto it = notes.choices.find(&o); it != notes.choices.end()) text += " " + it->second;
-  if (notes.with_default.contains(&o)) text += " (default " + o.get_default_str() + ")";
-  for (const CLI::Option* other : o.get_excludes()) text += " (not with " + option_names(*other, false) + ")";
-  return text;
-}
-
 std::string option_line(const CLI::Option& o, const Everyday* everyday, const HelpNotes& notes) {
   std::string left = option_names(o, everyday != nullptr);
   if (!o.get_positional() && o.get_type_size() != 0 && !o.get_type_name().empty())
     left += " " + o.get_type_name();
   const bool own_text = everyday == nullptr || everyday->text.empty();
-  return two_columns(left, own_text ? description_of(o, notes) : everyday->text);
+  return two_columns(left, own_text ? option_description(o, notes) : everyday->text);
 }
 
 /// Groups in the order in which their first options were added.
@@ -111,6 +103,7 @@ std::string command_groups(const CLI::App& app) {
   std::map<std::string, std::string> lines;
   for (const CLI::App* command : app.get_subcommands(std::function<bool(const CLI::App*)>())) {
     const std::string& title = command->get_group();
+    if (title.empty()) continue;  // hidden
     if (!lines.contains(title)) titles.push_back(title);
     lines[title] += two_columns(command->get_name(), command->get_description());
   }
@@ -147,6 +140,14 @@ std::string group_alone(const CLI::App& app, const std::string& name, const Help
 }
 
 }  // namespace
+
+std::string option_description(const CLI::Option& o, const HelpNotes& notes) {
+  std::string text = o.get_description();
+  if (const auto it = notes.choices.find(&o); it != notes.choices.end()) text += " " + it->second;
+  if (notes.with_default.contains(&o)) text += " (default " + o.get_default_str() + ")";
+  for (const CLI::Option* other : o.get_excludes()) text += " (not with " + option_names(*other, false) + ")";
+  return text;
+}
 
 std::string help_text(const CLI::App& app, const std::string& name, bool full, const HelpNotes& notes) {
   if (!notes.only_group.empty()) return group_alone(app, name, notes);
