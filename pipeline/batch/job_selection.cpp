@@ -108,7 +108,7 @@ void JobSelection::add_job(std::size_t i, bool remembered) {
 }
 
 void JobSelection::tell_earlier_cost(std::size_t job, WorkerReport& report) const {
-  const MemoRecord& earlier = records_[model_of_job_[job]];
+  const MemoRecord& earlier = records_.at(model_of_job_[job]);
   if (!report.ok() || earlier.failed || report.stages_ran >= report.stages_hit) return;
   report.made_s = earlier.seconds;
   report.made_memory_bytes = earlier.peak_memory_bytes;
