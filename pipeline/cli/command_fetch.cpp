@@ -44,6 +44,7 @@ double seconds_since(Clock::time_point start) {
 struct Moved {
   // What comes in one burst with an answer's first byte says little of the link.
   static constexpr double kLeastShare = 0.2;
+  static constexpr double kMost_bytes_s = 1e9;
   std::uint64_t bytes = 0;
   double seconds = 0;
   void add(std::uint64_t n, double s, double rtt_s) {
@@ -52,7 +53,7 @@ struct Moved {
   }
   /// `first`: what the first answer alone shows, when nothing else was asked for.
   double bytes_s(double first) const {
-    return std::clamp(bytes > 0 ? static_cast<double>(bytes) / seconds : first, 100.0, 1e9);
+    return std::clamp(bytes > 0 ? static_cast<double>(bytes) / seconds : first, 100.0, kMost_bytes_s);
   }
 };
 
@@ -213,6 +214,7 @@ void fetch_textures(const FetchArguments& a, const DeliveryRequest& request, con
 
 /// Bytes per second of all that was fetched.
 double mean_bytes_s(const Fetched& f, Moved moved) {
+  if (f.place.in_memory) return f.place.bytes_s;
   const double textures_s = f.end_s - f.mesh_s;
   if (f.load.transfer.bytes > 0 && textures_s > 0) moved.add(f.load.transfer.bytes, textures_s, f.rtt_s);
   return moved.bytes_s(f.place.bytes_s);
@@ -230,6 +232,7 @@ Fetched fetch(const FetchArguments& a, LinkWatch& watch) {
   f.place = server.place();
   f.rtt_s = request.network.rtt_s > 0 ? request.network.rtt_s : f.place.rtt_s;
   const auto bytes_s = [&] {
+    if (f.place.in_memory) return Moved::kMost_bytes_s;  // all of it is here
     return request.beta0_bytes_s > 0 ? request.beta0_bytes_s
                                      : watch.beta0(f.place.url, moved.bytes_s(f.place.bytes_s));
   };

@@ -185,7 +185,7 @@ Exhibit figures_3_5(const RunContext& context) {
       "fig-3.5",
       "Figs. 3.5 to 3.8: fragments of 128 px and more",
       "with at most 16 x 16 fragments of 128 x 128 px and more the sum is no larger than the one file, at every quality",
-      "pictures made by code, 256 to 4,096 px, baseline JPEGs 4:2:0",
+      "pictures made by code, 256 to 4,096 px, baseline JPEGs 4:2:0, of quality 100 with the channels apart",
       {table},
       cut_plots(images),
       {},

@@ -9,7 +9,7 @@
 
 namespace texmesh {
 
-inline constexpr int kSkeletonizationVersion = 4;
+inline constexpr int kSkeletonizationVersion = 5;
 
 struct SkeletonizationOptions {
   // At 40 a turtle has no hind legs, at 60 the skeleton of a saxophone's neck cuts its corner.

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "stages/base/parallel.h"
+#include "stages/fragment_codec/codec_list.h"
 #include "stages/fragment_codec/decode_rung.h"
 #include "stages/jpeg/jpeg.h"
 #include "stages/jpeg/jpeg_coder.h"
@@ -73,14 +74,22 @@ struct FileSizes {
   std::uint64_t standard = 0, optimised = 0;
 };
 
+/// The kind that the rungs have, so that a file and its fragments differ in nothing but the cuts.
+JpegKind file_kind(const Pixels& pixels, int quality, const FragmentStudyOptions& options) {
+  PlaneCoding coding;
+  coding.channels = pixels.channels;
+  coding.subsampling = options.subsampling;
+  return baseline_kind(coding, quality);
+}
+
 FileSizes file_sizes(const Pixels& pixels, const PixelWindow& window, int quality,
                      const FragmentStudyOptions& options) {
-  const JpegKind kind{pixels.channels, quality, options.subsampling};
+  const JpegKind kind = file_kind(pixels, quality, options);
   JpegCoder standard(kind);
   std::vector<std::uint8_t> body;
   standard.append_body(window, body);
   return {standard.head_stream(window.width_px, window.height_px).size() + body.size() - kMarkersInCommon +
-              kJfifHeader,
+              (kind.rgb ? 0 : kJfifHeader),  // the head names its channels
           options.optimised ? JpegCoder(kind).complete(window).size() : 0};
 }
 
@@ -98,7 +107,7 @@ double decode_s(const std::function<double()>& clock_s, const Decode& decode) {
 }
 
 double file_decode_s(const Pixels& pixels, int quality, const FragmentStudyOptions& options) {
-  JpegCoder coder({pixels.channels, quality, options.subsampling});
+  JpegCoder coder(file_kind(pixels, quality, options));
   const std::vector<std::uint8_t> file =
       coder.complete(window_of(pixels, {0, 0, pixels.width_px, pixels.height_px}));
   return decode_s(options.clock_s, [&] { decode_jpeg(file, pixels.data.size()); });

@@ -21,7 +21,8 @@ struct FragmentStudyOptions {
   std::function<double()> clock_s{};
 };
 
-/// One grid at one quality; bytes. "Standard" files have the Huffman tables of ISO 10918-1 annex K.3 and a
+/// One grid at one quality; bytes. Of quality 100 files and fragments have their channels apart
+/// (kFinestQuality). "Standard" files have the Huffman tables of ISO 10918-1 annex K.3 and a
 /// JFIF header, as most programs write them; "optimised" ones have tables made for them; "shared" is what
 /// packages hold: abbreviated streams behind one table stream, which is counted.
 struct FragmentStudyRow {

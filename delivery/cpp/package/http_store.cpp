@@ -218,7 +218,11 @@ class UrlStore final : public HttpStore {
       link_->pool.start(0, url, std::nullopt, link_->options.max_whole_bytes);
       auto ended = link_->pool.wait(kRequestWait_s);
       HttpAnswer a = ended ? std::move(ended->answer) : HttpAnswer{};
-      if (a.status == 200 && a.complete) return std::move(a.body);
+      if (a.status == 200 && a.complete) {
+        // The answer before was broken off, and says nothing of the link.
+        place_.bytes_s = static_cast<double>(a.body.size()) / std::max(1e-6, a.received_s);
+        return std::move(a.body);
+      }
       if (a.too_long)
         throw InputError(shown_url(url), "",
                          "at most " + std::to_string(link_->options.max_whole_bytes) +

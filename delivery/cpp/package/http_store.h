@@ -16,7 +16,7 @@ struct HttpPlace {
   bool in_memory = false;  // the server gave the whole container, which is kept
   std::string etag;        // of the container; "" for a weak one
   double rtt_s = 0;        // from the request to its answer's first byte
-  double bytes_s = 0;      // of that request, its round trip included
+  double bytes_s = 0;      // of that request, its round trip included; in_memory: of the whole container's
 };
 
 class HttpStore : public PackageStore {

@@ -13,6 +13,7 @@
 #include "stages/skeletonization/contraction/contraction_arena.h"
 #include "stages/skeletonization/contraction/inside_test.h"
 #include "stages/skeletonization/contraction/normal_equations.h"
+#include "stages/skeletonization/contraction/recentre.h"
 #include "stages/skeletonization/contraction/voronoi_poles.h"
 #include "stages/skeletonization/geometry_failure.h"
 
@@ -47,6 +48,9 @@ template <class PointOrVector>
 Vec3d vec(const PointOrVector& p) {
   return {p.x(), p.y(), p.z()};
 }
+
+/// The poles of the contraction that this thread is in, by the surface's points: CGAL keeps a few of them.
+thread_local std::vector<Vec3d> poles_found;
 
 }  // namespace
 }  // namespace texmesh
@@ -87,9 +91,11 @@ void texmesh::Contraction::compute_voronoi_pole() {
     normals[v->id()] = texmesh::vec(m_normals[v->id()]);
   }
   const std::vector<texmesh::Vec3d> poles = texmesh::voronoi_poles(points, normals);
+  texmesh::poles_found.assign(poles.size(), {});
   for (const auto v : vertices(m_tmesh)) {
     const texmesh::Vec3d& pole = poles[v->id()];
     v->pole = Point(pole.x, pole.y, pole.z);
+    texmesh::poles_found[v->vertices.front()] = pole;  // the copy has another order than the surface
   }
   m_are_poles_computed = true;
 }
@@ -108,6 +114,17 @@ SurfaceMesh closed_mesh(const TriangleSoup& closed) {
   return mesh;
 }
 
+/// Whether each pole lies inside: normals that mislead put some outside.
+std::vector<bool> poles_inside(const TriangleSoup& closed) {
+  std::vector<InsideTest::Corners> corners;
+  for (const Triangle& t : closed.triangles)
+    corners.push_back({closed.points[t[0]], closed.points[t[1]], closed.points[t[2]]});
+  const InsideTest test(corners);
+  std::vector<bool> inside;
+  for (const Vec3d& pole : poles_found) inside.push_back(test.is_inside(pole));
+  return inside;
+}
+
 CurveSkeleton contract(const TriangleSoup& closed, int max_contractions) {
   const SurfaceMesh mesh = closed_mesh(closed);
   // A triangle and its share of edges and vertices take about 400 bytes; the contraction splits edges as it
@@ -120,14 +137,19 @@ CurveSkeleton contract(const TriangleSoup& closed, int max_contractions) {
   contraction.set_max_iterations(static_cast<std::size_t>(max_contractions));
   contraction.contract_until_convergence();
   contraction.convert_to_skeleton(graph);
+  const std::vector<bool> inside = poles_inside(closed);
   CurveSkeleton out;
+  std::vector<NodePoles> poles;
   for (const auto v : CGAL::make_range(vertices(graph))) {
-    const auto& p = graph[v].point;
-    out.nodes.push_back({p.x(), p.y(), p.z()});
+    out.nodes.push_back(vec(graph[v].point));
+    NodePoles& of_node = poles.emplace_back();
+    for (const auto p : graph[v].vertices)
+      if (inside[p]) of_node.sum = of_node.sum + poles_found[p], ++of_node.count;
   }
   for (const auto e : CGAL::make_range(edges(graph)))
     out.segments.push_back(
         {static_cast<std::uint32_t>(source(e, graph)), static_cast<std::uint32_t>(target(e, graph))});
+  recentre(out, poles);
   return out;
 }
 

@@ -14,11 +14,11 @@ struct CurveSkeleton {
 };
 
 /// The mean curvature flow skeleton (Tagliasacchi et al. 2012, CGAL's defaults) of one connected closed
-/// oriented 2-manifold, contracted at most `max_contractions` times. CGAL's test whether a point is inside
-/// tries one random ray after the other until one misses every edge, which never happens on surfaces that lie
-/// on themselves (known upstream): after 1,000 rays from one point the contraction is given up.
-/// GeometryFailure for a surface that is not closed, where the contraction is given up, and where a check of
-/// CGAL fails. Deterministic, single-threaded.
+/// oriented 2-manifold, contracted at most `max_contractions` times and then recentred (recentre.h). CGAL's
+/// test whether a point is inside tries one random ray after the other until one misses every edge, which
+/// never happens on surfaces that lie on themselves (known upstream): after 1,000 rays from one point the
+/// contraction is given up. GeometryFailure for a surface that is not closed, where the contraction is given
+/// up, and where a check of CGAL fails. Deterministic, single-threaded.
 CurveSkeleton contract_to_skeleton(const TriangleSoup& closed, int max_contractions = 500);
 
 }  // namespace texmesh

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "tests/delivery/package/raw_server.h"
 #include "tests/support/command.h"
 #include "tests/support/schema.h"
 
@@ -220,6 +221,19 @@ TEST(CliFetch, ReadsAPackageFromAServerAndWritesWhatItGot) {
   EXPECT_EQ(fragments, got["fragments"].get<std::size_t>());
   EXPECT_EQ(none.exit_code, 1);
   EXPECT_EQ(texmesh({"fetch", kGolden}).exit_code, 1);  // a file needs no fetching
+}
+
+TEST(CliFetch, WhatAServerWithoutRangesHasSentCostsNothingMore) {
+  const std::string package = read_text(kGolden);
+  RawServer server([&](const Request& r) {
+    return Reply{r.path == "/scan.texmesh" ? answer(200, "", package) : answer(404, "", "")};
+  });
+  TemporaryFolder folder;
+  const std::string history = folder / "links.json";
+  const Json got = json_of({"fetch", server.url("/scan.texmesh"), "--time", "3", "--history", history});
+  EXPECT_EQ(got["scale"], 0);
+  EXPECT_EQ(got["skipped"], 0);
+  EXPECT_GT(Json::parse(read_text(history))["hosts"][0]["bytes_s"], 1000);
 }
 
 TEST(CliCheck, GatesByItsLimitsAndSaysWhy) {

@@ -81,6 +81,15 @@ TEST(FragmentStudy, WithoutOptimisedFilesTheOtherSizesAreTheSame) {
   }
 }
 
+TEST(FragmentStudy, AFileIsOfTheKindOfItsFragmentsAtEveryQuality) {
+  FragmentStudyOptions options;
+  options.grids = {1};
+  options.qualities = {90, 99, 100};
+  for (const FragmentStudyRow& row : study(picture(256, 256, 3), options))
+    EXPECT_NEAR(static_cast<double>(row.sum_shared) / static_cast<double>(row.file_optimised), 1, 0.05)
+        << row.quality;
+}
+
 TEST(FragmentStudy, OddSizesGreyAndTinyImages) {
   FragmentStudyOptions options;
   options.grids = {2, 16};
