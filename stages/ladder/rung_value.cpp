@@ -14,6 +14,8 @@ namespace {
 constexpr double kTextureShare = 0.75;
 // 1 - SSIM that nobody sees: a rung that saves half of less is not worth twice as much.
 constexpr double kUnseen = 0.01;
+// Neighbours on a hull have at most so many times the bytes of each other.
+constexpr double kMostApart = 2.5;
 // Prices of a byte in loss, from dear to cheap: four an octave.
 constexpr int kPrices = 176, kPricesPerOctave = 4, kDearestOctave = -6;
 
@@ -242,6 +244,31 @@ struct Asked {
   double rise_per_byte = 0;  // Worth::rise
 };
 
+/// Whether the hull of all levels has neighbours far apart where the pair was: a budget between them buys
+/// little more than the cheaper one. The preview is no neighbour.
+bool opens_gap(const TextureWays& texture, const std::vector<std::uint8_t>& keep, std::size_t pair,
+               std::size_t wanted) {
+  const Levels all{wanted, texture.preview_loss.size() - 1};
+  const Hull whole = hull_of(texture, keep, wanted, all);
+  if (std::ranges::find(whole, pair, &Vertex::pair) == whole.end()) return false;
+  std::vector<std::uint8_t> others = keep;
+  others[pair] = 0;
+  const Hull hull = hull_of(texture, others, wanted, all);
+  const std::size_t k = segment_of(hull, static_cast<double>(texture.pairs[pair].bytes));
+  if (k == 0 || k + 1 == hull.size()) return false;
+  return hull[k + 1].bytes > kMostApart * hull[k].bytes && hull[k].loss > hull[k + 1].loss + kUnseen;
+}
+
+/// Pairs without which the hull of some level that loads want has a gap.
+std::vector<std::uint8_t> gap_closers(const TextureWays& texture, const std::vector<std::uint8_t>& keep,
+                                      const GivenBytes& given) {
+  std::vector<std::uint8_t> out(keep.size());
+  for (std::size_t level = 0; level < given.size(); ++level)
+    for (std::size_t k = 0; k < keep.size() && !given[level].empty(); ++k)
+      if (keep[k] && texture.pairs[k].level >= level && !out[k]) out[k] = opens_gap(texture, keep, k, level);
+  return out;
+}
+
 bool takes_too_much(const TextureWays& texture, const std::vector<std::uint8_t>& keep) {
   double bytes = 0;
   for (std::size_t k = 0; k < keep.size(); ++k)
@@ -249,22 +276,28 @@ bool takes_too_much(const TextureWays& texture, const std::vector<std::uint8_t>&
   return bytes > texture.most_bytes;
 }
 
-/// The pair to go next; kPreview for none. Fixed pairs and the last one of every level stay.
+/// The pair to go next; kPreview for none. Fixed pairs and the last one of every level stay, and those of
+/// `closers` as long as another one can go.
 std::size_t next_to_go(const TextureWays& texture, const std::vector<std::uint8_t>& keep,
-                       const std::vector<Worth>& worth, const Asked& asked) {
+                       const std::vector<std::uint8_t>& closers, const std::vector<Worth>& worth,
+                       const Asked& asked) {
   std::vector<std::size_t> of_level(texture.preview_loss.size());
   for (std::size_t k = 0; k < keep.size(); ++k) of_level[texture.pairs[k].level] += keep[k];
   const bool too_much = takes_too_much(texture, keep);
-  std::size_t next = kPreview;
-  double least = 0;
+  std::size_t next = kPreview, closer = kPreview;
+  double least = 0, least_closer = 0;
   for (std::size_t k = 0; k < keep.size(); ++k) {
     const RungPair& pair = texture.pairs[k];
     if (!keep[k] || pair.fixed || of_level[pair.level] < 2) continue;
     const double per_byte = worth[k].rise / static_cast<double>(std::max<std::uint64_t>(pair.bytes, 1));
-    if (!too_much && worth[k].loads >= asked.loads && per_byte >= asked.rise_per_byte) continue;
-    if (next == kPreview || per_byte < least) next = k, least = per_byte;
+    const bool chosen = worth[k].loads >= asked.loads;
+    if (!too_much && chosen && (closers[k] || per_byte >= asked.rise_per_byte)) continue;
+    const bool stays = chosen && closers[k];
+    std::size_t& last = stays ? closer : next;
+    double& of_last = stays ? least_closer : least;
+    if (last == kPreview || per_byte < of_last) last = k, of_last = per_byte;
   }
-  return next;
+  return next == kPreview ? closer : next;
 }
 
 /// `keep` of one texture without what is not worth its bytes.
@@ -273,7 +306,8 @@ void drop_pairs(const TextureWays& texture, const GivenBytes& given, const Asked
   std::vector<std::vector<Hull>> whole;
   for (std::size_t level = 0; level < given.size(); ++level) whole.push_back(hulls_of(texture, keep, level));
   for (;;) {
-    const std::size_t next = next_to_go(texture, keep, worth_of(texture, keep, given, whole), asked);
+    const std::size_t next = next_to_go(texture, keep, gap_closers(texture, keep, given),
+                                        worth_of(texture, keep, given, whole), asked);
     if (next == kPreview) return;
     keep[next] = 0;
   }
