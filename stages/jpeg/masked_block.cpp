@@ -7,7 +7,6 @@
 #include <cstring>
 #include <limits>
 
-#include "stages/jpeg/finest_block.h"
 #include "stages/jpeg/jpeg_stream.h"
 
 namespace texmesh {

@@ -1,4 +1,4 @@
-#include "stages/jpeg/finest_block.h"
+#include "stages/jpeg/block_transform.h"
 
 #include <gtest/gtest.h>
 
@@ -25,7 +25,7 @@ int off_by(const BlockValues& samples, const BlockValues& steps) {
   return off;
 }
 
-TEST(FinestBlock, AQuarterFewerSamplesAreOffThanWithTheNearestNumbers) {
+TEST(BlockTransform, FinestStepsLeaveAQuarterFewerSamplesOff) {
   Random random{9};
   int nearest = 0, finest = 0;
   constexpr int kBlocks = 500;
@@ -45,14 +45,14 @@ TEST(FinestBlock, AQuarterFewerSamplesAreOffThanWithTheNearestNumbers) {
   EXPECT_LT(finest, 0.77 * nearest);
 }
 
-TEST(FinestBlock, WholeCoefficientsStay) {
+TEST(BlockTransform, FinestStepsOfWholeNumbersAreThese) {
   BlockValues whole{};
   EXPECT_EQ(finest_steps(whole), whole);
   for (std::size_t k = 0; k < 64; ++k) whole[k] = static_cast<float>(static_cast<int>(k) % 7 - 3);
   EXPECT_EQ(finest_steps(whole), whole);
 }
 
-TEST(FinestBlock, CoefficientsAtTheEndOfTheirRangeStayInIt) {
+TEST(BlockTransform, FinestStepsStayInTheRangeOfBaselineJpeg) {
   BlockValues checks;
   for (std::size_t k = 0; k < 64; ++k) checks[k] = (k / 8 + k % 8) % 2 == 0 ? 127.0f : -128.0f;
   for (const float s : finest_steps(block_dct(checks))) EXPECT_LE(std::fabs(s), 1023);
