@@ -6,91 +6,33 @@
 
 #include "format/base/portable_math.h"
 #include "format/rules/ordinary_loads.h"
+#include "stages/ladder/rung_gaps.h"
+#include "stages/ladder/rung_hull.h"
 
 namespace texmesh {
 namespace {
 
+using rungs::best_of;
+using rungs::bytes_of;
+using rungs::gap_closers;
+using rungs::GivenBytes;
+using rungs::Hull;
+using rungs::hull_of;
+using rungs::hulls_of;
+using rungs::kPreview;
+using rungs::kUnseen;
+using rungs::loss_at;
+using rungs::segment_of;
+using rungs::swap_pairs;
+
 // Of a load's bytes textures have so much; mesh and tables take the rest.
 constexpr double kTextureShare = 0.75;
-// 1 - SSIM that nobody sees: a rung that saves half of less is not worth twice as much.
-constexpr double kUnseen = 0.01;
-// Neighbours on a hull have at most so many times the bytes of each other.
-constexpr double kMostApart = 2.5;
 // Prices of a byte in loss, from dear to cheap: four an octave.
 constexpr int kPrices = 176, kPricesPerOctave = 4, kDearestOctave = -6;
 
 double price(int k) {
   constexpr double kLn2 = 0.693147180559945309417;
   return portable::exp(kLn2 * (kDearestOctave - static_cast<double>(k) / kPricesPerOctave));
-}
-
-/// The preview, where pairs are numbered.
-constexpr std::size_t kPreview = std::numeric_limits<std::size_t>::max();
-
-/// A vertex of a lower hull.
-struct Vertex {
-  std::size_t pair = kPreview;
-  double bytes = 0, loss = 0;
-};
-using Hull = std::vector<Vertex>;
-
-/// Levels of a texture, the last one included.
-struct Levels {
-  std::size_t first = 0, last = 0;
-};
-
-/// The lower hull of loss over bytes where a level is wanted: from the preview on along the kept pairs of
-/// some levels.
-Hull hull_of(const TextureWays& texture, const std::vector<std::uint8_t>& keep, std::size_t wanted,
-             Levels levels) {
-  Hull hull{{kPreview, 0, texture.preview_loss[wanted]}};
-  for (;;) {
-    const Vertex at = hull.back();
-    Vertex best;
-    double steepest = 0;
-    for (std::size_t k = 0; k < texture.pairs.size(); ++k) {
-      const RungPair& pair = texture.pairs[k];
-      if (!keep[k] || pair.level < levels.first || pair.level > levels.last) continue;
-      const Vertex to{k, static_cast<double>(pair.bytes), pair.loss[wanted]};
-      if (to.bytes <= at.bytes || to.loss >= at.loss) continue;
-      const double slope = (at.loss - to.loss) / (to.bytes - at.bytes);
-      if (slope > steepest || (slope == steepest && to.bytes > best.bytes)) steepest = slope, best = to;
-    }
-    if (best.pair == kPreview) return hull;
-    hull.push_back(best);
-  }
-}
-
-/// Those of the wanted level and of each coarser one.
-std::vector<Hull> hulls_of(const TextureWays& texture, const std::vector<std::uint8_t>& keep,
-                           std::size_t wanted) {
-  std::vector<Hull> out;
-  for (std::size_t level = wanted; level < texture.preview_loss.size(); ++level)
-    out.push_back(hull_of(texture, keep, wanted, {level, level}));
-  return out;
-}
-
-/// The vertex at or behind which so many bytes end.
-std::size_t segment_of(const Hull& hull, double bytes) {
-  std::size_t k = 0;
-  while (k + 1 < hull.size() && hull[k + 1].bytes <= bytes) ++k;
-  return k;
-}
-
-/// Some fragments at one vertex and the others at the next one.
-double loss_at(const Hull& hull, double bytes) {
-  const std::size_t k = segment_of(hull, bytes);
-  if (k + 1 == hull.size()) return hull[k].loss;
-  const Vertex &a = hull[k], &b = hull[k + 1];
-  return a.loss + (b.loss - a.loss) * ((bytes - a.bytes) / (b.bytes - a.bytes));
-}
-
-/// The hull that loses least with so many bytes: clients show one level of a texture.
-std::size_t best_of(const std::vector<Hull>& hulls, double bytes) {
-  std::size_t best = 0;
-  for (std::size_t k = 1; k < hulls.size(); ++k)
-    if (loss_at(hulls[k], bytes) < loss_at(hulls[best], bytes)) best = k;
-  return best;
 }
 
 /// The level of the display has 1 to 2 texels a pixel, and this one twice as many.
@@ -140,9 +82,6 @@ BytesByPrice bytes_by_price(const TextureWays& texture, const std::vector<std::u
   }
   return out;
 }
-
-/// What loads give a texture: bytes, by wanted level.
-using GivenBytes = std::vector<std::vector<double>>;
 
 /// By texture. Where one price takes less than a load has and the next one more, every texture goes the same
 /// part of its way between them.
@@ -244,43 +183,6 @@ struct Asked {
   double rise_per_byte = 0;  // Worth::rise
 };
 
-/// Whether the hull of all levels has neighbours far apart where the pair was: a budget between them buys
-/// little more than the cheaper one. The preview is no neighbour.
-bool opens_gap(const TextureWays& texture, const std::vector<std::uint8_t>& keep, std::size_t pair,
-               std::size_t wanted) {
-  const Levels all{wanted, texture.preview_loss.size() - 1};
-  const Hull whole = hull_of(texture, keep, wanted, all);
-  if (std::ranges::find(whole, pair, &Vertex::pair) == whole.end()) return false;
-  std::vector<std::uint8_t> others = keep;
-  others[pair] = 0;
-  const Hull hull = hull_of(texture, others, wanted, all);
-  const std::size_t k = segment_of(hull, static_cast<double>(texture.pairs[pair].bytes));
-  if (k == 0 || k + 1 == hull.size()) return false;
-  return hull[k + 1].bytes > kMostApart * hull[k].bytes && hull[k].loss > hull[k + 1].loss + kUnseen;
-}
-
-/// Pairs without which the hull of some level that loads want has a gap. Of a texture with mips only these
-/// and fixed pairs count: full-size rungs whose chroma is halved look worse in lit pictures than their luma
-/// says (a yurt's, of 655 kB: FLIP .017, as its mip 2 of 359 kB).
-std::vector<std::uint8_t> gap_closers(const TextureWays& texture, std::vector<std::uint8_t> keep,
-                                      const GivenBytes& given) {
-  const bool has_mips = texture.preview_loss.size() > 1;
-  for (std::size_t k = 0; k < keep.size(); ++k)
-    if (has_mips && texture.pairs[k].level == 0 && !texture.pairs[k].fixed) keep[k] = 0;
-  std::vector<std::uint8_t> out(keep.size());
-  for (std::size_t level = 0; level < given.size(); ++level)
-    for (std::size_t k = 0; k < keep.size() && !given[level].empty(); ++k)
-      if (keep[k] && texture.pairs[k].level >= level && !out[k]) out[k] = opens_gap(texture, keep, k, level);
-  return out;
-}
-
-bool takes_too_much(const TextureWays& texture, const std::vector<std::uint8_t>& keep) {
-  double bytes = 0;
-  for (std::size_t k = 0; k < keep.size(); ++k)
-    if (keep[k]) bytes += static_cast<double>(texture.pairs[k].bytes);
-  return bytes > texture.most_bytes;
-}
-
 /// The pair to go next; kPreview for none. Fixed pairs and the last one of every level stay, and those of
 /// `closers` as long as another one can go.
 std::size_t next_to_go(const TextureWays& texture, const std::vector<std::uint8_t>& keep,
@@ -288,21 +190,20 @@ std::size_t next_to_go(const TextureWays& texture, const std::vector<std::uint8_
                        const Asked& asked) {
   std::vector<std::size_t> of_level(texture.preview_loss.size());
   for (std::size_t k = 0; k < keep.size(); ++k) of_level[texture.pairs[k].level] += keep[k];
-  const bool too_much = takes_too_much(texture, keep);
-  std::size_t next = kPreview, closer = kPreview;
-  double least = 0, least_closer = 0;
+  const bool too_much = bytes_of(texture, keep) > texture.most_bytes;
+  std::size_t next = kPreview;
+  bool next_closes = false;
+  double least = 0;
   for (std::size_t k = 0; k < keep.size(); ++k) {
     const RungPair& pair = texture.pairs[k];
     if (!keep[k] || pair.fixed || of_level[pair.level] < 2) continue;
     const double per_byte = worth[k].rise / static_cast<double>(std::max<std::uint64_t>(pair.bytes, 1));
-    const bool chosen = worth[k].loads >= asked.loads;
-    if (!too_much && chosen && (closers[k] || per_byte >= asked.rise_per_byte)) continue;
-    const bool stays = chosen && closers[k];
-    std::size_t& last = stays ? closer : next;
-    double& of_last = stays ? least_closer : least;
-    if (last == kPreview || per_byte < of_last) last = k, of_last = per_byte;
+    const bool chosen = worth[k].loads >= asked.loads, closes = chosen && closers[k];
+    if (!too_much && (closes || (chosen && per_byte >= asked.rise_per_byte))) continue;
+    if (next != kPreview && (closes > next_closes || (closes == next_closes && per_byte >= least))) continue;
+    next = k, next_closes = closes, least = per_byte;
   }
-  return next == kPreview ? closer : next;
+  return next;
 }
 
 /// `keep` of one texture without what is not worth its bytes.
@@ -310,12 +211,20 @@ void drop_pairs(const TextureWays& texture, const GivenBytes& given, const Asked
                 std::vector<std::uint8_t>& keep) {
   std::vector<std::vector<Hull>> whole;
   for (std::size_t level = 0; level < given.size(); ++level) whole.push_back(hulls_of(texture, keep, level));
-  for (;;) {
-    const std::size_t next = next_to_go(texture, keep, gap_closers(texture, keep, given),
-                                        worth_of(texture, keep, given, whole), asked);
-    if (next == kPreview) return;
-    keep[next] = 0;
-  }
+  bool bound = false;
+  const auto drop = [&] {
+    for (;;) {
+      const std::size_t next = next_to_go(texture, keep, gap_closers(texture, keep, given),
+                                          worth_of(texture, keep, given, whole), asked);
+      if (next == kPreview) return;
+      bound = bound || bytes_of(texture, keep) > texture.most_bytes;
+      keep[next] = 0;
+    }
+  };
+  drop();
+  if (!bound) return;
+  swap_pairs(texture, given, keep);
+  drop();
 }
 
 }  // namespace
