@@ -17,8 +17,8 @@ constexpr std::uint32_t kWindowPx = 128;
 // Coarser mips show a window interpolated. A window so far from the border of its fragment shows one of a
 // mip's fragments, which covers four of the source's: fewer to encode and to decode.
 constexpr std::uint32_t kInsetPx = 16;
-// Added to the luma's loss of colours whose chroma is halved and coarse: lit pictures show it. Of a yurt, 655
-// kB of full size lose .021 of luma and .017 of FLIP; 665 kB of mip 1 lose .029 and .011.
+// Where chroma is halved, the luma's loss counts twice, but at most this much more: lit pictures show coarse
+// chroma. Of a yurt, 655 kB of full size lose .021 of luma and .017 of FLIP; 665 kB of mip 1 .029 and .011.
 constexpr double kHalvedChroma = 0.02;
 
 /// A rectangle of the plane's padded pixels, within one fragment.
@@ -257,7 +257,7 @@ TextureWays measure_ways(const Fragments& fragments, const std::vector<Pixels>& 
       RungPair& pair = out.pairs[first + way - 1];
       const bool halved = is_colour(fragments.planes[base].role) && !pair.fixed &&
                           has_halved_chroma(planes[chain[pair.level]].rungs[pair.rung]);
-      pair.loss.push_back(losses[way] + (halved ? kHalvedChroma : 0));
+      pair.loss.push_back(losses[way] + (halved ? std::min(losses[way], kHalvedChroma) : 0));
     }
   }
   return out;
