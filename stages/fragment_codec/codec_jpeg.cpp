@@ -1,6 +1,6 @@
 // Baseline JPEG: every rung has Huffman tables trained on a sample of the plane, and everything that
 // fragments have in common stands in the rung's table stream. Fragments with uncovered texels are coded by
-// MaskedJpeg, all others by libjpeg.
+// MaskedJpeg, and all of them at the finest quality; the others by libjpeg.
 #include <functional>
 #include <optional>
 
@@ -129,26 +129,25 @@ class JpegCodec : public TextureCodec {
         if (k == 0) masked_.emplace(kind);
       }
       alike_ = rungs_alike(qualities);
-      if (alike_ > 0 && alike_ < rungs_.size()) finest_.emplace(baseline_kind(codec.plane_, kFinestQuality));
+      if (alike_ < rungs_.size()) finest_.emplace(baseline_kind(codec.plane_, kFinestQuality));
     }
     // Rung after rung of one fragment, so that its pixels stay in the cache; rung by rung costs a quarter
     // more.
     void encode(const PixelWindow& fragment, std::span<std::vector<std::uint8_t>> streams) override {
-      if (wholly_covered(fragment)) {
-        for (std::size_t r = 0; r < coders_.size(); ++r) coders_[r]->append_body(fragment, streams[r]);
-        return;
-      }
       const std::span<const MaskedRung> rungs(rungs_);
-      if (!finest_) return masked_->append_bodies(fragment, rungs, streams);
-      masked_->append_bodies(fragment, rungs.first(alike_), streams.first(alike_));
-      finest_->append_bodies(fragment, rungs.subspan(alike_), streams.subspan(alike_));
+      if (wholly_covered(fragment))
+        for (std::size_t r = 0; r < alike_; ++r) coders_[r]->append_body(fragment, streams[r]);
+      else if (alike_ > 0)
+        masked_->append_bodies(fragment, rungs.first(alike_), streams.first(alike_));
+      // libjpeg's coefficients are the nearest ones: more samples would be off.
+      if (finest_) finest_->append_bodies(fragment, rungs.subspan(alike_), streams.subspan(alike_));
     }
 
    private:
     std::vector<std::unique_ptr<JpegCoder>> coders_;
     std::vector<MaskedRung> rungs_;
     std::size_t alike_ = 0;
-    std::optional<MaskedJpeg> masked_, finest_;  // of the first rung's kind; of the last one where it differs
+    std::optional<MaskedJpeg> masked_, finest_;  // of the first rung's kind; of a rung of the finest quality
   };
 
   PlaneCoding plane_;

@@ -1,5 +1,8 @@
 #include "stages/jpeg/block_transform.h"
 
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <cstring>
 
 #include "format/base/portable_math.h"
@@ -56,6 +59,82 @@ void multiply(const float* left, const float* right, float* out) {
   }
 }
 
+constexpr float kBorne = 0.3f;        // errors below are not made smaller; .2 and .36 leave more samples off
+constexpr int kTriedSteps = 3;        // 1: 6.5 % of the samples are off; 8: 6.0 %
+constexpr int kMostSteps = 16;        // three are usual
+constexpr float kLargestStep = 1000;  // of coefficients that are changed
+
+using QuadBits = std::int32_t __attribute__((vector_size(16)));
+
+/// What errors have above kBorne, without sign.
+Quad excess(Quad error) {
+  const Quad size = (Quad)((QuadBits)error & 0x7fffffff) - kBorne;
+  return (Quad)((QuadBits)size & (size > 0));
+}
+
+float sum_of(Quad v) { return (v[0] + v[1]) + (v[2] + v[3]); }
+
+/// Basis functions of the inverse transform.
+const std::array<BlockValues, 64>& basis_functions() {
+  static const auto functions = [] {
+    std::array<BlockValues, 64> out;
+    for (std::size_t k = 0; k < 64; ++k) {
+      BlockValues one{};
+      one[k] = 1;
+      out[k] = block_inverse_dct(one);
+    }
+    return out;
+  }();
+  return functions;
+}
+
+/// Sum of squares of the excess of error + step x function.
+float cost_with(const BlockValues& error, float step, const BlockValues& function) {
+  Quad sum{};
+  for (std::size_t k = 0; k < 64; k += 4) {
+    const Quad over = excess(load(error.data() + k) + step * load(function.data() + k));
+    sum += over * over;
+  }
+  return sum_of(sum);
+}
+
+/// Half of the cost's derivatives by the coefficients.
+BlockValues cost_slopes(const BlockValues& error) {
+  BlockValues over;
+  for (std::size_t k = 0; k < 64; ++k) {
+    const float size = std::fabs(error[k]) - kBorne;
+    over[k] = size <= 0 ? 0 : error[k] < 0 ? -size : size;
+  }
+  return block_dct(over);
+}
+
+std::size_t steepest(const BlockValues& slopes) {
+  std::size_t best = 0;
+  for (std::size_t k = 1; k < 64; ++k)
+    if (std::fabs(slopes[k]) > std::fabs(slopes[best])) best = k;
+  return best;
+}
+
+/// Takes one step that lowers the cost; false when none of those that are tried does.
+bool take_step(BlockValues& steps, BlockValues& error, float& cost) {
+  BlockValues slopes = cost_slopes(error);
+  for (int tried = 0; tried < kTriedSteps; ++tried) {
+    const std::size_t k = steepest(slopes);
+    if (slopes[k] == 0) return false;
+    const float step = slopes[k] > 0 ? -1.0f : 1.0f;
+    slopes[k] = 0;
+    if (std::fabs(steps[k] + step) > kLargestStep) continue;
+    const BlockValues& function = basis_functions()[k];
+    const float then = cost_with(error, step, function);
+    if (then >= cost) continue;
+    cost = then;
+    steps[k] += step;
+    for (std::size_t s = 0; s < 64; ++s) error[s] += step * function[s];
+    return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 BlockValues block_dct(const BlockValues& samples) {
@@ -70,6 +149,19 @@ BlockValues block_inverse_dct(const BlockValues& coefficients) {
   multiply(kCosines.transposed.data(), coefficients.data(), columns.data());
   multiply(columns.data(), kCosines.matrix.data(), out.data());
   return out;
+}
+
+BlockValues finest_steps(const BlockValues& coefficients) {
+  BlockValues steps, rest;
+  for (std::size_t k = 0; k < 64; ++k) {
+    steps[k] = static_cast<float>(nearest_integer(coefficients[k]));
+    rest[k] = steps[k] - coefficients[k];
+  }
+  BlockValues error = block_inverse_dct(rest);
+  float cost = cost_with(error, 0, basis_functions()[0]);
+  for (int step = 0; step < kMostSteps && cost > 0; ++step)
+    if (!take_step(steps, error, cost)) break;
+  return steps;
 }
 
 void BlockGram::set_weights(const BlockValues& weights, float mean_weight) {

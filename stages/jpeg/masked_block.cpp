@@ -248,6 +248,8 @@ void subtract(BlockValues& from, float times, const BlockValues& column) {
 }  // namespace
 
 CodedBlock quantise_whole(const BlockValues& coefficients, const BlockCoding& coding) {
+  if (mask_where([&](std::size_t k) { return load_quad(coding.quantisers, k) != 1.0f; }) == 0)
+    return coded_block(finest_steps(coefficients));
   BlockValues steps;
   for (std::size_t k = 0; k < 64; k += 4) {
     const Quad x = load_quad(coefficients, k) / load_quad(coding.quantisers, k);

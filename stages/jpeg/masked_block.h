@@ -23,6 +23,7 @@ struct CodedBlock {
 
 /// Coefficients of a block all of which is seen: to the nearest, ties away from zero, and then, from the
 /// highest frequency down, AC coefficients one step nearer to zero where that saves more bits than error.
+/// Where all quantisers are 1, finest_steps() instead.
 CodedBlock quantise_whole(const BlockValues& coefficients, const BlockCoding& coding);
 
 /// A block of which some samples are free.

@@ -21,8 +21,9 @@ std::vector<std::vector<std::uint8_t>> choice_sample(const Fragments& fragments)
 /// let expect of the covered texels. The rung of the source's coefficients is fixed. Losses are measured in
 /// up to 6 windows of up to 128 px of the wanted level, in covered fragments evenly spread in index order:
 /// what is shown, scaled up bilinearly as a client does, against the wanted level's `pixels`, over covered
-/// texels; luma of colours, every channel of data. Each window weighs as much as its fragment's surface.
-/// `planes` are ladders of `fragments`; `preview_file` is a complete JPEG. Same result for any thread count.
+/// texels; luma of colours, counted twice where their chroma is halved, but at most .02 more, every channel
+/// of data. Each window weighs as much as its fragment's surface. `planes` are ladders of `fragments`;
+/// `preview_file` is a complete JPEG. Same result for any thread count.
 TextureWays measure_ways(const Fragments& fragments, const std::vector<Pixels>& pixels,
                          const std::vector<PlaneLadder>& planes, std::size_t base,
                          const std::vector<std::uint8_t>& preview_file, const RunContext& context);

@@ -6,89 +6,33 @@
 
 #include "format/base/portable_math.h"
 #include "format/rules/ordinary_loads.h"
+#include "stages/ladder/rung_gaps.h"
+#include "stages/ladder/rung_hull.h"
 
 namespace texmesh {
 namespace {
 
+using rungs::best_of;
+using rungs::bytes_of;
+using rungs::gap_closers;
+using rungs::GivenBytes;
+using rungs::Hull;
+using rungs::hull_of;
+using rungs::hulls_of;
+using rungs::kPreview;
+using rungs::kUnseen;
+using rungs::loss_at;
+using rungs::segment_of;
+using rungs::swap_pairs;
+
 // Of a load's bytes textures have so much; mesh and tables take the rest.
 constexpr double kTextureShare = 0.75;
-// 1 - SSIM that nobody sees: a rung that saves half of less is not worth twice as much.
-constexpr double kUnseen = 0.01;
 // Prices of a byte in loss, from dear to cheap: four an octave.
 constexpr int kPrices = 176, kPricesPerOctave = 4, kDearestOctave = -6;
 
 double price(int k) {
   constexpr double kLn2 = 0.693147180559945309417;
   return portable::exp(kLn2 * (kDearestOctave - static_cast<double>(k) / kPricesPerOctave));
-}
-
-/// The preview, where pairs are numbered.
-constexpr std::size_t kPreview = std::numeric_limits<std::size_t>::max();
-
-/// A vertex of a lower hull.
-struct Vertex {
-  std::size_t pair = kPreview;
-  double bytes = 0, loss = 0;
-};
-using Hull = std::vector<Vertex>;
-
-/// Levels of a texture, the last one included.
-struct Levels {
-  std::size_t first = 0, last = 0;
-};
-
-/// The lower hull of loss over bytes where a level is wanted: from the preview on along the kept pairs of
-/// some levels.
-Hull hull_of(const TextureWays& texture, const std::vector<std::uint8_t>& keep, std::size_t wanted,
-             Levels levels) {
-  Hull hull{{kPreview, 0, texture.preview_loss[wanted]}};
-  for (;;) {
-    const Vertex at = hull.back();
-    Vertex best;
-    double steepest = 0;
-    for (std::size_t k = 0; k < texture.pairs.size(); ++k) {
-      const RungPair& pair = texture.pairs[k];
-      if (!keep[k] || pair.level < levels.first || pair.level > levels.last) continue;
-      const Vertex to{k, static_cast<double>(pair.bytes), pair.loss[wanted]};
-      if (to.bytes <= at.bytes || to.loss >= at.loss) continue;
-      const double slope = (at.loss - to.loss) / (to.bytes - at.bytes);
-      if (slope > steepest || (slope == steepest && to.bytes > best.bytes)) steepest = slope, best = to;
-    }
-    if (best.pair == kPreview) return hull;
-    hull.push_back(best);
-  }
-}
-
-/// Those of the wanted level and of each coarser one.
-std::vector<Hull> hulls_of(const TextureWays& texture, const std::vector<std::uint8_t>& keep,
-                           std::size_t wanted) {
-  std::vector<Hull> out;
-  for (std::size_t level = wanted; level < texture.preview_loss.size(); ++level)
-    out.push_back(hull_of(texture, keep, wanted, {level, level}));
-  return out;
-}
-
-/// The vertex at or behind which so many bytes end.
-std::size_t segment_of(const Hull& hull, double bytes) {
-  std::size_t k = 0;
-  while (k + 1 < hull.size() && hull[k + 1].bytes <= bytes) ++k;
-  return k;
-}
-
-/// Some fragments at one vertex and the others at the next one.
-double loss_at(const Hull& hull, double bytes) {
-  const std::size_t k = segment_of(hull, bytes);
-  if (k + 1 == hull.size()) return hull[k].loss;
-  const Vertex &a = hull[k], &b = hull[k + 1];
-  return a.loss + (b.loss - a.loss) * ((bytes - a.bytes) / (b.bytes - a.bytes));
-}
-
-/// The hull that loses least with so many bytes: clients show one level of a texture.
-std::size_t best_of(const std::vector<Hull>& hulls, double bytes) {
-  std::size_t best = 0;
-  for (std::size_t k = 1; k < hulls.size(); ++k)
-    if (loss_at(hulls[k], bytes) < loss_at(hulls[best], bytes)) best = k;
-  return best;
 }
 
 /// The level of the display has 1 to 2 texels a pixel, and this one twice as many.
@@ -138,9 +82,6 @@ BytesByPrice bytes_by_price(const TextureWays& texture, const std::vector<std::u
   }
   return out;
 }
-
-/// What loads give a texture: bytes, by wanted level.
-using GivenBytes = std::vector<std::vector<double>>;
 
 /// By texture. Where one price takes less than a load has and the next one more, every texture goes the same
 /// part of its way between them.
@@ -242,27 +183,25 @@ struct Asked {
   double rise_per_byte = 0;  // Worth::rise
 };
 
-bool takes_too_much(const TextureWays& texture, const std::vector<std::uint8_t>& keep) {
-  double bytes = 0;
-  for (std::size_t k = 0; k < keep.size(); ++k)
-    if (keep[k]) bytes += static_cast<double>(texture.pairs[k].bytes);
-  return bytes > texture.most_bytes;
-}
-
-/// The pair to go next; kPreview for none. Fixed pairs and the last one of every level stay.
+/// The pair to go next; kPreview for none. Fixed pairs and the last one of every level stay, and those of
+/// `closers` as long as another one can go.
 std::size_t next_to_go(const TextureWays& texture, const std::vector<std::uint8_t>& keep,
-                       const std::vector<Worth>& worth, const Asked& asked) {
+                       const std::vector<std::uint8_t>& closers, const std::vector<Worth>& worth,
+                       const Asked& asked) {
   std::vector<std::size_t> of_level(texture.preview_loss.size());
   for (std::size_t k = 0; k < keep.size(); ++k) of_level[texture.pairs[k].level] += keep[k];
-  const bool too_much = takes_too_much(texture, keep);
+  const bool too_much = bytes_of(texture, keep) > texture.most_bytes;
   std::size_t next = kPreview;
+  bool next_closes = false;
   double least = 0;
   for (std::size_t k = 0; k < keep.size(); ++k) {
     const RungPair& pair = texture.pairs[k];
     if (!keep[k] || pair.fixed || of_level[pair.level] < 2) continue;
     const double per_byte = worth[k].rise / static_cast<double>(std::max<std::uint64_t>(pair.bytes, 1));
-    if (!too_much && worth[k].loads >= asked.loads && per_byte >= asked.rise_per_byte) continue;
-    if (next == kPreview || per_byte < least) next = k, least = per_byte;
+    const bool chosen = worth[k].loads >= asked.loads, closes = chosen && closers[k];
+    if (!too_much && (closes || (chosen && per_byte >= asked.rise_per_byte))) continue;
+    if (next != kPreview && (closes > next_closes || (closes == next_closes && per_byte >= least))) continue;
+    next = k, next_closes = closes, least = per_byte;
   }
   return next;
 }
@@ -272,11 +211,20 @@ void drop_pairs(const TextureWays& texture, const GivenBytes& given, const Asked
                 std::vector<std::uint8_t>& keep) {
   std::vector<std::vector<Hull>> whole;
   for (std::size_t level = 0; level < given.size(); ++level) whole.push_back(hulls_of(texture, keep, level));
-  for (;;) {
-    const std::size_t next = next_to_go(texture, keep, worth_of(texture, keep, given, whole), asked);
-    if (next == kPreview) return;
-    keep[next] = 0;
-  }
+  bool bound = false;
+  const auto drop = [&] {
+    for (;;) {
+      const std::size_t next = next_to_go(texture, keep, gap_closers(texture, keep, given),
+                                          worth_of(texture, keep, given, whole), asked);
+      if (next == kPreview) return;
+      bound = bound || bytes_of(texture, keep) > texture.most_bytes;
+      keep[next] = 0;
+    }
+  };
+  drop();
+  if (!bound) return;
+  swap_pairs(texture, given, keep);
+  drop();
 }
 
 }  // namespace

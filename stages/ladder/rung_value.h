@@ -42,7 +42,11 @@ std::vector<TextureLoad> texture_loads();
 /// that pair goes whose removal raises the loss least for its bytes, while the removal raises the mean over
 /// loads by less than `gain` times the pair's share of TextureWays::whole_bytes, or while less than
 /// `least_share` of the loads choose the pair, or while all pairs take more than TextureWays::most_bytes.
-/// Fixed pairs stay, and one of each level. Pure; same result anywhere.
+/// Fixed pairs stay, and one of each level. A pair stays, too, that enough loads choose and without which two
+/// neighbours, of all that no other pair beats in bytes and loss, would be more than 2.5 times apart in
+/// bytes, when the finer one of them saves what somebody sees. Where all take too much the least worthy of
+/// these go, as the last ones; then such a texture's pairs are swapped (swap_pairs() of rung_gaps.h). Pure;
+/// same result anywhere.
 std::vector<std::vector<std::uint8_t>> pairs_worth_storing(const std::vector<TextureWays>& textures,
                                                            const std::vector<TextureLoad>& loads, double gain,
                                                            double least_share);

@@ -19,8 +19,8 @@
 namespace texmesh {
 namespace {
 
-// Bytes of the rungs below, as parts of the top's.
-constexpr double kByteShares[] = {0.065, 0.16, 0.35};
+// Bytes of the rungs below, as parts of the top's: 2.5 times apart.
+constexpr double kByteShares[] = {0.065, 0.16, 0.4};
 // A quality is taken for a part that it misses by this factor at most, and not when it costs nearly the
 // top's.
 constexpr double kMostOff = 1.6, kMostShare = 0.75;

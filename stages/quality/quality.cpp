@@ -197,10 +197,12 @@ struct RawLosses {
 GroupPictures group_pictures(const GroupCells& group, const GroupCells& smaller,
                              const GroupPictures& measured) {
   const auto follow = [](const Cells& cells, const SmallerSize& below) { return losses_of(cells, &below); };
+  PictureLosses finer =
+      follow(group.finer, {smaller.finer, measured.finer, finer_along(measured.finer, smaller, group)});
+  PictureLosses coded = along_curve(group, smaller, measured, finer);
   return {
-      follow(group.coded, {smaller.coded, measured.coded, along_curve(group, smaller, measured.coded), true}),
-      follow(group.preview, {smaller.preview, measured.preview, measured.preview}),
-      follow(group.finer, {smaller.finer, measured.finer, finer_along(measured.finer, smaller, group)}),
+      follow(group.coded, {smaller.coded, measured.coded, std::move(coded), true}),
+      follow(group.preview, {smaller.preview, measured.preview, measured.preview}), std::move(finer),
       follow(group.coarser, {smaller.coarser, measured.coarser, coarser_along(group, smaller, measured)})};
 }
 

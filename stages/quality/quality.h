@@ -11,7 +11,7 @@
 
 namespace texmesh {
 
-inline constexpr int kQualityVersion = 11;
+inline constexpr int kQualityVersion = 12;
 
 struct QualityOptions {
   int views = 4;

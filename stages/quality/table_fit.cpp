@@ -82,20 +82,28 @@ void take_off(double mips, double exponent, TextureLosses& losses) {
 
 }  // namespace
 
-PictureLosses along_curve(const GroupCells& larger, const GroupCells& smaller, const PictureLosses& losses) {
+PictureLosses along_curve(const GroupCells& larger, const GroupCells& smaller, const GroupPictures& losses,
+                          const PictureLosses& finer) {
   const std::vector<std::size_t> kept = rising_knots(smaller.knots);
-  if (kept.empty()) return losses;
+  if (kept.empty()) return losses.coded;
   const double growth = larger.texel_level - smaller.texel_level;
   PictureLosses out;
   for (const auto list : {&PictureLosses::flip, &PictureLosses::flip_p95, &PictureLosses::dssim}) {
+    const auto before = static_cast<double>((losses.finer.*list)[0]),
+               now = static_cast<double>((finer.*list)[0]);
     TextureLosses read;
     for (const std::size_t k : kept) {
+      const auto coded = static_cast<double>((losses.coded.*list)[k]);
       read.texel_dssim.push_back(static_cast<float>(smaller.knots[k].mean_dssim));
-      read.coded.flip.push_back((losses.*list)[k]);
+      read.coded.flip.push_back(
+          static_cast<float>(std::sqrt(std::max(0.0, coded * coded - before * before))));
     }
+    make_rising(read.coded.flip);
     const GroupCurve curve = curve_of(std::move(read));
-    for (const Knot& knot : larger.knots)
-      (out.*list).push_back(static_cast<float>(curve.coded(knot.mean_dssim, {growth, growth})));
+    for (const Knot& knot : larger.knots) {
+      const double added = curve.coded(knot.mean_dssim, {growth, growth});
+      (out.*list).push_back(static_cast<float>(std::min(1.0, std::sqrt(added * added + now * now))));
+    }
   }
   return out;
 }

@@ -9,9 +9,12 @@ struct GroupPictures {
   PictureLosses coded, preview, finer, coarser;  // as in GroupCells
 };
 
-/// What `losses`, those per knot of `smaller`, would be for the knots of a larger size: along the curve that
-/// clients read, for texels as large on the screen as those of the larger size.
-PictureLosses along_curve(const GroupCells& larger, const GroupCells& smaller, const PictureLosses& losses);
+/// What losses.coded, those per knot of `smaller`, would be for the knots of a larger size: along the curve
+/// that clients read, for texels as large on the screen as those of the larger size. The curve is of what
+/// coding adds to losses.finer[0], the planes without coding; `finer` are theirs at the larger size. Squares
+/// are added: the exponent is not known yet, and 2 is a common one.
+PictureLosses along_curve(const GroupCells& larger, const GroupCells& smaller, const GroupPictures& losses,
+                          const PictureLosses& finer);
 /// The same of coarser mips: where there are no finer planes for the larger size, its mips are as large on
 /// the screen as coarser ones of the smaller size, and lose less by what full size has become coarser.
 PictureLosses coarser_along(const GroupCells& larger, const GroupCells& smaller, const GroupPictures& losses);

@@ -138,6 +138,32 @@ TEST(TextureCodec, OnlyTheFinestBaselineRungHasItsChannelsApart) {
   }
 }
 
+TEST(TextureCodec, TheFinestRungLeavesFewerSamplesOffThanLibjpeg) {
+  Pixels noise{64, 64, 3, {}};
+  testing::Random random{4};
+  for (std::size_t k = 0; k < std::size_t{64} * 64 * 3; ++k)
+    noise.data.push_back(static_cast<std::uint8_t>(random.next()));
+  const auto off = [&](const Bytes& file) {
+    const Pixels got = decode_fragment_file(Codec::kJpeg, file, 64 * 64);
+    std::size_t count = 0;
+    for (std::size_t k = 0; k < got.data.size(); ++k) count += got.data[k] != noise.data[k];
+    return static_cast<double>(count) / static_cast<double>(got.data.size());
+  };
+  PlaneCoding plane;
+  plane.fragment_width_px = plane.fragment_height_px = 64;
+  plane.qualities = {kFinestQuality};
+  const auto coder = make_texture_codec(Codec::kJpeg, plane);
+  const std::array<PixelWindow, 1> sample{window_of(noise)};
+  const std::vector<CodecRung> rungs = coder->train(sample, {});
+  std::vector<Bytes> streams(1);
+  coder->encoder()->encode(sample[0], streams);
+  JpegKind libjpeg;
+  libjpeg.quality = kFinestQuality;
+  libjpeg.rgb = true;
+  EXPECT_LT(off(join_fragment(Codec::kJpeg, rungs[0].table_stream, streams[0])), 0.067);
+  EXPECT_GT(off(JpegCoder(libjpeg).complete(sample[0])), 0.08);
+}
+
 TEST(TextureCodec, JoiningAndSplittingAreInverse) {
   const Pixels pixels = picture(32, 32, 3);
   for (const Codec codec : kCodecs) {

@@ -233,10 +233,14 @@ TEST(Ladder, AFragmentUnlikeTheTrainingOnesStillHasCodes) {
   const Ladder ladder = encode(p, options);
   for (const LadderRung& rung : ladder.planes[0].rungs) {
     const Pixels fragment = crop(p.pixels[0], p.fragments.planes[0], 0);
-    const Pixels direct = rung.quality == kFinestQuality
-                              ? channels_apart(fragment, rung.quality)
-                              : decode_jpeg(encode_jpeg(fragment, rung.quality, Subsampling::k420), 1 << 24);
-    EXPECT_TRUE(decode_baseline(rung, 0).data == direct.data) << rung.quality;
+    const Pixels coded = decode_baseline(rung, 0);
+    if (rung.quality == kFinestQuality) {
+      for (std::size_t k = 0; k < fragment.data.size(); ++k)
+        ASSERT_NEAR(coded.data[k], fragment.data[k], 1) << k;
+      continue;
+    }
+    const Pixels direct = decode_jpeg(encode_jpeg(fragment, rung.quality, Subsampling::k420), 1 << 24);
+    EXPECT_TRUE(coded.data == direct.data) << rung.quality;
   }
 }
 

@@ -87,6 +87,33 @@ TEST(RungValue, TheMoreIsAskedTheFewerStay) {
   EXPECT_EQ(kept(one, 0, 2).size(), 1u);  // more loads than there are
 }
 
+TEST(RungValue, NeighboursAreNoFurtherApartThanTheLadderCanBring) {
+  std::vector<std::pair<std::uint64_t, double>> rungs;
+  for (int k = 0; k < 12; ++k)
+    rungs.push_back({static_cast<std::uint64_t>(500e3 * std::pow(1.4, k)), 0.3 * std::pow(0.8, k)});
+  TextureWays one = texture(rungs);
+  one.pairs.front().fixed = one.pairs.back().fixed = true;
+  const Rungs all = kept(one, 1e9);
+  EXPECT_GE(all.size(), 5u);
+  EXPECT_LE(all.size(), 8u);
+  for (std::size_t k = 1; k < all.size(); ++k)
+    EXPECT_LE(static_cast<double>(rungs[all[k]].first), 2.5 * static_cast<double>(rungs[all[k - 1]].first));
+  // Where the finer ones save what nobody sees, they may be further apart.
+  TextureWays flat = one;
+  for (RungPair& pair : flat.pairs) pair.loss[0] *= 0.02;
+  EXPECT_EQ(kept(flat, 1e9), (Rungs{0, 11}));
+}
+
+TEST(RungValue, WhatClosesAGapGoesWhereAllTakeTooMuch) {
+  TextureWays one = texture({{300'000, 0.3}, {700'000, 0.2}, {1'500'000, 0.1}, {3'000'000, 0.01}});
+  one.pairs.front().fixed = one.pairs.back().fixed = true;
+  EXPECT_EQ(kept(one, 1e9), (Rungs{0, 1, 2, 3}));
+  one.most_bytes = 4'900'000;
+  EXPECT_EQ(kept(one, 1e9).size(), 3u);
+  one.most_bytes = 3'900'000;
+  EXPECT_EQ(kept(one, 1e9), (Rungs{0, 3}));
+}
+
 TEST(RungValue, EveryLevelKeepsAPair) {
   TextureWays one = texture({{500'000, 0.1}, {5'000'000, 0.01}});
   one.texels_across = 100;  // no display wants the mip
