@@ -66,12 +66,19 @@ class NamedFiles {
     return true;
   }
 
+  void add_uri(const std::string& uri) {
+    try {
+      add(decode_uri(uri, model_, ""));
+    } catch (const InputError&) {  // it names nothing beneath the folder
+    }
+  }
+
   void look_at_gltf(const std::vector<std::uint8_t>& json) {
     const nlohmann::ordered_json document = parse_bounded_json(json, model_, 64);
     for (const char* list : {"buffers", "images"})
       for (const auto& item : document.value(list, nlohmann::ordered_json::array())) {
         const std::string uri = item.is_object() ? item.value("uri", "") : "";
-        if (!uri.empty() && !is_data_uri(uri)) add(decode_uri(uri, model_, list));
+        if (!uri.empty() && !is_data_uri(uri)) add_uri(uri);
       }
   }
 

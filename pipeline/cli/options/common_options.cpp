@@ -7,8 +7,7 @@
 namespace texmesh {
 
 Option add_jobs_option(Command& c, int& jobs) {
-  return c.option("-j,--jobs", jobs, "Processors to use; 0 = all that this process may use (default)")
-      .integer_in(0, 1024);
+  return c.option("-j,--jobs", jobs, "Processors to use; 0 = all (default)").integer_in(0, 1024);
 }
 
 RunContext context_of(int jobs) {

@@ -11,8 +11,7 @@ namespace texmesh {
 
 void add_shard_options(Command& c, std::string& shard, std::string& costs) {
   c.option("--shard", shard,
-           "Compile only part I of 0 .. N-1, which take about as long as each other. auto = the part of this "
-           "array task; auto/N where the engine tells no N")
+           "Compile only part I of 0 .. N-1, balanced by cost. auto, auto/N = this array task's part")
       .value_name("I/N");
   c.option(
        "--costs", costs,
