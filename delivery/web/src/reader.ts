@@ -28,6 +28,9 @@ export * from './decide/scale_choice';
 export * from './decide/network_model';
 export * from './decide/simulation';
 export * from './decide/proxy_choice';
+export * from './decide/proxy_steps';
+export * from './decide/memory/gpu_size';
+export { planesWithin, scaleWithin } from './decide/memory/gpu_memory';
 export * from './decide/delivery_plan';
 /** Functions whose results have the same bits everywhere. */
 export * as portable from './decide/portable_math';

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "format/documents/package_writer.h"
 #include "format/rules/proxy_choice.h"
 #include "tests/format/container/package_fixture.h"
@@ -119,6 +121,59 @@ TEST(DeliveryPlan, BehindAProxyTheCoarsestMeshIsCountedToo) {
   EXPECT_GE(coarsest.bytes(), glb.offset + glb.bytes);
   r.scale = 4;
   EXPECT_EQ(plan_delivery(with, r).mesh_bytes, coarsest.mesh_bytes + kMeshBytes);
+}
+
+TEST(DeliveryPlan, ALargerProxyComesOnTheWayOnASlowLink) {
+  PackageReader package = open_package(Proxies::kGood);
+  bool stepped = false;
+  for (const double bytes_s : {3e4, 6e4, 1e5, 2e5, 1e6, 1e8}) {
+    DeliveryRequest r = request(700, bytes_s);
+    const DeliveryPlan with = plan_delivery(package, r);
+    r.proxy_steps = false;
+    const DeliveryPlan without = plan_delivery(package, r);
+    EXPECT_FALSE(without.step);
+    if (bytes_s > 1e7) EXPECT_FALSE(with.step) << "nobody would see it";
+    if (!with.step) continue;
+    stepped = true;
+    EXPECT_EQ(*with.step, 1u);
+    EXPECT_GT(with.step_s, with.first_picture_s);
+    EXPECT_LT(with.step_s, with.mesh_s);
+    EXPECT_EQ(with.step_bytes, proxy_bytes_beyond_start(package.manifest(), 1));
+    if (!without.proxy) EXPECT_GT(with.mesh_s, without.mesh_s);
+  }
+  EXPECT_TRUE(stepped);
+  DeliveryRequest by_hand = request(700, 1e5);
+  by_hand.scale = 4;
+  EXPECT_FALSE(plan_delivery(package, by_hand).step);
+}
+
+TEST(DeliveryPlan, MemoryIsKept) {
+  PackageReader package = open_package(Proxies::kNone);
+  const DeliveryPlan all = plan_delivery(package, request(2000, 1e8));
+  const auto taken = [](const DeliveryPlan& p) { return p.gpu_mesh_bytes + p.gpu_texture_bytes; };
+  EXPECT_GT(all.gpu_texture_bytes, 0u);
+  std::uint64_t before = taken(all);
+  double flip = all.flip;
+  for (const double share : {1.0, 0.8, 0.5, 0.3}) {
+    DeliveryRequest r = request(2000, 1e8);
+    r.memory_bytes = share * static_cast<double>(taken(all));
+    for (const DeliveryPlan& p : {plan_delivery(package, r), plan_budget(package, r, 1'000'000)}) {
+      const bool fits = static_cast<double>(taken(p)) <= r.memory_bytes;
+      EXPECT_EQ(fits, std::ranges::none_of(p.warnings,
+                                           [](const std::string& w) {
+                                             return w.find("bytes on the GPU") != std::string::npos;
+                                           }))
+          << share;
+    }
+    const DeliveryPlan p = plan_delivery(package, r);
+    EXPECT_LE(taken(p), before) << share;
+    EXPECT_GE(p.flip, flip - 1e-9) << share;
+    before = taken(p);
+    flip = p.flip;
+  }
+  DeliveryRequest none = request(2000, 1e8);
+  none.memory_bytes = 1;
+  EXPECT_EQ(plan_delivery(package, none).scale, package.manifest().scales.back().scale);
 }
 
 }  // namespace

@@ -222,6 +222,40 @@ TEST(CliFetch, ReadsAPackageFromAServerAndWritesWhatItGot) {
   EXPECT_EQ(texmesh({"fetch", kGolden}).exit_code, 1);  // a file needs no fetching
 }
 
+TEST(CliPlan, MemoryChoosesScaleAndMips) {
+  const std::vector<std::string> base{"plan", kGolden, "--display", "1000", "--bandwidth", "10MB/s"};
+  const Json all = json_of(base);
+  std::vector<std::string> less = base;
+  less.insert(less.end(), {"--memory", std::to_string(all["gpu_bytes"]["all"].get<int>() / 2)});
+  const Json some = json_of(less);
+  EXPECT_LE(some["gpu_bytes"]["all"].get<int>(), all["gpu_bytes"]["all"].get<int>() / 2);
+  EXPECT_GE(some["flip"], all["flip"]);
+  EXPECT_NE(texmesh(base).output.find("on the GPU: at most "), std::string::npos);
+  std::vector<std::string> bad = base;
+  bad.insert(bad.end(), {"--memory", "much"});
+  EXPECT_EQ(texmesh(bad).exit_code, 2);
+}
+
+TEST(CliFetch, AScaleOfTheStreamComesFromATree) {
+  TemporaryFolder folder;
+  ASSERT_EQ(texmesh({"unpack", kGolden, "-o", folder / "tree"}).exit_code, 0);
+  std::string scale;
+  for (const Json& s : Json::parse(texmesh({"dump", kGolden, "--json"}).output)["scales"])
+    if (s["path"] == "mesh/stream.bin") scale = std::to_string(s["scale"].get<int>());
+  ASSERT_NE(scale, "");
+  httplib::Server server;
+  server.set_mount_point("/", folder.path().string());
+  const int port = server.bind_to_any_port("127.0.0.1");
+  std::thread thread([&] { server.listen_after_bind(); });
+  while (!server.is_running()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  const CommandResult r = texmesh({"fetch", "http://127.0.0.1:" + std::to_string(port) + "/tree/", "--scale",
+                                   scale, "--time", "2", "-o", folder / "got", "--json"});
+  server.stop();
+  thread.join();
+  ASSERT_EQ(r.exit_code, 0) << r.errors;
+  EXPECT_EQ(Json::parse(r.output)["scale"].dump(), scale);
+}
+
 TEST(CliCheck, GatesByItsLimitsAndSaysWhy) {
   const std::vector<std::string> base{"check", kGolden, "--time", "10", "--bandwidth", "1MB/s"};
   auto with = [&](std::vector<std::string> more) {

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
+#include "format/base/errors.h"
 #include "pipeline/render/plane_pixels.h"
 
 namespace texmesh {
@@ -73,6 +76,24 @@ TEST(PlanPictures, ShowsWhatAPlanDecided) {
     fetched +=
         static_cast<std::size_t>(std::ranges::count_if(p.rungs, [](std::int32_t r) { return r >= 0; }));
   EXPECT_EQ(fetched, plan.textures.rungs.size() - plan.textures.skipped);
+}
+
+TEST(PlanPictures, AProxyIsMeasuredAsItIs) {
+  PackageReader package(open_store(std::string(TEXMESH_SOURCE_DIR) + "/tests/golden/v2.0-proxies.texmesh"));
+  DeliveryRequest request;
+  request.displayed_px = 128;
+  const DeliveryPlan plan = plan_budget(package, request, 45056);
+  ASSERT_EQ(plan.proxy, 0u);
+  const ShownPackage shown = shown_by(package, plan, list_of(package, request, plan));
+  EXPECT_EQ(shown.proxy, 0u);
+  const RenderedFlip measured = PlanPictures(package, "", 2, {}).measure(shown, 128);
+  EXPECT_GT(measured.whole, 0);
+  EXPECT_LT(std::abs(measured.whole - plan.flip), 0.1);  // two views for the manifest's many
+  EXPECT_EQ(measured.textures, measured.whole);
+  EXPECT_EQ(measured.geometry, 0);
+  ShownPackage none = shown;
+  none.proxy = 99;
+  EXPECT_THROW(PlanPictures(package, "", 2, {}).measure(none, 128), InputError);
 }
 
 }  // namespace

@@ -145,7 +145,7 @@ class ModelLoad {
     const { context } = this;
     context.enter('tables');
     if (!this.coming_) {
-      await context.reader.prefetchDocuments(context.signal); // with the coarsest scale, by one request
+      await this.showStep_(() => context.reader.prefetchDocuments(context.signal)); // with the coarsest scale, by one request
       await this.startScales_();
     }
     this.textures = await this.coming_!;
@@ -154,11 +154,26 @@ class ModelLoad {
     context.phase = 'refining';
     if (context.options.autoRefine ?? true) void this.refine();
   }
+  /** Proxies are candidates: one is in the scene, and nothing is chosen by hand. */
+  private get choosesProxies_(): boolean {
+    const { override: { scale, rung }, options: { rule = 'flip', fullSize } } = this.context;
+    return scale === undefined && rung === undefined && !fullSize && rule === 'flip' && this.scale_.held;
+  }
   /** The smallest proxy that cannot be told from S_0 in this view; -1: none, or scales and textures are chosen by hand. */
   private serving_(): number {
-    const { override: { scale, rung }, options: { rule = 'flip', fullSize }, view, reader } = this.context;
-    const byHand = scale !== undefined || rung !== undefined || fullSize || rule !== 'flip';
-    return byHand || !this.scale_.held ? -1 : servingProxy(reader.manifest, view.display.heightPx);
+    const { view, reader } = this.context;
+    return this.choosesProxies_ ? servingProxy(reader.manifest, view.display.heightPx) : -1;
+  }
+  /** Where a larger proxy pays on the way to scales: shows the proxy, and does the rest once the proxy's bytes are there. */
+  private async showStep_(rest: () => Promise<unknown>): Promise<void> {
+    const { context, scale_: { proxy } } = this;
+    const step = this.choosesProxies_ && context.options.policy !== 'thesis' ? context.proxyStep() : -1;
+    if (step <= proxy.shown) return void (await rest());
+    let arrive = (): void => undefined;
+    const arrived = new Promise<void>((done) => (arrive = done));
+    const shown = proxy.show(step, arrive).catch((error: unknown) => context.fail(error, 'proxy')); // the smaller one stays
+    await Promise.race([arrived, shown]);
+    await Promise.all([shown, rest()]);
   }
   /** Shows a proxy that is enough. False where scales are needed. */
   private async showServing_(): Promise<boolean> {

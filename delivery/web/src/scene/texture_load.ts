@@ -1,9 +1,9 @@
 import { type FragmentList, type ListOptions, lossesOf } from '../decide/fragment_list';
 import { clamp } from '../decide/numbers';
-import { throughputOf } from '../decide/request_groups';
 import { scaleWithin } from '../decide/memory/gpu_memory';
-import { proxyLoss } from '../decide/proxy_choice';
-import { choiceInTime } from '../decide/scale_choice';
+import { proxyBytes } from '../decide/memory/gpu_size';
+import { proxyBytesBeyondStart, proxyLoss } from '../decide/proxy_choice';
+import { choiceInTime, worthwhile } from '../decide/scale_choice';
 import { type PlaneChoice, pictureFlip } from '../decide/texture_loss';
 import { type VisiblePart, selectScale } from '../decide/viewing';
 import { throwIfAborted } from '../format/errors';
@@ -87,9 +87,10 @@ export class TextureLoad {
   async timedPart(): Promise<void> {
     const { load_: load, planes_: planes, fetching_: fetching } = this;
     const { reader, options, signal } = load;
-    load.beta0 = load.expectedBytesS || options.beta0BytesS || throughputOf(reader.requests, reader.client.latencyS);
+    load.beta0 = load.throughputBytesS();
     if (options.policy === 'thesis') this.inTime_.printed = await import('../decide/thesis/thesis_list');
-    const { scale, planes: chosen } = await this.choice_();
+    const { scale, planes: chosen, flip } = await this.choice_();
+    if (flip !== undefined) await this.showBetterProxy_(flip);
     if (scale !== this.scale_.shown) load.enter('mesh');
     const meshBytes = this.source_.bytesOf(scale);
     const mesh = this.scale_.load(scale);
@@ -109,6 +110,21 @@ export class TextureLoad {
     await Promise.race([meshShown, this.timer_(1)]);
     this.releaseIfBetter_();
     load.emit('deadline', { limit: load.limitS, actual: load.elapsedS(), skipped });
+  }
+  /** Shows a larger proxy first where scales look worse in the time. */
+  private async showBetterProxy_(flip: number): Promise<void> {
+    const { scale_: { proxy, held }, load_: load } = this;
+    const { reader: { manifest, client }, view: { display: { heightPx } }, beta0 } = load;
+    const better = manifest.proxies.map((_, k) => k).filter((k) => {
+      const seconds = client.latencyS + proxyBytesBeyondStart(manifest, k) / beta0;
+      const fits = proxyBytes(manifest.proxies[k]) <= load.memoryBytes;
+      return held && k > proxy.shown && fits && seconds < this.inTime_.leftS() && proxyLoss(manifest, k, heightPx).flip < flip - worthwhile;
+    });
+    try {
+      if (better.length > 0) await proxy.show(better[better.length - 1]);
+    } catch (error) {
+      load.fail(error, 'proxy'); // the smaller one stays
+    }
   }
   /** The scale takes the proxy's place once the scale is predicted to look better. */
   private releaseIfBetter_(): void {
@@ -146,7 +162,7 @@ export class TextureLoad {
     return scaleWithin(manifest.scales, selectScale(manifest, heightPx, part, rule), memoryBytes);
   }
   /** Scale and planes for the display, or those that look best in the time. */
-  private async choice_(): Promise<{ scale: number; planes: PlaneChoice[] }> {
+  private async choice_(): Promise<{ scale: number; planes: PlaneChoice[]; flip?: number }> {
     const { load_: load, planes_: planes, fetching_: fetching } = this;
     const { override, options, limitS, beta0, reader: { client }, view: { display } } = load;
     const wanted = override.scale ?? this.scaleFor_(display.heightPx, display.part);
@@ -163,6 +179,7 @@ export class TextureLoad {
     });
     const steps = choiceInTime(planes.data, {
       displayedPx: display.heightPx, wanted, only: override.scale !== undefined || !!printed, textures: spend, connections: client.options.connections,
+      memoryBytes: load.memoryBytes,
       afterMesh: (scale) => ({ plan: this.inTime_.planOptions(limitAfterMeshS(scale)), linkBytesS: beta0 }),
     });
     for (;;) {
