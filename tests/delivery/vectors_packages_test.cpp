@@ -223,6 +223,7 @@ Json plans(PackageReader& package) {
     r.time_limit_s = 4;
     r.network.link = BandwidthTrace::constant(3e5);
     r.network.rtt_s = 0.01;
+    r.htc.policy = Policy::kGuard;
     r.memory_bytes = memory_bytes;
     out.push_back(plan_json(package, "guard", r));
   }

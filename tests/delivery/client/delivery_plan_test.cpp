@@ -127,7 +127,7 @@ TEST(DeliveryPlan, ALargerProxyComesOnTheWayOnASlowLink) {
   PackageReader package = open_package(Proxies::kGood);
   bool stepped = false;
   for (const double bytes_s : {3e4, 6e4, 1e5, 2e5, 1e6, 1e8}) {
-    DeliveryRequest r = request(700, bytes_s);
+    DeliveryRequest r = request(3000, bytes_s, 8);
     const DeliveryPlan with = plan_delivery(package, r);
     r.proxy_steps = false;
     const DeliveryPlan without = plan_delivery(package, r);
