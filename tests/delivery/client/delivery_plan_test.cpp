@@ -125,23 +125,27 @@ TEST(DeliveryPlan, BehindAProxyTheCoarsestMeshIsCountedToo) {
 
 TEST(DeliveryPlan, ALargerProxyComesOnTheWayOnASlowLink) {
   PackageReader package = open_package(Proxies::kGood);
+  std::string seen;
   bool stepped = false;
-  for (const double bytes_s : {3e4, 6e4, 1e5, 2e5, 1e6, 1e8}) {
-    DeliveryRequest r = request(3000, bytes_s, 8);
-    const DeliveryPlan with = plan_delivery(package, r);
-    r.proxy_steps = false;
-    const DeliveryPlan without = plan_delivery(package, r);
-    EXPECT_FALSE(without.step);
-    if (bytes_s > 1e7) EXPECT_FALSE(with.step) << "nobody would see it";
-    if (!with.step) continue;
-    stepped = true;
-    EXPECT_EQ(*with.step, 1u);
-    EXPECT_GT(with.step_s, with.first_picture_s);
-    EXPECT_LT(with.step_s, with.mesh_s);
-    EXPECT_EQ(with.step_bytes, proxy_bytes_beyond_start(package.manifest(), 1));
-    if (!without.proxy) EXPECT_GT(with.mesh_s, without.mesh_s);
-  }
-  EXPECT_TRUE(stepped);
+  for (const double px : {700.0, 1000.0, 1500.0, 3000.0})
+    for (const double bytes_s : {3e4, 6e4, 1e5, 1.5e5, 2e5, 3e5, 1e6, 1e8}) {
+      DeliveryRequest r = request(px, bytes_s, 4);
+      const DeliveryPlan with = plan_delivery(package, r);
+      r.proxy_steps = false;
+      const DeliveryPlan without = plan_delivery(package, r);
+      EXPECT_FALSE(without.step);
+      if (bytes_s > 1e7) EXPECT_FALSE(with.step) << "nobody would see it";
+      seen += std::to_string(px) + ' ' + std::to_string(bytes_s) + (with.proxy ? " proxy " : " scale ") +
+              std::to_string(with.flip) + ' ' + std::to_string(with.mesh_s) + (with.step ? " step\n" : "\n");
+      if (!with.step) continue;
+      stepped = true;
+      EXPECT_EQ(*with.step, 1u);
+      EXPECT_GT(with.step_s, with.first_picture_s);
+      EXPECT_LT(with.step_s, with.mesh_s);
+      EXPECT_EQ(with.step_bytes, proxy_bytes_beyond_start(package.manifest(), 1));
+      if (!without.proxy && without.scale == with.scale) EXPECT_GT(with.mesh_s, without.mesh_s);
+    }
+  EXPECT_TRUE(stepped) << seen;
   DeliveryRequest by_hand = request(700, 1e5);
   by_hand.scale = 4;
   EXPECT_FALSE(plan_delivery(package, by_hand).step);

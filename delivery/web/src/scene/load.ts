@@ -50,6 +50,7 @@ class ModelLoad {
   private readonly source_: ScaleSource;
   private readonly scale_: ShownScale;
   private coming_?: Promise<TextureLoad>;
+  private part_?: Promise<typeof import('./texture_load') | undefined>;
   private refining_?: Promise<void>;
   private refineAgain_ = false;
   private restoring_?: Promise<void>;
@@ -115,7 +116,9 @@ class ModelLoad {
     context.enter('first-picture');
     if (manifest.proxies.length > 0 && context.override.scale === undefined)
       try {
-        await scales.proxy.show(0);
+        await scales.proxy.show(0, () => {
+          if (servingProxy(manifest, context.view.display.heightPx) < 0) this.part_ = import('./texture_load').catch(() => undefined); // said later
+        });
       } catch (error) {
         context.fail(error, 'proxy'); // scales do, too
       }
@@ -167,7 +170,8 @@ class ModelLoad {
   /** Where a larger proxy pays on the way to scales: shows the proxy, and does the rest once the proxy's bytes are there. */
   private async showStep_(rest: () => Promise<unknown>): Promise<void> {
     const { context, scale_: { proxy } } = this;
-    const step = this.choosesProxies_ && context.options.policy !== 'thesis' ? context.proxyStep() : -1;
+    const part = this.choosesProxies_ && context.options.policy !== 'thesis' ? await this.part_ : undefined;
+    const step = part ? part.stepOf(context) : -1;
     if (step <= proxy.shown) return void (await rest());
     let arrive = (): void => undefined;
     const arrived = new Promise<void>((done) => (arrive = done));

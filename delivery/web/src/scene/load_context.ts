@@ -1,9 +1,4 @@
 import { type Camera, Group, Vector2 } from 'three';
-import { scaleWithin } from '../decide/memory/gpu_memory';
-import { proxyBytes } from '../decide/memory/gpu_size';
-import { proxyStep } from '../decide/proxy_steps';
-import { throughputOf } from '../decide/request_groups';
-import { selectScale } from '../decide/viewing';
 import { InputError, abortError, isAbort, throwIfAborted } from '../format/errors';
 import { nowS } from '../http/clock';
 import type { PackageReader } from '../http/package_reader';
@@ -17,8 +12,6 @@ import { MaterialSet } from './scale_parts';
 export const hysteresis = 1.1;
 /** A longer time limit counts as none: timers and plans end there. */
 const longestS = 1e5;
-/** Proxies on the way to scales are chosen as if the limit were no longer. */
-const longestStepS = 60;
 /** Displayed height where nobody says one, device px. */
 const defaultHeightPx = 1000;
 
@@ -121,19 +114,6 @@ export class LoadContext {
 
   // ---- what is wanted
 
-  /** Throughput that whoever gave the load its turn expects, that options say, or that transfers have shown. */
-  throughputBytesS(): number {
-    const { expectedBytesS, options: { beta0BytesS }, reader: { requests, client } } = this;
-    return expectedBytesS || beta0BytesS || throughputOf(requests, client.latencyS);
-  }
-  /** The larger proxy that pays on the way to scales; -1: none does. */
-  proxyStep(): number {
-    const { reader: { manifest, client }, view: { display: { heightPx, part } }, memoryBytes } = this;
-    const wanted = scaleWithin(manifest.scales, selectScale(manifest, heightPx, part), memoryBytes);
-    const leftS = Math.min(this.limitS, longestStepS) - this.elapsedS();
-    const step = proxyStep(manifest, wanted, heightPx, { bytesS: this.throughputBytesS(), rttS: client.latencyS, leftS });
-    return step >= 0 && proxyBytes(manifest.proxies[step]) <= memoryBytes ? step : -1;
-  }
   /** The override with the nearest scale that the package has. InputError: scale or rung is no whole number from 0 on. */
   snapped({ scale, rung }: Override): Override {
     for (const [name, v] of Object.entries({ scale, rung }))

@@ -1,9 +1,8 @@
 import { type FragmentList, type ListOptions, lossesOf } from '../decide/fragment_list';
 import { clamp } from '../decide/numbers';
 import { scaleWithin } from '../decide/memory/gpu_memory';
-import { proxyBytes } from '../decide/memory/gpu_size';
-import { proxyBytesBeyondStart, proxyLoss } from '../decide/proxy_choice';
-import { choiceInTime, worthwhile } from '../decide/scale_choice';
+import { proxyLoss } from '../decide/proxy_choice';
+import { choiceInTime } from '../decide/scale_choice';
 import { type PlaneChoice, pictureFlip } from '../decide/texture_loss';
 import { type VisiblePart, selectScale } from '../decide/viewing';
 import { throwIfAborted } from '../format/errors';
@@ -13,6 +12,7 @@ import { FetchInTime, composeS } from './fetch_in_time';
 import { FragmentFetch, requestBytes } from './fragment_fetch';
 import { allWishes, bestWishes } from './fragment_wishes';
 import type { LoadContext } from './load_context';
+import { betterThanScales, throughputBytesS } from './proxy/larger_proxies';
 import type { ScaleSource } from './scale_source';
 import { ShownPlanes, readPlaneData } from './shown_planes';
 import type { ShownScale } from './shown_scale';
@@ -32,6 +32,8 @@ const unseen = 1e-3;
 const defaultRefineTo = 0.003;
 /** Refining ends where so many rounds have brought nothing. */
 const mostFruitlessRounds = 3;
+
+export { stepOf } from './proxy/larger_proxies';
 
 /** Reads the documents that decisions about textures are made from. */
 export async function openTextureLoad(load: LoadContext, scale: ShownScale, source: ScaleSource): Promise<TextureLoad> {
@@ -87,7 +89,7 @@ export class TextureLoad {
   async timedPart(): Promise<void> {
     const { load_: load, planes_: planes, fetching_: fetching } = this;
     const { reader, options, signal } = load;
-    load.beta0 = load.throughputBytesS();
+    load.beta0 = throughputBytesS(load);
     if (options.policy === 'thesis') this.inTime_.printed = await import('../decide/thesis/thesis_list');
     const { scale, planes: chosen, flip } = await this.choice_();
     if (flip !== undefined) await this.showBetterProxy_(flip);
@@ -114,17 +116,8 @@ export class TextureLoad {
   /** Shows a larger proxy first where scales look worse in the time. */
   private async showBetterProxy_(flip: number): Promise<void> {
     const { scale_: { proxy, held }, load_: load } = this;
-    const { reader: { manifest, client }, view: { display: { heightPx } }, beta0 } = load;
-    const better = manifest.proxies.map((_, k) => k).filter((k) => {
-      const seconds = client.latencyS + proxyBytesBeyondStart(manifest, k) / beta0;
-      const fits = proxyBytes(manifest.proxies[k]) <= load.memoryBytes;
-      return held && k > proxy.shown && fits && seconds < this.inTime_.leftS() && proxyLoss(manifest, k, heightPx).flip < flip - worthwhile;
-    });
-    try {
-      if (better.length > 0) await proxy.show(better[better.length - 1]);
-    } catch (error) {
-      load.fail(error, 'proxy'); // the smaller one stays
-    }
+    const better = held ? betterThanScales(load, proxy.shown, flip, this.inTime_.leftS()) : -1;
+    if (better >= 0) await proxy.show(better).catch((error: unknown) => load.fail(error, 'proxy')); // the smaller one stays
   }
   /** The scale takes the proxy's place once the scale is predicted to look better. */
   private releaseIfBetter_(): void {
