@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "tests/delivery/package/raw_server.h"
 #include "tests/support/command.h"
 #include "tests/support/schema.h"
 
@@ -239,19 +240,16 @@ TEST(CliPlan, MemoryChoosesScaleAndMips) {
 TEST(CliFetch, AScaleOfTheStreamComesFromATree) {
   TemporaryFolder folder;
   ASSERT_EQ(texmesh({"unpack", kGolden, "-o", folder / "tree"}).exit_code, 0);
-  const std::string scale = "2";
   ASSERT_FALSE(std::filesystem::exists(folder / "tree/mesh/s02.glb"));
-  httplib::Server server;
-  server.set_mount_point("/", folder.path().string());
-  const int port = server.bind_to_any_port("127.0.0.1");
-  std::thread thread([&] { server.listen_after_bind(); });
-  while (!server.is_running()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  const CommandResult r = texmesh({"fetch", "http://127.0.0.1:" + std::to_string(port) + "/tree/", "--scale",
-                                   scale, "--time", "2", "-o", folder / "got", "--json"});
-  server.stop();
-  thread.join();
+  RawServer server([&](const Request& request) {
+    const std::string body = read_text(folder.path().string() + request.path);
+    return Reply{answer(body.empty() ? 404 : 200, "", body)};
+  });
+  const CommandResult r =
+      texmesh({"fetch", server.url("/tree/"), "--scale", "2", "--time", "2", "-o", folder / "got", "--json"});
   ASSERT_EQ(r.exit_code, 0) << r.errors;
-  EXPECT_EQ(Json::parse(r.output)["scale"].dump(), scale);
+  EXPECT_EQ(Json::parse(r.output)["scale"], 2);
+  EXPECT_TRUE(std::filesystem::exists(folder / "got/mesh/s02.glb"));
 }
 
 TEST(CliCheck, GatesByItsLimitsAndSaysWhy) {
