@@ -10,6 +10,7 @@
 #include "format/base/bytes.h"
 #include "format/container/layout.h"
 #include "format/rules/proxy_choice.h"
+#include "format/rules/proxy_steps.h"
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/fetch/fetched.h"
 #include "pipeline/cli/fetch/link_watch.h"
@@ -109,18 +110,35 @@ void choose_in_time(PackageReader& package, DeliveryRequest request, double byte
   f.proxy = plan.proxy;
 }
 
+/// A larger proxy on the way to a scale, where it pays.
+void fetch_step(PackageReader& package, const DeliveryRequest& request, double bytes_s,
+                Clock::time_point start, FetchedFiles& writer, Fetched& f, Moved& moved) {
+  if (request.rule != StepRule::kFlip) return;
+  const std::optional<std::size_t> step =
+      proxy_step(package.manifest(), wanted_scale(package, request), request.displayed_px,
+                 {bytes_s, f.rtt_s, request.time_limit_s - seconds_since(start)});
+  if (!step) return;
+  fetch_proxy(package, static_cast<std::uint32_t>(*step), writer, f, moved);
+  f.step = {static_cast<std::uint32_t>(*step), seconds_since(start)};
+}
+
 /// A proxy instead of a scale: nothing else is needed.
 void end_with_proxy(PackageReader& package, double displayed_px, Clock::time_point start,
                     FetchedFiles& writer, Fetched& f, Moved& moved) {
-  if (*f.proxy > 0) fetch_proxy(package, *f.proxy, writer, f, moved);
+  if (*f.proxy > 0 && !(f.step && f.step->proxy == *f.proxy))
+    fetch_proxy(package, *f.proxy, writer, f, moved);
   f.scale = package.manifest().scales.back().scale;
   f.mesh_s = f.end_s = seconds_since(start);
   f.flip = f.texture_flip = proxy_loss(package.manifest(), *f.proxy, displayed_px).flip;
 }
 
 Bytes fetch_mesh(PackageReader& package, Fetched& f, Moved& moved) {
-  const EntryRef& entry = package.scale_entry(f.scale);
-  if (f.scale != package.manifest().scales.back().scale) {
+  const Manifest& m = package.manifest();
+  EntryRef entry = package.scale_entry(f.scale);
+  // A container gives the prefix that the scale takes. A tree has the stream as one file.
+  if (entry.path == kSplitStreamPath && m.stream && package.store().is_folder())
+    entry = {kSplitStreamPath, m.stream->offset, m.stream->bytes, {}};
+  if (f.scale != m.scales.back().scale) {
     const auto start = Clock::now();
     package.store().prefetch({entry});
     moved.add(entry.bytes, seconds_since(start), f.rtt_s);
@@ -245,6 +263,7 @@ Fetched fetch(const FetchArguments& a, LinkWatch& watch) {
     if (request.rule == StepRule::kFlip) f.proxy = serving_proxy(package.manifest(), request.displayed_px);
   }
   if (!f.proxy) {
+    if (proxies) fetch_step(package, request, bytes_s(), start, writer, f, moved);
     fetch_documents(package, !a.output.empty(), f, moved);
     if (!proxies) f.first_picture_s = seconds_since(start);
     choose_in_time(package, request, bytes_s(), f);

@@ -43,10 +43,15 @@ Json plan_json(PackageReader& package, const DeliveryPlan& p, const FragmentList
          {"bytes",
           {{"bootstrap", p.bootstrap_bytes},
            {"first_picture", p.first_picture_bytes},
+           {"step", p.step_bytes},
            {"mesh", p.mesh_bytes},
            {"tables", p.table_bytes},
            {"texture", p.texture_bytes},
            {"all", p.bytes()}}},
+         {"gpu_bytes",
+          {{"mesh", p.gpu_mesh_bytes},
+           {"textures", p.gpu_texture_bytes},
+           {"all", p.gpu_mesh_bytes + p.gpu_texture_bytes}}},
          {"fragments", p.textures.rungs.size()},
          {"skipped", p.textures.skipped},
          {"mean_quality", p.mean_quality},
@@ -55,6 +60,7 @@ Json plan_json(PackageReader& package, const DeliveryPlan& p, const FragmentList
          {"flip", p.flip},
          {"warnings", p.warnings}};
   if (p.proxy) j["proxy"] = *p.proxy;
+  if (p.step) j["step"] = {{"proxy", *p.step}, {"at_s", p.step_s}};
   return j;
 }
 
@@ -76,7 +82,12 @@ std::string rungs_text(PackageReader& package, const DeliveryPlan& p, const Frag
 }
 
 std::string textures_text(PackageReader& package, const DeliveryPlan& p, const FragmentList& list) {
-  std::string text;
+  std::string text = fmt::format("on the GPU: at most {:.1f} MB of textures, {:.1f} MB of mesh\n",
+                                 static_cast<double>(p.gpu_texture_bytes) / 1e6,
+                                 static_cast<double>(p.gpu_mesh_bytes) / 1e6);
+  if (p.step)
+    text += fmt::format("on the way: {} {} ({} bytes)\n", proxy_path(*p.step), moment(p.step_s),
+                        grouped(p.step_bytes));
   if (!p.textures.rungs.empty())
     text += fmt::format("fragments: {}, {} skipped; quality {:.0f} in the mean, {:.0f} at worst\n",
                         p.textures.rungs.size(), p.textures.skipped, p.mean_quality, p.worst_quality);
@@ -181,13 +192,15 @@ void add_plan_command(Command& app) {
   c.examples(
       "  texmesh plan bust.texmesh --display 800 --time 3 --bandwidth 2Mbit/s --rtt 40\n"
       "  texmesh plan https://host/bust.texmesh --display 400 --time 1.5 --trace monday.csv --rtt 80\n"
-      "  texmesh plan bust.texmesh --display 800 --budget 500kB");
+      "  texmesh plan bust.texmesh --display 800 --budget 500kB\n"
+      "  texmesh plan bust.texmesh --display 2000 --time 5 --bandwidth 20Mbit/s --memory 64MB");
   c.notes(
       "plan plays the transfer over a model of the network and needs nothing but the package. FLIP is "
       "how much a lit picture of that height differs from one of the source, in the mean over the object: 0 "
       "= equal, 1 = as different as can be. It comes from the table that compile measured.\n"
       "A proxy, a small file with an atlas of its own, is shown where it cannot be told from the source at "
-      "that height, or where it looks better than any scale in the time or the bytes.\n"
+      "that height, or where it looks better than any scale in the time or the bytes; on a slow link a larger "
+      "one may be shown on the way to a scale.\n"
       "Exit code: 0, 1 when the package cannot be read, 2 usage, 4 when not even the least fits the budget.");
   c.on_run([args] { return run_plan(*args); });
 }

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -130,6 +131,23 @@ void print_render_text(const RenderArguments& args, const RenderedModel& model, 
       std::cerr << "warning: " << n.code << (n.place.empty() ? "" : ": " + n.place) << ": " << n.text << '\n';
 }
 
+bool wholly_transparent(const RenderedModel& model) {
+  return std::ranges::all_of(model.mesh.triangle_material, [&](std::uint32_t m) {
+    const RenderMaterial& material = model.materials[m];
+    return material.alpha_mode != AlphaMode::kOpaque && material.base_colour.w <= 0;
+  });
+}
+
+void note_empty_picture(const PictureSheet& sheet, RenderedModel& model) {
+  if (std::ranges::any_of(sheet.views, [](const SheetView& v) { return v.covered_px > 0; })) return;
+  add_warning(
+      model.notes, "empty-picture", "",
+      wholly_transparent(model)
+          ? "the picture is empty, because every material of the model is wholly transparent (alpha 0)"
+          : "the picture is empty, because no view sees anything of the model: its surface is "
+            "transparent there, turned away, or smaller than a pixel's samples");
+}
+
 int run_render(const RenderArguments& args) {
   check_usage(args);
   check_output_file(args.output);  // not after the work
@@ -140,6 +158,7 @@ int run_render(const RenderArguments& args) {
       environment_of(args.environment == "white" ? RenderLight::kWhite : RenderLight::kStudio, context);
   const PictureSheet sheet =
       render_sheet(model, environment, args.views, static_cast<std::uint32_t>(args.size_px), context);
+  note_empty_picture(sheet, model);
   write_output_file(args.output, write_png(sheet.pixels));
   if (args.json)
     print_render_json(args, model, sheet);

@@ -6,6 +6,8 @@
 #include "pipeline/extract/glb/scale_file.h"
 #include "pipeline/extract/glb/scale_model.h"
 #include "pipeline/extract/glb/texture_source.h"
+#include "pipeline/import/import.h"
+#include "pipeline/io/file_resolver.h"
 #include "stages/image/decode_image.h"
 
 namespace texmesh {
@@ -97,6 +99,11 @@ RenderedModel package_scale(PackageReader& package, int scale, const RenderedMod
     }
   model.texture_images = all;
   return model;
+}
+
+RenderedModel package_proxy(PackageReader& package, std::uint32_t proxy, const RunContext& context) {
+  NoFiles none;
+  return rendered_model(import_gltf(proxy_path(proxy), package.proxy_glb(proxy), none, {}, context), context);
 }
 
 }  // namespace texmesh

@@ -33,4 +33,8 @@ RenderedModel package_model(PackageReader& package, const PackageChoice& choice,
 RenderedModel package_scale(PackageReader& package, int scale, const RenderedModel& textured,
                             const RunContext& context);
 
+/// A proxy, which has textures of its own. `bounds` are the proxy's. InputError for a proxy that is not
+/// there; FormatError when the package is damaged. Same result for any thread count.
+RenderedModel package_proxy(PackageReader& package, std::uint32_t proxy, const RunContext& context);
+
 }  // namespace texmesh

@@ -54,7 +54,7 @@ std::vector<RenderTexture> source_textures(const std::string& source, const std:
 }  // namespace
 
 ShownPackage shown_by(PackageReader& package, const DeliveryPlan& plan, const FragmentList& list) {
-  ShownPackage shown{plan.scale, {}};
+  ShownPackage shown{plan.scale, {}, plan.proxy};
   std::map<std::uint32_t, std::size_t> place_of;
   for (const PlaneChoice& choice : plan.planes) {
     place_of[choice.plane] = shown.planes.size();
@@ -137,7 +137,20 @@ const std::vector<PlanPictures::Reference>& PlanPictures::references(double disp
   return references_;
 }
 
+RenderedFlip PlanPictures::measure_proxy(std::uint32_t proxy, double displayed_px) {
+  const RenderedModel model = package_proxy(package_, proxy, context_);
+  const RenderScene scene = model.scene();
+  FlipSum whole;
+  for (const Reference& reference : references(displayed_px)) {
+    const Visibility seen = look(scene, reference.place.camera, reference.place.side_px, context_);
+    whole.add(compare_flip(reference.flip,
+                           prepare_flip(shade(scene, seen, model.textures, environment_, context_))));
+  }
+  return {whole.mean(), 0, whole.mean()};
+}
+
 RenderedFlip PlanPictures::measure(const ShownPackage& shown, double displayed_px) {
+  if (shown.proxy) return measure_proxy(*shown.proxy, displayed_px);
   const std::vector<RenderTexture> textures = textures_of(shown);
   const RenderScene finest = scale(0).scene(), coarse = scale(shown.scale).scene();
   FlipSum whole, geometry, coded;

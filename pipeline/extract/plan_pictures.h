@@ -1,6 +1,7 @@
 #pragma once
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,7 +14,7 @@
 namespace texmesh {
 
 /// What a client shows of a package: a scale, and a plane for each texture, with the rung of every fragment
-/// row by row; -1 = as the preview shows it.
+/// row by row; -1 = as the preview shows it. Or a proxy, instead of all that.
 struct ShownPlane {
   PlaneChoice choice;
   std::vector<std::int32_t> rungs;
@@ -21,6 +22,7 @@ struct ShownPlane {
 struct ShownPackage {
   int scale = 0;
   std::vector<ShownPlane> planes;
+  std::optional<std::uint32_t> proxy = {};
 };
 /// `list` is the one that the plan is about.
 ShownPackage shown_by(PackageReader& package, const DeliveryPlan& plan, const FragmentList& list);
@@ -28,8 +30,8 @@ ShownPackage shown_by(PackageReader& package, const DeliveryPlan& plan, const Fr
 /// Mean FLIP of lit pictures against S_0 with the source's texels, over all covered pixels of all views.
 struct RenderedFlip {
   double whole = 0;
-  double geometry = 0;  // of the scale with the source's texels
-  double textures = 0;  // of S_0 with the textures that are shown
+  double geometry = 0;  // of the scale with the source's texels; 0 for a proxy
+  double textures = 0;  // of S_0 with the textures that are shown; for a proxy the same as `whole`
 };
 
 /// Renders what clients would show of a package, and compares it with the source: the truth that quality.json
@@ -41,6 +43,7 @@ class PlanPictures {
   /// has other images.
   PlanPictures(PackageReader& package, const std::string& source, int views, const RunContext& context);
   /// At exactly that displayed height of the object, px.
+  /// InputError for a proxy that is not there.
   RenderedFlip measure(const ShownPackage& shown, double displayed_px);
 
  private:
@@ -56,6 +59,7 @@ class PlanPictures {
   Place place(int view, double displayed_px) const;
   RenderedModel& scale(int scale);
   std::vector<RenderTexture> textures_of(const ShownPackage& shown);
+  RenderedFlip measure_proxy(std::uint32_t proxy, double displayed_px);
   const std::vector<Reference>& references(double displayed_px);
 
   PackageReader& package_;

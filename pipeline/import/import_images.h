@@ -9,7 +9,8 @@
 namespace texmesh {
 
 /// How the file of a finer scale names a picture of its package: "../preview/PPP.jpg". The one name that
-/// leaves the model's folder. Resolvers of packages know it; FileResolver refuses it as any other.
+/// leaves the model's folder. Resolvers of packages and import_file() know it; FileResolver refuses it as any
+/// other.
 bool is_preview_uri(const std::string& uri);
 
 /// Bytes of an image a material refers to: probed and appended to model.images (one entry per uri), index

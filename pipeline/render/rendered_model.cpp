@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <optional>
 #include <set>
 
+#include "format/container/layout.h"
+#include "pipeline/import/import_images.h"
 #include "pipeline/io/file_resolver.h"
 #include "pipeline/io/resource_error.h"
 #include "stages/base/parallel.h"
@@ -26,6 +29,30 @@ std::int32_t texture_of(RenderedModel& model, const TextureRef& reference, Textu
   if (found == all.end()) all.push_back(wanted);
   return index;
 }
+
+/// Files beneath the model's folder; for a mesh of an unpacked package also the package's previews, which
+/// stand beside that folder.
+class ModelFiles : public Resolver {
+ public:
+  explicit ModelFiles(const std::filesystem::path& folder) : folder_(folder), files_(folder) {}
+
+  std::optional<Bytes> read(const std::string& uri, std::uint64_t max_bytes) override {
+    if (!is_preview_uri(uri) || !in_package()) return files_.read(uri, max_bytes);
+    if (!package_) package_.emplace(folder_ / "..");
+    return package_->read(uri.substr(std::string_view("../").size()), max_bytes);
+  }
+  bool failed_for_resources() const {
+    return files_.failed_for_resources() || (package_ && package_->failed_for_resources());
+  }
+
+ private:
+  bool in_package() const {
+    return std::filesystem::is_regular_file(std::filesystem::symlink_status(folder_ / ".." / kManifestPath));
+  }
+  std::filesystem::path folder_;
+  FileResolver files_;
+  std::optional<FileResolver> package_;
+};
 
 void note_what_is_left_out(const std::vector<Material>& materials, Notes& notes) {
   std::set<std::string> names;
@@ -73,7 +100,7 @@ ImportedModel import_file(const std::string& path, const ImportOptions& options,
   const std::filesystem::path file(path);
   const std::vector<std::uint8_t> bytes =
       read_input_file(file, static_cast<std::uint64_t>(options.max_file_bytes));
-  FileResolver resolver(file.parent_path());
+  ModelFiles resolver(file.parent_path());
   try {
     return import_model(file.filename().string(), bytes, resolver, options, context);
   } catch (const InputError& e) {

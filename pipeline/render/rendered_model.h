@@ -41,7 +41,8 @@ RenderedModel untextured_model(Mesh mesh, const std::vector<Material>& materials
 /// an image that does not decode. Same result for any thread count.
 RenderedModel rendered_model(ImportedModel imported, const RunContext& context);
 
-/// A file that compile would take, with the files beneath its folder that the file names. Errors as
+/// A file that compile would take, with the files beneath its folder that the file names. A mesh of an
+/// unpacked package also gets the package's previews ("../preview/PPP.jpg", beside a manifest). Errors as
 /// import_model(); ResourceError where the machine is to blame.
 ImportedModel import_file(const std::string& path, const ImportOptions& options, const RunContext& context);
 

@@ -30,6 +30,7 @@ class PackagePictures {
   /// A model in the frame that `offset` leads to from the package's, by the same camera.
   Picture picture_of(const RenderedModel& model, Vec3d offset, ViewNumber view, std::uint32_t side_px) const;
   const RenderedModel& finest() const { return finest_; }
+  const RunContext& context() const { return context_; }
 
  private:
   RenderCamera camera(Vec3d offset, ViewNumber view) const;

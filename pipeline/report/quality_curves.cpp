@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "format/base/portable_math.h"
+#include "format/rules/proxy_choice.h"
 
 namespace texmesh {
 namespace {
@@ -55,6 +56,15 @@ std::vector<std::uint64_t> fixed_bytes(PackageReader& package) {
   return out;
 }
 
+std::vector<QualityPoint> proxy_points(const Manifest& m, double displayed_px) {
+  std::vector<QualityPoint> out;
+  const std::uint64_t first = std::min(kStartBytes, m.provenance.offset + m.provenance.bytes);
+  for (std::uint32_t k = 0; k < m.proxies.size(); ++k)
+    out.push_back({m.scales.back().scale, k, first + proxy_bytes_beyond_start(m, k),
+                   proxy_loss(m, k, displayed_px).flip});
+  return out;
+}
+
 }  // namespace
 
 std::vector<QualityCurves> quality_curves(PackageReader& package, int budgets) {
@@ -71,12 +81,16 @@ std::vector<QualityCurves> quality_curves(PackageReader& package, int budgets) {
       std::vector<QualityPoint>& points = curves.scales.emplace_back();
       for (std::size_t way = 0; way <= most_rungs(package); ++way) {
         const PerGroup losses = texture_losses(loss, planes, way);
-        points.push_back({m.scales[k].scale, fixed[k] + texture_bytes(package, planes, way),
+        points.push_back({m.scales[k].scale,
+                          {},
+                          fixed[k] + texture_bytes(package, planes, way),
                           picture_flip(package.quality(), displayed_px, m.scales[k].scale, losses)});
         least = std::min(least, points.back().bytes);
         most = std::max(most, points.back().bytes);
       }
     }
+    curves.proxies = proxy_points(m, displayed_px);
+    if (!curves.proxies.empty()) least = std::min(least, curves.proxies.front().bytes);
     DeliveryRequest request;
     request.displayed_px = displayed_px;
     for (int i = 0; i < budgets; ++i) {
@@ -85,7 +99,7 @@ std::vector<QualityCurves> quality_curves(PackageReader& package, int budgets) {
           static_cast<double>(least) * portable::pow(ratio, static_cast<double>(i) / (budgets - 1));
       const DeliveryPlan plan = plan_budget(package, request, static_cast<std::uint64_t>(std::ceil(bytes)));
       if (curves.budgets.empty() || plan.bytes() > curves.budgets.back().bytes)
-        curves.budgets.push_back({plan.scale, plan.bytes(), plan.flip});
+        curves.budgets.push_back({plan.scale, plan.proxy, plan.bytes(), plan.flip});
     }
   }
   return out;

@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "delivery/cpp/client/delivery_plan.h"
@@ -9,7 +10,8 @@ namespace texmesh {
 /// What so many bytes look like: predicted FLIP against S_0 with the source's texels.
 struct QualityPoint {
   int scale = 0;
-  std::uint64_t bytes = 0;  // all that a client reads, from the first request on
+  std::optional<std::uint32_t> proxy = {};  // instead of the scale
+  std::uint64_t bytes = 0;                  // all that a client reads, from the first request on
   double flip = 0;
 };
 
@@ -18,6 +20,7 @@ struct QualityCurves {
   double displayed_px = 0;
   /// Per scale of the manifest: previews alone, then every rung, all planes alike.
   std::vector<std::vector<QualityPoint>> scales;
+  std::vector<QualityPoint> proxies;  // each alone, by rising bytes
   std::vector<QualityPoint> budgets;  // plan_budget() at bytes that rise by equal factors
 };
 

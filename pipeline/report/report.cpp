@@ -64,8 +64,9 @@ Report make_report(PackageReader& package, const ReportOptions& options, const R
   std::string body = header_section(package, report) + "<main>\n" + switch_section(pictures, report);
   if (source)
     body += source_section(pictures, *source, package.manifest().origin - source->mesh.origin, report);
-  body += curve_section(package, report) + bytes_section(package) + fragment_section(package, report) +
-          step_section(package) + proxy_section(package) + method_section(package, report) + "</main>\n";
+  body += curve_section(package, report) + bytes_section(package) + fragment_section(package, report);
+  body += step_section(package) + proxy_section(package, pictures, report);
+  body += method_section(package, report) + "</main>\n";
   const std::string page = html_page(report.title, body);
   report.files.front().bytes.assign(page.begin(), page.end());
   return report;

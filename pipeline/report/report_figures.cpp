@@ -41,6 +41,7 @@ std::string curve_figure(const QualityCurves& curves) {
   };
   for (std::size_t k = 0; k < curves.scales.size(); ++k)
     plot.series.push_back({k == 0 ? "each scale at its rungs" : "", "q", points_of(curves.scales[k])});
+  if (!curves.proxies.empty()) plot.series.push_back({"proxies", "b", points_of(curves.proxies), true});
   plot.series.push_back({"the best choice for a budget", "a", points_of(curves.budgets), true});
   plot.x_low = std::max(plot.x_low * 0.9, 1.0), plot.x_high = std::max(plot.x_high * 1.1, plot.x_low * 1.5);
   return fmt::format("<figure>\n<figcaption><h3>Displayed {:.0f} px high</h3></figcaption>\n",
@@ -50,12 +51,13 @@ std::string curve_figure(const QualityCurves& curves) {
 
 HtmlTable budget_table(const std::vector<QualityCurves>& curves) {
   HtmlTable table;
-  table.caption = "What a budget buys: bytes in all, the scale that is chosen, predicted FLIP.";
-  table.header = {"Displayed, px", "Bytes", "Scale", "FLIP"};
+  table.caption = "What a budget buys: bytes in all, the scale or proxy that is chosen, predicted FLIP.";
+  table.header = {"Displayed, px", "Bytes", "Mesh", "FLIP"};
   for (const QualityCurves& c : curves)
     for (std::size_t i = 0; i < c.budgets.size(); i += 3)
       table.rows.push_back({fmt::format("{:.0f}", c.displayed_px), thin_grouped(c.budgets[i].bytes),
-                            fmt::format("S_{}", c.budgets[i].scale),
+                            c.budgets[i].proxy ? fmt::format("proxy {}", *c.budgets[i].proxy)
+                                               : fmt::format("S_{}", c.budgets[i].scale),
                             fmt::format("{:.3f}", c.budgets[i].flip)});
   return table;
 }
@@ -210,7 +212,32 @@ std::string step_section(PackageReader& package) {
   return html_section("steps", "Step function", step_plot(m) + table.html());
 }
 
-std::string proxy_section(PackageReader& package) {
+namespace {
+
+/// A proxy beside S_0 at the largest measured height, from the front and from another side.
+std::string proxy_figure(PackageReader& package, PackagePictures& pictures, std::uint32_t proxy,
+                         Report& report) {
+  const Manifest& m = package.manifest();
+  const double height = m.proxy_sizes_px.back();
+  const RenderedModel model = package_proxy(package, proxy, pictures.context());
+  std::string out = fmt::format(
+      "<figure>\n<figcaption><h3>Proxy {}, {}</h3>{} triangles. Mean FLIP {:.3f} at {:.0f} px, over all measured "
+      "views.</figcaption>\n",
+      proxy, short_bytes(static_cast<double>(m.proxies[proxy].glb.bytes)),
+      thin_grouped(m.proxies[proxy].triangles), m.proxies[proxy].flip.back(), height);
+  const std::uint32_t side_px = pictures.side_for(height);
+  for (const auto& [view, name] : {std::pair{ViewNumber{0, 1}, "front"}, {ViewNumber{2, 6}, "side"}})
+    out += picture_row({fmt::format("proxy{:02}-{}", proxy, name), fmt::format("S_0, {}", name),
+                        fmt::format("proxy {}, {}", proxy, name),
+                        fmt::format("Proxy {} at {:.0f} px, {}", proxy, height, name)},
+                       pictures.picture(0, view, side_px), pictures.picture_of(model, {}, view, side_px),
+                       report.files);
+  return out + "</figure>\n";
+}
+
+}  // namespace
+
+std::string proxy_section(PackageReader& package, PackagePictures& pictures, Report& report) {
   const Manifest& m = package.manifest();
   if (m.proxies.empty()) return "";
   HtmlTable table;
@@ -228,7 +255,9 @@ std::string proxy_section(PackageReader& package) {
       "<p>A viewer shows the smallest proxy first: after {} of the package. Where a proxy's mean FLIP is at most "
       "{:g} and its 95th percentile at most {:g}, nothing else is read.</p>\n",
       short_bytes(static_cast<double>(start_bytes(m))), kSameFlip, kSameFlipP95);
-  return html_section("proxies", "Proxies", body + table.html());
+  body += table.html();
+  for (std::uint32_t k = 0; k < m.proxies.size(); ++k) body += proxy_figure(package, pictures, k, report);
+  return html_section("proxies", "Proxies", body);
 }
 
 }  // namespace texmesh

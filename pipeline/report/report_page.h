@@ -17,7 +17,7 @@ std::string bytes_section(PackageReader& package);
 std::string fragment_section(PackageReader& package, Report& report);
 std::string step_section(PackageReader& package);
 /// "" for a package without proxies.
-std::string proxy_section(PackageReader& package);
+std::string proxy_section(PackageReader& package, PackagePictures& pictures, Report& report);
 std::string method_section(PackageReader& package, const Report& report);
 
 }  // namespace texmesh

@@ -2,8 +2,10 @@
 
 #include <cmath>
 #include <functional>
+#include <tuple>
 
 #include "delivery/cpp/decide/acuity.h"
+#include "delivery/cpp/decide/gpu_memory.h"
 #include "delivery/cpp/decide/htc_theorem.h"
 #include "delivery/cpp/decide/upgrades.h"
 #include "delivery/cpp/simulate/network_model.h"
@@ -11,6 +13,7 @@
 #include "format/base/portable_math.h"
 #include "format/rules/allocation.h"
 #include "format/rules/proxy_choice.h"
+#include "format/rules/proxy_steps.h"
 
 namespace texmesh {
 namespace {
@@ -267,9 +270,83 @@ Json proxies() {
   return cases;
 }
 
+/// Three proxies before a package of some 5 MB with two scales besides the coarsest.
+Manifest stepped_manifest() {
+  Manifest m;
+  m.proxy_sizes_px = {128, 512};
+  m.proxies = {{{"", 4096, 20000, {}}, 800, 900, 192, {0.25, 0.34}, {0.5, 0.7}},
+               {{"", 260000, 50000, {}}, 2000, 2100, 224, {0.16, 0.24}, {0.3, 0.5}},
+               {{"", 310000, 150000, {}}, 8000, 7000, 416, {0.09, 0.13}, {0.2, 0.3}}};
+  m.index = {{"", 26000, 4000, {}}, 700, {}};
+  m.tables = {{"", 52000, 27000, {}}, 600, {}};
+  m.provenance = {"", 5'000'000, 2800, {}};
+  for (const auto& [scale, bytes, offset] :
+       {std::tuple{0, 300000, 600000}, {5, 160000, 900000}, {16, 90000, 170000}}) {
+    ManifestScale s;
+    s.scale = scale;
+    s.glb = {"", static_cast<std::uint64_t>(offset), static_cast<std::uint64_t>(bytes), {}};
+    m.scales.push_back(s);
+  }
+  return m;
+}
+
+Json proxy_steps() {
+  const Manifest m = stepped_manifest();
+  Json entry{{"name", "on the way to a scale"},
+             {"sizes_px", m.proxy_sizes_px},
+             {"document_bytes", document_bytes(m)}};
+  const auto range = [](const EntryRef& e) { return Json{{"offset", e.offset}, {"bytes", e.bytes}}; };
+  for (const ManifestProxy& p : m.proxies) {
+    entry["proxies"].push_back(range(p.glb));
+    entry["proxies"].back().update({{"flip", p.flip}, {"flip_p95", p.flip_p95}});
+  }
+  for (const ManifestScale& s : m.scales) {
+    entry["scales"].push_back(range(s.glb));
+    entry["scales"].back()["scale"] = s.scale;
+  }
+  entry["index"] = range(m.index), entry["tables"] = range(m.tables),
+  entry["provenance"] = range(m.provenance);
+  for (const int wanted : {0, 5, 16})
+    for (const double px : {100.0, 600.0})
+      for (const double bytes_s : {1e4, 3e4, 1e5, 2.5e5, 1e6, 2e7})
+        for (const double left_s : {0.0, 0.7, 4.5}) {
+          const auto step = proxy_step(m, wanted, px, {bytes_s, 0.04, left_s});
+          entry["wanted_px_bytes_s_left_s_step"].push_back(
+              {wanted, px, bytes_s, left_s, step ? Json(*step) : Json(-1)});
+        }
+  return entry;
+}
+
+/// [width, height, RGBA, blocks of 8 bytes, of 16] and [vertices, triangles, bytes].
+Json gpu_sizes() {
+  Json textures = Json::array(), meshes = Json::array();
+  for (const auto& [w, h] :
+       {std::pair{0u, 0u}, {1u, 1u}, {5u, 3u}, {256u, 256u}, {1000u, 3u}, {4096u, 2048u}})
+    textures.push_back({w, h, gpu_texture_bytes(w, h), gpu_texture_bytes(w, h, GpuTexels::kBlock8),
+                        gpu_texture_bytes(w, h, GpuTexels::kBlock16)});
+  for (const auto& [v, t] : {std::pair{0u, 0u}, {3u, 1u}, {71831u, 98516u}})
+    meshes.push_back({v, t, gpu_mesh_bytes(v, t)});
+  return {{"name", "bytes on the GPU"}, {"textures", textures}, {"meshes", meshes}};
+}
+
 TEST(Vectors, Proxies) {
-  expect_file("proxies.json", "FLIP of proxies by displayed height, and the smallest one that is enough",
-              proxies());
+  Json cases = proxies();
+  cases.push_back(proxy_steps());
+  cases.push_back(gpu_sizes());
+  expect_file("proxies.json",
+              "FLIP of proxies by displayed height, the smallest one that is enough, the larger one on the "
+              "way to a scale; bytes on the GPU",
+              cases);
+}
+TEST(Vectors, StepsAreTakenOnSlowLinksAlone) {
+  const Manifest m = stepped_manifest();
+  EXPECT_TRUE(proxy_step(m, 0, 600, {2.5e5, 0.04, 4.5}));  // 2 Mbit/s
+  EXPECT_FALSE(proxy_step(m, 0, 600, {2e7, 0.04, 4.5}));   // scales are there as soon
+  EXPECT_FALSE(proxy_step(m, 0, 600, {1e4, 0.04, 0.7}));   // no proxy comes in the time
+  EXPECT_FALSE(proxy_step(m, 0, 600, {2.5e5, 0.04, 0}));
+  Manifest same = m;
+  for (ManifestProxy& p : same.proxies) p.flip = {0.2, 0.2};
+  EXPECT_FALSE(proxy_step(same, 0, 600, {2.5e5, 0.04, 4.5}));  // none looks better
 }
 TEST(Vectors, HarmonicTime) {
   expect_file("harmonic-time.json", "calls of a HarmonicTimePlan in order, and what it answers",

@@ -194,9 +194,39 @@ Json lists(PackageReader& package) {
   return out;
 }
 
-/// What is chosen over links that are fast, slow and too slow.
+Json plan_json(PackageReader& package, const char* policy, const DeliveryRequest& r) {
+  const DeliveryPlan p = plan_delivery(package, r);
+  return {{"policy", policy},
+          {"proxy", p.proxy ? Json(*p.proxy) : Json(nullptr)},
+          {"step", p.step ? Json{*p.step, p.step_s} : Json(nullptr)},
+          {"displayed_px", r.displayed_px},
+          {"bytes_s", r.network.link.bytes_s.front()},
+          {"rtt_s", r.network.rtt_s},
+          {"time_limit_s", r.time_limit_s},
+          {"memory_bytes", std::isfinite(r.memory_bytes) ? Json(r.memory_bytes) : Json(nullptr)},
+          {"wanted_scale", wanted_scale(package, r)},
+          {"scale", p.scale},
+          {"planes", planes_json(p.planes)},
+          {"rungs", p.textures.rungs},
+          {"times_s", {p.first_picture_s, p.mesh_s, p.complete_s}},
+          {"bytes", p.bytes()},
+          {"gpu_bytes", {p.gpu_mesh_bytes, p.gpu_texture_bytes}},
+          {"texture_flip", p.texture_flip},
+          {"flip", p.flip}};
+}
+
+/// What is chosen over links that are fast, slow and too slow, and within little memory.
 Json plans(PackageReader& package) {
   Json out = Json::array();
+  for (const double memory_bytes : {5e4, 3e5, 2e6}) {
+    DeliveryRequest r;
+    r.time_limit_s = 4;
+    r.network.link = BandwidthTrace::constant(3e5);
+    r.network.rtt_s = 0.01;
+    r.htc.policy = Policy::kGuard;
+    r.memory_bytes = memory_bytes;
+    out.push_back(plan_json(package, "guard", r));
+  }
   for (const auto& [policy, name] : kPolicies)
     for (const double px : {60.0, 400.0, 1500.0})
       for (const double bytes_s : {4e3, 2e4, 3e5})
@@ -208,21 +238,7 @@ Json plans(PackageReader& package) {
           if (policy == Policy::kThesis) r = as_printed(r);
           r.network.link = BandwidthTrace::constant(bytes_s);
           r.network.rtt_s = bytes_s > 1e5 ? 0.01 : 0.05;
-          const DeliveryPlan p = plan_delivery(package, r);
-          out.push_back({{"policy", name},
-                         {"proxy", p.proxy ? Json(*p.proxy) : Json(nullptr)},
-                         {"displayed_px", px},
-                         {"bytes_s", bytes_s},
-                         {"rtt_s", r.network.rtt_s},
-                         {"time_limit_s", limit_s},
-                         {"wanted_scale", wanted_scale(package, r)},
-                         {"scale", p.scale},
-                         {"planes", planes_json(p.planes)},
-                         {"rungs", p.textures.rungs},
-                         {"times_s", {p.first_picture_s, p.mesh_s, p.complete_s}},
-                         {"bytes", p.bytes()},
-                         {"texture_flip", p.texture_flip},
-                         {"flip", p.flip}});
+          out.push_back(plan_json(package, name, r));
         }
   return out;
 }

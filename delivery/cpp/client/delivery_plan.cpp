@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "delivery/cpp/decide/gpu_memory.h"
 #include "format/rules/proxy_choice.h"
+#include "format/rules/proxy_steps.h"
 
 namespace texmesh {
 namespace {
@@ -79,23 +81,53 @@ DeliveryPlan timed_plan_of_proxy(const Manifest& m, const DeliveryRequest& reque
   return plan;
 }
 
+/// The smallest proxy is shown first, whatever it takes.
+bool proxy_fits(const Manifest& m, const DeliveryRequest& request, std::size_t proxy) {
+  return proxy == 0 || static_cast<double>(gpu_proxy_bytes(m.proxies[proxy])) <= request.memory_bytes;
+}
+
 /// A proxy that no one can tell from S_0, in the time.
 std::optional<DeliveryPlan> serving_plan(const Manifest& m, const DeliveryRequest& request) {
   if (request.scale >= 0 || request.rule != StepRule::kFlip) return std::nullopt;
   const std::optional<std::size_t> proxy = serving_proxy(m, request.displayed_px);
-  if (!proxy) return std::nullopt;
+  if (!proxy || !proxy_fits(m, request, *proxy)) return std::nullopt;
   DeliveryPlan plan = timed_plan_of_proxy(m, request, *proxy);
   if (plan.complete_s > request.time_limit_s) return std::nullopt;
   return plan;
 }
 
-/// What the transfers up to the mesh have shown, bytes/s; where the first request has brought it all, that
-/// one.
+/// What the first request has shown, bytes/s.
+double first_throughput(const DeliveryPlan& plan, double manifest_s, double rtt_s) {
+  return static_cast<double>(plan.bootstrap_bytes) / std::max(1e-9, manifest_s - rtt_s);
+}
+
+/// What the transfers up to the mesh have shown, bytes/s, behind a step those after it; where the first
+/// request has brought it all, that one.
 double shown_throughput(const DeliveryPlan& plan, double manifest_s, double rtt_s) {
-  const double moved = static_cast<double>(plan.first_picture_bytes + plan.mesh_bytes + plan.table_bytes);
-  if (moved == 0) return static_cast<double>(plan.bootstrap_bytes) / std::max(1e-9, manifest_s - rtt_s);
-  const double moved_s = std::isfinite(plan.mesh_s) ? plan.mesh_s - manifest_s - rtt_s : moved;
+  const std::uint64_t first_bytes = plan.step ? 0 : plan.first_picture_bytes;
+  const double moved = static_cast<double>(first_bytes + plan.mesh_bytes + plan.table_bytes);
+  if (moved == 0) return first_throughput(plan, manifest_s, rtt_s);
+  const double from_s = plan.step ? plan.step_s : manifest_s;
+  const double moved_s = std::isfinite(plan.mesh_s) ? plan.mesh_s - from_s - rtt_s : moved;
   return moved / std::max(1e-9, moved_s);
+}
+
+/// The larger proxy that comes before documents and mesh, where one pays.
+void take_step(const Manifest& m, const DeliveryRequest& request, double manifest_s, DeliveryPlan& plan) {
+  const bool by_hand =
+      request.scale >= 0 || request.rule != StepRule::kFlip || request.htc.policy == Policy::kThesis;
+  if (by_hand || !request.proxy_steps || m.proxies.empty() || !std::isfinite(plan.first_picture_s)) return;
+  const double rtt_s = request.network.rtt_s;
+  const double bytes_s =
+      request.beta0_bytes_s > 0 ? request.beta0_bytes_s : first_throughput(plan, manifest_s, rtt_s);
+  const int wanted = scale_at(step_function(m.scales, request.rule), request.displayed_px);
+  const std::optional<std::size_t> step =
+      proxy_step(m, scale_within(m.scales, wanted, request.memory_bytes), request.displayed_px,
+                 {bytes_s, rtt_s, request.time_limit_s - plan.first_picture_s});
+  if (!step || !proxy_fits(m, request, *step)) return;
+  plan.step = static_cast<std::uint32_t>(*step);
+  plan.step_bytes = proxy_bytes_beyond_start(m, *step);
+  plan.step_s = fetched_s(request.network, plan.first_picture_s, plan.step_bytes);
 }
 
 ListOptions list_options(const DeliveryRequest& request, int scale) {
@@ -103,6 +135,33 @@ ListOptions list_options(const DeliveryRequest& request, int scale) {
   options.scale = scale;
   options.displayed_px = request.displayed_px;
   return options;
+}
+
+std::uint64_t mesh_memory(const Manifest& m, int scale) {
+  const auto found = std::ranges::find(m.scales, scale, &ManifestScale::scale);
+  return found == m.scales.end() ? 0 : gpu_mesh_bytes(found->vertices, found->triangles);
+}
+/// What is left for textures beside a scale.
+double texture_memory(const Manifest& m, const DeliveryRequest& request, int scale) {
+  return request.memory_bytes - static_cast<double>(mesh_memory(m, scale));
+}
+void count_memory(PackageReader& package, const DeliveryRequest& request, DeliveryPlan& plan) {
+  const Manifest& m = package.manifest();
+  if (plan.proxy) {
+    const ManifestProxy& p = m.proxies[*plan.proxy];
+    plan.gpu_mesh_bytes = gpu_mesh_bytes(p.vertices, p.triangles);
+    plan.gpu_texture_bytes = gpu_proxy_bytes(p) - plan.gpu_mesh_bytes;
+  } else {
+    plan.gpu_mesh_bytes = mesh_memory(m, plan.scale);
+    plan.gpu_texture_bytes = 0;
+    for (const PlaneChoice& c : plan.planes) {
+      const TextureInfo& t = package.textures()[c.plane];
+      plan.gpu_texture_bytes += gpu_texture_bytes(t.width_px, t.height_px);
+    }
+  }
+  const std::uint64_t all = plan.gpu_mesh_bytes + plan.gpu_texture_bytes;
+  if (static_cast<double>(all) > request.memory_bytes)
+    plan.warnings.push_back("even the least takes " + std::to_string(all) + " bytes on the GPU");
 }
 
 /// What the policy spends its bytes on.
@@ -118,7 +177,9 @@ ChosenTextures choose_textures(TextureLoss& loss, const DeliveryRequest& request
     ThesisTextures printed = thesis_textures(loss, options, bytes);
     return {std::move(printed.planes), std::move(printed.list), printed.options.gamma};
   }
-  TextureBudget budget = texture_for_budget(loss, options, static_cast<std::uint64_t>(bytes));
+  TextureBudget budget =
+      texture_for_budget(loss, options, static_cast<std::uint64_t>(bytes),
+                         texture_memory(loss.package().manifest(), request, options.scale));
   return {std::move(budget.planes), std::move(budget.list), options.gamma};
 }
 
@@ -130,8 +191,10 @@ DeliveryPlan plan_at_scale(TextureLoss& loss, const DeliveryRequest& request, in
   count_fixed_bytes(m, scale, plan);
   const double manifest_s = fetched_s(request.network, 0, plan.bootstrap_bytes);
   plan.first_picture_s = fetched_s(request.network, manifest_s, plan.first_picture_bytes);
-  plan.mesh_s =
-      fetched_s(request.network, manifest_s, plan.first_picture_bytes + plan.mesh_bytes + plan.table_bytes);
+  take_step(m, request, manifest_s, plan);
+  const std::uint64_t fixed = plan.mesh_bytes + plan.table_bytes;
+  plan.mesh_s = plan.step ? fetched_s(request.network, plan.step_s, fixed)
+                          : fetched_s(request.network, manifest_s, plan.first_picture_bytes + fixed);
 
   HtcOptions htc = request.htc;
   htc.time_limit_s = request.time_limit_s - plan.mesh_s;
@@ -215,8 +278,12 @@ DeliveryPlan plan_delivery(PackageReader& package, const DeliveryRequest& reques
   const Manifest& m = package.manifest();
   const bool printed = request.htc.policy == Policy::kThesis, only = request.scale >= 0 || printed;
   if (!printed)
-    if (std::optional<DeliveryPlan> serving = serving_plan(m, request)) return *serving;
-  const int wanted = wanted_scale(package, request);
+    if (std::optional<DeliveryPlan> serving = serving_plan(m, request)) {
+      count_memory(package, request, *serving);
+      return *serving;
+    }
+  const int asked = wanted_scale(package, request);
+  const int wanted = only ? asked : scale_within(m.scales, asked, request.memory_bytes);
   TextureLoss loss(package, request.displayed_px);
   DeliveryPlan best;
   bool first = true;
@@ -232,6 +299,7 @@ DeliveryPlan plan_delivery(PackageReader& package, const DeliveryRequest& reques
   }
   if (first) package.scale_index(wanted);  // says which there are
   for (std::size_t k = 0; k < m.proxies.size() && !only; ++k) {
+    if (!proxy_fits(m, request, k)) continue;
     DeliveryPlan plan = timed_plan_of_proxy(m, request, k);
     const bool needed = best.mesh_s >= request.time_limit_s && plan.mesh_s < best.mesh_s;
     const bool in_time = plan.mesh_s < request.time_limit_s;
@@ -243,22 +311,27 @@ DeliveryPlan plan_delivery(PackageReader& package, const DeliveryRequest& reques
   else if (best.scale != wanted)
     best.warnings.push_back("S_" + std::to_string(wanted) + " would suit the display, but in this time S_" +
                             std::to_string(best.scale) + " leaves more for the texture and looks better");
+  if (wanted != asked)
+    best.warnings.push_back("S_" + std::to_string(asked) + " would take more than half of the memory");
+  count_memory(package, request, best);
   return best;
 }
 
 DeliveryPlan plan_budget(PackageReader& package, const DeliveryRequest& request, std::uint64_t bytes) {
   const Manifest& m = package.manifest();
   const int wanted = wanted_scale(package, request);
+  const int finest = scale_within(m.scales, 0, request.memory_bytes);
   TextureLoss loss(package, request.displayed_px);
   std::optional<DeliveryPlan> best;
   for (const ManifestScale& s : m.scales) {
-    if (request.scale >= 0 && s.scale != wanted) continue;
+    if (request.scale >= 0 ? s.scale != wanted : s.scale < finest) continue;
     DeliveryPlan plan;
     plan.scale = s.scale;
     count_fixed_bytes(m, s.scale, plan);
     const std::uint64_t fixed = plan.bytes();
     const TextureBudget budget =
-        texture_for_budget(loss, list_options(request, s.scale), bytes > fixed ? bytes - fixed : 0);
+        texture_for_budget(loss, list_options(request, s.scale), bytes > fixed ? bytes - fixed : 0,
+                           texture_memory(m, request, s.scale));
     plan.planes = budget.planes;
     plan.texture_bytes = budget.bytes;
     plan.textures.rungs = budget.rungs;
@@ -271,8 +344,9 @@ DeliveryPlan plan_budget(PackageReader& package, const DeliveryRequest& request,
     take_better(std::move(plan), bytes, best);
   }
   for (std::size_t k = 0; k < m.proxies.size() && request.scale < 0; ++k)
-    take_better(plan_of_proxy(m, request.displayed_px, k), bytes, best);
+    if (proxy_fits(m, request, k)) take_better(plan_of_proxy(m, request.displayed_px, k), bytes, best);
   if (!best) package.scale_index(wanted);  // says which there are
+  count_memory(package, request, *best);
   return *best;
 }
 

@@ -1,4 +1,5 @@
 #pragma once
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -20,6 +21,9 @@ struct DeliveryRequest {
   HtcOptions htc;            // policy, order, window ..: its time limit and beta_0 are set from the others
   NetworkOptions network;
   ProbeOptions probe;  // test packets beside the textures
+  /// GPU memory for mesh and textures, see gpu_memory.h. What is least takes its place where nothing fits.
+  double memory_bytes = std::numeric_limits<double>::infinity();
+  bool proxy_steps = true;  // a larger proxy may be shown on the way, see format/rules/proxy_steps.h
 };
 
 /// The request with chapters 4 and 7 as printed: Policy::kThesis, the JND's rule, the next fragment by
@@ -34,6 +38,10 @@ struct DeliveryPlan {
   /// is the coarsest one, mesh_bytes are the proxy's where it is not the first picture, and texture_flip is
   /// flip.
   std::optional<std::uint32_t> proxy;
+  /// The larger proxy that is shown on the way to the scale, and when; it delays all that follows.
+  std::optional<std::uint32_t> step;
+  double step_s = 0;
+  std::uint64_t step_bytes = 0;
   std::vector<PlaneChoice> planes;
   std::uint64_t bootstrap_bytes = 0, first_picture_bytes = 0, mesh_bytes = 0, table_bytes = 0,
                 texture_bytes = 0;
@@ -48,9 +56,12 @@ struct DeliveryPlan {
   double texture_flip = 0;          // what it would be of S_0 with these textures
   PerGroup group_weights{1, 1, 1};  // ListOptions::group_weights of the list that `textures` is about
   double gamma = -1;                // ListOptions::gamma of that list
+  /// On the GPU: vertex and index buffers, and textures with their mip levels as RGBA; most bytes, for a
+  /// proxy of all its parts. The browser keeps the former in main memory, too.
+  std::uint64_t gpu_mesh_bytes = 0, gpu_texture_bytes = 0;
   std::vector<std::string> warnings;
   std::uint64_t bytes() const {
-    return bootstrap_bytes + first_picture_bytes + mesh_bytes + table_bytes + texture_bytes;
+    return bootstrap_bytes + first_picture_bytes + step_bytes + mesh_bytes + table_bytes + texture_bytes;
   }
 };
 
@@ -59,6 +70,8 @@ struct DeliveryPlan {
 /// one gives the better picture in the time. A proxy that cannot be told from S_0 at the displayed height, or
 /// that looks better than what scales give in the time, takes the place of all; not where the request says a
 /// scale, and not the former where it asks for another rule than kFlip.
+/// On a slow link a larger proxy may come before documents and mesh, where proxy_step() says so. A scale and
+/// mips of the textures keep within DeliveryRequest::memory_bytes.
 /// With Policy::kThesis it is as printed: the rule's scale and no other, all textures at full size, the list
 /// whose D_i(Gamma) is T_0 beta_0. Deterministic.
 DeliveryPlan plan_delivery(PackageReader& package, const DeliveryRequest& request);

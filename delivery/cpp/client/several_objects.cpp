@@ -18,6 +18,8 @@ DeliveryRequest request_for(const DeliveryRequest& page, const PageObject& objec
   DeliveryRequest r = page;
   r.displayed_px = object.displayed_px;
   r.scale = object.scale;
+  r.proxy_steps = false;  // the link is shared with the others' first pictures
+  r.memory_bytes = page.memory_bytes * share;
   r.beta0_bytes_s = page.beta0_bytes_s * share;
   r.network.link = part_of(r.network.link, share);
   for (MirrorModel& m : r.network.mirrors) m.rate = part_of(m.rate, share);

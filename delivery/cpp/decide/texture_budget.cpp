@@ -4,6 +4,7 @@
 #include <optional>
 #include <set>
 
+#include "delivery/cpp/decide/gpu_memory.h"
 #include "format/base/portable_math.h"
 #include "format/rules/rate_distortion.h"
 
@@ -122,7 +123,8 @@ TextureBudget texture_for_budget(PackageReader& package, const ListOptions& opti
   return texture_for_budget(loss, options, bytes);
 }
 
-TextureBudget texture_for_budget(TextureLoss& loss, const ListOptions& options, std::uint64_t bytes) {
+TextureBudget texture_for_budget(TextureLoss& loss, const ListOptions& options, std::uint64_t bytes,
+                                 double memory_bytes) {
   PackageReader& package = loss.package();
   TextureBudget best = LevelSearch(loss, options, bytes).find();
   ListOptions weighted = options;
@@ -132,7 +134,11 @@ TextureBudget texture_for_budget(TextureLoss& loss, const ListOptions& options, 
     if (now.flip >= best.flip) break;
     best = std::move(now);
   }
-  return best;
+  std::vector<PlaneChoice> within = planes_within(loss, best.planes, memory_bytes);
+  const bool all_fit = std::ranges::equal(within, best.planes, {}, &PlaneChoice::plane, &PlaneChoice::plane);
+  if (all_fit) return best;
+  weighted.group_weights = best.list.group_weights;
+  return spend_on(loss, std::move(within), weighted, bytes);
 }
 
 }  // namespace texmesh

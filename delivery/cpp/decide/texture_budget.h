@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "delivery/cpp/decide/fragment_list.h"
@@ -26,7 +27,9 @@ struct TextureBudget {
 /// spent, and the bytes are spent again; the better choice stays. FragmentList::group_weights has its
 /// weights.
 TextureBudget texture_for_budget(PackageReader& package, const ListOptions& options, std::uint64_t bytes);
-/// `loss` is for options.displayed_px.
-TextureBudget texture_for_budget(TextureLoss& loss, const ListOptions& options, std::uint64_t bytes);
+/// `loss` is for options.displayed_px. Where the planes take more than `memory_bytes` on the GPU, coarser
+/// mips take their places (planes_within), and the bytes are spent on these.
+TextureBudget texture_for_budget(TextureLoss& loss, const ListOptions& options, std::uint64_t bytes,
+                                 double memory_bytes = std::numeric_limits<double>::infinity());
 
 }  // namespace texmesh

@@ -116,7 +116,7 @@ const TextureLoss::Plane& TextureLoss::plane(std::uint32_t plane) {
   const std::size_t fragments = t.fragment_count();
   out.weights = surface_weights(t);
   out.shown.resize((t.rung_count() + 1) * fragments);
-  const double mip = curve.halved(growth, package_.textures()[plane].mip);
+  const double mip = this->mip(plane);
   const double mean = preview_mean(plane), preview = preview_loss(plane);
   for (const std::uint16_t f : t.order) {
     out.weight += static_cast<double>(out.weights[f]);
@@ -129,6 +129,11 @@ const TextureLoss::Plane& TextureLoss::plane(std::uint32_t plane) {
     }
   }
   return out;
+}
+
+double TextureLoss::mip(std::uint32_t plane) {
+  const GroupCurve& curve = curves_[static_cast<std::size_t>(group_of(plane))];
+  return curve.halved(growth(plane), package_.textures()[plane].mip);
 }
 
 PerGroup TextureLoss::weights(const std::vector<PlaneChoice>& planes) {

@@ -49,6 +49,8 @@ class TextureLoss {
   };
   PlaneGroup group_of(std::uint32_t plane) const;
   const Plane& plane(std::uint32_t plane);
+  /// What a mip loses of the source's texels; 0 for full size.
+  double mip(std::uint32_t plane);
   /// The weight of each group's stored fragments.
   PerGroup weights(const std::vector<PlaneChoice>& planes);
   /// How much larger the plane's texels are at this height than those that the quality table sampled.

@@ -50,9 +50,27 @@ function runThroughput(cases: Json[]): void {
     });
 }
 
+function runProxySteps(c: Json): void {
+  const glb = ({ offset, bytes }: Json) => ({ offset, bytes });
+  const { index, tables, provenance } = c;
+  const scales = c.scales.map((s: Json) => ({ scale: s.scale, glb: glb(s) }));
+  const proxies = c.proxies.map((p: Json) => ({ glb: glb(p), flip: p.flip, flipP95: p.flip_p95 }));
+  const manifest = { proxySizesPx: c.sizes_px, proxies, scales, index, tables, provenance } as unknown as t.Manifest;
+  expect(t.documentBytes(manifest)).toBe(c.document_bytes);
+  for (const [wanted, px, bytesS, leftS, step] of c.wanted_px_bytes_s_left_s_step)
+    expect(t.proxyStep(manifest, wanted, px, { bytesS, rttS: 0.04, leftS }), `${wanted}, ${px}, ${bytesS}, ${leftS}`).toBe(step);
+}
+function runGpuSizes({ textures, meshes }: Json): void {
+  for (const [w, h, ...bytes] of textures)
+    expect((['rgba8', 'block8', 'block16'] as const).map((texels) => t.textureBytes(w, h, undefined, texels)), `${w} x ${h}`).toEqual(bytes);
+  for (const [vertices, triangles, bytes] of meshes) expect(t.scaleBytes({ vertices, triangles })).toBe(bytes);
+}
+
 function runProxies(cases: Json[]): void {
   for (const c of cases)
     it(c.name, () => {
+      if (c.meshes) return runGpuSizes(c);
+      if (c.scales) return runProxySteps(c);
       const glb = ({ offset, bytes }: Json) => ({ offset, bytes });
       const proxies = c.proxies.map((p: Json) => ({ glb: glb(p), flip: p.flip, flipP95: p.flip_p95 }));
       const manifest = { proxySizesPx: c.sizes_px, proxies } as unknown as t.Manifest;
@@ -198,6 +216,7 @@ async function checkPlan(reader: t.PackageReader, v: Json): Promise<void> {
     ...base,
     displayedPx: v.displayed_px,
     timeLimitS: v.time_limit_s,
+    memoryBytes: v.memory_bytes ?? undefined,
     htc: { ...base.htc, policy: v.policy },
     link: { ...base.link, bytesS: v.bytes_s, rttS: v.rtt_s },
   };
@@ -207,6 +226,8 @@ async function checkPlan(reader: t.PackageReader, v: Json): Promise<void> {
   const p = t.planDelivery(data, request)!;
   expect(p.scale).toBe(v.scale);
   expect(p.proxy ?? null).toBe(v.proxy ?? null);
+  expect(p.step ? [p.step.proxy, p.step.atS] : null).toEqual(v.step ?? null);
+  if (v.gpu_bytes) expect([p.gpuBytes.mesh, p.gpuBytes.textures]).toEqual(v.gpu_bytes);
   expect(p.planes.map((c) => [c.base, c.plane])).toEqual(v.planes);
   expectBits(p.rungs, v.rungs, 'rungs');
   expectBits([p.firstPictureS, p.meshS, p.completeS], v.times_s, 'times');

@@ -30,7 +30,10 @@ export interface Live {
   /** Read when the first picture stands. */
   about: About | null;
   phase: string;
+  /** null: none yet; -1: a proxy is shown. */
   scale: number | null;
+  /** -1: a scale is shown. */
+  proxy: number;
   displayedPx: number;
   startedAt: number;
   firstPictureS: number;
@@ -54,7 +57,7 @@ export interface Live {
 
 export function emptyLive(): Live {
   return {
-    manifest: null, textures: [], tables: [], packageBytes: 0, title: '', about: null, phase: 'opening', scale: null, displayedPx: 0, startedAt: 0,
+    manifest: null, textures: [], tables: [], packageBytes: 0, title: '', about: null, phase: 'opening', scale: null, proxy: -1, displayedPx: 0, startedAt: 0,
     firstPictureS: NaN, doneS: NaN, limitS: NaN, predictedFlip: NaN, bytes: 0, expected: 0, requests: 0, shownPlane: new Map(),
     rungs: new Map(), skipped: new Map(), turns: [], transfers: [], problem: '', problems: 0,
   };

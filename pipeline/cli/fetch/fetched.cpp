@@ -73,6 +73,7 @@ Json fetch_document(const Fetched& f, double limit_s) {
          {"texture_flip", f.texture_flip},
          {"flip", f.flip}};
   if (f.proxy) j["proxy"] = *f.proxy;
+  if (f.step) j["step"] = {{"proxy", f.step->proxy}, {"at_s", f.step->at_s}};
   if (f.refined)
     j["refined"] = {{"seconds", f.refined->transfer.end_s}, {"bytes", f.refined->transfer.bytes}};
   return j;
@@ -88,6 +89,7 @@ std::string load_text(const Fetched& f, double limit_s) {
         1000 * f.rtt_s, f.flip);
     return text;
   }
+  if (f.step) text += fmt::format("on the way: {} after {:.3f} s\n", proxy_path(f.step->proxy), f.step->at_s);
   text += fmt::format(
       "{}: first picture and tables after {:.3f} s, S_{} after {:.3f} s ({} bytes); round trip {:.1f} ms\n"
       "textures after {:.3f} s: {:+.2f} % of the limit of {:.2f} s, {} bytes in {} fragments, {} skipped, {} "

@@ -11,6 +11,11 @@ namespace texmesh {
 struct Fetched {
   int scale = 0;
   std::optional<std::uint32_t> proxy;  // shown instead of the scale
+  struct Step {
+    std::uint32_t proxy = 0;
+    double at_s = 0;
+  };
+  std::optional<Step> step;  // a larger proxy on the way
   double rtt_s = 0, first_picture_s = 0, mesh_s = 0, end_s = 0;
   std::uint64_t mesh_bytes = 0, texture_bytes = 0;  // mesh: the documents and the first picture, too
   HttpPlace place;

@@ -171,6 +171,11 @@ void add_delivery_options(Command& c, DeliveryArguments& a, bool package_require
   add_time_option(c, a);
   add_camera_options(c, a);
   add_scale_option(c, a);
+  c.option(
+       "--memory", a.memory,
+       "GPU memory for mesh and textures, 64MB: coarser scales and mips where more would be taken (default: "
+       "any)")
+      .value_name("SIZE");
   add_link_options(c, a);
   add_method_options(c, a);
   c.group("");
@@ -192,6 +197,7 @@ DeliveryRequest delivery_request(const DeliveryArguments& a) {
                                        {"jnd", StepRule::kJnd},
                                        {"error", StepRule::kError},
                                        {"edge", StepRule::kEdge}});
+  if (!a.memory.empty()) r.memory_bytes = static_cast<double>(parse_bytes(a.memory, "--memory"));
   r.time_limit_s = parse_duration(a.time, "--time");
   if (!(r.time_limit_s > 0)) throw UsageError("--time", "", "a time above 0", a.time);
   if (a.needs_link && a.bandwidth.empty() && a.trace.empty())

@@ -12,7 +12,7 @@ class Option;
 /// What plan, check and simulate ask about how a package is looked at and over what.
 struct DeliveryArguments {
   std::string package, time = "5", bandwidth, trace, rtt = "0", policy = "guard", order, estimator = "auto",
-                       rule, beta0;  // order and rule: "" = by the policy
+                       rule, beta0, memory;  // order and rule: "" = by the policy; memory: "" = any
   std::vector<std::string> mirrors;
   double display_px = 1000, distance = 0, loss = 0;  // distance > 0 counts instead of display_px
   Camera camera;

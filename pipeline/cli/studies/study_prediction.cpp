@@ -38,6 +38,7 @@ struct Row {
   std::string package, kind;
   double displayed_px = 0;
   int scale = 0;
+  std::optional<std::uint32_t> proxy;  // instead of a scale
   std::uint64_t bytes = 0;
   double predicted = 0, predicted_geometry = 0, predicted_textures = 0;
   RenderedFlip rendered;
@@ -49,16 +50,9 @@ struct Row {
 Row measured(PackageReader& package, PlanPictures& pictures, const DrawnPlan& drawn, std::string kind) {
   const DeliveryPlan& plan = drawn.plan;
   const double px = drawn.request.displayed_px;
-  Row row{package.store().name(),
-          std::move(kind),
-          px,
-          plan.scale,
-          plan.bytes(),
-          plan.flip,
-          0,
-          plan.texture_flip,
-          {}};
-  row.predicted_geometry = picture_flip(package.quality(), px, plan.scale, {});
+  Row row{package.store().name(), std::move(kind), px, plan.scale,        plan.proxy,
+          plan.bytes(),           plan.flip,       0,  plan.texture_flip, {}};
+  if (!plan.proxy) row.predicted_geometry = picture_flip(package.quality(), px, plan.scale, {});
   row.rendered = pictures.measure(shown_by(package, plan, list_of(package, drawn.request, plan)), px);
   return row;
 }
@@ -68,7 +62,8 @@ ShownPackage read_plan(const std::string& path, PackageReader& package) {
   std::ifstream in(path, std::ios::binary);
   const Json j = Json::parse(in, nullptr, false);
   if (j.is_discarded() || !j.contains("planes")) throw InputError(path, "", "output of plan --json", "other");
-  ShownPackage shown{j.at("scale").get<int>(), {}};
+  ShownPackage shown{j.at("scale").get<int>(), {}, {}};
+  if (j.contains("proxy")) shown.proxy = j.at("proxy").get<std::uint32_t>();
   for (const Json& p : j.at("planes")) {
     ShownPlane plane{{p.at("texture").get<std::uint32_t>(), p.at("plane").get<std::uint32_t>()}, {}};
     for (const Json& rung : p.at("rungs"))
@@ -92,8 +87,8 @@ std::vector<Row> rows_of(const PredictionArguments& args, const std::string& pat
   std::vector<Row> rows;
   if (!args.plan.empty()) {
     const ShownPackage shown = read_plan(args.plan, package);
-    rows.push_back(
-        {path, "plan", args.display_px, shown.scale, 0, 0, 0, 0, pictures.measure(shown, args.display_px)});
+    rows.push_back({path, "plan", args.display_px, shown.scale, shown.proxy, 0, 0, 0, 0,
+                    pictures.measure(shown, args.display_px)});
     return rows;
   }
   for (const std::string& budget : args.budgets)
@@ -149,7 +144,7 @@ double mean_error(const std::vector<Row>& rows) {
 
 Json prediction_json(const std::vector<Row>& rows) {
   Json list = Json::array();
-  for (const Row& r : rows)
+  for (const Row& r : rows) {
     list.push_back({{"package", r.package},
                     {"kind", r.kind},
                     {"displayed_px", r.displayed_px},
@@ -162,6 +157,8 @@ Json prediction_json(const std::vector<Row>& rows) {
                     {"rendered_geometry", r.rendered.geometry},
                     {"rendered_textures", r.rendered.textures},
                     {"error", r.error()}});
+    if (r.proxy) list.back()["proxy"] = *r.proxy;
+  }
   return {{"plans", list}, {"mean_error", mean_error(rows)}, {"rank_correlation", rank_correlation(rows)}};
 }
 
@@ -173,7 +170,8 @@ std::string prediction_text(const std::vector<Row>& rows) {
        {"px", "S", "bytes", "predicted", "scale", "textures", "rendered", "scale", "textures", "error %"})
     table.column(header);
   for (const Row& r : rows)
-    table.row({r.package, r.kind, fixed(r.displayed_px, 0), std::to_string(r.scale), grouped(r.bytes),
+    table.row({r.package, r.kind, fixed(r.displayed_px, 0),
+               r.proxy ? fmt::format("proxy {}", *r.proxy) : std::to_string(r.scale), grouped(r.bytes),
                fixed(r.predicted, 4), fixed(r.predicted_geometry, 4), fixed(r.predicted_textures, 4),
                fixed(r.rendered.whole, 4), fixed(r.rendered.geometry, 4), fixed(r.rendered.textures, 4),
                fixed(100 * r.error(), 1)});

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "format/documents/package_writer.h"
 #include "format/rules/proxy_choice.h"
 #include "tests/format/container/package_fixture.h"
@@ -13,8 +15,9 @@ namespace {
 constexpr std::uint64_t kMeshBytes = 100'000, kSmallBytes = 20'000, kLargeBytes = 60'000;
 
 /// make_package() with meshes of 100 kB and, where asked for, proxies of 20 and 60 kB: FLIP .04 and .02 at
-/// 128 px, .2 and .06 at 512 px, P95 three times that; or 1 everywhere. Scales lose 0, .1 and .2 at 128 px.
-enum class Proxies : std::uint8_t { kNone, kGood, kBad };
+/// 128 px, .2 and .06 at 512 px, P95 three times that; or .9 and .6 everywhere, or 1. Scales lose 0, .1 and
+/// .2 at 128 px.
+enum class Proxies : std::uint8_t { kNone, kGood, kFair, kBad };
 Bytes make_package(Proxies proxies) {
   const Bytes plain = testing::make_package(1, kMeshBytes);
   if (proxies == Proxies::kNone) return plain;
@@ -29,14 +32,21 @@ Bytes make_package(Proxies proxies) {
     entries.push_back({proxy_path(large ? 1 : 0), Bytes(bytes, 7)});
     m.proxies.push_back(
         {{}, 1, 3, 0, {large ? 0.02 : 0.04, large ? 0.06 : 0.2}, {large ? 0.06 : 0.12, large ? 0.18 : 0.6}});
+    if (proxies == Proxies::kFair) {
+      const double flip = large ? 0.6 : 0.9;
+      m.proxies.back().flip = m.proxies.back().flip_p95 = {flip, flip};
+    }
     if (proxies == Proxies::kBad) m.proxies.back().flip = m.proxies.back().flip_p95 = {1, 1};
   }
   return write_package(m, package.textures(), entries);
 }
 PackageReader open_package(Proxies proxies) {
   static const Bytes none = make_package(Proxies::kNone), good = make_package(Proxies::kGood),
-                     bad = make_package(Proxies::kBad);
-  const Bytes& bytes = proxies == Proxies::kNone ? none : proxies == Proxies::kGood ? good : bad;
+                     fair = make_package(Proxies::kFair), bad = make_package(Proxies::kBad);
+  const Bytes& bytes = proxies == Proxies::kNone   ? none
+                       : proxies == Proxies::kGood ? good
+                       : proxies == Proxies::kFair ? fair
+                                                   : bad;
   return PackageReader(open_container(memory_source(bytes)));
 }
 
@@ -119,6 +129,63 @@ TEST(DeliveryPlan, BehindAProxyTheCoarsestMeshIsCountedToo) {
   EXPECT_GE(coarsest.bytes(), glb.offset + glb.bytes);
   r.scale = 4;
   EXPECT_EQ(plan_delivery(with, r).mesh_bytes, coarsest.mesh_bytes + kMeshBytes);
+}
+
+TEST(DeliveryPlan, ALargerProxyComesOnTheWayOnASlowLink) {
+  PackageReader package = open_package(Proxies::kFair);
+  std::string seen;
+  bool stepped = false;
+  for (const double px : {300.0, 512.0})
+    for (const double bytes_s : {3e4, 6e4, 1e5, 1.5e5, 2e5, 3e5, 1e6, 1e8}) {
+      DeliveryRequest r = request(px, bytes_s, 4);
+      const DeliveryPlan with = plan_delivery(package, r);
+      r.proxy_steps = false;
+      const DeliveryPlan without = plan_delivery(package, r);
+      EXPECT_FALSE(without.step);
+      if (bytes_s > 1e7) EXPECT_FALSE(with.step) << "nobody would see it";
+      seen += std::to_string(px) + ' ' + std::to_string(bytes_s) + (with.proxy ? " proxy " : " scale ") +
+              std::to_string(with.flip) + ' ' + std::to_string(with.mesh_s) + (with.step ? " step\n" : "\n");
+      if (!with.step) continue;
+      stepped = true;
+      EXPECT_EQ(*with.step, 1u);
+      EXPECT_GT(with.step_s, with.first_picture_s);
+      EXPECT_LT(with.step_s, with.mesh_s);
+      EXPECT_EQ(with.step_bytes, proxy_bytes_beyond_start(package.manifest(), 1));
+      if (!without.proxy && without.scale == with.scale) EXPECT_GT(with.mesh_s, without.mesh_s);
+    }
+  EXPECT_TRUE(stepped) << seen;
+  DeliveryRequest by_hand = request(700, 1e5);
+  by_hand.scale = 4;
+  EXPECT_FALSE(plan_delivery(package, by_hand).step);
+}
+
+TEST(DeliveryPlan, MemoryIsKept) {
+  PackageReader package = open_package(Proxies::kNone);
+  const DeliveryPlan all = plan_delivery(package, request(2000, 1e8));
+  const auto taken = [](const DeliveryPlan& p) { return p.gpu_mesh_bytes + p.gpu_texture_bytes; };
+  EXPECT_GT(all.gpu_texture_bytes, 0u);
+  std::uint64_t before = taken(all);
+  double flip = all.flip;
+  for (const double share : {1.0, 0.8, 0.5, 0.3}) {
+    DeliveryRequest r = request(2000, 1e8);
+    r.memory_bytes = share * static_cast<double>(taken(all));
+    for (const DeliveryPlan& p : {plan_delivery(package, r), plan_budget(package, r, 1'000'000)}) {
+      const bool fits = static_cast<double>(taken(p)) <= r.memory_bytes;
+      EXPECT_EQ(fits, std::ranges::none_of(p.warnings,
+                                           [](const std::string& w) {
+                                             return w.find("bytes on the GPU") != std::string::npos;
+                                           }))
+          << share;
+    }
+    const DeliveryPlan p = plan_delivery(package, r);
+    EXPECT_LE(taken(p), before) << share;
+    EXPECT_GE(p.flip, flip - 1e-9) << share;
+    before = taken(p);
+    flip = p.flip;
+  }
+  DeliveryRequest none = request(2000, 1e8);
+  none.memory_bytes = 1;
+  EXPECT_EQ(plan_delivery(package, none).scale, package.manifest().scales.back().scale);
 }
 
 }  // namespace

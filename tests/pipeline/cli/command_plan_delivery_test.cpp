@@ -236,6 +236,35 @@ TEST(CliFetch, WhatAServerWithoutRangesHasSentCostsNothingMore) {
   EXPECT_GT(Json::parse(read_text(history))["hosts"][0]["bytes_s"], 1000);
 }
 
+TEST(CliPlan, MemoryChoosesScaleAndMips) {
+  const std::vector<std::string> base{"plan", kGolden, "--display", "1000", "--bandwidth", "10MB/s"};
+  const Json all = json_of(base);
+  std::vector<std::string> less = base;
+  less.insert(less.end(), {"--memory", std::to_string(all["gpu_bytes"]["all"].get<int>() / 2)});
+  const Json some = json_of(less);
+  EXPECT_LE(some["gpu_bytes"]["all"].get<int>(), all["gpu_bytes"]["all"].get<int>() / 2);
+  EXPECT_GE(some["flip"], all["flip"]);
+  EXPECT_NE(texmesh(base).output.find("on the GPU: at most "), std::string::npos);
+  std::vector<std::string> bad = base;
+  bad.insert(bad.end(), {"--memory", "much"});
+  EXPECT_EQ(texmesh(bad).exit_code, 2);
+}
+
+TEST(CliFetch, AScaleOfTheStreamComesFromATree) {
+  TemporaryFolder folder;
+  ASSERT_EQ(texmesh({"unpack", kGolden, "-o", folder / "tree"}).exit_code, 0);
+  ASSERT_FALSE(std::filesystem::exists(folder / "tree/mesh/s02.glb"));
+  RawServer server([&](const Request& request) {
+    const std::string body = read_text(folder.path().string() + request.path);
+    return Reply{answer(body.empty() ? 404 : 200, "", body)};
+  });
+  const CommandResult r =
+      texmesh({"fetch", server.url("/tree/"), "--scale", "2", "--time", "2", "-o", folder / "got", "--json"});
+  ASSERT_EQ(r.exit_code, 0) << r.errors;
+  EXPECT_EQ(Json::parse(r.output)["scale"], 2);
+  EXPECT_TRUE(std::filesystem::exists(folder / "got/mesh/s02.glb"));
+}
+
 TEST(CliCheck, GatesByItsLimitsAndSaysWhy) {
   const std::vector<std::string> base{"check", kGolden, "--time", "10", "--bandwidth", "1MB/s"};
   auto with = [&](std::vector<std::string> more) {

@@ -1,10 +1,12 @@
 // texmesh render as a user runs it: models and packages, sheets, what is printed, exit codes.
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "stages/image/decode_image.h"
 #include "tests/support/command.h"
+#include "tests/support/gltf_builder.h"
 
 namespace texmesh::testing {
 namespace {
@@ -117,6 +119,58 @@ TEST_F(RenderCommand, ExitCodes) {
   EXPECT_EQ(bad.exit_code, 1);
   EXPECT_NE(bad.errors.find("bad.glb"), std::string::npos) << bad.errors;
   EXPECT_TRUE(read_text(out()).empty());  // no failure left anything behind
+}
+
+TEST_F(RenderCommand, AMeshOfAnUnpackedPackageHasItsPreviews) {
+  const std::string tree = folder_ / "tree";
+  ASSERT_EQ(run_command({TEXMESH_BINARY, "unpack", kPackage, "-o", tree}).exit_code, 0);
+  const CommandResult r = render({tree + "/mesh/s00.glb", "-o", out(), "--size", "48", "--json"});
+  ASSERT_EQ(r.exit_code, 0) << r.errors;
+  EXPECT_GE(Json::parse(r.output)["textures"].size(), 1u);
+  EXPECT_EQ(run_command({TEXMESH_BINARY, "doctor", "s00.glb"}, {}, tree + "/mesh").exit_code, 0);
+  // Without a manifest the folder above is none of the model's business.
+  std::filesystem::rename(tree + "/manifest.json", tree + "/other.json");
+  const CommandResult bare = render({tree + "/mesh/s00.glb", "-o", out(), "--size", "48"});
+  EXPECT_EQ(bare.exit_code, 1);
+  EXPECT_NE(bare.errors.find("../preview/"), std::string::npos) << bare.errors;
+  std::filesystem::rename(tree + "/other.json", tree + "/manifest.json");
+  std::filesystem::rename(tree + "/preview", tree + "/elsewhere");
+  std::filesystem::create_directory_symlink(tree + "/elsewhere", tree + "/preview");
+  EXPECT_EQ(render({tree + "/mesh/s00.glb", "-o", out(), "--size", "48"}).exit_code, 1);
+}
+
+TEST_F(RenderCommand, PathsThatLeaveThePackageAreRefused) {
+  const std::string tree = folder_ / "tree";
+  ASSERT_EQ(run_command({TEXMESH_BINARY, "unpack", kPackage, "-o", tree}).exit_code, 0);
+  for (const char* uri : {"../../preview/000.jpg", "../preview/../preview/000.jpg", "../manifest.json",
+                          "../preview/x.jpg", "../poster.jpg", "/etc/hostname"}) {
+    GltfBuilder b = quad();
+    b.json["images"] = {{{"uri", uri}}};
+    b.json["textures"] = {{{"source", 0}}};
+    b.json["materials"] = {{{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}}};
+    b.json["meshes"][0]["primitives"][0]["material"] = 0;
+    const Bytes glb = b.glb();
+    write_text(tree + "/mesh/s99.glb", {glb.begin(), glb.end()});
+    const CommandResult r = render({tree + "/mesh/s99.glb", "-o", out(), "--size", "16"});
+    EXPECT_EQ(r.exit_code, 1) << uri;
+  }
+}
+
+TEST_F(RenderCommand, AnEmptyPictureSaysWhy) {
+  GltfBuilder b = quad();
+  b.json["materials"] = {
+      {{"alphaMode", "BLEND"}, {"pbrMetallicRoughness", {{"baseColorFactor", {1, 1, 1, 0}}}}}};
+  b.json["meshes"][0]["primitives"][0]["material"] = 0;
+  const Bytes glb = b.glb();
+  const std::string model = folder_ / "glass.glb";
+  write_text(model, {glb.begin(), glb.end()});
+  const CommandResult text = render({model, "-o", out(), "--size", "16"});
+  EXPECT_EQ(text.exit_code, 0) << text.errors;
+  EXPECT_NE(text.errors.find("every material of the model is wholly transparent (alpha 0)"),
+            std::string::npos)
+      << text.errors;
+  const Json json = Json::parse(render({model, "-o", out(), "--size", "16", "--json"}).output);
+  EXPECT_EQ(json["notes"].back()["code"], "empty-picture");
 }
 
 }  // namespace

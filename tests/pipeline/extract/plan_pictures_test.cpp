@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "format/base/errors.h"
 #include "pipeline/render/plane_pixels.h"
 
 namespace texmesh {
@@ -73,6 +74,24 @@ TEST(PlanPictures, ShowsWhatAPlanDecided) {
     fetched +=
         static_cast<std::size_t>(std::ranges::count_if(p.rungs, [](std::int32_t r) { return r >= 0; }));
   EXPECT_EQ(fetched, plan.textures.rungs.size() - plan.textures.skipped);
+}
+
+TEST(PlanPictures, AProxyIsMeasuredAsItIs) {
+  PackageReader package(open_store(std::string(TEXMESH_SOURCE_DIR) + "/tests/golden/v2.0-proxies.texmesh"));
+  DeliveryPlan plan;
+  plan.scale = package.manifest().scales.back().scale;
+  plan.proxy = 0;
+  const ShownPackage shown = shown_by(package, plan, {});
+  EXPECT_EQ(shown.proxy, 0u);
+  const RenderedFlip measured = PlanPictures(package, "", 2, {}).measure(shown, 128);
+  EXPECT_GT(measured.whole, 0);
+  const double stated = package.manifest().proxies[0].flip.front();
+  EXPECT_NEAR(measured.whole, stated, 0.1) << "two views for the manifest's many";
+  EXPECT_EQ(measured.textures, measured.whole);
+  EXPECT_EQ(measured.geometry, 0);
+  ShownPackage none = shown;
+  none.proxy = 99;
+  EXPECT_THROW(PlanPictures(package, "", 2, {}).measure(none, 128), InputError);
 }
 
 }  // namespace

@@ -113,8 +113,8 @@ TEST(Report, ProxiesHaveASectionWhereThereAreAny) {
   add_proxies(parts);
   const std::string page = page_of(report_of(parts.build())), without = page_of(report_of(sample()));
   EXPECT_EQ(tag_fault(page), "");
-  for (const char* text :
-       {"id=\"proxies\"", "href=\"#proxies\"", "FLIP at 128 px", "FLIP at 512 px", "0.060, P95 0.200"}) {
+  for (const char* text : {"id=\"proxies\"", "href=\"#proxies\"", "proxy00-front", "proxy01-side",
+                           "FLIP at 128 px", "FLIP at 512 px", "0.060, P95 0.200"}) {
     EXPECT_NE(page.find(text), std::string::npos) << text;
     EXPECT_EQ(without.find(text), std::string::npos) << text;
   }

@@ -1,9 +1,12 @@
 import { startBytes } from '../format/layout';
 import { type Manifest, firstPicture } from '../format/manifest';
 import type { PackageData } from '../format/package_data';
+import { scaleWithin } from './memory/gpu_memory';
+import { proxyBytes, scaleBytes, textureBytes } from './memory/gpu_size';
 import { HtcOptions, defaultHtcOptions, planOptions } from './harmonic_time';
 import { LinkOptions, fetchedS } from './network_model';
 import { beyondStart, proxyBytesBeyondStart, proxyLoss, servingProxy } from './proxy_choice';
+import { proxyStep } from './proxy_steps';
 import { InTime, type InTimeRequest, choiceInTime, worthwhile } from './scale_choice';
 import { everyGroup } from './texture_loss';
 import { StepRule, selectScale } from './viewing';
@@ -22,6 +25,8 @@ export interface DeliveryRequest {
   /** Its time limit, round trip and first throughput are set from the others. */
   htc: HtcOptions;
   link: LinkOptions;
+  /** GPU memory for mesh and textures; left out: any. What is least takes its place where nothing fits. */
+  memoryBytes?: number;
   /** The policy thesis: see asPrinted() of texmesh/thesis. */
   textures?: InTimeRequest['textures'];
 }
@@ -35,6 +40,10 @@ export function defaultDeliveryRequest(): DeliveryRequest {
 export interface DeliveryPlan extends InTime {
   /** The proxy that is shown instead of a scale: nothing else is fetched, and `scale` is the coarsest one. */
   proxy?: number;
+  /** The larger proxy that is shown on the way to the scale. */
+  step?: { proxy: number; atS: number };
+  /** On the GPU: buffers, and textures with their mip levels; most bytes. The buffers are kept in main memory, too. */
+  gpuBytes: { mesh: number; textures: number };
   /** Besides fragments. */
   fixedBytes: number;
   firstPictureS: number;
@@ -51,33 +60,53 @@ export function wantedScale(manifest: Manifest, { scale, displayedPx, rule }: De
 /** Bytes of the first request; provenance.json is the last entry. */
 const firstBytes = ({ provenance }: Manifest): number => Math.min(startBytes, provenance.offset + provenance.bytes);
 
-/** When the first picture is there and, with so many bytes more, the mesh. */
+/** When the first picture is there and, with so many bytes more, the mesh: by the last request, which moved `moved` bytes from `fromS` on. */
 function timesWith(m: Manifest, link: LinkOptions, more: number) {
   const { offset, bytes } = firstPicture(m);
   const firstPictureBytes = beyondStart(offset, offset + bytes);
   const moved = firstPictureBytes + more;
-  const manifestS = fetchedS(link, 0, firstBytes(m));
-  const firstPictureS = fetchedS(link, manifestS, firstPictureBytes);
-  return { moved, manifestS, firstPictureS, meshS: fetchedS(link, manifestS, moved) };
+  const fromS = fetchedS(link, 0, firstBytes(m));
+  const firstPictureS = fetchedS(link, fromS, firstPictureBytes);
+  return { moved, fromS, firstPictureS, meshS: fetchedS(link, fromS, moved), allBytes: firstBytes(m) + moved };
+}
+/** The smallest proxy is shown first, whatever it takes. */
+const proxyFits = (m: Manifest, proxy: number, memoryBytes = Infinity): boolean => proxy === 0 || proxyBytes(m.proxies[proxy]) <= memoryBytes;
+
+/** The larger proxy that comes before documents and mesh. */
+function stepOf(m: Manifest, request: DeliveryRequest, firstPictureS: number, manifestS: number) {
+  const { link, displayedPx, scale, rule, textures, beta0BytesS, timeLimitS, memoryBytes = Infinity } = request;
+  if (scale >= 0 || rule !== 'flip' || textures || m.proxies.length === 0) return undefined;
+  const bytesS = beta0BytesS > 0 ? beta0BytesS : firstBytes(m) / Math.max(1e-9, manifestS - link.rttS);
+  const wanted = scaleWithin(m.scales, selectScale(m, displayedPx, undefined, rule), memoryBytes);
+  const proxy = proxyStep(m, wanted, displayedPx, { bytesS, rttS: link.rttS, leftS: timeLimitS - firstPictureS });
+  return proxy < 0 || !proxyFits(m, proxy, memoryBytes) ? undefined : { proxy, atS: fetchedS(link, firstPictureS, proxyBytesBeyondStart(m, proxy)) };
 }
 /** When the fixed parts of a scale are there. */
-function timesOf(m: Manifest, link: LinkOptions, scale: number) {
+function timesOf(m: Manifest, request: DeliveryRequest, scale: number) {
+  const { link } = request;
   const { scale: coarsest, glb } = m.scales[m.scales.length - 1];
   const mesh = scale === coarsest ? undefined : m.scales.find((s) => s.scale === scale);
   // One range: index, textures.json, quality.json, table streams and tables.
   const tableBytes = beyondStart(m.index.offset, m.tables.offset + m.tables.bytes);
   const materials = m.proxies.length > 0 ? beyondStart(glb.offset, glb.offset + glb.bytes) : 0;
-  return timesWith(m, link, (mesh?.glb.bytes ?? 0) + materials + tableBytes);
+  const fixed = (mesh?.glb.bytes ?? 0) + materials + tableBytes;
+  const times = timesWith(m, link, fixed);
+  const step = stepOf(m, request, times.firstPictureS, times.fromS);
+  if (!step) return { ...times, step };
+  const allBytes = times.allBytes + proxyBytesBeyondStart(m, step.proxy);
+  return { ...times, step, moved: fixed, fromS: step.atS, meshS: fetchedS(link, step.atS, fixed), allBytes };
 }
 /** A proxy alone. */
 function planOfProxy(m: Manifest, { link, displayedPx }: DeliveryRequest, proxy: number): DeliveryPlan {
-  const { moved, firstPictureS, meshS } = timesWith(m, link, proxyBytesBeyondStart(m, proxy));
+  const { allBytes, firstPictureS, meshS } = timesWith(m, link, proxyBytesBeyondStart(m, proxy));
+  const mesh = scaleBytes(m.proxies[proxy]);
   const { flip } = proxyLoss(m, proxy, displayedPx);
   const none = everyGroup(0);
   return {
     scale: m.scales[m.scales.length - 1].scale, proxy, planes: [], rungs: [], bytes: 0, loss: 0, endS: 0, late: false,
     list: { offers: [], fragments: [], groups: [], groupWeights: everyGroup(1), previewLoss: none },
-    flip, textureFlip: flip, fixedBytes: firstBytes(m) + moved, firstPictureS, meshS, completeS: meshS,
+    flip, textureFlip: flip, fixedBytes: allBytes, firstPictureS, meshS, completeS: meshS,
+    gpuBytes: { mesh, textures: proxyBytes(m.proxies[proxy]) - mesh },
   };
 }
 
@@ -89,20 +118,21 @@ export function planDelivery(data: PackageData, request: DeliveryRequest): Deliv
   const { manifest } = data;
   const { link, displayedPx } = request;
   const { scale, rule, timeLimitS } = request;
-  const { textures } = request;
+  const { textures, memoryBytes = Infinity } = request;
   const only = scale >= 0 || !!textures;
   const serving = !only && rule === 'flip' ? servingProxy(manifest, displayedPx) : -1;
-  if (serving >= 0) {
+  if (serving >= 0 && proxyFits(manifest, serving, memoryBytes)) {
     const plan = planOfProxy(manifest, request, serving);
     if (plan.completeS <= timeLimitS) return plan;
   }
-  const wanted = wantedScale(manifest, request);
+  const asked = wantedScale(manifest, request);
+  const wanted = only ? asked : scaleWithin(manifest.scales, asked, memoryBytes);
   const steps = choiceInTime(data, {
-    displayedPx, wanted, only, textures, connections: link.connections,
+    displayedPx, wanted, only, textures, memoryBytes, connections: link.connections,
     afterMesh: (scale) => {
-      const { moved, manifestS, meshS } = timesOf(manifest, link, scale);
+      const { moved, fromS, meshS } = timesOf(manifest, request, scale);
       // Where the first request has brought all, that request shows the throughput.
-      const [shown, shownS] = moved > 0 ? [moved, meshS - manifestS] : [firstBytes(manifest), manifestS];
+      const [shown, shownS] = moved > 0 ? [moved, meshS - fromS] : [firstBytes(manifest), fromS];
       const initialBytesS = request.beta0BytesS > 0 ? request.beta0BytesS : shown / Math.max(1e-9, shownS - link.rttS);
       const throughput = { ...request.htc.throughput, initialBytesS };
       const htc = { ...request.htc, timeLimitS: request.timeLimitS - meshS, rttS: link.rttS, throughput };
@@ -113,10 +143,16 @@ export function planDelivery(data: PackageData, request: DeliveryRequest): Deliv
   while (!at.done) at = steps.next();
   const best = at.value;
   if (!best) return undefined;
-  const { moved, firstPictureS, meshS } = timesOf(manifest, link, best.scale);
-  let plan: DeliveryPlan = { ...best, fixedBytes: firstBytes(manifest) + moved, firstPictureS, meshS, completeS: meshS + best.endS };
+  const { allBytes, firstPictureS, meshS, step } = timesOf(manifest, request, best.scale);
+  const shown = manifest.scales.find((s) => s.scale === best.scale)!;
+  const textureSum = best.planes.reduce((sum, { plane }) => sum + textureBytes(data.textures[plane].widthPx, data.textures[plane].heightPx), 0);
+  let plan: DeliveryPlan = {
+    ...best, step, fixedBytes: allBytes, firstPictureS, meshS, completeS: meshS + best.endS,
+    gpuBytes: { mesh: scaleBytes(shown), textures: textureSum },
+  };
   if (!only)
     manifest.proxies.forEach((_, k) => {
+      if (!proxyFits(manifest, k, memoryBytes)) return;
       const other = planOfProxy(manifest, request, k);
       const needed = plan.meshS >= timeLimitS && other.meshS < plan.meshS;
       if (needed || (other.meshS < timeLimitS && other.flip < plan.flip - worthwhile)) plan = other;

@@ -1,9 +1,11 @@
 import { PackageData } from '../format/package_data';
 import { FragmentList, lossesOf } from './fragment_list';
+import { planesWithin } from './memory/gpu_memory';
+import { scaleBytes } from './memory/gpu_size';
 import type { TimePlanOptions } from './plan_types';
 import { geometryFlip } from './prediction';
 import { Simulated, simulate } from './simulation';
-import { TextureSpending, budgetSteps } from './texture_budget';
+import { TextureSpending, budgetSteps, spendOn } from './texture_budget';
 import { PlaneChoice, TextureLoss, pictureFlip, textureFlip } from './texture_loss';
 
 /** A coarser scale, or a proxy, has to look better by this much of FLIP. */
@@ -29,10 +31,18 @@ export interface InTimeRequest {
   /** Only this one. */
   only?: boolean;
   connections: number;
+  /** GPU memory for mesh and textures; left out: any. */
+  memoryBytes?: number;
   /** When a scale's mesh is chosen: the plan of what comes after it (limit <= 0: no time is left), and the link that is supposed. */
   afterMesh(scale: number): { plan: TimePlanOptions; linkBytesS: number };
   /** Chooses what bytes are spent on in the place of rate and distortion. */
   textures?: (loss: TextureLoss, scale: number, bytes: number) => { planes: PlaneChoice[]; list: FragmentList };
+}
+
+/** Memory for the textures beside a scale. */
+function texturesWithin({ data: { manifest } }: TextureLoss, { memoryBytes = Infinity }: InTimeRequest, scale: number): number {
+  const mesh = manifest.scales.find((s) => s.scale === scale);
+  return memoryBytes - (mesh ? scaleBytes(mesh) : 0);
 }
 
 /** Textures beside one scale; the generator gives the page a turn between its steps. */
@@ -41,7 +51,12 @@ function* texturesInTime(loss: TextureLoss, request: InTimeRequest, scale: numbe
   const { timeLimitS, initialBytesS, rttS } = plan;
   const bytes = Math.max(0, timeLimitS) * initialBytesS;
   let spent: Pick<TextureSpending, 'list' | 'planes'> | undefined = request.textures?.(loss, scale, bytes);
-  if (!spent) for (spent of budgetSteps(loss, { scale }, Math.floor(bytes))) yield;
+  if (!spent) {
+    for (spent of budgetSteps(loss, { scale }, Math.floor(bytes))) yield;
+    const { planes, list: { groupWeights } } = spent!;
+    const within = planesWithin(loss, planes, texturesWithin(loss, request, scale));
+    if (within.some(({ plane }, i) => plane !== planes[i].plane)) spent = spendOn(loss, within, { scale, groupWeights }, Math.floor(bytes));
+  }
   const { list, planes } = spent!;
   const played = simulate(list.offers, plan, { bytesS: linkBytesS, rttS, connections: request.connections });
   yield;

@@ -31,7 +31,8 @@ export interface TextureSpending {
 /** Options that have to be said. */
 export type SpendingOptions = Partial<ListOptions> & Pick<ListOptions, 'scale'>;
 
-function spendOn(loss: TextureLoss, planes: PlaneChoice[], options: SpendingOptions, budget: number): TextureSpending {
+/** Spends the bytes on these planes. */
+export function spendOn(loss: TextureLoss, planes: PlaneChoice[], options: SpendingOptions, budget: number): TextureSpending {
   const { data, displayedPx } = loss;
   const list = fragmentList(data, planes, { ...options, displayedPx }, loss);
   const curves = list.offers.map((f) => ({ bytes: [0, ...f.bytes], loss: f.loss.map((l) => Math.floor(l * lossUnit)) }));

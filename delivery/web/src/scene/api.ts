@@ -145,6 +145,8 @@ export interface LoadEvents {
   request: RequestRecord & { at: number };
   /** The smallest proxy (`scale` is -1 then), or the coarsest mesh with its previews (`proxy` is -1), stands in the scene. */
   'first-picture': { at: number; scale: number; proxy: number; bytes: number };
+  /** A proxy stands in the scene: the first one, a larger one on the way to scales, or one that is enough. */
+  proxy: { at: number; proxy: number; triangles: number };
   /** Another scale stands in the scene. */
   scale: { at: number; scale: number; triangles: number };
   /** A plane was chosen, or a finer one, to show a texture. */

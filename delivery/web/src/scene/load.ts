@@ -1,5 +1,4 @@
 import type { Material, Object3D } from 'three';
-import { servingProxy } from '../decide/proxy_choice';
 import { isAbort, throwIfAborted } from '../format/errors';
 import { firstPicture } from '../format/manifest';
 import type { PackageReader } from '../http/package_reader';
@@ -7,6 +6,7 @@ import type { WorkerPool } from '../worker/pool';
 import type { LoadOptions, LoadState, LoadedModel } from './api';
 import { LoadContext } from './load_context';
 import { gpuBytes } from './memory/gpu_bytes';
+import { ProxyChoice } from './proxy/proxy_choice';
 import { ScaleSource } from './scale_source';
 import { ShownScale } from './shown_scale';
 import type { TextureLoad } from './texture_load';
@@ -49,6 +49,7 @@ class ModelLoad {
   textures?: TextureLoad;
   private readonly source_: ScaleSource;
   private readonly scale_: ShownScale;
+  private readonly proxies_: ProxyChoice;
   private coming_?: Promise<TextureLoad>;
   private refining_?: Promise<void>;
   private refineAgain_ = false;
@@ -69,6 +70,7 @@ class ModelLoad {
       problem: (error, what) => context.fail(error, what),
     });
     this.scale_ = new ShownScale(context, scene, this.source_);
+    this.proxies_ = new ProxyChoice(context, this.scale_.proxy);
     this.firstPicture = this.showFirst_();
     this.done = this.firstPicture.then(() => this.showInTime_()).catch((error: unknown) => this.end_(error));
     this.done.catch(() => undefined);
@@ -115,7 +117,7 @@ class ModelLoad {
     context.enter('first-picture');
     if (manifest.proxies.length > 0 && context.override.scale === undefined)
       try {
-        await scales.proxy.show(0);
+        await this.proxies_.showFirst();
       } catch (error) {
         context.fail(error, 'proxy'); // scales do, too
       }
@@ -135,7 +137,7 @@ class ModelLoad {
   private async showInTime_(): Promise<void> {
     const { context } = this;
     await context.turn();
-    if (await this.showServing_()) {
+    if (await this.proxies_.showServing()) {
       context.emit('deadline', { limit: context.limitS, actual: context.elapsedS(), skipped: 0 });
       return this.rest_();
     }
@@ -145,7 +147,7 @@ class ModelLoad {
     const { context } = this;
     context.enter('tables');
     if (!this.coming_) {
-      await context.reader.prefetchDocuments(context.signal); // with the coarsest scale, by one request
+      await this.proxies_.showStep(() => context.reader.prefetchDocuments(context.signal)); // with the coarsest scale, by one request
       await this.startScales_();
     }
     this.textures = await this.coming_!;
@@ -153,24 +155,6 @@ class ModelLoad {
     await this.textures.timedPart();
     context.phase = 'refining';
     if (context.options.autoRefine ?? true) void this.refine();
-  }
-  /** The smallest proxy that cannot be told from S_0 in this view; -1: none, or scales and textures are chosen by hand. */
-  private serving_(): number {
-    const { override: { scale, rung }, options: { rule = 'flip', fullSize }, view, reader } = this.context;
-    const byHand = scale !== undefined || rung !== undefined || fullSize || rule !== 'flip';
-    return byHand || !this.scale_.held ? -1 : servingProxy(reader.manifest, view.display.heightPx);
-  }
-  /** Shows a proxy that is enough. False where scales are needed. */
-  private async showServing_(): Promise<boolean> {
-    const { scale_: { proxy }, context } = this;
-    const serving = this.serving_();
-    try {
-      if (serving > proxy.shown) await proxy.show(serving);
-      return serving >= 0;
-    } catch (error) {
-      context.fail(error, 'proxy');
-      return false;
-    }
   }
   private rest_(): void {
     const { context } = this;
@@ -228,8 +212,8 @@ class ModelLoad {
   private followByProxies_(): Promise<void> {
     return (this.leaving_ ??= (async () => {
       let enough = true;
-      while (enough && this.serving_() > this.scale_.proxy.shown) enough = await this.showServing_();
-      if (!enough || this.serving_() < 0) await this.showTextures_();
+      while (enough && this.proxies_.serving() > this.scale_.proxy.shown) enough = await this.proxies_.showServing();
+      if (!enough || this.proxies_.serving() < 0) await this.showTextures_();
     })()
       .catch((error: unknown) => this.context.fail(error, 'scales behind a proxy'))
       .finally(() => (this.leaving_ = undefined)));

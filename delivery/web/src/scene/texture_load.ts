@@ -1,6 +1,5 @@
 import { type FragmentList, type ListOptions, lossesOf } from '../decide/fragment_list';
 import { clamp } from '../decide/numbers';
-import { throughputOf } from '../decide/request_groups';
 import { scaleWithin } from '../decide/memory/gpu_memory';
 import { proxyLoss } from '../decide/proxy_choice';
 import { choiceInTime } from '../decide/scale_choice';
@@ -13,6 +12,7 @@ import { FetchInTime, composeS } from './fetch_in_time';
 import { FragmentFetch, requestBytes } from './fragment_fetch';
 import { allWishes, bestWishes } from './fragment_wishes';
 import type { LoadContext } from './load_context';
+import { betterThanScales, throughputBytesS } from './proxy/larger_proxies';
 import type { ScaleSource } from './scale_source';
 import { ShownPlanes, readPlaneData } from './shown_planes';
 import type { ShownScale } from './shown_scale';
@@ -32,6 +32,8 @@ const unseen = 1e-3;
 const defaultRefineTo = 0.003;
 /** Refining ends where so many rounds have brought nothing. */
 const mostFruitlessRounds = 3;
+
+export { stepOf } from './proxy/larger_proxies';
 
 /** Reads the documents that decisions about textures are made from. */
 export async function openTextureLoad(load: LoadContext, scale: ShownScale, source: ScaleSource): Promise<TextureLoad> {
@@ -87,9 +89,10 @@ export class TextureLoad {
   async timedPart(): Promise<void> {
     const { load_: load, planes_: planes, fetching_: fetching } = this;
     const { reader, options, signal } = load;
-    load.beta0 = load.expectedBytesS || options.beta0BytesS || throughputOf(reader.requests, reader.client.latencyS);
+    load.beta0 = throughputBytesS(load);
     if (options.policy === 'thesis') this.inTime_.printed = await import('../decide/thesis/thesis_list');
-    const { scale, planes: chosen } = await this.choice_();
+    const { scale, planes: chosen, flip } = await this.choice_();
+    if (flip !== undefined) await this.showBetterProxy_(flip);
     if (scale !== this.scale_.shown) load.enter('mesh');
     const meshBytes = this.source_.bytesOf(scale);
     const mesh = this.scale_.load(scale);
@@ -109,6 +112,12 @@ export class TextureLoad {
     await Promise.race([meshShown, this.timer_(1)]);
     this.releaseIfBetter_();
     load.emit('deadline', { limit: load.limitS, actual: load.elapsedS(), skipped });
+  }
+  /** Shows a larger proxy first where scales look worse in the time. */
+  private async showBetterProxy_(flip: number): Promise<void> {
+    const { scale_: { proxy, held }, load_: load } = this;
+    const better = held ? betterThanScales(load, proxy.shown, flip, this.inTime_.leftS()) : -1;
+    if (better >= 0) await proxy.show(better).catch((error: unknown) => load.fail(error, 'proxy')); // the smaller one stays
   }
   /** The scale takes the proxy's place once the scale is predicted to look better. */
   private releaseIfBetter_(): void {
@@ -146,7 +155,7 @@ export class TextureLoad {
     return scaleWithin(manifest.scales, selectScale(manifest, heightPx, part, rule), memoryBytes);
   }
   /** Scale and planes for the display, or those that look best in the time. */
-  private async choice_(): Promise<{ scale: number; planes: PlaneChoice[] }> {
+  private async choice_(): Promise<{ scale: number; planes: PlaneChoice[]; flip?: number }> {
     const { load_: load, planes_: planes, fetching_: fetching } = this;
     const { override, options, limitS, beta0, reader: { client }, view: { display } } = load;
     const wanted = override.scale ?? this.scaleFor_(display.heightPx, display.part);
@@ -163,6 +172,7 @@ export class TextureLoad {
     });
     const steps = choiceInTime(planes.data, {
       displayedPx: display.heightPx, wanted, only: override.scale !== undefined || !!printed, textures: spend, connections: client.options.connections,
+      memoryBytes: load.memoryBytes,
       afterMesh: (scale) => ({ plan: this.inTime_.planOptions(limitAfterMeshS(scale)), linkBytesS: beta0 }),
     });
     for (;;) {

@@ -1,5 +1,6 @@
 import { describe, expect, it } from 'vitest';
-import { defaultDeliveryRequest, planDelivery } from '../../src/decide/delivery_plan';
+import { type DeliveryPlan, defaultDeliveryRequest, planDelivery } from '../../src/decide/delivery_plan';
+import type { PackageData } from '../../src/format/package_data';
 import { setUp } from '../support/transferring';
 
 describe('the scale', () => {
@@ -14,5 +15,43 @@ describe('the scale', () => {
     expect(at(1e-3)).toMatchObject({ scale: coarsest, late: true });
     expect(at(1e-3, 0)).toMatchObject({ scale: 0, late: true }); // as it was asked for
     expect(at(1e3, 98)).toBeUndefined();
+  });
+});
+
+describe('memory', () => {
+  it('is kept by coarser scales and mips, and nothing is worse for more of it', async () => {
+    const { data } = await setUp();
+    const at = (memoryBytes?: number) => planDelivery(data, { ...defaultDeliveryRequest(), timeLimitS: 100, memoryBytes })!;
+    const taken = ({ gpuBytes: { mesh, textures } }: DeliveryPlan): number => mesh + textures;
+    const all = at();
+    let before = all;
+    for (const share of [1, 0.7, 0.4]) {
+      const now = at(share * taken(all));
+      expect(taken(now)).toBeLessThanOrEqual(share * taken(all));
+      expect(now.flip).toBeGreaterThanOrEqual(before.flip - 1e-9);
+      before = now;
+    }
+    expect(at(1).scale).toBe(data.manifest.scales.at(-1)!.scale);
+  });
+});
+
+describe('a larger proxy on the way', () => {
+  const glb = (offset: number, bytes: number) => ({ path: '', offset, bytes, sha256: new Uint8Array(32) });
+  const proxy = (offset: number, bytes: number, flip: number) => ({ glb: glb(offset, bytes), triangles: 1, vertices: 3, texturePx: 0, flip: [flip], flipP95: [1] });
+  it('comes where documents take long, delays what follows, and is nobody\'s choice by hand', async () => {
+    const { data } = await setUp();
+    // Tables behind a megabyte: scales come late.
+    const manifest = { ...data.manifest, proxySizesPx: [1000], proxies: [proxy(3000, 20000, 0.9), proxy(100000, 50000, 0.5)], tables: { ...data.manifest.tables, offset: 1e6 } };
+    const ask = { ...defaultDeliveryRequest(), displayedPx: 1000, timeLimitS: 20, link: { bytesS: 1e5, rttS: 0.04, connections: 6 } };
+    const plan = planDelivery({ ...data, manifest } as PackageData, ask)!;
+    expect(plan.proxy).toBeUndefined();
+    expect(plan.step?.proxy).toBe(1);
+    expect(plan.step!.atS).toBeGreaterThan(plan.firstPictureS);
+    expect(plan.step!.atS).toBeLessThan(plan.meshS);
+    expect(planDelivery({ ...data, manifest } as PackageData, { ...ask, scale: 0 })!.step).toBeUndefined();
+    const one = { ...manifest, proxies: manifest.proxies.slice(0, 1) };
+    const without = planDelivery({ ...data, manifest: one } as PackageData, ask)!;
+    expect(without.step).toBeUndefined();
+    expect(plan.meshS).toBeCloseTo(without.meshS + 0.04 + 0.5, 6);
   });
 });

@@ -3,7 +3,7 @@ import * as format from '../format';
 import type { Live } from '../live';
 
 const kFigures = [
-  ['scale', 'scale shown'], ['size', 'displayed height'], ['bytes', 'received'], ['first', 'first picture'], ['time', 'complete after'],
+  ['scale', 'mesh shown'], ['size', 'displayed height'], ['bytes', 'received'], ['first', 'first picture'], ['time', 'complete after'],
   ['flip', 'predicted FLIP'],
 ] as const;
 type Figure = (typeof kFigures)[number][0];
@@ -24,8 +24,8 @@ export class Figures {
   }
 
   show(l: Live): void {
-    const scale = l.manifest?.scales.find((s) => s.scale === l.scale);
-    this.set('scale', l.scale === null ? '–' : `S${l.scale}`, scale ? `${format.short(scale.triangles)} tri` : '');
+    const shown = l.proxy >= 0 ? l.manifest?.proxies[l.proxy] : l.manifest?.scales.find((s) => s.scale === l.scale);
+    this.set('scale', shownName(l), shown ? `${format.short(shown.triangles)} tri` : '');
     this.set('size', l.displayedPx > 0 ? format.px(l.displayedPx) : '–');
     this.set('bytes', l.bytes > 0 ? format.bytes(l.bytes) : '–', l.packageBytes > 0 ? `of ${format.bytes(l.packageBytes)}` : '');
     this.set('first', secondsOrDash(l.firstPictureS));
@@ -36,6 +36,11 @@ export class Figures {
   private set(figure: Figure, text: string, more = ''): void {
     this.values.get(figure)?.replaceChildren(text, ...(more ? [make('small', {}, ` ${more}`)] : []));
   }
+}
+
+/** What is in the scene. */
+export function shownName({ scale, proxy }: Pick<Live, 'scale' | 'proxy'>): string {
+  return proxy >= 0 ? `proxy ${proxy}` : scale === null ? '–' : `S${scale}`;
 }
 
 function secondsOrDash(s: number): string {

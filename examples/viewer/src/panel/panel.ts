@@ -8,6 +8,7 @@ import { Figures } from './figures';
 import { FragmentSection } from './fragment_section';
 import { ladderPlot } from './ladder_plot';
 import { scalePlot } from './scale_plot';
+import { ProxySection } from './proxy_section';
 import { PlotSection } from './section';
 import { timePlots } from './time_plots';
 
@@ -17,6 +18,7 @@ const kRefreshMs = 150;
 export class Panel {
   private readonly figures = new Figures();
   private readonly controls: Controls;
+  private readonly proxies: ProxySection;
   private readonly fragments: FragmentSection;
   private readonly plots: readonly PlotSection[];
   private offeredPackage: Manifest | null = null;
@@ -27,11 +29,12 @@ export class Panel {
     const now = (): Live => this.live;
     const redraw = (): void => this.update(this.live);
     this.controls = new Controls(choices, actions);
+    this.proxies = new ProxySection(now);
     this.fragments = new FragmentSection(now, redraw);
     const scales = new PlotSection(scalePlot(now));
     const below = [ladderPlot(() => this.live.tables[this.fragments.plane]), timePlots(now), bytesPlot(now)].map((p) => new PlotSection(p));
     this.plots = [scales, ...below];
-    const sections = [scales, this.fragments, ...below].map(({ box }) => box);
+    const sections = [scales, this.proxies, this.fragments, ...below].map(({ box }) => box);
     for (const section of sections) section.addEventListener('toggle', redraw);
     root.replaceChildren(this.figures.box, this.controls.box, ...sections);
   }
@@ -53,6 +56,7 @@ export class Panel {
     this.offer(this.live);
     this.fragments.followScene();
     this.figures.show(this.live);
+    this.proxies.draw();
     for (const section of this.plots) await section.draw(turn);
     await turn();
     this.fragments.draw();

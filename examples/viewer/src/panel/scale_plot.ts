@@ -2,6 +2,7 @@ import { stepFunction } from 'texmesh';
 import type { Manifest } from 'texmesh';
 import * as format from '../format';
 import type { Live } from '../live';
+import { shownName } from './figures';
 import type { SectionPlots } from './section';
 
 /** The step function: which scale is enough at which displayed height. */
@@ -21,9 +22,10 @@ export function scalePlot(live: () => Live): SectionPlots {
           { label: 'one pixel', colour: 'k4', kind: 'dashes', value: format.short },
         ],
         mark: () => {
-          const { displayedPx: x, scale, manifest } = live();
+          const { displayedPx: x, scale, proxy, manifest } = live();
           if (!(x > 0)) return null;
-          return { x, y: manifest?.scales.find((s) => s.scale === scale)?.triangles, label: scale === null ? 'now' : `S${scale}` };
+          const shown = proxy >= 0 ? manifest?.proxies[proxy] : manifest?.scales.find((s) => s.scale === scale);
+          return { x, y: shown?.triangles, label: scale === null ? 'now' : shownName({ scale, proxy }) };
         },
       },
       data: () => {

@@ -77,10 +77,17 @@ export class Listener {
     on('first-picture', (e) => {
       this.live.firstPictureS = this.secondsAt(e.at);
       this.live.scale = e.scale;
+      this.live.proxy = e.proxy;
       this.stage.draw();
+    });
+    on('proxy', (e) => {
+      this.live.scale = -1;
+      this.live.proxy = e.proxy;
+      this.stage.show();
     });
     on('scale', (e) => {
       this.live.scale = e.scale;
+      this.live.proxy = -1;
       this.stage.show();
     });
     on('plane', (e) => {

@@ -1,4 +1,4 @@
-import { open, shownFlip } from 'texmesh';
+import { open, proxyLoss, shownFlip } from 'texmesh';
 import type { LoadedModel, TexmeshPackage } from 'texmesh';
 import type { Choices } from '../choices';
 import type { Live } from '../live';
@@ -167,7 +167,11 @@ export class Session {
 
   /** What the package's measured table says of the picture that stands now. */
   private async predict(pkg: TexmeshPackage, model: LoadedModel, signal: AbortSignal): Promise<void> {
-    const { planes, scale, displayedPx } = model.state;
+    const { planes, scale, proxy, displayedPx } = model.state;
+    if (proxy >= 0) {
+      this.live.predictedFlip = proxyLoss(pkg.manifest, proxy, displayedPx).flip;
+      return this.listener.changed();
+    }
     const data = await pkg.data(planes.flatMap((p) => [p.base, p.plane]));
     if (signal.aborted) return;
     this.live.predictedFlip = shownFlip(data, displayedPx, scale, planes);

@@ -21,11 +21,13 @@ export class ShownProxy {
   get objects(): Object3D[] {
     return this.object_ ? [this.object_] : [];
   }
-  /** Loads a proxy, then puts it in place of the one before, in one turn of the page. */
-  async show(proxy: number): Promise<void> {
+  /** Loads a proxy, then puts it in place of the one before, in one turn of the page. `arrived` hears that all its bytes are there. */
+  async show(proxy: number, arrived?: () => void): Promise<void> {
     const { load_: load, scene_: scene } = this;
     const { reader, options, object, signal } = load;
-    const glb = await reader.decoded(signal, 'plainGlb', await reader.proxyGlb(proxy, { signal }));
+    const file = await reader.proxyGlb(proxy, { signal });
+    arrived?.();
+    const glb = await reader.decoded(signal, 'plainGlb', file);
     const { scene: shape } = await parseScale(options.gltfLoader(), glb, false);
     try {
       await readyToDraw(load, scene, shape);
@@ -39,6 +41,7 @@ export class ShownProxy {
     this.dispose();
     this.object_ = shape;
     this.shown = proxy;
+    load.emit('proxy', { proxy, triangles: reader.manifest.proxies[proxy].triangles });
   }
   /** Frees the proxy, which is in the scene no more. */
   dispose(): void {

@@ -1,0 +1,66 @@
+import { type Manifest } from '../format/manifest';
+import { pow } from './portable_math';
+import { beyondStart, proxyBytesBeyondStart, proxyLoss } from './proxy_choice';
+
+// Which larger proxy is shown on the way from the smallest one to a scale, from the numbers of the manifest alone:
+// format/rules/proxy_steps.cpp, bit for bit.
+
+const moments = 64;
+const meshShare = 0.5;
+const paying = 0.95;
+
+/** A link as the first request has shown it, and the seconds that are left until the time limit. */
+export interface StepLink {
+  bytesS: number;
+  rttS: number;
+  leftS: number;
+}
+
+/** Bytes behind those of the first request that a client of a package with proxies fetches before it can decide about scales and textures. */
+export function documentBytes({ index, tables, scales }: Manifest): number {
+  const { offset, bytes } = scales[scales.length - 1].glb;
+  return beyondStart(index.offset, tables.offset + tables.bytes) + beyondStart(offset, offset + bytes);
+}
+
+/**
+ * The proxy that lowers the mean FLIP of what is seen in the time left by at least a twentieth, of several the one that lowers it
+ * most; -1 where none does. What scales look like is supposed, see SPEC.md, A.6.
+ */
+export function proxyStep(m: Manifest, wanted: number, displayedPx: number, { bytesS, rttS, leftS }: StepLink): number {
+  if (m.proxies.length < 2 || !(leftS > 0) || !(bytesS > 0)) return -1;
+  const seconds = (bytes: number): number => rttS + bytes / bytesS;
+  const flips = m.proxies.map((_, k) => proxyLoss(m, k, displayedPx).flip);
+  const arrivalS = (k: number): number => seconds(proxyBytesBeyondStart(m, k));
+  const documents = documentBytes(m);
+  const mesh = m.scales.slice(0, -1).find((s) => s.scale >= wanted && seconds(documents + s.glb.bytes) <= meshShare * leftS);
+  const tooCoarse = !mesh && m.scales[m.scales.length - 1].scale > wanted;
+  const fixed = documents + (mesh?.glb.bytes ?? 0);
+  const all = m.provenance.offset + m.provenance.bytes;
+  const largest = m.proxies[m.proxies.length - 1].glb.bytes;
+  /** Mean FLIP in the time left; 0: without a step. */
+  const mean = (step: number): number => {
+    const stepS = step > 0 ? arrivalS(step) : 0;
+    const meshS = stepS + seconds(fixed);
+    const endS = Math.min(leftS, meshS + all / bytesS);
+    const first = Math.max(tooCoarse ? flips[0] : flips[flips.length - 1], 1e-6);
+    const bytes = Math.min(all, (leftS - stepS) * bytesS);
+    const last = tooCoarse ? first : Math.max(1e-6, first * Math.sqrt(largest / Math.max(largest, bytes)));
+    let sum = 0;
+    for (let i = 0; i < moments; ++i) {
+      const t = ((i + 0.5) / moments) * leftS;
+      const scale = t < meshS ? 1 : t >= endS ? last : first * pow(last / first, (t - meshS) / (endS - meshS));
+      sum += t < stepS ? flips[0] : Math.min(flips[step], scale);
+    }
+    return sum / moments;
+  };
+  let least = paying * mean(0);
+  let best = -1;
+  for (let k = 1; k < flips.length; ++k) {
+    if (!(flips[k] < flips[0]) || arrivalS(k) >= leftS) continue;
+    const now = mean(k);
+    if (now > least || (best >= 0 && now === least)) continue;
+    least = now;
+    best = k;
+  }
+  return best;
+}
