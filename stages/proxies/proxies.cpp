@@ -6,6 +6,7 @@
 
 #include "stages/proxies/making/make_proxy.h"
 #include "stages/proxies/making/nested_rival.h"
+#include "stages/proxies/making/smooth_surface.h"
 
 namespace texmesh {
 namespace {
@@ -24,6 +25,8 @@ constexpr std::uint32_t kLeastTriangles = 60;
 constexpr double kLeastBytesPerTriangle = 4;
 constexpr double kFirstMeshShare = 0.7, kMeshShare = 0.65, kLargeMeshShare = 0.55;
 constexpr int kFineFrom = 100000, kNormalMapPaysFrom = 100000;  // bytes
+constexpr int kFirstBits = 10, kBits = 11, kFineBits = 12;      // of positions
+constexpr double kOver = 1.02, kMostOfSource = 0.15;
 
 /// Source textures need not be finer than what a proxy and the pictures show of them.
 std::uint32_t least_side_px(const std::vector<Material>& materials) {
@@ -37,7 +40,7 @@ ProxyForm first_form(int bytes, bool first) {
   ProxyForm out;
   out.maps.orm = true;
   out.mesh_share = first ? kFirstMeshShare : bytes < kFineFrom ? kMeshShare : kLargeMeshShare;
-  out.coding = {!first, bytes < kFineFrom ? 11 : 12};
+  out.coding = {!first, first ? kFirstBits : bytes < kFineFrom ? kBits : kFineBits};
   return out;
 }
 
@@ -45,48 +48,82 @@ void note_none(Notes& notes, int bytes, const std::string& why) {
   add_info(notes, "no-proxy", "", "there is no proxy of " + std::to_string(bytes) + " bytes: " + why);
 }
 
+/// What the files of a model that proxies stand for take.
+double source_bytes(const NestedScales& scales, const std::vector<Image>& images) {
+  double sum = proxies::whole_mesh_bytes(scales);
+  for (const Image& image : images) sum += static_cast<double>(image.bytes.size());
+  return sum;
+}
+
+/// Sizes that are worth a try, rising. The others have a note.
+std::vector<int> sizes_to_try(const NestedScales& scales, const std::vector<Image>& images,
+                              const ProxiesOptions& options, Notes& notes) {
+  if (options.mode == ProxyMode::kAlways) return options.sizes;
+  std::vector<int> out;
+  double left = kMostOfSource * source_bytes(scales, images);
+  for (const int bytes : options.sizes) {
+    if (proxies::whole_mesh_is_small(scales, static_cast<std::uint64_t>(bytes))) {
+      note_none(notes, bytes, "S_0's mesh takes few of them, so the source's atlas can stay");
+    } else if (kOver * bytes > left) {
+      note_none(notes, bytes, "proxies take at most 15 % of the source");
+    } else {
+      left -= kOver * bytes;
+      out.push_back(bytes);
+    }
+  }
+  return out;
+}
+
 /// One model's proxies, smallest first.
 class ProxyRun {
  public:
   ProxyRun(const NestedScales& scales, const Mesh& mesh, const ShownMaterials& shown,
-           const BakeSource& source, const MaterialGroups& groups, const ProxiesOptions& options,
+           const BakeSource& source, const MaterialGroups& groups, ProxyMode mode, int most_bytes,
            const RunContext& context)
       : scales_(scales),
         shown_(shown),
-        mode_(options.mode),
+        mode_(mode),
         mapped_(std::ranges::any_of(
             shown.materials,
             [](const RenderMaterial& m) { return !m.unlit && m.slot(TextureUse::kNormal).texture >= 0; })),
-        surfaces_(mesh, groups, kLeastTriangles, most_triangles(mesh, options), context),
+        smooth_(proxies::is_smooth(mesh)),
+        surfaces_(mesh, groups, kLeastTriangles, most_triangles(mesh, most_bytes), context),
         shop_(source, groups, surfaces_),
         studio_(mesh, shown, context) {}
 
-  /// Whether larger sizes are worth a try.
+  /// Whether larger sizes may have a proxy.
   bool add(int bytes, Proxies& out, const RunContext& context) {
-    Candidate best = best_of(bytes, out.proxies.empty(), context);
+    const bool first = out.proxies.empty();
+    Candidate best = best_of(bytes, first, context);
     std::optional<MadeProxy>& made = best.made;
     if (!made) {
       note_none(out.notes, bytes, "mesh and pictures do not fit");
       return true;
     }
-    if (!out.proxies.empty() && made->proxy.glb.size() <= out.proxies.back().glb.size()) {
+    if (!first && made->proxy.glb.size() <= out.proxies.back().glb.size()) {
       note_none(out.notes, bytes, "the whole object takes fewer");
       return false;
     }
-    made->proxy.losses = studio_.losses(made->shown, best.flip, context);
-    if (mode_ == ProxyMode::kAuto) {
-      const auto rival = rival_flip(scales_, shown_, made->proxy.glb.size(), studio_, context);
-      if (rival && *rival <= made->proxy.losses[ProxyStudio::kMiddle].flip_mean) {
-        note_none(out.notes, bytes,
-                  "a scale with the source's atlas looks better for the same bytes, and for more bytes, too");
-        return false;
-      }
+    const bool loses = loses_to_scale(made->proxy.glb.size(), best.flip.mean(), context);
+    if (loses && !first) {
+      note_none(out.notes, bytes, kScaleWins);
+      return true;
     }
+    made->proxy.losses = studio_.losses(made->shown, best.flip, context);
     out.proxies.push_back(std::move(made->proxy));
+    if (first) first_loses_ = loses;
     return true;
   }
 
+  /// A smallest proxy that loses goes with those that it is shown before.
+  void finish(Proxies& out) const {
+    if (!first_loses_ || out.proxies.size() != 1) return;
+    note_none(out.notes, static_cast<int>(out.proxies.front().target_bytes), kScaleWins);
+    out.proxies.clear();
+  }
+
  private:
+  static constexpr const char* kScaleWins = "a scale with the source's atlas looks better for the same bytes";
   struct Candidate {
     std::optional<MadeProxy> made;
     ProxyForm form;
@@ -100,8 +137,15 @@ class ProxyRun {
     if (!best.made || flip.mean() < best.flip.mean()) best = {std::move(made), form, flip};
   }
 
-  /// Normals, flat triangles and a normal map compete on one bake. Where triangles of the first size need no
-  /// normals, a second bake has more of them.
+  bool loses_to_scale(std::uint64_t bytes, double flip, const RunContext& context) {
+    if (mode_ != ProxyMode::kAuto) return false;
+    const auto rival = rival_flip(scales_, shown_, bytes, studio_, context);
+    return rival && *rival <= flip;
+  }
+
+  /// Normals, a normal map and, where S_0 is faceted, flat triangles compete on one bake. Where triangles of
+  /// the first size need no normals, a second bake has more of them. FLIP likes facets of a smooth object at
+  /// 20 kB (a bust's .107 for .115), and who looks at them does not.
   Candidate best_of(int bytes, bool first, const RunContext& context) {
     const auto target = static_cast<std::uint64_t>(bytes);
     Candidate best;
@@ -115,7 +159,7 @@ class ProxyRun {
     }
     compete(*baked, target, form, best, context);
     form.normals = false;
-    if (first || flat_) compete(*baked, target, form, best, context);
+    if (!smooth_ && (first || flat_)) compete(*baked, target, form, best, context);
     if (best.made) shop_.learn(best.made->quality);
     flat_ = best.made && !best.form.normals;
     if (first && flat_)
@@ -123,15 +167,17 @@ class ProxyRun {
     return best;
   }
 
-  static std::uint32_t most_triangles(const Mesh& mesh, const ProxiesOptions& options) {
-    return static_cast<std::uint32_t>(std::min<double>(options.sizes.back() / kLeastBytesPerTriangle,
-                                                       static_cast<double>(mesh.triangles.size())));
+  static std::uint32_t most_triangles(const Mesh& mesh, int most_bytes) {
+    return static_cast<std::uint32_t>(
+        std::min<double>(most_bytes / kLeastBytesPerTriangle, static_cast<double>(mesh.triangles.size())));
   }
   const NestedScales& scales_;
   const ShownMaterials& shown_;
   ProxyMode mode_;
-  bool mapped_;        // a source material has a normal map
-  bool flat_ = false;  // the last proxy needs no normals
+  bool mapped_;               // a source material has a normal map
+  bool smooth_;               // S_0 shows no facets
+  bool flat_ = false;         // the last proxy needs no normals
+  bool first_loses_ = false;  // to a scale of as many bytes
   SurfaceLadder surfaces_;
   ProxyWorkshop shop_;
   ProxyStudio studio_;
@@ -140,17 +186,14 @@ class ProxyRun {
 }  // namespace
 
 Proxies make_proxies(const NestedScales& scales, const std::vector<Material>& materials,
-                     const Fragments& fragments, const std::vector<Pixels>& pixels,
-                     const ProxiesOptions& options, const RunContext& context) {
+                     const std::vector<Image>& images, const Fragments& fragments,
+                     const std::vector<Pixels>& pixels, const ProxiesOptions& options,
+                     const RunContext& context) {
   Proxies out;
-  if (options.mode == ProxyMode::kNone || options.sizes.empty()) return out;
+  if (options.mode == ProxyMode::kNone) return out;
   if (scales.scales.empty()) throw StageError("proxies", "scales", "S_0", "none");
-  if (options.mode == ProxyMode::kAuto &&
-      proxies::whole_mesh_is_small(scales, static_cast<std::uint64_t>(options.sizes.front()))) {
-    note_none(out.notes, options.sizes.front(),
-              "S_0's mesh takes few of them, so the source's atlas can stay");
-    return out;
-  }
+  const std::vector<int> sizes = sizes_to_try(scales, images, options, out.notes);
+  if (sizes.empty()) return out;
   RunContext inner = context;
   inner.progress = nullptr;
   const Mesh mesh = extract_scale(scales, scales.scales.front());
@@ -162,13 +205,12 @@ Proxies make_proxies(const NestedScales& scales, const std::vector<Material>& ma
     add_info(out.notes, "no-proxy", "", "there is no proxy: the object has no extent");
     return out;
   }
-  ProxyRun run(scales, mesh, shown, source, groups, options, inner);
-  for (std::size_t i = 0; i < options.sizes.size(); ++i) {
-    // An atlas of its own pays less the more bytes there are: .6 of the source atlas' FLIP at 20 kB, .8 at
-    // 150 kB, more than 1 from 250 kB on (two prototypes). Where it has lost, larger proxies are not tried.
-    if (!run.add(options.sizes[i], out, inner)) break;
-    context.report(static_cast<double>(i + 1) / static_cast<double>(options.sizes.size()));
+  ProxyRun run(scales, mesh, shown, source, groups, options.mode, sizes.back(), inner);
+  for (std::size_t i = 0; i < sizes.size(); ++i) {
+    if (!run.add(sizes[i], out, inner)) break;
+    context.report(static_cast<double>(i + 1) / static_cast<double>(sizes.size()));
   }
+  run.finish(out);
   return out;
 }
 
