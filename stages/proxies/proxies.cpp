@@ -35,10 +35,34 @@ std::uint32_t least_side_px(const std::vector<Material>& materials) {
   return used > 64 ? 256 : used > 24 ? 512 : used > 8 ? 1024 : 2048;
 }
 
+/// Whether occlusion, roughness and metal are not the same everywhere.
+bool data_varies(const std::vector<RenderMaterial>& materials) {
+  return std::ranges::any_of(materials, [&](const RenderMaterial& m) {
+    const RenderMaterial& other = materials.front();
+    return m.slot(TextureUse::kMetallicRoughness).texture >= 0 ||
+           m.slot(TextureUse::kOcclusion).texture >= 0 || m.metallic != other.metallic ||
+           m.roughness != other.roughness;
+  });
+}
+
+/// False where viewers read all base colours of the source without mip levels. A proxy read with them would
+/// look soft beside it: .060 instead of .043 for a building of 150 kB.
+bool reads_mip_levels(const std::vector<Material>& materials) {
+  bool without = false, with = false;
+  for (const Material& m : materials) {
+    const TextureRef& texture = m.base_colour_texture;
+    if (!texture.used()) continue;
+    const bool level_0 =
+        texture.minification == Minification::kLinear || texture.minification == Minification::kNearest;
+    (level_0 ? without : with) = true;
+  }
+  return with || !without;
+}
+
 /// What the first try of a size is made of.
-ProxyForm first_form(int bytes, bool first) {
+ProxyForm first_form(int bytes, bool first, bool data) {
   ProxyForm out;
-  out.maps.orm = true;
+  out.maps.orm = data;
   out.mesh_share = first ? kFirstMeshShare : bytes < kFineFrom ? kMeshShare : kLargeMeshShare;
   out.coding = {!first, first ? kFirstBits : bytes < kFineFrom ? kBits : kFineBits};
   return out;
@@ -86,6 +110,7 @@ class ProxyRun {
         mapped_(std::ranges::any_of(
             shown.materials,
             [](const RenderMaterial& m) { return !m.unlit && m.slot(TextureUse::kNormal).texture >= 0; })),
+        data_(data_varies(shown.materials)),
         smooth_(proxies::is_smooth(mesh)),
         surfaces_(mesh, groups, kLeastTriangles, most_triangles(mesh, most_bytes), context),
         shop_(source, groups, surfaces_),
@@ -134,7 +159,9 @@ class ProxyRun {
     std::optional<MadeProxy> made = shop_.finish(baked, bytes, form);
     if (!made) return;
     const FlipSum flip = studio_.at_middle(made->shown, context);
-    if (!best.made || flip.mean() < best.flip.mean()) best = {std::move(made), form, flip};
+    // Facets of a smooth object must be worth it.
+    const double worth = smooth_ && !form.normals ? 1.04 : 1;
+    if (!best.made || flip.mean() * worth < best.flip.mean()) best = {std::move(made), form, flip};
   }
 
   bool loses_to_scale(std::uint64_t bytes, double flip, const RunContext& context) {
@@ -143,13 +170,20 @@ class ProxyRun {
     return rival && *rival <= flip;
   }
 
-  /// Normals, a normal map and, where S_0 is faceted, flat triangles compete on one bake. Where triangles of
-  /// the first size need no normals, a second bake has more of them. FLIP likes facets of a smooth object at
-  /// 20 kB (a bust's .107 for .115), and who looks at them does not.
+  /// FLIP likes facets of a smooth object even where they are large (a bust's .107 for .115 at 20 kB); who
+  /// looks at them does not. Small ones are not seen, and the bytes of normals sharpen the textures.
+  bool may_be_flat(const BakedProxy& baked, int bytes, bool first) const {
+    constexpr std::size_t kSmallFacets = 8000;
+    if (!smooth_) return first || flat_;
+    return baked.atlas.triangles.size() >= kSmallFacets && (bytes < kFineFrom || flat_);
+  }
+
+  /// Normals, flat triangles and a normal map compete on one bake. Where triangles of the first size need no
+  /// normals, a second bake has more of them.
   Candidate best_of(int bytes, bool first, const RunContext& context) {
     const auto target = static_cast<std::uint64_t>(bytes);
     Candidate best;
-    ProxyForm form = first_form(bytes, first);
+    ProxyForm form = first_form(bytes, first, data_);
     const auto baked = shop_.bake(bytes, form, context);
     if (!baked) return best;
     if (mapped_ && bytes >= kNormalMapPaysFrom) {
@@ -159,7 +193,7 @@ class ProxyRun {
     }
     compete(*baked, target, form, best, context);
     form.normals = false;
-    if (!smooth_ && (first || flat_)) compete(*baked, target, form, best, context);
+    if (may_be_flat(*baked, bytes, first)) compete(*baked, target, form, best, context);
     if (best.made) shop_.learn(best.made->quality);
     flat_ = best.made && !best.form.normals;
     if (first && flat_)
@@ -175,6 +209,7 @@ class ProxyRun {
   const ShownMaterials& shown_;
   ProxyMode mode_;
   bool mapped_;               // a source material has a normal map
+  bool data_;                 // occlusion, roughness or metal need a map
   bool smooth_;               // S_0 shows no facets
   bool flat_ = false;         // the last proxy needs no normals
   bool first_loses_ = false;  // to a scale of as many bytes
@@ -199,7 +234,8 @@ Proxies make_proxies(const NestedScales& scales, const std::vector<Material>& ma
   const Mesh mesh = extract_scale(scales, scales.scales.front());
   const ShownMaterials shown =
       shown_materials(materials, fragments, pixels, mesh, least_side_px(materials), inner);
-  const MaterialGroups groups = find_groups(mesh, shown.materials);
+  MaterialGroups groups = find_groups(mesh, shown.materials);
+  groups.mip_levels = reads_mip_levels(materials);
   const BakeSource source(mesh, shown, groups);
   if (!(source.diagonal() > 0)) {
     add_info(out.notes, "no-proxy", "", "there is no proxy: the object has no extent");

@@ -7,6 +7,7 @@
 
 #include "stages/base/run_context.h"
 #include "stages/gltf/check_glb.h"
+#include "tests/support/hostile_meshes.h"
 #include "tests/support/meshes.h"
 
 namespace texmesh {
@@ -344,17 +345,34 @@ TEST(Proxies, TheDefaultSizesFitTheirBudgets) {
   EXPECT_LE(options.sizes.front() * 1.02 + kManifest, kFirstRequest);
 }
 
+bool says(const Proxy& proxy, const std::string& part) {
+  return std::string(proxy.glb.begin(), proxy.glb.end()).find(part) != std::string::npos;
+}
+
 TEST(Proxies, ASmoothObjectHasNoFacets) {
-  const auto has_normals = [](const Proxy& proxy) {
-    const std::string text(proxy.glb.begin(), proxy.glb.end());
-    return text.find("\"NORMAL\"") != std::string::npos;
-  };
   const ProxyModel smooth = textured(testing::bumpy_sphere(60, 120));
   for (const Proxy& proxy : proxies_of(smooth, {ProxyMode::kAlways, {6000, 12000}}).proxies)
-    EXPECT_TRUE(has_normals(proxy));
-  const ProxyModel facets = changed(textured(testing::cube()), [](ProxyModel& m) { m.mesh.normals.clear(); });
+    EXPECT_TRUE(says(proxy, "\"NORMAL\""));
+  const ProxyModel facets = textured(testing::cube());
   for (const Proxy& proxy : proxies_of(facets, {ProxyMode::kAlways, {6000}}).proxies)
-    EXPECT_FALSE(has_normals(proxy));
+    EXPECT_FALSE(says(proxy, "\"NORMAL\""));
+}
+
+TEST(Proxies, TexturesAreReadWithMipLevelsWhereTheSourcesAre) {
+  ProxyModel model = textured(testing::bumpy_sphere(20, 40));
+  model.materials.push_back(model.materials[0]);
+  const auto reads_mips = [&](Minification first, Minification second) {
+    model.materials[0].base_colour_texture.minification = first;
+    model.materials[1].base_colour_texture.minification = second;
+    const Proxies made = proxies_of(model, {ProxyMode::kAlways, {8000}});
+    const bool with = says(made.proxies.at(0), "\"minFilter\":9987"),
+               without = says(made.proxies.at(0), "\"minFilter\":9729");
+    EXPECT_NE(with, without);
+    return with;
+  };
+  EXPECT_TRUE(reads_mips(Minification::kLinearMipmapLinear, Minification::kLinearMipmapLinear));
+  EXPECT_TRUE(reads_mips(Minification::kLinear, Minification::kNearestMipmapNearest));
+  EXPECT_FALSE(reads_mips(Minification::kLinear, Minification::kNearest));
 }
 
 TEST(Proxies, VertexColoursBecomeTexels) {
