@@ -21,6 +21,7 @@ constexpr double kFewBits = 0.7, kManyBits = 1.5;
 constexpr double kMeshoptBytes = 9.5, kDracoBytes = 3.2;  // of a triangle, until one mesh is coded
 constexpr int kAttempts = 3;
 constexpr double kLeastMiss = 0.7, kMostMiss = 1.1;  // of a mesh' bytes: textures take what is left
+constexpr double kWorthPacking = 1.25;  // a larger texture of the same mesh, side to side
 constexpr std::size_t kSamples = 250000;
 
 /// Packs at the side, or at the least larger one that holds the charts.
@@ -134,7 +135,7 @@ std::optional<BakedProxy> ProxyWorkshop::bake(double target_bytes, const ProxyFo
   if (!out) return out;
   // Where the whole object has few triangles, textures get the rest.
   const std::uint32_t side_px = texture_side(others - out->mesh_bytes, form.maps);
-  if (side_px > out->atlas.width_px)
+  if (side_px >= kWorthPacking * out->atlas.width_px)
     if (auto larger = pack(*out->charted, side_px, context)) out->atlas = std::move(*larger);
   out->maps = proxies::bake(out->atlas, out->normals, source_, kSamples, context);
   return out;
