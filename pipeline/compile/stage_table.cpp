@@ -81,10 +81,10 @@ Results<MeasuredQuality> measure_pictures(const NestedScales& scales, const Perc
   return {std::move(measured), std::move(notes)};
 }
 
-Results<Proxies> bake_proxies(const NestedScales& scales, const Materials& materials,
+Results<Proxies> bake_proxies(const NestedScales& scales, const Materials& materials, const Images& images,
                               const Fragments& fragments, const Planes& planes, const ProxiesOptions& options,
                               const RunContext& context) {
-  Proxies made = make_proxies(scales, materials, fragments, planes, options, context);
+  Proxies made = make_proxies(scales, materials, images, fragments, planes, options, context);
   Notes notes = made.notes;
   return {std::move(made), std::move(notes)};
 }
@@ -180,7 +180,7 @@ std::vector<Stage> stage_table(const CompileOptions& o) {
             inputs(kNestedScales, kMaterials, kFragments, kFilledPlanes), outputs(kPoster),
             read_of(o, o.poster), {"libjpeg-turbo"}, make_poster),
       stage({"proxies", kProxiesVersion, "S_0 -> small GLBs with atlases and textures of their own"},
-            inputs(kNestedScales, kMaterials, kFragments, kFilledPlanes), outputs(kProxies),
+            inputs(kNestedScales, kMaterials, kImages, kFragments, kFilledPlanes), outputs(kProxies),
             read_of(o, o.proxies), {"draco", "libwebp", "meshoptimizer"}, bake_proxies),
       stage({"package", kPackageVersion, "everything -> the container"},
             inputs(kNestedScales, kPerceptualValues, kImages, kFragments, kLadder, kPreviews, kTables,

@@ -6,6 +6,7 @@
 
 #include "stages/proxies/making/make_proxy.h"
 #include "stages/proxies/making/nested_rival.h"
+#include "stages/proxies/making/smooth_surface.h"
 
 namespace texmesh {
 namespace {
@@ -24,6 +25,8 @@ constexpr std::uint32_t kLeastTriangles = 60;
 constexpr double kLeastBytesPerTriangle = 4;
 constexpr double kFirstMeshShare = 0.7, kMeshShare = 0.65, kLargeMeshShare = 0.55;
 constexpr int kFineFrom = 100000, kNormalMapPaysFrom = 100000;  // bytes
+constexpr int kFirstBits = 10, kBits = 11, kFineBits = 12;      // of positions
+constexpr double kOver = 1.02, kMostOfSource = 0.15;
 
 /// Source textures need not be finer than what a proxy and the pictures show of them.
 std::uint32_t least_side_px(const std::vector<Material>& materials) {
@@ -32,12 +35,36 @@ std::uint32_t least_side_px(const std::vector<Material>& materials) {
   return used > 64 ? 256 : used > 24 ? 512 : used > 8 ? 1024 : 2048;
 }
 
+/// Whether occlusion, roughness and metal are not the same everywhere.
+bool data_varies(const std::vector<RenderMaterial>& materials) {
+  return std::ranges::any_of(materials, [&](const RenderMaterial& m) {
+    const RenderMaterial& other = materials.front();
+    return m.slot(TextureUse::kMetallicRoughness).texture >= 0 ||
+           m.slot(TextureUse::kOcclusion).texture >= 0 || m.metallic != other.metallic ||
+           m.roughness != other.roughness;
+  });
+}
+
+/// False where viewers read all base colours of the source without mip levels. A proxy read with them would
+/// look soft beside it: .060 instead of .043 for a building of 150 kB.
+bool reads_mip_levels(const std::vector<Material>& materials) {
+  bool without = false, with = false;
+  for (const Material& m : materials) {
+    const TextureRef& texture = m.base_colour_texture;
+    if (!texture.used()) continue;
+    const bool level_0 =
+        texture.minification == Minification::kLinear || texture.minification == Minification::kNearest;
+    (level_0 ? without : with) = true;
+  }
+  return with || !without;
+}
+
 /// What the first try of a size is made of.
-ProxyForm first_form(int bytes, bool first) {
+ProxyForm first_form(int bytes, bool first, bool data) {
   ProxyForm out;
-  out.maps.orm = true;
+  out.maps.orm = data;
   out.mesh_share = first ? kFirstMeshShare : bytes < kFineFrom ? kMeshShare : kLargeMeshShare;
-  out.coding = {!first, bytes < kFineFrom ? 11 : 12};
+  out.coding = {!first, first ? kFirstBits : bytes < kFineFrom ? kBits : kFineBits};
   return out;
 }
 
@@ -45,48 +72,83 @@ void note_none(Notes& notes, int bytes, const std::string& why) {
   add_info(notes, "no-proxy", "", "there is no proxy of " + std::to_string(bytes) + " bytes: " + why);
 }
 
+/// What the files of a model that proxies stand for take.
+double source_bytes(const NestedScales& scales, const std::vector<Image>& images) {
+  double sum = proxies::whole_mesh_bytes(scales);
+  for (const Image& image : images) sum += static_cast<double>(image.bytes.size());
+  return sum;
+}
+
+/// Sizes that are worth a try, rising. The others have a note.
+std::vector<int> sizes_to_try(const NestedScales& scales, const std::vector<Image>& images,
+                              const ProxiesOptions& options, Notes& notes) {
+  if (options.mode == ProxyMode::kAlways) return options.sizes;
+  std::vector<int> out;
+  double left = kMostOfSource * source_bytes(scales, images);
+  for (const int bytes : options.sizes) {
+    if (proxies::whole_mesh_is_small(scales, static_cast<std::uint64_t>(bytes))) {
+      note_none(notes, bytes, "S_0's mesh takes few of them, so the source's atlas can stay");
+    } else if (kOver * bytes > left) {
+      note_none(notes, bytes, "proxies take at most 15 % of the source");
+    } else {
+      left -= kOver * bytes;
+      out.push_back(bytes);
+    }
+  }
+  return out;
+}
+
 /// One model's proxies, smallest first.
 class ProxyRun {
  public:
   ProxyRun(const NestedScales& scales, const Mesh& mesh, const ShownMaterials& shown,
-           const BakeSource& source, const MaterialGroups& groups, const ProxiesOptions& options,
+           const BakeSource& source, const MaterialGroups& groups, ProxyMode mode, int most_bytes,
            const RunContext& context)
       : scales_(scales),
         shown_(shown),
-        mode_(options.mode),
+        mode_(mode),
         mapped_(std::ranges::any_of(
             shown.materials,
             [](const RenderMaterial& m) { return !m.unlit && m.slot(TextureUse::kNormal).texture >= 0; })),
-        surfaces_(mesh, groups, kLeastTriangles, most_triangles(mesh, options), context),
+        data_(data_varies(shown.materials)),
+        smooth_(proxies::is_smooth(mesh)),
+        surfaces_(mesh, groups, kLeastTriangles, most_triangles(mesh, most_bytes), context),
         shop_(source, groups, surfaces_),
         studio_(mesh, shown, context) {}
 
-  /// Whether larger sizes are worth a try.
+  /// Whether larger sizes may have a proxy.
   bool add(int bytes, Proxies& out, const RunContext& context) {
-    Candidate best = best_of(bytes, out.proxies.empty(), context);
+    const bool first = out.proxies.empty();
+    Candidate best = best_of(bytes, first, context);
     std::optional<MadeProxy>& made = best.made;
     if (!made) {
       note_none(out.notes, bytes, "mesh and pictures do not fit");
       return true;
     }
-    if (!out.proxies.empty() && made->proxy.glb.size() <= out.proxies.back().glb.size()) {
+    if (!first && made->proxy.glb.size() <= out.proxies.back().glb.size()) {
       note_none(out.notes, bytes, "the whole object takes fewer");
       return false;
     }
-    made->proxy.losses = studio_.losses(made->shown, best.flip, context);
-    if (mode_ == ProxyMode::kAuto) {
-      const auto rival = rival_flip(scales_, shown_, made->proxy.glb.size(), studio_, context);
-      if (rival && *rival <= made->proxy.losses[ProxyStudio::kMiddle].flip_mean) {
-        note_none(out.notes, bytes,
-                  "a scale with the source's atlas looks better for the same bytes, and for more bytes, too");
-        return false;
-      }
+    const bool loses = loses_to_scale(made->proxy.glb.size(), best.flip.mean(), context);
+    if (loses && !first) {
+      note_none(out.notes, bytes, kScaleWins);
+      return true;
     }
+    made->proxy.losses = studio_.losses(made->shown, best.flip, context);
     out.proxies.push_back(std::move(made->proxy));
+    if (first) first_loses_ = loses;
     return true;
   }
 
+  /// A smallest proxy that loses goes with those that it is shown before.
+  void finish(Proxies& out) const {
+    if (!first_loses_ || out.proxies.size() != 1) return;
+    note_none(out.notes, static_cast<int>(out.proxies.front().target_bytes), kScaleWins);
+    out.proxies.clear();
+  }
+
  private:
+  static constexpr const char* kScaleWins = "a scale with the source's atlas looks better for the same bytes";
   struct Candidate {
     std::optional<MadeProxy> made;
     ProxyForm form;
@@ -97,7 +159,23 @@ class ProxyRun {
     std::optional<MadeProxy> made = shop_.finish(baked, bytes, form);
     if (!made) return;
     const FlipSum flip = studio_.at_middle(made->shown, context);
-    if (!best.made || flip.mean() < best.flip.mean()) best = {std::move(made), form, flip};
+    // Facets of a smooth object must be worth it.
+    const double worth = smooth_ && !form.normals ? 1.04 : 1;
+    if (!best.made || flip.mean() * worth < best.flip.mean()) best = {std::move(made), form, flip};
+  }
+
+  bool loses_to_scale(std::uint64_t bytes, double flip, const RunContext& context) {
+    if (mode_ != ProxyMode::kAuto) return false;
+    const auto rival = rival_flip(scales_, shown_, bytes, studio_, context);
+    return rival && *rival <= flip;
+  }
+
+  /// FLIP likes facets of a smooth object even where they are large (a bust's .107 for .115 at 20 kB); who
+  /// looks at them does not. Small ones are not seen, and the bytes of normals sharpen the textures.
+  bool may_be_flat(const BakedProxy& baked, int bytes, bool first) const {
+    constexpr std::size_t kSmallFacets = 8000;
+    if (!smooth_) return first || flat_;
+    return baked.atlas.triangles.size() >= kSmallFacets && (bytes < kFineFrom || flat_);
   }
 
   /// Normals, flat triangles and a normal map compete on one bake. Where triangles of the first size need no
@@ -105,7 +183,7 @@ class ProxyRun {
   Candidate best_of(int bytes, bool first, const RunContext& context) {
     const auto target = static_cast<std::uint64_t>(bytes);
     Candidate best;
-    ProxyForm form = first_form(bytes, first);
+    ProxyForm form = first_form(bytes, first, data_);
     const auto baked = shop_.bake(bytes, form, context);
     if (!baked) return best;
     if (mapped_ && bytes >= kNormalMapPaysFrom) {
@@ -115,7 +193,7 @@ class ProxyRun {
     }
     compete(*baked, target, form, best, context);
     form.normals = false;
-    if (first || flat_) compete(*baked, target, form, best, context);
+    if (may_be_flat(*baked, bytes, first)) compete(*baked, target, form, best, context);
     if (best.made) shop_.learn(best.made->quality);
     flat_ = best.made && !best.form.normals;
     if (first && flat_)
@@ -123,15 +201,18 @@ class ProxyRun {
     return best;
   }
 
-  static std::uint32_t most_triangles(const Mesh& mesh, const ProxiesOptions& options) {
-    return static_cast<std::uint32_t>(std::min<double>(options.sizes.back() / kLeastBytesPerTriangle,
-                                                       static_cast<double>(mesh.triangles.size())));
+  static std::uint32_t most_triangles(const Mesh& mesh, int most_bytes) {
+    return static_cast<std::uint32_t>(
+        std::min<double>(most_bytes / kLeastBytesPerTriangle, static_cast<double>(mesh.triangles.size())));
   }
   const NestedScales& scales_;
   const ShownMaterials& shown_;
   ProxyMode mode_;
-  bool mapped_;        // a source material has a normal map
-  bool flat_ = false;  // the last proxy needs no normals
+  bool mapped_;               // a source material has a normal map
+  bool data_;                 // occlusion, roughness or metal need a map
+  bool smooth_;               // S_0 shows no facets
+  bool flat_ = false;         // the last proxy needs no normals
+  bool first_loses_ = false;  // to a scale of as many bytes
   SurfaceLadder surfaces_;
   ProxyWorkshop shop_;
   ProxyStudio studio_;
@@ -140,35 +221,32 @@ class ProxyRun {
 }  // namespace
 
 Proxies make_proxies(const NestedScales& scales, const std::vector<Material>& materials,
-                     const Fragments& fragments, const std::vector<Pixels>& pixels,
-                     const ProxiesOptions& options, const RunContext& context) {
+                     const std::vector<Image>& images, const Fragments& fragments,
+                     const std::vector<Pixels>& pixels, const ProxiesOptions& options,
+                     const RunContext& context) {
   Proxies out;
-  if (options.mode == ProxyMode::kNone || options.sizes.empty()) return out;
+  if (options.mode == ProxyMode::kNone) return out;
   if (scales.scales.empty()) throw StageError("proxies", "scales", "S_0", "none");
-  if (options.mode == ProxyMode::kAuto &&
-      proxies::whole_mesh_is_small(scales, static_cast<std::uint64_t>(options.sizes.front()))) {
-    note_none(out.notes, options.sizes.front(),
-              "S_0's mesh takes few of them, so the source's atlas can stay");
-    return out;
-  }
+  const std::vector<int> sizes = sizes_to_try(scales, images, options, out.notes);
+  if (sizes.empty()) return out;
   RunContext inner = context;
   inner.progress = nullptr;
   const Mesh mesh = extract_scale(scales, scales.scales.front());
   const ShownMaterials shown =
       shown_materials(materials, fragments, pixels, mesh, least_side_px(materials), inner);
-  const MaterialGroups groups = find_groups(mesh, shown.materials);
+  MaterialGroups groups = find_groups(mesh, shown.materials);
+  groups.mip_levels = reads_mip_levels(materials);
   const BakeSource source(mesh, shown, groups);
   if (!(source.diagonal() > 0)) {
     add_info(out.notes, "no-proxy", "", "there is no proxy: the object has no extent");
     return out;
   }
-  ProxyRun run(scales, mesh, shown, source, groups, options, inner);
-  for (std::size_t i = 0; i < options.sizes.size(); ++i) {
-    // An atlas of its own pays less the more bytes there are: .6 of the source atlas' FLIP at 20 kB, .8 at
-    // 150 kB, more than 1 from 250 kB on (two prototypes). Where it has lost, larger proxies are not tried.
-    if (!run.add(options.sizes[i], out, inner)) break;
-    context.report(static_cast<double>(i + 1) / static_cast<double>(options.sizes.size()));
+  ProxyRun run(scales, mesh, shown, source, groups, options.mode, sizes.back(), inner);
+  for (std::size_t i = 0; i < sizes.size(); ++i) {
+    if (!run.add(sizes[i], out, inner)) break;
+    context.report(static_cast<double>(i + 1) / static_cast<double>(sizes.size()));
   }
+  run.finish(out);
   return out;
 }
 

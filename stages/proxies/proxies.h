@@ -10,7 +10,7 @@
 
 namespace texmesh {
 
-inline constexpr int kProxiesVersion = 2;
+inline constexpr int kProxiesVersion = 3;
 
 /// kAuto: only those that beat what the source's atlas gives for the same bytes.
 enum class ProxyMode : std::uint8_t { kNone, kAuto, kAlways };
@@ -21,7 +21,7 @@ struct EnumNames<ProxyMode> {
 
 struct ProxiesOptions {
   ProxyMode mode = ProxyMode::kAuto;
-  std::vector<int> sizes{20000, 50000, 150000};
+  std::vector<int> sizes{36000, 50000, 150000};
   template <class S, class V>
   static void fields(S& s, V&& v) {
     v("mode", s.mode,
@@ -38,18 +38,23 @@ struct ProxiesOptions {
 ///   mask or blend) become one material.
 /// - Maps: base colour; occlusion, roughness and metal where they vary; from 100 kB on a normal map where it
 ///   looks better; emission where something glows. Vertex colours and factors are in the texels.
-/// - Normals of vertices are there where pictures with them look better than flat triangles.
+/// - Normals of vertices are there where S_0 is smooth. Where it is not, pictures decide between them and
+/// flat
+///   triangles.
 /// - File: GLB with WebP inside. The smallest one, which clients show before they have a decoder, is coded by
 ///   EXT_meshopt_compression, KHR_mesh_quantization and KHR_texture_transform, larger ones by
-///   KHR_draco_mesh_compression. It is at most 2 % larger than its size asks for.
+///   KHR_draco_mesh_compression. It is at most 2 % larger than its size asks for. So the default's smallest
+///   one lies with a manifest of 8 kB in the 45,056 bytes of a client's first request.
 /// - Losses: FLIP of lit pictures beside S_0's (stages/render in the studio's light) at three displayed
 ///   heights, where the height is that of the bounding box's longest side.
-/// - Automatic choice: sizes from the first on at which a scale with the source's atlas looks better are left
-///   out.
+/// - Automatic choice: a size at which a scale with the source's atlas looks better is left out, each size by
+///   itself; but the smallest proxy stays where a larger one does, which clients cannot show at once. All of
+///   them take at most 15 % of the source: of its images' files and of S_0's mesh, coded.
 /// Sizes that get no proxy have a note that says why; no model fails because of its proxies. `pixels` are
 /// fill_planes()'s. Same bytes for any thread count and machine.
 Proxies make_proxies(const NestedScales& scales, const std::vector<Material>& materials,
-                     const Fragments& fragments, const std::vector<Pixels>& pixels,
-                     const ProxiesOptions& options, const RunContext& context);
+                     const std::vector<Image>& images, const Fragments& fragments,
+                     const std::vector<Pixels>& pixels, const ProxiesOptions& options,
+                     const RunContext& context);
 
 }  // namespace texmesh

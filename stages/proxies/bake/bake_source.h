@@ -25,6 +25,7 @@ MaterialGroup group_of(const RenderMaterial& material);
 struct MaterialGroups {
   std::vector<MaterialGroup> groups;
   std::vector<std::uint32_t> triangle_group;
+  bool mip_levels = true;  // whether viewers read textures with them
 };
 MaterialGroups find_groups(const Mesh& mesh, const std::vector<RenderMaterial>& materials);
 

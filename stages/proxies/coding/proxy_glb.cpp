@@ -10,6 +10,7 @@ namespace {
 
 using Json = GlbWriter::Json;
 constexpr int kByte = 5120, kUnsignedShort = 5123, kUnsignedInt = 5125, kFloat = 5126;
+constexpr int kLinear = 9729, kLinearMipmapLinear = 9987, kClampToEdge = 33071;
 
 class ProxyWriter {
  public:
@@ -120,11 +121,14 @@ class ProxyWriter {
   }
 
   /// Of one picture the same texture for all materials.
-  Json texture(const ProxyImage& image, std::size_t slot) {
+  Json texture_info(const ProxyImage& image, std::size_t slot, bool mip_levels) {
     if (!texture_[slot]) {
       Json& samplers = writer_.array("samplers");
       if (samplers.empty())
-        samplers.push_back({{"magFilter", 9729}, {"minFilter", 9987}, {"wrapS", 33071}, {"wrapT", 33071}});
+        samplers.push_back({{"magFilter", kLinear},
+                            {"minFilter", mip_levels ? kLinearMipmapLinear : kLinear},
+                            {"wrapS", kClampToEdge},
+                            {"wrapT", kClampToEdge}});
       Json texture{{"sampler", 0}};
       const std::size_t source = writer_.array("images").size();
       texture["extensions"]["EXT_texture_webp"]["source"] = source;
@@ -141,6 +145,9 @@ class ProxyWriter {
   }
 
   Json material(const MaterialGroup& group, const ProxyPictures& pictures) {
+    const auto texture = [&](const ProxyImage& image, std::size_t slot) {
+      return texture_info(image, slot, pictures.mip_levels);
+    };
     Json pbr{{"baseColorTexture", texture(pictures.base_colour, 0)}};
     Json out;
     if (!group.unlit) {

@@ -23,6 +23,7 @@ struct ProxyPictures {
   float metallic = 0, roughness = 1;  // where there is no `orm`
   Vec3f emissive;                     // what emission is to be multiplied by
   int quality = 0;                    // that of the base colour, 0..100
+  bool mip_levels = true;             // whether viewers are to read them with mip levels
   std::size_t bytes() const;
 };
 

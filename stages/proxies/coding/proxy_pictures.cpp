@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
-#include "format/base/errors.h"
+#include "format/base/portable_math.h"
 #include "stages/proxies/coding/webp_picture.h"
 #include "stages/render/shade.h"
 
@@ -12,7 +13,8 @@ namespace {
 
 constexpr float kOcclusionInColour = 0.5f;
 constexpr int kLeastQuality = 1, kMostQuality = 95;
-constexpr double kFull = 0.975;  // of the bytes: more is not worth another run of the encoder
+constexpr double kFull =
+    -0.025;  // log of the share of the bytes: more is not worth another run of the encoder
 // Normals and plain numbers need finer steps than colours for the same look.
 constexpr int kNormalQualityAbove = 10, kOrmQualityBelow = 5;
 
@@ -90,20 +92,30 @@ MapPixels map_pixels(const BakedMaps& maps, const MapChoice& choice) {
 }
 
 ProxyPictures code_pictures(const MapPixels& maps, std::size_t max_bytes) {
-  ProxyPictures best = code_at(maps, kLeastQuality);
-  for (int low = kLeastQuality + 1, high = kMostQuality; low <= high;) {
-    const int quality = (low + high) / 2;
+  constexpr int kFirstGuess = 60;
+  constexpr double kFirstSlope = 45, kLeastSlope = 8, kMostSlope = 120;  // qualities for e times the bytes
+  std::optional<ProxyPictures> best;
+  double slope = kFirstSlope, last_fill = 0;
+  int last_quality = 0;
+  for (int low = kLeastQuality, high = kMostQuality, quality = kFirstGuess; low <= high;) {
     ProxyPictures coded = code_at(maps, quality);
-    const std::size_t bytes = coded.bytes();
-    if (bytes <= max_bytes) {
+    const double fill = portable::log(static_cast<double>(coded.bytes()) /
+                                      static_cast<double>(std::max<std::size_t>(max_bytes, 1)));
+    if (last_quality > 0 && fill != last_fill)
+      slope = std::clamp((quality - last_quality) / (fill - last_fill), kLeastSlope, kMostSlope);
+    last_quality = quality, last_fill = fill;
+    if (fill <= 0) {
       best = std::move(coded);
-      if (static_cast<double>(bytes) >= kFull * static_cast<double>(max_bytes)) break;
+      if (fill >= kFull) break;
       low = quality + 1;
     } else {
       high = quality - 1;
     }
+    // The aim is the middle of what is full enough.
+    const double step = std::floor((kFull / 2 - fill) * slope + 0.5);
+    quality = low <= high ? std::clamp(quality + static_cast<int>(step), low, high) : quality;
   }
-  return best;
+  return best ? std::move(*best) : code_at(maps, kLeastQuality);
 }
 
 }  // namespace texmesh::proxies

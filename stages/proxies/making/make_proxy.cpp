@@ -17,11 +17,12 @@ constexpr double kCover = 0.58;  // of an atlas' texels
 // Of a covered texel at a quality of 50 or so; textures that take fewer or more teach it.
 constexpr double kColourBits = 2.4, kOrmBits = 1.6;
 constexpr int kFewBitsFrom = 80, kManyBitsTo = 25;  // qualities
-constexpr double kFewBits = 0.55, kManyBits = 1.5;
+constexpr double kFewBits = 0.7, kManyBits = 1.5;
 constexpr double kMeshoptBytes = 9.5, kDracoBytes = 3.2;  // of a triangle, until one mesh is coded
 constexpr int kAttempts = 3;
 constexpr double kLeastMiss = 0.7, kMostMiss = 1.1;  // of a mesh' bytes: textures take what is left
-constexpr std::size_t kSamples = 400000;
+constexpr double kWorthPacking = 1.25;  // a larger texture of the same mesh, side to side
+constexpr std::size_t kSamples = 250000;
 
 /// Packs at the side, or at the least larger one that holds the charts.
 std::optional<AtlasMesh> pack(const ChartedSurface& charted, std::uint32_t side_px,
@@ -90,8 +91,8 @@ ProxyWorkshop::ProxyWorkshop(const BakeSource& source, const MaterialGroups& gro
     : source_(source), groups_(groups), surfaces_(surfaces) {}
 
 /// The side of a square texture whose maps cost so many bytes.
-std::uint32_t ProxyWorkshop::texture_side(double bytes) const {
-  const double bits = (kColourBits + kOrmBits) * texel_bits_;
+std::uint32_t ProxyWorkshop::texture_side(double bytes, const MapChoice& maps) const {
+  const double bits = (kColourBits + (maps.orm ? kOrmBits : 0)) * texel_bits_;
   const double side = std::sqrt(std::max(bytes, 1.0) * 8 / (bits * kCover));
   const auto steps = static_cast<std::uint32_t>(std::clamp(side / kTexelStep + 0.5, 1.0, 64.0));
   return std::clamp(steps * kTexelStep, kLeastTexels, kMostTexels);
@@ -113,12 +114,14 @@ std::optional<BakedProxy> ProxyWorkshop::coded(double mesh_bytes, std::uint32_t 
     auto atlas = pack(*charted, side_px, context);
     if (!atlas) return std::nullopt;
     out.emplace();
+    out->charted = charted;
     out->atlas = std::move(*atlas);
     out->normals = sampled_normals(out->atlas, source_, context);
     const CodedMesh mesh =
         code_mesh(out->atlas, out->normals, with_normals(groups_, form.normals), form.coding);
     if (mesh.groups.empty()) return std::nullopt;
     const auto bytes = static_cast<double>(mesh.bytes());
+    out->mesh_bytes = bytes;
     of_triangle = bytes / static_cast<double>(charted->surface.triangles.size());
     if (bytes <= kMostMiss * mesh_bytes && bytes >= kLeastMiss * mesh_bytes) break;
   }
@@ -127,9 +130,14 @@ std::optional<BakedProxy> ProxyWorkshop::coded(double mesh_bytes, std::uint32_t 
 
 std::optional<BakedProxy> ProxyWorkshop::bake(double target_bytes, const ProxyForm& form,
                                               const RunContext& context) {
-  const double mesh_bytes = form.mesh_share * target_bytes;
-  auto out = coded(mesh_bytes, texture_side(target_bytes - mesh_bytes - kJsonBytes), form, context);
-  if (out) out->maps = proxies::bake(out->atlas, out->normals, source_, kSamples, context);
+  const double mesh_bytes = form.mesh_share * target_bytes, others = target_bytes - kJsonBytes;
+  auto out = coded(mesh_bytes, texture_side(others - mesh_bytes, form.maps), form, context);
+  if (!out) return out;
+  // Where the whole object has few triangles, textures get the rest.
+  const std::uint32_t side_px = texture_side(others - out->mesh_bytes, form.maps);
+  if (side_px >= kWorthPacking * out->atlas.width_px)
+    if (auto larger = pack(*out->charted, side_px, context)) out->atlas = std::move(*larger);
+  out->maps = proxies::bake(out->atlas, out->normals, source_, kSamples, context);
   return out;
 }
 
@@ -140,7 +148,8 @@ std::optional<MadeProxy> ProxyWorkshop::finish(const BakedProxy& baked, std::uin
   const CodedMesh mesh =
       code_mesh(baked.atlas, baked.normals, with_normals(groups_, form.normals), form.coding);
   const double left = static_cast<double>(target_bytes) - frame_bytes(mesh, groups, maps);
-  const ProxyPictures pictures = code_pictures(maps, static_cast<std::size_t>(std::max(left, 0.0)));
+  ProxyPictures pictures = code_pictures(maps, static_cast<std::size_t>(std::max(left, 0.0)));
+  pictures.mip_levels = groups_.mip_levels;
   MadeProxy out;
   out.quality = pictures.quality;
   out.proxy.glb = proxy_glb(mesh, groups, pictures);

@@ -41,6 +41,8 @@ class SurfaceLadder {
 
 /// All of a proxy that bytes do not depend on.
 struct BakedProxy {
+  const ChartedSurface* charted = nullptr;  // of the ladder
+  double mesh_bytes = 0;                    // coded in the form that it was made for
   AtlasMesh atlas;
   std::vector<Vec3f> normals;
   BakedMaps maps;
@@ -66,7 +68,7 @@ class ProxyWorkshop {
   void learn(int quality);
 
  private:
-  std::uint32_t texture_side(double bytes) const;
+  std::uint32_t texture_side(double bytes, const MapChoice& maps) const;
   std::optional<BakedProxy> coded(double mesh_bytes, std::uint32_t side_px, const ProxyForm& form,
                                   const RunContext& context);
 

@@ -47,10 +47,17 @@ std::vector<RenderTexture> affordable(const std::vector<RenderTexture>& textures
 
 }  // namespace
 
-bool whole_mesh_is_small(const NestedScales& scales, std::uint64_t bytes) {
-  constexpr double kSmall = 0.4;
+double whole_mesh_bytes(const NestedScales& scales) {
   std::vector<std::uint8_t> used;
-  return mesh_bytes(scales, 0, used) <= kSmall * static_cast<double>(bytes);
+  return mesh_bytes(scales, 0, used);
+}
+
+bool whole_mesh_is_small(const NestedScales& scales, std::uint64_t bytes) {
+  constexpr double kSmall = 0.4, kSmallInPieces = 0.15, kPieces = 1.5;
+  const bool in_pieces = static_cast<double>(scales.mesh.wedge_count()) >
+                         kPieces * static_cast<double>(scales.mesh.positions.size());
+  const double share = in_pieces ? kSmallInPieces : kSmall;
+  return whole_mesh_bytes(scales) <= share * static_cast<double>(bytes);
 }
 
 std::optional<double> rival_flip(const NestedScales& scales, const ShownMaterials& shown, std::uint64_t bytes,

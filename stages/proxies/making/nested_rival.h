@@ -13,8 +13,12 @@ namespace texmesh::proxies {
 std::optional<double> rival_flip(const NestedScales& scales, const ShownMaterials& shown, std::uint64_t bytes,
                                  ProxyStudio& studio, const RunContext& context);
 
-/// Whether S_0's whole mesh, coded, leaves most of the bytes to the source's textures. Then no atlas of
-/// a proxy's own can win.
+/// Bytes of S_0's whole mesh, coded; within 20 % for scans.
+double whole_mesh_bytes(const NestedScales& scales);
+
+/// Whether S_0's whole mesh, coded, leaves so much of the bytes to the source's textures that no atlas of
+/// a proxy's own can win. An atlas in pieces costs more than its texels, so it leaves its proxies a chance
+/// for longer.
 bool whole_mesh_is_small(const NestedScales& scales, std::uint64_t bytes);
 
 }  // namespace texmesh::proxies

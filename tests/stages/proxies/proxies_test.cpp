@@ -7,6 +7,7 @@
 
 #include "stages/base/run_context.h"
 #include "stages/gltf/check_glb.h"
+#include "tests/support/hostile_meshes.h"
 #include "tests/support/meshes.h"
 
 namespace texmesh {
@@ -27,6 +28,7 @@ struct ProxyModel {
   std::vector<Material> materials{Material{}};
   Fragments fragments;
   std::vector<Pixels> pixels;
+  std::vector<Image> images;  // what they take in the source
 };
 
 void add_plane(ProxyModel& model, TextureRole role, std::uint32_t side_px, auto&& value) {
@@ -46,7 +48,7 @@ void add_plane(ProxyModel& model, TextureRole role, std::uint32_t side_px, auto&
 }
 
 ProxyModel textured(Mesh mesh) {
-  ProxyModel out{std::move(mesh), {Material{}}, {}, {}};
+  ProxyModel out{std::move(mesh), {Material{}}, {}, {}, {}};
   out.materials[0].metallic = 0;
   out.materials[0].base_colour_texture.image = 0;
   add_plane(out, TextureRole::kBaseColour, 256, [](auto x, auto y, auto c) {
@@ -55,12 +57,21 @@ ProxyModel textured(Mesh mesh) {
   return out;
 }
 
+/// A texture that takes all bytes that it can get.
+ProxyModel noisy(Mesh mesh) {
+  ProxyModel out = textured(std::move(mesh));
+  std::uint32_t state = 1;
+  for (std::uint8_t& code : out.pixels[0].data)
+    code = static_cast<std::uint8_t>((state = state * 1664525u + 1013904223u) >> 24);
+  return out;
+}
+
 Proxies proxies_of(const ProxyModel& model, const ProxiesOptions& options = {ProxyMode::kAlways, {20000}},
                    int threads = 1) {
   RunContext context;
   context.threads = threads;
-  return make_proxies(only_scale(model.mesh), model.materials, model.fragments, model.pixels, options,
-                      context);
+  return make_proxies(only_scale(model.mesh), model.materials, model.images, model.fragments, model.pixels,
+                      options, context);
 }
 
 void expect_sound(const Proxies& made, const std::string& what) {
@@ -123,11 +134,11 @@ ProxyModel one_triangle() {
   m.triangle_material = {0};
   m.triangle_part = {0};
   m.part_names = {"part"};
-  return {std::move(m), {Material{}}, {}, {}};
+  return {std::move(m), {Material{}}, {}, {}, {}};
 }
 
 ProxyModel many_materials() {
-  ProxyModel out{testing::sphere(20, 40), {}, {}, {}};
+  ProxyModel out{testing::sphere(20, 40), {}, {}, {}, {}};
   for (std::uint16_t i = 0; i < 220; ++i) {
     Material m;
     m.base_colour = {static_cast<float>(i) / 220, 0.5f, 0.5f, 1};
@@ -151,47 +162,99 @@ ProxyModel masked() {
   return out;
 }
 
-TEST(Proxies, HardModelsHaveAProxyOrANote) {
-  const auto changed = [](ProxyModel model, const std::function<void(ProxyModel&)>& change) {
-    change(model);
-    return model;
-  };
+/// The lower half has another material, without a texture, and coordinates without area.
+ProxyModel partly_without_coordinates() {
+  ProxyModel out = textured(testing::bumpy_sphere(30, 60));
+  out.materials.emplace_back().base_colour = {0.2f, 0.8f, 0.3f, 1};
+  for (std::uint32_t t = 0; t < out.mesh.triangles.size(); ++t) {
+    if (out.mesh.positions[out.mesh.position_of(t, 0)].y > 0) continue;
+    out.mesh.triangle_material[t] = 1;
+    for (const std::uint32_t w : out.mesh.triangles[t]) out.mesh.uv0[w] = {0, 0};
+  }
+  return out;
+}
+
+/// Leaves: small sheets in all directions, seen from both sides, cut out by the texture's alpha.
+ProxyModel leaves(AlphaMode mode) {
+  std::vector<Mesh> sheets;
+  for (int i = 0; i < 60; ++i) {
+    Mesh& m = sheets.emplace_back(testing::sheet(2, 0.1f));
+    for (Vec3f& p : m.positions)
+      p = i % 3 == 0 ? p : i % 3 == 1 ? Vec3f{p.z, p.x, p.y} : Vec3f{p.y, p.z, p.x};
+  }
+  ProxyModel out = textured(testing::side_by_side(sheets, -0.3f));
+  out.materials[0].alpha_mode = mode;
+  out.materials[0].double_sided = true;
+  add_plane(out, TextureRole::kAlpha, 256, [](auto x, auto y, auto) {
+    const auto dx = static_cast<int>(x) - 128, dy = static_cast<int>(y) - 128;
+    return dx * dx + dy * dy < 100 * 100 ? 230 : 0;
+  });
+  return out;
+}
+
+ProxyModel changed(ProxyModel model, const std::function<void(ProxyModel&)>& change) {
+  change(model);
+  return model;
+}
+
+void expect_sound_at_two_sizes(const std::string& what, const ProxyModel& model) {
+  expect_sound(proxies_of(model, {ProxyMode::kAlways, {8000, 20000}}), what);
+}
+
+TEST(Proxies, HardMaterialsHaveAProxyOrANote) {
   const ProxyModel sphere = textured(testing::bumpy_sphere(30, 60));
   const std::vector<std::pair<std::string, ProxyModel>> models{
-      {"one triangle", one_triangle()},
       {"220 materials", many_materials()},
       {"alpha mask", masked()},
-      {"open sheet", textured(testing::sheet(30))},
       {"blended sheet", changed(textured(testing::sheet(30)),
                                 [](ProxyModel& m) { m.materials[0].alpha_mode = AlphaMode::kBlend; })},
+      {"blended leaves", leaves(AlphaMode::kBlend)},
+      {"leaves cut out", leaves(AlphaMode::kMask)},
       {"no coordinates", changed(sphere, [](ProxyModel& m) { m.mesh.uv0.clear(); })},
+      {"coordinates of one material only", partly_without_coordinates()},
       {"coordinates without area", changed(sphere,
                                            [](ProxyModel& m) {
                                              for (Vec2f& uv : m.mesh.uv0) uv = {0.5f, 0.5f};
                                            })},
-      {"vertex colours",
-       changed(sphere,
-               [](ProxyModel& m) {
-                 m.mesh.uv0.clear();
-                 for (const std::uint32_t p : m.mesh.wedge_position)
-                   m.mesh.colours.push_back({m.mesh.positions[p].x * 0.4f + 0.5f, 0.5f, 0.2f, 1});
-               })},
-      {"inside out", changed(sphere,
-                             [](ProxyModel& m) {
-                               for (Triangle& t : m.mesh.triangles) std::swap(t[1], t[2]);
-                               for (Vec3f& n : m.mesh.normals) n = n * -1.0f;
-                             })},
+      {"vertex colours", changed(sphere, [](ProxyModel& m) {
+         m.mesh.uv0.clear();
+         for (const std::uint32_t p : m.mesh.wedge_position)
+           m.mesh.colours.push_back({m.mesh.positions[p].x * 0.4f + 0.5f, 0.5f, 0.2f, 1});
+       })}};
+  for (const auto& [what, model] : models) expect_sound_at_two_sizes(what, model);
+}
+
+TEST(Proxies, HardShapesHaveAProxyOrANote) {
+  const ProxyModel sphere = textured(testing::bumpy_sphere(30, 60));
+  const auto turned = [](const Mesh& mesh, std::uint32_t every) {
+    ProxyModel out = textured(mesh);
+    for (std::uint32_t t = 0; t < out.mesh.triangles.size(); t += every)
+      std::swap(out.mesh.triangles[t][1], out.mesh.triangles[t][2]);
+    return out;
+  };
+  const Mesh pair =
+      testing::side_by_side({testing::bumpy_sphere(15, 30), testing::inside_out(testing::cube())});
+  const std::vector<std::pair<std::string, ProxyModel>> models{
+      {"one triangle", one_triangle()},
+      {"open sheet", textured(testing::sheet(30))},
+      {"slivers", textured(testing::sliver_sheet(20))},
+      {"inside out", textured(testing::inside_out(testing::bumpy_sphere(30, 60)))},
+      {"a part inside out", textured(pair)},
+      {"every third triangle inside out", turned(testing::bumpy_sphere(30, 60), 3)},
       {"far away", changed(sphere,
                            [](ProxyModel& m) {
                              for (Vec3f& p : m.mesh.positions) p = p * 1000.0f + Vec3f{1e7f, 1e7f, -1e7f};
                            })},
+      {"huge", changed(sphere,
+                       [](ProxyModel& m) {
+                         for (Vec3f& p : m.mesh.positions) p = p * 1e7f;
+                       })},
       {"no extent", changed(sphere,
                             [](ProxyModel& m) {
                               for (Vec3f& p : m.mesh.positions) p = {1, 1, 1};
                             })},
-      {"many pebbles", textured(testing::side_by_side(std::vector<Mesh>(200, testing::cube())))}};
-  for (const auto& [what, model] : models)
-    expect_sound(proxies_of(model, {ProxyMode::kAlways, {8000, 20000}}), what);
+      {"3,000 pebbles", textured(testing::side_by_side(std::vector<Mesh>(3000, testing::cube())))}};
+  for (const auto& [what, model] : models) expect_sound_at_two_sizes(what, model);
 }
 
 TEST(Proxies, TheFirstNeedsNoDracoAndLargerOnesDo) {
@@ -209,7 +272,107 @@ TEST(Proxies, TheFirstNeedsNoDracoAndLargerOnesDo) {
 TEST(Proxies, TinyMeshesKeepTheSourcesAtlas) {
   const Proxies made = proxies_of(textured(testing::sphere(10, 20)), {ProxyMode::kAuto, {20000, 50000}});
   EXPECT_TRUE(made.proxies.empty());
-  EXPECT_EQ(made.notes.size(), 1u);
+  EXPECT_EQ(made.notes.size(), 2u);
+}
+
+/// A file of so many bytes stands for the source's images.
+ProxyModel with_source(ProxyModel model, std::size_t bytes) {
+  model.images.emplace_back().bytes.resize(bytes);
+  return model;
+}
+
+std::size_t notes_saying(const Proxies& made, const std::string& part) {
+  return static_cast<std::size_t>(std::ranges::count_if(
+      made.notes, [&](const Note& note) { return note.text.find(part) != std::string::npos; }));
+}
+
+TEST(Proxies, EachSizeIsDecidedByItself) {
+  // The whole mesh fits, with all texels, so its scale has no loss at any of the sizes.
+  const ProxyModel model = with_source(noisy(testing::bumpy_sphere(60, 120)), 10000000);
+  const Proxies made = proxies_of(model, {ProxyMode::kAuto, {60000, 70000, 200000}});
+  EXPECT_TRUE(made.proxies.empty());
+  EXPECT_EQ(notes_saying(made, "looks better for the same bytes"), 2u);
+  EXPECT_EQ(notes_saying(made, "the source's atlas can stay"), 1u);
+  EXPECT_EQ(made.notes.size(), 3u);
+}
+
+TEST(Proxies, TheSmallestStaysWhereALargerOneWins) {
+  // A coarse scale of every eighth ring beats the first size; S_0 itself does not fit the second.
+  NestedScales scales = only_scale(testing::bumpy_sphere(120, 240));
+  const Mesh coarse = testing::bumpy_sphere(15, 30);
+  NestedScale scale;
+  scale.scale = 1;
+  for (const Triangle& t : coarse.triangles) {
+    Triangle on_finest;
+    for (std::size_t k = 0; k < 3; ++k) on_finest[k] = t[k] / 31 * 8 * 241 + t[k] % 31 * 8;
+    scale.triangles.push_back(on_finest);
+    scale.triangle_source.push_back(0);
+  }
+  scales.scales.push_back(std::move(scale));
+  const ProxyModel model = with_source(textured(Mesh{}), 10000000);
+  const auto made_of = [&](std::vector<int> sizes) {
+    return make_proxies(scales, model.materials, model.images, model.fragments, model.pixels,
+                        {ProxyMode::kAuto, std::move(sizes)}, {});
+  };
+  const Proxies alone = made_of({8000}), both = made_of({8000, 60000});
+  EXPECT_TRUE(alone.proxies.empty());
+  EXPECT_EQ(notes_saying(alone, "looks better for the same bytes"), 1u);
+  ASSERT_EQ(both.proxies.size(), 2u);
+  EXPECT_EQ(both.proxies[0].target_bytes, 8000u);
+  EXPECT_TRUE(both.notes.empty());
+}
+
+TEST(Proxies, TheyTakeLittleOfASmallSource) {
+  const Mesh mesh = testing::bumpy_sphere(80, 160);
+  for (const std::size_t bytes : {std::size_t{0}, std::size_t{200000}, std::size_t{600000}}) {
+    const Proxies made =
+        proxies_of(with_source(noisy(mesh), bytes), {ProxyMode::kAuto, {10000, 12000, 45000}});
+    std::size_t sum = 0;
+    for (const Proxy& proxy : made.proxies) sum += proxy.glb.size();
+    constexpr double kMeshBytes = 75000;  // at most
+    EXPECT_LE(static_cast<double>(sum), 0.15 * (static_cast<double>(bytes) + kMeshBytes));
+    EXPECT_EQ(made.proxies.size(), bytes == 0 ? 0u : bytes == 200000 ? 2u : 3u);
+    EXPECT_EQ(notes_saying(made, "15 % of the source"), 3 - made.proxies.size());
+  }
+}
+
+TEST(Proxies, TheDefaultSizesFitTheirBudgets) {
+  const ProxiesOptions options;
+  int sum = 0;
+  for (const int size : options.sizes) sum += size;
+  EXPECT_LE(sum * 1.02 + 8000, 250000) << "what a package may grow by";
+  constexpr int kFirstRequest = 45056, kManifest = 8000;
+  EXPECT_LE(options.sizes.front() * 1.02 + kManifest, kFirstRequest);
+}
+
+bool says(const Proxy& proxy, const std::string& part) {
+  return std::string(proxy.glb.begin(), proxy.glb.end()).find(part) != std::string::npos;
+}
+
+TEST(Proxies, ASmoothObjectHasNoFacets) {
+  const ProxyModel smooth = textured(testing::bumpy_sphere(60, 120));
+  for (const Proxy& proxy : proxies_of(smooth, {ProxyMode::kAlways, {6000, 12000}}).proxies)
+    EXPECT_TRUE(says(proxy, "\"NORMAL\""));
+  const ProxyModel facets = textured(testing::cube());
+  for (const Proxy& proxy : proxies_of(facets, {ProxyMode::kAlways, {6000}}).proxies)
+    EXPECT_FALSE(says(proxy, "\"NORMAL\""));
+}
+
+TEST(Proxies, TexturesAreReadWithMipLevelsWhereTheSourcesAre) {
+  ProxyModel model = textured(testing::bumpy_sphere(20, 40));
+  model.materials.push_back(model.materials[0]);
+  const auto reads_mips = [&](Minification first, Minification second) {
+    model.materials[0].base_colour_texture.minification = first;
+    model.materials[1].base_colour_texture.minification = second;
+    const Proxies made = proxies_of(model, {ProxyMode::kAlways, {8000}});
+    const bool with = says(made.proxies.at(0), "\"minFilter\":9987"),
+               without = says(made.proxies.at(0), "\"minFilter\":9729");
+    EXPECT_NE(with, without);
+    return with;
+  };
+  EXPECT_TRUE(reads_mips(Minification::kLinearMipmapLinear, Minification::kLinearMipmapLinear));
+  EXPECT_TRUE(reads_mips(Minification::kLinear, Minification::kNearestMipmapNearest));
+  EXPECT_FALSE(reads_mips(Minification::kLinear, Minification::kNearest));
 }
 
 TEST(Proxies, VertexColoursBecomeTexels) {
