@@ -8,7 +8,7 @@ namespace texmesh {
 
 void describe_program(CommandLine& line, const std::function<std::string()>& version_details) {
   line.version("texmesh " + tool_version() + ", package format " + std::to_string(kFormatMajor) + "." +
-               std::to_string(kFormatMinor),
+                   std::to_string(kFormatMinor),
                version_details);
   Command program = line.program();
   program.examples(

@@ -200,7 +200,8 @@ Command CommandLine::program() { return {app_.get(), *state_}; }
 void CommandLine::version(const std::string& text, const std::function<std::string()>& more) {
   const auto told = [this, text, more] { return app_->count("--verbose") > 0 ? text + "\n" + more() : text; };
   app_->set_version_flag("--version", told, "Print the versions of texmesh and of its package format");
-  const std::string help = "With --version: print libraries whose version changes bytes and what bounds a model's process, too";
+  const std::string help =
+      "With --version: print libraries whose version changes bytes and what bounds a model's process, too";
   app_->add_flag("--verbose", help);
 }
 

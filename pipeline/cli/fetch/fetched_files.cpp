@@ -1,4 +1,4 @@
-#include "pipeline/cli/fetched_files.h"
+#include "pipeline/cli/fetch/fetched_files.h"
 
 #include <filesystem>
 #include <span>
