@@ -27,7 +27,7 @@ struct BlockHead {
   std::uint64_t bytes = 0;
   Sha256 digest{};
 };
-constexpr std::size_t kHeadBytes = 8 + 32;
+constexpr std::size_t kBlockHeadBytes = 8 + 32;
 
 struct Block {
   std::vector<std::string> new_stages;
@@ -62,7 +62,7 @@ bool write_to_end(int fd, std::span<const std::uint8_t> bytes) {
   return true;
 }
 
-BlockHead head_of(std::span<const std::uint8_t, kHeadBytes> bytes) {
+BlockHead head_of(std::span<const std::uint8_t, kBlockHeadBytes> bytes) {
   BlockHead head;
   std::memcpy(&head.bytes, bytes.data(), 8);
   std::memcpy(head.digest.data(), bytes.data() + 8, 32);
@@ -103,16 +103,16 @@ bool MemoSegment::read_blocks(const std::function<void(MemoEntry)>& entry) {
   if (!read_at(file_.get(), 0, magic) || magic != kMagic) return false;
   bool last = false;
   std::uint64_t at = magic.size();
-  while (!last && at + kHeadBytes <= bytes_) {
-    std::array<std::uint8_t, kHeadBytes> bytes;
+  while (!last && at + kBlockHeadBytes <= bytes_) {
+    std::array<std::uint8_t, kBlockHeadBytes> bytes;
     if (!read_at(file_.get(), at, bytes)) return false;
     const BlockHead head = head_of(bytes);
     if (head.bytes > kMostBlockBytes) return false;
-    if (head.bytes > bytes_ - at - kHeadBytes) break;
+    if (head.bytes > bytes_ - at - kBlockHeadBytes) break;
     std::vector<std::uint8_t> payload(static_cast<std::size_t>(head.bytes));
-    if (!read_at(file_.get(), at + kHeadBytes, payload) || sha256(payload) != head.digest) return false;
-    if (!tell_block(payload, at + kHeadBytes, entry, last)) return false;
-    at += kHeadBytes + head.bytes;
+    if (!read_at(file_.get(), at + kBlockHeadBytes, payload) || sha256(payload) != head.digest) return false;
+    if (!tell_block(payload, at + kBlockHeadBytes, entry, last)) return false;
+    at += kBlockHeadBytes + head.bytes;
   }
   return is_finished() ? last && at == bytes_ : true;
 }
@@ -191,7 +191,7 @@ bool MemoSegmentWriter::flush() {
 
 bool MemoSegmentWriter::append(std::span<const std::uint8_t> payload) {
   if (failed_ || !open()) return failed_ = true, false;
-  std::vector<std::uint8_t> bytes(kHeadBytes);
+  std::vector<std::uint8_t> bytes(kBlockHeadBytes);
   const BlockHead head{payload.size(), sha256(payload)};
   std::memcpy(bytes.data(), &head.bytes, 8);
   std::memcpy(bytes.data() + 8, head.digest.data(), 32);
