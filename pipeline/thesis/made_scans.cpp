@@ -6,6 +6,7 @@
 #include <string>
 
 #include "format/base/portable_math.h"
+#include "format/rules/split_mix.h"
 #include "pipeline/import/import.h"
 #include "pipeline/import/memory_files.h"
 #include "stages/base/parallel.h"
@@ -94,11 +95,10 @@ Bytes radius_file(MadeShape shape, std::uint32_t columns, std::uint32_t rows) {
 double lattice_noise(double x, double y, std::uint32_t seed) {
   const double x0 = std::floor(x), y0 = std::floor(y);
   const auto corner = [&](double i, double j) {
-    auto z = static_cast<std::uint64_t>(static_cast<std::int64_t>(x0 + i)) * 0x9e3779b97f4a7c15ull +
-             static_cast<std::uint64_t>(static_cast<std::int64_t>(y0 + j)) * 0xc2b2ae3d27d4eb4full + seed;
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ull;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebull;
-    return static_cast<double>((z ^ (z >> 31)) >> 11) / 9007199254740992.0;
+    return SplitMix(
+               static_cast<std::uint64_t>(static_cast<std::int64_t>(x0 + i) - 1) * 0x9e3779b97f4a7c15ull +
+               static_cast<std::uint64_t>(static_cast<std::int64_t>(y0 + j)) * 0xc2b2ae3d27d4eb4full + seed)
+        .next();
   };
   const double u = x - x0, v = y - y0, su = u * u * (3 - 2 * u), sv = v * v * (3 - 2 * v);
   const double top = corner(0, 0) + su * (corner(1, 0) - corner(0, 0));

@@ -14,6 +14,7 @@
 #include "pipeline/cli/studies/studies.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/text_table.h"
+#include "stages/fragment_codec/fragment_codec.h"
 
 namespace texmesh {
 namespace {
@@ -58,7 +59,7 @@ PackageUse play_loads(const std::string& path, const RungArguments& args) {
   for (std::size_t p = 0; p < package.textures().size(); ++p) {
     const TextureInfo& info = package.textures()[p];
     const PlaneTables& tables = package.tables().planes[p];
-    const bool finest = info.mip == 0 && tables.rung_quality.back() == 100;
+    const bool finest = info.mip == 0 && tables.rung_quality.back() == kFinestQuality;
     out.planes.push_back({info.source_rung || finest, 0, std::vector<std::size_t>(tables.rung_count())});
   }
   const std::vector<OrdinaryLoad> loads = ordinary_loads(static_cast<std::size_t>(args.loads));
