@@ -62,7 +62,7 @@ int run(int argc, char** argv) {
   auto number = [&app](const char* name, int& value, int lo, int hi, const char* help) {
     app.add_option(name, value, help)->check(CLI::Range(lo, hi))->capture_default_str();
   };
-  number("--triangles", options.triangles, 48, 4'000'000, "triangles, about");
+  number("--triangles", options.triangles, 48, 50'000'000, "triangles, about");
   number("--texture", options.texture_px, 0, 16384, "side of the textures in px; 0 = vertex colours instead");
   number("--charts", options.charts, 2, 20'000, "charts of the texture atlas, about");
   number("--holes", options.holes, 0, 1000, "holes in the surface");

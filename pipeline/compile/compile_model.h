@@ -15,6 +15,9 @@ struct CompileRequest {
   std::string temporary;   // sibling of output that is renamed to it; "" = a name of its own
   CompileOptions options;  // resolved or not
   bool strict = false;     // warnings are errors
+  /// What this process may take; a model that surely needs more is refused before its meshes are read. 0 = no
+  /// limit but the machine's memory.
+  std::uint64_t memory_bytes = 0;
   // Digests of an earlier run, by stamp. A file whose stamp is known is not read to learn its digest.
   std::vector<FileRequest> known;
   StageKeys earlier_keys;    // of an earlier run, to explain against

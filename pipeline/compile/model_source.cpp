@@ -1,9 +1,13 @@
 #include "pipeline/compile/model_source.h"
 
+#include <fmt/format.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <cctype>
 #include <nlohmann/json.hpp>
 
+#include "pipeline/import/count_triangles.h"
 #include "pipeline/io/file_resolver.h"
 #include "pipeline/io/resource_error.h"
 #include "pipeline/io/wire_text.h"
@@ -13,6 +17,12 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 namespace fs = std::filesystem;
+
+std::uint64_t machine_memory_bytes() {
+  const long pages = ::sysconf(_SC_PHYS_PAGES), page = ::sysconf(_SC_PAGESIZE);
+  return pages > 0 && page > 0 ? static_cast<std::uint64_t>(pages) * static_cast<std::uint64_t>(page)
+                               : ~std::uint64_t{0};
+}
 
 std::string lower_extension(const fs::path& path) {
   std::string e = path.extension().string();
@@ -39,10 +49,34 @@ std::optional<std::vector<std::string>> uris_of(const std::string& note) {
   return uris;
 }
 
+/// Before work begins, instead of after minutes of it.
+void refuse_too_large(const std::string& name, const Bytes& bytes, std::uint64_t limit_bytes) {
+  const std::uint64_t machine = machine_memory_bytes();
+  const std::uint64_t most = limit_bytes > 0 ? std::min(limit_bytes, machine) : machine;
+  const std::uint64_t triangles = count_triangles(name, bytes), needed = least_memory_bytes(triangles);
+  if (needed <= most) return;
+  const auto gigabytes = [](std::uint64_t n) {
+    return fmt::format("{:.1f} GB", static_cast<double>(n) / 1e9);
+  };
+  throw ResourceError(name, "",
+                      fmt::format("a model that {} of memory are enough for ({})", gigabytes(most),
+                                  most == machine ? "the machine's" : "--model-memory"),
+                      fmt::format("{} triangles, which take {} or more", triangles, gigabytes(needed)));
+}
+
 }  // namespace
 
+/// Measured on made scans without textures.
+std::uint64_t least_memory_bytes(std::uint64_t triangles) {
+  constexpr std::uint64_t kPerTriangle = 400;
+  return kPerTriangle * triangles;
+}
+
 ModelSource::ModelSource(const CompileRequest& request)
-    : path_(request.input), options_(request.options.import), known_(request.known) {}
+    : path_(request.input),
+      options_(request.options.import),
+      memory_bytes_(request.memory_bytes),
+      known_(request.known) {}
 
 void ModelSource::open(Store& store, const RunContext& context, bool may_write_notes) {
   look_at_model();
@@ -115,6 +149,12 @@ void ModelSource::read_model() {
   main_ = found;
 }
 
+/// A file of a gigabyte need not wait for the package. Whoever needs it again reads it again.
+void ModelSource::forget_bytes() {
+  bytes_ = {};
+  has_bytes_ = false;
+}
+
 Sha256 ModelSource::list_key() const {
   Key key("import-files", kImportVersion);
   key.add("extension", lower_extension(path_));
@@ -147,9 +187,13 @@ ImportedModel ModelSource::import(const ImportOptions& options, const RunContext
   if (!has_bytes_) read_model();
   FileResolver resolver(path_.parent_path());
   try {
+    refuse_too_large(path_.filename().string(), bytes_, memory_bytes_);
     ImportedModel m = import_model(path_.filename().string(), bytes_, resolver, options, context);
     requests = resolver.requests();
+    forget_bytes();
     return m;
+  } catch (const ResourceError&) {
+    throw;
   } catch (const InputError& e) {
     requests = resolver.requests();
     if (resolver.failed_for_resources()) throw ResourceError(e.file(), e.place(), e.expected(), e.found());

@@ -12,6 +12,9 @@
 
 namespace texmesh {
 
+/// What compiling so many triangles takes at least, without their textures.
+std::uint64_t least_memory_bytes(std::uint64_t triangles);
+
 /// The model file with the files it refers to. Which those are is known only after an import, so the store
 /// remembers the list of the last one (as ccache's manifest does): while every file on it reads as it did,
 /// import need not run.
@@ -39,6 +42,7 @@ class ModelSource {
 
  private:
   void look_at_model();
+  void forget_bytes();
   void read_model();
   Sha256 list_key() const;
   bool unchanged_since(const std::string& note);
@@ -47,6 +51,7 @@ class ModelSource {
 
   std::filesystem::path path_;
   ImportOptions options_;  // of open()
+  std::uint64_t memory_bytes_ = 0;
   std::vector<FileRequest> known_;
   Bytes bytes_;
   bool has_bytes_ = false;

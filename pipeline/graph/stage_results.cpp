@@ -46,13 +46,15 @@ LoadedResult load_result(Store& store, const Stage& stage, std::size_t output, c
 std::vector<StoredBlob> put_results(Store& store, const Stage& stage, const Key& key,
                                     const StageResult& result) {
   std::vector<std::pair<std::string, SharedBytes>> encoded;
-  for (std::size_t k = 0; k < stage.outputs.size(); ++k)
-    encoded.emplace_back(stage.outputs[k].name,
-                         std::make_shared<const Bytes>(stage.outputs[k].encode(result.objects[k].get())));
-  encoded.emplace_back(stage.name + ".notes", std::make_shared<const Bytes>(encode_artefact(result.notes)));
-  store.put(key, encoded);
   std::vector<StoredBlob> blobs;
-  for (const auto& [name, bytes] : encoded) blobs.push_back({name, sha256(*bytes), bytes->size()});
+  const auto add = [&](const std::string& name, Bytes bytes) {
+    blobs.push_back({name, sha256(bytes), bytes.size()});
+    if (store.keeps_results()) encoded.emplace_back(name, std::make_shared<const Bytes>(std::move(bytes)));
+  };
+  for (std::size_t k = 0; k < stage.outputs.size(); ++k)
+    add(stage.outputs[k].name, stage.outputs[k].encode(result.objects[k].get()));
+  add(stage.name + ".notes", encode_artefact(result.notes));
+  if (store.keeps_results()) store.put(key, encoded);
   return blobs;
 }
 

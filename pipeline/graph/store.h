@@ -48,6 +48,8 @@ class Store {
   /// The bytes of a blob; null when it is gone or does not have this digest.
   virtual SharedBytes load(const StoredBlob& blob) = 0;
   virtual bool put(const Key& key, const std::vector<std::pair<std::string, SharedBytes>>& outputs) = 0;
+  /// False where put() forgets what it is given: its results need not be in memory together.
+  virtual bool keeps_results() const { return true; }
   /// The parts of a key that was put once (Key::preimage), whether its blobs are still there or not.
   virtual std::optional<std::string> preimage(const Sha256& key) = 0;
   /// The blobs that find() gave for the key have their digests but are no results of the stage (`reason`).
@@ -71,6 +73,7 @@ class NullStore : public Store {
   std::optional<std::vector<StoredBlob>> find(const Sha256&) override { return std::nullopt; }
   SharedBytes load(const StoredBlob&) override { return nullptr; }
   bool put(const Key&, const std::vector<std::pair<std::string, SharedBytes>>&) override { return true; }
+  bool keeps_results() const override { return false; }
   std::optional<std::string> preimage(const Sha256&) override { return std::nullopt; }
   std::optional<std::string> find_note(const Sha256&) override { return std::nullopt; }
   bool put_note(const Sha256&, const std::string&) override { return true; }

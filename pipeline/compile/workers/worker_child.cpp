@@ -160,6 +160,7 @@ CompileRequest request_of(const Json& job) {
   request.output = from_wire(job.at("output").get<std::string>());
   request.temporary = from_wire(job.at("temporary").get<std::string>());
   request.strict = job.at("strict").get<bool>();
+  request.memory_bytes = job.value("memory_bytes", std::uint64_t{0});
   request.known = files_from_json(job.at("known").get<std::string>());
   for (const auto& [stage, key] : job.at("keys").items())
     if (Sha256 digest; from_hex(key.get<std::string>(), digest)) request.earlier_keys[stage] = digest;
