@@ -9,6 +9,7 @@
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/options/command_line.h"
 #include "pipeline/cli/options/command_list.h"
+#include "pipeline/cli/options/told_errors.h"
 #include "pipeline/cli/program.h"
 #include "pipeline/io/core_path.h"
 #include "pipeline/io/exit_codes.h"
@@ -41,7 +42,8 @@ int main(int argc, char** argv) {
   using namespace texmesh;
   const std::string name = argc > 1 ? argv[1] : "";
   const bool only_tells = argc == 2 && (name == "--version" || name == "--help" || name == "-h");
-  if (!only_tells && name != "compile" && name != "cache") return start_core(argv);
+  if (!only_tells && name != "compile" && name != "cache")
+    return run_telling_errors([&] { return start_core(argv); });
   CommandLine line(kProgramSummary);
   Command program = line.program();
   if (name == "compile")

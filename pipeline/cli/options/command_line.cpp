@@ -2,8 +2,6 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <filesystem>
-#include <iostream>
 #include <iterator>
 #include <optional>
 #include <stdexcept>
@@ -11,6 +9,7 @@
 #include "pipeline/cli/options/command_list.h"
 #include "pipeline/cli/options/help_text.h"
 #include "pipeline/cli/options/shell_text.h"
+#include "pipeline/cli/options/told_errors.h"
 #include "pipeline/io/exit_codes.h"
 
 namespace texmesh {
@@ -226,21 +225,7 @@ int CommandLine::parse_and_run(int argc, char** argv) {
 }
 
 int CommandLine::run(int argc, char** argv) {
-  try {
-    return parse_and_run(argc, argv);
-  } catch (const UsageError& e) {
-    std::cerr << "texmesh: " << e.what() << '\n';
-    return kExitUsage;
-  } catch (const Error& e) {
-    std::cerr << "texmesh: " << e.what() << '\n';
-    return kExitModelFailed;
-  } catch (const std::filesystem::filesystem_error& e) {
-    std::cerr << "texmesh: " << e.what() << '\n';
-    return kExitModelFailed;
-  } catch (const std::exception& e) {
-    std::cerr << "texmesh: internal error: " << e.what() << '\n';
-    return kExitInternal;
-  }
+  return run_telling_errors([&] { return parse_and_run(argc, argv); });
 }
 
 }  // namespace texmesh
