@@ -124,8 +124,8 @@ std::vector<Plot> cut_plots(const std::vector<CutImage>& images) {
              "fragments in a row",
              "sum / file",
              1,
-             16,
-             1.3,
+             kMostFragmentRow,
+             1,
              0,
              false,
              {}};
@@ -134,7 +134,7 @@ std::vector<Plot> cut_plots(const std::vector<CutImage>& images) {
                  "sum / file",
                  0,
                  100,
-                 1.5,
+                 1,
                  0,
                  true,
                  {}};
@@ -151,8 +151,12 @@ std::vector<Plot> cut_plots(const std::vector<CutImage>& images) {
       by_quality.points.emplace_back(r.quality, ratio(r.sum_standard, r.file_standard));
       shared_by_quality.points.emplace_back(r.quality, ratio(r.sum_shared, r.file_standard));
     }
-    for (PlotSeries* s : {&complete, &shared}) grids.series.push_back(std::move(*s));
-    for (PlotSeries* s : {&by_quality, &shared_by_quality}) qualities.series.push_back(std::move(*s));
+    const auto add = [](PlotSeries line, Plot& plot) {
+      for (const auto& [at, value] : line.points) plot.y_high = std::max(plot.y_high, value);
+      plot.series.push_back(std::move(line));
+    };
+    add(std::move(complete), grids), add(std::move(shared), grids);
+    add(std::move(by_quality), qualities), add(std::move(shared_by_quality), qualities);
   }
   return {grids, qualities};
 }
