@@ -128,16 +128,18 @@ std::vector<Knot> sample_knots(const TextureData& data, const PlanesOfGroup& gro
   return knots;
 }
 
-std::optional<RenderTexture> texture_at(const TextureData& data, const ShownTexture& shown, const Knot& knot,
-                                        std::uint32_t source_first_level, const RunContext& context) {
+TextureMaker texture_at(const TextureData& data, const ShownTexture& shown, const Knot& knot,
+                        std::uint32_t source_first_level) {
   const std::optional<PlaneRung> colour = rung_of(data, knot, shown.plane);
-  if (!colour) return std::nullopt;
+  if (!colour) return {};
   std::optional<PlaneRung> alpha;
   std::uint32_t level = std::max(source_first_level, data.fragments.planes[colour->plane].mip);
   if (shown.alpha) alpha = rung_of(data, knot, *shown.alpha);
   // Both stand in one texture: the coarser of them decides.
   if (alpha) level = std::max(level, data.fragments.planes[alpha->plane].mip);
-  return coded_texture(data, shown, *colour, alpha, level, context);
+  return [&data, &shown, colour, alpha, level](const RunContext& context) {
+    return coded_texture(data, shown, *colour, alpha, level, context);
+  };
 }
 
 std::optional<RenderTexture> preview_at(const TextureData& data, const ShownTexture& shown,

@@ -1,6 +1,7 @@
 #pragma once
 // Inside the room only: groups of planes, and the rungs at which they are sampled.
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -48,9 +49,12 @@ std::vector<ShownMip> shown_mips(const TextureData& data, const PlanesOfGroup& g
 std::vector<Knot> sample_knots(const TextureData& data, const PlanesOfGroup& group, int samples,
                                const Display& display);
 
-/// The texture at that knot, which must have the texture's planes; nothing where it has not.
-std::optional<RenderTexture> texture_at(const TextureData& data, const ShownTexture& shown, const Knot& knot,
-                                        std::uint32_t source_first_level, const RunContext& context);
+/// Makes a texture, as often as it is called: textures take more memory than anything else of the stage.
+using TextureMaker = std::function<RenderTexture(const RunContext&)>;
+/// The texture at that knot; empty where the knot has not the texture's planes. `data` and `shown` must
+/// outlive the maker.
+TextureMaker texture_at(const TextureData& data, const ShownTexture& shown, const Knot& knot,
+                        std::uint32_t source_first_level);
 /// The same with the previews of the group's planes.
 std::optional<RenderTexture> preview_at(const TextureData& data, const ShownTexture& shown,
                                         const PlanesOfGroup& group, const RunContext& context);

@@ -3,22 +3,11 @@
 #include <algorithm>
 
 #include "stages/base/parallel.h"
-#include "stages/measure/image_compare.h"
 
 namespace texmesh::quality {
-namespace {
 
-struct Reference {
-  LumaPicture luma;
-  FlipPicture flip;
-};
-
-/// The shots of one scale in one view.
-struct ScaleShots {
-  std::size_t scale = 0;
-  std::vector<std::size_t> shots;
-};
-std::vector<ScaleShots> by_scale(const std::vector<Shot>& shots, const std::vector<std::size_t>& taken) {
+std::vector<SizePictures::ScaleShots> SizePictures::by_scale(const std::vector<Shot>& shots,
+                                                             const std::vector<std::size_t>& taken) {
   std::vector<ScaleShots> out;
   for (const std::size_t i : taken) {
     auto found = std::ranges::find(out, shots[i].scale, &ScaleShots::scale);
@@ -28,68 +17,76 @@ std::vector<ScaleShots> by_scale(const std::vector<Shot>& shots, const std::vect
   return out;
 }
 
-struct Task {
-  const Studio& studio;
-  const Materials& source;
-  const std::vector<Shot>& shots;
-  double displayed_px;
-  bool with_ssim;
+/// One picture per list of materials.
+PictureVariants SizePictures::pictures(std::size_t scale, const PicturePlace& place,
+                                       const std::vector<const Materials*>& materials,
+                                       const RunContext& context) const {
+  RenderScene scene = studio_.scenes[scale];
+  scene.materials = materials.front();
+  scene.texture_count = studio_.textures.size();
+  return shade_variants(scene, look(scene, place.camera, place.side_px, context), materials, studio_.textures,
+                        studio_.environment, context);
+}
 
-  /// One picture per list of materials.
-  PictureVariants pictures(std::size_t scale, const PicturePlace& place,
-                           const std::vector<const Materials*>& materials, const RunContext& context) const {
-    RenderScene scene = studio.scenes[scale];
-    scene.materials = materials.front();
-    scene.texture_count = studio.textures.size();
-    return shade_variants(scene, look(scene, place.camera, place.side_px, context), materials,
-                          studio.textures, studio.environment, context);
+Loss SizePictures::compare(const Reference& reference, const Picture& test) const {
+  Loss loss{compare_flip(reference.flip, prepare_flip(test)), 0};
+  if (with_ssim_) {
+    const PictureDifference d = compare_luma(reference.luma, prepare_luma(test));
+    loss.dssim = static_cast<double>(d.pixels) - d.ssim;
   }
-  PictureVariants pictures(const ScaleShots& of, const PicturePlace& place, bool with_source,
-                           const RunContext& context) const {
+  return loss;
+}
+
+/// Writes one loss of each shot that was taken. The reference is rendered together with shots of S_0, which
+/// share most of the work.
+void SizePictures::compare_view(std::size_t view, const std::vector<Shot>& shots,
+                                const std::vector<std::size_t>& taken, std::vector<Losses>& out,
+                                const RunContext& context) {
+  const PicturePlace place =
+      place_picture(studio_.frame, static_cast<int>(view), studio_.views.views, displayed_px_);
+  const auto compare_group = [&](const ScaleShots& group, const Reference* seen, const RunContext& run) {
     std::vector<const Materials*> materials;
-    if (with_source) materials.push_back(&source);
-    for (const std::size_t i : of.shots) materials.push_back(shots[i].materials);
-    return pictures(of.scale, place, materials, context);
-  }
-  Reference reference(const Picture& shown) const {
-    return {with_ssim ? prepare_luma(shown) : LumaPicture{}, prepare_flip(shown)};
-  }
-  Loss compare(const Reference& reference, const Picture& test) const {
-    Loss loss{compare_flip(reference.flip, prepare_flip(test)), 0};
-    if (with_ssim) {
-      const PictureDifference d = compare_luma(reference.luma, prepare_luma(test));
-      loss.dssim = static_cast<double>(d.pixels) - d.ssim;
+    if (!seen) materials.push_back(&source_);
+    for (const std::size_t i : group.shots) materials.push_back(shots[i].materials);
+    if (materials.empty()) return;
+    const PictureVariants shown = pictures(group.scale, place, materials, run);
+    const std::size_t first = seen ? 0 : 1;
+    if (!seen) {
+      const Picture whole = shown.picture(0);
+      seen = &(seen_[view] = {with_ssim_ ? prepare_luma(whole) : LumaPicture{}, prepare_flip(whole)});
     }
-    return loss;
-  }
-  /// Writes one loss of each shot that was taken.
-  void compare_view(std::size_t view, const PicturePlace& place, const std::vector<std::size_t>& taken,
-                    std::vector<Losses>& out, const RunContext& context) const {
-    std::vector<ScaleShots> groups = by_scale(shots, taken);
-    ScaleShots finest;
-    if (const auto found = std::ranges::find(groups, 0u, &ScaleShots::scale); found != groups.end()) {
-      finest = std::move(*found);
-      groups.erase(found);
-    }
-    const PictureVariants first = pictures(finest, place, true, context);
-    const Reference seen = reference(first.picture(0));
-    parallel_for(context, finest.shots.size(), 1, [&](std::size_t begin, std::size_t end) {
+    parallel_for(run, group.shots.size(), 1, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i)
-        out[finest.shots[i]][view] = compare(seen, first.picture(i + 1));
+        out[group.shots[i]][view] = compare(*seen, shown.picture(first + i));
     });
-    RunContext serial = context;
-    serial.threads = 1;
-    parallel_for(context, groups.size(), 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t g = begin; g < end; ++g) {
-        const PictureVariants shown = pictures(groups[g], place, false, serial);
-        for (std::size_t i = 0; i < shown.count(); ++i)
-          out[groups[g].shots[i]][view] = compare(seen, shown.picture(i));
-      }
-    });
+  };
+  std::vector<ScaleShots> groups = by_scale(shots, taken);
+  ScaleShots finest;
+  if (const auto found = std::ranges::find(groups, 0u, &ScaleShots::scale); found != groups.end()) {
+    finest = std::move(*found);
+    groups.erase(found);
   }
-};
+  const auto known = seen_.find(view);
+  compare_group(finest, known == seen_.end() ? nullptr : &known->second, context);
+  const Reference& seen = seen_.at(view);
+  RunContext serial = context;
+  serial.threads = 1;
+  parallel_for(context, groups.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t g = begin; g < end; ++g) compare_group(groups[g], &seen, serial);
+  });
+}
 
-}  // namespace
+std::vector<Losses> SizePictures::take(const std::vector<Shot>& shots, const RunContext& context) {
+  const auto views = static_cast<std::size_t>(studio_.views.views);
+  std::vector<Losses> out(shots.size(), Losses(views));
+  for (std::size_t v = 0; v < views; ++v) {
+    std::vector<std::size_t> taken;
+    for (std::size_t i = 0; i < shots.size(); ++i)
+      if (studio_.views.has(v, shots[i].views)) taken.push_back(i);
+    if (!taken.empty()) compare_view(v, shots, taken, out, context);
+  }
+  return out;
+}
 
 void Loss::add(const Loss& other) {
   flip.add(other.flip);
@@ -98,22 +95,6 @@ void Loss::add(const Loss& other) {
 
 double Loss::mean_dssim() const {
   return flip.pixels ? std::clamp(dssim / static_cast<double>(flip.pixels), 0.0, 1.0) : 0;
-}
-
-std::vector<Losses> take_shots(const Studio& studio, const Materials& source, double displayed_px,
-                               const std::vector<Shot>& shots, bool with_ssim, const RunContext& context) {
-  const Task task{studio, source, shots, displayed_px, with_ssim};
-  std::vector<Losses> out(shots.size(), Losses(static_cast<std::size_t>(studio.views.views)));
-  for (int v = 0; v < studio.views.views; ++v) {
-    const auto view = static_cast<std::size_t>(v);
-    std::vector<std::size_t> taken;
-    for (std::size_t i = 0; i < shots.size(); ++i)
-      if (studio.views.has(view, shots[i].views)) taken.push_back(i);
-    if (taken.empty()) continue;
-    const PicturePlace place = place_picture(studio.frame, v, studio.views.views, displayed_px);
-    task.compare_view(view, place, taken, out, context);
-  }
-  return out;
 }
 
 Loss pooled(const Losses& losses) {

@@ -1,9 +1,11 @@
 #pragma once
 // Inside the room only: pictures beside S_0's.
 #include <cstdint>
+#include <map>
 #include <vector>
 
 #include "stages/measure/flip.h"
+#include "stages/measure/image_compare.h"
 #include "stages/quality/framing.h"
 #include "stages/render/shade.h"
 
@@ -37,10 +39,39 @@ struct Shot {
 /// Per view; nothing where the shot was not taken.
 using Losses = std::vector<Loss>;
 
-/// Takes all shots at one displayed height. The reference is S_0 with `source`. `with_ssim`: else dssim stays
-/// 0. Views that no shot asks for are not rendered. One view at a time is in memory.
-std::vector<Losses> take_shots(const Studio& studio, const Materials& source, double displayed_px,
-                               const std::vector<Shot>& shots, bool with_ssim, const RunContext& context);
+/// Takes shots at one displayed height. The reference is S_0 with `source`, prepared once for each view that
+/// any shot asks for. One view at a time is in memory, but for what FLIP and SSIM compare of the references.
+class SizePictures {
+ public:
+  /// `with_ssim`: else dssim stays 0. `studio` and `source` must outlive the pictures; the studio's textures
+  /// may change between shots, but for those that `source` reads.
+  SizePictures(const Studio& studio, const Materials& source, double displayed_px, bool with_ssim)
+      : studio_(studio), source_(source), displayed_px_(displayed_px), with_ssim_(with_ssim) {}
+  std::vector<Losses> take(const std::vector<Shot>& shots, const RunContext& context);
+
+ private:
+  struct Reference {
+    LumaPicture luma;
+    FlipPicture flip;
+  };
+  /// The shots of one scale in one view.
+  struct ScaleShots {
+    std::size_t scale = 0;
+    std::vector<std::size_t> shots;
+  };
+  static std::vector<ScaleShots> by_scale(const std::vector<Shot>& shots,
+                                          const std::vector<std::size_t>& taken);
+  PictureVariants pictures(std::size_t scale, const PicturePlace& place,
+                           const std::vector<const Materials*>& materials, const RunContext& context) const;
+  Loss compare(const Reference& reference, const Picture& test) const;
+  void compare_view(std::size_t view, const std::vector<Shot>& shots, const std::vector<std::size_t>& taken,
+                    std::vector<Losses>& out, const RunContext& context);
+  const Studio& studio_;
+  const Materials& source_;
+  double displayed_px_;
+  bool with_ssim_;
+  std::map<std::size_t, Reference> seen_;  // by view
+};
 
 /// Of all views together, or of those in which `like` shows anything.
 Loss pooled(const Losses& losses);

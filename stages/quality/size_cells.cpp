@@ -33,9 +33,9 @@ class SizeShots {
   Replaced coded(const GroupCells& group, std::size_t knot) {
     Replaced out(source_, -1);
     for (std::size_t t = 0; t < source_; ++t)
-      if (auto texture = texture_at(sampler_.data, sampler_.shown.textures[t], group.knots[knot],
-                                    studio_.textures[t].first_level, context_))
-        out[t] = add(std::move(*texture));
+      if (TextureMaker texture = texture_at(sampler_.data, sampler_.shown.textures[t], group.knots[knot],
+                                            studio_.textures[t].first_level))
+        out[t] = add(std::move(texture));
     return out;
   }
 
@@ -43,7 +43,7 @@ class SizeShots {
     Replaced out(source_, -1);
     for (std::size_t t = 0; t < source_; ++t)
       if (auto texture = preview_at(sampler_.data, sampler_.shown.textures[t], group, context_))
-        out[t] = add(std::move(*texture));
+        out[t] = add([small = std::move(*texture)](const RunContext&) { return small; });
     return out;
   }
 
@@ -88,9 +88,11 @@ class SizeShots {
       shots_.insert(shots_.end(), scale_shots_.begin(), scale_shots_.end());
       to_.insert(to_.end(), scales_.begin(), scales_.end());
     } else {
-      take(sampler_.shown.materials, displayed_px, with_ssim, scale_shots_, scales_);
+      SizePictures pictures(studio_, sampler_.shown.materials, displayed_px, with_ssim);
+      take(pictures, scale_shots_, scales_);
     }
-    take(sampler_.shown.sampled, displayed_px, with_ssim, shots_, to_);
+    SizePictures pictures(studio_, sampler_.shown.sampled, displayed_px, with_ssim);
+    take(pictures, shots_, to_);
     for (const auto& [from, to] : repeated_) *to = *from;
     studio_.textures.resize(source_);
   }
@@ -128,17 +130,43 @@ class SizeShots {
     const auto [found, is_new] = uncoded_.try_emplace(mip, -1);
     const ShownTexture& shown = sampler_.shown.textures[mip.texture];
     if (is_new)
-      found->second = add(mip.is_source ? best_texture(sampler_.data, shown, 0, mip.level, context_)
-                                        : uncoded_texture(sampler_.data, shown, mip.level, context_));
+      found->second = add([this, &shown, mip](const RunContext& context) {
+        return mip.is_source ? best_texture(sampler_.data, shown, 0, mip.level, context)
+                             : uncoded_texture(sampler_.data, shown, mip.level, context);
+      });
     return found->second;
   }
-  void take(const Materials& source, double displayed_px, bool with_ssim, const std::vector<Shot>& shots,
-            const std::vector<Losses*>& to) {
-    std::vector<Losses> losses = take_shots(studio_, source, displayed_px, shots, with_ssim, context_);
-    for (std::size_t i = 0; i < to.size(); ++i) *to[i] = std::move(losses[i]);
+
+  /// Shots one after the other, with the textures that they read, as long as these are not too large
+  /// together.
+  void take(SizePictures& pictures, const std::vector<Shot>& shots, const std::vector<Losses*>& to) {
+    constexpr std::size_t kTogetherBytes = std::size_t{32} << 20;
+    for (std::size_t begin = 0; begin < shots.size();) {
+      std::size_t end = begin, bytes = 0;
+      while (end < shots.size() && bytes <= kTogetherBytes) bytes += make_textures(*shots[end++].materials);
+      const auto at = [](std::size_t i) { return static_cast<std::ptrdiff_t>(i); };
+      std::vector<Losses> losses =
+          pictures.take({shots.begin() + at(begin), shots.begin() + at(end)}, context_);
+      for (std::size_t i = begin; i < end; ++i) *to[i] = std::move(losses[i - begin]);
+      for (std::size_t t = source_; t < studio_.textures.size(); ++t) studio_.textures[t] = {};
+      begin = end;
+    }
   }
-  std::int32_t add(RenderTexture texture) {
-    studio_.textures.push_back(std::move(texture));
+  /// Those that are not there. Returns their bytes.
+  std::size_t make_textures(const Materials& materials) {
+    std::size_t bytes = 0;
+    for (const RenderMaterial& m : materials)
+      for (const TextureSlot& slot : m.textures) {
+        const auto t = static_cast<std::size_t>(slot.texture);
+        if (slot.texture < 0 || t < source_ || !studio_.textures[t].levels.empty()) continue;
+        studio_.textures[t] = makers_[t - source_](context_);
+        for (const Pixels& level : studio_.textures[t].levels) bytes += level.data.size();
+      }
+    return bytes;
+  }
+  std::int32_t add(TextureMaker maker) {
+    makers_.push_back(std::move(maker));
+    studio_.textures.emplace_back();
     return static_cast<std::int32_t>(studio_.textures.size() - 1);
   }
 
@@ -146,6 +174,7 @@ class SizeShots {
   Studio& studio_;
   const RunContext& context_;
   std::size_t source_;
+  std::vector<TextureMaker> makers_;  // of the studio's textures behind the source's
   std::map<MipShown, std::int32_t> uncoded_;
   std::deque<Materials> materials_;
   std::vector<Taken> taken_;
