@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <ostream>
 #include <set>
+#include <string_view>
 
 #include "format/base/errors.h"
 #include "pipeline/batch/fleet/run_summary.h"
@@ -71,9 +72,13 @@ class Batch {
 
   /// What killed runs have left beside the packages.
   void remove_leftovers() const {
-    std::set<std::string> folders;
-    for (const PlannedModel& m : plan_.models) folders.insert(fs::path(m.output).parent_path().string());
-    for (const std::string& folder : folders) remove_stale_temporaries(folder, ".texmesh");
+    std::set<std::string_view> folders;
+    for (const PlannedModel& m : plan_.models) {
+      const std::size_t slash = m.output.rfind('/');  // fs::path took a tenth of a run that does nothing
+      folders.insert(
+          std::string_view(m.output).substr(0, slash == std::string::npos ? 0 : slash + (slash == 0)));
+    }
+    for (const std::string_view folder : folders) remove_stale_temporaries(std::string(folder), ".texmesh");
   }
 
   void begin_progress() {

@@ -166,9 +166,9 @@ std::size_t remove_stale_temporaries(const std::string& folder, const std::strin
   std::error_code ec;
   for (std::filesystem::directory_iterator it(folder.empty() ? "." : folder, ec), end; !ec && it != end;
        it.increment(ec)) {
-    const std::string name = it->path().filename().string();
-    const auto parts = temporary_parts(name);
-    if (parts && parts->stem.ends_with(ending)) found.push_back(it->path().string());
+    const std::string& path = it->path().native();
+    const auto parts = temporary_parts(std::string_view(path).substr(path.rfind('/') + 1));
+    if (parts && parts->stem.ends_with(ending)) found.push_back(path);
   }
   return static_cast<std::size_t>(std::count_if(found.begin(), found.end(), remove_stale_temporary));
 }

@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <array>
-#include <filesystem>
 #include <optional>
+#include <string_view>
 
 #include "format/base/archive.h"
 #include "format/base/errors.h"
@@ -13,8 +13,6 @@
 
 namespace texmesh {
 namespace {
-
-namespace fs = std::filesystem;
 
 struct PackedFile {
   std::string uri;
@@ -152,10 +150,10 @@ StageKeys unpack_keys(std::span<const std::uint8_t> bytes, const StageNames& sta
 bool still_holds(MemoRecord& record, const std::string& input, const std::string& output, bool& refreshed) {
   refreshed = false;
   const std::int64_t now_ns = wall_clock_ns();
-  const std::string folder = fs::path(input).parent_path().string();
+  const std::string_view folder = std::string_view(input).substr(0, input.rfind('/') + 1);
   for (FileRequest& f : record.files) {
     const bool is_model = f.uri.empty();
-    const std::string path = is_model ? input : folder.empty() ? f.uri : folder + "/" + f.uri;
+    const std::string path = is_model ? input : std::string(folder) + f.uri;
     if (!f.found) {
       if (look(path, false)) return false;
       continue;

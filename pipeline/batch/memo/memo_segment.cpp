@@ -142,21 +142,30 @@ bool MemoSegment::tell_block(std::span<const std::uint8_t> payload, std::uint64_
   return true;
 }
 
+/// Models are asked for about in the order in which they were remembered: one read serves many.
+std::span<const std::uint8_t> MemoSegment::look(std::uint64_t at, std::size_t bytes) const {
+  constexpr std::size_t kWindowBytes = 8 << 10;
+  if (at < window_at_ || at + bytes > window_at_ + window_.size()) {
+    const std::uint64_t rest = at < bytes_ ? bytes_ - at : 0;
+    window_.resize(static_cast<std::size_t>(std::min<std::uint64_t>(std::max(bytes, kWindowBytes), rest)));
+    window_at_ = at;
+    if (window_.size() < bytes || !read_at(file_.get(), at, window_)) window_.clear();
+  }
+  if (window_.empty()) return {};
+  return std::span(window_).subspan(static_cast<std::size_t>(at - window_at_), bytes);
+}
+
 std::optional<MemoRecord> MemoSegment::record(const MemoEntry& entry) const {
-  std::vector<std::uint8_t> bytes(entry.bytes);
-  if (!read_at(file_.get(), entry.offset, bytes)) return std::nullopt;
   try {
-    return unpack_record(bytes);
+    return unpack_record(look(entry.offset, entry.bytes));
   } catch (const FormatError&) {
     return std::nullopt;
   }
 }
 
 StageKeys MemoSegment::keys(const MemoEntry& entry) const {
-  std::vector<std::uint8_t> bytes(entry.key_bytes);
-  if (!read_at(file_.get(), entry.offset + entry.bytes, bytes)) return {};
   try {
-    return unpack_keys(bytes, stages_);
+    return unpack_keys(look(entry.offset + entry.bytes, entry.key_bytes), stages_);
   } catch (const FormatError&) {
     return {};
   }

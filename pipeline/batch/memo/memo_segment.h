@@ -57,12 +57,16 @@ class MemoSegment {
   bool read_blocks(const std::function<void(MemoEntry)>& entry);
   bool tell_block(std::span<const std::uint8_t> payload, std::uint64_t at,
                   const std::function<void(MemoEntry)>& entry, bool& last);
+  /// Bytes of the file; fewer when it has changed.
+  std::span<const std::uint8_t> look(std::uint64_t at, std::size_t bytes) const;
   std::string path_;
   Descriptor file_;
   std::uint64_t bytes_ = 0;
   std::int64_t modified_ns_ = 0;
   bool damaged_ = false;
   StageNames stages_;
+  mutable std::vector<std::uint8_t> window_;
+  mutable std::uint64_t window_at_ = 0;
 };
 
 /// Writes a segment of its own, which no other process writes. The file is made with the first record. Losing
