@@ -291,7 +291,7 @@ constexpr const char* kNotes =
     "{\"version\":1,\"ladder\":{\"rungs\":[8,18,53,86]}}.\n"
     "A package is made again only when its model, a file that the model refers to, an option or texmesh has "
     "changed. A model that fails leaves the package that was there before.\n"
-    "Exit code: 0 all well, 1 some model failed, 2 usage, 3 internal error, 75 try again.";
+    "Exit code: 0 all well, 1 some model failed, 2 usage, 3 internal, 75 try again.";
 
 void add_compile_options(Command& c, CompileArguments& args) {
   c.option("INPUT", args.inputs,
