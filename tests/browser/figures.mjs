@@ -107,6 +107,9 @@ async function proxiesFirst() {
     row(`proxy first, ${name}: package bytes`, Math.round(bytes), '<= 45 056', bytes <= 45056);
     row(`proxy first, ${name}: seconds at 2 Mbit/s, 40 ms`, shown.at.toFixed(2), '', true);
     row(`proxy first, ${name}: lit FLIP beside S_0 at ${px} px`, flip?.toFixed(3), '', true);
+    for (const {proxy, at} of r.events.filter((e) => e.name === 'proxy' && e.proxy > 0)) row(`proxy first, ${name}: seconds to proxy ${proxy}`, at.toFixed(2), '', true);
+    const scale = r.events.find((e) => e.name === 'scale');
+    if (scale) row(`proxy first, ${name}: seconds to S_${scale.scale} in its place`, scale.at.toFixed(2), '', true);
     for (const at of [0.1, 0.3, 1, 4]) {
       const picture = await pictureAt(page, id, at);
       if (picture) fs.writeFileSync(path.join(pictures, `${name}-${at}s.png`), Buffer.from(picture, 'base64'));

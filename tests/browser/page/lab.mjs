@@ -68,7 +68,7 @@ function load(url, {open: openOptions = {}, load: loadOptions = {}, frames = 0, 
   let lastFrame = -1e9;
   const note = (name) => (e) => {
     run.events.push({name, ...e, error: undefined, at: (e.at - run.t0) / 1000});
-    if (['first-picture', 'scale', 'fragment', 'plane', 'deadline', 'done'].includes(name)) dirty = true;
+    if (['first-picture', 'proxy', 'scale', 'fragment', 'plane', 'deadline', 'done'].includes(name)) dirty = true;
   };
   const tick = () => {
     if (over === 'yes') return;
@@ -98,7 +98,7 @@ function load(url, {open: openOptions = {}, load: loadOptions = {}, frames = 0, 
         ...(px ? {display: () => run.px} : {}), signal: run.abort.signal, ...loadOptions,
       });
       run.model = model;
-      for (const name of ['first-picture', 'scale', 'plane', 'fragment', 'decision', 'progress', 'deadline', 'context', 'error', 'done'])
+      for (const name of ['first-picture', 'proxy', 'scale', 'plane', 'fragment', 'decision', 'progress', 'deadline', 'context', 'error', 'done'])
         model.on(name, note(name));
       requestAnimationFrame(tick);
       await model.done;

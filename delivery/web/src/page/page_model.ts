@@ -203,7 +203,7 @@ export class PageModel {
     this.load = load;
     this.complete = false;
     const redraw = (): void => host.redraw(this);
-    for (const name of ['scale', 'plane', 'fragment', 'context'] as const) load.on(name, redraw);
+    for (const name of ['proxy', 'scale', 'plane', 'fragment', 'context'] as const) load.on(name, redraw);
     load.on('progress', (event) => this.events_.emit('progress', event));
     load.on('error', ({ fatal, error }) => !fatal && this.say_(error, false)); // a fatal one ends `done`, too
     load.done.then(

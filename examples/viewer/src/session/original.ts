@@ -29,7 +29,7 @@ export class Original {
       ...stageOptions(this.stage, this.signal), time: Infinity, scale: 0, rung: 99, fullSize: true, autoRefine: false,
     });
     this.loaded = { pkg, model };
-    for (const name of ['first-picture', 'scale', 'fragment', 'done'] as const) model.on(name, () => this.stage.show());
+    for (const name of ['first-picture', 'proxy', 'scale', 'fragment', 'done'] as const) model.on(name, () => this.stage.show());
     try {
       await model.done;
     } catch (error) {
