@@ -173,7 +173,7 @@ class ProxyRun {
   /// FLIP likes facets of a smooth object even where they are large (a bust's .107 for .115 at 20 kB); who
   /// looks at them does not. Small ones are not seen, and the bytes of normals sharpen the textures.
   bool may_be_flat(const BakedProxy& baked, int bytes, bool first) const {
-    constexpr std::size_t kSmallFacets = 8000;
+    constexpr std::size_t kSmallFacets = 12000;  // a helmet of 9,000 showed them
     if (!smooth_) return first || flat_;
     return baked.atlas.triangles.size() >= kSmallFacets && (bytes < kFineFrom || flat_);
   }
