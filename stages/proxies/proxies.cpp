@@ -26,7 +26,7 @@ constexpr double kLeastBytesPerTriangle = 4;
 constexpr double kFirstMeshShare = 0.7, kMeshShare = 0.65, kLargeMeshShare = 0.55;
 constexpr int kFineFrom = 100000, kNormalMapPaysFrom = 100000;  // bytes
 constexpr int kFirstBits = 10, kBits = 11, kFineBits = 12;      // of positions
-constexpr double kOver = 1.02, kMostOfSource = 0.15;
+constexpr double kOverAsked = 1.02, kMostOfSource = 0.15;
 
 /// Source textures need not be finer than what a proxy and the pictures show of them.
 std::uint32_t least_side_px(const std::vector<Material>& materials) {
@@ -88,10 +88,10 @@ std::vector<int> sizes_to_try(const NestedScales& scales, const std::vector<Imag
   for (const int bytes : options.sizes) {
     if (proxies::whole_mesh_is_small(scales, static_cast<std::uint64_t>(bytes))) {
       note_none(notes, bytes, "S_0's mesh takes few of them, so the source's atlas can stay");
-    } else if (kOver * bytes > left) {
+    } else if (kOverAsked * bytes > left) {
       note_none(notes, bytes, "proxies take at most 15 % of the source");
     } else {
-      left -= kOver * bytes;
+      left -= kOverAsked * bytes;
       out.push_back(bytes);
     }
   }
@@ -173,7 +173,7 @@ class ProxyRun {
   /// FLIP likes facets of a smooth object even where they are large (a bust's .107 for .115 at 20 kB); who
   /// looks at them does not. Small ones are not seen, and the bytes of normals sharpen the textures.
   bool may_be_flat(const BakedProxy& baked, int bytes, bool first) const {
-    constexpr std::size_t kSmallFacets = 8000;
+    constexpr std::size_t kSmallFacets = 12000;  // a helmet of 9,000 showed them
     if (!smooth_) return first || flat_;
     return baked.atlas.triangles.size() >= kSmallFacets && (bytes < kFineFrom || flat_);
   }

@@ -9,8 +9,9 @@
 
 namespace texmesh::proxies {
 
-/// Unit normals per vertex, equal where vertices share position and group: the mean of what S_0 shows, normal
-/// maps included, on the triangles around, each sample by its corner's share. Same bits for any thread count.
+/// Unit normals per vertex: the mean of what S_0 shows, normal maps included, on the triangles around, each
+/// sample by its corner's share. Vertices that share position and group have one normal where their means
+/// turn by less than 50 degrees, so a crease at which charts end stays one. Same bits for any thread count.
 std::vector<Vec3f> sampled_normals(const AtlasMesh& mesh, const BakeSource& source,
                                    const RunContext& context);
 

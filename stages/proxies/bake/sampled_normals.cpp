@@ -57,7 +57,7 @@ CornerSums sums_of(const AtlasMesh& mesh, std::size_t triangle, const std::vecto
   return out;
 }
 
-/// Vertices that have one normal: equal position and group.
+/// Vertices of equal position and group have one number.
 std::vector<std::uint32_t> shared_normals(const AtlasMesh& mesh) {
   std::vector<std::uint32_t> group(mesh.positions.size(), 0);
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
@@ -68,6 +68,30 @@ std::vector<std::uint32_t> shared_normals(const AtlasMesh& mesh) {
     out.push_back(index.try_emplace({mesh.position_of[v], group[v]}, static_cast<std::uint32_t>(index.size()))
                       .first->second);
   return out;
+}
+
+/// Gives vertices of one number the sum over those whose own sums turn little from each other. The others lie
+/// on the two sides of a crease at which charts end.
+void join_sides(const std::vector<std::uint32_t>& shared, std::vector<Vec3d>& sums) {
+  constexpr double kCrease = 0.64;  // cosine, of 50 degrees: coarse triangles of round shapes turn by 30
+  struct Side {
+    Vec3d sum;
+    std::vector<std::size_t> vertices;
+  };
+  std::vector<std::vector<Side>> sides(shared.size());
+  for (std::size_t v = 0; v < shared.size(); ++v) {
+    std::vector<Side>& known = sides[shared[v]];
+    const Vec3d n = normalized(sums[v]);
+    auto side = std::find_if(known.begin(), known.end(), [&](const Side& s) {
+      return !(dot(n, n) > 0.5) || dot(normalized(s.sum), n) >= kCrease;
+    });
+    if (side == known.end()) side = known.insert(known.end(), Side{});
+    side->sum = side->sum + sums[v];
+    side->vertices.push_back(v);
+  }
+  for (const std::vector<Side>& known : sides)
+    for (const Side& side : known)
+      for (const std::size_t v : side.vertices) sums[v] = side.sum;
 }
 
 }  // namespace
@@ -89,12 +113,13 @@ std::vector<Vec3f> sampled_normals(const AtlasMesh& mesh, const BakeSource& sour
   std::vector<Vec3d> total(shared.size());
   for (std::size_t t = 0; t < sums.size(); ++t)
     for (std::size_t k = 0; k < 3; ++k) {
-      Vec3d& sum = total[shared[mesh.triangles[t][k]]];
+      Vec3d& sum = total[mesh.triangles[t][k]];
       sum = sum + sums[t][k];
     }
+  join_sides(shared, total);
   std::vector<Vec3f> out;
   for (std::size_t v = 0; v < shared.size(); ++v) {
-    const Vec3d n = normalized(total[shared[v]]);
+    const Vec3d n = normalized(total[v]);
     out.push_back(to_float(dot(n, n) > 0.5                   ? n
                            : dot(smooth[v], smooth[v]) > 0.5 ? smooth[v]
                                                              : Vec3d{0, 1, 0}));

@@ -21,7 +21,7 @@ constexpr double kFewBits = 0.7, kManyBits = 1.5;
 constexpr double kMeshoptBytes = 9.5, kDracoBytes = 3.2;  // of a triangle, until one mesh is coded
 constexpr int kAttempts = 3;
 constexpr double kLeastMiss = 0.7, kMostMiss = 1.1;  // of a mesh' bytes: textures take what is left
-constexpr double kWorthPacking = 1.25;               // a larger texture of the same mesh, side to side
+constexpr double kWorthPacking = 1.15;               // a larger texture of the same mesh, side to side
 constexpr std::size_t kSamples = 250000;
 
 /// Packs at the side, or at the least larger one that holds the charts.

@@ -21,7 +21,7 @@ constexpr std::uint32_t kMostCells = 512;
 // Covers that are tried, as shares of the texture: first down from kFirstCover until all charts fit, then
 // halves of what lies between.
 constexpr double kFirstCover = 0.7, kCoverStep = 0.85;
-constexpr int kCoverSteps = 40, kHalvings = 2;
+constexpr int kCoverSteps = 40, kHalvings = 3;
 
 struct TextureSize {
   std::uint32_t width_px, height_px, gutter_px;

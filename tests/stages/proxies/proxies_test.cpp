@@ -154,7 +154,7 @@ ProxyModel many_materials() {
 }
 
 ProxyModel masked() {
-  ProxyModel out = textured(testing::sheet(30));
+  ProxyModel out = textured(testing::sheet(20));
   out.materials[0].alpha_mode = AlphaMode::kMask;
   out.materials[0].double_sided = true;
   add_plane(out, TextureRole::kAlpha, 256,
@@ -164,7 +164,7 @@ ProxyModel masked() {
 
 /// The lower half has another material, without a texture, and coordinates without area.
 ProxyModel partly_without_coordinates() {
-  ProxyModel out = textured(testing::bumpy_sphere(30, 60));
+  ProxyModel out = textured(testing::bumpy_sphere(20, 40));
   out.materials.emplace_back().base_colour = {0.2f, 0.8f, 0.3f, 1};
   for (std::uint32_t t = 0; t < out.mesh.triangles.size(); ++t) {
     if (out.mesh.positions[out.mesh.position_of(t, 0)].y > 0) continue;
@@ -202,11 +202,11 @@ void expect_sound_at_two_sizes(const std::string& what, const ProxyModel& model)
 }
 
 TEST(Proxies, HardMaterialsHaveAProxyOrANote) {
-  const ProxyModel sphere = textured(testing::bumpy_sphere(30, 60));
+  const ProxyModel sphere = textured(testing::bumpy_sphere(20, 40));
   const std::vector<std::pair<std::string, ProxyModel>> models{
       {"220 materials", many_materials()},
       {"alpha mask", masked()},
-      {"blended sheet", changed(textured(testing::sheet(30)),
+      {"blended sheet", changed(textured(testing::sheet(20)),
                                 [](ProxyModel& m) { m.materials[0].alpha_mode = AlphaMode::kBlend; })},
       {"blended leaves", leaves(AlphaMode::kBlend)},
       {"leaves cut out", leaves(AlphaMode::kMask)},
@@ -225,7 +225,7 @@ TEST(Proxies, HardMaterialsHaveAProxyOrANote) {
 }
 
 TEST(Proxies, HardShapesHaveAProxyOrANote) {
-  const ProxyModel sphere = textured(testing::bumpy_sphere(30, 60));
+  const ProxyModel sphere = textured(testing::bumpy_sphere(20, 40));
   const auto turned = [](const Mesh& mesh, std::uint32_t every) {
     ProxyModel out = textured(mesh);
     for (std::uint32_t t = 0; t < out.mesh.triangles.size(); t += every)
@@ -236,11 +236,11 @@ TEST(Proxies, HardShapesHaveAProxyOrANote) {
       testing::side_by_side({testing::bumpy_sphere(15, 30), testing::inside_out(testing::cube())});
   const std::vector<std::pair<std::string, ProxyModel>> models{
       {"one triangle", one_triangle()},
-      {"open sheet", textured(testing::sheet(30))},
+      {"open sheet", textured(testing::sheet(20))},
       {"slivers", textured(testing::sliver_sheet(20))},
-      {"inside out", textured(testing::inside_out(testing::bumpy_sphere(30, 60)))},
+      {"inside out", textured(testing::inside_out(testing::bumpy_sphere(20, 40)))},
       {"a part inside out", textured(pair)},
-      {"every third triangle inside out", turned(testing::bumpy_sphere(30, 60), 3)},
+      {"every third triangle inside out", turned(testing::bumpy_sphere(20, 40), 3)},
       {"far away", changed(sphere,
                            [](ProxyModel& m) {
                              for (Vec3f& p : m.mesh.positions) p = p * 1000.0f + Vec3f{1e7f, 1e7f, -1e7f};
@@ -253,7 +253,7 @@ TEST(Proxies, HardShapesHaveAProxyOrANote) {
                             [](ProxyModel& m) {
                               for (Vec3f& p : m.mesh.positions) p = {1, 1, 1};
                             })},
-      {"3,000 pebbles", textured(testing::side_by_side(std::vector<Mesh>(3000, testing::cube())))}};
+      {"2,000 pebbles", textured(testing::side_by_side(std::vector<Mesh>(2000, testing::cube())))}};
   for (const auto& [what, model] : models) expect_sound_at_two_sizes(what, model);
 }
 
@@ -350,7 +350,7 @@ bool says(const Proxy& proxy, const std::string& part) {
 }
 
 TEST(Proxies, ASmoothObjectHasNoFacets) {
-  const ProxyModel smooth = textured(testing::bumpy_sphere(60, 120));
+  const ProxyModel smooth = textured(testing::bumpy_sphere(40, 80));
   for (const Proxy& proxy : proxies_of(smooth, {ProxyMode::kAlways, {6000, 12000}}).proxies)
     EXPECT_TRUE(says(proxy, "\"NORMAL\""));
   const ProxyModel facets = textured(testing::cube());
