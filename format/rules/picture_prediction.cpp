@@ -9,7 +9,7 @@ namespace texmesh {
 namespace {
 
 constexpr double kLeastFlip = 1e-6;                    // what logarithms take for 0
-constexpr double kFlattest = 0.25, kSteepest = 1;      // of the lines that go on before the first sample
+constexpr double kFlattest = 0.25, kSteepest = 1;      // of the lines that go on beyond the samples
 constexpr double kBehindOneSample = 0.5;               // slope of the line that goes on behind a single one
 constexpr double kLeastDssim = 1e-9, kMostFlip = 1.0;  // 0 of texels is 0 of the picture
 
@@ -91,7 +91,8 @@ double GroupCurve::Curve::at(double texel_dssim) const {
   std::size_t i = 0;
   while (i + 2 < n && log_dssim[i + 1] < x) ++i;
   double slope = (log_flip[i + 1] - log_flip[i]) / (log_dssim[i + 1] - log_dssim[i]);
-  if (x < log_dssim[0]) slope = std::clamp(slope, kFlattest, kSteepest);
+  if (x < log_dssim[0] || x > log_dssim[n - 1]) slope = std::clamp(slope, kFlattest, kSteepest);
+  if (x > log_dssim[n - 1]) i = n - 1;
   return portable::exp(log_flip[i] + slope * (x - log_dssim[i]));
 }
 

@@ -26,7 +26,8 @@ class GroupCurve {
  public:
   GroupCurve(const QualityTable& table, PlaneGroup group, double displayed_px);
   /// What rungs add where the texels lose `texel_dssim` >= 0: FLIP, 0 for 0, along straight lines through the
-  /// samples' logarithms, which go on before the first and behind the last sample. Twice as large texels lose
+  /// samples' logarithms. Before the first and behind the last sample the slope is 0.25 to 1: by a steeper
+  /// one fragments that the preview shows well would seem to lose next to nothing. Twice as large texels lose
   /// kLossPerDoubling times as much, and half as large ones 1 / kLossPerHalving of it: what coarse quantisers
   /// take, finer texels do not bring back. 0..1, not falling.
   double coded(double texel_dssim, const TexelGrowth& growth = {}) const;

@@ -231,6 +231,7 @@ TextureWays measure_ways(const Fragments& fragments, const std::vector<Pixels>& 
                          const std::vector<std::uint8_t>& preview_file, const RunContext& context) {
   const std::vector<std::size_t> chain = chain_of(fragments, base);
   TextureWays out;
+  out.closes_gaps = is_colour(fragments.planes[base].role);
   measure_size(fragments.planes[base], out);
   for (std::size_t level = 0; level < chain.size(); ++level) {
     const PlaneLadder& ladder = planes[chain[level]];

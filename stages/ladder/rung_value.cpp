@@ -214,15 +214,17 @@ void drop_pairs(const TextureWays& texture, const GivenBytes& given, const Asked
   bool bound = false;
   const auto drop = [&] {
     for (;;) {
-      const std::size_t next = next_to_go(texture, keep, gap_closers(texture, keep, given),
-                                          worth_of(texture, keep, given, whole), asked);
+      const std::vector<std::uint8_t> closers =
+          texture.closes_gaps ? gap_closers(texture, keep, given) : std::vector<std::uint8_t>(keep.size());
+      const std::size_t next =
+          next_to_go(texture, keep, closers, worth_of(texture, keep, given, whole), asked);
       if (next == kPreview) return;
       bound = bound || bytes_of(texture, keep) > texture.most_bytes;
       keep[next] = 0;
     }
   };
   drop();
-  if (!bound) return;
+  if (!bound || !texture.closes_gaps) return;
   swap_pairs(texture, given, keep);
   drop();
 }

@@ -23,6 +23,7 @@ struct TextureWays {
   std::vector<RungPair> pairs;       // by (level, rung)
   std::uint64_t whole_bytes = 0;     // by which pairs are judged; 0: those of the largest pair
   double most_bytes = std::numeric_limits<double>::infinity();  // that all stored pairs may take together
+  bool closes_gaps = true;  // whether pairs stay, and are swapped, because neighbours are far apart
 };
 
 /// What a load is to textures.
@@ -45,8 +46,8 @@ std::vector<TextureLoad> texture_loads();
 /// Fixed pairs stay, and one of each level. A pair stays, too, that enough loads choose and without which two
 /// neighbours, of all that no other pair beats in bytes and loss, would be more than 2.5 times apart in
 /// bytes, when the finer one of them saves what somebody sees. Where all take too much the least worthy of
-/// these go, as the last ones; then such a texture's pairs are swapped (swap_pairs() of rung_gaps.h). Pure;
-/// same result anywhere.
+/// these go, as the last ones; then such a texture's pairs are swapped (swap_pairs() of rung_gaps.h). Both
+/// only where TextureWays::closes_gaps. Pure; same result anywhere.
 std::vector<std::vector<std::uint8_t>> pairs_worth_storing(const std::vector<TextureWays>& textures,
                                                            const std::vector<TextureLoad>& loads, double gain,
                                                            double least_share);

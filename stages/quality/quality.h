@@ -11,7 +11,7 @@
 
 namespace texmesh {
 
-inline constexpr int kQualityVersion = 12;
+inline constexpr int kQualityVersion = 13;
 
 struct QualityOptions {
   int views = 4;

@@ -44,6 +44,23 @@ TEST(GroupCurve, GoesThroughTheSamples) {
   EXPECT_EQ(at64.halved({99, 99}, 200), 1);
 }
 
+TEST(GroupCurve, LinesBeyondTheSamplesAreNeitherSteepNorFlat) {
+  const auto curve = [](float first, float second) {
+    QualityTable t = make_table();
+    for (TextureLosses& l : t.groups[0].sizes) l.coded = losses({first, second});
+    return GroupCurve(t, PlaneGroup::kColour, 64);
+  };
+  // Between the samples 1 - SSIM grows 16 times; FLIP 64 times, not at all, and 4 times.
+  const GroupCurve steep = curve(0.00390625f, 0.25f), flat = curve(0.125f, 0.125f),
+                   own = curve(0.0625f, 0.25f);
+  EXPECT_NEAR(steep.coded(0.5), 0.5, 1e-12) << "twice as much of twice as much";
+  EXPECT_NEAR(steep.coded(0.0078125), 0.001953125, 1e-12);
+  EXPECT_NEAR(steep.coded(0.0625), 0.03125, 1e-12) << "between the samples as steep as they are";
+  EXPECT_NEAR(flat.coded(4), 0.25, 1e-12);
+  EXPECT_NEAR(flat.coded(0.0625), 0.125, 1e-12);
+  EXPECT_NEAR(own.coded(1), 0.5, 1e-12) << "the nearest line's";
+}
+
 TEST(GroupCurve, NothingLostIsNothing) {
   const GroupCurve curve(make_table(), PlaneGroup::kColour, 300);
   EXPECT_EQ(curve.coded(0), 0);

@@ -43,6 +43,17 @@ TEST(RungLoss, ATextureIsAsLargeAsItsTexelsOnABall) {
   EXPECT_NEAR(ways.texels_across, std::sqrt(512 * 384 / 3.14159265), 0.01);
 }
 
+TEST(RungLoss, ColoursAloneCloseGaps) {
+  Chain chain = make_chain(false, false);
+  const Ladder ladder = encode(chain, false);
+  for (const auto& [role, closes] :
+       {std::pair{TextureRole::kBaseColour, true}, std::pair{TextureRole::kEmissive, true},
+        std::pair{TextureRole::kNormal, false}, std::pair{TextureRole::kOcclusionRoughnessMetallic, false}}) {
+    chain.fragments.planes[0].role = role;
+    EXPECT_EQ(ways_of(chain, ladder).closes_gaps, closes) << static_cast<int>(role);
+  }
+}
+
 TEST(RungLoss, TheSourcesOwnRungIsFixed) {
   const Chain chain = make_chain(false);
   Ladder ladder = encode(chain, false);

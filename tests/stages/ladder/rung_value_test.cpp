@@ -114,6 +114,13 @@ TEST(RungValue, WhatClosesAGapGoesWhereAllTakeTooMuch) {
   EXPECT_EQ(kept(one, 1e9), (Rungs{0, 3}));
 }
 
+TEST(RungValue, GapsOfTexturesThatDoNotCloseThemStay) {
+  TextureWays one = texture({{300'000, 0.3}, {700'000, 0.2}, {1'500'000, 0.1}, {3'000'000, 0.01}});
+  one.pairs.front().fixed = one.pairs.back().fixed = true;
+  one.closes_gaps = false;
+  EXPECT_EQ(kept(one, 1e9), (Rungs{0, 3}));
+}
+
 TEST(RungValue, EveryLevelKeepsAPair) {
   TextureWays one = texture({{500'000, 0.1}, {5'000'000, 0.01}});
   one.texels_across = 100;  // no display wants the mip

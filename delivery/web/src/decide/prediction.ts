@@ -57,7 +57,8 @@ class Curve {
     if (x.length === 1) return exp(y[0] + (logDssim < x[0] ? 1 : 0.5) * (logDssim - x[0]));
     while (i + 2 < x.length && x[i + 1] < logDssim) ++i;
     const slope = (y[i + 1] - y[i]) / (x[i + 1] - x[i]);
-    return exp(y[i] + (logDssim < x[0] ? clamp(slope, 0.25, 1) : slope) * (logDssim - x[i]));
+    const from = logDssim > x[i + 1] ? i + 1 : i;
+    return exp(y[from] + (from > i || logDssim < x[0] ? clamp(slope, 0.25, 1) : slope) * (logDssim - x[from]));
   }
   atLevel(level: number): number {
     const mips = this.mips_;
