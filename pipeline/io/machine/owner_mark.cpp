@@ -39,7 +39,7 @@ std::string machine_digits() {
       .substr(0, kMachineDigits);
 }
 
-const std::string& this_machine() {
+const std::string& machine_id() {
   static const std::string digits = machine_digits();
   return digits;
 }
@@ -75,7 +75,7 @@ bool is_alive(pid_t pid) {
 
 std::string owner_mark() {
   static const std::string host = host_letters();
-  const std::string machine = this_machine().empty() ? std::string(kMachineDigits, '0') : this_machine();
+  const std::string machine = machine_id().empty() ? std::string(kMachineDigits, '0') : machine_id();
   return host + "-" + machine + "-" + std::to_string(::getpid());
 }
 
@@ -86,7 +86,7 @@ bool is_owner_mark(std::string_view text) {
 
 bool owner_may_live(std::string_view mark, std::int64_t modified_ns) {
   MarkParts parts;
-  if (read_mark(mark, parts) && !this_machine().empty() && parts.machine == this_machine())
+  if (read_mark(mark, parts) && !machine_id().empty() && parts.machine == machine_id())
     return is_alive(parts.pid);
   return modified_ns > wall_clock_ns() - kDay_ns;
 }
