@@ -1,10 +1,15 @@
 #include "pipeline/io/markup.h"
 
+#include <nlohmann/json.hpp>
+
 namespace texmesh {
 
 std::string markup_escaped(std::string_view text) {
+  using Json = nlohmann::json;
+  const std::string sound =
+      Json::parse(Json(text).dump(-1, ' ', false, Json::error_handler_t::replace)).get<std::string>();
   std::string out;
-  for (const char c : text) switch (c) {
+  for (const char c : sound) switch (c) {
       case '&':
         out += "&amp;";
         break;

@@ -5,7 +5,8 @@
 namespace texmesh {
 
 /// Text as it may stand in an element of HTML or XML, or in an attribute between quotes. Control characters,
-/// most of which XML 1.0 cannot write, become question marks; line feeds and tabs stay, as references.
+/// most of which XML 1.0 cannot write, become question marks; line feeds and tabs stay, as references. Bytes
+/// that are no UTF-8 (a file name may hold any) become U+FFFD.
 std::string markup_escaped(std::string_view text);
 
 }  // namespace texmesh

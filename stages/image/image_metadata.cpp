@@ -11,6 +11,7 @@
 #include <string_view>
 
 #include "format/base/bytes.h"
+#include "stages/image/jpeg_segments.h"
 
 namespace texmesh {
 namespace {
@@ -160,16 +161,7 @@ void read_jpeg(ByteSpan bytes, ImageMetadata& out) {
   constexpr std::string_view kIcc("ICC_PROFILE\0", 12);
   std::map<std::uint8_t, ByteSpan> profile;  // its pieces by number, from 1
   std::uint8_t pieces = 0;
-  for (std::size_t at = 2; at + 4 <= bytes.size() && bytes[at] == 0xff;) {
-    const std::uint8_t marker = bytes[at + 1];
-    if (marker == 0xff) {  // fill
-      ++at;
-      continue;
-    }
-    if (marker == 0xda) break;  // the pixels
-    const std::size_t length = big(bytes.subspan(at + 2, 2));
-    if (length < 2) break;
-    const ByteSpan body = part(bytes, at + 4, length - 2);
+  for_each_jpeg_segment(bytes, [&](std::uint8_t marker, ByteSpan body) {
     if (marker == 0xe1 && begins(body, "Exif")) read_exif(body, out);
     if (marker == 0xe2 && begins(body, kIcc)) {
       out.damaged_profile = true;  // until all pieces are there
@@ -178,10 +170,8 @@ void read_jpeg(ByteSpan bytes, ImageMetadata& out) {
         pieces = body[kIcc.size() + 1];
       }
     }
-    const bool frame = marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc;
-    if (frame && body.size() > 5) out.cmyk = body[5] == 4;
-    at += 2 + length;
-  }
+    if (is_jpeg_frame(marker) && body.size() > 5) out.cmyk = body[5] == 4;
+  });
   if (profile.empty() || profile.size() != pieces || profile.begin()->first != 1 ||
       profile.rbegin()->first != pieces)
     return;

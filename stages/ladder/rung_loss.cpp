@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "stages/base/parallel.h"
+#include "stages/image/jpeg_segments.h"
 #include "stages/measure/fragment_meter.h"
 #include "stages/measure/scale_samples.h"
 
@@ -173,14 +174,11 @@ std::vector<double> mean_losses(
 
 /// Whether the fragments of a JPEG rung have fewer samples of chroma than of luma.
 bool has_halved_chroma(const LadderRung& rung) {
-  const std::vector<std::uint8_t>& head = rung.table_stream;
-  for (std::size_t at = 2; at + 4 <= head.size() && head[at] == 0xff;) {
-    const std::size_t length = std::size_t{head[at + 2]} << 8 | head[at + 3];
-    const bool frame = head[at + 1] == 0xc0 || head[at + 1] == 0xc2;
-    if (frame && at + 15 < head.size() && head[at + 9] == 3) return head[at + 11] != head[at + 14];
-    at += 2 + length;
-  }
-  return false;
+  bool halved = false;
+  for_each_jpeg_segment(rung.table_stream, [&](std::uint8_t marker, ByteSpan body) {
+    if (is_jpeg_frame(marker) && body.size() > 10 && body[5] == 3) halved = body[7] != body[10];
+  });
+  return halved;
 }
 
 /// TextureWays::surface and texels_across.

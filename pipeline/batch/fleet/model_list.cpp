@@ -1,8 +1,8 @@
 #include "pipeline/batch/fleet/model_list.h"
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
 
+#include "pipeline/batch/fleet/json_lines.h"
 #include "pipeline/batch/fleet/named_files.h"
 
 namespace texmesh {
@@ -35,26 +35,15 @@ ModelList list_collection(PlanRequest request, int shards) {
   return list;
 }
 
-/// One line a model, as in summaries.
 std::string write_model_list(const ModelList& list) {
   using ListJson = nlohmann::ordered_json;
-  const auto line = [](const ListJson& j) {
-    return j.dump(-1, ' ', false, ListJson::error_handler_t::replace);
-  };
   ListJson head{{"version", 1}, {"shards", list.shards}};
   if (!list.collection.empty()) head["collection"] = list.collection;
   head["collections"] = list.collections;
-  std::string out = line(head);
-  out.back() = ',';
-  out += "\n\"models\":[";
-  for (const ListedModel& m : list.models)
-    out += (&m == list.models.data() ? "\n" : ",\n") + line({{"model", m.input},
-                                                             {"output", m.output},
-                                                             {"package", m.package},
-                                                             {"files", m.files},
-                                                             {"bytes", m.bytes},
-                                                             {"shard", m.shard}});
-  return out + "\n]}\n";
+  return json_with_lines(head, "models", list.models, [](const ListedModel& m) {
+    return ListJson{{"model", m.input}, {"output", m.output}, {"package", m.package},
+                    {"files", m.files}, {"bytes", m.bytes},   {"shard", m.shard}};
+  });
 }
 
 }  // namespace texmesh

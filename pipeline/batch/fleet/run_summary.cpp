@@ -7,6 +7,7 @@
 
 #include "format/base/bounded_json.h"
 #include "format/base/errors.h"
+#include "pipeline/batch/fleet/json_lines.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/markup.h"
 
@@ -14,12 +15,6 @@ namespace texmesh {
 namespace {
 
 using SummaryJson = nlohmann::ordered_json;
-
-/// Bytes that are no UTF-8 (a file name may hold any) become U+FFFD.
-std::string as_utf8(const std::string& text) {
-  return SummaryJson::parse(SummaryJson(text).dump(-1, ' ', false, SummaryJson::error_handler_t::replace))
-      .get<std::string>();
-}
 
 SummaryJson shard_json(const Shard& s) { return {{"index", s.index}, {"count", s.count}}; }
 
@@ -172,11 +167,7 @@ RunSummary summarize_run(const BatchPlan& plan, const std::vector<WorkerReport>&
   return s;
 }
 
-/// One line a model: a million of them are never one JSON document in memory.
 std::string write_summary(const RunSummary& s) {
-  const auto line = [](const SummaryJson& j) {
-    return j.dump(-1, ' ', false, SummaryJson::error_handler_t::replace);
-  };
   const SummaryCounts c = count_results(s.models);
   SummaryJson head{{"version", 1},       {"compiled", c.compiled},   {"unchanged", c.unchanged},
                    {"failed", c.failed}, {"cancelled", c.cancelled}, {"seconds", s.seconds}};
@@ -192,11 +183,7 @@ std::string write_summary(const RunSummary& s) {
   }
   for (const SummaryProblem& p : s.problems)
     head["problems"].push_back({{"file", p.file}, {"kind", p.kind}, {"text", p.text}});
-  std::string out = line(head);
-  out.back() = ',';
-  out += "\n\"models\":[";
-  for (const ModelSummary& m : s.models) out += (&m == s.models.data() ? "\n" : ",\n") + line(model_json(m));
-  return out + "\n]}\n";
+  return json_with_lines(head, "models", s.models, model_json);
 }
 
 std::string write_junit(const RunSummary& s) {
@@ -207,20 +194,20 @@ std::string write_junit(const RunSummary& s) {
       "time=\"{:.3f}\">\n",
       s.models.size(), c.failed, c.cancelled, s.seconds);
   for (const ModelSummary& m : s.models) {
-    out += fmt::format("<testcase classname=\"texmesh\" name=\"{}\" time=\"{:.3f}\"",
-                       markup_escaped(as_utf8(m.model)), m.seconds);
+    out += fmt::format("<testcase classname=\"texmesh\" name=\"{}\" time=\"{:.3f}\"", markup_escaped(m.model),
+                       m.seconds);
     out += fmt::format(
         ">\n<properties><property name=\"result\" value=\"{}\"/><property name=\"output\" value=\"{}\"/>"
         "<property name=\"bytes\" value=\"{}\"/><property name=\"peak_memory_bytes\" value=\"{}\"/>"
         "<property name=\"stages_ran\" value=\"{}\"/><property name=\"stages_from_cache\" value=\"{}\"/>"
         "</properties>\n",
-        enum_name(m.result), markup_escaped(as_utf8(m.output)), m.bytes, m.peak_memory_bytes, m.stages_ran,
+        enum_name(m.result), markup_escaped(m.output), m.bytes, m.peak_memory_bytes, m.stages_ran,
         m.stages_hit);
     if (m.result == ModelResult::kCancelled)
       out += "<skipped message=\"not reached\"/>\n";
     else if (!m.ok())
       out += fmt::format("<failure type=\"{}\" message=\"{}\"/>\n", markup_escaped(m.error_kind),
-                         markup_escaped(as_utf8(m.error_message)));
+                         markup_escaped(m.error_message));
     out += "</testcase>\n";
   }
   return out + "</testsuite>\n</testsuites>\n";

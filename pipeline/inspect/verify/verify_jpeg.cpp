@@ -1,12 +1,12 @@
 #include <algorithm>
 
 #include "pipeline/inspect/verify/verify_checks.h"
+#include "stages/image/jpeg_segments.h"
 
 namespace texmesh {
 namespace {
 
-constexpr std::uint8_t kExif = 0xe1, kProfile = 0xe2, kRestartInterval = 0xdd, kScan = 0xda,
-                       kEndOfImage = 0xd9;
+constexpr std::uint8_t kExif = 0xe1, kProfile = 0xe2, kRestartInterval = 0xdd;
 
 /// What stands in front of a JPEG's first scan.
 struct JpegSegments {
@@ -14,24 +14,14 @@ struct JpegSegments {
   std::vector<std::uint8_t> frame;  // per component: sampling factors
 };
 
-bool is_frame(std::uint8_t marker) {
-  return marker >= 0xc0 && marker <= 0xcf && marker != 0xc4 && marker != 0xc8 && marker != 0xcc;
-}
-
-/// Goes on as long as segments follow each other; what is no JPEG has none.
-JpegSegments read_segments(std::span<const std::uint8_t> jpeg) {
+JpegSegments read_segments(ByteSpan jpeg) {
   JpegSegments found;
-  for (std::size_t at = 2; at + 4 <= jpeg.size() && jpeg[at] == 0xff;) {
-    const std::uint8_t marker = jpeg[at + 1];
-    const std::size_t bytes = jpeg[at + 2] * std::size_t{256} + jpeg[at + 3];
-    if (marker == kScan || marker == kEndOfImage || bytes < 2 || bytes > jpeg.size() - at - 2) break;
-    const auto segment = jpeg.subspan(at + 4, bytes - 2);
+  for_each_jpeg_segment(jpeg, [&](std::uint8_t marker, ByteSpan body) {
     found.has_profile |= marker == kExif || marker == kProfile;
     found.has_restarts |= marker == kRestartInterval;
-    if (is_frame(marker))
-      for (std::size_t k = 7; k < segment.size(); k += 3) found.frame.push_back(segment[k]);
-    at += 2 + bytes;
-  }
+    if (is_jpeg_frame(marker))
+      for (std::size_t k = 7; k < body.size(); k += 3) found.frame.push_back(body[k]);
+  });
   return found;
 }
 

@@ -16,13 +16,6 @@ namespace {
 
 constexpr std::size_t kMostRows = 10'000;
 
-/// Names may hold any bytes; a page holds UTF-8.
-std::string page_text(const std::string& text) {
-  const std::string dumped =
-      nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-  return markup_escaped(nlohmann::json::parse(dumped).get<std::string>());
-}
-
 std::string cut_note(std::size_t all) {
   return all > kMostRows ? fmt::format("<p class=\"quiet\">The first {} of {}.</p>\n", kMostRows, all) : "";
 }
@@ -34,9 +27,10 @@ std::string failures_section(const RunSummary& s) {
   std::size_t failures = 0;
   for (const ModelSummary& m : s.models) {
     if (m.ok()) continue;
-    const std::string why = m.result == ModelResult::kCancelled ? "not reached" : page_text(m.error_message);
+    const std::string why =
+        m.result == ModelResult::kCancelled ? "not reached" : markup_escaped(m.error_message);
     if (++failures <= kMostRows)
-      table.rows.push_back({page_text(m.model), std::string(enum_name(m.result)), why});
+      table.rows.push_back({markup_escaped(m.model), std::string(enum_name(m.result)), why});
   }
   if (failures == 0) return "";
   return html_section("failures", fmt::format("{} without a new package", failures),
@@ -49,7 +43,7 @@ std::string problems_section(const RunSummary& s) {
   table.caption = "Reports of shards that are not as they should be";
   table.header = {"file", "kind", "what was found"};
   for (const SummaryProblem& p : s.problems)
-    table.rows.push_back({page_text(p.file), p.kind, page_text(p.text)});
+    table.rows.push_back({markup_escaped(p.file), p.kind, markup_escaped(p.text)});
   return html_section("problems", "Reports of shards", table.html());
 }
 
@@ -104,7 +98,7 @@ class ModelsSection {
       if (models++ < posters_) gallery += picture(m, files);
       if (models > kMostRows) continue;
       const std::uint64_t memory = m.made_s > 0 ? m.made_memory_bytes : m.peak_memory_bytes;
-      table.rows.push_back({page_text(m.model), std::string(enum_name(m.result)),
+      table.rows.push_back({markup_escaped(m.model), std::string(enum_name(m.result)),
                             m.cost_s() > 0 ? format_seconds(m.cost_s()) : "", format_bytes(memory),
                             format_bytes(m.bytes)});
     }
@@ -117,14 +111,14 @@ class ModelsSection {
  private:
   std::string picture(const ModelSummary& m, std::vector<PageFile>& files) {
     std::optional<PackageFace> face = face_(m);
-    if (!face) return "<div><p class=\"bad\">" + page_text(m.package) + ": cannot be read</p></div>\n";
+    if (!face) return "<div><p class=\"bad\">" + markup_escaped(m.package) + ": cannot be read</p></div>\n";
     std::string out = "<div>";
     if (!face->poster.empty()) {
       files.push_back({fmt::format("{}/{:05}.jpg", folder_, files.size()), std::move(face->poster)});
-      out += "<img loading=\"lazy\" alt=\"\" src=\"" + page_text(files.back().name) + "\">";
+      out += "<img loading=\"lazy\" alt=\"\" src=\"" + markup_escaped(files.back().name) + "\">";
     }
     const std::string name = face->title.empty() ? m.package : face->title;
-    return out + "<p>" + page_text(name) + "<br><span class=\"quiet\">" + format_bytes(m.bytes) +
+    return out + "<p>" + markup_escaped(name) + "<br><span class=\"quiet\">" + format_bytes(m.bytes) +
            "</span></p></div>\n";
   }
 

@@ -11,6 +11,11 @@ TEST(Markup, WhatHasAMeaningThereIsEscaped) {
   EXPECT_EQ(markup_escaped(""), "");
 }
 
+TEST(Markup, WhatIsNoUtf8IsReplaced) {
+  EXPECT_EQ(markup_escaped("a\xff<"), "a\xef\xbf\xbd&lt;");
+  EXPECT_EQ(markup_escaped("\xc3"), "\xef\xbf\xbd");
+}
+
 TEST(Markup, ControlCharactersDoNotPass) {
   EXPECT_EQ(markup_escaped("a\nb\tc\x01\x1f\r"), "a&#10;b&#9;c???");
   EXPECT_EQ(markup_escaped(std::string_view("\0x", 2)), "?x");
