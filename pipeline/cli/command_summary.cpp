@@ -10,6 +10,7 @@
 #include "pipeline/cli/options/command_line.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"
+#include "pipeline/io/text_bytes.h"
 #include "pipeline/report/collection/collection_page.h"
 
 namespace texmesh {
@@ -24,8 +25,7 @@ struct MergeArguments {
 };
 
 void write_text_file(const std::string& path, const std::string& text) {
-  if (!path.empty())
-    write_output_file(path, {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
+  if (!path.empty()) write_output_file(path, text_bytes(text));
 }
 
 /// The page's pictures stand in a folder beside it: page.html, page-posters/00000.jpg.

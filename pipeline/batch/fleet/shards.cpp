@@ -8,6 +8,7 @@
 
 #include "format/base/errors.h"
 #include "format/base/sha256.h"
+#include "pipeline/io/text_bytes.h"
 
 namespace texmesh {
 namespace {
@@ -162,7 +163,7 @@ std::string collection_digest(const std::vector<ModelCost>& models) {
     text += m->name;
     text += '\0' + std::to_string(m->cost_us) + '\n';
   }
-  return to_hex(sha256({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}));
+  return to_hex(sha256(text_bytes(text)));
 }
 
 double guessed_seconds(std::uint64_t model_bytes) {

@@ -15,6 +15,7 @@
 #include "format/base/errors.h"
 #include "pipeline/io/file_stamp.h"
 #include "pipeline/io/machine/owner_mark.h"
+#include "pipeline/io/text_bytes.h"
 
 namespace texmesh {
 namespace {
@@ -72,7 +73,7 @@ BlockHead head_of(std::span<const std::uint8_t, kBlockHeadBytes> bytes) {
 }  // namespace
 
 MemoName memo_name(const std::string& package) {
-  const Sha256 digest = sha256({reinterpret_cast<const std::uint8_t*>(package.data()), package.size()});
+  const Sha256 digest = sha256(text_bytes(package));
   MemoName name;
   std::copy_n(digest.begin(), name.size(), name.begin());
   return name;

@@ -12,6 +12,7 @@
 
 #include "format/base/sha256.h"
 #include "pipeline/io/file_stamp.h"
+#include "pipeline/io/text_bytes.h"
 
 namespace texmesh {
 namespace {
@@ -35,8 +36,7 @@ std::string machine_digits() {
   struct stat processes {};
   if (boot.empty() || ::stat("/proc/self/ns/pid", &processes) != 0) return "";
   const std::string text = boot + " " + std::to_string(processes.st_ino);
-  return to_hex(sha256({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}))
-      .substr(0, kMachineDigits);
+  return to_hex(sha256(text_bytes(text))).substr(0, kMachineDigits);
 }
 
 const std::string& machine_id() {
