@@ -5,11 +5,21 @@
 #include <stdexcept>
 
 namespace texmesh {
+namespace {
+
+/// Fetched once: EVP_sha256() is looked up again at each use.
+const EVP_MD* algorithm() {
+  static const EVP_MD* const md = EVP_MD_fetch(nullptr, "SHA256", nullptr);
+  return md;
+}
+
+}  // namespace
 
 Sha256 sha256(std::span<const std::uint8_t> bytes) {
   Sha256 digest{};
   unsigned size = 0;
-  if (EVP_Digest(bytes.data(), bytes.size(), digest.data(), &size, EVP_sha256(), nullptr) != 1 ||
+  if (!algorithm() ||
+      EVP_Digest(bytes.data(), bytes.size(), digest.data(), &size, algorithm(), nullptr) != 1 ||
       size != digest.size())
     throw std::runtime_error("SHA-256 is not available from OpenSSL");
   return digest;

@@ -4,9 +4,9 @@
 #include <cctype>
 #include <filesystem>
 #include <fstream>
-#include <unordered_map>
 
 #include "format/base/errors.h"
+#include "pipeline/batch/repeated_texts.h"
 
 namespace texmesh {
 namespace fs = std::filesystem;
@@ -21,7 +21,8 @@ bool is_model(const fs::path& path) {
 
 // Texts, not fs::path: taking a thousand paths apart again and again took a sixth of a run that does nothing.
 struct Found {
-  std::string path, relative;
+  std::string path;
+  std::size_t relative = 0;  // where the path within the input begins
 };
 
 /// The order of fs::path: by parts, so that a folder's files stand together.
@@ -30,11 +31,6 @@ bool path_less(const std::string& a, const std::string& b) {
     const auto rank = [](char c) { return c == '/' ? 0 : static_cast<unsigned char>(c) + 1; };
     return rank(x) < rank(y);
   });
-}
-
-void add_folder(const std::string& folder, std::vector<Found>& found) {
-  const std::string prefix = (fs::path(folder) / "").string();
-  for (const std::string& relative : list_models(folder)) found.push_back({prefix + relative, relative});
 }
 
 }  // namespace
@@ -49,23 +45,37 @@ bool is_range_scan(const std::string& path) {
   return head.find("\"cylindrical-range-scan\"") != std::string::npos;
 }
 
-std::vector<std::string> list_models(const std::string& folder) {
+namespace {
+
+std::size_t prefix_bytes(const std::string& folder) {
+  return folder.size() + (folder.ends_with('/') ? 0 : 1);
+}
+
+/// Paths as this process can open them, in the order of list_models().
+std::vector<std::string> model_paths(const std::string& folder) {
   std::error_code ec;
   fs::recursive_directory_iterator it(folder, ec), end;
   if (ec) throw InputError(folder, "", "a folder with models", ec.message());
   std::vector<std::string> models;
-  const std::size_t prefix = folder.ends_with('/') ? folder.size() : folder.size() + 1;
   while (it != end) {
-    const std::string path = it->path().string();
+    std::string path = it->path().string();
     if (it->path().filename().string().front() == '.')
       it.disable_recursion_pending();
     else if (it->is_regular_file(ec) && is_model(it->path()))
-      models.push_back(path.substr(prefix));
+      models.push_back(path);
     it.increment(ec);  // a folder that is left out without a word is a collection without its models
     if (ec) throw InputError(path, "", "a folder that can be listed", ec.message());
   }
   if (models.empty()) throw InputError(folder, "", "a folder with models", "none");
   std::sort(models.begin(), models.end(), path_less);
+  return models;
+}
+
+}  // namespace
+
+std::vector<std::string> list_models(const std::string& folder) {
+  std::vector<std::string> models = model_paths(folder);
+  for (std::string& path : models) path.erase(0, prefix_bytes(folder));
   return models;
 }
 
@@ -75,9 +85,9 @@ std::vector<ModelPath> find_models(const std::vector<std::string>& inputs, const
   for (const std::string& input : inputs) {
     if (fs::is_directory(input)) {
       any_folder = true;
-      add_folder(input, found);
+      for (std::string& path : model_paths(input)) found.push_back({std::move(path), prefix_bytes(input)});
     } else {
-      found.push_back({input, fs::path(input).filename().string()});
+      found.push_back({input, input.size() - fs::path(input).filename().string().size()});
     }
   }
   const bool one_file = inputs.size() == 1 && !any_folder && fs::path(output).extension() == ".texmesh" &&
@@ -87,26 +97,25 @@ std::vector<ModelPath> find_models(const std::vector<std::string>& inputs, const
     throw InputError(output, "", "a folder for the packages of several models", "the name of one package");
 
   const std::string prefix = (fs::path(output) / "").string();
-  const auto package_of = [&](const Found& f) {
-    const std::size_t slash = f.relative.rfind('/') + 1, dot = f.relative.rfind('.');
-    const bool extension = dot != std::string::npos && dot > slash;
-    return prefix + (extension ? f.relative.substr(0, dot) : f.relative) + ".texmesh";
-  };
-  std::unordered_map<std::string, int> sharing;
-  sharing.reserve(found.size());
-  for (const Found& f : found) ++sharing[package_of(f)];
   std::vector<ModelPath> models;
   models.reserve(found.size());
-  std::unordered_map<std::string, std::string> taken;
-  taken.reserve(found.size());
-  for (const Found& f : found) {
-    std::string package = package_of(f);
-    if (sharing[package] > 1) package = prefix + f.relative + ".texmesh";
-    const auto [other, fresh] = taken.emplace(package, f.path);
-    if (!fresh)
-      throw InputError(f.path, "", "a package of its own", package + ", which is that of " + other->second);
-    models.push_back({f.path, std::move(package)});
+  for (Found& f : found) {
+    const std::size_t slash = f.path.rfind('/') + 1, dot = f.path.rfind('.');
+    const bool extension = dot != std::string::npos && dot > std::max(slash, f.relative);
+    const std::string_view relative = std::string_view(f.path).substr(f.relative);
+    std::string package = prefix;
+    package.reserve(prefix.size() + relative.size() + 8);  // of 100,000, what growing leaves free counts
+    package.append(relative.substr(0, extension ? dot - f.relative : relative.npos)).append(".texmesh");
+    models.push_back({std::move(f.path), std::move(package)});
   }
+  const auto output_of = [](const ModelPath& m) { return std::string_view(m.output); };
+  std::vector<std::size_t> sharing;
+  for (const auto shared = repeated_texts(models, output_of); const ModelPath& m : models)
+    if (shared.contains(m.output)) sharing.push_back(static_cast<std::size_t>(&m - models.data()));
+  for (const std::size_t i : sharing)
+    models[i].output = prefix + models[i].input.substr(found[i].relative) + ".texmesh";
+  if (const auto [m, other] = first_repetition(models, output_of); m)
+    throw InputError(m->input, "", "a package of its own", m->output + ", which is that of " + other->input);
   return models;
 }
 

@@ -16,7 +16,7 @@ constexpr std::uint64_t kBaseMemory_bytes = 300'000'000, kMemoryPerByte = 10;
 /// Failures that only another machine or another moment explains are not remembered.
 bool is_lasting(const WorkerReport& r) {
   return r.result == ModelResult::kFailed &&
-         (r.error_kind == "input" || r.error_kind == "format" || r.error_kind == "stage");
+         (r.more->error.kind == "input" || r.more->error.kind == "format" || r.more->error.kind == "stage");
 }
 
 }  // namespace
@@ -64,15 +64,9 @@ void JobSelection::recall(const MemoRecord& record, WorkerReport& r) {
   r.result = record.failed ? ModelResult::kFailed : ModelResult::kUnchanged;
   r.package_bytes = record.package_bytes;
   if (!record.failed) r.made_s = record.seconds, r.made_memory_bytes = record.peak_memory_bytes;
-  if (!settings_.depfile.empty()) r.files = record.files;
-  if (record.failed && record.error.size() == 6) {
-    r.error_kind = record.error[0];
-    r.error_file = record.error[1];
-    r.error_place = record.error[2];
-    r.error_expected = record.error[3];
-    r.error_found = record.error[4];
-    r.error_message = record.error[5];
-  }
+  if (!settings_.depfile.empty()) r.more->files = record.files;
+  if (const auto& e = record.error; record.failed && e.size() == 6)
+    r.more->error = {e[0], e[1], e[2], e[3], e[4], e[5]};
 }
 
 void JobSelection::add_job(std::size_t i, bool remembered) {
@@ -116,15 +110,15 @@ void JobSelection::tell_earlier_cost(std::size_t job, WorkerReport& report) cons
 
 void JobSelection::remember(std::size_t job, const WorkerReport& report) {
   const std::size_t i = model_of_job_[job];
-  if (report.files.empty() || (!report.ok() && !is_lasting(report))) return;
+  if (report.more->files.empty() || (!report.ok() && !is_lasting(report))) return;
   const PlannedModel& m = plan_.models[i];
   MemoRecord record;
   record.request = request_of(m.profile);
   record.failed = !report.ok();
-  record.files = report.files;
+  record.files = report.more->files;
   record.peak_memory_bytes = report.peak_memory_bytes;
   record.seconds = report.seconds;
-  record.keys = report.keys;
+  record.keys = report.more->keys;
   const bool known = records_[i].peak_memory_bytes > 0;
   // A run that found everything in the cache, or that failed on the way, says little about what the model
   // costs, and a failure nothing about what the stages that it did not reach would run with.
@@ -140,8 +134,8 @@ void JobSelection::remember(std::size_t job, const WorkerReport& report) {
     record.package_digest = report.package_digest;
     record.package_bytes = report.package_bytes;
   } else {
-    record.error = {report.error_kind,     report.error_file,  report.error_place,
-                    report.error_expected, report.error_found, report.error_message};
+    const ModelError& e = report.more->error;
+    record.error = {e.kind, e.file, e.place, e.expected, e.found, e.message};
   }
   record.looked_at_ns = wall_clock_ns();
   memo_.set(package_within(plan_, m), record);

@@ -7,6 +7,7 @@
 #include "format/base/errors.h"
 #include "pipeline/batch/collection.h"
 #include "pipeline/batch/find_models.h"
+#include "pipeline/batch/repeated_texts.h"
 #include "pipeline/compile/options.h"
 #include "pipeline/compile/profile.h"
 #include "pipeline/io/file_resolver.h"
@@ -53,19 +54,15 @@ void add_collection(const std::string& file, const PlanRequest& request, const C
        read_collection(std::string(bytes.begin(), bytes.end()), file, base, list)) {
     const std::string input = (folder / m.input).string();
     plan.models.push_back(
-        {input, (fs::path(request.output) / m.output).string(), input, profiles.of(m.options)});
+        {input, (fs::path(request.output) / m.output).string(), false, profiles.of(m.options)});
   }
   plan.files.push_back(file);
 }
 
 void refuse_shared_outputs(const BatchPlan& plan) {
-  std::map<std::string_view, const PlannedModel*> taken;
-  for (const PlannedModel& m : plan.models) {
-    const auto [other, fresh] = taken.emplace(m.output, &m);
-    if (!fresh)
-      throw InputError(m.input, "", "a package of its own",
-                       m.output + ", which is that of " + other->second->input);
-  }
+  const auto output_of = [](const PlannedModel& m) { return std::string_view(m.output); };
+  if (const auto [m, other] = first_repetition(plan.models, output_of); m)
+    throw InputError(m->input, "", "a package of its own", m->output + ", which is that of " + other->input);
 }
 
 /// Costs are whole microseconds: sums of them do not depend on their order.
@@ -105,11 +102,11 @@ BatchPlan plan_batch(const PlanRequest& request) {
     throw InputError(request.output, "", "a folder for the packages of a collection",
                      "the name of one package");
   if (!others.empty()) {
-    for (ModelPath& m : find_models(others, request.output)) {
-      std::string name =
-          request.inputs.size() == 1 && names_package ? fs::path(m.input).filename().string() : m.input;
-      plan.models.push_back({std::move(m.input), std::move(m.output), std::move(name), profiles.of(base)});
-    }
+    std::vector<ModelPath> found = find_models(others, request.output);
+    plan.models.reserve(plan.models.size() + found.size());
+    const bool alone = request.inputs.size() == 1 && names_package;
+    for (ModelPath& m : found)
+      plan.models.push_back({std::move(m.input), std::move(m.output), alone, profiles.of(base)});
   }
   refuse_shared_outputs(plan);
   plan.output_prefix = (fs::path(request.output) / "").string();

@@ -3,6 +3,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "pipeline/batch/fleet/shards.h"
@@ -14,8 +15,10 @@ struct CompileOptions;
 /// One model of a run.
 struct PlannedModel {
   std::string input, output;                   // paths as this process can open them
-  std::string name;                            // as messages and reports call it
+  bool alone = false;                          // the one model of a package that the command line names
   std::shared_ptr<const std::string> profile;  // JSON of every option; models with equal options share it
+  /// As messages and reports call it.
+  std::string_view name() const { return std::string_view(input).substr(alone ? input.rfind('/') + 1 : 0); }
 };
 
 struct PlanRequest {

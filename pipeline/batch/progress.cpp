@@ -114,15 +114,16 @@ void Progress::begin(std::vector<ProgressModel> models) {
 }
 
 void Progress::recalled(std::size_t model, const WorkerReport& r, const std::string& output) {
-  if (!r.error_message.empty()) {
+  if (const ModelError& e = r.more->error; !e.message.empty()) {
     if (mode_ == OutputMode::kJson)
-      out_ << Json{{"event", "error"},       {"model", models_[model].name}, {"kind", r.error_kind},
-                   {"file", r.error_file},   {"place", r.error_place},       {"expected", r.error_expected},
-                   {"found", r.error_found}, {"message", r.error_message}}
+      out_ << Json{{"event", "error"}, {"model", models_[model].name},
+                   {"kind", e.kind},   {"file", e.file},
+                   {"place", e.place}, {"expected", e.expected},
+                   {"found", e.found}, {"message", e.message}}
                   .dump(-1, ' ', false, Json::error_handler_t::replace)
            << '\n';
     else
-      line("error: " + r.error_message + " (nothing has changed since; --retry-failed tries again)");
+      line("error: " + e.message + " (nothing has changed since; --retry-failed tries again)");
   }
   const bool alone = models_.size() == 1;
   ++finished_count_;
@@ -144,7 +145,7 @@ void Progress::started(std::size_t model, const std::string& output) {
 void Progress::event(std::size_t model, const std::string& json_line) {
   const Json e = Json::parse(json_line, nullptr, false);
   if (!e.is_object()) return;
-  const std::string event = e.value("event", ""), &name = models_[model].name;
+  const std::string event = e.value("event", ""), name(models_[model].name);
   if (mode_ == OutputMode::kJson) {
     Json tagged{{"event", event}, {"model", name}};
     for (const auto& [k, v] : e.items())
@@ -192,7 +193,7 @@ void Progress::cache_event(const std::string& code, const std::string& text) {
 
 void Progress::finished(std::size_t model, const WorkerReport& r, const std::string& output) {
   ++finished_count_;
-  const std::string& name = models_[model].name;
+  const std::string name(models_[model].name);
   const auto it = running_.find(model);
   done_weight_ += models_[model].weight - (it == running_.end() ? 0 : it->second.fraction);
   running_.erase(model);
@@ -286,7 +287,7 @@ std::string Progress::slowest() const {
   const auto it = std::min_element(running_.begin(), running_.end(), [](const auto& a, const auto& b) {
     return a.second.start < b.second.start;
   });
-  return it == running_.end() ? "" : models_[it->first].name + " " + it->second.stage;
+  return it == running_.end() ? "" : std::string(models_[it->first].name) + " " + it->second.stage;
 }
 
 /// Ten times a second is enough for an eye; events come faster.

@@ -4,6 +4,7 @@
 #include <iosfwd>
 #include <map>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "pipeline/compile/workers/worker.h"
@@ -13,8 +14,8 @@ namespace texmesh {
 enum class OutputMode : std::uint8_t { kTerminal, kPlain, kJson, kQuiet };
 
 struct ProgressModel {
-  std::string name;
-  double weight = 1;  // expected seconds; 0 for what need not run
+  std::string_view name;  // of a text that lives longer than the progress
+  double weight = 1;      // expected seconds; 0 for what need not run
 };
 
 /// What a user sees of a compile run: one bar for the whole run that redraws itself on a terminal, plain

@@ -54,10 +54,11 @@ std::string write_trace(const std::vector<PlannedModel>& models, const std::vect
     const WorkerReport& r = reports[i];
     if (!r.ran) continue;
     lanes.try_emplace(r.lane, 0);
-    events.push_back(span(models[i].name, "model", r.start_s, r.start_s + r.seconds, r.lane, 0));
-    const std::vector<int> threads = threads_of(r.spans);
-    for (std::size_t k = 0; k < r.spans.size(); ++k) {
-      const StageSpan& s = r.spans[k];
+    events.push_back(
+        span(std::string(models[i].name()), "model", r.start_s, r.start_s + r.seconds, r.lane, 0));
+    const std::vector<int> threads = threads_of(r.more->spans);
+    for (std::size_t k = 0; k < r.more->spans.size(); ++k) {
+      const StageSpan& s = r.more->spans[k];
       events.push_back(span(s.stage, s.hit ? "hit" : "stage", s.start_s, s.end_s, r.lane, threads[k]));
       lanes[r.lane] = std::max(lanes[r.lane], threads[k]);
     }
@@ -80,7 +81,7 @@ std::string write_statistics(const std::vector<WorkerReport>& reports) {
   std::map<std::string, Row> rows;
   Row all;
   for (const WorkerReport& r : reports)
-    for (const StageSpan& s : r.spans) {
+    for (const StageSpan& s : r.more->spans) {
       if (!rows.contains(s.stage)) order.push_back(s.stage);
       for (Row* row : {&rows[s.stage], &all}) {
         ++(s.hit ? row->hits : row->ran);

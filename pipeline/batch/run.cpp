@@ -83,7 +83,8 @@ class Batch {
 
   void begin_progress() {
     std::vector<ProgressModel> models;
-    for (std::size_t i = 0; i < plan_.models.size(); ++i) models.push_back({plan_.models[i].name, 0});
+    models.reserve(plan_.models.size());
+    for (std::size_t i = 0; i < plan_.models.size(); ++i) models.push_back({plan_.models[i].name(), 0});
     for (std::size_t j = 0; j < selection_.jobs().size(); ++j)
       models[selection_.model_of(j)].weight = selection_.jobs()[j].predicted_s;
     progress_.begin(std::move(models));
@@ -158,7 +159,7 @@ class Batch {
                                      [](const WorkerReport& r) { return r.result == ModelResult::kFailed; });
     for (const WorkerReport& r : reports_)
       if (!stopped || r.result != ModelResult::kCancelled)  // after --fail-fast: not asked to be tried again
-        code = graver_exit_code(code, exit_code_of(r.result, r.error_kind));
+        code = graver_exit_code(code, exit_code_of(r.result, r.more->error.kind));
     return code;
   }
 

@@ -114,9 +114,9 @@ void make_collection(const std::string& in, const std::string& out, const std::s
     WorkerReport report;
     report.result = ModelResult::kOk;
     const FileStamp stamp = *stamp_of(j.input);
-    report.files = {{"", true, digest_of(j.input), stamp.bytes, stamp}};
+    report.more->files = {{"", true, digest_of(j.input), stamp.bytes, stamp}};
     report.package_bytes = stamp_of(j.output)->bytes;
-    report.keys = keys_of(static_cast<int>(job));
+    report.more->keys = keys_of(static_cast<int>(job));
     selection.remember(job, report);
   }
   if (!selection.save_memo()) std::exit(1);

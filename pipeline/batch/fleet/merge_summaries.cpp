@@ -158,7 +158,7 @@ RunSummary merge_summaries(std::vector<SummaryFile> files) { return Merger(std::
 int exit_code_of(const RunSummary& merged) {
   int code = kExitOk;
   for (const ModelSummary& m : merged.models)
-    code = graver_exit_code(code, exit_code_of(m.result, m.error_kind));
+    code = graver_exit_code(code, exit_code_of(m.result, m.error.kind));
   for (const SummaryProblem& p : merged.problems)
     if (p.kind != "double")
       code = graver_exit_code(code, p.kind == "foreign" ? kExitModelFailed : kExitTryAgain);

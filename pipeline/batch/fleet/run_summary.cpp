@@ -30,9 +30,9 @@ SummaryJson model_json(const ModelSummary& m) {
                 {"stages_ran", m.stages_ran},
                 {"stages_from_cache", m.stages_hit}};
   if (m.made_s > 0) j["made"] = {{"seconds", m.made_s}, {"peak_memory_bytes", m.made_memory_bytes}};
-  if (!m.error_kind.empty())
-    j["error"] = {{"kind", m.error_kind},         {"file", m.error_file},   {"place", m.error_place},
-                  {"expected", m.error_expected}, {"found", m.error_found}, {"message", m.error_message}};
+  if (!m.error.kind.empty())
+    j["error"] = {{"kind", m.error.kind},         {"file", m.error.file},   {"place", m.error.place},
+                  {"expected", m.error.expected}, {"found", m.error.found}, {"message", m.error.message}};
   return j;
 }
 
@@ -113,9 +113,9 @@ class SummaryReader {
     if (j.contains("error")) {
       const SummaryJson& e = j["error"];
       const std::string at = place + "/error";
-      m.error_kind = text(e, at, "kind"), m.error_file = text(e, at, "file");
-      m.error_place = text(e, at, "place"), m.error_expected = text(e, at, "expected");
-      m.error_found = text(e, at, "found"), m.error_message = text(e, at, "message");
+      m.error.kind = text(e, at, "kind"), m.error.file = text(e, at, "file");
+      m.error.place = text(e, at, "place"), m.error.expected = text(e, at, "expected");
+      m.error.found = text(e, at, "found"), m.error.message = text(e, at, "message");
     }
     return m;
   }
@@ -159,10 +159,9 @@ RunSummary summarize_run(const BatchPlan& plan, const std::vector<WorkerReport>&
   for (std::size_t i = 0; i < plan.models.size(); ++i) {
     const PlannedModel& m = plan.models[i];
     const WorkerReport& r = reports[i];
-    s.models.push_back({m.name, m.output, package_within(plan, m), r.result, r.ran, r.package_bytes,
-                        r.peak_memory_bytes, r.seconds, r.stages_ran, r.stages_hit, r.made_s,
-                        r.made_memory_bytes, r.error_kind, r.error_file, r.error_place, r.error_expected,
-                        r.error_found, r.error_message});
+    s.models.push_back({std::string(m.name()), m.output, package_within(plan, m), r.result, r.ran,
+                        r.package_bytes, r.peak_memory_bytes, r.seconds, r.stages_ran, r.stages_hit, r.made_s,
+                        r.made_memory_bytes, r.more->error});
   }
   return s;
 }
@@ -206,8 +205,8 @@ std::string write_junit(const RunSummary& s) {
     if (m.result == ModelResult::kCancelled)
       out += "<skipped message=\"not reached\"/>\n";
     else if (!m.ok())
-      out += fmt::format("<failure type=\"{}\" message=\"{}\"/>\n", markup_escaped(m.error_kind),
-                         markup_escaped(m.error_message));
+      out += fmt::format("<failure type=\"{}\" message=\"{}\"/>\n", markup_escaped(m.error.kind),
+                         markup_escaped(m.error.message));
     out += "</testcase>\n";
   }
   return out + "</testsuite>\n</testsuites>\n";

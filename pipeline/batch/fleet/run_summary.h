@@ -23,7 +23,7 @@ struct ModelSummary {
   double made_s =
       0;  // what the model took when its package was made, where this run did not make it; 0 = not known
   std::uint64_t made_memory_bytes = 0;
-  std::string error_kind, error_file, error_place, error_expected, error_found, error_message;
+  ModelError error;
 
   bool ok() const { return result == ModelResult::kOk || result == ModelResult::kUnchanged; }
   /// Seconds of the run that made the package, 0 where nobody knows.

@@ -9,6 +9,7 @@
 
 #include "format/base/fields.h"
 #include "pipeline/compile/workers/sandbox/sandbox.h"
+#include "pipeline/compile/workers/seldom.h"
 #include "pipeline/graph/key.h"
 #include "pipeline/io/file_request.h"
 
@@ -58,24 +59,33 @@ struct StageSpan {
   bool running = false;  // the model ended, by a limit or a crash, before the stage did
 };
 
-/// What became of a model.
-struct WorkerReport {
-  ModelResult result = ModelResult::kInternal;
-  bool ran = false;  // false: known from an earlier run (up to date, or a known failure), or never started
-  std::uint64_t package_bytes = 0, peak_memory_bytes = 0;
-  Sha256 package_digest{};
-  double seconds = 0;
-  // What the model took when its package was made, where this run did not make it; 0 = not known.
-  double made_s = 0;
-  std::uint64_t made_memory_bytes = 0;
-  std::string error_kind, error_file, error_place, error_expected, error_found, error_message;
-  int stages_ran = 0, stages_hit = 0;
+/// Why a model failed.
+struct ModelError {
+  std::string kind, file, place, expected, found, message;
+};
+
+/// What only a model that ran, or that failed, has.
+struct WorkerDetails {
+  ModelError error;                // of empty texts when nothing went wrong
   std::vector<FileRequest> files;  // as CompileOutcome; empty after a failure
   StageKeys keys;
   std::vector<int> layers_left_out;  // numbers in CacheSettings::layers of those that did not work
-  int lane = 0;                      // which of the side-by-side places it ran in, from 0
-  double start_s = 0;
   std::vector<StageSpan> spans;
+};
+
+/// What became of a model. A run that does nothing holds one of each model of the collection.
+struct WorkerReport {
+  ModelResult result = ModelResult::kInternal;
+  bool ran = false;  // false: known from an earlier run (up to date, or a known failure), or never started
+  int lane = 0;      // which of the side-by-side places it ran in, from 0
+  std::uint64_t package_bytes = 0, peak_memory_bytes = 0;
+  Sha256 package_digest{};
+  double start_s = 0, seconds = 0;
+  // What the model took when its package was made, where this run did not make it; 0 = not known.
+  double made_s = 0;
+  std::uint64_t made_memory_bytes = 0;
+  int stages_ran = 0, stages_hit = 0;
+  Seldom<WorkerDetails> more;
   bool ok() const { return result == ModelResult::kOk || result == ModelResult::kUnchanged; }
 };
 

@@ -23,15 +23,15 @@ Json layers_of(const CacheSettings& cache, const std::set<std::string>& left_out
 void apply_stage_event(const Json& e, double now_s, WorkerReport& report) {
   const std::string stage = e.value("stage", "");
   if (e.value("event", "") == "stage-started") {
-    report.spans.push_back({stage, now_s, now_s, false, true});
+    report.more->spans.push_back({stage, now_s, now_s, false, true});
     return;
   }
   const bool hit = e.value("result", "") == "hit";
   ++(hit ? report.stages_hit : report.stages_ran);
-  const auto open = std::find_if(report.spans.rbegin(), report.spans.rend(),
+  const auto open = std::find_if(report.more->spans.rbegin(), report.more->spans.rend(),
                                  [&](const StageSpan& s) { return s.stage == stage; });
-  if (hit || open == report.spans.rend()) {
-    report.spans.push_back({stage, now_s, now_s, hit});
+  if (hit || open == report.more->spans.rend()) {
+    report.more->spans.push_back({stage, now_s, now_s, hit});
   } else {
     open->end_s = now_s;
     open->running = false;
@@ -39,12 +39,12 @@ void apply_stage_event(const Json& e, double now_s, WorkerReport& report) {
 }
 
 void apply_inputs_event(const Json& e, WorkerReport& report) {
-  report.files = files_from_json(e.value("files", ""));
+  report.more->files = files_from_json(e.value("files", ""));
   from_hex(e.value("package", ""), report.package_digest);
   const Json keys = e.value("keys", Json::object());
   for (const auto& [stage, key] : keys.items())
     if (Sha256 digest; key.is_string() && from_hex(key.get<std::string>(), digest))
-      report.keys[stage] = digest;
+      report.more->keys[stage] = digest;
 }
 
 }  // namespace
@@ -83,7 +83,7 @@ bool apply_event(const std::string& line, double now_s, WorkerReport& report) {
     return false;
   }
   if (event == "layer-left-out") {
-    report.layers_left_out.push_back(e.value("layer", -1));
+    report.more->layers_left_out.push_back(e.value("layer", -1));
     return false;
   }
   if (event == "stage-started" || event == "stage-finished") {
@@ -92,20 +92,16 @@ bool apply_event(const std::string& line, double now_s, WorkerReport& report) {
     report.package_bytes = e.value("bytes", std::uint64_t{0});
     report.result = e.value("unchanged", false) ? ModelResult::kUnchanged : ModelResult::kOk;
   } else if (event == "error") {
-    report.error_kind = e.value("kind", "");
-    report.error_file = e.value("file", "");
-    report.error_place = e.value("place", "");
-    report.error_expected = e.value("expected", "");
-    report.error_found = e.value("found", "");
-    report.error_message = e.value("message", "");
+    report.more->error = {e.value("kind", ""),     e.value("file", ""),  e.value("place", ""),
+                          e.value("expected", ""), e.value("found", ""), e.value("message", "")};
   }
   return true;
 }
 
 std::string error_event(const WorkerReport& r) {
-  return Json{{"event", "error"},          {"kind", r.error_kind},         {"file", r.error_file},
-              {"place", r.error_place},    {"expected", r.error_expected}, {"found", r.error_found},
-              {"message", r.error_message}}
+  const ModelError& e = r.more->error;
+  return Json{{"event", "error"},       {"kind", e.kind},   {"file", e.file},      {"place", e.place},
+              {"expected", e.expected}, {"found", e.found}, {"message", e.message}}
       .dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 

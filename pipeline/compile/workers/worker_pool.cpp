@@ -76,7 +76,7 @@ void read_events(Worker& worker, WorkerReport& report, double now_s, const Event
 /// zim".
 std::string end_running_stages(WorkerReport& report) {
   std::string names;
-  for (StageSpan& s : report.spans)
+  for (StageSpan& s : report.more->spans)
     if (s.running) {
       s.end_s = report.start_s + report.seconds;
       names += (names.empty() ? "running " : ", ") + s.stage;
@@ -88,12 +88,7 @@ void set_error(WorkerReport& report, const std::string& kind, const WorkerJob& j
                std::string found) {
   const InputError e(std::filesystem::path(job.input).filename().string(), end_running_stages(report),
                      std::move(expected), std::move(found));
-  report.error_kind = kind;
-  report.error_file = e.file();
-  report.error_place = e.place();
-  report.error_expected = e.expected();
-  report.error_found = e.found();
-  report.error_message = e.what();
+  report.more->error = {kind, e.file(), e.place(), e.expected(), e.found(), e.what()};
 }
 
 /// Enters into the report what the end of a worker means for its model.
@@ -109,8 +104,8 @@ void finish_report(const Worker& worker, int status, const rusage& usage, const 
     return;
   }
   report.result = ModelResult::kFailed;
-  if (!report.error_kind.empty()) {
-    if (report.error_kind == "internal") report.result = ModelResult::kInternal;
+  if (!report.more->error.kind.empty()) {
+    if (report.more->error.kind == "internal") report.result = ModelResult::kInternal;
     return;
   }
   if (worker.timed_out) {
@@ -232,10 +227,10 @@ class WorkerPool {
 
   void leave_layers_out(std::size_t job) {
     const std::vector<std::string>& layers = jobs_[job].cache.layers;
-    for (const int number : reports_[job].layers_left_out)
+    for (const int number : reports_[job].more->layers_left_out)
       if (number >= 0 && static_cast<std::size_t>(number) < layers.size())
         layers_left_out_[layers[static_cast<std::size_t>(number)]].begin();
-    reports_[job].layers_left_out.clear();  // the rest begins once
+    reports_[job].more->layers_left_out.clear();  // the rest begins once
   }
 
   void enforce_wall_limit() {
@@ -272,9 +267,9 @@ class WorkerPool {
       read_events(w, report, now_s(), sink_);
       leave_layers_out(w.job);
       if (w.process.err >= 0) read_available(w.process.err, w.last_words);
-      const bool told = !report.error_kind.empty();
+      const bool told = !report.more->error.kind.empty();
       finish_report(w, status, usage, limits_, jobs_[w.job], g_interrupted != 0, report);
-      if (!told && !report.error_kind.empty() && sink_) sink_(w.job, error_event(report));
+      if (!told && !report.more->error.kind.empty() && sink_) sink_(w.job, error_event(report));
       failed = failed || !report.ok();
       close_fd(w.process.out);
       close_fd(w.process.err);

@@ -28,7 +28,7 @@ std::string failures_section(const RunSummary& s) {
   for (const ModelSummary& m : s.models) {
     if (m.ok()) continue;
     const std::string why =
-        m.result == ModelResult::kCancelled ? "not reached" : markup_escaped(m.error_message);
+        m.result == ModelResult::kCancelled ? "not reached" : markup_escaped(m.error.message);
     if (++failures <= kMostRows)
       table.rows.push_back({markup_escaped(m.model), std::string(enum_name(m.result)), why});
   }

@@ -24,7 +24,7 @@ struct FakeRun {
 
   WorkerReport& add(const std::string& name, ModelResult result, int lane = 0, double start_s = 0,
                     double seconds = 0) {
-    models.push_back({name, "out/" + name + ".texmesh", name, nullptr});
+    models.push_back({name, "out/" + name + ".texmesh", false, nullptr});
     WorkerReport r;
     r.result = result;
     r.ran = result != ModelResult::kCancelled;
@@ -38,9 +38,9 @@ struct FakeRun {
 
 TEST(Trace, HasOneProcessPerLaneAndNothingOverlapsInAThread) {
   FakeRun run;
-  run.add("one", ModelResult::kOk, 0, 0, 3).spans = {
+  run.add("one", ModelResult::kOk, 0, 0, 3).more->spans = {
       {"import", 0, 1, false}, {"zim", 1, 2.5, false}, {"ssf", 1, 2, false}, {"lut", 2, 3, true}};
-  run.add("two", ModelResult::kOk, 1, 0.5, 1).spans = {{"import", 0.5, 1.5, false}};
+  run.add("two", ModelResult::kOk, 1, 0.5, 1).more->spans = {{"import", 0.5, 1.5, false}};
   run.add("three", ModelResult::kFailed, 1, 1.5, 1);
   run.add("recalled", ModelResult::kUnchanged).ran = false;
   const Json trace = Json::parse(write_trace(run.models, run.reports));
@@ -86,8 +86,7 @@ std::string told(OutputMode mode, bool verbose, bool explain) {
   a.ran = b.ran = true;
   a.stages_ran = 1;
   b.result = ModelResult::kFailed;
-  b.error_kind = "input";
-  b.error_message = "b.obj: no faces";
+  b.more->error = {"input", "", "", "", "", "b.obj: no faces"};
   c.result = ModelResult::kUnchanged;
   progress.recalled(2, c, "c.texmesh");
   progress.started(0, "a.texmesh");

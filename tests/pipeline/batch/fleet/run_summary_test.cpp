@@ -58,7 +58,7 @@ struct RunOfModels {
 
   WorkerReport& add(const std::string& name, ModelResult result, double seconds = 0) {
     plan.output_prefix = "out/";
-    plan.models.push_back({name, "out/" + name + ".texmesh", name, nullptr});
+    plan.models.push_back({name, "out/" + name + ".texmesh", false, nullptr});
     WorkerReport r;
     r.result = result;
     r.ran = result != ModelResult::kCancelled;
@@ -79,12 +79,11 @@ RunOfModels ugly_run() {
   ok.stages_ran = 3;
   run.add("unchanged\n\x01.obj", ModelResult::kUnchanged).ran = false;
   WorkerReport& bad = run.add("bad\xff\xfe.obj", ModelResult::kFailed, 0.5);
-  bad.error_kind = "input";
-  bad.error_message = "bad\xff.obj: line 1: expected <number>, found \"&\"\t\x02";
-  bad.error_file = bad.error_found = bad.error_message;
+  const std::string message = "bad\xff.obj: line 1: expected <number>, found \"&\"\t\x02";
+  bad.more->error = {"input", message, "", "", message, message};
   WorkerReport& dead = run.add("dead.obj", ModelResult::kInternal, 0.1);
-  dead.error_kind = "internal";
-  dead.error_message = "dead.obj: expected a worker that finishes, found signal Killed";
+  dead.more->error = {"internal", "", "",
+                      "",         "", "dead.obj: expected a worker that finishes, found signal Killed"};
   run.add("late.obj", ModelResult::kCancelled);
   return run;
 }
@@ -131,8 +130,7 @@ TEST(Summary, IsReadAsItWasWritten) {
   known.made_s = 4.5;
   known.made_memory_bytes = 77;
   WorkerReport& bad = run.add("c", ModelResult::kFailed, 0.5);
-  bad.error_kind = "resource";
-  bad.error_message = "c: time";
+  bad.more->error = {"resource", "", "", "", "", "c: time"};
   run.plan.shard = {1, 3};
   run.plan.models_in_collection = 9;
   run.plan.collection = std::string(64, 'a');
@@ -208,8 +206,8 @@ TEST(MergeSummaries, ForeignDoubleHalfWrittenAndMissingOnesAreNamed) {
 TEST(MergeSummaries, TheExitCodeSaysWhetherTryingAgainIsOfUse) {
   const auto code = [](ModelResult result, const std::string& kind) {
     SummaryFile f = shard_file(0, 1, {"a", "b"}, 'a', result);
-    f.summary->models[0].error_kind = kind;
-    f.summary->models[1].error_kind = kind;
+    f.summary->models[0].error.kind = kind;
+    f.summary->models[1].error.kind = kind;
     return exit_code_of(merge_summaries({shard_file(0, 1, {"c"}), f}));
   };
   EXPECT_EQ(code(ModelResult::kOk, ""), 0);

@@ -16,7 +16,7 @@ ModelSummary model(const std::string& name, ModelResult result, const std::strin
   m.bytes = 1'500'000;
   m.seconds = 2;
   m.peak_memory_bytes = 200'000'000;
-  if (!message.empty()) m.error_kind = "input", m.error_message = message;
+  if (!message.empty()) m.error.kind = "input", m.error.message = message;
   return m;
 }
 
