@@ -47,15 +47,14 @@ struct SecondReader : ::testing::Test {
     if (python.empty()) GTEST_SKIP() << "no Python with numpy and Pillow (python3-numpy, python3-pil)";
     if (golden_packages().empty()) GTEST_SKIP() << "no golden package of format 2";
   }
-  static CommandResult run_script(const char* script, std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(), {python, (kSource / "examples" / "reader" / script).string()});
+  static CommandResult run(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(),
+                     {python, (kSource / "examples" / "reader" / "texmesh_reader.py").string()});
     return testing::run_command(arguments, {"PYTHONDONTWRITEBYTECODE=1"});
   }
-  static CommandResult run(std::vector<std::string> arguments) {
-    return run_script("texmesh_reader.py", std::move(arguments));
-  }
   static CommandResult check(std::vector<std::string> packages) {
-    return run_script("conformance.py", std::move(packages));
+    packages.insert(packages.begin(), "check");
+    return run(std::move(packages));
   }
   static inline std::string python;
   TemporaryFolder folder;
