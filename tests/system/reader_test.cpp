@@ -209,7 +209,7 @@ std::vector<std::string> make_invalid_packages(const std::string& python, const 
     EXPECT_EQ(testing::run_command(cases, {"PYTHONDONTWRITEBYTECODE=1"}).exit_code, 0) << name;
   };
   make("v2.0-scan.texmesh", {});
-  make("v2.0-webp.texmesh", {"F07-no-webp"});
+  make("v2.0-webp.texmesh", {"F07-no-webp", "R05-codec-without-feature"});
   make("v2.0-progressive.texmesh", {"F06-ends-with-ff"});
   make("v2.0-source.texmesh", {"O02-damaged-source"});
   std::istringstream cases(testing::run_command({python, script, "--list"}).output);
@@ -233,6 +233,14 @@ TEST_F(SecondReader, RefusesByTheRuleThatIsBrokenAndSoDoesVerify) {
         << (line == std::string::npos ? told : told.substr(line, told.find('\n', line) - line));
     expect_verify_names(path, rule);
   }
+}
+
+TEST_F(SecondReader, InvalidPackagesBreakOneRuleEach) {
+  make_invalid_packages(python, folder / "invalid");
+  const CommandResult result = testing::run_command(
+      {python, (kSource / "tests" / "golden" / "check_invalid").string(), folder / "invalid"},
+      {"PYTHONDONTWRITEBYTECODE=1"});
+  EXPECT_EQ(result.exit_code, 0) << result.output;
 }
 
 /// All that PackageReader reads, except measurements.

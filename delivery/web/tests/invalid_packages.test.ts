@@ -22,7 +22,7 @@ describe.skipIf(!possible)('packages that break a rule', () => {
   const folder = mkdtempSync(join(tmpdir(), 'texmesh-invalid-'));
   afterAll(() => rmSync(folder, { recursive: true }));
   if (possible)
-    for (const [from, ...cases] of [[name], ['v2.0-webp', 'F07-no-webp'], ['v2.0-progressive', 'F06-ends-with-ff']])
+    for (const [from, ...cases] of [[name], ['v2.0-webp', 'F07-no-webp', 'R05-codec-without-feature'], ['v2.0-progressive', 'F06-ends-with-ff']])
       execFileSync('python3', [join(root, 'tests/golden/make_invalid'), join(root, `tests/golden/${from}.texmesh`), folder, ...cases]);
   it('differ from a sound one, which is read to its end', async () => {
     await readAll(golden(name));
