@@ -568,8 +568,8 @@ def run(options, package):
         for path, (offset, size, digest) in model.index.items():
             print(digest, offset, size, path)
     elif options.command == "picture":
-        plane, rung = options.plane, options.rung
-        shown = model.preview(plane) if rung == "preview" else model.picture(plane, int(rung))
+        plane, is_preview = options.plane, options.rung == "preview"
+        shown = model.preview(plane) if is_preview else model.picture(plane, int(options.rung))
         shown.save(output, format="PNG")
     else:
         splits = model.stream()
@@ -592,9 +592,9 @@ def main():
             run(options, package)
         except (Refused, OSError, KeyError, IndexError, TypeError, ValueError) as error:
             rule = "" if isinstance(error, (Refused, OSError)) else "J04: "  # a field is missing, or of another type
-            refused.append(f"{package}: refused: {rule}{error}")
-    sys.exit("\n".join(refused) or 0)
-
+            refused.append(f"{package}: refused: {rule}{error}\n")
+    print(*refused, sep="", end="", file=sys.stdout if options.command == "check" else sys.stderr)
+    sys.exit(len(refused) > 0)
 
 if __name__ == "__main__":
     main()
