@@ -1,185 +1,84 @@
 #!/usr/bin/env python3
 """Reads texmesh packages of format 2, written from format/SPEC.md alone; rule names are those of that text.
 
-  texmesh_reader.py info PACKAGE                                   digests, offsets and sizes of all entries
-  texmesh_reader.py picture PACKAGE [--plane P] [--rung R] -o OUT.png
-  texmesh_reader.py mesh PACKAGE [--scale N] [--raw] -o OUT.obj
-
-PACKAGE is a container or the folder of a tree. Needs numpy and Pillow (Debian: python3-numpy python3-pil).
+PACKAGE is a container or the folder of a tree. check: which rule it breaks first, by every byte. info: digests and
+places of its entries. picture: a texture plane as PNG. mesh: a scale of its stream as OBJ.
+Needs numpy and Pillow (Debian: python3-numpy python3-pil).
 """
 import argparse
 import collections
-import hashlib
 import io
-import itertools
-import json
 import os
-import re
-import struct
+import pathlib
 import sys
+import zlib
 
 import numpy as np
 from PIL import Image
 
-MAX32 = 0xFFFFFFFF
-PATH = re.compile(r"(?!(.*/)?\.{0,2}(/|$))[a-z0-9._/-]{1,200}")  # no part is empty, . or ..
-PACK = re.compile(r"texture/(0|[1-9]\d*)/(tables|r\d\d|r[1-9]\d\d+)\.pack")
-SOI, EOI = b"\xff\xd8", b"\xff\xd9"
+from formal_rules import MAX32, Cursor, Record, Refused, Rules, clamp, cut, follow_schema, parse_json, require, sha
+from package_checks import Checks, write_raw
 
+RULES = Rules("format/rules.txt")
 
-class Refused(Exception):
-    """A rule that the package breaks."""
+# Sections 2 and 6: container, tree, index ---------------------------------------------------------------
+def list_tree(root):
+    """{path: entry}, without offsets and CRCs."""
+    files = (file for file in pathlib.Path(root).rglob("*") if file.is_file())
+    sizes = {file.relative_to(root).as_posix(): file.stat().st_size for file in files}
+    return {p: Record(data=0, size=n, crc=None) for p, n in sizes.items() if not RULES.helpers.LOOSE.fullmatch(p)}
 
+def list_container(name):
+    """{path: central header and place of the data}; every byte outside of entries is what it must be."""
+    with open(name, "rb") as file:
+        size = file.seek(0, os.SEEK_END)
+        file.seek(max(0, size - 98))
+        tail = file.read()
+        end = last = RULES.follow("end record", Cursor(tail[-22:], "K01", "the end record"))
+        if 0xFFFF in end.counts or MAX32 in (end.size, end.at) or tail[-42:-38] == b"PK\6\7":
+            last = RULES.follow("ZIP64 end", Cursor(tail[:-22], "K10", "the ZIP64 end record"), end=end)
+        require(last.at + last.size + (22 if last is end else 98) == size, "K01", "bytes of no entry, or too few")
+        file.seek(last.at)
+        directory, entries, here = Cursor(file.read(last.size), "K01", "the central directory"), {}, 0
+        for _ in range(last.counts[0]):
+            central = RULES.follow("central header", directory, here=here, paths=entries)
+            file.seek(here)
+            header = Cursor(file.read(512), "K01", f"the local header of {central.path}")
+            entries[central.path] = RULES.follow("local header", header, central=central, size=central.size)
+            here = entries[central.path].data + central.size
+    directory.finish()
+    RULES.follow("container", paths=list(entries), entries=entries, here=here, directory=last.at)
+    return entries
 
-def require(good, rule, what):
-    if not good:
-        raise Refused(f"{rule}: {what}")
-
-
-def sha(data):
-    return hashlib.sha256(data).hexdigest()
-
-
-def rises(values):
-    return all(a < b for a, b in zip(values, values[1:]))
-
-
-def clamp(x, low, high):
-    return min(max(x, low), high)
-
-
-def cut(data, sizes):
-    ends = np.cumsum(sizes, dtype=np.int64).tolist()
-    return [data[end - int(size) : end] for end, size in zip(ends, sizes)]
-
-
-class Cursor:
-    """Little-endian numbers, one after the other; what is missing breaks `rule`."""
-
-    def __init__(self, data, rule, what):
-        self.data, self.at, self.rule, self.what = data, 0, rule, what
-
-    def raw(self, count):
-        require(count <= len(self.data) - self.at, self.rule, f"{self.what} ends early")
-        self.at += count
-        return self.data[self.at - count : self.at]
-
-    def get(self, code):
-        values = struct.unpack("<" + code, self.raw(struct.calcsize("<" + code)))
-        return values[0] if len(values) == 1 else values
-
-    def array(self, dtype, *shape):
-        return np.frombuffer(self.raw(np.dtype(dtype).itemsize * int(np.prod(shape))), dtype).reshape(shape)
-
-    def varint(self):
-        digits = [self.get("B")]
-        while digits[-1] > 127 and len(digits) < 6:
-            digits.append(self.get("B"))
-        value, is_shortest = sum((d & 127) << 7 * k for k, d in enumerate(digits)), 0 < digits[-1] < 128
-        require(value <= MAX32 and (is_shortest or digits == [0]), "S06", "a varint in its shortest form")
-        return value
-
-    def finish(self):
-        require(self.at == len(self.data), self.rule, f"{self.what} has further bytes")
-
-
-# Sections 6 and 8: index and tables -------------------------------------------------------------------
-
-
-def read_pages(data, m, name, magic, code, rules):
-    """The head's last number and, for each page or section, its record of `code` and a cursor over it."""
-    head = Cursor(data, rules[1], name)
-    require(head.raw(4) == magic, rules[0], "magic")
-    major, minor, count, number = head.get("HHII")
-    require(major == 2, "W03", f"{name}: version {major}")
-    require([major, minor] == [m["version"]["major"], m["version"]["minor"]], "R01", f"version of {name}")
-    require(count <= (len(data) - 16) // struct.calcsize("<" + code), head.rule, f"{count} records")
-    records, pages = [head.get(code) for _ in range(count)], []
-    require((head.at, sha(data[: head.at])) == (m[name]["headBytes"], m[name]["headSha256"]), "R02", name)
-    for *record, size, digest in records:
-        pages.append((*record, Cursor(head.raw(size), rules[3], f"page {len(pages)} of {name}")))
-        require(hashlib.sha256(pages[-1][-1].data).digest() == digest, rules[2], f"digest of {name}'s page")
-    head.finish()
-    return number, pages
-
+def read_pages(data, m, name, rules):
+    """(record, cursor) of each page of the index or section of the tables, to be read to its end."""
+    c = Cursor(data, rules[0], name)
+    head = RULES.follow(name, c, m=m)
+    require((c.at, sha(data[: c.at])) == (m[name].headBytes, m[name].headSha256), "R02", f"the head of {name}")
+    for *record, size, digest in head.pages:
+        page = Cursor(c.raw(size), rules[2], f"page {record} of {name}")
+        require(sha(page.data) == digest.hex(), rules[1], f"digest of {page.what}")
+        yield record, page
+        if m.version.minor == 0:
+            page.finish()
+    c.finish()
 
 def read_index(data, m):
-    """{path: (offset, bytes, digest)}"""
-    total, pages = read_pages(data, m, "index", b"TXMX", "III32s", ("I01", "I03", "I04", "I04"))
-    require(pages and sum(entries for _, entries, _ in pages) == total, "I03", "number of pages or entries")
-    require(pages[0][0] == MAX32 and rises([p[0] for p in pages[1:]] + [MAX32]), "I02", "planes of pages")
+    """{path: [offset, bytes, SHA-256]}"""
     index = {}
-    for plane, entries, page in pages:
+    for (plane, entries), page in read_pages(data, m, "index", ("I03", "I04", "I04")):
         end = 0
         for _ in range(entries):
-            offset, length, digest, size = page.get("QQ32sB")
-            path = page.raw(size).decode("latin-1")
-            pack = PACK.fullmatch(path)
-            is_here = plane == (int(pack[1]) if pack else MAX32)
-            is_plain = PATH.fullmatch(path) and path not in ("manifest.json", "index.bin")
-            require(offset % 64 == 0 and 0 < offset <= 2**53 >= length, "I05", f"place of {path}")
-            require(is_here and is_plain, "I06", f"{path} on the page of plane {plane}")
-            require(path not in index and offset > end, "I07", f"order of {path}")
-            end, index[path] = offset + length, (offset, length, digest.hex())
-        if m["version"]["minor"] == 0:
-            page.finish()
-    places = sorted(index.values())
-    require(all(a[0] + a[1] < b[0] for a, b in zip(places, places[1:])), "I07", "entries overlap")
+            r = RULES.follow("index record", page, plane=plane, index=index, end=end)
+            end, index[r.path] = r.offset + r.bytes, [r.offset, r.bytes, r.digest.hex()]
     return index
 
 
-def read_tables(data, m, textures):
-    """Per plane a dict of arrays, as section 8 names them."""
-    zero, sections = read_pages(data, m, "tables", b"TXMT", "I32s", ("T01", "T02", "T02", "T03"))
-    require(zero == 0 or m["version"]["minor"], "T01", "reserved bytes of the head")
-    require(len(sections) == m["planeCount"], "R04", "number of planes in tables.bin")
-    return [read_section(section, texture, m) for (section,), texture in zip(sections, textures)]
-
-
-def read_section(c, texture, m):
-    columns, rows, n, r, ws, wf, allocation, flags, k, zero = c.get("IIBBBBBBBB")
-    is_new = m["version"]["minor"] > 0
-    require((columns, rows) == (texture["columns"], texture["rows"]), "R08", "grid")
-    require(n == len(m["scales"]["scale"]), "R11", f"{n} rows")
-    require(1 <= r <= 100 and 1 <= ws <= 4 and 1 <= wf <= 3, "T03", "counts and widths")
-    require(allocation <= 3, "T13", f"allocation {allocation}")
-    require(is_new or (flags <= 1 and zero == 0), "W05", "reserved bits")
-    require((flags & 1) == (texture["codec"] == "jpeg-progressive"), "R10", "incremental")
-    t = {"incremental": flags & 1, "widths": (ws, wf), "parameters": c.array("<f4", 4)}
-    listed = c.get("I")
-    require(listed <= columns * rows, "T03", f"{listed} listed fragments")
-    layout = {"order": ("<u2", listed), "quality": ("u1", r), "tables": ("<u4", r), "knots": ("u1", k)}
-    layout |= {"positions": ("<u2", k), "size": ("u1", r, listed, ws), "digest": ("V8", r, listed)}
-    layout |= {"mse": ("<u2", r * listed), "dssim": ("<u2", r * listed), "preview": ("<u2", listed)}
-    layout |= {"covered": ("<u4", listed), "surface": ("<f4", listed), "features": ("u1", n, listed, wf)}
-    layout |= {"middle": ("<f4", n), "vqp": ("<u2", listed * (allocation == 3))}
-    rest = len(c.data) - c.at - sum(np.dtype(d).itemsize * int(np.prod(s)) for d, *s in layout.values())
-    require(rest == 0 or (is_new and rest > 0), "T03", f"{rest} bytes too many")
-    t |= {name: c.array(*form) for name, form in layout.items()}
-    for name in ("size", "features"):  # little-endian numbers of ws or wf bytes
-        t[name] = (t[name].astype(np.int64) << 8 * np.arange(t[name].shape[-1])).sum(axis=-1)
-    require(listed == len(np.unique(t["order"])) and (t["order"] < columns * rows).all(), "T05", "order")
-    require((t["size"] > 0).all(), "T06", "a size of 0")
-    return t
-
-
-# Sections 2, 4, 5, 7 and 9: bytes, documents, pictures ------------------------------------------------
-
-
-def parse_json(data, most, what):
-    require(len(data) <= most, "L09", f"{what}: more than {most} bytes")
+# Sections 4, 5, 7 to 10: documents, tables, pictures, GLBs ----------------------------------------------
+def decode_image(data, width, height, channels, rule, what, kind=("JPEG", "WEBP")):
     try:
-        document = json.loads(data.decode("utf-8"))
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-        raise Refused(f"J01: {what}: {error}") from error
-    require(isinstance(document, dict), "J01", f"{what}: not an object")
-    return document
-
-
-def decode_image(data, width, height, channels, rule, what):
-    try:
-        image = Image.open(io.BytesIO(data), formats=("JPEG", "WEBP"))
-        good = image.size == (width, height) and image.mode == ("L" if channels == 1 else "RGB")
+        image = Image.open(io.BytesIO(data), formats=kind)
+        good = image.size == (width, height) and (not channels or image.mode == ("L" if channels == 1 else "RGB"))
         require(good, rule, f"{what}: {image.size}, {image.mode}")
         image.load()
         return image
@@ -190,101 +89,87 @@ def decode_image(data, width, height, channels, rule, what):
 class Model:
     """A package, container or tree, with its documents."""
 
-    parse = staticmethod(parse_json)
-
     def __init__(self, name):
         self.name, self.is_tree = name, os.path.isdir(name)
-        data = self.read("manifest.json", 0, 16385)
-        if not self.is_tree:
-            require(data[:4] == b"PK\3\4" and data[30:43] == b"manifest.json", "K11", "no package")
-            data = data[64 : 64 + int.from_bytes(data[22:26], "little")]
-        require(64 + len(data) <= 16384, "K12", "the manifest ends beyond 16,384 bytes")
-        self.id, self.manifest = sha(data), self.parse(data, 16384, "manifest.json")
-        m, major = self.manifest, self.manifest["version"]["major"]
-        require(m.get("format") == "texmesh", "M01", "format")
-        require(major == 2, "W03", f"format {major} is not known; a model of format 1: compile again")
-        require(set(m["requiredFeatures"]) <= {"codec-jpeg-progressive", "codec-webp"}, "M02", "features")
-        self.check("manifest")
-        data = self.read("index.bin", m["index"]["offset"], m["index"]["bytes"])
-        require(sha(data) == m["index"]["sha256"], "R03", "digest of index.bin")
+        self.entries = list_tree(name) if self.is_tree else list_container(name)
+        data = self.read("manifest.json")
+        self.id, self.manifest = sha(data), parse_json(data, 16384, "manifest.json")
+        m = self.manifest
+        require(m.version.major == 2, "W03", f"format {m.version.major} is not known; of format 1: compile again")
+        follow_schema(m, "manifest.v2", "manifest.json")
+        RULES.follow("manifest", m=m)
+        data = self.read("index.bin")
+        require((len(data), sha(data)) == (m.index.bytes, m.index.sha256), "R03", "index.bin")
         self.index = read_index(data, m)
-        self.check("index")
-        self.textures = self.parse(self.entry("textures.json"), 32 << 20, "textures.json")["textures"]
-        require(len(self.textures) == m["planeCount"], "R04", "number of planes in textures.json")
-        self.check("textures")
-        self.tables = read_tables(self.entry("tables.bin"), m, self.textures)
+        RULES.follow("references", m=m, index=self.index, entries=self.entries, is_tree=self.is_tree)
+        self.textures = self.document("textures.json", 32 << 20, "textures.v2").textures
+        names = dict(m=m, index=self.index, textures=self.textures, names=list(self.entries), is_tree=self.is_tree)
+        RULES.follow("planes", **names)
+        self.tables = self.read_tables(self.entry("tables.bin"))
+        RULES.follow("order", **names)
 
-    def check(self, document):
-        """conformance.py checks here, field by field, what has just been read."""
-
-    def read(self, path, offset, size):
+    def read(self, path):
         full, root = os.path.realpath(os.path.join(self.name, path)), os.path.realpath(self.name)
         is_inside = full.startswith(root + os.sep) and os.path.isfile(full)
-        require(is_inside or not self.is_tree, "E01", f"no file {path} in the tree")
+        require(path in self.entries and (is_inside or not self.is_tree), "E01", f"no entry {path}")
         with open(full if self.is_tree else self.name, "rb") as file:
-            file.seek(0 if self.is_tree else offset)
-            return file.read(size)
+            file.seek(self.entries[path].data)
+            return file.read(self.entries[path].size)
 
     def entry(self, path):
-        rule = "R07" if path.startswith(("texture/", "preview/")) else "E01"
-        require(path in self.index, rule, f"no entry {path}")
-        offset, size, digest = self.index[path]
-        data = self.read(path, offset, size)
-        require(sha(data) == digest, "I08", f"digest of {path}")
+        data = self.read(path)
+        require(self.entries[path].crc in (None, zlib.crc32(data)), "K07", f"CRC-32 of {path}")
+        require(path not in self.index or sha(data) == self.index[path][2], "I08", f"digest of {path}")
         return data
+
+    def document(self, path, most, schema=None, free=()):
+        return follow_schema(parse_json(self.entry(path), most, path, free), schema, path)
+
+    def read_tables(self, data):
+        """Per plane a record of arrays, as section 8 names them."""
+        m, later = self.manifest, self.manifest.version.minor > 0
+        sections = zip(read_pages(data, m, "tables", ("T02", "T02", "T03")), self.textures)
+        return [RULES.follow("section", section, m=m, t=t, later=later) for (_, section), t in sections]
 
     def pack(self, plane, name, rule, sizes):
         data = self.entry(f"texture/{plane}/{name}.pack")
-        require(len(data) == sizes.sum(dtype=np.int64), rule, f"bytes of {name}.pack of plane {plane}")
+        require(len(data) == int(np.sum(sizes, dtype=np.int64)), rule, f"bytes of {name}.pack of plane {plane}")
         return cut(data, sizes)
 
     def preview(self, plane):
         t = self.textures[plane]
         data = self.entry(f"preview/{t.get('base', plane):03}.jpg")
-        return decode_image(data, t["previewWidthPx"], t["previewHeightPx"], t["channels"], "F16", "preview")
+        return decode_image(data, t.previewWidthPx, t.previewHeightPx, t.channels, "F16", "preview")
 
     def fragments(self, plane, rung):
         """(fragment, image) of every listed fragment."""
-        texture, t, streams = self.textures[plane], self.tables[plane], []
-        first = 0 if t["incremental"] else rung
-        head = self.pack(plane, "tables", "R12", t["tables"])[first]
+        t, table, streams = self.textures[plane], self.tables[plane], []
+        first = 0 if table.flags & 1 else rung
+        head = self.pack(plane, "tables", "R12", table.tables)[first]
         for r in range(first, rung + 1):
-            streams.append(self.pack(plane, f"r{r:02}", "R13", t["size"][r]))
-            digests = [hashlib.sha256(stream).digest()[:8] for stream in streams[-1]]
-            require(b"".join(digests) == t["digest"][r].tobytes(), "F03", f"digests of rung {r}")
-        for fragment, *parts in zip(t["order"].tolist(), *streams):
-            one, has_table = parts[0], head.startswith(SOI) and head.endswith(EOI)
-            good, rule, file = {
-                "jpeg": (has_table and one[:2] == SOI and one[-2:] == EOI, "F05", head[:-2] + one[2:]),
-                "jpeg-progressive": (
-                    has_table and parts[-1][-1:] != b"\xff", "F06", head[:-2] + b"".join(parts) + EOI
-                ),
-                "webp": (one[:4] == b"RIFF" and one[8:12] == b"WEBP", "F07", one),
-            }.get(texture["codec"], (False, "X03", b""))
+            streams.append(self.pack(plane, f"r{r:02}", "R13", table.sizes[r]))
+            digests = "".join(sha(stream)[:16] for stream in streams[-1])
+            require(digests == table.digests[r].tobytes().hex(), "F03", f"digests of rung {r}")
+        for fragment, *parts in zip(table.order, *streams):
             what = f"fragment {fragment} at rung {rung} of plane {plane}"
-            require(good, rule, what)
-            sides = texture["fragmentWidthPx"], texture["fragmentHeightPx"]
-            yield fragment, decode_image(file, *sides, texture["channels"], "F08", what)
+            file = RULES.follow("fragment", head=head, parts=parts, t=t, what=what).file
+            yield fragment, decode_image(file, t.fragmentWidthPx, t.fragmentHeightPx, t.channels, "F08", what)
 
     def picture(self, plane, rung):
         """The plane at a rung; the preview where nothing is listed."""
         t = self.textures[plane]
-        rung = range(len(t["rungQuality"]))[rung]  # -1: the highest
-        whole = self.preview(plane).resize((t["widthPx"], t["heightPx"]), Image.BILINEAR)
+        rung = range(len(t.rungQuality))[rung]  # -1: the highest
+        whole = self.preview(plane).resize((t.widthPx, t.heightPx), Image.BILINEAR)
         for fragment, image in self.fragments(plane, rung):
-            row, column = divmod(fragment, t["columns"])
-            whole.paste(image, (column * t["fragmentWidthPx"], row * t["fragmentHeightPx"]))
+            row, column = divmod(fragment, t.columns)
+            whole.paste(image, (column * t.fragmentWidthPx, row * t.fragmentHeightPx))
         return whole
 
     def stream(self):
-        require("stream" in self.manifest, "E01", "no split stream in this package")
-        return Splits(self.entry("mesh/stream.bin"), self.manifest["stream"])
+        return Splits(self.entry("mesh/stream.bin"), self.manifest.stream)
 
 
 # Section 11: the stream of vertex splits; names are those of that text, written small -----------------
-
-COMPONENTS = {-1: 3, 0: 2, 1: 2, 2: 2, 3: 4}  # of the kinds of attributes; positions are kind -1 here
-
 
 class Bits:
     """11.3: binary decisions. A model is a list [p, n]."""
@@ -346,52 +231,30 @@ class Splits:
     """The decoder. A corner is the number 3 * face + c."""
 
     def __init__(self, data, ref):
-        self.data, self.head_bytes = data, ref["headBytes"]
+        self.data, self.head_bytes = data, ref.headBytes
         self.read_head(Cursor(data, "S08", "the head of the stream"))
-        require(sha(data[: self.head_bytes]) == ref["headSha256"], "R02", "headSha256 of the stream")
+        require(sha(data[: self.head_bytes]) == ref.headSha256, "R02", "headSha256 of the stream")
         self.places, self.around, self.point_of, self.values = [], [], [], []
         self.wedge_of, self.groups_of, self.old, self.targets, self.fresh = [], [], {}, [], []
         self.last, self.steps, self.parent, self.child = 0, 0, None, None
         self.models = collections.defaultdict(lambda: [32768, 0])
 
     # 11.2
-
     def read_head(self, c):
-        require(c.raw(4) == b"TXMS", "S01", "magic")
-        major, _, bits, attributes, scales, zero, groups, blocks = c.get("HHBBBBII")
-        require(major == 2, "S01", f"version {major} of the stream")
-        require(zero == 0, "S02", "a reserved byte")
-        require(1 <= groups <= 65536 and 1 <= scales <= 100, "S05", "number of groups or scales")
-        self.kinds = [(-1, bits, c.array("<f4", 4))]
-        for _ in range(attributes):
-            kind, bits, zero = c.get("BBH")
-            require(self.kinds[-1][0] < kind <= 3, "S03", f"attribute kind {kind}")
-            require(zero == 0, "S02", "reserved bytes")
-            self.kinds.append((kind, bits, c.array("<f4", 3) if kind < 2 else np.ones(1)))
-        for kind, bits, grid in self.kinds:
-            require((2 if kind == 2 else 1) <= bits <= 24, "S03", f"{bits} bits of kind {kind}")
-            require(np.isfinite(grid).all() and grid[-1] > 0, "S04", "a grid")
-        self.groups, self.scales, self.blocks = [tuple(c.get("HH")) for _ in range(groups)], [], []
-        before = {"scale": 256, "blocks": 0, "points": 0, "wedges": 0, "faces": 0}
-        for _ in range(scales):
-            s = {"scale": c.get("B")} | {name: before[name] + c.varint() for name in list(before)[1:5]}
-            s["hidden"] = c.varint()
-            good = s["scale"] < before["scale"] and before["blocks"] < s["blocks"] <= blocks
-            good = good and s["wedges"] >= s["points"] and s["faces"] >= max(1, s["hidden"])
-            require(good and max(s.values()) <= MAX32, "S05", f"numbers of scale {s['scale']}")
-            self.scales.append(before := s)
-        require(before["scale"] == 0 and before["blocks"] == blocks, "S05", "the last scale")
-        self.starts = c.array("u1", attributes + 1, 117).tolist()
-        require(blocks <= len(c.data) // (attributes + 11), "S08", f"{blocks} blocks")
-        for _ in range(blocks):
-            (count, is_patch), *parts = divmod(c.varint(), 2), *(c.varint() for _ in range(attributes + 2))
-            good = count >= 1 and (is_patch or count <= 4096) and sum(parts) >= count // 64
-            require(good, "S07", "count of a block, or too few bytes for it")
-            self.blocks.append((is_patch, count, parts, c.raw(8)))
+        h = RULES.follow("stream", c)
+        self.kinds = [(-1, h.bits, h.grid, 3)]  # kind, bits, grid, components; -1: positions
+        for _ in range(h.A):
+            a = RULES.follow("attribute", c, kinds=[kind for kind, *_ in self.kinds])
+            self.kinds.append((a.kind, a.bits, a.grid, 4 if a.kind == 3 else 2))
+        self.groups = c.field("<u2", (h.groups, 2)).tolist()
+        before, self.scales = Record(scale=256, blocks=0, points=0, wedges=0, faces=0), []
+        for _ in range(h.scales):
+            self.scales.append(before := RULES.follow("stream scale", c, before=before, head=h))
+        self.starts = RULES.follow("stream starts", c, last=before, head=h, left=len(c.data) - c.at).starts.tolist()
+        self.blocks = [RULES.follow("block", c, head=h) for _ in range(h.blocks)]
         require(c.at == self.head_bytes, "S08", "headBytes of the stream")
 
     # 11.3, 11.5
-
     def b(self, *model):
         """B of a model, which is its name and its indices."""
         return self.connectivity.bit(self.models[model])
@@ -416,7 +279,7 @@ class Splits:
     def new_wedge(self, point, copied=None):
         w = len(self.point_of)
         self.point_of.append(point)
-        self.values.append(copied or [[0] * COMPONENTS[kind] for kind, *_ in self.kinds[1:]])
+        self.values.append(copied or [[0] * n for *_, n in self.kinds[1:]])
         self.fresh += [w] if copied is None else []
         self.targets += [w] if point == self.child else []
         return w
@@ -451,25 +314,25 @@ class Splits:
         self.old = {h: self.w(h) for fan, _ in self.fans for h in fan}
 
     # 11.6
-
     def scale_ends(self):
-        """Decodes scale after scale: what each has, and the bytes up to its end."""
+        """Decodes scale after scale; what each has, and its prefix."""
         at, done = self.head_bytes, 0
         for s in self.scales:
             self.queue, self.refusals = collections.OrderedDict(), collections.Counter()
             self.has_split, self.progress = set(), True
-            for is_patch, count, sizes, digest in self.blocks[done : s["blocks"]]:
-                data, at = self.data[at : at + sum(sizes)], at + sum(sizes)
+            for block in self.blocks[done : s.blocks]:
+                data, at = self.data[at : at + sum(block.sizes)], at + sum(block.sizes)
                 require(at <= len(self.data), "S08", "a block ends early")
-                require(hashlib.sha256(data).digest()[:8] == digest, "S09", "digest of a block")
-                first, *parts = cut(data, sizes)
+                require(sha(data)[:16] == block.digest.hex(), "S09", "digest of a block")
+                first, *parts = cut(data, block.sizes)
                 self.connectivity = Bits(first, 200)
                 self.parts = [Values(part, start) for part, start in zip(parts, self.starts)]
-                (self.patch if is_patch else self.split_block)(count)
-            done, hidden = s["blocks"], len(self.groups_of) - len(self.triangles())
-            found = [len(self.places), len(self.point_of), len(self.groups_of), hidden]
-            require(found == list(s.values())[2:], "S19", f"scale {s['scale']}: {found} instead of {s}")
-            yield s | {"triangles": s["faces"] - hidden, "bytes": at}
+                (self.patch if block.is_patch else self.split_block)(block.count)
+            done, triangles = s.blocks, len(self.triangles())
+            found = (len(self.places), len(self.point_of), len(self.groups_of), len(self.groups_of) - triangles)
+            told = (s.points, s.wedges, s.faces, s.hidden)
+            require(found == told, "S19", f"scale {s.scale}: {found} instead of {told}")
+            yield Record(scale=s.scale, wedges=s.wedges, triangles=triangles, bytes=at)
 
     def split_block(self, count):
         while count:
@@ -487,7 +350,6 @@ class Splits:
                 self.queue |= dict.fromkeys([v, u, *(self.ends[h][k] for h in self.old for k in (0, 1))])
 
     # 11.7
-
     def split(self, v):
         self.gather(v)
         u = self.new_point()
@@ -496,10 +358,8 @@ class Splits:
         for k, (fan, is_closed) in enumerate(self.fans):
             self.choose_moving(fan, is_closed, k > 0)
         for h in self.moving:
-            self.moving[h] = self.target(self.old[h])
+            self.wedge_of[h] = self.moving[h] = self.target(self.old[h])
         self.around[v], self.around[u] = [h for h in self.old if h not in self.moving], list(self.moving)
-        for h, w in self.moving.items():
-            self.wedge_of[h] = w
         for fan, is_closed in self.fans:
             ring = [fan[-1], *fan] if is_closed else [None, *fan, None]
             for last, following in zip(ring, ring[1:]):
@@ -517,12 +377,9 @@ class Splits:
         side, turns, run, n = 0, 0, 0, len(fan)
         for i, h in enumerate(fan):
             valence = clamp(len(self.around[self.p(h, 1)]), 4, 8)
-            later_turns = (
-                ("turn", is_closed, side, min(n - i, 11), valence),
-                ("turn_back", is_closed, side, min(run, 7), clamp(n, 3, 10), valence),
-                ("turn_again", is_closed, side),
-            )
-            turn = self.b(*(later_turns[min(turns, 2)] if i else ("first", min(n, 11), later)))
+            turn_back = "turn_back", is_closed, side, min(run, 7), clamp(n, 3, 10), valence
+            usual = ("turn", is_closed, side, min(n - i, 11), valence), turn_back, ("turn_again", is_closed, side)
+            turn = self.b(*(usual[min(turns, 2)] if i else ("first", min(n, 11), later)))
             side, turns, run = side ^ turn, turns + (turn if i else 0), 1 if turn else run + 1
             if side:
                 self.moving[h] = None
@@ -577,7 +434,6 @@ class Splits:
         return self.new_wedge(p) if found is None else found
 
     # 11.8
-
     def patch(self, count):
         self.gates, end = [], len(self.groups_of) + count
         while len(self.groups_of) < end:
@@ -628,7 +484,6 @@ class Splits:
         self.add((wb, wa, third), h // 3)
 
     # 11.9
-
     def fresh_wedges(self):
         """What stands in FRESH is pending."""
         while self.fresh:
@@ -638,28 +493,26 @@ class Splits:
             twin = next((self.w(h) for h in corners if self.w(h) not in self.fresh), None)
             beside = [self.w(h, k) for h in corners if self.w(h) == w for k in (1, 2)]
             beside = [n for n in beside if n not in self.fresh]
-            for k, (kind, bits, _) in enumerate(self.kinds[1:]):
+            for k, (kind, bits, _, components) in enumerate(self.kinds[1:]):
                 part = self.parts[k + 1]
                 if twin is not None and part.is_there and part.bit(part.models[116]):
                     self.values[w][k] = list(self.values[twin][k])
                     continue
                 if not beside and (twin is not None or self.parent is not None):
                     beside = [twin] if twin is not None else list(self.old.values())[:1]
-                known = [self.values[n][k] for n in beside] or [[0] * COMPONENTS[kind]]
+                known = [self.values[n][k] for n in beside] or [[0] * components]
                 guess = mean_normal(known, bits) if kind == 2 and beside else mean(known)
                 self.values[w][k] = part.value(guess, bits)
             self.fresh.pop(0)
 
-    # What was decoded, as numbers
-
     def triangles(self):
         """Numbers of the faces that show."""
         corners = np.array(self.places)[np.array(self.point_of)[np.array(self.wedge_of)]].reshape(-1, 3, 3)
-        return np.flatnonzero((corners != np.roll(corners, 1, axis=1)).any(axis=2).all(axis=1)).tolist()
+        return np.flatnonzero((corners != np.roll(corners, 1, axis=1)).any(axis=2).all(axis=1))
 
     def numbers(self, k):
         """Positions (k = 0) or attribute k - 1 of every wedge, in binary32."""
-        kind, bits, grid = self.kinds[k]
+        kind, bits, grid, _ = self.kinds[k]
         whole = np.array([v[k - 1] for v in self.values] if k else [self.places[p] for p in self.point_of])
         if kind == 3:
             return np.float32(whole) / np.float32((1 << bits) - 1)
@@ -669,40 +522,23 @@ class Splits:
         length = np.sqrt(x[:, 0] * x[:, 0] + x[:, 1] * x[:, 1] + x[:, 2] * x[:, 2])[:, None]
         return np.where(length > 0, x / np.where(length > 0, length, np.float32(1)), np.float32([0, 0, 1]))
 
-
 def mean(values):
     n = len(values)
     return [(2 * sum(column) + n) // (2 * n) for column in zip(*values)]
 
-
 def folded(xy, c):
     return (c - np.abs(xy[..., ::-1])) * np.where(xy < 0, -1, 1)
-
 
 def octahedron(uv, c):
     xy = uv - c
     z = c - np.abs(xy).sum(axis=1, keepdims=True)
     return np.hstack([np.where(z < 0, folded(xy, c), xy), z])
 
-
 def mean_normal(values, bits):
     c = (1 << bits - 1) - 1
     total = octahedron(np.array(values), c).sum(axis=0)
     xy = np.sign(total[:2]) * (np.abs(total[:2]) * c // max(np.abs(total).sum(), 1))
     return ((folded(xy, c) if total[2] < 0 else xy) + c).tolist()
-
-
-# Commands ---------------------------------------------------------------------------------------------
-
-
-def write_raw(splits, file):
-    for place in splits.places:
-        print("p", *place, file=file)
-    for point, values in zip(splits.point_of, splits.values):
-        print("w", point, *(number for value in values for number in value), file=file)
-    for face, group in zip(np.reshape(splits.wedge_of, (-1, 3)), splits.groups_of):
-        print("f", *face, group, file=file)
-
 
 def write_obj(splits, file):
     kinds = {kind: k for k, (kind, *_) in enumerate(splits.kinds)}
@@ -714,48 +550,51 @@ def write_obj(splits, file):
     for name, parts in columns.items():
         rows = np.hstack(parts)
         np.savetxt(file, rows, name + (" %.17g" if name == "vt" else " %.9g") * rows.shape[1])
-    corner = {3: "{0}/{0}/{0}", 2: "{0}//{0}" if 2 in kinds else "{0}/{0}", 1: "{0}"}[len(columns)]
-    group_of = splits.groups_of.__getitem__
-    for group, faces in itertools.groupby(sorted(splits.triangles(), key=group_of), key=group_of):
-        print("g material{}_part{}".format(*splits.groups[group]), file=file)
-        for f in faces:
-            print("f", *(corner.format(w + 1) for w in splits.wedge_of[3 * f : 3 * f + 3]), file=file)
+    corner = {3: " %d/%d/%d", 2: " %d//%d" if 2 in kinds else " %d/%d", 1: " %d"}[len(columns)]
+    shown, groups_of = splits.triangles(), np.array(splits.groups_of)
+    wedges = np.reshape(splits.wedge_of, (-1, 3)) + 1
+    for number, group in enumerate(splits.groups):
+        print("g material{}_part{}".format(*group), file=file)
+        faces = wedges[shown[groups_of[shown] == number]]
+        np.savetxt(file, np.repeat(faces, len(columns), axis=1), "f" + 3 * corner)
 
-
-def run(options):
-    model = Model(options.package)
-    if options.command == "info":
+def run(options, package):
+    model, output = Model(package), options.output
+    if options.command == "check":
+        Checks(model, RULES, decode_image).run()
+        print(f"{package}: no rule broken")
+    elif options.command == "info":
         print(f"id {model.id}")
         for path, (offset, size, digest) in model.index.items():
             print(digest, offset, size, path)
-    elif options.command == "mesh":
-        splits = model.stream()
-        is_there = any(end["scale"] == options.scale for end in splits.scale_ends())
-        require(is_there, "S21", f"no scale {options.scale} in the stream")
-        with open(options.output, "w", encoding="ascii") as file:
-            (write_raw if options.raw else write_obj)(splits, file)
+    elif options.command == "picture":
+        plane, is_preview = options.plane, options.rung == "preview"
+        shown = model.preview(plane) if is_preview else model.picture(plane, int(options.rung))
+        shown.save(output, format="PNG")
     else:
-        p, rung = options.plane, options.rung
-        shown = model.preview(p) if rung == "preview" else model.picture(p, int(rung))
-        shown.save(options.output, format="PNG")
-
+        splits = model.stream()
+        require(any(end.scale == options.scale for end in splits.scale_ends()), "S21", "no such scale")
+        with open(output, "w", encoding="ascii") as file:
+            (write_raw if options.raw else write_obj)(splits, file)
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("command", choices=("info", "picture", "mesh"))
-    parser.add_argument("package")
+    parser.add_argument("command", choices=("check", "info", "picture", "mesh"))
+    parser.add_argument("packages", nargs="+")
     parser.add_argument("--plane", type=int, default=0)
     parser.add_argument("--rung", default="-1", help="a number, or preview; default: the highest")
     parser.add_argument("--scale", type=int, default=0)
     parser.add_argument("--raw", action="store_true", help="whole numbers of points, wedges and faces")
     parser.add_argument("-o", "--output", default="/dev/stdout")
-    options = parser.parse_args()
-    try:
-        run(options)
-    except (Refused, OSError, KeyError, IndexError, TypeError, ValueError) as error:
-        is_told = isinstance(error, (Refused, OSError))  # else a field is missing, or of another type
-        sys.exit(f"{options.package}: refused: {error if is_told else f'J04: {error!r}'}")
-
+    options, refused = parser.parse_args(), []
+    for package in options.packages:
+        try:
+            run(options, package)
+        except (Refused, OSError, KeyError, IndexError, TypeError, ValueError) as error:
+            rule = "" if isinstance(error, (Refused, OSError)) else "J04: "  # a field is missing, or of another type
+            refused.append(f"{package}: refused: {rule}{error}\n")
+    print(*refused, sep="", end="", file=sys.stdout if options.command == "check" else sys.stderr)
+    sys.exit(len(refused) > 0)
 
 if __name__ == "__main__":
     main()

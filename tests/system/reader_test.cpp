@@ -47,15 +47,14 @@ struct SecondReader : ::testing::Test {
     if (python.empty()) GTEST_SKIP() << "no Python with numpy and Pillow (python3-numpy, python3-pil)";
     if (golden_packages().empty()) GTEST_SKIP() << "no golden package of format 2";
   }
-  static CommandResult run_script(const char* script, std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(), {python, (kSource / "examples" / "reader" / script).string()});
+  static CommandResult run(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(),
+                     {python, (kSource / "examples" / "reader" / "texmesh_reader.py").string()});
     return testing::run_command(arguments, {"PYTHONDONTWRITEBYTECODE=1"});
   }
-  static CommandResult run(std::vector<std::string> arguments) {
-    return run_script("texmesh_reader.py", std::move(arguments));
-  }
   static CommandResult check(std::vector<std::string> packages) {
-    return run_script("conformance.py", std::move(packages));
+    packages.insert(packages.begin(), "check");
+    return run(std::move(packages));
   }
   static inline std::string python;
   TemporaryFolder folder;
@@ -210,7 +209,7 @@ std::vector<std::string> make_invalid_packages(const std::string& python, const 
     EXPECT_EQ(testing::run_command(cases, {"PYTHONDONTWRITEBYTECODE=1"}).exit_code, 0) << name;
   };
   make("v2.0-scan.texmesh", {});
-  make("v2.0-webp.texmesh", {"F07-no-webp"});
+  make("v2.0-webp.texmesh", {"F07-no-webp", "R05-codec-without-feature"});
   make("v2.0-progressive.texmesh", {"F06-ends-with-ff"});
   make("v2.0-source.texmesh", {"O02-damaged-source"});
   std::istringstream cases(testing::run_command({python, script, "--list"}).output);
@@ -234,6 +233,14 @@ TEST_F(SecondReader, RefusesByTheRuleThatIsBrokenAndSoDoesVerify) {
         << (line == std::string::npos ? told : told.substr(line, told.find('\n', line) - line));
     expect_verify_names(path, rule);
   }
+}
+
+TEST_F(SecondReader, InvalidPackagesBreakOneRuleEach) {
+  make_invalid_packages(python, folder / "invalid");
+  const CommandResult result = testing::run_command(
+      {python, (kSource / "tests" / "golden" / "check_invalid").string(), folder / "invalid"},
+      {"PYTHONDONTWRITEBYTECODE=1"}, "", 900);
+  EXPECT_EQ(result.exit_code, 0) << result.errors;
 }
 
 /// All that PackageReader reads, except measurements.

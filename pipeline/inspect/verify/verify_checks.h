@@ -1,4 +1,5 @@
 #pragma once
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -48,10 +49,11 @@ void check_provenance(const Manifest& manifest, const std::vector<TextureInfo>& 
                       const Provenance& provenance, Findings& findings);
 
 /// A GLB and what manifest and index say about it and about the previews that it shows. Returns its
-/// positions, sorted; none when the GLB is broken. Textures without refs have not been found in the index.
+/// positions, sorted; none when the GLB is broken. Textures without refs have not been found in the index; no
+/// textures at all: textures.json could not be read, which has its finding.
 std::vector<Vec3d> check_mesh(const Manifest& manifest, const ManifestScale& scale,
-                              const std::vector<TextureInfo>& textures, std::span<const std::uint8_t> glb,
-                              Findings& findings);
+                              const std::optional<std::vector<TextureInfo>>& textures,
+                              std::span<const std::uint8_t> glb, Findings& findings);
 
 /// What the GLBs of a package have in common, as JSON texts.
 struct MeshShare {

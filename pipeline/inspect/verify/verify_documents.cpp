@@ -63,6 +63,12 @@ void check_steps(const Manifest& m, Findings& findings) {
                        "at most " + number(s.display_px_flip) + ", up to which S_" + std::to_string(s.scale) +
                            " is enough",
                        number(step.up_to_px));
+      for (const ManifestScale& coarser : m.scales)
+        findings.require(
+            coarser.scale <= s.scale || coarser.display_px_flip < s.display_px_flip, {"step", "M22"},
+            kManifestPath, at("steps", k, "/1"),
+            "no step, as S_" + std::to_string(coarser.scale) + " is enough up to the same height",
+            "S_" + std::to_string(s.scale));
     }
   }
 }

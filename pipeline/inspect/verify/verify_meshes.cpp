@@ -36,6 +36,25 @@ void check_previews_of(const Manifest& m, const ManifestScale& scale,
   }
 }
 
+void check_image_names(const ManifestScale& scale, const std::vector<TextureInfo>& textures,
+                       const GlbFacts& facts, Findings& findings) {
+  for (const TextureInfo& t : textures) {
+    const std::string name = "texture/" + std::to_string(t.image);
+    // A scale may have lost every triangle of a material; S_0 has them all.
+    if (scale.scale == 0)
+      findings.require(
+          std::find(facts.image_names.begin(), facts.image_names.end(), name) != facts.image_names.end(),
+          {"mesh-images", "G04"}, scale.glb.path, "/images", "an image named " + name, "none");
+  }
+  for (std::size_t k = 0; k < facts.image_names.size(); ++k)
+    findings.require(std::any_of(textures.begin(), textures.end(),
+                                 [&](const TextureInfo& t) {
+                                   return facts.image_names[k] == "texture/" + std::to_string(t.image);
+                                 }),
+                     {"mesh-images", "G04"}, scale.glb.path, "/images/" + std::to_string(k) + "/name",
+                     "texture/<image> of textures.json", facts.image_names[k]);
+}
+
 /// Stored positions may lie a little outside of S_0's bounds.
 void check_bounds(const Manifest& m, const GlbFacts& facts, const std::string& entry, const char* rule,
                   Findings& findings) {
@@ -51,8 +70,8 @@ void check_bounds(const Manifest& m, const GlbFacts& facts, const std::string& e
 }  // namespace
 
 std::vector<Vec3d> check_mesh(const Manifest& m, const ManifestScale& scale,
-                              const std::vector<TextureInfo>& textures, std::span<const std::uint8_t> glb,
-                              Findings& findings) {
+                              const std::optional<std::vector<TextureInfo>>& textures,
+                              std::span<const std::uint8_t> glb, Findings& findings) {
   const std::string& entry = scale.glb.path;
   const std::size_t before = findings.list().size();
   GlbFacts facts = check_glb(glb, entry, findings);
@@ -63,22 +82,10 @@ std::vector<Vec3d> check_mesh(const Manifest& m, const ManifestScale& scale,
   findings.require_equal<std::uint64_t>(scale.vertices, facts.vertices, {"mesh-counts", "G02"}, entry,
                                         "vertices");
   check_bounds(m, facts, entry, "G02", findings);
-  for (const TextureInfo& t : textures) {
-    const std::string name = "texture/" + std::to_string(t.image);
-    // A scale may have lost every triangle of a material; S_0 has them all.
-    if (scale.scale == 0)
-      findings.require(
-          std::find(facts.image_names.begin(), facts.image_names.end(), name) != facts.image_names.end(),
-          {"mesh-images", "G04"}, entry, "/images", "an image named " + name, "none");
+  if (textures) {
+    check_image_names(scale, *textures, facts, findings);
+    check_previews_of(m, scale, *textures, facts, findings);
   }
-  for (std::size_t k = 0; k < facts.image_names.size(); ++k)
-    findings.require(std::any_of(textures.begin(), textures.end(),
-                                 [&](const TextureInfo& t) {
-                                   return facts.image_names[k] == "texture/" + std::to_string(t.image);
-                                 }),
-                     {"mesh-images", "G04"}, entry, "/images/" + std::to_string(k) + "/name",
-                     "texture/<image> of textures.json", facts.image_names[k]);
-  check_previews_of(m, scale, textures, facts, findings);
   return std::move(facts.positions);
 }
 

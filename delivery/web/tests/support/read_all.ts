@@ -13,6 +13,7 @@ export async function readAll(bytes: Uint8Array): Promise<SplitStreamReader | un
   await readThesis(reader);
   const coarsest = reader.manifest.scales.at(-1)!.scale;
   for (const { scale, glb } of reader.manifest.scales) if (glb.path.endsWith('.glb')) requireSelfContained(await reader.scaleGlb(scale), scale !== coarsest);
+  for (const [k] of reader.manifest.proxies.entries()) requireSelfContained(await reader.proxyGlb(k), false, 'G13');
   const textures = await reader.textures();
   for (const [plane, tables] of (await reader.tables()).entries()) {
     if (textures[plane].mip === 0) await reader.preview(plane);
