@@ -216,7 +216,8 @@ void fetch_textures(const FetchArguments& a, const DeliveryRequest& request, con
   load.htc.time_limit_s = std::max(1e-3, request.time_limit_s - f.mesh_s);
   load.htc.throughput.initial_bytes_s = bytes_s;
   load.group_bytes = group_bytes(load.htc.throughput.initial_bytes_s, f.rtt_s, load.htc.time_limit_s);
-  const std::vector<PlaneChoice> planes = choose_textures(package, texture_memory(package, request, f.scale), load);
+  const std::vector<PlaneChoice> planes =
+      choose_textures(package, texture_memory(package, request, f.scale), load);
   f.gpu = gpu_scale(package, f.scale, planes);
   load.cancelled = http.cancelled;
   load.on_fragment = [&](const LoadedFragment& fragment) { writer.add(fragment); };

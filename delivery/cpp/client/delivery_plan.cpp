@@ -150,9 +150,8 @@ ChosenTextures choose_textures(TextureLoss& loss, const DeliveryRequest& request
     ThesisTextures printed = thesis_textures(loss, options, bytes);
     return {std::move(printed.planes), std::move(printed.list), printed.options.gamma};
   }
-  TextureBudget budget =
-      texture_for_budget(loss, options, static_cast<std::uint64_t>(bytes),
-                         texture_memory(loss.package(), request, options.scale));
+  TextureBudget budget = texture_for_budget(loss, options, static_cast<std::uint64_t>(bytes),
+                                            texture_memory(loss.package(), request, options.scale));
   return {std::move(budget.planes), std::move(budget.list), options.gamma};
 }
 

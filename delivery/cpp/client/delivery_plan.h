@@ -96,8 +96,8 @@ int wanted_scale(PackageReader& package, const DeliveryRequest& request);
 
 /// A proxy that no one can tell from S_0; nothing where the request says a scale or another rule than kFlip.
 std::optional<std::size_t> proxy_instead(const Manifest& manifest, const DeliveryRequest& request);
-/// The larger proxy that comes before documents and mesh; nothing where none pays, or where the request says a
-/// scale, another rule than kFlip or Policy::kThesis.
+/// The larger proxy that comes before documents and mesh; nothing where none pays, or where the request says
+/// a scale, another rule than kFlip or Policy::kThesis.
 std::optional<std::size_t> proxy_on_the_way(const Manifest& manifest, const DeliveryRequest& request,
                                             const StepLink& link);
 /// Memory that a scale leaves for textures, bytes.

@@ -25,7 +25,7 @@ struct Fetched {
   std::optional<LoadReport> refined;
   double texture_flip = 0, flip = 0;  // predicted of what has come
   GpuBytes gpu;
-  std::vector<std::string> urls;      // in the order of load.mirrors
+  std::vector<std::string> urls;  // in the order of load.mirrors
 };
 
 /// One line, schemas/fetch.v1.schema.json.

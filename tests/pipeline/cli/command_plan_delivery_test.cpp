@@ -276,8 +276,9 @@ TEST(CliFetch, MemoryChoosesScaleAndMipsAsPlansDo) {
     EXPECT_GT(some["flip"], flip) << percent;
     flip = some["flip"];
   }
-  const CommandResult least = texmesh({"fetch", "http://127.0.0.1:" + std::to_string(port) + "/v2.0-scan.texmesh",
-                                       "--time", "1", "--memory", "1kB"});
+  const CommandResult least =
+      texmesh({"fetch", "http://127.0.0.1:" + std::to_string(port) + "/v2.0-scan.texmesh", "--time", "1",
+               "--memory", "1kB"});
   server.stop();
   thread.join();
   EXPECT_EQ(least.exit_code, 0);
