@@ -10,7 +10,6 @@
 #include "format/base/bytes.h"
 #include "format/container/layout.h"
 #include "format/rules/proxy_choice.h"
-#include "format/rules/proxy_steps.h"
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/fetch/fetched.h"
 #include "pipeline/cli/fetch/fetched_files.h"
@@ -113,10 +112,8 @@ void choose_in_time(PackageReader& package, DeliveryRequest request, double byte
 /// A larger proxy on the way to a scale, where it pays.
 void fetch_step(PackageReader& package, const DeliveryRequest& request, double bytes_s,
                 Clock::time_point start, FetchedFiles& writer, Fetched& f, Moved& moved) {
-  if (request.rule != StepRule::kFlip) return;
-  const std::optional<std::size_t> step =
-      proxy_step(package.manifest(), wanted_scale(package, request), request.displayed_px,
-                 {bytes_s, f.rtt_s, request.time_limit_s - seconds_since(start)});
+  const std::optional<std::size_t> step = proxy_on_the_way(
+      package.manifest(), request, {bytes_s, f.rtt_s, request.time_limit_s - seconds_since(start)});
   if (!step) return;
   fetch_proxy(package, static_cast<std::uint32_t>(*step), writer, f, moved);
   f.step = {static_cast<std::uint32_t>(*step), seconds_since(start)};
@@ -130,6 +127,7 @@ void end_with_proxy(PackageReader& package, double displayed_px, Clock::time_poi
   f.scale = package.manifest().scales.back().scale;
   f.mesh_s = f.end_s = seconds_since(start);
   f.flip = f.texture_flip = proxy_loss(package.manifest(), *f.proxy, displayed_px).flip;
+  f.gpu = gpu_proxy(package.manifest().proxies[*f.proxy]);
 }
 
 Bytes fetch_mesh(PackageReader& package, Fetched& f, Moved& moved) {
@@ -188,17 +186,17 @@ void predict(PackageReader& package, const TextureLoader& loader, const std::vec
 }
 
 /// The textures for the time, and in `load.list` how they are listed.
-std::vector<PlaneChoice> choose_textures(PackageReader& package, LoadOptions& load) {
+std::vector<PlaneChoice> choose_textures(PackageReader& package, double memory_bytes, LoadOptions& load) {
   const double budget_bytes = load.htc.time_limit_s * load.htc.throughput.initial_bytes_s;
+  TextureLoss loss(package, load.list.displayed_px);
   if (load.htc.policy == Policy::kThesis) {
-    TextureLoss loss(package, load.list.displayed_px);
     ThesisTextures as_printed = thesis_textures(loss, load.list, budget_bytes);
     load.list = as_printed.options;
     load.group_bytes = 0;  // fragment by fragment
     return std::move(as_printed.planes);
   }
   const TextureBudget budget =
-      texture_for_budget(package, load.list, static_cast<std::uint64_t>(budget_bytes));
+      texture_for_budget(loss, load.list, static_cast<std::uint64_t>(budget_bytes), memory_bytes);
   load.list.group_weights = budget.list.group_weights;
   return budget.planes;
 }
@@ -218,7 +216,9 @@ void fetch_textures(const FetchArguments& a, const DeliveryRequest& request, con
   load.htc.time_limit_s = std::max(1e-3, request.time_limit_s - f.mesh_s);
   load.htc.throughput.initial_bytes_s = bytes_s;
   load.group_bytes = group_bytes(load.htc.throughput.initial_bytes_s, f.rtt_s, load.htc.time_limit_s);
-  const std::vector<PlaneChoice> planes = choose_textures(package, load);
+  const std::vector<PlaneChoice> planes =
+      choose_textures(package, texture_memory(package, request, f.scale), load);
+  f.gpu = gpu_scale(package, f.scale, planes);
   load.cancelled = http.cancelled;
   load.on_fragment = [&](const LoadedFragment& fragment) { writer.add(fragment); };
   f.load = loader.load(planes, load);
@@ -260,7 +260,7 @@ Fetched fetch(const FetchArguments& a, LinkWatch& watch) {
   if (proxies) {
     fetch_proxy(package, 0, writer, f, moved);
     f.first_picture_s = seconds_since(start);
-    if (request.rule == StepRule::kFlip) f.proxy = serving_proxy(package.manifest(), request.displayed_px);
+    f.proxy = proxy_instead(package.manifest(), request);
   }
   if (!f.proxy) {
     if (proxies) fetch_step(package, request, bytes_s(), start, writer, f, moved);
@@ -298,6 +298,8 @@ int run_fetch(FetchArguments& args) {
     std::cerr << "interrupted\n";
     return 130;
   }
+  if (static_cast<double>(f.gpu.all()) > delivery_request(args.delivery).memory_bytes)
+    std::cerr << "warning: even the least takes " << f.gpu.all() << " bytes on the GPU\n";
   std::cout << (args.json ? fetched_json(f, watch, limit_s) : fetched_text(f, watch, limit_s));
   return f.load.cancelled ? 130 : f.load.given_up > 0 ? kExitDifferent : kExitOk;
 }
@@ -309,6 +311,7 @@ void add_fetch_options(Command& c, FetchArguments& args) {
   add_time_option(c, d);
   add_display_option(c, d);
   add_scale_option(c, d);
+  add_memory_option(c, d);
   c.option("--mirror", args.mirrors, "URL of the same package on another server; may be given again")
       .value_name("URL");
   c.option("--refine", args.refine, "Go on for so long after the limit, best upgrades first")
@@ -348,6 +351,7 @@ void add_fetch_command(Command& app) {
   add_fetch_options(c, *args);
   c.examples(
       "  texmesh fetch https://host/bust.texmesh --time 4 --display 800\n"
+      "  texmesh fetch https://host/bust.texmesh --time 4 --memory 64MB\n"
       "  texmesh fetch https://a/bust.texmesh --mirror https://b/bust.texmesh --time 2 --refine 10 -o got");
   c.notes(
       "fetch checks every fragment against its digest. The fragments of a texture are dealt to the servers by "

@@ -48,10 +48,7 @@ Json plan_json(PackageReader& package, const DeliveryPlan& p, const FragmentList
            {"tables", p.table_bytes},
            {"texture", p.texture_bytes},
            {"all", p.bytes()}}},
-         {"gpu_bytes",
-          {{"mesh", p.gpu_mesh_bytes},
-           {"textures", p.gpu_texture_bytes},
-           {"all", p.gpu_mesh_bytes + p.gpu_texture_bytes}}},
+         {"gpu_bytes", gpu_json(p.gpu)},
          {"fragments", p.textures.rungs.size()},
          {"skipped", p.textures.skipped},
          {"mean_quality", p.mean_quality},
@@ -82,9 +79,7 @@ std::string rungs_text(PackageReader& package, const DeliveryPlan& p, const Frag
 }
 
 std::string textures_text(PackageReader& package, const DeliveryPlan& p, const FragmentList& list) {
-  std::string text = fmt::format("on the GPU: at most {:.1f} MB of textures, {:.1f} MB of mesh\n",
-                                 static_cast<double>(p.gpu_texture_bytes) / 1e6,
-                                 static_cast<double>(p.gpu_mesh_bytes) / 1e6);
+  std::string text = gpu_text(p.gpu);
   if (p.step)
     text += fmt::format("on the way: {} {} ({} bytes)\n", proxy_path(*p.step), moment(p.step_s),
                         grouped(p.step_bytes));

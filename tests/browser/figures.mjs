@@ -6,8 +6,10 @@ import {check, env, fs, lab, labPage, labRoots, launch, listen, path, pictures, 
 import {startLink} from './link.mjs';
 
 const kScans = {sea_turtle: 'sea_turtle/sea_turtle.glb', marble_bust_4k: 'marble_bust_4k/marble_bust_01_4k.obj', yurt: 'yurt/yurt.glb'};
+const kProxyScans = {sea_turtle: kScans.sea_turtle, saxophone: 'saxophone/saxophone.glb', realitycapture_site: 'realitycapture_site/site.glb', yurt: kScans.yurt};
 const kLink = {bytesPerSecond: 250000, rttMs: 40};
 const figures = process.env.TEXMESH_FIGURE_PACKAGES ?? path.join(env.work, 'figures');
+fs.mkdirSync(figures, {recursive: true});
 const sections = process.argv.slice(2);
 const wants = (name) => sections.length === 0 || sections.includes(name);
 const rows = [];
@@ -16,13 +18,13 @@ const row = (what, value, wanted, good) => {
   console.log(`${what.padEnd(64)} ${String(value).padStart(16)}   ${String(wanted).padStart(12)}   ${good ? 'yes' : 'NO'}`);
 };
 
-function packagesOfScans() {
-  check(env.data !== '', 'TEXMESH_DATA does not name the folder with the scans');
-  fs.mkdirSync(figures, {recursive: true});
-  for (const [name, scan] of Object.entries(kScans)) {
-    const file = path.join(figures, `${name}.texmesh`);
-    if (!fs.existsSync(file)) run(env.texmesh, 'compile', path.join(env.data, scan), '-o', file, '--quiet');
-  }
+/** Compiles the scan's package if there is none. */
+function makePackage(name) {
+  const file = path.join(figures, `${name}.texmesh`);
+  if (fs.existsSync(file)) return;
+  const scan = {...kScans, ...kProxyScans}[name];
+  check(env.data !== '' && scan, `no package ${name}, and TEXMESH_DATA names no folder with its scan`);
+  run(env.texmesh, 'compile', path.join(env.data, scan), '-o', file, '--quiet');
 }
 
 /** The plain GLB, in a folder with packages of its own: sharp and Draco's encoder are large. */
@@ -43,6 +45,7 @@ const link = await startLink({target: server.port});
 
 /** A page behind the link, with decoders, whose camera sees the package's object; the link is slow from then on. */
 async function readyPage(name, {size = 512, slow = kLink, warm = true} = {}) {
+  makePackage(name);
   await link.set({bytesPerSecond: 1e12, rttMs: 0, changes: 0});
   const page = await labPage(browser, link.url);
   await lab(page, async ([u, options, load]) => {
@@ -52,6 +55,7 @@ async function readyPage(name, {size = 512, slow = kLink, warm = true} = {}) {
     pkg.dispose();
     window.lab.start({min, max, ...options});
     window.lab.draw();
+    window.lab.pixels(); // the first time takes longer
     // Parts of the library that load when they are first needed belong to the page, as decoders do.
     if (load) {
       const id = window.lab.load(u, {load: {time: 0.5, autoRefine: false}});
@@ -91,9 +95,9 @@ const pictureAt = (page, id, at) => lab(page, ([i, seconds]) => {
   return canvas.toDataURL('image/png').split(',')[1];
 }, [id, at]);
 
-/** The first picture of packages with proxies, and what was shown when. TEXMESH_FIGURE_PROXIES names packages of the folder, by commas. */
+/** The first picture of packages with proxies, and what was shown when. TEXMESH_FIGURE_PROXIES names others, by commas. */
 async function proxiesFirst() {
-  for (const name of (process.env.TEXMESH_FIGURE_PROXIES ?? Object.keys(kScans).join(',')).split(',')) {
+  for (const name of process.env.TEXMESH_FIGURE_PROXIES?.split(',') ?? Object.keys(kProxyScans)) {
     const page = await readyPage(name);
     const id = await load(page, name, {frames: 1, load: {time: 4, autoRefine: false}});
     const r = await finished(page, id);
@@ -108,6 +112,8 @@ async function proxiesFirst() {
     row(`proxy first, ${name}: seconds at 2 Mbit/s, 40 ms`, shown.at.toFixed(2), '', true);
     row(`proxy first, ${name}: lit FLIP beside S_0 at ${px} px`, flip?.toFixed(3), '', true);
     for (const {proxy, at} of r.events.filter((e) => e.name === 'proxy' && e.proxy > 0)) row(`proxy first, ${name}: seconds to proxy ${proxy}`, at.toFixed(2), '', true);
+    const {proxy: enough, displayedPx} = r.state;
+    if (enough >= 0) row(`proxy first, ${name}: shown at the end, for ${displayedPx.toFixed(0)} px`, `proxy ${enough}`, '', true);
     const scale = r.events.find((e) => e.name === 'scale');
     if (scale) row(`proxy first, ${name}: seconds to S_${scale.scale} in its place`, scale.at.toFixed(2), '', true);
     for (const at of [0.1, 0.3, 1, 4]) {
@@ -229,6 +235,7 @@ async function screencast(page) {
 
 /** The viewer on the slow link, page and decoders in the browser's cache. */
 async function viewerPage(slow, size = {width: 1280, height: 800}) {
+  for (const name of ['yurt', 'sea_turtle']) makePackage(name);
   await slow.set({bytesPerSecond: 1e12, rttMs: 0, changes: 0});
   const page = await browser.newPage({viewport: size});
   listen(page);
@@ -322,7 +329,6 @@ async function viewerTasks() {
 }
 
 try {
-  packagesOfScans();
   for (const [name, body] of Object.entries({first: firstPictures, proxies: proxiesFirst, ssim: timeToQuality, deadline: deadlines, compose: composing, blocked, viewer: viewerTasks, shots}))
     if (wants(name)) await body();
 } finally {

@@ -38,39 +38,74 @@ test('a proxy that is enough for the display is shown after one request', async 
   await r.page.close();
 }, {seconds: 120});
 
-test('a proxy gives way to scales without an empty frame, and in the same place', async () => {
-  const b = await common();
-  const r = await loaded(b, null, proxied(b.url), {frames: 1, px: 400, load: {time: 4}});
-  check(!r.error, JSON.stringify(r.error));
-  check(first(r)?.proxy === 0, JSON.stringify(first(r)));
-  const scale = r.events.find((e) => e.name === 'scale');
-  check(scale && scale.at > first(r).at, `no scale behind the proxy: ${JSON.stringify(r.events.map(({name, at, scale: s}) => [name, at, s]))}`);
-  check(r.state.proxy === -1 && r.state.scale >= 0, JSON.stringify(r.state));
-  // Every frame since the first picture covers the object: as many pixels, around the same middle.
-  const seen = await lab(r.page, (i) => {
-    const {frames} = window.lab.loads[i];
-    return frames.map(({at, data}) => {
-      let [n, x, y] = [0, 0, 0];
-      const side = Math.sqrt(data.length / 4);
-      for (let p = 0; p < data.length / 4; p++) {
-        if (Math.max(...[0, 1, 2].map((c) => Math.abs(data[4 * p + c] - data[c]))) < 12) continue;
-        n++;
-        x += p % side;
-        y += Math.floor(p / side);
-      }
-      return {at, n, x: x / n, y: y / n};
-    });
-  }, r.id);
-  const shown = seen.filter((f) => f.at >= first(r).at && f.n > 0);
-  const last = shown.at(-1);
-  check(seen.filter((f) => f.at > first(r).at + 0.05).every((f) => f.n > 0), 'an empty frame');
-  for (const f of shown) {
-    near(f.n / last.n, 1, 0.15, 'pixels covered');
-    near(f.x, last.x, 4, 'middle');
-    near(f.y, last.y, 4, 'middle');
-  }
-  check(r.page.said.length === 0, r.page.said.join('\n'));
-  await r.page.close();
+/**
+ * Every frame of a load since its first picture: pixels covered and their middle, how far the frame is from the last one (mean difference of
+ * 8-bit values where one of both shows the object), and the worst flash: how much farther a frame is from one before it and one behind
+ * it, at most 300 ms each, than these two are from each other.
+ */
+const framesOf = (page, id, from) => lab(page, ([i, first]) => {
+  const frames = window.lab.loads[i].frames.filter((f) => f.at >= first);
+  const shows = (data, p) => Math.max(...[0, 1, 2].map((c) => Math.abs(data[4 * p + c] - data[c]))) >= 12;
+  const pictures = frames.map(({at, data}) => {
+    const covered = new Uint8Array(data.length / 4);
+    const side = Math.sqrt(covered.length);
+    let [n, x, y] = [0, 0, 0];
+    for (let p = 0; p < covered.length; p++) {
+      if (!shows(data, p)) continue;
+      covered[p] = 1;
+      n++;
+      x += p % side;
+      y += Math.floor(p / side);
+    }
+    return {at, data, covered, n, x: x / n, y: y / n};
+  });
+  const known = new Map();
+  const apart = (a, b) => {
+    const key = `${a} ${b}`;
+    if (known.has(key)) return known.get(key);
+    const [{data: d, covered: u}, {data: e, covered: v}] = [pictures[a], pictures[b]];
+    let [sum, n] = [0, 0];
+    for (let p = 0; p < u.length; p++) {
+      if (!u[p] && !v[p]) continue;
+      n++;
+      for (let c = 0; c < 3; c++) sum += Math.abs(d[4 * p + c] - e[4 * p + c]) / 3;
+    }
+    known.set(key, n ? sum / n : 0);
+    return known.get(key);
+  };
+  // Frames that changed nothing say nothing new: the first and the last of each such run stand for it.
+  const changes = pictures.flatMap((_, k) => (k > 0 && k < pictures.length - 1 && apart(k - 1, k) === 0 && apart(k, k + 1) === 0 ? [] : [k]));
+  let flash = 0;
+  for (const b of changes)
+    for (const a of changes.filter((k) => k < b && pictures[b].at - pictures[k].at <= 0.3))
+      for (const c of changes.filter((k) => k > b && pictures[k].at - pictures[b].at <= 0.3))
+        flash = Math.max(flash, Math.min(apart(a, b), apart(b, c)) - apart(a, c));
+  return {flash, frames: pictures.map(({at, n, x, y}, k) => ({at, n, x, y, fromLast: apart(k, pictures.length - 1)}))};
+}, [id, from]);
+
+test('a proxy gives way to scales in one frame: nothing flashes, nothing moves, nothing gets worse', async () => {
+  await throttled({}, async (page, link, large) => {
+    await lab(page, () => window.lab.start({size: 256}));
+    const r = await loaded(null, page, large.replace('large', 'proxied'), {frames: 1, always: true, px: 400, load: {time: 5}});
+    check(!r.error, JSON.stringify(r.error));
+    check(first(r)?.proxy === 0, JSON.stringify(first(r)));
+    const scale = r.events.find((e) => e.name === 'scale');
+    check(scale && scale.at > first(r).at, `no scale behind the proxy: ${JSON.stringify(r.events.map(({name, at, scale: s}) => [name, at, s]))}`);
+    check(r.state.proxy === -1 && r.state.scale >= 0, JSON.stringify(r.state));
+    const {flash, frames} = await framesOf(page, r.id, first(r).at);
+    const before = frames.findLast((f) => f.at < scale.at);
+    const after = frames.find((f) => f.at >= scale.at);
+    const last = frames.at(-1);
+    check(before && after, `no frame before or behind the change: ${JSON.stringify(frames.map((f) => f.at))}, ${scale.at}`);
+    for (const f of frames) {
+      near(f.n / last.n, 1, 0.1, `pixels covered at ${f.at.toFixed(2)} s`);
+      near(f.x, last.x, 1.5, `middle at ${f.at.toFixed(2)} s`);
+      near(f.y, last.y, 1.5, `middle at ${f.at.toFixed(2)} s`);
+    }
+    check(flash < 1, `a flash of ${flash.toFixed(2)} levels`);
+    check(after.fromLast <= before.fromLast + 0.5, `the scale is ${after.fromLast.toFixed(2)} levels from the end, the proxy was ${before.fromLast.toFixed(2)}`);
+    check(page.said.length === 0, page.said.join('\n'));
+  });
 }, {seconds: 120});
 
 test('a proxy that cannot be decoded leaves the load to scales', async () => {

@@ -210,7 +210,7 @@ Json plan_json(PackageReader& package, const char* policy, const DeliveryRequest
           {"rungs", p.textures.rungs},
           {"times_s", {p.first_picture_s, p.mesh_s, p.complete_s}},
           {"bytes", p.bytes()},
-          {"gpu_bytes", {p.gpu_mesh_bytes, p.gpu_texture_bytes}},
+          {"gpu_bytes", {p.gpu.mesh, p.gpu.textures}},
           {"texture_flip", p.texture_flip},
           {"flip", p.flip}};
 }

@@ -3,9 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "delivery/cpp/decide/gpu_memory.h"
 #include "format/rules/proxy_choice.h"
-#include "format/rules/proxy_steps.h"
 
 namespace texmesh {
 namespace {
@@ -83,14 +81,13 @@ DeliveryPlan timed_plan_of_proxy(const Manifest& m, const DeliveryRequest& reque
 
 /// The smallest proxy is shown first, whatever it takes.
 bool proxy_fits(const Manifest& m, const DeliveryRequest& request, std::size_t proxy) {
-  return proxy == 0 || static_cast<double>(gpu_proxy_bytes(m.proxies[proxy])) <= request.memory_bytes;
+  return proxy == 0 || static_cast<double>(gpu_proxy(m.proxies[proxy]).all()) <= request.memory_bytes;
 }
 
 /// A proxy that no one can tell from S_0, in the time.
 std::optional<DeliveryPlan> serving_plan(const Manifest& m, const DeliveryRequest& request) {
-  if (request.scale >= 0 || request.rule != StepRule::kFlip) return std::nullopt;
-  const std::optional<std::size_t> proxy = serving_proxy(m, request.displayed_px);
-  if (!proxy || !proxy_fits(m, request, *proxy)) return std::nullopt;
+  const std::optional<std::size_t> proxy = proxy_instead(m, request);
+  if (!proxy) return std::nullopt;
   DeliveryPlan plan = timed_plan_of_proxy(m, request, *proxy);
   if (plan.complete_s > request.time_limit_s) return std::nullopt;
   return plan;
@@ -114,17 +111,13 @@ double shown_throughput(const DeliveryPlan& plan, double manifest_s, double rtt_
 
 /// The larger proxy that comes before documents and mesh, where one pays.
 void take_step(const Manifest& m, const DeliveryRequest& request, double manifest_s, DeliveryPlan& plan) {
-  const bool by_hand =
-      request.scale >= 0 || request.rule != StepRule::kFlip || request.htc.policy == Policy::kThesis;
-  if (by_hand || !request.proxy_steps || m.proxies.empty() || !std::isfinite(plan.first_picture_s)) return;
+  if (!request.proxy_steps || m.proxies.empty() || !std::isfinite(plan.first_picture_s)) return;
   const double rtt_s = request.network.rtt_s;
   const double bytes_s =
       request.beta0_bytes_s > 0 ? request.beta0_bytes_s : first_throughput(plan, manifest_s, rtt_s);
-  const int wanted = scale_at(step_function(m.scales, request.rule), request.displayed_px);
   const std::optional<std::size_t> step =
-      proxy_step(m, scale_within(m.scales, wanted, request.memory_bytes), request.displayed_px,
-                 {bytes_s, rtt_s, request.time_limit_s - plan.first_picture_s});
-  if (!step || !proxy_fits(m, request, *step)) return;
+      proxy_on_the_way(m, request, {bytes_s, rtt_s, request.time_limit_s - plan.first_picture_s});
+  if (!step) return;
   plan.step = static_cast<std::uint32_t>(*step);
   plan.step_bytes = proxy_bytes_beyond_start(m, *step);
   plan.step_s = fetched_s(request.network, plan.first_picture_s, plan.step_bytes);
@@ -137,31 +130,11 @@ ListOptions list_options(const DeliveryRequest& request, int scale) {
   return options;
 }
 
-std::uint64_t mesh_memory(const Manifest& m, int scale) {
-  const auto found = std::ranges::find(m.scales, scale, &ManifestScale::scale);
-  return found == m.scales.end() ? 0 : gpu_mesh_bytes(found->vertices, found->triangles);
-}
-/// What is left for textures beside a scale.
-double texture_memory(const Manifest& m, const DeliveryRequest& request, int scale) {
-  return request.memory_bytes - static_cast<double>(mesh_memory(m, scale));
-}
 void count_memory(PackageReader& package, const DeliveryRequest& request, DeliveryPlan& plan) {
-  const Manifest& m = package.manifest();
-  if (plan.proxy) {
-    const ManifestProxy& p = m.proxies[*plan.proxy];
-    plan.gpu_mesh_bytes = gpu_mesh_bytes(p.vertices, p.triangles);
-    plan.gpu_texture_bytes = gpu_proxy_bytes(p) - plan.gpu_mesh_bytes;
-  } else {
-    plan.gpu_mesh_bytes = mesh_memory(m, plan.scale);
-    plan.gpu_texture_bytes = 0;
-    for (const PlaneChoice& c : plan.planes) {
-      const TextureInfo& t = package.textures()[c.plane];
-      plan.gpu_texture_bytes += gpu_texture_bytes(t.width_px, t.height_px);
-    }
-  }
-  const std::uint64_t all = plan.gpu_mesh_bytes + plan.gpu_texture_bytes;
-  if (static_cast<double>(all) > request.memory_bytes)
-    plan.warnings.push_back("even the least takes " + std::to_string(all) + " bytes on the GPU");
+  plan.gpu = plan.proxy ? gpu_proxy(package.manifest().proxies[*plan.proxy])
+                        : gpu_scale(package, plan.scale, plan.planes);
+  if (static_cast<double>(plan.gpu.all()) > request.memory_bytes)
+    plan.warnings.push_back("even the least takes " + std::to_string(plan.gpu.all()) + " bytes on the GPU");
 }
 
 /// What the policy spends its bytes on.
@@ -177,9 +150,8 @@ ChosenTextures choose_textures(TextureLoss& loss, const DeliveryRequest& request
     ThesisTextures printed = thesis_textures(loss, options, bytes);
     return {std::move(printed.planes), std::move(printed.list), printed.options.gamma};
   }
-  TextureBudget budget =
-      texture_for_budget(loss, options, static_cast<std::uint64_t>(bytes),
-                         texture_memory(loss.package().manifest(), request, options.scale));
+  TextureBudget budget = texture_for_budget(loss, options, static_cast<std::uint64_t>(bytes),
+                                            texture_memory(loss.package(), request, options.scale));
   return {std::move(budget.planes), std::move(budget.list), options.gamma};
 }
 
@@ -266,6 +238,26 @@ ThesisTextures thesis_textures(TextureLoss& loss, const ListOptions& options, do
   return out;
 }
 
+std::optional<std::size_t> proxy_instead(const Manifest& m, const DeliveryRequest& request) {
+  if (request.scale >= 0 || request.rule != StepRule::kFlip) return std::nullopt;
+  const std::optional<std::size_t> proxy = serving_proxy(m, request.displayed_px);
+  return proxy && proxy_fits(m, request, *proxy) ? proxy : std::nullopt;
+}
+
+std::optional<std::size_t> proxy_on_the_way(const Manifest& m, const DeliveryRequest& request,
+                                            const StepLink& link) {
+  if (request.scale >= 0 || request.rule != StepRule::kFlip || request.htc.policy == Policy::kThesis)
+    return std::nullopt;
+  const int wanted = scale_at(step_function(m.scales, request.rule), request.displayed_px);
+  const std::optional<std::size_t> step =
+      proxy_step(m, scale_within(m.scales, wanted, request.memory_bytes), request.displayed_px, link);
+  return step && proxy_fits(m, request, *step) ? step : std::nullopt;
+}
+
+double texture_memory(PackageReader& package, const DeliveryRequest& request, int scale) {
+  return request.memory_bytes - static_cast<double>(gpu_scale(package, scale, {}).mesh);
+}
+
 FragmentList list_of(PackageReader& package, const DeliveryRequest& request, const DeliveryPlan& plan) {
   ListOptions options = list_options(request, plan.scale);
   options.group_weights = plan.group_weights;
@@ -331,7 +323,7 @@ DeliveryPlan plan_budget(PackageReader& package, const DeliveryRequest& request,
     const std::uint64_t fixed = plan.bytes();
     const TextureBudget budget =
         texture_for_budget(loss, list_options(request, s.scale), bytes > fixed ? bytes - fixed : 0,
-                           texture_memory(m, request, s.scale));
+                           texture_memory(package, request, s.scale));
     plan.planes = budget.planes;
     plan.texture_bytes = budget.bytes;
     plan.textures.rungs = budget.rungs;

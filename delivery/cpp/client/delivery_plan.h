@@ -4,9 +4,11 @@
 #include <string>
 #include <vector>
 
+#include "delivery/cpp/decide/gpu_memory.h"
 #include "delivery/cpp/decide/texture_budget.h"
 #include "delivery/cpp/simulate/network_model.h"
 #include "delivery/cpp/simulate/simulation.h"
+#include "format/rules/proxy_steps.h"
 #include "format/rules/viewing.h"
 
 namespace texmesh {
@@ -56,9 +58,7 @@ struct DeliveryPlan {
   double texture_flip = 0;          // what it would be of S_0 with these textures
   PerGroup group_weights{1, 1, 1};  // ListOptions::group_weights of the list that `textures` is about
   double gamma = -1;                // ListOptions::gamma of that list
-  /// On the GPU: vertex and index buffers, and textures with their mip levels as RGBA; most bytes, for a
-  /// proxy of all its parts. The browser keeps the former in main memory, too.
-  std::uint64_t gpu_mesh_bytes = 0, gpu_texture_bytes = 0;
+  GpuBytes gpu;                     // the browser keeps the mesh in main memory, too
   std::vector<std::string> warnings;
   std::uint64_t bytes() const {
     return bootstrap_bytes + first_picture_bytes + step_bytes + mesh_bytes + table_bytes + texture_bytes;
@@ -91,6 +91,18 @@ DeliveryPlan plan_budget(PackageReader& package, const DeliveryRequest& request,
 
 /// The scale that the request asks for: DeliveryRequest::scale, or the rule's.
 int wanted_scale(PackageReader& package, const DeliveryRequest& request);
+
+// What a transfer decides by itself, as it goes. It keeps within DeliveryRequest::memory_bytes as plans do.
+
+/// A proxy that no one can tell from S_0; nothing where the request says a scale or another rule than kFlip.
+std::optional<std::size_t> proxy_instead(const Manifest& manifest, const DeliveryRequest& request);
+/// The larger proxy that comes before documents and mesh; nothing where none pays, or where the request says
+/// a scale, another rule than kFlip or Policy::kThesis.
+std::optional<std::size_t> proxy_on_the_way(const Manifest& manifest, const DeliveryRequest& request,
+                                            const StepLink& link);
+/// Memory that a scale leaves for textures, bytes.
+double texture_memory(PackageReader& package, const DeliveryRequest& request, int scale);
+
 /// The list that a plan of this package is about.
 FragmentList list_of(PackageReader& package, const DeliveryRequest& request, const DeliveryPlan& plan);
 

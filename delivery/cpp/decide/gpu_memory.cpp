@@ -40,9 +40,21 @@ std::uint64_t gpu_mesh_bytes(std::uint32_t vertices, std::uint32_t triangles) {
   return kVertexBytes * vertices + kTriangleBytes * triangles;
 }
 
-std::uint64_t gpu_proxy_bytes(const ManifestProxy& p) {
-  return gpu_mesh_bytes(p.vertices, p.triangles) +
-         kProxyTextures * gpu_texture_bytes(p.texture_px, p.texture_px);
+GpuBytes gpu_proxy(const ManifestProxy& p) {
+  return {gpu_mesh_bytes(p.vertices, p.triangles),
+          kProxyTextures * gpu_texture_bytes(p.texture_px, p.texture_px)};
+}
+
+GpuBytes gpu_scale(PackageReader& package, int scale, std::span<const PlaneChoice> planes) {
+  GpuBytes bytes;
+  const std::vector<ManifestScale>& scales = package.manifest().scales;
+  if (const auto s = std::ranges::find(scales, scale, &ManifestScale::scale); s != scales.end())
+    bytes.mesh = gpu_mesh_bytes(s->vertices, s->triangles);
+  for (const PlaneChoice& c : planes) {
+    const TextureInfo& t = package.textures()[c.plane];
+    bytes.textures += gpu_texture_bytes(t.width_px, t.height_px);
+  }
+  return bytes;
 }
 
 int scale_within(std::span<const ManifestScale> scales, int scale, double most_bytes) {

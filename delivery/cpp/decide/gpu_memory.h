@@ -24,9 +24,16 @@ std::uint64_t gpu_texture_bytes(std::uint32_t width_px, std::uint32_t height_px,
 /// 32-bit floats, indices of 32 bits. The browser keeps as many in main memory.
 std::uint64_t gpu_mesh_bytes(std::uint32_t vertices, std::uint32_t triangles);
 
-/// Most bytes of a proxy: its buffers and four textures of its texture_px. The manifest does not say how many
-/// it has.
-std::uint64_t gpu_proxy_bytes(const ManifestProxy& proxy);
+/// What something takes on the GPU at most: vertex and index buffers, and textures with their mip levels as
+/// RGBA, for a proxy of all its parts.
+struct GpuBytes {
+  std::uint64_t mesh = 0, textures = 0;
+  std::uint64_t all() const { return mesh + textures; }
+};
+/// With four textures of its texture_px: the manifest does not say how many it has.
+GpuBytes gpu_proxy(const ManifestProxy& proxy);
+/// A scale with these planes.
+GpuBytes gpu_scale(PackageReader& package, int scale, std::span<const PlaneChoice> planes);
 
 /// `scale`, or the next coarser one whose mesh takes at most half of the memory; the coarsest where none
 /// does.

@@ -5,6 +5,7 @@
 
 #include "format/container/layout.h"
 #include "pipeline/cli/fetch/server_share.h"
+#include "pipeline/cli/options/delivery_options.h"
 #include "pipeline/io/text_table.h"
 
 namespace texmesh {
@@ -71,7 +72,8 @@ Json fetch_document(const Fetched& f, double limit_s) {
          {"problems", f.load.problems},
          {"cancelled", f.load.cancelled},
          {"texture_flip", f.texture_flip},
-         {"flip", f.flip}};
+         {"flip", f.flip},
+         {"gpu_bytes", gpu_json(f.gpu)}};
   if (f.proxy) j["proxy"] = *f.proxy;
   if (f.step) j["step"] = {{"proxy", f.step->proxy}, {"at_s", f.step->at_s}};
   if (f.refined)
@@ -87,7 +89,7 @@ std::string load_text(const Fetched& f, double limit_s) {
         "predicted FLIP {:.4f} (0 = equal to the source): nothing else is needed\n",
         shown_url(f.place.url), f.first_picture_s, proxy_path(*f.proxy), f.mesh_s, grouped(f.mesh_bytes),
         1000 * f.rtt_s, f.flip);
-    return text;
+    return text + gpu_text(f.gpu);
   }
   if (f.step) text += fmt::format("on the way: {} after {:.3f} s\n", proxy_path(f.step->proxy), f.step->at_s);
   text += fmt::format(
@@ -108,7 +110,7 @@ std::string load_text(const Fetched& f, double limit_s) {
                         f.refined->out_of_time ? ", until its time was over" : "");
   text += fmt::format("predicted FLIP {:.4f} (0 = equal to the source), {:.4f} by the textures alone{}\n",
                       f.flip, f.texture_flip, f.load.cancelled ? "; cancelled" : "");
-  return text;
+  return text + gpu_text(f.gpu);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "delivery/cpp/decide/gpu_memory.h"
 #include "pipeline/cli/fetch/link_watch.h"
 
 namespace texmesh {
@@ -23,7 +24,8 @@ struct Fetched {
   LoadReport load;
   std::optional<LoadReport> refined;
   double texture_flip = 0, flip = 0;  // predicted of what has come
-  std::vector<std::string> urls;      // in the order of load.mirrors
+  GpuBytes gpu;
+  std::vector<std::string> urls;  // in the order of load.mirrors
 };
 
 /// One line, schemas/fetch.v1.schema.json.

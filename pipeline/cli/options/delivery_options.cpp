@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <algorithm>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "pipeline/cli/options/command_line.h"
@@ -81,6 +82,14 @@ Option add_window_option(Command& c, DeliveryArguments& a) {
   return c.option("--window", a.window, "Requests in flight; 0 = by throughput and round trip")
       .integer_in(0, 64)
       .shows_default();
+}
+
+void add_memory_option(Command& c, DeliveryArguments& a) {
+  c.option(
+       "--memory", a.memory,
+       "GPU memory for mesh and textures, 64MB: coarser scales and mips where more would be taken (default: "
+       "any)")
+      .value_name("SIZE");
 }
 
 namespace {
@@ -171,11 +180,7 @@ void add_delivery_options(Command& c, DeliveryArguments& a, bool package_require
   add_time_option(c, a);
   add_camera_options(c, a);
   add_scale_option(c, a);
-  c.option(
-       "--memory", a.memory,
-       "GPU memory for mesh and textures, 64MB: coarser scales and mips where more would be taken (default: "
-       "any)")
-      .value_name("SIZE");
+  add_memory_option(c, a);
   add_link_options(c, a);
   add_method_options(c, a);
   c.group("");
@@ -184,6 +189,15 @@ void add_delivery_options(Command& c, DeliveryArguments& a, bool package_require
 std::string moment(double time_s) {
   constexpr double kNever_s = 1e8;  // no link that a request may ask for takes as long
   return time_s < kNever_s ? fmt::format("at {:.2f} s", time_s) : "never";
+}
+
+std::string gpu_text(const GpuBytes& bytes) {
+  return fmt::format("on the GPU: at most {:.1f} MB of textures, {:.1f} MB of mesh\n",
+                     static_cast<double>(bytes.textures) / 1e6, static_cast<double>(bytes.mesh) / 1e6);
+}
+
+nlohmann::ordered_json gpu_json(const GpuBytes& bytes) {
+  return {{"mesh", bytes.mesh}, {"textures", bytes.textures}, {"all", bytes.all()}};
 }
 
 DeliveryRequest delivery_request(const DeliveryArguments& a) {

@@ -1,4 +1,5 @@
 #pragma once
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -30,10 +31,15 @@ void add_rtt_option(Command& command, DeliveryArguments& args);
 Option add_scale_option(Command& command, DeliveryArguments& args);
 Option add_policy_option(Command& command, DeliveryArguments& args);
 Option add_window_option(Command& command, DeliveryArguments& args);
+void add_memory_option(Command& command, DeliveryArguments& args);
 
 /// UsageError names the flag.
 DeliveryRequest delivery_request(const DeliveryArguments& args);
 /// "at 1.25 s", or "never" for what a network does not bring.
 std::string moment(double time_s);
+/// What is shown takes on the GPU, one line.
+std::string gpu_text(const GpuBytes& bytes);
+/// The same as {mesh, textures, all}.
+nlohmann::ordered_json gpu_json(const GpuBytes& bytes);
 
 }  // namespace texmesh

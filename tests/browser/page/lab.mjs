@@ -57,10 +57,10 @@ function pixels() {
 /**
  * Opens and loads a package; events, requests and, with `frames`, pictures are kept. Comes back at once with a number;
  * `finished` waits. `load` takes LoadOptions without renderer, loader and camera; `follow` gives the camera, too. With `memory`,
- * all of it is fetched before the clock starts; with `still`, nothing is drawn before the end. `here`: no workers. `px`: displayed height, which
- * may be changed later.
+ * all of it is fetched before the clock starts; with `still`, nothing is drawn before the end; with `always`, every frame of the page is
+ * drawn, as pages do that move. `here`: no workers. `px`: displayed height, which may be changed later.
  */
-function load(url, {open: openOptions = {}, load: loadOptions = {}, frames = 0, follow = true, memory = false, still = false, here = false, px} = {}) {
+function load(url, {open: openOptions = {}, load: loadOptions = {}, frames = 0, follow = true, memory = false, still = false, always = false, here = false, px} = {}) {
   const run = {events: [], requests: [], frames: [], error: null, t0: performance.now(), pkg: null, model: null, px, abort: new AbortController()};
   loads.push(run);
   let dirty = true;
@@ -74,7 +74,7 @@ function load(url, {open: openOptions = {}, load: loadOptions = {}, frames = 0, 
     if (over === 'yes') return;
     if (run.model) run.model.update(px ? undefined : stage.camera);
     const now = performance.now();
-    if (dirty && (!still || over) && (!frames || now - lastFrame >= frames || over)) {
+    if ((dirty || always) && (!still || over) && (!frames || now - lastFrame >= frames || over)) {
       dirty = false;
       lastFrame = now;
       draw();

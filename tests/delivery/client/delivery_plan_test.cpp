@@ -162,8 +162,8 @@ TEST(DeliveryPlan, ALargerProxyComesOnTheWayOnASlowLink) {
 TEST(DeliveryPlan, MemoryIsKept) {
   PackageReader package = open_package(Proxies::kNone);
   const DeliveryPlan all = plan_delivery(package, request(2000, 1e8));
-  const auto taken = [](const DeliveryPlan& p) { return p.gpu_mesh_bytes + p.gpu_texture_bytes; };
-  EXPECT_GT(all.gpu_texture_bytes, 0u);
+  const auto taken = [](const DeliveryPlan& p) { return p.gpu.all(); };
+  EXPECT_GT(all.gpu.textures, 0u);
   std::uint64_t before = taken(all);
   double flip = all.flip;
   for (const double share : {1.0, 0.8, 0.5, 0.3}) {

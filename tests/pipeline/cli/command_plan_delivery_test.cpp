@@ -250,6 +250,41 @@ TEST(CliPlan, MemoryChoosesScaleAndMips) {
   EXPECT_EQ(texmesh(bad).exit_code, 2);
 }
 
+TEST(CliFetch, MemoryChoosesScaleAndMipsAsPlansDo) {
+  httplib::Server server;
+  server.set_mount_point("/", std::string(TEXMESH_SOURCE_DIR) + "/tests/golden");
+  const int port = server.bind_to_any_port("127.0.0.1");
+  std::thread thread([&] { server.listen_after_bind(); });
+  while (!server.is_running()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  const auto fetched = [&](std::vector<std::string> more) {
+    // Time for all there is: memory alone decides.
+    more.insert(more.begin(), {"fetch", "http://127.0.0.1:" + std::to_string(port) + "/v2.0-scan.texmesh",
+                               "--time", "1", "--display", "1000"});
+    return json_of(more);
+  };
+  const Json all = fetched({});
+  const int whole = all["gpu_bytes"]["all"];
+  double flip = all["flip"];
+  for (const int percent : {60, 30}) {
+    const std::string memory = std::to_string(whole / 100 * percent);
+    const Json some = fetched({"--memory", memory});
+    const Json plan =
+        json_of({"plan", kGolden, "--display", "1000", "--bandwidth", "100MB/s", "--memory", memory});
+    EXPECT_LE(some["gpu_bytes"]["all"].get<int>(), whole / 100 * percent);
+    EXPECT_EQ(some["gpu_bytes"], plan["gpu_bytes"]);
+    EXPECT_EQ(some["scale"], plan["scale"]);
+    EXPECT_GT(some["flip"], flip) << percent;
+    flip = some["flip"];
+  }
+  const CommandResult least =
+      texmesh({"fetch", "http://127.0.0.1:" + std::to_string(port) + "/v2.0-scan.texmesh", "--time", "1",
+               "--memory", "1kB"});
+  server.stop();
+  thread.join();
+  EXPECT_EQ(least.exit_code, 0);
+  EXPECT_NE(least.errors.find("even the least takes "), std::string::npos) << least.errors;
+}
+
 TEST(CliFetch, AScaleOfTheStreamComesFromATree) {
   TemporaryFolder folder;
   ASSERT_EQ(texmesh({"unpack", kGolden, "-o", folder / "tree"}).exit_code, 0);
