@@ -1,30 +1,18 @@
 #include "pipeline/report/report.h"
 
-#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "pipeline/report/html.h"
+#include "pipeline/report/package_words.h"
 #include "pipeline/report/report_folder.h"
 #include "pipeline/report/report_page.h"
 
 namespace texmesh {
 namespace {
 
-namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 constexpr double kSourceHeight = 512;  // px at which the source stands beside S_0
-
-std::string last_name(const std::string& path) {
-  const fs::path p(path);
-  return (p.has_filename() ? p : p.parent_path()).filename().string();
-}
-
-/// Title of the page: what the package calls itself, or its file.
-std::string title_of(PackageReader& package) {
-  const std::string& title = package.manifest().title;
-  return title.empty() ? last_name(package.store().name()) : title;
-}
 
 SourceComparison compare_source(PackageReader& package, const PackagePictures& pictures,
                                 const RenderedModel& source, const Report& report) {
@@ -51,7 +39,7 @@ Json differences_json(const ViewDifferences& d) {
 Report make_report(PackageReader& package, const ReportOptions& options, const RunContext& context) {
   Report report;
   report.options = options;
-  report.title = title_of(package);
+  report.title = package_title(package);
   std::optional<RenderedModel> source;
   if (!options.against.empty()) source = load_rendered_model(options.against, {}, context);
   PackagePictures pictures(package, {}, context);
