@@ -24,6 +24,8 @@ inline constexpr CommandSummary kCommands[] = {
     {"Look inside", "debug", "Picture what a stage computed, with a legend of its colours"},
     {"Look inside", "doctor", "Say what a model's texture atlas costs and what to do: a gate for CI, too"},
     {"Export", "extract", "Write one GLB that any viewer opens: a scale with whole textures"},
+    {"Export", "export", "Write a package in the form of another viewer: 3D Tiles, MSFT_lod, model-viewer, oEmbed"},
+    {"Export", "site", "Write a static site of a collection: posters, search, licences, a viewer"},
     {"Export", "unpack", "Write a package's entries as files, for servers or tools that want a folder"},
     {"Export", "pack", "Put an unpacked package together again, byte for byte"},
     {"Deliver over a network", "plan",

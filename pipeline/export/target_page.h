@@ -1,0 +1,17 @@
+#pragma once
+// Inside the room only: the pages of targets that have one.
+#include <cstdint>
+#include <string>
+
+#include "pipeline/export/export.h"
+#include "pipeline/export/oembed.h"
+
+namespace texmesh {
+
+/// index.html beside model.glb, of `glb_bytes` bytes.
+std::string model_viewer_page(PackageReader& package, const ExportOptions& options, std::uint64_t glb_bytes);
+
+/// index.html that frames `viewer`, an address relative to it, and says where oembed.json stands: `url`.
+std::string oembed_page(const EmbeddedObject& object, const std::string& url, const std::string& viewer);
+
+}  // namespace texmesh
