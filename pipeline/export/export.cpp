@@ -26,6 +26,8 @@ using Json = nlohmann::ordered_json;
 
 constexpr const char* kListFile = "export.json";
 constexpr std::string_view kListBegin = "{\n  \"texmeshExport\": 1,";
+/// A level of more than this share of the next finer one's bytes is not worth a request of its own.
+constexpr double kWorthwhile = 0.75;
 constexpr std::uint32_t kPhoneTexturePx = 4096;
 
 ExportedFile text_file(const char* path, const std::string& text) { return {path, {text.begin(), text.end()}}; }
@@ -77,16 +79,21 @@ void export_tiles(PackageReader& package, const ExportOptions& options, const Ru
   });
   ExtractRequest request = request_for(options);
   request.recentre = request.metres = true;
-  for (std::size_t k = 0; k < tileset.levels.size(); ++k) {
-    TileLevel& level = tileset.levels[k];
-    level.uri = "level-" + std::to_string(tileset.levels.size() - 1 - k) + ".glb";
-    request.scale = level.scale;
-    request.display_px = level.texture_px;
+  std::vector<TileLevel> wanted = std::move(tileset.levels);
+  tileset.levels.clear();
+  for (std::size_t k = 0; k < wanted.size(); ++k) {
+    request.scale = wanted[k].scale;
+    request.display_px = wanted[k].texture_px;
     Extracted extracted = extract_model(package, request, context);
-    extend_by(extracted.glb, level.uri, tileset.bounds);
+    context.report(static_cast<double>(k + 1) / static_cast<double>(wanted.size()));
+    if (k > 0 && static_cast<double>(extracted.glb.size()) >
+                     kWorthwhile * static_cast<double>(made.files.back().bytes.size()))
+      continue;
+    wanted[k].uri = "level-" + std::to_string(tileset.levels.size()) + ".glb";
+    extend_by(extracted.glb, wanted[k].uri, tileset.bounds);
     if (k == 0) note_large_textures(extracted, made);
-    add_glb(made, std::move(extracted), level.uri);
-    context.report(static_cast<double>(k + 1) / static_cast<double>(tileset.levels.size()));
+    add_glb(made, std::move(extracted), wanted[k].uri);
+    tileset.levels.push_back(std::move(wanted[k]));
   }
   made.open = "tileset.json";
   made.files.push_back(text_file("tileset.json", tileset_json(tileset)));

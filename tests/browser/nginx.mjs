@@ -31,11 +31,12 @@ export function nginxMissing(http2) {
   return http2 && !has('openssl') ? 'openssl is not installed' : '';
 }
 
-export async function startNginx({http2 = false} = {}) {
+/** `roots`: folders by the prefixes beneath which they stand, as for `serve`. */
+export async function startNginx({http2 = false, roots = labRoots} = {}) {
   const folder = fs.mkdtempSync(path.join(env.work, 'nginx-'));
   const site = path.join(folder, 'site');
   fs.mkdirSync(site);
-  for (const [prefix, target] of Object.entries(labRoots)) {
+  for (const [prefix, target] of Object.entries(roots)) {
     if (prefix === '/') for (const f of fs.readdirSync(target)) fs.symlinkSync(path.join(target, f), path.join(site, f));
     else fs.symlinkSync(prefix === '/packages/' ? packages : target, path.join(site, prefix.slice(1, -1)));
   }

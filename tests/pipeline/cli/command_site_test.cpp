@@ -26,10 +26,9 @@ class SiteCommand : public ::testing::Test {
     write_text(folder_ / "viewer/index.html", "<!DOCTYPE html>");
     add("b.texmesh", "Bust", {});
   }
-  void add(const std::string& path, const std::string& title, const About& about, int minor = kFormatMinor) {
+  void add(const std::string& path, const std::string& title, const About& about) {
     PackageParts parts = make_package_parts();
     parts.manifest.title = title;
-    parts.manifest.minor = minor;
     parts.about = about;
     const Bytes bytes = parts.build();
     write_text(folder_ / ("in/" + path), std::string(bytes.begin(), bytes.end()));
@@ -88,7 +87,10 @@ TEST_F(SiteCommand, SamePackagesGiveTheSameBytes) {
 
 TEST_F(SiteCommand, ADamagedPackageIsLeftOutAndSaidTheOthersAreThere) {
   write_text(folder_ / "in/torn.texmesh", "no package");
-  add("later.texmesh", "Later", {}, kFormatMinor + 1);
+  ASSERT_EQ(run_command({"python3", kGolden + "make_later", kGolden + "v2.0-webp.texmesh",
+                         folder_ / "in/later.texmesh"})
+                .exit_code,
+            0);
   const CommandResult r = site({"--json"});
   EXPECT_EQ(r.exit_code, 1);
   EXPECT_NE(r.errors.find("torn.texmesh"), std::string::npos);
@@ -104,7 +106,7 @@ TEST_F(SiteCommand, HostileTextAndNamesStayText) {
   about.description = "{{facts}}<iframe src=x>";
   about.attribution = "\" onmouseover=\"alert(1)";
   about.licence = "</a><script>alert(1)</script>";
-  add("<script>alert(2)</script>.texmesh", "\"'><img src=x onerror=alert(1)>", about);
+  add("<script>alert(2).texmesh", "\"'><img src=x onerror=alert(1)>", about);
   add("\xff\xfe \n\".texmesh", "", {});
   add("a b.texmesh", "", {});
   add("a-b.texmesh", "", {});

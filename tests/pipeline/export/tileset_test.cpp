@@ -62,7 +62,7 @@ TEST(TileLevels, OneScaleWithoutTexturesIsOneTile) {
 
 Tileset small_tileset() {
   Tileset t;
-  t.levels = {{0, kAnyDisplayPx, 0, 0, "level-1.glb"}, {12, 160, 160, 0.05, "level-0.glb"}};
+  t.levels = {{0, kAnyDisplayPx, 0, 0, "level-0.glb"}, {12, 160, 160, 0.05, "level-1.glb"}};
   t.bounds = Box3d{{-1, 0, -3}, {3, 8, 1}};
   t.origin = {10, 20, 30};
   t.object_height = 8;
@@ -77,13 +77,13 @@ TEST(TilesetJson, IsAChainOfTilesThatReplaceEachOther) {
   EXPECT_EQ(j["asset"]["tilesetVersion"], "0123");
   EXPECT_EQ(j["asset"]["extras"]["title"], "</script>\"");
   const Json& root = j["root"];
-  EXPECT_EQ(root["content"]["uri"], "level-0.glb");
+  EXPECT_EQ(root["content"]["uri"], "level-1.glb");
   EXPECT_EQ(root["refine"], "REPLACE");
   EXPECT_DOUBLE_EQ(root["geometricError"], 16.0 / 160 * 8);  // 16 px where the object is 160 px high
   EXPECT_GE(j["geometricError"], root["geometricError"]);
   ASSERT_EQ(root["children"].size(), 1u);
   const Json& leaf = root["children"][0];
-  EXPECT_EQ(leaf["content"]["uri"], "level-1.glb");
+  EXPECT_EQ(leaf["content"]["uri"], "level-0.glb");
   EXPECT_EQ(leaf["geometricError"], 0);
   EXPECT_FALSE(leaf.contains("children"));
   EXPECT_FALSE(leaf.contains("transform"));  // the root's moves it already
