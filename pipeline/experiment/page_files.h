@@ -1,7 +1,7 @@
 #pragma once
 #include <span>
 
-#include "pipeline/io/built_in_file.h"
+#include "pipeline/io/pages/built_in_file.h"
 
 namespace texmesh {
 

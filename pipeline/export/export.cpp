@@ -30,7 +30,9 @@ constexpr std::string_view kListBegin = "{\n  \"texmeshExport\": 1,";
 constexpr double kWorthwhile = 0.75;
 constexpr std::uint32_t kPhoneTexturePx = 4096;
 
-ExportedFile text_file(const char* path, const std::string& text) { return {path, {text.begin(), text.end()}}; }
+ExportedFile text_file(const char* path, const std::string& text) {
+  return {path, {text.begin(), text.end()}};
+}
 
 void note_large_textures(const Extracted& extracted, Export& made) {
   for (const ExtractedImage& i : extracted.images)
@@ -117,7 +119,8 @@ void export_lods(PackageReader& package, const ExportOptions& options, const Run
 }
 
 void add_poster(PackageReader& package, Export& made) {
-  if (const auto& poster = package.manifest().poster) made.files.push_back({"poster.jpg", package.entry(*poster)});
+  if (const auto& poster = package.manifest().poster)
+    made.files.push_back({"poster.jpg", package.entry(*poster)});
 }
 
 void export_model_viewer(PackageReader& package, const ExportOptions& options, const RunContext& context,
@@ -130,7 +133,8 @@ void export_model_viewer(PackageReader& package, const ExportOptions& options, c
   add_poster(package, made);
 }
 
-void export_oembed(PackageReader& package, const std::string& path, const ExportOptions& options, Export& made) {
+void export_oembed(PackageReader& package, const std::string& path, const ExportOptions& options,
+                   Export& made) {
   EmbeddedObject object;
   object.about = package.about();
   object.about.title = package_title(package);
@@ -201,7 +205,8 @@ Export make_export(PackageReader& package, const std::string& path, const Export
   }
   for (const ExportedFile& f : made.files)
     if (f.path.ends_with(".glb") && f.bytes.size() > 0xffffffffu)
-      throw InputError(package.store().name(), "", "what fits a GLB of 4 GiB", std::to_string(f.bytes.size()));
+      throw InputError(package.store().name(), "", "what fits a GLB of 4 GiB",
+                       std::to_string(f.bytes.size()));
   return made;
 }
 
@@ -209,12 +214,8 @@ std::string export_json(const Export& made) {
   Json files = Json::array();
   for (const ExportedFile& f : made.files) files.push_back({{"path", f.path}, {"bytes", f.bytes.size()}});
   for (const ExportedCopy& c : made.copies) files.push_back({{"path", c.path}});
-  Json out{{"texmeshExport", 1},
-           {"target", target_name(made.target)},
-           {"package", made.package_id},
-           {"open", made.open},
-           {"files", std::move(files)},
-           {"notes", made.notes}};
+  Json out{{"texmeshExport", 1}, {"target", target_name(made.target)}, {"package", made.package_id},
+           {"open", made.open},  {"files", std::move(files)},          {"notes", made.notes}};
   return out.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 

@@ -13,15 +13,15 @@ enum class ExportTarget : std::uint8_t { k3dTiles, kGltfLod, kModelViewer, kOemb
 
 struct ExportOptions {
   ExportTarget target = ExportTarget::k3dTiles;
-  double display_px = 0;         // nothing finer than this displayed height needs; 0 = the target's own default
-  std::uint64_t bytes = 0;       // most bytes of the GLB, of gltf-lod and model-viewer; 0 = no limit
-  bool plain = false;            // no extension that compresses; not of gltf-lod
-  double screen_error_px = 16;   // 3dtiles: the error at which its viewer takes the next level
-  std::string url;               // oembed: where the folder will stand, ends with a slash
-  std::string provider;          // oembed; "" = the host of `url`
+  double display_px = 0;    // nothing finer than this displayed height needs; 0 = the target's own default
+  std::uint64_t bytes = 0;  // most bytes of the GLB, of gltf-lod and model-viewer; 0 = no limit
+  bool plain = false;       // no extension that compresses; not of gltf-lod
+  double screen_error_px = 16;  // 3dtiles: the error at which its viewer takes the next level
+  std::string url;              // oembed: where the folder will stand, ends with a slash
+  std::string provider;         // oembed; "" = the host of `url`
   std::uint32_t width_px = 640, height_px = 480;  // oembed: of the frame
-  std::string script;            // model-viewer: URL of the script; "" = kModelViewerScript
-  std::string viewer;            // oembed: folder with the built viewer
+  std::string script;                             // model-viewer: URL of the script; "" = kModelViewerScript
+  std::string viewer;                             // oembed: folder with the built viewer
 };
 
 /// Where a page gets <model-viewer> from, and the digest that its browser asks for.
@@ -52,8 +52,8 @@ struct Export {
 const char* target_name(ExportTarget target);
 
 /// A package in the form of another viewer. `path` is the package's own, for oembed, which copies it. Same
-/// bytes for any thread count and machine. InputError with the reason where the target cannot hold the package,
-/// FormatError when the package is damaged.
+/// bytes for any thread count and machine. InputError with the reason where the target cannot hold the
+/// package, FormatError when the package is damaged.
 Export make_export(PackageReader& package, const std::string& path, const ExportOptions& options,
                    const RunContext& context);
 

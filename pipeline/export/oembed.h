@@ -19,8 +19,8 @@ struct EmbeddedObject {
 /// The frame as HTML, for pages and for the answer.
 std::string embedded_frame(const EmbeddedObject& object);
 
-/// An answer of oEmbed 1.0, type rich, as JSON. Beside the fields of oEmbed: license, license_url, attribution
-/// and description, where they are known.
+/// An answer of oEmbed 1.0, type rich, as JSON. Beside the fields of oEmbed: license, license_url,
+/// attribution and description, where they are known.
 std::string oembed_json(const EmbeddedObject& object);
 
 }  // namespace texmesh

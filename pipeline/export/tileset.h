@@ -22,9 +22,9 @@ struct TileLevel {
 
 /// Planes of the textures that suit a displayed height; of 0 those of full size.
 using PlanesOfHeight = std::function<std::vector<std::uint32_t>(double displayed_px)>;
-/// Finest first: what suits `display_px` (0 = everything), then what suits 4096, 2048, ... 128 px where that is
-/// something else than the level before, then the coarsest scale, which a viewer shows while it waits. `uri`
-/// stays "".
+/// Finest first: what suits `display_px` (0 = everything), then what suits 4096, 2048, ... 128 px where that
+/// is something else than the level before, then the coarsest scale, which a viewer shows while it waits.
+/// `uri` stays "".
 std::vector<TileLevel> tile_levels(const Manifest& manifest, double display_px, const PlanesOfHeight& planes);
 
 struct Tileset {
@@ -38,11 +38,11 @@ struct Tileset {
   About about;
 };
 
-/// tileset.json of 3D Tiles 1.1: one tile inside the other, the coarsest outside, refine REPLACE. What a level
-/// costs is screen_error_px / displayed_px of the object's height, so that a viewer with that limit changes
-/// levels at the heights that the package measured; never less than error_max. Viewers turn glTF's y axis to
-/// the z axis of tiles: (x, y, z) becomes (x, -z, y), and boxes and origin here are turned so. No transform
-/// scales: versions of 3D Tiles differ in what that does to errors.
+/// tileset.json of 3D Tiles 1.1: one tile inside the other, the coarsest outside, refine REPLACE. What a
+/// level costs is screen_error_px / displayed_px of the object's height, so that a viewer with that limit
+/// changes levels at the heights that the package measured; never less than error_max. Viewers turn glTF's y
+/// axis to the z axis of tiles: (x, y, z) becomes (x, -z, y), and boxes and origin here are turned so. No
+/// transform scales: versions of 3D Tiles differ in what that does to errors.
 std::string tileset_json(const Tileset& tileset);
 
 }  // namespace texmesh

@@ -63,15 +63,17 @@ std::string address_of(const GalleryObject& object, const GalleryOptions& option
 std::string gallery_name(const std::string& path, std::vector<std::string>& taken) {
   std::string name;
   for (const char c : without_ending(path)) {
-    const bool plain = (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '-' ||
-                       c == '_' || c == '.';
+    const bool plain = (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
+                       c == '-' || c == '_' || c == '.';
     if (plain || name.empty() || name.back() != '-') name += plain ? c : '-';
   }
   name.resize(std::min(name.size(), kMostNameBytes));
   // A name that begins with a dot is hidden on servers.
   if (name.empty() || name.front() == '.' || std::ranges::find(taken, in_lower_case(name)) != taken.end()) {
     constexpr std::size_t kDigits = 10;
-    name = "p" + name + "-" + to_hex(sha256({reinterpret_cast<const std::uint8_t*>(path.data()), path.size()})).substr(0, kDigits);
+    name =
+        "p" + name + "-" +
+        to_hex(sha256({reinterpret_cast<const std::uint8_t*>(path.data()), path.size()})).substr(0, kDigits);
   }
   taken.push_back(in_lower_case(name));
   return name;
@@ -98,9 +100,8 @@ Gallery read_gallery(const std::string& packages, const GalleryOptions& options)
     object.address = address_of(object, options);
     gallery.objects.push_back(std::move(object));
   }
-  std::ranges::sort(gallery.objects, {}, [](const GalleryObject& o) {
-    return std::tuple(in_lower_case(o.title), o.path);
-  });
+  std::ranges::sort(gallery.objects, {},
+                    [](const GalleryObject& o) { return std::tuple(in_lower_case(o.title), o.path); });
   return gallery;
 }
 

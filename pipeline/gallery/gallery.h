@@ -41,7 +41,8 @@ struct Gallery {
 };
 
 /// What a folder of packages (or one package) holds: every package beneath it, hidden ones and symbolic links
-/// left out. A package that cannot be read is a fault, the others go on. InputError when there is none at all.
+/// left out. A package that cannot be read is a fault, the others go on. InputError when there is none at
+/// all.
 Gallery read_gallery(const std::string& packages, const GalleryOptions& options);
 
 /// Writes a static site: index.html with posters and search, objects/NAME.html, viewer/, posters/ and, unless

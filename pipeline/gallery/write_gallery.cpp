@@ -55,17 +55,18 @@ std::string card_html(const GalleryObject& o, std::size_t place) {
   return fmt::format(
       "<li data-words=\"{}\"><a href=\"objects/{}.html\"><span class=\"poster\">{}</span><strong>{}</strong></a>"
       "<p>{}</p><p>{}</p></li>\n",
-      markup_escaped(words_of(o)), o.name, poster_html(o, "", place >= kAtOnce), markup_escaped(o.title), quiet,
-      markup_escaped(figures_of(o)));
+      markup_escaped(words_of(o)), o.name, poster_html(o, "", place >= kAtOnce), markup_escaped(o.title),
+      quiet, markup_escaped(figures_of(o)));
 }
 
 std::string index_page(const Gallery& gallery) {
   std::string cards;
   for (std::size_t k = 0; k < gallery.objects.size(); ++k) cards += card_html(gallery.objects[k], k);
   const std::size_t n = gallery.objects.size();
-  return filled(gallery_file("index.html"), {{"title", markup_escaped(gallery.options.title)},
-                                             {"count", fmt::format("{} {}", n, n == 1 ? "object" : "objects")},
-                                             {"cards", cards}});
+  return filled(gallery_file("index.html"),
+                {{"title", markup_escaped(gallery.options.title)},
+                 {"count", fmt::format("{} {}", n, n == 1 ? "object" : "objects")},
+                 {"cards", cards}});
 }
 
 std::string text_html(const NamedText& line) {
@@ -90,21 +91,21 @@ std::string facts_html(const GalleryObject& o) {
 std::string from_below(const std::string& address) { return is_web_url(address) ? address : "../" + address; }
 
 std::string object_page(const GalleryObject& o, const GalleryOptions& options) {
-  const std::string viewer =
-      "../viewer/index.html?panel=0&pkg=" + percent_encoded(from_below(o.address));
-  return filled(gallery_file("object.html"),
-                {{"title", markup_escaped(o.title)},
-                 {"gallery", markup_escaped(options.title)},
-                 {"viewer", markup_escaped(viewer)},
-                 {"poster", poster_html(o, "../", false)},
-                 {"bytes", markup_escaped(format_bytes(o.bytes))},
-                 {"start", markup_escaped(format_bytes(o.start_bytes))},
-                 {"description", o.about.description.empty()
-                                     ? ""
-                                     : "<p class=\"description\">" + markup_escaped(o.about.description) + "</p>"},
-                 {"rights", rights_line(o.about)},
-                 {"facts", facts_html(o)},
-                 {"package", markup_escaped(from_below(o.address))}});
+  const std::string viewer = "../viewer/index.html?panel=0&pkg=" + percent_encoded(from_below(o.address));
+  return filled(
+      gallery_file("object.html"),
+      {{"title", markup_escaped(o.title)},
+       {"gallery", markup_escaped(options.title)},
+       {"viewer", markup_escaped(viewer)},
+       {"poster", poster_html(o, "../", false)},
+       {"bytes", markup_escaped(format_bytes(o.bytes))},
+       {"start", markup_escaped(format_bytes(o.start_bytes))},
+       {"description", o.about.description.empty()
+                           ? ""
+                           : "<p class=\"description\">" + markup_escaped(o.about.description) + "</p>"},
+       {"rights", rights_line(o.about)},
+       {"facts", facts_html(o)},
+       {"package", markup_escaped(from_below(o.address))}});
 }
 
 /// What the viewer offers where its address names no package.
@@ -115,12 +116,13 @@ std::string viewer_list(const Gallery& gallery) {
     if (!o.poster.empty()) entry["poster"] = "../posters/" + o.name + ".jpg";
     list.push_back(std::move(entry));
   }
-  return nlohmann::ordered_json{{"packages", list}}.dump(
-      -1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  return nlohmann::ordered_json{{"packages", list}}.dump(-1, ' ', false,
+                                                         nlohmann::ordered_json::error_handler_t::replace);
 }
 
 FolderRule gallery_folder_rule() {
-  return marked_folder_rule("index.html", kGalleryFirstLine, "an empty folder, an earlier site, or nothing yet");
+  return marked_folder_rule("index.html", kGalleryFirstLine,
+                            "an empty folder, an earlier site, or nothing yet");
 }
 
 }  // namespace
@@ -128,7 +130,8 @@ FolderRule gallery_folder_rule() {
 void write_gallery(const Gallery& gallery, const std::string& folder) {
   NewFolder out(folder, gallery_folder_rule());
   out.add("index.html", bytes_of(std::string(kGalleryFirstLine) + index_page(gallery)));
-  for (const char* name : {"gallery.css", "gallery.js", "icon.svg"}) out.add(name, bytes_of(gallery_file(name)));
+  for (const char* name : {"gallery.css", "gallery.js", "icon.svg"})
+    out.add(name, bytes_of(gallery_file(name)));
   for (const GalleryObject& o : gallery.objects) {
     out.add("objects/" + o.name + ".html", bytes_of(object_page(o, gallery.options)));
     if (!o.poster.empty()) out.add("posters/" + o.name + ".jpg", o.poster);

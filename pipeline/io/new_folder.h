@@ -18,7 +18,8 @@ struct FolderRule {
   std::string replaceable;  // for the error with `replace`: the only kind of folder that is replaced
 };
 
-/// A folder is new or empty, or its file `name` begins with `begin` and it is replaced. `replaceable` as above.
+/// A folder is new or empty, or its file `name` begins with `begin` and it is replaced. `replaceable` as
+/// above.
 FolderRule marked_folder_rule(const std::string& name, std::string_view begin, std::string replaceable);
 
 /// A folder under a temporary name beside its own, which takes its own name in publish(), or disappears with
@@ -33,8 +34,8 @@ class NewFolder {
 
   /// A file of the folder; `path` is relative, the caller vouches that it leads nowhere else. No path twice.
   void add(const std::string& path, std::span<const std::uint8_t> bytes);
-  /// A file that stands on this machine, or all files beneath a folder but hidden ones; symbolic links are left
-  /// out. `path` as of add(). InputError where one cannot be read.
+  /// A file that stands on this machine, or all files beneath a folder but hidden ones; symbolic links are
+  /// left out. `path` as of add(). InputError where one cannot be read.
   void copy(const std::string& path, const std::filesystem::path& source);
   /// Files and folders are on the disk before the name is taken. What is replaced goes away in one step.
   void publish();

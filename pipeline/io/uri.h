@@ -20,8 +20,8 @@ void check_relative_name(std::string_view name, const std::string& file, const s
 /// refused names.
 std::string decode_uri(std::string_view uri, const std::string& file, const std::string& place);
 
-/// Scheme, host and port of a URL: "https://museum.example" of "https://museum.example/a?b"; "" for an address
-/// without a host.
+/// Scheme, host and port of a URL: "https://museum.example" of "https://museum.example/a?b"; "" for an
+/// address without a host.
 std::string url_origin(std::string_view url);
 
 bool is_data_uri(std::string_view uri);

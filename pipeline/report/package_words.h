@@ -11,8 +11,8 @@ std::string last_name(const std::string& path);
 /// Title of a page about the package: what the package calls itself, or its file. Plain text.
 std::string package_title(PackageReader& package);
 
-/// A paragraph of HTML: whose the object is, and the licence as a link to where it can be read; "" where nothing
-/// is known.
+/// A paragraph of HTML: whose the object is, and the licence as a link to where it can be read; "" where
+/// nothing is known.
 std::string rights_line(const About& about);
 
 }  // namespace texmesh

@@ -4,7 +4,6 @@
 
 #include "pipeline/report/html.h"
 #include "pipeline/report/package_words.h"
-#include "pipeline/report/report_folder.h"
 #include "pipeline/report/report_page.h"
 
 namespace texmesh {
@@ -88,6 +87,11 @@ std::string report_json(const Report& report) {
   }
   j["files"] = std::move(files);
   return j.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+FolderRule report_folder_rule() {
+  return marked_folder_rule(kReportPage, kReportFirstLine,
+                            "an empty folder, an earlier report, or nothing yet");
 }
 
 void write_report(const Report& report, const std::string& folder) {

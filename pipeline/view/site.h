@@ -30,9 +30,10 @@ class SiteFile {
 
 /// Packages on this machine.
 struct PackageFolder {
-  std::string path;                   // absolute
-  std::vector<std::string> packages;  // relative to it, sorted, at most 10,000; unpacked ones end with a slash
-  bool alone = false;                 // one package was named, not a folder of them
+  std::string path;  // absolute
+  std::vector<std::string>
+      packages;        // relative to it, sorted, at most 10,000; unpacked ones end with a slash
+  bool alone = false;  // one package was named, not a folder of them
 };
 /// `package` is a .texmesh file, an unpacked package, or a folder of such. Hidden names and symbolic links
 /// beneath it are left out. InputError when it is not there or holds no package.

@@ -1,16 +1,15 @@
 // Forms for other viewers, each opened by the program that it is for, and the gallery.
-import {createRequire} from 'node:module';
 import {createHash} from 'node:crypto';
-import {check, common, env, fs, listen, near, packages, path, pictures, run, serve} from './browser.mjs';
+import {check, common, env, fs, here, listen, near, packages, path, pictures, run, serve} from './browser.mjs';
 import {test} from './harness.mjs';
 import {nginxMissing, startNginx} from './nginx.mjs';
 import {axe, kDesktop, kPhone} from './viewer-tests.mjs';
 
-const modules = path.dirname(path.dirname(createRequire(import.meta.url).resolve('three/package.json')));
+const modules = path.join(here, 'node_modules');
 const doors = path.join(env.work, 'doors');
 const roots = {
   '/out/': doors, '/three/': path.join(modules, 'three'), '/tiles-renderer/': path.join(modules, '3d-tiles-renderer'),
-  '/model-viewer/': path.join(modules, '@google/model-viewer/dist'), '/': path.join(import.meta.dirname ?? path.dirname(new URL(import.meta.url).pathname), 'page'),
+  '/model-viewer/': path.join(modules, '@google/model-viewer/dist'), '/': path.join(here, 'page'),
 };
 
 /** `texmesh export` of one of the tests' packages into a folder of its own. */

@@ -48,7 +48,8 @@ TEST(Oembed, WhatIsNotKnownIsLeftOut) {
   o.about = {};
   o.thumbnail_url.clear();
   const Json j = Json::parse(oembed_json(o));
-  for (const char* name : {"title", "author_name", "license", "license_url", "thumbnail_url", "thumbnail_width"})
+  for (const char* name :
+       {"title", "author_name", "license", "license_url", "thumbnail_url", "thumbnail_width"})
     EXPECT_FALSE(j.contains(name)) << name;
 }
 

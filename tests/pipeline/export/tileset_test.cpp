@@ -92,7 +92,8 @@ TEST(TilesetJson, IsAChainOfTilesThatReplaceEachOther) {
 TEST(TilesetJson, HasZUpWhereGltfHasYUp) {
   const Json root = Json::parse(tileset_json(small_tileset()))["root"];
   // Centre (1, 4, -1), half sides (2, 4, 2), y up.
-  EXPECT_EQ(root["boundingVolume"]["box"], (Json{1.0, 1.0, 4.0, 2.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 4.0}));
+  EXPECT_EQ(root["boundingVolume"]["box"],
+            (Json{1.0, 1.0, 4.0, 2.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 4.0}));
   EXPECT_EQ(root["transform"], (Json{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 10.0, -30.0, 20.0, 1}));
 }
 

@@ -34,8 +34,8 @@ class SiteCommand : public ::testing::Test {
     write_text(folder_ / ("in/" + path), std::string(bytes.begin(), bytes.end()));
   }
   CommandResult site(std::vector<std::string> more = {}) {
-    std::vector<std::string> all{TEXMESH_BINARY, "site", folder_ / "in", "-o", folder_ / "www", "--viewer",
-                                 folder_ / "viewer"};
+    std::vector<std::string> all{TEXMESH_BINARY,  "site",     folder_ / "in",    "-o",
+                                 folder_ / "www", "--viewer", folder_ / "viewer"};
     all.insert(all.end(), more.begin(), more.end());
     return run_command(all);
   }

@@ -38,16 +38,18 @@ void check_for_target(const ExportArguments& a, const ExportOptions& o) {
   if (o.plain && (o.target == ExportTarget::kGltfLod || o.target == ExportTarget::kOembed))
     refuse("--plain", "--to 3dtiles or model-viewer");
   if (o.plain && o.bytes > 0) throw UsageError("--plain", "", "no --bytes", a.bytes);
-  if (o.display_px > 0 && o.target == ExportTarget::kOembed) refuse("--display", "a target that holds a model");
+  if (o.display_px > 0 && o.target == ExportTarget::kOembed)
+    refuse("--display", "a target that holds a model");
   if (o.target == ExportTarget::kOembed) {
-    if (!is_web_url(o.url)) throw UsageError("--url", "", "the http or https URL of the folder, for --to oembed", o.url);
+    if (!is_web_url(o.url))
+      throw UsageError("--url", "", "the http or https URL of the folder, for --to oembed", o.url);
   } else if (!o.url.empty() || !o.provider.empty()) {
     refuse(o.url.empty() ? "--provider" : "--url", "--to oembed");
   }
   if (!o.script.empty() && o.target != ExportTarget::kModelViewer) refuse("--script", "--to model-viewer");
 }
 
-ExportOptions options_of(const ExportArguments& a) {
+ExportOptions export_options_of(const ExportArguments& a) {
   ExportOptions o = a.options;
   o.target = target_of(a.target);
   if (!a.bytes.empty()) {
@@ -63,7 +65,7 @@ ExportOptions options_of(const ExportArguments& a) {
 }
 
 int run_export(const ExportArguments& args) {
-  const ExportOptions options = options_of(args);
+  const ExportOptions options = export_options_of(args);
   check_export_folder(args.folder);  // not after the work
   PackageReader package(open_store(args.package));
   PercentLine progress("export");
@@ -98,7 +100,8 @@ void add_target_options(Command& c, ExportArguments& args) {
            "everything, for model-viewer 1000")
       .number_in(1, 1e6)
       .value_name("PX");
-  c.option("--bytes", args.bytes, "gltf-lod, model-viewer: the best-looking GLB of at most so many bytes: 2MB")
+  c.option("--bytes", args.bytes,
+           "gltf-lod, model-viewer: the best-looking GLB of at most so many bytes: 2MB")
       .value_name("SIZE");
   c.flag("--plain", args.options.plain,
          "3dtiles, model-viewer: meshes as floats, for viewers without a decoder of Draco");
@@ -119,8 +122,11 @@ void add_oembed_options(Command& c, ExportArguments& args) {
   c.option("--provider", args.options.provider, "oembed: name of the publisher; default: the host of --url")
       .value_name("NAME");
   c.option("--width", args.width_px, "oembed: width of the frame, px").integer_in(64, 8192).shows_default();
-  c.option("--height", args.height_px, "oembed: height of the frame, px").integer_in(64, 8192).shows_default();
-  c.option("--viewer", args.viewer, "oembed: folder with the built viewer, instead of the viewer of this build")
+  c.option("--height", args.height_px, "oembed: height of the frame, px")
+      .integer_in(64, 8192)
+      .shows_default();
+  c.option("--viewer", args.viewer,
+           "oembed: folder with the built viewer, instead of the viewer of this build")
       .value_name("DIR");
 }
 

@@ -27,9 +27,11 @@ class ExportCommand : public ::testing::Test {
     write_text(folder_ / "viewer/assets/a.js", "1");
     write_text(folder_ / "viewer/.hidden", "no");
   }
-  CommandResult run(const std::string& package, const std::string& target, std::vector<std::string> more = {}) {
+  CommandResult run(const std::string& package, const std::string& target,
+                    std::vector<std::string> more = {}) {
     std::vector<std::string> all{TEXMESH_BINARY, "export", package, "--to", target, "-o", folder_ / "out"};
-    if (target == "oembed") all.insert(all.end(), {"--url", "https://a.example/x", "--viewer", folder_ / "viewer"});
+    if (target == "oembed")
+      all.insert(all.end(), {"--url", "https://a.example/x", "--viewer", folder_ / "viewer"});
     all.insert(all.end(), more.begin(), more.end());
     return run_command(all);
   }
@@ -67,10 +69,14 @@ TEST_F(ExportCommand, EveryTargetWritesWhatItsListNamesTheSameForAnyThreads) {
 }
 
 TEST_F(ExportCommand, TilesHoldTheScalesWithinTheirBoxes) {
-  ASSERT_EQ(run_command({TEXMESH_MAKE_SCAN, "-o", folder_ / "s.glb", "--triangles", "4000", "--texture", "1024"}).exit_code, 0);
+  ASSERT_EQ(
+      run_command({TEXMESH_MAKE_SCAN, "-o", folder_ / "s.glb", "--triangles", "4000", "--texture", "1024"})
+          .exit_code,
+      0);
   write_text(folder_ / "cheap.json", kCheapProfile);
-  const CommandResult compiled = run_command({TEXMESH_BINARY, "compile", folder_ / "s.glb", "-o", folder_ / "s.texmesh", "--profile",
-                                              folder_ / "cheap.json", "--no-cache", "--quiet"});
+  const CommandResult compiled =
+      run_command({TEXMESH_BINARY, "compile", folder_ / "s.glb", "-o", folder_ / "s.texmesh", "--profile",
+                   folder_ / "cheap.json", "--no-cache", "--quiet"});
   ASSERT_EQ(compiled.exit_code, 0) << compiled.errors;
   ASSERT_EQ(run(folder_ / "s.texmesh", "3dtiles").exit_code, 0);
   const Json tileset = Json::parse(text("tileset.json"));
@@ -117,7 +123,9 @@ TEST_F(ExportCommand, LevelsOfDetailShareTheirTextures) {
   const std::string glb = text("model.glb");
   EXPECT_NE(glb.find("\"MSFT_lod\""), std::string::npos);
   EXPECT_NE(glb.find("MSFT_screencoverage"), std::string::npos);
-  ASSERT_EQ(run_command({TEXMESH_BINARY, "extract", kScan, "--scale", "0", "-o", folder_ / "one.glb"}).exit_code, 0);
+  ASSERT_EQ(
+      run_command({TEXMESH_BINARY, "extract", kScan, "--scale", "0", "-o", folder_ / "one.glb"}).exit_code,
+      0);
   EXPECT_EQ(facts_of(glb).image_names.size(), facts_of(read_text(folder_ / "one.glb")).image_names.size());
 }
 

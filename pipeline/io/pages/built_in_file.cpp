@@ -1,4 +1,4 @@
-#include "pipeline/io/built_in_file.h"
+#include "pipeline/io/pages/built_in_file.h"
 
 #include <stdexcept>
 

@@ -32,8 +32,8 @@ int run_site(SiteArguments& args) {
   if (args.json)
     std::cout << gallery_json(gallery, args.folder) << '\n';
   else
-    std::cout << (std::filesystem::path(args.folder) / "index.html").string() << ", " << gallery.objects.size()
-              << (gallery.objects.size() == 1 ? " object\n" : " objects\n");
+    std::cout << (std::filesystem::path(args.folder) / "index.html").string() << ", "
+              << gallery.objects.size() << (gallery.objects.size() == 1 ? " object\n" : " objects\n");
   return gallery.faults.empty() ? kExitOk : kExitModelFailed;
 }
 
@@ -42,12 +42,12 @@ int run_site(SiteArguments& args) {
 void add_site_command(Command& app) {
   auto args = std::make_shared<SiteArguments>();
   Command c = app.add("site");
-  c.option("PACKAGES", args->packages,
-           "A folder of packages, whose folders are looked into; or one package")
+  c.option("PACKAGES", args->packages, "A folder of packages, whose folders are looked into; or one package")
       .required();
-  c.option("-o,--output", args->folder,
-           "The folder to make, with index.html in it. An earlier site is replaced; any other folder with files "
-           "is refused")
+  c.option(
+       "-o,--output", args->folder,
+       "The folder to make, with index.html in it. An earlier site is replaced; any other folder with files "
+       "is refused")
       .required()
       .value_name("DIR");
   c.option("--title", args->options.title, "Title of the collection").shows_default().value_name("TEXT");
