@@ -14,7 +14,6 @@
 #include "pipeline/extract/extract.h"
 #include "pipeline/io/new_folder.h"
 #include "pipeline/io/uri.h"
-#include "pipeline/report/package_words.h"
 #include "pipeline/view/site.h"
 #include "stages/gltf/check_glb.h"
 
@@ -137,7 +136,7 @@ void export_oembed(PackageReader& package, const std::string& path, const Export
                    Export& made) {
   EmbeddedObject object;
   object.about = package.about();
-  object.about.title = package_title(package);
+  object.about.title = page_title(package);
   std::string from_viewer = path;  // as the viewer's page names the package
   if (!is_web_url(path)) {
     const bool tree = package.store().is_folder();

@@ -1,5 +1,7 @@
 #include "pipeline/export/target_page.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "format/documents/about.h"
@@ -25,14 +27,19 @@ std::string source_of_script(const std::string& url) {
 
 }  // namespace
 
+std::string page_title(PackageReader& package) {
+  const std::string title = package_title(package);
+  constexpr std::string_view kEnding = ".texmesh";
+  return title.ends_with(kEnding) ? title.substr(0, title.size() - kEnding.size()) : title;
+}
+
 std::string model_viewer_page(PackageReader& package, const ExportOptions& options, std::uint64_t glb_bytes) {
   const About& about = package.about();
   const auto& poster = package.manifest().poster;
-  const std::string title = package_title(package);
+  const std::string title = page_title(package);
   const std::string script = options.script.empty() ? kModelViewerScript : options.script;
-  std::string integrity;
-  if (options.script.empty())
-    integrity = std::string(" integrity=\"") + kModelViewerIntegrity + "\" crossorigin=\"anonymous\"";
+  const std::string integrity =
+      options.script.empty() ? fmt::format(R"( integrity="{}" crossorigin="anonymous")", kModelViewerIntegrity) : "";
   return filled(export_template("model-viewer.html"),
                 {{"title", markup_escaped(title)},
                  {"alt", markup_escaped(about.description.empty() ? title : about.description)},

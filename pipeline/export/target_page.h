@@ -8,6 +8,9 @@
 
 namespace texmesh {
 
+/// What the package calls itself, or the name of its file without its ending. Plain text.
+std::string page_title(PackageReader& package);
+
 /// index.html beside model.glb, of `glb_bytes` bytes.
 std::string model_viewer_page(PackageReader& package, const ExportOptions& options, std::uint64_t glb_bytes);
 

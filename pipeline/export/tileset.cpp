@@ -10,7 +10,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double kHighestPx = 4096, kLowestPx = 128;
+constexpr double kHighestPx = 4096, kLowestPx = 32;
 constexpr double kWaitingPx = 1;  // left as soon as something finer is there
 /// Thinner boxes have no inside for a viewer, whose distances to them are those to a plane.
 constexpr double kThinnest = 1e-4;
@@ -77,7 +77,10 @@ std::vector<TileLevel> tile_levels(const Manifest& manifest, double display_px,
     shown = std::move(these);
   }
   const int coarsest = manifest.scales.back().scale;
-  if (out.back().scale != coarsest) out.push_back(level(coarsest, kWaitingPx, kLowestPx));
+  if (out.back().scale != coarsest) {
+    const auto step = std::ranges::find(manifest.steps, coarsest, &ManifestStep::scale);
+    out.push_back(level(coarsest, step == manifest.steps.end() ? kWaitingPx : step->up_to_px, kLowestPx));
+  }
   return out;
 }
 

@@ -22,7 +22,7 @@ struct TileLevel {
 
 /// Planes of the textures that suit a displayed height; of 0 those of full size.
 using PlanesOfHeight = std::function<std::vector<std::uint32_t>(double displayed_px)>;
-/// Finest first: what suits `display_px` (0 = everything), then what suits 4096, 2048, ... 128 px where that
+/// Finest first: what suits `display_px` (0 = everything), then what suits 4096, 2048, ... 32 px where that
 /// is something else than the level before, then the coarsest scale, which a viewer shows while it waits.
 /// `uri` stays "".
 std::vector<TileLevel> tile_levels(const Manifest& manifest, double display_px, const PlanesOfHeight& planes);

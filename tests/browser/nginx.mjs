@@ -55,7 +55,7 @@ ${process.getuid() === 0 ? 'user root; ' : ''}worker_processes 1; daemon off; pi
 events {}
 http {
   access_log ${folder}/access.log; ${temporary}
-  types { text/html html; text/javascript js mjs; application/wasm wasm; }
+  types { text/html html; text/css css; text/javascript js mjs; application/wasm wasm; image/svg+xml svg; image/jpeg jpg; }
   ${server}
 }`);
   const child = spawn('nginx', ['-p', folder, '-c', path.join(folder, 'nginx.conf')], {stdio: 'ignore'});

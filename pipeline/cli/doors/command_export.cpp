@@ -146,7 +146,7 @@ void add_export_command(Command& app) {
       "  texmesh export bust.texmesh --to model-viewer --display 800 -o page/\n"
       "  texmesh export bust.texmesh --to oembed --url https://museum.example/bust/ -o bust/");
   c.notes(
-      "3dtiles: each level is what texmesh extract --display writes for 4096, 2048, ... 128 px, the coarsest "
+      "3dtiles: each level is what texmesh extract --display writes for 4096, 2048, ... 32 px, the coarsest "
       "outside; one that saves less than a quarter of the bytes is left out. A level's geometric error makes a viewer with --screen-error take the next "
       "one at that height. Where the unit is known (texmesh dump PKG about) tiles are in metres, else in the "
       "object's unit. The object stands where its source has it; nothing puts it on the globe.\n"
