@@ -39,7 +39,9 @@ std::string model_viewer_page(PackageReader& package, const ExportOptions& optio
   const std::string title = page_title(package);
   const std::string script = options.script.empty() ? kModelViewerScript : options.script;
   const std::string integrity =
-      options.script.empty() ? fmt::format(R"( integrity="{}" crossorigin="anonymous")", kModelViewerIntegrity) : "";
+      options.script.empty()
+          ? fmt::format(R"( integrity="{}" crossorigin="anonymous")", kModelViewerIntegrity)
+          : "";
   return filled(export_template("model-viewer.html"),
                 {{"title", markup_escaped(title)},
                  {"alt", markup_escaped(about.description.empty() ? title : about.description)},

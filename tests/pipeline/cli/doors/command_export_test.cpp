@@ -127,6 +127,13 @@ TEST_F(ExportCommand, LevelsOfDetailShareTheirTextures) {
       run_command({TEXMESH_BINARY, "extract", kScan, "--scale", "0", "-o", folder_ / "one.glb"}).exit_code,
       0);
   EXPECT_EQ(facts_of(glb).image_names.size(), facts_of(read_text(folder_ / "one.glb")).image_names.size());
+  // Our own import shows the finest level.
+  const CommandResult read = run_command(
+      {TEXMESH_BINARY, "render", folder_ / "out/model.glb", "-o", folder_ / "lod.png", "--size", "64"});
+  EXPECT_EQ(read.exit_code, 0) << read.errors;
+  EXPECT_EQ(std::to_string(facts_of(read_text(folder_ / "one.glb")).triangles),
+            read.output.substr(read.output.find(": ") + 2,
+                               read.output.find(" triangles") - read.output.find(": ") - 2));
 }
 
 TEST_F(ExportCommand, WhatATargetCannotHoldIsExitCode1WithTheReason) {
