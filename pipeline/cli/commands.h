@@ -26,6 +26,8 @@ void add_simulate_command(Command& app);
 void add_fetch_command(Command& app);
 void add_view_command(Command& app);
 void add_extract_command(Command& app);
+void add_export_command(Command& app);
+void add_site_command(Command& app);
 void add_stages_command(Command& app);
 void add_completion_command(Command& app);
 

@@ -36,6 +36,8 @@ void add_commands(Command& program) {
   add_doctor_command(program);
   program.group("Export");
   add_extract_command(program);
+  add_export_command(program);
+  add_site_command(program);
   add_unpack_command(program);
   add_pack_command(program);
   program.group("Deliver over a network");

@@ -14,6 +14,7 @@
 #include "pipeline/experiment/page_files.h"
 #include "pipeline/io/markup.h"
 #include "pipeline/io/new_folder.h"
+#include "pipeline/io/uri.h"
 #include "pipeline/render/picture_sheet.h"
 #include "stages/image/png_writer.h"
 #include "stages/measure/render_view.h"
@@ -116,26 +117,13 @@ void add_pictures(Experiment& experiment, const StimulusSet& set, const RenderEn
   }
 }
 
-void replace_all(std::string& text, std::string_view what, const std::string& by) {
-  for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + by.size()))
-    text.replace(at, what.size(), by);
-}
-
-/// What a Content-Security-Policy names to let the page post there; "" for an address on the page's own
-/// server.
-std::string origin_of(const std::string& url) {
-  const std::size_t scheme = url.find("://");
-  if (scheme == std::string::npos) return "";
-  return " " + url.substr(0, url.find_first_of("/?#", scheme + 3));
-}
-
 void add_page(Experiment& experiment, const std::string& design_json) {
-  for (const PageFile& file : page_files()) {
-    std::string text(file.text);
-    if (file.name == "index.html") {
-      replace_all(text, "{{title}}", markup_escaped(experiment.design.options.title));
-      replace_all(text, "{{connect}}", markup_escaped(origin_of(experiment.design.options.post_url)));
-    }
+  const std::string origin = url_origin(experiment.design.options.post_url);
+  // What a Content-Security-Policy names to let the page post there; nothing for the page's own server.
+  const TemplateValues values{{"title", markup_escaped(experiment.design.options.title)},
+                              {"connect", origin.empty() ? "" : " " + markup_escaped(origin)}};
+  for (const BuiltInFile& file : experiment_page_files()) {
+    const std::string text = file.name == "index.html" ? filled(file.text, values) : std::string(file.text);
     experiment.files.push_back({std::string(file.name), {text.begin(), text.end()}});
   }
   experiment.files.push_back({"design.json", {design_json.begin(), design_json.end()}});

@@ -1,13 +1,11 @@
 #pragma once
 #include <span>
-#include <string_view>
+
+#include "pipeline/io/pages/built_in_file.h"
 
 namespace texmesh {
 
-/// A file of page/, as the build puts it into the program.
-struct PageFile {
-  std::string_view name, text;
-};
-std::span<const PageFile> page_files();
+/// The files of page/.
+std::span<const BuiltInFile> experiment_page_files();
 
 }  // namespace texmesh

@@ -129,7 +129,10 @@ Extracted extract_whole(PackageReader& package, const ExtractRequest& request, c
   for (std::size_t l = 1; l < out.levels.size(); ++l)
     file.add_level(scale_file(package, out.levels[l], context), screen_coverage_of(m, out.levels[l]));
   if (request.plain) file = plain_file(file, mesh_path(out.scale), context);
-  if (!request.recentre) file.move_to(m.origin);
+  About about = package.about();
+  const double unit = request.metres && about.metres_per_unit > 0 ? about.metres_per_unit : 1;
+  if (unit != 1) about.unit = "m", about.metres_per_unit = 1;
+  file.move_to(request.recentre ? Vec3d{} : m.origin, unit);
   const std::map<std::uint32_t, std::uint32_t> planes = shown_planes(package, request);
   const std::vector<std::uint32_t> used = file.source_images();
   std::map<std::uint32_t, FileImageData> images;
@@ -139,7 +142,7 @@ Extracted extract_whole(PackageReader& package, const ExtractRequest& request, c
     context.report(static_cast<double>(images.size()) / static_cast<double>(used.size() + 1));
   }
   file.set_images(images);
-  file.set_about(package.about());
+  file.set_about(about);
   out.glb = file.finish();
   out.mesh_bytes = out.glb.size();
   for (const ExtractedImage& i : out.images) out.mesh_bytes -= i.bytes;

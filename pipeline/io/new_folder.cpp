@@ -7,6 +7,8 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <fstream>
+#include <vector>
 
 #include "format/base/errors.h"
 
@@ -46,6 +48,16 @@ void write_new_file(const fs::path& path, std::span<const std::uint8_t> bytes) {
 
 }  // namespace
 
+FolderRule marked_folder_rule(const std::string& name, std::string_view begin, std::string replaceable) {
+  const auto known = [name, text = std::string(begin)](const fs::path& folder) {
+    std::ifstream file(folder / name, std::ios::binary);
+    std::string head(text.size(), '\0');
+    file.read(head.data(), static_cast<std::streamsize>(head.size()));
+    return file && head == text;
+  };
+  return {true, known, "", std::move(replaceable)};
+}
+
 NewFolder::NewFolder(const std::string& folder, FolderRule rule) : rule_(std::move(rule)) {
   std::error_code ec;
   target_ = fs::absolute(fs::path(folder).has_filename() ? fs::path(folder) : fs::path(folder).parent_path());
@@ -66,6 +78,31 @@ void NewFolder::add(const std::string& path, std::span<const std::uint8_t> bytes
   const fs::path file = tree_ / path, folder = file.parent_path();
   if (folders_.insert(folder).second) fs::create_directories(folder);
   write_new_file(file, bytes);
+}
+
+void NewFolder::copy(const std::string& path, const fs::path& source) {
+  std::error_code ec;
+  if (!fs::is_directory(source, ec)) return copy_file(tree_ / path, source);
+  std::vector<fs::path> files;
+  for (auto it = fs::recursive_directory_iterator(source, ec); !ec && it != fs::end(it); it.increment(ec)) {
+    const bool hidden = it->path().filename().string().starts_with('.');
+    if (hidden && it->is_directory(ec)) it.disable_recursion_pending();
+    if (!hidden && fs::is_regular_file(it->symlink_status())) files.push_back(it->path());
+  }
+  if (ec) throw InputError(source.string(), "", "a folder that can be read", ec.message());
+  for (const fs::path& file : files) copy_file(tree_ / path / file.lexically_relative(source), file);
+}
+
+void NewFolder::copy_file(const fs::path& file, const fs::path& source) {
+  if (folders_.insert(file.parent_path()).second) fs::create_directories(file.parent_path());
+  std::error_code ec;
+  fs::copy_file(source, file, ec);
+  if (ec) throw InputError(source.string(), "", "a file that can be copied", ec.message());
+  fs::permissions(file, fs::perms{0644});
+  const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
+  const bool ok = fd >= 0 && ::fdatasync(fd) == 0;
+  if (fd >= 0) ::close(fd);
+  if (!ok) fail_output(file, "a writable file");
 }
 
 void NewFolder::publish() {

@@ -5,6 +5,7 @@
 #include <set>
 #include <span>
 #include <string>
+#include <string_view>
 
 namespace texmesh {
 
@@ -16,6 +17,10 @@ struct FolderRule {
   std::string instead;  // for the error without `replace`: what is expected in place of a folder with files
   std::string replaceable;  // for the error with `replace`: the only kind of folder that is replaced
 };
+
+/// A folder is new or empty, or its file `name` begins with `begin` and it is replaced. `replaceable` as
+/// above.
+FolderRule marked_folder_rule(const std::string& name, std::string_view begin, std::string replaceable);
 
 /// A folder under a temporary name beside its own, which takes its own name in publish(), or disappears with
 /// this object. InputError when the folder cannot be written, or when the rule forbids to replace what is
@@ -29,11 +34,15 @@ class NewFolder {
 
   /// A file of the folder; `path` is relative, the caller vouches that it leads nowhere else. No path twice.
   void add(const std::string& path, std::span<const std::uint8_t> bytes);
+  /// A file that stands on this machine, or all files beneath a folder but hidden ones; symbolic links are
+  /// left out. `path` as of add(). InputError where one cannot be read.
+  void copy(const std::string& path, const std::filesystem::path& source);
   /// Files and folders are on the disk before the name is taken. What is replaced goes away in one step.
   void publish();
 
  private:
   void check_target() const;
+  void copy_file(const std::filesystem::path& file, const std::filesystem::path& source);
 
   std::filesystem::path target_, tree_;
   std::set<std::filesystem::path> folders_;

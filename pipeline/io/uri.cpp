@@ -97,6 +97,12 @@ std::string decode_uri(std::string_view uri, const std::string& file, const std:
   return name;
 }
 
+std::string url_origin(std::string_view url) {
+  const std::size_t scheme = url.find("://");
+  return scheme == std::string_view::npos ? ""
+                                          : std::string(url.substr(0, url.find_first_of("/?#", scheme + 3)));
+}
+
 bool is_data_uri(std::string_view uri) {
   if (uri.size() < 5) return false;
   for (std::size_t i = 0; i < 4; ++i) {

@@ -6,7 +6,7 @@
 
 namespace texmesh {
 
-// Names of files inside models. `file` and `place` say where the name stands, for the message of an
+// Names of files inside models, and URLs. `file` and `place` say where the name stands, for the message of an
 // InputError.
 
 /// Refuses every name that could leave the model's folder or mean something else than a file in it: empty,
@@ -19,6 +19,10 @@ void check_relative_name(std::string_view name, const std::string& file, const s
 /// query and fragment are not split off, as glTF names files. Throws InputError for broken escapes and
 /// refused names.
 std::string decode_uri(std::string_view uri, const std::string& file, const std::string& place);
+
+/// Scheme, host and port of a URL: "https://museum.example" of "https://museum.example/a?b"; "" for an
+/// address without a host.
+std::string url_origin(std::string_view url);
 
 bool is_data_uri(std::string_view uri);
 

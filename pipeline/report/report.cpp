@@ -1,30 +1,17 @@
 #include "pipeline/report/report.h"
 
-#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "pipeline/report/html.h"
-#include "pipeline/report/report_folder.h"
+#include "pipeline/report/package_words.h"
 #include "pipeline/report/report_page.h"
 
 namespace texmesh {
 namespace {
 
-namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 constexpr double kSourceHeight = 512;  // px at which the source stands beside S_0
-
-std::string last_name(const std::string& path) {
-  const fs::path p(path);
-  return (p.has_filename() ? p : p.parent_path()).filename().string();
-}
-
-/// Title of the page: what the package calls itself, or its file.
-std::string title_of(PackageReader& package) {
-  const std::string& title = package.manifest().title;
-  return title.empty() ? last_name(package.store().name()) : title;
-}
 
 SourceComparison compare_source(PackageReader& package, const PackagePictures& pictures,
                                 const RenderedModel& source, const Report& report) {
@@ -51,7 +38,7 @@ Json differences_json(const ViewDifferences& d) {
 Report make_report(PackageReader& package, const ReportOptions& options, const RunContext& context) {
   Report report;
   report.options = options;
-  report.title = title_of(package);
+  report.title = package_title(package);
   std::optional<RenderedModel> source;
   if (!options.against.empty()) source = load_rendered_model(options.against, {}, context);
   PackagePictures pictures(package, {}, context);
@@ -100,6 +87,11 @@ std::string report_json(const Report& report) {
   }
   j["files"] = std::move(files);
   return j.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+FolderRule report_folder_rule() {
+  return marked_folder_rule(kReportPage, kReportFirstLine,
+                            "an empty folder, an earlier report, or nothing yet");
 }
 
 void write_report(const Report& report, const std::string& folder) {

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/io/new_folder.h"
 #include "pipeline/report/picture_row.h"
 #include "pipeline/report/quality_curves.h"
 #include "pipeline/report/switch_sizes.h"
@@ -44,6 +45,11 @@ Report make_report(PackageReader& package, const ReportOptions& options, const R
 
 /// For programs: schemas/report.v1.schema.json.
 std::string report_json(const Report& report);
+
+/// The page of a folder that html_page() fills.
+inline constexpr const char* kReportPage = "index.html";
+/// A folder is new or empty, or it holds such a page and is replaced.
+FolderRule report_folder_rule();
 
 /// Writes the files; the folder appears whole or not at all. An earlier report is replaced. InputError when
 /// the folder holds anything else, or cannot be made.

@@ -9,6 +9,7 @@
 #include "pipeline/io/markup.h"
 #include "pipeline/report/flip_colours.h"
 #include "pipeline/report/html.h"
+#include "pipeline/report/package_words.h"
 #include "pipeline/report/plot.h"
 
 namespace texmesh {
@@ -69,19 +70,6 @@ std::string switch_figure(PackagePictures& pictures, const SwitchSize& s, Report
                        pictures.picture(0, view, side_px), pictures.picture(s.scale, view, side_px),
                        report.files);
   return out + "</figure>\n";
-}
-
-/// Whose the object is; the licence as a link to where it can be read.
-std::string rights_line(const About& about) {
-  std::string out = markup_escaped(about.attribution.empty() ? about.creator : about.attribution);
-  if (!about.licence.empty()) {
-    const std::string licence = markup_escaped(about.licence);
-    if (!out.empty()) out += ", ";
-    out += about.licence_url.empty() ? licence
-                                     : fmt::format("<a rel=\"license\" href=\"{}\">{}</a>",
-                                                   markup_escaped(about.licence_url), licence);
-  }
-  return out.empty() ? out : "<p class=\"quiet\">" + out + "</p>\n";
 }
 
 }  // namespace

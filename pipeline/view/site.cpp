@@ -155,7 +155,7 @@ std::size_t SiteFile::read(std::uint64_t offset, char* to, std::size_t size) con
   }
 }
 
-Site::Site(const std::string& package, const std::string& viewer) {
+PackageFolder find_packages(const std::string& package) {
   std::error_code error;
   const fs::path path = fs::canonical(package, error);
   if (error) throw InputError(package, "", "a package, or a folder of packages", error.message());
@@ -163,11 +163,20 @@ Site::Site(const std::string& package, const std::string& viewer) {
   const bool tree = folder && fs::is_regular_file(path / kManifestPath);
   if (!folder && !fs::is_regular_file(path))
     throw InputError(package, "", "a regular file", "something else");
-  viewer_ = open_folder_or_throw(viewer);
-  root_ = open_folder_or_throw(folder && !tree ? path.string() : path.parent_path().string());
-  if (!folder || tree) only_ = path.filename().string() + (tree ? "/" : "");
-  if (only_.empty() && packages().empty())
+  if (!folder || tree)
+    return {path.parent_path().string(), {path.filename().string() + (tree ? "/" : "")}, true};
+  PackageFolder found{path.string(), {}, false};
+  list_packages(path, "", 0, found.packages);
+  if (found.packages.empty())
     throw InputError(package, "", "a package, or a folder of packages", "no package in it");
+  return found;
+}
+
+Site::Site(const std::string& package, const std::string& viewer) {
+  const PackageFolder found = find_packages(package);
+  viewer_ = open_folder_or_throw(viewer);
+  root_ = open_folder_or_throw(found.path);
+  if (found.alone) only_ = found.packages.front();
 }
 
 Site::~Site() {

@@ -28,13 +28,24 @@ class SiteFile {
   std::string type_, etag_;
 };
 
+/// Packages on this machine.
+struct PackageFolder {
+  std::string path;  // absolute
+  std::vector<std::string>
+      packages;        // relative to it, sorted, at most 10,000; unpacked ones end with a slash
+  bool alone = false;  // one package was named, not a folder of them
+};
+/// `package` is a .texmesh file, an unpacked package, or a folder of such. Hidden names and symbolic links
+/// beneath it are left out. InputError when it is not there or holds no package.
+PackageFolder find_packages(const std::string& package);
+
 /// The files that `texmesh view` serves: the viewer's beneath `/`, packages beneath `/packages/`. Nothing
 /// else can be reached: paths go down part by part, follow no symbolic link, and in a folder of packages lead
 /// to `.texmesh` files and into unpacked packages only, whatever stands beside them.
 class Site {
  public:
-  /// `package` is a .texmesh file, an unpacked package, or a folder of such; `viewer` a folder with
-  /// index.html. InputError when one of them is not there or the folder holds no package.
+  /// `package` as of find_packages(); `viewer` a folder with index.html. InputError when one of them is not
+  /// there or the folder holds no package.
   Site(const std::string& package, const std::string& viewer);
   ~Site();
   Site(const Site&) = delete;

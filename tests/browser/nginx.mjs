@@ -31,11 +31,12 @@ export function nginxMissing(http2) {
   return http2 && !has('openssl') ? 'openssl is not installed' : '';
 }
 
-export async function startNginx({http2 = false} = {}) {
+/** `roots`: folders by the prefixes beneath which they stand, as for `serve`. */
+export async function startNginx({http2 = false, roots = labRoots} = {}) {
   const folder = fs.mkdtempSync(path.join(env.work, 'nginx-'));
   const site = path.join(folder, 'site');
   fs.mkdirSync(site);
-  for (const [prefix, target] of Object.entries(labRoots)) {
+  for (const [prefix, target] of Object.entries(roots)) {
     if (prefix === '/') for (const f of fs.readdirSync(target)) fs.symlinkSync(path.join(target, f), path.join(site, f));
     else fs.symlinkSync(prefix === '/packages/' ? packages : target, path.join(site, prefix.slice(1, -1)));
   }
@@ -54,7 +55,7 @@ ${process.getuid() === 0 ? 'user root; ' : ''}worker_processes 1; daemon off; pi
 events {}
 http {
   access_log ${folder}/access.log; ${temporary}
-  types { text/html html; text/javascript js mjs; application/wasm wasm; }
+  types { text/html html; text/css css; text/javascript js mjs; application/wasm wasm; image/svg+xml svg; image/jpeg jpg; }
   ${server}
 }`);
   const child = spawn('nginx', ['-p', folder, '-c', path.join(folder, 'nginx.conf')], {stdio: 'ignore'});

@@ -5,8 +5,8 @@ import {test} from './harness.mjs';
 import {startLink} from './link.mjs';
 
 /** Looks at a page's names, roles, labels and contrasts. */
-const axe = fs.readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
-const kDesktop = {width: 1280, height: 800};
+export const axe = fs.readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
+export const kDesktop = {width: 1280, height: 800};
 export const kPhone = {width: 390, height: 844};
 
 /** Opens the viewer on a package; `body` gets the page. Nothing may be said on the console, nothing asked of elsewhere. */

@@ -1,6 +1,6 @@
-// Validates every mesh/sNN.glb of packages (.texmesh files or unpacked folders) with the Khronos glTF validator.
+// Validates every mesh/sNN.glb of packages (.texmesh files or unpacked folders), and GLBs, with the Khronos glTF validator.
 //
-//   node validate-packages.mjs PACKAGE... [--strict]
+//   node validate-packages.mjs PACKAGE|GLB... [--strict]
 //
 // Exit code 0: no error (with --strict: no warning either), 1: findings, 2: usage or a package that cannot be read.
 import { existsSync, readFileSync, readdirSync, statSync } from 'node:fs';
@@ -64,14 +64,15 @@ const args = process.argv.slice(2);
 const strict = args.includes('--strict');
 const packages = args.filter((a) => a !== '--strict');
 if (packages.length === 0) {
-  console.error('usage: node validate-packages.mjs PACKAGE... [--strict]');
+  console.error('usage: node validate-packages.mjs PACKAGE|GLB... [--strict]');
   process.exit(2);
 }
 let [meshes, errors, warnings] = [0, 0, 0];
 for (const path of packages) {
   let entries;
   try {
-    entries = statSync(path).isDirectory() ? entriesOfFolder(path) : entriesOfFile(path);
+    if (path.endsWith('.glb')) entries = [['mesh/file.glb', readFileSync(path)]];
+    else entries = statSync(path).isDirectory() ? entriesOfFolder(path) : entriesOfFile(path);
   } catch (error) {
     console.error(`${path}: ${error.message}`);
     process.exit(2);

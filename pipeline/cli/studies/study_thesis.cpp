@@ -9,7 +9,7 @@
 #include "pipeline/cli/studies/studies.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/text_bytes.h"
-#include "pipeline/report/report_folder.h"
+#include "pipeline/report/report.h"
 #include "pipeline/thesis/exhibits.h"
 
 namespace texmesh {

@@ -27,8 +27,10 @@ struct ExtractRequest {
   double display_px = 0;  // displayed height, device px; 0 = not said (with `bytes`: kBudgetDisplayPx)
   ExtractImages images = ExtractImages::kAuto;
   bool recentre = false;  // the frame of the package's meshes instead of the source's coordinates
-  bool plain = false;     // no extension that compresses (plain_file()); not with `bytes` or `lods`
-  bool lods = false;      // all major scales and the one chosen, as MSFT_lod
+  bool metres =
+      false;  // lengths in metres where the object unit is known, by a node that scales; not with `bytes`
+  bool plain = false;  // no extension that compresses (plain_file()); not with `bytes` or `lods`
+  bool lods = false;   // all major scales and the one chosen, as MSFT_lod
 };
 
 struct ExtractedImage {

@@ -323,11 +323,13 @@ void StandaloneGlb::add_level(StandaloneGlb coarser, double screen_coverage) {
   document_->root["nodes"].push_back(level);
 }
 
-void StandaloneGlb::move_to(Vec3d translation) {
-  if (translation == Vec3d{}) return;
+void StandaloneGlb::move_to(Vec3d translation, double scale) {
+  if (translation == Vec3d{} && scale == 1) return;
   const std::size_t scene = number(document_->root, "scene");
   Json& nodes = document_->root["scenes"].at(scene)["nodes"];
-  Json parent{{"name", "origin"}, {"translation", {translation.x, translation.y, translation.z}}};
+  const Vec3d to = translation * scale;
+  Json parent{{"name", "origin"}, {"translation", {to.x, to.y, to.z}}};
+  if (scale != 1) parent["scale"] = {scale, scale, scale};
   parent["children"] = nodes;
   nodes = Json::array({document_->root["nodes"].size()});
   document_->root["nodes"].push_back(parent);

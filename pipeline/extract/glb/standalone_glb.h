@@ -50,9 +50,10 @@ class StandaloneGlb {
   /// level is shown (extras.MSFT_screencoverage).
   void add_level(StandaloneGlb coarser, double screen_coverage);
 
-  /// Makes the nodes of the scene the children of one node that moves them by `translation`, object units.
-  /// Positions stay as they are. Nothing happens for {0, 0, 0}. After all levels of detail.
-  void move_to(Vec3d translation);
+  /// Makes the nodes of the scene the children of one node that moves them by `translation`, object units,
+  /// and then makes all lengths `scale` times as long. Positions stay as they are. Nothing happens for {0, 0,
+  /// 0} and 1. After all levels of detail.
+  void move_to(Vec3d translation, double scale = 1);
 
   /// What finish() writes of the object: asset.copyright, asset.extras, KHR_xmp_json_ld (write_gltf_about()).
   void set_about(const About& about);

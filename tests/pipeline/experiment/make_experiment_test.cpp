@@ -103,7 +103,7 @@ TEST(MakeExperiment, ThePageIsStrictAndEscapesText) {
   EXPECT_EQ(page.find("style=\""), std::string::npos);  // the policy would refuse it
   o.post_url = "/submit";
   EXPECT_NE(text_of(made(o), "index.html").find("connect-src 'self';"), std::string::npos);
-  for (const PageFile& f : page_files())
+  for (const BuiltInFile& f : experiment_page_files())
     EXPECT_FALSE(text_of(made(o), std::string(f.name)).empty()) << f.name;
 }
 

@@ -61,5 +61,11 @@ TEST(DataUri, RefusesMoreThanTheLimit) {
   EXPECT_THROW(data("data:a/b;base64,Zm9v", 2), InputError);
 }
 
+TEST(UrlOrigin, IsSchemeHostAndPort) {
+  EXPECT_EQ(url_origin("https://a.example:81/b?c://d"), "https://a.example:81");
+  EXPECT_EQ(url_origin("http://a.example?b/c"), "http://a.example");
+  EXPECT_EQ(url_origin("answers.php"), "");
+}
+
 }  // namespace
 }  // namespace texmesh

@@ -1,0 +1,288 @@
+// Forms for other viewers, each opened by the program that it is for, and the gallery.
+import {createHash} from 'node:crypto';
+import {check, common, env, fs, here, listen, near, packages, path, pictures, run, serve} from './browser.mjs';
+import {test} from './harness.mjs';
+import {nginxMissing, startNginx} from './nginx.mjs';
+import {axe, kDesktop, kPhone} from './viewer-tests.mjs';
+
+const modules = path.join(here, 'node_modules');
+const doors = path.join(env.work, 'doors');
+const roots = {
+  '/out/': doors, '/three/': path.join(modules, 'three'), '/tiles-renderer/': path.join(modules, '3d-tiles-renderer'),
+  '/model-viewer/': path.join(modules, '@google/model-viewer/dist'), '/': path.join(here, 'page'),
+};
+
+/** `texmesh export` of one of the tests' packages into a folder of its own. */
+function exported(name, target, ...more) {
+  fs.mkdirSync(doors, {recursive: true});
+  const folder = `${target}-${name}${more.filter((m) => m.startsWith('--')).join('')}`;
+  run(env.texmesh, 'export', path.join(packages, `${name}.texmesh`), '--to', target, '-o', path.join(doors, folder), ...more);
+  return folder;
+}
+
+/** A page of the server; nothing may be said on the console, nothing asked of elsewhere. */
+async function withPage(address, body, {viewport = kDesktop, dark = false, touch = false, script = true, elsewhere = [], allowed = /^$/, origin} = {}) {
+  const {browser} = await common();
+  const server = origin ? null : await serve(roots, {});
+  const context = await browser.newContext({viewport, colorScheme: dark ? 'dark' : 'light', hasTouch: touch, deviceScaleFactor: touch ? 2 : 1, javaScriptEnabled: script});
+  const page = await context.newPage();
+  listen(page);
+  for (const {url, file, type} of elsewhere)
+    await page.route(url, (route) => route.fulfill({body: fs.readFileSync(file(route.request().url())), contentType: type, headers: {'Access-Control-Allow-Origin': '*'}}));
+  try {
+    const base = origin ?? server.url;
+    await page.goto(`${base}/${address}`);
+    await body(page, base, server);
+    const said = page.said.filter((text) => !allowed.test(text));
+    check(said.length === 0, said.join('\n'));
+    const other = page.wentTo.filter((u) => !u.startsWith(base) && !/^(blob|data):/.test(u) && !elsewhere.some(({url}) => url.test(u)));
+    check(other.length === 0, `asked elsewhere: ${other.join(' ')}`);
+  } finally {
+    await context.close();
+    await server?.close();
+  }
+}
+
+const shot = (page, name) => page.screenshot({path: path.join(pictures, `${name}.png`)});
+
+/** Tiles of a tileset from the outside in, checked by the words of 3D Tiles 1.1. */
+function chainOf(tileset) {
+  check(tileset.asset.version === '1.1' && tileset.geometricError > 0, JSON.stringify(tileset.asset));
+  check(tileset.root.refine === 'REPLACE', 'the root says how it refines');
+  const tiles = [];
+  for (let tile = tileset.root, above = tileset.geometricError; tile; [above, tile] = [tile.geometricError, tile.children?.[0]]) {
+    const {box} = tile.boundingVolume;
+    check(box.length === 12 && box.every(Number.isFinite) && box[3] > 0 && box[7] > 0 && box[11] > 0, `box ${box}`);
+    check(Number.isFinite(tile.geometricError) && tile.geometricError >= 0 && tile.geometricError <= above, `error ${tile.geometricError} in ${above}`);
+    check((tile.children?.length ?? 1) === 1 && /^level-\d\.glb$/.test(tile.content.uri), tile.content.uri);
+    tiles.push(tile);
+  }
+  check(tiles.at(-1).geometricError === 0, 'the innermost tile has no error');
+  return tiles;
+}
+
+for (const name of ['large', 'colours']) {
+  test(`doors: a tileset in 3d-tiles-renderer (${name})`, async () => {
+    const folder = exported(name, '3dtiles');
+    const tiles = chainOf(JSON.parse(fs.readFileSync(path.join(doors, folder, 'tileset.json'))));
+    check(tiles.length >= 2, `${tiles.length} tiles`);
+    const seen = [];
+    await withPage('tiles.html', async (page, base) => {
+      await page.waitForFunction('window.ready');
+      for (const px of [20, 400, 4000]) {
+        const r = await page.evaluate(([u, p]) => window.door.tiles(u, p), [`${base}/out/${folder}/tileset.json`, px]);
+        check(r.still >= 10 && r.seen.length === 1, JSON.stringify(r));
+        check(r.target === 16, `the renderer asks for ${r.target} px`);
+        check(r.covered > 0.05 * Math.min(px, 512) ** 2, `${r.covered} px are covered at ${px} px`);
+        // Up is +Z: the height that the source has along y. And the box is where the picture is.
+        const {box} = tiles[0].boundingVolume;
+        for (const [k, half] of [3, 7, 11].entries()) near(r.size[k], 2 * box[half], 0.05 * r.size[k], `side ${k} of what is shown`);
+        const place = tiles[0].transform?.slice(12, 15) ?? [0, 0, 0];
+        for (const k of [0, 1, 2]) near(r.centre[k], box[k] + place[k], 0.05 * Math.hypot(...r.size), `centre ${k}`);
+        seen.push(tiles.findIndex((t) => t.content.uri === r.seen[0]));
+        await shot(page, `tiles-${name}-${px}`);
+      }
+    }, {allowed: /tiles versions at 1\.1 or higher have limited support/}); // the renderer says so of every such tileset
+    check(seen[0] <= seen[1] && seen[1] <= seen[2] && (seen[0] < seen[2] || name === 'colours') && seen[2] === tiles.length - 1, `levels ${seen} of ${tiles.length}`);
+  }, {seconds: 120});
+}
+
+test('doors: levels of detail in three.js', async () => {
+  const folder = exported('maps', 'gltf-lod');
+  const single = path.join(doors, 'maps-s0.glb');
+  run(env.texmesh, 'extract', path.join(packages, 'maps.texmesh'), '--scale', '0', '-o', single);
+  await withPage('tiles.html', async (page, base) => {
+    await page.waitForFunction('window.ready');
+    const [lods, one] = await Promise.all([`${folder}/model.glb`, 'maps-s0.glb'].map((f) => page.evaluate((u) => window.door.glb(u), `${base}/out/${f}`)));
+    check(lods.triangles === one.triangles, `${lods.triangles} triangles are shown, S_0 has ${one.triangles}`);
+    check(lods.images === one.images && one.images > 1, `${lods.images} images, a file of one scale has ${one.images}`);
+    check(lods.extensions.includes('MSFT_lod') && lods.lod.extensions.MSFT_lod.ids.length >= 1, JSON.stringify(lods.extensions));
+    const coverage = lods.lod.extras.MSFT_screencoverage;
+    check(coverage.length === lods.lod.extensions.MSFT_lod.ids.length + 1 && coverage.every((c, k) => k === 0 || c <= coverage[k - 1]), `${coverage}`);
+    check(lods.covered > 10000, 'nothing is drawn');
+    for (const k of [0, 1, 2]) near(lods.centre[k], one.centre[k], 0.05 * Math.hypot(...one.size), `centre ${k}`);
+    await shot(page, 'lods');
+  });
+}, {seconds: 90});
+
+/** What <model-viewer> says of itself once it shows something. */
+const modelShown = (page) => page.waitForFunction(() => document.querySelector('model-viewer').loaded, null, {timeout: 45000});
+
+for (const [name, how, options] of [
+  ['maps', 'plain', {}], ['colours', 'plain', {viewport: kPhone, touch: true}], ['maps', 'draco', {dark: true}],
+]) {
+  test(`doors: a page with model-viewer (${name}, ${how}${options.touch ? ', phone' : ''})`, async () => {
+    const folder = exported(name, 'model-viewer', '--script', '../../model-viewer/model-viewer.min.js', ...(how === 'plain' ? ['--plain'] : []));
+    // Its decoder of Draco comes from Google.
+    const elsewhere = how === 'plain' ? [] : [{
+      url: /^https:\/\/www\.gstatic\.com\/draco\//, type: 'application/wasm',
+      file: (url) => path.join(modules, 'three/examples/jsm/libs/draco/gltf', path.basename(url)),
+    }];
+    await withPage(`out/${folder}/index.html`, async (page) => {
+      await modelShown(page);
+      await page.waitForTimeout(500);
+      await shot(page, `model-viewer-${name}-${how}`);
+      const picture = await page.locator('model-viewer').screenshot();
+      check(picture.length > 8000, 'the picture is empty');
+      check(!(await page.evaluate(() => document.documentElement.scrollWidth > innerWidth)), 'wider than the screen');
+      await page.evaluate(axe);
+      const {violations} = await page.evaluate(() => window.axe.run(document, {resultTypes: ['violations']}));
+      check(violations.length === 0, violations.map((v) => `${v.id}: ${v.nodes[0].html}`).join('\n'));
+    }, {...options, elsewhere, allowed: /rAF timed out/}); // on a busy machine
+  }, {seconds: 90});
+}
+
+test('doors: the script of model-viewer is the one whose digest the page has', () => {
+  const folder = exported('maps', 'model-viewer');
+  const page = fs.readFileSync(path.join(doors, folder, 'index.html'), 'utf8');
+  const {version} = JSON.parse(fs.readFileSync(path.join(modules, '@google/model-viewer/package.json')));
+  check(page.includes(`@google/model-viewer@${version}/`), `the tests have version ${version}`);
+  const digest = createHash('sha384').update(fs.readFileSync(path.join(roots['/model-viewer/'], 'model-viewer.min.js'))).digest('base64');
+  check(page.includes(`integrity="sha384-${digest}"`), 'another digest');
+});
+
+test('doors: an oEmbed answer, and its frame on a page of others', async () => {
+  const {browser} = await common();
+  const [server, other] = [await serve(roots, {}), await serve({'/': doors}, {})];
+  const page = await browser.newPage({viewport: kDesktop});
+  listen(page);
+  try {
+    exported('maps', 'oembed', '--url', `${server.url}/out/frame/`, '--viewer', env.viewer, '--width', '700');
+    fs.rmSync(path.join(doors, 'frame'), {recursive: true, force: true});
+    fs.renameSync(path.join(doors, 'oembed-maps--url--viewer--width'), path.join(doors, 'frame'));
+    // As a consumer finds it: the object's page, its link, the answer, the HTML.
+    await page.goto(`${server.url}/out/frame/index.html`);
+    const href = await page.locator('link[type="application/json+oembed"]').getAttribute('href');
+    check(href === `${server.url}/out/frame/oembed.json`, href);
+    const answer = await (await fetch(href)).json();
+    check(answer.type === 'rich' && answer.version === '1.0' && answer.width === 700 && answer.html.includes('<iframe'), JSON.stringify(answer));
+    const thumbnail = await fetch(answer.thumbnail_url);
+    check(thumbnail.ok && thumbnail.headers.get('content-type') === 'image/jpeg', `${answer.thumbnail_url}: ${thumbnail.status}`);
+    fs.writeFileSync(path.join(doors, 'other.html'), `<!doctype html><html lang="en"><title>others</title><link rel="icon" href="data:,"><p>A page of others.</p>${answer.html}`);
+    await page.goto(`${other.url}/other.html`);
+    await page.locator('iframe').scrollIntoViewIfNeeded();
+    const frame = await (await page.waitForSelector('iframe')).contentFrame();
+    await frame.waitForFunction(() => window.texmeshViewer?.session.live.phase === 'done', null, {timeout: 60000});
+    check(await frame.locator('#toggle').getAttribute('aria-expanded') === 'false', 'the panel is open');
+    await shot(page, 'oembed');
+    check((await page.locator('iframe').screenshot()).length > 8000, 'the frame is empty');
+    check(page.said.length === 0, page.said.join('\n'));
+  } finally {
+    await page.close();
+    await Promise.all([server.close(), other.close()]);
+  }
+}, {seconds: 90});
+
+/** A gallery of the tests' packages, once. */
+let made;
+function gallery() {
+  if (made) return made;
+  const www = path.join(doors, 'www');
+  fs.mkdirSync(doors, {recursive: true});
+  run(env.texmesh, 'site', path.join(packages, 'alone'), '-o', www, '--viewer', env.viewer, '--title', 'Scans of the tests');
+  return (made = www);
+}
+
+/** How far things moved after they had been there: Cumulative Layout Shift. */
+const kWatchShifts = () => {
+  window.shifts = 0;
+  new PerformanceObserver((list) => { for (const e of list.getEntries()) if (!e.hadRecentInput) window.shifts += e.value; }).observe({type: 'layout-shift', buffered: true});
+};
+
+for (const [name, options] of [['desktop', {}], ['desktop-dark', {dark: true}], ['phone', {viewport: kPhone, touch: true}], ['phone-dark', {viewport: kPhone, touch: true, dark: true}]]) {
+  test(`gallery: list and object, nothing moves, axe, nothing asked elsewhere (${name})`, async () => {
+    gallery();
+    const looked = async (page, what) => {
+      await page.evaluate(axe);
+      const {violations, passes} = await page.evaluate(() => window.axe.run(document, {resultTypes: ['violations', 'passes']}));
+      check(passes.length > 8, `${passes.length} rules were looked at`);
+      check(violations.length === 0, violations.map((v) => `${what}: ${v.id}: ${v.nodes[0].html} ${v.nodes[0].failureSummary}`).join('\n'));
+      check(!(await page.evaluate(() => document.documentElement.scrollWidth > innerWidth)), `${what}: wider than the screen`);
+    };
+    await withPage('out/www/index.html', async (page, base) => {
+      await page.evaluate(kWatchShifts);
+      await page.waitForLoadState('networkidle');
+      await shot(page, `gallery-${name}`);
+      check(await page.locator('#objects > li').count() === fs.readdirSync(path.join(packages, 'alone')).length, 'a package is missing');
+      check(await page.evaluate(() => [...document.images].every((i) => i.loading === 'lazy' || i.naturalWidth > 0)), 'a poster did not come');
+      await page.evaluate(() => scrollTo(0, document.body.scrollHeight));
+      await page.waitForTimeout(400);
+      check(await page.evaluate(() => window.shifts) < 0.01, `shifts of ${await page.evaluate(() => window.shifts)}`);
+      await looked(page, 'list');
+      await page.goto(`${base}/out/www/objects/maps.html`);
+      await page.evaluate(kWatchShifts);
+      await page.waitForLoadState('networkidle');
+      await shot(page, `gallery-object-${name}`);
+      await looked(page, 'object');
+      check(page.wentTo.every((u) => !u.includes('/viewer/')), 'the viewer comes before it is asked for');
+      await page.locator('#show').click();
+      const frame = await (await page.waitForSelector('iframe')).contentFrame();
+      await frame.waitForFunction(() => window.texmeshViewer?.session.live.phase === 'done', null, {timeout: 60000});
+      await page.waitForTimeout(300);
+      await shot(page, `gallery-3d-${name}`);
+      check(await page.evaluate(() => window.shifts) < 0.01, `shifts of ${await page.evaluate(() => window.shifts)}`);
+      check((await page.locator('iframe').screenshot()).length > 8000, 'the frame is empty');
+    }, options);
+  }, {seconds: 120});
+}
+
+test('gallery: search and keyboard', async () => {
+  gallery();
+  await withPage('out/www/index.html', async (page) => {
+    await page.keyboard.press('Tab');
+    check(await page.evaluate(() => document.activeElement.className) === 'skip', 'the first key leads past the head');
+    await page.keyboard.press('Tab');
+    await page.keyboard.type('MAPS');
+    await page.waitForFunction(() => document.querySelectorAll('#objects > li:not([hidden])').length === 1);
+    check(/^1 of \d+ objects$/.test(await page.locator('#count').textContent()), await page.locator('#count').textContent());
+    check(page.url().endsWith('?q=MAPS'), page.url());
+    await page.reload();
+    check(await page.locator('#objects > li:not([hidden])').count() === 1, 'the search is forgotten');
+    await page.locator('#search').focus();
+    await page.keyboard.press('Tab');
+    await page.keyboard.press('Enter');
+    await page.waitForURL(/objects\/maps\.html$/);
+    await page.locator('#show').focus();
+    await page.keyboard.press('Enter');
+    const frame = await (await page.waitForSelector('iframe')).contentFrame();
+    await frame.waitForFunction(() => window.texmeshViewer?.session.live.phase === 'done', null, {timeout: 60000});
+    check(await page.evaluate(() => document.activeElement.tagName) === 'IFRAME', 'the focus is lost');
+  });
+}, {seconds: 90});
+
+test('gallery: without scripts the objects are links to the viewer', async () => {
+  gallery();
+  await withPage('out/www/index.html', async (page) => {
+    check(await page.locator('.search').isHidden(), 'a search that does nothing');
+    await page.locator('#objects a').first().click();
+    check(/viewer\/index\.html\?panel=0&pkg=/.test(await page.locator('#show').getAttribute('href')), 'no link to the viewer');
+  }, {script: false});
+});
+
+test('gallery: behind nginx', async ({skip}) => {
+  if (nginxMissing(false)) skip(nginxMissing(false));
+  const nginx = await startNginx({roots: {'/': gallery()}});
+  try {
+    await withPage('index.html', async (page) => {
+      await page.getByRole('link', {name: 'maps'}).click();
+      await page.locator('#show').click();
+      const frame = await (await page.waitForSelector('iframe')).contentFrame();
+      await frame.waitForFunction(() => window.texmeshViewer?.session.live.phase === 'done', null, {timeout: 60000});
+      check(/"GET \/packages\/maps\.texmesh[^"]*" 206/.test(nginx.log()), 'no ranges');
+    }, {origin: nginx.url});
+  } finally { nginx.close(); }
+}, {seconds: 90});
+
+test('gallery: from files the list is there', async () => {
+  const www = gallery();
+  const {browser} = await common();
+  const page = await browser.newPage({viewport: kDesktop});
+  listen(page);
+  await page.goto(`file://${www}/index.html`);
+  check(await page.evaluate(() => getComputedStyle(document.querySelector('#objects')).display) === 'grid', 'no style');
+  check(await page.evaluate(() => document.images[0].naturalWidth > 0), 'no poster');
+  await page.locator('#search').fill('maps');
+  await page.waitForFunction(() => document.querySelectorAll('#objects > li:not([hidden])').length === 1);
+  check(page.said.length === 0, page.said.join('\n'));
+  await page.close();
+});
