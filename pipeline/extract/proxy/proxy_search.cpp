@@ -23,8 +23,8 @@ namespace {
 struct MeshBits {
   int position, uv, normal;
 };
-constexpr MeshBits kMeshBits[] = {{9, 9, 6}, {10, 10, 7}, {11, 11, 7}, {12, 12, 8}};
-constexpr int kUsualBits = 2, kFinestBits = 3;
+constexpr MeshBits kMeshBits[] = {{8, 8, 5}, {9, 9, 5}, {9, 9, 6}, {10, 10, 7}, {11, 11, 7}, {12, 12, 8}};
+constexpr int kUsualBits = 3, kFinestBits = 5;
 constexpr double kMostMesh = 0.7;  // of the bytes, of the mesh that is tried first
 constexpr double kShareStep = 0.75, kLeastProxyShare = 0.15;
 constexpr double kPoorQuality = 15;  // pictures get smaller before they get worse
