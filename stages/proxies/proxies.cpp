@@ -166,8 +166,7 @@ class ProxyRun {
 
   bool loses_to_scale(std::uint64_t bytes, double flip, const RunContext& context) {
     if (mode_ != ProxyMode::kAuto) return false;
-    const auto rival = rival_flip(scales_, shown_, bytes, studio_, context);
-    return rival && *rival <= flip;
+    return rival_wins(scales_, shown_, bytes, flip, studio_, context);
   }
 
   /// FLIP likes facets of a smooth object even where they are large (a bust's .107 for .115 at 20 kB); who
