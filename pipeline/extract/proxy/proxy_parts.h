@@ -46,9 +46,9 @@ class ProxyParts {
   std::size_t mesh_count() const { return meshes_.size(); }
   std::uint64_t triangles(std::size_t mesh) const { return meshes_[mesh].triangles.size(); }
 
-  /// The proxy with one of its meshes as KHR_draco_mesh_compression of these steps and without the maps that are not
-  /// chosen; image k is "texture/k" and holds one texel. Without the map of data, roughness and metal are its
-  /// means. Same bytes for any thread count.
+  /// The proxy with one of its meshes as KHR_draco_mesh_compression of these steps and without the maps that
+  /// are not chosen; image k is "texture/k" and holds one texel. Without the map of data, roughness and metal
+  /// are its means. Same bytes for any thread count.
   StandaloneGlb file(const ProxyMapChoice& choice, std::size_t mesh, const DracoSteps& steps,
                      const RunContext& context) const;
   /// The pictures of such a file, by k. Without the map of data, half of its occlusion is multiplied into the
@@ -60,7 +60,7 @@ class ProxyParts {
   const ProxyMap* map_of(ProxyMap::Use use) const;
   nlohmann::ordered_json materials_of(const ProxyMapChoice& choice) const;
   std::string entry_;
-  std::string json_;            // of the file, without its mesh
+  std::string json_;  // of the file, without its mesh
   std::vector<Mesh> meshes_;
   std::vector<ProxyMap> maps_;  // by image of the file
 };

@@ -186,7 +186,8 @@ class ProxySearch {
     const auto key = std::tuple(trial.maps.data, trial.maps.normal, trial.mesh, trial.bits);
     const auto found = files_.find(key);
     if (found != files_.end()) return found->second;
-    return files_.emplace(key, parts.file(trial.maps, trial.mesh, steps_of(parts, trial.bits), source_.context))
+    return files_
+        .emplace(key, parts.file(trial.maps, trial.mesh, steps_of(parts, trial.bits), source_.context))
         .first->second;
   }
 

@@ -11,7 +11,7 @@ namespace {
 // Draco's meshes of the scans that docs/figures.md lists, within 20 %.
 constexpr double kBytesPerWedge = 4, kBytesPerTriangle = 0.6;
 constexpr double kBitsPerTexel = 1.2;  // of a JPEG of middle quality, the texels of the whole image
-constexpr double kFrameBytes = 2500, kPictureBytes = 600;  // of a file without mesh and texels
+constexpr double kFrameBytes = 2500, kPictureBytes = 600;    // of a file without mesh and texels
 constexpr std::array<double, 3> kMeshShares{0.6, 0.4, 0.8};  // likely winners first
 
 double mesh_bytes(const NestedScales& scales, std::size_t index, std::vector<std::uint8_t>& used) {

@@ -46,8 +46,8 @@ void PackingGrid::forbid_run(const std::uint64_t* taken, const ChartMask::Run& r
 
 /// False where a run finds no gap of its length.
 bool PackingGrid::may_hold(std::span<const ChartMask::Run> runs, std::uint32_t y) const {
-  return std::ranges::all_of(
-      runs, [&](const ChartMask::Run& run) { return run.count <= gaps_[y + run.row]; });
+  return std::ranges::all_of(runs,
+                             [&](const ChartMask::Run& run) { return run.count <= gaps_[y + run.row]; });
 }
 
 std::uint32_t PackingGrid::widest_gap(std::uint32_t y) {

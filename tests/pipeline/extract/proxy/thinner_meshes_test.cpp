@@ -24,7 +24,8 @@ std::set<Corner> corners_of(const Mesh& mesh) {
 
 TEST(ThinnerMeshes, EachHasFewerTrianglesOfTheSameAtlas) {
   Mesh mesh = testing::bumpy_sphere(30, 60);
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) mesh.triangle_material[t] = 2 * t < mesh.triangles.size();
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+    mesh.triangle_material[t] = 2 * t < mesh.triangles.size();
   const std::vector<Mesh> meshes = thinner_meshes(mesh, {});
   ASSERT_EQ(meshes.size(), 8u);
   EXPECT_EQ(meshes[0], mesh);
