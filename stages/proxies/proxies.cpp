@@ -27,6 +27,8 @@ constexpr double kFirstMeshShare = 0.7, kMeshShare = 0.65, kLargeMeshShare = 0.5
 constexpr int kFineFrom = 100000, kNormalMapPaysFrom = 100000;  // bytes
 constexpr int kFirstBits = 10, kBits = 11, kFineBits = 12;      // of positions
 constexpr double kOverAsked = 1.02, kMostOfSource = 0.15;
+// Of the first size: what Draco, which scales are coded by, needs for the same picture.
+constexpr double kFirstShare = 0.55;
 
 /// Source textures need not be finer than what a proxy and the pictures show of them.
 std::uint32_t least_side_px(const std::vector<Material>& materials) {
@@ -129,7 +131,7 @@ class ProxyRun {
       note_none(out.notes, bytes, "the whole object takes fewer");
       return false;
     }
-    const bool loses = loses_to_scale(made->proxy.glb.size(), best.flip.mean(), context);
+    const bool loses = loses_to_scale(made->proxy.glb.size(), first, best.flip.mean(), context);
     if (loses && !first) {
       note_none(out.notes, bytes, kScaleWins);
       return true;
@@ -164,10 +166,10 @@ class ProxyRun {
     if (!best.made || flip.mean() * worth < best.flip.mean()) best = {std::move(made), form, flip};
   }
 
-  bool loses_to_scale(std::uint64_t bytes, double flip, const RunContext& context) {
+  bool loses_to_scale(std::uint64_t bytes, bool first, double flip, const RunContext& context) {
     if (mode_ != ProxyMode::kAuto) return false;
-    const auto rival = rival_flip(scales_, shown_, bytes, studio_, context);
-    return rival && *rival <= flip;
+    const double rival_bytes = (first ? kFirstShare : 1) * static_cast<double>(bytes);
+    return rival_wins(scales_, shown_, static_cast<std::uint64_t>(rival_bytes), flip, studio_, context);
   }
 
   /// FLIP likes facets of a smooth object even where they are large (a bust's .107 for .115 at 20 kB); who

@@ -10,7 +10,7 @@
 
 namespace texmesh {
 
-inline constexpr int kProxiesVersion = 3;
+inline constexpr int kProxiesVersion = 4;
 
 /// kAuto: only those that beat what the source's atlas gives for the same bytes.
 enum class ProxyMode : std::uint8_t { kNone, kAuto, kAlways };
@@ -48,8 +48,9 @@ struct ProxiesOptions {
 /// - Losses: FLIP of lit pictures beside S_0's (stages/render in the studio's light) at three displayed
 ///   heights, where the height is that of the bounding box's longest side.
 /// - Automatic choice: a size at which a scale with the source's atlas looks better is left out, each size by
-///   itself; but the smallest proxy stays where a larger one does, which clients cannot show at once. All of
-///   them take at most 15 % of the source: of its images' files and of S_0's mesh, coded.
+///   itself. The smallest one is compared with scales of 55 % of its bytes, in which Draco codes as much, and
+///   it stays where a larger one does, which clients cannot show at once. All of them take at most 15 % of
+///   the source: of its images' files and of S_0's mesh, coded.
 /// Sizes that get no proxy have a note that says why; no model fails because of its proxies. `pixels` are
 /// fill_planes()'s. Same bytes for any thread count and machine.
 Proxies make_proxies(const NestedScales& scales, const std::vector<Material>& materials,

@@ -11,6 +11,7 @@
 #include "format/split/split_stream.h"
 #include "pipeline/extract/glb/glb_chunks.h"
 #include "pipeline/extract/glb/texture_source.h"
+#include "pipeline/extract/proxy/thinner_meshes.h"
 #include "pipeline/import/import.h"
 #include "pipeline/io/file_resolver.h"
 #include "stages/gltf/glb_container.h"
@@ -189,10 +190,11 @@ std::optional<ProxyParts> ProxyParts::read(std::span<const std::uint8_t> glb, co
   if (!chunks.root.contains("materials")) return std::nullopt;
   out.maps_ = maps_in(chunks.root, chunks.binary);
   NoFiles none;
-  out.model_ = import_gltf(entry, glb, none, {}, context).model;
-  if (!is_simple(chunks.root, out.maps_) || out.model_.materials.size() != chunks.root["materials"].size() ||
-      !bake_texture_scale(chunks.root, out.model_.mesh))
+  Model model = import_gltf(entry, glb, none, {}, context).model;
+  if (!is_simple(chunks.root, out.maps_) || model.materials.size() != chunks.root["materials"].size() ||
+      !bake_texture_scale(chunks.root, model.mesh))
     return std::nullopt;
+  out.meshes_ = thinner_meshes(model.mesh, context);
   for (const char* list : {"bufferViews", "accessors", "meshes", "buffers"}) chunks.root.erase(list);
   out.json_ = chunks.root.dump();
   return out;
@@ -203,7 +205,7 @@ const ProxyMap* ProxyParts::map_of(ProxyMap::Use use) const {
   return found == maps_.end() ? nullptr : &*found;
 }
 
-double ProxyParts::extent() const { return side_of_box(model_.mesh); }
+double ProxyParts::extent() const { return side_of_box(meshes_.front()); }
 
 Json ProxyParts::materials_of(const ProxyMapChoice& choice) const {
   Json root = Json::parse(json_);
@@ -217,9 +219,9 @@ Json ProxyParts::materials_of(const ProxyMapChoice& choice) const {
   return root;
 }
 
-StandaloneGlb ProxyParts::file(const ProxyMapChoice& choice, const DracoSteps& steps,
+StandaloneGlb ProxyParts::file(const ProxyMapChoice& choice, std::size_t mesh, const DracoSteps& steps,
                                const RunContext& context) const {
-  StandaloneGlb coded = uncoded(model_.mesh, entry_);
+  StandaloneGlb coded = uncoded(meshes_.at(mesh), entry_);
   coded.recode(steps, nullptr, context);
   GlbChunks chunks = glb_chunks(coded.finish(), entry_);
   Json root = materials_of(choice);
@@ -237,7 +239,7 @@ StandaloneGlb ProxyParts::file(const ProxyMapChoice& choice, const DracoSteps& s
   for (const Json& m : root["materials"])
     if (m.contains("extensions") && chunks.root["extensionsUsed"].size() == 1)
       chunks.root["extensionsUsed"].push_back("KHR_materials_unlit");
-  const Vec3d origin = model_.mesh.origin;
+  const Vec3d origin = meshes_.front().origin;
   if (!(origin == Vec3d{})) chunks.root["nodes"][0]["translation"] = {origin.x, origin.y, origin.z};
   return {glb_container(chunks.root.dump(), chunks.binary), entry_};
 }

@@ -30,8 +30,8 @@ struct ProxyMapChoice {
   friend bool operator==(const ProxyMapChoice&, const ProxyMapChoice&) = default;
 };
 
-/// A proxy taken apart, for files that are smaller: its mesh coded coarser, its pictures smaller or of less
-/// quality, maps left out.
+/// A proxy taken apart, for files that are smaller: of fewer triangles, its mesh coded coarser, its pictures
+/// smaller or of less quality, maps left out.
 class ProxyParts {
  public:
   /// Nothing for a proxy that this cannot be done with: of several nodes, with extensions of materials, with
@@ -42,11 +42,15 @@ class ProxyParts {
 
   bool has(ProxyMap::Use use) const { return map_of(use) != nullptr; }
   double extent() const;  // longest side of the mesh's box, object units; above 0
+  /// How many meshes there are to choose from: the proxy's own and, behind it, thinner_meshes().
+  std::size_t mesh_count() const { return meshes_.size(); }
+  std::uint64_t triangles(std::size_t mesh) const { return meshes_[mesh].triangles.size(); }
 
-  /// The proxy with its mesh as KHR_draco_mesh_compression of these steps and without the maps that are not
-  /// chosen; image k is "texture/k" and holds one texel. Without the map of data, roughness and metal are its
-  /// means. Same bytes for any thread count.
-  StandaloneGlb file(const ProxyMapChoice& choice, const DracoSteps& steps, const RunContext& context) const;
+  /// The proxy with one of its meshes as KHR_draco_mesh_compression of these steps and without the maps that
+  /// are not chosen; image k is "texture/k" and holds one texel. Without the map of data, roughness and metal
+  /// are its means. Same bytes for any thread count.
+  StandaloneGlb file(const ProxyMapChoice& choice, std::size_t mesh, const DracoSteps& steps,
+                     const RunContext& context) const;
   /// The pictures of such a file, by k. Without the map of data, half of its occlusion is multiplied into the
   /// base colour, as the stage does it.
   std::vector<ProxyMap> maps(const ProxyMapChoice& choice) const;
@@ -56,8 +60,8 @@ class ProxyParts {
   const ProxyMap* map_of(ProxyMap::Use use) const;
   nlohmann::ordered_json materials_of(const ProxyMapChoice& choice) const;
   std::string entry_;
-  std::string json_;            // of the file, without its mesh
-  Model model_;                 // its mesh
+  std::string json_;  // of the file, without its mesh
+  std::vector<Mesh> meshes_;
   std::vector<ProxyMap> maps_;  // by image of the file
 };
 

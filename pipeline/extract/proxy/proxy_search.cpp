@@ -23,8 +23,9 @@ namespace {
 struct MeshBits {
   int position, uv, normal;
 };
-constexpr MeshBits kMeshBits[] = {{10, 10, 7}, {11, 11, 7}, {12, 12, 8}};
-constexpr int kUsualBits = 1, kFinestBits = 2;
+constexpr MeshBits kMeshBits[] = {{8, 8, 5}, {9, 9, 5}, {9, 9, 6}, {10, 10, 7}, {11, 11, 7}, {12, 12, 8}};
+constexpr int kUsualBits = 3, kFinestBits = 5;
+constexpr double kMostMesh = 0.7;  // of the bytes, of the mesh that is tried first
 constexpr double kShareStep = 0.75, kLeastProxyShare = 0.15;
 constexpr double kPoorQuality = 15;  // pictures get smaller before they get worse
 constexpr double kNormalQualityAbove = 10, kDataQualityBelow = 5;  // as the stage codes them
@@ -34,6 +35,7 @@ constexpr double kNearlyAll = 0.99;
 /// A way to make a file of a proxy.
 struct ProxyTrial {
   ProxyMapChoice maps;
+  std::size_t mesh = 0;
   int bits = kUsualBits;
   double share = 1;
   FileImage format = FileImage::kWebp;
@@ -115,6 +117,10 @@ class ProxySearch {
     files_.clear();
     ProxyTrial trial;
     if (source_.request.images == ExtractImages::kJpeg) trial.format = FileImage::kJpeg;
+    const double most = kMostMesh * static_cast<double>(source_.request.bytes);
+    while (trial.mesh + 1 < parts->mesh_count() &&
+           static_cast<double>(coded(*parts, trial).finish().size()) > most)
+      ++trial.mesh;
     Extracted file = whole;
     while (!make(*parts, trial, file) && trial.share * kShareStep > kLeastProxyShare)
       trial.share *= kShareStep;
@@ -134,12 +140,16 @@ class ProxySearch {
       for (const ProxyTrial& next : other_maps(*parts, trial)) again |= try_next(next);
       for (const double step : {kShareStep, 1 / kShareStep})
         while (try_next(resized(trial, step))) again = true;
+      while (trial.mesh + 1 < parts->mesh_count() && try_next(with_mesh(trial, trial.mesh + 1))) again = true;
+      while (trial.mesh > 0 && try_next(with_mesh(trial, trial.mesh - 1))) again = true;
       for (const int bits : {trial.bits - 1, trial.bits + 1})
-        if (bits >= 0 && bits <= kFinestBits)
-          again |= try_next({trial.maps, bits, trial.share, trial.format});
+        if (bits >= 0 && bits <= kFinestBits) again |= try_next(with_bits(trial, bits));
     }
-    if (source_.request.images == ExtractImages::kAuto)
-      try_next({trial.maps, trial.bits, trial.share, FileImage::kJpeg});
+    if (source_.request.images == ExtractImages::kAuto) {
+      ProxyTrial jpeg = trial;
+      jpeg.format = FileImage::kJpeg;
+      try_next(jpeg);
+    }
     offer(std::move(file));
   }
 
@@ -148,12 +158,21 @@ class ProxySearch {
     return trial;
   }
 
+  static ProxyTrial with_mesh(ProxyTrial trial, std::size_t mesh) {
+    trial.mesh = mesh;
+    return trial;
+  }
+  static ProxyTrial with_bits(ProxyTrial trial, int bits) {
+    trial.bits = bits;
+    return trial;
+  }
+
   static std::vector<ProxyTrial> other_maps(const ProxyParts& parts, const ProxyTrial& from) {
     std::vector<ProxyTrial> out;
     const bool has_data = parts.has(ProxyMap::Use::kData), has_normal = parts.has(ProxyMap::Use::kNormal);
     for (const ProxyMapChoice choice : {ProxyMapChoice{true, false}, {false, true}, {false, false}})
       if ((choice.data || has_data) && (choice.normal || has_normal))
-        out.push_back({choice, from.bits, from.share, from.format});
+        out.push_back({choice, from.mesh, from.bits, from.share, from.format});
     return out;
   }
 
@@ -164,10 +183,11 @@ class ProxySearch {
   }
 
   const StandaloneGlb& coded(const ProxyParts& parts, const ProxyTrial& trial) {
-    const auto key = std::tuple(trial.maps.data, trial.maps.normal, trial.bits);
+    const auto key = std::tuple(trial.maps.data, trial.maps.normal, trial.mesh, trial.bits);
     const auto found = files_.find(key);
     if (found != files_.end()) return found->second;
-    return files_.emplace(key, parts.file(trial.maps, steps_of(parts, trial.bits), source_.context))
+    return files_
+        .emplace(key, parts.file(trial.maps, trial.mesh, steps_of(parts, trial.bits), source_.context))
         .first->second;
   }
 
@@ -216,6 +236,7 @@ class ProxySearch {
     draft.set_images(pictures(maps, trial, best, out.images));
     out.glb = files.contains(best) ? files[best] : file_at(best);
     out.mesh_bytes = out.glb.size();
+    out.triangles = parts.triangles(trial.mesh);
     for (const ExtractedImage& i : out.images) out.mesh_bytes -= i.bytes;
     if (!fits(out)) return false;
     measure(draft.finish(), out);
@@ -225,7 +246,7 @@ class ProxySearch {
   BudgetSource& source_;
   std::map<std::uint32_t, double>& whole_;
   Extracted& best_;
-  std::map<std::tuple<bool, bool, int>, StandaloneGlb> files_;  // of one proxy: maps and bits
+  std::map<std::tuple<bool, bool, std::size_t, int>, StandaloneGlb> files_;  // of one proxy: maps, mesh, bits
 };
 
 }  // namespace

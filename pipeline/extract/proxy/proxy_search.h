@@ -18,9 +18,9 @@ class ProxyOffers {
 
   /// Replaces `found`, a file of a scale for source.request.bytes, by one of a proxy where that one's whole
   /// lit pictures are nearer to the package's best, or where only that one keeps within the bytes. A proxy of
-  /// too many bytes gets its mesh coded by Draco, its pictures smaller or coded anew, and maps left out,
-  /// until it fills the bytes. `found` stays where a scale, levels of detail or PNG is asked for. Same bytes
-  /// for any thread count.
+  /// too many bytes gets fewer triangles, its mesh coded by Draco, its pictures smaller or coded anew, and
+  /// maps left out, until it fills the bytes. `found` stays where a scale, levels of detail or PNG is asked
+  /// for. Same bytes for any thread count.
   void offer(Extracted& found);
 
  private:

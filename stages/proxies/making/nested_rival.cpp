@@ -11,8 +11,8 @@ namespace {
 // Draco's meshes of the scans that docs/figures.md lists, within 20 %.
 constexpr double kBytesPerWedge = 4, kBytesPerTriangle = 0.6;
 constexpr double kBitsPerTexel = 1.2;  // of a JPEG of middle quality, the texels of the whole image
-constexpr double kFrameBytes = 2500, kPictureBytes = 600;  // of a file without mesh and texels
-constexpr std::array<double, 3> kMeshShares{0.4, 0.6, 0.8};
+constexpr double kFrameBytes = 2500, kPictureBytes = 600;    // of a file without mesh and texels
+constexpr std::array<double, 3> kMeshShares{0.6, 0.4, 0.8};  // likely winners first
 
 double mesh_bytes(const NestedScales& scales, std::size_t index, std::vector<std::uint8_t>& used) {
   used.assign(scales.mesh.wedge_count(), 0);
@@ -60,15 +60,14 @@ bool whole_mesh_is_small(const NestedScales& scales, std::uint64_t bytes) {
   return whole_mesh_bytes(scales) <= share * static_cast<double>(bytes);
 }
 
-std::optional<double> rival_flip(const NestedScales& scales, const ShownMaterials& shown, std::uint64_t bytes,
-                                 ProxyStudio& studio, const RunContext& context) {
+bool rival_wins(const NestedScales& scales, const ShownMaterials& shown, std::uint64_t bytes, double flip,
+                ProxyStudio& studio, const RunContext& context) {
   const double all = std::max(0.0, static_cast<double>(bytes) - kFrameBytes -
                                        kPictureBytes * static_cast<double>(shown.textures.size()));
   std::vector<std::uint8_t> used;
   std::vector<double> cost;
   for (std::size_t k = 0; k < scales.scales.size(); ++k) cost.push_back(mesh_bytes(scales, k, used));
   std::vector<std::size_t> tried;
-  std::optional<double> best;
   for (const double share : kMeshShares) {
     const auto found = std::ranges::find_if(cost, [&](double mesh) { return mesh <= share * all; });
     const auto index = static_cast<std::size_t>(found - cost.begin());
@@ -77,10 +76,9 @@ std::optional<double> rival_flip(const NestedScales& scales, const ShownMaterial
     const Mesh mesh = lit_scale(scales, index, context);
     const std::vector<RenderTexture> textures = affordable(shown.textures, all - cost[index]);
     const RenderScene scene = render_scene(mesh, shown.materials, textures.size());
-    const double flip = studio.compare(scene, textures, ProxyStudio::kMiddle, context).mean();
-    if (!best || flip < *best) best = flip;
+    if (studio.compare(scene, textures, ProxyStudio::kMiddle, context).mean() <= flip) return true;
   }
-  return best;
+  return false;
 }
 
 }  // namespace texmesh::proxies

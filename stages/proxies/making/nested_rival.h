@@ -1,17 +1,15 @@
 #pragma once
 // Inside the room only: what a nested scale with the source's atlas looks like for the bytes of a proxy.
-#include <optional>
-
 #include "stages/data/nested_scales.h"
 #include "stages/proxies/measure/proxy_studio.h"
 
 namespace texmesh::proxies {
 
-/// Mean FLIP at the studio's middle height of the best nested scale, with textures, that so many bytes buy;
-/// nothing where even the coarsest mesh does not fit. Bytes are estimated, and textures are those of the mip
-/// that fits, without losses of coding: the rival is a little better than the real one.
-std::optional<double> rival_flip(const NestedScales& scales, const ShownMaterials& shown, std::uint64_t bytes,
-                                 ProxyStudio& studio, const RunContext& context);
+/// Whether a nested scale with textures that so many bytes buy has at most this mean FLIP at the studio's
+/// middle height. Bytes are estimated, and textures are those of the mip that fits, without losses of coding:
+/// the rival is a little better than the real one.
+bool rival_wins(const NestedScales& scales, const ShownMaterials& shown, std::uint64_t bytes, double flip,
+                ProxyStudio& studio, const RunContext& context);
 
 /// Bytes of S_0's whole mesh, coded; within 20 % for scans.
 double whole_mesh_bytes(const NestedScales& scales);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cstddef>
+#include <functional>
 
 namespace texmesh {
 namespace {
@@ -29,6 +30,7 @@ PackingGrid::PackingGrid(std::uint32_t width, std::uint32_t height, std::uint32_
       gutter_(gutter),
       words_((width + 63) / 64),
       taken_(std::size_t{height} * words_, 0),
+      gaps_(height, width),
       forbidden_(words_),
       joined_(words_) {}
 
@@ -42,11 +44,26 @@ void PackingGrid::forbid_run(const std::uint64_t* taken, const ChartMask::Run& r
   join_moved(joined_.data(), forbidden_.data(), words_, run.first);
 }
 
+/// False where a run finds no gap of its length.
+bool PackingGrid::may_hold(std::span<const ChartMask::Run> runs, std::uint32_t y) const {
+  return std::ranges::all_of(runs,
+                             [&](const ChartMask::Run& run) { return run.count <= gaps_[y + run.row]; });
+}
+
+std::uint32_t PackingGrid::widest_gap(std::uint32_t y) {
+  std::uint32_t widest = 0, gap = 0;
+  for (std::uint32_t x = 0; x < width_; ++x) {
+    gap = row(y)[x / 64] >> x % 64 & 1 ? 0 : gap + 1;
+    widest = std::max(widest, gap);
+  }
+  return widest;
+}
+
 /// Whether places are left in the row.
-bool PackingGrid::forbid(const ChartMask& mask, std::uint32_t y) {
+bool PackingGrid::forbid(std::span<const ChartMask::Run> runs, std::uint32_t width, std::uint32_t y) {
   std::fill(forbidden_.begin(), forbidden_.end(), 0);
-  set_bits(forbidden_.data(), width_ - mask.width + 1, 64 * words_);
-  for (const ChartMask::Run& run : mask.runs) {
+  set_bits(forbidden_.data(), width_ - width + 1, 64 * words_);
+  for (const ChartMask::Run& run : runs) {
     forbid_run(row(y + run.row), run);
     if (std::all_of(forbidden_.begin(), forbidden_.end(), [](std::uint64_t w) { return w == ~0ull; }))
       return false;
@@ -56,8 +73,10 @@ bool PackingGrid::forbid(const ChartMask& mask, std::uint32_t y) {
 
 std::optional<PackingGrid::Place> PackingGrid::first_free(const ChartMask& mask, std::uint32_t last_row) {
   if (mask.width > width_ || mask.height > height_) return std::nullopt;
+  std::vector<ChartMask::Run> runs = mask.runs;  // long ones forbid most
+  std::ranges::stable_sort(runs, std::greater(), &ChartMask::Run::count);
   for (std::uint32_t y = 0; y <= std::min(last_row, height_ - mask.height); ++y) {
-    if (!forbid(mask, y)) continue;
+    if (!may_hold(runs, y) || !forbid(runs, mask.width, y)) continue;
     for (std::uint32_t w = 0; w < words_; ++w)
       if (forbidden_[w] != ~0ull)
         return Place{64 * w + static_cast<std::uint32_t>(std::countr_one(forbidden_[w])), y};
@@ -72,6 +91,8 @@ void PackingGrid::take(const ChartMask& mask, Place place) {
     for (std::uint32_t r = y - std::min(y, gutter_); r < std::min(height_, y + gutter_ + 1); ++r)
       set_bits(row(r), first, end);
   }
+  const std::uint32_t end = std::min(height_, place.y + mask.height + gutter_);
+  for (std::uint32_t r = place.y - std::min(place.y, gutter_); r < end; ++r) gaps_[r] = widest_gap(r);
 }
 
 }  // namespace texmesh

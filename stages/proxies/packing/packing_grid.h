@@ -2,6 +2,7 @@
 // Inside proxies only: which cells of a texture are taken.
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "stages/proxies/packing/chart_mask.h"
@@ -24,12 +25,15 @@ class PackingGrid {
   void take(const ChartMask& mask, Place place);
 
  private:
-  bool forbid(const ChartMask& mask, std::uint32_t y);
+  bool may_hold(std::span<const ChartMask::Run> runs, std::uint32_t y) const;
+  bool forbid(std::span<const ChartMask::Run> runs, std::uint32_t width, std::uint32_t y);
   void forbid_run(const std::uint64_t* taken, const ChartMask::Run& run);
+  std::uint32_t widest_gap(std::uint32_t y);
   std::uint64_t* row(std::uint32_t y) { return &taken_[std::size_t{y} * words_]; }
 
   std::uint32_t width_, height_, gutter_, words_;
   std::vector<std::uint64_t> taken_;               // rows of words; bit x % 64 of word x / 64
+  std::vector<std::uint32_t> gaps_;                // per row: free cells side by side, at most
   std::vector<std::uint64_t> forbidden_, joined_;  // one row each
 };
 

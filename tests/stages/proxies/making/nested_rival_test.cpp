@@ -43,21 +43,23 @@ TEST(WholeMesh, OfAnAtlasInPiecesIsSmallLater) {
   EXPECT_TRUE(whole_mesh_is_small(scales, static_cast<std::uint64_t>(7 * bytes)));
 }
 
-struct RivalFlip : ::testing::Test {
+struct RivalWins : ::testing::Test {
   NestedScales scales = alone(testing::bumpy_sphere(20, 40));
   ShownMaterials shown{{RenderMaterial{}}, {}};
   ProxyStudio studio{scales.mesh, shown, {}};
 };
 
-TEST_F(RivalFlip, IsZeroWhereTheWholeMeshFits) {
-  const auto flip = rival_flip(scales, shown, 30000, studio, {});
-  ASSERT_TRUE(flip);
-  EXPECT_EQ(*flip, 0);
+TEST_F(RivalWins, WithoutAnyLossWhereTheWholeMeshFits) {
+  EXPECT_TRUE(rival_wins(scales, shown, 30000, 0, studio, {}));
 }
 
-TEST_F(RivalFlip, IsNothingWhereNoScaleFits) {
-  EXPECT_FALSE(rival_flip(scales, shown, 4000, studio, {}));
-  EXPECT_FALSE(rival_flip(scales, shown, 0, studio, {}));
+TEST_F(RivalWins, NeverWhereItsPicturesAreFartherOff) {
+  EXPECT_FALSE(rival_wins(scales, shown, 30000, -1e-9, studio, {}));
+}
+
+TEST_F(RivalWins, NeverWhereNoScaleFits) {
+  EXPECT_FALSE(rival_wins(scales, shown, 4000, 1, studio, {}));
+  EXPECT_FALSE(rival_wins(scales, shown, 0, 1, studio, {}));
 }
 
 }  // namespace
