@@ -115,7 +115,8 @@ BlockCoverage CoveredTexels::block(SampleFactors factors, std::uint32_t left, st
   const std::uint32_t begin = reach_begin(left, factors.across);
   const std::uint32_t last = reach_end(left + 7, factors.across, width_px_) - 1;
   bool all = true, any = false;
-  for (std::uint32_t y = reach_begin(top, factors.down); y < reach_end(top + 7, factors.down, height_px_); ++y)
+  for (std::uint32_t y = reach_begin(top, factors.down); y < reach_end(top + 7, factors.down, height_px_);
+       ++y)
     for (std::uint32_t k = begin / 8; k <= last / 8; ++k) {
       unsigned mask = 0xff;
       if (k == begin / 8) mask &= 0xffu >> begin % 8;

@@ -49,9 +49,9 @@ class MaskedJpeg {
                   std::span<const MaskedRung> rungs, std::span<Sink> sinks);
 
   JpegKind kind_;
-  bool halved_;                                // chroma
-  std::vector<std::size_t> pairs_;             // of Huffman tables, by component
-  std::vector<SamplePlane> components_;        // level shift taken off
+  bool halved_;                          // chroma
+  std::vector<std::size_t> pairs_;       // of Huffman tables, by component
+  std::vector<SamplePlane> components_;  // level shift taken off
   CoveredTexels covered_;
   std::array<CoveredBlocks, 2> blocks_;        // of samples; of those of halved chroma
   std::vector<std::array<int, 3>> dc_before_;  // [rung][component]
