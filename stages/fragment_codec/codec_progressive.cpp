@@ -95,7 +95,7 @@ class ProgressiveCodec : public TextureCodec {
       JpegCoder coder(jpeg_kind(plane_, middle));
       double sum = 0;
       for (const PixelWindow& window : sample)
-        sum += squared_error(window, decode_jpeg(coder.complete(window), area(window)));
+        sum += squared_error(window, decode_jpeg(coder.complete_as_is(window), area(window)));
       if (sum <= error)
         high = middle;
       else

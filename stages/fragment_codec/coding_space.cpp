@@ -44,12 +44,13 @@ struct RateCurve {
 
 /// The length between two vectors' ends on the unit sphere: their angle where it is small.
 double chord(const std::uint8_t* a, const std::uint8_t* b) {
-  double aa = 0, bb = 0, ab = 0;
+  if (a[0] == b[0] && a[1] == b[1] && a[2] == b[2]) return 0;
+  int aa = 0, bb = 0, ab = 0;
   for (int c = 0; c < 3; ++c) {
-    const double x = 2.0 * a[c] - 255, y = 2.0 * b[c] - 255;
+    const int x = 2 * a[c] - 255, y = 2 * b[c] - 255;
     aa += x * x, bb += y * y, ab += x * y;
   }
-  const double cosine = ab / std::sqrt(aa * bb);  // 255 is odd, so that no vector is 0
+  const double cosine = ab / std::sqrt(static_cast<double>(aa) * bb);  // 255 is odd, so that no vector is 0
   return std::sqrt(std::max(0.0, 2 - 2 * cosine));
 }
 
@@ -87,7 +88,7 @@ RateCurve measure(DataKind kind, const CodingSpace& space, std::span<const Pixel
       double sum = 0;
       for (const PixelWindow& window : windows.subspan(begin, end - begin)) {
         const std::uint64_t area = std::uint64_t{window.width_px} * window.height_px;
-        sum += error_of(kind, window, decode_jpeg(coder.complete(window), area));
+        sum += error_of(kind, window, decode_jpeg(coder.complete_as_is(window), area));
       }
       return sum;
     });

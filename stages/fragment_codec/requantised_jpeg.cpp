@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cstdlib>
+#include <cstring>
 #include <utility>
 
 #include "stages/jpeg/jpeg_samples.h"
@@ -17,114 +18,85 @@ constexpr int kLeastDc = -1024, kMostDc = 1023, kMostAcBits = 10;
 // Of coefficients that samples of 8 bits can have. A hostile file says more, and no decoder shows it.
 constexpr float kLargestCoefficient = 1023;
 
+/// Bit n: coefficient n is not 0.
+std::uint64_t nonzero(const std::int16_t* coefficients) {
+  std::uint64_t out = 0;
+  for (std::size_t n = 0; n < 64; n += 4) {
+    std::uint64_t four;
+    std::memcpy(&four, coefficients + n, sizeof four);
+    if (four == 0) continue;
+    for (std::size_t k = n; k < n + 4; ++k) out |= std::uint64_t{coefficients[k] != 0} << k;
+  }
+  return out;
+}
+
 int bits_of(int value) { return std::bit_width(static_cast<unsigned>(std::abs(value))); }
-
-/// A row or column of `count` samples becomes one of count / factor by a triangle of twice the factor's
-/// width, which is how decoders interpolate; outermost samples are repeated. `at` gives a sample by its
-/// place.
-template <class At>
-float triangle_mean(std::uint32_t place, std::uint32_t factor, std::uint32_t count, const At& at) {
-  if (factor == 1) return at(place);
-  float sum = 0;
-  for (std::uint32_t d = 0; d < 2 * factor; ++d) {
-    const std::int64_t from = std::int64_t{place} * factor - factor / 2 + d;
-    const auto inside = static_cast<std::uint32_t>(std::clamp<std::int64_t>(from, 0, count - 1));
-    sum += static_cast<float>(std::min(2 * d + 1, 4 * factor - 2 * d - 1)) * at(inside);
-  }
-  return sum / static_cast<float>(2 * factor * factor);
-}
-
-/// What interpolation of covered texels takes from each sample of a component; 1 where they all are covered.
-void weigh(const SamplePlane& covered, std::uint32_t across, std::uint32_t down, SamplePlane& out) {
-  SamplePlane rows{covered.width / across, covered.height, {}};
-  rows.values.resize(std::size_t{rows.width} * rows.height);
-  for (std::uint32_t y = 0; y < rows.height; ++y) {
-    const float* from = covered.values.data() + std::size_t{y} * covered.width;
-    for (std::uint32_t x = 0; x < rows.width; ++x)
-      rows.values[std::size_t{y} * rows.width + x] =
-          triangle_mean(x, across, covered.width, [&](std::uint32_t k) { return from[k]; });
-  }
-  out.width = rows.width, out.height = covered.height / down;
-  out.values.resize(std::size_t{out.width} * out.height);
-  for (std::uint32_t y = 0; y < out.height; ++y)
-    for (std::uint32_t x = 0; x < out.width; ++x)
-      out.values[std::size_t{y} * out.width + x] = triangle_mean(y, down, rows.height, [&](std::uint32_t k) {
-        return rows.values[std::size_t{k} * rows.width + x];
-      });
-}
-
-/// Means of across x down samples.
-void shrink(SamplePlane& plane, std::uint32_t across, std::uint32_t down) {
-  if (across * down == 1) return;
-  SamplePlane out{plane.width / across, plane.height / down, {}};
-  for (std::uint32_t y = 0; y < out.height; ++y)
-    for (std::uint32_t x = 0; x < out.width; ++x) {
-      float sum = 0;
-      for (std::uint32_t v = 0; v < down; ++v)
-        for (std::uint32_t u = 0; u < across; ++u)
-          sum += plane.values[std::size_t{y * down + v} * plane.width + x * across + u];
-      out.values.push_back(sum / static_cast<float>(across * down));
-    }
-  plane = std::move(out);
-}
 
 }  // namespace
 
 struct RequantisedJpeg::Seen {
   BlockCoverage coverage = BlockCoverage::kAll;
-  BlockValues coefficients{};       // of kAll and kPart
+  BlockValues coefficients;         // of kAll and kPart, where a rung chooses coefficients
   float level = 0, same_level = 0;  // of kNothing
 };
 
 RequantisedJpeg::RequantisedJpeg(const JpegCoefficients& source, const SourceLayout& layout)
-    : source_(source),
-      layout_(layout),
-      weights_(layout.components.size()),
-      filled_(layout.components.size()) {}
+    : source_(source), layout_(layout), blocks_(layout.components.size()) {}
+
+SampleFactors RequantisedJpeg::factors_of(std::size_t component) const {
+  const SourceLayout::Component& of = layout_.components[component];
+  return {layout_.most_across() / of.across, layout_.most_down() / of.down};
+}
 
 void RequantisedJpeg::load(const PixelWindow& window) {
   masked_ = !window.coverage.mask.empty();
   if (!masked_) return;
-  covered_.width = window.width_px, covered_.height = window.height_px;
-  covered_.values.clear();
-  for (std::uint32_t y = 0; y < window.height_px; ++y)
-    for (std::uint32_t x = 0; x < window.width_px; ++x)
-      covered_.values.push_back(window.coverage.covered(x, y) ? 1.0f : 0.0f);
-  for (std::size_t c = 0; c < layout_.components.size(); ++c) load_component(window, c);
+  covered_.load(window);
+  for (std::size_t c = 0; c < blocks_.size(); ++c) blocks_[c].load(covered_, factors_of(c));
 }
 
-void RequantisedJpeg::load_component(const PixelWindow& window, std::size_t component) {
-  const std::uint32_t across = layout_.most_across() / layout_.components[component].across;
-  const std::uint32_t down = layout_.most_down() / layout_.components[component].down;
-  weigh(covered_, across, down, weights_[component]);
+/// The window's pixels as samples of a component's block.
+BlockValues RequantisedJpeg::filled_block(const PixelWindow& window, std::size_t component,
+                                          std::uint32_t left, std::uint32_t top) {
+  const auto [across, down] = factors_of(component);
   JpegKind kind;
   kind.channels = static_cast<std::uint32_t>(layout_.components.size());
   kind.rgb = layout_.rgb;
-  filled_[component].width = window.width_px, filled_[component].height = window.height_px;
-  jpeg_samples(window, kind, component, filled_[component].values);
-  shrink(filled_[component], across, down);
+  PixelWindow part = window;
+  part.width_px = 8 * across, part.height_px = 8 * down;
+  part.data += std::size_t{top} * down * window.stride_bytes + std::size_t{left} * across * kind.channels;
+  jpeg_samples(part, kind, component, samples_);
+  BlockValues out;
+  for (std::uint32_t y = 0; y < 8; ++y)
+    for (std::uint32_t x = 0; x < 8; ++x) {
+      float sum = 0;
+      for (std::uint32_t v = 0; v < down; ++v)
+        for (std::uint32_t u = 0; u < across; ++u)
+          sum += samples_[(std::size_t{y} * down + v) * part.width_px + x * across + u];
+      out[8 * y + x] = sum / static_cast<float>(across * down);
+    }
+  return out;
 }
 
-RequantisedJpeg::Seen RequantisedJpeg::look(std::size_t component, std::uint32_t left, std::uint32_t top,
+RequantisedJpeg::Seen RequantisedJpeg::look(const PixelWindow& window, std::size_t component,
+                                            std::uint32_t left, std::uint32_t top,
                                             const std::int16_t* coefficients) {
   Seen out;
-  BlockValues weights;
-  if (masked_) {
-    weights = weights_[component].block(left, top);
-    out.coverage = coverage_of(weights);
-  }
+  if (masked_) out.coverage = blocks_[component].at(left, top);
   if (out.coverage == BlockCoverage::kNothing) {
-    out.level = mean_of(filled_[component].block(left, top));
-    out.same_level = same_level_at(weights_[component], left, top);
+    out.level = mean_of(filled_block(window, component, left, top));
+    out.same_level = blocks_[component].same_level_at(left, top);
     return out;
   }
+  if (exact_only_) return out;
   const auto& quantisers = source_.components()[component].quantisers;
   for (std::size_t k = 0; k < 64; ++k)
     out.coefficients[k] = std::clamp(static_cast<float>(coefficients[k] * quantisers[k]),
                                      -kLargestCoefficient, kLargestCoefficient);
-  if (out.coverage == BlockCoverage::kAll || exact_only_) return out;
+  if (out.coverage == BlockCoverage::kAll) return out;
   BlockValues samples = block_inverse_dct(out.coefficients);
-  const BlockValues filled = filled_[component].block(left, top);
+  BlockValues weights = covered_.weights(factors_of(component), left, top);
+  const BlockValues filled = filled_block(window, component, left, top);
   for (std::size_t k = 0; k < 64; ++k) {
     if (weights[k] == 0) samples[k] = filled[k];
     weights[k] = std::max(weights[k], kUncoveredWeight);
@@ -136,10 +108,12 @@ RequantisedJpeg::Seen RequantisedJpeg::look(std::size_t component, std::uint32_t
 CodedBlock RequantisedJpeg::exact_block(const std::int16_t* coefficients, int dc_before) {
   CodedBlock out;
   bool fits = coefficients[0] >= kLeastDc && coefficients[0] <= kMostDc;
-  for (std::size_t k = 0; k < 64; ++k) {
-    out.values[k] = coefficients[kNaturalOfZigzag[k]];
-    out.used |= std::uint64_t{out.values[k] != 0} << k;
-    fits = fits && (k == 0 || bits_of(out.values[k]) <= kMostAcBits);
+  for (std::uint64_t left = nonzero(coefficients); left != 0; left &= left - 1) {
+    const auto n = static_cast<std::size_t>(std::countr_zero(left));
+    const std::size_t k = kZigzagOfNatural[n];
+    out.values[k] = coefficients[n];
+    out.used |= std::uint64_t{1} << k;
+    fits = fits && (k == 0 || bits_of(coefficients[n]) <= kMostAcBits);
   }
   if (fits) return out;
   fits_ = false;  // nobody asks for the streams
@@ -159,7 +133,7 @@ void RequantisedJpeg::code_block(const PixelWindow& window, std::size_t componen
   const std::uint32_t image_row = window.coverage.top_px / layout_.mcu_height_px * of.down + row;
   const bool beyond = image_column >= of.blocks_across || image_row >= of.blocks_down;
   const std::int16_t* coefficients = beyond ? nullptr : source_.block(component, image_row, image_column);
-  const Seen seen = beyond ? Seen{} : look(component, left, top, coefficients);
+  const Seen seen = beyond ? Seen{} : look(window, component, left, top, coefficients);
   for (std::size_t r = 0; r < rungs.size(); ++r) {
     const BlockCoding& coding = rungs[r].coding[component];
     int& dc = dc_before_[r][component];

@@ -47,8 +47,11 @@ class RequantisedJpeg {
   /// A block as its rungs need it.
   struct Seen;
   void load(const PixelWindow& window);
-  void load_component(const PixelWindow& window, std::size_t component);
-  Seen look(std::size_t component, std::uint32_t left, std::uint32_t top, const std::int16_t* coefficients);
+  SampleFactors factors_of(std::size_t component) const;
+  BlockValues filled_block(const PixelWindow& window, std::size_t component, std::uint32_t left,
+                           std::uint32_t top);
+  Seen look(const PixelWindow& window, std::size_t component, std::uint32_t left, std::uint32_t top,
+            const std::int16_t* coefficients);
   template <class Sink>
   void code(const PixelWindow& window, std::span<const SourceRung> rungs, std::span<Sink> sinks);
   template <class Sink>
@@ -59,8 +62,9 @@ class RequantisedJpeg {
   const JpegCoefficients& source_;
   const SourceLayout& layout_;
   bool masked_ = false;                        // some of the window is not covered
-  SamplePlane covered_;                        // 0 or 1 by texel
-  std::vector<SamplePlane> weights_, filled_;  // of masked windows, by component
+  CoveredTexels covered_;                      // of masked windows, and so are
+  std::vector<CoveredBlocks> blocks_;          // by component
+  std::vector<float> samples_;                 // of one block's texels
   std::vector<std::array<int, 3>> dc_before_;  // [rung][component]
   MaskedBlock block_;
   bool exact_only_ = false;  // no rung chooses coefficients

@@ -23,8 +23,7 @@ class BitWriter {
     count_ += count;
     while (count_ >= 32) {
       count_ -= 32;
-      const auto word = static_cast<std::uint32_t>(held_ >> count_);
-      for (unsigned shift = 32; shift > 0;) write(static_cast<std::uint8_t>(word >> (shift -= 8)));
+      write_word(static_cast<std::uint32_t>(held_ >> count_));
     }
   }
   /// Fills the last byte with ones and cuts `out` to what was written.
@@ -40,6 +39,15 @@ class BitWriter {
 
  private:
   static constexpr std::size_t kMostHeldBytes = 8;  // 31 bits and the zeros behind them
+  void write_word(std::uint32_t word) {
+    const bool has_ff = ((~word - 0x01010101u) & word & 0x80808080u) != 0;
+    std::uint8_t* to = out_->data() + used_;
+    for (unsigned shift = 32; shift > 0;) {
+      *to++ = static_cast<std::uint8_t>(word >> (shift -= 8));
+      if (has_ff && to[-1] == 0xff) *to++ = 0;
+    }
+    used_ = static_cast<std::size_t>(to - out_->data());
+  }
   void write(std::uint8_t byte) {
     (*out_)[used_++] = byte;
     if (byte == 0xff) (*out_)[used_++] = 0;

@@ -1,5 +1,7 @@
 #include "stages/jpeg/block_scan.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 
@@ -18,14 +20,25 @@ constexpr float kLumaBitCost = 0.09f, kOtherBitCost = 0.05f;
 // beside them: 0.7 % more bytes.
 constexpr float kSameLevelBeside = 24, kSameLevel = 64;
 
-/// Whether a block or one of the eight around it has weight.
-bool beside_coverage(const SamplePlane& weights, std::uint32_t left, std::uint32_t top) {
-  const std::uint32_t right = std::min(left + 16, weights.width), bottom = std::min(top + 16, weights.height);
-  for (std::uint32_t y = top > 8 ? top - 8 : 0; y < bottom; ++y) {
-    const float* row = weights.values.data() + std::size_t{y} * weights.width;
-    if (std::any_of(row + (left > 8 ? left - 8 : 0), row + right, [](float w) { return w > 0; })) return true;
+/// The first texel that a place's triangle reaches, and one behind the last, within `count`.
+std::uint32_t reach_begin(std::uint32_t place, std::uint32_t factor) {
+  return place * factor - std::min(place * factor, factor / 2);
+}
+std::uint32_t reach_end(std::uint32_t place, std::uint32_t factor, std::uint32_t count) {
+  return std::min((place + 1) * factor + factor / 2, count);
+}
+
+/// A row or column of `count` samples becomes one of count / factor; `at` gives a sample by its place.
+template <class At>
+float triangle_mean(std::uint32_t place, std::uint32_t factor, std::uint32_t count, const At& at) {
+  if (factor == 1) return at(place);
+  float sum = 0;
+  for (std::uint32_t d = 0; d < 2 * factor; ++d) {
+    const std::int64_t from = std::int64_t{place} * factor - factor / 2 + d;
+    const auto inside = static_cast<std::uint32_t>(std::clamp<std::int64_t>(from, 0, count - 1));
+    sum += static_cast<float>(std::min(2 * d + 1, 4 * factor - 2 * d - 1)) * at(inside);
   }
-  return false;
+  return sum / static_cast<float>(2 * factor * factor);
 }
 
 }  // namespace
@@ -49,12 +62,6 @@ BlockCoding block_coding(BlockKind kind, const std::array<std::uint16_t, 64>& qu
   return coding;
 }
 
-BlockCoverage coverage_of(const BlockValues& weights) {
-  bool all = true, any = false;
-  for (const float w : weights) all &= w >= 1, any |= w > 0;
-  return all ? BlockCoverage::kAll : any ? BlockCoverage::kPart : BlockCoverage::kNothing;
-}
-
 float mean_of(const BlockValues& samples) {
   std::array<float, 8> sums{};
   for (std::size_t k = 0; k < 64; ++k) sums[k % 8] += samples[k];
@@ -70,8 +77,70 @@ BlockValues SamplePlane::block(std::uint32_t left, std::uint32_t top) const {
   return out;
 }
 
-float same_level_at(const SamplePlane& weights, std::uint32_t left, std::uint32_t top) {
-  return beside_coverage(weights, left, top) ? kSameLevelBeside : kSameLevel;
+void CoveredTexels::load(const PixelWindow& window) {
+  width_px_ = window.width_px, height_px_ = window.height_px;
+  const CoverageMask& mask = window.coverage.mask;
+  bits_.assign(std::size_t{height_px_} * (width_px_ / 8), mask.empty() ? 0xff : 0);
+  if (mask.empty()) return;
+  std::uint8_t* to = bits_.data();
+  for (std::uint32_t y = 0; y < height_px_; ++y)
+    for (std::uint32_t x = 0; x < width_px_; x += 8, ++to) {
+      const std::uint32_t u = window.coverage.left_px + x, v = window.coverage.top_px + y;
+      if (u % 8 == 0 && u + 8 <= mask.width_px && v < mask.height_px)
+        *to = mask.byte_at(u, v);
+      else
+        for (std::uint32_t k = 0; k < 8; ++k)
+          *to = static_cast<std::uint8_t>(*to << 1 | (window.coverage.covered(x + k, y) ? 1 : 0));
+    }
+}
+
+BlockValues CoveredTexels::weights(SampleFactors factors, std::uint32_t left, std::uint32_t top) const {
+  constexpr std::uint32_t kMostRows = 8 * 4 + 4;
+  const std::uint32_t first = reach_begin(top, factors.down);
+  const std::uint32_t end = reach_end(top + 7, factors.down, height_px_);
+  std::array<std::array<float, 8>, kMostRows> rows;
+  for (std::uint32_t y = first; y < end; ++y)
+    for (std::uint32_t x = 0; x < 8; ++x)
+      rows[y - first][x] =
+          triangle_mean(left + x, factors.across, width_px_, [&](std::uint32_t k) { return at(k, y); });
+  BlockValues out;
+  for (std::uint32_t y = 0; y < 8; ++y)
+    for (std::uint32_t x = 0; x < 8; ++x)
+      out[8 * y + x] = triangle_mean(top + y, factors.down, height_px_,
+                                     [&](std::uint32_t k) { return rows[k - first][x]; });
+  return out;
+}
+
+BlockCoverage CoveredTexels::block(SampleFactors factors, std::uint32_t left, std::uint32_t top) const {
+  const std::uint32_t begin = reach_begin(left, factors.across);
+  const std::uint32_t last = reach_end(left + 7, factors.across, width_px_) - 1;
+  bool all = true, any = false;
+  for (std::uint32_t y = reach_begin(top, factors.down); y < reach_end(top + 7, factors.down, height_px_);
+       ++y)
+    for (std::uint32_t k = begin / 8; k <= last / 8; ++k) {
+      unsigned mask = 0xff;
+      if (k == begin / 8) mask &= 0xffu >> begin % 8;
+      if (k == last / 8) mask &= 0xffu << (7 - last % 8);
+      const unsigned set = bits_[std::size_t{y} * (width_px_ / 8) + k] & mask;
+      all &= set == mask, any |= set != 0;
+    }
+  return all ? BlockCoverage::kAll : any ? BlockCoverage::kPart : BlockCoverage::kNothing;
+}
+
+void CoveredBlocks::load(const CoveredTexels& texels, SampleFactors factors) {
+  columns_ = texels.width_px() / (8 * factors.across), rows_ = texels.height_px() / (8 * factors.down);
+  blocks_.clear();
+  for (std::uint32_t row = 0; row < rows_; ++row)
+    for (std::uint32_t column = 0; column < columns_; ++column)
+      blocks_.push_back(texels.block(factors, 8 * column, 8 * row));
+}
+
+float CoveredBlocks::same_level_at(std::uint32_t left, std::uint32_t top) const {
+  const std::uint32_t column = left / 8, row = top / 8;
+  for (std::uint32_t v = row > 0 ? row - 1 : 0; v < std::min(row + 2, rows_); ++v)
+    for (std::uint32_t u = column > 0 ? column - 1 : 0; u < std::min(column + 2, columns_); ++u)
+      if (blocks_[std::size_t{v} * columns_ + u] != BlockCoverage::kNothing) return kSameLevelBeside;
+  return kSameLevel;
 }
 
 CodedBlock flat_block(float level, float same_level, const BlockCoding& coding, int dc_before) {

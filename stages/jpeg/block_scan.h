@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "format/base/bytes.h"
+#include "stages/image/pixel_window.h"
 #include "stages/jpeg/bit_writer.h"
 #include "stages/jpeg/huffman_table.h"
 #include "stages/jpeg/masked_block.h"
@@ -34,19 +35,60 @@ inline constexpr float kUncoveredWeight = 0.003f;
 
 /// How much of a block is covered, by the weights of its samples.
 enum class BlockCoverage : std::uint8_t { kNothing, kPart, kAll };
-BlockCoverage coverage_of(const BlockValues& weights);
 
 float mean_of(const BlockValues& samples);
 
-/// Samples or weights of a component, row by row.
+/// Samples of a component, row by row.
 struct SamplePlane {
   std::uint32_t width = 0, height = 0;
   std::vector<float> values;
   BlockValues block(std::uint32_t left, std::uint32_t top) const;
 };
 
-/// How far off the DC before may be that the uncovered block at (left, top) takes for its own.
-float same_level_at(const SamplePlane& weights, std::uint32_t left, std::uint32_t top);
+/// By how many a component has fewer samples than the image, along both axes: 1, 2 or 4.
+struct SampleFactors {
+  std::uint32_t across = 1, down = 1;
+};
+
+/// Which texels of a window are covered.
+class CoveredTexels {
+ public:
+  /// The window's width is a multiple of 8.
+  void load(const PixelWindow& window);
+  std::uint32_t width_px() const { return width_px_; }
+  std::uint32_t height_px() const { return height_px_; }
+  /// 1 or 0.
+  float at(std::uint32_t x, std::uint32_t y) const {
+    return static_cast<float>(bits_[std::size_t{y} * (width_px_ / 8) + x / 8] >> (7 - x % 8) & 1);
+  }
+  /// What interpolation of covered texels takes from the samples of a component's block at (left, top), by a
+  /// triangle of twice the factor's width, which is how decoders interpolate; 1 where they all are covered.
+  /// The window's outermost texels are repeated.
+  BlockValues weights(SampleFactors factors, std::uint32_t left, std::uint32_t top) const;
+  /// What the weights of that block are.
+  BlockCoverage block(SampleFactors factors, std::uint32_t left, std::uint32_t top) const;
+
+ private:
+  std::uint32_t width_px_ = 0, height_px_ = 0;
+  std::vector<std::uint8_t> bits_;  // rows of width / 8 bytes, bit 7 first
+};
+
+/// The blocks of one component of a window.
+class CoveredBlocks {
+ public:
+  /// The window's sides hold whole blocks.
+  void load(const CoveredTexels& texels, SampleFactors factors);
+  /// Of the block at (left, top).
+  BlockCoverage at(std::uint32_t left, std::uint32_t top) const {
+    return blocks_[std::size_t{top / 8} * columns_ + left / 8];
+  }
+  /// How far off the DC before may be that the uncovered block at (left, top) takes for its own.
+  float same_level_at(std::uint32_t left, std::uint32_t top) const;
+
+ private:
+  std::uint32_t columns_ = 0, rows_ = 0;
+  std::vector<BlockCoverage> blocks_;
+};
 
 /// A block that nobody sees: the DC before it, unless that is further off than `same_level`.
 CodedBlock flat_block(float level, float same_level, const BlockCoding& coding, int dc_before);

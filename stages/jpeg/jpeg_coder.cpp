@@ -317,14 +317,19 @@ void JpegCoder::append_body(const PixelWindow& image, std::vector<std::uint8_t>&
 }
 
 std::vector<std::uint8_t> JpegCoder::complete(const PixelWindow& image) {
+  state_->info.optimize_coding = TRUE;
+  std::vector<std::uint8_t> out = complete_as_is(image);
+  state_->info.optimize_coding = state_->kind.progressive ? TRUE : FALSE;
+  return out;
+}
+
+std::vector<std::uint8_t> JpegCoder::complete_as_is(const PixelWindow& image) {
   jpeg_compress_struct& info = state_->info;
   state_->set_image(image);
   state_->run([&] {
     info.write_JFIF_header = state_->kind.rgb ? FALSE : TRUE;
     info.write_Adobe_marker = state_->kind.rgb ? TRUE : FALSE;
-    info.optimize_coding = TRUE;
     state_->write(TRUE);
-    info.optimize_coding = state_->kind.progressive ? TRUE : FALSE;
   });
   return {state_->output().begin(), state_->output().end()};
 }

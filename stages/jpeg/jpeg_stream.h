@@ -18,6 +18,13 @@ inline constexpr std::array<std::uint8_t, 64> kNaturalOfZigzag{
     41, 34, 27, 20, 13, 6,  7,  14, 21, 28, 35, 42, 49, 56, 57, 50, 43, 36, 29, 22, 15, 23,
     30, 37, 44, 51, 58, 59, 52, 45, 38, 31, 39, 46, 53, 60, 61, 54, 47, 55, 62, 63};
 
+/// And back.
+inline constexpr std::array<std::uint8_t, 64> kZigzagOfNatural = [] {
+  std::array<std::uint8_t, 64> out{};
+  for (std::size_t k = 0; k < 64; ++k) out[kNaturalOfZigzag[k]] = static_cast<std::uint8_t>(k);
+  return out;
+}();
+
 /// Adds the symbols of `blocks` 8 x 8 blocks of entropy-coded baseline data without restart markers. Block b
 /// is coded with the DC table 2 t and the AC table 2 t + 1, t = mcu[b % mcu.size()]. FormatError when the
 /// data end before the blocks do or a code is none of the tables'.

@@ -42,12 +42,6 @@ constexpr float kMeanWeight = 0.15f;
 // So many coefficients are taken out of the rest one by one; more go together, by transforms.
 constexpr int kFewMoves = 6;
 
-constexpr std::array<std::uint8_t, 64> kZigzagOfNatural = [] {
-  std::array<std::uint8_t, 64> out{};
-  for (std::size_t k = 0; k < 64; ++k) out[kNaturalOfZigzag[k]] = static_cast<std::uint8_t>(k);
-  return out;
-}();
-
 using Quad = float __attribute__((vector_size(16)));
 using Bits = std::int32_t __attribute__((vector_size(16)));
 

@@ -6,6 +6,12 @@
 #include "stages/jpeg/jpeg_samples.h"
 
 namespace texmesh {
+namespace {
+
+constexpr SampleFactors kHalved{2, 2};
+
+}  // namespace
+
 MaskedRung masked_rung(const JpegKind& kind, const std::vector<std::array<std::uint16_t, 64>>& quantisers,
                        const HuffmanTables& tables) {
   MaskedRung out;
@@ -36,51 +42,26 @@ void MaskedJpeg::halve(SamplePlane& chroma) const {
   chroma.width /= 2, chroma.height /= 2;
   std::vector<float> values(std::size_t{chroma.width} * chroma.height);
   for (std::uint32_t y = 0; y < chroma.height; ++y) {
-    const std::size_t row = std::size_t{2 * y} * w;
     for (std::uint32_t x = 0; x < chroma.width; ++x) {
       float covered = 0, all = 0, count = 0;
-      for (const std::size_t at : {row + 2 * x, row + 2 * x + 1, row + w + 2 * x, row + w + 2 * x + 1})
-        covered += weights_.values[at] * chroma.values[at], count += weights_.values[at],
-            all += chroma.values[at];
+      for (std::uint32_t k = 0; k < 4; ++k) {
+        const std::uint32_t u = 2 * x + k % 2, v = 2 * y + k / 2;
+        const float weight = covered_.at(u, v), value = chroma.values[std::size_t{v} * w + u];
+        covered += weight * value, count += weight, all += value;
+      }
       values[std::size_t{y} * chroma.width + x] = count > 0 ? covered / count : all / 4;
     }
   }
   chroma.values = std::move(values);
 }
 
-/// What bilinear interpolation (9, 3, 3 and 1 sixteenths, edges repeated) of covered texels takes from a
-/// sample of halved chroma, 1 when all of them are covered.
-void MaskedJpeg::weigh_halved() {
-  const std::uint32_t width = weights_.width, height = weights_.height, half = width / 2;
-  halved_weights_ = {half, height / 2, {}};
-  halved_weights_.values.resize(std::size_t{half} * (height / 2));
-  std::vector<float> across(std::size_t{half} * height);
-  for (std::uint32_t y = 0; y < height; ++y)
-    for (std::uint32_t x = 0; x < width; x += 2) {
-      const float* row = weights_.values.data() + std::size_t{y} * width;
-      across[std::size_t{y} * half + x / 2] =
-          row[x > 0 ? x - 1 : 0] + 3 * (row[x] + row[x + 1]) + row[std::min(x + 2, width - 1)];
-    }
-  for (std::uint32_t y = 0; y < height; y += 2)
-    for (std::uint32_t x = 0; x < half; ++x) {
-      const auto at = [&](std::uint32_t row) { return across[std::size_t{row} * half + x]; };
-      halved_weights_.values[std::size_t{y / 2} * half + x] =
-          (at(y > 0 ? y - 1 : 0) + 3 * (at(y) + at(y + 1)) + at(std::min(y + 2, height - 1))) / 64;
-    }
-}
-
 void MaskedJpeg::load(const PixelWindow& image) {
-  const std::uint32_t w = image.width_px, h = image.height_px;
-  weights_ = {w, h, std::move(weights_.values)};
-  weights_.values.resize(std::size_t{w} * h);
-  for (std::uint32_t y = 0; y < h; ++y)
-    for (std::uint32_t x = 0; x < w; ++x)
-      weights_.values[std::size_t{y} * w + x] =
-          image.coverage.mask.empty() || image.coverage.covered(x, y) ? 1.0f : 0.0f;
-  if (halved_) weigh_halved();
+  covered_.load(image);
+  blocks_[0].load(covered_, {});
+  if (halved_) blocks_[1].load(covered_, kHalved);
   for (std::size_t c = 0; c < components_.size(); ++c) {
     SamplePlane& component = components_[c];
-    component.width = w, component.height = h;
+    component.width = image.width_px, component.height = image.height_px;
     jpeg_samples(image, kind_, c, component.values);
     if (halved_ && c > 0) halve(component);
   }
@@ -89,18 +70,18 @@ void MaskedJpeg::load(const PixelWindow& image) {
 template <class Sink>
 void MaskedJpeg::code_block(std::size_t component, std::uint32_t left, std::uint32_t top,
                             std::span<const MaskedRung> rungs, std::span<Sink> sinks) {
-  const SamplePlane& from_weights = halved_ && component > 0 ? halved_weights_ : weights_;
+  const bool half = halved_ && component > 0;
   const BlockValues samples = components_[component].block(left, top);
-  BlockValues weights = from_weights.block(left, top);
-  const BlockCoverage what = coverage_of(weights);
+  const BlockCoverage what = blocks_[half].at(left, top);
   float level = 0, same_level = 0;
   if (what == BlockCoverage::kNothing) {
     level = mean_of(samples);
-    same_level = same_level_at(from_weights, left, top);
+    same_level = blocks_[half].same_level_at(left, top);
   }
   BlockValues coefficients{};
   if (what == BlockCoverage::kAll) coefficients = block_dct(samples);
   if (what == BlockCoverage::kPart) {
+    BlockValues weights = covered_.weights(half ? kHalved : SampleFactors{}, left, top);
     for (float& w : weights) w = std::max(w, kUncoveredWeight);
     block_.load(samples, weights);
   }

@@ -41,7 +41,6 @@ class MaskedJpeg {
 
  private:
   void load(const PixelWindow& image);
-  void weigh_halved();
   void halve(SamplePlane& chroma) const;
   template <class Sink>
   void code(const PixelWindow& image, std::span<const MaskedRung> rungs, std::span<Sink> sinks);
@@ -50,10 +49,11 @@ class MaskedJpeg {
                   std::span<const MaskedRung> rungs, std::span<Sink> sinks);
 
   JpegKind kind_;
-  bool halved_;                                // chroma
-  std::vector<std::size_t> pairs_;             // of Huffman tables, by component
-  std::vector<SamplePlane> components_;        // level shift taken off
-  SamplePlane weights_, halved_weights_;       // of samples; of those of halved chroma
+  bool halved_;                          // chroma
+  std::vector<std::size_t> pairs_;       // of Huffman tables, by component
+  std::vector<SamplePlane> components_;  // level shift taken off
+  CoveredTexels covered_;
+  std::array<CoveredBlocks, 2> blocks_;        // of samples; of those of halved chroma
   std::vector<std::array<int, 3>> dc_before_;  // [rung][component]
   MaskedBlock block_;
 };

@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
+#include <map>
+#include <optional>
 #include <utility>
 
 #include "stages/base/parallel.h"
@@ -82,37 +83,54 @@ void for_each_fragment(const TexturePlane& plane, const TexelRectangle& rectangl
       visit(std::size_t{row} * plane.columns + column);
 }
 
-/// The rectangle as one rung shows it; as the source does where no fragment is stored.
-SamplePatch decode_patch(const TexturePlane& plane, const Pixels& pixels, const PlaneLadder& ladder,
-                         std::size_t rung, const TexelRectangle& rectangle) {
-  const std::size_t measured = measured_channels(plane);
-  SamplePatch patch{rectangle, rectangle_samples(plane, pixels, rectangle)};
-  for_each_fragment(plane, rectangle, [&](std::size_t f) {
-    if (fragment_stream(ladder.rungs[rung], f).empty()) return;
-    const TexelRectangle whole = padded_fragment_rectangle(plane, f);
-    const Samples decoded =
-        decode_samples(ladder, rung, f, std::uint64_t{whole.width_px} * whole.height_px, measured);
-    const std::uint32_t left = std::max(rectangle.left_px, whole.left_px);
-    const std::uint32_t right = std::min(rectangle.right_px(), whole.right_px());
-    const std::uint32_t bottom = std::min(rectangle.bottom_px(), whole.bottom_px());
-    for (std::size_t c = 0; c < measured; ++c)
-      for (std::uint32_t y = std::max(rectangle.top_px, whole.top_px); y < bottom; ++y)
-        std::copy_n(
-            decoded[c].data() + std::size_t{y - whole.top_px} * whole.width_px + (left - whole.left_px),
-            right - left,
-            patch.samples[c].data() + std::size_t{y - rectangle.top_px} * rectangle.width_px +
-                (left - rectangle.left_px));
-  });
-  return patch;
-}
+/// What one rung of a plane shows. Fragments are decoded once, however many windows show them.
+class ShownRung {
+ public:
+  ShownRung(const TexturePlane& plane, const Pixels& pixels, const PlaneLadder& ladder, std::size_t rung)
+      : plane_(plane), pixels_(pixels), ladder_(ladder), rung_(rung) {}
 
-/// The window of `wanted` as a rung of the same or a coarser level shows it, scaled up.
-Samples show(const TexturePlane& wanted, const TexturePlane& level, const Pixels& pixels,
-             const PlaneLadder& ladder, std::size_t rung, const TexelRectangle& window) {
-  const Support support(wanted, level, window);
-  return scaled_up(decode_patch(level, pixels, ladder, rung, support.rectangle()), support.across,
-                   support.down);
-}
+  /// The window of `wanted`, the same or a finer level, scaled up.
+  Samples window(const TexturePlane& wanted, const TexelRectangle& window) {
+    if (&wanted == &plane_) return patch(window).samples;
+    const Support support(wanted, plane_, window);
+    return scaled_up(patch(support.rectangle()), support.across, support.down);
+  }
+
+ private:
+  /// As the source shows it where no fragment is stored.
+  SamplePatch patch(const TexelRectangle& rectangle) {
+    SamplePatch patch{rectangle, rectangle_samples(plane_, pixels_, rectangle)};
+    for_each_fragment(plane_, rectangle, [&](std::size_t f) {
+      if (fragment_stream(ladder_.rungs[rung_], f).empty()) return;
+      const TexelRectangle whole = padded_fragment_rectangle(plane_, f);
+      const Samples& decoded = fragment(f, whole);
+      const std::uint32_t left = std::max(rectangle.left_px, whole.left_px);
+      const std::uint32_t right = std::min(rectangle.right_px(), whole.right_px());
+      const std::uint32_t bottom = std::min(rectangle.bottom_px(), whole.bottom_px());
+      for (std::size_t c = 0; c < decoded.size(); ++c)
+        for (std::uint32_t y = std::max(rectangle.top_px, whole.top_px); y < bottom; ++y)
+          std::copy_n(
+              decoded[c].data() + std::size_t{y - whole.top_px} * whole.width_px + (left - whole.left_px),
+              right - left,
+              patch.samples[c].data() + std::size_t{y - rectangle.top_px} * rectangle.width_px +
+                  (left - rectangle.left_px));
+    });
+    return patch;
+  }
+  const Samples& fragment(std::size_t f, const TexelRectangle& whole) {
+    const auto [it, fresh] = decoded_.try_emplace(f);
+    if (fresh)
+      it->second = decode_samples(ladder_, rung_, f, std::uint64_t{whole.width_px} * whole.height_px,
+                                  measured_channels(plane_));
+    return it->second;
+  }
+
+  const TexturePlane& plane_;
+  const Pixels& pixels_;
+  const PlaneLadder& ladder_;
+  std::size_t rung_;
+  std::map<std::size_t, Samples> decoded_;
+};
 
 /// Marks the fragments of the same or a coarser level that the windows show.
 void mark_shown(const TexturePlane& wanted, const TexturePlane& level, const std::vector<Window>& windows,
@@ -145,32 +163,44 @@ std::vector<std::uint64_t> bytes_by_rung(const TexturePlane& plane, const PlaneL
   return out;
 }
 
-/// 1 - SSIM of `ways` to show the plane, by way, 0 where nothing is covered: the mean over the windows, each
-/// of which weighs as much as its fragment's surface. shown(window, way) gives the samples of a window.
-std::vector<double> mean_losses(
-    const TexturePlane& plane, const Pixels& pixels, const std::vector<Window>& windows, std::size_t ways,
-    const std::function<Samples(const TexelRectangle& window, std::size_t way)>& shown,
-    const RunContext& context) {
-  std::vector<double> loss(windows.size() * ways);
-  parallel_for(context, windows.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t w = begin; w < end; ++w) {
-      const TexelRectangle& window = windows[w].rectangle;
-      const FragmentMeter meter(rectangle_samples(plane, pixels, window), coverage_samples(plane, window),
-                                window.width_px, window.height_px);
-      for (std::size_t k = 0; k < ways; ++k)
-        loss[w * ways + k] = std::max(meter.against(shown(window, k)).dssim, 0.0);
-    }
-  });
-  std::vector<double> mean(ways);
-  double whole = 0;
-  for (std::size_t w = 0; w < windows.size(); ++w) {
-    const double weight = std::max(static_cast<double>(plane.surface_fraction[windows[w].fragment]), 1e-9);
-    whole += weight;
-    for (std::size_t k = 0; k < ways; ++k) mean[k] += weight * loss[w * ways + k];
+/// A level where it is wanted, and 1 - SSIM of what is shown of it.
+class WantedLevel {
+ public:
+  WantedLevel(const TexturePlane& plane, const Pixels& pixels, const RunContext& context)
+      : plane_(plane), windows_(sample_windows(plane)), meters_(windows_.size()) {
+    parallel_for(context, windows_.size(), 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t w = begin; w < end; ++w) {
+        const TexelRectangle& window = windows_[w].rectangle;
+        meters_[w].emplace(rectangle_samples(plane, pixels, window), coverage_samples(plane, window),
+                           window.width_px, window.height_px);
+      }
+    });
   }
-  for (double& m : mean) m /= std::max(whole, 1e-9);
-  return mean;
-}
+  /// The mean over the windows, each of which weighs as much as its fragment's surface; 0 where nothing is
+  /// covered. shown(window) gives the samples of a window.
+  template <class Shown>
+  double loss(const Shown& shown) const {
+    double sum = 0, whole = 0;
+    for (std::size_t w = 0; w < windows_.size(); ++w) {
+      const double weight =
+          std::max(static_cast<double>(plane_.surface_fraction[windows_[w].fragment]), 1e-9);
+      whole += weight;
+      sum += weight * std::max(meters_[w]->against(shown(windows_[w].rectangle)).dssim, 0.0);
+    }
+    return sum / std::max(whole, 1e-9);
+  }
+  double loss_of(ShownRung& rung) const {
+    return loss([&](const TexelRectangle& window) { return rung.window(plane_, window); });
+  }
+  double loss_of(const SamplePatch& preview) const {
+    return loss([&](const TexelRectangle& window) { return show_preview(plane_, preview, window); });
+  }
+
+ private:
+  const TexturePlane& plane_;
+  std::vector<Window> windows_;
+  std::vector<std::optional<FragmentMeter>> meters_;
+};
 
 /// Whether the fragments of a JPEG rung have fewer samples of chroma than of luma.
 bool has_halved_chroma(const LadderRung& rung) {
@@ -237,28 +267,22 @@ TextureWays measure_ways(const Fragments& fragments, const std::vector<Pixels>& 
     for (std::size_t r = 0; r < bytes.size(); ++r)
       out.pairs.push_back({level, r, bytes[r], {}, ladder.source_rung && r + 1 == bytes.size()});
   }
-  for (std::size_t wanted = 0; wanted < chain.size(); ++wanted) {
-    const TexturePlane& plane = fragments.planes[chain[wanted]];
-    const SamplePatch preview = preview_samples(plane, preview_file);
-    const auto first =
-        static_cast<std::size_t>(std::ranges::find(out.pairs, wanted, &RungPair::level) - out.pairs.begin());
-    const auto shown = [&](const TexelRectangle& window, std::size_t way) {
-      if (way == 0) return show_preview(plane, preview, window);
-      const RungPair& pair = out.pairs[first + way - 1];
+  std::vector<WantedLevel> levels;
+  for (const std::size_t p : chain) levels.emplace_back(fragments.planes[p], pixels[p], context);
+  const SamplePatch preview = preview_samples(fragments.planes[base], preview_file);
+  for (const WantedLevel& level : levels) out.preview_loss.push_back(level.loss_of(preview));
+  parallel_for(context, out.pairs.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) {
+      RungPair& pair = out.pairs[k];
       const std::size_t p = chain[pair.level];
-      return show(plane, fragments.planes[p], pixels[p], planes[p], pair.rung, window);
-    };
-    const std::size_t ways = out.pairs.size() - first + 1;
-    const std::vector<double> losses =
-        mean_losses(plane, pixels[chain[wanted]], sample_windows(plane), ways, shown, context);
-    out.preview_loss.push_back(losses[0]);
-    for (std::size_t way = 1; way < ways; ++way) {
-      RungPair& pair = out.pairs[first + way - 1];
-      const bool halved = is_colour(fragments.planes[base].role) && !pair.fixed &&
-                          has_halved_chroma(planes[chain[pair.level]].rungs[pair.rung]);
-      pair.loss.push_back(losses[way] + (halved ? std::min(losses[way], kHalvedChroma) : 0));
+      const bool halved = out.closes_gaps && !pair.fixed && has_halved_chroma(planes[p].rungs[pair.rung]);
+      ShownRung shown(fragments.planes[p], pixels[p], planes[p], pair.rung);
+      for (std::size_t wanted = 0; wanted <= pair.level; ++wanted) {
+        const double loss = levels[wanted].loss_of(shown);
+        pair.loss.push_back(loss + (halved ? std::min(loss, kHalvedChroma) : 0));
+      }
     }
-  }
+  });
   return out;
 }
 

@@ -1,6 +1,7 @@
 #include "stages/measure/scale_samples.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "stages/jpeg/jpeg.h"
 
@@ -28,20 +29,28 @@ std::vector<BilinearPlace> bilinear_places(std::uint32_t first, std::uint32_t co
 Samples scaled_up(const SamplePatch& patch, const std::vector<BilinearPlace>& across,
                   const std::vector<BilinearPlace>& down) {
   const std::uint32_t left = patch.rectangle.left_px, top = patch.rectangle.top_px;
-  const std::size_t width = patch.rectangle.width_px;
+  const std::size_t width = patch.rectangle.width_px, count = across.size();
   Samples out;
   for (const std::vector<std::uint8_t>& samples : patch.samples) {
-    std::vector<std::uint8_t>& to = out.emplace_back();
-    to.reserve(across.size() * down.size());
-    for (const BilinearPlace& v : down) {
-      const std::uint8_t* a = samples.data() + (v.first - top) * width;
-      const std::uint8_t* b = samples.data() + (v.second - top) * width;
-      for (const BilinearPlace& u : across) {
-        const std::uint32_t l = u.first - left, r = u.second - left;
-        const std::uint32_t upper = a[l] * (256 - u.part) + a[r] * u.part;
-        const std::uint32_t lower = b[l] * (256 - u.part) + b[r] * u.part;
-        to.push_back(static_cast<std::uint8_t>((upper * (256 - v.part) + lower * v.part + 32768) >> 16));
+    const auto stretch = [&](std::uint32_t row, std::vector<std::uint32_t>& to) {
+      const std::uint8_t* from = samples.data() + (row - top) * width;
+      for (std::size_t k = 0; k < count; ++k) {
+        const BilinearPlace& u = across[k];
+        to[k] = from[u.first - left] * (256 - u.part) + from[u.second - left] * u.part;
       }
+    };
+    // Several rows of the result lie between the same two.
+    std::vector<std::uint32_t> upper(count), lower(count);
+    constexpr std::uint32_t kNone = 0xffffffff;
+    std::uint32_t upper_row = kNone, lower_row = kNone;
+    std::vector<std::uint8_t>& to = out.emplace_back(count * down.size());
+    std::uint8_t* at = to.data();
+    for (const BilinearPlace& v : down) {
+      if (v.first == lower_row) std::swap(upper, lower), std::swap(upper_row, lower_row);
+      if (v.first != upper_row) stretch(upper_row = v.first, upper);
+      if (v.second != lower_row) stretch(lower_row = v.second, lower);
+      for (std::size_t k = 0; k < count; ++k)
+        *at++ = static_cast<std::uint8_t>((upper[k] * (256 - v.part) + lower[k] * v.part + 32768) >> 16);
     }
   }
   return out;
