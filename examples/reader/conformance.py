@@ -510,8 +510,11 @@ def check_shared(glbs, m):
         require(all(g.get(key) == first.get(key) for key in ("materials", "textures", "samplers")), "G07", f"S_{scale}")
         names = [[node.get("name") for node in x.get("nodes", [])] for x in (g, first)]
         require(names[0] == names[1], "G09", f"names of S_{scale}'s nodes")
-        one_node = any("partNames" in mesh.get("extras", {}) for mesh in g["meshes"])
-        require(not one_node or len(glbs) == len(columns["scale"]), "G10", "scales without a GLB")
+        for mesh in g["meshes"]:
+            names = mesh.get("extras", {}).get("partNames")
+            features = [p.get("extensions", {}).get("EXT_mesh_features", {}).get("featureIds", [{}])[0] for p in mesh["primitives"]]
+            counts = names is None or all(f.get("featureCount") == len(names) for f in features)
+            require(counts, "G10", f"S_{scale}: feature ids that do not count the parts")
         primitives = [p for mesh in g["meshes"] for p in mesh["primitives"]]
         points = sum(g["accessors"][p["attributes"]["POSITION"]]["count"] for p in primitives)
         corners = sum(g["accessors"][p["indices"]]["count"] for p in primitives)
