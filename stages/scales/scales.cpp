@@ -252,8 +252,8 @@ bool shows_the_same(const std::vector<std::uint8_t>& stream, const NestedScales&
 }
 
 /// The kept scales that have files of their own.
-bool has_file(std::size_t kept_index, std::size_t kept_count, const Mesh& mesh, const ScaleFiles& files) {
-  return kept_index == 0 || kept_index + 1 == kept_count || files.stream.empty() || parts_merged(mesh);
+bool has_file(std::size_t kept_index, std::size_t kept_count, const ScaleFiles& files) {
+  return kept_index == 0 || kept_index + 1 == kept_count || files.stream.empty();
 }
 
 void write_stream(const ScaleCoding& coding, const NestedScales& scales, const std::vector<std::size_t>& kept,
@@ -334,7 +334,7 @@ ScaleFiles write_scales(const NestedScales& scales, const PerceptualValues& perc
   result.files.resize(kept.size());
   std::vector<std::size_t> written;  // indices into kept
   for (std::size_t i = 0; i < kept.size(); ++i) {
-    if (has_file(i, kept.size(), scales.mesh, result))
+    if (has_file(i, kept.size(), result))
       written.push_back(i);
     else
       result.files[i] = count_streamed(read_split_head(result.stream), scales.scales[kept[i]].scale);

@@ -14,7 +14,7 @@
 
 namespace texmesh {
 
-inline constexpr int kScalesVersion = 8;
+inline constexpr int kScalesVersion = 9;
 
 enum class MeshCodec : std::uint8_t { kDraco, kMeshopt, kQuantized, kNone };
 template <>
@@ -58,7 +58,7 @@ struct ScalesOptions {
 };
 
 /// Writes all kept scales as a stream of vertex splits, and S_0 and the coarsest as GLBs. Every kept scale is
-/// a GLB where there is no stream, and where parts are merged, whose feature ids the stream does not have.
+/// a GLB where there is no stream.
 /// - Node k is part k, without a mesh where the scale has no triangle of the part; a primitive per material
 /// in
 ///   it. Above 256 parts there is one node for all: its mesh lists the names of those that are left in

@@ -62,10 +62,10 @@ struct MeshShare {
   bool known = false;
 };
 
-/// The first GLB says what is shared; the others must have the same. One node for all parts leaves no scale
-/// to the stream alone. `glb` has passed check_glb.
-void check_shared(const Manifest& manifest, const std::string& entry, std::span<const std::uint8_t> glb,
-                  MeshShare& share, Findings& findings);
+/// The first GLB says what is shared; the others must have the same. Where meshes list names of parts,
+/// feature ids count them. `glb` has passed check_glb.
+void check_shared(const std::string& entry, std::span<const std::uint8_t> glb, MeshShare& share,
+                  Findings& findings);
 
 /// A proxy and what the manifest says about it: a GLB that stands alone, within the model's bounds.
 void check_proxy(const Manifest& manifest, const ManifestProxy& proxy, std::span<const std::uint8_t> glb,

@@ -48,7 +48,7 @@ void EntryVerifier::check_mesh_entry(const EntryRef& e, int number) {
     return;
   ++report_.meshes;
   std::vector<Vec3d> positions = check_mesh(package_.manifest, *scale, package_.textures, bytes, findings_);
-  if (!positions.empty()) check_shared(package_.manifest, e.path, bytes, share_, findings_);
+  if (!positions.empty()) check_shared(e.path, bytes, share_, findings_);
   // Meshes stand from coarse to fine; any other order is a finding of "entry-order".
   if (coarser_ && coarser_->scale > scale->scale)
     check_nested(*scale, positions, *coarser_, coarser_positions_, findings_);

@@ -89,8 +89,19 @@ std::vector<Vec3d> check_mesh(const Manifest& m, const ManifestScale& scale,
   return std::move(facts.positions);
 }
 
-void check_shared(const Manifest& m, const std::string& entry, std::span<const std::uint8_t> glb,
-                  MeshShare& share, Findings& findings) {
+/// Where a mesh lists names of parts, feature ids of all its primitives count them.
+bool counts_part_names(const nlohmann::ordered_json& mesh) {
+  static const nlohmann::ordered_json::json_pointer kNames("/extras/partNames"),
+      kCount("/extensions/EXT_mesh_features/featureIds/0/featureCount");
+  if (!mesh.contains(kNames)) return true;
+  const std::size_t names = mesh.at(kNames).size();
+  return std::ranges::all_of(mesh.at("primitives"), [&](const auto& primitive) {
+    return primitive.contains(kCount) && primitive.at(kCount) == names;
+  });
+}
+
+void check_shared(const std::string& entry, std::span<const std::uint8_t> glb, MeshShare& share,
+                  Findings& findings) {
   const std::size_t bytes = glb[12] | glb[13] << 8 | glb[14] << 16 | std::size_t{glb[15]} << 24;
   const auto json =
       nlohmann::ordered_json::parse(glb.begin() + 20, glb.begin() + 20 + static_cast<std::ptrdiff_t>(bytes));
@@ -105,11 +116,9 @@ void check_shared(const Manifest& m, const std::string& entry, std::span<const s
                    "materials, textures and samplers of the other files", "others");
   findings.require(here.names == share.names, {"mesh-nodes", "G09"}, entry, "/nodes",
                    "nodes with the names of the other files", "others");
-  const bool one_node = std::ranges::any_of(array("meshes"), [](const auto& mesh) {
-    return mesh.contains("extras") && mesh["extras"].is_object() && mesh["extras"].contains("partNames");
-  });
-  findings.require(!one_node || std::ranges::all_of(m.scales, &ManifestScale::has_glb), {"mesh-nodes", "G10"},
-                   entry, "/meshes", "a file of every scale, as one node has all parts", "scales without");
+  for (const auto& mesh : array("meshes"))
+    findings.require(counts_part_names(mesh), {"mesh-nodes", "G10"}, entry, "/meshes",
+                     "feature ids in every primitive, as many as part names", "others");
 }
 
 void check_proxy(const Manifest& m, const ManifestProxy& proxy, std::span<const std::uint8_t> glb,

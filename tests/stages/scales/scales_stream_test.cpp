@@ -232,6 +232,16 @@ TEST(ScalesStream, HasPartsMaterialsAndColours) {
   expect_files_in_stream(Case(m, 2));
 }
 
+/// Names and feature ids are in the files alone; the stream's scales are of one part.
+TEST(ScalesStream, HasTheFacesOfMergedParts) {
+  Mesh m = testing::bumpy_sphere(20, 28);
+  m.part_names = {"parts"};  // the name of the files' one node
+  for (int i = 1; i < 257; ++i) m.part_names.push_back("part " + std::to_string(i));
+  for (std::size_t t = 0; t < m.triangles.size(); ++t)
+    m.triangle_part[t] = static_cast<std::uint16_t>(t / 4 % 257);
+  expect_files_in_stream(Case(m));
+}
+
 /// Small bodies beside a large one: simplification lets them vanish whole, the stream brings them back.
 TEST(ScalesStream, BringsBackWholeComponents) {
   std::vector<Mesh> bodies{testing::bumpy_sphere(30, 44)};
