@@ -73,8 +73,9 @@ template <class T>
 T remapped_difference(T power, T largest) {
   constexpr auto kKnee = static_cast<T>(0.4), kTop = static_cast<T>(0.95);
   const T knee = kKnee * largest;
-  return std::min(T{1},
-                  power < knee ? kTop / knee * power : kTop + (power - knee) / (largest - knee) * (1 - kTop));
+  // Both lines, so that compilers may take several values at once.
+  const T below = kTop / knee * power, above = kTop + (power - knee) / (largest - knee) * (1 - kTop);
+  return std::min(T{1}, power < knee ? below : above);
 }
 
 }  // namespace texmesh

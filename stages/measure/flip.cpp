@@ -4,8 +4,9 @@
 #include <cmath>
 
 #include "format/base/portable_math.h"
+#include "stages/base/float_math.h"
 #include "stages/measure/cie_lab.h"
-#include "stages/measure/pixel_spans.h"
+#include "stages/measure/filtered_rows.h"
 #include "stages/measure/sampled_curve.h"
 
 namespace texmesh {
@@ -14,10 +15,9 @@ namespace {
 constexpr double kPixelsPerDegree = 67.0206432765;  // 0.7 m from a screen 0.7 m wide with 3840 px
 
 using FlipCurve = SampledCurve<16384>;
-using measure::filtered;
+using measure::FilteredRows;
 using measure::Kernel;
 using measure::PixelSpans;
-using measure::SpanImage;
 
 double sum_of(const Kernel& kernel) {
   double sum = 0;
@@ -38,42 +38,35 @@ Kernel sensitivity(double b) {
   return out;
 }
 
-/// The sum over terms of a sqrt(pi / b) exp(-pi^2 z / b), made one in the sum over the plane.
+/// A term a sqrt(pi / b) exp(-pi^2 z / b) of an eye's filter: its row and its part of the sum over the plane.
 struct Term {
-  double a, b;
+  Kernel kernel;
+  float weight = 0;
 };
-SpanImage eye_filtered(const SpanImage& channel, const PixelSpans& spans, std::initializer_list<Term> terms) {
+std::vector<Term> eye_filter(std::initializer_list<std::array<double, 2>> terms) {
   double whole = 0;
-  for (const Term& t : terms) {
-    const double line = sum_of(sensitivity(t.b));
-    whole += t.a * std::sqrt(portable::kPi / t.b) * line * line;
+  std::vector<Term> out;
+  for (const auto& [a, b] : terms) {
+    out.push_back({sensitivity(b), 0});
+    const double line = sum_of(out.back().kernel);
+    whole += a * std::sqrt(portable::kPi / b) * line * line;
   }
-  SpanImage out{std::vector<float>(spans.count), 0};
-  for (const Term& t : terms) {
-    const Kernel kernel = sensitivity(t.b);
-    const SpanImage part = filtered(channel, spans, kernel, kernel);
-    const auto weight = static_cast<float>(t.a * std::sqrt(portable::kPi / t.b) / whole);
-    for (std::size_t i = 0; i < out.values.size(); ++i) out.values[i] += weight * part.values[i];
-    out.plain += weight * part.plain;
-  }
+  std::size_t i = 0;
+  for (const auto& [a, b] : terms)
+    out[i++].weight = static_cast<float>(a * std::sqrt(portable::kPi / b) / whole);
   return out;
+}
+
+/// Those of Y, Cx, Cz.
+const std::array<std::vector<Term>, 3>& eye_filters() {
+  static const std::array<std::vector<Term>, 3> filters{eye_filter({{1, 0.0047}}), eye_filter({{1, 0.0053}}),
+                                                        eye_filter({{34.1, 0.04}, {13.5, 0.025}})};
+  return filters;
 }
 
 const FlipCurve& flip_lab_curve() {
   static const FlipCurve curve(lab_root);
   return curve;
-}
-
-/// x^0.7 of 0 .. 256, which holds every HyAB distance of colours.
-float flip_compressed(float distance) {
-  static const FlipCurve power([](double x) { return x > 0 ? portable::pow(x * 256, kHyabExponent) : 0; });
-  if (distance >= 0.5f) return power(distance / 256);
-  return distance > 0 ? static_cast<float>(portable::pow(static_cast<double>(distance), kHyabExponent)) : 0;
-}
-
-float flip_colour_difference(Vec3f a, Vec3f b) {
-  static const float largest = flip_compressed(largest_hyab<float>(flip_lab_curve()));
-  return remapped_difference(flip_compressed(hyab<float>(a, b)), largest);
 }
 
 /// Derivatives of a Gaussian as wide as features that the eye looks for: first (edges), second (points); the
@@ -109,45 +102,14 @@ const FeatureKernels& feature_kernels() {
 
 float strength(float x, float y) { return std::sqrt(x * x + y * y); }
 
-SpanImage feature_strength(const SpanImage& luma, const PixelSpans& spans, const Kernel& derivative) {
-  const Kernel& smooth = feature_kernels().smooth;
-  SpanImage out = filtered(luma, spans, derivative, smooth);
-  const SpanImage y = filtered(luma, spans, smooth, derivative);
-  for (std::size_t i = 0; i < out.values.size(); ++i) out.values[i] = strength(out.values[i], y.values[i]);
-  out.plain = strength(out.plain, y.plain);
-  return out;
-}
-
 /// Y, Cx, Cz, and the luma that features are seen in.
 struct Channels {
-  std::array<SpanImage, 3> opponent;
-  SpanImage luma;
+  Vec3f opponent;
+  float luma = 0;
 };
-
-Channels channels_of(const Picture& picture, const PixelSpans& spans) {
-  Channels out;
-  for (SpanImage& channel : out.opponent) channel.values.resize(spans.count);
-  out.luma.values.resize(spans.count);
-  const auto convert = [](Vec3f linear, auto&& opponent_at, float& luma) {
-    const Vec3d xyz = xyz_of_linear(clamped_colour(linear));
-    const Vec3f colour = to_float(opponent_of_xyz(xyz));
-    for (int c = 0; c < 3; ++c) opponent_at(c) = colour[c];
-    luma = static_cast<float>(xyz.y);
-  };
-  for (std::size_t y = 0; y < spans.rows.size(); ++y) {
-    const PixelSpans::Row& row = spans.rows[y];
-    for (std::size_t x = row.first; x < row.last; ++x) {
-      const std::size_t i = row.offset + (x - row.first);
-      convert(
-          picture.linear[y * picture.side_px + x],
-          [&](int c) -> float& { return out.opponent[static_cast<std::size_t>(c)].values[i]; },
-          out.luma.values[i]);
-    }
-  }
-  convert(
-      picture.linear[0], [&](int c) -> float& { return out.opponent[static_cast<std::size_t>(c)].plain; },
-      out.luma.plain);
-  return out;
+Channels channels_of(Vec3f linear) {
+  const Vec3d xyz = xyz_of_linear(clamped_colour(linear));
+  return {to_float(opponent_of_xyz(xyz)), static_cast<float>(xyz.y)};
 }
 
 Vec3f flip_lab(Vec3f opponent) {
@@ -155,39 +117,153 @@ Vec3f flip_lab(Vec3f opponent) {
   return hunt_lab(xyz_of_linear(clamped_colour(linear_of_xyz(xyz))), flip_lab_curve());
 }
 
+/// Filters a picture's rows as they come, so that all that is in memory at once fits into a cache.
+class FlipFilter {
+ public:
+  FlipFilter(const Picture& picture, const PixelSpans& spans)
+      : picture_(picture), spans_(spans), plain_(channels_of(picture.linear[0])) {
+    const FeatureKernels& features = feature_kernels();
+    for (std::size_t c = 0; c < 3; ++c)
+      for (const Term& term : eye_filters()[c])
+        eyes_.push_back({c, term, {spans, plain_.opponent[static_cast<int>(c)], term.kernel}});
+    for (const Kernel* kernel : {&features.smooth, &features.edge, &features.point})
+      luma_.emplace_back(spans, plain_.luma, *kernel);
+    for (auto& row : opponent_) row.resize(measure::whole_blocks(spans.side_px));
+    for (auto& row : {&luma_row_, &part_, &other_}) row->resize(measure::whole_blocks(spans.side_px));
+  }
+
+  /// Rows are asked for one after the other.
+  void read(std::size_t y, FlipPicture& out) {
+    for (; made_ < std::min(spans_.rows.size(), y + measure::kFilterReach + 1); ++made_) make(made_);
+    const PixelSpans::Row& row = spans_.rows[y];
+    const std::size_t count = row.last - row.first;
+    if (count == 0) return;
+    for (auto& channel : opponent_) std::fill_n(channel.begin(), count, 0.f);
+    for (const Eye& eye : eyes_) {
+      eye.rows.read(y, eye.term.kernel, part_.data());
+      std::vector<float>& to = opponent_[eye.channel];
+      for (std::size_t i = 0; i < count; ++i) to[i] += eye.term.weight * part_[i];
+    }
+    for (std::size_t i = 0; i < count; ++i)
+      out.lab[row.offset + i] = flip_lab({opponent_[0][i], opponent_[1][i], opponent_[2][i]});
+    for (std::size_t k = 0; k < 2; ++k) {
+      luma_[k + 1].read(y, feature_kernels().smooth, part_.data());
+      luma_[0].read(y, derivative(k), other_.data());
+      for (std::size_t i = 0; i < count; ++i) out.detail[k][row.offset + i] = strength(part_[i], other_[i]);
+    }
+  }
+
+  void read_plain(FlipPicture& out) const {
+    Vec3f opponent;
+    for (const Eye& eye : eyes_)
+      opponent[static_cast<int>(eye.channel)] +=
+          eye.term.weight * measure::filtered_plain(eye.rows.plain(), eye.term.kernel);
+    out.plain_lab = flip_lab(opponent);
+    for (std::size_t k = 0; k < 2; ++k)
+      out.plain_detail[k] = strength(measure::filtered_plain(luma_[k + 1].plain(), feature_kernels().smooth),
+                                     measure::filtered_plain(luma_[0].plain(), derivative(k)));
+  }
+
+ private:
+  struct Eye {
+    std::size_t channel;
+    const Term& term;
+    FilteredRows rows;
+  };
+  static const Kernel& derivative(std::size_t k) {
+    return k == 0 ? feature_kernels().edge : feature_kernels().point;
+  }
+
+  void make(std::size_t y) {
+    const PixelSpans::Row& row = spans_.rows[y];
+    const Vec3f* linear = picture_.linear.data() + y * picture_.side_px + row.first;
+    for (std::size_t i = 0; i < row.last - row.first; ++i) {
+      const Channels c = channels_of(linear[i]);
+      for (std::size_t k = 0; k < 3; ++k) opponent_[k][i] = c.opponent[static_cast<int>(k)];
+      luma_row_[i] = c.luma;
+    }
+    for (Eye& eye : eyes_) eye.rows.make(y, opponent_[eye.channel].data());
+    for (FilteredRows& rows : luma_) rows.make(y, luma_row_.data());
+  }
+
+  const Picture& picture_;
+  const PixelSpans& spans_;
+  Channels plain_;
+  std::vector<Eye> eyes_;
+  std::vector<FilteredRows> luma_;  // along x: smooth, edge, point
+  std::array<std::vector<float>, 3> opponent_;
+  std::vector<float> luma_row_, part_, other_;
+  std::size_t made_ = 0;
+};
+
+/// FLIP of a block of pixels at a time, which compilers take several of at once.
+class FlipBlock {
+ public:
+  static constexpr std::size_t kSize = 64;
+  bool is_full() const { return count_ == kSize; }
+  std::size_t count() const { return count_; }
+  std::uint32_t column(std::size_t i) const { return column_[i]; }
+  float flip(std::size_t i) const { return distance_[i] > 0 ? flip_[i] : 0; }
+  void clear() { count_ = 0; }
+
+  void add(std::uint32_t column, Vec3f a, Vec3f b, float edges, float points) {
+    const float detail = std::max(std::fabs(edges), std::fabs(points));
+    column_[count_] = column;
+    distance_[count_] = hyab<float>(a, b);
+    exponent_[count_++] = 1 - std::min(1.f, std::sqrt(detail * 0.707106781f));
+  }
+
+  // Without square roots, which may set errno and so are taken one at a time.
+  void compute() {
+    constexpr auto kExponent = static_cast<float>(kHyabExponent);
+    static const float greatest = power(largest_hyab<float>(flip_lab_curve()), kExponent);
+    const float largest = greatest;
+    for (std::size_t i = 0; i < kSize; ++i)
+      flip_[i] = power(remapped_difference(power(distance_[i], kExponent), largest), exponent_[i]);
+  }
+
+ private:
+  /// base^exponent, of next to nothing where the base is 0.
+  static float power(float base, float exponent) {
+    return exp2_of(exponent * log2_of(base > 1e-30f ? base : 1e-30f));
+  }
+  std::size_t count_ = 0;
+  std::array<std::uint32_t, kSize> column_{};
+  std::array<float, kSize> distance_{}, exponent_{}, flip_{};
+};
+
 /// What the comparison reads of one picture at one pixel.
 struct Seen {
   Vec3f lab;
   std::array<float, 2> detail;
   bool covered;
 };
-Seen seen_at(const FlipPicture& picture, std::size_t y, std::uint32_t x) {
-  const FlipPicture::Row& row = picture.rows[y];
+Seen seen_at(const FlipPicture& picture, const FlipPicture::Row& row, std::uint32_t x) {
   if (x < row.first || x >= row.last) return {picture.plain_lab, picture.plain_detail, false};
   const std::size_t i = row.offset + (x - row.first);
   return {picture.lab[i], {picture.detail[0][i], picture.detail[1][i]}, picture.covered[i] != 0};
 }
 
-double flip_at(const Seen& reference, const Seen& test) {
-  const double colour = static_cast<double>(flip_colour_difference(reference.lab, test.lab));
-  if (!(colour > 0)) return 0;
-  const float edges = std::fabs(reference.detail[0] - test.detail[0]),
-              points = std::fabs(reference.detail[1] - test.detail[1]);
-  const double feature = std::sqrt(static_cast<double>(std::max(edges, points)) / std::sqrt(2.0));
-  return portable::pow(colour, 1 - std::min(1.0, feature));
-}
-
 /// Calls visit(x, y, FLIP) for every pixel that either picture covers, row by row.
 template <class Visit>
 void for_each_flip(const FlipPicture& reference, const FlipPicture& test, Visit&& visit) {
+  FlipBlock block;
   for (std::size_t y = 0; y < reference.rows.size(); ++y) {
+    const auto finish = [&] {
+      block.compute();
+      for (std::size_t i = 0; i < block.count(); ++i) visit(std::size_t{block.column(i)}, y, block.flip(i));
+      block.clear();
+    };
     const FlipPicture::Row &a = reference.rows[y], &b = test.rows[y];
     const bool none = a.first == a.last;
     const std::uint32_t first = none ? b.first : b.first == b.last ? a.first : std::min(a.first, b.first);
     for (std::uint32_t x = first; x < std::max(a.last, b.last); ++x) {
-      const Seen r = seen_at(reference, y, x), t = seen_at(test, y, x);
-      if (r.covered || t.covered) visit(std::size_t{x}, y, flip_at(r, t));
+      const Seen r = seen_at(reference, a, x), t = seen_at(test, b, x);
+      if (!r.covered && !t.covered) continue;
+      block.add(x, r.lab, t.lab, r.detail[0] - t.detail[0], r.detail[1] - t.detail[1]);
+      if (block.is_full()) finish();
     }
+    if (block.count() > 0) finish();
   }
 }
 
@@ -221,31 +297,21 @@ FlipPicture prepare_flip(const Picture& picture) {
     const auto covered = picture.covered.begin() + static_cast<std::ptrdiff_t>(y * picture.side_px);
     out.covered.insert(out.covered.end(), covered + row.first, covered + row.last);
   }
-  Channels channels = channels_of(picture, spans);
-  std::array<SpanImage, 3>& opponent = channels.opponent;
-  opponent[0] = eye_filtered(opponent[0], spans, {{1, 0.0047}});
-  opponent[1] = eye_filtered(opponent[1], spans, {{1, 0.0053}});
-  opponent[2] = eye_filtered(opponent[2], spans, {{34.1, 0.04}, {13.5, 0.025}});
   out.lab.resize(spans.count);
-  for (std::size_t i = 0; i < out.lab.size(); ++i)
-    out.lab[i] = flip_lab({opponent[0].values[i], opponent[1].values[i], opponent[2].values[i]});
-  out.plain_lab = flip_lab({opponent[0].plain, opponent[1].plain, opponent[2].plain});
-  const Kernel* features[2] = {&feature_kernels().edge, &feature_kernels().point};
-  for (std::size_t k = 0; k < 2; ++k) {
-    SpanImage detail = feature_strength(channels.luma, spans, *features[k]);
-    out.detail[k] = std::move(detail.values);
-    out.plain_detail[k] = detail.plain;
-  }
+  for (std::vector<float>& detail : out.detail) detail.resize(spans.count);
+  FlipFilter filter(picture, spans);
+  for (std::size_t y = 0; y < spans.rows.size(); ++y) filter.read(y, out);
+  filter.read_plain(out);
   return out;
 }
 
 FlipSum compare_flip(const FlipPicture& reference, const FlipPicture& test) {
   FlipSum sum;
-  for_each_flip(reference, test, [&](std::size_t, std::size_t, double flip) {
-    const auto step = static_cast<std::size_t>(std::clamp(flip * kFlipSteps, 0.0, kFlipSteps - 1.0));
+  for_each_flip(reference, test, [&](std::size_t, std::size_t, float flip) {
+    const auto step = static_cast<std::size_t>(std::min(flip * kFlipSteps, kFlipSteps - 1.f));
     ++sum.pixels;
     ++sum.histogram[flip > 0 ? step + 1 : 0];
-    sum.sum += flip;
+    sum.sum += static_cast<double>(flip);
   });
   return sum;
 }
@@ -253,9 +319,7 @@ FlipSum compare_flip(const FlipPicture& reference, const FlipPicture& test) {
 std::vector<float> flip_map(const FlipPicture& reference, const FlipPicture& test) {
   const std::size_t side = reference.rows.size();
   std::vector<float> map(side * side, 0);
-  for_each_flip(reference, test, [&](std::size_t x, std::size_t y, double flip) {
-    map[y * side + x] = static_cast<float>(flip);
-  });
+  for_each_flip(reference, test, [&](std::size_t x, std::size_t y, float flip) { map[y * side + x] = flip; });
   return map;
 }
 

@@ -7,7 +7,7 @@
 #include "format/base/portable_math.h"
 #include "format/base/srgb.h"
 #include "stages/measure/cie_lab.h"
-#include "stages/measure/pixel_spans.h"
+#include "stages/measure/filtered_rows.h"
 #include "stages/measure/sampled_curve.h"
 
 namespace texmesh {
@@ -58,8 +58,8 @@ class Gaussian {
   std::vector<float> weights_;
 };
 
-measure::SpanImage under_window(const measure::SpanImage& image, const measure::PixelSpans& spans) {
-  static const measure::Kernel window = [] {
+const measure::Kernel& window() {
+  static const measure::Kernel kernel = [] {
     constexpr double kDeviation = 1.5;
     measure::Kernel k;
     double sum = 0;
@@ -68,30 +68,33 @@ measure::SpanImage under_window(const measure::SpanImage& image, const measure::
       k.push_back(static_cast<float>(portable::exp(-i * i / (2 * kDeviation * kDeviation)) / sum));
     return k;
   }();
-  return measure::filtered(image, spans, window, window);
+  return kernel;
 }
 
-measure::SpanImage product(const measure::SpanImage& a, const measure::SpanImage& b) {
-  measure::SpanImage out{a.values, a.plain * b.plain};
-  for (std::size_t i = 0; i < out.values.size(); ++i) out.values[i] *= b.values[i];
-  return out;
-}
+/// Values under the window, row by row as they come: all that is in memory at once fits into a cache.
+class Windowed {
+ public:
+  Windowed(const measure::PixelSpans& spans, float plain)
+      : spans_(spans), rows_(spans, plain, window()), row_(measure::whole_blocks(spans.side_px)) {}
+  float plain() const { return measure::filtered_plain(rows_.plain(), window()); }
+  /// Row y. Rows are asked for one after the other; `values_of(row)` gives those of its span.
+  template <class ValuesOf>
+  const std::vector<float>& row(std::size_t y, ValuesOf&& values_of) {
+    for (; made_ < std::min(spans_.rows.size(), y + window().size() / 2 + 1); ++made_)
+      rows_.make(made_, values_of(made_));
+    rows_.read(y, window(), row_.data());
+    return row_;
+  }
+
+ private:
+  const measure::PixelSpans& spans_;
+  measure::FilteredRows rows_;
+  std::vector<float> row_;
+  std::size_t made_ = 0;
+};
 
 float luma_of(Vec3f c) {
   return 0.2126f * srgb_curve()(c.x) + 0.7152f * srgb_curve()(c.y) + 0.0722f * srgb_curve()(c.z);
-}
-
-/// The values of a picture's spans on wider ones.
-measure::SpanImage on_spans(const measure::SpanImage& image, const measure::PixelSpans& from,
-                            const measure::PixelSpans& to) {
-  measure::SpanImage out{std::vector<float>(to.count, image.plain), image.plain};
-  for (std::size_t y = 0; y < to.rows.size(); ++y) {
-    const measure::PixelSpans::Row &a = from.rows[y], &b = to.rows[y];
-    if (a.first == a.last) continue;
-    std::copy_n(image.values.begin() + static_cast<std::ptrdiff_t>(a.offset), a.last - a.first,
-                out.values.begin() + static_cast<std::ptrdiff_t>(b.offset + (a.first - b.first)));
-  }
-  return out;
 }
 
 struct Windows {
@@ -139,15 +142,32 @@ LumaPicture prepare_luma(const Picture& picture) {
   out.covered = picture.covered;
   if (picture.linear.empty()) return out;
   out.spans = measure::shown_spans(picture);
-  out.luma.values.resize(out.spans.count);
+  for (measure::SpanImage* image : {&out.luma, &out.mean, &out.square_mean})
+    image->values.resize(out.spans.count);
+  out.luma.plain = luma_of(picture.linear[0]);
+  Windowed mean(out.spans, out.luma.plain), square_mean(out.spans, out.luma.plain * out.luma.plain);
+  std::vector<float> squares(picture.side_px);
+  const auto values_of = [&](std::size_t y) {
+    const measure::PixelSpans::Row& row = out.spans.rows[y];
+    float* const luma = out.luma.values.data() + row.offset;
+    for (std::size_t x = row.first; x < row.last; ++x)
+      luma[x - row.first] = luma_of(picture.linear[y * picture.side_px + x]);
+    return luma;
+  };
+  const auto squares_of = [&](std::size_t y) {
+    const measure::PixelSpans::Row& row = out.spans.rows[y];
+    const float* const luma = out.luma.values.data() + row.offset;
+    for (std::size_t i = 0; i < row.last - row.first; ++i) squares[i] = luma[i] * luma[i];
+    return squares.data();
+  };
   for (std::size_t y = 0; y < out.spans.rows.size(); ++y) {
     const measure::PixelSpans::Row& row = out.spans.rows[y];
-    for (std::size_t x = row.first; x < row.last; ++x)
-      out.luma.values[row.offset + (x - row.first)] = luma_of(picture.linear[y * picture.side_px + x]);
+    const std::size_t count = row.last - row.first;
+    std::copy_n(mean.row(y, values_of).begin(), count, out.mean.values.data() + row.offset);
+    std::copy_n(square_mean.row(y, squares_of).begin(), count, out.square_mean.values.data() + row.offset);
   }
-  out.luma.plain = luma_of(picture.linear[0]);
-  out.mean = under_window(out.luma, out.spans);
-  out.square_mean = under_window(product(out.luma, out.luma), out.spans);
+  out.mean.plain = mean.plain();
+  out.square_mean.plain = square_mean.plain();
   return out;
 }
 
@@ -157,17 +177,25 @@ ComparedPicture prepare_comparison(const Picture& picture) {
 
 PictureDifference compare_luma(const LumaPicture& reference, const LumaPicture& test) {
   const measure::PixelSpans both = measure::union_of(reference.spans, test.spans);
-  const measure::SpanImage products = under_window(
-      product(on_spans(reference.luma, reference.spans, both), on_spans(test.luma, test.spans, both)), both);
+  Windowed products(both, reference.luma.plain * test.luma.plain);
+  std::vector<float> row_products(both.side_px);
+  const auto products_of = [&](std::size_t at) {
+    const auto y = static_cast<std::uint32_t>(at);
+    const measure::PixelSpans::Row& row = both.rows[y];
+    for (std::uint32_t x = row.first; x < row.last; ++x)
+      row_products[x - row.first] = reference.luma.at(reference.spans, x, y) * test.luma.at(test.spans, x, y);
+    return row_products.data();
+  };
   PictureDifference sum;
   for (std::uint32_t y = 0; y < both.rows.size(); ++y) {
     const measure::PixelSpans::Row& row = both.rows[y];
+    const std::vector<float>& product = products.row(y, products_of);
     for (std::uint32_t x = row.first; x < row.last; ++x) {
       const std::size_t at = std::size_t{y} * both.side_px + x;
       if (!reference.covered[at] && !test.covered[at]) continue;
       sum.ssim += ssim_of({reference.mean.at(reference.spans, x, y), test.mean.at(test.spans, x, y),
                            reference.square_mean.at(reference.spans, x, y),
-                           test.square_mean.at(test.spans, x, y), products.at(both, x, y)});
+                           test.square_mean.at(test.spans, x, y), product[x - row.first]});
       ++sum.pixels;
     }
   }

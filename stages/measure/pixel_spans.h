@@ -1,5 +1,5 @@
 #pragma once
-// Filters that cost by what a picture shows, not by its size.
+// What of a picture filters have to look at: they cost by what it shows, not by its size (filtered_rows.h).
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -39,9 +39,5 @@ struct SpanImage {
     return x >= row.first && x < row.last ? values[row.offset + (x - row.first)] : plain;
   }
 };
-
-/// As if the whole picture were filtered; borders are replicated.
-SpanImage filtered(const SpanImage& image, const PixelSpans& spans, const Kernel& along_x,
-                   const Kernel& along_y);
 
 }  // namespace texmesh::measure

@@ -33,6 +33,7 @@ using quality::ShownMip;
 using quality::ShownTexture;
 using quality::ShownTextures;
 using quality::SizeCells;
+using quality::SizeTask;
 using quality::SmallerSize;
 using quality::source_texture;
 using quality::Studio;
@@ -48,19 +49,20 @@ using quality::ViewPart;
 
 constexpr std::size_t kSizes = 3;  // of the table
 
-/// All displayed heights that are rendered, rising.
+/// A displayed height that is rendered whatever comes out, and the one between it and the next lower one.
 struct Height {
-  double displayed_px = 0;
+  double displayed_px = 0, between_px = 0;
   std::optional<std::size_t> rank;  // among the table's sizes
 };
+/// Rising, each twice the one before.
 std::vector<Height> heights_below(double largest_px) {
   std::vector<Height> heights;
-  for (std::size_t half = 0;; ++half) {
-    double px = std::ldexp(largest_px, -static_cast<int>(half / 2));
-    if (half % 2 == 1) px *= std::sqrt(0.5);
-    const bool in_table = half % 2 == 0 && half / 2 < kSizes;
+  for (std::size_t halvings = 0;; ++halvings) {
+    const double px = std::ldexp(largest_px, -static_cast<int>(halvings));
+    const bool in_table = halvings < kSizes;
     if (px < kLeastSwitchPx && !in_table) break;
-    heights.push_back({px, in_table ? std::optional(kSizes - 1 - half / 2) : std::nullopt});
+    heights.push_back(
+        {px, px * std::sqrt(0.5), in_table ? std::optional(kSizes - 1 - halvings) : std::nullopt});
   }
   std::reverse(heights.begin(), heights.end());
   return heights;
@@ -124,12 +126,22 @@ class SwitchSizes {
   const std::vector<std::uint8_t>& alive() const { return alive_; }
   const std::vector<float>& display_px() const { return display_px_; }
 
-  void judge(const Cells& geometry, double displayed_px) {
+  /// Of scales that have passed all heights so far. Returns those that fail here.
+  std::vector<std::uint8_t> judge(const Cells& geometry, double displayed_px) {
+    std::vector<std::uint8_t> failed(alive_.size(), 0);
     for (std::size_t k = 1; k < alive_.size(); ++k) {
       if (!alive_[k]) continue;
       alive_[k] = passes(geometry[k], options_, threshold_share(displayed_px, options_));
       if (alive_[k]) display_px_[k] = static_cast<float>(displayed_px);
+      failed[k] = !alive_[k];
     }
+    return failed;
+  }
+  /// Of scales that have passed the height below and failed the one above.
+  void judge_between(const Cells& geometry, const std::vector<std::uint8_t>& scales, double displayed_px) {
+    for (std::size_t k = 1; k < scales.size(); ++k)
+      if (scales[k] && passes(geometry[k], options_, threshold_share(displayed_px, options_)))
+        display_px_[k] = static_cast<float>(displayed_px);
   }
 
  private:
@@ -138,19 +150,39 @@ class SwitchSizes {
   std::vector<float> display_px_;
 };
 
+ViewPart views_at(double displayed_px, const QualityOptions& options) {
+  return is_small(displayed_px, options) ? ViewPart::kAll : ViewPart::kLarge;
+}
+
 /// The views in which scales are rendered: those that still pass, and what the table needs of a size beside.
 std::vector<std::optional<ViewPart>> rendered_scales(const std::vector<std::uint8_t>& alive,
                                                      const Height& height, const QualityOptions& options) {
   const std::size_t n = alive.size();
   std::vector<std::optional<ViewPart>> out(n);
   for (std::size_t k = 1; k < n; ++k) {
-    if (alive[k]) out[k] = is_small(height.displayed_px, options) ? ViewPart::kAll : ViewPart::kLarge;
+    if (alive[k]) out[k] = views_at(height.displayed_px, options);
     if (alive[k] || !height.rank) continue;
     if (*height.rank == 0) out[k] = ViewPart::kAll;
     if (*height.rank == 1 && (n - 1 - k) % 2 == 0) out[k] = ViewPart::kLarge;
     if (*height.rank == 2 && (k == 1 || k + 1 == n)) out[k] = ViewPart::kLargest;
   }
   return out;
+}
+
+/// Half octaves are rendered for the scales alone that fail the octave above.
+void judge_size(const SizeCells& cells, const Height& height, const TextureSampler& sampler,
+                const QualityOptions& options, Studio& studio, SwitchSizes& sizes,
+                const RunContext& context) {
+  if (height.displayed_px < kLeastSwitchPx) return;
+  const std::vector<std::uint8_t> failed = sizes.judge(cells.geometry, height.displayed_px);
+  if (height.between_px < kLeastSwitchPx || std::ranges::find(failed, 1) == failed.end()) return;
+  SizeTask task;
+  task.scales.resize(failed.size());
+  for (std::size_t k = 0; k < failed.size(); ++k)
+    if (failed[k]) task.scales[k] = views_at(height.between_px, options);
+  SizeCells between{height.between_px, {}, {}, {}};
+  render_size(sampler, task, studio, between, context);
+  sizes.judge_between(between.geometry, failed, height.between_px);
 }
 
 std::vector<SizeCells> render_heights(const TextureSampler& sampler, const QualityOptions& options,
@@ -160,11 +192,10 @@ std::vector<SizeCells> render_heights(const TextureSampler& sampler, const Quali
   for (std::size_t i = 0; i < heights.size(); ++i) {
     context.check_cancelled();
     context.report(static_cast<double>(i + 1) / static_cast<double>(heights.size() + 1));
-    const double px = heights[i].displayed_px;
-    SizeCells cells{px, {}, {}, {}};
+    SizeCells cells{heights[i].displayed_px, {}, {}, {}};
     render_size(sampler, {rendered_scales(sizes.alive(), heights[i], options), heights[i].rank}, studio,
                 cells, context);
-    if (px >= kLeastSwitchPx) sizes.judge(cells.geometry, px);
+    judge_size(cells, heights[i], sampler, options, studio, sizes, context);
     if (heights[i].rank) table_cells.push_back(std::move(cells));
   }
   return table_cells;

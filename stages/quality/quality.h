@@ -11,7 +11,7 @@
 
 namespace texmesh {
 
-inline constexpr int kQualityVersion = 13;
+inline constexpr int kQualityVersion = 14;
 
 struct QualityOptions {
   int views = 4;
@@ -46,12 +46,14 @@ struct QualityOptions {
 ///   show that the renderer knows: base colour with alpha, metallic-roughness, normal, occlusion, emission;
 ///   all of them read with mips, whatever the sampler says, where scales are compared, and as the source's
 ///   samplers read where textures are.
-/// - Heights: largest_px, and all that are sqrt(2) apart below it, down to kLeastSwitchPx. The table's sizes
-///   are the largest, its half and its quarter.
+/// - Heights: largest_px, its half and so on down to kLeastSwitchPx; half octaves between for scales alone
+/// that
+///   pass the height below and fail the one above. The table's sizes are the largest, its half and its
+///   quarter.
 /// - Switch sizes: a scale passes a height when in every view the mean of FLIP is at most flip_mean and its
 ///   95th percentile at most flip_p95. The switch size is the largest height such that the scale passes it
-///   and all lower ones; 0 = it passes nowhere. FLIP publishes no thresholds: these are our own. S_0 has
-///   kAnyDisplayPx.
+///   and all lower ones that are looked at; 0 = it passes nowhere. FLIP publishes no thresholds: these are
+///   our own. S_0 has kAnyDisplayPx.
 /// - Views: all at heights up to a quarter of the largest, which the table's least size is; `large_views` of
 ///   them for scales at larger heights, for coarser mips and for samples of everything together; every second
 ///   one of these for textures at larger sizes. 0.9 of both thresholds count where fewer than 12 views speak,

@@ -35,10 +35,10 @@ Vec3f read_level(const Level& level, Vec3f direction) {
   const float scale = static_cast<float>(level.side - 2) * 0.5f;
   // Texel i of a level has its middle at (i - 0.5) / (side - 2) of the square.
   const auto end = static_cast<float>(level.side - 1);
-  const float x = render::clamped((place.x + 1) * scale + 0.5f, 0, end),
-              y = render::clamped((place.y + 1) * scale + 0.5f, 0, end);
+  const float x = clamped((place.x + 1) * scale + 0.5f, 0, end),
+              y = clamped((place.y + 1) * scale + 0.5f, 0, end);
   const auto most = static_cast<std::int32_t>(level.side) - 2;
-  const std::int32_t column = std::min(render::floor_of(x), most), row = std::min(render::floor_of(y), most);
+  const std::int32_t column = std::min(floor_of(x), most), row = std::min(floor_of(y), most);
   const float fx = x - static_cast<float>(column), fy = y - static_cast<float>(row);
   const Vec3f* texel =
       level.texels.data() + static_cast<std::size_t>(row) * level.side + static_cast<std::size_t>(column);
@@ -59,7 +59,7 @@ Level make_level(std::uint32_t inner_side, const RunContext& context, F value_of
       };
       const Vec3f value =
           value_of(render::octahedral_direction({place(i % level.side), place(i / level.side)}));
-      for (int k = 0; k < 3; ++k) level.texels[i][k] = render::clamped(value[k], 0, 65504);
+      for (int k = 0; k < 3; ++k) level.texels[i][k] = clamped(value[k], 0, 65504);
     }
   });
   return level;
@@ -143,8 +143,7 @@ std::array<Vec3f, kHarmonics> irradiance_of(const Radiance& radiance) {
       const Vec3f light = radiance(to_float(d));
       const std::array<double, kHarmonics> basis = harmonics_of(d);
       for (std::size_t k = 0; k < kHarmonics; ++k)
-        for (int c = 0; c < 3; ++c)
-          sum[k][c] += basis[k] * static_cast<double>(render::clamped(light[c], 0, 65504));
+        for (int c = 0; c < 3; ++c) sum[k][c] += basis[k] * static_cast<double>(clamped(light[c], 0, 65504));
     }
   }
   std::array<Vec3f, kHarmonics> out;
@@ -176,8 +175,7 @@ Vec3f diffuse_light(const RenderEnvironment& environment, Vec3f normal) {
   const std::array<float, kHarmonics> basis = harmonics_of(normal);
   Vec3f sum;
   for (std::size_t k = 0; k < kHarmonics; ++k) sum = sum + environment.irradiance[k] * basis[k];
-  return {render::clamped(sum.x, 0, 65504), render::clamped(sum.y, 0, 65504),
-          render::clamped(sum.z, 0, 65504)};
+  return {clamped(sum.x, 0, 65504), clamped(sum.y, 0, 65504), clamped(sum.z, 0, 65504)};
 }
 
 Vec3f specular_light(const RenderEnvironment& environment, Vec3f direction, float roughness) {

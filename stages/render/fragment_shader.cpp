@@ -68,10 +68,9 @@ FragmentShader::Read FragmentShader::prepared_read(const TextureSlot& use,
   return {&texture, site};
 }
 
-FragmentPlace FragmentShader::place_of(std::uint32_t pixel, const RenderFragment& fragment) const {
-  FragmentPlace out;
-  out.corner = (*scene_.triangles)[fragment.triangle];
-  out.weight = {1 - fragment.weight1 - fragment.weight2, fragment.weight1, fragment.weight2};
+TriangleInView FragmentShader::triangle_in_view(std::uint32_t triangle) const {
+  TriangleInView out;
+  out.corner = (*scene_.triangles)[triangle];
   const Mesh& mesh = *scene_.mesh;
   std::array<Vec3d, 3> seen;
   Vec3d position[3];
@@ -83,14 +82,21 @@ FragmentPlace FragmentShader::place_of(std::uint32_t pixel, const RenderFragment
   out.edge1 = position[1] - position[0];
   out.edge2 = position[2] - position[0];
   out.face = to_float(normalized(cross(out.edge1, out.edge2)));
+  out.planes = edge_planes(seen);
+  return out;
+}
 
+FragmentPlace FragmentShader::place_of(std::uint32_t pixel, const RenderFragment& fragment,
+                                       const TriangleInView& triangle) const {
+  FragmentPlace out{
+      triangle, {1 - fragment.weight1 - fragment.weight2, fragment.weight1, fragment.weight2}, {}, {}, {}};
   const Vec2d mean = mean_of_samples(fragment.mask);
   const double x = (pixel % side_px_) * kSamplesPerSide + mean.x + 0.5 - frame_.half,
                y = (pixel / side_px_) * kSamplesPerSide + mean.y + 0.5 - frame_.half;
   const double right = x * frame_.pitch, down = y * frame_.pitch;
   out.to_viewer = to_float(normalized(camera_.z + camera_.y * down - camera_.x * right));
 
-  const EdgePlanes planes = edge_planes(seen);
+  const EdgePlanes& planes = triangle.planes;
   double sum = 0, a = 0, b = 0;
   for (const Plane& e : planes.edge) sum += e.at(x, y), a += e.a, b += e.b;
   const double step = kSamplesPerSide / sum;
@@ -319,7 +325,9 @@ void FragmentShader::colours_of(std::uint32_t pixel, const RenderFragment& fragm
                                 std::span<FragmentColour> out) const {
   const RenderMaterial& material = scene_.material_of(fragment.triangle);
   const Prepared& prepared = materials_[static_cast<std::size_t>(&material - scene_.materials->data())];
-  const FragmentPlace place = place_of(pixel, fragment);
+  if (scratch.triangle != fragment.triangle) scratch.in_view = triangle_in_view(fragment.triangle);
+  scratch.triangle = fragment.triangle;
+  const FragmentPlace place = place_of(pixel, fragment, scratch.in_view);
   Fragment here(*this, prepared, place, fragment.back != 0, scratch);
   for (std::size_t v = 0; v < out.size(); ++v) out[v] = here.colour(prepared.variants[v]);
 }

@@ -1,6 +1,7 @@
 #pragma once
 // Inside the room only: the colours of a triangle within a pixel.
 #include <array>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -10,15 +11,20 @@
 
 namespace texmesh::render {
 
+/// What all fragments of a triangle have in common.
+struct TriangleInView {
+  Triangle corner{};   // wedges
+  Vec3d edge1, edge2;  // from corner 0, object units
+  Vec3f face;          // unit normal of the triangle's front
+  EdgePlanes planes;
+};
+
 /// What is known of a fragment's place before its material is read.
-struct FragmentPlace {
-  Triangle corner{};              // wedges
+struct FragmentPlace : TriangleInView {
   std::array<float, 3> weight{};  // of the corners
   // Change of the weights of corners 1 and 2 by a pixel to the right, and downwards.
   Vec2f weight_dx, weight_dy;
-  Vec3d edge1, edge2;  // from corner 0, object units
-  Vec3f face;          // unit normal of the triangle's front
-  Vec3f to_viewer;     // unit
+  Vec3f to_viewer;  // unit
 
   /// Interpolates values of the wedges.
   template <class T>
@@ -48,7 +54,9 @@ class FragmentShader {
   /// Memory of one thread.
   struct Scratch {
     std::vector<TextureSite> sites;
-    std::vector<std::uint8_t> known;  // per site
+    std::vector<std::uint8_t> known;        // per site
+    std::optional<std::uint32_t> triangle;  // of the last fragment, which mostly is the next one's, too
+    TriangleInView in_view;
   };
   /// One colour per variant.
   void colours_of(std::uint32_t pixel, const RenderFragment& fragment, Scratch& scratch,
@@ -80,7 +88,9 @@ class FragmentShader {
                              const std::vector<RenderTexture>& textures) const;
   Read prepared_read(const TextureSlot& use, const std::vector<RenderTexture>& textures,
                      std::vector<Site>& sites) const;
-  FragmentPlace place_of(std::uint32_t pixel, const RenderFragment& fragment) const;
+  TriangleInView triangle_in_view(std::uint32_t triangle) const;
+  FragmentPlace place_of(std::uint32_t pixel, const RenderFragment& fragment,
+                         const TriangleInView& triangle) const;
   Vec4f vertex_colour(const FragmentPlace& place) const;
   Vec3f interpolated_normal(const FragmentPlace& place, float& roughness) const;
   bool vertex_frame(const FragmentPlace& place, Vec3f frame[2]) const;

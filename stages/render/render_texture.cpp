@@ -33,8 +33,8 @@ float folded(float u, Wrap wrap) {
   constexpr float kMost = 1e6f;
   if (!(u >= -kMost && u <= kMost)) return 0;
   if (wrap == Wrap::kClamp) return render::saturated(u);
-  if (wrap == Wrap::kRepeat) return u - static_cast<float>(render::floor_of(u));
-  const float t = u - 2 * static_cast<float>(render::floor_of(u * 0.5f));
+  if (wrap == Wrap::kRepeat) return u - static_cast<float>(floor_of(u));
+  const float t = u - 2 * static_cast<float>(floor_of(u * 0.5f));
   return t > 1 ? 2 - t : t;
 }
 
@@ -43,7 +43,7 @@ Axis bilinear_axis(float u, std::uint32_t size, Wrap wrap) {
   const auto n = static_cast<std::int32_t>(size);
   const float at = u * static_cast<float>(n) - 0.5f;
   Axis axis;
-  axis.first = render::floor_of(at);
+  axis.first = floor_of(at);
   axis.second = axis.first + 1;
   axis.part = at - static_cast<float>(axis.first);
   if (wrap == Wrap::kRepeat) {
@@ -59,7 +59,7 @@ Axis bilinear_axis(float u, std::uint32_t size, Wrap wrap) {
 /// `u` is folded.
 std::int32_t nearest_texel(float u, std::uint32_t size) {
   const auto n = static_cast<std::int32_t>(size);
-  return std::clamp(render::floor_of(u * static_cast<float>(n)), 0, n - 1);
+  return std::clamp(floor_of(u * static_cast<float>(n)), 0, n - 1);
 }
 
 template <std::size_t N>
@@ -110,7 +110,7 @@ float level_of(Vec2<std::uint32_t> size_px, const TextureFootprint& footprint) {
   const float longer = std::max(dot(dx, dx), dot(dy, dy));
   // Not finite: the derivatives of a triangle seen edge-on. The smallest level shows its mean.
   if (!(longer < 1e30f)) return 100;
-  return longer > 1e-30f ? 0.5f * render::log2_of(longer) : -100;
+  return longer > 1e-30f ? 0.5f * log2_of(longer) : -100;
 }
 
 }  // namespace

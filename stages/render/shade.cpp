@@ -173,7 +173,7 @@ Picture shade(const RenderScene& scene, const Visibility& visibility,
 Vec3f tone_mapped(Vec3f linear) {
   constexpr float kStart = 0.8f - 0.04f, kDesaturation = 0.15f, kRoom = 1 - kStart;
   Vec3f c;
-  for (int k = 0; k < 3; ++k) c[k] = render::clamped(linear[k], 0, 65504);
+  for (int k = 0; k < 3; ++k) c[k] = clamped(linear[k], 0, 65504);
   const float xy = c.x < c.y ? c.x : c.y, least = xy < c.z ? xy : c.z;
   const float offset = least < 0.08f ? least - 6.25f * least * least : 0.04f;
   c = c - Vec3f{offset, offset, offset};

@@ -20,13 +20,13 @@ constexpr Vec3f kZenith{0.33f, 0.35f, 0.39f}, kHorizon{0.45f, 0.44f, 0.43f}, kGr
 constexpr float kLog2E = 1.44269504f;
 
 float lobe(Vec3f direction, Vec3f axis, float sharpness) {
-  return render::exp2_of(kLog2E * sharpness * (dot(direction, normalized(axis)) - 1));
+  return exp2_of(kLog2E * sharpness * (dot(direction, normalized(axis)) - 1));
 }
 
 }  // namespace
 
 Vec3f studio_radiance(Vec3f direction) {
-  const float up = render::clamped(direction.y, -1, 1);
+  const float up = clamped(direction.y, -1, 1);
   // The sky turns into the ground within about 20 degrees around the horizon.
   const float t = render::saturated((up + 0.18f) / 0.36f), sky = t * t * (3 - 2 * t);
   const float high = render::saturated(up);
@@ -38,8 +38,14 @@ Vec3f studio_radiance(Vec3f direction) {
 
 KeyLight studio_key_light() { return {normalized(Vec3f{0.62f, 0.72f, 0.55f}), Vec3f{1.02f, 1.0f, 0.96f}}; }
 
+// Three stages ask for it. On one thread: one that waits for others might begin the work again.
 RenderEnvironment studio_environment(const RunContext& context) {
-  return prepare_environment(studio_radiance, studio_key_light(), context);
+  static const RenderEnvironment environment = [&] {
+    RunContext serial = context;
+    serial.threads = 1;
+    return prepare_environment(studio_radiance, studio_key_light(), serial);
+  }();
+  return environment;
 }
 
 }  // namespace texmesh

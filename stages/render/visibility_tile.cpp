@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "format/base/no_index.h"
 
@@ -204,11 +205,14 @@ class Tile {
            (triangle.planes().front || input_.scene->material_of(t).double_sided);
   }
 
-  RenderFragment fragment(std::uint32_t t, std::uint32_t pixel, std::uint16_t mask, bool layer) const {
-    return TileTriangle(input_, t, left_, top_).fragment(t, pixel, mask, layer);
+  /// Neighbouring pixels mostly show the same triangle.
+  RenderFragment fragment(std::uint32_t t, std::uint32_t pixel, std::uint16_t mask, bool layer) {
+    if (!shown_ || shown_index_ != t) shown_.emplace(input_, t, left_, top_);
+    shown_index_ = t;
+    return shown_->fragment(t, pixel, mask, layer);
   }
 
-  void add_opaque(std::uint32_t pixel, std::vector<RenderFragment>& out) const {
+  void add_opaque(std::uint32_t pixel, std::vector<RenderFragment>& out) {
     const std::size_t corner = (pixel / kTilePx * kTileSamples + pixel % kTilePx) * kSamplesPerSide;
     std::uint32_t triangles[16];
     std::uint16_t masks[16];
@@ -235,6 +239,8 @@ class Tile {
   std::vector<std::uint32_t> nearest_;
   std::vector<std::uint16_t> masks_;
   std::vector<LayerHit> hits_;
+  std::optional<TileTriangle> shown_;
+  std::uint32_t shown_index_ = 0;
 };
 
 }  // namespace

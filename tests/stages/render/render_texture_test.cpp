@@ -30,10 +30,10 @@ float step_at(float u, Wrap wrap) {
 }
 
 TEST(RenderTexture, MathAgreesWithTheStandardLibrary) {
-  for (float x = 1e-30f; x < 1e30f; x *= 1.37f) EXPECT_NEAR(render::log2_of(x), std::log2(x), 2e-5);
-  for (float x = 0.5f; x < 2; x += 0.01f) EXPECT_NEAR(render::log2_of(x), std::log2(x), 1e-6);
-  for (float x = -126; x < 126; x += 0.173f) EXPECT_NEAR(render::exp2_of(x) / std::exp2(x), 1, 3e-7);
-  EXPECT_EQ(render::exp2_of(std::numeric_limits<float>::quiet_NaN()), render::exp2_of(-126));
+  for (float x = 1e-30f; x < 1e30f; x *= 1.37f) EXPECT_NEAR(log2_of(x), std::log2(x), 2e-5);
+  for (float x = 0.5f; x < 2; x += 0.01f) EXPECT_NEAR(log2_of(x), std::log2(x), 1e-6);
+  for (float x = -126; x < 126; x += 0.173f) EXPECT_NEAR(exp2_of(x) / std::exp2(x), 1, 3e-7);
+  EXPECT_EQ(exp2_of(std::numeric_limits<float>::quiet_NaN()), exp2_of(-126));
 }
 
 TEST(RenderTexture, TexelsAreReadAtTheirMiddlesAndLinearlyBetween) {

@@ -1,0 +1,111 @@
+#include "stages/measure/filtered_rows.h"
+
+#include <algorithm>
+#include <array>
+
+#if defined(__x86_64__) && defined(__GNUC__)
+#define TEXMESH_HAS_AVX2_TWIN 1
+#endif
+
+namespace texmesh::measure {
+namespace {
+
+// Products are rounded before they are added (-ffp-contract=off), so that wider vectors change no bit.
+[[gnu::always_inline]] inline void add_blocks(const Kernel& kernel, const float* const* lines,
+                                              std::size_t count, float* out) {
+  const std::size_t taps = kernel.size();
+  const float* weights = kernel.data();
+  for (std::size_t i = 0; i < count; i += kFilterBlock) {
+    float sum[kFilterBlock] = {};
+    for (std::size_t k = 0; k < taps; ++k) {
+      const float* line = lines[k] + i;
+      const float weight = weights[k];
+      for (std::size_t j = 0; j < kFilterBlock; ++j) sum[j] += line[j] * weight;
+    }
+    for (std::size_t j = 0; j < kFilterBlock; ++j) out[i + j] = sum[j];
+  }
+}
+
+void add_blocks_plain(const Kernel& kernel, const float* const* lines, std::size_t count, float* out) {
+  add_blocks(kernel, lines, count, out);
+}
+
+#ifdef TEXMESH_HAS_AVX2_TWIN
+[[gnu::target("avx2")]] void add_blocks_avx2(const Kernel& kernel, const float* const* lines,
+                                             std::size_t count, float* out) {
+  add_blocks(kernel, lines, count, out);
+}
+#endif
+
+using Lines = std::array<const float*, 2 * kFilterReach + 1>;
+
+}  // namespace
+
+bool has_avx2() {
+#ifdef TEXMESH_HAS_AVX2_TWIN
+  static const bool has = __builtin_cpu_supports("avx2");
+  return has;
+#else
+  return false;
+#endif
+}
+
+void add_lines_by(bool avx2, const Kernel& kernel, const float* const* lines, std::size_t count, float* out) {
+#ifdef TEXMESH_HAS_AVX2_TWIN
+  if (avx2) return add_blocks_avx2(kernel, lines, count, out);
+#endif
+  add_blocks_plain(kernel, lines, count, out);
+}
+
+void add_lines(const Kernel& kernel, const float* const* lines, std::size_t count, float* out) {
+  add_lines_by(has_avx2(), kernel, lines, count, out);
+}
+
+float filtered_plain(float plain, const Kernel& kernel) {
+  float sum = 0;
+  for (const float weight : kernel) sum += plain * weight;
+  return sum;
+}
+
+FilteredRows::FilteredRows(const PixelSpans& spans, float plain, const Kernel& kernel)
+    : spans_(spans),
+      kernel_(kernel),
+      plain_(plain),
+      filtered_plain_(measure::filtered_plain(plain, kernel)),
+      width_(whole_blocks(spans.side_px) + kFilterBlock),
+      padded_(width_ + 2 * kFilterReach + kFilterBlock),
+      lines_(kKept * width_, filtered_plain_),
+      written_(kKept) {}
+
+void FilteredRows::make(std::size_t y, const float* values) {
+  float* out = lines_.data() + y % kKept * width_;
+  PixelSpans::Row& old = written_[y % kKept];
+  std::fill(out + old.first, out + old.last, filtered_plain_);
+  const PixelSpans::Row& row = spans_.rows[y];
+  old = row;
+  if (row.first == row.last) return;
+  const std::size_t count = row.last - row.first, radius = kernel_.size() / 2;
+  const float before = row.first == 0 ? values[0] : plain_,
+              behind = row.last == spans_.side_px ? values[count - 1] : plain_;
+  std::fill_n(padded_.begin(), radius, before);
+  std::copy_n(values, count, padded_.begin() + static_cast<std::ptrdiff_t>(radius));
+  std::fill_n(padded_.begin() + static_cast<std::ptrdiff_t>(radius + count), radius + kFilterBlock, behind);
+  Lines taps{};
+  for (std::size_t k = 0; k < kernel_.size(); ++k) taps[k] = padded_.data() + k;
+  add_lines(kernel_, taps.data(), count, out + row.first);
+  // Of what the last block wrote behind the span, only that on the picture is read: as plain.
+  std::fill(out + row.last, out + row.first + whole_blocks(count), filtered_plain_);
+}
+
+void FilteredRows::read(std::size_t y, const Kernel& along_y, float* out) const {
+  const PixelSpans::Row& row = spans_.rows[y];
+  const std::size_t rows = spans_.rows.size(), radius = along_y.size() / 2;
+  Lines taps{};
+  for (std::size_t k = 0; k < along_y.size(); ++k) {
+    const std::size_t at = std::min(std::max(y + k, radius) - radius, rows - 1);
+    taps[k] = line(at) + row.first;
+  }
+  add_lines(along_y, taps.data(), row.last - row.first, out);
+}
+
+}  // namespace texmesh::measure
