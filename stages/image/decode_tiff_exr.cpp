@@ -3,6 +3,7 @@
 #include <dlfcn.h>
 
 #include "format/base/errors.h"
+#include "stages/image/exr_header.h"
 #include "stages/image/oiio/tiff_exr_reader.h"
 
 namespace texmesh {
@@ -41,6 +42,10 @@ const TiffExrReader& reader_for(const std::string& name, ImageFormat format) {
 
 ImageHeader read_tiff_exr_header(const std::string& name, ImageFormat format, ByteSpan bytes,
                                  const ImageLimits& limits) {
+  // OpenEXR takes the memory that an attribute claims before it reads it.
+  const auto ignore = [](std::size_t, const ExrAttribute&) {};
+  if (format == ImageFormat::kExr && !for_each_exr_attribute(bytes, ignore))
+    throw InputError(name, "image header", "attributes within the file", "one that claims to be longer");
   return reader_for(name, format).read_header(name, format, bytes, limits);
 }
 
