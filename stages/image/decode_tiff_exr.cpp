@@ -2,8 +2,9 @@
 
 #include <dlfcn.h>
 
+#include <algorithm>
+
 #include "format/base/errors.h"
-#include "stages/image/exr_header.h"
 #include "stages/image/oiio/tiff_exr_reader.h"
 
 namespace texmesh {
@@ -38,7 +39,40 @@ const TiffExrReader& reader_for(const std::string& name, ImageFormat format) {
                    module.problem);
 }
 
+/// Text up to a zero byte, which `at` is then behind; null where there is none within EXR's 255.
+std::string_view exr_text(ByteSpan bytes, std::size_t& at) {
+  const auto begin = bytes.begin() + static_cast<std::ptrdiff_t>(std::min(at, bytes.size()));
+  const auto end = std::find(begin, begin + std::min<std::ptrdiff_t>(256, bytes.end() - begin), 0);
+  if (end == bytes.end() || *end != 0) return {};
+  at += static_cast<std::size_t>(end - begin) + 1;
+  return {reinterpret_cast<const char*>(bytes.data()) + (begin - bytes.begin()),
+          static_cast<std::size_t>(end - begin)};
+}
+
 }  // namespace
+
+bool for_each_exr_attribute(ByteSpan exr,
+                            const std::function<void(std::size_t part, const ExrAttribute&)>& f) {
+  constexpr std::size_t kFlagsAt = 5, kHead = 8;
+  constexpr std::uint8_t kParts = 0x10;
+  if (exr.size() < kHead) return true;
+  const bool many = (exr[kFlagsAt] & kParts) != 0;
+  std::size_t part = 0;
+  for (std::size_t at = kHead; at < exr.size();) {
+    if (exr[at] == 0) {  // the end of a part's header; two of them end the headers
+      if (!many || ++at >= exr.size() || exr[at] == 0) return true;
+      ++part;
+    }
+    const std::string_view name = exr_text(exr, at), type = exr_text(exr, at);
+    if (!name.data() || !type.data() || exr.size() - at < 4) return true;
+    const std::size_t bytes = BytesIn(exr.subspan(at, 4), "EXR").u32();
+    at += 4;
+    if (bytes > exr.size() - at) return false;
+    f(part, ExrAttribute{name, type, exr.subspan(at, bytes)});
+    at += bytes;
+  }
+  return true;
+}
 
 ImageHeader read_tiff_exr_header(const std::string& name, ImageFormat format, ByteSpan bytes,
                                  const ImageLimits& limits) {

@@ -11,7 +11,7 @@
 #include <string_view>
 
 #include "format/base/bytes.h"
-#include "stages/image/exr_header.h"
+#include "stages/image/decode_tiff_exr.h"
 #include "stages/image/jpeg_segments.h"
 
 namespace texmesh {

@@ -1,5 +1,5 @@
-// What runs of the compiler leave to each other and what users write for them: memos, records of the cache, collections, profiles,
-// a worker's words, summaries.
+// What runs of the compiler leave to each other and what users write for them: memos, records of the cache,
+// collections, profiles, a worker's words, summaries.
 #include <unistd.h>
 
 #include <algorithm>
@@ -27,12 +27,14 @@ std::string text_of(ByteSpan bytes) { return {bytes.begin(), bytes.end()}; }
 class OneFile {
  public:
   explicit OneFile(const char* ending)
-      : path_(std::string(::access("/dev/shm", W_OK) == 0 ? "/dev/shm" : "/tmp") + "/texmesh-fuzz-" + std::to_string(::getpid()) + ending) {}
+      : path_(std::string(::access("/dev/shm", W_OK) == 0 ? "/dev/shm" : "/tmp") + "/texmesh-fuzz-" +
+              std::to_string(::getpid()) + ending) {}
   ~OneFile() { ::unlink(path_.c_str()); }
   OneFile(const OneFile&) = delete;
   OneFile& operator=(const OneFile&) = delete;
   const std::string& write(ByteSpan bytes) const {
-    std::ofstream(path_, std::ios::binary).write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+    std::ofstream(path_, std::ios::binary)
+        .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
     return path_;
   }
 
@@ -45,7 +47,8 @@ bool read_memo(ByteSpan input) {
   static const OneFile finished(".seg"), open(".open");
   if (input.empty()) return false;
   std::vector<MemoEntry> entries;
-  const auto segment = MemoSegment::read((input[0] & 1 ? finished : open).write(input.subspan(1)), [&](const MemoEntry& e) { entries.push_back(e); });
+  const auto segment = MemoSegment::read((input[0] & 1 ? finished : open).write(input.subspan(1)),
+                                         [&](const MemoEntry& e) { entries.push_back(e); });
   require(segment != nullptr, "a segment that cannot be opened");
   for (const MemoEntry& e : entries) {
     try {
@@ -61,10 +64,11 @@ bool read_memo(ByteSpan input) {
 bool read_memo_record(ByteSpan input) {
   try {
     const MemoRecord record = unpack_record(input);
-    require(pack_record(unpack_record(pack_record(record))) == pack_record(record), "a memo's record changed by being packed");
+    require(pack_record(unpack_record(pack_record(record))) == pack_record(record),
+            "a memo's record changed by being packed");
     return true;
-  } catch (const FormatError&) {
-    return false;
+  } catch (const FormatError& e) {
+    return refused(e);
   }
 }
 
@@ -82,10 +86,9 @@ bool unless_refused(const Read& read) {
   try {
     read();
     return true;
-  } catch (const InputError&) {
-  } catch (const FormatError&) {
+  } catch (const Error& e) {
+    return refused(e);
   }
-  return false;
 }
 
 bool read_as_profile(ByteSpan input) {
@@ -96,7 +99,9 @@ bool read_as_profile(ByteSpan input) {
 bool read_as_collection(ByteSpan input) {
   static const CompileOptions base;
   return unless_refused([&] {
-    read_collection(text_of(input), "fuzz", base, [](const std::string&) { return std::vector<std::string>{"a.obj", "b/c.glb"}; });
+    read_collection(text_of(input), "fuzz", base, [](const std::string&) {
+      return std::vector<std::string>{"a.obj", "b/c.glb"};
+    });
   });
 }
 
@@ -137,7 +142,8 @@ MemoRecord a_record() {
 }
 
 std::vector<Bytes> memo_seeds() {
-  const std::string folder = std::filesystem::temp_directory_path() / ("texmesh-fuzz-memo-" + std::to_string(::getpid()));
+  const std::string folder =
+      std::filesystem::temp_directory_path() / ("texmesh-fuzz-memo-" + std::to_string(::getpid()));
   MemoSegmentWriter writer(folder);
   for (const char* name : {"a", "b"}) {
     writer.add(memo_name(name), a_record());
@@ -183,10 +189,12 @@ Bytes sealed_again(ByteSpan input) {
 }
 
 std::vector<Bytes> collection_seeds() {
-  return {to_bytes(R"({"version":1,"options":{"ladder":{"codec":"jpeg"}},"about":{"licence":"CC-BY-4.0"},
+  return {
+      to_bytes(R"({"version":1,"options":{"ladder":{"rungs":[30,60]}},"about":{"licence":"CC-BY-4.0"},
     "patterns":[{"match":"*.obj","options":{"import":{"up":"z"}}}],
     "models":[{"input":"a/b.obj","output":"b.texmesh","about":{"title":"B"}},{"input":"c.glb"}]})"),
-          to_bytes(R"({"version":1,"folders":[{"folder":"x"}],"patterns":[{"match":"*a*b*c?d"}]})")};
+      to_bytes(
+          R"({"version":1,"folders":["x"],"patterns":[{"match":"*a*b*c?[d-e]","about":{"title":"D"}}]})")};
 }
 
 std::vector<Bytes> summary_seeds() {
@@ -195,7 +203,8 @@ std::vector<Bytes> summary_seeds() {
   m.model = "a.obj", m.output = "out/a.texmesh", m.package = "a.texmesh";
   m.result = ModelResult::kOk, m.ran = true, m.bytes = 5, m.seconds = 1;
   summary.models = {m, m};
-  summary.models[1].package = "b.texmesh", summary.models[1].result = ModelResult::kFailed, summary.models[1].error_kind = "input";
+  summary.models[1].package = "b.texmesh", summary.models[1].result = ModelResult::kFailed,
+  summary.models[1].error_kind = "input";
   summary.shard = Shard{1, 4};
   summary.collection = "0123";
   return {to_bytes(write_summary(summary))};
@@ -204,9 +213,12 @@ std::vector<Bytes> summary_seeds() {
 std::vector<Bytes> event_seeds() {
   WorkerReport report;
   report.error_kind = "input", report.error_file = "a.obj", report.error_message = "bad";
-  return {to_bytes(error_event(report) + "\n{\"event\":\"stage-started\",\"stage\":\"import\"}\n{\"event\":\"stage-finished\",\"stage\":\"import\",\"result\":\"hit\"}\n"
-                   "{\"event\":\"result\",\"bytes\":5,\"sha256\":\"00\"}\n"),
-          to_bytes(files_to_json(a_record().files))};
+  return {
+      to_bytes(
+          error_event(report) +
+          "\n{\"event\":\"stage-started\",\"stage\":\"import\"}\n{\"event\":\"stage-finished\",\"stage\":\"import\",\"result\":\"hit\"}\n"
+          "{\"event\":\"result\",\"bytes\":5,\"sha256\":\"00\"}\n"),
+      to_bytes(files_to_json(a_record().files))};
 }
 
 }  // namespace
@@ -216,9 +228,15 @@ void add_batch_targets(std::vector<Target>& list) {
       list.end(),
       {{"memo", true, read_memo, memo_seeds, Shape::kBytes, with_block_digests},
        {"memo_record", true, read_memo_record, [] { return std::vector<Bytes>{pack_record(a_record())}; }},
-       {"cache_record", true, read_cache_record, cache_seeds, Shape::kBytes, sealed_again,
+       {"cache_record",
+        true,
+        read_cache_record,
+        cache_seeds,
+        Shape::kBytes,
+        sealed_again,
         {"\"version\": 2", "\"key\": {", "\"outputs\": [", "\"name\":", "\"sha256\":", "\"bytes\":"}},
-       {"profile", false, read_as_profile, [] { return std::vector<Bytes>{to_bytes(write_profile(CompileOptions{}))}; }, Shape::kJson},
+       {"profile", false, read_as_profile,
+        [] { return std::vector<Bytes>{to_bytes(write_profile(CompileOptions{}))}; }, Shape::kJson},
        {"collection", false, read_as_collection, collection_seeds, Shape::kJson},
        {"summary", false, read_as_summary, summary_seeds, Shape::kJson},
        {"events", false, read_events, event_seeds}});

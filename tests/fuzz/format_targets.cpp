@@ -28,8 +28,8 @@ bool unless_format_error(ByteSpan input) {
   try {
     kRead(input);
     return true;
-  } catch (const FormatError&) {
-    return false;
+  } catch (const FormatError& e) {
+    return refused(e);
   }
 }
 
@@ -134,7 +134,6 @@ Bytes with_digests(ByteSpan input, std::size_t fixed, std::size_t record, std::s
   return bytes;
 }
 
-
 /// Blocks go in part by part, so that their digests do not stand in the way.
 void read_split_stream(ByteSpan input) {
   constexpr SplitLimits kLimits{20000, 40000};
@@ -158,11 +157,11 @@ void read_split_stream(ByteSpan input) {
               "a face without three points");
 }
 
-
 // ---- seeds
 
 std::vector<Bytes> packages() {
-  return {texmesh::testing::make_package(0), texmesh::testing::make_package(1), texmesh::testing::make_package(2)};
+  return {texmesh::testing::make_package(0), texmesh::testing::make_package(1),
+          texmesh::testing::make_package(2)};
 }
 
 /// The entry of each of the packages.
@@ -213,22 +212,21 @@ std::vector<Bytes> split_seeds() {
 }  // namespace
 
 void add_format_targets(std::vector<Target>& list) {
-  list.insert(
-      list.end(),
-      {{"container", true, unless_format_error<read_container_again>, packages, Shape::kContainer},
-       {"package", true, unless_format_error<read_package>, packages, Shape::kContainer},
-       {"manifest", true, unless_format_error<read_manifest_twice>, manifests, Shape::kJson},
-       {"textures", false, unless_format_error<read_textures_twice>,
-        [] { return entries(kTexturesPath); }, Shape::kJson},
-       {"quality", false, unless_format_error<read_quality_twice>, [] { return entries(kQualityPath); },
-        Shape::kJson},
-       {"about", false, unless_format_error<read_about_twice>, about_seeds, Shape::kJson},
-       {"index", true, unless_format_error<read_index_twice>, [] { return entries(kIndexPath); },
-        Shape::kBytes, [](ByteSpan b) { return with_digests(b, 16, 44, 8); }},
-       {"tables", true, unless_format_error<read_tables_twice>, [] { return entries(kTablesPath); },
-        Shape::kBytes, [](ByteSpan b) { return with_digests(b, 16, 36, 0); }},
-       {"thesis", true, unless_format_error<read_thesis_twice>, thesis_seeds},
-       {"stream", true, unless_format_error<read_split_stream>, split_seeds}});
+  list.insert(list.end(),
+              {{"container", true, unless_format_error<read_container_again>, packages, Shape::kContainer},
+               {"package", true, unless_format_error<read_package>, packages, Shape::kContainer},
+               {"manifest", true, unless_format_error<read_manifest_twice>, manifests, Shape::kJson},
+               {"textures", false, unless_format_error<read_textures_twice>,
+                [] { return entries(kTexturesPath); }, Shape::kJson},
+               {"quality", false, unless_format_error<read_quality_twice>,
+                [] { return entries(kQualityPath); }, Shape::kJson},
+               {"about", false, unless_format_error<read_about_twice>, about_seeds, Shape::kJson},
+               {"index", true, unless_format_error<read_index_twice>, [] { return entries(kIndexPath); },
+                Shape::kBytes, [](ByteSpan b) { return with_digests(b, 16, 44, 8); }},
+               {"tables", true, unless_format_error<read_tables_twice>, [] { return entries(kTablesPath); },
+                Shape::kBytes, [](ByteSpan b) { return with_digests(b, 16, 36, 0); }},
+               {"thesis", true, unless_format_error<read_thesis_twice>, thesis_seeds},
+               {"stream", true, unless_format_error<read_split_stream>, split_seeds}});
 }
 
 }  // namespace texmesh::fuzz

@@ -1,9 +1,13 @@
-// libFuzzer's entry to all targets; tests/fuzz/run drives it. The environment variable TEXMESH_FUZZ_TARGET names the target.
+// libFuzzer's entry to all targets; tests/fuzz/run drives it. The environment variable TEXMESH_FUZZ_TARGET
+// names the target.
 //   texmesh_fuzz --list                  a line per target: name, runs that are wanted
-//   texmesh_fuzz --seeds FOLDER          writes the target's seeds, known troublemakers and dictionary (FOLDER.dict)
+//   texmesh_fuzz --seeds FOLDER          writes the target's seeds, known troublemakers and dictionary
+//   (FOLDER.dict)
 #include <sanitizer/allocator_interface.h>
+#include <sys/time.h>
 
 #include <atomic>
+#include <csignal>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
@@ -18,6 +22,7 @@ namespace texmesh::fuzz {
 namespace {
 
 constexpr std::size_t kSmallInput = 100'000;
+constexpr int kMostSeconds = 1;
 constexpr std::int64_t kMostHeapBytes = 256 << 20;  // that a small input may make a reader take
 
 std::atomic<std::int64_t> heap_bytes{0};
@@ -35,11 +40,20 @@ void count_gone(const volatile void* p) {
   if (p) heap_bytes -= static_cast<std::int64_t>(__sanitizer_get_allocated_size(const_cast<const void*>(p)));
 }
 
+/// libFuzzer's own limit goes by the clock on the wall, which means nothing on a machine with other work.
+void limit_processor_time(int seconds) {
+  const itimerval limit{{0, 0}, {seconds, 0}};
+  ::setitimer(ITIMER_PROF, &limit, nullptr);
+}
+void end_slow_run(int) { require(false, "more than a second of processor time"); }
+
 const Target& chosen_target() {
   static const Target* target = [] {
     const char* name = std::getenv("TEXMESH_FUZZ_TARGET");
     const Target* t = name ? find_target(name) : nullptr;
-    if (!t) std::fprintf(stderr, "TEXMESH_FUZZ_TARGET is %s; texmesh_fuzz --list names the targets\n", name ? name : "not set");
+    if (!t)
+      std::fprintf(stderr, "TEXMESH_FUZZ_TARGET is %s; texmesh_fuzz --list names the targets\n",
+                   name ? name : "not set");
     if (!t) std::exit(2);
     return t;
   }();
@@ -47,7 +61,8 @@ const Target& chosen_target() {
 }
 
 void write_file(const std::filesystem::path& path, const Bytes& bytes) {
-  std::ofstream(path, std::ios::binary).write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  std::ofstream(path, std::ios::binary)
+      .write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
 }
 
 /// As libFuzzer reads it: "..." with everything but letters and digits as \xNN.
@@ -70,7 +85,8 @@ void write_seeds(const std::string& folder) {
   std::filesystem::create_directories(folder);
   int number = 0;
   for (const auto& list : {target.seeds(), regressions(target.name)})
-    for (const Bytes& seed : list) write_file(std::filesystem::path(folder) / ("seed" + std::to_string(number++)), seed);
+    for (const Bytes& seed : list)
+      write_file(std::filesystem::path(folder) / ("seed" + std::to_string(number++)), seed);
   write_file(folder + ".dict", to_bytes(dictionary(target.words)));
 }
 
@@ -90,18 +106,22 @@ extern "C" int LLVMFuzzerInitialize(int* argc, char*** argv) {
   }
   chosen_target();
   __sanitizer_install_malloc_and_free_hooks(count_new, count_gone);
+  std::signal(SIGPROF, end_slow_run);
   return 0;
 }
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   heap_bytes = 0;
   watched = size < kSmallInput;
+  limit_processor_time(kMostSeconds);
   chosen_target().run({data, size});
+  limit_processor_time(0);
   watched = false;
   return 0;
 }
 
-extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size, std::size_t most, unsigned seed) {
+extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size, std::size_t most,
+                                               unsigned seed) {
   const auto change = [](texmesh::Bytes input, std::size_t growth) {
     const std::size_t length = input.size();
     input.resize(length + growth);

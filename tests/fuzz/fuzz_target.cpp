@@ -31,4 +31,10 @@ void require(bool good, const char* what) {
   std::abort();
 }
 
+bool refused(const std::exception& why) {
+  static const bool say = std::getenv("TEXMESH_FUZZ_SAY") != nullptr;
+  if (say) std::fprintf(stderr, "refused: %s\n", why.what());
+  return false;
+}
+
 }  // namespace texmesh::fuzz

@@ -1,6 +1,7 @@
 #pragma once
 // What is fuzzed: every reader of bytes that somebody else may have written. fuzz_main.cpp hands the targets
 // to libFuzzer; tests/system/fuzz_replay_test.cpp runs them over seeds, known troublemakers and mutations.
+#include <exception>
 #include <string>
 #include <vector>
 
@@ -41,6 +42,9 @@ std::vector<Bytes> regressions(const std::string& target);
 
 /// Aborts, with the sentence, unless `good`.
 void require(bool good, const char* what);
+
+/// False; with TEXMESH_FUZZ_SAY in the environment says why.
+bool refused(const std::exception& why);
 
 inline Bytes to_bytes(std::string_view text) { return {text.begin(), text.end()}; }
 

@@ -31,8 +31,8 @@ bool import_as_gltf(ByteSpan input) {
   try {
     import_gltf("fuzz", input, files, reader_limits(), {});
     return true;
-  } catch (const InputError&) {
-    return false;
+  } catch (const InputError& e) {
+    return refused(e);
   }
 }
 
@@ -41,7 +41,9 @@ bool import_built(const GltfBuilder& b) { return import_as_gltf(b.glb()); }
 bool check_as_glb(ByteSpan input) {
   Findings findings;
   check_glb(input, "fuzz", findings, GlbRules::kStandalone);
-  return findings.empty();
+  if (findings.empty()) return true;
+  const Finding& f = findings.list().front();
+  return refused(FormatError(f.entry, f.field, f.expected, f.found));
 }
 
 /// The lengths of the file and of its chunks fit its bytes.
@@ -69,7 +71,8 @@ constexpr int kComponents[] = {5120, 5121, 5122, 5123, 5125, 5126, 5124};
 
 json sparse_from(Choices& c) {
   json sparse = {{"count", c.number(2)}};
-  sparse["indices"] = {{"bufferView", c.below(4)}, {"byteOffset", c.number(2)}, {"componentType", kComponents[c.below(7)]}};
+  sparse["indices"] = {
+      {"bufferView", c.below(4)}, {"byteOffset", c.number(2)}, {"componentType", kComponents[c.below(7)]}};
   sparse["values"] = {{"bufferView", c.below(4)}, {"byteOffset", c.number(2)}};
   return sparse;
 }
@@ -78,7 +81,8 @@ json accessor_from(Choices& c) {
   json a = {{"type", kTypes[c.below(5)]}, {"componentType", kComponents[c.below(7)]}};
   const std::uint32_t flags = c.number(1);
   if (flags & 1) a["normalized"] = true;
-  if (!(flags & 2)) a["bufferView"] = c.below(4);
+  const std::uint32_t view = c.below(4);
+  if (!(flags & 2)) a["bufferView"] = view;
   if (const std::uint32_t offset = c.number(2)) a["byteOffset"] = offset;
   a["count"] = c.number(flags & 8 ? 4 : 1);
   if (flags & 4) a["sparse"] = sparse_from(c);
@@ -113,7 +117,9 @@ std::vector<Bytes> accessor_seeds() {
   std::vector<Bytes> list;
   for (const bool sparse : {false, true}) {
     BytesOut out;
-    const auto view = [&](int offset, int length) { out.u16(static_cast<unsigned>(offset)), out.u16(static_cast<unsigned>(length)), out.u8(0); };
+    const auto view = [&](int offset, int length) {
+      out.u16(static_cast<unsigned>(offset)), out.u16(static_cast<unsigned>(length)), out.u8(0);
+    };
     view(0, 48), view(48, 32), view(80, 6), view(88, 24);
     const auto accessor = [&](int type, int component, int flags, int v, int count) {
       for (const int x : {type, component, flags, v, 0, 0, count}) out.u8(static_cast<unsigned>(x));
@@ -147,9 +153,11 @@ bool read_draco(ByteSpan input) {
     int component;
   };
   const std::uint32_t points = c.number(2), corners = 3 * c.number(2);
-  for (const Kind& kind : {Kind{"POSITION", "VEC3", 5126}, Kind{"TEXCOORD_0", "VEC2", 5126}, Kind{"NORMAL", "VEC3", 5126}}) {
+  for (const Kind& kind :
+       {Kind{"POSITION", "VEC3", 5126}, Kind{"TEXCOORD_0", "VEC2", 5126}, Kind{"NORMAL", "VEC3", 5126}}) {
     json more = {{"min", {0, 0, 0}}, {"max", {1, 1, 1}}};
-    attributes[kind.name] = b.accessor(-1, kind.type, kind.component, points, std::string(kind.name) == "POSITION" ? more : json());
+    attributes[kind.name] = b.accessor(-1, kind.type, kind.component, points,
+                                       std::string(kind.name) == "POSITION" ? more : json());
     extension["attributes"][kind.name] = c.number(1);
   }
   const int indices = b.accessor(-1, "SCALAR", flags & 1 ? 5123 : 5125, corners);
@@ -173,7 +181,8 @@ Bytes draco_seed(draco::MeshEncoderMethod method, bool quantised) {
     std::array<std::array<float, 3>, 3> p{}, n{};
     std::array<std::array<float, 2>, 3> u{};
     for (std::size_t k = 0; k < 3; ++k) {
-      const float fx = static_cast<float>(corner[t % 2][k][0]) / kSide, fy = static_cast<float>(corner[t % 2][k][1]) / kSide;
+      const float fx = static_cast<float>(corner[t % 2][k][0]) / kSide,
+                  fy = static_cast<float>(corner[t % 2][k][1]) / kSide;
       p[k] = {fx, fy, fx * fy}, n[k] = {0, 0, 1}, u[k] = {fx, fy};
     }
     const draco::FaceIndex f(static_cast<std::uint32_t>(t));
@@ -208,34 +217,43 @@ bool read_meshopt(ByteSpan input) {
   constexpr const char* kModes[] = {"ATTRIBUTES", "TRIANGLES", "INDICES"};
   constexpr const char* kFilters[] = {"NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL", "COLOR"};
   Choices c(input);
-  const std::uint32_t mode = c.below(3), filter = c.below(5), stride = c.number(1), count = c.number(2), flags = c.number(1);
+  const std::uint32_t mode = c.below(3), filter = c.below(5), stride = c.number(1), count = c.number(2),
+                      flags = c.number(1);
   const int component = kComponents[c.below(7)];
   const char* type = kTypes[c.below(5)];
   GltfBuilder b;
   const int stream = b.view_of(Bytes(c.rest().begin(), c.rest().end()));
-  json extension = {{"buffer", 0}, {"byteOffset", b.json["bufferViews"][0]["byteOffset"]}, {"byteLength", c.rest().size()},
-                    {"byteStride", stride}, {"count", count}, {"mode", kModes[mode]}};
+  json extension = {{"buffer", 0},
+                    {"byteOffset", b.json["bufferViews"][0]["byteOffset"]},
+                    {"byteLength", c.rest().size()},
+                    {"byteStride", stride},
+                    {"count", count},
+                    {"mode", kModes[mode]}};
   if (filter != 0) extension["filter"] = kFilters[filter];
   json view = {{"buffer", 1}, {"byteOffset", 0}, {"byteLength", std::uint64_t{stride} * count}};
   if (mode == 0) view["byteStride"] = stride;
   const char* name = flags & 1 ? "KHR_meshopt_compression" : "EXT_meshopt_compression";
   view["extensions"][name] = extension;
   b.json["bufferViews"][static_cast<std::size_t>(stream)] = view;
-  const int compressed = b.accessor(0, mode == 0 ? type : "SCALAR", component, count, {{"normalized", (flags & 2) != 0}});
+  const int compressed =
+      b.accessor(0, mode == 0 ? type : "SCALAR", component, count, {{"normalized", (flags & 2) != 0}});
   const int floats = b.attribute<float>({0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0}, "VEC3");
   json attributes = {{"POSITION", mode == 0 && flags & 4 ? compressed : floats}};
   if (mode == 0 && !(flags & 4)) attributes[flags & 8 ? "NORMAL" : "TEXCOORD_0"] = compressed;
   b.mesh(attributes, mode == 0 ? json() : json{{"indices", compressed}});
   b.node({{"mesh", 0}});
-  b.json["buffers"] = {{{"byteLength", b.bin.size()}},
-                       {{"byteLength", std::uint64_t{stride} * count}, {"extensions", {{name, {{"fallback", true}}}}}}};
+  b.json["buffers"] = {
+      {{"byteLength", b.bin.size()}},
+      {{"byteLength", std::uint64_t{stride} * count}, {"extensions", {{name, {{"fallback", true}}}}}}};
   b.json["extensionsUsed"] = b.json["extensionsRequired"] = {name};
   return import_built(b);
 }
 
-Bytes meshopt_seed(int mode, int stride, std::size_t count, int component, int type, int flags, const Bytes& stream) {
+Bytes meshopt_seed(int mode, int stride, std::size_t count, int component, int type, int flags,
+                   const Bytes& stream) {
   BytesOut out;
-  out.u8(static_cast<unsigned>(mode)), out.u8(0), out.u8(static_cast<unsigned>(stride)), out.u16(count), out.u8(static_cast<unsigned>(flags));
+  out.u8(static_cast<unsigned>(mode)), out.u8(0), out.u8(static_cast<unsigned>(stride)), out.u16(count),
+      out.u8(static_cast<unsigned>(flags));
   out.u8(static_cast<unsigned>(component)), out.u8(static_cast<unsigned>(type));
   out.raw(stream);
   return out.finish();
@@ -265,13 +283,14 @@ GltfBuilder rich() {
   p["attributes"]["COLOR_0"] = b.attribute<std::uint16_t>(std::vector<std::uint16_t>(12, 9), "VEC3");
   p["attributes"]["NORMAL"] = b.attribute<std::int8_t>(std::vector<std::int8_t>(12, 9), "VEC3");
   p["material"] = 0;
-  b.json["materials"] = {{{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}},
-                          {"extensions",
-                           {{"KHR_materials_specular", {{"specularTexture", {{"index", 0}}}}},
-                            {"KHR_materials_clearcoat", {{"clearcoatFactor", 0.5}}}}}},
-                         {{"extensions",
-                           {{"KHR_materials_pbrSpecularGlossiness",
-                             {{"diffuseTexture", {{"index", 0}}}, {"specularGlossinessTexture", {{"index", 0}}}}}}}}};
+  b.json["materials"] = {
+      {{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}},
+       {"extensions",
+        {{"KHR_materials_specular", {{"specularTexture", {{"index", 0}}}}},
+         {"KHR_materials_clearcoat", {{"clearcoatFactor", 0.5}}}}}},
+      {{"extensions",
+        {{"KHR_materials_pbrSpecularGlossiness",
+          {{"diffuseTexture", {{"index", 0}}}, {"specularGlossinessTexture", {{"index", 0}}}}}}}}};
   b.json["textures"] = {{{"source", 0}, {"sampler", 0}}};
   b.json["samplers"] = {{{"wrapS", 33071}}};
   b.json["images"] = {{{"bufferView", b.view_of(texmesh::testing::png())}}};
@@ -282,12 +301,22 @@ GltfBuilder rich() {
   b.json["extensionsUsed"] = {"KHR_xmp_json_ld", "KHR_materials_specular", "KHR_materials_clearcoat",
                               "KHR_materials_pbrSpecularGlossiness"};
   b.json["extensions"]["KHR_xmp_json_ld"]["packets"] = {
-      {{"@context", {{"dc", "http://purl.org/dc/elements/1.1/"}}}, {"dc:title", {{"@type", "rdf:Alt"}, {"rdf:_1", {{"@value", "A"}}}}}}};
+      {{"@context", {{"dc", "http://purl.org/dc/elements/1.1/"}}},
+       {"dc:title", {{"@type", "rdf:Alt"}, {"rdf:_1", {{"@value", "A"}}}}}}};
   b.json["asset"]["extensions"]["KHR_xmp_json_ld"] = {{"packet", 0}};
   return b;
 }
 
 std::vector<Bytes> glb_seeds() { return {rich().glb(), texmesh::testing::quad().glb()}; }
+
+/// What a checker of packages finds nothing wrong with.
+std::vector<Bytes> checked_seeds() {
+  GltfBuilder b = texmesh::testing::quad();
+  b.json["accessors"][0]["max"] = {1, 1, 0};
+  b.json["scenes"] = {{{"nodes", {0}}}};
+  b.json["scene"] = 0;
+  return {b.glb()};
+}
 
 std::vector<Bytes> gltf_seeds() {
   GltfBuilder plain = texmesh::testing::quad();
@@ -296,7 +325,8 @@ std::vector<Bytes> gltf_seeds() {
   data["buffers"][0] = {{"byteLength", 3}, {"uri", "data:application/octet-stream;base64,AAAA"}};
   data["images"] = {{{"uri", "a.png"}}};
   data["bufferViews"] = {{{"buffer", 0}, {"byteLength", 3}}};
-  data["accessors"] = {{{"type", "VEC3"}, {"componentType", 5126}, {"count", 3}, {"min", {0, 0, 0}}, {"max", {0, 0, 0}}}};
+  data["accessors"] = {
+      {{"type", "VEC3"}, {"componentType", 5126}, {"count", 3}, {"min", {0, 0, 0}}, {"max", {0, 0, 0}}}};
   data["meshes"] = {{{"primitives", {{{"attributes", {{"POSITION", 0}}}}}}}};
   return {plain.gltf("a.bin"), to_bytes(data.dump())};
 }
@@ -306,8 +336,7 @@ std::vector<Bytes> gltf_seeds() {
 void add_gltf_targets(std::vector<Target>& list) {
   list.insert(list.end(), {{"gltf", false, import_as_gltf, gltf_seeds, Shape::kJson},
                            {"glb", false, import_as_gltf, glb_seeds, Shape::kGlb, with_lengths},
-                           {"glb_check", false, check_as_glb, [] { return std::vector<Bytes>{texmesh::testing::quad().glb()}; },
-                            Shape::kGlb, with_lengths},
+                           {"glb_check", false, check_as_glb, checked_seeds, Shape::kGlb, with_lengths},
                            {"accessors", false, read_accessors, accessor_seeds},
                            {"draco", false, read_draco, draco_seeds},
                            {"meshopt", false, read_meshopt, meshopt_seeds}});

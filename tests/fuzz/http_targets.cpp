@@ -1,5 +1,5 @@
-// Answers of a server, as the reader of packages over HTTP sees them, without a network: connections are made to pairs of sockets that
-// hold the next answer. curl itself is part of what runs.
+// Answers of a server, as the reader of packages over HTTP sees them, without a network: connections are made
+// to pairs of sockets that hold the next answer. curl itself is part of what runs.
 #include <dlfcn.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -8,8 +8,8 @@
 #include <cerrno>
 #include <deque>
 
-#include "delivery/cpp/package/package_reader.h"
 #include "delivery/cpp/package/http_store.h"
+#include "delivery/cpp/package/package_reader.h"
 #include "format/base/errors.h"
 #include "tests/format/container/package_fixture.h"
 #include "tests/fuzz/fuzz_target.h"
@@ -70,21 +70,32 @@ std::vector<Bytes> http_seeds() {
   const Bytes package = texmesh::testing::make_package(0);
   const std::string body(package.begin(), package.end()), total = std::to_string(body.size());
   const std::string separator(1, static_cast<char>(kNextAnswer));
-  const std::string range = "HTTP/1.1 206 Partial Content\r\nETag: \"a\"\r\nContent-Range: bytes 0-" + std::to_string(body.size() - 1) + "/" + total +
-                            "\r\nContent-Length: " + total + "\r\n\r\n" + body;
+  const std::string range = "HTTP/1.1 206 Partial Content\r\nETag: \"a\"\r\nContent-Range: bytes 0-" +
+                            std::to_string(body.size() - 1) + "/" + total + "\r\nContent-Length: " + total +
+                            "\r\n\r\n" + body;
   const std::string whole = "HTTP/1.1 200 OK\r\nContent-Length: " + total + "\r\n\r\n" + body;
-  return {to_bytes(range), to_bytes(whole + separator + "HTTP/1.1 404 Not Found\r\nContent-Length: 0\r\n\r\n" + separator + whole),
-          to_bytes("HTTP/1.1 503 Busy\r\nRetry-After: 1\r\n\r\n" + separator + range),
-          to_bytes("HTTP/1.1 302 Found\r\nLocation: http://127.0.0.1/b.texmesh\r\nContent-Length: 0\r\n\r\n" + separator + range)};
+  return {
+      to_bytes(range),
+      to_bytes(whole + separator + "HTTP/1.1 404 Not Found\r\nContent-Length: 0\r\n\r\n" + separator + whole),
+      to_bytes("HTTP/1.1 503 Busy\r\nRetry-After: 1\r\n\r\n" + separator + range),
+      to_bytes("HTTP/1.1 302 Found\r\nLocation: http://127.0.0.1/b.texmesh\r\nContent-Length: 0\r\n\r\n" +
+               separator + range)};
 }
 
 }  // namespace
 
 void add_http_targets(std::vector<Target>& list) {
-  list.push_back({"http", false, read_answers, http_seeds, Shape::kBytes, nullptr,
-                  {"HTTP/1.1 200 OK\r\n", "HTTP/1.1 206 Partial Content\r\n", "HTTP/1.1 404 No\r\n", "HTTP/2 200\r\n",
-                   "Content-Range: bytes 0-99/100\r\n", "Content-Length: ", "ETag: \"a\"\r\n", "ETag: W/\"a\"\r\n", "Retry-After: 9\r\n",
-                   "Transfer-Encoding: chunked\r\n", "Connection: close\r\n", "Location: /b\r\n", "\r\n\r\n", std::string(1, '\x1e')}});
+  list.push_back(
+      {"http",
+       false,
+       read_answers,
+       http_seeds,
+       Shape::kBytes,
+       nullptr,
+       {"HTTP/1.1 200 OK\r\n", "HTTP/1.1 206 Partial Content\r\n", "HTTP/1.1 404 No\r\n", "HTTP/2 200\r\n",
+        "Content-Range: bytes 0-99/100\r\n", "Content-Length: ", "ETag: \"a\"\r\n", "ETag: W/\"a\"\r\n",
+        "Retry-After: 9\r\n", "Transfer-Encoding: chunked\r\n", "Connection: close\r\n", "Location: /b\r\n",
+        "\r\n\r\n", std::string(1, '\x1e')}});
 }
 
 }  // namespace texmesh::fuzz

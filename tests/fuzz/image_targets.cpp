@@ -32,10 +32,11 @@ bool read_image(ByteSpan input) {
     Image image = probe_image("fuzz", {input.begin(), input.end()}, image_limits());
     image.honour_profile = true;
     const Pixels pixels = decode_image(image, FloatEncoding::kSrgb);
-    require(pixels.data.size() == std::size_t{image.width_px} * image.height_px * pixels.channels, "an image of another size than its header's");
+    require(pixels.data.size() == std::size_t{image.width_px} * image.height_px * pixels.channels,
+            "an image of another size than its header's");
     return true;
-  } catch (const InputError&) {
-    return false;
+  } catch (const InputError& e) {
+    return refused(e);
   }
 }
 
@@ -54,8 +55,8 @@ bool read_coefficients(ByteSpan input) {
     if (layout)
       for (const auto& steps : layout->quantisers) sum ^= quality_of(steps);
     return sum != -1;
-  } catch (const InputError&) {
-    return false;
+  } catch (const InputError& e) {
+    return refused(e);
   }
 }
 
@@ -65,8 +66,8 @@ bool read_fragment(ByteSpan input) {
     decode_fragment_file(kCodec, input, 1 << 20);
     decode_fragment_file_luma(kCodec, input, 1 << 20);
     return true;
-  } catch (const FormatError&) {
-    return false;
+  } catch (const FormatError& e) {
+    return refused(e);
   }
 }
 
@@ -77,10 +78,11 @@ bool join_streams(ByteSpan input) {
   const ByteSpan tables = c.rest().first(cut), stream = c.rest().subspan(cut);
   try {
     const Bytes file = join_fragment(Codec::kJpeg, tables, stream);
-    require(std::ranges::equal(split_fragment(Codec::kJpeg, tables, file, 0), stream), "a stream changed by being joined and split");
+    require(std::ranges::equal(split_fragment(Codec::kJpeg, tables, file, 0), stream),
+            "a stream changed by being joined and split");
     return true;
-  } catch (const FormatError&) {
-    return false;
+  } catch (const FormatError& e) {
+    return refused(e);
   }
 }
 
@@ -129,7 +131,8 @@ std::vector<Bytes> jpeg_seeds() {
   progressive.attribute("Compression", "jpeg:60");
   progressive.attribute("jpeg:progressive", 1);
   return {colour, jpeg_bytes(9, 9, 1), texmesh::testing::cmyk_jpeg(9, 8, {0, 100, 200, 50}, true),
-          texmesh::testing::encode_image("jpeg", 20, 20, 3, texmesh::testing::test_picture(20, 20, 3), OIIO::TypeDesc::UINT8, progressive)};
+          texmesh::testing::encode_image("jpeg", 20, 20, 3, texmesh::testing::test_picture(20, 20, 3),
+                                         OIIO::TypeDesc::UINT8, progressive)};
 }
 
 template <Codec kCodec>
@@ -156,11 +159,13 @@ std::vector<Bytes> joined_seeds() {
 }
 
 template <class T>
-std::vector<Bytes> encoded(const char* writer, OIIO::TypeDesc type, const std::vector<int>& channel_counts = {1, 3, 4}) {
+std::vector<Bytes> encoded(const char* writer, OIIO::TypeDesc type,
+                           const std::vector<int>& channel_counts = {1, 3, 4}) {
   std::vector<Bytes> list;
   for (const int channels : channel_counts) {
     std::vector<T> samples;
-    for (const std::uint8_t s : texmesh::testing::test_picture(7, 5, channels)) samples.push_back(static_cast<T>(s));
+    for (const std::uint8_t s : texmesh::testing::test_picture(7, 5, channels))
+      samples.push_back(static_cast<T>(s));
     OIIO::ImageSpec same_every_time;
     same_every_time.attribute("DateTime", "2026:01:01 00:00:00");
     list.push_back(texmesh::testing::encode_image(writer, 7, 5, channels, samples, type, same_every_time));
@@ -188,8 +193,10 @@ Bytes with_checksums(ByteSpan input) {
     std::size_t length = 0;
     for (std::size_t k = 0; k < 4; ++k) length = length << 8 | bytes[at + k];
     if (length > bytes.size() - at - 12) break;
-    const auto crc = static_cast<std::uint32_t>(::crc32(0, bytes.data() + at + 4, static_cast<unsigned>(length + 4)));
-    for (std::size_t k = 0; k < 4; ++k) bytes[at + 8 + length + k] = static_cast<std::uint8_t>(crc >> (24 - 8 * k));
+    const auto crc =
+        static_cast<std::uint32_t>(::crc32(0, bytes.data() + at + 4, static_cast<unsigned>(length + 4)));
+    for (std::size_t k = 0; k < 4; ++k)
+      bytes[at + 8 + length + k] = static_cast<std::uint8_t>(crc >> (24 - 8 * k));
     at += 12 + length;
   }
   return bytes;
@@ -207,9 +214,12 @@ std::vector<Bytes> icc_seeds() {
     return out;
   };
   const std::vector<std::pair<std::string_view, Bytes>> tags{
-      {"rXYZ", tag("XYZ ", {0x6fa2, 0x38f5, 0x0390})},  {"gXYZ", tag("XYZ ", {0x6299, 0xb785, 0x18da})},
-      {"bXYZ", tag("XYZ ", {0x24a0, 0x0f84, 0xb6cf})},  {"rTRC", tag("curv", {1, 0x02330000})},
-      {"gTRC", tag("curv", {2, 0x0000ffff})},           {"bTRC", tag("para", {0x00030000, 0x26666, 0xf2a7, 0x0d59, 0x13d0, 0x0a5b})},
+      {"rXYZ", tag("XYZ ", {0x6fa2, 0x38f5, 0x0390})},
+      {"gXYZ", tag("XYZ ", {0x6299, 0xb785, 0x18da})},
+      {"bXYZ", tag("XYZ ", {0x24a0, 0x0f84, 0xb6cf})},
+      {"rTRC", tag("curv", {1, 0x02330000})},
+      {"gTRC", tag("curv", {2, 0x0000ffff})},
+      {"bTRC", tag("para", {0x00030000, 0x26666, 0xf2a7, 0x0d59, 0x13d0, 0x0a5b})},
       {"kTRC", tag("curv", {0})}};
   std::vector<Bytes> list;
   for (const char* space : {"RGB ", "GRAY"}) {
@@ -246,33 +256,60 @@ std::vector<Bytes> exif_seeds() {
 
 std::vector<Bytes> metadata_seeds() {
   std::vector<Bytes> list;
-  for (const auto& seeds : {jpeg_seeds(), png_seeds(), webp_seeds(), tiff_seeds(), exr_seeds()}) list.push_back(seeds[0]);
+  for (const auto& seeds : {jpeg_seeds(), png_seeds(), webp_seeds(), tiff_seeds(), exr_seeds()})
+    list.push_back(seeds[0]);
   return list;
 }
 
 }  // namespace
 
 void add_image_targets(std::vector<Target>& list) {
-  list.insert(
-      list.end(),
-      {{"jpeg", false, read_image<ImageFormat::kJpeg>, jpeg_seeds},
-       {"coefficients", true, read_coefficients, jpeg_seeds},
-       {"fragment", false, read_fragment<Codec::kJpeg>, fragment_seeds<Codec::kJpeg>},
-       {"fragment_progressive", false, read_fragment<Codec::kJpegProgressive>, fragment_seeds<Codec::kJpegProgressive>},
-       {"fragment_webp", false, read_fragment<Codec::kWebp>, fragment_seeds<Codec::kWebp>},
-       {"fragment_join", true, join_streams, joined_seeds},
-       {"png", false, read_image<ImageFormat::kPng>, png_seeds, Shape::kBytes, with_checksums,
-        {"IHDR", "PLTE", "IDAT", "IEND", "tRNS", "gAMA", "cHRM", "iCCP", "sRGB", "acTL", "eXIf"}},
-       {"webp", false, read_image<ImageFormat::kWebp>, webp_seeds, Shape::kBytes, nullptr,
-        {"RIFF", "WEBP", "VP8 ", "VP8L", "VP8X", "ALPH", "ICCP", "ANIM", "ANMF", "EXIF"}},
-       {"tiff", false, read_image<ImageFormat::kTiff>, tiff_seeds},
-       {"exr", false, read_image<ImageFormat::kExr>, exr_seeds, Shape::kBytes, nullptr,
-        {"channels", "chlist", "compression", "dataWindow", "displayWindow", "box2i", "lineOrder", "chromaticities", "tiles", "type",
-         "deepscanline", "multiPartImage"}},
-       {"icc", false, read_icc, icc_seeds, Shape::kBytes, nullptr, {"acsp", "RGB ", "GRAY", "curv", "para", "XYZ ", "A2B0", "kTRC"}},
-       {"exif", false, read_exif, exif_seeds},
-       {"image_metadata", false, read_metadata, metadata_seeds, Shape::kBytes, nullptr,
-        {"ICC_PROFILE", "Exif", "iCCP", "gAMA", "cHRM", "ICCP", "chromaticities", "Adobe"}}});
+  list.insert(list.end(),
+              {{"jpeg", false, read_image<ImageFormat::kJpeg>, jpeg_seeds},
+               {"coefficients", true, read_coefficients, jpeg_seeds},
+               {"fragment", false, read_fragment<Codec::kJpeg>, fragment_seeds<Codec::kJpeg>},
+               {"fragment_progressive", false, read_fragment<Codec::kJpegProgressive>,
+                fragment_seeds<Codec::kJpegProgressive>},
+               {"fragment_webp", false, read_fragment<Codec::kWebp>, fragment_seeds<Codec::kWebp>},
+               {"fragment_join", true, join_streams, joined_seeds},
+               {"png",
+                false,
+                read_image<ImageFormat::kPng>,
+                png_seeds,
+                Shape::kBytes,
+                with_checksums,
+                {"IHDR", "PLTE", "IDAT", "IEND", "tRNS", "gAMA", "cHRM", "iCCP", "sRGB", "acTL", "eXIf"}},
+               {"webp",
+                false,
+                read_image<ImageFormat::kWebp>,
+                webp_seeds,
+                Shape::kBytes,
+                nullptr,
+                {"RIFF", "WEBP", "VP8 ", "VP8L", "VP8X", "ALPH", "ICCP", "ANIM", "ANMF", "EXIF"}},
+               {"tiff", false, read_image<ImageFormat::kTiff>, tiff_seeds},
+               {"exr",
+                false,
+                read_image<ImageFormat::kExr>,
+                exr_seeds,
+                Shape::kBytes,
+                nullptr,
+                {"channels", "chlist", "compression", "dataWindow", "displayWindow", "box2i", "lineOrder",
+                 "chromaticities", "tiles", "type", "deepscanline", "multiPartImage"}},
+               {"icc",
+                false,
+                read_icc,
+                icc_seeds,
+                Shape::kBytes,
+                nullptr,
+                {"acsp", "RGB ", "GRAY", "curv", "para", "XYZ ", "A2B0", "kTRC"}},
+               {"exif", false, read_exif, exif_seeds},
+               {"image_metadata",
+                false,
+                read_metadata,
+                metadata_seeds,
+                Shape::kBytes,
+                nullptr,
+                {"ICC_PROFILE", "Exif", "iCCP", "gAMA", "cHRM", "ICCP", "chromaticities", "Adobe"}}});
 }
 
 }  // namespace texmesh::fuzz

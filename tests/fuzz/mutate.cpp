@@ -18,7 +18,8 @@ using Json = nlohmann::ordered_json;
 constexpr std::size_t kMostGrowth = 4096;
 
 Json odd_value(Random& random) {
-  static const Json kOdd = Json::parse(R"([0,1,2,3,-1,4,255,256,65535,65536,2147483647,2147483648,4294967295,4294967296,9007199254740991,
+  static const Json kOdd = Json::parse(
+      R"([0,1,2,3,-1,4,255,256,65535,65536,2147483647,2147483648,4294967295,4294967296,9007199254740991,
     18446744073709551615,-9223372036854775808,null,true,false,"","a","../a","/a","data:,",[],{},[[]],1e300,-1e300,1e-300,0.5,5120,5121,
     5123,5125,5126,"POSITION","SCALAR","VEC3","MAT4","TRIANGLES","image/jpeg"])");
   return kOdd[random.below(kOdd.size())];
@@ -81,7 +82,9 @@ void mutate_json(Json& root, Random& random, const ByteMutator& change) {
   *at = odd_value(random);
 }
 
-Bytes json_text(const Json& json) { return to_bytes(json.dump(-1, ' ', false, Json::error_handler_t::replace)); }
+Bytes json_text(const Json& json) {
+  return to_bytes(json.dump(-1, ' ', false, Json::error_handler_t::replace));
+}
 
 Json parse(ByteSpan text) { return Json::parse(text.begin(), text.end(), nullptr, false); }
 
@@ -95,7 +98,8 @@ Bytes mutated_json(ByteSpan text, Random& random, const ByteMutator& change) {
 Bytes mutated_glb(ByteSpan glb, Random& random, const ByteMutator& change) {
   constexpr std::size_t kHead = 20, kChunkHead = 8;
   const std::size_t json_bytes = glb.size() < kHead ? 0 : Choices(glb.subspan(12)).number(4);
-  if (glb.size() < kHead || json_bytes > glb.size() - kHead) return change({glb.begin(), glb.end()}, kMostGrowth);
+  if (glb.size() < kHead || json_bytes > glb.size() - kHead)
+    return change({glb.begin(), glb.end()}, kMostGrowth);
   Bytes json(glb.begin() + kHead, glb.begin() + static_cast<std::ptrdiff_t>(kHead + json_bytes));
   Bytes binary;
   if (glb.size() - kHead - json_bytes >= kChunkHead) {
@@ -121,7 +125,8 @@ struct Entry {
 std::vector<Entry> entries_of(ByteSpan container) {
   const auto source = memory_source(container);
   std::vector<Entry> list;
-  for (const ContainerEntry& e : read_container(*source)) list.push_back({e.path, source->read(e.offset, e.bytes), e.offset});
+  for (const ContainerEntry& e : read_container(*source))
+    list.push_back({e.path, source->read(e.offset, e.bytes), e.offset});
   return list;
 }
 
@@ -146,14 +151,22 @@ void set_reference(Json& reference, const Entry& e) {
 
 /// The manifest's references, by the entries as they are.
 void set_references(Json& manifest, const std::map<std::string, const Entry*>& by_path) {
-  for (const auto& [key, path] : std::map<std::string, std::string>{{"index", kIndexPath}, {"tables", kTablesPath}, {"textures", kTexturesPath},
-                                                                    {"quality", kQualityPath}, {"provenance", kProvenancePath}, {"about", kAboutPath},
-                                                                    {"stream", kSplitStreamPath}, {"thesis", kThesisPath}, {"poster", kPosterPath}})
-    if (const auto it = by_path.find(path); it != by_path.end() && manifest.contains(key)) set_reference(manifest[key], *it->second);
+  for (const auto& [key, path] : std::map<std::string, std::string>{{"index", kIndexPath},
+                                                                    {"tables", kTablesPath},
+                                                                    {"textures", kTexturesPath},
+                                                                    {"quality", kQualityPath},
+                                                                    {"provenance", kProvenancePath},
+                                                                    {"about", kAboutPath},
+                                                                    {"stream", kSplitStreamPath},
+                                                                    {"thesis", kThesisPath},
+                                                                    {"poster", kPosterPath}})
+    if (const auto it = by_path.find(path); it != by_path.end() && manifest.contains(key))
+      set_reference(manifest[key], *it->second);
   if (!manifest.contains("scales") || !manifest["scales"].is_object()) return;
   Json& scales = manifest["scales"];
   for (const char* key : {"scale", "offset", "bytes", "sha256"})
-    if (!scales.contains(key) || !scales[key].is_array() || scales[key].size() != scales["scale"].size()) return;
+    if (!scales.contains(key) || !scales[key].is_array() || scales[key].size() != scales["scale"].size())
+      return;
   for (std::size_t k = 0; k < scales["scale"].size(); ++k) {
     if (!scales["scale"][k].is_number_integer()) continue;
     const auto it = by_path.find(mesh_path(scales["scale"][k].get<int>()));
@@ -195,8 +208,10 @@ Bytes mutated_container(ByteSpan container, Random& random, const ByteMutator& c
   try {
     std::vector<Entry> entries = entries_of(container);
     if (entries.empty()) return change({container.begin(), container.end()}, kMostGrowth);
-    Entry& e = entries[random.below(2) ? random.below(entries.size()) : random.below(std::min<std::size_t>(2, entries.size()))];
-    e.bytes = e.path.ends_with(".json") ? mutated_json(e.bytes, random, change) : change(e.bytes, kMostGrowth);
+    Entry& e = entries[random.below(2) ? random.below(entries.size())
+                                       : random.below(std::min<std::size_t>(2, entries.size()))];
+    e.bytes =
+        e.path.ends_with(".json") ? mutated_json(e.bytes, random, change) : change(e.bytes, kMostGrowth);
     if (e.path == kManifestPath && e.bytes.size() < 16000) e.bytes.resize(e.bytes.size() + 64, ' ');
     return sealed_container(std::move(entries), e.path);
   } catch (const FormatError&) {
@@ -253,7 +268,8 @@ ByteMutator plain_mutator(const Target& target, const Bytes& other, Random& rand
           }
           break;
         default:
-          std::fill(begin, begin + static_cast<std::ptrdiff_t>(std::min<std::size_t>(4, input.size() - at)), 0xff);
+          std::fill(begin, begin + static_cast<std::ptrdiff_t>(std::min<std::size_t>(4, input.size() - at)),
+                    0xff);
       }
     }
     return input;

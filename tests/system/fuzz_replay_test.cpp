@@ -1,5 +1,5 @@
-// All fuzz targets (tests/fuzz/) over their seeds, the inputs that once did harm, and mutations of both. A target aborts where a reader
-// does anything but answer or throw its own error.
+// All fuzz targets (tests/fuzz/) over their seeds, the inputs that once did harm, and mutations of both. A
+// target aborts where a reader does anything but answer or throw its own error.
 #include <gtest/gtest.h>
 
 #include <ctime>
@@ -21,7 +21,8 @@ class FuzzReplay : public ::testing::TestWithParam<Target> {};
 void run_in_time(const Target& target, ByteSpan input) {
   const std::clock_t start = std::clock();
   target.run(input);
-  EXPECT_LT(static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC, kMostSeconds) << input.size() << " bytes";
+  EXPECT_LT(static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC, kMostSeconds)
+      << input.size() << " bytes";
 }
 
 TEST_P(FuzzReplay, SeedsAreAccepted) {
@@ -42,12 +43,13 @@ TEST_P(FuzzReplay, MutationsGiveAnAnswerOrAnError) {
   constexpr std::size_t kRuns = 1500;
   for (std::size_t run = 0; run < kRuns; ++run) {
     const Bytes other = corpus[random.below(corpus.size())];
-    run_in_time(target, mutate(target, corpus[run % corpus.size()], random, plain_mutator(target, other, random)));
+    run_in_time(target,
+                mutate(target, corpus[run % corpus.size()], random, plain_mutator(target, other, random)));
   }
 }
 
 INSTANTIATE_TEST_SUITE_P(Targets, FuzzReplay, ::testing::ValuesIn(targets()),
-                         [](const auto& info) { return std::string(info.param.name); });
+                         [](const auto& test) { return std::string(test.param.name); });
 
 }  // namespace
 }  // namespace texmesh::fuzz
