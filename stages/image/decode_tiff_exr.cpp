@@ -3,6 +3,7 @@
 #include <dlfcn.h>
 
 #include <algorithm>
+#include <map>
 
 #include "format/base/errors.h"
 #include "stages/image/oiio/tiff_exr_reader.h"
@@ -49,37 +50,100 @@ std::string_view exr_text(ByteSpan bytes, std::size_t& at) {
           static_cast<std::size_t>(end - begin)};
 }
 
+/// The bytes of a list of channels: names, 16 bytes each, an empty name.
+bool is_channel_list(ByteSpan value) {
+  constexpr std::size_t kChannelBytes = 16;
+  for (std::size_t at = 0; at < value.size();) {
+    if (value[at] == 0) return at + 1 == value.size();
+    if (!exr_text(value, at).data()) return false;
+    at += kChannelBytes;
+  }
+  return false;
+}
+
+bool is_text_list(ByteSpan value) {
+  while (value.size() >= 4) {
+    const std::size_t bytes = BytesIn(value, "EXR").u32();
+    value = value.subspan(4);
+    if (bytes > value.size()) return false;
+    value = value.subspan(bytes);
+  }
+  return value.empty();
+}
+
+/// OpenEXR takes the memory that an attribute claims before it reads it, and of most types reads what the
+/// type says, whatever the attribute claims: what it takes for the next attribute would then be another one
+/// than ours.
+bool has_right_length(const ExrAttribute& a) {
+  static const std::map<std::string_view, std::size_t> kBytes{{"box2f", 16},
+                                                              {"box2i", 16},
+                                                              {"chromaticities", 32},
+                                                              {"compression", 1},
+                                                              {"deepImageState", 1},
+                                                              {"double", 8},
+                                                              {"envmap", 1},
+                                                              {"float", 4},
+                                                              {"int", 4},
+                                                              {"keycode", 28},
+                                                              {"lineOrder", 1},
+                                                              {"m33d", 72},
+                                                              {"m33f", 36},
+                                                              {"m44d", 128},
+                                                              {"m44f", 64},
+                                                              {"rational", 8},
+                                                              {"tiledesc", 9},
+                                                              {"timecode", 8},
+                                                              {"v2d", 16},
+                                                              {"v2f", 8},
+                                                              {"v2i", 8},
+                                                              {"v3d", 24},
+                                                              {"v3f", 12},
+                                                              {"v3i", 12}};
+  if (a.bytes != a.value.size()) return false;
+  if (const auto it = kBytes.find(a.type); it != kBytes.end()) return a.bytes == it->second;
+  if (a.type == "chlist") return is_channel_list(a.value);
+  if (a.type == "stringvector") return is_text_list(a.value);
+  if (a.type == "floatvector") return a.bytes % 4 == 0;
+  if (a.type != "preview") return true;
+  if (a.bytes < 8) return false;
+  BytesIn in(a.value, "EXR");
+  const std::uint64_t width = in.u32(), height = in.u32();
+  return width < a.bytes && height < a.bytes && a.bytes == 8 + 4 * width * height;
+}
+
 }  // namespace
 
-bool for_each_exr_attribute(ByteSpan exr,
+void for_each_exr_attribute(ByteSpan exr,
                             const std::function<void(std::size_t part, const ExrAttribute&)>& f) {
   constexpr std::size_t kFlagsAt = 5, kHead = 8;
   constexpr std::uint8_t kParts = 0x10;
-  if (exr.size() < kHead) return true;
+  if (exr.size() < kHead) return;
   const bool many = (exr[kFlagsAt] & kParts) != 0;
   std::size_t part = 0;
   for (std::size_t at = kHead; at < exr.size();) {
     if (exr[at] == 0) {  // the end of a part's header; two of them end the headers
-      if (!many || ++at >= exr.size() || exr[at] == 0) return true;
+      if (!many || ++at >= exr.size() || exr[at] == 0) return;
       ++part;
     }
-    const std::string_view name = exr_text(exr, at), type = exr_text(exr, at);
-    if (!name.data() || !type.data() || exr.size() - at < 4) return true;
-    const std::size_t bytes = BytesIn(exr.subspan(at, 4), "EXR").u32();
+    ExrAttribute a;
+    a.name = exr_text(exr, at), a.type = exr_text(exr, at);
+    if (!a.name.data() || !a.type.data() || exr.size() - at < 4) return;
+    a.bytes = BytesIn(exr.subspan(at, 4), "EXR").u32();
     at += 4;
-    if (bytes > exr.size() - at) return false;
-    f(part, ExrAttribute{name, type, exr.subspan(at, bytes)});
-    at += bytes;
+    a.value = exr.subspan(at, std::min<std::size_t>(a.bytes, exr.size() - at));
+    f(part, a);
+    at += a.value.size();
   }
-  return true;
 }
 
 ImageHeader read_tiff_exr_header(const std::string& name, ImageFormat format, ByteSpan bytes,
                                  const ImageLimits& limits) {
-  // OpenEXR takes the memory that an attribute claims before it reads it.
-  const auto ignore = [](std::size_t, const ExrAttribute&) {};
-  if (format == ImageFormat::kExr && !for_each_exr_attribute(bytes, ignore))
-    throw InputError(name, "image header", "attributes within the file", "one that claims to be longer");
+  if (format == ImageFormat::kExr)
+    for_each_exr_attribute(bytes, [&](std::size_t, const ExrAttribute& a) {
+      if (!has_right_length(a))
+        throw InputError(name, "image header", "attributes as long as their types are, within the file",
+                         std::to_string(a.bytes) + " bytes of one");
+    });
   return reader_for(name, format).read_header(name, format, bytes, limits);
 }
 

@@ -29,12 +29,13 @@ StoredSamples decode_tiff_exr(const Image& image);
 
 struct ExrAttribute {
   std::string_view name, type;
-  ByteSpan value;
+  std::uint32_t bytes = 0;  // as it claims
+  ByteSpan value;           // as many of them as the file has
 };
 
-/// Calls f(part, attribute) for the attributes in front of an EXR's pixels, in order, up to one that is not
-/// whole (OpenEXR, "File Layout"). False where an attribute claims to be longer than the file.
-bool for_each_exr_attribute(ByteSpan exr,
+/// Calls f(part, attribute) for the attributes in front of an EXR's pixels, in order, up to one that has no
+/// name, type or length (OpenEXR, "File Layout").
+void for_each_exr_attribute(ByteSpan exr,
                             const std::function<void(std::size_t part, const ExrAttribute&)>& f);
 
 }  // namespace texmesh

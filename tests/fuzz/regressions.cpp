@@ -17,11 +17,44 @@ Bytes exr_with_long_attribute(std::string_view type) {
   return out.finish();
 }
 
+/// A list of channels that is longer than it claims. OpenEXR went by the list, and took what stands behind
+/// for the length of another attribute.
+Bytes exr_with_short_claim() {
+  BytesOut out;
+  out.u32(20000630), out.u32(2);
+  out.text(std::string_view("channels\0chlist\0", 16)), out.u32(1);
+  out.text(std::string_view("\0R\0", 3)), out.raw(Bytes(16, 1)), out.u8(0);
+  out.text(std::string_view("b\0c\0", 4)), out.u32(1u << 30);
+  return out.finish();
+}
+
+/// A PNG with a chunk of text that claims 1 GB: libpng took the memory before it read.
+Bytes png_with_long_chunk() {
+  BytesOut out;
+  out.text("\x89PNG\r\n\x1a\n");
+  out.text(std::string_view("\0\0\0\x0dIHDR\0\0\0\x01\0\0\0\x01\x08\x02\0\0\0\x90\x77\x53\xde", 25));
+  out.text(std::string_view("\x41\0\x02\xf4zTXtRaw", 11));
+  return out.finish();
+}
+
+/// Words of a child that somebody has taken over: values of other types ended the parent.
+std::vector<Bytes> events_of_other_types() {
+  std::vector<Bytes> list;
+  for (const char* line :
+       {R"({"event":1})", R"({"event":"result","bytes":"a"})", R"({"event":"error","kind":[]})",
+        R"({"event":"inputs","files":7})", R"({"event":"layer-left-out","layer":{}})",
+        R"([["a",1,"0000000000000000000000000000000000000000000000000000000000000000",1,1,1,1,1,1]])"})
+    list.push_back(to_bytes(line));
+  return list;
+}
+
 }  // namespace
 
 std::vector<Bytes> regressions(const std::string& target) {
   static const std::map<std::string, std::vector<Bytes>> found{
-      {"exr", {exr_with_long_attribute("str"), exr_with_long_attribute("")}}};
+      {"events", events_of_other_types()},
+      {"exr", {exr_with_long_attribute("str"), exr_with_long_attribute(""), exr_with_short_claim()}},
+      {"png", {png_with_long_chunk()}}};
   const auto it = found.find(target);
   return it == found.end() ? std::vector<Bytes>{} : it->second;
 }
