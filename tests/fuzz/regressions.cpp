@@ -2,6 +2,7 @@
 // beside them.
 #include <map>
 
+#include "format/base/sha256.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace texmesh::fuzz {
@@ -22,8 +23,8 @@ Bytes exr_with_long_attribute(std::string_view type) {
 Bytes exr_with_short_claim() {
   BytesOut out;
   out.u32(20000630), out.u32(2);
-  out.text(std::string_view("channels\0chlist\0", 16)), out.u32(1);
-  out.text(std::string_view("\0R\0", 3)), out.raw(Bytes(16, 1)), out.u8(0);
+  out.text(std::string_view("channels\0chlist\0", 16)), out.u32(5);
+  out.text(std::string_view("R\0", 2)), out.raw(Bytes(16, 1)), out.u8(0);
   out.text(std::string_view("b\0c\0", 4)), out.u32(1u << 30);
   return out.finish();
 }
@@ -48,13 +49,31 @@ std::vector<Bytes> events_of_other_types() {
   return list;
 }
 
+/// Tables of 2 x 32767 fragments, of which none is stored: a message was put together for every cell.
+Bytes tables_of_many_cells() {
+  BytesOut section;
+  section.u32(2), section.u32(32767);
+  for (const unsigned x : {1, 50, 1, 1, 0, 0, 0, 0}) section.u8(x);  // a scale, 50 rungs, widths
+  for (const float x : {1.f, 1.f, 1.f, 100.f}) section.f32(x);
+  section.u32(0);
+  for (unsigned rung = 0; rung < 50; ++rung) section.u8(1 + rung);
+  for (unsigned rung = 0; rung < 50; ++rung) section.u32(20);
+  section.f32(50);
+  const Bytes bytes = section.finish();
+  BytesOut out;
+  out.text("TXMT"), out.u16(2), out.u16(0), out.u32(1), out.u32(0);
+  out.u32(bytes.size()), out.raw(sha256(bytes)), out.raw(bytes);
+  return out.finish();
+}
+
 }  // namespace
 
 std::vector<Bytes> regressions(const std::string& target) {
   static const std::map<std::string, std::vector<Bytes>> found{
       {"events", events_of_other_types()},
       {"exr", {exr_with_long_attribute("str"), exr_with_long_attribute(""), exr_with_short_claim()}},
-      {"png", {png_with_long_chunk()}}};
+      {"png", {png_with_long_chunk()}},
+      {"tables", {tables_of_many_cells()}}};
   const auto it = found.find(target);
   return it == found.end() ? std::vector<Bytes>{} : it->second;
 }
