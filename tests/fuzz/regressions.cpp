@@ -66,12 +66,20 @@ Bytes tables_of_many_cells() {
   return out.finish();
 }
 
+/// A glTF of 40 million positions that no byte stands for.
+Bytes gltf_of_zeros() {
+  return to_bytes(
+      R"({"asset":{"version":"2.0"},"accessors":[{"type":"VEC3","componentType":5126,"count":40000000}],
+    "meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],"nodes":[{"mesh":0}],"scenes":[{"nodes":[0]}]})");
+}
+
 }  // namespace
 
 std::vector<Bytes> regressions(const std::string& target) {
   static const std::map<std::string, std::vector<Bytes>> found{
       {"events", events_of_other_types()},
       {"exr", {exr_with_long_attribute("str"), exr_with_long_attribute(""), exr_with_short_claim()}},
+      {"gltf", {gltf_of_zeros()}},
       {"png", {png_with_long_chunk()}},
       {"tables", {tables_of_many_cells()}}};
   const auto it = found.find(target);
