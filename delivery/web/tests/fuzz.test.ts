@@ -137,4 +137,10 @@ describe('readers give an answer or a FormatError', () => {
       for (const bytes of kept(reader)) await expectAnswerOrFormatError(reader, bytes);
     }, 600_000);
   }
+  // Found by libFuzzer: these were taken for lists.
+  it.each(['bufferViews', 'buffers', 'extensionsUsed', 'extensionsRequired'])('glb, %s is no list', (list) => {
+    const json = new TextEncoder().encode(JSON.stringify({ [list]: {} }).padEnd(40));
+    const head = new Uint8Array(Uint32Array.of(0x46546c67, 2, 60, 40, 0x4e4f534a).buffer);
+    expect(() => plainGlb(Uint8Array.from([...head, ...json]))).toThrow(FormatError);
+  });
 });
