@@ -136,14 +136,38 @@ void for_each_exr_attribute(ByteSpan exr,
   }
 }
 
+namespace {
+
+/// What OpenEXR takes memory for when it opens a file: attributes, and its packers' buffers for up to 256
+/// lines of all channels of the first part.
+void check_exr_header(const std::string& name, ByteSpan bytes, const ImageLimits& limits) {
+  constexpr std::uint64_t kLines = 256, kFreeSamples = 1 << 18, kMostShrunk = 20000;
+  std::uint64_t width = 1, channels = 1;
+  for_each_exr_attribute(bytes, [&](std::size_t part, const ExrAttribute& a) {
+    if (!has_right_length(a))
+      throw InputError(name, "image header", "attributes as long as their types are, within the file",
+                       std::to_string(a.bytes) + " bytes of one");
+    if (part == 0 && a.type == "chlist")  // a channel is never shorter
+      channels = std::max<std::uint64_t>(channels, a.bytes / 18);
+    if (part != 0 || a.name != "dataWindow" || a.type != "box2i") return;
+    BytesIn in(a.value, "EXR");
+    const auto side = [&] { return std::int64_t{static_cast<std::int32_t>(in.u32())}; };
+    const std::int64_t left = side(), top = side(), right = side(), bottom = side();
+    width = static_cast<std::uint64_t>(std::max<std::int64_t>(0, right - left + 1));
+    check_image_size(name, width, static_cast<std::uint64_t>(std::max<std::int64_t>(0, bottom - top + 1)),
+                     limits);
+  });
+  if (width * channels > kFreeSamples && width * channels * kLines / kMostShrunk > bytes.size())
+    throw InputError(name, "image header",
+                     "rows that its " + std::to_string(bytes.size()) + " bytes can hold",
+                     std::to_string(width) + " px in " + std::to_string(channels) + " channels");
+}
+
+}  // namespace
+
 ImageHeader read_tiff_exr_header(const std::string& name, ImageFormat format, ByteSpan bytes,
                                  const ImageLimits& limits) {
-  if (format == ImageFormat::kExr)
-    for_each_exr_attribute(bytes, [&](std::size_t, const ExrAttribute& a) {
-      if (!has_right_length(a))
-        throw InputError(name, "image header", "attributes as long as their types are, within the file",
-                         std::to_string(a.bytes) + " bytes of one");
-    });
+  if (format == ImageFormat::kExr) check_exr_header(name, bytes, limits);
   return reader_for(name, format).read_header(name, format, bytes, limits);
 }
 
