@@ -95,7 +95,7 @@ class Checks:
         previews = {f"texture/{t.image}": model.entry(f"preview/{p:03}.jpg")
                     for p, t in enumerate(model.textures) if "mip" not in t and t.role != "alpha"}
         for k, (g, pictures) in glbs.items():
-            shared = dict(first=glbs[0][0], glbs=len(glbs), previews=previews, **self.known)
+            shared = dict(first=glbs[0][0], previews=previews, **self.known)
             self.follow("scale", g=g, k=k, pictures=pictures, **shared)
         return len(glbs[0][0].get("materials", ()))
 

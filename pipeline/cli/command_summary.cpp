@@ -10,6 +10,7 @@
 #include "pipeline/cli/options/command_line.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"
+#include "pipeline/io/resource_error.h"
 #include "pipeline/io/text_bytes.h"
 #include "pipeline/report/collection/collection_page.h"
 
@@ -35,7 +36,10 @@ void write_collection_page(const RunSummary& merged, const MergeArguments& args)
   const std::string posters = fs::path(args.html).stem().string() + "-posters";
   const CollectionPage page = collection_page(merged, posters, static_cast<std::size_t>(args.posters),
                                               [](const ModelSummary& m) { return package_face(m.output); });
-  if (!page.files.empty()) fs::create_directories(folder / posters);
+  std::error_code error;
+  if (!page.files.empty()) fs::create_directories(folder / posters, error);
+  if (error)
+    throw ResourceError((folder / posters).string(), "", "a folder that can be made", error.message());
   for (const PageFile& file : page.files) write_file_atomically((folder / file.name).string(), file.bytes);
   write_text_file(args.html, page.html);
 }

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <vector>
 
+#include "format/base/bytes.h"
 #include "format/base/errors.h"
 
 namespace texmesh {
@@ -42,6 +43,18 @@ void read_bytes(png_structp png, png_bytep to, std::size_t count) {
   decoder->at += count;
 }
 
+/// libpng takes the memory that a chunk in front of the pixels claims before it reads it.
+bool chunks_fit(ByteSpan png) {
+  for (std::size_t at = 8; at + 8 <= png.size();) {
+    std::size_t bytes = 0;
+    for (std::size_t k = 0; k < 4; ++k) bytes = bytes << 8 | png[at + k];
+    if (std::memcmp(png.data() + at + 4, "IDAT", 4) == 0) return true;
+    if (bytes > png.size() - at - 8) return false;
+    at += 12 + bytes;
+  }
+  return true;
+}
+
 bool open_png(PngDecoder& d) {
   d.png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &d, on_error, on_warning);
   if (d.png) d.info = png_create_info_struct(d.png);
@@ -50,9 +63,12 @@ bool open_png(PngDecoder& d) {
     return false;
   }
   if (setjmp(d.escape)) return false;
+  if (!chunks_fit(d.bytes)) png_error(d.png, "the file ends here");
   png_set_read_fn(d.png, &d, read_bytes);
   // The limits of this library are its caller's; of libpng's own only that of a side would ever be met first.
   png_set_user_limits(d.png, 0x7fffffff, 0x7fffffff);
+  constexpr std::size_t kMostUnpacked = 16 << 20;  // of a profile
+  png_set_chunk_malloc_max(d.png, std::max(d.bytes.size(), kMostUnpacked));
   png_set_keep_unknown_chunks(d.png, PNG_HANDLE_CHUNK_NEVER, nullptr, 0);
   png_read_info(d.png, d.info);
   png_set_expand(d.png);  // palettes, bits below 8, transparent colours

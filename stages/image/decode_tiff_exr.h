@@ -1,8 +1,11 @@
 #pragma once
 // Inside stages: TIFF and EXR by OpenImageIO, which the module texmesh_oiio.so brings when it is first
 // needed.
+#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <string>
+#include <string_view>
 #include <variant>
 #include <vector>
 
@@ -23,5 +26,16 @@ ImageHeader read_tiff_exr_header(const std::string& name, ImageFormat format, By
 /// claims, and when its header is not the one that `image` was made from. Both functions: InputError, with
 /// the name of Debian's package, where the module cannot be loaded.
 StoredSamples decode_tiff_exr(const Image& image);
+
+struct ExrAttribute {
+  std::string_view name, type;
+  std::uint32_t bytes = 0;  // as it claims
+  ByteSpan value;           // as many of them as the file has
+};
+
+/// Calls f(part, attribute) for the attributes in front of an EXR's pixels, in order, up to one that has no
+/// name, type or length (OpenEXR, "File Layout").
+void for_each_exr_attribute(ByteSpan exr,
+                            const std::function<void(std::size_t part, const ExrAttribute&)>& f);
 
 }  // namespace texmesh

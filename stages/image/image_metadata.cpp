@@ -11,6 +11,7 @@
 #include <string_view>
 
 #include "format/base/bytes.h"
+#include "stages/image/decode_tiff_exr.h"
 #include "stages/image/jpeg_segments.h"
 
 namespace texmesh {
@@ -244,16 +245,6 @@ void read_webp(ByteSpan bytes, ImageMetadata& out) {
 
 // --- EXR -----------------------------------------------------------------------------------------------
 
-/// Text up to a zero byte, which `at` is then behind; nothing where there is none within EXR's 255.
-std::string_view exr_text(ByteSpan bytes, std::size_t& at) {
-  const auto begin = bytes.begin() + static_cast<std::ptrdiff_t>(std::min(at, bytes.size()));
-  const auto end = std::find(begin, begin + std::min<std::ptrdiff_t>(256, bytes.end() - begin), 0);
-  if (end == bytes.end() || *end != 0) return {};
-  at += static_cast<std::size_t>(end - begin) + 1;
-  return {reinterpret_cast<const char*>(bytes.data()) + (begin - bytes.begin()),
-          static_cast<std::size_t>(end - begin)};
-}
-
 bool rec709_primaries(ByteSpan chromaticities) {
   constexpr float kRec709[8] = {0.64f, 0.33f, 0.30f, 0.60f, 0.15f, 0.06f, 0.3127f, 0.3290f};
   for (std::size_t i = 0; i < 8; ++i)
@@ -265,15 +256,10 @@ bool rec709_primaries(ByteSpan chromaticities) {
 void read_exr(ByteSpan bytes, ImageMetadata& out) {
   constexpr std::uint32_t kParts = 0x1000;
   out.more_pictures = little(part(bytes, 4, 4)) & kParts;
-  for (std::size_t at = 8;;) {
-    const std::string_view name = exr_text(bytes, at), type = exr_text(bytes, at);
-    const ByteSpan size = part(bytes, at, 4);
-    if (name.empty() || type.empty() || size.empty()) return;
-    const ByteSpan value = part(bytes, at + 4, little(size));
-    if (name == "chromaticities" && type == name && value.size() == 32)
-      out.other_primaries = !rec709_primaries(value);
-    at += 4 + std::size_t{little(size)};
-  }
+  for_each_exr_attribute(bytes, [&](std::size_t number, const ExrAttribute& a) {
+    if (number == 0 && a.name == "chromaticities" && a.type == a.name && a.value.size() == 32)
+      out.other_primaries = !rec709_primaries(a.value);
+  });
 }
 
 }  // namespace

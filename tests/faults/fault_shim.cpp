@@ -8,6 +8,12 @@
 //                         eio    this call fails with EIO
 //                         full   from this call on everything that needs space fails with ENOSPC;
 //                                where this call is a write, the write's first half is written
+//                         frozen from this call on the folders are read-only: EROFS
+//                         choppy nothing fails, but of reads and writes every third is interrupted by a
+//                         signal
+//                                (EINTR), and the others move half of what they are asked to; no call number
+//                         clock  nothing fails, but every second look at the time of day is a day early; no
+//                                call number
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <signal.h>
@@ -20,6 +26,7 @@
 #include <cstdarg>
 #include <cstdlib>
 #include <cstring>
+#include <ctime>
 #include <string>
 #include <string_view>
 
@@ -30,7 +37,7 @@ namespace {
 using texmesh::testing::FaultCall;
 using texmesh::testing::FaultCounts;
 
-enum class Action { kNone, kKill, kEio, kFull };
+enum class Action { kNone, kKill, kEio, kFull, kFrozen, kChoppy, kClock };
 
 struct Plan {
   FaultCounts* counts = nullptr;
@@ -46,10 +53,13 @@ struct Plan {
     const std::string file = variable("TEXMESH_FAULT_FILE"), what = variable("TEXMESH_FAULT_ACTION");
     under = variable("TEXMESH_FAULT_UNDER");
     at = std::strtoull(variable("TEXMESH_FAULT_AT").c_str(), nullptr, 10);
-    action = what == "kill"   ? Action::kKill
-             : what == "eio"  ? Action::kEio
-             : what == "full" ? Action::kFull
-                              : Action::kNone;
+    action = what == "kill"     ? Action::kKill
+             : what == "eio"    ? Action::kEio
+             : what == "full"   ? Action::kFull
+             : what == "frozen" ? Action::kFrozen
+             : what == "choppy" ? Action::kChoppy
+             : what == "clock"  ? Action::kClock
+                                : Action::kNone;
     using Open = int (*)(const char*, int, ...);
     const auto real = reinterpret_cast<Open>(::dlsym(RTLD_NEXT, "open"));
     const int fd = file.empty() ? -1 : real(file.c_str(), O_RDWR | O_CLOEXEC);
@@ -111,6 +121,10 @@ Verdict judge(FaultCall call, const std::string& path) {
     if (++p.counts->fired == 1) p.counts->fired_call = static_cast<std::uint32_t>(call);
     return {ENOSPC, false, first};
   }
+  if (p.action == Action::kFrozen) {
+    if (++p.counts->fired == 1) p.counts->fired_call = static_cast<std::uint32_t>(call);
+    return {EROFS, false, first};
+  }
   if (!first || p.action == Action::kFull) return {};
   ++p.counts->fired;
   p.counts->fired_call = static_cast<std::uint32_t>(call);
@@ -128,6 +142,16 @@ bool refused(FaultCall call, const std::string& path) {
   if (v.kill) kill_everything();
   if (v.error != 0) errno = v.error;
   return v.error != 0;
+}
+
+/// How many of `count` bytes a read or write may move; -1 where a signal comes first.
+ssize_t chopped(int fd, std::size_t count) {
+  Plan& p = plan();
+  if (p.action != Action::kChoppy || !p.counts || count < 2 || !p.covers(path_of(fd)))
+    return static_cast<ssize_t>(count);
+  if (++p.counts->fired % 3 != 0) return static_cast<ssize_t>(count / 2);
+  errno = EINTR;
+  return -1;
 }
 
 template <class F>
@@ -185,7 +209,30 @@ ssize_t write(int fd, const void* bytes, size_t count) {
     errno = v.error;
     return -1;
   }
-  return call(fd, bytes, count);
+  const ssize_t most = chopped(fd, count);
+  return most < 0 ? -1 : call(fd, bytes, static_cast<std::size_t>(most));
+}
+ssize_t read(int fd, void* bytes, size_t count) {
+  static const auto call = real<ssize_t (*)(int, void*, size_t)>("read");
+  const ssize_t most = chopped(fd, count);
+  return most < 0 ? -1 : call(fd, bytes, static_cast<std::size_t>(most));
+}
+ssize_t pread(int fd, void* bytes, size_t count, off_t at) {
+  static const auto call = real<ssize_t (*)(int, void*, size_t, off_t)>("pread");
+  const ssize_t most = chopped(fd, count);
+  return most < 0 ? -1 : call(fd, bytes, static_cast<std::size_t>(most), at);
+}
+ssize_t pread64(int fd, void* bytes, size_t count, off64_t at) { return pread(fd, bytes, count, at); }
+
+int clock_gettime(clockid_t clock, timespec* time) noexcept {
+  static const auto call = real<int (*)(clockid_t, timespec*)>("clock_gettime");
+  constexpr time_t kDay_s = 86400;
+  const int result = call(clock, time);
+  Plan& p = plan();
+  if (clock == CLOCK_REALTIME && result == 0 && p.counts && p.action == Action::kClock &&
+      ++p.counts->fired % 2 == 0)
+    time->tv_sec -= kDay_s;
+  return result;
 }
 
 int fsync(int fd) {

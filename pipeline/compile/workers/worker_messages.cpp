@@ -47,6 +47,28 @@ void apply_inputs_event(const Json& e, WorkerReport& report) {
       report.more->keys[stage] = digest;
 }
 
+bool apply_object(const Json& e, double now_s, WorkerReport& report) {
+  const std::string event = e.value("event", "");
+  if (event == "inputs") {
+    apply_inputs_event(e, report);
+    return false;
+  }
+  if (event == "layer-left-out") {
+    report.more->layers_left_out.push_back(e.value("layer", -1));
+    return false;
+  }
+  if (event == "stage-started" || event == "stage-finished") {
+    apply_stage_event(e, now_s, report);
+  } else if (event == "result") {
+    report.package_bytes = e.value("bytes", std::uint64_t{0});
+    report.result = e.value("unchanged", false) ? ModelResult::kUnchanged : ModelResult::kOk;
+  } else if (event == "error") {
+    report.more->error = {e.value("kind", ""),     e.value("file", ""),  e.value("place", ""),
+                          e.value("expected", ""), e.value("found", ""), e.value("message", "")};
+  }
+  return true;
+}
+
 }  // namespace
 
 std::string job_to_json(const WorkerJob& job, const std::string& temporary, const WorkerLimits& limits,
@@ -77,25 +99,11 @@ std::string job_to_json(const WorkerJob& job, const std::string& temporary, cons
 bool apply_event(const std::string& line, double now_s, WorkerReport& report) {
   const Json e = Json::parse(line, nullptr, false);
   if (!e.is_object()) return true;
-  const std::string event = e.value("event", "");
-  if (event == "inputs") {
-    apply_inputs_event(e, report);
-    return false;
+  try {
+    return apply_object(e, now_s, report);
+  } catch (const Json::exception&) {  // of a value: a text where a number belongs
+    return true;
   }
-  if (event == "layer-left-out") {
-    report.more->layers_left_out.push_back(e.value("layer", -1));
-    return false;
-  }
-  if (event == "stage-started" || event == "stage-finished") {
-    apply_stage_event(e, now_s, report);
-  } else if (event == "result") {
-    report.package_bytes = e.value("bytes", std::uint64_t{0});
-    report.result = e.value("unchanged", false) ? ModelResult::kUnchanged : ModelResult::kOk;
-  } else if (event == "error") {
-    report.more->error = {e.value("kind", ""),     e.value("file", ""),  e.value("place", ""),
-                          e.value("expected", ""), e.value("found", ""), e.value("message", "")};
-  }
-  return true;
 }
 
 std::string error_event(const WorkerReport& r) {
@@ -119,8 +127,9 @@ std::vector<FileRequest> files_from_json(const std::string& json) {
   if (!list.is_array()) return files;
   for (const Json& j : list) {
     FileRequest r;
-    if (!j.is_array() || j.size() != 9 || !j[0].is_string() || !j[2].is_string() ||
-        !from_hex(j[2].get<std::string>(), r.digest))
+    const auto is_number = [](const Json& n) { return n.is_number_integer(); };
+    if (!j.is_array() || j.size() != 9 || !j[0].is_string() || !j[1].is_boolean() || !j[2].is_string() ||
+        !from_hex(j[2].get<std::string>(), r.digest) || !std::all_of(j.begin() + 3, j.end(), is_number))
       continue;
     r.uri = from_wire(j[0].get<std::string>());
     r.found = j[1].get<bool>();

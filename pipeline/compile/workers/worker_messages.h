@@ -15,6 +15,8 @@ std::string job_to_json(const WorkerJob& job, const std::string& temporary, cons
                         int threads, const std::set<std::string>& layers_left_out);
 
 /// Enters what an event says about the model into the report. False when the event is for the parent alone.
+/// A line that is no event, or has values of other types, is passed on and believed no further: whoever has
+/// taken over a child writes what he likes.
 bool apply_event(const std::string& line, double now_s, WorkerReport& report);
 
 /// The event line of a report's error.

@@ -115,6 +115,8 @@ class AccessorReader {
   /// increasing and below count. `model` and `buffers` must outlive the reader.
   AccessorReader(const Source& source, const tinygltf::Model& model, Buffers& buffers, std::size_t index);
   std::size_t count() const { return count_; }
+  /// Elements that no byte of a file stands for.
+  std::size_t zeros() const { return base_ ? 0 : count_ - sparse_indices_.size(); }
   int components() const { return components_; }
   int component_type() const { return component_type_; }
   /// components() floats; integers as they are, or normalised where the accessor says so.

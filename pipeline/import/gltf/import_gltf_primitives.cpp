@@ -46,6 +46,7 @@ class PrimitiveReader {
   ReadFloats attribute(const std::string& name, VertexData& data, int min_components, int max_components,
                        int* components = nullptr) const;
   VertexData vertices() const;
+  void check_zeros(const AccessorReader& reader, const std::string& place) const;
   void read_indices(VertexData& data) const;
   std::vector<Triangle> triangles(const VertexData& data, int mode) const;
 
@@ -56,6 +57,15 @@ class PrimitiveReader {
   const PrimitivePath place_;
   const tinygltf::Primitive& primitive_;
 };
+
+/// Without a bufferView positions and indices are zeros, of which a few bytes can ask for millions.
+void PrimitiveReader::check_zeros(const AccessorReader& reader, const std::string& place) const {
+  constexpr std::size_t kMostZeros = 1 << 18;
+  if (reader.zeros() > kMostZeros)
+    source_.fail(place + "/count",
+                 "at most " + std::to_string(kMostZeros) + " elements that no bufferView holds",
+                 std::to_string(reader.zeros()));
+}
 
 bool PrimitiveReader::is_drawn() const {
   if (primitive_.mode < TINYGLTF_MODE_TRIANGLES) {
@@ -92,6 +102,7 @@ ReadFloats PrimitiveReader::attribute(const std::string& name, VertexData& data,
     source_.fail(place + "/componentType", "8 or 16 bits or floats for " + name, "32-bit integers");
   }
   if (name == "POSITION") {
+    check_zeros(*reader, place);
     data.count = count;
     if (model_.accessors[index].minValues.size() != 3 || model_.accessors[index].maxValues.size() != 3) {
       source_.note_once(Severity::kWarning, "accessor-without-bounds", place, "POSITION has no min and max");
@@ -154,6 +165,7 @@ void PrimitiveReader::read_indices(VertexData& data) const {
     source_.fail(place, "unsigned integer scalars for indices", "another type");
   }
   data.indexed = true;
+  check_zeros(reader, place);
   data.indices.resize(reader.count());
   for (std::size_t i = 0; i < data.indices.size(); ++i) data.indices[i] = reader.read_index(i);
 }

@@ -127,11 +127,12 @@ std::vector<T> read_samples(const Image& image, OpenImage& open, OIIO::TypeDesc 
       fail_pixels(image, open, "pixels");
     return samples;
   }
-  constexpr int kRows = 64;                // at once
+  // OpenImageIO takes and frees 64 MB at every call: few of them, even for an image of many short rows.
+  const int rows = std::max(64, height / 16);
   samples.reserve(row * image.height_px);  // not touched before it is read
   const int first = open.spec.y;           // the data window of an EXR may begin anywhere
-  for (int y = 0; y < height; y += kRows) {
-    const int end = std::min(height, y + kRows);
+  for (int y = 0; y < height; y += rows) {
+    const int end = std::min(height, y + rows);
     samples.resize(row * static_cast<std::size_t>(end));
     T* to = samples.data() + row * static_cast<std::size_t>(y);
     if (!open.input->read_scanlines(0, 0, first + y, first + end, 0, 0, channels, type, to) ||

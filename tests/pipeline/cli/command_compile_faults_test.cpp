@@ -63,11 +63,12 @@ class Site {
         environment);
   }
 
-  /// A build in which call number `at` goes wrong.
-  CommandResult build_with_fault(const std::string& action, std::uint64_t at, SharedCounts& counts) const {
+  /// A build in which call number `at` beneath the folder (of the whole site by default) goes wrong.
+  CommandResult build_with_fault(const std::string& action, std::uint64_t at, SharedCounts& counts,
+                                 const std::string& under = "") const {
     return build({"LD_PRELOAD=" TEXMESH_FAULT_SHIM, "TEXMESH_FAULT_FILE=" + counts.file(),
-                  "TEXMESH_FAULT_UNDER=" + folder_.path().string(), "TEXMESH_FAULT_ACTION=" + action,
-                  "TEXMESH_FAULT_AT=" + std::to_string(at)});
+                  "TEXMESH_FAULT_UNDER=" + (under.empty() ? folder_.path().string() : under),
+                  "TEXMESH_FAULT_ACTION=" + action, "TEXMESH_FAULT_AT=" + std::to_string(at)});
   }
   SharedCounts counts() const { return SharedCounts(folder_ / "counts"); }
 
@@ -231,6 +232,115 @@ TEST_F(Faults, TheDiskIsFullFromEveryCallOn) {
 
 TEST_F(Faults, AnInputOutputErrorAtEveryCall) {
   ASSERT_NO_FATAL_FAILURE(sweep_errors("eio", "Input/output error", 4));
+}
+
+/// A cache that cannot be written costs the next build's time, and nothing else.
+TEST_F(Faults, ACacheThatIsReadOnlyOrFullFromEveryCallOn) {
+  ASSERT_NO_FATAL_FAILURE(prepare(1, "1"));
+  int points_done = 0;
+  for (const char* action : {"frozen", "full"})
+    for (const std::uint64_t at : points(3)) {
+      const Site site(models_, profile_, jobs_);
+      fs::create_directories(site.cache());
+      SharedCounts counts = site.counts();
+      const CommandResult r = site.build_with_fault(action, at, counts, site.cache());
+      if ((*counts).fired == 0) continue;  // fewer calls are made beneath the cache than in all
+      ++points_done;
+      const std::string what = std::string(action) + " cache at call " + std::to_string(at);
+      EXPECT_EQ(r.exit_code, 0) << what << ": " << r.output << r.errors;
+      EXPECT_TRUE(site.packages() == reference_) << what;
+      site.expect_sound_cache(what);
+      expect_next_build_to_be_whole(site, what);
+    }
+  std::printf("caches read-only or full: %d points\n", points_done);
+  EXPECT_GE(points_done, 4);
+}
+
+TEST_F(Faults, ShortReadsAndWritesAndSignalsChangeNothing) {
+  ASSERT_NO_FATAL_FAILURE(prepare(2, "1"));
+  const Site site(models_, profile_, jobs_);
+  for (const char* build : {"first build", "no-op"}) {
+    SharedCounts counts = site.counts();
+    const CommandResult r = site.build_with_fault("choppy", 0, counts);
+    EXPECT_EQ(r.exit_code, 0) << build << ": " << r.output << r.errors;
+    EXPECT_GT((*counts).fired, 10u) << build << ": the shim is not at work";
+    std::printf("%s: %llu reads and writes cut or interrupted\n", build,
+                static_cast<unsigned long long>((*counts).fired));
+    EXPECT_TRUE(site.packages() == reference_) << build;
+    site.expect_sound_cache(build);
+  }
+  fs::remove_all(site.out());
+  fs::create_directories(site.out());
+  SharedCounts counts = site.counts();
+  EXPECT_EQ(site.build_with_fault("choppy", 0, counts).exit_code, 0) << "packages from the cache";
+  expect_next_build_to_be_whole(site, "short reads");
+}
+
+TEST_F(Faults, ClocksThatJumpChangeNothing) {
+  ASSERT_NO_FATAL_FAILURE(prepare(2, "1"));
+  const Site site(models_, profile_, jobs_);
+  for (const char* build : {"first build", "no-op", "again"}) {
+    SharedCounts counts = site.counts();
+    const CommandResult r = site.build_with_fault("clock", 0, counts);
+    EXPECT_EQ(r.exit_code, 0) << build << ": " << r.output << r.errors;
+    EXPECT_GT((*counts).fired, 1u) << build << ": the shim is not at work";
+    EXPECT_TRUE(site.packages() == reference_) << build;
+  }
+  // A model that changes is seen, whatever the clock had said when it was looked at.
+  const std::string model = models_ + "/scan_00000.glb";
+  std::string bytes = read_text(models_ + "/scan_00001.glb");
+  const std::string before = read_text(model);
+  write_text(model, bytes);
+  EXPECT_EQ(site.build().exit_code, 0);
+  EXPECT_FALSE(site.packages() == reference_) << "a change was not seen";
+  write_text(model, before);
+  expect_next_build_to_be_whole(site, "clocks that jump");
+}
+
+/// The merged summary is the old one or the new one, whatever happens to the process that writes it.
+TEST_F(Faults, AMergeThatIsKilledOrFailsAtEveryCall) {
+  prepare(2, "1");
+  std::vector<std::string> parts;
+  for (const std::string shard : {"0", "1"}) {
+    parts.push_back(folder_ / ("part" + shard + ".json"));
+    const CommandResult r =
+        texmesh({"compile", models_, "-o", folder_ / "out", "--cache", folder_ / "cache", "--profile",
+                 profile_, "--shard", shard + "/2", "--summary", parts.back()});
+    ASSERT_EQ(r.exit_code, 0) << r.output << r.errors;
+  }
+  const std::string place = folder_ / "merged";
+  fs::create_directories(place);
+  const std::string all = place + "/all.json", page = place + "/all.html", cases = place + "/all.xml";
+  SharedCounts none(folder_ / "counts");
+  const auto merge = [&](const std::string& action, std::uint64_t at, const SharedCounts& counts) {
+    return texmesh({"summary", "merge", parts[0], parts[1], "-o", all, "--junit", cases, "--html", page},
+                   {"LD_PRELOAD=" TEXMESH_FAULT_SHIM, "TEXMESH_FAULT_FILE=" + counts.file(),
+                    "TEXMESH_FAULT_UNDER=" + place, "TEXMESH_FAULT_ACTION=" + action,
+                    "TEXMESH_FAULT_AT=" + std::to_string(at)});
+  };
+  ASSERT_EQ(merge("none", 0, none).exit_code, 0);
+  const Packages reference = packages_in(place);
+  const std::uint64_t calls = (*none).calls;
+  ASSERT_GT(calls, 5u);
+  int points_done = 0;
+  for (const char* action : {"kill", "eio", "full", "frozen"})
+    for (std::uint64_t at = 1; at <= calls; ++at) {
+      fs::remove_all(place);
+      fs::create_directories(place);
+      write_text(all, "old");
+      SharedCounts counts(folder_ / "counts");
+      const CommandResult r = merge(action, at, counts);
+      if ((*counts).fired == 0) continue;
+      ++points_done;
+      const std::string what = std::string(action) + " at call " + std::to_string(at) + " of a merge";
+      const std::string text = read_text(all);
+      EXPECT_TRUE(text == "old" || text == reference.at("all.json")) << what << " left a torn summary";
+      EXPECT_NE(r.exit_code, 1) << what << ": models are not to blame: " << r.output << r.errors;
+      if (r.exit_code == 0)
+        EXPECT_EQ(text, reference.at("all.json")) << what << ": success without the summary";
+    }
+  std::printf("merges: %d points\n", points_done);
+  EXPECT_GE(points_done, 20);
 }
 
 /// Lustre with localflock, NFS with local_lock: every process gets every lock.

@@ -54,8 +54,8 @@ function bytesOfView({ buffer, byteOffset = 0, byteLength, extensions }: View, b
 export function plainGlb(glb: Uint8Array): Uint8Array {
   const { json, bytes } = partsOfGlb(glb);
   const gltf = json as Gltf;
-  const views = gltf.bufferViews ?? [];
-  require(Array.isArray(views) && views.every((view) => view), 'a list of views');
+  const { bufferViews: views = [], buffers = [], extensionsUsed = [], extensionsRequired = [] } = gltf;
+  require([views, buffers, extensionsUsed, extensionsRequired].every(Array.isArray) && views.every((view) => view), 'lists');
   const parts: Uint8Array[] = [];
   let end = 0;
   for (const view of views) {

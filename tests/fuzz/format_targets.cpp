@@ -1,13 +1,11 @@
-#pragma once
+// The readers of the package format. What is read must also be written again, unchanged where the format has
+// one form only.
 #include <algorithm>
-#include <cstdio>
-#include <cstdlib>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "delivery/cpp/package/package_reader.h"
-#include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "format/documents/about.h"
 #include "format/documents/index.h"
@@ -18,23 +16,27 @@
 #include "tests/format/container/package_fixture.h"
 #include "tests/format/documents/manifest_fixture.h"
 #include "tests/format/split/split_fixture.h"
+#include "tests/fuzz/fuzz_target.h"
 
 namespace texmesh::fuzz {
-namespace detail {
+namespace {
 
-using Input = std::span<const std::uint8_t>;
 using texmesh::testing::as_bytes;
 
-inline void require(bool good, const char* what) {
-  if (good) return;
-  std::fprintf(stderr, "format fuzz: %s\n", what);
-  std::abort();
+template <void (*kRead)(ByteSpan)>
+bool unless_format_error(ByteSpan input) {
+  try {
+    kRead(input);
+    return true;
+  } catch (const FormatError& e) {
+    return refused(e);
+  }
 }
 
-inline void fuzz_container(Input input) {
+void read_container_again(ByteSpan input) {
   const auto source = memory_source(input);
   Bytes again;
-  ContainerWriter writer([&](Input part) { again.insert(again.end(), part.begin(), part.end()); });
+  ContainerWriter writer([&](ByteSpan part) { again.insert(again.end(), part.begin(), part.end()); });
   for (const ContainerEntry& e : read_container(*source)) {
     check_crc(*source, e);
     writer.add(e.path, source->read(e.offset, e.bytes));
@@ -43,7 +45,7 @@ inline void fuzz_container(Input input) {
   require(std::ranges::equal(again, input), "a container was accepted that its entries do not lead to");
 }
 
-inline void fuzz_manifest(Input input) {
+void read_manifest_twice(ByteSpan input) {
   const Manifest m = read_manifest(input);
   std::string json;
   try {
@@ -56,40 +58,40 @@ inline void fuzz_manifest(Input input) {
   require(write_manifest(read_manifest(as_bytes(json))) == json, "a manifest changed by being written twice");
 }
 
-inline void fuzz_textures(Input input) {
+void read_textures_twice(ByteSpan input) {
   const auto textures = read_textures(input);
   require(read_textures(as_bytes(write_textures(textures))) == textures, "textures changed by being written");
 }
 
-inline void fuzz_index(Input input) {
+void read_index_twice(ByteSpan input) {
   const auto entries = read_index(input);
   require(read_index(write_index(entries)) == entries, "an index changed by being written");
 }
 
-inline void fuzz_tables(Input input) {
+void read_tables_twice(ByteSpan input) {
   const Bytes once = write_tables(read_tables(input));
   require(write_tables(read_tables(once)) == once, "tables changed by being written twice");
   if (input[6] == 0 && input[7] == 0)
     require(std::ranges::equal(once, input), "tables of this version have a second form");
 }
 
-inline void fuzz_thesis(Input input) {
+void read_thesis_twice(ByteSpan input) {
   const Bytes once = write_thesis(read_thesis(input).tables);
   require(write_thesis(read_thesis(once).tables) == once,
           "the thesis's tables changed by being written twice");
 }
 
-inline void fuzz_quality(Input input) {
+void read_quality_twice(ByteSpan input) {
   const QualityTable table = read_quality(input);
   require(read_quality(as_bytes(write_quality(table))) == table, "a quality table changed by being written");
 }
 
-inline void fuzz_about(Input input) {
+void read_about_twice(ByteSpan input) {
   const std::string json = write_about(read_about(input));
   require(write_about(read_about(as_bytes(json))) == json, "about.json changed by being written twice");
 }
 
-inline void fuzz_package(Input input) {
+void read_package(ByteSpan input) {
   PackageReader reader(open_container(memory_source(input)));
   for (const EntryRef& e : reader.index()) reader.entry(e);
   for (const ManifestScale& s : reader.manifest().scales)
@@ -111,7 +113,7 @@ inline void fuzz_package(Input input) {
 /// Puts the right SHA-256 in front of every section: a fuzzer cannot find one, whoever makes a package on
 /// purpose can. Index and tables have the same kind of head: `fixed` bytes with the count at 8, then records
 /// of `record` bytes that hold the section's length at `length_at` and its digest behind it.
-inline Bytes with_digests(Input input, std::size_t fixed, std::size_t record, std::size_t length_at) {
+Bytes with_digests(ByteSpan input, std::size_t fixed, std::size_t record, std::size_t length_at) {
   Bytes bytes(input.begin(), input.end());
   const auto u32 = [&](std::size_t at) {
     return bytes[at] | bytes[at + 1] << 8 | bytes[at + 2] << 16 |
@@ -132,17 +134,14 @@ inline Bytes with_digests(Input input, std::size_t fixed, std::size_t record, st
   return bytes;
 }
 
-inline void fuzz_index_with_digests(Input input) { fuzz_index(with_digests(input, 16, 44, 8)); }
-inline void fuzz_tables_with_digests(Input input) { fuzz_tables(with_digests(input, 16, 36, 0)); }
-
 /// Blocks go in part by part, so that their digests do not stand in the way.
-inline void fuzz_split_stream(Input input) {
+void read_split_stream(ByteSpan input) {
   constexpr SplitLimits kLimits{20000, 40000};
   const SplitStreamHead head = read_split_head(input);
   SplitStreamReader reader(head, kLimits);
   for (const SplitBlock& b : head.blocks) {
     if (b.offset + b.bytes() > input.size()) break;
-    std::vector<Input> parts;
+    std::vector<ByteSpan> parts;
     std::uint64_t at = b.offset;
     for (const std::uint32_t size : b.parts) {
       parts.push_back(input.subspan(static_cast<std::size_t>(at), size));
@@ -158,58 +157,32 @@ inline void fuzz_split_stream(Input input) {
               "a face without three points");
 }
 
-inline Bytes tagged(std::uint8_t kind, Input bytes) {
-  Bytes out{kind};
-  out.insert(out.end(), bytes.begin(), bytes.end());
-  return out;
+// ---- seeds
+
+std::vector<Bytes> packages() {
+  return {texmesh::testing::make_package(0), texmesh::testing::make_package(1),
+          texmesh::testing::make_package(2)};
 }
 
-}  // namespace detail
-
-/// Feeds bytes to the readers of the package format. The first byte chooses the reader, the rest is its
-/// input: 0 container, 1 manifest, 2 textures, 3 index, 4 tables, 5 quality, 6 a whole package through
-/// PackageReader, 9 a vertex-split stream, 10 the thesis's tables, 11 about.json. Anything but an answer or a
-/// FormatError is a fault: it aborts. What is read must also be written again, unchanged where the format has
-/// one form only.
-inline void read_format(std::span<const std::uint8_t> input) {
-  using namespace detail;
-  constexpr void (*kReaders[])(Input) = {fuzz_container,
-                                         fuzz_manifest,
-                                         fuzz_textures,
-                                         fuzz_index,
-                                         fuzz_tables,
-                                         fuzz_quality,
-                                         fuzz_package,
-                                         fuzz_index_with_digests,
-                                         fuzz_tables_with_digests,
-                                         fuzz_split_stream,
-                                         fuzz_thesis,
-                                         fuzz_about};
-  if (input.empty()) return;
-  try {
-    kReaders[input[0] % std::size(kReaders)](input.subspan(1));
-  } catch (const FormatError&) {
-  }
-}
-
-/// Well-formed inputs of every kind, made by code.
-inline std::vector<std::vector<std::uint8_t>> make_corpus() {
-  using namespace detail;
-  std::vector<Bytes> corpus;
-  for (const std::uint32_t planes : {0u, 1u, 2u}) {
-    const Bytes package = texmesh::testing::make_package(planes);
-    corpus.push_back(tagged(0, package));
-    corpus.push_back(tagged(6, package));
+/// The entry of each of the packages.
+std::vector<Bytes> entries(const std::string& path) {
+  std::vector<Bytes> list;
+  for (const Bytes& package : packages()) {
     PackageReader reader(open_container(memory_source(package)));
-    corpus.push_back(tagged(1, reader.store().read_manifest()));
-    corpus.push_back(tagged(2, reader.entry(kTexturesPath)));
-    corpus.push_back(tagged(3, reader.entry(reader.manifest().index)));
-    corpus.push_back(tagged(4, reader.entry(kTablesPath)));
-    corpus.push_back(tagged(7, reader.entry(reader.manifest().index)));
-    corpus.push_back(tagged(8, reader.entry(kTablesPath)));
-    corpus.push_back(tagged(5, reader.entry(kQualityPath)));
+    list.push_back(path == kManifestPath ? reader.store().read_manifest()
+                   : path == kIndexPath  ? reader.entry(reader.manifest().index)
+                                         : reader.entry(path));
   }
-  corpus.push_back(tagged(1, as_bytes(write_manifest(texmesh::testing::make_manifest(40, 220, true)))));
+  return list;
+}
+
+std::vector<Bytes> manifests() {
+  auto list = entries(kManifestPath);
+  list.push_back(to_bytes(write_manifest(texmesh::testing::make_manifest(40, 220, true))));
+  return list;
+}
+
+std::vector<Bytes> thesis_seeds() {
   ThesisTables thesis;
   PlaneThesis& said = thesis.planes.emplace_back();
   said.z = said.i = said.zeta = said.m = said.vqp = {0.5f, 1};
@@ -220,13 +193,40 @@ inline std::vector<std::vector<std::uint8_t>> make_corpus() {
   chain.scale = {0, 2}, chain.triangles = {1260, 700}, chain.collapses = {0, 280};
   chain.average = {0, 0.04f}, chain.largest = {0, 0.2f}, chain.least = {0, 0}, chain.deviation = {0, 0.03f};
   chain.p95 = {0.05f}, chain.chain_average = {0.04f}, chain.chain_largest = {0.2f}, chain.chain_least = {0};
-  corpus.push_back(tagged(10, write_thesis(thesis)));
-  corpus.push_back(tagged(11, as_bytes(R"({"title":"A","licence":"MIT","licenceUrl":"https://a.b/",
+  return {write_thesis(thesis)};
+}
+
+std::vector<Bytes> about_seeds() {
+  return {to_bytes(R"({"title":"A","licence":"MIT","licenceUrl":"https://a.b/",
     "identifiers":[{"scheme":"doi","value":"1"}],"unit":{"name":"m","metres":1},"upAxis":"y",
-    "coordinateReference":{"text":"t","epsg":4326},"source":{"format":"obj","x":[1.5,null]},"extras":-1e9})")));
+    "coordinateReference":{"text":"t","epsg":4326},"source":{"format":"obj","x":[1.5,null]},"extras":-1e9})")};
+}
+
+std::vector<Bytes> split_seeds() {
+  std::vector<Bytes> list;
   for (const std::uint32_t n : {3u, 9u})
-    corpus.push_back(tagged(9, write_split_stream(texmesh::testing::split_fixture(n).source)));
-  return corpus;
+    list.push_back(write_split_stream(texmesh::testing::split_fixture(n).source));
+  return list;
+}
+
+}  // namespace
+
+void add_format_targets(std::vector<Target>& list) {
+  list.insert(list.end(),
+              {{"container", true, unless_format_error<read_container_again>, packages, Shape::kContainer},
+               {"package", true, unless_format_error<read_package>, packages, Shape::kContainer},
+               {"manifest", true, unless_format_error<read_manifest_twice>, manifests, Shape::kJson},
+               {"textures", false, unless_format_error<read_textures_twice>,
+                [] { return entries(kTexturesPath); }, Shape::kJson},
+               {"quality", false, unless_format_error<read_quality_twice>,
+                [] { return entries(kQualityPath); }, Shape::kJson},
+               {"about", false, unless_format_error<read_about_twice>, about_seeds, Shape::kJson},
+               {"index", true, unless_format_error<read_index_twice>, [] { return entries(kIndexPath); },
+                Shape::kBytes, [](ByteSpan b) { return with_digests(b, 16, 44, 8); }},
+               {"tables", true, unless_format_error<read_tables_twice>, [] { return entries(kTablesPath); },
+                Shape::kBytes, [](ByteSpan b) { return with_digests(b, 16, 36, 0); }},
+               {"thesis", true, unless_format_error<read_thesis_twice>, thesis_seeds},
+               {"stream", true, unless_format_error<read_split_stream>, split_seeds}});
 }
 
 }  // namespace texmesh::fuzz
