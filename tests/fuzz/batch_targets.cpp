@@ -204,7 +204,7 @@ std::vector<Bytes> summary_seeds() {
   m.result = ModelResult::kOk, m.ran = true, m.bytes = 5, m.seconds = 1;
   summary.models = {m, m};
   summary.models[1].package = "b.texmesh", summary.models[1].result = ModelResult::kFailed,
-  summary.models[1].error_kind = "input";
+  summary.models[1].error.kind = "input";
   summary.shard = Shard{1, 4};
   summary.collection = "0123";
   return {to_bytes(write_summary(summary))};
@@ -212,7 +212,7 @@ std::vector<Bytes> summary_seeds() {
 
 std::vector<Bytes> event_seeds() {
   WorkerReport report;
-  report.error_kind = "input", report.error_file = "a.obj", report.error_message = "bad";
+  report.more->error = {"input", "a.obj", "", "", "", "bad"};
   return {
       to_bytes(
           error_event(report) +
