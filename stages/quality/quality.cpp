@@ -60,7 +60,7 @@ std::vector<Height> heights_below(double largest_px) {
   for (std::size_t halvings = 0;; ++halvings) {
     const double px = std::ldexp(largest_px, -static_cast<int>(halvings));
     const bool in_table = halvings < kSizes;
-    if (px < kLeastSwitchPx && !in_table) break;
+    if (px < (in_table ? 1 : kLeastSwitchPx)) break;  // the table holds whole pixels
     heights.push_back(
         {px, px * std::sqrt(0.5), in_table ? std::optional(kSizes - 1 - halvings) : std::nullopt});
   }

@@ -56,7 +56,7 @@ TEST(CommandHelp, GroupsTheCommands) {
   for (const char* title :
        {"Make packages:", "Look inside:", "Export:", "Deliver over a network:", "Measure the method:"})
     EXPECT_NE(text.find(std::string("\n") + title + "\n"), std::string::npos) << title;
-  EXPECT_EQ(commands().size(), 22u);
+  EXPECT_EQ(commands().size(), 24u);
 }
 
 TEST(CommandHelp, OfCompileFitsOnTwoScreens) {
