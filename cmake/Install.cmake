@@ -41,7 +41,7 @@ if(TEXMESH_COMPILER)
   texmesh_install_headers(pipeline "import/import\\.h" "compile/(compile_model|options|profile)\\.h"
     "batch/(plan|run|fleet/shards)\\.h" "cache/(disk_store|cache_layer|layer_rest|prune)\\.h" "inspect/(dump/dump|verify/verify|diff/diff)\\.h"
     "extract/extract\\.h" "export/export\\.h" "gallery/gallery\\.h"
-    "io/(file_request|file_resolver|file_stamp|resolver)\\.h" "compile/workers/(worker|sandbox/sandbox)\\.h" "batch/progress\\.h"
+    "io/(file_request|file_resolver|file_stamp|resolver)\\.h" "compile/workers/(seldom|worker|sandbox/sandbox)\\.h" "batch/progress\\.h"
     "graph/(artefact|explanation|graph_run|key|option_text|stage|stage_observer|store)\\.h"
     "extract/glb/(extracted|image_codecs)\\.h" "render/plane_pixels\\.h")
   install(FILES cmake/FindWebP.cmake DESTINATION ${texmesh_cmake_dir})
