@@ -2,6 +2,7 @@
 #include "stages/image/oiio/tiff_exr_reader.h"
 
 #include <algorithm>
+#include <cstring>
 #include <memory>
 #include <mutex>
 
@@ -15,9 +16,32 @@ namespace {
 
 const char* reader_name(ImageFormat format) { return format == ImageFormat::kTiff ? "tiff" : "openexr"; }
 
+/// OpenImageIO's own IOMemReader believes a place before the begin, which an EXR's table of rows can name.
+class MemoryFile final : public OIIO::Filesystem::IOProxy {
+ public:
+  explicit MemoryFile(ByteSpan bytes) : IOProxy("", Mode::Read), bytes_(bytes) {}
+  const char* proxytype() const override { return "texmesh"; }
+  std::size_t read(void* to, std::size_t size) override {
+    const std::size_t n = pread(to, size, m_pos);
+    m_pos += static_cast<std::int64_t>(n);
+    return n;
+  }
+  std::size_t pread(void* to, std::size_t size, std::int64_t offset) override {
+    if (offset < 0 || static_cast<std::uint64_t>(offset) >= bytes_.size()) return 0;
+    const ByteSpan rest = bytes_.subspan(static_cast<std::size_t>(offset));
+    const std::size_t n = std::min(size, rest.size());
+    if (n > 0) std::memcpy(to, rest.data(), n);
+    return n;
+  }
+  std::size_t size() const override { return bytes_.size(); }
+
+ private:
+  ByteSpan bytes_;
+};
+
 // An image file opened by the reader of its format, in memory; keep the bytes alive.
 struct OpenImage {
-  std::unique_ptr<OIIO::Filesystem::IOMemReader> memory;
+  std::unique_ptr<MemoryFile> memory;
   std::unique_ptr<OIIO::ImageInput> input;
   OIIO::ImageSpec spec;
 };
@@ -39,7 +63,7 @@ OpenImage open_image(const std::string& name, ImageFormat format, ByteSpan bytes
     OIIO::attribute("exr_threads", -1);
   });
   OpenImage open;
-  open.memory = std::make_unique<OIIO::Filesystem::IOMemReader>(bytes.data(), bytes.size());
+  open.memory = std::make_unique<MemoryFile>(bytes);
   open.input = OIIO::ImageInput::create(reader_name(format));
   if (!open.input)
     throw InputError(name, "", std::string("OpenImageIO's reader for ") + image_format_name(format), "none");
