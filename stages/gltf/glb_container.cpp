@@ -1,5 +1,8 @@
 #include "stages/gltf/glb_container.h"
 
+#include <limits>
+#include <string>
+
 namespace texmesh {
 namespace {
 
@@ -18,6 +21,11 @@ void pad_to_four(Bytes& out, std::uint8_t with) { out.resize(padded(out.size()),
 Bytes glb_container(std::string_view json, ByteSpan binary) {
   const std::size_t bytes =
       kHeaderBytes + 2 * kChunkHeaderBytes + padded(json.size()) + padded(binary.size());
+  constexpr std::size_t kMost = std::numeric_limits<std::uint32_t>::max();
+  if (bytes > kMost)
+    throw FormatError("GLB", "length",
+                      "at most " + std::to_string(kMost) + " bytes, since lengths have 32 bits",
+                      std::to_string(bytes));
   Bytes out;
   out.reserve(bytes);
   put_u32(out, kGlbMagic);

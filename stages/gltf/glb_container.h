@@ -15,7 +15,8 @@ inline constexpr std::uint32_t kGlbMagic = 0x46546c67, kGlbJsonChunk = 0x4e4f534
 void pad_to_four(Bytes& out, std::uint8_t with);
 
 /// A GLB file of version 2 (glTF 2.0, section 4.4) with both chunks. Each chunk is padded: JSON by spaces,
-/// `binary` by zeros.
+/// `binary` by zeros. FormatError where the file would have 4 GiB or more: its lengths have 32 bits. Nothing
+/// is read or copied before.
 Bytes glb_container(std::string_view json, ByteSpan binary);
 
 }  // namespace texmesh

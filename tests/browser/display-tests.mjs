@@ -2,6 +2,7 @@
 import {check, common, lab, labPage} from './browser.mjs';
 import {test} from './harness.mjs';
 import {comparePlane, kEverything, kTopQuality, loaded, throttled} from './loads.mjs';
+import {starvation} from './starved.mjs';
 
 const until = (page, f, arg, timeout = 30000) => page.waitForFunction(f, arg, {timeout});
 const phaseIs = (page, id, phase = 'done') => until(page, ([i, p]) => {
@@ -73,6 +74,7 @@ test('the camera turns during the timed part: what is refined then is what it lo
   for (const turned of [false, true])
     await throttled({}, async (page, link, url) => {
       await lab(page, () => window.lab.start({size: 900, zoom: 3, azimuth: 30}));
+      const starved = starvation();
       const id = await lab(page, (u) => window.lab.load(u, {load: {time: 1.5, refineTo: 0}}), url);
       await until(page, (i) => window.lab.report(i).events.some((e) => e.name === 'first-picture'), id);
       check(!(await lab(page, (i) => window.lab.report(i), id)).events.some((e) => e.name === 'deadline'), 'the timed part is over already');
@@ -88,7 +90,8 @@ test('the camera turns during the timed part: what is refined then is what it lo
       const timed = await lab(page, (i) => window.lab.finished(i), id);
       check(!timed.error, JSON.stringify(timed.error));
       const {at, actual} = timed.events.find((e) => e.name === 'deadline');
-      check(actual <= 1.5 * 1.1, `${actual} s of 1.5`);
+      const waited = starved();
+      check(actual <= 1.5 * 1.1 + waited, `${actual} s of 1.5, ${waited} s without a processor`);
       await link.set({bytesPerSecond: 1e12, rttMs: 0});
       await phaseIs(page, id);
       const {events} = await lab(page, (i) => window.lab.report(i), id);

@@ -184,12 +184,12 @@ export class PackageDocuments {
   }
   /**
    * Reads what a first plan and its first fragments need by one request, or as much of that as is small: index, textures.json,
-   * quality.json, table streams, tables, and behind a proxy the coarsest mesh. False where not even the documents before the tables are small.
+   * quality.json, table streams, tables, and `withMesh` the coarsest mesh. False where not even the documents before the tables are small.
    */
-  async prefetchDocuments(signal?: AbortSignal): Promise<boolean> {
-    const { index, tables, scales, proxies } = this.manifest;
+  async prefetchDocuments(signal?: AbortSignal, withMesh = false): Promise<boolean> {
+    const { index, tables, scales } = this.manifest;
     const { offset, bytes: meshBytes } = scales[scales.length - 1].glb;
-    const ends = [proxies.length > 0 ? offset + meshBytes : 0, tables.offset + tables.bytes, tables.offset].map((end) => end - index.offset);
+    const ends = [withMesh ? offset + meshBytes : 0, tables.offset + tables.bytes, tables.offset].map((end) => end - index.offset);
     const bytes = ends.find((n) => n > 0 && n <= wholeDocumentBytes);
     if (!bytes) return false;
     // Whoever takes a document of these bytes holds the document to its digest.

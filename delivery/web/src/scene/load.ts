@@ -147,7 +147,7 @@ class ModelLoad {
     const { context } = this;
     context.enter('tables');
     if (!this.coming_) {
-      await this.proxies_.showStep(() => context.reader.prefetchDocuments(context.signal)); // with the coarsest scale, by one request
+      await this.proxies_.showStep(() => context.reader.prefetchDocuments(context.signal, true));
       await this.startScales_();
     }
     this.textures = await this.coming_!;
