@@ -323,7 +323,7 @@ MeasuredQuality measure_quality(const NestedScales& scales, const PerceptualValu
     add_warning(result.notes, "quality-not-measured", "",
                 "no picture shows anything of the object; its scales count as equal");
   studio.frame = seen.frame;
-  studio.environment = studio_environment(context);
+  studio.environment = studio_environment();
   for (std::size_t t = 0; t < shown.textures.size(); ++t)
     studio.textures.push_back(source_texture(
         data, shown.textures[t], shown.textures[t].with_mips ? seen.first_levels[t] : 0, context));
