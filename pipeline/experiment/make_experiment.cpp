@@ -177,7 +177,7 @@ Experiment make_experiment(const ExperimentOptions& options, const StimulusSet& 
   design.options = options;
   design.levels = stimuli.levels;
   for (const double px : options.sizes_px) design.conditions.push_back({px, frame_px(stimuli, px)});
-  const RenderEnvironment environment = studio_environment(context);
+  const RenderEnvironment environment = studio_environment();
   design.background = background_of(environment);
   plan_trials(design);
   const std::string json = write_design(design);

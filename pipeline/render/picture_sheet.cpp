@@ -22,7 +22,7 @@ Pixels empty_sheet(std::uint32_t width_px, std::uint32_t height_px, const Render
 }  // namespace
 
 RenderEnvironment environment_of(RenderLight light, const RunContext& context) {
-  if (light == RenderLight::kStudio) return studio_environment(context);
+  if (light == RenderLight::kStudio) return studio_environment();
   return prepare_environment([](Vec3f) { return Vec3f{1, 1, 1}; }, KeyLight{}, context);
 }
 

@@ -40,7 +40,7 @@ PackagePictures::PackagePictures(PackageReader& package, const PackageChoice& te
     : package_(package),
       context_(context),
       finest_(package_model(package, finest_choice(textures), context)),
-      environment_(studio_environment(context)) {
+      environment_(studio_environment()) {
   context_.progress = nullptr;
   read_with_mips(finest_);
 }

@@ -149,6 +149,12 @@ class ScaleComparison {
   std::vector<std::uint32_t> of_source_;
 };
 
+/// Points on a scale: where there are few triangles, more points than triangles say little more.
+std::size_t sample_count(const NestedScale& scale, std::size_t most) {
+  constexpr std::size_t kLeast = 500;
+  return std::min(most, std::max(kLeast, scale.triangles.size()));
+}
+
 /// Fills p95 and p99 for all pairs; returns per scale the 95th percentile of S_0's distance in object units.
 std::vector<double> compare_scales(const NestedScales& scales, const Skeleton& skeleton, std::size_t samples,
                                    const RunContext& context, PerceptualValues& out) {
@@ -156,7 +162,8 @@ std::vector<double> compare_scales(const NestedScales& scales, const Skeleton& s
   std::vector<SampledScale> sampled(n);
   parallel_for(context, n - 1, 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i)
-      sampled[i] = sample_scale(scales.mesh, scales.scales[i], skeleton.radius, samples);
+      sampled[i] = sample_scale(scales.mesh, scales.scales[i], skeleton.radius,
+                                sample_count(scales.scales[i], samples));
   });
   std::vector<double> error(n, 0);
   std::atomic<std::size_t> done = 0;

@@ -116,7 +116,7 @@ class ProxyRun {
         smooth_(proxies::is_smooth(mesh)),
         surfaces_(mesh, groups, kLeastTriangles, most_triangles(mesh, most_bytes), context),
         shop_(source, groups, surfaces_),
-        studio_(mesh, shown, context) {}
+        studio_(mesh, shown) {}
 
   /// Whether larger sizes may have a proxy.
   bool add(int bytes, Proxies& out, const RunContext& context) {

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "format/documents/manifest.h"
+#include "format/rules/mip_choice.h"
 #include "stages/geometry/scale_frames.h"
 #include "stages/quality/table_fit.h"
 
@@ -16,6 +17,7 @@ using quality::Cells;
 using quality::choose_views;
 using quality::coarser_along;
 using quality::Coverage;
+using quality::enlarge;
 using quality::find_groups;
 using quality::find_shown;
 using quality::fit_exponent;
@@ -47,22 +49,25 @@ using quality::TogetherCell;
 using quality::TogetherLoss;
 using quality::ViewPart;
 
-constexpr std::size_t kSizes = 3;  // of the table
+constexpr std::size_t kSizes = 3;  // that show textures
+/// Below, a half height hardly costs anything.
+constexpr double kLeastEnlargedPx = 128;
 
 /// A displayed height that is rendered whatever comes out, and the one between it and the next lower one.
 struct Height {
   double displayed_px = 0, between_px = 0;
-  std::optional<std::size_t> rank;  // among the table's sizes
+  std::optional<std::size_t> rank;  // among the sizes that show textures
 };
-/// Rising, each twice the one before.
-std::vector<Height> heights_below(double largest_px) {
+/// Rising, each twice the one before, up to `largest_px` halved no time. Textures show at kSizes of them, the
+/// last of which is `largest_px` halved `fewer` times.
+std::vector<Height> heights_below(double largest_px, std::size_t fewer) {
   std::vector<Height> heights;
   for (std::size_t halvings = 0;; ++halvings) {
     const double px = std::ldexp(largest_px, -static_cast<int>(halvings));
-    const bool in_table = halvings < kSizes;
-    if (px < (in_table ? 1 : kLeastSwitchPx)) break;  // the table holds whole pixels
+    const bool shows = halvings >= fewer && halvings < fewer + kSizes;
+    if (halvings < fewer + kSizes ? px < 1 : px < kLeastSwitchPx) break;  // the table holds whole pixels
     heights.push_back(
-        {px, px * std::sqrt(0.5), in_table ? std::optional(kSizes - 1 - halvings) : std::nullopt});
+        {px, px * std::sqrt(0.5), shows ? std::optional(fewer + kSizes - 1 - halvings) : std::nullopt});
   }
   std::reverse(heights.begin(), heights.end());
   return heights;
@@ -185,9 +190,34 @@ void judge_size(const SizeCells& cells, const Height& height, const TextureSampl
   sizes.judge_between(between.geometry, failed, height.between_px);
 }
 
+/// How often the largest height is halved for pictures of textures. Beyond the height at which texels are as
+/// large as pixels and triangles as large as kTrianglePixels, pictures are enlarged ones: what they lose
+/// follows (enlarge()).
+std::size_t fewer_heights(const TextureSampler& sampler, std::size_t triangles, double object_height,
+                          const QualityOptions& options) {
+  constexpr double kTexelLevel = 0.5;  // texels of 0.7 pixels are the least
+  constexpr double kTrianglePixels = 16, kSeenArea = 0.25, kSeenTriangles = 0.5;
+  std::size_t fewer = 0;
+  while (fewer + 1 < kSizes) {
+    const double px = std::ldexp(options.largest_px, -static_cast<int>(fewer + 1));
+    const double per_unit = px / object_height;
+    const double pixels = kSeenArea * sampler.surface_area * per_unit * per_unit;
+    if (px < kLeastEnlargedPx || pixels < kTrianglePixels * kSeenTriangles * static_cast<double>(triangles))
+      break;
+    const bool finer = std::ranges::any_of(sampler.shown.textures, [&](const ShownTexture& t) {
+      return display_level(sampler.data.tables.planes[t.plane], sampler.surface_area, object_height, px) >
+             kTexelLevel;
+    });
+    if (finer || !sampler.shown.with_mips()) break;
+    ++fewer;
+  }
+  return fewer;
+}
+
 std::vector<SizeCells> render_heights(const TextureSampler& sampler, const QualityOptions& options,
-                                      Studio& studio, SwitchSizes& sizes, const RunContext& context) {
-  const std::vector<Height> heights = heights_below(options.largest_px);
+                                      std::size_t fewer, Studio& studio, SwitchSizes& sizes,
+                                      const RunContext& context) {
+  const std::vector<Height> heights = heights_below(options.largest_px, fewer);
   std::vector<SizeCells> table_cells;
   for (std::size_t i = 0; i < heights.size(); ++i) {
     context.check_cancelled();
@@ -297,6 +327,13 @@ void fill_table(const std::vector<SizeCells>& sizes, const std::vector<PlanesOfG
   }
 }
 
+/// Per group, of that size's textures shown twice as large as often.
+std::vector<double> texel_levels(const SizeCells& size, std::size_t doublings) {
+  std::vector<double> out;
+  for (const GroupCells& g : size.groups) out.push_back(g.texel_level + static_cast<double>(doublings));
+  return out;
+}
+
 }  // namespace
 
 MeasuredQuality measure_quality(const NestedScales& scales, const PerceptualValues& perceptual,
@@ -323,7 +360,7 @@ MeasuredQuality measure_quality(const NestedScales& scales, const PerceptualValu
     add_warning(result.notes, "quality-not-measured", "",
                 "no picture shows anything of the object; its scales count as equal");
   studio.frame = seen.frame;
-  studio.environment = studio_environment(context);
+  studio.environment = studio_environment();
   for (std::size_t t = 0; t < shown.textures.size(); ++t)
     studio.textures.push_back(source_texture(
         data, shown.textures[t], shown.textures[t].with_mips ? seen.first_levels[t] : 0, context));
@@ -331,10 +368,13 @@ MeasuredQuality measure_quality(const NestedScales& scales, const PerceptualValu
   const TextureSampler sampler{data, shown, groups, options.rung_samples,
                                surface_area_of(scales.mesh, scales.scales[0].triangles)};
   SwitchSizes switch_sizes(kept.meshes.size(), options);
-  const std::vector<SizeCells> cells = render_heights(sampler, options, studio, switch_sizes, context);
+  const std::size_t fewer =
+      fewer_heights(sampler, scales.scales[0].triangles.size(), studio.frame.extent, options);
+  const std::vector<SizeCells> cells = render_heights(sampler, options, fewer, studio, switch_sizes, context);
   result.table.views = static_cast<std::uint32_t>(options.views);
   result.table.scales = kept.numbers;
   fill_table(cells, groups, result.table);
+  for (std::size_t i = 0; i < fewer; ++i) enlarge(texel_levels(cells.back(), i), result.table);
   result.display_px_flip = switch_sizes.display_px();
   return result;
 }

@@ -11,7 +11,7 @@
 
 namespace texmesh {
 
-inline constexpr int kQualityVersion = 14;
+inline constexpr int kQualityVersion = 15;
 
 struct QualityOptions {
   int views = 4;
@@ -46,9 +46,14 @@ struct QualityOptions {
 ///   show that the renderer knows: base colour with alpha, metallic-roughness, normal, occlusion, emission;
 ///   all of them read with mips, whatever the sampler says, where scales are compared, and as the source's
 ///   samplers read where textures are.
-/// - Heights: largest_px, its half and so on down to kLeastSwitchPx; half octaves between for scales alone that
+/// - Heights: largest_px, its half and so on down to kLeastSwitchPx; half octaves between for scales alone
+/// that
 ///   pass the height below and fail the one above. The table's sizes are the largest, its half and its
-///   quarter.
+///   quarter. A model of few texels and triangles is not rendered at all of them: down to a quarter of
+///   largest_px the largest rendered height, which "largest size" means below, is the first at which texels
+///   are not smaller than 0.7 pixels and triangles cover 16 pixels on average. Scales that pass there are
+///   rendered at larger heights as well. Sizes beyond follow from the two largest rendered ones
+///   (table_fit.h: enlarge()).
 /// - Switch sizes: a scale passes a height when in every view the mean of FLIP is at most flip_mean and its
 ///   95th percentile at most flip_p95. The switch size is the largest height such that the scale passes it
 ///   and all lower ones that are looked at; 0 = it passes nowhere. FLIP publishes no thresholds: these are

@@ -29,6 +29,13 @@ TextureLosses texture_losses(const GroupCells& group, GroupPictures pictures, fl
 /// show others there, too. Losses as for texels as large on the screen as there. `texel_level` per size.
 void lend_knots(const std::vector<double>& texel_level, std::vector<TextureLosses>& sizes);
 
+/// Puts a size that is twice the last one in the first one's place: of a table with at least two, whose
+/// textures show all their texels at the last one, each as large as a pixel and more. `texel_level`: per
+/// group, that of the last size. Differences of geometry and previews grow by a share of what they grew
+/// before, those of coarser mips by kMipGrowth at texels of one pixel, and less at larger ones; what coding
+/// adds, by GroupCurve::kLossPerDoubling.
+void enlarge(const std::vector<double>& texel_level, QualityTable& table);
+
 /// What the table's parts say of a sample, and what was measured.
 struct TogetherLoss {
   std::vector<double> parts;

@@ -44,8 +44,8 @@ KeyLight studio_key_light();
 /// count.
 RenderEnvironment prepare_environment(const Radiance& radiance, const KeyLight& key,
                                       const RunContext& context);
-/// studio_radiance with studio_key_light.
-RenderEnvironment studio_environment(const RunContext& context);
+/// studio_radiance with studio_key_light, prepared when the library was built.
+RenderEnvironment studio_environment();
 
 /// Irradiance / pi on a surface with that unit normal; >= 0.
 Vec3f diffuse_light(const RenderEnvironment& environment, Vec3f normal);

@@ -38,14 +38,4 @@ Vec3f studio_radiance(Vec3f direction) {
 
 KeyLight studio_key_light() { return {normalized(Vec3f{0.62f, 0.72f, 0.55f}), Vec3f{1.02f, 1.0f, 0.96f}}; }
 
-// Three stages ask for it. On one thread: one that waits for others might begin the work again.
-RenderEnvironment studio_environment(const RunContext& context) {
-  static const RenderEnvironment environment = [&] {
-    RunContext serial = context;
-    serial.threads = 1;
-    return prepare_environment(studio_radiance, studio_key_light(), serial);
-  }();
-  return environment;
-}
-
 }  // namespace texmesh

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "format/base/no_index.h"
 #include "stages/base/parallel.h"
 #include "stages/geometry/component_boxes.h"
 #include "stages/geometry/distance.h"
@@ -11,14 +12,22 @@
 namespace texmesh {
 namespace {
 
-// Per scale and direction: the rms is within 2 % then; the largest distance is that of a sample.
-constexpr std::size_t kErrorSamples = 4000;
+// Per scale and direction: the rms is within 2 % then; the largest distance is that of a sample. Where there
+// are few triangles, more points than triangles say little more.
+constexpr std::size_t kErrorSamples = 4000, kLeastSamples = 500;
+
+std::size_t sample_count(std::size_t triangles) {
+  return std::min(kErrorSamples, std::max(kLeastSamples, triangles));
+}
 
 /// A point of S_0 and the component that it lies on.
 struct Probe {
   Vec3d point;
   std::uint32_t component;
+  std::uint32_t triangle = kNoIndex;  // of S_0
 };
+
+using Hint = SurfaceDistance::Hint;
 
 Vec3d place(const Mesh& mesh, const std::vector<Triangle>& triangles, const SurfaceSample& sample) {
   Vec3d p;
@@ -42,9 +51,10 @@ class ErrorMeter {
         context_(context),
         original_(mesh.positions, mesh.wedge_position, mesh.triangles),
         diagonal_(component_diagonals(component, mesh)) {
-    for (const SurfaceSample& s :
-         sample_surface(mesh.positions, mesh.wedge_position, mesh.triangles, kErrorSamples))
-      surface_.push_back({place(mesh, mesh.triangles, s), component[mesh.position_of(s.triangle, 0)]});
+    for (const SurfaceSample& s : sample_surface(mesh.positions, mesh.wedge_position, mesh.triangles,
+                                                 sample_count(mesh.triangles.size())))
+      surface_.push_back(
+          {place(mesh, mesh.triangles, s), component[mesh.position_of(s.triangle, 0)], s.triangle});
     // Vertices of S_0 are where it deviates most from a coarser scale.
     for (std::size_t p = 0; p < mesh.positions.size(); p += mesh.positions.size() / kErrorSamples + 1)
       vertices_.push_back({to_double(mesh.positions[p]), component[p]});
@@ -55,11 +65,20 @@ class ErrorMeter {
     std::vector<double> limit = diagonal_;  // of a component's distance: no limit where it is still there
     for (const Triangle& t : scale.triangles)
       limit[component_[mesh_.wedge_position[t[0]]]] = std::numeric_limits<double>::infinity();
-    const auto there = distances(surface_.size(), [&](std::size_t i) { return coarse(surface_[i].point); });
-    const std::vector<SurfaceSample> samples =
-        sample_surface(mesh_.positions, mesh_.wedge_position, scale.triangles, kErrorSamples);
-    const auto back = distances(
-        samples.size(), [&](std::size_t i) { return original_(place(mesh_, scale.triangles, samples[i])); });
+    // A search is several times shorter from the triangle that a point's own one comes from, or becomes.
+    std::vector<Hint> becomes(mesh_.triangles.size());
+    for (std::uint32_t t = 0; t < scale.triangles.size(); ++t)
+      becomes[scale.triangle_source[t]] = coarse.hint_of(t);
+    const auto there = distances(surface_.size(), [&](std::size_t i) {
+      Hint hint = becomes[surface_[i].triangle];
+      return coarse(surface_[i].point, hint);
+    });
+    const std::vector<SurfaceSample> samples = sample_surface(
+        mesh_.positions, mesh_.wedge_position, scale.triangles, sample_count(scale.triangles.size()));
+    const auto back = distances(samples.size(), [&](std::size_t i) {
+      Hint hint = original_.hint_of(scale.triangle_source[samples[i].triangle]);
+      return original_(place(mesh_, scale.triangles, samples[i]), hint);
+    });
     double square = 0, largest = 0, deviation = 0;  // only the deviation has the limits
     for (const auto* side : {&there, &back})
       for (double d : *side) square += d * d, largest = std::max(largest, d);

@@ -11,7 +11,7 @@
 
 namespace texmesh {
 
-inline constexpr int kSimplificationVersion = 7;
+inline constexpr int kSimplificationVersion = 8;
 
 enum class CollapseOrder : std::uint8_t { kTexmesh, kThesis };
 template <>

@@ -64,17 +64,32 @@ CurveSkeleton contract_parts(const std::vector<TriangleSoup>& parts, int max_con
   return all;
 }
 
+/// What a wrap need not be finer than.
+struct WrapSize {
+  double alpha = 0;
+  std::size_t faces = 0;
+};
+/// A mesh of few triangles has edges of about 1.4 diagonals / sqrt(triangles): a wrap of shorter ones shows
+/// no more of it.
+WrapSize wrap_size(const SkeletonizationOptions& options, std::size_t triangles) {
+  constexpr std::size_t kLeastFaces = 1000;
+  constexpr double kLeastDivisor = 40;
+  const double divisor = std::max(kLeastDivisor, std::sqrt(static_cast<double>(triangles)));
+  return {1 / std::min<double>(options.alpha_divisor, divisor),
+          std::min(static_cast<std::size_t>(options.max_wrap_faces), std::max(kLeastFaces, 2 * triangles))};
+}
+
 /// The wrap at the finest alpha at which it ends within the cap.
-std::vector<TriangleSoup> wrap(const TriangleSoup& soup, const SkeletonizationOptions& options, Notes& notes,
+std::vector<TriangleSoup> wrap(const TriangleSoup& soup, std::size_t triangles,
+                               const SkeletonizationOptions& options, Notes& notes,
                                const RunContext& context) {
-  double alpha = 1.0 / options.alpha_divisor;
+  auto [alpha, faces] = wrap_size(options, triangles);
   for (int attempt = 1;; ++attempt, alpha *= 2) {
     context.check_cancelled();
     std::vector<TriangleSoup> parts;
     try_geometry(
         [&] {
-          parts = wrap_surface(soup, alpha, 1.0 / options.offset_divisor,
-                               static_cast<std::size_t>(options.max_wrap_faces),
+          parts = wrap_surface(soup, alpha, 1.0 / options.offset_divisor, faces,
                                static_cast<std::size_t>(options.max_wrap_steps), context);
         },
         [&] {
@@ -118,7 +133,7 @@ CurveSkeleton extract(const ConditionedMesh& mesh, const UnitFrame& frame,
                       const SkeletonizationOptions& options, const RunContext& context,
                       std::vector<float>& distance, Notes& notes) {
   const TriangleSoup soup = make_wrap_soup(mesh, frame);
-  const std::vector<TriangleSoup> parts = wrap(soup, options, notes, context);
+  const std::vector<TriangleSoup> parts = wrap(soup, mesh.mesh.triangles.size(), options, notes, context);
   context.report(0.7);
   CurveSkeleton skeleton = contract_parts(parts, options.max_contractions, notes, context);
   context.report(0.8);

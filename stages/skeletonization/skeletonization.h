@@ -9,7 +9,7 @@
 
 namespace texmesh {
 
-inline constexpr int kSkeletonizationVersion = 5;
+inline constexpr int kSkeletonizationVersion = 6;
 
 struct SkeletonizationOptions {
   // At 40 a turtle has no hind legs, at 60 the skeleton of a saxophone's neck cuts its corner.
@@ -28,7 +28,7 @@ struct SkeletonizationOptions {
     v("offset_divisor", s.offset_divisor, Range{50, 6000},
       "offset of the wrap = bounding-box diagonal / this");
     v("max_wrap_faces", s.max_wrap_faces, Range{100, 100000},
-      "faces of the wrap that is contracted to the skeleton");
+      "most faces of the wrap that is contracted to the skeleton");
     v("radius_floor", s.radius_floor, Range{0, 1}, "least skeleton distance, as a fraction of its median");
     v("plate_ratio", s.plate_ratio, Range{1, 1e9},
       "a part whose median distance to the skeleton is more than this many half thicknesses is a plate: "
@@ -43,8 +43,9 @@ struct SkeletonizationOptions {
 
 /// The skeleton of any conditioned mesh (open, several components, one triangle): an alpha wrap, its mean
 /// curvature flow skeleton, and distances to it that the local thickness corrects where a curve is no
-/// skeleton (local_radius.h). Meshes of more than 100,000 triangles are clustered to that first. No mesh
-/// makes it fail. Every fallback gives a warning:
+/// skeleton (local_radius.h). Meshes of more than 100,000 triangles are clustered to that first. A mesh of
+/// few triangles has a wrap of at most twice as many faces, or 1,000, and an alpha_divisor of at most the
+/// root of their number, or 40. No mesh makes it fail. Every fallback gives a warning:
 /// - "skeleton-coarser-wrap": a wrap that takes more than max_wrap_steps, or looks at 50 times as many
 ///   triangles (thousands of needles around one point), is tried with twice and four times its alpha.
 /// - "skeleton-part-centroid": a part of the wrap that cannot be contracted has its centroid for a skeleton.

@@ -49,7 +49,7 @@ ImportedModel import_file(const std::string& path, const RunContext& context) {
 class Judge {
  public:
   Judge(ImportedModel imported, const Settings& settings, const RunContext& context)
-      : settings_(settings), context_(context), light_(studio_environment(context)) {
+      : settings_(settings), context_(context), light_(studio_environment()) {
     for (std::size_t m = 0; m < imported.model.materials.size(); ++m)
       material_of_.try_emplace(imported.model.materials[m].name, static_cast<std::uint16_t>(m));
     source_ = rendered_model(std::move(imported), context);

@@ -153,7 +153,7 @@ struct Settings {
 
 void measure_scene(const BenchScene& scene, const Settings& settings) {
   RenderEnvironment environment;
-  const double environment_ms = least_ms([&] { environment = studio_environment(settings.context); });
+  const double environment_ms = least_ms([&] { environment = studio_environment(); });
   std::vector<RenderTexture> textures(scene.images.size());
   const double start = spent_ms();
   for (std::size_t i = 0; i < textures.size(); ++i)

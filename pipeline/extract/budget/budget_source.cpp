@@ -60,7 +60,7 @@ BudgetSource::BudgetSource(PackageReader& from, const ExtractRequest& wishes, co
     windows = side_px < 2 * kWindowPx ? cameras : windows_of(views, kWindowsPerView, kWindowPx);
   }
   read_best_textures();
-  environment = studio_environment(context);
+  environment = studio_environment();
   finest_windows = std::make_unique<LitViews>(finest, windows, context);
   window_meter = std::make_unique<LitMeter>(*finest_windows, best_textures, environment, context);
 }

@@ -61,8 +61,8 @@ ShownModel shown_proxy(const AtlasMesh& mesh, const RoundedMesh& rounded,
   return out;
 }
 
-ProxyStudio::ProxyStudio(const Mesh& mesh, const ShownMaterials& shown, const RunContext& context)
-    : mesh_(mesh), shown_(shown), environment_(studio_environment(context)) {}
+ProxyStudio::ProxyStudio(const Mesh& mesh, const ShownMaterials& shown)
+    : mesh_(mesh), shown_(shown), environment_(studio_environment()) {}
 
 const std::vector<ProxyStudio::View>& ProxyStudio::views(std::size_t size, const RunContext& context) {
   std::vector<View>& views = views_[size];

@@ -28,7 +28,7 @@ class ProxyStudio {
   static constexpr std::size_t kMiddle = 1;
 
   /// S_0 must outlive the studio.
-  ProxyStudio(const Mesh& mesh, const ShownMaterials& shown, const RunContext& context);
+  ProxyStudio(const Mesh& mesh, const ShownMaterials& shown);
 
   /// At one of the displayed heights.
   FlipSum compare(const RenderScene& scene, const std::vector<RenderTexture>& textures, std::size_t size,

@@ -190,6 +190,25 @@ TEST(Quality, GroupsAreMeasuredApart) {
   EXPECT_LT(t.groups[1].sizes[0].coarser.flip.back(), 1e-4f) << "flat stays flat";
 }
 
+TEST(Quality, LargeSizesOfASmallModelFollowFromTheRenderedOnes) {
+  const Sample s = sample_sheet(true);
+  QualityOptions options = small_options();
+  options.largest_px = 128;
+  const QualityTable rendered = measure_all(s, options).table;
+  EXPECT_EQ(rendered.sizes_px, (std::vector<std::uint32_t>{32, 64, 128})) << "halves of 64 px cost nothing";
+  options.largest_px = 512;
+  const QualityTable t = measure_all(s, options).table;
+  ASSERT_EQ(t.sizes_px, (std::vector<std::uint32_t>{128, 256, 512}));
+  const float whole = rendered.groups[0].sizes[2].preview.flip[0];
+  EXPECT_NEAR(t.groups[0].sizes[0].preview.flip[0], whole, 0.1f * whole);
+  for (std::size_t i = 1; i < 3; ++i) {
+    const float before = t.geometry[i - 1].flip.back(), now = t.geometry[i].flip.back();
+    EXPECT_GE(now, before);
+    EXPECT_LE(now, 1.6f * before);
+    EXPECT_GT(t.groups[0].sizes[i].coarser.flip[0], t.groups[0].sizes[i - 1].coarser.flip[0]);
+  }
+}
+
 TEST(Quality, SameForAnyNumberOfThreads) {
   const Sample s = sample_sheet(true);
   const MeasuredQuality one = measure_all(s, small_options(), 1), four = measure_all(s, small_options(), 4);

@@ -42,7 +42,7 @@ void set_tangents(Mesh& mesh, Vec3f u, Vec3f v) {
 TEST(FragmentShader, AFlatNormalMapChangesNothing) {
   Mesh mesh = testing::sphere(32, 64);
   SmallScene scene{mesh, {plain({0.7f, 0.5f, 0.3f, 1}, 0.5f, 0.4f)}, {}};
-  const RenderEnvironment studio = studio_environment({});
+  const RenderEnvironment studio = studio_environment();
   const RenderCamera camera = perspective_camera(camera_of(2, 5, {}, 1));
   const Picture without = scene.picture(camera, 48, studio);
   // The levels hold -1 / 255 for 0: the nearest that 8 bits have.
@@ -55,7 +55,7 @@ TEST(FragmentShader, AFlatNormalMapChangesNothing) {
 }
 
 TEST(FragmentShader, TangentsAndDerivativesAgreeOnAPlane) {
-  const RenderEnvironment studio = studio_environment({});
+  const RenderEnvironment studio = studio_environment();
   struct Case {
     Vec2f origin, along_x, along_y;  // texture coordinates at the lower left, and along the square's sides
   };
@@ -123,7 +123,7 @@ void expect_sound(const Picture& picture) {
 }
 
 TEST(FragmentShader, HostileAttributesNeverGiveNan) {
-  const RenderEnvironment studio = studio_environment({});
+  const RenderEnvironment studio = studio_environment();
   const float nan = std::nanf(""), infinity = std::numeric_limits<float>::infinity();
   for (const float bad : {nan, infinity, -infinity, 3e38f, -3e38f, 1e-38f, 0.f}) {
     SmallScene scene = bumpy_square();
@@ -162,7 +162,7 @@ TEST(FragmentShader, HostileAttributesNeverGiveNan) {
 }
 
 TEST(FragmentShader, TinyAndHugeObjectsLookTheSame) {
-  const RenderEnvironment studio = studio_environment({});
+  const RenderEnvironment studio = studio_environment();
   Picture first;
   for (const float size : {1.f, 1e-12f, 1e12f}) {
     SmallScene scene = bumpy_square();

@@ -126,7 +126,7 @@ TEST(Shade, PixelsAreTheMeanOfTheirSamples) {
 TEST(Shade, UnlitIsTheToneMappedBaseColour) {
   SmallScene scene{square(), {unlit({0.9f, 0.5f, 0.1f, 1})}, {}};
   scene.materials[0].emissive = {1, 1, 1};
-  const Picture picture = scene.picture(front_camera(), 8, studio_environment({}));
+  const Picture picture = scene.picture(front_camera(), 8, studio_environment());
   for (const Vec3f c : picture.linear) EXPECT_NEAR(length(c - tone_mapped({0.9f, 0.5f, 0.1f})), 0, 1e-6);
 }
 
@@ -168,7 +168,7 @@ TEST(Shade, OneReadOfOcclusionAndRoughnessIsAsTwo) {
   scene.textures = {texture_of(32, 32, 3, false, noise), texture_of(32, 32, 3, false, noise)};
   scene.materials[0].slot(TextureUse::kMetallicRoughness).texture = 0;
   scene.materials[0].slot(TextureUse::kOcclusion).texture = 0;
-  const RenderEnvironment studio = studio_environment({});
+  const RenderEnvironment studio = studio_environment();
   const Picture shared = scene.picture(ball_camera(), 48, studio);
   scene.materials[0].slot(TextureUse::kOcclusion).texture = 1;
   EXPECT_EQ(largest_difference(shared, scene.picture(ball_camera(), 48, studio)), 0);
@@ -178,7 +178,7 @@ TEST(Shade, OneReadOfOcclusionAndRoughnessIsAsTwo) {
 
 TEST(Shade, AnEmptyTextureIsWhite) {
   SmallScene scene{ball(), {plain({0.8f, 0.5f, 0.3f, 1}, 0.5f, 0.5f)}, {}};
-  const RenderEnvironment studio = studio_environment({});
+  const RenderEnvironment studio = studio_environment();
   const Picture without = scene.picture(ball_camera(), 32, studio);
   scene.textures.resize(1);
   for (TextureSlot& slot : scene.materials[0].textures) slot.texture = 0;
@@ -189,7 +189,7 @@ TEST(Shade, AnEmptyTextureIsWhite) {
 
 TEST(Shade, WithoutNormalsTrianglesAreFlat) {
   SmallScene scene{square(), {plain({0.7f, 0.7f, 0.7f, 1})}, {}};
-  const RenderEnvironment studio = studio_environment({});
+  const RenderEnvironment studio = studio_environment();
   const Picture with = scene.picture(front_camera(), 16, studio);
   scene.mesh.normals.clear();
   EXPECT_LT(largest_difference(with, scene.picture(front_camera(), 16, studio)), 1e-6);
@@ -200,7 +200,7 @@ TEST(Shade, WithoutNormalsTrianglesAreFlat) {
 TEST(Shade, ABackFaceIsLitFromItsOwnSide) {
   SmallScene scene{square(), {plain({0.7f, 0.7f, 0.7f, 1}, 0, 0.8f)}, {}};
   scene.materials[0].double_sided = true;
-  const RenderEnvironment studio = studio_environment({});
+  const RenderEnvironment studio = studio_environment();
   RenderCamera behind = look_at_camera({0, 0, -10}, {0, 0, 0}, {0, 1, 0}, 12, 0.01);
   const Picture back = scene.picture(behind, 16, studio);
   for (Vec3f& p : scene.mesh.positions) p.x = -p.x;  // now this side is the front
@@ -241,7 +241,7 @@ TEST(Shade, SameBitsForAnyNumberOfThreads) {
   SmallScene scene{ball(), {plain({0.8f, 0.5f, 0.3f, 0.6f}, 0.4f, 0.3f)}, {}};
   scene.materials[0].alpha_mode = AlphaMode::kBlend;
   scene.materials[0].double_sided = true;
-  const RenderEnvironment studio = studio_environment({});
+  const RenderEnvironment studio = studio_environment();
   const Picture one = scene.picture(ball_camera(), 90, studio, 1),
                 many = scene.picture(ball_camera(), 90, studio, 8);
   EXPECT_EQ(one.linear, many.linear);

@@ -65,7 +65,7 @@ std::vector<Materials> variants_of(const SmallScene& scene) {
 
 void expect_as_alone(const SmallScene& scene, const std::vector<Materials>& variants,
                      const RunContext& context) {
-  const RenderEnvironment studio = studio_environment({});
+  const RenderEnvironment studio = studio_environment();
   const RenderScene shown = render_scene(scene.mesh, scene.materials, scene.textures.size());
   const Visibility seen = look(shown, perspective_camera(camera_of(1, 4, {}, 1)), 24, {});
   std::vector<const Materials*> lists;
@@ -114,8 +114,8 @@ TEST(ShadeVariants, OtherLengthsAreRefused) {
   const Visibility seen = look(shown, front_camera(), 4, {});
   const Materials two(2, scene.materials[0]);
   const std::vector<const Materials*> lists{&scene.materials, &two};
-  EXPECT_THROW(shade_variants(shown, seen, lists, {}, studio_environment({}), {}), std::invalid_argument);
-  EXPECT_EQ(shade_variants(shown, seen, {}, {}, studio_environment({}), {}).count(), 0u);
+  EXPECT_THROW(shade_variants(shown, seen, lists, {}, studio_environment(), {}), std::invalid_argument);
+  EXPECT_EQ(shade_variants(shown, seen, {}, {}, studio_environment(), {}).count(), 0u);
 }
 
 }  // namespace

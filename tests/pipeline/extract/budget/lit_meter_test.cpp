@@ -31,7 +31,7 @@ std::vector<LitCamera> cameras_of(const LitMesh& mesh) {
 TEST(LitMeter, EqualPicturesDoNotDifferAndOtherNormalsDo) {
   const LitMesh mesh = sphere(12, true);
   const LitViews views(mesh, cameras_of(mesh), {});
-  const RenderEnvironment environment = studio_environment({});
+  const RenderEnvironment environment = studio_environment();
   const LitMeter meter(views, {normals(128)}, environment, {});
   EXPECT_EQ(meter.difference(views, {normals(128)}, {}), 0);
   const double little = meter.difference(views, {normals(150)}, {}),
@@ -47,7 +47,7 @@ TEST(LitMeter, CoarserMeshesDiffer) {
   const LitMesh fine = sphere(24, false), coarse = sphere(8, false);
   const std::vector<LitCamera> cameras = cameras_of(fine);
   const LitViews views(fine, cameras, {}), coarser(coarse, cameras, {});
-  const RenderEnvironment environment = studio_environment({});
+  const RenderEnvironment environment = studio_environment();
   const LitMeter meter(views, {RenderTexture{}}, environment, {});
   EXPECT_GT(meter.difference(coarser, {RenderTexture{}}, {}), 0.001);
 }

@@ -46,7 +46,7 @@ TEST(WholeMesh, OfAnAtlasInPiecesIsSmallLater) {
 struct RivalWins : ::testing::Test {
   NestedScales scales = alone(testing::bumpy_sphere(20, 40));
   ShownMaterials shown{{RenderMaterial{}}, {}};
-  ProxyStudio studio{scales.mesh, shown, {}};
+  ProxyStudio studio{scales.mesh, shown};
 };
 
 TEST_F(RivalWins, WithoutAnyLossWhereTheWholeMeshFits) {

@@ -19,7 +19,7 @@ ShownModel plain_model(const Mesh& mesh, Vec4f colour) {
 
 TEST(ProxyStudio, S0ItselfHasNoLossAndAnotherColourHasOne) {
   const ShownModel source = plain_model(testing::sphere(20, 40), {0.5f, 0.5f, 0.5f, 1});
-  ProxyStudio studio(source.mesh, source.shown, {});
+  ProxyStudio studio(source.mesh, source.shown);
   const std::vector<ProxyPictureLoss> same = studio.losses(source, studio.at_middle(source, {}), {});
   ASSERT_EQ(same.size(), ProxyStudio::kDisplayedPx.size());
   for (const ProxyPictureLoss& loss : same) {

@@ -1,0 +1,46 @@
+// Read, not computed: 0.15 s is as long as a small model may take.
+#include <bit>
+#include <stdexcept>
+
+#include "stages/render/environment.h"
+#include "stages/render/studio/studio_table.h"
+
+namespace texmesh {
+namespace {
+
+/// Takes the table's words one after the other.
+class StudioWords {
+ public:
+  std::uint32_t next() {
+    if (at_ == words_.size()) throw std::logic_error("the studio's table is too short");
+    return words_[at_++];
+  }
+  Vec3f colour() {
+    Vec3f out;
+    for (int k = 0; k < 3; ++k) out[k] = std::bit_cast<float>(next());
+    return out;
+  }
+  bool at_end() const { return at_ == words_.size(); }
+
+ private:
+  std::span<const std::uint32_t> words_ = render::studio_table();
+  std::size_t at_ = 0;
+};
+
+}  // namespace
+
+RenderEnvironment studio_environment() {
+  RenderEnvironment out;
+  out.key = studio_key_light();
+  StudioWords words;
+  for (Vec3f& c : out.irradiance) c = words.colour();
+  while (!words.at_end()) {
+    RenderEnvironment::Level& level = out.levels.emplace_back();
+    level.side = words.next();
+    level.texels.resize(static_cast<std::size_t>(level.side) * level.side);
+    for (Vec3f& c : level.texels) c = words.colour();
+  }
+  return out;
+}
+
+}  // namespace texmesh
