@@ -10,6 +10,7 @@ namespace {
 
 constexpr std::uint32_t kLeaf = 4;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kSlack = 1e-12;  // relative, for rounding
 
 double box_distance2(const Box3d& box, Vec3d p) {
   double sum = 0;
@@ -33,7 +34,7 @@ bool meets_box(const Box3d& box, Vec3d origin, Vec3d direction, double limit) {
     from = std::max(from, a), to = std::min(to, b);
   }
   // Rounding may make a flat box a little too thin.
-  return from <= to * (1 + 1e-12);
+  return from <= to * (1 + kSlack);
 }
 
 double leaving_hit(const std::array<Vec3d, 3>& c, Vec3d origin, Vec3d direction) {
@@ -188,20 +189,26 @@ struct TriangleTree::LineSearch {
   Vec3d origin, direction;
   double best = 0;  // |t|
   std::optional<Nearest> found;
+  Vec3d inverse;  // of the direction; 0 where it does not move
 
-  /// Whether the line is in the box for some |t| <= best.
-  bool meets(const Box3d& box) const {
+  LineSearch(Vec3d from, Vec3d along, double reach) : origin(from), direction(along), best(reach) {
+    constexpr double kStill = 1e-200;  // its inverse times a distance stays finite
+    for (int k = 0; k < 3; ++k) inverse[k] = std::fabs(along[k]) > kStill ? 1 / along[k] : 0;
+  }
+  /// The least |t| at which the line is in the box; infinite where that is not within `best`.
+  double entry(const Box3d& box) const {
     double from = -best, to = best;
     for (int k = 0; k < 3; ++k) {
-      if (direction[k] == 0) {
-        if (origin[k] < box.min[k] || origin[k] > box.max[k]) return false;
+      if (inverse[k] == 0) {
+        if (origin[k] < box.min[k] || origin[k] > box.max[k]) return kInfinity;
         continue;
       }
-      const double a = (box.min[k] - origin[k]) / direction[k], b = (box.max[k] - origin[k]) / direction[k];
+      const double a = (box.min[k] - origin[k]) * inverse[k], b = (box.max[k] - origin[k]) * inverse[k];
       from = std::max(from, std::min(a, b)), to = std::min(to, std::max(a, b));
     }
     // Rounding may make a flat box a little too thin.
-    return from <= to + 1e-12 * (std::fabs(from) + std::fabs(to));
+    if (!(from <= to + kSlack * (std::fabs(from) + std::fabs(to)))) return kInfinity;
+    return std::max({from, -to, 0.0}) * (1 - kSlack);
   }
   void try_triangle(const std::array<Vec3d, 3>& c, std::uint32_t triangle, const Facing& facing) {
     const Vec3d u = c[1] - c[0], v = c[2] - c[0], h = cross(direction, v);
@@ -223,22 +230,30 @@ struct TriangleTree::LineSearch {
 std::optional<TriangleTree::Nearest> TriangleTree::crossing(Vec3d origin, Vec3d direction, double reach,
                                                             const Facing& facing,
                                                             std::optional<std::uint32_t> guess) const {
-  LineSearch line{origin, direction, reach, std::nullopt};
+  LineSearch line(origin, direction, reach);
   if (guess && *guess < place_.size()) line.try_triangle(corners_[place_[*guess]], *guess, facing);
-  std::array<std::uint32_t, 40> stack{};
-  std::size_t depth = 1;
+  struct Ahead {
+    double entry;
+    std::uint32_t node;
+  };
+  std::array<Ahead, 40> stack{};
+  std::size_t depth = 0;
+  const auto push = [&](Ahead a) {
+    if (a.entry < kInfinity) stack[depth++] = a;
+  };
+  push({line.entry(nodes_[0].box), 0});
   while (depth > 0) {
-    const std::uint32_t at = stack[--depth];
-    const Node& n = nodes_[at];
-    if (!line.meets(n.box)) continue;
+    const Ahead at = stack[--depth];
+    if (at.entry > line.best) continue;
+    const Node& n = nodes_[at.node];
     for (std::uint32_t i = n.first; i < n.first + n.count; ++i)
       line.try_triangle(corners_[i], order_[i], facing);
     if (n.count > 0) continue;
-    std::uint32_t nearer = at + 1, farther = n.first;
-    if (box_distance2(nodes_[farther].box, origin) < box_distance2(nodes_[nearer].box, origin))
-      std::swap(nearer, farther);
-    stack[depth++] = farther;
-    stack[depth++] = nearer;
+    Ahead nearer{line.entry(nodes_[at.node + 1].box), at.node + 1},
+        farther{line.entry(nodes_[n.first].box), n.first};
+    if (farther.entry < nearer.entry) std::swap(nearer, farther);
+    push(farther);
+    push(nearer);
   }
   return line.found;
 }
@@ -246,12 +261,16 @@ std::optional<TriangleTree::Nearest> TriangleTree::crossing(Vec3d origin, Vec3d 
 std::optional<TriangleTree::Nearest> TriangleTree::nearest_facing(Vec3d p, const Facing& facing) const {
   std::optional<Nearest> best;
   double distance2 = kInfinity;
-  std::array<std::uint32_t, 40> stack{};
+  struct Ahead {
+    double distance2;
+    std::uint32_t node;
+  };
+  std::array<Ahead, 40> stack{};
   std::size_t depth = 1;
   while (depth > 0) {
-    const std::uint32_t at = stack[--depth];
-    const Node& n = nodes_[at];
-    if (box_distance2(n.box, p) > distance2) continue;
+    const Ahead at = stack[--depth];
+    if (at.distance2 > distance2) continue;
+    const Node& n = nodes_[at.node];
     for (std::uint32_t i = n.first; i < n.first + n.count; ++i) {
       const OnTriangle on = closest_on_triangle(corners_[i], p);
       if (!(on.distance2 < distance2 || (on.distance2 == distance2 && best && order_[i] < best->triangle)) ||
@@ -261,9 +280,9 @@ std::optional<TriangleTree::Nearest> TriangleTree::nearest_facing(Vec3d p, const
       best = {order_[i], on.weight};
     }
     if (n.count > 0) continue;
-    std::uint32_t nearer = at + 1, farther = n.first;
-    if (box_distance2(nodes_[farther].box, p) < box_distance2(nodes_[nearer].box, p))
-      std::swap(nearer, farther);
+    Ahead nearer{box_distance2(nodes_[at.node + 1].box, p), at.node + 1},
+        farther{box_distance2(nodes_[n.first].box, p), n.first};
+    if (farther.distance2 < nearer.distance2) std::swap(nearer, farther);
     stack[depth++] = farther;
     stack[depth++] = nearer;
   }

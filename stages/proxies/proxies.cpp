@@ -186,13 +186,11 @@ class ProxyRun {
     const auto target = static_cast<std::uint64_t>(bytes);
     Candidate best;
     ProxyForm form = first_form(bytes, first, data_);
+    form.maps.normal = mapped_ && bytes >= kNormalMapPaysFrom;
     const auto baked = shop_.bake(bytes, form, context);
     if (!baked) return best;
-    if (mapped_ && bytes >= kNormalMapPaysFrom) {
-      ProxyForm mapped = form;
-      mapped.maps.normal = true;
-      compete(*baked, target, mapped, best, context);
-    }
+    if (form.maps.normal) compete(*baked, target, form, best, context);
+    form.maps.normal = false;
     compete(*baked, target, form, best, context);
     form.normals = false;
     if (may_be_flat(*baked, bytes, first)) compete(*baked, target, form, best, context);

@@ -124,8 +124,9 @@ Vec3d in_frame(Vec3d n, Vec3d u, Vec3d v, Vec3d w) {
 
 class Baker {
  public:
-  Baker(const AtlasMesh& mesh, const std::vector<Vec3f>& normals, const BakeSource& source, PlaceGrid grid)
-      : mesh_(mesh), normals_(normals), source_(source), grid_(std::move(grid)) {}
+  Baker(const AtlasMesh& mesh, const std::vector<Vec3f>& normals, const BakeSource& source, PlaceGrid grid,
+        bool normal_map)
+      : mesh_(mesh), normals_(normals), source_(source), grid_(std::move(grid)), normal_map_(normal_map) {}
 
   void bake_row(std::size_t y, BakedMaps& out) const {
     std::optional<SurfacePlace> guess;
@@ -153,7 +154,9 @@ class Baker {
     guess = place;
     const double texels = std::fabs(cross(c.uv[1] - c.uv[0], c.uv[2] - c.uv[0]));
     const double footprint = texels > 0 ? std::sqrt(length(face) / texels) : 0;
-    const SurfaceSample sample = source_.sample(*place, footprint / static_cast<double>(grid_.per_side));
+    const SurfaceSample sample =
+        source_.sample(*place, footprint / static_cast<double>(grid_.per_side), {true, true, normal_map_});
+    if (!normal_map_) return sum.add(sample, {});
     const TextureFrame frame = texture_frame(c.position, c.uv, normal);
     sum.add(sample, in_frame(to_double(sample.normal), frame.along_u, frame.along_v, normal));
   }
@@ -164,6 +167,7 @@ class Baker {
     out.emission[i] = sum.emission * (1 / sum.count);
     out.occlusion_roughness_metallic[i] = sum.orm * (1 / sum.count);
     out.alpha[i] = sum.alpha / sum.count;
+    if (out.normal.empty()) return;
     // What looks below the horizon of a coarse triangle stays just above.
     Vec3d n = normalized(sum.normal);
     if (!(n.z > 0.1)) n = normalized(Vec3d{n.x, n.y, 0.1});
@@ -174,6 +178,7 @@ class Baker {
   const std::vector<Vec3f>& normals_;
   const BakeSource& source_;
   PlaceGrid grid_;
+  bool normal_map_;
 };
 
 void finish_maps(BakedMaps& maps) {
@@ -194,9 +199,10 @@ void finish_maps(BakedMaps& maps) {
   }
   maps.mean_orm = count > 0 ? to_float(sum * (1 / count)) : Vec3f{1, 1, 0};
   maps.has_emission = maps.most_emission != Vec3f{};
-  for (std::vector<Vec3f>* map :
-       {&maps.base_colour, &maps.emission, &maps.occlusion_roughness_metallic, &maps.normal})
-    push_pull(*map, maps.covered, maps.width_px, maps.height_px);
+  push_pull(maps.base_colour, maps.covered, maps.width_px, maps.height_px);
+  push_pull(maps.occlusion_roughness_metallic, maps.covered, maps.width_px, maps.height_px);
+  if (maps.has_emission) push_pull(maps.emission, maps.covered, maps.width_px, maps.height_px);
+  if (!maps.normal.empty()) push_pull(maps.normal, maps.covered, maps.width_px, maps.height_px);
   for (Vec3f& n : maps.normal) n = normalized(n);
   if (!maps.has_alpha) return;
   std::vector<Vec3f> alpha;
@@ -208,10 +214,10 @@ void finish_maps(BakedMaps& maps) {
 }  // namespace
 
 BakedMaps bake(const AtlasMesh& mesh, const std::vector<Vec3f>& normals, const BakeSource& source,
-               std::size_t samples, const RunContext& context) {
+               const BakeOrder& order, const RunContext& context) {
   const std::size_t texels = std::size_t{mesh.width_px} * mesh.height_px;
   std::size_t per_side = 1;
-  while (per_side < kMostPerSide && texels * (per_side + 1) * (per_side + 1) <= samples) ++per_side;
+  while (per_side < kMostPerSide && texels * (per_side + 1) * (per_side + 1) <= order.samples) ++per_side;
   PlaceGrid grid = make_grid(mesh, per_side);
   own_thin_triangles(mesh, grid);
   BakedMaps out;
@@ -219,10 +225,10 @@ BakedMaps bake(const AtlasMesh& mesh, const std::vector<Vec3f>& normals, const B
   out.base_colour.resize(texels);
   out.emission.resize(texels);
   out.occlusion_roughness_metallic.resize(texels);
-  out.normal.resize(texels, {0, 0, 1});
+  if (order.normal_map) out.normal.resize(texels, {0, 0, 1});
   out.alpha.resize(texels, 1);
   out.covered.resize(texels, 0);
-  const Baker baker(mesh, normals, source, std::move(grid));
+  const Baker baker(mesh, normals, source, std::move(grid), order.normal_map);
   parallel_for(context, mesh.height_px, 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t y = begin; y < end; ++y) baker.bake_row(y, out);
   });

@@ -9,11 +9,18 @@
 
 namespace texmesh::proxies {
 
-/// Unit normals per vertex: the mean of what S_0 shows, normal maps included, on the triangles around, each
-/// sample by its corner's share. Vertices that share position and group have one normal where their means
-/// turn by less than 50 degrees, so a crease at which charts end stays one. Same bits for any thread count.
-std::vector<Vec3f> sampled_normals(const AtlasMesh& mesh, const BakeSource& source,
-                                   const RunContext& context);
+/// A mesh with unit normals per vertex. Vertices at creases stand there once for each side.
+struct SmoothMesh {
+  AtlasMesh mesh;
+  std::vector<Vec3f> normals;
+  /// Of a vertex; its number.
+  std::uint32_t add_copy(std::uint32_t vertex);
+};
+
+/// Normals are means of what S_0 shows, normal maps included, on the triangles around, each sample by its
+/// corner's share. Triangles between which S_0 turns at once by 20 degrees or more have normals of their own.
+/// Across charts, vertices of one position and group share them. Same bits for any thread count.
+SmoothMesh sampled_normals(const AtlasMesh& mesh, const BakeSource& source, const RunContext& context);
 
 /// Texels of an atlas, row by row from the top; all lists are width_px * height_px long and hold a
 /// continuation of the charts everywhere. Linear.
@@ -21,7 +28,7 @@ struct BakedMaps {
   std::uint32_t width_px = 0, height_px = 0;
   std::vector<Vec3f> base_colour, emission;
   std::vector<Vec3f> occlusion_roughness_metallic;  // as the channels of glTF's ORM textures
-  std::vector<Vec3f> normal;                        // tangent space, unit, +Y up
+  std::vector<Vec3f> normal;                        // tangent space, unit, +Y up; empty where not asked for
   std::vector<float> alpha;
   std::vector<std::uint8_t> covered;    // 1 = a chart shows here
   Vec3f mean_orm, least_orm, most_orm;  // over covered texels
@@ -29,11 +36,17 @@ struct BakedMaps {
   bool has_alpha = false, has_emission = false;
 };
 
-/// Bakes at the atlas' own size. Each texel is the mean of several places of its part of the charts; about
-/// `samples` places in all, at most 16 a texel. `normals` are those of the vertices; the normals' texels fit
+/// What is wanted of the maps. About `samples` places in all are looked at, at most 16 a texel.
+struct BakeOrder {
+  std::size_t samples = 0;
+  bool normal_map = true;
+};
+
+/// Bakes at the atlas' own size. Each texel is the mean of several places of its part of the charts.
+/// `normals` are those of the vertices; the normals' texels fit
 /// the frames that renderers derive of triangles without tangents. Same bits for any thread count and
 /// machine.
 BakedMaps bake(const AtlasMesh& mesh, const std::vector<Vec3f>& normals, const BakeSource& source,
-               std::size_t samples, const RunContext& context);
+               const BakeOrder& order, const RunContext& context);
 
 }  // namespace texmesh::proxies

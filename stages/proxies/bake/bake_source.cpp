@@ -35,6 +35,11 @@ std::array<Vec3d, 3> corners_of(const Mesh& mesh, const Triangle& t) {
 
 Vec3d area_normal(const std::array<Vec3d, 3>& c) { return cross(c[1] - c[0], c[2] - c[0]); }
 
+bool read_alike(const TextureSlot& a, const TextureSlot& b) {
+  return a.texture == b.texture && a.uv_set == b.uv_set && a.wrap_s == b.wrap_s && a.wrap_t == b.wrap_t &&
+         a.mag_filter == b.mag_filter && a.min_filter == b.min_filter && a.transform == b.transform;
+}
+
 /// Tangent and bitangent that the wedges carry; false when a corner has none.
 bool vertex_frame(const Mesh& mesh, const SurfacePlace& place, Vec3f face, Vec3f frame[2]) {
   if (mesh.tangents.empty()) return false;
@@ -169,41 +174,56 @@ Vec3f BakeSource::mapped_normal(const SurfacePlace& place, const RenderMaterial&
                  normal);
 }
 
-SurfaceSample BakeSource::sample(const SurfacePlace& place, double footprint) const {
-  const Triangle& corner = mesh_.triangles[place.triangle];
-  const RenderMaterial& m = shown_.materials[mesh_.triangle_material[place.triangle]];
-  const auto texel = [&](TextureUse use) {
-    return m.slot(use).texture < 0 ? Vec4f{1, 1, 1, 1} : read(place, m.slot(use), footprint);
-  };
+void BakeSource::add_colours(const SurfacePlace& place, const RenderMaterial& m, double footprint,
+                             SurfaceSample& out) const {
   Vec4f base = m.base_colour;
   const auto multiply = [&base](Vec4f by) {
     base = {base.x * by.x, base.y * by.y, base.z * by.z, base.w * by.w};
   };
-  multiply(texel(TextureUse::kBaseColour));
+  if (const TextureSlot& slot = m.slot(TextureUse::kBaseColour); slot.texture >= 0)
+    multiply(read(place, slot, footprint));
   if (!mesh_.colours.empty()) {
     Vec4f sum{};
     for (std::size_t k = 0; k < 3; ++k) {
-      const Vec4f c = mesh_.colours[corner[k]];
+      const Vec4f c = mesh_.colours[mesh_.triangles[place.triangle][k]];
       const auto w = static_cast<float>(place.weight[k]);
       sum = {sum.x + c.x * w, sum.y + c.y * w, sum.z + c.z * w, sum.w + c.w * w};
     }
     multiply(sum);
   }
-  SurfaceSample out;
   out.base_colour = {within_unit(base.x), within_unit(base.y), within_unit(base.z)};
   out.alpha = within_unit(base.w);
   if (m.alpha_mode == AlphaMode::kOpaque) out.alpha = 1;
   if (m.alpha_mode == AlphaMode::kMask) out.alpha = out.alpha >= m.alpha_cutoff ? 1 : 0;
-  if (m.unlit) return out;
-  const Vec4f rough_metal = texel(TextureUse::kMetallicRoughness);
-  out.roughness = within_unit(m.roughness * rough_metal.y);
-  out.metallic = within_unit(m.metallic * rough_metal.z);
-  out.occlusion = within_unit(1 + (texel(TextureUse::kOcclusion).x - 1) * m.occlusion_strength);
-  if (m.emissive != Vec3f{}) {
-    const Vec4f e = texel(TextureUse::kEmissive);
+  if (m.unlit || m.emissive == Vec3f{}) return;
+  out.emission = m.emissive;
+  if (const TextureSlot& slot = m.slot(TextureUse::kEmissive); slot.texture >= 0) {
+    const Vec4f e = read(place, slot, footprint);
     out.emission = {m.emissive.x * e.x, m.emissive.y * e.y, m.emissive.z * e.z};
   }
-  out.normal = mapped_normal(place, m, footprint);
+}
+
+void BakeSource::add_data(const SurfacePlace& place, const RenderMaterial& m, double footprint,
+                          SurfaceSample& out) const {
+  const TextureSlot &rough_metal = m.slot(TextureUse::kMetallicRoughness),
+                    &occlusion = m.slot(TextureUse::kOcclusion);
+  Vec4f texel{1, 1, 1, 1};
+  if (rough_metal.texture >= 0) texel = read(place, rough_metal, footprint);
+  out.roughness = within_unit(m.roughness * texel.y);
+  out.metallic = within_unit(m.metallic * texel.z);
+  if (occlusion.texture < 0) return;
+  if (!read_alike(occlusion, rough_metal)) texel = read(place, occlusion, footprint);
+  out.occlusion = within_unit(1 + (texel.x - 1) * m.occlusion_strength);
+}
+
+SurfaceSample BakeSource::sample(const SurfacePlace& place, double footprint,
+                                 const SampleParts& parts) const {
+  const RenderMaterial& m = shown_.materials[mesh_.triangle_material[place.triangle]];
+  SurfaceSample out;
+  if (parts.colours) add_colours(place, m, footprint, out);
+  if (m.unlit) return out;
+  if (parts.data) add_data(place, m, footprint, out);
+  if (parts.normal) out.normal = mapped_normal(place, m, footprint);
   return out;
 }
 

@@ -36,6 +36,13 @@ struct TextureFrame {
 };
 TextureFrame texture_frame(const std::array<Vec3d, 3>& corner, const std::array<Vec2d, 3>& uv, Vec3d normal);
 
+/// What of a sample is asked for; the rest stays as it is made.
+struct SampleParts {
+  bool colours = true;  // base colour, alpha, emission
+  bool data = true;     // occlusion, metallic, roughness
+  bool normal = true;
+};
+
 /// What S_0 shows in one place, linear.
 struct SurfaceSample {
   Vec3f base_colour{1, 1, 1}, emission;
@@ -64,7 +71,7 @@ class BakeSource {
                                    const std::optional<SurfacePlace>& guess) const;
 
   /// Textures are read at the mip whose texels are as large as `footprint`, object units.
-  SurfaceSample sample(const SurfacePlace& place, double footprint) const;
+  SurfaceSample sample(const SurfacePlace& place, double footprint, const SampleParts& parts) const;
 
   double diagonal() const { return diagonal_; }
 
@@ -73,6 +80,10 @@ class BakeSource {
     std::vector<std::uint32_t> triangles;  // of the tree's
     std::unique_ptr<TriangleTree> tree;    // null: none
   };
+  void add_colours(const SurfacePlace& place, const RenderMaterial& material, double footprint,
+                   SurfaceSample& out) const;
+  void add_data(const SurfacePlace& place, const RenderMaterial& material, double footprint,
+                SurfaceSample& out) const;
   Vec3f mapped_normal(const SurfacePlace& place, const RenderMaterial& material, double footprint) const;
   Vec4f read(const SurfacePlace& place, const TextureSlot& slot, double footprint) const;
 

@@ -34,11 +34,14 @@ std::optional<AtlasMesh> pack(const ChartedSurface& charted, std::uint32_t side_
   return std::nullopt;
 }
 
-std::vector<bool> with_normals(const MaterialGroups& groups, bool normals) {
-  std::vector<bool> out;
-  for (const MaterialGroup& g : groups.groups) out.push_back(normals && !g.unlit);
-  return out;
-}
+/// Flat triangles need no vertices on both sides of a crease.
+struct ShapeOf {
+  const AtlasMesh& mesh;
+  std::vector<Vec3f> normals;
+  ShapeOf(const BakedProxy& baked, const ProxyForm& form)
+      : mesh(form.normals ? baked.smooth.mesh : baked.atlas),
+        normals(form.normals ? baked.smooth.normals : std::vector<Vec3f>{}) {}
+};
 
 /// All of the file that is neither mesh nor picture; offsets of pictures take a few digits more.
 double frame_bytes(const CodedMesh& mesh, const std::vector<MaterialGroup>& groups, const MapPixels& maps) {
@@ -98,6 +101,13 @@ std::uint32_t ProxyWorkshop::texture_side(double bytes, const MapChoice& maps) c
   return std::clamp(steps * kTexelStep, kLeastTexels, kMostTexels);
 }
 
+CodedMesh ProxyWorkshop::coded_mesh(const BakedProxy& baked, const ProxyForm& form) const {
+  const ShapeOf shape(baked, form);
+  std::vector<bool> with_normals;
+  for (const MaterialGroup& g : groups_.groups) with_normals.push_back(form.normals && !g.unlit);
+  return code_mesh(shape.mesh, shape.normals, with_normals, form.coding);
+}
+
 /// A packed surface whose mesh takes about so many bytes.
 std::optional<BakedProxy> ProxyWorkshop::coded(double mesh_bytes, std::uint32_t side_px,
                                                const ProxyForm& form, const RunContext& context) {
@@ -116,9 +126,8 @@ std::optional<BakedProxy> ProxyWorkshop::coded(double mesh_bytes, std::uint32_t 
     out.emplace();
     out->charted = charted;
     out->atlas = std::move(*atlas);
-    out->normals = sampled_normals(out->atlas, source_, context);
-    const CodedMesh mesh =
-        code_mesh(out->atlas, out->normals, with_normals(groups_, form.normals), form.coding);
+    out->smooth = sampled_normals(out->atlas, source_, context);
+    const CodedMesh mesh = coded_mesh(*out, form);
     if (mesh.groups.empty()) return std::nullopt;
     const auto bytes = static_cast<double>(mesh.bytes());
     out->mesh_bytes = bytes;
@@ -136,8 +145,12 @@ std::optional<BakedProxy> ProxyWorkshop::bake(double target_bytes, const ProxyFo
   // Where the whole object has few triangles, textures get the rest.
   const std::uint32_t side_px = texture_side(others - out->mesh_bytes, form.maps);
   if (side_px >= kWorthPacking * out->atlas.width_px)
-    if (auto larger = pack(*out->charted, side_px, context)) out->atlas = std::move(*larger);
-  out->maps = proxies::bake(out->atlas, out->normals, source_, kSamples, context);
+    if (auto larger = pack(*out->charted, side_px, context)) {
+      out->atlas = std::move(*larger);
+      out->smooth = sampled_normals(out->atlas, source_, context);
+    }
+  const BakeOrder order{kSamples, form.maps.normal};
+  out->maps = proxies::bake(out->smooth.mesh, out->smooth.normals, source_, order, context);
   return out;
 }
 
@@ -145,8 +158,7 @@ std::optional<MadeProxy> ProxyWorkshop::finish(const BakedProxy& baked, std::uin
                                                const ProxyForm& form) {
   const std::vector<MaterialGroup>& groups = groups_.groups;
   const MapPixels maps = map_pixels(baked.maps, form.maps);
-  const CodedMesh mesh =
-      code_mesh(baked.atlas, baked.normals, with_normals(groups_, form.normals), form.coding);
+  const CodedMesh mesh = coded_mesh(baked, form);
   const double left = static_cast<double>(target_bytes) - frame_bytes(mesh, groups, maps);
   ProxyPictures pictures = code_pictures(maps, static_cast<std::size_t>(std::max(left, 0.0)));
   pictures.mip_levels = groups_.mip_levels;
@@ -161,10 +173,8 @@ std::optional<MadeProxy> ProxyWorkshop::finish(const BakedProxy& baked, std::uin
     out.proxy.vertices += static_cast<std::uint32_t>(g.vertices());
   }
   out.proxy.textures = textures_of(pictures);
-  const std::vector<Vec3f> none;
-  out.shown =
-      shown_proxy(baked.atlas, rounded_mesh(baked.atlas, form.normals ? baked.normals : none, form.coding),
-                  groups, pictures);
+  const ShapeOf shape(baked, form);
+  out.shown = shown_proxy(shape.mesh, rounded_mesh(shape.mesh, shape.normals, form.coding), groups, pictures);
   return out;
 }
 

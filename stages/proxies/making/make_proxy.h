@@ -44,7 +44,7 @@ struct BakedProxy {
   const ChartedSurface* charted = nullptr;  // of the ladder
   double mesh_bytes = 0;                    // coded in the form that it was made for
   AtlasMesh atlas;
-  std::vector<Vec3f> normals;
+  SmoothMesh smooth;  // the same with normals
   BakedMaps maps;
 };
 
@@ -62,12 +62,14 @@ class ProxyWorkshop {
 
   /// Nothing where no triangle is left or charts cannot be packed.
   std::optional<BakedProxy> bake(double target_bytes, const ProxyForm& form, const RunContext& context);
-  /// At most 2 % above `target_bytes`, or nothing. `form` may differ from the one baked for.
+  /// At most 2 % above `target_bytes`, or nothing. `form` may differ from the one baked for,
+  /// but for a normal map that was not baked.
   std::optional<MadeProxy> finish(const BakedProxy& baked, std::uint64_t target_bytes, const ProxyForm& form);
   /// The quality that a size's textures came to says how large those of the next one can be.
   void learn(int quality);
 
  private:
+  CodedMesh coded_mesh(const BakedProxy& baked, const ProxyForm& form) const;
   std::uint32_t texture_side(double bytes, const MapChoice& maps) const;
   std::optional<BakedProxy> coded(double mesh_bytes, std::uint32_t side_px, const ProxyForm& form,
                                   const RunContext& context);

@@ -8,14 +8,14 @@
 namespace texmesh {
 namespace {
 
-/// out[x] |= in[x + offset]; rows of `words` words, in == out allowed.
+/// out[x] |= in[x + offset]; rows of `words` words with one word of 0 behind them, in == out allowed.
 void join_moved(const std::uint64_t* in, std::uint64_t* out, std::uint32_t words, std::uint32_t offset) {
   const std::uint32_t whole = offset / 64, part = offset % 64;
-  for (std::uint32_t w = 0; w + whole < words; ++w) {
-    std::uint64_t moved = in[w + whole] >> part;
-    if (part != 0 && w + whole + 1 < words) moved |= in[w + whole + 1] << (64 - part);
-    out[w] |= moved;
-  }
+  in += whole;
+  if (part == 0)
+    for (std::uint32_t w = 0; w + whole < words; ++w) out[w] |= in[w];
+  else
+    for (std::uint32_t w = 0; w + whole < words; ++w) out[w] |= in[w] >> part | in[w + 1] << (64 - part);
 }
 
 void set_bits(std::uint64_t* row, std::uint32_t first, std::uint32_t end) {
@@ -32,10 +32,10 @@ PackingGrid::PackingGrid(std::uint32_t width, std::uint32_t height, std::uint32_
       taken_(std::size_t{height} * words_, 0),
       gaps_(height, width),
       forbidden_(words_),
-      joined_(words_) {}
+      joined_(words_ + 1) {}
 
 void PackingGrid::forbid_run(const std::uint64_t* taken, const ChartMask::Run& run) {
-  joined_.assign(taken, taken + words_);
+  std::copy(taken, taken + words_, joined_.begin());
   for (std::uint32_t length = 1; length < run.count;) {  // joined_ holds offsets 0 .. length - 1
     const std::uint32_t step = std::min(length, run.count - length);
     join_moved(joined_.data(), joined_.data(), words_, step);

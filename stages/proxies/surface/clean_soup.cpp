@@ -33,6 +33,27 @@ void drop_repeated(const std::vector<Triangle>& triangles, const std::vector<std
       dropped[keys[i].triangle] = 1;
 }
 
+/// Positions that triangles have, in order, and the triangles with their indices; a missing corner's is
+/// kNoIndex. Late in a simplification few of all positions are left, and welding sorts them.
+struct UsedSoup {
+  std::vector<Vec3f> points;
+  std::vector<Triangle> triangles;
+  UsedSoup(std::span<const Vec3f> positions, std::span<const Triangle> given)
+      : triangles(given.begin(), given.end()) {
+    std::vector<std::uint32_t> at(positions.size(), kNoIndex);
+    for (const Triangle& t : given)
+      for (const std::uint32_t p : t)
+        if (p < at.size()) at[p] = 0;
+    for (std::size_t p = 0; p < at.size(); ++p) {
+      if (at[p] == kNoIndex) continue;
+      at[p] = static_cast<std::uint32_t>(points.size());
+      points.push_back(positions[p]);
+    }
+    for (Triangle& t : triangles)
+      for (std::uint32_t& p : t) p = p < at.size() ? at[p] : kNoIndex;
+  }
+};
+
 bool has_area(const std::vector<Vec3f>& positions, const Triangle& t) {
   const Vec3d a = to_double(positions[t[0]]);
   const Vec3d n = cross(to_double(positions[t[1]]) - a, to_double(positions[t[2]]) - a);
@@ -43,7 +64,8 @@ bool has_area(const std::vector<Vec3f>& positions, const Triangle& t) {
 
 ProxySurface clean_soup(std::span<const Vec3f> positions, std::span<const Triangle> triangles,
                         std::span<const std::uint32_t> group, ZeroArea zero_area) {
-  const std::vector<Vec3f> points(positions.begin(), positions.end());
+  const UsedSoup used(positions, triangles);
+  const std::vector<Vec3f>& points = used.points;
   const std::vector<std::uint32_t> weld = weld_positions(points, 0);
   std::vector<Triangle> welded(triangles.size());
   std::vector<std::uint32_t> groups(triangles.size(), 0);
@@ -51,7 +73,7 @@ ProxySurface clean_soup(std::span<const Vec3f> positions, std::span<const Triang
   for (std::size_t t = 0; t < triangles.size(); ++t) {
     Triangle& w = welded[t];
     for (std::size_t k = 0; k < 3; ++k)
-      w[k] = triangles[t][k] < points.size() ? weld[triangles[t][k]] : kNoIndex;
+      w[k] = used.triangles[t][k] != kNoIndex ? weld[used.triangles[t][k]] : kNoIndex;
     const bool sound = w[0] != kNoIndex && w[1] != kNoIndex && w[2] != kNoIndex && w[0] != w[1] &&
                        w[1] != w[2] && w[2] != w[0];
     dropped[t] = !sound || (zero_area == ZeroArea::kDrop && !has_area(points, w));

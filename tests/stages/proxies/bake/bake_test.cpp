@@ -26,7 +26,8 @@ struct Baked {
     context.threads = threads;
     const MaterialGroups groups = find_groups(mesh, shown.materials);
     const BakeSource source(mesh, shown, groups);
-    return bake(atlas, sampled_normals(atlas, source, context), source, kManySamples, context);
+    const SmoothMesh smooth = sampled_normals(atlas, source, context);
+    return bake(smooth.mesh, smooth.normals, source, {kManySamples}, context);
   }
 };
 
@@ -108,14 +109,14 @@ TEST(Bake, ANormalMapOfTheSourceIsThatOfTheAtlas) {
   AtlasMesh atlas = square_atlas(8);
   const MaterialGroups groups = find_groups(source.mesh, source.shown.materials);
   const BakeSource bake_source(source.mesh, source.shown, groups);
-  const BakedMaps maps = bake(atlas, std::vector<Vec3f>(4, {0, 0, 1}), bake_source, kManySamples, {});
+  const BakedMaps maps = bake(atlas, std::vector<Vec3f>(4, {0, 0, 1}), bake_source, {kManySamples}, {});
   for (const Vec3f n : maps.normal) {
     EXPECT_NEAR(n.x, 0.6, 0.01);
     EXPECT_NEAR(n.y, 0, 0.01);
   }
   // An atlas that is turned by a quarter has the map turned.
   for (Vec2f& uv : atlas.uvs) uv = {uv.y, 1 - uv.x};
-  const BakedMaps turned = bake(atlas, std::vector<Vec3f>(4, {0, 0, 1}), bake_source, kManySamples, {});
+  const BakedMaps turned = bake(atlas, std::vector<Vec3f>(4, {0, 0, 1}), bake_source, {kManySamples}, {});
   for (const Vec3f n : turned.normal) {
     EXPECT_NEAR(n.x, 0, 0.01);
     EXPECT_NEAR(n.y, 0.6, 0.01);
@@ -213,8 +214,8 @@ TEST(SampledNormals, ThoseOfASphereAreItsRadii) {
   source.shown.materials.push_back(RenderMaterial{});
   const MaterialGroups groups = find_groups(source.mesh, source.shown.materials);
   const AtlasMesh atlas = sphere_atlas(testing::even_sphere(3, 0), 64);
-  const std::vector<Vec3f> normals =
-      sampled_normals(atlas, BakeSource(source.mesh, source.shown, groups), {});
+  const auto [smooth, normals] = sampled_normals(atlas, BakeSource(source.mesh, source.shown, groups), {});
+  EXPECT_EQ(smooth, atlas) << "a sphere has no creases";
   for (std::size_t v = 0; v < normals.size(); ++v)
     EXPECT_GT(dot(normals[v], normalized(atlas.positions[v])), 0.995f) << v;
   for (std::size_t v = 0; v < normals.size(); ++v)
