@@ -12,6 +12,7 @@ constexpr double kLeastFlip = 1e-6;                    // what logarithms take f
 constexpr double kFlattest = 0.25, kSteepest = 1;      // of the lines that go on beyond the samples
 constexpr double kBehindOneSample = 0.5;               // slope of the line that goes on behind a single one
 constexpr double kLeastDssim = 1e-9, kMostFlip = 1.0;  // 0 of texels is 0 of the picture
+constexpr double kPreviewLevels = 3;                   // previews have 1/8 of the sides, large ones 1/16
 
 /// Two neighbours on an axis and the way between them.
 struct Between {
@@ -96,12 +97,19 @@ double GroupCurve::Curve::at(double texel_dssim) const {
   return portable::exp(log_flip[i] + slope * (x - log_dssim[i]));
 }
 
-double GroupCurve::Curve::at_level(double level) const {
+double GroupCurve::Curve::at_level(double level, double preview_level) const {
   if (mips.size() == 1) return mips[0];
-  const double at = std::max(0.0, level - finest_level);
-  const double first = std::min(std::floor(at), static_cast<double>(mips.size() - 2));
+  const double at = std::max(0.0, level - finest_level), last = static_cast<double>(mips.size() - 1);
+  const double first = std::min(std::floor(at), last - 1);
   const auto i = static_cast<std::size_t>(first);
-  return mixed(mips[i], mips[i + 1], at - first);
+  const double along_line = mixed(mips[i], mips[i + 1], at - first);
+  const double to_preview = preview_level - finest_level - last;
+  if (at <= last || to_preview <= 0) return along_line;
+  // The line alone is too low by half for a turtle's normals, the preview, which is coded coarsely, too high
+  // by a half for its colours.
+  const double line = mixed(mips[i], mips[i + 1], to_preview + 1);
+  const double expected = std::max(line, std::sqrt(line * preview));
+  return along_line + (expected - line) * (at - last) / to_preview;
 }
 
 double GroupCurve::coded(double texel_dssim, const TexelGrowth& growth) const {
@@ -123,8 +131,9 @@ double GroupCurve::halved(const TexelGrowth& growth, std::uint32_t mip) const {
   if (curves_.empty()) return 0;
   const auto at = [&](std::size_t i) {
     const Curve& c = curves_[i];
-    const double full_size = c.at_level(growth[i] - mip) - c.mips.front();
-    return std::clamp(c.at_level(growth[i]) - std::max(0.0, full_size), 0.0, kMostFlip);
+    const double full_level = growth[i] - mip, preview_level = full_level + kPreviewLevels;
+    const double full_size = c.at_level(full_level, preview_level) - c.mips.front();
+    return std::clamp(c.at_level(growth[i], preview_level) - std::max(0.0, full_size), 0.0, kMostFlip);
   };
   return mixed(at(0), at(1), part_);
 }

@@ -34,8 +34,9 @@ class GroupCurve {
   /// FLIP where all textures of the group show their previews. Without the group 1.
   double preview() const;
   /// FLIP of the texels that rungs code, halved `mip` times. Between whole levels of growth linear, behind
-  /// the coarsest sampled ones along the last line; less what texels of full size, so much smaller, would
-  /// have beyond the finest sampled level. That level's for full size.
+  /// the coarsest sampled ones along the last line, or a steeper one: to the geometric mean of it and of
+  /// preview() where the texels are as large as the preview's; less what texels of full size, so much
+  /// smaller, would have beyond the finest sampled level. That level's for full size.
   double halved(const TexelGrowth& growth, std::uint32_t mip) const;
   static constexpr double kLossPerDoubling = 1.6, kLossPerHalving = 1.25;
 
@@ -46,7 +47,7 @@ class GroupCurve {
     double finest_level = 0;   // of mips[0], beside the planes that were sampled: <= 0
     double preview = 0;
     double at(double texel_dssim) const;
-    double at_level(double level) const;
+    double at_level(double level, double preview_level) const;
   };
   std::vector<Curve> curves_;  // none, one, or those of the two heights around
   double part_ = 0;            // of the second one

@@ -70,15 +70,15 @@ struct QualityOptions {
 ///   `rung_samples` of the ladder are rendered, first and last among them, and planes without coding: those
 ///   that are shown, up to 4 levels finer and 2 coarser; of full size the source's rung, where there is one.
 ///   At larger sizes the lowest rung and the planes that are shown are rendered, and one coarser level of
-///   these: at the half always, at the largest of textures that have no finer plane for it. Previews are
-///   rendered at all sizes. Other rungs follow along the curve of what coding adds at the size below, by
-///   GroupCurve::kLossPerDoubling where texels are larger on the screen, and by the ratio to it where both
-///   were rendered; the highest rung's ratio is 1. Each size has the knots of the others that lie far from
-///   its own: mips have few rungs. Of a model with a sampler that reads level 0 alone, all of this is
-///   rendered at every size. Planes are those that a client shows at the size (format/rules/mip_choice.h).
-///   Planes of one group have the rung whose quality is nearest to that of the group's first plane. FLIP of
-///   knots is scaled so that the mean over fragments of GroupCurve::coded() is what was measured for whole
-///   planes.
+///   these: at the half always, at the largest of textures that have no finer plane for it. The half has the
+///   highest rung, too, and all sizes have previews. Other rungs follow along the curve of what coding adds
+///   at the size below, by GroupCurve::kLossPerDoubling where texels are larger on the screen, and by the
+///   ratio to it where both were rendered; a highest rung that was not has a ratio of 1. Each size has the
+///   knots of the others that lie far from its own: mips have few rungs. Of a model with a sampler that reads
+///   level 0 alone, all of this is rendered at every size. Planes are those that a client shows at the size
+///   (format/rules/mip_choice.h). Planes of one group have the rung whose quality is nearest to that of the
+///   group's first plane. FLIP of knots is scaled so that the mean over fragments of GroupCurve::coded() is
+///   what was measured for whole planes.
 /// - Exponent and error: of samples with all groups changed, on S_0 and on coarser scales, with the lowest
 ///   rung, the coarsest mips or the previews, 7 at the least size and 1 at the half, the exponent that
 ///   predicts best.

@@ -189,12 +189,14 @@ bool repeats(const Knot& knot, const Knot& before) {
                             [](const PlaneRung& a, const PlaneRung& b) { return a.rung == b.rung; });
 }
 
-/// The knots that are rendered: all, at larger sizes that of the lowest rung. Without mips losses do not
-/// follow from smaller sizes.
+/// The knots that are rendered: all, at larger sizes that of the lowest rung, and at the half that of the
+/// highest one: from a mip with a single rung, as small sizes show it, nothing follows for another mip's best
+/// rung. Without mips losses do not follow from smaller sizes.
 bool is_sampled(const TextureSampler& sampler, const std::vector<Knot>& knots, std::size_t knot,
                 std::size_t rank) {
   if (knot > 0 && repeats(knots[knot], knots[knot - 1])) return false;
-  return rank == 0 || !sampler.shown.with_mips() || repeats(knots[knot], knots.back());
+  return rank == 0 || !sampler.shown.with_mips() || repeats(knots[knot], knots.back()) ||
+         (rank == 1 && knot == 0);
 }
 
 /// Levels of source's texels that are rendered.

@@ -1,12 +1,14 @@
 // How good the files of `texmesh extract --bytes` look beside those that other tools make of the same bytes.
 //
 //   extract_bench SOURCE PACKAGE --bytes 100,250,500,1000 [--peers DIR] [--views 6] [--size 512] [--keep DIR]
-//                 [--neighbours] [--unlit]
+//                 [--neighbours] [--unlit] [--reencoded]
 //   extract_bench SOURCE --score A.glb,B.glb
 //
 // Renders SOURCE and each file lit (texmesh render, the studio's light; --unlit: base colours alone) from the
 // same views and prints mean LDR-FLIP over the pixels of the object (0 = equal). --neighbours also makes the
-// best file of the next finer and the next coarser scale. DIR holds files that tests/bench/extract_peers has
+// best file of the next finer and the next coarser scale. --reencoded beside each file has the source with
+// its images encoded anew at the one JPEG quality that the bytes allow, or as they are where they fit; the
+// mesh is the source's and counts as the package's S_0. DIR holds files that tests/bench/extract_peers has
 // made of SOURCE; the best one within the bytes counts. The views are others than those that extract itself
 // compares.
 #include <fmt/format.h>
@@ -23,10 +25,12 @@
 #include "format/base/bytes.h"
 #include "format/base/srgb.h"
 #include "pipeline/extract/extract.h"
+#include "pipeline/extract/glb/image_codecs.h"
 #include "pipeline/import/import.h"
 #include "pipeline/io/file_resolver.h"
 #include "pipeline/render/picture_sheet.h"
 #include "pipeline/render/rendered_model.h"
+#include "stages/image/decode_image.h"
 #include "stages/measure/flip.h"
 #include "stages/render/shade.h"
 
@@ -75,7 +79,10 @@ class Scorer {
   double level() const { return level_; }
   Score score(const Bytes& glb, const std::string& name) const {
     NoFiles none;
-    RenderedModel model = rendered_model(import_model(name, glb, none, {}, context_), context_);
+    return score(import_model(name, glb, none, {}, context_));
+  }
+  Score score(ImportedModel imported) const {
+    RenderedModel model = rendered_model(std::move(imported), context_);
     if (unlit_) make_unlit(model);
     for (Vec3f& p : model.mesh.positions) p = to_float(to_double(p) + model.mesh.origin - origin_);
     Score out{0, 0};
@@ -142,12 +149,48 @@ Scored best_of(const std::vector<Scored>& roughly, const Scorer& scorer, const f
   return best;
 }
 
+/// The source with its images encoded anew, the best of at most `limit` bytes.
+Scored reencoded(const ImportedModel& source, std::uint64_t mesh_bytes, std::uint64_t limit,
+                 const Scorer& scorer) {
+  const auto encoded = [&](int quality) {
+    ImportedModel out = source;
+    for (Image& image : out.model.images)
+      image = probe_image(image.name,
+                          encode_image(decode_image(image), {FileImage::kJpeg, static_cast<double>(quality)}),
+                          {});
+    return out;
+  };
+  const auto bytes_of = [&](const ImportedModel& m) {
+    std::uint64_t bytes = mesh_bytes;
+    for (const Image& image : m.model.images) bytes += image.bytes.size();
+    return bytes;
+  };
+  if (bytes_of(source) <= limit) return {"the source's images", bytes_of(source), scorer.score(source).flip};
+  int low = 0, high = 101;  // fits; does not
+  Scored best;
+  ImportedModel chosen;
+  while (high - low > 1) {
+    const int quality = (low + high) / 2;
+    ImportedModel made = encoded(quality);
+    if (bytes_of(made) > limit) {
+      high = quality;
+      continue;
+    }
+    low = quality;
+    best.name = fmt::format("images of quality {}", quality);
+    best.bytes = bytes_of(made);
+    chosen = std::move(made);
+  }
+  if (low > 0) best.flip = scorer.score(std::move(chosen)).flip;
+  return best;
+}
+
 struct Arguments {
   std::string source, package, peers, keep;
   std::vector<double> bytes{100, 250, 500, 1000};
   std::vector<std::string> score;
   int views = 6, size = 512;
-  bool neighbours = false, unlit = false;
+  bool neighbours = false, unlit = false, reencoded = false;
 };
 
 /// What the search chose, and what it would have made of the scales beside that, in its own views.
@@ -172,6 +215,7 @@ void print_neighbours(const Arguments& a, std::uint64_t limit, const Extracted& 
 void print_table(const Arguments& a, const Scorer& scorer, const RunContext& context) {
   std::vector<Scored> peers = a.peers.empty() ? std::vector<Scored>{} : files_of(a.peers);
   const Scorer rough(a.source, 3, 256, a.unlit, context);
+  const ImportedModel source = a.reencoded ? import_file(a.source, {}, context) : ImportedModel();
   for (Scored& s : peers) score(rough, a.peers, s);
   std::cout << "     kB   extract     bytes  scale  FLIP    s   best other    bytes  FLIP    ratio\n";
   double logs = 0;
@@ -189,14 +233,18 @@ void print_table(const Arguments& a, const Scorer& scorer, const RunContext& con
       out.write(reinterpret_cast<const char*>(e.glb.data()), static_cast<std::streamsize>(e.glb.size()));
     }
     const double ours = scorer.score(e.glb, "extract.glb").flip;
-    const Scored best = best_of(peers, scorer, a.peers, limit);
+    Scored best = best_of(peers, scorer, a.peers, limit);
+    if (a.reencoded) {
+      const Scored plain = reencoded(source, package.manifest().scales.front().glb.bytes, limit, scorer);
+      if (plain.flip < best.flip) best = plain;
+    }
     std::cout << fmt::format("{:7}  {:>9}{:>10}  S_{:<4}{:.4f}{:5.1f}", kilobytes, e.within ? "" : "outside",
                              e.glb.size(), e.scale, ours, seconds);
     if (best.flip < 1) {
       std::cout << fmt::format("   {:28}{:>9}  {:.4f}  {:.3f}", best.name, best.bytes, best.flip,
                                ours / best.flip);
       if (e.within) logs += std::log(ours / best.flip), ++rows;
-    } else if (!peers.empty()) {
+    } else if (!peers.empty() || a.reencoded) {
       std::cout << "   none fits";
     }
     std::cout << fmt::format("  [own views {:.4f}, mesh {:.4f}]", e.difference, e.mesh_difference);
@@ -225,6 +273,7 @@ int main(int argc, char** argv) {
   app.add_option("--views", a.views)->check(CLI::Range(1, 100))->capture_default_str();
   app.add_option("--size", a.size)->check(CLI::Range(32, 4096))->capture_default_str();
   app.add_flag("--unlit", a.unlit, "Compare base colours alone");
+  app.add_flag("--reencoded", a.reencoded, "Compare with the source, its images encoded anew");
   app.add_flag("--neighbours", a.neighbours, "Also the best files of the scales beside the chosen one");
   CLI11_PARSE(app, argc, argv);
   RunContext context;

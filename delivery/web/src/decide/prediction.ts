@@ -11,6 +11,8 @@ const leastDssim = 1e-9;
 const lossPerDoubling = 1.6;
 /** Half as large ones lose so much less. */
 const lossPerHalving = 1.25;
+/** Previews have 1/8 of the sides. */
+const previewLevels = 3;
 
 const mixed = (a: number, b: number, part: number): number => (1 - part) * a + part * b;
 
@@ -60,12 +62,18 @@ class Curve {
     const from = logDssim > x[i + 1] ? i + 1 : i;
     return exp(y[from] + (from > i || logDssim < x[0] ? clamp(slope, 0.25, 1) : slope) * (logDssim - x[from]));
   }
-  atLevel(level: number): number {
+  /** Behind the coarsest sampled level towards the preview's. */
+  atLevel(level: number, previewLevel: number): number {
     const mips = this.mips_;
     if (mips.length < 2) return mips[0];
     const at = Math.max(0, level + this.finer_);
-    const first = Math.min(Math.floor(at), mips.length - 2);
-    return mixed(mips[first], mips[first + 1], at - first);
+    const last = mips.length - 1;
+    const first = Math.min(Math.floor(at), last - 1);
+    const alongLine = mixed(mips[first], mips[first + 1], at - first);
+    const toPreview = previewLevel + this.finer_ - last;
+    if (at <= last || toPreview <= 0) return alongLine;
+    const line = mixed(mips[first], mips[first + 1], toPreview + 1);
+    return alongLine + ((Math.max(line, Math.sqrt(line * this.preview)) - line) * (at - last)) / toPreview;
   }
 }
 
@@ -106,7 +114,10 @@ export class GroupCurve {
   /** FLIP of the texels that rungs code, halved `mip` times; for full size that of the finest sampled level. */
   halved(growth: TexelGrowth, mip: number): number {
     const [first, second] = this.curves_;
-    const at = (curve: Curve, level: number): number => clamp(curve.atLevel(level) - Math.max(0, curve.atLevel(level - mip) - curve.atLevel(-99)), 0, 1);
+    const at = (curve: Curve, level: number): number => {
+      const v = (of: number): number => curve.atLevel(of, level - mip + previewLevels);
+      return clamp(v(level) - Math.max(0, v(level - mip) - v(-99)), 0, 1);
+    };
     return first ? mixed(at(first, growth[0]), at(second, growth[1]), this.part_) : 0;
   }
 }
