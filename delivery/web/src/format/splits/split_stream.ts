@@ -240,8 +240,10 @@ export class SplitStreamReader {
     if (this.block_ === scale.blocks) this.checkScale_(scale);
   }
   private checkScale_(scale: SplitScale): void {
-    const found = { points: this.mesh.points, wedges: this.mesh.wedges, faces: this.mesh.faceCount };
-    for (const name of ['points', 'wedges', 'faces'] as const)
+    const { points, wedges, faceCount: faces } = this.mesh;
+    const found = { points, wedges, faces, triangles: 0 };
+    for (let face = 0; face < faces; ++face) found.triangles += Number(this.mesh.isVisible(face));
+    for (const name of ['points', 'wedges', 'faces', 'triangles'] as const)
       if (scale[name] !== found[name])
         throw new FormatError(file, `scale ${scale.scale}`, `${scale[name]} ${name}`, `${found[name]}`, 'S19');
   }
