@@ -8,9 +8,10 @@ export type Sources = Map<string, string>;
 export const roomsBelow: Record<string, readonly string[]> = {
   format: [],
   http: ['format'],
-  worker: ['format'],
+  blocks: [],
+  worker: ['format', 'blocks'],
   decide: ['format', 'http'],
-  scene: ['format', 'http', 'worker', 'decide'],
+  scene: ['format', 'http', 'blocks', 'worker', 'decide'],
   page: ['format', 'http', 'decide', 'scene'],
   element: ['format', 'page'],
 };
