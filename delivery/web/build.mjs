@@ -25,7 +25,7 @@ const entries = {
  * Gzip bytes of texmesh/open that an application may have to load, three.js and the worker apart: before the first picture; with
  * every part that is ever loaded. Then the same of `texmesh`, and the worker with the decoders.
  */
-const most = { first: 20 * 1024, all: 45 * 1024, texmesh: 36 * 1024, texmeshAll: 50 * 1024, page: 24 * 1024, pageAll: 50 * 1024, viewer: 180 * 1024, worker: 21 * 1024, blocks: 12 * 1024 };
+const most = { first: 20 * 1024, all: 45 * 1024, texmesh: 36 * 1024, texmeshAll: 51 * 1024, page: 24 * 1024, pageAll: 50 * 1024, viewer: 180 * 1024, worker: 21 * 1024, blocks: 17 * 1024 };
 
 /**
  * Workers decode documents. Where there are none, the page itself loads the workers' file, which has mostly come already: nothing is
@@ -93,7 +93,9 @@ async function bundled(entry) {
   };
 }
 
-/** Gzip bytes of what an entry loads at once, and of everything that it may load. */
+/** Parts that are loaded where memory asks for compressed textures, and by no ordinary load. */
+const beside = /-compression\.js$/;
+/** Gzip bytes of what an entry loads at once, of everything that it may load, and of what stands beside that. */
 async function sizesOf(entry) {
   const { bundle, ...output } = await bundled(entry);
   const { output: files } = await bundle.generate(output);
@@ -103,7 +105,8 @@ async function sizesOf(entry) {
   const atOnce = new Set([`${entry}.js`]);
   for (const name of atOnce) for (const imported of chunks.get(name).imports) if (chunks.has(imported)) atOnce.add(imported);
   const sum = (names) => [...names].reduce((bytes, name) => bytes + bytesOf(chunks.get(name)), 0);
-  return { first: sum(atOnce), all: sum(chunks.keys()) };
+  const ordinary = (name) => !beside.test(name);
+  return { first: sum(atOnce), all: sum([...chunks.keys()].filter(ordinary)), beside: sum([...chunks.keys()].filter((name) => !ordinary(name))) };
 }
 
 if (process.argv.includes('--check-size')) {
@@ -123,7 +126,7 @@ if (process.argv.includes('--check-size')) {
   say('  and every part that is ever loaded', page.all, most.pageAll);
   say('the element, three.js inside', await viewerSize(), most.viewer);
   say('worker: the decoders', worker.all, most.worker);
-  say('beside these: the encoder, where memory asks for compressed textures', blocks.all, most.blocks);
+  say('beside these: the encoder, where memory asks for compressed textures', blocks.all + open.beside, most.blocks);
   process.exit(good ? 0 : 1);
 }
 

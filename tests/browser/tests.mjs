@@ -8,6 +8,7 @@ import {makePackages} from './make-packages.mjs';
 import {nginxMissing, startNginx} from './nginx.mjs';
 import {comparePlane, kEverything, kTop, kTopQuality, loaded, rightFrom, throttled} from './loads.mjs';
 import './application-tests.mjs';
+import './block-tests.mjs';
 import './display-tests.mjs';
 import './doors-tests.mjs';
 import './experiment-tests.mjs';

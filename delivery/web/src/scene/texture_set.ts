@@ -1,10 +1,9 @@
 import { Texture, type WebGLRenderer } from 'three';
 import type { PlaneChoice } from '../decide/texture_loss';
-import type { BlockFormat, BlockRequest, Pixels } from '../blocks/formats';
+import type { BlockFormat } from '../blocks/formats';
 import type { TextureInfo } from '../format/textures';
 import type { WorkerPool } from '../worker/pool';
 import type { Levels } from '../worker/protocol';
-import type { BlockStorage, Upload } from './blocks/block_storage';
 import type { Compression } from './blocks/compression';
 import { type PlaneComposer, planeComposer } from './composer';
 import { isSoftware } from './gpu';
@@ -39,7 +38,11 @@ export class TextureSet {
   async show({ base, plane }: PlaneChoice, preview?: ImageBitmap): Promise<void> {
     const { planes } = this;
     const before = planes.get(base);
-    const next: PlaneComposer = planeComposer(this.renderer_, this.textures_[plane], base, plane, this.blockStorage_(plane, (from) => void this.refill_(next, from, next.blocks?.format).catch(() => undefined)));
+    const next: PlaneComposer = planeComposer(this.renderer_, this.textures_[plane], base, plane, this.blocksOf_(plane)?.[0].storage({
+      renderer: this.renderer_, pool: this.pool_, uploads: this.uploads_, info: this.textures_[plane], format: this.blocksOf_(plane)![1],
+      pending: (by) => (this.pending += by),
+      refill: (from) => void this.refill_(next, from, next.blocks?.format).catch(() => undefined),
+    }));
     const old = this.slotsOf_(base).map(textureAt);
     const shown = old.find((texture) => (texture.image as ImageBitmap | null)?.width);
     next.view(shown ?? old[0] ?? new Texture()); // a finer scale may bring the material that wants it
@@ -134,17 +137,6 @@ export class TextureSet {
   }
   private async refill_(next: PlaneComposer, from: Texture, format?: BlockFormat): Promise<void> {
     await this.blocksOf_(next.plane)?.[0].refill(next, from, format, this.renderer_, this.pool_, this.uploads_);
-  }
-  private blockStorage_(plane: number, refill: (from: Texture) => void): BlockStorage | undefined {
-    const [compression, format] = this.blocksOf_(plane) ?? [];
-    if (!compression) return undefined;
-    const host = {
-      encode: (picture: Pixels, blocks: BlockRequest) => this.pool_.blocksOf({ ...picture, blocks }),
-      enqueue: ({ pixels, run }: Upload) => this.uploads_.enqueue(pixels, run),
-      pending: (by: 1 | -1): void => void (this.pending += by),
-      blocksUrl: compression.url,
-    };
-    return new compression.BlockStorage(this.renderer_, this.textures_[plane], format!, host, refill);
   }
   private async enlarge_(next: PlaneComposer, image: ImageBitmap): Promise<void> {
     await (await import('./enlarge')).enlarge(next, image, this.pool_, this.uploads_);
