@@ -13,6 +13,7 @@ import { fileURLToPath } from 'node:url';
 import { createRequire } from 'node:module';
 import { gzipSync } from 'node:zlib';
 import { rollup } from 'rollup';
+import { encoderModule } from './encoder.mjs';
 import { ruleData } from './rule_data.mjs';
 
 const here = dirname(fileURLToPath(import.meta.url));
@@ -20,12 +21,13 @@ const dist = join(here, 'dist');
 /** Source files of the entries. */
 const entries = {
   texmesh: 'index', open: 'open', page: 'page', reader: 'reader', thesis: 'thesis', 'thesis-tables': 'thesis_tables', verify: 'verify', worker: 'worker',
+  blocks: 'blocks',
 };
 /**
  * Gzip bytes of texmesh/open that an application may have to load, three.js and the worker apart: before the first picture; with
  * every part that is ever loaded. Then the same of `texmesh`, and the worker with the decoders.
  */
-const most = { first: 20 * 1024, all: 45 * 1024, texmesh: 36 * 1024, texmeshAll: 50 * 1024, page: 24 * 1024, pageAll: 50 * 1024, viewer: 180 * 1024, worker: 21 * 1024 };
+const most = { first: 20 * 1024, all: 45 * 1024, texmesh: 36 * 1024, texmeshAll: 51 * 1024, page: 24 * 1024, pageAll: 50 * 1024, viewer: 180 * 1024, worker: 21 * 1024, blocks: 17 * 1024 };
 
 /**
  * Workers decode documents. Where there are none, the page itself loads the workers' file, which has mostly come already: nothing is
@@ -62,7 +64,7 @@ async function viewer(write) {
     const to = join(dist, 'viewer');
     mkdirSync(join(to, 'draco'), { recursive: true });
     for (const { path, contents } of outputFiles) writeFileSync(path, contents);
-    copyFileSync(join(dist, 'worker.js'), join(to, 'worker.js'));
+    for (const file of ['worker.js', 'blocks.js']) copyFileSync(join(dist, file), join(to, file));
     const three = dirname(dirname(createRequire(import.meta.url).resolve('three')));
     for (const file of ['draco_decoder.wasm', 'draco_wasm_wrapper.js']) copyFileSync(join(three, 'examples/jsm/libs/draco/gltf', file), join(to, 'draco', file));
   }
@@ -82,7 +84,7 @@ async function bundled(entry) {
   const bundle = await rollup({
     input: { [entry]: join(here, 'src', `${entries[entry]}.ts`) },
     external: [/^three($|\/)/],
-    plugins: [...(entry === 'reader' || entry === 'worker' ? [] : [documentsOfWorkers]), ruleData, typescript],
+    plugins: [encoderModule, ...(entry === 'reader' || entry === 'worker' ? [] : [documentsOfWorkers]), ruleData, typescript],
     preserveEntrySignatures: 'allow-extension', // no file more that only passes names on
     onwarn: (warning) => { throw new Error(warning.message); },
   });
@@ -93,7 +95,9 @@ async function bundled(entry) {
   };
 }
 
-/** Gzip bytes of what an entry loads at once, and of everything that it may load. */
+/** Parts that are loaded where memory asks for compressed textures, and by no ordinary load. */
+const beside = /-compression\.js$/;
+/** Gzip bytes of what an entry loads at once, of everything that it may load, and of what stands beside that. */
 async function sizesOf(entry) {
   const { bundle, ...output } = await bundled(entry);
   const { output: files } = await bundle.generate(output);
@@ -103,7 +107,8 @@ async function sizesOf(entry) {
   const atOnce = new Set([`${entry}.js`]);
   for (const name of atOnce) for (const imported of chunks.get(name).imports) if (chunks.has(imported)) atOnce.add(imported);
   const sum = (names) => [...names].reduce((bytes, name) => bytes + bytesOf(chunks.get(name)), 0);
-  return { first: sum(atOnce), all: sum(chunks.keys()) };
+  const ordinary = (name) => !beside.test(name);
+  return { first: sum(atOnce), all: sum([...chunks.keys()].filter(ordinary)), beside: sum([...chunks.keys()].filter((name) => !ordinary(name))) };
 }
 
 if (process.argv.includes('--check-size')) {
@@ -114,6 +119,7 @@ if (process.argv.includes('--check-size')) {
     good &&= bytes <= limit;
   };
   const [open, texmesh, page, worker] = [await sizesOf('open'), await sizesOf('texmesh'), await sizesOf('page'), await sizesOf('worker')];
+  const blocks = await sizesOf('blocks');
   say('texmesh/open: open() and load() until the first picture', open.first, most.first);
   say('  and every part that is ever loaded', open.all, most.all);
   say('texmesh, with every decision, until the first picture', texmesh.first, most.texmesh);
@@ -122,6 +128,7 @@ if (process.argv.includes('--check-size')) {
   say('  and every part that is ever loaded', page.all, most.pageAll);
   say('the element, three.js inside', await viewerSize(), most.viewer);
   say('worker: the decoders', worker.all, most.worker);
+  say('beside these: the encoder, where memory asks for compressed textures', blocks.all + open.beside, most.blocks);
   process.exit(good ? 0 : 1);
 }
 

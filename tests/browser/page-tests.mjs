@@ -1,6 +1,7 @@
 // Many packages on one page, and <texmesh-viewer>: one time limit, one link, one memory, whatever single ones do.
 import {PNG, check, common, env, fs, listen, packages, path, pictures, serve} from './browser.mjs';
 import {test} from './harness.mjs';
+import {sumStorage} from './loads.mjs';
 import {startLink} from './link.mjs';
 
 const kNames = ['maps', 'large', 'kept', 'progressive'];
@@ -82,21 +83,6 @@ test('twenty scans behind 4 Mbit/s and 40 ms: when the first pictures stand', as
 }, {seconds: 120});
 
 test('a page keeps within its memory: what WebGL was asked to store is what is counted', async () => {
-  const sum = () => {
-    window.stored = new Map();
-    const sizeOf = (levels, w, h) => Array.from({length: levels}, (_, l) => 4 * Math.max(1, w >> l) * Math.max(1, h >> l)).reduce((a, b) => a + b, 0);
-    const proto = WebGL2RenderingContext.prototype;
-    let bound;
-    const wrap = (name, note) => { const own = proto[name]; proto[name] = function (...a) { note(...a); return own.apply(this, a); }; };
-    wrap('bindTexture', (_, t) => { bound = t; });
-    wrap('texStorage2D', (_, levels, __, w, h) => window.stored.set(bound, sizeOf(levels, w, h)));
-    wrap('deleteTexture', (t) => window.stored.delete(t));
-    const buffers = new Map();
-    wrap('bindBuffer', (target, b) => buffers.set(target, b));
-    wrap('bufferData', (target, data) => window.stored.set(buffers.get(target), data.byteLength ?? data));
-    wrap('deleteBuffer', (b) => window.stored.delete(b));
-    window.storedBytes = () => [...window.stored.values()].reduce((a, b) => a + b, 0);
-  };
   await onPage(html(elements(4, 'camera-controls'), 'texmesh-viewer{height:440px}.grid{grid-template-columns:1fr 1fr}'), async (page) => {
     await settled(page, 4);
     await page.waitForFunction(() => [...document.querySelectorAll('texmesh-viewer')].every((e) => e.model.complete), null, {timeout: 60000});
@@ -111,7 +97,7 @@ test('a page keeps within its memory: what WebGL was asked to store is what is c
     await page.waitForTimeout(100);
     const left = await page.evaluate(() => window.storedBytes());
     check(left < 0.02 * stored + 70000, `${left} bytes are left of ${stored}`);
-  }, {before: sum});
+  }, {before: sumStorage});
 }, {seconds: 120});
 
 test('one package of twenty that cannot be had, an element of no height, one removed while it loads: the others go on', async () => {

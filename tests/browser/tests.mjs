@@ -9,6 +9,7 @@ import {nginxMissing, startNginx} from './nginx.mjs';
 import {comparePlane, kEverything, kTop, kTopQuality, loaded, rightFrom, throttled} from './loads.mjs';
 import {starvation} from './starved.mjs';
 import './application-tests.mjs';
+import './block-tests.mjs';
 import './display-tests.mjs';
 import './doors-tests.mjs';
 import './experiment-tests.mjs';

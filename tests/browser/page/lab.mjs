@@ -1,7 +1,9 @@
 // The page that tests and figures drive: the client library alone, a fixed camera, and everything that happens written down.
 import {TexmeshPackage, open} from 'texmesh';
 import {handle} from 'texmesh/worker';
-import {Box3, Color, DirectionalLight, HemisphereLight, PerspectiveCamera, Scene, Vector3, WebGLRenderer} from 'three';
+import {
+  Box3, Color, DirectionalLight, HemisphereLight, Mesh, OrthographicCamera, PerspectiveCamera, PlaneGeometry, Scene, ShaderMaterial, Vector3, WebGLRenderer, WebGLRenderTarget,
+} from 'three';
 import {DRACOLoader} from 'three/addons/loaders/DRACOLoader.js';
 import {GLTFLoader} from 'three/addons/loaders/GLTFLoader.js';
 import {MeshoptDecoder} from 'three/addons/libs/meshopt_decoder.module.js';
@@ -126,8 +128,8 @@ function report(id) {
     error: run.error, events: run.events, endedAt: run.endedAt,
     requests: run.requests.map((r) => ({...r, started: r.started - run.t0 / 1000, firstByte: r.firstByte - run.t0 / 1000, ended: r.ended - run.t0 / 1000})),
     state: s && {
-      phase: s.phase, scale: s.scale, proxy: s.proxy, wantedScale: s.wantedScale, displayedPx: s.displayedPx, bytes: s.bytes, pending: s.pending, rttS: s.rttS,
-      planes: s.planes.map((p) => ({base: p.base, plane: p.plane, role: p.role, widthPx: p.widthPx, heightPx: p.heightPx, rungs: [...p.rungs]})),
+      phase: s.phase, scale: s.scale, proxy: s.proxy, wantedScale: s.wantedScale, displayedPx: s.displayedPx, bytes: s.bytes, gpuBytes: s.gpuBytes, pending: s.pending, rttS: s.rttS,
+      planes: s.planes.map((p) => ({base: p.base, plane: p.plane, role: p.role, texels: p.texels, widthPx: p.widthPx, heightPx: p.heightPx, rungs: [...p.rungs]})),
     },
     longTasks: longTasks.filter((t) => t.start >= run.t0).map((t) => ({...t, start: (t.start - run.t0) / 1000})),
   };
@@ -174,6 +176,71 @@ function levels(id, base) {
   gl.deleteFramebuffer(frame);
   stage.renderer.resetState();
   return out;
+}
+
+/** As levels(), for a texture of blocks: each level is drawn. Means alone, and what they were of a level that stood a texel aside. */
+function blockLevels(id, base) {
+  const shown = loads[id].model.state.planes.find((p) => p.base === base);
+  const {renderer} = stage;
+  const out = [];
+  const material = new ShaderMaterial({
+    depthTest: false, depthWrite: false, uniforms: {map: {value: shown.textures[0]}, level: {value: 0}},
+    vertexShader: 'varying vec2 at; void main() { at = uv; gl_Position = vec4(position.xy * 2.0, 0.0, 1.0); }',
+    fragmentShader: 'varying vec2 at; uniform sampler2D map; uniform int level; void main() { gl_FragColor = texelFetch(map, ivec2(at * vec2(textureSize(map, level))), level); }',
+  });
+  const square = new Mesh(new PlaneGeometry(1, 1), material);
+  square.frustumCulled = false;
+  let before;
+  for (let level = 0, [w, h] = [shown.widthPx, shown.heightPx]; ; level++, w = Math.max(1, w >> 1), h = Math.max(1, h >> 1)) {
+    material.uniforms.level.value = level;
+    const target = new WebGLRenderTarget(w, h, {colorSpace: shown.textures[0].colorSpace, depthBuffer: false});
+    renderer.setRenderTarget(target);
+    renderer.render(square, new OrthographicCamera());
+    const data = new Uint8Array(4 * w * h);
+    renderer.readRenderTargetPixels(target, 0, 0, w, h, data);
+    renderer.setRenderTarget(null);
+    target.dispose();
+    if (before) {
+      const off = (by) => {
+        let sum = 0;
+        const at = (x, y, c) => before.data[4 * (Math.min(y, before.h - 1) * before.w + Math.min(x, before.w - 1)) + c];
+        for (let y = 0; y < h; y++)
+          for (let x = 0; x < w; x++)
+            for (let c = 0; c < 3; c++) {
+              const [u, v] = [2 * ((x + by) % w), 2 * ((y + by) % h)];
+              sum += Math.abs(data[4 * (y * w + x) + c] - (at(u, v, c) + at(u + 1, v, c) + at(u, v + 1, c) + at(u + 1, v + 1, c)) / 4);
+            }
+        return sum / (3 * w * h);
+      };
+      out.push({level, mean: off(0), moved: off(1)});
+    }
+    before = {w, h, data};
+    if (w === 1 && h === 1) return out;
+  }
+}
+
+/** Mpixel/s of a worker that makes blocks of a picture with shades, edges and noise, by format. */
+async function blockSpeeds() {
+  const side = 1024;
+  const source = `onmessage = async () => {
+    const {toBlocks} = await import('${new URL('/texmesh/blocks.js', location.href)}');
+    const pixels = Uint8Array.from({length: 4 * ${side} * ${side}}, (_, i) => {
+      const [x, y] = [(i >> 2) % ${side}, Math.floor((i >> 2) / ${side})];
+      return 128 + 60 * Math.sin(x / 19 + i % 4) * Math.cos(y / 23) + (x + y > 700 ? 40 : 0) + (Math.imul(i, 2654435761) >>> 28);
+    });
+    const speeds = {};
+    for (const format of ['bc1', 'bc3-normal', 'bc5', 'bc7', 'etc2', 'astc', 'astc-normal']) {
+      const once = async () => { const start = performance.now(); await toBlocks({pixels, width: ${side}, height: ${side}}, {format, own: 1, size: [${side}, ${side}]}); return performance.now() - start; };
+      const ms = [];
+      for (let i = 0; i < 7; i++) ms.push(await once());
+      speeds[format] = ${side} * ${side} / 1000 / Math.min(...ms);
+    }
+    postMessage(speeds);
+  };`;
+  const worker = new Worker(URL.createObjectURL(new Blob([source], {type: 'text/javascript'})), {type: 'module'});
+  const speeds = await new Promise((done, fail) => { worker.onmessage = (e) => done(e.data); worker.onerror = fail; worker.postMessage(0); });
+  worker.terminate();
+  return speeds;
 }
 
 function toBase64(bytes) {
@@ -356,7 +423,7 @@ const gl = () => stage.renderer.getContext();
 Object.assign(window, {
   lab: {
     start, draw, pixels, load, finished, report, plane, dispose, loadGlb, clear, keepReference, qualityOverTime, memory, loads, longTasks, gl,
-    gltfLoader, toBase64, ssim, wholeJpeg, settle, compareMesh, levels, stage: () => stage, draco, open,
+    gltfLoader, toBase64, ssim, wholeJpeg, settle, compareMesh, levels, blockLevels, blockSpeeds, stage: () => stage, draco, open,
   },
   ready: true,
 });

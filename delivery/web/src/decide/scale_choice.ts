@@ -1,6 +1,6 @@
 import { PackageData } from '../format/package_data';
 import { FragmentList, lossesOf } from './fragment_list';
-import { planesWithin } from './memory/gpu_memory';
+import { type BytesOf, planesWithin } from './memory/gpu_memory';
 import { scaleBytes } from './memory/gpu_size';
 import type { TimePlanOptions } from './plan_types';
 import { geometryFlip } from './prediction';
@@ -33,6 +33,8 @@ export interface InTimeRequest {
   connections: number;
   /** GPU memory for mesh and textures; left out: any. */
   memoryBytes?: number;
+  /** Ways to store texels, the best first; left out: RGBA. */
+  ways?: readonly BytesOf[];
   /** When a scale's mesh is chosen: the plan of what comes after it (limit <= 0: no time is left), and the link that is supposed. */
   afterMesh(scale: number): { plan: TimePlanOptions; linkBytesS: number };
   /** Chooses what bytes are spent on in the place of rate and distortion. */
@@ -54,7 +56,7 @@ function* texturesInTime(loss: TextureLoss, request: InTimeRequest, scale: numbe
   if (!spent) {
     for (spent of budgetSteps(loss, { scale }, Math.floor(bytes))) yield;
     const { planes, list: { groupWeights } } = spent!;
-    const within = planesWithin(loss, planes, texturesWithin(loss, request, scale));
+    const within = planesWithin(loss, planes, texturesWithin(loss, request, scale), request.ways);
     if (within.some(({ plane }, i) => plane !== planes[i].plane)) spent = spendOn(loss, within, { scale, groupWeights }, Math.floor(bytes));
   }
   const { list, planes } = spent!;

@@ -1,4 +1,5 @@
 import type { Camera, Material, Object3D, Texture, WebGLRenderer } from 'three';
+import type { BlockFormat } from '../blocks/formats';
 import type { HtcOrder, Policy } from '../decide/plan_types';
 import type { StepRule, VisiblePart } from '../decide/viewing';
 import type { RequestRecord } from '../http/requests';
@@ -100,6 +101,13 @@ export interface LoadOptions {
    * coarser. Left out: no limit.
    */
   memoryBytes?: number | (() => number);
+  /**
+   * Textures as blocks of 4 x 4 texels, which take a quarter or an eighth of the memory: auto = where memoryBytes would take coarser mips
+   * otherwise; always; never. What the GPU has decides the format: BC7, ASTC, BC5 for normals, at last BC1 or ETC2. Default auto.
+   */
+  compress?: 'auto' | 'always' | 'never';
+  /** Address of blocks.js, which makes blocks, where that file does not stand beside the library. */
+  blocksUrl?: string | URL;
   /** Cancels the load, as LoadedModel.cancel does. */
   signal?: AbortSignal;
 }
@@ -184,6 +192,8 @@ export interface ComposedPlane {
   widthPx: number;
   /** Texels of the shown plane down. */
   heightPx: number;
+  /** How texels are stored: rgba8, or the format of their blocks. */
+  texels: 'rgba8' | BlockFormat;
   /** Rung of each fragment in the texture; -1: the preview. */
   rungs: Int16Array;
   /** Textures in the materials; all of them have the same GPU texture. */

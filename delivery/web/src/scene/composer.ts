@@ -1,5 +1,7 @@
 import type { Texture, WebGLRenderer } from 'three';
+import type { Levels } from '../worker/protocol';
 import type { ComposedPlane } from './api';
+import type { BlockStorage, Upload } from './blocks/block_storage';
 import { PlaneStorage } from './plane_storage';
 import type { TextureInfo } from '../format/textures';
 
@@ -9,6 +11,8 @@ import type { TextureInfo } from '../format/textures';
  */
 export interface PlaneComposer extends ComposedPlane {
   readonly info: TextureInfo;
+  /** Where texels are stored as blocks. */
+  readonly blocks?: BlockStorage;
   /** Fragments that have come, shown or not yet. */
   readonly come: Set<number>;
   /** Every pixel has a colour: fragments may be shown. */
@@ -16,11 +20,12 @@ export interface PlaneComposer extends ComposedPlane {
   ready?: Promise<void>;
   /** A texture for the place where a material has `old`: the same sampler, channel and transform. */
   view(old: Texture): Texture;
-  /** Fills the whole with another texture, scaled bilinearly. */
+  /** Fills the whole with another texture, scaled bilinearly; blocks are filled by blocks/refill.ts. */
   fill(from: Texture): void;
-  /** Uploads pixels at a place of level 0 (multiples of 16), and the same in the levels below. Pixels beyond the image are left out. */
-  upload(levels: readonly ImageBitmap[], x: number, y: number): void;
-  uploadFragment(levels: readonly ImageBitmap[], fragment: number, rung: number): void;
+  /** Uploads of pixels at a place of level 0 (multiples of 16), and the same in the levels below. Pixels beyond the image are left out. */
+  uploads(levels: Levels, x: number, y: number): Upload[];
+  /** Where a fragment begins. */
+  placeOf(fragment: number): [x: number, y: number];
   /** The smallest levels follow the uploads. */
   updateMips(): void;
   /** RGBA bytes, row 0 at the top. */
@@ -29,23 +34,23 @@ export interface PlaneComposer extends ComposedPlane {
 }
 
 /** A plane to be composed in the renderer's context. */
-export function planeComposer(renderer: WebGLRenderer, info: TextureInfo, base: number, plane: number): PlaneComposer {
+export function planeComposer(renderer: WebGLRenderer, info: TextureInfo, base: number, plane: number, blocks?: BlockStorage): PlaneComposer {
   const { image, role, widthPx, heightPx, columns, rows, fragmentWidthPx, fragmentHeightPx } = info;
-  const storage = new PlaneStorage(renderer, info);
+  const rgba = blocks ? undefined : new PlaneStorage(renderer, info);
+  const storage = (blocks ?? rgba)!;
   const composer: PlaneComposer = {
-    info, base, plane, image, role, widthPx, heightPx,
+    info, base, plane, image, role, widthPx, heightPx, blocks,
+    texels: blocks?.format ?? 'rgba8',
     rungs: new Int16Array(columns * rows).fill(-1),
     come: new Set(),
     get textures() {
       return storage.textures;
     },
     view: (old) => storage.view(old, !!composer.filled),
-    fill: (from) => storage.fillAll(from),
-    uploadFragment(bitmaps, fragment, rung) {
-      composer.upload(bitmaps, (fragment % columns) * fragmentWidthPx, Math.floor(fragment / columns) * fragmentHeightPx);
-      composer.rungs[fragment] = rung;
-    },
-    upload: (bitmaps, x, y) => storage.upload(bitmaps, x, y),
+    fill: (from) => rgba?.fillAll(from),
+    uploads: (levels, x, y) =>
+      blocks?.uploads(levels, x, y) ?? [{ pixels: levels[0].width * levels[0].height, run: () => rgba!.upload(levels as ImageBitmap[], x, y) }],
+    placeOf: (fragment) => [(fragment % columns) * fragmentWidthPx, Math.floor(fragment / columns) * fragmentHeightPx],
     updateMips: () => storage.updateMips(),
     read: () => storage.read(),
     dispose: () => storage.dispose(),

@@ -1,5 +1,6 @@
 import type { PlaneComposer } from './composer';
 import { ownLevels } from './plane_storage';
+import type { Upload } from './blocks/block_storage';
 import type { UploadQueue } from './upload_queue';
 import type { WorkerPool } from '../worker/pool';
 
@@ -9,7 +10,7 @@ import type { WorkerPool } from '../worker/pool';
 const stripPx = 1 << 18;
 const mostPieces = 4;
 
-interface Piece {
+export interface Piece {
   x0: number;
   x1: number;
   y0: number;
@@ -26,9 +27,14 @@ export async function enlarge(
   pool: WorkerPool,
   uploads: UploadQueue,
 ): Promise<void> {
+  await eachPiece(next, uploads, (piece) => enlargePiece(next, image, piece, pool, uploads));
+}
+
+/** Works on all pieces, a few at once. */
+export async function eachPiece(next: PlaneComposer, uploads: UploadQueue, work: (piece: Piece) => Promise<void>): Promise<void> {
   const running = new Set<Promise<void>>();
   for (const piece of pieces(next)) {
-    const done = enlargePiece(next, image, piece, pool, uploads).finally(() => running.delete(done));
+    const done = work(piece).finally(() => running.delete(done));
     done.catch(() => undefined); // the first to fail is told
     running.add(done);
     if (running.size >= mostPieces) await Promise.race(running);
@@ -40,7 +46,8 @@ export async function enlarge(
 /** Runs of neighbouring fragments that have not come when the turn of the run comes. */
 function* pieces(next: PlaneComposer): Generator<Piece> {
   const { columns, rows, fragmentWidthPx: width, fragmentHeightPx: height } = next.info;
-  const rise = Math.min(height, Math.max(16, Math.floor(stripPx / width) & ~15));
+  const step = next.blocks ? 4 << (next.blocks.own - 1) : 16; // of blocks, all levels begin with a block
+  const rise = Math.min(height, Math.max(step, Math.floor(stripPx / width) & ~(step - 1)));
   const most = Math.max(1, Math.floor(stripPx / (width * rise)));
   for (let row = 0; row < rows; ++row)
     for (let y = row * height; y < Math.min((row + 1) * height, next.heightPx); y += rise)
@@ -63,10 +70,16 @@ async function enlargePiece(
 ): Promise<void> {
   const picture = await createImageBitmap(image, { premultiplyAlpha: 'none', colorSpaceConversion: 'none' });
   const { widthPx: width, heightPx: height } = next;
-  const bitmaps = await pool
-    .enlarge({ picture, width, height, ...piece, levels: ownLevels })
-    .finally(() => picture.close()); // workers have a copy of their own
   const { x0, x1, y0, y1 } = piece;
-  await uploads.enqueue((x1 - x0) * (y1 - y0), () => next.upload(bitmaps, x0, y0));
-  bitmaps.forEach((b) => b.close());
+  const blocks = next.blocks && { ...next.blocks.request(x0, y0), size: [x1 - x0, y1 - y0] as [number, number] };
+  const bitmaps = await pool
+    .enlarge({ picture, width, height, ...piece, levels: blocks ? 1 : ownLevels, blocks })
+    .finally(() => picture.close()); // workers have a copy of their own
+  await uploadAll(uploads, next.uploads(bitmaps, x0, y0));
+  bitmaps.forEach((b) => b.close?.());
+}
+
+/** Resolves when all have ended. */
+export async function uploadAll(uploads: UploadQueue, all: readonly Upload[]): Promise<void> {
+  await Promise.all(all.map(({ pixels, run }) => uploads.enqueue(pixels, run)));
 }

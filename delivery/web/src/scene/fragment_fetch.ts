@@ -27,6 +27,7 @@ export class FragmentFetch {
     this.transfers = new Transfers(load_.reader, planes.textures, load_.pool, {
       decoded: (wish, levels) => void this.show_(wish, levels),
       lost: (wish, error) => this.lost(wish, error),
+      blocks: (wish) => planes.blocksOf(wish),
     });
   }
 
@@ -37,7 +38,9 @@ export class FragmentFetch {
   /** Waits until all fragments that have come, but so many, are in their textures. */
   async composed(but = 0): Promise<void> {
     for (; this.pending() > but; await sleepS(0.004)) throwIfAborted(this.load_.signal);
-    if (but === 0) this.planes.finishMips();
+    if (but > 0) return;
+    this.planes.finishMips();
+    for (; this.pending() > 0; await sleepS(0.004)) throwIfAborted(this.load_.signal); // of blocks a worker makes them
   }
   /** Whether rungs come as a whole, whichever fragment is asked for: from a tree without files of fragments. */
   wholeRungs(): boolean {
@@ -102,7 +105,7 @@ export class FragmentFetch {
     const to = this.planes.showing(wish);
     const better = (there: number): boolean => rung > there || (!!replaces && load.override.rung !== undefined);
     const shown = to && !load.signal.aborted && (await this.planes.upload(to, levels, fragment, rung, better));
-    levels.forEach((b) => b.close());
+    levels.forEach((b) => b.close?.());
     this.fates.ended(wish, rung);
     if (shown) load.emit('fragment', { plane, fragment, rung });
   }

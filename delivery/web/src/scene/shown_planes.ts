@@ -1,4 +1,5 @@
-import { planesWithin } from '../decide/memory/gpu_memory';
+import type { BlockRequest } from '../blocks/formats';
+import { type BytesOf, planesWithin, rgbaBytes, wayWithin } from '../decide/memory/gpu_memory';
 import { scaleBytes } from '../decide/memory/gpu_size';
 import { TextureLoss, fullSize, planesForDisplay, type PlaneChoice } from '../decide/texture_loss';
 import { InputError, throwIfAborted } from '../format/errors';
@@ -6,6 +7,7 @@ import { mostPreviewPx } from '../format/layout';
 import type { PackageData } from '../format/package_data';
 import { type TextureInfo } from '../format/textures';
 import type { Levels } from '../worker/protocol';
+import type { Compression } from './blocks/compression';
 import type { PlaneComposer } from './composer';
 import type { FragmentPlace } from './fragment_fates';
 import { hysteresis, type LoadContext } from './load_context';
@@ -32,6 +34,10 @@ export async function readPlaneData(load: LoadContext, scales: ScaleSource): Pro
 /** Which planes show the textures of a load: choosing them, and showing them. */
 export class ShownPlanes {
   private set_: TextureSet;
+  private compression_?: Compression;
+  private considered_ = false;
+  /** How texels are stored, from the first planes that are shown on: other texels would have to be fetched again. */
+  private way_?: number;
 
   constructor(
     private readonly load_: LoadContext,
@@ -42,7 +48,10 @@ export class ShownPlanes {
   }
   private newSet_(): TextureSet {
     const { options, materials, pool } = this.load_;
-    return new TextureSet(options.renderer, this.textures, materials, pool);
+    return new TextureSet(options.renderer, this.textures, materials, pool, (plane) => {
+      const format = this.compression_?.ways[this.way_ ?? 0](plane);
+      return format && [this.compression_!, format];
+    });
   }
 
   get textures(): readonly TextureInfo[] {
@@ -65,6 +74,11 @@ export class ShownPlanes {
   }
   isUsed(base: number): boolean {
     return this.set_.isUsed(base);
+  }
+  /** How a worker makes blocks of a fragment. */
+  blocksOf(f: FragmentPlace): BlockRequest | undefined {
+    const to = this.showing(f);
+    return to?.blocks?.request(...to.placeOf(f.fragment));
   }
   readPlane(base: number): Uint8Array | undefined {
     return this.set_.planes.get(base)?.read();
@@ -104,10 +118,32 @@ export class ShownPlanes {
     });
   }
   private withinMemory_(choices: readonly PlaneChoice[], scale: number): readonly PlaneChoice[] {
-    const { memoryBytes, reader: { manifest }, view } = this.load_;
-    if (memoryBytes === Infinity) return choices;
+    const room = this.room_(scale);
+    this.way_ ??= wayWithin(choices, room, this.ways);
+    if (room === Infinity) return choices;
+    return planesWithin(new TextureLoss(this.data, this.load_.view.display.heightPx), choices, room, [this.ways[this.way_]]);
+  }
+  /** Memory for the textures beside a scale. */
+  private room_(scale: number): number {
+    const { memoryBytes, reader: { manifest } } = this.load_;
     const mesh = manifest.scales.find((s) => s.scale === scale);
-    return planesWithin(new TextureLoss(this.data, view.display.heightPx), choices, memoryBytes - (mesh ? scaleBytes(mesh) : 0));
+    return memoryBytes - (mesh ? scaleBytes(mesh) : 0);
+  }
+  /** Ways to store the planes, the best first. */
+  get ways(): readonly BytesOf[] {
+    return this.compression_?.bytes ?? [rgbaBytes(this.textures)];
+  }
+  /** Finds out, before planes are chosen beside a scale, whether they may be blocks: where all of them as RGBA take more than there is. */
+  async considerCompression(scale: number): Promise<void> {
+    const { compress = 'auto' } = this.load_.options;
+    const fits = compress === 'auto' && wayWithin(this.forDisplay(), this.room_(scale), [rgbaBytes(this.textures), () => 0]) === 0;
+    if (this.considered_ || compress === 'never' || fits) return;
+    this.considered_ = true;
+    try {
+      this.compression_ = await (await import('./blocks/compression')).openCompression(this.load_, this.textures);
+    } catch (error) {
+      this.load_.fail(error, 'compressed textures'); // RGBA it is
+    }
   }
   /** Planes with more texels where the view has come nearer; never planes with fewer, as the texels are there already. */
   finer(scale: number): PlaneChoice[] {
@@ -154,7 +190,7 @@ export class ShownPlanes {
     const { reader, pool, signal } = this.load_;
     const streams = [await reader.preview(base, signal)];
     const most: [number, number] = [mostPreviewPx, mostPreviewPx];
-    return (await pool.decode({ codec: 'jpeg', tables: new Uint8Array(0), streams, digests: [], complete: true, levels: 1, most }))[0];
+    return (await pool.decode({ codec: 'jpeg', tables: new Uint8Array(0), streams, digests: [], complete: true, levels: 1, most }))[0] as ImageBitmap;
   }
   /** The GPU has lost everything: the same planes begin with their previews. Gives the planes as they were. */
   async showAnew(): Promise<PlaneComposer[]> {

@@ -159,6 +159,7 @@ export class TextureLoad {
     const { load_: load, planes_: planes, fetching_: fetching } = this;
     const { override, options, limitS, beta0, reader: { client }, view: { display } } = load;
     const wanted = override.scale ?? this.scaleFor_(display.heightPx, display.part);
+    await planes.considerCompression(wanted);
     if (options.fullSize || !Number.isFinite(limitS) || override.rung !== undefined) return { scale: wanted, planes: planes.forDisplay() };
     /** Seconds that so many bytes of mesh take when nothing shares the link. */
     const meshS = (bytes: number): number => (bytes > 0 ? bytes / beta0 + client.latencyS : 0);
@@ -172,7 +173,7 @@ export class TextureLoad {
     });
     const steps = choiceInTime(planes.data, {
       displayedPx: display.heightPx, wanted, only: override.scale !== undefined || !!printed, textures: spend, connections: client.options.connections,
-      memoryBytes: load.memoryBytes,
+      memoryBytes: load.memoryBytes, ways: planes.ways,
       afterMesh: (scale) => ({ plan: this.inTime_.planOptions(limitAfterMeshS(scale)), linkBytesS: beta0 }),
     });
     for (;;) {

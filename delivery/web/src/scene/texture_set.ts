@@ -1,8 +1,10 @@
 import { Texture, type WebGLRenderer } from 'three';
 import type { PlaneChoice } from '../decide/texture_loss';
+import type { BlockFormat } from '../blocks/formats';
 import type { TextureInfo } from '../format/textures';
 import type { WorkerPool } from '../worker/pool';
 import type { Levels } from '../worker/protocol';
+import type { Compression } from './blocks/compression';
 import { type PlaneComposer, planeComposer } from './composer';
 import { isSoftware } from './gpu';
 import { type MaterialSet, type Slot, disposeTexture, texturesIn } from './scale_parts';
@@ -22,6 +24,8 @@ export class TextureSet {
     private readonly textures_: readonly TextureInfo[],
     private readonly materials_: MaterialSet,
     private readonly pool_: WorkerPool,
+    /** How a plane's texels are stored; left out: as RGBA. */
+    private readonly blocksOf_: (plane: number) => [Compression, BlockFormat] | undefined = () => undefined,
   ) {
     this.uploads_ = new UploadQueue(renderer_, () => this.planes.forEach((plane) => plane.updateMips()));
     this.software_ = isSoftware(renderer_); // once, and soon: a GPU that has something to draw keeps the page waiting for its name
@@ -34,7 +38,11 @@ export class TextureSet {
   async show({ base, plane }: PlaneChoice, preview?: ImageBitmap): Promise<void> {
     const { planes } = this;
     const before = planes.get(base);
-    const next = planeComposer(this.renderer_, this.textures_[plane], base, plane);
+    const next: PlaneComposer = planeComposer(this.renderer_, this.textures_[plane], base, plane, this.blocksOf_(plane)?.[0].storage({
+      renderer: this.renderer_, pool: this.pool_, uploads: this.uploads_, info: this.textures_[plane], format: this.blocksOf_(plane)![1],
+      pending: (by) => (this.pending += by),
+      refill: (from) => void this.refill_(next, from, next.blocks?.format).catch(() => undefined),
+    }));
     const old = this.slotsOf_(base).map(textureAt);
     const shown = old.find((texture) => (texture.image as ImageBitmap | null)?.width);
     next.view(shown ?? old[0] ?? new Texture()); // a finer scale may bring the material that wants it
@@ -48,6 +56,7 @@ export class TextureSet {
       throw error;
     }
     next.updateMips();
+    await next.blocks?.settled();
     if (this.uploads_.disposed || planes.get(base) !== next) return; // another has taken its place meanwhile
     this.showInMaterials_(next);
     if (before) before.dispose();
@@ -67,10 +76,13 @@ export class TextureSet {
     plane.come.add(fragment);
     let shown = false;
     await plane.ready!.catch(() => undefined);
-    await this.uploads_.enqueue(levels[0].width * levels[0].height, () => {
+    const uploads = plane.uploads(levels, ...plane.placeOf(fragment));
+    // All at once, so that none of another rung comes between.
+    await Promise.all(uploads.map(({ pixels, run }, i) => this.uploads_.enqueue(pixels, () => {
       shown = this.planes.get(plane.base) === plane && better(plane.rungs[fragment]);
-      if (shown) plane.uploadFragment(levels, fragment, rung);
-    });
+      if (shown) run();
+      if (shown && i === uploads.length - 1) plane.rungs[fragment] = rung;
+    })));
     --this.pending;
     return shown;
   }
@@ -100,22 +112,31 @@ export class TextureSet {
       const shown = texturesIn(slot.material);
       if (!shown[slot.name]) slot.material.needsUpdate = true;
       shown[slot.name] = plane.view(old);
+      if (plane.blocks) this.blocksOf_(plane.plane)?.[0].readTwoChannels(slot.material, slot.name, plane.blocks.format);
     }
   }
   private async fill_(next: PlaneComposer, before?: PlaneComposer, old?: Texture, preview?: ImageBitmap): Promise<void> {
     const image = preview ?? (old?.image as ImageBitmap | null | undefined);
-    if (before?.filled) next.fill(before.textures[0]);
+    if (before?.filled) await this.scale_(next, before.textures[0], before.blocks?.format);
     else if (image?.width)
       try {
         // Coverage alone has a preview of its own: the colours are shown already.
-        if (preview || (await this.software_)) await this.enlarge_(next, image);
-        else next.fill(old!);
+        if (preview || next.blocks || (await this.software_)) await this.enlarge_(next, image);
+        else await this.scale_(next, old!);
       } catch (error) {
         // A browser whose workers cannot draw leaves enlarging to the GPU.
         if (preview || this.uploads_.disposed) throw error;
-        next.fill(old!);
+        await this.scale_(next, old!);
       }
     next.filled = true;
+  }
+  /** Fills a plane with a texture that stands on the GPU. */
+  private async scale_(next: PlaneComposer, from: Texture, format?: BlockFormat): Promise<void> {
+    if (next.blocks) await this.refill_(next, from, format);
+    else next.fill(from);
+  }
+  private async refill_(next: PlaneComposer, from: Texture, format?: BlockFormat): Promise<void> {
+    await this.blocksOf_(next.plane)?.[0].refill(next, from, format, this.renderer_, this.pool_, this.uploads_);
   }
   private async enlarge_(next: PlaneComposer, image: ImageBitmap): Promise<void> {
     await (await import('./enlarge')).enlarge(next, image, this.pool_, this.uploads_);

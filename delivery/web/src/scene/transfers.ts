@@ -4,6 +4,7 @@ import type { TextureInfo } from '../format/textures';
 import { PlaneFiles } from '../http/package_documents';
 import { PackageReader } from '../http/package_reader';
 import type { WorkerPool } from '../worker/pool';
+import type { BlockRequest } from '../blocks/formats';
 import type { Levels } from '../worker/protocol';
 import { ownLevels } from './plane_storage';
 
@@ -22,6 +23,8 @@ export interface TransferHooks {
   decoded(wish: Wish, levels: Levels): void;
   /** The fragment cannot be had, or cannot be decoded; the preview stays. */
   lost(wish: Wish, error: unknown): void;
+  /** How a worker makes blocks of the fragment, where its texture is of blocks. */
+  blocks?(wish: Wish): BlockRequest | undefined;
 }
 /** A fragment at a border may reach so far beyond its plane. */
 const beyondPx = 1024;
@@ -170,8 +173,10 @@ export class Transfers {
       --this.pending;
     }
   }
-  private async decodeStreams_({ wish: { plane, fragment, rung }, first, streams }: Job, signal?: AbortSignal): Promise<Levels> {
+  private async decodeStreams_({ wish, first, streams }: Job, signal?: AbortSignal): Promise<Levels> {
+    const { plane, fragment, rung } = wish;
     const { tables: t, complete } = this.filesOf(plane);
+    const blocks = this.hooks_.blocks?.(wish);
     const { codec, fragmentWidthPx, fragmentHeightPx, widthPx, heightPx } = this.textures_[plane];
     const digestOf = (at: number): Uint8Array => t.digest.subarray(8 * at, 8 * at + 8);
     const levels = await this.pool_.decode({
@@ -180,7 +185,8 @@ export class Transfers {
       streams,
       digests: complete ? [complete[rung].get(fragment)!.sha256] : streams.map((_, i) => digestOf((first + i) * fragmentCount(t) + fragment)),
       complete: !!complete,
-      levels: ownLevels,
+      levels: blocks ? 1 : ownLevels,
+      blocks,
       // The GPU can hold the plane, so that the plane bounds the picture; the sides of an only fragment may be anything.
       most: [Math.min(fragmentWidthPx, widthPx + beyondPx), Math.min(fragmentHeightPx, heightPx + beyondPx)],
     });

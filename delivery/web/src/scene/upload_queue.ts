@@ -3,7 +3,7 @@ import { sleepS } from '../http/clock';
 import { gpuIdle } from './gpu';
 
 /** Milliseconds and pixels of uploads between two turns of the page. */
-const sliceMs = 5;
+const sliceMs = 4;
 const slicePx = 1 << 19;
 /**
  * The GPU may be so many slices behind: a further upload would wait in the middle of a page's turn. Nobody waits for the GPU longer

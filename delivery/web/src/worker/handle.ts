@@ -2,6 +2,7 @@ import * as documents from '../format/documents';
 import { FormatError, TexmeshError } from '../format/errors';
 import { SplitStreamReader } from '../format/splits/split_stream';
 import { decodePicture, enlargePicture } from './pictures';
+import type { BlockLevel, BlockRequest, Pixels } from '../blocks/formats';
 import type { WorkerAnswer, WorkerRequest } from './protocol';
 import { splitInfo, splitUpdate } from './split_update';
 
@@ -24,6 +25,12 @@ function streamOf(key: number): { reader: SplitStreamReader; wedges: number } {
   return stream;
 }
 
+/** What makes blocks is fetched where somebody asks for them: most loads never do. */
+async function inBlocks(picture: ImageBitmap | Pixels, request: BlockRequest): Promise<[BlockLevel[], Transferable[]]> {
+  const levels = await (await import(/* webpackIgnore: true */ /* @vite-ignore */ request.url)).toBlocks(picture, request);
+  return [levels, buffersOf(levels)];
+}
+
 /** Answers a request; the second value lists objects that may be handed over instead of copied. */
 export async function handle(request: WorkerRequest): Promise<[unknown, Transferable[]]> {
   switch (request.op) {
@@ -33,12 +40,14 @@ export async function handle(request: WorkerRequest): Promise<[unknown, Transfer
     }
     case 'decode': {
       const levels = await decodePicture(request);
-      return [levels, levels];
+      return request.blocks ? inBlocks(levels[0], request.blocks) : [levels, levels];
     }
     case 'enlarge': {
       const levels = enlargePicture(request);
-      return [levels, levels];
+      return request.blocks ? inBlocks(levels[0], request.blocks) : [levels, levels];
     }
+    case 'blocks':
+      return inBlocks(request, request.blocks);
     case 'split-open': {
       const reader = new SplitStreamReader(request.head);
       streams.set(request.key, { reader, wedges: 0 });

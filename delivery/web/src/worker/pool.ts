@@ -2,7 +2,7 @@ import type { DocumentDecoder } from '../format/document_decoder';
 import { FormatError, abortError } from '../format/errors';
 import { type Helper, type SharedWorkers, type WorkerEvents, startWorker } from './shared_workers';
 import type {
-  DecodeRequest, EnlargeRequest, Levels, SplitInfo, SplitUpdate, WorkerAnswer, WorkerRequest,
+  DecodeRequest, EnlargeRequest, Levels, PixelsRequest, SplitInfo, SplitUpdate, WorkerAnswer, WorkerRequest,
 } from './protocol';
 
 /** Images decoded at once, over all workers and loads of a page. */
@@ -85,6 +85,10 @@ export class WorkerPool {
   }
   enlarge(request: Omit<EnlargeRequest, 'op'>): Promise<Levels> {
     return this.ask_({ op: 'enlarge', ...request });
+  }
+  /** Blocks of a picture that is no file. */
+  blocksOf(request: Omit<PixelsRequest, 'op'>): Promise<Levels> {
+    return this.ask_({ op: 'blocks', ...request });
   }
   openSplits(key: number, head: Uint8Array): Promise<SplitInfo> {
     return this.ask_({ op: 'split-open', key, head });

@@ -1,3 +1,4 @@
+import type { BlockLevel, BlockRequest, Pixels } from '../blocks/formats';
 import type { CodecId } from '../format/codec';
 import type { Documents } from '../format/document_decoder';
 
@@ -15,6 +16,8 @@ export interface DecodeRequest {
   levels: number;
   /** Most width and height that the picture may have. */
   most: [number, number];
+  /** Levels as blocks, made of the picture alone. */
+  blocks?: BlockRequest;
 }
 /** x0 .. x1, y0 .. y1 (multiples of 16, or the end) of a picture enlarged to width x height, bilinearly. Gives Levels. */
 export interface EnlargeRequest {
@@ -27,9 +30,16 @@ export interface EnlargeRequest {
   y0: number;
   y1: number;
   levels: number;
+  /** As for decode. */
+  blocks?: BlockRequest;
+}
+/** Make blocks of a picture that is no file. Gives Levels. */
+export interface PixelsRequest extends Pixels {
+  op: 'blocks';
+  blocks: BlockRequest;
 }
 /** A picture and its halves, one after the other. */
-export type Levels = ImageBitmap[];
+export type Levels = (ImageBitmap | BlockLevel)[];
 /** Start a vertex-split stream under a number of the caller's. Gives SplitInfo. */
 export interface SplitOpenRequest {
   op: 'split-open';
@@ -62,7 +72,7 @@ export interface DocumentRequest {
   args: unknown[];
 }
 /** Anything that a worker is asked. */
-export type WorkerRequest = DocumentRequest | DecodeRequest | EnlargeRequest | SplitOpenRequest | SplitCheckRequest | SplitAddRequest | SplitCloseRequest;
+export type WorkerRequest = DocumentRequest | DecodeRequest | EnlargeRequest | PixelsRequest | SplitOpenRequest | SplitCheckRequest | SplitAddRequest | SplitCloseRequest;
 
 /** Facts about a stream from its head. */
 export interface SplitInfo {

@@ -9,9 +9,10 @@ export const roomsBelow: Record<string, readonly string[]> = {
   format: [],
   check: ['format'],
   http: ['format'],
-  worker: ['format'],
+  blocks: [],
+  worker: ['format', 'blocks'],
   decide: ['format', 'http'],
-  scene: ['format', 'http', 'worker', 'decide'],
+  scene: ['format', 'http', 'blocks', 'worker', 'decide'],
   page: ['format', 'http', 'decide', 'scene'],
   element: ['format', 'page'],
 };

@@ -1,0 +1,51 @@
+import { Source, type Texture, type WebGLRenderer } from 'three';
+import type { BlockFormat } from '../../blocks/formats';
+import type { BytesOf } from '../../decide/memory/gpu_memory';
+import type { TextureInfo } from '../../format/textures';
+import type { WorkerPool } from '../../worker/pool';
+import type { LoadContext } from '../load_context';
+import type { UploadQueue } from '../upload_queue';
+import { BlockStorage } from './block_storage';
+import { type Way, bytesBy, formatsOf, waysOf } from './gpu_formats';
+import { refill } from './refill';
+import { readTwoChannels } from './two_channels';
+
+/** A plane to be stored, and what its load works with. */
+export interface StorageOptions {
+  renderer: WebGLRenderer;
+  pool: WorkerPool;
+  uploads: UploadQueue;
+  info: TextureInfo;
+  format: BlockFormat;
+  /** Counts what is under way. */
+  pending(by: 1 | -1): void;
+  /** Fills a further storage of the plane. */
+  refill(from: Texture): void;
+}
+/** Textures as blocks; this module is loaded where a load wants them. */
+export interface Compression {
+  /** Ways to store the planes, the best pictures first, and the bytes of each. */
+  ways: Way[];
+  bytes: BytesOf[];
+  storage(of: StorageOptions): BlockStorage;
+  refill: typeof refill;
+  readTwoChannels: typeof readTwoChannels;
+}
+
+/** undefined: the GPU has no formats, three.js is too old, or a worker cannot make blocks. */
+export async function openCompression({ options, pool }: LoadContext, textures: readonly TextureInfo[]): Promise<Compression | undefined> {
+  const { renderer, workerUrl, blocksUrl, compress } = options;
+  const formats = formatsOf(renderer);
+  if (formats.size === 0 || !('dataReady' in new Source(null))) return undefined; // before three.js r162 a storage wants its texels at once
+  const url = blocksUrl ? new URL(blocksUrl, location.href) : workerUrl ? new URL('./blocks.js', new URL(workerUrl, location.href)) : new URL('./blocks.js', import.meta.url);
+  const [format] = formats;
+  await pool.blocksOf({ pixels: new Uint8Array(64), width: 4, height: 4, blocks: { url: url.href, format, own: 1, size: [4, 4] } });
+  const storage = ({ renderer: gpu, pool: workers, uploads, info, format: stored, pending, refill: filled }: StorageOptions): BlockStorage =>
+    new BlockStorage(gpu, info, stored, {
+      encode: (picture, blocks) => workers.blocksOf({ ...picture, blocks }),
+      enqueue: ({ pixels, run }) => uploads.enqueue(pixels, run),
+      pending, blocksUrl: url.href,
+    }, filled);
+  const ways = waysOf(textures, formats).slice(compress === 'always' ? 1 : 0);
+  return { ways, bytes: ways.map((way) => bytesBy(textures, way)), refill, readTwoChannels, storage };
+}
