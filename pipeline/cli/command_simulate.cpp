@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "delivery/cpp/decide/htc_theorem.h"
+#include "format/base/text_bytes.h"
 #include "pipeline/cli/commands.h"
 #include "pipeline/cli/options/command_line.h"
 #include "pipeline/cli/options/delivery_options.h"
@@ -15,7 +16,6 @@
 #include "pipeline/inspect/simulation_plot.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"
-#include "pipeline/io/text_bytes.h"
 #include "pipeline/io/text_table.h"
 
 namespace texmesh {

@@ -4,6 +4,7 @@
 #include <iostream>
 
 #include "format/base/errors.h"
+#include "format/base/text_bytes.h"
 #include "pipeline/batch/fleet/merge_summaries.h"
 #include "pipeline/batch/progress.h"
 #include "pipeline/cli/commands.h"
@@ -11,7 +12,6 @@
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/resource_error.h"
-#include "pipeline/io/text_bytes.h"
 #include "pipeline/report/collection/collection_page.h"
 
 namespace texmesh {

@@ -8,9 +8,9 @@
 
 #include "format/base/bounded_json.h"
 #include "format/base/sha256.h"
+#include "format/base/text_bytes.h"
 #include "format/rules/split_mix.h"
 #include "pipeline/compile/user_document.h"
-#include "pipeline/io/text_bytes.h"
 
 namespace texmesh {
 namespace {

@@ -9,6 +9,8 @@
 namespace texmesh::fuzz {
 namespace {
 
+using namespace std::string_view_literals;
+
 template <class Import>
 bool unless_input_error(const Import& import) {
   try {
@@ -68,7 +70,6 @@ bool read_cyberware(ByteSpan input) {
 // ---- seeds
 
 std::vector<Bytes> obj_seeds() {
-  using namespace std::string_view_literals;
   return {
       to_bytes(
           "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0 0.5 0.5 0.5\nv 1 1 0\nvn 0 0 1\nvt 0 0\nvt 1 0\ng a\ns 1\nusemtl m\n"
@@ -147,96 +148,85 @@ std::vector<Bytes> cyberware_seeds() {
   return {out.finish()};
 }
 
+// ---- what the texts are made of
+
+constexpr std::string_view kObjWords[] = {
+    "v ",   "vt ", "vn ",   "f ",   "g ", "o ", "s ",    "l ",  "usemtl ",     "mtllib a.mtl",
+    "\\\n", "#",   "1/1/1", "1//1", "-1", "0",  "1e300", "nan", "99999999999", "\0newmtl m\n"sv};
+constexpr std::string_view kMtlWords[] = {
+    "newmtl m",  "newmtl n",   "Ka ",         "Kd ",     "Ks ",     "Ns ",     "Ni ",    "Tf ",
+    "Tr ",       "d ",         "illum ",      "map_Kd ", "map_Ks ", "map_Ke ", "map_d ", "bump ",
+    "map_Bump ", "norm ",      "disp ",       "refl ",   "-s ",     "-o ",     "-t ",    "-mm ",
+    "-bm ",      "-clamp on ", "-imfchan r ", "Pr ",     "Pm ",     "Ke ",     "xyz ",   "spectral a.rfl"};
+constexpr std::string_view kPlyWords[] = {"ply\n",
+                                          "format ascii 1.0\n",
+                                          "format binary_little_endian 1.0\n",
+                                          "element vertex ",
+                                          "element face ",
+                                          "element tristrips ",
+                                          "element material ",
+                                          "property ",
+                                          "list ",
+                                          "uchar ",
+                                          "char ",
+                                          "short ",
+                                          "ushort ",
+                                          "int ",
+                                          "uint ",
+                                          "float ",
+                                          "double ",
+                                          "x\n",
+                                          "nx\n",
+                                          "s\n",
+                                          "t\n",
+                                          "red\n",
+                                          "alpha\n",
+                                          "vertex_indices\n",
+                                          "texcoord\n",
+                                          "texnumber\n",
+                                          "comment TextureFile a\n",
+                                          "obj_info ",
+                                          "end_header\n",
+                                          "4000000000",
+                                          "-1",
+                                          "nan",
+                                          "1e300"};
+constexpr std::string_view kStlWords[] = {"solid ",    "facet normal ", "outer loop\n", "vertex ",
+                                          "endloop\n", "endfacet\n",    "endsolid",     "color",
+                                          "COLOR=",    "nan",           "1e300"};
+constexpr std::string_view kRangeWords[] = {"\"y_top\":",
+                                            "\"alpha_step_deg\":",
+                                            "\"alpha_start_deg\":",
+                                            "\"clockwise\":true",
+                                            "\"radius_offset\":",
+                                            "\"valid_min\":",
+                                            "\"max_radius_step\":",
+                                            "\"texture\":",
+                                            "P5\n",
+                                            "255\n",
+                                            "65535\n",
+                                            "1e300",
+                                            "99999"};
+constexpr std::string_view kCyberwareWords[] = {
+    "NLG=",        "NLT=",           "LGINCR=", "LTINCR=",           "LGSHIFT=", "RSHIFT=",
+    "LGMIN=",      "LGMAX=",         "SCALE=",  "SPACE=CYLINDRICAL", "DATA=\n",  "THETA_RIGHTHAND=FALSE",
+    "FILLED=TRUE", "INSIDE_OUT=TRUE"};
+
+template <std::size_t kCount>
+Target text_target(const char* name, bool (*run)(ByteSpan), std::vector<Bytes> (*seeds)(),
+                   const std::string_view (&words)[kCount]) {
+  return {name, false, run, seeds, Shape::kBytes, nullptr, {std::begin(words), std::end(words)}};
+}
+
 }  // namespace
 
 void add_scan_targets(std::vector<Target>& list) {
   list.insert(
       list.end(),
-      {{"obj",
-        false,
-        read_obj,
-        obj_seeds,
-        Shape::kBytes,
-        nullptr,
-        {"v ",   "vt ",   "vn ",   "f ",          "g ",
-         "o ",   "s ",    "l ",    "usemtl ",     "mtllib a.mtl",
-         "\\\n", "#",     "1/1/1", "1//1",        "-1",
-         "0",    "1e300", "nan",   "99999999999", std::string("\0newmtl m\n", 10)}},
-       {"mtl",
-        false,
-        read_mtl,
-        mtl_seeds,
-        Shape::kBytes,
-        nullptr,
-        {"newmtl m", "newmtl n", "Ka ",       "Kd ",           "Ks ",        "Ns ",         "Ni ",
-         "Tf ",      "Tr ",      "d ",        "illum ",        "map_Kd ",    "map_Ks ",     "map_Ke ",
-         "map_d ",   "bump ",    "map_Bump ", "norm ",         "disp ",      "refl ",       "-s ",
-         "-o ",      "-t ",      "-mm ",      "-bm ",          "-clamp on ", "-imfchan r ", "Pr ",
-         "Pm ",      "Ke ",      "xyz ",      "spectral a.rfl"}},
-       {"ply",
-        false,
-        read_ply,
-        ply_seeds,
-        Shape::kBytes,
-        nullptr,
-        {"ply\n",
-         "format ascii 1.0\n",
-         "format binary_little_endian 1.0\n",
-         "element vertex ",
-         "element face ",
-         "element tristrips ",
-         "element material ",
-         "property ",
-         "list ",
-         "uchar ",
-         "char ",
-         "short ",
-         "ushort ",
-         "int ",
-         "uint ",
-         "float ",
-         "double ",
-         "x\n",
-         "nx\n",
-         "s\n",
-         "t\n",
-         "red\n",
-         "alpha\n",
-         "vertex_indices\n",
-         "texcoord\n",
-         "texnumber\n",
-         "comment TextureFile a\n",
-         "obj_info ",
-         "end_header\n",
-         "4000000000",
-         "-1",
-         "nan",
-         "1e300"}},
-       {"stl",
-        false,
-        read_stl,
-        stl_seeds,
-        Shape::kBytes,
-        nullptr,
-        {"solid ", "facet normal ", "outer loop\n", "vertex ", "endloop\n", "endfacet\n", "endsolid", "color",
-         "COLOR=", "nan", "1e300"}},
-       {"range",
-        false,
-        read_range,
-        range_seeds,
-        Shape::kBytes,
-        nullptr,
-        {"\"y_top\":", "\"alpha_step_deg\":", "\"alpha_start_deg\":", "\"clockwise\":true",
-         "\"radius_offset\":", "\"valid_min\":", "\"max_radius_step\":", "\"texture\":", "P5\n", "255\n",
-         "65535\n", "1e300", "99999"}},
-       {"cyberware",
-        false,
-        read_cyberware,
-        cyberware_seeds,
-        Shape::kBytes,
-        nullptr,
-        {"NLG=", "NLT=", "LGINCR=", "LTINCR=", "LGSHIFT=", "RSHIFT=", "LGMIN=", "LGMAX=", "SCALE=",
-         "SPACE=CYLINDRICAL", "DATA=\n", "THETA_RIGHTHAND=FALSE", "FILLED=TRUE", "INSIDE_OUT=TRUE"}}});
+      {text_target("obj", read_obj, obj_seeds, kObjWords), text_target("mtl", read_mtl, mtl_seeds, kMtlWords),
+       text_target("ply", read_ply, ply_seeds, kPlyWords), text_target("stl", read_stl, stl_seeds, kStlWords),
+       text_target("range", read_range, range_seeds, kRangeWords),
+       text_target("cyberware", read_cyberware, cyberware_seeds, kCyberwareWords)});
 }
 
 }  // namespace texmesh::fuzz

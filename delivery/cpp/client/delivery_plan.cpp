@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "delivery/cpp/client/request_htc.h"
 #include "format/rules/proxy_choice.h"
 
 namespace texmesh {
@@ -168,12 +169,8 @@ DeliveryPlan plan_at_scale(TextureLoss& loss, const DeliveryRequest& request, in
   plan.mesh_s = plan.step ? fetched_s(request.network, plan.step_s, fixed)
                           : fetched_s(request.network, manifest_s, plan.first_picture_bytes + fixed);
 
-  HtcOptions htc = request.htc;
-  htc.time_limit_s = request.time_limit_s - plan.mesh_s;
-  htc.rtt_s = request.network.rtt_s;
-  htc.sites = static_cast<int>(std::clamp<std::size_t>(request.network.mirrors.size(), 1, 64));
-  htc.throughput.initial_bytes_s =
-      request.beta0_bytes_s > 0 ? request.beta0_bytes_s : shown_throughput(plan, manifest_s, htc.rtt_s);
+  const HtcOptions htc = request_htc(request, request.time_limit_s - plan.mesh_s,
+                                     shown_throughput(plan, manifest_s, request.network.rtt_s));
   const ChosenTextures chosen =
       choose_textures(loss, request, list_options(request, scale),
                       std::max(0.0, htc.time_limit_s) * htc.throughput.initial_bytes_s);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "delivery/cpp/client/request_htc.h"
 #include "format/rules/proxy_choice.h"
 
 namespace texmesh {
@@ -122,12 +123,7 @@ void fetch_textures(const DeliveryRequest& request, PageList& page, PagePlan& pl
     plan.complete_s = plan.meshes_s;
     return;
   }
-  HtcOptions htc = request.htc;
-  htc.time_limit_s = left_s;
-  htc.rtt_s = request.network.rtt_s;
-  htc.sites = static_cast<int>(std::clamp<std::size_t>(request.network.mirrors.size(), 1, 64));
-  htc.throughput.initial_bytes_s =
-      request.beta0_bytes_s > 0 ? request.beta0_bytes_s : shown_bytes_s(request, plan);
+  const HtcOptions htc = request_htc(request, left_s, shown_bytes_s(request, plan));
   const NetworkOptions network = without_dead_mirrors(request.network, plan.meshes_s);
   plan.textures = simulate(std::move(page.offers), htc, network_from(network, plan.meshes_s), request.probe);
   plan.complete_s = plan.meshes_s + plan.textures.end_s;

@@ -8,7 +8,7 @@
 
 #include "format/base/errors.h"
 #include "format/base/sha256.h"
-#include "pipeline/io/text_bytes.h"
+#include "format/base/text_bytes.h"
 
 namespace texmesh {
 namespace {

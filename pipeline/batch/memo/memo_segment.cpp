@@ -13,9 +13,9 @@
 
 #include "format/base/archive.h"
 #include "format/base/errors.h"
+#include "format/base/text_bytes.h"
 #include "pipeline/io/file_stamp.h"
 #include "pipeline/io/machine/owner_mark.h"
-#include "pipeline/io/text_bytes.h"
 
 namespace texmesh {
 namespace {

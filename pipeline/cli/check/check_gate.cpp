@@ -4,10 +4,10 @@
 
 #include <algorithm>
 
+#include "format/base/text_bytes.h"
 #include "pipeline/cli/options/delivery_options.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/markup.h"
-#include "pipeline/io/text_bytes.h"
 #include "pipeline/io/text_table.h"
 #include "pipeline/report/html.h"
 #include "pipeline/report/switch_sizes.h"

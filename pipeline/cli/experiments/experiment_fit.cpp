@@ -5,6 +5,7 @@
 #include <iostream>
 #include <memory>
 
+#include "format/base/text_bytes.h"
 #include "pipeline/cli/experiments/experiments.h"
 #include "pipeline/cli/options/command_line.h"
 #include "pipeline/cli/options/common_options.h"
@@ -12,7 +13,6 @@
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/file_resolver.h"
-#include "pipeline/io/text_bytes.h"
 #include "pipeline/io/text_table.h"
 
 namespace texmesh {

@@ -6,11 +6,11 @@
 #include <nlohmann/json.hpp>
 
 #include "format/base/errors.h"
+#include "format/base/text_bytes.h"
 #include "pipeline/compile/user_document.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/file_resolver.h"
 #include "pipeline/io/resource_error.h"
-#include "pipeline/io/text_bytes.h"
 
 namespace texmesh {
 namespace {

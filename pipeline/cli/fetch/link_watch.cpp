@@ -4,8 +4,8 @@
 #include <algorithm>
 
 #include "format/base/errors.h"
+#include "format/base/text_bytes.h"
 #include "pipeline/io/atomic_file.h"
-#include "pipeline/io/text_bytes.h"
 
 namespace texmesh {
 namespace {

@@ -6,13 +6,13 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "format/base/text_bytes.h"
 #include "pipeline/cli/options/command_line.h"
 #include "pipeline/cli/options/common_options.h"
 #include "pipeline/cli/studies/studies.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/file_resolver.h"
-#include "pipeline/io/text_bytes.h"
 #include "pipeline/io/text_table.h"
 #include "stages/image/decode_image.h"
 #include "stages/study/fragment_study.h"

@@ -4,11 +4,11 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "format/base/text_bytes.h"
 #include "pipeline/cli/options/command_line.h"
 #include "pipeline/cli/options/common_options.h"
 #include "pipeline/cli/studies/studies.h"
 #include "pipeline/io/exit_codes.h"
-#include "pipeline/io/text_bytes.h"
 #include "pipeline/report/report.h"
 #include "pipeline/thesis/exhibits.h"
 

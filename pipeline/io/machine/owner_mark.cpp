@@ -11,8 +11,8 @@
 #include <fstream>
 
 #include "format/base/sha256.h"
+#include "format/base/text_bytes.h"
 #include "pipeline/io/file_stamp.h"
-#include "pipeline/io/text_bytes.h"
 
 namespace texmesh {
 namespace {
