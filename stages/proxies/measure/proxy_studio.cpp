@@ -78,8 +78,9 @@ const std::vector<ProxyStudio::View>& ProxyStudio::views(std::size_t size, const
     const double side = kDisplayedPx[size] * 2 * distance * view.camera.tan_half_fov / extent;
     view.side_px = static_cast<std::uint32_t>(std::clamp(std::ceil(side), 1.0, 8192.0));
     view.camera.tan_half_fov *= view.side_px / std::clamp(side, 0.5, 8192.0);
-    view.reference = prepare_flip(shade(scene, look(scene, view.camera, view.side_px, context),
-                                        shown_.textures, environment_, context));
+    const Picture picture =
+        shade(scene, look(scene, view.camera, view.side_px, context), shown_.textures, environment_, context);
+    view.reference = prepare_flip(picture);  // what was seen is gone by now
     views.push_back(std::move(view));
   }
   return views;
