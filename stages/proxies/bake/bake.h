@@ -17,10 +17,16 @@ struct SmoothMesh {
   std::uint32_t add_copy(std::uint32_t vertex);
 };
 
+/// Which creases of S_0 have normals of their own on each side. With a normal map only those at which charts
+/// end: the map shows the others, and their vertices would take bytes (a helmet of 150 kB: FLIP .057 for
+/// .059).
+enum class CreaseUse : std::uint8_t { kAll, kWhereChartsEnd };
+
 /// Normals are means of what S_0 shows, normal maps included, on the triangles around, each sample by its
 /// corner's share. Triangles between which S_0 turns at once by 20 degrees or more have normals of their own.
 /// Across charts, vertices of one position and group share them. Same bits for any thread count.
-SmoothMesh sampled_normals(const AtlasMesh& mesh, const BakeSource& source, const RunContext& context);
+SmoothMesh sampled_normals(const AtlasMesh& mesh, const BakeSource& source, CreaseUse use,
+                           const RunContext& context);
 
 /// Texels of an atlas, row by row from the top; all lists are width_px * height_px long and hold a
 /// continuation of the charts everywhere. Linear.

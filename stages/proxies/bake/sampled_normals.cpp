@@ -76,40 +76,52 @@ std::vector<std::uint32_t> shared_normals(const AtlasMesh& mesh) {
 /// the edge they differ by .55 to .6 of what the triangles do, at a hard edge by all of it.
 class Creases {
  public:
-  Creases(const AtlasMesh& mesh, const std::vector<CornerSums>& sums) : mesh_(mesh), sums_(sums) {}
+  Creases(const AtlasMesh& mesh, const std::vector<CornerSums>& sums, CreaseUse use)
+      : mesh_(mesh), sums_(sums), use_(use) {
+    for (const Triangle& t : mesh.triangles) mean_size_ += length(face_vector(mesh, t));
+    mean_size_ /= static_cast<double>(std::max<std::size_t>(mesh.triangles.size(), 1));
+  }
   bool between(std::uint32_t half_edge, std::uint32_t opposite) const {
-    constexpr double kLeastTurn = 0.35;  // chord of 20 degrees
-    constexpr double kLeastShare = 0.78;
-    const double turn = length(unit_face(half_edge) - unit_face(opposite));
-    if (turn < kLeastTurn) return false;
+    constexpr double kLeastTurn = 0.35, kLargeTurn = 0.85;  // chords of 20 and 50 degrees
+    constexpr double kLeastShare = 0.7;
+    // Of both triangles together, in means of all: a crease between small ones is hardly seen, and its
+    // vertices take bytes.
+    constexpr double kLeastSizes = 1.3;
     const Vec3d one = normalized(near(half_edge)), other = normalized(near(opposite));
     if (!(dot(one, one) > 0.5 && dot(other, other) > 0.5)) return false;
-    const double near_turn = length(one - other);
-    return near_turn >= kLeastTurn && near_turn >= kLeastShare * turn;
+    const double turn = length(one - other);
+    if (use_ == CreaseUse::kWhereChartsEnd)
+      return turn > kLargeTurn && mesh_.chart_of[half_edge / 3] != mesh_.chart_of[opposite / 3];
+    if (size(half_edge) + size(opposite) < kLeastSizes * mean_size_) return false;
+    const double faces_turn = length(unit_face(half_edge) - unit_face(opposite));
+    return std::min(turn, faces_turn) >= kLeastTurn && turn >= kLeastShare * faces_turn;
   }
 
  private:
   Vec3d unit_face(std::uint32_t corner) const {
     return normalized(face_vector(mesh_, mesh_.triangles[corner / 3]));
   }
+  double size(std::uint32_t corner) const { return length(face_vector(mesh_, mesh_.triangles[corner / 3])); }
   Vec3d near(std::uint32_t half_edge) const {
     const CornerSums& sums = sums_[half_edge / 3];
     return sums[half_edge % 3] + sums[next_corner(half_edge) % 3];
   }
   const AtlasMesh& mesh_;
   const std::vector<CornerSums>& sums_;
+  CreaseUse use_;
+  double mean_size_ = 0;
 };
 
 /// Per corner 3 t + k: the set of corners that have its normal. They lie around one position, and no crease
 /// is between them.
 DisjointSets smooth_corners(const AtlasMesh& mesh, const std::vector<std::uint32_t>& shared,
-                            std::size_t shared_count, const std::vector<CornerSums>& sums) {
+                            std::size_t shared_count, const std::vector<CornerSums>& sums, CreaseUse use) {
   constexpr std::size_t kMostSheets = 64;  // at one edge: their pairs take time that grows with the square
   std::vector<std::uint32_t> corners;
   for (const Triangle& t : mesh.triangles)
     for (const std::uint32_t v : t) corners.push_back(shared[v]);
   DisjointSets sets(corners.size());
-  const Creases creases(mesh, sums);
+  const Creases creases(mesh, sums, use);
   const EdgeTable edges = group_edges(corners, shared_count);
   for (std::size_t e = 0; e < edges.edge_count(); ++e) {
     const std::span<const std::uint32_t> sheets = edges.edge(e);
@@ -139,7 +151,8 @@ std::uint32_t SmoothMesh::add_copy(std::uint32_t vertex) {
   return static_cast<std::uint32_t>(normals.size() - 1);
 }
 
-SmoothMesh sampled_normals(const AtlasMesh& mesh, const BakeSource& source, const RunContext& context) {
+SmoothMesh sampled_normals(const AtlasMesh& mesh, const BakeSource& source, CreaseUse use,
+                           const RunContext& context) {
   const std::vector<std::uint32_t> shared = shared_normals(mesh);
   std::vector<Vec3d> face_sum(shared.size());
   for (const Triangle& t : mesh.triangles)
@@ -152,7 +165,7 @@ SmoothMesh sampled_normals(const AtlasMesh& mesh, const BakeSource& source, cons
   parallel_for(context, sums.size(), 64, [&](std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t) sums[t] = sums_of(mesh, t, smooth, places, source);
   });
-  DisjointSets sets = smooth_corners(mesh, shared, shared.size(), sums);
+  DisjointSets sets = smooth_corners(mesh, shared, shared.size(), sums, use);
   std::vector<Vec3d> total(3 * sums.size());  // per set, at its name
   for (std::uint32_t c = 0; c < total.size(); ++c) {
     Vec3d& sum = total[sets.find(c)];

@@ -20,7 +20,7 @@ constexpr int kFewBitsFrom = 80, kManyBitsTo = 25;  // qualities
 constexpr double kFewBits = 0.7, kManyBits = 1.5;
 constexpr double kMeshoptBytes = 9.5, kDracoBytes = 3.2;  // of a triangle, until one mesh is coded
 constexpr int kAttempts = 3;
-constexpr double kLeastMiss = 0.7, kMostMiss = 1.1;  // of a mesh' bytes: textures take what is left
+constexpr double kLeastMiss = 0.7, kMostMiss = 1.2;  // of a mesh' bytes: textures take what is left
 constexpr double kWorthPacking = 1.15;               // a larger texture of the same mesh, side to side
 constexpr std::size_t kSamples = 250000;
 
@@ -32,6 +32,10 @@ std::optional<AtlasMesh> pack(const ChartedSurface& charted, std::uint32_t side_
     if (atlas) return atlas;
   }
   return std::nullopt;
+}
+
+CreaseUse creases_of(const ProxyForm& form) {
+  return form.maps.normal ? CreaseUse::kWhereChartsEnd : CreaseUse::kAll;
 }
 
 /// Flat triangles need no vertices on both sides of a crease.
@@ -126,7 +130,7 @@ std::optional<BakedProxy> ProxyWorkshop::coded(double mesh_bytes, std::uint32_t 
     out.emplace();
     out->charted = charted;
     out->atlas = std::move(*atlas);
-    out->smooth = sampled_normals(out->atlas, source_, context);
+    out->smooth = sampled_normals(out->atlas, source_, creases_of(form), context);
     const CodedMesh mesh = coded_mesh(*out, form);
     if (mesh.groups.empty()) return std::nullopt;
     const auto bytes = static_cast<double>(mesh.bytes());
@@ -147,7 +151,7 @@ std::optional<BakedProxy> ProxyWorkshop::bake(double target_bytes, const ProxyFo
   if (side_px >= kWorthPacking * out->atlas.width_px)
     if (auto larger = pack(*out->charted, side_px, context)) {
       out->atlas = std::move(*larger);
-      out->smooth = sampled_normals(out->atlas, source_, context);
+      out->smooth = sampled_normals(out->atlas, source_, creases_of(form), context);
     }
   const BakeOrder order{kSamples, form.maps.normal};
   out->maps = proxies::bake(out->smooth.mesh, out->smooth.normals, source_, order, context);

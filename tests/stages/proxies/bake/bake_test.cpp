@@ -26,7 +26,7 @@ struct Baked {
     context.threads = threads;
     const MaterialGroups groups = find_groups(mesh, shown.materials);
     const BakeSource source(mesh, shown, groups);
-    const SmoothMesh smooth = sampled_normals(atlas, source, context);
+    const SmoothMesh smooth = sampled_normals(atlas, source, CreaseUse::kAll, context);
     return bake(smooth.mesh, smooth.normals, source, {kManySamples}, context);
   }
 };
@@ -214,7 +214,8 @@ TEST(SampledNormals, ThoseOfASphereAreItsRadii) {
   source.shown.materials.push_back(RenderMaterial{});
   const MaterialGroups groups = find_groups(source.mesh, source.shown.materials);
   const AtlasMesh atlas = sphere_atlas(testing::even_sphere(3, 0), 64);
-  const auto [smooth, normals] = sampled_normals(atlas, BakeSource(source.mesh, source.shown, groups), {});
+  const auto [smooth, normals] =
+      sampled_normals(atlas, BakeSource(source.mesh, source.shown, groups), CreaseUse::kAll, {});
   EXPECT_EQ(smooth, atlas) << "a sphere has no creases";
   for (std::size_t v = 0; v < normals.size(); ++v)
     EXPECT_GT(dot(normals[v], normalized(atlas.positions[v])), 0.995f) << v;
@@ -223,6 +224,30 @@ TEST(SampledNormals, ThoseOfASphereAreItsRadii) {
       if (atlas.position_of[v] == atlas.position_of[w]) {
         EXPECT_EQ(normals[v], normals[w]);
       }
+}
+
+TEST(SampledNormals, HardEdgesHaveNormalsOfTheirOwnOnBothSides) {
+  Baked source{testing::cube(), {}};
+  source.shown.materials.push_back(RenderMaterial{});
+  const MaterialGroups groups = find_groups(source.mesh, source.shown.materials);
+  const BakeSource bake_source(source.mesh, source.shown, groups);
+  AtlasMesh atlas;  // one chart, whose vertices all sides share
+  atlas.positions = source.mesh.positions;
+  atlas.uvs.resize(atlas.positions.size());
+  for (std::uint32_t v = 0; v < atlas.positions.size(); ++v) atlas.position_of.push_back(v);
+  for (std::uint32_t t = 0; t < source.mesh.triangles.size(); ++t)
+    atlas.triangles.push_back(
+        {source.mesh.position_of(t, 0), source.mesh.position_of(t, 1), source.mesh.position_of(t, 2)});
+  atlas.chart_of.assign(atlas.triangles.size(), 0);
+  atlas.group_of.assign(atlas.triangles.size(), 0);
+  const auto [mesh, normals] = sampled_normals(atlas, bake_source, CreaseUse::kAll, {});
+  EXPECT_EQ(mesh.positions.size(), 3 * atlas.positions.size());
+  for (const Triangle& t : mesh.triangles) {
+    const Vec3f a = mesh.positions[t[0]],
+                face = normalized(cross(mesh.positions[t[1]] - a, mesh.positions[t[2]] - a));
+    for (const std::uint32_t v : t) EXPECT_GT(dot(normals[v], face), 0.999f);
+  }
+  EXPECT_EQ(sampled_normals(atlas, bake_source, CreaseUse::kWhereChartsEnd, {}).mesh, atlas);
 }
 
 }  // namespace
