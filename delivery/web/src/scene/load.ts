@@ -141,7 +141,8 @@ class ModelLoad {
   private async showInTime_(): Promise<void> {
     const { context } = this;
     await context.turn();
-    if (await this.proxies_.showServing()) {
+    // A turn without time leaves what stands: other models' turns would begin later.
+    if ((await this.proxies_.showServing()) || (this.scale_.held && context.limitS <= context.elapsedS())) {
       context.emit('deadline', { limit: context.limitS, actual: context.elapsedS(), skipped: 0 });
       return this.rest_();
     }
@@ -238,6 +239,7 @@ class ModelLoad {
     const { context } = this;
     try {
       if (!context.resting) await this.done;
+      if (!this.textures) await this.followByProxies_();
       if (!this.textures) {
         this.refineAgain_ = false;
         return this.rest_(); // a proxy is enough
