@@ -2,7 +2,8 @@
 // blocks are made.
 import {check, common, lab, labPage, labRoots, serve} from './browser.mjs';
 import {test} from './harness.mjs';
-import {comparePlane, kEverything, kTopQuality, loaded, sumStorage} from './loads.mjs';
+import {countStorage} from './gpu-storage.mjs';
+import {comparePlane, kEverything, kTopQuality, loaded} from './loads.mjs';
 
 /** Runs in the page before the library: a GPU that has no other compressed formats than these. */
 function onlyFormats(names) {
@@ -20,7 +21,7 @@ function onlyFormats(names) {
     };
   }
 }
-const before = (formats) => `(${sumStorage})();(${onlyFormats})(${JSON.stringify(formats)});`;
+const before = (formats) => `(${countStorage})();(${onlyFormats})(${JSON.stringify(formats)});`;
 
 /** Loads a package whose textures become blocks of these formats. */
 async function inBlocks(b, formats, name, load = {}, url = b.url) {

@@ -61,23 +61,3 @@ export async function throttled(options, body) {
     await server.close();
   }
 }
-
-/** Runs in the page before anything else: `storedBytes()` sums what WebGL was asked to store and not yet to delete. */
-export function sumStorage() {
-  window.stored = new Map();
-  // Bytes of a block of 4 x 4 texels: BC1 and ETC2 of three channels 8, other BC and ASTC 16; other formats are RGBA.
-  const blocks = {0x83f0: 8, 0x8c4c: 8, 0x9274: 8, 0x9275: 8, 0x83f3: 16, 0x8dbd: 16, 0x8e8c: 16, 0x8e8d: 16, 0x93b0: 16, 0x93d0: 16};
-  const ofLevel = (format, w, h) => (blocks[format] ? blocks[format] * Math.ceil(w / 4) * Math.ceil(h / 4) : 4 * w * h);
-  const sizeOf = (levels, format, w, h) => Array.from({length: levels}, (_, l) => ofLevel(format, Math.max(1, w >> l), Math.max(1, h >> l))).reduce((a, b) => a + b, 0);
-  const proto = WebGL2RenderingContext.prototype;
-  let bound;
-  const wrap = (name, note) => { const own = proto[name]; proto[name] = function (...a) { note(...a); return own.apply(this, a); }; };
-  wrap('bindTexture', (_, t) => { bound = t; });
-  wrap('texStorage2D', (_, levels, format, w, h) => window.stored.set(bound, sizeOf(levels, format, w, h)));
-  wrap('deleteTexture', (t) => window.stored.delete(t));
-  const buffers = new Map();
-  wrap('bindBuffer', (target, b) => buffers.set(target, b));
-  wrap('bufferData', (target, data) => window.stored.set(buffers.get(target), data.byteLength ?? data));
-  wrap('deleteBuffer', (b) => window.stored.delete(b));
-  window.storedBytes = () => [...window.stored.values()].reduce((a, b) => a + b, 0);
-}

@@ -1,20 +1,20 @@
 // Many packages on one page, and <texmesh-viewer>: one time limit, one link, one memory, whatever single ones do.
 import {PNG, check, common, env, fs, listen, packages, path, pictures, serve} from './browser.mjs';
 import {test} from './harness.mjs';
-import {sumStorage} from './loads.mjs';
 import {startLink} from './link.mjs';
+import {countStorage} from './gpu-storage.mjs';
 
 const kNames = ['maps', 'large', 'kept', 'progressive'];
 const kElement = {'/packages/': packages, '/viewer/': path.join(env.work, 'work/delivery/web/dist/viewer')};
 /** A page with `elements`, by one script tag. */
-const html = (elements, style = '') => `<!doctype html><html lang="en"><title>page</title><link rel="icon" href="data:,">
+export const html = (elements, style = '') => `<!doctype html><html lang="en"><title>page</title><link rel="icon" href="data:,">
 <style>body{margin:0;font:14px sans-serif}.grid{display:grid;grid-template-columns:repeat(5,1fr);gap:4px}texmesh-viewer{width:100%;height:200px}${style}</style>
 <script type="module" src="/viewer/texmesh-viewer.js"></script><div class="grid">${elements}</div></html>`;
-const elements = (count, attributes = '') =>
-  Array.from({length: count}, (_, i) => `<texmesh-viewer src="/packages/${kNames[i % kNames.length]}.texmesh?${i}" alt="scan ${i}" ${attributes}></texmesh-viewer>`).join('');
+export const elements = (count, attributes = '', names = kNames) =>
+  Array.from({length: count}, (_, i) => `<texmesh-viewer src="/packages/${names[i % names.length]}.texmesh?${i}" alt="scan ${i}" ${attributes}></texmesh-viewer>`).join('');
 
 /** Serves the page and opens it in a context of its own; `body` gets the page and the server. */
-async function onPage(text, body, {link: linkOptions, context: contextOptions = {}, before, fault} = {}) {
+export async function onPage(text, body, {link: linkOptions, context: contextOptions = {}, before, fault} = {}) {
   const folder = fs.mkdtempSync(path.join(env.work, 'page-'));
   fs.writeFileSync(path.join(folder, 'index.html'), text);
   const b = await common();
@@ -37,12 +37,12 @@ async function onPage(text, body, {link: linkOptions, context: contextOptions = 
   }
 }
 const phases = (page) => page.evaluate(() => [...document.querySelectorAll('texmesh-viewer')].map((e) => e.model?.phase ?? 'none'));
-const settled = (page, count) => page.waitForFunction((n) => {
+export const settled = (page, count) => page.waitForFunction((n) => {
   const all = [...document.querySelectorAll('texmesh-viewer')].map((e) => e.model?.phase);
   return all.length === n && all.every((p) => p === 'shown' || p === 'failed');
 }, count, {timeout: 60000}).catch(async () => check(false, `it does not end: ${await phases(page)}: ${page.said.join('\n')}`));
 /** Share of an element's pixels that are not the background. */
-async function covered(page, index, name) {
+export async function covered(page, index, name) {
   const shot = await page.locator('texmesh-viewer').nth(index).screenshot({path: path.join(pictures, `${name}.png`)});
   const {data} = PNG.sync.read(shot);
   let n = 0;
@@ -97,7 +97,7 @@ test('a page keeps within its memory: what WebGL was asked to store is what is c
     await page.waitForTimeout(100);
     const left = await page.evaluate(() => window.storedBytes());
     check(left < 0.02 * stored + 70000, `${left} bytes are left of ${stored}`);
-  }, {before: sumStorage});
+  }, {before: countStorage});
 }, {seconds: 120});
 
 test('one package of twenty that cannot be had, an element of no height, one removed while it loads: the others go on', async () => {

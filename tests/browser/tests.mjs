@@ -15,6 +15,7 @@ import './doors-tests.mjs';
 import './experiment-tests.mjs';
 import './limits-tests.mjs';
 import './materials-tests.mjs';
+import './memory-tests.mjs';
 import './page-tests.mjs';
 import './proxy-tests.mjs';
 import './thesis-tests.mjs';

@@ -8,6 +8,7 @@ import { defaultMemoryBytes, linkBytesS, shareOf, turnS } from './page/schedule'
 import { Visibility } from './page/visibility';
 import type { GltfLoaderLike, Turn } from './scene/api';
 import { Emitter } from './scene/events';
+import { GpuRoom } from './scene/memory/gpu_room';
 import { SharedWorkers } from './worker/shared_workers';
 
 export type * from './page/page_model';
@@ -36,7 +37,7 @@ export interface PageEvents {
   'first-pictures': { at: number; seconds: number; models: number };
   /** Every model that is seen has had its turn: the limit and the actual time. */
   deadline: { at: number; limit: number; actual: number };
-  /** Models were released or loaded: bytes on the GPU. */
+  /** All have had their turn, or the GPU has shown that it holds less: bytes on the GPU, and the limit from now on. */
   memory: { at: number; gpuBytes: number; limitBytes: number };
 }
 
@@ -45,8 +46,8 @@ export interface PageEvents {
  * first, then what is close by; models far from the screen are released and keep their last picture.
  */
 export class TexmeshPage {
-  /** Most bytes on the GPU. */
-  readonly memoryBytes: number;
+  private readonly mostBytes_: number;
+  private readonly room_: GpuRoom;
   private readonly models_ = new Map<Element, PageModel>();
   private readonly painter_: Painter;
   private readonly workers_: SharedWorkers;
@@ -64,8 +65,9 @@ export class TexmeshPage {
   /** InputError of a load where an option has a value that it cannot have. */
   constructor(private readonly options_: PageOptions) {
     const { hardwareConcurrency: cores = 2 } = globalThis.navigator ?? {};
-    this.memoryBytes = options_.memoryBytes ?? deviceMemoryBytes();
+    this.mostBytes_ = options_.memoryBytes ?? deviceMemoryBytes();
     this.painter_ = new Painter(options_.renderer);
+    this.room_ = GpuRoom.of(this.renderer);
     this.workers_ = new SharedWorkers(options_.workers ?? Math.min(4, Math.max(2, cores - 1)), options_.workerUrl);
     this.visibility_ = new Visibility((canvas, resized) => this.placeChanged_(canvas, resized));
   }
@@ -75,6 +77,7 @@ export class TexmeshPage {
     this.models_.get(canvas)?.remove();
     const model = new PageModel(this.host_, canvas, url, options);
     this.models_.set(canvas, model);
+    model.on('memory', () => this.tellMemory_());
     this.visibility_.follow(canvas, model.place);
     this.advance_();
     return model;
@@ -86,6 +89,10 @@ export class TexmeshPage {
   /** All models, in the order in which they were added. */
   get models(): PageModel[] {
     return [...this.models_.values()];
+  }
+  /** Most bytes on the GPU: what the page was given, or less where the GPU has shown that it holds less. */
+  get memoryBytes(): number {
+    return Math.min(this.mostBytes_, this.room_.limitBytes);
   }
   /** Bytes on the GPU now. */
   get gpuBytes(): number {
@@ -159,7 +166,7 @@ export class TexmeshPage {
   private nextStep_(): ReturnType<typeof nextStep> {
     return nextStep({
       models: this.models, openAtOnce: this.options_.openAtOnce ?? 6, askedForTurn: new Set(this.turns_.keys()), refining: this.refining_,
-      isNear: ({ canvas }) => this.visibility_.isNear(canvas),
+      memoryShare: this.gpuBytes / this.memoryBytes, isNear: ({ canvas }) => this.visibility_.isNear(canvas),
     });
   }
   private take_(step: NonNullable<ReturnType<typeof nextStep>>): void {
@@ -209,6 +216,9 @@ export class TexmeshPage {
     if (said.deadline || waiting.length > 0) return;
     said.deadline = true;
     this.events_.emit('deadline', { limit: this.limitS_, actual: seconds });
+    this.tellMemory_();
+  }
+  private tellMemory_(): void {
     this.events_.emit('memory', { gpuBytes: this.gpuBytes, limitBytes: this.memoryBytes });
   }
 

@@ -55,6 +55,21 @@ describe('a page', () => {
       expect(small).toBeLessThanOrEqual(1e6);
       expect(page.gpuBytes).toBe(0);
     }));
+  it('keeps within its memory while the reader scrolls: what has just been seen makes room', () =>
+    withPage({ time: 0.3, memoryBytes: 2e6 }, async ({ page, canvas, scrolled }) => {
+      const { how } = options();
+      const canvases = Array.from({ length: 6 }, (_, i) => canvas(i * 0.6, 900));
+      const models = canvases.map((c, i) => page.add(c, hosts[i], how));
+      let most = 0;
+      for (let at = 0; at < 3; ++at) {
+        canvases.forEach((c, i) => ((c as unknown as FakeCanvas).top = (i - 2 * at) * 0.6));
+        scrolled();
+        expect(await until(() => [2 * at, 2 * at + 1].every((i) => models[i].phase === 'shown' && models[i].complete))).toBe(true);
+        most = Math.max(most, page.gpuBytes);
+      }
+      expect(most).toBeGreaterThan(1e5);
+      expect(most).toBeLessThanOrEqual(2e6);
+    }));
   it('fetches nothing for what is far from the screen, releases what has gone there, and shows it again', () =>
     withPage({ time: 1 }, async ({ page, canvas, scrolled }) => {
       const { how, server } = options();

@@ -13,13 +13,15 @@ canvas:active { cursor: grabbing; }
 .poster.gone { opacity: 0; }
 .bar { position: absolute; left: 0; top: 0; height: 3px; background: var(--texmesh-accent); transition: opacity .3s; }
 .bar[hidden] { display: block; opacity: 0; }
-.box { position: absolute; left: 50%; top: 50%; transform: translate(-50%, -50%); max-width: 90%; box-sizing: border-box; padding: .6em 1em; border: 0; border-radius: .5em;
+.box { position: absolute; left: 0; right: 0; margin: 0 auto; top: 50%; transform: translateY(-50%); width: fit-content; max-width: 94%; max-height: 100%; overflow: auto; box-sizing: border-box; padding: .6em 1em; border: 0; border-radius: .5em;
   font: inherit; text-align: center; color: var(--texmesh-text); background: var(--texmesh-panel); overflow-wrap: anywhere; }
 .box small { display: block; }
 .box[hidden] { display: none; }
 button { cursor: pointer; min-height: 44px; }
 .box button { font: inherit; color: var(--texmesh-accent); background: none; border: 1px solid; border-radius: .4em; margin-top: .5em; padding: 0 1em; }
 .rights { position: absolute; right: 0; bottom: 0; max-width: 100%; box-sizing: border-box; padding: .15em .5em; font-size: 12px; color: var(--texmesh-text); background: var(--texmesh-panel); }
+.note { position: absolute; left: 0; top: 3px; max-width: 100%; box-sizing: border-box; padding: .15em .5em; font-size: 12px; color: var(--texmesh-text); background: var(--texmesh-panel); }
+.note[hidden] { display: none; }
 .rights:empty { display: none; }
 .rights a { color: inherit; }
 .help { position: absolute; width: 1px; height: 1px; overflow: hidden; clip-path: inset(50%); }

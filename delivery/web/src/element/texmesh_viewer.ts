@@ -21,6 +21,7 @@ export interface ElementHost {
 /** Degrees per second. */
 const rotationDegreesS = 12;
 const bytesPerMegabit = 125e3;
+const noteMs = 8000;
 
 const template = `<style>${style}</style>
 <canvas part="canvas" tabindex="0" role="img" aria-describedby="help"></canvas>
@@ -28,6 +29,7 @@ const template = `<style>${style}</style>
 <div class="bar" part="progress" role="progressbar" aria-label="loading" aria-valuemin="0" aria-valuemax="100" hidden></div>
 <button class="box" part="reveal" hidden><span>Show in 3D</span><small></small></button>
 <div class="box" part="error" role="alert" hidden></div>
+<div class="note" part="note" role="status" hidden></div>
 <div class="rights" part="rights"></div>
 <p class="help" id="help">Drag or use the arrow keys to turn the object, plus and minus to come nearer or go away, Home to see the whole.</p>
 <slot></slot>`;
@@ -44,7 +46,7 @@ export class TexmeshViewer extends HTMLElement {
   static host: ElementHost;
   static readonly observedAttributes = ['src', 'alt', 'poster', 'camera-controls', 'camera-orbit', 'auto-rotate', 'reveal', 'bytes', 'touch-action'];
   private readonly root_ = this.attachShadow({ mode: 'open' });
-  private readonly parts_: Record<'canvas' | 'poster' | 'bar' | 'reveal' | 'error' | 'rights', HTMLElement>;
+  private readonly parts_: Record<'canvas' | 'poster' | 'bar' | 'reveal' | 'error' | 'note' | 'rights', HTMLElement>;
   private model_?: PageModel;
   private input_?: OrbitInput;
   private revealed_ = false;
@@ -54,7 +56,7 @@ export class TexmeshViewer extends HTMLElement {
     super();
     this.root_.innerHTML = template;
     const part = (selector: string): HTMLElement => this.root_.querySelector(selector)!;
-    this.parts_ = { canvas: part('canvas'), poster: part('.poster'), bar: part('.bar'), reveal: part('button.box'), error: part('div.box'), rights: part('.rights') };
+    this.parts_ = { canvas: part('canvas'), poster: part('.poster'), bar: part('.bar'), reveal: part('button.box'), error: part('div.box'), note: part('.note'), rights: part('.rights') };
     this.parts_.reveal.onclick = () => this.dismissPoster();
     const { canvas } = this.parts_;
     for (const name of ['pointerenter', 'focus']) canvas.addEventListener(name, () => this.model_ && TexmeshViewer.host.page().regard(this.model_));
@@ -138,9 +140,9 @@ export class TexmeshViewer extends HTMLElement {
     this.input_?.dispose();
     this.model_?.remove();
     this.input_ = this.model_ = undefined;
-    const { poster, bar, error, rights } = this.parts_;
+    const { poster, bar, error, note, rights } = this.parts_;
     poster.classList.remove('gone');
-    bar.hidden = error.hidden = true;
+    bar.hidden = error.hidden = note.hidden = true;
     rights.replaceChildren();
   }
 
@@ -168,6 +170,8 @@ export class TexmeshViewer extends HTMLElement {
       void this.showRights_(model.package);
       tell('load', { url: model.url });
     });
+    model.on('context', ({ lost }) => this.note_(lost ? 'The graphics memory was taken away; waiting for it.' : ''));
+    model.on('memory', () => this.note_('There is little graphics memory: a coarser picture is shown.', noteMs));
     model.on('error', ({ fatal, message }) => {
       tell('error', { type: 'loadfailure', fatal, message });
       if (fatal) this.fail_(message, true);
@@ -182,6 +186,13 @@ export class TexmeshViewer extends HTMLElement {
     };
     error.replaceChildren(message, document.createElement('br'), button);
     error.hidden = false;
+  }
+  /** A short line for a while, or until the next one. */
+  private note_(text: string, ms = Infinity): void {
+    const { note } = this.parts_;
+    note.textContent = text;
+    note.hidden = text === '';
+    if (ms < Infinity) setTimeout(() => note.textContent === text && (note.hidden = true), ms);
   }
   private async showRights_(pkg?: ShowablePackage): Promise<void> {
     const about = await pkg?.about().catch(() => undefined);

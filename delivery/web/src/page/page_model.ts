@@ -27,6 +27,10 @@ export interface PageModelEvents {
   progress: LoadEvents['progress'];
   /** The model's turn is over: what the time allowed is there. */
   loaded: { at: number };
+  /** The graphics context of the page was lost, or is there again; the canvas keeps its picture. */
+  context: LoadEvents['context'];
+  /** The GPU holds less than it was thought to: a coarser picture is shown. */
+  memory: LoadEvents['memory'];
   /** Something went wrong; fatal: nothing more comes of this model until retry(). */
   error: { at: number; fatal: boolean; message: string; error: unknown };
 }
@@ -204,6 +208,16 @@ export class PageModel {
     this.complete = false;
     const redraw = (): void => host.redraw(this);
     for (const name of ['proxy', 'scale', 'plane', 'fragment', 'context'] as const) load.on(name, redraw);
+    load.on('context', (event) => {
+      this.complete = false; // refining waits for what the load makes anew
+      this.events_.emit('context', event);
+      host.changed(this);
+    });
+    load.on('memory', (event) => {
+      this.complete = false; // the coarser planes have a first rung of all fragments, not yet what the display can show
+      this.events_.emit('memory', event);
+      host.changed(this);
+    });
     load.on('progress', (event) => this.events_.emit('progress', event));
     load.on('error', ({ fatal, error }) => !fatal && this.say_(error, false)); // a fatal one ends `done`, too
     load.done.then(

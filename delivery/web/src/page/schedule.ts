@@ -27,9 +27,9 @@ export function shareOf(area: number, areas: readonly number[]): number {
 
 /** A turn is no shorter than this, seconds: requests take as long. */
 const leastTurnS = 0.1;
-/** Seconds of a model's turn while `leftS` are left for it and the others that wait. */
+/** Seconds of a model's turn while `leftS` are left for it and the others that wait; 0: none are left, and what stands stays. */
 export function turnS(leftS: number, area: number, areas: readonly number[]): number {
-  return leftS === Infinity ? Infinity : Math.max(leastTurnS, leftS * shareOf(area, areas));
+  return leftS === Infinity || leftS <= 0 ? Math.max(0, leftS) : Math.max(leastTurnS, leftS * shareOf(area, areas));
 }
 
 /** Earlier transfers say nothing of the link now, seconds. */

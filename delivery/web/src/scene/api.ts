@@ -33,7 +33,7 @@ export interface GltfLoaderLike {
 
 /** A model's turn at the link. */
 export interface Turn {
-  /** From now on; Infinity: no limit. */
+  /** From now on; Infinity: no limit. 0: a proxy that is shown stays until refine() or another view asks for more. */
   seconds: number;
   /** What the link is expected to carry, bytes per second; left out: what the model's own transfers have shown. */
   bytesS?: number;
@@ -98,7 +98,7 @@ export interface LoadOptions {
   turn?: () => Promise<Turn>;
   /**
    * Bytes that textures and meshes may take on the GPU: textures get coarser mips, meshes coarser scales, until all fits or nothing is
-   * coarser. Left out: no limit.
+   * coarser. Left out: no limit but the one that the GPU shows by losing its context, or by refusing storage.
    */
   memoryBytes?: number | (() => number);
   /**
@@ -172,6 +172,8 @@ export interface LoadEvents {
    * again; event `done` tells when all have come.
    */
   context: { at: number; lost: boolean };
+  /** The GPU holds less than it was thought to: a coarser picture is shown from now on, within this limit. */
+  memory: { at: number; gpuBytes: number; limitBytes: number };
   /** Something went wrong; fatal: the load has ended. */
   error: { at: number; fatal: boolean; message: string; what: string; error: unknown };
   /** Nothing is left to fetch for what the display can show now. */

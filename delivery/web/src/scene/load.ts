@@ -7,6 +7,7 @@ import type { LoadOptions, LoadState, LoadedModel } from './api';
 import { LoadContext } from './load_context';
 import { gpuBytes } from './memory/gpu_bytes';
 import { ProxyChoice } from './proxy/proxy_choice';
+import { disposeGeometries, texturesOf } from './scale_parts';
 import { ScaleSource } from './scale_source';
 import { ShownScale } from './shown_scale';
 import type { TextureLoad } from './texture_load';
@@ -53,9 +54,10 @@ class ModelLoad {
   private coming_?: Promise<TextureLoad>;
   private refining_?: Promise<void>;
   private refineAgain_ = false;
-  private restoring_?: Promise<void>;
+  private restoring_?: Promise<unknown>;
   private leaving_?: Promise<void>;
   private readonly endRequests_: () => void;
+  private readonly leaveRoom_: () => void;
 
   constructor(
     readonly context: LoadContext,
@@ -77,8 +79,10 @@ class ModelLoad {
     const whileThere = { signal: disposal };
     options.signal?.addEventListener('abort', () => this.cancel(), whileThere);
     if (options.signal?.aborted) this.cancel();
+    this.leaveRoom_ = context.room.add({ gpuBytes: () => this.state.gpuBytes, refused: () => this.makeAnew_() });
+    for (const name of ['proxy', 'scale', 'plane'] as const) context.events.on(name, () => void context.room.ask());
     const { domElement } = options.renderer;
-    domElement?.addEventListener('webglcontextlost', () => context.emit('context', { lost: true }), whileThere);
+    domElement?.addEventListener('webglcontextlost', () => this.lose_(), whileThere);
     domElement?.addEventListener('webglcontextrestored', () => this.restore_(), whileThere);
     this.endRequests_ = reader.onRequest((record) => {
       context.emit('request', record);
@@ -137,7 +141,8 @@ class ModelLoad {
   private async showInTime_(): Promise<void> {
     const { context } = this;
     await context.turn();
-    if (await this.proxies_.showServing()) {
+    // A turn without time leaves what stands: other models' turns would begin later.
+    if ((await this.proxies_.showServing()) || (this.scale_.held && context.limitS <= context.elapsedS())) {
       context.emit('deadline', { limit: context.limitS, actual: context.elapsedS(), skipped: 0 });
       return this.rest_();
     }
@@ -182,6 +187,7 @@ class ModelLoad {
     this.cancel();
     context.dispose();
     this.endRequests_();
+    this.leaveRoom_();
     this.forget_();
     context.object.removeFromParent().clear();
     this.scale_.proxy.dispose();
@@ -233,6 +239,7 @@ class ModelLoad {
     const { context } = this;
     try {
       if (!context.resting) await this.done;
+      if (!this.textures) await this.followByProxies_();
       if (!this.textures) {
         this.refineAgain_ = false;
         return this.rest_(); // a proxy is enough
@@ -258,12 +265,29 @@ class ModelLoad {
       this.context.fail(error, 'refining');
     }
   }
+  /** What three.js keeps of a lost context is dropped while nothing of it can be deleted: a later context would not know it. */
+  private lose_(): void {
+    this.scale_.objects().forEach(disposeGeometries);
+    for (const texture of this.textures?.planes().flatMap((p) => p.textures) ?? []) texture.dispose();
+    for (const material of this.materials) {
+      for (const [, texture] of texturesOf(material)) texture.dispose();
+      material.dispose();
+    }
+    this.context.emit('context', { lost: true });
+  }
   /** After a lost context: three.js makes its geometries and pictures anew, but composed textures are gone. */
   private restore_(): void {
+    this.context.emit('context', { lost: false });
+    this.makeAnew_();
+  }
+  /** Makes anew what the GPU has lost, or has refused, within the memory that there is now. */
+  private makeAnew_(): void {
     const { context } = this;
-    context.emit('context', { lost: false });
     if (context.signal.aborted) return;
-    this.restoring_ = this.textures?.restore().catch((error) => context.fail(error, 'textures after a lost context'));
+    this.restoring_ = this.textures?.restore().then(
+      (coarser) => coarser && context.emit('memory', { gpuBytes: this.state.gpuBytes, limitBytes: context.memoryBytes }),
+      (error) => context.fail(error, 'what the GPU has lost'),
+    );
     if (!context.resting) return;
     context.enter('refining');
     this.refineAgain_ ||= context.options.autoRefine ?? true;

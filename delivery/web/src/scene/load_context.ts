@@ -6,6 +6,7 @@ import type { WorkerPool } from '../worker/pool';
 import type { Display, LoadEvents, LoadOptions, LoadPhase } from './api';
 import { displayOf } from './camera';
 import { Emitter } from './events';
+import { GpuRoom } from './memory/gpu_room';
 import { MaterialSet } from './scale_parts';
 
 /** The displayed height must change by this factor before another scale or plane is wanted. */
@@ -27,6 +28,7 @@ export class LoadContext {
   /** The object in the scene. */
   readonly object = new Group();
   readonly events = new Emitter<LoadEvents>();
+  readonly room: GpuRoom;
   /** Seconds from the load's start to the end of its timed part. */
   limitS: number;
   phase: LoadPhase = 'first-picture';
@@ -48,6 +50,7 @@ export class LoadContext {
     private readonly startS_: number,
   ) {
     const { time = 5, camera } = options;
+    this.room = GpuRoom.of(options.renderer);
     this.object.name = reader.manifest.title || 'texmesh';
     this.limitS = time > longestS ? Infinity : time;
     this.override = this.snapped(options);
@@ -84,7 +87,7 @@ export class LoadContext {
   /** Bytes that the load may take on the GPU. */
   get memoryBytes(): number {
     const { memoryBytes = Infinity } = this.options;
-    return typeof memoryBytes === 'function' ? memoryBytes() : memoryBytes;
+    return Math.min(typeof memoryBytes === 'function' ? memoryBytes() : memoryBytes, this.room.limitBytes);
   }
 
   // ---- events

@@ -33,6 +33,7 @@ export interface ScaleSourceParts {
  */
 export class ScaleSource {
   private readonly shapes_ = new Map<number, Object3D>();
+  private readonly offGpu_ = new Set<Object3D>(); // scales that were there and are not drawn
   private readonly underWay_ = new Map<number, ScaleLoad>();
   private splits_?: SplitShapes;
   private streamUsable_ = false;
@@ -77,13 +78,22 @@ export class ScaleSource {
     load.shape.then(end, end);
     return load;
   }
-  /** A scale that is there. */
+  /** A scale that is there, to be shown. */
   shape(scale: number): Object3D | undefined {
-    return this.shapes_.get(scale);
+    const shape = this.shapes_.get(scale);
+    if (shape) this.offGpu_.delete(shape);
+    return shape;
   }
-  /** All scales that are there. */
+  /** All scales that are on the GPU, or may be. */
   all(): Object3D[] {
-    return [...new Set(this.shapes_.values())];
+    return [...new Set(this.shapes_.values())].filter((shape) => !this.offGpu_.has(shape));
+  }
+  /** Takes all scales off the GPU; those that are drawn get there again. */
+  leaveGpu(): void {
+    for (const shape of this.shapes_.values()) {
+      disposeGeometries(shape); // of a lost context they are gone already
+      if (!shape.parent) this.offGpu_.add(shape);
+    }
   }
   dispose(): void {
     this.shapes_.forEach(disposeGeometries);

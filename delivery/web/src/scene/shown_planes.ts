@@ -192,12 +192,10 @@ export class ShownPlanes {
     const most: [number, number] = [mostPreviewPx, mostPreviewPx];
     return (await pool.decode({ codec: 'jpeg', tables: new Uint8Array(0), streams, digests: [], complete: true, levels: 1, most }))[0] as ImageBitmap;
   }
-  /** The GPU has lost everything: the same planes begin with their previews. Gives the planes as they were. */
-  async showAnew(): Promise<PlaneComposer[]> {
-    const before = this.all();
+  /** The GPU has lost everything: these planes begin with their previews. */
+  async showAnew(choices: readonly PlaneChoice[]): Promise<void> {
     this.set_.dispose();
     this.set_ = this.newSet_();
-    await (await this.show(before, true)).shown;
-    return before;
+    await (await this.show(choices, true)).shown;
   }
 }

@@ -138,7 +138,10 @@ export class SplitShapes {
       const grown = new BufferAttribute(new Float32Array(components * Math.max(to, Math.min(2 * from, most))), components);
       if (attribute) grown.array.set(attribute.array.subarray(0, components * from));
       this.attributes_.set(name, (attribute = grown));
-      for (const { geometry } of this.meshes_.values()) geometry.setAttribute(name, grown);
+      for (const { geometry } of this.meshes_.values()) {
+        geometry.dispose(); // three.js frees the buffers of attributes that a geometry still has, no others
+        geometry.setAttribute(name, grown);
+      }
     } else attribute.addUpdateRange(components * from, components * (to - from));
     attribute.array.set(values, components * from);
     attribute.needsUpdate = true;

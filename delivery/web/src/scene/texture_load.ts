@@ -197,20 +197,54 @@ export class TextureLoad {
     if (!again()) await this.fetching_.composed();
     this.releaseIfBetter_();
   }
-  /** After the GPU has lost everything: shows previews, then fetches the fragments that were there. */
-  async restore(): Promise<void> {
-    const before = await this.planes_.showAnew();
-    const had = before.flatMap(({ plane, rungs }) => [...rungs].map((rung, fragment) => ({ plane, fragment, rung, offer: 0 })));
-    await this.fetching_.fetch(had.filter((w) => w.rung >= 0));
-    await this.fetching_.composed();
+  /**
+   * After the GPU has lost everything, or has refused something: shows previews within the memory that there is now, then fetches the
+   * fragments that were there. True: the picture is coarser than before.
+   */
+  async restore(): Promise<boolean> {
+    const { planes_: planes, scale_: scale, fetching_: fetching } = this;
+    const before = planes.all();
+    const coarserScale = this.followMemory_();
+    const choices = planes.fitting(before, scale.wanted);
+    const had = new Map(before.map((p) => [p.base, p]));
+    const coarser = choices.filter(({ base, plane }) => had.get(base)!.plane !== plane);
+    await this.prepare_(coarser);
+    await planes.showAnew(choices);
+    const wishes = choices.flatMap(({ base, plane }) => {
+      const { plane: was, rungs } = had.get(base)!;
+      if (was === plane) return [...rungs].map((rung, fragment) => ({ plane, fragment, rung, offer: 0 }));
+      // Other fragments, and other rungs: each at the best quality of those that were there.
+      const { tables } = planes.data;
+      const { order, rungQuality } = tables[plane]!;
+      const quality = tables[was]!.rungQuality[Math.max(...rungs)];
+      if (!quality) return []; // nothing but the preview was there
+      const rung = rungQuality.filter((q) => q < quality).length;
+      return [...order].map((fragment) => ({ plane, fragment, rung: Math.min(rung, rungQuality.length - 1), offer: 0 }));
+    });
+    await fetching.fetch(wishes.filter((w) => w.rung >= 0));
+    await fetching.composed();
+    return (await coarserScale) || coarser.length > 0;
+  }
+  /** Shows a coarser scale where the memory has no room for the one that is wanted. False: there is room. */
+  private async followMemory_(): Promise<boolean> {
+    const { scale_: scale, source_: source, load_: { memoryBytes, override, reader: { manifest } } } = this;
+    const within = scaleWithin(manifest.scales, scale.wanted, memoryBytes);
+    source.leaveGpu();
+    if (scale.wanted < 0 || within === scale.wanted || override.scale !== undefined) return false;
+    await scale.follow(within);
+    source.leaveGpu();
+    return true;
   }
   private async showFinerPlanes_(): Promise<void> {
     const finer = this.planes_.finer(Math.max(this.scale_.shown, 0));
     if (finer.length === 0) return;
-    const asked = finer.map((c) => c.plane);
+    await this.prepare_(finer);
+    await (await this.planes_.show(finer)).shown;
+  }
+  private async prepare_(choices: readonly PlaneChoice[]): Promise<void> {
+    const asked = choices.map((c) => c.plane);
     await this.planes_.readTables(asked);
     await this.fetching_.transfers.prepare(asked, this.load_.signal);
-    await (await this.planes_.show(finer)).shown;
   }
   /** Fetches some fragments that are still wanted, `all` or those that the camera sees. False: nothing is left, or going on is of no use. */
   private async refineSome_(all = this.load_.override.rung !== undefined || this.fetching_.wholeRungs()): Promise<boolean> {

@@ -10,7 +10,7 @@ const model = (phase: PageModel['phase'], more: Partial<Fake> & { visible?: bool
 };
 const step = (models: Fake[], more: Partial<Situation> = {}): string => {
   const askedForTurn = new Set(models.filter((m) => m.phase === 'first-picture')) as unknown as Set<PageModel>;
-  const situation = { openAtOnce: 2, askedForTurn, isNear: (m: unknown) => !!(m as Fake).near, ...more };
+  const situation = { openAtOnce: 2, memoryShare: 0, askedForTurn, isNear: (m: unknown) => !!(m as Fake).near, ...more };
   const next = nextStep({ ...situation, models: models as unknown as PageModel[] });
   return next ? `${next.what} ${models.indexOf(next.model as unknown as Fake)}` : 'nothing';
 };
@@ -43,5 +43,12 @@ describe('a page', () => {
     expect(step([model('turn', { visible: false, near: false })])).toBe('release 0');
     expect(step([model('released', { visible: false, near: true })])).toBe('open 0');
     expect(step([model('released', { visible: false, near: false })])).toBe('nothing');
+  });
+  it('releases what nobody sees where the memory is full, the least of it first, and prepares nothing then', () => {
+    const near = (areaPx: number): Fake => model('shown', { visible: false, near: true, areaPx });
+    expect(step([near(100), near(50), model('shown')], { memoryShare: 1.1 })).toBe('release 1');
+    expect(step([model('shown', { complete: true })], { memoryShare: 1.1 })).toBe('nothing');
+    expect(step([model('shown', { complete: true }), model('released', { visible: false, near: true })], { memoryShare: 0.9 })).toBe('nothing');
+    expect(step([model('shown', { complete: true }), model('released', { visible: false, near: true })], { memoryShare: 0.7 })).toBe('open 1');
   });
 });

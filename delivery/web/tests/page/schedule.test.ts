@@ -15,7 +15,8 @@ it('time is shared by area, and what one leaves the others have', () => {
   expect(shareOf(0, [0, 0])).toBe(0.5);
   expect(turnS(4, 1, [1, 3])).toBe(1);
   expect(turnS(4, 3, [3])).toBe(4);
-  expect(turnS(-1, 3, [3])).toBe(0.1);
+  expect(turnS(0.2, 1, [1, 3])).toBe(0.1);
+  expect(turnS(-1, 3, [3])).toBe(0);
   expect(turnS(Infinity, 1, [1, 3])).toBe(Infinity);
 });
 it('the link is what came while something came, whatever came at once', () => {

@@ -2,6 +2,7 @@ import { type BufferGeometry, type EventDispatcher, type Material, type Mesh, Pe
 import { describe, expect, it } from 'vitest';
 import { InputError, PackageReader } from '../../src/reader';
 import { fakeServer } from '../support/fake_server';
+import { golden } from '../support/files';
 import { fakeGltf, loading, Loading, until } from '../support/loading';
 import { container, files, url } from '../support/scan';
 
@@ -223,5 +224,17 @@ it('a load that is disposed of frees textures, materials and geometries, and hea
   expect(l.count('request')).toBe(before);
   expect(l.pkg.client.listeners.size).toBe(0);
   expect(server.log.length).toBeGreaterThan(asked);
+  l.dispose();
+});
+
+it('a turn without time leaves the proxy, until somebody refines', async () => {
+  const server = fakeServer({ '/a/scan.texmesh': golden('v2.0-proxies') });
+  const l = await loading(url, server, { turn: () => Promise.resolve({ seconds: 0 }), autoRefine: false });
+  await l.model.done;
+  expect(l.model.state).toMatchObject({ proxy: 0, scale: -1, phase: 'done', planes: [] });
+  expect(l.pkg.requests.some((q) => q.kind === 'texture')).toBe(false);
+  await l.model.refine();
+  expect(l.model.state.scale).toBeGreaterThanOrEqual(0);
+  expect(l.model.state.planes.length).toBeGreaterThan(0);
   l.dispose();
 });

@@ -136,6 +136,7 @@ export class Listener {
       else this.forgetProblems();
       this.stage.draw();
     });
+    on('memory', () => this.addProblem(new Error('There is little graphics memory: a coarser picture is shown')));
     on('error', (e) => { if (!e.fatal) this.addProblem(e.error); }); // a fatal error rejects `done`
   }
 
