@@ -13,7 +13,7 @@ export async function loaded(browser, page_, url, options = {}) {
   return {page, id, ...await lab(page, (i) => window.lab.finished(i), id)};
 }
 
-/** Differences of a composed plane from the C++ reconstruction, over stored fragments. */
+/** Differences of a composed plane from the C++ reconstruction, over stored fragments; `degrees`: mean angle, where the colours are normals. */
 export async function comparePlane(page, id, base, name, quality) {
   const got = await lab(page, ([i, b]) => window.lab.plane(i, b), [id, base]);
   const file = path.join(env.work, `${name}-${got.plane}-${quality}.png`);
@@ -21,9 +21,15 @@ export async function comparePlane(page, id, base, name, quality) {
   const wanted = PNG.sync.read(fs.readFileSync(file));
   check(wanted.width === got.widthPx && wanted.height === got.heightPx, `plane ${got.plane} is ${got.widthPx} x ${got.heightPx}, not ${wanted.width} x ${wanted.height}`);
   const data = Buffer.from(got.base64, 'base64');
-  let [most, sum, n] = [0, 0, 0];
+  let [most, sum, n, angles, normals] = [0, 0, 0, 0, 0];
+  const normal = (of, i) => [0, 1, 2].map((c) => of[i + c] - 127.5);
   for (let i = 0; i < wanted.data.length; i += 4) {
     if (wanted.data[i + 3] === 0) continue; // not stored
+    const [a, z] = [normal(wanted.data, i), normal(data, i)];
+    if (a[2] > 12) { // make_scan's normals point into the surface, too, as none of a scan do
+      normals++;
+      angles += Math.acos(Math.min(1, (a[0] * z[0] + a[1] * z[1] + a[2] * z[2]) / (Math.hypot(...a) * Math.hypot(...z))));
+    }
     for (let c = 0; c < 3; c++) {
       const d = Math.abs(wanted.data[i + c] - data[i + c]);
       most = Math.max(most, d);
@@ -31,7 +37,7 @@ export async function comparePlane(page, id, base, name, quality) {
       n++;
     }
   }
-  return {most, mean: n ? sum / n : 0, n};
+  return {most, mean: n ? sum / n : 0, n, degrees: normals ? angles / normals * 180 / Math.PI : 0};
 }
 
 export const kTopQuality = 100;

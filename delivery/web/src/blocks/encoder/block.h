@@ -59,7 +59,7 @@ static inline void put(Bits* b, u64 value, int count) {
 static inline void store(u8* out, u64 word) { *(u64*)out = word; }
 static inline void store_big(u8* out, u64 word) { store(out, __builtin_bswap64(word)); }
 
-/** Each writes a block of 8 or 16 bytes. Two-channel blocks hold red and green. */
+/** Each writes a block of 8 or 16 bytes. Two-channel blocks hold red and green, of normals of length 1. */
 void encode_bc1(const Block* block, u8* out);
 void encode_bc3_normal(const Block* block, u8* out);  // red as alpha, green as green
 void encode_bc5(const Block* block, u8* out);

@@ -6,6 +6,19 @@
 static void (*const encoders[])(const Block*, u8*) = {encode_bc1,  encode_bc3_normal, encode_bc5,         encode_bc7,
                                                       encode_etc2, encode_astc,       encode_astc_normal};
 
+static const u8 is_normal[] = {0, 1, 1, 0, 0, 0, 1};
+
+/** Normals get length 1, so that two channels say the third: pictures of normals hold shorter ones wherever they were filtered or coded. */
+static void normalise(Block* block) {
+  EACH(row, 4) {
+    const f4 x = block->c[0][row] - 127.5f, y = block->c[1][row] - 127.5f, z = max4(block->c[2][row] - 127.5f, f4_of(0));
+    f4 square = x * x + y * y + z * z, scale;
+    EACH(i, 4) scale[i] = square[i] > 1 ? 127.5f / __builtin_sqrtf(square[i]) : 0;
+    block->c[0][row] = x * scale + 127.5f;
+    block->c[1][row] = y * scale + 127.5f;
+  }
+}
+
 static void load(const u8* pixels, int width, int height, int x, int y, Block* block) {
   EACH(row, 4) {
     const int from = y + row < height ? y + row : height - 1;
@@ -25,6 +38,7 @@ extern "C" __attribute__((export_name("encode"))) void encode(int format, int bl
     for (int x = 0; x < width; x += 4, out += block_bytes) {
       Block block;
       load(pixels, width, height, x, y, &block);
+      if (is_normal[format]) normalise(&block);
       encoders[format](&block, out);
     }
 }
