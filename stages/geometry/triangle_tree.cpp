@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::uint32_t kLeaf = 4;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kSlack = 1e-12;  // relative, for rounding
+constexpr double kOfRounding = 1e-12;  // relative, for rounding
 
 double box_distance2(const Box3d& box, Vec3d p) {
   double sum = 0;
@@ -34,7 +34,7 @@ bool meets_box(const Box3d& box, Vec3d origin, Vec3d direction, double limit) {
     from = std::max(from, a), to = std::min(to, b);
   }
   // Rounding may make a flat box a little too thin.
-  return from <= to * (1 + kSlack);
+  return from <= to * (1 + kOfRounding);
 }
 
 double leaving_hit(const std::array<Vec3d, 3>& c, Vec3d origin, Vec3d direction) {
@@ -207,8 +207,8 @@ struct TriangleTree::LineSearch {
       from = std::max(from, std::min(a, b)), to = std::min(to, std::max(a, b));
     }
     // Rounding may make a flat box a little too thin.
-    if (!(from <= to + kSlack * (std::fabs(from) + std::fabs(to)))) return kInfinity;
-    return std::max({from, -to, 0.0}) * (1 - kSlack);
+    if (!(from <= to + kOfRounding * (std::fabs(from) + std::fabs(to)))) return kInfinity;
+    return std::max({from, -to, 0.0}) * (1 - kOfRounding);
   }
   void try_triangle(const std::array<Vec3d, 3>& c, std::uint32_t triangle, const Facing& facing) {
     const Vec3d u = c[1] - c[0], v = c[2] - c[0], h = cross(direction, v);
