@@ -46,8 +46,8 @@ struct QualityOptions {
 ///   show that the renderer knows: base colour with alpha, metallic-roughness, normal, occlusion, emission;
 ///   all of them read with mips, whatever the sampler says, where scales are compared, and as the source's
 ///   samplers read where textures are.
-/// - Heights: largest_px, its half and so on down to kLeastSwitchPx; half octaves between for scales alone that
-///   pass the height below and fail the one above. The table's sizes are the largest, its half and its
+/// - Heights: largest_px, its half and so on down to kLeastSwitchPx; half octaves between for scales alone
+///   that pass the height below and fail the one above. The table's sizes are the largest, its half and its
 ///   quarter.
 /// - Switch sizes: a scale passes a height when in every view the mean of FLIP is at most flip_mean and its
 ///   95th percentile at most flip_p95. The switch size is the largest height such that the scale passes it
