@@ -47,8 +47,7 @@ struct QualityOptions {
 ///   all of them read with mips, whatever the sampler says, where scales are compared, and as the source's
 ///   samplers read where textures are.
 /// - Heights: largest_px, its half and so on down to kLeastSwitchPx; half octaves between for scales alone
-/// that
-///   pass the height below and fail the one above. The table's sizes are the largest, its half and its
+///   that pass the height below and fail the one above. The table's sizes are the largest, its half and its
 ///   quarter. A model of few texels and triangles is not rendered at all of them: down to a quarter of
 ///   largest_px the largest rendered height, which "largest size" means below, is the first at which texels
 ///   are not smaller than 0.7 pixels and triangles cover 16 pixels on average. Scales that pass there are

@@ -154,10 +154,12 @@ Scored reencoded(const ImportedModel& source, std::uint64_t mesh_bytes, std::uin
                  const Scorer& scorer) {
   const auto encoded = [&](int quality) {
     ImportedModel out = source;
-    for (Image& image : out.model.images)
-      image = probe_image(image.name,
-                          encode_image(decode_image(image), {FileImage::kJpeg, static_cast<double>(quality)}),
-                          {});
+    for (Image& image : out.model.images) {
+      const Pixels pixels = decode_image(image);
+      if (pixels.channels != 1 && pixels.channels != 3) continue;  // a JPEG has no alpha
+      image =
+          probe_image(image.name, encode_image(pixels, {FileImage::kJpeg, static_cast<double>(quality)}), {});
+    }
     return out;
   };
   const auto bytes_of = [&](const ImportedModel& m) {
@@ -241,9 +243,9 @@ void print_table(const Arguments& a, const Scorer& scorer, const RunContext& con
     std::cout << fmt::format("{:7}  {:>9}{:>10}  S_{:<4}{:.4f}{:5.1f}", kilobytes, e.within ? "" : "outside",
                              e.glb.size(), e.scale, ours, seconds);
     if (best.flip < 1) {
-      std::cout << fmt::format("   {:28}{:>9}  {:.4f}  {:.3f}", best.name, best.bytes, best.flip,
-                               ours / best.flip);
-      if (e.within) logs += std::log(ours / best.flip), ++rows;
+      std::cout << fmt::format("   {:28}{:>9}  {:.4f}", best.name, best.bytes, best.flip);
+      if (best.flip > 0) std::cout << fmt::format("  {:.3f}", ours / best.flip);
+      if (e.within && best.flip > 0) logs += std::log(ours / best.flip), ++rows;
     } else if (!peers.empty() || a.reencoded) {
       std::cout << "   none fits";
     }

@@ -2,7 +2,8 @@
 // angle of windows of 128 px spread over each image, coded as JPEGs in fragments' manner, for channels apart,
 // channels apart with a coarse z, YCbCr 4:4:4, YCbCr 4:2:0, and two ways that no package has, whose reader
 // rebuilds z: x and y in a file of three channels with an even z, which every decoder opens, and x and y in
-// two grey files. The last columns are bytes over those of channels apart and of the coarse z at equal angles.
+// two grey files. The last columns are bytes over those of channels apart and of the coarse z at equal
+// angles.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -133,7 +134,8 @@ Point measure(const Space& space, const std::vector<Pixels>& windows, int qualit
       const auto place = [&](std::size_t c) {
         return 2.0 * (space.two ? coded[c][w].data[i / 3] : coded[0][w].data[i + c]) / 255 - 1;
       };
-      out.angle += angle(is, space.rebuilds() ? rebuilt(place(0), place(1)) : vector_of(&coded[0][w].data[i]));
+      out.angle +=
+          angle(is, space.rebuilds() ? rebuilt(place(0), place(1)) : vector_of(&coded[0][w].data[i]));
     }
   out.angle /= texels;
   return out;

@@ -50,9 +50,10 @@ TEST(GroupCurve, BehindTheCoarsestSampleMipsGoTowardsThePreview) {
     t.groups[0].sizes[0].preview.flip = {preview};
     return GroupCurve(t, PlaneGroup::kColour, 64);
   };
-  // Samples end at level 2 with .125. The preview of a plane of growth and mip 3 is of level 3, where the line
-  // has .1875; that of mip 2 and growth 3 is of level 4.
-  EXPECT_EQ(at64(0.75f).halved({3, 3}, 3), 0.375 - 0.03125) << "the geometric mean, less what full size loses";
+  // Samples end at level 2 with .125. The preview of a plane of growth and mip 3 is of level 3, where the
+  // line has .1875; that of mip 2 and growth 3 is of level 4.
+  EXPECT_EQ(at64(0.75f).halved({3, 3}, 3), 0.375 - 0.03125)
+      << "the geometric mean, less what full size loses";
   EXPECT_EQ(at64(0.75f).halved({2, 2}, 3), 0.125 - 0.015625) << "samples are as they were";
   EXPECT_EQ(at64(0.125f).halved({3, 3}, 3), 0.1875 - 0.03125) << "not below the line";
   EXPECT_EQ(at64(1).halved({3, 3}, 2), (0.125 + 0.5) / 2 - 0.0625) << "half the way to level 4";
