@@ -7,6 +7,7 @@
 
 #include "format/base/errors.h"
 #include "format/base/json_fields.h"
+#include "format/base/text_bytes.h"
 #include "format/container/layout.h"
 
 namespace texmesh {
@@ -113,7 +114,7 @@ std::string write_about(const About& about) {
   } catch (const Json::parse_error&) {
     throw FormatError(kAboutFile, "/source", "JSON", "something else");
   }
-  read_about(std::span(reinterpret_cast<const std::uint8_t*>(json.data()), json.size()));
+  read_about(text_bytes(json));
   return json;
 }
 

@@ -8,6 +8,7 @@
 #include "format/base/errors.h"
 #include "format/base/json_fields.h"
 #include "format/base/rule_error.h"
+#include "format/base/text_bytes.h"
 #include "format/container/container.h"
 #include "format/container/format_version.h"
 #include "format/container/layout.h"
@@ -329,7 +330,7 @@ std::string write_manifest(const Manifest& manifest) {
   if (json.size() > room)
     throw RuleError("K12", kManifestFile, "", "at most " + std::to_string(room) + " bytes",
                     std::to_string(json.size()) + " bytes");
-  read_manifest(std::span(reinterpret_cast<const std::uint8_t*>(json.data()), json.size()));
+  read_manifest(text_bytes(json));
   return json;
 }
 

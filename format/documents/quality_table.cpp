@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "format/base/json_fields.h"
+#include "format/base/text_bytes.h"
 #include "format/container/layout.h"
 
 namespace texmesh {
@@ -107,7 +108,7 @@ std::string write_quality(const QualityTable& table) {
   j["groups"] = Json::array();
   for (const GroupLosses& group : table.groups) j["groups"].push_back(group_json(group));
   std::string json = dump_json(j, kQualityFile);
-  read_quality(std::span(reinterpret_cast<const std::uint8_t*>(json.data()), json.size()));
+  read_quality(text_bytes(json));
   return json;
 }
 

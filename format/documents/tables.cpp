@@ -4,9 +4,8 @@
 #include <cmath>
 
 #include "format/base/bytes.h"
-#include "format/base/half.h"
+#include "format/base/number16.h"
 #include "format/base/rule_error.h"
-#include "format/base/unit16.h"
 #include "format/container/format_version.h"
 #include "format/container/layout.h"
 #include "format/documents/check_tables.h"

@@ -7,6 +7,7 @@
 #include "format/base/errors.h"
 #include "format/base/json_fields.h"
 #include "format/base/rule_error.h"
+#include "format/base/text_bytes.h"
 #include "format/container/layout.h"
 
 namespace texmesh {
@@ -158,7 +159,7 @@ std::string write_textures(const std::vector<TextureInfo>& textures) {
   j["textures"] = Json::array();
   for (const TextureInfo& t : textures) j["textures"].push_back(texture_json(t));
   std::string json = dump_json(j, kTexturesFile);
-  read_textures(std::span(reinterpret_cast<const std::uint8_t*>(json.data()), json.size()));
+  read_textures(text_bytes(json));
   return json;
 }
 

@@ -6,8 +6,8 @@
 #include <tuple>
 
 #include "format/base/bytes.h"
+#include "format/base/number16.h"
 #include "format/base/rule_error.h"
-#include "format/base/unit16.h"
 #include "format/container/format_version.h"
 #include "format/container/layout.h"
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "format/base/half.h"
+#include "format/base/number16.h"
 #include "format/documents/tables.h"
 #include "format/rules/allocation.h"
 

@@ -7,6 +7,7 @@
 
 #include "format/base/bounded_json.h"
 #include "format/base/errors.h"
+#include "format/base/text_bytes.h"
 #include "format/documents/about.h"
 #include "pipeline/about/licence.h"
 #include "pipeline/about/source_fields.h"
@@ -15,10 +16,6 @@ namespace texmesh {
 namespace {
 
 using Ordered = nlohmann::ordered_json;
-
-std::span<const std::uint8_t> bytes_of(const std::string& text) {
-  return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
-}
 
 class MetaReader {
  public:
@@ -35,7 +32,7 @@ class MetaReader {
     check_licence(json);
     check_epsg(json);
     const std::string text = json.dump(-1, ' ', false, Ordered::error_handler_t::replace);
-    return json.empty() ? "" : write_about(read_about(bytes_of(text)));
+    return json.empty() ? "" : write_about(read_about(text_bytes(text)));
   }
 
   [[noreturn]] void fail(const std::string& at, const std::string& expected, const std::string& found) const {
@@ -107,7 +104,7 @@ std::string read_meta(const std::string& json, const std::string& file, const st
     throw InputError(file, place, "at most " + std::to_string(kMaxAboutBytes) + " bytes",
                      std::to_string(json.size()) + " bytes");
   try {
-    return MetaReader(file, place).read(parse_bounded_json(bytes_of(json), file));
+    return MetaReader(file, place).read(parse_bounded_json(text_bytes(json), file));
   } catch (const FormatError& e) {
     const bool is_pointer = e.place().starts_with("/");  // otherwise a byte of the file
     throw InputError(file, is_pointer ? place + (e.place() == "/" ? "" : e.place()) : e.place(), e.expected(),
@@ -118,7 +115,7 @@ std::string read_meta(const std::string& json, const std::string& file, const st
 std::string merge_meta(const std::string& under, const std::string& over) {
   const auto about_of = [](const std::string& meta) {
     const std::string canonical = meta.empty() ? "" : read_meta(meta, "package.meta");
-    return canonical.empty() ? About() : read_about(bytes_of(canonical));
+    return canonical.empty() ? About() : read_about(text_bytes(canonical));
   };
   const About merged = merge_about(about_of(under), about_of(over));
   return merged == About() ? "" : write_about(merged);
@@ -126,7 +123,7 @@ std::string merge_meta(const std::string& under, const std::string& over) {
 
 std::string up_axis_of_meta(const std::string& meta) {
   const std::string canonical = meta.empty() ? "" : read_meta(meta, "package.meta");
-  return canonical.empty() ? "" : read_about(bytes_of(canonical)).up_axis;
+  return canonical.empty() ? "" : read_about(text_bytes(canonical)).up_axis;
 }
 
 }  // namespace texmesh

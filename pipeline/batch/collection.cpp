@@ -11,6 +11,7 @@
 
 #include "format/base/bounded_json.h"
 #include "format/base/errors.h"
+#include "format/base/text_bytes.h"
 #include "pipeline/about/meta.h"
 #include "pipeline/compile/options.h"
 #include "pipeline/compile/profile.h"
@@ -205,7 +206,7 @@ std::vector<CollectionModel> read_collection(const std::string& json, const std:
   if (json.size() > kMaxFileBytes)
     throw InputError(file_name, "", "at most 256 MiB", std::to_string(json.size()) + " bytes");
   try {
-    const std::span bytes(reinterpret_cast<const std::uint8_t*>(json.data()), json.size());
+    const auto bytes = text_bytes(json);
     return CollectionReader(file_name, base, list_folder).read(parse_bounded_json(bytes, file_name, 16));
   } catch (const FormatError& e) {
     throw InputError(file_name, e.place(), e.expected(), e.found());

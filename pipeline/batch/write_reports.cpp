@@ -8,6 +8,7 @@
 #include <iostream>
 
 #include "format/base/errors.h"
+#include "format/base/text_bytes.h"
 #include "pipeline/batch/depfile.h"
 #include "pipeline/batch/fleet/run_summary.h"
 #include "pipeline/batch/reports.h"
@@ -18,15 +19,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::span<const std::uint8_t> bytes_of(const std::string& s) {
-  return {reinterpret_cast<const std::uint8_t*>(s.data()), s.size()};
-}
-
 void write_text(const std::string& path, const std::string& text) {
   if (path.empty()) return;
-  if (is_special_file(path)) return write_output_file(path, bytes_of(text));
+  if (is_special_file(path)) return write_output_file(path, text_bytes(text));
   remove_stale_temporaries(fs::path(path).parent_path().string(), fs::path(path).filename().string());
-  if (!file_holds(path, bytes_of(text))) write_output_file(path, bytes_of(text));
+  if (!file_holds(path, text_bytes(text))) write_output_file(path, text_bytes(text));
 }
 
 std::vector<std::string> dependencies(const BatchPlan& plan, const RunSettings& settings,

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "format/base/errors.h"
+#include "format/base/text_bytes.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/descriptor.h"
 
@@ -23,10 +24,6 @@ using Json = nlohmann::ordered_json;
 
 constexpr int kRecordVersion = 2;
 constexpr std::size_t kSealBytes = 66;  // newline, 64 digits, newline
-
-std::span<const std::uint8_t> as_bytes(const std::string& s) {
-  return {reinterpret_cast<const std::uint8_t*>(s.data()), s.size()};
-}
 
 bool write_all(int fd, std::span<const std::uint8_t> bytes) {
   while (!bytes.empty()) {
@@ -145,7 +142,7 @@ QuarantineResult move_to_quarantine(const std::string& folder, const std::string
                                                     : QuarantineResult{Fate::kFailed, ec.message()};
 }
 
-std::string seal(const std::string& body) { return body + "\n" + to_hex(sha256(as_bytes(body))) + "\n"; }
+std::string seal(const std::string& body) { return body + "\n" + to_hex(sha256(text_bytes(body))) + "\n"; }
 
 std::optional<std::string> unseal(std::span<const std::uint8_t> bytes) {
   if (bytes.size() < kSealBytes) return std::nullopt;

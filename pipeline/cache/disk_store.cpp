@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "format/base/errors.h"
+#include "format/base/text_bytes.h"
 #include "pipeline/cache/cache_files.h"
 #include "pipeline/cache/prune.h"
 #include "pipeline/io/atomic_file.h"
@@ -108,7 +109,7 @@ class DiskStore : public Store {
       record.outputs.push_back(blob);
     }
     const std::string text = write_record(record);
-    return publish_object(place("ac", key.digest()), bytes_of(text)) || not_written();
+    return publish_object(place("ac", key.digest()), text_bytes(text)) || not_written();
   }
 
   std::optional<std::string> preimage(const Sha256& key) override {
@@ -141,11 +142,11 @@ class DiskStore : public Store {
   bool put_note(const Sha256& key, const std::string& text) override {
     if (!writes_) return false;
     const std::string path = place("notes", key), sealed = seal(text);
-    if (file_holds(path, bytes_of(sealed))) return true;
+    if (file_holds(path, text_bytes(sealed))) return true;
     std::error_code ec;
     fs::create_directories(fs::path(path).parent_path(), ec);
     try {
-      write_file_atomically(path, bytes_of(sealed));
+      write_file_atomically(path, text_bytes(sealed));
       return true;
     } catch (const InputError&) {
       return not_written();
@@ -175,10 +176,6 @@ class DiskStore : public Store {
   /// Nobody prunes while it is held.
   FileLock pass_gate() const {
     return writes_ ? FileLock::wait(folder_ + "/gate", FileLock::Mode::kShared) : FileLock();
-  }
-
-  static std::span<const std::uint8_t> bytes_of(const std::string& s) {
-    return {reinterpret_cast<const std::uint8_t*>(s.data()), s.size()};
   }
 
   std::string place(const char* kind, const Sha256& digest) const {

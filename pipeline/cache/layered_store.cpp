@@ -1,6 +1,7 @@
 #include <filesystem>
 #include <set>
 
+#include "format/base/text_bytes.h"
 #include "pipeline/cache/cache_files.h"
 #include "pipeline/cache/cache_layer.h"
 
@@ -23,10 +24,6 @@ class FolderLayer : public CacheLayer {
  private:
   std::string folder_;
 };
-
-std::span<const std::uint8_t> bytes_of(const std::string& s) {
-  return {reinterpret_cast<const std::uint8_t*>(s.data()), s.size()};
-}
 
 class LayeredStore : public Store {
  public:
@@ -72,7 +69,7 @@ class LayeredStore : public Store {
           if (was_damaged(layer, digest) || !layer.layer->has("cas", digest, outputs[i].second->size()))
             layer.layer->put("cas", digest, *outputs[i].second);
         }
-        layer.layer->put("ac", key.digest(), bytes_of(text));
+        layer.layer->put("ac", key.digest(), text_bytes(text));
       });
     return kept;
   }
@@ -103,7 +100,7 @@ class LayeredStore : public Store {
     const bool kept = local_->put_note(key, text);
     if (use_ == LayerUse::kUpload) {
       const std::string sealed = seal(text);
-      for (Layer& layer : layers_) give(layer, [&] { layer.layer->put("notes", key, bytes_of(sealed)); });
+      for (Layer& layer : layers_) give(layer, [&] { layer.layer->put("notes", key, text_bytes(sealed)); });
     }
     return kept;
   }

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "format/base/text_bytes.h"
 #include "format/container/format_version.h"
 #include "pipeline/compile/artefacts.h"
 #include "pipeline/compile/library_versions.h"
@@ -50,8 +51,7 @@ class ModelGraph {
       : stages_(std::move(stages)), graph_(stages_, store, context, observer) {
     graph_.give(kSource, source.source(), source.digest(), 0, source.parts());
     const std::string json = provenance(source, options);
-    graph_.give(kProvenance, json, sha256({reinterpret_cast<const std::uint8_t*>(json.data()), json.size()}),
-                json.size());
+    graph_.give(kProvenance, json, sha256(text_bytes(json)), json.size());
   }
   GraphRun& operator*() { return graph_; }
   GraphRun* operator->() { return &graph_; }

@@ -6,6 +6,7 @@
 
 #include "format/base/bounded_json.h"
 #include "format/base/errors.h"
+#include "format/base/text_bytes.h"
 #include "pipeline/compile/option_json.h"
 #include "pipeline/compile/options.h"
 
@@ -19,8 +20,7 @@ Json parse_profile_text(const std::string& json, const std::string& file_name) {
   if (json.size() > 1 << 20)
     throw InputError(file_name, "", "at most 1 MiB", std::to_string(json.size()) + " bytes");
   try {
-    return parse_bounded_json({reinterpret_cast<const std::uint8_t*>(json.data()), json.size()}, file_name,
-                              16);
+    return parse_bounded_json(text_bytes(json), file_name, 16);
   } catch (const FormatError& e) {
     throw InputError(file_name, e.place(), e.expected(), e.found());
   }

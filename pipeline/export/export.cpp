@@ -6,6 +6,7 @@
 
 #include "delivery/cpp/decide/texture_loss.h"
 #include "format/base/errors.h"
+#include "format/base/text_bytes.h"
 #include "format/container/layout.h"
 #include "pipeline/export/oembed.h"
 #include "pipeline/export/page_files.h"
@@ -223,7 +224,7 @@ void write_export(const Export& made, const std::string& folder) {
   for (const ExportedFile& f : made.files) out.add(f.path, f.bytes);
   for (const ExportedCopy& c : made.copies) out.copy(c.path, c.source);
   const std::string list = export_json(made);
-  out.add(kListFile, {reinterpret_cast<const std::uint8_t*>(list.data()), list.size()});
+  out.add(kListFile, text_bytes(list));
   out.publish();
 }
 

@@ -8,6 +8,7 @@
 #include "delivery/cpp/package/package_reader.h"
 #include "format/base/errors.h"
 #include "format/base/sha256.h"
+#include "format/base/text_bytes.h"
 #include "format/container/layout.h"
 #include "pipeline/view/site.h"
 
@@ -71,9 +72,7 @@ std::string gallery_name(const std::string& path, std::vector<std::string>& take
   // A name that begins with a dot is hidden on servers.
   if (name.empty() || name.front() == '.' || std::ranges::find(taken, in_lower_case(name)) != taken.end()) {
     constexpr std::size_t kDigits = 10;
-    name =
-        "p" + name + "-" +
-        to_hex(sha256({reinterpret_cast<const std::uint8_t*>(path.data()), path.size()})).substr(0, kDigits);
+    name = "p" + name + "-" + to_hex(sha256(text_bytes(path))).substr(0, kDigits);
   }
   taken.push_back(in_lower_case(name));
   return name;

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "format/base/text_bytes.h"
 #include "pipeline/batch/progress.h"
 #include "pipeline/gallery/gallery.h"
 #include "pipeline/gallery/page_files.h"
@@ -24,10 +25,6 @@ constexpr std::size_t kAtOnce = 12;
 std::string_view gallery_file(std::string_view name) {
   const auto files = gallery_page_files();
   return std::ranges::find(files, name, &BuiltInFile::name)->text;
-}
-
-std::span<const std::uint8_t> bytes_of(std::string_view text) {
-  return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
 }
 
 std::string figures_of(const GalleryObject& o) {
@@ -129,17 +126,17 @@ FolderRule gallery_folder_rule() {
 
 void write_gallery(const Gallery& gallery, const std::string& folder) {
   NewFolder out(folder, gallery_folder_rule());
-  out.add("index.html", bytes_of(std::string(kGalleryFirstLine) + index_page(gallery)));
+  out.add("index.html", text_bytes(std::string(kGalleryFirstLine) + index_page(gallery)));
   for (const char* name : {"gallery.css", "gallery.js", "icon.svg"})
-    out.add(name, bytes_of(gallery_file(name)));
+    out.add(name, text_bytes(gallery_file(name)));
   for (const GalleryObject& o : gallery.objects) {
-    out.add("objects/" + o.name + ".html", bytes_of(object_page(o, gallery.options)));
+    out.add("objects/" + o.name + ".html", text_bytes(object_page(o, gallery.options)));
     if (!o.poster.empty()) out.add("posters/" + o.name + ".jpg", o.poster);
     if (gallery.options.packages_url.empty())
       out.copy(o.address.ends_with("/") ? o.address.substr(0, o.address.size() - 1) : o.address, o.source);
   }
   out.copy("viewer", gallery.options.viewer);
-  out.add("viewer/packages.json", bytes_of(viewer_list(gallery)));
+  out.add("viewer/packages.json", text_bytes(viewer_list(gallery)));
   out.publish();
 }
 

@@ -4,8 +4,8 @@
 #include <atomic>
 #include <string>
 
+#include "format/base/number16.h"
 #include "format/base/sha256.h"
-#include "format/base/unit16.h"
 #include "format/rules/allocation.h"
 #include "stages/base/parallel.h"
 #include "stages/image/check_pixels.h"

@@ -2,6 +2,7 @@
 #include <nlohmann/json.hpp>
 
 #include "format/base/bounded_json.h"
+#include "format/base/text_bytes.h"
 #include "pipeline/import/gltf/import_gltf_parts.h"
 #include "stages/gltf/glb_container.h"
 
@@ -24,8 +25,7 @@ std::string_view text_of(ByteSpan bytes) {
 }
 
 void check_shape(const Source& source, std::string_view text) {
-  const JsonShape shape =
-      scan_json_shape({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}, kMaxDepth);
+  const JsonShape shape = scan_json_shape(text_bytes(text), kMaxDepth);
   if (shape.too_deep)
     source.fail("byte " + std::to_string(*shape.too_deep), "JSON of at most 64 levels", "deeper nesting");
   if (shape.values > kMaxValues)

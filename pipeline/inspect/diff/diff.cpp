@@ -6,6 +6,7 @@
 #include <set>
 
 #include "format/base/sha256.h"
+#include "format/base/text_bytes.h"
 #include "format/container/layout.h"
 #include "pipeline/compile/stage_table.h"
 #include "pipeline/inspect/provenance.h"
@@ -51,9 +52,7 @@ void add_about(int side, const About& about, NamedDifferences& fields) {
   add_list("date", about.dates);
   for (const auto& [name, json] :
        {std::pair{"what the source said", &about.source}, {"extras", &about.extras}})
-    if (!json->empty())
-      fields.add(side, name,
-                 to_hex(sha256({reinterpret_cast<const std::uint8_t*>(json->data()), json->size()})));
+    if (!json->empty()) fields.add(side, name, to_hex(sha256(text_bytes(*json))));
 }
 
 std::vector<Difference> differences_of(const std::array<Provenance, 2>& p,

@@ -72,6 +72,29 @@ TEST_F(Tree, AContentCredentialStaysTheLastEntryAndIsNotChecked) {
   EXPECT_EQ(read_text(folder / "b.texmesh"), text_of(package));
 }
 
+// O08: a claim hashes every other entry, and the directory without the CRC-32 of the credential. So the bytes
+// of the credential, which are known last, change nothing that it has hashed.
+TEST_F(Tree, NothingThatAClaimHashesDependsOnTheCredential) {
+  unpack_package(folder / "a.texmesh", folder / "tree", {});
+  fs::create_directory(folder / "tree/META-INF");
+  const auto packed_with = [&](const std::string& credential, const char* name) {
+    write_text((folder.path() / "tree" / kContentCredentialPath).string(), credential);
+    pack_folder(folder / "tree", folder / name);
+    return read_text(folder / name);
+  };
+  const std::string before = packed_with("room for a claim", "before.texmesh");
+  const std::string after = packed_with("ROOM FOR A CLAIM", "after.texmesh");
+  ASSERT_EQ(before.size(), after.size());
+  const ContainerEntry credential = open_store(folder / "after.texmesh")->list().back();
+  const std::size_t header = after.rfind("PK\3\4", credential.offset),
+                    directory = credential.offset + credential.bytes;
+  const std::size_t crc = after.rfind("PK\1\2") + 16;  // in the last central header
+  EXPECT_EQ(before.substr(0, header), after.substr(0, header));
+  EXPECT_EQ(before.substr(directory, crc - directory), after.substr(directory, crc - directory));
+  EXPECT_NE(before.substr(crc, 4), after.substr(crc, 4));
+  EXPECT_EQ(before.substr(crc + 4), after.substr(crc + 4));
+}
+
 TEST_F(Tree, ADamagedContentCredentialIsNotUnpacked) {
   unpack_package(folder / "a.texmesh", folder / "tree", {});
   fs::create_directory(folder / "tree/META-INF");

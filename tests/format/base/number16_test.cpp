@@ -1,4 +1,4 @@
-#include "format/base/half.h"
+#include "format/base/number16.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,7 @@
 #pragma once
+#include <algorithm>
 #include <bit>
+#include <cmath>
 #include <cstdint>
 
 namespace texmesh {
@@ -29,5 +31,12 @@ inline float from_half(std::uint16_t half) {
   if (exponent == 0) return static_cast<float>(mantissa) * 0x1p-24f;
   return std::bit_cast<float>((exponent + 112) << 23 | mantissa << 13);
 }
+
+// Fractions 0..1 as multiples of 1 / 65535, rounded to nearest; what is out of range is clamped.
+
+inline std::uint16_t to_unit16(float v) {
+  return static_cast<std::uint16_t>(std::floor(std::clamp(v, 0.0f, 1.0f) * 65535.0 + 0.5));
+}
+inline float from_unit16(std::uint16_t v) { return static_cast<float>(v / 65535.0); }
 
 }  // namespace texmesh
