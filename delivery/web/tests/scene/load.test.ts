@@ -62,7 +62,7 @@ describe('a load', () => {
       camera.position.set(0, 0, 5 * side);
       camera.lookAt(0, 0, 0);
       const gltfLoader = () => ({ register: () => undefined, parseAsync: () => Promise.resolve(fakeGltf(new SphereGeometry(1, 64, 32))) });
-      const l = await loading(url, fakeServer(files), { camera, gltfLoader, time: 2, fullSize: true, autoRefine: false }, { capBytesS: 45000 });
+      const l = await loading(url, fakeServer(files), { camera, gltfLoader, time: 4, fullSize: true, autoRefine: false }, { capBytesS: 25000 });
       await l.model.done;
       // The half of a ball at +z has the texture's left half.
       const middle = (f: number): number => ((f % columns) + 0.5) / columns - 0.5;
