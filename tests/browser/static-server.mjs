@@ -2,6 +2,7 @@
 import fs from 'node:fs';
 import http from 'node:http';
 import path from 'node:path';
+import zlib from 'node:zlib';
 
 const kTypes = {
   '.html': 'text/html; charset=utf-8', '.js': 'text/javascript; charset=utf-8', '.mjs': 'text/javascript; charset=utf-8', '.css': 'text/css; charset=utf-8',
@@ -21,9 +22,10 @@ function requestedRange(header, size) {
 /**
  * Serves the folders of `roots` ({'/prefix/': folder}) on loopback. Every request is kept in `requests` as {method, path, range,
  * status, bytes}; `fault(request)` may return what goes wrong with one: {status}, {flip: byte of the body}, {cut: bytes after which
- * the connection ends}, {stall: bytes after which nothing more comes}, {delay: ms}. `policy`: the pages' Content-Security-Policy.
+ * the connection ends}, {stall: bytes after which nothing more comes}, {delay: ms}. `policy`: the pages' Content-Security-Policy. `gzip`: scripts and
+ * pages are packed, as most servers pack them.
  */
-export async function serve(roots, {ranges = true, fault = () => undefined, cors = true, policy = ''} = {}) {
+export async function serve(roots, {ranges = true, fault = () => undefined, cors = true, policy = '', gzip = false} = {}) {
   const requests = [];
   const sockets = new Set();
   const state = {fault};
@@ -78,6 +80,10 @@ export async function serve(roots, {ranges = true, fault = () => undefined, cors
       // Pages and decoders are kept as everywhere; packages are not, so that every load shows on the line.
       'Cache-Control': /packages|figures|data/.test(url) ? 'no-store' : 'max-age=600',
     });
+    if (gzip && !range && /\.(js|mjs|html|css|wasm)$/.test(url)) {
+      body = zlib.gzipSync(body);
+      Object.assign(headers, {'Content-Encoding': 'gzip', 'Content-Length': body.length});
+    }
     if (policy && url.endsWith('.html')) headers['Content-Security-Policy'] = policy;
     if (range) headers['Content-Range'] = `bytes ${first}-${last - 1}/${stat.size}`;
     if (ranges) headers['Accept-Ranges'] = 'bytes';

@@ -33,7 +33,7 @@ export interface GltfLoaderLike {
 
 /** A model's turn at the link. */
 export interface Turn {
-  /** From now on; Infinity: no limit. 0: a proxy that is shown stays until refine() or another view asks for more. */
+  /** From now on; Infinity: no limit. 0: the first picture stays until refine() or another view asks for more. */
   seconds: number;
   /** What the link is expected to carry, bytes per second; left out: what the model's own transfers have shown. */
   bytesS?: number;

@@ -1,9 +1,14 @@
 import { Camera, type Object3D, type Scene, type WebGLProgram, type WebGLRenderer } from 'three';
 import { throwIfAborted } from '../format/errors';
 import { nowS, sleepS } from '../http/clock';
-import type { LoadContext } from './load_context';
 import { materialsOf, texturesOf } from './scale_parts';
 
+/** What is drawn for the first time, as a LoadContext has it. */
+interface FirstDrawing {
+  signal: AbortSignal;
+  options: { renderer: WebGLRenderer };
+  view: { camera?: Camera };
+}
 /** The first picture waits for its programs no longer than this. */
 const mostCompileS = 0.5;
 
@@ -29,7 +34,7 @@ async function programsReady(renderer: WebGLRenderer, mostS: number, stopIfCance
 }
 
 /** Prepares programs and previews for the first frame, each in a turn of its own: the page goes on while the GPU's process makes them. */
-export async function readyToDraw(load: LoadContext, scene: Object3D, shape: Object3D): Promise<void> {
+export async function readyToDraw(load: FirstDrawing, scene: Object3D, shape: Object3D): Promise<void> {
   const { signal, options: { renderer } } = load;
   const stopIfCancelled = (): void => throwIfAborted(signal);
   let root = scene;

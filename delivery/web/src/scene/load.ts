@@ -142,7 +142,7 @@ class ModelLoad {
     const { context } = this;
     await context.turn();
     // A turn without time leaves what stands: other models' turns would begin later.
-    if ((await this.proxies_.showServing()) || (this.scale_.held && context.limitS <= context.elapsedS())) {
+    if ((context.options.turn && context.limitS <= context.elapsedS()) || (await this.proxies_.showServing())) {
       context.emit('deadline', { limit: context.limitS, actual: context.elapsedS(), skipped: 0 });
       return this.rest_();
     }

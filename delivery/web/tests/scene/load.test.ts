@@ -62,7 +62,7 @@ describe('a load', () => {
       camera.position.set(0, 0, 5 * side);
       camera.lookAt(0, 0, 0);
       const gltfLoader = () => ({ register: () => undefined, parseAsync: () => Promise.resolve(fakeGltf(new SphereGeometry(1, 64, 32))) });
-      const l = await loading(url, fakeServer(files), { camera, gltfLoader, time: 2, fullSize: true, autoRefine: false }, { capBytesS: 45000 });
+      const l = await loading(url, fakeServer(files), { camera, gltfLoader, time: 4, fullSize: true, autoRefine: false }, { capBytesS: 25000 });
       await l.model.done;
       // The half of a ball at +z has the texture's left half.
       const middle = (f: number): number => ((f % columns) + 0.5) / columns - 0.5;
@@ -227,11 +227,11 @@ it('a load that is disposed of frees textures, materials and geometries, and hea
   l.dispose();
 });
 
-it('a turn without time leaves the proxy, until somebody refines', async () => {
-  const server = fakeServer({ '/a/scan.texmesh': golden('v2.0-proxies') });
+it.each(['v2.0-proxies', 'v2.0-scan'])('a turn without time leaves the first picture of %s, until somebody refines', async (name) => {
+  const server = fakeServer({ '/a/scan.texmesh': golden(name) });
   const l = await loading(url, server, { turn: () => Promise.resolve({ seconds: 0 }), autoRefine: false });
   await l.model.done;
-  expect(l.model.state).toMatchObject({ proxy: 0, scale: -1, phase: 'done', planes: [] });
+  expect(l.model.state).toMatchObject({ proxy: name === 'v2.0-proxies' ? 0 : -1, phase: 'done', planes: [] });
   expect(l.pkg.requests.some((q) => q.kind === 'texture')).toBe(false);
   await l.model.refine();
   expect(l.model.state.scale).toBeGreaterThanOrEqual(0);

@@ -1,0 +1,120 @@
+// Twenty scans in a grid behind 4 Mbit/s and 40 ms: <texmesh-viewer> beside <model-viewer> with GLBs of the same scans. Prints a table and
+// leaves screenshots at .5, 1 and 3 s. TEXMESH_DATA names the folder with the scans; what is compiled of them is kept in TEXMESH_FIGURE_PACKAGES.
+// A grid of fewer scans repeats them under other addresses: nothing is fetched once for two elements. Words: the number of
+// runs (default 3), and `texmesh` or `model-viewer` for one of them alone.
+import {check, env, fs, here, launch, listen, path, pictures, run, serve} from './browser.mjs';
+import {countStorage} from './gpu-storage.mjs';
+import {startLink} from './link.mjs';
+import {starvation} from './starved.mjs';
+
+const kScans = {
+  fuze_bottle: 'fuze_bottle/fuze.obj', fran_cyberware: 'fran_cyberware/fran_cut.obj', lee_perry_smith_head: 'lee_perry_smith_head/LeePerrySmith.gltf',
+  apple_4k: 'apple_4k/food_apple_01_4k.gltf', asteroid_eros: 'asteroid_eros/eros.obj', yurt: 'yurt/yurt.glb',
+  marble_bust_4k: 'marble_bust_4k/marble_bust_01_4k.obj', ycb_banana_4k: 'ycb_banana_4k/textured_simple_reoriented.obj',
+};
+const kElements = 20;
+const kLink = {bytesPerSecond: 500000, rttMs: 40};
+const kLimitS = 5;
+const runs = Number(process.argv[2] ?? 3);
+const shown = process.argv[3] ? [process.argv[3]] : ['texmesh', 'model-viewer'];
+const figures = process.env.TEXMESH_FIGURE_PACKAGES ?? path.join(env.work, 'figures');
+fs.mkdirSync(figures, {recursive: true});
+
+/** Package and GLB of a scan, made where they are missing; false where there is no scan. */
+function made(name) {
+  const [file, folder, scan] = [path.join(figures, `${name}.texmesh`), path.join(figures, `mv-${name}`), path.join(env.data, kScans[name])];
+  if (!fs.existsSync(file)) {
+    if (env.data === '' || !fs.existsSync(scan)) return false;
+    run(env.texmesh, 'compile', scan, '-o', file, '--quiet', '--quality.views', '1');
+  }
+  if (!fs.existsSync(folder)) run(env.texmesh, 'export', file, '--to', 'model-viewer', '--plain', '-o', folder);
+  return true;
+}
+const names = Object.keys(kScans).filter(made);
+if (names.length === 0) {
+  console.log('skipped: TEXMESH_DATA names no folder with the scans of the grid');
+  process.exit(77);
+}
+
+const html = (script, element) => `<!doctype html><html lang="en"><title>grid</title><link rel="icon" href="data:,">
+<style>body{margin:0}.grid{display:grid;grid-template-columns:repeat(5,1fr);gap:4px}${element}{width:100%;height:200px}</style>
+<script type="module" src="${script}"></script><div class="grid">${Array.from({length: kElements}, (_, i) => {
+  const name = names[i % names.length];
+  return element === 'texmesh-viewer' ? `<texmesh-viewer src="/figures/${name}.texmesh?${i}" alt="${name}"></texmesh-viewer>` :
+    `<model-viewer src="/figures/mv-${name}/model.glb?${i}" alt="${name}"></model-viewer>`;
+}).join('')}</div></html>`;
+const pages = path.join(env.work, 'grid');
+fs.mkdirSync(pages, {recursive: true});
+fs.writeFileSync(path.join(pages, 'texmesh.html'), html('/viewer/texmesh-viewer.js', 'texmesh-viewer'));
+fs.writeFileSync(path.join(pages, 'model-viewer.html'), html('/model-viewer/model-viewer.min.js', 'model-viewer'));
+
+const browser = await launch();
+const server = await serve({
+  '/figures/': figures, '/viewer/': path.join(env.work, 'work/delivery/web/dist/viewer'), '/model-viewer/': path.join(here, 'node_modules/@google/model-viewer/dist'), '/': pages,
+}, {gzip: true});
+const link = await startLink({target: server.port, ...kLink});
+
+/** Runs in the page before anything else: when each element shows its first picture, and when each is done. */
+function watch() {
+  window.firsts = [];
+  window.loads = [];
+  const note = (list) => ({target}) => /-viewer$/i.test(target.localName ?? '') && list.push(performance.now() / 1000);
+  document.addEventListener('poster-dismissed', note(window.firsts), true);
+  document.addEventListener('load', note(window.loads), true);
+  document.addEventListener('error', ({target}) => console.error(`error of ${target.src ?? target}`), true);
+}
+
+/** One visit: seconds until all first pictures, until all is loaded; bytes on the GPU; the page's own deadline. */
+async function visit(context, which, {shots = false} = {}) {
+  const page = await context.newPage();
+  listen(page);
+  await page.addInitScript(countStorage);
+  await page.addInitScript(watch);
+  const starved = starvation();
+  const sent = server.requests.length;
+  await page.goto(`${link.url}/${which}.html`, {waitUntil: 'commit'});
+  const began = performance.now();
+  if (shots)
+    for (const s of [0.5, 1, 3]) {
+      await new Promise((go) => setTimeout(go, Math.max(0, 1000 * s - (performance.now() - began))));
+      await page.screenshot({path: path.join(pictures, `grid-${which}-${s}.png`), timeout: 60000});
+    }
+  const done = which === 'texmesh' ? 'firsts' : 'loads'; // model-viewer's poster goes when the model is there
+  await page.waitForFunction(([list, n]) => window[list].length >= n, [done, kElements], {timeout: 300000});
+  const waited = starved();
+  if (which === 'texmesh') await page.waitForFunction((n) => window.loads.length >= n, kElements, {timeout: 300000});
+  const r = await page.evaluate(async ([list, texmesh]) => {
+    const [first, loaded] = [Math.max(...window[list]), Math.max(...window.loads)];
+    const said = texmesh ? (await import('/viewer/texmesh-viewer.js')).texmeshPage().gpuBytes : 0;
+    return {first, loaded, stored: window.storedBytes(), said, heap: performance.memory?.usedJSHeapSize ?? 0};
+  }, [done, which === 'texmesh']);
+  if (shots) await page.screenshot({path: path.join(pictures, `grid-${which}-all.png`), timeout: 60000});
+  check(!page.said.some((s) => /^error of/.test(s)), page.said.join('\n'));
+  await page.close();
+  return {...r, waited, bytes: server.requests.slice(sent).reduce((sum, q) => sum + q.bytes, 0)};
+}
+
+console.log(`${kElements} elements of ${names.length} scans, 4 Mbit/s, 40 ms\n`);
+console.log('| page | scripts | first pictures, s | all in time, s | starved, s | GPU, MB | heap, MB | sent, MB |\n|---|---|--:|--:|--:|--:|--:|--:|');
+const late = [];
+for (const which of shown)
+  for (let k = 0; k < (which === 'texmesh' ? runs : 1); ++k) { // a minute and more each
+    const context = await browser.newContext({viewport: {width: 1280, height: 900}});
+    for (const scripts of ['cold', 'cached']) {
+      const v = await visit(context, which);
+      const row = [v.first, v.loaded, v.waited].map((s) => s.toFixed(2)).concat([v.stored, v.heap, v.bytes].map((b) => (b / 1e6).toFixed(1)));
+      console.log(`| ${which} | ${scripts} | ${row.join(' | ')} |`);
+      if (which === 'texmesh') late.push(v.loaded);
+      if (which === 'texmesh') check(v.stored <= 256e6, `${v.stored} bytes on the GPU`);
+    }
+    await context.close();
+  }
+for (const which of shown) {
+  const context = await browser.newContext({viewport: {width: 1280, height: 900}});
+  await visit(context, which, {shots: true});
+  await context.close();
+}
+console.log(`\nslowest page after ${Math.max(...late).toFixed(2)} s, limit ${kLimitS} s from the first model on; screenshots in ${pictures}`);
+await browser.close();
+link.close();
+await server.close();
