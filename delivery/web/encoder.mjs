@@ -1,6 +1,6 @@
 // Compiles src/blocks/encoder to WASM by Debian's clang and lld, for build.mjs and for the tests.
 import { execFileSync } from 'node:child_process';
-import { mkdtempSync, readFileSync, readdirSync, rmSync } from 'node:fs';
+import { mkdirSync, mkdtempSync, readFileSync, readdirSync, rmSync, symlinkSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
@@ -13,8 +13,11 @@ function encoder() {
   if (compiled) return compiled;
   const scratch = mkdtempSync(join(tmpdir(), 'texmesh-encoder-'));
   const out = join(scratch, 'encoder.wasm');
+  // Includes count from the project's root, which is not there where this folder alone was copied.
+  mkdirSync(join(scratch, 'delivery/web/src/blocks'), { recursive: true });
+  symlinkSync(folder, join(scratch, 'delivery/web/src/blocks/encoder'));
   const sources = readdirSync(folder).filter((name) => name.endsWith('.cpp')).sort().map((name) => join(folder, name));
-  const flags = ['--target=wasm32', '-std=c++20', '-O3', '-flto', '-msimd128', '-mbulk-memory', '-nostdlib', '-ffreestanding', '-fno-exceptions', '-fno-rtti',
+  const flags = [`-I${scratch}`, '--target=wasm32', '-std=c++20', '-O3', '-flto', '-msimd128', '-mbulk-memory', '-nostdlib', '-ffreestanding', '-fno-exceptions', '-fno-rtti',
     '-fno-math-errno', '-Wall', '-Wextra', '-Werror', '-Wl,--no-entry', '-Wl,--strip-all', '-Wl,--export=__heap_base', '-Wl,-z,stack-size=65536'];
   try {
     execFileSync(process.env.TEXMESH_CLANG ?? 'clang++', [...flags, '-o', out, ...sources], { stdio: ['ignore', 'ignore', 'pipe'], encoding: 'utf8' });

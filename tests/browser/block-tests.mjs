@@ -141,8 +141,8 @@ test('blocks of every format are made in a worker, and uploads are short', async
   const page = await labPage(b.browser, b.url);
   const speeds = await lab(page, () => window.lab.blockSpeeds());
   console.log(`         ${Object.entries(speeds).map(([name, v]) => `${name} ${v.toFixed(0)}`).join(', ')} Mpixel/s in one worker`);
-  // What a machine does that runs other tests, too, in a quarter of the speed that docs/memory.md says.
-  for (const [name, v] of Object.entries(speeds)) check(v > (name === 'bc7' || name.startsWith('astc') ? 3 : 15), `${name}: ${v} Mpixel/s`);
+  // A sixth of what docs/figures.md says: other tests run beside.
+  for (const [name, v] of Object.entries(speeds)) check(v > (name === 'bc7' || name.startsWith('astc') ? 3 : 10), `${name}: ${v} Mpixel/s`);
   await page.close();
   const r = await inBlocks(b, ['texture_compression_bptc', 'texture_compression_rgtc'], 'large');
   const uploads = await lab(r.page, () => window.uploads.filter((u) => u.name === 'compressedTexSubImage2D'));

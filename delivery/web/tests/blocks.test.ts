@@ -15,7 +15,7 @@ const wantedOf = (format: BlockFormat, colour: number[]): number[] => {
   if (channelsOf(format) === 3) return colour;
   const n = colour.map((v, c) => (c === 2 ? Math.max(0, v - 127.5) : v - 127.5));
   const length = Math.hypot(...n);
-  return n.slice(0, 2).map((v) => 127.5 + (length > 1 ? (127.5 * v) / length : 0));
+  return n.slice(0, 2).map((v) => 127.5 + (127.5 * v) / Math.max(1, length));
 };
 const picture = (width: number, height: number, at: (x: number, y: number) => number[]): Uint8Array =>
   Uint8Array.from({ length: 4 * width * height }, (_, i) => {

@@ -102,8 +102,9 @@ export interface LoadOptions {
    */
   memoryBytes?: number | (() => number);
   /**
-   * Textures as blocks of 4 x 4 texels, which take a quarter or an eighth of the memory: auto = where memoryBytes would take coarser mips
-   * otherwise; always; never. What the GPU has decides the format: BC7, ASTC, BC5 for normals, at last BC1 or ETC2. Default auto.
+   * Textures as blocks of 4 x 4 texels: auto = where memoryBytes would take coarser mips otherwise, as BC7 or ASTC, and normals as BC5, ASTC
+   * or BC3, which take a quarter of the memory; always = whatever memory there is, at last as BC1 or ETC2, which take an eighth and look
+   * worse; never. What the GPU has decides. Default auto.
    */
   compress?: 'auto' | 'always' | 'never';
   /** Address of blocks.js, which makes blocks, where that file does not stand beside the library. */

@@ -1,6 +1,7 @@
-#include "block.h"
+#include "delivery/web/src/blocks/encoder/block.h"
 
-// ASTC 4 x 4, LDR: Khronos Data Format Specification, section 23. A texel has a weight of its own in every block.
+// ASTC 4 x 4, LDR: Khronos Data Format Specification, section 23. A texel has a weight of its own in every
+// block.
 
 /** Ends of 192 steps: three times 6 bits. Value by code, and the code that comes closest to a value. */
 static u8 value_of[192], code_of[256], trits_of[243];
@@ -12,12 +13,17 @@ static void prepare_trits(void) {
       c = (t >> 5 & 7) << 2 | (t & 3), v[4] = v[3] = 2;
     } else {
       c = t & 31;
-      if ((t >> 5 & 3) == 3) v[4] = 2, v[3] = t >> 7;
-      else v[4] = t >> 7, v[3] = t >> 5 & 3;
+      if ((t >> 5 & 3) == 3)
+        v[4] = 2, v[3] = t >> 7;
+      else
+        v[4] = t >> 7, v[3] = t >> 5 & 3;
     }
-    if ((c & 3) == 3) v[2] = 2, v[1] = c >> 4 & 1, v[0] = (c >> 3 & 1) << 1 | ((c >> 2) & ~(c >> 3) & 1);
-    else if ((c >> 2 & 3) == 3) v[2] = 2, v[1] = 2, v[0] = c & 3;
-    else v[2] = c >> 4 & 1, v[1] = c >> 2 & 3, v[0] = (c >> 1 & 1) << 1 | (c & ~(c >> 1) & 1);
+    if ((c & 3) == 3)
+      v[2] = 2, v[1] = c >> 4 & 1, v[0] = (c >> 3 & 1) << 1 | ((c >> 2) & ~(c >> 3) & 1);
+    else if ((c >> 2 & 3) == 3)
+      v[2] = 2, v[1] = 2, v[0] = c & 3;
+    else
+      v[2] = c >> 4 & 1, v[1] = c >> 2 & 3, v[0] = (c >> 1 & 1) << 1 | (c & ~(c >> 1) & 1);
     const int number = v[0] + 3 * v[1] + 9 * v[2] + 27 * v[3] + 81 * v[4];
     // Several stand for the same: the one without high bits can be cut off.
     if (!trits_of[number]) trits_of[number] = (u8)t;
@@ -122,7 +128,8 @@ void encode_astc(const Block* b, u8* out) {
 
 /** Steps of one channel from its least to its greatest value. Gives the squared error. */
 static float place_channel(const f4 v[4], float last, int ends[2], i4 at[4]) {
-  const float low = least(min4(min4(v[0], v[1]), min4(v[2], v[3]))), high = most(max4(max4(v[0], v[1]), max4(v[2], v[3])));
+  const float low = least(min4(min4(v[0], v[1]), min4(v[2], v[3]))),
+              high = most(max4(max4(v[0], v[1]), max4(v[2], v[3])));
   ends[0] = (int)(low + 0.5f), ends[1] = (int)(high + 0.5f);
   const float scale = high > low ? last / (high - low) : 0;
   f4 error = f4_of(0);

@@ -1,6 +1,7 @@
-#include "block.h"
+#include "delivery/web/src/blocks/encoder/block.h"
 
-// BC1, BC3, BC5, BC7: Direct3D 11 functional specification, section 19.5; Khronos Data Format Specification, sections 18 to 20.
+// BC1, BC3, BC5, BC7: Direct3D 11 functional specification, section 19.5; Khronos Data Format Specification,
+// sections 18 to 20.
 
 // ---- BC1
 
@@ -30,7 +31,7 @@ static u32 to_565(f4* c) {
   const f4 last = {31, 63, 31, 0};
   i4 q;
   steps4(*c * (last * (1.0f / 255)), last, &q);
-  *c = __builtin_convertvector(q * (i4){8, 4, 8, 0} + ((q * (i4){16, 4, 16, 0}) >> 6), f4);
+  *c = __builtin_convertvector(q * i4{8, 4, 8, 0} + ((q * i4{16, 4, 16, 0}) >> 6), f4);
   return (u32)(q[0] << 11 | q[1] << 5 | q[2]);
 }
 
@@ -52,13 +53,16 @@ static u64 flat_bc1(const Block* b) {
 }
 
 static u64 write_bc1(u32 first, u32 second, const i4 at[4]) {
-  // Steps from the first end on, as BC1 numbers them: 0, 2, 3, 1. The first end is the larger number: with 3 colours otherwise.
+  // Steps from the first end on, as BC1 numbers them: 0, 2, 3, 1. The first end is the larger number: with 3
+  // colours otherwise.
   if (first == second) return (u64)second << 16 | first;
   const int swapped = first < second;
   i4 codes = {};
   EACH(y, 4) {
-    const i4 step = swapped ? 3 - at[y] : at[y], code = step == 0 ? step : step == 3 ? (i4){1, 1, 1, 1} : step + 1;
-    codes |= (code * (i4){1, 4, 16, 64}) << (8 * y);
+    const i4 step = swapped ? 3 - at[y] : at[y], code = step == 0   ? step
+                                                        : step == 3 ? i4{1, 1, 1, 1}
+                                                                    : step + 1;
+    codes |= (code * i4{1, 4, 16, 64}) << (8 * y);
   }
   return (u64)sum4(codes) << 32 | (swapped ? first << 16 | second : second << 16 | first);
 }
@@ -90,14 +94,15 @@ void encode_bc1(const Block* b, u8* out) { store(out, colours_bc1(b)); }
 
 /** One channel in 8 steps. */
 static u64 channel(const f4 v[4]) {
-  const float low = least(min4(min4(v[0], v[1]), min4(v[2], v[3]))), high = most(max4(max4(v[0], v[1]), max4(v[2], v[3])));
+  const float low = least(min4(min4(v[0], v[1]), min4(v[2], v[3]))),
+              high = most(max4(max4(v[0], v[1]), max4(v[2], v[3])));
   const u32 a = (u32)(high + 0.5f), z = (u32)(low + 0.5f);
   u64 codes = 0;
   if (a > z) EACH(y, 4) {
       // Steps from the larger value on, numbered 0, 2 .. 7, 1.
       i4 step;
       steps4((high - v[y]) * (7 / (high - low)), f4_of(7), &step);
-      const i4 code = step == 0 ? step : step == 7 ? (i4){1, 1, 1, 1} : step + 1;
+      const i4 code = step == 0 ? step : step == 7 ? i4{1, 1, 1, 1} : step + 1;
       codes |= (u64)(u32)(code[0] | code[1] << 3 | code[2] << 6 | code[3] << 9) << (12 * y);
     }
   return codes << 16 | z << 8 | a;
@@ -121,7 +126,8 @@ static int to_7_bits(f4* c) {
   float error[2];
   EACH(p, 2) {
     i4 q;
-    of[p] = steps4((*c - (float)p) * 0.5f, (f4){127, 127, 127, 0}, &q) * 2 + (f4){(float)p, (float)p, (float)p, 0};
+    of[p] =
+        steps4((*c - (float)p) * 0.5f, f4{127, 127, 127, 0}, &q) * 2 + f4{(float)p, (float)p, (float)p, 0};
     error[p] = sum4((of[p] - *c) * (of[p] - *c));
   }
   const int bit = error[1] < error[0];

@@ -1,4 +1,4 @@
-#include "block.h"
+#include "delivery/web/src/blocks/encoder/block.h"
 
 Line main_line(const Block* b) {
   float mean[3], cov[6] = {0, 0, 0, 0, 0, 0};
@@ -36,7 +36,8 @@ int fitted_line(const Block* b, const i4 at[4], float last, Line* line) {
     w[y] = __builtin_convertvector(at[y], f4) * (1 / last);
     s1 += w[y], s2 += w[y] * w[y];
   }
-  const float sum = sum4(s1), square = sum4(s2), aa = 16 - 2 * sum + square, ab = sum - square, det = aa * square - ab * ab;
+  const float sum = sum4(s1), square = sum4(s2), aa = 16 - 2 * sum + square, ab = sum - square,
+              det = aa * square - ab * ab;
   if (det < 0.05f) return 0;
   f4 first = {}, second = {};
   EACH(c, 3) {

@@ -1,6 +1,7 @@
 #pragma once
 
-// A block of 4 x 4 texels, and lines through its colours. Compiled for WASM by ../../../build.mjs, without a standard library.
+// A block of 4 x 4 texels, and lines through its colours. Compiled for WASM by ../../../build.mjs, without a
+// standard library.
 
 typedef unsigned char u8;
 typedef unsigned int u32;
@@ -8,7 +9,6 @@ typedef unsigned long long u64;
 /** Four texels of a row, or four numbers. */
 typedef float f4 __attribute__((vector_size(16)));
 typedef int i4 __attribute__((vector_size(16)));
-typedef u8 u8x4 __attribute__((vector_size(4)));
 
 /** Rows of red, green, blue, 0 to 255. */
 typedef struct {
@@ -22,11 +22,12 @@ typedef struct {
 #define EACH(i, n) for (int i = 0; i < (n); ++i)
 
 static inline float sum4(f4 v) { return (v[0] + v[1]) + (v[2] + v[3]); }
-static inline f4 f4_of(float v) { return (f4){v, v, v, v}; }
+static inline f4 f4_of(float v) { return f4{v, v, v, v}; }
 static inline f4 min4(f4 a, f4 b) { return a < b ? a : b; }
 static inline f4 max4(f4 a, f4 b) { return a > b ? a : b; }
 static inline f4 in_range(f4 v) { return min4(max4(v, f4_of(0)), f4_of(255)); }
-/** Rounded, 0 to `most`; `whole` as an integer. Adding 2^23 leaves no fraction: conversions of four numbers are slow in WASM. */
+/** Rounded, 0 to `most`; `whole` as an integer. Adding 2^23 leaves no fraction: conversions of four numbers
+ * are slow in WASM. */
 static inline f4 steps4(f4 v, f4 most, i4* whole) {
   const f4 moved = min4(max4(v, f4_of(0)), most) + 8388608.0f;
   *whole = (i4)moved - 0x4b000000;

@@ -1,8 +1,10 @@
-#include "block.h"
+#include "delivery/web/src/blocks/encoder/block.h"
 
-// ETC2 of three channels: Khronos Data Format Specification, section 21: the two modes of ETC1, and planar. T and H are left out.
+// ETC2 of three channels: Khronos Data Format Specification, section 21: the two modes of ETC1, and planar. T
+// and H are left out.
 
-static const f4 small[2] = {{2, 5, 9, 13}, {18, 24, 33, 47}}, large[2] = {{8, 17, 29, 42}, {60, 80, 106, 183}};
+static const f4 small[2] = {{2, 5, 9, 13}, {18, 24, 33, 47}},
+                large[2] = {{8, 17, 29, 42}, {60, 80, 106, 183}};
 
 /** Half a block: channels of 8 texels. */
 typedef struct {
@@ -25,7 +27,8 @@ static void halve(const Block* b, int flip, Half out[2]) {
   }
 }
 
-/** Bases of both halves: quantised means, as 5 bits and a difference where that is possible, else as 4 bits. */
+/** Bases of both halves: quantised means, as 5 bits and a difference where that is possible, else as 4 bits.
+ */
 typedef struct {
   int differs;
   i4 q[2];
@@ -44,7 +47,8 @@ static Bases bases_of(const Half h[2]) {
   return o;
 }
 
-/** The best table of a half and its steps: bit 0 large, bit 1 negative. All channels move alike, so that the mean difference decides. */
+/** The best table of a half and its steps: bit 0 large, bit 1 negative. All channels move alike, so that the
+ * mean difference decides. */
 static float best_table(const Half* h, f4 base, int* table, i4 code[2]) {
   f4 d[2], size[2], rest = f4_of(0), error[2] = {};
   EACH(i, 2) {
@@ -71,7 +75,7 @@ static float best_table(const Half* h, f4 base, int* table, i4 code[2]) {
 
 /** Texels stand by columns: low bits from 0 on, high bits from 16 on. */
 static u64 write_codes(const i4 code[2][2], int flip) {
-  const i4 places = flip ? (i4){1, 16, 256, 4096} : (i4){1, 16, 2, 32};
+  const i4 places = flip ? i4{1, 16, 256, 4096} : i4{1, 16, 2, 32};
   i4 low = {}, high = {};
   EACH(h, 2) EACH(i, 2) {
     const int by = flip ? 2 * h + i : 8 * h + 2 * i;
@@ -103,7 +107,7 @@ static float fit_planar(const Block* b, i4 q[3]) {
   const f4 o = mean - (dx + dy) * 1.5f, last = {63, 127, 63, 0}, ends[3] = {o, o + dx * 4, o + dy * 4};
   EACH(i, 3) {
     steps4(ends[i] * (last * (1.0f / 255)), last, &q[i]);
-    v[i] = __builtin_convertvector(q[i] * (i4){4, 2, 4, 0} + ((q[i] * (i4){4, 1, 4, 0}) >> 6), f4);
+    v[i] = __builtin_convertvector(q[i] * i4{4, 2, 4, 0} + ((q[i] * i4{4, 1, 4, 0}) >> 6), f4);
   }
   const f4 x = (v[1] - v[0]) * 0.25f, y = (v[2] - v[0]) * 0.25f;
   f4 error = {};
@@ -116,12 +120,14 @@ static float fit_planar(const Block* b, i4 q[3]) {
 
 static u64 write_planar(const i4 q[3]) {
   const u64 ro = (u64)q[0][0], go = (u64)q[0][1], bo = (u64)q[0][2];
-  u64 w = ro << 57 | (go >> 6) << 56 | (go & 63) << 49 | (bo >> 5) << 48 | (bo >> 3 & 3) << 43 | (bo & 7) << 39 | 1ull << 33;
+  u64 w = ro << 57 | (go >> 6) << 56 | (go & 63) << 49 | (bo >> 5) << 48 | (bo >> 3 & 3) << 43 |
+          (bo & 7) << 39 | 1ull << 33;
   w |= (u64)(q[1][0] >> 1) << 34 | (u64)(q[1][0] & 1) << 32 | (u64)q[1][1] << 25 | (u64)q[1][2] << 19;
   w |= (u64)q[2][0] << 13 | (u64)q[2][1] << 6 | (u64)q[2][2];
   // Red and green must look like differences that fit, blue like one that does not.
   EACH(i, 2) {
-    const int at = 56 - 8 * i, d = (int)(w >> at & 7), base = (int)(w >> (at + 3) & 31), sum = base + (d >= 4 ? d - 8 : d);
+    const int at = 56 - 8 * i, d = (int)(w >> at & 7), base = (int)(w >> (at + 3) & 31),
+              sum = base + (d >= 4 ? d - 8 : d);
     if (sum < 0) w |= 1ull << (at + 7);
   }
   return w | ((bo >> 3 & 3) + (bo >> 1 & 3) < 4 ? 1ull << 42 : 7ull << 45);
@@ -145,5 +151,6 @@ void encode_etc2(const Block* b, u8* out) {
   i4 code[2][2];
   float error = 0;
   EACH(e, 2) error += best_table(&h[e], bases.base[e], &table[e], code[e]);
-  store_big(out, flat <= error ? write_planar(q) : write_halves(&bases, table, write_codes(code, flip), flip));
+  store_big(out,
+            flat <= error ? write_planar(q) : write_halves(&bases, table, write_codes(code, flip), flip));
 }

@@ -6,7 +6,7 @@ import type { WorkerPool } from '../../worker/pool';
 import type { LoadContext } from '../load_context';
 import type { UploadQueue } from '../upload_queue';
 import { BlockStorage } from './block_storage';
-import { type Way, bytesBy, formatsOf, waysOf } from './gpu_formats';
+import { type Way, blocksFor, bytesBy, formatsOf } from './gpu_formats';
 import { refill } from './refill';
 import { readTwoChannels } from './two_channels';
 
@@ -46,6 +46,8 @@ export async function openCompression({ options, pool }: LoadContext, textures: 
       enqueue: ({ pixels, run }) => uploads.enqueue(pixels, run),
       pending, blocksUrl: url.href,
     }, filled);
-  const ways = waysOf(textures, formats).slice(compress === 'always' ? 1 : 0);
+  const always = compress === 'always';
+  const blocks = blocksFor(textures, formats, always);
+  const ways: Way[] = always ? [blocks] : [() => undefined, blocks];
   return { ways, bytes: ways.map((way) => bytesBy(textures, way)), refill, readTwoChannels, storage };
 }

@@ -15,12 +15,13 @@ export const threeFormats = {
 
 /** Smaller textures are not worth it, and their levels end within a block. */
 const leastPx = 64;
-/** Colours, best first; then those of half the bytes. Normals stand in two channels. Measured: docs/memory.md. */
-const colours = ['bc7', 'astc', 'etc2', 'bc1'] as const;
-const small = ['etc2', 'bc1'] as const;
+/**
+ * Colours, best first. RGBA of half the sides, which takes as much as BC7 and ASTC and twice as much as BC1 and ETC2, looks worse than the
+ * first two and better than the others (docs/figures.md), so that memory alone is no reason for those. Normals stand in two channels.
+ */
+const better = ['bc7', 'astc'] as const;
+const colours = [...better, 'bc1', 'etc2'] as const;
 const normals = ['bc5', 'astc-normal', 'bc3-normal'] as const;
-/** Coverage has edges: nothing that blurs them. */
-const coverage = ['bc7', 'astc'] as const;
 
 /** Formats that the renderer's GPU has. */
 export function formatsOf(renderer: WebGLRenderer): Set<BlockFormat> {
@@ -35,17 +36,16 @@ export function formatsOf(renderer: WebGLRenderer): Set<BlockFormat> {
   return found;
 }
 
-/** The ways to store planes, best pictures first: RGBA; the best blocks; blocks of 8 bytes for colours and data. */
-export function waysOf(textures: readonly TextureInfo[], formats: ReadonlySet<BlockFormat>): Way[] {
+/** Blocks for each plane that a format suits; with `any`, formats that look worse than coarser mips, too. Coverage has edges, which those blur. */
+export function blocksFor(textures: readonly TextureInfo[], formats: ReadonlySet<BlockFormat>, any: boolean): Way {
   const first = (of: readonly BlockFormat[], { widthPx, heightPx }: TextureInfo): BlockFormat | undefined => {
     const whole = widthPx % 4 === 0 && heightPx % 4 === 0; // what BC wants of level 0
     return Math.min(widthPx, heightPx) < leastPx ? undefined : of.find((f) => formats.has(f) && (whole || !f.startsWith('bc')));
   };
-  const of = (texture: TextureInfo, wanted: readonly BlockFormat[]): BlockFormat | undefined => {
-    const { role } = texture;
-    return first(role === 'normal' ? normals : role === 'alpha' ? coverage : wanted, texture);
+  return (plane) => {
+    const { role } = textures[plane];
+    return first(role === 'normal' ? normals : role === 'alpha' || !any ? better : colours, textures[plane]);
   };
-  return [() => undefined, (p) => of(textures[p], colours), (p) => of(textures[p], small) ?? of(textures[p], colours)];
 }
 
 /** Bytes of planes that are stored this way. */
