@@ -13,6 +13,7 @@
 #include "format/base/errors.h"
 #include "format/base/text_bytes.h"
 #include "pipeline/about/meta.h"
+#include "pipeline/batch/find_models.h"
 #include "pipeline/compile/options.h"
 #include "pipeline/compile/profile.h"
 
@@ -140,24 +141,30 @@ class CollectionReader {
       const std::string folder = folders[i].get<std::string>();
       if (!list_folder_) continue;
       const std::vector<std::string> found = list_folder_(folder);
-      std::map<std::string, int> sharing;
+      std::map<std::string, std::pair<int, int>> sharing;  // files, those that are no .json
       const auto package_of = [](const std::string& relative) {
         return fs::path(relative).replace_extension(".texmesh").string();
       };
-      for (const std::string& relative : found) ++sharing[package_of(relative)];
+      for (const std::string& relative : found) {
+        auto& [files, others] = sharing[package_of(relative)];
+        ++files, others += is_json(relative) ? 0 : 1;
+      }
       for (const std::string& relative : found) {
         const std::string input = (fs::path(folder) / relative).string();
         if (!listed.insert(fs::path(input).lexically_normal().string()).second) continue;
         const std::string package = package_of(relative);
-        add(models, {input, sharing[package] > 1 ? relative + ".texmesh" : package, options_for(input)},
-            place);
+        const bool unread = is_json(relative);
+        const auto [files, others] = sharing[package];
+        const bool longer = unread ? files > 1 : others > 1;
+        add(models, {input, longer ? relative + ".texmesh" : package, options_for(input), unread}, place);
       }
     }
   }
 
   void add(std::vector<CollectionModel>& models, CollectionModel model, const std::string& place) {
     if (models.size() >= kMaxModels) fail(place, "at most " + std::to_string(kMaxModels) + " models", "more");
-    if (!outputs_.insert(std::filesystem::path(model.output).lexically_normal().string()).second)
+    if (!model.unread &&
+        !outputs_.insert(std::filesystem::path(model.output).lexically_normal().string()).second)
       fail(place, "an output of its own for " + model.input, model.output + ", as another model");
     models.push_back(std::move(model));
   }

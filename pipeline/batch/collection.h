@@ -16,10 +16,11 @@ struct CollectionModel {
   // model's own. What `about` says of each of them goes the same way, field by field, into package.meta.
   // Models with equal options share them.
   std::shared_ptr<const CompileOptions> options;
+  bool unread = false;  // a folder's .json, as in ModelPath; its output may be another's
 };
 
-/// Finds the models of a folder that a collection names: paths relative to the folder, sorted. The reader
-/// itself looks at no folder.
+/// Finds the models of a folder that a collection names, as list_models(): paths relative to the folder,
+/// sorted. The reader itself looks at no folder.
 using FolderLister = std::function<std::vector<std::string>(const std::string& folder)>;
 
 /// Reads a collection (schemas/collection.v1.schema.json): models, folders of models, and their options.

@@ -4,6 +4,7 @@
 #include <cctype>
 #include <filesystem>
 #include <fstream>
+#include <map>
 
 #include "format/base/errors.h"
 #include "pipeline/batch/repeated_texts.h"
@@ -12,17 +13,17 @@ namespace texmesh {
 namespace fs = std::filesystem;
 namespace {
 
-bool is_model(const fs::path& path) {
+bool may_be_model(const fs::path& path) {
   std::string e = path.extension().string();
   std::transform(e.begin(), e.end(), e.begin(), [](unsigned char c) { return std::tolower(c); });
-  return e == ".glb" || e == ".gltf" || e == ".obj" || e == ".ply" || e == ".stl" ||
-         (e == ".json" && is_range_scan(path.string()));
+  return e == ".glb" || e == ".gltf" || e == ".obj" || e == ".ply" || e == ".stl" || e == ".json";
 }
 
 // Texts, not fs::path: taking a thousand paths apart again and again took a sixth of a run that does nothing.
 struct Found {
   std::string path;
   std::size_t relative = 0;  // where the path within the input begins
+  bool unread = false;
 };
 
 /// The order of fs::path: by parts, so that a folder's files stand together.
@@ -34,6 +35,13 @@ bool path_less(const std::string& a, const std::string& b) {
 }
 
 }  // namespace
+
+bool is_json(const std::string& path) {
+  constexpr std::string_view kEnd = ".json";
+  return path.size() > kEnd.size() &&
+         std::ranges::equal(std::string_view(path).substr(path.size() - kEnd.size()), kEnd, {},
+                            [](unsigned char c) { return std::tolower(c); });
+}
 
 bool is_range_scan(const std::string& path) {
   std::error_code ec;
@@ -61,13 +69,14 @@ std::vector<std::string> model_paths(const std::string& folder) {
     std::string path = it->path().string();
     if (it->path().filename().string().front() == '.')
       it.disable_recursion_pending();
-    else if (it->is_regular_file(ec) && is_model(it->path()))
+    else if (it->is_regular_file(ec) && may_be_model(it->path()))
       models.push_back(path);
     it.increment(ec);  // a folder that is left out without a word is a collection without its models
     if (ec) throw InputError(path, "", "a folder that can be listed", ec.message());
   }
-  if (models.empty()) throw InputError(folder, "", "a folder with models", "none");
   std::sort(models.begin(), models.end(), path_less);
+  if (std::ranges::all_of(models, is_json) && std::ranges::none_of(models, is_range_scan))
+    throw InputError(folder, "", "a folder with models", "none");
   return models;
 }
 
@@ -85,7 +94,10 @@ std::vector<ModelPath> find_models(const std::vector<std::string>& inputs, const
   for (const std::string& input : inputs) {
     if (fs::is_directory(input)) {
       any_folder = true;
-      for (std::string& path : model_paths(input)) found.push_back({std::move(path), prefix_bytes(input)});
+      for (std::string& path : model_paths(input)) {
+        const bool unread = is_json(path);
+        found.push_back({std::move(path), prefix_bytes(input), unread});
+      }
     } else {
       found.push_back({input, input.size() - fs::path(input).filename().string().size()});
     }
@@ -106,16 +118,18 @@ std::vector<ModelPath> find_models(const std::vector<std::string>& inputs, const
     std::string package = prefix;
     package.reserve(prefix.size() + relative.size() + 8);  // of 100,000, what growing leaves free counts
     package.append(relative.substr(0, extension ? dot - f.relative : relative.npos)).append(".texmesh");
-    models.push_back({std::move(f.path), std::move(package)});
+    models.push_back({std::move(f.path), std::move(package), f.unread});
   }
-  const auto output_of = [](const ModelPath& m) { return std::string_view(m.output); };
-  std::vector<std::size_t> sharing;
-  for (const auto shared = repeated_texts(models, output_of); const ModelPath& m : models)
-    if (shared.contains(m.output)) sharing.push_back(static_cast<std::size_t>(&m - models.data()));
-  for (const std::size_t i : sharing)
+  std::map<std::string_view, int> others;  // by shared package: its files that are not unread
+  const auto shared = repeated_texts(models, [](const ModelPath& m) { return std::string_view(m.output); });
+  for (const ModelPath& m : models)
+    if (shared.contains(m.output)) others[m.output] += m.unread ? 0 : 1;
+  std::vector<std::size_t> longer;
+  for (const ModelPath& m : models)
+    if (const auto it = others.find(m.output); it != others.end() && (m.unread || it->second > 1))
+      longer.push_back(static_cast<std::size_t>(&m - models.data()));
+  for (const std::size_t i : longer)
     models[i].output = prefix + models[i].input.substr(found[i].relative) + ".texmesh";
-  if (const auto [m, other] = first_repetition(models, output_of); m)
-    throw InputError(m->input, "", "a package of its own", m->output + ", which is that of " + other->input);
   return models;
 }
 

@@ -54,13 +54,28 @@ void add_collection(const std::string& file, const PlanRequest& request, const C
        read_collection(std::string(bytes.begin(), bytes.end()), file, base, list)) {
     const std::string input = (folder / m.input).string();
     plan.models.push_back(
-        {input, (fs::path(request.output) / m.output).string(), false, profiles.of(m.options)});
+        {input, (fs::path(request.output) / m.output).string(), false, m.unread, profiles.of(m.options)});
   }
   plan.files.push_back(file);
 }
 
-void refuse_shared_outputs(const BatchPlan& plan) {
+/// Unread files that `chosen` names leave the plan where they are no models.
+template <class Chosen>
+void read_unread(BatchPlan& plan, const Chosen& chosen) {
+  for (PlannedModel& m : plan.models) {
+    if (!m.unread || !chosen(m)) continue;
+    m.unread = false;
+    if (!is_range_scan(m.input)) m.input.clear();
+  }
+  std::erase_if(plan.models, [](const PlannedModel& m) { return m.input.empty(); });
+}
+
+void refuse_shared_outputs(BatchPlan& plan) {
   const auto output_of = [](const PlannedModel& m) { return std::string_view(m.output); };
+  const auto shared = repeated_texts(plan.models, output_of);
+  if (shared.empty()) return;
+  // The few that must be opened by every shard, such as a meta.json in each of two folders.
+  read_unread(plan, [&](const PlannedModel& m) { return shared.contains(m.output); });
   if (const auto [m, other] = first_repetition(plan.models, output_of); m)
     throw InputError(m->input, "", "a package of its own", m->output + ", which is that of " + other->input);
 }
@@ -75,9 +90,6 @@ std::uint64_t cost_us(const PlannedModel& m, const std::string& package, const P
 }
 
 void drop_other_shards(BatchPlan& plan, const PlanRequest& request) {
-  plan.models_in_collection = plan.models.size();
-  plan.shard = request.shard;
-  if (request.shard.count <= 1) return;
   const ShardSplit split = split_plan(plan, request, request.shard.count);
   plan.collection = split.collection;
   std::size_t i = 0;
@@ -87,6 +99,16 @@ void drop_other_shards(BatchPlan& plan, const PlanRequest& request) {
 }  // namespace
 
 BatchPlan plan_batch(const PlanRequest& request) {
+  BatchPlan plan = plan_collection(request);
+  const std::size_t in_collection = plan.models.size();
+  plan.shard = request.shard;
+  if (request.shard.count > 1) drop_other_shards(plan, request);
+  read_unread(plan, [](const PlannedModel&) { return true; });
+  plan.models_in_collection = request.shard.count > 1 ? in_collection : plan.models.size();
+  return plan;
+}
+
+BatchPlan plan_collection(const PlanRequest& request) {
   BatchPlan plan;
   const auto base = request.base ? request.base : std::make_shared<const CompileOptions>();
   Profiles profiles(request);
@@ -106,11 +128,10 @@ BatchPlan plan_batch(const PlanRequest& request) {
     plan.models.reserve(plan.models.size() + found.size());
     const bool alone = request.inputs.size() == 1 && names_package;
     for (ModelPath& m : found)
-      plan.models.push_back({std::move(m.input), std::move(m.output), alone, profiles.of(base)});
+      plan.models.push_back({std::move(m.input), std::move(m.output), alone, m.unread, profiles.of(base)});
   }
   refuse_shared_outputs(plan);
   plan.output_prefix = (fs::path(request.output) / "").string();
-  drop_other_shards(plan, request);
   plan.outputs = fs::absolute(request.output).lexically_normal().string();
   return plan;
 }

@@ -24,7 +24,7 @@ int run_list(const ListArguments& args) {
   request.inputs = args.inputs;
   request.output = args.output;
   request.costs_s = costs_option(args.costs);
-  const ModelList list = list_collection(std::move(request), args.shards);
+  const ModelList list = list_collection(request, args.shards);
   if (args.json) {
     std::cout << write_model_list(list);
     return kExitOk;

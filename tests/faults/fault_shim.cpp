@@ -14,9 +14,11 @@
 //                                (EINTR), and the others move half of what they are asked to; no call number
 //                         clock  nothing fails, but every second look at the time of day is a day early; no
 //                                call number
+//                         nolock no lock is granted: ENOLCK, as from NFS without its daemon; no call number
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <signal.h>
+#include <sys/file.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -37,7 +39,7 @@ namespace {
 using texmesh::testing::FaultCall;
 using texmesh::testing::FaultCounts;
 
-enum class Action { kNone, kKill, kEio, kFull, kFrozen, kChoppy, kClock };
+enum class Action { kNone, kKill, kEio, kFull, kFrozen, kChoppy, kClock, kNoLock };
 
 struct Plan {
   FaultCounts* counts = nullptr;
@@ -59,6 +61,7 @@ struct Plan {
              : what == "frozen" ? Action::kFrozen
              : what == "choppy" ? Action::kChoppy
              : what == "clock"  ? Action::kClock
+             : what == "nolock" ? Action::kNoLock
                                 : Action::kNone;
     using Open = int (*)(const char*, int, ...);
     const auto real = reinterpret_cast<Open>(::dlsym(RTLD_NEXT, "open"));
@@ -233,6 +236,15 @@ int clock_gettime(clockid_t clock, timespec* time) noexcept {
       ++p.counts->fired % 2 == 0)
     time->tv_sec -= kDay_s;
   return result;
+}
+
+int flock(int fd, int operation) noexcept {
+  static const auto call = real<int (*)(int, int)>("flock");
+  Plan& p = plan();
+  if (p.action != Action::kNoLock || !p.counts || !p.covers(path_of(fd))) return call(fd, operation);
+  ++p.counts->fired;
+  errno = ENOLCK;
+  return -1;
 }
 
 int fsync(int fd) {

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 
+#include "pipeline/batch/find_models.h"
 #include "pipeline/batch/fleet/json_lines.h"
 #include "pipeline/batch/fleet/named_files.h"
 
@@ -16,9 +17,8 @@ std::uint64_t bytes_of_file(const std::string& path) {
 
 }  // namespace
 
-ModelList list_collection(PlanRequest request, int shards) {
-  request.shard = {};
-  const BatchPlan plan = plan_batch(request);
+ModelList list_collection(const PlanRequest& request, int shards) {
+  const BatchPlan plan = plan_collection(request);
   ModelList list;
   list.shards = shards;
   list.collections = plan.files;
@@ -26,6 +26,7 @@ ModelList list_collection(PlanRequest request, int shards) {
   list.collection = shards > 1 ? split.collection : "";
   for (std::size_t i = 0; i < plan.models.size(); ++i) {
     const PlannedModel& m = plan.models[i];
+    if (m.unread && !is_range_scan(m.input)) continue;
     ListedModel listed{
         m.input,          m.output, split.packages[i], named_files(m.input), bytes_of_file(m.input),
         split.shard_of[i]};

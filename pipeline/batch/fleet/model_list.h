@@ -24,7 +24,7 @@ struct ModelList {
 };
 
 /// Every model of a plan of the whole collection, with the shard that `compile --shard I/shards` gives it.
-ModelList list_collection(PlanRequest request, int shards);
+ModelList list_collection(const PlanRequest& request, int shards);
 
 /// schemas/list.v1.schema.json
 std::string write_model_list(const ModelList& list);

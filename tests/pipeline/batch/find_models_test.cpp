@@ -4,6 +4,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <map>
+
 #include "format/base/errors.h"
 #include "tests/support/command.h"
 
@@ -55,11 +57,13 @@ TEST(FindModels, FoldersKeepTheirTreeAndSkipWhatIsNoModel) {
   write_text(folder / "sub/options.json", "{}");
   write_text(folder / "sub/scan.json", R"({"version":1,"type":"cylindrical-range-scan"})");
   const auto m = find_models({folder.path().string()}, "out");
-  ASSERT_EQ(m.size(), 4u);
+  ASSERT_EQ(m.size(), 5u);
   EXPECT_EQ(m[0].output, "out/a.texmesh");
   EXPECT_EQ(m[1].output, "out/b.texmesh");
   EXPECT_EQ(m[2].output, "out/sub/deep/c.texmesh");
-  EXPECT_EQ(m[3].output, "out/sub/scan.texmesh");
+  EXPECT_EQ(m[3].output, "out/sub/options.texmesh");
+  EXPECT_EQ(m[4].output, "out/sub/scan.texmesh");
+  for (const ModelPath& p : m) EXPECT_EQ(p.unread, p.input.ends_with(".json")) << p.input;
 }
 
 TEST(FindModels, ModelsThatWouldShareAPackageKeepTheirExtension) {
@@ -72,12 +76,24 @@ TEST(FindModels, ModelsThatWouldShareAPackageKeepTheirExtension) {
   EXPECT_EQ(m[2].output, "out/yurt.texmesh");
 }
 
-TEST(FindModels, TheSameNameTwiceIsRefused) {
-  EXPECT_THROW(find_models({"x/a.glb", "y/a.glb"}, "out"), InputError);
+TEST(FindModels, OfAJsonAndAnotherOnlyTheJsonKeepsItsExtension) {
+  const TemporaryFolder folder;
+  for (const char* f : {"site.json", "site.obj", "yurt.json", "yurt.obj", "yurt.ply"})
+    write_text(folder / f, "x");
+  std::map<std::string, std::string> outputs;
+  for (const ModelPath& m : find_models({folder.path().string()}, "out"))
+    outputs[fs::path(m.input).filename()] = m.output;
+  EXPECT_EQ(outputs, (std::map<std::string, std::string>{{"site.json", "out/site.json.texmesh"},
+                                                         {"site.obj", "out/site.texmesh"},
+                                                         {"yurt.json", "out/yurt.json.texmesh"},
+                                                         {"yurt.obj", "out/yurt.obj.texmesh"},
+                                                         {"yurt.ply", "out/yurt.ply.texmesh"}}));
 }
 
 TEST(FindModels, AFolderWithoutModelsIsRefused) {
   const TemporaryFolder folder;
+  EXPECT_THROW(find_models({folder.path().string()}, "out"), InputError);
+  write_text(folder / "options.json", "{}");
   EXPECT_THROW(find_models({folder.path().string()}, "out"), InputError);
 }
 

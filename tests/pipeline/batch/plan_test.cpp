@@ -1,5 +1,8 @@
 #include <gtest/gtest.h>
+#include <sys/inotify.h>
+#include <unistd.h>
 
+#include <array>
 #include <filesystem>
 #include <map>
 #include <set>
@@ -148,6 +151,73 @@ TEST_F(Plan, ShardsPartitionExactlyAndAreBalancedBySize) {
   EXPECT_FALSE(collections.contains(plan({"in"}, 0, kShards).collection));
 }
 
+/// Names of the files of a folder that this process opened since.
+class OpenedFiles {
+ public:
+  explicit OpenedFiles(const std::string& folder) : fd_(::inotify_init1(IN_NONBLOCK | IN_CLOEXEC)) {
+    EXPECT_GE(::inotify_add_watch(fd_, folder.c_str(), IN_OPEN), 0);
+  }
+  ~OpenedFiles() { ::close(fd_); }
+  OpenedFiles(const OpenedFiles&) = delete;
+  OpenedFiles& operator=(const OpenedFiles&) = delete;
+  std::set<std::string> names() {
+    std::set<std::string> all;
+    alignas(inotify_event) std::array<char, 65536> buffer;
+    for (ssize_t bytes = 0; (bytes = ::read(fd_, buffer.data(), buffer.size())) > 0;)
+      for (ssize_t at = 0; at < bytes;) {
+        const auto* event = reinterpret_cast<const inotify_event*>(buffer.data() + at);
+        if (event->len > 0) all.insert(event->name);
+        at += static_cast<ssize_t>(sizeof(inotify_event) + event->len);
+      }
+    return all;
+  }
+
+ private:
+  int fd_;
+};
+
+constexpr const char* kScan = R"({"version":1,"type":"cylindrical-range-scan"})";
+
+TEST_F(Plan, AShardOpensOnlyItsOwnFiles) {
+  constexpr int kShards = 4;
+  for (int i = 0; i < 12; ++i) {
+    add("in/m" + std::to_string(i) + ".obj");
+    add("in/m" + std::to_string(i) + ".json", R"({"title":"what is known of the model beside it"})");
+    add("in/s" + std::to_string(i) + ".json", kScan);
+  }
+  add("c.json", R"({"version":1,"folders":["in"]})");
+  for (const char* input : {"in", "c.json"}) {
+    const BatchPlan whole = plan({input});
+    EXPECT_EQ(whole.models.size(), 24u);
+    EXPECT_EQ(whole.models_in_collection, 24u);
+    std::set<std::string> together, opened;
+    for (int s = 0; s < kShards; ++s) {
+      OpenedFiles files(folder_ / "in");
+      const BatchPlan p = plan({input}, s, kShards);
+      EXPECT_EQ(p.models.size(), 6u) << "as many of each kind";
+      for (const PlannedModel& m : p.models) EXPECT_TRUE(together.insert(m.output).second) << m.output;
+      for (const std::string& name : files.names())
+        EXPECT_TRUE(opened.insert(name).second) << name << " was opened by two shards";
+    }
+    EXPECT_EQ(together, outputs(whole));
+    EXPECT_EQ(opened.size(), 24u);
+  }
+}
+
+TEST_F(Plan, AJsonThatIsNoModelTakesNoPackageFromAnother) {
+  add("x/meta.json", "{}");
+  add("y/meta.json", "{}");
+  add("y/a.json", "{}");
+  add("x/a.obj"), add("y/b.obj");
+  add("c.json", R"({"version":1,"folders":["x","y"]})");
+  for (const std::vector<std::string>& inputs :
+       {std::vector<std::string>{"x", "y"}, std::vector<std::string>{"c.json"}})
+    EXPECT_EQ(outputs(plan(inputs)),
+              (std::set<std::string>{folder_ / "out/a.texmesh", folder_ / "out/b.texmesh"}));
+  add("y/a.json", kScan);
+  EXPECT_THROW(plan({"c.json"}), InputError);
+}
+
 TEST_F(Plan, WhatModelsTookBeforeWinsOverTheirSizes) {
   for (int i = 0; i < 9; ++i) add("in/m" + std::to_string(i) + ".obj");
   costs_s_["m4.texmesh"] = 100;
@@ -187,6 +257,8 @@ TEST_F(Plan, TwoModelsForOnePackageAreRefused) {
   add("x/a.obj");
   add("c.json", R"({"version":1,"models":[{"input":"x/a.obj"}]})");
   EXPECT_THROW(plan({"c.json", "x"}), InputError);
+  add("y/a.obj");
+  EXPECT_THROW(plan({"x/a.obj", "y/a.obj"}), InputError);
 }
 
 TEST_F(Plan, EqualProfilesAreOneText) {

@@ -65,8 +65,8 @@ class Site {
 
   /// A build in which call number `at` beneath the folder (of the whole site by default) goes wrong.
   CommandResult build_with_fault(const std::string& action, std::uint64_t at, SharedCounts& counts,
-                                 const std::string& under = "") const {
-    return build({"LD_PRELOAD=" TEXMESH_FAULT_SHIM, "TEXMESH_FAULT_FILE=" + counts.file(),
+                                 const std::string& under = "", const std::string& preload = "") const {
+    return build({"LD_PRELOAD=" TEXMESH_FAULT_SHIM + preload, "TEXMESH_FAULT_FILE=" + counts.file(),
                   "TEXMESH_FAULT_UNDER=" + (under.empty() ? folder_.path().string() : under),
                   "TEXMESH_FAULT_ACTION=" + action, "TEXMESH_FAULT_AT=" + std::to_string(at)});
   }
@@ -194,6 +194,32 @@ class Faults : public ::testing::Test {
     EXPECT_GT(failed + succeeded, 0u);
   }
 
+  /// Kills at the points of a sweep. Returns how many there were.
+  int sweep_kills(std::uint64_t sample, const std::string& preload = "") {
+    std::map<std::uint32_t, int> killed;
+    int points_done = 0;
+    for (const std::uint64_t at : points(sample)) {
+      const Site site(models_, profile_, jobs_);
+      SharedCounts counts = site.counts();
+      const CommandResult r = site.build_with_fault("kill", at, counts, "", preload);
+      if ((*counts).fired == 0) continue;  // threads: this run has made fewer calls
+      ++points_done;
+      ++killed[(*counts).fired_call];
+      const std::string what =
+          "kill at call " + std::to_string(at) + " (kind " + std::to_string((*counts).fired_call) + ")";
+      EXPECT_EQ(r.exit_code, 128 + 9) << what;
+      site.wait_for_the_dead();
+      expect_nothing_torn(site, what);
+      expect_next_build_to_be_whole(site, what);
+      if (HasFatalFailure()) break;
+    }
+    std::printf(
+        "killed at %d of %llu calls: open %d, write %d, sync %d, link %d, rename %d, unlink %d, mkdir %d\n",
+        points_done, static_cast<unsigned long long>(calls_), killed[0], killed[1], killed[2], killed[3],
+        killed[4], killed[5], killed[6]);
+    return points_done;
+  }
+
   TemporaryFolder folder_;
   std::string models_, profile_, jobs_;
   Packages reference_;
@@ -202,28 +228,12 @@ class Faults : public ::testing::Test {
 
 TEST_F(Faults, KilledAtEveryCall) {
   ASSERT_NO_FATAL_FAILURE(prepare(full_sweeps() ? 3 : 1, full_sweeps() ? "2" : "1"));
-  std::map<std::uint32_t, int> killed;
-  int points_done = 0;
-  for (const std::uint64_t at : points(6)) {
-    const Site site(models_, profile_, jobs_);
-    SharedCounts counts = site.counts();
-    const CommandResult r = site.build_with_fault("kill", at, counts);
-    if ((*counts).fired == 0) continue;  // threads: this run has made fewer calls
-    ++points_done;
-    ++killed[(*counts).fired_call];
-    const std::string what =
-        "kill at call " + std::to_string(at) + " (kind " + std::to_string((*counts).fired_call) + ")";
-    EXPECT_EQ(r.exit_code, 128 + 9) << what;
-    site.wait_for_the_dead();
-    expect_nothing_torn(site, what);
-    expect_next_build_to_be_whole(site, what);
-    if (HasFatalFailure()) return;
-  }
-  std::printf(
-      "killed at %d of %llu calls: open %d, write %d, sync %d, link %d, rename %d, unlink %d, mkdir %d\n",
-      points_done, static_cast<unsigned long long>(calls_), killed[0], killed[1], killed[2], killed[3],
-      killed[4], killed[5], killed[6]);
-  EXPECT_GE(points_done, full_sweeps() ? 500 : 5);
+  EXPECT_GE(sweep_kills(6), full_sweeps() ? 500 : 5);
+}
+
+TEST_F(Faults, KilledAtEveryCallWhereLocksAreGrantedToAll) {
+  ASSERT_NO_FATAL_FAILURE(prepare(1, "1"));
+  EXPECT_GE(sweep_kills(2, ":" TEXMESH_GRANT_LOCKS), full_sweeps() ? 200 : 2);
 }
 
 TEST_F(Faults, TheDiskIsFullFromEveryCallOn) {
@@ -295,6 +305,19 @@ TEST_F(Faults, ClocksThatJumpChangeNothing) {
   EXPECT_FALSE(site.packages() == reference_) << "a change was not seen";
   write_text(model, before);
   expect_next_build_to_be_whole(site, "clocks that jump");
+}
+
+TEST_F(Faults, WithoutLocksEveryPackageIsMade) {
+  ASSERT_NO_FATAL_FAILURE(prepare(2, "1"));
+  const Site site(models_, profile_, jobs_);
+  for (const char* build : {"first build", "no-op"}) {
+    SharedCounts counts = site.counts();
+    const CommandResult r = site.build_with_fault("nolock", 0, counts);
+    EXPECT_EQ(r.exit_code, 0) << build << ": " << r.output << r.errors;
+    EXPECT_GT((*counts).fired, 0u) << build << ": the shim is not at work";
+    EXPECT_TRUE(site.packages() == reference_) << build;
+  }
+  expect_next_build_to_be_whole(site, "no locks");
 }
 
 /// The merged summary is the old one or the new one, whatever happens to the process that writes it.

@@ -83,6 +83,7 @@ TEST_F(ModelFiles, AListTellsWhatTheRunOfEachShardCompiles) {
   add("in/m.mtl", "newmtl a\nmap_Kd skin.jpg\n");
   add("in/skin.jpg", std::string(500, 'x'));
   for (int i = 0; i < 9; ++i) add("in/m" + std::to_string(i) + ".obj", "mtllib m.mtl\n");
+  for (int i = 0; i < 5; ++i) add("in/meta" + std::to_string(i) + ".json", "{}");
   PlanRequest request;
   request.inputs = {folder_ / "in"};
   request.output = folder_ / "out";
