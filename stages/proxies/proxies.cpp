@@ -161,8 +161,9 @@ class ProxyRun {
     std::optional<MadeProxy> made = shop_.finish(baked, bytes, form);
     if (!made) return;
     const FlipSum flip = studio_.at_middle(made->shown, context);
-    // Facets of a smooth object must be worth it.
-    const double worth = smooth_ && !form.normals ? 1.04 : 1;
+    // Facets of a smooth object must be worth it. Another's normals, which stand for its own facets, are to
+    // be more than noise.
+    const double worth = form.normals ? 1 : smooth_ ? 1.04 : 0.995;
     if (!best.made || flip.mean() * worth < best.flip.mean()) best = {std::move(made), form, flip};
   }
 
