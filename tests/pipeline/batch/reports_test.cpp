@@ -24,7 +24,7 @@ struct FakeRun {
 
   WorkerReport& add(const std::string& name, ModelResult result, int lane = 0, double start_s = 0,
                     double seconds = 0) {
-    models.push_back({name, "out/" + name + ".texmesh", false, nullptr});
+    models.push_back({name, "out/" + name + ".texmesh", false, false, nullptr});
     WorkerReport r;
     r.result = result;
     r.ran = result != ModelResult::kCancelled;

@@ -58,7 +58,7 @@ struct RunOfModels {
 
   WorkerReport& add(const std::string& name, ModelResult result, double seconds = 0) {
     plan.output_prefix = "out/";
-    plan.models.push_back({name, "out/" + name + ".texmesh", false, nullptr});
+    plan.models.push_back({name, "out/" + name + ".texmesh", false, false, nullptr});
     WorkerReport r;
     r.result = result;
     r.ran = result != ModelResult::kCancelled;
