@@ -15,7 +15,7 @@
 #include "pipeline/cache/cache_layer.h"
 #include "pipeline/cache/disk_store.h"
 #include "tests/pipeline/cache/cache_fixtures.h"
-#include "tests/support/command.h"
+#include "tests/support/small_builds.h"
 
 namespace texmesh::testing {
 namespace {
@@ -223,9 +223,10 @@ TEST_F(ServerFaults, AtEveryAnswerCostTimeAndNothingElse) {
   EXPECT_EQ(work_of_two_machines("sound", kMuchPatience_s), 3);
   const int answers = server_.answers();
   ASSERT_GT(answers, 8);
+  const int step = full_sweeps() ? 1 : 4;  // every store that is opened waits for the disk
   int points = 0, lost = 0;
   for (int fault = 0; fault < kFaults; ++fault)
-    for (int at = 1; at <= answers; ++at) {
+    for (int at = 1 + fault % step; at <= answers; at += step) {
       SCOPED_TRACE("fault " + std::to_string(fault) + " in answer " + std::to_string(at));
       const std::string name = std::to_string(fault) + "-" + std::to_string(at);
       server_.forget();
