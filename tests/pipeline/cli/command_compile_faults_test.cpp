@@ -314,7 +314,8 @@ TEST_F(Faults, WithoutLocksEveryPackageIsMade) {
     SharedCounts counts = site.counts();
     const CommandResult r = site.build_with_fault("nolock", 0, counts);
     EXPECT_EQ(r.exit_code, 0) << build << ": " << r.output << r.errors;
-    EXPECT_GT((*counts).fired, 0u) << build << ": the shim is not at work";
+    // A build that makes nothing may ask for no lock at all.
+    if (build == std::string("first build")) EXPECT_GT((*counts).fired, 0u) << "the shim is not at work";
     EXPECT_TRUE(site.packages() == reference_) << build;
   }
   expect_next_build_to_be_whole(site, "no locks");

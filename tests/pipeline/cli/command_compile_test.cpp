@@ -204,7 +204,7 @@ TEST_F(CompileCommand, UsageErrorsExitWithTwo) {
 
 TEST_F(CompileCommand, MemoryLimitIsAnErrorOfTheModel) {
   const CommandResult r =
-      texmesh({"compile", scan(), "-o", folder_ / "x.texmesh", "--no-cache", "--model-memory", "120MB"});
+      texmesh({"compile", scan(), "-o", folder_ / "x.texmesh", "--no-cache", "--model-memory", "60MB"});
 #if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
   EXPECT_NE(r.exit_code, 0) << r.output;
 #endif
