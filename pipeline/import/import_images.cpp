@@ -8,7 +8,7 @@
 #include "pipeline/io/uri.h"
 #include "stages/image/decode_image.h"
 #include "stages/image/image_metadata.h"
-#include "stages/image/read_ktx2.h"
+#include "stages/image/ktx2/read_ktx2.h"
 
 namespace texmesh {
 namespace {

@@ -11,7 +11,7 @@
 #include "stages/image/decode_image.h"
 #include "stages/image/decode_jpeg.h"
 #include "stages/image/image_metadata.h"
-#include "stages/image/read_ktx2.h"
+#include "stages/image/ktx2/read_ktx2.h"
 #include "stages/jpeg/source_jpeg.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/fuzz/reader_limits.h"

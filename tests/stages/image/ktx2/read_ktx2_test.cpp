@@ -1,4 +1,4 @@
-#include "stages/image/read_ktx2.h"
+#include "stages/image/ktx2/read_ktx2.h"
 
 #include <gtest/gtest.h>
 
