@@ -7,6 +7,7 @@
 #include <png.h>
 #include <webp/encode.h>
 #include <zlib.h>
+#include <zstd.h>
 
 #include <jconfig.h>
 
@@ -29,6 +30,7 @@ const std::map<std::string, std::string>& library_versions() {
       {"libjpeg-turbo", TEXMESH_TEXT(LIBJPEG_TURBO_VERSION)},
       {"libpng", PNG_LIBPNG_VER_STRING},
       {"libwebp", webp_version()},
+      {"libzstd", ZSTD_VERSION_STRING},
       {"meshoptimizer", std::to_string(MESHOPTIMIZER_VERSION)},
       {"openimageio", OIIO_VERSION_STRING},
       {"tinygltf", "2.7"},  // its headers carry no version

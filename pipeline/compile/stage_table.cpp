@@ -134,7 +134,8 @@ std::vector<Stage> stage_table(const CompileOptions& o) {
   return {
       stage({"import", kImportVersion, "file -> mesh, materials, images, what it says of itself"},
             inputs(kSource), outputs(kImportedMesh, kMaterials, kImages, kSourceAbout), read_of(o, o.import),
-            {"draco", "libpng", "meshoptimizer", "openimageio", "tinygltf"}, import_source),
+            {"draco", "libpng", "libzstd", "meshoptimizer", "openimageio", "tinygltf", "zlib"},
+            import_source),
       stage({"condition", kConditionVersion,
              "mesh -> 2-manifold mesh: weld, drop degenerates, split, components"},
             inputs(kImportedMesh), outputs(kConditionedMesh), read_of(o, o.condition), {}, condition_import),

@@ -14,7 +14,7 @@
 
 namespace texmesh {
 
-inline constexpr int kImportVersion = 7;
+inline constexpr int kImportVersion = 8;
 
 enum class KdPolicy : std::uint8_t { kIgnore, kMultiply };
 template <>

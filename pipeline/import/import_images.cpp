@@ -8,6 +8,7 @@
 #include "pipeline/io/uri.h"
 #include "stages/image/decode_image.h"
 #include "stages/image/image_metadata.h"
+#include "stages/image/ktx2/read_ktx2.h"
 
 namespace texmesh {
 namespace {
@@ -34,8 +35,9 @@ bool extension_fits(const std::string& extension, ImageFormat format) {
 }
 
 void note_foreign_extension(Model& model, const Image& image, const std::string& place) {
-  static constexpr std::string_view kKnown[] = {"jpg", "jpeg", "jpe", "jfif", "png", "tif", "tiff", "webp",
-                                                "exr", "tga",  "bmp", "gif",  "ppm", "pgm", "hdr",  "dds"};
+  static constexpr std::string_view kKnown[] = {"jpg",  "jpeg", "jpe", "jfif", "png", "tif",
+                                                "tiff", "webp", "exr", "tga",  "bmp", "gif",
+                                                "ppm",  "pgm",  "hdr", "dds",  "ktx2"};
   const std::string extension = lower_extension(image.name);
   if (std::find(std::begin(kKnown), std::end(kKnown), extension) == std::end(kKnown)) return;
   if (!extension_fits(extension, image.format))
@@ -82,20 +84,30 @@ void apply_metadata(Model& model, Image& image, const std::string& place, const 
 std::int32_t add_image_bytes(Model& model, std::string name, std::vector<std::uint8_t> bytes,
                              const std::string& file_name, const std::string& place,
                              const ImportOptions& options) {
+  ImageLimits limits;
+  limits.max_pixels = static_cast<std::uint64_t>(options.max_image_pixels);
+  const auto placed = [&](auto&& read) {
+    try {
+      return read();
+    } catch (const InputError& e) {
+      throw InputError(file_name, place + " (" + name + ")" + (e.place().empty() ? "" : ": " + e.place()),
+                       e.expected(), e.found());
+    }
+  };
+  const bool ktx2 = is_ktx2(bytes);
+  if (ktx2) bytes = placed([&] { return png_of_ktx2(name, bytes, limits); });
   for (std::size_t i = 0; i < model.images.size(); ++i)
     if (model.images[i].bytes == bytes) return static_cast<std::int32_t>(i);
   if (model.images.size() >= static_cast<std::size_t>(options.max_images))
     throw InputError(file_name, place, "at most " + std::to_string(options.max_images) + " images", "more");
-  ImageLimits limits;
-  limits.max_pixels = static_cast<std::uint64_t>(options.max_image_pixels);
-  try {
-    model.images.push_back(probe_image(base_name(name), std::move(bytes), limits));
-  } catch (const InputError& e) {
-    throw InputError(file_name, place + " (" + name + ")" + (e.place().empty() ? "" : ": " + e.place()),
-                     e.expected(), e.found());
-  }
-  note_foreign_extension(model, model.images.back(), place);
-  apply_metadata(model, model.images.back(), place, options);
+  model.images.push_back(placed([&] { return probe_image(base_name(name), std::move(bytes), limits); }));
+  Image& image = model.images.back();
+  if (ktx2)
+    add_info(model.notes, "ktx2-image", place,
+             image.name + " is a KTX2: its largest level is read and goes on as a PNG of the same texels");
+  else
+    note_foreign_extension(model, image, place);
+  apply_metadata(model, image, place, options);
   return static_cast<std::int32_t>(model.images.size() - 1);
 }
 

@@ -176,7 +176,9 @@ std::optional<ColourProfile> honoured_profile(const Image& image) {
 
 Image probe_image(std::string name, Bytes bytes, const ImageLimits& limits) {
   const std::optional<ImageFormat> format = sniff_image_format(bytes);
-  if (!format) throw InputError(name, "first bytes", "JPEG, PNG, TIFF, WebP or EXR", first_bytes(bytes));
+  if (!format)
+    throw InputError(name, "first bytes", "JPEG, PNG, TIFF, WebP or EXR (of models KTX2, too)",
+                     first_bytes(bytes));
   const ImageHeader header = read_header(name, *format, bytes, limits);
   check_image_size(name, header.width_px, header.height_px, limits);
   Image image;

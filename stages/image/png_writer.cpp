@@ -52,7 +52,7 @@ long cost(const std::vector<std::uint8_t>& row) {
 
 }  // namespace
 
-std::vector<std::uint8_t> write_png(const Pixels& image) {
+std::vector<std::uint8_t> write_png(const Pixels& image, const PngOptions& options) {
   const std::uint32_t channels = image.channels;
   if (image.width_px == 0 || image.height_px == 0 || (channels != 1 && channels != 3 && channels != 4))
     throw StageError("png", "image", "1, 3 or 4 channels and at least one pixel",
@@ -68,7 +68,7 @@ std::vector<std::uint8_t> write_png(const Pixels& image) {
   }
   uLongf size = compressBound(static_cast<uLong>(rows.size()));
   std::vector<std::uint8_t> packed(size);
-  if (compress2(packed.data(), &size, rows.data(), static_cast<uLong>(rows.size()), 9) != Z_OK)
+  if (compress2(packed.data(), &size, rows.data(), static_cast<uLong>(rows.size()), options.level) != Z_OK)
     throw StageError("png", "deflate", "a compressed stream", "an error");
   packed.resize(size);
   std::vector<std::uint8_t> header;
@@ -81,6 +81,7 @@ std::vector<std::uint8_t> write_png(const Pixels& image) {
                                0, 0, 0});
   std::vector<std::uint8_t> out{0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
   put_chunk(out, "IHDR", header);
+  if (options.linear) put_chunk(out, "gAMA", {0, 1, 0x86, 0xa0});  // 100,000 / 100,000
   put_chunk(out, "IDAT", packed);
   put_chunk(out, "IEND", {});
   return out;

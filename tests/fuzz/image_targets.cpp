@@ -11,10 +11,12 @@
 #include "stages/image/decode_image.h"
 #include "stages/image/decode_jpeg.h"
 #include "stages/image/image_metadata.h"
+#include "stages/image/ktx2/read_ktx2.h"
 #include "stages/jpeg/source_jpeg.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/fuzz/reader_limits.h"
 #include "tests/support/images.h"
+#include "tests/support/ktx2_writer.h"
 
 namespace texmesh::fuzz {
 namespace {
@@ -34,6 +36,22 @@ bool read_image(ByteSpan input) {
     const Pixels pixels = decode_image(image, FloatEncoding::kSrgb);
     require(pixels.data.size() == std::size_t{image.width_px} * image.height_px * pixels.channels,
             "an image of another size than its header's");
+    return true;
+  } catch (const InputError& e) {
+    return refused(e);
+  }
+}
+
+bool read_ktx2_file(ByteSpan input) {
+  if (!is_ktx2(input)) return false;
+  try {
+    const Pixels pixels = read_ktx2("fuzz", input, image_limits()).pixels;
+    require(pixels.data.size() == std::size_t{pixels.width_px} * pixels.height_px * pixels.channels,
+            "an image of another size than its header's");
+    constexpr std::size_t kFew = 1 << 14;  // as a PNG takes as long as reading a hundred of them
+    if (pixels.data.size() > kFew) return true;
+    const Image png = probe_image("fuzz", png_of_ktx2("fuzz", input, image_limits()), image_limits());
+    require(decode_image(png).data == pixels.data, "a PNG of other texels");
     return true;
   } catch (const InputError& e) {
     return refused(e);
@@ -186,6 +204,21 @@ std::vector<Bytes> tiff_seeds() {
 }
 std::vector<Bytes> exr_seeds() { return encoded<float>("openexr", OIIO::TypeDesc::FLOAT); }
 
+std::vector<Bytes> ktx2_seeds() {
+  using namespace texmesh::testing;  // NOLINT: fixtures
+  std::vector<Bytes> list;
+  for (const bool zstd : {false, true})
+    for (int channels = 1; channels <= 4; ++channels) {
+      Ktx2Parts parts = ktx2_parts(7, 5, channels, test_picture(7, 5, channels), zstd);
+      parts.zstd = zstd;
+      parts.levels.push_back(test_picture(3, 2, channels));
+      parts.keys = {{"KTXorientation", "ru"}, {"KTXswizzle", "rrrg"}};
+      if (channels > 2) parts.keys.pop_back();
+      list.push_back(ktx2_bytes(parts));
+    }
+  return list;
+}
+
 /// PNG's checksums, so that changed chunks are read.
 Bytes with_checksums(ByteSpan input) {
   Bytes bytes(input.begin(), input.end());
@@ -295,6 +328,13 @@ void add_image_targets(std::vector<Target>& list) {
                 nullptr,
                 {"channels", "chlist", "compression", "dataWindow", "displayWindow", "box2i", "lineOrder",
                  "chromaticities", "tiles", "type", "deepscanline", "multiPartImage"}},
+               {"ktx2",
+                false,
+                read_ktx2_file,
+                ktx2_seeds,
+                Shape::kBytes,
+                nullptr,
+                {"KTXorientation", "KTXswizzle", "rgb1", "rrr1", "rrrg", "ru"}},
                {"icc",
                 false,
                 read_icc,

@@ -15,10 +15,10 @@ constexpr double kMaxSize = 9007199254740991.0;  // 2^53 - 1
 constexpr double kMaxInt = 2147483647.0;         // tinygltf keeps some sizes as int
 constexpr std::size_t kMaxArray = 1'000'000;
 
-constexpr std::array<std::string_view, 7> kSupported{"KHR_draco_mesh_compression", "KHR_mesh_quantization",
+constexpr std::array<std::string_view, 8> kSupported{"KHR_draco_mesh_compression", "KHR_mesh_quantization",
                                                      "EXT_meshopt_compression",    "KHR_meshopt_compression",
                                                      "KHR_texture_transform",      "EXT_texture_webp",
-                                                     "KHR_materials_unlit"};
+                                                     "KHR_texture_basisu",         "KHR_materials_unlit"};
 
 bool supported(const std::string& name) {
   return find_material_extension(name) ||
@@ -251,7 +251,8 @@ void check_image(const Item& image) {
 
 void check_texture(const Item& texture) {
   texture.index("sampler", "samplers").index("source", "images");
-  texture.extension("EXT_texture_webp", [](const Item& e) { e.index("source", "images"); });
+  for (const char* name : {"EXT_texture_webp", "KHR_texture_basisu"})
+    texture.extension(name, [](const Item& e) { e.index("source", "images"); });
 }
 
 void check_sampler(const Item& sampler) {

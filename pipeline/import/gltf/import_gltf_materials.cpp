@@ -68,6 +68,7 @@ class MaterialReader {
  private:
   std::int32_t image(std::size_t index);
   std::int32_t read_image(std::size_t index);
+  std::int32_t ktx2_image(std::size_t index, bool has_other, const std::string& place);
   std::int32_t image_of_texture(std::size_t index);
   TextureRef texture(const Json* info, const std::string& place);
   void read_specular_glossiness(const Json& e, const std::string& place, Material& out);
@@ -118,18 +119,35 @@ std::int32_t MaterialReader::image(std::size_t index) {
   return image_of_[index];
 }
 
-/// The WebP image where there is one, else (or when its file is missing) the plain one.
+/// -1 with a note where the file cannot be read and the texture has another image.
+std::int32_t MaterialReader::ktx2_image(std::size_t index, bool has_other, const std::string& place) {
+  if (!has_other) return image(index);
+  try {
+    return image(index);
+  } catch (const InputError& e) {
+    source_.note_once(Severity::kWarning, "ktx2-left-out", place,
+                      "another image is taken for that of KHR_texture_basisu: " + std::string(e.what()));
+    return -1;
+  }
+}
+
+/// The KTX2 image where there is one, else (or when its file is missing or cannot be read) the WebP one, else
+/// the plain one.
 std::int32_t MaterialReader::image_of_texture(std::size_t index) {
   const Json& texture = document_["textures"][index];
-  std::int32_t found = -1;
-  const Json* webp = extension(texture, "EXT_texture_webp");
-  if (webp && member(*webp, "source")) {
-    found = image((*webp)["source"].get<std::size_t>());
-  }
+  const std::string place = "/textures/" + std::to_string(index);
+  const auto source_of = [&](const char* name) {
+    const Json* e = extension(texture, name);
+    return e ? member(*e, "source") : nullptr;
+  };
+  const Json *ktx2 = source_of("KHR_texture_basisu"), *webp = source_of("EXT_texture_webp");
   const int source = structure_.textures[index].source;
+  std::int32_t found = -1;
+  if (ktx2) found = ktx2_image(ktx2->get<std::size_t>(), webp || source >= 0, place);
+  if (found < 0 && webp) found = image(webp->get<std::size_t>());
   if (found < 0 && source >= 0) found = image(static_cast<std::size_t>(source));
-  if (found < 0 && source < 0 && !webp) {
-    source_.note_once(Severity::kWarning, "missing-texture", "/textures/" + std::to_string(index),
+  if (found < 0 && source < 0 && !webp && !ktx2) {
+    source_.note_once(Severity::kWarning, "missing-texture", place,
                       "a texture without an image of a kind that texmesh reads is left out");
   }
   return found;

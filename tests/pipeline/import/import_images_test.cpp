@@ -7,7 +7,9 @@
 
 #include "format/base/errors.h"
 #include "pipeline/import/import.h"
+#include "stages/image/decode_image.h"
 #include "tests/support/images.h"
+#include "tests/support/ktx2_writer.h"
 #include "tests/support/memory_resolver.h"
 #include "tests/support/meshes.h"
 
@@ -39,6 +41,31 @@ TEST(AddImage, OneEntryPerContentOneWarningPerName) {
       input_error([&] { add_image(m, "c.png", resolver, "model.obj", "material", options); });
   EXPECT_NE(error.find("model.obj"), std::string::npos) << error;
   EXPECT_NE(error.find("c.png"), std::string::npos) << error;
+}
+
+TEST(AddImage, AKtx2IsReadByItsContentAndOnce) {
+  Model m;
+  MemoryResolver resolver;
+  const Bytes texels = testing::test_picture(4, 4, 3);
+  resolver.files["x.ktx2"] = testing::ktx2_bytes(testing::ktx2_parts(4, 4, 3, texels));
+  resolver.files["y.png"] = resolver.files["x.ktx2"];
+  resolver.files["light.ktx2"] = testing::ktx2_bytes(testing::ktx2_parts(4, 4, 3, texels, false));
+  EXPECT_EQ(add_image(m, "x.ktx2", resolver, "f", "p", {}), 0);
+  EXPECT_EQ(add_image(m, "y.png", resolver, "f", "p", {}), 0);
+  EXPECT_EQ(count_notes(m, "ktx2-image"), 1);
+  EXPECT_EQ(count_notes(m, "colour-profile"), 0);
+  EXPECT_EQ(decode_image(m.images[0], FloatEncoding::kSrgb).data, texels);
+  EXPECT_EQ(add_image(m, "light.ktx2", resolver, "f", "p", {}), 1);
+  EXPECT_EQ(count_notes(m, "colour-profile"), 1);
+  EXPECT_EQ(decode_image(m.images[1]).data, texels);
+  const Bytes lit = decode_image(m.images[1], FloatEncoding::kSrgb).data;
+  for (std::size_t i = 0; i < texels.size(); ++i) EXPECT_GE(lit[i], texels[i]);
+  EXPECT_NE(lit, texels) << "light becomes sRGB where it gives colours";
+  resolver.files["z.ktx2"] = {resolver.files["x.ktx2"].begin(), resolver.files["x.ktx2"].end() - 1};
+  const std::string error =
+      input_error([&] { add_image(m, "z.ktx2", resolver, "model.obj", "material", {}); });
+  EXPECT_NE(error.find("z.ktx2"), std::string::npos) << error;
+  EXPECT_NE(error.find("level 0"), std::string::npos) << error;
 }
 
 TEST(AddImage, NotesSayWhatBecomesOfColoursAndOrientation) {

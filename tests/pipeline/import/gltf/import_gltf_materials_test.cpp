@@ -4,7 +4,9 @@
 #include <cmath>
 
 #include "format/model/material_extensions.h"
+#include "stages/image/decode_image.h"
 #include "tests/support/gltf_builder.h"
+#include "tests/support/ktx2_writer.h"
 
 namespace texmesh {
 namespace {
@@ -154,6 +156,55 @@ TEST(ImportGltfMaterials, PrefersWebpAndFallsBackWhenItIsMissing) {
   EXPECT_EQ(m.images[0].format, ImageFormat::kPng);
 }
 
+/// "a.png", and image 1 in a buffer view as the KTX2 of the texture.
+GltfBuilder with_ktx2(const Bytes& file) {
+  GltfBuilder b = textured(base_colour());
+  b.json["images"].push_back({{"bufferView", b.view_of(file)}, {"mimeType", "image/ktx2"}});
+  b.json["textures"][0]["extensions"] = {{"KHR_texture_basisu", {{"source", 1}}}};
+  b.json["extensionsUsed"] = b.json["extensionsRequired"] = {"KHR_texture_basisu"};
+  return b;
+}
+
+TEST(ImportGltfMaterials, ReadsPlainAndPackedKtx2) {
+  for (const bool zstd : {false, true}) {
+    const Bytes texels{1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12};
+    testing::Ktx2Parts parts = testing::ktx2_parts(2, 2, 3, texels);
+    parts.zstd = zstd;
+    GltfBuilder b = with_ktx2(testing::ktx2_bytes(parts));
+    for (const bool fallback : {true, false}) {
+      if (!fallback) b.json["textures"][0].erase("source");
+      const Model m = import(b);
+      ASSERT_EQ(m.images.size(), 1u);
+      EXPECT_EQ(m.images[0].format, ImageFormat::kPng);
+      EXPECT_EQ(decode_image(m.images[0]).data, texels);
+      EXPECT_TRUE(has_note(m, "ktx2-image", Severity::kInfo));
+      EXPECT_FALSE(has_note(m, "unknown-extension", Severity::kInfo));
+      EXPECT_TRUE(m.materials.at(0).base_colour_texture.used());
+    }
+  }
+}
+
+TEST(ImportGltfMaterials, BasisIsRefusedUnlessThereIsAnotherImage) {
+  testing::Ktx2Parts basis = testing::ktx2_parts(2, 2, 3, Bytes(12));
+  basis.vk_format = 0, basis.model = 166;
+  GltfBuilder b = with_ktx2(testing::ktx2_bytes(basis));
+  const Model m = import(b);
+  ASSERT_EQ(m.images.size(), 1u);
+  EXPECT_EQ(m.images[0].bytes, png());
+  ASSERT_TRUE(has_note(m, "ktx2-left-out", Severity::kWarning));
+  EXPECT_NE(m.notes.front().text.find("Basis Universal"), std::string::npos) << m.notes.front().text;
+  b.json["textures"][0].erase("source");
+  try {
+    import(b);
+    FAIL() << "no refusal";
+  } catch (const InputError& e) {
+    EXPECT_NE(std::string(e.what()).find("Basis Universal cannot be read"), std::string::npos) << e.what();
+    EXPECT_NE(std::string(e.what()).find("/images/1"), std::string::npos) << e.what();
+  }
+  b.json["textures"][0]["extensions"]["KHR_texture_basisu"]["source"] = 2;
+  EXPECT_THROW(import(b), InputError) << "no such image";
+}
+
 TEST(ImportGltfMaterials, AMissingImageIsAWarning) {
   MemoryResolver empty;
   const Model m = import(textured(base_colour()), empty);
@@ -164,7 +215,7 @@ TEST(ImportGltfMaterials, AMissingImageIsAWarning) {
 
 TEST(ImportGltfMaterials, ATextureOfAnotherKindOnlyIsAWarning) {
   GltfBuilder b = textured(base_colour());
-  b.json["textures"][0] = {{"extensions", {{"KHR_texture_basisu", {{"source", 0}}}}}};
+  b.json["textures"][0] = {{"extensions", {{"MSFT_texture_dds", {{"source", 0}}}}}};
   const Model m = import(b);
   EXPECT_TRUE(has_note(m, "missing-texture", Severity::kWarning));
   EXPECT_FALSE(m.materials.at(0).base_colour_texture.used());
