@@ -242,7 +242,7 @@ Ktx2Picture read_ktx2(const std::string& name, ByteSpan bytes, const ImageLimits
 
 Bytes png_of_ktx2(const std::string& name, ByteSpan bytes, const ImageLimits& limits) {
   const Ktx2Picture picture = read_ktx2(name, bytes, limits);
-  // Level 9 takes ten times as long for files that are seldom kept.
+  // A fast level: the file is seldom kept.
   constexpr int kFast = 1;
   return write_png(picture.pixels, {.level = kFast, .linear = picture.linear});
 }
