@@ -16,9 +16,10 @@ const mostCompileS = 0.5;
 export async function gpuIdle(renderer: WebGLRenderer, mostS = 0.5): Promise<void> {
   const gl = renderer.getContext() as WebGL2RenderingContext;
   const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+  const lives = () => fence !== null && gl.isSync(fence); // not behind a lost context, which may stand again by then
   gl.flush();
-  for (const end = nowS() + mostS; fence && nowS() < end && gl.getSyncParameter(fence, gl.SYNC_STATUS) !== gl.SIGNALED; ) await sleepS(0.004);
-  gl.deleteSync(fence);
+  for (const end = nowS() + mostS; lives() && nowS() < end && gl.getSyncParameter(fence!, gl.SYNC_STATUS) !== gl.SIGNALED; ) await sleepS(0.004);
+  if (lives()) gl.deleteSync(fence);
 }
 
 /** Waits for each program, then asks the program for its uniforms, in a turn of its own: the first frame would wait for the linker otherwise. */
