@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
+#include <string_view>
 
 #include "format/base/errors.h"
 #include "pipeline/batch/repeated_texts.h"
@@ -27,7 +28,7 @@ struct Found {
 };
 
 /// The order of fs::path: by parts, so that a folder's files stand together.
-bool path_less(const std::string& a, const std::string& b) {
+bool path_less(std::string_view a, std::string_view b) {
   return std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end(), [](char x, char y) {
     const auto rank = [](char c) { return c == '/' ? 0 : static_cast<unsigned char>(c) + 1; };
     return rank(x) < rank(y);
@@ -74,7 +75,9 @@ std::vector<std::string> model_paths(const std::string& folder) {
     it.increment(ec);  // a folder that is left out without a word is a collection without its models
     if (ec) throw InputError(path, "", "a folder that can be listed", ec.message());
   }
-  std::sort(models.begin(), models.end(), path_less);
+  std::sort(models.begin(), models.end(), [same = prefix_bytes(folder)](std::string_view a, std::string_view b) {
+    return path_less(a.substr(same), b.substr(same));
+  });
   if (std::ranges::all_of(models, is_json) && std::ranges::none_of(models, is_range_scan))
     throw InputError(folder, "", "a folder with models", "none");
   return models;

@@ -171,6 +171,9 @@ Bytes with_block_digests(ByteSpan input) {
     const Sha256 digest = sha256(ByteSpan(bytes).subspan(at + 40, static_cast<std::size_t>(length)));
     std::memcpy(bytes.data() + at + 8, digest.data(), digest.size());
     at += 40 + static_cast<std::size_t>(length);
+    std::uint64_t body = 0;  // its size ends the payload
+    if (length >= 8) std::memcpy(&body, bytes.data() + at - 8, 8);
+    at += static_cast<std::size_t>(std::min<std::uint64_t>(body, bytes.size()));
   }
   return bytes;
 }

@@ -20,7 +20,7 @@
 namespace texmesh {
 namespace {
 
-constexpr std::array<std::uint8_t, 8> kMagic{'T', 'X', 'M', 'E', 'M', 'O', 0, 2};
+constexpr std::array<std::uint8_t, 8> kMagic{'T', 'X', 'M', 'E', 'M', 'O', 0, 3};
 constexpr std::size_t kMostBlockBytes = 8u << 20, kFullBlockBytes = 1u << 20;
 constexpr std::string_view kOpenEnding = ".open", kFinishedEnding = ".seg";
 
@@ -34,13 +34,33 @@ struct Block {
   std::vector<std::string> new_stages;
   std::vector<MemoName> names;
   std::vector<std::int64_t> times;
-  std::vector<std::uint32_t> sizes, key_sizes;
-  std::vector<std::uint8_t> records;
+  std::vector<std::uint32_t> sizes;
+  std::uint64_t body_bytes = 0;
   template <class S, class A>
   static void archive(S& s, A& a) {
-    a(s.new_stages, s.names, s.times, s.sizes, s.key_sizes, s.records);
+    a(s.new_stages, s.names, s.times, s.sizes, s.body_bytes);
   }
 };
+
+/// In front of a record. What check is of begins behind it.
+struct RecordHead {
+  std::uint64_t check = 0;
+  std::uint32_t keys_ahead = 0;  // bytes from this head to the keys' check
+  std::uint32_t key_bytes = 0;   // with the check
+};
+constexpr std::size_t kCheckBytes = 8, kRecordHeadBytes = 16;
+static_assert(sizeof(RecordHead) == kRecordHeadBytes);
+
+std::uint64_t check_of(std::span<const std::uint8_t> bytes) { return truncated(sha256(bytes)); }
+
+/// The bytes behind a check that holds; none where it does not.
+std::span<const std::uint8_t> checked(std::span<const std::uint8_t> bytes) {
+  if (bytes.size() < kCheckBytes) return {};
+  std::uint64_t check = 0;
+  std::memcpy(&check, bytes.data(), kCheckBytes);
+  return check == check_of(bytes.subspan(kCheckBytes)) ? bytes.subspan(kCheckBytes)
+                                                       : std::span<const std::uint8_t>{};
+}
 
 bool read_at(int fd, std::uint64_t at, std::span<std::uint8_t> to) {
   while (!to.empty()) {
@@ -61,6 +81,11 @@ bool write_to_end(int fd, std::span<const std::uint8_t> bytes) {
     bytes = bytes.subspan(static_cast<std::size_t>(n));
   }
   return true;
+}
+
+void append_bytes(std::vector<std::uint8_t>& to, const void* from, std::size_t size) {
+  const auto* p = static_cast<const std::uint8_t*>(from);
+  to.insert(to.end(), p, p + size);
 }
 
 BlockHead head_of(std::span<const std::uint8_t, kBlockHeadBytes> bytes) {
@@ -112,61 +137,71 @@ bool MemoSegment::read_blocks(const std::function<void(MemoEntry)>& entry) {
     if (head.bytes > bytes_ - at - kBlockHeadBytes) break;
     std::vector<std::uint8_t> payload(static_cast<std::size_t>(head.bytes));
     if (!read_at(file_.get(), at + kBlockHeadBytes, payload) || sha256(payload) != head.digest) return false;
-    if (!tell_block(payload, at + kBlockHeadBytes, entry, last)) return false;
     at += kBlockHeadBytes + head.bytes;
+    const auto body_bytes = tell_block(payload, at, entry, last);
+    if (!body_bytes) return false;
+    at += *body_bytes;
+    if (at > bytes_) return !is_finished();
   }
   return is_finished() ? last && at == bytes_ : true;
 }
 
-bool MemoSegment::tell_block(std::span<const std::uint8_t> payload, std::uint64_t at,
-                             const std::function<void(MemoEntry)>& entry, bool& last) {
+std::optional<std::uint64_t> MemoSegment::tell_block(std::span<const std::uint8_t> payload, std::uint64_t body,
+                                                     const std::function<void(MemoEntry)>& entry,
+                                                     bool& last) {
   Block block;
   try {
     block = decode_artefact<Block>(payload, "memo");
   } catch (const FormatError&) {
-    return false;
+    return std::nullopt;
   }
-  const auto sum = [](const std::vector<std::uint32_t>& sizes) {
-    return std::accumulate(sizes.begin(), sizes.end(), std::uint64_t{0});
-  };
   const std::size_t count = block.names.size();
-  if (block.times.size() != count || block.sizes.size() != count || block.key_sizes.size() != count ||
-      sum(block.sizes) + sum(block.key_sizes) != block.records.size())
-    return false;
+  const auto records_bytes = std::accumulate(block.sizes.begin(), block.sizes.end(), std::uint64_t{0});
+  if (block.times.size() != count || block.sizes.size() != count || records_bytes > block.body_bytes ||
+      block.body_bytes > kMostBlockBytes)
+    return std::nullopt;
   for (const std::string& stage : block.new_stages) stages_.number_of(stage);
-  std::uint64_t offset = at + payload.size() - block.records.size();  // the records are the payload's end
-  for (std::size_t i = 0; i < block.names.size(); ++i) {
-    entry({block.names[i], block.times[i], offset, block.sizes[i], block.key_sizes[i]});
-    offset += std::uint64_t{block.sizes[i]} + block.key_sizes[i];
+  if (block.body_bytes > bytes_ - body) return block.body_bytes;  // cut off
+  std::uint64_t offset = body;
+  for (std::size_t i = 0; i < count; ++i) {
+    entry({block.names[i], block.times[i], offset, block.sizes[i]});
+    offset += block.sizes[i];
   }
   last = block.names.empty();
-  return true;
+  return block.body_bytes;
 }
 
 /// Models are asked for about in the order in which they were remembered: one read serves many.
-std::span<const std::uint8_t> MemoSegment::look(std::uint64_t at, std::size_t bytes) const {
+std::span<const std::uint8_t> MemoSegment::look(Window& window, std::uint64_t at, std::size_t bytes) const {
   constexpr std::size_t kWindowBytes = 8 << 10;
-  if (at < window_at_ || at + bytes > window_at_ + window_.size()) {
+  if (at < window.at || at + bytes > window.at + window.bytes.size()) {
     const std::uint64_t rest = at < bytes_ ? bytes_ - at : 0;
-    window_.resize(static_cast<std::size_t>(std::min<std::uint64_t>(std::max(bytes, kWindowBytes), rest)));
-    window_at_ = at;
-    if (window_.size() < bytes || !read_at(file_.get(), at, window_)) window_.clear();
+    window.bytes.resize(static_cast<std::size_t>(std::min<std::uint64_t>(std::max(bytes, kWindowBytes), rest)));
+    window.at = at;
+    if (window.bytes.size() < bytes || !read_at(file_.get(), at, window.bytes)) window.bytes.clear();
   }
-  if (window_.empty()) return {};
-  return std::span(window_).subspan(static_cast<std::size_t>(at - window_at_), bytes);
+  if (window.bytes.empty()) return {};
+  return std::span(window.bytes).subspan(static_cast<std::size_t>(at - window.at), bytes);
 }
 
 std::optional<MemoRecord> MemoSegment::record(const MemoEntry& entry) const {
+  const std::span<const std::uint8_t> bytes = checked(look(record_window_, entry.offset, entry.bytes));
+  if (bytes.size() < kRecordHeadBytes - kCheckBytes) return std::nullopt;
   try {
-    return unpack_record(look(entry.offset, entry.bytes));
+    return unpack_record(bytes.subspan(kRecordHeadBytes - kCheckBytes));
   } catch (const FormatError&) {
     return std::nullopt;
   }
 }
 
 StageKeys MemoSegment::keys(const MemoEntry& entry) const {
+  const std::span<const std::uint8_t> bytes = look(record_window_, entry.offset, entry.bytes);
+  if (bytes.size() < kRecordHeadBytes || checked(bytes).empty()) return {};
+  RecordHead head;
+  std::memcpy(&head, bytes.data(), kRecordHeadBytes);
+  if (head.keys_ahead > kMostBlockBytes || head.key_bytes > kMostBlockBytes) return {};
   try {
-    return unpack_keys(look(entry.offset + entry.bytes, entry.key_bytes), stages_);
+    return unpack_keys(checked(look(key_window_, entry.offset + head.keys_ahead, head.key_bytes)), stages_);
   } catch (const FormatError&) {
     return {};
   }
@@ -174,38 +209,59 @@ StageKeys MemoSegment::keys(const MemoEntry& entry) const {
 
 void MemoSegmentWriter::add(const MemoName& name, const MemoRecord& record) {
   const std::vector<std::uint8_t> bytes = pack_record(record), keys = pack_keys(record.keys, stages_);
-  const std::size_t size = bytes.size() + keys.size();
+  const std::size_t size = kRecordHeadBytes + bytes.size() + kCheckBytes + keys.size();
   if (size > kMostBlockBytes / 2) return;  // a model of ten thousand files is looked at again
-  if (records_.size() + size > kFullBlockBytes) flush();
+  if (records_.size() + keys_.size() + size > kFullBlockBytes) flush();
   names_.push_back(name);
   times_.push_back(record.looked_at_ns);
-  sizes_.push_back(static_cast<std::uint32_t>(bytes.size()));
-  key_sizes_.push_back(static_cast<std::uint32_t>(keys.size()));
+  const RecordHead head{0, static_cast<std::uint32_t>(keys_.size()),
+                        static_cast<std::uint32_t>(kCheckBytes + keys.size())};
+  sizes_.push_back(static_cast<std::uint32_t>(kRecordHeadBytes + bytes.size()));
+  append_bytes(records_, &head, sizeof head);
   records_.insert(records_.end(), bytes.begin(), bytes.end());
-  records_.insert(records_.end(), keys.begin(), keys.end());
+  const std::uint64_t check = check_of(keys);
+  append_bytes(keys_, &check, sizeof check);
+  keys_.insert(keys_.end(), keys.begin(), keys.end());
+}
+
+/// Where the keys begin is known when the block's last record is.
+void MemoSegmentWriter::end_records() {
+  std::size_t at = 0;
+  for (const std::uint32_t size : sizes_) {
+    RecordHead head;
+    std::memcpy(&head, records_.data() + at, sizeof head);
+    head.keys_ahead += static_cast<std::uint32_t>(records_.size() - at);
+    std::memcpy(records_.data() + at, &head, sizeof head);
+    head.check = check_of(std::span(records_).subspan(at + kCheckBytes, size - kCheckBytes));
+    std::memcpy(records_.data() + at, &head.check, kCheckBytes);
+    at += size;
+  }
 }
 
 bool MemoSegmentWriter::flush() {
   if (names_.empty()) return !failed_;
+  end_records();
   const auto first_new = stages_.all().begin() + static_cast<std::ptrdiff_t>(stages_written_);
-  Block block{{first_new, stages_.all().end()},
-              std::move(names_),
-              std::move(times_),
-              std::move(sizes_),
-              std::move(key_sizes_),
-              std::move(records_)};
-  names_.clear(), times_.clear(), sizes_.clear(), key_sizes_.clear(), records_.clear();
+  const Block block{{first_new, stages_.all().end()},
+                    std::move(names_),
+                    std::move(times_),
+                    std::move(sizes_),
+                    records_.size() + keys_.size()};
+  records_.insert(records_.end(), keys_.begin(), keys_.end());
   stages_written_ = stages_.all().size();
-  return append(encode_artefact(block));
+  const bool written = append(encode_artefact(block), records_);
+  names_.clear(), times_.clear(), sizes_.clear(), keys_.clear(), records_.clear();
+  return written;
 }
 
-bool MemoSegmentWriter::append(std::span<const std::uint8_t> payload) {
+bool MemoSegmentWriter::append(std::span<const std::uint8_t> payload, std::span<const std::uint8_t> body) {
   if (failed_ || !open()) return failed_ = true, false;
   std::vector<std::uint8_t> bytes(kBlockHeadBytes);
   const BlockHead head{payload.size(), sha256(payload)};
   std::memcpy(bytes.data(), &head.bytes, 8);
   std::memcpy(bytes.data() + 8, head.digest.data(), 32);
   bytes.insert(bytes.end(), payload.begin(), payload.end());
+  bytes.insert(bytes.end(), body.begin(), body.end());
   failed_ = !write_to_end(file_.get(), bytes);
   return !failed_;
 }
@@ -229,7 +285,7 @@ bool MemoSegmentWriter::open() {
 bool MemoSegmentWriter::finish() {
   flush();
   if (file_.get() < 0 || failed_) return file_.reset(), false;
-  const bool ended = append(encode_artefact(Block{}));
+  const bool ended = append(encode_artefact(Block{}), {});
   file_.reset();
   const std::string final_path =
       path_.substr(0, path_.size() - kOpenEnding.size()) + std::string(kFinishedEnding);

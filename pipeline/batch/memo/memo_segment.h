@@ -23,21 +23,22 @@ struct MemoEntry {
   MemoName name{};
   std::int64_t looked_at_ns = 0;
   std::uint64_t offset = 0;
-  std::uint32_t bytes = 0, key_bytes = 0;  // the keys stand behind the record
+  std::uint32_t bytes = 0;
 };
 
-// File: 8 bytes of magic; then blocks of at most kMostBlockBytes:
+// File: 8 bytes of magic; then blocks of at most kMostBlockBytes and as much again:
 //   u64 size of the payload, SHA-256 of the payload, payload = archive of
-//   names of stages that are new in this block, names and times of the records, sizes of each and of its
-//   keys, all their bytes.
+//   names of stages that are new in this block, names and times of the records, sizes of each, size of the body;
+//   body = the records, then the keys of each. Each of both begins with the first 8 bytes of the SHA-256 of its rest,
+//   and is checked when it is asked for: a run that finds everything up to date reads no keys, which are two thirds.
 // A finished file ends with a block without records, and its name with ".seg"; that of a file that is being
 // written ends with ".open", and what is cut off at its end is no damage.
 
 /// Reads a segment. Not thread-safe.
 class MemoSegment {
  public:
-  /// Opens the file, checks every block, and tells of each record that a sound block holds. Nothing when
-  /// there is no such file (it has been merged into another), or when it cannot be opened.
+  /// Opens the file, checks every block's payload, and tells of each record that a sound block names. Nothing
+  /// when there is no such file (it has been merged into another), or when it cannot be opened.
   static std::unique_ptr<MemoSegment> read(const std::string& path,
                                            const std::function<void(MemoEntry)>& entry);
 
@@ -45,28 +46,32 @@ class MemoSegment {
   std::uint64_t bytes() const { return bytes_; }
   std::int64_t modified_ns() const { return modified_ns_; }
   bool is_finished() const;
-  /// Not all of it was believed.
+  /// Not all of its blocks were believed. Records have checks of their own.
   bool is_damaged() const { return damaged_; }
-  /// The record of an entry that read() told of, without its keys; nothing when the file has changed.
+  /// The record of an entry that read() told of, without its keys; nothing where its bytes are damaged.
   std::optional<MemoRecord> record(const MemoEntry& entry) const;
-  /// The record's keys; none when the file has changed.
+  /// The record's keys; none where the bytes of either are damaged.
   StageKeys keys(const MemoEntry& entry) const;
 
  private:
+  struct Window {
+    std::vector<std::uint8_t> bytes;
+    std::uint64_t at = 0;
+  };
   MemoSegment() = default;
   bool read_blocks(const std::function<void(MemoEntry)>& entry);
-  bool tell_block(std::span<const std::uint8_t> payload, std::uint64_t at,
-                  const std::function<void(MemoEntry)>& entry, bool& last);
+  /// The body's size, whose records begin at `body` in the file; nothing for a payload that contradicts itself.
+  std::optional<std::uint64_t> tell_block(std::span<const std::uint8_t> payload, std::uint64_t body,
+                                          const std::function<void(MemoEntry)>& entry, bool& last);
   /// Bytes of the file; fewer when it has changed.
-  std::span<const std::uint8_t> look(std::uint64_t at, std::size_t bytes) const;
+  std::span<const std::uint8_t> look(Window& window, std::uint64_t at, std::size_t bytes) const;
   std::string path_;
   Descriptor file_;
   std::uint64_t bytes_ = 0;
   std::int64_t modified_ns_ = 0;
   bool damaged_ = false;
   StageNames stages_;
-  mutable std::vector<std::uint8_t> window_;
-  mutable std::uint64_t window_at_ = 0;
+  mutable Window record_window_, key_window_;
 };
 
 /// Writes a segment of its own, which no other process writes. The file is made with the first record. Losing
@@ -89,7 +94,8 @@ class MemoSegmentWriter {
 
  private:
   bool open();
-  bool append(std::span<const std::uint8_t> payload);
+  void end_records();
+  bool append(std::span<const std::uint8_t> payload, std::span<const std::uint8_t> body);
   std::string folder_, path_;  // of the file while it is written
   Descriptor file_;
   bool failed_ = false;
@@ -97,8 +103,8 @@ class MemoSegmentWriter {
   std::size_t stages_written_ = 0;
   std::vector<MemoName> names_;
   std::vector<std::int64_t> times_;
-  std::vector<std::uint32_t> sizes_, key_sizes_;
-  std::vector<std::uint8_t> records_;
+  std::vector<std::uint32_t> sizes_;
+  std::vector<std::uint8_t> records_, keys_;
 };
 
 }  // namespace texmesh

@@ -71,7 +71,7 @@ TEST(MemoSegment, AFileThatIsNoSegmentIsDamagedAndAMissingOneIsNone) {
   const TemporaryFolder folder;
   bool damaged = false;
   for (const std::string& text :
-       {std::string("not a segment at all"), std::string("TXMEMO\0\1", 8), std::string()}) {
+       {std::string("not a segment at all"), std::string("TXMEMO\0\2", 8), std::string()}) {
     testing::write_text(folder / "a.seg", text);
     EXPECT_TRUE(entries_of(folder / "a.seg", damaged).empty());
     EXPECT_TRUE(damaged) << text;
@@ -81,34 +81,34 @@ TEST(MemoSegment, AFileThatIsNoSegmentIsDamagedAndAMissingOneIsNone) {
 }
 
 /// A finished file with one block, whose digest is right.
-std::string with_block(const std::vector<std::uint8_t>& payload) {
+std::string with_block(const std::vector<std::uint8_t>& payload, const std::string& body = "") {
   const Sha256 digest = sha256(payload);
-  std::string file("TXMEMO\0\2", 8);
+  std::string file("TXMEMO\0\3", 8);
   for (int i = 0; i < 8; ++i) file += static_cast<char>(payload.size() >> 8 * i);
   file.append(digest.begin(), digest.end());
-  return file.append(payload.begin(), payload.end());
+  return file.append(payload.begin(), payload.end()) + body;
 }
 
 struct HostileBlock {
   std::vector<std::string> stages;
   std::vector<MemoName> names;
   std::vector<std::int64_t> times;
-  std::vector<std::uint32_t> sizes, key_sizes;
-  std::vector<std::uint8_t> records;
+  std::vector<std::uint32_t> sizes;
+  std::uint64_t body_bytes = 0;
   template <class S, class A>
   static void archive(S& s, A& a) {
-    a(s.stages, s.names, s.times, s.sizes, s.key_sizes, s.records);
+    a(s.stages, s.names, s.times, s.sizes, s.body_bytes);
   }
 };
 
 TEST(MemoSegment, BlocksThatContradictThemselvesAreNotBelieved) {
   const TemporaryFolder folder;
-  const HostileBlock blocks[] = {
-      {{}, {MemoName{}}, {}, {1}, {0}, {0}},    {{}, {MemoName{}}, {1}, {}, {0}, {0}},
-      {{}, {MemoName{}}, {1}, {1}, {}, {0}},    {{}, {MemoName{}}, {1}, {2}, {0}, {0}},
-      {{}, {MemoName{}}, {1}, {~0u}, {2}, {0}}, {{}, {}, {}, {}, {}, {0}}};
+  const HostileBlock blocks[] = {{{}, {MemoName{}}, {}, {1}, 1},         {{}, {MemoName{}}, {1}, {}, 1},
+                                 {{}, {MemoName{}}, {1}, {2}, 1},        {{}, {}, {1}, {}, 1},
+                                 {{}, {MemoName{}}, {1}, {~0u}, ~0u},    {{}, {MemoName{}}, {1}, {1}, 2},
+                                 {{}, {MemoName{}}, {1}, {1}, ~0ull - 7}, {{}, {}, {}, {}, 0}};
   for (const HostileBlock& block : blocks) {
-    testing::write_text(folder / "a.seg", with_block(encode_artefact(block)));
+    testing::write_text(folder / "a.seg", with_block(encode_artefact(block), "x"));
     bool damaged = false;
     EXPECT_TRUE(entries_of(folder / "a.seg", damaged).empty());
     EXPECT_TRUE(damaged) << &block - blocks;
@@ -117,15 +117,29 @@ TEST(MemoSegment, BlocksThatContradictThemselvesAreNotBelieved) {
   testing::write_text(folder / "a.seg", with_block({1, 2, 3}));
   EXPECT_TRUE(entries_of(folder / "a.seg", damaged).empty());
   EXPECT_TRUE(damaged);
-  // A record of garbage is told of, and then not believed.
-  testing::write_text(folder / "a.open",
-                      with_block(encode_artefact(HostileBlock{{}, {{}}, {1}, {3}, {2}, {1, 2, 3, 4, 5}})));
-  std::vector<MemoEntry> entries;
-  const auto segment =
-      MemoSegment::read(folder / "a.open", [&](const MemoEntry& e) { entries.push_back(e); });
-  ASSERT_EQ(entries.size(), 1u);
-  EXPECT_FALSE(segment->record(entries[0]).has_value());
-  EXPECT_TRUE(segment->keys(entries[0]).empty());
+}
+
+/// As a record or its keys stand in a file.
+std::string checked(const std::string& bytes) {
+  const std::uint64_t check = truncated(sha256_of_text(bytes));
+  return std::string(reinterpret_cast<const char*>(&check), sizeof check) + bytes;
+}
+
+TEST(MemoSegment, ARecordOfGarbageIsToldOfAndThenNotBelieved) {
+  const TemporaryFolder folder;
+  const std::string far("\xff\xff\xff\x7f\xff\xff\xff\x7f", 8), outside("\0\0\1\0\0\0\1\0", 8), here("\0\0\0\0\5\0\0\0", 8);
+  for (const std::string& record : {std::string("12345"), std::string("12345678901234567890"), checked(""), checked("1234"),
+                                    checked(far), checked(far + "text"), checked(outside + "text"), checked(here + "text")}) {
+    const auto bytes = static_cast<std::uint32_t>(record.size());
+    testing::write_text(folder / "a.open",
+                        with_block(encode_artefact(HostileBlock{{}, {{}}, {1}, {bytes}, bytes}), record));
+    std::vector<MemoEntry> entries;
+    const auto segment =
+        MemoSegment::read(folder / "a.open", [&](const MemoEntry& e) { entries.push_back(e); });
+    ASSERT_EQ(entries.size(), 1u);
+    EXPECT_FALSE(segment->record(entries[0]).has_value());
+    EXPECT_TRUE(segment->keys(entries[0]).empty());
+  }
 }
 
 }  // namespace
