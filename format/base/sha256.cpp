@@ -2,6 +2,7 @@
 
 #include <openssl/evp.h>
 
+#include <memory>
 #include <stdexcept>
 
 namespace texmesh {
@@ -13,14 +14,21 @@ const EVP_MD* algorithm() {
   return md;
 }
 
+/// Kept for the thread: to make one takes longer than to digest a name.
+EVP_MD_CTX* context() {
+  static thread_local const std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> kept(EVP_MD_CTX_new(),
+                                                                                         &EVP_MD_CTX_free);
+  return kept.get();
+}
+
 }  // namespace
 
 Sha256 sha256(std::span<const std::uint8_t> bytes) {
   Sha256 digest{};
   unsigned size = 0;
-  if (!algorithm() ||
-      EVP_Digest(bytes.data(), bytes.size(), digest.data(), &size, algorithm(), nullptr) != 1 ||
-      size != digest.size())
+  if (!algorithm() || !context() || EVP_DigestInit_ex2(context(), algorithm(), nullptr) != 1 ||
+      EVP_DigestUpdate(context(), bytes.data(), bytes.size()) != 1 ||
+      EVP_DigestFinal_ex(context(), digest.data(), &size) != 1 || size != digest.size())
     throw std::runtime_error("SHA-256 is not available from OpenSSL");
   return digest;
 }
