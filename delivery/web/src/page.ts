@@ -1,4 +1,5 @@
 import type { WebGLRenderer } from 'three';
+import { bootstrapBytes, startBytes } from './format/layout';
 import { nowS } from './http/clock';
 import { type TexmeshPackage, open } from './open';
 import { nextStep } from './page/model_queue';
@@ -8,11 +9,13 @@ import { defaultMemoryBytes, linkBytesS, shareOf, turnS } from './page/schedule'
 import { Visibility } from './page/visibility';
 import type { GltfLoaderLike, Turn } from './scene/api';
 import { Emitter } from './scene/events';
-import { GpuRoom } from './scene/memory/gpu_room';
 import { SharedWorkers } from './worker/shared_workers';
 
 export type * from './page/page_model';
 export type { Orbit } from './page/framing';
+
+/** So many packages share the link without harm: one round trip each costs as much as the bytes behind the first pictures. */
+const fewModels = 2;
 
 /** Options of a TexmeshPage. */
 export interface PageOptions {
@@ -47,7 +50,6 @@ export interface PageEvents {
  */
 export class TexmeshPage {
   private readonly mostBytes_: number;
-  private readonly room_: GpuRoom;
   private readonly models_ = new Map<Element, PageModel>();
   private readonly painter_: Painter;
   private readonly workers_: SharedWorkers;
@@ -60,6 +62,7 @@ export class TexmeshPage {
   private said_ = { pictures: true, deadline: true };
   private frame_ = 0;
   private advancing_ = false;
+  private preparing_?: ReturnType<typeof setTimeout>;
   private disposed_ = false;
 
   /** InputError of a load where an option has a value that it cannot have. */
@@ -67,7 +70,6 @@ export class TexmeshPage {
     const { hardwareConcurrency: cores = 2 } = globalThis.navigator ?? {};
     this.mostBytes_ = options_.memoryBytes ?? deviceMemoryBytes();
     this.painter_ = new Painter(options_.renderer);
-    this.room_ = GpuRoom.of(this.renderer);
     this.workers_ = new SharedWorkers(options_.workers ?? Math.min(4, Math.max(2, cores - 1)), options_.workerUrl);
     this.visibility_ = new Visibility((canvas, resized) => this.placeChanged_(canvas, resized));
   }
@@ -92,7 +94,7 @@ export class TexmeshPage {
   }
   /** Most bytes on the GPU: what the page was given, or less where the GPU has shown that it holds less. */
   get memoryBytes(): number {
-    return Math.min(this.mostBytes_, this.room_.limitBytes);
+    return Math.min(this.mostBytes_, this.painter_.limitBytes);
   }
   /** Bytes on the GPU now. */
   get gpuBytes(): number {
@@ -121,7 +123,8 @@ export class TexmeshPage {
   // ---- what models ask for
 
   private readonly host_: Host = {
-    open: (url: string, options: OpenHow): Promise<TexmeshPackage> => open(url, { ...options, shared: this.workers_, workerUrl: this.options_.workerUrl }),
+    open: (url: string, options: OpenHow): Promise<TexmeshPackage> =>
+      open(url, { startBytes: this.startBytes_, ...options, shared: this.workers_, workerUrl: this.options_.workerUrl }),
     loadOptions: () => ({ renderer: this.painter_.renderer, gltfLoader: this.options_.gltfLoader, workers: 2 }),
     memoryBytes: (model) => this.memoryOf_(model),
     turn: (model) =>
@@ -138,6 +141,10 @@ export class TexmeshPage {
       this.advance_();
     },
   };
+  /** Of several packages, each asks for its manifest and little more: what stands behind one's first picture would keep the others' waiting. */
+  private get startBytes_(): number {
+    return this.waiting_.length > fewModels ? bootstrapBytes : startBytes;
+  }
   /** What is seen has nearly all of the memory; what is only close by has a picture. */
   private memoryOf_(model: PageModel): number {
     const areas = this.models.filter((m) => m.place.visible || m === model).map((m) => m.place.areaPx);
@@ -158,9 +165,18 @@ export class TexmeshPage {
     queueMicrotask(() => {
       this.advancing_ = false;
       if (this.disposed_) return;
+      this.visibility_.glance();
       this.beginPeriod_();
       for (let step = this.nextStep_(); step; step = this.nextStep_()) this.take_(step);
       this.tell_();
+    });
+  }
+  /** Makes the graphics context while the first bytes come: nobody is asked for bytes while a context is being made. */
+  private prepare_(): void {
+    this.preparing_ ??= setTimeout(() => {
+      try {
+        if (!this.disposed_) void this.renderer;
+      } catch { /* each model says it */ }
     });
   }
   private nextStep_(): ReturnType<typeof nextStep> {
@@ -171,8 +187,10 @@ export class TexmeshPage {
   }
   private take_(step: NonNullable<ReturnType<typeof nextStep>>): void {
     const { model } = step;
-    if (step.what === 'open') void model.begin();
-    else if (step.what === 'release') {
+    if (step.what === 'open') {
+      void model.begin();
+      this.prepare_();
+    } else if (step.what === 'release') {
       this.dropped_(model);
       model.release();
     } else if (step.what === 'turn') this.giveTurn_(model, step.among);

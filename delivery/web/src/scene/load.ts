@@ -51,6 +51,7 @@ class ModelLoad {
   private readonly source_: ScaleSource;
   private readonly scale_: ShownScale;
   private readonly proxies_: ProxyChoice;
+  private shape_?: Promise<Object3D>; // the coarsest scale's
   private coming_?: Promise<TextureLoad>;
   private refining_?: Promise<void>;
   private refineAgain_ = false;
@@ -134,9 +135,14 @@ class ModelLoad {
   private startScales_(): Promise<void> {
     const { context } = this;
     const { shape, shown } = this.scale_.load(context.reader.manifest.scales.at(-1)!.scale);
-    this.coming_ = Promise.all([import('./texture_load'), shape]).then(([part]) => part.openTextureLoad(context, this.scale_, this.source_));
-    this.coming_.catch(() => undefined);
+    this.shape_ = shape;
+    if (!context.options.turn || context.phase !== 'first-picture') void this.openTextures_(); // others wait for their first pictures
     return shown;
+  }
+  private openTextures_(): Promise<TextureLoad> {
+    this.coming_ ??= Promise.all([import('./texture_load'), this.shape_]).then(([part]) => part.openTextureLoad(this.context, this.scale_, this.source_));
+    this.coming_.catch(() => undefined);
+    return this.coming_;
   }
   private async showInTime_(): Promise<void> {
     const { context } = this;
@@ -151,11 +157,11 @@ class ModelLoad {
   private async showTextures_(): Promise<void> {
     const { context } = this;
     context.enter('tables');
-    if (!this.coming_) {
+    if (!this.shape_) {
       await this.proxies_.showStep(() => context.reader.prefetchDocuments(context.signal, true));
       await this.startScales_();
     }
-    this.textures = await this.coming_!;
+    this.textures = await this.openTextures_();
     throwIfAborted(context.signal);
     await this.textures.timedPart();
     context.phase = 'refining';
