@@ -5,7 +5,7 @@ import { type TexmeshPackage, open } from './open';
 import { nextStep } from './page/model_queue';
 import { type Host, type OpenHow, PageModel, type PageModelOptions } from './page/page_model';
 import { Painter } from './page/painter';
-import { defaultMemoryBytes, linkBytesS, shareOf, turnS } from './page/schedule';
+import { defaultMemoryBytes, leastS, linkBytesS, shareOf, turnS } from './page/schedule';
 import { Visibility } from './page/visibility';
 import type { GltfLoaderLike, Turn } from './scene/api';
 import { Emitter } from './scene/events';
@@ -55,7 +55,7 @@ export class TexmeshPage {
   private readonly workers_: SharedWorkers;
   private readonly visibility_: Visibility;
   private readonly events_ = new Emitter<PageEvents>();
-  private readonly turns_ = new Map<PageModel, (turn: Turn) => void>();
+  private readonly turns_ = new Map<PageModel, { bytes: number; given: (turn: Turn) => void }>();
   private readonly dirty_ = new Set<PageModel>();
   private refining_?: PageModel;
   private startS_ = 0;
@@ -127,9 +127,9 @@ export class TexmeshPage {
       open(url, { startBytes: this.startBytes_, ...options, shared: this.workers_, workerUrl: this.options_.workerUrl }),
     loadOptions: () => ({ renderer: this.painter_.renderer, gltfLoader: this.options_.gltfLoader, workers: 2 }),
     memoryBytes: (model) => this.memoryOf_(model),
-    turn: (model) =>
+    turn: (model, bytes) =>
       new Promise((given) => {
-        this.turns_.set(model, given);
+        this.turns_.set(model, { bytes, given });
         this.advance_();
       }),
     changed: () => this.advance_(),
@@ -203,13 +203,15 @@ export class TexmeshPage {
     }
   }
   private giveTurn_(model: PageModel, among: readonly PageModel[]): void {
-    const given = this.turns_.get(model)!;
+    const { bytes, given } = this.turns_.get(model)!;
     this.turns_.delete(model);
     const leftS = this.startS_ + this.limitS_ - nowS();
     const areas = among.map((m) => m.place.areaPx);
     const records = this.models.flatMap((m) => m.package?.requests ?? []);
+    const bytesS = linkBytesS(records, nowS());
     model.phase = 'turn'; // at once: nobody else has it
-    given({ seconds: turnS(leftS, model.place.areaPx, areas), bytesS: linkBytesS(records, nowS()) || undefined });
+    const least = leastS(bytes, bytesS, model.package?.client.latencyS ?? 0);
+    given({ seconds: turnS(leftS, model.place.areaPx, areas, least), bytesS: bytesS || undefined });
   }
   private get limitS_(): number {
     return this.options_.time ?? 5;

@@ -58,8 +58,8 @@ export interface Host {
   loadOptions(): Pick<LoadOptions, 'renderer' | 'gltfLoader' | 'workers' | 'workerUrl'>;
   /** Bytes that the model may take on the GPU. */
   memoryBytes(model: PageModel): number;
-  /** Resolves when it is the model's turn. */
-  turn(model: PageModel): Promise<Turn>;
+  /** Resolves when it is the model's turn, which fetches so many bytes however short it is. */
+  turn(model: PageModel, bytes: number): Promise<Turn>;
   /** Something has changed that the page may act upon. */
   changed(model: PageModel): void;
   /** The picture is to be drawn anew. */
@@ -218,8 +218,8 @@ export class PageModel {
       meshes: 'auto', ...this.options_.load, ...host.loadOptions(), camera, signal, time: Infinity, autoRefine: false,
       display: () => this.display_(pkg),
       memoryBytes: () => host.memoryBytes(this),
-      turn: async () => {
-        const turn = await host.turn(this);
+      turn: async (bytes) => {
+        const turn = await host.turn(this, bytes);
         this.enter_('turn');
         return turn;
       },

@@ -11,6 +11,7 @@ export class Painter {
   get renderer(): WebGLRenderer {
     if (this.given_ ?? this.own_) return (this.given_ ?? this.own_)!;
     const renderer = (this.own_ = new WebGLRenderer({ antialias: true, alpha: true, powerPreference: 'high-performance' }));
+    renderer.debug.checkShaderErrors = false; // each question waits for the compiler, and the programs are three.js's own
     renderer.toneMapping = NeutralToneMapping;
     renderer.setClearAlpha(0);
     return renderer;

@@ -146,13 +146,19 @@ class ModelLoad {
   }
   private async showInTime_(): Promise<void> {
     const { context } = this;
-    await context.turn();
+    await context.turn(this.bytesOfAnyTurn_());
     // A turn without time leaves what stands: other models' turns would begin later.
     if ((context.options.turn && context.limitS <= context.elapsedS()) || (await this.proxies_.showServing())) {
       context.emit('deadline', { limit: context.limitS, actual: context.elapsedS(), skipped: 0 });
       return this.rest_();
     }
     await this.showTextures_();
+  }
+  private bytesOfAnyTurn_(): number {
+    const { context: { reader: { manifest: { proxies, scales, index, tables } } }, scale_: { proxy } } = this;
+    const serving = this.proxies_.serving();
+    if (serving >= 0) return serving > proxy.shown ? proxies[serving].glb.bytes : 0;
+    return tables.offset + tables.bytes - index.offset + (this.shape_ ? 0 : scales[scales.length - 1].glb.bytes);
   }
   private async showTextures_(): Promise<void> {
     const { context } = this;
