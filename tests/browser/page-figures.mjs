@@ -115,6 +115,40 @@ for (const which of shown.filter((name) => name !== 'memory'))
     }
     await context.close();
   }
+/** Runs in the page before anything else: a device of so many GB of memory, whose GPU has compressed formats or has none. */
+function deviceWith([gb, blocks]) {
+  Object.defineProperty(navigator, 'deviceMemory', {get: () => gb});
+  const own = WebGL2RenderingContext.prototype.getExtension;
+  WebGL2RenderingContext.prototype.getExtension = function (name) { return /compress/.test(name) && !blocks ? null : own.call(this, name); };
+}
+/** All that a screen of twice the density can show of twenty scans, within the default limit of a device; the link does not count. */
+async function memory(gb, blocks) {
+  const context = await browser.newContext({viewport: {width: 1280, height: 900}, deviceScaleFactor: 2});
+  const page = await context.newPage();
+  await page.addInitScript(countStorage);
+  await page.addInitScript(deviceWith, [gb, blocks]);
+  await page.goto(`${server.url}/texmesh.html`, {waitUntil: 'commit'});
+  const all = () => [...document.querySelectorAll('texmesh-viewer')];
+  await page.waitForFunction(`(${all})().every((e) => e.model?.phase === 'shown' && e.model.complete)`, null, {timeout: 300000});
+  const r = await page.evaluate(async () => {
+    const {texmeshPage} = await import('/viewer/texmesh-viewer.js');
+    const {gpuBytes, memoryBytes, models} = texmeshPage();
+    const planes = models.flatMap((m) => m.load.state.planes);
+    return {gpuBytes, memoryBytes, stored: window.storedBytes(), texels: planes.reduce((sum, p) => sum + p.widthPx * p.heightPx, 0), formats: [...new Set(planes.map((p) => p.texels))].sort()};
+  });
+  await page.screenshot({path: path.join(pictures, `grid-memory-${gb}-${blocks ? 'blocks' : 'rgba'}.png`), timeout: 60000});
+  await context.close();
+  check(Math.abs(r.gpuBytes - r.stored) <= 0.02 * r.stored + 70000 && r.gpuBytes <= r.memoryBytes, JSON.stringify(r));
+  return r;
+}
+if (shown.includes('memory')) {
+  console.log('\nall that 512 x 400 px can show of each of them\n\n| limit, MB | formats of the GPU | counted, MB | stored, MB | textures, Mpixel | as |\n|--:|---|--:|--:|--:|---|');
+  for (const gb of [4, 0.5])
+    for (const blocks of [false, true]) {
+      const r = await memory(gb, blocks);
+      console.log(`| ${[r.memoryBytes / 1e6, blocks ? 'BC' : 'RGBA alone', (r.gpuBytes / 1e6).toFixed(1), (r.stored / 1e6).toFixed(1), (r.texels / 1e6).toFixed(1), r.formats.join(', ')].join(' | ')} |`);
+    }
+}
 for (const which of shown.filter((name) => name !== 'memory')) {
   const context = await browser.newContext({viewport: {width: 1280, height: 900}});
   await visit(context, which, {shots: true});

@@ -145,10 +145,14 @@ export class TexmeshPage {
   private get startBytes_(): number {
     return this.waiting_.length > fewModels ? bootstrapBytes : startBytes;
   }
-  /** What is seen has nearly all of the memory; what is only close by has a picture. */
+  /**
+   * What is seen has nearly all of the memory; what is only close by has a picture. Some models take more than their share however coarse they
+   * are: those that come later have the less.
+   */
   private memoryOf_(model: PageModel): number {
     const areas = this.models.filter((m) => m.place.visible || m === model).map((m) => m.place.areaPx);
-    return this.memoryBytes * shareOf(model.place.areaPx, areas);
+    const free = this.memoryBytes - (this.gpuBytes - model.gpuBytes);
+    return Math.max(0, Math.min(this.memoryBytes * shareOf(model.place.areaPx, areas), free));
   }
   private dropped_(model: PageModel): void {
     this.turns_.delete(model);
