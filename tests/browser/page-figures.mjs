@@ -3,7 +3,7 @@
 // A grid of fewer scans repeats them under other addresses: nothing is fetched once for two elements. Words: the number of
 // runs (default 3), and `texmesh`, `model-viewer` or `memory` (what limits and blocks make of it) for one of them alone.
 import {check, env, fs, here, launch, listen, path, pictures, run, serve} from './browser.mjs';
-import {countStorage} from './gpu-storage.mjs';
+import {countStorage, onlyFormats} from './gpu-storage.mjs';
 import {startLink} from './link.mjs';
 import {starvation} from './starved.mjs';
 
@@ -115,18 +115,13 @@ for (const which of shown.filter((name) => name !== 'memory'))
     }
     await context.close();
   }
-/** Runs in the page before anything else: a device of so many GB of memory, whose GPU has compressed formats or has none. */
-function deviceWith([gb, blocks]) {
-  Object.defineProperty(navigator, 'deviceMemory', {get: () => gb});
-  const own = WebGL2RenderingContext.prototype.getExtension;
-  WebGL2RenderingContext.prototype.getExtension = function (name) { return /compress/.test(name) && !blocks ? null : own.call(this, name); };
-}
 /** All that a screen of twice the density can show of twenty scans, within the default limit of a device; the link does not count. */
 async function memory(gb, blocks) {
   const context = await browser.newContext({viewport: {width: 1280, height: 900}, deviceScaleFactor: 2});
   const page = await context.newPage();
   await page.addInitScript(countStorage);
-  await page.addInitScript(deviceWith, [gb, blocks]);
+  await page.addInitScript((memory) => Object.defineProperty(navigator, 'deviceMemory', {get: () => memory}), gb);
+  if (!blocks) await page.addInitScript(onlyFormats, []);
   await page.goto(`${server.url}/texmesh.html`, {waitUntil: 'commit'});
   const all = () => [...document.querySelectorAll('texmesh-viewer')];
   await page.waitForFunction(`(${all})().every((e) => e.model?.phase === 'shown' && e.model.complete)`, null, {timeout: 300000});
