@@ -62,10 +62,11 @@ std::string head_html(const std::string& title, const std::string& root, bool fr
       "default-src 'none'; script-src 'self' file:; style-src 'self' file:; img-src 'self' file:; {}base-uri 'none'; form-action 'none'",
       frames ? "frame-src 'self' file:; " : "");
   return page_beginning(title, policy) +
-         fmt::format("<link rel=\"icon\" href=\"{0}icon.svg\" type=\"image/svg+xml\">\n"
-                     "<link rel=\"stylesheet\" href=\"{0}gallery.css\">\n"
-                     "<script defer=\"\" src=\"{0}gallery.js\"></script>\n",
-                     root);
+         fmt::format(
+             "<link rel=\"icon\" href=\"{0}icon.svg\" type=\"image/svg+xml\">\n"
+             "<link rel=\"stylesheet\" href=\"{0}gallery.css\">\n"
+             "<script defer=\"\" src=\"{0}gallery.js\"></script>\n",
+             root);
 }
 
 std::string index_page(const Gallery& gallery) {

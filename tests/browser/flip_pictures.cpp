@@ -1,5 +1,5 @@
-// flip_pictures REFERENCE.png PICTURE.png..: mean FLIP of each picture, one line each. Pictures are square and of one size; what they show
-// is what is not transparent.
+// flip_pictures REFERENCE.png PICTURE.png..: mean FLIP of each picture, one line each. Pictures are square
+// and of one size; what they show is what is not transparent.
 #include <fstream>
 #include <iostream>
 #include <iterator>

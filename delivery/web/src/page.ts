@@ -27,7 +27,7 @@ export interface PageOptions {
   time?: number;
   /** Bytes that all models may take on the GPU. Default: by the device. */
   memoryBytes?: number;
-  /** Packages that are opened at once. Default 6, the connections that a browser has for a server. */
+  /** Packages whose manifests and first pictures come at once. Default 6, the connections that a browser has for a server. */
   openAtOnce?: number;
   /** Workers of all models. Default: 2 to 4 by the number of cores. */
   workers?: number;
