@@ -14,6 +14,8 @@ set_tests_properties(delivery_web PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 600 LAB
 if(TARGET texmesh AND TARGET make_scan)
   add_executable(compose_plane browser/compose_plane.cpp)
   target_link_libraries(compose_plane PRIVATE texmesh_stages texmesh_delivery)
+  add_executable(flip_pictures browser/flip_pictures.cpp)
+  target_link_libraries(flip_pictures PRIVATE texmesh_stages)
   add_executable(export_environment browser/export_environment.cpp)
   target_link_libraries(export_environment PRIVATE texmesh_stages nlohmann_json::nlohmann_json)
   add_test(NAME web_browser COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/browser/run ${CMAKE_CURRENT_BINARY_DIR}/browser

@@ -120,8 +120,11 @@ void add_pictures(Experiment& experiment, const StimulusSet& set, const RenderEn
 void add_page(Experiment& experiment, const std::string& design_json) {
   const std::string origin = url_origin(experiment.design.options.post_url);
   // What a Content-Security-Policy names to let the page post there; nothing for the page's own server.
-  const TemplateValues values{{"title", markup_escaped(experiment.design.options.title)},
-                              {"connect", origin.empty() ? "" : " " + markup_escaped(origin)}};
+  const std::string policy =
+      "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'" +
+      (origin.empty() ? "" : " " + markup_escaped(origin)) + "; base-uri 'none'; form-action 'none'";
+  const std::string& title = experiment.design.options.title;
+  const TemplateValues values{{"beginning", page_beginning(title, policy)}, {"title", markup_escaped(title)}};
   for (const BuiltInFile& file : experiment_page_files()) {
     const std::string text = file.name == "index.html" ? filled(file.text, values) : std::string(file.text);
     experiment.files.push_back({std::string(file.name), {text.begin(), text.end()}});

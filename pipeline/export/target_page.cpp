@@ -8,7 +8,6 @@
 #include "pipeline/batch/progress.h"
 #include "pipeline/export/page_files.h"
 #include "pipeline/io/markup.h"
-#include "pipeline/io/uri.h"
 #include "pipeline/report/package_words.h"
 
 namespace texmesh {
@@ -17,12 +16,6 @@ namespace {
 std::string_view export_template(std::string_view name) {
   const auto files = export_page_files();
   return std::ranges::find(files, name, &BuiltInFile::name)->text;
-}
-
-/// How a page may name where it loads a script from.
-std::string source_of_script(const std::string& url) {
-  const std::string origin = url_origin(url);
-  return origin.empty() ? "'self'" : origin;
 }
 
 }  // namespace
@@ -43,12 +36,13 @@ std::string model_viewer_page(PackageReader& package, const ExportOptions& optio
           ? fmt::format(R"( integrity="{}" crossorigin="anonymous")", kModelViewerIntegrity)
           : "";
   return filled(export_template("model-viewer.html"),
-                {{"title", markup_escaped(title)},
+                {{"beginning", page_beginning(title, "")},
+                 {"style", std::string(export_template("export.css"))},
+                 {"title", markup_escaped(title)},
                  {"alt", markup_escaped(about.description.empty() ? title : about.description)},
                  {"poster", poster ? " poster=\"poster.jpg\"" : ""},
                  {"script", markup_escaped(script)},
                  {"integrity", integrity},
-                 {"script-source", markup_escaped(source_of_script(script))},
                  {"rights", rights_line(about)},
                  {"bytes", markup_escaped(format_bytes(glb_bytes))}});
 }
@@ -56,7 +50,11 @@ std::string model_viewer_page(PackageReader& package, const ExportOptions& optio
 std::string oembed_page(const EmbeddedObject& object, const std::string& url, const std::string& viewer) {
   EmbeddedObject here = object;
   here.page_url = viewer;
-  return filled(export_template("oembed.html"), {{"title", markup_escaped(object.about.title)},
+  constexpr std::string_view kPolicy =
+      "default-src 'none'; frame-src 'self'; img-src 'self' data:; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'";
+  return filled(export_template("oembed.html"), {{"beginning", page_beginning(object.about.title, kPolicy)},
+                                                 {"style", std::string(export_template("export.css"))},
+                                                 {"title", markup_escaped(object.about.title)},
                                                  {"oembed", markup_escaped(url + "oembed.json")},
                                                  {"frame", embedded_frame(here)},
                                                  {"code", markup_escaped(embedded_frame(object))},

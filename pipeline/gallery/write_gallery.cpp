@@ -56,12 +56,26 @@ std::string card_html(const GalleryObject& o, std::size_t place) {
       quiet, markup_escaped(figures_of(o)));
 }
 
+/// The head of a page that stands `root` away from the gallery's files; `frames`: the page has frames.
+std::string head_html(const std::string& title, const std::string& root, bool frames) {
+  const std::string policy = fmt::format(
+      "default-src 'none'; script-src 'self' file:; style-src 'self' file:; img-src 'self' file:; {}base-uri 'none'; form-action 'none'",
+      frames ? "frame-src 'self' file:; " : "");
+  return page_beginning(title, policy) +
+         fmt::format(
+             "<link rel=\"icon\" href=\"{0}icon.svg\" type=\"image/svg+xml\">\n"
+             "<link rel=\"stylesheet\" href=\"{0}gallery.css\">\n"
+             "<script defer=\"\" src=\"{0}gallery.js\"></script>\n",
+             root);
+}
+
 std::string index_page(const Gallery& gallery) {
   std::string cards;
   for (std::size_t k = 0; k < gallery.objects.size(); ++k) cards += card_html(gallery.objects[k], k);
   const std::size_t n = gallery.objects.size();
   return filled(gallery_file("index.html"),
-                {{"title", markup_escaped(gallery.options.title)},
+                {{"head", head_html(gallery.options.title, "", false)},
+                 {"title", markup_escaped(gallery.options.title)},
                  {"count", fmt::format("{} {}", n, n == 1 ? "object" : "objects")},
                  {"cards", cards}});
 }
@@ -91,7 +105,8 @@ std::string object_page(const GalleryObject& o, const GalleryOptions& options) {
   const std::string viewer = "../viewer/index.html?panel=0&pkg=" + percent_encoded(from_below(o.address));
   return filled(
       gallery_file("object.html"),
-      {{"title", markup_escaped(o.title)},
+      {{"head", head_html(o.title + " - " + options.title, "../", true)},
+       {"title", markup_escaped(o.title)},
        {"gallery", markup_escaped(options.title)},
        {"viewer", markup_escaped(viewer)},
        {"poster", poster_html(o, "../", false)},

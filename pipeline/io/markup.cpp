@@ -37,4 +37,16 @@ std::string markup_escaped(std::string_view text) {
   return out;
 }
 
+std::string page_beginning(std::string_view title, std::string_view policy) {
+  std::string out = R"(<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="color-scheme" content="light dark">
+)";
+  if (!policy.empty())
+    out += "<meta http-equiv=\"Content-Security-Policy\" content=\"" + std::string(policy) + "\">\n";
+  return out + "<title>" + markup_escaped(title) + "</title>\n";
+}
+
 }  // namespace texmesh

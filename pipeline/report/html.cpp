@@ -81,15 +81,8 @@ std::string html_section(const std::string& id, const std::string& heading, cons
 
 std::string html_page(const std::string& title, const std::string& body) {
   std::string out(kReportFirstLine);
-  out += R"(<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<meta name="color-scheme" content="light dark">
-<meta http-equiv="Content-Security-Policy" content="default-src 'none'; img-src 'self' file:; style-src 'unsafe-inline'">
-<title>)";
-  out += markup_escaped(title);
-  out += "</title>\n<style>";
+  out += page_beginning(title, "default-src 'none'; img-src 'self' file:; style-src 'unsafe-inline'");
+  out += "<style>";
   out += kStyle;
   out += "</style>\n</head>\n<body>\n";
   out += body;

@@ -2,15 +2,11 @@
 // blocks are made.
 import {check, common, lab, labPage, labRoots, serve} from './browser.mjs';
 import {test} from './harness.mjs';
-import {countStorage} from './gpu-storage.mjs';
+import {countStorage, onlyFormats} from './gpu-storage.mjs';
 import {comparePlane, kEverything, kTopQuality, loaded} from './loads.mjs';
 
-/** Runs in the page before the library: a GPU that has no other compressed formats than these. */
-function onlyFormats(names) {
-  const own = WebGL2RenderingContext.prototype.getExtension;
-  WebGL2RenderingContext.prototype.getExtension = function (name) {
-    return /compress/.test(name) && !names.some((n) => name.endsWith(n)) ? null : own.call(this, name);
-  };
+/** Runs in the page before the library: writes down what is uploaded. */
+function noteUploads() {
   const uploads = (window.uploads = []);
   for (const name of ['compressedTexSubImage2D', 'texSubImage2D']) {
     const upload = WebGL2RenderingContext.prototype[name];
@@ -21,7 +17,7 @@ function onlyFormats(names) {
     };
   }
 }
-const before = (formats) => `(${countStorage})();(${onlyFormats})(${JSON.stringify(formats)});`;
+const before = (formats) => `(${countStorage})();(${onlyFormats})(${JSON.stringify(formats)});(${noteUploads})();`;
 
 /** Loads a package whose textures become blocks of these formats. */
 async function inBlocks(b, formats, name, load = {}, url = b.url) {

@@ -1,4 +1,4 @@
-// What WebGL is asked to store, counted in the page; and a GPU that holds no more than a test says.
+// What WebGL is asked to store, counted in the page; a GPU that holds no more than a test says, or has no other formats.
 
 /**
  * Runs in the page before anything else. `storedBytes()` sums what textures and buffers take; `gpuBytesLimit`, set by a test, makes calls that
@@ -48,4 +48,12 @@ export function countStorage() {
     return context;
   };
   window.storedBytes = () => [...window.stored.values()].reduce((a, b) => a + b, 0);
+}
+
+/** Runs in the page before the library: a GPU that has no other compressed formats than these. */
+export function onlyFormats(names) {
+  const own = WebGL2RenderingContext.prototype.getExtension;
+  WebGL2RenderingContext.prototype.getExtension = function (name) {
+    return /compress/.test(name) && !names.some((n) => name.endsWith(n)) ? null : own.call(this, name);
+  };
 }

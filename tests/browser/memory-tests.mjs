@@ -1,5 +1,5 @@
 // Pages within the memory of the GPU: contexts that are lost, storage that is refused, packages that cannot be read, elements that come and go.
-import {check, env, fs, packages, path, pictures, run} from './browser.mjs';
+import {PNG, check, env, fs, packages, path, pictures, run} from './browser.mjs';
 import {countStorage} from './gpu-storage.mjs';
 import {test} from './harness.mjs';
 import {covered, elements, html, onPage, settled} from './page-tests.mjs';
@@ -53,6 +53,29 @@ test('memory: a context that is lost with much in it comes back with a smaller p
     page.said = page.said.filter((s) => !/CONTEXT_LOST|Context Lost|Context Restored/i.test(s));
   }, sharp);
 }, {seconds: 150});
+
+test('memory: metal mirrors its room again when a lost context is back', async () => {
+  await onPage(html(elements(1, '', ['metal'])), async (page) => {
+    const mirrors = () => page.waitForFunction(() => document.querySelector('texmesh-viewer').model?.scene.environment, null, {timeout: 20000});
+    const shot = async (name) => {
+      await page.waitForTimeout(500);
+      const {data} = PNG.sync.read(await page.locator('texmesh-viewer').screenshot({path: path.join(pictures, `${name}.png`)}));
+      return data;
+    };
+    await complete(page);
+    await mirrors();
+    const before = await shot('metal-before');
+    await lose(page);
+    await line(page, 'waiting for it');
+    await restore(page);
+    await page.waitForFunction(() => document.querySelector('texmesh-viewer').shadowRoot.querySelector('[part=note]').hidden, null, {timeout: 20000});
+    await complete(page);
+    const after = await shot('metal-after');
+    const difference = before.reduce((sum, v, i) => sum + Math.abs(v - after[i]), 0) / before.length;
+    check(difference < 0.5, `the pictures before and after differ by ${difference.toFixed(2)} of 255`);
+    page.said = page.said.filter((s) => !/CONTEXT_LOST|Context Lost|Context Restored/i.test(s));
+  }, {before: countStorage});
+}, {seconds: 60});
 
 test('memory: a GPU that refuses storage shows a smaller picture within what it holds', async () => {
   await onPage(html(large(4), two), async (page) => {

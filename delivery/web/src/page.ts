@@ -1,18 +1,21 @@
 import type { WebGLRenderer } from 'three';
+import { bootstrapBytes, startBytes } from './format/layout';
 import { nowS } from './http/clock';
 import { type TexmeshPackage, open } from './open';
 import { nextStep } from './page/model_queue';
 import { type Host, type OpenHow, PageModel, type PageModelOptions } from './page/page_model';
 import { Painter } from './page/painter';
-import { defaultMemoryBytes, linkBytesS, shareOf, turnS } from './page/schedule';
+import { defaultMemoryBytes, leastS, linkBytesS, shareOf, turnS } from './page/schedule';
 import { Visibility } from './page/visibility';
 import type { GltfLoaderLike, Turn } from './scene/api';
 import { Emitter } from './scene/events';
-import { GpuRoom } from './scene/memory/gpu_room';
 import { SharedWorkers } from './worker/shared_workers';
 
 export type * from './page/page_model';
 export type { Orbit } from './page/framing';
+
+/** So many packages share the link without harm: one round trip each costs as much as the bytes behind the first pictures. */
+const fewModels = 2;
 
 /** Options of a TexmeshPage. */
 export interface PageOptions {
@@ -24,7 +27,7 @@ export interface PageOptions {
   time?: number;
   /** Bytes that all models may take on the GPU. Default: by the device. */
   memoryBytes?: number;
-  /** Packages that are opened at once. Default 6, the connections that a browser has for a server. */
+  /** Packages whose manifests and first pictures come at once. Default 6, the connections that a browser has for a server. */
   openAtOnce?: number;
   /** Workers of all models. Default: 2 to 4 by the number of cores. */
   workers?: number;
@@ -47,19 +50,19 @@ export interface PageEvents {
  */
 export class TexmeshPage {
   private readonly mostBytes_: number;
-  private readonly room_: GpuRoom;
   private readonly models_ = new Map<Element, PageModel>();
   private readonly painter_: Painter;
   private readonly workers_: SharedWorkers;
   private readonly visibility_: Visibility;
   private readonly events_ = new Emitter<PageEvents>();
-  private readonly turns_ = new Map<PageModel, (turn: Turn) => void>();
+  private readonly turns_ = new Map<PageModel, { bytes: number; given: (turn: Turn) => void }>();
   private readonly dirty_ = new Set<PageModel>();
   private refining_?: PageModel;
   private startS_ = 0;
   private said_ = { pictures: true, deadline: true };
   private frame_ = 0;
   private advancing_ = false;
+  private preparing_?: ReturnType<typeof setTimeout>;
   private disposed_ = false;
 
   /** InputError of a load where an option has a value that it cannot have. */
@@ -67,7 +70,6 @@ export class TexmeshPage {
     const { hardwareConcurrency: cores = 2 } = globalThis.navigator ?? {};
     this.mostBytes_ = options_.memoryBytes ?? deviceMemoryBytes();
     this.painter_ = new Painter(options_.renderer);
-    this.room_ = GpuRoom.of(this.renderer);
     this.workers_ = new SharedWorkers(options_.workers ?? Math.min(4, Math.max(2, cores - 1)), options_.workerUrl);
     this.visibility_ = new Visibility((canvas, resized) => this.placeChanged_(canvas, resized));
   }
@@ -92,7 +94,7 @@ export class TexmeshPage {
   }
   /** Most bytes on the GPU: what the page was given, or less where the GPU has shown that it holds less. */
   get memoryBytes(): number {
-    return Math.min(this.mostBytes_, this.room_.limitBytes);
+    return Math.min(this.mostBytes_, this.painter_.limitBytes);
   }
   /** Bytes on the GPU now. */
   get gpuBytes(): number {
@@ -121,12 +123,13 @@ export class TexmeshPage {
   // ---- what models ask for
 
   private readonly host_: Host = {
-    open: (url: string, options: OpenHow): Promise<TexmeshPackage> => open(url, { ...options, shared: this.workers_, workerUrl: this.options_.workerUrl }),
+    open: (url: string, options: OpenHow): Promise<TexmeshPackage> =>
+      open(url, { startBytes: this.startBytes_, ...options, shared: this.workers_, workerUrl: this.options_.workerUrl }),
     loadOptions: () => ({ renderer: this.painter_.renderer, gltfLoader: this.options_.gltfLoader, workers: 2 }),
     memoryBytes: (model) => this.memoryOf_(model),
-    turn: (model) =>
+    turn: (model, bytes) =>
       new Promise((given) => {
-        this.turns_.set(model, given);
+        this.turns_.set(model, { bytes, given });
         this.advance_();
       }),
     changed: () => this.advance_(),
@@ -138,10 +141,18 @@ export class TexmeshPage {
       this.advance_();
     },
   };
-  /** What is seen has nearly all of the memory; what is only close by has a picture. */
+  /** Of several packages, each asks for its manifest and little more: what stands behind one's first picture would keep the others' waiting. */
+  private get startBytes_(): number {
+    return this.waiting_.length > fewModels ? bootstrapBytes : startBytes;
+  }
+  /**
+   * What is seen has nearly all of the memory; what is only close by has a picture. Some models take more than their share however coarse they
+   * are: those that come later have the less.
+   */
   private memoryOf_(model: PageModel): number {
     const areas = this.models.filter((m) => m.place.visible || m === model).map((m) => m.place.areaPx);
-    return this.memoryBytes * shareOf(model.place.areaPx, areas);
+    const free = this.memoryBytes - (this.gpuBytes - model.gpuBytes);
+    return Math.max(0, Math.min(this.memoryBytes * shareOf(model.place.areaPx, areas), free));
   }
   private dropped_(model: PageModel): void {
     this.turns_.delete(model);
@@ -158,9 +169,18 @@ export class TexmeshPage {
     queueMicrotask(() => {
       this.advancing_ = false;
       if (this.disposed_) return;
+      this.visibility_.glance();
       this.beginPeriod_();
       for (let step = this.nextStep_(); step; step = this.nextStep_()) this.take_(step);
       this.tell_();
+    });
+  }
+  /** Makes the graphics context while the first bytes come: nobody is asked for bytes while a context is being made. */
+  private prepare_(): void {
+    this.preparing_ ??= setTimeout(() => {
+      try {
+        if (!this.disposed_) void this.renderer;
+      } catch { /* each model says it */ }
     });
   }
   private nextStep_(): ReturnType<typeof nextStep> {
@@ -171,8 +191,10 @@ export class TexmeshPage {
   }
   private take_(step: NonNullable<ReturnType<typeof nextStep>>): void {
     const { model } = step;
-    if (step.what === 'open') void model.begin();
-    else if (step.what === 'release') {
+    if (step.what === 'open') {
+      void model.begin();
+      this.prepare_();
+    } else if (step.what === 'release') {
       this.dropped_(model);
       model.release();
     } else if (step.what === 'turn') this.giveTurn_(model, step.among);
@@ -185,13 +207,15 @@ export class TexmeshPage {
     }
   }
   private giveTurn_(model: PageModel, among: readonly PageModel[]): void {
-    const given = this.turns_.get(model)!;
+    const { bytes, given } = this.turns_.get(model)!;
     this.turns_.delete(model);
     const leftS = this.startS_ + this.limitS_ - nowS();
     const areas = among.map((m) => m.place.areaPx);
     const records = this.models.flatMap((m) => m.package?.requests ?? []);
+    const bytesS = linkBytesS(records, nowS());
     model.phase = 'turn'; // at once: nobody else has it
-    given({ seconds: turnS(leftS, model.place.areaPx, areas), bytesS: linkBytesS(records, nowS()) || undefined });
+    const least = leastS(bytes, bytesS, model.package?.client.latencyS ?? 0);
+    given({ seconds: turnS(leftS, model.place.areaPx, areas, least), bytesS: bytesS || undefined });
   }
   private get limitS_(): number {
     return this.options_.time ?? 5;

@@ -21,5 +21,12 @@ TEST(Markup, ControlCharactersDoNotPass) {
   EXPECT_EQ(markup_escaped(std::string_view("\0x", 2)), "?x");
 }
 
+TEST(Markup, PageBeginsWithItsTitleEscapedAndItsPolicy) {
+  const std::string with = page_beginning("<b> & c", "default-src 'none'");
+  EXPECT_NE(with.find("<title>&lt;b&gt; &amp; c</title>\n"), std::string::npos);
+  EXPECT_NE(with.find("content=\"default-src 'none'\""), std::string::npos);
+  EXPECT_EQ(page_beginning("a", "").find("Content-Security-Policy"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace texmesh

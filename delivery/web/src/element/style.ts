@@ -8,11 +8,11 @@ canvas { outline-offset: -3px; cursor: grab; touch-action: pan-y; }
 canvas:active { cursor: grabbing; }
 :host(:not([camera-controls])) canvas { cursor: default; }
 :focus-visible { outline: 3px solid var(--texmesh-accent); }
-.poster { pointer-events: none; transition: opacity .15s; }
+.poster { pointer-events: none; }
+.poster.fades { transition: opacity .15s; }
 .poster img, ::slotted([slot=poster]) { width: 100%; height: 100%; object-fit: contain; }
 .poster.gone { opacity: 0; }
-.bar { position: absolute; left: 0; top: 0; height: 3px; background: var(--texmesh-accent); transition: opacity .3s; }
-.bar[hidden] { display: block; opacity: 0; }
+.bar { position: absolute; left: 0; top: 0; height: 3px; background: var(--texmesh-accent); }
 .box { position: absolute; left: 0; right: 0; margin: 0 auto; top: 50%; transform: translateY(-50%); width: fit-content; max-width: 94%; max-height: 100%; overflow: auto; box-sizing: border-box; padding: .6em 1em; border: 0; border-radius: .5em;
   font: inherit; text-align: center; color: var(--texmesh-text); background: var(--texmesh-panel); overflow-wrap: anywhere; }
 .box small { display: block; }
@@ -25,5 +25,5 @@ button { cursor: pointer; min-height: 44px; }
 .rights:empty { display: none; }
 .rights a { color: inherit; }
 .help { position: absolute; width: 1px; height: 1px; overflow: hidden; clip-path: inset(50%); }
-@media (prefers-reduced-motion: reduce) { .poster, .bar { transition: none; } }
+@media (prefers-reduced-motion: reduce) { .poster.fades { transition: none; } }
 `;

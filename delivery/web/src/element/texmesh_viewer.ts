@@ -22,6 +22,8 @@ export interface ElementHost {
 const rotationDegreesS = 12;
 const bytesPerMegabit = 125e3;
 const noteMs = 8000;
+/** Percent by which the bar grows. */
+const barStep = 20;
 
 const template = `<style>${style}</style>
 <canvas part="canvas" tabindex="0" role="img" aria-describedby="help"></canvas>
@@ -154,6 +156,8 @@ export class TexmeshViewer extends HTMLElement {
     const tell = (name: string, detail: object = {}): void => void this.dispatchEvent(new CustomEvent(name, { detail }));
     model.on('open', () => this.controls_());
     model.on('first-picture', () => {
+      // A poster of nothing does not fade: each frame of that would draw the whole page.
+      poster.classList.toggle('fades', (poster.firstElementChild as HTMLSlotElement).assignedElements({ flatten: true }).length > 0);
       poster.classList.add('gone');
       tell('poster-dismissed');
       tell('model-visibility', { visible: true });
@@ -161,8 +165,12 @@ export class TexmeshViewer extends HTMLElement {
     });
     model.on('progress', ({ bytes, bytesExpected }) => {
       const totalProgress = bytesExpected > 0 ? Math.min(1, bytes / bytesExpected) : 0;
-      bar.style.width = `${100 * totalProgress}%`;
-      bar.setAttribute('aria-valuenow', (100 * totalProgress).toFixed(0));
+      // In few steps: each is a frame, and twenty elements' bars would keep the browser drawing the page.
+      const percent = `${barStep * Math.floor((100 * totalProgress) / barStep)}`;
+      if (percent !== bar.getAttribute('aria-valuenow')) {
+        bar.style.width = `${percent}%`;
+        bar.setAttribute('aria-valuenow', percent);
+      }
       tell('progress', { totalProgress });
     });
     model.on('phase', ({ phase }) => (bar.hidden = phase !== 'opening' && phase !== 'turn'));

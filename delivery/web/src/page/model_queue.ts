@@ -14,7 +14,7 @@ const mostBeforehand = 0.8;
 /** What a decision needs to know of the page. */
 export interface Situation {
   models: readonly PageModel[];
-  /** Packages that may be opened at once. */
+  /** Packages whose first bytes may come at once. */
   openAtOnce: number;
   /** Models that wait for their turn, and the model that is being refined. */
   askedForTurn: ReadonlySet<PageModel>;
@@ -40,7 +40,7 @@ export function nextStep({ models, openAtOnce, askedForTurn, refining, memorySha
   const toOpen = (m: PageModel): boolean => m.phase === 'waiting' || m.phase === 'released';
   const seen = inOrder.filter((m) => m.place.visible);
   const closed = seen.find(toOpen);
-  if (closed) return opening.length < openAtOnce ? { what: 'open', model: closed } : undefined;
+  if (closed) return opening.filter((m) => m.coming).length < openAtOnce ? { what: 'open', model: closed } : undefined;
   if (opening.some((m) => m.place.visible) || inOrder.some((m) => m.phase === 'turn')) return undefined;
   const among = seen.filter((m) => askedForTurn.has(m));
   if (among.length > 0) return { what: 'turn', model: among[0], among };

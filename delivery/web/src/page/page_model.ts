@@ -1,5 +1,6 @@
 import { DirectionalLight, HemisphereLight, type Object3D, PerspectiveCamera, Scene } from 'three';
 import { isAbort } from '../format/errors';
+import { firstPicture } from '../format/manifest';
 import type { OpenOptions, PackageReader } from '../http/package_reader';
 import type { LoadEvents, LoadOptions, LoadedModel, Turn } from '../scene/api';
 import { displayOf } from '../scene/camera';
@@ -57,8 +58,8 @@ export interface Host {
   loadOptions(): Pick<LoadOptions, 'renderer' | 'gltfLoader' | 'workers' | 'workerUrl'>;
   /** Bytes that the model may take on the GPU. */
   memoryBytes(model: PageModel): number;
-  /** Resolves when it is the model's turn. */
-  turn(model: PageModel): Promise<Turn>;
+  /** Resolves when it is the model's turn, which fetches so many bytes however short it is. */
+  turn(model: PageModel, bytes: number): Promise<Turn>;
   /** Something has changed that the page may act upon. */
   changed(model: PageModel): void;
   /** The picture is to be drawn anew. */
@@ -75,6 +76,8 @@ export class PageModel {
   phase: ModelPhase = 'waiting';
   package?: ShowablePackage;
   load?: LoadedModel;
+  /** Bytes of the first picture are on their way. */
+  coming = false;
   /** All that the display can show is there. */
   complete = false;
   /** Resolves when the first picture is on the canvas; rejects when the package cannot be had or is removed before. */
@@ -145,6 +148,7 @@ export class PageModel {
 
   /** Opens the package and shows its first picture. Errors are told, not thrown. */
   async begin(): Promise<void> {
+    this.coming = true;
     this.enter_('opening');
     const { signal } = (this.abort_ = new AbortController());
     try {
@@ -155,6 +159,7 @@ export class PageModel {
         if (!this.options_.camera) this.frame();
         this.events_.emit('open', { package: opened });
       }
+      this.awaitBytes_(this.package, signal);
       this.startLoad_(this.package, signal);
       await this.load!.firstPicture;
       if (signal.aborted) return;
@@ -192,14 +197,29 @@ export class PageModel {
     return this.phase === 'opening' || this.phase === 'turn';
   }
 
+  /** While the picture is decoded, the link is the next model's. */
+  private awaitBytes_(pkg: ShowablePackage, signal: AbortSignal): void {
+    const { offset, bytes } = firstPicture(pkg.manifest);
+    const came = (): void => {
+      this.coming = false;
+      this.host_.changed(this);
+    };
+    if (pkg.requests.some((r) => r.ok && r.offset <= offset && r.offset + r.received >= offset + bytes)) return came();
+    const end = pkg.onRequest(({ kind }) => {
+      if (kind !== 'mesh') return;
+      end();
+      came();
+    });
+    signal.addEventListener('abort', end, { once: true });
+  }
   private startLoad_(pkg: ShowablePackage, signal: AbortSignal): void {
     const { host_: host, camera } = this;
     const load = pkg.load(this.scene, {
       meshes: 'auto', ...this.options_.load, ...host.loadOptions(), camera, signal, time: Infinity, autoRefine: false,
       display: () => this.display_(pkg),
       memoryBytes: () => host.memoryBytes(this),
-      turn: async () => {
-        const turn = await host.turn(this);
+      turn: async (bytes) => {
+        const turn = await host.turn(this, bytes);
         this.enter_('turn');
         return turn;
       },

@@ -1,17 +1,27 @@
 import { type Camera, NeutralToneMapping, type Scene, Vector2, WebGLRenderer } from 'three';
+import { GpuRoom } from '../scene/memory/gpu_room';
 
 /** The renderer that draws all models of a page: browsers give a page few contexts. Pictures are copied to the models' own canvases. */
 export class Painter {
-  readonly renderer: WebGLRenderer;
+  private own_?: WebGLRenderer;
 
-  /** `renderer` is the application's; left out: one of the page's own, which the page disposes of. */
-  constructor(private readonly given_?: WebGLRenderer) {
-    this.renderer = given_ ?? new WebGLRenderer({ antialias: true, alpha: true, powerPreference: 'high-performance' });
-    if (given_) return;
-    this.renderer.toneMapping = NeutralToneMapping;
-    this.renderer.setClearAlpha(0);
+  /** `given` is the application's; left out: one of the page's own, which the page disposes of. */
+  constructor(private readonly given_?: WebGLRenderer) {}
+  /** Made when it is first asked for. Throws where the browser has no WebGL. */
+  get renderer(): WebGLRenderer {
+    if (this.given_ ?? this.own_) return (this.given_ ?? this.own_)!;
+    const renderer = (this.own_ = new WebGLRenderer({ antialias: true, alpha: true, powerPreference: 'high-performance' }));
+    renderer.debug.checkShaderErrors = false; // each question waits for the compiler, and the programs are three.js's own
+    renderer.toneMapping = NeutralToneMapping;
+    renderer.setClearAlpha(0);
+    return renderer;
   }
 
+  /** What the GPU has shown to hold, bytes; Infinity: nothing has been refused. */
+  get limitBytes(): number {
+    const renderer = this.given_ ?? this.own_;
+    return renderer ? GpuRoom.of(renderer).limitBytes : Infinity;
+  }
   /** Draws a scene as large as the canvas has pixels. False: nothing can be drawn now, the context is lost. */
   draw(scene: Scene, camera: Camera, canvas: HTMLCanvasElement): boolean {
     const { renderer } = this;
@@ -30,8 +40,7 @@ export class Painter {
     return true;
   }
   dispose(): void {
-    if (this.given_) return;
-    this.renderer.dispose();
-    this.renderer.forceContextLoss();
+    this.own_?.dispose();
+    this.own_?.forceContextLoss();
   }
 }

@@ -25,11 +25,21 @@ export function shareOf(area: number, areas: readonly number[]): number {
   return sum > 0 ? area / sum : 1 / Math.max(1, areas.length);
 }
 
-/** A turn is no shorter than this, seconds: requests take as long. */
+/** A turn is no shorter than this, seconds. */
 const leastTurnS = 0.1;
-/** Seconds of a model's turn while `leftS` are left for it and the others that wait; 0: none are left, and what stands stays. */
-export function turnS(leftS: number, area: number, areas: readonly number[]): number {
-  return leftS === Infinity || leftS <= 0 ? Math.max(0, leftS) : Math.max(leastTurnS, leftS * shareOf(area, areas));
+/** Requests of a turn that wait for one another, at least. */
+const roundTrips = 2;
+/** Seconds that a turn takes at least which fetches so many bytes whatever it is given; `bytesS` 0: nobody knows the link. */
+export function leastS(bytes: number, bytesS: number, latencyS: number): number {
+  return bytes > 0 ? Math.max(leastTurnS, roundTrips * latencyS + (bytesS > 0 ? bytes / bytesS : 0)) : leastTurnS;
+}
+/**
+ * Seconds of a model's turn of at least `leastS` while `leftS` are left for it and the others that wait; 0: so many are not left, and what
+ * stands stays.
+ */
+export function turnS(leftS: number, area: number, areas: readonly number[], leastS: number): number {
+  if (leftS === Infinity) return Infinity;
+  return leftS < leastS ? 0 : Math.max(leastS, leftS * shareOf(area, areas));
 }
 
 /** Earlier transfers say nothing of the link now, seconds. */

@@ -3,12 +3,17 @@ import type { Place } from './schedule';
 /** Models are prepared when they are so far from the screen, as a share of its height, and released when they are further. */
 const nearShare = 1;
 
+/** From the middle of a box to the middle of a screen. */
+const distance = ({ top, left, width, height }: DOMRectReadOnly, screenWidth: number, screenHeight: number): number =>
+  Math.hypot(left + width / 2 - screenWidth / 2, top + height / 2 - screenHeight / 2);
+
 /** Follows where canvases lie on the page and how large they are. */
 export class Visibility {
   private readonly seen_: IntersectionObserver;
   private readonly near_: IntersectionObserver;
   private readonly sized_: ResizeObserver;
   private readonly nearby_ = new Set<Element>();
+  private readonly lookedAt_ = new Set<Element>(); // whether they are seen is known
   private readonly places_ = new Map<Element, Place>();
 
   /** `changed` hears of a canvas that has come, gone, or has another size: `resized` then. */
@@ -17,10 +22,9 @@ export class Visibility {
       for (const { target, isIntersecting, boundingClientRect, rootBounds } of entries) {
         const place = this.places_.get(target);
         if (!place) continue;
+        this.lookedAt_.add(target);
         place.visible = isIntersecting && boundingClientRect.width * boundingClientRect.height > 0;
-        const { top, left, width, height } = boundingClientRect;
-        const [x, y] = [(rootBounds?.width ?? 0) / 2, (rootBounds?.height ?? 0) / 2];
-        place.distancePx = Math.hypot(left + width / 2 - x, top + height / 2 - y);
+        place.distancePx = distance(boundingClientRect, rootBounds?.width ?? 0, rootBounds?.height ?? 0);
         this.changed_(target, false);
       }
     }, { threshold: [0, 0.01, 0.5, 1] });
@@ -31,41 +35,57 @@ export class Visibility {
         this.changed_(target, false);
       }
     }, { rootMargin: `${100 * nearShare}% 0%` });
-    this.sized_ = new ResizeObserver((entries) => {
-      for (const { target } of entries) this.fit_(target as HTMLCanvasElement);
-    });
+    this.sized_ = new ResizeObserver((entries) => this.fit_(entries.map(({ target }) => target as HTMLCanvasElement)));
   }
   /** Follows a canvas; its place is kept up to date. */
   follow(canvas: HTMLCanvasElement, place: Place): void {
     this.places_.set(canvas, place);
-    this.fit_(canvas);
     for (const observer of [this.seen_, this.near_, this.sized_]) observer.observe(canvas);
+  }
+  /**
+   * Looks by itself where canvases lie that were followed just now: the observers speak up with the next frame only, and by then bytes can
+   * have been asked for.
+   */
+  glance(): void {
+    for (const [canvas, place] of this.places_) {
+      if (this.lookedAt_.has(canvas)) continue;
+      const rect = canvas.getBoundingClientRect();
+      const { innerWidth, innerHeight, devicePixelRatio: ratio = 1 } = globalThis;
+      place.areaPx = Math.round(rect.width * ratio) * Math.round(rect.height * ratio);
+      place.visible = place.areaPx > 0 && rect.bottom > 0 && rect.right > 0 && rect.top < innerHeight && rect.left < innerWidth;
+      place.distancePx = distance(rect, innerWidth, innerHeight);
+    }
   }
   forget(canvas: Element): void {
     for (const observer of [this.seen_, this.near_, this.sized_]) observer.unobserve(canvas);
     this.places_.delete(canvas);
     this.nearby_.delete(canvas);
+    this.lookedAt_.delete(canvas);
   }
-  /** Whether a canvas is on the screen or close to it. */
+  /** Whether a canvas is on the screen or close to it; not before it is known which of the two. */
   isNear(canvas: Element): boolean {
-    return this.nearby_.has(canvas);
+    return this.nearby_.has(canvas) && this.lookedAt_.has(canvas);
   }
   dispose(): void {
     for (const observer of [this.seen_, this.near_, this.sized_]) observer.disconnect();
     this.places_.clear();
     this.nearby_.clear();
+    this.lookedAt_.clear();
   }
 
-  /** As many pixels as the device shows of the canvas. */
-  private fit_(canvas: HTMLCanvasElement): void {
+  /** As many pixels as the device shows of the canvases. A size that is read behind one that is written makes the browser lay out all anew. */
+  private fit_(canvases: readonly HTMLCanvasElement[]): void {
     const ratio = globalThis.devicePixelRatio || 1;
-    const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((px) => Math.round(px * ratio));
-    const place = this.places_.get(canvas);
-    if (!place) return;
-    place.areaPx = width * height;
-    if (width < 1 || height < 1 || (canvas.width === width && canvas.height === height)) return;
-    canvas.width = width;
-    canvas.height = height;
-    this.changed_(canvas, true);
+    const sizes = canvases.map((canvas) => [canvas.clientWidth, canvas.clientHeight].map((px) => Math.round(px * ratio)));
+    canvases.forEach((canvas, i) => {
+      const [width, height] = sizes[i];
+      const place = this.places_.get(canvas);
+      if (!place) return;
+      place.areaPx = width * height;
+      if (width < 1 || height < 1 || (canvas.width === width && canvas.height === height)) return;
+      canvas.width = width;
+      canvas.height = height;
+      this.changed_(canvas, true);
+    });
   }
 }

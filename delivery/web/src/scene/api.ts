@@ -93,9 +93,10 @@ export interface LoadOptions {
   workers?: number;
   /**
    * Asked once the first picture stands; the timed part begins when the answer comes, and lasts as long as the answer says. So several
-   * models of a page have the link one after the other. `time` counts where this is left out.
+   * models of a page have the link one after the other. `bytes` are fetched in any turn, before anything can be chosen. `time` counts where
+   * this is left out.
    */
-  turn?: () => Promise<Turn>;
+  turn?: (bytes: number) => Promise<Turn>;
   /**
    * Bytes that textures and meshes may take on the GPU: textures get coarser mips, meshes coarser scales, until all fits or nothing is
    * coarser. Left out: no limit but the one that the GPU shows by losing its context, or by refusing storage.

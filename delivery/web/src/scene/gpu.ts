@@ -22,15 +22,20 @@ export async function gpuIdle(renderer: WebGLRenderer, mostS = 0.5): Promise<voi
   if (lives()) gl.deleteSync(fence);
 }
 
+/** Programs that were waited for: models of one page share them. */
+const ready = new WeakSet<WebGLProgram>();
+
 /** Waits for each program, then asks the program for its uniforms, in a turn of its own: the first frame would wait for the linker otherwise. */
 async function programsReady(renderer: WebGLRenderer, mostS: number, stopIfCancelled: () => void): Promise<void> {
   const end = nowS() + mostS;
-  for (const program of [...(renderer.info?.programs ?? [])] as (WebGLProgram & { isReady?(): boolean })[]) {
+  const programs = (renderer.info?.programs ?? []) as (WebGLProgram & { isReady?(): boolean })[];
+  for (const program of programs.filter((p) => !ready.has(p))) {
     do {
       await sleepS(0.004);
       stopIfCancelled();
     } while (program.isReady?.() === false && nowS() < end);
     program.getUniforms();
+    ready.add(program);
   }
 }
 

@@ -51,6 +51,7 @@ class ModelLoad {
   private readonly source_: ScaleSource;
   private readonly scale_: ShownScale;
   private readonly proxies_: ProxyChoice;
+  private shape_?: Promise<Object3D>; // the coarsest scale's
   private coming_?: Promise<TextureLoad>;
   private refining_?: Promise<void>;
   private refineAgain_ = false;
@@ -134,13 +135,18 @@ class ModelLoad {
   private startScales_(): Promise<void> {
     const { context } = this;
     const { shape, shown } = this.scale_.load(context.reader.manifest.scales.at(-1)!.scale);
-    this.coming_ = Promise.all([import('./texture_load'), shape]).then(([part]) => part.openTextureLoad(context, this.scale_, this.source_));
-    this.coming_.catch(() => undefined);
+    this.shape_ = shape;
+    if (!context.options.turn || context.phase !== 'first-picture') void this.openTextures_(); // others wait for their first pictures
     return shown;
+  }
+  private openTextures_(): Promise<TextureLoad> {
+    this.coming_ ??= Promise.all([import('./texture_load'), this.shape_]).then(([part]) => part.openTextureLoad(this.context, this.scale_, this.source_));
+    this.coming_.catch(() => undefined);
+    return this.coming_;
   }
   private async showInTime_(): Promise<void> {
     const { context } = this;
-    await context.turn();
+    await context.turn(this.bytesOfAnyTurn_());
     // A turn without time leaves what stands: other models' turns would begin later.
     if ((context.options.turn && context.limitS <= context.elapsedS()) || (await this.proxies_.showServing())) {
       context.emit('deadline', { limit: context.limitS, actual: context.elapsedS(), skipped: 0 });
@@ -148,14 +154,20 @@ class ModelLoad {
     }
     await this.showTextures_();
   }
+  private bytesOfAnyTurn_(): number {
+    const { context: { reader: { manifest: { proxies, scales, index, tables } } }, scale_: { proxy } } = this;
+    const serving = this.proxies_.serving();
+    if (serving >= 0) return serving > proxy.shown ? proxies[serving].glb.bytes : 0;
+    return tables.offset + tables.bytes - index.offset + (this.shape_ ? 0 : scales[scales.length - 1].glb.bytes);
+  }
   private async showTextures_(): Promise<void> {
     const { context } = this;
     context.enter('tables');
-    if (!this.coming_) {
+    if (!this.shape_) {
       await this.proxies_.showStep(() => context.reader.prefetchDocuments(context.signal, true));
       await this.startScales_();
     }
-    this.textures = await this.coming_!;
+    this.textures = await this.openTextures_();
     throwIfAborted(context.signal);
     await this.textures.timedPart();
     context.phase = 'refining';

@@ -74,12 +74,12 @@ export class LoadContext {
     return nowS() - this.startS_;
   }
 
-  /** The timed part begins when whoever gives turns says so. */
-  async turn(): Promise<void> {
+  /** The timed part begins when whoever gives turns says so; `bytes` of it are fetched however long it is. */
+  async turn(bytes: number): Promise<void> {
     const { options: { turn }, signal } = this;
     if (!turn) return;
     const cancelled = new Promise<never>((_, end) => signal.addEventListener('abort', () => end(abortError()), { once: true }));
-    const { seconds, bytesS = 0 } = await Promise.race([turn(), cancelled]);
+    const { seconds, bytesS = 0 } = await Promise.race([turn(bytes), cancelled]);
     throwIfAborted(signal);
     this.limitS = this.elapsedS() + seconds;
     this.expectedBytesS = bytesS;

@@ -2,11 +2,11 @@ import { describe, expect, it } from 'vitest';
 import { type Situation, nextStep } from '../../src/page/model_queue';
 import type { PageModel } from '../../src/page/page_model';
 
-type Fake = Pick<PageModel, 'phase' | 'place' | 'complete'> & { load?: object; near?: boolean };
+type Fake = Pick<PageModel, 'phase' | 'place' | 'complete' | 'coming'> & { load?: object; near?: boolean };
 const model = (phase: PageModel['phase'], more: Partial<Fake> & { visible?: boolean; areaPx?: number; regarded?: boolean } = {}): Fake => {
   const { visible = true, areaPx = 100, regarded = false, ...rest } = more;
   const load = ['first-picture', 'turn', 'shown'].includes(phase) ? {} : undefined;
-  return { phase, load, complete: false, near: visible, place: { visible, regarded, areaPx, distancePx: 0 }, ...rest };
+  return { phase, load, complete: false, coming: phase === 'opening', near: visible, place: { visible, regarded, areaPx, distancePx: 0 }, ...rest };
 };
 const step = (models: Fake[], more: Partial<Situation> = {}): string => {
   const askedForTurn = new Set(models.filter((m) => m.phase === 'first-picture')) as unknown as Set<PageModel>;
@@ -20,6 +20,7 @@ describe('a page', () => {
     expect(step([])).toBe('nothing');
     expect(step([model('waiting'), model('waiting', { areaPx: 200 }), model('waiting', { visible: false, near: true, areaPx: 900 })])).toBe('open 1');
     expect(step([model('waiting'), model('opening'), model('opening')])).toBe('nothing');
+    expect(step([model('waiting'), model('opening'), model('opening', { coming: false })])).toBe('open 0'); // bytes that have come leave the link to others
     expect(step([model('waiting', { visible: false, near: false })])).toBe('nothing');
   });
   it('gives turns once all that is seen has its first picture, one after the other', () => {

@@ -1,5 +1,5 @@
 import { expect, it } from 'vitest';
-import { type Place, byInterest, defaultMemoryBytes, linkBytesS, shareOf, turnS } from '../../src/page/schedule';
+import { type Place, byInterest, defaultMemoryBytes, leastS, linkBytesS, shareOf, turnS } from '../../src/page/schedule';
 import type { RequestRecord } from '../../src/http/requests';
 
 const place = (p: Partial<Place>): Place => ({ visible: true, regarded: false, areaPx: 100, distancePx: 0, ...p });
@@ -13,11 +13,15 @@ it('what the user looks at comes first, then what is seen, by size and by place'
 it('time is shared by area, and what one leaves the others have', () => {
   expect(shareOf(1, [1, 3])).toBe(0.25);
   expect(shareOf(0, [0, 0])).toBe(0.5);
-  expect(turnS(4, 1, [1, 3])).toBe(1);
-  expect(turnS(4, 3, [3])).toBe(4);
-  expect(turnS(0.2, 1, [1, 3])).toBe(0.1);
-  expect(turnS(-1, 3, [3])).toBe(0);
-  expect(turnS(Infinity, 1, [1, 3])).toBe(Infinity);
+  expect(turnS(4, 1, [1, 3], 0.1)).toBe(1);
+  expect(turnS(4, 3, [3], 0.1)).toBe(4);
+  expect(turnS(0.2, 1, [1, 3], 0.1)).toBe(0.1);
+  expect(turnS(-1, 3, [3], 0.1)).toBe(0);
+  expect(turnS(Infinity, 1, [1, 3], 0.1)).toBe(Infinity);
+  expect(turnS(0.2, 1, [1], 0.25)).toBe(0); // it would end too late, whatever it did
+  expect(leastS(50000, 500000, 0.05)).toBe(0.2);
+  expect(leastS(0, 500000, 0.05)).toBe(0.1);
+  expect(leastS(50000, 0, 0.2)).toBe(0.4);
 });
 it('the link is what came while something came, whatever came at once', () => {
   expect(linkBytesS([], 10)).toBe(0);

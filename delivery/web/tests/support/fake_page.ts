@@ -15,6 +15,11 @@ export interface FakeCanvas {
 }
 const screen = { width: 1000, height: 1000 };
 
+function rectOf({ clientWidth: width, clientHeight: height, top }: Omit<FakeCanvas, 'pictures'>): object {
+  const y = top * screen.height;
+  return { top: y, left: 0, width, height, right: width, bottom: y + height };
+}
+
 interface Observer {
   targets: Set<FakeCanvas>;
   look(): void;
@@ -43,9 +48,9 @@ class FakeIntersectionObserver implements Observer {
     if (this.targets.size > 0) this.heard_([...this.targets].map((t) => this.entry_(t)));
   }
   private entry_(target: FakeCanvas): object {
-    const { clientWidth: width, clientHeight: height, top } = target;
+    const { top } = target;
     const isIntersecting = top >= -this.margin_ && top < 1 + this.margin_;
-    return { target, isIntersecting, rootBounds: screen, boundingClientRect: { top: top * screen.height, left: 0, width, height } };
+    return { target, isIntersecting, rootBounds: screen, boundingClientRect: rectOf(target) };
   }
 }
 class FakeResizeObserver implements Observer {
@@ -55,6 +60,7 @@ class FakeResizeObserver implements Observer {
   }
   observe(target: FakeCanvas): void {
     this.targets.add(target);
+    queueMicrotask(() => this.targets.has(target) && this.heard_([{ target }]));
   }
   unobserve(target: FakeCanvas): void {
     this.targets.delete(target);
@@ -79,7 +85,7 @@ export interface FakePage {
 export async function withPage(options: Partial<PageOptions>, body: (page: FakePage) => Promise<void>): Promise<void> {
   const fakes: Record<string, unknown> = {
     IntersectionObserver: FakeIntersectionObserver, ResizeObserver: FakeResizeObserver,
-    requestAnimationFrame: (draw: () => void) => setTimeout(draw, 0), cancelAnimationFrame: clearTimeout,
+    innerWidth: screen.width, innerHeight: screen.height, requestAnimationFrame: (draw: () => void) => setTimeout(draw, 0), cancelAnimationFrame: clearTimeout,
   };
   const before = Object.keys(fakes).map((name) => [name, Object.getOwnPropertyDescriptor(globalThis, name)] as const);
   for (const [name, value] of Object.entries(fakes)) Object.defineProperty(globalThis, name, { value, configurable: true, writable: true });
@@ -90,7 +96,7 @@ export async function withPage(options: Partial<PageOptions>, body: (page: FakeP
   const gltfLoader = () => ({ register: () => undefined, parseAsync: () => Promise.resolve(fakeGltf()) });
   const page = new TexmeshPage({ gltfLoader, renderer: renderer as unknown as WebGLRenderer, ...options });
   const canvas = (top = 0, px = 100): HTMLCanvasElement => {
-    const made = { width: 1, height: 1, clientWidth: px, clientHeight: px, top, pictures: 0, getContext: () => ({ drawImage: () => ++made.pictures }) };
+    const made = { width: 1, height: 1, clientWidth: px, clientHeight: px, top, pictures: 0, getBoundingClientRect: () => rectOf(made), getContext: () => ({ drawImage: () => ++made.pictures }) };
     return made as unknown as HTMLCanvasElement;
   };
   try {

@@ -1,6 +1,14 @@
 #include "delivery/web/src/blocks/encoder/block.h"
 
+template <int kFrom, int kTo>
 Line main_line(const Block* b) {
+  if constexpr (kTo - kFrom == 1) {
+    Line line = {};
+    float low, high;
+    range_of(b->c[kFrom], &low, &high);
+    line.ends[0][kFrom] = low, line.ends[1][kFrom] = high;
+    return line;
+  }
   float mean[3], cov[6] = {0, 0, 0, 0, 0, 0};
   f4 d[3][4];
   EACH(c, 3) {
@@ -30,6 +38,7 @@ Line main_line(const Block* b) {
   return {{in_range(middle + step * least(low)), in_range(middle + step * most(high))}};
 }
 
+template <int kFrom, int kTo>
 int fitted_line(const Block* b, const i4 at[4], float last, Line* line) {
   f4 s1 = f4_of(0), s2 = s1, w[4];
   EACH(y, 4) {
@@ -40,7 +49,7 @@ int fitted_line(const Block* b, const i4 at[4], float last, Line* line) {
               det = aa * square - ab * ab;
   if (det < 0.05f) return 0;
   f4 first = {}, second = {};
-  EACH(c, 3) {
+  for (int c = kFrom; c < kTo; ++c) {
     f4 all = f4_of(0), weighed = all;
     EACH(y, 4) all += b->c[c][y], weighed += b->c[c][y] * w[y];
     second[c] = sum4(weighed), first[c] = sum4(all) - second[c];
@@ -50,6 +59,7 @@ int fitted_line(const Block* b, const i4 at[4], float last, Line* line) {
   return 1;
 }
 
+template <int kFrom, int kTo>
 float place(const Block* b, const f4 ends[2], float last, i4 at[4]) {
   const f4 d = ends[1] - ends[0];
   const float length = sum4(d * d);
@@ -57,12 +67,19 @@ float place(const Block* b, const f4 ends[2], float last, i4 at[4]) {
   f4 error = f4_of(0);
   EACH(y, 4) {
     f4 from[3], t = f4_of(0);
-    EACH(c, 3) from[c] = b->c[c][y] - ends[0][c], t += from[c] * d[c];
+    for (int c = kFrom; c < kTo; ++c) from[c] = b->c[c][y] - ends[0][c], t += from[c] * d[c];
     t = steps4(t * scale, f4_of(last), &at[y]) * (1 / last);
-    EACH(c, 3) {
+    for (int c = kFrom; c < kTo; ++c) {
       const f4 off = from[c] - t * d[c];
       error += off * off;
     }
   }
   return sum4(error);
 }
+
+template Line main_line<0, 3>(const Block*);
+template Line main_line<1, 2>(const Block*);
+template int fitted_line<0, 3>(const Block*, const i4[4], float, Line*);
+template int fitted_line<1, 2>(const Block*, const i4[4], float, Line*);
+template float place<0, 3>(const Block*, const f4[2], float, i4[4]);
+template float place<1, 2>(const Block*, const f4[2], float, i4[4]);

@@ -70,7 +70,13 @@ export class GpuRoom {
   }
   private hasRefused_(): boolean {
     const gl = this.renderer_.getContext();
-    return Array.from({ length: errorKinds }, () => gl.getError()).includes(gl.OUT_OF_MEMORY);
+    let refused = false;
+    for (let k = 0; k < errorKinds; ++k) {
+      const error = gl.getError();
+      if (error === gl.NO_ERROR) break; // each question waits for the GPU's process
+      refused ||= error === gl.OUT_OF_MEMORY;
+    }
+    return refused;
   }
 }
 const rooms = new WeakMap<WebGLRenderer, GpuRoom>();
