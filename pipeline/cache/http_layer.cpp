@@ -52,7 +52,12 @@ int look_at_watch(void* user, curl_off_t, curl_off_t down, curl_off_t, curl_off_
 
 struct Easy {
   CURL* handle = ::curl_easy_init();
-  ~Easy() { ::curl_easy_cleanup(handle); }
+  /// None of "Expect: 100-continue": curl would wait a second for servers that do not answer it, at each PUT.
+  curl_slist* headers = ::curl_slist_append(nullptr, "Expect:");
+  ~Easy() {
+    ::curl_easy_cleanup(handle);
+    ::curl_slist_free_all(headers);
+  }
 };
 
 class HttpLayer : public CacheLayer {
@@ -99,6 +104,7 @@ class HttpLayer : public CacheLayer {
     Upload upload{bytes};
     prepare(kind, digest);
     ::curl_easy_setopt(easy_.handle, CURLOPT_UPLOAD, 1L);
+    ::curl_easy_setopt(easy_.handle, CURLOPT_HTTPHEADER, easy_.headers);
     ::curl_easy_setopt(easy_.handle, CURLOPT_READFUNCTION, send_body);
     ::curl_easy_setopt(easy_.handle, CURLOPT_READDATA, &upload);
     ::curl_easy_setopt(easy_.handle, CURLOPT_INFILESIZE_LARGE, static_cast<curl_off_t>(bytes.size()));

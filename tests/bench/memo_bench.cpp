@@ -162,7 +162,11 @@ std::vector<std::string> make_ninja_rules(const std::string& folder, const std::
 
 void noop(const std::string& folder, int models) {
   const std::string in = folder + "/in", out = folder + "/out", cache = folder + "/cache";
-  make_collection(in, out, cache, models);
+  // In a process of its own: the kernel counts the memory of who starts a program as that of the program.
+  const pid_t pid = ::fork();
+  if (pid == 0) make_collection(in, out, cache, models), ::_exit(0);
+  int status = 0;
+  if (::waitpid(pid, &status, 0) != pid || status != 0) std::exit(1);
   constexpr int kMostOfNinja = 5000, kRepeat = 11;
   std::vector<std::string> ninja;
   if (models <= kMostOfNinja) {

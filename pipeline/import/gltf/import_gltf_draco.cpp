@@ -133,6 +133,8 @@ float normal_limit(draco::DataType type) {
 
 void check_attribute(const Source& source, const std::string& place, const draco::Mesh& mesh,
                      const draco::PointAttribute& attribute) {
+  // Draco takes the bytes of truth values as bool whatever they are, which is undefined.
+  if (attribute.data_type() == draco::DT_BOOL) source.fail(place, "an attribute of numbers", "truth values");
   if (!attribute.is_mapping_identity() && attribute.indices_map_size() < mesh.num_points()) {
     source.fail(place, "a value for every point", "fewer");
   }

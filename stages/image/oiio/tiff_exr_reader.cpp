@@ -151,7 +151,10 @@ std::vector<T> read_samples(const Image& image, OpenImage& open, OIIO::TypeDesc 
       fail_pixels(image, open, "pixels");
     return samples;
   }
-  // OpenImageIO takes and frees 64 MB at every call: few of them, even for an image of many short rows.
+  // OpenImageIO takes and frees 64 MB at every call that names a type, be it the file's own: none is named then. Of
+  // calls that convert there are few, even for an image of many short rows.
+  const bool as_stored = open.spec.format == type && open.spec.channelformats.empty();
+  const OIIO::TypeDesc asked = as_stored ? OIIO::TypeDesc() : type;
   const int rows = std::max(64, height / 16);
   samples.reserve(row * image.height_px);  // not touched before it is read
   const int first = open.spec.y;           // the data window of an EXR may begin anywhere
@@ -159,7 +162,7 @@ std::vector<T> read_samples(const Image& image, OpenImage& open, OIIO::TypeDesc 
     const int end = std::min(height, y + rows);
     samples.resize(row * static_cast<std::size_t>(end));
     T* to = samples.data() + row * static_cast<std::size_t>(y);
-    if (!open.input->read_scanlines(0, 0, first + y, first + end, 0, 0, channels, type, to) ||
+    if (!open.input->read_scanlines(0, 0, first + y, first + end, 0, 0, channels, asked, to) ||
         open.input->has_error())
       fail_pixels(
           image, open,
