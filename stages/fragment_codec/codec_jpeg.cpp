@@ -31,7 +31,7 @@ std::size_t rungs_alike(std::span<const int> qualities) {
 class JpegCodec : public TextureCodec {
  public:
   explicit JpegCodec(const PlaneCoding& plane) : plane_(plane) {}
-  Codec id() const override { return Codec::kJpeg; }
+  Codec id() const override { return plane_.without_z ? Codec::kJpegXy : Codec::kJpeg; }
 
   std::vector<CodecRung> train(std::span<const PixelWindow> sample, const RunContext& context) override {
     std::vector<CodecRung> rungs(plane_.qualities.size());

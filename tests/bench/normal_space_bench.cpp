@@ -22,7 +22,7 @@ namespace {
 
 constexpr std::uint32_t kWindowPx = 128;
 constexpr std::size_t kMostWindows = 64;
-constexpr std::array kQualities{30, 53, 75, 86, 93, 97};
+constexpr std::array kQualities{30, 53, 75, 86, 93, 97, 100};
 constexpr double kDegrees = 57.29577951308232;
 
 struct Space {
@@ -30,6 +30,7 @@ struct Space {
   JpegKind kind;
   bool even = false;  // z is 128 everywhere
   bool two = false;   // x and y as two grey pictures
+  bool unit = false;  // of vectors of unit length
   bool rebuilds() const { return even || two; }
 };
 
@@ -49,6 +50,7 @@ std::vector<Space> spaces() {
           {"YCbCr 4:4:4", kind_of(3, false, false, full)},
           {"YCbCr 4:2:0", kind_of(3, false, false, Subsampling::k420)},
           {"x, y, even z", kind_of(3, true, false, full), true, false},
+          {"unit x, y", kind_of(3, true, false, full), true, false, true},
           {"x and y alone", kind_of(1, false, false, full), false, true}};
 }
 
@@ -78,6 +80,16 @@ Pixels channel_of(const Pixels& image, std::size_t channel) {
 
 Pixels with_even_z(Pixels image) {
   for (std::size_t i = 2; i < image.data.size(); i += 3) image.data[i] = 128;
+  return image;
+}
+
+std::array<double, 3> vector_of(const std::uint8_t* texel);
+Pixels unit_of(Pixels image) {
+  for (std::size_t i = 0; i < image.data.size(); i += 3) {
+    const auto v = vector_of(&image.data[i]);
+    for (std::size_t c = 0; c < 2; ++c) image.data[i + c] = static_cast<std::uint8_t>(std::clamp(std::floor((v[c] + 1) * 127.5 + .5), 0.0, 255.0));
+    image.data[i + 2] = 128;
+  }
   return image;
 }
 
@@ -120,7 +132,7 @@ Point measure(const Space& space, const std::vector<Pixels>& windows, int qualit
   std::vector<std::vector<Pixels>> coded(space.two ? 2 : 1);
   for (std::size_t c = 0; c < coded.size(); ++c) {
     for (const Pixels& w : windows)
-      coded[c].push_back(space.two ? channel_of(w, c) : space.even ? with_even_z(w) : w);
+      coded[c].push_back(space.two ? channel_of(w, c) : space.unit ? unit_of(w) : space.even ? with_even_z(w) : w);
     const std::vector<PixelWindow> views = views_of(coded[c]);
     out.bits += jpeg_bits(kind, views, qualities, context)[0];
     JpegCoder coder(kind);
@@ -168,7 +180,7 @@ double ratio_of(const Curve& one, const Curve& other) {
 }
 
 std::string chosen(const std::vector<Pixels>& windows, const RunContext& context) {
-  const CodingSpace space = measure_coding_space(DataKind::kVectors, views_of(windows), context);
+  const CodingSpace space = measure_coding_space(DataKind::kVectors, false, views_of(windows), context);
   const char* ycc = space.subsampling == Subsampling::k420 ? "YCbCr 4:2:0" : "YCbCr 4:4:4";
   return !space.apart ? ycc : space.coarse_last ? "coarse z" : "channels apart";
 }

@@ -58,7 +58,7 @@ std::vector<PixelWindow> windows_of(const Pixels& pixels) {
 CodingSpace space_of(const Pixels& pixels, DataKind kind = DataKind::kNumbers, int threads = 1) {
   RunContext context;
   context.threads = threads;
-  return measure_coding_space(kind, windows_of(pixels), context);
+  return measure_coding_space(kind, true, windows_of(pixels), context);
 }
 
 TEST(CodingSpace, ChannelsThatHaveNothingInCommonStayApart) { EXPECT_EQ(space_of(unrelated()), kApart); }
@@ -92,8 +92,8 @@ TEST(CodingSpace, VectorsGoByTheirAngle) {
 }
 
 TEST(CodingSpace, NothingIsKnownOfAnEmptySample) {
-  EXPECT_EQ(measure_coding_space(DataKind::kNumbers, {}, RunContext{}), kApart);
-  EXPECT_EQ(measure_coding_space(DataKind::kVectors, {}, RunContext{}), kApart);
+  EXPECT_EQ(measure_coding_space(DataKind::kNumbers, true, {}, RunContext{}), kApart);
+  EXPECT_EQ(measure_coding_space(DataKind::kVectors, true, {}, RunContext{}), kApart);
 }
 
 TEST(CodingSpace, OneColourStaysApart) {
@@ -121,7 +121,7 @@ TEST(CodingSpace, OnlyCoveredTexelsCount) {
   for (std::size_t k = 0; k < windows.size(); ++k)
     windows[k].coverage = {CoverageMask(coverage, kSide, kSide), static_cast<std::uint32_t>(k % 8 * 32),
                            static_cast<std::uint32_t>(k / 8 * 32)};
-  EXPECT_FALSE(measure_coding_space(DataKind::kNumbers, windows, RunContext{}).apart);
+  EXPECT_FALSE(measure_coding_space(DataKind::kNumbers, true, windows, RunContext{}).apart);
 }
 
 TEST(CodingSpace, SameForAnyNumberOfThreads) {
