@@ -120,8 +120,8 @@ void choose_space(const TexturePlane& plane, const Pixels& pixels, Codec codec, 
   coding.coarse_last = space.coarse_last;
   coding.without_z = space.without_z;
   if (space.without_z)
-    trained.made = without_z({pixels.data.data(), std::size_t{3} * pixels.width_px, pixels.width_px,
-                              pixels.height_px, {}});
+    trained.made = without_z(
+        {pixels.data.data(), std::size_t{3} * pixels.width_px, pixels.width_px, pixels.height_px, {}});
 }
 
 /// The codecs of all planes, trained on samples of their pixels.
@@ -145,7 +145,8 @@ std::vector<TrainedPlane> train_planes(const Fragments& fragments, const std::ve
       trained.codec = make_texture_codec(codec, trained.coding);
     }
     trained.rungs = trained.codec->train(
-        training_sample(plane, trained.coded(pixels[p]), options.uncovered, options.training_fragments), context);
+        training_sample(plane, trained.coded(pixels[p]), options.uncovered, options.training_fragments),
+        context);
     context.report(kTrained * static_cast<double>(p + 1) / static_cast<double>(fragments.planes.size()));
   }
   return out;
