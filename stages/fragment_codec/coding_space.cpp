@@ -16,7 +16,7 @@ namespace texmesh {
 namespace {
 
 constexpr std::array<int, 3> kQualities{30, 75, 93};
-constexpr std::size_t kMostWindows = 64;
+constexpr std::size_t kMostWindows = 32;
 constexpr double kMostTimesLeastError = 2;
 constexpr int kComparedErrors = 9;
 constexpr double kNoError = 1e-9;
