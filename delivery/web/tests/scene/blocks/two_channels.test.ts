@@ -1,6 +1,6 @@
 import { MeshStandardMaterial, ShaderChunk, type WebGLProgramParametersWithUniforms, type WebGLRenderer } from 'three';
 import { expect, test } from 'vitest';
-import { readTwoChannels } from '../../src/scene/blocks/two_channels';
+import { readTwoChannels } from '../../../src/scene/blocks/two_channels';
 
 const shaderOf = (material: MeshStandardMaterial): string => {
   const shader = { fragmentShader: '#include <normal_fragment_maps>' } as WebGLProgramParametersWithUniforms;
