@@ -2,8 +2,7 @@
 """Reads texmesh packages of format 2, written from format/SPEC.md alone; rule names are those of that text.
 
 PACKAGE is a container or the folder of a tree. check: which rule it breaks first, by every byte. info: digests and
-places of its entries. picture: a texture plane as PNG. mesh: a scale of its stream as OBJ.
-Needs numpy and Pillow (Debian: python3-numpy python3-pil).
+places of its entries. picture: a texture plane as PNG. mesh: a scale of its stream as OBJ. Needs numpy and Pillow.
 """
 import argparse
 import collections
@@ -85,6 +84,10 @@ def decode_image(data, width, height, channels, rule, what, kind=("JPEG", "WEBP"
     except (OSError, SyntaxError, ValueError) as error:
         raise Refused(f"{rule}: {what}: {error}") from error
 
+def with_z(image):
+    xy = np.asarray(image)[..., :2]  # F24
+    z = (256 + np.sqrt(np.maximum(0, 65025 - ((2.0 * xy - 255) ** 2).sum(axis=2))).astype(int)) // 2
+    return Image.fromarray(np.dstack([xy, z]).astype("u1"))
 
 class Model:
     """A package, container or tree, with its documents."""
@@ -153,7 +156,8 @@ class Model:
         for fragment, *parts in zip(table.order, *streams):
             what = f"fragment {fragment} at rung {rung} of plane {plane}"
             file = RULES.follow("fragment", head=head, parts=parts, t=t, what=what).file
-            yield fragment, decode_image(file, t.fragmentWidthPx, t.fragmentHeightPx, t.channels, "F08", what)
+            image = decode_image(file, t.fragmentWidthPx, t.fragmentHeightPx, t.channels, "F08", what)
+            yield fragment, with_z(image) if t.codec == "jpeg-xy" else image
 
     def picture(self, plane, rung):
         """The plane at a rung; the preview where nothing is listed."""
@@ -491,8 +495,7 @@ class Splits:
             corners = self.around[self.point_of[w]]
             self.step(len(corners))
             twin = next((self.w(h) for h in corners if self.w(h) not in self.fresh), None)
-            beside = [self.w(h, k) for h in corners if self.w(h) == w for k in (1, 2)]
-            beside = [n for n in beside if n not in self.fresh]
+            beside = [self.w(h, k) for h in corners if self.w(h) == w for k in (1, 2) if self.w(h, k) not in self.fresh]
             for k, (kind, bits, _, components) in enumerate(self.kinds[1:]):
                 part = self.parts[k + 1]
                 if twin is not None and part.is_there and part.bit(part.models[116]):
@@ -523,8 +526,7 @@ class Splits:
         return np.where(length > 0, x / np.where(length > 0, length, np.float32(1)), np.float32([0, 0, 1]))
 
 def mean(values):
-    n = len(values)
-    return [(2 * sum(column) + n) // (2 * n) for column in zip(*values)]
+    return [(2 * sum(column) + len(column)) // (2 * len(column)) for column in zip(*values)]
 
 def folded(xy, c):
     return (c - np.abs(xy[..., ::-1])) * np.where(xy < 0, -1, 1)
@@ -565,12 +567,10 @@ def run(options, package):
         print(f"{package}: no rule broken")
     elif options.command == "info":
         print(f"id {model.id}")
-        for path, (offset, size, digest) in model.index.items():
-            print(digest, offset, size, path)
+        print(*(f"{digest} {at} {size} {path}\n" for path, (at, size, digest) in model.index.items()), sep="", end="")
     elif options.command == "picture":
         plane, is_preview = options.plane, options.rung == "preview"
-        shown = model.preview(plane) if is_preview else model.picture(plane, int(options.rung))
-        shown.save(output, format="PNG")
+        (model.preview(plane) if is_preview else model.picture(plane, int(options.rung))).save(output, format="PNG")
     else:
         splits = model.stream()
         require(any(end.scale == options.scale for end in splits.scale_ends()), "S21", "no such scale")

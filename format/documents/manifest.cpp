@@ -23,8 +23,9 @@ constexpr double kLargest = 1e300;       // of lengths: leaves room for sums
 constexpr std::size_t kMaxScales = 100;  // two digits in the path
 
 /// Features that a package may require, one per line (SPEC.md, section 14).
-constexpr std::array<std::string_view, 2> kKnownFeatures{
+constexpr std::array<std::string_view, 3> kKnownFeatures{
     "codec-jpeg-progressive",
+    "codec-jpeg-xy",
     "codec-webp",
 };
 bool is_known_feature(const std::string& name) {

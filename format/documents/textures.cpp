@@ -127,9 +127,11 @@ TextureInfo read_texture(const JsonAt& at, std::uint32_t plane) {
   if (t.colour_space != "srgb" && t.colour_space != "linear")
     at["colourSpace"].by("X03").fail("srgb or linear", t.colour_space);
   const std::string codec = at["codec"].text(100);
-  if (!find_codec(codec)) at["codec"].by("X03").fail("jpeg, jpeg-progressive or webp", codec);
+  if (!find_codec(codec)) at["codec"].by("X03").fail("jpeg, jpeg-progressive, webp or jpeg-xy", codec);
   t.codec = *find_codec(codec);
   read_grid(at, t);
+  if (t.codec == Codec::kJpegXy && (t.channels != 3 || t.colour_space != "linear"))
+    at["codec"].by("F24").fail("jpeg-xy for three linear channels alone", codec);
   t.preview_width_px = u32(at["previewWidthPx"], 1, kMaxSide);
   t.preview_height_px = u32(at["previewHeightPx"], 1, kMaxSide);
   const JsonAt qualities = at["rungQuality"];

@@ -67,10 +67,11 @@ bool is_webp(Span file) {
 }  // namespace
 
 const CodecTraits& codec_traits(Codec codec) {
-  static constexpr std::array<CodecTraits, 3> traits{
+  static constexpr std::array<CodecTraits, 4> traits{
       CodecTraits{"jpeg", "", "jpg", "image/jpeg", false},
       CodecTraits{"jpeg-progressive", "codec-jpeg-progressive", "jpg", "image/jpeg", true},
-      CodecTraits{"webp", "codec-webp", "webp", "image/webp", false}};
+      CodecTraits{"webp", "codec-webp", "webp", "image/webp", false},
+      CodecTraits{"jpeg-xy", "codec-jpeg-xy", "jpg", "image/jpeg", false}};
   return traits.at(static_cast<std::size_t>(codec));
 }
 
@@ -92,6 +93,7 @@ Bytes join_fragment(Codec codec, Span tables, std::span<const Span> streams) {
                       std::to_string(streams.size()));
   switch (codec) {
     case Codec::kJpeg:
+    case Codec::kJpegXy:
       return join_jpeg(tables, streams.front());
     case Codec::kJpegProgressive:
       return join_progressive(tables, streams);
@@ -114,12 +116,12 @@ Bytes split_fragment(Codec codec, Span tables, Span file, std::uint64_t lower_by
       throw FormatError("WebP", "file", "RIFF ... WEBP", std::to_string(file.size()) + " other bytes");
     return {file.begin(), file.end()};
   }
-  const Span head = without_end(tables, codec == Codec::kJpeg ? "F05" : "F06");
+  const Span head = without_end(tables, is_baseline(codec) ? "F05" : "F06");
   if (file.size() < head.size() + kMarkerBytes || !marker_at(file, file.size() - kMarkerBytes, kEnd) ||
       !std::equal(head.begin(), head.end(), file.begin()))
     throw FormatError("JPEG", "byte 0", "the rung's table stream", "other bytes");
   const Span body = file.subspan(head.size());
-  if (codec == Codec::kJpeg) {
+  if (is_baseline(codec)) {
     Bytes out{0xff, kStart};
     append(out, body);
     return out;

@@ -16,11 +16,12 @@ namespace texmesh {
 enum class Codec : std::uint8_t {
   kJpeg = 0,             // baseline, one table stream per rung
   kJpegProgressive = 1,  // one progressive file per fragment; a rung adds scans to the rungs below it
-  kWebp = 2              // a complete lossy WebP file per fragment and rung, no tables
+  kWebp = 2,             // a complete lossy WebP file per fragment and rung, no tables
+  kJpegXy = 3            // as kJpeg, of vectors' x and y: who decodes makes z of them
 };
 template <>
 struct EnumNames<Codec> {
-  static constexpr std::array<std::string_view, 3> names{"jpeg", "jpeg-progressive", "webp"};
+  static constexpr std::array<std::string_view, 4> names{"jpeg", "jpeg-progressive", "webp", "jpeg-xy"};
 };
 
 struct CodecTraits {
@@ -33,6 +34,8 @@ struct CodecTraits {
   bool incremental = false;
 };
 const CodecTraits& codec_traits(Codec codec);
+/// Whether its fragments are complete baseline JPEGs (SPEC.md, F05).
+constexpr bool is_baseline(Codec codec) { return codec == Codec::kJpeg || codec == Codec::kJpegXy; }
 /// By id, the same with an extension; nothing for unknown ones.
 std::optional<Codec> find_codec(std::string_view id);
 

@@ -23,15 +23,21 @@ HuffmanTable table_for(const std::array<std::uint64_t, 256>& count,
   return make_huffman_table(symbols, weights);
 }
 
-/// Of rising qualities, how many have one kind but for the quality: all below the finest.
-std::size_t rungs_alike(std::span<const int> qualities) {
+/// Of rising qualities, how many are below the finest.
+std::size_t rungs_below_finest(std::span<const int> qualities) {
   return qualities.size() - (!qualities.empty() && qualities.back() == kFinestQuality ? 1 : 0);
+}
+
+/// How many have one kind but for the quality: all below the finest, or all.
+std::size_t rungs_alike(const PlaneCoding& plane, std::span<const int> qualities) {
+  const bool also_finest = plane.channels != 3 || (plane.apart && !plane.coarse_last);
+  return also_finest ? qualities.size() : rungs_below_finest(qualities);
 }
 
 class JpegCodec : public TextureCodec {
  public:
   explicit JpegCodec(const PlaneCoding& plane) : plane_(plane) {}
-  Codec id() const override { return Codec::kJpeg; }
+  Codec id() const override { return plane_.without_z ? Codec::kJpegXy : Codec::kJpeg; }
 
   std::vector<CodecRung> train(std::span<const PixelWindow> sample, const RunContext& context) override {
     std::vector<CodecRung> rungs(plane_.qualities.size());
@@ -102,7 +108,7 @@ class JpegCodec : public TextureCodec {
     std::vector<std::vector<SymbolCounts>> counts(part.size());
     for_each(context, part.size(), [&](std::size_t w) {
       counts[w].assign(rungs.size(), SymbolCounts(training[0].counts.size()));
-      const std::size_t alike = rungs_alike(plane_.qualities);
+      const std::size_t alike = rungs_alike(plane_, plane_.qualities);
       const std::span<const MaskedRung> all(rungs);
       const std::span<SymbolCounts> into(counts[w]);
       if (alike > 0) MaskedJpeg(kind_of(0)).count_symbols(part[w], all.first(alike), into.first(alike));
@@ -128,25 +134,29 @@ class JpegCodec : public TextureCodec {
         rungs_.push_back(masked_rung(kind, coders_.back()->quantisers(), codec.huffman_tables_[r]));
         if (k == 0) masked_.emplace(kind);
       }
-      alike_ = rungs_alike(qualities);
-      if (alike_ < rungs_.size()) finest_.emplace(baseline_kind(codec.plane_, kFinestQuality));
+      alike_ = rungs_alike(codec.plane_, qualities);
+      below_finest_ = rungs_below_finest(qualities);
+      if (below_finest_ < rungs_.size()) finest_.emplace(baseline_kind(codec.plane_, kFinestQuality));
     }
     // Rung after rung of one fragment, so that its pixels stay in the cache; rung by rung costs a quarter
     // more.
     void encode(const PixelWindow& fragment, std::span<std::vector<std::uint8_t>> streams) override {
       const std::span<const MaskedRung> rungs(rungs_);
-      if (wholly_covered(fragment))
-        for (std::size_t r = 0; r < alike_; ++r) coders_[r]->append_body(fragment, streams[r]);
-      else if (alike_ > 0)
-        masked_->append_bodies(fragment, rungs.first(alike_), streams.first(alike_));
+      const bool whole = wholly_covered(fragment);
+      const std::size_t first = whole ? below_finest_ : alike_;
+      if (whole)
+        for (std::size_t r = 0; r < first; ++r) coders_[r]->append_body(fragment, streams[r]);
+      else if (first > 0)
+        masked_->append_bodies(fragment, rungs.first(first), streams.first(first));
       // libjpeg's coefficients are the nearest ones: more samples would be off.
-      if (finest_) finest_->append_bodies(fragment, rungs.subspan(alike_), streams.subspan(alike_));
+      if (first < rungs.size())
+        finest_->append_bodies(fragment, rungs.subspan(first), streams.subspan(first));
     }
 
    private:
     std::vector<std::unique_ptr<JpegCoder>> coders_;
     std::vector<MaskedRung> rungs_;
-    std::size_t alike_ = 0;
+    std::size_t alike_ = 0, below_finest_ = 0;
     std::optional<MaskedJpeg> masked_, finest_;  // of the first rung's kind; of a rung of the finest quality
   };
 

@@ -7,6 +7,7 @@
 
 #include "format/base/portable_math.h"
 #include "stages/base/parallel.h"
+#include "stages/fragment_codec/rebuilt_z.h"
 #include "stages/jpeg/jpeg.h"
 #include "stages/jpeg/jpeg_bits.h"
 #include "stages/jpeg/jpeg_coder.h"
@@ -15,15 +16,16 @@ namespace texmesh {
 namespace {
 
 constexpr std::array<int, 3> kQualities{30, 75, 93};
-constexpr std::size_t kMostWindows = 256;
+constexpr std::size_t kMostWindows = 32;
 constexpr double kMostTimesLeastError = 2;
 constexpr int kComparedErrors = 9;
 constexpr double kNoError = 1e-9;
 
-// Two channels, whose reader rebuilds z, are not among them: docs/method.md, "Tried and not taken".
 constexpr CodingSpace kApart{true, Subsampling::k444, false};
-constexpr std::array<CodingSpace, 3> kOthers{
-    {{false, Subsampling::k444, false}, {false, Subsampling::k420, false}, {true, Subsampling::k444, true}}};
+constexpr std::array<CodingSpace, 4> kOthers{{{false, Subsampling::k444, false},
+                                              {false, Subsampling::k420, false},
+                                              {true, Subsampling::k444, true},
+                                              {true, Subsampling::k444, false, true}}};
 
 /// Logarithms of a space's bits and errors, by quality.
 struct RateCurve {
@@ -73,22 +75,37 @@ double error_of(DataKind kind, const PixelWindow& window, const Pixels& decoded)
   return sum;
 }
 
+/// The windows as they are coded, which point into `made` where that is something else.
+std::vector<PixelWindow> coded_windows(const CodingSpace& space, std::span<const PixelWindow> windows,
+                                       std::vector<Pixels>& made) {
+  std::vector<PixelWindow> out(windows.begin(), windows.end());
+  if (!space.without_z) return out;
+  for (const PixelWindow& window : windows) made.push_back(without_z(window));
+  for (std::size_t w = 0; w < out.size(); ++w)
+    out[w].data = made[w].data.data(), out[w].stride_bytes = std::size_t{3} * made[w].width_px;
+  return out;
+}
+
 RateCurve measure(DataKind kind, const CodingSpace& space, std::span<const PixelWindow> windows,
                   const RunContext& context) {
   JpegKind jpeg;
   jpeg.rgb = space.apart;
   jpeg.coarse_last = space.coarse_last;
   jpeg.subsampling = space.subsampling;
-  const std::vector<double> bits = jpeg_bits(jpeg, windows, kQualities, context);
+  std::vector<Pixels> made;
+  const std::vector<PixelWindow> coded = coded_windows(space, windows, made);
+  const std::vector<double> bits = jpeg_bits(jpeg, coded, kQualities, context);
   RateCurve out;
   for (std::size_t q = 0; q < kQualities.size(); ++q) {
     jpeg.quality = kQualities[q];
     const double error = parallel_sum(context, windows.size(), 16, [&](std::size_t begin, std::size_t end) {
       JpegCoder coder(jpeg);
       double sum = 0;
-      for (const PixelWindow& window : windows.subspan(begin, end - begin)) {
-        const std::uint64_t area = std::uint64_t{window.width_px} * window.height_px;
-        sum += error_of(kind, window, decode_jpeg(coder.complete_as_is(window), area));
+      for (std::size_t w = begin; w < end; ++w) {
+        const std::uint64_t area = std::uint64_t{windows[w].width_px} * windows[w].height_px;
+        Pixels decoded = decode_jpeg(coder.complete_as_is(coded[w]), area);
+        if (space.without_z) rebuild_z(decoded);
+        sum += error_of(kind, windows[w], decoded);
       }
       return sum;
     });
@@ -116,7 +133,7 @@ double more_bits(const RateCurve& one, const RateCurve& other) {
 
 }  // namespace
 
-CodingSpace measure_coding_space(DataKind kind, std::span<const PixelWindow> sample,
+CodingSpace measure_coding_space(DataKind kind, bool needs_z, std::span<const PixelWindow> sample,
                                  const RunContext& context) {
   std::vector<PixelWindow> windows;
   const std::size_t count = std::min(sample.size(), kMostWindows);
@@ -128,7 +145,8 @@ CodingSpace measure_coding_space(DataKind kind, std::span<const PixelWindow> sam
   CodingSpace best = kApart;
   double least = 0;
   for (const CodingSpace& space : kOthers) {
-    if (space.coarse_last && kind != DataKind::kVectors) continue;
+    if ((space.coarse_last || space.without_z) && kind != DataKind::kVectors) continue;
+    if (space.without_z && needs_z) continue;
     const double more = more_bits(measure(kind, space, windows, quiet), apart);
     if (more < least) best = space, least = more;
   }

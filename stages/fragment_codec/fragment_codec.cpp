@@ -4,6 +4,7 @@
 
 #include "format/base/errors.h"
 #include "stages/fragment_codec/codec_list.h"
+#include "stages/fragment_codec/rebuilt_z.h"
 #include "stages/jpeg/jpeg.h"
 
 namespace texmesh {
@@ -37,17 +38,23 @@ std::unique_ptr<TextureCodec> make_texture_codec(Codec codec, const PlaneCoding&
     case Codec::kWebp:
       return make_webp_codec(plane);
     case Codec::kJpeg:
+    case Codec::kJpegXy:
       break;
   }
   return make_jpeg_codec(plane);
 }
 
 Pixels decode_fragment_file(Codec codec, std::span<const std::uint8_t> file, std::uint64_t max_pixels) {
-  return codec == Codec::kWebp ? decode_webp(file, max_pixels) : decode_jpeg(file, max_pixels);
+  if (codec == Codec::kWebp) return decode_webp(file, max_pixels);
+  Pixels pixels = decode_jpeg(file, max_pixels);
+  if (codec == Codec::kJpegXy) rebuild_z(pixels);
+  return pixels;
 }
 
 Pixels decode_fragment_file_luma(Codec codec, std::span<const std::uint8_t> file, std::uint64_t max_pixels) {
-  return codec == Codec::kWebp ? luma_of(decode_webp(file, max_pixels)) : decode_jpeg_luma(file, max_pixels);
+  return codec == Codec::kJpeg || codec == Codec::kJpegProgressive
+             ? decode_jpeg_luma(file, max_pixels)
+             : luma_of(decode_fragment_file(codec, file, max_pixels));
 }
 
 }  // namespace texmesh

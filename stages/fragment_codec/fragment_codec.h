@@ -23,6 +23,7 @@ struct PlaneCoding {
   std::uint32_t fragment_width_px = 0, fragment_height_px = 0;  // multiples of 16
   bool apart = false;        // three channels are coded as they are; otherwise as YCbCr
   bool coarse_last = false;  // with `apart`: the last channel is quantised more coarsely (JpegKind)
+  bool without_z = false;    // with `apart`: windows are those of without_z() (rebuilt_z.h), Codec::kJpegXy
   Subsampling subsampling = Subsampling::k420;  // of YCbCr
   std::vector<int> qualities;                   // wanted rungs, IJG scale, strictly rising
 };

@@ -132,7 +132,8 @@ std::vector<PlaneLadder> encode_rungs(const Fragments& fragments, const std::vec
         streams.resize(work[p].rungs.size());
         if (work[p].wanted[f] && fragments.planes[p].covered_texels[f] > 0) {
           auto encoder = encoders.borrow(p);
-          encoder->encode(fragment_window(fragments.planes[p], pixels[p], uncovered, f), streams);
+          encoder->encode(fragment_window(fragments.planes[p], trained[p].coded(pixels[p]), uncovered, f),
+                          streams);
           encoders.give_back(p, std::move(encoder));
         }
       }

@@ -21,6 +21,9 @@ struct TrainedPlane {
   std::vector<CodecRung> rungs;
   SourceCodec source;        // without its codec, which is the one above
   bool source_rung = false;  // the last rung has the source's coefficients
+  Pixels made;               // of codec jpeg-xy: what is coded, see without_z(); otherwise without texels
+  /// What is coded of the plane's pixels.
+  const Pixels& coded(const Pixels& pixels) const { return made.data.empty() ? pixels : made; }
 };
 
 /// What is encoded of one plane.

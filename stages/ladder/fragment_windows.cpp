@@ -8,8 +8,10 @@
 namespace texmesh {
 namespace {
 
-/// What samples show of a plane: this part of its pixels, but at least so many.
-constexpr std::uint64_t kSampleDivisor = 16, kLeastSamplePixels = 131072;
+/// What samples show of a plane: this part of its pixels, but at least so many. Huffman tables need fewer
+/// than sizes: with 131072 the textures of a helmet, 512 px, take .3 % fewer bytes, and the stage a fifth more
+/// time.
+constexpr std::uint64_t kSampleDivisor = 16, kLeastSamplePixels = 131072, kLeastTrainingPixels = 32768;
 
 std::vector<std::size_t> covered_fragments(const TexturePlane& plane) {
   std::vector<std::size_t> out;
@@ -44,7 +46,7 @@ std::vector<PixelWindow> training_sample(const TexturePlane& plane, const Pixels
                                          int wanted, std::uint32_t rows) {
   const std::vector<std::size_t> covered = covered_fragments(plane);
   const std::uint64_t budget =
-      std::max(std::uint64_t{pixels.width_px} * pixels.height_px / kSampleDivisor, kLeastSamplePixels);
+      std::max(std::uint64_t{pixels.width_px} * pixels.height_px / kSampleDivisor, kLeastTrainingPixels);
   const std::size_t count = std::min(covered.size(), static_cast<std::size_t>(std::max(wanted, 1)));
   // More windows and smaller ones show more of the plane for the same work. They are whole rows, because the
   // DC step from a row's end to the next row's begin is large: narrower windows would show it too often, and

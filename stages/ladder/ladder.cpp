@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "stages/fragment_codec/coding_space.h"
+#include "stages/fragment_codec/rebuilt_z.h"
 #include "stages/image/check_pixels.h"
 #include "stages/image/decode_image.h"
 #include "stages/ladder/choose_rungs.h"
@@ -106,16 +107,25 @@ void add_finest(const TexturePlane& plane, const std::vector<Image>& images, con
     coding.qualities.push_back(kFinestQuality);
 }
 
-/// The space of three channels of data, by what a sample of their pixels shows.
-void choose_space(const TexturePlane& plane, const Pixels& pixels, Uncovered uncovered, PlaneCoding& coding,
-                  const RunContext& context) {
+/// The space of three channels of data, by what a sample of their pixels shows. Mips have their full size's
+/// (`base`, or null where the source's coefficients have one): measuring each took a tenth of the stage's
+/// time.
+void choose_space(const TexturePlane& plane, const Pixels& pixels, Codec codec, Uncovered uncovered,
+                  const PlaneCoding* base, TrainedPlane& trained, const RunContext& context) {
   if (is_colour(plane.role) || plane.channels != 3) return;
+  PlaneCoding& coding = trained.coding;
   const CodingSpace space =
-      measure_coding_space(plane.role == TextureRole::kNormal ? DataKind::kVectors : DataKind::kNumbers,
-                           size_sample(plane, pixels, uncovered), context);
+      base
+          ? CodingSpace{base->apart, base->subsampling, base->coarse_last, base->without_z}
+          : measure_coding_space(plane.role == TextureRole::kNormal ? DataKind::kVectors : DataKind::kNumbers,
+                                 codec != Codec::kJpeg, size_sample(plane, pixels, uncovered), context);
   coding.apart = space.apart;
   coding.subsampling = space.subsampling;
   coding.coarse_last = space.coarse_last;
+  coding.without_z = space.without_z;
+  if (space.without_z)
+    trained.made = without_z(
+        {pixels.data.data(), std::size_t{3} * pixels.width_px, pixels.width_px, pixels.height_px, {}});
 }
 
 /// The codecs of all planes, trained on samples of their pixels.
@@ -134,12 +144,16 @@ std::vector<TrainedPlane> train_planes(const Fragments& fragments, const std::ve
       trained.codec = std::move(trained.source.codec);
       trained.source_rung = true;
     } else {
-      choose_space(plane, pixels[p], options.uncovered, trained.coding, context);
+      const TrainedPlane* base = plane.mip > 0 ? &out[plane.base] : nullptr;
+      const bool known = base && !base->source_rung && base->codec->id() != Codec::kJpegProgressive;
+      choose_space(plane, pixels[p], codec, options.uncovered, known ? &base->coding : nullptr, trained,
+                   context);
       add_finest(plane, images, options, trained.coding);
       trained.codec = make_texture_codec(codec, trained.coding);
     }
     trained.rungs = trained.codec->train(
-        training_sample(plane, pixels[p], options.uncovered, options.training_fragments), context);
+        training_sample(plane, trained.coded(pixels[p]), options.uncovered, options.training_fragments),
+        context);
     context.report(kTrained * static_cast<double>(p + 1) / static_cast<double>(fragments.planes.size()));
   }
   return out;

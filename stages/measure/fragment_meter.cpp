@@ -29,11 +29,12 @@ Samples rectangle_samples(const TexturePlane& plane, const Pixels& pixels, const
   const std::size_t measured = measured_channels(plane);
   Samples out(measured);
   for (std::size_t c = 0; c < measured; ++c) {
-    out[c].reserve(std::size_t{rectangle.width_px} * rectangle.height_px);
+    out[c].resize(std::size_t{rectangle.width_px} * rectangle.height_px);
+    std::uint8_t* to = out[c].data();
     for (std::uint32_t y = rectangle.top_px; y < rectangle.bottom_px(); ++y) {
       const std::uint8_t* texel = pixels.at(rectangle.left_px, y);
       for (std::uint32_t x = 0; x < rectangle.width_px; ++x, texel += pixels.channels)
-        out[c].push_back(measured_value(texel, pixels.channels, measured, c));
+        *to++ = measured_value(texel, pixels.channels, measured, c);
     }
   }
   return out;

@@ -6,11 +6,11 @@
 //
 // Renders SOURCE and each file lit (texmesh render, the studio's light; --unlit: base colours alone) from the
 // same views and prints mean LDR-FLIP over the pixels of the object (0 = equal). --neighbours also makes the
-// best file of the next finer and the next coarser scale. --reencoded beside each file has the source with
-// its images encoded anew at the one JPEG quality that the bytes allow, or as they are where they fit; the
-// mesh is the source's and counts as the package's S_0. DIR holds files that tests/bench/extract_peers has
-// made of SOURCE; the best one within the bytes counts. The views are others than those that extract itself
-// compares.
+// best file of the next finer and the next coarser scale. --reencoded beside each file has the source's
+// images encoded anew at the one JPEG quality that the bytes allow, or as they are where they fit, on the
+// package's S_0 (--uncoded: on the source's own mesh, which counts as S_0's bytes all the same). DIR holds
+// files that tests/bench/extract_peers has made of SOURCE; the best one within the bytes counts. The views
+// are others than those that extract itself compares.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -149,6 +149,21 @@ Scored best_of(const std::vector<Scored>& roughly, const Scorer& scorer, const f
   return best;
 }
 
+/// S_0 of the package, whose images take the place of the source's of the same numbers.
+ImportedModel on_coded_mesh(PackageReader& package, const ImportedModel& source, const RunContext& context) {
+  ExtractRequest request;
+  request.scale = 0;
+  NoFiles none;
+  ImportedModel out = import_model("S_0", extract_model(package, request, context).glb, none, {}, context);
+  for (Image& image : out.model.images) {
+    const auto number = static_cast<std::size_t>(std::stoul(image.name.substr(image.name.rfind('/') + 1)));
+    const std::string name = image.name;
+    image = source.model.images.at(number);
+    image.name = name;
+  }
+  return out;
+}
+
 /// The source with its images encoded anew, the best of at most `limit` bytes.
 Scored reencoded(const ImportedModel& source, std::uint64_t mesh_bytes, std::uint64_t limit,
                  const Scorer& scorer) {
@@ -192,7 +207,7 @@ struct Arguments {
   std::vector<double> bytes{100, 250, 500, 1000};
   std::vector<std::string> score;
   int views = 6, size = 512;
-  bool neighbours = false, unlit = false, reencoded = false;
+  bool neighbours = false, unlit = false, reencoded = false, uncoded = false;
 };
 
 /// What the search chose, and what it would have made of the scales beside that, in its own views.
@@ -217,7 +232,11 @@ void print_neighbours(const Arguments& a, std::uint64_t limit, const Extracted& 
 void print_table(const Arguments& a, const Scorer& scorer, const RunContext& context) {
   std::vector<Scored> peers = a.peers.empty() ? std::vector<Scored>{} : files_of(a.peers);
   const Scorer rough(a.source, 3, 256, a.unlit, context);
-  const ImportedModel source = a.reencoded ? import_file(a.source, {}, context) : ImportedModel();
+  ImportedModel source = a.reencoded ? import_file(a.source, {}, context) : ImportedModel();
+  if (a.reencoded && !a.uncoded) {
+    PackageReader package(open_store(a.package));
+    source = on_coded_mesh(package, source, context);
+  }
   for (Scored& s : peers) score(rough, a.peers, s);
   std::cout << "     kB   extract     bytes  scale  FLIP    s   best other    bytes  FLIP    ratio\n";
   double logs = 0;
@@ -276,6 +295,7 @@ int main(int argc, char** argv) {
   app.add_option("--size", a.size)->check(CLI::Range(32, 4096))->capture_default_str();
   app.add_flag("--unlit", a.unlit, "Compare base colours alone");
   app.add_flag("--reencoded", a.reencoded, "Compare with the source, its images encoded anew");
+  app.add_flag("--uncoded", a.uncoded, "--reencoded with the source's own mesh");
   app.add_flag("--neighbours", a.neighbours, "Also the best files of the scales beside the chosen one");
   CLI11_PARSE(app, argc, argv);
   RunContext context;

@@ -1,9 +1,8 @@
 // What each space for the coding of normal maps takes: normal_space_bench IMAGE ... . Prints bytes and mean
 // angle of windows of 128 px spread over each image, coded as JPEGs in fragments' manner, for channels apart,
-// channels apart with a coarse z, YCbCr 4:4:4, YCbCr 4:2:0, and two ways that no package has, whose reader
-// rebuilds z: x and y in a file of three channels with an even z, which every decoder opens, and x and y in
-// two grey files. The last columns are bytes over those of channels apart and of the coarse z at equal
-// angles.
+// channels apart with a coarse z, YCbCr 4:4:4, YCbCr 4:2:0, x and y alone (codec jpeg-xy, whose reader makes
+// z), and, which no package has, x and y in two grey files. The last columns are bytes over those of channels
+// apart and of the coarse z at equal angles.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -13,6 +12,7 @@
 #include <iterator>
 
 #include "stages/fragment_codec/coding_space.h"
+#include "stages/fragment_codec/rebuilt_z.h"
 #include "stages/image/decode_image.h"
 #include "stages/jpeg/jpeg.h"
 #include "stages/jpeg/jpeg_bits.h"
@@ -22,15 +22,14 @@ namespace {
 
 constexpr std::uint32_t kWindowPx = 128;
 constexpr std::size_t kMostWindows = 64;
-constexpr std::array kQualities{30, 53, 75, 86, 93, 97};
+constexpr std::array kQualities{30, 53, 75, 86, 93, 97, 100};
 constexpr double kDegrees = 57.29577951308232;
 
 struct Space {
   const char* name;
   JpegKind kind;
-  bool even = false;  // z is 128 everywhere
-  bool two = false;   // x and y as two grey pictures
-  bool rebuilds() const { return even || two; }
+  bool without_z = false;
+  bool two = false;  // x and y as two grey pictures
 };
 
 JpegKind kind_of(std::uint32_t channels, bool apart, bool coarse_last, Subsampling subsampling) {
@@ -48,8 +47,8 @@ std::vector<Space> spaces() {
           {"coarse z", kind_of(3, true, true, full)},
           {"YCbCr 4:4:4", kind_of(3, false, false, full)},
           {"YCbCr 4:2:0", kind_of(3, false, false, Subsampling::k420)},
-          {"x, y, even z", kind_of(3, true, false, full), true, false},
-          {"x and y alone", kind_of(1, false, false, full), false, true}};
+          {"without z", kind_of(3, true, false, full), true},
+          {"two grey files", kind_of(1, false, false, full), true, true}};
 }
 
 /// The first three channels of some windows.
@@ -76,11 +75,6 @@ Pixels channel_of(const Pixels& image, std::size_t channel) {
   return out;
 }
 
-Pixels with_even_z(Pixels image) {
-  for (std::size_t i = 2; i < image.data.size(); i += 3) image.data[i] = 128;
-  return image;
-}
-
 std::vector<PixelWindow> views_of(const std::vector<Pixels>& pictures) {
   std::vector<PixelWindow> out;
   for (const Pixels& p : pictures)
@@ -95,11 +89,6 @@ std::array<double, 3> vector_of(const std::uint8_t* texel) {
   for (std::size_t c = 0; c < 3; ++c) v[c] = 2.0 * texel[c] / 255 - 1, length += v[c] * v[c];
   for (double& x : v) x /= std::sqrt(length);  // 255 is odd, so that no vector is 0
   return v;
-}
-
-std::array<double, 3> rebuilt(double x, double y) {
-  const double rest = 1 - x * x - y * y, length = std::sqrt(std::max(1.0, x * x + y * y));
-  return {x / length, y / length, std::sqrt(std::max(0.0, rest))};
 }
 
 double angle(const std::array<double, 3>& a, const std::array<double, 3>& b) {
@@ -119,8 +108,11 @@ Point measure(const Space& space, const std::vector<Pixels>& windows, int qualit
   const std::array qualities{quality};
   std::vector<std::vector<Pixels>> coded(space.two ? 2 : 1);
   for (std::size_t c = 0; c < coded.size(); ++c) {
-    for (const Pixels& w : windows)
-      coded[c].push_back(space.two ? channel_of(w, c) : space.even ? with_even_z(w) : w);
+    for (const PixelWindow& w : views_of(windows)) {
+      const Pixels& plain = windows[coded[c].size()];
+      const Pixels made = space.without_z ? without_z(w) : plain;
+      coded[c].push_back(space.two ? channel_of(made, c) : made);
+    }
     const std::vector<PixelWindow> views = views_of(coded[c]);
     out.bits += jpeg_bits(kind, views, qualities, context)[0];
     JpegCoder coder(kind);
@@ -131,11 +123,11 @@ Point measure(const Space& space, const std::vector<Pixels>& windows, int qualit
   for (std::size_t w = 0; w < windows.size(); ++w)
     for (std::size_t i = 0; i < windows[w].data.size(); i += 3, ++texels) {
       const std::array<double, 3> is = vector_of(&windows[w].data[i]);
-      const auto place = [&](std::size_t c) {
-        return 2.0 * (space.two ? coded[c][w].data[i / 3] : coded[0][w].data[i + c]) / 255 - 1;
-      };
-      out.angle +=
-          angle(is, space.rebuilds() ? rebuilt(place(0), place(1)) : vector_of(&coded[0][w].data[i]));
+      Pixels shown{1, 1, 3, {}};
+      for (std::size_t c = 0; c < 3; ++c)
+        shown.data.push_back(!space.two ? coded[0][w].data[i + c] : c < 2 ? coded[c][w].data[i / 3] : 128);
+      if (space.without_z) rebuild_z(shown);
+      out.angle += angle(is, vector_of(shown.data.data()));
     }
   out.angle /= texels;
   return out;
@@ -168,9 +160,9 @@ double ratio_of(const Curve& one, const Curve& other) {
 }
 
 std::string chosen(const std::vector<Pixels>& windows, const RunContext& context) {
-  const CodingSpace space = measure_coding_space(DataKind::kVectors, views_of(windows), context);
+  const CodingSpace space = measure_coding_space(DataKind::kVectors, false, views_of(windows), context);
   const char* ycc = space.subsampling == Subsampling::k420 ? "YCbCr 4:2:0" : "YCbCr 4:4:4";
-  return !space.apart ? ycc : space.coarse_last ? "coarse z" : "channels apart";
+  return !space.apart ? ycc : space.without_z ? "no z" : space.coarse_last ? "coarse z" : "channels apart";
 }
 
 void print_image(const std::string& path, const RunContext& context) {

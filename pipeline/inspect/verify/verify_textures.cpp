@@ -189,7 +189,7 @@ void check_table_streams(const TextureInfo& texture, const PlaneTables& t, std::
     check_jpeg_head(texture.tables.path, "rung " + std::to_string(r), streams.back(), findings);
     findings.require(
         is_table_stream(texture.codec, static_cast<std::uint32_t>(r), pack.subspan(offset, t.table_bytes[r])),
-        {"table-stream", texture.codec == Codec::kJpeg ? "F05" : "F06"}, texture.tables.path,
+        {"table-stream", is_baseline(texture.codec) ? "F05" : "F06"}, texture.tables.path,
         "rung " + std::to_string(r),
         "a table stream of " + std::string(codec_traits(texture.codec).id) + " in " +
             std::to_string(t.table_bytes[r]) + " bytes",

@@ -55,10 +55,24 @@ std::vector<PixelWindow> windows_of(const Pixels& pixels) {
   return out;
 }
 
-CodingSpace space_of(const Pixels& pixels, DataKind kind = DataKind::kNumbers, int threads = 1) {
+CodingSpace space_of(const Pixels& pixels, DataKind kind = DataKind::kNumbers, int threads = 1,
+                     bool needs_z = true) {
   RunContext context;
   context.threads = threads;
-  return measure_coding_space(kind, windows_of(pixels), context);
+  return measure_coding_space(kind, needs_z, windows_of(pixels), context);
+}
+
+/// Bumps whose vectors have that length, and z of that sign.
+Pixels bumps(double length, double sign) {
+  Pixels map{kSide, kSide, 3, {}};
+  Random random{9};
+  for (std::uint32_t y = 0; y < kSide; ++y)
+    for (std::uint32_t x = 0; x < kSide; ++x) {
+      const double u = waves(x, y, 4, random) / 128, v = waves(y, x, 6, random) / 128;
+      const double z = sign * std::sqrt(std::max(0.0, 1 - u * u - v * v));
+      for (const double n : {u, v, z}) map.data.push_back(byte(n * 127 * length));
+    }
+  return map;
 }
 
 TEST(CodingSpace, ChannelsThatHaveNothingInCommonStayApart) { EXPECT_EQ(space_of(unrelated()), kApart); }
@@ -77,23 +91,26 @@ TEST(CodingSpace, ChromaIsHalvedOnlyWhereItIsSmooth) {
 }
 
 TEST(CodingSpace, VectorsGoByTheirAngle) {
-  // Lengths that vary by themselves turn no vector: as numbers they differ in all channels alike.
-  Pixels map{kSide, kSide, 3, {}};
-  Random random{9};
-  for (std::uint32_t y = 0; y < kSide; ++y)
-    for (std::uint32_t x = 0; x < kSide; ++x) {
-      const double u = waves(x, y, 4, random) / 128, v = waves(y, x, 6, random) / 128;
-      const double z = std::sqrt(std::max(0.0, 1 - u * u - v * v));
-      for (const double n : {u, v, z}) map.data.push_back(byte(n * 127));
-    }
+  const Pixels map = bumps(1, 1);
   EXPECT_TRUE(space_of(map, DataKind::kVectors).apart);
   EXPECT_TRUE(space_of(map, DataKind::kVectors).coarse_last);  // z follows from x and y
   EXPECT_FALSE(space_of(map).coarse_last);
 }
 
+TEST(CodingSpace, ZIsLeftToTheReaderWhereItFollows) {
+  const auto leaves_z = [](const Pixels& map, DataKind kind, bool needs_z) {
+    return space_of(map, kind, 1, needs_z).without_z;
+  };
+  EXPECT_TRUE(leaves_z(bumps(1, 1), DataKind::kVectors, false));
+  EXPECT_TRUE(leaves_z(bumps(0.8, 1), DataKind::kVectors, false)) << "length turns no vector";
+  EXPECT_FALSE(leaves_z(bumps(1, -1), DataKind::kVectors, false)) << "z below 0 does not follow";
+  EXPECT_FALSE(leaves_z(bumps(1, 1), DataKind::kVectors, true));
+  EXPECT_FALSE(leaves_z(bumps(1, 1), DataKind::kNumbers, false));
+}
+
 TEST(CodingSpace, NothingIsKnownOfAnEmptySample) {
-  EXPECT_EQ(measure_coding_space(DataKind::kNumbers, {}, RunContext{}), kApart);
-  EXPECT_EQ(measure_coding_space(DataKind::kVectors, {}, RunContext{}), kApart);
+  EXPECT_EQ(measure_coding_space(DataKind::kNumbers, true, {}, RunContext{}), kApart);
+  EXPECT_EQ(measure_coding_space(DataKind::kVectors, true, {}, RunContext{}), kApart);
 }
 
 TEST(CodingSpace, OneColourStaysApart) {
@@ -121,7 +138,7 @@ TEST(CodingSpace, OnlyCoveredTexelsCount) {
   for (std::size_t k = 0; k < windows.size(); ++k)
     windows[k].coverage = {CoverageMask(coverage, kSide, kSide), static_cast<std::uint32_t>(k % 8 * 32),
                            static_cast<std::uint32_t>(k / 8 * 32)};
-  EXPECT_FALSE(measure_coding_space(DataKind::kNumbers, windows, RunContext{}).apart);
+  EXPECT_FALSE(measure_coding_space(DataKind::kNumbers, true, windows, RunContext{}).apart);
 }
 
 TEST(CodingSpace, SameForAnyNumberOfThreads) {

@@ -1,5 +1,5 @@
 /** How a plane's fragments are coded (format/SPEC.md, section 9). */
-export type CodecId = 'jpeg' | 'jpeg-progressive' | 'webp';
+export type CodecId = 'jpeg' | 'jpeg-progressive' | 'webp' | 'jpeg-xy';
 
 /** Traits of a codec. */
 export interface CodecTraits {
@@ -19,6 +19,7 @@ const traits: Record<CodecId, CodecTraits> = {
     incremental: true,
   },
   webp: { requiredFeature: 'codec-webp', extension: 'webp', mediaType: 'image/webp', incremental: false },
+  'jpeg-xy': { requiredFeature: 'codec-jpeg-xy', extension: 'jpg', mediaType: 'image/jpeg', incremental: false },
 };
 /** Traits of a codec that this reader knows. */
 export function codecTraits(codec: CodecId): CodecTraits {

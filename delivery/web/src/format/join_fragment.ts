@@ -20,7 +20,7 @@ export function joinFragment(codec: CodecId, tables: Uint8Array, streams: readon
   };
   if (streams.length === 0 || (streams.length > 1 && !codecTraits(codec).incremental)) fail('one stream');
   const first = streams[0];
-  if (codec === 'jpeg') {
+  if (codec === 'jpeg' || codec === 'jpeg-xy') {
     if (!beginsAndEnds(first)) fail('SOI ... EOI', 'F05');
     return concat([withoutEnd(tables, 'F05'), first.subarray(2)]);
   }

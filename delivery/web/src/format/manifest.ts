@@ -8,7 +8,7 @@ export const formatMajor = 2;
 /** Minor version: packages of later ones can be read, too. */
 export const formatMinor = 0;
 /** Features that packages may require of this reader. */
-export const knownFeatures: readonly string[] = ['codec-jpeg-progressive', 'codec-webp'];
+export const knownFeatures: readonly string[] = ['codec-jpeg-progressive', 'codec-jpeg-xy', 'codec-webp'];
 
 /** Where an entry's data stands in the container, and its digest. */
 export interface EntryRef {

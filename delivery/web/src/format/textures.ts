@@ -79,6 +79,7 @@ function readTexture(at: JsonAt): TextureInfo {
   if (colourSpace !== 'srgb' && colourSpace !== 'linear') at.fail('srgb or linear', colourSpace, 'X03');
   const codec = at.at('codec').text(100);
   if (!isCodec(codec)) return at.fail('a known codec', codec, 'X03');
+  if (codec === 'jpeg-xy' && (colourSpace !== 'linear' || at.at('channels').integer(1, 3) !== 3)) at.fail('jpeg-xy for three linear channels alone', codec, 'F24');
   const mip = at.has('mip') ? at.at('mip').integer(1, 20) : 0;
   const rungQuality: number[] = [];
   for (let i = 0, n = at.at('rungQuality').array(1, 100); i < n; ++i) {

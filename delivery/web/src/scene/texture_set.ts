@@ -17,6 +17,7 @@ export class TextureSet {
   pending = 0;
   private readonly uploads_: UploadQueue;
   private readonly software_: Promise<boolean>;
+  private readTwoChannels_?: Compression['readTwoChannels']; // loaded with the first plane that needs it
 
   /** Composes the textures of a package for these materials. */
   constructor(
@@ -112,7 +113,8 @@ export class TextureSet {
       const shown = texturesIn(slot.material);
       if (!shown[slot.name]) slot.material.needsUpdate = true;
       shown[slot.name] = plane.view(old);
-      if (plane.blocks) this.blocksOf_(plane.plane)?.[0].readTwoChannels(slot.material, slot.name, plane.blocks.format);
+      const asBlocks = plane.blocks && this.blocksOf_(plane.plane)?.[0].readTwoChannels(slot.material, slot.name, plane.blocks.format);
+      if (!asBlocks && this.isXy_(plane)) this.readTwoChannels_?.(slot.material, slot.name, 'jpeg-xy');
     }
   }
   private async fill_(next: PlaneComposer, before?: PlaneComposer, old?: Texture, preview?: ImageBitmap): Promise<void> {
@@ -128,7 +130,12 @@ export class TextureSet {
         if (preview || this.uploads_.disposed) throw error;
         await this.scale_(next, old!);
       }
+    if (this.isXy_(next)) this.readTwoChannels_ ??= (await import('./blocks/two_channels')).readTwoChannels;
     next.filled = true;
+  }
+  /** Whether fragments bring x and y alone. */
+  private isXy_({ plane }: PlaneComposer): boolean {
+    return this.textures_[plane].codec === 'jpeg-xy';
   }
   /** Fills a plane with a texture that stands on the GPU. */
   private async scale_(next: PlaneComposer, from: Texture, format?: BlockFormat): Promise<void> {
