@@ -195,7 +195,7 @@ class ProxyRun {
     compete(*baked, target, form, best, context);
     form.normals = false;
     if (may_be_flat(*baked, bytes, first)) compete(*baked, target, form, best, context);
-    if (best.made) shop_.learn(best.made->quality);
+    if (best.made) shop_.learn(*best.made);
     flat_ = best.made && !best.form.normals;
     if (first && flat_)
       if (const auto again = shop_.bake(bytes, form, context)) compete(*again, target, form, best, context);

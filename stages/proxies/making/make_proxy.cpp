@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "format/base/portable_math.h"
 #include "stages/proxies/packing/pack_atlas.h"
 #include "stages/proxies/surface/simplify_surface.h"
 
@@ -14,10 +15,10 @@ constexpr double kOver = 1.02;       // of the bytes asked for
 constexpr std::uint32_t kGutterPx = 1;
 constexpr std::uint32_t kTexelStep = 32, kLeastTexels = 32, kMostTexels = 1024;
 constexpr double kCover = 0.58;  // of an atlas' texels
-// Of a covered texel at a quality of 50 or so; textures that take fewer or more teach it.
+// Of a covered texel at the quality aimed at; textures that take fewer or more teach it.
 constexpr double kColourBits = 2.4, kOrmBits = 1.6;
-constexpr int kFewBitsFrom = 80, kManyBitsTo = 25;  // qualities
-constexpr double kFewBits = 0.7, kManyBits = 1.5;
+constexpr double kAimedQuality = 50, kQualitiesOfE = 45;  // so many above it take e times the bytes
+constexpr const char *kColourUse = "base-colour", *kDataUse = "metallic-roughness";
 constexpr double kMeshoptBytes = 9.5, kDracoBytes = 3.2;  // of a triangle, until one mesh is coded
 constexpr int kAttempts = 3;
 constexpr double kLeastMiss = 0.7, kMostMiss = 1.2;  // of a mesh' bytes: textures take what is left
@@ -63,8 +64,8 @@ std::vector<ProxyTexture> textures_of(const ProxyPictures& pictures) {
   const auto add = [&](const char* use, const ProxyImage& image) {
     out.push_back({use, image.width_px, image.height_px, image.file.size()});
   };
-  add("base-colour", pictures.base_colour);
-  if (pictures.orm) add("metallic-roughness", *pictures.orm);
+  add(kColourUse, pictures.base_colour);
+  if (pictures.orm) add(kDataUse, *pictures.orm);
   if (pictures.normal) add("normal", *pictures.normal);
   if (pictures.emission) add("emissive", *pictures.emission);
   return out;
@@ -182,9 +183,16 @@ std::optional<MadeProxy> ProxyWorkshop::finish(const BakedProxy& baked, std::uin
   return out;
 }
 
-void ProxyWorkshop::learn(int quality) {
-  if (quality >= kFewBitsFrom) texel_bits_ *= kFewBits;
-  if (quality <= kManyBitsTo) texel_bits_ *= kManyBits;
+void ProxyWorkshop::learn(const MadeProxy& made) {
+  double bytes = 0, expected = 0;
+  for (const ProxyTexture& t : made.proxy.textures) {
+    const double bits = t.use == kColourUse ? kColourBits : t.use == kDataUse ? kOrmBits : 0;
+    if (bits == 0) continue;
+    bytes += static_cast<double>(t.bytes);
+    expected += bits / 8 * kCover * t.width_px * t.height_px;
+  }
+  if (expected > 0)
+    texel_bits_ = bytes / expected * portable::exp((kAimedQuality - made.quality) / kQualitiesOfE);
 }
 
 }  // namespace texmesh::proxies

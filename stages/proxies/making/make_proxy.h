@@ -65,8 +65,8 @@ class ProxyWorkshop {
   /// At most 2 % above `target_bytes`, or nothing. `form` may differ from the one baked for,
   /// but for a normal map that was not baked.
   std::optional<MadeProxy> finish(const BakedProxy& baked, std::uint64_t target_bytes, const ProxyForm& form);
-  /// The quality that a size's textures came to says how large those of the next one can be.
-  void learn(int quality);
+  /// What a size's textures took at their quality says how large those of the next one can be.
+  void learn(const MadeProxy& made);
 
  private:
   CodedMesh coded_mesh(const BakedProxy& baked, const ProxyForm& form) const;

@@ -25,14 +25,15 @@ ShownModel shown_proxy(const AtlasMesh& mesh, const RoundedMesh& rounded,
 class ProxyStudio {
  public:
   static constexpr std::array<double, 3> kDisplayedPx{128, 256, 512};
-  static constexpr std::size_t kMiddle = 1;
+  static constexpr std::size_t kMiddle = 1, kLarge = 2;
 
   /// S_0 must outlive the studio.
   ProxyStudio(const Mesh& mesh, const ShownMaterials& shown);
 
-  /// At one of the displayed heights.
+  /// At one of the displayed heights: four views, at the largest one two. Half of the views will do where their
+  /// mean is more than `hopeless`.
   FlipSum compare(const RenderScene& scene, const std::vector<RenderTexture>& textures, std::size_t size,
-                  const RunContext& context);
+                  const RunContext& context, double hopeless = 1);
   FlipSum at_middle(const ShownModel& model, const RunContext& context);
   /// At all of them, of which the middle one is known.
   std::vector<ProxyPictureLoss> losses(const ShownModel& model, const FlipSum& middle,
