@@ -43,9 +43,6 @@ float triangle_mean(std::uint32_t place, std::uint32_t factor, std::uint32_t cou
 
 }  // namespace
 
-// Of the bit cost where all quantisers are 1: such a rung stands for the source.
-constexpr float kFinestPart = 0.3f;
-
 float bit_cost_of(BlockKind kind, const std::array<std::uint16_t, 64>& quantisers) {
   float square = 0;
   for (std::size_t k = 1; k < 10; ++k) {
@@ -60,7 +57,6 @@ BlockCoding block_coding(BlockKind kind, const std::array<std::uint16_t, 64>& qu
   BlockCoding coding;
   for (std::size_t k = 0; k < 64; ++k) coding.quantisers[kNaturalOfZigzag[k]] = quantisers[k];
   coding.bit_cost = bit_cost_of(kind, quantisers);
-  if (std::ranges::all_of(quantisers, [](std::uint16_t q) { return q == 1; })) coding.bit_cost *= kFinestPart;
   coding.dc = symbol_codes(dc);
   coding.ac = symbol_codes(ac);
   return coding;

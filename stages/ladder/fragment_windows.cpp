@@ -9,8 +9,8 @@ namespace texmesh {
 namespace {
 
 /// What samples show of a plane: this part of its pixels, but at least so many. Huffman tables need fewer
-/// than sizes: with 131072 the textures of a helmet, 512 px, take .3 % fewer bytes, and the stage a fifth more
-/// time.
+/// than sizes: with 131072 the textures of a helmet, 512 px, take .3 % fewer bytes, and the stage a fifth
+/// more time.
 constexpr std::uint64_t kSampleDivisor = 16, kLeastSamplePixels = 131072, kLeastTrainingPixels = 32768;
 
 std::vector<std::size_t> covered_fragments(const TexturePlane& plane) {

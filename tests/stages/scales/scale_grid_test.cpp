@@ -36,7 +36,7 @@ TEST(Scales, HugeRangesOfTextureCoordinatesStayFine) {
 TEST(Scales, BitsFollowTheOptionsAndTheEdges) {
   const Case c(testing::bumpy_sphere(16, 24));
   const ScaleFiles automatic = c.write(MeshCodec::kDraco);
-  EXPECT_EQ(automatic.position_bits, 14);
+  EXPECT_EQ(automatic.position_bits, 16);
   EXPECT_EQ(automatic.uv_bits, 15);  // 1/8 texel of 4096
   const ScaleFiles by_edges = c.write(MeshCodec::kDraco, {.least_position_bits = 1, .least_uv_bits = 1});
   EXPECT_GE(by_edges.position_bits, 6);
@@ -52,9 +52,9 @@ TEST(Scales, BitsFollowTheOptionsAndTheEdges) {
   EXPECT_LE(by_edges.position_error * 1.7321, mean / count / 4);
   EXPECT_GT(automatic.position_error, 0);
   ScalesOptions options;
-  options.position_bits = 18, options.uv_bits = 15;
+  options.position_bits = 20, options.uv_bits = 15;
   const ScaleFiles asked = c.write(MeshCodec::kDraco, options);
-  EXPECT_EQ(asked.position_bits, 18);
+  EXPECT_EQ(asked.position_bits, 20);
   EXPECT_EQ(asked.uv_bits, 15);
   EXPECT_LT(asked.position_error, automatic.position_error / 4);
   EXPECT_TRUE(asked.notes.empty());
