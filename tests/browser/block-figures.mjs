@@ -1,9 +1,10 @@
 // What textures lose as blocks of 4 x 4 texels: PSNR and angles of scans' own textures against decoders that are none of the encoder's, and
-// lit FLIP of loads. TEXMESH_DATA names the folder with the scans; packages of two of them are those of page-figures.mjs.
+// lit FLIP of loads. TEXMESH_DATA names the folder with the scans; packages are kept as those of page-figures.mjs. Words: names of the scans
+// whose FLIP is measured (head, apple, turtle and saxophone).
 import {createRequire} from 'node:module';
 import {PNG, check, env, fs, lab, labPage, labRoots, launch, path, pictures, run, serve} from './browser.mjs';
 import {countStorage, onlyFormats} from './gpu-storage.mjs';
-import {kTop, loaded} from './loads.mjs';
+import {loaded} from './loads.mjs';
 
 const kColours = {
   head: 'lee_perry_smith_head/color.jpg', bust: 'marble_bust_4k/marble_bust_01_diff_4k.jpg', site: 'realitycapture_site/site_tex0.jpg', turtle: 'sea_turtle/sea_turtle.glb',
@@ -13,7 +14,7 @@ const kData = {leather: 'flight_helmet/FlightHelmet_Materials_LeatherPartsMat_Oc
 const kNormals = {head: 'lee_perry_smith_head/normal.jpg', bust: 'marble_bust_4k/marble_bust_01_nor_gl_4k.jpg', apple: 'apple_4k/textures/food_apple_01_nor_gl_4k.jpg'};
 const kDecoders = {bc1: 'decodeBc1', 'bc3-normal': 'decodeBc3Normal', bc5: 'decodeBc5', bc7: 'decodeBc7', etc2: 'decodeEtc2', astc: 'decodeAstc', 'astc-normal': 'decodeAstcNormal'};
 const kTwoChannels = ['bc3-normal', 'bc5', 'astc-normal'];
-const kScans = {head: 'lee_perry_smith_head', apple: 'apple_4k'};
+const kScans = {head: 'lee_perry_smith_head/LeePerrySmith.gltf', apple: 'apple_4k/food_apple_01_4k.gltf', turtle: 'sea_turtle/sea_turtle.glb', saxophone: 'saxophone/saxophone.glb'};
 const kWays = {
   'BC7, BC5': ['texture_compression_bptc', 'texture_compression_rgtc'], ASTC: ['texture_astc'], 'BC1, BC3': ['texture_s3tc', 'texture_s3tc_srgb'], 'ETC2, normals RGBA': ['texture_etc'],
 };
@@ -22,6 +23,8 @@ if (!env.data || !Object.values({...kColours, ...kData, ...kNormals}).every((fil
   console.log('skipped: TEXMESH_DATA names no folder with these scans');
   process.exit(77);
 }
+
+const packageOf = (name) => path.join(figures, `${path.dirname(kScans[name])}.texmesh`);
 
 /** The image file, or the base colour of a GLB's first material. */
 function imageOf(file) {
@@ -89,13 +92,13 @@ await page.close();
 
 /** A picture of 700 px of a load within the time that it takes; what is background is transparent. */
 async function shown(name, formats, load) {
-  const url = `${server.url}/figures/${kScans[name]}.texmesh`;
+  const url = `${server.url}/figures/${path.basename(packageOf(name))}`;
   const shot = await labPage(browser, server.url, `(${countStorage})();(${onlyFormats})(${JSON.stringify(formats)});`);
   await lab(shot, async (u) => {
     const {manifest} = await window.lab.open(u);
     window.lab.start({size: 700, min: manifest.boundsMin, max: manifest.boundsMax});
   }, url);
-  const r = await loaded(null, shot, url, {load: {time: 1e9, scale: 0, rung: kTop, display: 1000, autoRefine: false, ...load}});
+  const r = await loaded(null, shot, url, {load: {time: 1e9, display: 700, autoRefine: false, ...load}});
   check(!r.error, JSON.stringify(r.error));
   const data = Buffer.from(await lab(shot, () => { window.lab.draw(); return [...window.lab.pixels()]; }));
   for (let i = 0; i < data.length; i += 4) data[i + 3] = data.subarray(i, i + 3).equals(data.subarray(0, 3)) ? 0 : 255; // the corner is background
@@ -115,11 +118,8 @@ function flip(pngs) {
 console.log('\nlit FLIP of 700 px against RGBA; MB on the GPU\n');
 row('', 'RGBA', ...Object.keys(kWays), 'RGBA mips within the memory of BC7');
 row('---', '--:', ...Object.keys(kWays).map(() => '--:'), '--:');
-for (const name of Object.keys(kScans)) {
-  if (!fs.existsSync(path.join(figures, `${kScans[name]}.texmesh`))) {
-    run(env.texmesh, 'compile', path.join(env.data, {head: 'lee_perry_smith_head/LeePerrySmith.gltf', apple: 'apple_4k/food_apple_01_4k.gltf'}[name]), '-o', path.join(figures, `${kScans[name]}.texmesh`),
-      '--quiet', '--quality.views', '1');
-  }
+for (const name of process.argv[2]?.split(',') ?? Object.keys(kScans)) {
+  if (!fs.existsSync(packageOf(name))) run(env.texmesh, 'compile', path.join(env.data, kScans[name]), '-o', packageOf(name), '--quiet', '--quality.views', '1');
   const reference = await shown(name, [], {compress: 'never'});
   const ways = [];
   for (const formats of Object.values(kWays)) ways.push(await shown(name, formats, {compress: 'always'}));

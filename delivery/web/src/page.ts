@@ -16,6 +16,8 @@ export type { Orbit } from './page/framing';
 
 /** So many packages share the link without harm: one round trip each costs as much as the bytes behind the first pictures. */
 const fewModels = 2;
+/** Share of the time behind the last bytes: they are decoded, go to the GPU, and are drawn. */
+const drawingShare = 0.01;
 
 /** Options of a TexmeshPage. */
 export interface PageOptions {
@@ -209,7 +211,7 @@ export class TexmeshPage {
   private giveTurn_(model: PageModel, among: readonly PageModel[]): void {
     const { bytes, given } = this.turns_.get(model)!;
     this.turns_.delete(model);
-    const leftS = this.startS_ + this.limitS_ - nowS();
+    const leftS = this.startS_ + (1 - drawingShare) * this.limitS_ - nowS();
     const areas = among.map((m) => m.place.areaPx);
     const records = this.models.flatMap((m) => m.package?.requests ?? []);
     const bytesS = linkBytesS(records, nowS());
