@@ -68,7 +68,27 @@ void read_index_twice(ByteSpan input) {
   require(read_index(write_index(entries)) == entries, "an index changed by being written");
 }
 
+/// Few bytes of tables may claim millions of cells of fragments that are not stored. One in sixteen of these
+/// takes place: with all of them there were 230 runs a second, and 7,500 now.
+bool is_left_out(ByteSpan input) {
+  constexpr std::size_t kHead = 16, kRecord = 36;
+  constexpr std::uint64_t kMostFragments = 65535, kManyCells = 1 << 14;
+  if (input.size() < kHead) return false;
+  const std::uint64_t count = Choices(input.subspan(8)).number(4);
+  if (count > (input.size() - kHead) / kRecord) return false;
+  std::uint64_t at = kHead + count * kRecord, cells = 0;
+  for (std::size_t i = 0; i < count && at < input.size(); ++i) {
+    Choices section(input.subspan(static_cast<std::size_t>(at)));
+    const std::uint64_t columns = section.number(4), fragments = columns * section.number(4);
+    const std::uint64_t lines = section.number(1) + section.number(1);  // scales, rungs
+    if (fragments <= kMostFragments) cells += fragments * lines;
+    at += Choices(input.subspan(kHead + i * kRecord)).number(4);
+  }
+  return cells > kManyCells && sha256(input)[0] % 16 != 0;
+}
+
 void read_tables_twice(ByteSpan input) {
+  if (is_left_out(input)) return;
   const Bytes once = write_tables(read_tables(input));
   require(write_tables(read_tables(once)) == once, "tables changed by being written twice");
   if (input[6] == 0 && input[7] == 0)

@@ -103,14 +103,15 @@ Bytes tables_of_many_cells() {
 /// Three points in Draco's plain coding, whose attributes are truth values of 0xb6: they were read as bool.
 Bytes draco_of_truth_values() {
   BytesOut out;
-  out.u8(0), out.u16(3), out.u16(1);           // for the target: points, triangles
+  out.u8(0), out.u16(3), out.u16(1);  // for the target: points, triangles
   for (unsigned id = 0; id < 3; ++id) out.u8(id);
   out.text("DRACO");
   for (const unsigned x : {2, 2, 1, 0, 0, 0})  // version, a mesh, one index after the other, flags
     out.u8(x);
   for (const unsigned x : {1, 3, 1, 0, 1, 2})  // a face, three points, indices as they are
     out.u8(x);
-  for (const unsigned x : {1, 3, 0, 11, 3, 0, 0, 3, 11, 2, 0, 1, 1, 11, 3, 0, 2, 0, 0, 0})  // three attributes
+  for (const unsigned x :
+       {1, 3, 0, 11, 3, 0, 0, 3, 11, 2, 0, 1, 1, 11, 3, 0, 2, 0, 0, 0})  // three attributes
     out.u8(x);
   out.raw(Bytes(24, 0xb6));
   return out.finish();

@@ -151,8 +151,8 @@ std::vector<T> read_samples(const Image& image, OpenImage& open, OIIO::TypeDesc 
       fail_pixels(image, open, "pixels");
     return samples;
   }
-  // OpenImageIO takes and frees 64 MB at every call that names a type, be it the file's own: none is named then. Of
-  // calls that convert there are few, even for an image of many short rows.
+  // OpenImageIO takes and frees 64 MB at every call that names a type, be it the file's own: none is named
+  // then. Of calls that convert there are few, even for an image of many short rows.
   const bool as_stored = open.spec.format == type && open.spec.channelformats.empty();
   const OIIO::TypeDesc asked = as_stored ? OIIO::TypeDesc() : type;
   const int rows = std::max(64, height / 16);
