@@ -46,7 +46,7 @@ struct ProxiesOptions {
 ///   KHR_draco_mesh_compression. It is at most 2 % larger than its size asks for. So the default's smallest
 ///   one lies with a manifest of 8 kB in the 45,056 bytes of a client's first request.
 /// - Losses: FLIP of lit pictures beside S_0's (stages/render in the studio's light) at three displayed
-///   heights, where the height is that of the bounding box's longest side.
+///   heights, where the height is that of the bounding box's longest side; four views, at the largest two.
 /// - Automatic choice: a size at which a scale with the source's atlas looks better is left out, each size by
 ///   itself. The smallest one is compared with scales of 55 % of its bytes, in which Draco codes as much, and
 ///   it stays where a larger one does, which clients cannot show at once. All of them take at most 15 % of

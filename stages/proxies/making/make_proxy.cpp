@@ -17,7 +17,8 @@ constexpr std::uint32_t kTexelStep = 32, kLeastTexels = 32, kMostTexels = 1024;
 constexpr double kCover = 0.58;  // of an atlas' texels
 // Of a covered texel at the quality aimed at; textures that take fewer or more teach it.
 constexpr double kColourBits = 2.4, kOrmBits = 1.6;
-constexpr double kAimedQuality = 50, kQualitiesOfE = 45;  // so many above it take e times the bytes
+constexpr double kAimedQuality = 50, kQualitiesOfE = 45;     // so many above it take e times the bytes
+constexpr double kLeastTexelBits = 0.3, kMostTexelBits = 3;  // times the above
 constexpr const char *kColourUse = "base-colour", *kDataUse = "metallic-roughness";
 constexpr double kMeshoptBytes = 9.5, kDracoBytes = 3.2;  // of a triangle, until one mesh is coded
 constexpr int kAttempts = 3;
@@ -191,8 +192,9 @@ void ProxyWorkshop::learn(const MadeProxy& made) {
     bytes += static_cast<double>(t.bytes);
     expected += bits / 8 * kCover * t.width_px * t.height_px;
   }
-  if (expected > 0)
-    texel_bits_ = bytes / expected * portable::exp((kAimedQuality - made.quality) / kQualitiesOfE);
+  if (!(expected > 0)) return;
+  const double found = bytes / expected * portable::exp((kAimedQuality - made.quality) / kQualitiesOfE);
+  texel_bits_ = std::clamp(found, kLeastTexelBits, kMostTexelBits);
 }
 
 }  // namespace texmesh::proxies

@@ -13,7 +13,7 @@ constexpr double kBytesPerWedge = 4, kBytesPerTriangle = 0.6;
 constexpr double kBitsPerTexel = 1.2;  // of a JPEG of middle quality, the texels of the whole image
 constexpr double kFrameBytes = 2500, kPictureBytes = 600;    // of a file without mesh and texels
 constexpr std::array<double, 3> kMeshShares{0.6, 0.4, 0.8};  // likely winners first
-constexpr double kFarOff = 1.4;  // times the proxy's FLIP: no other scale makes up for it
+constexpr double kFarOff = 1.5;  // times the proxy's FLIP: no other scale makes up for it
 
 double mesh_bytes(const NestedScales& scales, std::size_t index, std::vector<std::uint8_t>& used) {
   used.assign(scales.mesh.wedge_count(), 0);
@@ -77,7 +77,8 @@ bool rival_wins(const NestedScales& scales, const ShownMaterials& shown, std::ui
     const Mesh mesh = lit_scale(scales, index, context);
     const std::vector<RenderTexture> textures = affordable(shown.textures, all - cost[index]);
     const RenderScene scene = render_scene(mesh, shown.materials, textures.size());
-    const double rival = studio.compare(scene, textures, ProxyStudio::kMiddle, context, kFarOff * flip).mean();
+    const double rival =
+        studio.compare(scene, textures, ProxyStudio::kMiddle, context, kFarOff * flip).mean();
     if (rival <= flip) return true;
     if (rival > kFarOff * flip) return false;
   }

@@ -10,7 +10,7 @@ namespace texmesh::proxies {
 namespace {
 
 constexpr int kViews = 4;
-// At the largest height, which has 16 of 21 parts of all pixels: two opposite ones.
+// At the largest height, which has 16 of 21 parts of all pixels: two.
 constexpr int kLargeStep = 2;
 
 RenderTexture decoded(const ProxyImage& image, bool srgb, const RunContext& context) {

@@ -30,8 +30,8 @@ class ProxyStudio {
   /// S_0 must outlive the studio.
   ProxyStudio(const Mesh& mesh, const ShownMaterials& shown);
 
-  /// At one of the displayed heights: four views, at the largest one two. Half of the views will do where their
-  /// mean is more than `hopeless`.
+  /// At one of the displayed heights: four views, at the largest one two. Half of the views will do where
+  /// their mean is more than `hopeless`.
   FlipSum compare(const RenderScene& scene, const std::vector<RenderTexture>& textures, std::size_t size,
                   const RunContext& context, double hopeless = 1);
   FlipSum at_middle(const ShownModel& model, const RunContext& context);

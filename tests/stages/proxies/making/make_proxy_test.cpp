@@ -58,14 +58,23 @@ TEST(ProxyWorkshop, DracoAndFlatTrianglesHoldMoreTrianglesInTheSameBytes) {
   EXPECT_TRUE(no_normals->shown.mesh.normals.empty());
 }
 
-TEST(ProxyWorkshop, QualitiesTeachTheNextTexturesSide) {
-  Workshop w{testing::bumpy_sphere(60, 120)};
-  const ProxyForm form{0.5, {}, {}, true};
-  const auto before = make(w, 20000, form);
-  w.shop.learn(90);
-  const auto after = make(w, 20000, form);
-  ASSERT_TRUE(before && after);
-  EXPECT_GT(after->proxy.textures[0].width_px, before->proxy.textures[0].width_px);
+TEST(ProxyWorkshop, WhatTexturesTookTeachesTheNextSide) {
+  const auto side_after = [](double factor, int quality) {
+    Workshop w{testing::bumpy_sphere(60, 120)};
+    const ProxyForm form{0.5, {}, {}, true};
+    auto made = make(w, 20000, form);
+    ProxyTexture& colour = made.value().proxy.textures[0];
+    colour.bytes = static_cast<std::uint64_t>(factor * 2.4 / 8 * 0.58 * colour.width_px * colour.height_px);
+    made->quality = quality;
+    w.shop.learn(*made);
+    return make(w, 20000, form).value().proxy.textures[0].width_px;
+  };
+  const std::uint32_t as_expected = side_after(1, 50);
+  EXPECT_GT(side_after(0.4, 50), as_expected);
+  EXPECT_LT(side_after(2.5, 50), as_expected);
+  // The same bytes at a better quality say that the middle one takes fewer.
+  EXPECT_GT(side_after(1, 90), as_expected);
+  EXPECT_EQ(side_after(1e-6, 50), side_after(1e-3, 50)) << "a plain colour's texture has an end";
 }
 
 TEST(ProxyWorkshop, NothingWhereEvenTheCoarsestDoesNotFit) {

@@ -33,6 +33,19 @@ TEST(ProxyStudio, S0ItselfHasNoLossAndAnotherColourHasOne) {
   }
 }
 
+TEST(ProxyStudio, HalfOfTheViewsWillDoForWhatIsHopeless) {
+  const ShownModel source = plain_model(testing::sphere(20, 40), {0.5f, 0.5f, 0.5f, 1});
+  ProxyStudio studio(source.mesh, source.shown);
+  const ShownModel red = plain_model(source.mesh, {1, 0, 0, 1});
+  const RenderScene scene = render_scene(red.mesh, red.shown.materials, 0);
+  const FlipSum all = studio.compare(scene, {}, ProxyStudio::kMiddle, {}),
+                near = studio.compare(scene, {}, ProxyStudio::kMiddle, {}, 2 * all.mean()),
+                far = studio.compare(scene, {}, ProxyStudio::kMiddle, {}, 0.5 * all.mean());
+  EXPECT_EQ(near.pixels, all.pixels);
+  EXPECT_LT(far.pixels, 0.6 * static_cast<double>(all.pixels));
+  EXPECT_GT(far.mean(), 0.5 * all.mean());
+}
+
 TEST(ProxyStudio, AProxyIsShownAsItsFileSaysIt) {
   AtlasMesh atlas;
   atlas.positions = {{-1, 1, 0}, {-1, -1, 0}, {1, -1, 0}};
