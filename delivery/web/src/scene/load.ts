@@ -1,6 +1,6 @@
 import type { Material, Object3D } from 'three';
 import { isAbort, throwIfAborted } from '../format/errors';
-import { firstPicture } from '../format/manifest';
+import { type Manifest, firstPicture } from '../format/manifest';
 import type { PackageReader } from '../http/package_reader';
 import type { WorkerPool } from '../worker/pool';
 import type { LoadOptions, LoadState, LoadedModel } from './api';
@@ -41,6 +41,22 @@ export function loadModel(
     dispose: () => load.dispose(),
     readPlane: (base) => load.textures?.readPlane(base) ?? new Uint8Array(0),
   };
+}
+
+/** Bytes that a turn fetches however short it is: a larger proxy that is enough, or documents, and the coarsest mesh where it is not there yet. */
+function bytesOfAnyTurn({ proxies, scales, index, tables }: Manifest, serving: number, shown: number, withMesh: boolean): number {
+  if (serving >= 0) return serving > shown ? proxies[serving].glb.bytes : 0;
+  return tables.offset + tables.bytes - index.offset + (withMesh ? scales[scales.length - 1].glb.bytes : 0);
+}
+
+/** What three.js keeps of a lost context is dropped while nothing of it can be deleted: a later context would not know it. */
+function forgetGpu(objects: readonly Object3D[], planes: LoadState['planes'], materials: readonly Material[]): void {
+  objects.forEach(disposeGeometries);
+  for (const texture of planes.flatMap((p) => p.textures)) texture.dispose();
+  for (const material of materials) {
+    for (const [, texture] of texturesOf(material)) texture.dispose();
+    material.dispose();
+  }
 }
 
 /** The course of a load: first picture, documents, the timed part, refining. */
@@ -146,19 +162,13 @@ class ModelLoad {
   }
   private async showInTime_(): Promise<void> {
     const { context } = this;
-    await context.turn(this.bytesOfAnyTurn_());
+    await context.turn(bytesOfAnyTurn(context.reader.manifest, this.proxies_.serving(), this.scale_.proxy.shown, !this.shape_));
     // A turn without time leaves what stands: other models' turns would begin later.
     if ((context.options.turn && context.limitS <= context.elapsedS()) || (await this.proxies_.showServing())) {
       context.emit('deadline', { limit: context.limitS, actual: context.elapsedS(), skipped: 0 });
       return this.rest_();
     }
     await this.showTextures_();
-  }
-  private bytesOfAnyTurn_(): number {
-    const { context: { reader: { manifest: { proxies, scales, index, tables } } }, scale_: { proxy } } = this;
-    const serving = this.proxies_.serving();
-    if (serving >= 0) return serving > proxy.shown ? proxies[serving].glb.bytes : 0;
-    return tables.offset + tables.bytes - index.offset + (this.shape_ ? 0 : scales[scales.length - 1].glb.bytes);
   }
   private async showTextures_(): Promise<void> {
     const { context } = this;
@@ -277,14 +287,8 @@ class ModelLoad {
       this.context.fail(error, 'refining');
     }
   }
-  /** What three.js keeps of a lost context is dropped while nothing of it can be deleted: a later context would not know it. */
   private lose_(): void {
-    this.scale_.objects().forEach(disposeGeometries);
-    for (const texture of this.textures?.planes().flatMap((p) => p.textures) ?? []) texture.dispose();
-    for (const material of this.materials) {
-      for (const [, texture] of texturesOf(material)) texture.dispose();
-      material.dispose();
-    }
+    forgetGpu(this.scale_.objects(), this.textures?.planes() ?? [], this.materials);
     this.context.emit('context', { lost: true });
   }
   /** After a lost context: three.js makes its geometries and pictures anew, but composed textures are gone. */

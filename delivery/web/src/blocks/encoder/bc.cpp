@@ -36,11 +36,10 @@ static u32 to_565(f4* c) {
 }
 
 /** Colours of one value each. */
-template <int kFrom, int kTo>
-static u64 flat_bc1(const Block* b) {
+[[gnu::noinline]] static u64 flat_bc1(const Block* b, int from, int to) {
   u32 word[2] = {0, 0};
   EACH(c, 3) EACH(e, 2) {
-    const int v = c >= kFrom && c < kTo ? (int)(b->c[c][0][0] + 0.5f) : 0;
+    const int v = c >= from && c < to ? (int)(b->c[c][0][0] + 0.5f) : 0;
     word[e] = word[e] << (c == 1 ? 6 : 5) | (c == 1 ? flat6 : flat5)[v][e];
   }
   u64 at = 0xaaaaaaaa;  // 2 of the first, 1 of the second
@@ -53,7 +52,7 @@ static u64 flat_bc1(const Block* b) {
   return at << 32 | word[1] << 16 | word[0];
 }
 
-static u64 write_bc1(u32 first, u32 second, const i4 at[4]) {
+[[gnu::noinline]] static u64 write_bc1(u32 first, u32 second, const i4 at[4]) {
   // Steps from the first end on, as BC1 numbers them: 0, 2, 3, 1. The first end is the larger number: with 3
   // colours otherwise.
   if (first == second) return (u64)second << 16 | first;
@@ -75,7 +74,7 @@ template <int kFrom = 0, int kTo = 3>
 static u64 colours_bc1(const Block* b) {
   Line line = main_line<kFrom, kTo>(b);
   const f4 d = line.ends[1] - line.ends[0];
-  if (sum4(d * d) < 0.5f) return flat_bc1<kFrom, kTo>(b);
+  if (sum4(d * d) < 0.5f) return flat_bc1(b, kFrom, kTo);
   float best = 1e30f;
   u32 ends[2] = {};
   i4 at[2][4];
