@@ -75,9 +75,10 @@ std::vector<std::string> model_paths(const std::string& folder) {
     it.increment(ec);  // a folder that is left out without a word is a collection without its models
     if (ec) throw InputError(path, "", "a folder that can be listed", ec.message());
   }
-  std::sort(models.begin(), models.end(), [same = prefix_bytes(folder)](std::string_view a, std::string_view b) {
-    return path_less(a.substr(same), b.substr(same));
-  });
+  std::sort(models.begin(), models.end(),
+            [same = prefix_bytes(folder)](std::string_view a, std::string_view b) {
+              return path_less(a.substr(same), b.substr(same));
+            });
   if (std::ranges::all_of(models, is_json) && std::ranges::none_of(models, is_range_scan))
     throw InputError(folder, "", "a folder with models", "none");
   return models;

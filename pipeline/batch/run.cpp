@@ -90,8 +90,9 @@ class Batch {
     progress_.begin(std::move(models));
     if (!cache_problem_.empty()) progress_.cache_event("cache-not-written", cache_problem_);
     if (selection_.memo_was_damaged())
-      progress_.cache_event("cache-entry-damaged",
-                            "what earlier runs found out does not have its digest; every model is looked at");
+      progress_.cache_event(
+          "cache-entry-damaged",
+          "what earlier runs found out does not have its digest; those models are looked at again");
     std::size_t next = 0;
     for (std::size_t i = 0; i < plan_.models.size(); ++i) {
       if (next < selection_.jobs().size() && selection_.model_of(next) == i)

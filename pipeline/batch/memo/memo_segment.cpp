@@ -146,7 +146,8 @@ bool MemoSegment::read_blocks(const std::function<void(MemoEntry)>& entry) {
   return is_finished() ? last && at == bytes_ : true;
 }
 
-std::optional<std::uint64_t> MemoSegment::tell_block(std::span<const std::uint8_t> payload, std::uint64_t body,
+std::optional<std::uint64_t> MemoSegment::tell_block(std::span<const std::uint8_t> payload,
+                                                     std::uint64_t body,
                                                      const std::function<void(MemoEntry)>& entry,
                                                      bool& last) {
   Block block;
@@ -176,7 +177,8 @@ std::span<const std::uint8_t> MemoSegment::look(Window& window, std::uint64_t at
   constexpr std::size_t kWindowBytes = 8 << 10;
   if (at < window.at || at + bytes > window.at + window.bytes.size()) {
     const std::uint64_t rest = at < bytes_ ? bytes_ - at : 0;
-    window.bytes.resize(static_cast<std::size_t>(std::min<std::uint64_t>(std::max(bytes, kWindowBytes), rest)));
+    window.bytes.resize(
+        static_cast<std::size_t>(std::min<std::uint64_t>(std::max(bytes, kWindowBytes), rest)));
     window.at = at;
     if (window.bytes.size() < bytes || !read_at(file_.get(), at, window.bytes)) window.bytes.clear();
   }
@@ -186,25 +188,27 @@ std::span<const std::uint8_t> MemoSegment::look(Window& window, std::uint64_t at
 
 std::optional<MemoRecord> MemoSegment::record(const MemoEntry& entry) const {
   const std::span<const std::uint8_t> bytes = checked(look(record_window_, entry.offset, entry.bytes));
-  if (bytes.size() < kRecordHeadBytes - kCheckBytes) return std::nullopt;
+  constexpr std::size_t kRestOfHead = kRecordHeadBytes - kCheckBytes;
   try {
-    return unpack_record(bytes.subspan(kRecordHeadBytes - kCheckBytes));
+    if (bytes.size() >= kRestOfHead) return unpack_record(bytes.subspan(kRestOfHead));
   } catch (const FormatError&) {
-    return std::nullopt;
   }
+  damaged_ = true;
+  return std::nullopt;
 }
 
 StageKeys MemoSegment::keys(const MemoEntry& entry) const {
   const std::span<const std::uint8_t> bytes = look(record_window_, entry.offset, entry.bytes);
-  if (bytes.size() < kRecordHeadBytes || checked(bytes).empty()) return {};
   RecordHead head;
-  std::memcpy(&head, bytes.data(), kRecordHeadBytes);
-  if (head.keys_ahead > kMostBlockBytes || head.key_bytes > kMostBlockBytes) return {};
+  if (bytes.size() >= kRecordHeadBytes && !checked(bytes).empty())
+    std::memcpy(&head, bytes.data(), kRecordHeadBytes);
   try {
-    return unpack_keys(checked(look(key_window_, entry.offset + head.keys_ahead, head.key_bytes)), stages_);
+    if (head.key_bytes > 0 && head.key_bytes <= kMostBlockBytes && head.keys_ahead <= kMostBlockBytes)
+      return unpack_keys(checked(look(key_window_, entry.offset + head.keys_ahead, head.key_bytes)), stages_);
   } catch (const FormatError&) {
-    return {};
   }
+  damaged_ = true;
+  return {};
 }
 
 void MemoSegmentWriter::add(const MemoName& name, const MemoRecord& record) {

@@ -28,9 +28,10 @@ struct MemoEntry {
 
 // File: 8 bytes of magic; then blocks of at most kMostBlockBytes and as much again:
 //   u64 size of the payload, SHA-256 of the payload, payload = archive of
-//   names of stages that are new in this block, names and times of the records, sizes of each, size of the body;
-//   body = the records, then the keys of each. Each of both begins with the first 8 bytes of the SHA-256 of its rest,
-//   and is checked when it is asked for: a run that finds everything up to date reads no keys, which are two thirds.
+//   names of stages that are new in this block, names and times of the records, sizes of each, size of the
+//   body; body = the records, then the keys of each. Each of both begins with the first 8 bytes of the
+//   SHA-256 of its rest, and is checked when it is asked for: a run that finds everything up to date reads no
+//   keys, which are two thirds.
 // A finished file ends with a block without records, and its name with ".seg"; that of a file that is being
 // written ends with ".open", and what is cut off at its end is no damage.
 
@@ -46,7 +47,7 @@ class MemoSegment {
   std::uint64_t bytes() const { return bytes_; }
   std::int64_t modified_ns() const { return modified_ns_; }
   bool is_finished() const;
-  /// Not all of its blocks were believed. Records have checks of their own.
+  /// Not all of it was believed: a block, or a record or keys that were asked for.
   bool is_damaged() const { return damaged_; }
   /// The record of an entry that read() told of, without its keys; nothing where its bytes are damaged.
   std::optional<MemoRecord> record(const MemoEntry& entry) const;
@@ -60,7 +61,8 @@ class MemoSegment {
   };
   MemoSegment() = default;
   bool read_blocks(const std::function<void(MemoEntry)>& entry);
-  /// The body's size, whose records begin at `body` in the file; nothing for a payload that contradicts itself.
+  /// The body's size, whose records begin at `body` in the file; nothing for a payload that contradicts
+  /// itself.
   std::optional<std::uint64_t> tell_block(std::span<const std::uint8_t> payload, std::uint64_t body,
                                           const std::function<void(MemoEntry)>& entry, bool& last);
   /// Bytes of the file; fewer when it has changed.
@@ -69,7 +71,7 @@ class MemoSegment {
   Descriptor file_;
   std::uint64_t bytes_ = 0;
   std::int64_t modified_ns_ = 0;
-  bool damaged_ = false;
+  mutable bool damaged_ = false;
   StageNames stages_;
   mutable Window record_window_, key_window_;
 };

@@ -109,10 +109,12 @@ export class TextureSet {
   private showInMaterials_(plane: PlaneComposer): void {
     for (const slot of this.slotsOf_(plane.base)) {
       const old = textureAt(slot);
-      if (plane.textures.includes(old)) continue;
       const shown = texturesIn(slot.material);
-      if (!shown[slot.name]) slot.material.needsUpdate = true;
-      shown[slot.name] = plane.view(old);
+      if (!plane.textures.includes(old)) {
+        if (!shown[slot.name]) slot.material.needsUpdate = true;
+        shown[slot.name] = plane.view(old);
+      }
+      // A finer scale's material may be a copy of one that shows the plane: it has its textures, not its shader.
       const asBlocks = plane.blocks && this.blocksOf_(plane.plane)?.[0].readTwoChannels(slot.material, slot.name, plane.blocks.format);
       if (!asBlocks && this.isXy_(plane)) this.readTwoChannels_?.(slot.material, slot.name, 'jpeg-xy');
     }

@@ -103,9 +103,9 @@ struct HostileBlock {
 
 TEST(MemoSegment, BlocksThatContradictThemselvesAreNotBelieved) {
   const TemporaryFolder folder;
-  const HostileBlock blocks[] = {{{}, {MemoName{}}, {}, {1}, 1},         {{}, {MemoName{}}, {1}, {}, 1},
-                                 {{}, {MemoName{}}, {1}, {2}, 1},        {{}, {}, {1}, {}, 1},
-                                 {{}, {MemoName{}}, {1}, {~0u}, ~0u},    {{}, {MemoName{}}, {1}, {1}, 2},
+  const HostileBlock blocks[] = {{{}, {MemoName{}}, {}, {1}, 1},          {{}, {MemoName{}}, {1}, {}, 1},
+                                 {{}, {MemoName{}}, {1}, {2}, 1},         {{}, {}, {1}, {}, 1},
+                                 {{}, {MemoName{}}, {1}, {~0u}, ~0u},     {{}, {MemoName{}}, {1}, {1}, 2},
                                  {{}, {MemoName{}}, {1}, {1}, ~0ull - 7}, {{}, {}, {}, {}, 0}};
   for (const HostileBlock& block : blocks) {
     testing::write_text(folder / "a.seg", with_block(encode_artefact(block), "x"));
@@ -127,9 +127,11 @@ std::string checked(const std::string& bytes) {
 
 TEST(MemoSegment, ARecordOfGarbageIsToldOfAndThenNotBelieved) {
   const TemporaryFolder folder;
-  const std::string far("\xff\xff\xff\x7f\xff\xff\xff\x7f", 8), outside("\0\0\1\0\0\0\1\0", 8), here("\0\0\0\0\5\0\0\0", 8);
-  for (const std::string& record : {std::string("12345"), std::string("12345678901234567890"), checked(""), checked("1234"),
-                                    checked(far), checked(far + "text"), checked(outside + "text"), checked(here + "text")}) {
+  const std::string far("\xff\xff\xff\x7f\xff\xff\xff\x7f", 8), outside("\0\0\1\0\0\0\1\0", 8),
+      here("\0\0\0\0\5\0\0\0", 8);
+  for (const std::string& record :
+       {std::string("12345"), std::string("12345678901234567890"), checked(""), checked("1234"), checked(far),
+        checked(far + "text"), checked(outside + "text"), checked(here + "text")}) {
     const auto bytes = static_cast<std::uint32_t>(record.size());
     testing::write_text(folder / "a.open",
                         with_block(encode_artefact(HostileBlock{{}, {{}}, {1}, {bytes}, bytes}), record));
