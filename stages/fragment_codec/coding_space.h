@@ -22,10 +22,10 @@ enum class DataKind : std::uint8_t { kVectors, kNumbers };
 
 /// The space in which baseline JPEGs of the data have the least mean error for their bytes: channels apart,
 /// vectors with a coarse z or not or with z left to the reader (unless `needs_z`), YCbCr 4:4:4 or YCbCr
-/// 4:2:0. Error is the angle of vectors and the squared error of numbers, over covered texels. Measured on at most 32 windows of `sample` at three qualities;
-/// bytes are compared at equal errors. A space is left out whose least error is more than twice that of
-/// channels apart. Channels apart for an empty sample. `sample`: windows of 3 channels, whose sides are
-/// multiples of 16. Same result for any thread count.
+/// 4:2:0. Error is the angle of vectors and the squared error of numbers, over covered texels. Measured on at
+/// most 32 windows of `sample` at three qualities; bytes are compared at equal errors. A space is left out
+/// whose least error is more than twice that of channels apart. Channels apart for an empty sample. `sample`:
+/// windows of 3 channels, whose sides are multiples of 16. Same result for any thread count.
 CodingSpace measure_coding_space(DataKind kind, bool needs_z, std::span<const PixelWindow> sample,
                                  const RunContext& context);
 
