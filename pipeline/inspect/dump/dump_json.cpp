@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <nlohmann/json.hpp>
 
 #include "format/container/layout.h"
 #include "format/documents/tables.h"
