@@ -23,6 +23,9 @@ constexpr double kManyCapped = 0.1;
 /// What is closer than this, in mean edges, is one vertex then.
 constexpr double kCluster = 0.5;
 
+/// Share of a level's vertices to slow down: with 0, 0.02, 0.05 a saxophone takes 1.26, 0.94, 0.83 s.
+constexpr double kTrimmed = 0.02;
+
 /// Times of one recurrence: what its accumulators cost in memory. Splitting the flow costs a sixth more
 /// terms.
 constexpr std::size_t kTimesAtOnce = 8;
@@ -199,6 +202,7 @@ class ComponentFilter {
   LevelState first_state() {
     LevelState state;
     state.level = finest_level(component_.points, component_.corners, 1, options_.rate_cap);
+    trim_spectrum(state.level.laplacian, kTrimmed);
     out_.capped = state.level.laplacian.capped;
     state.points = signal_;
     state.vertex = state.level.vertex;
@@ -211,6 +215,7 @@ class ComponentFilter {
   LevelState next_state(LevelState fine, double radius) const {
     LevelState coarse;
     coarse.level = coarsen(fine.level, radius, options_.rate_cap);
+    trim_spectrum(coarse.level.laplacian, kTrimmed);
     coarse.time = fine.time;
     for (std::uint32_t v : coarse.level.vertex) {
       coarse.vertex.push_back(fine.vertex[v]);
