@@ -21,20 +21,30 @@ double box_distance2(const Box3d& box, Vec3d p) {
   return sum;
 }
 
-/// Whether a ray meets a box before t = limit.
-bool meets_box(const Box3d& box, Vec3d origin, Vec3d direction, double limit) {
+constexpr double kStill = 1e-200;  // the inverse of a larger direction times a distance stays finite
+
+Vec3d inverse_of(Vec3d direction) {
+  Vec3d inverse;
+  for (int k = 0; k < 3; ++k) inverse[k] = std::fabs(direction[k]) > kStill ? 1 / direction[k] : 0;
+  return inverse;
+}
+
+/// Where a ray enters a box, infinite when not before t = limit. `inverse`: 0 where it does not move.
+double ray_entry(const Box3d& box, Vec3d origin, Vec3d inverse, double limit) {
   double from = 0, to = limit;
-  for (int k = 0; k < 3; ++k) {
-    if (direction[k] == 0) {
-      if (origin[k] < box.min[k] || origin[k] > box.max[k]) return false;
-      continue;
+  const auto clip = [&](double min, double max, double at, double one_over) {
+    if (one_over == 0) {
+      if (at < min || at > max) from = kInfinity;
+      return;
     }
-    double a = (box.min[k] - origin[k]) / direction[k], b = (box.max[k] - origin[k]) / direction[k];
-    if (a > b) std::swap(a, b);
-    from = std::max(from, a), to = std::min(to, b);
-  }
+    const double a = (min - at) * one_over, b = (max - at) * one_over;
+    from = std::max(from, std::min(a, b)), to = std::min(to, std::max(a, b));
+  };
+  clip(box.min.x, box.max.x, origin.x, inverse.x);
+  clip(box.min.y, box.max.y, origin.y, inverse.y);
+  clip(box.min.z, box.max.z, origin.z, inverse.z);
   // Rounding may make a flat box a little too thin.
-  return from <= to * (1 + kOfRounding);
+  return from <= to * (1 + kOfRounding) ? from * (1 - kOfRounding) : kInfinity;
 }
 
 double leaving_hit(const std::array<Vec3d, 3>& c, Vec3d origin, Vec3d direction) {
@@ -42,11 +52,11 @@ double leaving_hit(const std::array<Vec3d, 3>& c, Vec3d origin, Vec3d direction)
   const double det = dot(u, h);
   if (!(det < 0)) return kInfinity;  // dot(direction, normal) = -det: only what looks along the ray
   const Vec3d s = origin - c[0];
-  const double a = dot(s, h) / det;
-  if (!(a >= 0 && a <= 1)) return kInfinity;
+  const double a = dot(s, h);
+  if (!(a <= 0 && a >= det)) return kInfinity;
   const Vec3d q = cross(s, u);
-  const double b = dot(direction, q) / det;
-  if (!(b >= 0 && a + b <= 1)) return kInfinity;
+  const double b = dot(direction, q);
+  if (!(b <= 0 && a + b >= det)) return kInfinity;
   const double t = dot(v, q) / det;
   return t > 0 ? t : kInfinity;
 }
@@ -126,20 +136,32 @@ void TriangleTree::build(std::uint32_t first, std::uint32_t count, std::vector<V
 }
 
 double TriangleTree::exit(Vec3d origin, Vec3d direction) const {
+  const Vec3d inverse = inverse_of(direction);
   double best = kInfinity;
-  std::array<std::uint32_t, 40> stack{};
-  std::size_t depth = 1;
+  struct Ahead {
+    double entry;
+    std::uint32_t node;
+  };
+  std::array<Ahead, 40> stack{};
+  std::size_t depth = 0;
+  const auto push = [&](Ahead a) {
+    if (a.entry < best) stack[depth++] = a;
+  };
+  const auto ahead = [&](std::uint32_t node) {
+    return Ahead{ray_entry(nodes_[node].box, origin, inverse, best), node};
+  };
+  push(ahead(0));
   while (depth > 0) {
-    const std::uint32_t at = stack[--depth];
-    const Node& n = nodes_[at];
-    if (!meets_box(n.box, origin, direction, best)) continue;
-    if (n.count == 0) {
-      stack[depth++] = n.first;
-      stack[depth++] = at + 1;
-      continue;
-    }
+    const Ahead at = stack[--depth];
+    if (!(at.entry < best)) continue;
+    const Node& n = nodes_[at.node];
     for (std::uint32_t i = n.first; i < n.first + n.count; ++i)
       best = std::min(best, leaving_hit(corners_[i], origin, direction));
+    if (n.count > 0) continue;
+    Ahead nearer = ahead(at.node + 1), farther = ahead(n.first);
+    if (farther.entry < nearer.entry) std::swap(nearer, farther);
+    push(farther);
+    push(nearer);
   }
   return best;
 }
