@@ -23,8 +23,7 @@ constexpr double kManyCapped = 0.1;
 /// What is closer than this, in mean edges, is one vertex then.
 constexpr double kCluster = 0.5;
 
-/// Share of a level's vertices to slow down: with 0, 0.02, 0.05 a saxophone takes 1.26, 0.94, 0.83 s.
-constexpr double kTrimmed = 0.02;
+constexpr double kTrimmed = 0.02;  // of a level; 0, 0.02, 0.05: a saxophone takes 1.26, 0.94, 0.83 s
 
 /// Times of one recurrence: what its accumulators cost in memory. Splitting the flow costs a sixth more
 /// terms.
