@@ -1,6 +1,7 @@
 #include "stages/geometry/triangle_tree.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -19,32 +20,6 @@ double box_distance2(const Box3d& box, Vec3d p) {
     sum += d * d;
   }
   return sum;
-}
-
-constexpr double kStill = 1e-200;  // the inverse of a larger direction times a distance stays finite
-
-Vec3d inverse_of(Vec3d direction) {
-  Vec3d inverse;
-  for (int k = 0; k < 3; ++k) inverse[k] = std::fabs(direction[k]) > kStill ? 1 / direction[k] : 0;
-  return inverse;
-}
-
-/// Where a ray enters a box, infinite when not before t = limit. `inverse`: 0 where it does not move.
-double ray_entry(const Box3d& box, Vec3d origin, Vec3d inverse, double limit) {
-  double from = 0, to = limit;
-  const auto clip = [&](double min, double max, double at, double one_over) {
-    if (one_over == 0) {
-      if (at < min || at > max) from = kInfinity;
-      return;
-    }
-    const double a = (min - at) * one_over, b = (max - at) * one_over;
-    from = std::max(from, std::min(a, b)), to = std::min(to, std::max(a, b));
-  };
-  clip(box.min.x, box.max.x, origin.x, inverse.x);
-  clip(box.min.y, box.max.y, origin.y, inverse.y);
-  clip(box.min.z, box.max.z, origin.z, inverse.z);
-  // Rounding may make a flat box a little too thin.
-  return from <= to * (1 + kOfRounding) ? from * (1 - kOfRounding) : kInfinity;
 }
 
 double leaving_hit(const std::array<Vec3d, 3>& c, Vec3d origin, Vec3d direction) {
@@ -135,35 +110,74 @@ void TriangleTree::build(std::uint32_t first, std::uint32_t count, std::vector<V
   build(first + count / 2, count - count / 2, centres);
 }
 
-double TriangleTree::exit(Vec3d origin, Vec3d direction) const {
-  const Vec3d inverse = inverse_of(direction);
-  double best = kInfinity;
-  struct Ahead {
-    double entry;
-    std::uint32_t node;
-  };
-  std::array<Ahead, 40> stack{};
-  std::size_t depth = 0;
-  const auto push = [&](Ahead a) {
-    if (a.entry < best) stack[depth++] = a;
-  };
-  const auto ahead = [&](std::uint32_t node) {
-    return Ahead{ray_entry(nodes_[node].box, origin, inverse, best), node};
-  };
-  push(ahead(0));
-  while (depth > 0) {
-    const Ahead at = stack[--depth];
-    if (!(at.entry < best)) continue;
-    const Node& n = nodes_[at.node];
-    for (std::uint32_t i = n.first; i < n.first + n.count; ++i)
-      best = std::min(best, leaving_hit(corners_[i], origin, direction));
-    if (n.count > 0) continue;
-    Ahead nearer = ahead(at.node + 1), farther = ahead(n.first);
-    if (farther.entry < nearer.entry) std::swap(nearer, farther);
-    push(farther);
-    push(nearer);
+/// Looks at boxes in single precision, a little too large, four rays at once; at triangles as for one ray.
+struct TriangleTree::RayBundle {
+  using Lanes = float __attribute__((vector_size(16)));
+  static constexpr std::size_t kGroups = kRays / 4;
+  static constexpr float kSlack = 1e-5f;
+
+  Vec3d origin;
+  const Rays& directions;
+  float touch;  // boxes that are farther off are not met
+  Lanes inverse[3][kGroups], limit[kGroups];
+  std::array<double, kRays> best;
+
+  RayBundle(Vec3d from, const Rays& along, double size)
+      : origin(from), directions(along), touch(static_cast<float>(size) * 1e-6f) {
+    constexpr double kMostInverse = 1e15;
+    for (std::size_t r = 0; r < kRays; ++r)
+      for (int k = 0; k < 3; ++k)
+        inverse[k][r / 4][r % 4] =
+            static_cast<float>(std::clamp(1 / along[r][k], -kMostInverse, kMostInverse));
+    for (Lanes& l : limit) l = Lanes{} + std::numeric_limits<float>::max();
+    best.fill(kInfinity);
   }
-  return best;
+  /// A bit for each ray that may meet the box before what it has met.
+  unsigned meets(const Box3d& box) const {
+    const Vec3f low = to_float(box.min - origin), high = to_float(box.max - origin);
+    unsigned met = 0;
+    for (std::size_t g = 0; g < kGroups; ++g) {
+      Lanes from{}, to = limit[g];
+      for (int k = 0; k < 3; ++k) {
+        const Lanes a = inverse[k][g] * low[k], b = inverse[k][g] * high[k];
+        const Lanes nearer = a < b ? a : b, farther = a < b ? b : a;
+        from = from > nearer ? from : nearer;
+        to = to < farther ? to : farther;
+      }
+      const auto yes = from * (1 - kSlack) <= to * (1 + kSlack) + touch;
+      for (std::size_t l = 0; l < 4; ++l) met |= (static_cast<unsigned>(yes[l]) & 1u) << (4 * g + l);
+    }
+    return met;
+  }
+  void try_triangle(const std::array<Vec3d, 3>& corners, unsigned rays) {
+    for (; rays != 0; rays &= rays - 1) {
+      const auto r = static_cast<std::size_t>(std::countr_zero(rays));
+      const double t = leaving_hit(corners, origin, directions[r]);
+      if (t < best[r]) best[r] = t, limit[r / 4][r % 4] = static_cast<float>(t);
+    }
+  }
+};
+
+std::array<double, TriangleTree::kRays> TriangleTree::exits(Vec3d origin, const Rays& directions) const {
+  RayBundle rays(origin, directions, box().diagonal());
+  Vec3d along;
+  for (const Vec3d& d : directions) along = along + d;
+  const auto ahead = [&](std::uint32_t node) { return dot(nodes_[node].box.centre() - origin, along); };
+  std::array<std::uint32_t, 40> stack{};
+  std::size_t depth = 1;
+  while (depth > 0) {
+    const std::uint32_t at = stack[--depth];
+    const Node& n = nodes_[at];
+    const unsigned met = rays.meets(n.box);
+    if (met == 0) continue;
+    for (std::uint32_t i = n.first; i < n.first + n.count; ++i) rays.try_triangle(corners_[i], met);
+    if (n.count > 0) continue;
+    std::uint32_t nearer = at + 1, farther = n.first;
+    if (ahead(farther) < ahead(nearer)) std::swap(nearer, farther);
+    stack[depth++] = farther;
+    stack[depth++] = nearer;
+  }
+  return rays.best;
 }
 
 struct TriangleTree::Found {
