@@ -1,6 +1,7 @@
 #include "stages/geometry/distance.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -47,15 +48,14 @@ std::vector<CurvedTriangle> along_curve(std::size_t count, Centre&& centre) {
   return order;
 }
 
-double float_box_distance2(Vec3d p, const Box3f& box) {
-  double sum = 0;
-  for (int k = 0; k < 3; ++k) {
-    const double below = static_cast<double>(box.min[k]) - p[k];
-    const double above = p[k] - static_cast<double>(box.max[k]);
-    const double d = std::max(std::max(below, above), 0.0);
-    sum += d * d;
-  }
-  return sum;
+/// Where the highest bit changes the curve leaves one half of a cube for the other.
+std::uint32_t middle_of(std::uint32_t begin, std::uint32_t end, const std::vector<CurvedTriangle>& order) {
+  const std::uint64_t differ = order[begin].code ^ order[end - 1].code;
+  if (differ == 0) return begin + (end - begin) / 2;
+  const std::uint64_t bit = std::bit_floor(differ);
+  const auto at = std::partition_point(order.begin() + begin, order.begin() + end,
+                                       [bit](const CurvedTriangle& c) { return (c.code & bit) == 0; });
+  return static_cast<std::uint32_t>(at - order.begin());
 }
 
 /// Squared distance of the origin to the segment a, b.
@@ -69,13 +69,23 @@ double segment_distance2(Vec3d a, Vec3d b) {
 
 /// Squared distance of the origin to a triangle, degenerate ones included.
 double triangle_distance2(Vec3d a, Vec3d b, Vec3d c) {
-  const Vec3d n = cross(b - a, c - a);
-  const double square = dot(n, n);
-  if (square > 0 && dot(cross(a, b), n) >= 0 && dot(cross(b, c), n) >= 0 && dot(cross(c, a), n) >= 0) {
+  constexpr double kNeedle =
+      1e-8;  // square of height over edge: below it rounding says which edge is crossed
+  const Vec3d u = b - a, v = c - a, n = cross(u, v);
+  const double square = dot(n, n), edge = std::max(dot(u, u), dot(v, v));
+  const bool out_ab = dot(cross(a, b), n) < 0, out_bc = dot(cross(b, c), n) < 0,
+             out_ca = dot(cross(c, a), n) < 0;
+  if (square > 0 && !out_ab && !out_bc && !out_ca) {
     const double d = dot(a, n);
     return d * d / square;
   }
-  return std::min({segment_distance2(a, b), segment_distance2(b, c), segment_distance2(c, a)});
+  // The closest point is on an edge that the origin is beyond.
+  const bool any = !(square > kNeedle * edge * edge);
+  double best = std::numeric_limits<double>::infinity();
+  if (any || out_ab) best = segment_distance2(a, b);
+  if (any || out_bc) best = std::min(best, segment_distance2(b, c));
+  if (any || out_ca) best = std::min(best, segment_distance2(c, a));
+  return best;
 }
 
 }  // namespace
@@ -87,47 +97,83 @@ SurfaceDistance::SurfaceDistance(const std::vector<Vec3f>& positions,
   auto corner = [&](std::size_t t, std::size_t k) { return positions[wedge_position[triangles[t][k]]]; };
   const std::vector<CurvedTriangle> order = along_curve(
       n, [&](std::size_t t) { return (corner(t, 0) + corner(t, 1) + corner(t, 2)) * (1.0f / 3); });
-  nodes_.reserve(n);
-  nodes_.emplace_back();
-  split(0, 0, static_cast<std::uint32_t>(n), order);
+  Box3f box;
   corners_.resize(3 * n);
   leaf_of_.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
     leaf_of_[order[i].triangle] = static_cast<std::uint32_t>(i);
-    for (std::size_t k = 0; k < 3; ++k) corners_[3 * i + k] = corner(order[i].triangle, k);
+    for (std::size_t k = 0; k < 3; ++k) box.extend(corners_[3 * i + k] = corner(order[i].triangle, k));
   }
-  // Children stand behind their parents, so one pass from the back fits all boxes.
-  for (std::size_t i = nodes_.size(); i-- > 0;) {
-    Node& node = nodes_[i];
-    if (node.count == 0) {
-      node.box = nodes_[node.first].box;
-      node.box.extend(nodes_[node.first + 1].box);
-      continue;
-    }
-    for (std::size_t c = 3 * node.first; c < 3 * (node.first + node.count); ++c) node.box.extend(corners_[c]);
-  }
+  frame_.centre = to_double(box).centre();
+  if (const double side = to_double(box).longest_side(); side > 0) frame_.scale = 1 / side;
+  nodes_.reserve(n / 4 + 1);
+  nodes_.emplace_back();
+  split(0, 0, static_cast<std::uint32_t>(n), order);
+  fit_boxes();
 }
 
 void SurfaceDistance::split(std::uint32_t node, std::uint32_t begin, std::uint32_t end,
                             const std::vector<CurvedTriangle>& order) {
-  if (end - begin <= kLeafTriangles) {
-    nodes_[node].first = begin;
-    nodes_[node].count = end - begin;
-    return;
+  std::array<std::uint32_t, 5> at{begin, end};
+  std::size_t parts = 1;
+  for (int round = 0; round < 2; ++round) {
+    std::array<std::uint32_t, 5> next{begin};
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < parts; ++i) {
+      if (at[i + 1] - at[i] > kLeafTriangles) next[++count] = middle_of(at[i], at[i + 1], order);
+      next[++count] = at[i + 1];
+    }
+    at = next, parts = count;
   }
-  // Where the highest bit changes the curve leaves one half of a cube for the other.
-  std::uint32_t middle = begin + (end - begin) / 2;
-  if (const std::uint64_t differ = order[begin].code ^ order[end - 1].code; differ != 0) {
-    const std::uint64_t bit = std::bit_floor(differ);
-    const auto at = std::partition_point(order.begin() + begin, order.begin() + end,
-                                         [bit](const CurvedTriangle& c) { return (c.code & bit) == 0; });
-    middle = static_cast<std::uint32_t>(at - order.begin());
+  for (std::size_t i = 0; i < 4; ++i) {
+    const bool used = i < parts, leaf = used && at[i + 1] - at[i] <= kLeafTriangles;
+    nodes_[node].first[i] = used ? at[i] : 0;
+    nodes_[node].count[i] = leaf ? at[i + 1] - at[i] : 0;
+    if (!used || leaf) continue;
+    const auto child = static_cast<std::uint32_t>(nodes_.size());
+    nodes_.emplace_back();
+    nodes_[node].first[i] = child;
+    split(child, at[i], at[i + 1], order);
   }
-  const auto child = static_cast<std::uint32_t>(nodes_.size());
-  nodes_.resize(nodes_.size() + 2);
-  nodes_[node].first = child;
-  split(child, begin, middle, order);
-  split(child + 1, middle, end, order);
+}
+
+/// Children stand behind their parents, so one pass from the back fits all boxes.
+void SurfaceDistance::fit_boxes() {
+  constexpr float kSlack = 0x1p-22f;  // more than what rounding moves places within the frame by
+  constexpr float kNowhere = std::numeric_limits<float>::max();
+  for (std::size_t n = nodes_.size(); n-- > 0;) {
+    Node& node = nodes_[n];
+    for (std::size_t i = 0; i < 4; ++i) {
+      Vec3f lo{kNowhere, kNowhere, kNowhere}, hi = lo * -1;
+      const auto extend = [&](float low, float high, int k) {
+        lo[k] = std::min(lo[k], low), hi[k] = std::max(hi[k], high);
+      };
+      if (node.count[i] > 0) {
+        for (std::size_t c = 3 * node.first[i]; c < 3 * (node.first[i] + node.count[i]); ++c) {
+          const Vec3f p = to_float((to_double(corners_[c]) - frame_.centre) * frame_.scale);
+          for (int k = 0; k < 3; ++k) extend(p[k] - kSlack, p[k] + kSlack, k);
+        }
+      } else if (node.first[i] > n) {
+        const Node& child = nodes_[node.first[i]];
+        for (std::size_t j = 0; j < 4; ++j)
+          for (int k = 0; k < 3; ++k) extend(child.min[k][j], child.max[k][j], k);
+      }
+      for (int k = 0; k < 3; ++k) node.min[k][i] = lo[k], node.max[k][i] = hi[k];
+    }
+  }
+}
+
+/// Squares of lower bounds, in the frame's unit; infinite where there is no child.
+SurfaceDistance::Lanes SurfaceDistance::box_distances2(const Lanes (&p)[3], const Node& node) const {
+  constexpr float kOfRounding = 1e-6f;
+  Lanes sum{};
+  for (int k = 0; k < 3; ++k) {
+    const Lanes below = node.min[k] - p[k], above = p[k] - node.max[k];
+    Lanes d = below > above ? below : above;
+    d = d > 0.0f ? d : Lanes{};
+    sum += d * d;
+  }
+  return sum * (1 - kOfRounding);
 }
 
 double SurfaceDistance::operator()(Vec3d p, double enough) const {
@@ -137,42 +183,56 @@ double SurfaceDistance::operator()(Vec3d p, double enough) const {
 
 double SurfaceDistance::operator()(Vec3d p, Hint& hint) const {
   double best = std::numeric_limits<double>::infinity();
-  if (hint.leaf != Hint{}.leaf) {
-    const Vec3f* c = &corners_[3 * std::size_t{hint.leaf}];
-    best = triangle_distance2(to_double(c[0]) - p, to_double(c[1]) - p, to_double(c[2]) - p);
-  }
+  if (hint.leaf != kNoIndex) best = leaf_distance2(hint.leaf, p);
   return search(p, 0, best, hint.leaf);
+}
+
+double SurfaceDistance::leaf_distance2(std::uint32_t leaf, Vec3d p) const {
+  const Vec3f* c = &corners_[3 * std::size_t{leaf}];
+  return triangle_distance2(to_double(c[0]) - p, to_double(c[1]) - p, to_double(c[2]) - p);
+}
+
+SurfaceDistance::Hint SurfaceDistance::nearer(Hint a, Hint b, Vec3d p) const {
+  return b.leaf != kNoIndex && leaf_distance2(b.leaf, p) < leaf_distance2(a.leaf, p) ? b : a;
+}
+
+double SurfaceDistance::distance2_to(std::uint32_t triangle, Vec3d p) const {
+  return leaf_distance2(leaf_of_[triangle], p);
 }
 
 /// `best` is the square of an upper bound that triangle `leaf` gives.
 double SurfaceDistance::search(Vec3d p, double enough, double best, std::uint32_t& leaf) const {
   struct Open {
-    std::uint32_t node;
-    double distance2;
+    std::uint32_t first, count;
+    float distance2;
   };
-  Open stack[128];  // 63 bits of the curve, and halves of what shares a cell
+  // 63 bits of the curve and halves of what shares a cell, two to a node, of which three children wait.
+  Open stack[3 * 48 + 4];
   int depth = 0;
-  const double enough2 = enough * enough;
-  stack[depth++] = {0, float_box_distance2(p, nodes_[0].box)};
+  const double enough2 = enough * enough, square = frame_.scale * frame_.scale;
+  constexpr double kFar = 1e18;  // its square is a float
+  const Vec3d q = (p - frame_.centre) * frame_.scale;
+  Lanes place[3];
+  for (int k = 0; k < 3; ++k) place[k] = Lanes{} + static_cast<float>(std::clamp(q[k], -kFar, kFar));
+  stack[depth++] = {0, 0, 0};
   while (depth > 0) {
     const Open open = stack[--depth];
-    if (open.distance2 >= best) continue;
-    const Node& node = nodes_[open.node];
-    if (node.count > 0) {
-      for (std::uint32_t t = node.first; t < node.first + node.count; ++t) {
-        const double d =
-            triangle_distance2(to_double(corners_[3 * t]) - p, to_double(corners_[3 * t + 1]) - p,
-                               to_double(corners_[3 * t + 2]) - p);
-        if (d < best) best = d, leaf = t;
-      }
+    if (static_cast<double>(open.distance2) >= best * square) continue;
+    if (open.count > 0) {
+      for (std::uint32_t t = open.first; t < open.first + open.count; ++t)
+        if (const double d = leaf_distance2(t, p); d < best) best = d, leaf = t;
       if (best <= enough2) break;
       continue;
     }
-    Open near{node.first, float_box_distance2(p, nodes_[node.first].box)};
-    Open far{node.first + 1, float_box_distance2(p, nodes_[node.first + 1].box)};
-    if (far.distance2 < near.distance2) std::swap(near, far);
-    if (far.distance2 < best) stack[depth++] = far;
-    if (near.distance2 < best) stack[depth++] = near;
+    const Node& node = nodes_[open.first];
+    const Lanes distance2 = box_distances2(place, node);
+    const int bottom = depth;
+    for (int i = 0; i < 4; ++i) {
+      if (!(static_cast<double>(distance2[i]) < best * square)) continue;
+      int at = depth++;  // farthest first
+      for (; at > bottom && stack[at - 1].distance2 < distance2[i]; --at) stack[at] = stack[at - 1];
+      stack[at] = {node.first[i], node.count[i], distance2[i]};
+    }
   }
   return std::sqrt(best);
 }

@@ -16,8 +16,8 @@ struct CurvedTriangle {
 };
 
 /// Answers "how far is this point from the surface" exactly (point to triangle), about a million times a
-/// second. Binary tree of boxes over the triangles in the order of a space-filling curve: built in linear
-/// time, since most surfaces are asked a few thousand questions only. Deterministic.
+/// second. A tree of boxes, four side by side, over the triangles in the order of a space-filling curve:
+/// built in linear time, since most surfaces are asked a few thousand questions only. Deterministic.
 class SurfaceDistance {
  public:
   /// Triangles index `wedge_position`, which indexes `positions`. At least one triangle.
@@ -36,18 +36,33 @@ class SurfaceDistance {
   double operator()(Vec3d p, Hint& hint) const;
   /// The hint that names the triangle with this index in the constructor's list.
   Hint hint_of(std::uint32_t triangle) const { return {leaf_of_[triangle]}; }
+  /// Whichever hint is nearer to the point; the first one where the other names nothing.
+  Hint nearer(Hint a, Hint b, Vec3d p) const;
+  /// The square of the distance to that triangle alone: no less than that of the distance.
+  double distance2_to(std::uint32_t triangle, Vec3d p) const;
 
  private:
+  using Lanes = float __attribute__((vector_size(16)));
+  /// Up to four boxes, side by side, in the unit of `frame_`, a little too large. Of a leaf `first` and
+  /// `count` are its triangles, whose corners stand at corners_[3 * first]; of an inner child count is 0 and
+  /// `first` a node. Behind the last child boxes are nowhere.
   struct Node {
-    Box3f box;
-    // Of a leaf: its triangles, whose corners stand at corners_[3 * first]. An inner node has count 0 and its
-    // children at first and first + 1.
-    std::uint32_t first = 0, count = 0;
+    Lanes min[3], max[3];
+    std::uint32_t first[4], count[4];
+  };
+  /// Where the boxes are: floats near 0 are fine and cheap.
+  struct Frame {
+    Vec3d centre;
+    double scale = 1;
   };
   void split(std::uint32_t node, std::uint32_t begin, std::uint32_t end,
              const std::vector<CurvedTriangle>& order);
+  void fit_boxes();
+  Lanes box_distances2(const Lanes (&p)[3], const Node& node) const;
   double search(Vec3d p, double enough, double best, std::uint32_t& leaf) const;
+  double leaf_distance2(std::uint32_t leaf, Vec3d p) const;
 
+  Frame frame_;
   std::vector<Node> nodes_;
   std::vector<Vec3f> corners_;  // three per triangle, in the order of the leaves
   std::vector<std::uint32_t> leaf_of_;

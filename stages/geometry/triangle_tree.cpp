@@ -1,6 +1,7 @@
 #include "stages/geometry/triangle_tree.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -21,32 +22,16 @@ double box_distance2(const Box3d& box, Vec3d p) {
   return sum;
 }
 
-/// Whether a ray meets a box before t = limit.
-bool meets_box(const Box3d& box, Vec3d origin, Vec3d direction, double limit) {
-  double from = 0, to = limit;
-  for (int k = 0; k < 3; ++k) {
-    if (direction[k] == 0) {
-      if (origin[k] < box.min[k] || origin[k] > box.max[k]) return false;
-      continue;
-    }
-    double a = (box.min[k] - origin[k]) / direction[k], b = (box.max[k] - origin[k]) / direction[k];
-    if (a > b) std::swap(a, b);
-    from = std::max(from, a), to = std::min(to, b);
-  }
-  // Rounding may make a flat box a little too thin.
-  return from <= to * (1 + kOfRounding);
-}
-
 double leaving_hit(const std::array<Vec3d, 3>& c, Vec3d origin, Vec3d direction) {
   const Vec3d u = c[1] - c[0], v = c[2] - c[0], h = cross(direction, v);
   const double det = dot(u, h);
   if (!(det < 0)) return kInfinity;  // dot(direction, normal) = -det: only what looks along the ray
   const Vec3d s = origin - c[0];
-  const double a = dot(s, h) / det;
-  if (!(a >= 0 && a <= 1)) return kInfinity;
+  const double a = dot(s, h);
+  if (!(a <= 0 && a >= det)) return kInfinity;
   const Vec3d q = cross(s, u);
-  const double b = dot(direction, q) / det;
-  if (!(b >= 0 && a + b <= 1)) return kInfinity;
+  const double b = dot(direction, q);
+  if (!(b <= 0 && a + b >= det)) return kInfinity;
   const double t = dot(v, q) / det;
   return t > 0 ? t : kInfinity;
 }
@@ -125,23 +110,74 @@ void TriangleTree::build(std::uint32_t first, std::uint32_t count, std::vector<V
   build(first + count / 2, count - count / 2, centres);
 }
 
-double TriangleTree::exit(Vec3d origin, Vec3d direction) const {
-  double best = kInfinity;
+/// Looks at boxes in single precision, a little too large, four rays at once; at triangles as for one ray.
+struct TriangleTree::RayBundle {
+  using Lanes = float __attribute__((vector_size(16)));
+  static constexpr std::size_t kGroups = kRays / 4;
+  static constexpr float kSlack = 1e-5f;
+
+  Vec3d origin;
+  const Rays& directions;
+  float touch;  // boxes that are farther off are not met
+  Lanes inverse[3][kGroups], limit[kGroups];
+  std::array<double, kRays> best;
+
+  RayBundle(Vec3d from, const Rays& along, double size)
+      : origin(from), directions(along), touch(static_cast<float>(size) * 1e-6f) {
+    constexpr double kMostInverse = 1e15;
+    for (std::size_t r = 0; r < kRays; ++r)
+      for (int k = 0; k < 3; ++k)
+        inverse[k][r / 4][r % 4] =
+            static_cast<float>(std::clamp(1 / along[r][k], -kMostInverse, kMostInverse));
+    for (Lanes& l : limit) l = Lanes{} + std::numeric_limits<float>::max();
+    best.fill(kInfinity);
+  }
+  /// A bit for each ray that may meet the box before what it has met.
+  unsigned meets(const Box3d& box) const {
+    const Vec3f low = to_float(box.min - origin), high = to_float(box.max - origin);
+    unsigned met = 0;
+    for (std::size_t g = 0; g < kGroups; ++g) {
+      Lanes from{}, to = limit[g];
+      for (int k = 0; k < 3; ++k) {
+        const Lanes a = inverse[k][g] * low[k], b = inverse[k][g] * high[k];
+        const Lanes nearer = a < b ? a : b, farther = a < b ? b : a;
+        from = from > nearer ? from : nearer;
+        to = to < farther ? to : farther;
+      }
+      const auto yes = from * (1 - kSlack) <= to * (1 + kSlack) + touch;
+      for (std::size_t l = 0; l < 4; ++l) met |= (static_cast<unsigned>(yes[l]) & 1u) << (4 * g + l);
+    }
+    return met;
+  }
+  void try_triangle(const std::array<Vec3d, 3>& corners, unsigned rays) {
+    for (; rays != 0; rays &= rays - 1) {
+      const auto r = static_cast<std::size_t>(std::countr_zero(rays));
+      const double t = leaving_hit(corners, origin, directions[r]);
+      if (t < best[r]) best[r] = t, limit[r / 4][r % 4] = static_cast<float>(t);
+    }
+  }
+};
+
+std::array<double, TriangleTree::kRays> TriangleTree::exits(Vec3d origin, const Rays& directions) const {
+  RayBundle rays(origin, directions, box().diagonal());
+  Vec3d along;
+  for (const Vec3d& d : directions) along = along + d;
+  const auto ahead = [&](std::uint32_t node) { return dot(nodes_[node].box.centre() - origin, along); };
   std::array<std::uint32_t, 40> stack{};
   std::size_t depth = 1;
   while (depth > 0) {
     const std::uint32_t at = stack[--depth];
     const Node& n = nodes_[at];
-    if (!meets_box(n.box, origin, direction, best)) continue;
-    if (n.count == 0) {
-      stack[depth++] = n.first;
-      stack[depth++] = at + 1;
-      continue;
-    }
-    for (std::uint32_t i = n.first; i < n.first + n.count; ++i)
-      best = std::min(best, leaving_hit(corners_[i], origin, direction));
+    const unsigned met = rays.meets(n.box);
+    if (met == 0) continue;
+    for (std::uint32_t i = n.first; i < n.first + n.count; ++i) rays.try_triangle(corners_[i], met);
+    if (n.count > 0) continue;
+    std::uint32_t nearer = at + 1, farther = n.first;
+    if (ahead(farther) < ahead(nearer)) std::swap(nearer, farther);
+    stack[depth++] = farther;
+    stack[depth++] = nearer;
   }
-  return best;
+  return rays.best;
 }
 
 struct TriangleTree::Found {

@@ -27,9 +27,13 @@ class TriangleTree {
   /// At least one triangle; indices below points.size().
   TriangleTree(std::span<const Vec3d> points, std::span<const Triangle> triangles);
 
-  /// Least t > 0 at which origin + t * direction leaves the solid, that is crosses a triangle whose normal
-  /// looks along the direction; infinite when it does not. Rays through an edge may count as hits or misses.
-  double exit(Vec3d origin, Vec3d direction) const;
+  /// Rays that begin at one point; they are fastest where they look about the same way.
+  static constexpr std::size_t kRays = 16;
+  using Rays = std::array<Vec3d, kRays>;
+  /// For each direction the least t > 0 at which origin + t * direction leaves the solid, that is crosses a
+  /// triangle whose normal looks along the direction; infinite when it does not. Rays through an edge may
+  /// count as hits or misses.
+  std::array<double, kRays> exits(Vec3d origin, const Rays& directions) const;
 
   struct Nearest {
     std::uint32_t triangle = 0;      // index in the constructor's list; ties: the first one found
@@ -68,6 +72,7 @@ class TriangleTree {
   };
   struct Found;
   struct LineSearch;
+  struct RayBundle;
   Found search(Vec3d p, double limit2, std::uint64_t& tried) const;
   void build(std::uint32_t first, std::uint32_t count, std::vector<Vec3d>& centres);
 

@@ -3,49 +3,45 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <span>
 #include <string>
 
 #include "format/base/box.h"
 #include "format/base/errors.h"
-#include "format/base/no_index.h"
 #include "format/base/portable_math.h"
 #include "format/rules/jnd_choice.h"
 #include "stages/base/parallel.h"
-#include "stages/geometry/distance.h"
+#include "stages/perceptual_values/scale_comparison.h"
 
 namespace texmesh {
 namespace {
 
-/// Points on one scale, with the skeleton distance that stands for the size of the shape around them.
-struct SampledScale {
-  std::vector<Vec3d> points;
-  std::vector<double> radius;
-  std::vector<std::uint32_t> source;  // the triangle of S_0 that the point's triangle comes from
-};
-
-SampledScale sample_scale(const Mesh& mesh, const NestedScale& scale, const std::vector<float>& radius,
-                          std::size_t count) {
-  SampledScale out;
+std::vector<ScalePoint> sample_scale(const Mesh& mesh, const NestedScale& scale,
+                                     const std::vector<float>& radius, std::size_t count) {
+  std::vector<ScalePoint> out;
   for (const SurfaceSample& s : sample_surface(mesh.positions, mesh.wedge_position, scale.triangles, count)) {
-    Vec3d p;
-    double r = 0;
+    ScalePoint p;
+    float most = 0;
     for (std::size_t k = 0; k < 3; ++k) {
       const std::uint32_t position = mesh.wedge_position[scale.triangles[s.triangle][k]];
-      p = p + to_double(mesh.positions[position]) * static_cast<double>(s.weight[k]);
-      r += static_cast<double>(s.weight[k]) * radius[position];
+      p.at = p.at + to_double(mesh.positions[position]) * static_cast<double>(s.weight[k]);
+      p.radius += static_cast<double>(s.weight[k]) * radius[position];
+      if (s.weight[k] > most) most = s.weight[k], p.position = position;
     }
-    out.points.push_back(p);
-    out.radius.push_back(r);
-    out.source.push_back(scale.triangle_source[s.triangle]);
+    out.push_back(p);
   }
   return out;
+}
+
+/// The index of a percentile among rising values.
+std::size_t nearest_rank(std::size_t count, double percent) {
+  return static_cast<std::size_t>(std::floor(percent / 100 * static_cast<double>(count - 1) + 0.5));
 }
 
 /// Nearest-rank percentile; reorders the values. 0 for none.
 double percentile(std::vector<double>& values, double percent) {
   if (values.empty()) return 0;
-  const double rank = std::floor(percent / 100 * static_cast<double>(values.size() - 1) + 0.5);
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(rank);
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(nearest_rank(values.size(), percent));
   std::nth_element(values.begin(), at, values.end());
   return *at;
 }
@@ -56,21 +52,10 @@ double collapse_value(const Skeleton& skeleton, std::uint32_t removed, std::uint
          skeleton.radius[left];
 }
 
-/// Per position of S_0: the one that stands for it at scale k.
-std::vector<std::uint32_t> survivors_at(const NestedScales& scales, std::size_t k) {
-  std::vector<std::uint32_t> survivor(scales.mesh.positions.size());
-  for (std::size_t p = 0; p < survivor.size(); ++p) survivor[p] = static_cast<std::uint32_t>(p);
-  // Backwards, so that a chain's end is known before the links that lead to it.
-  for (std::size_t c = scales.scales[k].collapse_count; c-- > 0;)
-    survivor[scales.collapses[c].from] = survivor[scales.collapses[c].to];
-  return survivor;
-}
-
 /// The column of scale j of the tables of chains.
-void chain_statistics(const NestedScales& scales, std::size_t j, const Skeleton& skeleton,
-                      PerceptualValues& out) {
+void chain_statistics(const NestedScales& scales, std::size_t j, std::span<const std::uint32_t> survivor,
+                      const Skeleton& skeleton, PerceptualValues& out) {
   const std::size_t n = scales.scales.size();
-  const std::vector<std::uint32_t> survivor = survivors_at(scales, j);
   double sum = 0, least = 0, most = 0;
   std::size_t count = 0;
   for (std::size_t k = j; k > 0; --k) {
@@ -90,9 +75,9 @@ void chain_statistics(const NestedScales& scales, std::size_t j, const Skeleton&
 }
 
 /// Table 7.1: one scale change.
-CollapseStatistics collapse_statistics(const NestedScales& scales, std::size_t k, const Skeleton& skeleton) {
+CollapseStatistics collapse_statistics(const NestedScales& scales, std::size_t k,
+                                       std::span<const std::uint32_t> survivor, const Skeleton& skeleton) {
   const std::size_t begin = scales.scales[k - 1].collapse_count, end = scales.scales[k].collapse_count;
-  const std::vector<std::uint32_t> survivor = survivors_at(scales, k);
   CollapseStatistics out;
   double sum = 0, squares = 0, least = 0, most = 0;
   for (std::size_t i = begin; i < end; ++i) {
@@ -113,53 +98,39 @@ CollapseStatistics collapse_statistics(const NestedScales& scales, std::size_t k
   return out;
 }
 
-/// A chain of hints begins anew with every so many samples, wherever the threads' pieces begin.
-constexpr std::size_t kHintChain = 64;
-
-/// Per triangle of S_0: the triangle of this scale that it has become.
-std::vector<std::uint32_t> triangle_of_source(const NestedScale& scale, std::size_t source_count) {
-  std::vector<std::uint32_t> of(source_count, kNoIndex);
-  for (std::size_t t = 0; t < scale.triangles.size(); ++t)
-    of[scale.triangle_source[t]] = static_cast<std::uint32_t>(t);
-  return of;
-}
-
-/// Distances of the samples of finer scales to one scale j. A search begins at the sample's own triangle
-/// where j still has it, and else at the triangle of the answer before.
-class ScaleComparison {
- public:
-  ScaleComparison(const Mesh& mesh, const NestedScale& scale, std::size_t source_count)
-      : surface_(mesh.positions, mesh.wedge_position, scale.triangles),
-        of_source_(triangle_of_source(scale, source_count)) {}
-
-  std::vector<double> distances(const SampledScale& sampled) const {
-    std::vector<double> distance(sampled.points.size());
-    SurfaceDistance::Hint hint;
-    for (std::size_t s = 0; s < distance.size(); ++s) {
-      if (s % kHintChain == 0) hint = {};
-      const std::uint32_t own = of_source_[sampled.source[s]];
-      if (own != kNoIndex) hint = surface_.hint_of(own);
-      distance[s] = surface_(sampled.points[s], hint);
-    }
-    return distance;
-  }
-
- private:
-  SurfaceDistance surface_;
-  std::vector<std::uint32_t> of_source_;
-};
-
 /// Points on a scale: where there are few triangles, more points than triangles say little more.
 std::size_t sample_count(const NestedScale& scale, std::size_t most) {
   constexpr std::size_t kLeast = 500;
   return std::min(most, std::max(kLeast, scale.triangles.size()));
 }
 
-/// Fills p95 and p99 for all pairs; returns per scale the 95th percentile of S_0's distance in object units.
+/// Fills p95 and p99 of the pairs that end at scale j; returns the 95th percentile of S_0's distance in
+/// object units.
+double compare_finer(const NestedScales& scales, std::size_t j, std::span<const std::uint32_t> survivor,
+                     const std::vector<std::vector<ScalePoint>>& sampled, const RunContext& context,
+                     PerceptualValues& out) {
+  const std::size_t n = scales.scales.size();
+  const ScaleComparison comparison(scales.mesh, scales.scales[j], survivor);
+  double error = 0;
+  for (std::size_t i = 0; i < j; ++i) {
+    context.check_cancelled();
+    const std::size_t count = sampled[i].size();
+    if (count == 0) continue;
+    const std::size_t asked = count - nearest_rank(count, 95);
+    const std::vector<double> rho = comparison.largest(sampled[i], asked, true);
+    out.p95[i * n + j] = static_cast<float>(rho.back());
+    out.p99[i * n + j] = static_cast<float>(rho[count - 1 - nearest_rank(count, 99)]);
+    if (i == 0) error = comparison.largest(sampled[i], asked, false).back();
+  }
+  return error;
+}
+
+/// All that is measured scale by scale: chains, steps, p95 and p99. Returns per scale the 95th percentile of
+/// S_0's distance in object units.
 std::vector<double> compare_scales(const NestedScales& scales, const Skeleton& skeleton, std::size_t samples,
                                    const RunContext& context, PerceptualValues& out) {
   const std::size_t n = scales.scales.size();
-  std::vector<SampledScale> sampled(n);
+  std::vector<std::vector<ScalePoint>> sampled(n);
   parallel_for(context, n - 1, 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i)
       sampled[i] = sample_scale(scales.mesh, scales.scales[i], skeleton.radius,
@@ -169,15 +140,11 @@ std::vector<double> compare_scales(const NestedScales& scales, const Skeleton& s
   std::atomic<std::size_t> done = 0;
   parallel_for(context, n - 1, 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t j = begin + 1; j <= end; ++j) {
-      const ScaleComparison comparison(scales.mesh, scales.scales[j], scales.mesh.triangles.size());
-      for (std::size_t i = 0; i < j; ++i) {
-        context.check_cancelled();
-        std::vector<double> distance = comparison.distances(sampled[i]), rho(distance.size());
-        for (std::size_t s = 0; s < rho.size(); ++s) rho[s] = distance[s] / sampled[i].radius[s];
-        out.p95[i * n + j] = static_cast<float>(percentile(rho, 95));
-        out.p99[i * n + j] = static_cast<float>(percentile(rho, 99));
-        if (i == 0) error[j] = percentile(distance, 95);
-      }
+      const std::vector<std::uint32_t> survivor =
+          survivors(scales.mesh.positions.size(), scales.collapses, scales.scales[j].collapse_count);
+      out.step[j] = collapse_statistics(scales, j, survivor, skeleton);
+      chain_statistics(scales, j, survivor, skeleton, out);
+      error[j] = compare_finer(scales, j, survivor, sampled, context, out);
       context.report(static_cast<double>(++done) / static_cast<double>(n));
     }
   });
@@ -321,10 +288,6 @@ PerceptualValues measure_perceptual_values(const NestedScales& scales, const Ske
   out.p95.assign(n * n, 0), out.p99.assign(n * n, 0);
   for (std::vector<float>* chain : {&out.chain_average, &out.chain_largest, &out.chain_least})
     chain->assign(n * n, 0);
-  for (std::size_t k = 1; k < n; ++k) {
-    out.step[k] = collapse_statistics(scales, k, skeleton);
-    chain_statistics(scales, k, skeleton, out);
-  }
   const std::vector<double> error =
       compare_scales(scales, skeleton, static_cast<std::size_t>(options.samples), context, out);
   const std::vector<float> value = value_table(out, options.statistic);

@@ -9,7 +9,7 @@
 
 namespace texmesh {
 
-inline constexpr int kPerceptualValuesVersion = 6;
+inline constexpr int kPerceptualValuesVersion = 7;
 
 /// What makes the step function of the JND. kScales: every kept scale, by its distance from S_0. kMajors: as
 /// printed (7.5, 7.6): the displayed size chooses a scale by O_V / E_S, the JND, whatever the distance, puts

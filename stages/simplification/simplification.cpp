@@ -166,7 +166,7 @@ NestedScales simplify(const ConditionedMesh& mesh, const ScaleMap& scale_map,
   }
   result.collapses = engine.collapses();
   append_new_wedges(engine.mesh(), result.mesh, result.scales);
-  measure_scale_errors(mesh.component, result.mesh, result.scales, context);
+  measure_scale_errors(mesh.component, result, context);
   const std::size_t taken = result.scales.size();
   drop_far_scales(result, options.max_error * engine.mesh().diagonal());
   if (result.scales.size() < taken) floor = "every coarser scale exceeds max_error";

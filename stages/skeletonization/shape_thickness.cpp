@@ -21,8 +21,8 @@ struct ConeRay {
   Vec3d direction;
   double cosine;
 };
-std::array<ConeRay, 16> cone() {
-  std::array<ConeRay, 16> rays{};
+std::array<ConeRay, TriangleTree::kRays> cone() {
+  std::array<ConeRay, TriangleTree::kRays> rays{};
   rays[0] = {{0, 0, 1}, 1};
   std::size_t next = 1;
   for (const auto& [angle, count] : {std::pair{0.25, 5}, std::pair{0.5, 10}})
@@ -40,15 +40,20 @@ double median(std::vector<double>& values) {
   return *middle;
 }
 
-double measure(const TriangleTree& tree, const std::array<ConeRay, 16>& rays, Vec3d centre, Vec3d normal) {
+double measure(const TriangleTree& tree, const std::array<ConeRay, TriangleTree::kRays>& rays, Vec3d centre,
+               Vec3d normal) {
   const Vec3d inwards = normal * -1.0;
   const Vec3d side = normalized(cross(inwards, std::fabs(inwards.y) < 0.9 ? Vec3d{0, 1, 0} : Vec3d{1, 0, 0}));
   const Vec3d other = cross(inwards, side);
-  std::vector<double> lengths;
-  for (const ConeRay& ray : rays) {
-    const Vec3d d = side * ray.direction.x + other * ray.direction.y + inwards * ray.direction.z;
-    if (const double t = tree.exit(centre, d); t < kInfinity) lengths.push_back(t * ray.cosine);
+  TriangleTree::Rays directions;
+  for (std::size_t r = 0; r < rays.size(); ++r) {
+    const Vec3d& d = rays[r].direction;
+    directions[r] = side * d.x + other * d.y + inwards * d.z;
   }
+  const auto exits = tree.exits(centre, directions);
+  std::vector<double> lengths;
+  for (std::size_t r = 0; r < rays.size(); ++r)
+    if (exits[r] < kInfinity) lengths.push_back(exits[r] * rays[r].cosine);
   return lengths.empty() ? kInfinity : median(lengths) / 2;
 }
 
@@ -82,7 +87,7 @@ std::vector<double> filtered(const TriangleSoup& soup, const Fans& fans, const s
 
 std::vector<double> half_thickness(const TriangleSoup& closed, const TriangleTree& tree,
                                    const RunContext& context) {
-  const std::array<ConeRay, 16> rays = cone();
+  const std::array<ConeRay, TriangleTree::kRays> rays = cone();
   std::vector<double> face(closed.triangles.size()), area(face.size());
   parallel_for(context, face.size(), 64, [&](std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t) {

@@ -9,7 +9,7 @@
 
 namespace texmesh {
 
-inline constexpr int kSkeletonizationVersion = 6;
+inline constexpr int kSkeletonizationVersion = 7;
 
 struct SkeletonizationOptions {
   // At 40 a turtle has no hind legs, at 60 the skeleton of a saxophone's neck cuts its corner.
@@ -44,8 +44,8 @@ struct SkeletonizationOptions {
 /// The skeleton of any conditioned mesh (open, several components, one triangle): an alpha wrap, its mean
 /// curvature flow skeleton, and distances to it that the local thickness corrects where a curve is no
 /// skeleton (local_radius.h). Meshes of more than 100,000 triangles are clustered to that first. A mesh of
-/// few triangles has a wrap of at most twice as many faces, or 1,000, and an alpha_divisor of at most the
-/// root of their number, or 40. No mesh makes it fail. Every fallback gives a warning:
+/// fewer than 6,400 triangles has an alpha_divisor of at most an 80th of their number, or 28, and a wrap of
+/// at most a 2,000th of their square, or 1,000 faces. No mesh makes it fail. Every fallback gives a warning:
 /// - "skeleton-coarser-wrap": a wrap that takes more than max_wrap_steps, or looks at 50 times as many
 ///   triangles (thousands of needles around one point), is tried with twice and four times its alpha.
 /// - "skeleton-part-centroid": a part of the wrap that cannot be contracted has its centroid for a skeleton.

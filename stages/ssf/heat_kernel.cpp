@@ -104,12 +104,17 @@ void fill_rows(const std::vector<HeatChord>& edges, HeatOperator& l) {
   for (const HeatChord& e : edges) put(e.lo, e.hi, e.weight);
 }
 
-/// L has the nonzero eigenvalues of the edges' matrix B M^-1 B^T W, whose row sums are those of both ends
-/// together: never above Gershgorin's bound for L itself.
-double bound_spectrum(const HeatOperator& l) {
+std::vector<double> sums_of_rates(const HeatOperator& l) {
   std::vector<double> leaving(l.mass.size(), 0);
   for (std::size_t i = 0; i < leaving.size(); ++i)
     for (std::uint32_t k = l.first[i]; k < l.first[i + 1]; ++k) leaving[i] += double{l.rate[k]};
+  return leaving;
+}
+
+/// L has the nonzero eigenvalues of the edges' matrix B M^-1 B^T W, whose row sums are those of both ends
+/// together: never above Gershgorin's bound for L itself.
+double bound_spectrum(const HeatOperator& l) {
+  const std::vector<double> leaving = sums_of_rates(l);
   double bound = 0;
   for (std::size_t i = 0; i < leaving.size(); ++i)
     for (std::uint32_t k = l.first[i]; k < l.first[i + 1]; ++k)
@@ -306,16 +311,20 @@ HeatOperator make_heat_operator(const HeatSurface& surface, std::vector<double> 
 }
 
 void limit_spectrum(HeatOperator& l, double bound) {
-  std::vector<double> factor(l.vertex_count());
-  for (std::size_t i = 0; i < factor.size(); ++i) {
-    double leaving = 0;
-    for (std::uint32_t k = l.first[i]; k < l.first[i + 1]; ++k) leaving += double{l.rate[k]};
-    factor[i] = leaving > 0.5 * bound ? 0.5 * bound / leaving : 1;
-  }
+  std::vector<double> factor = sums_of_rates(l);
+  for (double& f : factor) f = f > 0.5 * bound ? 0.5 * bound / f : 1;
   for (std::size_t i = 0; i < factor.size(); ++i)
     for (std::uint32_t k = l.first[i]; k < l.first[i + 1]; ++k)
       l.rate[k] = static_cast<float>(double{l.rate[k]} * std::min(factor[i], factor[l.column[k]]));
   l.bound = bound_spectrum(l);
+}
+
+void trim_spectrum(HeatOperator& l, double share) {
+  std::vector<double> leaving = sums_of_rates(l);
+  const auto rank = static_cast<std::size_t>((1 - share) * static_cast<double>(leaving.size() - 1));
+  std::nth_element(leaving.begin(), leaving.begin() + static_cast<std::ptrdiff_t>(rank), leaving.end());
+  const double bound = 2 * leaving[rank];
+  if (bound > 0 && bound < l.bound) limit_spectrum(l, bound);
 }
 
 int heat_terms(double time, double bound) {

@@ -45,6 +45,11 @@ HeatOperator make_heat_operator(const HeatSurface& surface, std::vector<double> 
 /// no eigenvalue is larger than `bound`.
 void limit_spectrum(HeatOperator& laplacian, double bound);
 
+/// Slows down the vertices whose rates sum up to most, at most `share` of all, to what the others have at
+/// most. A handful of them set the bound of the spectrum, and heat through them is even long before it has
+/// gone anywhere.
+void trim_spectrum(HeatOperator& laplacian, double share);
+
 /// The points x after heat flow until time t, as displacements. A place as a float would have too few digits
 /// for the response of fine relief on a large surface.
 struct HeatFlow {

@@ -23,14 +23,19 @@ constexpr double kManyCapped = 0.1;
 /// What is closer than this, in mean edges, is one vertex then.
 constexpr double kCluster = 0.5;
 
-/// Times of one recurrence: what its accumulators cost in memory. Splitting the flow costs a sixth more
-/// terms.
-constexpr std::size_t kTimesAtOnce = 8;
-
+constexpr double kTrimmed = 0.02;  // of a level; with 0 a saxophone takes a third longer
+/// What the accumulators of one recurrence may take. Splitting the flow costs up to two thirds more terms.
+constexpr std::size_t kFlowBytes = std::size_t{64} << 20, kLeastTimesAtOnce = 8;
 constexpr std::size_t kCrossingGrain = 4096;
 constexpr std::uint8_t kExtremum = 1, kCrossing = 2;
 
 Vec3d moved(Vec3d point, Vec3f by) { return point + to_double(by); }
+
+std::vector<Vec3d> moved(const std::vector<Vec3d>& points, const HeatFlow& flow) {
+  std::vector<Vec3d> out(points.size());
+  for (std::size_t v = 0; v < points.size(); ++v) out[v] = moved(points[v], flow.moved[v]);
+  return out;
+}
 
 double rms(const std::vector<float>& values) {
   double squares = 0;
@@ -199,6 +204,7 @@ class ComponentFilter {
   LevelState first_state() {
     LevelState state;
     state.level = finest_level(component_.points, component_.corners, 1, options_.rate_cap);
+    trim_spectrum(state.level.laplacian, kTrimmed);
     out_.capped = state.level.laplacian.capped;
     state.points = signal_;
     state.vertex = state.level.vertex;
@@ -211,6 +217,7 @@ class ComponentFilter {
   LevelState next_state(LevelState fine, double radius) const {
     LevelState coarse;
     coarse.level = coarsen(fine.level, radius, options_.rate_cap);
+    trim_spectrum(coarse.level.laplacian, kTrimmed);
     coarse.time = fine.time;
     for (std::uint32_t v : coarse.level.vertex) {
       coarse.vertex.push_back(fine.vertex[v]);
@@ -245,8 +252,10 @@ class ComponentFilter {
     std::vector<std::vector<float>> curvature;
     LevelState walker{{}, {}, state.points, state.time, state.normals};
     const std::size_t handover = handover_scale(state, begin, end);
+    const std::size_t times_at_once =
+        std::max(kLeastTimesAtOnce, kFlowBytes / (2 * sizeof(Vec3f) * state.points.size()));
     for (std::size_t i = begin; i < end + ladder_.band;) {
-      const std::size_t stop = std::min(i + kTimesAtOnce, i < handover ? handover : end + ladder_.band);
+      const std::size_t stop = std::min(i + times_at_once, end + ladder_.band);
       const std::span<const double> times(ladder_.time.data() + i, stop - i);
       const std::vector<HeatFlow> flows =
           diffuse(state.level.laplacian, walker.points, walker.time, times, context_);
@@ -257,14 +266,13 @@ class ComponentFilter {
       });
       for (std::size_t s = i; s < std::min(stop, scales_) && s < end; ++s)
         if (has_converged(walker.points, flows[s - i], s)) converged = std::min(converged, s);
-      walker.time = times.back();
-      for (std::size_t v = 0; v < walker.points.size(); ++v)
-        walker.points[v] = moved(walker.points[v], flows.back().moved[v]);
-      if (stop == handover) {
-        state.normals = normals_of(state, walker.points);
-        state.time = walker.time;
-        state.points = walker.points;
+      if (i < handover && handover <= stop) {
+        state.time = ladder_.time[handover - 1];
+        state.points = moved(walker.points, flows[handover - 1 - i]);
+        state.normals = normals_of(state, state.points);
       }
+      walker.time = times.back();
+      walker.points = moved(walker.points, flows.back());
       i = stop;
     }
     for (std::size_t i = begin; i < end; ++i)
@@ -282,9 +290,7 @@ class ComponentFilter {
   }
 
   bool has_converged(const std::vector<Vec3d>& points, const HeatFlow& flow, std::size_t scale) {
-    Box3d box;
-    for (std::size_t v = 0; v < points.size(); ++v) box.extend(moved(points[v], flow.moved[v]));
-    const double now = box.longest_side();
+    const double now = bounding_box(moved(points, flow)).longest_side();
     out_.convergence[scale + 1] = static_cast<float>(now / range_);
     return scale > 0 && now / range_ < options_.convergence;
   }
@@ -319,9 +325,7 @@ class ComponentFilter {
   /// t H per vertex. With L positive semi-definite, L x = 2 H n.
   std::vector<float> curvature_of(const LevelState& state, const std::vector<Vec3d>& points,
                                   const HeatFlow& flow) const {
-    std::vector<Vec3d> smoothed(points.size());
-    for (std::size_t v = 0; v < points.size(); ++v) smoothed[v] = moved(points[v], flow.moved[v]);
-    const std::vector<Vec3f> normal = normals_of(state, smoothed);
+    const std::vector<Vec3f> normal = normals_of(state, moved(points, flow));
     std::vector<float> curvature(points.size());
     for (std::size_t v = 0; v < points.size(); ++v)
       curvature[v] = static_cast<float>(0.5 * dot(to_double(flow.response[v]), to_double(normal[v])));

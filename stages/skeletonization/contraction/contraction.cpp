@@ -52,6 +52,9 @@ Vec3d vec(const PointOrVector& p) {
 /// The poles of the contraction that this thread is in, by the surface's points: CGAL keeps a few of them.
 thread_local std::vector<Vec3d> poles_found;
 
+/// The last answers of the contraction's inside test, in the order of the questions.
+thread_local std::vector<bool> last_answers;
+
 }  // namespace
 }  // namespace texmesh
 
@@ -59,10 +62,14 @@ thread_local std::vector<Vec3d> poles_found;
 template <>
 class CGAL::Side_of_triangle_mesh<texmesh::MesoSkeleton, texmesh::Kernel> {
  public:
-  explicit Side_of_triangle_mesh(const texmesh::MesoSkeleton& mesh) : test_(triangles_of(mesh)) {}
+  explicit Side_of_triangle_mesh(const texmesh::MesoSkeleton& mesh) : test_(triangles_of(mesh)) {
+    texmesh::last_answers.clear();
+  }
 
   CGAL::Bounded_side operator()(const texmesh::Kernel::Point_3& p) const {
-    return test_.is_inside(texmesh::vec(p)) ? CGAL::ON_BOUNDED_SIDE : CGAL::ON_UNBOUNDED_SIDE;
+    const bool inside = test_.is_inside(texmesh::vec(p));
+    texmesh::last_answers.push_back(inside);
+    return inside ? CGAL::ON_BOUNDED_SIDE : CGAL::ON_UNBOUNDED_SIDE;
   }
 
  private:
@@ -98,6 +105,26 @@ void texmesh::Contraction::compute_voronoi_pole() {
     texmesh::poles_found[v->vertices.front()] = pole;  // the copy has another order than the surface
   }
   m_are_poles_computed = true;
+}
+
+/// CGAL's own, but for where the poles are: assemble_LHS has asked just before, of the same vertices in the
+/// same order.
+template <>
+void texmesh::Contraction::assemble_RHS(SolverTraits::Vector& x, SolverTraits::Vector& y,
+                                        SolverTraits::Vector& z) {
+  const std::size_t count = num_vertices(m_tmesh);
+  std::size_t asked = 0;
+  const auto set = [&](std::size_t row, const Point& p, double weight) {
+    x[row] = p.x() * weight, y[row] = p.y() * weight, z[row] = p.z() * weight;
+  };
+  for (const auto v : vertices(m_tmesh)) {
+    const auto id = static_cast<int>(v->id());
+    const auto i = static_cast<std::size_t>(m_new_id[id]);
+    const bool pole = !v->is_fixed && id < m_max_id && texmesh::last_answers.at(asked++);
+    set(i, {0, 0, 0}, 0);
+    set(i + count, v->point(), v->is_fixed ? 1.0 / m_zero_TH : m_omega_H);
+    set(i + 2 * count, v->pole, pole ? m_omega_P : 0);
+  }
 }
 
 namespace texmesh {

@@ -186,6 +186,29 @@ TEST(TriangleTree, MeetsAgreesWithTryingAll) {
   EXPECT_GT(missed, 50);
 }
 
+double exit_of(const TriangleTree& tree, Vec3d from, Vec3d along) {
+  TriangleTree::Rays same;
+  same.fill(along);
+  return tree.exits(from, same)[0];
+}
+
+TEST(TriangleTree, RaysOfABundleLeaveWhereEachWouldAlone) {
+  const TriangleSoup soup = soup_of(testing::bumpy_sphere(16, 24, 0.2f));
+  const TriangleTree tree(soup.points, soup.triangles);
+  Random random{9};
+  const auto any = [&] {
+    return Vec3d{random.uniform() - 0.5, random.uniform() - 0.5, random.uniform() - 0.5};
+  };
+  for (int q = 0; q < 100; ++q) {
+    TriangleTree::Rays rays;
+    for (Vec3d& r : rays) r = normalized(any());
+    rays[3] = {0, 0, 1}, rays[7] = {-1, 0, 0};
+    const Vec3d from = q % 2 ? any() * 3.0 : soup.points[static_cast<std::size_t>(q)];
+    const auto found = tree.exits(from, rays);
+    for (std::size_t r = 0; r < rays.size(); ++r) EXPECT_EQ(found[r], exit_of(tree, from, rays[r])) << r;
+  }
+}
+
 TEST(TriangleTree, RaysLeaveTheBox) {
   const TriangleSoup soup = box(1, 2, 3, 5);
   const TriangleTree tree(soup.points, soup.triangles);
@@ -200,11 +223,11 @@ TEST(TriangleTree, RaysLeaveTheBox) {
     for (int k = 0; k < 3; ++k)
       if (along[k] != 0)
         expected = std::min(expected, ((along[k] > 0 ? half[k] : -half[k]) - from[k]) / along[k]);
-    EXPECT_NEAR(tree.exit(from, along), expected, 1e-9);
+    EXPECT_NEAR(exit_of(tree, from, along), expected, 1e-9);
   }
   // From outside looking away, and from outside through: entering does not count, leaving does.
-  EXPECT_EQ(tree.exit({5, 0.1, 0.1}, {1, 0, 0}), kInfinity);
-  EXPECT_NEAR(tree.exit({5, 0.1, 0.1}, {-1, 0, 0}), 6, 1e-12);
+  EXPECT_EQ(exit_of(tree, {5, 0.1, 0.1}, {1, 0, 0}), kInfinity);
+  EXPECT_NEAR(exit_of(tree, {5, 0.1, 0.1}, {-1, 0, 0}), 6, 1e-12);
 }
 
 TEST(HalfThickness, OfABallABoxAndAPlate) {

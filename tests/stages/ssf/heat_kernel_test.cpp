@@ -76,5 +76,25 @@ TEST(HeatKernel, MatchesADenseEigenSolveOfTheSameOperator) {
   }
 }
 
+TEST(HeatKernel, AFewFastVerticesDoNotSetThePaceOfAll) {
+  const Surface s = surface_of(testing::bumpy_sphere(40, 60, 0.08f));
+  HeatOperator l = make_heat_operator({s.points, s.corners, {}}, {}, s.mean_edge, 10);
+  const HeatOperator before = l;
+  trim_spectrum(l, 0);
+  EXPECT_EQ(l.rate, before.rate) << "nobody is to be slowed down";
+  trim_spectrum(l, 0.1);
+  EXPECT_LT(l.bound, 0.8 * before.bound);
+  std::size_t slower = 0;
+  for (std::size_t v = 0; v < l.vertex_count(); ++v) {
+    double sum = 0, was = 0;
+    for (std::uint32_t k = l.first[v]; k < l.first[v + 1]; ++k)
+      sum += double{l.rate[k]}, was += double{before.rate[k]};
+    slower += was > 0.5 * l.bound * (1 + 1e-5);
+    EXPECT_LE(sum, was * (1 + 1e-6));
+  }
+  EXPECT_GT(slower, 0u);
+  EXPECT_LE(static_cast<double>(slower), 0.1 * static_cast<double>(l.vertex_count()) + 1);
+}
+
 }  // namespace
 }  // namespace texmesh
