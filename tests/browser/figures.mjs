@@ -1,5 +1,5 @@
-// The figures of the browser client, measured here and printed as a table. Sections by name: first proxies ssim deadline compose blocked
-// viewer shots; all without one. Wants TEXMESH_DATA, the folder with the real scans, and keeps what it compiles of them in
+// The figures of the browser client, measured here and printed as a table. Sections by name: first proxies ssim deadline compose start
+// blocked viewer shots; all without one. Wants TEXMESH_DATA, the folder with the real scans, and keeps what it compiles of them in
 // TEXMESH_FIGURE_PACKAGES. The machine should have nothing else to do.
 import {execFileSync} from 'node:child_process';
 import {check, env, fs, lab, labPage, labRoots, launch, listen, path, pictures, run, serve, waitedFor} from './browser.mjs';
@@ -208,6 +208,59 @@ async function composing() {
   await page.close();
 }
 
+/** Compiling and running a script's top level, as the trace names it. What is called later has names of its own. */
+const kScripts = /^(EvaluateScript|v8\.compile|v8\.compileModule|v8\.evaluateModule|V8\.CompileModule)$/;
+
+/** Ms that a page's scripts take of the main thread for parsing and starting, in a browser that has never seen them: on the processor, by the clock. */
+async function startOf(url) {
+  const context = await browser.newContext();
+  const page = await context.newPage();
+  const session = await browser.newBrowserCDPSession();
+  const events = [];
+  session.on('Tracing.dataCollected', ({value}) => events.push(...value));
+  await session.send('Tracing.start', {traceConfig: {includedCategories: ['devtools.timeline', 'v8', 'disabled-by-default-v8.compile', 'blink.user_timing', '__metadata']}, transferMode: 'ReportEvents'});
+  await page.goto(url, {waitUntil: 'networkidle'});
+  await page.waitForTimeout(300);
+  await page.evaluate(() => performance.mark('here'));
+  const complete = new Promise((go) => session.once('Tracing.tracingComplete', go));
+  await session.send('Tracing.end');
+  await complete;
+  await context.close();
+  const {pid, tid} = events.find((e) => e.name === 'here');
+  const own = events.filter((e) => e.ph === 'X' && e.pid === pid && e.tid === tid && kScripts.test(e.name)).sort((a, b) => a.ts - b.ts || b.dur - a.dur);
+  let [until, cpu, clock] = [0, 0, 0];
+  for (const {ts, dur, tdur} of own) {
+    if (ts < until) continue; // inside another
+    cpu += tdur / 1000;
+    clock += dur / 1000;
+    until = ts + dur;
+  }
+  return {cpu, clock};
+}
+/** Scripts alone: the pages name no package. */
+async function starting() {
+  const folder = path.join(env.work, 'start');
+  fs.mkdirSync(folder, {recursive: true});
+  const pages = {
+    'three.js alone': '<script type="module">import * as three from "three"; import "three/addons/loaders/GLTFLoader.js"; import "three/addons/loaders/DRACOLoader.js"; window.three = three;</script>',
+    'texmesh/open beside three.js': '<script type="module">import * as three from "three"; import "three/addons/loaders/GLTFLoader.js"; import "three/addons/loaders/DRACOLoader.js"; import {open} from "/texmesh/open.js"; Object.assign(window, {three, open});</script>',
+    'the element': '<script type="module" src="/texmesh/viewer/texmesh-viewer.js"></script><texmesh-viewer alt="none"></texmesh-viewer>',
+  };
+  const imports = '<script type="importmap">{"imports": {"three": "/three/build/three.module.js", "three/addons/": "/three/examples/jsm/"}}</script>';
+  Object.values(pages).forEach((script, i) => fs.writeFileSync(path.join(folder, `${i}.html`), `<!doctype html><html lang="en"><title>start</title><link rel="icon" href="data:,">${imports}${script}</html>`));
+  const own = await serve({'/start/': folder, '/viewer/': env.viewer, ...labRoots}, {gzip: true});
+  const loads = 5;
+  for (const [name, address] of [...Object.keys(pages).map((n, i) => [n, `start/${i}.html`]), ['the viewer', 'viewer/index.html']]) {
+    const all = [];
+    for (let i = 0; i < loads; i++) all.push(await startOf(`${own.url}/${address}`));
+    const median = (of) => all.map(of).sort((a, b) => a - b)[loads >> 1];
+    const [cpu, clock] = [median((t) => t.cpu), median((t) => t.clock)];
+    console.log(`${name}: ${all.map((t) => `${t.cpu.toFixed(1)} (${t.clock.toFixed(1)})`).join(' ')}`);
+    row(`parse and start, ${name}: main thread, median of ${loads}, ms (by the clock)`, `${cpu.toFixed(1)} (${clock.toFixed(1)})`, '<= 60', cpu <= 60);
+  }
+  await own.close();
+}
+
 async function blocked() {
   for (const name of Object.keys(kScans)) {
     const page = await readyPage(name, {warm: false});
@@ -329,7 +382,7 @@ async function viewerTasks() {
 }
 
 try {
-  for (const [name, body] of Object.entries({first: firstPictures, proxies: proxiesFirst, ssim: timeToQuality, deadline: deadlines, compose: composing, blocked, viewer: viewerTasks, shots}))
+  for (const [name, body] of Object.entries({first: firstPictures, proxies: proxiesFirst, ssim: timeToQuality, deadline: deadlines, compose: composing, start: starting, blocked, viewer: viewerTasks, shots}))
     if (wants(name)) await body();
 } finally {
   await browser.close();
