@@ -18,6 +18,8 @@ export interface PlaneComposer extends ComposedPlane {
   /** Every pixel has a colour: fragments may be shown. */
   filled?: boolean;
   ready?: Promise<void>;
+  /** While a preview is enlarged: resolves when no piece of it may come over this fragment any more; rejects where workers cannot draw. */
+  clear?(fragment: number): Promise<unknown>;
   /** A texture for the place where a material has `old`: the same sampler, channel and transform. */
   view(old: Texture): Texture;
   /** Fills the whole with another texture, scaled bilinearly; blocks are filled by blocks/refill.ts. */

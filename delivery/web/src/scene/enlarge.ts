@@ -27,7 +27,22 @@ export async function enlarge(
   pool: WorkerPool,
   uploads: UploadQueue,
 ): Promise<void> {
-  await eachPiece(next, uploads, (piece) => enlargePiece(next, image, piece, pool, uploads));
+  const underWay = new Map<Piece, Promise<void>>();
+  let first: Promise<void> | undefined;
+  if (!next.blocks) next.clear = async (fragment) => {
+    await first; // whoever has made one piece will make the others
+    await Promise.all([...underWay].map(([piece, done]) => (holds(piece, next, fragment) ? done : undefined)));
+  };
+  await eachPiece(next, uploads, (piece) => {
+    const done = enlargePiece(next, image, piece, pool, uploads).finally(() => underWay.delete(piece));
+    underWay.set(piece, done);
+    first ??= done;
+    return done;
+  });
+}
+function holds({ x0, x1, y0, y1 }: Piece, next: PlaneComposer, fragment: number): boolean {
+  const [x, y] = next.placeOf(fragment);
+  return x >= x0 && x < x1 && y < y1 && y + next.info.fragmentHeightPx > y0;
 }
 
 /** Works on all pieces, a few at once. */

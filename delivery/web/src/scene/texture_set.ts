@@ -76,7 +76,8 @@ export class TextureSet {
     ++this.pending;
     plane.come.add(fragment);
     let shown = false;
-    await plane.ready!.catch(() => undefined);
+    const filled = plane.ready!.catch(() => undefined);
+    await (plane.clear ? plane.clear(fragment).catch(() => filled) : filled);
     const uploads = plane.uploads(levels, ...plane.placeOf(fragment));
     // All at once, so that none of another rung comes between.
     await Promise.all(uploads.map(({ pixels, run }, i) => this.uploads_.enqueue(pixels, () => {
@@ -129,7 +130,7 @@ export class TextureSet {
         else await this.scale_(next, old!);
       } catch (error) {
         // A browser whose workers cannot draw leaves enlarging to the GPU.
-        if (preview || this.uploads_.disposed) throw error;
+        if (preview || next.rungs.some((rung) => rung >= 0) || this.uploads_.disposed) throw error;
         await this.scale_(next, old!);
       }
     if (this.isXy_(next)) this.readTwoChannels_ ??= (await import('./blocks/two_channels')).readTwoChannels;
