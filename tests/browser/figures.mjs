@@ -135,19 +135,20 @@ async function timeToQuality() {
   const [[plainS, plainSsim]] = await lab(page, (i) => window.lab.qualityOverTime(i), glb);
   await lab(page, (i) => window.lab.clear(i), glb);
   console.log(`turtle, 512 px, 2 Mbit/s, 40 ms: plain GLB (Draco, WebP) ${plainS.toFixed(2)} s, SSIM ${plainSsim.toFixed(4)} against the source`);
-  // As the display asks for, and with the scale of a display of twice the pixels, which errs by half a pixel, not by one.
+  // As the display asks for; for who wants it within a quarter of the GLB's time; and with the scale of a display of twice the pixels, which
+  // errs by half a pixel, not by one.
   let finer;
-  for (const twice of [false, true]) {
+  for (const [time, twice] of [[4, false], [2, false], [4, true]]) {
     await link.set(kLink);
-    const id = await load(page, 'sea_turtle', {frames: 60, load: {time: 4, ...(twice ? {scale: finer} : {})}});
+    const id = await load(page, 'sea_turtle', {frames: 60, load: {time, ...(twice ? {scale: finer} : {})}});
     const r = await finished(page, id);
     finer = await lab(page, ([i, px]) => window.lab.loads[i].pkg.manifest.steps.find((s) => 2 * px <= s.upToPx).scale, [id, r.state.displayedPx]);
     const curve = await lab(page, (i) => window.lab.qualityOverTime(i), id);
     console.log(`  S_${r.state.scale} for ${r.state.displayedPx.toFixed(0)} px: ${curve.map(([s, q]) => `${s.toFixed(2)} s ${q.toFixed(3)}`).join(', ')}`);
     const reached = curve.find(([, q]) => q >= 0.95)?.[0] ?? Infinity;
-    const what = `time to SSIM 0.95, turtle${twice ? ', scale for twice the px' : ''}`;
+    const what = `time to SSIM 0.95, turtle, limit of ${time} s${twice ? ', scale for twice the px' : ''}`;
     row(`${what}: seconds`, reached.toFixed(2), '', true);
-    row(`${what}: of the plain GLB's time`, (reached / plainS).toFixed(2), '<= 0.5', reached <= 0.5 * plainS);
+    row(`${what}: of the plain GLB's time`, (reached / plainS).toFixed(2), '<= 0.25', reached <= 0.25 * plainS);
     await lab(page, (i) => window.lab.dispose(i), id);
   }
   await page.close();
@@ -171,7 +172,7 @@ async function deadlines() {
   console.log(`deviations, %: ${off.map((d) => (100 * d).toFixed(1)).join(' ')}`);
   const sorted = off.map(Math.abs).sort((a, b) => a - b);
   const p95 = sorted[Math.min(sorted.length - 1, Math.ceil(0.95 * sorted.length) - 1)];
-  row(`deadline 4 s, +-50 % changes, ${loads} loads: p95 deviation, %`, (100 * p95).toFixed(1), '<= 3', p95 <= 0.03);
+  row(`deadline 4 s, +-50 % changes, ${loads} loads: p95 deviation, %`, (100 * p95).toFixed(1), '<= 1.5', p95 <= 0.015);
   row('deadline: latest, %', (100 * Math.max(...off)).toFixed(1), '<= 5', Math.max(...off) <= 0.05);
   await page.close();
 }
@@ -204,7 +205,7 @@ async function composing() {
   }
   console.log(`compose ${fragments} fragments, ms: ${own.map((v) => v.toFixed(0)).join(' ')}; whole JPEG: ${whole.map((v) => v.toFixed(0)).join(' ')}`);
   const ratio = Math.min(...own) / Math.min(...whole);
-  row(`${fragments} fragments of 4096 px over one whole JPEG`, ratio.toFixed(2), '<= 2', ratio <= 2);
+  row(`${fragments} fragments of 4096 px over one whole JPEG`, ratio.toFixed(2), '<= 0.4', ratio <= 0.4);
   await page.close();
 }
 

@@ -17,8 +17,7 @@ export interface PlaneComposer extends ComposedPlane {
   readonly come: Set<number>;
   /** Every pixel has a colour: fragments may be shown. */
   filled?: boolean;
-  ready?: Promise<void>;
-  /** While a preview is enlarged: resolves when no piece of it may come over this fragment any more; rejects where workers cannot draw. */
+  /** Resolves when the picture that a plane begins with does not come over this fragment any more. */
   clear?(fragment: number): Promise<unknown>;
   /** A texture for the place where a material has `old`: the same sampler, channel and transform. */
   view(old: Texture): Texture;

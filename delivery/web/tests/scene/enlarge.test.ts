@@ -1,5 +1,5 @@
 import { afterEach, beforeEach, expect, it, vi } from 'vitest';
-import { enlarge } from '../../src/scene/enlarge';
+import { type Clear, enlarge } from '../../src/scene/enlarge';
 import type { PlaneComposer } from '../../src/scene/composer';
 import type { UploadQueue } from '../../src/scene/upload_queue';
 import type { WorkerPool } from '../../src/worker/pool';
@@ -12,7 +12,7 @@ interface Asked { x0: number; x1: number; y0: number; y1: number; end(): void; f
 beforeEach(() => vi.stubGlobal('createImageBitmap', async () => ({ close: () => undefined })));
 afterEach(() => void vi.unstubAllGlobals());
 
-function setUp(): { next: PlaneComposer; asked: Asked[]; written: [number, number][]; done: Promise<void> } {
+function setUp(): { next: PlaneComposer; clear: Clear; asked: Asked[]; written: [number, number][]; done: Promise<void> } {
   const asked: Asked[] = [];
   const written: [number, number][] = [];
   const next = {
@@ -24,9 +24,9 @@ function setUp(): { next: PlaneComposer; asked: Asked[]; written: [number, numbe
     enlarge: (piece: Asked) => new Promise((end, fail) => asked.push({ ...piece, end: () => end([]), fail: () => fail(new Error('workers cannot draw')) })),
   } as unknown as WorkerPool;
   const uploads = { disposed: false, enqueue: async (_: number, run: () => void) => run() } as unknown as UploadQueue;
-  const done = enlarge(next, {} as ImageBitmap, pool, uploads);
+  const { clear, done } = enlarge(next, {} as ImageBitmap, pool, uploads);
   done.catch(() => undefined);
-  return { next, asked, written, done };
+  return { next, clear: clear!, asked, written, done };
 }
 const settles = async (promise: Promise<unknown>): Promise<boolean> => {
   let settled = false;
@@ -36,11 +36,11 @@ const settles = async (promise: Promise<unknown>): Promise<boolean> => {
 };
 
 it('a fragment waits for the first piece and for those over it, and is left out of later ones', async () => {
-  const { next, asked, written, done } = setUp();
+  const { next, clear, asked, written, done } = setUp();
   await turns();
   expect(asked.map(({ x0, y0 }) => [x0, y0])).toEqual([0, 1024, 2048, 3072].map((x) => [x, 0]));
   for (const f of [1, 15]) next.come.add(f);
-  const [over, far] = [next.clear!(1), next.clear!(15)];
+  const [over, far] = [clear(1), clear(15)];
   expect(await settles(far)).toBe(false); // nobody knows yet whether workers can draw
   asked[0].end();
   expect([await settles(far), await settles(over)]).toEqual([true, false]);
@@ -55,9 +55,9 @@ it('a fragment waits for the first piece and for those over it, and is left out 
   expect(asked.reduce((px, { x0, x1, y0, y1 }) => px + (x1 - x0) * (y1 - y0), 0)).toBe(14 * side * side + 256 * side);
 });
 it('where workers cannot draw, fragments hear of it', async () => {
-  const { next, asked, done } = setUp();
+  const { clear, asked, done } = setUp();
   await turns();
-  const waiting = rejection(next.clear!(15));
+  const waiting = rejection(clear(15));
   for (const piece of asked) piece.fail();
   expect((await waiting).message).toContain('cannot draw');
   expect((await rejection(done)).message).toContain('cannot draw');
