@@ -45,6 +45,7 @@ export class TexmeshViewer extends HTMLElement {
   private model_?: PageModel;
   private input_?: OrbitInput;
   private revealed_ = false;
+  private served_ = { src: '', bytes: 0 }; // what the server has said of the package
   private rotating_ = 0;
 
   constructor() {
@@ -115,11 +116,17 @@ export class TexmeshViewer extends HTMLElement {
       const image = Object.assign(document.createElement('img'), { src: url, alt: '', loading: 'lazy' });
       slot.replaceChildren(image);
     } else if (!url) slot.replaceChildren();
-    const offer = (bytes: number): void => void (reveal.querySelector('small')!.textContent = offerInWords(startBytes, bytes, linkBytesS()));
     const said = numberOf(this.getAttribute('bytes'), 0, 0, mostBytes);
-    offer(said);
     const { src } = this;
-    if (!said && src && this.waits_) void bytesAt(src).then((bytes) => bytes > 0 && this.src === src && offer(bytes));
+    if (!said && src && this.waits_ && this.served_.src !== src) {
+      const served = (this.served_ = { src, bytes: 0 });
+      void bytesAt(src).then((bytes) => {
+        served.bytes = bytes;
+        if (this.isConnected) this.describe_();
+      });
+    }
+    const allBytes = said || (this.served_.src === src ? this.served_.bytes : 0);
+    reveal.querySelector('small')!.textContent = offerInWords(startBytes, allBytes, linkBytesS());
   }
   private get waits_(): boolean {
     return !this.revealed_ && (this.getAttribute('reveal') === 'manual' || savesData());
