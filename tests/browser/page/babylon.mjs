@@ -3,6 +3,8 @@ const {BABYLON} = window;
 const draco = (file) => `/three/examples/jsm/libs/draco/gltf/${file}`;
 BABYLON.DracoDecoder.DefaultConfiguration = {wasmUrl: draco('draco_wasm_wrapper.js'), wasmBinaryUrl: draco('draco_decoder.wasm'), fallbackUrl: draco('draco_decoder.js'), numWorkers: 1};
 
+BABYLON.SceneLoader.ShowLoadingScreen = false;
+
 const canvas = document.getElementById('canvas');
 const engine = new BABYLON.Engine(canvas, true, {preserveDrawingBuffer: true});
 
@@ -31,7 +33,7 @@ async function levels(url) {
     const size = max.subtract(min);
     if (!camera) {
       const centre = min.add(max).scale(0.5);
-      camera = new BABYLON.FreeCamera('camera', centre.add(new BABYLON.Vector3(0, 0, -2 * size.length())), scene);
+      camera = new BABYLON.FreeCamera('camera', centre.add(new BABYLON.Vector3(0, 0, 2 * size.length())), scene);
       [camera.minZ, camera.maxZ] = [0.1, 10].map((f) => f * size.length());
       camera.setTarget(centre);
     }
@@ -43,11 +45,15 @@ async function levels(url) {
     });
   };
   let looking = Promise.resolve();
-  const observer = BABYLON.SceneLoader.OnPluginActivatedObservable.add((loader) => loader.onExtensionLoadedObservable.add((extension) => {
-    // It goes on to the next level at once: what stands now is looked at before.
-    if (extension.name === 'MSFT_lod') extension.onNodeLODsLoadedObservable.add(() => { looking = looking.then(look); });
-  }));
-  await new Promise((done, fail) => BABYLON.SceneLoader.Append('', url, scene, done, null, (_, text, error) => fail(error ?? new Error(text)), '.glb').onCompleteObservable.add(done));
+  let loader;
+  const observer = BABYLON.SceneLoader.OnPluginActivatedObservable.add((own) => {
+    loader = own;
+    own.onExtensionLoadedObservable.add((extension) => {
+      if (extension.name === 'MSFT_lod') extension.onNodeLODsLoadedObservable.add(() => { looking = looking.then(look); });
+    });
+  });
+  await BABYLON.SceneLoader.AppendAsync('', url, scene, null, '.glb');
+  await loader.whenCompleteAsync();
   BABYLON.SceneLoader.OnPluginActivatedObservable.remove(observer);
   await looking;
   await look();
