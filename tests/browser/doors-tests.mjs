@@ -1,5 +1,7 @@
 // Forms for other viewers, each opened by the program that it is for, and the gallery.
+import {spawn} from 'node:child_process';
 import {createHash} from 'node:crypto';
+import {unfurl} from 'unfurl.js';
 import {check, common, env, fs, here, listen, near, packages, path, pictures, run, serve} from './browser.mjs';
 import {test} from './harness.mjs';
 import {nginxMissing, startNginx} from './nginx.mjs';
@@ -9,6 +11,7 @@ const modules = path.join(here, 'node_modules');
 const doors = path.join(env.work, 'doors');
 const roots = {
   '/out/': doors, '/three/': path.join(modules, 'three'), '/tiles-renderer/': path.join(modules, '3d-tiles-renderer'),
+  '/babylonjs/': path.join(modules, 'babylonjs'), '/babylonjs-loaders/': path.join(modules, 'babylonjs-loaders'),
   '/model-viewer/': path.join(modules, '@google/model-viewer/dist'), '/': path.join(here, 'page'),
 };
 
@@ -45,16 +48,39 @@ async function withPage(address, body, {viewport = kDesktop, dark = false, touch
 
 const shot = (page, name) => page.screenshot({path: path.join(pictures, `${name}.png`)});
 
-/** Tiles of a tileset from the outside in, checked by the words of 3D Tiles 1.1. */
-function chainOf(tileset) {
+/** What 3D Tiles 1.1 lets stand in each object; `extras` may stand in all. */
+const kTileWords = {
+  tileset: ['asset', 'geometricError', 'root'], asset: ['version', 'tilesetVersion'], content: ['uri', 'boundingVolume'], boundingVolume: ['box'],
+  tile: ['boundingVolume', 'geometricError', 'refine', 'transform', 'content', 'children'],
+};
+const inWords = (object, kind) => check(Object.keys(object).every((k) => k === 'extras' || kTileWords[kind].includes(k)), `${kind}: ${Object.keys(object)}`);
+
+/** Tiles of a tileset from the outside in, checked by what 3D Tiles 1.1 says and by what viewers rely on: one box within the other. */
+function chainOf(tileset, folder) {
+  inWords(tileset, 'tileset');
+  inWords(tileset.asset, 'asset');
   check(tileset.asset.version === '1.1' && tileset.geometricError > 0, JSON.stringify(tileset.asset));
   check(tileset.root.refine === 'REPLACE', 'the root says how it refines');
   const tiles = [];
+  let outside;
   for (let tile = tileset.root, above = tileset.geometricError; tile; [above, tile] = [tile.geometricError, tile.children?.[0]]) {
+    inWords(tile, 'tile');
+    inWords(tile.boundingVolume, 'boundingVolume');
+    inWords(tile.content, 'content');
     const {box} = tile.boundingVolume;
     check(box.length === 12 && box.every(Number.isFinite) && box[3] > 0 && box[7] > 0 && box[11] > 0, `box ${box}`);
+    check([4, 5, 6, 8, 9, 10].every((k) => box[k] === 0), `a box that is turned: ${box}`);
+    for (const k of [0, 1, 2]) {
+      const half = (b) => b[3 + 4 * k];
+      check(!outside || Math.abs(box[k] - outside[k]) + half(box) <= half(outside) * (1 + 1e-9), `a tile reaches out of its parent along ${'xyz'[k]}`);
+    }
+    outside = box;
+    const m = tile.transform;
+    check(!m || (m.length === 16 && m.every(Number.isFinite) && [m[3], m[7], m[11], m[15]].join() === '0,0,0,1'), `transform ${m}`);
     check(Number.isFinite(tile.geometricError) && tile.geometricError >= 0 && tile.geometricError <= above, `error ${tile.geometricError} in ${above}`);
     check((tile.children?.length ?? 1) === 1 && /^level-\d\.glb$/.test(tile.content.uri), tile.content.uri);
+    const glb = fs.readFileSync(path.join(folder, tile.content.uri));
+    check(glb.toString('latin1', 0, 4) === 'glTF' && glb.readUInt32LE(4) === 2 && glb.readUInt32LE(8) === glb.length, `${tile.content.uri} is no GLB`);
     tiles.push(tile);
   }
   check(tiles.at(-1).geometricError === 0, 'the innermost tile has no error');
@@ -64,7 +90,7 @@ function chainOf(tileset) {
 for (const name of ['large', 'colours']) {
   test(`doors: a tileset in 3d-tiles-renderer (${name})`, async () => {
     const folder = exported(name, '3dtiles');
-    const tiles = chainOf(JSON.parse(fs.readFileSync(path.join(doors, folder, 'tileset.json'))));
+    const tiles = chainOf(JSON.parse(fs.readFileSync(path.join(doors, folder, 'tileset.json'))), path.join(doors, folder));
     check(tiles.length >= 2, `${tiles.length} tiles`);
     const seen = [];
     await withPage('tiles.html', async (page, base) => {
@@ -105,8 +131,43 @@ test('doors: levels of detail in three.js', async () => {
   });
 }, {seconds: 90});
 
+test('doors: levels of detail in Babylon.js, the coarsest first', async () => {
+  const folder = exported('maps', 'gltf-lod');
+  const {scales} = JSON.parse(run(env.texmesh, 'dump', path.join(packages, 'maps.texmesh'), 'scales', '--json'));
+  await withPage('babylon.html', async (page, base) => {
+    await page.waitForFunction('window.ready');
+    const levels = await page.evaluate((u) => window.door.levels(u), `${base}/out/${folder}/model.glb`);
+    const [first, last] = [levels[0], levels.at(-1)];
+    check(levels.length > 2 && last.triangles === scales[0].triangles, `${levels.map((l) => l.triangles)} triangles, S_0 has ${scales[0].triangles}`);
+    check(levels.every((l, k) => k === 0 || l.triangles >= levels[k - 1].triangles) && first.triangles < last.triangles, levels.map((l) => l.triangles).join());
+    check(levels.every((l) => l.textures === last.textures) && last.textures > 1, `${levels.map((l) => l.textures)} textures`);
+    check(levels.every((l) => l.covered > 10000 && l.covered < 0.9 * 512 ** 2), `${levels.map((l) => l.covered)} px are covered`);
+    for (const l of levels) for (const k of [0, 1, 2]) near(l.size[k], last.size[k], 0.1 * Math.hypot(...last.size), `side ${k}`);
+    await shot(page, 'lods-babylon');
+  });
+}, {seconds: 120});
+
 /** What <model-viewer> says of itself once it shows something. */
 const modelShown = (page) => page.waitForFunction(() => document.querySelector('model-viewer').loaded, null, {timeout: 45000});
+
+test('doors: 220 materials, each with a texture, in all that read GLBs', async () => {
+  fs.copyFileSync(path.join(env.source, 'tests/golden/v2.0-planes.texmesh'), path.join(packages, 'planes.texmesh'));
+  const [tileset, lods] = ['3dtiles', 'gltf-lod'].map((target) => exported('planes', target));
+  const single = exported('planes', 'model-viewer', '--plain', '--script', '../../model-viewer/model-viewer.min.js');
+  await withPage('tiles.html', async (page, base) => {
+    await page.waitForFunction('window.ready');
+    const one = await page.evaluate((u) => window.door.glb(u), `${base}/out/${single}/model.glb`);
+    check(one.images === 220 && one.covered > 10000, JSON.stringify(one));
+    const tiles = await page.evaluate(([u, p]) => window.door.tiles(u, p), [`${base}/out/${tileset}/tileset.json`, 4000]);
+    check(tiles.seen.join() === 'level-0.glb' && tiles.covered > 10000, JSON.stringify(tiles));
+  }, {allowed: /tiles versions at 1\.1 or higher have limited support/});
+  await withPage('babylon.html', async (page, base) => {
+    await page.waitForFunction('window.ready');
+    const levels = await page.evaluate((u) => window.door.levels(u), `${base}/out/${lods}/model.glb`);
+    check(levels.at(-1).textures === 220 && levels.at(-1).covered > 1000, JSON.stringify(levels));
+  });
+  await withPage(`out/${single}/index.html`, (page) => modelShown(page));
+}, {seconds: 150});
 
 for (const [name, how, options] of [
   ['maps', 'plain', {}], ['colours', 'plain', {viewport: kPhone, touch: true}], ['maps', 'draco', {dark: true}],
@@ -156,6 +217,9 @@ test('doors: an oEmbed answer, and its frame on a page of others', async () => {
     check(href === `${server.url}/out/frame/oembed.json`, href);
     const answer = await (await fetch(href)).json();
     check(answer.type === 'rich' && answer.version === '1.0' && answer.width === 700 && answer.html.includes('<iframe'), JSON.stringify(answer));
+    // A program that makes previews of links finds the same.
+    const {oEmbed} = await unfurl(`${server.url}/out/frame/index.html`);
+    check(oEmbed?.type === 'rich' && oEmbed.html === answer.html.replaceAll('&amp;', '&') && oEmbed.width === 700 && oEmbed.thumbnails[0].url === answer.thumbnail_url, JSON.stringify(oEmbed));
     const thumbnail = await fetch(answer.thumbnail_url);
     check(thumbnail.ok && thumbnail.headers.get('content-type') === 'image/jpeg', `${answer.thumbnail_url}: ${thumbnail.status}`);
     fs.writeFileSync(path.join(doors, 'other.html'), `<!doctype html><html lang="en"><title>others</title><link rel="icon" href="data:,"><p>A page of others.</p>${answer.html}`);
@@ -271,6 +335,26 @@ test('gallery: behind nginx', async ({skip}) => {
       check(/"GET \/packages\/maps\.texmesh[^"]*" 206/.test(nginx.log()), 'no ranges');
     }, {origin: nginx.url});
   } finally { nginx.close(); }
+}, {seconds: 90});
+
+test('gallery: from a server of files without ranges (python3 -m http.server)', async () => {
+  const python = spawn('python3', ['-u', '-m', 'http.server', '0', '--bind', '127.0.0.1', '--directory', gallery()], {stdio: ['ignore', 'pipe', 'ignore']});
+  try {
+    const port = await new Promise((done, fail) => {
+      python.on('error', fail);
+      let said = '';
+      python.stdout.on('data', (text) => {
+        const [, found] = /port (\d+)/.exec((said += text)) ?? [];
+        if (found) done(found);
+      });
+    });
+    await withPage('index.html', async (page) => {
+      await page.getByRole('link', {name: 'maps'}).click();
+      await page.locator('#show').click();
+      const frame = await (await page.waitForSelector('iframe')).contentFrame();
+      await frame.waitForFunction(() => window.texmeshViewer?.session.live.phase === 'done', null, {timeout: 60000});
+    }, {origin: `http://127.0.0.1:${port}`, allowed: /404/}); // a tree beside the package is asked for
+  } finally { python.kill(); }
 }, {seconds: 90});
 
 test('gallery: from files the list is there', async () => {

@@ -25,6 +25,11 @@ const kPackages = {
   proxied: {scan: ['--triangles', '30000', '--texture', '1024', '--charts', '30'], options: ['--rungs', '20,50,85'], proxies: [[300, 64], [2000, 128]]},
   // The thesis as printed.
   printed: {scan: ['--triangles', '4000', '--texture', '1024', '--charts', '12'], options: ['--profile', 'thesis', '--rungs', '10,30,60,90']},
+  // Whose it is, in words that a page must not take for markup.
+  told: {
+    scan: ['--triangles', '1500', '--texture', '256', '--charts', '6'], options: ['--rungs', '20,85'],
+    meta: {attribution: '<img src=x onerror=alert(1)> Museum of Casts', licence: 'CC-BY-4.0'},
+  },
   // No texture at all: colours of vertices.
   colours: {scan: ['--triangles', '1500', '--texture', '0', '--charts', '4'], ending: 'ply', options: []},
 };
@@ -61,7 +66,9 @@ export function makePackages() {
     const scan = path.join(packages, `${name}.${p.ending ?? 'glb'}`);
     if (p.sheet) fs.writeFileSync(scan, sheetGlb(p.sheet));
     else run(env.makeScan, '-o', scan, ...p.scan);
-    run(env.texmesh, 'compile', scan, '-o', file, ...kQuick, ...p.options);
+    const meta = p.meta ? ['--meta', path.join(packages, `${name}.json`)] : [];
+    if (p.meta) fs.writeFileSync(meta[1], JSON.stringify(p.meta));
+    run(env.texmesh, 'compile', scan, '-o', file, ...kQuick, ...p.options, ...meta);
     if (p.proxies) addProxies(file, scan, p.proxies);
     if (!p.sheet) fs.rmSync(scan);
     run(env.texmesh, 'unpack', file, '-o', path.join(packages, name), '--force');

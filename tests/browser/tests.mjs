@@ -12,6 +12,7 @@ import './application-tests.mjs';
 import './block-tests.mjs';
 import './display-tests.mjs';
 import './doors-tests.mjs';
+import './element-tests.mjs';
 import './experiment-tests.mjs';
 import './limits-tests.mjs';
 import './materials-tests.mjs';

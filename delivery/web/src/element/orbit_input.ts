@@ -13,18 +13,19 @@ export class OrbitInput {
   private readonly pointers_ = new Map<number, { x: number; y: number }>();
   private readonly ended_ = new AbortController();
 
-  /** `moved` hears of each new orbit. The wheel zooms only while the canvas has the focus: a page that scrolls by goes on scrolling. */
+  /** `moved` hears of each new orbit; `zooms`: the distance changes, too. The wheel zooms only while the canvas has the focus: a page that scrolls by goes on scrolling. */
   constructor(
     private readonly canvas_: HTMLElement,
     private home_: Orbit,
     private readonly moved_: () => void,
+    private readonly zooms_ = true,
   ) {
     this.orbit = { ...home_ };
     const { signal } = this.ended_;
     canvas_.addEventListener('pointerdown', (e) => this.down_(e), { signal });
     canvas_.addEventListener('pointermove', (e) => this.move_(e), { signal });
     for (const name of ['pointerup', 'pointercancel'] as const) canvas_.addEventListener(name, (e) => this.pointers_.delete(e.pointerId), { signal });
-    canvas_.addEventListener('wheel', (e) => this.wheel_(e), { signal, passive: false });
+    if (zooms_) canvas_.addEventListener('wheel', (e) => this.wheel_(e), { signal, passive: false });
     canvas_.addEventListener('keydown', (e) => this.key_(e), { signal });
   }
   /** Whether the user holds the object now. */
@@ -41,7 +42,7 @@ export class OrbitInput {
     this.set_({ thetaDegrees: (thetaDegrees + right) % 360, phiDegrees: Math.min(179, Math.max(1, phiDegrees - up)), distance });
   }
   zoom(factor: number): void {
-    this.set_({ ...this.orbit, distance: Math.min(distances.most, Math.max(distances.least, this.orbit.distance * factor)) });
+    if (this.zooms_) this.set_({ ...this.orbit, distance: Math.min(distances.most, Math.max(distances.least, this.orbit.distance * factor)) });
   }
   dispose(): void {
     this.ended_.abort();

@@ -6,7 +6,7 @@ export const style = `
 canvas, .poster { position: absolute; inset: 0; width: 100%; height: 100%; }
 canvas { outline-offset: -3px; cursor: grab; touch-action: pan-y; }
 canvas:active { cursor: grabbing; }
-:host(:not([camera-controls])) canvas { cursor: default; }
+:host(:not([camera-controls])) canvas { cursor: default; touch-action: auto; }
 :focus-visible { outline: 3px solid var(--texmesh-accent); }
 .poster { pointer-events: none; }
 .poster.fades { transition: opacity .15s; }
@@ -25,5 +25,6 @@ button { cursor: pointer; min-height: 44px; }
 .rights:empty { display: none; }
 .rights a { color: inherit; }
 .help { position: absolute; width: 1px; height: 1px; overflow: hidden; clip-path: inset(50%); }
+:host([disable-zoom]) .help span { display: none; }
 @media (prefers-reduced-motion: reduce) { .poster.fades { transition: none; } }
 `;

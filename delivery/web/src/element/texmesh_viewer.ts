@@ -2,9 +2,10 @@ import { startBytes } from '../format/layout';
 import type { PageModel } from '../page/page_model';
 import type { ShowablePackage } from '../page/page_model';
 import { frame } from '../page/framing';
+import { bytesAt, linkBytesS, mostBytes, savesData } from './link';
 import { OrbitInput } from './orbit_input';
 import { style } from './style';
-import { numberOf, offerInWords, orbitOf } from './wording';
+import { degreesOf, numberOf, offerInWords, orbitOf } from './wording';
 
 /** The page that all elements share, as far as an element uses it. */
 export interface ElementPage {
@@ -20,38 +21,31 @@ export interface ElementHost {
 
 /** Degrees per second. */
 const rotationDegreesS = 12;
-const bytesPerMegabit = 125e3;
 const noteMs = 8000;
 /** Percent by which the bar grows. */
 const barStep = 20;
 
 const template = `<style>${style}</style>
-<canvas part="canvas" tabindex="0" role="img" aria-describedby="help"></canvas>
+<canvas part="canvas" role="img"></canvas>
 <div class="poster" part="poster"><slot name="poster"></slot></div>
-<div class="bar" part="progress" role="progressbar" aria-label="loading" aria-valuemin="0" aria-valuemax="100" hidden></div>
+<slot name="progress-bar"><div class="bar" part="progress" role="progressbar" aria-label="loading" aria-valuemin="0" aria-valuemax="100" hidden></div></slot>
 <button class="box" part="reveal" hidden><span>Show in 3D</span><small></small></button>
 <div class="box" part="error" role="alert" hidden></div>
 <div class="note" part="note" role="status" hidden></div>
 <div class="rights" part="rights"></div>
-<p class="help" id="help">Drag or use the arrow keys to turn the object, plus and minus to come nearer or go away, Home to see the whole.</p>
+<p class="help" id="help">Drag or use the arrow keys to turn the object<span>, plus and minus to come nearer or go away</span>, Home to see it as at first.</p>
 <slot></slot>`;
-
-interface Connection {
-  saveData?: boolean;
-  /** Mbit/s */
-  downlink?: number;
-}
-const connection = (): Connection => (navigator as { connection?: Connection }).connection ?? {};
 
 /** <texmesh-viewer>; `host` is to be set before the element is defined. */
 export class TexmeshViewer extends HTMLElement {
   static host: ElementHost;
-  static readonly observedAttributes = ['src', 'alt', 'poster', 'camera-controls', 'camera-orbit', 'auto-rotate', 'reveal', 'bytes', 'touch-action'];
+  static readonly observedAttributes = ['src', 'alt', 'poster', 'camera-controls', 'camera-orbit', 'auto-rotate', 'rotation-per-second', 'disable-zoom', 'reveal', 'bytes', 'touch-action'];
   private readonly root_ = this.attachShadow({ mode: 'open' });
   private readonly parts_: Record<'canvas' | 'poster' | 'bar' | 'reveal' | 'error' | 'note' | 'rights', HTMLElement>;
   private model_?: PageModel;
   private input_?: OrbitInput;
   private revealed_ = false;
+  private served_ = { src: '', bytes: 0 }; // what the server has said of the package
   private rotating_ = 0;
 
   constructor() {
@@ -102,8 +96,8 @@ export class TexmeshViewer extends HTMLElement {
       this.start_();
     } else if (name === 'reveal') this.start_();
     else if (name === 'camera-orbit') this.input_?.reset(orbitOf(now));
-    else if (name === 'auto-rotate') this.rotate_();
-    else if (name === 'camera-controls') this.controls_();
+    else if (/rotat/.test(name)) this.rotate_();
+    else if (name === 'camera-controls' || name === 'disable-zoom') this.controls_();
   }
 
   // ---- what stands there
@@ -112,18 +106,30 @@ export class TexmeshViewer extends HTMLElement {
     const { canvas, poster, reveal } = this.parts_;
     canvas.setAttribute('aria-label', this.getAttribute('alt') ?? '');
     canvas.style.touchAction = this.getAttribute('touch-action') ?? '';
+    // Who can do nothing with a picture is not led there by keys.
+    for (const [attribute, value] of [['tabindex', '0'], ['aria-describedby', 'help']])
+      if (this.hasAttribute('camera-controls')) canvas.setAttribute(attribute, value);
+      else canvas.removeAttribute(attribute);
     const url = this.getAttribute('poster');
     const slot = poster.firstElementChild!;
     if (url && !(slot.firstElementChild as HTMLImageElement | null)?.src.endsWith(url)) {
       const image = Object.assign(document.createElement('img'), { src: url, alt: '', loading: 'lazy' });
       slot.replaceChildren(image);
     } else if (!url) slot.replaceChildren();
-    const allBytes = numberOf(this.getAttribute('bytes'), 0, 0, 1e12);
-    const linkBytesS = (connection().downlink ?? 0) * bytesPerMegabit;
-    reveal.querySelector('small')!.textContent = offerInWords(startBytes, allBytes, linkBytesS);
+    const said = numberOf(this.getAttribute('bytes'), 0, 0, mostBytes);
+    const { src } = this;
+    if (!said && src && this.waits_ && this.served_.src !== src) {
+      const served = (this.served_ = { src, bytes: 0 });
+      void bytesAt(src).then((bytes) => {
+        served.bytes = bytes;
+        if (this.isConnected) this.describe_();
+      });
+    }
+    const allBytes = said || (this.served_.src === src ? this.served_.bytes : 0);
+    reveal.querySelector('small')!.textContent = offerInWords(startBytes, allBytes, linkBytesS());
   }
   private get waits_(): boolean {
-    return !this.revealed_ && (this.getAttribute('reveal') === 'manual' || connection().saveData === true);
+    return !this.revealed_ && (this.getAttribute('reveal') === 'manual' || savesData());
   }
   private start_(): void {
     const { reveal, canvas } = this.parts_;
@@ -220,7 +226,9 @@ export class TexmeshViewer extends HTMLElement {
     this.input_ = undefined;
     const orbit = orbitOf(this.getAttribute('camera-orbit'));
     model.frame(orbit);
-    if (this.hasAttribute('camera-controls')) this.input_ = new OrbitInput(canvas, orbit, () => this.look_(this.input_!.orbit));
+    if (this.hasAttribute('camera-controls'))
+      this.input_ = new OrbitInput(canvas, orbit, () => this.look_(this.input_!.orbit), !this.hasAttribute('disable-zoom'));
+    if (this.rotating_) this.rotate_(); // by the new input
   }
   private look_(orbit: Parameters<typeof frame>[3]): void {
     const { model_: model } = this;
@@ -232,14 +240,15 @@ export class TexmeshViewer extends HTMLElement {
   /** Turns the object while nobody holds it; not for people who want no motion. */
   private rotate_(): void {
     cancelAnimationFrame(this.rotating_);
-    if (!this.hasAttribute('auto-rotate') || matchMedia('(prefers-reduced-motion: reduce)').matches) return;
+    if (!this.model_ || !this.hasAttribute('auto-rotate') || matchMedia('(prefers-reduced-motion: reduce)').matches) return;
+    const degreesS = degreesOf(this.getAttribute('rotation-per-second'), rotationDegreesS);
     const own = this.input_ ?? { orbit: orbitOf(this.getAttribute('camera-orbit')), isHeld: false };
     let before = performance.now();
     const step = (now: number): void => {
       const { model_: model } = this;
       if (!model || model.phase === 'removed') return;
       if (!own.isHeld && model.place.visible) {
-        own.orbit = { ...own.orbit, thetaDegrees: (own.orbit.thetaDegrees + (rotationDegreesS * Math.min(100, now - before)) / 1000) % 360 };
+        own.orbit = { ...own.orbit, thetaDegrees: (own.orbit.thetaDegrees + (degreesS * Math.min(100, now - before)) / 1000) % 360 };
         this.look_(own.orbit);
       }
       before = now;

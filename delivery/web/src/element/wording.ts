@@ -19,17 +19,18 @@ export function offerInWords(firstBytes: number, allBytes: number, linkBytesS: n
   return `${bytesInWords(firstBytes)}${wait}${more}`;
 }
 
+/** An angle, "30deg" or ".5rad", in degrees; `otherwise` where it cannot be read. */
+export function degreesOf(said: string | null | undefined, otherwise: number): number {
+  const found = /^(-?(?:\d+\.?\d*|\.\d+))(deg|rad)$/.exec(said?.trim() ?? '');
+  return found ? Number(found[1]) * (found[2] === 'rad' ? 180 / Math.PI : 1) : otherwise;
+}
 /** "28deg 72deg 105%" or parts of it, as model-viewer writes them: round the vertical axis, from the axis, distance. What cannot be read is the default's. */
 export function orbitOf(text: string | null): Orbit {
   const [theta, phi, distance] = (text ?? '').trim().split(/\s+/).filter(Boolean);
-  const degrees = (said: string | undefined, otherwise: number): number => {
-    const found = /^(-?\d+(?:\.\d+)?)(deg|rad)$/.exec(said ?? '');
-    return found ? Number(found[1]) * (found[2] === 'rad' ? 180 / Math.PI : 1) : otherwise;
-  };
   const share = /^(\d+(?:\.\d+)?)%$/.exec(distance ?? '');
   return {
-    thetaDegrees: degrees(theta, defaultOrbit.thetaDegrees),
-    phiDegrees: Math.min(179, Math.max(1, degrees(phi, defaultOrbit.phiDegrees))),
+    thetaDegrees: degreesOf(theta, defaultOrbit.thetaDegrees),
+    phiDegrees: Math.min(179, Math.max(1, degreesOf(phi, defaultOrbit.phiDegrees))),
     distance: share ? Math.min(20, Math.max(0.05, Number(share[1]) / 100)) : defaultOrbit.distance,
   };
 }

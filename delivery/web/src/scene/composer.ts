@@ -17,7 +17,8 @@ export interface PlaneComposer extends ComposedPlane {
   readonly come: Set<number>;
   /** Every pixel has a colour: fragments may be shown. */
   filled?: boolean;
-  ready?: Promise<void>;
+  /** Resolves when the picture that a plane begins with does not come over this fragment any more. */
+  clear?(fragment: number): Promise<unknown>;
   /** A texture for the place where a material has `old`: the same sampler, channel and transform. */
   view(old: Texture): Texture;
   /** Fills the whole with another texture, scaled bilinearly; blocks are filled by blocks/refill.ts. */

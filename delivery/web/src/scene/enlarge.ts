@@ -15,19 +15,32 @@ export interface Piece {
   x1: number;
   y0: number;
   y1: number;
+  /** Fragments in it, [from, to). */
+  from: number;
+  to: number;
 }
+
+/** Resolves when no piece may come over this fragment any more; rejects where workers cannot draw. */
+export type Clear = (fragment: number) => Promise<unknown>;
 
 /**
  * Enlarges a preview off the main thread, piece by piece: a processor that draws takes seconds for a large texture. Fragments that have
  * come meanwhile need no preview.
  */
-export async function enlarge(
-  next: PlaneComposer,
-  image: ImageBitmap | HTMLImageElement,
-  pool: WorkerPool,
-  uploads: UploadQueue,
-): Promise<void> {
-  await eachPiece(next, uploads, (piece) => enlargePiece(next, image, piece, pool, uploads));
+export function enlarge(next: PlaneComposer, image: ImageBitmap | HTMLImageElement, pool: WorkerPool, uploads: UploadQueue): { clear?: Clear; done: Promise<void> } {
+  const underWay = new Map<Piece, Promise<void>>();
+  let first: Promise<void> | undefined;
+  const done = eachPiece(next, uploads, (piece) => {
+    const made = enlargePiece(next, image, piece, pool, uploads).finally(() => underWay.delete(piece));
+    underWay.set(piece, made);
+    first ??= made;
+    return made;
+  });
+  const clear: Clear = async (fragment) => {
+    await first; // whoever has made one piece will make the others
+    await Promise.all([...underWay].map(([{ from, to }, made]) => fragment >= from && fragment < to && made));
+  };
+  return next.blocks ? { done } : { clear, done };
 }
 
 /** Works on all pieces, a few at once. */
@@ -57,7 +70,7 @@ function* pieces(next: PlaneComposer): Generator<Piece> {
         if (!lacks(from)) continue;
         while (to - from < most && lacks(to)) ++to;
         const [x1, y1] = [Math.min(to * width, next.widthPx), Math.min(y + rise, (row + 1) * height, next.heightPx)];
-        yield { x0: from * width, x1, y0: y, y1 };
+        yield { x0: from * width, x1, y0: y, y1, from: row * columns + from, to: row * columns + to };
       }
 }
 

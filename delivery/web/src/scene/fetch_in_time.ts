@@ -13,7 +13,7 @@ import type { Wish } from './transfers';
 /** Decoding and uploading take so long after the last byte: 4 ms, or 11 on a machine without a GPU, were measured. */
 export const composeS = 0.015;
 /** Fragments that are later than this share of the limit are given up. */
-const mostLate = 0.02;
+const mostLate = 0.01;
 /** A rest of less than this share of the limit, a round trip taken off, is not worth another request. */
 const leastRest = 0.004;
 /** Share of the bytes promised by the throughput that a request may count on. */

@@ -6,6 +6,7 @@ import type { WorkerPool } from '../worker/pool';
 import type { Levels } from '../worker/protocol';
 import type { Compression } from './blocks/compression';
 import { type PlaneComposer, planeComposer } from './composer';
+import type { Clear } from './enlarge';
 import { isSoftware } from './gpu';
 import { type MaterialSet, type Slot, disposeTexture, texturesIn } from './scale_parts';
 import { UploadQueue } from './upload_queue';
@@ -49,7 +50,11 @@ export class TextureSet {
     next.view(shown ?? old[0] ?? new Texture()); // a finer scale may bring the material that wants it
     planes.set(base, next);
     try {
-      await (next.ready = this.fill_(next, before, shown, preview));
+      let enlarges!: (clear?: Clear) => void;
+      const enlarged = new Promise<Clear | undefined>((done) => (enlarges = done));
+      const ready = this.fill_(next, enlarges, before, shown, preview).finally(enlarges);
+      next.clear = (fragment) => enlarged.then((clear) => clear?.(fragment) ?? ready).catch(() => ready).catch(() => undefined);
+      await ready;
     } catch (error) {
       if (before) planes.set(base, before);
       else planes.delete(base);
@@ -76,7 +81,7 @@ export class TextureSet {
     ++this.pending;
     plane.come.add(fragment);
     let shown = false;
-    await plane.ready!.catch(() => undefined);
+    await plane.clear!(fragment);
     const uploads = plane.uploads(levels, ...plane.placeOf(fragment));
     // All at once, so that none of another rung comes between.
     await Promise.all(uploads.map(({ pixels, run }, i) => this.uploads_.enqueue(pixels, () => {
@@ -119,17 +124,17 @@ export class TextureSet {
       if (!asBlocks && this.isXy_(plane)) this.readTwoChannels_?.(slot.material, slot.name, 'jpeg-xy');
     }
   }
-  private async fill_(next: PlaneComposer, before?: PlaneComposer, old?: Texture, preview?: ImageBitmap): Promise<void> {
+  private async fill_(next: PlaneComposer, enlarges: (clear?: Clear) => void, before?: PlaneComposer, old?: Texture, preview?: ImageBitmap): Promise<void> {
     const image = preview ?? (old?.image as ImageBitmap | null | undefined);
     if (before?.filled) await this.scale_(next, before.textures[0], before.blocks?.format);
     else if (image?.width)
       try {
         // Coverage alone has a preview of its own: the colours are shown already.
-        if (preview || next.blocks || (await this.software_)) await this.enlarge_(next, image);
+        if (preview || next.blocks || (await this.software_)) await this.enlarge_(next, image, enlarges);
         else await this.scale_(next, old!);
       } catch (error) {
         // A browser whose workers cannot draw leaves enlarging to the GPU.
-        if (preview || this.uploads_.disposed) throw error;
+        if (preview || next.rungs.some((rung) => rung >= 0) || this.uploads_.disposed) throw error;
         await this.scale_(next, old!);
       }
     if (this.isXy_(next)) this.readTwoChannels_ ??= (await import('./blocks/two_channels')).readTwoChannels;
@@ -147,8 +152,10 @@ export class TextureSet {
   private async refill_(next: PlaneComposer, from: Texture, format?: BlockFormat): Promise<void> {
     await this.blocksOf_(next.plane)?.[0].refill(next, from, format, this.renderer_, this.pool_, this.uploads_);
   }
-  private async enlarge_(next: PlaneComposer, image: ImageBitmap): Promise<void> {
-    await (await import('./enlarge')).enlarge(next, image, this.pool_, this.uploads_);
+  private async enlarge_(next: PlaneComposer, image: ImageBitmap, enlarges: (clear?: Clear) => void): Promise<void> {
+    const { clear, done } = (await import('./enlarge')).enlarge(next, image, this.pool_, this.uploads_);
+    enlarges(clear);
+    await done;
   }
 }
 

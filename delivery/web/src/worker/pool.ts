@@ -22,7 +22,9 @@ let queue: Job[] = [];
 let running = 0;
 function postWaitingJobs(): void {
   while (queue.length > 0 && running < mostAtOnce) {
-    const job = queue.shift()!;
+    // A preview is enlarged when nothing better waits: what comes meanwhile needs none.
+    const next = Math.max(0, queue.findIndex(({ request }) => request.op !== 'enlarge'));
+    const [job] = queue.splice(next, 1);
     job.pool.post(job);
   }
 }

@@ -26,6 +26,27 @@ it('pictures that nobody waits for are closed, and streams are told of their end
   expect(heard).toContain('split-close');
 });
 
+it('previews are enlarged when no fragment waits', async () => {
+  const begun: string[] = [];
+  const letGo: (() => void)[] = [];
+  const pool = new WorkerPool({
+    decode: async ({ op }) => {
+      begun.push(op);
+      await new Promise<void>((go) => letGo.push(go));
+      return [[], []];
+    },
+  });
+  const none = new Uint8Array(0);
+  const piece = { picture: {} as ImageBitmap, width: 8, height: 8, x0: 0, x1: 8, y0: 0, y1: 8, levels: 1 };
+  const all = Array.from({ length: 12 }, () => pool.enlarge(piece) as Promise<unknown>);
+  for (let i = 0; i < 4; ++i) all.push(pool.decode({ codec: 'jpeg', tables: none, streams: [none], digests: [], complete: true, levels: 1, most: [9, 9] }));
+  await turns(5);
+  for (; letGo.length > 0; await turns(5)) letGo.shift()!();
+  await Promise.all(all);
+  expect(begun.slice(8, 12)).toEqual(Array(4).fill('decode')); // eight were under way
+  pool.dispose();
+});
+
 it('a worker that breaks is replaced once, then there are none', async () => {
   const started: Broken[] = [];
   class Broken {

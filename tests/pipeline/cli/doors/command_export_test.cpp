@@ -145,6 +145,30 @@ TEST_F(ExportCommand, WhatATargetCannotHoldIsExitCode1WithTheReason) {
   EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
 }
 
+TEST_F(ExportCommand, Holds220MaterialsAndColoursWithoutAnyTexture) {
+  const std::string planes = TEXMESH_SOURCE_DIR "/tests/golden/v2.0-planes.texmesh";
+  write_text(folder_ / "c.obj",
+             "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 1 1 0 0 0 1\nv 0 1 0 1 1 0\nf 1 2 3\nf 1 3 4\n");
+  const CommandResult compiled =
+      run_command({TEXMESH_BINARY, "compile", folder_ / "c.obj", "-o", folder_ / "c.texmesh", "--no-cache",
+                   "--quiet", "--quality.views", "1", "--quality.largest_px", "128"});
+  ASSERT_EQ(compiled.exit_code, 0) << compiled.errors;
+  for (const std::string target : {"3dtiles", "gltf-lod", "model-viewer"}) {
+    const std::string glb = "out/" + std::string(target == "3dtiles" ? "level-0.glb" : "model.glb");
+    const CommandResult many = run(planes, target);
+    ASSERT_EQ(many.exit_code, 0) << target << many.errors;
+    EXPECT_EQ(facts_of(read_text(folder_ / glb)).image_names.size(), 220u) << target;
+    const CommandResult none = run(folder_ / "c.texmesh", target);
+    if (none.exit_code == 1) {  // two triangles have no coarser scale
+      EXPECT_EQ(target, "gltf-lod");
+      EXPECT_NE(none.errors.find("levels of detail"), std::string::npos) << none.errors;
+      continue;
+    }
+    ASSERT_EQ(none.exit_code, 0) << target << none.errors;
+    EXPECT_EQ(facts_of(read_text(folder_ / glb)).image_names.size(), 0u);
+  }
+}
+
 TEST_F(ExportCommand, HostileTextStaysText) {
   PackageParts parts = make_package_parts();
   parts.manifest.title = "\"><script>alert(1)</script>{{script}}";
