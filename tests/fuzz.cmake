@@ -23,7 +23,7 @@ endforeach()
 list(FILTER sources EXCLUDE REGEX "/stages/image/oiio/")
 # -O1: half the time to build, and two thirds of the runs per second. Sections: what only other targets or stages call is not linked, and
 # its counters with it, with lld alone.
-add_library(texmesh_fuzz OBJECT EXCLUDE_FROM_ALL ${sources})
+add_library(texmesh_fuzz STATIC EXCLUDE_FROM_ALL ${sources})
 target_compile_definitions(texmesh_fuzz PRIVATE TEXMESH_VERSION="${PROJECT_VERSION}")
 target_compile_options(texmesh_fuzz PRIVATE -fPIE -O1 -ffunction-sections -fdata-sections)
 set_target_properties(texmesh_fuzz PROPERTIES POSITION_INDEPENDENT_CODE OFF)
