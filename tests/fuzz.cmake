@@ -38,7 +38,7 @@ add_library(texmesh_fuzz_mutator SHARED EXCLUDE_FROM_ALL fuzz/mutate.cpp fuzz/mu
   ${PROJECT_SOURCE_DIR}/format/documents/index.cpp ${PROJECT_SOURCE_DIR}/stages/gltf/glb_container.cpp)
 target_include_directories(texmesh_fuzz_mutator PRIVATE ${PROJECT_SOURCE_DIR})
 target_compile_options(texmesh_fuzz_mutator PRIVATE -fno-sanitize=all -O2)
-target_link_options(texmesh_fuzz_mutator PRIVATE -fno-sanitize=all LINKER:-Bsymbolic LINKER:--version-script=${CMAKE_CURRENT_SOURCE_DIR}/fuzz/mutator_module.map)
+target_link_options(texmesh_fuzz_mutator PRIVATE -fno-sanitize=all -static-libstdc++ LINKER:-Bsymbolic LINKER:--version-script=${CMAKE_CURRENT_SOURCE_DIR}/fuzz/mutator_module.map)
 target_link_libraries(texmesh_fuzz_mutator PRIVATE OpenSSL::Crypto ZLIB::ZLIB nlohmann_json::nlohmann_json fmt::fmt)
 add_custom_target(texmesh_fuzzers)
 foreach(file ${targets})

@@ -6,6 +6,7 @@
 #include <sanitizer/allocator_interface.h>
 #include <sys/time.h>
 
+#include <algorithm>
 #include <atomic>
 #include <csignal>
 #include <cstdlib>
@@ -123,10 +124,18 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
 extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size, std::size_t most,
                                                unsigned seed) {
   static texmesh::Bytes mutated;
+  const Target& target = chosen_target();
+  if (target.shape == Shape::kBytes) {
+    const std::size_t changed = LLVMFuzzerMutate(data, size, most);
+    if (!target.mend || seed % 8 == 0) return changed;
+    mutated = target.mend({data, changed});
+    std::memcpy(data, mutated.data(), std::min(mutated.size(), most));
+    return std::min(mutated.size(), most);
+  }
   const auto take = [](const std::uint8_t* bytes, std::size_t count) {
     mutated.assign(bytes, bytes + count);
   };
-  texmesh_fuzz_mutate(&chosen_target(), data, size, seed, LLVMFuzzerMutate, take);
+  texmesh_fuzz_mutate(&target, data, size, seed, LLVMFuzzerMutate, take);
   if (mutated.size() > most) return LLVMFuzzerMutate(data, size, most);
   std::memcpy(data, mutated.data(), mutated.size());
   return mutated.size();
