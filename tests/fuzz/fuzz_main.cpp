@@ -53,8 +53,7 @@ const Target& chosen_target() {
     const char* name = std::getenv("TEXMESH_FUZZ_TARGET");
     const Target* t = name ? find_target(name) : nullptr;
     if (!t)
-      std::fprintf(stderr, "TEXMESH_FUZZ_TARGET is %s; --list names the targets\n",
-                   name ? name : "not set");
+      std::fprintf(stderr, "TEXMESH_FUZZ_TARGET is %s; --list names the targets\n", name ? name : "not set");
     if (!t) std::exit(2);
     return t;
   }();

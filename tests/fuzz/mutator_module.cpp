@@ -4,7 +4,8 @@
 
 #include "tests/fuzz/mutate.h"
 
-void texmesh_fuzz_mutate(const texmesh::fuzz::Target* target, const std::uint8_t* data, std::size_t size, unsigned seed,
+void texmesh_fuzz_mutate(const texmesh::fuzz::Target* target, const std::uint8_t* data, std::size_t size,
+                         unsigned seed,
                          std::size_t (*change)(std::uint8_t* data, std::size_t size, std::size_t most),
                          void (*take)(const std::uint8_t* data, std::size_t size)) {
   const auto change_bytes = [change](texmesh::Bytes input, std::size_t growth) {
@@ -18,8 +19,8 @@ void texmesh_fuzz_mutate(const texmesh::fuzz::Target* target, const std::uint8_t
   take(mutated.data(), mutated.size());
 }
 
-// The sanitizer's allocator was a third of what a mutation took. Nothing allocated here is freed elsewhere, or the reverse: the
-// library has libstdc++ in itself.
+// The sanitizer's allocator was a third of what a mutation took. Nothing allocated here is freed elsewhere,
+// or the reverse: the library has libstdc++ in itself.
 extern "C" void* __libc_malloc(std::size_t bytes);
 extern "C" void __libc_free(void* place);
 void* operator new(std::size_t bytes) {
