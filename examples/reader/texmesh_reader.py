@@ -590,7 +590,7 @@ def main():
     for package in options.packages:
         try:
             run(options, package)
-        except (Refused, OSError, KeyError, IndexError, TypeError, ValueError) as error:
+        except (Refused, OSError, AttributeError, IndexError, KeyError, TypeError, ValueError) as error:
             rule = "" if isinstance(error, (Refused, OSError)) else "J04: "  # a field is missing, or of another type
             refused.append(f"{package}: refused: {rule}{error}\n")
     print(*refused, sep="", end="", file=sys.stdout if options.command == "check" else sys.stderr)

@@ -38,7 +38,8 @@ figure{margin:1rem 0 1.75rem}
 table{border-collapse:collapse;margin:1rem 0;font-variant-numeric:tabular-nums}
 caption{text-align:left;padding-bottom:.35rem}
 th,td{padding:.3rem .7rem;border-bottom:1px solid var(--line);text-align:right;white-space:nowrap}
-th:first-child{text-align:left}
+th:first-child,.sentences td,.sentences th{text-align:left}
+.sentences td{white-space:normal;overflow-wrap:anywhere}
 thead th{color:var(--quiet);font-weight:600;font-size:.9rem}
 tbody th{font-weight:400}
 svg{display:block;max-width:100%;height:auto}
@@ -62,7 +63,9 @@ h2,h3{break-after:avoid}img,svg,.verdict{print-color-adjust:exact;-webkit-print-
 }  // namespace
 
 std::string HtmlTable::html() const {
-  std::string out = "<div class=\"scroll\"><table>\n<caption>" + caption + "</caption>\n<thead><tr>";
+  std::string out =
+      sentences ? "<div class=\"scroll\"><table class=\"sentences\">" : "<div class=\"scroll\"><table>";
+  out += "\n<caption>" + caption + "</caption>\n<thead><tr>";
   for (const std::string& cell : header) out += "<th scope=\"col\">" + cell + "</th>";
   out += "</tr></thead>\n<tbody>\n";
   for (const std::vector<std::string>& row : rows) {

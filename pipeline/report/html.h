@@ -10,6 +10,7 @@ struct HtmlTable {
   std::string caption;
   std::vector<std::string> header;
   std::vector<std::vector<std::string>> rows;
+  bool sentences = false;  // no numbers: to the left, and broken into lines
   std::string html() const;
 };
 

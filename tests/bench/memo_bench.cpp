@@ -62,6 +62,13 @@ std::string package_of(int i) {
   return "museum/" + std::to_string(i % 1000) + "/scan_" + std::to_string(i) + ".texmesh";
 }
 
+double megabytes_in(const std::string& folder) {
+  std::uintmax_t bytes = 0;
+  for (const auto& file : fs::recursive_directory_iterator(folder))
+    if (file.is_regular_file()) bytes += file.file_size();
+  return static_cast<double>(bytes) / 1e6;
+}
+
 void save(const std::string& folder, int models) {
   {
     BuildMemo memo(folder, "/out");
@@ -80,12 +87,15 @@ void save(const std::string& folder, int models) {
   for (int i = 0; i < models; i += 1000) known += memo.find(package_of(i), found) ? 1 : 0;
   constexpr int kModelsIn30s = 60;
   for (int i = 0; i < kModelsIn30s; ++i) memo.set(package_of(i), record_of(i + 1));
+  const double before_mb = megabytes_in(folder);
   start = Clock::now();
   const bool saved = memo.save();
+  const double save_ms = ms_since(start);
   std::printf(
-      "%d records: %.0f ms and %.0f MiB to read them; a save of %d: %.2f ms, %s; %d of %d found; peak %.0f MiB\n",
-      models, read_ms, read_mib, kModelsIn30s, ms_since(start), saved ? "written" : "NOT written", known,
-      (models + 999) / 1000, peak_mib());
+      "%d records, %.0f MB: %.0f ms and %.0f MiB to read them; a save of %d: %.2f ms, %.0f kB, %s; %d of %d found; "
+      "peak %.0f MiB\n",
+      models, before_mb, read_ms, read_mib, kModelsIn30s, save_ms, 1000 * (megabytes_in(folder) - before_mb),
+      saved ? "written" : "NOT written", known, (models + 999) / 1000, peak_mib());
   std::fflush(stdout);
   ::_exit(0);
 }

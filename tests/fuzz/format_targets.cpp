@@ -234,7 +234,7 @@ std::vector<Bytes> split_seeds() {
 void add_format_targets(std::vector<Target>& list) {
   list.insert(list.end(),
               {{"container", true, unless_format_error<read_container_again>, packages, Shape::kContainer},
-               {"package", true, unless_format_error<read_package>, packages, Shape::kContainer},
+               {"package", false, unless_format_error<read_package>, packages, Shape::kContainer},
                {"manifest", true, unless_format_error<read_manifest_twice>, manifests, Shape::kJson},
                {"textures", false, unless_format_error<read_textures_twice>,
                 [] { return entries(kTexturesPath); }, Shape::kJson},

@@ -1,11 +1,12 @@
-// libFuzzer's entry to all targets; tests/fuzz/run drives it. The environment variable TEXMESH_FUZZ_TARGET
-// names the target.
-//   texmesh_fuzz --list                  a line per target: name, runs that are wanted
-//   texmesh_fuzz --seeds FOLDER          writes the target's seeds, known troublemakers and dictionary
+// libFuzzer's entry to the targets of a room; tests/fuzz/run drives it. The environment variable
+// TEXMESH_FUZZ_TARGET names the target.
+//   texmesh_fuzz_ROOM --list                  a line per target: name, runs that are wanted
+//   texmesh_fuzz_ROOM --seeds FOLDER          writes the target's seeds, known troublemakers and dictionary
 //   (FOLDER.dict)
 #include <sanitizer/allocator_interface.h>
 #include <sys/time.h>
 
+#include <algorithm>
 #include <atomic>
 #include <csignal>
 #include <cstdlib>
@@ -14,7 +15,7 @@
 #include <fstream>
 
 #include "tests/fuzz/fuzz_target.h"
-#include "tests/fuzz/mutate.h"
+#include "tests/fuzz/mutator_module.h"
 
 extern "C" std::size_t LLVMFuzzerMutate(std::uint8_t* data, std::size_t size, std::size_t most);
 
@@ -52,8 +53,7 @@ const Target& chosen_target() {
     const char* name = std::getenv("TEXMESH_FUZZ_TARGET");
     const Target* t = name ? find_target(name) : nullptr;
     if (!t)
-      std::fprintf(stderr, "TEXMESH_FUZZ_TARGET is %s; texmesh_fuzz --list names the targets\n",
-                   name ? name : "not set");
+      std::fprintf(stderr, "TEXMESH_FUZZ_TARGET is %s; --list names the targets\n", name ? name : "not set");
     if (!t) std::exit(2);
     return t;
   }();
@@ -122,14 +122,19 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
 
 extern "C" std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size, std::size_t most,
                                                unsigned seed) {
-  const auto change = [](texmesh::Bytes input, std::size_t growth) {
-    const std::size_t length = input.size();
-    input.resize(length + growth);
-    input.resize(LLVMFuzzerMutate(input.data(), length, input.size()));
-    return input;
+  static texmesh::Bytes mutated;
+  const Target& target = chosen_target();
+  if (target.shape == Shape::kBytes) {
+    const std::size_t changed = LLVMFuzzerMutate(data, size, most);
+    if (!target.mend || seed % 8 == 0) return changed;
+    mutated = target.mend({data, changed});
+    std::memcpy(data, mutated.data(), std::min(mutated.size(), most));
+    return std::min(mutated.size(), most);
+  }
+  const auto take = [](const std::uint8_t* bytes, std::size_t count) {
+    mutated.assign(bytes, bytes + count);
   };
-  Random random{seed};
-  const texmesh::Bytes mutated = mutate(chosen_target(), {data, data + size}, random, change);
+  texmesh_fuzz_mutate(&target, data, size, seed, LLVMFuzzerMutate, take);
   if (mutated.size() > most) return LLVMFuzzerMutate(data, size, most);
   std::memcpy(data, mutated.data(), mutated.size());
   return mutated.size();

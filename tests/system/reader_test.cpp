@@ -322,6 +322,12 @@ TEST_F(SecondReader, FindsDamageEverywhere) {
     EXPECT_NE(told.find(path + ": refused: "), std::string::npos) << path << told.substr(0, 400);
 }
 
+TEST_F(SecondReader, AcceptsOrRefusesWhateverComes) {
+  const CommandResult result = testing::run_command(
+      {python, (kSource / "tests" / "fuzz" / "check_reader").string(), "--runs", "300"}, {}, "", 600);
+  EXPECT_EQ(result.exit_code, 0) << result.output << result.errors;
+}
+
 TEST_F(SecondReader, ReadsTheTreeAsWell) {
   const std::string texmesh = TEXMESH_BINARY;
   for (const std::string& golden : golden_packages()) {

@@ -24,6 +24,7 @@ std::string failures_section(const RunSummary& s) {
   HtmlTable table;
   table.caption = "What went wrong, model by model";
   table.header = {"model", "result", "what was found"};
+  table.sentences = true;
   std::size_t failures = 0;
   for (const ModelSummary& m : s.models) {
     if (m.ok()) continue;
@@ -42,6 +43,7 @@ std::string problems_section(const RunSummary& s) {
   HtmlTable table;
   table.caption = "Reports of shards that are not as they should be";
   table.header = {"file", "kind", "what was found"};
+  table.sentences = true;
   for (const SummaryProblem& p : s.problems)
     table.rows.push_back({markup_escaped(p.file), p.kind, markup_escaped(p.text)});
   return html_section("problems", "Reports of shards", table.html());

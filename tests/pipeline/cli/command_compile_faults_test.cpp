@@ -1,46 +1,22 @@
 // Builds that are killed, or whose file system fails, at every call that changes a file: what they leave is
 // either absent or whole, and the next build gives the same bytes as an undisturbed one. (Power loss is not
 // covered: what the kernel was given counts as written.)
-#include <fcntl.h>
 #include <gtest/gtest.h>
-#include <sys/mman.h>
-#include <unistd.h>
 
+#include <cinttypes>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <thread>
 
 #include "pipeline/io/machine/owner_mark.h"
-#include "tests/faults/fault_plan.h"
+#include "tests/faults/shared_counts.h"
 #include "tests/support/small_builds.h"
 
 namespace texmesh::testing {
 namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
-
-/// The file that the processes under the shim share with this one.
-class SharedCounts {
- public:
-  explicit SharedCounts(const std::string& file) : file_(file) {
-    const int fd = ::open(file.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
-    if (fd < 0 || ::ftruncate(fd, sizeof(FaultCounts)) != 0) throw std::runtime_error(file);
-    void* place = ::mmap(nullptr, sizeof(FaultCounts), PROT_READ | PROT_WRITE, MAP_SHARED, fd, 0);
-    ::close(fd);
-    if (place == MAP_FAILED) throw std::runtime_error(file);
-    counts_ = static_cast<FaultCounts*>(place);
-  }
-  ~SharedCounts() { ::munmap(counts_, sizeof(FaultCounts)); }
-  SharedCounts(const SharedCounts&) = delete;
-  SharedCounts& operator=(const SharedCounts&) = delete;
-  const FaultCounts& operator*() const { return *counts_; }
-  const std::string& file() const { return file_; }
-
- private:
-  std::string file_;
-  FaultCounts* counts_;
-};
 
 CommandResult texmesh(std::vector<std::string> arguments, const std::vector<std::string>& environment = {}) {
   arguments.insert(arguments.begin(), TEXMESH_BINARY);
@@ -110,6 +86,8 @@ class Faults : public ::testing::Test {
 #endif
   }
 
+  static void TearDownTestSuite() { std::printf("points of all sweeps that ran: %d\n", all_points_); }
+
   /// Makes `models` tiny models and compiles them undisturbed.
   void prepare(int models, const std::string& jobs) {
     models_ = folder_ / "models";
@@ -129,14 +107,25 @@ class Faults : public ::testing::Test {
   }
 
   /// All points, or a sample: spread over them, and more of the last ones, which write the package and the
-  /// memo.
+  /// memo. Of all, TEXMESH_SWEEP_PART=1/4 names a part.
   std::set<std::uint64_t> points(std::uint64_t sample) const {
     std::set<std::uint64_t> all;
+    std::uint64_t part = 0, parts = 1;
+    if (const char* said = std::getenv("TEXMESH_SWEEP_PART"); said && full_sweeps())
+      std::sscanf(said, "%" SCNu64 "/%" SCNu64, &part, &parts);
+    if (parts > 1) {
+      for (std::uint64_t at = 1 + part; at <= calls_; at += parts) all.insert(at);
+      return all;
+    }
     const std::uint64_t n = full_sweeps() ? calls_ : std::min(sample, calls_);
     for (std::uint64_t i = 0; i < n; ++i)
       all.insert(1 + i * (calls_ - 1) / std::max<std::uint64_t>(n - 1, 1));
     for (std::uint64_t back = 2; back <= 14; back += 3) all.insert(calls_ - back);
     return all;
+  }
+
+  static int wanted(int of_all, int of_a_sample) {
+    return full_sweeps() && !std::getenv("TEXMESH_SWEEP_PART") ? of_all : of_a_sample;
   }
 
   void expect_nothing_torn(const Site& site, const std::string& what) const {
@@ -169,6 +158,7 @@ class Faults : public ::testing::Test {
       const std::string what =
           action + " at call " + std::to_string(at) + " (kind " + std::to_string((*counts).fired_call) + ")";
       if ((*counts).fired == 0) continue;
+      ++all_points_;
       const std::string text = r.output + r.errors;
       if (r.exit_code == 0) {
         ++succeeded;
@@ -203,7 +193,7 @@ class Faults : public ::testing::Test {
       SharedCounts counts = site.counts();
       const CommandResult r = site.build_with_fault("kill", at, counts, "", preload);
       if ((*counts).fired == 0) continue;  // threads: this run has made fewer calls
-      ++points_done;
+      ++points_done, ++all_points_;
       ++killed[(*counts).fired_call];
       const std::string what =
           "kill at call " + std::to_string(at) + " (kind " + std::to_string((*counts).fired_call) + ")";
@@ -224,16 +214,17 @@ class Faults : public ::testing::Test {
   std::string models_, profile_, jobs_;
   Packages reference_;
   std::uint64_t calls_ = 0;
+  static inline int all_points_ = 0;
 };
 
 TEST_F(Faults, KilledAtEveryCall) {
   ASSERT_NO_FATAL_FAILURE(prepare(full_sweeps() ? 3 : 1, full_sweeps() ? "2" : "1"));
-  EXPECT_GE(sweep_kills(6), full_sweeps() ? 500 : 5);
+  EXPECT_GE(sweep_kills(6), wanted(500, 5));
 }
 
 TEST_F(Faults, KilledAtEveryCallWhereLocksAreGrantedToAll) {
   ASSERT_NO_FATAL_FAILURE(prepare(1, "1"));
-  EXPECT_GE(sweep_kills(2, ":" TEXMESH_GRANT_LOCKS), full_sweeps() ? 200 : 2);
+  EXPECT_GE(sweep_kills(2, ":" TEXMESH_GRANT_LOCKS), wanted(200, 2));
 }
 
 TEST_F(Faults, TheDiskIsFullFromEveryCallOn) {
@@ -255,7 +246,7 @@ TEST_F(Faults, ACacheThatIsReadOnlyOrFullFromEveryCallOn) {
       SharedCounts counts = site.counts();
       const CommandResult r = site.build_with_fault(action, at, counts, site.cache());
       if ((*counts).fired == 0) continue;  // fewer calls are made beneath the cache than in all
-      ++points_done;
+      ++points_done, ++all_points_;
       const std::string what = std::string(action) + " cache at call " + std::to_string(at);
       EXPECT_EQ(r.exit_code, 0) << what << ": " << r.output << r.errors;
       EXPECT_TRUE(site.packages() == reference_) << what;
@@ -352,7 +343,7 @@ TEST_F(Faults, AMergeThatIsKilledOrFailsAtEveryCall) {
       SharedCounts counts(folder_ / "counts");
       const CommandResult r = merge(action, at, counts);
       if ((*counts).fired == 0) continue;
-      ++points_done;
+      ++points_done, ++all_points_;
       const std::string what = std::string(action) + " at call " + std::to_string(at) + " of a merge";
       const std::string text = read_text(all);
       EXPECT_TRUE(text == "old" || text == reference.at("all.json")) << what << " left a torn summary";
