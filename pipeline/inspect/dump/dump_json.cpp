@@ -1,5 +1,7 @@
 #include <algorithm>
 
+#include <nlohmann/json.hpp>
+
 #include "format/container/layout.h"
 #include "format/documents/tables.h"
 #include "format/rules/allocation.h"
