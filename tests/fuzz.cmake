@@ -26,7 +26,7 @@ target_compile_definitions(texmesh_fuzz PRIVATE TEXMESH_VERSION="${PROJECT_VERSI
 # -O1: half the time to build, and two thirds of the runs per second. Sections: what only stages call is not linked.
 target_compile_options(texmesh_fuzz PRIVATE -O1 -ffunction-sections -fdata-sections)
 target_link_options(texmesh_fuzz PRIVATE -fsanitize=fuzzer LINKER:--gc-sections)
-target_link_libraries(texmesh_fuzz PRIVATE texmesh_format OpenSSL::Crypto ZLIB::ZLIB nlohmann_json::nlohmann_json CURL::libcurl
+target_link_libraries(texmesh_fuzz PRIVATE texmesh_format ZLIB::ZLIB nlohmann_json::nlohmann_json CURL::libcurl
   TBB::tbb Eigen3::Eigen WebP::webp zstd::libzstd_shared draco::draco meshoptimizer::meshoptimizer JPEG::JPEG PNG::PNG fmt::fmt OpenImageIO::OpenImageIO
   ${CMAKE_DL_LIBS})
 add_dependencies(texmesh_fuzz texmesh_oiio)
