@@ -1,5 +1,5 @@
 # make install, and what find_package(texmesh) finds. Component delivery (format, delivery: a client of packages) needs
-# OpenSSL, zlib, libcurl and nlohmann-json; component compiler (the stages and the pipeline as libraries) all the rest. The
+# nettle, zlib, libcurl and nlohmann-json; component compiler (the stages and the pipeline as libraries) all the rest. The
 # texmesh command, where it was built, is texmesh::texmesh for texmesh_add_package().
 include(CMakePackageConfigHelpers)
 set(texmesh_cmake_dir ${CMAKE_INSTALL_LIBDIR}/cmake/texmesh)

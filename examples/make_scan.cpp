@@ -64,6 +64,8 @@ int run(int argc, char** argv) {
   };
   number("--triangles", options.triangles, 48, 50'000'000, "triangles, about");
   number("--texture", options.texture_px, 0, 16384, "side of the textures in px; 0 = vertex colours instead");
+  number("--enlarge", options.enlarge, 1, 16,
+         "paint textures at this part of their size and enlarge them: 16384 px in seconds");
   number("--charts", options.charts, 2, 20'000, "charts of the texture atlas, about");
   number("--holes", options.holes, 0, 1000, "holes in the surface");
   app.add_option("--noise", options.noise, "measuring noise, fraction of the object's diagonal")

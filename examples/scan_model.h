@@ -20,6 +20,7 @@ struct ScanOptions {
   double noise = 0.0002;  // measuring noise across the surface, fraction of the diagonal
   int seed = 1;
   bool all_textures = false;  // normal and occlusion-roughness-metallic maps beside the base colour
+  int enlarge = 1;            // textures are painted at this part of their size
   int jpeg_quality = 92;
   int range_columns = 720, range_rows = 480;  // samples of the range-scan form
 };

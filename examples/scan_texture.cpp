@@ -6,6 +6,7 @@
 
 #include "examples/scan_model.h"
 #include "examples/scan_noise.h"
+#include "format/base/errors.h"
 #include "format/base/no_index.h"
 #include "format/base/portable_math.h"
 #include "stages/base/parallel.h"
@@ -165,6 +166,57 @@ ScanTextures paint_atlas(const ScanShape& shape, const ScanMesh& scan, const Sca
   return out;
 }
 
+namespace {
+
+/// So many times as large, bilinear, with a camera's grain where something was painted.
+Pixels enlarged(const Pixels& small, std::uint32_t times, std::uint32_t seed, const RunContext& context) {
+  Pixels out = blank(small.width_px * times, small.height_px * times);
+  const auto cell = [times](std::uint32_t at, std::uint32_t side) {
+    const double p = std::clamp((at + 0.5) / times - 0.5, 0.0, side - 1.0);
+    const auto first = std::min(static_cast<std::uint32_t>(p), side > 1 ? side - 2 : 0);
+    return std::pair(first, p - first);
+  };
+  parallel_for(context, out.height_px, 16, [&](std::size_t begin, std::size_t end) {
+    for (auto y = static_cast<std::uint32_t>(begin); y < end; ++y)
+      for (std::uint32_t x = 0; x < out.width_px; ++x) {
+        const auto [u, s] = cell(x, small.width_px);
+        const auto [v, t] = cell(y, small.height_px);
+        const std::uint8_t *a = small.at(u, v), *b = small.at(std::min(u + 1, small.width_px - 1), v);
+        const std::uint32_t below = std::min(v + 1, small.height_px - 1);
+        const std::uint8_t *c = small.at(u, below), *d = small.at(std::min(u + 1, small.width_px - 1), below);
+        const double grain = hash01(x, y, 3, seed) + hash01(x, y, 4, seed) - 1;
+        Vec3d colour;
+        for (int k = 0; k < 3; ++k)
+          colour[k] = mix(mix(1.0 * a[k], 1.0 * b[k], s), mix(1.0 * c[k], 1.0 * d[k], s), t) / 255;
+        if (colour == Vec3d{}) continue;
+        for (int k = 0; k < 3; ++k) colour[k] += 0.014 * grain;
+        put(out, std::size_t{y} * out.width_px + x, colour);
+      }
+  });
+  return out;
+}
+
+/// What the mesh's atlas and the textures are made for before they are enlarged.
+ScanOptions as_painted(ScanOptions options) {
+  if (options.texture_px % options.enlarge != 0)
+    throw InputError("make_scan", "--enlarge", "a divisor of --texture", std::to_string(options.enlarge));
+  options.texture_px /= options.enlarge;
+  return options;
+}
+
+ScanTextures painted_textures(const ScanShape& shape, const ScanMesh& scan, const ScanOptions& options,
+                              const RunContext& context) {
+  ScanTextures out = paint_atlas(shape, scan, options, context);
+  if (options.enlarge == 1) return out;
+  for (Pixels* pixels : {&out.base_colour, &out.normal, &out.orm})
+    if (!pixels->data.empty())
+      *pixels = enlarged(*pixels, static_cast<std::uint32_t>(options.enlarge),
+                         static_cast<std::uint32_t>(options.seed), context);
+  return out;
+}
+
+}  // namespace
+
 std::vector<std::uint8_t> encode_scan_jpeg(const Pixels& pixels, int quality) {
   jpeg_compress_struct cinfo;
   jpeg_error_mgr errors;
@@ -193,7 +245,8 @@ std::vector<std::uint8_t> encode_scan_jpeg(const Pixels& pixels, int quality) {
   return out;
 }
 
-Model make_scan(const ScanOptions& options, const RunContext& context) {
+Model make_scan(const ScanOptions& asked, const RunContext& context) {
+  const ScanOptions options = as_painted(asked);
   const ScanShape shape(static_cast<std::uint32_t>(options.seed));
   ScanMesh scan = make_scan_mesh(shape, options);
   Model model;
@@ -216,7 +269,7 @@ Model make_scan(const ScanOptions& options, const RunContext& context) {
     return ref;
   };
   if (options.texture_px > 0) {
-    const ScanTextures textures = paint_atlas(shape, scan, options, context);
+    const ScanTextures textures = painted_textures(shape, scan, options, context);
     material.base_colour_texture = add(textures.base_colour, "base_colour");
     if (options.all_textures) {
       material.normal_texture = add(textures.normal, "normal");

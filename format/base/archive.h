@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "format/base/errors.h"
+#include "format/base/sha256/sha256_stream.h"
 #include "format/base/vec.h"
 
 namespace texmesh {
@@ -34,20 +35,19 @@ template <class T, std::size_t N>
 struct IsFlat<std::array<T, N>> : IsFlat<T> {};
 }  // namespace archive_detail
 
-class ArchiveWriter {
+/// Hands the bytes of what it is called with to `Sink`, piece by piece: a function of ByteSpan.
+template <class Sink>
+class ArchiveTo {
  public:
   template <class... T>
   void operator()(const T&... values) {
     (put(values), ...);
   }
-  /// The bytes; the writer is empty afterwards.
-  std::vector<std::uint8_t> finish() { return std::move(bytes_); }
+  Sink& sink() { return sink_; }
 
  private:
   void raw(const void* data, std::size_t size) {
-    if (size == 0) return;
-    const auto* p = static_cast<const std::uint8_t*>(data);
-    bytes_.insert(bytes_.end(), p, p + size);
+    if (size > 0) sink_({static_cast<const std::uint8_t*>(data), size});
   }
   template <class T>
   void put(const T& value) {
@@ -70,7 +70,31 @@ class ArchiveWriter {
       for (const T& x : v) put(x);
     }
   }
-  std::vector<std::uint8_t> bytes_;
+  Sink sink_;
+};
+
+namespace archive_detail {
+struct SizeSink {
+  std::size_t bytes = 0;
+  void operator()(std::span<const std::uint8_t> piece) { bytes += piece.size(); }
+};
+struct MemorySink {
+  std::vector<std::uint8_t> bytes;
+  void operator()(std::span<const std::uint8_t> piece) {
+    bytes.insert(bytes.end(), piece.begin(), piece.end());
+  }
+};
+struct DigestSink {
+  Sha256Stream stream;
+  void operator()(std::span<const std::uint8_t> piece) { stream.add(piece); }
+};
+}  // namespace archive_detail
+
+class ArchiveWriter : public ArchiveTo<archive_detail::MemorySink> {
+ public:
+  void reserve(std::size_t bytes) { sink().bytes.reserve(bytes); }
+  /// The bytes; the writer is empty afterwards.
+  std::vector<std::uint8_t> finish() { return std::move(sink().bytes); }
 };
 
 /// Reads what ArchiveWriter wrote; throws FormatError on any truncation or on bytes left over (see finish()).
@@ -137,11 +161,28 @@ class ArchiveReader {
   std::size_t at_ = 0;
 };
 
+/// Bytes that grow would for a moment take three times their memory: gigabytes where a scan is large.
 template <class T>
 std::vector<std::uint8_t> encode_artefact(const T& value) {
+  ArchiveTo<archive_detail::SizeSink> size;
+  size(value);
   ArchiveWriter w;
+  w.reserve(size.sink().bytes);
   w(value);
   return w.finish();
+}
+/// Of the bytes that encode_artefact() gives, without having them in memory.
+struct ArtefactDigest {
+  Sha256 digest{};
+  std::uint64_t bytes = 0;
+};
+template <class T>
+ArtefactDigest digest_artefact(const T& value) {
+  ArchiveTo<archive_detail::DigestSink> w;
+  w(value);
+  Sha256Stream& stream = w.sink().stream;
+  const std::uint64_t bytes = stream.bytes();
+  return {stream.finish(), bytes};
 }
 template <class T>
 T decode_artefact(std::span<const std::uint8_t> bytes, const std::string& name) {

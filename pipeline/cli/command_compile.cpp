@@ -1,9 +1,11 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <iostream>
 #include <map>
 #include <memory>
+#include <string_view>
 
 #include "format/base/errors.h"
 #include "format/documents/about.h"
@@ -18,6 +20,7 @@
 #include "pipeline/cli/options/common_options.h"
 #include "pipeline/cli/options/shard_options.h"
 #include "pipeline/cli/options/units.h"
+#include "pipeline/cli/program.h"
 #include "pipeline/compile/jnd_profile.h"
 #include "pipeline/compile/option_fields.h"
 #include "pipeline/compile/options.h"
@@ -90,6 +93,31 @@ const char* value_name_of(const OptionField& f) {
   return std::visit(Name{}, f.value);
 }
 
+/// Which options of stages a command line may mean.
+class AskedOptions {
+ public:
+  AskedOptions() = default;  // all
+  explicit AskedOptions(std::span<char* const> words)
+      : words_(words.begin(), words.end()), all_(std::ranges::any_of(words_, asks_for_help)) {}
+
+  bool has(const OptionField& f) const {
+    const auto it = kShortNames.find(f.path());
+    const std::string long_name = "--" + f.path();
+    return all_ || std::ranges::any_of(words_, [&](std::string_view word) {
+             return word.starts_with(long_name) ||
+                    (it != kShortNames.end() && word.starts_with(it->second.name));
+           });
+  }
+
+ private:
+  static bool asks_for_help(std::string_view word) {
+    return word.starts_with("--help") || (!word.starts_with("--") && word.starts_with("-") &&
+                                          word.find('h') != std::string_view::npos);  // -h, also as -qh
+  }
+  std::vector<std::string_view> words_;
+  bool all_ = true;
+};
+
 /// The short name of a switch takes no value; --STAGE.OPTION does.
 void add_stage_option(Command& c, const OptionField& f, CompileArguments& args) {
   const auto it = kShortNames.find(f.path());
@@ -109,9 +137,10 @@ void add_stage_option(Command& c, const OptionField& f, CompileArguments& args) 
       .everyday(kEverydayTitle, help_of(f));
 }
 
-void add_stage_options(Command& c, CompileArguments& args) {
+void add_stage_options(Command& c, CompileArguments& args, const AskedOptions& asked) {
   CompileOptions defaults;
   for (const OptionField& f : list_options(defaults)) {
+    if (!asked.has(f)) continue;
     c.group("Stage " + f.stage);
     add_stage_option(c, f, args);
   }
@@ -293,7 +322,7 @@ constexpr const char* kNotes =
     "changed. A model that fails leaves the package that was there before.\n"
     "Exit code: 0 all well, 1 some model failed, 2 usage, 3 internal, 75 try again.";
 
-void add_compile_options(Command& c, CompileArguments& args) {
+void add_compile_options(Command& c, CompileArguments& args, const AskedOptions& asked) {
   c.option("INPUT", args.inputs,
            "Models (.glb .gltf .obj .ply .stl, range-scan .json), folders of models, or collections (.json)")
       .required();
@@ -317,7 +346,7 @@ void add_compile_options(Command& c, CompileArguments& args) {
   add_run_options(c, args);
   add_all_cache_options(c, args);
   add_report_options(c, args);
-  add_stage_options(c, args);
+  add_stage_options(c, args, asked);
 }
 
 int run_compile(CompileArguments& args) {
@@ -349,15 +378,21 @@ int run_compile(CompileArguments& args) {
   }
 }
 
-}  // namespace
-
-void add_compile_command(Command& app) {
+void add_compile(Command& app, const AskedOptions& asked) {
   auto args = std::make_shared<CompileArguments>();
   Command c = app.add("compile");
-  add_compile_options(c, *args);
+  add_compile_options(c, *args, asked);
   c.examples(kExamples);
   c.notes(kNotes);
   c.on_run([args] { return run_compile(*args); });
+}
+
+}  // namespace
+
+void add_compile_command(Command& app) { add_compile(app, AskedOptions()); }
+
+void add_compile_command(Command& app, std::span<char* const> words) {
+  add_compile(app, AskedOptions(words));
 }
 
 }  // namespace texmesh

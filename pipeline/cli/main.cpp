@@ -47,7 +47,7 @@ int main(int argc, char** argv) {
   CommandLine line(kProgramSummary);
   Command program = line.program();
   if (name == "compile")
-    add_compile_command(program);
+    add_compile_command(program, {argv, static_cast<std::size_t>(argc)});
   else if (name == "cache")
     add_cache_command(program);
   else

@@ -102,8 +102,9 @@ namespace make_stage_detail {
 
 template <class T>
 StageOutput stored_output(Artefact<T> artefact) {
-  StageOutput output{ArtefactName(artefact), {}, {}};
+  StageOutput output{ArtefactName(artefact), {}, {}, {}};
   output.encode = [](const void* object) { return encode_artefact(*static_cast<const T*>(object)); };
+  output.digest = [](const void* object) { return digest_artefact(*static_cast<const T*>(object)); };
   output.decode = [name = output.name](ByteSpan bytes) {
     return make_object(decode_artefact<T>(bytes, name));
   };
@@ -176,7 +177,7 @@ Stage make_stage(StageTitle title, Inputs<I...> read, DerivedOutput<O> made, Opt
                  std::vector<StageLibrary> libraries, F function) {
   namespace detail = make_stage_detail;
   Stage stage = detail::describe(std::move(title), read, options, std::move(libraries));
-  stage.outputs.push_back({ArtefactName(made.artefact), {}, {}});
+  stage.outputs.push_back({ArtefactName(made.artefact), {}, {}, {}});
   stage.stored = false;
   stage.run = detail::bind_function(read, static_cast<const std::tuple<O>*>(nullptr), std::move(options),
                                     std::move(function));

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "format/base/archive.h"
 #include "format/base/bytes.h"
 #include "format/base/note.h"
 #include "pipeline/graph/artefact.h"
@@ -13,11 +14,12 @@
 
 namespace texmesh {
 
-/// One result of a stage, and how it gets into and out of the store; both functions are empty for derived
+/// One result of a stage, and how it gets into and out of the store; the functions are empty for derived
 /// data.
 struct StageOutput : ArtefactName {
   std::function<Bytes(const void*)> encode;
-  std::function<Object(ByteSpan)> decode;  // throws FormatError
+  std::function<ArtefactDigest(const void*)> digest;  // of these bytes, where nobody keeps them
+  std::function<Object(ByteSpan)> decode;             // throws FormatError
 };
 
 /// Options that a stage reads: a whole section ("ssf") or a single field ("ladder.mode").

@@ -47,14 +47,24 @@ std::vector<StoredBlob> put_results(Store& store, const Stage& stage, const Key&
                                     const StageResult& result) {
   std::vector<std::pair<std::string, SharedBytes>> encoded;
   std::vector<StoredBlob> blobs;
+  const std::string notes = stage.name + ".notes";
+  if (!store.keeps_results()) {
+    const auto add = [&](const std::string& name, const ArtefactDigest& d) {
+      blobs.push_back({name, d.digest, d.bytes});
+    };
+    for (std::size_t k = 0; k < stage.outputs.size(); ++k)
+      add(stage.outputs[k].name, stage.outputs[k].digest(result.objects[k].get()));
+    add(notes, digest_artefact(result.notes));
+    return blobs;
+  }
   const auto add = [&](const std::string& name, Bytes bytes) {
     blobs.push_back({name, sha256(bytes), bytes.size()});
-    if (store.keeps_results()) encoded.emplace_back(name, std::make_shared<const Bytes>(std::move(bytes)));
+    encoded.emplace_back(name, std::make_shared<const Bytes>(std::move(bytes)));
   };
   for (std::size_t k = 0; k < stage.outputs.size(); ++k)
     add(stage.outputs[k].name, stage.outputs[k].encode(result.objects[k].get()));
-  add(stage.name + ".notes", encode_artefact(result.notes));
-  if (store.keeps_results()) store.put(key, encoded);
+  add(notes, encode_artefact(result.notes));
+  store.put(key, encoded);
   return blobs;
 }
 

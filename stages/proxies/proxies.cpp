@@ -4,6 +4,9 @@
 #include <array>
 #include <string>
 
+#include "format/base/box.h"
+#include "stages/geometry/scale_frames.h"
+#include "stages/geometry/stand_in_scale.h"
 #include "stages/proxies/making/make_proxy.h"
 #include "stages/proxies/making/nested_rival.h"
 #include "stages/proxies/making/smooth_surface.h"
@@ -29,6 +32,10 @@ constexpr int kFirstBits = 10, kBits = 11, kFineBits = 12;      // of positions
 constexpr double kOverAsked = 1.02, kMostOfSource = 0.15;
 // Of the first size: what Draco, which scales are coded by, needs for the same picture.
 constexpr double kFirstShare = 0.55;
+// What proxies of up to 40,000 triangles and pictures of 512 px need of S_0: at 500,000 the collapses took
+// eight times as long.
+constexpr std::size_t kMostBaked = 250'000;
+constexpr double kFarthestBaked = 2e-4;  // of the diagonal
 
 /// Source textures need not be finer than what a proxy and the pictures show of them.
 std::uint32_t least_side_px(const std::vector<Material>& materials) {
@@ -72,6 +79,11 @@ ProxyForm first_form(int bytes, bool first, bool data) {
 
 void note_none(Notes& notes, int bytes, const std::string& why) {
   add_info(notes, "no-proxy", "", "there is no proxy of " + std::to_string(bytes) + " bytes: " + why);
+}
+
+Mesh baked_mesh(const NestedScales& scales, const RunContext& context) {
+  const double diagonal = bounding_box(scales.mesh.positions).diagonal();
+  return lit_scale(scales, stand_in_scale(scales, kMostBaked, kFarthestBaked * diagonal), context);
 }
 
 /// What the files of a model that proxies stand for take.
@@ -232,7 +244,7 @@ Proxies make_proxies(const NestedScales& scales, const std::vector<Material>& ma
   if (sizes.empty()) return out;
   RunContext inner = context;
   inner.progress = nullptr;
-  const Mesh mesh = extract_scale(scales, scales.scales.front());
+  const Mesh mesh = baked_mesh(scales, inner);
   const ShownMaterials shown =
       shown_materials(materials, fragments, pixels, mesh, least_side_px(materials), inner);
   MaterialGroups groups = find_groups(mesh, shown.materials);

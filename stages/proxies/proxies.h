@@ -10,7 +10,7 @@
 
 namespace texmesh {
 
-inline constexpr int kProxiesVersion = 6;
+inline constexpr int kProxiesVersion = 7;
 
 /// kAuto: only those that beat what the source's atlas gives for the same bytes.
 enum class ProxyMode : std::uint8_t { kNone, kAuto, kAlways };
@@ -36,6 +36,7 @@ struct ProxiesOptions {
 /// - Mesh: simplification without regard to the source's charts, one run for all sizes; new charts, packed
 ///   into one square. Triangles of one class of materials (unlit or lit, single- or double-sided, opaque,
 ///   mask or blend) become one material.
+///   Of meshes of more than 250,000 triangles a scale of about as many stands for S_0.
 /// - Maps: base colour; occlusion, roughness and metal where they vary; from 100 kB on a normal map where it
 ///   looks better; emission where something glows. Vertex colours and factors are in the texels.
 /// - Normals of vertices are there where S_0 is smooth. Where it is not, pictures decide between them and

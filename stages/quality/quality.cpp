@@ -86,7 +86,7 @@ double surface_area_of(const Mesh& mesh, const std::vector<Triangle>& triangles)
 /// at.
 struct KeptScales {
   std::vector<int> numbers;
-  std::vector<Mesh> meshes;
+  std::vector<Mesh> coarser;  // all but S_0, which is the nest's own mesh: a copy of a large one would count
 };
 KeptScales kept_scales(const NestedScales& scales, const PerceptualValues& perceptual,
                        const RunContext& context) {
@@ -94,8 +94,18 @@ KeptScales kept_scales(const NestedScales& scales, const PerceptualValues& perce
   for (std::size_t k = 0; k < scales.scales.size(); ++k) {
     if (k > 0 && !perceptual.kept[k]) continue;
     out.numbers.push_back(scales.scales[k].scale);
-    out.meshes.push_back(k == 0 ? extract_scale(scales, scales.scales[0]) : lit_scale(scales, k, context));
+    if (k > 0) out.coarser.push_back(lit_scale(scales, k, context));
   }
+  return out;
+}
+
+std::vector<RenderScene> scenes_of(const NestedScales& scales, const KeptScales& kept,
+                                   const ShownTextures& shown) {
+  const NestedScale& finest = scales.scales[0];
+  std::vector<RenderScene> out{
+      {&scales.mesh, &finest.triangles, &finest.triangle_source, &shown.materials, shown.textures.size()}};
+  for (const Mesh& mesh : kept.coarser)
+    out.push_back(render_scene(mesh, shown.materials, shown.textures.size()));
   return out;
 }
 
@@ -349,8 +359,7 @@ MeasuredQuality measure_quality(const NestedScales& scales, const PerceptualValu
   MeasuredQuality result;
   Studio studio;
   studio.views = choose_views(options.views, options.large_views);
-  for (const Mesh& mesh : kept.meshes)
-    studio.scenes.push_back(render_scene(mesh, shown.materials, shown.textures.size()));
+  studio.scenes = scenes_of(scales, kept, shown);
   TextureSizes sizes;
   for (const ShownTexture& t : shown.textures)
     sizes.push_back({fragments.planes[t.plane].width_px, fragments.planes[t.plane].height_px});
@@ -367,7 +376,7 @@ MeasuredQuality measure_quality(const NestedScales& scales, const PerceptualValu
 
   const TextureSampler sampler{data, shown, groups, options.rung_samples,
                                surface_area_of(scales.mesh, scales.scales[0].triangles)};
-  SwitchSizes switch_sizes(kept.meshes.size(), options);
+  SwitchSizes switch_sizes(kept.numbers.size(), options);
   const std::size_t fewer =
       fewer_heights(sampler, scales.scales[0].triangles.size(), studio.frame.extent, options);
   const std::vector<SizeCells> cells = render_heights(sampler, options, fewer, studio, switch_sizes, context);

@@ -6,6 +6,16 @@
 
 namespace texmesh::quality {
 
+std::size_t shown_scale(const std::vector<RenderScene>& scenes, std::size_t scale, double displayed_px) {
+  constexpr std::size_t kLarge = 1'000'000;
+  constexpr double kTrianglesPerPixel = 4;
+  const double least = kTrianglesPerPixel * displayed_px * displayed_px;
+  if (scenes[0].triangles->size() <= kLarge) return scale;
+  while (scale + 1 < scenes.size() && static_cast<double>(scenes[scale + 1].triangles->size()) >= least)
+    ++scale;
+  return scale;
+}
+
 std::vector<SizePictures::ScaleShots> SizePictures::by_scale(const std::vector<Shot>& shots,
                                                              const std::vector<std::size_t>& taken) {
   std::vector<ScaleShots> out;
@@ -21,7 +31,7 @@ std::vector<SizePictures::ScaleShots> SizePictures::by_scale(const std::vector<S
 PictureVariants SizePictures::pictures(std::size_t scale, const PicturePlace& place,
                                        const std::vector<const Materials*>& materials,
                                        const RunContext& context) const {
-  RenderScene scene = studio_.scenes[scale];
+  RenderScene scene = studio_.scenes[shown_scale(studio_.scenes, scale, displayed_px_)];
   scene.materials = materials.front();
   scene.texture_count = studio_.textures.size();
   return shade_variants(scene, look(scene, place.camera, place.side_px, context), materials, studio_.textures,

@@ -22,6 +22,10 @@ struct Studio {
   std::vector<RenderTexture> textures;  // the source's, then coded ones for the time that they are needed
 };
 
+/// What is shown of a scale. A picture of a large scan shows nothing of triangles of which several fall into
+/// each pixel: the coarsest kept scale that has still so many stands for all finer ones.
+std::size_t shown_scale(const std::vector<RenderScene>& scenes, std::size_t scale, double displayed_px);
+
 /// How one picture, or several, differ from S_0's.
 struct Loss {
   FlipSum flip;

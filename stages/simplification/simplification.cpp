@@ -139,21 +139,13 @@ void drop_far_scales(NestedScales& result, double limit) {
   cut(m.wedge_position), cut(m.uv0), cut(m.uv1), cut(m.normals), cut(m.colours), cut(m.tangents);
 }
 
-}  // namespace
-
-NestedScales simplify(const ConditionedMesh& mesh, const ScaleMap& scale_map,
-                      const SimplificationOptions& asked, const RunContext& context) {
-  const SimplificationOptions options = without_bounds_of_thesis(asked);
-  if (scale_map.persistence.size() != mesh.mesh.positions.size())
-    throw StageError("simplification", "scale map", std::to_string(mesh.mesh.positions.size()) + " positions",
-                     std::to_string(scale_map.persistence.size()));
-  NestedScales result;
-  result.mesh = mesh.mesh;
-  result.twin = mesh.twin;
-  const std::vector<std::uint32_t> target = vertex_targets(scale_map, options);
+/// Fills scales, collapses and new wedges; returns the diagonal. What collapses take, twice a large mesh, is
+/// gone behind it. `floor`: what stopped the last scale.
+double collapse(const ConditionedMesh& mesh, const ScaleMap& scale_map,
+                const std::vector<std::uint32_t>& target, const SimplificationOptions& options,
+                const RunContext& context, NestedScales& result, std::string& floor) {
   CollapseEngine engine(mesh, scale_map, options, context);
   result.scales.push_back(scale_at_this_point(engine, 0, ""));
-  std::string floor;
   for (std::size_t i = 1; i < target.size(); ++i) {
     floor = stop_reason(engine.run_to(target[i], static_cast<int>(i), context), options);
     const NestedScale& finer = result.scales.back();
@@ -166,9 +158,30 @@ NestedScales simplify(const ConditionedMesh& mesh, const ScaleMap& scale_map,
   }
   result.collapses = engine.collapses();
   append_new_wedges(engine.mesh(), result.mesh, result.scales);
+<<<<<<< HEAD
   measure_scale_errors(mesh.component, result, context);
+=======
+  return engine.mesh().diagonal();
+}
+
+}  // namespace
+
+NestedScales simplify(const ConditionedMesh& mesh, const ScaleMap& scale_map,
+                      const SimplificationOptions& asked, const RunContext& context) {
+  const SimplificationOptions options = without_bounds_of_thesis(asked);
+  if (scale_map.persistence.size() != mesh.mesh.positions.size())
+    throw StageError("simplification", "scale map", std::to_string(mesh.mesh.positions.size()) + " positions",
+                     std::to_string(scale_map.persistence.size()));
+  NestedScales result;
+  result.mesh = mesh.mesh;
+  result.twin = mesh.twin;
+  const std::vector<std::uint32_t> target = vertex_targets(scale_map, options);
+  std::string floor;
+  const double diagonal = collapse(mesh, scale_map, target, options, context, result, floor);
+  measure_scale_errors(mesh.component, result.mesh, result.scales, context);
+>>>>>>> big
   const std::size_t taken = result.scales.size();
-  drop_far_scales(result, options.max_error * engine.mesh().diagonal());
+  drop_far_scales(result, options.max_error * diagonal);
   if (result.scales.size() < taken) floor = "every coarser scale exceeds max_error";
   // The last scale may have met its own target before what stopped the next ones.
   if (result.scales.size() > 1 && result.scales.back().floor_reason.empty())
