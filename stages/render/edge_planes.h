@@ -2,7 +2,6 @@
 // Inside the room only: a triangle as a camera sees it, in homogeneous coordinates (Olano and Greer 1997), so
 // that nothing has to be cut at the near plane.
 #include <array>
-#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <vector>
@@ -58,11 +57,20 @@ inline EdgePlanes edge_planes(const std::array<Vec3d, 3>& corner) {
   return out;
 }
 
+/// Bits of a mask. Without the instruction, which not every processor has, std::popcount is a call.
+constexpr int sample_count(std::uint16_t mask) {
+  unsigned n = mask;
+  n = (n & 0x5555u) + (n >> 1 & 0x5555u);
+  n = (n & 0x3333u) + (n >> 2 & 0x3333u);
+  n = (n + (n >> 4)) & 0x0F0Fu;
+  return static_cast<int>((n + (n >> 8)) & 0x1Fu);
+}
+
 /// The mean column and row, 0..3, of the samples of a mask that is not 0.
 inline Vec2d mean_of_samples(std::uint16_t mask) {
-  auto count = [mask](unsigned bits) { return std::popcount(mask & bits); };
+  auto count = [mask](unsigned bits) { return sample_count(static_cast<std::uint16_t>(mask & bits)); };
   const double columns = count(0xAAAAu) + 2 * count(0xCCCCu), rows = count(0xF0F0u) + 2 * count(0xFF00u);
-  const double samples = std::popcount(mask);
+  const double samples = sample_count(mask);
   return {columns / samples, rows / samples};
 }
 

@@ -1,13 +1,14 @@
 #include "stages/render/shade.h"
 
+#include <algorithm>
 #include <array>
-#include <bit>
 #include <span>
 #include <utility>
 
 #include "format/base/srgb.h"
 #include "stages/base/parallel.h"
 #include "stages/measure/sampled_curve.h"
+#include "stages/render/edge_planes.h"
 #include "stages/render/fragment_shader.h"
 #include "stages/render/srgb_encoder.h"
 
@@ -28,7 +29,7 @@ Vec3f encoded(Vec3f light) { return curved<srgb_of_light>(light); }
 Vec3f decoded(Vec3f code) { return curved<light_of_srgb>(code); }
 
 float share_of(const RenderFragment& fragment) {
-  return static_cast<float>(std::popcount(fragment.mask)) / static_cast<float>(kSamples);
+  return static_cast<float>(render::sample_count(fragment.mask)) / static_cast<float>(kSamples);
 }
 
 /// The samples of one pixel, filled from the nearest fragment to the farthest.
@@ -121,6 +122,23 @@ class PixelShader {
   std::vector<FragmentColour> colours_;  // [fragment][variant]
 };
 
+/// Indices into places by squares of the picture: what a square reads of many textures stays in the cache
+/// while a row of the picture would have pushed it out.
+std::vector<std::uint32_t> by_squares(const std::vector<std::uint32_t>& places, std::uint32_t side_px) {
+  constexpr std::uint32_t kSquarePx = 16;
+  const std::uint32_t across = (side_px + kSquarePx - 1) / kSquarePx;
+  std::vector<std::uint32_t> out(places.size()), next(across + 1);
+  const auto column = [&](std::size_t i) { return places[i] % side_px / kSquarePx; };
+  for (std::size_t begin = 0, end = 0; begin < places.size(); begin = end) {
+    const std::uint32_t row = places[begin] / side_px / kSquarePx;
+    std::ranges::fill(next, 0u);
+    for (; end < places.size() && places[end] / side_px / kSquarePx == row; ++end) ++next[column(end) + 1];
+    for (std::uint32_t c = 0; c < across; ++c) next[c + 1] += next[c];
+    for (std::size_t i = begin; i < end; ++i) out[begin + next[column(i)]++] = static_cast<std::uint32_t>(i);
+  }
+  return out;
+}
+
 }  // namespace
 
 PictureVariants::PictureVariants(const Visibility& visibility, std::size_t count, Vec3f background)
@@ -153,11 +171,12 @@ PictureVariants shade_variants(const RenderScene& scene, const Visibility& visib
   const render::FragmentShader shader(scene, visibility, variants, textures, environment);
   PictureVariants out(visibility, variants.size(), environment.background);
   const std::vector<std::uint32_t>& places = out.places();
-  parallel_for(context, places.size(), 256, [&](std::size_t begin, std::size_t end) {
+  const std::vector<std::uint32_t> order = by_squares(places, visibility.side_px);
+  parallel_for(context, order.size(), 256, [&](std::size_t begin, std::size_t end) {
     PixelShader pixel(shader, out, environment.background);
     for (std::size_t i = begin; i < end; ++i) {
-      const std::uint32_t first = visibility.first[places[i]];
-      pixel.shade(i, {visibility.fragments.data() + first, visibility.first[places[i] + 1] - first});
+      const std::uint32_t at = order[i], place = places[at], first = visibility.first[place];
+      pixel.shade(at, {visibility.fragments.data() + first, visibility.first[place + 1] - first});
     }
   });
   return out;

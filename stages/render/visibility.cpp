@@ -60,15 +60,22 @@ void for_each_tile(const SampleBox& box, std::uint32_t tiles, F f) {
       f(static_cast<std::size_t>(y) * tiles + static_cast<std::size_t>(x));
 }
 
-Bins sorted_into_tiles(const std::vector<SampleBox>& boxes, std::uint32_t tiles) {
+/// Those that nobody looks at stay empty.
+Bins sorted_into_tiles(const std::vector<SampleBox>& boxes, std::uint32_t tiles,
+                       std::span<const std::uint8_t> bands) {
   Bins bins;
   bins.first.assign(static_cast<std::size_t>(tiles) * tiles + 1, 0);
   for (const SampleBox& box : boxes) for_each_tile(box, tiles, [&](std::size_t i) { ++bins.first[i + 1]; });
+  const auto looks_at = [&](std::size_t tile) { return bands.empty() || bands[tile / tiles] != 0; };
+  for (std::size_t i = 0; i + 1 < bins.first.size(); ++i)
+    if (!looks_at(i)) bins.first[i + 1] = 0;
   for (std::size_t i = 1; i < bins.first.size(); ++i) bins.first[i] += bins.first[i - 1];
   bins.triangles.resize(bins.first.back());
   std::vector<std::size_t> next(bins.first.begin(), bins.first.end() - 1);
   for (std::uint32_t t = 0; t < boxes.size(); ++t)
-    for_each_tile(boxes[t], tiles, [&](std::size_t i) { bins.triangles[next[i]++] = t; });
+    for_each_tile(boxes[t], tiles, [&](std::size_t i) {
+      if (looks_at(i)) bins.triangles[next[i]++] = t;
+    });
   return bins;
 }
 
@@ -96,9 +103,9 @@ TileInput tile_input(const RenderScene& scene, const RenderCamera& camera, std::
 /// Corners and boxes of triangles are gone when tiles are joined: 100,000 triangles have 5 MB of them.
 std::vector<TileFragments> look_into_tiles(const RenderScene& scene, const RenderCamera& camera,
                                            std::uint32_t side_px, std::uint32_t tiles,
-                                           const RunContext& context) {
+                                           std::span<const std::uint8_t> bands, const RunContext& context) {
   const TileInput input = tile_input(scene, camera, side_px, context);
-  const Bins bins = sorted_into_tiles(input.boxes, tiles);
+  const Bins bins = sorted_into_tiles(input.boxes, tiles, bands);
   std::vector<TileFragments> parts(bins.first.size() - 1);
   parallel_for(context, parts.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
@@ -148,12 +155,14 @@ RenderScene render_scene(const Mesh& mesh, const std::vector<RenderMaterial>& ma
 }
 
 Visibility look(const RenderScene& scene, const RenderCamera& camera, std::uint32_t side_px,
-                const RunContext& context) {
+                const RunContext& context, std::span<const std::uint8_t> bands) {
+  static_assert(kBandPx == kTilePx);
   require(side_px > 0 && side_px <= kMostSide, "look: a picture has 1 to 8192 pixels a side");
   check_camera(camera);
   check_scene(scene);
   const std::uint32_t tiles = (side_px + kTilePx - 1) / kTilePx;
-  std::vector<TileFragments> parts = look_into_tiles(scene, camera, side_px, tiles, context);
+  require(bands.empty() || bands.size() == tiles, "look: as many bands as the picture has");
+  std::vector<TileFragments> parts = look_into_tiles(scene, camera, side_px, tiles, bands, context);
   Visibility out;
   out.side_px = side_px;
   out.camera = camera;

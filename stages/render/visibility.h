@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "format/model/model.h"
@@ -51,14 +52,18 @@ struct Visibility {
   std::vector<RenderFragment> fragments;
 };
 
+/// Rows of a picture that are looked at together.
+inline constexpr std::uint32_t kBandPx = 32;
+
 /// Finds out what is seen on 4 x 4 samples a pixel. Opaque triangles: the nearest a sample, of equal ones the
 /// lowest index. Mask and blend: all that no opaque sample hides, ordered by their depth in the pixel, then
 /// index; at most the kMaxLayers nearest. Back faces are seen of double-sided materials only. A sample on an
 /// edge that two triangles share belongs to one of them. Triangles without area, and those with a corner that
 /// is not finite, are not seen. Same bits on every machine and for any thread count.
+/// `bands`: by kBandPx rows, 0 = nothing is looked at, as if nothing were there; empty: everything is.
 /// std::invalid_argument for a side of 0 or above 8192, a camera that is not finite, and indices of the scene
-/// beyond their tables.
+/// beyond their tables, and for bands of another number.
 Visibility look(const RenderScene& scene, const RenderCamera& camera, std::uint32_t side_px,
-                const RunContext& context);
+                const RunContext& context, std::span<const std::uint8_t> bands = {});
 
 }  // namespace texmesh

@@ -36,6 +36,23 @@ TEST(RenderTexture, MathAgreesWithTheStandardLibrary) {
   EXPECT_EQ(exp2_of(std::numeric_limits<float>::quiet_NaN()), exp2_of(-126));
 }
 
+TEST(RenderTexture, MipsOfNumbersAreRoundedMeans) {
+  for (const std::uint32_t channels : {1u, 2u, 3u, 4u}) {
+    std::uint32_t seed = 7;
+    const RenderTexture t = texture_of(32, 16, channels, false, [&](auto, auto, auto) {
+      return static_cast<std::uint8_t>((seed = seed * 1664525 + 1013904223) >> 24);
+    });
+    const Pixels &fine = t.levels[0], &coarse = t.levels[1];
+    for (std::uint32_t y = 0; y < 8; ++y)
+      for (std::uint32_t x = 0; x < 16; ++x)
+        for (std::uint32_t c = 0; c < channels; ++c) {
+          const int sum = fine.at(2 * x, 2 * y)[c] + fine.at(2 * x + 1, 2 * y)[c] +
+                          fine.at(2 * x, 2 * y + 1)[c] + fine.at(2 * x + 1, 2 * y + 1)[c];
+          EXPECT_EQ(coarse.at(x, y)[c], static_cast<int>(sum / 4.0 + 0.5));
+        }
+  }
+}
+
 TEST(RenderTexture, TexelsAreReadAtTheirMiddlesAndLinearlyBetween) {
   for (const Wrap wrap : {Wrap::kRepeat, Wrap::kClamp, Wrap::kMirror}) {
     EXPECT_NEAR(step_at(0.125f, wrap), 0, 1e-3);

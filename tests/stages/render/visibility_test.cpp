@@ -205,6 +205,24 @@ TEST(Visibility, SameForAnyNumberOfThreads) {
   expect_equal(scene.seen(camera, 150, 1), scene.seen(camera, 150, 8));
 }
 
+TEST(Visibility, OnlyBandsThatAreLookedAtShowSomething) {
+  Mesh mesh = testing::bumpy_sphere(20, 30);
+  mesh.triangle_material.assign(mesh.triangles.size(), 0);
+  const SmallScene scene{mesh, {plain({1, 1, 1, 1})}, {}};
+  const RenderCamera camera = perspective_camera(camera_of(3, 7, {}, 1.1));
+  constexpr std::uint32_t kSide = 100;
+  const std::vector<std::uint8_t> bands{0, 1, 0, 1};
+  const Visibility whole = scene.seen(camera, kSide), part = look(scene.scene(), camera, kSide, {}, bands);
+  ASSERT_EQ(part.first.size(), whole.first.size());
+  for (std::size_t p = 0; p + 1 < whole.first.size(); ++p) {
+    const std::uint32_t count = bands[p / kSide / kBandPx] ? whole.first[p + 1] - whole.first[p] : 0;
+    ASSERT_EQ(part.first[p + 1] - part.first[p], count) << p;
+    for (std::uint32_t k = 0; k < count; ++k)
+      EXPECT_EQ(part.fragments[part.first[p] + k].mask, whole.fragments[whole.first[p] + k].mask);
+  }
+  EXPECT_THROW(look(scene.scene(), camera, kSide, {}, std::vector<std::uint8_t>(3)), std::invalid_argument);
+}
+
 TEST(Visibility, AScaleOfANestTakesItsMaterialsFromTheSourceTriangles) {
   const Mesh mesh = joined(square(), square(), 1, {0, 0, 1});
   const std::vector<RenderMaterial> materials{plain({}), blended()};
