@@ -35,7 +35,8 @@ TEST(CollectionPage, FailuresComeFirstInTheWordsOfTheErrors) {
   ASSERT_NE(problems, std::string::npos);
   ASSERT_NE(models, std::string::npos);
   EXPECT_LT(failures, problems);
-  EXPECT_NE(html.find("<table class=\"sentences\">"), std::string::npos) << "messages are laid out as numbers are";
+  EXPECT_NE(html.find("<table class=\"sentences\">"), std::string::npos)
+      << "messages are laid out as numbers are";
   EXPECT_LT(problems, models);
   EXPECT_NE(html.find("line 1: &lt;nothing&gt;"), std::string::npos);
   EXPECT_NE(html.find("not reached"), std::string::npos);
