@@ -14,7 +14,7 @@
 
 namespace texmesh {
 
-inline constexpr int kLadderVersion = 18;
+inline constexpr int kLadderVersion = 19;
 
 /// Side of the smallest fragments that are coded progressively: below it scans' headers and tables cost more
 /// than refinement saves.

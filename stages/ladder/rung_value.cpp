@@ -206,6 +206,31 @@ std::size_t next_to_go(const TextureWays& texture, const std::vector<std::uint8_
   return next;
 }
 
+/// Where all still take too much, since the last pair of a level stays: cheaper pairs in the place of such
+/// ones, those first that lose least for the bytes they save. What a sample says of bytes is some hundredths
+/// off.
+void take_cheaper(const TextureWays& texture, std::vector<std::uint8_t>& keep) {
+  constexpr double kRoom = 0.97;
+  while (bytes_of(texture, keep) > texture.most_bytes) {
+    std::size_t out = kPreview, in = kPreview;
+    double least = 0;
+    for (std::size_t k = 0; k < keep.size(); ++k)
+      for (std::size_t c = 0; c < keep.size(); ++c) {
+        const RungPair &dear = texture.pairs[k], &cheap = texture.pairs[c];
+        if (!keep[k] || dear.fixed || keep[c] || cheap.level != dear.level || cheap.bytes >= dear.bytes ||
+            cheap.loss[cheap.level] >= texture.preview_loss[cheap.level])
+          continue;
+        const auto saved = static_cast<double>(dear.bytes - cheap.bytes);
+        const double enough = bytes_of(texture, keep) - kRoom * texture.most_bytes;
+        const double rise = std::max(cheap.loss[cheap.level] - dear.loss[dear.level], 0.0);
+        const double per_byte = (rise + kUnseen) / std::min(saved, enough);
+        if (in == kPreview || per_byte < least) out = k, in = c, least = per_byte;
+      }
+    if (in == kPreview) return;
+    keep[out] = 0, keep[in] = 1;
+  }
+}
+
 /// `keep` of one texture without what is not worth its bytes.
 void drop_pairs(const TextureWays& texture, const GivenBytes& given, const Asked& asked,
                 std::vector<std::uint8_t>& keep) {
@@ -224,9 +249,11 @@ void drop_pairs(const TextureWays& texture, const GivenBytes& given, const Asked
     }
   };
   drop();
-  if (!bound || !texture.closes_gaps) return;
-  swap_pairs(texture, given, keep);
-  drop();
+  if (bound && texture.closes_gaps) {
+    swap_pairs(texture, given, keep);
+    drop();
+  }
+  take_cheaper(texture, keep);
 }
 
 }  // namespace

@@ -47,7 +47,8 @@ std::vector<TextureLoad> texture_loads();
 /// neighbours, of all that no other pair beats in bytes and loss, would be more than 2.5 times apart in
 /// bytes, when the finer one of them saves what somebody sees. Where all take too much the least worthy of
 /// these go, as the last ones; then such a texture's pairs are swapped (swap_pairs() of rung_gaps.h). Both
-/// only where TextureWays::closes_gaps. Pure; same result anywhere.
+/// only where TextureWays::closes_gaps. What then still takes too much has cheaper pairs in the place of the
+/// last ones of levels. Pure; same result anywhere.
 std::vector<std::vector<std::uint8_t>> pairs_worth_storing(const std::vector<TextureWays>& textures,
                                                            const std::vector<TextureLoad>& loads, double gain,
                                                            double least_share);

@@ -102,6 +102,7 @@ TEST(GoldenPackages, ShowTheirFeatures) {
       {"progressive", "textures.json", R"("codec":"jpeg-progressive")"},
       {"requantised", "textures.json", R"("sourceRung":true)"},
       {"png-normals", "textures.json", R"("role":"normal")"},
+      {"png-normals", "textures.json", R"("codec":"jpeg-xy")"},
       {"alpha", "textures.json", R"("role":"alpha")"},
       {"source", "textures.json", R"("source":"png")"},
       {"nodes", "mesh/s00.glb", R"("name":"middle")"},

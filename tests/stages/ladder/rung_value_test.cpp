@@ -44,6 +44,22 @@ TEST(RungValue, LoadsAreOrdinaryOnesLessMeshAndTables) {
   }
 }
 
+TEST(RungValue, TheLastPairOfALevelIsACheaperOneWhereAllTakeTooMuch) {
+  TextureWays one = texture({{150'000, 0.001}});
+  one.pairs[0].fixed = true;
+  one.closes_gaps = false;
+  one.preview_loss = {0.5, 0.4};
+  one.pairs.push_back({1, 0, 20'000, {0.5, 0.41}, false});  // no better than the preview
+  one.pairs.push_back({1, 1, 60'000, {0.3, 0.1}, false});
+  one.pairs.push_back({1, 2, 110'000, {0.25, 0.03}, false});
+  one.pairs.push_back({1, 3, 140'000, {0.24, 0.01}, false});
+  EXPECT_EQ(kept(one, -1, 0), (Rungs{0, 2, 3, 4}));
+  for (const auto& [most, rest] : {std::pair{300e3, 4u}, {270e3, 3u}, {220e3, 2u}, {180e3, 2u}}) {
+    one.most_bytes = most;
+    EXPECT_EQ(kept(one), (Rungs{0, rest})) << most;
+  }
+}
+
 TEST(RungValue, ADominatedRungGoes) {
   EXPECT_EQ(kept(texture({{500'000, 0.1}, {600'000, 0.12}, {5'000'000, 0.01}})), (Rungs{0, 2}));
 }
