@@ -158,9 +158,6 @@ double collapse(const ConditionedMesh& mesh, const ScaleMap& scale_map,
   }
   result.collapses = engine.collapses();
   append_new_wedges(engine.mesh(), result.mesh, result.scales);
-<<<<<<< HEAD
-  measure_scale_errors(mesh.component, result, context);
-=======
   return engine.mesh().diagonal();
 }
 
@@ -178,8 +175,7 @@ NestedScales simplify(const ConditionedMesh& mesh, const ScaleMap& scale_map,
   const std::vector<std::uint32_t> target = vertex_targets(scale_map, options);
   std::string floor;
   const double diagonal = collapse(mesh, scale_map, target, options, context, result, floor);
-  measure_scale_errors(mesh.component, result.mesh, result.scales, context);
->>>>>>> big
+  measure_scale_errors(mesh.component, result, context);
   const std::size_t taken = result.scales.size();
   drop_far_scales(result, options.max_error * diagonal);
   if (result.scales.size() < taken) floor = "every coarser scale exceeds max_error";
