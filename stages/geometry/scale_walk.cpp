@@ -2,8 +2,6 @@
 
 #include <limits>
 
-#include "format/base/no_index.h"
-
 namespace texmesh {
 namespace {
 

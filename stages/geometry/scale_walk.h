@@ -3,6 +3,7 @@
 #include <span>
 #include <vector>
 
+#include "format/base/no_index.h"
 #include "stages/data/nested_scales.h"
 #include "stages/geometry/distance.h"
 

@@ -11,6 +11,8 @@
 #include "format/base/portable_math.h"
 #include "format/rules/jnd_choice.h"
 #include "stages/base/parallel.h"
+#include "stages/geometry/distance.h"
+#include "stages/geometry/scale_walk.h"
 #include "stages/perceptual_values/scale_comparison.h"
 
 namespace texmesh {

@@ -24,8 +24,8 @@ constexpr double kManyCapped = 0.1;
 constexpr double kCluster = 0.5;
 
 constexpr double kTrimmed = 0.02;  // of a level; with 0 a saxophone takes a third longer
-/// What the accumulators of one recurrence may take. Splitting the flow costs up to two thirds more terms.
-constexpr std::size_t kFlowBytes = std::size_t{64} << 20, kLeastTimesAtOnce = 8;
+/// What the accumulators of one recurrence may take; simplification takes more. Splitting costs more terms.
+constexpr std::size_t kFlowBytes = std::size_t{256} << 20, kLeastTimesAtOnce = 8;
 constexpr std::size_t kCrossingGrain = 4096;
 constexpr std::uint8_t kExtremum = 1, kCrossing = 2;
 
