@@ -12,7 +12,6 @@ namespace {
 /// Of all pixels of all views: where S_0 covers less, the pictures compare next to nothing. A thread across
 /// the whole picture, one pixel wide, covers 0.5 %.
 constexpr double kLeastCovered = 0.002;
-constexpr double kLookedAtPx = 192;  // displayed height at which the coverage is looked at
 
 BoundingSphere sphere_of(const Mesh& mesh) {
   if (mesh.positions.empty()) throw StageError("quality", "S_0", "positions", "none");
@@ -42,8 +41,24 @@ BoundingSphere crowd_sphere(const Mesh& mesh, const BoundingSphere& bounds) {
 
 struct Seen {
   std::uint64_t pixels = 0, of = 0;
+  std::vector<ShownRows> rows;
   std::vector<std::uint32_t> first_levels;
 };
+
+ShownRows shown_rows(const Visibility& view) {
+  ShownRows out;
+  out.pixels.resize(view.side_px);
+  for (std::size_t i = 0; i + 1 < view.first.size(); ++i)
+    out.pixels[i / view.side_px] += view.first[i] < view.first[i + 1];
+  const auto shows = [](std::uint32_t pixels) { return pixels > 0; };
+  const auto first = std::ranges::find_if(out.pixels, shows);
+  if (first == out.pixels.end()) return out;
+  const auto last = std::find_if(out.pixels.rbegin(), out.pixels.rend(), shows);
+  const double side = view.side_px;
+  out.first = static_cast<double>(first - out.pixels.begin()) / side;
+  out.end = static_cast<double>(out.pixels.rend() - last) / side;
+  return out;
+}
 
 Seen look_around(const RenderScene& scene, const Frame& frame, const TextureSizes& sizes, int views,
                  double largest_px, const RunContext& context) {
@@ -53,7 +68,8 @@ Seen look_around(const RenderScene& scene, const Frame& frame, const TextureSize
     context.check_cancelled();
     const PicturePlace place = place_picture(frame, v, views, kLookedAtPx);
     const Visibility view = look(scene, place.camera, place.side_px, context);
-    for (std::size_t i = 0; i + 1 < view.first.size(); ++i) seen.pixels += view.first[i] < view.first[i + 1];
+    seen.rows.push_back(shown_rows(view));
+    for (const std::uint32_t pixels : seen.rows.back().pixels) seen.pixels += pixels;
     seen.of += static_cast<std::uint64_t>(place.side_px) * place.side_px;
     levels.add(scene, view, sizes, largest_px / kLookedAtPx);
   }
@@ -92,7 +108,7 @@ PicturePlace place_picture(const Frame& frame, int view, int views, double displ
 
 Coverage frame_object(const RenderScene& scene, const TextureSizes& sizes, double extent, int views,
                       double largest_px, Notes& notes, const RunContext& context) {
-  Coverage out{{sphere_of(*scene.mesh), extent}, 0, {}};
+  Coverage out{{sphere_of(*scene.mesh), extent}, 0, {}, {}};
   // A sphere around a box is at most so much wider than its longest side: O_V of other positions than these
   // would ask for huge pictures.
   out.frame.extent = std::max(extent, 1.15 * out.frame.sphere.radius);
@@ -113,6 +129,7 @@ Coverage frame_object(const RenderScene& scene, const TextureSizes& sizes, doubl
     }
   }
   out.pixels = seen.pixels;
+  out.rows = std::move(seen.rows);
   out.first_levels = std::move(seen.first_levels);
   return out;
 }

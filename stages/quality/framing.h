@@ -5,6 +5,7 @@
 
 #include "format/base/box.h"
 #include "format/base/note.h"
+#include "stages/quality/bands.h"
 #include "stages/quality/shown_textures.h"
 #include "stages/render/visibility.h"
 
@@ -35,10 +36,13 @@ PicturePlace place_picture(const Frame& frame, int view, int views, double displ
 
 using TextureSizes = std::vector<Vec2<std::uint32_t>>;  // per shown texture, px
 
+inline constexpr double kLookedAtPx = 192;  // displayed height at which the coverage is looked at
+
 /// What the views show of S_0.
 struct Coverage {
   Frame frame;
-  std::uint64_t pixels = 0;
+  std::uint64_t pixels = 0;                 // of all views, at kLookedAtPx
+  std::vector<ShownRows> rows;              // by view
   std::vector<std::uint32_t> first_levels;  // per shown texture, the finest mip that pictures ask for
 };
 

@@ -369,6 +369,9 @@ MeasuredQuality measure_quality(const NestedScales& scales, const PerceptualValu
     add_warning(result.notes, "quality-not-measured", "",
                 "no picture shows anything of the object; its scales count as equal");
   studio.frame = seen.frame;
+  studio.rows = seen.rows;
+  studio.pixels_of_unit =
+      static_cast<double>(seen.pixels) / (options.views * quality::kLookedAtPx * quality::kLookedAtPx);
   studio.environment = studio_environment();
   for (std::size_t t = 0; t < shown.textures.size(); ++t)
     studio.textures.push_back(source_texture(

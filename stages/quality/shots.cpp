@@ -28,14 +28,22 @@ std::vector<SizePictures::ScaleShots> SizePictures::by_scale(const std::vector<S
 }
 
 /// One picture per list of materials.
-PictureVariants SizePictures::pictures(std::size_t scale, const PicturePlace& place,
+PictureVariants SizePictures::pictures(std::size_t scale, const PictureView& at,
                                        const std::vector<const Materials*>& materials,
-                                       const RunContext& context) const {
-  RenderScene scene = studio_.scenes[shown_scale(studio_.scenes, scale, displayed_px_)];
+                                       const RunContext& context) {
+  const std::size_t shown = shown_scale(studio_.scenes, scale, displayed_px_);
+  RenderScene scene = studio_.scenes[shown];
   scene.materials = materials.front();
   scene.texture_count = studio_.textures.size();
-  return shade_variants(scene, look(scene, place.camera, place.side_px, context), materials, studio_.textures,
-                        studio_.environment, context);
+  const auto shaded = [&](const Visibility& seen) {
+    return shade_variants(scene, seen, materials, studio_.textures, studio_.environment, context);
+  };
+  const auto look_here = [&] {
+    return look(scene, at.place.camera, at.place.side_px, context, at.bands.rendered);
+  };
+  if (shown > 0) return shaded(look_here());
+  if (!finest_ || finest_->first != at.view) finest_ = {at.view, look_here()};
+  return shaded(finest_->second);
 }
 
 Loss SizePictures::compare(const Reference& reference, const Picture& test) const {
@@ -52,22 +60,29 @@ Loss SizePictures::compare(const Reference& reference, const Picture& test) cons
 void SizePictures::compare_view(std::size_t view, const std::vector<Shot>& shots,
                                 const std::vector<std::size_t>& taken, std::vector<Losses>& out,
                                 const RunContext& context) {
-  const PicturePlace place =
-      place_picture(studio_.frame, static_cast<int>(view), studio_.views.views, displayed_px_);
+  PictureView at{
+      view, place_picture(studio_.frame, static_cast<int>(view), studio_.views.views, displayed_px_), {}};
+  at.bands = choose_bands(studio_.rows[view], at.place.side_px,
+                          studio_.pixels_of_unit * displayed_px_ * displayed_px_);
+  const auto picture_of = [&at](const PictureVariants& shown, std::size_t i) {
+    Picture whole = shown.picture(i);
+    at.bands.cut(whole);
+    return whole;
+  };
   const auto compare_group = [&](const ScaleShots& group, const Reference* seen, const RunContext& run) {
     std::vector<const Materials*> materials;
     if (!seen) materials.push_back(&source_);
     for (const std::size_t i : group.shots) materials.push_back(shots[i].materials);
     if (materials.empty()) return;
-    const PictureVariants shown = pictures(group.scale, place, materials, run);
+    const PictureVariants shown = pictures(group.scale, at, materials, run);
     const std::size_t first = seen ? 0 : 1;
     if (!seen) {
-      const Picture whole = shown.picture(0);
-      seen = &(seen_[view] = {with_ssim_ ? prepare_luma(whole) : LumaPicture{}, prepare_flip(whole)});
+      const Picture source = picture_of(shown, 0);
+      seen = &(seen_[view] = {with_ssim_ ? prepare_luma(source) : LumaPicture{}, prepare_flip(source)});
     }
     parallel_for(run, group.shots.size(), 1, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i)
-        out[group.shots[i]][view] = compare(*seen, shown.picture(first + i));
+        out[group.shots[i]][view] = compare(*seen, picture_of(shown, first + i));
     });
   };
   std::vector<ScaleShots> groups = by_scale(shots, taken);

@@ -2,6 +2,8 @@
 // Inside the room only: pictures beside S_0's.
 #include <cstdint>
 #include <map>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "stages/measure/flip.h"
@@ -17,6 +19,8 @@ using Materials = std::vector<RenderMaterial>;
 struct Studio {
   Frame frame;
   ViewChoice views;
+  std::vector<ShownRows> rows;  // by view
+  double pixels_of_unit = 0;    // that views show on average at a displayed height of 1 px
   RenderEnvironment environment;
   std::vector<RenderScene> scenes;      // per kept scale, S_0 first
   std::vector<RenderTexture> textures;  // the source's, then coded ones for the time that they are needed
@@ -43,8 +47,9 @@ struct Shot {
 /// Per view; nothing where the shot was not taken.
 using Losses = std::vector<Loss>;
 
-/// Takes shots at one displayed height. The reference is S_0 with `source`, prepared once for each view that
-/// any shot asks for. One view at a time is in memory, but for what FLIP and SSIM compare of the references.
+/// Takes shots at one displayed height, large ones in bands of rows (bands.h). The reference is S_0 with
+/// `source`, prepared once for each view that any shot asks for. One view at a time is in memory, but for
+/// what FLIP and SSIM compare of the references.
 class SizePictures {
  public:
   /// `with_ssim`: else dssim stays 0. `studio` and `source` must outlive the pictures; the studio's textures
@@ -65,8 +70,14 @@ class SizePictures {
   };
   static std::vector<ScaleShots> by_scale(const std::vector<Shot>& shots,
                                           const std::vector<std::size_t>& taken);
-  PictureVariants pictures(std::size_t scale, const PicturePlace& place,
-                           const std::vector<const Materials*>& materials, const RunContext& context) const;
+  /// Where and in which rows a view is rendered.
+  struct PictureView {
+    std::size_t view = 0;
+    PicturePlace place;
+    Bands bands;
+  };
+  PictureVariants pictures(std::size_t scale, const PictureView& at,
+                           const std::vector<const Materials*>& materials, const RunContext& context);
   Loss compare(const Reference& reference, const Picture& test) const;
   void compare_view(std::size_t view, const std::vector<Shot>& shots, const std::vector<std::size_t>& taken,
                     std::vector<Losses>& out, const RunContext& context);
@@ -75,6 +86,8 @@ class SizePictures {
   double displayed_px_;
   bool with_ssim_;
   std::map<std::size_t, Reference> seen_;  // by view
+  // What the last view shows of S_0: shots of large textures come one after the other.
+  std::optional<std::pair<std::size_t, Visibility>> finest_;
 };
 
 /// Of all views together, or of those in which `like` shows anything.
