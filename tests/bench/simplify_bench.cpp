@@ -59,18 +59,22 @@ ScaleMap made_scale_map(std::size_t positions) {
 }
 
 /// The collapses to every scale's count of vertices; the triangles of each.
-std::vector<NestedScale> collapse(const ConditionedMesh& mesh, const ScaleMap& map,
-                                  const SimplificationOptions& options, const RunContext& context) {
+NestedScales collapse(const ConditionedMesh& mesh, const ScaleMap& map, const SimplificationOptions& options,
+                      const RunContext& context) {
   CollapseEngine engine(mesh, map, options, context);
-  std::vector<NestedScale> scales(1);
+  NestedScales nested;
+  std::vector<NestedScale>& scales = nested.scales;
+  scales.resize(1);
   engine.mesh().snapshot(scales[0].triangles, scales[0].triangle_source);
   for (int i = 1; i <= map.scales; ++i) {
     std::uint32_t left = 0;
     for (std::uint8_t p : map.persistence) left += p >= i;
     engine.run_to(left, i, context);
     engine.mesh().snapshot(scales.emplace_back().triangles, scales.back().triangle_source);
+    scales.back().collapse_count = engine.collapses().size();
   }
-  return scales;
+  nested.collapses = engine.collapses();
+  return nested;
 }
 
 std::size_t meshopt_chain(const Mesh& mesh, const std::vector<Vec3f>& points,
@@ -103,22 +107,23 @@ Row measure(int triangles, int repeats, int threads) {
   const ScaleMap map = made_scale_map(mesh.mesh.positions.size());
   std::vector<Vec3f> points;
   for (std::uint32_t p : mesh.mesh.wedge_position) points.push_back(mesh.mesh.positions[p]);
-  std::vector<NestedScale> scales;
+  NestedScales nested;
+  const std::vector<NestedScale>& scales = nested.scales;
   Row row;
   row.triangles = static_cast<double>(mesh.mesh.triangles.size());
   SimplificationOptions plain;
   plain.uv_weight = plain.normal_weight = plain.colour_weight = 0;
-  row.plain = best_of(repeats, [&] { scales = collapse(mesh, map, plain, context); });
-  row.attributes = best_of(repeats, [&] { scales = collapse(mesh, map, {}, context); });
+  row.plain = best_of(repeats, [&] { nested = collapse(mesh, map, plain, context); });
+  row.attributes = best_of(repeats, [&] { nested = collapse(mesh, map, {}, context); });
   std::size_t left = 0;
   row.peer = best_of(repeats, [&] { left = meshopt_chain(mesh.mesh, points, scales); });
-  Mesh whole =
-      mesh.mesh;  // relaxed junctions' wedges are left out: their faces keep the count, not the place
-  for (NestedScale& s : scales)
+  // Relaxed junctions' wedges are left out: their faces keep the count, not the place.
+  nested.mesh = mesh.mesh;
+  for (NestedScale& s : nested.scales)
     std::erase_if(s.triangles, [&](const Triangle& t) {
-      return std::max({t[0], t[1], t[2]}) >= whole.wedge_count();
+      return std::max({t[0], t[1], t[2]}) >= nested.mesh.wedge_count();
     });
-  row.error = best_of(repeats, [&] { measure_scale_errors(mesh.component, whole, scales, context); });
+  row.error = best_of(repeats, [&] { measure_scale_errors(mesh.component, nested, context); });
   std::printf("%9.0f %8zu %8zu | %6.2f %6.2f | %6.2f %6.2f %5.2f | %6.2f %6.2f %5.2f | %6.2f %6.2f\n",
               row.triangles, scales.back().triangles.size(), left, row.peer.cpu, row.peer.wall, row.plain.cpu,
               row.plain.wall, row.plain.cpu / row.peer.cpu, row.attributes.cpu, row.attributes.wall,
