@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <optional>
 
 #include "delivery/cpp/decide/fragment_list.h"
 #include "format/container/layout.h"
@@ -11,6 +12,7 @@
 #include "pipeline/extract/glb/joined_jpeg.h"
 #include "pipeline/extract/glb/plain_file.h"
 #include "pipeline/extract/glb/scale_file.h"
+#include "pipeline/extract/glb/scale_model.h"
 #include "pipeline/extract/glb/standalone_glb.h"
 #include "pipeline/extract/glb/texture_source.h"
 #include "pipeline/extract/proxy/proxy_search.h"
@@ -73,11 +75,29 @@ bool takes_coefficients(PackageReader& package, const ExtractRequest& request, c
          package.textures()[plane].codec == Codec::kJpeg;
 }
 
-FileImageData coefficient_file(PackageReader& package, const ExtractRequest& request, std::uint32_t plane,
-                               const RunContext& context, ExtractedImage& row) {
+/// Which texels of an image S_0 shows; S_0 is read when it is first asked for.
+class ShownTexels {
+ public:
+  ShownTexels(PackageReader& package, const RunContext& context) : package_(package), context_(context) {}
+  std::vector<std::uint8_t> of(const PackageImage& image) {
+    if (!finest_) finest_ = read_model(scale_file(package_, 0, context_), mesh_path(0), context_);
+    return shown_texels(finest_->mesh, *finest_, image.image, image.width_px, image.height_px);
+  }
+
+ private:
+  PackageReader& package_;
+  const RunContext& context_;
+  std::optional<Model> finest_;
+};
+
+FileImageData coefficient_file(PackageReader& package, const ExtractRequest& request,
+                               const PackageImage& image, ShownTexels& shown, const RunContext& context,
+                               ExtractedImage& row) {
+  const std::uint32_t plane = image.plane;
   const std::size_t rung =
       std::min<std::size_t>(request.rung, package.tables().planes.at(plane).rung_count() - 1);
-  const JoinedJpeg joined(package, plane, rung, context);
+  JoinedJpeg joined(package, plane, rung, context);
+  joined.fill_unseen(shown.of(image));
   row.width_px = joined.width_px();
   row.height_px = joined.height_px();
   row.quality = quality_of_rung(package, plane, request.rung);
@@ -104,14 +124,14 @@ FileImageData coded_file(PackageReader& package, const ExtractRequest& request, 
 }
 
 FileImageData image_file(PackageReader& package, const ExtractRequest& request, const PackageImage& image,
-                         const std::map<std::uint32_t, std::uint32_t>& planes, const RunContext& context,
-                         ExtractedImage& row) {
+                         const std::map<std::uint32_t, std::uint32_t>& planes, ShownTexels& shown,
+                         const RunContext& context, ExtractedImage& row) {
   const std::uint32_t plane = planes.at(image.plane);
   row.image = image.image;
   row.role = image.role;
   row.format = format_of(request, image.alpha_plane.has_value());
   FileImageData file = takes_coefficients(package, request, image, plane)
-                           ? coefficient_file(package, request, plane, context, row)
+                           ? coefficient_file(package, request, image, shown, context, row)
                            : coded_file(package, request, image, plane, context, row);
   row.bytes = file.bytes.size();
   return file;
@@ -136,9 +156,11 @@ Extracted extract_whole(PackageReader& package, const ExtractRequest& request, c
   const std::map<std::uint32_t, std::uint32_t> planes = shown_planes(package, request);
   const std::vector<std::uint32_t> used = file.source_images();
   std::map<std::uint32_t, FileImageData> images;
+  ShownTexels shown(package, context);
   for (const PackageImage& image : package_images(package)) {
     if (std::find(used.begin(), used.end(), image.image) == used.end()) continue;
-    images[image.image] = image_file(package, request, image, planes, context, out.images.emplace_back());
+    images[image.image] =
+        image_file(package, request, image, planes, shown, context, out.images.emplace_back());
     context.report(static_cast<double>(images.size()) / static_cast<double>(used.size() + 1));
   }
   file.set_images(images);

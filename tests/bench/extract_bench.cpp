@@ -2,7 +2,7 @@
 //
 //   extract_bench SOURCE PACKAGE --bytes 100,250,500,1000 [--peers DIR] [--views 6] [--size 512] [--keep DIR]
 //                 [--neighbours] [--unlit] [--reencoded]
-//   extract_bench SOURCE --score A.glb,B.glb
+//   extract_bench SOURCE --score A.glb,B.glb [--sheet FILE.png]
 //
 // Renders SOURCE and each file lit (texmesh render, the studio's light; --unlit: base colours alone) from the
 // same views and prints mean LDR-FLIP over the pixels of the object (0 = equal). --neighbours also makes the
@@ -10,7 +10,8 @@
 // images encoded anew at the one JPEG quality that the bytes allow, or as they are where they fit, on the
 // package's S_0 (--uncoded: on the source's own mesh, which counts as S_0's bytes all the same). DIR holds
 // files that tests/bench/extract_peers has made of SOURCE; the best one within the bytes counts. The views
-// are others than those that extract itself compares.
+// are others than those that extract itself compares. --sheet draws them: a row of the source, and one of
+// each file.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -31,6 +32,7 @@
 #include "pipeline/render/picture_sheet.h"
 #include "pipeline/render/rendered_model.h"
 #include "stages/image/decode_image.h"
+#include "stages/image/png_writer.h"
 #include "stages/measure/flip.h"
 #include "stages/render/shade.h"
 
@@ -74,14 +76,18 @@ class Scorer {
       const Picture picture = picture_of(model, camera);
       level_ += mean_level(picture) / views;
       reference_.push_back(prepare_flip(picture));
+      drawn_.push_back(encode_srgb(picture));
     }
   }
   double level() const { return level_; }
-  Score score(const Bytes& glb, const std::string& name) const {
+  /// The source's views.
+  const std::vector<Pixels>& drawn() const { return drawn_; }
+  /// `drawn`: gets the views, too.
+  Score score(const Bytes& glb, const std::string& name, std::vector<Pixels>* drawn = nullptr) const {
     NoFiles none;
-    return score(import_model(name, glb, none, {}, context_));
+    return score(import_model(name, glb, none, {}, context_), drawn);
   }
-  Score score(ImportedModel imported) const {
+  Score score(ImportedModel imported, std::vector<Pixels>* drawn = nullptr) const {
     RenderedModel model = rendered_model(std::move(imported), context_);
     if (unlit_) make_unlit(model);
     for (Vec3f& p : model.mesh.positions) p = to_float(to_double(p) + model.mesh.origin - origin_);
@@ -90,6 +96,7 @@ class Scorer {
       const Picture picture = picture_of(model, cameras_[v]);
       out.flip += flip_of(reference_[v], prepare_flip(picture)) / static_cast<double>(cameras_.size());
       out.level += mean_level(picture) / static_cast<double>(cameras_.size());
+      if (drawn) drawn->push_back(encode_srgb(picture));
     }
     return out;
   }
@@ -107,7 +114,21 @@ class Scorer {
   std::vector<RenderCamera> cameras_;
   RenderEnvironment environment_;
   std::vector<FlipPicture> reference_;
+  std::vector<Pixels> drawn_;
 };
+
+/// Rows of as many square pictures each, as a PNG.
+void write_sheet(const std::string& file, const std::vector<std::vector<Pixels>>& rows) {
+  const std::uint32_t side_px = rows.front().front().width_px;
+  const auto columns = static_cast<std::uint32_t>(rows.front().size());
+  Pixels sheet{columns * side_px, static_cast<std::uint32_t>(rows.size()) * side_px, 3, {}};
+  sheet.data.resize(std::size_t{sheet.width_px} * sheet.height_px * 3);
+  for (std::uint32_t r = 0; r < rows.size(); ++r)
+    for (std::uint32_t c = 0; c < columns; ++c) paste(rows[r][c], c * side_px, r * side_px, sheet);
+  const Bytes png = write_png(sheet);
+  std::ofstream(file, std::ios::binary)
+      .write(reinterpret_cast<const char*>(png.data()), static_cast<std::streamsize>(png.size()));
+}
 
 struct Scored {
   std::string name;
@@ -203,7 +224,7 @@ Scored reencoded(const ImportedModel& source, std::uint64_t mesh_bytes, std::uin
 }
 
 struct Arguments {
-  std::string source, package, peers, keep;
+  std::string source, package, peers, keep, sheet;
   std::vector<double> bytes{100, 250, 500, 1000};
   std::vector<std::string> score;
   int views = 6, size = 512;
@@ -278,6 +299,18 @@ void print_table(const Arguments& a, const Scorer& scorer, const RunContext& con
   if (rows) std::cout << fmt::format("geometric mean of {} ratios: {:.3f}\n", rows, std::exp(logs / rows));
 }
 
+void print_scores(const Arguments& a, const Scorer& scorer) {
+  std::vector<std::vector<Pixels>> rows{scorer.drawn()};
+  std::cout << fmt::format("{}: mean level {:.1f}\n", a.source, scorer.level());
+  for (const std::string& file : a.score) {
+    const Bytes bytes = read_bytes(file);
+    const Score found = scorer.score(bytes, file, &rows.emplace_back());
+    std::cout << fmt::format("{}: {} bytes, FLIP {:.4f}, mean level {:.1f}\n", file, bytes.size(), found.flip,
+                             found.level);
+  }
+  if (!a.sheet.empty()) write_sheet(a.sheet, rows);
+}
+
 }  // namespace
 }  // namespace texmesh
 
@@ -291,6 +324,7 @@ int main(int argc, char** argv) {
   app.add_option("--peers", a.peers, "Folder of files to compare with");
   app.add_option("--keep", a.keep, "Folder for the extracted files");
   app.add_option("--score", a.score, "Only rate these files")->delimiter(',');
+  app.add_option("--sheet", a.sheet, "Draw the source and the files of --score here (PNG)");
   app.add_option("--views", a.views)->check(CLI::Range(1, 100))->capture_default_str();
   app.add_option("--size", a.size)->check(CLI::Range(32, 4096))->capture_default_str();
   app.add_flag("--unlit", a.unlit, "Compare base colours alone");
@@ -302,13 +336,7 @@ int main(int argc, char** argv) {
   context.threads = 2;
   try {
     const Scorer scorer(a.source, a.views, static_cast<std::uint32_t>(a.size), a.unlit, context);
-    if (!a.score.empty()) std::cout << fmt::format("{}: mean level {:.1f}\n", a.source, scorer.level());
-    for (const std::string& file : a.score) {
-      const Bytes bytes = read_bytes(file);
-      const Score found = scorer.score(bytes, file);
-      std::cout << fmt::format("{}: {} bytes, FLIP {:.4f}, mean level {:.1f}\n", file, bytes.size(),
-                               found.flip, found.level);
-    }
+    if (!a.score.empty()) print_scores(a, scorer);
     if (!a.package.empty()) print_table(a, scorer, context);
   } catch (const std::exception& e) {
     std::cerr << e.what() << '\n';

@@ -6,9 +6,11 @@
 #include <memory>
 #include <numeric>
 #include <set>
+#include <utility>
 
 #include "pipeline/extract/budget/budget_file.h"
 #include "pipeline/extract/budget/budget_source.h"
+#include "pipeline/extract/budget/file_looks.h"
 #include "pipeline/extract/budget/mesh_candidates.h"
 #include "pipeline/extract/glb/standalone_glb.h"
 #include "pipeline/extract/proxy/proxy_search.h"
@@ -20,7 +22,10 @@ constexpr int kFirstCoding = 2;
 constexpr double kNothing = 1e9;
 constexpr double kFewestExtraBits = -3, kMostExtraBits = 9;
 constexpr int kMeshTries = 12;
-constexpr double kSurely = 0.9;                         // of a loss that others tell
+constexpr double kSurely = 0.9;  // of a loss that others tell
+constexpr std::uint64_t kLookAtFilesBelow = 200000;
+constexpr double kLikely = 1.2;  // times the least joined loss
+constexpr std::size_t kMostLikely = 4;
 constexpr double kUsualBytes = 3.5, kLeastBytes = 1.5;  // of a coded triangle
 
 /// What searches for several numbers of bytes share.
@@ -52,7 +57,8 @@ class BudgetSearch {
         meshes_(shared.meshes),
         coder_(shared.coder),
         curves_(shared.curves),
-        filler_(source_, coder_) {}
+        filler_(source_, coder_),
+        looks_(source_, meshes_, coder_, filler_) {}
 
   /// `report`: parts of the way.
   Extracted run(const std::function<void(double)>& report) {
@@ -60,14 +66,41 @@ class BudgetSearch {
                     kUsualBytes * static_cast<double>(scales()[start().scale].triangles));
     report(0.4);
     const MeshKey best = choose_mesh();
+    report(0.6);
+    FoundFile found = looks_.file_of(best, allocation_of(best));
+    if (source_.request.bytes <= kLookAtFilesBelow && filler_.fits(found.file)) look_at_files(found);
     report(0.7);
-    BudgetFile file = filler_.fill(meshes_.at(best), curves_.allocate(bytes_left(meshes_.at(best))));
-    const MeshKey filled = filler_.fits(file) && !filler_.fills(file) ? fill_by_mesh(best, file) : best;
-    return finish(filled, std::move(file));
+    const bool fitting = filler_.fits(found.file) && !filler_.fills(found.file);
+    const MeshKey filled = fitting ? fill_by_mesh(found.key, found.file) : found.key;
+    return finish(filled, std::move(found.file));
   }
 
  private:
   const std::vector<ManifestScale>& scales() const { return source_.package.manifest().scales; }
+
+  Allocation allocation_of(const MeshKey& key) { return curves_.allocate(bytes_left(meshes_.at(key))); }
+
+  /// What meshes and textures lose is told from parts of pictures, one change at a time. Where files are
+  /// small, which is nearest to the truth is seen in whole pictures: files of the likeliest meshes, and the
+  /// texture that loses most in other sizes.
+  void look_at_files(FoundFile& best) {
+    looks_.look_at(best);
+    for (const MeshKey& key : likeliest())
+      looks_.replace_if_nearer(looks_.file_of(key, allocation_of(key)), best);
+    looks_.try_other_sizes(best);
+  }
+
+  /// But for the best.
+  std::vector<MeshKey> likeliest() const {
+    std::vector<std::pair<double, MeshKey>> order;
+    for (const auto& [key, loss] : predicted_)
+      if (key != best_ && loss <= kLikely * least_) order.emplace_back(loss, key);
+    std::ranges::sort(order);
+    if (order.size() > kMostLikely) order.resize(kMostLikely);
+    std::vector<MeshKey> out;
+    for (const auto& [loss, key] : order) out.push_back(key);
+    return out;
+  }
 
   MeshKey start() {
     return {source_.request.scale ? source_.package.scale_index(*source_.request.scale) : likely_scale(),
@@ -152,7 +185,7 @@ class BudgetSearch {
     geometry_[key] = mesh.geometry;
     const Allocation images = curves_.allocate(bytes_left(mesh));
     if (images.bytes > bytes_left(mesh)) return kNothing;
-    return joined(mesh.geometry) + images.loss;
+    return predicted_[key] = joined(mesh.geometry) + images.loss;
   }
 
   /// The finest that is likely to leave half of the bytes to textures.
@@ -208,15 +241,7 @@ class BudgetSearch {
     out.images = file.rows;
     out.mesh_bytes = file.glb.size();
     for (const ExtractedImage& i : file.rows) out.mesh_bytes -= i.bytes;
-    OtherTextures textures;
-    for (std::size_t i = 0; i < source_.image_count(); ++i)
-      textures.merge(coder_.shown_by(i, file.images.at(source_.image(i).image), source_.context));
-    const LitViews views(meshes_.mesh(key), source_.cameras, source_.context);
-    std::vector<OtherTextures> changes;
-    changes.emplace_back();  // none: what the mesh alone costs
-    changes.push_back(std::move(textures));
-    const std::vector<double> differences = source_.whole_pictures().differences(
-        views, source_.best_textures, std::move(changes), source_.context);
+    const std::vector<double> differences = looks_.differences_of(key, file);
     out.mesh_difference = differences[0];
     out.difference = differences[1];
     out.glb = std::move(file.glb);
@@ -228,8 +253,10 @@ class BudgetSearch {
   ImageCoder& coder_;
   LossCurves& curves_;
   BudgetFiller filler_;
+  FileLooks looks_;
   std::set<MeshKey> seen_;
-  std::map<MeshKey, double> geometry_;  // of meshes looked at: MeshCandidate::geometry
+  std::map<MeshKey, double> geometry_;   // of meshes looked at: MeshCandidate::geometry
+  std::map<MeshKey, double> predicted_;  // joined losses of files, of meshes whose files fit
   MeshKey best_;
   double least_ = kNothing;
 };

@@ -156,12 +156,7 @@ std::uint32_t side_of(std::uint32_t full, double share) {
 
 std::vector<std::uint8_t> shown_texels(const BudgetSource& source, std::size_t image, std::uint32_t width_px,
                                        std::uint32_t height_px) {
-  const Model& model = source.source;
-  for (std::size_t k = 0; k < model.images.size(); ++k)
-    if (model.images[k].name == image_name(source.image(image).image))
-      return coverage_of(source.finest.mesh, model.materials, static_cast<std::int32_t>(k), width_px,
-                         height_px);
-  return std::vector<std::uint8_t>(coverage_size_bytes(width_px, height_px));
+  return shown_texels(source.finest.mesh, source.source, source.image(image).image, width_px, height_px);
 }
 
 }  // namespace texmesh

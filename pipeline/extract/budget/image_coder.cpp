@@ -43,7 +43,7 @@ void ImageCoder::load_stored(std::size_t image) {
   const std::size_t last = source_.package.textures().at(from.plane).rungs.size() - 1;
   JoinedJpeg& joined =
       stored_.emplace(image, JoinedJpeg(source_.package, from.plane, last, source_.context)).first->second;
-  joined.flatten(shown_texels(source_, image, joined.width_px(), joined.height_px()));
+  joined.fill_unseen(shown_texels(source_, image, joined.width_px(), joined.height_px()));
 }
 
 /// What makes up for averaging and for the interpolation of texels larger than pixels, as far as its bytes

@@ -84,6 +84,22 @@ std::vector<std::uint8_t> coded_coefficients(const CoefficientFile& file) {
   return writer.file();
 }
 
+struct TexelRange {
+  std::int64_t begin, end;
+};
+
+bool any_covered(const CoverageMask& mask, TexelRange x, TexelRange y) {
+  x = {std::max<std::int64_t>(x.begin, 0), std::min<std::int64_t>(x.end, mask.width_px)};
+  y = {std::max<std::int64_t>(y.begin, 0), std::min<std::int64_t>(y.end, mask.height_px)};
+  for (auto v = static_cast<std::uint32_t>(y.begin); v < y.end; ++v)
+    for (auto u = static_cast<std::uint32_t>(x.begin); u < x.end;) {
+      const bool whole = u % 8 == 0 && u + 8 <= x.end;
+      if (whole ? mask.byte_at(u, v) != 0 : mask.covered(u, v)) return true;
+      u += whole ? 8 : 1;
+    }
+  return false;
+}
+
 std::int16_t requantised(std::int16_t value, std::uint16_t from, std::uint16_t to) {
   const int product = std::abs(int{value}) * from, rounded = (2 * product + to) / (2 * to);
   return static_cast<std::int16_t>(value < 0 ? -rounded : rounded);
@@ -205,8 +221,61 @@ void JoinedJpeg::fill_gaps(const std::vector<std::uint8_t>& stored) {
   }
 }
 
-void JoinedJpeg::flatten(const std::vector<std::uint8_t>& coverage) {
+void JoinedJpeg::fill_unseen(const std::vector<std::uint8_t>& coverage) {
   const CoverageMask mask(coverage, width_px_, height_px_);
+  for (Component& c : components_) continue_means(c, known_blocks(c, mask));
+  flatten(mask);
+}
+
+/// By block: 1 where a sample is read for a covered texel, by decoders that interpolate, or where the block
+/// holds more than a mean.
+std::vector<std::uint8_t> JoinedJpeg::known_blocks(const Component& c, const CoverageMask& mask) const {
+  const auto [mcu_width, mcu_height] = mcu_px();
+  const std::int64_t wide = mcu_width / c.across, high = mcu_height / c.down;  // texels of a block
+  const std::int64_t beside_x = wide / 8 - 1, beside_y = high / 8 - 1;
+  std::vector<std::uint8_t> out(c.blocks.size());
+  for (std::uint32_t y = 0; y < c.blocks_down; ++y)
+    for (std::uint32_t x = 0; x < c.blocks_across; ++x) {
+      const std::size_t at = std::size_t{y} * c.blocks_across + x;
+      const Block& block = c.blocks[at];
+      const bool more = std::any_of(block.begin() + 1, block.end(), [](std::int16_t v) { return v != 0; });
+      out[at] = more || any_covered(mask, {x * wide - beside_x, (x + 1) * wide + beside_x},
+                                    {y * high - beside_y, (y + 1) * high + beside_y});
+    }
+  return out;
+}
+
+void JoinedJpeg::continue_means(Component& c, std::vector<std::uint8_t> known) {
+  const auto beside = [&](std::size_t at, const auto& visit) {
+    const std::size_t x = at % c.blocks_across, y = at / c.blocks_across;
+    for (std::size_t v = y - std::min<std::size_t>(y, 1); v < std::min<std::size_t>(y + 2, c.blocks_down);
+         ++v)
+      for (std::size_t u = x - std::min<std::size_t>(x, 1); u < std::min<std::size_t>(x + 2, c.blocks_across);
+           ++u)
+        visit(v * c.blocks_across + u);
+  };
+  std::vector<std::size_t> ring, next;
+  for (std::size_t at = 0; at < known.size(); ++at)
+    if (known[at]) ring.push_back(at);
+  constexpr std::uint8_t kWaits = 2;
+  for (; !ring.empty(); std::swap(ring, next)) {
+    next.clear();
+    for (const std::size_t at : ring)
+      beside(at, [&](std::size_t other) {
+        if (known[other] == 0) known[other] = kWaits, next.push_back(other);
+      });
+    for (const std::size_t at : next) {
+      int sum = 0, count = 0;
+      beside(at, [&](std::size_t other) {
+        if (known[other] == 1) sum += c.blocks[other][0], ++count;
+      });
+      c.blocks[at][0] = static_cast<std::int16_t>(sum / count);
+    }
+    for (const std::size_t at : next) known[at] = 1;
+  }
+}
+
+void JoinedJpeg::flatten(const CoverageMask& mask) {
   const auto [mcu_width, mcu_height] = mcu_px();
   const std::uint32_t across = divided_up(width_px_, mcu_width), down = divided_up(height_px_, mcu_height);
   // With a border of one on each side, so that every MCU has neighbours.

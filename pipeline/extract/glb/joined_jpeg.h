@@ -5,6 +5,7 @@
 
 #include "delivery/cpp/package/package_reader.h"
 #include "stages/base/run_context.h"
+#include "stages/data/coverage.h"
 
 namespace texmesh {
 
@@ -25,9 +26,12 @@ class JoinedJpeg {
   std::uint32_t height_px() const { return height_px_; }
   std::uint32_t channels() const { return static_cast<std::uint32_t>(components_.size()); }
 
-  /// Makes cheap what nobody sees: blocks keep their mean alone where neither their MCU nor one of its eight
-  /// neighbours has a covered texel. `coverage`: bits as TexturePlane::coverage.
-  void flatten(const std::vector<std::uint8_t>& coverage);
+  /// What nobody sees continues what is seen, so that smaller copies of the image do not mix other colours
+  /// into it, and is cheap. A block of which no sample is read for a covered texel, and which has no AC
+  /// coefficients, as packages store such blocks, takes its mean from the blocks around it, ring by ring.
+  /// Blocks keep their mean alone where neither their MCU nor one of its eight neighbours has a covered
+  /// texel. `coverage`: bits as TexturePlane::coverage.
+  void fill_unseen(const std::vector<std::uint8_t>& coverage);
 
   /// A progressive JPEG with Huffman tables of its own. At quality 100 the coefficients are those of the
   /// package; below (1..100) steps are at least those of texture_step(), and coefficients are rounded to
@@ -46,6 +50,9 @@ class JoinedJpeg {
   void set_components(const Fragments& fragments, std::size_t first);
   void put_fragment(const Fragments& fragments, std::size_t fragment);
   void fill_gaps(const std::vector<std::uint8_t>& stored);
+  std::vector<std::uint8_t> known_blocks(const Component& component, const CoverageMask& mask) const;
+  static void continue_means(Component& component, std::vector<std::uint8_t> known);
+  void flatten(const CoverageMask& mask);
   std::array<std::uint32_t, 2> mcu_px() const;
 
   std::uint32_t width_px_ = 0, height_px_ = 0;

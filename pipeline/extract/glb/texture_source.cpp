@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "format/container/layout.h"
+#include "pipeline/extract/glb/scale_model.h"
 #include "pipeline/render/plane_pixels.h"
 #include "stages/data/coverage.h"
 #include "stages/fill/fill.h"
@@ -138,12 +139,14 @@ Pixels with_alpha(const Pixels& colours, const Pixels& alpha) {
   return out;
 }
 
-std::vector<std::uint8_t> coverage_of(const Mesh& mesh, const std::vector<Material>& materials,
-                                      std::int32_t image, std::uint32_t width_px, std::uint32_t height_px) {
+std::vector<std::uint8_t> shown_texels(const Mesh& mesh, const Model& model, std::uint32_t image,
+                                       std::uint32_t width_px, std::uint32_t height_px) {
   TexelCoverage coverage(width_px, height_px, Wrap::kRepeat, Wrap::kRepeat);
-  for (std::size_t m = 0; m < materials.size(); ++m)
-    for_each_texture(materials[m], [&](const TextureRef& ref) {
-      if (ref.image != image || ref.texcoord > 1) return;
+  const auto named = std::ranges::find(model.images, image_name(image), &Image::name);
+  const auto number = static_cast<std::int32_t>(named - model.images.begin());
+  for (std::size_t m = 0; m < model.materials.size() && named != model.images.end(); ++m)
+    for_each_texture(model.materials[m], [&](const TextureRef& ref) {
+      if (ref.image != number || ref.texcoord > 1) return;
       add_triangles(mesh, m, ref, TexelMap(ref.transform, width_px, height_px), coverage);
     });
   return coverage.release_bits();

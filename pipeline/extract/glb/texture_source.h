@@ -60,9 +60,9 @@ class TextureSource {
 /// Colours and alpha as one image of 4 channels; both of one size.
 Pixels with_alpha(const Pixels& colours, const Pixels& alpha);
 
-/// The texels of an image of `width_px` x `height_px` that a mesh shows with these materials, as
-/// TexturePlane::coverage. `image` is the index that the materials have for the image.
-std::vector<std::uint8_t> coverage_of(const Mesh& mesh, const std::vector<Material>& materials,
-                                      std::int32_t image, std::uint32_t width_px, std::uint32_t height_px);
+/// The texels of source image `image`, in a size of `width_px` x `height_px`, that a mesh shows with the
+/// model's materials, as TexturePlane::coverage. The model's images are named as read_model() names them.
+std::vector<std::uint8_t> shown_texels(const Mesh& mesh, const Model& model, std::uint32_t image,
+                                       std::uint32_t width_px, std::uint32_t height_px);
 
 }  // namespace texmesh

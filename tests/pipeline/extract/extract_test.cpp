@@ -181,6 +181,19 @@ TEST(ExtractModel, MoreBytesGiveNoWorsePicture) {
   }
 }
 
+TEST(ExtractModel, FilesOfTheScalesBesideTheChosenOneAreNotNearer) {
+  for (const std::uint64_t bytes : {6000u, 9000u}) {
+    const Extracted chosen = extract(budget(bytes));
+    for (const int step : {-1, 1}) {
+      ExtractRequest r = budget(bytes);
+      r.scale = chosen.scale + step;
+      if (*r.scale < 0 || *r.scale > 5) continue;
+      const Extracted other = extract(r);
+      if (other.within) EXPECT_LE(chosen.difference, 1.01 * other.difference) << bytes << " S_" << *r.scale;
+    }
+  }
+}
+
 TEST(ExtractModel, ThreadsDoNotChangeAByte) {
   EXPECT_EQ(extract(budget(7000), 1).glb, extract(budget(7000), 8).glb);
   ExtractRequest r;
