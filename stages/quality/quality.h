@@ -45,10 +45,10 @@ struct QualityOptions {
 ///   displayed height is the length on screen that O_V has at the sphere's centre. All maps of the material
 ///   show that the renderer knows: base colour with alpha, metallic-roughness, normal, occlusion, emission;
 ///   all of them read with mips, whatever the sampler says, where scales are compared, and as the source's
-  ///   samplers read where textures are. Where views show far more of the object than 30,000 pixels, bands of
-  ///   96 rows are rendered and compared, evenly spread, at least two in each view.
-  ///   Of meshes of more than a million triangles each height is shown by the coarsest kept scale that has four
-  ///   or more triangles for every pixel of the height's square, and so stands for all finer ones.
+///   samplers read where textures are. Where views show far more of the object than 30,000 pixels, bands of
+///   96 rows are rendered and compared, evenly spread, at least two in each view.
+///   Of meshes of more than a million triangles each height is shown by the coarsest kept scale that has four
+///   or more triangles for every pixel of the height's square, and so stands for all finer ones.
 /// - Heights: largest_px, its half and so on down to kLeastSwitchPx; half octaves between for scales alone
 ///   that pass the height below and fail the one above. The table's sizes are the largest, its half and its
 ///   quarter. A model of few texels and triangles is not rendered at all of them: down to a quarter of
