@@ -33,7 +33,8 @@ async function programsReady(renderer: WebGLRenderer, mostS: number, stopIfCance
     do {
       await sleepS(0.004);
       stopIfCancelled();
-    } while (program.isReady?.() === false && nowS() < end);
+    } while (program.program && program.isReady?.() === false && nowS() < end);
+    if (!program.program) continue; // of another model, which went meanwhile
     program.getUniforms();
     ready.add(program);
   }
