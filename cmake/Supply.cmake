@@ -19,7 +19,7 @@ install(CODE "
       ${PROJECT_SOURCE_DIR}/cmake/debian-packages.txt
       \$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_BINDIR}/texmesh
       \$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_LIBEXECDIR}/texmesh/texmesh-core
-      \$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${TEXMESH_MODULE_FOLDER}/texmesh_oiio.so
+      \$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${TEXMESH_MODULE_FOLDER}/texmesh_readers.so
     OUTPUT_FILE \${to}/doc/texmesh/texmesh.cdx.json COMMAND_ERROR_IS_FATAL ANY)
 " COMPONENT tool)
 install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${texmesh_documents} RENAME copyright COMPONENT tool)

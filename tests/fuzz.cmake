@@ -20,7 +20,7 @@ foreach(name batch/build_memo batch/collection batch/find_models batch/fleet/run
     compile/options compile/profile compile/workers/worker_messages)
   list(APPEND sources ${PROJECT_SOURCE_DIR}/pipeline/${name}.cpp)
 endforeach()
-list(FILTER sources EXCLUDE REGEX "/stages/image/oiio/")
+list(FILTER sources EXCLUDE REGEX "/stages/image/seldom/module")
 # -O1: half the time to build, and two thirds of the runs per second. Sections: what only other targets or stages call is not linked, and
 # its counters with it, with lld alone.
 add_library(texmesh_fuzz STATIC EXCLUDE_FROM_ALL ${sources})
@@ -51,5 +51,5 @@ foreach(file ${targets})
   target_compile_options(${program} PRIVATE -O1 -ffunction-sections -fdata-sections)
   target_link_options(${program} PRIVATE -fsanitize=fuzzer -fuse-ld=lld LINKER:--gc-sections LINKER:-z,start-stop-gc)
   target_link_libraries(${program} PRIVATE texmesh_fuzz texmesh_fuzz_mutator)
-  add_dependencies(texmesh_fuzzers ${program} texmesh_oiio)
+  add_dependencies(texmesh_fuzzers ${program} texmesh_readers)
 endforeach()

@@ -6,15 +6,15 @@
 #include <map>
 
 #include "format/base/errors.h"
-#include "stages/image/oiio/tiff_exr_reader.h"
+#include "stages/image/seldom/seldom_readers.h"
 
 namespace texmesh {
 namespace {
 
-constexpr const char* kModule = "texmesh_oiio.so";
+constexpr const char* kModule = "texmesh_readers.so";
 
 struct ReaderModule {
-  const TiffExrReader* reader = nullptr;
+  const SeldomReaders* reader = nullptr;
   std::string problem;
 };
 
@@ -25,13 +25,13 @@ ReaderModule load_module() {
   // the module throws outlive any call.
   void* const module = ::dlopen(kModule, RTLD_NOW | RTLD_LOCAL);
   if (module)
-    if (void* const symbol = ::dlsym(module, kTiffExrSymbol))
-      return {reinterpret_cast<const TiffExrReader* (*)()>(symbol)(), ""};
+    if (void* const symbol = ::dlsym(module, kSeldomReadersSymbol))
+      return {reinterpret_cast<const SeldomReaders* (*)()>(symbol)(), ""};
   const char* const why = ::dlerror();
   return {nullptr, why ? why : "an error without a message"};
 }
 
-const TiffExrReader& reader_for(const std::string& name, ImageFormat format) {
+const SeldomReaders& reader_for(const std::string& name, ImageFormat format) {
   static const ReaderModule module = load_module();
   if (module.reader) return *module.reader;
   throw InputError(name, "",

@@ -1,5 +1,5 @@
 #pragma once
-// Inside stages: TIFF and EXR by OpenImageIO, which the module texmesh_oiio.so brings when it is first
+// Inside stages: TIFF and EXR by OpenImageIO, which the module texmesh_readers.so brings when it is first
 // needed.
 #include <cstddef>
 #include <cstdint>

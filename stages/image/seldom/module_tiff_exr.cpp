@@ -1,5 +1,5 @@
-// The module texmesh_oiio.so: see stages/image/decode_tiff_exr.cpp.
-#include "stages/image/oiio/tiff_exr_reader.h"
+// The module texmesh_readers.so: see stages/image/decode_tiff_exr.cpp.
+#include "stages/image/seldom/seldom_readers.h"
 
 #include <algorithm>
 #include <cstring>
@@ -191,11 +191,11 @@ StoredSamples decode(const Image& image) {
   }
 }
 
-constexpr TiffExrReader kReader{&read_module_header, &decode};
+constexpr SeldomReaders kReader{&read_module_header, &decode};
 
 }  // namespace
 }  // namespace texmesh
 
-__attribute__((visibility("default"))) const texmesh::TiffExrReader* texmesh_tiff_exr_reader_1() {
+__attribute__((visibility("default"))) const texmesh::SeldomReaders* texmesh_seldom_readers_1() {
   return &texmesh::kReader;
 }

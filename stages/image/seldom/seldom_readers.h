@@ -1,5 +1,5 @@
 #pragma once
-// What the program and its module texmesh_oiio.so say to each other.
+// What the program and its module texmesh_readers.so say to each other.
 #include <string>
 
 #include "format/base/bytes.h"
@@ -8,7 +8,7 @@
 namespace texmesh {
 
 /// The functions of stages/image/decode_tiff_exr.h, by OpenImageIO. They throw InputError.
-struct TiffExrReader {
+struct SeldomReaders {
   ImageHeader (*read_header)(const std::string& name, ImageFormat format, ByteSpan bytes,
                              const ImageLimits& limits);
   StoredSamples (*decode)(const Image& image);
@@ -16,8 +16,8 @@ struct TiffExrReader {
 
 /// The module's only symbol: its name holds a version, which is raised with every change of what the reader
 /// takes or gives, so that the module of another build is never called.
-inline constexpr const char* kTiffExrSymbol = "texmesh_tiff_exr_reader_1";
+inline constexpr const char* kSeldomReadersSymbol = "texmesh_seldom_readers_1";
 
 }  // namespace texmesh
 
-extern "C" const texmesh::TiffExrReader* texmesh_tiff_exr_reader_1();
+extern "C" const texmesh::SeldomReaders* texmesh_seldom_readers_1();

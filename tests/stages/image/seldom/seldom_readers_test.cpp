@@ -1,0 +1,34 @@
+#include "stages/image/seldom/seldom_readers.h"
+
+#include <dlfcn.h>
+#include <gtest/gtest.h>
+
+#include "format/base/errors.h"
+
+namespace texmesh {
+namespace {
+
+TEST(SeldomReaders, TheModuleIsFoundByItsNameAndShowsOneSymbol) {
+  void* const module = ::dlopen("texmesh_readers.so", RTLD_NOW | RTLD_LOCAL);
+  ASSERT_NE(module, nullptr) << ::dlerror();
+  EXPECT_NE(::dlsym(module, kSeldomReadersSymbol), nullptr);
+  EXPECT_EQ(::dlsym(module, "texmesh_seldom_readers_0"), nullptr) << "the module of another build";
+}
+
+TEST(SeldomReaders, ItsErrorsAreThoseOfTheProgram) {
+  void* const module = ::dlopen("texmesh_readers.so", RTLD_NOW | RTLD_LOCAL);
+  ASSERT_NE(module, nullptr) << ::dlerror();
+  const auto reader = reinterpret_cast<const SeldomReaders* (*)()>(::dlsym(module, kSeldomReadersSymbol));
+  ASSERT_NE(reader, nullptr);
+  const Bytes no_tiff{'I', 'I', 42, 0, 1};
+  try {
+    reader()->read_header("broken.tif", ImageFormat::kTiff, no_tiff, {});
+    FAIL() << "five bytes were read as a TIFF";
+  } catch (const InputError& e) {
+    EXPECT_EQ(e.file(), "broken.tif");
+    EXPECT_FALSE(e.found().empty());
+  }
+}
+
+}  // namespace
+}  // namespace texmesh
