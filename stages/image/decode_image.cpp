@@ -15,6 +15,7 @@
 #include "stages/image/decode_tiff_exr.h"
 #include "stages/image/decode_webp.h"
 #include "stages/image/image_metadata.h"
+#include "stages/image/seldom/wide_jpeg.h"
 
 namespace texmesh {
 namespace {
@@ -107,11 +108,15 @@ void store_floats(const std::vector<float>& values, FloatEncoding encoding, cons
 
 /// Samples of 16 bits and floats go by `profile`, if any, before they are rounded.
 Pixels decode_stored(const Image& image, FloatEncoding encoding, const ColourProfile* profile) {
-  if (image.format == ImageFormat::kJpeg) {
+  if (image.format == ImageFormat::kJpeg && image.bits_per_channel == 8) {
     check_jpeg_unchanged(image);
     return decode_jpeg_pixels(image);
   }
   Pixels pixels{image.width_px, image.height_px, image.channels, {}};
+  if (image.format == ImageFormat::kJpeg) {
+    store_words(decode_wide_jpeg(image), profile, pixels);
+    return pixels;
+  }
   if (image.format == ImageFormat::kWebp) {
     pixels.data = decode_webp_samples(image);
     return pixels;
@@ -144,7 +149,11 @@ ImageHeader header_of(const PngHeader& h) {
 
 ImageHeader read_header(const std::string& name, ImageFormat format, ByteSpan bytes,
                         const ImageLimits& limits) {
-  if (format == ImageFormat::kJpeg) return header_of(read_jpeg_header(name, bytes));
+  if (format == ImageFormat::kJpeg) {
+    if (const auto wide = read_wide_jpeg_header(name, bytes))
+      return {wide->width_px, wide->height_px, static_cast<std::uint8_t>(wide->channels), 16};
+    return header_of(read_jpeg_header(name, bytes));
+  }
   if (format == ImageFormat::kPng) return header_of(read_png_header(name, bytes));
   if (format == ImageFormat::kWebp) return read_webp_header(name, bytes);
   const std::string colours = read_image_metadata(format, bytes).foreign_colours;
@@ -212,6 +221,10 @@ FloatPixels decode_float(const Image& image) {
   if (image.format == ImageFormat::kPng && image.bits_per_channel == 16) {
     check_png_unchanged(image);
     widen(png_pixels<std::uint16_t>(image));
+    return pixels;
+  }
+  if (image.format == ImageFormat::kJpeg && image.bits_per_channel == 16) {
+    widen(decode_wide_jpeg(image));
     return pixels;
   }
   if (image.format != ImageFormat::kTiff && image.format != ImageFormat::kExr) {

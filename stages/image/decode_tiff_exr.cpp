@@ -1,7 +1,5 @@
 #include "stages/image/decode_tiff_exr.h"
 
-#include <dlfcn.h>
-
 #include <algorithm>
 #include <map>
 
@@ -11,33 +9,8 @@
 namespace texmesh {
 namespace {
 
-constexpr const char* kModule = "texmesh_readers.so";
-
-struct ReaderModule {
-  const SeldomReaders* reader = nullptr;
-  std::string problem;
-};
-
-// OpenImageIO brings 200 shared libraries with it. Loading them takes .2 s, and most models need none of
-// them.
-ReaderModule load_module() {
-  // By name alone: the run path of this program or library tells the folder. Never closed, since errors that
-  // the module throws outlive any call.
-  void* const module = ::dlopen(kModule, RTLD_NOW | RTLD_LOCAL);
-  if (module)
-    if (void* const symbol = ::dlsym(module, kSeldomReadersSymbol))
-      return {reinterpret_cast<const SeldomReaders* (*)()>(symbol)(), ""};
-  const char* const why = ::dlerror();
-  return {nullptr, why ? why : "an error without a message"};
-}
-
 const SeldomReaders& reader_for(const std::string& name, ImageFormat format) {
-  static const ReaderModule module = load_module();
-  if (module.reader) return *module.reader;
-  throw InputError(name, "",
-                   std::string("a reader for ") + image_format_name(format) + ": " + kModule +
-                       ", which is installed with texmesh, and Debian's package libopenimageio2.4",
-                   module.problem);
+  return seldom_readers(name, image_format_name(format), "libopenimageio2.4");
 }
 
 /// Text up to a zero byte, which `at` is then behind; null where there is none within EXR's 255.
@@ -168,11 +141,11 @@ void check_exr_header(const std::string& name, ByteSpan bytes, const ImageLimits
 ImageHeader read_tiff_exr_header(const std::string& name, ImageFormat format, ByteSpan bytes,
                                  const ImageLimits& limits) {
   if (format == ImageFormat::kExr) check_exr_header(name, bytes, limits);
-  return reader_for(name, format).read_header(name, format, bytes, limits);
+  return reader_for(name, format).read_tiff_exr_header(name, format, bytes, limits);
 }
 
 StoredSamples decode_tiff_exr(const Image& image) {
-  return reader_for(image.name, image.format).decode(image);
+  return reader_for(image.name, image.format).decode_tiff_exr(image);
 }
 
 }  // namespace texmesh

@@ -1,4 +1,5 @@
-// The module texmesh_readers.so: see stages/image/decode_tiff_exr.cpp.
+// The module texmesh_readers.so: see stages/image/seldom/load_readers.cpp.
+#include "stages/image/seldom/module_wide_jpeg.h"
 #include "stages/image/seldom/seldom_readers.h"
 
 #include <algorithm>
@@ -191,11 +192,11 @@ StoredSamples decode(const Image& image) {
   }
 }
 
-constexpr SeldomReaders kReader{&read_module_header, &decode};
+constexpr SeldomReaders kReader{&read_module_header, &decode, &decode_wide_jpeg_file};
 
 }  // namespace
 }  // namespace texmesh
 
-__attribute__((visibility("default"))) const texmesh::SeldomReaders* texmesh_seldom_readers_1() {
+__attribute__((visibility("default"))) const texmesh::SeldomReaders* texmesh_seldom_readers_2() {
   return &texmesh::kReader;
 }

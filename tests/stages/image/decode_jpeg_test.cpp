@@ -24,19 +24,6 @@ TEST(DecodeJpeg, JpegIsCloseAndRowsAreTopFirst) {
   }
 }
 
-TEST(DecodeJpeg, JpegOfTwelveAndSixteenBitsIsRefused) {
-  for (std::uint8_t bits : {std::uint8_t{12}, std::uint8_t{16}}) {
-    Bytes jpeg = jpeg_bytes(16, 16, 3);
-    for (std::size_t i = 0; i + 9 < jpeg.size(); ++i)
-      if (jpeg[i] == 0xff && jpeg[i + 1] == 0xc0) {
-        jpeg[i + 4] = bits;
-        break;
-      }
-    const std::string error = error_of([&] { probe(jpeg); });
-    EXPECT_NE(error.find("precision " + std::to_string(bits)), std::string::npos) << error;
-  }
-}
-
 TEST(DecodeJpeg, CmykJpegBecomesRgb) {
   for (const bool adobe : {false, true}) {
     const Image image = probe(testing::cmyk_jpeg(16, 16, {255, 128, 0, 64}, adobe));

@@ -1,0 +1,16 @@
+#pragma once
+// Inside the module texmesh_readers.so.
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "format/base/bytes.h"
+#include "stages/image/seldom/wide_jpeg.h"
+
+namespace texmesh {
+
+/// SeldomReaders::decode_wide_jpeg.
+std::vector<std::uint16_t> decode_wide_jpeg_file(const std::string& name, ByteSpan bytes,
+                                                 const WideJpegHeader& header);
+
+}  // namespace texmesh
