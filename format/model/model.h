@@ -170,11 +170,13 @@ struct Image {
   std::uint8_t channels = 0;          // 1 grey, 2 grey+alpha, 3 RGB, 4 RGBA
   std::uint8_t bits_per_channel = 0;  // 8, 16 or 32 (float)
   bool honour_profile = false;        // colours are converted to sRGB by what the file says of them
+  bool accept_damage = false;         // a JPEG that ends early or is corrupt is shown as viewers show it
   std::vector<std::uint8_t> bytes;    // the file
   friend bool operator==(const Image&, const Image&) = default;
   template <class S, class A>
   static void archive(S& s, A& a) {
-    a(s.name, s.format, s.width_px, s.height_px, s.channels, s.bits_per_channel, s.honour_profile, s.bytes);
+    a(s.name, s.format, s.width_px, s.height_px, s.channels, s.bits_per_channel, s.honour_profile,
+      s.accept_damage, s.bytes);
   }
 };
 

@@ -58,7 +58,8 @@ Model scale_model(PackageReader& package, int scale, const RunContext& context) 
   return read_model(scale_file(package, scale, context), mesh_path(scale), context);
 }
 
-/// Mesh and materials of a scale. The list of textures counts the package's images.
+}  // namespace
+
 RenderedModel bare_scale(PackageReader& package, int scale, const RunContext& context) {
   package.scale_index(scale);  // says which scales there are
   Model source = scale_model(package, scale, context);
@@ -68,8 +69,6 @@ RenderedModel bare_scale(PackageReader& package, int scale, const RunContext& co
     texture.image = image_named(images, source.images.at(texture.image).name).image;
   return model;
 }
-
-}  // namespace
 
 RenderedModel package_model(PackageReader& package, const PackageChoice& choice, const RunContext& context) {
   if (choice.textures == PackageTextures::kRung) require_rung(package, choice.rung);

@@ -27,9 +27,12 @@ struct PackageChoice {
 /// `texture_images` count the images of textures.json.
 RenderedModel package_model(PackageReader& package, const PackageChoice& choice, const RunContext& context);
 
-/// Another scale for the textures of `textured`, which package_model() made: its materials count these, and
-/// its own list of textures stays empty. A texture that `textured` does not have is not shown. Bounds and
-/// errors as package_model().
+/// Mesh and materials of a scale; `textures` stays empty, `bounds` are its own. Else as package_model().
+RenderedModel bare_scale(PackageReader& package, int scale, const RunContext& context);
+
+/// Another scale for the textures of `textured`, a package_model() or bare_scale() of another: its materials
+/// count these, and its own list of textures stays empty. A texture that `textured` does not have is not
+/// shown. Bounds and errors as package_model().
 RenderedModel package_scale(PackageReader& package, int scale, const RenderedModel& textured,
                             const RunContext& context);
 

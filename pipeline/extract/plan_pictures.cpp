@@ -34,18 +34,14 @@ const ShownPlane& shown_plane(const ShownPackage& shown, std::uint32_t base) {
 }
 
 /// The source's textures in the order in which S_0's materials count them.
-std::vector<RenderTexture> source_textures(const std::string& source, const std::vector<std::string>& names,
-                                           const std::vector<TextureImage>& wanted,
+std::vector<RenderTexture> source_textures(const std::string& source, const std::vector<TextureImage>& wanted,
                                            const RunContext& context) {
   RenderedModel model = load_rendered_model(source, {}, context);
   std::vector<RenderTexture> out;
   for (const TextureImage& image : wanted) {
-    std::uint32_t number = 0;
-    while (image_name(number) != names.at(image.image) && number < model.texture_images.size() + 1000)
-      ++number;
-    const auto found = std::ranges::find(model.texture_images, TextureImage{number, image.srgb});
+    const auto found = std::ranges::find(model.texture_images, image);
     if (found == model.texture_images.end())
-      throw InputError(source, "", "an image for the package's " + names.at(image.image), "none");
+      throw InputError(source, "", "an image for the package's " + image_name(image.image), "none");
     out.push_back(model.textures[static_cast<std::size_t>(found - model.texture_images.begin())]);
   }
   return out;
@@ -72,29 +68,21 @@ PlanPictures::PlanPictures(PackageReader& package, const std::string& source, in
     : package_(package),
       views_(views),
       context_(context),
-      environment_(environment_of(RenderLight::kStudio, context)) {
-  RenderedModel& finest = scale(0);
+      environment_(environment_of(RenderLight::kStudio, context)),
+      finest_(bare_scale(package, 0, context)) {
   source_ = source.empty() ? package_model(package, {0, PackageTextures::kRung, kBestRung}, context).textures
-                           : source_textures(source, images_, finest.texture_images, context);
+                           : source_textures(source, finest_.texture_images, context);
 }
 
-RenderedModel& PlanPictures::scale(int scale) {
+const RenderedModel& PlanPictures::scale(int scale) {
+  if (scale == 0) return finest_;
   const auto found = scales_.find(scale);
   if (found != scales_.end()) return found->second;
-  package_.scale_index(scale);  // says which there are
-  const std::string entry = mesh_path(scale);
-  Model model = read_model(scale_file(package_, scale, context_), entry, context_);
-  RenderedModel& out =
-      scales_.emplace(scale, untextured_model(std::move(model.mesh), model.materials)).first->second;
-  if (images_.empty())
-    for (const auto& image : model.images) images_.push_back(image.name);
-  if (out.texture_images != scales_.begin()->second.texture_images)
-    throw FormatError(entry, "", "the textures of all scales", "others");
-  return out;
+  return scales_.emplace(scale, package_scale(package_, scale, finest_, context_)).first->second;
 }
 
 PlanPictures::Place PlanPictures::place(int view, double displayed_px) const {
-  const BoundingSphere& sphere = scales_.at(0).bounds;
+  const BoundingSphere& sphere = finest_.bounds;
   Place out{perspective_camera(camera_of(view, views_, sphere.centre, sphere.radius)), 0};
   const double distance = length(out.camera.eye - sphere.centre);
   const double side =
@@ -111,11 +99,11 @@ std::vector<RenderTexture> PlanPictures::textures_of(const ShownPackage& shown) 
   };
   const std::vector<PackageImage> images = package_images(package_);
   std::vector<RenderTexture> out;
-  for (const TextureImage& from : scale(0).texture_images) {
-    const auto image = std::ranges::find_if(
-        images, [&](const PackageImage& i) { return image_name(i.image) == images_.at(from.image); });
+  for (const TextureImage& from : finest_.texture_images) {
+    const auto image =
+        std::ranges::find_if(images, [&](const PackageImage& i) { return i.image == from.image; });
     if (image == images.end())
-      throw FormatError(kTexturesPath, "", "image " + images_.at(from.image) + ", which a mesh uses", "none");
+      throw FormatError(kTexturesPath, "", image_name(from.image) + ", which a mesh uses", "none");
     Pixels pixels = texels(image->plane);
     if (image->alpha_plane) pixels = with_alpha_of(*image, pixels, texels(*image->alpha_plane));
     out.push_back(render_texture(std::move(pixels), from.srgb, 0, context_));
@@ -127,7 +115,7 @@ const std::vector<PlanPictures::Reference>& PlanPictures::references(double disp
   if (referenced_px_ == displayed_px) return references_;
   references_.clear();
   referenced_px_ = displayed_px;
-  const RenderScene scene = scale(0).scene();
+  const RenderScene scene = finest_.scene();
   for (int v = 0; v < views_; ++v) {
     Reference reference{place(v, displayed_px), {}, {}};
     reference.seen = look(scene, reference.place.camera, reference.place.side_px, context_);
@@ -152,7 +140,7 @@ RenderedFlip PlanPictures::measure_proxy(std::uint32_t proxy, double displayed_p
 RenderedFlip PlanPictures::measure(const ShownPackage& shown, double displayed_px) {
   if (shown.proxy) return measure_proxy(*shown.proxy, displayed_px);
   const std::vector<RenderTexture> textures = textures_of(shown);
-  const RenderScene finest = scale(0).scene(), coarse = scale(shown.scale).scene();
+  const RenderScene finest = finest_.scene(), coarse = scale(shown.scale).scene();
   FlipSum whole, geometry, coded;
   for (const Reference& reference : references(displayed_px)) {
     const auto add = [&](const RenderScene& scene, const Visibility& seen,

@@ -57,7 +57,7 @@ class PlanPictures {
     FlipPicture flip;
   };
   Place place(int view, double displayed_px) const;
-  RenderedModel& scale(int scale);
+  const RenderedModel& scale(int scale);
   std::vector<RenderTexture> textures_of(const ShownPackage& shown);
   RenderedFlip measure_proxy(std::uint32_t proxy, double displayed_px);
   const std::vector<Reference>& references(double displayed_px);
@@ -66,9 +66,9 @@ class PlanPictures {
   int views_;
   RunContext context_;
   RenderEnvironment environment_;
-  std::vector<std::string> images_;    // names of images by index, of S_0's materials
-  std::vector<RenderTexture> source_;  // as S_0 counts textures
-  std::map<int, RenderedModel> scales_;
+  RenderedModel finest_;
+  std::vector<RenderTexture> source_;    // as S_0 counts textures
+  std::map<int, RenderedModel> scales_;  // but S_0, with its textures
   double referenced_px_ = 0;
   std::vector<Reference> references_;  // of that height
 };

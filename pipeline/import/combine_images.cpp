@@ -13,11 +13,13 @@ struct Plane {
   Pixels pixels{1, 1, 1, {255}};
   std::string name;
 
-  Plane(const Model& model, CombinedImage from) {
+  Plane(Model& model, CombinedImage from) {
     if (from.index < 0) return;
     const Image& image = model.images.at(static_cast<std::size_t>(from.index));
-    pixels = decode_image(image, from.encoding);
+    std::string damage;
+    pixels = decode_image(image, from.encoding, &damage);
     name = image.name;
+    if (!damage.empty()) add_warning(model.notes, "damaged-image", name, damage_words(damage));
   }
   /// The texel nearest to (x, y) of a picture of the given size.
   ImageTexel at(std::uint32_t x, std::uint32_t y, std::uint32_t width, std::uint32_t height) const {

@@ -49,6 +49,7 @@ void note_foreign_extension(Model& model, const Image& image, const std::string&
 void apply_metadata(Model& model, Image& image, const std::string& place, const ImportOptions& options) {
   const ImageMetadata metadata = read_image_metadata(image.format, image.bytes);
   image.honour_profile = options.colour_profiles != ProfilePolicy::kIgnore;
+  image.accept_damage = true;
   const char* what = metadata.damaged_profile        ? "a damaged ICC profile"
                      : !metadata.icc_profile.empty() ? "an ICC profile"
                      : metadata.gamma > 0            ? "a gamma"

@@ -57,13 +57,15 @@ std::vector<std::uint8_t> bytes_from_floats(const std::vector<float>& values, st
   return out;
 }
 
-Pixels decode_jpeg_pixels(const Image& image) {
+Pixels decode_jpeg_pixels(const Image& image, std::string& damage) {
   Pixels pixels{image.width_px, image.height_px, image.channels, {}};
   const std::size_t row_bytes = static_cast<std::size_t>(image.width_px) * image.channels;
   // Reserved, not filled: memory is touched row by row, so that a header that lies costs nothing.
   pixels.data.reserve(row_bytes * image.height_px);
-  decode_jpeg(image.name, image.bytes,
-              [&](const std::uint8_t* row) { pixels.data.insert(pixels.data.end(), row, row + row_bytes); });
+  decode_jpeg(
+      image.name, image.bytes,
+      [&](const std::uint8_t* row) { pixels.data.insert(pixels.data.end(), row, row + row_bytes); },
+      image.accept_damage ? &damage : nullptr);
   return pixels;
 }
 
@@ -107,10 +109,11 @@ void store_floats(const std::vector<float>& values, FloatEncoding encoding, cons
 }
 
 /// Samples of 16 bits and floats go by `profile`, if any, before they are rounded.
-Pixels decode_stored(const Image& image, FloatEncoding encoding, const ColourProfile* profile) {
+Pixels decode_stored(const Image& image, FloatEncoding encoding, const ColourProfile* profile,
+                     std::string& damage) {
   if (image.format == ImageFormat::kJpeg && image.bits_per_channel == 8) {
     check_jpeg_unchanged(image);
-    return decode_jpeg_pixels(image);
+    return decode_jpeg_pixels(image, damage);
   }
   Pixels pixels{image.width_px, image.height_px, image.channels, {}};
   if (image.format == ImageFormat::kJpeg) {
@@ -201,13 +204,19 @@ Image probe_image(std::string name, Bytes bytes, const ImageLimits& limits) {
   return image;
 }
 
-Pixels decode_image(const Image& image, FloatEncoding encoding) {
+Pixels decode_image(const Image& image, FloatEncoding encoding, std::string* damage) {
   // Before the pixels, since a profile may be refused.
   std::optional<ColourProfile> profile;
   if (encoding == FloatEncoding::kSrgb && image.honour_profile) profile = honoured_profile(image);
-  Pixels pixels = decode_stored(image, encoding, profile ? &*profile : nullptr);
+  std::string found;
+  Pixels pixels = decode_stored(image, encoding, profile ? &*profile : nullptr, found);
   if (profile && image.bits_per_channel <= 8) convert_to_srgb(*profile, pixels);
+  if (damage) *damage = std::move(found);
   return pixels;
+}
+
+std::string damage_words(const std::string& damage) {
+  return "it is damaged (" + damage + "); what cannot be read of it is grey or wrong";
 }
 
 bool changes_colours(const Image& image, FloatEncoding encoding) {

@@ -25,8 +25,13 @@ Image probe_image(std::string name, Bytes bytes, const ImageLimits& limits);
 /// `encoding`, alpha not multiplied in. Rows and columns are those of the file whatever its EXIF orientation
 /// says: texture coordinates count from the first stored pixel. Single-threaded; the same bytes for every
 /// run. Throws InputError when the file is truncated (with the row), lies about its size, or has a colour
-/// profile to be honoured that cannot be.
-Pixels decode_image(const Image& image, FloatEncoding encoding = FloatEncoding::kAsIs);
+/// profile to be honoured that cannot be. Image::accept_damage: what decode_jpeg() makes of a damaged JPEG;
+/// `damage`, if there is one, becomes what is wrong with it, and empty for a sound image.
+Pixels decode_image(const Image& image, FloatEncoding encoding = FloatEncoding::kAsIs,
+                    std::string* damage = nullptr);
+
+/// A warning's words for what decode_image() says of a damaged image.
+std::string damage_words(const std::string& damage);
 
 /// Whether decode_image() gives other colours than the file's own numbers: CMYK, floats, or a profile that is
 /// honoured. Throws as decode_image.

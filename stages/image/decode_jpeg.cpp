@@ -24,6 +24,7 @@ struct JpegDecoder {
   jpeg_error_mgr errors{};
   std::jmp_buf escape;
   char message[JMSG_LENGTH_MAX] = "";
+  std::string* damage = nullptr;  // what is wrong goes here, as far as decoding goes on
 
   JpegDecoder() = default;
   JpegDecoder(const JpegDecoder&) = delete;
@@ -37,6 +38,37 @@ struct JpegDecoder {
   std::longjmp(decoder->escape, 1);
 }
 
+JDIMENSION row_of_scan(const jpeg_decompress_struct& info) {
+  return std::min<JDIMENSION>(
+      info.image_height, info.input_iMCU_row * static_cast<JDIMENSION>(info.max_v_samp_factor) * DCTSIZE);
+}
+
+/// Where a file goes wrong that holds its pixels in several scans, or whose rows are not given yet.
+std::string scan_place(const JpegDecoder& decoder) {
+  const jpeg_decompress_struct& info = decoder.info;
+  if (info.input_scan_number == 0 || !info.comps_in_scan) return "JPEG header";
+  return "scan " + std::to_string(info.input_scan_number) + ", row " + std::to_string(row_of_scan(info)) +
+         " of " + std::to_string(info.image_height);
+}
+
+/// Whether enough is there without what is missing. Where there are restart markers, a marker before its time
+/// costs what stands before the next one.
+bool goes_on(const JpegDecoder& decoder, int code) {
+  const jpeg_decompress_struct& info = decoder.info;
+  const bool ends = code == JWRN_JPEG_EOF || (code == JWRN_HIT_MARKER && info.restart_interval == 0);
+  return info.comps_in_scan &&
+         (!ends || info.input_scan_number > 1 || 2 * row_of_scan(info) >= info.image_height);
+}
+
+void on_damage(j_common_ptr info) {
+  auto* decoder = static_cast<JpegDecoder*>(info->client_data);
+  if (!decoder->damage || !goes_on(*decoder, info->err->msg_code)) escape_with_message(info);
+  if (!decoder->damage->empty()) return;
+  char message[JMSG_LENGTH_MAX];
+  info->err->format_message(info, message);
+  *decoder->damage = scan_place(*decoder) + ": " + message;
+}
+
 void on_message(j_common_ptr info, int level) {
   if (level >= 0) return;  // a trace
   switch (info->err->msg_code) {
@@ -45,7 +77,7 @@ void on_message(j_common_ptr info, int level) {
     case JWRN_HUFF_BAD_CODE:
     case JWRN_ARITH_BAD_CODE:
     case JWRN_MUST_RESYNC:
-      escape_with_message(info);
+      return on_damage(info);
     default:
       return;  // stray bytes between markers and the like: every viewer shows such files
   }
@@ -131,16 +163,6 @@ JBLOCKROW block_row(JpegDecoder& decoder, jvirt_barray_ptr blocks, JDIMENSION ro
   throw InputError(name, place, "a JPEG that decodes", decoder.message[0] ? decoder.message : "no more data");
 }
 
-/// Where a file that holds its pixels in several scans went wrong before the first row could be given.
-std::string scan_place(const JpegDecoder& decoder) {
-  const jpeg_decompress_struct& info = decoder.info;
-  if (info.input_scan_number == 0 || !info.comps_in_scan) return "JPEG header";
-  const JDIMENSION row = std::min<JDIMENSION>(
-      info.image_height, info.input_iMCU_row * static_cast<JDIMENSION>(info.max_v_samp_factor) * DCTSIZE);
-  return "scan " + std::to_string(info.input_scan_number) + ", row " + std::to_string(row) + " of " +
-         std::to_string(info.image_height);
-}
-
 }  // namespace
 
 JpegHeader read_jpeg_header(const std::string& name, std::span<const std::uint8_t> bytes) {
@@ -155,8 +177,9 @@ JpegHeader read_jpeg_header(const std::string& name, std::span<const std::uint8_
 }
 
 void decode_jpeg(const std::string& name, std::span<const std::uint8_t> bytes,
-                 const std::function<void(const std::uint8_t* pixels)>& row) {
+                 const std::function<void(const std::uint8_t* pixels)>& row, std::string* damage) {
   JpegDecoder decoder;
+  decoder.damage = damage;
   jpeg_progress_mgr progress{};
   open_jpeg(decoder, progress, bytes);
   if (decoder.message[0]) fail_jpeg(name, "JPEG header", decoder);

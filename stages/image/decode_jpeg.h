@@ -21,9 +21,11 @@ struct JpegHeader {
 JpegHeader read_jpeg_header(const std::string& name, std::span<const std::uint8_t> bytes);
 
 /// Calls row(pixels) for every row, top first; pixels are width * channels bytes. Accurate integer DCT,
-/// triangle-filter upsampling. Throws InputError when the data ends early or is corrupt.
+/// triangle-filter upsampling. Throws InputError when the data ends early or is corrupt. With `damage` such a
+/// file is decoded as viewers show it, and `damage` says where it is wrong first, and how; it is refused when
+/// its data end before half of its first scan's rows.
 void decode_jpeg(const std::string& name, std::span<const std::uint8_t> bytes,
-                 const std::function<void(const std::uint8_t* pixels)>& row);
+                 const std::function<void(const std::uint8_t* pixels)>& row, std::string* damage = nullptr);
 
 /// The quantised coefficients of a JPEG, baseline or progressive: all that decoding to pixels starts from.
 /// Takes two bytes for every sample. Throws as decode_jpeg.

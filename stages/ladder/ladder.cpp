@@ -248,6 +248,14 @@ std::string hundredths(double x) {
   return std::to_string(whole / 100) + "." + (rest.size() < 2 ? "0" : "") + rest;
 }
 
+/// What is wrong with a JPEG that was decoded nevertheless. One whose coefficients were read is sound.
+std::string damage_of(const Image& image, const TrainedPlane& trained) {
+  std::string damage;
+  if (image.format == ImageFormat::kJpeg && image.bits_per_channel == 8 && !trained.source_rung)
+    decode_image(image, FloatEncoding::kAsIs, &damage);
+  return damage;
+}
+
 /// What a plane's ladder says of its source.
 void finish_plane(const TexturePlane& plane, const Pixels& pixels, const std::vector<Image>& images,
                   const TrainedPlane& trained, const LadderOptions& options, PlaneLadder& ladder,
@@ -258,7 +266,11 @@ void finish_plane(const TexturePlane& plane, const Pixels& pixels, const std::ve
     add_info(notes, "jpeg-coded-anew", image.name,
              "it is coded from its pixels, since " + trained.source.why_not + "; the last rung is " +
                  hundredths(source_difference(plane, pixels, ladder)) + " of 255 off on average");
-  if (!options.keep_source) return;
+  const std::string damage = damage_of(image, trained);
+  if (!damage.empty())
+    add_warning(notes, "damaged-image", image.name,
+                damage_words(damage) + (options.keep_source ? "; its file is not kept" : ""));
+  if (!options.keep_source || !damage.empty()) return;
   const bool changed =
       changes_colours(image, is_colour(plane.role) ? FloatEncoding::kSrgb : FloatEncoding::kAsIs);
   ladder.source = changed ? SourceFile::kOtherColours : SourceFile::kSameColours;

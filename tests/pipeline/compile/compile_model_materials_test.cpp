@@ -13,6 +13,7 @@
 #include "tests/support/command.h"
 #include "tests/support/gltf_builder.h"
 #include "tests/support/images.h"
+#include "tests/support/wide_jpeg.h"
 
 namespace texmesh {
 namespace {
@@ -55,6 +56,11 @@ std::size_t vertices(GltfBuilder& b) {
   return b.json["accessors"][primitive(b)["attributes"]["POSITION"].get<std::size_t>()]["count"];
 }
 
+Json texture_of(GltfBuilder& b, const Bytes& file, const char* mime) {
+  const int image = b.push("images", {{"bufferView", b.view_of(file)}, {"mimeType", mime}});
+  return {{"index", b.push("textures", {{"source", image}})}};
+}
+
 /// A reference to a new texture of that side, smooth with a grid of dots. Its content differs from call to
 /// call.
 Json texture(GltfBuilder& b, int channels, int side_px = 48) {
@@ -65,9 +71,9 @@ Json texture(GltfBuilder& b, int channels, int side_px = 48) {
         samples.push_back(
             static_cast<std::uint8_t>(60 + 2 * x + y + 10 * c + (x % 8 == 3 && y % 8 == 3 ? 20 : 0)));
   samples[0] = static_cast<std::uint8_t>(b.bin.size() % 251);
-  const Bytes file = testing::encode_image("png", side_px, side_px, channels, samples, OIIO::TypeDesc::UINT8);
-  const int image = b.push("images", {{"bufferView", b.view_of(file)}, {"mimeType", "image/png"}});
-  return {{"index", b.push("textures", {{"source", image}})}};
+  return texture_of(b,
+                    testing::encode_image("png", side_px, side_px, channels, samples, OIIO::TypeDesc::UINT8),
+                    "image/png");
 }
 
 /// Gives the first mesh a material.
@@ -166,6 +172,21 @@ const std::vector<Kind> kKinds{
        }
      }},
     {"base colour, normal and data", [](GltfBuilder& b) { use(b, full_material(b)); }},
+    {"JPEG of 12 bits",
+     [](GltfBuilder& b) {
+       std::vector<std::uint16_t> samples;
+       for (int i = 0; i < 48 * 48 * 3; ++i)
+         samples.push_back(static_cast<std::uint16_t>(i % 3 * 1000 + i / 5));
+       use(b, coloured(texture_of(b, testing::wide_jpeg(48, 48, samples, 12), "image/jpeg")));
+     }},
+    {"JPEG that ends early",
+     [](GltfBuilder& b) {
+       Bytes jpeg = testing::jpeg_bytes(64, 64, 3);
+       jpeg.resize(jpeg.size() - jpeg.size() / 8);
+       Json m = coloured(texture_of(b, jpeg, "image/jpeg"));
+       m["pbrMetallicRoughness"]["metallicRoughnessTexture"] = texture(b, 3);
+       use(b, m);
+     }},
     {"textures of 1 px", [](GltfBuilder& b) { use(b, blended_material(b, 1)); }},
     {"all transparent",
      [](GltfBuilder& b) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "format/base/errors.h"
+#include "pipeline/extract/package_model.h"
 #include "pipeline/render/plane_pixels.h"
 
 namespace texmesh {
@@ -92,6 +93,20 @@ TEST(PlanPictures, AProxyIsMeasuredAsItIs) {
   ShownPackage none = shown;
   none.proxy = 99;
   EXPECT_THROW(PlanPictures(package, "", 2, {}).measure(none, 128), InputError);
+}
+
+TEST(PlanPictures, AScaleMayHaveLostTheLastTriangleOfATexture) {
+  int fewer = 0;
+  for (const char* name : {"scan", "nodes", "alpha", "planes"}) {
+    SCOPED_TRACE(name);
+    PackageReader package(
+        open_store(std::string(TEXMESH_SOURCE_DIR) + "/tests/golden/v2.0-" + name + ".texmesh"));
+    const int coarsest = package.manifest().scales.back().scale;
+    fewer += bare_scale(package, coarsest, {}).texture_images.size() <
+             bare_scale(package, 0, {}).texture_images.size();
+    EXPECT_GT(PlanPictures(package, "", 1, {}).measure(uniform(package, coarsest, 0), 64).whole, 0);
+  }
+  EXPECT_GT(fewer, 0) << "no package tries it";
 }
 
 }  // namespace

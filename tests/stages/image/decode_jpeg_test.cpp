@@ -2,8 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <cstring>
+
 #include "stages/image/image_metadata.h"
 #include "tests/stages/image/image_files.h"
+#include "tests/stages/ladder/source_scenes.h"
 
 namespace texmesh {
 namespace {
@@ -34,6 +37,54 @@ TEST(DecodeJpeg, CmykJpegBecomesRgb) {
     for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(pixels.data[c], want[c], 3) << adobe << c;
     EXPECT_TRUE(read_image_metadata(ImageFormat::kJpeg, image.bytes).cmyk);
   }
+}
+
+Bytes cut(const Bytes& jpeg, double part) {
+  return {jpeg.begin(), jpeg.begin() + static_cast<std::ptrdiff_t>(part * static_cast<double>(jpeg.size()))};
+}
+
+TEST(DecodeJpeg, ADamagedFileIsShownAsViewersShowItWhereThatIsAccepted) {
+  const Kind kinds[] = {{"baseline"}, {"progressive", 3, 1, 1, true}, {"grey", 1}};
+  for (const Kind& kind : kinds) {
+    SCOPED_TRACE(kind.name);
+    const Bytes whole = make_jpeg(kind, 64, 64);
+    const Pixels sound = decode_image(probe(whole));
+    Image image = probe(cut(whole, 0.9));
+    EXPECT_NE(error_of([&] { decode_image(image); }), "");
+    image.accept_damage = true;
+    std::string damage;
+    const Pixels shown = decode_image(image, FloatEncoding::kAsIs, &damage);
+    EXPECT_NE(damage.find(" of 64: "), std::string::npos) << damage;
+    ASSERT_EQ(shown.data.size(), sound.data.size());
+    EXPECT_NE(shown.data, sound.data);
+    if (kind.progressive) continue;
+    const std::size_t first_rows_bytes = 24 * std::size_t{sound.width_px} * sound.channels;
+    EXPECT_EQ(std::memcmp(shown.data.data(), sound.data.data(), first_rows_bytes), 0);
+  }
+}
+
+TEST(DecodeJpeg, AFileWithoutMostOfItsRowsIsRefused) {
+  for (const bool progressive : {false, true}) {
+    const Bytes whole = make_jpeg({"", 3, 1, 1, progressive}, 128, 128);
+    for (const double part : {0.02, 0.04, progressive ? 0.04 : 0.4}) {
+      try {
+        Image image = probe(cut(whole, part));
+        image.accept_damage = true;
+        std::string damage;
+        decode_image(image, FloatEncoding::kAsIs, &damage);
+        ADD_FAILURE() << part << " of it is enough: " << damage;
+      } catch (const InputError&) {
+      }
+    }
+  }
+}
+
+TEST(DecodeJpeg, ASoundFileHasNoDamage) {
+  Image image = probe(make_jpeg({""}, 64, 64));
+  image.accept_damage = true;
+  std::string damage = "of another one";
+  decode_image(image, FloatEncoding::kAsIs, &damage);
+  EXPECT_EQ(damage, "");
 }
 
 }  // namespace

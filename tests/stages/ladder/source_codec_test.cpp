@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/stages/ladder/source_scenes.h"
+#include "tests/support/wide_jpeg.h"
 
 namespace texmesh {
 namespace {
@@ -220,6 +221,39 @@ TEST(SourceCodec, FilesAreKeptWhereTheyAreWanted) {
   EXPECT_EQ(encode(png, keep).planes[0].source, SourceFile::kNone);  // the colour plane's has it
   const Scene inks = scene_of(image_of(testing::cmyk_jpeg(48, 48, {10, 20, 30, 40}, true)));
   EXPECT_EQ(encode(inks, keep).planes[0].source, SourceFile::kOtherColours);
+}
+
+const Note* note_of(const Ladder& ladder, const std::string& code) {
+  for (const Note& note : ladder.notes)
+    if (note.code == code) return &note;
+  return nullptr;
+}
+
+TEST(SourceCodec, WideAndDamagedFilesAreCodedFromTheirPixels) {
+  std::vector<std::uint16_t> ramp;
+  for (int i = 0; i < 64 * 64; ++i) ramp.push_back(static_cast<std::uint16_t>(i));
+  const Bytes whole = make_jpeg({""}, 64, 64);
+  Image damaged = image_of(Bytes(whole.begin(), whole.end() - static_cast<std::ptrdiff_t>(whole.size() / 8)));
+  damaged.accept_damage = true;
+  LadderOptions keep = asked({50});
+  keep.keep_source = true;
+  for (const LadderMode mode : {LadderMode::kJpeg, LadderMode::kProgressive}) {
+    keep.mode = mode;
+    const Ladder wide = encode(scene_of(image_of(testing::wide_jpeg(64, 64, ramp, 12))), keep);
+    EXPECT_FALSE(note_of(wide, "damaged-image"));
+    EXPECT_EQ(wide.planes[0].source, SourceFile::kSameColours);
+    const Ladder ladder = encode(scene_of(damaged), keep);
+    const Note* damage = note_of(ladder, "damaged-image");
+    ASSERT_TRUE(damage);
+    EXPECT_EQ(damage->severity, Severity::kWarning);
+    EXPECT_NE(damage->text.find(" of 64: "), std::string::npos) << damage->text;
+    EXPECT_EQ(ladder.planes[0].source, SourceFile::kNone) << "a file that is not whole is kept";
+    if (mode != LadderMode::kJpeg) continue;
+    for (const Ladder* l : {&wide, &ladder}) {
+      ASSERT_TRUE(note_of(*l, "jpeg-coded-anew"));
+      EXPECT_NE(note_of(*l, "jpeg-coded-anew")->text.find(" of 255 off on average"), std::string::npos);
+    }
+  }
 }
 
 TEST(SourceCodec, ThreadsMakeNoDifference) {
