@@ -36,7 +36,8 @@ class SurfaceDistance {
   double operator()(Vec3d p, Hint& hint) const;
   /// The hint that names the triangle with this index in the constructor's list.
   Hint hint_of(std::uint32_t triangle) const { return {leaf_of_[triangle]}; }
-  /// Whichever hint is nearer to the point; the first one where the other names nothing.
+  /// Whichever hint is nearer to the point; the first one, which names a triangle, where the other names
+  /// nothing.
   Hint nearer(Hint a, Hint b, Vec3d p) const;
   /// The square of the distance to that triangle alone: no less than that of the distance.
   double distance2_to(std::uint32_t triangle, Vec3d p) const;

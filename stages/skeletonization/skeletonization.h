@@ -43,9 +43,10 @@ struct SkeletonizationOptions {
 
 /// The skeleton of any conditioned mesh (open, several components, one triangle): an alpha wrap, its mean
 /// curvature flow skeleton, and distances to it that the local thickness corrects where a curve is no
-/// skeleton (local_radius.h). Meshes of more than 100,000 triangles are clustered to that first. A mesh of
-/// fewer than 6,400 triangles has an alpha_divisor of at most an 80th of their number, or 28, and a wrap of
-/// at most a 2,000th of their square, or 1,000 faces. No mesh makes it fail. Every fallback gives a warning:
+/// skeleton (local_radius.h). Meshes of more than 100,000 triangles are clustered to that first. Of few
+/// triangles alpha_divisor is at most an 80th of their number, or 28 (the default is whole from 6,400 on),
+/// and the wrap has at most a 2,000th of their square, or 1,000 faces. No mesh makes it fail. Every fallback
+/// gives a warning:
 /// - "skeleton-coarser-wrap": a wrap that takes more than max_wrap_steps, or looks at 50 times as many
 ///   triangles (thousands of needles around one point), is tried with twice and four times its alpha.
 /// - "skeleton-part-centroid": a part of the wrap that cannot be contracted has its centroid for a skeleton.

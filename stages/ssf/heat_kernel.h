@@ -45,7 +45,7 @@ HeatOperator make_heat_operator(const HeatSurface& surface, std::vector<double> 
 /// no eigenvalue is larger than `bound`.
 void limit_spectrum(HeatOperator& laplacian, double bound);
 
-/// Slows down the vertices whose rates sum up to most, at most `share` of all, to what the others have at
+/// Slows down the vertices whose rates sum up to most, `share` of all, rounded up, to what the others have at
 /// most. A handful of them set the bound of the spectrum, and heat through them is even long before it has
 /// gone anywhere.
 void trim_spectrum(HeatOperator& laplacian, double share);

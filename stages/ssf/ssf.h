@@ -75,6 +75,7 @@ struct SsfOptions {
 ///   the largest component (most positions), is within component_cap of the component's diagonal.
 /// - Large sigmas are solved on coarser levels, whose vertices are positions of the mesh. Feature points of a
 ///   scale are there no closer to one another than feature_spacing().
+/// - The fastest 50th of a level's vertices has the rates of the others: trim_spectrum() of heat_kernel.h.
 /// O(n log n). Deterministic for any thread count.
 ScaleMap filter_scale_space(const ConditionedMesh& mesh, const SsfOptions& options,
                             const RunContext& context);

@@ -10,7 +10,8 @@ struct Target;
 
 extern "C" {
 /// `change`: libFuzzer's, on `size` bytes of a buffer of `most`; returns the new size. `take` gets the
-/// result.
+/// result. Not for Shape::kBytes: what Target::mend of the program allocates would be freed by this
+/// library's allocator.
 void texmesh_fuzz_mutate(const texmesh::fuzz::Target* target, const std::uint8_t* data, std::size_t size,
                          unsigned seed,
                          std::size_t (*change)(std::uint8_t* data, std::size_t size, std::size_t most),

@@ -7,7 +7,6 @@
 #include "format/base/errors.h"
 #include "format/container/layout.h"
 #include "pipeline/extract/glb/scale_file.h"
-#include "stages/data/coverage.h"
 
 namespace texmesh {
 namespace {

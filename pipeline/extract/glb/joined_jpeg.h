@@ -34,8 +34,8 @@ class JoinedJpeg {
   void fill_unseen(const std::vector<std::uint8_t>& coverage);
 
   /// A progressive JPEG with Huffman tables of its own. At quality 100 the coefficients are those of the
-  /// package; below (1..100) steps are at least those of texture_step(), and coefficients are rounded to
-  /// them. Same bytes for the same input.
+  /// package, but for what fill_unseen() has changed; below (1..100) steps are at least those of
+  /// texture_step(), and coefficients are rounded to them. Same bytes for the same input.
   std::vector<std::uint8_t> file(double quality = 100) const;
 
  private:
