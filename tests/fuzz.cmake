@@ -27,7 +27,7 @@ add_library(texmesh_fuzz STATIC EXCLUDE_FROM_ALL ${sources})
 target_compile_definitions(texmesh_fuzz PRIVATE TEXMESH_VERSION="${PROJECT_VERSION}")
 target_compile_options(texmesh_fuzz PRIVATE -fPIE -O1 -ffunction-sections -fdata-sections)
 set_target_properties(texmesh_fuzz PROPERTIES POSITION_INDEPENDENT_CODE OFF)
-target_link_libraries(texmesh_fuzz PUBLIC texmesh_format nettle ZLIB::ZLIB nlohmann_json::nlohmann_json CURL::libcurl
+target_link_libraries(texmesh_fuzz PUBLIC texmesh_format Nettle::nettle ZLIB::ZLIB nlohmann_json::nlohmann_json CURL::libcurl
   TBB::tbb Eigen3::Eigen WebP::webp zstd::libzstd_shared draco::draco meshoptimizer::meshoptimizer JPEG::JPEG PNG::PNG fmt::fmt OpenImageIO::OpenImageIO
   ${CMAKE_DL_LIBS})
 texmesh_precompile(texmesh_fuzz <filesystem> <sstream> <nlohmann/json.hpp>)
@@ -39,7 +39,7 @@ add_library(texmesh_fuzz_mutator SHARED EXCLUDE_FROM_ALL fuzz/mutate.cpp fuzz/mu
 target_include_directories(texmesh_fuzz_mutator PRIVATE ${PROJECT_SOURCE_DIR})
 target_compile_options(texmesh_fuzz_mutator PRIVATE -fno-sanitize=all -O2)
 target_link_options(texmesh_fuzz_mutator PRIVATE -fno-sanitize=all -static-libstdc++ LINKER:-Bsymbolic LINKER:--version-script=${CMAKE_CURRENT_SOURCE_DIR}/fuzz/mutator_module.map)
-target_link_libraries(texmesh_fuzz_mutator PRIVATE nettle ZLIB::ZLIB nlohmann_json::nlohmann_json fmt::fmt)
+target_link_libraries(texmesh_fuzz_mutator PRIVATE Nettle::nettle ZLIB::ZLIB nlohmann_json::nlohmann_json fmt::fmt)
 add_custom_target(texmesh_fuzzers)
 foreach(file ${targets})
   if(NOT file MATCHES "/([a-z]+)_targets\\.cpp$")

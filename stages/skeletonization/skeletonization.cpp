@@ -88,7 +88,9 @@ WrapSize wrap_size(const SkeletonizationOptions& options, std::size_t triangles)
 std::vector<TriangleSoup> wrap(const TriangleSoup& soup, std::size_t triangles,
                                const SkeletonizationOptions& options, Notes& notes,
                                const RunContext& context) {
-  auto [alpha, faces] = wrap_size(options, triangles);
+  const auto [finest_alpha, faces] = wrap_size(options, triangles);
+  const auto divisor = [](double of) { return std::to_string(std::lround(1 / of)); };
+  double alpha = finest_alpha;
   for (int attempt = 1;; ++attempt, alpha *= 2) {
     context.check_cancelled();
     std::vector<TriangleSoup> parts;
@@ -104,8 +106,8 @@ std::vector<TriangleSoup> wrap(const TriangleSoup& soup, std::size_t triangles,
     if (parts.empty()) continue;
     if (attempt > 1)
       add_warning(notes, "skeleton-coarser-wrap", "",
-                  "the surface is too intricate for alpha_divisor " + std::to_string(options.alpha_divisor) +
-                      ", wrapped with " + std::to_string(options.alpha_divisor >> (attempt - 1)));
+                  "the surface is too intricate for alpha_divisor " + divisor(finest_alpha) +
+                      ", wrapped with " + divisor(alpha));
     return parts;
   }
 }

@@ -320,6 +320,7 @@ void limit_spectrum(HeatOperator& l, double bound) {
 }
 
 void trim_spectrum(HeatOperator& l, double share) {
+  if (share * static_cast<double>(l.vertex_count()) < 1) return;
   std::vector<double> leaving = sums_of_rates(l);
   const auto rank = static_cast<std::size_t>((1 - share) * static_cast<double>(leaving.size() - 1));
   std::nth_element(leaving.begin(), leaving.begin() + static_cast<std::ptrdiff_t>(rank), leaving.end());

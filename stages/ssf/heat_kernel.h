@@ -46,8 +46,8 @@ HeatOperator make_heat_operator(const HeatSurface& surface, std::vector<double> 
 void limit_spectrum(HeatOperator& laplacian, double bound);
 
 /// Slows down the vertices whose rates sum up to most, `share` of all, rounded up, to what the others have at
-/// most. A handful of them set the bound of the spectrum, and heat through them is even long before it has
-/// gone anywhere.
+/// most; of so few vertices that it is less than one of them, none. A handful of them set the bound of the
+/// spectrum, and heat through them is even long before it has gone anywhere.
 void trim_spectrum(HeatOperator& laplacian, double share);
 
 /// The points x after heat flow until time t, as displacements. A place as a float would have too few digits

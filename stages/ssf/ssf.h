@@ -11,7 +11,7 @@
 
 namespace texmesh {
 
-inline constexpr int kSsfVersion = 5;
+inline constexpr int kSsfVersion = 6;
 
 /// What meshes are filtered by: the curvature of positions, or R(v) as the thesis has it (7.2).
 enum class ScaleSignal : std::uint8_t { kCurvature, kRadius };

@@ -94,6 +94,9 @@ TEST(HeatKernel, AFewFastVerticesDoNotSetThePaceOfAll) {
   }
   EXPECT_GT(slower, 0u);
   EXPECT_LE(static_cast<double>(slower), 0.1 * static_cast<double>(l.vertex_count()) + 1);
+  HeatOperator small = before;
+  trim_spectrum(small, 0.9 / static_cast<double>(l.vertex_count()));
+  EXPECT_EQ(small.rate, before.rate) << "less than one vertex is none";
 }
 
 }  // namespace

@@ -20,10 +20,12 @@ interface Job {
 /** Jobs of all loads that wait for their turn, and how many are under way. */
 let queue: Job[] = [];
 let running = 0;
+let turns = 0;
 function postWaitingJobs(): void {
   while (queue.length > 0 && running < mostAtOnce) {
-    // A preview is enlarged when nothing better waits: what comes meanwhile needs none.
-    const next = Math.max(0, queue.findIndex(({ request }) => request.op !== 'enlarge'));
+    // A preview is enlarged when nothing better waits: what comes meanwhile needs none. But its texture shows nothing of that before the
+    // first piece has been made, so every fourth turn belongs to whoever waits longest.
+    const next = ++turns % 4 === 0 ? 0 : Math.max(0, queue.findIndex(({ request }) => request.op !== 'enlarge'));
     const [job] = queue.splice(next, 1);
     job.pool.post(job);
   }
