@@ -69,7 +69,12 @@ class BudgetSearch {
     const MeshKey best = choose_mesh();
     report(0.6);
     FoundFile found = looks_.file_of(best, allocation_of(best));
-    if (source_.request.bytes <= kLookAtFilesBelow && filler_.fits(found.file)) look_at_files(found);
+    if (filler_.fits(found.file)) {
+      if (source_.request.bytes <= kLookAtFilesBelow)
+        look_at_files(found);
+      else
+        looks_.try_smaller_than_stored(found);
+    }
     report(0.7);
     const bool fitting = filler_.fits(found.file) && !filler_.fills(found.file);
     if (fitting) fill_by_mesh(found);

@@ -132,6 +132,16 @@ void FileLooks::try_other_files(const LossCurves& curves, FoundFile& best) {
   }
 }
 
+void FileLooks::try_smaller_than_stored(FoundFile& best) {
+  if (best.images.images.empty()) return;
+  const ImagePlan& plan = best.images.images[largest_loss(best.images)].plan;
+  if (!plan.coding.stored || plan.is_source()) return;
+  look_at(best);
+  for (const int steps : {1, 2})
+    if (const auto other = with_largest_loss_resized(best.images, steps, coder_))
+      try_file(best.key, *other, best);
+}
+
 std::vector<double> FileLooks::differences_of(const MeshKey& key, const BudgetFile& file) {
   OtherTextures textures;
   for (std::size_t i = 0; i < source_.image_count(); ++i)

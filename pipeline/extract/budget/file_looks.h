@@ -28,6 +28,8 @@ class FileLooks {
   /// The texture that loses most in other sizes and codings, with more or fewer bytes for others, and with
   /// the mesh coded finer or leaner, as long as that is nearer.
   void try_other_files(const LossCurves& curves, FoundFile& best);
+  /// Where the texture that loses most is to be some of the source's own coefficients: smaller and finer.
+  void try_smaller_than_stored(FoundFile& best);
   /// Of the mesh alone, and of the file.
   std::vector<double> differences_of(const MeshKey& key, const BudgetFile& file);
 

@@ -79,6 +79,18 @@ TEST_F(Looks, WhatIsPlannedAsTheSourcesCoefficientsMayBecomeSmaller) {
   EXPECT_FALSE(best.images.images[image].plan.coding.stored);
 }
 
+TEST_F(Looks, FewOfTheSourcesCoefficientsLoseToASmallerTexture) {
+  Allocation images = good();
+  const std::size_t image = worst(images);
+  images.last = image == 0 ? 1 : 0;  // the texture itself stays poor
+  images.images[image].plan = {{FileImage::kJpeg, false, true}, 1, kLowestQuality};
+  FoundFile best = looked_at(images);
+  const double before = best.difference;
+  looks_.try_smaller_than_stored(best);
+  EXPECT_LT(best.difference, before);
+  EXPECT_FALSE(best.images.images[image].plan.coding.stored);
+}
+
 TEST_F(Looks, ATextureThatTakesTooMuchGivesBytesToTheOneThatLosesMost) {
   Allocation images = good();
   ASSERT_GT(images.images.size(), 1u);
