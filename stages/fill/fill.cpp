@@ -327,9 +327,10 @@ void decode_and_fill(const std::vector<TexturePlane>& planes, std::size_t full,
 
 }  // namespace
 
-void fill_uncovered(Pixels& pixels, const std::vector<std::uint8_t>& coverage, const RunContext& context) {
+void fill_uncovered(Pixels& pixels, const std::vector<std::uint8_t>& coverage, const RunContext& context,
+                    PartBlocks part) {
   push_pull(pixels, coverage, context);
-  flatten_where_covered(pixels, coverage, PartBlocks::kSparse, context);
+  flatten_where_covered(pixels, coverage, part, context);
 }
 
 std::vector<Pixels> fill_planes(const Fragments& fragments, const std::vector<Image>& images, Fill fill,

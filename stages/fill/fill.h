@@ -30,6 +30,7 @@ std::vector<Pixels> fill_planes(const Fragments& fragments, const std::vector<Im
 /// Push-pull: gives every texel whose coverage bit (as TexturePlane::coverage) is 0 a smooth continuation of
 /// the covered ones, and fill_blocks.h makes that cheap for JPEG; covered ones keep their value. Without any
 /// covered texel nothing changes.
-void fill_uncovered(Pixels& pixels, const std::vector<std::uint8_t>& coverage, const RunContext& context);
+void fill_uncovered(Pixels& pixels, const std::vector<std::uint8_t>& coverage, const RunContext& context,
+                    PartBlocks part = PartBlocks::kSparse);
 
 }  // namespace texmesh

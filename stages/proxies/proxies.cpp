@@ -130,28 +130,19 @@ class ProxyRun {
         shop_(source, groups, surfaces_),
         studio_(mesh, shown) {}
 
-  /// Whether larger sizes may have a proxy.
-  bool add(int bytes, Proxies& out, const RunContext& context) {
+  void add(int bytes, Proxies& out, const RunContext& context) {
     const bool first = out.proxies.empty();
+    if (whole_) return note_none(out.notes, bytes, kWholeTakesFewer);
     Candidate best = best_of(bytes, first, context);
     std::optional<MadeProxy>& made = best.made;
-    if (!made) {
-      note_none(out.notes, bytes, "mesh and pictures do not fit");
-      return true;
-    }
-    if (!first && made->proxy.glb.size() <= out.proxies.back().glb.size()) {
-      note_none(out.notes, bytes, "the whole object takes fewer");
-      return false;
-    }
+    if (!made) return note_none(out.notes, bytes, "mesh and pictures do not fit");
+    whole_ = !first && made->proxy.glb.size() <= out.proxies.back().glb.size();
+    if (whole_) return note_none(out.notes, bytes, kWholeTakesFewer);
     const bool loses = loses_to_scale(made->proxy.glb.size(), first, best.flip.mean(), context);
-    if (loses && !first) {
-      note_none(out.notes, bytes, kScaleWins);
-      return true;
-    }
+    if (loses && !first) return note_none(out.notes, bytes, kScaleWins);
     made->proxy.losses = studio_.losses(made->shown, best.flip, context);
     out.proxies.push_back(std::move(made->proxy));
     if (first) first_loses_ = loses;
-    return true;
   }
 
   /// A smallest proxy that loses goes with those that it is shown before.
@@ -163,6 +154,7 @@ class ProxyRun {
 
  private:
   static constexpr const char* kScaleWins = "a scale with the source's atlas looks better for the same bytes";
+  static constexpr const char* kWholeTakesFewer = "the whole object takes fewer";
   struct Candidate {
     std::optional<MadeProxy> made;
     ProxyForm form;
@@ -226,6 +218,7 @@ class ProxyRun {
   bool smooth_;               // S_0 shows no facets
   bool flat_ = false;         // the last proxy needs no normals
   bool first_loses_ = false;  // to a scale of as many bytes
+  bool whole_ = false;        // the last proxy is all that larger ones could be
   SurfaceLadder surfaces_;
   ProxyWorkshop shop_;
   ProxyStudio studio_;
@@ -251,12 +244,12 @@ Proxies make_proxies(const NestedScales& scales, const std::vector<Material>& ma
   groups.mip_levels = reads_mip_levels(materials);
   const BakeSource source(mesh, shown, groups);
   if (!(source.diagonal() > 0)) {
-    add_info(out.notes, "no-proxy", "", "there is no proxy: the object has no extent");
+    for (const int bytes : sizes) note_none(out.notes, bytes, "the object has no extent");
     return out;
   }
   ProxyRun run(scales, mesh, shown, source, groups, options.mode, sizes.back(), inner);
   for (std::size_t i = 0; i < sizes.size(); ++i) {
-    if (!run.add(sizes[i], out, inner)) break;
+    run.add(sizes[i], out, inner);
     context.report(static_cast<double>(i + 1) / static_cast<double>(sizes.size()));
   }
   run.finish(out);

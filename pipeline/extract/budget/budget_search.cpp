@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <numeric>
+#include <optional>
 #include <set>
 #include <utility>
 
@@ -68,11 +69,16 @@ class BudgetSearch {
     const MeshKey best = choose_mesh();
     report(0.6);
     FoundFile found = looks_.file_of(best, allocation_of(best));
-    if (source_.request.bytes <= kLookAtFilesBelow && filler_.fits(found.file)) look_at_files(found);
+    if (filler_.fits(found.file)) {
+      if (source_.request.bytes <= kLookAtFilesBelow)
+        look_at_files(found);
+      else
+        looks_.try_smaller_than_stored(found);
+    }
     report(0.7);
     const bool fitting = filler_.fits(found.file) && !filler_.fills(found.file);
-    const MeshKey filled = fitting ? fill_by_mesh(found.key, found.file) : found.key;
-    return finish(filled, std::move(found.file));
+    if (fitting) fill_by_mesh(found);
+    return finish(found.key, std::move(found.file));
   }
 
  private:
@@ -87,7 +93,7 @@ class BudgetSearch {
     looks_.look_at(best);
     for (const MeshKey& key : likeliest())
       looks_.replace_if_nearer(looks_.file_of(key, allocation_of(key)), best);
-    looks_.try_other_sizes(best);
+    looks_.try_other_files(curves_, best);
   }
 
   /// But for the best.
@@ -198,31 +204,39 @@ class BudgetSearch {
     return scales().size() - 1;
   }
 
-  /// Where textures cannot take the bytes that are left: the same mesh coded finer by parts of a bit, or a
-  /// finer scale.
-  MeshKey fill_by_mesh(const MeshKey& from, BudgetFile& best) {
-    MeshKey chosen = from;
-    if (is_finest(from) || !meshes_.at(from).file->has_draco()) return from;
-    const auto measure = [&](const MeshKey& key) {
-      BudgetFile file = best;
-      file.glb = meshes_.at(key).file_with(best.images);
-      const bool fits = filler_.fits(file), better = fits && file.glb.size() > best.glb.size();
-      if (better) best = std::move(file);
-      meshes_.forget(better ? chosen : key);
-      if (better) chosen = key;
-      return fits;
-    };
-    for (MeshKey key = from;; --key.scale) {
-      for (key.coding = from.coding; key.coding < kMeshCodings; ++key.coding) {
-        const bool same = key.scale == from.scale && key.coding == from.coding;
-        double low = same ? 0 : kFewestExtraBits, high = kMostExtraBits;
-        for (int i = 0; i < kMeshTries && !filler_.fills(best); ++i) {
-          key.extra_bits = (low + high) / 2;
-          (measure(key) ? low : high) = key.extra_bits;
-        }
+  /// `from` with its mesh coded finer by parts of a bit: the largest file that was found. Nothing
+  /// where all that fit are smaller.
+  std::optional<FoundFile> larger_by_bits(const FoundFile& from, std::size_t scale, int coding) {
+    const bool same = scale == from.key.scale && coding == from.key.coding;
+    double low = same ? 0 : kFewestExtraBits, high = kMostExtraBits;
+    std::optional<FoundFile> best;
+    for (int i = 0; i < kMeshTries && !(best && filler_.fills(best->file)); ++i) {
+      FoundFile other = from;
+      other.key = {scale, coding, (low + high) / 2};
+      other.file.glb = meshes_.at(other.key).file_with(from.file.images);
+      meshes_.forget(other.key);
+      (filler_.fits(other.file) ? low : high) = other.key.extra_bits;
+      if (filler_.fits(other.file) && other.file.glb.size() >= (best ? *best : from).file.glb.size())
+        best = std::move(other);
+    }
+    return best;
+  }
+
+  /// Where textures cannot take the bytes that are left: the same mesh coded finer, or a finer scale. Of
+  /// several codings the one that looks nearest.
+  void fill_by_mesh(FoundFile& best) {
+    if (is_finest(best.key) || !meshes_.at(best.key).file->has_draco()) return;
+    const FoundFile from = best;
+    looks_.look_at(best);
+    for (std::size_t scale = from.key.scale;; --scale) {
+      for (int coding = from.key.coding; coding < kMeshCodings; ++coding) {
+        std::optional<FoundFile> other = larger_by_bits(from, scale, coding);
+        if (!other || filler_.fills(other->file) < filler_.fills(best.file)) continue;
+        looks_.look_at(*other);
+        if (filler_.fills(other->file) > filler_.fills(best.file) || other->difference <= best.difference)
+          best = *std::move(other);
       }
-      key.coding = from.coding;
-      if (key.scale == 0 || filler_.fills(best) || source_.request.scale) return chosen;
+      if (scale == 0 || filler_.fills(best.file) || source_.request.scale) return;
     }
   }
 

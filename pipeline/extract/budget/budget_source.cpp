@@ -129,6 +129,8 @@ void BudgetSource::measure_surface(const LitViews& views) {
 }
 
 void BudgetSource::read_best_textures() {
+  for (std::size_t i = 0; i < image_count() && request.images != ExtractImages::kPng; ++i)
+    textures.set_shown(i, shown_texels(*this, i, image(i).width_px, image(i).height_px));
   for (const ShownTexture& t : shown) {
     const PackageImage& from = image(t.image);
     double share = 1;  // halves, not sharpened: the source's own smaller copies

@@ -30,6 +30,7 @@ struct ImagePlan {
   double quality = 0;
   /// Nothing of the package comes nearer to the source.
   bool is_source() const { return coding.stored && quality >= 100; }
+  friend bool operator==(const ImagePlan&, const ImagePlan&) = default;
 };
 
 double size_step(int step);  // share of an image's sides, each 1 / sqrt 2 of the one before

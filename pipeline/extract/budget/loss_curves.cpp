@@ -259,6 +259,16 @@ Allocation LossCurves::allocate(double bytes) const {
   return best;
 }
 
+const CodedImage* LossCurves::neighbour(std::size_t image, const CodedImage& from, int step) const {
+  const CodedImage* fewer = nullptr;
+  for (const CodedImage& file : curves_[image]) {
+    if (file.plan == from.plan) continue;
+    if (step > 0 && file.bytes > from.bytes) return &file;
+    if (step < 0 && file.bytes < from.bytes) fewer = &file;
+  }
+  return fewer;
+}
+
 Allocation LossCurves::allocate(double bytes, const std::vector<double>& group_weights) const {
   Allocation out;
   std::vector<std::size_t> at(curves_.size(), 0);

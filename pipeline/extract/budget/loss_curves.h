@@ -39,6 +39,9 @@ class LossCurves {
   void measure(double bytes);
   /// The least loss of at most `bytes`; the smallest files where nothing fits.
   Allocation allocate(double bytes) const;
+  /// Another file of an image on its curve, that with next more bytes than `from`, or next fewer with a step
+  /// of -1; null where there is none.
+  const CodedImage* neighbour(std::size_t image, const CodedImage& from, int step) const;
 
  private:
   using TrialKey = std::tuple<std::size_t, int, TextureCoding, double>;

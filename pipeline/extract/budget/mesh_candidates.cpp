@@ -16,8 +16,8 @@ namespace {
 struct Coding {
   int position, uv, normal, colour;
 };
-constexpr Coding kCodings[kMeshCodings] = {
-    {10, 10, 7, 5}, {11, 11, 7, 6}, {12, 12, 8, 7}, {13, 13, 8, 8}, {14, 14, 9, 8}};
+constexpr Coding kCodings[kMeshCodings] = {{10, 10, 7, 5}, {11, 11, 7, 6}, {12, 12, 8, 7},
+                                           {13, 13, 8, 8}, {14, 14, 9, 8}, {15, 14, 11, 8}};
 
 }  // namespace
 

@@ -10,7 +10,7 @@
 namespace texmesh {
 
 /// How many ways to code a mesh there are, from the leanest to the finest (of S_0: as it is stored).
-inline constexpr int kMeshCodings = 5;
+inline constexpr int kMeshCodings = 6;
 
 /// A scale, as an index into the manifest's scales, and how finely it is coded, 0 .. kMeshCodings - 1; with
 /// `extra_bits` (any part of one) for its positions and texture coordinates, where bytes have to be filled.

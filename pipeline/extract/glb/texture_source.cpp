@@ -36,6 +36,23 @@ void add_triangles(const Mesh& mesh, std::size_t material, const TextureRef& ref
   }
 }
 
+/// A byte of coverage is a row of a block.
+void cover_whole_blocks(std::vector<std::uint8_t>& coverage, std::uint32_t width_px,
+                        std::uint32_t height_px) {
+  constexpr std::uint32_t kSide = 8;
+  const std::size_t stride = coverage_stride_bytes(width_px);
+  for (std::uint32_t y = 0; y < height_px; y += kSide)
+    for (std::size_t x = 0; x < stride; ++x) {
+      const std::uint32_t end = std::min(y + kSide, height_px);
+      bool any = false;
+      for (std::uint32_t row = y; row < end; ++row) any |= coverage[row * stride + x] != 0;
+      const std::uint32_t beyond =
+          x + 1 == stride ? static_cast<std::uint32_t>(stride * kSide) - width_px : 0;
+      const auto whole = static_cast<std::uint8_t>(0xffu << beyond);
+      for (std::uint32_t row = y; row < end; ++row) coverage[row * stride + x] = any ? whole : 0;
+    }
+}
+
 }  // namespace
 
 Averaging PackageImage::averaging() const {
@@ -70,6 +87,13 @@ TextureSource::TextureSource(PackageReader& package, double most_texels, const R
   first_level_ = halvings(most_texels);
 }
 
+void TextureSource::set_shown(std::size_t index, std::vector<std::uint8_t> coverage) {
+  const PackageImage& image = images_.at(index);
+  cover_whole_blocks(coverage, image.width_px, image.height_px);
+  if (image.alpha_plane) shown_[*image.alpha_plane] = coverage;
+  shown_[image.plane] = std::move(coverage);
+}
+
 /// How often sides of colours are halved.
 std::uint32_t TextureSource::halvings(double most_texels) const {
   double texels = 0;
@@ -88,6 +112,8 @@ const std::vector<Pixels>& TextureSource::levels(std::uint32_t plane, bool colou
   std::vector<Pixels>& levels = planes_[plane];
   if (!levels.empty()) return levels;
   Pixels full = read_plane(package_, plane, kBestRung, context_);
+  if (const auto shown = shown_.find(plane); shown != shown_.end())
+    fill_uncovered(full, shown->second, context_, PartBlocks::kSmooth);
   const std::uint32_t skip = colours ? first_level_ : 0;
   if (skip > 0)
     full = reduced(full, full.width_px, full.height_px, half_of(full.width_px, skip),

@@ -40,6 +40,10 @@ class TextureSource {
   /// made cheap to code. `sharpening` (see reduced()) is for colours alone.
   Pixels texels(std::size_t index, std::uint32_t width_px, std::uint32_t height_px,
                 const std::vector<std::uint8_t>& coverage, float sharpening = kSharpening);
+  /// Says which texels of an image at full size are shown, before any are asked for. Blocks of 8 x 8 without
+  /// one, of which packages hold nothing true, are filled smoothly before smaller copies are made: those
+  /// would take them in at the borders of charts.
+  void set_shown(std::size_t index, std::vector<std::uint8_t> coverage);
   /// Largest share of an image's sides, 0 .. 1, that texels() gives.
   double largest_share(std::size_t index);
   /// Whether a source that allows so many texels gives the same ones.
@@ -53,8 +57,9 @@ class TextureSource {
   PackageReader& package_;
   RunContext context_;
   std::vector<PackageImage> images_;
-  std::uint32_t first_level_ = 0;                        // of colour planes: how often sides are halved
-  std::map<std::uint32_t, std::vector<Pixels>> planes_;  // by plane: halves, halves of them ..
+  std::uint32_t first_level_ = 0;                             // of colour planes: how often sides are halved
+  std::map<std::uint32_t, std::vector<std::uint8_t>> shown_;  // by plane
+  std::map<std::uint32_t, std::vector<Pixels>> planes_;       // by plane: halves, halves of them ..
 };
 
 /// Colours and alpha as one image of 4 channels; both of one size.

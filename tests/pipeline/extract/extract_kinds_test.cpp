@@ -2,13 +2,16 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <sstream>
 
 #include "pipeline/compile/compile_model.h"
+#include "pipeline/extract/budget/mesh_candidates.h"
 #include "pipeline/extract/extract.h"
 #include "stages/gltf/check_glb.h"
 #include "tests/support/command.h"
 #include "tests/support/gltf_builder.h"
 #include "tests/support/images.h"
+#include "tests/support/meshes.h"
 
 namespace texmesh {
 namespace {
@@ -155,6 +158,37 @@ INSTANTIATE_TEST_SUITE_P(Kinds, ExtractKinds, ::testing::ValuesIn(kKinds), [](co
   std::replace(name.begin(), name.end(), ' ', '_');
   return name;
 });
+
+TEST(ExtractMesh, ALittleLeanerThanStoredItKeepsItsNormals) {
+  const testing::TemporaryFolder folder;
+  const Mesh mesh = testing::bumpy_sphere(30, 60);
+  std::ostringstream obj;
+  for (const Vec3f& p : mesh.positions) obj << "v " << p.x << ' ' << p.y << ' ' << p.z << '\n';
+  for (const Vec3f& n : mesh.normals) obj << "vn " << n.x << ' ' << n.y << ' ' << n.z << '\n';
+  for (const Triangle& t : mesh.triangles) {
+    obj << 'f';
+    for (const std::uint32_t w : t) obj << ' ' << mesh.wedge_position[w] + 1 << "//" << w + 1;
+    obj << '\n';
+  }
+  testing::write_text(folder / "a.obj", obj.str());
+  CompileRequest request;
+  request.input = folder / "a.obj";
+  request.output = folder / "a.texmesh";
+  request.options.quality = {1, 32, 1};
+  NullStore store;
+  compile_model(request, store, {}, {});
+  PackageReader package(open_store(folder / "a.texmesh"));
+  ExtractRequest wanted;
+  wanted.bytes = 100'000;
+  const BudgetSource source(package, wanted, {});
+  MeshCandidates meshes(source);
+  const MeshCandidate stored = meshes.at({0, kMeshCodings - 1, 0}),
+                      leaner = meshes.at({0, kMeshCodings - 1, -1}),
+                      next = meshes.at({0, kMeshCodings - 2, 0});
+  EXPECT_EQ(stored.geometry, 0);
+  EXPECT_LT(leaner.fixed_bytes, stored.fixed_bytes);
+  EXPECT_LT(leaner.geometry, 0.5 * next.geometry);
+}
 
 }  // namespace
 }  // namespace texmesh

@@ -35,6 +35,31 @@ TEST(LossCurves, MoreBytesLoseLess) {
   EXPECT_GT(curves.allocate(0).loss, before);
 }
 
+TEST(LossCurves, NeighboursAreTheFilesOfACurveInTurn) {
+  PackageReader package(open_store(kGolden));
+  ExtractRequest request;
+  request.bytes = 60000;
+  request.display_px = 64;
+  BudgetSource source(package, request, {});
+  ImageCoder coder(source);
+  LossCurves curves(source, coder);
+  curves.measure(40000);
+  CodedImage at = curves.allocate(0).images[0];
+  EXPECT_EQ(curves.neighbour(0, at, -1), nullptr);
+  std::vector<CodedImage> up{at};
+  while (const CodedImage* next = curves.neighbour(0, up.back(), 1)) {
+    EXPECT_GT(next->bytes, up.back().bytes);
+    EXPECT_LT(next->loss, up.back().loss);
+    up.push_back(*next);
+  }
+  ASSERT_GT(up.size(), 2u);
+  for (std::size_t k = up.size(); k-- > 1;) {
+    const CodedImage* next = curves.neighbour(0, up[k], -1);
+    ASSERT_NE(next, nullptr);
+    EXPECT_EQ(next->plan, up[k - 1].plan);
+  }
+}
+
 TEST(LossCurves, ImagesOfOneMaterialAreOneGroup) {
   PackageReader package(open_store(kGolden));
   ExtractRequest request;
