@@ -170,11 +170,15 @@ std::vector<std::uint8_t> shown_texels(const Mesh& mesh, const Model& model, std
   TexelCoverage coverage(width_px, height_px, Wrap::kRepeat, Wrap::kRepeat);
   const auto named = std::ranges::find(model.images, image_name(image), &Image::name);
   const auto number = static_cast<std::int32_t>(named - model.images.begin());
+  bool known = false;
   for (std::size_t m = 0; m < model.materials.size() && named != model.images.end(); ++m)
     for_each_texture(model.materials[m], [&](const TextureRef& ref) {
       if (ref.image != number || ref.texcoord > 1) return;
+      known = true;
       add_triangles(mesh, m, ref, TexelMap(ref.transform, width_px, height_px), coverage);
     });
+  const auto twice = [](std::uint32_t side_px) { return 2.0 * side_px; };
+  if (!known) coverage.add({Vec2d{0, 0}, Vec2d{twice(width_px), 0}, Vec2d{0, twice(height_px)}});
   return coverage.release_bits();
 }
 

@@ -66,7 +66,8 @@ class TextureSource {
 Pixels with_alpha(const Pixels& colours, const Pixels& alpha);
 
 /// The texels of source image `image`, in a size of `width_px` x `height_px`, that a mesh shows with the
-/// model's materials, as TexturePlane::coverage. The model's images are named as read_model() names them.
+/// model's materials, as TexturePlane::coverage. The model's images are named as read_model() names them. All
+/// texels of an image that no material shows by one of the first two sets of coordinates.
 std::vector<std::uint8_t> shown_texels(const Mesh& mesh, const Model& model, std::uint32_t image,
                                        std::uint32_t width_px, std::uint32_t height_px);
 

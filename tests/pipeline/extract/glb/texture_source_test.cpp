@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <bit>
 
 #include "stages/data/coverage.h"
 #include "tests/support/packages.h"
@@ -41,6 +42,14 @@ TEST(TextureSource, WhatIsFarFromAllThatIsShownIsNotRead) {
       other += !equal;
     }
   EXPECT_GT(other, std::size_t{b.height_px} * (b.width_px - middle - 1) / 2);
+}
+
+TEST(TextureSource, OfAnImageThatNoMaterialHasAllIsShown) {
+  constexpr std::uint32_t kWidth = 20, kHeight = 9;
+  const std::vector<std::uint8_t> bits = shown_texels({}, {}, 3, kWidth, kHeight);
+  std::size_t shown = 0;
+  for (const std::uint8_t byte : bits) shown += static_cast<std::size_t>(std::popcount(byte));
+  EXPECT_EQ(shown, std::size_t{kWidth} * kHeight);
 }
 
 }  // namespace
