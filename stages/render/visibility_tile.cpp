@@ -212,8 +212,22 @@ class Tile {
     return shown_->fragment(t, pixel, mask, layer);
   }
 
+  /// The triangle that all samples of a pixel show, if one does.
+  std::uint32_t whole_pixel(std::size_t corner) const {
+    const std::uint32_t t = nearest_[corner];
+    std::uint32_t other = 0;
+    for (std::size_t row = 0; row < kSamplesPerSide; ++row)
+      for (std::size_t column = 0; column < kSamplesPerSide; ++column)
+        other |= nearest_[corner + row * kTileSamples + column] ^ t;
+    return other == 0 ? t : kNoIndex;
+  }
+
   void add_opaque(std::uint32_t pixel, std::vector<RenderFragment>& out) {
     const std::size_t corner = (pixel / kTilePx * kTileSamples + pixel % kTilePx) * kSamplesPerSide;
+    if (const std::uint32_t whole = whole_pixel(corner); whole != kNoIndex) {
+      out.push_back(fragment(whole, pixel, 0xFFFF, false));
+      return;
+    }
     std::uint32_t triangles[16];
     std::uint16_t masks[16];
     std::size_t count = 0;
