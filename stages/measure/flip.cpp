@@ -302,9 +302,12 @@ double FlipSum::percentile(double part) const {
 }
 
 FlipPicture prepare_flip(const Picture& picture) {
+  return prepare_flip(picture, measure::shown_spans(picture));
+}
+
+FlipPicture prepare_flip(const Picture& picture, const PixelSpans& spans) {
   FlipPicture out;
   if (picture.linear.empty()) return out;
-  const PixelSpans spans = measure::shown_spans(picture);
   for (std::size_t y = 0; y < spans.rows.size(); ++y) {
     const PixelSpans::Row& row = spans.rows[y];
     out.rows.push_back({row.first, row.last, row.offset});

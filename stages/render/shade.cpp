@@ -154,14 +154,20 @@ PictureVariants::PictureVariants(const Visibility& visibility, std::size_t count
 }
 
 Picture PictureVariants::picture(std::size_t variant) const {
+  Picture out;
+  put(variant, out);
+  return out;
+}
+
+void PictureVariants::put(std::size_t variant, Picture& picture) const {
   const std::size_t pixels = static_cast<std::size_t>(side_px_) * side_px_;
   const Shown& shown = shown_.at(variant);
-  Picture out{side_px_, std::vector<Vec3f>(pixels, background_), std::vector<std::uint8_t>(pixels)};
+  if (picture.linear.empty())
+    picture = {side_px_, std::vector<Vec3f>(pixels, background_), std::vector<std::uint8_t>(pixels)};
   for (std::size_t i = 0; i < places_.size(); ++i) {
-    out.linear[places_[i]] = shown.linear[i];
-    out.covered[places_[i]] = shown.covered[i];
+    picture.linear[places_[i]] = shown.linear[i];
+    picture.covered[places_[i]] = shown.covered[i];
   }
-  return out;
 }
 
 PictureVariants shade_variants(const RenderScene& scene, const Visibility& visibility,

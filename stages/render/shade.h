@@ -33,6 +33,9 @@ class PictureVariants {
   std::size_t count() const { return shown_.size(); }
   /// The whole picture.
   Picture picture(std::size_t variant) const;
+  /// The same in place of another of these pictures, or of an empty one: what both show of the background
+  /// stays.
+  void put(std::size_t variant, Picture& picture) const;
 
   /// Places of the shown pixels in the pictures, rising.
   const std::vector<std::uint32_t>& places() const { return places_; }
