@@ -42,8 +42,9 @@ PictureVariants SizePictures::pictures(std::size_t scale, const PictureView& at,
     return look(scene, at.place.camera, at.place.side_px, context, at.bands.rendered);
   };
   if (shown > 0) return shaded(look_here());
-  if (!finest_ || finest_->first != at.view) finest_ = {at.view, look_here()};
-  return shaded(finest_->second);
+  const auto [found, is_new] = finest_.try_emplace(at.view);
+  if (is_new) found->second = look_here();
+  return shaded(found->second);
 }
 
 Loss SizePictures::compare(const Reference& reference, const Picture& test) const {
