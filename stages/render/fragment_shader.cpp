@@ -192,6 +192,12 @@ class FragmentShader::Fragment {
     scratch_.known.assign(prepared.sites.size(), 0);
   }
 
+  /// Of what colour() will read that no earlier variant has read.
+  void prefetch(const Reads& reads) {
+    for (std::size_t i = 0; i < reads.size(); ++i)
+      if (reads[i].texture && !(read_[i] == reads[i])) site(reads[i].site).prefetch(*reads[i].texture);
+  }
+
   FragmentColour colour(const Reads& reads) {
     const RenderMaterial& material = *prepared_.material;
     const Vec4f base = base_colour(reads);
@@ -332,7 +338,11 @@ void FragmentShader::colours_of(std::uint32_t pixel, const RenderFragment& fragm
   scratch.triangle = fragment.triangle;
   const FragmentPlace place = place_of(pixel, fragment, scratch.in_view);
   Fragment here(*this, prepared, place, fragment.back != 0, scratch);
-  for (std::size_t v = 0; v < out.size(); ++v) out[v] = here.colour(prepared.variants[v]);
+  if (out.size() > 1) here.prefetch(prepared.variants[0]);
+  for (std::size_t v = 0; v < out.size(); ++v) {
+    if (v + 1 < out.size()) here.prefetch(prepared.variants[v + 1]);
+    out[v] = here.colour(prepared.variants[v]);
+  }
 }
 
 }  // namespace texmesh::render
