@@ -42,13 +42,22 @@ inline double lab_root(double x) {
   return x > 216.0 / 24389 ? portable::pow(x, 1.0 / 3) : (841.0 / 108) * x + 4.0 / 29;
 }
 
-/// L*a*b* with colours counting for less in the dark (Hunt). `root`: lab_root(), or samples of it.
+/// XYZ, white as 1.
+inline Vec3f over_white(Vec3d xyz) {
+  return {static_cast<float>(xyz.x / kWhiteXyz.x), static_cast<float>(xyz.y),
+          static_cast<float>(xyz.z / kWhiteXyz.z)};
+}
+/// L*a*b* of what over_white() gives, with colours counting for less in the dark (Hunt). `root`: lab_root(),
+/// or samples of it.
 template <class Root>
-Vec3f hunt_lab(Vec3d xyz, const Root& root) {
-  const float fx = root(static_cast<float>(xyz.x / kWhiteXyz.x)), fy = root(static_cast<float>(xyz.y)),
-              fz = root(static_cast<float>(xyz.z / kWhiteXyz.z));
+Vec3f hunt_lab_of(Vec3f relative, const Root& root) {
+  const float fx = root(relative.x), fy = root(relative.y), fz = root(relative.z);
   const float lightness = 116 * fy - 16, share = 0.01f * lightness;
   return {lightness, share * 500 * (fx - fy), share * 200 * (fy - fz)};
+}
+template <class Root>
+Vec3f hunt_lab(Vec3d xyz, const Root& root) {
+  return hunt_lab_of(over_white(xyz), root);
 }
 
 /// HyAB, the distance of two colours in L*a*b* that suits large differences, too.

@@ -112,10 +112,12 @@ Channels channels_of(Vec3f linear) {
   return {to_float(opponent_of_xyz(xyz)), static_cast<float>(xyz.y)};
 }
 
-Vec3f flip_lab(Vec3f opponent) {
-  const Vec3d xyz = xyz_of_opponent(to_double(opponent));
-  return hunt_lab(xyz_of_linear(clamped_colour(linear_of_xyz(xyz))), flip_lab_curve());
+/// over_white() of what a screen can show next to it.
+Vec3f shown_xyz(Vec3f opponent) {
+  return over_white(xyz_of_linear(clamped_colour(linear_of_xyz(xyz_of_opponent(to_double(opponent))))));
 }
+
+Vec3f flip_lab(Vec3f opponent) { return hunt_lab_of(shown_xyz(opponent), flip_lab_curve()); }
 
 /// Filters a picture's rows as they come, so that all that is in memory at once fits into a cache.
 class FlipFilter {
@@ -144,8 +146,7 @@ class FlipFilter {
       std::vector<float>& to = opponent_[eye.channel];
       for (std::size_t i = 0; i < count; ++i) to[i] += eye.term.weight * part_[i];
     }
-    for (std::size_t i = 0; i < count; ++i)
-      out.lab[row.offset + i] = flip_lab({opponent_[0][i], opponent_[1][i], opponent_[2][i]});
+    find_lab(count, out.lab.data() + row.offset);
     for (std::size_t k = 0; k < 2; ++k) {
       luma_[k + 1].read(y, feature_kernels().smooth, part_.data());
       luma_[0].read(y, derivative(k), other_.data());
@@ -174,13 +175,26 @@ class FlipFilter {
     return k == 0 ? feature_kernels().edge : feature_kernels().point;
   }
 
+  /// Of opponent_, which it spoils: arithmetic of several pixels at once, and then the curve.
+  void find_lab(std::size_t count, Vec3f* out) {
+    float *const a = opponent_[0].data(), *const b = opponent_[1].data(), *const c = opponent_[2].data();
+    for (std::size_t i = 0; i < count; ++i) {
+      const Vec3f xyz = shown_xyz({a[i], b[i], c[i]});
+      a[i] = xyz.x, b[i] = xyz.y, c[i] = xyz.z;
+    }
+    const FlipCurve& curve = flip_lab_curve();
+    for (std::size_t i = 0; i < count; ++i) out[i] = hunt_lab_of({a[i], b[i], c[i]}, curve);
+  }
+
   void make(std::size_t y) {
     const PixelSpans::Row& row = spans_.rows[y];
     const Vec3f* linear = picture_.linear.data() + y * picture_.side_px + row.first;
+    float *const a = opponent_[0].data(), *const b = opponent_[1].data(), *const c = opponent_[2].data(),
+                 *const luma = luma_row_.data();
     for (std::size_t i = 0; i < row.last - row.first; ++i) {
-      const Channels c = channels_of(linear[i]);
-      for (std::size_t k = 0; k < 3; ++k) opponent_[k][i] = c.opponent[static_cast<int>(k)];
-      luma_row_[i] = c.luma;
+      const Channels of = channels_of(linear[i]);
+      a[i] = of.opponent.x, b[i] = of.opponent.y, c[i] = of.opponent.z;
+      luma[i] = of.luma;
     }
     for (Eye& eye : eyes_) eye.rows.make(y, opponent_[eye.channel].data());
     for (FilteredRows& rows : luma_) rows.make(y, luma_row_.data());
@@ -288,9 +302,12 @@ double FlipSum::percentile(double part) const {
 }
 
 FlipPicture prepare_flip(const Picture& picture) {
+  return prepare_flip(picture, measure::shown_spans(picture));
+}
+
+FlipPicture prepare_flip(const Picture& picture, const PixelSpans& spans) {
   FlipPicture out;
   if (picture.linear.empty()) return out;
-  const PixelSpans spans = measure::shown_spans(picture);
   for (std::size_t y = 0; y < spans.rows.size(); ++y) {
     const PixelSpans::Row& row = spans.rows[y];
     out.rows.push_back({row.first, row.last, row.offset});

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "stages/measure/picture.h"
+#include "stages/measure/pixel_spans.h"
 
 namespace texmesh {
 
@@ -23,6 +24,8 @@ struct FlipPicture {
 };
 /// Costs by what the picture shows; the values are those of the whole picture.
 FlipPicture prepare_flip(const Picture& picture);
+/// `spans`: shown_spans() of the picture.
+FlipPicture prepare_flip(const Picture& picture, const measure::PixelSpans& spans);
 
 inline constexpr int kFlipSteps = 1024;
 

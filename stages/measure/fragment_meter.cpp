@@ -75,6 +75,7 @@ FragmentMeter::FragmentMeter(Samples source, const std::vector<std::uint8_t>& ma
   }
   for (double& weight : weights_)
     weight = varying > 0 ? weight / varying : 1 / static_cast<double>(source.size());
+  meters_.reserve(source.size());
   for (std::vector<std::uint8_t>& channel : source)
     meters_.emplace_back(std::move(channel), mask, width, height);
 }

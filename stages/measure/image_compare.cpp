@@ -138,10 +138,14 @@ std::vector<Vec3f> eye_lab(const Picture& picture) {
 }  // namespace
 
 LumaPicture prepare_luma(const Picture& picture) {
+  return prepare_luma(picture, measure::shown_spans(picture));
+}
+
+LumaPicture prepare_luma(const Picture& picture, const measure::PixelSpans& spans) {
   LumaPicture out;
   out.covered = picture.covered;
   if (picture.linear.empty()) return out;
-  out.spans = measure::shown_spans(picture);
+  out.spans = spans;
   for (measure::SpanImage* image : {&out.luma, &out.mean, &out.square_mean})
     image->values.resize(out.spans.count);
   out.luma.plain = luma_of(picture.linear[0]);

@@ -17,6 +17,8 @@ struct LumaPicture {
   std::vector<std::uint8_t> covered;     // of the whole picture
 };
 LumaPicture prepare_luma(const Picture& picture);
+/// `spans`: shown_spans() of the picture.
+LumaPicture prepare_luma(const Picture& picture, const measure::PixelSpans& spans);
 
 /// The same with what the colour difference compares.
 struct ComparedPicture : LumaPicture {

@@ -11,7 +11,7 @@
 
 namespace texmesh {
 
-inline constexpr int kQualityVersion = 16;
+inline constexpr int kQualityVersion = 17;
 
 struct QualityOptions {
   int views = 4;

@@ -30,13 +30,20 @@ struct Channels {
 
 /// Writes the part of a block that lies on the level; (x0, y0) is the block's place there.
 void put_block(const Pixels& block, std::uint32_t x0, std::uint32_t y0, Channels channels, Pixels& level) {
-  for (std::uint32_t y = 0; y < block.height_px && y0 + y < level.height_px; ++y)
-    for (std::uint32_t x = 0; x < block.width_px && x0 + x < level.width_px; ++x) {
-      const std::uint8_t* from = block.at(x, y);
-      std::uint8_t* to = level.data.data() +
-                         ((std::size_t{y0} + y) * level.width_px + x0 + x) * level.channels + channels.first;
-      for (std::uint32_t c = 0; c < channels.count; ++c) to[c] = from[block.channels >= 3 ? c : 0];
+  if (x0 >= level.width_px) return;
+  const std::uint32_t width = std::min(block.width_px, level.width_px - x0);
+  const std::size_t step = block.channels >= 3 ? 1 : 0;
+  for (std::uint32_t y = 0; y < block.height_px && y0 + y < level.height_px; ++y) {
+    const std::uint8_t* from = block.at(0, y);
+    std::uint8_t* to = level.data.data() + ((std::size_t{y0} + y) * level.width_px + x0) * level.channels;
+    if (channels.count == block.channels && channels.count == level.channels) {
+      std::copy_n(from, std::size_t{width} * level.channels, to);
+      continue;
     }
+    to += channels.first;
+    for (std::uint32_t x = 0; x < width; ++x, from += block.channels, to += level.channels)
+      for (std::uint32_t c = 0; c < channels.count; ++c) to[c] = from[c * step];
+  }
 }
 
 /// Where texels of a level come from.

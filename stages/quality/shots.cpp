@@ -42,14 +42,16 @@ PictureVariants SizePictures::pictures(std::size_t scale, const PictureView& at,
     return look(scene, at.place.camera, at.place.side_px, context, at.bands.rendered);
   };
   if (shown > 0) return shaded(look_here());
-  if (!finest_ || finest_->first != at.view) finest_ = {at.view, look_here()};
-  return shaded(finest_->second);
+  const auto [found, is_new] = finest_.try_emplace(at.view);
+  if (is_new) found->second = look_here();
+  return shaded(found->second);
 }
 
 Loss SizePictures::compare(const Reference& reference, const Picture& test) const {
-  Loss loss{compare_flip(reference.flip, prepare_flip(test)), 0};
+  const measure::PixelSpans spans = measure::shown_spans(test);
+  Loss loss{compare_flip(reference.flip, prepare_flip(test, spans)), 0};
   if (with_ssim_) {
-    const PictureDifference d = compare_luma(reference.luma, prepare_luma(test));
+    const PictureDifference d = compare_luma(reference.luma, prepare_luma(test, spans));
     loss.dssim = static_cast<double>(d.pixels) - d.ssim;
   }
   return loss;
@@ -64,10 +66,9 @@ void SizePictures::compare_view(std::size_t view, const std::vector<Shot>& shots
       view, place_picture(studio_.frame, static_cast<int>(view), studio_.views.views, displayed_px_), {}};
   at.bands = choose_bands(studio_.rows[view], at.place.side_px,
                           studio_.pixels_of_unit * displayed_px_ * displayed_px_);
-  const auto picture_of = [&at](const PictureVariants& shown, std::size_t i) {
-    Picture whole = shown.picture(i);
-    at.bands.cut(whole);
-    return whole;
+  const auto put = [&at](const PictureVariants& shown, std::size_t i, Picture& to) {
+    shown.put(i, to);
+    at.bands.cut(to);
   };
   const auto compare_group = [&](const ScaleShots& group, const Reference* seen, const RunContext& run) {
     std::vector<const Materials*> materials;
@@ -77,12 +78,16 @@ void SizePictures::compare_view(std::size_t view, const std::vector<Shot>& shots
     const PictureVariants shown = pictures(group.scale, at, materials, run);
     const std::size_t first = seen ? 0 : 1;
     if (!seen) {
-      const Picture source = picture_of(shown, 0);
+      Picture source;
+      put(shown, 0, source);
       seen = &(seen_[view] = {with_ssim_ ? prepare_luma(source) : LumaPicture{}, prepare_flip(source)});
     }
     parallel_for(run, group.shots.size(), 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i)
-        out[group.shots[i]][view] = compare(*seen, picture_of(shown, first + i));
+      Picture picture;
+      for (std::size_t i = begin; i < end; ++i) {
+        put(shown, first + i, picture);
+        out[group.shots[i]][view] = compare(*seen, picture);
+      }
     });
   };
   std::vector<ScaleShots> groups = by_scale(shots, taken);

@@ -86,8 +86,8 @@ class SizePictures {
   double displayed_px_;
   bool with_ssim_;
   std::map<std::size_t, Reference> seen_;  // by view
-  // What the last view shows of S_0: shots of large textures come one after the other.
-  std::optional<std::pair<std::size_t, Visibility>> finest_;
+  // What views show of S_0: shots of large textures come one after the other.
+  std::map<std::size_t, Visibility> finest_;
 };
 
 /// Of all views together, or of those in which `like` shows anything.

@@ -10,6 +10,7 @@ Vec3f f0_of(const Surface& s) { return mixed({0.04f, 0.04f, 0.04f}, s.base_colou
 
 /// Lagarde and de Rousiers 2014: occlusion of what comes from the direction of the mirror.
 float specular_occlusion(float n_dot_v, float occlusion, float roughness) {
+  if (!(occlusion < 1)) return 1;
   const float base = n_dot_v + occlusion;
   if (!(base > 0)) return 0;
   const float power = exp2_of(exp2_of(-16 * roughness - 1) * log2_of(base < 1e-30f ? 1e-30f : base));
@@ -57,7 +58,8 @@ Vec3f reflected_surroundings(const Surface& s, const Lighting& lighting) {
   const Vec3f diffuse = product(s.base_colour, light) * ((1 - s.metallic) * left * s.occlusion);
   const Vec3f specular =
       (product(lighting.glossy, single) + product(light, multiple)) *
-      (s.occlusion < 1 ? specular_occlusion(lighting.n_dot_v, s.occlusion, s.roughness) : 1.f);
+      (s.occlusion == lighting.occlusion ? lighting.occluded
+                                         : specular_occlusion(lighting.n_dot_v, s.occlusion, s.roughness));
   return diffuse + specular;
 }
 
@@ -89,6 +91,8 @@ Lighting lighting_of(const Surface& s, Vec3f to_viewer, const RenderEnvironment&
   const Vec3f mirror = s.normal * (2 * cosine) - to_viewer;
   const Vec3f direction = normalized(mixed(mirror, s.normal, s.roughness * s.roughness));
   out.glossy = specular_light(environment, direction, s.roughness);
+  out.occlusion = s.occlusion;
+  out.occluded = specular_occlusion(out.n_dot_v, s.occlusion, s.roughness);
   return out;
 }
 

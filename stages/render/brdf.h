@@ -43,12 +43,14 @@ Vec3f reflected_by_brdf(const Surface& surface, Vec3f to_light, Vec3f to_viewer)
 /// What reaches a viewer by a surface of that normal and roughness, whatever its colours.
 struct Lighting {
   float n_dot_v = 0;
-  float n_dot_l = 0;   // of the key light
-  float mirrored = 0;  // specular BRDF of the key light, without Fresnel's part
-  float schlick = 0;   // weight of the key light
-  Vec2f split;         // split_sum
-  Vec3f diffuse;       // diffuse_light
-  Vec3f glossy;        // specular_light
+  float n_dot_l = 0;    // of the key light
+  float mirrored = 0;   // specular BRDF of the key light, without Fresnel's part
+  float schlick = 0;    // weight of the key light
+  Vec2f split;          // split_sum
+  Vec3f diffuse;        // diffuse_light
+  Vec3f glossy;         // specular_light
+  float occlusion = 1;  // the surface's
+  float occluded = 1;   // what that leaves of glossy light
 };
 /// `same_normal`, where there is one, has been found with the same normal.
 Lighting lighting_of(const Surface& surface, Vec3f to_viewer, const RenderEnvironment& environment,

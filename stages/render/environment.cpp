@@ -30,8 +30,8 @@ constexpr LevelPlan kLevels[] = {{128, 1, 0},      {64, 96, 0.0008}, {64, 96, 0.
 // pi leaves 1, 2/3, 1/4, 0 and -1/24.
 constexpr double kIrradianceOfBand[] = {1, 0.740, 0.391, 0.167, 0.057};
 
-Vec3f read_level(const Level& level, Vec3f direction) {
-  const Vec2f place = render::octahedral(direction);
+/// `place`: octahedral().
+Vec3f read_level(const Level& level, Vec2f place) {
   const float scale = static_cast<float>(level.side - 2) * 0.5f;
   // Texel i of a level has its middle at (i - 0.5) / (side - 2) of the square.
   const auto end = static_cast<float>(level.side - 1);
@@ -96,7 +96,9 @@ Vec3f filtered(const Level& radiance, const std::vector<LobeSample>& lobe, Vec3f
   const Vec3f y = cross(z, x);
   Vec3f sum;
   for (const LobeSample& s : lobe)
-    sum = sum + read_level(radiance, x * s.direction.x + y * s.direction.y + z * s.direction.z) * s.weight;
+    sum = sum + read_level(radiance,
+                           render::octahedral(x * s.direction.x + y * s.direction.y + z * s.direction.z)) *
+                    s.weight;
   return sum;
 }
 
@@ -174,6 +176,7 @@ RenderEnvironment prepare_environment(const Radiance& radiance, const KeyLight& 
 Vec3f diffuse_light(const RenderEnvironment& environment, Vec3f normal) {
   const std::array<float, kHarmonics> basis = harmonics_of(normal);
   Vec3f sum;
+#pragma GCC unroll 1  // g++ would copy all numbers about
   for (std::size_t k = 0; k < kHarmonics; ++k) sum = sum + environment.irradiance[k] * basis[k];
   return {clamped(sum.x, 0, 65504), clamped(sum.y, 0, 65504), clamped(sum.z, 0, 65504)};
 }
@@ -181,8 +184,9 @@ Vec3f diffuse_light(const RenderEnvironment& environment, Vec3f normal) {
 Vec3f specular_light(const RenderEnvironment& environment, Vec3f direction, float roughness) {
   const float at = render::saturated(roughness) * static_cast<float>(environment.levels.size() - 1);
   const auto sharp = std::min(static_cast<std::size_t>(at), environment.levels.size() - 2);
-  const Vec3f a = read_level(environment.levels[sharp], direction),
-              b = read_level(environment.levels[sharp + 1], direction);
+  const Vec2f place = render::octahedral(direction);
+  const Vec3f a = read_level(environment.levels[sharp], place),
+              b = read_level(environment.levels[sharp + 1], place);
   return a + (b - a) * (at - static_cast<float>(sharp));
 }
 

@@ -27,6 +27,7 @@ FragmentShader::FragmentShader(const RenderScene& scene, const Visibility& visib
                                const RenderEnvironment& environment)
     : scene_(scene),
       camera_(visibility.camera),
+      axes_{to_float(camera_.x), to_float(camera_.y), to_float(camera_.z)},
       environment_(environment),
       frame_(visibility.camera, visibility.side_px),
       side_px_(visibility.side_px) {
@@ -113,7 +114,8 @@ FragmentPlace FragmentShader::place_of(std::uint32_t pixel, const RenderFragment
 
 Vec4f FragmentShader::vertex_colour(const FragmentPlace& place) const {
   const std::vector<Vec4f>& colours = scene_.mesh->colours;
-  const Vec4f a = colours[place.corner[0]], b = colours[place.corner[1]], d = colours[place.corner[2]];
+  const Vec4f a = colours[place.triangle.corner[0]], b = colours[place.triangle.corner[1]],
+              d = colours[place.triangle.corner[2]];
   auto mean = [&](float x, float y, float z) {
     return x + (y - x) * place.weight[1] + (z - x) * place.weight[2];
   };
@@ -125,19 +127,19 @@ Vec4f FragmentShader::vertex_colour(const FragmentPlace& place) const {
 Vec3f FragmentShader::interpolated_normal(const FragmentPlace& place, float& roughness) const {
   roughness = 0;
   const std::vector<Vec3f>& normals = scene_.mesh->normals;
-  if (normals.empty()) return place.face;
+  if (normals.empty()) return place.triangle.face;
   const Vec3f sum = place.mean(normals);
   const float square = dot(sum, sum);
-  if (!(square > kNone && square < 1e20f)) return place.face;
+  if (!(square > kNone && square < 1e20f)) return place.triangle.face;
   const float inverse = 1 / std::sqrt(square);
   const Vec3f normal = sum * inverse;
-  const Vec3f along1 = normals[place.corner[1]] - normals[place.corner[0]],
-              along2 = normals[place.corner[2]] - normals[place.corner[0]];
+  const Vec3f along1 = normals[place.triangle.corner[1]] - normals[place.triangle.corner[0]],
+              along2 = normals[place.triangle.corner[2]] - normals[place.triangle.corner[0]];
   for (const Vec2f step : {place.weight_dx, place.weight_dy}) {
     const Vec3f change = along1 * step.x + along2 * step.y;
     const Vec3f turn = (change - normal * dot(normal, change)) * inverse;
-    for (const Vec3d& axis : {camera_.x, camera_.y, camera_.z}) {
-      const float part = std::fabs(dot(turn, to_float(axis)));
+    for (const Vec3f& axis : axes_) {
+      const float part = std::fabs(dot(turn, axis));
       if (part > roughness) roughness = part;
     }
   }
@@ -150,10 +152,10 @@ bool FragmentShader::vertex_frame(const FragmentPlace& place, Vec3f frame[2]) co
   if (mesh.tangents.empty()) return false;
   frame[0] = frame[1] = {};
   for (std::size_t k = 0; k < 3; ++k) {
-    const Vec4f tangent = mesh.tangents[place.corner[k]];
+    const Vec4f tangent = mesh.tangents[place.triangle.corner[k]];
     const Vec3f direction = normalized(xyz(tangent));
     if (!(dot(direction, direction) > 0.5f)) return false;
-    const Vec3f normal = mesh.normals.empty() ? place.face : mesh.normals[place.corner[k]];
+    const Vec3f normal = mesh.normals.empty() ? place.triangle.face : mesh.normals[place.triangle.corner[k]];
     frame[0] = frame[0] + direction * place.weight[k];
     frame[1] = frame[1] + normalized(cross(normal, direction) * tangent.w) * place.weight[k];
   }
@@ -168,12 +170,12 @@ bool FragmentShader::vertex_frame(const FragmentPlace& place, Vec3f frame[2]) co
 void FragmentShader::derivative_frame(const Site& site, const FragmentPlace& place, Vec3f normal,
                                       Vec3f frame[2]) const {
   const std::vector<Vec2f>& uv = *site.uv;
-  const Vec2f first = uv[place.corner[0]];
-  const Vec2d along1 = to_double(site.matrix.direction(uv[place.corner[1]] - first)),
-              along2 = to_double(site.matrix.direction(uv[place.corner[2]] - first));
+  const Vec2f first = uv[place.triangle.corner[0]];
+  const Vec2d along1 = to_double(site.matrix.direction(uv[place.triangle.corner[1]] - first)),
+              along2 = to_double(site.matrix.direction(uv[place.triangle.corner[2]] - first));
   const Vec3d n = to_double(normal);
-  const Vec3d u = cross(n, place.edge1 * along2.x - place.edge2 * along1.x);
-  const Vec3d v = cross(n, place.edge2 * along1.y - place.edge1 * along2.y);
+  const Vec3d u = cross(n, place.triangle.edge1 * along2.x - place.triangle.edge2 * along1.x);
+  const Vec3d v = cross(n, place.triangle.edge2 * along1.y - place.triangle.edge1 * along2.y);
   const double square = std::max(dot(u, u), dot(v, v));
   const double scale = square > 0 && std::isfinite(square) ? 1 / std::sqrt(square) : 0;
   frame[0] = to_float(u * scale);
@@ -188,6 +190,12 @@ class FragmentShader::Fragment {
       : shader_(shader), prepared_(prepared), place_(place), back_(back), scratch_(scratch) {
     if (scratch_.sites.size() < prepared.sites.size()) scratch_.sites.resize(prepared.sites.size());
     scratch_.known.assign(prepared.sites.size(), 0);
+  }
+
+  /// Of what colour() will read that no earlier variant has read.
+  void prefetch(const Reads& reads) {
+    for (std::size_t i = 0; i < reads.size(); ++i)
+      if (reads[i].texture && !(read_[i] == reads[i])) site(reads[i].site).prefetch(*reads[i].texture);
   }
 
   FragmentColour colour(const Reads& reads) {
@@ -225,8 +233,9 @@ class FragmentShader::Fragment {
     scratch_.known[index] = 1;
     const Site& site = prepared_.sites[index];
     const std::vector<Vec2f>& uv = *site.uv;
-    const Vec2f first = uv[place_.corner[0]];
-    const Vec2f along1 = uv[place_.corner[1]] - first, along2 = uv[place_.corner[2]] - first;
+    const Vec2f first = uv[place_.triangle.corner[0]];
+    const Vec2f along1 = uv[place_.triangle.corner[1]] - first,
+                along2 = uv[place_.triangle.corner[2]] - first;
     TextureFootprint footprint;
     footprint.uv = site.matrix.place(first + along1 * place_.weight[1] + along2 * place_.weight[2]);
     footprint.uv_dx = site.matrix.direction(along1 * place_.weight_dx.x + along2 * place_.weight_dx.y);
@@ -329,7 +338,11 @@ void FragmentShader::colours_of(std::uint32_t pixel, const RenderFragment& fragm
   scratch.triangle = fragment.triangle;
   const FragmentPlace place = place_of(pixel, fragment, scratch.in_view);
   Fragment here(*this, prepared, place, fragment.back != 0, scratch);
-  for (std::size_t v = 0; v < out.size(); ++v) out[v] = here.colour(prepared.variants[v]);
+  if (out.size() > 1) here.prefetch(prepared.variants[0]);
+  for (std::size_t v = 0; v < out.size(); ++v) {
+    if (v + 1 < out.size()) here.prefetch(prepared.variants[v + 1]);
+    out[v] = here.colour(prepared.variants[v]);
+  }
 }
 
 }  // namespace texmesh::render

@@ -19,8 +19,9 @@ struct TriangleInView {
   EdgePlanes planes;
 };
 
-/// What is known of a fragment's place before its material is read.
-struct FragmentPlace : TriangleInView {
+/// What is known of a fragment's place before its material is read. The triangle must outlive it.
+struct FragmentPlace {
+  const TriangleInView& triangle;
   std::array<float, 3> weight{};  // of the corners
   // Change of the weights of corners 1 and 2 by a pixel to the right, and downwards.
   Vec2f weight_dx, weight_dy;
@@ -29,6 +30,7 @@ struct FragmentPlace : TriangleInView {
   /// Interpolates values of the wedges.
   template <class T>
   T mean(const std::vector<T>& of_wedges) const {
+    const Triangle& corner = triangle.corner;
     const T a = of_wedges[corner[0]];
     return a + (of_wedges[corner[1]] - a) * weight[1] + (of_wedges[corner[2]] - a) * weight[2];
   }
@@ -98,6 +100,7 @@ class FragmentShader {
 
   const RenderScene& scene_;
   const RenderCamera& camera_;
+  std::array<Vec3f, 3> axes_;  // the camera's
   const RenderEnvironment& environment_;
   SampleFrame frame_;
   std::uint32_t side_px_;

@@ -158,6 +158,17 @@ Vec4f TextureSite::read(const RenderTexture& texture) const {
           a.w + (b.w - a.w) * part};
 }
 
+void TextureSite::prefetch(const RenderTexture& texture) const {
+  if (nearest_ || fine_ < texture.first_level) return;
+  const std::size_t at = fine_ - texture.first_level;
+  for (std::size_t k = 0; k < 2 && at + k < texture.levels.size(); ++k) {
+    const Pixels& level = texture.levels[at + k];
+    for (const std::int32_t row : {places_[k].y.first, places_[k].y.second})
+      __builtin_prefetch(
+          level.at(static_cast<std::uint32_t>(places_[k].x.first), static_cast<std::uint32_t>(row)));
+  }
+}
+
 Vec4f read_texture(const RenderTexture& texture, const TextureSlot& slot, const TextureFootprint& footprint) {
   return TextureSite({texture.width_px, texture.height_px}, texture.first_level, slot, footprint)
       .read(texture);

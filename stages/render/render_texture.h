@@ -48,6 +48,8 @@ class TextureSite {
               const TextureFootprint& footprint);
   /// What read_texture() gives of a texture of that size.
   Vec4f read(const RenderTexture& texture) const;
+  /// Asks for the texels that read() will need: large textures lie in memory, not in caches.
+  void prefetch(const RenderTexture& texture) const;
 
   /// Two texels and the part of the way from the first to the second.
   struct Axis {

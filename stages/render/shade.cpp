@@ -17,6 +17,9 @@ namespace {
 
 using render::FragmentColour;
 
+/// Triangles of an opaque pixel that are shaded: as many as a graphics processor with four samples a pixel
+/// shades at most.
+constexpr std::size_t kMostShaded = 4;
 constexpr std::size_t kSamples = std::size_t{kSamplesPerSide} * kSamplesPerSide;
 using Curve = SampledCurve<8192>;
 
@@ -70,15 +73,18 @@ class PixelShader {
   /// `at` indexes the pictures' places.
   void shade(std::size_t at, std::span<const RenderFragment> fragments) {
     const std::size_t variants = pictures_.count();
+    const bool layers = fragments.front().layer != 0;
+    float covered = 0;
+    for (const RenderFragment& f : fragments) covered += share_of(f);
+    if (!layers) fragments = most_seen(fragments);
     for (std::size_t i = 0; i < fragments.size(); ++i)
       shader_.colours_of(pictures_.places()[at], fragments[i], scratch_,
                          {colours_.data() + i * variants, variants});
-    const bool layers = fragments.front().layer != 0;
     for (std::size_t v = 0; v < variants; ++v) {
       if (layers)
         put_layers(at, fragments, v);
       else
-        put_opaque(at, fragments, v);
+        put_opaque(at, fragments, covered, v);
     }
   }
 
@@ -87,16 +93,34 @@ class PixelShader {
     return colours_[fragment * pictures_.count() + variant];
   }
 
-  /// Nothing can be seen through what the pixel shows.
-  void put_opaque(std::size_t at, std::span<const RenderFragment> fragments, std::size_t variant) {
+  /// The kMostShaded fragments with most samples, of equal ones the first; their order stays.
+  std::span<const RenderFragment> most_seen(std::span<const RenderFragment> fragments) {
+    if (fragments.size() <= kMostShaded) return fragments;
+    std::array<std::size_t, kSamples> order;
+    for (std::size_t i = 0; i < fragments.size(); ++i) {
+      std::size_t to = i;
+      const int samples = render::sample_count(fragments[i].mask);
+      for (; to > 0 && render::sample_count(fragments[order[to - 1]].mask) < samples; --to)
+        order[to] = order[to - 1];
+      order[to] = i;
+    }
+    std::sort(order.begin(), order.begin() + kMostShaded);
+    for (std::size_t i = 0; i < kMostShaded; ++i) most_seen_[i] = fragments[order[i]];
+    return most_seen_;
+  }
+
+  /// Nothing can be seen through what the pixel shows, of which so much is covered.
+  void put_opaque(std::size_t at, std::span<const RenderFragment> fragments, float covered,
+                  std::size_t variant) {
     Vec3f sum;
-    float left = 1;
+    float shaded = 0;
     for (std::size_t i = 0; i < fragments.size(); ++i) {
       const float share = share_of(fragments[i]);
       sum = sum + colour(i, variant).linear * share;
-      left -= share;
+      shaded += share;
     }
-    pictures_.set(variant, at, sum + background_ * left, true);
+    if (shaded < covered) sum = sum * (covered / shaded);
+    pictures_.set(variant, at, sum + background_ * (1 - covered), true);
   }
 
   void put_layers(std::size_t at, std::span<const RenderFragment> fragments, std::size_t variant) {
@@ -120,6 +144,7 @@ class PixelShader {
   Vec3f background_;
   render::FragmentShader::Scratch scratch_;
   std::vector<FragmentColour> colours_;  // [fragment][variant]
+  std::array<RenderFragment, kMostShaded> most_seen_;
 };
 
 /// Indices into places by squares of the picture: what a square reads of many textures stays in the cache
@@ -154,14 +179,20 @@ PictureVariants::PictureVariants(const Visibility& visibility, std::size_t count
 }
 
 Picture PictureVariants::picture(std::size_t variant) const {
+  Picture out;
+  put(variant, out);
+  return out;
+}
+
+void PictureVariants::put(std::size_t variant, Picture& picture) const {
   const std::size_t pixels = static_cast<std::size_t>(side_px_) * side_px_;
   const Shown& shown = shown_.at(variant);
-  Picture out{side_px_, std::vector<Vec3f>(pixels, background_), std::vector<std::uint8_t>(pixels)};
+  if (picture.linear.empty())
+    picture = {side_px_, std::vector<Vec3f>(pixels, background_), std::vector<std::uint8_t>(pixels)};
   for (std::size_t i = 0; i < places_.size(); ++i) {
-    out.linear[places_[i]] = shown.linear[i];
-    out.covered[places_[i]] = shown.covered[i];
+    picture.linear[places_[i]] = shown.linear[i];
+    picture.covered[places_[i]] = shown.covered[i];
   }
-  return out;
 }
 
 PictureVariants shade_variants(const RenderScene& scene, const Visibility& visibility,

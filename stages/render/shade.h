@@ -14,7 +14,8 @@ namespace texmesh {
 /// without levels counts as white (a normal map as flat).
 /// Materials: glTF 2.0, appendix B (GGX, height-correlated Smith, Schlick, Lambert), with what three.js r170
 /// adds: a floor of roughness, roughness of the geometry, multiple scattering (Fdez-Aguera 2019), specular
-/// occlusion (Lagarde 2014). Each triangle is shaded once a pixel, at the mean of its samples. Colours are
+/// occlusion (Lagarde 2014). Each triangle is shaded once a pixel, at the mean of its samples; of an opaque
+/// pixel with more than four of them the four with most samples stand for all of it. Colours are
 /// tone-mapped (Khronos PBR Neutral) and cut to 0..1 there; a pixel is the mean of its samples in linear
 /// light. Blending mixes sRGB-encoded values, as browsers' canvases do. A pixel is covered where something
 /// with an alpha above 0 is seen. Uncovered samples show the environment's background. NaN never comes out.
@@ -33,6 +34,9 @@ class PictureVariants {
   std::size_t count() const { return shown_.size(); }
   /// The whole picture.
   Picture picture(std::size_t variant) const;
+  /// The same in place of another of these pictures, or of an empty one: what both show of the background
+  /// stays.
+  void put(std::size_t variant, Picture& picture) const;
 
   /// Places of the shown pixels in the pictures, rising.
   const std::vector<std::uint32_t>& places() const { return places_; }

@@ -81,7 +81,7 @@ Bins sorted_into_tiles(const std::vector<SampleBox>& boxes, std::uint32_t tiles,
 
 TileInput tile_input(const RenderScene& scene, const RenderCamera& camera, std::uint32_t side_px,
                      const RunContext& context) {
-  TileInput input{&scene, render::SampleFrame(camera, side_px), camera.near, side_px, {}, {}};
+  TileInput input{&scene, render::SampleFrame(camera, side_px), camera.near, side_px, {}, {}, true};
   input.seen.resize(scene.mesh->positions.size());
   parallel_for(context, input.seen.size(), 4096, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i)

@@ -6,6 +6,10 @@
 
 #include "format/base/no_index.h"
 
+#ifdef __SSE2__
+#include <emmintrin.h>
+#endif
+
 namespace texmesh::render {
 namespace {
 
@@ -40,6 +44,7 @@ class TileTriangle {
     nearest_ = 1 / std::max({c[0].z, c[1].z, c[2].z});
     farthest_ = 1 / std::min({c[0].z, c[1].z, c[2].z});
     clamps_ = true;
+    pairs_ = input.pairs;
   }
   const EdgePlanes& planes() const { return planes_; }
   const SampleBox& box() const { return box_; }
@@ -63,6 +68,12 @@ class TileTriangle {
       const double row[3] = {e[0].b * py + e[0].c, e[1].b * py + e[1].c, e[2].b * py + e[2].c};
       std::int32_t x = box_.x_first, last = box_.x_last;
       narrow(row, x, last);
+#ifdef __SSE2__
+      if (pairs_) {
+        for_each_pair(row, y, x, last, f);
+        continue;
+      }
+#endif
       for (; x <= last; ++x) {
         const double px = x_ + x;
         if (!inside(e[0].a * px + row[0], owns[0]) || !inside(e[1].a * px + row[1], owns[1]) ||
@@ -77,6 +88,39 @@ class TileTriangle {
   RenderFragment fragment(std::uint32_t triangle, std::uint32_t pixel, std::uint16_t mask, bool layer) const;
 
  private:
+#ifdef __SSE2__
+  /// The samples x to `last` of a row; as one after the other, of triangles wholly in front.
+  template <class F>
+  void for_each_pair(const double row[3], std::int32_t y, std::int32_t x, std::int32_t last, F f) const {
+    const __m128d none = _mm_setzero_pd(), left = _mm_set1_pd(x_), two = _mm_set1_pd(2);
+    __m128d slope[3], offset[3], owned[3];
+    for (std::size_t k = 0; k < 3; ++k) {
+      slope[k] = _mm_set1_pd(planes_.edge[k].a);
+      offset[k] = _mm_set1_pd(row[k]);
+      owned[k] = owns_edge(planes_.edge[k]) ? _mm_cmpeq_pd(none, none) : none;
+    }
+    const Plane& plane = planes_.nearness;
+    const __m128d near_slope = _mm_set1_pd(plane.a), near_offset = _mm_set1_pd(plane.b * (y_ + y) + plane.c),
+                  low = _mm_set1_pd(nearest_), high = _mm_set1_pd(farthest_);
+    for (__m128d column = _mm_set_pd(x + 1, x); x <= last; x += 2, column = _mm_add_pd(column, two)) {
+      const __m128d px = _mm_add_pd(left, column);
+      __m128d inside = _mm_cmpeq_pd(none, none);
+      for (std::size_t k = 0; k < 3; ++k) {
+        const __m128d value = _mm_add_pd(_mm_mul_pd(slope[k], px), offset[k]);
+        inside = _mm_and_pd(
+            inside, _mm_or_pd(_mm_cmpgt_pd(value, none), _mm_and_pd(owned[k], _mm_cmpeq_pd(value, none))));
+      }
+      const int covered = _mm_movemask_pd(inside) & (x == last ? 1 : 3);
+      if (covered == 0) continue;
+      alignas(16) double near[2];
+      const __m128d value = _mm_add_pd(_mm_mul_pd(near_slope, px), near_offset);
+      _mm_store_pd(near, _mm_min_pd(high, _mm_max_pd(low, value)));  // as std::clamp
+      if ((covered & 1) && near[0] > 0) f(x, y, near[0]);
+      if ((covered & 2) && near[1] > 0) f(x + 1, y, near[1]);
+    }
+  }
+#endif
+
   /// Takes samples off both ends that are outside of an edge for certain: a row of a large triangle's box is
   /// mostly empty.
   void narrow(const double row[3], std::int32_t& first, std::int32_t& last) const {
@@ -95,7 +139,7 @@ class TileTriangle {
   EdgePlanes planes_;
   double x_, y_;  // of the tile's first sample in the frame
   double nearest_ = 0, farthest_ = 0;
-  bool clamps_ = false;
+  bool clamps_ = false, pairs_ = false;
   SampleBox box_;
 };
 
@@ -212,8 +256,22 @@ class Tile {
     return shown_->fragment(t, pixel, mask, layer);
   }
 
+  /// The triangle that all samples of a pixel show, if one does.
+  std::uint32_t whole_pixel(std::size_t corner) const {
+    const std::uint32_t t = nearest_[corner];
+    std::uint32_t other = 0;
+    for (std::size_t row = 0; row < kSamplesPerSide; ++row)
+      for (std::size_t column = 0; column < kSamplesPerSide; ++column)
+        other |= nearest_[corner + row * kTileSamples + column] ^ t;
+    return other == 0 ? t : kNoIndex;
+  }
+
   void add_opaque(std::uint32_t pixel, std::vector<RenderFragment>& out) {
     const std::size_t corner = (pixel / kTilePx * kTileSamples + pixel % kTilePx) * kSamplesPerSide;
+    if (const std::uint32_t whole = whole_pixel(corner); whole != kNoIndex) {
+      out.push_back(fragment(whole, pixel, 0xFFFF, false));
+      return;
+    }
     std::uint32_t triangles[16];
     std::uint16_t masks[16];
     std::size_t count = 0;

@@ -25,6 +25,7 @@ struct TileInput {
   std::uint32_t side_px = 0;
   std::vector<Vec3d> seen;       // per position, as seen_from gives it
   std::vector<SampleBox> boxes;  // per triangle; empty for those that are not seen
+  bool pairs = true;             // of samples at once, where the processor can: the same bits
   std::array<Vec3d, 3> corners_of(std::uint32_t triangle) const;
 };
 

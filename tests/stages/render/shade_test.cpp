@@ -123,6 +123,45 @@ TEST(Shade, PixelsAreTheMeanOfTheirSamples) {
   }
 }
 
+// By the fragments themselves: their shares of what is covered, as if the four largest were all.
+TEST(Shade, FourFragmentsStandForAPixelOfManyTriangles) {
+  SmallScene scene{ball(), {}, {}};
+  for (int m = 0; m < 7; ++m)
+    scene.materials.push_back(
+        unlit({0.1f * static_cast<float>(m), 0.5f, 0.7f - 0.1f * static_cast<float>(m), 1}));
+  for (std::size_t t = 0; t < scene.mesh.triangles.size(); ++t)
+    scene.mesh.triangle_material[t] = static_cast<std::uint16_t>(t * 5 % 7);
+  RenderEnvironment light = even_light({});
+  light.background = {0.1f, 0.2f, 0.3f};
+  const Visibility seen = scene.seen(ball_camera(), 24);
+  const Picture picture = scene.picture(ball_camera(), 24, light);
+  std::size_t crowded = 0, few = 0;
+  for (std::size_t p = 0; p < picture.linear.size(); ++p) {
+    std::vector<std::pair<int, Vec3f>> shown;  // samples, colour
+    int covered = 0, shaded = 0;
+    for (std::uint32_t i = seen.first[p]; i < seen.first[p + 1]; ++i) {
+      const RenderFragment& f = seen.fragments[i];
+      const int samples = __builtin_popcount(f.mask);
+      const Vec4f c = scene.scene().material_of(f.triangle).base_colour;
+      shown.push_back({samples, tone_mapped({c.x, c.y, c.z})});
+      covered += samples;
+    }
+    (shown.size() > 4 ? crowded : few) += !shown.empty();
+    std::stable_sort(shown.begin(), shown.end(), [](auto& a, auto& b) { return a.first > b.first; });
+    shown.resize(std::min<std::size_t>(shown.size(), 4));
+    Vec3f sum;
+    for (const auto& [samples, colour] : shown) {
+      sum = sum + colour * static_cast<float>(samples);
+      shaded += samples;
+    }
+    const float share = static_cast<float>(covered) / 16;
+    if (shaded > 0) sum = sum * (share / static_cast<float>(shaded));
+    EXPECT_NEAR(length(picture.linear[p] - (sum + light.background * (1 - share))), 0, 1e-6) << p;
+  }
+  EXPECT_GT(crowded, 100u);
+  EXPECT_GT(few, 10u);
+}
+
 TEST(Shade, UnlitIsTheToneMappedBaseColour) {
   SmallScene scene{square(), {unlit({0.9f, 0.5f, 0.1f, 1})}, {}};
   scene.materials[0].emissive = {1, 1, 1};
