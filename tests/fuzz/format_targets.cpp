@@ -196,9 +196,23 @@ std::vector<Bytes> entries(const std::string& path) {
   return list;
 }
 
+/// Small ones: what the entries hold is nothing to the container.
+std::vector<Bytes> containers() {
+  std::vector<Bytes> list;
+  for (const std::size_t count : {1u, 2u, 4u}) {
+    Bytes& out = list.emplace_back();
+    ContainerWriter writer([&](ByteSpan part) { out.insert(out.end(), part.begin(), part.end()); });
+    for (std::size_t k = 0; k < count; ++k)
+      writer.add(k == 0 ? kManifestPath : mesh_path(static_cast<int>(k)),
+                 Bytes(30 * k + 3, static_cast<std::uint8_t>(k)));
+    writer.finish();
+  }
+  return list;
+}
+
 std::vector<Bytes> manifests() {
   auto list = entries(kManifestPath);
-  list.push_back(to_bytes(write_manifest(texmesh::testing::make_manifest(40, 220, true))));
+  list.push_back(to_bytes(write_manifest(texmesh::testing::make_manifest(4, 2, true))));
   return list;
 }
 
@@ -224,7 +238,7 @@ std::vector<Bytes> about_seeds() {
 
 std::vector<Bytes> split_seeds() {
   std::vector<Bytes> list;
-  for (const std::uint32_t n : {3u, 9u})
+  for (const std::uint32_t n : {3u, 5u})
     list.push_back(write_split_stream(texmesh::testing::split_fixture(n).source));
   return list;
 }
@@ -233,9 +247,23 @@ std::vector<Bytes> split_seeds() {
 
 void add_format_targets(std::vector<Target>& list) {
   list.insert(list.end(),
-              {{"container", true, unless_format_error<read_container_again>, packages, Shape::kContainer},
+              {{"container",
+                true,
+                unless_format_error<read_container_again>,
+                containers,
+                Shape::kContainer,
+                nullptr,
+                {},
+                2048},
                {"package", false, unless_format_error<read_package>, packages, Shape::kContainer},
-               {"manifest", true, unless_format_error<read_manifest_twice>, manifests, Shape::kJson},
+               {"manifest",
+                true,
+                unless_format_error<read_manifest_twice>,
+                manifests,
+                Shape::kJson,
+                nullptr,
+                {},
+                4096},
                {"textures", false, unless_format_error<read_textures_twice>,
                 [] { return entries(kTexturesPath); }, Shape::kJson},
                {"quality", false, unless_format_error<read_quality_twice>,
@@ -245,8 +273,22 @@ void add_format_targets(std::vector<Target>& list) {
                 Shape::kBytes, [](ByteSpan b) { return with_digests(b, 16, 44, 8); }},
                {"tables", true, unless_format_error<read_tables_twice>, [] { return entries(kTablesPath); },
                 Shape::kBytes, [](ByteSpan b) { return with_digests(b, 16, 36, 0); }},
-               {"thesis", true, unless_format_error<read_thesis_twice>, thesis_seeds},
-               {"stream", true, unless_format_error<read_split_stream>, split_seeds}});
+               {"thesis",
+                true,
+                unless_format_error<read_thesis_twice>,
+                thesis_seeds,
+                Shape::kBytes,
+                nullptr,
+                {},
+                4096},
+               {"stream",
+                true,
+                unless_format_error<read_split_stream>,
+                split_seeds,
+                Shape::kBytes,
+                nullptr,
+                {},
+                2048}});
 }
 
 }  // namespace texmesh::fuzz

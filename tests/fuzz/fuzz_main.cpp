@@ -1,6 +1,6 @@
 // libFuzzer's entry to the targets of a room; tests/fuzz/run drives it. The environment variable
 // TEXMESH_FUZZ_TARGET names the target.
-//   texmesh_fuzz_ROOM --list                  a line per target: name, runs that are wanted
+//   texmesh_fuzz_ROOM --list                  a line per target: name, runs that are wanted, most bytes
 //   texmesh_fuzz_ROOM --seeds FOLDER          writes the target's seeds, known troublemakers and dictionary
 //   (FOLDER.dict)
 #include <sanitizer/allocator_interface.h>
@@ -97,7 +97,8 @@ using namespace texmesh::fuzz;
 
 extern "C" int LLVMFuzzerInitialize(int* argc, char*** argv) {
   if (*argc == 2 && std::strcmp((*argv)[1], "--list") == 0) {
-    for (const Target& t : targets()) std::printf("%s\t%d\n", t.name, t.own ? 10'000'000 : 1'000'000);
+    for (const Target& t : targets())
+      std::printf("%s\t%d\t%zu\n", t.name, t.own ? 10'000'000 : 1'000'000, t.most_bytes);
     std::exit(0);
   }
   if (*argc == 3 && std::strcmp((*argv)[1], "--seeds") == 0) {

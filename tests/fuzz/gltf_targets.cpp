@@ -5,6 +5,7 @@
 
 #include "format/base/errors.h"
 #include "format/base/finding.h"
+#include "pipeline/import/gltf/import_gltf_parts.h"
 #include "stages/gltf/check_glb.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/fuzz/reader_limits.h"
@@ -37,6 +38,23 @@ bool import_as_gltf(ByteSpan input) {
 }
 
 bool import_built(const GltfBuilder& b) { return import_as_gltf(b.glb()); }
+
+/// What the parts of the reader are given.
+struct Given {
+  std::string file = "fuzz";
+  FewFiles files;
+  ImportOptions options = reader_limits();
+  RunContext context;
+  Notes notes;
+  gltf::Source source{file, files, options, context, notes};
+};
+
+/// For what takes several times as long as the rest.
+bool is_one_of_sixteen(ByteSpan input) {
+  unsigned sum = 0;
+  for (const std::uint8_t x : input) sum += x;
+  return sum % 16 == 0;
+}
 
 bool check_as_glb(ByteSpan input) {
   Findings findings;
@@ -143,7 +161,8 @@ std::vector<Bytes> accessor_seeds() {
 
 // ---- Draco: ids, counts, then the stream
 
-bool read_draco(ByteSpan input) {
+/// Through the file around the stream.
+bool import_draco(ByteSpan input) {
   Choices c(input);
   GltfBuilder b;
   json extension, attributes;
@@ -166,6 +185,27 @@ bool read_draco(ByteSpan input) {
   b.node({{"mesh", 0}});
   b.json["extensionsUsed"] = b.json["extensionsRequired"] = {"KHR_draco_mesh_compression"};
   return import_built(b);
+}
+
+bool read_draco(ByteSpan input) {
+  if (is_one_of_sixteen(input)) return import_draco(input);
+  Choices c(input);
+  const std::uint32_t flags = c.number(1);
+  c.number(4);  // of the accessors
+  json attributes;
+  for (const char* name : {"POSITION", "TEXCOORD_0", "NORMAL"}) attributes[name] = c.number(1);
+  Given given;
+  try {
+    const gltf::VertexData data = gltf::decode_draco(given.source, "stream", c.rest(), attributes,
+                                                     [&](const std::string&) { return (flags & 2) != 0; });
+    std::array<float, 4> value{};
+    for (const gltf::ReadFloats* read : {&data.position, &data.uv0, &data.normal})
+      for (std::size_t v = 0; *read && v < data.count; ++v) (*read)(v, value.data());
+    for (const std::uint32_t v : data.indices) require(v < data.count, "an index of no vertex");
+    return true;
+  } catch (const InputError& e) {
+    return refused(e);
+  }
 }
 
 Bytes draco_seed(draco::MeshEncoderMethod method, bool quantised) {
@@ -213,7 +253,8 @@ std::vector<Bytes> draco_seeds() {
 
 // ---- meshopt: mode, filter, stride, count, then the stream
 
-bool read_meshopt(ByteSpan input) {
+/// Through the file around the stream.
+bool import_meshopt(ByteSpan input) {
   constexpr const char* kModes[] = {"ATTRIBUTES", "TRIANGLES", "INDICES"};
   constexpr const char* kFilters[] = {"NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL", "COLOR"};
   Choices c(input);
@@ -247,6 +288,23 @@ bool read_meshopt(ByteSpan input) {
       {{"byteLength", std::uint64_t{stride} * count}, {"extensions", {{name, {{"fallback", true}}}}}}};
   b.json["extensionsUsed"] = b.json["extensionsRequired"] = {name};
   return import_built(b);
+}
+
+bool read_meshopt(ByteSpan input) {
+  if (is_one_of_sixteen(input)) return import_meshopt(input);
+  Choices c(input);
+  const auto mode = static_cast<gltf::MeshoptMode>(c.below(3));
+  const auto filter = static_cast<gltf::MeshoptFilter>(c.below(5));
+  const std::uint32_t stride = c.number(1), count = c.number(2);
+  c.number(3);  // of the accessor
+  Given given;
+  try {
+    const Bytes bytes = gltf::decode_meshopt(given.source, "stream", c.rest(), count, stride, mode, filter);
+    require(bytes.size() == std::size_t{count} * stride, "fewer elements than asked for");
+    return true;
+  } catch (const InputError& e) {
+    return refused(e);
+  }
 }
 
 Bytes meshopt_seed(int mode, int stride, std::size_t count, int component, int type, int flags,
