@@ -211,9 +211,8 @@ std::vector<Bytes> containers() {
 }
 
 std::vector<Bytes> manifests() {
-  auto list = entries(kManifestPath);
-  list.push_back(to_bytes(write_manifest(texmesh::testing::make_manifest(4, 2, true))));
-  return list;
+  using texmesh::testing::make_manifest;
+  return {to_bytes(write_manifest(make_manifest(1, 0))), to_bytes(write_manifest(make_manifest(2, 1)))};
 }
 
 std::vector<Bytes> thesis_seeds() {
