@@ -30,8 +30,6 @@ struct Target {
   Bytes (*mend)(ByteSpan input) = nullptr;
   /// What the format's texts are made of.
   std::vector<std::string> words = {};
-  /// Longer inputs say nothing new, and take time.
-  std::size_t most_bytes = 8192;
 };
 
 /// All of them, by room.
