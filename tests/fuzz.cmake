@@ -21,11 +21,11 @@ foreach(name batch/build_memo batch/collection batch/find_models batch/fleet/run
   list(APPEND sources ${PROJECT_SOURCE_DIR}/pipeline/${name}.cpp)
 endforeach()
 list(FILTER sources EXCLUDE REGEX "/stages/image/seldom/module")
-# -O1: half the time to build, and two thirds of the runs per second. Sections: what only other targets or stages call is not linked, and
+# Sections: what only other targets or stages call is not linked, and
 # its counters with it, with lld alone.
 add_library(texmesh_fuzz STATIC EXCLUDE_FROM_ALL ${sources})
 target_compile_definitions(texmesh_fuzz PRIVATE TEXMESH_VERSION="${PROJECT_VERSION}")
-target_compile_options(texmesh_fuzz PRIVATE -fPIE -O1 -ffunction-sections -fdata-sections)
+target_compile_options(texmesh_fuzz PRIVATE -fPIE -O2 -ffunction-sections -fdata-sections)
 set_target_properties(texmesh_fuzz PROPERTIES POSITION_INDEPENDENT_CODE OFF)
 target_link_libraries(texmesh_fuzz PUBLIC texmesh_format Nettle::nettle ZLIB::ZLIB nlohmann_json::nlohmann_json CURL::libcurl
   TBB::tbb Eigen3::Eigen WebP::webp zstd::libzstd_shared draco::draco meshoptimizer::meshoptimizer JPEG::JPEG PNG::PNG fmt::fmt OpenImageIO::OpenImageIO
@@ -48,7 +48,7 @@ foreach(file ${targets})
   set(program texmesh_fuzz_${CMAKE_MATCH_1})
   add_executable(${program} EXCLUDE_FROM_ALL ${file} fuzz/fuzz_main.cpp fuzz/fuzz_target.cpp fuzz/regressions.cpp)
   target_compile_definitions(${program} PRIVATE TEXMESH_FUZZ_ROOM=add_${CMAKE_MATCH_1}_targets)
-  target_compile_options(${program} PRIVATE -O1 -ffunction-sections -fdata-sections)
+  target_compile_options(${program} PRIVATE -O2 -ffunction-sections -fdata-sections)
   target_link_options(${program} PRIVATE -fsanitize=fuzzer -fuse-ld=lld LINKER:--gc-sections LINKER:-z,start-stop-gc)
   target_link_libraries(${program} PRIVATE texmesh_fuzz texmesh_fuzz_mutator)
   add_dependencies(texmesh_fuzzers ${program} texmesh_readers)

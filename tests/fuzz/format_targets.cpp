@@ -196,10 +196,23 @@ std::vector<Bytes> entries(const std::string& path) {
   return list;
 }
 
-std::vector<Bytes> manifests() {
-  auto list = entries(kManifestPath);
-  list.push_back(to_bytes(write_manifest(texmesh::testing::make_manifest(40, 220, true))));
+/// Small ones: what the entries hold is nothing to the container.
+std::vector<Bytes> containers() {
+  std::vector<Bytes> list;
+  for (const std::size_t count : {1u, 2u, 4u}) {
+    Bytes& out = list.emplace_back();
+    ContainerWriter writer([&](ByteSpan part) { out.insert(out.end(), part.begin(), part.end()); });
+    for (std::size_t k = 0; k < count; ++k)
+      writer.add(k == 0 ? kManifestPath : mesh_path(static_cast<int>(k)),
+                 Bytes(30 * k + 3, static_cast<std::uint8_t>(k)));
+    writer.finish();
+  }
   return list;
+}
+
+std::vector<Bytes> manifests() {
+  using texmesh::testing::make_manifest;
+  return {to_bytes(write_manifest(make_manifest(1, 0))), to_bytes(write_manifest(make_manifest(2, 1)))};
 }
 
 std::vector<Bytes> thesis_seeds() {
@@ -224,7 +237,7 @@ std::vector<Bytes> about_seeds() {
 
 std::vector<Bytes> split_seeds() {
   std::vector<Bytes> list;
-  for (const std::uint32_t n : {3u, 9u})
+  for (const std::uint32_t n : {3u, 5u})
     list.push_back(write_split_stream(texmesh::testing::split_fixture(n).source));
   return list;
 }
@@ -233,7 +246,7 @@ std::vector<Bytes> split_seeds() {
 
 void add_format_targets(std::vector<Target>& list) {
   list.insert(list.end(),
-              {{"container", true, unless_format_error<read_container_again>, packages, Shape::kContainer},
+              {{"container", true, unless_format_error<read_container_again>, containers, Shape::kContainer},
                {"package", false, unless_format_error<read_package>, packages, Shape::kContainer},
                {"manifest", true, unless_format_error<read_manifest_twice>, manifests, Shape::kJson},
                {"textures", false, unless_format_error<read_textures_twice>,

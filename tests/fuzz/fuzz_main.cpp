@@ -1,6 +1,6 @@
 // libFuzzer's entry to the targets of a room; tests/fuzz/run drives it. The environment variable
 // TEXMESH_FUZZ_TARGET names the target.
-//   texmesh_fuzz_ROOM --list                  a line per target: name, runs that are wanted
+//   texmesh_fuzz_ROOM --list                  a line per target: name, runs that are wanted, most bytes
 //   texmesh_fuzz_ROOM --seeds FOLDER          writes the target's seeds, known troublemakers and dictionary
 //   (FOLDER.dict)
 #include <sanitizer/allocator_interface.h>
@@ -90,6 +90,13 @@ void write_seeds(const std::string& folder) {
   write_file(folder + ".dict", to_bytes(dictionary(target.words)));
 }
 
+/// Twice the largest seed: time goes by bytes, and what is longer says little that is new.
+std::size_t most_bytes(const Target& target) {
+  std::size_t largest = 0;
+  for (const Bytes& seed : target.seeds()) largest = std::max(largest, seed.size());
+  return std::clamp<std::size_t>(2 * largest, 512, 8192);
+}
+
 }  // namespace
 }  // namespace texmesh::fuzz
 
@@ -97,7 +104,8 @@ using namespace texmesh::fuzz;
 
 extern "C" int LLVMFuzzerInitialize(int* argc, char*** argv) {
   if (*argc == 2 && std::strcmp((*argv)[1], "--list") == 0) {
-    for (const Target& t : targets()) std::printf("%s\t%d\n", t.name, t.own ? 10'000'000 : 1'000'000);
+    for (const Target& t : targets())
+      std::printf("%s\t%d\t%zu\n", t.name, t.own ? 10'000'000 : 1'000'000, most_bytes(t));
     std::exit(0);
   }
   if (*argc == 3 && std::strcmp((*argv)[1], "--seeds") == 0) {

@@ -13,6 +13,7 @@ const std::vector<Target>& targets() {
 #else
     add_format_targets(l);
     add_gltf_targets(l);
+    add_parts_targets(l);
     add_scan_targets(l);
     add_image_targets(l);
     add_batch_targets(l);

@@ -68,6 +68,7 @@ class Choices {
 // By file of targets:
 void add_format_targets(std::vector<Target>& list);
 void add_gltf_targets(std::vector<Target>& list);
+void add_parts_targets(std::vector<Target>& list);
 void add_scan_targets(std::vector<Target>& list);
 void add_image_targets(std::vector<Target>& list);
 void add_batch_targets(std::vector<Target>& list);

@@ -2,6 +2,7 @@
 // where there are any.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <nlohmann/json.hpp>
 #include <regex>
 
@@ -43,6 +44,46 @@ TEST(ShellText, BashOffersCommandsOptionsAndWords) {
   EXPECT_EQ(offered("texmesh compile -o ''", 3), "");
   EXPECT_EQ(offered("texmesh verify ''", 2), "");
   EXPECT_NE(told("bash").find("complete -o default"), std::string::npos);
+}
+
+/// A zsh at a terminal, to which the file's lines are typed; Tab takes the first of what is offered.
+constexpr const char* kTypeToZsh = R"(zmodload zsh/zpty
+zpty z env TERM=dumb zsh -f -i
+zpty -w z "cd $1; PS1=; fpath=($1 \$fpath); autoload -Uz compinit; compinit -D -u; setopt menu_complete no_beep"
+zpty -w z 'texmesh() { print -r -- "got <${(j:|:)@}>" }'
+while IFS= read -r line; do zpty -w -n z "$line"$'\t\n'; done < $1/lines
+zpty -w z exit
+while zpty -r z part; do all+=$part; done
+print -r -- $all)";
+
+TEST(ShellText, ZshOffersCommandsOptionsAndWords) {
+  if (!has_program("zsh")) GTEST_SKIP() << "no zsh";
+  const std::vector<std::array<std::string, 2>> typed{
+      {"texmesh comp", "compile"},
+      {"texmesh cache pr", "cache|prune"},
+      {"texmesh plan --bandw", "plan|--bandwidth"},
+      {"texmesh plan --policy gu", "plan|--policy|guard"},
+      {"texmesh compile --keep-s", "compile|--keep-source"},
+      {"texmesh compile --ladder ", "compile|--ladder|jpeg"},
+      {"texmesh compile --ladder p", "compile|--ladder|progressive"},
+      {"texmesh dump a.texmesh sc", "dump|a.texmesh|scales"},
+      {"texmesh compile -o a-fi", "compile|-o|a-file"},
+      {"texmesh verify a-fi", "verify|a-file"},
+      {"texmesh verify none", "verify|none"}};
+  TemporaryFolder folder;
+  write_text(folder / "_texmesh", told("zsh"));
+  write_text(folder / "type", kTypeToZsh);
+  write_text(folder / "a-file", "");
+  std::string lines;
+  for (const auto& [line, words] : typed) lines += line + "\n";
+  write_text(folder / "lines", lines);
+  const CommandResult r = run_command({"zsh", "-f", folder / "type", folder.path()});
+  std::vector<std::string> got;
+  const std::regex words("got <([a-z][^>]*)>");
+  for (std::sregex_iterator w(r.output.begin(), r.output.end(), words), end; w != end; ++w)
+    got.push_back((*w)[1]);
+  ASSERT_EQ(got.size(), typed.size()) << r.output << r.errors;
+  for (std::size_t k = 0; k < typed.size(); ++k) EXPECT_EQ(got[k], typed[k][1]) << typed[k][0];
 }
 
 TEST(ShellText, ShellsReadTheScripts) {
