@@ -14,7 +14,7 @@
 
 namespace texmesh {
 
-inline constexpr int kImportVersion = 8;
+inline constexpr int kImportVersion = 9;
 
 enum class KdPolicy : std::uint8_t { kIgnore, kMultiply };
 template <>

@@ -11,7 +11,7 @@
 
 namespace texmesh {
 
-inline constexpr int kQualityVersion = 17;
+inline constexpr int kQualityVersion = 18;
 
 struct QualityOptions {
   int views = 4;

@@ -18,8 +18,10 @@ namespace {
 using render::FragmentColour;
 
 /// Triangles of an opaque pixel that are shaded: as many as a graphics processor with four samples a pixel
-/// shades at most.
+/// shades at most. In pictures of at most kSmallPx all of them are: with a dozen a pixel four are noise, and
+/// no scale of a turtle was like S_0 below 100 px.
 constexpr std::size_t kMostShaded = 4;
+constexpr std::uint32_t kSmallPx = 200;
 constexpr std::size_t kSamples = std::size_t{kSamplesPerSide} * kSamplesPerSide;
 using Curve = SampledCurve<8192>;
 
@@ -64,10 +66,12 @@ class Samples {
 /// The fragments of one pixel at a time, in all variants.
 class PixelShader {
  public:
-  PixelShader(const render::FragmentShader& shader, PictureVariants& pictures, Vec3f background)
+  PixelShader(const render::FragmentShader& shader, PictureVariants& pictures, Vec3f background,
+              bool all_shaded)
       : shader_(shader),
         pictures_(pictures),
         background_(background),
+        all_shaded_(all_shaded),
         colours_(pictures.count() * (kMaxLayers + kSamples)) {}
 
   /// `at` indexes the pictures' places.
@@ -76,7 +80,7 @@ class PixelShader {
     const bool layers = fragments.front().layer != 0;
     float covered = 0;
     for (const RenderFragment& f : fragments) covered += share_of(f);
-    if (!layers) fragments = most_seen(fragments);
+    if (!layers && !all_shaded_) fragments = most_seen(fragments);
     for (std::size_t i = 0; i < fragments.size(); ++i)
       shader_.colours_of(pictures_.places()[at], fragments[i], scratch_,
                          {colours_.data() + i * variants, variants});
@@ -142,6 +146,7 @@ class PixelShader {
   const render::FragmentShader& shader_;
   PictureVariants& pictures_;
   Vec3f background_;
+  bool all_shaded_;
   render::FragmentShader::Scratch scratch_;
   std::vector<FragmentColour> colours_;  // [fragment][variant]
   std::array<RenderFragment, kMostShaded> most_seen_;
@@ -204,7 +209,7 @@ PictureVariants shade_variants(const RenderScene& scene, const Visibility& visib
   const std::vector<std::uint32_t>& places = out.places();
   const std::vector<std::uint32_t> order = by_squares(places, visibility.side_px);
   parallel_for(context, order.size(), 256, [&](std::size_t begin, std::size_t end) {
-    PixelShader pixel(shader, out, environment.background);
+    PixelShader pixel(shader, out, environment.background, visibility.side_px <= kSmallPx);
     for (std::size_t i = begin; i < end; ++i) {
       const std::uint32_t at = order[i], place = places[at], first = visibility.first[place];
       pixel.shade(at, {visibility.fragments.data() + first, visibility.first[place + 1] - first});

@@ -15,11 +15,11 @@ namespace texmesh {
 /// Materials: glTF 2.0, appendix B (GGX, height-correlated Smith, Schlick, Lambert), with what three.js r170
 /// adds: a floor of roughness, roughness of the geometry, multiple scattering (Fdez-Aguera 2019), specular
 /// occlusion (Lagarde 2014). Each triangle is shaded once a pixel, at the mean of its samples; of an opaque
-/// pixel with more than four of them the four with most samples stand for all of it. Colours are
-/// tone-mapped (Khronos PBR Neutral) and cut to 0..1 there; a pixel is the mean of its samples in linear
-/// light. Blending mixes sRGB-encoded values, as browsers' canvases do. A pixel is covered where something
-/// with an alpha above 0 is seen. Uncovered samples show the environment's background. NaN never comes out.
-/// Same bits on every machine and for any thread count.
+/// pixel with more than four of them, in pictures of more than 200 px, the four with most samples stand for
+/// all of it. Colours are tone-mapped (Khronos PBR Neutral) and cut to 0..1 there; a pixel is the mean of its
+/// samples in linear light. Blending mixes sRGB-encoded values, as browsers' canvases do. A pixel is covered
+/// where something with an alpha above 0 is seen. Uncovered samples show the environment's background. NaN
+/// never comes out. Same bits on every machine and for any thread count.
 Picture shade(const RenderScene& scene, const Visibility& visibility,
               const std::vector<RenderTexture>& textures, const RenderEnvironment& environment,
               const RunContext& context);

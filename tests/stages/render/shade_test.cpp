@@ -133,8 +133,10 @@ TEST(Shade, FourFragmentsStandForAPixelOfManyTriangles) {
     scene.mesh.triangle_material[t] = static_cast<std::uint16_t>(t * 5 % 7);
   RenderEnvironment light = even_light({});
   light.background = {0.1f, 0.2f, 0.3f};
-  const Visibility seen = scene.seen(ball_camera(), 24);
-  const Picture picture = scene.picture(ball_camera(), 24, light);
+  RenderCamera far = ball_camera();
+  far.tan_half_fov *= 10;  // so that a pixel of a picture that is no small one has many triangles
+  const Visibility seen = scene.seen(far, 240);
+  const Picture picture = scene.picture(far, 240, light);
   std::size_t crowded = 0, few = 0;
   for (std::size_t p = 0; p < picture.linear.size(); ++p) {
     std::vector<std::pair<int, Vec3f>> shown;  // samples, colour

@@ -58,7 +58,7 @@ struct Case {
   }
   void add_image(TextureRole role, bool alpha = false) {
     const auto image = static_cast<std::uint32_t>(images.size());
-    images.push_back({"image", ImageFormat::kPng, 512, 512, 3, 8, false, {}});
+    images.push_back({"image", ImageFormat::kPng, 512, 512, 3, 8, false, false, {}});
     add_plane(image, role, 3);
     if (alpha) add_plane(image, TextureRole::kAlpha, 1);
   }
