@@ -27,8 +27,9 @@ std::vector<std::uint16_t> decode_wide_jpeg(const Image& image) {
   if (!header || header->width_px != image.width_px || header->height_px != image.height_px ||
       header->channels != image.channels)
     throw InputError(image.name, "JPEG header", "the size that import had found", "another one");
-  // A code of one bit for a block's DC and one for its end: no JPEG shrinks a block of 64 samples further.
-  constexpr std::uint64_t kMostSamplesPerByte = 64 * 8 / 2;
+  // A code of one bit for a block's DC: no Huffman-coded JPEG, progressive ones either, shrinks 64 samples
+  // further.
+  constexpr std::uint64_t kMostSamplesPerByte = 64 * 8;
   if (std::uint64_t{image.width_px} * image.height_px / kMostSamplesPerByte > image.bytes.size())
     throw InputError(image.name, "JPEG header",
                      "a size that its " + std::to_string(image.bytes.size()) + " bytes can hold",

@@ -26,7 +26,8 @@ it('pictures that nobody waits for are closed, and streams are told of their end
   expect(heard).toContain('split-close');
 });
 
-it('previews are enlarged when no fragment waits', async () => {
+/** A pool whose jobs end one after the other, in the order in which they have begun. */
+function slowPool(): { begun: string[]; decode: () => Promise<unknown>; enlarge: () => Promise<unknown>; end: (all: Promise<unknown>[]) => Promise<void> } {
   const begun: string[] = [];
   const letGo: (() => void)[] = [];
   const pool = new WorkerPool({
@@ -37,37 +38,30 @@ it('previews are enlarged when no fragment waits', async () => {
     },
   });
   const none = new Uint8Array(0);
-  const piece = { picture: {} as ImageBitmap, width: 8, height: 8, x0: 0, x1: 8, y0: 0, y1: 8, levels: 1 };
-  const all = Array.from({ length: 12 }, () => pool.enlarge(piece) as Promise<unknown>);
-  for (let i = 0; i < 4; ++i) all.push(pool.decode({ codec: 'jpeg', tables: none, streams: [none], digests: [], complete: true, levels: 1, most: [9, 9] }));
-  await turns(5);
-  for (; letGo.length > 0; await turns(5)) letGo.shift()!();
-  await Promise.all(all);
+  return {
+    begun,
+    decode: () => pool.decode({ codec: 'jpeg', tables: none, streams: [none], digests: [], complete: true, levels: 1, most: [9, 9] }),
+    enlarge: () => pool.enlarge({ picture: {} as ImageBitmap, width: 8, height: 8, x0: 0, x1: 8, y0: 0, y1: 8, levels: 1 }),
+    end: async (all) => {
+      await turns(5);
+      for (; letGo.length > 0; await turns(5)) letGo.shift()!();
+      await Promise.all(all);
+      pool.dispose();
+    },
+  };
+}
+
+it('previews are enlarged when no fragment waits', async () => {
+  const { begun, decode, enlarge, end } = slowPool();
+  await end([...Array.from({ length: 12 }, enlarge), ...Array.from({ length: 4 }, decode)]);
   expect(begun.slice(8, 13).filter((op) => op === 'decode').length).toBe(4); // eight were under way; one turn of four is the eldest's
-  pool.dispose();
 });
 
 it('an enlarged preview does not wait for ever behind fragments', async () => {
-  const begun: string[] = [];
-  const letGo: (() => void)[] = [];
-  const pool = new WorkerPool({
-    decode: async ({ op }) => {
-      begun.push(op);
-      await new Promise<void>((go) => letGo.push(go));
-      return [[], []];
-    },
-  });
-  const none = new Uint8Array(0);
-  const decode = (): Promise<unknown> => pool.decode({ codec: 'jpeg', tables: none, streams: [none], digests: [], complete: true, levels: 1, most: [9, 9] });
-  const all = Array.from({ length: 8 }, decode);
-  all.push(pool.enlarge({ picture: {} as ImageBitmap, width: 8, height: 8, x0: 0, x1: 8, y0: 0, y1: 8, levels: 1 }));
-  for (let i = 0; i < 40; ++i) all.push(decode());
-  await turns(5);
-  for (; letGo.length > 0; await turns(5)) letGo.shift()!();
-  await Promise.all(all);
+  const { begun, decode, enlarge, end } = slowPool();
+  await end([...Array.from({ length: 8 }, decode), enlarge(), ...Array.from({ length: 40 }, decode)]);
   expect(begun.length).toBe(49);
   expect(begun.indexOf('enlarge')).toBeLessThan(13);
-  pool.dispose();
 });
 
 it('a worker that breaks is replaced once, then there are none', async () => {

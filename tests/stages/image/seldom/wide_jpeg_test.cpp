@@ -83,24 +83,24 @@ TEST(WideJpeg, EveryChangedByteIsRefusedOrDecodes) {
   }
 }
 
-TEST(WideJpeg, ASizeThatItsBytesCannotHoldIsRefusedBeforeMemoryIsTaken) {
-  Bytes jpeg = wide_jpeg(kWidth, kHeight, ramps(1, 12), 12);
+/// With another byte in the body of the frame header, after its marker and length.
+Bytes with_frame_byte(Bytes jpeg, std::size_t at, std::uint8_t value) {
   for (std::size_t i = 0; i + 9 < jpeg.size(); ++i)
     if (jpeg[i] == 0xff && (jpeg[i + 1] == 0xc0 || jpeg[i + 1] == 0xc1)) {
-      jpeg[i + 5] = 0xff;
+      jpeg[i + 4 + at] = value;
       break;
     }
+  return jpeg;
+}
+
+TEST(WideJpeg, ASizeThatItsBytesCannotHoldIsRefusedBeforeMemoryIsTaken) {
+  const Bytes jpeg = with_frame_byte(wide_jpeg(kWidth, kHeight, ramps(1, 12), 12), 1, 0xff);  // of the height
   const std::string error = error_of([&] { decode_image(probe(jpeg)); });
   EXPECT_NE(error.find("a size that its"), std::string::npos) << error;
 }
 
 TEST(WideJpeg, FourComponentsAreRefused) {
-  Bytes jpeg = wide_jpeg(kWidth, kHeight, ramps(3, 12), 12);
-  for (std::size_t i = 0; i + 9 < jpeg.size(); ++i)
-    if (jpeg[i] == 0xff && (jpeg[i + 1] == 0xc0 || jpeg[i + 1] == 0xc1)) {
-      jpeg[i + 9] = 4;
-      break;
-    }
+  const Bytes jpeg = with_frame_byte(wide_jpeg(kWidth, kHeight, ramps(3, 12), 12), 5, 4);
   const std::string error = error_of([&] { probe(jpeg); });
   EXPECT_NE(error.find("1 or 3 components of 12 bits"), std::string::npos) << error;
 }
