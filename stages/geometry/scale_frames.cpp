@@ -4,6 +4,8 @@
 
 #include "format/base/no_index.h"
 #include "stages/base/parallel.h"
+#include "stages/geometry/scale_walk.h"
+#include "stages/geometry/spokes.h"
 #include "stages/geometry/triangle_tree.h"
 
 namespace texmesh {
@@ -17,13 +19,13 @@ constexpr double kLeastFacing = 0.25;  // cosine between a sample and the triang
 /// Where S_0's positions are in a scale: the position that they have collapsed into, one of twins for all;
 /// kNoIndex = vanished with its component.
 std::vector<std::uint32_t> places_in(const NestedScales& scales, const NestedScale& scale) {
-  std::vector<std::uint32_t> place(scales.mesh.positions.size());
-  for (std::uint32_t p = 0; p < place.size(); ++p) place[p] = p;
-  for (std::size_t i = scale.collapse_count; i-- > 0;) {
-    const Collapse& c = scales.collapses[i];
-    const bool gone = c.to == kNoIndex || c.vanishes_with_component();
-    place[c.from] = gone ? kNoIndex : place[c.to];
-  }
+  std::vector<std::uint32_t> place =
+      survivors(scales.mesh.positions.size(), scales.collapses, scale.collapse_count);
+  std::vector<bool> vanished(place.size(), false);
+  for (std::size_t i = 0; i < scale.collapse_count; ++i)
+    if (scales.collapses[i].vanishes_with_component()) vanished[scales.collapses[i].from] = true;
+  for (std::uint32_t& p : place)
+    if (vanished[p]) p = kNoIndex;
   if (!scales.twin.empty())
     for (std::uint32_t& p : place)
       if (p != kNoIndex) p = scales.twin[p];
@@ -45,9 +47,11 @@ std::vector<double> wedge_areas(const Mesh& mesh, const std::vector<Triangle>& t
 class Fit {
  public:
   Fit(const NestedScales& scales, const NestedScale& scale)
-      : mesh_(scales.mesh), place_(places_in(scales, scale)), normal_of_(mesh_.wedge_count(), kNoIndex) {
+      : mesh_(scales.mesh),
+        place_(places_in(scales, scale)),
+        normal_of_(mesh_.wedge_count(), kNoIndex),
+        spokes_(mesh_.positions.size(), scale.triangles, [&](std::uint32_t w) { return place(w); }) {
     add_faces(scale);
-    around_place(scale);
   }
   void take_samples(const std::vector<Triangle>& finest, const RunContext& context);
   void improve();
@@ -67,14 +71,13 @@ class Fit {
   };
   std::uint32_t place(std::uint32_t wedge) const { return place_[mesh_.wedge_position[wedge]]; }
   void add_faces(const NestedScale& scale);
-  void around_place(const NestedScale& scale);
   void put_on_face(Sample& sample) const;
 
   const Mesh& mesh_;
   std::vector<std::uint32_t> place_, normal_of_;  // per position; per wedge
   std::vector<Vec3d> normals_;
   std::vector<Face> faces_;
-  std::vector<std::uint32_t> begin_, around_;  // faces at a place: around_[begin_[place]] and on
+  Spokes spokes_;  // of places
   std::vector<Sample> samples_;
 };
 
@@ -96,17 +99,6 @@ void Fit::add_faces(const NestedScale& scale) {
   }
 }
 
-void Fit::around_place(const NestedScale& scale) {
-  begin_.assign(mesh_.positions.size() + 1, 0);
-  for (const Triangle& t : scale.triangles)
-    for (const std::uint32_t w : t) ++begin_[place(w) + 1];
-  for (std::size_t p = 1; p < begin_.size(); ++p) begin_[p] += begin_[p - 1];
-  around_.resize(begin_.back());
-  std::vector<std::uint32_t> end(begin_.begin(), begin_.end() - 1);
-  for (std::uint32_t f = 0; f < scale.triangles.size(); ++f)
-    for (const std::uint32_t w : scale.triangles[f]) around_[end[place(w)]++] = f;
-}
-
 /// From the place that the sample's position has collapsed into, on to the places at which nearer triangles
 /// meet.
 void Fit::put_on_face(Sample& sample) const {
@@ -117,15 +109,15 @@ void Fit::put_on_face(Sample& sample) const {
   for (int walk = 0; walk < kMostWalks && p != last; ++walk) {
     last = p;
     const std::uint32_t before = sample.face;
-    for (std::uint32_t i = begin_[p]; i < begin_[p + 1]; ++i) {
-      const Face& face = faces_[around_[i]];
+    for (const Spokes::Spoke& spoke : spokes_.at(p)) {
+      const Face& face = faces_[spoke.triangle];
       if (!(dot(face.up, n) > kLeastFacing)) continue;
       const double height = dot(face.up, at - face.corners[0]);
       if (sample.face != kNoIndex && height * height >= best) continue;
       const OnTriangle found = closest_on_triangle(face.corners, at);
       if (sample.face != kNoIndex && found.distance2 >= best) continue;
       best = found.distance2;
-      sample.face = around_[i];
+      sample.face = spoke.triangle;
       sample.weight = found.weight;
     }
     if (sample.face == before) return;

@@ -23,17 +23,7 @@ ScaleWalk::ScaleWalk(const Mesh& mesh, const std::vector<Triangle>& triangles,
     : positions_(mesh.positions),
       survivor_(survivor),
       surface_(surface),
-      begin_(mesh.positions.size() + 1, 0),
-      spoke_(3 * triangles.size()) {
-  for (const Triangle& t : triangles)
-    for (const std::uint32_t w : t) ++begin_[mesh.wedge_position[w] + 1];
-  for (std::size_t p = 1; p < begin_.size(); ++p) begin_[p] += begin_[p - 1];
-  std::vector<std::uint32_t> end(begin_.begin(), begin_.end() - 1);
-  for (std::uint32_t t = 0; t < triangles.size(); ++t)
-    for (std::size_t k = 0; k < 3; ++k)
-      spoke_[end[mesh.wedge_position[triangles[t][k]]]++] = {t,
-                                                             mesh.wedge_position[triangles[t][(k + 1) % 3]]};
-}
+      spokes_(mesh.positions.size(), triangles, [&](std::uint32_t w) { return mesh.wedge_position[w]; }) {}
 
 std::uint32_t ScaleWalk::nearest_corner(std::uint32_t from, Vec3d point) const {
   const auto distance2 = [&](std::uint32_t p) {
@@ -43,8 +33,8 @@ std::uint32_t ScaleWalk::nearest_corner(std::uint32_t from, Vec3d point) const {
   double best = distance2(from);
   for (int walk = 0; walk < kMostCorners; ++walk) {
     std::uint32_t next = from;
-    for (std::uint32_t i = begin_[from]; i < begin_[from + 1]; ++i)
-      if (const double d = distance2(spoke_[i].next); d < best) best = d, next = spoke_[i].next;
+    for (const Spokes::Spoke& spoke : spokes_.at(from))
+      if (const double d = distance2(spoke.next); d < best) best = d, next = spoke.next;
     if (next == from) break;
     from = next;
   }
@@ -54,9 +44,11 @@ std::uint32_t ScaleWalk::nearest_corner(std::uint32_t from, Vec3d point) const {
 ScaleWalk::Guess ScaleWalk::from(std::uint32_t position, Vec3d point) const {
   Guess best{std::numeric_limits<double>::infinity(), kNoIndex, {}};
   const std::uint32_t at = nearest_corner(survivor_[position], point);
-  for (std::uint32_t i = begin_[at]; i < begin_[at + 1] && best.distance2 > 0; ++i)
-    if (const double d = surface_.distance2_to(spoke_[i].triangle, point); d < best.distance2)
-      best.distance2 = d, best.triangle = spoke_[i].triangle;
+  for (const Spokes::Spoke& spoke : spokes_.at(at)) {
+    if (!(best.distance2 > 0)) break;
+    if (const double d = surface_.distance2_to(spoke.triangle, point); d < best.distance2)
+      best.distance2 = d, best.triangle = spoke.triangle;
+  }
   if (best.triangle != kNoIndex) best.hint = surface_.hint_of(best.triangle);
   return best;
 }

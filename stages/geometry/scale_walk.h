@@ -6,10 +6,12 @@
 #include "format/base/no_index.h"
 #include "stages/data/nested_scales.h"
 #include "stages/geometry/distance.h"
+#include "stages/geometry/spokes.h"
 
 namespace texmesh {
 
-/// Per position of S_0: the one that stands for it when the first `count` collapses are done.
+/// Per position of S_0: the one that stands for it when the first `count` collapses are done. What has
+/// collapsed into a component that vanished is stood for by the last position of it.
 std::vector<std::uint32_t> survivors(std::size_t positions, std::span<const Collapse> collapses,
                                      std::size_t count);
 
@@ -29,17 +31,12 @@ class ScaleWalk {
   Guess from(std::uint32_t position, Vec3d point) const;
 
  private:
-  /// A triangle at a position, and the next one of its other corners.
-  struct Spoke {
-    std::uint32_t triangle, next;
-  };
   std::uint32_t nearest_corner(std::uint32_t from, Vec3d point) const;
 
   const std::vector<Vec3f>& positions_;
   std::span<const std::uint32_t> survivor_;
   const SurfaceDistance& surface_;
-  std::vector<std::uint32_t> begin_;  // spokes of a position: spoke_[begin_[position]] and on
-  std::vector<Spoke> spoke_;
+  Spokes spokes_;  // of positions
 };
 
 }  // namespace texmesh

@@ -176,7 +176,7 @@ class CollapseReplay {
     note_final(coarse);
     for (std::uint32_t c = fine.collapse_count; c < coarse.collapse_count; ++c) {
       const Collapse& collapse = scales_.collapses.at(c);
-      if (collapse.to == kNoIndex || collapse.vanishes_with_component()) continue;
+      if (collapse.vanishes_with_component()) continue;
       const std::uint32_t u = rounded_.point(collapse.from), v = rounded_.point(collapse.to);
       if (u != v && head_[u] != kNoIndex) replay(u, v);
     }
