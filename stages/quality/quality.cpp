@@ -168,16 +168,18 @@ ViewPart views_at(double displayed_px, const QualityOptions& options) {
 }
 
 /// The views in which scales are rendered: those that still pass, and what the table needs of a size beside.
+/// `few` texels and triangles: half the views, and the coarsest speaks for all at the largest size.
 std::vector<std::optional<ViewPart>> rendered_scales(const std::vector<std::uint8_t>& alive,
-                                                     const Height& height, const QualityOptions& options) {
+                                                     const Height& height, bool few,
+                                                     const QualityOptions& options) {
   const std::size_t n = alive.size();
   std::vector<std::optional<ViewPart>> out(n);
   for (std::size_t k = 1; k < n; ++k) {
     if (alive[k]) out[k] = views_at(height.displayed_px, options);
     if (alive[k] || !height.rank) continue;
-    if (*height.rank == 0) out[k] = ViewPart::kAll;
-    if (*height.rank == 1 && (n - 1 - k) % 2 == 0) out[k] = ViewPart::kLarge;
-    if (*height.rank == 2 && (k == 1 || k + 1 == n)) out[k] = ViewPart::kLargest;
+    if (*height.rank == 0) out[k] = few ? ViewPart::kLarge : ViewPart::kAll;
+    if (*height.rank == 1 && (n - 1 - k) % 2 == 0) out[k] = few ? ViewPart::kLargest : ViewPart::kLarge;
+    if (*height.rank == 2 && ((k == 1 && !few) || k + 1 == n)) out[k] = ViewPart::kLargest;
   }
   return out;
 }
@@ -231,7 +233,8 @@ std::vector<SizeCells> render_heights(const TextureSampler& sampler, const Quali
     context.check_cancelled();
     context.report(static_cast<double>(i + 1) / static_cast<double>(heights.size() + 1));
     SizeCells cells{heights[i].displayed_px, {}, {}, {}};
-    SizeTask task{rendered_scales(sizes.alive(), heights[i], options), std::nullopt, heights[i].rank};
+    SizeTask task{rendered_scales(sizes.alive(), heights[i], fewer > 0, options), std::nullopt,
+                  heights[i].rank};
     if (!task.rank) task.ends_beyond = limits_at(heights[i].displayed_px, options);
     render_size(sampler, task, studio, cells, context);
     judge_size(cells, heights[i], sampler, options, studio, sizes, context);
