@@ -100,10 +100,10 @@ CollapseStatistics collapse_statistics(const NestedScales& scales, std::size_t k
   return out;
 }
 
-/// Points on a scale: where there are few triangles, more points than triangles say little more.
+/// Points on a scale: where there are few triangles, more than one for every fourth say little more.
 std::size_t sample_count(const NestedScale& scale, std::size_t most) {
-  constexpr std::size_t kLeast = 500;
-  return std::min(most, std::max(kLeast, scale.triangles.size()));
+  constexpr std::size_t kLeast = 250, kTrianglesOfOneEach = 4;
+  return std::min(most, std::max(kLeast, scale.triangles.size() / kTrianglesOfOneEach));
 }
 
 /// Fills p95 and p99 of the pairs that end at scale j; returns the 95th percentile of S_0's distance in

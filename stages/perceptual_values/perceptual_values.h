@@ -9,7 +9,7 @@
 
 namespace texmesh {
 
-inline constexpr int kPerceptualValuesVersion = 7;
+inline constexpr int kPerceptualValuesVersion = 8;
 
 /// What makes the step function of the JND. kScales: every kept scale, by its distance from S_0. kMajors: as
 /// printed (7.5, 7.6): the displayed size chooses a scale by O_V / E_S, the JND, whatever the distance, puts
@@ -49,7 +49,7 @@ struct PerceptualValuesOptions {
       "what makes the JND's step function: scales = each kept scale, by jnd and jnd_reference_px; majors = the "
       "major scales, each for the sizes at which O_V / E_S asks for a scale of its tier");
     v("samples", s.samples, Range{100, 1000000},
-      "most points compared per pair of scales: one for each triangle of the finer one, at least 500");
+      "most points compared per pair of scales: one for every fourth triangle of the finer one, at least 250");
     v("kept_scales", s.kept_scales, Range{0, 40},
       "scales a package holds, about; steps of about 2x between them. 0 = S_0, the major scales and the "
       "coarsest alone");

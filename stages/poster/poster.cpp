@@ -27,7 +27,7 @@ Bytes best_jpeg(const Pixels& pixels, std::size_t max_bytes) {
   return best;
 }
 
-constexpr std::size_t kCoarseTriangles = 20000;
+constexpr std::size_t kCoarseTriangles = 2000;
 
 const NestedScale& coarse_scale(const NestedScales& scales) {
   const auto few = [](const NestedScale& s) { return s.triangles.size() <= kCoarseTriangles; };

@@ -10,7 +10,7 @@
 
 namespace texmesh {
 
-inline constexpr int kPosterVersion = 2;
+inline constexpr int kPosterVersion = 3;
 
 struct PosterOptions {
   int size_px = 512;

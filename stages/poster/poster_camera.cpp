@@ -10,7 +10,7 @@ namespace texmesh::poster {
 namespace {
 
 constexpr double kMargin = 0.04;  // of the picture's side
-constexpr std::uint32_t kTrialSide = 96;
+constexpr std::uint32_t kTrialSide = 48;
 constexpr double kTiny = 0.02;     // of the trial's pixels: less than a thread would cover
 constexpr double kStrays = 0.005;  // share of positions that may be strays, on each side
 

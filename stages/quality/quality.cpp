@@ -21,6 +21,7 @@ using quality::enlarge;
 using quality::find_groups;
 using quality::find_shown;
 using quality::fit_exponent;
+using quality::FlipLimits;
 using quality::frame_object;
 using quality::GroupCells;
 using quality::GroupPictures;
@@ -109,13 +110,9 @@ std::vector<RenderScene> scenes_of(const NestedScales& scales, const KeptScales&
   return out;
 }
 
-/// Whether nobody can tell the scale from S_0 in any view. `share` of the thresholds counts.
-bool passes(const Losses& losses, const QualityOptions& options, double share) {
-  constexpr double kPart = 0.95;
-  return std::all_of(losses.begin(), losses.end(), [&](const Loss& loss) {
-    return loss.flip.mean() <= share * options.flip_mean &&
-           loss.flip.percentile(kPart) <= share * options.flip_p95;
-  });
+/// Whether nobody can tell the scale from S_0 in any view.
+bool passes(const Losses& losses, const FlipLimits& limits) {
+  return std::ranges::all_of(losses, [&](const Loss& loss) { return limits.hold(loss); });
 }
 
 /// Up to a quarter of the largest height all views count.
@@ -124,10 +121,11 @@ bool is_small(double displayed_px, const QualityOptions& options) {
 }
 
 /// The worst of 12 views is up to 1.24 times the worse of two (saxophone and turtle, 256 and 1024 px).
-double threshold_share(double displayed_px, const QualityOptions& options) {
+FlipLimits limits_at(double displayed_px, const QualityOptions& options) {
   const int views =
       is_small(displayed_px, options) ? options.views : std::min(options.views, options.large_views);
-  return views >= 12 ? 1 : views >= 6 ? 0.9 : 0.8;
+  const double share = views >= 12 ? 1 : views >= 6 ? 0.9 : 0.8;
+  return {share * options.flip_mean, share * options.flip_p95};
 }
 
 /// The switch sizes, found from small heights to large ones.
@@ -146,7 +144,7 @@ class SwitchSizes {
     std::vector<std::uint8_t> failed(alive_.size(), 0);
     for (std::size_t k = 1; k < alive_.size(); ++k) {
       if (!alive_[k]) continue;
-      alive_[k] = passes(geometry[k], options_, threshold_share(displayed_px, options_));
+      alive_[k] = passes(geometry[k], limits_at(displayed_px, options_));
       if (alive_[k]) display_px_[k] = static_cast<float>(displayed_px);
       failed[k] = !alive_[k];
     }
@@ -155,7 +153,7 @@ class SwitchSizes {
   /// Of scales that have passed the height below and failed the one above.
   void judge_between(const Cells& geometry, const std::vector<std::uint8_t>& scales, double displayed_px) {
     for (std::size_t k = 1; k < scales.size(); ++k)
-      if (scales[k] && passes(geometry[k], options_, threshold_share(displayed_px, options_)))
+      if (scales[k] && passes(geometry[k], limits_at(displayed_px, options_)))
         display_px_[k] = static_cast<float>(displayed_px);
   }
 
@@ -170,16 +168,18 @@ ViewPart views_at(double displayed_px, const QualityOptions& options) {
 }
 
 /// The views in which scales are rendered: those that still pass, and what the table needs of a size beside.
+/// `few` texels and triangles: half the views, and the coarsest speaks for all at the largest size.
 std::vector<std::optional<ViewPart>> rendered_scales(const std::vector<std::uint8_t>& alive,
-                                                     const Height& height, const QualityOptions& options) {
+                                                     const Height& height, bool few,
+                                                     const QualityOptions& options) {
   const std::size_t n = alive.size();
   std::vector<std::optional<ViewPart>> out(n);
   for (std::size_t k = 1; k < n; ++k) {
     if (alive[k]) out[k] = views_at(height.displayed_px, options);
     if (alive[k] || !height.rank) continue;
-    if (*height.rank == 0) out[k] = ViewPart::kAll;
-    if (*height.rank == 1 && (n - 1 - k) % 2 == 0) out[k] = ViewPart::kLarge;
-    if (*height.rank == 2 && (k == 1 || k + 1 == n)) out[k] = ViewPart::kLargest;
+    if (*height.rank == 0) out[k] = few ? ViewPart::kLarge : ViewPart::kAll;
+    if (*height.rank == 1 && (n - 1 - k) % 2 == 0) out[k] = few ? ViewPart::kLargest : ViewPart::kLarge;
+    if (*height.rank == 2 && ((k == 1 && !few) || k + 1 == n)) out[k] = ViewPart::kLargest;
   }
   return out;
 }
@@ -191,8 +191,8 @@ void judge_size(const SizeCells& cells, const Height& height, const TextureSampl
   if (height.displayed_px < kLeastSwitchPx) return;
   const std::vector<std::uint8_t> failed = sizes.judge(cells.geometry, height.displayed_px);
   if (height.between_px < kLeastSwitchPx || std::ranges::find(failed, 1) == failed.end()) return;
-  SizeTask task;
-  task.scales.resize(failed.size());
+  SizeTask task{
+      std::vector<std::optional<ViewPart>>(failed.size()), limits_at(height.between_px, options), {}};
   for (std::size_t k = 0; k < failed.size(); ++k)
     if (failed[k]) task.scales[k] = views_at(height.between_px, options);
   SizeCells between{height.between_px, {}, {}, {}};
@@ -233,8 +233,10 @@ std::vector<SizeCells> render_heights(const TextureSampler& sampler, const Quali
     context.check_cancelled();
     context.report(static_cast<double>(i + 1) / static_cast<double>(heights.size() + 1));
     SizeCells cells{heights[i].displayed_px, {}, {}, {}};
-    render_size(sampler, {rendered_scales(sizes.alive(), heights[i], options), heights[i].rank}, studio,
-                cells, context);
+    SizeTask task{rendered_scales(sizes.alive(), heights[i], fewer > 0, options), std::nullopt,
+                  heights[i].rank};
+    if (!task.rank) task.ends_beyond = limits_at(heights[i].displayed_px, options);
+    render_size(sampler, task, studio, cells, context);
     judge_size(cells, heights[i], sampler, options, studio, sizes, context);
     if (heights[i].rank) table_cells.push_back(std::move(cells));
   }

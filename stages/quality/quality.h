@@ -11,7 +11,7 @@
 
 namespace texmesh {
 
-inline constexpr int kQualityVersion = 18;
+inline constexpr int kQualityVersion = 19;
 
 struct QualityOptions {
   int views = 4;
@@ -67,7 +67,9 @@ struct QualityOptions {
 ///   than at the size below are corrected by what these views were among all there.
 /// - Geometry: at the least size all scales are rendered; at the half those that still pass, every second
 ///   other one and the coarsest; at the largest those that still pass, the finest and the coarsest. The
-///   others follow by the ratio to the size below, linear between the neighbours in the list of scales.
+///   others follow by the ratio to the size below, linear between the neighbours in the list of scales. Of
+///   models of few texels and triangles, those that no longer pass have half the views, and only the coarsest
+///   is rendered at the largest size.
 /// - Groups: one group's planes are coded, the others have the source's texels. At the least size
 ///   `rung_samples` of the ladder are rendered, first and last among them, and planes without coding: those
 ///   that are shown, up to 4 levels finer and 2 coarser; of full size the source's rung, where there is one.

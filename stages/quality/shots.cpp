@@ -6,6 +6,15 @@
 
 namespace texmesh::quality {
 
+namespace {
+
+bool ended(const Shot& shot, const Losses& so_far) {
+  return shot.ends_beyond &&
+         !std::ranges::all_of(so_far, [&](const Loss& l) { return shot.ends_beyond->hold(l); });
+}
+
+}  // namespace
+
 std::size_t shown_scale(const std::vector<RenderScene>& scenes, std::size_t scale, double displayed_px) {
   constexpr std::size_t kLarge = 1'000'000;
   constexpr double kTrianglesPerPixel = 4;
@@ -112,10 +121,15 @@ std::vector<Losses> SizePictures::take(const std::vector<Shot>& shots, const Run
   for (std::size_t v = 0; v < views; ++v) {
     std::vector<std::size_t> taken;
     for (std::size_t i = 0; i < shots.size(); ++i)
-      if (studio_.views.has(v, shots[i].views)) taken.push_back(i);
+      if (studio_.views.has(v, shots[i].views) && !ended(shots[i], out[i])) taken.push_back(i);
     if (!taken.empty()) compare_view(v, shots, taken, out, context);
   }
   return out;
+}
+
+bool FlipLimits::hold(const Loss& loss) const {
+  constexpr double kPart = 0.95;
+  return loss.flip.mean() <= mean && loss.flip.percentile(kPart) <= p95;
 }
 
 void Loss::add(const Loss& other) {

@@ -38,11 +38,18 @@ struct Loss {
   double mean_dssim() const;
 };
 
+/// Up to which a view looks like S_0.
+struct FlipLimits {
+  double mean = 0, p95 = 0;
+  bool hold(const Loss& loss) const;
+};
+
 /// A scale with materials, whose slots count the studio's textures.
 struct Shot {
   std::size_t scale = 0;  // index into Studio::scenes
   const Materials* materials = nullptr;
   ViewPart views = ViewPart::kAll;
+  std::optional<FlipLimits> ends_beyond = std::nullopt;  // views behind the first such one are left out
 };
 /// Per view; nothing where the shot was not taken.
 using Losses = std::vector<Loss>;

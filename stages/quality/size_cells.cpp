@@ -61,8 +61,8 @@ class SizeShots {
   }
 
   /// A scale with the source's texels, all read with mips.
-  void take_scale(std::size_t scale, Losses& to, ViewPart views) {
-    scale_shots_.push_back({scale, &sampler_.shown.materials, views});
+  void take_scale(std::size_t scale, Losses& to, ViewPart views, const std::optional<FlipLimits>& limits) {
+    scale_shots_.push_back({scale, &sampler_.shown.materials, views, limits});
     scales_.push_back(&to);
   }
 
@@ -318,7 +318,7 @@ void render_size(const TextureSampler& sampler, const SizeTask& task, Studio& st
   SizeShots shots(sampler, studio, context);
   cells.geometry.resize(studio.scenes.size());
   for (std::size_t k = 1; k < task.scales.size(); ++k)
-    if (task.scales[k]) shots.take_scale(k, cells.geometry[k], *task.scales[k]);
+    if (task.scales[k]) shots.take_scale(k, cells.geometry[k], *task.scales[k], task.ends_beyond);
   if (task.rank && !sampler.groups.empty()) add_textures(sampler, *task.rank, studio, cells, shots);
   shots.render(cells.displayed_px, task.rank.has_value());
   for (GroupCells& group : cells.groups)

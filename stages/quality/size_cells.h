@@ -51,6 +51,7 @@ struct TextureSampler {
 struct SizeTask {
   /// Per kept scale: the views in which it is rendered with the source's texels. S_0 is not.
   std::vector<std::optional<ViewPart>> scales;
+  std::optional<FlipLimits> ends_beyond;  // scales: of no more use behind the first view that is beyond
   std::optional<std::size_t>
       rank;  // of the table's sizes, 0 = the least: textures are rendered as quality.h says
 };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <iterator>
 
 #include "format/base/portable_math.h"
@@ -30,8 +31,18 @@ constexpr LevelPlan kLevels[] = {{128, 1, 0},      {64, 96, 0.0008}, {64, 96, 0.
 // pi leaves 1, 2/3, 1/4, 0 and -1/24.
 constexpr double kIrradianceOfBand[] = {1, 0.740, 0.391, 0.167, 0.057};
 
+/// A colour and a number that does not matter.
+using Quad = float __attribute__((vector_size(16)));
+Quad quad_of(const Vec4f& v) {
+  Quad q;
+  std::memcpy(&q, &v, sizeof q);
+  return q;
+}
+Vec3f colour_of(Quad q) { return {q[0], q[1], q[2]}; }
+Vec4f padded(Vec3f c) { return {c.x, c.y, c.z, 0}; }
+
 /// `place`: octahedral().
-Vec3f read_level(const Level& level, Vec2f place) {
+Quad read_level(const Level& level, Vec2f place) {
   const float scale = static_cast<float>(level.side - 2) * 0.5f;
   // Texel i of a level has its middle at (i - 0.5) / (side - 2) of the square.
   const auto end = static_cast<float>(level.side - 1);
@@ -40,10 +51,11 @@ Vec3f read_level(const Level& level, Vec2f place) {
   const auto most = static_cast<std::int32_t>(level.side) - 2;
   const std::int32_t column = std::min(floor_of(x), most), row = std::min(floor_of(y), most);
   const float fx = x - static_cast<float>(column), fy = y - static_cast<float>(row);
-  const Vec3f* texel =
+  const Vec4f* texel =
       level.texels.data() + static_cast<std::size_t>(row) * level.side + static_cast<std::size_t>(column);
-  const Vec3f top = texel[0] + (texel[1] - texel[0]) * fx;
-  const Vec3f bottom = texel[level.side] + (texel[level.side + 1] - texel[level.side]) * fx;
+  const Quad a = quad_of(texel[0]), b = quad_of(texel[1]), c = quad_of(texel[level.side]),
+             d = quad_of(texel[level.side + 1]);
+  const Quad top = a + (b - a) * fx, bottom = c + (d - c) * fx;
   return top + (bottom - top) * fy;
 }
 
@@ -59,7 +71,8 @@ Level make_level(std::uint32_t inner_side, const RunContext& context, F value_of
       };
       const Vec3f value =
           value_of(render::octahedral_direction({place(i % level.side), place(i / level.side)}));
-      for (int k = 0; k < 3; ++k) level.texels[i][k] = clamped(value[k], 0, 65504);
+      level.texels[i] =
+          padded({clamped(value.x, 0, 65504), clamped(value.y, 0, 65504), clamped(value.z, 0, 65504)});
     }
   });
   return level;
@@ -94,12 +107,12 @@ Vec3f filtered(const Level& radiance, const std::vector<LobeSample>& lobe, Vec3f
   // Any pair of axes serves; this one has no seam near the poles.
   const Vec3f x = normalized(cross(z.y < 0.9f && z.y > -0.9f ? Vec3f{0, 1, 0} : Vec3f{1, 0, 0}, z));
   const Vec3f y = cross(z, x);
-  Vec3f sum;
+  Quad sum{};
   for (const LobeSample& s : lobe)
-    sum = sum + read_level(radiance,
-                           render::octahedral(x * s.direction.x + y * s.direction.y + z * s.direction.z)) *
-                    s.weight;
-  return sum;
+    sum +=
+        read_level(radiance, render::octahedral(x * s.direction.x + y * s.direction.y + z * s.direction.z)) *
+        s.weight;
+  return colour_of(sum);
 }
 
 /// Real spherical harmonics of the bands 0 to 4.
@@ -133,7 +146,7 @@ std::array<T, kHarmonics> harmonics_of(Vec3<T> d) {
           T(0.62583573544917614) * (x2 * x2 - 6 * x2 * y2 + y2 * y2)};
 }
 
-std::array<Vec3f, kHarmonics> irradiance_of(const Radiance& radiance) {
+std::array<Vec4f, kHarmonics> irradiance_of(const Radiance& radiance) {
   constexpr int kRings = 64, kPlaces = 128;
   std::array<Vec3d, kHarmonics> sum{};
   for (int i = 0; i < kRings; ++i) {
@@ -148,10 +161,10 @@ std::array<Vec3f, kHarmonics> irradiance_of(const Radiance& radiance) {
         for (int c = 0; c < 3; ++c) sum[k][c] += basis[k] * static_cast<double>(clamped(light[c], 0, 65504));
     }
   }
-  std::array<Vec3f, kHarmonics> out;
+  std::array<Vec4f, kHarmonics> out;
   for (std::size_t k = 0; k < kHarmonics; ++k) {
     const double weight = kIrradianceOfBand[k == 0 ? 0 : k < 4 ? 1 : k < 9 ? 2 : k < 16 ? 3 : 4];
-    out[k] = to_float(sum[k] * (4 * portable::kPi / (kRings * kPlaces) * weight));
+    out[k] = padded(to_float(sum[k] * (4 * portable::kPi / (kRings * kPlaces) * weight)));
   }
   return out;
 }
@@ -175,19 +188,18 @@ RenderEnvironment prepare_environment(const Radiance& radiance, const KeyLight& 
 
 Vec3f diffuse_light(const RenderEnvironment& environment, Vec3f normal) {
   const std::array<float, kHarmonics> basis = harmonics_of(normal);
-  Vec3f sum;
-#pragma GCC unroll 1  // g++ would copy all numbers about
-  for (std::size_t k = 0; k < kHarmonics; ++k) sum = sum + environment.irradiance[k] * basis[k];
-  return {clamped(sum.x, 0, 65504), clamped(sum.y, 0, 65504), clamped(sum.z, 0, 65504)};
+  Quad sum{};
+  for (std::size_t k = 0; k < kHarmonics; ++k) sum += quad_of(environment.irradiance[k]) * basis[k];
+  return {clamped(sum[0], 0, 65504), clamped(sum[1], 0, 65504), clamped(sum[2], 0, 65504)};
 }
 
 Vec3f specular_light(const RenderEnvironment& environment, Vec3f direction, float roughness) {
   const float at = render::saturated(roughness) * static_cast<float>(environment.levels.size() - 1);
   const auto sharp = std::min(static_cast<std::size_t>(at), environment.levels.size() - 2);
   const Vec2f place = render::octahedral(direction);
-  const Vec3f a = read_level(environment.levels[sharp], place),
-              b = read_level(environment.levels[sharp + 1], place);
-  return a + (b - a) * (at - static_cast<float>(sharp));
+  const Quad a = read_level(environment.levels[sharp], place),
+             b = read_level(environment.levels[sharp + 1], place);
+  return colour_of(a + (b - a) * (at - static_cast<float>(sharp)));
 }
 
 }  // namespace texmesh

@@ -18,11 +18,12 @@ struct KeyLight {
 /// Light from all around, prepared for shading. About 0.3 MB.
 struct RenderEnvironment {
   static constexpr std::size_t kHarmonics = 25;  // of the bands 0 to 4
-  std::array<Vec3f, kHarmonics> irradiance;      // spherical harmonics of irradiance / pi
+  /// Colours are padded with a 0, so that processors take all channels at once.
+  std::array<Vec4f, kHarmonics> irradiance;  // spherical harmonics of irradiance / pi
   /// Prefiltered radiance as octahedral maps with a border of one texel, roughness i / (size - 1).
   struct Level {
     std::uint32_t side = 0;     // texels with the border
-    std::vector<Vec3f> texels;  // side x side
+    std::vector<Vec4f> texels;  // side x side
   };
   std::vector<Level> levels;
   KeyLight key;

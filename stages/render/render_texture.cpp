@@ -128,8 +128,35 @@ TextureSite::TextureSite(Vec2<std::uint32_t> size_px, std::uint32_t first_level,
   if (slot.min_filter == MinFilter::kTrilinear)
     level_ = std::max(level_, std::min(level, static_cast<float>(last)));
   fine_ = static_cast<std::size_t>(level_);
+  find_places(size_px);
+}
+
+/// place_in() of both levels at once: the same bits.
+void TextureSite::find_places(Vec2<std::uint32_t> size_px) {
+  using Quad = float __attribute__((vector_size(16)));
+  using Whole = std::int32_t __attribute__((vector_size(16)));
+  const auto side = [&](std::uint32_t px, std::size_t level) {
+    return static_cast<std::int32_t>(std::max(px >> level, 1u));
+  };
+  const Whole n{side(size_px.x, fine_), side(size_px.y, fine_), side(size_px.x, fine_ + 1),
+                side(size_px.y, fine_ + 1)};
+  const auto repeats = [](Wrap wrap) { return wrap == Wrap::kRepeat ? -1 : 0; };
+  const Whole wraps{repeats(wrap_s_), repeats(wrap_t_), repeats(wrap_s_), repeats(wrap_t_)};
+  const Quad at = Quad{uv_.x, uv_.y, uv_.x, uv_.y} * __builtin_convertvector(n, Quad) - 0.5f;
+  Whole first = __builtin_convertvector(at, Whole);
+  first += at < __builtin_convertvector(first, Quad);  // true is -1
+  const Quad part = at - __builtin_convertvector(first, Quad);
+  Whole second = first + 1;
+  first += n & (first < 0) & wraps;
+  second -= n & (second >= n) & wraps;
+  const Whole last = n - 1;
+  for (Whole* texel : {&first, &second}) {
+    *texel = *texel < 0 ? Whole{} : *texel;
+    *texel = *texel > last ? last : *texel;
+  }
   for (std::size_t k = 0; k < 2; ++k)
-    places_[k] = place_in(std::max(size_px.x >> (fine_ + k), 1u), std::max(size_px.y >> (fine_ + k), 1u));
+    places_[k] = {{first[2 * k], second[2 * k], part[2 * k]},
+                  {first[2 * k + 1], second[2 * k + 1], part[2 * k + 1]}};
 }
 
 Place TextureSite::place_in(std::uint32_t width_px, std::uint32_t height_px) const {

@@ -62,6 +62,7 @@ class TextureSite {
 
  private:
   Place place_in(std::uint32_t width_px, std::uint32_t height_px) const;
+  void find_places(Vec2<std::uint32_t> size_px);
   Vec4f read_level(const RenderTexture& texture, std::size_t level) const;
   Vec2f uv_;  // folded into 0..1
   Wrap wrap_s_ = Wrap::kRepeat, wrap_t_ = Wrap::kRepeat;

@@ -195,6 +195,9 @@ class Tile {
   void draw_opaque(std::uint32_t t) {
     const TileTriangle triangle(input_, t, left_, top_);
     if (!shows(triangle, t)) return;
+    const SampleBox& box = triangle.box();
+    drawn_ = {std::min(drawn_.x_first, box.x_first), std::min(drawn_.y_first, box.y_first),
+              std::max(drawn_.x_last, box.x_last), std::max(drawn_.y_last, box.y_last)};
     triangle.for_each_sample([&](std::int32_t x, std::int32_t y, double nearness) {
       const std::size_t i = static_cast<std::size_t>(y) * kTileSamples + static_cast<std::size_t>(x);
       const auto d = static_cast<float>(nearness);
@@ -237,7 +240,7 @@ class Tile {
       const std::size_t before_pixel = out.fragments.size();
       for (; hit != hits_.end() && hit->pixel == pixel; ++hit)
         out.fragments.push_back(fragment(hit->triangle, pixel, hit->mask, true));
-      add_opaque(pixel, out.fragments);
+      if (may_be_drawn(pixel)) add_opaque(pixel, out.fragments);
       out.count[pixel] = static_cast<std::uint32_t>(out.fragments.size() - before_pixel);
     }
     return out;
@@ -247,6 +250,12 @@ class Tile {
   bool shows(const TileTriangle& triangle, std::uint32_t t) const {
     return triangle.planes().visible &&
            (triangle.planes().front || input_.scene->material_of(t).double_sided);
+  }
+
+  bool may_be_drawn(std::uint32_t pixel) const {
+    const auto x = static_cast<std::int32_t>(pixel % kTilePx), y = static_cast<std::int32_t>(pixel / kTilePx);
+    return x >= drawn_.x_first / kSamplesPerSide && x <= drawn_.x_last / kSamplesPerSide &&
+           y >= drawn_.y_first / kSamplesPerSide && y <= drawn_.y_last / kSamplesPerSide;
   }
 
   /// Neighbouring pixels mostly show the same triangle.
@@ -295,6 +304,7 @@ class Tile {
   std::int32_t left_, top_;
   std::vector<float> depth_;  // nearness 1 / w, 0 = nothing
   std::vector<std::uint32_t> nearest_;
+  SampleBox drawn_{kTileSamples, kTileSamples, -1, -1};  // by opaque triangles
   std::vector<std::uint16_t> masks_;
   std::vector<LayerHit> hits_;
   std::optional<TileTriangle> shown_;

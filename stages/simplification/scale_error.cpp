@@ -14,11 +14,11 @@ namespace texmesh {
 namespace {
 
 // Per scale and direction: the rms is within 2 % then; the largest distance is that of a sample. Where there
-// are few triangles, more points than triangles say little more.
-constexpr std::size_t kErrorSamples = 4000, kLeastSamples = 500;
+// are few triangles, more than one for every fourth say little more.
+constexpr std::size_t kErrorSamples = 4000, kLeastSamples = 250, kTrianglesOfOneEach = 4;
 
 std::size_t sample_count(std::size_t triangles) {
-  return std::min(kErrorSamples, std::max(kLeastSamples, triangles));
+  return std::min(kErrorSamples, std::max(kLeastSamples, triangles / kTrianglesOfOneEach));
 }
 
 /// A point of S_0 and the component that it lies on.

@@ -11,7 +11,7 @@
 
 namespace texmesh {
 
-inline constexpr int kSimplificationVersion = 9;
+inline constexpr int kSimplificationVersion = 10;
 
 enum class CollapseOrder : std::uint8_t { kTexmesh, kThesis };
 template <>

@@ -70,15 +70,13 @@ struct WrapSize {
   std::size_t faces = 0;
 };
 /// A mesh of 6,400 triangles has edges of about alpha, and a wrap of shorter ones shows no more of it.
-/// Smaller models come in thousands, so below that the wrap gets coarser a little faster than the mesh: of
-/// 2,000 triangles it takes half the time of one with edges of 0.7 of the mesh's own, and the middle 90 % of
-/// R are within 14 % of it.
+/// Smaller models come in thousands, so below that the wrap gets coarser faster than the mesh.
 WrapSize wrap_size(const SkeletonizationOptions& options, std::size_t triangles) {
   constexpr std::size_t kLeastFaces = 1000;
-  constexpr double kLeastDivisor = 28, kTrianglesPerDivisor = 80, kTrianglesOfOneEach = 2000;
-  const auto count = static_cast<double>(triangles);
-  const double divisor = std::max(kLeastDivisor, count / kTrianglesPerDivisor);
-  const double faces = std::min<double>(options.max_wrap_faces, count * count / kTrianglesOfOneEach);
+  constexpr double kLeastDivisor = 24, kDivisor = 80, kTriangles = 6400, kCubeOfOneFace = 8e6;
+  const auto count = static_cast<double>(triangles), part = count / kTriangles;
+  const double divisor = std::max(kLeastDivisor, kDivisor * part * std::sqrt(part));
+  const double faces = std::min<double>(options.max_wrap_faces, count * count * count / kCubeOfOneFace);
   return {1 / std::min<double>(options.alpha_divisor, divisor),
           std::max(std::min<std::size_t>(kLeastFaces, static_cast<std::size_t>(options.max_wrap_faces)),
                    static_cast<std::size_t>(faces))};

@@ -17,10 +17,10 @@ int main() {
   };
   const texmesh::RenderEnvironment studio =
       texmesh::prepare_environment(texmesh::studio_radiance, texmesh::studio_key_light(), {});
-  for (const texmesh::Vec3f c : studio.irradiance) put_colour(c);
+  for (const texmesh::Vec4f c : studio.irradiance) put_colour({c.x, c.y, c.z});
   for (const auto& level : studio.levels) {
     put(level.side);
-    for (const texmesh::Vec3f c : level.texels) put_colour(c);
+    for (const texmesh::Vec4f c : level.texels) put_colour({c.x, c.y, c.z});
   }
   std::puts(
       "};\n\n}  // namespace\n\nstd::span<const std::uint32_t> studio_table() { return kStudioWords; }\n\n"

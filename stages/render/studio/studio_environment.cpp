@@ -15,9 +15,9 @@ class StudioWords {
     if (at_ == words_.size()) throw std::logic_error("the studio's table is too short");
     return words_[at_++];
   }
-  Vec3f colour() {
-    Vec3f out;
-    for (int k = 0; k < 3; ++k) out[k] = std::bit_cast<float>(next());
+  Vec4f colour() {
+    Vec4f out;
+    for (float* channel : {&out.x, &out.y, &out.z}) *channel = std::bit_cast<float>(next());
     return out;
   }
   bool at_end() const { return at_ == words_.size(); }
@@ -33,12 +33,12 @@ RenderEnvironment studio_environment() {
   RenderEnvironment out;
   out.key = studio_key_light();
   StudioWords words;
-  for (Vec3f& c : out.irradiance) c = words.colour();
+  for (Vec4f& c : out.irradiance) c = words.colour();
   while (!words.at_end()) {
     RenderEnvironment::Level& level = out.levels.emplace_back();
     level.side = words.next();
     level.texels.resize(static_cast<std::size_t>(level.side) * level.side);
-    for (Vec3f& c : level.texels) c = words.colour();
+    for (Vec4f& c : level.texels) c = words.colour();
   }
   return out;
 }

@@ -93,7 +93,8 @@ TEST(Environment, ALobeIsAGaussianWhoseWidthFollowsTheRoughness) {
 
 TEST(Environment, TheStudioIsNeutralAndLightsAWhiteBodyWithoutBurningIt) {
   const RenderEnvironment studio = studio_environment();
-  const Vec3f mean = studio.irradiance[0] * 0.2820948f;
+  const Vec4f flat = studio.irradiance[0];
+  const Vec3f mean = Vec3f{flat.x, flat.y, flat.z} * 0.2820948f;
   EXPECT_NEAR(mean.x / mean.y, 1, 0.03);
   EXPECT_NEAR(mean.z / mean.y, 1, 0.03);
   float most = 0;

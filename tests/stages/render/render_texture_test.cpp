@@ -182,6 +182,27 @@ TEST(RenderTexture, FinerLevelsThatAreNotKeptAreReplacedByTheFirstThatIs) {
   EXPECT_EQ(render_texture(image, true, 99, {}).levels.size(), 1u);
 }
 
+TEST(RenderTexture, PlacesOfTwoLevelsAtOnceAreThoseOfEachAlone) {
+  std::uint32_t seed = 5;
+  const auto next = [&seed] { return (seed = seed * 1664525 + 1013904223) >> 8; };
+  for (const std::uint32_t width : {1u, 2u, 5u, 64u, 97u}) {
+    const RenderTexture whole =
+        texture_of(width, 33, 3, false, [&](auto, auto, auto) { return static_cast<std::uint8_t>(next()); });
+    RenderTexture coarse = whole;
+    coarse.levels.erase(coarse.levels.begin(), coarse.levels.begin() + 3);
+    coarse.first_level = 3;
+    for (int i = 0; i < 300; ++i) {
+      TextureSlot slot;
+      slot.wrap_s = static_cast<Wrap>(i % 3), slot.wrap_t = static_cast<Wrap>(i / 3 % 3);
+      const auto place = [&] { return static_cast<float>(next() % 65536) / 16384 - 2; };
+      const TextureFootprint here = point(place(), place());
+      // Of level 3 the first site knows no places, the other has found them together with those of level 4.
+      const TextureSite alone({width, 33}, 0, slot, here), together({width, 33}, 3, slot, here);
+      EXPECT_EQ(alone.read(coarse), together.read(coarse)) << width << ' ' << i;
+    }
+  }
+}
+
 TEST(RenderTexture, OneTexelIsATexture) {
   const RenderTexture texture =
       texture_of(1, 1, 3, false, [](auto, auto, auto c) { return static_cast<std::uint8_t>(c); });
