@@ -160,7 +160,7 @@ class ProxyRun {
     ProxyForm form;
     FlipSum flip;  // at the middle height
   };
-  void compete(const BakedProxy& baked, std::uint64_t bytes, const ProxyForm& form, Candidate& best,
+  void compete(BakedProxy& baked, std::uint64_t bytes, const ProxyForm& form, Candidate& best,
                const RunContext& context) {
     std::optional<MadeProxy> made = shop_.finish(baked, bytes, form);
     if (!made) return;
@@ -192,7 +192,7 @@ class ProxyRun {
     Candidate best;
     ProxyForm form = first_form(bytes, first, data_);
     form.maps.normal = mapped_ && bytes >= kNormalMapPaysFrom;
-    const auto baked = shop_.bake(bytes, form, context);
+    auto baked = shop_.bake(bytes, form, context);
     if (!baked) return best;
     if (form.maps.normal) compete(*baked, target, form, best, context);
     form.maps.normal = false;
@@ -202,7 +202,7 @@ class ProxyRun {
     if (best.made) shop_.learn(*best.made);
     flat_ = best.made && !best.form.normals;
     if (first && flat_)
-      if (const auto again = shop_.bake(bytes, form, context)) compete(*again, target, form, best, context);
+      if (auto again = shop_.bake(bytes, form, context)) compete(*again, target, form, best, context);
     return best;
   }
 
