@@ -6,21 +6,13 @@
 #include <limits>
 #include <numeric>
 
+#include "stages/geometry/box_distance.h"
+
 namespace texmesh {
 namespace {
 
 constexpr std::uint32_t kLeaf = 4;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kOfRounding = 1e-12;  // relative, for rounding
-
-double box_distance2(const Box3d& box, Vec3d p) {
-  double sum = 0;
-  for (int k = 0; k < 3; ++k) {
-    const double d = std::max({box.min[k] - p[k], p[k] - box.max[k], 0.0});
-    sum += d * d;
-  }
-  return sum;
-}
 
 double leaving_hit(const std::array<Vec3d, 3>& c, Vec3d origin, Vec3d direction) {
   const Vec3d u = c[1] - c[0], v = c[2] - c[0], h = cross(direction, v);
@@ -34,11 +26,6 @@ double leaving_hit(const std::array<Vec3d, 3>& c, Vec3d origin, Vec3d direction)
   if (!(b <= 0 && a + b >= det)) return kInfinity;
   const double t = dot(v, q) / det;
   return t > 0 ? t : kInfinity;
-}
-
-bool faces(const std::array<Vec3d, 3>& c, const TriangleTree::Facing& facing) {
-  const Vec3d n = cross(c[1] - c[0], c[2] - c[0]);
-  return dot(n, facing.direction) > facing.least_cosine * length(n);
 }
 
 void try_segment(Vec3d p, const std::array<Vec3d, 3>& c, std::size_t i, std::size_t j, OnTriangle& best) {
@@ -91,6 +78,32 @@ TriangleTree::TriangleTree(std::span<const Vec3d> points, std::span<const Triang
     if (node.count == 0)
       for (const std::size_t child : {n + 1, std::size_t{node.first}}) node.box.extend(nodes_[child].box);
   }
+  for (int k = 0; k < 3; ++k)
+    largest_ = std::max({largest_, std::fabs(box().min[k]), std::fabs(box().max[k])});
+  add_quad(0);
+}
+
+/// Of a node's grandchildren, or of children that are leaves, and all that are below; its index.
+std::uint32_t TriangleTree::add_quad(std::uint32_t node) {
+  std::array<std::uint32_t, BoxQuad::kBoxes> boxes{};
+  std::size_t count = 0;
+  const auto add_below = [&](std::uint32_t n, auto add) {
+    if (nodes_[n].count > 0)
+      boxes[count++] = n;
+    else
+      add(n + 1), add(nodes_[n].first);
+  };
+  add_below(node, [&](std::uint32_t child) {
+    add_below(child, [&](std::uint32_t below) { boxes[count++] = below; });
+  });
+  const auto index = static_cast<std::uint32_t>(quads_.size());
+  quads_.emplace_back();
+  for (std::size_t i = 0; i < count; ++i) {
+    const Node& n = nodes_[boxes[i]];
+    const std::uint32_t first = n.count > 0 ? n.first : add_quad(boxes[i]);
+    quads_[index].set(i, n.box, first, n.count);
+  }
+  return index;
 }
 
 void TriangleTree::build(std::uint32_t first, std::uint32_t count, std::vector<Vec3d>& centres) {
@@ -218,111 +231,6 @@ TriangleTree::Nearest TriangleTree::nearest(Vec3d p) const {
 TriangleTree::Nearest TriangleTree::nearest(Vec3d p, std::uint64_t& tried) const {
   const Found best = search(p, kInfinity, tried);
   return {best.triangle, best.on.weight};
-}
-
-/// A line, and the least crossing that has been found of it.
-struct TriangleTree::LineSearch {
-  Vec3d origin, direction;
-  double best = 0;  // |t|
-  std::optional<Nearest> found;
-  Vec3d inverse;  // of the direction; 0 where it does not move
-
-  LineSearch(Vec3d from, Vec3d along, double reach) : origin(from), direction(along), best(reach) {
-    constexpr double kStill = 1e-200;  // its inverse times a distance stays finite
-    for (int k = 0; k < 3; ++k) inverse[k] = std::fabs(along[k]) > kStill ? 1 / along[k] : 0;
-  }
-  /// The least |t| at which the line is in the box; infinite where that is not within `best`.
-  double entry(const Box3d& box) const {
-    double from = -best, to = best;
-    for (int k = 0; k < 3; ++k) {
-      if (inverse[k] == 0) {
-        if (origin[k] < box.min[k] || origin[k] > box.max[k]) return kInfinity;
-        continue;
-      }
-      const double a = (box.min[k] - origin[k]) * inverse[k], b = (box.max[k] - origin[k]) * inverse[k];
-      from = std::max(from, std::min(a, b)), to = std::min(to, std::max(a, b));
-    }
-    // Rounding may make a flat box a little too thin.
-    if (!(from <= to + kOfRounding * (std::fabs(from) + std::fabs(to)))) return kInfinity;
-    return std::max({from, -to, 0.0}) * (1 - kOfRounding);
-  }
-  void try_triangle(const std::array<Vec3d, 3>& c, std::uint32_t triangle, const Facing& facing) {
-    const Vec3d u = c[1] - c[0], v = c[2] - c[0], h = cross(direction, v);
-    const double det = dot(u, h);
-    if (det == 0) return;
-    const Vec3d s = origin - c[0];
-    const double a = dot(s, h) / det;
-    if (!(a >= 0 && a <= 1)) return;
-    const Vec3d q = cross(s, u);
-    const double b = dot(direction, q) / det;
-    if (!(b >= 0 && a + b <= 1)) return;
-    const double t = std::fabs(dot(v, q) / det);
-    if (!(t <= best) || (found && t == best && triangle >= found->triangle) || !faces(c, facing)) return;
-    best = t;
-    found = {triangle, {1 - a - b, a, b}};
-  }
-};
-
-std::optional<TriangleTree::Nearest> TriangleTree::crossing(Vec3d origin, Vec3d direction, double reach,
-                                                            const Facing& facing,
-                                                            std::optional<std::uint32_t> guess) const {
-  LineSearch line(origin, direction, reach);
-  if (guess && *guess < place_.size()) line.try_triangle(corners_[place_[*guess]], *guess, facing);
-  struct Ahead {
-    double entry;
-    std::uint32_t node;
-  };
-  std::array<Ahead, 40> stack{};
-  std::size_t depth = 0;
-  const auto push = [&](Ahead a) {
-    if (a.entry < kInfinity) stack[depth++] = a;
-  };
-  push({line.entry(nodes_[0].box), 0});
-  while (depth > 0) {
-    const Ahead at = stack[--depth];
-    if (at.entry > line.best) continue;
-    const Node& n = nodes_[at.node];
-    for (std::uint32_t i = n.first; i < n.first + n.count; ++i)
-      line.try_triangle(corners_[i], order_[i], facing);
-    if (n.count > 0) continue;
-    Ahead nearer{line.entry(nodes_[at.node + 1].box), at.node + 1},
-        farther{line.entry(nodes_[n.first].box), n.first};
-    if (farther.entry < nearer.entry) std::swap(nearer, farther);
-    push(farther);
-    push(nearer);
-  }
-  return line.found;
-}
-
-std::optional<TriangleTree::Nearest> TriangleTree::nearest_facing(Vec3d p, const Facing& facing) const {
-  std::optional<Nearest> best;
-  double distance2 = kInfinity;
-  struct Ahead {
-    double distance2;
-    std::uint32_t node;
-  };
-  std::array<Ahead, 40> stack{};
-  std::size_t depth = 1;
-  while (depth > 0) {
-    const Ahead at = stack[--depth];
-    if (at.distance2 > distance2) continue;
-    const Node& n = nodes_[at.node];
-    for (std::uint32_t i = n.first; i < n.first + n.count; ++i) {
-      const OnTriangle on = closest_on_triangle(corners_[i], p);
-      if (!(on.distance2 < distance2 || (on.distance2 == distance2 && best && order_[i] < best->triangle)) ||
-          !faces(corners_[i], facing))
-        continue;
-      distance2 = on.distance2;
-      best = {order_[i], on.weight};
-    }
-    if (n.count > 0) continue;
-    Ahead nearer{box_distance2(nodes_[at.node + 1].box, p), at.node + 1},
-        farther{box_distance2(nodes_[n.first].box, p), n.first};
-    if (farther.distance2 < nearer.distance2) std::swap(nearer, farther);
-    stack[depth++] = farther;
-    stack[depth++] = nearer;
-  }
-  return best;
 }
 
 double TriangleTree::distance2(Vec3d p, double limit2, std::uint64_t& tried) const {

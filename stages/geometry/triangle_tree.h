@@ -8,6 +8,7 @@
 #include "format/base/box.h"
 #include "format/base/vec.h"
 #include "format/model/model.h"
+#include "stages/geometry/box_quad.h"
 #include "stages/geometry/tetrahedron.h"
 
 namespace texmesh {
@@ -75,11 +76,14 @@ class TriangleTree {
   struct RayBundle;
   Found search(Vec3d p, double limit2, std::uint64_t& tried) const;
   void build(std::uint32_t first, std::uint32_t count, std::vector<Vec3d>& centres);
+  std::uint32_t add_quad(std::uint32_t node);
 
   std::vector<std::array<Vec3d, 3>> corners_;  // in the order of order_
   std::vector<std::uint32_t> order_;
   std::vector<std::uint32_t> place_;  // the reverse of order_
   std::vector<Node> nodes_;
+  std::vector<BoxQuad> quads_;  // the same tree, four children a node
+  double largest_ = 0;          // coordinate
 };
 
 }  // namespace texmesh

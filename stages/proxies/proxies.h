@@ -10,7 +10,7 @@
 
 namespace texmesh {
 
-inline constexpr int kProxiesVersion = 9;
+inline constexpr int kProxiesVersion = 10;
 
 /// kAuto: only those that beat what the source's atlas gives for the same bytes.
 enum class ProxyMode : std::uint8_t { kNone, kAuto, kAlways };

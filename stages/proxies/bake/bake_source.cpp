@@ -35,9 +35,13 @@ std::array<Vec3d, 3> corners_of(const Mesh& mesh, const Triangle& t) {
 
 Vec3d area_normal(const std::array<Vec3d, 3>& c) { return cross(c[1] - c[0], c[2] - c[0]); }
 
-bool read_alike(const TextureSlot& a, const TextureSlot& b) {
-  return a.texture == b.texture && a.uv_set == b.uv_set && a.wrap_s == b.wrap_s && a.wrap_t == b.wrap_t &&
+bool placed_alike(const TextureSlot& a, const TextureSlot& b) {
+  return a.uv_set == b.uv_set && a.wrap_s == b.wrap_s && a.wrap_t == b.wrap_t &&
          a.mag_filter == b.mag_filter && a.min_filter == b.min_filter && a.transform == b.transform;
+}
+
+bool read_alike(const TextureSlot& a, const TextureSlot& b) {
+  return a.texture == b.texture && placed_alike(a, b);
 }
 
 /// Tangent and bitangent that the wedges carry; false when a corner has none.
@@ -130,27 +134,54 @@ std::optional<SurfacePlace> BakeSource::find(std::uint32_t group, Vec3d p, Vec3d
   return SurfacePlace{g.triangles[found->triangle], found->weight};
 }
 
-Vec4f BakeSource::read(const SurfacePlace& place, const TextureSlot& slot, double footprint) const {
-  const Triangle& corner = mesh_.triangles[place.triangle];
-  const std::vector<Vec2f>& uv = slot.uv_set == 1 ? mesh_.uv1 : mesh_.uv0;
-  const RenderTexture& texture = shown_.textures[static_cast<std::size_t>(slot.texture)];
-  const UvMatrix matrix = uv_matrix(slot.transform);
-  TextureFootprint at;
-  at.uv = matrix.place(mean_of(uv, corner, place.weight));
-  const Vec2d along1 = to_double(matrix.direction(uv[corner[1]] - uv[corner[0]])),
-              along2 = to_double(matrix.direction(uv[corner[2]] - uv[corner[0]]));
-  const double texels = std::fabs(cross(along1, along2)) * texture.width_px * texture.height_px;
-  const double area = length(area_normal(corners_of(mesh_, corner)));
-  const double side = footprint * std::sqrt(texels / area);  // of the footprint in texels
-  if (std::isfinite(side)) {
-    at.uv_dx = {static_cast<float>(side / texture.width_px), 0};
-    at.uv_dy = {0, static_cast<float>(side / texture.height_px)};
-  }
-  return read_texture(texture, slot, at);
-}
+/// Reads textures in one place. Those that are alike but for their texels share where they are read.
+class BakeSource::Reader {
+ public:
+  Reader(const BakeSource& source, const SurfacePlace& place, double footprint)
+      : source_(source), place_(place), footprint_(footprint) {}
+  const SurfacePlace& place() const { return place_; }
 
-Vec3f BakeSource::mapped_normal(const SurfacePlace& place, const RenderMaterial& material,
-                                double footprint) const {
+  Vec4f read(const TextureSlot& slot) {
+    const RenderTexture& texture = source_.shown_.textures[static_cast<std::size_t>(slot.texture)];
+    if (!slot_ || !placed_alike(*slot_, slot) || texture.width_px != like_->width_px ||
+        texture.height_px != like_->height_px || texture.first_level != like_->first_level) {
+      site_ = TextureSite({texture.width_px, texture.height_px}, texture.first_level, slot,
+                          footprint_of(slot, texture));
+      slot_ = &slot, like_ = &texture;
+    }
+    return site_.read(texture);
+  }
+
+ private:
+  TextureFootprint footprint_of(const TextureSlot& slot, const RenderTexture& texture) const {
+    const Mesh& mesh = source_.mesh_;
+    const Triangle& corner = mesh.triangles[place_.triangle];
+    const std::vector<Vec2f>& uv = slot.uv_set == 1 ? mesh.uv1 : mesh.uv0;
+    const UvMatrix matrix = uv_matrix(slot.transform);
+    TextureFootprint at;
+    at.uv = matrix.place(mean_of(uv, corner, place_.weight));
+    const Vec2d along1 = to_double(matrix.direction(uv[corner[1]] - uv[corner[0]])),
+                along2 = to_double(matrix.direction(uv[corner[2]] - uv[corner[0]]));
+    const double texels = std::fabs(cross(along1, along2)) * texture.width_px * texture.height_px;
+    const double area = length(area_normal(corners_of(mesh, corner)));
+    const double side = footprint_ * std::sqrt(texels / area);  // of the footprint in texels
+    if (std::isfinite(side)) {
+      at.uv_dx = {static_cast<float>(side / texture.width_px), 0};
+      at.uv_dy = {0, static_cast<float>(side / texture.height_px)};
+    }
+    return at;
+  }
+
+  const BakeSource& source_;
+  const SurfacePlace& place_;
+  const double footprint_;
+  const TextureSlot* slot_ = nullptr;    // of the last one read,
+  const RenderTexture* like_ = nullptr;  // its texture
+  TextureSite site_;                     // and where it was read
+};
+
+Vec3f BakeSource::mapped_normal(Reader& reader, const RenderMaterial& material) const {
+  const SurfacePlace& place = reader.place();
   const Triangle& corner = mesh_.triangles[place.triangle];
   const std::array<Vec3d, 3> corners = corners_of(mesh_, corner);
   const Vec3f face = to_float(normalized(area_normal(corners)));
@@ -167,21 +198,21 @@ Vec3f BakeSource::mapped_normal(const SurfacePlace& place, const RenderMaterial&
     const TextureFrame derived = texture_frame(corners, at, to_double(normal));
     frame[0] = to_float(derived.along_u), frame[1] = to_float(derived.along_v);
   }
-  const Vec4f texel = read(place, slot, footprint);
+  const Vec4f texel = reader.read(slot);
   const float scale = material.normal_scale;
   return unit_or(frame[0] * ((texel.x * 2 - 1) * scale) + frame[1] * ((texel.y * 2 - 1) * scale) +
                      normal * (texel.z * 2 - 1),
                  normal);
 }
 
-void BakeSource::add_colours(const SurfacePlace& place, const RenderMaterial& m, double footprint,
-                             SurfaceSample& out) const {
+void BakeSource::add_colours(Reader& reader, const RenderMaterial& m, SurfaceSample& out) const {
+  const SurfacePlace& place = reader.place();
   Vec4f base = m.base_colour;
   const auto multiply = [&base](Vec4f by) {
     base = {base.x * by.x, base.y * by.y, base.z * by.z, base.w * by.w};
   };
   if (const TextureSlot& slot = m.slot(TextureUse::kBaseColour); slot.texture >= 0)
-    multiply(read(place, slot, footprint));
+    multiply(reader.read(slot));
   if (!mesh_.colours.empty()) {
     Vec4f sum{};
     for (std::size_t k = 0; k < 3; ++k) {
@@ -198,21 +229,20 @@ void BakeSource::add_colours(const SurfacePlace& place, const RenderMaterial& m,
   if (m.unlit || m.emissive == Vec3f{}) return;
   out.emission = m.emissive;
   if (const TextureSlot& slot = m.slot(TextureUse::kEmissive); slot.texture >= 0) {
-    const Vec4f e = read(place, slot, footprint);
+    const Vec4f e = reader.read(slot);
     out.emission = {m.emissive.x * e.x, m.emissive.y * e.y, m.emissive.z * e.z};
   }
 }
 
-void BakeSource::add_data(const SurfacePlace& place, const RenderMaterial& m, double footprint,
-                          SurfaceSample& out) const {
+void BakeSource::add_data(Reader& reader, const RenderMaterial& m, SurfaceSample& out) const {
   const TextureSlot &rough_metal = m.slot(TextureUse::kMetallicRoughness),
                     &occlusion = m.slot(TextureUse::kOcclusion);
   Vec4f texel{1, 1, 1, 1};
-  if (rough_metal.texture >= 0) texel = read(place, rough_metal, footprint);
+  if (rough_metal.texture >= 0) texel = reader.read(rough_metal);
   out.roughness = within_unit(m.roughness * texel.y);
   out.metallic = within_unit(m.metallic * texel.z);
   if (occlusion.texture < 0) return;
-  if (!read_alike(occlusion, rough_metal)) texel = read(place, occlusion, footprint);
+  if (!read_alike(occlusion, rough_metal)) texel = reader.read(occlusion);
   out.occlusion = within_unit(1 + (texel.x - 1) * m.occlusion_strength);
 }
 
@@ -220,10 +250,11 @@ SurfaceSample BakeSource::sample(const SurfacePlace& place, double footprint,
                                  const SampleParts& parts) const {
   const RenderMaterial& m = shown_.materials[mesh_.triangle_material[place.triangle]];
   SurfaceSample out;
-  if (parts.colours) add_colours(place, m, footprint, out);
+  Reader reader(*this, place, footprint);
+  if (parts.colours) add_colours(reader, m, out);
   if (m.unlit) return out;
-  if (parts.data) add_data(place, m, footprint, out);
-  if (parts.normal) out.normal = mapped_normal(place, m, footprint);
+  if (parts.data) add_data(reader, m, out);
+  if (parts.normal) out.normal = mapped_normal(reader, m);
   return out;
 }
 

@@ -80,12 +80,10 @@ class BakeSource {
     std::vector<std::uint32_t> triangles;  // of the tree's
     std::unique_ptr<TriangleTree> tree;    // null: none
   };
-  void add_colours(const SurfacePlace& place, const RenderMaterial& material, double footprint,
-                   SurfaceSample& out) const;
-  void add_data(const SurfacePlace& place, const RenderMaterial& material, double footprint,
-                SurfaceSample& out) const;
-  Vec3f mapped_normal(const SurfacePlace& place, const RenderMaterial& material, double footprint) const;
-  Vec4f read(const SurfacePlace& place, const TextureSlot& slot, double footprint) const;
+  class Reader;
+  void add_colours(Reader& reader, const RenderMaterial& material, SurfaceSample& out) const;
+  void add_data(Reader& reader, const RenderMaterial& material, SurfaceSample& out) const;
+  Vec3f mapped_normal(Reader& reader, const RenderMaterial& material) const;
 
   const Mesh& mesh_;
   const ShownMaterials& shown_;

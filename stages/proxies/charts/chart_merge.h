@@ -17,6 +17,11 @@ struct GrowingChart {
   std::vector<std::uint32_t> triangles, border;  // border: half-edges 3 t + k, in no order
   Vec3d area_normal;                             // sum of unit normals times areas
   double area = 0, perimeter = 0;
+  struct Refusal {
+    std::uint32_t triangle;  // of the other chart
+    std::size_t triangles;   // of both together
+  };
+  std::vector<Refusal> refusals;  // others that it could not be merged with
 };
 
 /// Merges neighbouring charts, beginning with one per triangle, the flattest and roundest result first, as
@@ -40,6 +45,7 @@ class ChartMerge {
   std::vector<std::uint32_t> longest_common_path(std::uint32_t a, std::uint32_t b) const;
   void glue(std::span<const std::uint32_t> path, std::span<const std::uint32_t> triangles);
   bool try_merge(std::uint32_t a, std::uint32_t b);
+  bool was_refused(std::uint32_t a, std::uint32_t b) const;
   std::vector<std::uint32_t> joint_border(std::uint32_t a, std::uint32_t b,
                                           std::span<const std::uint32_t> path);
   std::uint32_t start_of(std::uint32_t half_edge) const {

@@ -45,19 +45,34 @@ Pixels with_alpha(const Pixels& rgb, const std::vector<float>& alpha) {
   return out;
 }
 
-ProxyImage code_picture(const Pixels& pixels, int quality) {
-  return {encode_webp(pixels, std::clamp(quality, 0, 100)), pixels.width_px, pixels.height_px};
-}
+enum MapKind : std::size_t { kBaseColour, kOrm, kNormal, kEmission };
 
-ProxyPictures code_at(const MapPixels& maps, int quality) {
+ProxyPictures code_at(const MapPixels& maps, int quality, CodedPictures& coded) {
+  const auto code = [&](MapKind kind, const Pixels& pixels, int its_quality) {
+    its_quality = std::clamp(its_quality, 0, 100);
+    const auto [at, is_new] = coded.images[kind].try_emplace(its_quality);
+    if (is_new) at->second = {encode_webp(pixels, its_quality), pixels.width_px, pixels.height_px};
+    return at->second;
+  };
   ProxyPictures out;
   out.metallic = maps.metallic, out.roughness = maps.roughness, out.emissive = maps.emissive;
   out.quality = quality;
-  out.base_colour = code_picture(maps.base_colour, quality);
-  if (maps.choice.orm) out.orm = code_picture(maps.orm, quality - kOrmQualityBelow);
-  if (maps.choice.normal) out.normal = code_picture(maps.normal, quality + kNormalQualityAbove);
-  if (!maps.emission.data.empty()) out.emission = code_picture(maps.emission, quality);
+  out.base_colour = code(kBaseColour, maps.base_colour, quality);
+  if (maps.choice.orm) out.orm = code(kOrm, maps.orm, quality - kOrmQualityBelow);
+  if (maps.choice.normal) out.normal = code(kNormal, maps.normal, quality + kNormalQualityAbove);
+  if (!maps.emission.data.empty()) out.emission = code(kEmission, maps.emission, quality);
   return out;
+}
+
+/// How fine libwebp's steps are at a quality, 0..1; logarithms of bytes grow evenly with it, while they grow
+/// three times as fast with qualities above 75 as with those below.
+double fineness_of(int quality) {
+  const double q = std::max(quality, 1) / 100.0, share = q < 0.75 ? q * 2 / 3 : 2 * q - 1;
+  return portable::exp(portable::log(share) / 3);
+}
+double quality_of(double fineness) {
+  const double share = fineness * fineness * fineness;
+  return 100 * (share < 0.5 ? share * 1.5 : (share + 1) / 2);
 }
 
 }  // namespace
@@ -91,31 +106,37 @@ MapPixels map_pixels(const BakedMaps& maps, const MapChoice& choice) {
   return out;
 }
 
-ProxyPictures code_pictures(const MapPixels& maps, std::size_t max_bytes) {
+ProxyPictures code_pictures(const MapPixels& maps, std::size_t max_bytes, CodedPictures& coded) {
   constexpr int kFirstGuess = 60;
-  constexpr double kFirstSlope = 45, kLeastSlope = 8, kMostSlope = 120;  // qualities for e times the bytes
+  // Finenesses for e times the bytes.
+  constexpr double kFirstSlope = 0.3, kLeastSlope = 0.1, kMostSlope = 1;
   std::optional<ProxyPictures> best;
   double slope = kFirstSlope, last_fill = 0;
   int last_quality = 0;
-  for (int low = kLeastQuality, high = kMostQuality, quality = kFirstGuess; low <= high;) {
-    ProxyPictures coded = code_at(maps, quality);
-    const double fill = portable::log(static_cast<double>(coded.bytes()) /
+  int quality = coded.last_quality > 0 ? coded.last_quality : kFirstGuess;
+  for (int low = kLeastQuality, high = kMostQuality; low <= high;) {
+    ProxyPictures tried = code_at(maps, quality, coded);
+    const double fill = portable::log(static_cast<double>(tried.bytes()) /
                                       static_cast<double>(std::max<std::size_t>(max_bytes, 1)));
+    const double fineness = fineness_of(quality);
     if (last_quality > 0 && fill != last_fill)
-      slope = std::clamp((quality - last_quality) / (fill - last_fill), kLeastSlope, kMostSlope);
+      slope =
+          std::clamp((fineness - fineness_of(last_quality)) / (fill - last_fill), kLeastSlope, kMostSlope);
     last_quality = quality, last_fill = fill;
     if (fill <= 0) {
-      best = std::move(coded);
+      best = std::move(tried);
       if (fill >= kFull) break;
       low = quality + 1;
     } else {
       high = quality - 1;
     }
     // The aim is the middle of what is full enough.
-    const double step = std::floor((kFull / 2 - fill) * slope + 0.5);
-    quality = low <= high ? std::clamp(quality + static_cast<int>(step), low, high) : quality;
+    const double next = quality_of(std::clamp(fineness + (kFull / 2 - fill) * slope, 0.0, 1.0));
+    if (low <= high) quality = std::clamp(static_cast<int>(std::floor(next + 0.5)), low, high);
   }
-  return best ? std::move(*best) : code_at(maps, kLeastQuality);
+  if (!best) best = code_at(maps, kLeastQuality, coded);
+  coded.last_quality = best->quality;
+  return std::move(*best);
 }
 
 }  // namespace texmesh::proxies

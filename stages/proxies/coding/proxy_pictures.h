@@ -1,5 +1,7 @@
 #pragma once
 // Inside the room only: baked maps as pictures of a given size.
+#include <array>
+#include <map>
 #include <vector>
 
 #include "stages/proxies/bake/bake.h"
@@ -25,7 +27,15 @@ struct MapPixels {
 };
 MapPixels map_pixels(const BakedMaps& maps, const MapChoice& choice);
 
-/// All pictures at the highest quality that fits max_bytes; at the lowest where none does.
-ProxyPictures code_pictures(const MapPixels& maps, std::size_t max_bytes);
+/// Pictures of one bake's maps, which are coded once at each quality, and the quality that was chosen last.
+/// Maps of all choices that agree on `orm` may share it.
+struct CodedPictures {
+  std::array<std::map<int, ProxyImage>, 4> images;  // by map, by quality
+  int last_quality = 0;                             // 0 = none
+};
+
+/// All pictures at the highest quality that fits max_bytes, or at one whose pictures take at least 97.5 % of
+/// them; at the lowest where none does.
+ProxyPictures code_pictures(const MapPixels& maps, std::size_t max_bytes, CodedPictures& coded);
 
 }  // namespace texmesh::proxies

@@ -133,7 +133,7 @@ std::optional<BakedProxy> ProxyWorkshop::coded(double mesh_bytes, std::uint32_t 
     out->charted = charted;
     out->atlas = std::move(*atlas);
     out->smooth = sampled_normals(out->atlas, source_, creases_of(form), context);
-    const CodedMesh mesh = coded_mesh(*out, form);
+    const CodedMesh& mesh = out->meshes[form.normals ? 1 : 0].emplace(coded_mesh(*out, form));
     if (mesh.groups.empty()) return std::nullopt;
     const auto bytes = static_cast<double>(mesh.bytes());
     out->mesh_bytes = bytes;
@@ -153,6 +153,7 @@ std::optional<BakedProxy> ProxyWorkshop::bake(double target_bytes, const ProxyFo
   if (side_px >= kWorthPacking * out->atlas.width_px)
     if (auto larger = pack(*out->charted, side_px, context)) {
       out->atlas = std::move(*larger);
+      out->meshes = {};
       out->smooth = sampled_normals(out->atlas, source_, creases_of(form), context);
     }
   const BakeOrder order{kSamples, form.maps.normal};
@@ -160,13 +161,15 @@ std::optional<BakedProxy> ProxyWorkshop::bake(double target_bytes, const ProxyFo
   return out;
 }
 
-std::optional<MadeProxy> ProxyWorkshop::finish(const BakedProxy& baked, std::uint64_t target_bytes,
+std::optional<MadeProxy> ProxyWorkshop::finish(BakedProxy& baked, std::uint64_t target_bytes,
                                                const ProxyForm& form) {
   const std::vector<MaterialGroup>& groups = groups_.groups;
   const MapPixels maps = map_pixels(baked.maps, form.maps);
-  const CodedMesh mesh = coded_mesh(baked, form);
+  std::optional<CodedMesh>& known = baked.meshes[form.normals ? 1 : 0];
+  if (!known) known = coded_mesh(baked, form);
+  const CodedMesh& mesh = *known;
   const double left = static_cast<double>(target_bytes) - frame_bytes(mesh, groups, maps);
-  ProxyPictures pictures = code_pictures(maps, static_cast<std::size_t>(std::max(left, 0.0)));
+  ProxyPictures pictures = code_pictures(maps, static_cast<std::size_t>(std::max(left, 0.0)), baked.pictures);
   pictures.mip_levels = groups_.mip_levels;
   MadeProxy out;
   out.quality = pictures.quality;

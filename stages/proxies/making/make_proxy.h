@@ -46,6 +46,9 @@ struct BakedProxy {
   AtlasMesh atlas;
   SmoothMesh smooth;  // the same with normals
   BakedMaps maps;
+  // What finish() has coded, for the next form.
+  std::array<std::optional<CodedMesh>, 2> meshes;  // without normals, with them
+  CodedPictures pictures;
 };
 
 struct MadeProxy {
@@ -62,9 +65,9 @@ class ProxyWorkshop {
 
   /// Nothing where no triangle is left or charts cannot be packed.
   std::optional<BakedProxy> bake(double target_bytes, const ProxyForm& form, const RunContext& context);
-  /// At most 2 % above `target_bytes`, or nothing. `form` may differ from the one baked for,
-  /// but for a normal map that was not baked.
-  std::optional<MadeProxy> finish(const BakedProxy& baked, std::uint64_t target_bytes, const ProxyForm& form);
+  /// At most 2 % above `target_bytes`, or nothing. `form` may differ from the one baked for by normals, and
+  /// by a normal map where one was baked.
+  std::optional<MadeProxy> finish(BakedProxy& baked, std::uint64_t target_bytes, const ProxyForm& form);
   /// What a size's textures took at their quality says how large those of the next one can be.
   void learn(const MadeProxy& made);
 

@@ -27,23 +27,35 @@ double mesh_bytes(const NestedScales& scales, std::size_t index, std::vector<std
   return kBytesPerWedge * wedges + kBytesPerTriangle * static_cast<double>(scale.triangles.size());
 }
 
-/// Textures without the levels that cost too much.
-std::vector<RenderTexture> affordable(const std::vector<RenderTexture>& textures, double bytes) {
-  std::vector<RenderTexture> out = textures;
-  for (;;) {
+std::size_t kept_from(const RenderTexture& texture, std::size_t dropped) {
+  return std::min(dropped, texture.levels.size() - 1);
+}
+
+/// How many of their finest levels textures are shown without, so that the others cost no more.
+std::size_t affordable(const std::vector<RenderTexture>& textures, double bytes) {
+  for (std::size_t dropped = 0;; ++dropped) {
     double texels = 0;
     bool coarser = false;
-    for (const RenderTexture& t : out) {
-      texels += static_cast<double>(t.levels.front().width_px) * t.levels.front().height_px;
-      coarser = coarser || t.levels.size() > 1;
+    for (const RenderTexture& t : textures) {
+      const Pixels& level = t.levels[kept_from(t, dropped)];
+      texels += static_cast<double>(level.width_px) * level.height_px;
+      coarser = coarser || dropped + 1 < t.levels.size();
     }
-    if (texels * kBitsPerTexel / 8 <= bytes || !coarser) return out;
-    for (RenderTexture& t : out) {
-      if (t.levels.size() < 2) continue;
-      t.levels.erase(t.levels.begin());
-      ++t.first_level;
-    }
+    if (texels * kBitsPerTexel / 8 <= bytes || !coarser) return dropped;
   }
+}
+
+std::vector<RenderTexture> without_finest(const std::vector<RenderTexture>& textures, std::size_t dropped) {
+  std::vector<RenderTexture> out;
+  for (const RenderTexture& t : textures) {
+    const std::size_t from = kept_from(t, dropped);
+    out.push_back({t.width_px,
+                   t.height_px,
+                   t.srgb,
+                   t.first_level + static_cast<std::uint32_t>(from),
+                   {t.levels.begin() + static_cast<std::ptrdiff_t>(from), t.levels.end()}});
+  }
+  return out;
 }
 
 }  // namespace
@@ -61,28 +73,49 @@ bool whole_mesh_is_small(const NestedScales& scales, std::uint64_t bytes) {
   return whole_mesh_bytes(scales) <= share * static_cast<double>(bytes);
 }
 
-bool rival_wins(const NestedScales& scales, const ShownMaterials& shown, std::uint64_t bytes, double flip,
-                ProxyStudio& studio, const RunContext& context) {
-  const double all = std::max(0.0, static_cast<double>(bytes) - kFrameBytes -
-                                       kPictureBytes * static_cast<double>(shown.textures.size()));
+NestedRivals::NestedRivals(const NestedScales& scales, const ShownMaterials& shown, ProxyStudio& studio)
+    : scales_(scales), shown_(shown), studio_(studio) {
   std::vector<std::uint8_t> used;
-  std::vector<double> cost;
-  for (std::size_t k = 0; k < scales.scales.size(); ++k) cost.push_back(mesh_bytes(scales, k, used));
-  std::vector<std::size_t> tried;
+  for (std::size_t k = 0; k < scales.scales.size(); ++k) mesh_bytes_.push_back(mesh_bytes(scales, k, used));
+}
+
+/// The likeliest winners first.
+std::vector<NestedRivals::Rival> NestedRivals::rivals(std::uint64_t bytes) const {
+  const double all = std::max(0.0, static_cast<double>(bytes) - kFrameBytes -
+                                       kPictureBytes * static_cast<double>(shown_.textures.size()));
+  std::vector<Rival> out;
   for (const double share : kMeshShares) {
-    const auto found = std::ranges::find_if(cost, [&](double mesh) { return mesh <= share * all; });
-    const auto index = static_cast<std::size_t>(found - cost.begin());
-    if (found == cost.end() || std::ranges::find(tried, index) != tried.end()) continue;
-    tried.push_back(index);
-    const Mesh mesh = lit_scale(scales, index, context);
-    const std::vector<RenderTexture> textures = affordable(shown.textures, all - cost[index]);
-    const RenderScene scene = render_scene(mesh, shown.materials, textures.size());
-    const double rival =
-        studio.compare(scene, textures, ProxyStudio::kMiddle, context, kFarOff * flip).mean();
-    if (rival <= flip) return true;
-    if (rival > kFarOff * flip) return false;
+    const auto found = std::ranges::find_if(mesh_bytes_, [&](double mesh) { return mesh <= share * all; });
+    const auto index = static_cast<std::size_t>(found - mesh_bytes_.begin());
+    if (found != mesh_bytes_.end() && std::ranges::find(out, index, &Rival::scale) == out.end())
+      out.push_back({index, affordable(shown_.textures, all - mesh_bytes_[index])});
+  }
+  return out;
+}
+
+/// Of half of the views where that is far more than `flip`.
+double NestedRivals::flip_of(const Rival& rival, double flip, const RunContext& context) {
+  if (const auto found = known_.find(rival); found != known_.end()) return found->second;
+  const Mesh mesh = lit_scale(scales_, rival.scale, context);
+  const std::vector<RenderTexture> textures = without_finest(shown_.textures, rival.dropped_levels);
+  const RenderScene scene = render_scene(mesh, shown_.materials, textures.size());
+  const double out = studio_.compare(scene, textures, ProxyStudio::kMiddle, context, kFarOff * flip).mean();
+  if (out <= kFarOff * flip) known_[rival] = out;
+  return out;
+}
+
+bool NestedRivals::win(std::uint64_t bytes, double flip, const RunContext& context) {
+  for (const Rival& rival : rivals(bytes)) {
+    const double its_flip = flip_of(rival, flip, context);
+    if (its_flip <= flip) return true;
+    if (its_flip > kFarOff * flip) return false;
   }
   return false;
+}
+
+bool NestedRivals::likeliest_wins(std::uint64_t bytes, double flip, const RunContext& context) {
+  const std::vector<Rival> all = rivals(bytes);
+  return !all.empty() && flip_of(all.front(), flip, context) <= flip;
 }
 
 }  // namespace texmesh::proxies

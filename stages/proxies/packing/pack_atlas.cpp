@@ -41,6 +41,17 @@ Vec2d turned(Vec2d p, Vec2d box, std::uint32_t quarter_turns) {
   return p;
 }
 
+/// A chart at the scale in hand, turned by quarters.
+struct ScaledChart {
+  PlacedChart box;                 // without a place
+  std::array<ChartMask, 4> masks;  // by quarter turns, so many as are made
+  std::size_t made = 0;            // 0: too large
+  const ChartMask& mask(std::size_t turns) {
+    for (; made <= turns; ++made) masks[made] = quarter_turned(masks[made - 1]);
+    return masks[turns];
+  }
+};
+
 class AtlasPacking {
  public:
   AtlasPacking(const SurfaceCharts& charts, TextureSize size);
@@ -62,6 +73,7 @@ class AtlasPacking {
   bool place_in_order(const std::vector<std::uint32_t>& order, double scale, const RunContext& context);
   Vec2d in_box(std::size_t corner, Vec2d box) const;
   ChartMask mask_at(std::uint32_t chart, const PlacedChart& at) const;
+  ScaledChart& scaled(std::uint32_t chart, double scale);
   bool place(std::uint32_t chart, PackingGrid& grid, double scale, std::uint64_t& room);
 
   const SurfaceCharts& charts_;
@@ -70,6 +82,7 @@ class AtlasPacking {
   double area_ = 0;
   std::vector<std::vector<std::uint32_t>> orders_;     // of charts, to try
   std::vector<std::vector<std::uint32_t>> triangles_;  // per chart
+  std::vector<ScaledChart> scaled_;                    // orders share them
   std::vector<PlacedChart> placed_;
 };
 
@@ -122,38 +135,50 @@ ChartMask AtlasPacking::mask_at(std::uint32_t chart, const PlacedChart& at) cons
   return mask_of(flat, cells(at.width_px), cells(at.height_px));
 }
 
-bool AtlasPacking::place(std::uint32_t chart, PackingGrid& grid, double scale, std::uint64_t& room) {
+ScaledChart& AtlasPacking::scaled(std::uint32_t chart, double scale) {
+  ScaledChart& out = scaled_[chart];
+  if (out.made > 0) return out;
   // A box of whole texels wastes none on its border. That changes the density of small charts a little.
-  const auto texels = [&](double size) { return std::max(1.0, std::round(size * scale)); };
-  const Vec2d box{texels(charts_.size[chart].x), texels(charts_.size[chart].y)};
+  const auto texels = [&](double size) {
+    constexpr double kMost = 1e6;  // more than any texture has
+    return static_cast<std::uint32_t>(std::clamp(std::round(size * scale), 1.0, kMost));
+  };
+  out.box = {0, 0, texels(charts_.size[chart].x), texels(charts_.size[chart].y), 0};
   const std::uint32_t longest_px = std::max(size_.width_px, size_.height_px);
-  if (box.x > longest_px || box.y > longest_px) return false;
+  if (out.box.width_px > longest_px || out.box.height_px > longest_px) return out;
+  out.masks[0] = mask_at(chart, out.box);
+  out.made = 1;
+  return out;
+}
+
+bool AtlasPacking::place(std::uint32_t chart, PackingGrid& grid, double scale, std::uint64_t& room) {
+  ScaledChart& chart_here = scaled(chart, scale);
+  if (chart_here.made == 0) return false;
+  const std::uint64_t cells = chart_here.masks[0].cell_count();
+  if (cells > room) return false;
+  room -= cells;
   PlacedChart& at = placed_[chart];
-  at = {0, 0, static_cast<std::uint32_t>(box.x), static_cast<std::uint32_t>(box.y), 0};
-  ChartMask mask = mask_at(chart, at);
-  if (mask.cell_count() > room) return false;
-  room -= mask.cell_count();
+  at = chart_here.box;
   std::uint32_t least_bottom = kNoIndex;
   PackingGrid::Place best;
-  ChartMask best_mask;
   for (std::uint32_t turns = 0; turns < 4; ++turns) {
-    if (turns > 0) mask = quarter_turned(mask);
+    const ChartMask& mask = chart_here.mask(turns);
     if (mask.height >= least_bottom) continue;
     const auto found = grid.first_free(mask, least_bottom - mask.height - 1);
     if (!found) continue;
     least_bottom = found->y + mask.height;
     best = *found;
-    best_mask = mask;
     at.quarter_turns = turns;
   }
   if (least_bottom == kNoIndex) return false;
-  grid.take(best_mask, best);
+  grid.take(chart_here.mask(at.quarter_turns), best);
   at.x_px = best.x * cell_px_;
   at.y_px = best.y * cell_px_;
   return true;
 }
 
 bool AtlasPacking::place_all(double scale, const RunContext& context) {
+  scaled_.assign(charts_.chart_count, {});
   return std::any_of(orders_.begin(), orders_.end(),
                      [&](const auto& order) { return place_in_order(order, scale, context); });
 }

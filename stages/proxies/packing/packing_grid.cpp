@@ -8,7 +8,7 @@
 namespace texmesh {
 namespace {
 
-/// out[x] |= in[x + offset]; rows of `words` words with one word of 0 behind them, in == out allowed.
+/// out[x] |= in[x + offset]; `in` has one word of 0 behind its `words`.
 void join_moved(const std::uint64_t* in, std::uint64_t* out, std::uint32_t words, std::uint32_t offset) {
   const std::uint32_t whole = offset / 64, part = offset % 64;
   in += whole;
@@ -29,19 +29,29 @@ PackingGrid::PackingGrid(std::uint32_t width, std::uint32_t height, std::uint32_
       height_(height),
       gutter_(gutter),
       words_((width + 63) / 64),
-      taken_(std::size_t{height} * words_, 0),
+      powers_(static_cast<std::uint32_t>(std::bit_width(width))),
+      taken_(std::size_t{height} * powers_ * (words_ + 1), 0),
+      made_(height, 1),
       gaps_(height, width),
-      forbidden_(words_),
-      joined_(words_ + 1) {}
+      forbidden_(words_) {}
 
-void PackingGrid::forbid_run(const std::uint64_t* taken, const ChartMask::Run& run) {
-  std::copy(taken, taken + words_, joined_.begin());
-  for (std::uint32_t length = 1; length < run.count;) {  // joined_ holds offsets 0 .. length - 1
-    const std::uint32_t step = std::min(length, run.count - length);
-    join_moved(joined_.data(), joined_.data(), words_, step);
-    length += step;
+/// The row's taken cells at the offsets 0 .. 2^power - 1.
+const std::uint64_t* PackingGrid::joined(std::uint32_t y, std::uint32_t power) {
+  for (; made_[y] <= power; ++made_[y]) {
+    const std::uint64_t* half = row(y, made_[y] - 1u);
+    std::uint64_t* whole = row(y, made_[y]);
+    std::copy(half, half + words_, whole);
+    join_moved(half, whole, words_, 1u << (made_[y] - 1u));
   }
-  join_moved(joined_.data(), forbidden_.data(), words_, run.first);
+  return row(y, power);
+}
+
+void PackingGrid::forbid_run(std::uint32_t y, const ChartMask::Run& run) {
+  const auto power = static_cast<std::uint32_t>(std::bit_width(run.count)) - 1;
+  const std::uint64_t* from = joined(y, power);
+  join_moved(from, forbidden_.data(), words_, run.first);
+  if (const std::uint32_t rest = run.count - (1u << power); rest > 0)
+    join_moved(from, forbidden_.data(), words_, run.first + rest);
 }
 
 /// False where a run finds no gap of its length.
@@ -64,7 +74,7 @@ bool PackingGrid::forbid(std::span<const ChartMask::Run> runs, std::uint32_t wid
   std::fill(forbidden_.begin(), forbidden_.end(), 0);
   set_bits(forbidden_.data(), width_ - width + 1, 64 * words_);
   for (const ChartMask::Run& run : runs) {
-    forbid_run(row(y + run.row), run);
+    forbid_run(y + run.row, run);
     if (std::all_of(forbidden_.begin(), forbidden_.end(), [](std::uint64_t w) { return w == ~0ull; }))
       return false;
   }
@@ -89,7 +99,7 @@ void PackingGrid::take(const ChartMask& mask, Place place) {
     const std::uint32_t x = place.x + run.first, y = place.y + run.row;
     const std::uint32_t first = x - std::min(x, gutter_), end = std::min(width_, x + run.count + gutter_);
     for (std::uint32_t r = y - std::min(y, gutter_); r < std::min(height_, y + gutter_ + 1); ++r)
-      set_bits(row(r), first, end);
+      set_bits(row(r), first, end), made_[r] = 1;
   }
   const std::uint32_t end = std::min(height_, place.y + mask.height + gutter_);
   for (std::uint32_t r = place.y - std::min(place.y, gutter_); r < end; ++r) gaps_[r] = widest_gap(r);

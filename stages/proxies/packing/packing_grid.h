@@ -10,7 +10,8 @@
 namespace texmesh {
 
 /// A bitmap that charts are put on. 64 places are tried at once: the places of a row that a run of cells
-/// forbids are the row's taken cells, moved by each of the run's offsets and joined.
+/// forbids are the row's taken cells, moved by each of the run's offsets and joined. Rows are kept joined
+/// over 1, 2, 4, ... offsets, so two of these make those of any run.
 class PackingGrid {
  public:
   PackingGrid(std::uint32_t width, std::uint32_t height, std::uint32_t gutter);
@@ -27,14 +28,20 @@ class PackingGrid {
  private:
   bool may_hold(std::span<const ChartMask::Run> runs, std::uint32_t y) const;
   bool forbid(std::span<const ChartMask::Run> runs, std::uint32_t width, std::uint32_t y);
-  void forbid_run(const std::uint64_t* taken, const ChartMask::Run& run);
+  void forbid_run(std::uint32_t y, const ChartMask::Run& run);
+  const std::uint64_t* joined(std::uint32_t y, std::uint32_t power);
   std::uint32_t widest_gap(std::uint32_t y);
-  std::uint64_t* row(std::uint32_t y) { return &taken_[std::size_t{y} * words_]; }
+  std::uint64_t* row(std::uint32_t y, std::uint32_t power = 0) {
+    return &taken_[(std::size_t{y} * powers_ + power) * (words_ + 1)];
+  }
 
-  std::uint32_t width_, height_, gutter_, words_;
-  std::vector<std::uint64_t> taken_;               // rows of words; bit x % 64 of word x / 64
-  std::vector<std::uint32_t> gaps_;                // per row: free cells side by side, at most
-  std::vector<std::uint64_t> forbidden_, joined_;  // one row each
+  std::uint32_t width_, height_, gutter_, words_, powers_;
+  // Per row: its words, bit x % 64 of word x / 64, and one word of 0; then the same for x or x + 1, for x to
+  // x + 3, and so on.
+  std::vector<std::uint64_t> taken_;
+  std::vector<std::uint8_t> made_;        // per row: how many of these are up to date
+  std::vector<std::uint32_t> gaps_;       // per row: free cells side by side, at most
+  std::vector<std::uint64_t> forbidden_;  // one row
 };
 
 }  // namespace texmesh

@@ -76,6 +76,37 @@ TEST(TriangleTree, AGuessChangesNothing) {
   EXPECT_GT(hits, 200u);
 }
 
+/// What a look at every triangle finds, far from 0 and along the axes as well.
+TEST(TriangleTree, ALineMissesNoTriangle) {
+  const Mesh mesh = testing::even_sphere(4, 0.2);
+  for (const Vec3d moved : {Vec3d{}, Vec3d{3000, -70, 0.5}}) {
+    std::vector<Vec3d> points;
+    for (const Vec3f p : mesh.positions) points.push_back(to_double(p) + moved);
+    const TriangleTree tree(points, mesh.triangles);
+    std::vector<TriangleTree> alone;
+    for (const Triangle& t : mesh.triangles) alone.emplace_back(points, std::vector{t});
+    testing::Random random{7};
+    for (int i = 0; i < 300; ++i) {
+      const Vec3d p{random.uniform() * 2 - 1, random.uniform() * 2 - 1, random.uniform() * 2 - 1};
+      const Vec3d towards = i % 3 == 0 ? Vec3d{0, i % 2 ? 1. : -1., 0} : normalized(p);
+      const TriangleTree::Facing facing{towards, -0.5};
+      const auto found = tree.crossing(p + moved, towards, 0.4, facing, std::nullopt);
+      std::optional<std::uint32_t> expected;
+      double least = 0.4;
+      for (std::uint32_t t = 0; t < alone.size(); ++t) {
+        const auto one = alone[t].crossing(p + moved, towards, 0.4, facing, std::nullopt);
+        if (!one) continue;
+        Vec3d place;
+        for (std::size_t k = 0; k < 3; ++k) place = place + points[mesh.triangles[t][k]] * one->weight[k];
+        const double distance = length(place - p - moved);
+        if (distance < least) least = distance, expected = t;
+      }
+      ASSERT_EQ(found.has_value(), expected.has_value()) << i;
+      if (found) EXPECT_EQ(found->triangle, *expected) << i;
+    }
+  }
+}
+
 TEST(TriangleTree, TheNearestPointLooksTheSameWay) {
   const Soup soup = squares({{0.1, false}, {-2, true}});
   const TriangleTree tree(soup.points, soup.triangles);

@@ -34,6 +34,11 @@ BakedMaps noise_maps(std::uint32_t side_px, bool alpha) {
   return out;
 }
 
+ProxyPictures pictures_of(const MapPixels& maps, std::size_t most_bytes) {
+  CodedPictures coded;
+  return code_pictures(maps, most_bytes, coded);
+}
+
 const std::vector<Vec3f> kUp(4, Vec3f{0, 0, 1});
 
 std::string json_of(const Bytes& glb) {
@@ -50,7 +55,7 @@ GlbFacts checked(const Bytes& glb) {
 TEST(ProxyGlb, StandsAloneWithItsPictures) {
   const AtlasMesh atlas = testing::square_atlas(32);
   const CodedMesh mesh = code_mesh(atlas, kUp, {true}, {});
-  const ProxyPictures pictures = code_pictures(map_pixels(noise_maps(32, false), {true, true}), 6000);
+  const ProxyPictures pictures = pictures_of(map_pixels(noise_maps(32, false), {true, true}), 6000);
   const Bytes glb = proxy_glb(mesh, {MaterialGroup{}}, pictures);
   const GlbFacts facts = checked(glb);
   EXPECT_EQ(facts.triangles, 2u);
@@ -73,7 +78,7 @@ TEST(ProxyGlb, DracosMeshIsTheSameInFloats) {
   ASSERT_EQ(mesh.groups.size(), 1u);
   EXPECT_TRUE(mesh.groups[0].is_draco());
   const Bytes glb =
-      proxy_glb(mesh, {MaterialGroup{}}, code_pictures(map_pixels(noise_maps(32, false), {}), 6000));
+      proxy_glb(mesh, {MaterialGroup{}}, pictures_of(map_pixels(noise_maps(32, false), {}), 6000));
   const GlbFacts facts = checked(glb);
   EXPECT_EQ(facts.codec, "draco");
   EXPECT_EQ(facts.triangles, 2u);
@@ -106,7 +111,7 @@ TEST(ProxyGlb, GroupsAreMaterialsOverTheSamePictures) {
   const CodedMesh mesh = code_mesh(atlas, kUp, {true, false}, {});
   ASSERT_EQ(mesh.groups.size(), 2u);
   EXPECT_FALSE(mesh.groups[1].has_normals) << "an unlit material needs no normals";
-  const Bytes glb = proxy_glb(mesh, groups, code_pictures(map_pixels(noise_maps(16, true), {}), 100000));
+  const Bytes glb = proxy_glb(mesh, groups, pictures_of(map_pixels(noise_maps(16, true), {}), 100000));
   EXPECT_EQ(checked(glb).primitives, 2u);
   const std::string json = json_of(glb);
   for (const char* part : {"MASK", "doubleSided", "KHR_materials_unlit", "EXT_texture_webp"})
@@ -116,13 +121,30 @@ TEST(ProxyGlb, GroupsAreMaterialsOverTheSamePictures) {
 TEST(ProxyPictures, FillTheBytesAndNoMore) {
   const MapPixels maps = map_pixels(noise_maps(128, false), {true, true});
   for (const std::size_t bytes : {30000u, 50000u}) {
-    const ProxyPictures pictures = code_pictures(maps, bytes);
+    const ProxyPictures pictures = pictures_of(maps, bytes);
     EXPECT_LE(pictures.bytes(), bytes);
     EXPECT_GT(pictures.bytes(), bytes * 9 / 10);
   }
-  const std::size_t least = code_pictures(maps, 0).bytes();
+  const std::size_t least = pictures_of(maps, 0).bytes();
   EXPECT_GT(least, 0u);
   EXPECT_LT(least, 30000u);
+}
+
+TEST(ProxyPictures, ASecondChoiceTakesOverWhatTheFirstHasCoded) {
+  const BakedMaps maps = noise_maps(128, false);
+  CodedPictures coded;
+  const ProxyPictures all = code_pictures(map_pixels(maps, {true, true}), 30000, coded);
+  const std::size_t first = coded.images[0].size(), normals = coded.images[2].size();
+  const ProxyPictures less = code_pictures(map_pixels(maps, {true, false}), 30000, coded);
+  EXPECT_LE(less.bytes(), 30000u);
+  EXPECT_GT(less.bytes(), 28000u);
+  EXPECT_GT(less.quality, all.quality);
+  EXPECT_FALSE(less.normal);
+  EXPECT_EQ(coded.images[2].size(), normals);
+  EXPECT_LE(first, 4u) << "encodes of a search";
+  EXPECT_LE(coded.images[0].size(), first + 3);
+  const MapPixels pixels = map_pixels(maps, {true, false});
+  EXPECT_EQ(less.base_colour.file, encode_webp(pixels.base_colour, less.quality));
 }
 
 TEST(ProxyPictures, HalfOfTheOcclusionIsInTheColourWhereItHasNoMap) {
@@ -138,7 +160,7 @@ TEST(ProxyPictures, AMapOfOneValueIsAFactor) {
   BakedMaps maps = noise_maps(8, false);
   maps.mean_orm = maps.least_orm = maps.most_orm = {1, 0.4f, 0.3f};
   for (Vec3f& orm : maps.occlusion_roughness_metallic) orm = maps.mean_orm;
-  const ProxyPictures pictures = code_pictures(map_pixels(maps, {true, false}), 100000);
+  const ProxyPictures pictures = pictures_of(map_pixels(maps, {true, false}), 100000);
   EXPECT_FALSE(pictures.orm);
   EXPECT_EQ(pictures.roughness, 0.4f);
 }

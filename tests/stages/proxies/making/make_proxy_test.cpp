@@ -33,7 +33,7 @@ TEST(SurfaceLadder, GivesTheFinestSurfaceThatIsCoarseEnough) {
 }
 
 std::optional<MadeProxy> make(Workshop& w, int bytes, const ProxyForm& form) {
-  const auto baked = w.shop.bake(bytes, form, {});
+  auto baked = w.shop.bake(bytes, form, {});
   return baked ? w.shop.finish(*baked, static_cast<std::uint64_t>(bytes), form) : std::nullopt;
 }
 

@@ -43,23 +43,37 @@ TEST(WholeMesh, OfAnAtlasInPiecesIsSmallLater) {
   EXPECT_TRUE(whole_mesh_is_small(scales, static_cast<std::uint64_t>(7 * bytes)));
 }
 
-struct RivalWins : ::testing::Test {
+struct Rivals : ::testing::Test {
   NestedScales scales = alone(testing::bumpy_sphere(20, 40));
   ShownMaterials shown{{RenderMaterial{}}, {}};
   ProxyStudio studio{scales.mesh, shown};
+  NestedRivals rivals{scales, shown, studio};
 };
 
-TEST_F(RivalWins, WithoutAnyLossWhereTheWholeMeshFits) {
-  EXPECT_TRUE(rival_wins(scales, shown, 30000, 0, studio, {}));
+TEST_F(Rivals, WinWithoutAnyLossWhereTheWholeMeshFits) { EXPECT_TRUE(rivals.win(30000, 0, {})); }
+
+TEST_F(Rivals, NeverWinWhereTheirPicturesAreFartherOff) { EXPECT_FALSE(rivals.win(30000, -1e-9, {})); }
+
+TEST_F(Rivals, NeverWinWhereNoScaleFits) {
+  EXPECT_FALSE(rivals.win(4000, 1, {}));
+  EXPECT_FALSE(rivals.win(0, 1, {}));
 }
 
-TEST_F(RivalWins, NeverWhereItsPicturesAreFartherOff) {
-  EXPECT_FALSE(rival_wins(scales, shown, 30000, -1e-9, studio, {}));
+TEST_F(Rivals, TheLikeliestSpeaksForAll) {
+  EXPECT_TRUE(rivals.likeliest_wins(30000, 0, {}));
+  EXPECT_FALSE(rivals.likeliest_wins(30000, -1e-9, {}));
+  EXPECT_FALSE(rivals.likeliest_wins(4000, 1, {}));
 }
 
-TEST_F(RivalWins, NeverWhereNoScaleFits) {
-  EXPECT_FALSE(rival_wins(scales, shown, 4000, 1, studio, {}));
-  EXPECT_FALSE(rival_wins(scales, shown, 0, 1, studio, {}));
+/// What was compared with one proxy is known for the next, and half of the views are not taken for all.
+TEST_F(Rivals, ManyQuestionsHaveTheAnswersOfOne) {
+  NestedScales coarse = alone(testing::sphere(6, 9));  // stands for S_0 and does not look like it
+  const auto asked = [&](NestedRivals& of, double flip) { return of.win(30000, flip, {}); };
+  NestedRivals all(coarse, shown, studio);
+  for (const double flip : {1e-4, 0.02, 0.05, 0.1, 0.5, 1e-4}) {
+    NestedRivals one(coarse, shown, studio);
+    EXPECT_EQ(asked(all, flip), asked(one, flip)) << flip;
+  }
 }
 
 }  // namespace

@@ -65,8 +65,9 @@ TEST(ProxyStudio, AProxyIsShownAsItsFileSaysIt) {
   maps.most_orm = {1, 0.5f, 0.75f};
   const MaterialGroup group{false, true, AlphaMode::kOpaque};
   const auto shown = [&](const MapChoice& choice) {
+    CodedPictures coded;
     return shown_proxy(atlas, rounded_mesh(atlas, std::vector<Vec3f>(3, {0, 0, 1}), {}), {group},
-                       code_pictures(map_pixels(maps, choice), 100000));
+                       code_pictures(map_pixels(maps, choice), 100000, coded));
   };
   const ShownModel plain = shown({false, false});
   ASSERT_EQ(plain.shown.materials.size(), 1u);
