@@ -18,10 +18,12 @@ namespace {
 constexpr int kMostThreads = 4;  // stages side by side: each has threads of its own
 
 /// What a stage has freed goes back to the system: the next stages ask for blocks of other sizes, and would
-/// find no place between those that are left (126 MB on a saxophone).
+/// find no place between those that are left (126 MB on a saxophone). A few are kept: fetching pages back
+/// takes a small model longer.
 void return_free_memory() {
 #ifdef __GLIBC__
-  ::malloc_trim(0);
+  constexpr std::size_t kKeptBytes = std::size_t{16} << 20;
+  if (::mallinfo2().fordblks > kKeptBytes) ::malloc_trim(0);
 #endif
 }
 }  // namespace

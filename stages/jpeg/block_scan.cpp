@@ -94,7 +94,17 @@ void CoveredTexels::load(const PixelWindow& window) {
     }
 }
 
+BlockValues CoveredTexels::texels(std::uint32_t left, std::uint32_t top) const {
+  BlockValues out;
+  for (std::uint32_t y = 0; y < 8; ++y) {
+    const unsigned row = bits_[std::size_t{top + y} * (width_px_ / 8) + left / 8];
+    for (std::uint32_t x = 0; x < 8; ++x) out[8 * y + x] = static_cast<float>(row >> (7 - x) & 1);
+  }
+  return out;
+}
+
 BlockValues CoveredTexels::weights(SampleFactors factors, std::uint32_t left, std::uint32_t top) const {
+  if (factors.across == 1 && factors.down == 1) return texels(left, top);
   constexpr std::uint32_t kMostRows = 8 * 4 + 4;
   const std::uint32_t first = reach_begin(top, factors.down);
   const std::uint32_t end = reach_end(top + 7, factors.down, height_px_);

@@ -69,6 +69,8 @@ class CoveredTexels {
   BlockCoverage block(SampleFactors factors, std::uint32_t left, std::uint32_t top) const;
 
  private:
+  /// at() of the block at (left, top), a multiple of 8.
+  BlockValues texels(std::uint32_t left, std::uint32_t top) const;
   std::uint32_t width_px_ = 0, height_px_ = 0;
   std::vector<std::uint8_t> bits_;  // rows of width / 8 bytes, bit 7 first
 };

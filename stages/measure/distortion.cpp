@@ -26,12 +26,15 @@ DistortionMeter::DistortionMeter(std::vector<std::uint8_t> source, std::vector<s
   for (std::size_t k = 0; k < source_.size(); ++k) source_[k] &= mask_[k];
   cells_.resize(std::size_t{columns_} * rows_);
   for (std::size_t y = 0; y < height; ++y)
-    for (std::size_t x = 0; x < width_; ++x) {
-      SourceCell& cell = cells_[y / 4 * columns_ + x / 4];
-      const std::uint32_t value = source_[y * width_ + x];
-      cell.count += mask_[y * width_ + x] & 1;
-      cell.sum += value;
-      cell.square += value * value;
+    for (std::size_t c = 0; c < columns_; ++c) {
+      SourceCell cell = cells_[y / 4 * columns_ + c];
+      for (std::size_t x = y * width_ + 4 * c; x < y * width_ + 4 * c + 4; ++x) {
+        const std::uint32_t value = source_[x];
+        cell.count += mask_[x] & 1;
+        cell.sum += value;
+        cell.square += value * value;
+      }
+      cells_[y / 4 * columns_ + c] = cell;
     }
 }
 

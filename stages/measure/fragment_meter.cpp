@@ -9,6 +9,24 @@
 namespace texmesh {
 namespace {
 
+/// Channel `c` of `measured` of a row of texels.
+template <std::size_t kChannels>
+void measure_row(const std::uint8_t* texels, std::size_t count, std::size_t measured, std::size_t c,
+                 std::uint8_t* to) {
+  if (kChannels == 1 || measured > 1)
+    for (std::size_t i = 0; i < count; ++i) to[i] = texels[kChannels * i + c];
+  else
+    for (std::size_t i = 0; i < count; ++i) to[i] = measured_value(texels + kChannels * i, kChannels, 1, 0);
+}
+void measure_row(const std::uint8_t* texels, std::size_t channels, std::size_t count, std::size_t measured,
+                 std::size_t c, std::uint8_t* to) {
+  const auto rows = channels == 1   ? measure_row<1>
+                    : channels == 2 ? measure_row<2>
+                    : channels == 3 ? measure_row<3>
+                                    : measure_row<4>;
+  rows(texels, count, measured, c, to);
+}
+
 bool varies(const std::vector<std::uint8_t>& values, const std::vector<std::uint8_t>& mask) {
   std::uint8_t low = 255, high = 0;
   for (std::size_t i = 0; i < values.size(); ++i) {
@@ -31,11 +49,8 @@ Samples rectangle_samples(const TexturePlane& plane, const Pixels& pixels, const
   for (std::size_t c = 0; c < measured; ++c) {
     out[c].resize(std::size_t{rectangle.width_px} * rectangle.height_px);
     std::uint8_t* to = out[c].data();
-    for (std::uint32_t y = rectangle.top_px; y < rectangle.bottom_px(); ++y) {
-      const std::uint8_t* texel = pixels.at(rectangle.left_px, y);
-      for (std::uint32_t x = 0; x < rectangle.width_px; ++x, texel += pixels.channels)
-        *to++ = measured_value(texel, pixels.channels, measured, c);
-    }
+    for (std::uint32_t y = rectangle.top_px; y < rectangle.bottom_px(); ++y, to += rectangle.width_px)
+      measure_row(pixels.at(rectangle.left_px, y), pixels.channels, rectangle.width_px, measured, c, to);
   }
   return out;
 }
@@ -55,8 +70,7 @@ Samples split_samples(const Pixels& pixels, std::size_t measured) {
   if (pixels.channels == 1) return {pixels.data};
   Samples out(measured, std::vector<std::uint8_t>(texels));
   for (std::size_t c = 0; c < measured; ++c)
-    for (std::size_t i = 0; i < texels; ++i)
-      out[c][i] = measured_value(pixels.data.data() + i * pixels.channels, pixels.channels, measured, c);
+    measure_row(pixels.data.data(), pixels.channels, texels, measured, c, out[c].data());
   return out;
 }
 
