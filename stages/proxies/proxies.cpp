@@ -183,8 +183,8 @@ class ProxyRun {
     return rivals_.win(static_cast<std::uint64_t>(rival_bytes), flip, context);
   }
 
-  /// Whether a scale is farther ahead of the last size than a larger proxy has ever come: with the power .45
-  /// of the bytes FLIP falls on average, of nine scans at most with .63.
+  /// Whether a scale is farther ahead of the last size than this one can come. FLIP falls with a power of the
+  /// bytes: of six scans on average .4, at most .63.
   bool cannot_win(int bytes, const RunContext& context) {
     constexpr double kMostPower = 0.75;
     if (mode_ != ProxyMode::kAuto || !(last_.bytes > 0)) return false;

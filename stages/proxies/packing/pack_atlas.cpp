@@ -59,7 +59,7 @@ class AtlasPacking {
   /// Texels per object unit where the charts would cover the share of the texture.
   double scale_of(double cover) const;
   std::size_t order_count() const { return orders_.size(); }
-  /// Whether all charts fit in one of the orders; then placed() is theirs.
+  /// Whether all charts fit in that order; then placed() is theirs.
   bool place_all(double scale, std::size_t order, const RunContext& context);
   const std::vector<PlacedChart>& placed() const { return placed_; }
   /// A corner's texel coordinates.
