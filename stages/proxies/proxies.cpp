@@ -167,10 +167,13 @@ class ProxyRun {
                const RunContext& context) {
     std::optional<MadeProxy> made = shop_.finish(baked, bytes, form);
     if (!made) return;
-    const FlipSum flip = studio_.at_middle(made->shown, context);
     // Facets of a smooth object must be worth it. Another's normals, which stand for its own facets, are to
     // be more than noise.
     const double worth = form.normals ? 1 : smooth_ ? 1.04 : 0.995;
+    // After half of the views.
+    constexpr double kFarOff = 1.15, kNoise = 0.005;
+    const double hopeless = best.made ? kFarOff * best.flip.mean() / worth + kNoise : 1;
+    const FlipSum flip = studio_.at_middle(made->shown, context, hopeless);
     if (!best.made || flip.mean() * worth < best.flip.mean()) best = {std::move(made), form, flip};
   }
 
@@ -180,8 +183,8 @@ class ProxyRun {
     return rivals_.win(static_cast<std::uint64_t>(rival_bytes), flip, context);
   }
 
-  /// Whether a scale is farther ahead of the last size than a larger proxy has ever come: with the power .45
-  /// of the bytes FLIP falls on average, of nine scans at most with .63.
+  /// Whether a scale is farther ahead of the last size than this one can come. FLIP falls with a power of the
+  /// bytes: of six scans on average .4, at most .63.
   bool cannot_win(int bytes, const RunContext& context) {
     constexpr double kMostPower = 0.75;
     if (mode_ != ProxyMode::kAuto || !(last_.bytes > 0)) return false;

@@ -50,8 +50,9 @@ struct ProxiesOptions {
 ///   heights, where the height is that of the bounding box's longest side; four views, at the largest two.
 /// - Automatic choice: a size at which a scale with the source's atlas looks better is left out, each size by
 ///   itself. The smallest one is compared with scales of 55 % of its bytes, in which Draco codes as much, and
-///   it stays where a larger one does, which clients cannot show at once. All of them take at most 15 % of
-///   the source: of its images' files and of S_0's mesh, coded.
+///   it stays where a larger one does, which clients cannot show at once. A size is not tried at all where
+///   the likeliest scale is farther ahead of the last size than proxies come by their bytes. All of them take
+///   at most 15 % of the source: of its images' files and of S_0's mesh, coded.
 /// Sizes that get no proxy have a note that says why; no model fails because of its proxies. `pixels` are
 /// fill_planes()'s. Same bytes for any thread count and machine.
 Proxies make_proxies(const NestedScales& scales, const std::vector<Material>& materials,

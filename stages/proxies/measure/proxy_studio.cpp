@@ -102,9 +102,9 @@ FlipSum ProxyStudio::compare(const RenderScene& scene, const std::vector<RenderT
   return sum;
 }
 
-FlipSum ProxyStudio::at_middle(const ShownModel& model, const RunContext& context) {
+FlipSum ProxyStudio::at_middle(const ShownModel& model, const RunContext& context, double hopeless) {
   const RenderScene scene = render_scene(model.mesh, model.shown.materials, model.shown.textures.size());
-  return compare(scene, model.shown.textures, kMiddle, context);
+  return compare(scene, model.shown.textures, kMiddle, context, hopeless);
 }
 
 std::vector<ProxyPictureLoss> ProxyStudio::losses(const ShownModel& model, const FlipSum& middle,

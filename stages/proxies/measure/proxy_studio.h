@@ -34,7 +34,7 @@ class ProxyStudio {
   /// their mean is more than `hopeless`.
   FlipSum compare(const RenderScene& scene, const std::vector<RenderTexture>& textures, std::size_t size,
                   const RunContext& context, double hopeless = 1);
-  FlipSum at_middle(const ShownModel& model, const RunContext& context);
+  FlipSum at_middle(const ShownModel& model, const RunContext& context, double hopeless = 1);
   /// At all of them, of which the middle one is known.
   std::vector<ProxyPictureLoss> losses(const ShownModel& model, const FlipSum& middle,
                                        const RunContext& context);

@@ -58,8 +58,9 @@ class AtlasPacking {
 
   /// Texels per object unit where the charts would cover the share of the texture.
   double scale_of(double cover) const;
-  /// Whether all charts fit; then placed() is theirs.
-  bool place_all(double scale, const RunContext& context);
+  std::size_t order_count() const { return orders_.size(); }
+  /// Whether all charts fit in that order; then placed() is theirs.
+  bool place_all(double scale, std::size_t order, const RunContext& context);
   const std::vector<PlacedChart>& placed() const { return placed_; }
   /// A corner's texel coordinates.
   Vec2d texel(std::size_t corner, const PlacedChart& at) const {
@@ -70,7 +71,6 @@ class AtlasPacking {
 
  private:
   void add_order(double (*size_of)(Vec2d box));
-  bool place_in_order(const std::vector<std::uint32_t>& order, double scale, const RunContext& context);
   Vec2d in_box(std::size_t corner, Vec2d box) const;
   ChartMask mask_at(std::uint32_t chart, const PlacedChart& at) const;
   ScaledChart& scaled(std::uint32_t chart, double scale);
@@ -82,7 +82,8 @@ class AtlasPacking {
   double area_ = 0;
   std::vector<std::vector<std::uint32_t>> orders_;     // of charts, to try
   std::vector<std::vector<std::uint32_t>> triangles_;  // per chart
-  std::vector<ScaledChart> scaled_;                    // orders share them
+  double scale_ = -1;                                  // of scaled_
+  std::vector<ScaledChart> scaled_;
   std::vector<PlacedChart> placed_;
 };
 
@@ -177,43 +178,42 @@ bool AtlasPacking::place(std::uint32_t chart, PackingGrid& grid, double scale, s
   return true;
 }
 
-bool AtlasPacking::place_all(double scale, const RunContext& context) {
-  scaled_.assign(charts_.chart_count, {});
-  return std::any_of(orders_.begin(), orders_.end(),
-                     [&](const auto& order) { return place_in_order(order, scale, context); });
-}
-
-bool AtlasPacking::place_in_order(const std::vector<std::uint32_t>& order, double scale,
-                                  const RunContext& context) {
+bool AtlasPacking::place_all(double scale, std::size_t order, const RunContext& context) {
+  if (scale != scale_) scaled_.assign(charts_.chart_count, {});
+  scale_ = scale;
   const std::uint32_t width = size_.width_px / cell_px_, height = size_.height_px / cell_px_;
   if (width == 0 || height == 0) return false;
   PackingGrid grid(width, height, (size_.gutter_px + cell_px_ - 1) / cell_px_);
   std::uint64_t room = std::uint64_t{width} * height;
-  return std::all_of(order.begin(), order.end(), [&](std::uint32_t chart) {
+  return std::ranges::all_of(orders_[order], [&](std::uint32_t chart) {
     context.check_cancelled();
     return place(chart, grid, scale, room);
   });
 }
 
-/// The placement of the largest scale found.
+/// The placement of the largest scale found: by the first order, then by the others as far as they are
+/// better.
 std::optional<std::vector<PlacedChart>> pack_largest(AtlasPacking& packing, const RunContext& context) {
+  std::vector<PlacedChart> best;
+  const auto fits = [&](double cover, std::size_t order) {
+    if (!packing.place_all(packing.scale_of(cover), order, context)) return false;
+    best = packing.placed();
+    return true;
+  };
   double low = kFirstCover, high = 1;
-  int step = 0;
-  for (; step < kCoverSteps && !packing.place_all(packing.scale_of(low), context); ++step) {
-    high = low;
-    low *= kCoverStep;
+  for (int step = 0; !fits(low, 0); high = low, low *= kCoverStep) {
+    if (++step < kCoverSteps) continue;
+    for (std::size_t order = 0; order < packing.order_count(); ++order)
+      if (fits(0, order)) return best;
+    return std::nullopt;
   }
-  if (step == kCoverSteps && !packing.place_all(0, context)) return std::nullopt;
-  std::vector<PlacedChart> best = packing.placed();
-  for (int i = 0; i < kHalvings && step < kCoverSteps; ++i) {
+  for (int i = 0; i < kHalvings; ++i) {
     const double middle = (low + high) / 2;
-    if (packing.place_all(packing.scale_of(middle), context)) {
-      low = middle;
-      best = packing.placed();
-    } else {
-      high = middle;
-    }
+    (fits(middle, 0) ? low : high) = middle;
   }
+  const double step = high - low;
+  for (std::size_t order = 1; order < packing.order_count(); ++order)
+    while (low + step < 1 && fits(low + step, order)) low += step;
   return best;
 }
 
