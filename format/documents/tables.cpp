@@ -202,9 +202,9 @@ PackageTables select_scales(const PackageTables& tables, const std::vector<std::
     const std::vector<float> quality = std::move(t.quality);
     t.features.clear(), t.quality.clear();
     for (const std::size_t row : rows) {
+      t.quality.push_back(quality.at(row));  // refuses a row that is not there
       const auto begin = features.begin() + static_cast<std::ptrdiff_t>(row * t.fragment_count());
       t.features.insert(t.features.end(), begin, begin + static_cast<std::ptrdiff_t>(t.fragment_count()));
-      t.quality.push_back(quality.at(row));
     }
   }
   return out;
