@@ -5,7 +5,6 @@
 #include "format/base/no_index.h"
 #include "stages/base/parallel.h"
 #include "stages/geometry/scale_walk.h"
-#include "stages/geometry/spokes.h"
 #include "stages/geometry/triangle_tree.h"
 
 namespace texmesh {

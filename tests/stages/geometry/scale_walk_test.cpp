@@ -1,4 +1,4 @@
-#include "stages/geometry/spokes.h"
+#include "stages/geometry/scale_walk.h"
 
 #include <gtest/gtest.h>
 
