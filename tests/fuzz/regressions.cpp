@@ -124,6 +124,18 @@ Bytes gltf_of_zeros() {
     "meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],"nodes":[{"mesh":0}],"scenes":[{"nodes":[0]}]})");
 }
 
+/// A GLB of four billion indices that no byte stands for: each was looked at.
+Bytes glb_of_zeros() {
+  const std::string json =
+      R"({"asset":{"version":"2.0"},"accessors":[{"type":"VEC3","componentType":5126,"count":1},)"
+      R"({"type":"SCALAR","componentType":5123,"count":4294967295}],)"
+      R"("meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}]}    )";
+  BytesOut out;
+  out.text("glTF"), out.u32(2), out.u32(20 + json.size());
+  out.u32(json.size()), out.text("JSON"), out.text(json);
+  return out.finish();
+}
+
 }  // namespace
 
 std::vector<Bytes> regressions(const std::string& target) {
@@ -134,6 +146,7 @@ std::vector<Bytes> regressions(const std::string& target) {
        {exr_with_long_attribute("str"), exr_with_long_attribute(""), exr_with_short_claim(),
         exr_of_one_row(1u << 30, 400),  // OpenEXR took memory for its rows before anybody saw the size
         exr_of_one_row(4, ~0ull)}},     // OpenImageIO read in front of the file
+      {"glb_check", {glb_of_zeros()}},
       {"gltf", {gltf_of_zeros()}},
       {"png", {png_with_long_chunk()}},
       {"tiff", {tiff_of_short_rows()}},
