@@ -14,7 +14,7 @@
 namespace texmesh {
 namespace {
 
-using namespace testing;  // the server
+using namespace testing;        // the server
 const std::string& package() {  // its start is not all of the first picture
   static const std::string bytes = text_of(make_package(2, 80000));
   return bytes;
