@@ -15,12 +15,16 @@ std::vector<std::uint32_t> SplitMesh::visible_faces() const {
   return visible;
 }
 
+std::vector<std::array<std::uint32_t, 3>> SplitMesh::face_wedges() const {
+  std::vector<std::array<std::uint32_t, 3>> out;
+  out.reserve(faces_.size());
+  for (const Face& f : faces_) out.push_back(f.wedge);
+  return out;
+}
+
 std::uint32_t SplitMesh::add_point() {
   points_.push_back({});
-  head_.push_back(kNoIndex);
-  degree_.push_back(0);
-  first_a_.push_back(kNoIndex);
-  count_b_.push_back(0);
+  ring_.emplace_back();
   return static_cast<std::uint32_t>(points_.size() - 1);
 }
 
@@ -38,27 +42,27 @@ void SplitMesh::copy_values(std::uint32_t from, std::uint32_t to) {
 
 std::uint32_t SplitMesh::add_face(std::array<std::uint32_t, 3> wedges, std::uint16_t group) {
   const auto face = static_cast<std::uint32_t>(faces_.size());
-  faces_.push_back(wedges);
+  Face& added = faces_.emplace_back(Face{wedges, {}, {}});
   face_group_.push_back(group);
   for (std::uint32_t k = 0; k < 3; ++k) {
-    const std::uint32_t p = wedge_point_[wedges[k]];
-    next_.push_back(head_[p]);
-    head_[p] = 3 * face + k;
-    ++degree_[p];
+    Ring& ring = ring_[added.point[k] = wedge_point_[wedges[k]]];
+    added.next[k] = ring.head;
+    ring.head = 3 * face + k;
+    ++ring.degree;
   }
   return face;
 }
 
 void SplitMesh::distribute(std::uint32_t from, std::uint32_t to, const std::vector<Corner>& corners) {
-  head_[from] = head_[to] = kNoIndex;
-  degree_[from] = degree_[to] = 0;
+  for (const std::uint32_t p : {from, to}) ring_[p].head = kNoIndex, ring_[p].degree = 0;
   for (std::size_t i = corners.size(); i-- > 0;) {
     const Corner& c = corners[i];
-    const std::uint32_t id = 3 * c.face + c.corner, p = c.moves ? to : from;
-    if (c.moves) faces_[c.face][c.corner] = c.target;
-    next_[id] = head_[p];
-    head_[p] = id;
-    ++degree_[p];
+    Ring& ring = ring_[c.moves ? to : from];
+    Face& face = faces_[c.face];
+    if (c.moves) face.wedge[c.corner] = c.target, face.point[c.corner] = to;
+    face.next[c.corner] = ring.head;
+    ring.head = 3 * c.face + c.corner;
+    ++ring.degree;
   }
 }
 
@@ -68,7 +72,7 @@ void SplitMesh::gather_fan(std::uint32_t start, std::vector<Corner>& corners, st
   for (std::uint32_t at = start; at != kNoIndex;) {
     taken_[at] = true;
     corners.push_back(loose_[at]);
-    std::uint32_t& next = first_a_[loose_[at].b];
+    std::uint32_t& next = ring_[loose_[at].b].first_a;
     while (next != kNoIndex && taken_[next]) next = chain_[next];
     at = next;
   }
@@ -88,15 +92,16 @@ void SplitMesh::gather(std::uint32_t point, std::vector<Corner>& corners, std::v
   chain_.assign(loose_.size(), kNoIndex);
   taken_.assign(loose_.size(), false);
   for (std::size_t i = loose_.size(); i-- > 0;) {
-    chain_[i] = first_a_[loose_[i].a];
-    first_a_[loose_[i].a] = static_cast<std::uint32_t>(i);
-    ++count_b_[loose_[i].b];
+    std::uint32_t& first = ring_[loose_[i].a].first_a;
+    chain_[i] = first;
+    first = static_cast<std::uint32_t>(i);
+    ++ring_[loose_[i].b].count_b;
   }
   for (std::uint32_t i = 0; i < loose_.size(); ++i)
-    if (!taken_[i] && count_b_[loose_[i].a] == 0) gather_fan(i, corners, fans);
+    if (!taken_[i] && ring_[loose_[i].a].count_b == 0) gather_fan(i, corners, fans);
   for (std::uint32_t i = 0; i < loose_.size(); ++i)
     if (!taken_[i]) gather_fan(i, corners, fans);
-  for (const Corner& c : loose_) first_a_[c.a] = kNoIndex, count_b_[c.b] = 0;
+  for (const Corner& c : loose_) ring_[c.a].first_a = kNoIndex, ring_[c.b].count_b = 0;
 }
 
 }  // namespace texmesh

@@ -29,9 +29,10 @@ class SplitMesh {
   /// `components`: per attribute, how many numbers each wedge has.
   explicit SplitMesh(std::vector<int> components);
 
-  const std::vector<Point>& points() const { return points_; }                       // places on the grid
-  const std::vector<std::uint32_t>& wedge_point() const { return wedge_point_; }     // per wedge
-  const std::vector<std::array<std::uint32_t, 3>>& faces() const { return faces_; }  // wedges
+  const std::vector<Point>& points() const { return points_; }                    // places on the grid
+  const std::vector<std::uint32_t>& wedge_point() const { return wedge_point_; }  // per wedge
+  std::size_t face_count() const { return faces_.size(); }
+  std::vector<std::array<std::uint32_t, 3>> face_wedges() const;  // per face
   const std::vector<std::uint16_t>& face_group() const { return face_group_; }
   /// Numbers of attribute k of all wedges, one wedge after the other.
   const std::vector<std::int32_t>& values(std::size_t k) const { return values_[k]; }
@@ -50,15 +51,17 @@ class SplitMesh {
   std::int32_t* value(std::size_t k, std::uint32_t wedge) {
     return values_[k].data() + wedge * static_cast<std::size_t>(components_[k]);
   }
-  std::uint32_t degree(std::uint32_t point) const { return degree_[point]; }
+  std::uint32_t degree(std::uint32_t point) const { return ring_[point].degree; }
   std::uint32_t point_at(std::uint32_t face, std::uint32_t corner) const {
-    return wedge_point_[faces_[face][corner % 3]];
+    return faces_[face].point[corner % 3];
   }
-  std::uint32_t wedge_at(std::uint32_t face, std::uint32_t corner) const { return faces_[face][corner % 3]; }
+  std::uint32_t wedge_at(std::uint32_t face, std::uint32_t corner) const {
+    return faces_[face].wedge[corner % 3];
+  }
   /// Calls visit(face, corner) for the corners at a point.
   template <class Visit>
   void each_corner(std::uint32_t point, Visit&& visit) const {
-    for (std::uint32_t c = head_[point]; c != kNoIndex; c = next_[c]) visit(c / 3, c % 3);
+    for (std::uint32_t c = ring_[point].head; c != kNoIndex; c = next_of(c)) visit(c / 3, c % 3);
   }
   /// The corners at a point, sorted into fans: open fans first, each in the order of its first corner in
   /// the point's list.
@@ -68,17 +71,25 @@ class SplitMesh {
   void distribute(std::uint32_t from, std::uint32_t to, const std::vector<Corner>& corners);
 
  private:
+  // What is asked together lies together: neighbours on a large mesh are anywhere in memory.
+  struct Face {
+    std::array<std::uint32_t, 3> wedge, point, next;  // the next corner (3 * face + corner) at its point
+  };
+  struct Ring {
+    std::uint32_t head = kNoIndex, degree = 0;  // first corner, number of corners
+    // Scratch of gather(): the first unsorted corner with this a, and how many have this b.
+    std::uint32_t first_a = kNoIndex, count_b = 0;
+  };
+  std::uint32_t& next_of(std::uint32_t corner) { return faces_[corner / 3].next[corner % 3]; }
+  std::uint32_t next_of(std::uint32_t corner) const { return faces_[corner / 3].next[corner % 3]; }
   void gather_fan(std::uint32_t start, std::vector<Corner>& corners, std::vector<Fan>& fans);
   std::vector<Point> points_;
   std::vector<std::uint32_t> wedge_point_;
-  std::vector<std::array<std::uint32_t, 3>> faces_;
+  std::vector<Face> faces_;
   std::vector<std::uint16_t> face_group_;
   std::vector<int> components_;
   std::vector<std::vector<std::int32_t>> values_;
-  std::vector<std::uint32_t> head_, degree_;  // per point: its first corner, number of corners
-  std::vector<std::uint32_t> next_;           // per corner (3 * face + corner): the next at its point
-  // Scratch of gather(): per point the first unsorted corner with this a, and how many have this b.
-  std::vector<std::uint32_t> first_a_, count_b_;
+  std::vector<Ring> ring_;  // per point
   std::vector<Corner> loose_;
   std::vector<std::uint32_t> chain_;
   std::vector<bool> taken_;

@@ -51,7 +51,7 @@ Mesh split_model(const SplitStreamHead& head, const SplitMesh& mesh) {
   std::uint16_t parts = 0;
   for (const std::uint32_t f : mesh.visible_faces()) {
     Triangle t;
-    for (std::size_t k = 0; k < 3; ++k) t[k] = wedges.of(mesh.faces()[f][k]);
+    for (std::size_t k = 0; k < 3; ++k) t[k] = wedges.of(mesh.wedge_at(f, static_cast<std::uint32_t>(k)));
     const SplitGroup group = head.groups[mesh.face_group()[f]];
     out.triangles.push_back(t);
     out.triangle_material.push_back(group.material);

@@ -208,7 +208,7 @@ void SplitStreamReader::add_parts(std::span<const ByteSpan> parts) {
   };
   require("points", scale.points, s.mesh.points().size());
   require("wedges", scale.wedges, s.mesh.wedge_point().size());
-  require("faces", scale.faces, s.mesh.faces().size());
+  require("faces", scale.faces, s.mesh.face_count());
   if (s.complete) require("triangles", scale.triangles, s.mesh.visible_faces().size());
 }
 

@@ -24,16 +24,17 @@ void SplitTruth::begin_chapter(const SplitSource::Chapter& chapter) {
 }
 
 void SplitTruth::begin_split(std::uint32_t v, std::uint32_t u) {
-  std::uint32_t& ready = ready_[source_point_[v]];
+  std::uint32_t& ready = ready_[v];
   number_ = ready;
   ready = kNoIndex;
   const SplitSource::Split& split = chapter_->splits[number_];
   parent_ = split.parent, child_ = split.child;
   bind_point(u, child_);
   for (std::uint32_t i = split.move_begin; i < split.move_end; ++i)
-    move_[chapter_->moves[i].face] = chapter_->moves[i].wedge;
+    move_[moved_face(i)] = chapter_->moves[i].wedge;
   remaining_.clear();
-  for (std::uint32_t i = split.born_begin; i < split.born_end; ++i) remaining_.push_back(i);
+  for (std::uint32_t i = split.born_begin; i < split.born_end; ++i)
+    remaining_.push_back({i, third_of(chapter_->born[i])});
 }
 
 void SplitTruth::check_moves(std::size_t found) const {
@@ -46,7 +47,7 @@ void SplitTruth::check_moves(std::size_t found) const {
 
 void SplitTruth::end_split() {
   const SplitSource::Split& split = chapter_->splits[number_];
-  for (std::uint32_t i = split.move_begin; i < split.move_end; ++i) move_[chapter_->moves[i].face] = kNoIndex;
+  for (std::uint32_t i = split.move_begin; i < split.move_end; ++i) move_[moved_face(i)] = kNoIndex;
   for (std::uint32_t i = first_[number_]; i < first_[number_ + 1]; ++i)
     if (--waiting_[after_[i]] == 0) make_ready(after_[i]);
 }
@@ -57,13 +58,13 @@ bool SplitTruth::is_any_target(std::uint32_t face, const std::vector<std::uint32
 
 bool SplitTruth::target_equals(std::uint32_t face, std::uint32_t w) const {
   for (std::size_t k = 0; k < source_.values.size(); ++k)
-    if (!equal_source(k, move_[source_face_[face]], source_wedge_[w])) return false;
+    if (!equal_source(k, move_[face], source_wedge_[w])) return false;
   return true;
 }
 
 bool SplitTruth::choose_born_face(std::uint32_t x) {
   for (std::size_t i = 0; i < remaining_.size(); ++i)
-    if (third_of(chapter_->born[remaining_[i]]) == source_point_[x]) return set_born_face(i);
+    if (remaining_[i].third == source_point_[x]) return set_born_face(i);
   return false;
 }
 
@@ -73,8 +74,9 @@ bool SplitTruth::fits_better(std::uint32_t v, std::uint32_t x, std::uint32_t v2,
 }
 
 void SplitTruth::bind_face(std::uint32_t face) {
-  if (face != source_face_.size()) fail_split_source("faces", "in order", "another");
-  source_face_.push_back(face_);
+  if (face != move_.size()) fail_split_source("faces", "in order", "another");
+  move_.push_back(kNoIndex);
+  stream_face_[face_] = face;
 }
 
 void SplitTruth::choose_seed_face() {
@@ -96,7 +98,8 @@ bool SplitTruth::choose_face_at_gate(std::uint32_t a, std::uint32_t b) {
 }
 
 void SplitTruth::make_ready(std::uint32_t split) {
-  std::uint32_t& ready = ready_.at(chapter_->splits[split].parent);
+  const std::uint32_t source = chapter_->splits[split].parent, p = stream_point_.at(source);
+  std::uint32_t& ready = p == kNoIndex ? early_[source] : ready_[p];
   if (ready != kNoIndex) fail_split_source("splits of one point", "one after the other", "two at once");
   ready = split;
 }
@@ -106,6 +109,7 @@ void SplitTruth::bind_point(std::uint32_t p, std::uint32_t source) {
     fail_split_source("point " + std::to_string(source), "a point that is made once", "another");
   stream_point_[source] = p;
   source_point_.push_back(source);
+  ready_.push_back(early_[source]);
 }
 
 void SplitTruth::bind_wedge(std::uint32_t w, std::uint32_t source) {
@@ -119,14 +123,22 @@ std::uint32_t SplitTruth::third_of(const SplitSource::Face& face) const {
   return kNoIndex;
 }
 
+std::uint32_t SplitTruth::moved_face(std::uint32_t move) const {
+  const std::uint32_t face = stream_face_[chapter_->moves[move].face];
+  if (face == kNoIndex)
+    fail_split_source("split " + std::to_string(number_), "faces at its parent", "one that is not there yet");
+  return face;
+}
+
 bool SplitTruth::set_born_face(std::size_t i) {
-  const SplitSource::Face& face = chapter_->born[remaining_[i]];
+  const SplitSource::Face& face = chapter_->born[remaining_[i].number];
+  const std::uint32_t third = remaining_[i].third;
   remaining_.erase(remaining_.begin() + static_cast<std::ptrdiff_t>(i));
   face_ = face.face;
   std::size_t at = 3;
   for (std::size_t k = 0; k < 3; ++k)
     if (source_.wedge_point[face.wedges[k]] == parent_) at = k;
-  if (at == 3 || third_of(face) == kNoIndex)
+  if (at == 3 || third == kNoIndex)
     fail_split_source("face " + std::to_string(face_), "corners at its split", "others");
   const std::uint32_t next = face.wedges[(at + 1) % 3], last = face.wedges[(at + 2) % 3];
   forward_ = source_.wedge_point[last] == child_;

@@ -18,27 +18,25 @@ class SplitTruth {
       : source_(source),
         mesh_(mesh),
         stream_point_(source.points.size(), kNoIndex),
-        ready_(source.points.size(), kNoIndex),
-        move_(source.face_group.size(), kNoIndex) {}
+        stream_face_(source.face_group.size(), kNoIndex),
+        early_(source.points.size(), kNoIndex) {}
 
   // ---- chapters
 
   void begin_chapter(const SplitSource::Chapter& chapter);
 
-  bool is_ready(std::uint32_t v) const { return ready_[source_point_[v]] != kNoIndex; }
+  bool is_ready(std::uint32_t v) const { return ready_[v] != kNoIndex; }
   void begin_split(std::uint32_t v, std::uint32_t u);
   void check_moves(std::size_t found) const;
   void end_split();
 
   // ---- corners that move
 
-  bool moves(std::uint32_t face) const { return move_[source_face_[face]] != kNoIndex; }
-  bool is_target(std::uint32_t face, std::uint32_t w) const {
-    return source_wedge_[w] == move_[source_face_[face]];
-  }
+  bool moves(std::uint32_t face) const { return move_[face] != kNoIndex; }
+  bool is_target(std::uint32_t face, std::uint32_t w) const { return source_wedge_[w] == move_[face]; }
   bool is_any_target(std::uint32_t face, const std::vector<std::uint32_t>& wedges) const;
   bool target_equals(std::uint32_t face, std::uint32_t w) const;
-  void bind_target(std::uint32_t face, std::uint32_t w) { bind_wedge(w, move_[source_face_[face]]); }
+  void bind_target(std::uint32_t face, std::uint32_t w) { bind_wedge(w, move_[face]); }
 
   // ---- the face under way; roles are parent, child, third, or start, end, third of a patch's edge
 
@@ -83,6 +81,7 @@ class SplitTruth {
   void bind_point(std::uint32_t p, std::uint32_t source);
   void bind_wedge(std::uint32_t w, std::uint32_t source);
   std::uint32_t third_of(const SplitSource::Face& face) const;
+  std::uint32_t moved_face(std::uint32_t move) const;
   bool set_born_face(std::size_t i);
   void sort_patch();
   void set_patch_face(std::uint32_t index, std::uint32_t corner);
@@ -94,13 +93,18 @@ class SplitTruth {
 
   const SplitSource& source_;
   const SplitMesh& mesh_;
-  std::vector<std::uint32_t> stream_point_;                               // by source number
-  std::vector<std::uint32_t> source_point_, source_wedge_, source_face_;  // by stream number
+  std::vector<std::uint32_t> stream_point_, stream_face_;   // by source number
+  std::vector<std::uint32_t> source_point_, source_wedge_;  // by stream number
   const SplitSource::Chapter* chapter_ = nullptr;
-  std::vector<std::uint32_t> ready_;  // per source point: the split it is parent of that may come now
+  /// Per point of the stream: the split it is parent of that may come now. `early_`: per source point that
+  /// the stream does not have yet.
+  std::vector<std::uint32_t> ready_, early_;
   std::vector<std::uint32_t> waiting_, first_, after_;
-  std::vector<std::uint32_t> move_;  // per source face: its wedge at the child of the split under way
-  std::vector<std::uint32_t> remaining_;
+  std::vector<std::uint32_t> move_;  // per face of the stream: its wedge at the child of the split under way
+  struct Born {
+    std::uint32_t number, third;  // in Chapter::born; the source's point beside parent and child
+  };
+  std::vector<Born> remaining_;
   std::uint32_t number_ = 0, parent_ = kNoIndex, child_ = kNoIndex, face_ = 0;
   std::array<std::uint32_t, 3> wanted_{};
   bool forward_ = false;

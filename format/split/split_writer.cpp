@@ -125,7 +125,7 @@ class SplitStreamWriter {
     head_.scales.push_back({chapter.scale, static_cast<std::uint32_t>(head_.blocks.size()),
                             static_cast<std::uint32_t>(mesh_.points().size()),
                             static_cast<std::uint32_t>(mesh_.wedge_point().size()),
-                            static_cast<std::uint32_t>(mesh_.faces().size()),
+                            static_cast<std::uint32_t>(mesh_.face_count()),
                             static_cast<std::uint32_t>(mesh_.visible_faces().size())});
   }
   void end_block(bool is_patch, std::uint32_t count) {

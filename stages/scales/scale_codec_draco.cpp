@@ -9,6 +9,7 @@
 
 #include "format/base/box.h"
 #include "format/base/errors.h"
+#include "stages/gltf/draco_points.h"
 #include "stages/scales/scale_codecs.h"
 
 namespace texmesh {
@@ -75,10 +76,9 @@ class DracoPrimitive {
   CodedPrimitive code(GlbWriter& writer) {
     // Equal values get one index, so that connectivity is that of positions and every other attribute's seams
     // are its own.
-    if (!mesh_.DeduplicateAttributeValues()) fail("attributes without repeats", "a failure");
     // Points that agree in everything (relaxed junctions make some) are one to a decoder; the encoder would
     // count each.
-    mesh_.DeduplicatePointIds();
+    merge_equal_points(mesh_);
     draco::ExpertEncoder encoder(mesh_);
     const int speed = 10 - coding_.options.draco_level;
     encoder.SetSpeedOptions(speed, speed);

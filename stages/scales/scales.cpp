@@ -251,11 +251,6 @@ bool shows_the_same(const std::vector<std::uint8_t>& stream, const NestedScales&
   });
 }
 
-/// The kept scales that have files of their own.
-bool has_file(std::size_t kept_index, std::size_t kept_count, const ScaleFiles& files) {
-  return kept_index == 0 || kept_index + 1 == kept_count || files.stream.empty();
-}
-
 void write_stream(const ScaleCoding& coding, const NestedScales& scales, const std::vector<std::size_t>& kept,
                   const std::vector<Material>& materials, const std::vector<Image>& images,
                   const RunContext& context, ScaleFiles& result) {
@@ -330,25 +325,34 @@ ScaleFiles write_scales(const NestedScales& scales, const PerceptualValues& perc
   result.position_bits = coding.position.bits;
   result.uv_bits = coding.write_uv[0] ? coding.uv[0].bits : 0;
   result.position_error = largest_rounding(scales.mesh, coding.position);
-  write_stream(coding, scales, kept, materials, images, context, result);
   result.files.resize(kept.size());
-  std::vector<std::size_t> written;  // indices into kept
-  for (std::size_t i = 0; i < kept.size(); ++i) {
-    if (has_file(i, kept.size(), result))
-      written.push_back(i);
-    else
-      result.files[i] = count_streamed(read_split_head(result.stream), scales.scales[kept[i]].scale);
-  }
-  parallel_for(context, written.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t w = begin; w < end; ++w) {
-      const std::size_t i = written[w];
-      ScaleCoding lit = coding;
-      lit.frames = scale_frames(scales, kept[i], context);
-      const PreviewForm form = i + 1 == kept.size() ? PreviewForm::kEmbedded : PreviewForm::kRelative;
-      result.files[i] = write_scale(lit, scales.scales[kept[i]], materials, preview_files, form);
-      context.report(static_cast<double>(w + 1) / static_cast<double>(written.size() + 1));
+  const auto write_file = [&](std::size_t i) {
+    ScaleCoding lit = coding;
+    lit.frames = scale_frames(scales, kept[i], context);
+    const PreviewForm form = i + 1 == kept.size() ? PreviewForm::kEmbedded : PreviewForm::kRelative;
+    result.files[i] = write_scale(lit, scales.scales[kept[i]], materials, preview_files, form);
+  };
+  // The stream and S_0's file take about as long. These two scales have files beside any stream.
+  const std::size_t always = std::min<std::size_t>(kept.size(), 2);
+  parallel_for(context, 1 + always, 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t task = begin; task < end; ++task) {
+      if (task == 0)
+        write_stream(coding, scales, kept, materials, images, context, result);
+      else
+        write_file(task == 1 ? 0 : kept.size() - 1);
     }
   });
+  context.report(0.5);
+  const std::size_t between = kept.size() - always;
+  if (!result.stream.empty()) {
+    const SplitStreamHead head = read_split_head(result.stream);
+    for (std::size_t i = 1; i <= between; ++i)
+      result.files[i] = count_streamed(head, scales.scales[kept[i]].scale);
+  } else {
+    parallel_for(context, between, 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin + 1; i <= end; ++i) write_file(i);
+    });
+  }
   note_grid(coding, scales.scales[0].triangles.size(), result.files[0].triangles, result.notes);
   return result;
 }

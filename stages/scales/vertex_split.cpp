@@ -142,27 +142,31 @@ struct PointUse {
   std::uint32_t shared = kNoIndex;  // head of a list of those that shared it since
 };
 
+// What is asked together lies together: collapses come in the order of their cost, anywhere on the surface.
+struct ReplayPoint {
+  std::uint32_t head = kNoIndex;  // its first corner
+  std::uint32_t mark = 0;         // the last collapse that counted it as one of those around
+  PointUse use;
+};
+struct ReplayFace {
+  std::array<std::uint32_t, 3> wedge{}, point{};
+  std::array<std::uint32_t, 3> next{};   // the next corner (3 * face + corner) at its point
+  std::array<std::uint32_t, 3> final{};  // wedges in the coarse scale, where it has the face
+  bool alive = true;
+};
+
 /// Replays the collapses from fine to coarse on faces of wedges, recording what each did.
 class CollapseReplay {
  public:
   CollapseReplay(const NestedScales& scales, RoundedMesh& rounded)
-      : scales_(scales),
-        rounded_(rounded),
-        head_(rounded.points(), kNoIndex),
-        use_(rounded.points()),
-        mark_(rounded.points(), 0) {
-    const auto& triangles = scales.mesh.triangles;
-    faces_.resize(triangles.size());
-    final_.resize(triangles.size());
-    next_.resize(3 * triangles.size());
-    alive_.assign(triangles.size(), true);
-    for (std::uint32_t f = 0; f < triangles.size(); ++f) {
-      for (std::uint32_t k = 0; k < 3; ++k) faces_[f][k] = rounded_.wedge(triangles[f][k]);
+      : scales_(scales), rounded_(rounded), points_(rounded.points()), faces_(scales.mesh.triangles.size()) {
+    for (std::uint32_t f = 0; f < faces_.size(); ++f) {
+      for (std::uint32_t k = 0; k < 3; ++k) put_wedge(f, k, rounded_.wedge(scales.mesh.triangles[f][k]));
       // Where rounding or twins leave a face with a corner twice it shows nothing and cannot take part.
       if (point(f, 0) == point(f, 1) || point(f, 1) == point(f, 2) || point(f, 2) == point(f, 0))
-        alive_[f] = false;
-      if (!alive_[f]) continue;
-      for (std::uint32_t k = 0; k < 3; ++k) link(3 * f + k);
+        faces_[f].alive = false;
+      if (!faces_[f].alive) continue;
+      for (std::uint32_t k = 0; k < 3; ++k) link(f, k);
     }
   }
 
@@ -172,13 +176,13 @@ class CollapseReplay {
     chapter.scale = fine.scale;
     chapter_ = &chapter;
     shares_.clear();
-    std::fill(use_.begin(), use_.end(), PointUse{});
+    for (ReplayPoint& p : points_) p.use = {};
     note_final(coarse);
     for (std::uint32_t c = fine.collapse_count; c < coarse.collapse_count; ++c) {
       const Collapse& collapse = scales_.collapses.at(c);
       if (collapse.vanishes_with_component()) continue;
       const std::uint32_t u = rounded_.point(collapse.from), v = rounded_.point(collapse.to);
-      if (u != v && head_[u] != kNoIndex) replay(u, v);
+      if (u != v && points_[u].head != kNoIndex) replay(u, v);
     }
     patch_leftovers();
     reverse(chapter);
@@ -189,31 +193,36 @@ class CollapseReplay {
     SplitSource::Chapter chapter;
     chapter.scale = scale;
     for (std::uint32_t f = 0; f < faces_.size(); ++f)
-      if (alive_[f]) chapter.patch.push_back({f, faces_[f]});
+      if (faces_[f].alive) chapter.patch.push_back({f, faces_[f].wedge});
     return chapter;
   }
 
  private:
   std::uint32_t point(std::uint32_t face, std::uint32_t corner) const {
-    return rounded_.point_of(faces_[face][corner % 3]);
+    return faces_[face].point[corner % 3];
   }
-  void link(std::uint32_t corner) {
-    const std::uint32_t p = point(corner / 3, corner % 3);
-    next_[corner] = head_[p];
-    head_[p] = corner;
+  void put_wedge(std::uint32_t face, std::uint32_t corner, std::uint32_t wedge) {
+    faces_[face].wedge[corner] = wedge;
+    faces_[face].point[corner] = rounded_.point_of(wedge);
   }
-  void unlink(std::uint32_t corner) {
-    std::uint32_t* at = &head_[point(corner / 3, corner % 3)];
-    while (*at != corner) at = &next_[*at];
-    *at = next_[corner];
+  std::uint32_t& next(std::uint32_t corner) { return faces_[corner / 3].next[corner % 3]; }
+  void link(std::uint32_t face, std::uint32_t corner) {
+    std::uint32_t& head = points_[point(face, corner)].head;
+    faces_[face].next[corner] = head;
+    head = 3 * face + corner;
+  }
+  void unlink(std::uint32_t face, std::uint32_t corner) {
+    std::uint32_t* at = &points_[point(face, corner)].head;
+    while (*at != 3 * face + corner) at = &next(*at);
+    *at = faces_[face].next[corner];
   }
 
   /// Wedges of the faces that the coarse scale has.
   void note_final(const NestedScale& coarse) {
-    std::fill(final_.begin(), final_.end(), std::array{kNoIndex, kNoIndex, kNoIndex});
+    for (ReplayFace& f : faces_) f.final.fill(kNoIndex);
     for (std::size_t i = 0; i < coarse.triangles.size(); ++i)
       for (std::size_t k = 0; k < 3; ++k)
-        final_[coarse.triangle_source[i]][k] = rounded_.wedge(coarse.triangles[i][k]);
+        faces_[coarse.triangle_source[i]].final[k] = rounded_.wedge(coarse.triangles[i][k]);
   }
 
   void replay(std::uint32_t u, std::uint32_t v) {
@@ -227,33 +236,34 @@ class CollapseReplay {
     ring_.clear();
     corners_.clear();
     map_.clear();
-    for (std::uint32_t c = head_[u]; c != kNoIndex; c = next_[c]) corners_.push_back(c);
+    for (std::uint32_t c = points_[u].head; c != kNoIndex; c = next(c)) corners_.push_back(c);
     for (std::uint32_t c : corners_) {
       const std::uint32_t f = c / 3, k = c % 3, a = point(f, k + 1), b = point(f, k + 2);
       ring_.push_back(a);
       ring_.push_back(b);
-      if (a == v || b == v) map_.push_back({faces_[f][k], group(f), faces_[f][(k + (a == v ? 1 : 2)) % 3]});
+      const std::array<std::uint32_t, 3>& wedge = faces_[f].wedge;
+      if (a == v || b == v) map_.push_back({wedge[k], group(f), wedge[(k + (a == v ? 1 : 2)) % 3]});
     }
     order(number, u, v);
     for (std::uint32_t c : corners_) {
       const std::uint32_t f = c / 3, k = c % 3;
       if (point(f, k + 1) == v || point(f, k + 2) == v) {
-        chapter_->born.push_back({f, faces_[f]});
+        chapter_->born.push_back({f, faces_[f].wedge});
         for (std::uint32_t i = 0; i < 3; ++i)
-          if (i != k) unlink(3 * f + i);
-        alive_[f] = false;
+          if (i != k) unlink(f, i);
+        faces_[f].alive = false;
       } else {
-        chapter_->moves.push_back({f, faces_[f][k]});
-        const std::uint32_t last = final_[f][k];
+        const std::uint32_t moved = faces_[f].wedge[k], last = faces_[f].final[k];
+        chapter_->moves.push_back({f, moved});
         const bool stays = last != kNoIndex && rounded_.point_of(last) == v;
-        faces_[f][k] = stays ? last : target(faces_[f][k], group(f), v);
+        put_wedge(f, k, stays ? last : target(moved, group(f), v));
       }
     }
-    head_[u] = kNoIndex;
+    points_[u].head = kNoIndex;
     for (std::uint32_t i = split.move_begin; i < chapter_->moves.size(); ++i) {
       const std::uint32_t f = chapter_->moves[i].face;
       for (std::uint32_t k = 0; k < 3; ++k)
-        if (point(f, k) == v) link(3 * f + k);
+        if (point(f, k) == v) link(f, k);
     }
     split.move_end = static_cast<std::uint32_t>(chapter_->moves.size());
     split.born_end = static_cast<std::uint32_t>(chapter_->born.size());
@@ -280,30 +290,33 @@ class CollapseReplay {
       if (earlier != kNoIndex) chapter_->before.push_back({number, earlier});
     };
     for (std::uint32_t p : {u, v}) {
-      after(use_[p].alone);
-      for (std::uint32_t s = use_[p].shared; s != kNoIndex; s = shares_[s].next) after(shares_[s].collapse);
-      use_[p] = {number, kNoIndex};
+      PointUse& use = points_[p].use;
+      after(use.alone);
+      for (std::uint32_t s = use.shared; s != kNoIndex; s = shares_[s].next) after(shares_[s].collapse);
+      use = {number, kNoIndex};
     }
     ++now_;
-    mark_[u] = mark_[v] = now_;
+    points_[u].mark = points_[v].mark = now_;
     for (std::uint32_t p : ring_) {
-      if (mark_[p] == now_) continue;
-      mark_[p] = now_;
-      after(use_[p].alone);
-      shares_.push_back({number, use_[p].shared});
-      use_[p].shared = static_cast<std::uint32_t>(shares_.size() - 1);
+      ReplayPoint& around = points_[p];
+      if (around.mark == now_) continue;
+      around.mark = now_;
+      after(around.use.alone);
+      shares_.push_back({number, around.use.shared});
+      around.use.shared = static_cast<std::uint32_t>(shares_.size() - 1);
     }
   }
 
   /// Faces that the coarse scale does not have although no collapse removed them become the chapter's patch.
   void patch_leftovers() {
     for (std::uint32_t f = 0; f < faces_.size(); ++f) {
-      if (!alive_[f]) continue;
-      if (final_[f][0] == kNoIndex) {
-        chapter_->patch.push_back({f, faces_[f]});
-        for (std::uint32_t k = 0; k < 3; ++k) unlink(3 * f + k);
-        alive_[f] = false;
-      } else if (faces_[f] != final_[f]) {
+      ReplayFace& face = faces_[f];
+      if (!face.alive) continue;
+      if (face.final[0] == kNoIndex) {
+        chapter_->patch.push_back({f, face.wedge});
+        for (std::uint32_t k = 0; k < 3; ++k) unlink(f, k);
+        face.alive = false;
+      } else if (face.wedge != face.final) {
         fail("collapses", "those that lead to the nested scales",
              "triangle " + std::to_string(f) + " elsewhere");
       }
@@ -324,12 +337,10 @@ class CollapseReplay {
   };
   const NestedScales& scales_;
   RoundedMesh& rounded_;
-  std::vector<std::array<std::uint32_t, 3>> faces_, final_;
-  std::vector<bool> alive_;
-  std::vector<std::uint32_t> head_, next_;  // corners at a point
-  std::vector<PointUse> use_;
+  std::vector<ReplayPoint> points_;
+  std::vector<ReplayFace> faces_;
   std::vector<Share> shares_;
-  std::vector<std::uint32_t> mark_, ring_, corners_;
+  std::vector<std::uint32_t> ring_, corners_;
   std::vector<Mapping> map_;
   std::uint32_t now_ = 0;
   SplitSource::Chapter* chapter_ = nullptr;

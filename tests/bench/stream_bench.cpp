@@ -131,7 +131,7 @@ bool same_mesh(const NestedScales& scales, const NestedScale& scale, const Quant
         x[k][static_cast<std::size_t>(i)] = static_cast<std::int32_t>(
             grid.index(scales.mesh.positions[scales.mesh.wedge_position[t[k]]][i], i));
   }
-  for (std::uint32_t f = 0; f < mesh.faces().size(); ++f) {
+  for (std::uint32_t f = 0; f < mesh.face_count(); ++f) {
     auto& x = found.emplace_back();
     for (std::uint32_t k = 0; k < 3; ++k) x[k] = mesh.points()[mesh.point_at(f, k)];
   }

@@ -269,11 +269,11 @@ Json split_stream(PackageReader& package) {
     out.push_back({{"scale", reader.head().scales[i].scale},
                    {"points", mesh.points().size()},
                    {"wedges", mesh.wedge_point().size()},
-                   {"faces", mesh.faces().size()},
+                   {"faces", mesh.face_count()},
                    {"visible_faces", mesh.visible_faces().size()},
                    {"points_sha256", digest_of(mesh.points())},
                    {"wedge_points_sha256", digest_of(mesh.wedge_point())},
-                   {"faces_sha256", digest_of(mesh.faces())},
+                   {"faces_sha256", digest_of(mesh.face_wedges())},
                    {"groups_sha256", digest_of(mesh.face_group())},
                    {"values_sha256", attributes}});
   }

@@ -43,7 +43,7 @@ class SplitElementCodec {
     return w;
   }
   std::uint32_t add_face(std::array<std::uint32_t, 3> wedges, std::uint16_t group) {
-    if (mesh.faces().size() >= limits_.faces)
+    if (mesh.face_count() >= limits_.faces)
       fail_split_stream("S19", "faces within the reader's limit", std::to_string(limits_.faces));
     const std::uint32_t face = mesh.add_face(wedges, group);
     channel.update_truth([&](auto& t) { t.bind_face(face); });

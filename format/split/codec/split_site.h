@@ -28,7 +28,7 @@ class SplitStepLimit {
   /// FormatError when the stream needed too many steps.
   void add(std::uint64_t steps) {
     steps_ += steps;
-    if (steps_ > (std::uint64_t{1} << 20) + 256 * (mesh_.points().size() + mesh_.faces().size()))
+    if (steps_ > (std::uint64_t{1} << 20) + 256 * (mesh_.points().size() + mesh_.face_count()))
       fail_split_stream("S20", "splits that are found in reasonable time",
                         "more steps than 256 per point and face");
   }

@@ -11,6 +11,7 @@
 #include <memory>
 
 #include "format/base/errors.h"
+#include "stages/gltf/draco_points.h"
 
 namespace texmesh {
 namespace {
@@ -177,9 +178,7 @@ DracoStream coded(Work& work, const Extent& positions, const Extent& uvs, const 
                   const std::string& entry) {
   for (const auto& [name, id] : work.ids)
     if (name.starts_with("COLOR_")) coarsen_colours(*work.mesh->attribute(id), steps.colour_bits);
-  if (!work.mesh->DeduplicateAttributeValues())
-    throw StageError("extract", entry, "attributes without repeats", "a failure");
-  work.mesh->DeduplicatePointIds();
+  merge_equal_points(*work.mesh);
   draco::ExpertEncoder encoder(*work.mesh);
   set_up_draco(encoder, work, positions, uvs, steps);
   draco::EncoderBuffer buffer;

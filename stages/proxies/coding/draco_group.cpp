@@ -7,6 +7,8 @@
 #include <charconv>
 #include <string>
 
+#include "stages/gltf/draco_points.h"
+
 namespace texmesh::proxies {
 namespace {
 
@@ -55,8 +57,7 @@ DracoGroup code_draco_group(const DracoInput& input) {
   const int normal =
       input.normals.empty() ? -1 : add_vertices(mesh, draco::GeometryAttribute::NORMAL, input.normals);
   const int uv = add_vertices(mesh, draco::GeometryAttribute::TEX_COORD, input.uvs);
-  if (!mesh.DeduplicateAttributeValues()) return {};
-  mesh.DeduplicatePointIds();
+  merge_equal_points(mesh);
   draco::ExpertEncoder encoder(mesh);
   encoder.SetSpeedOptions(kSpeed, kSpeed);
   const Vec3f o = input.origin;

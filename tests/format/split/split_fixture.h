@@ -24,7 +24,7 @@ inline void add_corners(Corners& list, std::int32_t group, std::array<std::vecto
 
 inline Corners corners_of(const SplitMesh& mesh) {
   Corners list;
-  for (std::uint32_t f = 0; f < mesh.faces().size(); ++f) {
+  for (std::uint32_t f = 0; f < mesh.face_count(); ++f) {
     std::array<std::vector<std::int32_t>, 3> corners;
     for (std::uint32_t k = 0; k < 3; ++k) {
       const std::uint32_t w = mesh.wedge_at(f, k);
@@ -47,7 +47,7 @@ struct SplitEdges {
 };
 inline SplitEdges count_split_edges(const SplitMesh& mesh) {
   std::vector<std::uint64_t> edges;
-  for (std::uint32_t f = 0; f < mesh.faces().size(); ++f)
+  for (std::uint32_t f = 0; f < mesh.face_count(); ++f)
     for (std::uint32_t k = 0; k < 3; ++k) {
       const auto [a, b] = std::minmax({mesh.point_at(f, k), mesh.point_at(f, k + 1)});
       edges.push_back(std::uint64_t{a} << 32 | b);

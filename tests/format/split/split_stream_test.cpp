@@ -36,9 +36,9 @@ std::vector<std::span<const std::uint8_t>> parts_of(const SplitStreamHead& head,
 /// Indices in range, three points per face, no edge with more than two faces, none twice in one direction.
 void expect_manifold(const SplitMesh& mesh) {
   std::map<std::pair<std::uint32_t, std::uint32_t>, int> edges;
-  for (std::uint32_t f = 0; f < mesh.faces().size(); ++f) {
-    for (const std::uint32_t w : mesh.faces()[f]) ASSERT_LT(w, mesh.wedge_point().size());
+  for (std::uint32_t f = 0; f < mesh.face_count(); ++f) {
     for (std::uint32_t k = 0; k < 3; ++k) {
+      ASSERT_LT(mesh.wedge_at(f, k), mesh.wedge_point().size());
       ASSERT_LT(mesh.point_at(f, k), mesh.points().size());
       ASSERT_NE(mesh.point_at(f, k), mesh.point_at(f, k + 1));
       ASSERT_EQ(++edges[std::pair(mesh.point_at(f, k), mesh.point_at(f, k + 1))], 1);
@@ -100,7 +100,7 @@ TEST(SplitStream, ValuesMayBeLeftOutPartByPart) {
       reader.add_parts(parts);
     }
     const SplitMesh &a = whole.mesh(), &b = reader.mesh();
-    EXPECT_EQ(a.faces(), b.faces());
+    EXPECT_EQ(a.face_wedges(), b.face_wedges());
     EXPECT_EQ(a.points() == b.points(), dropped != 1);
     for (std::size_t k = 0; k < a.attributes(); ++k)
       EXPECT_EQ(a.values(k) == b.values(k), dropped != k + 2) << "attribute " << k << ", part " << dropped;
@@ -174,8 +174,8 @@ TEST(SplitStream, AnyPartsDecodeWithinBounds) {
     } catch (const FormatError&) {
     }
     EXPECT_LE(reader.mesh().points().size(), head.scales.back().points);
-    EXPECT_LE(reader.mesh().faces().size(), head.scales.back().faces);
-    for (std::uint32_t f = 0; f < reader.mesh().faces().size(); ++f)
+    EXPECT_LE(reader.mesh().face_count(), head.scales.back().faces);
+    for (std::uint32_t f = 0; f < reader.mesh().face_count(); ++f)
       for (std::uint32_t k = 0; k < 3; ++k)
         ASSERT_LT(reader.mesh().point_at(f, k), reader.mesh().points().size());
     for (const auto& p : reader.mesh().points())
@@ -209,7 +209,7 @@ double error_with(SplitFill fill, const SplitStreamHead& head, const Bytes& stre
   EXPECT_EQ(reader.lost_points().size(), lost);
   EXPECT_GT(lost, 0u);
   if (again) reader.refill_lost_points();
-  EXPECT_EQ(reader.mesh().faces(), whole.faces());
+  EXPECT_EQ(reader.mesh().face_wedges(), whole.face_wedges());
   double sum = 0;
   for (std::size_t p = 0; p < whole.points().size(); ++p)
     for (std::size_t k = 0; k < 3; ++k)

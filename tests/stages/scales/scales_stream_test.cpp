@@ -139,7 +139,7 @@ Corner stream_corner(const SplitStreamHead& head, const SplitMesh& mesh, std::ui
 Faces stream_faces(const SplitStreamReader& reader, const std::vector<std::string>& parts) {
   const SplitMesh& mesh = reader.mesh();
   Faces faces;
-  for (std::uint32_t f = 0; f < mesh.faces().size(); ++f) {
+  for (std::uint32_t f = 0; f < mesh.face_count(); ++f) {
     const SplitGroup group = reader.head().groups[mesh.face_group()[f]];
     Face face{parts.at(group.part), group.material, {}};
     std::array<SplitMesh::Point, 3> places;

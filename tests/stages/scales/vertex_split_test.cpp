@@ -100,7 +100,7 @@ void expect_stream(const NestedScales& scales, const std::vector<std::size_t>& k
     const SplitBlock& b = head.blocks[i];
     reader.add_block(std::span(stream).subspan(b.offset, b.bytes()));
     const SplitMesh& mesh = reader.mesh();
-    for (std::uint32_t f = 0; f < mesh.faces().size(); ++f)
+    for (std::uint32_t f = 0; f < mesh.face_count(); ++f)
       for (std::uint32_t k = 0; k < 3; ++k) ASSERT_NE(mesh.point_at(f, k), mesh.point_at(f, k + 1));
     if (!b.is_patch) {
       const SplitEdges edges = count_split_edges(mesh);

@@ -1,0 +1,15 @@
+#pragma once
+
+namespace draco {
+class Mesh;
+}
+
+namespace texmesh {
+
+/// Gives values of an attribute that are equal bit for bit one index, and points that have all of their
+/// values in common one index; both are numbered in the order in which they first stand. So does Draco
+/// (DeduplicateAttributeValues, then DeduplicatePointIds), whose streams come out the same; its tables of
+/// nodes take three times as long, and more on meshes that fit no cache. Fewer than 2^31 values and points.
+void merge_equal_points(draco::Mesh& mesh);
+
+}  // namespace texmesh
