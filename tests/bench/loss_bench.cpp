@@ -68,13 +68,13 @@ Errors compare(const SplitMesh& whole, const SplitMesh& filled, const std::vecto
 /// Mean length of an edge in places.
 double mean_edge(const SplitMesh& mesh) {
   double sum = 0;
-  for (std::uint32_t f = 0; f < mesh.faces().size(); ++f)
+  for (std::uint32_t f = 0; f < mesh.face_count(); ++f)
     for (std::uint32_t k = 0; k < 3; ++k) {
       const SplitMesh::Point &a = mesh.points()[mesh.point_at(f, k)],
                              &b = mesh.points()[mesh.point_at(f, k + 1)];
       sum += std::sqrt(std::pow(a[0] - b[0], 2) + std::pow(a[1] - b[1], 2) + std::pow(a[2] - b[2], 2));
     }
-  return sum / (3.0 * static_cast<double>(mesh.faces().size()));
+  return sum / (3.0 * static_cast<double>(mesh.face_count()));
 }
 
 void measure(const std::string& path, int seeds) {

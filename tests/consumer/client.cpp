@@ -21,7 +21,7 @@ int main(int argc, char** argv) {
     if (package.manifest().stream) {
       SplitStreamReader stream(package.split_stream_head());
       stream.read_to_scale(0, package.entry(kSplitStreamPath));
-      std::cout << stream.mesh().faces().size() << " faces to begin with\n";
+      std::cout << stream.mesh().face_count() << " faces to begin with\n";
     }
     if (argc > 2) {
       const auto transport = open_transport({argv[2]});

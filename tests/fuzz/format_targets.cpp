@@ -170,8 +170,8 @@ void read_split_stream(ByteSpan input) {
     reader.add_parts(parts);
   }
   const SplitMesh& mesh = reader.mesh();
-  require(mesh.points().size() <= kLimits.points && mesh.faces().size() <= kLimits.faces, "a mesh too large");
-  for (std::uint32_t f = 0; f < mesh.faces().size(); ++f)
+  require(mesh.points().size() <= kLimits.points && mesh.face_count() <= kLimits.faces, "a mesh too large");
+  for (std::uint32_t f = 0; f < mesh.face_count(); ++f)
     for (std::uint32_t k = 0; k < 3; ++k)
       require(mesh.point_at(f, k) < mesh.points().size() && mesh.point_at(f, k) != mesh.point_at(f, k + 1),
               "a face without three points");

@@ -79,8 +79,8 @@ std::string raw_numbers(const SplitMesh& mesh) {
     }
     out << "\n";
   }
-  for (std::size_t f = 0; f < mesh.faces().size(); ++f)
-    out << "f " << mesh.faces()[f][0] << " " << mesh.faces()[f][1] << " " << mesh.faces()[f][2] << " "
+  for (std::uint32_t f = 0; f < mesh.face_count(); ++f)
+    out << "f " << mesh.wedge_at(f, 0) << " " << mesh.wedge_at(f, 1) << " " << mesh.wedge_at(f, 2) << " "
         << mesh.face_group()[f] << "\n";
   return out.str();
 }

@@ -61,14 +61,14 @@ Places places_of(const Mesh& mesh, const NestedScale& scale, const QuantisationG
   return shown(std::move(list));
 }
 Places places_of(const SplitMesh& mesh) {
-  Places list(mesh.faces().size());
+  Places list(mesh.face_count());
   for (std::uint32_t f = 0; f < list.size(); ++f)
     for (std::uint32_t k = 0; k < 3; ++k) list[f][k] = mesh.points()[mesh.point_at(f, k)];
   return shown(std::move(list));
 }
 
 void expect_sound_block(const SplitMesh& mesh, const SplitEdges& most, std::size_t block) {
-  for (std::uint32_t f = 0; f < mesh.faces().size(); ++f)
+  for (std::uint32_t f = 0; f < mesh.face_count(); ++f)
     for (std::uint32_t k = 0; k < 3; ++k) {
       ASSERT_LT(mesh.point_at(f, k), mesh.points().size());
       ASSERT_NE(mesh.point_at(f, k), mesh.point_at(f, k + 1));
