@@ -114,7 +114,7 @@ namespace {
 /// What OpenEXR takes memory for when it opens a file: attributes, and its packers' buffers for up to 256
 /// lines of all channels of the first part.
 void check_exr_header(const std::string& name, ByteSpan bytes, const ImageLimits& limits) {
-  constexpr std::uint64_t kLines = 256, kFreeSamples = 1 << 18, kMostShrunk = 20000;
+  constexpr std::uint64_t kLines = 256, kFreeSamples = 1 << 17, kMostShrunk = 20000;
   std::uint64_t width = 1, channels = 1;
   for_each_exr_attribute(bytes, [&](std::size_t part, const ExrAttribute& a) {
     if (!has_right_length(a))
