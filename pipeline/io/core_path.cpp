@@ -68,6 +68,7 @@ std::string core_executable() {
   namespace fs = std::filesystem;
   std::error_code ec;
   const fs::path self = fs::read_symlink("/proc/self/exe", ec);
+  if (ec) throw InputError("/proc/self/exe", "", "a link to this program (is /proc mounted?)", ec.message());
   const fs::path folder = self.parent_path();
   for (const fs::path& candidate : {folder / "texmesh-core", folder / "../libexec/texmesh/texmesh-core"})
     if (::access(candidate.c_str(), X_OK) == 0) return candidate.lexically_normal().string();

@@ -49,18 +49,34 @@ Bytes exr_of_one_row(std::uint32_t width, std::uint64_t pixels_at) {
   return out.finish();
 }
 
+/// A TIFF of fields with one short number each, and zeros and ones for its data.
+Bytes tiff_of(std::vector<std::pair<unsigned, unsigned>> fields, std::size_t data_bytes) {
+  BytesOut out;
+  out.text("II"), out.u16(42), out.u32(8), out.u16(static_cast<std::uint16_t>(fields.size()));
+  for (const auto& [tag, value] : fields) out.u16(tag), out.u16(3), out.u32(1), out.u32(value);
+  out.u32(0);
+  out.raw(Bytes(data_bytes, 0x55));
+  return out.finish();
+}
+
 /// A TIFF of 65,024 rows of seven texels, all from one strip: reading 64 rows at a time cost 30 s under asan.
 Bytes tiff_of_short_rows() {
-  BytesOut out;
-  out.text("II"), out.u16(42), out.u32(8), out.u16(7);
-  const auto entry = [&](unsigned tag, unsigned value) {
-    out.u16(tag), out.u16(3), out.u32(1), out.u32(value);
-  };
-  entry(256, 7), entry(257, 65024), entry(262, 1), entry(273, 100), entry(277, 1), entry(278, 65024),
-      entry(279, 8129);
-  out.u32(0);
-  out.raw(Bytes(65024 + 100, 0x55));
-  return out.finish();
+  return tiff_of({{256, 7}, {257, 65024}, {262, 1}, {273, 100}, {277, 1}, {278, 65024}, {279, 8129}}, 65124);
+}
+
+/// A small picture in a tile of 4 GB, which OpenImageIO took.
+Bytes tiff_of_large_tile() {
+  return tiff_of({{256, 8},
+                  {257, 48},
+                  {258, 8},
+                  {259, 8},
+                  {262, 1},
+                  {277, 1},
+                  {322, 65520},
+                  {323, 65520},
+                  {324, 150},
+                  {325, 50}},
+                 100);
 }
 
 /// A PNG with a chunk of text that claims 1 GB: libpng took the memory before it read.
@@ -150,7 +166,7 @@ std::vector<Bytes> regressions(const std::string& target) {
       {"glb_check", {glb_of_zeros()}},
       {"gltf", {gltf_of_zeros()}},
       {"png", {png_with_long_chunk()}},
-      {"tiff", {tiff_of_short_rows()}},
+      {"tiff", {tiff_of_short_rows(), tiff_of_large_tile()}},
       {"tables", {tables_of_many_cells()}}};
   const auto it = found.find(target);
   return it == found.end() ? std::vector<Bytes>{} : it->second;

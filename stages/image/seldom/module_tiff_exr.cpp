@@ -115,14 +115,24 @@ void check_spec(const std::string& name, const OIIO::ImageSpec& spec, const Imag
 
 /// No packer of TIFF or EXR shrinks a picture with any noise further. A header that claims more lies about
 /// the size, and is refused before memory is taken. (Deflate ends at 1032; the rest is for the newer
-/// packers.)
-void check_plausible(const Image& image) {
+/// packers.) Whole tiles are read, however little of them the image has.
+void check_plausible(const Image& image, const OIIO::ImageSpec& spec) {
   constexpr std::uint64_t kMostShrunk = 20000;
-  if (std::uint64_t{image.width_px} * image.height_px * image.channels / kMostShrunk <= image.bytes.size())
-    return;
+  const auto in_tiles = [](std::uint32_t px, int tile_px) {
+    const auto tile = static_cast<std::uint64_t>(std::max(1, tile_px));
+    return (px + tile - 1) / tile * tile;
+  };
+  const std::uint64_t width = in_tiles(image.width_px, spec.tile_width);
+  const std::uint64_t height = in_tiles(image.height_px, spec.tile_height);
+  // Both sides are below 2^32, so that their product is whole; more than the bytes times kMostShrunk ends
+  // here.
+  const std::uint64_t samples = static_cast<std::uint64_t>(spec.nchannels) * std::max(1, spec.tile_depth);
+  if (width * height / kMostShrunk <= image.bytes.size() / samples) return;
+  std::string found = std::to_string(image.width_px) + " x " + std::to_string(image.height_px);
+  if (spec.tile_width > 0)
+    found += " in tiles of " + std::to_string(spec.tile_width) + " x " + std::to_string(spec.tile_height);
   throw InputError(image.name, "image header",
-                   "a size that its " + std::to_string(image.bytes.size()) + " bytes can hold",
-                   std::to_string(image.width_px) + " x " + std::to_string(image.height_px));
+                   "a size that its " + std::to_string(image.bytes.size()) + " bytes can hold", found);
 }
 
 OpenImage open_checked(const Image& image) {
@@ -131,7 +141,7 @@ OpenImage open_checked(const Image& image) {
       static_cast<std::uint32_t>(open.spec.height) != image.height_px ||
       colour_channels(open.spec, image.format) != image.channels)
     throw InputError(image.name, "image header", "the size that import had found", "another one");
-  check_plausible(image);
+  check_plausible(image, open.spec);
   return open;
 }
 
