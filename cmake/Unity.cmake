@@ -50,7 +50,8 @@ function(texmesh_unity target)
     file(REAL_PATH ${source} source)
     file(STRINGS ${source} macro REGEX "^#define " LIMIT_COUNT 1)
     get_source_file_property(options ${source} COMPILE_OPTIONS)
-    if(macro)  # would reach the neighbours
+    get_source_file_property(alone ${source} SKIP_PRECOMPILE_HEADERS)
+    if(macro OR alone)  # would reach the neighbours, or is compiled in another way
       set_source_files_properties(${source} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
       continue()
     endif()

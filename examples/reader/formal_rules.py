@@ -156,6 +156,12 @@ def follow_schema(document, name, what):
     return document
 
 
+def major_of(manifest):
+    """The major version; 2 where there is none, which the schema refuses."""
+    version = manifest.get("version")
+    return version.get("major", 2) if isinstance(version, dict) else 2
+
+
 def parse_json(data, most, what, free=()):
     """A document; texts below members that are named in `free` may hold control characters."""
     def pairs(members):

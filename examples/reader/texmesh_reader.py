@@ -15,7 +15,7 @@ import zlib
 import numpy as np
 from PIL import Image
 
-from formal_rules import MAX32, Cursor, Record, Refused, Rules, clamp, cut, follow_schema, parse_json, require, sha
+from formal_rules import MAX32, Cursor, Record, Refused, Rules, clamp, cut, follow_schema, major_of, parse_json, require, sha
 from package_checks import Checks, write_raw
 
 RULES = Rules("format/rules.txt")
@@ -98,7 +98,7 @@ class Model:
         data = self.read("manifest.json")
         self.id, self.manifest = sha(data), parse_json(data, 16384, "manifest.json")
         m = self.manifest
-        require(m.version.major == 2, "W03", f"format {m.version.major} is not known; of format 1: compile again")
+        require(major_of(m) == 2, "W03", f"format {major_of(m)} is not known; of format 1: compile again")
         follow_schema(m, "manifest.v2", "manifest.json")
         RULES.follow("manifest", m=m)
         data = self.read("index.bin")

@@ -5,15 +5,12 @@
 #include <ctime>
 
 #include "tests/fuzz/mutate.h"
+#include "tests/support/sanitizers.h"
 
 namespace texmesh::fuzz {
 namespace {
 
-#ifdef __SANITIZE_ADDRESS__
-constexpr double kMostSeconds = 10;
-#else
-constexpr double kMostSeconds = 1;
-#endif
+constexpr double kMostSeconds = testing::sanitizers_take(1.0);
 
 class FuzzReplay : public ::testing::TestWithParam<Target> {};
 

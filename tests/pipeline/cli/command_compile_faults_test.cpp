@@ -11,6 +11,7 @@
 
 #include "pipeline/io/machine/owner_mark.h"
 #include "tests/faults/shared_counts.h"
+#include "tests/support/sanitizers.h"
 #include "tests/support/small_builds.h"
 
 namespace texmesh::testing {
@@ -81,9 +82,7 @@ class Site {
 class Faults : public ::testing::Test {
  protected:
   void SetUp() override {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-    GTEST_SKIP() << "a preloaded library would come before the sanitizer's";
-#endif
+    if (testing::kSanitized) GTEST_SKIP() << "a preloaded library would come before the sanitizer's";
   }
 
   static void TearDownTestSuite() { std::printf("points of all sweeps that ran: %d\n", all_points_); }

@@ -6,14 +6,11 @@
 #include <functional>
 
 #include "tests/support/gltf_builder.h"
+#include "tests/support/sanitizers.h"
 
 namespace texmesh::testing {
 
-#ifdef __SANITIZE_ADDRESS__
-inline constexpr double kMostSeconds = 20;
-#else
-inline constexpr double kMostSeconds = 2;
-#endif
+inline constexpr double kMostSeconds = sanitizers_take(2.0);
 
 inline std::string refusal(const Bytes& bytes, const ImportOptions& options = {}) {
   MemoryResolver resolver;

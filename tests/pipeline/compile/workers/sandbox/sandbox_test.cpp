@@ -22,6 +22,7 @@
 #include "pipeline/compile/workers/sandbox/worker_rules.h"
 #include "pipeline/io/atomic_file.h"
 #include "tests/support/command.h"
+#include "tests/support/sanitizers.h"
 
 namespace texmesh {
 namespace {
@@ -67,9 +68,7 @@ int try_to_connect(std::uint16_t port) {
 class Sandbox : public ::testing::Test {
  protected:
   void SetUp() override {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-    GTEST_SKIP() << "sanitizers look into the process as a debugger does";
-#endif
+    if (testing::kSanitized) GTEST_SKIP() << "sanitizers look into the process as a debugger does";
     if (!sandbox_support().complete())
       GTEST_SKIP() << "this kernel cannot bound a process: " << describe_sandbox(sandbox_support());
     for (const char* name : {"model", "result", "outside"}) fs::create_directories(folder_ / name);
