@@ -138,7 +138,8 @@ void add_method_options(Command& c, DeliveryArguments& a) {
   add_policy_option(c, a).rare();
   c.option("--order", a.order,
            "Next fragment: credit = by the sign of the credit; beta0 = by the throughput, as first "
-           "published; finest = always the finest. Default: credit, and beta0 with --policy thesis")
+           "published; finest = always the finest. Default: finest with --policy guard, beta0 with thesis, "
+           "else credit")
       .one_of_explained({"credit", "beta0", "finest"})
       .value_name("NAME")
       .rare();
@@ -238,6 +239,8 @@ DeliveryRequest delivery_request(const DeliveryArguments& a) {
   if (!a.order.empty())
     r.htc.order = choice<HtcOrder>(
         a.order, {{"credit", HtcOrder::kCredit}, {"beta0", HtcOrder::kBeta0}, {"finest", HtcOrder::kFinest}});
+  else if (r.htc.policy == Policy::kGuard)
+    r.htc.order = HtcOrder::kFinest;  // as browsers do: what shows most comes first
   const bool harmonic = r.htc.policy == Policy::kPrice || r.htc.policy == Policy::kProportional ||
                         r.htc.policy == Policy::kStatic;
   r.htc.throughput.estimator = a.estimator == "auto"

@@ -265,7 +265,7 @@ function loadGlb(url, {frames = 0} = {}) {
   run.promise = (async () => {
     const bytes = await (await fetch(url, {cache: 'no-store'})).arrayBuffer();
     run.bytes = bytes.byteLength;
-    const gltf = await gltfLoader().parseAsync(bytes, '');
+    const gltf = await gltfLoader().parseAsync(bytes, url.replace(/[^/]*$/, ''));
     run.object = gltf.scene;
     stage.scene.add(gltf.scene);
     draw();

@@ -67,6 +67,8 @@ export interface TimePlanOptions {
   waitS?: number;
   lowestRung?: (f: FragmentOffer, limits: boolean) => number;
   skips?: boolean;
+  /** Seconds from a request to its answer as they are now, for the requests in flight; left out: rttS. */
+  tripS?: () => number;
   rate?: TransferRate;
   estimate?: () => number;
 }

@@ -26,9 +26,9 @@ function completed(options: TimePlanOptions): Required<TimePlanOptions> {
     latencyS = Math.min(rttS, timeLimitS / 2), waitS = 0, lowestRung = lowestShown, skips = true,
     rate = transferRate(initialBytesS),
     // With several requests in flight completions come in bunches: only sums over some of them say anything.
-    estimate = () => rate.recentBytesS(),
+    estimate = () => rate.recentBytesS(), tripS = () => rttS,
   } = options;
-  return { ...options, guard, priceKappa, leastInFlight, mostInFlight, latencyS, waitS, lowestRung, skips, rate, estimate };
+  return { ...options, guard, priceKappa, leastInFlight, mostInFlight, latencyS, waitS, lowestRung, skips, rate, estimate, tripS };
 }
 
 /** Decides fragment by fragment what to ask for. The list is taken by falling eta (ties: index). Nothing is checked. */
@@ -166,7 +166,7 @@ export class UncheckedPlan {
     return Math.max(0, Math.min(beta * leftS - this.inFlightBytes_(), beta * (leftS - this.options_.latencyS)));
   }
   private windowOpen_(): boolean {
-    const { leastInFlight, mostInFlight, timeLimitS, latencyS, rttS, rate } = this.options_;
+    const { leastInFlight, mostInFlight, timeLimitS, latencyS, tripS, rate } = this.options_;
     const n = this.inFlight_.length;
     if (n < leastInFlight || n >= mostInFlight) return n < leastInFlight;
     // Transfers in flight take all the time that is left: a request now could only be late.
@@ -174,7 +174,7 @@ export class UncheckedPlan {
     // Counted in fragments of the planned size: counted in bytes, many small ones would be in flight when there is little
     // time, and those are received side by side and late.
     const fragmentBytes = this.planned_.total / this.offers_.length;
-    return n < leastInFlight + (windowFactor * (rate.recentBytesS(tripSamples) * rttS)) / fragmentBytes;
+    return n < leastInFlight + (windowFactor * (rate.recentBytesS(tripSamples) * tripS())) / fragmentBytes;
   }
   /**
    * Throughput of the link in the time left: the mean over as long a time until now, so that shorter bursts do not count. But a link

@@ -193,7 +193,8 @@ export class PackageDocuments {
     const bytes = ends.find((n) => n > 0 && n <= wholeDocumentBytes);
     if (!bytes) return false;
     // Whoever takes a document of these bytes holds the document to its digest.
-    if (this.form === 'range') await this.store.read(index, { offset: index.offset, bytes }, { kind: 'tables', signal });
+    const read = (): Promise<Uint8Array> => this.store.read(index, { offset: index.offset, bytes }, { kind: 'tables', signal });
+    if (this.form === 'range') await this.readOnce_(`documents/${bytes}`, read, signal);
     return true;
   }
 

@@ -67,7 +67,7 @@ export interface LoadOptions {
    * a time, textures at full size. Default guard.
    */
   policy?: Policy | 'htca';
-  /** Which fragment of the plan is fetched next. Default credit. */
+  /** Which fragment of the plan is fetched next. Default finest with guard: what shows most of what the camera sees; else credit. */
   order?: HtcOrder;
   /** First guess of the throughput, bytes per second; left out: the throughput of the first transfers. */
   beta0BytesS?: number;

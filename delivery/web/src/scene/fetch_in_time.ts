@@ -19,6 +19,9 @@ const leastRest = 0.004;
 /** Share of the bytes promised by the throughput that a request may count on. */
 const certain = 0.85;
 
+/** A page that is busy hears of answers late, and asks late: so many seconds more of the link are asked for at once, at most. */
+const mostBusyS = 0.25;
+
 /** Fetches fragments by Harmonic Time Compensation: group by group, so that the last one comes at the limit. */
 export class FetchInTime {
   private plan_?: UncheckedPlan;
@@ -41,7 +44,7 @@ export class FetchInTime {
 
   /** Options of the plan for fragments in so many seconds. */
   planOptions(timeLimitS: number): TimePlanOptions {
-    const { options: { policy, order = 'credit' }, reader: { client: { latencyS: rttS } }, beta0 } = this.load_;
+    const { options: { policy, order = policy === 'guard' ? 'finest' : 'credit' }, reader: { client: { latencyS: rttS } }, beta0 } = this.load_;
     const initialBytesS = Math.max(1, beta0);
     return { policy: policy as Policy, order, timeLimitS, rttS, initialBytesS, ...this.printed?.printedPlan(transferRate(initialBytesS), rttS) };
   }
@@ -51,13 +54,18 @@ export class FetchInTime {
     const whole = fetching.wholeRungs();
     const bytesEach = whole ? Infinity : this.printed ? 0 : groupBytes(load.beta0, load.reader.client.latencyS, timeLimitS);
     const list = groupedList(fragments, bytesEach, load.beta0 * timeLimitS);
-    const plan = (this.plan_ = new UncheckedPlan(list.offers, this.planOptions(timeLimitS)));
+    const plan = (this.plan_ = new UncheckedPlan(list.offers, { ...this.planOptions(timeLimitS), tripS: () => this.tripS_() }));
     const hooks = {
       decided: (step: HtcStep): void => this.decided_(step, list),
       lost: (wish: Wish, error: unknown): void => fetching.lost(wish, error),
     };
     await playPlan(plan, list, fetching.transfers, load.signal, timeLimitS + mostLate * load.limitS, hooks);
     if (!fetching.wholeRungs() && !this.printed) await this.spendRest_(fragments, plan);
+  }
+  /** From a request to its answer, as the page has noticed lately. */
+  private tripS_(): number {
+    const { rttS, latencyS } = this.load_.reader.client;
+    return Math.min(latencyS, rttS + mostBusyS);
   }
   private decided_(s: HtcStep, { groups, offers }: GroupedList): void {
     const group = groups[s.offer];

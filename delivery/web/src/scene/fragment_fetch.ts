@@ -1,7 +1,7 @@
-import type { Mesh } from 'three';
+import type { Mesh, Object3D } from 'three';
 import { type FragmentList, type ListOptions, fragmentList } from '../decide/fragment_list';
 import { isAbort, throwIfAborted } from '../format/errors';
-import { sleepS } from '../http/clock';
+import { nextTurn, sleepS } from '../http/clock';
 import type { Levels } from '../worker/protocol';
 import { FragmentFates } from './fragment_fates';
 import type { LoadContext } from './load_context';
@@ -50,17 +50,17 @@ export class FragmentFetch {
 
   /**
    * The list of the fragments of the planes shown, with the bytes that fetching takes. A fragment's losses count by the share that the
-   * camera sees, and by `unseen` at least; with a gaze, by the acuity of the eye, too.
+   * camera sees of `surface`, which is in the object or would be, and by `unseen` at least; with a gaze, by the acuity of the eye, too.
    */
-  async listOf(scale: number, unseen: number): Promise<FragmentList> {
+  async listOf(scale: number, unseen: number, surface: Object3D): Promise<FragmentList> {
     const { planes, transfers, load_: { view, options, object } } = this;
     const seen = new Map<number, Float32Array | undefined>();
     const looked = new Map<number, Float32Array>();
     const gaze = view.camera && options.gaze?.();
     const gazeWeights = gaze && (await import('./gaze/gaze_weights')).gazeWeights;
     for (const { plane } of planes.all()) {
-      await sleepS(0); // the page goes on in between
-      seen.set(plane, this.shares_(plane));
+      await nextTurn(); // the page goes on in between
+      seen.set(plane, this.shares_(plane, surface));
       if (gazeWeights) looked.set(plane, gazeWeights(planes.textures[plane], object, view.camera!, options.renderer, gaze, this.showsOf_(plane)));
     }
     const list = fragmentList(planes.data, planes.all(), { scale, displayedPx: view.display.heightPx, ...this.listOptions });
@@ -68,15 +68,17 @@ export class FragmentFetch {
       const { plane, fragment } = list.fragments[i];
       offer.bytes = offer.bytes.map((b, r) => transfers.bytesOf(plane, r, fragment) || b);
       const attention = looked.get(plane)?.[fragment] ?? 1;
-      offer.loss = offer.loss.map((l) => l * attention * Math.max(unseen, seen.get(plane)?.[fragment] ?? 1));
-      offer.eta *= attention;
+      const weight = attention * Math.max(unseen, seen.get(plane)?.[fragment] ?? 1);
+      offer.loss = offer.loss.map((l) => l * weight);
+      offer.eta *= weight;
     });
     return list;
   }
   /** Share of each fragment that the camera sees; undefined without a camera. */
-  private shares_(plane: number): Float32Array | undefined {
+  private shares_(plane: number, surface: Object3D): Float32Array | undefined {
     const { view, object } = this.load_;
-    return view.camera && seenShares(this.planes.textures[plane], object, view.camera, this.showsOf_(plane));
+    const within = surface === object || surface.parent ? undefined : object;
+    return view.camera && seenShares(this.planes.textures[plane], surface, view.camera, this.showsOf_(plane), within);
   }
   /** Whether a mesh has the plane's image. */
   private showsOf_(plane: number): (mesh: Mesh) => boolean {

@@ -86,10 +86,11 @@ class ModelLoad {
     this.source_ = new ScaleSource({
       reader, options, materials, pool, signal,
       added: () => this.textures?.showInNewMaterials(),
+      leadBytes: () => context.beta0 * reader.client.latencyS,
       problem: (error, what) => context.fail(error, what),
     });
     this.scale_ = new ShownScale(context, scene, this.source_);
-    this.proxies_ = new ProxyChoice(context, this.scale_.proxy);
+    this.proxies_ = new ProxyChoice(context, this.scale_.proxy, () => this.fetchDocuments_(true));
     this.firstPicture = this.showFirst_();
     this.done = this.firstPicture.then(() => this.showInTime_()).catch((error: unknown) => this.end_(error));
     this.done.catch(() => undefined);
@@ -150,10 +151,19 @@ class ModelLoad {
   /** Starts with the coarsest scale, which has the materials; resolves when the scale is shown. */
   private startScales_(): Promise<void> {
     const { context } = this;
-    const { shape, shown } = this.scale_.load(context.reader.manifest.scales.at(-1)!.scale);
+    const { arrived, shape, shown } = this.scale_.load(context.reader.manifest.scales.at(-1)!.scale);
     this.shape_ = shape;
-    if (!context.options.turn || context.phase !== 'first-picture') void this.openTextures_(); // others wait for their first pictures
+    if (context.options.turn && context.phase === 'first-picture') return shown; // others wait for their first pictures
+    arrived.then(() => this.fetchDocuments_()).catch(() => undefined); // whoever takes them asks again
+    void this.openTextures_();
     return shown;
+  }
+  /** Asks for what decisions about scales and textures are made from. */
+  private fetchDocuments_(withMesh = false): Promise<unknown> {
+    const { reader, signal } = this.context;
+    const documents = reader.prefetchDocuments(signal, withMesh);
+    this.source_.openStream().catch(() => undefined); // whoever wants scales of the stream asks again
+    return documents;
   }
   private openTextures_(): Promise<TextureLoad> {
     this.coming_ ??= Promise.all([import('./texture_load'), this.shape_]).then(([part]) => part.openTextureLoad(this.context, this.scale_, this.source_));
@@ -174,7 +184,7 @@ class ModelLoad {
     const { context } = this;
     context.enter('tables');
     if (!this.shape_) {
-      await this.proxies_.showStep(() => context.reader.prefetchDocuments(context.signal, true));
+      await this.proxies_.showStep();
       await this.startScales_();
     }
     this.textures = await this.openTextures_();

@@ -9,7 +9,7 @@ import type { SplitShapes } from './split_shape';
 
 /** A scale on its way. */
 export interface ScaleLoad {
-  /** All bytes are there. */
+  /** All bytes are there, or as many that a request that is made now is answered when the last one comes. */
   arrived: Promise<void>;
   shape: Promise<Object3D>;
 }
@@ -23,6 +23,8 @@ export interface ScaleSourceParts {
   signal: AbortSignal;
   /** Hears of every slot of a material that has a texture of the package. */
   added: (slot: Slot) => void;
+  /** Bytes that the link brings between a request and its answer. */
+  leadBytes: () => number;
   /** Hears of a problem for which there is another way. */
   problem: (error: unknown, what: string) => void;
 }
@@ -36,22 +38,26 @@ export class ScaleSource {
   private readonly offGpu_ = new Set<Object3D>(); // scales that were there and are not drawn
   private readonly underWay_ = new Map<number, ScaleLoad>();
   private splits_?: SplitShapes;
+  private opening_?: Promise<void>;
   private streamUsable_ = false;
   /** The GLB of the coarsest scale, which has the materials and their textures. */
   private first_?: ParsedGltf;
 
   constructor(private readonly parts_: ScaleSourceParts) {}
 
-  /** Reads the head of the vertex-split stream, where the stream is to be used. */
-  async openStream(): Promise<void> {
-    const { reader, options, pool, materials, added, signal, problem } = this.parts_;
+  /** Reads the head of the vertex-split stream once, where the stream is to be used. */
+  openStream(): Promise<void> {
+    return (this.opening_ ??= this.openStream_());
+  }
+  private async openStream_(): Promise<void> {
+    const { reader, options, pool, materials, added, leadBytes, signal, problem } = this.parts_;
     const { meshes } = options;
     // A tree's stream comes as a whole file.
     const cheap = meshes === 'stream' || (meshes !== 'glb' && reader.form !== 'files');
     if (!reader.manifest.stream || reader.manifest.scales.length < 2 || !cheap) return;
     try {
       const { openSplitShapes } = await import('./split_shape');
-      this.splits_ = await openSplitShapes(reader, pool, materials, added, signal);
+      this.splits_ = await openSplitShapes(reader, pool, materials, added, leadBytes, signal);
       this.streamUsable_ = true;
     } catch (error) {
       if (isAbort(error)) throw error;
@@ -140,14 +146,17 @@ export class ScaleSource {
     });
   }
   private async readGlb_(scale: number, arrived: () => void): Promise<Object3D> {
-    const { reader, options, materials, signal, added } = this.parts_;
-    const file = this.fileFor_(scale).scale;
+    const { reader, options, materials, signal, added, leadBytes } = this.parts_;
+    const { scale: file, glb: { bytes } } = this.fileFor_(scale);
     const known = this.shapes_.get(file);
     if (known) {
       this.shapes_.set(scale, known);
       return known;
     }
-    const glb = await reader.scaleGlb(file, { signal });
+    const onBytes = (received: number): void => {
+      if (bytes - received <= leadBytes()) arrived();
+    };
+    const glb = await reader.scaleGlb(file, { signal, onBytes });
     arrived();
     const placeholders = this.first_ !== undefined;
     await reader.decoded(signal, 'requireSelfContained', glb, placeholders);

@@ -90,6 +90,10 @@ export class ShownScale {
     if (!object.parent) this.scene_.add(object);
     this.load_.emit('scale', { scale: shown, triangles: reader.manifest.scales.find((s) => s.scale === shown)!.triangles });
   }
+  /** The object, or the scale that is held back: a proxy says nothing of fragments. */
+  surface(): Object3D {
+    return (this.held && this.source_.all().at(-1)) || this.load_.object;
+  }
   /** Scales that are there, and the proxy. */
   objects(): Object3D[] {
     return [...this.source_.all(), ...this.proxy.objects];

@@ -1,4 +1,5 @@
 import { BufferAttribute, BufferGeometry, Material, Mesh } from 'three';
+import { sumOf } from '../decide/numbers';
 import { concat } from '../format/bytes';
 import { FormatError } from '../format/errors';
 import type { PackageReader } from '../http/package_reader';
@@ -13,18 +14,19 @@ const leastRequestBytes = 32 << 10;
 
 let streamCount = 0;
 
-/** Reads the head of a package's stream of vertex splits. `added` hears of materials' slots that no GLB had. */
+/** Reads the head of a package's stream of vertex splits. `added` hears of materials' slots that no GLB had; see ScaleSourceParts for `leadBytes`. */
 export async function openSplitShapes(
   reader: PackageReader,
   pool: WorkerPool,
   materials: MaterialSet,
   added: (slot: Slot) => void,
+  leadBytes: () => number,
   signal: AbortSignal,
 ): Promise<SplitShapes> {
   const key = ++streamCount;
   const known = (await reader.splitStreamStart(withHeadBytes, signal))!; // the head, and some bytes that came with it
   const info = await pool.openSplits(key, known.subarray(0, reader.manifest.stream!.headBytes));
-  return new SplitShapes(reader, pool, materials, added, key, known, info);
+  return new SplitShapes(reader, pool, materials, added, leadBytes, key, known, info);
 }
 
 /** Scales that are fetched by one request. */
@@ -45,6 +47,7 @@ export class SplitShapes {
     private readonly pool_: WorkerPool,
     private readonly materials_: MaterialSet,
     private readonly added_: (slot: Slot) => void,
+    private readonly leadBytes_: () => number,
     private readonly key_: number,
     private readonly known_: Uint8Array,
     private readonly info_: SplitInfo,
@@ -58,7 +61,7 @@ export class SplitShapes {
     return s ? Math.max(0, s.end - Math.max(this.decoded_, this.known_.length)) : Infinity;
   }
   /**
-   * Fetches and decodes up to a scale. `arrived` is called when the bytes are there; `passed` hears of every scale on the way,
+   * Fetches and decodes up to a scale. `arrived` is called when all bytes but `leadBytes` are there, once or again; `passed` hears of every scale on the way,
    * the wanted one included.
    */
   load(scale: number, gltf: ParsedGltf, signal: AbortSignal, arrived: () => void, passed: (scale: number, mesh: Mesh) => void): Promise<Mesh> {
@@ -79,7 +82,12 @@ export class SplitShapes {
     passed: (scale: number, mesh: Mesh) => void,
   ): Promise<Mesh> {
     const runs = this.runsUpTo_(scale);
-    const requests = runs.map(({ from, scales }) => this.bytes_(from, scales.at(-1)!.end, signal)); // all are made at once
+    const left = runs.map(() => Infinity);
+    const come = (run: number, bytes: number): void => {
+      left[run] = bytes;
+      if (sumOf(left) <= this.leadBytes_()) arrived();
+    };
+    const requests = runs.map(({ from, scales }, i) => this.bytes_(from, scales.at(-1)!.end, signal, (bytes) => come(i, bytes))); // all are made at once
     Promise.all(requests).then(arrived, arrived);
     for (const [i, { from, scales }] of runs.entries()) {
       const got = await requests[i];
@@ -102,19 +110,22 @@ export class SplitShapes {
     }
     return runs;
   }
-  private async bytes_(from: number, to: number, signal: AbortSignal): Promise<Uint8Array> {
+  /** `left` hears of the bytes that are still to come. */
+  private async bytes_(from: number, to: number, signal: AbortSignal, left: (bytes: number) => void): Promise<Uint8Array> {
     const verify = (got: Uint8Array): Promise<void> => this.pool_.checkSplits(this.key_, from, got);
     const first = this.known_.subarray(from, to);
     const rest = to - from - first.length;
+    left(rest);
+    const onBytes = (received: number): void => left(rest - received);
     if (first.length > 0)
       try {
-        const all = rest > 0 ? concat([first, await this.reader_.splitStream(to - rest, rest, { signal })]) : first;
+        const all = rest > 0 ? concat([first, await this.reader_.splitStream(to - rest, rest, { signal, onBytes })]) : first;
         await verify(all);
         return all;
       } catch (error) {
         if (!(error instanceof FormatError)) throw error; // damaged on the way, perhaps with the head
       }
-    return this.reader_.splitStream(from, to - from, { signal, verify });
+    return this.reader_.splitStream(from, to - from, { signal, verify, onBytes });
   }
 
   private async add_(scale: number, update: SplitUpdate, gltf: ParsedGltf): Promise<Mesh> {

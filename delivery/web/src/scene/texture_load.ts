@@ -6,7 +6,7 @@ import { choiceInTime } from '../decide/scale_choice';
 import { type PlaneChoice, pictureFlip } from '../decide/texture_loss';
 import { type VisiblePart, selectScale } from '../decide/viewing';
 import { throwIfAborted } from '../format/errors';
-import { nowS, sleepS } from '../http/clock';
+import { nextTurn, nowS, sleepS } from '../http/clock';
 import type { PlaneComposer } from './composer';
 import { FetchInTime, composeS } from './fetch_in_time';
 import { FragmentFetch, requestBytes } from './fragment_fetch';
@@ -101,10 +101,10 @@ export class TextureLoad {
     // Coverage that no material asks for is not fetched.
     const choices = planes.fitting(chosen, scale).filter(({ base }) => planes.textures[base].role !== 'alpha' || planes.isUsed(base));
     const [{ shown }] = await Promise.all([planes.show(choices), fetching.transfers.prepare(choices.map((c) => c.plane), signal)]);
+    this.list_ = await fetching.listOf(scale, unseen, this.scale_.surface());
     // A mesh that takes less than a round trip leaves the link to the textures. A longer one is waited for; coarser scales show on its way.
     if (meshBytes > load.beta0 * reader.client.latencyS) await Promise.race([mesh.arrived, this.timer_(meshShare)]);
     load.enter('textures');
-    this.list_ = await fetching.listOf(scale, unseen);
     await this.fetchTimed_(this.list_);
     await shown;
     await fetching.composed();
@@ -182,7 +182,7 @@ export class TextureLoad {
         fetching.listOptions = listed ?? { groupWeights: value!.list.groupWeights };
         return value!;
       }
-      await sleepS(0); // the page goes on meanwhile
+      await nextTurn(); // the page goes on meanwhile
       throwIfAborted(load.signal);
     }
   }
@@ -252,7 +252,7 @@ export class TextureLoad {
     await sleepS(0);
     if (load.pool.isUnavailable) return false;
     if (all) await fetching.composed(); // a fragment must not come behind the one that replaces it
-    const list = await fetching.listOf(Math.max(this.scale_.shown, 0), 0); // fragments that are not seen are not fetched
+    const list = await fetching.listOf(Math.max(this.scale_.shown, 0), 0, this.scale_.surface()); // fragments that are not seen are not fetched
     this.list_ = list;
     const enough = load.options.refineTo ?? defaultRefineTo;
     const wishes = all ? allWishes(list, load.override.rung, fetching) : bestWishes(list, refineBytes, enough, this.planes_.data, fetching);

@@ -14,27 +14,30 @@ export function fragmentAt({ columns, rows, widthPx, heightPx, fragmentWidthPx, 
 
 /**
  * Share of each fragment's surface that the camera sees, from a sample of the triangles. Seen: within the camera's frustum and turned to
- * the camera, by the material's side. `shows`: whether a mesh has the plane's image, by texture coordinates of set 0. [fragments]
+ * the camera, by the material's side. `shows`: whether a mesh has the plane's image, by texture coordinates of set 0. `within`: an object that
+ * would have this one as its child. [fragments]
  */
-export function seenShares(plane: TextureInfo, object: Object3D, camera: Camera, shows: (mesh: Mesh) => boolean): Float32Array {
+export function seenShares(plane: TextureInfo, object: Object3D, camera: Camera, shows: (mesh: Mesh) => boolean, within?: Object3D): Float32Array {
   const { columns, rows } = plane;
   const seen = new Float32Array(columns * rows);
   const all = new Float32Array(columns * rows);
   object.updateWorldMatrix(true, true);
   const eye = new Vector3().setFromMatrixPosition(camera.matrixWorld);
   const frustum = new Frustum().setFromProjectionMatrix(new Matrix4().multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse));
-  const [at, uv, middle] = [new Triangle(), new Triangle(), new Vector3()];
+  const [at, uv, middle, world] = [new Triangle(), new Triangle(), new Vector3(), new Matrix4()];
   sampleTriangles(object, mostSamples, (mesh, places) => {
-    const { geometry: { attributes }, matrixWorld } = mesh;
+    const { geometry: { attributes } } = mesh;
     if (!attributes.uv || !shows(mesh)) return;
+    world.copy(mesh.matrixWorld);
+    if (within) world.premultiply(within.matrixWorld);
     uv.setFromAttributeAndIndices(attributes.uv, ...places).getMidpoint(middle);
     const f = fragmentAt(plane, middle);
     at.setFromAttributeAndIndices(attributes.position, ...places);
-    const corners = [at.a, at.b, at.c].map((p) => p.applyMatrix4(matrixWorld));
+    const corners = [at.a, at.b, at.c].map((p) => p.applyMatrix4(world));
     const area = at.getArea();
     all[f] += area;
     const sides = [mesh.material].flat().map((m) => m.side);
-    const front = sides.includes(BackSide) === matrixWorld.determinant() < 0; // mirrored: three.js takes the other side for the front
+    const front = sides.includes(BackSide) === world.determinant() < 0; // mirrored: three.js takes the other side for the front
     const turned = sides.includes(DoubleSide) || at.isFrontFacing(at.getMidpoint(middle).sub(eye)) === front;
     if (turned && corners.some((p) => frustum.containsPoint(p))) seen[f] += area;
   });

@@ -26,6 +26,17 @@ describe('a timed fetch', () => {
     expect(bytesAskedTwice(t.server.log, url)).toBe(0);
     expect(new Set(t.ended.map((step) => step.offer)).size).toBe(t.list.offers.length);
   });
+  it('has as much under way as comes while the page is busy', async () => {
+    const { list } = await setUp(undefined);
+    const { offers } = groupedList(list, 2000, 60000);
+    const underWay = (tripS: number): number => {
+      const plan = new UncheckedPlan(offers, { ...planOptions({ ...defaultHtcOptions(), timeLimitS: 2, rttS: 0.002 }), tripS: () => tripS });
+      let n = 0;
+      while (plan.next(0)) ++n;
+      return n;
+    };
+    expect(underWay(0.2)).toBeGreaterThan(underWay(0.002) + 2);
+  });
   it('gives up what does not come', async () => {
     const t = await fetchInTime(({ range }) => range !== undefined && range[0] > 100000 && 'stall', 0.3);
     const begin = performance.now();

@@ -40,6 +40,13 @@ describe('the visible surface', () => {
       root.updateMatrixWorld(true);
     }
   });
+  it('is the same of a mesh that would stand in an object', () => {
+    const place = new Group();
+    place.rotation.y = Math.PI; // what was behind is in front
+    place.updateMatrixWorld();
+    const seen = seenShares(plane, new Group().add(sphere.clone()), camera, () => true, place);
+    expect(seen[2] + seen[3]).toBeGreaterThan(2.5 * (seen[0] + seen[1]));
+  });
   it('of a mesh that does not show the plane may be seen or not', () => {
     expect([...seenShares(plane, root, camera, () => false)]).toEqual([0.5, 0.5, 0.5, 0.5]);
   });

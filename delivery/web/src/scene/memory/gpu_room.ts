@@ -1,5 +1,5 @@
 import type { WebGLRenderer } from 'three';
-import { sleepS } from '../../http/clock';
+import { nowS, sleepS } from '../../http/clock';
 import { gpuIdle } from '../gpu';
 
 /** Somebody who draws with a renderer. */
@@ -18,6 +18,12 @@ const shareAfter = { lost: 0.5, refused: 0.75 };
 /** New shapes go to the GPU with the next frame: the GPU is asked so much later. */
 const askAfterS = 0.25;
 const mostIdleS = 1;
+/**
+ * A question holds the page up until the GPU has done all that stands before it: half a second to one and a half were measured where the
+ * processor draws. A GPU that does nothing says so soon. One that never rests is asked at last.
+ */
+const soonS = 0.03;
+const mostBusyS = 10;
 /** WebGL keeps one flag for each kind of error. */
 const errorKinds = 8;
 
@@ -55,13 +61,21 @@ export class GpuRoom {
     if (this.asking_) return;
     this.asking_ = true;
     await sleepS(askAfterS);
-    await gpuIdle(this.renderer_, mostIdleS); // a question to a busy GPU holds the page up
+    await this.rest_();
     this.asking_ = false;
     if (this.users_.size === 0 || this.limitBytes <= leastLimit || !this.hasRefused_()) return;
     this.lower_(shareAfter.refused * this.usedBytes_());
     for (const user of [...this.users_]) user.refused?.();
   }
 
+  /** Resolves when the GPU has nothing to do. */
+  private async rest_(): Promise<void> {
+    for (const end = nowS() + mostBusyS; ; ) {
+      const start = nowS();
+      await gpuIdle(this.renderer_, mostIdleS);
+      if (nowS() < start + soonS || nowS() > end) return;
+    }
+  }
   private usedBytes_(): number {
     return [...this.users_].reduce((sum, user) => sum + user.gpuBytes(), 0);
   }

@@ -2,31 +2,50 @@ import { servingProxy } from '../../decide/proxy_choice';
 import type { LoadContext } from '../load_context';
 import type { ShownProxy } from './shown_proxy';
 
+/** What is fetched on the way to scales. */
+interface Way {
+  /** The larger proxy that is shown meanwhile; -1: none. */
+  step: number;
+  bytes?: Promise<Uint8Array>;
+  /** What scales need is there. */
+  rest: Promise<unknown>;
+}
+
 /** Which proxy a load shows: the smallest first, one that is enough, or a larger one on the way to scales. */
 export class ProxyChoice {
   private part_?: Promise<typeof import('../texture_load') | undefined>;
+  private way_?: Promise<Way>;
 
+  /** `fetchRest` fetches what scales need. */
   constructor(
     private readonly load_: LoadContext,
     private readonly proxy_: ShownProxy,
+    private readonly fetchRest_: () => Promise<unknown>,
   ) {}
 
-  /** Shows the smallest one; what decides about larger ones is loaded meanwhile. */
-  showFirst(): Promise<void> {
-    const { reader: { manifest }, view: { display } } = this.load_;
-    return this.proxy_.show(0, () => {
-      if (servingProxy(manifest, display.heightPx) < 0) this.part_ = import('../texture_load').catch(() => undefined); // said later
-    });
+  /**
+   * Shows the smallest one. What decides about larger ones is loaded meanwhile; and where nobody gives turns, the link goes on with what
+   * comes next while the proxy is decoded.
+   */
+  async showFirst(): Promise<void> {
+    const { load_: { reader: { manifest }, view: { display }, options: { turn } }, proxy_: proxy } = this;
+    const bytes = proxy.fetch(0);
+    const next = (): void => {
+      if (servingProxy(manifest, display.heightPx) >= 0) return;
+      this.part_ = import('../texture_load').catch(() => undefined); // said later
+      if (!turn) this.way_ = this.goOn_();
+    };
+    await Promise.all([proxy.show(0, bytes), bytes.then(next, () => undefined)]);
   }
-  /** Proxies are candidates: one is in the scene, and nothing is chosen by hand. */
-  private get asked_(): boolean {
+  /** Nothing is chosen by hand. */
+  private get free_(): boolean {
     const { override: { scale, rung }, options: { rule = 'flip', fullSize } } = this.load_;
-    return scale === undefined && rung === undefined && !fullSize && rule === 'flip' && this.proxy_.shown >= 0;
+    return scale === undefined && rung === undefined && !fullSize && rule === 'flip';
   }
   /** The smallest proxy that cannot be told from S_0 in this view; -1: none, or scales and textures are chosen by hand. */
   serving(): number {
     const { view, reader } = this.load_;
-    return this.asked_ ? servingProxy(reader.manifest, view.display.heightPx) : -1;
+    return this.free_ && this.proxy_.shown >= 0 ? servingProxy(reader.manifest, view.display.heightPx) : -1;
   }
   /** Shows a proxy that is enough. False where scales are needed. */
   async showServing(): Promise<boolean> {
@@ -39,16 +58,21 @@ export class ProxyChoice {
       return false;
     }
   }
-  /** Where a larger proxy pays on the way to scales: shows the proxy, and does the rest once the proxy's bytes are there. */
-  async showStep(rest: () => Promise<unknown>): Promise<void> {
+  /** Fetches what scales need; before that a larger proxy, where one pays on the way to scales. */
+  private async goOn_(): Promise<Way> {
     const { load_: load, proxy_: proxy } = this;
-    const part = this.asked_ && load.options.policy !== 'thesis' ? await this.part_ : undefined;
+    const part = this.free_ && load.options.policy !== 'thesis' ? await this.part_ : undefined;
     const step = part ? part.stepOf(load) : -1;
-    if (step <= proxy.shown) return void (await rest());
-    let arrive = (): void => undefined;
-    const arrived = new Promise<void>((done) => (arrive = done));
-    const shown = proxy.show(step, arrive).catch((error: unknown) => load.fail(error, 'proxy')); // the smaller one stays
-    await Promise.race([arrived, shown]);
-    await Promise.all([shown, rest()]);
+    const bytes = step > Math.max(proxy.shown, 0) ? proxy.fetch(step) : undefined;
+    const rest = (bytes ?? Promise.resolve()).then(this.fetchRest_, this.fetchRest_);
+    rest.catch(() => undefined); // whoever waits hears of it
+    return { step, bytes, rest };
+  }
+  /** Shows the larger proxy that pays, if any; resolves when what scales need is there, too. */
+  async showStep(): Promise<void> {
+    const { load_: load, proxy_: proxy } = this;
+    const { step, bytes, rest } = await (this.way_ ?? this.goOn_());
+    const shown = bytes && proxy.show(step, bytes).catch((error: unknown) => load.fail(error, 'proxy')); // the smaller one stays
+    await Promise.all([shown, rest]);
   }
 }

@@ -21,13 +21,16 @@ export class ShownProxy {
   get objects(): Object3D[] {
     return this.object_ ? [this.object_] : [];
   }
-  /** Loads a proxy, then puts it in place of the one before, in one turn of the page. `arrived` hears that all its bytes are there. */
-  async show(proxy: number, arrived?: () => void): Promise<void> {
+  /** The bytes of a proxy. */
+  fetch(proxy: number): Promise<Uint8Array> {
+    const { reader, signal } = this.load_;
+    return reader.proxyGlb(proxy, { signal });
+  }
+  /** Puts a proxy in place of the one before, in one turn of the page, once its bytes are there. */
+  async show(proxy: number, bytes = this.fetch(proxy)): Promise<void> {
     const { load_: load, scene_: scene } = this;
     const { reader, options, object, signal } = load;
-    const file = await reader.proxyGlb(proxy, { signal });
-    arrived?.();
-    const glb = await reader.decoded(signal, 'plainGlb', file);
+    const glb = await reader.decoded(signal, 'plainGlb', await bytes);
     const { scene: shape } = await parseScale(options.gltfLoader(), glb, false);
     try {
       await readyToDraw(load, scene, shape);

@@ -57,6 +57,28 @@ it('a GPU that refuses storage gets a smaller picture, as good as the one before
   expect(told.length).toBe(2);
 });
 
+it('a GPU that has something to do is asked when it rests', async () => {
+  const { renderer } = scantRenderer();
+  const gl = renderer.getContext();
+  let [busy, asked] = [true, 0];
+  const getError = (): number => {
+    ++asked;
+    return 0;
+  };
+  const answers = {
+    fenceSync: () => ({}), isSync: () => true, getSyncParameter: () => (busy ? 'UNSIGNALED' : 'SIGNALED'), getError,
+  };
+  const working = new Proxy(gl, { get: (own, name) => Reflect.get(name in answers ? answers : own, name) });
+  const room = GpuRoom.of(Object.assign(renderer, { getContext: () => working }));
+  room.add({ gpuBytes: () => 1e6 });
+  const done = room.ask();
+  await new Promise((go) => setTimeout(go, 1500)); // longer than a fence is waited for
+  expect(asked).toBe(0);
+  busy = false;
+  await done;
+  expect(asked).toBeGreaterThan(0);
+});
+
 it('a context that is lost with much in it lowers the limit; one with little in it does not', async () => {
   const { renderer, lose } = scantRenderer();
   const room = GpuRoom.of(renderer);

@@ -2,6 +2,7 @@ import { describe, expect, it } from 'vitest';
 import type { LoadContext } from '../../../src/scene/load_context';
 import { ProxyChoice } from '../../../src/scene/proxy/proxy_choice';
 import type { ShownProxy } from '../../../src/scene/proxy/shown_proxy';
+import '../../../src/scene/texture_load'; // or the first test would wait for it
 
 // Documents of a megabyte over 100 kB/s: scales come late, the larger proxy after half a second.
 const glb = (offset: number, bytes: number) => ({ path: '', offset, bytes, sha256: new Uint8Array(32) });
@@ -21,26 +22,31 @@ async function stepped(change: object = {}, broken = false): Promise<string[]> {
   } as unknown as LoadContext;
   const shown = {
     shown: -1,
-    async show(k: number, arrived?: () => void) {
+    async fetch(k: number): Promise<void> {
       if (broken && k > 0) throw new Error('broken');
       said.push(`${k} arrived`);
-      arrived?.();
-      await new Promise((go) => setTimeout(go, 20));
+    },
+    async show(k: number, bytes: Promise<void>): Promise<void> {
+      await bytes;
+      await new Promise((go) => setTimeout(go, 100));
       this.shown = k;
       said.push(`${k} shown`);
     },
   };
-  const choice = new ProxyChoice(load, shown as unknown as ShownProxy);
+  const choice = new ProxyChoice(load, shown as unknown as ShownProxy, async () => void said.push('documents'));
   await choice.showFirst();
-  await choice.showStep(async () => void said.push('documents'));
+  await choice.showStep();
   return said;
 }
 
 describe('a larger proxy on the way', () => {
-  it('is shown while documents come', async () => {
-    expect(await stepped()).toEqual(['0 arrived', '0 shown', '1 arrived', 'documents', '1 shown']);
+  it('is fetched while the first is decoded, and documents while it is', async () => {
+    expect(await stepped()).toEqual(['0 arrived', '1 arrived', 'documents', '0 shown', '1 shown']);
   });
-  const none = ['0 arrived', '0 shown', 'documents'];
+  it('waits for the turn where somebody gives turns', async () => {
+    expect(await stepped({ options: { beta0BytesS: 1e5, turn: () => undefined } })).toEqual(['0 arrived', '0 shown', '1 arrived', 'documents', '1 shown']);
+  });
+  const none = ['0 arrived', 'documents', '0 shown'];
   it('is left out where it does not pay, fit or suit the choice by hand', async () => {
     expect(await stepped({ options: { beta0BytesS: 1e8 } })).toEqual(none);
     expect(await stepped({ limitS: 0.6 })).toEqual(none);
@@ -49,6 +55,6 @@ describe('a larger proxy on the way', () => {
     expect(await stepped({ options: { beta0BytesS: 1e5, policy: 'thesis' } })).toEqual(none);
   });
   it('that is broken leaves the smaller one', async () => {
-    expect(await stepped({}, true)).toEqual(['0 arrived', '0 shown', 'failed: proxy', 'documents']);
+    expect(await stepped({}, true)).toEqual(['0 arrived', 'documents', '0 shown', 'failed: proxy']);
   });
 });
