@@ -237,6 +237,11 @@ double SurfaceDistance::search(Vec3d p, double enough, double best, std::uint32_
   return std::sqrt(best);
 }
 
+std::size_t enough_samples(std::size_t triangles, std::size_t most) {
+  constexpr std::size_t kLeast = 250, kTrianglesOfOneEach = 4;
+  return std::min(most, std::max(kLeast, triangles / kTrianglesOfOneEach));
+}
+
 std::vector<SurfaceSample> sample_surface(const std::vector<Vec3f>& positions,
                                           const std::vector<std::uint32_t>& wedge_position,
                                           const std::vector<Triangle>& triangles, std::size_t count) {

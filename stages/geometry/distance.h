@@ -75,6 +75,10 @@ struct SurfaceSample {
   float weight[3] = {1, 0, 0};
 };
 
+/// As many points as say something about so many triangles, at most `most`: where there are few, more than
+/// one for every fourth say little more.
+std::size_t enough_samples(std::size_t triangles, std::size_t most);
+
 /// `count` points spread over the surface in proportion to area: equal steps along the running sum of areas,
 /// weights from a low-discrepancy sequence. Deterministic; empty when no triangle has an area.
 std::vector<SurfaceSample> sample_surface(const std::vector<Vec3f>& positions,

@@ -100,12 +100,6 @@ CollapseStatistics collapse_statistics(const NestedScales& scales, std::size_t k
   return out;
 }
 
-/// Points on a scale: where there are few triangles, more than one for every fourth say little more.
-std::size_t sample_count(const NestedScale& scale, std::size_t most) {
-  constexpr std::size_t kLeast = 250, kTrianglesOfOneEach = 4;
-  return std::min(most, std::max(kLeast, scale.triangles.size() / kTrianglesOfOneEach));
-}
-
 /// Fills p95 and p99 of the pairs that end at scale j; returns the 95th percentile of S_0's distance in
 /// object units.
 double compare_finer(const NestedScales& scales, std::size_t j, std::span<const std::uint32_t> survivor,
@@ -136,7 +130,7 @@ std::vector<double> compare_scales(const NestedScales& scales, const Skeleton& s
   parallel_for(context, n - 1, 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i)
       sampled[i] = sample_scale(scales.mesh, scales.scales[i], skeleton.radius,
-                                sample_count(scales.scales[i], samples));
+                                enough_samples(scales.scales[i].triangles.size(), samples));
   });
   std::vector<double> error(n, 0);
   std::atomic<std::size_t> done = 0;

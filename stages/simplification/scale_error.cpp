@@ -13,13 +13,8 @@
 namespace texmesh {
 namespace {
 
-// Per scale and direction: the rms is within 2 % then; the largest distance is that of a sample. Where there
-// are few triangles, more than one for every fourth say little more.
-constexpr std::size_t kErrorSamples = 4000, kLeastSamples = 250, kTrianglesOfOneEach = 4;
-
-std::size_t sample_count(std::size_t triangles) {
-  return std::min(kErrorSamples, std::max(kLeastSamples, triangles / kTrianglesOfOneEach));
-}
+// Per scale and direction: the rms is within 2 % then; the largest distance is that of a sample.
+constexpr std::size_t kErrorSamples = 4000;
 
 /// A point of S_0 and the component that it lies on.
 struct Probe {
@@ -62,7 +57,7 @@ class ErrorMeter {
         original_(mesh_.positions, mesh_.wedge_position, mesh_.triangles),
         diagonal_(component_diagonals(component, mesh_)) {
     for (const SurfaceSample& s : sample_surface(mesh_.positions, mesh_.wedge_position, mesh_.triangles,
-                                                 sample_count(mesh_.triangles.size()))) {
+                                                 enough_samples(mesh_.triangles.size(), kErrorSamples))) {
       const std::uint32_t corner = heaviest_corner(mesh_, s);
       surface_.push_back({place(mesh_, mesh_.triangles, s), component[corner], corner});
     }
@@ -84,8 +79,9 @@ class ErrorMeter {
       Hint hint = walk.from(surface_[i].position, surface_[i].point).hint;
       return coarse(surface_[i].point, hint);
     });
-    const std::vector<SurfaceSample> samples = sample_surface(
-        mesh_.positions, mesh_.wedge_position, scale.triangles, sample_count(scale.triangles.size()));
+    const std::vector<SurfaceSample> samples =
+        sample_surface(mesh_.positions, mesh_.wedge_position, scale.triangles,
+                       enough_samples(scale.triangles.size(), kErrorSamples));
     const auto back = distances(samples.size(), [&](std::size_t i, Hint& last) {
       const Vec3d p = place(mesh_, scale.triangles, samples[i]);
       last = original_.nearer(original_.hint_of(scale.triangle_source[samples[i].triangle]), last, p);

@@ -26,6 +26,15 @@ double by_trying_all(const Mesh& mesh, Vec3d p) {
   return std::sqrt(best);
 }
 
+TEST(SurfaceSamples, FewTrianglesHaveFewerPointsAndNoneHaveMoreThanAsked) {
+  EXPECT_EQ(enough_samples(0, 4000), 250u);
+  EXPECT_EQ(enough_samples(1003, 4000), 250u);
+  EXPECT_EQ(enough_samples(1004, 4000), 251u);
+  EXPECT_EQ(enough_samples(100000, 4000), 4000u);
+  EXPECT_EQ(enough_samples(100000, 100), 100u);
+  EXPECT_EQ(enough_samples(12, 100), 100u);
+}
+
 void expect_exact(const Mesh& mesh, double size, Vec3d centre) {
   const SurfaceDistance surface(mesh.positions, mesh.wedge_position, mesh.triangles);
   testing::Random random{7};

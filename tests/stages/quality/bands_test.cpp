@@ -34,6 +34,14 @@ TEST(Bands, TheyAreEvenlySpreadAndOneLiesInTheMiddle) {
     ASSERT_EQ(bands.compared.size(), 1024u);
     const auto middle = static_cast<std::size_t>((rows.first + rows.end) / 2 * 1024);
     EXPECT_TRUE(bands.compared[middle]) << rows.first;
+    std::vector<std::size_t> begins;  // of bands that are whole
+    for (std::size_t t = 1; t + 2 < bands.rendered.size(); ++t)
+      if (!bands.rendered[t - 1] && bands.rendered[t]) begins.push_back(t);
+    ASSERT_GE(begins.size(), 2u) << rows.first;
+    for (std::size_t i = 1; i < begins.size(); ++i)
+      EXPECT_EQ(begins[i] - begins[i - 1], begins[1] - begins[0]) << rows.first;
+    for (std::size_t begin : begins)
+      for (std::size_t t = begin; t < begin + 4; ++t) EXPECT_EQ(bands.rendered[t], t < begin + 3) << t;
     EXPECT_LE(std::ranges::count(bands.rendered, 1), 18);
     EXPECT_GE(std::ranges::count(bands.rendered, 1), 9);
   }

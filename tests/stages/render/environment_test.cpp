@@ -33,6 +33,63 @@ Vec3d blurred_by_sum(const Radiance& radiance, Vec3f middle, double variance) {
   return sum * (1 / weights);
 }
 
+// What processors do for all channels at once, channel by channel.
+float diffuse_channel(const RenderEnvironment& light, Vec3f normal, float Vec4f::*channel) {
+  float sum = 0;
+  for (std::size_t k = 0; k < RenderEnvironment::kHarmonics; ++k) {
+    RenderEnvironment one;  // whose light is the harmonic itself, and without its sign
+    one.irradiance.fill({});
+    one.irradiance[k] = {1, -1, 0, 0};
+    const Vec3f basis = diffuse_light(one, normal);
+    sum += light.irradiance[k].*channel * (basis.x - basis.y);
+  }
+  return clamped(sum, 0, 65504);
+}
+
+float level_channel(const RenderEnvironment::Level& level, Vec2f place, float Vec4f::*channel) {
+  const float scale = static_cast<float>(level.side - 2) * 0.5f, end = static_cast<float>(level.side - 1);
+  const float x = clamped((place.x + 1) * scale + 0.5f, 0, end),
+              y = clamped((place.y + 1) * scale + 0.5f, 0, end);
+  const auto column = std::min(static_cast<std::size_t>(x), std::size_t{level.side - 2}),
+             row = std::min(static_cast<std::size_t>(y), std::size_t{level.side - 2});
+  const auto texel = [&](std::size_t dx, std::size_t dy) {
+    return level.texels[(row + dy) * level.side + column + dx].*channel;
+  };
+  const float fx = x - static_cast<float>(column), fy = y - static_cast<float>(row);
+  const float top = texel(0, 0) + (texel(1, 0) - texel(0, 0)) * fx,
+              bottom = texel(0, 1) + (texel(1, 1) - texel(0, 1)) * fx;
+  return top + (bottom - top) * fy;
+}
+
+float specular_channel(const RenderEnvironment& light, Vec3f direction, float roughness,
+                       float Vec4f::*channel) {
+  const float at = render::saturated(roughness) * static_cast<float>(light.levels.size() - 1);
+  const auto sharp = std::min(static_cast<std::size_t>(at), light.levels.size() - 2);
+  const Vec2f place = render::octahedral(direction);
+  const float a = level_channel(light.levels[sharp], place, channel),
+              b = level_channel(light.levels[sharp + 1], place, channel);
+  return a + (b - a) * (at - static_cast<float>(sharp));
+}
+
+TEST(Environment, ChannelsSummedAtOnceHaveTheBitsOfEachByItself) {
+  const RenderEnvironment lights[] = {studio_environment(),
+                                      prepare_environment(
+                                          [](Vec3f d) {
+                                            return Vec3f{d.x > 0 ? 1e30f : 0, d.y * 65504, 1e-30f};
+                                          },
+                                          {}, {})};
+  constexpr float Vec4f::*kChannels[] = {&Vec4f::x, &Vec4f::y, &Vec4f::z};
+  for (const RenderEnvironment& light : lights)
+    for (const Vec3f d : directions(300))
+      for (int c = 0; c < 3; ++c) {
+        EXPECT_EQ(diffuse_light(light, d)[c], diffuse_channel(light, d, kChannels[c])) << c;
+        for (const float roughness : {0.f, 0.07f, 0.5f, 0.99f, 1.f})
+          EXPECT_EQ(specular_light(light, d, roughness)[c],
+                    specular_channel(light, d, roughness, kChannels[c]))
+              << c << ' ' << roughness;
+      }
+}
+
 TEST(Environment, PlacesOfTheOctahedronAreTheirDirections) {
   for (const Vec3f d : directions(1000)) {
     const Vec2f place = render::octahedral(d);
