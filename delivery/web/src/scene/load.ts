@@ -84,13 +84,12 @@ class ModelLoad {
     const { reader, options, materials, pool, signal, disposal } = context;
     pool.onUnavailable = (error) => context.fail(error, 'workers');
     this.source_ = new ScaleSource({
-      reader, options, materials, pool, signal,
+      reader, options, materials, pool, signal, leadBytes: () => context.beta0 * reader.client.latencyS,
       added: () => this.textures?.showInNewMaterials(),
-      leadBytes: () => context.beta0 * reader.client.latencyS,
       problem: (error, what) => context.fail(error, what),
     });
     this.scale_ = new ShownScale(context, scene, this.source_);
-    this.proxies_ = new ProxyChoice(context, this.scale_.proxy, () => this.fetchDocuments_(true));
+    this.proxies_ = new ProxyChoice(context, this.scale_.proxy, () => this.source_.fetchDocuments(true));
     this.firstPicture = this.showFirst_();
     this.done = this.firstPicture.then(() => this.showInTime_()).catch((error: unknown) => this.end_(error));
     this.done.catch(() => undefined);
@@ -153,19 +152,11 @@ class ModelLoad {
     const { context } = this;
     const { arrived, shape, shown } = this.scale_.load(context.reader.manifest.scales.at(-1)!.scale);
     this.shape_ = shape;
-    if (context.options.turn && context.phase === 'first-picture') return shown; // others wait for their first pictures
-    arrived.then(() => this.fetchDocuments_()).catch(() => undefined); // whoever takes them asks again
-    void this.openTextures_();
+    if (!context.options.turn || context.phase !== 'first-picture') void this.openTextures_(arrived); // others wait for their first pictures
     return shown;
   }
-  /** Asks for what decisions about scales and textures are made from. */
-  private fetchDocuments_(withMesh = false): Promise<unknown> {
-    const { reader, signal } = this.context;
-    const documents = reader.prefetchDocuments(signal, withMesh);
-    this.source_.openStream().catch(() => undefined); // whoever wants scales of the stream asks again
-    return documents;
-  }
-  private openTextures_(): Promise<TextureLoad> {
+  private openTextures_(arrived?: Promise<void>): Promise<TextureLoad> {
+    arrived?.then(() => this.source_.fetchDocuments()).catch(() => undefined); // whoever takes them asks again
     this.coming_ ??= Promise.all([import('./texture_load'), this.shape_]).then(([part]) => part.openTextureLoad(this.context, this.scale_, this.source_));
     this.coming_.catch(() => undefined);
     return this.coming_;
@@ -183,10 +174,7 @@ class ModelLoad {
   private async showTextures_(): Promise<void> {
     const { context } = this;
     context.enter('tables');
-    if (!this.shape_) {
-      await this.proxies_.showStep();
-      await this.startScales_();
-    }
+    if (!this.shape_) await this.proxies_.showStep().then(() => this.startScales_());
     this.textures = await this.openTextures_();
     throwIfAborted(context.signal);
     await this.textures.timedPart();

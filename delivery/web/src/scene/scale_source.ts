@@ -45,6 +45,13 @@ export class ScaleSource {
 
   constructor(private readonly parts_: ScaleSourceParts) {}
 
+  /** Asks for what decisions about scales and textures are made from. */
+  fetchDocuments(withMesh = false): Promise<unknown> {
+    const { reader, signal } = this.parts_;
+    const documents = reader.prefetchDocuments(signal, withMesh);
+    this.openStream().catch(() => undefined); // whoever wants scales of the stream hears of it
+    return documents;
+  }
   /** Reads the head of the vertex-split stream once, where the stream is to be used. */
   openStream(): Promise<void> {
     return (this.opening_ ??= this.openStream_());

@@ -34,7 +34,7 @@ it('a scale that the stream alone has is the next finer file where the stream is
 it('a scale has arrived when no more is missing than comes while a request is on its way', async () => {
   for (const [lead, early] of [[1e6, true], [0, false]] as const) {
     const reader = await openAt(range());
-    const { scale, glb: { bytes } } = reader.manifest.scales[0];
+    const { scale, glb: { bytes } } = reader.manifest.scales.at(-1)!;
     let release = (): void => undefined;
     const released = new Promise<void>((go) => (release = go));
     const read = reader.scaleGlb.bind(reader);
