@@ -79,6 +79,13 @@ Bytes tiff_of_large_tile() {
                  100);
 }
 
+/// Five rows in a strip of 1.8 GB, which OpenImageIO took.
+Bytes tiff_of_long_strip() {
+  return tiff_of(
+      {{256, 27000}, {257, 5}, {258, 8}, {259, 8}, {262, 1}, {273, 150}, {277, 1}, {278, 65312}, {279, 50}},
+      100);
+}
+
 /// A PNG with a chunk of text that claims 1 GB: libpng took the memory before it read.
 Bytes png_with_long_chunk() {
   BytesOut out;
@@ -166,7 +173,7 @@ std::vector<Bytes> regressions(const std::string& target) {
       {"glb_check", {glb_of_zeros()}},
       {"gltf", {gltf_of_zeros()}},
       {"png", {png_with_long_chunk()}},
-      {"tiff", {tiff_of_short_rows(), tiff_of_large_tile()}},
+      {"tiff", {tiff_of_short_rows(), tiff_of_large_tile(), tiff_of_long_strip()}},
       {"tables", {tables_of_many_cells()}}};
   const auto it = found.find(target);
   return it == found.end() ? std::vector<Bytes>{} : it->second;

@@ -115,7 +115,7 @@ void check_spec(const std::string& name, const OIIO::ImageSpec& spec, const Imag
 
 /// No packer of TIFF or EXR shrinks a picture with any noise further. A header that claims more lies about
 /// the size, and is refused before memory is taken. (Deflate ends at 1032; the rest is for the newer
-/// packers.) Whole tiles are read, however little of them the image has.
+/// packers.) Whole tiles and strips are read, however little of them the image has.
 void check_plausible(const Image& image, const OIIO::ImageSpec& spec) {
   constexpr std::uint64_t kMostShrunk = 20000;
   const auto in_tiles = [](std::uint32_t px, int tile_px) {
@@ -123,7 +123,8 @@ void check_plausible(const Image& image, const OIIO::ImageSpec& spec) {
     return (px + tile - 1) / tile * tile;
   };
   const std::uint64_t width = in_tiles(image.width_px, spec.tile_width);
-  const std::uint64_t height = in_tiles(image.height_px, spec.tile_height);
+  const int strip_rows = spec.get_int_attribute("tiff:RowsPerStrip");  // below 0: all
+  const std::uint64_t height = in_tiles(image.height_px, std::max(spec.tile_height, strip_rows));
   // Both sides are below 2^32, so that their product is whole; more than the bytes times kMostShrunk ends
   // here.
   const std::uint64_t samples = static_cast<std::uint64_t>(spec.nchannels) * std::max(1, spec.tile_depth);
@@ -131,6 +132,8 @@ void check_plausible(const Image& image, const OIIO::ImageSpec& spec) {
   std::string found = std::to_string(image.width_px) + " x " + std::to_string(image.height_px);
   if (spec.tile_width > 0)
     found += " in tiles of " + std::to_string(spec.tile_width) + " x " + std::to_string(spec.tile_height);
+  else if (strip_rows > 0)
+    found += " in strips of " + std::to_string(strip_rows) + " rows";
   throw InputError(image.name, "image header",
                    "a size that its " + std::to_string(image.bytes.size()) + " bytes can hold", found);
 }
