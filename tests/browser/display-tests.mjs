@@ -104,6 +104,7 @@ test('the camera turns during the timed part: what is refined then is what it lo
 
 test('coming nearer during a load: it ends in time, with what the new view asks for', () => throttled({}, async (page, link, url) => {
   await lab(page, () => window.lab.start({size: 900, zoom: 0.4}));
+  const starved = starvation();
   const id = await lab(page, (u) => window.lab.load(u, {load: {time: 3}}), url);
   await until(page, (i) => window.lab.report(i).events.some((e) => e.name === 'fragment'), id);
   const far = (await lab(page, (i) => window.lab.report(i), id)).state.wantedScale;
@@ -115,7 +116,8 @@ test('coming nearer during a load: it ends in time, with what the new view asks 
   const r = await lab(page, (i) => window.lab.finished(i), id);
   check(!r.error, JSON.stringify(r.error));
   const deadline = r.events.find((e) => e.name === 'deadline');
-  check(deadline.actual <= 3 * 1.06, `${deadline.actual} s of 3`);
+  const waited = starved();
+  check(deadline.actual <= 3 * 1.06 + waited, `${deadline.actual} s of 3; starved for ${waited} s`);
   await link.set({bytesPerSecond: 1e12, rttMs: 0});
   await phaseIs(page, id);
   // What the deadline left comes on its own, on a busy machine a little after.
