@@ -49,7 +49,7 @@ Bytes exr_of_one_row(std::uint32_t width, std::uint64_t pixels_at) {
   return out.finish();
 }
 
-/// A TIFF of fields with one short number each, and zeros and ones for its data.
+/// A TIFF of fields with one short number each, and some data.
 Bytes tiff_of(std::vector<std::pair<unsigned, unsigned>> fields, std::size_t data_bytes) {
   BytesOut out;
   out.text("II"), out.u16(42), out.u32(8), out.u16(static_cast<std::uint16_t>(fields.size()));

@@ -125,8 +125,7 @@ void check_plausible(const Image& image, const OIIO::ImageSpec& spec) {
   const std::uint64_t width = in_tiles(image.width_px, spec.tile_width);
   const int strip_rows = spec.get_int_attribute("tiff:RowsPerStrip");  // below 0: all
   const std::uint64_t height = in_tiles(image.height_px, std::max(spec.tile_height, strip_rows));
-  // Both sides are below 2^32, so that their product is whole; more than the bytes times kMostShrunk ends
-  // here.
+  // Both sides are below 2^32, so that their product is whole.
   const std::uint64_t samples = static_cast<std::uint64_t>(spec.nchannels) * std::max(1, spec.tile_depth);
   if (width * height / kMostShrunk <= image.bytes.size() / samples) return;
   std::string found = std::to_string(image.width_px) + " x " + std::to_string(image.height_px);
