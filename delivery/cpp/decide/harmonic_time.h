@@ -31,6 +31,10 @@ enum class Policy : std::uint8_t { kHtc, kGuard, kPrice, kProportional, kStatic,
 /// Which end of the list is next. kCredit: by the sign of the next credit (negative: the finest fragment,
 /// positive: the coarsest). kBeta0: by the last throughput against beta_0. kFinest: always the finest.
 enum class HtcOrder : std::uint8_t { kCredit, kBeta0, kFinest };
+/// The order of a client that is told the policy alone. With kGuard what shows most comes first.
+constexpr HtcOrder default_order(Policy policy) {
+  return policy == Policy::kGuard ? HtcOrder::kFinest : HtcOrder::kCredit;
+}
 
 struct HtcOptions {
   Policy policy = Policy::kHtc;

@@ -236,11 +236,10 @@ DeliveryRequest delivery_request(const DeliveryArguments& a) {
                                            {"proportional", Policy::kProportional},
                                            {"static", Policy::kStatic},
                                            {"thesis", Policy::kThesis}});
-  if (!a.order.empty())
-    r.htc.order = choice<HtcOrder>(
-        a.order, {{"credit", HtcOrder::kCredit}, {"beta0", HtcOrder::kBeta0}, {"finest", HtcOrder::kFinest}});
-  else if (r.htc.policy == Policy::kGuard)
-    r.htc.order = HtcOrder::kFinest;  // as browsers do: what shows most comes first
+  r.htc.order = a.order.empty() ? default_order(r.htc.policy)
+                                : choice<HtcOrder>(a.order, {{"credit", HtcOrder::kCredit},
+                                                             {"beta0", HtcOrder::kBeta0},
+                                                             {"finest", HtcOrder::kFinest}});
   const bool harmonic = r.htc.policy == Policy::kPrice || r.htc.policy == Policy::kProportional ||
                         r.htc.policy == Policy::kStatic;
   r.htc.throughput.estimator = a.estimator == "auto"

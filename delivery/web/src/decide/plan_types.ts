@@ -25,6 +25,8 @@ export interface FragmentOffer {
 export type Policy = 'htc' | 'guard' | 'price' | 'proportional' | 'static' | 'thesis';
 /** Which end of the list is next: by the sign of the next credit, by the last throughput against beta_0, or the finest. */
 export type HtcOrder = 'credit' | 'beta0' | 'finest';
+/** The order of a client that is told the policy alone. With guard what shows most comes first. */
+export const defaultOrder = (policy: Policy): HtcOrder => (policy === 'guard' ? 'finest' : 'credit');
 
 /** A decision and what became of it. */
 export interface HtcStep {

@@ -1,5 +1,5 @@
 import type { FragmentList } from '../decide/fragment_list';
-import type { HtcStep, Policy, TimePlanOptions } from '../decide/plan_types';
+import { type HtcStep, type Policy, type TimePlanOptions, defaultOrder } from '../decide/plan_types';
 import { type GroupedList, groupBytes, groupedList } from '../decide/request_groups';
 import type * as Printed from '../decide/thesis/thesis_list';
 import { UncheckedPlan } from '../decide/unchecked_plan';
@@ -44,9 +44,10 @@ export class FetchInTime {
 
   /** Options of the plan for fragments in so many seconds. */
   planOptions(timeLimitS: number): TimePlanOptions {
-    const { options: { policy, order = policy === 'guard' ? 'finest' : 'credit' }, reader: { client: { latencyS: rttS } }, beta0 } = this.load_;
+    const { options, reader: { client: { latencyS: rttS } }, beta0 } = this.load_;
+    const policy = options.policy as Policy, order = options.order ?? defaultOrder(policy);
     const initialBytesS = Math.max(1, beta0);
-    return { policy: policy as Policy, order, timeLimitS, rttS, initialBytesS, ...this.printed?.printedPlan(transferRate(initialBytesS), rttS) };
+    return { policy, order, timeLimitS, rttS, initialBytesS, ...this.printed?.printedPlan(transferRate(initialBytesS), rttS) };
   }
 
   async run(fragments: FragmentList, timeLimitS: number): Promise<void> {
