@@ -8,6 +8,7 @@
 #include "pipeline/import/local_frame.h"
 #include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/text_scan.h"
+#include "stages/base/first_use_table.h"
 
 // STL knows triangles only: no colour, no texture, no shared vertices. Its face normals repeat the winding
 // (and are often 0), so they are ignored; the "attribute byte count" has no agreed meaning (VisCAM and Magics
@@ -91,12 +92,9 @@ std::vector<Vec3f> read_ascii(const std::string& file, std::span<const std::uint
 std::uint32_t bits_of(float x) { return x == 0 ? 0 : std::bit_cast<std::uint32_t>(x); }
 
 std::uint64_t hash_of(const Vec3f& p) {
-  std::uint64_t h = 0;
-  for (float x : {p.x, p.y, p.z}) {
-    h = (h ^ bits_of(x)) * 0x9e3779b97f4a7c15ull;
-    h ^= h >> 29;
-  }
-  return h ^ h >> 32;
+  std::uint64_t hash = 0;
+  for (const float x : {p.x, p.y, p.z}) hash = hash_with(hash, bits_of(x));
+  return hash;
 }
 
 bool same_point(const Vec3f& a, const Vec3f& b) {
@@ -105,19 +103,16 @@ bool same_point(const Vec3f& a, const Vec3f& b) {
 
 // Indices into `unique`, which is filled in order of first use.
 std::vector<std::uint32_t> weld(const std::vector<Vec3f>& points, std::vector<Vec3d>& unique) {
-  std::size_t size = 1024;
-  while (size < points.size() + points.size() / 2) size *= 2;
-  std::vector<std::uint32_t> table(size, 0), index(points.size()), first;  // table: index into first + 1
+  std::vector<std::uint32_t> index, first;  // first: of a unique point, the place in `points`
+  index.reserve(points.size());
+  FirstUseTable table(points.size() / 4);  // six triangles share a point of a closed surface
   for (std::size_t i = 0; i < points.size(); ++i) {
-    std::size_t slot = hash_of(points[i]) & (size - 1);
-    while (table[slot] && !same_point(points[first[table[slot] - 1]], points[i]))
-      slot = (slot + 1) & (size - 1);
-    if (!table[slot]) {
-      first.push_back(static_cast<std::uint32_t>(i));
-      unique.push_back(to_double(points[i]));
-      table[slot] = static_cast<std::uint32_t>(first.size());
-    }
-    index[i] = table[slot] - 1;
+    index.push_back(table.number_of(
+        hash_of(points[i]), [&](std::uint32_t n) { return same_point(points[first[n]], points[i]); },
+        [&](std::uint32_t n) { return hash_of(points[first[n]]); }));
+    if (index.back() < first.size()) continue;
+    first.push_back(static_cast<std::uint32_t>(i));
+    unique.push_back(to_double(points[i]));
   }
   return index;
 }

@@ -10,11 +10,6 @@
 namespace texmesh {
 namespace {
 
-std::uint64_t mix(std::uint64_t h, std::uint64_t value) {
-  h ^= value;
-  h *= 0x9e3779b97f4a7c15ull;
-  return h ^ h >> 29;
-}
 std::uint64_t bits(float x) { return std::bit_cast<std::uint32_t>(x); }
 bool equal_bits(float a, float b) {
   return std::bit_cast<std::uint32_t>(a) == std::bit_cast<std::uint32_t>(b);
@@ -156,15 +151,15 @@ void triangulate_polygon(std::span<const Vec3d> points, std::vector<std::array<s
 }
 
 MeshBuilder::MeshBuilder(const std::vector<Vec3d>& positions, Attributes attributes)
-    : positions_(positions), attributes_(attributes), table_(1024, 0) {}
+    : positions_(positions), attributes_(attributes) {}
 
 std::uint64_t MeshBuilder::hash(const Corner& c) const {
-  std::uint64_t h = mix(0, c.position);
-  if (attributes_.uv) h = mix(h, bits(c.uv.x) << 32 | bits(c.uv.y));
-  if (attributes_.normals) h = mix(mix(h, bits(c.normal.x) << 32 | bits(c.normal.y)), bits(c.normal.z));
-  if (attributes_.colours)
-    h = mix(mix(h, bits(c.colour.x) << 32 | bits(c.colour.y)), bits(c.colour.z) << 32 | bits(c.colour.w));
-  return h ^ h >> 32;
+  std::uint64_t h = hash_with(0, c.position);
+  const auto add = [&h](float a, float b) { h = hash_with(h, bits(a) << 32 | bits(b)); };
+  if (attributes_.uv) add(c.uv.x, c.uv.y);
+  if (attributes_.normals) add(c.normal.x, c.normal.y), add(c.normal.z, 0);
+  if (attributes_.colours) add(c.colour.x, c.colour.y), add(c.colour.z, c.colour.w);
+  return h;
 }
 
 bool MeshBuilder::same(std::uint32_t w, const Corner& c) const {
@@ -182,27 +177,15 @@ Corner MeshBuilder::corner_of(std::uint32_t w) const {
   return c;
 }
 
-void MeshBuilder::grow_table() {
-  table_.assign(table_.size() * 4, 0);
-  const std::size_t mask = table_.size() - 1;
-  for (std::uint32_t w = 0; w < mesh_.wedge_position.size(); ++w) {
-    std::size_t slot = hash(corner_of(w)) & mask;
-    while (table_[slot]) slot = (slot + 1) & mask;
-    table_[slot] = w + 1;
-  }
-}
-
 std::uint32_t MeshBuilder::wedge(const Corner& c) {
-  std::size_t mask = table_.size() - 1, slot = hash(c) & mask;
-  for (; table_[slot]; slot = (slot + 1) & mask)
-    if (same(table_[slot] - 1, c)) return table_[slot] - 1;
-  const auto w = static_cast<std::uint32_t>(mesh_.wedge_position.size());
-  table_[slot] = w + 1;
+  const std::uint32_t w = table_.number_of(
+      hash(c), [&](std::uint32_t other) { return same(other, c); },
+      [&](std::uint32_t other) { return hash(corner_of(other)); });
+  if (w < mesh_.wedge_position.size()) return w;
   mesh_.wedge_position.push_back(c.position);
   if (attributes_.uv) mesh_.uv0.push_back(c.uv);
   if (attributes_.normals) mesh_.normals.push_back(c.normal);
   if (attributes_.colours) mesh_.colours.push_back(c.colour);
-  if (mesh_.wedge_position.size() * 2 > table_.size()) grow_table();
   return w;
 }
 
@@ -227,7 +210,7 @@ void MeshBuilder::add_face(std::span<const Corner> corners, std::uint16_t materi
 
 Mesh MeshBuilder::finish() {
   set_positions(mesh_, positions_);
-  table_.assign(1024, 0);
+  table_ = FirstUseTable();
   Mesh mesh = std::move(mesh_);
   mesh_ = {};
   return mesh;

@@ -7,6 +7,7 @@
 
 #include "format/model/model.h"
 #include "pipeline/import/local_frame.h"
+#include "stages/base/first_use_table.h"
 
 namespace texmesh {
 
@@ -47,7 +48,6 @@ class MeshBuilder {
 
  private:
   std::uint32_t wedge(const Corner& corner);
-  void grow_table();
   std::uint64_t hash(const Corner& corner) const;
   bool same(std::uint32_t wedge, const Corner& corner) const;
   Corner corner_of(std::uint32_t wedge) const;
@@ -55,7 +55,7 @@ class MeshBuilder {
   const std::vector<Vec3d>& positions_;
   Attributes attributes_;
   Mesh mesh_;
-  std::vector<std::uint32_t> table_;  // open addressing: wedge + 1, 0 = free; a power of two
+  FirstUseTable table_;  // of wedges
   std::uint64_t ear_work_ = 0;
   std::vector<Vec3d> points_;                         // of the polygon at hand
   std::vector<std::array<std::uint32_t, 3>> pieces_;  // its triangles

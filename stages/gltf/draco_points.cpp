@@ -3,12 +3,11 @@
 #include <draco/mesh/mesh.h>
 
 #include <algorithm>
-#include <bit>
 #include <cstring>
 #include <span>
 #include <vector>
 
-#include "format/base/no_index.h"
+#include "stages/base/first_use_table.h"
 
 namespace texmesh {
 namespace {
@@ -19,14 +18,10 @@ struct FirstUses {
   std::vector<std::uint32_t> first;   // per number: the first record that has it
 };
 
-/// Any mix serves: the records decide about what is equal.
-std::uint64_t mixed(std::span<const std::uint32_t> record) {
-  std::uint64_t h = 0;
-  for (const std::uint32_t word : record) {
-    h = (h ^ word) * 0x9e3779b97f4a7c15u;
-    h ^= h >> 29;
-  }
-  return h * 0xbf58476d1ce4e5b9u;
+std::uint64_t hash_of(std::span<const std::uint32_t> record) {
+  std::uint64_t hash = 0;
+  for (const std::uint32_t word : record) hash = hash_with(hash, word);
+  return hash;
 }
 
 FirstUses find_first_uses(std::span<const std::uint32_t> words, std::size_t words_each) {
@@ -34,17 +29,14 @@ FirstUses find_first_uses(std::span<const std::uint32_t> words, std::size_t word
   const auto record = [&](std::size_t i) { return words.subspan(i * words_each, words_each); };
   FirstUses out;
   out.number.reserve(count);
-  const int bits = std::max(4, static_cast<int>(std::bit_width(2 * count)));
-  std::vector<std::uint32_t> table(std::size_t{1} << bits, kNoIndex);  // numbers, by open addressing
+  FirstUseTable table(count);
+  const auto record_of = [&](std::uint32_t number) { return record(out.first[number]); };
   for (std::size_t i = 0; i < count; ++i) {
-    std::size_t at = mixed(record(i)) >> (64 - bits);
-    while (table[at] != kNoIndex && !std::ranges::equal(record(out.first[table[at]]), record(i)))
-      at = (at + 1) & (table.size() - 1);
-    if (table[at] == kNoIndex) {
-      table[at] = static_cast<std::uint32_t>(out.first.size());
-      out.first.push_back(static_cast<std::uint32_t>(i));
-    }
-    out.number.push_back(table[at]);
+    const std::uint32_t number = table.number_of(
+        hash_of(record(i)), [&](std::uint32_t n) { return std::ranges::equal(record_of(n), record(i)); },
+        [&](std::uint32_t n) { return hash_of(record_of(n)); });
+    if (number == out.first.size()) out.first.push_back(static_cast<std::uint32_t>(i));
+    out.number.push_back(number);
   }
   return out;
 }
