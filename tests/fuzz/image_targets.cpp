@@ -92,7 +92,7 @@ bool read_fragment(ByteSpan input) {
 /// Tables up to a place that the first two bytes choose, the rest is the stream.
 bool join_streams(ByteSpan input) {
   Choices c(input);
-  const std::size_t cut = std::min<std::size_t>(c.number(2), c.rest().size());
+  const std::size_t wanted = c.number(2), cut = std::min(wanted, c.rest().size());
   const ByteSpan tables = c.rest().first(cut), stream = c.rest().subspan(cut);
   try {
     const Bytes file = join_fragment(Codec::kJpeg, tables, stream);
