@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "stages/image/image_metadata.h"
+#include "tests/stages/image/hostile_pictures.h"
 #include "tests/stages/image/image_files.h"
 #include "tests/stages/image/tiff_files.h"
 
@@ -124,6 +125,16 @@ TEST(DecodeTiffExr, PrimariesOfAnExrAreSeen) {
   EXPECT_FALSE(read_image_metadata(ImageFormat::kExr, exr_of({"R", "G", "B"})).other_primaries);
   for (std::size_t n = 0; n < aces.size(); ++n)
     read_image_metadata(ImageFormat::kExr, std::span(aces).first(n));
+}
+
+TEST(DecodeTiffExr, WhatLibrariesTookTooMuchForIsRefusedFirst) {
+  const auto refusal = [](const Bytes& file) { return error_of([&] { decode_image(probe(file)); }); };
+  const std::vector<Bytes> exrs = hostile_exrs();
+  for (std::size_t i = 0; i + 1 < exrs.size(); ++i)
+    EXPECT_NE(refusal(exrs[i]).find("image header"), std::string::npos) << refusal(exrs[i]);
+  EXPECT_NE(refusal(exrs.back()).find("a whole EXR"), std::string::npos) << refusal(exrs.back());
+  for (const Bytes& file : {tiff_of_large_tile(), tiff_of_long_strip()})
+    EXPECT_NE(refusal(file).find("a size that its"), std::string::npos) << refusal(file);
 }
 
 }  // namespace
