@@ -7,7 +7,7 @@ import { FragmentFates } from './fragment_fates';
 import type { LoadContext } from './load_context';
 import type { ShownPlanes } from './shown_planes';
 import { Transfers, type Wish } from './transfers';
-import { seenShares } from './visibility';
+import { type LookedSurface, seenShares } from './visibility';
 
 /** Bytes of a request. */
 export const requestBytes = 256 << 10;
@@ -53,7 +53,7 @@ export class FragmentFetch {
    * camera sees of `surface`, which is in the object or would be, and by `unseen` at least; with a gaze, by the acuity of the eye, too.
    */
   async listOf(scale: number, unseen: number, surface: Object3D): Promise<FragmentList> {
-    const { planes, transfers, load_: { view, options, object } } = this;
+    const { planes, transfers, load_: { view, options } } = this;
     const seen = new Map<number, Float32Array | undefined>();
     const looked = new Map<number, Float32Array>();
     const gaze = view.camera && options.gaze?.();
@@ -61,7 +61,7 @@ export class FragmentFetch {
     for (const { plane } of planes.all()) {
       await nextTurn(); // the page goes on in between
       seen.set(plane, this.shares_(plane, surface));
-      if (gazeWeights) looked.set(plane, gazeWeights(planes.textures[plane], object, view.camera!, options.renderer, gaze, this.showsOf_(plane)));
+      if (gazeWeights) looked.set(plane, gazeWeights(planes.textures[plane], this.lookedAt_(plane, surface), view.camera!, options.renderer, gaze));
     }
     const list = fragmentList(planes.data, planes.all(), { scale, displayedPx: view.display.heightPx, ...this.listOptions });
     list.offers.forEach((offer, i) => {
@@ -76,9 +76,13 @@ export class FragmentFetch {
   }
   /** Share of each fragment that the camera sees; undefined without a camera. */
   private shares_(plane: number, surface: Object3D): Float32Array | undefined {
-    const { view, object } = this.load_;
-    const within = surface === object || surface.parent ? undefined : object;
-    return view.camera && seenShares(this.planes.textures[plane], surface, view.camera, this.showsOf_(plane), within);
+    const { camera } = this.load_.view;
+    return camera && seenShares(this.planes.textures[plane], this.lookedAt_(plane, surface), camera);
+  }
+  /** `surface` is in the object, or would be. */
+  private lookedAt_(plane: number, surface: Object3D): LookedSurface {
+    const { object } = this.load_;
+    return { object: surface, shows: this.showsOf_(plane), within: surface === object || surface.parent ? undefined : object };
   }
   /** Whether a mesh has the plane's image. */
   private showsOf_(plane: number): (mesh: Mesh) => boolean {

@@ -1,12 +1,9 @@
-import { Camera, Mesh, Object3D, Triangle, Vector3, WebGLRenderer, Vector2 } from 'three';
+import { Camera, Vector2, Vector3, WebGLRenderer } from 'three';
 import { gazeWeight } from '../../decide/acuity';
 import type { TextureInfo } from '../../format/textures';
 import type { Gaze } from '../api';
-import { fragmentAt } from '../visibility';
-import { sampleTriangles } from '../scale_parts';
+import { type LookedSurface, sampleFragments } from '../visibility';
 
-/** Triangles looked at per model. */
-const mostSamples = 6000;
 /** Device pixels of a degree: 96 to the inch at 60 cm. */
 const usualPxPerDegree = 40;
 
@@ -16,23 +13,16 @@ const usualPxPerDegree = 40;
  */
 export function gazeWeights(
   plane: TextureInfo,
-  object: Object3D,
+  surface: LookedSurface,
   camera: Camera,
   renderer: WebGLRenderer,
   { x, y, pxPerDegree = usualPxPerDegree }: Gaze,
-  shows: (mesh: Mesh) => boolean,
 ): Float32Array {
   const count = plane.columns * plane.rows;
   const [weights, all] = [new Float32Array(count), new Float32Array(count)];
   const size = renderer.getDrawingBufferSize(new Vector2());
-  const [at, uv, middle] = [new Triangle(), new Triangle(), new Vector3()];
-  object.updateWorldMatrix(true, true);
-  sampleTriangles(object, mostSamples, (mesh, places) => {
-    const { geometry: { attributes }, matrixWorld } = mesh;
-    if (!attributes.uv || !shows(mesh)) return;
-    const f = fragmentAt(plane, uv.setFromAttributeAndIndices(attributes.uv, ...places).getMidpoint(middle));
-    at.setFromAttributeAndIndices(attributes.position, ...places);
-    [at.a, at.b, at.c].forEach((p) => p.applyMatrix4(matrixWorld));
+  const middle = new Vector3();
+  sampleFragments(plane, surface, (f, at) => {
     const area = at.getArea();
     at.getMidpoint(middle).applyMatrix4(camera.matrixWorldInverse);
     const behind = middle.z >= 0;
@@ -42,6 +32,6 @@ export function gazeWeights(
     all[f] += area;
   });
   // A fragment without a sample counts as much as the others do in the mean.
-  const [sum, surface] = [weights, all].map((a) => a.reduce((s, v) => s + v, 0));
-  return weights.map((w, f) => (all[f] > 0 ? w / all[f] : surface > 0 ? sum / surface : 1));
+  const [sum, area] = [weights, all].map((a) => a.reduce((s, v) => s + v, 0));
+  return weights.map((w, f) => (all[f] > 0 ? w / all[f] : area > 0 ? sum / area : 1));
 }

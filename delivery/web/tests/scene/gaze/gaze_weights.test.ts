@@ -18,14 +18,14 @@ describe('acuity', () => {
 describe('the gaze', () => {
   // A square that fills the picture, with a texture of 8 x 8 fragments.
   const square = new Mesh(new PlaneGeometry(2, 2, 64, 64), new MeshStandardMaterial());
-  const root = new Group().add(square);
+  const shown = { object: new Group().add(square), shows: () => true };
   const plane = { columns: 8, rows: 8, widthPx: 512, heightPx: 512, fragmentWidthPx: 64, fragmentHeightPx: 64 } as TextureInfo;
   const camera = new PerspectiveCamera(90, 1, 0.1, 100);
   camera.position.set(0, 0, 1);
   camera.updateMatrixWorld();
   const renderer = { getDrawingBufferSize: (to: { set(x: number, y: number): unknown }) => to.set(800, 800) } as unknown as WebGLRenderer;
   const weightsAt = (x: number, y: number, pxPerDegree?: number): Float32Array =>
-    gazeWeights(plane, root, camera, renderer, { x, y, pxPerDegree }, () => true);
+    gazeWeights(plane, shown, camera, renderer, { x, y, pxPerDegree });
   /** u, v of the square's texture: three.js has v upwards, the fragments count rows of v from 0. */
   const fragmentOf = (x: number, y: number): number => Math.floor(((y + 1) / 2) * 8) * 8 + Math.floor(((x + 1) / 2) * 8);
 
@@ -47,10 +47,17 @@ describe('the gaze', () => {
     expect(Math.min(...weights)).toBe(1);
   });
   it('gives fragments without a sample the mean, and an object without one weight 1', () => {
-    const none = gazeWeights(plane, root, camera, renderer, { x: 0, y: 0 }, () => false);
+    const none = gazeWeights(plane, { ...shown, shows: () => false }, camera, renderer, { x: 0, y: 0 });
     expect(Math.min(...none)).toBe(1);
     const finer = { ...plane, columns: 800, fragmentWidthPx: 1, widthPx: 800 } as TextureInfo;
-    const weights = gazeWeights(finer, root, camera, renderer, { x: 0, y: 0 }, () => true);
+    const weights = gazeWeights(finer, shown, camera, renderer, { x: 0, y: 0 });
     expect(Math.min(...weights)).toBeGreaterThan(0);
+  });
+  it('looks at a surface where it would stand', () => {
+    const within = new Group();
+    within.position.set(0.5, 0.25, 0);
+    within.updateMatrixWorld();
+    const moved = gazeWeights(plane, { ...shown, within }, camera, renderer, { x: 0.6, y: 0.35 });
+    expect(moved.indexOf(Math.max(...moved))).toBe(fragmentOf(0.1, 0.1));
   });
 });
