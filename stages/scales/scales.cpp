@@ -1,6 +1,7 @@
 #include "stages/scales/scales.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -332,6 +333,10 @@ ScaleFiles write_scales(const NestedScales& scales, const PerceptualValues& perc
     const PreviewForm form = i + 1 == kept.size() ? PreviewForm::kEmbedded : PreviewForm::kRelative;
     result.files[i] = write_scale(lit, scales.scales[kept[i]], materials, preview_files, form);
   };
+  std::atomic<std::size_t> made = 0;
+  const auto made_one = [&] {
+    context.report(static_cast<double>(++made) / static_cast<double>(1 + kept.size()));
+  };
   // The stream and S_0's file take about as long. These two scales have files beside any stream.
   const std::size_t always = std::min<std::size_t>(kept.size(), 2);
   parallel_for(context, 1 + always, 1, [&](std::size_t begin, std::size_t end) {
@@ -340,9 +345,9 @@ ScaleFiles write_scales(const NestedScales& scales, const PerceptualValues& perc
         write_stream(coding, scales, kept, materials, images, context, result);
       else
         write_file(task == 1 ? 0 : kept.size() - 1);
+      made_one();
     }
   });
-  context.report(0.5);
   const std::size_t between = kept.size() - always;
   if (!result.stream.empty()) {
     const SplitStreamHead head = read_split_head(result.stream);
@@ -350,7 +355,7 @@ ScaleFiles write_scales(const NestedScales& scales, const PerceptualValues& perc
       result.files[i] = count_streamed(head, scales.scales[kept[i]].scale);
   } else {
     parallel_for(context, between, 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin + 1; i <= end; ++i) write_file(i);
+      for (std::size_t i = begin + 1; i <= end; ++i) write_file(i), made_one();
     });
   }
   note_grid(coding, scales.scales[0].triangles.size(), result.files[0].triangles, result.notes);
