@@ -57,9 +57,8 @@ void view(const ViewArguments& args) {
   announce(args, site, "http://" + url_host(args.host) + ":" + std::to_string(port) + "/");
   int signal = 0;
   ::sigwait(&ends, &signal);
-  server.stop();
-  // Connections that browsers keep open would hold the library's threads for seconds. Nothing here needs
-  // an end.
+  // Without a stop: connections that browsers keep open would hold the library's threads for seconds. Nothing
+  // here needs an end.
   ::_exit(kExitOk);
 }
 

@@ -159,6 +159,5 @@ int ViewServer::bind(const std::string& host, int port) {
 }
 
 void ViewServer::serve() { impl_->server.listen_after_bind(); }
-void ViewServer::stop() { impl_->server.stop(); }
 
 }  // namespace texmesh

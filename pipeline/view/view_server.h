@@ -27,8 +27,7 @@ class ViewServer {
   ~ViewServer();
   /// Port 0 = any free one; returns the port. InputError where it cannot be had.
   int bind(const std::string& host, int port);
-  void serve();  // until stop(), from any thread
-  void stop();
+  void serve();  // until the process ends
 
  private:
   struct Impl;
