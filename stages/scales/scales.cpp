@@ -333,10 +333,9 @@ ScaleFiles write_scales(const NestedScales& scales, const PerceptualValues& perc
     const PreviewForm form = i + 1 == kept.size() ? PreviewForm::kEmbedded : PreviewForm::kRelative;
     result.files[i] = write_scale(lit, scales.scales[kept[i]], materials, preview_files, form);
   };
+  const std::size_t tasks = 1 + (options.stream ? std::min<std::size_t>(kept.size(), 2) : kept.size());
   std::atomic<std::size_t> made = 0;
-  const auto made_one = [&] {
-    context.report(static_cast<double>(++made) / static_cast<double>(1 + kept.size()));
-  };
+  const auto made_one = [&] { context.report(static_cast<double>(++made) / static_cast<double>(tasks + 1)); };
   // The stream and S_0's file take about as long. These two scales have files beside any stream.
   const std::size_t always = std::min<std::size_t>(kept.size(), 2);
   parallel_for(context, 1 + always, 1, [&](std::size_t begin, std::size_t end) {
@@ -355,7 +354,10 @@ ScaleFiles write_scales(const NestedScales& scales, const PerceptualValues& perc
       result.files[i] = count_streamed(head, scales.scales[kept[i]].scale);
   } else {
     parallel_for(context, between, 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin + 1; i <= end; ++i) write_file(i), made_one();
+      for (std::size_t i = begin + 1; i <= end; ++i) {
+        write_file(i);
+        if (made < tasks) made_one();  // a stream that was given up leaves more files than were counted
+      }
     });
   }
   note_grid(coding, scales.scales[0].triangles.size(), result.files[0].triangles, result.notes);
