@@ -1,0 +1,183 @@
+#include "stages/scales/collapse_replay.h"
+
+#include <algorithm>
+#include <string>
+
+#include "format/base/errors.h"
+
+namespace texmesh {
+namespace {
+
+/// Splits are the collapses backwards.
+void reverse(SplitSource::Chapter& chapter) {
+  const auto last = static_cast<std::uint32_t>(chapter.splits.size()) - 1;
+  std::reverse(chapter.splits.begin(), chapter.splits.end());
+  for (auto& [a, b] : chapter.before) a = last - a, b = last - b;
+}
+
+}  // namespace
+
+CollapseReplay::CollapseReplay(const NestedScales& scales, RoundedMesh& rounded)
+    : scales_(scales), rounded_(rounded), points_(rounded.points()), faces_(scales.mesh.triangles.size()) {
+  for (std::uint32_t f = 0; f < faces_.size(); ++f) {
+    for (std::uint32_t k = 0; k < 3; ++k) put_wedge(f, k, rounded_.wedge(scales.mesh.triangles[f][k]));
+    // Where rounding or twins leave a face with a corner twice it shows nothing and cannot take part.
+    if (point(f, 0) == point(f, 1) || point(f, 1) == point(f, 2) || point(f, 2) == point(f, 0))
+      faces_[f].alive = false;
+    if (!faces_[f].alive) continue;
+    for (std::uint32_t k = 0; k < 3; ++k) link(f, k);
+  }
+}
+
+SplitSource::Chapter CollapseReplay::run(const NestedScale& fine, const NestedScale& coarse) {
+  SplitSource::Chapter chapter;
+  chapter.scale = fine.scale;
+  chapter_ = &chapter;
+  shares_.clear();
+  for (Point& p : points_) p.use = {};
+  note_final(coarse);
+  for (std::uint32_t c = fine.collapse_count; c < coarse.collapse_count; ++c) {
+    const Collapse& collapse = scales_.collapses.at(c);
+    if (collapse.vanishes_with_component()) continue;
+    const std::uint32_t u = rounded_.point(collapse.from), v = rounded_.point(collapse.to);
+    if (u != v && points_[u].head != kNoIndex) replay(u, v);
+  }
+  patch_leftovers();
+  reverse(chapter);
+  return chapter;
+}
+
+SplitSource::Chapter CollapseReplay::remaining_faces(int scale) const {
+  SplitSource::Chapter chapter;
+  chapter.scale = scale;
+  for (std::uint32_t f = 0; f < faces_.size(); ++f)
+    if (faces_[f].alive) chapter.patch.push_back({f, faces_[f].wedge});
+  return chapter;
+}
+
+void CollapseReplay::put_wedge(std::uint32_t face, std::uint32_t corner, std::uint32_t wedge) {
+  faces_[face].wedge[corner] = wedge;
+  faces_[face].point[corner] = rounded_.point_of(wedge);
+}
+
+void CollapseReplay::link(std::uint32_t face, std::uint32_t corner) {
+  std::uint32_t& head = points_[point(face, corner)].head;
+  faces_[face].next[corner] = head;
+  head = 3 * face + corner;
+}
+
+void CollapseReplay::unlink(std::uint32_t face, std::uint32_t corner) {
+  std::uint32_t* at = &points_[point(face, corner)].head;
+  while (*at != 3 * face + corner) at = &next(*at);
+  *at = faces_[face].next[corner];
+}
+
+/// Wedges of the faces that the coarse scale has.
+void CollapseReplay::note_final(const NestedScale& coarse) {
+  for (Face& f : faces_) f.final.fill(kNoIndex);
+  for (std::size_t i = 0; i < coarse.triangles.size(); ++i)
+    for (std::size_t k = 0; k < 3; ++k)
+      faces_[coarse.triangle_source[i]].final[k] = rounded_.wedge(coarse.triangles[i][k]);
+}
+
+void CollapseReplay::replay(std::uint32_t u, std::uint32_t v) {
+  const auto number = static_cast<std::uint32_t>(chapter_->splits.size());
+  SplitSource::Split split{v,
+                           u,
+                           static_cast<std::uint32_t>(chapter_->moves.size()),
+                           0,
+                           static_cast<std::uint32_t>(chapter_->born.size()),
+                           0};
+  ring_.clear();
+  corners_.clear();
+  map_.clear();
+  for (std::uint32_t c = points_[u].head; c != kNoIndex; c = next(c)) corners_.push_back(c);
+  for (std::uint32_t c : corners_) {
+    const std::uint32_t f = c / 3, k = c % 3, a = point(f, k + 1), b = point(f, k + 2);
+    ring_.push_back(a);
+    ring_.push_back(b);
+    const std::array<std::uint32_t, 3>& wedge = faces_[f].wedge;
+    if (a == v || b == v) map_.push_back({wedge[k], group(f), wedge[(k + (a == v ? 1 : 2)) % 3]});
+  }
+  order(number, u, v);
+  for (std::uint32_t c : corners_) {
+    const std::uint32_t f = c / 3, k = c % 3;
+    if (point(f, k + 1) == v || point(f, k + 2) == v) {
+      chapter_->born.push_back({f, faces_[f].wedge});
+      for (std::uint32_t i = 0; i < 3; ++i)
+        if (i != k) unlink(f, i);
+      faces_[f].alive = false;
+    } else {
+      const std::uint32_t moved = faces_[f].wedge[k], last = faces_[f].final[k];
+      chapter_->moves.push_back({f, moved});
+      const bool stays = last != kNoIndex && rounded_.point_of(last) == v;
+      put_wedge(f, k, stays ? last : target(moved, group(f), v));
+    }
+  }
+  points_[u].head = kNoIndex;
+  for (std::uint32_t i = split.move_begin; i < chapter_->moves.size(); ++i) {
+    const std::uint32_t f = chapter_->moves[i].face;
+    for (std::uint32_t k = 0; k < 3; ++k)
+      if (point(f, k) == v) link(f, k);
+  }
+  split.move_end = static_cast<std::uint32_t>(chapter_->moves.size());
+  split.born_end = static_cast<std::uint32_t>(chapter_->born.size());
+  chapter_->splits.push_back(split);
+}
+
+std::uint32_t CollapseReplay::group(std::uint32_t face) const {
+  return std::uint32_t{scales_.mesh.triangle_material[face]} << 16 | scales_.mesh.triangle_part[face];
+}
+
+/// Where a wedge of the point that goes is mapped by the removed faces, those of its own material and part
+/// first; a wedge without such a face keeps its values and becomes one of the point that stays.
+std::uint32_t CollapseReplay::target(std::uint32_t wedge, std::uint32_t group, std::uint32_t v) {
+  for (const Mapping& m : map_)
+    if (m.from == wedge && m.group == group) return m.to;
+  for (const Mapping& m : map_)
+    if (m.from == wedge) return m.to;
+  const std::uint32_t made = rounded_.add_wedge(wedge, v);
+  map_.push_back({wedge, group, made});
+  return made;
+}
+
+/// Notes which earlier collapses this one comes after.
+void CollapseReplay::order(std::uint32_t number, std::uint32_t u, std::uint32_t v) {
+  auto after = [&](std::uint32_t earlier) {
+    if (earlier != kNoIndex) chapter_->before.push_back({number, earlier});
+  };
+  for (std::uint32_t p : {u, v}) {
+    PointUse& use = points_[p].use;
+    after(use.alone);
+    for (std::uint32_t s = use.shared; s != kNoIndex; s = shares_[s].next) after(shares_[s].collapse);
+    use = {number, kNoIndex};
+  }
+  ++now_;
+  points_[u].mark = points_[v].mark = now_;
+  for (std::uint32_t p : ring_) {
+    Point& around = points_[p];
+    if (around.mark == now_) continue;
+    around.mark = now_;
+    after(around.use.alone);
+    shares_.push_back({number, around.use.shared});
+    around.use.shared = static_cast<std::uint32_t>(shares_.size() - 1);
+  }
+}
+
+/// Faces that the coarse scale does not have although no collapse removed them become the chapter's patch.
+void CollapseReplay::patch_leftovers() {
+  for (std::uint32_t f = 0; f < faces_.size(); ++f) {
+    Face& face = faces_[f];
+    if (!face.alive) continue;
+    if (face.final[0] == kNoIndex) {
+      chapter_->patch.push_back({f, face.wedge});
+      for (std::uint32_t k = 0; k < 3; ++k) unlink(f, k);
+      face.alive = false;
+    } else if (face.wedge != face.final) {
+      throw StageError("scales", "collapses", "those that lead to the nested scales",
+                       "triangle " + std::to_string(f) + " elsewhere");
+    }
+  }
+}
+
+}  // namespace texmesh

@@ -1,0 +1,76 @@
+#pragma once
+// Inside the room only.
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "format/base/no_index.h"
+#include "format/split/split_source.h"
+#include "stages/data/nested_scales.h"
+#include "stages/scales/rounded_mesh.h"
+
+namespace texmesh {
+
+/// Replays the collapses from fine to coarse on faces of wedges, recording what each did.
+class CollapseReplay {
+ public:
+  CollapseReplay(const NestedScales& scales, RoundedMesh& rounded);
+
+  /// From scale `fine` to `coarse`; the chapter leads back.
+  SplitSource::Chapter run(const NestedScale& fine, const NestedScale& coarse);
+  /// All faces there are now.
+  SplitSource::Chapter remaining_faces(int scale) const;
+
+ private:
+  /// Who has used a point since, for the order of splits: a collapse uses its two points alone, the points
+  /// around shared.
+  struct PointUse {
+    std::uint32_t alone = kNoIndex;   // last collapse that had it alone
+    std::uint32_t shared = kNoIndex;  // head of a list of those that shared it since
+  };
+
+  // What is asked together lies together: collapses come in the order of their cost, anywhere on the surface.
+  struct Point {
+    std::uint32_t head = kNoIndex;  // its first corner
+    std::uint32_t mark = 0;         // the last collapse that counted it as one of those around
+    PointUse use;
+  };
+  struct Face {
+    std::array<std::uint32_t, 3> wedge{}, point{};
+    std::array<std::uint32_t, 3> next{};   // the next corner (3 * face + corner) at its point
+    std::array<std::uint32_t, 3> final{};  // wedges in the coarse scale, where it has the face
+    bool alive = true;
+  };
+  struct Mapping {
+    std::uint32_t from, group, to;
+  };
+  struct Share {
+    std::uint32_t collapse, next;
+  };
+
+  std::uint32_t point(std::uint32_t face, std::uint32_t corner) const {
+    return faces_[face].point[corner % 3];
+  }
+  void put_wedge(std::uint32_t face, std::uint32_t corner, std::uint32_t wedge);
+  std::uint32_t& next(std::uint32_t corner) { return faces_[corner / 3].next[corner % 3]; }
+  void link(std::uint32_t face, std::uint32_t corner);
+  void unlink(std::uint32_t face, std::uint32_t corner);
+  void note_final(const NestedScale& coarse);
+  void replay(std::uint32_t u, std::uint32_t v);
+  std::uint32_t group(std::uint32_t face) const;
+  std::uint32_t target(std::uint32_t wedge, std::uint32_t group, std::uint32_t v);
+  void order(std::uint32_t number, std::uint32_t u, std::uint32_t v);
+  void patch_leftovers();
+
+  const NestedScales& scales_;
+  RoundedMesh& rounded_;
+  std::vector<Point> points_;
+  std::vector<Face> faces_;
+  std::vector<Share> shares_;
+  std::vector<std::uint32_t> ring_, corners_;
+  std::vector<Mapping> map_;
+  std::uint32_t now_ = 0;
+  SplitSource::Chapter* chapter_ = nullptr;
+};
+
+}  // namespace texmesh
