@@ -22,6 +22,16 @@ std::vector<std::array<std::uint32_t, 3>> SplitMesh::face_wedges() const {
   return out;
 }
 
+void SplitMesh::reserve(std::size_t points, std::size_t wedges, std::size_t faces) {
+  points_.reserve(points);
+  ring_.reserve(points);
+  wedge_point_.reserve(wedges);
+  for (std::size_t k = 0; k < values_.size(); ++k)
+    values_[k].reserve(wedges * static_cast<std::size_t>(components_[k]));
+  faces_.reserve(faces);
+  face_group_.reserve(faces);
+}
+
 std::uint32_t SplitMesh::add_point() {
   points_.push_back({});
   ring_.emplace_back();
@@ -64,6 +74,16 @@ void SplitMesh::distribute(std::uint32_t from, std::uint32_t to, const std::vect
     ring.head = 3 * c.face + c.corner;
     ++ring.degree;
   }
+}
+
+std::uint32_t SplitMesh::look_behind(std::uint32_t corner) const {
+  const std::uint32_t face = corner / 3, beside = point_at(face, corner + 1);
+  const std::size_t wedge = wedge_at(face, corner + 1);
+  __builtin_prefetch(&ring_[beside]);
+  __builtin_prefetch(&points_[beside]);
+  for (std::size_t k = 0; k < values_.size(); ++k)
+    __builtin_prefetch(values_[k].data() + wedge * static_cast<std::size_t>(components_[k]));
+  return asked_for(next_of(corner));
 }
 
 /// Appends the fan that begins with the loose corner `start`.

@@ -43,6 +43,7 @@ class SplitMesh {
   std::vector<std::uint32_t> visible_faces() const;
 
   // For the codec:
+  void reserve(std::size_t points, std::size_t wedges, std::size_t faces);
   std::uint32_t add_point();
   std::uint32_t add_wedge(std::uint32_t point);
   void copy_values(std::uint32_t from, std::uint32_t to);
@@ -66,6 +67,11 @@ class SplitMesh {
   /// The corners at a point, sorted into fans: open fans first, each in the order of its first corner in
   /// the point's list.
   void gather(std::uint32_t point, std::vector<Corner>& corners, std::vector<Fan>& fans);
+  /// Asks memory for what gather(point) will read, first for the head of the point's list, and then corner by
+  /// corner: each call needs what the one before it has brought, and gives the next corner.
+  void look_ahead(std::uint32_t point) const { __builtin_prefetch(&ring_[point]); }
+  std::uint32_t look_at_first(std::uint32_t point) const { return asked_for(ring_[point].head); }
+  std::uint32_t look_behind(std::uint32_t corner) const;
   /// Gives the corners that move their target wedges, all of point `to`, which had no corner before.
   /// `corners` are those of gather(from); both points' corners stand in that order afterwards.
   void distribute(std::uint32_t from, std::uint32_t to, const std::vector<Corner>& corners);
@@ -82,6 +88,13 @@ class SplitMesh {
   };
   std::uint32_t& next_of(std::uint32_t corner) { return faces_[corner / 3].next[corner % 3]; }
   std::uint32_t next_of(std::uint32_t corner) const { return faces_[corner / 3].next[corner % 3]; }
+  /// The corner, whose face is asked for; it may be none.
+  std::uint32_t asked_for(std::uint32_t corner) const {
+    if (corner == kNoIndex) return corner;
+    __builtin_prefetch(&faces_[corner / 3].wedge);
+    __builtin_prefetch(&faces_[corner / 3].next[2]);
+    return corner;
+  }
   void gather_fan(std::uint32_t start, std::vector<Corner>& corners, std::vector<Fan>& fans);
   std::vector<Point> points_;
   std::vector<std::uint32_t> wedge_point_;

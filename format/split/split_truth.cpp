@@ -37,6 +37,43 @@ void SplitTruth::begin_split(std::uint32_t v, std::uint32_t u) {
     remaining_.push_back({i, third_of(chapter_->born[i])});
 }
 
+void SplitTruth::look_ahead(std::uint32_t v, std::size_t step, std::uint32_t corner) const {
+  if (step == 0) return __builtin_prefetch(&ready_[v]);
+  if (corner != kNoIndex) __builtin_prefetch(&move_[corner / 3]);
+  const std::uint32_t number = ready_[v];
+  if (number == kNoIndex || step > 4) return;
+  const SplitSource::Split& split = chapter_->splits[number];
+  if (step == 1) {
+    __builtin_prefetch(&split);
+    __builtin_prefetch(&first_[number]);
+    return;
+  }
+  const std::span moves(chapter_->moves.data() + split.move_begin, split.move_end - split.move_begin);
+  const std::span born(chapter_->born.data() + split.born_begin, split.born_end - split.born_begin);
+  const std::span after(after_.data() + first_[number], first_[number + 1] - first_[number]);
+  if (step == 2) {
+    for (const std::uint32_t p : {split.child, split.parent}) {
+      __builtin_prefetch(&source_.points[p]);
+      __builtin_prefetch(&stream_point_[p]);
+      __builtin_prefetch(&early_[p]);
+    }
+    __builtin_prefetch(moves.data());
+    __builtin_prefetch(born.data());
+    __builtin_prefetch(born.data() + 1);
+    __builtin_prefetch(after.data());
+  } else if (step == 3) {
+    for (const SplitSource::Move& m : moves) __builtin_prefetch(&stream_face_[m.face]);
+    for (const SplitSource::Face& f : born)
+      for (const std::uint32_t w : f.wedges) __builtin_prefetch(&source_.wedge_point[w]);
+    for (const std::uint32_t s : after) __builtin_prefetch(&waiting_[s]);
+  } else {
+    for (const SplitSource::Move& m : moves)
+      if (stream_face_[m.face] != kNoIndex) __builtin_prefetch(&move_[stream_face_[m.face]]);
+    for (const std::uint32_t s : after)
+      if (waiting_[s] == 1) __builtin_prefetch(&chapter_->splits[s]);
+  }
+}
+
 void SplitTruth::check_moves(std::size_t found) const {
   const SplitSource::Split& split = chapter_->splits[number_];
   if (found != split.move_end - split.move_begin)

@@ -87,7 +87,10 @@ class SplitStreamWriter {
       : source_(source),
         mesh_(components()),
         channel_(source, mesh_),
-        codec_(mesh_, channel_, source.groups.size(), SplitLimits{}) {}
+        codec_(mesh_, channel_, source.groups.size(), SplitLimits{}) {
+    // Growing by doubles would take twice the memory, and time to clear it.
+    mesh_.reserve(source.points.size(), source.wedge_point.size(), source.face_group.size());
+  }
 
   std::vector<std::uint8_t> write() {
     head_.position = source_.position;

@@ -1,6 +1,7 @@
 #include "stages/scales/collapse_replay.h"
 
 #include <algorithm>
+#include <ranges>
 #include <string>
 
 #include "format/base/errors.h"
@@ -15,19 +16,30 @@ void reverse(SplitSource::Chapter& chapter) {
   for (auto& [a, b] : chapter.before) a = last - a, b = last - b;
 }
 
+std::vector<ReplayFace> faces_of(const Mesh& mesh, const RoundedMesh& rounded) {
+  std::vector<ReplayFace> faces(mesh.triangles.size());
+  for (std::size_t f = 0; f < faces.size(); ++f) {
+    auto& [wedge, point, last, material, part, alive] = faces[f];
+    for (std::size_t k = 0; k < 3; ++k) {
+      wedge[k] = rounded.wedge(mesh.triangles[f][k]);
+      point[k] = rounded.point_of(wedge[k]);
+    }
+    material = mesh.triangle_material[f];
+    part = mesh.triangle_part[f];
+    // Where rounding or twins leave a face with a corner twice it shows nothing and cannot take part.
+    alive = point[0] != point[1] && point[1] != point[2] && point[2] != point[0];
+  }
+  return faces;
+}
+
 }  // namespace
 
 CollapseReplay::CollapseReplay(const NestedScales& scales, RoundedMesh& rounded)
-    : scales_(scales), rounded_(rounded), points_(rounded.points()), faces_(scales.mesh.triangles.size()) {
-  for (std::uint32_t f = 0; f < faces_.size(); ++f) {
-    for (std::uint32_t k = 0; k < 3; ++k) put_wedge(f, k, rounded_.wedge(scales.mesh.triangles[f][k]));
-    // Where rounding or twins leave a face with a corner twice it shows nothing and cannot take part.
-    if (point(f, 0) == point(f, 1) || point(f, 1) == point(f, 2) || point(f, 2) == point(f, 0))
-      faces_[f].alive = false;
-    if (!faces_[f].alive) continue;
-    for (std::uint32_t k = 0; k < 3; ++k) link(f, k);
-  }
-}
+    : scales_(scales),
+      rounded_(rounded),
+      points_(rounded.points()),
+      faces_(faces_of(scales.mesh, rounded)),
+      corners_(faces_, rounded.points()) {}
 
 SplitSource::Chapter CollapseReplay::run(const NestedScale& fine, const NestedScale& coarse) {
   SplitSource::Chapter chapter;
@@ -37,10 +49,11 @@ SplitSource::Chapter CollapseReplay::run(const NestedScale& fine, const NestedSc
   for (Point& p : points_) p.use = {};
   note_final(coarse);
   for (std::uint32_t c = fine.collapse_count; c < coarse.collapse_count; ++c) {
+    look_ahead(c, coarse.collapse_count);
     const Collapse& collapse = scales_.collapses.at(c);
     if (collapse.vanishes_with_component()) continue;
     const std::uint32_t u = rounded_.point(collapse.from), v = rounded_.point(collapse.to);
-    if (u != v && points_[u].head != kNoIndex) replay(u, v);
+    if (u != v) replay(u, v);
   }
   patch_leftovers();
   reverse(chapter);
@@ -60,27 +73,61 @@ void CollapseReplay::put_wedge(std::uint32_t face, std::uint32_t corner, std::ui
   faces_[face].point[corner] = rounded_.point_of(wedge);
 }
 
-void CollapseReplay::link(std::uint32_t face, std::uint32_t corner) {
-  std::uint32_t& head = points_[point(face, corner)].head;
-  faces_[face].next[corner] = head;
-  head = 3 * face + corner;
+/// Collapses come in the order of their cost, anywhere on the surface, and each would wait for memory a
+/// dozen times. So what the next ones read is asked for in steps, each of which needs what the one before
+/// it has brought.
+void CollapseReplay::look_ahead(std::uint32_t collapse, std::uint32_t end) const {
+  constexpr std::uint32_t kSteps = 5, kApart = 4;  // collapses between two steps
+  for (std::uint32_t step = 0; step < kSteps; ++step)
+    if (const std::uint32_t at = collapse + (kSteps - step) * kApart; at < end)
+      look_at(scales_.collapses[at], step);
 }
 
-void CollapseReplay::unlink(std::uint32_t face, std::uint32_t corner) {
-  std::uint32_t* at = &points_[point(face, corner)].head;
-  while (*at != 3 * face + corner) at = &next(*at);
-  *at = faces_[face].next[corner];
+void CollapseReplay::look_at(const Collapse& collapse, std::uint32_t step) const {
+  if (step == 0) {
+    for (const std::uint32_t position : {collapse.from, collapse.to}) rounded_.look_ahead(position);
+    return;
+  }
+  const std::uint32_t u = rounded_.point(collapse.from), v = rounded_.point(collapse.to);
+  if (step == 1) {
+    for (const std::uint32_t p : {u, v}) {
+      corners_.look_ahead(p);
+      __builtin_prefetch(&points_[p]);
+    }
+    return;
+  }
+  const std::span<const std::uint32_t> corners = corners_.at(u);
+  if (step == 2) {
+    __builtin_prefetch(corners.data());
+    __builtin_prefetch(corners.data() + corners.size());
+    return;
+  }
+  constexpr std::size_t kMost = 16;
+  for (const std::uint32_t c : corners.last(std::min(corners.size(), kMost))) {
+    const ReplayFace& face = faces_[c / 3];
+    if (step == 3) {
+      __builtin_prefetch(&face);
+      __builtin_prefetch(&face.alive);
+    } else if (face.alive) {
+      __builtin_prefetch(&points_[face.point[(c + 1) % 3]]);
+    }
+  }
 }
 
 /// Wedges of the faces that the coarse scale has.
 void CollapseReplay::note_final(const NestedScale& coarse) {
-  for (Face& f : faces_) f.final.fill(kNoIndex);
+  for (ReplayFace& f : faces_) f.final.fill(kNoIndex);
   for (std::size_t i = 0; i < coarse.triangles.size(); ++i)
     for (std::size_t k = 0; k < 3; ++k)
       faces_[coarse.triangle_source[i]].final[k] = rounded_.wedge(coarse.triangles[i][k]);
 }
 
 void CollapseReplay::replay(std::uint32_t u, std::uint32_t v) {
+  gathered_.clear();
+  for (const std::uint32_t c : corners_.at(u) | std::views::reverse)
+    if (faces_[c / 3].alive) gathered_.push_back(c);
+  corners_.clear(u);
+  if (gathered_.empty()) return;
   const auto number = static_cast<std::uint32_t>(chapter_->splits.size());
   SplitSource::Split split{v,
                            u,
@@ -89,10 +136,8 @@ void CollapseReplay::replay(std::uint32_t u, std::uint32_t v) {
                            static_cast<std::uint32_t>(chapter_->born.size()),
                            0};
   ring_.clear();
-  corners_.clear();
   map_.clear();
-  for (std::uint32_t c = points_[u].head; c != kNoIndex; c = next(c)) corners_.push_back(c);
-  for (std::uint32_t c : corners_) {
+  for (const std::uint32_t c : gathered_) {
     const std::uint32_t f = c / 3, k = c % 3, a = point(f, k + 1), b = point(f, k + 2);
     ring_.push_back(a);
     ring_.push_back(b);
@@ -100,12 +145,10 @@ void CollapseReplay::replay(std::uint32_t u, std::uint32_t v) {
     if (a == v || b == v) map_.push_back({wedge[k], group(f), wedge[(k + (a == v ? 1 : 2)) % 3]});
   }
   order(number, u, v);
-  for (std::uint32_t c : corners_) {
+  for (const std::uint32_t c : gathered_) {
     const std::uint32_t f = c / 3, k = c % 3;
     if (point(f, k + 1) == v || point(f, k + 2) == v) {
       chapter_->born.push_back({f, faces_[f].wedge});
-      for (std::uint32_t i = 0; i < 3; ++i)
-        if (i != k) unlink(f, i);
       faces_[f].alive = false;
     } else {
       const std::uint32_t moved = faces_[f].wedge[k], last = faces_[f].final[k];
@@ -114,11 +157,10 @@ void CollapseReplay::replay(std::uint32_t u, std::uint32_t v) {
       put_wedge(f, k, stays ? last : target(moved, group(f), v));
     }
   }
-  points_[u].head = kNoIndex;
   for (std::uint32_t i = split.move_begin; i < chapter_->moves.size(); ++i) {
     const std::uint32_t f = chapter_->moves[i].face;
     for (std::uint32_t k = 0; k < 3; ++k)
-      if (point(f, k) == v) link(f, k);
+      if (point(f, k) == v) corners_.add(v, 3 * f + k);
   }
   split.move_end = static_cast<std::uint32_t>(chapter_->moves.size());
   split.born_end = static_cast<std::uint32_t>(chapter_->born.size());
@@ -126,7 +168,7 @@ void CollapseReplay::replay(std::uint32_t u, std::uint32_t v) {
 }
 
 std::uint32_t CollapseReplay::group(std::uint32_t face) const {
-  return std::uint32_t{scales_.mesh.triangle_material[face]} << 16 | scales_.mesh.triangle_part[face];
+  return std::uint32_t{faces_[face].material} << 16 | faces_[face].part;
 }
 
 /// Where a wedge of the point that goes is mapped by the removed faces, those of its own material and part
@@ -167,11 +209,10 @@ void CollapseReplay::order(std::uint32_t number, std::uint32_t u, std::uint32_t 
 /// Faces that the coarse scale does not have although no collapse removed them become the chapter's patch.
 void CollapseReplay::patch_leftovers() {
   for (std::uint32_t f = 0; f < faces_.size(); ++f) {
-    Face& face = faces_[f];
+    ReplayFace& face = faces_[f];
     if (!face.alive) continue;
     if (face.final[0] == kNoIndex) {
       chapter_->patch.push_back({f, face.wedge});
-      for (std::uint32_t k = 0; k < 3; ++k) unlink(f, k);
       face.alive = false;
     } else if (face.wedge != face.final) {
       throw StageError("scales", "collapses", "those that lead to the nested scales",

@@ -1,12 +1,12 @@
 #pragma once
 // Inside the room only.
-#include <array>
 #include <cstdint>
 #include <vector>
 
 #include "format/base/no_index.h"
 #include "format/split/split_source.h"
 #include "stages/data/nested_scales.h"
+#include "stages/scales/corner_lists.h"
 #include "stages/scales/rounded_mesh.h"
 
 namespace texmesh {
@@ -31,15 +31,8 @@ class CollapseReplay {
 
   // What is asked together lies together: collapses come in the order of their cost, anywhere on the surface.
   struct Point {
-    std::uint32_t head = kNoIndex;  // its first corner
-    std::uint32_t mark = 0;         // the last collapse that counted it as one of those around
+    std::uint32_t mark = 0;  // the last collapse that counted it as one of those around
     PointUse use;
-  };
-  struct Face {
-    std::array<std::uint32_t, 3> wedge{}, point{};
-    std::array<std::uint32_t, 3> next{};   // the next corner (3 * face + corner) at its point
-    std::array<std::uint32_t, 3> final{};  // wedges in the coarse scale, where it has the face
-    bool alive = true;
   };
   struct Mapping {
     std::uint32_t from, group, to;
@@ -52,9 +45,8 @@ class CollapseReplay {
     return faces_[face].point[corner % 3];
   }
   void put_wedge(std::uint32_t face, std::uint32_t corner, std::uint32_t wedge);
-  std::uint32_t& next(std::uint32_t corner) { return faces_[corner / 3].next[corner % 3]; }
-  void link(std::uint32_t face, std::uint32_t corner);
-  void unlink(std::uint32_t face, std::uint32_t corner);
+  void look_ahead(std::uint32_t collapse, std::uint32_t end) const;
+  void look_at(const Collapse& collapse, std::uint32_t step) const;
   void note_final(const NestedScale& coarse);
   void replay(std::uint32_t u, std::uint32_t v);
   std::uint32_t group(std::uint32_t face) const;
@@ -65,9 +57,10 @@ class CollapseReplay {
   const NestedScales& scales_;
   RoundedMesh& rounded_;
   std::vector<Point> points_;
-  std::vector<Face> faces_;
+  std::vector<ReplayFace> faces_;
+  CornerLists corners_;
   std::vector<Share> shares_;
-  std::vector<std::uint32_t> ring_, corners_;
+  std::vector<std::uint32_t> ring_, gathered_;
   std::vector<Mapping> map_;
   std::uint32_t now_ = 0;
   SplitSource::Chapter* chapter_ = nullptr;

@@ -77,13 +77,21 @@ void RoundedMesh::append_value(const SplitAttribute& a, std::size_t w, std::vect
   }
 }
 
+/// The wedges of each point together, rising.
+std::vector<std::uint32_t> RoundedMesh::by_points(std::vector<std::uint32_t>& end) const {
+  end.assign(places_.size() + 1, 0);
+  const auto point_of = [&](std::uint32_t w) { return point_[mesh_.wedge_position[w]]; };
+  const auto n = static_cast<std::uint32_t>(mesh_.wedge_count());
+  for (std::uint32_t w = 0; w < n; ++w) ++end[point_of(w) + 1];
+  std::partial_sum(end.begin(), end.end(), end.begin());
+  std::vector<std::uint32_t> order(n);
+  for (std::uint32_t w = 0; w < n; ++w) order[end[point_of(w)]++] = w;
+  return order;
+}
+
 void RoundedMesh::merge_wedges(const std::vector<std::vector<std::int32_t>>& all) {
   const std::size_t n = mesh_.wedge_count();
-  std::vector<std::uint32_t> order(n);
-  std::iota(order.begin(), order.end(), 0u);
-  auto compare = [&](std::uint32_t a, std::uint32_t b) {
-    const std::uint32_t pa = point_[mesh_.wedge_position[a]], pb = point_[mesh_.wedge_position[b]];
-    if (pa != pb) return pa < pb ? -1 : 1;
+  const auto compare = [&](std::uint32_t a, std::uint32_t b) {
     for (std::size_t k = 0; k < attributes_.size(); ++k) {
       const auto c = static_cast<std::size_t>(split_components(attributes_[k].kind));
       for (std::size_t i = 0; i < c; ++i)
@@ -91,13 +99,18 @@ void RoundedMesh::merge_wedges(const std::vector<std::vector<std::int32_t>>& all
     }
     return 0;
   };
-  std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
-    const int c = compare(a, b);
-    return c < 0 || (c == 0 && a < b);
-  });
+  std::vector<std::uint32_t> end;  // by point
+  std::vector<std::uint32_t> order = by_points(end);
   std::vector<std::uint32_t> same(n);  // the lowest equal wedge
-  for (std::size_t i = 0; i < n; ++i)
-    same[order[i]] = i > 0 && compare(order[i - 1], order[i]) == 0 ? same[order[i - 1]] : order[i];
+  for (std::size_t p = 0, i = 0; p < places_.size(); ++p) {
+    const auto at = [&](std::size_t place) { return order.begin() + static_cast<std::ptrdiff_t>(place); };
+    std::sort(at(i), at(end[p]), [&](std::uint32_t a, std::uint32_t b) {
+      const int c = compare(a, b);
+      return c < 0 || (c == 0 && a < b);
+    });
+    for (const std::size_t begin = i; i < end[p]; ++i)
+      same[order[i]] = i > begin && compare(order[i - 1], order[i]) == 0 ? same[order[i - 1]] : order[i];
+  }
   wedge_.resize(n);
   values_.resize(attributes_.size());
   for (std::uint32_t w = 0; w < n; ++w) {

@@ -14,6 +14,8 @@ class RoundedMesh {
  public:
   RoundedMesh(const NestedScales& scales, const VertexSplitCoding& coding);
   std::uint32_t point(std::uint32_t position) const { return point_.at(position); }
+  /// Asks memory for what point() will read.
+  void look_ahead(std::uint32_t position) const { __builtin_prefetch(&point_[position]); }
   std::uint32_t wedge(std::uint32_t mesh_wedge) const { return wedge_.at(mesh_wedge); }
   std::uint32_t point_of(std::uint32_t wedge) const { return wedge_point_[wedge]; }
   std::size_t points() const { return places_.size(); }
@@ -25,6 +27,7 @@ class RoundedMesh {
  private:
   void add_attributes();
   void append_value(const SplitAttribute& a, std::size_t w, std::vector<std::int32_t>& out) const;
+  std::vector<std::uint32_t> by_points(std::vector<std::uint32_t>& end) const;
   void merge_wedges(const std::vector<std::vector<std::int32_t>>& all);
 
   const Mesh& mesh_;

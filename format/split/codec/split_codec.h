@@ -1,5 +1,6 @@
 #pragma once
 #include <algorithm>
+#include <array>
 #include <cstdint>
 
 #include "format/split/codec/split_element_codec.h"
@@ -29,6 +30,7 @@ class SplitCodec {
   void code_splits(std::uint32_t count) {
     while (count > 0) {
       const std::uint32_t v = queue_.pop();
+      look_ahead();
       elements_.steps.add(1);
       if (!code_answer(v)) {
         queue_.note_refusal(v);
@@ -48,6 +50,27 @@ class SplitCodec {
   }
 
  private:
+  /// Splits are anywhere on the surface, and each would wait for memory a dozen times. So what the next
+  /// points of the queue need is asked for, step by step.
+  void look_ahead() {
+    constexpr std::size_t kApart = 3;  // pops between two steps
+    static_assert(kSteps * kApart < kAhead);
+    ++popped_;
+    for (std::size_t step = 0; step < kSteps; ++step) {
+      const std::size_t more = (kSteps - 1 - step) * kApart;
+      const std::uint32_t p = queue_.ahead(more);
+      std::uint32_t& corner = ahead_[(popped_ + more) % kAhead];
+      if (step == 0) corner = kNoIndex;
+      if (p == kNoIndex) continue;
+      if (step == 0)
+        elements_.mesh.look_ahead(p);
+      else if (step == 1)
+        corner = elements_.mesh.look_at_first(p);
+      else if (corner != kNoIndex)
+        corner = elements_.mesh.look_behind(corner);
+      elements_.channel.update_truth([&](auto& t) { t.look_ahead(p, step, corner); });
+    }
+  }
   /// Whether the point splits now.
   bool code_answer(std::uint32_t v) {
     const auto degree = std::min<std::uint32_t>(elements_.mesh.degree(v), SplitModels::kDegrees - 1);
@@ -62,6 +85,9 @@ class SplitCodec {
   SplitVertexCodec<Channel> vertices_;
   SplitPatchCodec<Channel> patches_;
   bool last_answer_ = false;
+  static constexpr std::size_t kSteps = 8, kAhead = 32;
+  std::array<std::uint32_t, kAhead> ahead_{};  // the corner that look_ahead() has come to, by pops
+  std::size_t popped_ = 0;
 };
 
 }  // namespace texmesh

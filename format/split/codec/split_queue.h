@@ -37,6 +37,13 @@ class SplitQueue {
     queued_[point] = false;
     return point;
   }
+  /// The point that is popped after `more` others; kNoIndex where the queue ends before.
+  std::uint32_t ahead(std::size_t more) const {
+    if (next_ + more >= queue_.size()) return kNoIndex;
+    const std::uint32_t point = queue_[next_ + more];
+    __builtin_prefetch(&history_[point]);
+    return point;
+  }
   std::size_t refusals(std::uint32_t point) const { return history_[point] & 3u; }  // at most 3
   bool has_split(std::uint32_t point) const { return (history_[point] & kHasSplit) != 0; }
   void note_refusal(std::uint32_t point) {

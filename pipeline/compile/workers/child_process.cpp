@@ -5,8 +5,10 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <stdexcept>
+#include <vector>
 
 #include "pipeline/io/core_path.h"
 
@@ -37,7 +39,15 @@ void write_all(int fd, const std::string& text) {
 
 }  // namespace
 
-ChildProcess start_worker_process(const std::string& input) {
+std::vector<std::string> worker_environment(bool large_pages) {
+  std::vector<std::string> variables;
+  for (char** variable = environ; *variable; ++variable) variables.emplace_back(*variable);
+  if (large_pages && !::getenv("GLIBC_TUNABLES"))
+    variables.emplace_back("GLIBC_TUNABLES=glibc.malloc.hugetlb=1");
+  return variables;
+}
+
+ChildProcess start_worker_process(const std::string& input, bool large_pages) {
   static const std::string executable = core_executable();
   ChildProcess child;
   Pipe in, out, err;
@@ -48,7 +58,11 @@ ChildProcess start_worker_process(const std::string& input) {
   posix_spawn_file_actions_adddup2(&actions, err.write, 2);
   std::string name = "texmesh", command = "worker";
   char* argv[] = {name.data(), command.data(), nullptr};
-  const int rc = ::posix_spawn(&child.pid, executable.c_str(), &actions, nullptr, argv, environ);
+  std::vector<std::string> variables = worker_environment(large_pages);
+  std::vector<char*> environment;
+  for (std::string& variable : variables) environment.push_back(variable.data());
+  environment.push_back(nullptr);
+  const int rc = ::posix_spawn(&child.pid, executable.c_str(), &actions, nullptr, argv, environment.data());
   posix_spawn_file_actions_destroy(&actions);
   ::close(in.read);
   ::close(out.write);

@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <string>
+#include <vector>
 
 namespace texmesh {
 
@@ -13,9 +14,13 @@ struct ChildProcess {
   std::chrono::steady_clock::time_point start;
 };
 
-/// Starts `texmesh-core worker` (posix_spawn, never a fork of a threaded parent) and gives it `input` as the
-/// whole of its standard input. Throws std::runtime_error.
-ChildProcess start_worker_process(const std::string& input);
+/// This process's variables for a worker, as NAME=value. With `large_pages` glibc asks the system for pages
+/// of 2 MiB, unless GLIBC_TUNABLES is set already.
+std::vector<std::string> worker_environment(bool large_pages);
+
+/// Starts `texmesh-core worker` (posix_spawn, never a fork of a threaded parent) in worker_environment() and
+/// gives it `input` as the whole of its standard input. Throws std::runtime_error.
+ChildProcess start_worker_process(const std::string& input, bool large_pages);
 
 /// Appends what can be read now; false at the end of the file.
 bool read_available(int fd, std::string& into);

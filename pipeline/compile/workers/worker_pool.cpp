@@ -27,6 +27,10 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+/// From here on a model gets large pages: four million triangles take an eighth less of the processor's time
+/// with them, half a million nothing, and small models a few hundredths more memory.
+constexpr std::uint64_t kLargeModel_bytes = 1'000'000'000;
+
 volatile sig_atomic_t g_interrupted = 0;
 
 /// Catches SIGINT and SIGTERM while workers run and gives them back afterwards.
@@ -199,7 +203,8 @@ class WorkerPool {
     std::set<std::string> resting;
     for (const auto& [layer, rest] : layers_left_out_)
       if (rest.holds()) resting.insert(layer);
-    worker.process = start_worker_process(job_to_json(job, worker.temporary, limits_, threads, resting));
+    worker.process = start_worker_process(job_to_json(job, worker.temporary, limits_, threads, resting),
+                                          job.predicted_memory_bytes >= kLargeModel_bytes);
     reports_[index].lane = worker.lane;
     reports_[index].start_s = now_s();
     return worker;
