@@ -39,14 +39,17 @@ CollapseReplay::CollapseReplay(const NestedScales& scales, RoundedMesh& rounded)
       rounded_(rounded),
       points_(rounded.points()),
       faces_(faces_of(scales.mesh, rounded)),
-      corners_(faces_, rounded.points()) {}
+      corners_(faces_, rounded.points()) {
+  for (std::uint32_t f = 0; f < faces_.size(); ++f)
+    if (faces_[f].alive) alive_.push_back(f);
+}
 
 SplitSource::Chapter CollapseReplay::run(const NestedScale& fine, const NestedScale& coarse) {
   SplitSource::Chapter chapter;
   chapter.scale = fine.scale;
   chapter_ = &chapter;
   shares_.clear();
-  for (Point& p : points_) p.use = {};
+  begin_ = now_;
   note_final(coarse);
   for (std::uint32_t c = fine.collapse_count; c < coarse.collapse_count; ++c) {
     look_ahead(c, coarse.collapse_count);
@@ -63,8 +66,7 @@ SplitSource::Chapter CollapseReplay::run(const NestedScale& fine, const NestedSc
 SplitSource::Chapter CollapseReplay::remaining_faces(int scale) const {
   SplitSource::Chapter chapter;
   chapter.scale = scale;
-  for (std::uint32_t f = 0; f < faces_.size(); ++f)
-    if (faces_[f].alive) chapter.patch.push_back({f, faces_[f].wedge});
+  for (const std::uint32_t f : alive_) chapter.patch.push_back({f, faces_[f].wedge});
   return chapter;
 }
 
@@ -116,7 +118,7 @@ void CollapseReplay::look_at(const Collapse& collapse, std::uint32_t step) const
 
 /// Wedges of the faces that the coarse scale has.
 void CollapseReplay::note_final(const NestedScale& coarse) {
-  for (ReplayFace& f : faces_) f.final.fill(kNoIndex);
+  for (const std::uint32_t f : alive_) faces_[f].final.fill(kNoIndex);
   for (std::size_t i = 0; i < coarse.triangles.size(); ++i)
     for (std::size_t k = 0; k < 3; ++k)
       faces_[coarse.triangle_source[i]].final[k] = rounded_.wedge(coarse.triangles[i][k]);
@@ -188,8 +190,13 @@ void CollapseReplay::order(std::uint32_t number, std::uint32_t u, std::uint32_t 
   auto after = [&](std::uint32_t earlier) {
     if (earlier != kNoIndex) chapter_->before.push_back({number, earlier});
   };
+  // What a point has of the chapter before counts no more.
+  const auto use_of = [&](Point& p) -> PointUse& {
+    if (p.mark <= begin_) p.use = {};
+    return p.use;
+  };
   for (std::uint32_t p : {u, v}) {
-    PointUse& use = points_[p].use;
+    PointUse& use = use_of(points_[p]);
     after(use.alone);
     for (std::uint32_t s = use.shared; s != kNoIndex; s = shares_[s].next) after(shares_[s].collapse);
     use = {number, kNoIndex};
@@ -199,16 +206,17 @@ void CollapseReplay::order(std::uint32_t number, std::uint32_t u, std::uint32_t 
   for (std::uint32_t p : ring_) {
     Point& around = points_[p];
     if (around.mark == now_) continue;
+    PointUse& use = use_of(around);
     around.mark = now_;
-    after(around.use.alone);
-    shares_.push_back({number, around.use.shared});
-    around.use.shared = static_cast<std::uint32_t>(shares_.size() - 1);
+    after(use.alone);
+    shares_.push_back({number, use.shared});
+    use.shared = static_cast<std::uint32_t>(shares_.size() - 1);
   }
 }
 
 /// Faces that the coarse scale does not have although no collapse removed them become the chapter's patch.
 void CollapseReplay::patch_leftovers() {
-  for (std::uint32_t f = 0; f < faces_.size(); ++f) {
+  for (const std::uint32_t f : alive_) {
     ReplayFace& face = faces_[f];
     if (!face.alive) continue;
     if (face.final[0] == kNoIndex) {
@@ -219,6 +227,7 @@ void CollapseReplay::patch_leftovers() {
                        "triangle " + std::to_string(f) + " elsewhere");
     }
   }
+  std::erase_if(alive_, [&](std::uint32_t f) { return !faces_[f].alive; });
 }
 
 }  // namespace texmesh

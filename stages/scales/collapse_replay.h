@@ -58,11 +58,12 @@ class CollapseReplay {
   RoundedMesh& rounded_;
   std::vector<Point> points_;
   std::vector<ReplayFace> faces_;
+  std::vector<std::uint32_t> alive_;  // faces, rising; after a chapter only those that are
   CornerLists corners_;
   std::vector<Share> shares_;
   std::vector<std::uint32_t> ring_, gathered_;
   std::vector<Mapping> map_;
-  std::uint32_t now_ = 0;
+  std::uint32_t now_ = 0, begin_ = 0;  // collapses so far, in all and when the chapter began
   SplitSource::Chapter* chapter_ = nullptr;
 };
 

@@ -104,6 +104,9 @@ void number_wedges(ScalePrimitive& p, const std::vector<std::uint16_t>& part,
   for (std::uint32_t w : p.wedges) index[w] = kNoIndex;
 }
 
+/// Two corners in one place.
+bool is_flat(Vec3f a, Vec3f b, Vec3f c) { return a == b || b == c || c == a; }
+
 /// One primitive per part and material. Triangles with two corners in one place of the grid show nothing and
 /// go.
 std::vector<ScalePrimitive> split_primitives(const Mesh& mesh, const NestedScale& scale,
@@ -115,7 +118,7 @@ std::vector<ScalePrimitive> split_primitives(const Mesh& mesh, const NestedScale
     if (grid.bits > 0) {
       Vec3f at[3];
       for (std::size_t k = 0; k < 3; ++k) at[k] = grid.place(mesh.positions[mesh.wedge_position[t[k]]]);
-      if (at[0] == at[1] || at[1] == at[2] || at[2] == at[0]) continue;
+      if (is_flat(at[0], at[1], at[2])) continue;
     }
     const std::uint32_t source = scale.triangle_source[i];
     const std::uint16_t part = mesh.triangle_part[source];
@@ -244,11 +247,14 @@ ScaleFile count_streamed(const SplitStreamHead& head, int scale) {
 bool shows_the_same(const std::vector<std::uint8_t>& stream, const NestedScales& scales,
                     const std::vector<std::size_t>& kept, const QuantisationGrid& grid) {
   const SplitStreamHead head = read_split_head(stream);
+  std::vector<Vec3f> place;  // per position
+  for (const Vec3f p : scales.mesh.positions) place.push_back(grid.bits > 0 ? grid.place(p) : p);
+  const auto at = [&](std::uint32_t wedge) { return place[scales.mesh.wedge_position[wedge]]; };
   return std::ranges::all_of(kept, [&](std::size_t k) {
-    std::size_t triangles = 0;
-    for (const ScalePrimitive& p : split_primitives(scales.mesh, scales.scales[k], grid))
-      triangles += p.indices.size() / 3;
-    return count_streamed(head, scales.scales[k].scale).triangles == triangles;
+    const auto triangles = std::ranges::count_if(scales.scales[k].triangles, [&](const Triangle& t) {
+      return grid.bits == 0 || !is_flat(at(t[0]), at(t[1]), at(t[2]));
+    });
+    return count_streamed(head, scales.scales[k].scale).triangles == static_cast<std::size_t>(triangles);
   });
 }
 
