@@ -138,4 +138,14 @@ QuantisationGrid uv_grid(const std::vector<Vec2f>& uv, double largest_texture_px
   return grid;
 }
 
+double largest_rounding(const Mesh& mesh, const QuantisationGrid& grid) {
+  double largest = 0;
+  if (grid.bits == 0) return largest;
+  for (Vec3f p : mesh.positions) {
+    const Vec3f q = grid.rounded(p);
+    for (int k = 0; k < 3; ++k) largest = std::max(largest, std::fabs(static_cast<double>(q[k]) - p[k]));
+  }
+  return largest;
+}
+
 }  // namespace texmesh

@@ -34,4 +34,7 @@ QuantisationGrid position_grid(const Mesh& mesh, const ScalesOptions& options, i
 QuantisationGrid uv_grid(const std::vector<Vec2f>& uv, double largest_texture_px,
                          const ScalesOptions& options, int max_bits);
 
+/// How far rounding moves a position at most, along an axis.
+double largest_rounding(const Mesh& mesh, const QuantisationGrid& grid);
+
 }  // namespace texmesh

@@ -275,16 +275,6 @@ void write_stream(const ScaleCoding& coding, const NestedScales& scales, const s
   }
 }
 
-double largest_rounding(const Mesh& mesh, const QuantisationGrid& grid) {
-  double largest = 0;
-  if (grid.bits == 0) return largest;
-  for (Vec3f p : mesh.positions) {
-    const Vec3f q = grid.rounded(p);
-    for (int k = 0; k < 3; ++k) largest = std::max(largest, std::fabs(static_cast<double>(q[k]) - p[k]));
-  }
-  return largest;
-}
-
 void note_parts(const Mesh& mesh, Notes& notes) {
   if (!parts_merged(mesh)) return;
   add_info(notes, "parts-merged", "",
