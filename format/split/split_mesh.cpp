@@ -76,7 +76,7 @@ void SplitMesh::distribute(std::uint32_t from, std::uint32_t to, const std::vect
   }
 }
 
-std::uint32_t SplitMesh::look_behind(std::uint32_t corner) const {
+std::uint32_t SplitMesh::look_beside(std::uint32_t corner) const {
   const std::uint32_t face = corner / 3, beside = point_at(face, corner + 1);
   const std::size_t wedge = wedge_at(face, corner + 1);
   __builtin_prefetch(&ring_[beside]);

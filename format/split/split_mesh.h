@@ -67,11 +67,13 @@ class SplitMesh {
   /// The corners at a point, sorted into fans: open fans first, each in the order of its first corner in
   /// the point's list.
   void gather(std::uint32_t point, std::vector<Corner>& corners, std::vector<Fan>& fans);
-  /// Asks memory for what gather(point) will read, first for the head of the point's list, and then corner by
-  /// corner: each call needs what the one before it has brought, and gives the next corner.
+  /// Asks memory for what a split of the point will read: first for the head of its list of corners, then for
+  /// the first corner's face, then corner by corner for the point beside it and the next face. Each call
+  /// needs what the one before it has brought. The last two give the corner whose face was asked for, which
+  /// may be none.
   void look_ahead(std::uint32_t point) const { __builtin_prefetch(&ring_[point]); }
   std::uint32_t look_at_first(std::uint32_t point) const { return asked_for(ring_[point].head); }
-  std::uint32_t look_behind(std::uint32_t corner) const;
+  std::uint32_t look_beside(std::uint32_t corner) const;
   /// Gives the corners that move their target wedges, all of point `to`, which had no corner before.
   /// `corners` are those of gather(from); both points' corners stand in that order afterwards.
   void distribute(std::uint32_t from, std::uint32_t to, const std::vector<Corner>& corners);
@@ -88,7 +90,7 @@ class SplitMesh {
   };
   std::uint32_t& next_of(std::uint32_t corner) { return faces_[corner / 3].next[corner % 3]; }
   std::uint32_t next_of(std::uint32_t corner) const { return faces_[corner / 3].next[corner % 3]; }
-  /// The corner, whose face is asked for; it may be none.
+  /// Asks for the corner's face. Gives the corner, which may be none.
   std::uint32_t asked_for(std::uint32_t corner) const {
     if (corner == kNoIndex) return corner;
     __builtin_prefetch(&faces_[corner / 3].wedge);

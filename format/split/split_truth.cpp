@@ -1,6 +1,7 @@
 #include "format/split/split_truth.h"
 
 #include <algorithm>
+#include <span>
 
 namespace texmesh {
 
@@ -58,8 +59,7 @@ void SplitTruth::look_ahead(std::uint32_t v, std::size_t step, std::uint32_t cor
       __builtin_prefetch(&early_[p]);
     }
     __builtin_prefetch(moves.data());
-    __builtin_prefetch(born.data());
-    __builtin_prefetch(born.data() + 1);
+    for (const SplitSource::Face& f : born) __builtin_prefetch(&f);
     __builtin_prefetch(after.data());
   } else if (step == 3) {
     for (const SplitSource::Move& m : moves) __builtin_prefetch(&stream_face_[m.face]);

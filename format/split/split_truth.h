@@ -25,8 +25,8 @@ class SplitTruth {
 
   void begin_chapter(const SplitSource::Chapter& chapter);
 
-  /// Asks memory for what a split of the point will read, in steps 0, 1, 2 .. some time before: each needs
-  /// what the one before it has brought. `corner`: one at the point, which may be none.
+  /// Asks memory for what a split of the point will read, in steps 0, 1, 2 .. : each needs what the one
+  /// before it has brought. `corner`: one at the point, which may be none.
   void look_ahead(std::uint32_t v, std::size_t step, std::uint32_t corner) const;
   bool is_ready(std::uint32_t v) const { return ready_[v] != kNoIndex; }
   void begin_split(std::uint32_t v, std::uint32_t u);

@@ -88,7 +88,7 @@ class SplitStreamWriter {
         mesh_(components()),
         channel_(source, mesh_),
         codec_(mesh_, channel_, source.groups.size(), SplitLimits{}) {
-    // Growing by doubles would take twice the memory, and time to clear it.
+    // Vectors that grow by doubling would take twice the memory for a while.
     mesh_.reserve(source.points.size(), source.wedge_point.size(), source.face_group.size());
   }
 

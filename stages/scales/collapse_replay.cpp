@@ -19,7 +19,7 @@ void reverse(SplitSource::Chapter& chapter) {
 std::vector<ReplayFace> faces_of(const Mesh& mesh, const RoundedMesh& rounded) {
   std::vector<ReplayFace> faces(mesh.triangles.size());
   for (std::size_t f = 0; f < faces.size(); ++f) {
-    auto& [wedge, point, last, material, part, alive] = faces[f];
+    auto& [wedge, point, coarse, material, part, alive] = faces[f];
     for (std::size_t k = 0; k < 3; ++k) {
       wedge[k] = rounded.wedge(mesh.triangles[f][k]);
       point[k] = rounded.point_of(wedge[k]);
@@ -45,6 +45,11 @@ CollapseReplay::CollapseReplay(const NestedScales& scales, RoundedMesh& rounded)
 }
 
 SplitSource::Chapter CollapseReplay::run(const NestedScale& fine, const NestedScale& coarse) {
+  if (coarse.collapse_count > scales_.collapses.size())
+    throw StageError(
+        "scales", "collapses",
+        std::to_string(coarse.collapse_count) + " that lead to scale " + std::to_string(coarse.scale),
+        std::to_string(scales_.collapses.size()));
   SplitSource::Chapter chapter;
   chapter.scale = fine.scale;
   chapter_ = &chapter;
@@ -53,7 +58,7 @@ SplitSource::Chapter CollapseReplay::run(const NestedScale& fine, const NestedSc
   note_final(coarse);
   for (std::uint32_t c = fine.collapse_count; c < coarse.collapse_count; ++c) {
     look_ahead(c, coarse.collapse_count);
-    const Collapse& collapse = scales_.collapses.at(c);
+    const Collapse& collapse = scales_.collapses[c];
     if (collapse.vanishes_with_component()) continue;
     const std::uint32_t u = rounded_.point(collapse.from), v = rounded_.point(collapse.to);
     if (u != v) replay(u, v);
@@ -79,7 +84,8 @@ void CollapseReplay::put_wedge(std::uint32_t face, std::uint32_t corner, std::ui
 /// dozen times. So what the next ones read is asked for in steps, each of which needs what the one before
 /// it has brought.
 void CollapseReplay::look_ahead(std::uint32_t collapse, std::uint32_t end) const {
-  constexpr std::uint32_t kSteps = 5, kApart = 4;  // collapses between two steps
+  // Two collapses between steps, and ten steps along lists, took as long.
+  constexpr std::uint32_t kSteps = 5, kApart = 4;
   for (std::uint32_t step = 0; step < kSteps; ++step)
     if (const std::uint32_t at = collapse + (kSteps - step) * kApart; at < end)
       look_at(scales_.collapses[at], step);
@@ -104,7 +110,7 @@ void CollapseReplay::look_at(const Collapse& collapse, std::uint32_t step) const
     __builtin_prefetch(corners.data() + corners.size());
     return;
   }
-  constexpr std::size_t kMost = 16;
+  constexpr std::size_t kMost = 16;  // of hubs not all
   for (const std::uint32_t c : corners.last(std::min(corners.size(), kMost))) {
     const ReplayFace& face = faces_[c / 3];
     if (step == 3) {
@@ -118,10 +124,10 @@ void CollapseReplay::look_at(const Collapse& collapse, std::uint32_t step) const
 
 /// Wedges of the faces that the coarse scale has.
 void CollapseReplay::note_final(const NestedScale& coarse) {
-  for (const std::uint32_t f : alive_) faces_[f].final.fill(kNoIndex);
+  for (const std::uint32_t f : alive_) faces_[f].coarse_wedge.fill(kNoIndex);
   for (std::size_t i = 0; i < coarse.triangles.size(); ++i)
     for (std::size_t k = 0; k < 3; ++k)
-      faces_[coarse.triangle_source[i]].final[k] = rounded_.wedge(coarse.triangles[i][k]);
+      faces_[coarse.triangle_source[i]].coarse_wedge[k] = rounded_.wedge(coarse.triangles[i][k]);
 }
 
 void CollapseReplay::replay(std::uint32_t u, std::uint32_t v) {
@@ -153,7 +159,7 @@ void CollapseReplay::replay(std::uint32_t u, std::uint32_t v) {
       chapter_->born.push_back({f, faces_[f].wedge});
       faces_[f].alive = false;
     } else {
-      const std::uint32_t moved = faces_[f].wedge[k], last = faces_[f].final[k];
+      const std::uint32_t moved = faces_[f].wedge[k], last = faces_[f].coarse_wedge[k];
       chapter_->moves.push_back({f, moved});
       const bool stays = last != kNoIndex && rounded_.point_of(last) == v;
       put_wedge(f, k, stays ? last : target(moved, group(f), v));
@@ -190,7 +196,7 @@ void CollapseReplay::order(std::uint32_t number, std::uint32_t u, std::uint32_t 
   auto after = [&](std::uint32_t earlier) {
     if (earlier != kNoIndex) chapter_->before.push_back({number, earlier});
   };
-  // What a point has of the chapter before counts no more.
+  // What a point has of an earlier chapter counts no more.
   const auto use_of = [&](Point& p) -> PointUse& {
     if (p.mark <= begin_) p.use = {};
     return p.use;
@@ -219,10 +225,10 @@ void CollapseReplay::patch_leftovers() {
   for (const std::uint32_t f : alive_) {
     ReplayFace& face = faces_[f];
     if (!face.alive) continue;
-    if (face.final[0] == kNoIndex) {
+    if (face.coarse_wedge[0] == kNoIndex) {
       chapter_->patch.push_back({f, face.wedge});
       face.alive = false;
-    } else if (face.wedge != face.final) {
+    } else if (face.wedge != face.coarse_wedge) {
       throw StageError("scales", "collapses", "those that lead to the nested scales",
                        "triangle " + std::to_string(f) + " elsewhere");
     }

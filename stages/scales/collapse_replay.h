@@ -15,6 +15,9 @@ namespace texmesh {
 class CollapseReplay {
  public:
   CollapseReplay(const NestedScales& scales, RoundedMesh& rounded);
+  // The parts refer to each other.
+  CollapseReplay(const CollapseReplay&) = delete;
+  CollapseReplay& operator=(const CollapseReplay&) = delete;
 
   /// From scale `fine` to `coarse`; the chapter leads back.
   SplitSource::Chapter run(const NestedScale& fine, const NestedScale& coarse);
@@ -31,7 +34,7 @@ class CollapseReplay {
 
   // What is asked together lies together: collapses come in the order of their cost, anywhere on the surface.
   struct Point {
-    std::uint32_t mark = 0;  // the last collapse that counted it as one of those around
+    std::uint32_t mark = 0;  // the last collapse that used it; up to begin_, `use` is of an earlier chapter
     PointUse use;
   };
   struct Mapping {
@@ -58,12 +61,12 @@ class CollapseReplay {
   RoundedMesh& rounded_;
   std::vector<Point> points_;
   std::vector<ReplayFace> faces_;
-  std::vector<std::uint32_t> alive_;  // faces, rising; after a chapter only those that are
+  std::vector<std::uint32_t> alive_;  // faces, rising; dead ones go when a chapter ends
   CornerLists corners_;
   std::vector<Share> shares_;
   std::vector<std::uint32_t> ring_, gathered_;
   std::vector<Mapping> map_;
-  std::uint32_t now_ = 0, begin_ = 0;  // collapses so far, in all and when the chapter began
+  std::uint32_t now_ = 0, begin_ = 0;  // collapses replayed so far, and when the chapter began
   SplitSource::Chapter* chapter_ = nullptr;
 };
 

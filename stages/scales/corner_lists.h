@@ -6,18 +6,23 @@
 #include <span>
 #include <vector>
 
+#include "format/base/errors.h"
+#include "format/base/no_index.h"
+
 namespace texmesh {
 
 /// A face while collapses are replayed.
 struct ReplayFace {
   std::array<std::uint32_t, 3> wedge{}, point{};
-  std::array<std::uint32_t, 3> final{};  // wedges in the coarse scale, where it has the face
+  std::array<std::uint32_t, 3> coarse_wedge{};  // wedges in the coarse scale, where it has the face
   std::uint16_t material = 0, part = 0;
   bool alive = true;
 };
 
-/// The corners (3 * face + corner) at each point, which may be of dead faces: lists in one array. Where a
-/// list has no room left, it first gives up those, and then moves to the end.
+/// The corners (3 * face + corner) at each point, which may be of dead faces: lists in one array. A list
+/// without room gives up the corners of dead faces. Where that frees less than a quarter, the list moves to
+/// the end of the array with room for half as many more, so that adding costs the same on average however
+/// long it is. `faces` must outlive the lists.
 class CornerLists {
  public:
   CornerLists(const std::vector<ReplayFace>& faces, std::size_t points) : faces_(faces), lists_(points) {
@@ -41,6 +46,7 @@ class CornerLists {
     corners_[list.begin + list.count++] = corner;
   }
   void clear(std::uint32_t point) { lists_[point].count = 0; }
+  /// Asks memory for what at() will read first.
   void look_ahead(std::uint32_t point) const { __builtin_prefetch(&lists_[point]); }
 
  private:
@@ -53,11 +59,14 @@ class CornerLists {
                                     [&](std::uint32_t corner) { return !faces_[corner / 3].alive; });
     list.count = static_cast<std::uint32_t>(end - begin);
     if (list.count <= list.room - list.room / 4 && list.count < list.room) return;
-    const auto at = static_cast<std::uint32_t>(corners_.size());
+    const std::size_t at = corners_.size();
     list.room = list.count + list.count / 2 + 4;
+    if (at + list.room > kNoIndex)
+      throw StageError("scales", "collapses", "corners that 32 bits can count", "more");
     corners_.resize(at + list.room);
-    std::copy_n(corners_.begin() + list.begin, list.count, corners_.begin() + at);
-    list.begin = at;
+    std::copy_n(corners_.begin() + list.begin, list.count,
+                corners_.begin() + static_cast<std::ptrdiff_t>(at));
+    list.begin = static_cast<std::uint32_t>(at);
   }
   const std::vector<ReplayFace>& faces_;
   std::vector<List> lists_;

@@ -77,7 +77,7 @@ void RoundedMesh::append_value(const SplitAttribute& a, std::size_t w, std::vect
   }
 }
 
-/// The wedges of each point together, rising.
+/// The wedges of each point together, rising. `end`: per point, where its wedges end.
 std::vector<std::uint32_t> RoundedMesh::by_points(std::vector<std::uint32_t>& end) const {
   end.assign(places_.size() + 1, 0);
   const auto point_of = [&](std::uint32_t w) { return point_[mesh_.wedge_position[w]]; };
@@ -103,7 +103,7 @@ void RoundedMesh::merge_wedges(const std::vector<std::vector<std::int32_t>>& all
   std::vector<std::uint32_t> order = by_points(end);
   std::vector<std::uint32_t> same(n);  // the lowest equal wedge
   for (std::size_t p = 0, i = 0; p < places_.size(); ++p) {
-    const auto at = [&](std::size_t place) { return order.begin() + static_cast<std::ptrdiff_t>(place); };
+    const auto at = [&](std::size_t k) { return order.begin() + static_cast<std::ptrdiff_t>(k); };
     std::sort(at(i), at(end[p]), [&](std::uint32_t a, std::uint32_t b) {
       const int c = compare(a, b);
       return c < 0 || (c == 0 && a < b);

@@ -248,6 +248,7 @@ bool shows_the_same(const std::vector<std::uint8_t>& stream, const NestedScales&
                     const std::vector<std::size_t>& kept, const QuantisationGrid& grid) {
   const SplitStreamHead head = read_split_head(stream);
   std::vector<Vec3f> place;  // per position
+  place.reserve(scales.mesh.positions.size());
   for (const Vec3f p : scales.mesh.positions) place.push_back(grid.bits > 0 ? grid.place(p) : p);
   const auto at = [&](std::uint32_t wedge) { return place[scales.mesh.wedge_position[wedge]]; };
   return std::ranges::all_of(kept, [&](std::size_t k) {

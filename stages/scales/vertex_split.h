@@ -23,7 +23,8 @@ struct VertexSplitCoding {
 /// between two scales is not known it is the one that the removed faces suggest, and at every given scale it
 /// is exactly that scale's. What a scale lacks that no collapse explains (components that vanish) is a patch
 /// of the next finer one. Twins are one point; wedges of a point that are equal after rounding are one.
-/// Deterministic, O(n log n). Throws StageError when collapses and scales do not belong together.
+/// Deterministic. Time grows with triangles and with the triangles that collapses move. Throws StageError
+/// when collapses and scales do not belong together.
 SplitSource make_vertex_splits(const NestedScales& scales, const std::vector<std::size_t>& kept,
                                const VertexSplitCoding& coding, const RunContext& context);
 

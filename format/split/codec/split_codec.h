@@ -17,7 +17,9 @@ template <class Channel>
 class SplitCodec {
  public:
   SplitCodec(SplitMesh& mesh, Channel& channel, std::size_t groups, SplitLimits limits)
-      : elements_(mesh, channel, groups, limits), queue_(mesh), vertices_(elements_), patches_(elements_) {}
+      : elements_(mesh, channel, groups, limits), queue_(mesh), vertices_(elements_), patches_(elements_) {
+    ahead_.fill(kNoIndex);
+  }
   // The parts refer to each other.
   SplitCodec(const SplitCodec&) = delete;
   SplitCodec& operator=(const SplitCodec&) = delete;
@@ -53,12 +55,12 @@ class SplitCodec {
   /// Splits are anywhere on the surface, and each would wait for memory a dozen times. So what the next
   /// points of the queue need is asked for, step by step.
   void look_ahead() {
-    constexpr std::size_t kApart = 3;  // pops between two steps
+    constexpr std::size_t kApart = 3;  // pops between two steps; two took as long
     static_assert(kSteps * kApart < kAhead);
     ++popped_;
     for (std::size_t step = 0; step < kSteps; ++step) {
       const std::size_t more = (kSteps - 1 - step) * kApart;
-      const std::uint32_t p = queue_.ahead(more);
+      const std::uint32_t p = queue_.look_ahead(more);
       std::uint32_t& corner = ahead_[(popped_ + more) % kAhead];
       if (step == 0) corner = kNoIndex;
       if (p == kNoIndex) continue;
@@ -67,7 +69,7 @@ class SplitCodec {
       else if (step == 1)
         corner = elements_.mesh.look_at_first(p);
       else if (corner != kNoIndex)
-        corner = elements_.mesh.look_behind(corner);
+        corner = elements_.mesh.look_beside(corner);
       elements_.channel.update_truth([&](auto& t) { t.look_ahead(p, step, corner); });
     }
   }

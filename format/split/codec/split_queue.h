@@ -37,8 +37,9 @@ class SplitQueue {
     queued_[point] = false;
     return point;
   }
-  /// The point that is popped after `more` others; kNoIndex where the queue ends before.
-  std::uint32_t ahead(std::size_t more) const {
+  /// The point that is popped after `more` others, of whose history memory is asked for; kNoIndex where the
+  /// queue ends before.
+  std::uint32_t look_ahead(std::size_t more) const {
     if (next_ + more >= queue_.size()) return kNoIndex;
     const std::uint32_t point = queue_[next_ + more];
     __builtin_prefetch(&history_[point]);

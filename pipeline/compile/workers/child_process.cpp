@@ -41,7 +41,7 @@ void write_all(int fd, const std::string& text) {
 
 std::vector<std::string> worker_environment(bool large_pages) {
   std::vector<std::string> variables;
-  for (char** variable = environ; *variable; ++variable) variables.emplace_back(*variable);
+  for (char** variable = environ; variable && *variable; ++variable) variables.emplace_back(*variable);
   if (large_pages && !::getenv("GLIBC_TUNABLES"))
     variables.emplace_back("GLIBC_TUNABLES=glibc.malloc.hugetlb=1");
   return variables;
@@ -49,6 +49,10 @@ std::vector<std::string> worker_environment(bool large_pages) {
 
 ChildProcess start_worker_process(const std::string& input, bool large_pages) {
   static const std::string executable = core_executable();
+  std::vector<std::string> variables = worker_environment(large_pages);
+  std::vector<char*> environment;
+  for (std::string& variable : variables) environment.push_back(variable.data());
+  environment.push_back(nullptr);
   ChildProcess child;
   Pipe in, out, err;
   posix_spawn_file_actions_t actions;
@@ -58,10 +62,6 @@ ChildProcess start_worker_process(const std::string& input, bool large_pages) {
   posix_spawn_file_actions_adddup2(&actions, err.write, 2);
   std::string name = "texmesh", command = "worker";
   char* argv[] = {name.data(), command.data(), nullptr};
-  std::vector<std::string> variables = worker_environment(large_pages);
-  std::vector<char*> environment;
-  for (std::string& variable : variables) environment.push_back(variable.data());
-  environment.push_back(nullptr);
   const int rc = ::posix_spawn(&child.pid, executable.c_str(), &actions, nullptr, argv, environment.data());
   posix_spawn_file_actions_destroy(&actions);
   ::close(in.read);

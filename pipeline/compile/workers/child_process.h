@@ -14,8 +14,8 @@ struct ChildProcess {
   std::chrono::steady_clock::time_point start;
 };
 
-/// This process's variables for a worker, as NAME=value. With `large_pages` glibc asks the system for pages
-/// of 2 MiB, unless GLIBC_TUNABLES is set already.
+/// This process's variables for a worker, as NAME=value. With `large_pages` glibc asks the system for large
+/// pages (2 MiB on x86-64), unless GLIBC_TUNABLES is set already.
 std::vector<std::string> worker_environment(bool large_pages);
 
 /// Starts `texmesh-core worker` (posix_spawn, never a fork of a threaded parent) in worker_environment() and

@@ -27,8 +27,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// From here on a model gets large pages: four million triangles take an eighth less of the processor's time
-/// with them, half a million nothing, and small models a few hundredths more memory.
+/// From here on a model gets large pages. Simplification of four million triangles takes a tenth less time
+/// with them, a whole compile of half a million up to 5 % less, and small models nothing but 2 to 6 % more
+/// memory.
 constexpr std::uint64_t kLargeModel_bytes = 1'000'000'000;
 
 volatile sig_atomic_t g_interrupted = 0;

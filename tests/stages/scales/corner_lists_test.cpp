@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdint>
+#include <vector>
+
 #include <numeric>
 
 #include "tests/support/meshes.h"
@@ -30,6 +33,19 @@ TEST(CornerLists, HoldTheCornersOfFacesThatAreAliveInTheirOrder) {
   EXPECT_EQ(alive_at(lists, faces, 0), (std::vector<std::uint32_t>{0, 6}));
   EXPECT_EQ(alive_at(lists, faces, 2), (std::vector<std::uint32_t>{2}));
   EXPECT_EQ(alive_at(lists, faces, 3), (std::vector<std::uint32_t>{7}));
+}
+
+TEST(CornerLists, GiveUpDeadFacesBeforeTheyTakeMoreRoom) {
+  std::vector<ReplayFace> faces = fan(8);
+  CornerLists lists(faces, 10);
+  const std::uint32_t* const before = lists.at(0).data();
+  for (std::uint32_t f = 0; f < 4; ++f) faces[f].alive = false;
+  for (std::uint32_t f = 4; f < 8; ++f) lists.add(0, 3 * f);
+  EXPECT_EQ(lists.at(0).data(), before);
+  EXPECT_EQ(lists.at(0).size(), 8u);
+  lists.add(0, 12);  // none is dead: the list moves
+  EXPECT_NE(lists.at(0).data(), before);
+  EXPECT_EQ(lists.at(0).size(), 9u);
 }
 
 TEST(CornerLists, AreThoseOfPlainListsWhateverIsAddedAndDies) {
