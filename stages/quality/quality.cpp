@@ -205,7 +205,9 @@ void judge_size(const SizeCells& cells, const Height& height, const TextureSampl
 /// follows (enlarge()).
 std::size_t fewer_heights(const TextureSampler& sampler, std::size_t triangles, double object_height,
                           const QualityOptions& options) {
-  constexpr double kTexelLevel = 0.5;  // texels of 0.7 pixels are the least
+  // Texels of 0.7 pixels are the least. Those of a sampler that reads level 0 alone flicker where they are
+  // smaller than pixels.
+  constexpr double kTexelLevel = 0.5, kSharpTexelLevel = 0;
   constexpr double kTrianglePixels = 16, kSeenArea = 0.25, kSeenTriangles = 0.5;
   std::size_t fewer = 0;
   while (fewer + 1 < kSizes) {
@@ -216,9 +218,9 @@ std::size_t fewer_heights(const TextureSampler& sampler, std::size_t triangles, 
       break;
     const bool finer = std::ranges::any_of(sampler.shown.textures, [&](const ShownTexture& t) {
       return display_level(sampler.data.tables.planes[t.plane], sampler.surface_area, object_height, px) >
-             kTexelLevel;
+             (t.with_mips ? kTexelLevel : kSharpTexelLevel);
     });
-    if (finer || !sampler.shown.with_mips()) break;
+    if (finer) break;
     ++fewer;
   }
   return fewer;

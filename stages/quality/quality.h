@@ -11,7 +11,7 @@
 
 namespace texmesh {
 
-inline constexpr int kQualityVersion = 19;
+inline constexpr int kQualityVersion = 20;
 
 struct QualityOptions {
   int views = 4;
@@ -53,7 +53,8 @@ struct QualityOptions {
 ///   that pass the height below and fail the one above. The table's sizes are the largest, its half and its
 ///   quarter. A model of few texels and triangles is not rendered at all of them: down to a quarter of
 ///   largest_px the largest rendered height, which "largest size" means below, is the first at which texels
-///   are not smaller than 0.7 pixels and triangles cover 16 pixels on average. Scales that pass there are
+///   are not smaller than 0.7 pixels (1 where samplers read level 0 alone) and triangles cover 16 pixels on
+///   average. Scales that pass there are
 ///   rendered at larger heights as well. Sizes beyond follow from the two largest rendered ones
 ///   (table_fit.h: enlarge()).
 /// - Switch sizes: a scale passes a height when in every view the mean of FLIP is at most flip_mean and its
