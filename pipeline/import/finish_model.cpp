@@ -73,14 +73,16 @@ void drop_non_finite_triangles(Model& model, const std::string& file_name) {
   }
   const std::size_t dropped = mesh.triangles.size() - kept;
   if (dropped && kept == 0)
-    throw InputError(file_name, "positions", "some finite ones", "only NaN and infinities in every triangle");
+    throw InputError(file_name, "positions", "some finite ones",
+                     "NaN, infinity or more than 1e18 in every triangle");
   if (kept == 0) throw InputError(file_name, "triangles", "at least one", "none");
   if (!dropped) return;
   mesh.triangles.resize(kept);
   mesh.triangle_material.resize(kept);
   mesh.triangle_part.resize(kept);
   add_warning(model.notes, "non-finite-position", file_name,
-              count_of(dropped, "triangle", "triangles") + " left out because of NaN or infinite positions");
+              count_of(dropped, "triangle", "triangles") +
+                  " left out because of positions that are NaN, infinite or beyond 1e18");
 }
 
 void repair_uvs(Model& model, std::vector<Vec2f>& uvs, const std::string& file_name) {
