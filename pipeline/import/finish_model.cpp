@@ -5,7 +5,9 @@
 
 #include "format/base/errors.h"
 #include "pipeline/import/drop_unused.h"
+#include "pipeline/import/local_frame.h"
 #include "pipeline/import/near_uvs.h"
+#include "pipeline/io/text_table.h"
 
 namespace texmesh {
 namespace {
@@ -74,7 +76,7 @@ void drop_non_finite_triangles(Model& model, const std::string& file_name) {
   const std::size_t dropped = mesh.triangles.size() - kept;
   if (dropped && kept == 0)
     throw InputError(file_name, "positions", "some finite ones",
-                     "NaN, infinity or more than 1e18 in every triangle");
+                     "NaN, infinity or more than " + shortest(kLargestCoordinate) + " in every triangle");
   if (kept == 0) throw InputError(file_name, "triangles", "at least one", "none");
   if (!dropped) return;
   mesh.triangles.resize(kept);
@@ -82,7 +84,8 @@ void drop_non_finite_triangles(Model& model, const std::string& file_name) {
   mesh.triangle_part.resize(kept);
   add_warning(model.notes, "non-finite-position", file_name,
               count_of(dropped, "triangle", "triangles") +
-                  " left out because of positions that are NaN, infinite or beyond 1e18");
+                  " left out because of positions that are NaN, infinite or beyond " +
+                  shortest(kLargestCoordinate));
 }
 
 void repair_uvs(Model& model, std::vector<Vec2f>& uvs, const std::string& file_name) {

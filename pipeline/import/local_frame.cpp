@@ -8,9 +8,6 @@
 namespace texmesh {
 namespace {
 
-// Beyond this a coordinate is no measure of anything, and squares of differences would overflow a float.
-constexpr double kLargestCoordinate = 1e18;
-
 bool usable(const Vec3d& p) {
   auto in_range = [](double x) { return std::fabs(x) <= kLargestCoordinate; };  // false for NaN
   return in_range(p.x) && in_range(p.y) && in_range(p.z);

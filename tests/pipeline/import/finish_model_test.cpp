@@ -87,6 +87,24 @@ TEST(FinishModel, NonFiniteValues) {
   for (const Vec3f& n : out.mesh.normals) EXPECT_NEAR(length(n), 1, 1e-5);
 }
 
+/// The texts name the bound that set_positions() goes by.
+TEST(FinishModel, WhatIsLeftOutIsSaidWithTheBound) {
+  const double beyond = std::nextafter(kLargestCoordinate, 1e300);
+  Model m;
+  set_positions(m.mesh, {{0, 0, 0}, {kLargestCoordinate, 0, 0}, {0, 1, 0}, {beyond, 0, 0}});
+  m.mesh.wedge_position = {0, 1, 2, 3};
+  m.mesh.triangles = {{0, 1, 2}, {0, 3, 2}};
+  const Model out = finished(m);
+  EXPECT_EQ(out.mesh.triangles.size(), 1u) << "at the bound is not beyond it";
+  ASSERT_EQ(count_notes(out, "non-finite-position"), 1);
+  EXPECT_EQ(out.notes.front().text,
+            "1 triangle left out because of positions that are NaN, infinite or beyond 1e+18");
+  m.mesh.triangles = {{0, 3, 2}};
+  EXPECT_EQ(
+      input_error([&] { finished(m); }),
+      "f: positions: expected some finite ones, found NaN, infinity or more than 1e+18 in every triangle");
+}
+
 TEST(FinishModel, HardFaults) {
   EXPECT_THROW(finished({}), InputError) << "no triangle";
   Model m = model_of(testing::cube());
