@@ -102,7 +102,8 @@ RenderedModel package_scale(PackageReader& package, int scale, const RenderedMod
 
 RenderedModel package_proxy(PackageReader& package, std::uint32_t proxy, const RunContext& context) {
   NoFiles none;
-  return rendered_model(import_gltf(proxy_path(proxy), package.proxy_glb(proxy), none, {}, context), context);
+  return rendered_model(import_package_glb(proxy_path(proxy), package.proxy_glb(proxy), none, context),
+                        context);
 }
 
 }  // namespace texmesh

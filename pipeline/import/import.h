@@ -80,6 +80,10 @@ ImportedModel import_model(const std::string& file_name, std::span<const std::ui
 /// .gltf and .glb.
 ImportedModel import_gltf(const std::string& file_name, std::span<const std::uint8_t> bytes,
                           Resolver& resolver, const ImportOptions& options, const RunContext& context);
+/// A .glb of a package, or one made of it. Whatever compiles is read whole: on its grid a position may lie
+/// farther out than any that the readers of sources take.
+ImportedModel import_package_glb(const std::string& file_name, std::span<const std::uint8_t> bytes,
+                                 Resolver& resolver, const RunContext& context);
 ImportedModel import_obj(const std::string& file_name, std::span<const std::uint8_t> bytes,
                          Resolver& resolver, const ImportOptions& options, const RunContext& context);
 ImportedModel import_ply(const std::string& file_name, std::span<const std::uint8_t> bytes,

@@ -8,8 +8,8 @@
 namespace texmesh {
 namespace {
 
-bool usable(const Vec3d& p) {
-  auto in_range = [](double x) { return std::fabs(x) <= kLargestCoordinate; };  // false for NaN
+bool usable(const Vec3d& p, double largest) {
+  auto in_range = [largest](double x) { return std::fabs(x) <= largest; };  // false for NaN
   return in_range(p.x) && in_range(p.y) && in_range(p.z);
 }
 
@@ -20,10 +20,10 @@ double float_exact(double x) {
   return static_cast<double>(rounded);
 }
 
-Vec3d choose_origin(const std::vector<Vec3d>& positions) {
+Vec3d choose_origin(const std::vector<Vec3d>& positions, double largest) {
   Box3d box;
   for (const Vec3d& p : positions)
-    if (usable(p)) box.extend(p);
+    if (usable(p, largest)) box.extend(p);
   if (box.empty()) return {};
   double farthest = 0;
   for (int i = 0; i < 3; ++i) farthest = std::max({farthest, std::fabs(box.min[i]), std::fabs(box.max[i])});
@@ -35,12 +35,13 @@ Vec3d choose_origin(const std::vector<Vec3d>& positions) {
 
 }  // namespace
 
-void set_positions(Mesh& mesh, const std::vector<Vec3d>& positions) {
-  mesh.origin = choose_origin(positions);
+void set_positions(Mesh& mesh, const std::vector<Vec3d>& positions, double largest) {
+  mesh.origin = choose_origin(positions, largest);
   mesh.positions.resize(positions.size());
   const float nan = std::numeric_limits<float>::quiet_NaN();
   for (std::size_t i = 0; i < positions.size(); ++i)
-    mesh.positions[i] = usable(positions[i]) ? to_float(positions[i] - mesh.origin) : Vec3f{nan, nan, nan};
+    mesh.positions[i] =
+        usable(positions[i], largest) ? to_float(positions[i] - mesh.origin) : Vec3f{nan, nan, nan};
 }
 
 }  // namespace texmesh

@@ -25,7 +25,7 @@ class PreviewsOf : public Resolver {
 
 ImportedModel finest_scale(PackageReader& package, const RunContext& context) {
   PreviewsOf previews(package);
-  return import_model(mesh_path(0), package.scale_glb(0), previews, {}, context);
+  return import_package_glb(mesh_path(0), package.scale_glb(0), previews, context);
 }
 
 std::int32_t plane_of_image(const std::vector<TextureInfo>& textures, const std::string& name) {

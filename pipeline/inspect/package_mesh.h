@@ -8,7 +8,7 @@
 
 namespace texmesh {
 
-/// S_0 of a package as its GLB has it; the images are previews. Errors as import_model().
+/// S_0 of a package as its GLB has it; the images are previews. Errors as import_package_glb().
 ImportedModel finest_scale(PackageReader& package, const RunContext& context);
 
 /// The full-size plane of a package that an image of finest_scale() stands for, colours before alpha; -1 =

@@ -16,7 +16,7 @@ Model read_model(StandaloneGlb file, const std::string& entry, const RunContext&
   }
   file.set_images(images);
   NoFiles none;
-  return import_gltf(entry, file.finish(), none, {}, context).model;
+  return import_package_glb(entry, file.finish(), none, context).model;
 }
 
 std::string image_name(std::uint32_t image) { return std::to_string(image); }

@@ -190,7 +190,7 @@ std::optional<ProxyParts> ProxyParts::read(std::span<const std::uint8_t> glb, co
   if (!chunks.root.contains("materials")) return std::nullopt;
   out.maps_ = maps_in(chunks.root, chunks.binary);
   NoFiles none;
-  Model model = import_gltf(entry, glb, none, {}, context).model;
+  Model model = import_package_glb(entry, glb, none, context).model;
   if (!is_simple(chunks.root, out.maps_) || model.materials.size() != chunks.root["materials"].size() ||
       !bake_texture_scale(chunks.root, model.mesh))
     return std::nullopt;

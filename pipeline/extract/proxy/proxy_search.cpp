@@ -92,7 +92,7 @@ class ProxySearch {
   void measure(const Bytes& glb, Extracted& file) {
     NoFiles none;
     RenderedModel model =
-        rendered_model(import_gltf("proxy.glb", glb, none, {}, source_.context), source_.context);
+        rendered_model(import_package_glb("proxy.glb", glb, none, source_.context), source_.context);
     const LitMesh mesh{std::move(model.mesh), std::move(model.materials), model.textures.size()};
     const LitViews views(mesh, source_.cameras, source_.context);
     set_difference(source_.whole_pictures().difference(views, model.textures, source_.context), file);

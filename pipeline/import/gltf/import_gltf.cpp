@@ -145,24 +145,34 @@ void GltfReader::read() {
   drop_textures_without_uv();
 }
 
-}  // namespace
-}  // namespace gltf
-
-ImportedModel import_gltf(const std::string& file_name, std::span<const std::uint8_t> bytes,
-                          Resolver& resolver, const ImportOptions& options, const RunContext& context) {
+ImportedModel read_gltf(const std::string& file_name, ByteSpan bytes, Resolver& resolver,
+                        const ImportOptions& options, const RunContext& context, double largest_coordinate) {
   ImportedModel out;
   // glTF 2.0, 3.8.3: colour space information of PNG and JPEG must be ignored.
   ImportOptions by_specification = options;
   if (by_specification.colour_profiles == ProfilePolicy::kAuto)
     by_specification.colour_profiles = ProfilePolicy::kIgnore;
-  const gltf::Source source{file_name, resolver, by_specification, context, out.model.notes};
-  gltf::GltfReader reader(source, bytes, out.model);
+  const Source source{file_name, resolver, by_specification, context, out.model.notes, largest_coordinate};
+  GltfReader reader(source, bytes, out.model);
   reader.read();
   out.format = reader.is_glb() ? "glb" : "gltf";
   out.about = reader.about();
   out.normals_by_specification = true;
   finish_model(out.model, file_name, options);
   return out;
+}
+
+}  // namespace
+}  // namespace gltf
+
+ImportedModel import_gltf(const std::string& file_name, std::span<const std::uint8_t> bytes,
+                          Resolver& resolver, const ImportOptions& options, const RunContext& context) {
+  return gltf::read_gltf(file_name, bytes, resolver, options, context, kLargestCoordinate);
+}
+
+ImportedModel import_package_glb(const std::string& file_name, std::span<const std::uint8_t> bytes,
+                                 Resolver& resolver, const RunContext& context) {
+  return gltf::read_gltf(file_name, bytes, resolver, {}, context, kLargestPackedCoordinate);
 }
 
 }  // namespace texmesh

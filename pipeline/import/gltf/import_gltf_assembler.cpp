@@ -112,7 +112,7 @@ void Assembler::finish() {
   if (!mesh_.uv1.empty()) mesh_.uv1.resize(n);
   if (!mesh_.colours.empty()) mesh_.colours.resize(n, {1, 1, 1, 1});
   if (!mesh_.tangents.empty()) mesh_.tangents.resize(n);
-  set_positions(mesh_, positions_);
+  set_positions(mesh_, positions_, source_.largest_coordinate);
 }
 
 }  // namespace texmesh::gltf

@@ -10,6 +10,7 @@
 
 #include "format/base/bytes.h"
 #include "pipeline/import/import.h"
+#include "pipeline/import/local_frame.h"
 
 namespace tinygltf {
 class Model;
@@ -28,6 +29,7 @@ struct Source {
   const ImportOptions& options;
   const RunContext& context;
   Notes& notes;
+  double largest_coordinate = kLargestCoordinate;  // beyond it a position is left out
   [[noreturn]] void fail(const std::string& place, const std::string& expected,
                          const std::string& found) const;
   /// Adds the note unless there is one with that code.

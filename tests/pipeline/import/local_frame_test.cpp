@@ -19,6 +19,8 @@ TEST(SetPositions, NearModelsKeepTheirCoordinatesAndFarOnesGetAnOrigin) {
   set_positions(mesh, {{std::nan(""), 0, 0}, {1e300, 0, 0}, {7e6, 1, 1}, {7e6 + 1, 1, 1}});
   EXPECT_TRUE(std::isnan(mesh.positions[0].x) && std::isnan(mesh.positions[1].x));
   EXPECT_NEAR(mesh.origin.x, 7e6, 1);
+  set_positions(mesh, {{2e18, 0, 0}, {1e18, 0, 0}, {9e18, 0, 0}}, kLargestPackedCoordinate);
+  EXPECT_TRUE(std::isfinite(mesh.positions[0].x) && std::isnan(mesh.positions[2].x));
   set_positions(mesh, {});
   EXPECT_TRUE(mesh.positions.empty());
 }
