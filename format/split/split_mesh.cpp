@@ -79,10 +79,10 @@ void SplitMesh::distribute(std::uint32_t from, std::uint32_t to, const std::vect
 std::uint32_t SplitMesh::look_beside(std::uint32_t corner) const {
   const std::uint32_t face = corner / 3, beside = point_at(face, corner + 1);
   const std::size_t wedge = wedge_at(face, corner + 1);
-  __builtin_prefetch(&ring_[beside]);
-  __builtin_prefetch(&points_[beside]);
+  ask_memory(&ring_[beside]);
+  ask_memory(&points_[beside]);
   for (std::size_t k = 0; k < values_.size(); ++k)
-    __builtin_prefetch(values_[k].data() + wedge * static_cast<std::size_t>(components_[k]));
+    ask_memory(values_[k].data() + wedge * static_cast<std::size_t>(components_[k]));
   return asked_for(next_of(corner));
 }
 

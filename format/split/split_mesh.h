@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "format/base/no_index.h"
+#include "format/split/look_ahead.h"
 
 namespace texmesh {
 
@@ -71,7 +72,7 @@ class SplitMesh {
   /// the first corner's face, then corner by corner for the point beside it and the next face. Each call
   /// needs what the one before it has brought. The last two give the corner whose face was asked for, which
   /// may be none.
-  void look_ahead(std::uint32_t point) const { __builtin_prefetch(&ring_[point]); }
+  void look_ahead(std::uint32_t point) const { ask_memory(&ring_[point]); }
   std::uint32_t look_at_first(std::uint32_t point) const { return asked_for(ring_[point].head); }
   std::uint32_t look_beside(std::uint32_t corner) const;
   /// Gives the corners that move their target wedges, all of point `to`, which had no corner before.
@@ -93,8 +94,8 @@ class SplitMesh {
   /// Asks for the corner's face. Gives the corner, which may be none.
   std::uint32_t asked_for(std::uint32_t corner) const {
     if (corner == kNoIndex) return corner;
-    __builtin_prefetch(&faces_[corner / 3].wedge);
-    __builtin_prefetch(&faces_[corner / 3].next[2]);
+    ask_memory(&faces_[corner / 3].wedge);
+    ask_memory(&faces_[corner / 3].next[2]);
     return corner;
   }
   void gather_fan(std::uint32_t start, std::vector<Corner>& corners, std::vector<Fan>& fans);

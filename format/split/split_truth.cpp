@@ -38,39 +38,42 @@ void SplitTruth::begin_split(std::uint32_t v, std::uint32_t u) {
     remaining_.push_back({i, third_of(chapter_->born[i])});
 }
 
-void SplitTruth::look_ahead(std::uint32_t v, std::size_t step, std::uint32_t corner) const {
-  if (step == 0) return __builtin_prefetch(&ready_[v]);
-  if (corner != kNoIndex) __builtin_prefetch(&move_[corner / 3]);
-  const std::uint32_t number = ready_[v];
-  if (number == kNoIndex || step > 4) return;
+void SplitTruth::look_ahead(std::uint32_t v, SplitStep step, std::uint32_t corner) const {
+  if (step == SplitStep::kPoint) return ask_memory(&ready_[v]);
+  if (corner != kNoIndex) ask_memory(&move_[corner / 3]);
+  if (ready_[v] != kNoIndex) look_at_split(ready_[v], step);
+}
+
+void SplitTruth::look_at_split(std::uint32_t number, SplitStep step) const {
   const SplitSource::Split& split = chapter_->splits[number];
-  if (step == 1) {
-    __builtin_prefetch(&split);
-    __builtin_prefetch(&first_[number]);
+  if (step == SplitStep::kSplit) {
+    ask_memory(&split);
+    ask_memory(&first_[number]);
     return;
   }
+  if (step > SplitStep::kFollowing) return;
   const std::span moves(chapter_->moves.data() + split.move_begin, split.move_end - split.move_begin);
   const std::span born(chapter_->born.data() + split.born_begin, split.born_end - split.born_begin);
   const std::span after(after_.data() + first_[number], first_[number + 1] - first_[number]);
-  if (step == 2) {
+  if (step == SplitStep::kLists) {
     for (const std::uint32_t p : {split.child, split.parent}) {
-      __builtin_prefetch(&source_.points[p]);
-      __builtin_prefetch(&stream_point_[p]);
-      __builtin_prefetch(&early_[p]);
+      ask_memory(&source_.points[p]);
+      ask_memory(&stream_point_[p]);
+      ask_memory(&early_[p]);
     }
-    __builtin_prefetch(moves.data());
-    for (const SplitSource::Face& f : born) __builtin_prefetch(&f);
-    __builtin_prefetch(after.data());
-  } else if (step == 3) {
-    for (const SplitSource::Move& m : moves) __builtin_prefetch(&stream_face_[m.face]);
+    ask_memory(moves.data());
+    for (const SplitSource::Face& f : born) ask_memory(&f);
+    ask_memory(after.data());
+  } else if (step == SplitStep::kListed) {
+    for (const SplitSource::Move& m : moves) ask_memory(&stream_face_[m.face]);
     for (const SplitSource::Face& f : born)
-      for (const std::uint32_t w : f.wedges) __builtin_prefetch(&source_.wedge_point[w]);
-    for (const std::uint32_t s : after) __builtin_prefetch(&waiting_[s]);
+      for (const std::uint32_t w : f.wedges) ask_memory(&source_.wedge_point[w]);
+    for (const std::uint32_t s : after) ask_memory(&waiting_[s]);
   } else {
     for (const SplitSource::Move& m : moves)
-      if (stream_face_[m.face] != kNoIndex) __builtin_prefetch(&move_[stream_face_[m.face]]);
+      if (stream_face_[m.face] != kNoIndex) ask_memory(&move_[stream_face_[m.face]]);
     for (const std::uint32_t s : after)
-      if (waiting_[s] == 1) __builtin_prefetch(&chapter_->splits[s]);
+      if (waiting_[s] == 1) ask_memory(&chapter_->splits[s]);
   }
 }
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "format/base/no_index.h"
+#include "format/split/split_ahead.h"
 #include "format/split/split_mesh.h"
 #include "format/split/split_source.h"
 
@@ -25,9 +26,8 @@ class SplitTruth {
 
   void begin_chapter(const SplitSource::Chapter& chapter);
 
-  /// Asks memory for what a split of the point will read, in steps 0, 1, 2 .. : each needs what the one
-  /// before it has brought. `corner`: one at the point, which may be none.
-  void look_ahead(std::uint32_t v, std::size_t step, std::uint32_t corner) const;
+  /// Asks memory for what a split of the point will read. `corner`: one at the point, which may be none.
+  void look_ahead(std::uint32_t v, SplitStep step, std::uint32_t corner) const;
   bool is_ready(std::uint32_t v) const { return ready_[v] != kNoIndex; }
   void begin_split(std::uint32_t v, std::uint32_t u);
   void check_moves(std::size_t found) const;
@@ -80,6 +80,7 @@ class SplitTruth {
     std::uint32_t face, corner;
     friend auto operator<=>(const Edge&, const Edge&) = default;
   };
+  void look_at_split(std::uint32_t number, SplitStep step) const;
   void make_ready(std::uint32_t split);
   void bind_point(std::uint32_t p, std::uint32_t source);
   void bind_wedge(std::uint32_t w, std::uint32_t source);

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "format/base/errors.h"
+#include "format/split/look_ahead.h"
 
 namespace texmesh {
 namespace {
@@ -80,44 +81,40 @@ void CollapseReplay::put_wedge(std::uint32_t face, std::uint32_t corner, std::ui
   faces_[face].point[corner] = rounded_.point_of(wedge);
 }
 
-/// Collapses come in the order of their cost, anywhere on the surface, and each would wait for memory a
-/// dozen times. So what the next ones read is asked for in steps, each of which needs what the one before
-/// it has brought.
+/// Collapses come in the order of their cost, anywhere on the surface.
 void CollapseReplay::look_ahead(std::uint32_t collapse, std::uint32_t end) const {
-  // Two collapses between steps, and ten steps along lists, took as long.
-  constexpr std::uint32_t kSteps = 5, kApart = 4;
-  for (std::uint32_t step = 0; step < kSteps; ++step)
-    if (const std::uint32_t at = collapse + (kSteps - step) * kApart; at < end)
-      look_at(scales_.collapses[at], step);
+  LookAhead<ReplayStep, 4>::each_step([&](ReplayStep step, std::size_t ahead) {
+    if (const std::size_t at = collapse + ahead; at < end) look_at(scales_.collapses[at], step);
+  });
 }
 
-void CollapseReplay::look_at(const Collapse& collapse, std::uint32_t step) const {
-  if (step == 0) {
+void CollapseReplay::look_at(const Collapse& collapse, ReplayStep step) const {
+  if (step == ReplayStep::kPositions) {
     for (const std::uint32_t position : {collapse.from, collapse.to}) rounded_.look_ahead(position);
     return;
   }
   const std::uint32_t u = rounded_.point(collapse.from), v = rounded_.point(collapse.to);
-  if (step == 1) {
+  if (step == ReplayStep::kPoints) {
     for (const std::uint32_t p : {u, v}) {
       corners_.look_ahead(p);
-      __builtin_prefetch(&points_[p]);
+      ask_memory(&points_[p]);
     }
     return;
   }
   const std::span<const std::uint32_t> corners = corners_.at(u);
-  if (step == 2) {
-    __builtin_prefetch(corners.data());
-    __builtin_prefetch(corners.data() + corners.size());
+  if (step == ReplayStep::kCorners) {
+    ask_memory(corners.data());
+    ask_memory(corners.data() + corners.size());
     return;
   }
   constexpr std::size_t kMost = 16;  // of hubs not all
   for (const std::uint32_t c : corners.last(std::min(corners.size(), kMost))) {
     const ReplayFace& face = faces_[c / 3];
-    if (step == 3) {
-      __builtin_prefetch(&face);
-      __builtin_prefetch(&face.alive);
+    if (step == ReplayStep::kFaces) {
+      ask_memory(&face);
+      ask_memory(&face.alive);
     } else if (face.alive) {
-      __builtin_prefetch(&points_[face.point[(c + 1) % 3]]);
+      ask_memory(&points_[face.point[(c + 1) % 3]]);
     }
   }
 }

@@ -11,6 +11,16 @@
 
 namespace texmesh {
 
+/// Steps by which memory is asked for what a collapse will read.
+enum class ReplayStep : std::uint8_t {
+  kPositions,   // which points it joins
+  kPoints,      // the points, and where their corners are listed
+  kCorners,     // of the point that goes
+  kFaces,       // at these corners
+  kNeighbours,  // the points around
+  kCount
+};
+
 /// Replays the collapses from fine to coarse on faces of wedges, recording what each did.
 class CollapseReplay {
  public:
@@ -49,7 +59,7 @@ class CollapseReplay {
   }
   void put_wedge(std::uint32_t face, std::uint32_t corner, std::uint32_t wedge);
   void look_ahead(std::uint32_t collapse, std::uint32_t end) const;
-  void look_at(const Collapse& collapse, std::uint32_t step) const;
+  void look_at(const Collapse& collapse, ReplayStep step) const;
   void note_final(const NestedScale& coarse);
   void replay(std::uint32_t u, std::uint32_t v);
   std::uint32_t group(std::uint32_t face) const;

@@ -8,6 +8,7 @@
 
 #include "format/base/errors.h"
 #include "format/base/no_index.h"
+#include "format/split/look_ahead.h"
 
 namespace texmesh {
 
@@ -47,7 +48,7 @@ class CornerLists {
   }
   void clear(std::uint32_t point) { lists_[point].count = 0; }
   /// Asks memory for what at() will read first.
-  void look_ahead(std::uint32_t point) const { __builtin_prefetch(&lists_[point]); }
+  void look_ahead(std::uint32_t point) const { ask_memory(&lists_[point]); }
 
  private:
   struct List {

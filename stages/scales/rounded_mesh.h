@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "format/split/look_ahead.h"
 #include "format/split/split_source.h"
 #include "stages/data/nested_scales.h"
 #include "stages/scales/vertex_split.h"
@@ -15,7 +16,7 @@ class RoundedMesh {
   RoundedMesh(const NestedScales& scales, const VertexSplitCoding& coding);
   std::uint32_t point(std::uint32_t position) const { return point_.at(position); }
   /// Asks memory for what point() will read.
-  void look_ahead(std::uint32_t position) const { __builtin_prefetch(&point_[position]); }
+  void look_ahead(std::uint32_t position) const { ask_memory(&point_[position]); }
   std::uint32_t wedge(std::uint32_t mesh_wedge) const { return wedge_.at(mesh_wedge); }
   std::uint32_t point_of(std::uint32_t wedge) const { return wedge_point_[wedge]; }
   std::size_t points() const { return places_.size(); }

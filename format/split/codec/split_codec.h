@@ -1,12 +1,14 @@
 #pragma once
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstdint>
 
 #include "format/split/codec/split_element_codec.h"
 #include "format/split/codec/split_patch_codec.h"
 #include "format/split/codec/split_queue.h"
 #include "format/split/codec/split_vertex_codec.h"
+#include "format/split/split_ahead.h"
 
 namespace texmesh {
 
@@ -52,26 +54,22 @@ class SplitCodec {
   }
 
  private:
-  /// Splits are anywhere on the surface, and each would wait for memory a dozen times. So what the next
-  /// points of the queue need is asked for, step by step.
+  /// For the points that the queue gives next.
   void look_ahead() {
-    constexpr std::size_t kApart = 3;  // pops between two steps; two took as long
-    static_assert(kSteps * kApart < kAhead);
     ++popped_;
-    for (std::size_t step = 0; step < kSteps; ++step) {
-      const std::size_t more = (kSteps - 1 - step) * kApart;
-      const std::uint32_t p = queue_.look_ahead(more);
-      std::uint32_t& corner = ahead_[(popped_ + more) % kAhead];
-      if (step == 0) corner = kNoIndex;
-      if (p == kNoIndex) continue;
-      if (step == 0)
+    SplitAhead::each_step([&](SplitStep step, std::size_t ahead) {
+      const std::uint32_t p = queue_.look_ahead(ahead - 1);
+      std::uint32_t& corner = ahead_[(popped_ + ahead) % ahead_.size()];
+      if (step == SplitStep::kPoint) corner = kNoIndex;
+      if (p == kNoIndex) return;
+      if (step == SplitStep::kPoint)
         elements_.mesh.look_ahead(p);
-      else if (step == 1)
+      else if (step == SplitStep::kSplit)
         corner = elements_.mesh.look_at_first(p);
       else if (corner != kNoIndex)
         corner = elements_.mesh.look_beside(corner);
       elements_.channel.update_truth([&](auto& t) { t.look_ahead(p, step, corner); });
-    }
+    });
   }
   /// Whether the point splits now.
   bool code_answer(std::uint32_t v) {
@@ -87,8 +85,8 @@ class SplitCodec {
   SplitVertexCodec<Channel> vertices_;
   SplitPatchCodec<Channel> patches_;
   bool last_answer_ = false;
-  static constexpr std::size_t kSteps = 8, kAhead = 32;
-  std::array<std::uint32_t, kAhead> ahead_{};  // the corner that look_ahead() has come to, by pops
+  // The corner that look_ahead() has come to, by pops; a power of two is fast.
+  std::array<std::uint32_t, std::bit_ceil(SplitAhead::kFarthest + 1)> ahead_{};
   std::size_t popped_ = 0;
 };
 

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "format/split/codec/split_site.h"
+#include "format/split/look_ahead.h"
 
 namespace texmesh {
 
@@ -42,7 +43,7 @@ class SplitQueue {
   std::uint32_t look_ahead(std::size_t more) const {
     if (next_ + more >= queue_.size()) return kNoIndex;
     const std::uint32_t point = queue_[next_ + more];
-    __builtin_prefetch(&history_[point]);
+    ask_memory(&history_[point]);
     return point;
   }
   std::size_t refusals(std::uint32_t point) const { return history_[point] & 3u; }  // at most 3
