@@ -143,5 +143,25 @@ TEST(Scales, SameBytesForAnyNumberOfThreads) {
     EXPECT_EQ(encode_artefact(c.write(codec, {}, 1)), encode_artefact(c.write(codec, {}, 8)));
 }
 
+TEST(Scales, ProgressRisesWithWhatIsMade) {
+  Case c(testing::bumpy_sphere(16, 24));
+  ASSERT_GE(c.scales.scales.size(), 4u);
+  for (const bool stream : {false, true}) {
+    SCOPED_TRACE(stream);
+    std::vector<double> told;
+    RunContext context;
+    context.progress = [&](double fraction) { told.push_back(fraction); };
+    const ScaleFiles files = write_scales(c.scales, c.perceptual, c.materials, c.images, c.fragments,
+                                          c.previews, {.stream = stream}, context);
+    ASSERT_EQ(files.stream.empty(), !stream);
+    // The stream, and each file that is made beside it.
+    ASSERT_EQ(told.size(), stream ? 3u : 1 + c.scales.scales.size());
+    EXPECT_GT(told.front(), 0);
+    EXPECT_LE(told.back(), 1);
+    EXPECT_TRUE(std::ranges::is_sorted(told, std::ranges::less_equal{}))
+        << "each is more than the one before";
+  }
+}
+
 }  // namespace
 }  // namespace texmesh
