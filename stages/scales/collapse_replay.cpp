@@ -128,18 +128,33 @@ void CollapseReplay::note_final(const NestedScale& coarse) {
 }
 
 void CollapseReplay::replay(std::uint32_t u, std::uint32_t v) {
+  gather_corners(u);
+  if (gathered_.empty()) return;
+  const auto number = static_cast<std::uint32_t>(chapter_->splits.size()),
+             move_begin = static_cast<std::uint32_t>(chapter_->moves.size()),
+             born_begin = static_cast<std::uint32_t>(chapter_->born.size());
+  look_around(v);
+  order(number, u, v);
+  for (const std::uint32_t c : gathered_)
+    if (has_edge_to(v, c))
+      remove_face(c / 3);
+    else
+      move_corner(c, v);
+  list_moved_corners(move_begin, v);
+  chapter_->splits.push_back({v, u, move_begin, static_cast<std::uint32_t>(chapter_->moves.size()),
+                              born_begin, static_cast<std::uint32_t>(chapter_->born.size())});
+}
+
+/// Of the faces there are; the point has none afterwards.
+void CollapseReplay::gather_corners(std::uint32_t u) {
   gathered_.clear();
   for (const std::uint32_t c : corners_.at(u) | std::views::reverse)
     if (faces_[c / 3].alive) gathered_.push_back(c);
   corners_.clear(u);
-  if (gathered_.empty()) return;
-  const auto number = static_cast<std::uint32_t>(chapter_->splits.size());
-  SplitSource::Split split{v,
-                           u,
-                           static_cast<std::uint32_t>(chapter_->moves.size()),
-                           0,
-                           static_cast<std::uint32_t>(chapter_->born.size()),
-                           0};
+}
+
+/// Which points lie around the gathered corners, and where faces that go map wedges to.
+void CollapseReplay::look_around(std::uint32_t v) {
   ring_.clear();
   map_.clear();
   for (const std::uint32_t c : gathered_) {
@@ -149,27 +164,32 @@ void CollapseReplay::replay(std::uint32_t u, std::uint32_t v) {
     const std::array<std::uint32_t, 3>& wedge = faces_[f].wedge;
     if (a == v || b == v) map_.push_back({wedge[k], group(f), wedge[(k + (a == v ? 1 : 2)) % 3]});
   }
-  order(number, u, v);
-  for (const std::uint32_t c : gathered_) {
-    const std::uint32_t f = c / 3, k = c % 3;
-    if (point(f, k + 1) == v || point(f, k + 2) == v) {
-      chapter_->born.push_back({f, faces_[f].wedge});
-      faces_[f].alive = false;
-    } else {
-      const std::uint32_t moved = faces_[f].wedge[k], last = faces_[f].coarse_wedge[k];
-      chapter_->moves.push_back({f, moved});
-      const bool stays = last != kNoIndex && rounded_.point_of(last) == v;
-      put_wedge(f, k, stays ? last : target(moved, group(f), v));
-    }
-  }
-  for (std::uint32_t i = split.move_begin; i < chapter_->moves.size(); ++i) {
+}
+
+bool CollapseReplay::has_edge_to(std::uint32_t v, std::uint32_t corner) const {
+  return point(corner / 3, corner % 3 + 1) == v || point(corner / 3, corner % 3 + 2) == v;
+}
+
+void CollapseReplay::remove_face(std::uint32_t face) {
+  chapter_->born.push_back({face, faces_[face].wedge});
+  faces_[face].alive = false;
+}
+
+void CollapseReplay::move_corner(std::uint32_t corner, std::uint32_t v) {
+  const std::uint32_t f = corner / 3, k = corner % 3;
+  const std::uint32_t moved = faces_[f].wedge[k], last = faces_[f].coarse_wedge[k];
+  chapter_->moves.push_back({f, moved});
+  const bool stays = last != kNoIndex && rounded_.point_of(last) == v;
+  put_wedge(f, k, stays ? last : target(moved, group(f), v));
+}
+
+/// Only now: lists without room give up corners of faces that are gone.
+void CollapseReplay::list_moved_corners(std::uint32_t move_begin, std::uint32_t v) {
+  for (std::size_t i = move_begin; i < chapter_->moves.size(); ++i) {
     const std::uint32_t f = chapter_->moves[i].face;
     for (std::uint32_t k = 0; k < 3; ++k)
       if (point(f, k) == v) corners_.add(v, 3 * f + k);
   }
-  split.move_end = static_cast<std::uint32_t>(chapter_->moves.size());
-  split.born_end = static_cast<std::uint32_t>(chapter_->born.size());
-  chapter_->splits.push_back(split);
 }
 
 std::uint32_t CollapseReplay::group(std::uint32_t face) const {

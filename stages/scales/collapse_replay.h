@@ -62,6 +62,12 @@ class CollapseReplay {
   void look_at(const Collapse& collapse, ReplayStep step) const;
   void note_final(const NestedScale& coarse);
   void replay(std::uint32_t u, std::uint32_t v);
+  void gather_corners(std::uint32_t u);
+  void look_around(std::uint32_t v);
+  bool has_edge_to(std::uint32_t v, std::uint32_t corner) const;
+  void remove_face(std::uint32_t face);
+  void move_corner(std::uint32_t corner, std::uint32_t v);
+  void list_moved_corners(std::uint32_t move_begin, std::uint32_t v);
   std::uint32_t group(std::uint32_t face) const;
   std::uint32_t target(std::uint32_t wedge, std::uint32_t group, std::uint32_t v);
   void order(std::uint32_t number, std::uint32_t u, std::uint32_t v);
