@@ -5,8 +5,8 @@
 #include <string>
 
 #include "format/documents/manifest.h"
-#include "format/rules/mip_choice.h"
 #include "stages/geometry/scale_frames.h"
+#include "stages/quality/size_rules.h"
 #include "stages/quality/table_fit.h"
 
 namespace texmesh {
@@ -18,6 +18,7 @@ using quality::choose_views;
 using quality::coarser_along;
 using quality::Coverage;
 using quality::enlarge;
+using quality::fewer_heights;
 using quality::find_groups;
 using quality::find_shown;
 using quality::fit_exponent;
@@ -25,6 +26,7 @@ using quality::FlipLimits;
 using quality::frame_object;
 using quality::GroupCells;
 using quality::GroupPictures;
+using quality::kSizes;
 using quality::lend_knots;
 using quality::Loss;
 using quality::Losses;
@@ -49,10 +51,6 @@ using quality::Together;
 using quality::TogetherCell;
 using quality::TogetherLoss;
 using quality::ViewPart;
-
-constexpr std::size_t kSizes = 3;  // that show textures
-/// Below, a half height hardly costs anything.
-constexpr double kLeastEnlargedPx = 128;
 
 /// A displayed height that is rendered whatever comes out, and the one between it and the next lower one.
 struct Height {
@@ -198,32 +196,6 @@ void judge_size(const SizeCells& cells, const Height& height, const TextureSampl
   SizeCells between{height.between_px, {}, {}, {}};
   render_size(sampler, task, studio, between, context);
   sizes.judge_between(between.geometry, failed, height.between_px);
-}
-
-/// How often the largest height is halved for pictures of textures. Beyond the height at which texels are as
-/// large as pixels and triangles as large as kTrianglePixels, pictures are enlarged ones: what they lose
-/// follows (enlarge()).
-std::size_t fewer_heights(const TextureSampler& sampler, std::size_t triangles, double object_height,
-                          const QualityOptions& options) {
-  // Texels of 0.7 pixels are the least. Those of a sampler that reads level 0 alone flicker where they are
-  // smaller than pixels.
-  constexpr double kTexelLevel = 0.5, kSharpTexelLevel = 0;
-  constexpr double kTrianglePixels = 16, kSeenArea = 0.25, kSeenTriangles = 0.5;
-  std::size_t fewer = 0;
-  while (fewer + 1 < kSizes) {
-    const double px = std::ldexp(options.largest_px, -static_cast<int>(fewer + 1));
-    const double per_unit = px / object_height;
-    const double pixels = kSeenArea * sampler.surface_area * per_unit * per_unit;
-    if (px < kLeastEnlargedPx || pixels < kTrianglePixels * kSeenTriangles * static_cast<double>(triangles))
-      break;
-    const bool finer = std::ranges::any_of(sampler.shown.textures, [&](const ShownTexture& t) {
-      return display_level(sampler.data.tables.planes[t.plane], sampler.surface_area, object_height, px) >
-             (t.with_mips ? kTexelLevel : kSharpTexelLevel);
-    });
-    if (finer) break;
-    ++fewer;
-  }
-  return fewer;
 }
 
 std::vector<SizeCells> render_heights(const TextureSampler& sampler, const QualityOptions& options,

@@ -6,6 +6,8 @@
 #include <functional>
 #include <map>
 
+#include "stages/quality/size_rules.h"
+
 namespace texmesh::quality {
 namespace {
 
@@ -84,7 +86,7 @@ class SizeShots {
   }
 
   void render(double displayed_px, bool with_ssim) {
-    if (sampler_.shown.with_mips()) {  // one reference serves both
+    if (have_one_reference(sampler_.shown)) {
       shots_.insert(shots_.end(), scale_shots_.begin(), scale_shots_.end());
       to_.insert(to_.end(), scales_.begin(), scales_.end());
     } else {
@@ -182,39 +184,6 @@ class SizeShots {
   std::vector<Shot> shots_, scale_shots_;
   std::vector<Losses*> to_, scales_;
 };
-
-/// Short ladders have no other rung.
-bool repeats(const Knot& knot, const Knot& before) {
-  return std::ranges::equal(knot.rungs, before.rungs,
-                            [](const PlaneRung& a, const PlaneRung& b) { return a.rung == b.rung; });
-}
-
-/// The knots that are rendered: all, at larger sizes that of the lowest rung, and at the half that of the
-/// highest one: from a mip with a single rung, as small sizes show it, nothing follows for another mip's best
-/// rung. Without mips losses do not follow from smaller sizes.
-bool is_sampled(const TextureSampler& sampler, const std::vector<Knot>& knots, std::size_t knot,
-                std::size_t rank) {
-  if (knot > 0 && repeats(knots[knot], knots[knot - 1])) return false;
-  return rank == 0 || !sampler.shown.with_mips() || repeats(knots[knot], knots.back()) ||
-         (rank == 1 && knot == 0);
-}
-
-/// Levels of source's texels that are rendered.
-struct MipSamples {
-  std::size_t finer = 0, coarser = 0;
-};
-/// At larger heights the planes that are shown, and the next coarser ones where textures have no finer planes
-/// for them, and once for all.
-MipSamples mip_samples(const TextureSampler& sampler, std::size_t rank, const Display& display,
-                       const PlanesOfGroup& group) {
-  if (rank == 0 || !sampler.shown.with_mips()) return {kFinerLevels + 1, kCoarserLevels};
-  Display smaller = display;
-  smaller.displayed_px /= 2;
-  const bool again = rank == 1 || std::ranges::any_of(group.planes, [&](std::uint32_t p) {
-                       return shown_plane(sampler.data, p, smaller) == shown_plane(sampler.data, p, display);
-                     });
-  return {1, again ? std::size_t{1} : 0};
-}
 
 /// The samples that tell how losses add up: parts that lose little and much.
 struct TogetherSample {
