@@ -38,6 +38,10 @@ export class FetchInTime {
   throughputBytesS(): number | undefined {
     return this.plan_?.throughputBytesS();
   }
+  /** A plan has run, and fragments may be asked for one by one: not where rungs come as a whole, nor by the printed policy. */
+  get hasPlan(): boolean {
+    return !!this.plan_ && !this.printed && !this.fetching_.wholeRungs();
+  }
   leftS(): number {
     return this.load_.limitS - this.load_.elapsedS();
   }
@@ -61,7 +65,7 @@ export class FetchInTime {
       lost: (wish: Wish, error: unknown): void => fetching.lost(wish, error),
     };
     await playPlan(plan, list, fetching.transfers, load.signal, timeLimitS + mostLate * load.limitS, hooks);
-    if (!fetching.wholeRungs() && !this.printed) await this.spendRest_(fragments, plan);
+    await this.spendRest(fragments);
   }
   /** From a request to its answer, as the page has noticed lately. */
   private tripS_(): number {
@@ -87,8 +91,9 @@ export class FetchInTime {
     });
   }
   /** Upgrades take the rest of the time, in ever smaller requests: rungs do not fit a plan to the byte. */
-  private async spendRest_(list: FragmentList, plan: UncheckedPlan): Promise<void> {
-    const { limitS, signal, reader: { client } } = this.load_;
+  async spendRest(list: FragmentList): Promise<void> {
+    const { plan_: plan, load_: { limitS, signal, reader: { client } } } = this;
+    if (!plan || !this.hasPlan) return;
     for (;;) {
       const restS = this.leftS() - composeS;
       const afterS = restS - client.rttS; // nothing else is on its way

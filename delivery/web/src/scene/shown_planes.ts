@@ -6,6 +6,7 @@ import { InputError, throwIfAborted } from '../format/errors';
 import { mostPreviewPx } from '../format/layout';
 import type { PackageData } from '../format/package_data';
 import { type TextureInfo } from '../format/textures';
+import { nowS } from '../http/clock';
 import type { Levels } from '../worker/protocol';
 import type { Compression } from './blocks/compression';
 import type { PlaneComposer } from './composer';
@@ -36,6 +37,7 @@ export class ShownPlanes {
   private set_: TextureSet;
   private compression_?: Compression;
   private considered_ = false;
+  private texelS_ = 0; // seconds that showing planes has taken at most, by their texels
   /** How texels are stored, from the first planes that are shown on: other texels would have to be fetched again. */
   private way_?: number;
 
@@ -153,6 +155,21 @@ export class ShownPlanes {
     const all = wanted.map(({ base, plane }) => ({ base, plane: larger(plane, planes.get(base)!.plane) }));
     return this.fitting(all, scale).filter((c) => planes.get(c.base)!.widthPx < this.textures[c.plane].widthPx);
   }
+  /** Of the textures with finer() planes the one that loses most by the plane that it shows; its finest plane that is likely to show within so many seconds. */
+  nextFiner(scale: number, withinS: number): PlaneChoice | undefined {
+    const { textures, set_: { planes }, data, load_ } = this;
+    const loss = new TextureLoss(data, load_.view.display.heightPx);
+    const next = this.finer(scale).flatMap(({ base, plane }) => {
+      const { plane: shown } = planes.get(base)!;
+      const mips = [...textures.keys()].filter((p) => textures[p].mip > 0 && textures[p].base === base); // in falling order of their size
+      const finest = [base, ...mips].find((p) => textures[p].mip >= textures[plane].mip && this.texelsOf_(p) * this.texelS_ <= withinS);
+      return finest !== undefined && textures[finest].mip < textures[shown].mip ? [{ base, plane: finest, loss: loss.mip(shown) }] : [];
+    });
+    return next.sort((a, b) => b.loss - a.loss)[0];
+  }
+  private texelsOf_(plane: number): number {
+    return this.textures[plane].widthPx * this.textures[plane].heightPx;
+  }
   /** Reads the tables of these planes, too. */
   async readTables(planes: readonly number[]): Promise<void> {
     const { reader, signal } = this.load_;
@@ -167,6 +184,7 @@ export class ShownPlanes {
    */
   async show(choices: readonly PlaneChoice[], anew = false): Promise<{ shown: Promise<unknown> }> {
     const { signal } = this.load_;
+    const beganS = nowS();
     const shown: Promise<void>[] = [];
     for (const choice of choices) {
       const { base, plane } = choice;
@@ -184,7 +202,8 @@ export class ShownPlanes {
       }
       throwIfAborted(signal);
     }
-    return { shown: Promise.all(shown) };
+    const texels = choices.reduce((sum, { plane }) => sum + this.texelsOf_(plane), 0);
+    return { shown: Promise.all(shown).then(() => (this.texelS_ = Math.max(this.texelS_, (nowS() - beganS) / texels))) };
   }
   private async previewOf_(base: number): Promise<ImageBitmap> {
     const { reader, pool, signal } = this.load_;

@@ -28,6 +28,8 @@ const longestTimerS = 1e6;
 const lookEachS = 0.1;
 /** In the timed part a surface that the camera does not see is worth this much of a surface that the camera sees. */
 const unseen = 1e-3;
+/** Share of the time left that showing a plane may take, by what earlier ones took: without a graphics card .1 to .8 s for 4 million texels. */
+const showShare = 0.6;
 /** 1 - SSIM at which refining ends by default. */
 const defaultRefineTo = 0.003;
 /** Refining ends where so many rounds have brought nothing. */
@@ -108,6 +110,8 @@ export class TextureLoad {
     await this.fetchTimed_(this.list_);
     await shown;
     await fetching.composed();
+    await this.useRest_().catch((error: unknown) => load.fail(error, 'finer planes')); // refining asks for them, too
+    throwIfAborted(signal);
     const skipped = this.skippedFragments_();
     await Promise.race([meshShown, this.timer_(1)]);
     this.releaseIfBetter_();
@@ -138,6 +142,25 @@ export class TextureLoad {
     const given = load.override.rung !== undefined;
     if (given || !Number.isFinite(fragmentsS)) while (given === (load.override.rung !== undefined) && (await this.refineSome_(true)));
     else if (fragmentsS > 0 && !load.pool.isUnavailable && list.offers.length > 0) await this.inTime_.run(list, fragmentsS);
+  }
+  /**
+   * All that was chosen is there before the time is over, as the link is faster than was to be expected: planes with more texels take the
+   * rest, one after the other, each with fragments of it.
+   */
+  private async useRest_(): Promise<void> {
+    const { load_: load, planes_: planes, fetching_: fetching, inTime_: inTime } = this;
+    if (load.options.turn || !inTime.hasPlan) return; // other models wait for the link
+    for (;;) {
+      const scale = Math.max(this.scale_.shown, 0);
+      const finer = planes.nextFiner(scale, showShare * (inTime.leftS() - composeS - load.reader.client.rttS));
+      if (!finer) return;
+      await this.prepare_([finer]);
+      await Promise.race([(await planes.show([finer])).shown, this.timer_(1)]);
+      if (!planes.showing(finer)) return; // could not be shown
+      this.list_ = await fetching.listOf(scale, unseen, this.scale_.surface());
+      await inTime.spendRest(this.list_);
+      await fetching.composed();
+    }
   }
   /** Number of fragments whose previews are shown. */
   private skippedFragments_(): number {
