@@ -28,7 +28,7 @@ endfunction()
 texmesh_install_component(texmeshDelivery "format;delivery")
 install(FILES cmake/FindNettle.cmake DESTINATION ${texmesh_cmake_dir})
 # Of the split stream the mesh and its reader; coders are nobody's business but the reader's.
-texmesh_install_headers(format "(base|model|container|documents|rules)/.*" "split/split_(mesh|stream|reader)\\.h")
+texmesh_install_headers(format "(base|model|container|documents|rules)/.*" "split/(look_ahead|split_(mesh|stream|reader))\\.h")
 texmesh_install_headers(delivery/cpp ".*")
 if(TEXMESH_COMPILER)
   texmesh_install_component(texmeshCompiler "stages;pipeline")
