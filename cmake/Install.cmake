@@ -1,5 +1,5 @@
 # make install, and what find_package(texmesh) finds. Component delivery (format, delivery: a client of packages) needs
-# nettle, zlib, libcurl and nlohmann-json; component compiler (the stages and the pipeline as libraries) all the rest. The
+# nettle, zlib, libcurl and nlohmann-json; component compiler (stages, pipeline and tools as libraries) all the rest. The
 # texmesh command, where it was built, is texmesh::texmesh for texmesh_add_package().
 include(CMakePackageConfigHelpers)
 set(texmesh_cmake_dir ${CMAKE_INSTALL_LIBDIR}/cmake/texmesh)
@@ -31,20 +31,20 @@ install(FILES cmake/FindNettle.cmake DESTINATION ${texmesh_cmake_dir})
 texmesh_install_headers(format "(base|model|container|documents|rules)/.*" "split/(look_ahead|split_(mesh|stream|reader))\\.h")
 texmesh_install_headers(delivery/cpp ".*")
 if(TEXMESH_COMPILER)
-  texmesh_install_component(texmeshCompiler "stages;pipeline")
+  texmesh_install_component(texmeshCompiler "stages;pipeline;tools")
   # Of the stages the data, and of each its one public header (tests/house/check_layers).
   texmesh_install_headers(stages "data/.*" "base/run_context\\.h")
   foreach(stage condition skeletonization ssf simplification perceptual_values fragmentation fill zim previews ladder lut
       scales quality poster proxies package)
     texmesh_install_headers(stages "${stage}/${stage}\\.h")
   endforeach()
-  # Of the pipeline what a program calls, and what those headers name; tests/house/check_install sees that none misses.
+  # Of pipeline and tools what a program calls, and what those headers name; tests/house/check_install sees that none misses.
   texmesh_install_headers(pipeline "import/import\\.h" "compile/(compile_model|options|profile)\\.h"
-    "batch/(plan|run|fleet/shards)\\.h" "cache/(disk_store|cache_layer|layer_rest|prune)\\.h" "inspect/(dump/dump|verify/verify|diff/diff)\\.h"
-    "extract/extract\\.h" "export/export\\.h" "gallery/gallery\\.h"
+    "batch/(plan|run|fleet/shards)\\.h" "cache/(disk_store|cache_layer|layer_rest|prune)\\.h"
     "io/(file_request|file_resolver|file_stamp|resolver)\\.h" "compile/workers/(seldom|worker|sandbox/sandbox)\\.h" "batch/progress\\.h"
-    "graph/(artefact|explanation|graph_run|key|option_text|stage|stage_observer|store)\\.h"
-    "extract/glb/(extracted|image_codecs)\\.h" "render/plane_pixels\\.h")
+    "graph/(artefact|explanation|graph_run|key|option_text|stage|stage_observer|store)\\.h")
+  texmesh_install_headers(tools "inspect/(dump/dump|verify/verify|diff/diff)\\.h" "extract/extract\\.h" "publish/export/export\\.h"
+    "publish/site/gallery\\.h" "extract/glb/(extracted|image_codecs)\\.h" "render/plane_pixels\\.h")
   install(FILES cmake/FindWebP.cmake DESTINATION ${texmesh_cmake_dir})
   install(TARGETS texmesh EXPORT texmeshTool RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT tool)
   install(TARGETS texmesh-core RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/texmesh COMPONENT tool)

@@ -25,16 +25,16 @@
 
 #include "format/base/bytes.h"
 #include "format/base/srgb.h"
-#include "pipeline/extract/extract.h"
-#include "pipeline/extract/glb/image_codecs.h"
 #include "pipeline/import/import.h"
 #include "pipeline/io/file_resolver.h"
-#include "pipeline/render/picture_sheet.h"
-#include "pipeline/render/rendered_model.h"
 #include "stages/image/decode_image.h"
 #include "stages/image/png_writer.h"
 #include "stages/measure/flip.h"
 #include "stages/render/shade.h"
+#include "tools/extract/extract.h"
+#include "tools/extract/glb/image_codecs.h"
+#include "tools/render/picture_sheet.h"
+#include "tools/render/rendered_model.h"
 
 namespace texmesh {
 namespace {

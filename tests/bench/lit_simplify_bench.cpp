@@ -15,10 +15,8 @@
 #include <iostream>
 #include <map>
 
-#include "pipeline/extract/package_model.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/file_resolver.h"
-#include "pipeline/render/picture_sheet.h"
 #include "stages/condition/condition.h"
 #include "stages/geometry/scale_frames.h"
 #include "stages/image/png_writer.h"
@@ -27,6 +25,8 @@
 #include "stages/simplification/collapse_engine.h"
 #include "stages/ssf/ssf.h"
 #include "tests/bench/bench_model.h"
+#include "tools/extract/package_model.h"
+#include "tools/render/picture_sheet.h"
 
 namespace {
 

@@ -1,4 +1,4 @@
-// texmesh experiment: the page that judges see, simulated judges who use it, and the fit of what they answer.
+// texmesh-lab experiment: the page that judges see, simulated judges who use it, and the fit of what they answer.
 import {check, common, env, fs, listen, near, path, pictures, run, serve} from './browser.mjs';
 import {test} from './harness.mjs';
 

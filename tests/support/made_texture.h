@@ -5,10 +5,10 @@
 #include <utility>
 #include <vector>
 
+#include "lab/study/covered_plane.h"
 #include "stages/base/run_context.h"
 #include "stages/data/fragments.h"
 #include "stages/data/pixels.h"
-#include "stages/study/covered_plane.h"
 
 namespace texmesh::testing {
 

@@ -8,8 +8,8 @@
 
 #include "delivery/cpp/package/package_reader.h"
 #include "format/container/container.h"
-#include "pipeline/inspect/verify/verify.h"
 #include "tests/support/command.h"
+#include "tools/inspect/verify/verify.h"
 
 namespace texmesh {
 namespace {

@@ -8,11 +8,11 @@
 #include "format/container/format_version.h"
 #include "format/documents/manifest.h"
 #include "format/documents/textures.h"
-#include "pipeline/inspect/dump/dump.h"
-#include "pipeline/inspect/verify/verify.h"
 #include "stages/fragment_codec/fragment_codec.h"
 #include "stages/jpeg/jpeg.h"
 #include "tests/support/command.h"
+#include "tools/inspect/dump/dump.h"
+#include "tools/inspect/verify/verify.h"
 
 namespace texmesh {
 namespace {

@@ -11,10 +11,10 @@
 #include "delivery/cpp/package/package_reader.h"
 #include "format/base/errors.h"
 #include "format/split/split_reader.h"
-#include "pipeline/inspect/verify/verify.h"
 #include "stages/fragment_codec/fragment_codec.h"
 #include "stages/image/decode_image.h"
 #include "tests/support/command.h"
+#include "tools/inspect/verify/verify.h"
 
 namespace texmesh {
 namespace {

@@ -17,16 +17,16 @@
 #include "format/documents/quality_table.h"
 #include "format/documents/textures.h"
 #include "format/rules/allocation.h"
+#include "lab/experiment/design.h"
+#include "lab/experiment/results.h"
 #include "pipeline/about/meta.h"
 #include "pipeline/batch/collection.h"
 #include "pipeline/compile/jnd_profile.h"
 #include "pipeline/compile/options.h"
 #include "pipeline/compile/profile.h"
-#include "pipeline/experiment/design.h"
-#include "pipeline/experiment/results.h"
 #include "pipeline/import/range/range_scan_document.h"
-#include "pipeline/inspect/fragment_files.h"
-#include "pipeline/inspect/provenance.h"
+#include "tools/inspect/fragment_files.h"
+#include "tools/inspect/provenance.h"
 
 namespace texmesh {
 namespace {

@@ -9,11 +9,11 @@
 #include "format/container/container.h"
 #include "format/rules/picture_prediction.h"
 #include "pipeline/compile/compile_model.h"
-#include "pipeline/inspect/verify/verify.h"
 #include "tests/support/command.h"
 #include "tests/support/gltf_builder.h"
 #include "tests/support/images.h"
 #include "tests/support/wide_jpeg.h"
+#include "tools/inspect/verify/verify.h"
 
 namespace texmesh {
 namespace {

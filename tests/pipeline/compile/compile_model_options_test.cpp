@@ -6,8 +6,8 @@
 #include "delivery/cpp/package/package_reader.h"
 #include "pipeline/compile/compile_model.h"
 #include "pipeline/graph/store.h"
-#include "pipeline/inspect/provenance.h"
 #include "tests/support/command.h"
+#include "tools/inspect/provenance.h"
 
 namespace texmesh {
 namespace {

@@ -10,10 +10,10 @@
 #include "delivery/cpp/package/package_reader.h"
 #include "format/model/material_extensions.h"
 #include "pipeline/compile/compile_model.h"
-#include "pipeline/extract/glb/scale_file.h"
 #include "tests/support/command.h"
 #include "tests/support/gltf_builder.h"
 #include "tests/support/images.h"
+#include "tools/extract/glb/scale_file.h"
 
 namespace texmesh {
 namespace {

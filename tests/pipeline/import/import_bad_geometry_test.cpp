@@ -9,12 +9,12 @@
 
 #include "delivery/cpp/package/package_reader.h"
 #include "pipeline/compile/compile_model.h"
-#include "pipeline/extract/glb/scale_file.h"
-#include "pipeline/inspect/verify/verify.h"
 #include "tests/support/command.h"
 #include "tests/support/gltf_builder.h"
 #include "tests/support/hostile_meshes.h"
 #include "tests/support/packages.h"
+#include "tools/extract/glb/scale_file.h"
+#include "tools/inspect/verify/verify.h"
 
 namespace texmesh::testing {
 namespace {

@@ -5,13 +5,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "lab/study/fragment_study.h"
 #include "stages/fill/fill.h"
 #include "stages/image/decode_image.h"
 #include "stages/image/png_writer.h"
 #include "stages/ladder/ladder.h"
 #include "stages/lut/lut.h"
 #include "stages/previews/previews.h"
-#include "stages/study/fragment_study.h"
 #include "stages/zim/zim.h"
 #include "tests/support/all_rungs.h"
 #include "tests/support/allocation_curves.h"

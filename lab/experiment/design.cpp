@@ -1,0 +1,183 @@
+#include "lab/experiment/design.h"
+
+#include <algorithm>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <tuple>
+
+#include "format/base/bounded_json.h"
+#include "format/base/sha256.h"
+#include "format/base/text_bytes.h"
+#include "format/rules/split_mix.h"
+#include "pipeline/compile/user_document.h"
+
+namespace texmesh {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::size_t kIdDigits = 16;
+constexpr std::uint64_t kMaxDesignBytes = 16u << 20;
+
+/// Names of pictures, drawn once for each picture.
+class PictureNames {
+ public:
+  explicit PictureNames(std::uint64_t seed) : random_(seed) {}
+  enum Role : std::uint8_t { kReference, kSame, kChanged };
+  const std::string& of(std::uint32_t condition, std::uint32_t object, Role role, std::uint32_t level) {
+    std::string& name = names_[{condition, object, role, level}];
+    while (name.empty()) {
+      static constexpr const char* kDigits = "0123456789abcdef";
+      std::string drawn;
+      for (std::uint64_t bits = random_.bits(); drawn.size() < kIdDigits; bits >>= 4)
+        drawn += kDigits[bits & 15];
+      if (used_.insert(drawn).second) name = drawn + ".png";
+    }
+    return name;
+  }
+
+ private:
+  SplitMix random_;
+  std::map<std::tuple<std::uint32_t, std::uint32_t, Role, std::uint32_t>, std::string> names_;
+  std::set<std::string> used_;
+};
+
+ExperimentTrial trial_of(const ExperimentDesign& design, std::uint32_t condition, std::uint32_t level,
+                         std::uint32_t object, PictureNames& names) {
+  ExperimentTrial t;
+  t.condition = condition, t.object = object, t.level_index = level;
+  t.is_catch = level == design.levels.size();
+  t.level = t.is_catch ? kCatchLevel : design.levels[level];
+  t.reference = names.of(condition, object, PictureNames::kReference, 0);
+  t.same = names.of(condition, object, PictureNames::kSame, 0);
+  t.changed = names.of(condition, object, PictureNames::kChanged, level);
+  return t;
+}
+
+/// Half of them true (of an odd number one more or less), in any order.
+std::vector<bool> balanced_sides(std::size_t count, SplitMix& random) {
+  std::vector<std::uint8_t> sides;
+  const std::size_t first = random.below(2);
+  for (std::size_t k = 0; k < count; ++k) sides.push_back(static_cast<std::uint8_t>((k + first) % 2));
+  random.shuffle(sides);
+  return {sides.begin(), sides.end()};
+}
+
+/// Trials of one cell: a level at a size.
+using Cells = std::map<std::pair<std::uint32_t, std::uint32_t>, std::vector<std::uint32_t>>;
+
+std::vector<std::uint32_t> draw_order(const ExperimentDesign& design, const Cells& cells, SplitMix& random) {
+  const auto repeats = static_cast<std::size_t>(design.options.repeats);
+  std::vector<std::vector<std::uint32_t>> blocks(repeats);
+  for (const auto& [cell, trials] : cells) {
+    std::vector<std::uint32_t> drawn = trials;
+    random.shuffle(drawn);
+    const std::vector<bool> right = balanced_sides(drawn.size(), random);
+    // Those of a level: one a block. Catch trials: spread over the blocks.
+    for (std::size_t k = 0; k < drawn.size(); ++k)
+      blocks[k * repeats / drawn.size()].push_back(2 * drawn[k] + (right[k] ? 1 : 0));
+  }
+  std::vector<std::uint32_t> order;
+  for (std::vector<std::uint32_t>& block : blocks) {
+    random.shuffle(block);
+    order.insert(order.end(), block.begin(), block.end());
+  }
+  return order;
+}
+
+Json trials_json(const ExperimentDesign& design) {
+  Json list = Json::array();
+  for (const ExperimentTrial& t : design.trials)
+    list.push_back({{"condition", t.condition},
+                    {"level", t.level},
+                    {"catch", t.is_catch},
+                    {"reference", t.reference},
+                    {"same", t.same},
+                    {"changed", t.changed}});
+  return list;
+}
+
+Json design_json(const ExperimentDesign& design) {
+  const ExperimentOptions& o = design.options;
+  Json conditions = Json::array();
+  for (const ExperimentCondition& c : design.conditions)
+    conditions.push_back({{"displayed_px", c.displayed_px}, {"frame_px", c.frame_px}});
+  return {{"version", 1},
+          {"title", o.title},
+          {"kind", name_of(o.kind)},
+          {"consent", o.consent},
+          {"post_url", o.post_url},
+          {"seed", o.seed},
+          {"time_limit_s", o.time_limit_s},
+          {"pause_s", o.pause_s},
+          {"pixels_per_degree", o.pixels_per_degree},
+          {"views", o.views},
+          {"background", design.background},
+          {"levels", design.levels},
+          {"conditions", std::move(conditions)},
+          {"trials", trials_json(design)},
+          {"orders", design.orders}};
+}
+
+std::string id_of(const Json& without_id, const std::string& file) {
+  const std::string text = dump_json(without_id, file);
+  return to_hex(sha256(text_bytes(text))).substr(0, kIdDigits);
+}
+
+DesignKey key_of(const nlohmann::json& root, const std::string& file) {
+  const JsonAt at(root, file);
+  at["version"].integer(1, 1);
+  DesignKey key;
+  key.id = at["id"].text(kIdDigits);
+  key.kind = at["kind"].text(20);
+  std::vector<double> sizes;
+  const JsonAt conditions = at["conditions"], trials = at["trials"];
+  for (std::size_t c = 0, n = conditions.array(1, kMostSizes); c < n; ++c)
+    sizes.push_back(conditions[c]["displayed_px"].number(1, 100000));
+  for (std::size_t t = 0, n = trials.array(1, kMostTrials); t < n; ++t)
+    key.trials.push_back({sizes[trials[t]["condition"].integer(0, sizes.size() - 1)],
+                          trials[t]["level"].number(kLeastLevel, kMostLevel), trials[t]["catch"].boolean()});
+  return key;
+}
+
+}  // namespace
+
+void plan_trials(ExperimentDesign& design) {
+  const ExperimentOptions& o = design.options;
+  SplitMix random(o.seed);
+  PictureNames names(random.bits());
+  const auto levels = static_cast<std::uint32_t>(design.levels.size());
+  const auto objects = static_cast<std::uint32_t>(o.kind == StimulusKind::kMesh ? 1 : o.objects);
+  Cells cells;
+  for (std::uint32_t c = 0; c < design.conditions.size(); ++c)
+    for (std::uint32_t level = 0; level <= levels; ++level) {
+      const auto count = static_cast<std::uint32_t>(level < levels ? o.repeats : o.catches);
+      for (std::uint32_t k = 0; k < count; ++k) {
+        cells[{c, level}].push_back(static_cast<std::uint32_t>(design.trials.size()));
+        design.trials.push_back(trial_of(design, c, level, (k + level) % objects, names));
+      }
+    }
+  for (int k = 0; k < o.orders; ++k) design.orders.push_back(draw_order(design, cells, random));
+}
+
+std::string write_design(ExperimentDesign& design) {
+  Json json = design_json(design);
+  design.id = id_of(json, "design.json");
+  json["id"] = design.id;
+  return dump_json(json, "design.json") + "\n";
+}
+
+DesignKey read_design(std::span<const std::uint8_t> json, const std::string& file) {
+  return read_document(file, [&] {
+    const nlohmann::json checked = parse_json(json, file, kMaxDesignBytes);
+    DesignKey key = key_of(checked, file);
+    Json rest = parse_bounded_json(json, file, 8);
+    rest.erase("id");
+    if (const std::string id = id_of(rest, file); id != key.id)
+      throw InputError(file, "/id", id + ", the digest of the rest", key.id + ": the design was changed");
+    return key;
+  });
+}
+
+}  // namespace texmesh

@@ -1,0 +1,11 @@
+#pragma once
+#include <span>
+
+#include "tools/publish/pages/built_in_file.h"
+
+namespace texmesh {
+
+/// The files of page/.
+std::span<const BuiltInFile> experiment_page_files();
+
+}  // namespace texmesh

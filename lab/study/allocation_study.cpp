@@ -1,0 +1,355 @@
+#include "lab/study/allocation_study.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+
+#include "format/base/box.h"
+#include "format/base/srgb.h"
+#include "format/rules/allocation.h"
+#include "format/rules/rate_distortion.h"
+#include "stages/base/parallel.h"
+#include "stages/fragment_codec/decode_rung.h"
+#include "stages/jpeg/jpeg.h"
+#include "stages/measure/render_view.h"
+
+namespace texmesh {
+namespace {
+
+constexpr std::uint32_t kLargestLevelPx = 2048;  // what a view of some hundred pixels can show
+constexpr std::uint64_t kMaxPreviewPixels = 1u << 26;
+
+using Rungs = std::vector<std::vector<std::int16_t>>;  // [shown plane][fragment]
+
+struct Shown {
+  std::vector<std::size_t> planes;        // indices into Fragments::planes
+  std::vector<std::int32_t> of_material;  // index into planes, -1 = no texture
+};
+
+Shown shown_planes(const std::vector<Material>& materials, const Fragments& fragments) {
+  Shown out;
+  for (const Material& m : materials) {
+    std::int32_t found = -1;
+    for (std::size_t p = 0; m.base_colour_texture.used() && p < fragments.planes.size() && found < 0; ++p) {
+      const TexturePlane& plane = fragments.planes[p];
+      if (plane.image != static_cast<std::uint32_t>(m.base_colour_texture.image) ||
+          plane.role != TextureRole::kBaseColour)
+        continue;
+      const auto at = std::find(out.planes.begin(), out.planes.end(), p);
+      found = static_cast<std::int32_t>(at - out.planes.begin());
+      if (at == out.planes.end()) out.planes.push_back(p);
+    }
+    out.of_material.push_back(found);
+  }
+  if (out.planes.empty())
+    throw StageError("allocation study", "materials", "a base colour with a texture", "none");
+  return out;
+}
+
+std::uint8_t encode(float linear) {
+  const double x = std::clamp(static_cast<double>(linear), 0.0, 1.0);
+  const double s = srgb_of_light(x);
+  return static_cast<std::uint8_t>(255 * s + 0.5);
+}
+
+/// A plane's pixels in linear light, prefiltered from the first level that is worth keeping.
+MipTexture texture_of(const Pixels& pixels, const TexturePlane& plane) {
+  MipTexture texture;
+  texture.width_px = plane.width_px;
+  texture.height_px = plane.height_px;
+  while (std::max(plane.width_px, plane.height_px) >> texture.first_level > kLargestLevelPx)
+    ++texture.first_level;
+  const std::uint32_t step = 1u << texture.first_level;
+  texture.levels.resize(1);
+  MipTexture::Level& level = texture.levels[0];
+  level.width = (plane.width_px + step - 1) / step;
+  level.height = (plane.height_px + step - 1) / step;
+  level.texels.resize(std::size_t{level.width} * level.height);
+  const auto& linear = light_of_bytes();
+  for (std::uint32_t y = 0; y < level.height; ++y)
+    for (std::uint32_t x = 0; x < level.width; ++x) {
+      Vec3f sum;
+      for (std::uint32_t v = y * step; v < y * step + step; ++v)
+        for (std::uint32_t u = x * step; u < x * step + step; ++u) {
+          const std::uint8_t* c =
+              pixels.at(std::min(u, pixels.width_px - 1), std::min(v, pixels.height_px - 1));
+          sum = sum + (pixels.channels == 3 ? Vec3f{linear[c[0]], linear[c[1]], linear[c[2]]}
+                                            : Vec3f{linear[c[0]], linear[c[0]], linear[c[0]]});
+        }
+      level.texels[std::size_t{y} * level.width + x] = sum * (1.f / static_cast<float>(step * step));
+    }
+  build_mips(texture);
+  return texture;
+}
+
+/// Bilinear, texel centres at halves.
+std::uint8_t preview_value(const Pixels& preview, const TexturePlane& plane, std::uint32_t x, std::uint32_t y,
+                           std::uint32_t channel) {
+  const double u =
+      std::clamp((x + 0.5) * preview.width_px / plane.width_px - 0.5, 0.0, preview.width_px - 1.0);
+  const double v =
+      std::clamp((y + 0.5) * preview.height_px / plane.height_px - 0.5, 0.0, preview.height_px - 1.0);
+  const auto a = static_cast<std::uint32_t>(u), b = static_cast<std::uint32_t>(v);
+  const std::uint32_t c = std::min(a + 1, preview.width_px - 1), d = std::min(b + 1, preview.height_px - 1);
+  const double s = u - a, t = v - b;
+  const double upper = preview.at(a, b)[channel] * (1 - s) + preview.at(c, b)[channel] * s;
+  const double lower = preview.at(a, d)[channel] * (1 - s) + preview.at(c, d)[channel] * s;
+  return static_cast<std::uint8_t>(upper * (1 - t) + lower * t + 0.5);
+}
+
+/// A plane as a client puts it together from the chosen rungs.
+Pixels compose(const TexturePlane& plane, const Pixels& source, const PlaneLadder& ladder,
+               const PlanePreview& preview_file, const std::vector<std::int16_t>& rungs,
+               const RunContext& context) {
+  Pixels out = source;  // fragments without coverage keep the source's pixels: nobody sees them
+  const Pixels preview = decode_jpeg(preview_file.file, kMaxPreviewPixels);
+  parallel_for(context, plane.fragment_count(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t f = begin; f < end; ++f) {
+      if (plane.covered_texels[f] == 0) continue;
+      const auto [left, top, w, h] = padded_fragment_rectangle(plane, f);
+      Pixels block;
+      if (rungs[f] != kSkipped)
+        block = decode_fragment(ladder, static_cast<std::size_t>(rungs[f]), f, std::uint64_t{w} * h);
+      for (std::uint32_t y = 0; y < h; ++y)
+        for (std::uint32_t x = 0; x < w; ++x)
+          for (std::uint32_t c = 0; c < out.channels; ++c)
+            out.data[(std::size_t{top + y} * out.width_px + left + x) * out.channels + c] =
+                block.data.empty()
+                    ? preview_value(preview, plane, left + x, top + y, std::min(c, preview.channels - 1))
+                    : block.at(x, y)[c];
+    }
+  });
+  return out;
+}
+
+struct Chosen {
+  std::string name;
+  Rungs rungs;
+};
+
+std::uint64_t bytes_of(const std::vector<const PlaneTables*>& tables, const Rungs& rungs) {
+  std::uint64_t sum = 0;
+  for (std::size_t p = 0; p < tables.size(); ++p) sum += sum_of(texmesh::bytes_of(*tables[p], rungs[p]));
+  return sum;
+}
+
+Rungs uniform_rungs(const std::vector<const PlaneTables*>& tables, int quality) {
+  Rungs out;
+  for (const PlaneTables* t : tables) {
+    out.emplace_back(t->fragment_count(), kSkipped);
+    for (const std::uint16_t f : t->order)
+      out.back()[f] = static_cast<std::int16_t>(nearest_rung(*t, quality));
+  }
+  return out;
+}
+
+/// What whole rungs leave of the budget: fragment after fragment by falling eta of scale 0 (ties: plane,
+/// index) goes up by a rung where that fits, again and again until none does.
+void spend_remainder(const std::vector<const PlaneTables*>& tables, std::uint64_t budget, Rungs& rungs) {
+  struct RankedFragment {
+    float eta;
+    std::size_t plane, fragment;
+  };
+  std::vector<RankedFragment> ranked;
+  for (std::size_t p = 0; p < tables.size(); ++p) {
+    const std::vector<float> eta = eta_of(*tables[p], 0);
+    for (std::size_t f = 0; f < eta.size(); ++f)
+      if (rungs[p][f] != kSkipped) ranked.push_back({eta[f], p, f});
+  }
+  std::stable_sort(ranked.begin(), ranked.end(),
+                   [](const RankedFragment& a, const RankedFragment& b) { return a.eta > b.eta; });
+  std::uint64_t spent = bytes_of(tables, rungs);
+  for (bool more = spent < budget; more;) {
+    more = false;
+    for (const RankedFragment& at : ranked) {
+      const PlaneTables& t = *tables[at.plane];
+      std::int16_t& rung = rungs[at.plane][at.fragment];
+      const auto next = static_cast<std::size_t>(rung) + 1;
+      if (next >= t.rung_count()) continue;
+      const std::uint64_t others = spent - bytes_to_show(t, next - 1, at.fragment);
+      if (others + bytes_to_show(t, next, at.fragment) > budget) continue;
+      spent = others + bytes_to_show(t, next, at.fragment);
+      ++rung;
+      more = true;
+    }
+  }
+}
+
+/// (3.2) or its log form with the highest Q_i that fits.
+Rungs variable_rungs(const std::vector<const PlaneTables*>& tables, std::uint8_t allocation, double width,
+                     std::uint64_t budget) {
+  Rungs best = uniform_rungs(tables, 1);
+  for (double q = 1; q <= 100; q += 0.25) {
+    Rungs rungs;
+    for (const PlaneTables* t : tables) {
+      PlaneTables asked = *t;
+      asked.allocation = allocation;
+      asked.quality_width = static_cast<float>(width);
+      asked.quality[0] = static_cast<float>(q);
+      rungs.push_back(rungs_of(asked, 0, mean_eta(asked, 0)));
+    }
+    if (bytes_of(tables, rungs) <= budget) best = std::move(rungs);
+  }
+  spend_remainder(tables, budget, best);
+  return best;
+}
+
+double largest_weight(const PlaneTables& tables) {
+  double largest = 0;
+  for (const float w : surface_weights(tables)) largest = std::max(largest, static_cast<double>(w));
+  return largest;
+}
+
+Rungs bought_rungs(const std::vector<const PlaneTables*>& tables, std::uint64_t budget) {
+  double largest = 0;
+  for (const PlaneTables* t : tables) largest = std::max(largest, largest_weight(*t));
+  std::vector<RdCurve> curves;
+  for (const PlaneTables* t : tables) {
+    const auto own = rd_curves(*t, surface_weights(*t), largest > 0 ? largest_weight(*t) / largest : 1);
+    curves.insert(curves.end(), own.begin(), own.end());
+  }
+  const std::vector<std::uint32_t> ways = spend_bytes(curves, budget);
+  Rungs out;
+  std::size_t k = 0;
+  for (const PlaneTables* t : tables) {
+    std::vector<std::uint16_t> stored = t->order;
+    std::sort(stored.begin(), stored.end());
+    out.emplace_back(t->fragment_count(), kSkipped);
+    for (const std::uint16_t f : stored)
+      out.back()[f] = static_cast<std::int16_t>(static_cast<int>(ways[k++]) - 1);
+  }
+  return out;
+}
+
+void describe(const std::vector<const PlaneTables*>& tables, const Rungs& rungs, StudiedChoice& out) {
+  out.bytes = bytes_of(tables, rungs);
+  double loss = 0, weight = 0;
+  for (std::size_t p = 0; p < tables.size(); ++p) {
+    const PlaneTables& t = *tables[p];
+    for (const std::uint16_t f : t.order) {
+      ++out.fragments;
+      if (rungs[p][f] == kSkipped) {
+        ++out.skipped;
+        continue;
+      }
+      const int q = t.rung_quality[static_cast<std::size_t>(rungs[p][f])];
+      out.lowest_quality = out.lowest_quality == 0 ? q : std::min(out.lowest_quality, q);
+      out.highest_quality = std::max(out.highest_quality, q);
+    }
+    double w = 0;
+    for (const float v : surface_weights(t)) w += static_cast<double>(v);
+    loss += w * surface_dssim(t, rungs[p]);
+    weight += w;
+  }
+  out.surface_ssim = weight > 0 ? 1 - loss / weight : 1;
+}
+
+Pixels picture_of(const Picture& picture) {
+  Pixels out{picture.side_px, picture.side_px, 3, {}};
+  out.data.reserve(picture.linear.size() * 3);
+  for (std::size_t k = 0; k < picture.linear.size(); ++k)
+    for (int c = 0; c < 3; ++c)
+      out.data.push_back(picture.covered[k] ? encode(picture.linear[k][c]) : std::uint8_t{255});
+  return out;
+}
+
+/// The budget is what one quality everywhere takes.
+std::vector<Chosen> choices_of(const std::vector<const PlaneTables*>& tables,
+                               const AllocationStudyOptions& options) {
+  std::vector<Chosen> out{{"source", {}}, {"uniform", uniform_rungs(tables, options.quality)}};
+  const std::uint64_t budget = bytes_of(tables, out[1].rungs);
+  out.push_back({"variable (3.2)", variable_rungs(tables, 0, options.width, budget)});
+  out.push_back({"variable (log)", variable_rungs(tables, 1, options.width, budget)});
+  out.push_back({"rate-distortion", bought_rungs(tables, budget)});
+  return out;
+}
+
+std::vector<ViewBuffer> views_of(const Mesh& mesh, const std::vector<Material>& materials, const Shown& shown,
+                                 const Fragments& fragments, const AllocationStudyOptions& options) {
+  if (mesh.positions.empty()) throw StageError("allocation study", "mesh", "positions", "none");
+  std::vector<std::uint32_t> source(mesh.triangles.size());
+  std::iota(source.begin(), source.end(), 0u);
+  ViewScene scene;
+  scene.mesh = &mesh, scene.triangles = &mesh.triangles, scene.triangle_source = &source;
+  scene.materials = &materials;
+  scene.base_plane = shown.of_material;
+  scene.emissive_plane.assign(materials.size(), -1);
+  for (const std::size_t p : shown.planes)
+    scene.sizes.push_back({fragments.planes[p].width_px, fragments.planes[p].height_px});
+  const BoundingSphere sphere = bounding_sphere(mesh.positions);
+  const auto side = static_cast<std::uint32_t>(options.size_px);
+  std::vector<ViewBuffer> views;
+  for (int v = 0; v < options.views; ++v)
+    views.push_back(look_at(scene, camera_of(v, options.views, sphere.centre, sphere.radius), side));
+  return views;
+}
+
+/// What is the same for all choices.
+struct StudyScene {
+  const Shown& shown;
+  const Fragments& fragments;
+  const std::vector<Pixels>& pixels;
+  const Ladder& ladder;
+  const Previews& previews;
+};
+
+std::vector<MipTexture> textures_of(const StudyScene& scene, const Chosen& choice,
+                                    const RunContext& context) {
+  std::vector<MipTexture> textures;
+  for (std::size_t p = 0; p < scene.shown.planes.size(); ++p) {
+    const std::size_t index = scene.shown.planes[p];
+    const TexturePlane& plane = scene.fragments.planes[index];
+    const Pixels& whole = scene.pixels.at(index);
+    textures.push_back(texture_of(choice.rungs.empty()
+                                      ? whole
+                                      : compose(plane, whole, scene.ladder.planes.at(index),
+                                                scene.previews.planes.at(index), choice.rungs[p], context),
+                                  plane));
+  }
+  return textures;
+}
+
+/// Compares the views with the originals, which the first choice, the source, sets.
+void measure_views(const std::vector<ViewBuffer>& views, const std::vector<MipTexture>& textures,
+                   int picture_view, std::vector<ComparedPicture>& original, StudiedChoice& result) {
+  const bool first = original.empty();
+  PictureDifference sum;
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    const Picture picture = draw(views[v], textures);
+    if (static_cast<int>(v) == picture_view) result.picture = picture_of(picture);
+    const ComparedPicture compared = prepare_comparison(picture);
+    if (first) original.push_back(compared);
+    const PictureDifference d = compare_pictures(original[v], compared);
+    sum.ssim += d.ssim, sum.difference += d.difference, sum.pixels += d.pixels;
+  }
+  if (sum.pixels == 0) throw StageError("allocation study", "views", "pixels that show the object", "none");
+  result.ssim = sum.ssim / static_cast<double>(sum.pixels);
+  result.difference = sum.difference / static_cast<double>(sum.pixels);
+}
+
+}  // namespace
+
+std::vector<StudiedChoice> study_allocation(
+    const ConditionedMesh& mesh, const std::vector<Material>& materials, const Fragments& fragments,
+    const std::vector<Pixels>& pixels, const Ladder& ladder, const Previews& previews,
+    const PackageTables& tables, const AllocationStudyOptions& options, const RunContext& context) {
+  const Shown shown = shown_planes(materials, fragments);
+  std::vector<const PlaneTables*> shown_tables;
+  for (const std::size_t p : shown.planes) shown_tables.push_back(&tables.planes.at(p));
+  const std::vector<Chosen> choices = choices_of(shown_tables, options);
+  const std::vector<ViewBuffer> views = views_of(mesh.mesh, materials, shown, fragments, options);
+  std::vector<ComparedPicture> original;
+  std::vector<StudiedChoice> out;
+  for (const Chosen& choice : choices) {
+    StudiedChoice& result = out.emplace_back();
+    result.name = choice.name;
+    if (!choice.rungs.empty()) describe(shown_tables, choice.rungs, result);
+    measure_views(views, textures_of({shown, fragments, pixels, ladder, previews}, choice, context),
+                  options.picture_view, original, result);
+    context.report(static_cast<double>(out.size()) / static_cast<double>(choices.size()));
+  }
+  return out;
+}
+
+}  // namespace texmesh

@@ -1,0 +1,279 @@
+// Tables 7.1, 7.2 and 7.3: perceptual values of a nutcracker, and the monitors of the experiments.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "format/rules/jnd_choice.h"
+#include "format/rules/viewing.h"
+#include "lab/thesis/exhibits.h"
+#include "lab/thesis/made_scans.h"
+#include "stages/perceptual_values/perceptual_values.h"
+#include "stages/skeletonization/skeletonization.h"
+
+namespace texmesh {
+namespace {
+
+// 18 x 36 samples of a full turn have the printed 1,260 faces.
+constexpr std::uint32_t kNutcrackerColumns = 18, kNutcrackerRows = 36;
+constexpr double kThesisJnd = 0.10;
+
+struct PrintedStep {
+  double faces, average, deviation;
+};
+constexpr PrintedStep kTable71[] = {{1162, .0410, .0308},
+                                    {1118, .0412, .0294},
+                                    {1074, .0478, .0390},
+                                    {1040, .0468, .0288},
+                                    {1002, .0678, .0491}};
+constexpr double kTable72[] = {.0410, .0616, .0677, .0759, .1080};
+
+struct Nutcracker {
+  MadeChain chain;
+  Skeleton skeleton;
+  PerceptualValues values;
+};
+
+Nutcracker measure_nutcracker(const RunContext& context) {
+  Nutcracker n;
+  n.chain = thesis_chain(
+      make_scan_model(MadeShape::kNutcracker, kNutcrackerColumns, kNutcrackerRows, 0, context), context);
+  n.skeleton = skeletonize(n.chain.mesh, {}, context);
+  PerceptualValuesOptions options;
+  options.jnd = kThesisJnd;
+  options.statistic = PerceptualStatistic::kAverage;
+  n.values = measure_perceptual_values(n.chain.scales, n.skeleton, options, context);
+  return n;
+}
+
+std::string step_name(const Nutcracker& n, std::size_t k) {
+  return fmt::format("{}-{}", n.chain.scales.scales[k - 1].scale, n.chain.scales.scales[k].scale);
+}
+
+/// How many of the printed rows have a row of ours beside them.
+std::size_t compared_rows(const Nutcracker& n) { return std::min<std::size_t>(5, n.values.step.size() - 1); }
+
+Exhibit table_7_1(const Nutcracker& n) {
+  ExhibitTable table{"Perceptual values between adjacent scales",
+                     {{"scales, printed", 0},
+                      {"ours", 0},
+                      {"faces, printed", 0},
+                      {"ours", 0},
+                      {"average, printed", 4},
+                      {"ours", 4},
+                      {"deviation, printed", 4},
+                      {"ours", 4},
+                      {"largest, ours", 4},
+                      {"least, ours", 4}},
+                     {}};
+  std::size_t rising = 0, small = 0;
+  const std::size_t rows = compared_rows(n);
+  for (std::size_t k = 1; k <= rows; ++k) {
+    const PrintedStep& p = kTable71[k - 1];
+    const CollapseStatistics& s = n.values.step[k];
+    table.rows.push_back({fmt::format("{}-{}", k - 1, k), step_name(n, k), p.faces,
+                          static_cast<double>(n.chain.scales.scales[k].triangles.size()), p.average,
+                          static_cast<double>(s.mean), p.deviation, static_cast<double>(s.deviation),
+                          static_cast<double>(s.max), static_cast<double>(s.min)});
+    rising += k > 1 && s.mean >= n.values.step[k - 1].mean;
+    small += static_cast<double>(s.mean) < kThesisJnd;
+  }
+  return {
+      "7.1",
+      "Table 7.1: perceptual values between adjacent scales",
+      "averages of .041 to .068 on a nutcracker of 1,260 faces, rising but from S_3 to S_4; deviations below them",
+      fmt::format(
+          "range scan of a made nutcracker, {} x {} samples: {} faces; skeleton, and collapses in the scale "
+          "map's order; scales within 3 % of each other's faces count as one",
+          kNutcrackerColumns, kNutcrackerRows, n.chain.mesh.mesh.triangles.size()),
+      {table},
+      {},
+      {},
+      small == rows && rising + 2 >= rows ? Verdict::kConfirmed : Verdict::kInPart,
+      fmt::format(
+          "ours rise in {} of {} steps, and {} of {} averages are below the JND of .10. Our first step takes {} of "
+          "1,260 faces, the printed one 98: at the first sigma many samples of a coarse grid cross nothing. A grid "
+          "of 18 x 36 over a full turn has exactly the printed number of faces.",
+          rising, rows - 1, small, rows,
+          n.chain.mesh.mesh.triangles.size() - n.chain.scales.scales[1].triangles.size())};
+}
+
+ExhibitTable table_of_rules(const Nutcracker& n) {
+  std::vector<float> printed_steps{0}, steps;
+  for (const PrintedStep& p : kTable71) printed_steps.push_back(static_cast<float>(p.average));
+  for (const CollapseStatistics& s : n.values.step) steps.push_back(s.mean);
+  const std::vector<float> printed = chained_values(printed_steps), ours = chained_values(steps);
+  ExhibitTable table{
+      "Cumulative values from S_0: printed, by rules from the printed Table 7.1, and of our nutcracker",
+      {{"to", 0},
+       {"printed", 4},
+       {"root of squares of 7.1", 4},
+       {"sum of 7.1", 4},
+       {"our scale", 0},
+       {"ours, root of squares", 4},
+       {"ours, sum", 4},
+       {"ours, against the survivor", 4},
+       {"ours, p95 of distances", 4}},
+      {}};
+  double sum = 0, our_sum = 0;
+  for (std::size_t j = 1; j <= 5; ++j) {
+    sum += kTable71[j - 1].average;
+    std::vector<ExhibitCell> row{fmt::format("S_{}", j), kTable72[j - 1], static_cast<double>(printed[j]),
+                                 sum};
+    if (j < steps.size()) {
+      our_sum += static_cast<double>(steps[j]);
+      row.insert(row.end(),
+                 {fmt::format("S_{}", n.chain.scales.scales[j].scale), static_cast<double>(ours[j]), our_sum,
+                  static_cast<double>(n.values.chain_average[j]), static_cast<double>(n.values.p95[j])});
+    }
+    row.resize(9);
+    table.rows.push_back(std::move(row));
+  }
+  return table;
+}
+
+Plot plot_7_13(const Nutcracker& n, const std::vector<std::uint8_t>& major) {
+  const std::vector<NestedScale>& scales = n.chain.scales.scales;
+  Plot plot{"Fig. 7.13: scale shown over distance, one unit a scale",
+            "distance, units",
+            "scale",
+            0,
+            static_cast<double>(scales.back().scale),
+            static_cast<double>(scales.back().scale),
+            0,
+            true,
+            {}};
+  PlotSeries linear{"a scale a unit", "q", {}, false, true, false, false};
+  PlotSeries steps{"major scales", "a", {}, true, false, false, true};
+  double from = 0;
+  for (std::size_t k = 0; k < scales.size(); ++k) {
+    linear.points.emplace_back(scales[k].scale, scales[k].scale);
+    if (k > 0 && !major[k]) continue;
+    steps.points.emplace_back(from, scales[k].scale);
+    from = scales[k].scale;
+  }
+  steps.points.emplace_back(from, scales.back().scale);
+  plot.series = {linear, steps};
+  return plot;
+}
+
+std::string majors_of(const Nutcracker& n, const std::vector<std::uint8_t>& major) {
+  std::vector<int> out;
+  for (std::size_t k = 0; k < major.size(); ++k)
+    if (major[k]) out.push_back(n.chain.scales.scales[k].scale);
+  return fmt::format("{}", fmt::join(out, ", "));
+}
+
+Exhibit table_7_2(const Nutcracker& n) {
+  const ExhibitTable table = table_of_rules(n);
+  double root = 0, sum = 0;
+  for (std::size_t j = 0; j < 5; ++j) {
+    root = std::max(root, std::abs(std::get<double>(table.rows[j][2]) / kTable72[j] - 1));
+    sum = std::max(sum, std::abs(std::get<double>(table.rows[j][3]) / kTable72[j] - 1));
+  }
+  std::vector<float> printed(36, 0);
+  for (std::size_t j = 1; j < 6; ++j) printed[j] = static_cast<float>(kTable72[j - 1]);
+  const std::size_t first = coarsest_alike(printed, 6, 0, kThesisJnd);
+  const std::size_t rows = n.values.step.size();
+  const std::vector<std::uint8_t> survivor = major_rows(n.values.chain_average, rows, kThesisJnd);
+  return {
+      "7.2",
+      "Table 7.2 and Fig. 7.13: cumulative values and major scales",
+      "S_1 to S_5 differ from S_0 by .041 to .108; the rule is not printed; S_4 is the first major scale of "
+      "4, 9, 11, 17 and 20",
+      "the printed Table 7.1, and the nutcracker of Table 7.1, whose chains of collapses are followed to the vertex that "
+      "is left (7.2)",
+      {table},
+      {plot_7_13(n, n.values.major)},
+      {},
+      first == 4 && root < sum ? Verdict::kInPart : Verdict::kNotConfirmed,
+      fmt::format(
+          "with the printed values and JND .10 the first major scale is S_{}, as printed. Of the rules, the root of "
+          "the sum of squares of Table 7.1 comes within {:.0f} % of Table 7.2, the plain sum within {:.0f} %; "
+          "neither gives the printed digits. Major scales of our nutcracker: {} by the root of squares, {} "
+          "against the survivor.",
+          first, 100 * root, 100 * sum, majors_of(n, n.values.major), majors_of(n, survivor))};
+}
+
+// ---- Table 7.3
+
+struct Monitor {
+  double width_in, height_in, width_px, height_px;
+};
+constexpr Monitor kMonitors[] = {
+    {16, 12, 1280, 1024}, {11, 8, 1024, 768}, {12, 9, 1024, 768}, {14, 11, 1280, 1024}};
+constexpr double kNear_in = 18, kFar_in = 30;
+
+std::vector<ManifestScale> viewed_scales(const Nutcracker& n) {
+  std::vector<ManifestScale> out;
+  for (std::size_t k = 0; k < n.chain.scales.scales.size(); ++k) {
+    ManifestScale s;
+    s.scale = n.chain.scales.scales[k].scale;
+    s.display_px_error = k == 0 ? kAnyDisplayPx : static_cast<double>(n.values.display_px_error[k]);
+    s.display_px_edge = k == 0 ? kAnyDisplayPx : static_cast<double>(n.values.display_px_edge[k]);
+    out.push_back(s);
+  }
+  return out;
+}
+
+Exhibit table_7_3(const Nutcracker& n) {
+  const std::vector<ManifestScale> scales = viewed_scales(n);
+  const std::vector<ManifestStep> by_pixel = step_function(scales, StepRule::kError),
+                                  by_edge = step_function(scales, StepRule::kEdge);
+  const std::size_t rows = scales.size();
+  const int by_jnd =
+      scales[coarsest_alike(value_table(n.values, PerceptualStatistic::kAverage), rows, 0, kThesisJnd)].scale;
+  std::vector<float> radius = n.skeleton.radius;
+  std::ranges::sort(radius);
+  const double middle =
+      static_cast<double>(radius[radius.size() / 2]) / static_cast<double>(n.values.object_height);
+  ExhibitTable table{"The monitors, with the nutcracker as high as the screen",
+                     {{"monitor", 0},
+                      {"inches", 0},
+                      {"pixels", 0},
+                      {"pixels per inch", 1},
+                      {"px per degree at 18 in", 1},
+                      {"at 30 in", 1},
+                      {"JND of the middle R, px", 1},
+                      {"scale by JND", 0},
+                      {"by one pixel", 0},
+                      {"by O_V / E_S", 0}},
+                     {}};
+  std::size_t coarser = 0;
+  for (std::size_t k = 0; k < 4; ++k) {
+    const Monitor& m = kMonitors[k];
+    const double per_inch = m.height_px / m.height_in;
+    const int pixel = scale_at(by_pixel, m.height_px);
+    coarser += by_jnd > pixel;
+    table.rows.push_back({fmt::format("{}", k + 1), fmt::format("{:.0f} x {:.0f}", m.width_in, m.height_in),
+                          fmt::format("{:.0f} x {:.0f}", m.width_px, m.height_px), per_inch,
+                          fovea_radius_px(kNear_in * per_inch, 1) * 2,
+                          fovea_radius_px(kFar_in * per_inch, 1) * 2, kThesisJnd * middle * m.height_px,
+                          static_cast<double>(by_jnd), static_cast<double>(pixel),
+                          static_cast<double>(scale_at(by_edge, m.height_px))});
+  }
+  return {
+      "7.3",
+      "Table 7.3: monitors, and the scales they ask for",
+      "four monitors; refinement may stop at the JND before one pixel limits it (7.6)",
+      "the printed sizes; the nutcracker's scales by the average value below .10, by an error of one pixel (95th "
+      "percentile) and by O_V / E_S",
+      {table},
+      {},
+      {},
+      coarser == 4 ? Verdict::kInPart : Verdict::kNotConfirmed,
+      fmt::format(
+          "the JND stops refinement before the pixel on {} of 4 monitors. That nothing is lost by it is not "
+          "confirmed: on scans of ours, scales that the JND allows differ visibly from S_0 (FLIP .10 to .18 over "
+          "the object).",
+          coarser)};
+}
+
+}  // namespace
+
+std::vector<Exhibit> perceptual_exhibits(const RunContext& context) {
+  const Nutcracker n = measure_nutcracker(context);
+  return {table_7_1(n), table_7_2(n), table_7_3(n)};
+}
+
+}  // namespace texmesh

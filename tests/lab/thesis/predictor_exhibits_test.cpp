@@ -1,0 +1,64 @@
+#include <gtest/gtest.h>
+
+#include "lab/thesis/exhibits.h"
+#include "lab/thesis/made_patterns.h"
+#include "tests/lab/thesis/exhibit_rows.h"
+
+namespace texmesh {
+namespace {
+
+using namespace testing;  // NOLINT: fixtures
+
+const std::vector<Exhibit>& predictors_shown() {
+  static const std::vector<Exhibit> kMade = predictor_exhibits({});
+  return kMade;
+}
+
+TEST(PredictorExhibits, AreSound) { expect_sound(predictors_shown()); }
+
+TEST(PredictorExhibits, Fig82FollowsTheFormulas) {
+  const Exhibit& e = exhibit_of(predictors_shown(), "fig-8.2");
+  ASSERT_EQ(e.tables[1].rows.size(), kMadePatterns);
+  double least = 1, most = 0;
+  for (std::size_t f = 0; f < kMadePatterns; ++f) {
+    const double i = number_at(e, 1, f, 2), zeta = number_at(e, 1, f, 3), m = number_at(e, 1, f, 4);
+    EXPECT_NEAR(m, 1 - (0.5 * (1 - i) + 0.5 * zeta), 1e-6);
+    least = std::min(least, number_at(e, 1, f, 5)), most = std::max(most, number_at(e, 1, f, 5));
+  }
+  EXPECT_GE(least, 0);
+  EXPECT_LE(most, 1);
+  EXPECT_NEAR(number_at(e, 1, pattern_of('a'), 1), 0, 1e-6);  // plain: no deviation, no gradient
+  EXPECT_NEAR(number_at(e, 1, pattern_of('a'), 2), 0.15, 0.005);
+  EXPECT_EQ(number_at(e, 1, pattern_of('a'), 3), 0);
+  EXPECT_EQ(e.verdict, Verdict::kConfirmed) << exhibit_text(e);
+}
+
+TEST(PredictorExhibits, Fig83MarksWhatZetaCounts) {
+  const Exhibit& e = exhibit_of(predictors_shown(), "fig-8.3");
+  EXPECT_EQ(e.verdict, Verdict::kConfirmed) << exhibit_text(e);
+  EXPECT_EQ(number_at(e, 0, pattern_of('a'), 2), 0);
+  EXPECT_GT(number_at(e, 0, pattern_of('w'), 2), 0.2);
+}
+
+TEST(PredictorExhibits, Fig85SpendsTheSameBytes) {
+  const Exhibit& e = exhibit_of(predictors_shown(), "fig-8.5");
+  ASSERT_EQ(e.tables[0].rows.size(), 5u);
+  const double uniform = number_at(e, 0, 4, 4), variable = number_at(e, 0, 4, 5);
+  EXPECT_LE(variable, 1.01 * uniform);
+  EXPECT_GE(variable, 0.9 * uniform);
+  for (const std::size_t column : {4u, 5u}) {
+    double sum = 0;
+    for (std::size_t f = 0; f < 4; ++f) sum += number_at(e, 0, f, column);
+    EXPECT_EQ(sum, number_at(e, 0, 4, column));
+  }
+  double least = 100, most = 0;
+  for (std::size_t f = 0; f < 4; ++f) {
+    least = std::min(least, number_at(e, 0, f, 3)), most = std::max(most, number_at(e, 0, f, 3));
+  }
+  EXPECT_NEAR(most - least, 18, 1) << "the printed span";
+  EXPECT_EQ(number_at(e, 1, 0, 2), 825.45);
+  EXPECT_GT(number_at(e, 1, 1, 4), 0.9) << "correlation of (x)";
+}
+
+}  // namespace
+}  // namespace texmesh

@@ -1,0 +1,48 @@
+#include "tools/cli/options/told_errors.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+
+#include "pipeline/io/exit_codes.h"
+#include "tools/cli/options/units.h"
+
+namespace texmesh {
+namespace {
+
+struct Told {
+  int exit_code = 0;
+  std::string text;
+};
+
+Told told_of(const std::function<int()>& run) {
+  testing::internal::CaptureStderr();
+  const int code = run_telling_errors(run);
+  return {code, testing::internal::GetCapturedStderr()};
+}
+
+TEST(ToldErrors, WhatIsGivenIsTheExitCode) {
+  const Told t = told_of([] { return 42; });
+  EXPECT_EQ(t.exit_code, 42);
+  EXPECT_EQ(t.text, "");
+}
+
+TEST(ToldErrors, EachKindHasItsCodeAndSaysWhatItFound) {
+  const Told usage = told_of([]() -> int { throw UsageError("--time", "", "seconds", "much"); });
+  EXPECT_EQ(usage.exit_code, kExitUsage);
+  EXPECT_NE(usage.text.find("much"), std::string::npos);
+  const Told input = told_of([]() -> int { throw InputError("scan.glb", "byte 4", "a GLB", "a letter"); });
+  EXPECT_EQ(input.exit_code, kExitModelFailed);
+  EXPECT_NE(input.text.find("a letter"), std::string::npos);
+  const Told file = told_of([] { return static_cast<int>(std::filesystem::file_size("/nothing/there")); });
+  EXPECT_EQ(file.exit_code, kExitModelFailed);
+  EXPECT_NE(file.text.find("/nothing/there"), std::string::npos);
+  const Told internal = told_of([]() -> int { throw std::logic_error("two and two"); });
+  EXPECT_EQ(internal.exit_code, kExitInternal);
+  EXPECT_NE(internal.text.find("internal error: two and two"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace texmesh

@@ -1,0 +1,304 @@
+// extract_model() on small packages made by code.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "stages/gltf/check_glb.h"
+#include "stages/image/decode_image.h"
+#include "tests/support/packages.h"
+#include "tools/extract/extract.h"
+
+namespace texmesh {
+namespace {
+
+using testing::make_package_parts;
+
+PackageReader open(const Bytes& package) { return PackageReader(open_container(memory_source(package))); }
+const Bytes& package_bytes() {
+  static const Bytes bytes = make_package_parts().build();
+  return bytes;
+}
+
+Extracted extract(const ExtractRequest& request, int threads = 2) {
+  PackageReader package = open(package_bytes());
+  RunContext context;
+  context.threads = threads;
+  return extract_model(package, request, context);
+}
+
+ExtractRequest budget(std::uint64_t bytes) {
+  ExtractRequest r;
+  r.bytes = bytes;
+  r.display_px = 64;  // small pictures, quick tests
+  return r;
+}
+
+void expect_valid(const Bytes& glb, const std::string& what) {
+  Findings findings;
+  const GlbFacts facts = check_glb(glb, "x.glb", findings, GlbRules::kStandalone);
+  for (const Finding& f : findings.list()) ADD_FAILURE() << what << ": " << to_string(f);
+  EXPECT_GT(facts.triangles, 0u);
+}
+
+nlohmann::json json_of(const Bytes& glb) {
+  const std::size_t bytes = glb[12] | glb[13] << 8 | glb[14] << 16;
+  return nlohmann::json::parse(glb.begin() + 20, glb.begin() + 20 + static_cast<std::ptrdiff_t>(bytes));
+}
+
+Pixels image_of(const Bytes& glb, std::size_t k) {
+  const nlohmann::json root = json_of(glb);
+  const nlohmann::json& view = root["bufferViews"][root["images"][k]["bufferView"].get<std::size_t>()];
+  const std::size_t at =
+      28u + (glb[12] | glb[13] << 8 | glb[14] << 16) + view["byteOffset"].get<std::size_t>();
+  const auto begin = glb.begin() + static_cast<std::ptrdiff_t>(at);
+  return decode_image(probe_image(
+      "x", {begin, begin + static_cast<std::ptrdiff_t>(view["byteLength"].get<std::size_t>())}, {}));
+}
+
+Bytes package_with_proxies() {
+  testing::PackageParts parts = make_package_parts();
+  testing::add_proxies(parts);
+  return parts.build();
+}
+
+TEST(ExtractModel, AProxyIsWrittenAsItIs) {
+  const Bytes bytes = package_with_proxies();
+  PackageReader package = open(bytes);
+  ExtractRequest r;
+  r.proxy = 1;
+  const Extracted moved = extract_model(package, r, {});
+  expect_valid(moved.glb, "proxy 1");
+  EXPECT_EQ(moved.proxy, 1u);
+  EXPECT_EQ(moved.triangles, package.manifest().proxies[1].triangles);
+  Findings findings;
+  const GlbFacts facts = check_glb(moved.glb, "x.glb", findings, GlbRules::kStandalone);
+  EXPECT_NEAR(facts.bounds_min.x, 9, 1e-3);  // where the source has it
+  EXPECT_EQ(facts.largest_image_px, package.manifest().proxies[1].texture_px);
+  r.recentre = true;
+  EXPECT_NEAR(check_glb(extract_model(package, r, {}).glb, "x.glb", findings).bounds_min.x, -1, 1e-3);
+  r.proxy = 2;
+  EXPECT_THROW(extract_model(package, r, {}), InputError);
+  PackageReader without = open(package_bytes());
+  r.proxy = 0;
+  EXPECT_THROW(extract_model(without, r, {}), InputError);
+}
+
+TEST(ExtractModel, TheBestRungAsPngIsThePlanePutTogetherAgain) {
+  ExtractRequest r;
+  r.scale = 0;
+  r.images = ExtractImages::kPng;
+  const Extracted e = extract(r);
+  expect_valid(e.glb, "png");
+  const Pixels image = image_of(e.glb, 0);
+  ASSERT_EQ(image.width_px, 64u);
+  ASSERT_EQ(image.height_px, 48u);
+  // Fragment by fragment, as a client would decode them; fragment 3 is not stored.
+  PackageReader package = open(package_bytes());
+  for (const std::uint32_t f : {0u, 1u, 2u}) {
+    const Pixels part = decode_image(probe_image("f", package.complete_fragment(0, 1, f), {}));
+    for (std::uint32_t y = 0; y < 32; ++y)
+      for (std::uint32_t x = 0; x < 32; ++x) {
+        const std::uint32_t px = f % 2 * 32 + x, py = f / 2 * 32 + y;
+        if (py < 48) ASSERT_TRUE(std::equal(part.at(x, y), part.at(x, y) + 3, image.at(px, py))) << f;
+      }
+  }
+}
+
+TEST(ExtractModel, EveryKindOfRequestGivesAValidFile) {
+  for (const ExtractImages images :
+       {ExtractImages::kAuto, ExtractImages::kJpeg, ExtractImages::kWebp, ExtractImages::kPng})
+    for (const bool lods : {false, true})
+      for (const double display : {0.0, 50.0, 5000.0}) {
+        ExtractRequest r;
+        r.images = images;
+        r.lods = lods;
+        r.display_px = display;
+        const Extracted e = extract(r);
+        expect_valid(e.glb, std::to_string(static_cast<int>(images)) + " " + std::to_string(display));
+        const nlohmann::json root = json_of(e.glb);
+        const bool webp = images == ExtractImages::kWebp;
+        EXPECT_EQ(root.value("extensionsRequired", nlohmann::json::array()).dump().find("EXT_texture_webp") !=
+                      std::string::npos,
+                  webp);
+        EXPECT_EQ(e.scale, display == 50 ? 5 : 0);
+        EXPECT_EQ(e.levels.size(), lods && e.scale == 0 ? 2u : 1u);
+      }
+}
+
+TEST(ExtractModel, LevelsShareTexturesAndStandBehindTheFinest) {
+  ExtractRequest r;
+  r.lods = true;
+  const Extracted e = extract(r);
+  const nlohmann::json root = json_of(e.glb);
+  EXPECT_EQ(root["images"].size(), 1u);
+  EXPECT_EQ(root["meshes"].size(), 2u);
+  ASSERT_EQ(root["scenes"][0]["nodes"].size(), 1u);
+  const nlohmann::json& placed = root["nodes"][root["scenes"][0]["nodes"][0].get<std::size_t>()];
+  EXPECT_EQ(placed["translation"], nlohmann::json::parse("[10.0, 20.0, 30.0]"));
+  ASSERT_EQ(placed["children"].size(), 1u);
+  const nlohmann::json& top = root["nodes"][placed["children"][0].get<std::size_t>()];
+  ASSERT_EQ(top["extensions"]["MSFT_lod"]["ids"].size(), 1u);
+  const auto coverage = top["extras"]["MSFT_screencoverage"].get<std::vector<double>>();
+  ASSERT_EQ(coverage.size(), 2u);
+  EXPECT_GT(coverage[0], coverage[1]);
+  EXPECT_EQ(coverage[1], 0);
+}
+
+TEST(ExtractModel, BytesAreMetWithinTwoPercentFromBelow) {
+  const std::uint64_t smallest = extract(budget(1)).glb.size();
+  const Extracted most = extract(budget(10'000'000));
+  EXPECT_FALSE(most.within);
+  int within = 0, asked = 0;
+  for (std::uint64_t bytes = smallest + 300; bytes < most.glb.size(); bytes += 160, ++asked) {
+    const Extracted e = extract(budget(bytes));
+    EXPECT_LE(e.glb.size(), bytes);
+    EXPECT_EQ(e.within, static_cast<double>(e.glb.size()) >= 0.98 * static_cast<double>(bytes));
+    expect_valid(e.glb, std::to_string(bytes));
+    EXPECT_EQ(e.mesh_bytes + e.images[0].bytes, e.glb.size());
+    EXPECT_TRUE(e.within) << bytes << " got " << e.glb.size() << " S_" << e.scale << " "
+                          << e.images[0].width_px << " q" << e.images[0].quality;
+    within += e.within;
+  }
+  EXPECT_GT(asked, 4);
+  EXPECT_EQ(within, asked);
+}
+
+TEST(ExtractModel, OutsideTheReachTheNearestFileIsGiven) {
+  const Extracted small = extract(budget(100));
+  EXPECT_FALSE(small.within);
+  EXPECT_EQ(small.scale, 5);
+  expect_valid(small.glb, "smallest");
+  EXPECT_LE(small.glb.size(), extract(budget(small.glb.size() + 200)).glb.size());
+}
+
+TEST(ExtractModel, MoreBytesGiveNoWorsePicture) {
+  double before = 1;
+  for (const std::uint64_t bytes : {5000u, 8000u, 12000u}) {
+    const Extracted e = extract(budget(bytes));
+    EXPECT_LE(e.difference, before + 0.005) << bytes;
+    before = e.difference;
+  }
+}
+
+TEST(ExtractModel, FilesOfTheOtherScaleAreNotNearer) {
+  int compared = 0;
+  for (const std::uint64_t bytes : {6000u, 9000u}) {
+    const Extracted chosen = extract(budget(bytes));
+    for (const int scale : {0, 5}) {
+      if (scale == chosen.scale) continue;
+      ExtractRequest r = budget(bytes);
+      r.scale = scale;
+      const Extracted other = extract(r);
+      if (other.glb.size() > bytes) continue;
+      EXPECT_LE(chosen.difference, 1.01 * other.difference) << bytes << " S_" << *r.scale;
+      ++compared;
+    }
+  }
+  EXPECT_GT(compared, 0) << "no file of another scale fits";
+}
+
+TEST(ExtractModel, ThreadsDoNotChangeAByte) {
+  EXPECT_EQ(extract(budget(7000), 1).glb, extract(budget(7000), 8).glb);
+  ExtractRequest r;
+  EXPECT_EQ(extract(r, 1).glb, extract(r, 8).glb);
+}
+
+TEST(ExtractModel, SaysWhichScaleOrRungIsNotThere) {
+  ExtractRequest r;
+  r.scale = 3;
+  EXPECT_THROW(extract(r), InputError);
+  r.bytes = 9000;
+  EXPECT_THROW(extract(r), InputError);
+  ExtractRequest rung;
+  rung.rung = 2;
+  EXPECT_THROW(extract(rung), InputError);
+  rung.rung = 0;
+  EXPECT_EQ(extract(rung).images[0].quality, 20);
+}
+
+TEST(ExtractModel, DamageIsAnErrorWhereverItIs) {
+  for (const char* entry : {"texture/0/r01.pack", "texture/0/tables.pack", "mesh/s00.glb", "tables.bin"}) {
+    testing::PackagePatcher patcher(package_bytes());
+    patcher.edit(entry, [](Bytes& b) { b[b.size() / 2] ^= 0x55; });
+    ExtractRequest r;
+    r.scale = 0;
+    EXPECT_THROW(
+        {
+          PackageReader package = open(patcher.package());
+          extract_model(package, r, {});
+        },
+        FormatError)
+        << entry;
+  }
+  // Sealed again, so that only its content is wrong.
+  for (const char* entry : {"texture/0/r01.pack", "mesh/s00.glb"})
+    for (const std::size_t at : {0u, 13u, 40u}) {
+      testing::PackagePatcher patcher(package_bytes());
+      patcher.edit(entry, [at](Bytes& b) { b[at] ^= 0xff; }).seal();
+      ExtractRequest r = budget(8000);
+      r.scale = 0;
+      try {
+        PackageReader package = open(patcher.package());
+        expect_valid(extract_model(package, r, {}).glb, entry);  // some bytes only change texels
+      } catch (const Error& e) {
+        EXPECT_FALSE(std::string(e.what()).empty());
+      }
+    }
+}
+
+TEST(ExtractModel, ReportsAreJson) {
+  ExtractRequest r = budget(3000);
+  r.images = ExtractImages::kWebp;
+  const auto json = nlohmann::json::parse(extract_json(extract(r), r, "a.glb"));
+  EXPECT_EQ(json["asked_bytes"], 3000);
+  EXPECT_EQ(json["images"][0]["format"], "webp");
+  EXPECT_NE(extract_text(extract(r), r, "a.glb").find("a.glb: "), std::string::npos);
+}
+
+TEST(ExtractBudgets, EveryFileIsTheOneThatItsNumberAloneGives) {
+  const Bytes with = package_with_proxies();
+  for (const Bytes* bytes : {&package_bytes(), &with}) {
+    // Out of order, twice the same search, too few bytes for anything, and more than there is.
+    const std::vector<std::uint64_t> numbers{9000, 2500, 4000, 10, 2600, 1000000};
+    PackageReader package = open(*bytes);
+    const std::vector<Extracted> together = extract_budgets(package, budget(0), numbers, {});
+    ASSERT_EQ(together.size(), numbers.size());
+    for (std::size_t k = 0; k < numbers.size(); ++k) {
+      PackageReader fresh = open(*bytes);
+      const Extracted alone = extract_model(fresh, budget(numbers[k]), {});
+      EXPECT_EQ(together[k].glb, alone.glb) << numbers[k];
+      EXPECT_EQ(together[k].difference, alone.difference) << numbers[k];
+      EXPECT_EQ(together[k].mesh_difference, alone.mesh_difference) << numbers[k];
+      EXPECT_EQ(together[k].within, alone.within) << numbers[k];
+      EXPECT_EQ(together[k].proxy, alone.proxy) << numbers[k];
+      EXPECT_EQ(together[k].notes, alone.notes) << numbers[k];
+    }
+  }
+}
+
+TEST(ExtractBudgets, LevelsOfDetailToo) {
+  const std::vector<std::uint64_t> numbers{6000, 12000};
+  PackageReader package = open(package_bytes());
+  ExtractRequest r = budget(0);
+  r.lods = true;
+  const std::vector<Extracted> together = extract_budgets(package, r, numbers, {});
+  for (std::size_t k = 0; k < numbers.size(); ++k) {
+    r.bytes = numbers[k];
+    EXPECT_EQ(together[k].glb, extract_model(package, r, {}).glb) << numbers[k];
+  }
+}
+
+TEST(ExtractBudgets, ProgressRisesToOne) {
+  PackageReader package = open(package_bytes());
+  std::vector<double> seen;
+  RunContext context;
+  context.progress = [&](double fraction) { seen.push_back(fraction); };
+  extract_budgets(package, budget(0), {3000, 5000}, context);
+  ASSERT_FALSE(seen.empty());
+  EXPECT_TRUE(std::ranges::is_sorted(seen));
+  EXPECT_EQ(seen.back(), 1);
+}
+
+}  // namespace
+}  // namespace texmesh

@@ -1,0 +1,87 @@
+#include "tools/cli/check/check_gate.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "format/base/text_bytes.h"
+#include "pipeline/io/atomic_file.h"
+#include "pipeline/io/markup.h"
+#include "pipeline/io/text_table.h"
+#include "tools/cli/options/delivery_options.h"
+#include "tools/publish/report/html.h"
+#include "tools/publish/report/switch_sizes.h"
+
+namespace texmesh {
+
+std::vector<GateResult> check_plan(const DeliveryPlan& plan, const Gate& gate, double time_limit_s) {
+  std::vector<GateResult> results;
+  const auto add = [&](std::string name, bool good, std::string failure) {
+    results.push_back({std::move(name), good ? "" : std::move(failure)});
+  };
+  add("predicted FLIP", plan.flip <= gate.max_flip,
+      fmt::format("predicted FLIP {:.4f}, expected at most {:.4f}", plan.flip, gate.max_flip));
+  add("predicted FLIP by the textures alone", plan.texture_flip <= gate.max_texture_flip,
+      fmt::format("predicted FLIP by the textures alone {:.4f}, expected at most {:.4f}", plan.texture_flip,
+                  gate.max_texture_flip));
+  add("time of the first picture", plan.first_picture_s <= gate.max_first_picture_s,
+      fmt::format("first picture {}, expected by {:.2f} s", moment(plan.first_picture_s),
+                  gate.max_first_picture_s));
+  add("time of all", plan.complete_s <= 1.01 * time_limit_s,
+      fmt::format("complete {}, expected by {:.2f} s", moment(plan.complete_s), time_limit_s));
+  add("bytes", plan.bytes() <= gate.max_bytes,
+      fmt::format("{} bytes, expected at most {}", grouped(plan.bytes()), grouped(gate.max_bytes)));
+  return results;
+}
+
+std::vector<GateResult> check_switch_sizes(PackageReader& package, double max_flip, int views,
+                                           const RunContext& context) {
+  std::vector<GateResult> results;
+  const bool any =
+      std::ranges::any_of(package.manifest().steps, [](const ManifestStep& s) { return s.scale > 0; });
+  if (!any) return results;
+  PackagePictures pictures(package, {}, context);
+  for (const SwitchSize& s : measure_switch_sizes(package, pictures, views, context)) {
+    const double flip = s.views.worst_mean();
+    results.push_back({fmt::format("FLIP of S_{} at its switch size", s.scale),
+                       flip <= max_flip
+                           ? ""
+                           : fmt::format("S_{} at {:.0f} px: measured FLIP {:.4f} in the worst of {} views, "
+                                         "expected at most {:.4f}",
+                                         s.scale, s.rendered_px, flip, views, max_flip)});
+  }
+  return results;
+}
+
+std::string gate_junit(const std::string& suite, const std::string& input,
+                       const std::vector<GateResult>& results) {
+  const auto failures =
+      std::ranges::count_if(results, [](const GateResult& r) { return !r.failure.empty(); });
+  const std::string name = markup_escaped(printable(input));
+  std::string out = fmt::format(
+      "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n<testsuite name=\"{}\" "
+      "tests=\"{}\" failures=\"{}\">\n",
+      markup_escaped(suite), results.size(), failures);
+  for (const GateResult& r : results) {
+    out += fmt::format("<testcase classname=\"{}\" name=\"{}\"", name, markup_escaped(r.name));
+    out += r.failure.empty()
+               ? "/>\n"
+               : fmt::format("><failure message=\"{}\"/></testcase>\n", markup_escaped(r.failure));
+  }
+  return out + "</testsuite>\n</testsuites>\n";
+}
+
+void write_gate_junit(const std::string& path, const std::string& suite, const std::string& input,
+                      const std::vector<GateResult>& results) {
+  const std::string xml = gate_junit(suite, input, results);
+  write_output_file(path, text_bytes(xml));
+}
+
+std::vector<std::string> gate_failures(const std::vector<GateResult>& results) {
+  std::vector<std::string> out;
+  for (const GateResult& r : results)
+    if (!r.failure.empty()) out.push_back(r.failure);
+  return out;
+}
+
+}  // namespace texmesh

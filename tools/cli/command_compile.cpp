@@ -1,0 +1,399 @@
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <iostream>
+#include <map>
+#include <memory>
+#include <string_view>
+
+#include "format/base/errors.h"
+#include "format/documents/about.h"
+#include "pipeline/about/meta.h"
+#include "pipeline/batch/plan.h"
+#include "pipeline/batch/run.h"
+#include "pipeline/batch/write_reports.h"
+#include "pipeline/cache/cache_layer.h"
+#include "pipeline/cache/disk_store.h"
+#include "pipeline/compile/jnd_profile.h"
+#include "pipeline/compile/option_fields.h"
+#include "pipeline/compile/options.h"
+#include "pipeline/compile/profile.h"
+#include "pipeline/io/exit_codes.h"
+#include "pipeline/io/file_resolver.h"
+#include "pipeline/io/machine/machine_share.h"
+#include "pipeline/io/resource_error.h"
+#include "tools/cli/commands.h"
+#include "tools/cli/options/command_line.h"
+#include "tools/cli/options/common_options.h"
+#include "tools/cli/options/shard_options.h"
+#include "tools/cli/options/units.h"
+#include "tools/cli/program.h"
+
+namespace texmesh {
+namespace {
+
+/// A name beside --STAGE.OPTION.
+struct ShortName {
+  const char* name;
+  bool everyday;  // one of the options that --help shows
+};
+const std::map<std::string, ShortName> kShortNames{{"package.title", {"--title", true}},
+                                                   {"import.up", {"--up", true}},
+                                                   {"proxies.mode", {"--proxies", false}},
+                                                   {"ladder.rungs", {"--rungs", true}},
+                                                   {"ladder.mode", {"--ladder", true}},
+                                                   {"ladder.keep_source", {"--keep-source", true}},
+                                                   {"ladder.subsampling", {"--subsampling", true}},
+                                                   {"scales.mesh_codec", {"--mesh-codec", true}},
+                                                   {"perceptual_values.jnd", {"--jnd", true}},
+                                                   {"fragmentation.fill", {"--fill", true}},
+                                                   {"lut.allocate", {"--allocate", false}},
+                                                   {"simplification.order", {"--order", false}}};
+constexpr const char* kEverydayTitle = "What the package holds";
+
+struct CompileArguments {
+  std::vector<std::string> inputs, layers;
+  std::string output, profile, jnd_profile, meta, memory, model_memory = "8GiB", shard, costs,
+                                                          sandbox = "auto";
+  CacheChoice cache;
+  std::string cache_size = "20GB", cache_age = "90d";
+  int jobs = 0;
+  bool json = false, quiet = false, keep_going = false;
+  RunSettings run;
+  std::map<std::string, std::string> options;  // path -> text
+  std::string meta_text;                       // what the file of --meta says
+};
+
+/// The field's own text, what it may be and its default. Names of values and of symbols stay as they are.
+std::string help_of(const OptionField& f) {
+  std::string help = f.help;
+  const std::string first = help.substr(0, help.find(' '));
+  const bool is_name = first.ends_with(':') || help.compare(first.size(), 2, " =") == 0;
+  if (!is_name && std::islower(static_cast<unsigned char>(first[first.size() > 1 ? 1 : 0])))
+    help[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(help[0])));
+  if (f.range && !std::holds_alternative<std::string*>(f.value))
+    help += fmt::format(" [{:g}..{:g}]", f.range->lo, f.range->hi);
+  if (const auto* e = std::get_if<EnumField>(&f.value))
+    help += fmt::format(" {{{}}}", fmt::join(e->names, "|"));
+  std::string text = option_text(f);
+  std::erase(text, '"');
+  return text.empty() ? help : help + " (default " + text + ")";
+}
+
+const char* value_name_of(const OptionField& f) {
+  struct Name {
+    const char* operator()(bool*) const { return "true|false"; }
+    const char* operator()(int*) const { return "N"; }
+    const char* operator()(double*) const { return "X"; }
+    const char* operator()(std::string*) const { return "TEXT"; }
+    const char* operator()(std::vector<int>*) const { return "N,N..."; }
+    const char* operator()(std::vector<double>*) const { return "X,X..."; }
+    const char* operator()(const EnumField&) const { return "NAME"; }
+  };
+  return std::visit(Name{}, f.value);
+}
+
+/// Which options of stages a command line may mean.
+class AskedOptions {
+ public:
+  AskedOptions() = default;  // all
+  explicit AskedOptions(std::span<char* const> words)
+      : words_(words.begin(), words.end()), all_(std::ranges::any_of(words_, asks_for_help)) {}
+
+  bool has(const OptionField& f) const {
+    const auto it = kShortNames.find(f.path());
+    const std::string long_name = "--" + f.path();
+    return all_ || std::ranges::any_of(words_, [&](std::string_view word) {
+             return word.starts_with(long_name) ||
+                    (it != kShortNames.end() && word.starts_with(it->second.name));
+           });
+  }
+
+ private:
+  static bool asks_for_help(std::string_view word) {
+    return word.starts_with("--help") || (!word.starts_with("--") && word.starts_with("-") &&
+                                          word.find('h') != std::string_view::npos);  // -h, also as -qh
+  }
+  std::vector<std::string_view> words_;
+  bool all_ = true;
+};
+
+/// The short name of a switch takes no value; --STAGE.OPTION does.
+void add_stage_option(Command& c, const OptionField& f, CompileArguments& args) {
+  const auto it = kShortNames.find(f.path());
+  const bool is_short = it != kShortNames.end(), is_switch = std::holds_alternative<bool*>(f.value);
+  std::string names = "--" + f.path();
+  if (is_short && !is_switch) names += std::string(",") + it->second.name;
+  Option option = c.option(
+      names, [&args, path = f.path()](const std::string& text) { args.options[path] = text; }, help_of(f));
+  option.value_name(value_name_of(f)).rare();
+  if (const auto* e = std::get_if<EnumField>(&f.value)) option.offers({e->names.begin(), e->names.end()});
+  if (is_short && !is_switch && it->second.everyday) option.everyday(kEverydayTitle);
+  if (!is_short || !is_switch) return;
+  c.flag(
+       it->second.name, [&args, path = f.path()] { args.options[path] = "true"; },
+       "the same as " + names + " true")
+      .rare()
+      .everyday(kEverydayTitle, help_of(f));
+}
+
+void add_stage_options(Command& c, CompileArguments& args, const AskedOptions& asked) {
+  CompileOptions defaults;
+  for (const OptionField& f : list_options(defaults)) {
+    if (!asked.has(f)) continue;
+    c.group("Stage " + f.stage);
+    add_stage_option(c, f, args);
+  }
+}
+
+/// Defaults, the profile, then the JND profile over it.
+CompileOptions base_options(const CompileArguments& args) {
+  CompileOptions options;
+  if (!args.profile.empty()) {
+    const auto bytes = read_input_file(args.profile, 1 << 20);
+    read_profile(options, std::string(bytes.begin(), bytes.end()), args.profile);
+  }
+  if (!args.jnd_profile.empty())
+    read_jnd_profile(options, read_input_file(args.jnd_profile, 1 << 16), args.jnd_profile);
+  return options;
+}
+
+void read_meta_file(CompileArguments& args) {
+  if (args.meta.empty()) return;
+  const auto bytes = read_input_file(args.meta, kMaxAboutBytes);
+  args.meta_text = read_meta(std::string(bytes.begin(), bytes.end()), args.meta);
+}
+
+/// Flags win over everything that a file says.
+void apply_flags(const CompileArguments& args, CompileOptions& options) {
+  std::vector<OptionField> fields = list_options(options);
+  for (const auto& [path, text] : args.options) set_option(*find_option(fields, path), text, "--" + path);
+  options.package.meta = merge_meta(options.package.meta, args.meta_text);
+  check_options(options, "command line");
+}
+
+OutputMode output_mode(const CompileArguments& args) {
+  if (args.json) return OutputMode::kJson;
+  if (args.quiet) return OutputMode::kQuiet;
+  return ::isatty(STDOUT_FILENO) ? OutputMode::kTerminal : OutputMode::kPlain;
+}
+
+/// Four fifths of what the process may use, unless the user says what there is to use.
+std::uint64_t memory_to_use(const std::string& text, const MachineShare& share) {
+  return text.empty() ? share.memory_bytes / 5 * 4 : parse_bytes(text, "--memory");
+}
+
+SandboxMode sandbox_mode(const std::string& name) {
+  if (name == "off") return SandboxMode::kOff;
+  if (name == "auto") return SandboxMode::kAuto;
+  if (const SandboxSupport s = sandbox_support(); !s.complete())
+    throw InputError("--sandbox require", "", "bounds on files and calls", describe_sandbox(s));
+  return SandboxMode::kRequire;
+}
+
+/// What a verbose run says of the processes that it is going to start.
+std::string sandbox_line(SandboxMode mode) {
+  if (mode == SandboxMode::kOff) return "sandbox: off";
+  const SandboxSupport s = sandbox_support();
+  return std::string(s.complete() ? "sandbox: " : "sandbox, degraded: ") + describe_sandbox(s);
+}
+
+PlanRequest plan_request(const CompileArguments& args) {
+  PlanRequest request;
+  request.inputs = args.inputs;
+  request.output = args.output;
+  request.base = std::make_shared<const CompileOptions>(base_options(args));
+  request.apply_flags = [&args](CompileOptions& options) { apply_flags(args, options); };
+  CompileOptions check = *request.base;  // wrong flags are an error even where there is nothing to compile
+  apply_flags(args, check);
+  request.shard = shard_option(args.shard);
+  request.costs_s = costs_option(args.costs);
+  return request;
+}
+
+RunSettings run_settings(const CompileArguments& args) {
+  RunSettings run = args.run;
+  const MachineShare share = machine_share();
+  run.pool.processors = args.jobs > 0 ? args.jobs : share.processors;
+  run.pool.memory_bytes = memory_to_use(args.memory, share);
+  run.pool.limits.memory_bytes = parse_bytes(args.model_memory, "--model-memory");
+  run.pool.limits.sandbox = sandbox_mode(args.sandbox);
+  if (!args.cache.off) run.cache.folder = default_cache_folder(args.cache.folder);
+  run.cache.layers = args.layers;
+  for (std::string& layer : layers_from_environment()) run.cache.layers.push_back(std::move(layer));
+  for (const std::string& layer : run.cache.layers) check_layer(layer);
+  run.cache_limits = {parse_bytes(args.cache_size, "--cache-size"),
+                      parse_seconds(args.cache_age, "--cache-age")};
+  run.mode = output_mode(args);
+  for (const std::string& file : {args.profile, args.jnd_profile, args.meta})
+    if (!file.empty()) run.more_inputs.push_back(file);
+  return run;
+}
+
+void add_run_options(Command& c, CompileArguments& args) {
+  RunSettings& run = args.run;
+  c.group("Running");
+  add_jobs_option(c, args.jobs);
+  c.option("--memory", args.memory,
+           "Most memory of all models that run side by side, by what they took before (default: 4/5 of what "
+           "machine, cgroup and Slurm allow). A model that needs more runs alone, see --model-memory")
+      .value_name("SIZE")
+      .rare();
+  c.option("--model-memory", args.model_memory, "Most memory (address space) of one model's process")
+      .value_name("SIZE")
+      .shows_default()
+      .rare();
+  c.option("--timeout", run.pool.limits.wall_s, "Most seconds for one model, 0 = no limit").shows_default();
+  c.option("--cpu-limit", run.pool.limits.cpu_s, "Most processor seconds for one model, 0 = no limit")
+      .shows_default()
+      .rare();
+  c.option(
+       "--sandbox", args.sandbox,
+       "What one model's process may touch: auto = the model's folder, its result and the cache, no other "
+       "programs, no network but cache layers, as far as the kernel can bound that; require = the same, and "
+       "nothing is compiled where it cannot; off")
+      .one_of_explained({"auto", "require", "off"})
+      .value_name("NAME")
+      .shows_default()
+      .rare();
+  add_shard_options(c, args.shard, args.costs);
+  Option keep_going =
+      c.flag("--keep-going", args.keep_going, "Compile the other models after a failure (default)").rare();
+  c.flag("--fail-fast", run.pool.stop_on_failure, "Start no further model after a failure")
+      .excludes(keep_going);
+  c.flag("--retry-failed", run.retry_failed,
+         "Try models again that failed before, though nothing has changed since");
+  c.flag("--strict", run.strict, "Treat warnings as errors");
+}
+
+void add_all_cache_options(Command& c, CompileArguments& args) {
+  c.group("Cache");
+  add_cache_options(c, args.cache);
+  c.option("--cache-layer", args.layers,
+           "Folder or http(s) URL to ask behind the cache folder; may be given several times (also "
+           "TEXMESH_CACHE_LAYERS, separated by blanks)")
+      .value_name("PLACE")
+      .rare();
+  c.flag("--cache-upload", args.run.cache.upload, "Put what is computed into the layers that are URLs")
+      .rare();
+  c.option("--cache-size", args.cache_size, "The cache folder is pruned to this size, 0 = no limit")
+      .value_name("SIZE")
+      .shows_default()
+      .rare();
+  c.option("--cache-age", args.cache_age, "Results unused for this long are pruned, 0 = never")
+      .value_name("TIME")
+      .shows_default()
+      .rare();
+}
+
+void add_report_options(Command& c, CompileArguments& args) {
+  RunSettings& run = args.run;
+  c.group("Reports");
+  c.flag("-n,--dry-run", run.dry_run, "Say what would run and why; write nothing");
+  c.flag("--explain", run.explain, "Say of every stage whether it runs, and what has changed");
+  c.flag("--stats", run.statistics, "Print a table of stages at the end: runs, cache hits, seconds");
+  c.flag("-q,--quiet", args.quiet, "Print only warnings and errors");
+  c.flag("-v,--verbose", run.verbose, "Print every stage and note");
+  c.flag("--json", args.json, "Print one JSON event a line (schemas/event.v1.schema.json)");
+  c.option("--summary", run.summary, "Write every model's result as JSON (schemas/summary.v1.schema.json)")
+      .value_name("FILE");
+  c.option("--junit", run.junit, "Write every model's result as JUnit XML").value_name("FILE");
+  c.option("--depfile", run.depfile, "Write the package's dependencies for make and ninja (one model only)")
+      .value_name("FILE")
+      .rare();
+  c.option("--trace", run.trace, "Write what ran when, for chrome://tracing or Perfetto")
+      .value_name("FILE")
+      .rare();
+}
+
+constexpr const char* kExamples =
+    "  texmesh compile turtle.glb -o turtle.texmesh             one model, one package\n"
+    "  texmesh compile scans/ -o packages/ --jobs 8             every model of a folder";
+
+constexpr const char* kNotes =
+    "More examples:\n"
+    "  texmesh compile collection.json -o packages/ --junit report.xml\n"
+    "  texmesh compile scans/ -o packages/ --dry-run            what would run, and why\n"
+    "  texmesh compile scans/ -o packages/ --shard auto         an array task's part (examples/slurm)\n"
+    "  texmesh compile bust.obj -o bust.texmesh --profile museum.json --rungs 8,18,53,86\n\n"
+    "Every stage option can stand in a profile under the same name: "
+    "{\"version\":1,\"ladder\":{\"rungs\":[8,18,53,86]}}.\n"
+    "A package is made again only when its model, a file that the model refers to, an option or texmesh has "
+    "changed. A model that fails leaves the package that was there before.\n"
+    "Exit code: 0 all well, 1 some model failed, 2 usage, 3 internal, 75 try again.";
+
+void add_compile_options(Command& c, CompileArguments& args, const AskedOptions& asked) {
+  c.option("INPUT", args.inputs,
+           "Models (.glb .gltf .obj .ply .stl, range-scan .json), folders of models, or collections (.json)")
+      .required();
+  c.option("-o,--output", args.output, "NAME.texmesh for one model, a folder for several models")
+      .required()
+      .value_name("OUTPUT");
+  c.option("--profile", args.profile,
+           "JSON file of options (schemas/profile.v1.schema.json), or thesis = chapters 2 to 8 as printed; "
+           "flags win")
+      .value_name("FILE");
+  c.option(
+       "--jnd-profile", args.jnd_profile,
+       "JSON file of what judges could just tell (schemas/jnd-profile.v1.schema.json). The file wins over "
+       "--profile, flags win over the file")
+      .value_name("FILE");
+  c.option("--meta", args.meta,
+           "JSON file about the object (schemas/meta.v1.schema.json). The file wins over the model's words")
+      .value_name("FILE")
+      .everyday(kEverydayTitle);
+  c.help_option("--help-stage", "Stage ", "Print the options of one stage (texmesh stages lists the stages)");
+  add_run_options(c, args);
+  add_all_cache_options(c, args);
+  add_report_options(c, args);
+  add_stage_options(c, args, asked);
+}
+
+int run_compile(CompileArguments& args) {
+  RunSettings settings;
+  BatchPlan plan;
+  try {
+    read_meta_file(args);
+    if (!args.profile.empty()) args.profile = profile_file(args.profile);
+    const PlanRequest request = plan_request(args);
+    settings = run_settings(args);
+    plan = plan_batch(request);
+    if (!settings.depfile.empty() && plan.models.size() != 1)
+      throw InputError("--depfile", "", "one model", std::to_string(plan.models.size()) + " models");
+    check_reports(plan, settings);
+  } catch (const InputError& e) {  // what was asked for makes no sense: nothing has been compiled yet
+    std::cerr << "texmesh compile: " << e.what() << '\n';
+    return kExitUsage;
+  }
+  if (plan.shard.count > 1 && settings.mode != OutputMode::kJson && settings.mode != OutputMode::kQuiet)
+    std::cout << "shard " << plan.shard.index << " of " << plan.shard.count << ": " << plan.models.size()
+              << " of " << plan.models_in_collection << " models" << std::endl;
+  if (settings.verbose && !args.json) std::cout << sandbox_line(settings.pool.limits.sandbox) << std::endl;
+  settings.more_inputs.insert(settings.more_inputs.end(), plan.files.begin(), plan.files.end());
+  try {
+    return run_batch(plan, settings, std::cout);
+  } catch (const ResourceError& e) {
+    std::cerr << "texmesh compile: " << e.what() << '\n';
+    return kExitTryAgain;
+  }
+}
+
+void add_compile(Command& app, const AskedOptions& asked) {
+  auto args = std::make_shared<CompileArguments>();
+  Command c = app.add("compile");
+  add_compile_options(c, *args, asked);
+  c.examples(kExamples);
+  c.notes(kNotes);
+  c.on_run([args] { return run_compile(*args); });
+}
+
+}  // namespace
+
+void add_compile_command(Command& app) { add_compile(app, AskedOptions()); }
+
+void add_compile_command(Command& app, std::span<char* const> words) {
+  add_compile(app, AskedOptions(words));
+}
+
+}  // namespace texmesh

@@ -1,0 +1,68 @@
+#include "tools/cli/options/units.h"
+
+#include <fmt/format.h>
+#include <map>
+
+namespace texmesh {
+namespace {
+
+constexpr double kMostBytes = 1e18, kMost_s = 1e6, kMostRate = 1e12;
+
+/// The number that a text begins with; `end` is where it stops, 0 when there is none.
+double leading_number(const std::string& text, std::size_t& end) {
+  try {
+    return std::stod(text, &end);
+  } catch (const std::exception&) {
+    end = 0;
+    return 0;
+  }
+}
+
+double parse(const std::string& text, const std::string& flag, const std::map<std::string, double>& units,
+             const char* expected, double most) {
+  std::size_t end = 0;
+  const double v = leading_number(text, end);
+  const auto unit = units.find(text.substr(end));
+  if (end == 0 || unit == units.end() || !(v >= 0 && v * unit->second <= most))
+    throw UsageError(flag, "", expected, text);
+  return v * unit->second;
+}
+
+}  // namespace
+
+std::string NumberIn::operator()(const std::string& text) const {
+  std::size_t end = 0;
+  const double v = leading_number(text, end);
+  if (end > 0 && end == text.size() && v >= least_ && v <= most_) return "";
+  return fmt::format("expected a number from {:g} to {:g}, found {}", least_, most_, text);
+}
+
+std::uint64_t parse_bytes(const std::string& text, const std::string& flag) {
+  static const std::map<std::string, double> kUnits{
+      {"", 1},      {"B", 1},      {"kB", 1e3},        {"MB", 1e6},           {"GB", 1e9},
+      {"TB", 1e12}, {"KiB", 1024}, {"MiB", 1048576.0}, {"GiB", 1073741824.0}, {"TiB", 1099511627776.0}};
+  return static_cast<std::uint64_t>(parse(text, flag, kUnits, "a size such as 500MB or 8GiB", kMostBytes));
+}
+
+std::int64_t parse_seconds(const std::string& text, const std::string& flag) {
+  static const std::map<std::string, double> kUnits{
+      {"", 1}, {"s", 1}, {"min", 60}, {"h", 3600}, {"d", 86400}};
+  return static_cast<std::int64_t>(parse(text, flag, kUnits, "a time such as 90d, 12h or 30min", kMostBytes));
+}
+
+double parse_duration(const std::string& text, const std::string& flag) {
+  static const std::map<std::string, double> kUnits{{"", 1}, {"s", 1}, {"ms", 1e-3}, {"min", 60}};
+  return parse(text, flag, kUnits, "a time such as 4, 1.5s or 250ms, at most 1e6 s", kMost_s);
+}
+
+double parse_bandwidth(const std::string& text, const std::string& flag) {
+  static const std::map<std::string, double> kUnits{
+      {"B/s", 1},         {"kB/s", 1e3},      {"MB/s", 1e6},       {"GB/s", 1e9},       {"KiB/s", 1024},
+      {"MiB/s", 1048576}, {"bit/s", 1 / 8.0}, {"kbit/s", 1e3 / 8}, {"Mbit/s", 1e6 / 8}, {"Gbit/s", 1e9 / 8}};
+  const double v =
+      parse(text, flag, kUnits, "a rate such as 2Mbit/s or 41.68kB/s, at most 1e12 B/s", kMostRate);
+  if (!(v > 0)) throw UsageError(flag, "", "a rate above 0", text);
+  return v;
+}
+
+}  // namespace texmesh

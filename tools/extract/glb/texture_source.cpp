@@ -1,0 +1,185 @@
+#include "tools/extract/glb/texture_source.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "format/container/layout.h"
+#include "stages/data/coverage.h"
+#include "stages/fill/fill.h"
+#include "stages/geometry/texel_coverage.h"
+#include "tools/extract/glb/scale_model.h"
+#include "tools/render/plane_pixels.h"
+
+namespace texmesh {
+namespace {
+
+std::uint32_t half_of(std::uint32_t side, std::uint32_t times) {
+  for (; times > 0; --times) side = (side + 1) / 2;
+  return side;
+}
+
+bool finite(const std::array<Vec2d, 3>& corners) {
+  return std::all_of(corners.begin(), corners.end(),
+                     [](Vec2d c) { return std::isfinite(c.x) && std::isfinite(c.y); });
+}
+
+void add_triangles(const Mesh& mesh, std::size_t material, const TextureRef& ref, const TexelMap& map,
+                   TexelCoverage& coverage) {
+  const std::vector<Vec2f>& uv = ref.texcoord == 0 ? mesh.uv0 : mesh.uv1;
+  if (uv.empty()) return;
+  coverage.set_wrap(ref.wrap_s, ref.wrap_t);
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    if (mesh.triangle_material[t] != material) continue;
+    std::array<Vec2d, 3> corners;
+    for (std::size_t k = 0; k < 3; ++k) corners[k] = map(uv[mesh.triangles[t][k]]);
+    if (finite(corners)) coverage.add(corners);
+  }
+}
+
+/// A byte of coverage is a row of a block.
+void cover_whole_blocks(std::vector<std::uint8_t>& coverage, std::uint32_t width_px,
+                        std::uint32_t height_px) {
+  constexpr std::uint32_t kSide = 8;
+  const std::size_t stride = coverage_stride_bytes(width_px);
+  for (std::uint32_t y = 0; y < height_px; y += kSide)
+    for (std::size_t x = 0; x < stride; ++x) {
+      const std::uint32_t end = std::min(y + kSide, height_px);
+      bool any = false;
+      for (std::uint32_t row = y; row < end; ++row) any |= coverage[row * stride + x] != 0;
+      const std::uint32_t beyond =
+          x + 1 == stride ? static_cast<std::uint32_t>(stride * kSide) - width_px : 0;
+      const auto whole = static_cast<std::uint8_t>(0xffu << beyond);
+      for (std::uint32_t row = y; row < end; ++row) coverage[row * stride + x] = any ? whole : 0;
+    }
+}
+
+}  // namespace
+
+Averaging PackageImage::averaging() const {
+  if (colours) return Averaging::kLight;
+  return role == "normal" ? Averaging::kNormals : Averaging::kNumbers;
+}
+
+std::vector<PackageImage> package_images(PackageReader& package) {
+  const std::vector<TextureInfo>& textures = package.textures();
+  std::vector<PackageImage> out;
+  for (std::uint32_t p = 0; p < full_size_planes(textures); ++p) {
+    const TextureInfo& t = textures[p];
+    if (t.role == "alpha" && !out.empty() && out.back().image == t.image) {
+      out.back().alpha_plane = p;
+      continue;
+    }
+    PackageImage image;
+    image.image = t.image;
+    image.plane = p;
+    image.role = t.role;
+    image.width_px = t.width_px;
+    image.height_px = t.height_px;
+    image.colours = t.colour_space == "srgb";
+    out.push_back(std::move(image));
+  }
+  return out;
+}
+
+TextureSource::TextureSource(PackageReader& package, double most_texels, const RunContext& context)
+    : package_(package), context_(context), images_(package_images(package)) {
+  context_.progress = nullptr;
+  first_level_ = halvings(most_texels);
+}
+
+void TextureSource::set_shown(std::size_t index, std::vector<std::uint8_t> coverage) {
+  const PackageImage& image = images_.at(index);
+  cover_whole_blocks(coverage, image.width_px, image.height_px);
+  if (image.alpha_plane) shown_[*image.alpha_plane] = coverage;
+  shown_[image.plane] = std::move(coverage);
+}
+
+/// How often sides of colours are halved.
+std::uint32_t TextureSource::halvings(double most_texels) const {
+  double texels = 0;
+  for (const PackageImage& i : images_)
+    if (i.colours) texels += static_cast<double>(i.width_px) * i.height_px;
+  std::uint32_t times = 0;
+  for (; texels > most_texels && times < 20; texels /= 4) ++times;
+  return times;
+}
+
+double TextureSource::largest_share(std::size_t index) {
+  return images_[index].colours ? 1.0 / static_cast<double>(1u << first_level_) : 1.0;
+}
+
+const std::vector<Pixels>& TextureSource::levels(std::uint32_t plane, bool colours, Averaging kind) {
+  std::vector<Pixels>& levels = planes_[plane];
+  if (!levels.empty()) return levels;
+  Pixels full = read_plane(package_, plane, kBestRung, context_);
+  if (const auto shown = shown_.find(plane); shown != shown_.end())
+    fill_uncovered(full, shown->second, context_, PartBlocks::kSmooth);
+  const std::uint32_t skip = colours ? first_level_ : 0;
+  if (skip > 0)
+    full = reduced(full, full.width_px, full.height_px, half_of(full.width_px, skip),
+                   half_of(full.height_px, skip), kind);
+  levels.push_back(std::move(full));
+  while (levels.back().width_px > 8 && levels.back().height_px > 8) {
+    const Pixels& last = levels.back();
+    levels.push_back(reduced(last, last.width_px, last.height_px, half_of(last.width_px, 1),
+                             half_of(last.height_px, 1), kind));
+  }
+  return levels;
+}
+
+Pixels TextureSource::plane_texels(std::size_t index, std::uint32_t base, std::uint32_t width_px,
+                                   std::uint32_t height_px, const std::vector<std::uint8_t>& coverage,
+                                   float sharpening) {
+  const Averaging kind = base == images_[index].plane ? images_[index].averaging() : Averaging::kNumbers;
+  const std::vector<Pixels>& from = levels(base, images_[index].colours, kind);
+  std::size_t level = 0;  // the smallest that is twice as large: averaging it again costs no sharpness
+  while (level + 1 < from.size() && from[level + 1].width_px >= 2 * width_px &&
+         from[level + 1].height_px >= 2 * height_px)
+    ++level;
+  const Pixels& p = from[level];
+  Pixels out = reduced(p, p.width_px, p.height_px, std::min(width_px, p.width_px),
+                       std::min(height_px, p.height_px), kind, images_[index].colours ? sharpening : 0.f);
+  if (coverage.size() == coverage_size_bytes(out.width_px, out.height_px))
+    fill_uncovered(out, coverage, context_);
+  return out;
+}
+
+Pixels TextureSource::texels(std::size_t index, std::uint32_t width_px, std::uint32_t height_px,
+                             const std::vector<std::uint8_t>& coverage, float sharpening) {
+  const PackageImage& image = images_.at(index);
+  Pixels colours = plane_texels(index, image.plane, width_px, height_px, coverage, sharpening);
+  if (!image.alpha_plane) return colours;
+  return with_alpha(colours, plane_texels(index, *image.alpha_plane, width_px, height_px, coverage, 0));
+}
+
+Pixels with_alpha(const Pixels& colours, const Pixels& alpha) {
+  if (colours.width_px != alpha.width_px || colours.height_px != alpha.height_px || alpha.channels != 1)
+    throw FormatError(kTexturesPath, "alpha", "a plane as large as its colours", "another");
+  Pixels out{colours.width_px, colours.height_px, 4, {}};
+  out.data.reserve(std::size_t{4} * colours.width_px * colours.height_px);
+  for (std::size_t i = 0; i < alpha.data.size(); ++i) {
+    const std::uint8_t* c = colours.data.data() + i * colours.channels;
+    for (std::uint32_t k = 0; k < 3; ++k) out.data.push_back(c[colours.channels == 1 ? 0 : k]);
+    out.data.push_back(alpha.data[i]);
+  }
+  return out;
+}
+
+std::vector<std::uint8_t> shown_texels(const Mesh& mesh, const Model& model, std::uint32_t image,
+                                       std::uint32_t width_px, std::uint32_t height_px) {
+  TexelCoverage coverage(width_px, height_px, Wrap::kRepeat, Wrap::kRepeat);
+  const auto named = std::ranges::find(model.images, image_name(image), &Image::name);
+  const auto number = static_cast<std::int32_t>(named - model.images.begin());
+  bool known = false;
+  for (std::size_t m = 0; m < model.materials.size() && named != model.images.end(); ++m)
+    for_each_texture(model.materials[m], [&](const TextureRef& ref) {
+      if (ref.image != number || ref.texcoord > 1) return;
+      known = true;
+      add_triangles(mesh, m, ref, TexelMap(ref.transform, width_px, height_px), coverage);
+    });
+  const auto twice = [](std::uint32_t side_px) { return 2.0 * side_px; };
+  if (!known) coverage.add({Vec2d{0, 0}, Vec2d{twice(width_px), 0}, Vec2d{0, twice(height_px)}});
+  return coverage.release_bits();
+}
+
+}  // namespace texmesh

@@ -1,0 +1,74 @@
+#pragma once
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "delivery/cpp/package/package_reader.h"
+#include "format/model/model.h"
+#include "stages/base/run_context.h"
+#include "tools/extract/glb/resize.h"
+
+namespace texmesh {
+
+/// Sharpening of colours that are made smaller (reduced()): it undoes the blur of averaging, and a little of
+/// the blur of viewers.
+inline constexpr float kSharpening = 0.06f;
+
+/// A source image of a package: one image of every file that is extracted.
+struct PackageImage {
+  std::uint32_t image = 0;  // "texture/<image>"
+  std::uint32_t plane = 0;  // full-size plane of its colours or data
+  std::optional<std::uint32_t> alpha_plane;
+  std::string role;
+  std::uint32_t width_px = 0, height_px = 0;
+  bool colours = true;  // sRGB encoded
+  Averaging averaging() const;
+};
+std::vector<PackageImage> package_images(PackageReader& package);
+
+/// Texels of a package's images at any size, from the best rungs. Images that were read stay in memory, at
+/// the size that `most_texels` (over all colour images) allows.
+class TextureSource {
+ public:
+  TextureSource(PackageReader& package, double most_texels, const RunContext& context);
+  const std::vector<PackageImage>& images() const { return images_; }
+  /// An image with these sides, of 1, 3 or, where the image has alpha, 4 channels. Sides are at least 1 and
+  /// at most the image's; where memory is bounded, larger sides are cut down, see largest_share(). `coverage`
+  /// (bits as TexturePlane::coverage, empty = all) holds the texels that a mesh shows; the other texels are
+  /// made cheap to code. `sharpening` (see reduced()) is for colours alone.
+  Pixels texels(std::size_t index, std::uint32_t width_px, std::uint32_t height_px,
+                const std::vector<std::uint8_t>& coverage, float sharpening = kSharpening);
+  /// Says which texels of an image at full size are shown, before any are asked for. Blocks of 8 x 8 without
+  /// one, of which packages hold nothing true, are filled smoothly before smaller copies are made: those
+  /// would take them in at the borders of charts.
+  void set_shown(std::size_t index, std::vector<std::uint8_t> coverage);
+  /// Largest share of an image's sides, 0 .. 1, that texels() gives.
+  double largest_share(std::size_t index);
+  /// Whether a source that allows so many texels gives the same ones.
+  bool serves(double most_texels) const { return halvings(most_texels) == first_level_; }
+
+ private:
+  std::uint32_t halvings(double most_texels) const;
+  const std::vector<Pixels>& levels(std::uint32_t plane, bool colours, Averaging kind);
+  Pixels plane_texels(std::size_t index, std::uint32_t base, std::uint32_t width_px, std::uint32_t height_px,
+                      const std::vector<std::uint8_t>& coverage, float sharpening);
+  PackageReader& package_;
+  RunContext context_;
+  std::vector<PackageImage> images_;
+  std::uint32_t first_level_ = 0;                             // of colour planes: how often sides are halved
+  std::map<std::uint32_t, std::vector<std::uint8_t>> shown_;  // by plane
+  std::map<std::uint32_t, std::vector<Pixels>> planes_;       // by plane: halves, halves of them ..
+};
+
+/// Colours and alpha as one image of 4 channels; both of one size.
+Pixels with_alpha(const Pixels& colours, const Pixels& alpha);
+
+/// The texels of source image `image`, in a size of `width_px` x `height_px`, that a mesh shows with the
+/// model's materials, as TexturePlane::coverage. The model's images are named as read_model() names them. All
+/// texels of an image that no material shows by one of the first two sets of coordinates.
+std::vector<std::uint8_t> shown_texels(const Mesh& mesh, const Model& model, std::uint32_t image,
+                                       std::uint32_t width_px, std::uint32_t height_px);
+
+}  // namespace texmesh

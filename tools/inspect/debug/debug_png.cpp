@@ -1,0 +1,179 @@
+#include <algorithm>
+#include <cmath>
+
+#include "format/base/box.h"
+#include "format/base/portable_math.h"
+#include "format/base/srgb.h"
+#include "stages/image/png_writer.h"
+#include "stages/measure/render_view.h"
+#include "tools/inspect/debug/debug_view.h"
+
+namespace texmesh {
+namespace {
+
+constexpr double kTube = 0.004, kPoint = 0.01;  // half width of lines and points, of the object's diagonal
+constexpr std::uint32_t kBar = 16;              // width of the bar of colours, px
+constexpr double kElevation = 0.35;             // sine of the angle the views look down at
+
+ViewCamera camera_at(double angle, const BoundingSphere& bounds) {
+  const double ring = std::sqrt(1 - kElevation * kElevation);
+  ViewCamera camera;
+  camera.z = {ring * portable::sin(angle), kElevation, ring * portable::cos(angle)};
+  camera.x = normalized(cross(Vec3d{0, 1, 0}, camera.z));
+  camera.y = cross(camera.z, camera.x);
+  camera.centre = bounds.centre;
+  camera.radius = bounds.radius;
+  return camera;
+}
+
+/// A bar with four sides along a line; a cube for a point.
+void add_bar(Vec3d a, Vec3d b, double diagonal, Mesh& mesh) {
+  const bool point = a == b;
+  const double half = (point ? kPoint : kTube) * diagonal;
+  const Vec3d along = point ? Vec3d{1, 0, 0} : normalized(b - a);
+  const Vec3d side = normalized(cross(along, std::fabs(along.y) < 0.9 ? Vec3d{0, 1, 0} : Vec3d{1, 0, 0}));
+  const Vec3d up = cross(along, side);
+  if (point) a = a - along * half, b = b + along * half;
+  const auto first = static_cast<std::uint32_t>(mesh.positions.size());
+  for (const Vec3d& end : {a, b})
+    for (int k = 0; k < 4; ++k) {
+      const double u = k == 0 || k == 3 ? 1 : -1, v = k < 2 ? 1 : -1;
+      mesh.positions.push_back(to_float(end + side * (u * half) + up * (v * half)));
+      mesh.wedge_position.push_back(static_cast<std::uint32_t>(mesh.positions.size() - 1));
+    }
+  for (std::uint32_t k = 0; k < 4; ++k) {
+    const std::uint32_t next = (k + 1) % 4;
+    mesh.triangles.push_back({first + k, first + next, first + 4 + next});
+    mesh.triangles.push_back({first + k, first + 4 + next, first + 4 + k});
+  }
+  for (std::uint32_t end : {first, first + 4}) {
+    mesh.triangles.push_back({end, end + 1, end + 2});
+    mesh.triangles.push_back({end, end + 2, end + 3});
+  }
+}
+
+Mesh bars_of(const DebugView& view, double diagonal) {
+  Mesh mesh;
+  for (const auto& [a, b] : view.lines)
+    add_bar(to_double(view.nodes[a]), to_double(view.nodes[b]), diagonal, mesh);
+  mesh.triangle_material.assign(mesh.triangles.size(), 0);
+  return mesh;
+}
+
+MipTexture mips_of(const Pixels& pixels) {
+  MipTexture texture;
+  texture.width_px = pixels.width_px, texture.height_px = pixels.height_px;
+  MipTexture::Level level{pixels.width_px, pixels.height_px, {}};
+  const std::array<float, 256>& linear = light_of_bytes();
+  for (std::size_t i = 0; i < pixels.data.size(); i += 3)
+    level.texels.push_back({linear[pixels.data[i]], linear[pixels.data[i + 1]], linear[pixels.data[i + 2]]});
+  texture.levels.push_back(std::move(level));
+  build_mips(texture);
+  return texture;
+}
+
+Picture render(const Mesh& mesh, const std::vector<Material>& materials, const std::vector<Pixels>& textures,
+               const ViewCamera& camera, std::uint32_t side_px) {
+  ViewScene scene;
+  std::vector<std::uint32_t> source(mesh.triangles.size());
+  for (std::size_t t = 0; t < source.size(); ++t) source[t] = static_cast<std::uint32_t>(t);
+  scene.mesh = &mesh, scene.triangles = &mesh.triangles, scene.triangle_source = &source;
+  scene.materials = &materials;
+  std::vector<MipTexture> mips;
+  for (const Pixels& p : textures) {
+    mips.push_back(mips_of(p));
+    scene.sizes.push_back({p.width_px, p.height_px});
+  }
+  for (const Material& m : materials) {
+    scene.base_plane.push_back(m.base_colour_texture.image);
+    scene.emissive_plane.push_back(-1);
+  }
+  return draw(look_at(scene, camera, side_px), mips);
+}
+
+std::uint8_t encode(float linear) {
+  const double x = std::clamp(static_cast<double>(linear), 0.0, 1.0);
+  const double s = srgb_of_light(x);
+  return static_cast<std::uint8_t>(255 * s + 0.5);
+}
+
+void paste(const Picture& picture, std::uint32_t left, Pixels& out) {
+  for (std::uint32_t y = 0; y < picture.side_px; ++y)
+    for (std::uint32_t x = 0; x < picture.side_px; ++x) {
+      const Vec3f c = picture.linear[std::size_t{y} * picture.side_px + x];
+      std::uint8_t* to = out.data.data() + (std::size_t{y} * out.width_px + left + x) * 3;
+      to[0] = encode(c.x), to[1] = encode(c.y), to[2] = encode(c.z);
+    }
+}
+
+void paste_bar(Pixels& out) {
+  for (std::uint32_t y = 0; y < out.height_px; ++y) {
+    const Srgb c = colour_of(1 - (y + 0.5) / out.height_px);
+    for (std::uint32_t x = out.width_px - kBar; x < out.width_px; ++x)
+      std::copy(c.begin(), c.end(), out.data.data() + (std::size_t{y} * out.width_px + x) * 3);
+  }
+}
+
+constexpr std::size_t kMostLayouts = 4;
+
+/// The mean of the texels of a rectangle, of at least one.
+std::array<std::uint8_t, 3> mean_of(const Pixels& p, std::uint32_t x0, std::uint32_t y0, std::uint32_t x1,
+                                    std::uint32_t y1) {
+  std::array<std::uint64_t, 3> sum{};
+  for (std::uint32_t y = y0; y < y1; ++y)
+    for (std::uint32_t x = x0; x < x1; ++x)
+      for (std::size_t c = 0; c < 3; ++c) sum[c] += p.at(x, y)[c];
+  const std::uint64_t count = std::uint64_t{x1 - x0} * (y1 - y0);
+  return {static_cast<std::uint8_t>(sum[0] / count), static_cast<std::uint8_t>(sum[1] / count),
+          static_cast<std::uint8_t>(sum[2] / count)};
+}
+
+/// A texture within the square whose left side is `left`, in its own shape.
+void paste_layout(const Pixels& texture, std::uint32_t left, Pixels& out) {
+  const std::uint32_t side = out.height_px, longer = std::max(texture.width_px, texture.height_px);
+  const auto scaled = [](std::uint32_t at, std::uint32_t from, std::uint32_t to) {
+    return static_cast<std::uint32_t>(std::uint64_t{at} * to / from);
+  };
+  const std::uint32_t width = std::max(1u, scaled(texture.width_px, longer, side)),
+                      height = std::max(1u, scaled(texture.height_px, longer, side));
+  for (std::uint32_t y = 0; y < height; ++y)
+    for (std::uint32_t x = 0; x < width; ++x) {
+      const std::uint32_t x0 = scaled(x, width, texture.width_px), y0 = scaled(y, height, texture.height_px);
+      const auto c = mean_of(texture, x0, y0, std::max(x0 + 1, scaled(x + 1, width, texture.width_px)),
+                             std::max(y0 + 1, scaled(y + 1, height, texture.height_px)));
+      std::copy(c.begin(), c.end(), out.data.data() + (std::size_t{y} * out.width_px + left + x) * 3);
+    }
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> write_debug_png(const DebugView& view, std::uint32_t side_px) {
+  BoundingSphere bounds = bounding_sphere(view.mesh.positions);
+  if (!(bounds.radius > 0)) bounds.radius = 1;
+  Mesh mesh = view.mesh;
+  mesh.normals.clear();  // flat: what the triangles are like is to be seen
+  const Mesh bars = bars_of(view, 2 * bounds.radius);
+  Material red;
+  red.base_colour = {1, 0.02f, 0.02f, 1};
+  Pixels out;
+  const auto layouts =
+      static_cast<std::uint32_t>(view.shows_layout ? std::min(kMostLayouts, view.textures.size()) : 0);
+  out.width_px = (2 + layouts) * side_px + (view.legend.coloured ? kBar : 0);
+  out.height_px = side_px, out.channels = 3;
+  out.data.resize(std::size_t{out.width_px} * out.height_px * 3);
+  for (std::uint32_t k = 0; k < 2; ++k) {
+    const ViewCamera camera = camera_at(0.5 + portable::kPi * k, bounds);
+    Picture picture = render(mesh, view.materials, view.textures, camera, side_px);
+    if (!bars.triangles.empty()) {
+      const Picture over = render(bars, {red}, {}, camera, side_px);
+      for (std::size_t i = 0; i < over.covered.size(); ++i)
+        if (over.covered[i]) picture.linear[i] = over.linear[i];
+    }
+    paste(picture, k * side_px, out);
+  }
+  for (std::uint32_t k = 0; k < layouts; ++k) paste_layout(view.textures[k], (2 + k) * side_px, out);
+  if (view.legend.coloured) paste_bar(out);
+  return write_png(out);
+}
+
+}  // namespace texmesh

@@ -1,0 +1,205 @@
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "format/base/json_fields.h"
+#include "format/container/layout.h"
+#include "format/documents/textures.h"
+#include "pipeline/io/text_table.h"
+#include "stages/data/ladder.h"
+#include "tools/inspect/provenance.h"
+#include "tools/inspect/verify/verify_checks.h"
+
+namespace texmesh {
+namespace {
+
+std::string at(const char* array, std::size_t i, const char* member = "") {
+  return std::string("/") + array + "/" + std::to_string(i) + member;
+}
+
+bool near(double a, double b, double relative) {
+  return std::fabs(a - b) <= relative * std::max(std::fabs(a), std::fabs(b));
+}
+
+std::string number(double v) { return shortest(v, 9); }
+
+std::string text_of(const EntryRef& e) {
+  return std::to_string(e.bytes) + " bytes at " + std::to_string(e.offset) + ", " +
+         to_hex(e.digest).substr(0, 16) + "...";
+}
+
+void require_six_digits(double value, const std::string& field, Findings& findings) {
+  findings.require(six_digits(value) == value, {"manifest", "M07"}, kManifestPath, field,
+                   "at most six significant digits", shortest(value, 17));
+}
+
+void check_scales(const Manifest& m, Findings& findings) {
+  for (std::size_t k = 0; k < m.scales.size(); ++k) {
+    // No rule about triangles: on a coarse grid a scale may show more of them than the next finer one.
+    const ManifestScale& s = m.scales[k];
+    findings.require(s.error_rms <= s.error_max, {"scale", "M12"}, kManifestPath, at("scales/errorRms", k),
+                     "at most errorMax, " + number(s.error_max), number(s.error_rms));
+    if (k == 0)
+      for (const double zero : {s.error_max, s.error_rms, s.p95, s.p99})
+        findings.require(zero == 0, {"scale", "M12"}, kManifestPath, at("scales", k), "0 for S_0",
+                         number(zero));
+    for (const double v : {s.error_max, s.error_rms, s.p95, s.p99, s.display_px_jnd, s.display_px_error,
+                           s.display_px_edge, s.display_px_flip})
+      require_six_digits(v, at("scales", k), findings);
+  }
+}
+
+/// The default rule shows what lit pictures cannot tell from S_0.
+void check_steps(const Manifest& m, Findings& findings) {
+  for (std::size_t k = 0; k < m.steps.size(); ++k) {
+    const ManifestStep& step = m.steps[k];
+    require_six_digits(step.up_to_px, at("steps", k), findings);
+    for (const ManifestScale& s : m.scales) {
+      if (s.scale != step.scale) continue;
+      findings.require(step.up_to_px <= s.display_px_flip * (1 + 1e-5), {"step", "M22"}, kManifestPath,
+                       at("steps", k, "/0"),
+                       "at most " + number(s.display_px_flip) + ", up to which S_" + std::to_string(s.scale) +
+                           " is enough",
+                       number(step.up_to_px));
+      for (const ManifestScale& coarser : m.scales)
+        findings.require(
+            coarser.scale <= s.scale || coarser.display_px_flip < s.display_px_flip, {"step", "M22"},
+            kManifestPath, at("steps", k, "/1"),
+            "no step, as S_" + std::to_string(coarser.scale) + " is enough up to the same height",
+            "S_" + std::to_string(s.scale));
+    }
+  }
+}
+
+}  // namespace
+
+void check_manifest(const Manifest& m, Findings& findings) {
+  const Vec3d size = m.bounds_max - m.bounds_min;
+  const double extent = std::max({size.x, size.y, size.z});
+  findings.require(near(m.object_height, extent, 1e-5), {"manifest", "M04"}, kManifestPath, "/objectHeight",
+                   number(extent) + ", the largest extent of the bounds", number(m.object_height));
+  require_six_digits(m.surface_area, "/surfaceArea", findings);
+  check_scales(m, findings);
+  check_steps(m, findings);
+}
+
+void check_references(const Manifest& m, const std::vector<EntryRef>& index, Findings& findings) {
+  std::map<std::string, const EntryRef*> entries;
+  for (const EntryRef& e : index) entries[e.path] = &e;
+  const auto check = [&](const EntryRef& ref, const std::string& field) {
+    const auto it = entries.find(ref.path);
+    if (it == entries.end())
+      findings.add({"reference", "R03"}, kManifestPath, field, "an entry " + ref.path, "none in the index");
+    else
+      findings.require(*it->second == ref, {"reference", "R03"}, kManifestPath, field,
+                       text_of(*it->second) + " as in the index", text_of(ref));
+  };
+  check(m.tables, "/tables");
+  check(m.textures, "/textures");
+  check(m.quality, "/quality");
+  check(m.provenance, "/provenance");
+  check(m.about, "/about");
+  if (m.stream) {
+    const auto it = entries.find(kSplitStreamPath);
+    if (it == entries.end())
+      findings.add({"reference", "R03"}, kManifestPath, "/stream",
+                   std::string("an entry ") + kSplitStreamPath, "none in the index");
+    else
+      findings.require(it->second->offset == m.stream->offset && it->second->bytes == m.stream->bytes,
+                       {"reference", "R03"}, kManifestPath, "/stream",
+                       text_of(*it->second) + " as in the index",
+                       std::to_string(m.stream->bytes) + " bytes at " + std::to_string(m.stream->offset));
+  }
+  if (m.thesis) check(*m.thesis, "/thesis");
+  if (m.poster) check(*m.poster, "/poster");
+  for (std::size_t k = 0; k < m.proxies.size(); ++k) check(m.proxies[k].glb, at("proxies/offset", k));
+  for (std::size_t k = 0; k < m.scales.size(); ++k)
+    if (m.scales[k].has_glb()) check(m.scales[k].glb, at("scales/offset", k));
+}
+
+void check_about(const Manifest& m, const About& about, Findings& findings) {
+  findings.require_equal(about.title, m.title, {"about", "B03"}, kManifestPath, "/title");
+}
+
+/// Switch sizes are heights that were rendered.
+static void check_switch_sizes(const Manifest& m, const QualityTable& q, Findings& findings) {
+  constexpr double kDigits = 1e-5;  // six are written
+  const double largest = q.sizes_px.back();
+  for (std::size_t k = 1; k < m.scales.size(); ++k) {
+    const double px = m.scales[k].display_px_flip;
+    findings.require(px == 0 || (px >= kLeastSwitchPx * (1 - kDigits) && px <= largest * (1 + kDigits)),
+                     {"scale", "M13"}, kManifestPath, at("scales/displayPxFlip", k),
+                     "0, or " + number(kLeastSwitchPx) + " to " + number(largest), number(px));
+  }
+  findings.require(m.scales[0].display_px_flip == kAnyDisplayPx, {"scale", "M12"}, kManifestPath,
+                   "/scales/displayPxFlip/0", number(kAnyDisplayPx), number(m.scales[0].display_px_flip));
+}
+
+static void check_geometry(const QualityTable& q, Findings& findings) {
+  for (std::size_t i = 0; i < q.geometry.size(); ++i)
+    for (const auto* list : {&q.geometry[i].flip, &q.geometry[i].flip_p95, &q.geometry[i].dssim})
+      findings.require((*list)[0] == 0, {"quality", "Q02"}, kQualityPath, at("geometry", i),
+                       "no loss of S_0, which is what is compared with",
+                       number(static_cast<double>((*list)[0])));
+}
+
+void check_quality(const Manifest& m, const std::vector<TextureInfo>& textures, const QualityTable& q,
+                   Findings& findings) {
+  std::vector<int> kept;
+  for (const ManifestScale& s : m.scales) kept.push_back(s.scale);
+  findings.require(q.scales == kept, {"quality", "R14"}, kQualityPath, "/scales", "the scales of the package",
+                   std::to_string(q.scales.size()) + " others or in another order");
+  std::set<PlaneGroup> groups;
+  for (const TextureInfo& t : textures) groups.insert(group_of(t.role));
+  std::set<PlaneGroup> found;
+  for (const GroupLosses& group : q.groups) found.insert(group.group);
+  findings.require(groups == found, {"quality", "R15"}, kQualityPath, "/groups",
+                   "the groups that the planes have",
+                   std::to_string(found.size()) + " of " + std::to_string(groups.size()) + ", or others");
+  check_geometry(q, findings);
+  check_switch_sizes(m, q, findings);
+}
+
+/// Which option has the rungs of a plane.
+static std::string rungs_option(const TextureInfo& texture) {
+  if (texture.colour_space == "srgb") return "rungs";
+  if (texture.role == "normal") return "normal_rungs";
+  return texture.role == "alpha" ? "alpha_rungs" : "data_rungs";
+}
+
+void check_provenance(const Manifest& m, const std::vector<TextureInfo>& textures, const Provenance& p,
+                      Findings& findings) {
+  findings.require(p.format_major == m.major && p.format_minor == m.minor, {"provenance", "O03"},
+                   kProvenancePath, "/format",
+                   std::to_string(m.major) + "." + std::to_string(m.minor) + ", as the manifest",
+                   std::to_string(p.format_major) + "." + std::to_string(p.format_minor));
+  const auto option = [&](const char* stage, const char* name) {
+    const auto section = p.options->find(stage);
+    if (section == p.options->end() || !section->contains(name)) return nlohmann::ordered_json();
+    return (*section)[name];
+  };
+  const auto title = option("package", "title");
+  if (title.is_string() && title != "" && title != m.title)
+    findings.add({"provenance", "O03"}, kProvenancePath, "/options/package/title",
+                 m.title + ", as the manifest", title.get<std::string>());
+  const auto jnd = option("perceptual_values", "jnd");
+  if (jnd.is_number() && jnd.get<double>() != m.jnd)
+    findings.add({"provenance", "O03"}, kProvenancePath, "/options/perceptual_values/jnd",
+                 number(m.jnd) + ", as the manifest", jnd.dump());
+  for (std::size_t k = 0; k < textures.size(); ++k) {
+    const std::string name = rungs_option(textures[k]);
+    const auto rungs = option("ladder", name.c_str());
+    if (!rungs.is_array() || codec_traits(textures[k].codec).incremental) continue;
+    if (textures[k].source_rung) continue;  // its qualities follow from the source
+    for (const int q : textures[k].rung_quality) {
+      if (q == 100 && textures[k].mip == 0) continue;  // stands for a source without loss
+      findings.require(std::find(rungs.begin(), rungs.end(), q) != rungs.end(), {"provenance", "O03"},
+                       kProvenancePath, "/options/ladder/" + name,
+                       "rung " + std::to_string(q) + " of plane " + std::to_string(k), rungs.dump());
+    }
+  }
+}
+
+}  // namespace texmesh

@@ -1,0 +1,233 @@
+#include "tools/publish/export/export.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "delivery/cpp/decide/texture_loss.h"
+#include "format/base/errors.h"
+#include "format/base/text_bytes.h"
+#include "format/container/layout.h"
+#include "pipeline/io/new_folder.h"
+#include "pipeline/io/uri.h"
+#include "stages/gltf/check_glb.h"
+#include "tools/extract/extract.h"
+#include "tools/publish/export/oembed.h"
+#include "tools/publish/export/page_files.h"
+#include "tools/publish/export/target_page.h"
+#include "tools/publish/export/tileset.h"
+#include "tools/publish/view/site.h"
+
+namespace texmesh {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kListFile = "export.json";
+constexpr std::string_view kListBegin = "{\n  \"texmeshExport\": 1,";
+/// A level of more than this share of the next finer one's bytes is not worth a request of its own.
+constexpr double kWorthwhile = 0.75;
+constexpr std::uint32_t kPhoneTexturePx = 4096;
+
+ExportedFile text_file(const char* path, const std::string& text) {
+  return {path, {text.begin(), text.end()}};
+}
+
+void note_large_textures(const Extracted& extracted, Export& made) {
+  for (const ExtractedImage& i : extracted.images)
+    if (std::max(i.width_px, i.height_px) > kPhoneTexturePx) {
+      made.notes.emplace_back("textures beyond 4096 px do not fit many phones; --display makes them smaller");
+      return;
+    }
+}
+
+ExtractRequest request_for(const ExportOptions& options) {
+  ExtractRequest request;
+  request.display_px = options.display_px;
+  request.bytes = options.bytes;
+  request.plain = options.plain;
+  return request;
+}
+
+void add_glb(Export& made, Extracted extracted, const std::string& path) {
+  for (const std::string& note : extracted.notes) made.notes.push_back(note);
+  if (!extracted.within) made.notes.push_back("no GLB comes within 2 % below the bytes asked for");
+  made.files.push_back({path, std::move(extracted.glb)});
+}
+
+/// Extends `bounds` by what the GLB holds, where its nodes put it.
+void extend_by(const std::vector<std::uint8_t>& glb, const std::string& name, Box3d& bounds) {
+  Findings findings;
+  const GlbFacts facts = check_glb(glb, name, findings, GlbRules::kStandalone);
+  if (facts.has_bounds) bounds.extend(Box3d{facts.bounds_min, facts.bounds_max});
+}
+
+void export_tiles(PackageReader& package, const ExportOptions& options, const RunContext& context,
+                  Export& made) {
+  const Manifest& m = package.manifest();
+  Tileset tileset;
+  tileset.about = package.about();
+  if (tileset.about.metres_per_unit > 0) tileset.metres = tileset.about.metres_per_unit;
+  tileset.origin = m.origin * tileset.metres;
+  tileset.object_height = m.object_height;
+  tileset.screen_error_px = options.screen_error_px;
+  tileset.version = made.package_id.substr(0, 16);
+  tileset.levels = tile_levels(m, options.display_px, [&](double px) {
+    std::vector<std::uint32_t> planes;
+    for (const PlaneChoice& c : px > 0 ? planes_for_display(package, px) : full_size(package))
+      planes.push_back(c.plane);
+    return planes;
+  });
+  ExtractRequest request = request_for(options);
+  request.recentre = request.metres = true;
+  std::vector<TileLevel> wanted = std::move(tileset.levels);
+  tileset.levels.clear();
+  for (std::size_t k = 0; k < wanted.size(); ++k) {
+    request.scale = wanted[k].scale;
+    request.display_px = wanted[k].texture_px;
+    Extracted extracted = extract_model(package, request, context);
+    context.report(static_cast<double>(k + 1) / static_cast<double>(wanted.size()));
+    if (k > 0 && static_cast<double>(extracted.glb.size()) >
+                     kWorthwhile * static_cast<double>(made.files.back().bytes.size()))
+      continue;
+    wanted[k].uri = "level-" + std::to_string(tileset.levels.size()) + ".glb";
+    extend_by(extracted.glb, wanted[k].uri, tileset.bounds);
+    if (k == 0) note_large_textures(extracted, made);
+    add_glb(made, std::move(extracted), wanted[k].uri);
+    tileset.levels.push_back(std::move(wanted[k]));
+  }
+  made.open = "tileset.json";
+  made.files.push_back(text_file("tileset.json", tileset_json(tileset)));
+}
+
+void export_lods(PackageReader& package, const ExportOptions& options, const RunContext& context,
+                 Export& made) {
+  if (package.manifest().scales.size() < 2)
+    throw InputError(package.store().name(), "scales", "two or more, for levels of detail (MSFT_lod)", "one");
+  ExtractRequest request = request_for(options);
+  request.lods = true;
+  Extracted extracted = extract_model(package, request, context);
+  if (extracted.levels.size() < 2)
+    throw InputError(package.store().name(), "scales",
+                     "a major scale coarser than S_" + std::to_string(extracted.scale) +
+                         ", for levels of detail (MSFT_lod)",
+                     "none; texmesh extract writes the one");
+  note_large_textures(extracted, made);
+  made.open = "model.glb";
+  add_glb(made, std::move(extracted), made.open);
+}
+
+void add_poster(PackageReader& package, Export& made) {
+  if (const auto& poster = package.manifest().poster)
+    made.files.push_back({"poster.jpg", package.entry(*poster)});
+}
+
+void export_model_viewer(PackageReader& package, const ExportOptions& options, const RunContext& context,
+                         Export& made) {
+  Extracted extracted = extract_model(package, request_for(options), context);
+  note_large_textures(extracted, made);
+  made.open = "index.html";
+  made.files.push_back(text_file("index.html", model_viewer_page(package, options, extracted.glb.size())));
+  add_glb(made, std::move(extracted), "model.glb");
+  add_poster(package, made);
+}
+
+void export_oembed(PackageReader& package, const std::string& path, const ExportOptions& options,
+                   Export& made) {
+  EmbeddedObject object;
+  object.about = package.about();
+  object.about.title = page_title(package);
+  std::string from_viewer = path;  // as the viewer's page names the package
+  if (!is_web_url(path)) {
+    const bool tree = package.store().is_folder();
+    made.copies.push_back({tree ? "object" : "object.texmesh", path});
+    from_viewer = tree ? "../object/" : "../object.texmesh";
+  }
+  made.copies.push_back({"viewer", options.viewer});
+  const std::string viewer = "viewer/index.html?panel=0&pkg=" + percent_encoded(from_viewer);
+  object.page_url = options.url + viewer;
+  object.width_px = options.width_px;
+  object.height_px = options.height_px;
+  object.provider_url = url_origin(options.url);
+  object.provider_name = options.provider.empty()
+                             ? object.provider_url.substr(object.provider_url.find("://") + 3)
+                             : options.provider;
+  if (const auto& poster = package.manifest().poster) {
+    object.thumbnail_url = options.url + "poster.jpg";
+    object.thumbnail_width_px = poster->width_px;
+    object.thumbnail_height_px = poster->height_px;
+  }
+  made.open = "index.html";
+  made.files.push_back(text_file("oembed.json", oembed_json(object)));
+  made.files.push_back(text_file("index.html", oembed_page(object, options.url, viewer)));
+  add_poster(package, made);
+}
+
+FolderRule export_folder_rule() {
+  return marked_folder_rule(kListFile, kListBegin, "an empty folder, an earlier export, or nothing yet");
+}
+
+}  // namespace
+
+const char* target_name(ExportTarget target) {
+  switch (target) {
+    case ExportTarget::k3dTiles:
+      return "3dtiles";
+    case ExportTarget::kGltfLod:
+      return "gltf-lod";
+    case ExportTarget::kModelViewer:
+      return "model-viewer";
+    case ExportTarget::kOembed:
+      break;
+  }
+  return "oembed";
+}
+
+Export make_export(PackageReader& package, const std::string& path, const ExportOptions& options,
+                   const RunContext& context) {
+  Export made;
+  made.target = options.target;
+  made.package_id = to_hex(package.id());
+  switch (options.target) {
+    case ExportTarget::k3dTiles:
+      export_tiles(package, options, context, made);
+      break;
+    case ExportTarget::kGltfLod:
+      export_lods(package, options, context, made);
+      break;
+    case ExportTarget::kModelViewer:
+      export_model_viewer(package, options, context, made);
+      break;
+    case ExportTarget::kOembed:
+      export_oembed(package, path, options, made);
+      break;
+  }
+  for (const ExportedFile& f : made.files)
+    if (f.path.ends_with(".glb") && f.bytes.size() > 0xffffffffu)
+      throw InputError(package.store().name(), "", "what fits a GLB of 4 GiB",
+                       std::to_string(f.bytes.size()));
+  return made;
+}
+
+std::string export_json(const Export& made) {
+  Json files = Json::array();
+  for (const ExportedFile& f : made.files) files.push_back({{"path", f.path}, {"bytes", f.bytes.size()}});
+  for (const ExportedCopy& c : made.copies) files.push_back({{"path", c.path}});
+  Json out{{"texmeshExport", 1}, {"target", target_name(made.target)}, {"package", made.package_id},
+           {"open", made.open},  {"files", std::move(files)},          {"notes", made.notes}};
+  return out.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+void write_export(const Export& made, const std::string& folder) {
+  NewFolder out(folder, export_folder_rule());
+  for (const ExportedFile& f : made.files) out.add(f.path, f.bytes);
+  for (const ExportedCopy& c : made.copies) out.copy(c.path, c.source);
+  const std::string list = export_json(made);
+  out.add(kListFile, text_bytes(list));
+  out.publish();
+}
+
+void check_export_folder(const std::string& folder) { NewFolder(folder, export_folder_rule()); }
+
+}  // namespace texmesh

@@ -1,0 +1,164 @@
+#include "tools/publish/report/collection/collection_page.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "delivery/cpp/package/package_reader.h"
+#include "format/base/errors.h"
+#include "pipeline/batch/progress.h"
+#include "pipeline/io/markup.h"
+#include "tools/publish/report/html.h"
+
+namespace texmesh {
+namespace {
+
+constexpr std::size_t kMostRows = 10'000;
+
+std::string cut_note(std::size_t all) {
+  return all > kMostRows ? fmt::format("<p class=\"quiet\">The first {} of {}.</p>\n", kMostRows, all) : "";
+}
+
+std::string failures_section(const RunSummary& s) {
+  HtmlTable table;
+  table.caption = "What went wrong, model by model";
+  table.header = {"model", "result", "what was found"};
+  table.sentences = true;
+  std::size_t failures = 0;
+  for (const ModelSummary& m : s.models) {
+    if (m.ok()) continue;
+    const std::string why =
+        m.result == ModelResult::kCancelled ? "not reached" : markup_escaped(m.error.message);
+    if (++failures <= kMostRows)
+      table.rows.push_back({markup_escaped(m.model), std::string(enum_name(m.result)), why});
+  }
+  if (failures == 0) return "";
+  return html_section("failures", fmt::format("{} without a new package", failures),
+                      table.html() + cut_note(failures));
+}
+
+std::string problems_section(const RunSummary& s) {
+  if (s.problems.empty()) return "";
+  HtmlTable table;
+  table.caption = "Reports of shards that are not as they should be";
+  table.header = {"file", "kind", "what was found"};
+  table.sentences = true;
+  for (const SummaryProblem& p : s.problems)
+    table.rows.push_back({markup_escaped(p.file), p.kind, markup_escaped(p.text)});
+  return html_section("problems", "Reports of shards", table.html());
+}
+
+/// The value that `part` of the models do not exceed.
+template <class T>
+T quantile(std::vector<T> values, double part) {
+  if (values.empty()) return T{};
+  std::sort(values.begin(), values.end());
+  return values[static_cast<std::size_t>(part * static_cast<double>(values.size() - 1))];
+}
+
+std::string figures_section(const RunSummary& s) {
+  std::vector<double> seconds;
+  std::vector<std::uint64_t> memory, bytes;
+  double all_s = 0;
+  std::uint64_t all_bytes = 0;
+  for (const ModelSummary& m : s.models) {
+    if (!m.ok()) continue;
+    bytes.push_back(m.bytes);
+    all_bytes += m.bytes;
+    if (m.cost_s() <= 0) continue;
+    seconds.push_back(m.cost_s());
+    memory.push_back(m.made_s > 0 ? m.made_memory_bytes : m.peak_memory_bytes);
+    all_s += m.cost_s();
+  }
+  HtmlTable table;
+  table.caption = "What a model took when its package was made";
+  table.header = {"", "median", "9 of 10", "most", "all"};
+  table.rows = {{"time", format_seconds(quantile(seconds, .5)), format_seconds(quantile(seconds, .9)),
+                 format_seconds(quantile(seconds, 1)), format_seconds(all_s)},
+                {"peak memory", format_bytes(quantile(memory, .5)), format_bytes(quantile(memory, .9)),
+                 format_bytes(quantile(memory, 1)), ""},
+                {"package", format_bytes(quantile(bytes, .5)), format_bytes(quantile(bytes, .9)),
+                 format_bytes(quantile(bytes, 1)), format_bytes(all_bytes)}};
+  return html_section("figures", "Figures", table.html());
+}
+
+class ModelsSection {
+ public:
+  ModelsSection(const RunSummary& s, const std::string& folder, std::size_t posters,
+                const std::function<std::optional<PackageFace>(const ModelSummary&)>& face)
+      : summary_(s), folder_(folder), posters_(posters), face_(face) {}
+
+  std::string html(std::vector<PageFile>& files) {
+    HtmlTable table;
+    table.caption = "Every package";
+    table.header = {"model", "result", "time", "peak memory", "package"};
+    std::string gallery;
+    std::size_t models = 0;
+    for (const ModelSummary& m : summary_.models) {
+      if (!m.ok()) continue;
+      if (models++ < posters_) gallery += picture(m, files);
+      if (models > kMostRows) continue;
+      const std::uint64_t memory = m.made_s > 0 ? m.made_memory_bytes : m.peak_memory_bytes;
+      table.rows.push_back({markup_escaped(m.model), std::string(enum_name(m.result)),
+                            m.cost_s() > 0 ? format_seconds(m.cost_s()) : "", format_bytes(memory),
+                            format_bytes(m.bytes)});
+    }
+    if (models == 0) return "";
+    if (!gallery.empty()) gallery = "<div class=\"row\">\n" + gallery + "</div>\n";
+    return html_section("models", fmt::format("{} packages", models),
+                        gallery + table.html() + cut_note(models));
+  }
+
+ private:
+  std::string picture(const ModelSummary& m, std::vector<PageFile>& files) {
+    std::optional<PackageFace> face = face_(m);
+    if (!face) return "<div><p class=\"bad\">" + markup_escaped(m.package) + ": cannot be read</p></div>\n";
+    std::string out = "<div>";
+    if (!face->poster.empty()) {
+      files.push_back({fmt::format("{}/{:05}.jpg", folder_, files.size()), std::move(face->poster)});
+      out += "<img loading=\"lazy\" alt=\"\" src=\"" + markup_escaped(files.back().name) + "\">";
+    }
+    const std::string name = face->title.empty() ? m.package : face->title;
+    return out + "<p>" + markup_escaped(name) + "<br><span class=\"quiet\">" + format_bytes(m.bytes) +
+           "</span></p></div>\n";
+  }
+
+  const RunSummary& summary_;
+  const std::string& folder_;
+  std::size_t posters_;
+  const std::function<std::optional<PackageFace>(const ModelSummary&)>& face_;
+};
+
+}  // namespace
+
+CollectionPage collection_page(const RunSummary& s, const std::string& poster_folder, std::size_t posters,
+                               const std::function<std::optional<PackageFace>(const ModelSummary&)>& face) {
+  CollectionPage page;
+  const SummaryCounts c = count_results(s.models);
+  const bool good = c.failed + c.cancelled == 0 && s.problems.empty();
+  std::string body = "<h1>Collection</h1>\n";
+  body += fmt::format(
+      "<p class=\"verdict{}\">{} compiled, {} up to date, {} failed, {} not reached; {} of processes' "
+      "time in {} {}.</p>\n",
+      good ? "" : " bad", c.compiled, c.unchanged, c.failed, c.cancelled, format_seconds(s.seconds),
+      std::max<std::size_t>(s.parts.size(), 1), s.parts.size() > 1 ? "runs" : "run");
+  body += failures_section(s) + problems_section(s) + figures_section(s);
+  body += ModelsSection(s, poster_folder, posters, face).html(page.files);
+  page.html = html_page("Collection", body);
+  return page;
+}
+
+std::optional<PackageFace> package_face(const std::string& package) {
+  try {
+    PackageReader reader(open_store(package));
+    PackageFace face{reader.manifest().title, {}};
+    if (const auto& poster = reader.manifest().poster)
+      face.poster = reader.store().read(*poster, 0, poster->bytes);
+    return face;
+  } catch (const Error&) {
+    return std::nullopt;
+  }
+}
+
+}  // namespace texmesh

@@ -1,0 +1,60 @@
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pipeline/io/new_folder.h"
+#include "tools/publish/report/picture_row.h"
+#include "tools/publish/report/quality_curves.h"
+#include "tools/publish/report/switch_sizes.h"
+
+namespace texmesh {
+
+struct ReportOptions {
+  int views = 12;
+  FlipLimits limits;
+  std::string against;  // the model file behind the package; "" = none
+  int budgets = 16;     // points of the budget's path
+};
+
+/// S_0 at the highest rung beside the model file.
+struct SourceComparison {
+  std::string file;  // name without folders
+  double displayed_px = 0;
+  ViewDifferences views;
+};
+
+/// What a report is about, and the report.
+struct Report {
+  std::string title;  // plain text: the package's, or the name of its file
+  std::string verdict;
+  bool holds = true;  // every switch size
+  ReportOptions options;
+  std::vector<SwitchSize> switches;
+  std::vector<QualityCurves> curves;
+  std::optional<SourceComparison> source;
+  std::vector<ReportFile> files;  // index.html first
+};
+
+/// Renders the switch sizes of a package, reads what its tables say, and writes one static page about it:
+/// verdict, pictures at each switch size beside S_0 with maps of FLIP, curves of quality against bytes, bytes
+/// by kind, maps of fragments, the step function. The page needs no script and asks for nothing but its own
+/// files. Text of the package stands in it as text only. Same bytes for any thread count and machine.
+/// FormatError when the package is damaged, InputError for a model file that cannot be read.
+Report make_report(PackageReader& package, const ReportOptions& options, const RunContext& context);
+
+/// For programs: schemas/report.v1.schema.json.
+std::string report_json(const Report& report);
+
+/// The page of a folder that html_page() fills.
+inline constexpr const char* kReportPage = "index.html";
+/// A folder is new or empty, or it holds such a page and is replaced.
+FolderRule report_folder_rule();
+
+/// Writes the files; the folder appears whole or not at all. An earlier report is replaced. InputError when
+/// the folder holds anything else, or cannot be made.
+void write_report(const Report& report, const std::string& folder);
+/// The same refusals, before the work.
+void check_report_folder(const std::string& folder);
+
+}  // namespace texmesh
