@@ -10,6 +10,8 @@
 #include <numeric>
 #include <ostream>
 
+#include "pipeline/io/number_text.h"
+
 namespace texmesh {
 namespace {
 
@@ -60,20 +62,6 @@ std::string last_columns(const std::string& text, std::size_t columns) {
 }
 
 }  // namespace
-
-std::string format_bytes(std::uint64_t bytes) {
-  if (bytes < 1000) return fmt::format("{} B", bytes);
-  if (bytes < 1000000) return fmt::format("{:.1f} kB", static_cast<double>(bytes) / 1e3);
-  if (bytes < 1000000000) return fmt::format("{:.2f} MB", static_cast<double>(bytes) / 1e6);
-  return fmt::format("{:.2f} GB", static_cast<double>(bytes) / 1e9);
-}
-
-std::string format_seconds(double seconds) {
-  if (seconds < 60) return fmt::format("{:.1f} s", seconds);
-  const int s = static_cast<int>(seconds + .5);
-  if (s < 3600) return fmt::format("{} min {} s", s / 60, s % 60);
-  return fmt::format("{} h {} min", s / 3600, s / 60 % 60);
-}
 
 std::string describe_change(const std::string& part, const std::string& from, const std::string& to) {
   const auto shorten = [&](const std::string& value) -> std::string {

@@ -1,14 +1,18 @@
 #include "pipeline/io/markup.h"
 
-#include <nlohmann/json.hpp>
+#include <algorithm>
+
+#include "pipeline/io/wire_text.h"
 
 namespace texmesh {
 
 std::string markup_escaped(std::string_view text) {
-  using Json = nlohmann::json;
-  const std::string sound =
-      Json::parse(Json(text).dump(-1, ' ', false, Json::error_handler_t::replace)).get<std::string>();
-  std::string out;
+  std::string sound, out;
+  while (!text.empty()) {
+    const std::size_t n = utf8_bytes(text);
+    sound += n == 0 ? std::string_view("\xef\xbf\xbd") : text.substr(0, n);
+    text.remove_prefix(std::max<std::size_t>(n, 1));
+  }
   for (const char c : sound) switch (c) {
       case '&':
         out += "&amp;";

@@ -1,7 +1,10 @@
 #pragma once
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
+
+#include "pipeline/io/number_text.h"
 
 namespace texmesh {
 
@@ -29,15 +32,7 @@ class TextTable {
   std::vector<std::vector<std::string>> rows_;
 };
 
-/// 1234567 -> "1 234 567"; thin groups of three so that columns of bytes can be read.
-std::string grouped(std::uint64_t value);
-/// `digits` significant digits, no exponent between 1e-4 and 1e9, no trailing zeros: 0.01235, 153.2, 1e+09.
-std::string shortest(double value, int digits = 4);
-/// `digits` digits after the point.
-std::string fixed(double value, int digits);
-/// Thousands of bytes, one digit after the point.
-std::string kilobytes(std::uint64_t bytes);
 /// Text of a package for a terminal: control characters and invalid UTF-8 become '?'.
-std::string printable(const std::string& text);
+std::string printable(std::string_view text);
 
 }  // namespace texmesh

@@ -29,18 +29,6 @@ TEST(TextTable, CountsCodePointsNotBytes) {
   EXPECT_EQ(t.text(), "x    y\n---  -\n\xc3\xa4\xc3\xb6   1\nabc  2\n");
 }
 
-TEST(Numbers, AreShortAndReadable) {
-  EXPECT_EQ(grouped(0), "0");
-  EXPECT_EQ(grouped(999), "999");
-  EXPECT_EQ(grouped(1000), "1 000");
-  EXPECT_EQ(grouped(1234567), "1 234 567");
-  EXPECT_EQ(shortest(0.012345678), "0.01235");
-  EXPECT_EQ(shortest(153.2), "153.2");
-  EXPECT_EQ(shortest(12345.6), "12346");
-  EXPECT_EQ(shortest(0), "0");
-  EXPECT_EQ(fixed(2.0 / 3, 2), "0.67");
-}
-
 TEST(Printable, ReplacesWhatATerminalMustNotSee) {
   EXPECT_EQ(printable("Fig \xc3\xa4 \xf0\x9f\x97\xbf"), "Fig \xc3\xa4 \xf0\x9f\x97\xbf");
   EXPECT_EQ(printable("a\x1b[2Jb\n\x7f"), "a?[2Jb??");

@@ -7,8 +7,8 @@
 
 #include "delivery/cpp/package/package_reader.h"
 #include "format/base/errors.h"
-#include "pipeline/batch/progress.h"
 #include "pipeline/io/markup.h"
+#include "pipeline/io/number_text.h"
 #include "tools/publish/report/html.h"
 
 namespace texmesh {
