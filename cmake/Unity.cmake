@@ -5,7 +5,7 @@ option(TEXMESH_UNITY "Compile several sources of a room as one: a faster build, 
 set(texmesh_unity_most 8)  # sources of a unit
 
 # Shares the sources of a room evenly among units, named after the room. CMake leaves sources with options of their own out of
-# units; so the units get these options (texmesh_seldom_run).
+# units; so the units get these options (texmesh_optimise_little).
 function(texmesh_unity_room target room options)  # sources
   list(LENGTH ARGN count)
   math(EXPR units "(${count} + ${texmesh_unity_most} - 1) / ${texmesh_unity_most}")
@@ -62,7 +62,7 @@ function(texmesh_unity target)
       set(room ${target})
     endif()
     if(options)
-      string(APPEND room _seldom)
+      string(APPEND room _little)
     endif()
     get_source_file_property(apart ${source} TEXMESH_APART)
     if(apart)

@@ -5,11 +5,11 @@
 #include <vector>
 
 #include "format/base/bytes.h"
-#include "stages/image/seldom/wide_jpeg.h"
+#include "stages/image/readers_module/wide_jpeg.h"
 
 namespace texmesh {
 
-/// SeldomReaders::decode_wide_jpeg.
+/// ModuleReaders::decode_wide_jpeg.
 std::vector<std::uint16_t> decode_wide_jpeg_file(const std::string& name, ByteSpan bytes,
                                                  const WideJpegHeader& header);
 
