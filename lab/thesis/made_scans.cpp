@@ -8,7 +8,7 @@
 #include "format/base/portable_math.h"
 #include "format/rules/split_mix.h"
 #include "pipeline/import/import.h"
-#include "pipeline/import/memory_files.h"
+#include "pipeline/io/resolver.h"
 #include "stages/base/parallel.h"
 #include "stages/condition/condition.h"
 #include "stages/image/png_writer.h"

@@ -9,7 +9,6 @@
 #include "format/base/errors.h"
 #include "format/base/text_bytes.h"
 #include "format/documents/about.h"
-#include "pipeline/about/licence.h"
 #include "pipeline/about/source_fields.h"
 
 namespace texmesh {

@@ -7,7 +7,7 @@
 #include <cctype>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/import/count_triangles.h"
+#include "pipeline/import/import.h"
 #include "pipeline/io/file_resolver.h"
 #include "pipeline/io/resource_error.h"
 #include "pipeline/io/wire_text.h"

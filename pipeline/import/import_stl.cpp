@@ -5,7 +5,6 @@
 #include "format/base/errors.h"
 #include "pipeline/import/finish_model.h"
 #include "pipeline/import/import.h"
-#include "pipeline/import/local_frame.h"
 #include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/text_scan.h"
 #include "stages/base/first_use_table.h"
