@@ -41,7 +41,7 @@ if(TEXMESH_COMPILER)
   # Of pipeline and tools what a program calls, and what those headers name; tests/house/check_install sees that none misses.
   texmesh_install_headers(pipeline "import/import\\.h" "compile/(compile_model|options|profile)\\.h"
     "batch/(plan|run|fleet/shards)\\.h" "cache/(disk_store|cache_layer|layer_rest|prune)\\.h"
-    "io/(file_request|file_resolver|file_stamp|resolver)\\.h" "compile/workers/(seldom|worker|sandbox/sandbox)\\.h" "batch/progress\\.h"
+    "io/(file_resolver|file_stamp|resolver)\\.h" "compile/workers/(seldom|worker|sandbox/sandbox)\\.h" "batch/progress\\.h"
     "graph/(artefact|explanation|graph_run|key|option_text|stage|stage_observer|store)\\.h")
   texmesh_install_headers(tools "inspect/(dump/dump|verify/verify|diff/diff)\\.h" "extract/extract\\.h" "publish/export/export\\.h"
     "publish/site/gallery\\.h" "extract/glb/(extracted|image_codecs)\\.h" "render/plane_pixels\\.h")

@@ -1,4 +1,5 @@
-// Written by pipeline/about/make_tables; spdx-license-ids 3.0.12, spdx-exceptions 2.3.0; EPSG v10.076, 7242 codes.
+// Written by pipeline/about/make_tables:
+// spdx-license-ids 3.0.12, spdx-exceptions 2.3.0; EPSG v10.076, 7242 codes.
 // clang-format off
 #include "pipeline/about/code_tables.h"
 

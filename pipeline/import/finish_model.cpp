@@ -1,4 +1,4 @@
-#include "pipeline/import/finish_model.h"
+#include "pipeline/import/mesh_builder.h"
 
 #include <algorithm>
 #include <array>
@@ -8,7 +8,6 @@
 
 #include "format/base/errors.h"
 #include "format/base/no_index.h"
-#include "pipeline/import/mesh_builder.h"
 #include "pipeline/io/number_text.h"
 
 namespace texmesh {

@@ -3,7 +3,6 @@
 #include <cstring>
 
 #include "format/base/errors.h"
-#include "pipeline/import/finish_model.h"
 #include "pipeline/import/import.h"
 #include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/text_scan.h"

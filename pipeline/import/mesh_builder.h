@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "format/model/model.h"
+#include "pipeline/import/import.h"
 #include "stages/base/first_use_table.h"
 
 namespace texmesh {
@@ -79,5 +80,10 @@ class MeshBuilder {
 void triangulate_polygon(std::span<const Vec3d> points, std::vector<std::array<std::uint32_t, 3>>& triangles,
                          std::uint64_t& work);
 inline constexpr std::uint64_t kMaxEarWork = 400'000'000;  // about two seconds
+
+/// Last step of every reader: drops triangles that refer to non-finite positions or UVs (warnings
+/// "non-finite-position", "non-finite-uv": such UVs become 0), unused images and materials; sets part names;
+/// checks the limits; throws InputError when no triangle is left.
+void finish_model(Model& model, const std::string& file_name, const ImportOptions& options);
 
 }  // namespace texmesh

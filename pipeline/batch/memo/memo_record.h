@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "pipeline/graph/key.h"
-#include "pipeline/io/file_request.h"
+#include "pipeline/io/file_stamp.h"
 
 namespace texmesh {
 

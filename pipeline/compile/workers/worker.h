@@ -11,7 +11,7 @@
 #include "pipeline/compile/workers/sandbox/sandbox.h"
 #include "pipeline/compile/workers/seldom.h"
 #include "pipeline/graph/key.h"
-#include "pipeline/io/file_request.h"
+#include "pipeline/io/file_stamp.h"
 
 namespace texmesh {
 

@@ -11,8 +11,8 @@
 
 #include "format/model/material_extensions.h"
 #include "pipeline/about/gltf_about.h"
-#include "pipeline/import/finish_model.h"
 #include "pipeline/import/gltf/import_gltf_parts.h"
+#include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/text_scan.h"
 
 namespace texmesh {

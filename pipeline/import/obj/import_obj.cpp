@@ -13,7 +13,6 @@
 #include "format/base/no_index.h"
 #include "format/base/vec.h"
 #include "pipeline/about/source_fields.h"
-#include "pipeline/import/finish_model.h"
 #include "pipeline/import/import.h"
 #include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/obj/obj_material.h"

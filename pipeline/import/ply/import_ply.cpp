@@ -8,7 +8,6 @@
 #include "format/base/errors.h"
 #include "format/base/vec.h"
 #include "pipeline/about/source_fields.h"
-#include "pipeline/import/finish_model.h"
 #include "pipeline/import/import.h"
 #include "pipeline/import/import_images.h"
 #include "pipeline/import/mesh_builder.h"

@@ -6,7 +6,6 @@
 #include "format/base/errors.h"
 #include "format/base/no_index.h"
 #include "format/base/portable_math.h"
-#include "pipeline/import/finish_model.h"
 #include "pipeline/import/import.h"
 #include "pipeline/import/import_images.h"
 #include "pipeline/import/mesh_builder.h"

@@ -224,7 +224,6 @@ PictureSamples read_picture(const std::string& name, OtherPicture other, ByteSpa
                          std::to_string(spec.nchannels) + " channels");
   PictureSamples out;
   out.channels = colour_channels(spec, ImageFormat::kTiff);
-  out.alpha = spec.alpha_channel == static_cast<int>(out.channels) - 1;
   out.profile = spec.find_attribute("ICCProfile") != nullptr;
   out.samples = read_stored(name, kind, out.channels, open);
   out.more_pictures = other == OtherPicture::kGif && open.input->seek_subimage(1, 0);

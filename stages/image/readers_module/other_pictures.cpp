@@ -130,9 +130,10 @@ void drop_dull_alpha(std::vector<T>& samples, std::uint32_t& channels) {
 
 /// A TIFF without compression, in one strip.
 template <class T>
-Bytes tiff_of(const PictureSize& size, std::uint32_t channels, bool alpha, const std::vector<T>& samples) {
+Bytes tiff_of(const PictureSize& size, std::uint32_t channels, const std::vector<T>& samples) {
   constexpr std::uint32_t kShort = 3, kLong = 4, kBits = 8 * sizeof(T), kSeparateAlpha = 2;
   constexpr std::uint32_t kSampleFormat = std::is_floating_point_v<T> ? 3 : 1;
+  const bool alpha = channels % 2 == 0;
   const std::uint32_t entries = alpha ? 12 : 11, lists_at = 8 + 2 + 12 * entries + 4,
                       pixels_at = lists_at + 16;
   BytesOut out;
@@ -203,9 +204,7 @@ ConvertedPicture convert_other_picture(const std::string& name, OtherPicture kin
   out.profile = picture.profile;
   std::visit(
       [&](auto& samples) {
-        const std::uint32_t before = picture.channels;
-        if (picture.alpha && picture.channels > 1) drop_dull_alpha(samples, picture.channels);
-        const bool alpha = picture.alpha && picture.channels == before && before > 1;
+        if (picture.channels % 2 == 0) drop_dull_alpha(samples, picture.channels);
         using T = typename std::decay_t<decltype(samples)>::value_type;
         constexpr std::size_t kMostTiff = 4'000'000'000;
         if (sizeof(T) > 1 && samples.size() > kMostTiff / sizeof(T))
@@ -213,7 +212,7 @@ ConvertedPicture convert_other_picture(const std::string& name, OtherPicture kin
         if constexpr (sizeof(T) == 1)
           out.bytes = png_of(size, picture.channels, std::move(samples));
         else
-          out.bytes = tiff_of(size, picture.channels, alpha, samples);
+          out.bytes = tiff_of(size, picture.channels, samples);
       },
       picture.samples);
   return out;

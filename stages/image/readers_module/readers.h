@@ -12,8 +12,7 @@
 namespace texmesh {
 
 struct PictureSamples {
-  std::uint32_t channels = 0;  // 1 to 4
-  bool alpha = false;          // the last channel is one
+  std::uint32_t channels = 0;  // 1 to 4; the last of two and of four is alpha
   bool more_pictures = false, profile = false;
   StoredSamples samples;
 };
