@@ -81,9 +81,9 @@ void apply_metadata(Model& model, Image& image, const std::string& place, const 
                     "); texture coordinates count from its first stored pixel, so it is not turned");
 }
 
-void note_conversion(Model& model, const Image& image, OtherPicture kind, const ConvertedPicture& picture,
-                     const std::string& place) {
-  const std::string what = image.name + " is a " + other_picture_name(kind);
+void note_conversion(Model& model, const Image& image, const std::string& kind,
+                     const ConvertedPicture& picture, const std::string& place) {
+  const std::string what = image.name + " is a " + kind;
   add_info(model.notes, "converted-image", place,
            what + ": it goes on as a " + image_format_name(image.format) + " of the same texels");
   if (picture.more_pictures)
@@ -110,10 +110,10 @@ std::int32_t add_image_bytes(Model& model, std::string name, std::vector<std::ui
   };
   const bool ktx2 = is_ktx2(bytes);
   if (ktx2) bytes = placed([&] { return png_of_ktx2(name, bytes, limits); });
-  const std::optional<OtherPicture> other =
-      sniff_image_format(bytes) ? std::nullopt : sniff_other_picture(name, bytes);
   ConvertedPicture picture;
-  if (other) {
+  std::string kind;  // of a picture that is converted
+  if (const auto other = sniff_image_format(bytes) ? std::nullopt : sniff_other_picture(name, bytes)) {
+    kind = other_picture_name(*other);
     picture = placed([&] { return convert_other_picture(name, *other, bytes, limits); });
     bytes = std::move(picture.bytes);
   }
@@ -126,8 +126,8 @@ std::int32_t add_image_bytes(Model& model, std::string name, std::vector<std::ui
   if (ktx2)
     add_info(model.notes, "ktx2-image", place,
              image.name + " is a KTX2: its largest level is read and goes on as a PNG of the same texels");
-  else if (other)
-    note_conversion(model, image, *other, picture, place);
+  else if (!kind.empty())
+    note_conversion(model, image, kind, picture, place);
   else
     note_foreign_extension(model, image, place);
   apply_metadata(model, image, place, options);
