@@ -31,8 +31,8 @@ class StructureReader {
     const auto it = document_.find(array);
     if (it == document_.end()) return;
     for (const Json& declared : *it) {
-      read_element("/" + array + "/" + std::to_string(elements.size()), declared, elements.emplace_back(),
-                   read);
+      const std::string place = "/" + array + "/" + std::to_string(elements.size());
+      read_element(place, declared, elements.emplace_back(), read);
     }
   }
   template <class T, class Read>
