@@ -1,5 +1,4 @@
 // The module texmesh_readers.so: see stages/image/readers_module/load_readers.cpp.
-#include "stages/image/readers_module/module_wide_jpeg.h"
 #include "stages/image/readers_module/readers.h"
 
 #include <algorithm>

@@ -31,6 +31,10 @@ struct ModuleReaders {
                                                  const WideJpegHeader& header);
 };
 
+/// ModuleReaders::decode_wide_jpeg, inside the module.
+std::vector<std::uint16_t> decode_wide_jpeg_file(const std::string& name, ByteSpan bytes,
+                                                 const WideJpegHeader& header);
+
 /// The module's only symbol: its name holds a version, which is raised with every change of what the readers
 /// take or give, so that the module of another build is never called.
 inline constexpr const char* kReadersSymbol = "texmesh_readers_3";
