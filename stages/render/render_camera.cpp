@@ -1,6 +1,7 @@
 #include "stages/render/render_camera.h"
 
 #include <cmath>
+#include <initializer_list>
 
 #include "format/base/portable_math.h"
 
