@@ -9,7 +9,7 @@
 #include "format/model/model.h"
 #include "stages/base/run_context.h"
 #include "stages/jpeg/joined_jpeg.h"
-#include "tools/extract/glb/resize.h"
+#include "stages/image/resize.h"
 
 namespace texmesh {
 
