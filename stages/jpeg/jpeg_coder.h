@@ -45,7 +45,7 @@ struct JpegKind {
   bool progressive = false;  // deep successive approximation, see progressive_scans() in the .cpp
   /// For complete() alone: libjpeg's usual progressive scans, one pair of Huffman tables for all channels of
   /// `rgb`, and these steps instead of those of `quality`.
-  std::optional<FileSteps> file;
+  std::optional<FileSteps> file{};
 };
 
 /// The quantised coefficients of an image as a file's; refers to everything.
