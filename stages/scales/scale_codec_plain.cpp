@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "format/base/box.h"
-#include "stages/gltf/meshopt_streams.h"
+#include "stages/gltf/glb_writer.h"
 #include "stages/scales/scale_codecs.h"
 
 namespace texmesh {
