@@ -9,7 +9,7 @@
 #include "format/model/model.h"
 #include "stages/base/run_context.h"
 #include "stages/image/resize.h"
-#include "stages/jpeg/joined_jpeg.h"
+#include "stages/jpeg/source_jpeg.h"
 
 namespace texmesh {
 
