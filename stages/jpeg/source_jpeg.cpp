@@ -129,7 +129,7 @@ struct TexelRange {
   std::int64_t begin, end;
 };
 
-bool any_covered(const CoverageMask& mask, TexelRange x, TexelRange y) {
+bool shows_any(const CoverageMask& mask, TexelRange x, TexelRange y) {
   x = {std::max<std::int64_t>(x.begin, 0), std::min<std::int64_t>(x.end, mask.width_px)};
   y = {std::max<std::int64_t>(y.begin, 0), std::min<std::int64_t>(y.end, mask.height_px)};
   for (auto v = static_cast<std::uint32_t>(y.begin); v < y.end; ++v)
@@ -259,7 +259,7 @@ std::vector<std::uint8_t> JoinedJpeg::known_blocks(const Component& c, const Cov
       const std::size_t at = std::size_t{y} * c.blocks_across + x;
       const Block& block = c.blocks[at];
       const bool more = std::any_of(block.begin() + 1, block.end(), [](std::int16_t v) { return v != 0; });
-      out[at] = more || any_covered(mask, {x * wide - beside_x, (x + 1) * wide + beside_x},
+      out[at] = more || shows_any(mask, {x * wide - beside_x, (x + 1) * wide + beside_x},
                                     {y * high - beside_y, (y + 1) * high + beside_y});
     }
   return out;
