@@ -9,7 +9,6 @@
 #include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "format/base/srgb.h"
-#include "stages/image/colour_profile.h"
 #include "stages/image/decode_jpeg.h"
 #include "stages/image/decode_png.h"
 #include "stages/image/decode_tiff_exr.h"

@@ -10,8 +10,8 @@
 
 #include "format/base/errors.h"
 #include "format/base/srgb.h"
-#include "format/base/vec.h"
 #include "stages/base/parallel.h"
+#include "stages/image/srgb_encoder.h"
 
 namespace texmesh {
 namespace {
@@ -159,40 +159,6 @@ Pixels part_of(const Pixels& from, std::uint32_t width_px, std::uint32_t height_
   return to;
 }
 
-constexpr int kCodeSteps = 4096;
-
-/// sRGB <-> linear light.
-struct LightCurves {
-  std::array<float, 256> linear{};
-  std::array<float, 256> upto{};                     // linear light up to which a code is the nearest one
-  std::array<std::uint8_t, kCodeSteps + 1> first{};  // code to start looking at, by linear light
-};
-
-const LightCurves& light_curves() {
-  static const LightCurves curves = [] {
-    LightCurves c;
-    for (std::size_t v = 0; v < 256; ++v) {
-      c.linear[v] = static_cast<float>(light_of_srgb(static_cast<double>(v) / 255));
-      c.upto[v] = v == 255 ? 2.f : static_cast<float>(light_of_srgb((static_cast<double>(v) + 0.5) / 255));
-    }
-    std::uint8_t code = 0;
-    for (std::size_t i = 0; i <= kCodeSteps; ++i) {
-      while (static_cast<float>(i) / kCodeSteps > c.upto[code]) ++code;
-      c.first[i] = code;
-    }
-    return c;
-  }();
-  return curves;
-}
-
-std::uint8_t code_of_light(float light) {
-  const LightCurves& c = light_curves();
-  const float at = std::clamp(light, 0.f, 1.f);
-  std::uint8_t code = c.first[static_cast<std::size_t>(at * kCodeSteps)];
-  while (at > c.upto[code]) ++code;
-  return code;
-}
-
 /// The weights as parts of a texel.
 std::vector<float> shares_of(const Axis& axis) {
   std::vector<float> out;
@@ -261,9 +227,10 @@ Pixels reduced(const Pixels& from, std::uint32_t used_width, std::uint32_t used_
                      "1 x 1 to " + std::to_string(used_width) + " x " + std::to_string(used_height),
                      std::to_string(width) + " x " + std::to_string(height));
   if (width == used_width && height == used_height) return cropped(from, width, height);
-  std::array<float, 256> numbers;
-  for (std::size_t v = 0; v < 256; ++v) numbers[v] = static_cast<float>(v);
-  const std::array<float, 256>& value = kind == Averaging::kLight ? light_curves().linear : numbers;
+  std::array<float, 256> value;
+  for (std::size_t v = 0; v < 256; ++v)
+    value[v] = kind == Averaging::kLight ? static_cast<float>(light_of_srgb(static_cast<double>(v) / 255))
+                                         : static_cast<float>(v);
   const Axis columns = axis_of(used_width, width), rows = axis_of(used_height, height);
   const std::vector<float> column_shares = shares_of(columns), row_shares = shares_of(rows);
   const float scale = static_cast<float>(static_cast<double>(width) * height /
@@ -284,6 +251,7 @@ Pixels reduced(const Pixels& from, std::uint32_t used_width, std::uint32_t used_
     for (std::uint32_t x = 0; x < width; ++x)
       sharpen(means.data() + std::size_t{x} * from.channels, height, stride, from.channels, sharpening);
   }
+  static const SrgbEncoder<float, true> encode;
   Pixels out{width, height, from.channels, {}};
   out.data.resize(means.size());
   if (kind == Averaging::kNormals && from.channels == 3)
@@ -294,7 +262,7 @@ Pixels reduced(const Pixels& from, std::uint32_t used_width, std::uint32_t used_
   else
     for (std::size_t i = 0; i < means.size(); ++i)
       out.data[i] = kind == Averaging::kLight
-                        ? code_of_light(means[i])
+                        ? encode(means[i])
                         : static_cast<std::uint8_t>(std::clamp(std::floor(means[i] + 0.5f), 0.f, 255.f));
   return out;
 }
