@@ -10,9 +10,9 @@
 #include "format/base/errors.h"
 #include "format/base/srgb.h"
 #include "stages/image/decode_jpeg.h"
-#include "stages/image/decode_png.h"
 #include "stages/image/decode_tiff_exr.h"
 #include "stages/image/image_metadata.h"
+#include "stages/image/png_writer.h"
 #include "stages/image/seldom/wide_jpeg.h"
 #include "stages/image/webp.h"
 
