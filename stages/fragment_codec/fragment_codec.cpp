@@ -7,18 +7,14 @@
 // - Lossy WebP: a complete file per fragment and rung.
 #include "stages/fragment_codec/fragment_codec.h"
 
-#include <algorithm>
 #include <cmath>
 #include <functional>
-#include <optional>
-#include <string>
 #include <utility>
 
 #include "format/base/errors.h"
 #include "stages/base/parallel.h"
 #include "stages/image/webp.h"
 #include "stages/jpeg/jpeg.h"
-#include "stages/jpeg/jpeg_stream.h"
 #include "stages/jpeg/masked_jpeg.h"
 
 namespace texmesh {

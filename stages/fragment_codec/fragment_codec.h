@@ -1,15 +1,9 @@
 #pragma once
-#include <cstdint>
-#include <memory>
-#include <span>
-#include <vector>
 
 #include "format/model/codec.h"
 #include "stages/base/run_context.h"
 #include "stages/data/ladder.h"
 #include "stages/data/pixels.h"
-#include "stages/data/subsampling.h"
-#include "stages/image/pixel_window.h"
 #include "stages/jpeg/jpeg_coder.h"
 
 namespace texmesh {

@@ -1,9 +1,6 @@
 #include "stages/gltf/glb_container.h"
 
-#include <nlohmann/json.hpp>
-
 #include <limits>
-#include <string>
 
 #include "format/base/bounded_json.h"
 #include "format/base/errors.h"

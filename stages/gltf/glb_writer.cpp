@@ -3,9 +3,7 @@
 #include <meshoptimizer.h>
 
 #include <algorithm>
-#include <array>
 #include <charconv>
-#include <map>
 
 #include "format/base/errors.h"
 #include "stages/gltf/glb_container.h"

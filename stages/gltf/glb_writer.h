@@ -3,12 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include <cstddef>
-#include <cstdint>
 #include <initializer_list>
-#include <memory>
-#include <span>
-#include <string>
-#include <vector>
 
 #include "stages/gltf/draco_mesh.h"
 

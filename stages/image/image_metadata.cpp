@@ -9,10 +9,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <map>
-#include <optional>
-#include <string_view>
 
-#include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "format/base/portable_math.h"
 #include "stages/image/decode_tiff_exr.h"

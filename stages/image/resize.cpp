@@ -1,7 +1,6 @@
 #include "stages/image/resize.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numeric>
 #include <string>
@@ -9,7 +8,6 @@
 #include <vector>
 
 #include "format/base/errors.h"
-#include "format/base/srgb.h"
 #include "stages/base/parallel.h"
 #include "stages/image/srgb_encoder.h"
 

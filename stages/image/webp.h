@@ -1,8 +1,6 @@
 #pragma once
 // WebP by libwebp itself, both ways: OpenImageIO 2.4 multiplies alpha into the colours whatever it is asked.
-#include <string>
 
-#include "format/base/bytes.h"
 #include "stages/data/pixels.h"
 #include "stages/image/image_format.h"
 #include "stages/image/pixel_window.h"

@@ -1,14 +1,8 @@
 #include "stages/jpeg/block_scan.h"
 
-#include <algorithm>
-#include <array>
-#include <bit>
 #include <cmath>
-#include <cstdlib>
 #include <cstring>
 #include <limits>
-
-#include "stages/jpeg/jpeg_stream.h"
 
 namespace texmesh {
 namespace {

@@ -3,13 +3,8 @@
 // becomes coefficients (quantise_whole(), MaskedBlock, flat_block()), these become symbols (emit_block()),
 // and a sink writes or counts them.
 #include <algorithm>
-#include <array>
 #include <bit>
-#include <cstddef>
-#include <cstdint>
 #include <cstdlib>
-#include <span>
-#include <vector>
 
 #include "format/base/bytes.h"
 #include "stages/image/pixel_window.h"

@@ -3,7 +3,6 @@
 #include "stages/jpeg/jpeg_coder.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <csetjmp>
 #include <cstdio>
@@ -18,7 +17,6 @@
 
 #include "format/base/errors.h"
 #include "stages/jpeg/jpeg.h"
-#include "stages/jpeg/jpeg_stream.h"
 
 namespace texmesh {
 namespace {

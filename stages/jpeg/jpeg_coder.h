@@ -2,12 +2,8 @@
 // Inside stages only: libjpeg-turbo's compressor behind an interface that neither leaks its headers nor its
 // longjmp.
 // Inside stages only: what a JPEG is made of before it is transformed.
-#include <array>
-#include <cstddef>
-#include <cstdint>
 #include <memory>
 #include <optional>
-#include <vector>
 
 #include "stages/data/subsampling.h"
 #include "stages/image/pixel_window.h"

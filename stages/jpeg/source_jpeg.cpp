@@ -8,9 +8,7 @@
 #include "format/base/errors.h"
 #include "format/rules/size_curve.h"
 #include "stages/base/parallel.h"
-#include "stages/image/decode_jpeg.h"
 #include "stages/jpeg/jpeg_coder.h"
-#include "stages/jpeg/jpeg_stream.h"
 
 namespace texmesh {
 namespace {
@@ -260,7 +258,7 @@ std::vector<std::uint8_t> JoinedJpeg::known_blocks(const Component& c, const Cov
       const Block& block = c.blocks[at];
       const bool more = std::any_of(block.begin() + 1, block.end(), [](std::int16_t v) { return v != 0; });
       out[at] = more || shows_any(mask, {x * wide - beside_x, (x + 1) * wide + beside_x},
-                                    {y * high - beside_y, (y + 1) * high + beside_y});
+                                  {y * high - beside_y, (y + 1) * high + beside_y});
     }
   return out;
 }

@@ -1,13 +1,7 @@
 #pragma once
 // A source JPEG as baseline JPEGs of its fragments, which keep its components, and such fragments put
 // together to one JPEG again, coefficient by coefficient.
-#include <array>
-#include <cstddef>
-#include <cstdint>
-#include <functional>
 #include <optional>
-#include <string>
-#include <vector>
 
 #include "format/base/bytes.h"
 #include "stages/base/run_context.h"

@@ -1,7 +1,5 @@
 #pragma once
 #include <array>
-#include <cstdint>
-#include <vector>
 
 #include "stages/measure/picture.h"
 

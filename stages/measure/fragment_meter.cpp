@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "stages/data/coverage.h"
 #include "stages/fragment_codec/fragment_codec.h"
 #include "stages/jpeg/jpeg.h"
 

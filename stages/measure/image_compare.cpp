@@ -1,11 +1,9 @@
 #include "stages/measure/image_compare.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "format/base/portable_math.h"
 #include "format/base/srgb.h"
-#include "stages/measure/picture.h"
 #include "stages/measure/sampled_curve.h"
 
 namespace texmesh {

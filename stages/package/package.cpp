@@ -4,7 +4,6 @@
 #include <set>
 
 #include "format/base/box.h"
-#include "format/base/bytes.h"
 #include "format/base/clean_text.h"
 #include "format/container/layout.h"
 #include "format/documents/package_writer.h"

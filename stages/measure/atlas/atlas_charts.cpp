@@ -1,8 +1,6 @@
 // Charts: triangles that hang together in the texture. Seams: edges between them, and the colours on both
 // sides.
-#include <algorithm>
 #include <bit>
-#include <cmath>
 #include <tuple>
 
 #include "format/base/srgb.h"

@@ -3,8 +3,6 @@
 #include <cmath>
 #include <tuple>
 
-#include "stages/base/run_context.h"
-#include "stages/measure/atlas/atlas_figures.h"
 #include "stages/measure/atlas/atlas_parts.h"
 
 namespace texmesh {

@@ -1,6 +1,5 @@
 // What one image of a model is like as an atlas: where triangles lie on it, how they are stretched there, and
 // what charts, seams (atlas_charts.cpp) and cover (atlas_cover.cpp) add up to.
-#include "stages/measure/atlas/atlas_figures.h"
 
 #include <algorithm>
 #include <cmath>

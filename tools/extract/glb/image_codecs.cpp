@@ -1,7 +1,6 @@
 #include "tools/extract/glb/image_codecs.h"
 
 #include <algorithm>
-#include <string>
 
 #include "format/base/errors.h"
 #include "stages/image/png_writer.h"

@@ -1,17 +1,14 @@
 #include "tools/extract/glb/scale_file.h"
 
 #include <algorithm>
-#include <map>
 #include <set>
 
-#include "format/base/bytes.h"
 #include "format/container/layout.h"
 #include "format/split/split_model.h"
 #include "format/split/split_reader.h"
 #include "format/split/split_stream.h"
 #include "pipeline/import/import.h"
 #include "pipeline/io/file_resolver.h"
-#include "stages/geometry/fit_normals.h"
 #include "stages/gltf/glb_container.h"
 #include "stages/image/decode_image.h"
 

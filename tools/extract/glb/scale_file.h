@@ -2,10 +2,6 @@
 // A scale of a package as a file, a file as a model, and files for programs that know no extension.
 #include <nlohmann/json.hpp>
 
-#include <cstdint>
-#include <span>
-#include <string>
-
 #include "delivery/cpp/package/package_reader.h"
 #include "format/base/bytes.h"
 #include "format/model/model.h"

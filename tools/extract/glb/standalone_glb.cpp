@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <charconv>
-#include <nlohmann/json.hpp>
 #include <utility>
 
-#include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "pipeline/about/gltf_about.h"
 #include "stages/gltf/glb_container.h"

@@ -1,10 +1,4 @@
 #pragma once
-#include <cstdint>
-#include <map>
-#include <memory>
-#include <span>
-#include <string>
-#include <vector>
 
 #include "format/documents/about.h"
 #include "stages/gltf/check_glb.h"

@@ -5,7 +5,6 @@
 
 #include "delivery/cpp/package/plane_streams.h"
 #include "format/container/layout.h"
-#include "stages/data/coverage.h"
 #include "stages/fill/fill.h"
 #include "stages/geometry/texel_coverage.h"
 #include "tools/extract/glb/scale_file.h"

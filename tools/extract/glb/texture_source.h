@@ -1,13 +1,8 @@
 #pragma once
-#include <cstdint>
 #include <map>
-#include <optional>
-#include <string>
-#include <vector>
 
 #include "delivery/cpp/package/package_reader.h"
 #include "format/model/model.h"
-#include "stages/base/run_context.h"
 #include "stages/image/resize.h"
 #include "stages/jpeg/source_jpeg.h"
 
