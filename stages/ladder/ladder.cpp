@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "stages/fragment_codec/coding_space.h"
-#include "stages/fragment_codec/rebuilt_z.h"
+#include "stages/fragment_codec/fragment_codec.h"
 #include "stages/image/check_pixels.h"
 #include "stages/image/decode_image.h"
 #include "stages/ladder/choose_rungs.h"

@@ -9,7 +9,6 @@
 #include "stages/base/parallel.h"
 #include "stages/image/jpeg_segments.h"
 #include "stages/measure/fragment_meter.h"
-#include "stages/measure/scale_samples.h"
 
 namespace texmesh {
 namespace {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "stages/data/coverage.h"
-#include "stages/fragment_codec/decode_rung.h"
+#include "stages/fragment_codec/fragment_codec.h"
 
 namespace texmesh {
 

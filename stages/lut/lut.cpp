@@ -11,7 +11,6 @@
 #include "stages/image/check_pixels.h"
 #include "stages/lut/size_model.h"
 #include "stages/measure/fragment_meter.h"
-#include "stages/measure/scale_samples.h"
 
 namespace texmesh {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "stages/measure/pixel_spans.h"
+#include "stages/measure/picture.h"
 #include "stages/render/visibility.h"
 
 namespace texmesh::quality {

@@ -1,8 +1,6 @@
 #pragma once
-#include <cstdint>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "tools/extract/glb/image_codecs.h"
 #include "tools/render/plane_pixels.h"

@@ -78,9 +78,10 @@ DebugView view_atlas(PackageReader& package, const RunContext& context);
 
 /// GLB: the mesh (COLOR_0 or textures), then the lines as a primitive of mode LINES in a node "lines".
 std::vector<std::uint8_t> write_debug_glb(const DebugView& view);
-/// Two views side by side from opposite sides, a little from above, each side_px wide, by the stages' own
-/// rasteriser; lines are drawn over the mesh. A bar at the right shows the scale of colours, hi at the top.
-/// With shows_layout the first four textures stand at the right, each within side_px.
+/// Two views side by side from opposite sides, a little from above, each side_px wide, by stages/render with
+/// a light at the camera; lines are drawn over the mesh. A bar at the right shows the scale of colours, hi at
+/// the top, as the tone mapping makes them. With shows_layout the first four textures stand at the right,
+/// each within side_px.
 std::vector<std::uint8_t> write_debug_png(const DebugView& view, std::uint32_t side_px);
 
 }  // namespace texmesh

@@ -1,4 +1,4 @@
-#include "tools/extract/glb/fit_normals.h"
+#include "stages/geometry/fit_normals.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,8 +10,8 @@ namespace texmesh {
 namespace {
 
 constexpr std::size_t kMostSamples = 400000;
-constexpr int kSteps = 4;
-constexpr double kLeastFacing = 0.25;  // cosine between a sample and the face that it is put on
+constexpr int kFitSteps = 4;
+constexpr double kLeastCosine = 0.25;  // cosine between a sample and the face that it is put on
 
 /// What a sample says about three normals.
 struct Tie {
@@ -29,7 +29,7 @@ std::vector<Tie> ties_of(std::span<const Vec3d> points, std::span<const Triangle
       const TriangleTree::Nearest found = tree.nearest(samples.places[s]);
       const Triangle& t = triangles[found.triangle];
       const Vec3d face = normalized(cross(points[t[1]] - points[t[0]], points[t[2]] - points[t[0]]));
-      out[s] = {found.weight, found.triangle, dot(face, to_double(samples.normals[s])) > kLeastFacing};
+      out[s] = {found.weight, found.triangle, dot(face, to_double(samples.normals[s])) > kLeastCosine};
     }
   });
   return out;
@@ -87,7 +87,7 @@ std::vector<Vec3f> fit_normals(std::span<const Vec3d> points, std::span<const Tr
   const std::vector<Tie> ties = ties_of(points, triangles, samples, context);
   std::vector<Vec3d> fitted;
   for (const Vec3f n : normals) fitted.push_back(to_double(n));
-  for (int i = 0; i < kSteps; ++i) improve(triangles, ties, samples, fitted);
+  for (int i = 0; i < kFitSteps; ++i) improve(triangles, ties, samples, fitted);
   for (std::size_t i = 0; i < normals.size(); ++i) normals[i] = to_float(fitted[i]);
   return normals;
 }
