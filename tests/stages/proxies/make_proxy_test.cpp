@@ -13,7 +13,7 @@ struct Parts {
   MaterialGroups groups{find_groups(mesh, shown.materials)};
   BakeSource source{mesh, shown, groups};
   CoarseSurfaces surfaces{mesh, groups, 60, static_cast<std::uint32_t>(mesh.triangles.size()), {}};
-  ProxyCosts costs;
+  ProxyCosts costs{};
 };
 
 TEST(CoarseSurfaces, GivesTheFinestSurfaceThatIsCoarseEnough) {

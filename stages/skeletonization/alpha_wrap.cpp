@@ -1,7 +1,7 @@
 // CGAL's checks stay on in release builds: a broken invariant is an exception that the caller falls back on,
 // not a crash.
 #define CGAL_DEBUG
-#include "stages/skeletonization/wrap/alpha_wrap.h"
+#include "stages/skeletonization/wrap.h"
 
 #include <CGAL/Alpha_wrap_3/internal/Alpha_wrap_3.h>
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
@@ -13,7 +13,6 @@
 #include <vector>
 
 #include "stages/geometry/triangle_tree.h"
-#include "stages/skeletonization/cgal_failure.h"
 #include "stages/skeletonization/geometry_failure.h"
 
 namespace texmesh {

@@ -1,4 +1,4 @@
-#include "stages/skeletonization/wrap/wrap.h"
+#include "stages/skeletonization/wrap.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,6 @@
 #include <map>
 
 #include "stages/skeletonization/geometry_failure.h"
-#include "stages/skeletonization/wrap/decimation.h"
 #include "tests/support/even_sphere.h"
 
 namespace texmesh {

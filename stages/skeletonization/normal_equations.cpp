@@ -1,4 +1,4 @@
-#include "stages/skeletonization/contraction/normal_equations.h"
+#include "stages/skeletonization/contraction_parts.h"
 
 #include <Eigen/SparseCholesky>
 

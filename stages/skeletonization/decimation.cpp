@@ -1,18 +1,20 @@
 // CGAL's checks stay on in release builds: a broken invariant is an exception that the caller falls back on,
 // not a crash.
 #define CGAL_DEBUG
-#include "stages/skeletonization/wrap/decimation.h"
+#include "stages/skeletonization/wrap.h"
 
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Surface_mesh.h>
 #include <CGAL/Surface_mesh_simplification/Policies/Edge_collapse/Count_stop_predicate.h>
 #include <CGAL/Surface_mesh_simplification/edge_collapse.h>
+#include <CGAL/Uncertain.h>
+#include <CGAL/exceptions.h>
 
 #include <array>
 #include <cstdint>
 #include <utility>
 
-#include "stages/skeletonization/cgal_failure.h"
+#include "stages/skeletonization/geometry_failure.h"
 
 namespace texmesh {
 namespace {
@@ -43,6 +45,16 @@ TriangleSoup triangle_soup(const SurfaceMesh& mesh) {
 }
 
 }  // namespace
+
+void rethrow_cgal_failure() {
+  try {
+    throw;
+  } catch (const CGAL::Failure_exception& e) {
+    throw GeometryFailure(e.what());
+  } catch (const CGAL::Uncertain_conversion_exception& e) {
+    throw GeometryFailure(e.what());
+  }
+}
 
 TriangleSoup decimate(TriangleSoup closed, std::size_t max_faces) {
   if (closed.triangles.size() <= max_faces) return closed;

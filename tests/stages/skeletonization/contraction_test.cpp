@@ -1,9 +1,8 @@
-#include "stages/skeletonization/contraction/contraction.h"
+#include "stages/skeletonization/curve_skeleton.h"
 
 #include <gtest/gtest.h>
 
-#include "stages/skeletonization/contraction/inside_test.h"
-#include "stages/skeletonization/contraction/voronoi_poles.h"
+#include "stages/skeletonization/contraction_parts.h"
 #include "stages/skeletonization/geometry_failure.h"
 #include "tests/support/even_sphere.h"
 

@@ -1,7 +1,7 @@
 // CGAL's checks stay on in release builds: a broken invariant is an exception that the caller falls back on,
 // not a crash.
 #define CGAL_DEBUG
-#include "stages/skeletonization/contraction/inside_test.h"
+#include "stages/skeletonization/contraction_parts.h"
 
 #include <CGAL/AABB_traits.h>
 #include <CGAL/AABB_tree.h>

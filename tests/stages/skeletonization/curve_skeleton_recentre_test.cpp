@@ -1,5 +1,5 @@
 // Nodes of a curve find the middle of their poles, across the curve and not along it.
-#include "stages/skeletonization/contraction/recentre.h"
+#include "stages/skeletonization/curve_skeleton.h"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
 // CGAL's checks stay on in release builds: a broken invariant is an exception that the caller falls back on,
 // not a crash.
 #define CGAL_DEBUG
-#include "stages/skeletonization/contraction/voronoi_poles.h"
+#include "stages/skeletonization/contraction_parts.h"
 
 #include <CGAL/Delaunay_triangulation_3.h>
 #include <CGAL/Delaunay_triangulation_cell_base_3.h>
