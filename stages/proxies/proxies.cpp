@@ -10,19 +10,8 @@
 #include "stages/geometry/stand_in_scale.h"
 #include "stages/proxies/make_proxy.h"
 
-namespace texmesh {
+namespace texmesh::proxies {
 namespace {
-
-using proxies::BakedProxy;
-using proxies::BakeSource;
-using proxies::CoarseSurfaces;
-using proxies::CompetingScales;
-using proxies::MadeProxy;
-using proxies::MaterialGroups;
-using proxies::ProxyCosts;
-using proxies::ProxyForm;
-using proxies::ReferenceViews;
-using proxies::ShownModel;
 
 constexpr std::uint32_t kLeastTriangles = 60;
 constexpr double kLeastBytesPerTriangle = 4;
@@ -93,7 +82,7 @@ Mesh baked_mesh(const NestedScales& scales, const RunContext& context) {
 
 /// What the files of a model that proxies stand for take.
 double source_bytes(const NestedScales& scales, const std::vector<Image>& images) {
-  double sum = proxies::whole_mesh_bytes(scales);
+  double sum = whole_mesh_bytes(scales);
   for (const Image& image : images) sum += static_cast<double>(image.bytes.size());
   return sum;
 }
@@ -105,7 +94,7 @@ std::vector<int> sizes_to_try(const NestedScales& scales, const std::vector<Imag
   std::vector<int> out;
   double left = kMostOfSource * source_bytes(scales, images);
   for (const int bytes : options.sizes) {
-    if (proxies::whole_mesh_is_small(scales, static_cast<std::uint64_t>(bytes))) {
+    if (whole_mesh_is_small(scales, static_cast<std::uint64_t>(bytes))) {
       note_none(notes, bytes, "S_0's mesh takes few of them, so the source's atlas can stay");
     } else if (kOverAsked * bytes > left) {
       note_none(notes, bytes, "proxies take at most 15 % of the source");
@@ -137,7 +126,7 @@ ProxySubject subject_of(const Mesh& mesh, const ShownMaterials& shown, const Mat
   const bool mapped = std::ranges::any_of(shown.materials, [](const RenderMaterial& m) {
     return !m.unlit && m.slot(TextureUse::kNormal).texture >= 0;
   });
-  return {mesh, shown, groups, source, mode, mapped, data_varies(shown.materials), proxies::is_smooth(mesh)};
+  return {mesh, shown, groups, source, mode, mapped, data_varies(shown.materials), is_smooth(mesh)};
 }
 
 /// What the sizes so far tell the next one.
@@ -166,8 +155,8 @@ void compete(const ProxySubject& subject, const ReferenceViews& views, BakedProx
   // be more than noise.
   const double worth = form.normals ? 1 : subject.smooth ? 1.04 : 0.995;
   // After half of the views.
-  constexpr double kFarOff = 1.15, kNoise = 0.005;
-  const double hopeless = best.made ? kFarOff * best.flip.mean() / worth + kNoise : 1;
+  constexpr double kFarBehind = 1.15, kNoise = 0.005;
+  const double hopeless = best.made ? kFarBehind * best.flip.mean() / worth + kNoise : 1;
   const FlipSum flip =
       picture_loss(views, made->shown.scene(), made->shown.shown.textures, context, hopeless);
   if (!best.made || flip.mean() * worth < best.flip.mean()) best = {std::move(made), form, flip};
@@ -231,8 +220,7 @@ std::vector<KeptProxy> kept_proxies(const ProxySubject& subject, const NestedSca
                                     const RunContext& context) {
   CoarseSurfaces surfaces(subject.mesh, subject.groups, kLeastTriangles,
                           most_triangles(subject.mesh, sizes.back()), inner);
-  const ReferenceViews views =
-      proxies::reference_views(subject.mesh, subject.shown, proxies::kMiddlePx, inner);
+  const ReferenceViews views = reference_views(subject.mesh, subject.shown, kMiddlePx, inner);
   CompetingScales competitors(scales, subject.shown, views);
   const bool scales_compete = subject.mode == ProxyMode::kAuto;
   std::vector<KeptProxy> kept;
@@ -273,10 +261,10 @@ std::vector<Proxy> measured_proxies(const ProxySubject& subject, std::vector<Kep
                                     const RunContext& context) {
   std::vector<Proxy> out;
   for (KeptProxy& k : kept) out.push_back(std::move(k.made.proxy));
-  for (const double px : {proxies::kSmallPx, proxies::kMiddlePx, proxies::kLargePx}) {
-    const bool known = px == proxies::kMiddlePx;
+  for (const double px : {kSmallPx, kMiddlePx, kLargePx}) {
+    const bool known = px == kMiddlePx;
     ReferenceViews views;
-    if (!known && !kept.empty()) views = proxies::reference_views(subject.mesh, subject.shown, px, context);
+    if (!known && !kept.empty()) views = reference_views(subject.mesh, subject.shown, px, context);
     for (std::size_t i = 0; i < kept.size(); ++i) {
       const ShownModel& shown = kept[i].made.shown;
       const FlipSum flip =
@@ -288,11 +276,15 @@ std::vector<Proxy> measured_proxies(const ProxySubject& subject, std::vector<Kep
 }
 
 }  // namespace
+}  // namespace texmesh::proxies
+
+namespace texmesh {
 
 Proxies make_proxies(const NestedScales& scales, const std::vector<Material>& materials,
                      const std::vector<Image>& images, const Fragments& fragments,
                      const std::vector<Pixels>& pixels, const ProxiesOptions& options,
                      const RunContext& context) {
+  using namespace proxies;
   Proxies out;
   if (options.mode == ProxyMode::kNone) return out;
   if (scales.scales.empty()) throw StageError("proxies", "scales", "S_0", "none");
@@ -303,7 +295,7 @@ Proxies make_proxies(const NestedScales& scales, const std::vector<Material>& ma
   const Mesh mesh = baked_mesh(scales, inner);
   const ShownMaterials shown =
       shown_materials(materials, fragments, pixels, mesh, least_side_px(materials), inner);
-  MaterialGroups groups = proxies::find_groups(mesh, shown.materials);
+  MaterialGroups groups = find_groups(mesh, shown.materials);
   groups.mip_levels = reads_mip_levels(materials);
   const BakeSource source(mesh, shown, groups);
   if (!(source.diagonal() > 0)) {
