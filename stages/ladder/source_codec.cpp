@@ -14,7 +14,7 @@
 #include "stages/jpeg/jpeg_bits.h"
 #include "stages/jpeg/jpeg_coder.h"
 #include "stages/jpeg/source_jpeg.h"
-#include "stages/ladder/fragment_windows.h"
+#include "stages/ladder/encode_rungs.h"
 
 namespace texmesh {
 namespace {
