@@ -8,8 +8,8 @@
 #include "stages/data/proxies.h"
 #include "stages/measure/flip.h"
 #include "stages/proxies/coding/proxy_glb.h"
-#include "stages/render/materials/shown_materials.h"
 #include "stages/render/shade.h"
+#include "stages/render/shown_materials.h"
 
 namespace texmesh::proxies {
 

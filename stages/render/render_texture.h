@@ -4,7 +4,7 @@
 
 #include "stages/base/run_context.h"
 #include "stages/data/pixels.h"
-#include "stages/render/render_material.h"
+#include "stages/render/visibility.h"
 
 namespace texmesh {
 

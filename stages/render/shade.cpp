@@ -10,7 +10,7 @@
 #include "stages/measure/sampled_curve.h"
 #include "stages/render/edge_planes.h"
 #include "stages/render/fragment_shader.h"
-#include "stages/render/srgb_encoder.h"
+#include "stages/render/render_math.h"
 
 namespace texmesh {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "format/model/model.h"
 #include "stages/geometry/triangle_tree.h"
-#include "stages/render/materials/shown_materials.h"
+#include "stages/render/shown_materials.h"
 
 namespace texmesh::proxies {
 

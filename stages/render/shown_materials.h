@@ -5,8 +5,8 @@
 #include "stages/base/run_context.h"
 #include "stages/data/fragments.h"
 #include "stages/data/pixels.h"
-#include "stages/render/render_material.h"
 #include "stages/render/render_texture.h"
+#include "stages/render/visibility.h"
 
 namespace texmesh {
 

@@ -1,4 +1,4 @@
-#include "stages/render/materials/shown_materials.h"
+#include "stages/render/shown_materials.h"
 
 #include <algorithm>
 #include <cstring>
