@@ -8,7 +8,7 @@
 #include "stages/data/coverage.h"
 #include "stages/fill/fill_blocks.h"
 #include "stages/image/decode_image.h"
-#include "stages/image/halve_pixels.h"
+#include "stages/image/resize.h"
 
 namespace texmesh {
 namespace {
@@ -282,7 +282,7 @@ void fill_chain(const std::vector<TexturePlane>& planes, std::size_t base, std::
   for (std::size_t p = base, next = first_mip;; p = next++) {
     const bool more = next < planes.size() && planes[next].mip > 0 && planes[next].base == base;
     Pixels half = more ? halved(pixels, planes[p].width_px, planes[p].height_px,
-                                halving_of(planes[next].role, planes[next].channels))
+                                averaging_of(planes[next].role, planes[next].channels))
                        : Pixels{};
     if (way.fill == Fill::kPushPull) flatten_where_covered(pixels, planes[p].coverage, way.part, context);
     out[p] = padded(std::move(pixels), planes[p]);

@@ -20,7 +20,7 @@ enum class PartBlocks : std::uint8_t { kSparse, kSmooth };
 
 /// The pixels of every plane: decoded, uncovered texels filled, and extended to columns x fragment_width by
 /// rows x fragment_height: edges repeated to the end of their 16 x 16 block, flat blocks beyond (never seen,
-/// nearly free). A mip is the next finer plane, filled smoothly, halved (stages/image/halve_pixels.h), its
+/// nearly free). A mip is the next finer plane, filled smoothly, halved (stages/image/resize.h), its
 /// blocks made cheap in turn. Derived data, never stored: zim, ladder and lut share one copy. Throws
 /// InputError for an image that does not decode, StageError for planes that do not fit the images or each
 /// other.

@@ -15,6 +15,4 @@ JpegKind jpeg_kind(const PlaneCoding& plane, int quality);
 /// Of baseline JPEGs, whose rungs need not be alike: at kFinestQuality three channels are coded as they are.
 JpegKind baseline_kind(const PlaneCoding& plane, int quality);
 
-Pixels decode_webp(std::span<const std::uint8_t> file, std::uint64_t max_pixels);
-
 }  // namespace texmesh

@@ -5,6 +5,7 @@
 #include "format/base/errors.h"
 #include "stages/fragment_codec/codec_list.h"
 #include "stages/fragment_codec/rebuilt_z.h"
+#include "stages/image/webp.h"
 #include "stages/jpeg/jpeg.h"
 
 namespace texmesh {
@@ -45,7 +46,7 @@ std::unique_ptr<TextureCodec> make_texture_codec(Codec codec, const PlaneCoding&
 }
 
 Pixels decode_fragment_file(Codec codec, std::span<const std::uint8_t> file, std::uint64_t max_pixels) {
-  if (codec == Codec::kWebp) return decode_webp(file, max_pixels);
+  if (codec == Codec::kWebp) return decode_lossy_webp(file, max_pixels);
   Pixels pixels = decode_jpeg(file, max_pixels);
   if (codec == Codec::kJpegXy) rebuild_z(pixels);
   return pixels;

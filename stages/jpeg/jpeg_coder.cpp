@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdlib>
 #include <cstring>
 #include <string>
@@ -116,18 +117,33 @@ std::vector<std::uint8_t> ac_symbols(std::span<const unsigned> most_bits) {
   return symbols;
 }
 
-}  // namespace
+std::uint16_t step_of(double step, double quality, double rounding) {
+  const double percent = quality < 50 ? 5000 / quality : 200 - 2 * quality;  // libjpeg's scale
+  return static_cast<std::uint16_t>(std::clamp(std::floor(step * percent / 100 + rounding), 1.0, 255.0));
+}
 
-struct JpegCoder::State {
-  JpegKind kind;
+/// Where a step is rounded up. The same for all of them, many would change at one quality, and the bytes with
+/// them by more than what a search may miss.
+double rounding_of(std::size_t i) {
+  if (i / DCTSIZE + i % DCTSIZE < 2) return 0.5;  // the three that show most
+  const double spread = 0.618 * static_cast<double>(i);
+  return 0.2 + 0.6 * (spread - std::floor(spread));
+}
+
+/// libjpeg's compressor and what it writes. Everything that it owns is freed whatever happens.
+struct Compressor {
   jpeg_compress_struct info{};
   JpegErrors errors;
   GrowingBuffer buffer;
-  std::vector<JSAMPROW> rows;
-  std::vector<jpeg_scan_info> scans;
 
-  explicit State(const JpegKind& k) : kind(k) {}
-  ~State() { jpeg_destroy_compress(&info); }
+  Compressor() {
+    info.err = &errors.base;
+    run([this] { jpeg_create_compress(&info); });
+    info.dest = &buffer.base;
+  }
+  ~Compressor() { jpeg_destroy_compress(&info); }
+  Compressor(const Compressor&) = delete;
+  Compressor& operator=(const Compressor&) = delete;
 
   template <class Body>
   void run(Body&& body) {
@@ -136,6 +152,62 @@ struct JpegCoder::State {
     jpeg_abort_compress(&info);
     throw StageError("jpeg", "", "an image that libjpeg can code", message);
   }
+  std::span<const std::uint8_t> output() const { return {buffer.data, buffer.size}; }
+};
+
+std::uint32_t rounded_up(std::uint32_t count, std::uint32_t step) { return (count + step - 1) / step * step; }
+
+void set_up_file(jpeg_compress_struct& info, const CoefficientFile& file) {
+  info.image_width = file.width_px;
+  info.image_height = file.height_px;
+  info.input_components = static_cast<int>(file.parts.size());
+  info.in_color_space = file.parts.size() == 1 ? JCS_GRAYSCALE : file.rgb ? JCS_RGB : JCS_YCbCr;
+  jpeg_set_defaults(&info);
+  jpeg_set_colorspace(&info, info.in_color_space);
+  for (std::size_t c = 0; c < file.parts.size(); ++c) {
+    jpeg_component_info& to = info.comp_info[c];
+    to.h_samp_factor = static_cast<int>(file.parts[c].across);
+    to.v_samp_factor = static_cast<int>(file.parts[c].down);
+    to.quant_tbl_no = static_cast<int>(c);
+    if (!info.quant_tbl_ptrs[c])
+      info.quant_tbl_ptrs[c] = jpeg_alloc_quant_table(reinterpret_cast<j_common_ptr>(&info));
+    for (std::size_t k = 0; k < DCTSIZE2; ++k) info.quant_tbl_ptrs[c]->quantval[k] = file.parts[c].steps[k];
+  }
+  info.optimize_coding = TRUE;
+  jpeg_simple_progression(&info);
+}
+
+/// Between them the arrays are allocated, and nothing is coded yet: libjpeg codes when it finishes.
+void write_blocks(jpeg_compress_struct& info, const CoefficientFile& file) {
+  auto* common = reinterpret_cast<j_common_ptr>(&info);
+  jvirt_barray_ptr arrays[3];
+  for (std::size_t c = 0; c < file.parts.size(); ++c) {
+    const CoefficientFile::Part& part = file.parts[c];
+    arrays[c] =
+        info.mem->request_virt_barray(common, JPOOL_IMAGE, TRUE, rounded_up(part.blocks_across, part.across),
+                                      rounded_up(part.blocks_down, part.down), part.down);
+  }
+  jpeg_write_coefficients(&info, arrays);
+  for (std::size_t c = 0; c < file.parts.size(); ++c) {
+    const CoefficientFile::Part& part = file.parts[c];
+    for (std::uint32_t row = 0; row < part.blocks_down; ++row) {
+      JBLOCKROW to = *info.mem->access_virt_barray(common, arrays[c], row, 1, TRUE);
+      const std::int16_t* from = part.blocks + std::size_t{64} * row * part.blocks_across;
+      std::copy_n(from, std::size_t{64} * part.blocks_across, &to[0][0]);
+    }
+  }
+  jpeg_finish_compress(&info);
+}
+
+}  // namespace
+
+struct JpegCoder::State : Compressor {
+  JpegKind kind;
+  std::vector<JSAMPROW> rows;
+  std::vector<jpeg_scan_info> scans;
+
+  explicit State(const JpegKind& k) : kind(k) {}
+
   void set_image(const PixelWindow& image) {
     info.image_width = image.width_px;
     info.image_height = image.height_px;
@@ -160,7 +232,6 @@ struct JpegCoder::State {
       write(FALSE);
     });
   }
-  std::span<const std::uint8_t> output() const { return {buffer.data, buffer.size}; }
   /// Bytes of SOI SOF [SOS] in front of an abbreviated stream's own part. A progressive stream has its tables
   /// in front of each SOS, so there the frame header is all.
   std::size_t frame_head_bytes() const {
@@ -181,24 +252,35 @@ struct JpegCoder::State {
     info.in_color_space = kind.channels == 1 ? JCS_GRAYSCALE : JCS_RGB;
     jpeg_set_defaults(&info);
     if (kind.channels == 3 && kind.rgb) jpeg_set_colorspace(&info, JCS_RGB);
-    jpeg_set_quality(&info, kind.quality, TRUE);
+    set_steps();
     info.dct_method = JDCT_ISLOW;
     if (kind.channels == 1) {  // jpeg_write_tables() writes every table there is
       info.quant_tbl_ptrs[1] = nullptr;
       info.dc_huff_tbl_ptrs[1] = info.ac_huff_tbl_ptrs[1] = nullptr;
     } else if (kind.rgb) {
-      use_second_tables_for_last();
+      if (!kind.file) use_second_tables_for_last();
     } else {
       const int factor = kind.subsampling == Subsampling::k420 ? 2 : 1;
       info.comp_info[0].h_samp_factor = info.comp_info[0].v_samp_factor = factor;
     }
-    if (kind.progressive) {
+    if (kind.file) {
+      jpeg_simple_progression(&info);
+    } else if (kind.progressive) {
       info.scan_info = scans.data();
       info.num_scans = static_cast<int>(scans.size());
     }
   }
 
  private:
+  void set_steps() {
+    if (!kind.file) return jpeg_set_quality(&info, kind.quality, TRUE);
+    const double quality = std::clamp(kind.file->quality, 1.0, 100.0);
+    jpeg_set_linear_quality(&info, 100, TRUE);
+    for (JQUANT_TBL* table : info.quant_tbl_ptrs)
+      for (std::size_t i = 0; table && i < DCTSIZE2; ++i)
+        table->quantval[i] =
+            kind.file->of_textures ? texture_step(i, quality) : step_of(table->quantval[i], quality, 0.5);
+  }
   /// Three channels of data are three different things, but there are two pairs of Huffman tables: the last
   /// channel (z of a normal, metalness) differs most from the others. All are quantised like luma, or the
   /// last one more coarsely.
@@ -215,17 +297,25 @@ struct JpegCoder::State {
   }
 };
 
+std::uint16_t texture_step(std::size_t i, double quality) {
+  const std::size_t row = i / DCTSIZE, column = i % DCTSIZE;
+  return step_of(4 * (1 + static_cast<double>(row * row + column * column)), quality, rounding_of(i));
+}
+
+std::vector<std::uint8_t> jpeg_of_coefficients(const CoefficientFile& file) {
+  Compressor coder;
+  coder.run([&] {
+    set_up_file(coder.info, file);
+    write_blocks(coder.info, file);
+  });
+  return {coder.output().begin(), coder.output().end()};
+}
+
 JpegCoder::JpegCoder(const JpegKind& kind) : state_(new State(kind)) {
   if (kind.channels != 1 && kind.channels != 3)
     throw StageError("jpeg", "channels", "1 or 3", std::to_string(kind.channels));
   if (kind.progressive) state_->scans = progressive_scans(static_cast<int>(kind.channels));
-  jpeg_compress_struct& info = state_->info;
-  info.err = &state_->errors.base;
-  state_->run([&] {
-    jpeg_create_compress(&info);
-    info.dest = &state_->buffer.base;
-    state_->set_up();
-  });
+  state_->run([&] { state_->set_up(); });
 }
 
 JpegCoder::~JpegCoder() = default;

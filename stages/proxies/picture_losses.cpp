@@ -6,7 +6,7 @@
 
 #include "format/base/box.h"
 #include "stages/geometry/scale_frames.h"
-#include "stages/proxies/coding/webp_picture.h"
+#include "stages/image/webp.h"
 
 namespace texmesh::proxies {
 namespace {
@@ -16,7 +16,7 @@ constexpr int kViews = 4;
 constexpr int kLargeStep = 2;
 
 RenderTexture decoded(const ProxyImage& image, bool srgb, const RunContext& context) {
-  return render_texture(decode_webp_picture(image.file), srgb, 0, context);
+  return render_texture(decode_webp_rgba(image.file), srgb, 0, context);
 }
 
 RenderMaterial proxy_material(const MaterialGroup& group, const ProxyPictures& pictures) {

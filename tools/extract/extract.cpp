@@ -9,7 +9,6 @@
 #include "format/rules/viewing.h"
 #include "pipeline/about/gltf_about.h"
 #include "tools/extract/budget/budget_search.h"
-#include "tools/extract/glb/joined_jpeg.h"
 #include "tools/extract/glb/plain_file.h"
 #include "tools/extract/glb/scale_file.h"
 #include "tools/extract/glb/scale_model.h"
@@ -96,7 +95,7 @@ FileImageData coefficient_file(PackageReader& package, const ExtractRequest& req
   const std::uint32_t plane = image.plane;
   const std::size_t rung =
       std::min<std::size_t>(request.rung, package.tables().planes.at(plane).rung_count() - 1);
-  JoinedJpeg joined(package, plane, rung, context);
+  JoinedJpeg joined = joined_plane(package, plane, rung, context);
   joined.fill_unseen(shown.of(image));
   row.width_px = joined.width_px();
   row.height_px = joined.height_px();

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "format/container/layout.h"
-#include "tools/extract/glb/resize.h"
+#include "stages/image/resize.h"
 #include "tools/extract/glb/scale_file.h"
 #include "tools/extract/glb/scale_model.h"
 #include "tools/extract/glb/texture_source.h"

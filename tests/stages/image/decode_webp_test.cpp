@@ -1,4 +1,4 @@
-#include "stages/image/decode_webp.h"
+#include "stages/image/webp.h"
 
 #include <gtest/gtest.h>
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "stages/base/run_context.h"
-#include "stages/image/halve_pixels.h"
+#include "stages/image/resize.h"
 #include "stages/ladder/choose_rungs.h"
 #include "stages/ladder/ladder.h"
 #include "stages/previews/previews.h"
@@ -48,7 +48,7 @@ inline Chain make_chain(bool noise, bool with_mip = true) {
   out.pixels.push_back(shades(512, 384, noise));
   out.fragments.planes.push_back(plane_of(out.pixels[0]));
   if (!with_mip) return out;
-  out.pixels.push_back(halved(out.pixels[0], 512, 384, Halving::kLight));
+  out.pixels.push_back(halved(out.pixels[0], 512, 384, Averaging::kLight));
   out.fragments.planes.push_back(plane_of(out.pixels[1]));
   out.fragments.planes[1].mip = 1;
   return out;

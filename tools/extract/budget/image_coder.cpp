@@ -31,7 +31,7 @@ std::optional<double> ImageCoder::stored_bytes(std::size_t image) const {
   const PackageImage& from = source_.image(image);
   const ExtractImages wanted = source_.request.images;
   const TextureInfo& info = source_.package.textures().at(from.plane);
-  if (from.alpha_plane || !holds_source(info) ||
+  if (from.alpha_plane || !info.source_rung ||
       (wanted != ExtractImages::kAuto && wanted != ExtractImages::kJpeg))
     return std::nullopt;
   return static_cast<double>(info.rungs.back().bytes);
@@ -42,7 +42,7 @@ void ImageCoder::load_stored(std::size_t image) {
   const PackageImage& from = source_.image(image);
   const std::size_t last = source_.package.textures().at(from.plane).rungs.size() - 1;
   JoinedJpeg& joined =
-      stored_.emplace(image, JoinedJpeg(source_.package, from.plane, last, source_.context)).first->second;
+      stored_.emplace(image, joined_plane(source_.package, from.plane, last, source_.context)).first->second;
   joined.fill_unseen(shown_texels(source_, image, joined.width_px(), joined.height_px()));
 }
 

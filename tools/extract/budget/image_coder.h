@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "stages/jpeg/joined_jpeg.h"
 #include "tools/extract/budget/budget_source.h"
-#include "tools/extract/glb/joined_jpeg.h"
 
 namespace texmesh {
 

@@ -8,7 +8,8 @@
 #include "delivery/cpp/package/package_reader.h"
 #include "format/model/model.h"
 #include "stages/base/run_context.h"
-#include "tools/extract/glb/resize.h"
+#include "stages/jpeg/joined_jpeg.h"
+#include "stages/image/resize.h"
 
 namespace texmesh {
 
@@ -61,6 +62,10 @@ class TextureSource {
   std::map<std::uint32_t, std::vector<std::uint8_t>> shown_;  // by plane
   std::map<std::uint32_t, std::vector<Pixels>> planes_;       // by plane: halves, halves of them ..
 };
+
+/// One rung of a plane of codec jpeg as one image. FormatError for another codec, and as JoinedJpeg.
+JoinedJpeg joined_plane(PackageReader& package, std::uint32_t plane, std::size_t rung,
+                        const RunContext& context);
 
 /// Colours and alpha as one image of 4 channels; both of one size.
 Pixels with_alpha(const Pixels& colours, const Pixels& alpha);

@@ -1,87 +1,19 @@
-#include "tools/extract/glb/joined_jpeg.h"
+#include "stages/jpeg/joined_jpeg.h"
 
 #include <algorithm>
-#include <string>
+#include <cstdlib>
 #include <utility>
 
-#include "delivery/cpp/package/plane_streams.h"
 #include "format/base/errors.h"
 #include "stages/base/parallel.h"
-#include "stages/data/coverage.h"
 #include "stages/image/decode_jpeg.h"
-#include "tools/extract/glb/jpeg_writer.h"
+#include "stages/jpeg/jpeg_coder.h"
 
 namespace texmesh {
 namespace {
 
 std::uint32_t divided_up(std::uint64_t a, std::uint64_t b) {
   return static_cast<std::uint32_t>((a + b - 1) / b);
-}
-
-/// What a JPEG of coefficients is made of; refers to everything.
-struct CoefficientFile {
-  std::uint32_t width_px, height_px;
-  J_COLOR_SPACE colours;
-  struct Part {
-    std::uint32_t across, down, blocks_across, blocks_down;
-    std::array<std::uint16_t, 64> steps;
-    const std::int16_t* blocks;  // 64 each, row by row
-  };
-  std::array<Part, 3> parts;
-  std::size_t count = 0;
-};
-
-void set_up(jpeg_compress_struct& info, const CoefficientFile& file) {
-  info.image_width = file.width_px;
-  info.image_height = file.height_px;
-  info.input_components = static_cast<int>(file.count);
-  info.in_color_space = file.colours;
-  jpeg_set_defaults(&info);
-  jpeg_set_colorspace(&info, file.colours);
-  for (std::size_t c = 0; c < file.count; ++c) {
-    jpeg_component_info& to = info.comp_info[c];
-    to.h_samp_factor = static_cast<int>(file.parts[c].across);
-    to.v_samp_factor = static_cast<int>(file.parts[c].down);
-    to.quant_tbl_no = static_cast<int>(c);
-    if (!info.quant_tbl_ptrs[c])
-      info.quant_tbl_ptrs[c] = jpeg_alloc_quant_table(reinterpret_cast<j_common_ptr>(&info));
-    for (std::size_t k = 0; k < DCTSIZE2; ++k) info.quant_tbl_ptrs[c]->quantval[k] = file.parts[c].steps[k];
-  }
-  info.optimize_coding = TRUE;
-  jpeg_simple_progression(&info);
-}
-
-/// Between them the arrays are allocated, and nothing is coded yet: libjpeg codes when it finishes.
-void write_blocks(jpeg_compress_struct& info, const CoefficientFile& file) {
-  auto* common = reinterpret_cast<j_common_ptr>(&info);
-  jvirt_barray_ptr arrays[3];
-  for (std::size_t c = 0; c < file.count; ++c) {
-    const CoefficientFile::Part& part = file.parts[c];
-    arrays[c] = info.mem->request_virt_barray(common, JPOOL_IMAGE, TRUE,
-                                              divided_up(part.blocks_across, part.across) * part.across,
-                                              divided_up(part.blocks_down, part.down) * part.down, part.down);
-  }
-  jpeg_write_coefficients(&info, arrays);
-  for (std::size_t c = 0; c < file.count; ++c) {
-    const CoefficientFile::Part& part = file.parts[c];
-    for (std::uint32_t row = 0; row < part.blocks_down; ++row) {
-      JBLOCKROW to = *info.mem->access_virt_barray(common, arrays[c], row, 1, TRUE);
-      const std::int16_t* from = part.blocks + std::size_t{64} * row * part.blocks_across;
-      std::copy_n(from, std::size_t{64} * part.blocks_across, &to[0][0]);
-    }
-  }
-  jpeg_finish_compress(&info);
-}
-
-std::vector<std::uint8_t> coded_coefficients(const CoefficientFile& file) {
-  JpegWriter writer;
-  const bool ok = jpeg_guarded(writer.errors, [&] {
-    jpeg_mem_dest(&writer.info, &writer.data, &writer.size);
-    set_up(writer.info, file);
-    write_blocks(writer.info, file);
-  });
-  if (!ok) throw StageError("extract", "image", "coefficients that a JPEG can hold", writer.errors.message);
-  return writer.file();
 }
 
 struct TexelRange {
@@ -105,57 +37,36 @@ std::int16_t requantised(std::int16_t value, std::uint16_t from, std::uint16_t t
   return static_cast<std::int16_t>(value < 0 ? -rounded : rounded);
 }
 
+[[noreturn]] void fail_fragment(const JpegFragments& fragments, std::size_t fragment, std::string expected) {
+  throw FormatError(fragments.entry, "fragment " + std::to_string(fragment), std::move(expected), "another");
+}
+
+JpegCoefficients coefficients_of(const JpegFragments& fragments, std::size_t fragment) {
+  try {
+    return JpegCoefficients(fragments.entry, fragments.file(fragment));
+  } catch (const InputError& e) {  // of no model, but of the package
+    throw FormatError(fragments.entry, "fragment " + std::to_string(fragment) + ", " + e.place(),
+                      e.expected(), e.found());
+  }
+}
+
 }  // namespace
 
-bool holds_source(const TextureInfo& info) { return info.source_rung; }
-
-/// The fragments' files of one rung.
-class JoinedJpeg::Fragments {
- public:
-  Fragments(PackageReader& package, std::uint32_t plane, std::size_t rung)
-      : info_(package.textures().at(plane)),
-        path_(info_.rungs.at(rung).path),
-        streams_(info_.codec, package.tables().planes.at(plane), package.entry(info_.tables)) {
-    if (info_.codec != Codec::kJpeg) throw FormatError(path_, "", "a plane of codec jpeg", "another");
-    streams_.add_pack(rung, package.entry(info_.rungs[rung]));
-  }
-  const TextureInfo& info() const { return info_; }
-  bool has(std::size_t fragment) const { return !streams_.stream(fragment).empty(); }
-  JpegCoefficients at(std::size_t fragment) const {
-    try {
-      return JpegCoefficients(path_, streams_.file(fragment));
-    } catch (const InputError& e) {  // of no model, but of the package
-      throw FormatError(path_, "fragment " + std::to_string(fragment) + ", " + e.place(), e.expected(),
-                        e.found());
-    }
-  }
-  [[noreturn]] void fail(std::size_t fragment, std::string expected) const {
-    throw FormatError(path_, "fragment " + std::to_string(fragment), std::move(expected), "another");
-  }
-
- private:
-  const TextureInfo& info_;
-  const std::string& path_;
-  PlaneStreams streams_;
-};
-
-JoinedJpeg::JoinedJpeg(PackageReader& package, std::uint32_t plane, std::size_t rung,
-                       const RunContext& context) {
-  const Fragments fragments(package, plane, rung);
-  const TextureInfo& info = fragments.info();
-  width_px_ = info.width_px, height_px_ = info.height_px;
-  fragment_width_px_ = info.fragment_width_px, fragment_height_px_ = info.fragment_height_px;
-  columns_ = info.columns;
-  std::vector<std::uint8_t> stored(package.tables().planes.at(plane).fragment_count());
+JoinedJpeg::JoinedJpeg(const JpegFragments& from, const RunContext& context)
+    : width_px_(from.width_px),
+      height_px_(from.height_px),
+      fragment_width_px_(from.fragment_width_px),
+      fragment_height_px_(from.fragment_height_px),
+      columns_(from.columns) {
   std::vector<std::size_t> parts;
-  for (std::size_t f = 0; f < stored.size(); ++f)
-    if ((stored[f] = fragments.has(f))) parts.push_back(f);
-  if (parts.empty()) throw FormatError(info.rungs[rung].path, "", "a stored fragment", "none");
-  set_components(fragments, parts.front());
+  for (std::size_t f = 0; f < from.stored.size(); ++f)
+    if (from.stored[f]) parts.push_back(f);
+  if (parts.empty()) throw FormatError(from.entry, "", "a stored fragment", "none");
+  set_components(from, parts.front());
   parallel_for(context, parts.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) put_fragment(fragments, parts[i]);
+    for (std::size_t i = begin; i < end; ++i) put_fragment(from, parts[i]);
   });
-  fill_gaps(stored);
+  fill_gaps(from.stored);
 }
 
 std::array<std::uint32_t, 2> JoinedJpeg::mcu_px() const {
@@ -164,10 +75,10 @@ std::array<std::uint32_t, 2> JoinedJpeg::mcu_px() const {
   return out;
 }
 
-void JoinedJpeg::set_components(const Fragments& fragments, std::size_t first) {
-  const JpegCoefficients one = fragments.at(first);
-  if (!one.is_plain() || one.components().size() != fragments.info().channels)
-    fragments.fail(first, "a grey, YCbCr or RGB JPEG with the plane's channels");
+void JoinedJpeg::set_components(const JpegFragments& fragments, std::size_t first) {
+  const JpegCoefficients one = coefficients_of(fragments, first);
+  if (!one.is_plain() || one.components().size() != fragments.channels)
+    fail_fragment(fragments, first, "a grey, YCbCr or RGB JPEG with the plane's channels");
   rgb_ = one.is_rgb();
   for (const JpegCoefficients::Component& from : one.components()) {
     Component& to = components_.emplace_back();
@@ -178,7 +89,7 @@ void JoinedJpeg::set_components(const Fragments& fragments, std::size_t first) {
   }
   const auto [mcu_width, mcu_height] = mcu_px();
   if (fragment_width_px_ % mcu_width != 0 || fragment_height_px_ % mcu_height != 0)
-    fragments.fail(first, "sides of whole MCUs");
+    fail_fragment(fragments, first, "sides of whole MCUs");
   for (Component& c : components_) {
     c.blocks_across = divided_up(std::uint64_t{width_px_} * c.across, mcu_width);
     c.blocks_down = divided_up(std::uint64_t{height_px_} * c.down, mcu_height);
@@ -186,18 +97,18 @@ void JoinedJpeg::set_components(const Fragments& fragments, std::size_t first) {
   }
 }
 
-void JoinedJpeg::put_fragment(const Fragments& fragments, std::size_t fragment) {
-  const JpegCoefficients from = fragments.at(fragment);
+void JoinedJpeg::put_fragment(const JpegFragments& fragments, std::size_t fragment) {
+  const JpegCoefficients from = coefficients_of(fragments, fragment);
   if (from.width_px() != fragment_width_px_ || from.height_px() != fragment_height_px_ ||
       from.components().size() != components_.size() || from.is_rgb() != rgb_)
-    fragments.fail(fragment, "a fragment like the first one");
+    fail_fragment(fragments, fragment, "a fragment like the first one");
   const auto [mcu_width, mcu_height] = mcu_px();
   const auto column = static_cast<std::uint32_t>(fragment % columns_),
              row = static_cast<std::uint32_t>(fragment / columns_);
   for (std::size_t c = 0; c < components_.size(); ++c) {
     Component& to = components_[c];
     if (from.components()[c].quantisers != to.quantisers)
-      fragments.fail(fragment, "the first one's quantisers");
+      fail_fragment(fragments, fragment, "the first one's quantisers");
     const std::uint32_t across = fragment_width_px_ / mcu_width * to.across,
                         down = fragment_height_px_ / mcu_height * to.down;
     for (std::uint32_t y = 0; y < down && row * down + y < to.blocks_down; ++y)
@@ -299,19 +210,13 @@ void JoinedJpeg::flatten(const CoverageMask& mask) {
 }
 
 std::vector<std::uint8_t> JoinedJpeg::file(double quality) const {
-  CoefficientFile out{width_px_,
-                      height_px_,
-                      components_.size() == 1 ? JCS_GRAYSCALE
-                      : rgb_                  ? JCS_RGB
-                                              : JCS_YCbCr,
-                      {},
-                      components_.size()};
+  CoefficientFile out{width_px_, height_px_, rgb_, {}};
   std::vector<std::vector<Block>> coarser(components_.size());
   for (std::size_t c = 0; c < components_.size(); ++c) {
     const Component& from = components_[c];
-    CoefficientFile::Part& part = out.parts[c];
-    part = {from.across,      from.down,       from.blocks_across,
-            from.blocks_down, from.quantisers, from.blocks[0].data()};
+    out.parts.push_back({from.across, from.down, from.blocks_across, from.blocks_down, from.quantisers,
+                         from.blocks[0].data()});
+    CoefficientFile::Part& part = out.parts.back();
     for (std::size_t k = 0; k < 64; ++k)
       part.steps[k] = std::max(part.steps[k], texture_step(k, std::clamp(quality, 1.0, 100.0)));
     if (part.steps == from.quantisers) continue;
@@ -322,7 +227,7 @@ std::vector<std::uint8_t> JoinedJpeg::file(double quality) const {
           block[k] = requantised(block[k], from.quantisers[k], part.steps[k]);
     part.blocks = coarser[c][0].data();
   }
-  return coded_coefficients(out);
+  return jpeg_of_coefficients(out);
 }
 
 }  // namespace texmesh

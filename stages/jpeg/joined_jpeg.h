@@ -1,26 +1,35 @@
 #pragma once
+// JPEGs of fragments put together to one of the whole image, coefficient by coefficient.
 #include <array>
 #include <cstdint>
+#include <functional>
+#include <string>
 #include <vector>
 
-#include "delivery/cpp/package/package_reader.h"
+#include "format/base/bytes.h"
 #include "stages/base/run_context.h"
 #include "stages/data/coverage.h"
 
 namespace texmesh {
 
-/// Whether the last rung of a plane holds the quantised coefficients of the plane's source image, a JPEG.
-bool holds_source(const TextureInfo& info);
+/// The fragments of an image, row by row, each a JPEG of their sides.
+struct JpegFragments {
+  std::string entry;                          // for messages
+  std::uint32_t width_px = 0, height_px = 0;  // of the image
+  std::uint32_t fragment_width_px = 0, fragment_height_px = 0, columns = 0;
+  std::uint32_t channels = 0;
+  std::vector<std::uint8_t> stored;                 // by fragment: 1 = it has a file
+  std::function<Bytes(std::size_t fragment)> file;  // may be called by several threads
+};
 
-/// The quantised coefficients of one rung of a plane of codec jpeg, the fragments side by side: an image of
-/// the plane's size with the components, sampling and quantisers of the fragments. Two bytes for every
-/// sample.
+/// The quantised coefficients of all fragments side by side: an image with the components, sampling and
+/// quantisers of the fragments. Two bytes for every sample.
 class JoinedJpeg {
  public:
   /// A block of a fragment that is not stored has no AC coefficients and the mean of the block to the left of
   /// it, or above it. FormatError for fragments that are no such parts of one image. Same for any number of
   /// threads.
-  JoinedJpeg(PackageReader& package, std::uint32_t plane, std::size_t rung, const RunContext& context);
+  JoinedJpeg(const JpegFragments& fragments, const RunContext& context);
 
   std::uint32_t width_px() const { return width_px_; }
   std::uint32_t height_px() const { return height_px_; }
@@ -34,7 +43,7 @@ class JoinedJpeg {
   void fill_unseen(const std::vector<std::uint8_t>& coverage);
 
   /// A progressive JPEG with Huffman tables of its own. At quality 100 the coefficients are those of the
-  /// package, but for what fill_unseen() has changed; below (1..100) steps are at least those of
+  /// fragments, but for what fill_unseen() has changed; below (1..100) steps are at least those of
   /// texture_step(), and coefficients are rounded to them. Same bytes for the same input.
   std::vector<std::uint8_t> file(double quality = 100) const;
 
@@ -46,9 +55,8 @@ class JoinedJpeg {
     std::array<std::uint16_t, 64> quantisers{};        // row by row
     std::vector<Block> blocks;
   };
-  class Fragments;
-  void set_components(const Fragments& fragments, std::size_t first);
-  void put_fragment(const Fragments& fragments, std::size_t fragment);
+  void set_components(const JpegFragments& fragments, std::size_t first);
+  void put_fragment(const JpegFragments& fragments, std::size_t fragment);
   void fill_gaps(const std::vector<std::uint8_t>& stored);
   std::vector<std::uint8_t> known_blocks(const Component& component, const CoverageMask& mask) const;
   static void continue_means(Component& component, std::vector<std::uint8_t> known);
