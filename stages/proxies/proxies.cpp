@@ -7,7 +7,6 @@
 #include "format/base/box.h"
 #include "format/base/portable_math.h"
 #include "stages/geometry/scale_frames.h"
-#include "stages/geometry/stand_in_scale.h"
 #include "stages/proxies/make_proxy.h"
 
 namespace texmesh::proxies {

@@ -4,7 +4,6 @@
 
 #include "format/base/no_index.h"
 #include "stages/base/run_context.h"
-#include "stages/simplification/collapse_components.h"
 #include "stages/simplification/collapse_cost.h"
 #include "stages/simplification/collapse_mesh.h"
 #include "stages/simplification/collapse_queue.h"

@@ -8,7 +8,7 @@
 #include "format/base/no_index.h"
 #include "format/base/portable_math.h"
 #include "stages/base/parallel.h"
-#include "stages/ssf/heat_levels.h"
+#include "stages/ssf/heat_kernel.h"
 
 namespace texmesh {
 namespace {

@@ -8,7 +8,6 @@
 #include <limits>
 
 #include "format/base/box.h"
-#include "stages/geometry/tetrahedron.h"
 #include "stages/geometry/triangle_tree.h"
 #include "tests/support/meshes.h"
 

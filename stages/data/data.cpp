@@ -1,8 +1,24 @@
-#include "stages/data/nested_scales.h"
+// What the artefacts of stages say of themselves.
+#include <algorithm>
 
 #include "format/base/no_index.h"
+#include "stages/data/ladder.h"
+#include "stages/data/nested_scales.h"
+#include "stages/data/uv_sets.h"
 
 namespace texmesh {
+
+std::span<const std::uint8_t> fragment_stream(const LadderRung& rung, std::size_t fragment) {
+  return std::span(rung.data).subspan(rung.offset[fragment],
+                                      rung.offset[fragment + 1] - rung.offset[fragment]);
+}
+
+std::uint64_t bytes_to_show(const PlaneLadder& plane, std::size_t rung, std::size_t fragment) {
+  std::uint64_t bytes = 0;
+  for (std::size_t r = codec_traits(plane.codec).incremental ? 0 : rung; r <= rung; ++r)
+    bytes += fragment_stream(plane.rungs[r], fragment).size();
+  return bytes;
+}
 
 Mesh extract_scale(const NestedScales& scales, const NestedScale& scale) {
   const Mesh& in = scales.mesh;
@@ -35,6 +51,24 @@ Mesh extract_scale(const NestedScales& scales, const NestedScale& scale) {
     out.triangle_part.push_back(in.triangle_part[scale.triangle_source[i]]);
   }
   return out;
+}
+
+std::vector<UvSets> uv_sets_of(const std::vector<Material>& materials) {
+  std::vector<UvSets> sets;
+  for (const Material& m : materials) {
+    UvSets s;
+    bool first = true;
+    for_each_texture(m, [&](const TextureRef& t) {  // the base colour comes first
+      if (!t.used()) return;
+      const std::uint8_t set = t.texcoord == 1 ? 1 : 0;
+      if (first) s.guide = set;
+      if (set != s.guide) s.both = 1;
+      first = false;
+    });
+    sets.push_back(s);
+  }
+  if (std::all_of(sets.begin(), sets.end(), [](const UvSets& s) { return s == UvSets{}; })) sets.clear();
+  return sets;
 }
 
 }  // namespace texmesh
