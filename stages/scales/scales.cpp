@@ -175,7 +175,6 @@ ScaleFile write_scale(const ScaleCoding& coding, const NestedScale& scale,
   ScaleFile file;
   file.scale = scale.scale;
   GlbWriter writer;
-  std::size_t fallback_bytes = 0;
   int open_part = -1;
   std::vector<ScalePrimitive> primitives = split_primitives(coding.mesh, scale, coding.position);
   const std::vector<std::string> merged_names = name_merged_parts(coding.mesh, primitives);
@@ -186,7 +185,7 @@ ScaleFile write_scale(const ScaleCoding& coding, const NestedScale& scale,
     const std::uint16_t part = primitive.part, material = primitive.material;
     CodedPrimitive coded = coding.options.mesh_codec == MeshCodec::kDraco
                                ? code_draco(writer, coding, primitive)
-                               : code_plain(writer, coding, std::move(primitive), fallback_bytes);
+                               : code_plain(writer, coding, std::move(primitive));
     coded.json["material"] = material;
     file.triangles += coded.triangles;
     file.vertices += coded.vertices;
@@ -207,7 +206,6 @@ ScaleFile write_scale(const ScaleCoding& coding, const NestedScale& scale,
   if (file.triangles == 0)
     throw StageError("scales", "scale " + std::to_string(scale.scale), "a triangle with area on the grid",
                      std::to_string(coding.position.bits) + " bits per coordinate collapse all");
-  writer.set_fallback_buffer(fallback_bytes);
   write_materials(writer, materials, previews, form, coding.write_uv[0], coding.write_uv[1]);
   file.glb = writer.finish();
   return file;

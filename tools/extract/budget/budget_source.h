@@ -3,8 +3,8 @@
 #include <memory>
 #include <vector>
 
+#include "stages/gltf/draco_mesh.h"
 #include "tools/extract/budget/lit_meter.h"
-#include "tools/extract/glb/draco_recode.h"
 #include "tools/extract/glb/extracted.h"
 #include "tools/extract/glb/scale_model.h"
 #include "tools/extract/glb/texture_source.h"

@@ -6,7 +6,7 @@
 #include "format/container/layout.h"
 #include "format/split/split_model.h"
 #include "format/split/split_reader.h"
-#include "tools/extract/glb/fit_normals.h"
+#include "stages/geometry/fit_normals.h"
 
 namespace texmesh {
 namespace {

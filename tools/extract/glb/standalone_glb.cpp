@@ -65,10 +65,6 @@ Json* draco_of(Json& primitive) {
   return &primitive["extensions"][kDraco];
 }
 
-Json vector_json(Vec3f v) {
-  return Json::array({GlbWriter::shortest(v.x), GlbWriter::shortest(v.y), GlbWriter::shortest(v.z)});
-}
-
 void require_valid(std::span<const std::uint8_t> glb, const std::string& entry, GlbRules rules) {
   Findings findings;
   check_glb(glb, entry, findings, rules);
@@ -239,7 +235,7 @@ void StandaloneGlb::recode(const DracoSteps& steps, const NormalSamples* lit_as,
     for (const auto& [name, accessor] : primitive["attributes"].items()) {
       Json& a = document_->root["accessors"].at(accessor.get<std::size_t>());
       a["count"] = s.vertices;
-      if (name == "POSITION") a["min"] = vector_json(s.low), a["max"] = vector_json(s.high);
+      if (name == "POSITION") a["min"] = GlbWriter::shortest(s.low), a["max"] = GlbWriter::shortest(s.high);
     }
     Json& indices = document_->root["accessors"].at(number(primitive, "indices"));
     indices["count"] = std::size_t{s.triangles} * 3;

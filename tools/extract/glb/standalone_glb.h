@@ -8,8 +8,8 @@
 
 #include "format/documents/about.h"
 #include "stages/gltf/check_glb.h"
+#include "stages/gltf/draco_mesh.h"
 #include "stages/scales/scales.h"
-#include "tools/extract/glb/draco_recode.h"
 #include "tools/extract/glb/image_codecs.h"
 
 namespace texmesh {

@@ -9,7 +9,7 @@
 #include "tests/support/packages.h"
 #include "tools/extract/budget/mesh_candidates.h"
 #include "tools/extract/budget/quality_search.h"
-#include "tools/extract/glb/fit_normals.h"
+#include "stages/geometry/fit_normals.h"
 #include "tools/extract/glb/standalone_glb.h"
 
 namespace texmesh {

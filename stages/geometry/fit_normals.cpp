@@ -1,4 +1,4 @@
-#include "tools/extract/glb/fit_normals.h"
+#include "stages/geometry/fit_normals.h"
 
 #include <algorithm>
 #include <cmath>
