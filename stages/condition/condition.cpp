@@ -1,19 +1,12 @@
 #include "stages/condition/condition.h"
 
-#include <algorithm>
 #include <cassert>
 #include <cmath>
-#include <cstdint>
 #include <numeric>
-#include <span>
-#include <string>
 #include <tuple>
 #include <utility>
-#include <vector>
 
 #include "format/base/box.h"
-#include "format/base/no_index.h"
-#include "format/model/model.h"
 #include "stages/base/run_context.h"
 #include "stages/geometry/mesh_topology.h"
 #include "stages/geometry/weld.h"

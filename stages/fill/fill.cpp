@@ -1,17 +1,11 @@
 #include "stages/fill/fill.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdint>
 #include <cstring>
-#include <string>
-#include <vector>
 
 #include "stages/base/parallel.h"
-#include "stages/base/run_context.h"
 #include "stages/data/coverage.h"
-#include "stages/data/pixels.h"
 #include "stages/image/decode_image.h"
 #include "stages/image/resize.h"
 #include "stages/jpeg/block_transform.h"

@@ -1,8 +1,5 @@
 #include "stages/geometry/scale_frames.h"
 
-#include <algorithm>
-
-#include "format/base/no_index.h"
 #include "stages/base/parallel.h"
 #include "stages/geometry/distance.h"
 #include "stages/geometry/triangle_tree.h"

@@ -1,13 +1,8 @@
 #include "stages/geometry/triangle_tree.h"
 
-#include <algorithm>
 #include <bit>
-#include <cmath>
 #include <cstddef>
-#include <limits>
 #include <numeric>
-
-#include "format/base/box.h"
 
 namespace texmesh {
 namespace {

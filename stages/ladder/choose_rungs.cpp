@@ -2,9 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
-#include <limits>
 #include <map>
 #include <optional>
 #include <utility>
@@ -12,8 +9,6 @@
 #include "stages/base/parallel.h"
 #include "stages/fragment_codec/fragment_codec.h"
 #include "stages/image/jpeg_segments.h"
-#include "stages/ladder/rung_value.h"
-#include "stages/measure/fragment_meter.h"
 #include "stages/measure/scale_samples.h"
 
 namespace texmesh::rungs {

@@ -1,30 +1,19 @@
 #include "stages/ladder/ladder.h"
 
-#include <algorithm>
-#include <cstdint>
 #include <cstdlib>
 #include <numeric>
-#include <span>
-#include <string>
 #include <utility>
-#include <vector>
 
 #include "format/rules/size_curve.h"
-#include "stages/base/run_context.h"
 #include "stages/data/coverage.h"
-#include "stages/data/fragments.h"
-#include "stages/data/ladder.h"
-#include "stages/data/pixels.h"
 #include "stages/fragment_codec/coding_space.h"
 #include "stages/fragment_codec/decode_rung.h"
-#include "stages/fragment_codec/fragment_codec.h"
 #include "stages/fragment_codec/rebuilt_z.h"
 #include "stages/image/check_pixels.h"
 #include "stages/image/decode_image.h"
 #include "stages/jpeg/jpeg_bits.h"
 #include "stages/ladder/choose_rungs.h"
 #include "stages/ladder/encode_rungs.h"
-#include "stages/ladder/source_codec.h"
 
 namespace texmesh {
 namespace {

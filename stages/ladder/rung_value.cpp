@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <limits>
 
 #include "format/base/portable_math.h"
 #include "format/rules/ordinary_loads.h"

@@ -1,21 +1,12 @@
 #include "stages/perceptual_values/perceptual_values.h"
 
-#include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <cstdint>
-#include <functional>
-#include <span>
-#include <string>
-#include <utility>
-#include <vector>
 
-#include "format/base/box.h"
 #include "format/base/errors.h"
 #include "format/base/portable_math.h"
 #include "format/rules/jnd_choice.h"
 #include "stages/base/parallel.h"
-#include "stages/data/nested_scales.h"
 #include "stages/geometry/distance.h"
 
 namespace texmesh {

@@ -4,7 +4,6 @@
 
 #include "stages/jpeg/jpeg.h"
 #include "stages/poster/poster_camera.h"
-#include "stages/render/environment.h"
 #include "stages/render/shade.h"
 #include "stages/render/shown_materials.h"
 

@@ -1,6 +1,5 @@
 #include "stages/proxies/picture_losses.h"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 

@@ -1,7 +1,5 @@
 #include "stages/proxies/proxies.h"
 
-#include <algorithm>
-#include <array>
 #include <string>
 
 #include "format/base/box.h"

@@ -6,7 +6,6 @@
 
 #include "stages/data/stage.h"
 #include "stages/measure/pixel_spans.h"
-#include "stages/render/visibility.h"
 
 namespace texmesh::quality {
 namespace {

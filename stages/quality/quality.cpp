@@ -2,11 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string>
 
 #include "format/documents/manifest.h"
 #include "stages/geometry/scale_frames.h"
-#include "stages/quality/size_cells.h"
 #include "stages/quality/table_fit.h"
 
 namespace texmesh::quality {

@@ -1,10 +1,8 @@
 #include "stages/quality/textures.h"
 
-#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstdlib>
-#include <string>
 
 #include "format/rules/mip_choice.h"
 #include "format/rules/rate_distortion.h"

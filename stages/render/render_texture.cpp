@@ -1,13 +1,10 @@
 #include "stages/render/render_texture.h"
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cmath>
 #include <stdexcept>
 
-#include "format/base/portable_math.h"
-#include "format/base/srgb.h"
 #include "stages/base/parallel.h"
 #include "stages/render/render_math.h"
 

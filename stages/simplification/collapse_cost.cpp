@@ -1,8 +1,5 @@
 #include "stages/simplification/collapse_cost.h"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <numeric>
 
 #include "format/base/box.h"

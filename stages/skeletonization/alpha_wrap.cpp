@@ -6,11 +6,8 @@
 #include <CGAL/Alpha_wrap_3/internal/Alpha_wrap_3.h>
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 
-#include <cmath>
-#include <cstdint>
 #include <limits>
 #include <unordered_map>
-#include <vector>
 
 #include "stages/geometry/triangle_tree.h"
 #include "stages/skeletonization/geometry_failure.h"

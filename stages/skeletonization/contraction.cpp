@@ -5,12 +5,7 @@
 
 #include <CGAL/memory.h>
 
-#include <cstddef>
-#include <cstdint>
-#include <memory>
 #include <type_traits>
-#include <utility>
-#include <vector>
 
 #include "stages/skeletonization/contraction_parts.h"
 #include "stages/skeletonization/geometry_failure.h"

@@ -1,13 +1,9 @@
 #include "stages/skeletonization/local_radius.h"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <limits>
 
 #include "format/base/portable_math.h"
 #include "stages/base/parallel.h"
-#include "stages/geometry/triangle_tree.h"
 
 namespace texmesh {
 namespace {

@@ -3,13 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
-#include <utility>
 
 #include "stages/base/parallel.h"
 #include "stages/skeletonization/curve_skeleton.h"
 #include "stages/skeletonization/geometry_failure.h"
 #include "stages/skeletonization/local_radius.h"
-#include "stages/skeletonization/wrap.h"
 
 namespace texmesh {
 namespace {

@@ -8,8 +8,6 @@
 #include <CGAL/Exact_predicates_exact_constructions_kernel.h>
 #include <CGAL/Triangulation_vertex_base_with_info_3.h>
 
-#include <cstddef>
-#include <cstdint>
 #include <utility>
 
 #include "format/base/no_index.h"

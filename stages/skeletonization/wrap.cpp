@@ -2,10 +2,7 @@
 
 #include <meshoptimizer.h>
 
-#include <algorithm>
-#include <cstdint>
 #include <numeric>
-#include <utility>
 
 #include "format/base/box.h"
 #include "format/base/no_index.h"

@@ -1,6 +1,5 @@
 #include "stages/ssf/ssf.h"
 
-#include <algorithm>
 #include <cmath>
 #include <string>
 #include <utility>

@@ -1,6 +1,5 @@
 #include "stages/ssf/ssf_component.h"
 
-#include <algorithm>
 #include <cmath>
 #include <utility>
 

@@ -1,12 +1,10 @@
 #include "stages/proxies/atlas_mesh.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <numeric>
 #include <utility>
-#include <vector>
 
 #include "format/base/no_index.h"
 #include "stages/proxies/atlas/packing_grid.h"

@@ -2,22 +2,12 @@
 
 #include <Eigen/SparseCholesky>
 
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <complex>
-#include <cstddef>
-#include <cstdint>
 #include <numeric>
-#include <span>
 #include <utility>
-#include <vector>
 
 #include "format/base/no_index.h"
 #include "format/base/portable_math.h"
-#include "format/base/vec.h"
-#include "format/model/model.h"
-#include "stages/base/run_context.h"
 #include "stages/geometry/mesh_topology.h"
 #include "stages/proxies/atlas/flat_chart.h"
 #include "stages/proxies/atlas/pair_queue.h"

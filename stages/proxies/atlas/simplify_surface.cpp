@@ -1,19 +1,8 @@
 #include "stages/proxies/atlas_mesh.h"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <cstddef>
-#include <cstdint>
-#include <span>
 #include <utility>
-#include <vector>
 
 #include "format/base/box.h"
-#include "format/base/no_index.h"
-#include "format/base/vec.h"
-#include "format/model/model.h"
-#include "stages/base/run_context.h"
 #include "stages/geometry/mesh_topology.h"
 #include "stages/geometry/quadric.h"
 #include "stages/geometry/weld.h"
