@@ -220,7 +220,7 @@ struct Level {
 };
 
 /// How the texels that nobody sees are made up.
-struct FillWay {
+struct FillChoice {
   Fill fill;
   PartBlocks part;
 };
@@ -475,14 +475,14 @@ void flatten_where_covered(Pixels& pixels, const std::vector<std::uint8_t>& cove
 /// A full-size plane and its mips. Each size is halved before its blocks are made flat, which would show as
 /// squares in the next one.
 void fill_chain(const std::vector<TexturePlane>& planes, std::size_t base, std::size_t first_mip,
-                Pixels pixels, FillWay way, const RunContext& context, std::vector<Pixels>& out) {
-  if (way.fill == Fill::kPushPull) push_pull(pixels, planes[base].coverage, context);
+                Pixels pixels, FillChoice choice, const RunContext& context, std::vector<Pixels>& out) {
+  if (choice.fill == Fill::kPushPull) push_pull(pixels, planes[base].coverage, context);
   for (std::size_t p = base, next = first_mip;; p = next++) {
     const bool more = next < planes.size() && planes[next].mip > 0 && planes[next].base == base;
     Pixels half = more ? halved(pixels, planes[p].width_px, planes[p].height_px,
                                 averaging_of(planes[next].role, planes[next].channels))
                        : Pixels{};
-    if (way.fill == Fill::kPushPull) flatten_where_covered(pixels, planes[p].coverage, way.part, context);
+    if (choice.fill == Fill::kPushPull) flatten_where_covered(pixels, planes[p].coverage, choice.part, context);
     out[p] = padded(std::move(pixels), planes[p]);
     if (!more) return;
     pixels = std::move(half);
@@ -498,7 +498,7 @@ std::vector<std::size_t> first_mips(const std::vector<TexturePlane>& planes, std
 }
 
 void decode_and_fill(const std::vector<TexturePlane>& planes, std::size_t full,
-                     const std::vector<Image>& images, FillWay way, const RunContext& context,
+                     const std::vector<Image>& images, FillChoice choice, const RunContext& context,
                      std::vector<Pixels>& out) {
   const std::vector<std::size_t> mips = first_mips(planes, full);
   std::vector<std::size_t> starts;  // planes of one image stand together; each image is decoded once
@@ -517,7 +517,7 @@ void decode_and_fill(const std::vector<TexturePlane>& planes, std::size_t full,
         const bool last = p + 1 == full || planes[p + 1].image != planes[p].image;
         Pixels plane = last && decoded.channels == planes[p].channels ? std::move(decoded)
                                                                       : channels_of(decoded, planes[p]);
-        fill_chain(planes, p, mips[p], std::move(plane), way, inner, out);
+        fill_chain(planes, p, mips[p], std::move(plane), choice, inner, out);
       }
     }
   });

@@ -1,3 +1,4 @@
+// Proxies and nested scales are rendered from the same places as S_0, and FLIP tells how they differ.
 #include "stages/proxies/picture_losses.h"
 
 #include <array>

@@ -1,3 +1,5 @@
+// What is wrapped of a mesh: its triangles, clustered where there are many, with fans over holes. Behind the
+// alpha wrap and its decimation stand its connected parts.
 #include "stages/skeletonization/wrap.h"
 
 #include <meshoptimizer.h>

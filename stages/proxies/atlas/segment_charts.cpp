@@ -1,3 +1,6 @@
+// How charts grow. Each triangle is a chart at first. ChartMerge takes the pair of neighbours that would be
+// flattest and roundest, and joins it when ChartLayout finds places in a plane for it: by projection, else by
+// conformal_map(). A pair that was refused is tried again when it has grown. It ends when no pair is left.
 #include "stages/proxies/atlas_mesh.h"
 
 #include <Eigen/SparseCholesky>

@@ -1,3 +1,5 @@
+// Each texel of the atlas is the mean of what S_0 shows at several places of its part of the charts (Baker).
+// What no chart covers continues the charts smoothly (push_pull()).
 #include "stages/proxies/bake/bake.h"
 
 #include <algorithm>
