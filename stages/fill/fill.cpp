@@ -482,7 +482,8 @@ void fill_chain(const std::vector<TexturePlane>& planes, std::size_t base, std::
     Pixels half = more ? halved(pixels, planes[p].width_px, planes[p].height_px,
                                 averaging_of(planes[next].role, planes[next].channels))
                        : Pixels{};
-    if (choice.fill == Fill::kPushPull) flatten_where_covered(pixels, planes[p].coverage, choice.part, context);
+    if (choice.fill == Fill::kPushPull)
+      flatten_where_covered(pixels, planes[p].coverage, choice.part, context);
     out[p] = padded(std::move(pixels), planes[p]);
     if (!more) return;
     pixels = std::move(half);

@@ -1,5 +1,5 @@
-// Losses of all rungs are measured in a few windows of each plane. Then rung_value.h tells which are worth their
-// bytes.
+// Losses of all rungs are measured in a few windows of each plane. Then rung_value.h tells which are worth
+// their bytes.
 #include "stages/ladder/choose_rungs.h"
 
 #include <algorithm>

@@ -1,6 +1,6 @@
-// Scales as vertex splits. RoundedMesh rounds all values and merges what is equal then. CollapseReplay carries
-// the collapses out once more, from fine to coarse, and writes down what each one changes. Read backwards these
-// are the splits.
+// Scales as vertex splits. RoundedMesh rounds all values and merges what is equal then. CollapseReplay
+// carries the collapses out once more, from fine to coarse, and writes down what each one changes. Read
+// backwards these are the splits.
 #include "stages/scales/vertex_split.h"
 
 #include <algorithm>

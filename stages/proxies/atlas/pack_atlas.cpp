@@ -1,5 +1,6 @@
-// How charts are packed. All have one scale. The scale falls until all charts find a place one after the other,
-// and rises again by halves of what lies between. Then other orders of the charts are tried for a larger one.
+// How charts are packed. All have one scale. The scale falls until all charts find a place one after the
+// other, and rises again by halves of what lies between. Then other orders of the charts are tried for a
+// larger one.
 #include "stages/proxies/atlas_mesh.h"
 
 #include <algorithm>

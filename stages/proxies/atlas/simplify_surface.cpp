@@ -1,7 +1,7 @@
-// How a soup gets coarse. clean_soup() welds it. SurfaceQuadrics gives each vertex the planes that it stands for.
-// SurfaceCollapse joins the two ends of an edge, cheapest first, on CornerRings, which know the triangles at a
-// vertex. Where nothing goes any more the guards of shape are loosened, and at last the smallest triangles are
-// dropped, so that every count is reached.
+// How a soup gets coarse. clean_soup() welds it. SurfaceQuadrics gives each vertex the planes that it stands
+// for. SurfaceCollapse joins the two ends of an edge, cheapest first, on CornerRings, which know the
+// triangles at a vertex. Where nothing goes any more the guards of shape are loosened, and at last the
+// smallest triangles are dropped, so that every count is reached.
 #include "stages/proxies/atlas_mesh.h"
 
 #include <utility>
