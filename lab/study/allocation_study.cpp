@@ -8,7 +8,7 @@
 #include "format/rules/allocation.h"
 #include "format/rules/rate_distortion.h"
 #include "stages/base/parallel.h"
-#include "stages/fragment_codec/decode_rung.h"
+#include "stages/fragment_codec/fragment_codec.h"
 #include "stages/jpeg/jpeg.h"
 #include "stages/render/shade.h"
 

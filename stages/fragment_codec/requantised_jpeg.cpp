@@ -6,7 +6,7 @@
 #include <cstring>
 #include <utility>
 
-#include "stages/jpeg/jpeg_samples.h"
+#include "stages/jpeg/jpeg_coder.h"
 #include "stages/jpeg/jpeg_stream.h"
 
 namespace texmesh {

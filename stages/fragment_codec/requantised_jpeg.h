@@ -10,7 +10,7 @@
 #include "stages/image/decode_jpeg.h"
 #include "stages/image/pixel_window.h"
 #include "stages/jpeg/block_scan.h"
-#include "stages/jpeg/huffman_table.h"
+#include "stages/jpeg/jpeg_stream.h"
 #include "stages/jpeg/source_jpeg.h"
 
 namespace texmesh {

@@ -12,7 +12,7 @@
 #include "format/base/vec.h"
 #include "stages/base/parallel.h"
 #include "stages/jpeg/block_transform.h"
-#include "stages/jpeg/jpeg_samples.h"
+#include "stages/jpeg/jpeg_coder.h"
 #include "stages/jpeg/jpeg_stream.h"
 #include "stages/jpeg/masked_jpeg.h"
 

@@ -1,6 +1,7 @@
 #pragma once
 // Inside stages only: libjpeg-turbo's compressor behind an interface that neither leaks its headers nor its
 // longjmp.
+// Inside stages only: what a JPEG is made of before it is transformed.
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -10,7 +11,7 @@
 
 #include "stages/data/subsampling.h"
 #include "stages/image/pixel_window.h"
-#include "stages/jpeg/huffman_table.h"
+#include "stages/jpeg/jpeg_stream.h"
 
 namespace texmesh {
 
@@ -45,7 +46,7 @@ struct JpegKind {
   bool progressive = false;  // deep successive approximation, see progressive_scans() in the .cpp
   /// For complete() alone: libjpeg's usual progressive scans, one pair of Huffman tables for all channels of
   /// `rgb`, and these steps instead of those of `quality`.
-  std::optional<FileSteps> file;
+  std::optional<FileSteps> file{};
 };
 
 /// The quantised coefficients of an image as a file's; refers to everything.
@@ -99,5 +100,19 @@ class JpegCoder {
   struct State;
   std::unique_ptr<State> state_;
 };
+
+/// A component's samples before chroma is halved, less 128, row by row. In libjpeg's integers.
+void jpeg_samples(const PixelWindow& image, const JpegKind& kind, std::size_t component,
+                  std::vector<float>& out);
+
+/// Whether components other than the first have half as many samples each way.
+inline bool halves_chroma(const JpegKind& kind) {
+  return kind.channels == 3 && !kind.rgb && kind.subsampling == Subsampling::k420;
+}
+
+/// The pair of Huffman tables that codes a component.
+inline std::size_t table_pair(const JpegKind& kind, std::size_t component) {
+  return component > (kind.rgb ? 1u : 0u) ? 1 : 0;  // as JpegCoder
+}
 
 }  // namespace texmesh

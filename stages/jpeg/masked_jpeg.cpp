@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "stages/jpeg/jpeg_samples.h"
+#include "stages/jpeg/jpeg_coder.h"
 
 namespace texmesh {
 namespace {

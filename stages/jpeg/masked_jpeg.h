@@ -6,9 +6,8 @@
 #include <vector>
 
 #include "stages/jpeg/block_scan.h"
-#include "stages/jpeg/huffman_table.h"
 #include "stages/jpeg/jpeg_coder.h"
-#include "stages/jpeg/masked_block.h"
+#include "stages/jpeg/jpeg_stream.h"
 
 namespace texmesh {
 

@@ -11,7 +11,7 @@
 #include "stages/base/parallel.h"
 #include "stages/fragment_codec/fragment_codec.h"
 #include "stages/image/jpeg_segments.h"
-#include "stages/measure/scale_samples.h"
+#include "stages/measure/fragment_meter.h"
 
 namespace texmesh::rungs {
 namespace {

@@ -7,8 +7,6 @@
 #include "format/rules/size_curve.h"
 #include "stages/data/coverage.h"
 #include "stages/fragment_codec/coding_space.h"
-#include "stages/fragment_codec/decode_rung.h"
-#include "stages/fragment_codec/rebuilt_z.h"
 #include "stages/image/check_pixels.h"
 #include "stages/image/decode_image.h"
 #include "stages/jpeg/jpeg_bits.h"

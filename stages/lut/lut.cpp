@@ -8,7 +8,7 @@
 #include "stages/base/parallel.h"
 #include "stages/image/check_pixels.h"
 #include "stages/lut/size_model.h"
-#include "stages/measure/scale_samples.h"
+#include "stages/measure/fragment_meter.h"
 
 namespace texmesh {
 namespace {

@@ -6,7 +6,7 @@
 #include "format/base/portable_math.h"
 #include "stages/base/float_math.h"
 #include "stages/measure/cie_lab.h"
-#include "stages/measure/filtered_rows.h"
+#include "stages/measure/picture.h"
 #include "stages/measure/sampled_curve.h"
 
 namespace texmesh {

@@ -7,7 +7,7 @@
 #include "format/base/portable_math.h"
 #include "format/base/srgb.h"
 #include "stages/measure/cie_lab.h"
-#include "stages/measure/filtered_rows.h"
+#include "stages/measure/picture.h"
 #include "stages/measure/sampled_curve.h"
 
 namespace texmesh {

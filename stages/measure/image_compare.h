@@ -4,7 +4,6 @@
 
 #include "format/base/vec.h"
 #include "stages/measure/picture.h"
-#include "stages/measure/pixel_spans.h"
 
 namespace texmesh {
 

@@ -10,7 +10,7 @@
 #include "format/documents/package_writer.h"
 #include "format/rules/viewing.h"
 #include "stages/base/run_context.h"
-#include "stages/gltf/glb_copyright.h"
+#include "stages/gltf/glb_container.h"
 #include "stages/image/decode_image.h"
 
 namespace texmesh {

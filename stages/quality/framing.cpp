@@ -5,7 +5,6 @@
 #include <string>
 
 #include "stages/data/stage.h"
-#include "stages/measure/pixel_spans.h"
 
 namespace texmesh::quality {
 namespace {

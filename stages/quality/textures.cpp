@@ -10,7 +10,7 @@
 #include "format/rules/rate_distortion.h"
 #include "stages/base/parallel.h"
 #include "stages/data/stage.h"
-#include "stages/fragment_codec/decode_rung.h"
+#include "stages/fragment_codec/fragment_codec.h"
 #include "stages/image/decode_image.h"
 #include "stages/jpeg/jpeg.h"
 

@@ -1,24 +1,13 @@
 #include "stages/scales/scales.h"
 
-#include <nlohmann/json.hpp>
-
-#include <algorithm>
-#include <array>
 #include <atomic>
 #include <cmath>
 #include <map>
-#include <string>
-#include <vector>
 
 #include "format/base/no_index.h"
 #include "format/container/layout.h"
-#include "format/model/model.h"
-#include "format/split/split_stream.h"
 #include "format/split/split_writer.h"
 #include "stages/base/parallel.h"
-#include "stages/data/fragments.h"
-#include "stages/data/previews.h"
-#include "stages/gltf/glb_writer.h"
 #include "stages/image/png_writer.h"
 #include "stages/jpeg/jpeg.h"
 #include "stages/scales/scale_codecs.h"

@@ -3,19 +3,11 @@
 // backwards these are the splits.
 #include "stages/scales/vertex_split.h"
 
-#include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <map>
 #include <numeric>
 #include <ranges>
-#include <string>
-#include <vector>
 
-#include "format/base/errors.h"
-#include "format/base/no_index.h"
-#include "format/split/look_ahead.h"
-#include "format/split/split_source.h"
 #include "stages/data/nested_scales.h"
 #include "stages/scales/corner_lists.h"
 

@@ -7,7 +7,7 @@
 #include "format/base/box.h"
 #include "format/base/errors.h"
 #include "format/base/no_index.h"
-#include "stages/gltf/meshopt_streams.h"
+#include "stages/gltf/glb_writer.h"
 
 namespace texmesh::proxies {
 namespace {

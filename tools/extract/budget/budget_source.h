@@ -6,7 +6,7 @@
 #include "stages/gltf/draco_mesh.h"
 #include "tools/extract/budget/lit_meter.h"
 #include "tools/extract/glb/extracted.h"
-#include "tools/extract/glb/scale_model.h"
+#include "tools/extract/glb/scale_file.h"
 #include "tools/extract/glb/texture_source.h"
 
 namespace texmesh {

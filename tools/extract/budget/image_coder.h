@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "stages/jpeg/joined_jpeg.h"
+#include "stages/jpeg/source_jpeg.h"
 #include "tools/extract/budget/budget_source.h"
 
 namespace texmesh {

@@ -5,7 +5,6 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "format/base/bounded_json.h"
 #include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "pipeline/about/gltf_about.h"
@@ -20,12 +19,6 @@ constexpr const char* kDraco = "KHR_draco_mesh_compression";
 constexpr const char* kMeshopt = "EXT_meshopt_compression";
 constexpr const char* kWebp = "EXT_texture_webp";
 constexpr const char* kLod = "MSFT_lod";
-constexpr int kMaxJsonDepth = 64;
-
-std::uint32_t read_u32(std::span<const std::uint8_t> bytes, std::size_t at) {
-  return static_cast<std::uint32_t>(bytes[at] | bytes[at + 1] << 8 | bytes[at + 2] << 16) |
-         static_cast<std::uint32_t>(bytes[at + 3]) << 24;
-}
 
 std::size_t number(const Json& object, const char* key) {
   return object.contains(key) ? object[key].get<std::size_t>() : 0;
@@ -98,13 +91,9 @@ StandaloneGlb::~StandaloneGlb() = default;
 StandaloneGlb::StandaloneGlb(std::span<const std::uint8_t> glb, std::string entry, GlbRules rules)
     : entry_(std::move(entry)), document_(std::make_unique<Document>()) {
   require_valid(glb, entry_, rules);
-  constexpr std::size_t kHeader = 12, kChunk = 8;
-  const std::size_t json_bytes = read_u32(glb, kHeader);
-  document_->root = parse_bounded_json(glb.subspan(kHeader + kChunk, json_bytes), entry_, kMaxJsonDepth);
-  const std::size_t binary_at = kHeader + kChunk + json_bytes;
-  const std::span<const std::uint8_t> binary = glb.size() > binary_at + kChunk
-                                                   ? glb.subspan(binary_at + kChunk, read_u32(glb, binary_at))
-                                                   : std::span<const std::uint8_t>();
+  GlbParts parts = read_glb(glb, entry_);
+  const Bytes& binary = parts.binary;
+  document_->root = std::move(parts.root);
   if (document_->root.contains("buffers") && document_->root["buffers"].size() > 1)
     fallback_bytes_ = document_->root["buffers"][1].value("byteLength", std::uint64_t{0});
   if (!document_->root.contains("bufferViews")) return;
@@ -131,19 +120,6 @@ void StandaloneGlb::use_extension(const std::string& name, bool required) {
     Json names = document_->root.value(list, Json::array());
     if (std::find(names.begin(), names.end(), Json(name)) == names.end()) names.push_back(name);
     document_->root[list] = names;
-  }
-}
-
-void StandaloneGlb::forget_extension(const std::string& name) {
-  for (const char* list : {"extensionsUsed", "extensionsRequired"}) {
-    if (!document_->root.contains(list)) continue;
-    Json kept = Json::array();
-    for (const Json& n : document_->root[list])
-      if (n != name) kept.push_back(n);
-    if (kept.empty())
-      document_->root.erase(list);
-    else
-      document_->root[list] = kept;
   }
 }
 
@@ -206,7 +182,7 @@ void StandaloneGlb::set_images(const std::map<std::uint32_t, FileImageData>& ima
         texture["source"] = image;
       if (texture.contains("extensions") && texture["extensions"].empty()) texture.erase("extensions");
     }
-  forget_extension(kWebp);
+  forget_extension(document_->root, kWebp);
   if (std::find(webp.begin(), webp.end(), true) != webp.end()) use_extension(kWebp, true);
 }
 

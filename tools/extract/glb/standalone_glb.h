@@ -67,7 +67,6 @@ class StandaloneGlb {
   /// Appends views, accessors and meshes; gives the index of the first mesh.
   std::size_t append_meshes(StandaloneGlb& other);
   void use_extension(const std::string& name, bool required);
-  void forget_extension(const std::string& name);
   std::string entry_;
   std::shared_ptr<const About> about_;
   std::unique_ptr<Document> document_;

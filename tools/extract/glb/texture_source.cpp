@@ -8,7 +8,7 @@
 #include "stages/data/coverage.h"
 #include "stages/fill/fill.h"
 #include "stages/geometry/texel_coverage.h"
-#include "tools/extract/glb/scale_model.h"
+#include "tools/extract/glb/scale_file.h"
 #include "tools/render/plane_pixels.h"
 
 namespace texmesh {

@@ -8,8 +8,8 @@
 #include "delivery/cpp/package/package_reader.h"
 #include "format/model/model.h"
 #include "stages/base/run_context.h"
-#include "stages/jpeg/joined_jpeg.h"
 #include "stages/image/resize.h"
+#include "stages/jpeg/source_jpeg.h"
 
 namespace texmesh {
 

@@ -10,9 +10,9 @@
 #include "pipeline/about/gltf_about.h"
 #include "pipeline/import/import.h"
 #include "pipeline/io/file_resolver.h"
+#include "stages/gltf/glb_container.h"
 #include "tools/extract/budget/quality_search.h"
-#include "tools/extract/glb/glb_chunks.h"
-#include "tools/extract/glb/plain_file.h"
+#include "tools/extract/glb/scale_file.h"
 #include "tools/extract/proxy/proxy_parts.h"
 #include "tools/render/rendered_model.h"
 
@@ -69,7 +69,7 @@ class ProxySearch {
   bool is_wanted_kind(std::uint32_t proxy) const {
     const ExtractImages wanted = source_.request.images;
     if (wanted == ExtractImages::kAuto) return true;
-    const GlbChunks chunks = glb_chunks(source_.package.proxy_glb(proxy), proxy_path(proxy));
+    const GlbParts chunks = read_glb(source_.package.proxy_glb(proxy), proxy_path(proxy));
     const char* mime = mime_type_of(wanted == ExtractImages::kWebp ? FileImage::kWebp : FileImage::kJpeg);
     const auto images = chunks.root.value("images", nlohmann::ordered_json::array());
     return std::ranges::all_of(images,
