@@ -1,12 +1,8 @@
 #pragma once
-#include <cstdint>
 #include <span>
-#include <vector>
 
 #include "format/base/box.h"
 #include "format/base/no_index.h"
-#include "format/base/vec.h"
-#include "format/model/model.h"
 #include "stages/data/nested_scales.h"
 
 namespace texmesh {

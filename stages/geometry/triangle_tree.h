@@ -4,16 +4,10 @@
 #endif
 #include <emmintrin.h>
 
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <cstdint>
 #include <optional>
 #include <span>
-#include <vector>
 
 #include "format/base/box.h"
-#include "format/base/vec.h"
 #include "format/model/model.h"
 
 namespace texmesh {

@@ -1,18 +1,7 @@
 #pragma once
 // Inside the ladder only: which parts of a plane's pixels codecs are given, and all fragments through their
 // planes' codecs, on several threads.
-#include <cstddef>
-#include <cstdint>
-#include <memory>
-#include <vector>
 
-#include "stages/base/run_context.h"
-#include "stages/data/fragments.h"
-#include "stages/data/ladder.h"
-#include "stages/data/pixels.h"
-#include "stages/fragment_codec/fragment_codec.h"
-#include "stages/image/pixel_window.h"
-#include "stages/ladder/ladder.h"
 #include "stages/ladder/source_codec.h"
 
 namespace texmesh {

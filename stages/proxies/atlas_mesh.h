@@ -1,11 +1,8 @@
 #pragma once
 // Inside the room only: a coarse surface of a model, cut into charts, which are packed into an atlas.
-#include <cstdint>
 #include <optional>
 #include <span>
-#include <vector>
 
-#include "format/base/vec.h"
 #include "format/model/model.h"
 #include "stages/base/run_context.h"
 

@@ -1,10 +1,7 @@
 #pragma once
 // Inside the room only: one proxy of a given number of bytes.
-#include <array>
 #include <optional>
-#include <vector>
 
-#include "stages/proxies/bake/bake.h"
 #include "stages/proxies/coding/proxy_pictures.h"
 #include "stages/proxies/picture_losses.h"
 

@@ -2,7 +2,6 @@
 // Inside the room only: how a proxy looks beside S_0, and how a nested scale with the source's atlas looks
 // for the same bytes.
 #include <map>
-#include <vector>
 
 #include "stages/data/nested_scales.h"
 #include "stages/data/proxies.h"

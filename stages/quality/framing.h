@@ -1,13 +1,10 @@
 #pragma once
 // Inside the room only: what the pictures show of the object, and the rows in which large ones are rendered.
-#include <cstdint>
-#include <vector>
 
 #include "format/base/box.h"
 #include "format/base/note.h"
 #include "stages/measure/picture.h"
 #include "stages/quality/textures.h"
-#include "stages/render/visibility.h"
 
 namespace texmesh::quality {
 

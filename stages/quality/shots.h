@@ -1,13 +1,10 @@
 #pragma once
 // Inside the room only: pictures beside S_0's.
-#include <cstdint>
 #include <map>
 #include <optional>
 #include <utility>
-#include <vector>
 
 #include "stages/measure/flip.h"
-#include "stages/measure/image_compare.h"
 #include "stages/quality/framing.h"
 #include "stages/render/shade.h"
 

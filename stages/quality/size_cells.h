@@ -5,8 +5,6 @@
 // pixels. What is lost there is a matter of chance, so it follows neither from a smaller size nor from
 // pictures of the same texels read with mips.
 #include <cstddef>
-#include <cstdint>
-#include <vector>
 
 #include "stages/quality/quality.h"
 #include "stages/quality/shots.h"

@@ -1,24 +1,15 @@
 #pragma once
 // Inside the room only: which textures show, what they are made from, and how they look at one displayed
 // height.
-#include <algorithm>
-#include <array>
-#include <cstdint>
-#include <functional>
 #include <optional>
-#include <vector>
 
 #include "format/documents/quality_table.h"
 #include "format/documents/tables.h"
 #include "format/documents/textures.h"
-#include "format/model/model.h"
-#include "stages/base/run_context.h"
 #include "stages/data/fragments.h"
 #include "stages/data/ladder.h"
-#include "stages/data/pixels.h"
 #include "stages/data/previews.h"
 #include "stages/render/render_texture.h"
-#include "stages/render/visibility.h"
 
 namespace texmesh::quality {
 

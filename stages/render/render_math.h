@@ -1,8 +1,5 @@
 #pragma once
 // Inside the room only: functions of shading with the same bits on every machine.
-#include <array>
-#include <cstddef>
-#include <cstdint>
 
 #include "format/base/srgb.h"
 #include "format/base/vec.h"

@@ -1,8 +1,5 @@
 #pragma once
-#include <cstdint>
-#include <vector>
 
-#include "stages/base/run_context.h"
 #include "stages/data/pixels.h"
 #include "stages/render/visibility.h"
 

@@ -1,12 +1,7 @@
 #pragma once
-#include <cstdint>
-#include <vector>
 
-#include "stages/base/run_context.h"
 #include "stages/data/fragments.h"
-#include "stages/data/pixels.h"
 #include "stages/render/render_texture.h"
-#include "stages/render/visibility.h"
 
 namespace texmesh {
 

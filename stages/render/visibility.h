@@ -1,9 +1,5 @@
 #pragma once
-#include <array>
-#include <cstdint>
-#include <functional>
 #include <span>
-#include <vector>
 
 #include "format/model/model.h"
 #include "stages/base/run_context.h"

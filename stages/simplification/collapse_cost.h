@@ -1,14 +1,7 @@
 #pragma once
-#include <array>
-#include <cmath>
 #include <cstddef>
-#include <cstdint>
-#include <span>
-#include <vector>
 
-#include "format/base/vec.h"
 #include "stages/geometry/quadric.h"
-#include "stages/simplification/collapse_mesh.h"
 #include "stages/simplification/collapse_ring.h"
 #include "stages/simplification/simplification.h"
 

@@ -1,12 +1,9 @@
 #pragma once
 // Inside the room only: a surface contracted to a curve, the curve put into the middle, distances to it.
 #include <array>
-#include <cstdint>
 #include <span>
-#include <vector>
 
 #include "format/base/box.h"
-#include "format/base/vec.h"
 #include "stages/skeletonization/wrap.h"
 
 namespace texmesh {

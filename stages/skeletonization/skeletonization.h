@@ -1,7 +1,4 @@
 #pragma once
-#include <array>
-#include <cstdint>
-#include <vector>
 
 #include "stages/data/conditioned_mesh.h"
 #include "stages/data/skeleton.h"

@@ -1,9 +1,7 @@
 #pragma once
 // Inside the room only: the closed surface around a mesh that is contracted to the skeleton.
 #include <cstddef>
-#include <vector>
 
-#include "format/model/model.h"
 #include "stages/base/run_context.h"
 #include "stages/data/conditioned_mesh.h"
 

@@ -1,7 +1,6 @@
 #pragma once
 // Inside proxies only: a chart's triangles laid into a plane.
 #include <array>
-#include <cstdint>
 #include <span>
 #include <vector>
 

@@ -1,7 +1,6 @@
 #pragma once
 // Inside the room only: which cells of a texture a chart touches, and which are taken.
 #include <array>
-#include <cstdint>
 #include <optional>
 #include <span>
 #include <vector>

@@ -1,10 +1,7 @@
 #pragma once
 // Inside the room only: what S_0 shows, as the texels of an atlas.
-#include <cstdint>
-#include <vector>
 
 #include "format/base/vec.h"
-#include "stages/base/run_context.h"
 #include "stages/proxies/atlas_mesh.h"
 #include "stages/proxies/bake/bake_source.h"
 
