@@ -1,5 +1,4 @@
 #pragma once
-
 #include "stages/base/run_context.h"
 #include "stages/data/nested_scales.h"
 

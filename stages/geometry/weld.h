@@ -1,5 +1,4 @@
 #pragma once
-
 #include "format/base/no_index.h"
 #include "format/model/model.h"
 

@@ -1,6 +1,5 @@
 #pragma once
 // Inside the ladder only: what rungs lose, measured in a few windows of a plane, and which are worth storing.
-
 #include "format/model/model.h"
 #include "stages/base/run_context.h"
 #include "stages/data/fragments.h"

@@ -1,7 +1,6 @@
 #pragma once
 // Inside the ladder only: which parts of a plane's pixels codecs are given, and all fragments through their
 // planes' codecs, on several threads.
-
 #include "stages/ladder/source_codec.h"
 
 namespace texmesh {

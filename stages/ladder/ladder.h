@@ -1,5 +1,4 @@
 #pragma once
-
 #include "format/model/model.h"
 #include "stages/data/fragments.h"
 #include "stages/data/ladder.h"

@@ -1,6 +1,5 @@
 #pragma once
 // Inside the ladder only.
-
 #include "stages/fragment_codec/fragment_codec.h"
 #include "stages/ladder/ladder.h"
 

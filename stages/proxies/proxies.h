@@ -1,5 +1,4 @@
 #pragma once
-
 #include "stages/data/fragments.h"
 #include "stages/data/nested_scales.h"
 #include "stages/data/pixels.h"

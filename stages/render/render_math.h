@@ -1,6 +1,5 @@
 #pragma once
 // Inside the room only: functions of shading with the same bits on every machine.
-
 #include "format/base/srgb.h"
 #include "format/base/vec.h"
 #include "stages/base/float_math.h"

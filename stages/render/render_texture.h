@@ -1,5 +1,4 @@
 #pragma once
-
 #include "stages/data/pixels.h"
 #include "stages/render/visibility.h"
 

@@ -1,5 +1,4 @@
 #pragma once
-
 #include "stages/data/fragments.h"
 #include "stages/render/render_texture.h"
 

@@ -1,5 +1,4 @@
 #pragma once
-
 #include "stages/geometry/scale_frames.h"
 #include "stages/gltf/glb_writer.h"
 #include "stages/scales/scale_grid.h"

@@ -1,5 +1,4 @@
 #pragma once
-
 #include "stages/scales/scales.h"
 
 namespace texmesh {

@@ -1,5 +1,4 @@
 #pragma once
-
 #include "format/split/split_stream.h"
 #include "stages/data/fragments.h"
 #include "stages/data/nested_scales.h"

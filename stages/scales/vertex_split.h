@@ -1,5 +1,4 @@
 #pragma once
-
 #include "format/split/split_source.h"
 #include "stages/base/run_context.h"
 #include "stages/scales/scale_grid.h"

@@ -1,5 +1,4 @@
 #pragma once
-
 #include "stages/data/conditioned_mesh.h"
 #include "stages/data/skeleton.h"
 #include "stages/data/stage.h"

@@ -1,6 +1,5 @@
 #pragma once
 // Inside the room only: a proxy as a file.
-
 #include "stages/proxies/bake/bake_source.h"
 #include "stages/proxies/coding/proxy_mesh.h"
 
