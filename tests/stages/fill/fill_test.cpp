@@ -6,8 +6,8 @@
 #include <cstdlib>
 
 #include "stages/image/decode_image.h"
-#include "stages/image/resize.h"
 #include "stages/image/png_writer.h"
+#include "stages/image/resize.h"
 #include "stages/jpeg/jpeg.h"
 #include "tests/support/coverage_bits.h"
 #include "tests/support/meshes.h"
