@@ -14,7 +14,7 @@ namespace texmesh {
 inline constexpr int kFillVersion = 1;
 
 /// What blocks of 16 x 16 texels become that are covered in part: kSparse makes their uncovered texels such
-/// that any codec finds few coefficients (fill_blocks.h); kSmooth leaves the smooth fill, for an encoder that
+/// that any codec finds few coefficients; kSmooth leaves the smooth fill, for an encoder that
 /// knows which texels are free, as the ladder's baseline JPEG does, and costs a sixth of the time.
 enum class PartBlocks : std::uint8_t { kSparse, kSmooth };
 
@@ -28,7 +28,7 @@ std::vector<Pixels> fill_planes(const Fragments& fragments, const std::vector<Im
                                 const RunContext& context, PartBlocks part = PartBlocks::kSparse);
 
 /// Push-pull: gives every texel whose coverage bit (as TexturePlane::coverage) is 0 a smooth continuation of
-/// the covered ones, and fill_blocks.h makes that cheap for JPEG; covered ones keep their value. Without any
+/// the covered ones, and makes that cheap for JPEG; covered ones keep their value. Without any
 /// covered texel nothing changes.
 void fill_uncovered(Pixels& pixels, const std::vector<std::uint8_t>& coverage, const RunContext& context,
                     PartBlocks part = PartBlocks::kSparse);

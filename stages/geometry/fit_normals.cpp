@@ -1,8 +1,5 @@
 #include "stages/geometry/fit_normals.h"
 
-#include <algorithm>
-#include <cmath>
-
 #include "stages/base/parallel.h"
 #include "stages/geometry/triangle_tree.h"
 

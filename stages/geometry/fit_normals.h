@@ -1,6 +1,5 @@
 #pragma once
 #include <span>
-#include <vector>
 
 #include "format/model/model.h"
 #include "stages/base/run_context.h"

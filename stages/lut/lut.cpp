@@ -1,8 +1,6 @@
 #include "stages/lut/lut.h"
 
-#include <algorithm>
 #include <atomic>
-#include <string>
 
 #include "format/base/number16.h"
 #include "format/base/sha256.h"

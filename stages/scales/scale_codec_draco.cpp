@@ -1,6 +1,4 @@
-#include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "format/base/box.h"
 #include "stages/gltf/draco_mesh.h"

@@ -1,13 +1,10 @@
 #include <meshoptimizer.h>
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
-#include <limits>
 
 #include "format/base/box.h"
-#include "stages/gltf/glb_writer.h"
 #include "stages/scales/scale_codecs.h"
 
 namespace texmesh {

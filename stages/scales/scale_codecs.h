@@ -1,12 +1,7 @@
 #pragma once
-#include <cstdint>
-#include <nlohmann/json.hpp>
-#include <vector>
-
 #include "stages/geometry/scale_frames.h"
 #include "stages/gltf/glb_writer.h"
 #include "stages/scales/scale_grid.h"
-#include "stages/scales/scales.h"
 
 namespace texmesh {
 

@@ -1,7 +1,6 @@
 #include "stages/proxies/coding/proxy_glb.h"
 
 #include <array>
-#include <nlohmann/json.hpp>
 
 #include "stages/gltf/glb_writer.h"
 

@@ -2,7 +2,6 @@
 
 #include <meshoptimizer.h>
 
-#include <algorithm>
 #include <cmath>
 
 #include "format/base/box.h"

@@ -1,9 +1,6 @@
 #pragma once
 // Inside the room only: a proxy's mesh as streams of EXT_meshopt_compression or KHR_draco_mesh_compression.
-#include <array>
 #include <cstddef>
-#include <cstdint>
-#include <vector>
 
 #include "format/base/bytes.h"
 #include "stages/gltf/draco_mesh.h"

@@ -5,8 +5,8 @@
 
 #include "stages/base/run_context.h"
 #include "stages/image/resize.h"
+#include "stages/ladder/choose_rungs.h"
 #include "stages/ladder/ladder.h"
-#include "stages/ladder/rung_loss.h"
 #include "stages/previews/previews.h"
 #include "tests/support/meshes.h"
 
@@ -64,9 +64,9 @@ inline Ladder encode(const Chain& chain, bool prune, int threads = 1, LadderMode
   return encode_ladder(chain.fragments, chain.pixels, chain.previews(), {}, options, context);
 }
 
-inline TextureWays ways_of(const Chain& chain, const Ladder& ladder) {
-  return measure_ways(chain.fragments, chain.pixels, ladder.planes, 0, chain.previews().planes[0].file,
-                      RunContext{});
+inline rungs::TextureRungs rungs_of(const Chain& chain, const Ladder& ladder) {
+  return rungs::measure_rungs(chain.fragments, chain.pixels, ladder.planes, 0,
+                              chain.previews().planes[0].file, RunContext{});
 }
 
 }  // namespace texmesh::testing
