@@ -1,6 +1,5 @@
 // Bundles the library: dist/texmesh.js (everything; three.js stays outside), dist/open.js (to show packages), dist/page.js (many on one
-// page), dist/reader.js (without three.js), dist/thesis.js (chapter 4 as printed), dist/thesis-tables.js (readThesis), dist/verify.js (every
-// byte of a package), dist/worker.js, dist/viewer/ (an element by one script tag, with three.js inside). Each entry stands alone: the parts
+// page), dist/reader.js (without three.js), dist/thesis.js (chapter 4 as printed), dist/thesis-tables.js (readThesis), dist/worker.js, dist/viewer/ (an element by one script tag, with three.js inside). Each entry stands alone: the parts
 // that an entry loads by import() belong to that entry.
 //   node build.mjs               builds
 //   node build.mjs --types       after tsc: names files in full in dist/types, as Node.js resolves them
@@ -14,13 +13,12 @@ import { createRequire } from 'node:module';
 import { gzipSync } from 'node:zlib';
 import { rollup } from 'rollup';
 import { encoderModule } from './encoder.mjs';
-import { ruleData } from './rule_data.mjs';
 
 const here = dirname(fileURLToPath(import.meta.url));
 const dist = join(here, 'dist');
 /** Source files of the entries. */
 const entries = {
-  texmesh: 'index', open: 'open', page: 'page', reader: 'reader', thesis: 'thesis', 'thesis-tables': 'thesis_tables', verify: 'verify', worker: 'worker',
+  texmesh: 'index', open: 'open', page: 'page', reader: 'reader', thesis: 'thesis', 'thesis-tables': 'thesis_tables', worker: 'worker',
   blocks: 'blocks',
 };
 /**
@@ -84,7 +82,7 @@ async function bundled(entry) {
   const bundle = await rollup({
     input: { [entry]: join(here, 'src', `${entries[entry]}.ts`) },
     external: [/^three($|\/)/],
-    plugins: [encoderModule, ...(entry === 'reader' || entry === 'worker' ? [] : [documentsOfWorkers]), ruleData, typescript],
+    plugins: [encoderModule, ...(entry === 'reader' || entry === 'worker' ? [] : [documentsOfWorkers]), typescript],
     preserveEntrySignatures: 'allow-extension', // no file more that only passes names on
     onwarn: (warning) => { throw new Error(warning.message); },
   });

@@ -7,7 +7,6 @@ export type Sources = Map<string, string>;
 /** The rooms that the files of each room may import from, besides their own. Files beneath no room, the entries, may import all. */
 export const roomsBelow: Record<string, readonly string[]> = {
   format: [],
-  check: ['format'],
   http: ['format'],
   blocks: [],
   worker: ['format', 'blocks'],
