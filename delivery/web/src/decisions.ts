@@ -17,7 +17,7 @@ export * from './decide/rate_distortion';
 export * from './decide/size_curve';
 export * from './decide/viewing';
 export * from './http/throughput';
-export type * from './decide/plan_types';
+export type * from './decide/harmonic_time';
 export * from './decide/upgrades';
 export * from './decide/texture_loss';
 export * from './decide/fragment_list';

@@ -1,5 +1,6 @@
-// Chapter 4 as printed: for planDelivery(), and its Theorem 4.1. Apart from the library, which loads this where the policy is thesis.
+// Chapter 4 as printed, for planDelivery(), and thesis.bin. Apart from the library, which loads its part of this where
+// the policy is thesis.
 
-export { asPrinted, gammaForBytes, thesisTextures } from './decide/thesis/thesis_list';
-export * from './decide/thesis/htc_theorem';
-export type { ThesisTextures } from './decide/thesis/thesis_list';
+export * from './decide/thesis_list';
+export * from './format/thesis_tables';
+export { readThesis } from './http/read_thesis';

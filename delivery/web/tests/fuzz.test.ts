@@ -12,7 +12,7 @@ import { parseTablesSection, readTablesHead } from '../src/format/read_tables';
 import { requireSelfContained } from '../src/format/self_contained_glb';
 import { SplitStreamReader } from '../src/format/splits/split_stream';
 import { readTextures } from '../src/format/textures';
-import { parseThesis } from '../src/format/thesis/thesis_tables';
+import { parseThesis } from '../src/format/thesis_tables';
 import { FormatError, manifestOfContainer, PackageReader, readManifest } from '../src/reader';
 import { golden, goldenSet } from './support/files';
 import { readAll } from './support/read_all';

@@ -2,7 +2,7 @@ import { PackageData } from '../format/package_data';
 import { FragmentList, lossesOf } from './fragment_list';
 import { type BytesOf, planesWithin } from './memory/gpu_memory';
 import { scaleBytes } from './memory/gpu_size';
-import type { TimePlanOptions } from './plan_types';
+import type { TimePlanOptions } from './harmonic_time';
 import { geometryFlip } from './prediction';
 import { Simulated, simulate } from './simulation';
 import { TextureSpending, budgetSteps, spendOn } from './texture_budget';

@@ -1,8 +1,6 @@
+import { FragmentOffer, HarmonicTimePlan, HtcStep, TimePlanOptions, bytesAtRung } from './harmonic_time';
 import { LinkOptions, linkModel } from './network_model';
 import { sumOf } from './numbers';
-import { FragmentOffer, HtcStep, TimePlanOptions } from './plan_types';
-import { bytesAtRung } from './rung_choice';
-import { UncheckedPlan } from './unchecked_plan';
 
 // delivery/cpp/simulate/simulation.h for one server on a link of constant rate: the same arithmetic, the same bits.
 
@@ -21,7 +19,7 @@ export function simulate(offers: readonly FragmentOffer[], options: TimePlanOpti
   const rungs = offers.map(() => -1);
   let endS = 0;
   if (options.timeLimitS > 0) {
-    const plan = new UncheckedPlan(offers, options);
+    const plan = new HarmonicTimePlan(offers, options);
     const model = linkModel<HtcStep>(link);
     for (;;) {
       for (let s = plan.next(model.nowS); s; s = plan.next(model.nowS)) model.request(s, s.bytes);

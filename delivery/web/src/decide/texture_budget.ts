@@ -4,7 +4,7 @@ import { FragmentList, ListOptions, fragmentList, lossesOf } from './fragment_li
 import { sumOf } from './numbers';
 import { pow } from './portable_math';
 import { spendBytes } from './rate_distortion';
-import { bytesAtRung } from './rung_choice';
+import { bytesAtRung } from './harmonic_time';
 import { PerGroup, PlaneChoice, TextureLoss, everyGroup, pictureFlip, planesForDisplay } from './texture_loss';
 
 // delivery/cpp/decide/texture_budget.cpp, bit for bit.

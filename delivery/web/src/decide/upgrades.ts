@@ -1,4 +1,4 @@
-import type { FragmentOffer } from './plan_types';
+import type { FragmentOffer } from './harmonic_time';
 
 /** An upgrade of a fragment to a higher rung, which may be fetched after the deadline. */
 export interface Upgrade {

@@ -1,4 +1,4 @@
-import { type ThesisTables, parseThesis } from '../format/thesis/thesis_tables';
+import { type ThesisTables, parseThesis } from '../format/thesis_tables';
 import type { PackageDocuments } from './package_documents';
 
 /** thesis.bin of a package, read anew with every call; undefined where the package has none. Loads that do not ask for it never fetch it. */

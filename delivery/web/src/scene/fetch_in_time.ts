@@ -1,9 +1,7 @@
 import type { FragmentList } from '../decide/fragment_list';
-import { type HtcStep, type Policy, type TimePlanOptions, defaultOrder } from '../decide/plan_types';
+import { HarmonicTimePlan, type HtcStep, type TimePlanOptions } from '../decide/harmonic_time';
 import { type GroupedList, groupBytes, groupedList } from '../decide/request_groups';
-import type * as Printed from '../decide/thesis/thesis_list';
-import { UncheckedPlan } from '../decide/unchecked_plan';
-import { transferRate } from '../http/throughput';
+import type * as Printed from '../decide/thesis_list';
 import type { FragmentFetch } from './fragment_fetch';
 import { upgradeWishes } from './fragment_wishes';
 import type { LoadContext } from './load_context';
@@ -24,7 +22,7 @@ const mostBusyS = 0.25;
 
 /** Fetches fragments by Harmonic Time Compensation: group by group, so that the last one comes at the limit. */
 export class FetchInTime {
-  private plan_?: UncheckedPlan;
+  private plan_?: HarmonicTimePlan;
 
   /** Policy thesis. */
   printed?: typeof Printed;
@@ -48,10 +46,9 @@ export class FetchInTime {
 
   /** Options of the plan for fragments in so many seconds. */
   planOptions(timeLimitS: number): TimePlanOptions {
-    const { options, reader: { client: { latencyS: rttS } }, beta0 } = this.load_;
-    const policy = options.policy as Policy, order = options.order ?? defaultOrder(policy);
-    const initialBytesS = Math.max(1, beta0);
-    return { policy, order, timeLimitS, rttS, initialBytesS, ...this.printed?.printedPlan(transferRate(initialBytesS), rttS) };
+    const { reader: { client: { latencyS: rttS } }, beta0 } = this.load_;
+    const options = { timeLimitS, rttS, initialBytesS: Math.max(1, beta0) };
+    return this.printed?.printedPlan(options) ?? { policy: 'guard', order: 'finest', ...options };
   }
 
   async run(fragments: FragmentList, timeLimitS: number): Promise<void> {
@@ -59,7 +56,7 @@ export class FetchInTime {
     const whole = fetching.wholeRungs();
     const bytesEach = whole ? Infinity : this.printed ? 0 : groupBytes(load.beta0, load.reader.client.latencyS, timeLimitS);
     const list = groupedList(fragments, bytesEach, load.beta0 * timeLimitS);
-    const plan = (this.plan_ = new UncheckedPlan(list.offers, { ...this.planOptions(timeLimitS), tripS: () => this.tripS_() }));
+    const plan = (this.plan_ = new HarmonicTimePlan(list.offers, { ...this.planOptions(timeLimitS), tripS: () => this.tripS_() }));
     const hooks = {
       decided: (step: HtcStep): void => this.decided_(step, list),
       lost: (wish: Wish, error: unknown): void => fetching.lost(wish, error),

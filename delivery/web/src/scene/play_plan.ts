@@ -1,6 +1,5 @@
-import type { HtcStep } from '../decide/plan_types';
+import type { HarmonicTimePlan, HtcStep } from '../decide/harmonic_time';
 import type { GroupedList } from '../decide/request_groups';
-import type { UncheckedPlan } from '../decide/unchecked_plan';
 import { throwIfAborted } from '../format/errors';
 import { nowS } from '../http/clock';
 import type { Transfers, Wish } from './transfers';
@@ -17,7 +16,7 @@ export interface PlayedPlanHooks {
  * fragment has come or was given up; after `mostS` seconds the rest is given up.
  */
 export async function playPlan(
-  plan: UncheckedPlan,
+  plan: HarmonicTimePlan,
   { groups }: GroupedList,
   transfers: Transfers,
   signal: AbortSignal,

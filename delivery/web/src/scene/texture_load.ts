@@ -92,7 +92,7 @@ export class TextureLoad {
     const { load_: load, planes_: planes, fetching_: fetching } = this;
     const { reader, options, signal } = load;
     load.beta0 = throughputBytesS(load);
-    if (options.policy === 'thesis') this.inTime_.printed = await import('../decide/thesis/thesis_list');
+    if (options.policy === 'thesis') this.inTime_.printed = await import('../decide/thesis_list');
     const { scale, planes: chosen, flip } = await this.choice_();
     if (flip !== undefined) await this.showBetterProxy_(flip);
     if (scale !== this.scale_.shown) load.enter('mesh');

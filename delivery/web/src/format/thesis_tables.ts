@@ -1,9 +1,9 @@
-import { BytesIn } from '../bytes_in';
-import { thesisPath as file } from '../entry_paths';
-import { readEntryStart } from '../entry_start';
-import { FormatError } from '../errors';
-import { formatMinor, type Manifest } from '../manifest';
-import type { TextureInfo } from '../textures';
+import { BytesIn } from './bytes_in';
+import { thesisPath as file } from './entry_paths';
+import { readEntryStart } from './entry_start';
+import { FormatError } from './errors';
+import { formatMinor, type Manifest } from './manifest';
+import type { TextureInfo } from './textures';
 
 /** Values of Gamma that tables hold sizes for: 0, 0.05 .. 1. */
 export const gammaSteps = 21;

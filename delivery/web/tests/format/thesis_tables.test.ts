@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
-import type { Manifest, TextureInfo } from '../../../src/reader';
-import { type PerceptualTable, chainedValues, coarsestAlike, majorRows, modelledBytes, modelledQuality, pairValues, parseThesis, refineTo } from '../../../src/thesis_tables';
+import type { Manifest, TextureInfo } from '../../src/reader';
+import { parseThesis } from '../../src/thesis';
 
 // Two planes of 2 and 1 fragments; scales 0 and 5 are stored, the chain has 0, 2 and 5.
 const manifest = { version: { major: 2, minor: 0 }, scales: [{ scale: 0 }, { scale: 5 }] } as Manifest;
@@ -58,44 +58,5 @@ describe('thesis.bin', () => {
   for (const [what, rule, sections] of bad) it(`is refused: ${what}`, () => expect(() => parse(...sections)).toThrow(`[${rule}]`));
   it('may have sections of later versions', () => {
     expect(parse(perceptual, [5, 3, [1, 2]]).perceptual).toBeDefined();
-  });
-});
-
-// The values of tests/format/rules/jnd_choice_test.cpp and size_model_test.cpp.
-describe('a JND of the client', () => {
-  const table71 = Float32Array.of(0, 0.041, 0.0412, 0.0478, 0.0468, 0.0678);
-  const printed = new Float32Array(36);
-  printed.set([0, 0.041, 0.0616, 0.0677, 0.0759, 0.108]);
-  it('chains by the root of the sum of squares', () => {
-    const value = chainedValues(table71);
-    expect(value[2]).toBeCloseTo(0.0581244, 6);
-    expect(value[5]).toBeCloseTo(0.11158, 5);
-    expect(value[3 * 6 + 4]).toBe(Math.fround(0.0468));
-    expect(value[4 * 6 + 3]).toBe(0);
-  });
-  it('makes S_4 of Table 7.2 the first major scale', () => {
-    expect(coarsestAlike(printed, 6, 0, 0.1)).toBe(4);
-    expect(majorRows(printed, 6, 0.1)).toEqual([4, 5]);
-    expect(majorRows(chainedValues(table71), 6, 0)).toEqual([1, 2, 3, 4, 5]);
-    expect(majorRows(chainedValues(table71), 6, 1)).toEqual([5]);
-    expect(coarsestAlike(printed, 6, 0, Math.fround(0.041))).toBe(0);
-  });
-  it('refines only as far as it shows', () => {
-    const to = (have: number, want: number, jnd: number): number => refineTo(printed, 6, have, want, jnd);
-    expect([to(5, 0, 0.1), to(5, 0, 0.11), to(4, 0, 0.1), to(5, 0, 0.04), to(2, 3, 0.04), to(2, 2, 0.04)]).toEqual([4, 5, 4, 0, 2, 2]);
-  });
-  it('goes by every statistic', () => {
-    const t = parse(perceptual).perceptual as PerceptualTable;
-    const row = (v: Float32Array): number[] => [v[1], v[2], v[5]];
-    expect(row(pairValues(t, 'p95', 'survivor'))).toEqual([1, 2, 3]);
-    expect(row(pairValues(t, 'average'))).toEqual([...Float32Array.of(0.3, 0.5, 0.4)]);
-    expect(row(pairValues(t, 'conservative'))).toEqual([...Float32Array.of(0.6, 1, 0.8)]);
-    expect(row(pairValues(t, 'aggressive', 'survivor'))).toEqual([10, 11, 12]);
-  });
-  it('knows the size model and its inverse', () => {
-    const plane = { ...parse(models).planes[0], vqp: Float32Array.of(0.5, 0) };
-    expect(modelledBytes(plane, 0, 1) / 825.45).toBeCloseTo(3.78138, 4);
-    expect(modelledQuality(plane, 0, modelledBytes(plane, 0, 0.3))).toBeCloseTo(0.3, 12);
-    expect([modelledBytes(plane, 1, 0.5), modelledQuality(plane, 1, 1000), modelledQuality(plane, 0, 0)]).toEqual([0, 0, 0]);
   });
 });

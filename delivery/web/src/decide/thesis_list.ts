@@ -1,12 +1,11 @@
-import type { PackageData } from '../../format/package_data';
-import type { TransferRate } from '../../http/throughput';
-import { qualityOf } from '../allocation';
-import type { DeliveryRequest } from '../delivery_plan';
-import { type FragmentList, type ListOptions, fragmentList } from '../fragment_list';
-import type { FragmentOffer, TimePlanOptions } from '../plan_types';
-import { meanOffer } from '../rung_choice';
-import { interpolatedBytes } from '../size_curve';
-import { type PlaneChoice, type TextureLoss, fullSize, tablesOf } from '../texture_loss';
+import type { PackageData } from '../format/package_data';
+import { transferRate } from '../http/throughput';
+import { qualityOf } from './allocation';
+import type { DeliveryRequest } from './delivery_plan';
+import { type FragmentList, type ListOptions, fragmentList } from './fragment_list';
+import { type TimePlanOptions, meanOffer } from './harmonic_time';
+import { interpolatedBytes } from './size_curve';
+import { type PlaneChoice, type TextureLoss, fullSize, tablesOf } from './texture_loss';
 
 // Chapter 4 as printed: gamma_for_bytes, thesis_textures and as_printed of delivery/cpp, bit for bit.
 
@@ -67,15 +66,18 @@ export function thesisTextures(loss: TextureLoss, scale: number, bytes: number):
   return { planes, options, list: fragmentList(loss.data, planes, options, loss) };
 }
 
-/** The request with the policy thesis: the JND's rule, order by beta_0, one request at a time, hard limits. */
-export function asPrinted(request: DeliveryRequest): DeliveryRequest {
-  const { htc } = request;
-  const throughput = { ...htc.throughput, estimator: 'last' as const };
-  return { ...request, rule: 'jnd', textures: thesisTextures, htc: { ...htc, policy: 'thesis', order: 'beta0', window: 1, hardLimits: true, throughput } };
+/**
+ * The plan as printed: order by beta_0, one request at a time, each with a round trip of its own; never below the lower
+ * limit, nothing skipped; the last transfer tells the throughput.
+ */
+export function printedPlan(options: Pick<TimePlanOptions, 'timeLimitS' | 'initialBytesS' | 'rttS'>): TimePlanOptions {
+  const rate = transferRate(options.initialBytesS);
+  return {
+    policy: 'thesis', order: 'beta0', ...options, leastInFlight: 1, mostInFlight: 1, latencyS: 0, waitS: options.rttS,
+    lowestRung: (f) => Math.min(f.lowRung, f.bytes.length - 1), skips: false, rate, estimate: () => rate.recentBytesS(1),
+  };
 }
 
-/** What the plan of a load has besides policy, order, time and round trip: as asPrinted() says. */
-export function printedPlan(rate: TransferRate, rttS: number): Partial<TimePlanOptions> {
-  const lowestRung = (f: FragmentOffer): number => Math.min(f.lowRung, f.bytes.length - 1);
-  return { leastInFlight: 1, mostInFlight: 1, latencyS: 0, waitS: rttS, lowestRung, skips: false, rate, estimate: () => rate.recentBytesS(1) };
-}
+/** The request with the policy thesis; the just-noticeable difference says which scale is enough. */
+export const asPrinted = (request: DeliveryRequest): DeliveryRequest =>
+  ({ ...request, rule: 'jnd', textures: thesisTextures, plan: printedPlan });
