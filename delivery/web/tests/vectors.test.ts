@@ -1,7 +1,7 @@
 import { readdirSync } from 'node:fs';
 import { join } from 'node:path';
 import { describe, expect, it } from 'vitest';
-import { acuityAt, gazeWeight } from '../src/decide/acuity';
+import { acuityAt, gazeWeight } from '../src/scene/gaze_weights';
 import * as t from '../src/reader';
 import { asPrinted } from '../src/thesis';
 import { SplitStreamReader } from '../src/format/splits/split_stream';

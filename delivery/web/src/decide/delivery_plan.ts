@@ -1,10 +1,10 @@
 import { startBytes } from '../format/layout';
 import { type Manifest, firstPicture } from '../format/manifest';
-import type { PackageData } from '../format/package_data';
-import { scaleWithin } from './memory/gpu_memory';
-import { proxyBytes, scaleBytes, textureBytes } from './memory/gpu_size';
+import type { PackageData } from '../format/tables';
+import { scaleWithin } from './gpu_memory';
+import { proxyBytes, scaleBytes, textureBytes } from './gpu_size';
 import type { TimePlanOptions } from './harmonic_time';
-import { LinkOptions, fetchedS } from './network_model';
+import { LinkOptions, fetchedS } from './simulation';
 import { beyondStart, proxyBytesBeyondStart, proxyLoss, servingProxy } from './proxy_choice';
 import { proxyStep } from './proxy_steps';
 import { InTime, type InTimeRequest, choiceInTime, worthwhile } from './scale_choice';

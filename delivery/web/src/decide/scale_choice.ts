@@ -1,7 +1,7 @@
-import { PackageData } from '../format/package_data';
+import { PackageData } from '../format/tables';
 import { FragmentList, lossesOf } from './fragment_list';
-import { type BytesOf, planesWithin } from './memory/gpu_memory';
-import { scaleBytes } from './memory/gpu_size';
+import { type BytesOf, planesWithin } from './gpu_memory';
+import { scaleBytes } from './gpu_size';
 import type { TimePlanOptions } from './harmonic_time';
 import { geometryFlip } from './prediction';
 import { Simulated, simulate } from './simulation';

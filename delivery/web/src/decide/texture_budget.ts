@@ -1,4 +1,4 @@
-import type { PackageData } from '../format/package_data';
+import type { PackageData } from '../format/tables';
 import type { QualityTable } from '../format/quality_table';
 import { FragmentList, ListOptions, fragmentList, lossesOf } from './fragment_list';
 import { sumOf } from './numbers';

@@ -1,9 +1,8 @@
 import { InputError } from '../format/errors';
 import { fullSizePlanes } from '../format/layout';
 import type { Manifest } from '../format/manifest';
-import type { PackageData } from '../format/package_data';
+import { type PackageData, PlaneTables, fragmentCount } from '../format/tables';
 import { QualityTable, groupOf, planeGroups } from '../format/quality_table';
-import { PlaneTables, fragmentCount } from '../format/tables';
 import { TextureInfo } from '../format/textures';
 import { sumOf } from './numbers';
 import { log } from './portable_math';

@@ -1,4 +1,4 @@
-import type { PackageData } from '../format/package_data';
+import type { PackageData } from '../format/tables';
 import { transferRate } from '../http/throughput';
 import { qualityOf } from './allocation';
 import type { DeliveryRequest } from './delivery_plan';

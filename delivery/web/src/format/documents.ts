@@ -15,8 +15,8 @@ import * as layout from './layout';
 // where there are none. Digests have been checked before.
 
 export { readIndex } from './index_table';
-export { plainGlb } from './glb/plain_glb';
-export { requireSelfContained } from './self_contained_glb';
+export { plainGlb } from './glb';
+export { requireSelfContained } from './glb';
 
 const sum = (values: Uint32Array): number => values.reduce((total, v) => total + v, 0);
 

@@ -1,6 +1,5 @@
-import { BytesIn } from './bytes_in';
+import { BytesIn, readEntryStart } from './bytes_in';
 import * as paths from './entry_paths';
-import { readEntryStart } from './entry_start';
 import { FormatError } from './errors';
 import { EntryRef, formatMinor } from './manifest';
 import { requireDigest } from './sha256';

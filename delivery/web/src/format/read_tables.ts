@@ -1,6 +1,5 @@
-import { BytesIn } from './bytes_in';
+import { BytesIn, readEntryStart } from './bytes_in';
 import { tablesPath as file } from './entry_paths';
-import { readEntryStart } from './entry_start';
 import { FormatError } from './errors';
 import { formatMinor } from './manifest';
 import { requireDigest } from './sha256';

@@ -1,6 +1,5 @@
-import { BytesIn } from './bytes_in';
+import { BytesIn, readEntryStart } from './bytes_in';
 import { thesisPath as file } from './entry_paths';
-import { readEntryStart } from './entry_start';
 import { FormatError } from './errors';
 import { formatMinor, type Manifest } from './manifest';
 import type { TextureInfo } from './textures';

@@ -6,7 +6,7 @@ import type { WorkerPool } from '../worker/pool';
 import type { Display, LoadEvents, LoadOptions, LoadPhase } from './api';
 import { displayOf } from './camera';
 import { Emitter } from './events';
-import { GpuRoom } from './memory/gpu_room';
+import { GpuRoom } from './gpu';
 import { MaterialSet } from './scale_parts';
 
 /** The displayed height must change by this factor before another scale or plane is wanted. */

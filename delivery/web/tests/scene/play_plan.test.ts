@@ -1,7 +1,7 @@
 import { describe, expect, it } from 'vitest';
 import { groupedList } from '../../src/decide/request_groups';
 import { HarmonicTimePlan, type HtcStep } from '../../src/reader';
-import { playPlan } from '../../src/scene/play_plan';
+import { playPlan } from '../../src/scene/fetch_in_time';
 import { bytesAskedTwice, Fault } from '../support/fake_server';
 import { defaultTimePlan, setUp, url } from '../support/transferring';
 

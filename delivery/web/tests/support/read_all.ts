@@ -1,4 +1,4 @@
-import { requireSelfContained } from '../../src/format/self_contained_glb';
+import { requireSelfContained } from '../../src/format/glb';
 import { SplitStreamReader } from '../../src/format/splits/split_stream';
 import { PackageReader } from '../../src/reader';
 import { readThesis } from '../../src/thesis';

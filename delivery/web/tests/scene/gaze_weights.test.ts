@@ -1,8 +1,7 @@
 import { Group, Mesh, MeshStandardMaterial, PerspectiveCamera, PlaneGeometry, WebGLRenderer } from 'three';
 import { describe, expect, it } from 'vitest';
-import { acuityAt, gazeWeight } from '../../../src/decide/acuity';
-import type { TextureInfo } from '../../../src/format/textures';
-import { gazeWeights } from '../../../src/scene/gaze/gaze_weights';
+import { acuityAt, gazeWeight, gazeWeights } from '../../src/scene/gaze_weights';
+import type { TextureInfo } from '../../src/format/textures';
 
 describe('acuity', () => {
   it('is full in the fovea, half 2.3 degrees beyond, and falls from there on', () => {

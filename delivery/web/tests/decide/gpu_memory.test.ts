@@ -1,8 +1,8 @@
 import { describe, expect, it } from 'vitest';
-import { planesWithin, scaleWithin } from '../../../src/decide/memory/gpu_memory';
-import { scaleBytes, textureBytes } from '../../../src/decide/memory/gpu_size';
-import { TextureLoss, fullSize } from '../../../src/decide/texture_loss';
-import { setUp } from '../../support/transferring';
+import { planesWithin, scaleWithin } from '../../src/decide/gpu_memory';
+import { scaleBytes, textureBytes } from '../../src/decide/gpu_size';
+import { TextureLoss, fullSize } from '../../src/decide/texture_loss';
+import { setUp } from '../support/transferring';
 
 describe('memory on the GPU', () => {
   it('counts every mip level', () => {

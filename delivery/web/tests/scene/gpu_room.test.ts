@@ -1,10 +1,10 @@
 import type { WebGLRenderer } from 'three';
 import { afterEach, beforeEach, expect, it, vi } from 'vitest';
-import type { LoadEvents } from '../../../src/scene/api';
-import { GpuRoom } from '../../../src/scene/memory/gpu_room';
-import { fakeServer } from '../../support/fake_server';
-import { decodeNothing, fakeRenderer, loading, until } from '../../support/loading';
-import { files, turns, url } from '../../support/scan';
+import type { LoadEvents } from '../../src/scene/api';
+import { GpuRoom } from '../../src/scene/gpu';
+import { fakeServer } from '../support/fake_server';
+import { decodeNothing, fakeRenderer, loading, until } from '../support/loading';
+import { files, turns, url } from '../support/scan';
 
 /** A renderer whose GPU refuses once whenever `refuse` is called, and whose context `lose` takes. */
 function scantRenderer(): { renderer: WebGLRenderer; refuse(): void; lose(): void } {

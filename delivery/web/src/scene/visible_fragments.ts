@@ -1,12 +1,12 @@
 import { BackSide, Camera, DoubleSide, Frustum, Matrix4, Mesh, Object3D, Triangle, Vector3 } from 'three';
-import { sampleTriangles } from './scale_parts';
 import type { TextureInfo } from '../format/textures';
+import { sampleTriangles } from './scale_parts';
 
 /** Triangles looked at per model: enough to tell which fragments are seen, and where. */
 const mostSamples = 6000;
 
 /** The fragment at texture coordinates. */
-export function fragmentAt({ columns, rows, widthPx, heightPx, fragmentWidthPx, fragmentHeightPx }: TextureInfo, uv: { x: number; y: number }): number {
+function fragmentAt({ columns, rows, widthPx, heightPx, fragmentWidthPx, fragmentHeightPx }: TextureInfo, uv: { x: number; y: number }): number {
   const cell = (part: number, px: number, whole: number, count: number): number =>
     Math.min(count - 1, Math.floor(((part - Math.floor(part)) * whole) / px));
   return cell(uv.y, fragmentHeightPx, heightPx, rows) * columns + cell(uv.x, fragmentWidthPx, widthPx, columns);

@@ -1,8 +1,7 @@
 import { describe, expect, it } from 'vitest';
-import type { LoadContext } from '../../../src/scene/load_context';
-import { ProxyChoice } from '../../../src/scene/proxy/proxy_choice';
-import type { ShownProxy } from '../../../src/scene/proxy/shown_proxy';
-import '../../../src/scene/texture_load'; // or the first test would wait for it
+import type { LoadContext } from '../../src/scene/load_context';
+import { ProxyChoice, type ShownProxy } from '../../src/scene/proxies';
+import '../../src/scene/texture_load'; // or the first test would wait for it
 
 // Documents of a megabyte over 100 kB/s: scales come late, the larger proxy after half a second.
 const glb = (offset: number, bytes: number) => ({ path: '', offset, bytes, sha256: new Uint8Array(32) });

@@ -1,7 +1,7 @@
 import { BackSide, DoubleSide, FrontSide, Group, Mesh, MeshStandardMaterial, PerspectiveCamera, SphereGeometry } from 'three';
 import { describe, expect, it } from 'vitest';
 import type { TextureInfo } from '../../src/format/textures';
-import { seenShares } from '../../src/scene/visibility';
+import { seenShares } from '../../src/scene/visible_fragments';
 
 describe('the visible surface', () => {
   const sphere = new Mesh(new SphereGeometry(1, 64, 32), new MeshStandardMaterial());

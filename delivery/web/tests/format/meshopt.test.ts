@@ -1,7 +1,7 @@
 import { MeshoptDecoder } from 'three/examples/jsm/libs/meshopt_decoder.module.js';
 import { beforeAll, describe, expect, it } from 'vitest';
-import { FormatError } from '../../../src/format/errors';
-import { decodeAttributes, decodeTriangles } from '../../../src/format/glb/meshopt';
+import { FormatError } from '../../src/format/errors';
+import { decodeAttributes, decodeTriangles } from '../../src/format/glb';
 
 // Random streams: whatever three.js's decoder makes of a stream, this decoder makes of it, too.
 

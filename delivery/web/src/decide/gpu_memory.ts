@@ -1,7 +1,7 @@
-import type { ManifestScale } from '../../format/manifest';
-import type { TextureInfo } from '../../format/textures';
+import type { ManifestScale } from '../format/manifest';
+import type { TextureInfo } from '../format/textures';
 import { scaleBytes, textureBytes } from './gpu_size';
-import { type PlaneChoice, type TextureLoss, groupIndex } from '../texture_loss';
+import { type PlaneChoice, type TextureLoss, groupIndex } from './texture_loss';
 
 // What fits into the GPU's memory.
 

@@ -1,4 +1,4 @@
-import type { ManifestProxy, ManifestScale } from '../../format/manifest';
+import type { ManifestProxy, ManifestScale } from '../format/manifest';
 
 // What choices take on the GPU, from manifest and textures.json alone: delivery/cpp/decide/gpu_memory.cpp.
 
