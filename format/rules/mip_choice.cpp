@@ -8,7 +8,6 @@ namespace texmesh {
 
 double display_level(const PlaneTables& full_size, double surface_area, double object_height,
                      double displayed_px) {
-  constexpr double kLn2 = 0.693147180559945309417;
   double texels = 0, surface = 0;
   for (std::size_t f = 0; f < full_size.fragment_count(); ++f) {
     texels += full_size.covered_texels[f];
@@ -16,7 +15,7 @@ double display_level(const PlaneTables& full_size, double surface_area, double o
   }
   if (!(surface > 0) || !(surface_area > 0) || !(texels > 0)) return 0;
   const double texels_per_unit = std::sqrt(texels / (surface * surface_area));
-  return portable::log(texels_per_unit / (displayed_px / object_height)) / kLn2;
+  return portable::log(texels_per_unit / (displayed_px / object_height)) / portable::kLn2;
 }
 
 std::uint32_t plane_at_level(std::span<const TextureInfo> textures, std::uint32_t base, double level) {

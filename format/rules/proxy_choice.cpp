@@ -7,13 +7,11 @@
 namespace texmesh {
 namespace {
 
-constexpr double kLogOf2 = 0.693147180559945309417;
-
 double loss_at(const std::vector<double>& sizes, const std::vector<double>& losses, double displayed_px) {
   const double px = std::max(displayed_px, 1.0);
   if (px <= sizes.front()) return losses.front();
   if (px >= sizes.back()) {
-    const double doublings = portable::log(px / sizes.back()) / kLogOf2;
+    const double doublings = portable::log(px / sizes.back()) / portable::kLn2;
     return std::min(1.0, losses.back() * portable::pow(kProxyLossPerDoubling, doublings));
   }
   std::size_t i = 0;

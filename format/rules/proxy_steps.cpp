@@ -10,7 +10,7 @@ namespace texmesh {
 namespace {
 
 constexpr int kMoments = 64;        // at which the time left is looked at
-constexpr double kMeshShare = 0.5;  // of the time left
+constexpr double kMeshTimeShare = 0.5;  // of the time left
 constexpr double kPaying = 0.95;    // of the mean without a step
 
 std::uint64_t beyond_first_request(std::uint64_t begin, std::uint64_t bytes) {
@@ -40,7 +40,7 @@ class StepModel {
     for (const ManifestScale& s : m.scales) {
       if (s.scale < wanted || &s == &m.scales.back()) continue;
       const auto bytes = static_cast<double>(s.glb.bytes);
-      if (seconds(fixed_bytes_ + bytes) > kMeshShare * link.left_s) continue;
+      if (seconds(fixed_bytes_ + bytes) > kMeshTimeShare * link.left_s) continue;
       mesh_bytes = bytes;
       too_coarse_ = false;
       break;

@@ -1,5 +1,6 @@
 import { startBytes } from '../format/layout';
 import { type Manifest, firstPicture } from '../format/manifest';
+import { worthwhileFlip } from '../format/shared_numbers';
 import type { PackageData } from '../format/tables';
 import { scaleWithin } from './gpu_memory';
 import { proxyBytes, scaleBytes, textureBytes } from './gpu_size';
@@ -7,7 +8,7 @@ import type { TimePlanOptions } from './harmonic_time';
 import { LinkOptions, fetchedS } from './simulation';
 import { beyondStart, proxyBytesBeyondStart, proxyLoss, servingProxy } from './proxy_choice';
 import { proxyStep } from './proxy_steps';
-import { InTime, type InTimeRequest, choiceInTime, worthwhile } from './scale_choice';
+import { InTime, type InTimeRequest, choiceInTime } from './scale_choice';
 import { everyGroup } from './texture_loss';
 import { StepRule, selectScale } from './viewing';
 
@@ -154,7 +155,7 @@ export function planDelivery(data: PackageData, request: DeliveryRequest): Deliv
       if (!proxyFits(manifest, k, memoryBytes)) return;
       const other = planOfProxy(manifest, request, k);
       const needed = chosen.meshS >= timeLimitS && other.meshS < chosen.meshS;
-      if (needed || (other.meshS < timeLimitS && other.flip < chosen.flip - worthwhile)) chosen = other;
+      if (needed || (other.meshS < timeLimitS && other.flip < chosen.flip - worthwhileFlip)) chosen = other;
     });
   return chosen;
 }

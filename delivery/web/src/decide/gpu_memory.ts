@@ -1,12 +1,10 @@
 import type { ManifestScale } from '../format/manifest';
+import { meshShare } from '../format/shared_numbers';
 import type { TextureInfo } from '../format/textures';
 import { scaleBytes, textureBytes } from './gpu_size';
 import { type PlaneChoice, type TextureLoss, groupIndex } from './texture_loss';
 
 // What fits into the GPU's memory.
-
-/** A mesh may take so much of the memory where a coarser scale takes less. */
-const meshShare = 0.5;
 
 /** `scale`, or the next coarser one whose mesh leaves room for textures; the coarsest where none does. */
 export function scaleWithin(scales: readonly ManifestScale[], scale: number, mostBytes: number): number {

@@ -1,12 +1,8 @@
 import type { ManifestProxy, ManifestScale } from '../format/manifest';
+import { proxyTextures, triangleBytes, vertexBytes } from '../format/shared_numbers';
 
 // What choices take on the GPU, from manifest and textures.json alone: delivery/cpp/decide/gpu_memory.cpp.
 
-/** Position, normal, texture coordinates and tangent, 32-bit floats. */
-const vertexBytes = 4 * (3 + 3 + 2 + 4);
-const triangleBytes = 3 * 4;
-/** Textures that a proxy has at most; the manifest does not say how many. */
-const proxyTextures = 4;
 const levelsOf = (widthPx: number, heightPx: number): number => 32 - Math.clz32(Math.max(widthPx, heightPx));
 /** How texels are stored: RGBA of 8 bits, or blocks of 4 x 4 texels: block8 = BC1, ETC2 of three channels; block16 = BC3, BC7, ETC2 of four, ASTC. */
 export type GpuTexels = 'rgba8' | 'block8' | 'block16';

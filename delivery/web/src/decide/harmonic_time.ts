@@ -1,3 +1,4 @@
+import { breakFactor, guardSamples, tripSamples, windowFactor } from '../format/shared_numbers';
 import { type TransferRate, transferRate } from '../http/throughput';
 import { clamp, sumOf } from './numbers';
 import { exp } from './portable_math';
@@ -83,10 +84,6 @@ export interface TimePlanOptions {
 }
 
 const guard = 1.5;
-const windowFactor = 1.5;
-const tripSamples = 64; // a window that follows every swing makes them worse
-const guardSamples = 20;
-const breakFactor = 4; // a link this many times faster or slower is another link
 
 // ---- rungs of one fragment
 

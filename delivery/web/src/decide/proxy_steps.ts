@@ -1,13 +1,10 @@
 import { type Manifest } from '../format/manifest';
+import { meshTimeShare, moments, paying } from '../format/shared_numbers';
 import { pow } from './portable_math';
 import { beyondStart, proxyBytesBeyondStart, proxyLoss } from './proxy_choice';
 
 // Which larger proxy is shown on the way from the smallest one to a scale, from the numbers of the manifest alone:
 // format/rules/proxy_steps.cpp, bit for bit.
-
-const moments = 64;
-const meshShare = 0.5;
-const paying = 0.95;
 
 /** A link as the first request has shown it, and the seconds that are left until the time limit. */
 export interface StepLink {
@@ -32,7 +29,7 @@ export function proxyStep(m: Manifest, wanted: number, displayedPx: number, { by
   const flips = m.proxies.map((_, k) => proxyLoss(m, k, displayedPx).flip);
   const arrivalS = (k: number): number => seconds(proxyBytesBeyondStart(m, k));
   const documents = documentBytes(m);
-  const mesh = m.scales.slice(0, -1).find((s) => s.scale >= wanted && seconds(documents + s.glb.bytes) <= meshShare * leftS);
+  const mesh = m.scales.slice(0, -1).find((s) => s.scale >= wanted && seconds(documents + s.glb.bytes) <= meshTimeShare * leftS);
   const tooCoarse = !mesh && m.scales[m.scales.length - 1].scale > wanted;
   const fixed = documents + (mesh?.glb.bytes ?? 0);
   const all = m.provenance.offset + m.provenance.bytes;

@@ -1,3 +1,4 @@
+import { doneBytes, forEver } from '../format/shared_numbers';
 import { FragmentOffer, HarmonicTimePlan, HtcStep, TimePlanOptions, bytesAtRung } from './harmonic_time';
 import { sumOf } from './numbers';
 
@@ -23,9 +24,6 @@ export interface LinkModel<T> {
 
 const serverBytesS = 1e12;
 const noCap = 1e300;
-/** Bytes that rounding may leave of a transfer. */
-const doneBytes = 1e-6;
-const never = 1e9;
 
 /** An even share of `capacity` for each; the rest of a capped one goes to the others. */
 function shareEvenly(capacity: number, caps: readonly number[]): number[] {
@@ -52,8 +50,8 @@ export function linkModel<T>({ bytesS, rttS, connections }: LinkOptions, nowS = 
       for (;;) {
         const ended = flows.findIndex((f) => f.bytesLeft <= doneBytes);
         if (ended >= 0) return flows.splice(ended, 1)[0].what;
-        if (nowS >= never) return undefined;
-        let next = never;
+        if (nowS >= forEver) return undefined;
+        let next = forEver;
         const active = flows.slice(0, connections).filter((f) => {
           f.startsS ??= nowS + rttS; // when its first byte may come
           if (f.startsS > nowS) next = Math.min(next, f.startsS);

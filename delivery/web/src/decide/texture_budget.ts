@@ -1,3 +1,6 @@
+import {
+  leastWeight, lossUnit, reweightings, worthwhileFinerFlip, worthwhilePart,
+} from '../format/shared_numbers';
 import type { PackageData } from '../format/tables';
 import type { QualityTable } from '../format/quality_table';
 import { FragmentList, ListOptions, fragmentList, lossesOf } from './fragment_list';
@@ -8,14 +11,6 @@ import { bytesAtRung } from './harmonic_time';
 import { PerGroup, PlaneChoice, TextureLoss, everyGroup, pictureFlip, planesForDisplay } from './texture_loss';
 
 // delivery/cpp/decide/texture_budget.cpp, bit for bit.
-
-/** FLIP that finer planes have to save. */
-const worthwhile = 2e-3;
-const reweightings = 2;
-/** Losses as spendBytes counts them. */
-const lossUnit = 2 ** 40;
-/** Of a group beside the others. */
-const leastWeight = 1e-3;
 
 /** How bytes are best spent on textures. */
 export interface TextureSpending {
@@ -74,7 +69,7 @@ export function* budgetSteps(loss: TextureLoss, options: SpendingOptions, bytes:
       const now = spend(to);
       // Finer planes take memory: they have to look better, not only as good, but not so much better than each other.
       const finer = step.includes(-1);
-      if (!now || now.flip >= best.flip || (finer && now.flip >= withoutFiner - Math.min(worthwhile, withoutFiner / 16))) continue;
+      if (!now || now.flip >= best.flip || (finer && now.flip >= withoutFiner - Math.min(worthwhileFinerFlip, worthwhilePart * withoutFiner))) continue;
       best = now;
       if (!finer) withoutFiner = now.flip;
       from = to;

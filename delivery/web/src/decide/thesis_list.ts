@@ -1,3 +1,4 @@
+import { gammaBisections } from '../format/shared_numbers';
 import type { PackageData } from '../format/tables';
 import { transferRate } from '../http/throughput';
 import { qualityOf } from './allocation';
@@ -8,8 +9,6 @@ import { interpolatedBytes } from './size_curve';
 import { type PlaneChoice, type TextureLoss, fullSize, tablesOf } from './texture_loss';
 
 // Chapter 4 as printed: gamma_for_bytes, thesis_textures and as_printed of delivery/cpp, bit for bit.
-
-const gammaBisections = 20;
 
 /** The Gamma whose list comes to so many bytes, D_i(Gamma) = D_1, by bisection; 0 or 1 where no list does. */
 export function gammaForBytes(data: PackageData, planes: readonly PlaneChoice[], scale: number, bytes: number): number {

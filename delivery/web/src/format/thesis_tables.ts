@@ -2,10 +2,10 @@ import { BytesIn, readEntryStart } from './bytes_in';
 import { thesisPath as file } from './entry_paths';
 import { FormatError } from './errors';
 import { formatMinor, type Manifest } from './manifest';
+import { gammaSteps, mostChainScales, mostTotalBytes, noIndex } from './shared_numbers';
 import type { TextureInfo } from './textures';
 
-/** Values of Gamma that tables hold sizes for: 0, 0.05 .. 1. */
-export const gammaSteps = 21;
+export { gammaSteps };
 
 /** What only the thesis's policy reads of a texture plane. F fragments, M scales of the chain by scale number; empty arrays say nothing. */
 export interface PlaneThesis {
@@ -52,8 +52,6 @@ export interface ThesisTables {
   perceptual?: PerceptualTable;
 }
 
-const wholePackage = 0xffffffff;
-const mostScales = 100;
 const none = new Float32Array(0);
 const noPlane = (): PlaneThesis => ({
   z: none, i: none, zeta: none, m: none, vqp: none, sizeA: none, sizeB: none, sizeCorrelation: none, quality: none, totalBytes: new Float64Array(0),
@@ -93,14 +91,14 @@ function readGamma(input: BytesIn, out: PlaneThesis, minor: number, lastScale: n
   const scales = input.u8();
   const width = input.u8();
   requireReserved(input, 2, minor);
-  if (scales < 1 || scales > mostScales || width < 1 || width > 8) input.fail('1 to 100 scales and a width of 1 to 8', `${scales}, ${width}`);
+  if (scales < 1 || scales > mostChainScales || width < 1 || width > 8) input.fail('1 to 100 scales and a width of 1 to 8', `${scales}, ${width}`);
   if (scales <= lastScale) input.fail(`scale ${lastScale}`, `${scales} scales`, 'R16');
   out.quality = floats(input, scales, 0, 100);
   let most = 0;
   out.totalBytes = Float64Array.from({ length: scales * gammaSteps }, () => {
     const low = input.number(Math.min(width, 4)) >>> 0;
     const bytes = width > 4 ? low + 2 ** 32 * (input.number(width - 4) >>> 0) : low;
-    if (bytes > 2 ** 53) input.fail('at most 2^53', bytes);
+    if (bytes > mostTotalBytes) input.fail('at most 2^53', bytes);
     most = Math.max(most, bytes);
     return bytes;
   });
@@ -114,10 +112,10 @@ function readPerceptual(input: BytesIn, minor: number, manifest: Manifest): Perc
   const rows = input.u8();
   requireReserved(input, 3, minor);
   const pairs = (rows * (rows - 1)) / 2;
-  if (rows < 1 || rows > mostScales || input.left < rows * 25 + pairs * 16) input.fail('a table of 1 to 100 scales', rows);
+  if (rows < 1 || rows > mostChainScales || input.left < rows * 25 + pairs * 16) input.fail('a table of 1 to 100 scales', rows);
   const scale = input.raw(rows).slice();
   scale.forEach((s, k) => {
-    if (k === 0 ? s !== 0 : s <= scale[k - 1] || s >= mostScales) input.fail('scale numbers rising from 0, below 100', s);
+    if (k === 0 ? s !== 0 : s <= scale[k - 1] || s >= mostChainScales) input.fail('scale numbers rising from 0, below 100', s);
   });
   const [triangles, collapses] = [whole(input, rows), whole(input, rows)];
   if (collapses[0] !== 0) input.fail('no collapse for S_0', collapses[0]);
@@ -137,14 +135,14 @@ export function parseThesis(bytes: Uint8Array, manifest: Manifest, textures: rea
   if (count > input.left / 12) input.fail('a section count that fits the file', count);
   const sections = Array.from({ length: count }, () => ({ id: input.u32(), plane: input.u32(), bytes: input.u32() }));
   const out: ThesisTables = { planes: textures.map(noPlane) };
-  let last = { id: 0, plane: wholePackage };
+  let last = { id: 0, plane: noIndex };
   for (const { id, plane, bytes: size } of sections) {
     if (id < last.id || (id === last.id && plane <= last.plane) || id === 0) input.fail('sections by id and plane', 'another order');
     last = { id, plane };
     const section = new BytesIn(input.raw(size), `${file}: section ${id} of plane ${plane}`, 'O05');
     if (id > 4) continue;
     if (id === 4) {
-      if (plane !== wholePackage) section.fail('a table of the package', `of plane ${plane}`);
+      if (plane !== noIndex) section.fail('a table of the package', `of plane ${plane}`);
       out.perceptual = readPerceptual(section, minor, manifest);
     } else {
       if (plane >= textures.length) section.fail('a plane', plane, 'R16');

@@ -1,3 +1,5 @@
+import { leastSeconds } from '../format/shared_numbers';
+
 /** Throughput of a connection, or of several, from transfers that have ended: delivery/cpp/decide/throughput.h. */
 export interface TransferRate {
   /**
@@ -12,7 +14,6 @@ export interface TransferRate {
   meanBytesS(seconds: number): number;
 }
 
-const leastSeconds = 1e-9;
 const none = { allBytes: 0, allSeconds: 0 };
 
 /** `initialBytesS` is beta_0, until there is a sample; > 0. */

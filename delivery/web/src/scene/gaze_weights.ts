@@ -1,10 +1,8 @@
 import { Camera, Vector2, Vector3, WebGLRenderer } from 'three';
+import { foveaRadiusDegrees, halfAcuityDegrees } from '../format/shared_numbers';
 import type { TextureInfo } from '../format/textures';
 import type { Gaze } from './api';
 import { type LookedSurface, sampleFragments } from './visible_fragments';
-
-const foveaRadiusDegrees = 0.5;
-const halfAcuityDegrees = 2.3;
 
 /**
  * What somebody resolves so many degrees beside the point that they look at, as a part of what they resolve at that point: 1 in the

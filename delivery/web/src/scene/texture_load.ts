@@ -5,10 +5,11 @@ import { clamp } from '../decide/numbers';
 import { proxyBytesBeyondStart, proxyLoss } from '../decide/proxy_choice';
 import { proxyStep } from '../decide/proxy_steps';
 import { throughputOf } from '../decide/request_groups';
-import { choiceInTime, worthwhile } from '../decide/scale_choice';
+import { choiceInTime } from '../decide/scale_choice';
 import { type PlaneChoice, pictureFlip } from '../decide/texture_loss';
 import { type VisiblePart, selectScale } from '../decide/viewing';
 import { throwIfAborted } from '../format/errors';
+import { worthwhileFlip } from '../format/shared_numbers';
 import { nextTurn, nowS, sleepS } from '../http/clock';
 import type { PlaneComposer } from './composer';
 import { FetchInTime, composeS } from './fetch_in_time';
@@ -43,7 +44,7 @@ export function stepOf(load: LoadContext): number {
 function betterThanScales(load: LoadContext, shown: number, flip: number, leftS: number): number {
   const { reader: { manifest, client }, view: { display: { heightPx } }, beta0 } = load;
   const better = (k: number): boolean =>
-    fits(load, k) && client.latencyS + proxyBytesBeyondStart(manifest, k) / beta0 < leftS && proxyLoss(manifest, k, heightPx).flip < flip - worthwhile;
+    fits(load, k) && client.latencyS + proxyBytesBeyondStart(manifest, k) / beta0 < leftS && proxyLoss(manifest, k, heightPx).flip < flip - worthwhileFlip;
   let k = manifest.proxies.length - 1;
   while (k > shown && !better(k)) --k;
   return k > shown ? k : -1;

@@ -91,7 +91,7 @@ export class SplitState {
   readonly guess = [0, 0, 0, 0];
   readonly wedges = new WedgeNotes();
   readonly queue = new SplitQueue();
-  private readonly models_ = new BitModels(m.modelCount, 200);
+  private readonly models_ = new BitModels(m.modelCount, m.limit);
   private bits_ = new BitDecoder(new Uint8Array(0));
   private work_ = 0;
   private list_ = 0; // number of the list of wedges that is offered

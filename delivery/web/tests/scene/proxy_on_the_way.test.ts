@@ -1,6 +1,7 @@
 import { describe, expect, it } from 'vitest';
 import type { LoadContext } from '../../src/scene/load_context';
-import { ProxyChoice, type ShownProxy } from '../../src/scene/proxies';
+import { ProxyOnTheWay } from '../../src/scene/load';
+import type { ShownProxy } from '../../src/scene/shown_proxy';
 import '../../src/scene/texture_load'; // or the first test would wait for it
 
 // Documents of a megabyte over 100 kB/s: scales come late, the larger proxy after half a second.
@@ -32,7 +33,7 @@ async function stepped(change: object = {}, broken = false): Promise<string[]> {
       said.push(`${k} shown`);
     },
   };
-  const choice = new ProxyChoice(load, shown as unknown as ShownProxy, async () => void said.push('documents'));
+  const choice = new ProxyOnTheWay(load, shown as unknown as ShownProxy, async () => void said.push('documents'));
   await choice.showFirst();
   await choice.showStep();
   return said;
