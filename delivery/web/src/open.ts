@@ -1,6 +1,6 @@
 import type { Object3D } from 'three';
 import { InputError } from './format/errors';
-import { nowS } from './http/clock';
+import { nowS } from './http/requests';
 import { OpenOptions, PackageReader } from './http/package_reader';
 import type { LoadOptions, LoadedModel } from './scene/api';
 import { loadModel } from './scene/load';

@@ -1,6 +1,6 @@
 import { type Camera, NeutralToneMapping, type Scene, Vector2, WebGLRenderer } from 'three';
 import { bootstrapBytes, startBytes } from './format/layout';
-import { nowS } from './http/clock';
+import { nowS } from './http/requests';
 import { type TexmeshPackage, open } from './open';
 import { nextStep } from './page/model_queue';
 import { type Host, type OpenHow, PageModel, type PageModelOptions } from './page/page_model';

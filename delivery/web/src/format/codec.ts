@@ -1,4 +1,4 @@
-import { concat } from './bytes';
+import { concat } from './sha256';
 import { FormatError } from './errors';
 
 /** How a plane's fragments are coded (format/SPEC.md, section 9). */

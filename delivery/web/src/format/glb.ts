@@ -1,4 +1,4 @@
-import { concat } from './bytes';
+import { concat } from './sha256';
 import { FormatError } from './errors';
 import { imageSize } from './image_size';
 import { mostPreviewPx } from './layout';

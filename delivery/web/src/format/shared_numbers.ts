@@ -1,22 +1,15 @@
 // Written by delivery/web/make_numbers from constants of C++: numbers that compiler and clients go by.
 
-/**
- * The version of packages that this library writes, and the highest that it reads (SPEC.md, Version history).
- */
+/** Major version of packages that this library writes and reads (SPEC.md, Version history). */
 export const formatMajor = 2;
-/**
- * The version of packages that this library writes, and the highest that it reads (SPEC.md, Version history).
- */
+/** Minor version of packages that this library writes. */
 export const formatMinor = 0;
 /**
  * The manifest with its ZIP header fits in this many bytes, whatever the model: one request bootstraps a
  * client.
  */
 export const bootstrapBytes = 16384;
-/**
- * What a client asks for in its first request. A container whose first picture ends within these bytes is
- * shown after one round trip (see start_bytes()).
- */
+/** What a client asks for in its first request. */
 export const startBytes = 45056;
 /** "Enough at any size": display_px of S_0 and the last step's up_to_px. */
 export const anyDisplayPx = 1000000000;
@@ -27,7 +20,6 @@ export const maxJsonInteger = 2 ** 53;
 export const largestHalf = 31743; // 65504
 /** Most texture planes of a package, mips included, and most rungs of a plane. */
 export const maxPackagePlanes = 10000;
-/** Most texture planes of a package, mips included, and most rungs of a plane. */
 export const maxPackageRungs = 100;
 /** Longest title in bytes of UTF-8; control characters are not allowed in it. */
 export const maxTitleBytes = 200;
@@ -95,7 +87,6 @@ export const behindOneSample = 0.5; // slope of the line that goes on behind a s
 export const proxyLossPerDoubling = 1.6;
 /** Lit pictures with at most these losses cannot be told from S_0's (SPEC.md, 5.5). */
 export const sameFlip = 0.05;
-/** Lit pictures with at most these losses cannot be told from S_0's (SPEC.md, 5.5). */
 export const sameFlipP95 = 0.15;
 export const moments = 64; // at which the time left is looked at
 export const meshTimeShare = 0.5; // of the time left

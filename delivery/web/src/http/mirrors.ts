@@ -1,7 +1,6 @@
 import { FormatError, TexmeshError, throwIfAborted } from '../format/errors';
 import { HttpClient } from './client';
-import { nowS, sleepS } from './clock';
-import type { Answer } from './requests';
+import { type Answer, nowS, sleepS } from './requests';
 import { TransferRate, transferRate } from './throughput';
 
 /** Whether asking again may give a better answer. */

@@ -8,13 +8,10 @@ import { type ByteRange, hasGlb } from '../format/manifest';
 import { requireDigest } from '../format/sha256';
 import { fragmentCount, rungCount } from '../format/tables';
 import { HttpClient } from './client';
-import { nowS } from './clock';
-import { decodeWith } from './decoding';
-import type { HttpOptions } from './options';
-import { PackageDocuments, type PlaneFiles } from './package_documents';
+import { type RequestKind, type RequestRecord, nowS } from './requests';
+import { PackageDocuments, type PlaneFiles, decodeWith } from './package_documents';
+import type { HttpOptions, OpenedStore, ReadOptions, StoreMode } from './store';
 import { RangeStore } from './range_store';
-import type { RequestKind, RequestRecord } from './requests';
-import type { OpenedStore, ReadOptions, StoreMode } from './store';
 
 /**
  * Finds out how the server can be read (SPEC.md, section 19): ranges of the container; the tree beside the container where the server

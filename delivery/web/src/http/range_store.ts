@@ -1,4 +1,4 @@
-import { concat } from '../format/bytes';
+import { concat } from '../format/sha256';
 import { FormatError, InputError } from '../format/errors';
 import { bootstrapBytes } from '../format/layout';
 import { type ByteRange, manifestOfContainer } from '../format/manifest';

@@ -3,7 +3,7 @@ import { HarmonicTimePlan, type HtcStep, type TimePlanOptions } from '../decide/
 import { type GroupedList, groupBytes, groupedList } from '../decide/request_groups';
 import type * as Printed from '../decide/thesis_list';
 import { throwIfAborted } from '../format/errors';
-import { nowS } from '../http/clock';
+import { nowS } from '../http/requests';
 import { type FragmentFetch, upgradeWishes } from './fragment_fetch';
 import type { LoadContext } from './load_context';
 import type { Transfers, Wish } from './transfers';

@@ -3,7 +3,7 @@ import { type FragmentList, type ListOptions, fragmentList } from '../decide/fra
 import { spendBytes } from '../decide/rate_distortion';
 import { isAbort, throwIfAborted } from '../format/errors';
 import type { PackageData } from '../format/tables';
-import { nextTurn, sleepS } from '../http/clock';
+import { nextTurn, sleepS } from '../http/requests';
 import type { Levels } from '../worker/protocol';
 import { FragmentFates } from './fragment_fates';
 import type { LoadContext } from './load_context';

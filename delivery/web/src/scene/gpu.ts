@@ -5,7 +5,7 @@ import {
 } from 'three';
 import { type GpuTexels, textureBytes } from '../decide/gpu_size';
 import { throwIfAborted } from '../format/errors';
-import { nowS, sleepS } from '../http/clock';
+import { nowS, sleepS } from '../http/requests';
 import { materialsOf, meshesOf, texturesOf } from './scale_parts';
 
 /** What is drawn for the first time, as a LoadContext has it. */

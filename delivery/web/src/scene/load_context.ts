@@ -1,6 +1,6 @@
 import { type Camera, Group, Vector2 } from 'three';
 import { InputError, abortError, isAbort, throwIfAborted } from '../format/errors';
-import { nowS } from '../http/clock';
+import { nowS } from '../http/requests';
 import type { PackageReader } from '../http/package_reader';
 import type { WorkerPool } from '../worker/pool';
 import type { Display, LoadEvents, LoadOptions, LoadPhase } from './api';

@@ -6,7 +6,7 @@ import { InputError, throwIfAborted } from '../format/errors';
 import { mostPreviewPx } from '../format/layout';
 import type { PackageData } from '../format/tables';
 import { type TextureInfo } from '../format/textures';
-import { nowS } from '../http/clock';
+import { nowS } from '../http/requests';
 import type { Levels } from '../worker/protocol';
 import type { Compression } from './blocks/compression';
 import type { PlaneComposer } from './composer';

@@ -10,7 +10,7 @@ import { type PlaneChoice, pictureFlip } from '../decide/texture_loss';
 import { type VisiblePart, selectScale } from '../decide/viewing';
 import { throwIfAborted } from '../format/errors';
 import { worthwhileFlip } from '../format/shared_numbers';
-import { nextTurn, nowS, sleepS } from '../http/clock';
+import { nextTurn, nowS, sleepS } from '../http/requests';
 import type { PlaneComposer } from './composer';
 import { FetchInTime, composeS } from './fetch_in_time';
 import { FragmentFetch, allWishes, bestWishes, requestBytes } from './fragment_fetch';

@@ -1,10 +1,9 @@
 import type { BlockLevel, BlockRequest, Pixels } from '../blocks/formats';
-import { samePrefix } from '../format/bytes';
+import { samePrefix, sha256 } from '../format/sha256';
 import { codecTraits, joinFragment } from '../format/codec';
 import * as documents from '../format/documents';
 import { FormatError, TexmeshError } from '../format/errors';
 import { imageSize } from '../format/image_size';
-import { sha256 } from '../format/sha256';
 import { type SplitGrid, type SplitStreamHead, SplitStreamReader } from '../format/splits/split_stream';
 import { octahedralVector } from '../format/splits/split_values';
 import type {

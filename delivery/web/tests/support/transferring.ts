@@ -1,5 +1,4 @@
-import { samePrefix } from '../../src/format/bytes';
-import { sha256 } from '../../src/format/sha256';
+import { samePrefix, sha256 } from '../../src/format/sha256';
 import { FormatError, type FragmentList, PackageReader, fragmentList, fullSize } from '../../src/reader';
 import { Transfers, type Wish } from '../../src/scene/transfers';
 import { WorkerPool } from '../../src/worker/pool';

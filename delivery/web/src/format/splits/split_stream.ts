@@ -1,8 +1,7 @@
-import { samePrefix } from '../bytes';
+import { samePrefix, sha256 } from '../sha256';
 import { BytesIn } from '../bytes_in';
 import { FormatError } from '../errors';
 import { splitStreamPath as file } from '../layout';
-import { sha256 } from '../sha256';
 import { mostPerByte, mostSplits, splitStreamMajor } from '../shared_numbers';
 import { SplitCodec } from './split_codec';
 import { ValueDecoder, valueModelCount } from './split_coder';

@@ -7,9 +7,8 @@ import type { PlaneComposer } from '../composer';
 import { eachPiece, uploadAll } from '../enlarge';
 import type { LoadContext } from '../load_context';
 import type { UploadQueue } from '../upload_queue';
-import { BlockStorage } from './block_storage';
+import { BlockStorage, readPicture } from './block_storage';
 import { type Way, blocksFor, bytesBy, formatsOf } from './gpu_formats';
-import { readPicture } from './read_picture';
 import { readTwoChannels } from './two_channels';
 
 /** Fills a plane of blocks with a texture, scaled bilinearly: the GPU draws it piece by piece, workers make the blocks. */
