@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "format/documents/perceptual_table.h"
+#include "format/documents/thesis_tables.h"
 
 namespace texmesh {
 

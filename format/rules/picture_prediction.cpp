@@ -43,7 +43,9 @@ double beyond_sizes(const QualityTable& table, double displayed_px) {
   const double px = std::max(displayed_px, 1.0);
   const double nearest =
       std::clamp(px, static_cast<double>(table.sizes_px.front()), static_cast<double>(table.sizes_px.back()));
-  return px == nearest ? 1 : portable::pow(GroupCurve::kLossPerDoubling, portable::log(px / nearest) / portable::kLn2);
+  return px == nearest
+             ? 1
+             : portable::pow(GroupCurve::kLossPerDoubling, portable::log(px / nearest) / portable::kLn2);
 }
 
 double mixed(double a, double b, double part) { return (1 - part) * a + part * b; }

@@ -8,7 +8,6 @@
 #include "delivery/cpp/decide/texture_budget.h"
 #include "delivery/cpp/simulate/network_model.h"
 #include "delivery/cpp/simulate/simulation.h"
-#include "format/rules/proxy_steps.h"
 #include "format/rules/viewing.h"
 
 namespace texmesh {
