@@ -1,7 +1,7 @@
 import type { PlaneTables } from '../format/tables';
 import { positive, sumOf } from './numbers';
 
-// How a budget of bytes is best spent: format/rules/rate_distortion.cpp, bit for bit.
+// How a budget of bytes is best spent: format/rules/allocation.cpp, bit for bit.
 
 /**
  * Weight of a fragment's quality: its surface fraction, with the area per texel capped at the 99th percentile of

@@ -305,7 +305,7 @@ class SplitPatches {
   }
 }
 
-/** The reader's side of format/split/codec/split_codec.h: points are asked in the same order, every decision is read from the stream. */
+/** The reader's side of format/split/split_codec.h: points are asked in the same order, every decision is read from the stream. */
 export class SplitCodec {
   private readonly state_: SplitState;
   private readonly vertices_: SplitVertices;

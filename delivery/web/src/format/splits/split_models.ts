@@ -2,7 +2,7 @@ import {
   splitDegrees, splitLefts, splitModelLimit, splitRings, splitRuns, splitValences,
 } from '../shared_numbers';
 
-// Places of the probabilities of the connectivity part: the kinds of SplitModels in format/split/codec/split_models.h, and how many contexts
+// Places of the probabilities of the connectivity part: the kinds of SplitModels in format/split/split_element_codec.h, and how many contexts
 // each kind has.
 
 export {
