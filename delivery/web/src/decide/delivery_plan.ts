@@ -4,7 +4,7 @@ import { worthwhileFlip } from '../format/shared_numbers';
 import type { PackageData } from '../format/tables';
 import { scaleWithin } from './gpu_memory';
 import { proxyBytes, scaleBytes, textureBytes } from './gpu_size';
-import type { TimePlanOptions } from './harmonic_time';
+import type { PlanLimits, TimePlanOptions } from './harmonic_time';
 import { LinkOptions, fetchedS } from './simulation';
 import { beyondStart, proxyBytesBeyondStart, proxyLoss, servingProxy } from './proxy_choice';
 import { proxyStep } from './proxy_steps';
@@ -27,7 +27,7 @@ export interface DeliveryRequest {
   /** GPU memory for mesh and textures; left out: any. What is least takes its place where nothing fits. */
   memoryBytes?: number;
   /** The plan by which fragments are fetched; left out: that of loads with the policy guard. */
-  plan?: (options: Pick<TimePlanOptions, 'timeLimitS' | 'initialBytesS' | 'rttS'>) => TimePlanOptions;
+  plan?: (options: PlanLimits) => TimePlanOptions;
   /** The policy thesis: see asPrinted() of texmesh/thesis. */
   textures?: InTimeRequest['textures'];
 }
@@ -136,7 +136,8 @@ export function planDelivery(data: PackageData, request: DeliveryRequest): Deliv
       // Where the first request has brought all, that request shows the throughput.
       const [shown, shownS] = moved > 0 ? [moved, meshS - fromS] : [firstBytes(manifest), fromS];
       const initialBytesS = request.beta0BytesS > 0 ? request.beta0BytesS : shown / Math.max(1e-9, shownS - link.rttS);
-      return { plan: plan({ timeLimitS: timeLimitS - meshS, initialBytesS, rttS: link.rttS }), linkBytesS: link.bytesS };
+      const left = { timeLimitS: timeLimitS - meshS, initialBytesS, rttS: link.rttS };
+      return { plan: plan(left), linkBytesS: link.bytesS };
     },
   });
   let at = steps.next();

@@ -62,13 +62,16 @@ export interface HtcStep {
   residualS: number;
 }
 
-/** Options of a plan. Those that may be left out have the values of the policy guard. */
-export interface TimePlanOptions {
-  policy: Policy;
-  order: HtcOrder;
+/** Time and link of a plan: T_0, beta_0 and the round trip. */
+export interface PlanLimits {
   timeLimitS: number;
   initialBytesS: number;
   rttS: number;
+}
+/** Options of a plan. Those that may be left out have the values of the policy guard. */
+export interface TimePlanOptions extends PlanLimits {
+  policy: Policy;
+  order: HtcOrder;
   /** Least and most requests in flight; between them, as many as the link needs. */
   leastInFlight?: number;
   mostInFlight?: number;
@@ -264,7 +267,8 @@ export class HarmonicTimePlan {
     const rung = this.rungOf_(offer, targetBytes);
     const step: HtcStep = {
       position: this.steps.length + 1, offer, rung, bytes: bytesAtRung(this.offers_[offer], rung),
-      creditS, thetaS, targetBytes, throughputBytesS, issuedS: this.nowS_, doneS: -1, spacingS: 0, residualS: 0,
+      creditS, thetaS, targetBytes, throughputBytesS,
+      issuedS: this.nowS_, doneS: -1, spacingS: 0, residualS: 0,
     };
     this.remaining_.splice(this.remaining_.indexOf(offer), 1);
     for (const bytes of [this.smallest_, this.limited_, this.planned_]) bytes.issue(offer);

@@ -54,7 +54,8 @@ class Curve {
     while (i + 2 < x.length && x[i + 1] < logDssim) ++i;
     const slope = (y[i + 1] - y[i]) / (x[i + 1] - x[i]);
     const from = logDssim > x[i + 1] ? i + 1 : i;
-    return exp(y[from] + (from > i || logDssim < x[0] ? clamp(slope, flattest, steepest) : slope) * (logDssim - x[from]));
+    const beyond = from > i || logDssim < x[0];
+    return exp(y[from] + (beyond ? clamp(slope, flattest, steepest) : slope) * (logDssim - x[from]));
   }
   /** Behind the coarsest sampled level towards the preview's. */
   atLevel(level: number, previewLevel: number): number {

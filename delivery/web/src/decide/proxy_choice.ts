@@ -15,7 +15,8 @@ function lossAt(sizes: readonly number[], losses: readonly number[], displayedPx
   const px = Math.max(displayedPx, 1);
   const last = sizes.length - 1;
   if (px <= sizes[0]) return losses[0];
-  if (px >= sizes[last]) return Math.min(1, losses[last] * pow(proxyLossPerDoubling, log(px / sizes[last]) / ln2));
+  const doublings = log(px / sizes[last]) / ln2;
+  if (px >= sizes[last]) return Math.min(1, losses[last] * pow(proxyLossPerDoubling, doublings));
   const i = sizes.findIndex((size) => size >= px) - 1;
   const from = log(sizes[i]);
   const part = (log(px) - from) / (log(sizes[i + 1]) - from);

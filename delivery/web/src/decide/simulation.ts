@@ -2,7 +2,8 @@ import { doneBytes, forEver } from '../format/shared_numbers';
 import { FragmentOffer, HarmonicTimePlan, HtcStep, TimePlanOptions, bytesAtRung } from './harmonic_time';
 import { sumOf } from './numbers';
 
-// delivery/cpp/simulate/network_model.h for one server on a link of constant rate: the same arithmetic, the same bits.
+// delivery/cpp/simulate/network_model.h for one server on a link of constant rate: the same arithmetic, the
+// same bits.
 
 /** A link as a plan supposes it. */
 export interface LinkOptions {
@@ -78,7 +79,8 @@ export function fetchedS(link: LinkOptions, fromS: number, bytes: number): numbe
   return model.nowS;
 }
 
-// delivery/cpp/simulate/simulation.h for one server on a link of constant rate: the same arithmetic, the same bits.
+// delivery/cpp/simulate/simulation.h for one server on a link of constant rate: the same arithmetic, the same
+// bits.
 
 /** The course of a plan over a link. */
 export interface Simulated {

@@ -69,7 +69,8 @@ export function* budgetSteps(loss: TextureLoss, options: SpendingOptions, bytes:
       const now = spend(to);
       // Finer planes take memory: they have to look better, not only as good, but not so much better than each other.
       const finer = step.includes(-1);
-      if (!now || now.flip >= best.flip || (finer && now.flip >= withoutFiner - Math.min(worthwhileFinerFlip, worthwhilePart * withoutFiner))) continue;
+      const least = Math.min(worthwhileFinerFlip, worthwhilePart * withoutFiner);
+      if (!now || now.flip >= best.flip || (finer && now.flip >= withoutFiner - least)) continue;
       best = now;
       if (!finer) withoutFiner = now.flip;
       from = to;

@@ -4,7 +4,7 @@ import { transferRate } from '../http/throughput';
 import { qualityOf } from './allocation';
 import type { DeliveryRequest } from './delivery_plan';
 import { type FragmentList, type ListOptions, fragmentList } from './fragment_list';
-import { type TimePlanOptions, meanOffer } from './harmonic_time';
+import { type PlanLimits, type TimePlanOptions, meanOffer } from './harmonic_time';
 import { interpolatedBytes } from './size_curve';
 import { type PlaneChoice, type TextureLoss, fullSize, tablesOf } from './texture_loss';
 
@@ -34,8 +34,8 @@ export function gammaForBytes(data: PackageData, planes: readonly PlaneChoice[],
 }
 
 /**
- * A list of all fragments as printed: etas count from Gamma, the limits are Q_i - dQ and Q_i + dQ, and F-bar, the fragment nearest to Gamma,
- * is sent at Q_i itself.
+ * A list of all fragments as printed: etas count from Gamma, the limits are Q_i - dQ and Q_i + dQ, and F-bar,
+ * the fragment nearest to Gamma, is sent at Q_i itself.
  */
 function asPrintedList(data: PackageData, { offers, fragments }: FragmentList, { scale, gamma, qualityLow, qualityHigh }: ListOptions): void {
   const row = data.manifest.scales.findIndex((s) => s.scale === scale);
@@ -66,14 +66,15 @@ export function thesisTextures(loss: TextureLoss, scale: number, bytes: number):
 }
 
 /**
- * The plan as printed: order by beta_0, one request at a time, each with a round trip of its own; never below the lower
- * limit, nothing skipped; the last transfer tells the throughput.
+ * The plan as printed: order by beta_0, one request at a time, each with a round trip of its own; never below
+ * the lower limit, nothing skipped; the last transfer tells the throughput.
  */
-export function printedPlan(options: Pick<TimePlanOptions, 'timeLimitS' | 'initialBytesS' | 'rttS'>): TimePlanOptions {
+export function printedPlan(options: PlanLimits): TimePlanOptions {
   const rate = transferRate(options.initialBytesS);
   return {
-    policy: 'thesis', order: 'beta0', ...options, leastInFlight: 1, mostInFlight: 1, latencyS: 0, waitS: options.rttS,
-    lowestRung: (f) => Math.min(f.lowRung, f.bytes.length - 1), skips: false, rate, estimate: () => rate.recentBytesS(1),
+    policy: 'thesis', order: 'beta0', ...options, leastInFlight: 1, mostInFlight: 1,
+    latencyS: 0, waitS: options.rttS, rate, estimate: () => rate.recentBytesS(1),
+    lowestRung: (f) => Math.min(f.lowRung, f.bytes.length - 1), skips: false,
   };
 }
 
