@@ -59,6 +59,7 @@ export interface ThesisTextures {
   options: Partial<ListOptions>;
   list: FragmentList;
 }
+/** The textures that so many bytes show of a scale. */
 export function thesisTextures(loss: TextureLoss, scale: number, bytes: number): ThesisTextures {
   const planes = fullSize(loss.data.textures);
   const options = { scale, displayedPx: loss.displayedPx, printed: asPrintedList, gamma: gammaForBytes(loss.data, planes, scale, bytes) };
