@@ -41,7 +41,6 @@ export const maxTexturesBytes = 2 ** 25;
 export const maxFragments = 65535;
 export const maxScaleCount = 100;
 export const maxPlaneCells = 2 ** 24;
-export const featureLimit = 2 ** 24;
 export const largestMse = 65025;
 /** PlaneTables::allocation where VQP takes the place of eta. */
 export const byVqp = 3;

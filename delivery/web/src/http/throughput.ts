@@ -1,4 +1,4 @@
-import { leastSeconds } from '../format/shared_numbers';
+import { leastSeconds, windowSamples } from '../format/shared_numbers';
 
 /** Throughput of a connection, or of several, from transfers that have ended: delivery/cpp/decide/throughput.h. */
 export interface TransferRate {
@@ -8,7 +8,7 @@ export interface TransferRate {
    * between what the link has given with nothing of the others and with all of the others.
    */
   add(bytes: number, seconds: number, others?: number, othersBytes?: number): void;
-  /** Bytes over seconds of at most so many samples (default 10). */
+  /** Bytes over seconds of at most so many samples (default windowSamples). */
   recentBytesS(samples?: number): number;
   /** The mean of the last `seconds` > 0 of transfers; time before the first transfer counts with beta_0. */
   meanBytesS(seconds: number): number;
@@ -30,7 +30,7 @@ export function transferRate(initialBytesS: number): TransferRate {
       starting &&= ended.length <= others;
       startBytesS = Math.min(Math.max(initialBytesS, all.allBytes / all.allSeconds), (all.allBytes + othersBytes) / all.allSeconds);
     },
-    recentBytesS(samples = 10) {
+    recentBytesS(samples = windowSamples) {
       if (starting) return startBytesS;
       let [bytes, seconds] = [0, 0];
       for (const sample of ended.slice(-samples).reverse()) {
