@@ -15,6 +15,9 @@
 
 namespace texmesh {
 
+// Texts and JSON that strangers wrote, made fit to be shown (clean_text), bounded before they are parsed
+// (bounded_json.h), and read field by field (json_fields.h).
+
 std::string clean_text(const std::string& text, std::size_t max_bytes) {
   std::string out;
   for (std::size_t i = 0; i < text.size();) {

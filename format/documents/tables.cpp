@@ -12,6 +12,9 @@
 #include "format/container/layout.h"
 
 namespace texmesh {
+
+// tables.bin: what holds for the tables of a plane, for their writer and their reader, and its bytes.
+
 namespace {
 
 /// Throws RuleError for tables.bin.

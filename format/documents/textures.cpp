@@ -12,6 +12,9 @@
 #include "format/documents/quality_table.h"
 
 namespace texmesh {
+
+// textures.json says what the planes are, quality.json what a picture loses by scales, rungs and mips.
+
 namespace {
 
 using Json = nlohmann::ordered_json;

@@ -11,10 +11,9 @@
 
 namespace texmesh {
 
-// Thesis 3.2-3.3: from feature counts to the quality that a fragment is asked to have.
-
-// Which rung of which fragment a budget is best spent on (facts: surface-weighted 1 - SSIM; convex hulls and
-// one price for all, Everett 1963, Shoham and Gersho 1988).
+// Two ways to choose rungs. Thesis 3.2-3.3: feature counts give the quality that a fragment is asked to have.
+// allocate_rd(): a budget is spent on the rungs that save most surface-weighted 1 - SSIM for a byte, along
+// convex hulls and with one price for all (Everett 1963, Shoham and Gersho 1988).
 
 namespace {
 

@@ -10,6 +10,10 @@
 
 namespace texmesh {
 
+// The order of decisions of mesh/stream.bin, for writer and reader. SplitQueue says which point is asked
+// next. SplitMoveCodec and SplitVertexCodec code one split: which faces and corners move to the new vertex,
+// and which faces are born. SplitPatchCodec codes faces that no split makes. SplitCodec puts them together.
+
 /// Steps by which memory is asked for what a split of a point will read: of the mesh the corners at the
 /// point, one after the other, and of the writer's knowledge what the split makes and moves.
 enum class SplitStep : std::uint8_t {

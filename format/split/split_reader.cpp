@@ -16,6 +16,10 @@
 #include "format/split/split_model.h"
 
 namespace texmesh {
+
+// The reader of mesh/stream.bin: what a block says becomes part of a SplitMesh, points that were lost are
+// placed among their neighbours, and split_model() makes a Mesh of the whole.
+
 namespace {
 
 /// A neighbour in the chart of the point: texture coordinates relative to the point's, and its place.

@@ -19,6 +19,12 @@
 
 namespace texmesh {
 
+// The writer of mesh/stream.bin. A SplitSource says which splits lead from one scale to the next finer one.
+// SplitTruth follows the stream's mesh beside the source, and answers what SplitCodec asks about the split or
+// face under way. EncodingChannel codes these answers at once and keeps the values' symbols. When all blocks
+// are known, SplitStreamWriter starts each part's models by the counts of the whole stream and codes the
+// symbols.
+
 void fail_split_source(const std::string& place, const std::string& expected, const std::string& found) {
   throw FormatError("split source", place, expected, found);
 }
