@@ -3,7 +3,6 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "format/base/errors.h"
 #include "pipeline/batch/progress.h"
 #include "pipeline/cache/disk_store.h"
 #include "pipeline/cache/prune.h"

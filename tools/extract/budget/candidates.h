@@ -1,12 +1,7 @@
 #pragma once
 #include <compare>
-#include <cstdint>
-#include <map>
-#include <memory>
-#include <optional>
 #include <span>
 #include <utility>
-#include <vector>
 
 #include "tools/extract/budget/reference.h"
 #include "tools/extract/glb/joined_jpeg.h"

@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <array>
-#include <nlohmann/json.hpp>
 
 #include "format/base/box.h"
-#include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "format/base/srgb.h"
 #include "format/split/split_stream.h"

@@ -1,9 +1,6 @@
 #include "tools/extract/proxy/proxy_search.h"
 
 #include <algorithm>
-#include <map>
-#include <optional>
-#include <utility>
 
 #include "format/base/portable_math.h"
 #include "format/container/layout.h"
