@@ -4,12 +4,17 @@
 #include <vector>
 
 #include "delivery/cpp/package/package_reader.h"
+#include "format/base/fields.h"
 #include "stages/base/run_context.h"
 
 namespace texmesh {
 
 /// Whose form a package gets.
 enum class ExportTarget : std::uint8_t { k3dTiles, kGltfLod, kModelViewer, kOembed };
+template <>
+struct EnumNames<ExportTarget> {
+  static constexpr std::array<std::string_view, 4> names{"3dtiles", "gltf-lod", "model-viewer", "oembed"};
+};
 
 struct ExportOptions {
   ExportTarget target = ExportTarget::k3dTiles;
@@ -47,9 +52,6 @@ struct Export {
   std::vector<ExportedCopy> copies;
   std::vector<std::string> notes;
 };
-
-/// What --to calls the target.
-const char* target_name(ExportTarget target);
 
 /// A package in the form of another viewer. `path` is the package's own, for oembed, which copies it. Same
 /// bytes for any thread count and machine. InputError with the reason where the target cannot hold the
