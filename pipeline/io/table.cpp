@@ -180,8 +180,11 @@ Json Table::json() const {
   Json list = Json::array();
   for (const auto& row : rows) {
     Json object = Json::object();
-    for (std::size_t k = 0; k < columns.size(); ++k)
-      if (!columns[k].key.empty()) object[columns[k].key] = cell_json(cell_of(row, k));
+    for (std::size_t k = 0; k < columns.size(); ++k) {
+      const Cell& cell = cell_of(row, k);
+      const bool left_out = !columns[k].shown && std::holds_alternative<std::monostate>(cell.value);
+      if (!columns[k].key.empty() && !left_out) object[columns[k].key] = cell_json(cell);
+    }
     list.push_back(std::move(object));
   }
   return list;

@@ -6,7 +6,6 @@
 
 #include "pipeline/io/text_table.h"
 #include "tools/inspect/atlas/atlas_advice.h"
-#include "tools/inspect/dump/dump_cells.h"
 
 namespace texmesh {
 namespace {
