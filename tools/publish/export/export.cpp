@@ -16,7 +16,7 @@
 #include "tools/publish/export/page_files.h"
 #include "tools/publish/export/target_page.h"
 #include "tools/publish/export/tileset.h"
-#include "tools/publish/view/site.h"
+#include "tools/publish/view/served_files.h"
 
 namespace texmesh {
 namespace {

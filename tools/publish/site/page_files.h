@@ -5,7 +5,7 @@
 
 namespace texmesh {
 
-/// The files of page/: what a gallery is made of.
+/// The files of page/: what a site is made of.
 std::span<const BuiltInFile> site_page_files();
 
 }  // namespace texmesh

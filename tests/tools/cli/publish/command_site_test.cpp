@@ -1,4 +1,4 @@
-// texmesh site as a user runs it: a gallery of good, damaged and hostile packages.
+// texmesh site as a user runs it: a site of good, damaged and hostile packages.
 #include <gtest/gtest.h>
 
 #include <filesystem>

@@ -1,4 +1,4 @@
-// Forms for other viewers, each opened by the program that it is for, and the gallery.
+// Forms for other viewers, each opened by the program that it is for, and the site.
 import {spawn} from 'node:child_process';
 import {createHash} from 'node:crypto';
 import {unfurl} from 'unfurl.js';
@@ -8,18 +8,18 @@ import {nginxMissing, startNginx} from './nginx.mjs';
 import {axe, kDesktop, kPhone} from './viewer-tests.mjs';
 
 const modules = path.join(here, 'node_modules');
-const doors = path.join(env.work, 'doors');
+const published = path.join(env.work, 'published');
 const roots = {
-  '/out/': doors, '/three/': path.join(modules, 'three'), '/tiles-renderer/': path.join(modules, '3d-tiles-renderer'),
+  '/out/': published, '/three/': path.join(modules, 'three'), '/tiles-renderer/': path.join(modules, '3d-tiles-renderer'),
   '/babylonjs/': path.join(modules, 'babylonjs'), '/babylonjs-loaders/': path.join(modules, 'babylonjs-loaders'),
   '/model-viewer/': path.join(modules, '@google/model-viewer/dist'), '/': path.join(here, 'page'),
 };
 
 /** `texmesh export` of one of the tests' packages into a folder of its own. */
 function exported(name, target, ...more) {
-  fs.mkdirSync(doors, {recursive: true});
+  fs.mkdirSync(published, {recursive: true});
   const folder = `${target}-${name}${more.filter((m) => m.startsWith('--')).join('')}`;
-  run(env.texmesh, 'export', path.join(packages, `${name}.texmesh`), '--to', target, '-o', path.join(doors, folder), ...more);
+  run(env.texmesh, 'export', path.join(packages, `${name}.texmesh`), '--to', target, '-o', path.join(published, folder), ...more);
   return folder;
 }
 
@@ -88,9 +88,9 @@ function chainOf(tileset, folder) {
 }
 
 for (const name of ['large', 'colours']) {
-  test(`doors: a tileset in 3d-tiles-renderer (${name})`, async () => {
+  test(`export: a tileset in 3d-tiles-renderer (${name})`, async () => {
     const folder = exported(name, '3dtiles');
-    const tiles = chainOf(JSON.parse(fs.readFileSync(path.join(doors, folder, 'tileset.json'))), path.join(doors, folder));
+    const tiles = chainOf(JSON.parse(fs.readFileSync(path.join(published, folder, 'tileset.json'))), path.join(published, folder));
     check(tiles.length >= 2, `${tiles.length} tiles`);
     const seen = [];
     await withPage('tiles.html', async (page, base) => {
@@ -113,9 +113,9 @@ for (const name of ['large', 'colours']) {
   }, {seconds: 120});
 }
 
-test('doors: levels of detail in three.js', async () => {
+test('export: levels of detail in three.js', async () => {
   const folder = exported('maps', 'gltf-lod');
-  const single = path.join(doors, 'maps-s0.glb');
+  const single = path.join(published, 'maps-s0.glb');
   run(env.texmesh, 'extract', path.join(packages, 'maps.texmesh'), '--scale', '0', '-o', single);
   await withPage('tiles.html', async (page, base) => {
     await page.waitForFunction('window.ready');
@@ -131,7 +131,7 @@ test('doors: levels of detail in three.js', async () => {
   });
 }, {seconds: 90});
 
-test('doors: levels of detail in Babylon.js, the coarsest first', async () => {
+test('export: levels of detail in Babylon.js, the coarsest first', async () => {
   const folder = exported('maps', 'gltf-lod');
   const {scales} = JSON.parse(run(env.texmesh, 'dump', path.join(packages, 'maps.texmesh'), 'scales', '--json'));
   await withPage('babylon.html', async (page, base) => {
@@ -150,7 +150,7 @@ test('doors: levels of detail in Babylon.js, the coarsest first', async () => {
 /** What <model-viewer> says of itself once it shows something. */
 const modelShown = (page) => page.waitForFunction(() => document.querySelector('model-viewer').loaded, null, {timeout: 45000});
 
-test('doors: 220 materials, each with a texture, in all that read GLBs', async () => {
+test('export: 220 materials, each with a texture, in all that read GLBs', async () => {
   fs.copyFileSync(path.join(env.source, 'tests/golden/v2.0-planes.texmesh'), path.join(packages, 'planes.texmesh'));
   const [tileset, lods] = ['3dtiles', 'gltf-lod'].map((target) => exported('planes', target));
   const single = exported('planes', 'model-viewer', '--plain', '--script', '../../model-viewer/model-viewer.min.js');
@@ -172,7 +172,7 @@ test('doors: 220 materials, each with a texture, in all that read GLBs', async (
 for (const [name, how, options] of [
   ['maps', 'plain', {}], ['colours', 'plain', {viewport: kPhone, touch: true}], ['maps', 'draco', {dark: true}],
 ]) {
-  test(`doors: a page with model-viewer (${name}, ${how}${options.touch ? ', phone' : ''})`, async () => {
+  test(`export: a page with model-viewer (${name}, ${how}${options.touch ? ', phone' : ''})`, async () => {
     const folder = exported(name, 'model-viewer', '--script', '../../model-viewer/model-viewer.min.js', ...(how === 'plain' ? ['--plain'] : []));
     // Its decoder of Draco comes from Google.
     const elsewhere = how === 'plain' ? [] : [{
@@ -193,24 +193,24 @@ for (const [name, how, options] of [
   }, {seconds: 90});
 }
 
-test('doors: the script of model-viewer is the one whose digest the page has', () => {
+test('export: the script of model-viewer is the one whose digest the page has', () => {
   const folder = exported('maps', 'model-viewer');
-  const page = fs.readFileSync(path.join(doors, folder, 'index.html'), 'utf8');
+  const page = fs.readFileSync(path.join(published, folder, 'index.html'), 'utf8');
   const {version} = JSON.parse(fs.readFileSync(path.join(modules, '@google/model-viewer/package.json')));
   check(page.includes(`@google/model-viewer@${version}/`), `the tests have version ${version}`);
   const digest = createHash('sha384').update(fs.readFileSync(path.join(roots['/model-viewer/'], 'model-viewer.min.js'))).digest('base64');
   check(page.includes(`integrity="sha384-${digest}"`), 'another digest');
 });
 
-test('doors: an oEmbed answer, and its frame on a page of others', async () => {
+test('export: an oEmbed answer, and its frame on a page of others', async () => {
   const {browser} = await common();
-  const [server, other] = [await serve(roots, {}), await serve({'/': doors}, {})];
+  const [server, other] = [await serve(roots, {}), await serve({'/': published}, {})];
   const page = await browser.newPage({viewport: kDesktop});
   listen(page);
   try {
     exported('maps', 'oembed', '--url', `${server.url}/out/frame/`, '--viewer', env.viewer, '--width', '700');
-    fs.rmSync(path.join(doors, 'frame'), {recursive: true, force: true});
-    fs.renameSync(path.join(doors, 'oembed-maps--url--viewer--width'), path.join(doors, 'frame'));
+    fs.rmSync(path.join(published, 'frame'), {recursive: true, force: true});
+    fs.renameSync(path.join(published, 'oembed-maps--url--viewer--width'), path.join(published, 'frame'));
     // As a consumer finds it: the object's page, its link, the answer, the HTML.
     await page.goto(`${server.url}/out/frame/index.html`);
     const href = await page.locator('link[type="application/json+oembed"]').getAttribute('href');
@@ -222,7 +222,7 @@ test('doors: an oEmbed answer, and its frame on a page of others', async () => {
     check(oEmbed?.type === 'rich' && oEmbed.html === answer.html.replaceAll('&amp;', '&') && oEmbed.width === 700 && oEmbed.thumbnails[0].url === answer.thumbnail_url, JSON.stringify(oEmbed));
     const thumbnail = await fetch(answer.thumbnail_url);
     check(thumbnail.ok && thumbnail.headers.get('content-type') === 'image/jpeg', `${answer.thumbnail_url}: ${thumbnail.status}`);
-    fs.writeFileSync(path.join(doors, 'other.html'), `<!doctype html><html lang="en"><title>others</title><link rel="icon" href="data:,"><p>A page of others.</p>${answer.html}`);
+    fs.writeFileSync(path.join(published, 'other.html'), `<!doctype html><html lang="en"><title>others</title><link rel="icon" href="data:,"><p>A page of others.</p>${answer.html}`);
     await page.goto(`${other.url}/other.html`);
     await page.locator('iframe').scrollIntoViewIfNeeded();
     const frame = await (await page.waitForSelector('iframe')).contentFrame();
@@ -237,12 +237,12 @@ test('doors: an oEmbed answer, and its frame on a page of others', async () => {
   }
 }, {seconds: 90});
 
-/** A gallery of the tests' packages, once. */
+/** A site of the tests' packages, once. */
 let made;
-function gallery() {
+function site() {
   if (made) return made;
-  const www = path.join(doors, 'www');
-  fs.mkdirSync(doors, {recursive: true});
+  const www = path.join(published, 'www');
+  fs.mkdirSync(published, {recursive: true});
   run(env.texmesh, 'site', path.join(packages, 'alone'), '-o', www, '--viewer', env.viewer, '--title', 'Scans of the tests');
   return (made = www);
 }
@@ -254,8 +254,8 @@ const kWatchShifts = () => {
 };
 
 for (const [name, options] of [['desktop', {}], ['desktop-dark', {dark: true}], ['phone', {viewport: kPhone, touch: true}], ['phone-dark', {viewport: kPhone, touch: true, dark: true}]]) {
-  test(`gallery: list and object, nothing moves, axe, nothing asked elsewhere (${name})`, async () => {
-    gallery();
+  test(`site: list and object, nothing moves, axe, nothing asked elsewhere (${name})`, async () => {
+    site();
     const looked = async (page, what) => {
       await page.evaluate(axe);
       const {violations, passes} = await page.evaluate(() => window.axe.run(document, {resultTypes: ['violations', 'passes']}));
@@ -266,7 +266,7 @@ for (const [name, options] of [['desktop', {}], ['desktop-dark', {dark: true}], 
     await withPage('out/www/index.html', async (page, base) => {
       await page.evaluate(kWatchShifts);
       await page.waitForLoadState('networkidle');
-      await shot(page, `gallery-${name}`);
+      await shot(page, `site-${name}`);
       check(await page.locator('#objects > li').count() === fs.readdirSync(path.join(packages, 'alone')).length, 'a package is missing');
       check(await page.evaluate(() => [...document.images].every((i) => i.loading === 'lazy' || i.naturalWidth > 0)), 'a poster did not come');
       await page.evaluate(() => scrollTo(0, document.body.scrollHeight));
@@ -276,22 +276,22 @@ for (const [name, options] of [['desktop', {}], ['desktop-dark', {dark: true}], 
       await page.goto(`${base}/out/www/objects/maps.html`);
       await page.evaluate(kWatchShifts);
       await page.waitForLoadState('networkidle');
-      await shot(page, `gallery-object-${name}`);
+      await shot(page, `site-object-${name}`);
       await looked(page, 'object');
       check(page.wentTo.every((u) => !u.includes('/viewer/')), 'the viewer comes before it is asked for');
       await page.locator('#show').click();
       const frame = await (await page.waitForSelector('iframe')).contentFrame();
       await frame.waitForFunction(() => window.texmeshViewer?.session.live.phase === 'done', null, {timeout: 60000});
       await page.waitForTimeout(300);
-      await shot(page, `gallery-3d-${name}`);
+      await shot(page, `site-3d-${name}`);
       check(await page.evaluate(() => window.shifts) < 0.01, `shifts of ${await page.evaluate(() => window.shifts)}`);
       check((await page.locator('iframe').screenshot()).length > 8000, 'the frame is empty');
     }, options);
   }, {seconds: 120});
 }
 
-test('gallery: search and keyboard', async () => {
-  gallery();
+test('site: search and keyboard', async () => {
+  site();
   await withPage('out/www/index.html', async (page) => {
     await page.keyboard.press('Tab');
     check(await page.evaluate(() => document.activeElement.className) === 'skip', 'the first key leads past the head');
@@ -314,8 +314,8 @@ test('gallery: search and keyboard', async () => {
   });
 }, {seconds: 90});
 
-test('gallery: without scripts the objects are links to the viewer', async () => {
-  gallery();
+test('site: without scripts the objects are links to the viewer', async () => {
+  site();
   await withPage('out/www/index.html', async (page) => {
     check(await page.locator('.search').isHidden(), 'a search that does nothing');
     await page.locator('#objects a').first().click();
@@ -323,9 +323,9 @@ test('gallery: without scripts the objects are links to the viewer', async () =>
   }, {script: false});
 });
 
-test('gallery: behind nginx', async ({skip}) => {
+test('site: behind nginx', async ({skip}) => {
   if (nginxMissing(false)) skip(nginxMissing(false));
-  const nginx = await startNginx({roots: {'/': gallery()}});
+  const nginx = await startNginx({roots: {'/': site()}});
   try {
     await withPage('index.html', async (page) => {
       await page.getByRole('link', {name: 'maps'}).click();
@@ -337,8 +337,8 @@ test('gallery: behind nginx', async ({skip}) => {
   } finally { nginx.close(); }
 }, {seconds: 90});
 
-test('gallery: from a server of files without ranges (python3 -m http.server)', async () => {
-  const python = spawn('python3', ['-u', '-m', 'http.server', '0', '--bind', '127.0.0.1', '--directory', gallery()], {stdio: ['ignore', 'pipe', 'ignore']});
+test('site: from a server of files without ranges (python3 -m http.server)', async () => {
+  const python = spawn('python3', ['-u', '-m', 'http.server', '0', '--bind', '127.0.0.1', '--directory', site()], {stdio: ['ignore', 'pipe', 'ignore']});
   try {
     const port = await new Promise((done, fail) => {
       python.on('error', fail);
@@ -357,8 +357,8 @@ test('gallery: from a server of files without ranges (python3 -m http.server)', 
   } finally { python.kill(); }
 }, {seconds: 90});
 
-test('gallery: from files the list is there', async () => {
-  const www = gallery();
+test('site: from files the list is there', async () => {
+  const www = site();
   const {browser} = await common();
   const page = await browser.newPage({viewport: kDesktop});
   listen(page);

@@ -1,4 +1,4 @@
-#include "tools/publish/view/site.h"
+#include "tools/publish/view/served_files.h"
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -14,6 +14,7 @@
 
 #include "format/base/errors.h"
 #include "format/container/layout.h"
+#include "pipeline/io/uri.h"
 
 namespace texmesh {
 namespace {
@@ -81,19 +82,19 @@ bool has_manifest(int folder) {
   return ::fstatat(folder, kManifestPath, &st, AT_SYMLINK_NOFOLLOW) == 0 && S_ISREG(st.st_mode);
 }
 
-std::optional<SiteFile> regular_file(int fd, const std::string& path) {
+std::optional<ServedFile> regular_file(int fd, const std::string& path) {
   if (fd < 0) return std::nullopt;
   struct stat st {};
   if (::fstat(fd, &st) != 0 || !S_ISREG(st.st_mode)) {
     ::close(fd);
     return std::nullopt;
   }
-  return SiteFile(fd, static_cast<std::uint64_t>(st.st_size), media_type(path), etag_of(st));
+  return ServedFile(fd, static_cast<std::uint64_t>(st.st_size), media_type(path), etag_of(st));
 }
 
 /// The file at the end of `parts`. With `packages_only`, one named .texmesh or beneath a folder
 /// with a manifest.
-std::optional<SiteFile> open_beneath(int root, const std::vector<std::string>& parts, bool packages_only) {
+std::optional<ServedFile> open_beneath(int root, const std::vector<std::string>& parts, bool packages_only) {
   bool in_package = !packages_only;
   int folder = ::dup(root);
   for (std::size_t i = 0; folder >= 0 && i + 1 < parts.size(); ++i) {
@@ -138,16 +139,16 @@ void list_packages(const fs::path& folder, const std::string& prefix, int depth,
 
 }  // namespace
 
-SiteFile::~SiteFile() {
+ServedFile::~ServedFile() {
   if (fd_ >= 0) ::close(fd_);
 }
-SiteFile::SiteFile(SiteFile&& other) noexcept
+ServedFile::ServedFile(ServedFile&& other) noexcept
     : fd_(std::exchange(other.fd_, -1)),
       bytes_(other.bytes_),
       type_(std::move(other.type_)),
       etag_(std::move(other.etag_)) {}
 
-std::size_t SiteFile::read(std::uint64_t offset, char* to, std::size_t size) const {
+std::size_t ServedFile::read(std::uint64_t offset, char* to, std::size_t size) const {
   for (;;) {
     const ssize_t n = ::pread(fd_, to, size, static_cast<off_t>(offset));
     if (n < 0 && errno == EINTR) continue;
@@ -172,19 +173,19 @@ PackageFolder find_packages(const std::string& package) {
   return found;
 }
 
-Site::Site(const std::string& package, const std::string& viewer) {
+ServedFiles::ServedFiles(const std::string& package, const std::string& viewer) {
   const PackageFolder found = find_packages(package);
   viewer_ = open_folder_or_throw(viewer);
   root_ = open_folder_or_throw(found.path);
   if (found.alone) only_ = found.packages.front();
 }
 
-Site::~Site() {
+ServedFiles::~ServedFiles() {
   if (viewer_ >= 0) ::close(viewer_);
   if (root_ >= 0) ::close(root_);
 }
 
-std::optional<SiteFile> Site::open(const std::string& path) const {
+std::optional<ServedFile> ServedFiles::open(const std::string& path) const {
   if (!path.starts_with("/")) return std::nullopt;
   if (path.starts_with(kPrefix)) {
     const std::string rest = path.substr(kPrefix.size());
@@ -206,7 +207,7 @@ std::optional<SiteFile> Site::open(const std::string& path) const {
   return parts ? open_beneath(viewer_, *parts, false) : std::nullopt;
 }
 
-std::vector<std::string> Site::packages() const {
+std::vector<std::string> ServedFiles::packages() const {
   std::vector<std::string> found;
   if (!only_.empty())
     found.push_back(only_);
@@ -230,21 +231,6 @@ std::string viewer_folder(const std::string& wanted) {
                    "the built viewer; to build the viewer, run: cmake --build " + build.string() +
                        " --target viewer (it needs node and npm)",
                    "no index.html");
-}
-
-std::string percent_encoded(const std::string& path) {
-  static constexpr char kHex[] = "0123456789ABCDEF";
-  std::string out;
-  for (const char c : path) {
-    const auto u = static_cast<unsigned char>(c);
-    const bool plain = (u >= '0' && u <= '9') || (u >= 'A' && u <= 'Z') || (u >= 'a' && u <= 'z') ||
-                       std::string_view("-._~/").find(c) != std::string_view::npos;
-    if (plain)
-      out += c;
-    else
-      out += {'%', kHex[u >> 4], kHex[u & 15]};
-  }
-  return out;
 }
 
 }  // namespace texmesh

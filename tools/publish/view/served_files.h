@@ -7,14 +7,14 @@
 namespace texmesh {
 
 /// An open regular file; closed with the object.
-class SiteFile {
+class ServedFile {
  public:
-  SiteFile(int fd, std::uint64_t bytes, std::string type, std::string etag)
+  ServedFile(int fd, std::uint64_t bytes, std::string type, std::string etag)
       : fd_(fd), bytes_(bytes), type_(std::move(type)), etag_(std::move(etag)) {}
-  ~SiteFile();
-  SiteFile(SiteFile&& other) noexcept;
-  SiteFile(const SiteFile&) = delete;
-  SiteFile& operator=(const SiteFile&) = delete;
+  ~ServedFile();
+  ServedFile(ServedFile&& other) noexcept;
+  ServedFile(const ServedFile&) = delete;
+  ServedFile& operator=(const ServedFile&) = delete;
 
   std::uint64_t bytes() const { return bytes_; }
   const std::string& type() const { return type_; }  // media type by the path's ending (SPEC.md, section 3)
@@ -42,18 +42,18 @@ PackageFolder find_packages(const std::string& package);
 /// The files that `texmesh view` serves: the viewer's beneath `/`, packages beneath `/packages/`. Nothing
 /// else can be reached: paths go down part by part, follow no symbolic link, and in a folder of packages lead
 /// to `.texmesh` files and into unpacked packages only, whatever stands beside them.
-class Site {
+class ServedFiles {
  public:
   /// `package` as of find_packages(); `viewer` a folder with index.html. InputError when one of them is not
   /// there or the folder holds no package.
-  Site(const std::string& package, const std::string& viewer);
-  ~Site();
-  Site(const Site&) = delete;
-  Site& operator=(const Site&) = delete;
+  ServedFiles(const std::string& package, const std::string& viewer);
+  ~ServedFiles();
+  ServedFiles(const ServedFiles&) = delete;
+  ServedFiles& operator=(const ServedFiles&) = delete;
 
   /// The file of a decoded URL path ("/", "/assets/x.js", "/packages/bust.texmesh"); nothing where there
   /// is none. Thread-safe.
-  std::optional<SiteFile> open(const std::string& path) const;
+  std::optional<ServedFile> open(const std::string& path) const;
   /// Paths of the packages relative to `/`, percent-encoded, sorted, at most 10,000; trees end with a slash.
   std::vector<std::string> packages() const;
 
@@ -66,8 +66,5 @@ class Site {
 /// executable's folder (a build tree) or share/texmesh/viewer of an installation. InputError, which says how
 /// to build it, where there is none.
 std::string viewer_folder(const std::string& wanted);
-
-/// Bytes as they stand in a URL path; slashes stay.
-std::string percent_encoded(const std::string& path);
 
 }  // namespace texmesh

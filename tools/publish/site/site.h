@@ -7,17 +7,17 @@
 
 namespace texmesh {
 
-struct GalleryOptions {
+struct SiteOptions {
   std::string title = "Scans";
   std::string packages_url;  // where the packages stand already, ends with a slash; "" = they are copied
   std::string viewer;        // folder with the built viewer
 };
 
-/// A package of a gallery.
-struct GalleryObject {
-  std::string path;  // relative to the folder of packages; of an unpacked one with a slash behind
-  std::string name;  // of its files in the gallery: letters, digits, "-", "_", "."; no two alike in any case
-  std::string address;  // of the package, from a page in the gallery's folder
+/// A package of a site.
+struct SiteObject {
+  std::string path;     // relative to the folder of packages; of an unpacked one with a slash behind
+  std::string name;     // of its files in the site: letters, digits, "-", "_", "."; no two alike in any case
+  std::string address;  // of the package, from a page in the site's folder
   std::string source;   // file or folder on this machine
   std::string title;
   About about;
@@ -30,33 +30,33 @@ struct GalleryObject {
 };
 
 /// A package that could not be read, and why.
-struct GalleryFault {
+struct SiteFault {
   std::string path, message;
 };
 
-struct Gallery {
-  GalleryOptions options;
-  std::vector<GalleryObject> objects;  // by title
-  std::vector<GalleryFault> faults;
+struct Site {
+  SiteOptions options;
+  std::vector<SiteObject> objects;  // by title
+  std::vector<SiteFault> faults;
 };
 
 /// What a folder of packages (or one package) holds: every package beneath it, hidden ones and symbolic links
 /// left out. A package that cannot be read is a fault, the others go on. InputError when there is none at
 /// all.
-Gallery read_gallery(const std::string& packages, const GalleryOptions& options);
+Site read_site(const std::string& packages, const SiteOptions& options);
 
 /// Writes a static site: index.html with posters and search, objects/NAME.html, viewer/, posters/ and, unless
 /// they stand elsewhere, packages/. Texts of packages stand in it as text only. It asks nothing of other
 /// servers but packages that stand there. Same packages, same bytes. The folder appears whole or not at all;
 /// an earlier site is replaced. InputError when it holds anything else or cannot be made.
-void write_gallery(const Gallery& gallery, const std::string& folder);
+void write_site(const Site& site, const std::string& folder);
 /// The same refusals, before the work.
-void check_gallery_folder(const std::string& folder);
+void check_site_folder(const std::string& folder);
 
 /// For programs: schemas/site.v1.schema.json.
-std::string gallery_json(const Gallery& gallery, const std::string& folder);
+std::string site_json(const Site& site, const std::string& folder);
 
 /// A name for the files of the package at `path`, none of `taken` (in lower case), to which it is added.
-std::string gallery_name(const std::string& path, std::vector<std::string>& taken);
+std::string object_name(const std::string& path, std::vector<std::string>& taken);
 
 }  // namespace texmesh

@@ -1,4 +1,4 @@
-#include "tools/publish/site/gallery.h"
+#include "tools/publish/site/site.h"
 
 #include <gtest/gtest.h>
 
@@ -12,16 +12,16 @@ namespace {
 using testing::TemporaryFolder;
 
 std::string name_of(const std::string& path, std::vector<std::string> taken = {}) {
-  return gallery_name(path, taken);
+  return object_name(path, taken);
 }
 
-TEST(GalleryName, KeepsWhatEveryServerTakes) {
+TEST(ObjectName, KeepsWhatEveryServerTakes) {
   EXPECT_EQ(name_of("bust.texmesh"), "bust");
   EXPECT_EQ(name_of("casts/Bust_2.v1/"), "casts-Bust_2.v1");
   EXPECT_EQ(name_of("a  <b>.texmesh"), "a-b-");
 }
 
-TEST(GalleryName, IsNeverEmptyHiddenOrLong) {
+TEST(ObjectName, IsNeverEmptyHiddenOrLong) {
   for (const char* path : {".texmesh", "\xff.texmesh", "..texmesh", ".hidden.texmesh"}) {
     const std::string name = name_of(path);
     EXPECT_FALSE(name.empty());
@@ -30,16 +30,16 @@ TEST(GalleryName, IsNeverEmptyHiddenOrLong) {
   EXPECT_LE(name_of(std::string(3000, 'x') + ".texmesh").size(), 112u);
 }
 
-TEST(GalleryName, NoTwoAreAlikeInAnyCase) {
+TEST(ObjectName, NoTwoAreAlikeInAnyCase) {
   std::vector<std::string> taken;
-  const std::string first = gallery_name("a b.texmesh", taken), second = gallery_name("A-B.texmesh", taken);
+  const std::string first = object_name("a b.texmesh", taken), second = object_name("A-B.texmesh", taken);
   EXPECT_EQ(first, "a-b");
   EXPECT_NE(second, "A-B");
   EXPECT_EQ(taken.size(), 2u);
   EXPECT_EQ(name_of("A-B.texmesh", {"a-b"}), second) << "by the path alone";
 }
 
-TEST(Gallery, HasFiguresOfEveryPackageByTitle) {
+TEST(Site, HasFiguresOfEveryPackageByTitle) {
   TemporaryFolder folder;
   const auto add = [&](const std::string& file, const std::string& title) {
     testing::PackageParts parts = testing::make_package_parts();
@@ -51,21 +51,21 @@ TEST(Gallery, HasFiguresOfEveryPackageByTitle) {
   add("1.texmesh", "zebra");
   const std::size_t bytes = add("2.texmesh", "Ape");
   add("3.texmesh", "");
-  const Gallery gallery = read_gallery(folder.path().string(), {});
-  ASSERT_EQ(gallery.objects.size(), 3u);
-  EXPECT_EQ(gallery.objects[0].title, "3");  // the file's name
-  EXPECT_EQ(gallery.objects[1].title, "Ape");
-  EXPECT_EQ(gallery.objects[2].title, "zebra");
-  EXPECT_EQ(gallery.objects[1].bytes, bytes);
-  EXPECT_EQ(gallery.objects[1].texture_px, 64u);
-  EXPECT_GT(gallery.objects[1].start_bytes, 0u);
-  EXPECT_EQ(gallery.objects[1].address, "packages/2.texmesh");
+  const Site site = read_site(folder.path().string(), {});
+  ASSERT_EQ(site.objects.size(), 3u);
+  EXPECT_EQ(site.objects[0].title, "3");  // the file's name
+  EXPECT_EQ(site.objects[1].title, "Ape");
+  EXPECT_EQ(site.objects[2].title, "zebra");
+  EXPECT_EQ(site.objects[1].bytes, bytes);
+  EXPECT_EQ(site.objects[1].texture_px, 64u);
+  EXPECT_GT(site.objects[1].start_bytes, 0u);
+  EXPECT_EQ(site.objects[1].address, "packages/2.texmesh");
 }
 
-TEST(Gallery, AFolderWithoutPackagesIsRefused) {
+TEST(Site, AFolderWithoutPackagesIsRefused) {
   TemporaryFolder folder;
-  EXPECT_THROW(read_gallery(folder.path().string(), {}), InputError);
-  EXPECT_THROW(read_gallery(folder / "none", {}), InputError);
+  EXPECT_THROW(read_site(folder.path().string(), {}), InputError);
+  EXPECT_THROW(read_site(folder / "none", {}), InputError);
 }
 
 }  // namespace
