@@ -16,8 +16,7 @@
 #include "pipeline/io/new_folder.h"
 #include "pipeline/io/table.h"
 #include "pipeline/io/uri.h"
-#include "tools/publish/report/package_words.h"
-#include "tools/publish/site/page_files.h"
+#include "tools/publish/pages/page.h"
 #include "tools/publish/view/served_files.h"
 
 namespace texmesh {
@@ -71,10 +70,7 @@ constexpr std::string_view kSiteFirstLine = "<!DOCTYPE html><!-- texmesh site 1 
 /// Posters that are fetched with the page; those further down come when somebody looks.
 constexpr std::size_t kAtOnce = 12;
 
-std::string_view site_file(std::string_view name) {
-  const auto files = site_page_files();
-  return std::ranges::find(files, name, &BuiltInFile::name)->text;
-}
+std::string_view site_file(std::string_view name) { return built_in_text(site_page_files(), name); }
 
 std::string figures_of(const SiteObject& o) {
   std::string out = format_bytes(o.bytes) + ", " + grouped(o.triangles) + " triangles";
@@ -248,7 +244,8 @@ std::string site_json(const Site& site, const std::string& folder) {
 void write_site(const Site& site, const std::string& folder) {
   NewFolder out(folder, site_folder_rule());
   out.add("index.html", text_bytes(std::string(kSiteFirstLine) + index_page(site)));
-  for (const char* name : {"site.css", "site.js", "icon.svg"}) out.add(name, text_bytes(site_file(name)));
+  out.add("site.css", text_bytes(page_style(site_file("site.css"))));
+  for (const char* name : {"site.js", "icon.svg"}) out.add(name, text_bytes(site_file(name)));
   for (const SiteObject& o : site.objects) {
     out.add("objects/" + o.name + ".html", text_bytes(object_page(o, site.options)));
     if (!o.poster.empty()) out.add("posters/" + o.name + ".jpg", o.poster);

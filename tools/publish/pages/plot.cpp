@@ -1,4 +1,4 @@
-#include "tools/publish/report/plot.h"
+#include "tools/publish/pages/plot.h"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,6 @@
 #include "format/base/portable_math.h"
 #include "pipeline/io/markup.h"
 #include "pipeline/io/table.h"
-#include "tools/publish/report/html.h"
 
 namespace texmesh {
 namespace {

@@ -1,8 +1,10 @@
-#include "tools/publish/report/html.h"
+#include "tools/publish/pages/page.h"
 
 #include <gtest/gtest.h>
 
-#include "tests/tools/publish/report/html_check.h"
+#include <stdexcept>
+
+#include "tests/tools/publish/pages/html_check.h"
 
 namespace texmesh::testing {
 namespace {
@@ -15,19 +17,21 @@ TEST(Html, APageIsWellFormedWhateverItsTitle) {
   EXPECT_EQ(page.find("<script"), std::string::npos);
 }
 
-TEST(Html, TablesHaveHeadersOfRowsAndColumns) {
-  const std::string html = HtmlTable{"Things", {"A", "B"}, {{"1", "2"}, {"3", "4"}}}.html();
-  EXPECT_EQ(tag_fault(html), "");
-  EXPECT_NE(html.find("<caption>Things</caption>"), std::string::npos);
-  EXPECT_NE(html.find("<th scope=\"row\">3</th><td>4</td>"), std::string::npos);
-}
-
 TEST(Html, TheCheckFindsFaults) {
   EXPECT_NE(tag_fault("<p><b></p></b>"), "");
   EXPECT_NE(tag_fault("<p>"), "");
   EXPECT_NE(tag_fault("</p>"), "");
   EXPECT_EQ(tag_fault("<p title=\"a > b\"><img src=\"x\"></p><path d=\"M0 0\"/>"), "");
 }
+
+TEST(Filled, PutsValuesIntoTheirPlaces) {
+  EXPECT_EQ(filled("a {{x}} b {{y}}{{x}}", {{"x", "1"}, {"y", "2"}}), "a 1 b 21");
+  EXPECT_EQ(filled("nothing } to { do", {}), "nothing } to { do");
+}
+
+TEST(Filled, NeverLooksIntoAValue) { EXPECT_EQ(filled("{{x}}", {{"x", "{{y}}{{x}}"}}), "{{y}}{{x}}"); }
+
+TEST(Filled, ANameWithoutAValueIsAMistakeOfOurs) { EXPECT_THROW(filled("{{z}}", {}), std::logic_error); }
 
 }  // namespace
 }  // namespace texmesh::testing

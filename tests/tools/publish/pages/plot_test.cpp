@@ -1,8 +1,8 @@
-#include "tools/publish/report/plot.h"
+#include "tools/publish/pages/plot.h"
 
 #include <gtest/gtest.h>
 
-#include "tests/tools/publish/report/html_check.h"
+#include "tests/tools/publish/pages/html_check.h"
 
 namespace texmesh::testing {
 namespace {
