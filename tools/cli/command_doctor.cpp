@@ -39,11 +39,7 @@ int run_doctor(const DoctorArguments& args) {
   const std::vector<std::string> reasons = gate_failures(results);
   const std::string name = std::filesystem::path(args.input).filename().string();
   if (args.json) {
-    nlohmann::ordered_json j{{"input", name}};
-    j.update(atlas_json(diagnosis));
-    j["good"] = reasons.empty();
-    j["reasons"] = reasons;
-    std::cout << j.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) << '\n';
+    std::cout << json_line(doctor_json({name, diagnosis, reasons})) << '\n';
   } else {
     std::cout << printable(name) << "\n" << atlas_text(diagnosis);
     for (const std::string& r : reasons) std::cout << "not good enough: " << r << '\n';

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -23,11 +24,9 @@ struct ExportArguments {
 };
 
 ExportTarget target_of(const std::string& name) {
-  for (const ExportTarget t : {ExportTarget::k3dTiles, ExportTarget::kGltfLod, ExportTarget::kModelViewer})
-    if (name == target_name(t)) return t;
-  return ExportTarget::kOembed;
+  const auto& names = EnumNames<ExportTarget>::names;
+  return static_cast<ExportTarget>(std::ranges::find(names, name) - names.begin());
 }
-
 /// Options that mean nothing for the target are a mistake of the user's.
 void check_for_target(const ExportArguments& a, const ExportOptions& o) {
   const auto refuse = [&](const char* option, const char* instead) {

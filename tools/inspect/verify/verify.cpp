@@ -26,6 +26,7 @@
 #include "format/documents/manifest.h"
 #include "format/documents/tables.h"
 #include "format/documents/textures.h"
+#include "pipeline/io/record.h"
 #include "stages/base/run_context.h"
 #include "stages/jpeg/jpeg.h"
 #include "tools/inspect/fragment_files.h"
@@ -33,7 +34,47 @@
 #include "tools/inspect/verify/verify_checks.h"
 
 namespace texmesh {
+
+template <>
+struct RecordFields<Finding> {
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("check", s.check, FieldRule{.pattern = "^[a-z0-9-]+$"}, "");
+    v("rule", s.rule, FieldRule{.pattern = "^([A-Z][0-9][0-9])?$"},
+      "the rule of format/SPEC.md that is broken");
+    v("entry", s.entry, "");
+    v("field", s.field, "");
+    v("expected", s.expected, "");
+    v("found", s.found, "");
+  }
+};
+
+template <>
+struct RecordFields<VerifiedPackage> {
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("package", s.package, "");
+    v("ok", s.report.findings.empty(), "");
+    v("entries", s.report.entries, "");
+    v("bytes", s.report.bytes, "");
+    v("meshes", s.report.meshes, "");
+    v("previews", s.report.previews, "");
+    v("fragments", s.report.fragments, "");
+    v("content_credential", s.report.content_credential, "there is one; what it says was not checked");
+    v("findings", s.report.findings, "");
+  }
+};
+
 namespace {
+
+/// What verify --json prints.
+struct VerifiedPackages {
+  std::vector<VerifiedPackage> packages;
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("packages", s.packages, "");
+  }
+};
 
 constexpr std::uint64_t kMostProvenanceBytes = 64u << 20;
 
@@ -451,6 +492,15 @@ class Verifier {
 
 VerifyReport verify_package(PackageStore& store, const RunContext& context) {
   return Verifier(store, context).run();
+}
+
+std::string verify_json(const std::vector<VerifiedPackage>& packages) {
+  return to_json_line(VerifiedPackages{packages});
+}
+
+DocumentSchema verify_schema() {
+  return document_schema("verify.v1", "texmesh verify report, version 1",
+                         "Output of `texmesh verify PKG... --json`.", schema_of<VerifiedPackages>());
 }
 
 }  // namespace texmesh

@@ -12,6 +12,7 @@
 #include "format/container/layout.h"
 #include "pipeline/io/markup.h"
 #include "pipeline/io/new_folder.h"
+#include "pipeline/io/record.h"
 #include "pipeline/io/table.h"
 #include "pipeline/io/uri.h"
 #include "stages/gltf/check_glb.h"
@@ -24,8 +25,37 @@
 namespace texmesh {
 namespace {
 
+struct ListedFile {
+  std::string path;
+  std::optional<std::uint64_t> bytes;
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("path", s.path, FieldRule{.pattern = "."},
+      "Relative to the folder. Without `bytes` a copy of the package, or of the viewer's folder.");
+    v("bytes", s.bytes, "");
+  }
+};
+
+/// export.json.
+struct ExportList {
+  ExportTarget target = ExportTarget::k3dTiles;
+  std::string package, open;
+  std::vector<ListedFile> files;
+  std::vector<std::string> notes;
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("texmeshExport", Constant{1}, "");
+    v("target", s.target, "");
+    v("package", s.package, FieldRule{.pattern = "^[0-9a-f]{64}$"},
+      "Id of the package: SHA-256 of its manifest.");
+    v("open", s.open, FieldRule{.pattern = "."},
+      "The file that the target's viewer opens, relative to the folder.");
+    v("files", s.files, FieldRule{.count = Range{1, 1e6}}, "");
+    v("notes", s.notes, "");
+  }
+};
+
 namespace fs = std::filesystem;
-using Json = nlohmann::ordered_json;
 
 constexpr const char* kListFile = "export.json";
 constexpr std::string_view kListBegin = "{\n  \"texmeshExport\": 1,";
@@ -219,20 +249,6 @@ FolderRule export_folder_rule() {
 
 }  // namespace
 
-const char* target_name(ExportTarget target) {
-  switch (target) {
-    case ExportTarget::k3dTiles:
-      return "3dtiles";
-    case ExportTarget::kGltfLod:
-      return "gltf-lod";
-    case ExportTarget::kModelViewer:
-      return "model-viewer";
-    case ExportTarget::kOembed:
-      break;
-  }
-  return "oembed";
-}
-
 Export make_export(PackageReader& package, const std::string& path, const ExportOptions& options,
                    const RunContext& context) {
   Export made;
@@ -260,12 +276,17 @@ Export make_export(PackageReader& package, const std::string& path, const Export
 }
 
 std::string export_json(const Export& made) {
-  Json files = Json::array();
-  for (const ExportedFile& f : made.files) files.push_back({{"path", f.path}, {"bytes", f.bytes.size()}});
-  for (const ExportedCopy& c : made.copies) files.push_back({{"path", c.path}});
-  Json out{{"texmeshExport", 1}, {"target", target_name(made.target)}, {"package", made.package_id},
-           {"open", made.open},  {"files", std::move(files)},          {"notes", made.notes}};
-  return out.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  ExportList list{made.target, made.package_id, made.open, {}, made.notes};
+  for (const ExportedFile& f : made.files) list.files.push_back({f.path, f.bytes.size()});
+  for (const ExportedCopy& c : made.copies) list.files.push_back({c.path, {}});
+  return to_json(list).dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+DocumentSchema export_schema() {
+  return document_schema(
+      "export.v1", "texmesh export list, version 1",
+      "Output of `texmesh export PKG --to TARGET -o DIR --json`, and export.json in DIR: what was written.",
+      schema_of<ExportList>());
 }
 
 void write_export(const Export& made, const std::string& folder) {

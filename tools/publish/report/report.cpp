@@ -13,12 +13,72 @@
 #include "format/container/layout.h"
 #include "format/rules/proxy_choice.h"
 #include "pipeline/io/markup.h"
+#include "pipeline/io/record.h"
 #include "pipeline/io/table.h"
 #include "tools/inspect/dump/package_figures.h"
 #include "tools/publish/pages/page.h"
 #include "tools/publish/pages/plot.h"
 
 namespace texmesh {
+namespace {
+
+constexpr Range kFlip{0, 1}, kPx{0, 1e9};
+
+/// What a list of views says of its worst.
+template <class V>
+void differences_fields(const ViewDifferences& d, V&& v) {
+  v("flip", d.worst_mean(), kFlip, "mean FLIP of the worst view");
+  v("flip_p95", d.worst_p95(), kFlip, "largest 95th percentile of a view's pixels");
+  v("worst_view", d.worst(), Range{0, 63}, "");
+}
+
+struct ReportedSwitch {
+  SwitchSize size;
+  bool holds = false;
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("scale", s.size.scale, Range{1, 99}, "");
+    v("triangles", s.size.triangles, "");
+    v("up_to_px", s.size.up_to_px, kPx, "");
+    v("rendered_px", s.size.rendered_px, kPx, "less than up_to_px where pictures would be too large");
+    differences_fields(s.size.views, v);
+    v("holds", s.holds, "");
+  }
+};
+
+/// What report --json prints.
+struct ReportDocument {
+  Report report;
+  std::vector<ReportedSwitch> switches;
+  std::vector<std::string> files;
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("version", Constant{1}, "");
+    v("title", s.report.title, "");
+    v("holds", s.report.holds, "every switch size is within both limits; the exit code is 0 then, else 4");
+    v("verdict", s.report.verdict, "one sentence");
+    v("worst_flip", worst_flip(s.report.switches), kFlip, "");
+    v("max_flip", s.report.options.limits.mean, kFlip, "");
+    v("max_flip_p95", s.report.options.limits.p95, kFlip, "");
+    v("views", s.report.options.views, Range{1, 64}, "");
+    v("switch_sizes", s.switches, "");
+    v("source", s.report.source, "with --against: S_0 at the highest rung beside the model file");
+    v("files", s.files, FieldRule{.count = Range{1, 1e6}}, "beneath the folder, index.html first");
+  }
+};
+
+}  // namespace
+
+template <>
+struct RecordFields<SourceComparison> {
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("file", s.file, "");
+    v("displayed_px", s.displayed_px, Range{1, 1e9}, "");
+    differences_fields(s.views, v);
+  }
+};
+
 namespace {
 
 std::string answer(bool holds) {
@@ -394,8 +454,6 @@ std::string method_section(PackageReader& package, const Report& report) {
   return html_section("method", "Method", body);
 }
 
-using Json = nlohmann::ordered_json;
-
 constexpr double kSourceHeight = 512;  // px at which the source stands beside S_0
 
 SourceComparison compare_source(PackageReader& package, const PackagePictures& pictures,
@@ -412,10 +470,6 @@ SourceComparison compare_source(PackageReader& package, const PackagePictures& p
     out.views.p95.push_back(static_cast<float>(flip.percentile(0.95)));
   }
   return out;
-}
-
-Json differences_json(const ViewDifferences& d) {
-  return {{"flip", d.worst_mean()}, {"flip_p95", d.worst_p95()}, {"worst_view", d.worst()}};
 }
 
 }  // namespace
@@ -445,33 +499,20 @@ Report make_report(PackageReader& package, const ReportOptions& options, const R
 }
 
 std::string report_json(const Report& report) {
-  Json switches = Json::array();
-  for (const SwitchSize& s : report.switches) {
-    Json j{{"scale", s.scale},
-           {"triangles", s.triangles},
-           {"up_to_px", s.up_to_px},
-           {"rendered_px", s.rendered_px}};
-    j.update(differences_json(s.views));
-    j["holds"] = s.holds(report.options.limits);
-    switches.push_back(std::move(j));
-  }
-  Json files = Json::array();
-  for (const ReportFile& f : report.files) files.push_back(f.path);
-  Json j{{"version", 1},
-         {"title", report.title},
-         {"holds", report.holds},
-         {"verdict", report.verdict},
-         {"worst_flip", worst_flip(report.switches)},
-         {"max_flip", report.options.limits.mean},
-         {"max_flip_p95", report.options.limits.p95},
-         {"views", report.options.views},
-         {"switch_sizes", std::move(switches)}};
-  if (report.source) {
-    j["source"] = {{"file", report.source->file}, {"displayed_px", report.source->displayed_px}};
-    j["source"].update(differences_json(report.source->views));
-  }
-  j["files"] = std::move(files);
-  return j.dump(-1, ' ', false, Json::error_handler_t::replace);
+  ReportDocument document;
+  document.report = {
+      report.title, report.verdict, report.holds, report.options, report.switches, {}, report.source, {}};
+  for (const SwitchSize& s : report.switches)
+    document.switches.push_back({s, s.holds(report.options.limits)});
+  for (const ReportFile& f : report.files) document.files.push_back(f.path);
+  return to_json_line(document);
+}
+
+DocumentSchema report_schema() {
+  return document_schema(
+      "report.v1", "texmesh report --json, version 1",
+      "What a report says. FLIP is measured by rendering: 0 = equal, 1 = as different as can be.",
+      schema_of<ReportDocument>());
 }
 
 FolderRule report_folder_rule() {

@@ -11,6 +11,8 @@
 
 namespace texmesh {
 
+struct DocumentSchema;  // pipeline/io/record.h
+
 /// What so many bytes look like: predicted FLIP against S_0 with the source's texels.
 struct QualityPoint {
   int scale = 0;
@@ -66,6 +68,7 @@ Report make_report(PackageReader& package, const ReportOptions& options, const R
 
 /// For programs: schemas/report.v1.schema.json.
 std::string report_json(const Report& report);
+DocumentSchema report_schema();
 
 /// The page of a folder that html_page() fills.
 inline constexpr const char* kReportPage = "index.html";

@@ -14,13 +14,51 @@
 #include "format/container/layout.h"
 #include "pipeline/io/markup.h"
 #include "pipeline/io/new_folder.h"
+#include "pipeline/io/record.h"
 #include "pipeline/io/table.h"
 #include "pipeline/io/uri.h"
 #include "tools/publish/pages/page.h"
 #include "tools/publish/view/served_files.h"
 
 namespace texmesh {
+
+template <>
+struct RecordFields<SiteFault> {
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("package", s.path, "");
+    v("error", s.message, FieldRule{.pattern = "."}, "");
+  }
+};
+
 namespace {
+
+struct ReportedObject {
+  std::string package, page, title;
+  std::uint64_t bytes = 0;
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("package", s.package, FieldRule{.pattern = "."},
+      "Relative to the folder of packages; an unpacked one ends with a slash.");
+    v("page", s.page, FieldRule{.pattern = "^objects/[A-Za-z0-9._-]+\\.html$"}, "Relative to DIR.");
+    v("title", s.title, "");
+    v("bytes", s.bytes, "Of the whole package.");
+  }
+};
+
+/// What site --json prints.
+struct SiteReport {
+  std::string page;
+  std::vector<ReportedObject> objects;
+  std::vector<SiteFault> faults;
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("version", Constant{1}, "");
+    v("page", s.page, FieldRule{.pattern = "."}, "Path of index.html.");
+    v("objects", s.objects, "In the order of the page.");
+    v("faults", s.faults, "Packages that could not be read and are not in the site.");
+  }
+};
 
 namespace fs = std::filesystem;
 
@@ -226,19 +264,16 @@ Site read_site(const std::string& packages, const SiteOptions& options) {
 }
 
 std::string site_json(const Site& site, const std::string& folder) {
-  using Json = nlohmann::ordered_json;
-  Json objects = Json::array(), faults = Json::array();
+  SiteReport report{(fs::path(folder) / "index.html").string(), {}, site.faults};
   for (const SiteObject& o : site.objects)
-    objects.push_back({{"package", o.path},
-                       {"page", "objects/" + o.name + ".html"},
-                       {"title", o.title},
-                       {"bytes", o.bytes}});
-  for (const SiteFault& f : site.faults) faults.push_back({{"package", f.path}, {"error", f.message}});
-  const Json out{{"version", 1},
-                 {"page", (fs::path(folder) / "index.html").string()},
-                 {"objects", std::move(objects)},
-                 {"faults", std::move(faults)}};
-  return out.dump(-1, ' ', false, Json::error_handler_t::replace);
+    report.objects.push_back({o.path, "objects/" + o.name + ".html", o.title, o.bytes});
+  return to_json_line(report);
+}
+
+DocumentSchema site_schema() {
+  return document_schema("site.v1", "texmesh site report, version 1",
+                         "Output of `texmesh site PACKAGES -o DIR --json`: what the site shows.",
+                         schema_of<SiteReport>());
 }
 
 void write_site(const Site& site, const std::string& folder) {

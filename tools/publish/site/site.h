@@ -7,6 +7,8 @@
 
 namespace texmesh {
 
+struct DocumentSchema;  // pipeline/io/record.h
+
 struct SiteOptions {
   std::string title = "Scans";
   std::string packages_url;  // where the packages stand already, ends with a slash; "" = they are copied
@@ -55,6 +57,7 @@ void check_site_folder(const std::string& folder);
 
 /// For programs: schemas/site.v1.schema.json.
 std::string site_json(const Site& site, const std::string& folder);
+DocumentSchema site_schema();
 
 /// A name for the files of the package at `path`, none of `taken` (in lower case), to which it is added.
 std::string object_name(const std::string& path, std::vector<std::string>& taken);
