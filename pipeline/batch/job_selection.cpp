@@ -3,7 +3,7 @@
 #include <filesystem>
 
 #include "pipeline/batch/fleet/shards.h"
-#include "pipeline/io/core_path.h"
+#include "pipeline/io/program.h"
 
 namespace texmesh {
 namespace {
@@ -25,7 +25,7 @@ JobSelection::JobSelection(const BatchPlan& plan, const RunSettings& settings)
     : plan_(plan),
       settings_(settings),
       memo_(settings.cache.folder, plan.outputs),
-      tool_seed_(core_build()) {}
+      tool_seed_(program_build()) {}
 
 const Sha256& JobSelection::request_of(const std::shared_ptr<const std::string>& profile) {
   const auto [it, fresh] = requests_.try_emplace(profile.get());

@@ -1,9 +1,6 @@
 #include <filesystem>
-#include <iostream>
-#include <memory>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/io/exit_codes.h"
 #include "pipeline/io/text_table.h"
 #include "tools/cli/check/atlas_gate.h"
 #include "tools/cli/commands.h"
@@ -81,7 +78,7 @@ void add_limits(Command& c, AtlasLimits& limits) {
 
 void add_doctor_command(Command& app) {
   auto args = std::make_shared<DoctorArguments>();
-  Command c = app.add("doctor");
+  Command c = app.add("doctor", "Say what a model's texture atlas costs and what to do: a gate for CI, too");
   c.option("INPUT", args->input,
            "A model that compile takes, or a package: a .texmesh file or a folder that unpack made")
       .required();

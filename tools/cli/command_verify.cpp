@@ -1,9 +1,5 @@
 #include <sys/resource.h>
 
-#include <iostream>
-#include <memory>
-
-#include "pipeline/io/exit_codes.h"
 #include "pipeline/io/table.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"
@@ -78,7 +74,7 @@ int run_verify(const VerifyArguments& args) {
 
 void add_verify_command(Command& app) {
   auto args = std::make_shared<VerifyArguments>();
-  Command c = app.add("verify");
+  Command c = app.add("verify", "Check every byte of packages: digests, documents, meshes, images");
   c.option("PACKAGES", args->packages, ".texmesh files or unpacked folders").required();
   add_jobs_option(c, args->jobs);
   c.option("--memory-mib", args->memory_mib, "Most memory; 0 = no limit").shows_default().value_name("MIB");

@@ -2,12 +2,9 @@
 #include <signal.h>
 #include <unistd.h>
 
-#include <iostream>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "pipeline/io/exit_codes.h"
 #include "pipeline/io/uri.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"
@@ -67,7 +64,7 @@ void view(const ViewArguments& args) {
 
 void add_view_command(Command& app) {
   auto args = std::make_shared<ViewArguments>();
-  Command c = app.add("view");
+  Command c = app.add("view", "Look at packages in a browser: serves the packages and the viewer");
   c.option("PACKAGE", args->package,
            "A .texmesh file, a folder that unpack made, or a folder of packages to choose from")
       .required();

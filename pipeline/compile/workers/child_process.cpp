@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "pipeline/io/core_path.h"
+#include "pipeline/io/program.h"
 
 extern char** environ;
 
@@ -48,7 +48,7 @@ std::vector<std::string> worker_environment(bool large_pages) {
 }
 
 ChildProcess start_worker_process(const std::string& input, bool large_pages) {
-  static const std::string executable = core_executable();
+  static const std::string executable = worker_executable();
   std::vector<std::string> variables = worker_environment(large_pages);
   std::vector<char*> environment;
   for (std::string& variable : variables) environment.push_back(variable.data());

@@ -18,7 +18,7 @@ struct ChildProcess {
 /// pages (2 MiB on x86-64), unless GLIBC_TUNABLES is set already.
 std::vector<std::string> worker_environment(bool large_pages);
 
-/// Starts `texmesh-core worker` (posix_spawn, never a fork of a threaded parent) in worker_environment() and
+/// Starts `texmesh worker` (posix_spawn, never a fork of a threaded parent) in worker_environment() and
 /// gives it `input` as the whole of its standard input. Throws std::runtime_error.
 ChildProcess start_worker_process(const std::string& input, bool large_pages);
 

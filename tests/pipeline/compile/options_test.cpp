@@ -153,7 +153,7 @@ TEST(Options, SchemaInTheRepositoryIsTheGeneratedOne) {
   std::ifstream in(TEXMESH_SOURCE_DIR "/schemas/profile.v1.schema.json");
   std::ostringstream text;
   text << in.rdbuf();
-  EXPECT_EQ(text.str(), profile_schema()) << "write it with: texmesh stages --profile-schema";
+  EXPECT_EQ(text.str(), profile_schema()) << "write it with: texmesh schema profile.v1";
 }
 
 }  // namespace

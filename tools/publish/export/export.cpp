@@ -121,12 +121,23 @@ void note_large_textures(const Extracted& extracted, Export& made) {
     }
 }
 
-ExtractRequest request_for(const ExportOptions& options) {
-  ExtractRequest request;
-  request.display_px = options.display_px;
-  request.bytes = options.bytes;
-  request.plain = options.plain;
-  return request;
+/// The best-looking file of so many bytes, or the scale that suits the displayed height.
+ExtractRequest request_for(const ExportOptions& options, ExtractScale::Form form) {
+  if (options.bytes == 0) {
+    ExtractScale scale;
+    scale.display_px = options.display_px;
+    scale.form = form;
+    return {scale};
+  }
+  ExtractBudget budget;
+  budget.bytes = {options.bytes};
+  if (options.display_px > 0) budget.display_px = options.display_px;
+  budget.levels = form == ExtractScale::Form::kLevels;
+  return {budget};
+}
+
+ExtractScale::Form form_of(const ExportOptions& options) {
+  return options.plain ? ExtractScale::Form::kPlain : ExtractScale::Form::kCoded;
 }
 
 void add_glb(Export& made, Extracted extracted, const std::string& path) {
@@ -158,14 +169,15 @@ void export_tiles(PackageReader& package, const ExportOptions& options, const Ru
       planes.push_back(c.plane);
     return planes;
   });
-  ExtractRequest request = request_for(options);
-  request.recentre = request.metres = true;
+  ExtractScale scale;
+  scale.form = form_of(options);
+  scale.metres = true;
   std::vector<TileLevel> wanted = std::move(tileset.levels);
   tileset.levels.clear();
   for (std::size_t k = 0; k < wanted.size(); ++k) {
-    request.scale = wanted[k].scale;
-    request.display_px = wanted[k].texture_px;
-    Extracted extracted = extract_model(package, request, context);
+    scale.scale = wanted[k].scale;
+    scale.display_px = wanted[k].texture_px;
+    Extracted extracted = extract_model(package, {scale, true}, context);
     context.report(static_cast<double>(k + 1) / static_cast<double>(wanted.size()));
     if (k > 0 && static_cast<double>(extracted.glb.size()) >
                      kWorthwhile * static_cast<double>(made.files.back().bytes.size()))
@@ -184,9 +196,7 @@ void export_lods(PackageReader& package, const ExportOptions& options, const Run
                  Export& made) {
   if (package.manifest().scales.size() < 2)
     throw InputError(package.store().name(), "scales", "two or more, for levels of detail (MSFT_lod)", "one");
-  ExtractRequest request = request_for(options);
-  request.lods = true;
-  Extracted extracted = extract_model(package, request, context);
+  Extracted extracted = extract_model(package, request_for(options, ExtractScale::Form::kLevels), context);
   if (extracted.levels.size() < 2)
     throw InputError(package.store().name(), "scales",
                      "a major scale coarser than S_" + std::to_string(extracted.scale) +
@@ -204,7 +214,7 @@ void add_poster(PackageReader& package, Export& made) {
 
 void export_model_viewer(PackageReader& package, const ExportOptions& options, const RunContext& context,
                          Export& made) {
-  Extracted extracted = extract_model(package, request_for(options), context);
+  Extracted extracted = extract_model(package, request_for(options, form_of(options)), context);
   note_large_textures(extracted, made);
   made.open = "index.html";
   made.files.push_back(text_file("index.html", model_viewer_page(package, options, extracted.glb.size())));

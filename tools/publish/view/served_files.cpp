@@ -220,8 +220,7 @@ std::vector<std::string> ServedFiles::packages() const {
 std::string viewer_folder(const std::string& wanted) {
   std::error_code error;
   const fs::path folder = fs::read_symlink("/proc/self/exe", error).parent_path();
-  std::vector<fs::path> candidates{folder / "../viewer", folder / "../share/texmesh/viewer",
-                                   folder / "../../share/texmesh/viewer"};
+  std::vector<fs::path> candidates{folder / "../viewer", folder / "../share/texmesh/viewer"};
   if (!wanted.empty()) candidates = {wanted};
   for (const fs::path& c : candidates)
     if (fs::is_regular_file(c / "index.html", error)) return c.lexically_normal().string();

@@ -1,10 +1,7 @@
 #include <algorithm>
 #include <filesystem>
-#include <iostream>
-#include <memory>
 
 #include "format/documents/about.h"
-#include "pipeline/io/exit_codes.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"
 #include "tools/cli/options/common_options.h"
@@ -17,26 +14,22 @@ namespace texmesh {
 namespace {
 
 struct ExportArguments {
-  std::string package, folder, target, bytes, viewer;
+  std::string package, folder, viewer;
   ExportOptions options;
   int width_px = 640, height_px = 480, jobs = 0;
   bool json = false;
 };
 
-ExportTarget target_of(const std::string& name) {
-  const auto& names = EnumNames<ExportTarget>::names;
-  return static_cast<ExportTarget>(std::ranges::find(names, name) - names.begin());
-}
 /// Options that mean nothing for the target are a mistake of the user's.
-void check_for_target(const ExportArguments& a, const ExportOptions& o) {
+void check_for_target(const ExportOptions& o) {
   const auto refuse = [&](const char* option, const char* instead) {
-    throw UsageError(option, "", instead, "--to " + a.target);
+    throw UsageError(option, "", instead, "--to " + std::string(enum_name(o.target)));
   };
   const bool one_glb = o.target == ExportTarget::kGltfLod || o.target == ExportTarget::kModelViewer;
   if (o.bytes > 0 && !one_glb) refuse("--bytes", "--to gltf-lod or model-viewer");
   if (o.plain && (o.target == ExportTarget::kGltfLod || o.target == ExportTarget::kOembed))
     refuse("--plain", "--to 3dtiles or model-viewer");
-  if (o.plain && o.bytes > 0) throw UsageError("--plain", "", "no --bytes", a.bytes);
+  if (o.plain && o.bytes > 0) throw UsageError("--plain", "", "no --bytes", std::to_string(o.bytes));
   if (o.display_px > 0 && o.target == ExportTarget::kOembed)
     refuse("--display", "a target that holds a model");
   if (o.target == ExportTarget::kOembed) {
@@ -50,14 +43,9 @@ void check_for_target(const ExportArguments& a, const ExportOptions& o) {
 
 ExportOptions export_options_of(const ExportArguments& a) {
   ExportOptions o = a.options;
-  o.target = target_of(a.target);
-  if (!a.bytes.empty()) {
-    o.bytes = parse_bytes(a.bytes, "--bytes");
-    if (o.bytes == 0) throw UsageError("--bytes", "", "a number above 0", a.bytes);
-  }
   o.width_px = static_cast<std::uint32_t>(a.width_px);
   o.height_px = static_cast<std::uint32_t>(a.height_px);
-  check_for_target(a, o);
+  check_for_target(o);
   if (!o.url.empty() && !o.url.ends_with("/")) o.url += "/";
   if (o.target == ExportTarget::kOembed) o.viewer = viewer_folder(a.viewer);
   return o;
@@ -83,12 +71,11 @@ int run_export(const ExportArguments& args) {
 }
 
 void add_target_options(Command& c, ExportArguments& args) {
-  c.option("--to", args.target,
+  c.choice("--to", args.options.target,
            "The form: 3dtiles = a tileset of 3D Tiles 1.1 for CesiumJS and its like; gltf-lod = one GLB with "
            "levels of detail (MSFT_lod); model-viewer = a page with <model-viewer>; oembed = a frame for "
            "other pages and the oEmbed answer that tells of it")
       .required()
-      .one_of_explained({"3dtiles", "gltf-lod", "model-viewer", "oembed"})
       .value_name("TARGET");
   c.option("-o,--output", args.folder,
            "The folder to make. An earlier export is replaced; any other folder with files is refused")
@@ -99,7 +86,7 @@ void add_target_options(Command& c, ExportArguments& args) {
            "everything, for model-viewer 1000")
       .number_in(1, 1e6)
       .value_name("PX");
-  c.option("--bytes", args.bytes,
+  c.option("--bytes", args.options.bytes, parse_some_bytes,
            "gltf-lod, model-viewer: the best-looking GLB of at most so many bytes: 2MB")
       .value_name("SIZE");
   c.flag("--plain", args.options.plain,
@@ -133,7 +120,8 @@ void add_oembed_options(Command& c, ExportArguments& args) {
 
 void add_export_command(Command& app) {
   auto args = std::make_shared<ExportArguments>();
-  Command c = app.add("export");
+  Command c = app.add(
+      "export", "Write a package in the form of another viewer: 3D Tiles, MSFT_lod, model-viewer, oEmbed");
   add_package_argument(c, args->package, true).required();
   add_target_options(c, *args);
   add_oembed_options(c, *args);

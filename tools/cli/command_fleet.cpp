@@ -1,23 +1,49 @@
+// What serves builds of large collections on many machines: the list of models, and one summary of many runs.
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <iostream>
 
-#include "format/base/errors.h"
 #include "format/base/text_bytes.h"
 #include "pipeline/batch/fleet/merge_summaries.h"
+#include "pipeline/batch/fleet/model_list.h"
 #include "pipeline/batch/progress.h"
+#include "pipeline/io/table.h"
 #include "pipeline/io/atomic_file.h"
-#include "pipeline/io/exit_codes.h"
 #include "pipeline/io/resource_error.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"
+#include "tools/cli/options/common_options.h"
 #include "tools/publish/report/collection/collection_page.h"
 
 namespace texmesh {
 namespace {
 
 namespace fs = std::filesystem;
+
+struct ListArguments {
+  std::vector<std::string> inputs;
+  std::string output, costs;
+  int shards = 1;
+  bool json = false;
+};
+
+int run_list(const ListArguments& args) {
+  PlanRequest request;
+  request.inputs = args.inputs;
+  request.output = args.output;
+  request.costs_s = costs_option(args.costs);
+  const ModelList list = list_collection(request, args.shards);
+  if (args.json) {
+    std::cout << write_model_list(list);
+    return kExitOk;
+  }
+  for (const ListedModel& m : list.models) {
+    std::cout << m.input << " -> " << m.output << "  " << format_bytes(m.bytes);
+    if (args.shards > 1) std::cout << "  shard " << m.shard;
+    std::cout << '\n';
+  }
+  return kExitOk;
+}
 
 struct MergeArguments {
   std::vector<std::string> files;
@@ -65,9 +91,30 @@ int run_merge(const MergeArguments& args) {
 
 }  // namespace
 
+void add_list_command(Command& app) {
+  auto args = std::make_shared<ListArguments>();
+  Command c = app.add("list", "List the models of a collection with their packages and files");
+  c.option("INPUT", args->inputs, "Models, folders of models, or collections (.json), as compile takes them")
+      .required();
+  c.option("-o,--output", args->output, "Where the packages would go, as compile takes it")
+      .required()
+      .value_name("OUTPUT");
+  c.option("--shards", args->shards, "Say of every model which of so many shards compile --shard gives it to")
+      .integer_in(1, 1'000'000);
+  c.option("--costs", args->costs, "As for compile --shard").value_name("FILE");
+  c.flag("--json", args->json, "Print JSON (schemas/list.v1.schema.json)");
+  c.examples(
+      "  texmesh list scans/ -o packages/                      what compile would make\n"
+      "  texmesh list scans/ -o packages/ --shards 40 --json   for another engine");
+  c.notes(
+      "For Snakemake (examples/snakemake), Nextflow, make: names of packages, the files that each model names, "
+      "and sizes. Nothing is compiled and no picture is opened.");
+  c.on_run([args] { return as_usage([&] { return run_list(*args); }); });
+}
+
 void add_summary_command(Command& app) {
   auto args = std::make_shared<MergeArguments>();
-  Command c = app.add("summary");
+  Command c = app.add("summary", "Merge the reports of many runs of compile into one");
   c.needs_command();
   Command merge = c.add("merge", "Merge what compile --summary wrote for each shard");
   merge.option("SUMMARY", args->files, "Files of compile --summary").required();
@@ -85,14 +132,7 @@ void add_summary_command(Command& app) {
       "named.\n"
       "Exit code: as compile's for the models of all runs; 75 also where a shard is missing or half-written, 1 "
       "also where a summary is foreign.");
-  merge.on_run([args] {
-    try {
-      return run_merge(*args);
-    } catch (const InputError& e) {
-      std::cerr << "texmesh summary: " << e.what() << '\n';
-      return static_cast<int>(kExitUsage);
-    }
-  });
+  merge.on_run([args] { return as_usage([&] { return run_merge(*args); }); });
 }
 
 }  // namespace texmesh

@@ -1,9 +1,6 @@
 #include <filesystem>
-#include <iostream>
-#include <memory>
 
 #include "format/documents/about.h"
-#include "pipeline/io/exit_codes.h"
 #include "pipeline/io/text_table.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"
@@ -41,7 +38,7 @@ int run_site(SiteArguments& args) {
 
 void add_site_command(Command& app) {
   auto args = std::make_shared<SiteArguments>();
-  Command c = app.add("site");
+  Command c = app.add("site", "Write a static site of a collection: posters, search, licences, a viewer");
   c.option("PACKAGES", args->packages, "A folder of packages, whose folders are looked into; or one package")
       .required();
   c.option(

@@ -1,4 +1,4 @@
-#include "tools/extract/plan_pictures.h"
+#include "lab/cli/studies/plan_pictures.h"
 
 #include <algorithm>
 #include <cmath>
