@@ -1,4 +1,4 @@
-// texmesh debug as a user runs it: files, legend, exit codes, the cache that it shares with compile.
+// texmesh render --what as a user runs it: files, legend, exit codes, the cache that it shares with compile.
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
@@ -15,7 +15,7 @@ CommandResult texmesh(std::vector<std::string> arguments) {
   return run_command(arguments);
 }
 
-class DebugCommand : public ::testing::Test {
+class RenderWhat : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     shared_ = new TemporaryFolder;
@@ -30,75 +30,82 @@ class DebugCommand : public ::testing::Test {
   static TemporaryFolder* shared_;
   TemporaryFolder folder_;
 };
-TemporaryFolder* DebugCommand::shared_ = nullptr;
+TemporaryFolder* RenderWhat::shared_ = nullptr;
 
-TEST_F(DebugCommand, EveryQuantityAsGlbAndPng) {
-  for (const char* what : {"persistence", "skeleton", "R", "collapse-error", "fragments", "atlas"}) {
+TEST_F(RenderWhat, EveryQuantityAsGlbAndPng) {
+  for (const char* what : {"scales", "fragments", "atlas"}) {
     const std::string glb = folder_ / "x.glb", png = folder_ / "x.png";
     const CommandResult r =
-        texmesh({"debug", scan(), "--what", what, "-o", glb, "--json", "--cache", cache()});
+        texmesh({"render", scan(), "--what", what, "-o", glb, "--json", "--cache", cache()});
     ASSERT_EQ(r.exit_code, 0) << what << r.errors;
     const Json legend = Json::parse(r.output);
     EXPECT_EQ(legend["what"], what);
     EXPECT_FALSE(legend["quantity"].get<std::string>().empty());
-    if (std::string(what) != "skeleton" && std::string(what) != "atlas") {
+    if (std::string(what) != "atlas") {
       EXPECT_LE(legend["range"][0], legend["range"][1]);
       EXPECT_EQ(legend["stops"].size(), 5u);
     }
     EXPECT_EQ(read_text(glb).substr(0, 4), "glTF");
     const CommandResult again =
-        texmesh({"debug", scan(), "--what", what, "-o", png, "--size", "64", "--cache", cache()});
+        texmesh({"render", scan(), "--what", what, "-o", png, "--size", "64", "--cache", cache()});
     ASSERT_EQ(again.exit_code, 0) << what << again.errors;
     EXPECT_EQ(read_text(png).substr(1, 3), "PNG");
     EXPECT_NE(again.output.find(legend["quantity"].get<std::string>()), std::string::npos) << again.output;
   }
 }
 
-TEST_F(DebugCommand, SharesTheCacheWithCompileAndNeedsNoMoreStages) {
+TEST_F(RenderWhat, SharesTheCacheWithCompileAndNeedsNoMoreStages) {
   const std::string own = folder_ / "cache";
-  ASSERT_EQ(texmesh({"debug", scan(), "--what", "R", "-o", folder_ / "x.glb", "--cache", own}).exit_code, 0);
+  ASSERT_EQ(
+      texmesh({"render", scan(), "--what", "fragments", "-o", folder_ / "x.glb", "--cache", own}).exit_code,
+      0);
   const std::string bytes = read_text(folder_ / "x.glb");
   const CommandResult r = texmesh({"compile", scan(), "-o", folder_ / "p.texmesh", "--cache", own, "--json"});
   ASSERT_EQ(r.exit_code, 0) << r.errors;
-  for (const char* hit : {"import", "condition", "skeletonization"})
+  for (const char* hit : {"import", "condition", "fragmentation"})
     EXPECT_NE(r.output.find(std::string("\"stage\":\"") + hit + "\",\"result\":\"hit\""), std::string::npos)
         << r.output;
-  EXPECT_EQ(r.output.find("\"stage\":\"ssf\",\"result\":\"hit\""), std::string::npos);
+  EXPECT_EQ(r.output.find("\"stage\":\"simplification\",\"result\":\"hit\""), std::string::npos);
   // Same bytes without a cache, and from the package for what it holds.
   ASSERT_EQ(
-      texmesh({"debug", scan(), "--what", "R", "-o", folder_ / "y.glb", "--no-cache", "-j", "1"}).exit_code,
+      texmesh({"render", scan(), "--what", "fragments", "-o", folder_ / "y.glb", "--no-cache", "-j", "1"})
+          .exit_code,
       0);
   EXPECT_EQ(read_text(folder_ / "y.glb"), bytes);
   ASSERT_EQ(texmesh({"unpack", folder_ / "p.texmesh", "-o", folder_ / "tree"}).exit_code, 0);
   for (const char* package : {"p.texmesh", "tree"})
-    EXPECT_EQ(texmesh({"debug", folder_ / package, "--what", "fragments", "-o", folder_ / "f.glb"}).exit_code,
-              0)
+    EXPECT_EQ(
+        texmesh({"render", folder_ / package, "--what", "fragments", "-o", folder_ / "f.glb"}).exit_code, 0)
         << package;
 }
 
-TEST_F(DebugCommand, OptionsChangeWhatIsSeen) {
-  ASSERT_EQ(texmesh({"debug", scan(), "--what", "persistence", "-o", folder_ / "x.glb", "--json", "--cache",
+TEST_F(RenderWhat, OptionsChangeWhatIsSeen) {
+  ASSERT_EQ(texmesh({"render", scan(), "--what", "scales", "-o", folder_ / "x.glb", "--json", "--cache",
                      cache(), "--set", "ssf.scales=4"})
                 .exit_code,
             0);
-  const CommandResult r = texmesh({"debug", scan(), "--what", "persistence", "-o", folder_ / "x.glb",
-                                   "--json", "--cache", cache(), "--set", "ssf.scales=4"});
+  const CommandResult r = texmesh({"render", scan(), "--what", "scales", "-o", folder_ / "x.glb", "--json",
+                                   "--cache", cache(), "--set", "ssf.scales=4"});
   EXPECT_EQ(Json::parse(r.output)["range"][1], 4);
 }
 
-TEST_F(DebugCommand, ExitCodes) {
+TEST_F(RenderWhat, ExitCodes) {
   const std::string out = folder_ / "x.glb";
-  EXPECT_EQ(texmesh({"debug", "--help"}).exit_code, 0);
-  EXPECT_EQ(texmesh({"debug", scan(), "-o", out}).exit_code, 2);
-  EXPECT_EQ(texmesh({"debug", scan(), "--what", "eta", "-o", out}).exit_code, 2);
-  EXPECT_EQ(texmesh({"debug", scan(), "--what", "R", "-o", folder_ / "x.obj"}).exit_code, 2);
-  EXPECT_EQ(texmesh({"debug", scan(), "--what", "R", "-o", out, "--set", "ssf.size=4"}).exit_code, 2);
-  EXPECT_EQ(texmesh({"debug", scan(), "--what", "R", "-o", out, "--set", "ssf.scales=999"}).exit_code, 2);
-  EXPECT_EQ(texmesh({"debug", folder_ / "absent.glb", "--what", "R", "-o", out, "--no-cache"}).exit_code, 1);
+  EXPECT_EQ(texmesh({"render", "--help"}).exit_code, 0);
+  EXPECT_EQ(texmesh({"render", scan(), "--what", "atlas", "--unlit", "-o", out}).exit_code, 2);
+  EXPECT_EQ(texmesh({"render", scan(), "--what", "eta", "-o", out}).exit_code, 2);
+  EXPECT_EQ(texmesh({"render", scan(), "--what", "fragments", "-o", folder_ / "x.obj"}).exit_code, 2);
+  EXPECT_EQ(texmesh({"render", scan(), "--what", "fragments", "-o", out, "--set", "ssf.size=4"}).exit_code,
+            2);
+  EXPECT_EQ(
+      texmesh({"render", scan(), "--what", "fragments", "-o", out, "--set", "ssf.scales=999"}).exit_code, 2);
+  EXPECT_EQ(
+      texmesh({"render", folder_ / "absent.glb", "--what", "fragments", "-o", out, "--no-cache"}).exit_code,
+      1);
   const CommandResult package = texmesh(
-      {"debug", TEXMESH_SOURCE_DIR "/tests/golden/v2.0-scan.texmesh", "--what", "persistence", "-o", out});
+      {"render", TEXMESH_SOURCE_DIR "/tests/golden/v2.0-scan.texmesh", "--what", "scales", "-o", out});
   EXPECT_EQ(package.exit_code, 1);
-  EXPECT_NE(package.errors.find("texmesh debug MODEL --what persistence"), std::string::npos);
+  EXPECT_NE(package.errors.find("the model it was compiled from"), std::string::npos);
   EXPECT_TRUE(read_text(out).empty());  // no failure left anything behind
 }
 
