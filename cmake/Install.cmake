@@ -44,7 +44,7 @@ if(TEXMESH_COMPILER)
     "io/(file_request|file_resolver|file_stamp|resolver)\\.h" "compile/workers/(seldom|worker|sandbox/sandbox)\\.h" "batch/progress\\.h"
     "graph/(artefact|explanation|graph_run|key|option_text|stage|stage_observer|store)\\.h")
   texmesh_install_headers(tools "inspect/(dump/dump|verify/verify|diff/diff)\\.h" "extract/extract\\.h" "publish/export/export\\.h"
-    "publish/site/gallery\\.h" "extract/glb/image_codecs\\.h" "render/plane_pixels\\.h")
+    "publish/site/site\\.h" "extract/glb/image_codecs\\.h" "render/plane_pixels\\.h")
   install(FILES cmake/FindWebP.cmake DESTINATION ${texmesh_cmake_dir})
   install(TARGETS texmesh EXPORT texmeshTool RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT tool)
   install(TARGETS texmesh_readers LIBRARY DESTINATION ${TEXMESH_MODULE_FOLDER} COMPONENT tool)

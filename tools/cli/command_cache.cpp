@@ -3,9 +3,10 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/batch/progress.h"
+#include "format/base/errors.h"
 #include "pipeline/cache/disk_store.h"
 #include "pipeline/cache/prune.h"
+#include "pipeline/io/table.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"
 #include "tools/cli/options/units.h"

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <filesystem>
 
 #include "format/documents/about.h"
@@ -7,7 +8,7 @@
 #include "tools/cli/options/percent_line.h"
 #include "tools/cli/options/units.h"
 #include "tools/publish/export/export.h"
-#include "tools/publish/view/site.h"
+#include "tools/publish/view/served_files.h"
 
 namespace texmesh {
 namespace {

@@ -7,6 +7,7 @@
 #include "pipeline/batch/fleet/merge_summaries.h"
 #include "pipeline/batch/fleet/model_list.h"
 #include "pipeline/batch/progress.h"
+#include "pipeline/io/table.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/resource_error.h"
 #include "tools/cli/commands.h"

@@ -2,8 +2,15 @@
 // writes the document; schemas/NAME.schema.json in the sources hold the same texts.
 
 #include "pipeline/compile/profile.h"
+#include "pipeline/io/record.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"
+#include "tools/inspect/atlas/atlas_report.h"
+#include "tools/inspect/diff/diff.h"
+#include "tools/inspect/verify/verify.h"
+#include "tools/publish/export/export.h"
+#include "tools/publish/report/report.h"
+#include "tools/publish/site/site.h"
 
 namespace texmesh {
 namespace {
@@ -12,7 +19,11 @@ struct PrintedSchema {
   const char* name;
   std::string (*text)();
 };
-constexpr PrintedSchema kPrintedSchemas[] = {{"profile.v1", profile_schema}};
+constexpr PrintedSchema kPrintedSchemas[] = {
+    {"diff.v1", [] { return diff_schema().text; }},     {"doctor.v1", [] { return doctor_schema().text; }},
+    {"export.v1", [] { return export_schema().text; }}, {"profile.v1", profile_schema},
+    {"report.v1", [] { return report_schema().text; }}, {"site.v1", [] { return site_schema().text; }},
+    {"verify.v1", [] { return verify_schema().text; }}};
 
 }  // namespace
 

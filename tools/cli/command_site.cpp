@@ -4,34 +4,34 @@
 #include "pipeline/io/text_table.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"
-#include "tools/publish/site/gallery.h"
-#include "tools/publish/view/site.h"
+#include "tools/publish/site/site.h"
+#include "tools/publish/view/served_files.h"
 
 namespace texmesh {
 namespace {
 
 struct SiteArguments {
   std::string packages, folder, viewer;
-  GalleryOptions options;
+  SiteOptions options;
   bool json = false;
 };
 
 int run_site(SiteArguments& args) {
-  GalleryOptions& options = args.options;
+  SiteOptions& options = args.options;
   if (!options.packages_url.empty() && !is_web_url(options.packages_url))
     throw UsageError("--packages-url", "", "an http or https URL", options.packages_url);
   if (!options.packages_url.empty() && !options.packages_url.ends_with("/")) options.packages_url += "/";
   options.viewer = viewer_folder(args.viewer);
-  check_gallery_folder(args.folder);  // not after the work
-  const Gallery gallery = read_gallery(args.packages, options);
-  for (const GalleryFault& f : gallery.faults) std::cerr << "texmesh: " << printable(f.message) << '\n';
-  write_gallery(gallery, args.folder);
+  check_site_folder(args.folder);  // not after the work
+  const Site site = read_site(args.packages, options);
+  for (const SiteFault& f : site.faults) std::cerr << "texmesh: " << printable(f.message) << '\n';
+  write_site(site, args.folder);
   if (args.json)
-    std::cout << gallery_json(gallery, args.folder) << '\n';
+    std::cout << site_json(site, args.folder) << '\n';
   else
-    std::cout << (std::filesystem::path(args.folder) / "index.html").string() << ", "
-              << gallery.objects.size() << (gallery.objects.size() == 1 ? " object\n" : " objects\n");
-  return gallery.faults.empty() ? kExitOk : kExitModelFailed;
+    std::cout << (std::filesystem::path(args.folder) / "index.html").string() << ", " << site.objects.size()
+              << (site.objects.size() == 1 ? " object\n" : " objects\n");
+  return site.faults.empty() ? kExitOk : kExitModelFailed;
 }
 
 }  // namespace

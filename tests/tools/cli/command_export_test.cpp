@@ -9,7 +9,7 @@
 #include "tests/support/packages.h"
 #include "tests/support/schema.h"
 #include "tests/support/small_builds.h"
-#include "tests/tools/publish/report/html_check.h"
+#include "tests/tools/publish/pages/html_check.h"
 
 namespace texmesh::testing {
 namespace {

@@ -1,4 +1,4 @@
-// texmesh site as a user runs it: a gallery of good, damaged and hostile packages.
+// texmesh site as a user runs it: a site of good, damaged and hostile packages.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -8,7 +8,7 @@
 #include "tests/support/packages.h"
 #include "tests/support/schema.h"
 #include "tests/support/small_builds.h"
-#include "tests/tools/publish/report/html_check.h"
+#include "tests/tools/publish/pages/html_check.h"
 
 namespace texmesh::testing {
 namespace {

@@ -1,6 +1,8 @@
 #pragma once
+#include <array>
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "delivery/cpp/package/package_reader.h"
@@ -9,8 +11,11 @@
 
 namespace texmesh {
 
+struct DocumentSchema;  // pipeline/io/record.h
+
 /// Whose form a package gets.
 enum class ExportTarget : std::uint8_t { k3dTiles, kGltfLod, kModelViewer, kOembed };
+/// What --to calls the target.
 template <>
 struct EnumNames<ExportTarget> {
   static constexpr std::array<std::string_view, 4> names{"3dtiles", "gltf-lod", "model-viewer", "oembed"};
@@ -61,6 +66,7 @@ Export make_export(PackageReader& package, const std::string& path, const Export
 
 /// export.json of the folder, which names its files (schemas/export.v1.schema.json).
 std::string export_json(const Export& made);
+DocumentSchema export_schema();
 
 /// Writes the folder, which appears whole or not at all. An earlier export is replaced. InputError when the
 /// folder holds anything else, or cannot be made.
