@@ -11,7 +11,7 @@
 #include "format/container/layout.h"
 #include "format/rules/viewing.h"
 #include "pipeline/about/gltf_about.h"
-#include "pipeline/io/text_table.h"
+#include "pipeline/io/table.h"
 #include "tools/extract/budget/budget_search.h"
 #include "tools/extract/glb/joined_jpeg.h"
 #include "tools/extract/glb/plain_file.h"
