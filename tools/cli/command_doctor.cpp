@@ -1,7 +1,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/io/text_table.h"
+#include "pipeline/io/table.h"
 #include "tools/cli/check/atlas_gate.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"

@@ -80,7 +80,7 @@ bool ends_with_either(const std::string& path, const char* ending, const char* l
   return path.ends_with(ending) || path.ends_with(large);
 }
 
-CompileRequest request_of(const Painting& p) {
+CompileRequest painting_request(const Painting& p) {
   CompileRequest request;
   request.input = p.input;
   try {
@@ -92,7 +92,7 @@ CompileRequest request_of(const Painting& p) {
 }
 
 PaintedModel paint(const Painting& p, const PaintedQuantity& what, Notes& notes) {
-  const CompileRequest request = request_of(p);
+  const CompileRequest request = painting_request(p);
   const RunContext context = context_of(p.jobs);
   if (is_package(p.input)) return paint_package(p.input, what, context);
   const std::unique_ptr<Store> store =

@@ -9,7 +9,7 @@
 #include "format/container/layout.h"
 #include "format/rules/viewing.h"
 #include "pipeline/about/gltf_about.h"
-#include "pipeline/io/text_table.h"
+#include "pipeline/io/table.h"
 #include "tools/extract/budget/budget_search.h"
 #include "tools/extract/glb/scale_file.h"
 #include "tools/extract/glb/standalone_glb.h"
