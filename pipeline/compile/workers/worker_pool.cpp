@@ -15,7 +15,7 @@
 #include <set>
 
 #include "format/base/errors.h"
-#include "pipeline/cache/layer_rest.h"
+#include "pipeline/cache/cache_layer.h"
 #include "pipeline/compile/workers/child_process.h"
 #include "pipeline/compile/workers/worker.h"
 #include "pipeline/compile/workers/worker_messages.h"

@@ -1,4 +1,4 @@
-#include "pipeline/graph/explanation.h"
+#include "pipeline/graph/graph_run.h"
 
 #include <gtest/gtest.h>
 
