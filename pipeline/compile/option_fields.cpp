@@ -1,20 +1,17 @@
+// Options as generic code sees them: listed from the fields of their structs, as JSON both ways, as schema.
 #include "pipeline/compile/option_fields.h"
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
 #include <sstream>
-#include <type_traits>
 
 #include "format/base/errors.h"
-#include "pipeline/compile/option_json.h"
-#include "pipeline/compile/options.h"
 #include "pipeline/graph/option_text.h"
+#include "pipeline/io/record.h"
 #include "pipeline/io/wire_text.h"
 
 namespace texmesh {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 /// Collects the fields of one options struct.
 struct FieldCollector {
@@ -23,20 +20,44 @@ struct FieldCollector {
   std::vector<OptionField>& out;
 
   template <class T>
-  void operator()(const char* name, T& value, Range range, const char* help) {
-    out.push_back({stage, name, help, range, &value, &set_by_user});
+  void add(const char* name, T& value, std::optional<Range> range, bool has_flag, const char* help) {
+    OptionField field{stage, name, help, range, has_flag, static_cast<int*>(nullptr), &set_by_user};
+    if constexpr (std::is_enum_v<T>)
+      field.value = EnumField{EnumNames<T>::names, [&value] { return static_cast<std::size_t>(value); },
+                              [&value](std::size_t i) { value = static_cast<T>(i); }};
+    else
+      field.value = &value;
+    out.push_back(std::move(field));
   }
   template <class T>
   void operator()(const char* name, T& value, const char* help) {
-    if constexpr (std::is_enum_v<T>) {
-      EnumField e{EnumNames<T>::names, [&value] { return static_cast<std::size_t>(value); },
-                  [&value](std::size_t i) { value = static_cast<T>(i); }};
-      out.push_back({stage, name, help, std::nullopt, std::move(e), &set_by_user});
-    } else {
-      out.push_back({stage, name, help, std::nullopt, &value, &set_by_user});
-    }
+    add(name, value, std::nullopt, true, help);
+  }
+  template <class T>
+  void operator()(const char* name, T& value, Range range, const char* help) {
+    add(name, value, range, true, help);
+  }
+  template <class T>
+  void operator()(const char* name, T& value, ProfileOnly, const char* help) {
+    add(name, value, std::nullopt, false, help);
+  }
+  template <class T>
+  void operator()(const char* name, T& value, Range range, ProfileOnly, const char* help) {
+    add(name, value, range, false, help);
   }
 };
+
+template <class T>
+constexpr bool kIsList = std::is_same_v<T, std::vector<int>> || std::is_same_v<T, std::vector<double>>;
+
+/// What a document may hold: lists have 1 to 64 elements, texts without a Range 200 bytes.
+template <class T>
+FieldRule rule_of(const OptionField& field, const T*) {
+  FieldRule rule{.range = field.range};
+  if (kIsList<T>) rule.count = Range{1, 64};
+  if (std::is_same_v<T, std::string> && !field.range) rule.range = Range{0, 200};
+  return rule;
+}
 
 /// Command-line text of a field as JSON: numbers and booleans as they stand, lists by commas, everything else
 /// a string.
@@ -75,21 +96,51 @@ OptionField* find_option(std::vector<OptionField>& fields, std::string_view path
   return it == fields.end() ? nullptr : &*it;
 }
 
-std::string option_text(const OptionField& field) {
-  if (const auto* e = std::get_if<EnumField>(&field.value)) return option_text(e->names[e->get()]);
+Json option_json(const OptionField& field) {
   return std::visit(
       [](const auto& value) {
         if constexpr (std::is_same_v<std::decay_t<decltype(value)>, EnumField>)
-          return std::string();
+          return Json(value.names[value.get()]);
         else
-          return option_text(*value);
+          return Json(*value);
       },
       field.value);
+}
+
+std::string option_text(const OptionField& field) { return option_json(field).dump(); }
+
+void set_option_json(OptionField& field, const Json& json, const std::string& file,
+                     const std::string& place) {
+  const RecordPlace at{file, nullptr, place};
+  std::visit(
+      [&](auto& value) {
+        if constexpr (std::is_same_v<std::decay_t<decltype(value)>, EnumField>)
+          value.set(record_detail::get_enum(json, value.names, at));
+        else
+          get_value(json, *value, rule_of(field, value), at);
+      },
+      field.value);
+  field.set_by_user->insert(field.path());
 }
 
 void set_option(OptionField& field, const std::string& text, const std::string& source) {
   if (!is_utf8(text)) throw InputError(source, "", "UTF-8", readable_name(text));
   set_option_json(field, parse_text(field, text), source, "");
+}
+
+Json option_schema(const OptionField& field) {
+  Json schema = Json::object();
+  std::visit(
+      [&](const auto& value) {
+        if constexpr (std::is_same_v<std::decay_t<decltype(value)>, EnumField>)
+          record_detail::schema_of_enum(schema, value.names);
+        else
+          put_schema<std::remove_pointer_t<std::decay_t<decltype(value)>>>(schema, rule_of(field, value));
+      },
+      field.value);
+  schema["description"] = field.help;
+  schema["default"] = option_json(field);
+  return schema;
 }
 
 }  // namespace texmesh

@@ -1,18 +1,21 @@
 #pragma once
 #include <functional>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <set>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <variant>
 #include <vector>
 
 #include "format/base/fields.h"
+#include "pipeline/compile/options.h"
+#include "pipeline/graph/make_stage.h"
 
 namespace texmesh {
-
-struct CompileOptions;
 
 /// A field whose C++ type is an enum, seen as text.
 struct EnumField {
@@ -25,6 +28,7 @@ struct EnumField {
 struct OptionField {
   std::string stage, name, help;
   std::optional<Range> range;
+  bool has_flag = true;  // false: profiles alone may set it (ProfileOnly)
   std::variant<bool*, int*, double*, std::string*, std::vector<int>*, std::vector<double>*, EnumField> value;
   std::set<std::string>* set_by_user = nullptr;  // of the same CompileOptions; set_option() adds the path
   std::string path() const { return stage + "." + name; }
@@ -34,10 +38,45 @@ std::vector<OptionField> list_options(CompileOptions& options);
 /// The field with this path, or null.
 OptionField* find_option(std::vector<OptionField>& fields, std::string_view path);
 
-/// Text of a field's value as JSON: what keys, provenance and --explain compare.
+/// A field's value as JSON, and its text: what keys, provenance and --explain compare.
+nlohmann::ordered_json option_json(const OptionField& field);
 std::string option_text(const OptionField& field);
 
+/// Sets a field. Strict: a wrong type or a value out of range throws InputError{file, place, ...}.
+void set_option_json(OptionField& field, const nlohmann::ordered_json& json, const std::string& file,
+                     const std::string& place);
 /// Sets a field from text as given on a command line ("20", "draco", "5,8,11"). InputError names the flag.
 void set_option(OptionField& field, const std::string& text, const std::string& source);
+
+/// What a schema says of a field: type, range, help, default.
+nlohmann::ordered_json option_schema(const OptionField& field);
+
+/// The name of a part of `all`: "ssf" of a section, "ladder.mode" of a field. Throws std::logic_error for
+/// what is no part of it.
+template <class T>
+std::string option_name(const CompileOptions& all, const T& part) {
+  const auto is_part = [&part](const auto& candidate) {
+    if constexpr (std::is_same_v<std::remove_cvref_t<decltype(candidate)>, T>)
+      return &candidate == &part;
+    else
+      return false;
+  };
+  std::string found;
+  CompileOptions::sections(all, [&](const std::string& name, const auto& section) {
+    if (is_part(section)) found = name;
+    std::remove_cvref_t<decltype(section)>::fields(section,
+                                                   [&](const char* field, const auto& value, auto&&...) {
+                                                     if (is_part(value)) found = name + "." + field;
+                                                   });
+  });
+  if (found.empty()) throw std::logic_error("not an option");
+  return found;
+}
+
+/// Declares what a stage reads of `all`: whole sections or single fields, as they stand there.
+template <class... T>
+Options<T...> read_of(const CompileOptions& all, const T&... parts) {
+  return options(OptionValue<T>(option_name(all, parts), parts)...);
+}
 
 }  // namespace texmesh

@@ -1,8 +1,9 @@
 // A run of the graph over one model, from below:
 // - the results of one stage in a store: found, looked for, loaded, put;
+// - ArtefactTable knows which artefacts are known, under which digests, and who still needs their objects;
 // - StageExecutor brings single stages up to date by them, and explains what it does;
 // - StageScheduler runs the stages that are ready side by side;
-// - GraphRun joins these with the ArtefactTable, which knows what is known so far.
+// - GraphRun joins these.
 #include "pipeline/graph/graph_run.h"
 
 #ifdef __GLIBC__
@@ -13,13 +14,13 @@
 #include <chrono>
 #include <condition_variable>
 #include <exception>
+#include <map>
 #include <mutex>
 #include <optional>
 #include <stdexcept>
 #include <thread>
 
 #include "format/base/errors.h"
-#include "pipeline/graph/artefact_table.h"
 
 namespace texmesh {
 namespace {
@@ -142,6 +143,154 @@ std::vector<StoredBlob> put_results(Store& store, const Stage& stage, const Key&
   store.put(key, encoded);
   return blobs;
 }
+
+/// The artefacts of one run of a graph: of each, the stage that makes the artefact, the digest or parts that
+/// stand for it in keys, and its object while a stage needs the object. Safe from several threads.
+class ArtefactTable {
+ public:
+  static constexpr std::size_t kGiven = static_cast<std::size_t>(-1);
+  /// Where an artefact comes from.
+  struct Origin {
+    std::size_t stage = kGiven;  // index into the stages; kGiven: from outside the graph
+    std::size_t output = 0;      // of that stage
+  };
+
+  /// `stages` must outlive the table. Throws std::logic_error where an artefact is made twice, or is made as
+  /// one type and read as another.
+  explicit ArtefactTable(const std::vector<Stage>& stages) : stages_(stages) {
+    for (std::size_t i = 0; i < stages.size(); ++i)
+      for (std::size_t k = 0; k < stages[i].outputs.size(); ++k) {
+        Slot& slot = slot_of(stages[i].outputs[k]);
+        if (slot.origin.stage != kGiven)
+          throw std::logic_error("artefact " + stages[i].outputs[k].name + " is made twice");
+        slot.origin = {i, k};
+      }
+    for (const Stage& s : stages)
+      for (const ArtefactName& input : s.inputs) ++slot_of(input).uses_left;
+  }
+
+  /// Takes an artefact from outside the graph. In keys `parts` stand for the artefact where there are any,
+  /// else digest and bytes. Throws std::logic_error for another type than the stages read.
+  void give(const ArtefactName& artefact, Object object, const Sha256& digest, std::uint64_t bytes,
+            std::vector<std::pair<std::string, std::string>> parts) {
+    Slot& slot = slot_of(artefact);
+    slot.object = std::move(object);
+    slot.digest = digest;
+    slot.bytes = bytes;
+    slot.parts = std::move(parts);
+    slot.known = true;
+  }
+
+  /// std::logic_error for an artefact of another type, or of no stage.
+  void check_type(const ArtefactName& artefact) const {
+    const auto it = slots_.find(artefact.name);
+    if (it == slots_.end() || it->second.type != artefact.type)
+      throw std::logic_error("no stage makes artefact " + artefact.name + " with this type");
+  }
+  Origin origin_of(const std::string& artefact) const { return slots_.at(artefact).origin; }
+
+  /// From now on these stand for a stage's results in keys: the blobs that hold the results, or, for derived
+  /// data, the stage's own key.
+  void publish_blobs(const Stage& stage, const std::vector<StoredBlob>& blobs) {
+    const std::lock_guard lock(mutex_);
+    for (std::size_t k = 0; k < stage.outputs.size(); ++k) {
+      Slot& slot = slots_.at(stage.outputs[k].name);
+      slot.digest = blobs.at(k).digest;
+      slot.bytes = blobs[k].bytes;
+      slot.known = true;
+    }
+  }
+  void publish_key(const Stage& stage, const Sha256& key) {
+    const std::lock_guard lock(mutex_);
+    for (const StageOutput& output : stage.outputs) {
+      Slot& slot = slots_.at(output.name);
+      slot.digest = key;
+      slot.bytes = 0;
+      slot.known = true;
+    }
+  }
+
+  bool is_known(const std::string& artefact) const {
+    const std::lock_guard lock(mutex_);
+    return slots_.at(artefact).known;
+  }
+  /// The first input that is not known yet; "" when all are known.
+  std::string first_unknown_input(const Stage& stage) const {
+    const std::lock_guard lock(mutex_);
+    for (const ArtefactName& input : stage.inputs)
+      if (!slots_.at(input.name).known) return input.name;
+    return "";
+  }
+  /// All inputs must be known.
+  Key key_of(const Stage& stage) const {
+    Key key(stage.name, stage.version);
+    for (const StageOption& option : stage.options)
+      for (const auto& [path, text] : option.fields) key.add("option " + path, text);
+    for (const StageLibrary& library : stage.libraries) key.add("library " + library.name, library.version);
+    const std::lock_guard lock(mutex_);
+    for (const ArtefactName& input : stage.inputs) {
+      const Slot& slot = slots_.at(input.name);
+      if (slot.parts.empty()) key.add_input(input.name, slot.digest, slot.bytes);
+      for (const auto& [label, value] : slot.parts) key.add(label, value);
+    }
+    return key;
+  }
+
+  /// The object at hand, or null.
+  Object object(const std::string& artefact) const {
+    const std::lock_guard lock(mutex_);
+    return slots_.at(artefact).object;
+  }
+  /// Keeps an object until the artefact's last use is over. An object without a further use is not kept.
+  void keep(const std::string& artefact, Object object) {
+    const std::lock_guard lock(mutex_);
+    Slot& slot = slots_.at(artefact);
+    if (slot.uses_left > 0) slot.object = std::move(object);
+  }
+  /// One more use of an artefact than the stages' own.
+  void add_use(const std::string& artefact) {
+    const std::lock_guard lock(mutex_);
+    ++slots_.at(artefact).uses_left;
+  }
+  /// Ends a stage's uses of its inputs. The inputs of derived data are in use until the last use of the
+  /// derived data, which may still have to be computed.
+  void release_inputs(const Stage& stage) {
+    const std::lock_guard lock(mutex_);
+    release_inputs_locked(stage);
+  }
+
+ private:
+  struct Slot {
+    explicit Slot(const ArtefactName& artefact) : type(artefact.type) {}
+    std::type_index type;
+    Origin origin;
+    int uses_left = 0;
+    bool known = false;
+    Sha256 digest{};
+    std::uint64_t bytes = 0;
+    std::vector<std::pair<std::string, std::string>> parts;  // see give()
+    Object object;
+  };
+  Slot& slot_of(const ArtefactName& artefact) {
+    Slot& slot = slots_.try_emplace(artefact.name, artefact).first->second;
+    if (slot.type != artefact.type)
+      throw std::logic_error("artefact " + artefact.name + " is read as another type than it is made");
+    return slot;
+  }
+  void release_inputs_locked(const Stage& stage) {
+    for (const ArtefactName& input : stage.inputs) {
+      Slot& slot = slots_.at(input.name);
+      if (--slot.uses_left > 0 || slot.origin.stage == kGiven) continue;
+      slot.object.reset();
+      const Stage& producer = stages_[slot.origin.stage];
+      if (!producer.stored) release_inputs_locked(producer);
+    }
+  }
+
+  const std::vector<Stage>& stages_;
+  mutable std::mutex mutex_;           // of what changes inside the slots
+  std::map<std::string, Slot> slots_;  // the map itself is complete before the run begins
+};
 
 /// Brings single stages of a graph up to date and fetches artefacts, from the store or by running stages.
 /// Safe from several threads: a stage is never run by two of them at once, however many results it has.

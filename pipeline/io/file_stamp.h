@@ -14,6 +14,18 @@ struct FileStamp {
   std::uint64_t device = 0, inode = 0, bytes = 0;
   std::int64_t modified_ns = 0, changed_ns = 0;
   friend bool operator==(const FileStamp&, const FileStamp&) = default;
+  template <class S, class A>
+  static void archive(S& s, A& a) {
+    a(s.device, s.inode, s.bytes, s.modified_ns, s.changed_ns);
+  }
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("device", s.device, "");
+    v("inode", s.inode, "");
+    v("bytes", s.bytes, "");
+    v("modified_ns", s.modified_ns, "");
+    v("changed_ns", s.changed_ns, "");
+  }
 
   /// A file that was changed this shortly before it was looked at may be changed again within the clock's
   /// tick: its stamp is no proof.

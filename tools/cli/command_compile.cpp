@@ -15,7 +15,6 @@
 #include "pipeline/batch/write_reports.h"
 #include "pipeline/cache/cache_layer.h"
 #include "pipeline/cache/disk_store.h"
-#include "pipeline/compile/jnd_profile.h"
 #include "pipeline/compile/option_fields.h"
 #include "pipeline/compile/options.h"
 #include "pipeline/compile/profile.h"
@@ -47,9 +46,7 @@ const std::map<std::string, ShortName> kShortNames{{"package.title", {"--title",
                                                    {"ladder.subsampling", {"--subsampling", true}},
                                                    {"scales.mesh_codec", {"--mesh-codec", true}},
                                                    {"perceptual_values.jnd", {"--jnd", true}},
-                                                   {"fragmentation.fill", {"--fill", true}},
-                                                   {"lut.allocate", {"--allocate", false}},
-                                                   {"simplification.order", {"--order", false}}};
+                                                   {"fragmentation.fill", {"--fill", true}}};
 constexpr const char* kEverydayTitle = "What the package holds";
 
 struct CompileArguments {
@@ -141,7 +138,7 @@ void add_stage_option(Command& c, const OptionField& f, CompileArguments& args) 
 void add_stage_options(Command& c, CompileArguments& args, const AskedOptions& asked) {
   CompileOptions defaults;
   for (const OptionField& f : list_options(defaults)) {
-    if (!asked.has(f)) continue;
+    if (!f.has_flag || !asked.has(f)) continue;
     c.group("Stage " + f.stage);
     add_stage_option(c, f, args);
   }

@@ -70,7 +70,7 @@ void add_stages_command(Command& app) {
   c.examples("  texmesh stages\n  texmesh stages --dot | dot -Tsvg > stages.svg");
   c.on_run([args] {
     if (args->schema)
-      std::cout << profile_schema();
+      std::cout << profile_schema().text;
     else if (args->json)
       print_stages_json();
     else if (args->dot)

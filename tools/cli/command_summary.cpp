@@ -5,7 +5,7 @@
 
 #include "format/base/errors.h"
 #include "format/base/text_bytes.h"
-#include "pipeline/batch/fleet/merge_summaries.h"
+#include "pipeline/batch/fleet/run_summary.h"
 #include "pipeline/batch/progress.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"

@@ -2,8 +2,8 @@
 #include <string>
 
 #include "pipeline/compile/library_versions.h"
-#include "pipeline/compile/workers/sandbox/sandbox.h"
-#include "pipeline/compile/workers/worker_child.h"
+#include "pipeline/compile/workers/sandbox.h"
+#include "pipeline/compile/workers/worker.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"
 #include "tools/cli/program.h"
@@ -54,7 +54,7 @@ void add_commands(Command& program) {
 int main(int argc, char** argv) {
   using namespace texmesh;
   if (argc == 2 && std::string(argv[1]) == "worker")
-    return worker_main();  // started by compile, see pipeline/compile/workers/worker_child.h
+    return worker_main();  // started by compile, see pipeline/compile/workers/worker.h
 
   CommandLine line(kProgramSummary);
   describe_program(line, version_details);

@@ -4,7 +4,6 @@
 
 #include <set>
 
-#include "pipeline/compile/declare_options.h"
 #include "pipeline/compile/option_fields.h"
 
 namespace texmesh {

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "tests/pipeline/graph/fake_graph.h"
+#include "tests/support/memory_store.h"
 
 namespace texmesh {
 namespace {
