@@ -47,10 +47,9 @@ if(TEXMESH_COMPILER)
     "io/(file_request|file_resolver|file_stamp|record|resolver)\\.h" "compile/workers/(sandbox|worker|worker_messages)\\.h" "batch/progress\\.h"
     "graph/(graph_run|key|option_text|stage|store)\\.h")
   texmesh_install_headers(tools "inspect/(dump/dump|verify/verify|diff/diff)\\.h" "extract/extract\\.h" "publish/export/export\\.h"
-    "publish/site/gallery\\.h" "extract/glb/(extracted|image_codecs)\\.h" "render/plane_pixels\\.h")
+    "publish/site/site\\.h" "extract/glb/image_codecs\\.h" "render/plane_pixels\\.h")
   install(FILES cmake/FindWebP.cmake DESTINATION ${texmesh_cmake_dir})
   install(TARGETS texmesh EXPORT texmeshTool RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT tool)
-  install(TARGETS texmesh-core RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/texmesh COMPONENT tool)
   install(TARGETS texmesh_readers LIBRARY DESTINATION ${TEXMESH_MODULE_FOLDER} COMPONENT tool)
   install(DIRECTORY ${PROJECT_BINARY_DIR}/viewer/ DESTINATION ${CMAKE_INSTALL_DATADIR}/texmesh/viewer COMPONENT tool OPTIONAL)
   install(DIRECTORY profiles/ DESTINATION ${CMAKE_INSTALL_DATADIR}/texmesh/profiles COMPONENT tool)

@@ -22,20 +22,6 @@ function(texmesh_unity_room target room options)  # sources
   endforeach()
 endfunction()
 
-# These sources of a room get units of their own, NAME behind the room's. A program that needs few sources of a library links
-# the units that hold them, whole.
-function(texmesh_unity_apart name room)  # sources without .cpp, or *
-  list(TRANSFORM ARGN APPEND .cpp)
-  list(TRANSFORM ARGN PREPEND ${CMAKE_CURRENT_SOURCE_DIR}/${room}/)
-  foreach(source ${ARGN})
-    file(GLOB found ${source})
-    if(NOT found)
-      message(FATAL_ERROR "${source}: expected a source, found none")
-    endif()
-    set_source_files_properties(${found} PROPERTIES TEXMESH_APART ${name})
-  endforeach()
-endfunction()
-
 # To be called when the properties of all sources are set.
 function(texmesh_unity target)
   if(NOT TEXMESH_UNITY)
@@ -63,10 +49,6 @@ function(texmesh_unity target)
     endif()
     if(options)
       string(APPEND room _seldom)
-    endif()
-    get_source_file_property(apart ${source} TEXMESH_APART)
-    if(apart)
-      string(APPEND room _${apart})
     endif()
     list(APPEND rooms ${room})
     list(APPEND sources_of_${room} ${source})

@@ -8,7 +8,7 @@
 #include <set>
 
 #include "pipeline/batch/fleet/shards.h"
-#include "pipeline/io/core_path.h"
+#include "pipeline/io/program.h"
 #include "pipeline/io/file_stamp.h"
 
 namespace texmesh {
@@ -166,7 +166,7 @@ JobSelection::JobSelection(const BatchPlan& plan, const RunSettings& settings)
     : plan_(plan),
       settings_(settings),
       memo_(settings.cache.folder, plan.outputs),
-      tool_seed_(core_build()) {}
+      tool_seed_(program_build()) {}
 
 const Sha256& JobSelection::request_of(const std::shared_ptr<const std::string>& profile) {
   const auto [it, fresh] = requests_.try_emplace(profile.get());

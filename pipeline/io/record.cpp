@@ -217,6 +217,11 @@ Json& schema_of_map(Json& to) {
   return to["additionalProperties"];
 }
 
+Json& schema_or_null(Json& to) {
+  to["anyOf"] = Json::array({{{"type", "null"}}, Json()});
+  return to["anyOf"][1];
+}
+
 void begin_object_schema(Json& to) {
   to["type"] = "object";
   to["required"] = Json::array();

@@ -44,6 +44,12 @@ using Json = nlohmann::ordered_json;
 // has its description in RecordFields. Behind the member stands nothing, a Range or a FieldRule; then what
 // the schema says.
 
+/// A member of documents that are written alone: null where it is empty.
+template <class T>
+struct OrNull {
+  std::optional<T> value;
+};
+
 /// A member that every document of this kind has with the same value.
 struct Constant {
   Constant(int value) : number(value) {}
@@ -108,6 +114,12 @@ template <class T>
 struct IsList : std::false_type {};
 template <class T>
 struct IsList<std::vector<T>> : std::true_type {};
+template <class T, std::size_t N>
+struct IsList<std::array<T, N>> : std::true_type {};
+template <class T>
+struct IsOrNull : std::false_type {};
+template <class T>
+struct IsOrNull<OrNull<T>> : std::true_type {};
 template <class T>
 struct IsMap : std::false_type {};
 template <class T>
@@ -173,6 +185,7 @@ void schema_of_enum(Json& to, std::span<const std::string_view> names);
 void schema_of_constant(Json& to, const Constant& value);
 Json& schema_of_list(Json& to, const FieldRule& rule);  // the elements' schema
 Json& schema_of_map(Json& to);                          // the members' schema
+Json& schema_or_null(Json& to);                         // the schema of what is not null
 void begin_object_schema(Json& to);
 Json& schema_of_member(Json& object, const char* name, bool may_miss);
 void describe_schema(Json& member, const char* text);
@@ -238,6 +251,8 @@ void put_value(Json& to, const T& value, const FieldRule& rule) {
     put(to, std::string_view(to_hex(value)), rule);
   } else if constexpr (IsOptional<T>::value) {
     if (value) put_value(to, *value, rule);
+  } else if constexpr (IsOrNull<T>::value) {
+    if (value.value) put_value(to, *value.value, rule);
   } else if constexpr (IsShared<T>::value) {
     put_value(to, *value, rule);
   } else if constexpr (IsList<T>::value) {
@@ -326,6 +341,8 @@ void put_schema(Json& to, const FieldRule& rule = {}) {
     schema_of_digest(to);
   } else if constexpr (IsOptional<T>::value) {
     put_schema<typename T::value_type>(to, rule);
+  } else if constexpr (IsOrNull<T>::value) {
+    put_schema<typename decltype(T::value)::value_type>(schema_or_null(to), rule);
   } else if constexpr (IsList<T>::value) {
     put_schema<typename T::value_type>(schema_of_list(to, rule), rule);
   } else if constexpr (IsMap<T>::value) {

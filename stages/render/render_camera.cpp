@@ -7,7 +7,7 @@
 namespace texmesh {
 namespace {
 
-constexpr double kFill = 0.96;  // of the picture's side, as stages/measure's camera
+constexpr double kFill = 0.96;  // of the picture's side
 constexpr double kNearOfDistance = 1e-3;
 
 double tan_of_half(double degrees) {
@@ -16,6 +16,21 @@ double tan_of_half(double degrees) {
 }
 
 }  // namespace
+
+ViewCamera camera_of(int index, int count, Vec3d centre, double radius) {
+  // A Fibonacci lattice on the sphere, starting a little to the side of the front.
+  const double golden = portable::kPi * (3 - std::sqrt(5.0));
+  const double height = count == 1 ? 0.2 : 1 - 2 * (index + 0.5) / count,
+               ring = std::sqrt(1 - height * height);
+  const double angle = 0.4 + golden * index;
+  ViewCamera camera;
+  camera.z = {ring * portable::sin(angle), height, ring * portable::cos(angle)};
+  camera.x = normalized(cross(Vec3d{0, 1, 0}, camera.z));
+  camera.y = cross(camera.z, camera.x);
+  camera.centre = centre;
+  camera.radius = radius;
+  return camera;
+}
 
 RenderCamera perspective_camera(const ViewCamera& view, double fov_degrees) {
   const double radius = std::isfinite(view.radius) && view.radius > 0 ? view.radius : 1;

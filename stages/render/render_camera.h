@@ -1,7 +1,17 @@
 #pragma once
-#include "stages/measure/render_view.h"
+#include "format/base/vec.h"
 
 namespace texmesh {
+
+/// A direction of view: a camera looks along -z at the sphere of radius `radius` around `centre`.
+struct ViewCamera {
+  Vec3d x, y, z;  // unit vectors: x to the right, y up, z towards the viewer
+  Vec3d centre;
+  double radius = 1;
+};
+/// The camera of view `index`, 0 <= index < count. The `count` directions are spread evenly over the sphere.
+/// The directions are the same for every model.
+ViewCamera camera_of(int index, int count, Vec3d centre, double radius);
 
 /// A perspective camera with a square picture.
 struct RenderCamera {

@@ -168,7 +168,7 @@ int check_and_run_debug(const DebugArguments& args) {
 
 void add_debug_command(Command& app) {
   auto args = std::make_shared<DebugArguments>();
-  Command c = app.add("debug");
+  Command c = app.add("debug", "Picture what a stage computed, with a legend of its colours");
   add_debug_options(c, *args);
   c.examples(
       "  texmesh debug turtle.glb --what persistence -o turtle.png\n"

@@ -1,9 +1,6 @@
 #include <filesystem>
-#include <iostream>
-#include <memory>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/io/exit_codes.h"
 #include "pipeline/io/text_table.h"
 #include "tools/cli/check/atlas_gate.h"
 #include "tools/cli/commands.h"
@@ -39,11 +36,7 @@ int run_doctor(const DoctorArguments& args) {
   const std::vector<std::string> reasons = gate_failures(results);
   const std::string name = std::filesystem::path(args.input).filename().string();
   if (args.json) {
-    nlohmann::ordered_json j{{"input", name}};
-    j.update(atlas_json(diagnosis));
-    j["good"] = reasons.empty();
-    j["reasons"] = reasons;
-    std::cout << j.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) << '\n';
+    std::cout << json_line(doctor_json({name, diagnosis, reasons})) << '\n';
   } else {
     std::cout << printable(name) << "\n" << atlas_text(diagnosis);
     for (const std::string& r : reasons) std::cout << "not good enough: " << r << '\n';
@@ -85,7 +78,7 @@ void add_limits(Command& c, AtlasLimits& limits) {
 
 void add_doctor_command(Command& app) {
   auto args = std::make_shared<DoctorArguments>();
-  Command c = app.add("doctor");
+  Command c = app.add("doctor", "Say what a model's texture atlas costs and what to do: a gate for CI, too");
   c.option("INPUT", args->input,
            "A model that compile takes, or a package: a .texmesh file or a folder that unpack made")
       .required();

@@ -212,7 +212,7 @@ void add_render_options(Command& c, RenderArguments& args) {
 
 void add_render_command(Command& app) {
   auto args = std::make_shared<RenderArguments>();
-  Command c = app.add("render");
+  Command c = app.add("render", "Picture a model or a package as viewers show it, lit");
   add_render_options(c, *args);
   c.examples(
       "  texmesh render bust.glb -o bust.png\n"

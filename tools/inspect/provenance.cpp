@@ -1,10 +1,13 @@
 #include "tools/inspect/provenance.h"
 
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "format/base/bounded_json.h"
 #include "format/base/errors.h"
 #include "format/base/sha256.h"
+#include "pipeline/compile/option_fields.h"
+#include "pipeline/compile/options.h"
 
 namespace texmesh {
 namespace {
@@ -94,6 +97,23 @@ Provenance read_provenance(std::span<const std::uint8_t> json) {
   for (const auto& [name, value] : libraries.items())
     p.libraries.emplace_back(name, text(libraries, name.c_str(), "/libraries"));
   return p;
+}
+
+std::vector<OptionChange> changed_options(const nlohmann::ordered_json& profile) {
+  CompileOptions defaults;
+  std::map<std::string, std::string> fallback;
+  for (const OptionField& f : list_options(defaults)) fallback[f.path()] = option_text(f);
+  std::vector<OptionChange> changes;
+  for (const auto& [stage, section] : profile.items()) {
+    if (!section.is_object()) continue;
+    for (const auto& [name, value] : section.items()) {
+      const std::string path = stage + "." + name, text = value.dump();
+      const auto it = fallback.find(path);
+      if (it == fallback.end() || it->second != text)
+        changes.push_back({path, text, it == fallback.end() ? "" : it->second});
+    }
+  }
+  return changes;
 }
 
 }  // namespace texmesh

@@ -27,4 +27,13 @@ struct Provenance {
 /// Strict for what version 1 defines, ignores unknown fields. FormatError names the JSON pointer.
 Provenance read_provenance(std::span<const std::uint8_t> json);
 
+/// An option of a package that is not what this build would take by itself.
+struct OptionChange {
+  std::string name;      // "ladder.rungs"
+  std::string value;     // JSON text
+  std::string fallback;  // JSON text; "" where this build has no such option
+};
+/// `profile`: every option of a package, as its provenance holds them.
+std::vector<OptionChange> changed_options(const nlohmann::ordered_json& profile);
+
 }  // namespace texmesh

@@ -303,7 +303,7 @@ SandboxRules sandbox_rules(const WorkerPlaces& places) {
   SandboxRules rules;
   rules.read = {folder_of_file(places.input), real_path(places.input)};
   if (!places.program.empty())
-    for (const char* modules : {"/../stages", "/../../lib", "/../../lib64"})
+    for (const char* modules : {"/../stages", "/../lib", "/../lib64"})
       rules.read.push_back(folder_of_file(places.program) + modules);
   if (!places.output.empty()) {
     rules.write.push_back(folder_of_file(places.output));

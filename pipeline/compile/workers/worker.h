@@ -74,7 +74,7 @@ struct PoolSettings {
   bool stop_on_failure = false;  // no further child starts after a failure
 };
 
-/// Compiles the jobs, each in a fresh child process of texmesh-core (posix_spawn, never a fork of a threaded
+/// Compiles the jobs, each in a fresh child process of texmesh (posix_spawn, never a fork of a threaded
 /// parent). Returns a report per job, in the order of the jobs.
 /// - Jobs that are predicted to take longest start first. At most `processors` run side by side, fewer when
 ///   the predicted peaks do not fit the memory; one always runs. The last jobs get the free processors as

@@ -23,7 +23,7 @@
 #include "pipeline/cache/cache_layer.h"
 #include "pipeline/compile/workers/worker.h"
 #include "pipeline/io/atomic_file.h"
-#include "pipeline/io/core_path.h"
+#include "pipeline/io/program.h"
 #include "pipeline/io/exit_codes.h"
 
 extern char** environ;
@@ -69,10 +69,10 @@ void write_all(int fd, const std::string& text) {
   }
 }
 
-/// Starts `texmesh-core worker` (posix_spawn, never a fork of a threaded parent) in worker_environment() and
+/// Starts `texmesh worker` (posix_spawn, never a fork of a threaded parent) in worker_environment() and
 /// gives it `input` as the whole of its standard input. Throws std::runtime_error.
 ChildProcess start_worker_process(const std::string& input, bool large_pages) {
-  static const std::string executable = core_executable();
+  static const std::string executable = worker_executable();
   std::vector<std::string> variables = worker_environment(large_pages);
   std::vector<char*> environment;
   for (std::string& variable : variables) environment.push_back(variable.data());

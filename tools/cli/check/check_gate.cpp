@@ -9,7 +9,6 @@
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/text_table.h"
 #include "tools/cli/options/delivery_options.h"
-#include "tools/publish/report/html.h"
 #include "tools/publish/report/switch_sizes.h"
 
 namespace texmesh {

@@ -6,7 +6,7 @@
 #include "format/base/errors.h"
 #include "format/base/no_index.h"
 #include "stages/measure/atlas/atlas_map.h"
-#include "tools/inspect/atlas/atlas_subject.h"
+#include "tools/inspect/atlas/atlas_report.h"
 #include "tools/inspect/debug/debug_view.h"
 
 namespace texmesh {

@@ -5,7 +5,7 @@
 #include "format/base/portable_math.h"
 #include "format/base/srgb.h"
 #include "stages/image/png_writer.h"
-#include "stages/measure/render_view.h"
+#include "stages/render/shade.h"
 #include "tools/inspect/debug/debug_view.h"
 
 namespace texmesh {
@@ -13,7 +13,8 @@ namespace {
 
 constexpr double kTube = 0.004, kPoint = 0.01;  // half width of lines and points, of the object's diagonal
 constexpr std::uint32_t kBar = 16;              // width of the bar of colours, px
-constexpr double kElevation = 0.35;             // sine of the angle the views look down at
+constexpr double kAmbient = 0.3;
+constexpr double kElevation = 0.35;  // sine of the angle the views look down at
 
 ViewCamera camera_at(double angle, const BoundingSphere& bounds) {
   const double ring = std::sqrt(1 - kElevation * kElevation);
@@ -60,57 +61,60 @@ Mesh bars_of(const DebugView& view, double diagonal) {
   return mesh;
 }
 
-MipTexture mips_of(const Pixels& pixels) {
-  MipTexture texture;
-  texture.width_px = pixels.width_px, texture.height_px = pixels.height_px;
-  MipTexture::Level level{pixels.width_px, pixels.height_px, {}};
-  const std::array<float, 256>& linear = light_of_bytes();
-  for (std::size_t i = 0; i < pixels.data.size(); i += 3)
-    level.texels.push_back({linear[pixels.data[i]], linear[pixels.data[i + 1]], linear[pixels.data[i + 2]]});
-  texture.levels.push_back(std::move(level));
-  build_mips(texture);
-  return texture;
+/// Triangles of one brightness each, as a light at the camera makes them: edge-on they keep kAmbient of it.
+Mesh lit_from(Vec3d towards_viewer, const Mesh& mesh) {
+  Mesh out;
+  out.positions = mesh.positions;
+  out.triangle_material = mesh.triangle_material;
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    const auto at = [&](int k) { return to_double(mesh.positions[mesh.position_of(t, k)]); };
+    const Vec3d face = normalized(cross(at(1) - at(0), at(2) - at(0)));
+    const auto light = static_cast<float>(kAmbient + (1 - kAmbient) * std::fabs(dot(face, towards_viewer)));
+    const auto first = static_cast<std::uint32_t>(out.wedge_position.size());
+    out.triangles.push_back({first, first + 1, first + 2});
+    for (const std::uint32_t w : mesh.triangles[t]) {
+      out.wedge_position.push_back(mesh.wedge_position[w]);
+      const Vec4f c = mesh.colours.empty() ? Vec4f{1, 1, 1, 1} : mesh.colours[w];
+      out.colours.push_back({c.x * light, c.y * light, c.z * light, 1});
+      if (!mesh.uv0.empty()) out.uv0.push_back(mesh.uv0[w]);
+      if (!mesh.uv1.empty()) out.uv1.push_back(mesh.uv1[w]);
+    }
+  }
+  return out;
 }
 
-Picture render(const Mesh& mesh, const std::vector<Material>& materials, const std::vector<Pixels>& textures,
-               const ViewCamera& camera, std::uint32_t side_px) {
-  ViewScene scene;
-  std::vector<std::uint32_t> source(mesh.triangles.size());
-  for (std::size_t t = 0; t < source.size(); ++t) source[t] = static_cast<std::uint32_t>(t);
-  scene.mesh = &mesh, scene.triangles = &mesh.triangles, scene.triangle_source = &source;
-  scene.materials = &materials;
-  std::vector<MipTexture> mips;
-  for (const Pixels& p : textures) {
-    mips.push_back(mips_of(p));
-    scene.sizes.push_back({p.width_px, p.height_px});
-  }
+Picture render(const Mesh& mesh, const std::vector<Material>& materials,
+               const std::vector<RenderTexture>& textures, const ViewCamera& camera, std::uint32_t side_px) {
+  const Mesh lit = lit_from(camera.z, mesh);
+  std::vector<RenderMaterial> unlit;
   for (const Material& m : materials) {
-    scene.base_plane.push_back(m.base_colour_texture.image);
-    scene.emissive_plane.push_back(-1);
+    unlit.push_back(render_material(m, [](const TextureRef& ref, TextureUse use) {
+      return use == TextureUse::kBaseColour ? ref.image : -1;
+    }));
+    unlit.back().unlit = unlit.back().double_sided = true;
+    unlit.back().alpha_mode = AlphaMode::kOpaque;
   }
-  return draw(look_at(scene, camera, side_px), mips);
-}
-
-std::uint8_t encode(float linear) {
-  const double x = std::clamp(static_cast<double>(linear), 0.0, 1.0);
-  const double s = srgb_of_light(x);
-  return static_cast<std::uint8_t>(255 * s + 0.5);
+  const RenderScene scene = render_scene(lit, unlit, textures.size());
+  return shade(scene, look(scene, perspective_camera(camera), side_px, {}), textures, studio_environment(),
+               {});
 }
 
 void paste(const Picture& picture, std::uint32_t left, Pixels& out) {
-  for (std::uint32_t y = 0; y < picture.side_px; ++y)
-    for (std::uint32_t x = 0; x < picture.side_px; ++x) {
-      const Vec3f c = picture.linear[std::size_t{y} * picture.side_px + x];
-      std::uint8_t* to = out.data.data() + (std::size_t{y} * out.width_px + left + x) * 3;
-      to[0] = encode(c.x), to[1] = encode(c.y), to[2] = encode(c.z);
-    }
+  const Pixels from = encode_srgb(picture);
+  for (std::uint32_t y = 0; y < from.height_px; ++y)
+    std::copy_n(from.at(0, y), std::size_t{3} * from.width_px,
+                out.data.data() + (std::size_t{y} * out.width_px + left) * 3);
 }
 
+/// The colours as the tone mapping of pictures shows them.
 void paste_bar(Pixels& out) {
   for (std::uint32_t y = 0; y < out.height_px; ++y) {
-    const Srgb c = colour_of(1 - (y + 0.5) / out.height_px);
+    const Srgb code = colour_of(1 - (y + 0.5) / out.height_px);
+    const std::array<float, 256>& light = light_of_bytes();
+    const Vec3f mapped = tone_mapped({light[code[0]], light[code[1]], light[code[2]]});
+    const Pixels c = encode_srgb({1, {mapped}, {1}});
     for (std::uint32_t x = out.width_px - kBar; x < out.width_px; ++x)
-      std::copy(c.begin(), c.end(), out.data.data() + (std::size_t{y} * out.width_px + x) * 3);
+      std::copy_n(c.data.data(), 3, out.data.data() + (std::size_t{y} * out.width_px + x) * 3);
   }
 }
 
@@ -150,11 +154,11 @@ void paste_layout(const Pixels& texture, std::uint32_t left, Pixels& out) {
 std::vector<std::uint8_t> write_debug_png(const DebugView& view, std::uint32_t side_px) {
   BoundingSphere bounds = bounding_sphere(view.mesh.positions);
   if (!(bounds.radius > 0)) bounds.radius = 1;
-  Mesh mesh = view.mesh;
-  mesh.normals.clear();  // flat: what the triangles are like is to be seen
   const Mesh bars = bars_of(view, 2 * bounds.radius);
   Material red;
   red.base_colour = {1, 0.02f, 0.02f, 1};
+  std::vector<RenderTexture> textures;
+  for (const Pixels& p : view.textures) textures.push_back(render_texture(p, true, 0, {}));
   Pixels out;
   const auto layouts =
       static_cast<std::uint32_t>(view.shows_layout ? std::min(kMostLayouts, view.textures.size()) : 0);
@@ -163,7 +167,7 @@ std::vector<std::uint8_t> write_debug_png(const DebugView& view, std::uint32_t s
   out.data.resize(std::size_t{out.width_px} * out.height_px * 3);
   for (std::uint32_t k = 0; k < 2; ++k) {
     const ViewCamera camera = camera_at(0.5 + portable::kPi * k, bounds);
-    Picture picture = render(mesh, view.materials, view.textures, camera, side_px);
+    Picture picture = render(view.mesh, view.materials, textures, camera, side_px);
     if (!bars.triangles.empty()) {
       const Picture over = render(bars, {red}, {}, camera, side_px);
       for (std::size_t i = 0; i < over.covered.size(); ++i)

@@ -190,8 +190,8 @@ TEST(SandboxRulesOfAWorker, AreItsPlacesAndNoMore) {
   EXPECT_EQ(rules.read.back(), "/shared");
   EXPECT_EQ(rules.write, (std::vector<std::string>{"out", "/cache"}));
   EXPECT_FALSE(rules.network);
-  places.program = "/opt/t/libexec/texmesh/texmesh-core";
-  EXPECT_EQ(sandbox_rules(places).read[3], "/opt/t/libexec/texmesh/../../lib");
+  places.program = "/opt/t/bin/texmesh";
+  EXPECT_EQ(sandbox_rules(places).read[3], "/opt/t/bin/../lib");
   places.only_looks = true;
   places.output.clear();
   EXPECT_TRUE(sandbox_rules(places).write.empty());
