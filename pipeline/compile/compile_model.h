@@ -5,7 +5,7 @@
 #include "pipeline/compile/options.h"
 #include "pipeline/graph/graph_run.h"
 #include "pipeline/graph/store.h"
-#include "pipeline/io/file_request.h"
+#include "pipeline/io/file_stamp.h"
 
 namespace texmesh {
 

@@ -6,12 +6,21 @@
 #include <sstream>
 
 #include "format/base/errors.h"
-#include "pipeline/graph/option_text.h"
-#include "pipeline/io/record.h"
 #include "pipeline/io/wire_text.h"
 
 namespace texmesh {
 namespace {
+
+template <class T>
+constexpr OptionKind kind_of() {
+  if constexpr (std::is_enum_v<T>) return OptionKind::kName;
+  if constexpr (std::is_same_v<T, bool>) return OptionKind::kSwitch;
+  if constexpr (std::is_same_v<T, int>) return OptionKind::kInteger;
+  if constexpr (std::is_same_v<T, double>) return OptionKind::kNumber;
+  if constexpr (std::is_same_v<T, std::vector<int>>) return OptionKind::kIntegers;
+  if constexpr (std::is_same_v<T, std::vector<double>>) return OptionKind::kNumbers;
+  return OptionKind::kText;
+}
 
 /// Collects the fields of one options struct.
 struct FieldCollector {
@@ -19,45 +28,32 @@ struct FieldCollector {
   std::set<std::string>& set_by_user;
   std::vector<OptionField>& out;
 
-  template <class T>
-  void add(const char* name, T& value, std::optional<Range> range, bool has_flag, const char* help) {
-    OptionField field{stage, name, help, range, has_flag, static_cast<int*>(nullptr), &set_by_user};
-    if constexpr (std::is_enum_v<T>)
-      field.value = EnumField{EnumNames<T>::names, [&value] { return static_cast<std::size_t>(value); },
-                              [&value](std::size_t i) { value = static_cast<T>(i); }};
-    else
-      field.value = &value;
+  /// `rest`: a Range or none, ProfileOnly or not, the help.
+  template <class T, class... Rest>
+  void operator()(const char* name, T& value, const Rest&... rest) {
+    OptionField field;
+    field.stage = stage, field.name = name, field.kind = kind_of<T>(), field.set_by_user = &set_by_user;
+    (take(field, rest), ...);
+    if constexpr (std::is_enum_v<T>) field.words = EnumNames<T>::names;
+    const FieldRule rule = rule_of(field);
+    field.put = [&value](Json& to) { put_value(to, value); };
+    field.put_schema = [rule](Json& to) { texmesh::put_schema<T>(to, rule); };
+    field.get = [&value, rule](const Json& from, const RecordPlace& at) { get_value(from, value, rule, at); };
     out.push_back(std::move(field));
   }
-  template <class T>
-  void operator()(const char* name, T& value, const char* help) {
-    add(name, value, std::nullopt, true, help);
-  }
-  template <class T>
-  void operator()(const char* name, T& value, Range range, const char* help) {
-    add(name, value, range, true, help);
-  }
-  template <class T>
-  void operator()(const char* name, T& value, ProfileOnly, const char* help) {
-    add(name, value, std::nullopt, false, help);
-  }
-  template <class T>
-  void operator()(const char* name, T& value, Range range, ProfileOnly, const char* help) {
-    add(name, value, range, false, help);
+
+ private:
+  static void take(OptionField& field, const Range& range) { field.range = range; }
+  static void take(OptionField& field, const ProfileOnly&) { field.has_flag = false; }
+  static void take(OptionField& field, const char* help) { field.help = help; }
+
+  /// Lists have 1 to 64 elements, texts without a Range 200 bytes.
+  static FieldRule rule_of(const OptionField& field) {
+    FieldRule rule{.range = field.range, .count = Range{1, 64}};
+    if (field.kind == OptionKind::kText && !field.range) rule.range = Range{0, 200};
+    return rule;
   }
 };
-
-template <class T>
-constexpr bool kIsList = std::is_same_v<T, std::vector<int>> || std::is_same_v<T, std::vector<double>>;
-
-/// What a document may hold: lists have 1 to 64 elements, texts without a Range 200 bytes.
-template <class T>
-FieldRule rule_of(const OptionField& field, const T*) {
-  FieldRule rule{.range = field.range};
-  if (kIsList<T>) rule.count = Range{1, 64};
-  if (std::is_same_v<T, std::string> && !field.range) rule.range = Range{0, 200};
-  return rule;
-}
 
 /// Command-line text of a field as JSON: numbers and booleans as they stand, lists by commas, everything else
 /// a string.
@@ -66,13 +62,8 @@ Json parse_text(const OptionField& field, const std::string& text) {
     Json j = Json::parse(t, nullptr, false);
     return j.is_number() || j.is_boolean() ? j : Json(t);
   };
-  const bool is_list = std::holds_alternative<std::vector<int>*>(field.value) ||
-                       std::holds_alternative<std::vector<double>*>(field.value);
-  if (!is_list) {
-    const bool is_text =
-        std::holds_alternative<std::string*>(field.value) || std::holds_alternative<EnumField>(field.value);
-    return is_text ? Json(text) : scalar(text);
-  }
+  if (field.kind == OptionKind::kText || field.kind == OptionKind::kName) return Json(text);
+  if (field.kind != OptionKind::kIntegers && field.kind != OptionKind::kNumbers) return scalar(text);
   Json list = Json::array();
   std::istringstream in(text);
   for (std::string part; std::getline(in, part, ',');) list.push_back(scalar(part));
@@ -97,29 +88,16 @@ OptionField* find_option(std::vector<OptionField>& fields, std::string_view path
 }
 
 Json option_json(const OptionField& field) {
-  return std::visit(
-      [](const auto& value) {
-        if constexpr (std::is_same_v<std::decay_t<decltype(value)>, EnumField>)
-          return Json(value.names[value.get()]);
-        else
-          return Json(*value);
-      },
-      field.value);
+  Json json;
+  field.put(json);
+  return json;
 }
 
 std::string option_text(const OptionField& field) { return option_json(field).dump(); }
 
 void set_option_json(OptionField& field, const Json& json, const std::string& file,
                      const std::string& place) {
-  const RecordPlace at{file, nullptr, place};
-  std::visit(
-      [&](auto& value) {
-        if constexpr (std::is_same_v<std::decay_t<decltype(value)>, EnumField>)
-          value.set(record_detail::get_enum(json, value.names, at));
-        else
-          get_value(json, *value, rule_of(field, value), at);
-      },
-      field.value);
+  field.get(json, RecordPlace{file, nullptr, place});
   field.set_by_user->insert(field.path());
 }
 
@@ -129,15 +107,8 @@ void set_option(OptionField& field, const std::string& text, const std::string& 
 }
 
 Json option_schema(const OptionField& field) {
-  Json schema = Json::object();
-  std::visit(
-      [&](const auto& value) {
-        if constexpr (std::is_same_v<std::decay_t<decltype(value)>, EnumField>)
-          record_detail::schema_of_enum(schema, value.names);
-        else
-          put_schema<std::remove_pointer_t<std::decay_t<decltype(value)>>>(schema, rule_of(field, value));
-      },
-      field.value);
+  Json schema;
+  field.put_schema(schema);
   schema["description"] = field.help;
   schema["default"] = option_json(field);
   return schema;

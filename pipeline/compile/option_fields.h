@@ -1,6 +1,5 @@
 #pragma once
 #include <functional>
-#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <set>
 #include <span>
@@ -8,28 +7,26 @@
 #include <string>
 #include <string_view>
 #include <type_traits>
-#include <variant>
 #include <vector>
 
-#include "format/base/fields.h"
 #include "pipeline/compile/options.h"
 #include "pipeline/graph/make_stage.h"
+#include "pipeline/io/record.h"
 
 namespace texmesh {
 
-/// A field whose C++ type is an enum, seen as text.
-struct EnumField {
-  std::span<const std::string_view> names;
-  std::function<std::size_t()> get;
-  std::function<void(std::size_t)> set;
-};
+enum class OptionKind : std::uint8_t { kSwitch, kInteger, kNumber, kText, kIntegers, kNumbers, kName };
 
-/// One option as generic code sees it. Pointers lead into the CompileOptions that list_options was given.
+/// One option as generic code sees it. The functions reach into the CompileOptions that list_options was
+/// given.
 struct OptionField {
   std::string stage, name, help;
   std::optional<Range> range;
   bool has_flag = true;  // false: profiles alone may set it (ProfileOnly)
-  std::variant<bool*, int*, double*, std::string*, std::vector<int>*, std::vector<double>*, EnumField> value;
+  OptionKind kind = OptionKind::kText;
+  std::span<const std::string_view> words;  // kName: one of these
+  std::function<void(Json&to)> put, put_schema;
+  std::function<void(const Json& from, const RecordPlace& at)> get;
   std::set<std::string>* set_by_user = nullptr;  // of the same CompileOptions; set_option() adds the path
   std::string path() const { return stage + "." + name; }
 };
@@ -39,17 +36,16 @@ std::vector<OptionField> list_options(CompileOptions& options);
 OptionField* find_option(std::vector<OptionField>& fields, std::string_view path);
 
 /// A field's value as JSON, and its text: what keys, provenance and --explain compare.
-nlohmann::ordered_json option_json(const OptionField& field);
+Json option_json(const OptionField& field);
 std::string option_text(const OptionField& field);
 
 /// Sets a field. Strict: a wrong type or a value out of range throws InputError{file, place, ...}.
-void set_option_json(OptionField& field, const nlohmann::ordered_json& json, const std::string& file,
-                     const std::string& place);
+void set_option_json(OptionField& field, const Json& json, const std::string& file, const std::string& place);
 /// Sets a field from text as given on a command line ("20", "draco", "5,8,11"). InputError names the flag.
 void set_option(OptionField& field, const std::string& text, const std::string& source);
 
 /// What a schema says of a field: type, range, help, default.
-nlohmann::ordered_json option_schema(const OptionField& field);
+Json option_schema(const OptionField& field);
 
 /// The name of a part of `all`: "ssf" of a section, "ladder.mode" of a field. Throws std::logic_error for
 /// what is no part of it.

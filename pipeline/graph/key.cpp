@@ -1,9 +1,6 @@
-// Keys, and the texts of options that stand in them.
 #include "pipeline/graph/key.h"
 
 #include <nlohmann/json.hpp>
-
-#include "pipeline/graph/option_text.h"
 
 namespace texmesh {
 namespace {
@@ -64,12 +61,5 @@ std::string Key::preimage() const {
   for (const auto& [label, value] : parts_) j[label] = value;
   return j.dump(1);
 }
-
-std::string option_text(bool value) { return value ? "true" : "false"; }
-std::string option_text(int value) { return std::to_string(value); }
-std::string option_text(double value) { return nlohmann::json(value).dump(); }
-std::string option_text(std::string_view value) { return nlohmann::json(value).dump(); }
-std::string option_text(const std::vector<int>& values) { return nlohmann::json(values).dump(); }
-std::string option_text(const std::vector<double>& values) { return nlohmann::json(values).dump(); }
 
 }  // namespace texmesh

@@ -5,6 +5,9 @@
 #include <optional>
 #include <string>
 
+#include "format/base/sha256.h"
+#include "pipeline/io/record.h"
+
 namespace texmesh {
 
 /// What tells, without reading a file, that it has not changed: device, inode, size, and the times of the
@@ -33,6 +36,29 @@ struct FileStamp {
     return modified_ns < looked_at_ns - kSettleNs && changed_ns < looked_at_ns - kSettleNs;
   }
   static constexpr std::int64_t kSettleNs = 2'000'000'000;
+};
+
+/// A file that a model asked for. `digest`, `bytes` and `stamp` are zero unless found. Uri, found, digest and
+/// bytes become part of the cache key: the same requests with the same answers give the same model.
+struct FileRequest {
+  std::string uri;  // as the model names it; "" = the model itself
+  bool found = false;
+  Sha256 digest{};
+  std::uint64_t bytes = 0;
+  FileStamp stamp;  // when it was read; no part of any key
+  friend bool operator==(const FileRequest&, const FileRequest&) = default;
+  template <class S, class A>
+  static void archive(S& s, A& a) {
+    a(s.uri, s.found, s.digest, s.bytes, s.stamp);
+  }
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("uri", s.uri, kNamesFile, "");
+    v("found", s.found, "");
+    v("sha256", s.digest, "");
+    v("bytes", s.bytes, "");
+    v("stamp", s.stamp, kMayMiss, "");
+  }
 };
 
 FileStamp stamp_of(const struct stat& status);

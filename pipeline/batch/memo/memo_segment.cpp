@@ -124,16 +124,6 @@ bool read_at(int fd, std::uint64_t at, std::span<std::uint8_t> to) {
   return true;
 }
 
-bool write_to_end(int fd, std::span<const std::uint8_t> bytes) {
-  while (!bytes.empty()) {
-    const ssize_t n = ::write(fd, bytes.data(), bytes.size());
-    if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) return false;
-    bytes = bytes.subspan(static_cast<std::size_t>(n));
-  }
-  return true;
-}
-
 void append_bytes(std::vector<std::uint8_t>& to, const void* from, std::size_t size) {
   const auto* p = static_cast<const std::uint8_t*>(from);
   to.insert(to.end(), p, p + size);
@@ -350,7 +340,7 @@ bool MemoSegmentWriter::append(std::span<const std::uint8_t> payload, std::span<
   std::memcpy(bytes.data() + 8, head.digest.data(), 32);
   bytes.insert(bytes.end(), payload.begin(), payload.end());
   bytes.insert(bytes.end(), body.begin(), body.end());
-  failed_ = !write_to_end(file_.get(), bytes);
+  failed_ = !write_all(file_.get(), bytes);
   return !failed_;
 }
 
@@ -367,7 +357,7 @@ bool MemoSegmentWriter::open() {
     file_.reset(::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_APPEND | O_CLOEXEC | O_NOFOLLOW, 0666));
     if (file_.get() < 0 && errno != EEXIST) return false;
   }
-  return file_.get() >= 0 && write_to_end(file_.get(), kMagic);
+  return file_.get() >= 0 && write_all(file_.get(), kMagic);
 }
 
 bool MemoSegmentWriter::finish() {

@@ -11,7 +11,7 @@
 
 #include "pipeline/graph/key.h"
 #include "pipeline/io/descriptor.h"
-#include "pipeline/io/file_request.h"
+#include "pipeline/io/file_stamp.h"
 
 namespace texmesh {
 

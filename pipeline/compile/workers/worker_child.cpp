@@ -19,6 +19,7 @@
 #include "pipeline/compile/profile.h"
 #include "pipeline/compile/stage_table.h"
 #include "pipeline/compile/workers/worker.h"
+#include "pipeline/io/descriptor.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/machine/owner_mark.h"
 #include "pipeline/io/resource_error.h"
@@ -36,11 +37,7 @@ class EventWriter {
   void write(const Event& event) {
     const std::string line = to_json_line(event) + "\n";
     const std::lock_guard lock(mutex_);
-    for (std::size_t at = 0; at < line.size();) {
-      const ssize_t n = ::write(fd_, line.data() + at, line.size() - at);
-      if (n <= 0) return;  // the parent is gone, and this process with it in a moment
-      at += static_cast<std::size_t>(n);
-    }
+    write_all(fd_, line);  // false: the parent is gone, and this process with it in a moment
   }
 
  private:

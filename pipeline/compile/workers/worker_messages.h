@@ -11,7 +11,7 @@
 
 #include "pipeline/compile/workers/sandbox.h"
 #include "pipeline/graph/graph_run.h"
-#include "pipeline/io/file_request.h"
+#include "pipeline/io/file_stamp.h"
 #include "pipeline/io/record.h"
 
 namespace texmesh {

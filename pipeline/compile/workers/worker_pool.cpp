@@ -23,8 +23,9 @@
 #include "pipeline/cache/cache_layer.h"
 #include "pipeline/compile/workers/worker.h"
 #include "pipeline/io/atomic_file.h"
-#include "pipeline/io/program.h"
+#include "pipeline/io/descriptor.h"
 #include "pipeline/io/exit_codes.h"
+#include "pipeline/io/program.h"
 
 extern char** environ;
 
@@ -59,16 +60,6 @@ struct Pipe {
   }
 };
 
-void write_all(int fd, const std::string& text) {
-  std::size_t at = 0;
-  while (at < text.size()) {
-    const ssize_t n = ::write(fd, text.data() + at, text.size() - at);
-    if (n < 0 && errno == EINTR) continue;
-    if (n < 0) return;  // the child is gone; its exit status says the rest
-    at += static_cast<std::size_t>(n);
-  }
-}
-
 /// Starts `texmesh worker` (posix_spawn, never a fork of a threaded parent) in worker_environment() and
 /// gives it `input` as the whole of its standard input. Throws std::runtime_error.
 ChildProcess start_worker_process(const std::string& input, bool large_pages) {
@@ -92,7 +83,7 @@ ChildProcess start_worker_process(const std::string& input, bool large_pages) {
   ::close(out.write);
   ::close(err.write);
   if (rc != 0) throw std::runtime_error(std::string("cannot start a worker: ") + std::strerror(rc));
-  write_all(in.write, input);
+  write_all(in.write, input);  // a child that is gone says the rest by its exit status
   ::close(in.write);
   child.out = out.read;
   child.err = err.read;
