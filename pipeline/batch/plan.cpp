@@ -241,7 +241,7 @@ class CollectionReader {
     Json profile = body;
     profile["version"] = 1;
     try {
-      read_profile(options, profile, file_);
+      apply_profile(options, profile, file_);
     } catch (const InputError& e) {
       throw InputError(file_, place + e.place(), e.expected(), e.found());
     }

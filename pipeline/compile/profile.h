@@ -14,7 +14,8 @@ struct CompileOptions;
 /// those that it has count as set by the user. Strict: unknown fields, wrong types and values out of range
 /// throw InputError{file_name, JSON pointer, ...}.
 void read_profile(CompileOptions& options, const std::string& json, const std::string& file_name);
-void read_profile(CompileOptions& options, const Json& profile, const std::string& file_name);
+/// The same for a profile that is parsed already.
+void apply_profile(CompileOptions& options, const Json& profile, const std::string& file_name);
 
 /// The file of a profile: `wanted` where there is such a file or it has a slash or a dot, else NAME.json of
 /// profiles/ beside the executable's folder (a build tree) or of share/texmesh/profiles of an installation.
