@@ -8,8 +8,10 @@
 #include "format/rules/allocation.h"
 #include "format/rules/rate_distortion.h"
 #include "stages/base/parallel.h"
-#include "stages/fragment_codec/decode_rung.h"
+#include "stages/fragment_codec/fragment_codec.h"
 #include "stages/jpeg/jpeg.h"
+#include "stages/measure/flip.h"
+#include "stages/measure/image_compare.h"
 #include "stages/render/shade.h"
 
 namespace texmesh {
@@ -283,24 +285,32 @@ std::vector<RenderTexture> textures_of(const StudyScene& scene, const Chosen& ch
   return textures;
 }
 
+/// What a view is compared by.
+struct ComparedView {
+  LumaPicture luma;
+  FlipPicture flip;
+};
+
 /// Compares the views with the originals, which the first choice, the source, sets.
 void measure_views(const RenderScene& scene, const std::vector<Visibility>& views,
                    const std::vector<RenderTexture>& textures, int picture_view,
-                   std::vector<ComparedPicture>& original, StudiedChoice& result, const RunContext& context) {
+                   std::vector<ComparedView>& original, StudiedChoice& result, const RunContext& context) {
   const RenderEnvironment environment = studio_environment();
   const bool first = original.empty();
-  PictureDifference sum;
+  PictureDifference luma;
+  FlipSum flip;
   for (std::size_t v = 0; v < views.size(); ++v) {
     const Picture picture = shade(scene, views[v], textures, environment, context);
     if (static_cast<int>(v) == picture_view) result.picture = picture_of(picture);
-    const ComparedPicture compared = prepare_comparison(picture);
+    const ComparedView compared{prepare_luma(picture), prepare_flip(picture)};
     if (first) original.push_back(compared);
-    const PictureDifference d = compare_pictures(original[v], compared);
-    sum.ssim += d.ssim, sum.difference += d.difference, sum.pixels += d.pixels;
+    const PictureDifference d = compare_luma(original[v].luma, compared.luma);
+    luma.ssim += d.ssim, luma.pixels += d.pixels;
+    flip.add(compare_flip(original[v].flip, compared.flip));
   }
-  if (sum.pixels == 0) throw StageError("allocation study", "views", "pixels that show the object", "none");
-  result.ssim = sum.ssim / static_cast<double>(sum.pixels);
-  result.difference = sum.difference / static_cast<double>(sum.pixels);
+  if (luma.pixels == 0) throw StageError("allocation study", "views", "pixels that show the object", "none");
+  result.ssim = luma.ssim / static_cast<double>(luma.pixels);
+  result.difference = flip.mean();
 }
 
 }  // namespace
@@ -318,7 +328,7 @@ std::vector<StudiedChoice> study_allocation(
   const std::vector<RenderMaterial> lit = lit_materials(materials, shown);
   const RenderScene scene = render_scene(mesh.mesh, lit, shown.planes.size());
   const std::vector<Visibility> views = views_of(scene, options, inner);
-  std::vector<ComparedPicture> original;
+  std::vector<ComparedView> original;
   std::vector<StudiedChoice> out;
   for (const Chosen& choice : choices) {
     StudiedChoice& result = out.emplace_back();

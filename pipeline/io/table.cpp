@@ -13,7 +13,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-std::string number_text(double value, const NumberForm& form) {
+std::string shown_number(double value, const NumberForm& form) {
   const double shown = value * form.factor;
   const std::string text =
       form.kind == NumberForm::Kind::kShortest ? shortest(shown, form.digits) : fixed(shown, form.digits);
@@ -26,7 +26,7 @@ std::string integer_text(Integer value, const NumberForm& form) {
   if (form.kind == NumberForm::Kind::kGrouped && value >= 0)
     return grouped(static_cast<std::uint64_t>(value));
   if (form.digits == 0 && form.factor == 1) return std::string(form.before) + std::to_string(value);
-  return number_text(static_cast<double>(value), form);
+  return shown_number(static_cast<double>(value), form);
 }
 
 std::string shown_text(const Cell& cell, const NumberForm& form) {
@@ -41,7 +41,7 @@ std::string shown_text(const Cell& cell, const NumberForm& form) {
         else if constexpr (std::is_same_v<T, std::string>)
           return value;
         else if constexpr (std::is_same_v<T, double>)
-          return number_text(value, form);
+          return shown_number(value, form);
         else
           return integer_text(value, form);
       },

@@ -1,9 +1,4 @@
 #pragma once
-#include <cstdint>
-#include <span>
-#include <string_view>
-#include <vector>
-
 #include "format/model/model.h"
 #include "stages/data/fragments.h"
 #include "stages/data/ladder.h"

@@ -1,7 +1,7 @@
 #pragma once
 #include <vector>
 
-#include "format/documents/perceptual_table.h"
+#include "format/documents/thesis_tables.h"
 #include "stages/data/nested_scales.h"
 #include "stages/data/perceptual_values.h"
 #include "stages/data/skeleton.h"

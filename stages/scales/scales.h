@@ -1,9 +1,4 @@
 #pragma once
-#include <cstdint>
-#include <string_view>
-#include <vector>
-
-#include "format/model/model.h"
 #include "format/split/split_stream.h"
 #include "stages/data/fragments.h"
 #include "stages/data/nested_scales.h"

@@ -1,8 +1,5 @@
 #pragma once
-#include <cstdint>
-#include <string>
 #include <string_view>
-#include <vector>
 
 #include "stages/data/conditioned_mesh.h"
 #include "stages/data/nested_scales.h"

@@ -1,8 +1,4 @@
 #pragma once
-#include <array>
-#include <cstdint>
-#include <vector>
-
 #include "stages/data/conditioned_mesh.h"
 #include "stages/data/skeleton.h"
 #include "stages/data/stage.h"

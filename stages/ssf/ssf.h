@@ -1,9 +1,6 @@
 #pragma once
-#include <cstdint>
 #include <string_view>
-#include <vector>
 
-#include "format/model/model.h"
 #include "stages/data/conditioned_mesh.h"
 #include "stages/data/scale_map.h"
 #include "stages/data/skeleton.h"

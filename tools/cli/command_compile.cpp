@@ -1,11 +1,8 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <algorithm>
-#include <map>
 #include <optional>
 
-#include "format/base/errors.h"
 #include "format/documents/about.h"
 #include "pipeline/about/meta.h"
 #include "pipeline/batch/plan.h"

@@ -1,12 +1,12 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/io/text_table.h"
+#include "pipeline/io/table.h"
 #include "tools/cli/check/atlas_gate.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"
 #include "tools/cli/options/common_options.h"
-#include "tools/inspect/debug/debug_input.h"
+#include "tools/inspect/package_mesh.h"
 
 namespace texmesh {
 namespace {
@@ -90,7 +90,7 @@ void add_doctor_command(Command& app) {
       "  texmesh doctor scan.glb                                      figures and what to do\n"
       "  texmesh doctor scan.glb --max-charts 500 --min-cover 0.5     refuses a bad atlas in CI\n"
       "  texmesh doctor scan.texmesh --json                           the same of a package's finest scale\n"
-      "  texmesh debug scan.glb --what atlas -o atlas.png             the charts as a picture");
+      "  texmesh render scan.glb --what atlas -o atlas.png            the charts as a picture");
   c.notes(
       "An atlas is a texture with the charts that a surface is cut into. Every chart has borders that no "
       "simplified mesh can give up: an atlas of thousands of charts puts a floor under every coarse mesh, "

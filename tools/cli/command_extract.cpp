@@ -1,6 +1,4 @@
-#include <algorithm>
 #include <filesystem>
-#include <optional>
 
 #include "format/container/layout.h"
 #include "pipeline/io/atomic_file.h"

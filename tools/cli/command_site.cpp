@@ -1,7 +1,7 @@
 #include <filesystem>
 
 #include "format/documents/about.h"
-#include "pipeline/io/text_table.h"
+#include "pipeline/io/table.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"
 #include "tools/publish/site/site.h"

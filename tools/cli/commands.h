@@ -18,7 +18,6 @@ class Command;
   COMMAND("Look inside", diff)                                    \
   COMMAND("Look inside", render)                                  \
   COMMAND("Look inside", report)                                  \
-  RARE("Look inside", debug)                                      \
   COMMAND("Look inside", doctor)                                  \
   COMMAND("Export", extract)                                      \
   COMMAND("Export", export)                                       \

@@ -3,20 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <map>
 #include <nlohmann/json.hpp>
-#include <optional>
 
 #include "delivery/cpp/decide/fragment_list.h"
 #include "format/container/layout.h"
 #include "format/rules/viewing.h"
 #include "pipeline/about/gltf_about.h"
-#include "pipeline/io/text_table.h"
+#include "pipeline/io/table.h"
 #include "tools/extract/budget/budget_search.h"
-#include "tools/extract/glb/joined_jpeg.h"
-#include "tools/extract/glb/plain_file.h"
 #include "tools/extract/glb/scale_file.h"
-#include "tools/extract/glb/scale_model.h"
 #include "tools/extract/glb/standalone_glb.h"
 #include "tools/extract/glb/texture_source.h"
 #include "tools/extract/proxy/proxy_search.h"
@@ -99,7 +94,7 @@ FileImageData coefficient_file(PackageReader& package, const ExtractScale& wishe
   const std::uint32_t plane = image.plane;
   const std::size_t rung =
       std::min<std::size_t>(wishes.rung, package.tables().planes.at(plane).rung_count() - 1);
-  JoinedJpeg joined(package, plane, rung, context);
+  JoinedJpeg joined = joined_plane(package, plane, rung, context);
   joined.fill_unseen(shown.of(image));
   row.width_px = joined.width_px();
   row.height_px = joined.height_px();

@@ -1,10 +1,10 @@
 #pragma once
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <span>
 #include <string>
-#include <utility>
 #include <vector>
 
 namespace texmesh {
@@ -18,10 +18,10 @@ struct Provenance {
   };
   std::string tool;  // "texmesh 1.2.3"
   int format_major = 0, format_minor = 0;
-  std::vector<Input> inputs;                                   // the model first
-  std::shared_ptr<const nlohmann::ordered_json> options;       // a profile with every option, never null
-  std::vector<std::pair<std::string, int>> stages;             // name, version
-  std::vector<std::pair<std::string, std::string>> libraries;  // name, version
+  std::vector<Input> inputs;                              // the model first
+  std::shared_ptr<const nlohmann::ordered_json> options;  // a profile with every option, never null
+  std::map<std::string, int> stages;                      // versions by name
+  std::map<std::string, std::string> libraries;           // versions by name
 };
 
 /// Strict for what version 1 defines, ignores unknown fields. FormatError names the JSON pointer.

@@ -4,9 +4,8 @@
 #include <cmath>
 
 #include "format/container/layout.h"
-#include "tools/extract/glb/resize.h"
+#include "stages/image/resize.h"
 #include "tools/extract/glb/scale_file.h"
-#include "tools/extract/glb/scale_model.h"
 #include "tools/extract/glb/texture_source.h"
 #include "tools/extract/package_model.h"
 #include "tools/render/picture_sheet.h"

@@ -19,7 +19,7 @@
 #include "tools/cli/options/command_line.h"
 #include "tools/cli/options/common_options.h"
 #include "tools/cli/options/delivery_options.h"
-#include "tools/inspect/debug/debug_input.h"
+#include "tools/inspect/package_mesh.h"
 
 namespace texmesh {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "pipeline/io/text_table.h"
+#include "pipeline/io/table.h"
 
 namespace texmesh {
 namespace {

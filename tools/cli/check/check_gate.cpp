@@ -7,7 +7,7 @@
 #include "format/base/text_bytes.h"
 #include "pipeline/batch/junit.h"
 #include "pipeline/io/atomic_file.h"
-#include "pipeline/io/text_table.h"
+#include "pipeline/io/table.h"
 #include "tools/cli/options/delivery_options.h"
 #include "tools/publish/report/switch_sizes.h"
 

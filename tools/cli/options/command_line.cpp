@@ -7,7 +7,6 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <map>
@@ -620,7 +619,8 @@ void CommandLine::version(const std::string& text, const std::function<std::stri
   const auto told = [this, text, more] { return app_->count("--verbose") > 0 ? text + "\n" + more() : text; };
   app_->set_version_flag("--version", told, "Print the versions of texmesh and of its package format");
   const std::string help =
-      "With --version: print libraries whose version changes bytes and what bounds a model's process, too";
+      "With --version: print libraries whose version changes bytes, what bounds a model's process, and the licence "
+      "of the program, too";
   app_->add_flag("--verbose", help);
 }
 

@@ -3,7 +3,6 @@
 #include <functional>
 #include <iostream>
 #include <memory>
-#include <string>
 #include <vector>
 
 #include "format/base/fields.h"

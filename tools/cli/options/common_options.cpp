@@ -2,7 +2,6 @@
 
 #include <cstdlib>
 
-#include "format/base/errors.h"
 #include "pipeline/batch/fleet/run_summary.h"
 #include "pipeline/io/file_resolver.h"
 #include "pipeline/io/machine/machine_share.h"

@@ -20,9 +20,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
 #include <numeric>
-#include <utility>
 
 #include "tools/extract/proxy/proxy_search.h"
 

@@ -1,10 +1,5 @@
 #pragma once
-#include <cstdint>
-#include <functional>
-#include <map>
-#include <optional>
 #include <set>
-#include <vector>
 
 #include "tools/extract/budget/filling.h"
 

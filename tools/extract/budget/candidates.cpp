@@ -8,7 +8,6 @@
 #include "stages/base/parallel.h"
 #include "stages/image/decode_image.h"
 #include "tools/extract/glb/scale_file.h"
-#include "tools/extract/glb/scale_model.h"
 
 namespace texmesh {
 namespace {
@@ -126,7 +125,7 @@ std::optional<double> Candidates::stored_bytes(std::size_t image) const {
   const PackageImage& from = reference_.images[image];
   const ExtractImages wanted = reference_.wishes.images;
   const TextureInfo& info = reference_.package.textures().at(from.plane);
-  if (from.alpha_plane || !holds_source(info) ||
+  if (from.alpha_plane || !info.source_rung ||
       (wanted != ExtractImages::kAuto && wanted != ExtractImages::kJpeg))
     return std::nullopt;
   return static_cast<double>(info.rungs.back().bytes);
@@ -137,7 +136,7 @@ void Candidates::load_stored(std::size_t image) {
   const PackageImage& from = reference_.images[image];
   const std::size_t last = reference_.package.textures().at(from.plane).rungs.size() - 1;
   JoinedJpeg& joined =
-      stored_.emplace(image, JoinedJpeg(reference_.package, from.plane, last, reference_.context))
+      stored_.emplace(image, joined_plane(reference_.package, from.plane, last, reference_.context))
           .first->second;
   joined.fill_unseen(reference_.shown_texels(image, joined.width_px(), joined.height_px()));
 }

@@ -1,15 +1,10 @@
 #pragma once
 #include <compare>
-#include <cstdint>
-#include <map>
-#include <memory>
-#include <optional>
 #include <span>
 #include <utility>
-#include <vector>
 
+#include "stages/jpeg/source_jpeg.h"
 #include "tools/extract/budget/reference.h"
-#include "tools/extract/glb/joined_jpeg.h"
 #include "tools/extract/glb/standalone_glb.h"
 
 namespace texmesh {

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <numeric>
-#include <utility>
 
 #include "format/base/portable_math.h"
 #include "pipeline/about/gltf_about.h"

@@ -1,9 +1,5 @@
 #pragma once
-#include <cstdint>
 #include <functional>
-#include <map>
-#include <memory>
-#include <vector>
 
 #include "tools/extract/budget/loss_curves.h"
 

@@ -8,7 +8,6 @@
 #include "format/container/layout.h"
 #include "stages/base/parallel.h"
 #include "tools/extract/glb/scale_file.h"
-#include "tools/extract/glb/scale_model.h"
 
 namespace texmesh {
 namespace {

@@ -5,10 +5,10 @@
 #include <vector>
 
 #include "format/base/box.h"
+#include "stages/geometry/fit_normals.h"
 #include "stages/measure/flip.h"
 #include "stages/render/shade.h"
 #include "tools/extract/extract.h"
-#include "tools/extract/glb/fit_normals.h"
 #include "tools/extract/glb/texture_source.h"
 
 namespace texmesh {

@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <array>
-#include <nlohmann/json.hpp>
 
 #include "format/base/box.h"
-#include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "format/base/srgb.h"
 #include "format/split/split_stream.h"
@@ -15,7 +13,7 @@
 #include "stages/gltf/glb_container.h"
 #include "stages/image/decode_image.h"
 #include "stages/simplification/simplification.h"
-#include "tools/extract/glb/glb_chunks.h"
+#include "tools/extract/glb/scale_file.h"
 #include "tools/extract/glb/texture_source.h"
 
 namespace texmesh {
@@ -229,7 +227,7 @@ std::optional<ProxyParts> ProxyParts::read(std::span<const std::uint8_t> glb, co
   StandaloneGlb(glb, entry, GlbRules::kStandalone);  // checks it
   ProxyParts out;
   out.entry_ = entry;
-  GlbChunks chunks = glb_chunks(glb, entry);
+  GlbParts chunks = read_glb(glb, entry);
   if (!chunks.root.contains("materials")) return std::nullopt;
   out.maps_ = maps_in(chunks.root, chunks.binary);
   NoFiles none;
@@ -266,7 +264,7 @@ StandaloneGlb ProxyParts::file(const ProxyMapChoice& choice, std::size_t mesh, c
                                const RunContext& context) const {
   StandaloneGlb coded = uncoded(meshes_.at(mesh), entry_);
   coded.recode(steps, nullptr, context);
-  GlbChunks chunks = glb_chunks(coded.finish(), entry_);
+  GlbParts chunks = read_glb(coded.finish(), entry_);
   Json root = materials_of(choice);
   keep_used(root);
   for (Json& image : root["images"]) image["bufferView"] = chunks.root["bufferViews"].size();

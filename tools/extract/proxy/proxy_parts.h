@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "format/model/model.h"
-#include "tools/extract/glb/resize.h"
+#include "stages/image/resize.h"
 #include "tools/extract/glb/standalone_glb.h"
 
 namespace texmesh {

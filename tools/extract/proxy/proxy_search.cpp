@@ -1,18 +1,15 @@
 #include "tools/extract/proxy/proxy_search.h"
 
 #include <algorithm>
-#include <map>
-#include <optional>
-#include <utility>
 
 #include "format/base/portable_math.h"
 #include "format/container/layout.h"
 #include "pipeline/about/gltf_about.h"
 #include "pipeline/import/import.h"
 #include "pipeline/io/file_resolver.h"
+#include "stages/gltf/glb_container.h"
 #include "tools/extract/budget/filling.h"
-#include "tools/extract/glb/glb_chunks.h"
-#include "tools/extract/glb/plain_file.h"
+#include "tools/extract/glb/scale_file.h"
 #include "tools/extract/proxy/proxy_parts.h"
 #include "tools/render/rendered_model.h"
 
@@ -71,7 +68,7 @@ class ProxySearch {
   bool is_wanted_kind(std::uint32_t proxy) const {
     const ExtractImages wanted = reference_.wishes.images;
     if (wanted == ExtractImages::kAuto) return true;
-    const GlbChunks chunks = glb_chunks(reference_.package.proxy_glb(proxy), proxy_path(proxy));
+    const GlbParts chunks = read_glb(reference_.package.proxy_glb(proxy), proxy_path(proxy));
     const char* mime = mime_type_of(wanted == ExtractImages::kWebp ? FileImage::kWebp : FileImage::kJpeg);
     const auto images = chunks.root.value("images", nlohmann::ordered_json::array());
     return std::ranges::all_of(images,

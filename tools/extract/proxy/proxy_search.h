@@ -1,5 +1,4 @@
 #pragma once
-#include <map>
 
 #include "tools/extract/budget/reference.h"
 

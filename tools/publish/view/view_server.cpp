@@ -167,7 +167,7 @@ void send_file(ServedFile opened, const httplib::Request& request, httplib::Resp
       });
 }
 
-void answer(const ServedFiles& files, const httplib::Request& request, httplib::Response& response) {
+void respond(const ServedFiles& files, const httplib::Request& request, httplib::Response& response) {
   common_headers(response);
   if (request.method == "OPTIONS") {
     response.status = 204;
@@ -231,7 +231,7 @@ ViewServer::ViewServer(const ServedFiles& files) : impl_(std::make_unique<Impl>(
   server.set_pre_routing_handler([&files](const httplib::Request& request, httplib::Response& response) {
     // Ranges are ours: the library's own know neither If-Range nor ranges that lie behind the end.
     const_cast<httplib::Request&>(request).ranges.clear();
-    answer(files, request, response);
+    respond(files, request, response);
     return httplib::Server::HandlerResponse::Handled;
   });
   server.set_exception_handler(

@@ -1,5 +1,5 @@
 // Files without extensions that compress.
-#include "tools/extract/glb/plain_file.h"
+#include "tools/extract/glb/scale_file.h"
 
 #include <gtest/gtest.h>
 
