@@ -8,8 +8,8 @@
 #include <set>
 
 #include "pipeline/batch/fleet/shards.h"
-#include "pipeline/io/program.h"
 #include "pipeline/io/file_stamp.h"
+#include "pipeline/io/program.h"
 
 namespace texmesh {
 namespace {
