@@ -108,6 +108,13 @@ Stage scale_space_stage(const CompileOptions& o) {
                filter_scales);
 }
 
+Stage package_stage(const CompileOptions& o) {
+  return stage({"package", kPackageVersion, "everything -> the container", .01},
+               inputs(kNestedScales, kPerceptualValues, kImages, kFragments, kLadder, kPreviews, kTables,
+                      kThesisTables, kScaleFiles, kQuality, kPoster, kProxies, kSourceAbout, kProvenance),
+               outputs(kPackage), read_of(o, o.package, o.perceptual_values.jnd), {}, package_all);
+}
+
 }  // namespace
 
 std::vector<Stage> stage_table(const CompileOptions& o) {
@@ -165,10 +172,7 @@ std::vector<Stage> stage_table(const CompileOptions& o) {
       stage({"proxies", kProxiesVersion, "S_0 -> small GLBs with atlases and textures of their own", .17},
             inputs(kNestedScales, kMaterials, kImages, kFragments, kFilledPlanes), outputs(kProxies),
             read_of(o, o.proxies), {"draco", "libwebp", "meshoptimizer"}, make_proxies),
-      stage({"package", kPackageVersion, "everything -> the container", .01},
-            inputs(kNestedScales, kPerceptualValues, kImages, kFragments, kLadder, kPreviews, kTables,
-                   kThesisTables, kScaleFiles, kQuality, kPoster, kProxies, kSourceAbout, kProvenance),
-            outputs(kPackage), read_of(o, o.package, o.perceptual_values.jnd), {}, package_all),
+      package_stage(o),
   };
 }
 
