@@ -10,5 +10,6 @@ int main(int argc, char** argv) {
   Command program = line.program();
   add_study_command(program);
   add_experiment_command(program);
+  add_picture_command(program);
   return line.run(argc, argv);
 }

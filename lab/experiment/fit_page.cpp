@@ -6,8 +6,9 @@
 #include "format/base/portable_math.h"
 #include "lab/experiment/fit_experiment.h"
 #include "pipeline/io/markup.h"
-#include "tools/publish/report/html.h"
-#include "tools/publish/report/plot.h"
+#include "pipeline/io/table.h"
+#include "tools/publish/pages/page.h"
+#include "tools/publish/pages/plot.h"
 
 namespace texmesh {
 namespace {
@@ -68,15 +69,17 @@ std::string distance_plot(const ExperimentFit& fit) {
 }
 
 std::string judges_table(const ExperimentFit& fit) {
-  HtmlTable table;
-  table.caption = "One row a file of results";
-  table.header = {"judge", "answers", "right [%]", "left [%]", "late", "catch trials right", "verdict"};
+  Table table("One row a file of results", {"judge",
+                                            "answers",
+                                            {"right [%]", percent_form(0)},
+                                            {"left [%]", percent_form(0)},
+                                            "late",
+                                            "catch trials right",
+                                            "verdict"});
   for (const FittedJudge& j : fit.judges) {
     const double n = std::max(j.counts.answers, 1u);
-    table.rows.push_back(
-        {markup_escaped(j.judge), std::to_string(j.counts.answers), fmt::format("{:.0f}", 100 * j.right / n),
-         fmt::format("{:.0f}", 100 * j.counts.left / n), std::to_string(j.late),
-         fmt::format("{} of {}", j.counts.caught, j.counts.catches), markup_escaped(verdict_text(j))});
+    table.row({j.judge, j.counts.answers, j.right / n, j.counts.left / n, j.late,
+               fmt::format("{} of {}", j.counts.caught, j.counts.catches), verdict_text(j)});
   }
   return table.html();
 }

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "format/base/fields.h"
-#include "tools/publish/report/plot.h"
+#include "tools/publish/pages/plot.h"
 
 namespace texmesh {
 

@@ -4,30 +4,30 @@
 
 #include "lab/thesis/exhibit.h"
 #include "pipeline/io/markup.h"
-#include "pipeline/io/text_table.h"
-#include "tools/publish/report/html.h"
+#include "pipeline/io/table.h"
+#include "tools/publish/pages/page.h"
 
 namespace texmesh {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-std::string cell_text(const ExhibitCell& cell, int digits) {
-  if (const auto* number = std::get_if<double>(&cell)) return fixed(*number, digits);
-  const auto* text = std::get_if<std::string>(&cell);
-  return text ? *text : "";
+Cell cell_of(const ExhibitCell& cell) {
+  if (const auto* number = std::get_if<double>(&cell)) return *number;
+  if (const auto* text = std::get_if<std::string>(&cell)) return *text;
+  return {};
 }
 
-std::string table_html(const ExhibitTable& table) {
-  HtmlTable out{markup_escaped(table.caption), {}, {}};
-  for (const ExhibitColumn& column : table.columns) out.header.push_back(markup_escaped(column.name));
+/// The first column names the rows.
+Table table_of(const ExhibitTable& table) {
+  Table out(table.caption, {});
+  for (const ExhibitColumn& c : table.columns) out.column({c.name, c.digits});
+  if (!out.columns.empty()) out.columns.front().align = Align::kLeft;
   for (const std::vector<ExhibitCell>& row : table.rows) {
-    std::vector<std::string> cells;
-    for (std::size_t k = 0; k < row.size(); ++k)
-      cells.push_back(markup_escaped(cell_text(row[k], table.columns[k].digits)));
-    out.rows.push_back(std::move(cells));
+    out.row({});
+    for (const ExhibitCell& cell : row) out.rows.back().push_back(cell_of(cell));
   }
-  return out.html();
+  return out;
 }
 
 std::string verdict_html(Verdict verdict) {
@@ -60,27 +60,13 @@ std::string exhibit_html(const Exhibit& e) {
         "</figure>\n",
         markup_escaped(p.file), markup_escaped(p.caption), p.width_px, p.height_px,
         markup_escaped(p.caption));
-  for (const ExhibitTable& table : e.tables) body += table_html(table);
+  for (const ExhibitTable& table : e.tables) body += table_of(table).html();
   return html_section(anchor_of(e), markup_escaped(e.title), body);
-}
-
-Json cell_json(const ExhibitCell& cell) {
-  if (const auto* number = std::get_if<double>(&cell)) return *number;
-  if (const auto* text = std::get_if<std::string>(&cell)) return *text;
-  return nullptr;
 }
 
 Json exhibit_json(const Exhibit& e) {
   Json tables = Json::array();
-  for (const ExhibitTable& table : e.tables) {
-    Json columns = Json::array(), rows = Json::array();
-    for (const ExhibitColumn& column : table.columns) columns.push_back(column.name);
-    for (const std::vector<ExhibitCell>& row : table.rows) {
-      rows.push_back(Json::array());
-      for (const ExhibitCell& cell : row) rows.back().push_back(cell_json(cell));
-    }
-    tables.push_back({{"caption", table.caption}, {"columns", columns}, {"rows", rows}});
-  }
+  for (const ExhibitTable& table : e.tables) tables.push_back(table_of(table).json_document());
   return {{"id", e.id},
           {"title", e.title},
           {"claim", e.claim},
@@ -93,11 +79,12 @@ Json exhibit_json(const Exhibit& e) {
 }  // namespace
 
 std::string exhibits_html(const std::vector<Exhibit>& exhibits) {
-  HtmlTable summary{"Tables and figures of the thesis, measured again", {"exhibit", "verdict"}, {}};
+  Table summary("Tables and figures of the thesis, measured again", {"exhibit", "verdict"});
   std::string sections;
   for (const Exhibit& e : exhibits) {
-    summary.rows.push_back({fmt::format("<a href=\"#{}\">{}</a>", anchor_of(e), markup_escaped(e.title)),
-                            verdict_html(e.verdict)});
+    summary.row(
+        {Cell::markup(e.title, fmt::format("<a href=\"#{}\">{}</a>", anchor_of(e), markup_escaped(e.title))),
+         Cell::markup("", verdict_html(e.verdict))});
     sections += exhibit_html(e);
   }
   return html_page(
@@ -118,18 +105,7 @@ Json exhibits_json(const std::vector<Exhibit>& exhibits) {
 
 std::string exhibit_text(const Exhibit& e) {
   std::string out = fmt::format("{}\nthesis: {}\nhere: {}\n", e.title, e.claim, e.made_by);
-  for (const ExhibitTable& table : e.tables) {
-    TextTable text;
-    for (std::size_t k = 0; k < table.columns.size(); ++k)
-      text.column(table.columns[k].name, k == 0 ? Align::kLeft : Align::kRight);
-    for (const std::vector<ExhibitCell>& row : table.rows) {
-      std::vector<std::string> cells;
-      for (std::size_t k = 0; k < row.size(); ++k)
-        cells.push_back(cell_text(row[k], table.columns[k].digits));
-      text.row(std::move(cells));
-    }
-    out += "\n" + table.caption + "\n" + text.text();
-  }
+  for (const ExhibitTable& table : e.tables) out += "\n" + table_of(table).text();
   return out + fmt::format("\n{}: {}\n", enum_name(e.verdict), e.finding);
 }
 

@@ -30,7 +30,7 @@ class Progress {
   /// The model need not run.
   void recalled(std::size_t model, const WorkerReport& report, const std::string& output);
   void started(std::size_t model, const std::string& output);
-  void event(std::size_t model, const std::string& json_line);
+  void event(std::size_t model, WorkerEvent event);
   /// Something about the cache that no single model has met.
   void cache_event(const std::string& code, const std::string& text);
   void finished(std::size_t model, const WorkerReport& report, const std::string& output);
@@ -44,6 +44,19 @@ class Progress {
     double fraction = 0;                    // of its weight: stages that are done
     std::map<std::string, double> partial;  // and of stages that are not: how far they are
   };
+  // Of one event, for people.
+  void show(std::size_t model, const StageStarted& e);
+  void show(std::size_t model, const StageProgress& e);
+  void show(std::size_t model, const StageFinished& e);
+  void show(std::size_t model, const StageExplained& e);
+  void show(std::size_t model, const CacheTold& e);
+  void show(std::size_t model, const NoteTold& e);
+  void show(std::size_t model, const ErrorTold& e);
+  template <class Other>
+  void show(std::size_t, const Other&) {}
+  template <class Event>
+  void json_event(const Event& event);
+  std::string name_of(std::size_t model) const { return std::string(models_[model].name); }
   void line(const std::string& text);  // a lasting line
   void redraw(bool now);
   double done_fraction() const;
@@ -55,12 +68,15 @@ class Progress {
   OutputMode mode_;
   bool verbose_, explain_;
   std::vector<ProgressModel> models_;
+  std::map<std::string, double> shares_;  // of a model's time, by stage
   std::map<std::size_t, Running> running_;
   std::size_t finished_count_ = 0;
   std::map<std::string, std::size_t> cache_events_;  // by text: the same one from many models is told once
   double done_weight_ = 0, total_weight_ = 0;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now(), drawn_;
 };
+
+std::string format_seconds(double seconds);  // "3.4 s", "2 min 10 s"
 
 /// "ladder.rungs: [5,8] -> [8]"; digests shortened.
 std::string describe_change(const std::string& part, const std::string& from, const std::string& to);

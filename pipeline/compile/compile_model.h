@@ -35,6 +35,9 @@ struct CompileOutcome {
   StageKeys keys;
 };
 
+/// What compiling so many triangles takes at least, without their textures.
+std::uint64_t least_memory_bytes(std::uint64_t triangles);
+
 /// Compiles one model in this process: reads the input and what it refers to beneath its folder, runs the
 /// graph over the store, writes the package atomically. Throws InputError, FormatError, StageError or
 /// Cancelled; then nothing is left under the output's name that was not there before.

@@ -8,7 +8,7 @@
 
 #include "format/base/errors.h"
 #include "format/base/no_index.h"
-#include "pipeline/io/number_text.h"
+#include "pipeline/io/table.h"
 
 namespace texmesh {
 namespace {

@@ -12,7 +12,7 @@ constexpr char kMark = 1;
 std::string escaped(std::string_view bytes) {
   std::string out;
   while (!bytes.empty()) {
-    const std::size_t n = utf8_bytes(bytes);
+    const std::size_t n = utf8_character_bytes(bytes);
     if (n == 0 || bytes[0] == kMark || bytes[0] == '\\')
       out += fmt::format("\\x{:02x}", static_cast<std::uint8_t>(bytes[0]));
     else
@@ -28,7 +28,7 @@ int lower_hex_digit(char c) {
 
 }  // namespace
 
-std::size_t utf8_bytes(std::string_view s) {
+std::size_t utf8_character_bytes(std::string_view s) {
   const auto at = [&](std::size_t i) {
     return i < s.size() ? static_cast<std::uint8_t>(s[i]) : std::uint8_t{0};
   };
@@ -51,7 +51,7 @@ std::size_t utf8_bytes(std::string_view s) {
 
 bool is_utf8(std::string_view bytes) {
   while (!bytes.empty()) {
-    const std::size_t n = utf8_bytes(bytes);
+    const std::size_t n = utf8_character_bytes(bytes);
     if (n == 0) return false;
     bytes.remove_prefix(n);
   }

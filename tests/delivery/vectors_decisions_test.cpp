@@ -13,7 +13,6 @@
 #include "format/base/portable_math.h"
 #include "format/rules/allocation.h"
 #include "format/rules/proxy_choice.h"
-#include "format/rules/proxy_steps.h"
 
 namespace texmesh {
 namespace {

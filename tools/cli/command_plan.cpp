@@ -178,7 +178,7 @@ int run_check(const CheckArguments& args) {
 
 void add_plan_command(Command& app) {
   auto args = std::make_shared<PlanArguments>();
-  Command c = app.add("plan");
+  Command c = app.add("plan", "Say what a viewer will get in a time over a link, or in a number of bytes");
   add_delivery_options(c, *args, true);
   c.option("--budget", args->budget,
            "Bytes instead of time: the mesh and the textures that look best together in 500kB")
@@ -202,7 +202,7 @@ void add_plan_command(Command& app) {
 
 void add_check_command(Command& app) {
   auto args = std::make_shared<CheckArguments>();
-  Command c = app.add("check");
+  Command c = app.add("check", "Fail when a package does not show well enough in a time: a gate for CI");
   add_delivery_options(c, *args, true);
   c.option(
        "--max-flip", args->max_flip,

@@ -343,7 +343,7 @@ void add_output_options(Command& c, SimulateArguments& args) {
 
 void add_simulate_command(Command& app) {
   auto args = std::make_shared<SimulateArguments>();
-  Command c = app.add("simulate");
+  Command c = app.add("simulate", "Play a transfer over a model of a network");
   add_delivery_options(c, *args, false);
   add_probe_options(c, args->probe);
   add_play_options(c, *args);

@@ -7,6 +7,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "lab/cli/studies/plan_pictures.h"
 #include "lab/cli/studies/studies.h"
 #include "pipeline/cache/disk_store.h"
 #include "pipeline/compile/compile_model.h"
@@ -18,8 +19,7 @@
 #include "tools/cli/options/command_line.h"
 #include "tools/cli/options/common_options.h"
 #include "tools/cli/options/delivery_options.h"
-#include "tools/extract/plan_pictures.h"
-#include "tools/inspect/debug/debug_input.h"
+#include "tools/inspect/package_mesh.h"
 
 namespace texmesh {
 namespace {

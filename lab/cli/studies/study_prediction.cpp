@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "format/base/json_fields.h"
+#include "lab/cli/studies/plan_pictures.h"
 #include "lab/cli/studies/random_plans.h"
 #include "lab/cli/studies/studies.h"
 #include "pipeline/io/exit_codes.h"
@@ -16,7 +17,6 @@
 #include "tools/cli/options/command_line.h"
 #include "tools/cli/options/common_options.h"
 #include "tools/cli/options/units.h"
-#include "tools/extract/plan_pictures.h"
 
 namespace texmesh {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "pipeline/io/text_table.h"
+#include "pipeline/io/table.h"
 
 namespace texmesh {
 namespace {
@@ -32,9 +32,8 @@ std::vector<GateResult> check_atlases(const AtlasDiagnosis& d, const AtlasLimits
   std::vector<GateResult> out;
   add_most("charts", static_cast<double>(d.charts()), limits.max_charts, out);
   add_most("triangle floor", static_cast<double>(d.triangle_floor()), limits.max_floor_triangles, out);
-  for (std::size_t k = 0; k < d.report.atlases.size(); ++k) {
-    const AtlasFigures& a = d.report.atlases[k];
-    const std::string of = d.names[k] + ": ";
+  for (const NamedAtlas& a : d.atlases) {
+    const std::string of = a.name + ": ";
     add_least(of + "cover", a.cover, limits.min_cover, out);
     add_most(of + "share of texels in thin charts", a.thin_share, limits.max_thin, out);
     add_most(of + "overlap", a.overlap, limits.max_overlap, out);
