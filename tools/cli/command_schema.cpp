@@ -5,6 +5,7 @@
 #include "pipeline/io/record.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"
+#include "tools/extract/extract.h"
 #include "tools/inspect/atlas/atlas_report.h"
 #include "tools/inspect/diff/diff.h"
 #include "tools/inspect/verify/verify.h"
@@ -19,11 +20,14 @@ struct PrintedSchema {
   const char* name;
   std::string (*text)();
 };
-constexpr PrintedSchema kPrintedSchemas[] = {
-    {"diff.v1", [] { return diff_schema().text; }},     {"doctor.v1", [] { return doctor_schema().text; }},
-    {"export.v1", [] { return export_schema().text; }}, {"profile.v1", profile_schema},
-    {"report.v1", [] { return report_schema().text; }}, {"site.v1", [] { return site_schema().text; }},
-    {"verify.v1", [] { return verify_schema().text; }}};
+constexpr PrintedSchema kPrintedSchemas[] = {{"diff.v1", [] { return diff_schema().text; }},
+                                             {"doctor.v1", [] { return doctor_schema().text; }},
+                                             {"export.v1", [] { return export_schema().text; }},
+                                             {"extract.v1", [] { return extract_schema().text; }},
+                                             {"profile.v1", profile_schema},
+                                             {"report.v1", [] { return report_schema().text; }},
+                                             {"site.v1", [] { return site_schema().text; }},
+                                             {"verify.v1", [] { return verify_schema().text; }}};
 
 }  // namespace
 
