@@ -12,7 +12,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "pipeline/batch/job_selection.h"
+#include "pipeline/batch/build_memo.h"
 #include "pipeline/compile/options.h"
 
 namespace {

@@ -10,7 +10,6 @@
 #include "pipeline/batch/write_reports.h"
 #include "pipeline/cache/cache_layer.h"
 #include "pipeline/cache/disk_store.h"
-#include "pipeline/compile/jnd_profile.h"
 #include "pipeline/compile/option_fields.h"
 #include "pipeline/compile/options.h"
 #include "pipeline/compile/profile.h"
@@ -40,9 +39,7 @@ const std::map<std::string, ShortName> kShortNames{{"package.title", {"--title",
                                                    {"ladder.subsampling", {"--subsampling", true}},
                                                    {"scales.mesh_codec", {"--mesh-codec", true}},
                                                    {"perceptual_values.jnd", {"--jnd", true}},
-                                                   {"fragmentation.fill", {"--fill", true}},
-                                                   {"lut.allocate", {"--allocate", false}},
-                                                   {"simplification.order", {"--order", false}}};
+                                                   {"fragmentation.fill", {"--fill", true}}};
 constexpr const char* kEverydayTitle = "What the package holds";
 
 struct CompileArguments {
@@ -64,38 +61,28 @@ std::string help_of(const OptionField& f) {
   const bool is_name = first.ends_with(':') || help.compare(first.size(), 2, " =") == 0;
   if (!is_name && std::islower(static_cast<unsigned char>(first[first.size() > 1 ? 1 : 0])))
     help[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(help[0])));
-  if (f.range && !std::holds_alternative<std::string*>(f.value))
-    help += fmt::format(" [{:g}..{:g}]", f.range->lo, f.range->hi);
-  if (const auto* e = std::get_if<EnumField>(&f.value))
-    help += fmt::format(" {{{}}}", fmt::join(e->names, "|"));
+  if (f.range && f.kind != OptionKind::kText) help += fmt::format(" [{:g}..{:g}]", f.range->lo, f.range->hi);
+  if (!f.words.empty()) help += fmt::format(" {{{}}}", fmt::join(f.words, "|"));
   std::string text = option_text(f);
   std::erase(text, '"');
   return text.empty() ? help : help + " (default " + text + ")";
 }
 
 const char* value_name_of(const OptionField& f) {
-  struct Name {
-    const char* operator()(bool*) const { return "true|false"; }
-    const char* operator()(int*) const { return "N"; }
-    const char* operator()(double*) const { return "X"; }
-    const char* operator()(std::string*) const { return "TEXT"; }
-    const char* operator()(std::vector<int>*) const { return "N,N..."; }
-    const char* operator()(std::vector<double>*) const { return "X,X..."; }
-    const char* operator()(const EnumField&) const { return "NAME"; }
-  };
-  return std::visit(Name{}, f.value);
+  constexpr const char* kNames[] = {"true|false", "N", "X", "TEXT", "N,N...", "X,X...", "NAME"};
+  return kNames[static_cast<std::size_t>(f.kind)];
 }
 
 /// The short name of a switch takes no value; --STAGE.OPTION does.
 void add_stage_option(Command& c, const OptionField& f, CompileArguments& args) {
   const auto it = kShortNames.find(f.path());
-  const bool is_short = it != kShortNames.end(), is_switch = std::holds_alternative<bool*>(f.value);
+  const bool is_short = it != kShortNames.end(), is_switch = f.kind == OptionKind::kSwitch;
   std::string names = "--" + f.path();
   if (is_short && !is_switch) names += std::string(",") + it->second.name;
   Option option = c.option(
       names, [&args, path = f.path()](const std::string& text) { args.options[path] = text; }, help_of(f));
   option.value_name(value_name_of(f)).rare();
-  if (const auto* e = std::get_if<EnumField>(&f.value)) option.offers({e->names.begin(), e->names.end()});
+  if (!f.words.empty()) option.offers({f.words.begin(), f.words.end()});
   if (is_short && !is_switch && it->second.everyday) option.everyday(kEverydayTitle);
   if (!is_short || !is_switch) return;
   c.flag(
@@ -108,6 +95,7 @@ void add_stage_option(Command& c, const OptionField& f, CompileArguments& args) 
 void add_stage_options(Command& c, CompileArguments& args) {
   CompileOptions defaults;
   for (const OptionField& f : list_options(defaults)) {
+    if (!f.has_flag) continue;
     c.group("Stage " + f.stage);
     add_stage_option(c, f, args);
   }

@@ -4,8 +4,8 @@
 #include <filesystem>
 
 #include "format/base/text_bytes.h"
-#include "pipeline/batch/fleet/merge_summaries.h"
 #include "pipeline/batch/fleet/model_list.h"
+#include "pipeline/batch/fleet/run_summary.h"
 #include "pipeline/batch/progress.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/resource_error.h"

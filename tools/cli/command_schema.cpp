@@ -1,7 +1,8 @@
 // The JSON Schemas of what texmesh reads and prints. Each is made of the description that also reads and
 // writes the document; schemas/NAME.schema.json in the sources hold the same texts.
+#include <iostream>
 
-#include "pipeline/compile/profile.h"
+#include "pipeline/batch/write_reports.h"
 #include "pipeline/io/record.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"
@@ -15,15 +16,13 @@
 namespace texmesh {
 namespace {
 
-struct PrintedSchema {
-  const char* name;
-  std::string (*text)();
-};
-constexpr PrintedSchema kPrintedSchemas[] = {
-    {"diff.v1", [] { return diff_schema().text; }},     {"doctor.v1", [] { return doctor_schema().text; }},
-    {"export.v1", [] { return export_schema().text; }}, {"profile.v1", profile_schema},
-    {"report.v1", [] { return report_schema().text; }}, {"site.v1", [] { return site_schema().text; }},
-    {"verify.v1", [] { return verify_schema().text; }}};
+std::vector<DocumentSchema> command_schemas() {
+  std::vector<DocumentSchema> all = pipeline_schemas();
+  for (DocumentSchema& schema : std::vector{diff_schema(), doctor_schema(), export_schema(), report_schema(),
+                                            site_schema(), verify_schema()})
+    all.push_back(std::move(schema));
+  return all;
+}
 
 }  // namespace
 
@@ -32,12 +31,12 @@ void add_schema_command(Command& app) {
   Command c = app.add("schema", "Print the JSON Schema of a document that texmesh reads or prints");
   c.hidden();
   std::vector<std::string> names;
-  for (const PrintedSchema& schema : kPrintedSchemas) names.emplace_back(schema.name);
+  for (const DocumentSchema& schema : command_schemas()) names.push_back(schema.name);
   c.option("NAME", *name, "The document").required().one_of(names);
   c.examples("  texmesh schema profile.v1");
   c.on_run([name] {
-    for (const PrintedSchema& schema : kPrintedSchemas)
-      if (*name == schema.name) std::cout << schema.text();
+    for (const DocumentSchema& schema : command_schemas())
+      if (*name == schema.name) std::cout << schema.text;
     return kExitOk;
   });
 }

@@ -5,8 +5,8 @@
 #include <algorithm>
 
 #include "format/base/text_bytes.h"
+#include "pipeline/batch/junit.h"
 #include "pipeline/io/atomic_file.h"
-#include "pipeline/io/markup.h"
 #include "pipeline/io/table.h"
 #include "tools/cli/options/delivery_options.h"
 #include "tools/publish/report/switch_sizes.h"
@@ -56,18 +56,9 @@ std::string gate_junit(const std::string& suite, const std::string& input,
                        const std::vector<GateResult>& results) {
   const auto failures =
       std::ranges::count_if(results, [](const GateResult& r) { return !r.failure.empty(); });
-  const std::string name = markup_escaped(printable(input));
-  std::string out = fmt::format(
-      "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n<testsuite name=\"{}\" "
-      "tests=\"{}\" failures=\"{}\">\n",
-      markup_escaped(suite), results.size(), failures);
-  for (const GateResult& r : results) {
-    out += fmt::format("<testcase classname=\"{}\" name=\"{}\"", name, markup_escaped(r.name));
-    out += r.failure.empty()
-               ? "/>\n"
-               : fmt::format("><failure message=\"{}\"/></testcase>\n", markup_escaped(r.failure));
-  }
-  return out + "</testsuite>\n</testsuites>\n";
+  JunitReport report({suite, results.size(), static_cast<std::size_t>(failures), 0, {}});
+  for (const GateResult& r : results) report.add({printable(input), r.name, {}, {}, r.failure, "", ""});
+  return report.finish();
 }
 
 void write_gate_junit(const std::string& path, const std::string& suite, const std::string& input,

@@ -63,7 +63,7 @@ std::string figures_section(const RunSummary& s) {
     all_bytes += m.bytes;
     if (m.cost_s() <= 0) continue;
     seconds.push_back(m.cost_s());
-    memory.push_back(m.made_s > 0 ? m.made_memory_bytes : m.peak_memory_bytes);
+    memory.push_back(m.made ? m.made->peak_memory_bytes : m.peak_memory_bytes);
     all_s += m.cost_s();
   }
   Table table("What a model took when its package was made", {"", "median", "9 of 10", "most", "all"});
@@ -90,7 +90,7 @@ class ModelsSection {
       if (!m.ok()) continue;
       if (models++ < posters_) posters += picture(m, files);
       if (models > kMostRows) continue;
-      const std::uint64_t memory = m.made_s > 0 ? m.made_memory_bytes : m.peak_memory_bytes;
+      const std::uint64_t memory = m.made ? m.made->peak_memory_bytes : m.peak_memory_bytes;
       table.row({m.model, enum_name(m.result), m.cost_s() > 0 ? format_seconds(m.cost_s()) : "",
                  format_bytes(memory), format_bytes(m.bytes)});
     }

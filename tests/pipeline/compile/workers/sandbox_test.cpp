@@ -1,6 +1,6 @@
 // A child in the sandbox tries what it must not do. Each attempt runs in a process of its own, because a
 // sandbox is for good.
-#include "pipeline/compile/workers/sandbox/sandbox.h"
+#include "pipeline/compile/workers/sandbox.h"
 
 #include <arpa/inet.h>
 #include <fcntl.h>
@@ -19,7 +19,7 @@
 #include <map>
 #include <thread>
 
-#include "pipeline/compile/workers/sandbox/worker_rules.h"
+#include "pipeline/compile/workers/sandbox.h"
 #include "pipeline/io/atomic_file.h"
 #include "tests/support/command.h"
 #include "tests/support/sanitizers.h"
