@@ -8,6 +8,7 @@
 #include "delivery/cpp/decide/texture_budget.h"
 #include "delivery/cpp/simulate/network_model.h"
 #include "delivery/cpp/simulate/simulation.h"
+#include "format/rules/proxy_choice.h"
 #include "format/rules/viewing.h"
 
 namespace texmesh {
