@@ -1,4 +1,4 @@
-#include "stages/proxies/coding/proxy_mesh.h"
+#include "stages/proxies/coding/proxy_glb.h"
 
 #include <meshoptimizer.h>
 
