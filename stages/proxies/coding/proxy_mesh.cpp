@@ -2,10 +2,6 @@
 
 #include <meshoptimizer.h>
 
-#include <cmath>
-
-#include "format/base/box.h"
-#include "format/base/errors.h"
 #include "format/base/no_index.h"
 #include "stages/gltf/glb_writer.h"
 
