@@ -62,8 +62,7 @@ class Progress {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now(), drawn_;
 };
 
-std::string format_bytes(std::uint64_t bytes);  // "1.23 MB", decimal units
-std::string format_seconds(double seconds);     // "3.4 s", "2 min 10 s"
+std::string format_seconds(double seconds);  // "3.4 s", "2 min 10 s"
 
 /// "ladder.rungs: [5,8] -> [8]"; digests shortened.
 std::string describe_change(const std::string& part, const std::string& from, const std::string& to);

@@ -1,39 +1,45 @@
 #include "pipeline/io/markup.h"
 
-#include <nlohmann/json.hpp>
+#include "pipeline/io/wire_text.h"
 
 namespace texmesh {
+namespace {
+
+std::string escaped_character(char c) {
+  switch (c) {
+    case '&':
+      return "&amp;";
+    case '<':
+      return "&lt;";
+    case '>':
+      return "&gt;";
+    case '"':
+      return "&quot;";
+    case '\'':
+      return "&#39;";
+    case '\n':
+      return "&#10;";
+    case '\t':
+      return "&#9;";
+    default:
+      return static_cast<unsigned char>(c) < 0x20 ? "?" : std::string(1, c);
+  }
+}
+
+}  // namespace
 
 std::string markup_escaped(std::string_view text) {
-  using Json = nlohmann::json;
-  const std::string sound =
-      Json::parse(Json(text).dump(-1, ' ', false, Json::error_handler_t::replace)).get<std::string>();
   std::string out;
-  for (const char c : sound) switch (c) {
-      case '&':
-        out += "&amp;";
-        break;
-      case '<':
-        out += "&lt;";
-        break;
-      case '>':
-        out += "&gt;";
-        break;
-      case '"':
-        out += "&quot;";
-        break;
-      case '\'':
-        out += "&#39;";
-        break;
-      case '\n':
-        out += "&#10;";
-        break;
-      case '\t':
-        out += "&#9;";
-        break;
-      default:
-        out += static_cast<unsigned char>(c) < 0x20 ? '?' : c;
-    }
+  while (!text.empty()) {
+    const std::size_t n = utf8_character_bytes(text);
+    if (n == 0)
+      out += "\xef\xbf\xbd";  // U+FFFD
+    else if (n > 1)
+      out += text.substr(0, n);
+    else
+      out += escaped_character(text[0]);
+    text.remove_prefix(n == 0 ? 1 : n);
+  }
   return out;
 }
 

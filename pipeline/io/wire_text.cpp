@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <cstddef>
 #include <cstdint>
 
 namespace texmesh {
@@ -10,9 +9,26 @@ namespace {
 
 constexpr char kMark = 1;
 
-/// Bytes of the UTF-8 character at the beginning; 0 where there is none (RFC 3629: shortest forms, no
-/// surrogates, up to U+10FFFF).
-std::size_t character_bytes(std::string_view s) {
+std::string escaped(std::string_view bytes) {
+  std::string out;
+  while (!bytes.empty()) {
+    const std::size_t n = utf8_character_bytes(bytes);
+    if (n == 0 || bytes[0] == kMark || bytes[0] == '\\')
+      out += fmt::format("\\x{:02x}", static_cast<std::uint8_t>(bytes[0]));
+    else
+      out += bytes.substr(0, n);
+    bytes.remove_prefix(n == 0 ? 1 : n);
+  }
+  return out;
+}
+
+int lower_hex_digit(char c) {
+  return c >= '0' && c <= '9' ? c - '0' : c >= 'a' && c <= 'f' ? c - 'a' + 10 : -1;
+}
+
+}  // namespace
+
+std::size_t utf8_character_bytes(std::string_view s) {
   const auto at = [&](std::size_t i) {
     return i < s.size() ? static_cast<std::uint8_t>(s[i]) : std::uint8_t{0};
   };
@@ -33,28 +49,9 @@ std::size_t character_bytes(std::string_view s) {
   return 0;
 }
 
-std::string escaped(std::string_view bytes) {
-  std::string out;
-  while (!bytes.empty()) {
-    const std::size_t n = character_bytes(bytes);
-    if (n == 0 || bytes[0] == kMark || bytes[0] == '\\')
-      out += fmt::format("\\x{:02x}", static_cast<std::uint8_t>(bytes[0]));
-    else
-      out += bytes.substr(0, n);
-    bytes.remove_prefix(n == 0 ? 1 : n);
-  }
-  return out;
-}
-
-int lower_hex_digit(char c) {
-  return c >= '0' && c <= '9' ? c - '0' : c >= 'a' && c <= 'f' ? c - 'a' + 10 : -1;
-}
-
-}  // namespace
-
 bool is_utf8(std::string_view bytes) {
   while (!bytes.empty()) {
-    const std::size_t n = character_bytes(bytes);
+    const std::size_t n = utf8_character_bytes(bytes);
     if (n == 0) return false;
     bytes.remove_prefix(n);
   }

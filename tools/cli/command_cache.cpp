@@ -5,10 +5,10 @@
 #include <nlohmann/json.hpp>
 
 #include "format/base/errors.h"
-#include "pipeline/batch/progress.h"
 #include "pipeline/cache/disk_store.h"
 #include "pipeline/cache/prune.h"
 #include "pipeline/io/exit_codes.h"
+#include "pipeline/io/table.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"
 #include "tools/cli/options/units.h"

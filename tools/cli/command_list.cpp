@@ -2,9 +2,9 @@
 
 #include "format/base/errors.h"
 #include "pipeline/batch/fleet/model_list.h"
-#include "pipeline/batch/progress.h"
 #include "pipeline/compile/options.h"
 #include "pipeline/io/exit_codes.h"
+#include "pipeline/io/table.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"
 #include "tools/cli/options/shard_options.h"

@@ -26,7 +26,7 @@ std::string value_of(const Difference& d, int side) {
 }
 
 std::string head_text(const PackageDiff& diff, const std::array<std::string, 2>& names) {
-  TextTable table("");
+  TextTable table;
   table.column("", Align::kLeft);
   table.column("package", Align::kLeft);
   table.column("id", Align::kLeft);
@@ -34,7 +34,7 @@ std::string head_text(const PackageDiff& diff, const std::array<std::string, 2>&
   for (int side = 0; side < 2; ++side)
     table.row(
         {side ? "B" : "A", printable(names[side]), diff.ids[side].substr(0, 16), grouped(diff.bytes[side])});
-  return table.text();
+  return table.text("");
 }
 
 std::string recorded_text(const PackageDiff& diff) {

@@ -6,8 +6,6 @@
 
 namespace texmesh {
 
-std::string percent(double fraction, int digits) { return fixed(100 * fraction, digits); }
-
 std::string plane_title(const TextureInfo& t, std::size_t plane) {
   const std::string name = t.name.empty() ? "" : " \"" + printable(t.name) + "\"";
   const std::string mip = t.mip == 0 ? "" : fmt::format(", mip {} of plane {}", t.mip, t.base);

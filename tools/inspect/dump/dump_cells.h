@@ -6,9 +6,8 @@
 
 namespace texmesh {
 
-// How the text of a dump shows numbers and names.
+// How the text of a dump shows names.
 
-std::string percent(double fraction, int digits = 1);
 /// The title line of a texture plane.
 std::string plane_title(const TextureInfo& texture, std::size_t plane);
 

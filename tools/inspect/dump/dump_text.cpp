@@ -14,15 +14,16 @@ namespace texmesh {
 namespace {
 
 std::string entries_text(PackageReader& p) {
-  TextTable table("");
+  TextTable table;
   table.column("offset");
   table.column("bytes");
   table.column("sha256", Align::kLeft);
   table.column("path", Align::kLeft);
   const nlohmann::ordered_json dumped = dump_json(p, DumpPart::kEntries);
   for (const auto& e : dumped["entries"])
-    table.row({e["offset"].dump(), e["bytes"].dump(), e["sha256"], e["path"]});
-  return table.text();
+    table.row({e["offset"].dump(), e["bytes"].dump(), e["sha256"].get<std::string>(),
+               e["path"].get<std::string>()});
+  return table.text("");
 }
 
 std::string provenance_text(PackageReader& p) {

@@ -5,8 +5,8 @@
 #include <algorithm>
 
 #include "format/documents/about.h"
-#include "pipeline/batch/progress.h"
 #include "pipeline/io/markup.h"
+#include "pipeline/io/table.h"
 #include "tools/publish/export/page_files.h"
 #include "tools/publish/report/package_words.h"
 

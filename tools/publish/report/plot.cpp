@@ -7,6 +7,7 @@
 
 #include "format/base/portable_math.h"
 #include "pipeline/io/markup.h"
+#include "pipeline/io/table.h"
 #include "tools/publish/report/html.h"
 
 namespace texmesh {
@@ -58,7 +59,7 @@ class Canvas {
           "<path class=\"grid\" d=\"M{0:.1f} {1}v{2}\"/><text class=\"quiet mid\" x=\"{0:.1f}\" "
           "y=\"{3}\">{4}</text>\n",
           x(v), kTop, kPlotHeight + 5, kTop + kPlotHeight + 20,
-          bytes                     ? short_bytes(v)
+          bytes                     ? format_bytes(static_cast<std::uint64_t>(v))
           : plot_.linear_x || v < 1 ? fmt::format("{:.4g}", v)
                                     : fmt::format("{:.0f}", v));
     return svg + fmt::format("<text class=\"quiet end\" x=\"{}\" y=\"{}\">{}</text>\n", kLeft + kPlotWidth,
@@ -155,22 +156,6 @@ std::string Plot::svg() const {
                            canvas.x(px), canvas.y(py));
   }
   return out + legend(series, kHeight + kLegendLine) + "</svg>\n";
-}
-
-std::string short_bytes(double bytes) {
-  constexpr const char* kUnits[] = {"B", "kB", "MB", "GB"};
-  std::size_t unit = 0;
-  while (bytes >= 999.5 && unit < 3) bytes /= 1000, ++unit;
-  return fmt::format("{:.3g} {}", bytes, kUnits[unit]);
-}
-
-std::string thin_grouped(unsigned long long value) {
-  std::string digits = std::to_string(value), out;
-  for (std::size_t i = 0; i < digits.size(); ++i) {
-    if (i > 0 && (digits.size() - i) % 3 == 0) out += "\xe2\x80\xaf";  // narrow no-break space
-    out += digits[i];
-  }
-  return out;
 }
 
 }  // namespace texmesh

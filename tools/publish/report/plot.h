@@ -24,10 +24,4 @@ struct Plot {
   std::string svg() const;
 };
 
-/// "1.2 MB", "340 kB", "12 B": at most three digits.
-std::string short_bytes(double bytes);
-
-/// A number with thin blanks between groups of three digits.
-std::string thin_grouped(unsigned long long value);
-
 }  // namespace texmesh

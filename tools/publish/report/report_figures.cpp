@@ -8,6 +8,7 @@
 #include "format/container/layout.h"
 #include "format/rules/proxy_choice.h"
 #include "pipeline/io/markup.h"
+#include "pipeline/io/table.h"
 #include "tools/inspect/dump/package_figures.h"
 #include "tools/publish/report/fragment_maps.h"
 #include "tools/publish/report/html.h"
@@ -80,8 +81,7 @@ std::string kinds_bar(const std::vector<KindBytes>& kinds, double sum) {
     const double width = kWidth * static_cast<double>(kinds[k].bytes) / sum;
     out += fmt::format(
         "<rect class=\"{}\" x=\"{:.1f}\" width=\"{:.1f}\" height=\"{}\"><title>{}: {}</title></rect>\n",
-        kind_class(k), x, width, kHeight, markup_escaped(kinds[k].kind),
-        short_bytes(static_cast<double>(kinds[k].bytes)));
+        kind_class(k), x, width, kHeight, markup_escaped(kinds[k].kind), format_bytes(kinds[k].bytes));
     x += width;
   }
   return out + "</svg>\n";
@@ -95,7 +95,7 @@ HtmlTable plane_table(PackageReader& package) {
     const TextureInfo& t = package.textures()[p];
     std::uint64_t all = t.tables.bytes;
     for (const EntryRef& rung : t.rungs) all += rung.bytes;
-    const auto bytes = [](std::uint64_t n) { return short_bytes(static_cast<double>(n)); };
+    const auto bytes = [](std::uint64_t n) { return format_bytes(n); };
     table.rows.push_back({t.mip == 0 ? std::to_string(p) : fmt::format("{} (mip {} of {})", p, t.mip, t.base),
                           markup_escaped(t.role), fmt::format("{} x {}", t.width_px, t.height_px),
                           std::to_string(stored_fragments(package.tables().planes[p])),
@@ -223,8 +223,8 @@ std::string proxy_figure(PackageReader& package, PackagePictures& pictures, std:
   std::string out = fmt::format(
       "<figure>\n<figcaption><h3>Proxy {}, {}</h3>{} triangles. Mean FLIP {:.3f} at {:.0f} px, over all measured "
       "views.</figcaption>\n",
-      proxy, short_bytes(static_cast<double>(m.proxies[proxy].glb.bytes)),
-      thin_grouped(m.proxies[proxy].triangles), m.proxies[proxy].flip.back(), height);
+      proxy, format_bytes(m.proxies[proxy].glb.bytes), thin_grouped(m.proxies[proxy].triangles),
+      m.proxies[proxy].flip.back(), height);
   const std::uint32_t side_px = pictures.side_for(height);
   for (const auto& [view, name] : {std::pair{ViewNumber{0, 1}, "front"}, {ViewNumber{2, 6}, "side"}})
     out += picture_row({fmt::format("proxy{:02}-{}", proxy, name), fmt::format("S_0, {}", name),
@@ -254,7 +254,7 @@ std::string proxy_section(PackageReader& package, PackagePictures& pictures, Rep
   std::string body = fmt::format(
       "<p>A viewer shows the smallest proxy first: after {} of the package. Where a proxy's mean FLIP is at most "
       "{:g} and its 95th percentile at most {:g}, nothing else is read.</p>\n",
-      short_bytes(static_cast<double>(start_bytes(m))), kSameFlip, kSameFlipP95);
+      format_bytes(start_bytes(m)), kSameFlip, kSameFlipP95);
   body += table.html();
   for (std::uint32_t k = 0; k < m.proxies.size(); ++k) body += proxy_figure(package, pictures, k, report);
   return html_section("proxies", "Proxies", body);

@@ -7,6 +7,7 @@
 #include "format/base/sha256.h"
 #include "format/container/layout.h"
 #include "pipeline/io/markup.h"
+#include "pipeline/io/table.h"
 #include "tools/publish/report/flip_colours.h"
 #include "tools/publish/report/html.h"
 #include "tools/publish/report/package_words.h"
@@ -85,8 +86,8 @@ std::string header_section(PackageReader& package, Report& report) {
   out += fmt::format(
       "<p class=\"quiet\">A texmesh package of {}: {} scales, S_0 with {} triangles, {} texture planes; "
       "{:.4g} x {:.4g} x {:.4g} object units.</p>\n",
-      short_bytes(static_cast<double>(bytes)), m.scales.size(), thin_grouped(m.scales.front().triangles),
-      m.plane_count, size.x, size.y, size.z);
+      format_bytes(bytes), m.scales.size(), thin_grouped(m.scales.front().triangles), m.plane_count, size.x,
+      size.y, size.z);
   out += rights_line(package.about());
   out += "<nav aria-label=\"Sections\"><ul>";
   for (const auto& [id, name] : {std::pair{"switches", "Switch sizes"},

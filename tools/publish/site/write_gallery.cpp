@@ -5,10 +5,9 @@
 #include <nlohmann/json.hpp>
 
 #include "format/base/text_bytes.h"
-#include "pipeline/batch/progress.h"
 #include "pipeline/io/markup.h"
 #include "pipeline/io/new_folder.h"
-#include "pipeline/io/text_table.h"
+#include "pipeline/io/table.h"
 #include "pipeline/io/uri.h"
 #include "tools/publish/report/package_words.h"
 #include "tools/publish/site/gallery.h"

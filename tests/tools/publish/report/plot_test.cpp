@@ -54,16 +54,5 @@ TEST(Plot, ALinearAxisMayGoBelowZero) {
   EXPECT_NE(svg.find("M58.0 310.0L401.0 240.0L744.0 30.0"), std::string::npos) << svg;
 }
 
-TEST(Plot, BytesForPeople) {
-  EXPECT_EQ(short_bytes(12), "12 B");
-  EXPECT_EQ(short_bytes(340000), "340 kB");
-  EXPECT_EQ(short_bytes(1.23456e6), "1.23 MB");
-  EXPECT_EQ(thin_grouped(1234567),
-            "1\xe2\x80\xaf"
-            "234\xe2\x80\xaf"
-            "567");
-  EXPECT_EQ(thin_grouped(12), "12");
-}
-
 }  // namespace
 }  // namespace texmesh::testing

@@ -9,6 +9,7 @@
 #include "format/base/errors.h"
 #include "pipeline/batch/progress.h"
 #include "pipeline/io/markup.h"
+#include "pipeline/io/table.h"
 #include "tools/publish/report/html.h"
 
 namespace texmesh {
