@@ -1,5 +1,5 @@
 // Objects that share one link and one time limit.
-#include "delivery/cpp/client/several_objects.h"
+#include "lab/transfer/several_objects.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,10 @@
 #pragma once
 #include <cstdint>
+#include <map>
 #include <vector>
+
+#include "delivery/cpp/simulate/simulation.h"
+#include "delivery/cpp/transfer/transfer.h"
 
 namespace texmesh {
 
@@ -53,5 +57,50 @@ class BandwidthMonitor {
   std::uint64_t sent_bytes_ = 0;
   std::vector<BandwidthSample> samples_;
 };
+
+/// A transport that sends a monitor's test packets beside the requests, and tells nobody of their outcomes.
+/// A packet goes out when it is due and a request is under way, to the mirror that was asked last. It takes
+/// its part of the link: that is what monitoring costs.
+class MonitoredTransport final : public Transport {
+ public:
+  /// The number of a test packet's request; no other request may have it.
+  static constexpr std::uint32_t kPacketNumber = 0xfffffffe;
+  MonitoredTransport(Transport& inner, BandwidthMonitor& monitor, double rtt_s)
+      : inner_(inner), monitor_(monitor), rtt_s_(rtt_s) {}
+
+  std::size_t mirrors() const override { return inner_.mirrors(); }
+  double now_s() override { return inner_.now_s(); }
+  void start(const TransferRequest& request, std::uint32_t mirror) override;
+  void cancel(std::uint32_t number) override;
+  void forget(std::uint32_t number) override;
+  double received(std::uint32_t number) override { return inner_.received(number); }
+  std::optional<Outcome> wait(double until_s) override;
+
+ private:
+  void send_packet();
+  double moved_bytes();
+
+  Transport& inner_;
+  BandwidthMonitor& monitor_;
+  double rtt_s_;
+  struct UnderWay {
+    double bytes = 0, before = 0;  // of the whole request; what had come of it when it was started
+  };
+  std::map<std::uint32_t, UnderWay> under_way_;
+  std::uint32_t mirror_ = 0;  // asked last
+  double ended_bytes_ = 0;    // of requests that are under way no longer
+  double moved_before_ = 0;
+};
+
+/// What a monitor did beside a simulated transfer. Its bytes are not among the transfer's.
+struct ProbeResult {
+  std::vector<BandwidthSample> samples;
+  std::uint32_t packets = 0;
+  std::uint64_t bytes = 0;
+};
+/// simulate() with test packets. The plan hears of throughput from its own transfers alone.
+SimulationResult simulate_with_probes(const std::vector<FragmentOffer>& offers, const HtcOptions& options,
+                                      const NetworkOptions& network, const ProbeOptions& probe,
+                                      ProbeResult& result);
 
 }  // namespace texmesh

@@ -1,9 +1,9 @@
-#include "delivery/cpp/simulate/packet_loss.h"
+#include "lab/transfer/packet_loss.h"
 
 #include <algorithm>
 #include <cmath>
 
-#include "delivery/cpp/simulate/simulation.h"
+#include "lab/transfer/chapter_4.h"
 
 namespace texmesh {
 namespace {

@@ -1,10 +1,9 @@
-#include "delivery/cpp/client/several_objects.h"
+#include "lab/transfer/several_objects.h"
 
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
-#include "delivery/cpp/client/request_htc.h"
 #include "format/rules/proxy_choice.h"
 
 namespace texmesh {
@@ -125,7 +124,7 @@ void fetch_textures(const DeliveryRequest& request, PageList& page, PagePlan& pl
   }
   const HtcOptions htc = request_htc(request, left_s, shown_bytes_s(request, plan));
   const NetworkOptions network = without_dead_mirrors(request.network, plan.meshes_s);
-  plan.textures = simulate(std::move(page.offers), htc, network_from(network, plan.meshes_s), request.probe);
+  plan.textures = simulate(std::move(page.offers), htc, network_from(network, plan.meshes_s));
   plan.complete_s = plan.meshes_s + plan.textures.end_s;
 }
 

@@ -1,5 +1,5 @@
 // Test packets: when they go out, how they adapt, what they show.
-#include "delivery/cpp/decide/bandwidth_monitor.h"
+#include "lab/transfer/probes.h"
 
 #include <gtest/gtest.h>
 

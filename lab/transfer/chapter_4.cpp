@@ -1,8 +1,9 @@
+#include "lab/transfer/chapter_4.h"
+
 #include <algorithm>
 #include <cmath>
 #include <span>
 
-#include "delivery/cpp/simulate/simulation.h"
 #include "format/base/portable_math.h"
 
 namespace texmesh {
@@ -80,7 +81,7 @@ std::vector<Table42Row> table_4_2(const HtcOptions& base, int seeds, Table42Rung
     row.static_percent = 100 * (1 - beta0 * 1e3 / kLinkBytes_s);
     HtcOptions options = base;
     options.time_limit_s = row.t0_s;
-    options.throughput.initial_bytes_s = beta0 * 1e3;
+    options.initial_bytes_s = beta0 * 1e3;
     for (int seed = 1; seed <= seeds; ++seed) {
       const BandwidthTrace samples =
           random_trace(kLinkBytes_s, 0.2, 0, 1, kFragments, static_cast<std::uint64_t>(seed));
@@ -101,6 +102,94 @@ std::vector<Table42Row> table_4_2(const HtcOptions& base, int seeds, Table42Rung
     rows.push_back(row);
   }
   return rows;
+}
+
+SimulationResult simulate_samples(std::vector<FragmentOffer> offers, const HtcOptions& options,
+                                  const std::function<double(std::size_t, double)>& rate) {
+  HtcOptions serial = options;
+  serial.window = 1;
+  serial.rtt_s = 0;
+  HarmonicTimePlan plan(std::move(offers), serial);
+  double now_s = 0;
+  while (const HtcStep* step = plan.next(now_s)) {
+    now_s += step->bytes / rate(step->position, now_s);
+    plan.completed(step->offer, now_s);
+  }
+  return result_of(plan, options.time_limit_s, now_s);
+}
+
+SimulationResult simulate_serial_trace(std::vector<FragmentOffer> offers, const HtcOptions& options,
+                                       const BandwidthTrace& trace) {
+  HtcOptions serial = options;
+  serial.window = 1;
+  serial.rtt_s = 0;
+  NetworkOptions network;
+  network.link = trace;
+  network.connections = 1;
+  return simulate(std::move(offers), serial, network);
+}
+
+double TraceRandom::uniform() { return numbers_.next() + 1 / 9007199254740992.0; }
+
+double TraceRandom::normal() {
+  const double u = uniform(), v = uniform();
+  return std::sqrt(-2 * portable::log(u)) * portable::cos(2 * portable::kPi * v);
+}
+
+BandwidthTrace random_trace(double mean_bytes_s, double cv, double rho, double step_s, double length_s,
+                            std::uint64_t seed) {
+  const double variance = portable::log(1 + cv * cv), sigma = std::sqrt(variance);
+  TraceRandom random(seed);
+  BandwidthTrace trace{{}, {}};
+  double x = random.normal();
+  const auto steps = static_cast<std::size_t>(std::ceil(length_s / step_s));
+  for (std::size_t i = 0; i <= steps; ++i) {
+    trace.time_s.push_back(static_cast<double>(i) * step_s);
+    trace.bytes_s.push_back(mean_bytes_s * portable::exp(sigma * x - variance / 2));
+    x = rho * x + std::sqrt(1 - rho * rho) * random.normal();
+  }
+  return trace;
+}
+
+HtcTheorem theorem_of(const HarmonicTimePlan& plan) {
+  HtcTheorem t;
+  const std::vector<HtcStep>& steps = plan.steps();
+  if (steps.empty()) return t;
+  const std::size_t n = steps.size();
+  const HtcStep& last = steps.back();
+  t.surplus_s = plan.surplus_s();
+  t.last_residual_s = last.residual_s;
+  if (last.bytes > 0) {
+    const double beta_n = last.bytes / last.spacing_s;
+    t.corrected_bound_s = std::abs(last.theta_s) * std::abs(last.throughput_bytes_s / beta_n - 1) +
+                          std::abs(last.target_bytes - last.bytes) / beta_n;
+  } else {
+    t.corrected_bound_s = std::abs(last.theta_s);
+  }
+  double sum = 0;
+  for (std::size_t k = 0; k + 1 < n; ++k) sum += steps[k].residual_s;
+  const double mean = n > 1 ? sum / static_cast<double>(n - 1) : 0;
+  const double log_n = portable::log(static_cast<double>(std::max<std::size_t>(n, 3)));
+  t.published_bound_s =
+      last.residual_s + (n > 1 ? steps[n - 2].residual_s / 2 : 0) + (1.088 + portable::log(log_n)) * mean;
+  return t;
+}
+
+HtcTheorem theorem_run(const HtcOptions& base, const std::vector<FragmentOffer>& offers, int seed, int runs) {
+  HtcOptions o = base;
+  o.window = 1;
+  o.hard_limits = false;
+  o.time_limit_s = kTheoremLimit_s;
+  o.initial_bytes_s = 20e3 + 33e3 * seed / runs;
+  HarmonicTimePlan plan(offers, o);
+  const BandwidthTrace samples =
+      random_trace(41.68e3, 0.05 * (seed % 20), 0.5, 1, 300, static_cast<std::uint64_t>(seed));
+  double now = 0;
+  while (const HtcStep* s = plan.next(now)) {
+    now += s->bytes / samples.bytes_s[s->position];
+    plan.completed(s->offer, now);
+  }
+  return theorem_of(plan);
 }
 
 }  // namespace texmesh

@@ -1,6 +1,6 @@
-#include <queue>
+#include "delivery/cpp/decide/fragment_offer.h"
 
-#include "delivery/cpp/decide/upgrades.h"
+#include <queue>
 
 namespace texmesh {
 namespace {

@@ -1,5 +1,5 @@
 // Packets that get lost and are not sent again: what is estimated, and how well.
-#include "delivery/cpp/simulate/packet_loss.h"
+#include "lab/transfer/packet_loss.h"
 
 #include <gtest/gtest.h>
 
