@@ -5,7 +5,7 @@
 
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/text_table.h"
-#include "tools/cli/check/atlas_gate.h"
+#include "tools/cli/check/check_gate.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"
 #include "tools/cli/options/common_options.h"

@@ -57,6 +57,12 @@ Option& Option::shows_default() {
   return *this;
 }
 
+Option& Option::shows_default(const std::string& text) {
+  option_->default_str(text);
+  state_->help.with_default.insert(option_);
+  return *this;
+}
+
 Option& Option::integer_in(int least, int most) {
   option_->check(CLI::Range(least, most).description(""));
   return *this;
@@ -182,9 +188,9 @@ void Command::on_run(std::function<int()> run) {
   app_->callback([state = state_, run = std::move(run)] { state->exit_code = run(); });
 }
 
-CommandLine::CommandLine(const std::string& what_the_program_is)
+CommandLine::CommandLine(const std::string& what_the_program_is, const std::string& program_name)
     : state_(std::make_unique<CommandLineState>()),
-      app_(std::make_unique<CLI::App>(what_the_program_is, "texmesh")) {
+      app_(std::make_unique<CLI::App>(what_the_program_is, program_name)) {
   app_->require_subcommand(1);
   app_->set_help_flag("-h,--help", "Print this help");
   app_->formatter_fn([this](const CLI::App* app, const std::string& name, CLI::AppFormatMode mode) {

@@ -29,6 +29,7 @@ class Option {
   Option& value_name(const std::string& name);
   /// The help tells the value that the variable has now.
   Option& shows_default();
+  Option& shows_default(const std::string& text);  // of an option that a function takes
   Option& integer_in(int least, int most);
   Option& number_in(double least, double most);  // not NaN
   /// One of these words; the help lists them after its text.
@@ -92,7 +93,7 @@ class Command {
 
 class CommandLine {
  public:
-  explicit CommandLine(const std::string& what_the_program_is);
+  explicit CommandLine(const std::string& what_the_program_is, const std::string& program_name = "texmesh");
   ~CommandLine();
   CommandLine(const CommandLine&) = delete;
   CommandLine& operator=(const CommandLine&) = delete;
