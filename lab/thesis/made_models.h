@@ -1,15 +1,33 @@
 #pragma once
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "format/model/model.h"
 #include "stages/base/run_context.h"
 #include "stages/data/conditioned_mesh.h"
+#include "stages/data/fragments.h"
 #include "stages/data/nested_scales.h"
 #include "stages/data/pixels.h"
 #include "stages/data/scale_map.h"
 
 namespace texmesh {
+
+/// Texture patterns made by code, from plain to complex, named (a) to (x) as the thesis's 24 of Fig. 8.2.
+/// Pairs that the thesis compares are pairs here: (i) is (j) darkened, (n) is (p) darkened, (s) has the
+/// sharpest edges on the brightest ground.
+inline constexpr std::size_t kMadePatterns = 24;
+inline constexpr std::uint32_t kPatternPx = 64;
+std::string pattern_name(std::size_t pattern);
+/// Index of the pattern with this letter.
+inline std::size_t pattern_of(char letter) { return static_cast<std::size_t>(letter - 'a'); }
+
+/// One plane, a fragment for each of these patterns, all covered, without feature points.
+struct PatternPlane {
+  Fragments fragments;
+  std::vector<Pixels> pixels;
+};
+PatternPlane pattern_plane(const std::vector<std::size_t>& patterns, std::uint32_t columns);
 
 // Stand-ins for the thesis's models, whose data are not available: cylindrical range scans made by code.
 
