@@ -176,7 +176,7 @@ void Ktx2File::read_key_values() {
 }
 
 void Ktx2File::read_key(std::string_view key, std::string_view value) {
-  const auto shown = [&] { return "\"" + std::string(value.substr(0, 20)) + "\""; };
+  const auto shown = [&] { return std::string(1, '"').append(value.substr(0, 20)).append(1, '"'); };
   if (key == "KTXorientation") {
     if (value != "rd" && value != "ru") fail("KTXorientation", "\"rd\" or \"ru\"", shown());
     bottom_first_ = value == "ru";
