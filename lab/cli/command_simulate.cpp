@@ -25,7 +25,8 @@
 #include "pipeline/io/wire_text.h"
 #include "stages/condition/condition.h"
 #include "stages/image/png_writer.h"
-#include "tools/cli/simulated.h"
+#include "tools/cli/options/delivery_options.h"
+#include "tools/cli/options/delivery_text.h"
 #include "tools/render/picture_sheet.h"
 
 namespace texmesh {

@@ -24,6 +24,7 @@
 #include "pipeline/io/table.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/delivery_options.h"
+#include "tools/cli/options/delivery_text.h"
 #include "tools/extract/glb/scale_file.h"
 
 namespace texmesh {

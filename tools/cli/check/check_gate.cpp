@@ -8,7 +8,7 @@
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/markup.h"
 #include "pipeline/io/table.h"
-#include "tools/cli/options/delivery_options.h"
+#include "tools/cli/options/delivery_text.h"
 #include "tools/publish/report/html.h"
 #include "tools/publish/report/switch_sizes.h"
 

@@ -1,10 +1,7 @@
 #include "tools/cli/options/delivery_options.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <fstream>
-#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "pipeline/io/table.h"
@@ -142,32 +139,6 @@ void add_delivery_options(Command& c, DeliveryArguments& a) {
   add_policy_option(c, a).rare();
   add_rule_option(c, a).rare();
   c.group("");
-}
-
-std::string moment(double time_s) {
-  constexpr double kNever_s = 1e8;  // no link that a request may ask for takes as long
-  return time_s < kNever_s ? fmt::format("at {:.2f} s", time_s) : "never";
-}
-
-std::string gpu_text(const GpuBytes& bytes) {
-  return fmt::format("on the GPU: at most {:.1f} MB of textures, {:.1f} MB of mesh\n",
-                     static_cast<double>(bytes.textures) / 1e6, static_cast<double>(bytes.mesh) / 1e6);
-}
-
-nlohmann::ordered_json gpu_json(const GpuBytes& bytes) {
-  return {{"mesh", bytes.mesh}, {"textures", bytes.textures}, {"all", bytes.all()}};
-}
-
-nlohmann::ordered_json server_json(const MirrorShare& share) {
-  nlohmann::ordered_json j{{"requests", share.requests}, {"bytes", share.bytes}, {"bytes_s", share.bytes_s}};
-  if (!share.dropped.empty()) j["dropped"] = share.dropped;
-  return j;
-}
-
-std::string server_text(const std::string& name, const MirrorShare& share) {
-  return fmt::format("  {}: {} requests, {} bytes, {:.0f} kB/s{}\n", name, share.requests,
-                     grouped(share.bytes), share.bytes_s / 1e3,
-                     share.dropped.empty() ? "" : "; dropped: " + share.dropped);
 }
 
 DeliveryRequest delivery_request(const DeliveryArguments& a) {

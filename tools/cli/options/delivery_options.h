@@ -1,7 +1,6 @@
 #pragma once
 #include <array>
 #include <functional>
-#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -64,14 +63,5 @@ void add_memory_option(Command& command, DeliveryArguments& args);
 
 /// UsageError names the flag.
 DeliveryRequest delivery_request(const DeliveryArguments& args);
-/// "at 1.25 s", or "never" for what a network does not bring.
-std::string moment(double time_s);
-/// What is shown takes on the GPU, one line.
-std::string gpu_text(const GpuBytes& bytes);
-/// The same as {mesh, textures, all}.
-nlohmann::ordered_json gpu_json(const GpuBytes& bytes);
-/// What one of several servers has brought: of fetch.v1 and simulate.v1 the fields that both have; a line.
-nlohmann::ordered_json server_json(const MirrorShare& share);
-std::string server_text(const std::string& name, const MirrorShare& share);
 
 }  // namespace texmesh
