@@ -1,8 +1,11 @@
 #pragma once
-// The cases of harmonic-time.json and throughput.json, for the policies and estimators that are known.
+// The cases of harmonic-time.json, throughput.json and portable-math.json, for the policies and estimators
+// that are known.
 #include <cmath>
 
 #include "delivery/cpp/simulate/network_model.h"
+#include "format/base/portable_math.h"
+#include "format/rules/allocation.h"
 #include "tests/delivery/made_links.h"
 #include "tests/delivery/vectors.h"
 
@@ -176,6 +179,35 @@ inline Json throughput(const MakesEstimate& make) {
                        {"options", throughput_json(estimator, samples, 1e5)},
                        {"add_bytes_seconds_then_bytes_s_and_recent_3", calls}});
     }
+  return cases;
+}
+
+/// Adds pairs of x from `low` to `high` and f(x).
+inline void add_function(const char* name, const std::function<double(double)>& f, double low, double high,
+                         Json& cases) {
+  Json pairs = Json::array();
+  testing::MadeNumbers random(99);
+  for (int i = 0; i < 40; ++i) {
+    const double x = i == 0 ? low : i == 1 ? high : low + (high - low) * random.uniform();
+    pairs.push_back({x, f(x)});
+  }
+  cases.push_back({{"name", name}, {"x_y", pairs}});
+}
+
+inline Json portable_math() {
+  Json cases = Json::array();
+  const auto add = [&](const char* name, const std::function<double(double)>& f, double low, double high) {
+    add_function(name, f, low, high, cases);
+  };
+  add("exp", portable::exp, -60, 60);
+  add("exp", portable::exp, -1, 1);
+  add("log", portable::log, 1e-12, 10);
+  add("log", portable::log, 0.5, 1e9);
+  add("sin", portable::sin, -10, 10);
+  add("cos", portable::cos, -10, 10);
+  add(
+      "pow of 0.37", [](double x) { return portable::pow(0.37, x); }, -3, 3);
+  add("log_quantiser", log_quantiser, 1, 100);
   return cases;
 }
 

@@ -1,4 +1,5 @@
 // The vectors in delivery/vectors of which the laboratory knows all cases: written and compared whole.
+#include "lab/transfer/acuity.h"
 #include "lab/transfer/chapter_4.h"
 #include "lab/transfer/policies.h"
 #include "tests/delivery/vector_decisions.h"
@@ -47,6 +48,13 @@ TEST(Vectors, Throughput) {
   };
   expect_file("throughput.json", "samples added to a Throughput, and its estimates after each",
               throughput(make));
+}
+
+TEST(Vectors, PortableMath) {
+  Json cases = portable_math();
+  add_function("acuity", acuity_at, 0, 30, cases);
+  add_function("gaze_weight", gaze_weight, 0, 30, cases);
+  expect_file("portable-math.json", "functions whose bits decide", cases);
 }
 
 TEST(Vectors, Packages) {
