@@ -34,20 +34,22 @@ if(TEXMESH_COMPILER)
   texmesh_install_component(texmeshCompiler "stages;pipeline;tools")
   # Of the stages the data, and of each its one public header (tests/house/check_layers).
   texmesh_install_headers(stages "data/.*" "base/run_context\\.h")
-  foreach(stage condition skeletonization ssf simplification perceptual_values fragmentation fill zim previews ladder lut
-      scales quality poster proxies package)
-    texmesh_install_headers(stages "${stage}/${stage}\\.h")
+  file(GLOB stages RELATIVE ${PROJECT_SOURCE_DIR}/stages CONFIGURE_DEPENDS stages/*/*.h)
+  foreach(header ${stages})
+    file(STRINGS stages/${header} version REGEX "^inline constexpr int k[A-Za-z]+Version = ")
+    if(version AND header MATCHES "^([a-z_]+)/([a-z_]+)\\.h$" AND CMAKE_MATCH_1 STREQUAL CMAKE_MATCH_2)
+      texmesh_install_headers(stages "${CMAKE_MATCH_1}/${CMAKE_MATCH_1}\\.h")
+    endif()
   endforeach()
   # Of pipeline and tools what a program calls, and what those headers name; tests/house/check_install sees that none misses.
   texmesh_install_headers(pipeline "import/import\\.h" "compile/(compile_model|options|profile)\\.h"
-    "batch/(plan|run|fleet/shards)\\.h" "cache/(disk_store|cache_layer|layer_rest|prune)\\.h"
-    "io/(file_request|file_resolver|file_stamp|resolver)\\.h" "compile/workers/(seldom|worker|sandbox/sandbox)\\.h" "batch/progress\\.h"
-    "graph/(artefact|explanation|graph_run|key|option_text|stage|stage_observer|store)\\.h")
+    "batch/(plan|run|fleet/shards)\\.h" "cache/(disk_store|cache_layer|prune)\\.h"
+    "io/(file_resolver|file_stamp|record|resolver)\\.h" "compile/workers/(sandbox|worker|worker_messages)\\.h" "batch/progress\\.h"
+    "graph/(graph_run|key|option_text|stage|store)\\.h")
   texmesh_install_headers(tools "inspect/(dump/dump|verify/verify|diff/diff)\\.h" "extract/extract\\.h" "publish/export/export\\.h"
-    "publish/site/gallery\\.h" "extract/glb/(extracted|image_codecs)\\.h" "render/plane_pixels\\.h")
+    "publish/site/site\\.h" "extract/glb/image_codecs\\.h" "render/plane_pixels\\.h")
   install(FILES cmake/FindWebP.cmake DESTINATION ${texmesh_cmake_dir})
   install(TARGETS texmesh EXPORT texmeshTool RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT tool)
-  install(TARGETS texmesh-core RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/texmesh COMPONENT tool)
   install(TARGETS texmesh_readers LIBRARY DESTINATION ${TEXMESH_MODULE_FOLDER} COMPONENT tool)
   install(DIRECTORY ${PROJECT_BINARY_DIR}/viewer/ DESTINATION ${CMAKE_INSTALL_DATADIR}/texmesh/viewer COMPONENT tool OPTIONAL)
   install(DIRECTORY profiles/ DESTINATION ${CMAKE_INSTALL_DATADIR}/texmesh/profiles COMPONENT tool)

@@ -4,25 +4,25 @@ find_program(GZIP gzip REQUIRED)
 set(texmesh_documents ${CMAKE_INSTALL_DATADIR}/doc/texmesh)
 install(CODE "
   set(to \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_DATADIR}\")
-  set(core $<TARGET_FILE:texmesh-core>)
+  set(program $<TARGET_FILE:texmesh>)
   set(zsh \${to}/zsh/site-functions)
   if(CMAKE_INSTALL_PREFIX STREQUAL \"/usr\")
     set(zsh \${to}/zsh/vendor-completions) # Debian's place for packages
   endif()
   file(MAKE_DIRECTORY \${to}/man/man1 \${to}/bash-completion/completions \${zsh} \${to}/doc/texmesh)
-  execute_process(COMMAND \${core} completion man COMMAND ${GZIP} -9n OUTPUT_FILE \${to}/man/man1/texmesh.1.gz
+  execute_process(COMMAND \${program} completion man COMMAND ${GZIP} -9n OUTPUT_FILE \${to}/man/man1/texmesh.1.gz
     COMMAND_ERROR_IS_FATAL ANY)
-  execute_process(COMMAND \${core} completion bash OUTPUT_FILE \${to}/bash-completion/completions/texmesh
+  execute_process(COMMAND \${program} completion bash OUTPUT_FILE \${to}/bash-completion/completions/texmesh
     COMMAND_ERROR_IS_FATAL ANY)
-  execute_process(COMMAND \${core} completion zsh OUTPUT_FILE \${zsh}/_texmesh COMMAND_ERROR_IS_FATAL ANY)
+  execute_process(COMMAND \${program} completion zsh OUTPUT_FILE \${zsh}/_texmesh COMMAND_ERROR_IS_FATAL ANY)
   execute_process(COMMAND ${PROJECT_SOURCE_DIR}/cmake/make_sbom ${PROJECT_VERSION}
       ${PROJECT_SOURCE_DIR}/cmake/debian-packages.txt
       \$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_BINDIR}/texmesh
-      \$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_LIBEXECDIR}/texmesh/texmesh-core
       \$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${TEXMESH_MODULE_FOLDER}/texmesh_readers.so
     OUTPUT_FILE \${to}/doc/texmesh/texmesh.cdx.json COMMAND_ERROR_IS_FATAL ANY)
 " COMPONENT tool)
-install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${texmesh_documents} RENAME copyright COMPONENT tool)
+# Sources and program have different licences: the file says which and why.
+install(FILES ${PROJECT_SOURCE_DIR}/cmake/copyright DESTINATION ${texmesh_documents} COMPONENT tool)
 
 set(TEXMESH_MAINTAINER "texmesh developers <texmesh@localhost>" CACHE STRING "Maintainer of the Debian package")
 set(CPACK_GENERATOR DEB)

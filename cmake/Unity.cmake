@@ -3,36 +3,33 @@
 # No name of a source clashes with a neighbour's: tests/house/check_unity.
 option(TEXMESH_UNITY "Compile several sources of a room as one: a faster build, a slower change" OFF)
 set(texmesh_unity_most 8)  # sources of a unit
+set(texmesh_unity_bytes 80000)  # of a unit's sources, about: 6 CPU seconds
 
-# Shares the sources of a room evenly among units, named after the room. CMake leaves sources with options of their own out of
-# units; so the units get these options (texmesh_seldom_run).
+# Shares the sources of a room evenly among units, by their bytes. Units are named after the room. CMake leaves sources with
+# options of their own out of units; so the units get these options (texmesh_seldom_run).
 function(texmesh_unity_room target room options)  # sources
   list(LENGTH ARGN count)
+  set(bytes 0)
+  foreach(source ${ARGN})
+    file(SIZE ${source} size)
+    math(EXPR bytes "${bytes} + ${size}")
+  endforeach()
   math(EXPR units "(${count} + ${texmesh_unity_most} - 1) / ${texmesh_unity_most}")
+  math(EXPR units_by_bytes "(${bytes} + ${texmesh_unity_bytes} - 1) / ${texmesh_unity_bytes}")
+  if(units_by_bytes GREATER units)
+    set(units ${units_by_bytes})
+  endif()
   set(at 0)
   foreach(source ${ARGN})
-    math(EXPR unit "${at} * ${units} / ${count}")
+    math(EXPR unit "${at} * ${units} / ${bytes}")
     set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${room}_${unit})
     if(options)
       set_property(SOURCE ${source} PROPERTY COMPILE_OPTIONS)
       set_source_files_properties(${CMAKE_CURRENT_BINARY_DIR}/CMakeFiles/${target}.dir/Unity/unity_${room}_${unit}_cxx.cxx
         PROPERTIES COMPILE_OPTIONS "${options}")
     endif()
-    math(EXPR at "${at} + 1")
-  endforeach()
-endfunction()
-
-# These sources of a room get units of their own, NAME behind the room's. A program that needs few sources of a library links
-# the units that hold them, whole.
-function(texmesh_unity_apart name room)  # sources without .cpp, or *
-  list(TRANSFORM ARGN APPEND .cpp)
-  list(TRANSFORM ARGN PREPEND ${CMAKE_CURRENT_SOURCE_DIR}/${room}/)
-  foreach(source ${ARGN})
-    file(GLOB found ${source})
-    if(NOT found)
-      message(FATAL_ERROR "${source}: expected a source, found none")
-    endif()
-    set_source_files_properties(${found} PROPERTIES TEXMESH_APART ${name})
+    file(SIZE ${source} size)
+    math(EXPR at "${at} + ${size}")
   endforeach()
 endfunction()
 
@@ -63,10 +60,6 @@ function(texmesh_unity target)
     endif()
     if(options)
       string(APPEND room _seldom)
-    endif()
-    get_source_file_property(apart ${source} TEXMESH_APART)
-    if(apart)
-      string(APPEND room _${apart})
     endif()
     list(APPEND rooms ${room})
     list(APPEND sources_of_${room} ${source})

@@ -1,6 +1,5 @@
 // Bundles the library: dist/texmesh.js (everything; three.js stays outside), dist/open.js (to show packages), dist/page.js (many on one
-// page), dist/reader.js (without three.js), dist/thesis.js (chapter 4 as printed), dist/thesis-tables.js (readThesis), dist/verify.js (every
-// byte of a package), dist/worker.js, dist/viewer/ (an element by one script tag, with three.js inside). Each entry stands alone: the parts
+// page), dist/reader.js (without three.js), dist/thesis.js (chapter 4 as printed, thesis.bin), dist/worker.js, dist/viewer/ (an element by one script tag, with three.js inside). Each entry stands alone: the parts
 // that an entry loads by import() belong to that entry.
 //   node build.mjs               builds
 //   node build.mjs --types       after tsc: names files in full in dist/types, as Node.js resolves them
@@ -14,13 +13,12 @@ import { createRequire } from 'node:module';
 import { gzipSync } from 'node:zlib';
 import { rollup } from 'rollup';
 import { encoderModule } from './encoder.mjs';
-import { ruleData } from './rule_data.mjs';
 
 const here = dirname(fileURLToPath(import.meta.url));
 const dist = join(here, 'dist');
 /** Source files of the entries. */
 const entries = {
-  texmesh: 'index', open: 'open', page: 'page', reader: 'reader', thesis: 'thesis', 'thesis-tables': 'thesis_tables', verify: 'verify', worker: 'worker',
+  texmesh: 'index', open: 'open', page: 'page', reader: 'reader', thesis: 'thesis', worker: 'worker',
   blocks: 'blocks',
 };
 /**
@@ -43,22 +41,30 @@ const sources = readdirSync(join(here, 'src'), { recursive: true }).filter((name
 const privateNames = new Set(sources.flatMap((name) => readFileSync(join(here, 'src', name), 'utf8').match(/\b[a-z]\w*_(?!\w)/gi) ?? []));
 const mangled = { mangleProps: /^[a-z]\w*_$/i, mangleCache: Object.fromEntries([...privateNames].sort().map((name, i) => [name, `_${i.toString(36)}`])) };
 
+/** Sources have the shared numbers that they name as their own: else every part would ask the first one for its numbers. */
+const numbers = new Map([...readFileSync(join(here, 'src/format/shared_numbers.ts'), 'utf8').matchAll(/^export const (\w+) = ([^;]+);/gm)]
+  .map(([, name, value]) => [name, value]));
+const withNumbers = (text) => text.replace(/^import \{([^}]*)\} from '[./\w]*\/shared_numbers';$/m, (_, names) =>
+  names.match(/\w+/g).map((name) => `const ${name} = ${numbers.get(name)};`).join(' '));
+const sourceOf = (file) => withNumbers(readFileSync(file, 'utf8'));
+
 /** TypeScript by esbuild: types taken away from each file, each chunk minified. */
 const typescript = {
   name: 'typescript',
   resolveId: (id, importer) => (importer && /^\.\.?\//.test(id) ? join(dirname(importer), `${id}.ts`) : null),
   load: (file) =>
-    file.endsWith('.ts') ? transform(readFileSync(file, 'utf8'), { loader: 'ts', target: 'es2022', sourcemap: 'external', sourcefile: file }) : null,
+    file.endsWith('.ts') ? transform(sourceOf(file), { loader: 'ts', target: 'es2022', sourcemap: 'external', sourcefile: file }) : null,
   renderChunk: (code) => transform(code, { minify: true, format: 'esm', target: 'es2022', sourcemap: 'external', ...mangled }),
 };
 
 /** The element with three.js and its decoders inside: dist/viewer/. Gives the outputs by their names. */
 async function viewer(write) {
   const worker = { name: 'documents-of-workers', setup: (b) => b.onResolve({ filter: /^\.\/documents$/ }, () => ({ path: './worker.js', external: true })) };
+  const shared = { name: 'shared-numbers', setup: (b) => b.onLoad({ filter: /src\/.*\.ts$/ }, ({ path }) => ({ contents: sourceOf(path), loader: 'ts' })) };
   const { outputFiles, metafile } = await build({
     entryPoints: { 'texmesh-viewer': join(here, 'src', 'viewer.ts') }, outdir: join(dist, 'viewer'), chunkNames: 'viewer-[name]-[hash]',
     bundle: true, splitting: true, format: 'esm', minify: true, target: 'es2022', legalComments: 'linked', write: false, metafile: true,
-    absWorkingDir: here, plugins: [worker], ...mangled,
+    absWorkingDir: here, plugins: [worker, shared], ...mangled,
   });
   if (write) {
     const to = join(dist, 'viewer');
@@ -84,7 +90,7 @@ async function bundled(entry) {
   const bundle = await rollup({
     input: { [entry]: join(here, 'src', `${entries[entry]}.ts`) },
     external: [/^three($|\/)/],
-    plugins: [encoderModule, ...(entry === 'reader' || entry === 'worker' ? [] : [documentsOfWorkers]), ruleData, typescript],
+    plugins: [encoderModule, ...(entry === 'reader' || entry === 'worker' ? [] : [documentsOfWorkers]), typescript],
     preserveEntrySignatures: 'allow-extension', // no file more that only passes names on
     onwarn: (warning) => { throw new Error(warning.message); },
   });

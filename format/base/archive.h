@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "format/base/errors.h"
-#include "format/base/sha256/sha256_stream.h"
+#include "format/base/sha256_stream.h"
 #include "format/base/vec.h"
 
 namespace texmesh {

@@ -17,7 +17,19 @@ struct Finding {
 };
 
 /// `mesh/s09.glb: /accessors/3/count: expected 12, found 13 [glb-accessor] [G01]`
-std::string to_string(const Finding& finding);
+inline std::string to_string(const Finding& f) {
+  std::string s = f.entry;
+  const auto add = [&s](const char* separator, const std::string& text) {
+    if (text.empty()) return;
+    if (!s.empty()) s += separator;
+    s += text;
+  };
+  add(": ", f.field);
+  add(": expected ", f.expected);
+  add(f.expected.empty() ? ": found " : ", found ", f.found);
+  s += " [" + f.check + "]";
+  return f.rule.empty() ? s : s + " [" + f.rule + "]";
+}
 
 /// What was looked at, and the rule that it breaks where it is not right.
 struct Check {

@@ -3,15 +3,86 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstdint>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
 
 #include "format/base/bounded_json.h"
+#include "format/base/clean_text.h"
 #include "format/base/errors.h"
 #include "format/base/rule_error.h"
 
 namespace texmesh {
+
+// Texts and JSON that strangers wrote, made fit to be shown (clean_text), bounded before they are parsed
+// (bounded_json.h), and read field by field (json_fields.h).
+
+std::string clean_text(const std::string& text, std::size_t max_bytes) {
+  std::string out;
+  for (std::size_t i = 0; i < text.size();) {
+    const auto at = [&](std::size_t k) {
+      return i + k < text.size() ? static_cast<std::uint8_t>(text[i + k]) : 0u;
+    };
+    const unsigned c = at(0);
+    const std::size_t length = c < 0x80                ? 1
+                               : c >= 0xc2 && c < 0xe0 ? 2
+                               : c >= 0xe0 && c < 0xf0 ? 3
+                               : c >= 0xf0 && c < 0xf5 ? 4
+                                                       : 0;
+    bool good = length > 0 && (c >= 0x20 && c != 0x7f);
+    for (std::size_t k = 1; k < length; ++k) good = good && (at(k) & 0xc0) == 0x80;
+    // Overlong forms, surrogates and numbers past U+10FFFF show in the second byte.
+    good = good && !(c == 0xe0 && at(1) < 0xa0) && !(c == 0xed && at(1) > 0x9f) &&
+           !(c == 0xf0 && at(1) < 0x90) && !(c == 0xf4 && at(1) > 0x8f);
+    const std::string part = good ? text.substr(i, length) : "?";
+    if (out.size() + part.size() > max_bytes) break;
+    out += part;
+    i += good ? length : 1;
+  }
+  return out;
+}
+
+JsonShape scan_json_shape(std::span<const std::uint8_t> json, int max_depth) {
+  JsonShape shape;
+  int depth = 0;
+  bool quoted = false;
+  for (std::size_t i = 0; i < json.size(); ++i) {
+    const std::uint8_t c = json[i];
+    if (quoted) {
+      if (c == '\\') ++i;
+      quoted = c != '"';
+    } else if (c == '"') {
+      quoted = true;
+    } else if (c == '{' || c == '[') {
+      ++shape.values;
+      if (++depth > max_depth) {
+        shape.too_deep = i;
+        return shape;
+      }
+    } else if (c == '}' || c == ']') {
+      --depth;
+    } else if (c == ',') {
+      ++shape.values;
+    }
+  }
+  return shape;
+}
+
+nlohmann::ordered_json parse_bounded_json(std::span<const std::uint8_t> bytes, const std::string& document,
+                                          int max_depth) {
+  using Json = nlohmann::ordered_json;
+  if (scan_json_shape(bytes, max_depth).too_deep)
+    throw FormatError(document, "", "JSON at most " + std::to_string(max_depth) + " levels deep", "more");
+  try {
+    return Json::parse(bytes.begin(), bytes.end());
+  } catch (const nlohmann::json::parse_error& e) {
+    throw FormatError(document, "byte " + std::to_string(e.byte), "JSON", "a syntax error");
+  } catch (const nlohmann::json::out_of_range&) {
+    throw FormatError(document, "", "JSON numbers that fit a double", "a larger one");
+  }
+}
+
 namespace {
 
 using Json = nlohmann::json;

@@ -12,7 +12,7 @@ double sin(double x);  // |x| <= 1e6
 double cos(double x);  // |x| <= 1e6
 double atan2(double y, double x);
 double pow(double base, double exponent);  // base > 0
-inline constexpr double kPi = 3.14159265358979323846;
+inline constexpr double kPi = 3.14159265358979323846, kLn2 = 0.693147180559945309417;
 }  // namespace portable
 
 }  // namespace texmesh

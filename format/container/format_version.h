@@ -6,9 +6,10 @@
 
 namespace texmesh {
 
-/// The version of packages that this library writes, and the highest that it reads
-/// (SPEC.md, Version history).
-inline constexpr int kFormatMajor = 2, kFormatMinor = 0;
+/// Major version of packages that this library writes and reads (SPEC.md, Version history).
+inline constexpr int kFormatMajor = 2;
+/// Minor version of packages that this library writes. It reads packages of later minor versions, too.
+inline constexpr int kFormatMinor = 0;
 
 /// What a reader says it has found instead of kFormatMajor.
 inline std::string describe_other_major(int major) {

@@ -1,8 +1,11 @@
 #include "format/container/layout.h"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cstdio>
+#include <cstring>
+#include <span>
 #include <tuple>
 
 namespace texmesh {
@@ -13,88 +16,6 @@ std::string print(const char* format, T... values) {
   char text[64];
   std::snprintf(text, sizeof text, format, values...);
   return text;
-}
-
-/// Takes the digits at the front of `text`; false when there are none or the number does not fit.
-bool consume_number(std::string_view& text, std::uint32_t& number) {
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  if (error != std::errc() || end == text.data()) return false;
-  text.remove_prefix(static_cast<std::size_t>(end - text.data()));
-  return true;
-}
-
-bool consume_prefix(std::string_view& text, std::string_view prefix) {
-  if (!text.starts_with(prefix)) return false;
-  text.remove_prefix(prefix.size());
-  return true;
-}
-
-EntryName parse_texture_path(std::string_view text) {
-  EntryName name;
-  if (!consume_number(text, name.number) || !consume_prefix(text, "/")) return {};
-  if (text == "tables.pack") {
-    name.kind = EntryKind::kTableStreams;
-  } else if (consume_prefix(text, "r") && consume_number(text, name.rung)) {
-    if (text == ".pack") name.kind = EntryKind::kRung;
-    if (consume_prefix(text, "/") && consume_number(text, name.fragment) && consume_prefix(text, "."))
-      for (const std::string_view extension : {"jpg", "webp"})
-        if (text == extension) name.kind = EntryKind::kFragmentFile, name.extension = extension;
-  }
-  return name;
-}
-
-EntryName parse_any_spelling(std::string_view path) {
-  constexpr std::pair<const char*, EntryKind> kSingle[] = {
-      {kManifestPath, EntryKind::kManifest},
-      {kIndexPath, EntryKind::kIndex},
-      {kTablesPath, EntryKind::kTables},
-      {kTexturesPath, EntryKind::kTextures},
-      {kQualityPath, EntryKind::kQuality},
-      {kProvenancePath, EntryKind::kProvenance},
-      {kSplitStreamPath, EntryKind::kSplitStream},
-      {kPosterPath, EntryKind::kPoster},
-      {kThesisPath, EntryKind::kThesis},
-      {kAboutPath, EntryKind::kAbout},
-      {kContentCredentialPath, EntryKind::kContentCredential}};
-  for (const auto& [single, kind] : kSingle)
-    if (path == single) return {kind};
-  std::string_view text = path;
-  EntryName name;
-  if (consume_prefix(text, "mesh/s")) {
-    if (consume_number(text, name.number) && text == ".glb") name.kind = EntryKind::kMesh;
-  } else if (consume_prefix(text, "proxies/")) {
-    if (consume_number(text, name.number) && text == ".glb") name.kind = EntryKind::kProxy;
-  } else if (consume_prefix(text, "preview/")) {
-    if (consume_number(text, name.number) && text == ".jpg") name.kind = EntryKind::kPreview;
-  } else if (consume_prefix(text, "source/")) {
-    if (consume_number(text, name.number) && consume_prefix(text, "."))
-      for (const std::string_view extension : kSourceExtensions)
-        if (text == extension) name.kind = EntryKind::kSource, name.extension = extension;
-  } else if (consume_prefix(text, "texture/")) {
-    return parse_texture_path(text);
-  }
-  return name;
-}
-
-std::string spell(const EntryName& name) {
-  switch (name.kind) {
-    case EntryKind::kMesh:
-      return name.number > 9999 ? "" : mesh_path(static_cast<int>(name.number));
-    case EntryKind::kProxy:
-      return proxy_path(name.number);
-    case EntryKind::kPreview:
-      return preview_path(name.number);
-    case EntryKind::kTableStreams:
-      return table_streams_path(name.number);
-    case EntryKind::kRung:
-      return rung_path(name.number, name.rung);
-    case EntryKind::kFragmentFile:
-      return fragment_file_path(name.number, name.rung, name.fragment, name.extension);
-    case EntryKind::kSource:
-      return source_path(name.number, name.extension);
-    default:
-      return "";
-  }
 }
 
 /// Which of the coarse places of the order an entry has.
@@ -117,8 +38,67 @@ enum Place : int {
   kBehindAll
 };
 
+/// A kind of entry: its path as it is printed, with the numbers of EntryName in their order and without an
+/// extension that varies, and its place. The first picture has another place than others of its kind.
+struct KindOfEntry {
+  EntryKind kind;
+  const char* path;
+  Place place;
+  std::span<const std::string_view> extensions = {};
+};
+constexpr std::string_view kFragmentExtensions[] = {"jpg", "webp"};
+constexpr KindOfEntry kKindsOfEntries[] = {
+    {EntryKind::kManifest, kManifestPath, kManifestPlace},
+    {EntryKind::kIndex, kIndexPath, kIndexPlace},
+    {EntryKind::kTables, kTablesPath, kTablesPlace},
+    {EntryKind::kTextures, kTexturesPath, kTexturesPlace},
+    {EntryKind::kQuality, kQualityPath, kQualityPlace},
+    {EntryKind::kProvenance, kProvenancePath, kLast},
+    {EntryKind::kSplitStream, kSplitStreamPath, kInterleaved},
+    {EntryKind::kPoster, kPosterPath, kPosterPlace},
+    {EntryKind::kThesis, kThesisPath, kOthers},
+    {EntryKind::kAbout, kAboutPath, kAboutPlace},
+    {EntryKind::kContentCredential, kContentCredentialPath, kBehindAll},
+    {EntryKind::kMesh, "mesh/s%02u.glb", kInterleaved},
+    {EntryKind::kProxy, "proxies/%02u.glb", kProxies},
+    {EntryKind::kPreview, "preview/%03u.jpg", kPreviews},
+    {EntryKind::kTableStreams, "texture/%u/tables.pack", kTableStreamsPlace},
+    {EntryKind::kRung, "texture/%u/r%02u.pack", kInterleaved},
+    {EntryKind::kFragmentFile, "texture/%u/r%02u/%04u.", kOthers, kFragmentExtensions},
+    {EntryKind::kSource, "source/%03u.", kOthers, kSourceExtensions}};
+
+const KindOfEntry& row_of(EntryKind kind) {
+  return *std::ranges::find(kKindsOfEntries, kind, &KindOfEntry::kind);
+}
+std::string spell(EntryKind kind, std::uint32_t number, std::uint32_t rung = 0, std::uint32_t fragment = 0) {
+  return print(row_of(kind).path, number, rung, fragment);
+}
+
+/// Whether a path is of this kind, however its numbers are written; fills in what the path says.
+bool is_of_kind(std::string_view text, const KindOfEntry& kind, EntryName& name) {
+  const std::array numbers{&name.number, &name.rung, &name.fragment};
+  std::size_t seen = 0;
+  for (const char* p = kind.path; *p != '\0'; ++p) {
+    if (*p != '%') {
+      if (!text.starts_with(*p)) return false;
+      text.remove_prefix(1);
+      continue;
+    }
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), *numbers[seen++]);
+    if (error != std::errc() || end == text.data()) return false;
+    text.remove_prefix(static_cast<std::size_t>(end - text.data()));
+    p = std::strchr(p, 'u');
+  }
+  if (kind.extensions.empty()) return text.empty();
+  const auto extension = std::ranges::find(kind.extensions, text);
+  if (extension == kind.extensions.end()) return false;
+  name.extension = *extension;
+  return true;
+}
+
 /// Greater than any scale number: the stream stands before the GLBs.
 constexpr std::uint32_t kStreamRank = 0xffffffffu;
+constexpr std::uint32_t kMostScaleInPath = 9999;
 
 bool is_mesh(const EntryName& name) {
   return name.kind == EntryKind::kMesh || name.kind == EntryKind::kSplitStream;
@@ -135,69 +115,39 @@ struct OrderFacts {
 };
 
 Place place_of(const EntryName& name, const OrderFacts& facts) {
-  switch (name.kind) {
-    case EntryKind::kManifest:
-      return kManifestPlace;
-    case EntryKind::kIndex:
-      return kIndexPlace;
-    case EntryKind::kTables:
-      return kTablesPlace;
-    case EntryKind::kTextures:
-      return kTexturesPlace;
-    case EntryKind::kQuality:
-      return kQualityPlace;
-    case EntryKind::kMesh:
-      if (name.number != facts.coarsest_scale) return kInterleaved;
-      return facts.has_proxies ? kCoarsestMesh : kFirstPicture;
-    case EntryKind::kProxy:
-      return name.number == facts.smallest_proxy ? kFirstPicture : kProxies;
-    case EntryKind::kPreview:
-      return kPreviews;
-    case EntryKind::kTableStreams:
-      return kTableStreamsPlace;
-    case EntryKind::kPoster:
-      return kPosterPlace;
-    case EntryKind::kAbout:
-      return kAboutPlace;
-    case EntryKind::kRung:
-    case EntryKind::kSplitStream:
-      return kInterleaved;
-    case EntryKind::kProvenance:
-      return kLast;
-    case EntryKind::kContentCredential:
-      return kBehindAll;
-    case EntryKind::kFragmentFile:
-    case EntryKind::kSource:
-    case EntryKind::kThesis:
-    case EntryKind::kOther:
-      return kOthers;
-  }
-  return kOthers;
+  if (name.kind == EntryKind::kMesh && name.number == facts.coarsest_scale)
+    return facts.has_proxies ? kCoarsestMesh : kFirstPicture;
+  if (name.kind == EntryKind::kProxy && name.number == facts.smallest_proxy) return kFirstPicture;
+  return name.kind == EntryKind::kOther ? kOthers : row_of(name.kind).place;
 }
 
 }  // namespace
 
-std::string mesh_path(int scale) { return print("mesh/s%02d.glb", scale); }
-std::string proxy_path(std::uint32_t proxy) { return print("proxies/%02u.glb", proxy); }
-std::string preview_path(std::uint32_t plane) { return print("preview/%03u.jpg", plane); }
-std::string table_streams_path(std::uint32_t plane) { return print("texture/%u/tables.pack", plane); }
+std::string mesh_path(int scale) { return spell(EntryKind::kMesh, static_cast<std::uint32_t>(scale)); }
+std::string proxy_path(std::uint32_t proxy) { return spell(EntryKind::kProxy, proxy); }
+std::string preview_path(std::uint32_t plane) { return spell(EntryKind::kPreview, plane); }
+std::string table_streams_path(std::uint32_t plane) { return spell(EntryKind::kTableStreams, plane); }
 std::string rung_path(std::uint32_t plane, std::uint32_t rung) {
-  return print("texture/%u/r%02u.pack", plane, rung);
+  return spell(EntryKind::kRung, plane, rung);
 }
 std::string source_path(std::uint32_t plane, std::string_view extension) {
-  return print("source/%03u.", plane).append(extension);
+  return spell(EntryKind::kSource, plane).append(extension);
 }
 std::string fragment_file_path(std::uint32_t plane, std::uint32_t rung, std::uint32_t fragment,
                                std::string_view extension) {
-  return print("texture/%u/r%02u/%04u.", plane, rung, fragment).append(extension);
+  return spell(EntryKind::kFragmentFile, plane, rung, fragment).append(extension);
 }
 
 EntryName parse_entry_path(const std::string& path) {
-  const EntryName name = parse_any_spelling(path);
-  const std::string canonical = spell(name);
-  if (!canonical.empty()) return canonical == path ? name : EntryName{};
-  const bool numbered = name.kind >= EntryKind::kMesh && name.kind <= EntryKind::kSource;
-  return numbered ? EntryName{} : name;
+  for (const KindOfEntry& kind : kKindsOfEntries) {
+    EntryName name{kind.kind};
+    if (!is_of_kind(path, kind, name)) continue;
+    std::string canonical = spell(kind.kind, name.number, name.rung, name.fragment);
+    if (!kind.extensions.empty()) canonical += name.extension;
+    const bool fits = kind.kind != EntryKind::kMesh || name.number <= kMostScaleInPath;
+    return canonical == path && fits ? name : EntryName{};
+  }
+  return {};
 }
 
 std::vector<std::string> streaming_order(std::vector<std::string> paths) {

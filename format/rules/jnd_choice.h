@@ -4,13 +4,13 @@
 #include <span>
 #include <vector>
 
-#include "format/documents/perceptual_table.h"
+#include "format/documents/thesis_tables.h"
 
 namespace texmesh {
 
 // A client's own just-noticeable difference on the values of thesis.bin (thesis 7.2, 7.5). A table of values
-// is [i * n + j], i < j, for n rows, S_0 first; all else in it is 0. Pure functions, the same bits everywhere
-// (delivery/web/src/decide/jnd_choice.ts).
+// is [i * n + j], i < j, for n rows, S_0 first; all else in it is 0. Pure functions, the same bits
+// everywhere.
 
 /// What becomes of the collapses of several scale changes. The thesis prints Table 7.2 and no rule.
 /// kRootOfSquares: the root of the sum of the squared values of the changes. kSurvivor: every removed vertex

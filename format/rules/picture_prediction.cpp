@@ -40,11 +40,12 @@ Between size_at(const QualityTable& table, double displayed_px) {
 
 /// How much more a picture of a fixed number of texels loses than at the nearest height of the table.
 double beyond_sizes(const QualityTable& table, double displayed_px) {
-  constexpr double kLn2 = 0.693147180559945309417;
   const double px = std::max(displayed_px, 1.0);
   const double nearest =
       std::clamp(px, static_cast<double>(table.sizes_px.front()), static_cast<double>(table.sizes_px.back()));
-  return px == nearest ? 1 : portable::pow(GroupCurve::kLossPerDoubling, portable::log(px / nearest) / kLn2);
+  return px == nearest
+             ? 1
+             : portable::pow(GroupCurve::kLossPerDoubling, portable::log(px / nearest) / portable::kLn2);
 }
 
 double mixed(double a, double b, double part) { return (1 - part) * a + part * b; }

@@ -1,16 +1,168 @@
 #include "format/split/split_reader.h"
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <limits>
+#include <vector>
 
 #include "format/base/bytes.h"
 #include "format/base/errors.h"
+#include "format/base/no_index.h"
 #include "format/base/sha256.h"
-#include "format/split/codec/split_codec.h"
+#include "format/split/split_codec.h"
 #include "format/split/split_coder.h"
-#include "format/split/split_fill.h"
 #include "format/split/split_head.h"
+#include "format/split/split_model.h"
 
 namespace texmesh {
+
+// The reader of mesh/stream.bin: what a block says becomes part of a SplitMesh, points that were lost are
+// placed among their neighbours, and split_model() makes a Mesh of the whole.
+
+namespace {
+
+/// A neighbour in the chart of the point: texture coordinates relative to the point's, and its place.
+struct Neighbour {
+  std::uint32_t point;
+  double u, v;
+};
+
+/// The point's neighbours over the corners that have this wedge, each once.
+std::vector<Neighbour> neighbours_in_chart(const SplitMesh& mesh, std::size_t k, std::uint32_t point,
+                                           std::uint32_t wedge) {
+  const std::vector<std::int32_t>& uv = mesh.values(k);
+  std::vector<Neighbour> out;
+  mesh.each_corner(point, [&](std::uint32_t face, std::uint32_t corner) {
+    if (mesh.wedge_at(face, corner) != wedge) return;
+    for (std::uint32_t i = 1; i <= 2; ++i) {
+      const std::uint32_t w = mesh.wedge_at(face, corner + i), p = mesh.point_at(face, corner + i);
+      if (std::ranges::find(out, p, &Neighbour::point) != out.end()) continue;
+      out.push_back({p, static_cast<double>(uv[2 * w]) - uv[2 * wedge],
+                     static_cast<double>(uv[2 * w + 1]) - uv[2 * wedge + 1]});
+    }
+  });
+  return out;
+}
+
+/// The wedge that most corners of the point have (ties: the first met).
+std::uint32_t main_wedge(const SplitMesh& mesh, std::uint32_t point) {
+  std::vector<std::pair<std::uint32_t, int>> counts;
+  mesh.each_corner(point, [&](std::uint32_t face, std::uint32_t corner) {
+    const std::uint32_t w = mesh.wedge_at(face, corner);
+    const auto it = std::ranges::find(counts, w, [](const auto& c) { return c.first; });
+    if (it == counts.end())
+      counts.emplace_back(w, 1);
+    else
+      ++it->second;
+  });
+  if (counts.empty()) return kNoIndex;
+  return std::ranges::max_element(counts, {}, [](const auto& c) { return c.second; })->first;
+}
+
+/// Puts a point where its texture coordinates lie among those of its neighbours (SplitFill::kTexture); leaves
+/// it where it is when they say nothing.
+void fill_lost_point(const SplitStreamHead& head, SplitMesh& mesh, std::uint32_t point) {
+  std::size_t k = 0;
+  while (k < head.attributes.size() && head.attributes[k].kind != SplitKind::kUv0) ++k;
+  const std::uint32_t wedge = main_wedge(mesh, point);
+  if (k == head.attributes.size() || wedge == kNoIndex) return;
+  const std::vector<Neighbour> ring = neighbours_in_chart(mesh, k, point, wedge);
+  if (ring.size() < 3) return;
+  // Least squares of place = c + a u + b v with weights 1 / distance^2: c is the place at the point. The
+  // normal equations are solved for c alone, by Cramer's rule.
+  double w0 = 0, wu = 0, wv = 0, wuu = 0, wuv = 0, wvv = 0;
+  std::array<double, 3> p0{}, pu{}, pv{};
+  for (const Neighbour& n : ring) {
+    const double w = 1 / (n.u * n.u + n.v * n.v + 1);
+    w0 += w, wu += w * n.u, wv += w * n.v;
+    wuu += w * n.u * n.u, wuv += w * n.u * n.v, wvv += w * n.v * n.v;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double x = mesh.points()[n.point][i];
+      p0[i] += w * x, pu[i] += w * n.u * x, pv[i] += w * n.v * x;
+    }
+  }
+  const double a = wuu * wvv - wuv * wuv, b = wuv * wv - wu * wvv, c = wu * wuv - wuu * wv;
+  const double determinant = w0 * a + wu * b + wv * c;
+  // Coordinates that lie on a line, or on one side of the point only, would be extrapolated.
+  if (!(determinant > 1e-3 * w0 * wuu * wvv)) return;
+  const std::int32_t largest = (1 << head.position.bits) - 1;
+  SplitMesh::Point place{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double x = (p0[i] * a + pu[i] * b + pv[i] * c) / determinant;
+    double low = 1e300, high = -1e300;
+    for (const Neighbour& n : ring) {
+      low = std::min<double>(low, mesh.points()[n.point][i]);
+      high = std::max<double>(high, mesh.points()[n.point][i]);
+    }
+    place[i] = std::clamp(static_cast<std::int32_t>(std::floor(std::clamp(x, low, high) + 0.5)), 0, largest);
+  }
+  mesh.point(point) = place;
+}
+
+/// Numbers things in the order of their first use.
+class Numbering {
+ public:
+  explicit Numbering(std::size_t count) : number_(count, kNoIndex) {}
+  std::uint32_t of(std::uint32_t old) {
+    if (number_[old] == kNoIndex) {
+      number_[old] = static_cast<std::uint32_t>(used_.size());
+      used_.push_back(old);
+    }
+    return number_[old];
+  }
+  const std::vector<std::uint32_t>& used() const { return used_; }
+
+ private:
+  std::vector<std::uint32_t> number_, used_;
+};
+
+void add_attribute(const SplitAttribute& a, const std::vector<std::int32_t>& values,
+                   const std::vector<std::uint32_t>& wedges, Mesh& out) {
+  const auto components = static_cast<std::size_t>(split_components(a.kind));
+  const float one = static_cast<float>((std::uint32_t{1} << a.grid.bits) - 1);
+  for (const std::uint32_t w : wedges) {
+    const std::int32_t* v = values.data() + w * components;
+    if (a.kind == SplitKind::kNormal) {
+      const auto n = octahedral_normal(v[0], v[1], a.grid.bits);
+      out.normals.push_back({n[0], n[1], n[2]});
+    } else if (a.kind == SplitKind::kColour) {
+      const auto part = [&](std::size_t k) { return static_cast<float>(v[k]) / one; };
+      out.colours.push_back({part(0), part(1), part(2), part(3)});
+    } else {
+      (a.kind == SplitKind::kUv1 ? out.uv1 : out.uv0)
+          .push_back({a.grid.value(v[0], 0), a.grid.value(v[1], 1)});
+    }
+  }
+}
+
+}  // namespace
+
+Mesh split_model(const SplitStreamHead& head, const SplitMesh& mesh) {
+  Mesh out;
+  Numbering points(mesh.points().size()), wedges(mesh.wedge_point().size());
+  std::uint16_t parts = 0;
+  for (const std::uint32_t f : mesh.visible_faces()) {
+    Triangle t;
+    for (std::size_t k = 0; k < 3; ++k) t[k] = wedges.of(mesh.wedge_at(f, static_cast<std::uint32_t>(k)));
+    const SplitGroup group = head.groups[mesh.face_group()[f]];
+    out.triangles.push_back(t);
+    out.triangle_material.push_back(group.material);
+    out.triangle_part.push_back(group.part);
+    parts = std::max(parts, group.part);
+  }
+  for (const std::uint32_t w : wedges.used()) out.wedge_position.push_back(points.of(mesh.wedge_point()[w]));
+  for (const std::uint32_t p : points.used()) {
+    const SplitMesh::Point& place = mesh.points()[p];
+    out.positions.push_back({head.position.value(place[0], 0), head.position.value(place[1], 1),
+                             head.position.value(place[2], 2)});
+  }
+  for (std::size_t k = 0; k < head.attributes.size(); ++k)
+    add_attribute(head.attributes[k], mesh.values(k), wedges.used(), out);
+  out.part_names.resize(parts + std::size_t{1});
+  return out;
+}
+
 namespace {
 
 /// Decodes the values of one part. Where the part was left out every residual is 0.

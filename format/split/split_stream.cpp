@@ -6,7 +6,7 @@
 
 #include "format/base/bytes.h"
 #include "format/base/rule_error.h"
-#include "format/split/codec/split_codec.h"
+#include "format/split/split_codec.h"
 #include "format/split/split_coder.h"
 #include "format/split/split_head.h"
 

@@ -13,6 +13,7 @@ void add_rungs_study(Command& study);
 void add_thesis_study(Command& study);
 void add_make_experiment(Command& experiment);
 void add_fit_experiment(Command& experiment);
-void add_lab_simulate_command(Command& app);
+void add_lab_simulate_command(Command& app);  // command_simulate.cpp
+void add_picture_command(Command& app);
 
 }  // namespace texmesh

@@ -42,6 +42,7 @@ int main(int argc, char** argv) {
   add_study_command(program);
   add_experiment_command(program);
   add_lab_simulate_command(program);
+  add_picture_command(program);
   add_completion_command(program);
   return line.run(argc, argv);
 }

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "lab/cli/commands.h"
+#include "lab/cli/plan_pictures.h"
 #include "lab/transfer/chapter_4.h"
 #include "pipeline/cache/disk_store.h"
 #include "pipeline/compile/compile_model.h"
@@ -19,8 +20,7 @@
 #include "tools/cli/options/command_line.h"
 #include "tools/cli/options/common_options.h"
 #include "tools/cli/options/delivery_options.h"
-#include "tools/extract/plan_pictures.h"
-#include "tools/inspect/debug/debug_input.h"
+#include "tools/inspect/package_mesh.h"
 
 namespace texmesh {
 namespace {

@@ -17,12 +17,12 @@
 #include "format/base/portable_math.h"
 #include "format/rules/split_mix.h"
 #include "lab/cli/commands.h"
+#include "lab/cli/plan_pictures.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/table.h"
 #include "tools/cli/options/command_line.h"
 #include "tools/cli/options/common_options.h"
 #include "tools/cli/options/units.h"
-#include "tools/extract/plan_pictures.h"
 
 namespace texmesh {
 namespace {

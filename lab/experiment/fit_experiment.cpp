@@ -12,9 +12,9 @@
 #include "format/base/json_fields.h"
 #include "format/base/portable_math.h"
 #include "pipeline/io/markup.h"
-#include "pipeline/io/text_table.h"
-#include "tools/publish/report/html.h"
-#include "tools/publish/report/plot.h"
+#include "pipeline/io/table.h"
+#include "tools/publish/pages/page.h"
+#include "tools/publish/pages/plot.h"
 
 namespace texmesh {
 namespace {
@@ -259,36 +259,43 @@ std::string method_text(const ExperimentFit& fit) {
       fit.options.curve == FittedCurve::kLine ? "line" : "sigmoid", fit.jnd.low, fit.jnd.high, fit.design);
 }
 
-std::string judges_text(const ExperimentFit& fit) {
-  TextTable table;
-  table.column("judge", Align::kLeft);
-  for (const char* header : {"answers", "right %", "left %", "late", "catch trials"}) table.column(header);
-  table.column("", Align::kLeft);
+Table judges_table(const ExperimentFit& fit) {
+  Table table("One row a file of results", {Column::text("judge"),
+                                            "answers",
+                                            {"right %", percent_form(0)},
+                                            {"left %", percent_form(0)},
+                                            "late",
+                                            "catch trials right",
+                                            Column::text("verdict")});
   for (const FittedJudge& j : fit.judges) {
     const double n = std::max(j.counts.answers, 1u);
-    table.row({printable(j.judge), std::to_string(j.counts.answers), fixed(100 * j.right / n, 0),
-               fixed(100 * j.counts.left / n, 0), std::to_string(j.late),
+    table.row({j.judge, j.counts.answers, j.right / n, j.counts.left / n, j.late,
                fmt::format("{} of {}", j.counts.caught, j.counts.catches), verdict_text(j)});
   }
-  return table.text();
+  return table;
 }
 
-std::string conditions_text(const ExperimentFit& fit) {
-  TextTable table;
-  for (const char* header : {"displayed px", "answers", "JND", "95 % from", "to", "slope", "lapse %",
-                             "deviance", "levels", "JND of the line"})
-    table.column(header);
+Table conditions_table(const ExperimentFit& fit) {
+  Table table{"",
+              {{"displayed px", kShortest},
+               "answers",
+               {"JND", 4},
+               {"95 % from", 4},
+               {"to", 4},
+               {"slope", 1},
+               {"lapse %", percent_form()},
+               {"deviance", 1},
+               "levels",
+               {"JND of the line", 4}}};
   for (std::size_t c = 0; c < fit.sizes_px.size(); ++c) {
     const ConditionFit& f = fit.study.conditions[c];
     std::uint64_t answers = 0;
     for (const LevelCount& l : f.counts) answers += l.answers;
-    table.row({shortest(fit.sizes_px[c]), std::to_string(answers), fixed(f.threshold.value, 4),
-               fixed(f.threshold.low, 4), fixed(f.threshold.high, 4), fixed(f.sigmoid.curve.slope, 1),
-               fixed(100 * f.sigmoid.curve.lapse, 1), fixed(f.sigmoid.deviance, 1),
-               std::to_string(f.counts.size()),
-               std::isfinite(f.line.threshold) ? fixed(f.line.threshold, 4) : "-"});
+    table.row({fit.sizes_px[c], answers, f.threshold.value, f.threshold.low, f.threshold.high,
+               f.sigmoid.curve.slope, f.sigmoid.curve.lapse, f.sigmoid.deviance, f.counts.size(),
+               std::isfinite(f.line.threshold) ? Cell(f.line.threshold) : Cell("-")});
   }
-  return table.text();
+  return table;
 }
 
 }  // namespace
@@ -330,8 +337,8 @@ std::string fit_json(const ExperimentFit& fit) {
 
 std::string fit_text(const ExperimentFit& fit) {
   return fmt::format("Experiment {}, {}: {} of {} judges, {} answers\n{}\n{}\n{}\n{}\n", fit.design, fit.kind,
-                     fit.kept(), fit.judges.size(), fit.answers, judges_text(fit), conditions_text(fit),
-                     fit.verdict, fit.distance_verdict);
+                     fit.kept(), fit.judges.size(), fit.answers, judges_table(fit).text(),
+                     conditions_table(fit).text(), fit.verdict, fit.distance_verdict);
 }
 
 namespace {
@@ -391,20 +398,6 @@ std::string distance_plot(const ExperimentFit& fit) {
   return plot.svg();
 }
 
-std::string judges_table(const ExperimentFit& fit) {
-  HtmlTable table;
-  table.caption = "One row a file of results";
-  table.header = {"judge", "answers", "right [%]", "left [%]", "late", "catch trials right", "verdict"};
-  for (const FittedJudge& j : fit.judges) {
-    const double n = std::max(j.counts.answers, 1u);
-    table.rows.push_back(
-        {markup_escaped(j.judge), std::to_string(j.counts.answers), fmt::format("{:.0f}", 100 * j.right / n),
-         fmt::format("{:.0f}", 100 * j.counts.left / n), std::to_string(j.late),
-         fmt::format("{} of {}", j.counts.caught, j.counts.catches), markup_escaped(verdict_text(j))});
-  }
-  return table.html();
-}
-
 }  // namespace
 
 std::string fit_page(const ExperimentFit& fit) {
@@ -426,7 +419,7 @@ std::string fit_page(const ExperimentFit& fit) {
   body += html_section("curves", "Curves", curves);
   if (fit.sizes_px.size() > 1)
     body += html_section("distance", "Distance", "<figure>" + distance_plot(fit) + "</figure>\n");
-  body += html_section("judges", "Judges", judges_table(fit)) + "</main>\n";
+  body += html_section("judges", "Judges", judges_table(fit).html()) + "</main>\n";
   return html_page("What judges could just tell", body);
 }
 

@@ -18,7 +18,6 @@
 #include "pipeline/io/new_folder.h"
 #include "pipeline/io/uri.h"
 #include "stages/image/png_writer.h"
-#include "stages/measure/render_view.h"
 #include "stages/render/shade.h"
 #include "tools/extract/package_model.h"
 #include "tools/render/picture_sheet.h"

@@ -1,7 +1,7 @@
 #pragma once
 #include <span>
 
-#include "tools/publish/pages/built_in_file.h"
+#include "tools/publish/pages/page.h"
 
 namespace texmesh {
 

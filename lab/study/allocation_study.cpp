@@ -3,16 +3,16 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
 
 #include "format/base/box.h"
-#include "format/base/srgb.h"
 #include "format/rules/allocation.h"
 #include "format/rules/rate_distortion.h"
 #include "stages/base/parallel.h"
-#include "stages/fragment_codec/decode_rung.h"
+#include "stages/fragment_codec/fragment_codec.h"
 #include "stages/jpeg/jpeg.h"
-#include "stages/measure/render_view.h"
+#include "stages/measure/flip.h"
+#include "stages/measure/image_compare.h"
+#include "stages/render/shade.h"
 
 namespace texmesh {
 namespace {
@@ -47,40 +47,15 @@ Shown shown_planes(const std::vector<Material>& materials, const Fragments& frag
   return out;
 }
 
-std::uint8_t encode(float linear) {
-  const double x = std::clamp(static_cast<double>(linear), 0.0, 1.0);
-  const double s = srgb_of_light(x);
-  return static_cast<std::uint8_t>(255 * s + 0.5);
-}
-
-/// A plane's pixels in linear light, prefiltered from the first level that is worth keeping.
-MipTexture texture_of(const Pixels& pixels, const TexturePlane& plane) {
-  MipTexture texture;
-  texture.width_px = plane.width_px;
-  texture.height_px = plane.height_px;
-  while (std::max(plane.width_px, plane.height_px) >> texture.first_level > kLargestLevelPx)
-    ++texture.first_level;
-  const std::uint32_t step = 1u << texture.first_level;
-  texture.levels.resize(1);
-  MipTexture::Level& level = texture.levels[0];
-  level.width = (plane.width_px + step - 1) / step;
-  level.height = (plane.height_px + step - 1) / step;
-  level.texels.resize(std::size_t{level.width} * level.height);
-  const auto& linear = light_of_bytes();
-  for (std::uint32_t y = 0; y < level.height; ++y)
-    for (std::uint32_t x = 0; x < level.width; ++x) {
-      Vec3f sum;
-      for (std::uint32_t v = y * step; v < y * step + step; ++v)
-        for (std::uint32_t u = x * step; u < x * step + step; ++u) {
-          const std::uint8_t* c =
-              pixels.at(std::min(u, pixels.width_px - 1), std::min(v, pixels.height_px - 1));
-          sum = sum + (pixels.channels == 3 ? Vec3f{linear[c[0]], linear[c[1]], linear[c[2]]}
-                                            : Vec3f{linear[c[0]], linear[c[0]], linear[c[0]]});
-        }
-      level.texels[std::size_t{y} * level.width + x] = sum * (1.f / static_cast<float>(step * step));
-    }
-  build_mips(texture);
-  return texture;
+/// A plane's texture, from the first level that is worth keeping.
+RenderTexture texture_of(const Pixels& pixels, const TexturePlane& plane, const RunContext& context) {
+  Pixels whole{plane.width_px, plane.height_px, pixels.channels, {}};
+  for (std::uint32_t y = 0; y < whole.height_px; ++y)
+    whole.data.insert(whole.data.end(), pixels.at(0, y),
+                      pixels.at(0, y) + std::size_t{whole.width_px} * whole.channels);
+  std::uint32_t first_level = 0;
+  while (std::max(plane.width_px, plane.height_px) >> first_level > kLargestLevelPx) ++first_level;
+  return render_texture(std::move(whole), true, first_level, context);
 }
 
 /// Bilinear, texel centres at halves.
@@ -245,12 +220,12 @@ void describe(const std::vector<const PlaneTables*>& tables, const Rungs& rungs,
   out.surface_ssim = weight > 0 ? 1 - loss / weight : 1;
 }
 
+/// White where nothing is.
 Pixels picture_of(const Picture& picture) {
-  Pixels out{picture.side_px, picture.side_px, 3, {}};
-  out.data.reserve(picture.linear.size() * 3);
-  for (std::size_t k = 0; k < picture.linear.size(); ++k)
-    for (int c = 0; c < 3; ++c)
-      out.data.push_back(picture.covered[k] ? encode(picture.linear[k][c]) : std::uint8_t{255});
+  Pixels out = encode_srgb(picture);
+  for (std::size_t k = 0; k < picture.covered.size(); ++k)
+    if (!picture.covered[k])
+      std::fill_n(out.data.begin() + static_cast<std::ptrdiff_t>(3 * k), 3, std::uint8_t{255});
   return out;
 }
 
@@ -265,23 +240,23 @@ std::vector<Chosen> choices_of(const std::vector<const PlaneTables*>& tables,
   return out;
 }
 
-std::vector<ViewBuffer> views_of(const Mesh& mesh, const std::vector<Material>& materials, const Shown& shown,
-                                 const Fragments& fragments, const AllocationStudyOptions& options) {
-  if (mesh.positions.empty()) throw StageError("allocation study", "mesh", "positions", "none");
-  std::vector<std::uint32_t> source(mesh.triangles.size());
-  std::iota(source.begin(), source.end(), 0u);
-  ViewScene scene;
-  scene.mesh = &mesh, scene.triangles = &mesh.triangles, scene.triangle_source = &source;
-  scene.materials = &materials;
-  scene.base_plane = shown.of_material;
-  scene.emissive_plane.assign(materials.size(), -1);
-  for (const std::size_t p : shown.planes)
-    scene.sizes.push_back({fragments.planes[p].width_px, fragments.planes[p].height_px});
-  const BoundingSphere sphere = bounding_sphere(mesh.positions);
-  const auto side = static_cast<std::uint32_t>(options.size_px);
-  std::vector<ViewBuffer> views;
+std::vector<RenderMaterial> lit_materials(const std::vector<Material>& materials, const Shown& shown) {
+  std::vector<RenderMaterial> out;
+  for (std::size_t m = 0; m < materials.size(); ++m)
+    out.push_back(render_material(materials[m], [&](const TextureRef&, TextureUse use) {
+      return use == TextureUse::kBaseColour ? shown.of_material[m] : -1;
+    }));
+  return out;
+}
+
+std::vector<Visibility> views_of(const RenderScene& scene, const AllocationStudyOptions& options,
+                                 const RunContext& context) {
+  if (scene.mesh->positions.empty()) throw StageError("allocation study", "mesh", "positions", "none");
+  const BoundingSphere sphere = bounding_sphere(scene.mesh->positions);
+  std::vector<Visibility> views;
   for (int v = 0; v < options.views; ++v)
-    views.push_back(look_at(scene, camera_of(v, options.views, sphere.centre, sphere.radius), side));
+    views.push_back(look(scene, perspective_camera(camera_of(v, options.views, sphere.centre, sphere.radius)),
+                         static_cast<std::uint32_t>(options.size_px), context));
   return views;
 }
 
@@ -294,9 +269,9 @@ struct StudyScene {
   const Previews& previews;
 };
 
-std::vector<MipTexture> textures_of(const StudyScene& scene, const Chosen& choice,
-                                    const RunContext& context) {
-  std::vector<MipTexture> textures;
+std::vector<RenderTexture> textures_of(const StudyScene& scene, const Chosen& choice,
+                                       const RunContext& context) {
+  std::vector<RenderTexture> textures;
   for (std::size_t p = 0; p < scene.shown.planes.size(); ++p) {
     const std::size_t index = scene.shown.planes[p];
     const TexturePlane& plane = scene.fragments.planes[index];
@@ -305,27 +280,37 @@ std::vector<MipTexture> textures_of(const StudyScene& scene, const Chosen& choic
                                       ? whole
                                       : compose(plane, whole, scene.ladder.planes.at(index),
                                                 scene.previews.planes.at(index), choice.rungs[p], context),
-                                  plane));
+                                  plane, context));
   }
   return textures;
 }
 
+/// What a view is compared by.
+struct ComparedView {
+  LumaPicture luma;
+  FlipPicture flip;
+};
+
 /// Compares the views with the originals, which the first choice, the source, sets.
-void measure_views(const std::vector<ViewBuffer>& views, const std::vector<MipTexture>& textures,
-                   int picture_view, std::vector<ComparedPicture>& original, StudiedChoice& result) {
+void measure_views(const RenderScene& scene, const std::vector<Visibility>& views,
+                   const std::vector<RenderTexture>& textures, int picture_view,
+                   std::vector<ComparedView>& original, StudiedChoice& result, const RunContext& context) {
+  const RenderEnvironment environment = studio_environment();
   const bool first = original.empty();
-  PictureDifference sum;
+  PictureDifference luma;
+  FlipSum flip;
   for (std::size_t v = 0; v < views.size(); ++v) {
-    const Picture picture = draw(views[v], textures);
+    const Picture picture = shade(scene, views[v], textures, environment, context);
     if (static_cast<int>(v) == picture_view) result.picture = picture_of(picture);
-    const ComparedPicture compared = prepare_comparison(picture);
+    const ComparedView compared{prepare_luma(picture), prepare_flip(picture)};
     if (first) original.push_back(compared);
-    const PictureDifference d = compare_pictures(original[v], compared);
-    sum.ssim += d.ssim, sum.difference += d.difference, sum.pixels += d.pixels;
+    const PictureDifference d = compare_luma(original[v].luma, compared.luma);
+    luma.ssim += d.ssim, luma.pixels += d.pixels;
+    flip.add(compare_flip(original[v].flip, compared.flip));
   }
-  if (sum.pixels == 0) throw StageError("allocation study", "views", "pixels that show the object", "none");
-  result.ssim = sum.ssim / static_cast<double>(sum.pixels);
-  result.difference = sum.difference / static_cast<double>(sum.pixels);
+  if (luma.pixels == 0) throw StageError("allocation study", "views", "pixels that show the object", "none");
+  result.ssim = luma.ssim / static_cast<double>(luma.pixels);
+  result.difference = flip.mean();
 }
 
 }  // namespace
@@ -338,15 +323,19 @@ std::vector<StudiedChoice> study_allocation(
   std::vector<const PlaneTables*> shown_tables;
   for (const std::size_t p : shown.planes) shown_tables.push_back(&tables.planes.at(p));
   const std::vector<Chosen> choices = choices_of(shown_tables, options);
-  const std::vector<ViewBuffer> views = views_of(mesh.mesh, materials, shown, fragments, options);
-  std::vector<ComparedPicture> original;
+  RunContext inner = context;
+  inner.progress = nullptr;
+  const std::vector<RenderMaterial> lit = lit_materials(materials, shown);
+  const RenderScene scene = render_scene(mesh.mesh, lit, shown.planes.size());
+  const std::vector<Visibility> views = views_of(scene, options, inner);
+  std::vector<ComparedView> original;
   std::vector<StudiedChoice> out;
   for (const Chosen& choice : choices) {
     StudiedChoice& result = out.emplace_back();
     result.name = choice.name;
     if (!choice.rungs.empty()) describe(shown_tables, choice.rungs, result);
-    measure_views(views, textures_of({shown, fragments, pixels, ladder, previews}, choice, context),
-                  options.picture_view, original, result);
+    measure_views(scene, views, textures_of({shown, fragments, pixels, ladder, previews}, choice, inner),
+                  options.picture_view, original, result, inner);
     context.report(static_cast<double>(out.size()) / static_cast<double>(choices.size()));
   }
   return out;

@@ -27,7 +27,7 @@ struct StudiedChoice {
   std::size_t fragments = 0, skipped = 0;
   int lowest_quality = 0, highest_quality = 0;  // of fragments that are not skipped
   double surface_ssim = 1;                      // 1 - surface-weighted (1 - SSIM), from the tables
-  double ssim = 1, difference = 0;              // of the rendered views (image_compare.h), means over pixels
+  double ssim = 1, difference = 0;              // SSIM of luma, FLIP: of the lit views, means over pixels
   Pixels picture;                               // sRGB, size_px x size_px
 };
 

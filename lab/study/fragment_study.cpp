@@ -7,8 +7,7 @@
 
 #include "stages/base/parallel.h"
 #include "stages/data/coverage.h"
-#include "stages/fragment_codec/codec_list.h"
-#include "stages/fragment_codec/decode_rung.h"
+#include "stages/fragment_codec/fragment_codec.h"
 #include "stages/jpeg/jpeg.h"
 #include "stages/jpeg/jpeg_coder.h"
 #include "stages/ladder/ladder.h"

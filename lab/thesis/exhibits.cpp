@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/io/markup.h"
-#include "tools/publish/report/html.h"
+#include "tools/publish/pages/page.h"
 
 namespace texmesh {
 

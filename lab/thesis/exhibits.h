@@ -10,7 +10,7 @@
 #include "format/base/fields.h"
 #include "pipeline/io/table.h"
 #include "stages/base/run_context.h"
-#include "tools/publish/report/plot.h"
+#include "tools/publish/pages/plot.h"
 
 namespace texmesh {
 

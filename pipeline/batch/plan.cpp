@@ -1,21 +1,386 @@
+// Which models a run compiles, and with which options: those that it is given, those beneath folders, those
+// of collections; then the part of them that is one shard's.
 #include "pipeline/batch/plan.h"
 
-#include <algorithm>
-#include <filesystem>
-#include <map>
+#include <fnmatch.h>
 
+#include <algorithm>
+#include <cctype>
+#include <cstddef>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <initializer_list>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "format/base/bounded_json.h"
 #include "format/base/errors.h"
-#include "pipeline/batch/collection.h"
-#include "pipeline/batch/find_models.h"
-#include "pipeline/batch/repeated_texts.h"
+#include "format/base/text_bytes.h"
+#include "pipeline/about/meta.h"
 #include "pipeline/compile/options.h"
 #include "pipeline/compile/profile.h"
 #include "pipeline/io/file_resolver.h"
 
 namespace texmesh {
+
+bool is_json(const std::string& path) {
+  constexpr std::string_view kEnd = ".json";
+  return path.size() > kEnd.size() &&
+         std::ranges::equal(std::string_view(path).substr(path.size() - kEnd.size()), kEnd, {},
+                            [](unsigned char c) { return std::tolower(c); });
+}
+
+bool is_range_scan(const std::string& path) {
+  std::error_code ec;
+  if (!std::filesystem::is_regular_file(path, ec)) return false;  // to open a FIFO is to wait
+  std::ifstream in(path, std::ios::binary);
+  std::string head(4096, '\0');
+  in.read(head.data(), static_cast<std::streamsize>(head.size()));
+  head.resize(static_cast<std::size_t>(in.gcount()));
+  return head.find("\"cylindrical-range-scan\"") != std::string::npos;
+}
+
 namespace {
 
 namespace fs = std::filesystem;
+
+bool may_be_model(const fs::path& path) {
+  std::string e = path.extension().string();
+  std::transform(e.begin(), e.end(), e.begin(), [](unsigned char c) { return std::tolower(c); });
+  return e == ".glb" || e == ".gltf" || e == ".obj" || e == ".ply" || e == ".stl" || e == ".json";
+}
+
+// Texts, not fs::path: taking a thousand paths apart again and again took a sixth of a run that does nothing.
+struct Found {
+  std::string path;
+  std::size_t relative = 0;  // where the path within the input begins
+  bool unread = false;
+};
+
+/// The order of fs::path: by parts, so that a folder's files stand together.
+bool path_less(std::string_view a, std::string_view b) {
+  return std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end(), [](char x, char y) {
+    const auto rank = [](char c) { return c == '/' ? 0 : static_cast<unsigned char>(c) + 1; };
+    return rank(x) < rank(y);
+  });
+}
+
+std::size_t prefix_bytes(const std::string& folder) {
+  return folder.size() + (folder.ends_with('/') ? 0 : 1);
+}
+
+/// Paths as this process can open them, in the order of list_models().
+std::vector<std::string> model_paths(const std::string& folder) {
+  std::error_code ec;
+  fs::recursive_directory_iterator it(folder, ec), end;
+  if (ec) throw InputError(folder, "", "a folder with models", ec.message());
+  std::vector<std::string> models;
+  while (it != end) {
+    std::string path = it->path().string();
+    if (it->path().filename().string().front() == '.')
+      it.disable_recursion_pending();
+    else if (it->is_regular_file(ec) && may_be_model(it->path()))
+      models.push_back(path);
+    it.increment(ec);  // a folder that is left out without a word is a collection without its models
+    if (ec) throw InputError(path, "", "a folder that can be listed", ec.message());
+  }
+  std::sort(models.begin(), models.end(),
+            [same = prefix_bytes(folder)](std::string_view a, std::string_view b) {
+              return path_less(a.substr(same), b.substr(same));
+            });
+  if (std::ranges::all_of(models, is_json) && std::ranges::none_of(models, is_range_scan))
+    throw InputError(folder, "", "a folder with models", "none");
+  return models;
+}
+
+/// The texts that `text_of` gives for more than one of the items; the views point to what it gives.
+/// 8 bytes an item: a map of the texts of 100,000 models took a sixth of a run that does nothing.
+template <class Item, class TextOf>
+std::set<std::string_view> repeated_texts(const std::vector<Item>& items, const TextOf& text_of) {
+  const std::hash<std::string_view> hash;
+  std::vector<std::size_t> hashes;
+  hashes.reserve(items.size());
+  for (const Item& item : items) hashes.push_back(hash(text_of(item)));
+  std::sort(hashes.begin(), hashes.end());
+  std::set<std::size_t> shared;
+  for (auto at = hashes.begin(); (at = std::adjacent_find(at, hashes.end())) != hashes.end(); ++at)
+    shared.insert(*at);
+  std::set<std::string_view> seen, repeated;
+  if (shared.empty()) return repeated;
+  for (const Item& item : items)
+    if (const std::string_view text = text_of(item); shared.contains(hash(text)) && !seen.insert(text).second)
+      repeated.insert(text);
+  return repeated;
+}
+
+/// The first item whose text an earlier one has, and that one; nulls when there is none.
+template <class Item, class TextOf>
+std::pair<const Item*, const Item*> first_repetition(const std::vector<Item>& items, const TextOf& text_of) {
+  const std::set<std::string_view> repeated = repeated_texts(items, text_of);
+  std::map<std::string_view, const Item*> taken;
+  if (repeated.empty()) return {};
+  for (const Item& item : items) {
+    if (!repeated.contains(text_of(item))) continue;
+    const auto [earlier, fresh] = taken.emplace(text_of(item), &item);
+    if (!fresh) return {&item, earlier->second};
+  }
+  return {};
+}
+
+}  // namespace
+
+std::vector<std::string> list_models(const std::string& folder) {
+  std::vector<std::string> models = model_paths(folder);
+  for (std::string& path : models) path.erase(0, prefix_bytes(folder));
+  return models;
+}
+
+std::vector<ModelPath> find_models(const std::vector<std::string>& inputs, const std::string& output) {
+  std::vector<Found> found;
+  bool any_folder = false;
+  for (const std::string& input : inputs) {
+    if (fs::is_directory(input)) {
+      any_folder = true;
+      for (std::string& path : model_paths(input)) {
+        const bool unread = is_json(path);
+        found.push_back({std::move(path), prefix_bytes(input), unread});
+      }
+    } else {
+      found.push_back({input, input.size() - fs::path(input).filename().string().size()});
+    }
+  }
+  const bool one_file = inputs.size() == 1 && !any_folder && fs::path(output).extension() == ".texmesh" &&
+                        !fs::is_directory(output);
+  if (one_file) return {{inputs[0], output}};
+  if (fs::path(output).extension() == ".texmesh" && !fs::is_directory(output))
+    throw InputError(output, "", "a folder for the packages of several models", "the name of one package");
+
+  const std::string prefix = (fs::path(output) / "").string();
+  std::vector<ModelPath> models;
+  models.reserve(found.size());
+  for (Found& f : found) {
+    const std::size_t slash = f.path.rfind('/') + 1, dot = f.path.rfind('.');
+    const bool extension = dot != std::string::npos && dot > std::max(slash, f.relative);
+    const std::string_view relative = std::string_view(f.path).substr(f.relative);
+    std::string package = prefix;
+    package.reserve(prefix.size() + relative.size() + 8);  // of 100,000, what growing leaves free counts
+    package.append(relative.substr(0, extension ? dot - f.relative : relative.npos)).append(".texmesh");
+    models.push_back({std::move(f.path), std::move(package), f.unread});
+  }
+  std::map<std::string_view, int> others;  // by shared package: its files that are not unread
+  const auto shared = repeated_texts(models, [](const ModelPath& m) { return std::string_view(m.output); });
+  for (const ModelPath& m : models)
+    if (shared.contains(m.output)) others[m.output] += m.unread ? 0 : 1;
+  std::vector<std::size_t> longer;
+  for (const ModelPath& m : models)
+    if (const auto it = others.find(m.output); it != others.end() && (m.unread || it->second > 1))
+      longer.push_back(static_cast<std::size_t>(&m - models.data()));
+  for (const std::size_t i : longer)
+    models[i].output = prefix + models[i].input.substr(found[i].relative) + ".texmesh";
+  return models;
+}
+
+namespace {
+
+constexpr std::size_t kMaxFileBytes = 256u << 20, kMaxModels = 1'000'000, kMaxPathBytes = 1000;
+
+class CollectionReader {
+ public:
+  CollectionReader(const std::string& file, const CompileOptions& base, const FolderLister& list_folder)
+      : file_(file), list_folder_(list_folder), options_(base) {}
+
+  std::vector<CollectionModel> read(const Json& root) {
+    check_members(root, "", {"$schema", "version", "options", "about", "patterns", "models", "folders"});
+    if (!root.contains("version") || root["version"] != 1)
+      fail("/version", "1", root.contains("version") ? root["version"].dump() : "nothing");
+    apply_members(options_, root, "");
+    read_patterns(root);
+    const bool has_folders = root.contains("folders");
+    if (!root.contains("models") && !has_folders) fail("/models", "models or folders", "nothing");
+    std::vector<CollectionModel> models;
+    if (root.contains("models")) {
+      check_list(root["models"], "/models", "models");
+      for (std::size_t i = 0; i < root["models"].size(); ++i)
+        models.push_back(read_model(root["models"][i], "/models/" + std::to_string(i)));
+    }
+    if (has_folders) read_folders(root["folders"], models);
+    return models;
+  }
+
+ private:
+  [[noreturn]] void fail(const std::string& place, const std::string& expected,
+                         const std::string& found) const {
+    throw InputError(file_, place, expected, found.substr(0, 120));
+  }
+
+  void check_members(const Json& object, const std::string& place,
+                     std::initializer_list<std::string_view> known) const {
+    if (!object.is_object()) fail(place, "an object", object.type_name());
+    for (const auto& [name, value] : object.items())
+      if (std::find(known.begin(), known.end(), name) == known.end())
+        fail(place + "/" + name, "a known field", "\"" + name + "\"");
+  }
+
+  std::string path_at(const Json& object, const char* key, const std::string& place) const {
+    const Json& v = object[key];
+    if (!v.is_string() || v.get_ref<const std::string&>().empty() ||
+        v.get_ref<const std::string&>().size() > kMaxPathBytes)
+      fail(place + "/" + key, "a path of 1 to " + std::to_string(kMaxPathBytes) + " bytes", v.dump());
+    for (const char c : v.get_ref<const std::string&>())
+      if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f)
+        fail(place + "/" + key, "a path without control characters", v.dump());
+    return v.get<std::string>();
+  }
+
+  void apply(CompileOptions& options, const Json& body, const std::string& place) const {
+    if (!body.is_object()) fail(place, "an object", body.type_name());
+    if (body.contains("version"))
+      fail(place + "/version", "no version, the collection has one", body["version"].dump());
+    Json profile = body;
+    profile["version"] = 1;
+    try {
+      apply_profile(options, profile, file_);
+    } catch (const InputError& e) {
+      throw InputError(file_, place + e.place(), e.expected(), e.found());
+    }
+  }
+
+  /// `options` and `about` of the collection, a pattern or a model.
+  void apply_members(CompileOptions& options, const Json& object, const std::string& place) const {
+    if (object.contains("options")) apply(options, object["options"], place + "/options");
+    if (!object.contains("about")) return;
+    const std::string meta = read_meta(object["about"].dump(), file_, place + "/about");
+    options.package.meta = merge_meta(options.package.meta, meta);
+  }
+
+  void check_list(const Json& list, const std::string& place, const std::string& what) const {
+    if (!list.is_array() || list.empty() || list.size() > kMaxModels)
+      fail(place, "a list of 1 to " + std::to_string(kMaxModels) + " " + what, list.type_name());
+  }
+
+  void read_patterns(const Json& root) {
+    if (!root.contains("patterns")) return;
+    const Json& list = root["patterns"];
+    check_list(list, "/patterns", "patterns");
+    for (std::size_t i = 0; i < list.size(); ++i) {
+      const std::string place = "/patterns/" + std::to_string(i);
+      check_members(list[i], place, {"match", "options", "about"});
+      if (!list[i].contains("match")) fail(place + "/match", "a pattern", "nothing");
+      if (!list[i].contains("options") && !list[i].contains("about"))
+        fail(place + "/options", "options or about", "nothing");
+      patterns_.push_back({path_at(list[i], "match", place), list[i], place});
+      CompileOptions check = options_;  // wrong options are an error even where nothing matches
+      apply_members(check, list[i], place);
+    }
+  }
+
+  /// Options of the models that the same patterns match, made once.
+  std::shared_ptr<const CompileOptions> options_for(const std::string& input) {
+    std::vector<bool> matches;
+    for (const Pattern& p : patterns_) matches.push_back(::fnmatch(p.match.c_str(), input.c_str(), 0) == 0);
+    auto& shared = shared_[matches];
+    if (!shared) {
+      CompileOptions options = options_;
+      for (std::size_t i = 0; i < patterns_.size(); ++i)
+        if (matches[i]) apply_members(options, patterns_[i].json, patterns_[i].place);
+      shared = std::make_shared<const CompileOptions>(std::move(options));
+    }
+    return shared;
+  }
+
+  /// Folders give what the list does not name already; a model keeps its place in the folder.
+  void read_folders(const Json& folders, std::vector<CollectionModel>& models) {
+    check_list(folders, "/folders", "folders");
+    std::set<std::string> listed;
+    for (const CollectionModel& m : models) listed.insert(fs::path(m.input).lexically_normal().string());
+    for (std::size_t i = 0; i < folders.size(); ++i) {
+      const std::string place = "/folders/" + std::to_string(i);
+      if (!folders[i].is_string() || folders[i].get_ref<const std::string&>().empty())
+        fail(place, "a path", folders[i].dump());
+      const std::string folder = folders[i].get<std::string>();
+      if (!list_folder_) continue;
+      const std::vector<std::string> found = list_folder_(folder);
+      std::map<std::string, std::pair<int, int>> sharing;  // files, those that are no .json
+      const auto package_of = [](const std::string& relative) {
+        return fs::path(relative).replace_extension(".texmesh").string();
+      };
+      for (const std::string& relative : found) {
+        auto& [files, others] = sharing[package_of(relative)];
+        ++files, others += is_json(relative) ? 0 : 1;
+      }
+      for (const std::string& relative : found) {
+        const std::string input = (fs::path(folder) / relative).string();
+        if (!listed.insert(fs::path(input).lexically_normal().string()).second) continue;
+        const std::string package = package_of(relative);
+        const bool unread = is_json(relative);
+        const auto [files, others] = sharing[package];
+        const bool longer = unread ? files > 1 : others > 1;
+        add(models, {input, longer ? relative + ".texmesh" : package, options_for(input), unread}, place);
+      }
+    }
+  }
+
+  void add(std::vector<CollectionModel>& models, CollectionModel model, const std::string& place) {
+    if (models.size() >= kMaxModels) fail(place, "at most " + std::to_string(kMaxModels) + " models", "more");
+    if (!model.unread && !outputs_.insert(fs::path(model.output).lexically_normal().string()).second)
+      fail(place, "an output of its own for " + model.input, model.output + ", as another model");
+    models.push_back(std::move(model));
+  }
+
+  CollectionModel read_model(const Json& json, const std::string& place) {
+    check_members(json, place, {"input", "output", "options", "about"});
+    if (!json.contains("input")) fail(place + "/input", "a path", "nothing");
+    CollectionModel m;
+    m.input = path_at(json, "input", place);
+    m.output = json.contains("output") ? path_at(json, "output", place)
+                                       : fs::path(m.input).filename().replace_extension(".texmesh").string();
+    const fs::path output(m.output);
+    bool beneath = output.is_relative() && output.extension() == ".texmesh";
+    for (const fs::path& part : output) beneath = beneath && part != "..";
+    if (!beneath)
+      fail(place + "/output", "a path beneath the output folder that ends with .texmesh", m.output);
+    if (!outputs_.insert(output.lexically_normal().string()).second)
+      fail(place + "/output", "an output of its own", m.output + ", as another model");
+    m.options = options_for(m.input);
+    if (json.contains("options") || json.contains("about")) {
+      CompileOptions with_changes = *m.options;
+      apply_members(with_changes, json, place);
+      m.options = std::make_shared<const CompileOptions>(std::move(with_changes));
+    }
+    return m;
+  }
+
+  struct Pattern {
+    std::string match;
+    Json json;  // with options or about
+    std::string place;
+  };
+  const std::string& file_;
+  const FolderLister& list_folder_;
+  CompileOptions options_;
+  std::vector<Pattern> patterns_;
+  std::map<std::vector<bool>, std::shared_ptr<const CompileOptions>> shared_;
+  std::set<std::string> outputs_;
+};
+
+}  // namespace
+
+std::vector<CollectionModel> read_collection(const std::string& json, const std::string& file_name,
+                                             const CompileOptions& base, const FolderLister& list_folder) {
+  if (json.size() > kMaxFileBytes)
+    throw InputError(file_name, "", "at most 256 MiB", std::to_string(json.size()) + " bytes");
+  try {
+    const auto bytes = text_bytes(json);
+    return CollectionReader(file_name, base, list_folder).read(parse_bounded_json(bytes, file_name, 16));
+  } catch (const FormatError& e) {
+    throw InputError(file_name, e.place(), e.expected(), e.found());
+  }
+}
+
+namespace {
+
 constexpr std::uint64_t kMaxCollectionBytes = 256u << 20;
 
 bool is_collection(const std::string& input) {

@@ -12,6 +12,55 @@ namespace texmesh {
 
 struct CompileOptions;
 
+/// A model to compile and where its package goes.
+struct ModelPath {
+  std::string input, output;
+  bool unread = false;  // a .json of a folder: a model only where is_range_scan() says so
+};
+
+/// The models that `inputs` name: files as they are; of a folder every .glb .gltf .obj .ply .stl and .json
+/// beneath it, sorted by path. One input file with an `output` that ends in .texmesh gives that package;
+/// otherwise `output` is a folder, and a model's package stands in it under the same relative path. Two
+/// models that would share a package (a.glb beside a.obj) keep their extension in its name (a.glb.texmesh);
+/// a .json keeps it beside any other, which does not keep it for the .json. What a .json holds does not
+/// count: a shard of a run opens its own ones only. InputError for what is not there.
+std::vector<ModelPath> find_models(const std::vector<std::string>& inputs, const std::string& output);
+
+/// The files beneath a folder that find_models finds there: paths relative to it, sorted. InputError when the
+/// folder is not there or holds no model.
+std::vector<std::string> list_models(const std::string& folder);
+
+/// By its name: only what it holds tells whether it is a model.
+bool is_json(const std::string& path);
+
+/// A JSON file that says within its first bytes that it is a range scan; other JSON files are collections.
+bool is_range_scan(const std::string& path);
+
+/// One model of a collection.
+struct CollectionModel {
+  std::string input;   // path; relative ones are relative to the collection's folder
+  std::string output;  // path beneath the output folder, ends with ".texmesh"
+  // Defaults, then the collection's options, then those of the patterns that match, in their order, then the
+  // model's own. What `about` says of each of them goes the same way, field by field, into package.meta.
+  // Models with equal options share them.
+  std::shared_ptr<const CompileOptions> options;
+  bool unread = false;  // a folder's .json, as in ModelPath; its output may be another's
+};
+
+/// Finds the models of a folder that a collection names, as list_models(): paths relative to the folder,
+/// sorted. The reader itself looks at no folder.
+using FolderLister = std::function<std::vector<std::string>(const std::string& folder)>;
+
+/// Reads a collection (schemas/collection.v1.schema.json): models, folders of models, and their options.
+/// Strict: unknown fields, wrong types, options out of range, outputs that leave the output folder and
+/// outputs named twice throw InputError{file_name, JSON pointer, ...}. `base` holds the options that the
+/// collection starts from (a profile). A model that is listed and found in a folder, too, is compiled
+/// once, as listed. Patterns are matched against the input as the collection writes it; `*` and `?` match
+/// "/" as well.
+std::vector<CollectionModel> read_collection(const std::string& json, const std::string& file_name,
+                                             const CompileOptions& base,
+                                             const FolderLister& list_folder = {});
+
 /// One model of a run.
 struct PlannedModel {
   std::string input, output;                   // paths as this process can open them

@@ -6,9 +6,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <map>
-#include <nlohmann/json.hpp>
-#include <numeric>
 #include <ostream>
 
 #include "pipeline/io/table.h"
@@ -16,31 +13,8 @@
 namespace texmesh {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
-/// Shares of a model's time that the stages took on the sample scans; they only shape the progress bar.
-double share(const std::string& stage) {
-  static const std::map<std::string, double> shares{{"import", .03},
-                                                    {"condition", .04},
-                                                    {"skeletonization", .2},
-                                                    {"ssf", .2},
-                                                    {"simplification", .15},
-                                                    {"perceptual_values", .05},
-                                                    {"fragmentation", .03},
-                                                    {"zim", .02},
-                                                    {"previews", .01},
-                                                    {"ladder", .07},
-                                                    {"lut", .08},
-                                                    {"scales", .05},
-                                                    {"quality", .06},
-                                                    {"package", .01}};
-  const auto it = shares.find(stage);
-  return it == shares.end() ? 0 : it->second;
-}
-
-std::string sentence(const Json& note) {
-  const std::string place = note.value("place", "");
-  return note.value("code", "") + (place.empty() ? "" : " at " + place) + ": " + note.value("text", "");
+std::string sentence(const Note& note) {
+  return note.code + (note.place.empty() ? "" : " at " + note.place) + ": " + note.text;
 }
 
 /// Columns of the terminal behind standard output; 80 where nobody knows.
@@ -85,17 +59,14 @@ std::string describe_change(const std::string& part, const std::string& from, co
 namespace {
 
 /// "runs: ladder.rungs [5,8] -> [8]" and the like.
-std::string verdict(const Json& e) {
-  const std::string v = e.value("verdict", "");
-  if (v == "hit") return "from the cache";
-  if (v == "unknown") return "depends on what becomes of " + e.value("waits_for", "");
-  const Json changes = e.value("changes", Json::array());
-  if (!e.value("history", false)) return "runs: no earlier run of it is known";
-  if (changes.empty()) return "runs: nothing has changed, but its result is no longer in the cache";
-  std::string text = "runs: ";
-  for (std::size_t i = 0; i < changes.size(); ++i)
-    text += (i ? "; " : "") + describe_change(changes[i].value("part", ""), changes[i].value("from", ""),
-                                              changes[i].value("to", ""));
+std::string verdict(const StageExplanation& e) {
+  if (e.verdict == StageVerdict::kHit) return "from the cache";
+  if (e.verdict == StageVerdict::kUnknown) return "depends on what becomes of " + e.waits_for;
+  if (!e.has_history) return "runs: no earlier run of it is known";
+  if (e.changes.empty()) return "runs: nothing has changed, but its result is no longer in the cache";
+  std::string text;
+  for (const KeyChange& c : e.changes)
+    text += (text.empty() ? "runs: " : "; ") + describe_change(c.label, c.from, c.to);
   return text;
 }
 
@@ -112,12 +83,7 @@ void Progress::begin(std::vector<ProgressModel> models) {
 void Progress::recalled(std::size_t model, const WorkerReport& r, const std::string& output) {
   if (const ModelError& e = r.more->error; !e.message.empty()) {
     if (mode_ == OutputMode::kJson)
-      out_ << Json{{"event", "error"}, {"model", models_[model].name},
-                   {"kind", e.kind},   {"file", e.file},
-                   {"place", e.place}, {"expected", e.expected},
-                   {"found", e.found}, {"message", e.message}}
-                  .dump(-1, ' ', false, Json::error_handler_t::replace)
-           << '\n';
+      json_event(ErrorTold{name_of(model), e});
     else
       line("error: " + e.message + " (nothing has changed since; --retry-failed tries again)");
   }
@@ -129,94 +95,95 @@ void Progress::recalled(std::size_t model, const WorkerReport& r, const std::str
   }
 }
 
+template <class Event>
+void Progress::json_event(const Event& event) {
+  out_ << to_json_line(event) << '\n';
+}
+
 void Progress::started(std::size_t model, const std::string& output) {
   running_[model].start = std::chrono::steady_clock::now();
-  if (mode_ == OutputMode::kJson)
-    out_ << Json{{"event", "model-started"}, {"model", models_[model].name}, {"output", output}}.dump(
-                -1, ' ', false, Json::error_handler_t::replace)
-         << '\n'
-         << std::flush;
+  if (mode_ != OutputMode::kJson) return;
+  json_event(ModelStarted{name_of(model), output});
+  out_ << std::flush;
 }
 
-void Progress::event(std::size_t model, const std::string& json_line) {
-  const Json e = Json::parse(json_line, nullptr, false);
-  if (!e.is_object()) return;
-  const std::string event = e.value("event", ""), name(models_[model].name);
-  if (mode_ == OutputMode::kJson) {
-    Json tagged{{"event", event}, {"model", name}};
-    for (const auto& [k, v] : e.items())
-      if (k != "event") tagged[k] = v;
-    out_ << tagged.dump(-1, ' ', false, Json::error_handler_t::replace) << '\n' << std::flush;
+void Progress::event(std::size_t model, WorkerEvent event) {
+  if (auto* told = std::get_if<SharesTold>(&event)) {
+    shares_ = std::move(told->shares);
     return;
   }
-  const std::string stage = e.value("stage", "");
-  if (event == "stage-started") {
-    running_[model].stage = stage;
-  } else if (event == "stage-progress") {
-    running_[model].partial[stage] =
-        share(stage) * models_[model].weight * std::clamp(e.value("fraction", 0.0), 0.0, 1.0);
-  } else if (event == "stage-finished") {
-    const double part = share(stage) * models_[model].weight;
-    running_[model].partial.erase(stage);
-    running_[model].fraction += part;
-    done_weight_ += part;
-    if (verbose_ && e.value("result", "") == "ran")
-      line(fmt::format("{}: {} took {}", name, stage, format_seconds(e.value("seconds", 0.0))));
-    else if (verbose_ && !explain_)
-      line(fmt::format("{}: {} from the cache", name, stage));
-  } else if (event == "stage-explained" && explain_) {
-    line(fmt::format("{}: {:<18} {}", name, stage, verdict(e)));
-  } else if (event == "note" && (e.value("severity", "") == "warning" || verbose_)) {
-    line(fmt::format("{}: {}: {}", name, e.value("severity", "") == "warning" ? "warning" : "note",
-                     sentence(e)));
-  } else if (event == "cache") {
-    if (++cache_events_[e.value("text", "")] == 1) line("cache: " + e.value("text", ""));
-  } else if (event == "error") {
-    line(fmt::format("error: {}", e.value("message", "")));
-  }
-  redraw(false);
+  std::visit(
+      [&](auto& e) {
+        e.model = name_of(model);
+        if (mode_ == OutputMode::kJson)
+          json_event(e);
+        else
+          show(model, e);
+      },
+      event);
+  if (mode_ == OutputMode::kJson)
+    out_ << std::flush;
+  else
+    redraw(false);
 }
 
+void Progress::show(std::size_t model, const StageStarted& e) { running_[model].stage = e.stage; }
+
+void Progress::show(std::size_t model, const StageProgress& e) {
+  running_[model].partial[e.stage] = shares_[e.stage] * models_[model].weight * e.fraction;
+}
+
+void Progress::show(std::size_t model, const StageFinished& e) {
+  const double part = shares_[e.stage] * models_[model].weight;
+  running_[model].partial.erase(e.stage);
+  running_[model].fraction += part;
+  done_weight_ += part;
+  if (verbose_ && e.result == "ran")
+    line(fmt::format("{}: {} took {}", e.model, e.stage, format_seconds(e.seconds)));
+  else if (verbose_ && !explain_)
+    line(fmt::format("{}: {} from the cache", e.model, e.stage));
+}
+
+void Progress::show(std::size_t, const StageExplained& e) {
+  if (explain_) line(fmt::format("{}: {:<18} {}", e.model, e.stage, verdict(e.explanation)));
+}
+
+void Progress::show(std::size_t, const CacheTold& e) {
+  if (++cache_events_[e.text] == 1) line("cache: " + e.text);
+}
+
+void Progress::show(std::size_t, const NoteTold& e) {
+  const bool warns = e.note.severity == Severity::kWarning;
+  if (warns || verbose_)
+    line(fmt::format("{}: {}: {}", e.model, warns ? "warning" : "note", sentence(e.note)));
+}
+
+void Progress::show(std::size_t, const ErrorTold& e) { line("error: " + e.error.message); }
+
 void Progress::cache_event(const std::string& code, const std::string& text) {
-  if (mode_ == OutputMode::kJson)
-    out_ << Json{{"event", "cache"}, {"model", ""}, {"code", code}, {"text", text}}.dump(
-                -1, ' ', false, Json::error_handler_t::replace)
-         << '\n'
-         << std::flush;
-  else
-    line("cache: " + text);
+  if (mode_ != OutputMode::kJson) return line("cache: " + text);
+  json_event(CacheTold{"", code, text});
+  out_ << std::flush;
 }
 
 void Progress::finished(std::size_t model, const WorkerReport& r, const std::string& output) {
   ++finished_count_;
-  const std::string name(models_[model].name);
   const auto it = running_.find(model);
   done_weight_ += models_[model].weight - (it == running_.end() ? 0 : it->second.fraction);
   running_.erase(model);
   if (mode_ == OutputMode::kJson) {
-    out_ << Json{{"event", "model-finished"},
-                 {"model", name},
-                 {"result", enum_name(r.result)},
-                 {"ran", r.ran},
-                 {"output", output},
-                 {"bytes", r.package_bytes},
-                 {"seconds", r.seconds},
-                 {"peak_memory_bytes", r.peak_memory_bytes},
-                 {"stages_ran", r.stages_ran},
-                 {"stages_from_cache", r.stages_hit}}
-                .dump(-1, ' ', false, Json::error_handler_t::replace)
-         << '\n';
+    json_event(ModelFinished{name_of(model), output, r});
     if (r.ran) out_ << std::flush;
     return;
   }
   if (r.result == ModelResult::kOk && mode_ != OutputMode::kQuiet)
-    line(fmt::format("{}: {}, {}, {}, peak memory {}{}", name, output, format_bytes(r.package_bytes),
+    line(fmt::format("{}: {}, {}, {}, peak memory {}{}", models_[model].name, output, format_bytes(r.bytes),
                      format_seconds(r.seconds), format_bytes(r.peak_memory_bytes),
                      r.stages_hit ? fmt::format(" ({} of {} stages from the cache)", r.stages_hit,
                                                 r.stages_hit + r.stages_ran)
                                   : ""));
   else if (r.result == ModelResult::kUnchanged && mode_ != OutputMode::kQuiet)
-    line(fmt::format("{}: {} is up to date", name, output));
+    line(fmt::format("{}: {} is up to date", models_[model].name, output));
   redraw(true);
 }
 
@@ -230,11 +197,10 @@ void Progress::summary(const std::vector<WorkerReport>& reports, double seconds)
   const auto models = static_cast<std::ptrdiff_t>(reports.size()), failed = models - ok - same - cancelled;
   if (mode_ == OutputMode::kTerminal) out_ << "\r\033[K" << std::flush;
   if (mode_ == OutputMode::kJson) {
-    out_ << Json{{"event", "summary"}, {"models", reports.size()}, {"compiled", ok},    {"unchanged", same},
-                 {"failed", failed},   {"cancelled", cancelled},   {"seconds", seconds}}
-                .dump()
-         << '\n'
-         << std::flush;
+    const auto number = [](std::ptrdiff_t n) { return static_cast<std::uint64_t>(n); };
+    json_event(
+        RunFinished{number(models), number(ok), number(same), number(failed), number(cancelled), seconds});
+    out_ << std::flush;
     return;
   }
   for (const auto& [text, times] : cache_events_)

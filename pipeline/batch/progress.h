@@ -30,7 +30,7 @@ class Progress {
   /// The model need not run.
   void recalled(std::size_t model, const WorkerReport& report, const std::string& output);
   void started(std::size_t model, const std::string& output);
-  void event(std::size_t model, const std::string& json_line);
+  void event(std::size_t model, WorkerEvent event);
   /// Something about the cache that no single model has met.
   void cache_event(const std::string& code, const std::string& text);
   void finished(std::size_t model, const WorkerReport& report, const std::string& output);
@@ -44,6 +44,19 @@ class Progress {
     double fraction = 0;                    // of its weight: stages that are done
     std::map<std::string, double> partial;  // and of stages that are not: how far they are
   };
+  // Of one event, for people.
+  void show(std::size_t model, const StageStarted& e);
+  void show(std::size_t model, const StageProgress& e);
+  void show(std::size_t model, const StageFinished& e);
+  void show(std::size_t model, const StageExplained& e);
+  void show(std::size_t model, const CacheTold& e);
+  void show(std::size_t model, const NoteTold& e);
+  void show(std::size_t model, const ErrorTold& e);
+  template <class Other>
+  void show(std::size_t, const Other&) {}
+  template <class Event>
+  void json_event(const Event& event);
+  std::string name_of(std::size_t model) const { return std::string(models_[model].name); }
   void line(const std::string& text);  // a lasting line
   void redraw(bool now);
   double done_fraction() const;
@@ -55,6 +68,7 @@ class Progress {
   OutputMode mode_;
   bool verbose_, explain_;
   std::vector<ProgressModel> models_;
+  std::map<std::string, double> shares_;  // of a model's time, by stage
   std::map<std::size_t, Running> running_;
   std::size_t finished_count_ = 0;
   std::map<std::string, std::size_t> cache_events_;  // by text: the same one from many models is told once

@@ -1,3 +1,5 @@
+// A run of compile: which models must run, by the memo of earlier runs; then their processes, and what they
+// report.
 #include "pipeline/batch/run.h"
 
 #include <algorithm>
@@ -9,8 +11,8 @@
 #include <string_view>
 
 #include "format/base/errors.h"
+#include "pipeline/batch/build_memo.h"
 #include "pipeline/batch/fleet/run_summary.h"
-#include "pipeline/batch/job_selection.h"
 #include "pipeline/batch/write_reports.h"
 #include "pipeline/cache/disk_store.h"
 #include "pipeline/io/atomic_file.h"
@@ -106,11 +108,11 @@ class Batch {
     begin_progress();
     std::vector<bool> announced(selection_.jobs().size());
     auto saved = Clock::now();
-    const auto on_event = [&](std::size_t job, const std::string& line) {
+    const auto on_event = [&](std::size_t job, WorkerEvent event) {
       const std::size_t i = selection_.model_of(job);
       if (!announced[job]) progress_.started(i, selection_.jobs()[job].output);
       announced[job] = true;
-      progress_.event(i, line);
+      progress_.event(i, std::move(event));
     };
     const auto on_finish = [&](std::size_t job, const WorkerReport& report) {
       const std::size_t i = selection_.model_of(job);
@@ -139,8 +141,8 @@ class Batch {
 
   int forecast() {
     begin_progress();
-    const auto on_event = [&](std::size_t job, const std::string& line) {
-      progress_.event(selection_.model_of(job), line);
+    const auto on_event = [&](std::size_t job, WorkerEvent event) {
+      progress_.event(selection_.model_of(job), std::move(event));
     };
     const auto reports = run_workers(selection_.jobs(), settings_.pool, on_event, {});
     for (std::size_t job = 0; job < reports.size(); ++job) reports_[selection_.model_of(job)] = reports[job];

@@ -1,4 +1,5 @@
 #pragma once
+#include <string>
 #include <vector>
 
 #include "pipeline/batch/plan.h"
@@ -16,5 +17,21 @@ void check_reports(const BatchPlan& plan, const RunSettings& settings);
 /// the standard error.
 bool write_reports(const BatchPlan& plan, const RunSettings& settings,
                    const std::vector<WorkerReport>& reports, double seconds);
+
+/// Chrome's trace format (chrome://tracing, Perfetto): one process per lane of the pool, in it a thread with
+/// the models and threads with their stages.
+std::string write_trace(const std::vector<PlannedModel>& models, const std::vector<WorkerReport>& reports);
+
+/// Runs, cache hits and seconds per stage, as a table for people.
+std::string write_statistics(const std::vector<WorkerReport>& reports);
+
+/// A dependency file that GNU make and Ninja (deps = gcc) read alike: `target: dependencies`, then an
+/// empty rule per dependency, so that removing one does not stop make. Blanks, # and $ are escaped.
+/// InputError for a path with a line break or a backslash before a character that is escaped, which
+/// neither of them can express.
+std::string write_depfile(const std::string& target, const std::vector<std::string>& dependencies);
+
+/// The schemas of what compile, list and summary read and write: profile, JND profile, event, summary, list.
+std::vector<DocumentSchema> pipeline_schemas();
 
 }  // namespace texmesh

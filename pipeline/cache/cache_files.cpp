@@ -15,25 +15,15 @@
 #include "format/base/text_bytes.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/descriptor.h"
+#include "pipeline/io/record.h"
 
 namespace texmesh {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::ordered_json;
 
 constexpr int kRecordVersion = 2;
 constexpr std::size_t kSealBytes = 66;  // newline, 64 digits, newline
-
-bool write_all(int fd, std::span<const std::uint8_t> bytes) {
-  while (!bytes.empty()) {
-    const ssize_t n = ::write(fd, bytes.data(), std::min<std::size_t>(bytes.size(), 1 << 24));
-    if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) return false;
-    bytes = bytes.subspan(static_cast<std::size_t>(n));
-  }
-  return true;
-}
 
 bool is_there(const std::string& path, std::size_t bytes) {
   struct stat s {};
@@ -55,34 +45,29 @@ bool publish_by_rename(const std::string& path, std::span<const std::uint8_t> by
   }
 }
 
-bool has(const Json& object, const char* member, Json::value_t type) {
-  return object.is_object() && object.contains(member) && object[member].type() == type;
-}
+/// A record as its file has it.
+struct RecordText {
+  Json key;  // Key::preimage
+  std::vector<StoredBlob> outputs;
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("version", Constant{kRecordVersion}, "");
+    v("key", s.key, "");
+    v("outputs", s.outputs, "");
+  }
+};
 
 std::optional<CacheRecord> parse_record(std::span<const std::uint8_t> bytes, const Sha256* key) {
   const auto body = unseal(bytes);
   if (!body) return std::nullopt;
-  const Json j = Json::parse(*body, nullptr, false);
-  if (!j.is_object() || !j.contains("version") || j["version"] != Json(kRecordVersion) ||
-      !j.contains("key") || !j["key"].is_object() || !j.contains("outputs") || !j["outputs"].is_array())
+  try {
+    auto text = from_json<RecordText>(Json::parse(*body, nullptr, false), "record");
+    const auto parts = key_from_json(text.key);
+    if (!parts || (key && parts->digest() != *key)) return std::nullopt;
+    return CacheRecord{parts->preimage(), std::move(text.outputs)};
+  } catch (const InputError&) {
     return std::nullopt;
-  std::vector<std::pair<std::string, std::string>> parts;
-  for (const auto& [label, value] : j["key"].items()) {
-    if (!value.is_string()) return std::nullopt;
-    parts.emplace_back(label, value.get<std::string>());
   }
-  if (key && digest_of_parts(parts) != *key) return std::nullopt;
-  CacheRecord record;
-  record.preimage = j["key"].dump(1);
-  for (const Json& o : j["outputs"]) {
-    if (!has(o, "name", Json::value_t::string) || !has(o, "sha256", Json::value_t::string) ||
-        !has(o, "bytes", Json::value_t::number_unsigned))
-      return std::nullopt;
-    StoredBlob b{o["name"].get<std::string>(), {}, o["bytes"].get<std::uint64_t>()};
-    if (!from_hex(o["sha256"].get<std::string>(), b.digest)) return std::nullopt;
-    record.outputs.push_back(std::move(b));
-  }
-  return record;
 }
 
 }  // namespace
@@ -153,12 +138,7 @@ std::optional<std::string> unseal(std::span<const std::uint8_t> bytes) {
 }
 
 std::string write_record(const CacheRecord& record) {
-  Json outputs = Json::array();
-  for (const StoredBlob& b : record.outputs)
-    outputs.push_back({{"name", b.name}, {"sha256", to_hex(b.digest)}, {"bytes", b.bytes}});
-  return seal(Json{
-      {"version", kRecordVersion}, {"key", Json::parse(record.preimage)}, {"outputs", std::move(outputs)}}
-                  .dump(1));
+  return seal(to_json(RecordText{Json::parse(record.preimage), record.outputs}).dump(1));
 }
 
 std::optional<CacheRecord> read_record(std::span<const std::uint8_t> bytes, const Sha256& key) {

@@ -8,7 +8,7 @@
 #include "format/documents/tables.h"
 #include "format/documents/thesis_tables.h"
 #include "format/model/model.h"
-#include "pipeline/graph/artefact.h"
+#include "pipeline/graph/stage.h"
 #include "pipeline/import/import.h"
 #include "stages/data/conditioned_mesh.h"
 #include "stages/data/fragments.h"

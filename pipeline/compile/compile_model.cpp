@@ -1,5 +1,11 @@
+// One model, from its files to its package: what it is made of, its provenance, the graph over it.
 #include "pipeline/compile/compile_model.h"
 
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cctype>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
@@ -7,16 +13,214 @@
 #include "format/container/format_version.h"
 #include "pipeline/compile/artefacts.h"
 #include "pipeline/compile/library_versions.h"
-#include "pipeline/compile/model_source.h"
 #include "pipeline/compile/profile.h"
 #include "pipeline/compile/stage_table.h"
+#include "pipeline/import/count_triangles.h"
 #include "pipeline/io/atomic_file.h"
+#include "pipeline/io/file_resolver.h"
+#include "pipeline/io/record.h"
+#include "pipeline/io/resource_error.h"
+#include "pipeline/io/wire_text.h"
 
 namespace texmesh {
 namespace fs = std::filesystem;
 namespace {
 
-using Json = nlohmann::ordered_json;
+std::uint64_t machine_memory_bytes() {
+  const long pages = ::sysconf(_SC_PHYS_PAGES), page = ::sysconf(_SC_PAGESIZE);
+  return pages > 0 && page > 0 ? static_cast<std::uint64_t>(pages) * static_cast<std::uint64_t>(page)
+                               : ~std::uint64_t{0};
+}
+
+std::string lower_extension(const fs::path& path) {
+  std::string e = path.extension().string();
+  std::transform(e.begin(), e.end(), e.begin(), [](unsigned char c) { return std::tolower(c); });
+  return e;
+}
+
+/// What is asked of files, without the stamps, which are no part of any key.
+std::string note_of(std::vector<FileRequest> requests) {
+  for (FileRequest& r : requests) r.stamp = {};
+  return json_line_of([&](Json& to) { put_value(to, requests); });
+}
+
+std::optional<std::vector<std::string>> uris_of(const std::string& note) {
+  try {
+    std::vector<std::string> uris;
+    for (FileRequest& r : from_json<std::vector<FileRequest>>(Json::parse(note, nullptr, false), "note"))
+      uris.push_back(std::move(r.uri));
+    return uris;
+  } catch (const InputError&) {
+    return std::nullopt;
+  }
+}
+
+/// Before work begins, instead of after minutes of it.
+void refuse_too_large(const std::string& name, const Bytes& bytes, std::uint64_t limit_bytes) {
+  const std::uint64_t machine = machine_memory_bytes();
+  const std::uint64_t most = limit_bytes > 0 ? std::min(limit_bytes, machine) : machine;
+  const std::uint64_t triangles = count_triangles(name, bytes), needed = least_memory_bytes(triangles);
+  if (needed <= most) return;
+  const auto gigabytes = [](std::uint64_t n) {
+    return fmt::format("{:.1f} GB", static_cast<double>(n) / 1e9);
+  };
+  throw ResourceError(name, "",
+                      fmt::format("a model that {} of memory are enough for ({})", gigabytes(most),
+                                  most == machine ? "the machine's" : "--model-memory"),
+                      fmt::format("{} triangles, which take {} or more", triangles, gigabytes(needed)));
+}
+
+/// The model file with the files it refers to. Which those are is known only after an import, so the store
+/// remembers the list of the last one (as ccache's manifest does): while every file on it reads as it did,
+/// import need not run.
+class ModelSource {
+ public:
+  explicit ModelSource(const CompileRequest& request)
+      : path_(request.input),
+        options_(request.options.import),
+        memory_bytes_(request.memory_bytes),
+        known_(request.known) {}
+
+  /// Reads what is needed to know parts(). Before anything else. `may_write_notes`: the store may be told the
+  /// list. InputError, ResourceError, Cancelled.
+  void open(Store& store, const RunContext& context, bool may_write_notes) {
+    look_at_model();
+    const Sha256 note_key = list_key();
+    if (const auto note = store.find_note(note_key); note && unchanged_since(*note)) return;
+    imported_ = std::make_shared<ImportedModel>(import(options_, context, requests_));
+    if (may_write_notes) store.put_note(note_key, note_of(requests_));
+  }
+
+  /// What the model is made of: its own bytes, and every file that it asked for, found or not.
+  std::vector<std::pair<std::string, std::string>> parts() const {
+    Key key("source", 1);
+    key.add("extension", lower_extension(path_));
+    key.add_input("model", main_.digest, main_.bytes);
+    for (const FileRequest& r : requests_)
+      if (r.found)
+        key.add_input("file " + to_wire(r.uri), r.digest, r.bytes);
+      else
+        key.add("input file " + to_wire(r.uri), "not there");
+    return key.added_parts();
+  }
+  Sha256 digest() const { return digest_of_parts(parts()); }
+
+  /// Imports the model, unless open() has. InputError when a file is not what it was at open(). Refers to
+  /// this object.
+  Source source() {
+    return {[this](const ImportOptions& options, const RunContext& context) {
+      if (imported_) return std::move(*std::exchange(imported_, nullptr));
+      std::vector<FileRequest> again;
+      ImportedModel model = import(options, context, again);
+      if (note_of(again) != note_of(requests_))
+        throw InputError(path_.filename().string(), "", "files that stay as they are while they are compiled",
+                         "one that has changed meanwhile");
+      return model;
+    }};
+  }
+
+  /// Input digests for provenance: the model's own references, never the paths of this machine.
+  Json inputs() const {
+    Json list = Json::array({{{"role", "model"}, {"sha256", to_hex(main_.digest)}, {"bytes", main_.bytes}}});
+    for (const FileRequest& r : requests_)
+      if (r.found)
+        list.push_back({{"role", "file"},
+                        {"uri", readable_name(r.uri)},
+                        {"sha256", to_hex(r.digest)},
+                        {"bytes", r.bytes}});
+    return list;
+  }
+
+  /// The model, then what it asked for, in that order.
+  std::vector<FileRequest> files() const {
+    std::vector<FileRequest> all;
+    if (main_.found) all.push_back(main_);
+    all.insert(all.end(), requests_.begin(), requests_.end());
+    return all;
+  }
+
+ private:
+  void look_at_model() {
+    const auto stamp = stamp_of(path_.string());
+    for (const FileRequest& r : known_)
+      if (r.uri.empty() && r.found && stamp && *stamp == r.stamp) {
+        main_ = r;
+        return;
+      }
+    read_model();
+  }
+  /// A file of a gigabyte need not wait for the package. Whoever needs it again reads it again.
+  void forget_bytes() {
+    bytes_ = {};
+    has_bytes_ = false;
+  }
+  void read_model() {
+    FileStamp stamp;
+    bytes_ = read_input_file(path_, static_cast<std::uint64_t>(options_.max_file_bytes), &stamp);
+    has_bytes_ = true;
+    const FileRequest found{"", true, sha256(bytes_), bytes_.size(), stamp};
+    if (main_.found && (found.digest != main_.digest || found.bytes != main_.bytes))
+      throw InputError(path_.filename().string(), "", "a file that stays as it is while it is compiled",
+                       "one that has changed meanwhile");
+    main_ = found;
+  }
+  Sha256 list_key() const {
+    Key key("import-files", kImportVersion);
+    key.add("extension", lower_extension(path_));
+    key.add_input("model", main_.digest, main_.bytes);
+    OptionTexts texts;
+    append_field_texts("import", options_, texts);
+    for (auto& [path, text] : texts) key.add(std::move(path), std::move(text));
+    return key.digest();
+  }
+  bool unchanged_since(const std::string& note) {
+    const auto uris = uris_of(note);
+    if (!uris) return false;
+    FileResolver resolver(path_.parent_path());
+    resolver.expect(known_);
+    for (const std::string& uri : *uris) {
+      try {
+        resolver.look(uri, static_cast<std::uint64_t>(options_.max_file_bytes));
+      } catch (const InputError&) {
+        return false;  // the import itself must say what is wrong
+      }
+    }
+    if (note_of(resolver.requests()) != note) return false;
+    requests_ = resolver.requests();
+    return true;
+  }
+  ImportedModel import(const ImportOptions& options, const RunContext& context,
+                       std::vector<FileRequest>& requests) {
+    if (!has_bytes_) read_model();
+    FileResolver resolver(path_.parent_path());
+    try {
+      refuse_too_large(path_.filename().string(), bytes_, memory_bytes_);
+      ImportedModel m = import_model(path_.filename().string(), bytes_, resolver, options, context);
+      requests = resolver.requests();
+      forget_bytes();
+      return m;
+    } catch (const ResourceError&) {
+      throw;
+    } catch (const InputError& e) {
+      requests = resolver.requests();
+      if (resolver.failed_for_resources()) throw ResourceError(e.file(), e.place(), e.expected(), e.found());
+      throw;
+    } catch (...) {
+      requests = resolver.requests();  // what a failure depends on, too
+      throw;
+    }
+  }
+
+  std::filesystem::path path_;
+  ImportOptions options_;  // of open()
+  std::uint64_t memory_bytes_ = 0;
+  std::vector<FileRequest> known_;
+  Bytes bytes_;
+  bool has_bytes_ = false;
+  FileRequest main_;
+  std::vector<FileRequest> requests_;
+  std::shared_ptr<ImportedModel> imported_;
+};
 
 /// What made the package, without dates, hosts or paths. What package.meta says stands in about.json.
 std::string provenance(const ModelSource& source, const CompileOptions& options) {
@@ -30,7 +234,7 @@ std::string provenance(const ModelSource& source, const CompileOptions& options)
               {"tool", "texmesh " + tool_version()},
               {"format", {{"major", kFormatMajor}, {"minor", kFormatMinor}}},
               {"inputs", source.inputs()},
-              {"options", Json::parse(write_profile(recorded))},
+              {"options", profile_json(recorded)},
               {"stages", stages},
               {"libraries", libraries}}
       .dump();
@@ -83,6 +287,13 @@ CompileOutcome compile_source(const CompileRequest& request, const CompileOption
 }
 
 }  // namespace
+
+/// A bound from below: of ten million triangles scale space takes 427 bytes each, of 500,000 simplification
+/// 520.
+std::uint64_t least_memory_bytes(std::uint64_t triangles) {
+  constexpr std::uint64_t kPerTriangle = 400;
+  return kPerTriangle * triangles;
+}
 
 CompileOutcome compile_model(const CompileRequest& request, Store& store, const RunContext& context,
                              const StageObserver& observer) {

@@ -5,7 +5,7 @@
 #include "pipeline/compile/options.h"
 #include "pipeline/graph/graph_run.h"
 #include "pipeline/graph/store.h"
-#include "pipeline/io/file_request.h"
+#include "pipeline/io/file_stamp.h"
 
 namespace texmesh {
 
@@ -34,6 +34,9 @@ struct CompileOutcome {
   std::vector<FileRequest> files;  // what the result depends on: the model (uri ""), then what it refers to
   StageKeys keys;
 };
+
+/// What compiling so many triangles takes at least, without their textures.
+std::uint64_t least_memory_bytes(std::uint64_t triangles);
 
 /// Compiles one model in this process: reads the input and what it refers to beneath its folder, runs the
 /// graph over the store, writes the package atomically. Throws InputError, FormatError, StageError or

@@ -1,20 +1,26 @@
+// Options as generic code sees them: listed from the fields of their structs, as JSON both ways, as schema.
 #include "pipeline/compile/option_fields.h"
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
 #include <sstream>
-#include <type_traits>
 
 #include "format/base/errors.h"
-#include "pipeline/compile/option_json.h"
-#include "pipeline/compile/options.h"
-#include "pipeline/graph/option_text.h"
 #include "pipeline/io/wire_text.h"
 
 namespace texmesh {
 namespace {
 
-using Json = nlohmann::ordered_json;
+template <class T>
+constexpr OptionKind kind_of() {
+  if constexpr (std::is_enum_v<T>) return OptionKind::kName;
+  if constexpr (std::is_same_v<T, bool>) return OptionKind::kSwitch;
+  if constexpr (std::is_same_v<T, int>) return OptionKind::kInteger;
+  if constexpr (std::is_same_v<T, double>) return OptionKind::kNumber;
+  if constexpr (std::is_same_v<T, std::vector<int>>) return OptionKind::kIntegers;
+  if constexpr (std::is_same_v<T, std::vector<double>>) return OptionKind::kNumbers;
+  return OptionKind::kText;
+}
 
 /// Collects the fields of one options struct.
 struct FieldCollector {
@@ -22,19 +28,30 @@ struct FieldCollector {
   std::set<std::string>& set_by_user;
   std::vector<OptionField>& out;
 
-  template <class T>
-  void operator()(const char* name, T& value, Range range, const char* help) {
-    out.push_back({stage, name, help, range, &value, &set_by_user});
+  /// `rest`: a Range or none, ProfileOnly or not, the help.
+  template <class T, class... Rest>
+  void operator()(const char* name, T& value, const Rest&... rest) {
+    OptionField field;
+    field.stage = stage, field.name = name, field.kind = kind_of<T>(), field.set_by_user = &set_by_user;
+    (take(field, rest), ...);
+    if constexpr (std::is_enum_v<T>) field.words = EnumNames<T>::names;
+    const FieldRule rule = rule_of(field);
+    field.put = [&value](Json& to) { put_value(to, value); };
+    field.put_schema = [rule](Json& to) { texmesh::put_schema<T>(to, rule); };
+    field.get = [&value, rule](const Json& from, const RecordPlace& at) { get_value(from, value, rule, at); };
+    out.push_back(std::move(field));
   }
-  template <class T>
-  void operator()(const char* name, T& value, const char* help) {
-    if constexpr (std::is_enum_v<T>) {
-      EnumField e{EnumNames<T>::names, [&value] { return static_cast<std::size_t>(value); },
-                  [&value](std::size_t i) { value = static_cast<T>(i); }};
-      out.push_back({stage, name, help, std::nullopt, std::move(e), &set_by_user});
-    } else {
-      out.push_back({stage, name, help, std::nullopt, &value, &set_by_user});
-    }
+
+ private:
+  static void take(OptionField& field, const Range& range) { field.range = range; }
+  static void take(OptionField& field, const ProfileOnly&) { field.has_flag = false; }
+  static void take(OptionField& field, const char* help) { field.help = help; }
+
+  /// Lists have 1 to 64 elements, texts without a Range 200 bytes.
+  static FieldRule rule_of(const OptionField& field) {
+    FieldRule rule{.range = field.range, .count = Range{1, 64}};
+    if (field.kind == OptionKind::kText && !field.range) rule.range = Range{0, 200};
+    return rule;
   }
 };
 
@@ -45,13 +62,8 @@ Json parse_text(const OptionField& field, const std::string& text) {
     Json j = Json::parse(t, nullptr, false);
     return j.is_number() || j.is_boolean() ? j : Json(t);
   };
-  const bool is_list = std::holds_alternative<std::vector<int>*>(field.value) ||
-                       std::holds_alternative<std::vector<double>*>(field.value);
-  if (!is_list) {
-    const bool is_text =
-        std::holds_alternative<std::string*>(field.value) || std::holds_alternative<EnumField>(field.value);
-    return is_text ? Json(text) : scalar(text);
-  }
+  if (field.kind == OptionKind::kText || field.kind == OptionKind::kName) return Json(text);
+  if (field.kind != OptionKind::kIntegers && field.kind != OptionKind::kNumbers) return scalar(text);
   Json list = Json::array();
   std::istringstream in(text);
   for (std::string part; std::getline(in, part, ',');) list.push_back(scalar(part));
@@ -75,21 +87,31 @@ OptionField* find_option(std::vector<OptionField>& fields, std::string_view path
   return it == fields.end() ? nullptr : &*it;
 }
 
-std::string option_text(const OptionField& field) {
-  if (const auto* e = std::get_if<EnumField>(&field.value)) return option_text(e->names[e->get()]);
-  return std::visit(
-      [](const auto& value) {
-        if constexpr (std::is_same_v<std::decay_t<decltype(value)>, EnumField>)
-          return std::string();
-        else
-          return option_text(*value);
-      },
-      field.value);
+Json option_json(const OptionField& field) {
+  Json json;
+  field.put(json);
+  return json;
+}
+
+std::string option_text(const OptionField& field) { return option_json(field).dump(); }
+
+void set_option_json(OptionField& field, const Json& json, const std::string& file,
+                     const std::string& place) {
+  field.get(json, RecordPlace{file, nullptr, place});
+  field.set_by_user->insert(field.path());
 }
 
 void set_option(OptionField& field, const std::string& text, const std::string& source) {
   if (!is_utf8(text)) throw InputError(source, "", "UTF-8", readable_name(text));
   set_option_json(field, parse_text(field, text), source, "");
+}
+
+Json option_schema(const OptionField& field) {
+  Json schema;
+  field.put_schema(schema);
+  schema["description"] = field.help;
+  schema["default"] = option_json(field);
+  return schema;
 }
 
 }  // namespace texmesh

@@ -3,29 +3,30 @@
 #include <optional>
 #include <set>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <string_view>
-#include <variant>
+#include <type_traits>
 #include <vector>
 
-#include "format/base/fields.h"
+#include "pipeline/compile/options.h"
+#include "pipeline/graph/make_stage.h"
+#include "pipeline/io/record.h"
 
 namespace texmesh {
 
-struct CompileOptions;
+enum class OptionKind : std::uint8_t { kSwitch, kInteger, kNumber, kText, kIntegers, kNumbers, kName };
 
-/// A field whose C++ type is an enum, seen as text.
-struct EnumField {
-  std::span<const std::string_view> names;
-  std::function<std::size_t()> get;
-  std::function<void(std::size_t)> set;
-};
-
-/// One option as generic code sees it. Pointers lead into the CompileOptions that list_options was given.
+/// One option as generic code sees it. The functions reach into the CompileOptions that list_options was
+/// given.
 struct OptionField {
   std::string stage, name, help;
   std::optional<Range> range;
-  std::variant<bool*, int*, double*, std::string*, std::vector<int>*, std::vector<double>*, EnumField> value;
+  bool has_flag = true;  // false: profiles alone may set it (ProfileOnly)
+  OptionKind kind = OptionKind::kText;
+  std::span<const std::string_view> words;  // kName: one of these
+  std::function<void(Json&to)> put, put_schema;
+  std::function<void(const Json& from, const RecordPlace& at)> get;
   std::set<std::string>* set_by_user = nullptr;  // of the same CompileOptions; set_option() adds the path
   std::string path() const { return stage + "." + name; }
 };
@@ -34,10 +35,44 @@ std::vector<OptionField> list_options(CompileOptions& options);
 /// The field with this path, or null.
 OptionField* find_option(std::vector<OptionField>& fields, std::string_view path);
 
-/// Text of a field's value as JSON: what keys, provenance and --explain compare.
+/// A field's value as JSON, and its text: what keys, provenance and --explain compare.
+Json option_json(const OptionField& field);
 std::string option_text(const OptionField& field);
 
+/// Sets a field. Strict: a wrong type or a value out of range throws InputError{file, place, ...}.
+void set_option_json(OptionField& field, const Json& json, const std::string& file, const std::string& place);
 /// Sets a field from text as given on a command line ("20", "draco", "5,8,11"). InputError names the flag.
 void set_option(OptionField& field, const std::string& text, const std::string& source);
+
+/// What a schema says of a field: type, range, help, default.
+Json option_schema(const OptionField& field);
+
+/// The name of a part of `all`: "ssf" of a section, "ladder.mode" of a field. Throws std::logic_error for
+/// what is no part of it.
+template <class T>
+std::string option_name(const CompileOptions& all, const T& part) {
+  const auto is_part = [&part](const auto& candidate) {
+    if constexpr (std::is_same_v<std::remove_cvref_t<decltype(candidate)>, T>)
+      return &candidate == &part;
+    else
+      return false;
+  };
+  std::string found;
+  CompileOptions::sections(all, [&](const std::string& name, const auto& section) {
+    if (is_part(section)) found = name;
+    std::remove_cvref_t<decltype(section)>::fields(section,
+                                                   [&](const char* field, const auto& value, auto&&...) {
+                                                     if (is_part(value)) found = name + "." + field;
+                                                   });
+  });
+  if (found.empty()) throw std::logic_error("not an option");
+  return found;
+}
+
+/// Declares what a stage reads of `all`: whole sections or single fields, as they stand there.
+template <class... T>
+Options<T...> read_of(const CompileOptions& all, const T&... parts) {
+  return options(OptionValue<T>(option_name(all, parts), parts)...);
+}
 
 }  // namespace texmesh

@@ -3,8 +3,8 @@
 #include <algorithm>
 
 #include "pipeline/compile/artefacts.h"
-#include "pipeline/compile/declare_options.h"
 #include "pipeline/compile/library_versions.h"
+#include "pipeline/compile/option_fields.h"
 #include "stages/fill/fill.h"
 #include "stages/previews/previews.h"
 
@@ -69,26 +69,6 @@ Results<PackageTables, ThesisTables> measure_fragments(const Fragments& fragment
   return {{std::move(made.tables), std::move(made.thesis)}, {}};
 }
 
-Results<MeasuredQuality> measure_pictures(const NestedScales& scales, const PerceptualValues& perceptual,
-                                          const Materials& materials, const Images& images,
-                                          const Fragments& fragments, const Planes& planes,
-                                          const Ladder& ladder, const Previews& previews,
-                                          const PackageTables& tables, const QualityOptions& options,
-                                          const RunContext& context) {
-  MeasuredQuality measured = measure_quality(scales, perceptual, materials, images, fragments, planes, ladder,
-                                             previews, tables, options, context);
-  Notes notes = measured.notes;
-  return {std::move(measured), std::move(notes)};
-}
-
-Results<Proxies> bake_proxies(const NestedScales& scales, const Materials& materials, const Images& images,
-                              const Fragments& fragments, const Planes& planes, const ProxiesOptions& options,
-                              const RunContext& context) {
-  Proxies made = make_proxies(scales, materials, images, fragments, planes, options, context);
-  Notes notes = made.notes;
-  return {std::move(made), std::move(notes)};
-}
-
 Bytes package_all(const NestedScales& scales, const PerceptualValues& perceptual, const Images& images,
                   const Fragments& fragments, const Ladder& ladder, const Previews& previews,
                   const PackageTables& tables, const ThesisTables& thesis, const ScaleFiles& files,
@@ -120,7 +100,7 @@ Stage stage(StageTitle title, Read read, Made made, Declared declared,
 /// Waits for the skeleton only where R(v) is the signal.
 Stage scale_space_stage(const CompileOptions& o) {
   const StageTitle title{"ssf", kSsfVersion,
-                         "mesh -> scale map: the highest scale at which a vertex is a feature"};
+                         "mesh -> scale map: the highest scale at which a vertex is a feature", .05};
   if (o.ssf.signal == ScaleSignal::kRadius)
     return stage(title, inputs(kImportedMesh, kConditionedMesh, kSkeleton), outputs(kScaleMap),
                  read_of(o, o.ssf), {}, filter_radius);
@@ -128,65 +108,71 @@ Stage scale_space_stage(const CompileOptions& o) {
                filter_scales);
 }
 
+Stage package_stage(const CompileOptions& o) {
+  return stage({"package", kPackageVersion, "everything -> the container", .01},
+               inputs(kNestedScales, kPerceptualValues, kImages, kFragments, kLadder, kPreviews, kTables,
+                      kThesisTables, kScaleFiles, kQuality, kPoster, kProxies, kSourceAbout, kProvenance),
+               outputs(kPackage), read_of(o, o.package, o.perceptual_values.jnd), {}, package_all);
+}
+
 }  // namespace
 
 std::vector<Stage> stage_table(const CompileOptions& o) {
   return {
-      stage({"import", kImportVersion, "file -> mesh, materials, images, what it says of itself"},
+      stage({"import", kImportVersion, "file -> mesh, materials, images, what it says of itself", .02},
             inputs(kSource), outputs(kImportedMesh, kMaterials, kImages, kSourceAbout), read_of(o, o.import),
             {"draco", "libpng", "libzstd", "meshoptimizer", "openimageio", "tinygltf", "zlib"},
             import_source),
       stage({"condition", kConditionVersion,
-             "mesh -> 2-manifold mesh: weld, drop degenerates, split, components"},
+             "mesh -> 2-manifold mesh: weld, drop degenerates, split, components", .02},
             inputs(kImportedMesh), outputs(kConditionedMesh), read_of(o, o.condition), {}, condition_import),
-      stage({"skeletonization", kSkeletonizationVersion, "mesh -> curve skeleton, R(v)"},
+      stage({"skeletonization", kSkeletonizationVersion, "mesh -> curve skeleton, R(v)", .08},
             inputs(kConditionedMesh), outputs(kSkeleton), read_of(o, o.skeletonization),
             {"cgal", "meshoptimizer"}, skeletonize),
       scale_space_stage(o),
-      stage({"simplification", kSimplificationVersion, "mesh, scale map -> collapse sequence, nested scales"},
+      stage({"simplification", kSimplificationVersion, "mesh, scale map -> collapse sequence, nested scales",
+             .09},
             inputs(kConditionedMesh, kScaleMap), outputs(kNestedScales), read_of(o, o.simplification), {},
             simplify),
       stage({"perceptual_values", kPerceptualValuesVersion,
-             "scales, R -> perceptual values, major scales, step function"},
+             "scales, R -> perceptual values, major scales, step function", .03},
             inputs(kNestedScales, kSkeleton), outputs(kPerceptualValues), read_of(o, o.perceptual_values), {},
             measure_perceptual_values),
-      stage({"fragmentation", kFragmentationVersion, "images, mesh -> grids, coverage, feature counts, eta"},
+      stage({"fragmentation", kFragmentationVersion, "images, mesh -> grids, coverage, feature counts, eta",
+             .01},
             inputs(kConditionedMesh, kMaterials, kImages, kScaleMap), outputs(kFragments),
             read_of(o, o.fragmentation), {"openimageio"}, fragment_textures),
-      stage({"fill", kFillVersion, "images, coverage -> filled texels (derived, never stored)"},
+      stage({"fill", kFillVersion, "images, coverage -> filled texels (derived, never stored)", .05},
             inputs(kFragments, kImages), derived(kFilledPlanes),
             read_of(o, o.fragmentation.fill, o.ladder.mode, o.ladder.uncovered),
             {"libjpeg-turbo", "libpng", "openimageio"}, fill_fragments),
-      stage({"zim", kZimVersion, "fragments -> predictors Z, I, M, VQP"},  //
+      stage({"zim", kZimVersion, "fragments -> predictors Z, I, M, VQP", .03},  //
             inputs(kFragments, kFilledPlanes), outputs(kPredictors), read_of(o, o.zim), {}, predict_quality),
-      stage({"previews", kPreviewsVersion, "fragments -> a small JPEG of every texture"},
+      stage({"previews", kPreviewsVersion, "fragments -> a small JPEG of every texture", .01},
             inputs(kFragments, kFilledPlanes), outputs(kPreviews),
             read_of(o, o.ladder.preview_quality, o.ladder.subsampling), {"libjpeg-turbo"}, preview_fragments),
-      stage({"ladder", kLadderVersion, "fragments, previews -> rungs of streams in the chosen codec"},
+      stage({"ladder", kLadderVersion, "fragments, previews -> rungs of streams in the chosen codec", .11},
             inputs(kFragments, kFilledPlanes, kPreviews, kImages), outputs(kLadder), read_of(o, o.ladder),
             {"libjpeg-turbo", "libwebp"}, encode_ladder),
-      stage({"lut", kLutVersion, "fragments, predictors, ladder, previews -> quality and size tables"},
+      stage({"lut", kLutVersion, "fragments, predictors, ladder, previews -> quality and size tables", .08},
             inputs(kFragments, kFilledPlanes, kPredictors, kLadder, kPreviews),
             outputs(kTables, kThesisTables), read_of(o, o.lut), {"libjpeg-turbo", "libwebp"},
             measure_fragments),
-      stage({"scales", kScalesVersion, "kept scales -> GLB files, vertex splits"},
+      stage({"scales", kScalesVersion, "kept scales -> GLB files, vertex splits", .03},
             inputs(kNestedScales, kPerceptualValues, kMaterials, kImages, kFragments, kPreviews),
             outputs(kScaleFiles), read_of(o, o.scales), {"draco", "libjpeg-turbo", "meshoptimizer", "zlib"},
             write_scales),
-      stage({"quality", kQualityVersion, "scales, rungs -> losses of lit pictures, switch sizes"},
+      stage({"quality", kQualityVersion, "scales, rungs -> losses of lit pictures, switch sizes", .26},
             inputs(kNestedScales, kPerceptualValues, kMaterials, kImages, kFragments, kFilledPlanes, kLadder,
                    kPreviews, kTables),
-            outputs(kQuality), read_of(o, o.quality), kImageLibraries, measure_pictures),
-      stage({"poster", kPosterVersion, "S_0 with the source's texels -> a picture of the object"},
+            outputs(kQuality), read_of(o, o.quality), kImageLibraries, measure_quality),
+      stage({"poster", kPosterVersion, "S_0 with the source's texels -> a picture of the object", .02},
             inputs(kNestedScales, kMaterials, kFragments, kFilledPlanes), outputs(kPoster),
             read_of(o, o.poster), {"libjpeg-turbo"}, make_poster),
-      stage({"proxies", kProxiesVersion, "S_0 -> small GLBs with atlases and textures of their own"},
+      stage({"proxies", kProxiesVersion, "S_0 -> small GLBs with atlases and textures of their own", .10},
             inputs(kNestedScales, kMaterials, kImages, kFragments, kFilledPlanes), outputs(kProxies),
-            read_of(o, o.proxies), {"draco", "libwebp", "meshoptimizer"}, bake_proxies),
-      stage({"package", kPackageVersion, "everything -> the container"},
-            inputs(kNestedScales, kPerceptualValues, kImages, kFragments, kLadder, kPreviews, kTables,
-                   kThesisTables, kScaleFiles, kQuality, kPoster, kProxies, kSourceAbout, kProvenance),
-            outputs(kPackage), read_of(o, o.package, o.perceptual_values.jnd), {}, package_all),
+            read_of(o, o.proxies), {"draco", "libwebp", "meshoptimizer"}, make_proxies),
+      package_stage(o),
   };
 }
 

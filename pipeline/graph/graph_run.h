@@ -1,15 +1,61 @@
 #pragma once
+#include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "pipeline/graph/explanation.h"
+#include "pipeline/graph/key.h"
 #include "pipeline/graph/stage.h"
-#include "pipeline/graph/stage_observer.h"
 #include "pipeline/graph/store.h"
+#include "pipeline/io/record.h"
 
 namespace texmesh {
+
+/// One labelled part of a key that has changed; "" where the key had, or has, no such part.
+struct KeyChange {
+  std::string label, from, to;
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("part", s.label, kNotEmpty, "");
+    v("from", s.from, "empty = was not there");
+    v("to", s.to, "empty = is not there");
+  }
+};
+
+enum class StageVerdict : std::uint8_t {
+  kHit,      // the result is in the store
+  kRuns,     // the result is not in the store
+  kUnknown,  // forecasts only: depends on the result of an earlier stage that runs
+};
+template <>
+struct EnumNames<StageVerdict> {
+  static constexpr std::array<std::string_view, 3> names{"hit", "runs", "unknown"};
+};
+
+/// Why a stage is run or not.
+struct StageExplanation {
+  using Verdict = StageVerdict;
+  Verdict verdict = Verdict::kHit;
+  bool has_history = false;        // a key of an earlier run of this stage for this model is known
+  std::vector<KeyChange> changes;  // against that key, in the order of its parts; empty where nothing changed
+  std::string waits_for;           // kUnknown: the artefact
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("verdict", s.verdict,
+      "hit = from the cache; unknown = in a dry run, depends on what an earlier stage gives");
+    v("history", s.has_history, "an earlier run of this stage for this model is known");
+    v("changes", s.changes, "against that run, in the order of the key's parts");
+    v("waits_for", s.waits_for, FieldRule{.range = kNotEmpty.range, .may_miss = true},
+      "the artefact that is not known yet");
+  }
+};
+using StageExplainer = std::function<void(const Stage& stage, const StageExplanation& explanation)>;
+
+/// Compares a stage's key with the key of an earlier run, whose parts the store remembers.
+StageExplanation explain_key(const Stage& stage, const Key& key, StageExplanation::Verdict verdict,
+                             const StageKeys& earlier, Store& store);
 
 /// Runs a graph of stages for one model over a store, once. Stages whose inputs are known run side by side,
 /// at most context.threads at a time. A stage whose key is in the store is not run, and its result is loaded

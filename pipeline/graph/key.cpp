@@ -43,10 +43,13 @@ Sha256 digest_of_parts(const std::vector<std::pair<std::string, std::string>>& p
 }
 
 std::optional<Key> key_from_preimage(const std::string& preimage) {
-  const auto j = nlohmann::ordered_json::parse(preimage, nullptr, false);
-  if (!j.is_object()) return std::nullopt;
+  return key_from_json(nlohmann::ordered_json::parse(preimage, nullptr, false));
+}
+
+std::optional<Key> key_from_json(const nlohmann::ordered_json& json) {
+  if (!json.is_object()) return std::nullopt;
   Key key;
-  for (const auto& [label, value] : j.items()) {
+  for (const auto& [label, value] : json.items()) {
     if (!value.is_string()) return std::nullopt;
     key.add(label, value.get<std::string>());
   }

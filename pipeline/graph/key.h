@@ -1,6 +1,7 @@
 #pragma once
 #include <cstdint>
 #include <map>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -33,12 +34,13 @@ class Key {
 
  private:
   Key() = default;
-  friend std::optional<Key> key_from_preimage(const std::string& preimage);
+  friend std::optional<Key> key_from_json(const nlohmann::ordered_json& json);
   std::vector<std::pair<std::string, std::string>> parts_;
 };
 
 /// A key from its preimage, with the same parts in the same order; nothing when it is no preimage.
 std::optional<Key> key_from_preimage(const std::string& preimage);
+std::optional<Key> key_from_json(const nlohmann::ordered_json& json);
 
 /// The keys that the stages of one model had, by stage name.
 using StageKeys = std::map<std::string, Sha256>;

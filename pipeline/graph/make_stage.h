@@ -96,6 +96,7 @@ struct StageTitle {
   std::string name;
   int version = 1;
   std::string summary;
+  double time_share = 0;
 };
 
 namespace make_stage_detail {
@@ -151,6 +152,7 @@ Stage describe(StageTitle title, const Inputs<I...>& read, const Options<P...>& 
   stage.name = std::move(title.name);
   stage.version = title.version;
   stage.summary = std::move(title.summary);
+  stage.time_share = title.time_share;
   stage.libraries = std::move(libraries);
   std::apply([&](auto... artefact) { (stage.inputs.emplace_back(artefact), ...); }, read.artefacts);
   std::apply([&](const auto&... option) { (stage.options.push_back(option.for_key()), ...); },

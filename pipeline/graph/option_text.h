@@ -1,26 +1,20 @@
 #pragma once
-#include <cstddef>
 #include <string>
-#include <string_view>
 #include <type_traits>
 #include <utility>
 #include <vector>
 
-#include "format/base/fields.h"
+#include "pipeline/io/record.h"
 
 namespace texmesh {
 
 /// The value of an option as JSON: what keys hold and --explain compares. Doubles have the fewest digits that
 /// give the same double back.
-std::string option_text(bool value);
-std::string option_text(int value);
-std::string option_text(double value);
-std::string option_text(std::string_view value);
-std::string option_text(const std::vector<int>& values);
-std::string option_text(const std::vector<double>& values);
-inline std::string option_text(const std::string& value) { return option_text(std::string_view(value)); }
-template <class E>
-requires std::is_enum_v<E> std::string option_text(E value) { return option_text(enum_name(value)); }
+template <class T>
+requires(!std::is_class_v<T> || std::is_same_v<T, std::string> || record_detail::IsList<T>::value) std::string
+    option_text(const T& value) {
+  return to_json_line(value);
+}
 
 /// Labels and texts, in order.
 using OptionTexts = std::vector<std::pair<std::string, std::string>>;

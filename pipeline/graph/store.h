@@ -1,8 +1,6 @@
 #pragma once
 #include <cstdint>
-#include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -20,6 +18,12 @@ struct StoredBlob {
   Sha256 digest{};
   std::uint64_t bytes = 0;
   friend bool operator==(const StoredBlob&, const StoredBlob&) = default;
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("name", s.name, "");
+    v("sha256", s.digest, "");
+    v("bytes", s.bytes, "");
+  }
 };
 using SharedBytes = std::shared_ptr<const Bytes>;
 
@@ -77,24 +81,6 @@ class NullStore : public Store {
   std::optional<std::string> preimage(const Sha256&) override { return std::nullopt; }
   std::optional<std::string> find_note(const Sha256&) override { return std::nullopt; }
   bool put_note(const Sha256&, const std::string&) override { return true; }
-};
-
-/// In memory, for tests.
-class MemoryStore : public Store {
- public:
-  std::optional<std::vector<StoredBlob>> find(const Sha256& key) override;
-  SharedBytes load(const StoredBlob& blob) override;
-  bool put(const Key& key, const std::vector<std::pair<std::string, SharedBytes>>& outputs) override;
-  std::optional<std::string> preimage(const Sha256& key) override;
-  void reject(const Sha256& key, const std::vector<StoredBlob>& found, const std::string& reason) override;
-  std::optional<std::string> find_note(const Sha256& key) override;
-  bool put_note(const Sha256& key, const std::string& text) override;
-
- private:
-  std::mutex mutex_;
-  std::map<Sha256, std::vector<StoredBlob>> runs_;
-  std::map<Sha256, SharedBytes> blobs_;
-  std::map<Sha256, std::string> notes_, preimages_;
 };
 
 }  // namespace texmesh

@@ -11,6 +11,7 @@
 #include "format/model/model.h"
 #include "pipeline/io/resolver.h"
 #include "stages/base/run_context.h"
+#include "stages/data/stage.h"
 
 namespace texmesh {
 
@@ -46,7 +47,7 @@ struct ImportOptions {
   static void fields(S& s, V&& v) {
     v("max_vertices", s.max_vertices, Range{3, 2e9}, "refuse models with more vertices");
     v("max_triangles", s.max_triangles, Range{1, 2e9}, "refuse models with more triangles");
-    v("max_images", s.max_images, Range{0, 65535}, "refuse models with more images");
+    v("max_images", s.max_images, Range{0, 65535}, ProfileOnly{}, "refuse models with more images");
     v("max_file_bytes", s.max_file_bytes, Range{1, 1e12}, "refuse larger files");
     v("max_image_pixels", s.max_image_pixels, Range{1, 4e9}, "refuse larger images");
     v("obj_kd", s.obj_kd,

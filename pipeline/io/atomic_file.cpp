@@ -29,15 +29,6 @@ constexpr std::string_view kTemporaryMark = ".tmp-";
   throw ResourceError(path, "", "a writable file", std::string(step) + ": " + std::strerror(errno));
 }
 
-void write_all(int fd, std::span<const std::uint8_t> bytes, const std::string& path) {
-  while (!bytes.empty()) {
-    const ssize_t n = ::write(fd, bytes.data(), std::min<std::size_t>(bytes.size(), 1 << 24));
-    if (n < 0 && errno == EINTR) continue;
-    if (n < 0) fail(path, "write");
-    bytes = bytes.subspan(static_cast<std::size_t>(n));
-  }
-}
-
 void sync_folder(const std::string& path) {
   const std::string folder = std::filesystem::path(path).parent_path().string();
   Descriptor d{::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)};
@@ -111,7 +102,7 @@ void write_file_atomically(const std::string& path, std::span<const std::uint8_t
   }
   if (d.get() < 0) fail(path, "open");
   try {
-    write_all(d.get(), bytes, path);
+    if (!write_all(d.get(), bytes)) fail(path, "write");
     if (::fdatasync(d.get()) != 0) fail(path, "fdatasync");
     if (::rename(temp.c_str(), path.c_str()) != 0) fail(path, "rename");
   } catch (...) {
@@ -147,7 +138,8 @@ void write_output_file(const std::string& path, std::span<const std::uint8_t> by
   if (is_special_file(path)) {
     const Descriptor d{::open(path.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC)};
     if (d.get() < 0) fail(path, "open");
-    return write_all(d.get(), bytes, path);
+    if (!write_all(d.get(), bytes)) fail(path, "write");
+    return;
   }
   const std::string target = behind_links(path);
   write_file_atomically(target, bytes, target == path ? temporary : "");

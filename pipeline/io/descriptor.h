@@ -1,6 +1,11 @@
 #pragma once
 #include <unistd.h>
 
+#include <algorithm>
+#include <cerrno>
+#include <cstdint>
+#include <span>
+#include <string_view>
 #include <utility>
 
 namespace texmesh {
@@ -22,5 +27,20 @@ class Descriptor {
  private:
   int fd_;
 };
+
+/// Writes all of it, in pieces that every system takes at once; false, with errno, where that fails.
+inline bool write_all(int fd, std::span<const std::uint8_t> bytes) {
+  constexpr std::size_t kPieceBytes = 1 << 24;
+  while (!bytes.empty()) {
+    const ssize_t n = ::write(fd, bytes.data(), std::min(bytes.size(), kPieceBytes));
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) return false;
+    bytes = bytes.subspan(static_cast<std::size_t>(n));
+  }
+  return true;
+}
+inline bool write_all(int fd, std::string_view text) {
+  return write_all(fd, {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
+}
 
 }  // namespace texmesh

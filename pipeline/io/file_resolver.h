@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/io/file_request.h"
 #include "pipeline/io/file_stamp.h"
 #include "pipeline/io/resolver.h"
 

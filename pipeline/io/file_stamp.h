@@ -5,6 +5,9 @@
 #include <optional>
 #include <string>
 
+#include "format/base/sha256.h"
+#include "pipeline/io/record.h"
+
 namespace texmesh {
 
 /// What tells, without reading a file, that it has not changed: device, inode, size, and the times of the
@@ -14,6 +17,18 @@ struct FileStamp {
   std::uint64_t device = 0, inode = 0, bytes = 0;
   std::int64_t modified_ns = 0, changed_ns = 0;
   friend bool operator==(const FileStamp&, const FileStamp&) = default;
+  template <class S, class A>
+  static void archive(S& s, A& a) {
+    a(s.device, s.inode, s.bytes, s.modified_ns, s.changed_ns);
+  }
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("device", s.device, "");
+    v("inode", s.inode, "");
+    v("bytes", s.bytes, "");
+    v("modified_ns", s.modified_ns, "");
+    v("changed_ns", s.changed_ns, "");
+  }
 
   /// A file that was changed this shortly before it was looked at may be changed again within the clock's
   /// tick: its stamp is no proof.
@@ -21,6 +36,29 @@ struct FileStamp {
     return modified_ns < looked_at_ns - kSettleNs && changed_ns < looked_at_ns - kSettleNs;
   }
   static constexpr std::int64_t kSettleNs = 2'000'000'000;
+};
+
+/// A file that a model asked for. `digest`, `bytes` and `stamp` are zero unless found. Uri, found, digest and
+/// bytes become part of the cache key: the same requests with the same answers give the same model.
+struct FileRequest {
+  std::string uri;  // as the model names it; "" = the model itself
+  bool found = false;
+  Sha256 digest{};
+  std::uint64_t bytes = 0;
+  FileStamp stamp;  // when it was read; no part of any key
+  friend bool operator==(const FileRequest&, const FileRequest&) = default;
+  template <class S, class A>
+  static void archive(S& s, A& a) {
+    a(s.uri, s.found, s.digest, s.bytes, s.stamp);
+  }
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("uri", s.uri, kNamesFile, "");
+    v("found", s.found, "");
+    v("sha256", s.digest, "");
+    v("bytes", s.bytes, "");
+    v("stamp", s.stamp, kMayMiss, "");
+  }
 };
 
 FileStamp stamp_of(const struct stat& status);

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "format/base/errors.h"
@@ -88,36 +90,34 @@ void get(const Json& from, bool& value, const RecordPlace& at) {
 std::int64_t get_signed(const Json& from, double least, double most, const FieldRule& rule,
                         const RecordPlace& at) {
   const Range range = rule.range.value_or(Range{least, most});
-  const std::string expected = rule.range ? range_text("an integer", range) : "a whole number";
-  if (!from.is_number_integer()) at.fail(expected, from);
-  const double value = from.get<double>();
-  if (!(value >= std::max(range.lo, least) && value <= std::min(range.hi, most))) at.fail(expected, from);
+  const double value = from.is_number_integer() ? from.get<double>() : std::nan("");
+  if (!(value >= std::max(range.lo, least) && value <= std::min(range.hi, most)))
+    at.fail(rule.range ? range_text("an integer", range) : "a whole number", from);
   return from.get<std::int64_t>();
 }
 
 std::uint64_t get_unsigned(const Json& from, double most, const FieldRule& rule, const RecordPlace& at) {
   const Range range = rule.range.value_or(Range{0, most});
-  const std::string expected = rule.range ? range_text("an integer", range) : "a whole number from 0";
-  if (!from.is_number_unsigned()) at.fail(expected, from);
-  const double value = from.get<double>();
-  if (!(value >= range.lo && value <= std::min(range.hi, most))) at.fail(expected, from);
+  const double value = from.is_number_unsigned() ? from.get<double>() : std::nan("");
+  if (!(value >= range.lo && value <= std::min(range.hi, most)))
+    at.fail(rule.range ? range_text("an integer", range) : "a whole number from 0", from);
   return from.get<std::uint64_t>();
 }
 
 void get(const Json& from, double& value, const FieldRule& rule, const RecordPlace& at) {
-  const std::string expected = rule.range ? range_text("a number", *rule.range) : "a number";
-  if (!from.is_number()) at.fail(expected, from);
+  if (!from.is_number()) at.fail("a number", from);
   value = from.get<double>();
-  if (rule.range && !(value >= rule.range->lo && value <= rule.range->hi)) at.fail(expected, from);
+  if (rule.range && !(value >= rule.range->lo && value <= rule.range->hi))
+    at.fail(range_text("a number", *rule.range), from);
 }
 
 void get(const Json& from, std::string& value, const FieldRule& rule, const RecordPlace& at) {
-  const auto most = rule.range ? static_cast<std::size_t>(rule.range->hi) : std::string::npos;
-  if (!from.is_string() || from.get_ref<const std::string&>().size() > most)
-    at.fail(rule.range ? "a text of at most " + std::to_string(most) + " bytes" : "a text", from);
-  if (rule.range && from.get_ref<const std::string&>().size() < static_cast<std::size_t>(rule.range->lo))
-    at.fail("a text of at least " + std::to_string(static_cast<std::size_t>(rule.range->lo)) + " bytes",
-            from);
+  const std::string* const text = from.get_ptr<const std::string*>();
+  const Range bytes = rule.range.value_or(Range{0, std::numeric_limits<double>::infinity()});
+  if (!text || static_cast<double>(text->size()) > bytes.hi)
+    at.fail(std::isinf(bytes.hi) ? "a text" : fmt::format("a text of at most {} bytes", bytes.hi), from);
+  if (static_cast<double>(text->size()) < bytes.lo)
+    at.fail(fmt::format("a text of at least {} bytes", bytes.lo), from);
   value = from.get<std::string>();
   if (rule.names_file) value = from_wire(value);
   if (!rule.words) return;
@@ -188,7 +188,7 @@ void schema_of_text(Json& to, const FieldRule& rule) {
   }
   to["type"] = "string";
   if (rule.range && rule.range->lo > 0) to["minLength"] = bound(rule.range->lo, true);
-  if (rule.range) to["maxLength"] = bound(rule.range->hi, true);
+  if (rule.range && !std::isinf(rule.range->hi)) to["maxLength"] = bound(rule.range->hi, true);
   if (rule.pattern) to["pattern"] = rule.pattern;
 }
 
@@ -215,6 +215,11 @@ Json& schema_of_list(Json& to, const FieldRule& rule) {
 Json& schema_of_map(Json& to) {
   to["type"] = "object";
   return to["additionalProperties"];
+}
+
+Json& schema_or_null(Json& to) {
+  to["anyOf"] = Json::array({{{"type", "null"}}, Json()});
+  return to["anyOf"][1];
 }
 
 void begin_object_schema(Json& to) {

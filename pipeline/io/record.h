@@ -5,6 +5,7 @@
 #include <functional>
 #include <limits>
 #include <map>
+#include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <span>
@@ -43,6 +44,12 @@ using Json = nlohmann::ordered_json;
 // has its description in RecordFields. Behind the member stands nothing, a Range or a FieldRule; then what
 // the schema says.
 
+/// A member of documents that are written alone: null where it is empty.
+template <class T>
+struct OrNull {
+  std::optional<T> value;
+};
+
 /// A member that every document of this kind has with the same value.
 struct Constant {
   Constant(int value) : number(value) {}
@@ -61,6 +68,7 @@ struct FieldRule {
   bool names_file = false;          // bytes, which to_wire() makes UTF-8
 };
 inline constexpr FieldRule kMayMiss{.may_miss = true};
+inline constexpr FieldRule kNotEmpty{.range = Range{1, std::numeric_limits<double>::infinity()}};
 inline constexpr FieldRule kNamesFile{.names_file = true};
 inline constexpr FieldRule kSeconds{.range = Range{0, 1e9}};
 
@@ -106,10 +114,20 @@ template <class T>
 struct IsList : std::false_type {};
 template <class T>
 struct IsList<std::vector<T>> : std::true_type {};
+template <class T, std::size_t N>
+struct IsList<std::array<T, N>> : std::true_type {};
+template <class T>
+struct IsOrNull : std::false_type {};
+template <class T>
+struct IsOrNull<OrNull<T>> : std::true_type {};
 template <class T>
 struct IsMap : std::false_type {};
 template <class T>
 struct IsMap<std::map<std::string, T>> : std::true_type {};
+template <class T>
+struct IsShared : std::false_type {};
+template <class T>
+struct IsShared<std::shared_ptr<const T>> : std::true_type {};
 template <class T>
 struct IsOptional : std::false_type {};
 template <class T>
@@ -118,7 +136,14 @@ struct IsOptional<std::optional<T>> : std::true_type {};
 /// Empty or zero.
 template <class T>
 bool is_missing(const T& value) {
-  return value == T{};
+  if constexpr (IsList<T>::value || IsMap<T>::value)
+    return value.empty();
+  else if constexpr (IsOptional<T>::value)
+    return !value;
+  else if constexpr (requires { value == T{}; })
+    return value == T{};
+  else
+    return false;
 }
 
 Json& member(Json& object, std::string_view name);  // makes it
@@ -160,6 +185,7 @@ void schema_of_enum(Json& to, std::span<const std::string_view> names);
 void schema_of_constant(Json& to, const Constant& value);
 Json& schema_of_list(Json& to, const FieldRule& rule);  // the elements' schema
 Json& schema_of_map(Json& to);                          // the members' schema
+Json& schema_or_null(Json& to);                         // the schema of what is not null
 void begin_object_schema(Json& to);
 Json& schema_of_member(Json& object, const char* name, bool may_miss);
 void describe_schema(Json& member, const char* text);
@@ -190,7 +216,25 @@ class FieldVisitor {
 
 /// Puts a value into `to`. Nobody who calls needs json.hpp.
 template <class T>
-void put_value(Json& to, const T& value, const FieldRule& rule = {}) {
+void put_value(Json& to, const T& value, const FieldRule& rule = {});
+
+/// Puts the members of a record into `to`, but for the list called `left_out`.
+template <class T>
+void put_members(Json& to, const T& record, std::string_view left_out = "") {
+  using namespace record_detail;
+  make_object(to);
+  RecordFields<T>::fields(
+      record, FieldVisitor([&](const char* name, const auto& x, const FieldRule& rule, const char*) {
+        using X = std::remove_cvref_t<decltype(x)>;
+        if (name == left_out) return;
+        if constexpr (!std::is_same_v<X, Constant>)
+          if ((rule.may_miss || IsOptional<X>::value) && is_missing(x)) return;
+        put_value(member(to, name), x, rule);
+      }));
+}
+
+template <class T>
+void put_value(Json& to, const T& value, const FieldRule& rule) {
   using namespace record_detail;
   if constexpr (std::is_same_v<T, bool> || std::is_same_v<T, double> || std::is_same_v<T, Json> ||
                 std::is_same_v<T, Constant>) {
@@ -207,6 +251,10 @@ void put_value(Json& to, const T& value, const FieldRule& rule = {}) {
     put(to, std::string_view(to_hex(value)), rule);
   } else if constexpr (IsOptional<T>::value) {
     if (value) put_value(to, *value, rule);
+  } else if constexpr (IsOrNull<T>::value) {
+    if (value.value) put_value(to, *value.value, rule);
+  } else if constexpr (IsShared<T>::value) {
+    put_value(to, *value, rule);
   } else if constexpr (IsList<T>::value) {
     make_list(to);
     for (const auto& x : value) put_value(append(to), x, rule);
@@ -214,14 +262,7 @@ void put_value(Json& to, const T& value, const FieldRule& rule = {}) {
     make_object(to);
     for (const auto& [name, x] : value) put_value(member(to, name), x, rule);
   } else {
-    make_object(to);
-    RecordFields<T>::fields(
-        value, FieldVisitor([&to](const char* name, const auto& x, const FieldRule& r, const char*) {
-          using X = std::remove_cvref_t<decltype(x)>;
-          if constexpr (!std::is_same_v<X, Constant>)
-            if ((r.may_miss || IsOptional<X>::value) && is_missing(x)) return;
-          put_value(member(to, name), x, r);
-        }));
+    put_members(to, value);
   }
 }
 
@@ -245,6 +286,10 @@ void get_value(const Json& from, T& value, const FieldRule& rule, const RecordPl
     value = static_cast<T>(get_unsigned(from, static_cast<double>(std::numeric_limits<T>::max()), rule, at));
   } else if constexpr (IsOptional<T>::value) {
     get_value(from, value.emplace(), rule, at);
+  } else if constexpr (IsShared<T>::value) {
+    std::remove_const_t<typename T::element_type> own;
+    get_value(from, own, rule, at);
+    value = std::make_shared<const decltype(own)>(std::move(own));
   } else if constexpr (IsList<T>::value) {
     const std::size_t count = size_of_list(from, rule, at);
     value.clear();
@@ -296,6 +341,8 @@ void put_schema(Json& to, const FieldRule& rule = {}) {
     schema_of_digest(to);
   } else if constexpr (IsOptional<T>::value) {
     put_schema<typename T::value_type>(to, rule);
+  } else if constexpr (IsOrNull<T>::value) {
+    put_schema<typename decltype(T::value)::value_type>(schema_or_null(to), rule);
   } else if constexpr (IsList<T>::value) {
     put_schema<typename T::value_type>(schema_of_list(to, rule), rule);
   } else if constexpr (IsMap<T>::value) {
@@ -330,6 +377,21 @@ std::string json_line_of(const std::function<void(Json& to)>& put);
 template <class T>
 std::string to_json_line(const T& record) {
   return json_line_of([&](Json& to) { put_value(to, record); });
+}
+
+/// The record's JSON with its member `list` behind the others, an element a line: a million of them are never
+/// one JSON document in memory.
+template <class T, class Item>
+std::string to_json_with_lines(const T& record, const char* list, const std::vector<Item>& items) {
+  std::string out = json_line_of([&](Json& to) { put_members(to, record, list); });
+  out.back() = ',';
+  out += std::string("\n\"") + list + "\":[";
+  const char* before = "\n";
+  for (const Item& item : items) {
+    out += before + to_json_line(item);
+    before = ",\n";
+  }
+  return out + "\n]}\n";
 }
 
 /// A record of JSON from outside. InputError {file, JSON pointer, expected, found}; `refuse_others`: also for

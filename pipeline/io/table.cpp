@@ -13,7 +13,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-std::string number_text(double value, const NumberForm& form) {
+std::string shown_number(double value, const NumberForm& form) {
   const double shown = value * form.factor;
   const std::string text =
       form.kind == NumberForm::Kind::kShortest ? shortest(shown, form.digits) : fixed(shown, form.digits);
@@ -26,7 +26,7 @@ std::string integer_text(Integer value, const NumberForm& form) {
   if (form.kind == NumberForm::Kind::kGrouped && value >= 0)
     return grouped(static_cast<std::uint64_t>(value));
   if (form.digits == 0 && form.factor == 1) return std::string(form.before) + std::to_string(value);
-  return number_text(static_cast<double>(value), form);
+  return shown_number(static_cast<double>(value), form);
 }
 
 std::string shown_text(const Cell& cell, const NumberForm& form) {
@@ -41,7 +41,7 @@ std::string shown_text(const Cell& cell, const NumberForm& form) {
         else if constexpr (std::is_same_v<T, std::string>)
           return value;
         else if constexpr (std::is_same_v<T, double>)
-          return number_text(value, form);
+          return shown_number(value, form);
         else
           return integer_text(value, form);
       },
@@ -180,8 +180,11 @@ Json Table::json() const {
   Json list = Json::array();
   for (const auto& row : rows) {
     Json object = Json::object();
-    for (std::size_t k = 0; k < columns.size(); ++k)
-      if (!columns[k].key.empty()) object[columns[k].key] = cell_json(cell_of(row, k));
+    for (std::size_t k = 0; k < columns.size(); ++k) {
+      const Cell& cell = cell_of(row, k);
+      const bool left_out = !columns[k].shown && std::holds_alternative<std::monostate>(cell.value);
+      if (!columns[k].key.empty() && !left_out) object[columns[k].key] = cell_json(cell);
+    }
     list.push_back(std::move(object));
   }
   return list;

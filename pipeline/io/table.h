@@ -48,7 +48,7 @@ struct Column {
   // NOLINTEND
   /// A column of texts, to the left.
   static Column text(std::string heading, std::string json_key = {});
-  /// A column of JSON and CSV alone.
+  /// A column of JSON and CSV alone. JSON leaves out the member of an empty cell.
   static Column data(std::string json_key);
 };
 
@@ -109,7 +109,7 @@ struct Table {
   /// In a box that scrolls. The first column holds row headers. A table of texts alone breaks them into
   /// lines.
   std::string html() const;
-  /// A list of objects with a member for every column that has a key. Empty cells are null.
+  /// A list of objects with a member for every column that has a key. Empty cells that people see are null.
   nlohmann::ordered_json json() const;
   /// {"caption", "columns", "rows"}: headings, and lists of cells.
   nlohmann::ordered_json json_document() const;

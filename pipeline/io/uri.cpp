@@ -103,6 +103,21 @@ std::string url_origin(std::string_view url) {
                                           : std::string(url.substr(0, url.find_first_of("/?#", scheme + 3)));
 }
 
+std::string percent_encoded(const std::string& path) {
+  static constexpr char kHex[] = "0123456789ABCDEF";
+  std::string out;
+  for (const char c : path) {
+    const auto u = static_cast<unsigned char>(c);
+    const bool plain = (u >= '0' && u <= '9') || (u >= 'A' && u <= 'Z') || (u >= 'a' && u <= 'z') ||
+                       std::string_view("-._~/").find(c) != std::string_view::npos;
+    if (plain)
+      out += c;
+    else
+      out += {'%', kHex[u >> 4], kHex[u & 15]};
+  }
+  return out;
+}
+
 bool is_data_uri(std::string_view uri) {
   if (uri.size() < 5) return false;
   for (std::size_t i = 0; i < 4; ++i) {

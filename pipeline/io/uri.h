@@ -24,6 +24,9 @@ std::string decode_uri(std::string_view uri, const std::string& file, const std:
 /// address without a host.
 std::string url_origin(std::string_view url);
 
+/// Bytes as they stand in a URL path; slashes stay.
+std::string percent_encoded(const std::string& path);
+
 bool is_data_uri(std::string_view uri);
 
 /// The bytes of "data:[<type>];base64,<text>": padding, alphabet and the unused last bits are checked, as a

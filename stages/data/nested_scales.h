@@ -8,11 +8,12 @@
 namespace texmesh {
 
 /// One half-edge collapse: position `from` merges into its neighbour `to`, which does not move. A component
-/// that vanishes whole has one record for each position that it has left, one behind the other, with `to` ==
-/// `from`; its triangles go with them.
+/// that vanishes whole has one record for each position that it has left, one behind the other; its triangles
+/// go with them.
 struct Collapse {
-  std::uint32_t from = 0, to = 0;
-  float error = 0;  // square root of the quadric error, object units
+  std::uint32_t from = 0, to = 0;  // equal where the position vanishes with its component
+  float error = 0;                 // square root of the quadric error, object units
+  static Collapse with_component(std::uint32_t position, float error) { return {position, position, error}; }
   bool vanishes_with_component() const { return to == from; }
   template <class S, class A>
   static void archive(S& s, A& a) {

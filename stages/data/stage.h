@@ -7,4 +7,8 @@ namespace texmesh {
 
 struct RunContext;
 
+/// In `fields`, before the text: profiles may set the option, the command line has no flag for it. The
+/// method's own constants, which the thesis or a test sets.
+struct ProfileOnly {};
+
 }  // namespace texmesh

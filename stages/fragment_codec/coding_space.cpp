@@ -1,16 +1,12 @@
 #include "stages/fragment_codec/coding_space.h"
 
-#include <algorithm>
-#include <array>
 #include <cmath>
-#include <vector>
 
 #include "format/base/portable_math.h"
 #include "stages/base/parallel.h"
-#include "stages/fragment_codec/rebuilt_z.h"
+#include "stages/fragment_codec/fragment_codec.h"
 #include "stages/jpeg/jpeg.h"
 #include "stages/jpeg/jpeg_bits.h"
-#include "stages/jpeg/jpeg_coder.h"
 
 namespace texmesh {
 namespace {

@@ -1,14 +1,10 @@
 #pragma once
-#include <cstdint>
-#include <memory>
-#include <span>
-#include <vector>
 
 #include "format/model/codec.h"
 #include "stages/base/run_context.h"
+#include "stages/data/ladder.h"
 #include "stages/data/pixels.h"
-#include "stages/data/subsampling.h"
-#include "stages/image/pixel_window.h"
+#include "stages/jpeg/jpeg_coder.h"
 
 namespace texmesh {
 
@@ -23,10 +19,15 @@ struct PlaneCoding {
   std::uint32_t fragment_width_px = 0, fragment_height_px = 0;  // multiples of 16
   bool apart = false;        // three channels are coded as they are; otherwise as YCbCr
   bool coarse_last = false;  // with `apart`: the last channel is quantised more coarsely (JpegKind)
-  bool without_z = false;    // with `apart`: windows are those of without_z() (rebuilt_z.h), Codec::kJpegXy
+  bool without_z = false;    // with `apart`: windows are those of without_z(), Codec::kJpegXy
   Subsampling subsampling = Subsampling::k420;  // of YCbCr
   std::vector<int> qualities;                   // wanted rungs, IJG scale, strictly rising
 };
+
+/// How a plane's JPEGs are coded.
+JpegKind jpeg_kind(const PlaneCoding& plane, int quality);
+/// Of baseline JPEGs, whose rungs need not be alike: at kFinestQuality three channels are coded as they are.
+JpegKind baseline_kind(const PlaneCoding& plane, int quality);
 
 /// A rung as the package describes it.
 struct CodecRung {
@@ -65,5 +66,22 @@ std::unique_ptr<TextureCodec> make_texture_codec(Codec codec, const PlaneCoding&
 Pixels decode_fragment_file(Codec codec, std::span<const std::uint8_t> file, std::uint64_t max_pixels);
 /// The same, but luma as JPEG defines it (grey planes: as they are).
 Pixels decode_fragment_file_luma(Codec codec, std::span<const std::uint8_t> file, std::uint64_t max_pixels);
+
+/// The complete image file of a stored fragment at a rung. FormatError when a part is damaged.
+std::vector<std::uint8_t> fragment_file(const PlaneLadder& plane, std::size_t rung, std::size_t fragment);
+
+/// Its pixels, or luma only. FormatError when it is damaged or has more than max_pixels.
+Pixels decode_fragment(const PlaneLadder& plane, std::size_t rung, std::size_t fragment,
+                       std::uint64_t max_pixels);
+
+Pixels decode_fragment_luma(const PlaneLadder& plane, std::size_t rung, std::size_t fragment,
+                            std::uint64_t max_pixels);
+
+/// The z of unit vectors of whose components the bytes b stand for 2 b / 255 - 1 (SPEC.md, F24): the third
+/// channel of every texel becomes what makes the length 1, never below 128. Of three channels; others stay.
+void rebuild_z(Pixels& pixels);
+
+/// What codec jpeg-xy codes: x and y of the vectors made as long as 1, and 128 for z. Of three channels.
+Pixels without_z(const PixelWindow& window);
 
 }  // namespace texmesh

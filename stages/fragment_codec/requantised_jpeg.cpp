@@ -1,13 +1,9 @@
 #include "stages/fragment_codec/requantised_jpeg.h"
 
-#include <algorithm>
-#include <bit>
-#include <cstdlib>
 #include <cstring>
 #include <utility>
 
-#include "stages/jpeg/jpeg_samples.h"
-#include "stages/jpeg/jpeg_stream.h"
+#include "stages/jpeg/jpeg_coder.h"
 
 namespace texmesh {
 namespace {

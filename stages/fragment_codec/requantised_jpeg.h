@@ -1,16 +1,8 @@
 #pragma once
 // Inside stages only: fragments of a source JPEG from its coefficients, without a transform where all is
 // seen.
-#include <array>
-#include <cstddef>
-#include <cstdint>
-#include <span>
-#include <vector>
 
-#include "stages/image/decode_jpeg.h"
-#include "stages/image/pixel_window.h"
 #include "stages/jpeg/block_scan.h"
-#include "stages/jpeg/huffman_table.h"
 #include "stages/jpeg/source_jpeg.h"
 
 namespace texmesh {

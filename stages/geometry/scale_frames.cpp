@@ -1,10 +1,7 @@
 #include "stages/geometry/scale_frames.h"
 
-#include <algorithm>
-
-#include "format/base/no_index.h"
 #include "stages/base/parallel.h"
-#include "stages/geometry/scale_walk.h"
+#include "stages/geometry/distance.h"
 #include "stages/geometry/triangle_tree.h"
 
 namespace texmesh {
@@ -202,6 +199,15 @@ Mesh lit_scale(const NestedScales& scales, std::size_t index, const RunContext& 
       if (!frames.tangents.empty()) out.tangents[to] = frames.tangents[from];
     }
   return out;
+}
+
+std::size_t stand_in_scale(const NestedScales& scales, std::size_t most_triangles, double farthest) {
+  const std::vector<NestedScale>& all = scales.scales;
+  std::size_t i = 0;
+  while (i + 1 < all.size() && all[i].triangles.size() > most_triangles &&
+         2 * all[i + 1].triangles.size() >= most_triangles && double{all[i + 1].error_rms} <= farthest)
+    ++i;
+  return i;
 }
 
 }  // namespace texmesh

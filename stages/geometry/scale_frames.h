@@ -1,6 +1,4 @@
 #pragma once
-#include <vector>
-
 #include "stages/base/run_context.h"
 #include "stages/data/nested_scales.h"
 
@@ -24,5 +22,10 @@ ScaleFrames scale_frames(const NestedScales& scales, std::size_t index, const Ru
 
 /// extract_scale() with these normals and tangents.
 Mesh lit_scale(const NestedScales& scales, std::size_t index, const RunContext& context);
+
+/// What stands for S_0 where small pictures are all that is asked for: the index of the finest scale of at
+/// most so many triangles. A finer one where scales are missing in between or are farther (root mean square)
+/// from S_0 than `farthest`, object units; 0, S_0 itself, for meshes that have no more.
+std::size_t stand_in_scale(const NestedScales& scales, std::size_t most_triangles, double farthest);
 
 }  // namespace texmesh

@@ -1,14 +1,93 @@
 #include "stages/geometry/triangle_tree.h"
 
-#include <algorithm>
 #include <bit>
-#include <cmath>
-#include <limits>
+#include <cstddef>
 #include <numeric>
 
-#include "stages/geometry/box_distance.h"
-
 namespace texmesh {
+namespace {
+
+/// Square of the distance to the box; 0 inside.
+inline double box_distance2(const Box3d& box, Vec3d p) {
+  double sum = 0;
+  for (int k = 0; k < 3; ++k) {
+    const double d = std::max({box.min[k] - p[k], p[k] - box.max[k], 0.0});
+    sum += d * d;
+  }
+  return sum;
+}
+
+/// The corners of each side, so that cross(second - first, third - first) looks inwards.
+constexpr std::size_t kSides[4][3] = {{1, 3, 2}, {0, 2, 3}, {0, 3, 1}, {0, 1, 2}};
+
+/// A triangle clipped by four half-spaces has at most seven corners.
+struct Polygon {
+  std::array<Vec3d, 8> corner;
+  std::size_t count = 0;
+};
+
+}  // namespace
+
+Tetrahedron::Tetrahedron(const std::array<Vec3d, 4>& corners)
+    : corners_(corners), box_(bounding_box(corners)) {
+  for (std::size_t s = 0; s < 4; ++s) {
+    const Vec3d at = corners[kSides[s][0]];
+    planes_[s] = {cross(corners[kSides[s][1]] - at, corners[kSides[s][2]] - at), at};
+  }
+}
+
+bool Tetrahedron::may_meet_box(const Box3d& box) const {
+  for (int k = 0; k < 3; ++k)
+    if (box.min[k] > box_.max[k] || box.max[k] < box_.min[k]) return false;
+  const Vec3d middle = box.centre(), half = (box.max - box.min) * 0.5;
+  for (const Plane& s : planes_)
+    if (s.height(middle) + std::fabs(s.inwards.x) * half.x + std::fabs(s.inwards.y) * half.y +
+            std::fabs(s.inwards.z) * half.z <
+        0)
+      return false;
+  return true;
+}
+
+bool Tetrahedron::meets(const std::array<Vec3d, 3>& triangle) const {
+  // Most triangles are asked in vain: near a surface cells lie along it, on one side.
+  const Vec3d normal = cross(triangle[1] - triangle[0], triangle[2] - triangle[0]);
+  int above = 0, below = 0;
+  for (const Vec3d& c : corners_) {
+    const double h = dot(normal, c - triangle[0]);
+    above += h > 0, below += h < 0;
+  }
+  if (above == 4 || below == 4) return false;
+  for (const Plane& s : planes_)
+    if (s.height(triangle[0]) < 0 && s.height(triangle[1]) < 0 && s.height(triangle[2]) < 0) return false;
+  return clipped(triangle);
+}
+
+bool Tetrahedron::clipped(const std::array<Vec3d, 3>& triangle) const {
+  Polygon in;
+  in.count = 3;
+  std::copy(triangle.begin(), triangle.end(), in.corner.begin());
+  for (const Plane& s : planes_) {
+    std::array<double, 8> height{};
+    bool inside = true;
+    for (std::size_t i = 0; i < in.count; ++i) {
+      height[i] = s.height(in.corner[i]);
+      inside = inside && height[i] >= 0;
+    }
+    if (inside) continue;
+    Polygon out;
+    for (std::size_t i = 0; i < in.count; ++i) {
+      const std::size_t j = i + 1 < in.count ? i + 1 : 0;
+      if (height[i] >= 0) out.corner[out.count++] = in.corner[i];
+      if ((height[i] < 0) != (height[j] < 0))
+        out.corner[out.count++] =
+            in.corner[i] + (in.corner[j] - in.corner[i]) * (height[i] / (height[i] - height[j]));
+    }
+    if (out.count == 0) return false;
+    in = out;
+  }
+  return true;
+}
+
 namespace {
 
 constexpr std::uint32_t kLeaf = 4;
@@ -255,6 +334,107 @@ bool TriangleTree::meets(const Tetrahedron& solid, std::uint64_t& tried) const {
       if (solid.meets(corners_[i])) return true;
   }
   return false;
+}
+
+namespace {
+
+bool faces(const std::array<Vec3d, 3>& c, const TriangleTree::Facing& facing) {
+  const Vec3d n = cross(c[1] - c[0], c[2] - c[0]);
+  return dot(n, facing.direction) > facing.least_cosine * length(n);
+}
+
+}  // namespace
+
+/// A line, and the least crossing that has been found of it.
+struct TriangleTree::LineSearch {
+  Vec3d origin, direction;
+  const Facing& facing;
+  double best = 0;  // |t|
+  std::optional<Nearest> found;
+
+  void try_triangle(const std::array<Vec3d, 3>& c, std::uint32_t triangle) {
+    const Vec3d u = c[1] - c[0], v = c[2] - c[0], h = cross(direction, v);
+    const double det = dot(u, h), sign = det < 0 ? -1 : 1, size = det * sign;
+    if (!(size > 0)) return;
+    const Vec3d s = origin - c[0];
+    const double along_u = dot(s, h) * sign;
+    if (!(along_u >= 0 && along_u <= size)) return;
+    const Vec3d q = cross(s, u);
+    const double along_v = dot(direction, q) * sign;
+    if (!(along_v >= 0)) return;
+    const double a = along_u / size, b = along_v / size;
+    if (!(a + b <= 1)) return;
+    const double t = std::fabs(dot(v, q) / det);
+    if (!(t <= best) || (found && t == best && triangle >= found->triangle) || !faces(c, facing)) return;
+    best = t;
+    found = {triangle, {1 - a - b, a, b}};
+  }
+};
+
+std::optional<TriangleTree::Nearest> TriangleTree::crossing(Vec3d origin, Vec3d direction, double reach,
+                                                            const Facing& facing,
+                                                            std::optional<std::uint32_t> guess) const {
+  LineSearch line{origin, direction, facing, reach, std::nullopt};
+  if (guess && *guess < place_.size()) line.try_triangle(corners_[place_[*guess]], *guess);
+  const QuadLine slabs(origin, direction, reach, largest_);
+  struct Ahead {
+    float at;
+    std::uint32_t quad;
+  };
+  std::array<Ahead, 64> stack{};  // three more for every two levels of at most 32
+  std::size_t depth = 0;
+  stack[depth++] = {0, 0};
+  while (depth > 0) {
+    const Ahead next = stack[--depth];
+    if (next.at > line.best) continue;
+    const BoxQuad& quad = quads_[next.quad];
+    BoxQuad::Lanes at{};
+    unsigned met = slabs.meets(quad, line.best, at);
+    const std::size_t before = depth;
+    for (; met != 0; met &= met - 1) {
+      const auto i = static_cast<std::size_t>(std::countr_zero(met));
+      if (quad.count[i] == 0) {
+        std::size_t to = depth++;
+        for (; to > before && stack[to - 1].at < at[i]; --to) stack[to] = stack[to - 1];
+        stack[to] = {at[i], quad.first[i]};
+      } else if (at[i] <= line.best) {
+        for (std::uint32_t t = quad.first[i]; t < quad.first[i] + quad.count[i]; ++t)
+          line.try_triangle(corners_[t], order_[t]);
+      }
+    }
+  }
+  return line.found;
+}
+
+std::optional<TriangleTree::Nearest> TriangleTree::nearest_facing(Vec3d p, const Facing& facing) const {
+  std::optional<Nearest> best;
+  double distance2 = std::numeric_limits<double>::infinity();
+  struct Ahead {
+    double distance2;
+    std::uint32_t node;
+  };
+  std::array<Ahead, 40> stack{};
+  std::size_t depth = 1;
+  while (depth > 0) {
+    const Ahead at = stack[--depth];
+    if (at.distance2 > distance2) continue;
+    const Node& n = nodes_[at.node];
+    for (std::uint32_t i = n.first; i < n.first + n.count; ++i) {
+      const OnTriangle on = closest_on_triangle(corners_[i], p);
+      if (!(on.distance2 < distance2 || (on.distance2 == distance2 && best && order_[i] < best->triangle)) ||
+          !faces(corners_[i], facing))
+        continue;
+      distance2 = on.distance2;
+      best = {order_[i], on.weight};
+    }
+    if (n.count > 0) continue;
+    Ahead nearer{box_distance2(nodes_[at.node + 1].box, p), at.node + 1},
+        farther{box_distance2(nodes_[n.first].box, p), n.first};
+    if (farther.distance2 < nearer.distance2) std::swap(nearer, farther);
+    stack[depth++] = farther;
+    stack[depth++] = nearer;
+  }
+  return best;
 }
 
 }  // namespace texmesh

@@ -7,8 +7,6 @@
 #include <cstring>
 #include <numeric>
 
-#include "format/base/no_index.h"
-
 namespace texmesh {
 namespace {
 

@@ -1,7 +1,4 @@
 #pragma once
-#include <cstdint>
-#include <vector>
-
 #include "format/base/no_index.h"
 #include "format/model/model.h"
 

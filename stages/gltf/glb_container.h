@@ -1,5 +1,7 @@
 #pragma once
 #include <cstdint>
+#include <nlohmann/json.hpp>
+#include <string>
 #include <string_view>
 
 #include "format/base/bytes.h"
@@ -18,5 +20,20 @@ void pad_to_four(Bytes& out, std::uint8_t with);
 /// `binary` by zeros. FormatError where the file would have 4 GiB or more: its lengths have 32 bits. Nothing
 /// is read or copied before.
 Bytes glb_container(std::string_view json, ByteSpan binary);
+
+/// A GLB's JSON and its binary chunk.
+struct GlbParts {
+  nlohmann::ordered_json root;
+  Bytes binary;
+};
+/// FormatError for another file, and for JSON that parse_bounded_json() refuses. `entry` is for messages.
+GlbParts read_glb(ByteSpan glb, const std::string& entry);
+
+/// Takes an extension out of the lists of those that a document uses and requires.
+void forget_extension(nlohmann::ordered_json& root, const std::string& name);
+
+/// The same GLB with this asset.copyright; as it is for "". Order of names and every other value stay.
+/// FormatError when it is no GLB.
+Bytes with_copyright(const Bytes& glb, const std::string& line);
 
 }  // namespace texmesh

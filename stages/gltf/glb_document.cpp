@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
-#include <nlohmann/json.hpp>
 
 #include "format/base/bounded_json.h"
 #include "stages/gltf/glb_container.h"

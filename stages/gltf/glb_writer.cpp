@@ -1,14 +1,19 @@
 #include "stages/gltf/glb_writer.h"
 
-#include <algorithm>
-#include <array>
-#include <charconv>
-#include <map>
-#include <nlohmann/json.hpp>
+#include <meshoptimizer.h>
 
+#include <algorithm>
+#include <charconv>
+
+#include "format/base/errors.h"
 #include "stages/gltf/glb_container.h"
 
 namespace texmesh {
+namespace {
+
+constexpr int kUnsignedShort = 5123, kUnsignedInt = 5125;
+
+}  // namespace
 
 struct GlbWriter::Elements {
   Json views = Json::array(), accessors = Json::array();
@@ -41,6 +46,38 @@ std::size_t GlbWriter::add_json_view(Json view) {
   return elements_->views.size() - 1;
 }
 
+std::size_t GlbWriter::add_meshopt_view(std::span<const std::uint8_t> packed, std::size_t count,
+                                        std::size_t stride, bool is_index, int target) {
+  Json view{{"buffer", 1}, {"byteOffset", fallback_bytes_}, {"byteLength", count * stride}};
+  if (!is_index) view["byteStride"] = stride;
+  if (target) view["target"] = target;
+  view["extensions"]["EXT_meshopt_compression"] = {{"buffer", 0},
+                                                   {"byteOffset", add_bytes(packed)},
+                                                   {"byteLength", packed.size()},
+                                                   {"byteStride", stride},
+                                                   {"count", count},
+                                                   {"mode", is_index ? "TRIANGLES" : "ATTRIBUTES"}};
+  fallback_bytes_ += (count * stride + 3) / 4 * 4;
+  use_extension("EXT_meshopt_compression", true);
+  return add_json_view(std::move(view));
+}
+
+GlbWriter::Json GlbWriter::add_draco(const DracoStream& stream, std::vector<DracoAccessor> attributes) {
+  Json out, ids;
+  for (DracoAccessor& a : attributes) {
+    a.accessor["count"] = stream.vertices;
+    out["attributes"][a.name] = add_accessor(std::move(a.accessor));
+    ids[a.name] = stream.attributes.at(a.name);
+  }
+  out["indices"] = add_accessor({{"componentType", stream.vertices > 65535 ? kUnsignedInt : kUnsignedShort},
+                                 {"count", std::size_t{stream.triangles} * 3},
+                                 {"type", "SCALAR"}});
+  out["extensions"]["KHR_draco_mesh_compression"] = {{"bufferView", add_view(stream.bytes)},
+                                                     {"attributes", std::move(ids)}};
+  use_extension("KHR_draco_mesh_compression", true);
+  return out;
+}
+
 std::size_t GlbWriter::add_accessor(Json accessor) {
   elements_->accessors.push_back(std::move(accessor));
   return elements_->accessors.size() - 1;
@@ -61,6 +98,12 @@ double GlbWriter::shortest(float x) {
   double d = 0;
   std::from_chars(text.data(), end, d);
   return d;
+}
+
+GlbWriter::Json GlbWriter::shortest(std::initializer_list<float> numbers) {
+  Json out = Json::array();
+  for (const float x : numbers) out.push_back(shortest(x));
+  return out;
 }
 
 std::vector<std::uint8_t> GlbWriter::finish() const {
@@ -84,6 +127,38 @@ std::vector<std::uint8_t> GlbWriter::finish() const {
                                {"extensions", {{"EXT_meshopt_compression", {{"fallback", true}}}}}});
 
   return glb_container(root.dump(-1, ' ', false, Json::error_handler_t::replace), bin);
+}
+
+namespace {
+
+std::vector<std::uint8_t> of_size(std::vector<std::uint8_t> packed, std::size_t size, const char* stage) {
+  if (size == 0) throw StageError(stage, "meshopt", "a compressed stream", "nothing");
+  packed.resize(size);
+  return packed;
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> meshopt_attributes(std::span<const std::uint8_t> bytes, std::size_t count,
+                                             std::size_t stride, const char* stage) {
+  std::vector<std::uint8_t> packed(meshopt_encodeVertexBufferBound(count, stride));
+  const std::size_t size =
+      meshopt_encodeVertexBuffer(packed.data(), packed.size(), bytes.data(), count, stride);
+  return of_size(std::move(packed), size, stage);
+}
+
+std::vector<std::uint8_t> meshopt_triangles(std::span<const std::uint32_t> indices, std::size_t vertices,
+                                            const char* stage) {
+  // The extension asks for version 1, but the library writes 0 until told otherwise, once for the process.
+  static const bool version_1 = [] {
+    meshopt_encodeIndexVersion(1);
+    return true;
+  }();
+  static_cast<void>(version_1);
+  std::vector<std::uint8_t> packed(meshopt_encodeIndexBufferBound(indices.size(), vertices));
+  const std::size_t size =
+      meshopt_encodeIndexBuffer(packed.data(), packed.size(), indices.data(), indices.size());
+  return of_size(std::move(packed), size, stage);
 }
 
 }  // namespace texmesh

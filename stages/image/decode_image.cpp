@@ -9,13 +9,12 @@
 #include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "format/base/srgb.h"
-#include "stages/image/colour_profile.h"
 #include "stages/image/decode_jpeg.h"
-#include "stages/image/decode_png.h"
 #include "stages/image/decode_tiff_exr.h"
-#include "stages/image/decode_webp.h"
 #include "stages/image/image_metadata.h"
+#include "stages/image/png_writer.h"
 #include "stages/image/seldom/wide_jpeg.h"
+#include "stages/image/webp.h"
 
 namespace texmesh {
 namespace {

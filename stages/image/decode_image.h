@@ -10,7 +10,7 @@ namespace texmesh {
 
 /// What samples become: kAsIs for data (normals, roughness); kSrgb for colours: float files (EXR, float TIFF)
 /// hold linear light where every other image of a material is sRGB encoded, and images with
-/// Image::honour_profile go by their ICC profile or gamma (stages/image/colour_profile.h).
+/// Image::honour_profile go by their ICC profile or gamma (stages/image/image_metadata.h).
 enum class FloatEncoding : std::uint8_t { kAsIs, kSrgb };
 
 /// Reads the header with the reader of exactly that format (never by OpenImageIO's own content sniffing) and

@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <cstdio>
 #include <exception>
-#include <vector>
 
 #include <jpeglib.h>
 // jerror.h needs jpeglib.h first.

@@ -1,5 +1,8 @@
 #pragma once
 #include <cstdint>
+#include <functional>
+#include <span>
+#include <string>
 #include <vector>
 
 #include "stages/data/pixels.h"
@@ -15,5 +18,25 @@ struct PngOptions {
 /// absolute differences, deflate, no ancillary chunks but gAMA, so the same pixels always give the same
 /// bytes.
 std::vector<std::uint8_t> write_png(const Pixels& pixels, const PngOptions& options = {});
+
+// The PNG part of decode_image: libpng itself. OpenImageIO 2.4 does not say in which row a file is cut off,
+// wants the whole image's memory before it looks at the pixels, and takes 0.15 s to load; here rows arrive
+// one by one.
+
+struct PngHeader {
+  std::uint32_t width_px = 0, height_px = 0;
+  std::uint32_t channels = 0;  // after decoding: palettes become RGB, transparent colours an alpha channel
+  std::uint32_t bits = 0;      // 8 or 16; fewer become 8
+  bool interlaced = false;
+};
+
+/// Throws InputError{name, ...} when the bytes before the pixels are no PNG's.
+PngHeader read_png_header(const std::string& name, std::span<const std::uint8_t> bytes);
+
+/// Calls row(samples) for every row, top first; 16-bit samples are in this machine's byte order. No colour
+/// conversion: gamma and profiles are the caller's. Memory is taken for one row, and for the whole image when
+/// it is interlaced. Throws InputError, with the row, when the data end early or are damaged.
+void decode_png(const std::string& name, std::span<const std::uint8_t> bytes,
+                const std::function<void(const std::uint8_t* samples)>& row);
 
 }  // namespace texmesh

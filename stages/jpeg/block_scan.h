@@ -1,21 +1,112 @@
 #pragma once
-// Inside stages only: blocks of a baseline scan, each coded at several rungs by what of it is seen.
+// Inside stages only: blocks of a baseline scan, each coded at several rungs by what of it is seen. A block
+// becomes coefficients (quantise_whole(), MaskedBlock, flat_block()), these become symbols (emit_block()),
+// and a sink writes or counts them.
 #include <algorithm>
-#include <array>
 #include <bit>
-#include <cstddef>
-#include <cstdint>
 #include <cstdlib>
-#include <span>
-#include <vector>
 
 #include "format/base/bytes.h"
 #include "stages/image/pixel_window.h"
-#include "stages/jpeg/bit_writer.h"
-#include "stages/jpeg/huffman_table.h"
-#include "stages/jpeg/masked_block.h"
+#include "stages/jpeg/block_transform.h"
+#include "stages/jpeg/jpeg_stream.h"
 
 namespace texmesh {
+
+/// How the blocks of one component are coded at one rung.
+struct BlockCoding {
+  BlockValues quantisers{};
+  SymbolCodes dc, ac;
+  float bit_cost = 0;  // squared error of samples that a bit less may cost: lambda
+};
+
+/// Quantised coefficients in zigzag order.
+struct CodedBlock {
+  std::array<std::int16_t, 64> values{};
+  std::uint64_t used = 0;  // bit k: values[k] is not 0
+};
+
+/// Coefficients of a block all of which is seen: to the nearest, ties away from zero, and then, from the
+/// highest frequency down, AC coefficients one step nearer to zero where that saves more bits than error.
+/// Where all quantisers are 1, finest_steps() instead.
+CodedBlock quantise_whole(const BlockValues& coefficients, const BlockCoding& coding);
+
+/// A block of which some samples are free.
+class MaskedBlock {
+ public:
+  /// Samples (level shift taken off), and weights 0..1 of their squared errors, not all 0.
+  void load(const BlockValues& samples, const BlockValues& weights);
+  /// Coefficients of small weighted squared error + bit_cost x coded bits. From all zero on, or, since
+  /// load(), from those of the rung before, requantised with what it left of the samples: changes of one
+  /// coefficient that gain at least an eighth of what the best one could, until none is worth half a bit
+  /// (matching pursuit by rate and distortion). Rungs had best come from the coarsest to the finest. Bits are
+  /// those of the Huffman codes, with runs and with the step from the DC before; a symbol without a code is
+  /// never chosen.
+  CodedBlock quantise(const BlockCoding& coding, int dc_before);
+
+ private:
+  CodedBlock requantised(const BlockCoding& coding, int dc_before);
+  void recode(const BlockValues& next);
+
+  BlockGram gram_;
+  BlockValues samples_{};
+  float mean_ = 0;            // of the samples, as the coefficient of frequency 0
+  BlockValues per_energy_{};  // 1 / Gram diagonal, 0 where that is nothing
+  BlockValues rest_{};        // correlation of basis functions with what is left of the samples, weighted
+  BlockValues coded_{};       // coefficients that rest_ goes with
+  bool begun_ = false;        // a rung has been quantised since load()
+};
+
+/// Appends the entropy-coded bits of a JPEG to `out`, the first bit highest, with a zero behind every 0xff.
+/// `out` is larger than what is written until finish().
+class BitWriter {
+ public:
+  explicit BitWriter(Bytes& out) : out_(&out), used_(out.size()) {}
+  /// Before put(): room for so many bytes, zeros behind 0xff included.
+  void reserve(std::size_t bytes) {
+    if (out_->size() - used_ < bytes + kMostHeldBytes)
+      out_->resize(2 * out_->size() + bytes + kMostHeldBytes);
+  }
+  /// The lowest `count` bits of `value`, whose others are 0; count <= 32.
+  void put(std::uint32_t value, unsigned count) {
+    held_ = held_ << count | value;
+    count_ += count;
+    while (count_ >= 32) {
+      count_ -= 32;
+      write_word(static_cast<std::uint32_t>(held_ >> count_));
+    }
+  }
+  /// Fills the last byte with ones and cuts `out` to what was written.
+  void finish() {
+    reserve(0);
+    if (count_ > 0) {
+      const unsigned fill = (8 - count_ % 8) % 8;
+      put((1u << fill) - 1, fill);
+    }
+    while (count_ > 0) write(static_cast<std::uint8_t>(held_ >> (count_ -= 8)));
+    out_->resize(used_);
+  }
+
+ private:
+  static constexpr std::size_t kMostHeldBytes = 8;  // 31 bits and the zeros behind them
+  void write_word(std::uint32_t word) {
+    const bool has_ff = ((~word - 0x01010101u) & word & 0x80808080u) != 0;
+    std::uint8_t* to = out_->data() + used_;
+    for (unsigned shift = 32; shift > 0;) {
+      *to++ = static_cast<std::uint8_t>(word >> (shift -= 8));
+      if (has_ff && to[-1] == 0xff) *to++ = 0;
+    }
+    used_ = static_cast<std::size_t>(to - out_->data());
+  }
+  void write(std::uint8_t byte) {
+    (*out_)[used_++] = byte;
+    if (byte == 0xff) (*out_)[used_++] = 0;
+  }
+  Bytes* out_;
+  std::size_t used_;
+  std::uint64_t held_ = 0;
+  unsigned count_ = 0;
+};
 
 /// How one rung's blocks are coded, by component.
 using MaskedRung = std::vector<BlockCoding>;

@@ -1,19 +1,10 @@
 #include "stages/jpeg/jpeg_bits.h"
 
-#include <algorithm>
-#include <array>
-#include <bit>
-#include <cstdint>
-#include <cstdlib>
 #include <cstring>
-#include <functional>
 #include <mutex>
 
 #include "format/base/vec.h"
 #include "stages/base/parallel.h"
-#include "stages/jpeg/block_transform.h"
-#include "stages/jpeg/jpeg_samples.h"
-#include "stages/jpeg/jpeg_stream.h"
 #include "stages/jpeg/masked_jpeg.h"
 
 namespace texmesh {

@@ -1,10 +1,6 @@
 #pragma once
 // Inside stages only: what baseline JPEGs take, without making them.
-#include <span>
-#include <vector>
 
-#include "stages/base/run_context.h"
-#include "stages/image/decode_jpeg.h"
 #include "stages/jpeg/block_scan.h"
 #include "stages/jpeg/jpeg_coder.h"
 #include "stages/jpeg/source_jpeg.h"

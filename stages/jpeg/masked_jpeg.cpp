@@ -1,9 +1,6 @@
 #include "stages/jpeg/masked_jpeg.h"
 
-#include <algorithm>
 #include <utility>
-
-#include "stages/jpeg/jpeg_samples.h"
 
 namespace texmesh {
 namespace {

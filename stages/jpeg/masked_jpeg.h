@@ -1,14 +1,8 @@
 #pragma once
 // Inside stages only: baseline JPEG data of images in which nobody sees the uncovered texels.
-#include <array>
-#include <cstdint>
-#include <span>
-#include <vector>
 
 #include "stages/jpeg/block_scan.h"
-#include "stages/jpeg/huffman_table.h"
 #include "stages/jpeg/jpeg_coder.h"
-#include "stages/jpeg/masked_block.h"
 
 namespace texmesh {
 

@@ -1,24 +1,84 @@
 #include "stages/ladder/ladder.h"
 
-#include <algorithm>
+#include <cstdlib>
 #include <numeric>
-#include <string>
 #include <utility>
 
+#include "format/rules/size_curve.h"
+#include "stages/data/coverage.h"
 #include "stages/fragment_codec/coding_space.h"
-#include "stages/fragment_codec/rebuilt_z.h"
 #include "stages/image/check_pixels.h"
 #include "stages/image/decode_image.h"
+#include "stages/jpeg/jpeg_bits.h"
 #include "stages/ladder/choose_rungs.h"
 #include "stages/ladder/encode_rungs.h"
-#include "stages/ladder/fragment_windows.h"
-#include "stages/ladder/rung_loss.h"
-#include "stages/ladder/size_knots.h"
-#include "stages/ladder/source_codec.h"
-#include "stages/ladder/source_difference.h"
 
 namespace texmesh {
 namespace {
+
+/// Knots between the rungs of a plane, from what a sample takes at every whole quality, `bits` [0..100]; none
+/// for empty `bits`.
+SizeKnots size_knots(const std::vector<int>& rungs, const std::vector<double>& bits) {
+  SizeKnots out;
+  if (bits.empty() || rungs.size() < 2) return out;
+  std::vector<std::uint8_t> rung_quality;
+  std::vector<double> rung_bits, knot_bits;
+  for (int q = rungs.front(); q <= rungs.back(); ++q) {
+    const bool rung = q == rungs[rung_quality.size()];
+    (rung ? rung_quality : out.quality).push_back(static_cast<std::uint8_t>(q));
+    (rung ? rung_bits : knot_bits).push_back(bits[static_cast<std::size_t>(q)]);
+  }
+  out.position = knot_positions(rung_quality, rung_bits, out.quality, knot_bits);
+  return out;
+}
+
+/// Measures how the bytes of a plane of colours grow between the rungs of its baseline JPEGs: what `sample`
+/// takes at `plane.qualities` and at every whole quality between them (jpeg_bits()). What bends sizes there
+/// most are the quantisers of the JPEG that the texture has been before, and these are the same everywhere in
+/// a plane, so that a small sample tells it for all fragments. None for an empty sample and for fewer than
+/// two qualities. Same result for any thread count.
+SizeKnots measure_size_knots(const PlaneCoding& plane, std::span<const PixelWindow> sample,
+                             const RunContext& context) {
+  if (sample.empty() || plane.qualities.size() < 2) return {};
+  std::vector<int> qualities;
+  for (int q = plane.qualities.front(); q <= plane.qualities.back(); ++q) qualities.push_back(q);
+  JpegKind kind;
+  kind.channels = plane.channels;
+  kind.subsampling = plane.subsampling;
+  std::vector<double> bits(101);
+  std::ranges::copy(jpeg_bits(kind, sample, qualities, context), bits.begin() + qualities.front());
+  if (qualities.back() == kFinestQuality && plane.channels == 3) {
+    kind.rgb = true;
+    bits.back() = jpeg_bits(kind, sample, std::span(&kFinestQuality, 1), context).front();
+  }
+  return size_knots(plane.qualities, bits);
+}
+
+/// Mean absolute difference of 8-bit samples between the plane's last rung and `pixels`, over the covered
+/// texels of up to 16 stored fragments, evenly spread in index order; 0 when nothing is stored.
+double source_difference(const TexturePlane& plane, const Pixels& pixels, const PlaneLadder& ladder) {
+  constexpr std::size_t kMostFragments = 16;
+  const std::size_t top = ladder.rungs.size() - 1;
+  std::vector<std::size_t> stored;
+  for (std::size_t f = 0; f < plane.fragment_count(); ++f)
+    if (!fragment_stream(ladder.rungs[top], f).empty()) stored.push_back(f);
+  const std::size_t count = std::min(stored.size(), kMostFragments);
+  std::uint64_t sum = 0, samples = 0;
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::size_t f = stored[k * stored.size() / count];
+    const TexelRectangle padded = padded_fragment_rectangle(plane, f), at = fragment_rectangle(plane, f);
+    const Pixels decoded = decode_fragment(ladder, top, f, std::uint64_t{padded.width_px} * padded.height_px);
+    for (std::uint32_t y = 0; y < at.height_px; ++y)
+      for (std::uint32_t x = 0; x < at.width_px; ++x) {
+        if (!plane.coverage.empty() && !CoverageMask(plane).covered(at.left_px + x, at.top_px + y)) continue;
+        const std::uint8_t* from = pixels.at(at.left_px + x, at.top_px + y);
+        for (std::uint32_t c = 0; c < pixels.channels; ++c)
+          sum += static_cast<std::uint64_t>(std::abs(int{from[c]} - int{decoded.at(x, y)[c]}));
+        samples += pixels.channels;
+      }
+  }
+  return samples > 0 ? static_cast<double>(sum) / static_cast<double>(samples) : 0;
+}
 
 // Rungs are packed by at most this many per model in tables.bin, and more than that buys nothing (16
 // rungs gain 0.1 dB over 10).
@@ -103,7 +163,7 @@ PlaneCoding coding_of(const TexturePlane& plane, Codec codec, const LadderOption
 void add_finest(const TexturePlane& plane, const std::vector<Image>& images, const LadderOptions& options,
                 PlaneCoding& coding) {
   if (options.prune && options.mode == LadderMode::kJpeg && plane.mip == 0 && !images.empty() &&
-      is_lossless(images[plane.image]) && coding.qualities.back() < kFinestQuality)
+      rungs::is_lossless(images[plane.image]) && coding.qualities.back() < kFinestQuality)
     coding.qualities.push_back(kFinestQuality);
 }
 
@@ -190,7 +250,7 @@ std::vector<PlaneWork> sample_work(const Fragments& fragments, const std::vector
                                    bool prune) {
   std::vector<PlaneWork> work(trained.size());
   std::vector<std::vector<std::uint8_t>> sample;
-  if (prune) sample = choice_sample(fragments);
+  if (prune) sample = rungs::choice_sample(fragments);
   for (std::size_t p = 0; p < work.size(); ++p) {
     if (prune)
       work[p].wanted = std::move(sample[p]);
@@ -229,7 +289,7 @@ bool take_too_much(const Fragments& fragments, const std::vector<PlaneLadder>& p
       bytes[fragments.planes[p].mip > 0 ? fragments.planes[p].base : p] +=
           static_cast<double>(rung.data.size() + rung.table_stream.size());
   for (std::size_t p = 0; p < planes.size(); ++p)
-    if (bytes[p] > 0 && bytes[p] > most_bytes(fragments.planes[p], images)) return true;
+    if (bytes[p] > 0 && bytes[p] > rungs::most_bytes(fragments.planes[p], images)) return true;
   return false;
 }
 
@@ -296,11 +356,12 @@ Ladder encode_ladder(const Fragments& fragments, const std::vector<Pixels>& pixe
   std::vector<PlaneLadder> sample =
       encode(sample_work(fragments, trained, options.prune), {kTrained, kSampled});
   auto kept = all_rungs(trained);
-  if (options.prune) kept = choose_rungs(fragments, pixels, sample, previews, images, context);
+  if (options.prune) kept = rungs::choose_rungs(fragments, pixels, sample, previews, images, context);
   ladder.planes = encode(whole_work(fragments, std::move(sample), std::move(kept)), {kChosen, 1});
   // What a sample lets expect of a texture's bytes is some hundredths off.
   if (options.prune && take_too_much(fragments, ladder.planes, images))
-    keep_rungs(choose_rungs(fragments, pixels, ladder.planes, previews, images, context), ladder.planes);
+    keep_rungs(rungs::choose_rungs(fragments, pixels, ladder.planes, previews, images, context),
+               ladder.planes);
   measure_knots(fragments, pixels, options, trained, ladder.planes, context);
   for (std::size_t p = 0; p < fragments.planes.size(); ++p)
     finish_plane(fragments.planes[p], pixels[p], images, trained[p], options, ladder.planes[p], ladder.notes);

@@ -1,9 +1,4 @@
 #pragma once
-#include <cstdint>
-#include <span>
-#include <string_view>
-#include <vector>
-
 #include "format/model/model.h"
 #include "stages/data/fragments.h"
 #include "stages/data/ladder.h"
@@ -63,9 +58,9 @@ struct LadderOptions {
     v("uncovered", s.uncovered,
       "what baseline JPEGs keep of texels that no chart covers: free = whatever makes their blocks "
       "cheap; kept = what the fill, or the source with --fill none, has there");
-    v("training_fragments", s.training_fragments, Range{1, 256},
+    v("training_fragments", s.training_fragments, Range{1, 256}, ProfileOnly{},
       "fragments that a rung's Huffman tables are trained on");
-    v("preview_quality", s.preview_quality, Range{1, 100}, "JPEG quality of the preview");
+    v("preview_quality", s.preview_quality, Range{1, 100}, ProfileOnly{}, "JPEG quality of the preview");
     v("prune", s.prune,
       "store only the rungs, of full size and mips, that simulated loads choose and that are worth their bytes; "
       "false = store all of them");

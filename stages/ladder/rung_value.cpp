@@ -2,28 +2,201 @@
 
 #include <algorithm>
 #include <array>
-#include <limits>
 
 #include "format/base/portable_math.h"
 #include "format/rules/ordinary_loads.h"
-#include "stages/ladder/rung_gaps.h"
-#include "stages/ladder/rung_hull.h"
 
-namespace texmesh {
+namespace texmesh::rungs {
+
+Hull hull_of(const TextureRungs& texture, const std::vector<std::uint8_t>& keep, std::size_t wanted,
+             Levels levels) {
+  Hull hull{{kPreview, 0, texture.preview_loss[wanted]}};
+  for (;;) {
+    const Vertex at = hull.back();
+    Vertex best;
+    double steepest = 0;
+    for (std::size_t k = 0; k < texture.pairs.size(); ++k) {
+      const RungPair& pair = texture.pairs[k];
+      if (!keep[k] || pair.level < levels.first || pair.level > levels.last) continue;
+      const Vertex to{k, static_cast<double>(pair.bytes), pair.loss[wanted]};
+      if (to.bytes <= at.bytes || to.loss >= at.loss) continue;
+      const double slope = (at.loss - to.loss) / (to.bytes - at.bytes);
+      if (slope > steepest || (slope == steepest && to.bytes > best.bytes)) steepest = slope, best = to;
+    }
+    if (best.pair == kPreview) return hull;
+    hull.push_back(best);
+  }
+}
+
+std::vector<Hull> hulls_of(const TextureRungs& texture, const std::vector<std::uint8_t>& keep,
+                           std::size_t wanted) {
+  std::vector<Hull> out;
+  for (std::size_t level = wanted; level < texture.preview_loss.size(); ++level)
+    out.push_back(hull_of(texture, keep, wanted, {level, level}));
+  return out;
+}
+
+std::size_t segment_of(const Hull& hull, double bytes) {
+  std::size_t k = 0;
+  while (k + 1 < hull.size() && hull[k + 1].bytes <= bytes) ++k;
+  return k;
+}
+
+double loss_at(const Hull& hull, double bytes) {
+  const std::size_t k = segment_of(hull, bytes);
+  if (k + 1 == hull.size()) return hull[k].loss;
+  const Vertex &a = hull[k], &b = hull[k + 1];
+  return a.loss + (b.loss - a.loss) * ((bytes - a.bytes) / (b.bytes - a.bytes));
+}
+
+std::size_t best_of(const std::vector<Hull>& hulls, double bytes) {
+  std::size_t best = 0;
+  for (std::size_t k = 1; k < hulls.size(); ++k)
+    if (loss_at(hulls[k], bytes) < loss_at(hulls[best], bytes)) best = k;
+  return best;
+}
+
+double bytes_of(const TextureRungs& texture, const std::vector<std::uint8_t>& keep) {
+  double bytes = 0;
+  for (std::size_t k = 0; k < keep.size(); ++k)
+    if (keep[k]) bytes += static_cast<double>(texture.pairs[k].bytes);
+  return bytes;
+}
+
 namespace {
 
-using rungs::best_of;
-using rungs::bytes_of;
-using rungs::gap_closers;
-using rungs::GivenBytes;
-using rungs::Hull;
-using rungs::hull_of;
-using rungs::hulls_of;
-using rungs::kPreview;
-using rungs::kUnseen;
-using rungs::loss_at;
-using rungs::segment_of;
-using rungs::swap_pairs;
+constexpr int kMostSwaps = 12;
+
+/// Whether what is left has neighbours far apart where the pair was.
+bool opens_gap(const TextureRungs& texture, const std::vector<std::uint8_t>& keep, std::size_t pair,
+               std::size_t wanted) {
+  const RungPair& gone = texture.pairs[pair];
+  const RungPair *cheaper = nullptr, *dearer = nullptr;
+  const auto loss = [&](const RungPair& p) { return p.loss[wanted]; };
+  for (std::size_t k = 0; k < keep.size(); ++k) {
+    const RungPair& other = texture.pairs[k];
+    if (!keep[k] || k == pair || other.level < wanted || other.bytes > gone.bytes) continue;
+    if (cheaper == nullptr || loss(other) < loss(*cheaper)) cheaper = &other;
+  }
+  if (cheaper == nullptr || loss(*cheaper) <= loss(gone)) return false;
+  for (std::size_t k = 0; k < keep.size(); ++k) {
+    const RungPair& other = texture.pairs[k];
+    if (!keep[k] || other.level < wanted || other.bytes <= gone.bytes || loss(other) >= loss(*cheaper))
+      continue;
+    if (dearer == nullptr || other.bytes < dearer->bytes) dearer = &other;
+  }
+  return dearer != nullptr && loss(*cheaper) > loss(*dearer) + kUnseen &&
+         static_cast<double>(dearer->bytes) > kMostApart * static_cast<double>(cheaper->bytes);
+}
+
+/// How far neighbours are apart beyond kMostApart: logarithms, summed over the levels that loads want.
+double gaps_of(const TextureRungs& texture, const std::vector<std::uint8_t>& keep, const GivenBytes& given) {
+  double sum = 0;
+  std::vector<std::size_t> order;
+  for (std::size_t k = 0; k < keep.size(); ++k)
+    if (keep[k]) order.push_back(k);
+  std::ranges::stable_sort(order, {}, [&](std::size_t k) { return texture.pairs[k].bytes; });
+  for (std::size_t level = 0; level < given.size(); ++level) {
+    const RungPair* before = nullptr;
+    for (const std::size_t k : order) {
+      const RungPair& pair = texture.pairs[k];
+      if (given[level].empty() || pair.level < level) continue;
+      if (before != nullptr && pair.loss[level] >= before->loss[level]) continue;
+      if (before != nullptr && before->loss[level] > pair.loss[level] + kUnseen) {
+        const double apart = static_cast<double>(pair.bytes) / static_cast<double>(before->bytes);
+        if (apart > kMostApart) sum += portable::log(apart / kMostApart);
+      }
+      before = &pair;
+    }
+  }
+  return sum;
+}
+
+/// Summed over loads, in parts of what all pairs would lose.
+double loss_of(const TextureRungs& texture, const std::vector<std::uint8_t>& keep, const GivenBytes& given,
+               const std::vector<std::vector<double>>& units) {
+  double sum = 0;
+  for (std::size_t level = 0; level < given.size(); ++level) {
+    if (given[level].empty()) continue;
+    const std::vector<Hull> hulls = hulls_of(texture, keep, level);
+    for (std::size_t load = 0; load < given[level].size(); ++load) {
+      const double bytes = given[level][load];
+      sum += loss_at(hulls[best_of(hulls, bytes)], bytes) / units[level][load];
+    }
+  }
+  return sum;
+}
+
+std::vector<std::vector<double>> units_of(const TextureRungs& texture, const GivenBytes& given) {
+  const std::vector<std::uint8_t> all(texture.pairs.size(), 1);
+  std::vector<std::vector<double>> out(given.size());
+  for (std::size_t level = 0; level < given.size(); ++level) {
+    const std::vector<Hull> hulls = hulls_of(texture, all, level);
+    for (const double bytes : given[level])
+      out[level].push_back(loss_at(hulls[best_of(hulls, bytes)], bytes) + kUnseen);
+  }
+  return out;
+}
+
+/// What a choice is worth: smaller is better, gaps first.
+struct Choice {
+  std::vector<std::uint8_t> keep;
+  double gaps = 0, loss = 0;
+  bool is_better_than(const Choice& other) const {
+    constexpr double kSame = 1e-9;
+    if (gaps < other.gaps - kSame) return true;
+    return gaps <= other.gaps + kSame && loss < other.loss * (1 - kSame);
+  }
+};
+
+bool every_level_has_one(const TextureRungs& texture, const std::vector<std::uint8_t>& keep) {
+  std::vector<std::uint8_t> has(texture.preview_loss.size());
+  for (std::size_t k = 0; k < keep.size(); ++k) has[texture.pairs[k].level] |= keep[k];
+  return std::ranges::count(has, 0) == 0;
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> gap_closing_pairs(const TextureRungs& texture,
+                                            const std::vector<std::uint8_t>& keep, const GivenBytes& given) {
+  std::vector<std::uint8_t> out(keep.size());
+  for (std::size_t level = 0; level < given.size(); ++level)
+    for (std::size_t k = 0; k < keep.size() && !given[level].empty(); ++k)
+      if (keep[k] && texture.pairs[k].level >= level && !out[k]) out[k] = opens_gap(texture, keep, k, level);
+  return out;
+}
+
+void swap_pairs(const TextureRungs& texture, const GivenBytes& given, std::vector<std::uint8_t>& keep) {
+  const std::vector<std::vector<double>> units = units_of(texture, given);
+  const double most = std::max(texture.most_bytes, bytes_of(texture, keep));
+  Choice best{keep, gaps_of(texture, keep, given), loss_of(texture, keep, given, units)};
+  for (int swap = 0; swap < kMostSwaps; ++swap) {
+    const std::vector<std::uint8_t> from = best.keep;
+    const auto consider = [&](const std::vector<std::uint8_t>& choice) {
+      if (bytes_of(texture, choice) > most || !every_level_has_one(texture, choice)) return;
+      Choice next{choice, gaps_of(texture, choice, given), best.loss};
+      if (next.gaps > best.gaps) return;
+      next.loss = loss_of(texture, choice, given, units);
+      if (next.is_better_than(best)) best = std::move(next);
+    };
+    for (std::size_t in = 0; in < from.size(); ++in) {
+      if (from[in]) continue;
+      std::vector<std::uint8_t> choice = from;
+      choice[in] = 1;
+      consider(choice);
+      for (std::size_t out = 0; out < from.size(); ++out) {
+        if (!from[out] || texture.pairs[out].fixed) continue;
+        choice[out] = 0;
+        consider(choice);
+        choice[out] = 1;
+      }
+    }
+    if (best.keep == from) break;
+  }
+  keep = best.keep;
+}
+
+namespace {
 
 // Of a load's bytes textures have so much; mesh and tables take the rest.
 constexpr double kTextureShare = 0.75;
@@ -36,7 +209,7 @@ double price(int k) {
 }
 
 /// The level of the display has 1 to 2 texels a pixel, and this one twice as many.
-std::size_t wanted_level(const TextureWays& texture, double displayed_px) {
+std::size_t wanted_level(const TextureRungs& texture, double displayed_px) {
   std::size_t level = 0;
   while (level + 1 < texture.preview_loss.size() &&
          texture.texels_across >= displayed_px * static_cast<double>(std::uint64_t{4} << level))
@@ -44,7 +217,7 @@ std::size_t wanted_level(const TextureWays& texture, double displayed_px) {
   return level;
 }
 
-std::vector<std::uint8_t> better_than_the_preview(const TextureWays& texture) {
+std::vector<std::uint8_t> better_than_the_preview(const TextureRungs& texture) {
   std::vector<std::uint8_t> keep;
   for (const RungPair& pair : texture.pairs)
     keep.push_back(pair.fixed || pair.loss[pair.level] < texture.preview_loss[pair.level]);
@@ -52,7 +225,7 @@ std::vector<std::uint8_t> better_than_the_preview(const TextureWays& texture) {
 }
 
 /// One pair of every level: of those that have none the best one.
-void keep_one_of_each_level(const TextureWays& texture, std::vector<std::uint8_t>& keep) {
+void keep_one_of_each_level(const TextureRungs& texture, std::vector<std::uint8_t>& keep) {
   for (std::size_t level = 0; level < texture.preview_loss.size(); ++level) {
     std::size_t best = kPreview;
     bool any = false;
@@ -69,7 +242,7 @@ void keep_one_of_each_level(const TextureWays& texture, std::vector<std::uint8_t
 /// The bytes that a texture takes where a level is wanted, by price.
 using BytesByPrice = std::array<double, kPrices>;
 
-BytesByPrice bytes_by_price(const TextureWays& texture, const std::vector<std::uint8_t>& keep,
+BytesByPrice bytes_by_price(const TextureRungs& texture, const std::vector<std::uint8_t>& keep,
                             std::size_t level) {
   const Hull hull = hull_of(texture, keep, level, {level, texture.preview_loss.size() - 1});
   BytesByPrice out{};
@@ -85,7 +258,7 @@ BytesByPrice bytes_by_price(const TextureWays& texture, const std::vector<std::u
 
 /// By texture. Where one price takes less than a load has and the next one more, every texture goes the same
 /// part of its way between them.
-std::vector<GivenBytes> share_loads(const std::vector<TextureWays>& textures,
+std::vector<GivenBytes> share_loads(const std::vector<TextureRungs>& textures,
                                     const std::vector<std::vector<std::uint8_t>>& keep,
                                     const std::vector<TextureLoad>& loads) {
   std::vector<std::vector<BytesByPrice>> bytes(textures.size());
@@ -120,7 +293,7 @@ std::vector<GivenBytes> share_loads(const std::vector<TextureWays>& textures,
 }
 
 /// What a pair is to the loads.
-struct Worth {
+struct PairWorth {
   double loads = 0;  // that choose it
   double rise = 0;   // of the loss without it, summed over loads, in parts of the whole ladder's loss
 };
@@ -131,7 +304,7 @@ struct LevelHulls {
   std::vector<std::vector<Hull>> without;  // the same without that vertex, by hull and vertex
 };
 
-LevelHulls level_hulls(const TextureWays& texture, const std::vector<std::uint8_t>& keep,
+LevelHulls level_hulls(const TextureRungs& texture, const std::vector<std::uint8_t>& keep,
                        std::size_t wanted) {
   LevelHulls out{hulls_of(texture, keep, wanted), {}};
   for (std::size_t h = 0; h < out.hulls.size(); ++h) {
@@ -154,9 +327,9 @@ double loss_without(const LevelHulls& at, std::size_t hull, std::size_t vertex, 
 }
 
 /// `whole`: the texture's hulls with all pairs, by wanted level.
-std::vector<Worth> worth_of(const TextureWays& texture, const std::vector<std::uint8_t>& keep,
-                            const GivenBytes& given, const std::vector<std::vector<Hull>>& whole) {
-  std::vector<Worth> out(texture.pairs.size());
+std::vector<PairWorth> worth_of(const TextureRungs& texture, const std::vector<std::uint8_t>& keep,
+                                const GivenBytes& given, const std::vector<std::vector<Hull>>& whole) {
+  std::vector<PairWorth> out(texture.pairs.size());
   for (std::size_t level = 0; level < given.size(); ++level) {
     if (given[level].empty()) continue;
     const LevelHulls now = level_hulls(texture, keep, level);
@@ -168,7 +341,7 @@ std::vector<Worth> worth_of(const TextureWays& texture, const std::vector<std::u
       const std::size_t k = segment_of(hull, bytes), last = std::min(k + 1, hull.size() - 1);
       for (std::size_t v = std::max<std::size_t>(k, 1); v <= last; ++v) {
         if (v > k && bytes <= hull[k].bytes) continue;  // all fragments are at the vertex before
-        Worth& worth = out[hull[v].pair];
+        PairWorth& worth = out[hull[v].pair];
         worth.loads += 1;
         worth.rise += (loss_without(now, h, v, bytes) - loss) / unit;
       }
@@ -178,16 +351,16 @@ std::vector<Worth> worth_of(const TextureWays& texture, const std::vector<std::u
 }
 
 /// What is asked of a pair.
-struct Asked {
+struct LeastWorth {
   double loads = 0;          // that choose it
-  double rise_per_byte = 0;  // Worth::rise
+  double rise_per_byte = 0;  // PairWorth::rise
 };
 
 /// The pair to go next; kPreview for none. Fixed pairs and the last one of every level stay, and those of
-/// `closers` as long as another one can go.
-std::size_t next_to_go(const TextureWays& texture, const std::vector<std::uint8_t>& keep,
-                       const std::vector<std::uint8_t>& closers, const std::vector<Worth>& worth,
-                       const Asked& asked) {
+/// `gap_closing` as long as another one can go.
+std::size_t next_to_go(const TextureRungs& texture, const std::vector<std::uint8_t>& keep,
+                       const std::vector<std::uint8_t>& gap_closing, const std::vector<PairWorth>& worth,
+                       const LeastWorth& least_worth) {
   std::vector<std::size_t> of_level(texture.preview_loss.size());
   for (std::size_t k = 0; k < keep.size(); ++k) of_level[texture.pairs[k].level] += keep[k];
   const bool too_much = bytes_of(texture, keep) > texture.most_bytes;
@@ -198,8 +371,8 @@ std::size_t next_to_go(const TextureWays& texture, const std::vector<std::uint8_
     const RungPair& pair = texture.pairs[k];
     if (!keep[k] || pair.fixed || of_level[pair.level] < 2) continue;
     const double per_byte = worth[k].rise / static_cast<double>(std::max<std::uint64_t>(pair.bytes, 1));
-    const bool chosen = worth[k].loads >= asked.loads, closes = chosen && closers[k];
-    if (!too_much && (closes || (chosen && per_byte >= asked.rise_per_byte))) continue;
+    const bool chosen = worth[k].loads >= least_worth.loads, closes = chosen && gap_closing[k];
+    if (!too_much && (closes || (chosen && per_byte >= least_worth.rise_per_byte))) continue;
     if (next != kPreview && (closes > next_closes || (closes == next_closes && per_byte >= least))) continue;
     next = k, next_closes = closes, least = per_byte;
   }
@@ -209,7 +382,7 @@ std::size_t next_to_go(const TextureWays& texture, const std::vector<std::uint8_
 /// Where all still take too much, since the last pair of a level stays: cheaper pairs in the place of such
 /// ones, those first that lose least for the bytes they save. What a sample says of bytes is some hundredths
 /// off.
-void take_cheaper(const TextureWays& texture, std::vector<std::uint8_t>& keep) {
+void take_cheaper(const TextureRungs& texture, std::vector<std::uint8_t>& keep) {
   constexpr double kRoom = 0.97;
   while (bytes_of(texture, keep) > texture.most_bytes) {
     std::size_t out = kPreview, in = kPreview;
@@ -232,17 +405,18 @@ void take_cheaper(const TextureWays& texture, std::vector<std::uint8_t>& keep) {
 }
 
 /// `keep` of one texture without what is not worth its bytes.
-void drop_pairs(const TextureWays& texture, const GivenBytes& given, const Asked& asked,
+void drop_pairs(const TextureRungs& texture, const GivenBytes& given, const LeastWorth& least_worth,
                 std::vector<std::uint8_t>& keep) {
   std::vector<std::vector<Hull>> whole;
   for (std::size_t level = 0; level < given.size(); ++level) whole.push_back(hulls_of(texture, keep, level));
   bool bound = false;
   const auto drop = [&] {
     for (;;) {
-      const std::vector<std::uint8_t> closers =
-          texture.closes_gaps ? gap_closers(texture, keep, given) : std::vector<std::uint8_t>(keep.size());
+      const std::vector<std::uint8_t> gap_closing = texture.closes_gaps
+                                                        ? gap_closing_pairs(texture, keep, given)
+                                                        : std::vector<std::uint8_t>(keep.size());
       const std::size_t next =
-          next_to_go(texture, keep, closers, worth_of(texture, keep, given, whole), asked);
+          next_to_go(texture, keep, gap_closing, worth_of(texture, keep, given, whole), least_worth);
       if (next == kPreview) return;
       bound = bound || bytes_of(texture, keep) > texture.most_bytes;
       keep[next] = 0;
@@ -265,11 +439,11 @@ std::vector<TextureLoad> texture_loads() {
   return out;
 }
 
-std::vector<std::vector<std::uint8_t>> pairs_worth_storing(const std::vector<TextureWays>& textures,
+std::vector<std::vector<std::uint8_t>> pairs_worth_storing(const std::vector<TextureRungs>& textures,
                                                            const std::vector<TextureLoad>& loads, double gain,
                                                            double least_share) {
   std::vector<std::vector<std::uint8_t>> keep;
-  for (const TextureWays& texture : textures) {
+  for (const TextureRungs& texture : textures) {
     keep.push_back(better_than_the_preview(texture));
     keep_one_of_each_level(texture, keep.back());
   }
@@ -285,4 +459,4 @@ std::vector<std::vector<std::uint8_t>> pairs_worth_storing(const std::vector<Tex
   return keep;
 }
 
-}  // namespace texmesh
+}  // namespace texmesh::rungs

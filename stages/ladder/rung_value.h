@@ -1,11 +1,27 @@
 #pragma once
-// Inside the ladder only: which ways of storing a texture are worth their bytes.
+// Inside the ladder only: which rungs of a texture are worth their bytes.
+//
+// The search looks for the smallest set of pairs (a level at a rung) that serves 1,000 simulated loads nearly
+// as well as all pairs do. A load wants each texture at one level: one finer than the display has, since
+// clients take it where bytes are left. A client shows one level of a texture, some fragments at one rung and
+// the others at the next. So what a load gets for its bytes lies on the lower hull of loss over bytes.
+// 1. Pairs that lose no less than the preview go.
+// 2. Each load's bytes are shared among all textures at one price of a byte in loss x surface.
+// 3. Texture by texture, one pair after the other goes: the one whose removal raises the loss least for its
+//    bytes. This ends when every pair that is left is worth what LeastWorth asks and all fit in most_bytes.
+// 4. Pairs stay that close gaps. Two neighbours more than kMostApart times apart in bytes leave clients
+// nothing
+//    to choose between them. Where most_bytes does not allow all, the least worthy of them go last, and
+//    swap_pairs() tries every exchange, at most 12 rounds.
+// 5. What still takes too much has cheaper pairs in the place of the last ones of levels.
+// Each step removes pairs or makes them cheaper, or improves one number in a bounded number of rounds; so it
+// ends.
 #include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <vector>
 
-namespace texmesh {
+namespace texmesh::rungs {
 
 /// One way to store a texture: a plane of the chain (0 = full size, 1 = its first mip, ...) at one rung.
 struct RungPair {
@@ -16,7 +32,7 @@ struct RungPair {
 };
 
 /// A texture as loads meet it.
-struct TextureWays {
+struct TextureRungs {
   double surface = 0;                // share of the object's surface that shows it
   double texels_across = 0;          // of full size, along the height of an object that looks like a ball
   std::vector<double> preview_loss;  // [levels], as RungPair::loss; the preview takes no bytes
@@ -35,22 +51,65 @@ struct TextureLoad {
 /// Of ordinary_loads() (format/rules).
 std::vector<TextureLoad> texture_loads();
 
-/// Which pairs are worth storing, by texture and pair, 1 or 0. In every load each texture is wanted at one
-/// level finer than the display has, which clients take where bytes are left, and is shown by one level, that
-/// or a coarser one: along the lower hull of loss over bytes of its pairs, which begins at the preview, some
-/// fragments at one vertex, the others at the next one. The load's bytes are shared at one price, in
-/// loss x surface, for all textures. First the pairs go that lose no less than the preview. Then, one by one,
-/// that pair goes whose removal raises the loss least for its bytes, while the removal raises the mean over
-/// loads by less than `gain` times the pair's share of TextureWays::whole_bytes, or while less than
-/// `least_share` of the loads choose the pair, or while all pairs take more than TextureWays::most_bytes.
-/// Fixed pairs stay, and one of each level. A pair stays, too, that enough loads choose and without which two
-/// neighbours, of all that no other pair beats in bytes and loss, would be more than 2.5 times apart in
-/// bytes, when the finer one of them saves what somebody sees. Where all take too much the least worthy of
-/// these go, as the last ones; then such a texture's pairs are swapped (swap_pairs() of rung_gaps.h). Both
-/// only where TextureWays::closes_gaps. What then still takes too much has cheaper pairs in the place of the
-/// last ones of levels. Pure; same result anywhere.
-std::vector<std::vector<std::uint8_t>> pairs_worth_storing(const std::vector<TextureWays>& textures,
+/// Which pairs are worth storing, by texture and pair, 1 or 0. A pair goes while its removal raises the mean
+/// loss over loads by less than `gain` times its share of TextureRungs::whole_bytes, while less than
+/// `least_share` of the loads choose it, or while all pairs take more than TextureRungs::most_bytes. Fixed
+/// pairs stay, and one of each level. Pairs that close gaps stay, when enough loads choose them and the finer
+/// neighbour saves what somebody sees (kUnseen); this and the swaps hold where TextureRungs::closes_gaps.
+/// Pure; same result anywhere.
+std::vector<std::vector<std::uint8_t>> pairs_worth_storing(const std::vector<TextureRungs>& textures,
                                                            const std::vector<TextureLoad>& loads, double gain,
                                                            double least_share);
 
-}  // namespace texmesh
+/// 1 - SSIM that nobody sees: a rung that saves half of less is not worth twice as much.
+inline constexpr double kUnseen = 0.01;
+/// The preview, where pairs are numbered.
+inline constexpr std::size_t kPreview = std::numeric_limits<std::size_t>::max();
+
+/// A vertex of a lower hull.
+struct Vertex {
+  std::size_t pair = kPreview;
+  double bytes = 0, loss = 0;
+};
+using Hull = std::vector<Vertex>;
+
+/// Levels of a texture, the last one included.
+struct Levels {
+  std::size_t first = 0, last = 0;
+};
+
+/// What loads give a texture: bytes, by wanted level.
+using GivenBytes = std::vector<std::vector<double>>;
+
+/// The lower hull of loss over bytes where a level is wanted: from the preview on along the kept pairs of
+/// some levels.
+Hull hull_of(const TextureRungs& texture, const std::vector<std::uint8_t>& keep, std::size_t wanted,
+             Levels levels);
+/// Those of the wanted level and of each coarser one.
+std::vector<Hull> hulls_of(const TextureRungs& texture, const std::vector<std::uint8_t>& keep,
+                           std::size_t wanted);
+/// The vertex at or behind which so many bytes end.
+std::size_t segment_of(const Hull& hull, double bytes);
+/// Some fragments at one vertex and the others at the next one.
+double loss_at(const Hull& hull, double bytes);
+/// The hull that loses least with so many bytes: clients show one level of a texture.
+std::size_t best_of(const std::vector<Hull>& hulls, double bytes);
+
+/// Of all kept pairs together.
+double bytes_of(const TextureRungs& texture, const std::vector<std::uint8_t>& keep);
+
+/// Neighbours, of all pairs of any level that no other one beats in bytes and loss, have at most so many
+/// times the bytes of each other, when the finer one saves more than kUnseen. Pairs above the lower hull
+/// count, too: clients cannot mix levels. The preview is no neighbour.
+inline constexpr double kMostApart = 2.5;
+
+/// Pairs without which there is a gap where some level is wanted that loads want.
+std::vector<std::uint8_t> gap_closing_pairs(const TextureRungs& texture,
+                                            const std::vector<std::uint8_t>& keep, const GivenBytes& given);
+
+/// Adds pairs, takes them away and puts others in their place, one at a time, as long as that makes gaps
+/// smaller, or at equal gaps the mean loss of the loads. Fixed pairs stay, one of each level does, and all
+/// take at most TextureRungs::most_bytes, if they did before. Same result anywhere.
+void swap_pairs(const TextureRungs& texture, const GivenBytes& given, std::vector<std::uint8_t>& keep);
+
+}  // namespace texmesh::rungs

@@ -2,19 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
-#include <utility>
 
 #include "format/base/errors.h"
 #include "format/base/portable_math.h"
 #include "stages/base/parallel.h"
 #include "stages/fragment_codec/requantised_jpeg.h"
 #include "stages/image/decode_image.h"
-#include "stages/image/decode_jpeg.h"
 #include "stages/jpeg/jpeg_bits.h"
-#include "stages/jpeg/jpeg_coder.h"
-#include "stages/jpeg/source_jpeg.h"
-#include "stages/ladder/fragment_windows.h"
+#include "stages/ladder/encode_rungs.h"
 
 namespace texmesh {
 namespace {

@@ -1,13 +1,5 @@
 #pragma once
 // Inside the ladder only.
-#include <memory>
-#include <string>
-#include <vector>
-
-#include "format/model/model.h"
-#include "stages/base/run_context.h"
-#include "stages/data/fragments.h"
-#include "stages/data/pixels.h"
 #include "stages/fragment_codec/fragment_codec.h"
 #include "stages/ladder/ladder.h"
 

@@ -1,8 +1,6 @@
 #include "stages/lut/lut.h"
 
-#include <algorithm>
 #include <atomic>
-#include <string>
 
 #include "format/base/number16.h"
 #include "format/base/sha256.h"
@@ -11,7 +9,6 @@
 #include "stages/image/check_pixels.h"
 #include "stages/lut/size_model.h"
 #include "stages/measure/fragment_meter.h"
-#include "stages/measure/scale_samples.h"
 
 namespace texmesh {
 namespace {

@@ -30,25 +30,28 @@ struct LutOptions {
   double normal_quality_min = 30, data_quality_min = 18, alpha_quality_min = 18;  // beside quality_min
   template <class S, class V>
   static void fields(S& s, V&& v) {
-    v("allocate", s.allocate,
+    v("allocate", s.allocate, ProfileOnly{},
       "how bytes are shared among fragments: thesis = equation 3.2 in quality; vqp = the same by VQP (8.4) in "
       "the place of feature density; log = the same in the "
       "logarithm of the quantiser; rd = the bytes of log, spent where they save most visible error (1 - "
       "SSIM x surface)");
-    v("quality_fine", s.quality_fine, Range{1, 100}, "Q_i asked for at S_0");
-    v("quality_coarse", s.quality_coarse, Range{1, 100}, "Q_i asked for at the coarsest scale");
-    v("quality_width", s.quality_width, Range{0, 100}, "dQ: how far feature density moves the quality");
-    v("log_width", s.log_width, Range{0, 4},
+    v("quality_fine", s.quality_fine, Range{1, 100}, ProfileOnly{}, "Q_i asked for at S_0");
+    v("quality_coarse", s.quality_coarse, Range{1, 100}, ProfileOnly{},
+      "Q_i asked for at the coarsest scale");
+    v("quality_width", s.quality_width, Range{0, 100}, ProfileOnly{},
+      "dQ: how far feature density moves the quality");
+    v("log_width", s.log_width, Range{0, 4}, ProfileOnly{},
       "dg: how far feature density moves the logarithm of the quantiser; below 0.6 by at most one of the "
       "default rungs");
-    v("quality_min", s.quality_min, Range{1, 100}, "no fragment is asked to be worse");
-    v("normal_quality_min", s.normal_quality_min, Range{1, 100},
+    v("quality_min", s.quality_min, Range{1, 100}, ProfileOnly{}, "no fragment is asked to be worse");
+    v("normal_quality_min", s.normal_quality_min, Range{1, 100}, ProfileOnly{},
       "least quality asked for in normal maps; quality_min where that is more, quality_max where that is "
       "less");
-    v("data_quality_min", s.data_quality_min, Range{1, 100},
+    v("data_quality_min", s.data_quality_min, Range{1, 100}, ProfileOnly{},
       "as normal_quality_min, for occlusion, roughness, metalness and other data");
-    v("alpha_quality_min", s.alpha_quality_min, Range{1, 100}, "as normal_quality_min, for alpha channels");
-    v("quality_max", s.quality_max, Range{1, 100}, "no fragment is asked to be better");
+    v("alpha_quality_min", s.alpha_quality_min, Range{1, 100}, ProfileOnly{},
+      "as normal_quality_min, for alpha channels");
+    v("quality_max", s.quality_max, Range{1, 100}, ProfileOnly{}, "no fragment is asked to be better");
   }
 };
 

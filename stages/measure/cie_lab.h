@@ -1,7 +1,6 @@
 #pragma once
-// Colours as the eye tells them apart: what FLIP (Andersson et al. 2020) and the difference of
-// image_compare.h have in common. Linear colours are those of sRGB's primaries, 0 .. 1; XYZ is relative to a
-// white of Y = 1.
+// Colours as the eye tells them apart, for FLIP (Andersson et al. 2020) and for seams. Linear colours are
+// those of sRGB's primaries, 0 .. 1; XYZ is relative to a white of Y = 1.
 #include <algorithm>
 #include <cmath>
 

@@ -1,12 +1,7 @@
 #include "stages/measure/flip.h"
 
-#include <algorithm>
-#include <cmath>
-
-#include "format/base/portable_math.h"
 #include "stages/base/float_math.h"
 #include "stages/measure/cie_lab.h"
-#include "stages/measure/filtered_rows.h"
 #include "stages/measure/sampled_curve.h"
 
 namespace texmesh {

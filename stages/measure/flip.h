@@ -1,10 +1,7 @@
 #pragma once
 #include <array>
-#include <cstdint>
-#include <vector>
 
 #include "stages/measure/picture.h"
-#include "stages/measure/pixel_spans.h"
 
 namespace texmesh {
 

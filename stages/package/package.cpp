@@ -4,13 +4,12 @@
 #include <set>
 
 #include "format/base/box.h"
-#include "format/base/bytes.h"
 #include "format/base/clean_text.h"
 #include "format/container/layout.h"
 #include "format/documents/package_writer.h"
 #include "format/rules/viewing.h"
 #include "stages/base/run_context.h"
-#include "stages/gltf/glb_copyright.h"
+#include "stages/gltf/glb_container.h"
 #include "stages/image/decode_image.h"
 
 namespace texmesh {

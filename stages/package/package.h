@@ -26,7 +26,7 @@ struct PackageOptions {
   template <class S, class V>
   static void fields(S& s, V&& v) {
     v("title", s.title, "shown by viewers, before any other title");
-    v("meta", s.meta, Range{0, static_cast<double>(kMaxAboutBytes)},
+    v("meta", s.meta, Range{0, static_cast<double>(kMaxAboutBytes)}, ProfileOnly{},
       "about.json without what the source says, as one text; --meta FILE sets it");
   }
 };

@@ -1,22 +1,71 @@
 #include "stages/perceptual_values/perceptual_values.h"
 
-#include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <span>
-#include <string>
 
-#include "format/base/box.h"
 #include "format/base/errors.h"
 #include "format/base/portable_math.h"
 #include "format/rules/jnd_choice.h"
 #include "stages/base/parallel.h"
 #include "stages/geometry/distance.h"
-#include "stages/geometry/scale_walk.h"
-#include "stages/perceptual_values/scale_comparison.h"
 
 namespace texmesh {
 namespace {
+
+/// A point on a scale.
+struct ScalePoint {
+  Vec3d at;
+  double radius = 0;  // the skeleton distance there, which stands for the size of the shape around it
+  std::uint32_t position = 0;  // the corner of its triangle that weighs most
+};
+
+/// Distances of the points of finer scales to one scale. Only the largest are asked for, so that few points
+/// need a search: guesses bound the others. Safe to ask from many threads.
+class ScaleComparison {
+ public:
+  /// `survivor`: of the scale, per position of S_0. The arguments must outlive the comparison.
+  ScaleComparison(const Mesh& mesh, const NestedScale& scale, std::span<const std::uint32_t> survivor)
+      : surface_(mesh.positions, mesh.wedge_position, scale.triangles),
+        walk_(mesh, scale.triangles, survivor, surface_) {}
+
+  /// The largest `count` distances, at most one for each point, falling; `relative`: over the point's radius.
+  std::vector<double> largest(std::span<const ScalePoint> points, std::size_t count, bool relative) const {
+    struct Candidate {
+      double most;
+      std::uint32_t point;
+      SurfaceDistance::Hint hint;
+      bool operator<(const Candidate& o) const {
+        return most < o.most || (most == o.most && point < o.point);
+      }
+    };
+    const auto divisor = [&](std::uint32_t p) { return relative ? points[p].radius : 1; };
+    std::vector<Candidate> candidates;
+    candidates.reserve(points.size());
+    for (std::uint32_t p = 0; p < points.size(); ++p) {
+      const ScaleWalk::Guess guess = walk_.from(points[p].position, points[p].at);
+      candidates.push_back({std::sqrt(guess.distance2) / divisor(p), p, guess.hint});
+    }
+    std::make_heap(candidates.begin(), candidates.end());
+    count = std::min(count, points.size());
+    std::vector<double> found;  // a heap, the least on top
+    while (!candidates.empty() && (found.size() < count || candidates.front().most > found.front())) {
+      std::pop_heap(candidates.begin(), candidates.end());
+      auto [most, p, hint] = candidates.back();
+      candidates.pop_back();
+      found.push_back(surface_(points[p].at, hint) / divisor(p));
+      std::push_heap(found.begin(), found.end(), std::greater<>());
+      if (found.size() <= count) continue;
+      std::pop_heap(found.begin(), found.end(), std::greater<>());
+      found.pop_back();
+    }
+    std::sort(found.begin(), found.end(), std::greater<>());
+    return found;
+  }
+
+ private:
+  SurfaceDistance surface_;
+  ScaleWalk walk_;
+};
 
 std::vector<ScalePoint> sample_scale(const Mesh& mesh, const NestedScale& scale,
                                      const std::vector<float>& radius, std::size_t count) {

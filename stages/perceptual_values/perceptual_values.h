@@ -1,7 +1,7 @@
 #pragma once
 #include <vector>
 
-#include "format/documents/perceptual_table.h"
+#include "format/documents/thesis_tables.h"
 #include "stages/data/nested_scales.h"
 #include "stages/data/perceptual_values.h"
 #include "stages/data/skeleton.h"
@@ -36,24 +36,24 @@ struct PerceptualValuesOptions {
   template <class S, class V>
   static void fields(S& s, V&& v) {
     v("jnd", s.jnd, Range{0.001, 1}, "just-noticeable relative change of the distance to the skeleton");
-    v("jnd_reference_px", s.jnd_reference_px, Range{1, 100000},
+    v("jnd_reference_px", s.jnd_reference_px, Range{1, 100000}, ProfileOnly{},
       "displayed height of the object in px at which that difference is just noticeable");
-    v("jnd_distance_exponent", s.jnd_distance_exponent, Range{0, 2},
+    v("jnd_distance_exponent", s.jnd_distance_exponent, Range{0, 2}, ProfileOnly{},
       "e of the change that is just noticeable at D px: jnd x (jnd_reference_px / D)^e. 0 = the same at "
       "every "
       "distance, as the thesis prints; 1 is a guess until judges have been asked (docs/experiments.md)");
-    v("statistic", s.statistic,
+    v("statistic", s.statistic, ProfileOnly{},
       "what decides about major scales: p95 of the relative distance, or the thesis's average, "
       "conservative (largest) and aggressive (smallest) change of the skeleton distance");
-    v("steps", s.steps,
+    v("steps", s.steps, ProfileOnly{},
       "what makes the JND's step function: scales = each kept scale, by jnd and jnd_reference_px; majors = the "
       "major scales, each for the sizes at which O_V / E_S asks for a scale of its tier");
-    v("samples", s.samples, Range{100, 1000000},
+    v("samples", s.samples, Range{100, 1000000}, ProfileOnly{},
       "most points compared per pair of scales: one for every fourth triangle of the finer one, at least 250");
     v("kept_scales", s.kept_scales, Range{0, 40},
       "scales a package holds, about; steps of about 2x between them. 0 = S_0, the major scales and the "
       "coarsest alone");
-    v("edge_percentile", s.edge_percentile, Range{0, 50},
+    v("edge_percentile", s.edge_percentile, Range{0, 50}, ProfileOnly{},
       "percentile of the edge lengths that counts as shortest edge");
   }
 };

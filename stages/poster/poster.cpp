@@ -4,9 +4,8 @@
 
 #include "stages/jpeg/jpeg.h"
 #include "stages/poster/poster_camera.h"
-#include "stages/render/environment.h"
-#include "stages/render/materials/shown_materials.h"
 #include "stages/render/shade.h"
+#include "stages/render/shown_materials.h"
 
 namespace texmesh {
 namespace {

@@ -19,7 +19,7 @@ struct PosterOptions {
   static void fields(S& s, V&& v) {
     v("size_px", s.size_px, Range{0, 4096},
       "side of the poster, the picture of the object for lists and search engines; 0 = no poster");
-    v("max_bytes", s.max_bytes, Range{1000, 1000000}, "most bytes of the poster's JPEG");
+    v("max_bytes", s.max_bytes, Range{1000, 1000000}, ProfileOnly{}, "most bytes of the poster's JPEG");
   }
 };
 

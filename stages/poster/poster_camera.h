@@ -3,7 +3,6 @@
 #include <vector>
 
 #include "stages/base/run_context.h"
-#include "stages/render/render_camera.h"
 #include "stages/render/visibility.h"
 
 namespace texmesh::poster {

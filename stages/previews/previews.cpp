@@ -4,7 +4,7 @@
 
 #include "stages/base/parallel.h"
 #include "stages/image/check_pixels.h"
-#include "stages/image/halve_pixels.h"
+#include "stages/image/resize.h"
 #include "stages/jpeg/jpeg.h"
 
 namespace texmesh {
@@ -15,7 +15,7 @@ constexpr std::size_t kPreviewLimitBytes = 16 * 1024;
 PlanePreview make_preview(const TexturePlane& plane, const Pixels& pixels, const PreviewOptions& options,
                           const RunContext& context) {
   const Subsampling subsampling = is_colour(plane.role) ? options.subsampling : Subsampling::k444;
-  const Halving kind = halving_of(plane.role, plane.channels);
+  const Averaging kind = averaging_of(plane.role, plane.channels);
   const auto encode = [&](const Pixels& small) {
     return PlanePreview{encode_jpeg(small, options.quality, subsampling), small.width_px, small.height_px};
   };

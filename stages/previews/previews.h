@@ -18,7 +18,7 @@ struct PreviewOptions {
 };
 
 /// A preview of every full-size plane: a baseline JPEG of 1/8 of each side, rounded up, or of 1/16 where that
-/// of 1/8 would reach 16 KB. Its texels are means of what mips are means of (stages/image/halve_pixels.h).
+/// of 1/8 would reach 16 KB. Its texels are means of what mips are means of (stages/image/resize.h).
 /// `pixels` are fill_planes()'s. Throws StageError for pixels that do not fit the planes. Same bytes for any
 /// thread count.
 Previews make_previews(const Fragments& fragments, const std::vector<Pixels>& pixels,

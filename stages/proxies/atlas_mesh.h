@@ -1,11 +1,12 @@
 #pragma once
-#include <cstdint>
-#include <vector>
+// Inside the room only: a coarse surface of a model, cut into charts, which are packed into an atlas.
+#include <optional>
+#include <span>
 
-#include "format/base/vec.h"
 #include "format/model/model.h"
+#include "stages/base/run_context.h"
 
-namespace texmesh {
+namespace texmesh::proxies {
 
 /// A triangle soup whose equal positions are one. A group is a class of materials that must stay apart, such
 /// as unlit, blended or double-sided ones: no chart holds triangles of two groups.
@@ -34,4 +35,50 @@ struct AtlasMesh {
   friend bool operator==(const AtlasMesh&, const AtlasMesh&) = default;
 };
 
-}  // namespace texmesh
+/// Coarse surfaces of a triangle soup, by collapses of edges to the place of least quadric error (Garland and
+/// Heckbert 1997). Topology may change: there is no link condition, and what is too small to be seen
+/// vanishes.
+///
+/// `positions`: finite or not, object units; equal ones are welded. `triangles`: three position indices each;
+/// those with equal, non-finite or missing corners are dropped. `group`: per triangle, or empty for one
+/// group; outlines of groups are held as borders are. `triangle_counts`: how many triangles to have at most,
+/// in falling order, each >= 1.
+///
+/// Returns one surface per count, from one run. A surface has no triangle only when the soup has none with an
+/// area. Same bytes on every machine, for any number of threads. Time O(n log n), memory about 200 bytes per
+/// triangle. Throws Cancelled.
+std::vector<ProxySurface> simplify_surface(std::span<const Vec3f> positions,
+                                           std::span<const Triangle> triangles,
+                                           std::span<const std::uint32_t> group,
+                                           std::span<const std::uint32_t> triangle_counts,
+                                           const RunContext& context);
+
+/// A surface cut into charts, each flattened without overlap.
+struct SurfaceCharts {
+  std::vector<std::uint32_t> chart_of;  // per triangle; charts are numbered by their lowest triangle
+  std::uint32_t chart_count = 0;
+  // Per corner 3 t + k: place in the chart's own plane, object units, y up as seen from the front. A chart's
+  // area here is its area on the surface.
+  std::vector<Vec2d> plane;
+  // Per corner: the vertex of the atlas that it is. Corners of a vertex have one place, chart and position;
+  // where a chart is cut, a position has several vertices in it.
+  std::vector<std::uint32_t> vertex_of;
+  std::uint32_t vertex_count = 0;
+  // Per chart: the box of its places is [0, size.x] x [0, size.y], turned so that it is small.
+  std::vector<Vec2d> size;
+};
+
+/// Cuts a surface into charts by merging triangles from the bottom up, and flattens each chart along its mean
+/// normal, or so that angles stay. A chart is a disk of one group, which may be cut; no triangle flips, no
+/// two overlap; singular values of the flattening are within 3 x of each other. Same bytes everywhere. Throws
+/// Cancelled.
+SurfaceCharts segment_charts(const ProxySurface& surface, const RunContext& context);
+
+/// Packs charts into a texture of width_px x height_px (1..16384 each) with texels of one size as far as
+/// whole texels allow. nullopt when there are more charts than a texture of this size can hold: a larger
+/// texture, or fewer triangles, will do. Same bytes everywhere. Throws Cancelled.
+std::optional<AtlasMesh> pack_atlas(const ProxySurface& surface, const SurfaceCharts& charts,
+                                    std::uint32_t width_px, std::uint32_t height_px, std::uint32_t gutter_px,
+                                    const RunContext& context);
+
+}  // namespace texmesh::proxies

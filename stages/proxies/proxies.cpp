@@ -1,30 +1,14 @@
 #include "stages/proxies/proxies.h"
 
-#include <algorithm>
-#include <array>
 #include <string>
 
 #include "format/base/box.h"
 #include "format/base/portable_math.h"
 #include "stages/geometry/scale_frames.h"
-#include "stages/geometry/stand_in_scale.h"
-#include "stages/proxies/making/make_proxy.h"
-#include "stages/proxies/making/nested_rival.h"
-#include "stages/proxies/making/smooth_surface.h"
+#include "stages/proxies/make_proxy.h"
 
-namespace texmesh {
+namespace texmesh::proxies {
 namespace {
-
-using proxies::BakedProxy;
-using proxies::BakeSource;
-using proxies::find_groups;
-using proxies::MadeProxy;
-using proxies::MaterialGroups;
-using proxies::NestedRivals;
-using proxies::ProxyForm;
-using proxies::ProxyStudio;
-using proxies::ProxyWorkshop;
-using proxies::SurfaceLadder;
 
 constexpr std::uint32_t kLeastTriangles = 60;
 constexpr double kLeastBytesPerTriangle = 4;
@@ -83,6 +67,11 @@ void note_none(Notes& notes, int bytes, const std::string& why) {
   add_info(notes, "no-proxy", "", "there is no proxy of " + std::to_string(bytes) + " bytes: " + why);
 }
 
+std::uint32_t most_triangles(const Mesh& mesh, int most_bytes) {
+  return static_cast<std::uint32_t>(
+      std::min<double>(most_bytes / kLeastBytesPerTriangle, static_cast<double>(mesh.triangles.size())));
+}
+
 Mesh baked_mesh(const NestedScales& scales, const RunContext& context) {
   const double diagonal = bounding_box(scales.mesh.positions).diagonal();
   return lit_scale(scales, stand_in_scale(scales, kMostBaked, kFarthestBaked * diagonal), context);
@@ -90,7 +79,7 @@ Mesh baked_mesh(const NestedScales& scales, const RunContext& context) {
 
 /// What the files of a model that proxies stand for take.
 double source_bytes(const NestedScales& scales, const std::vector<Image>& images) {
-  double sum = proxies::whole_mesh_bytes(scales);
+  double sum = whole_mesh_bytes(scales);
   for (const Image& image : images) sum += static_cast<double>(image.bytes.size());
   return sum;
 }
@@ -102,7 +91,7 @@ std::vector<int> sizes_to_try(const NestedScales& scales, const std::vector<Imag
   std::vector<int> out;
   double left = kMostOfSource * source_bytes(scales, images);
   for (const int bytes : options.sizes) {
-    if (proxies::whole_mesh_is_small(scales, static_cast<std::uint64_t>(bytes))) {
+    if (whole_mesh_is_small(scales, static_cast<std::uint64_t>(bytes))) {
       note_none(notes, bytes, "S_0's mesh takes few of them, so the source's atlas can stay");
     } else if (kOverAsked * bytes > left) {
       note_none(notes, bytes, "proxies take at most 15 % of the source");
@@ -114,139 +103,185 @@ std::vector<int> sizes_to_try(const NestedScales& scales, const std::vector<Imag
   return out;
 }
 
-/// One model's proxies, smallest first.
-class ProxyRun {
- public:
-  ProxyRun(const NestedScales& scales, const Mesh& mesh, const ShownMaterials& shown,
-           const BakeSource& source, const MaterialGroups& groups, ProxyMode mode, int most_bytes,
-           const RunContext& context)
-      : mode_(mode),
-        mapped_(std::ranges::any_of(
-            shown.materials,
-            [](const RenderMaterial& m) { return !m.unlit && m.slot(TextureUse::kNormal).texture >= 0; })),
-        data_(data_varies(shown.materials)),
-        smooth_(proxies::is_smooth(mesh)),
-        surfaces_(mesh, groups, kLeastTriangles, most_triangles(mesh, most_bytes), context),
-        shop_(source, groups, surfaces_),
-        studio_(mesh, shown),
-        rivals_(scales, shown, studio_) {}
+constexpr const char* kScaleWins = "a scale with the source's atlas looks better for the same bytes";
+constexpr const char* kWholeTakesFewer = "the whole object takes fewer";
 
-  void add(int bytes, Proxies& out, const RunContext& context) {
-    const bool first = out.proxies.empty();
-    if (whole_) return note_none(out.notes, bytes, kWholeTakesFewer);
-    if (!first && cannot_win(bytes, context)) return note_none(out.notes, bytes, kScaleWins);
-    Candidate best = best_of(bytes, first, context);
-    std::optional<MadeProxy>& made = best.made;
-    if (!made) return note_none(out.notes, bytes, "mesh and pictures do not fit");
-    whole_ = !first && made->proxy.glb.size() <= out.proxies.back().glb.size();
-    if (whole_) return note_none(out.notes, bytes, kWholeTakesFewer);
-    last_ = {(first ? kFirstShare : 1) * bytes, best.flip.mean()};
-    const bool loses = loses_to_scale(made->proxy.glb.size(), first, best.flip.mean(), context);
-    if (loses && !first) return note_none(out.notes, bytes, kScaleWins);
-    made->proxy.losses = studio_.losses(made->shown, best.flip, context);
-    out.proxies.push_back(std::move(made->proxy));
-    if (first) first_loses_ = loses;
-  }
-
-  /// A smallest proxy that loses goes with those that it is shown before.
-  void finish(Proxies& out) const {
-    if (!first_loses_ || out.proxies.size() != 1) return;
-    note_none(out.notes, static_cast<int>(out.proxies.front().target_bytes), kScaleWins);
-    out.proxies.clear();
-  }
-
- private:
-  static constexpr const char* kScaleWins = "a scale with the source's atlas looks better for the same bytes";
-  static constexpr const char* kWholeTakesFewer = "the whole object takes fewer";
-  struct Candidate {
-    std::optional<MadeProxy> made;
-    ProxyForm form;
-    FlipSum flip;  // at the middle height
-  };
-  void compete(BakedProxy& baked, std::uint64_t bytes, const ProxyForm& form, Candidate& best,
-               const RunContext& context) {
-    std::optional<MadeProxy> made = shop_.finish(baked, bytes, form);
-    if (!made) return;
-    // Facets of a smooth object must be worth it. Another's normals, which stand for its own facets, are to
-    // be more than noise.
-    const double worth = form.normals ? 1 : smooth_ ? 1.04 : 0.995;
-    // After half of the views.
-    constexpr double kFarOff = 1.15, kNoise = 0.005;
-    const double hopeless = best.made ? kFarOff * best.flip.mean() / worth + kNoise : 1;
-    const FlipSum flip = studio_.at_middle(made->shown, context, hopeless);
-    if (!best.made || flip.mean() * worth < best.flip.mean()) best = {std::move(made), form, flip};
-  }
-
-  bool loses_to_scale(std::uint64_t bytes, bool first, double flip, const RunContext& context) {
-    if (mode_ != ProxyMode::kAuto) return false;
-    const double rival_bytes = (first ? kFirstShare : 1) * static_cast<double>(bytes);
-    return rivals_.win(static_cast<std::uint64_t>(rival_bytes), flip, context);
-  }
-
-  /// Whether a scale is farther ahead of the last size than this one can come. FLIP falls with a power of the
-  /// bytes: of six scans on average .4, at most .63.
-  bool cannot_win(int bytes, const RunContext& context) {
-    constexpr double kMostPower = 0.75;
-    if (mode_ != ProxyMode::kAuto || !(last_.bytes > 0)) return false;
-    const double best = last_.flip * portable::pow(last_.bytes / bytes, kMostPower);
-    return rivals_.likeliest_wins(static_cast<std::uint64_t>(bytes), best, context);
-  }
-
-  /// FLIP likes facets of a smooth object even where they are large (a bust's .107 for .115 at 20 kB); who
-  /// looks at them does not. Small ones are not seen, and the bytes of normals sharpen the textures.
-  bool may_be_flat(const BakedProxy& baked, int bytes, bool first) const {
-    constexpr std::size_t kSmallFacets = 12000;  // a helmet of 9,000 showed them
-    if (!smooth_) return first || flat_;
-    return baked.atlas.triangles.size() >= kSmallFacets && (bytes < kFineFrom || flat_);
-  }
-
-  /// Normals, flat triangles and a normal map compete on one bake. Where triangles of the first size need no
-  /// normals, a second bake has more of them.
-  Candidate best_of(int bytes, bool first, const RunContext& context) {
-    const auto target = static_cast<std::uint64_t>(bytes);
-    Candidate best;
-    ProxyForm form = first_form(bytes, first, data_);
-    form.maps.normal = mapped_ && bytes >= kNormalMapPaysFrom;
-    auto baked = shop_.bake(bytes, form, context);
-    if (!baked) return best;
-    if (form.maps.normal) compete(*baked, target, form, best, context);
-    form.maps.normal = false;
-    compete(*baked, target, form, best, context);
-    form.normals = false;
-    if (may_be_flat(*baked, bytes, first)) compete(*baked, target, form, best, context);
-    if (best.made) shop_.learn(*best.made);
-    flat_ = best.made && !best.form.normals;
-    if (first && flat_)
-      if (auto again = shop_.bake(bytes, form, context)) compete(*again, target, form, best, context);
-    return best;
-  }
-
-  static std::uint32_t most_triangles(const Mesh& mesh, int most_bytes) {
-    return static_cast<std::uint32_t>(
-        std::min<double>(most_bytes / kLeastBytesPerTriangle, static_cast<double>(mesh.triangles.size())));
-  }
-  ProxyMode mode_;
-  bool mapped_;               // a source material has a normal map
-  bool data_;                 // occlusion, roughness or metal need a map
-  bool smooth_;               // S_0 shows no facets
-  bool flat_ = false;         // the last proxy needs no normals
-  bool first_loses_ = false;  // to a scale of as many bytes
-  bool whole_ = false;        // the last proxy is all that larger ones could be
-  struct {
-    double bytes = 0, flip = 0;  // in bytes of Draco
-  } last_;                       // size that was made
-  SurfaceLadder surfaces_;
-  ProxyWorkshop shop_;
-  ProxyStudio studio_;
-  NestedRivals rivals_;
+/// What every size is made of, and how the model looks. Constant once made.
+struct ProxySubject {
+  const Mesh& mesh;  // S_0, or what stands for it
+  const ShownMaterials& shown;
+  const MaterialGroups& groups;
+  const BakeSource& source;
+  ProxyMode mode;
+  bool mapped;  // a source material has a normal map
+  bool varied;  // occlusion, roughness or metal need a map
+  bool smooth;  // S_0 shows no facets
 };
 
+ProxySubject subject_of(const Mesh& mesh, const ShownMaterials& shown, const MaterialGroups& groups,
+                        const BakeSource& source, ProxyMode mode) {
+  const bool mapped = std::ranges::any_of(shown.materials, [](const RenderMaterial& m) {
+    return !m.unlit && m.slot(TextureUse::kNormal).texture >= 0;
+  });
+  return {mesh, shown, groups, source, mode, mapped, data_varies(shown.materials), is_smooth(mesh)};
+}
+
+/// What the sizes so far tell the next one.
+struct Learned {
+  ProxyCosts costs;
+  bool flat = false;                // the last proxy needs no normals
+  double last_bytes = 0;            // of the last size that was made, in bytes of Draco
+  double last_flip = 0;             // its loss
+  bool smallest_loses = false;      // to a scale of as many bytes
+  bool holds_whole_object = false;  // the last proxy is all that larger ones could be
+};
+
+/// A proxy of one size, in the form that looks best so far.
+struct Candidate {
+  std::optional<MadeProxy> made;
+  ProxyForm form;
+  FlipSum flip;  // at the middle height
+};
+
+/// Takes the place of `best` where it looks better, worth its form.
+void compete(const ProxySubject& subject, const ReferenceViews& views, BakedProxy& baked, std::uint64_t bytes,
+             const ProxyForm& form, Candidate& best, const RunContext& context) {
+  std::optional<MadeProxy> made = finish_proxy(baked, subject.groups, bytes, form);
+  if (!made) return;
+  // Facets of a smooth object must be worth it. Another's normals, which stand for its own facets, are to
+  // be more than noise.
+  const double worth = form.normals ? 1 : subject.smooth ? 1.04 : 0.995;
+  // After half of the views.
+  constexpr double kFarBehind = 1.15, kNoise = 0.005;
+  const double hopeless = best.made ? kFarBehind * best.flip.mean() / worth + kNoise : 1;
+  const FlipSum flip =
+      picture_loss(views, made->shown.scene(), made->shown.shown.textures, context, hopeless);
+  if (!best.made || flip.mean() * worth < best.flip.mean()) best = {std::move(made), form, flip};
+}
+
+/// FLIP likes facets of a smooth object even where they are large (a bust's .107 for .115 at 20 kB); who
+/// looks at them does not. Small ones are not seen, and the bytes of normals sharpen the textures.
+bool may_be_flat(const ProxySubject& subject, const BakedProxy& baked, int bytes, bool first,
+                 bool last_flat) {
+  constexpr std::size_t kSmallFacets = 12000;  // a helmet of 9,000 showed them
+  if (!subject.smooth) return first || last_flat;
+  return baked.atlas.triangles.size() >= kSmallFacets && (bytes < kFineFrom || last_flat);
+}
+
+/// Normals, flat triangles and a normal map compete on one bake. Where triangles of the first size need no
+/// normals, a second bake has more of them.
+Candidate best_of(const ProxySubject& subject, const ReferenceViews& views, CoarseSurfaces& surfaces,
+                  int bytes, bool first, Learned& learned, const RunContext& context) {
+  Candidate best;
+  ProxyForm form = first_form(bytes, first, subject.varied);
+  const auto bake = [&] {
+    return bake_proxy(subject.source, subject.groups, surfaces, learned.costs, bytes, form, context);
+  };
+  const auto try_form = [&](BakedProxy& baked) {
+    compete(subject, views, baked, static_cast<std::uint64_t>(bytes), form, best, context);
+  };
+  form.maps.normal = subject.mapped && bytes >= kNormalMapPaysFrom;
+  auto baked = bake();
+  if (!baked) return best;
+  if (form.maps.normal) try_form(*baked);
+  form.maps.normal = false;
+  try_form(*baked);
+  form.normals = false;
+  if (may_be_flat(subject, *baked, bytes, first, learned.flat)) try_form(*baked);
+  if (best.made)
+    if (const auto bits = texel_bits_of(*best.made)) learned.costs.texel_bits = *bits;
+  learned.flat = best.made && !best.form.normals;
+  if (first && learned.flat)
+    if (auto again = bake()) try_form(*again);
+  return best;
+}
+
+/// Whether a scale is farther ahead of the last size than this one can come. FLIP falls with a power of the
+/// bytes: of six scans on average .4, at most .63.
+bool cannot_win(CompetingScales& scales, int bytes, const Learned& learned, const RunContext& context) {
+  constexpr double kMostPower = 0.75;
+  if (!(learned.last_bytes > 0)) return false;
+  const double best = learned.last_flip * portable::pow(learned.last_bytes / bytes, kMostPower);
+  return scales.likeliest_wins(static_cast<std::uint64_t>(bytes), best, context);
+}
+
+/// A proxy that stays, with its loss at the middle height.
+struct KeptProxy {
+  MadeProxy made;
+  FlipSum middle;
+};
+
+/// Tries one size after the other, smallest first; what does not stay has a note.
+std::vector<KeptProxy> kept_proxies(const ProxySubject& subject, const NestedScales& scales,
+                                    const std::vector<int>& sizes, Notes& notes, const RunContext& inner,
+                                    const RunContext& context) {
+  CoarseSurfaces surfaces(subject.mesh, subject.groups, kLeastTriangles,
+                          most_triangles(subject.mesh, sizes.back()), inner);
+  const ReferenceViews views = reference_views(subject.mesh, subject.shown, kMiddlePx, inner);
+  CompetingScales competitors(scales, subject.shown, views);
+  const bool scales_compete = subject.mode == ProxyMode::kAuto;
+  std::vector<KeptProxy> kept;
+  Learned learned;
+  /// Why the size gets no proxy; null where it does.
+  const auto add = [&](int bytes) -> const char* {
+    const bool first = kept.empty();
+    if (learned.holds_whole_object) return kWholeTakesFewer;
+    if (!first && scales_compete && cannot_win(competitors, bytes, learned, inner)) return kScaleWins;
+    Candidate best = best_of(subject, views, surfaces, bytes, first, learned, inner);
+    if (!best.made) return "mesh and pictures do not fit";
+    const std::size_t size = best.made->proxy.glb.size();
+    learned.holds_whole_object = !first && size <= kept.back().made.proxy.glb.size();
+    if (learned.holds_whole_object) return kWholeTakesFewer;
+    const double flip = best.flip.mean(), share = first ? kFirstShare : 1;
+    learned.last_bytes = share * bytes, learned.last_flip = flip;
+    const auto rival_bytes = static_cast<std::uint64_t>(share * static_cast<double>(size));
+    const bool loses = scales_compete && competitors.win(rival_bytes, flip, inner);
+    if (loses && !first) return kScaleWins;
+    if (first) learned.smallest_loses = loses;
+    kept.push_back({std::move(*best.made), best.flip});
+    return nullptr;
+  };
+  for (std::size_t i = 0; i < sizes.size(); ++i) {
+    if (const char* why = add(sizes[i])) note_none(notes, sizes[i], why);
+    context.report(static_cast<double>(i + 1) / static_cast<double>(sizes.size()));
+  }
+  // A smallest proxy that loses goes with those that it is shown before.
+  if (learned.smallest_loses && kept.size() == 1) {
+    note_none(notes, static_cast<int>(kept.front().made.proxy.target_bytes), kScaleWins);
+    kept.clear();
+  }
+  return kept;
+}
+
+/// The proxies with their losses at all displayed heights.
+std::vector<Proxy> measured_proxies(const ProxySubject& subject, std::vector<KeptProxy> kept,
+                                    const RunContext& context) {
+  std::vector<Proxy> out;
+  for (KeptProxy& k : kept) out.push_back(std::move(k.made.proxy));
+  for (const double px : {kSmallPx, kMiddlePx, kLargePx}) {
+    const bool known = px == kMiddlePx;
+    ReferenceViews views;
+    if (!known && !kept.empty()) views = reference_views(subject.mesh, subject.shown, px, context);
+    for (std::size_t i = 0; i < kept.size(); ++i) {
+      const ShownModel& shown = kept[i].made.shown;
+      const FlipSum flip =
+          known ? kept[i].middle : picture_loss(views, shown.scene(), shown.shown.textures, context);
+      out[i].losses.push_back({px, flip.mean(), flip.percentile(0.95)});
+    }
+  }
+  return out;
+}
+
 }  // namespace
+}  // namespace texmesh::proxies
+
+namespace texmesh {
 
 Proxies make_proxies(const NestedScales& scales, const std::vector<Material>& materials,
                      const std::vector<Image>& images, const Fragments& fragments,
                      const std::vector<Pixels>& pixels, const ProxiesOptions& options,
                      const RunContext& context) {
+  using namespace proxies;
   Proxies out;
   if (options.mode == ProxyMode::kNone) return out;
   if (scales.scales.empty()) throw StageError("proxies", "scales", "S_0", "none");
@@ -264,12 +299,9 @@ Proxies make_proxies(const NestedScales& scales, const std::vector<Material>& ma
     for (const int bytes : sizes) note_none(out.notes, bytes, "the object has no extent");
     return out;
   }
-  ProxyRun run(scales, mesh, shown, source, groups, options.mode, sizes.back(), inner);
-  for (std::size_t i = 0; i < sizes.size(); ++i) {
-    run.add(sizes[i], out, inner);
-    context.report(static_cast<double>(i + 1) / static_cast<double>(sizes.size()));
-  }
-  run.finish(out);
+  const ProxySubject subject = subject_of(mesh, shown, groups, source, options.mode);
+  out.proxies =
+      measured_proxies(subject, kept_proxies(subject, scales, sizes, out.notes, inner, context), inner);
   return out;
 }
 

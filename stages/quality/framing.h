@@ -1,15 +1,30 @@
 #pragma once
-// Inside the room only: what the pictures show of the object.
-#include <cstdint>
-#include <vector>
-
+// Inside the room only: what the pictures show of the object, and the rows in which large ones are rendered.
 #include "format/base/box.h"
 #include "format/base/note.h"
-#include "stages/quality/bands.h"
-#include "stages/quality/shown_textures.h"
-#include "stages/render/visibility.h"
+#include "stages/measure/picture.h"
+#include "stages/quality/textures.h"
 
 namespace texmesh::quality {
+
+/// Where a view shows S_0.
+struct ShownRows {
+  double first = 0, end = 1;          // parts of the picture's side
+  std::vector<std::uint32_t> pixels;  // by row of a smaller picture, that show something
+};
+
+/// Bands of rows, evenly spread over those that show the object. What is compared has the values that it has
+/// in the whole picture: beside it as much is rendered as filters see.
+struct Bands {
+  std::vector<std::uint8_t> rendered;  // as look() takes them; empty: all rows
+  std::vector<std::uint8_t> compared;  // by row
+  /// Takes the rows that are not compared out of the picture's covered pixels.
+  void cut(Picture& picture) const;
+};
+
+/// For a size at which views show about so many pixels of the object each: one band in as many as leave
+/// kEnoughPixels, but at least two bands. Whole pictures where bands would miss most of the object.
+Bands choose_bands(const ShownRows& view, std::uint32_t side_px, double pixels);
 
 /// The sphere that all pictures frame, and the extent whose length on screen is the displayed height.
 struct Frame {

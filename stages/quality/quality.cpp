@@ -2,55 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string>
 
 #include "format/documents/manifest.h"
 #include "stages/geometry/scale_frames.h"
-#include "stages/quality/size_rules.h"
 #include "stages/quality/table_fit.h"
 
-namespace texmesh {
+namespace texmesh::quality {
 namespace {
-
-using quality::along_curve;
-using quality::Cells;
-using quality::choose_views;
-using quality::coarser_along;
-using quality::Coverage;
-using quality::enlarge;
-using quality::fewer_heights;
-using quality::find_groups;
-using quality::find_shown;
-using quality::fit_exponent;
-using quality::FlipLimits;
-using quality::frame_object;
-using quality::GroupCells;
-using quality::GroupPictures;
-using quality::kSizes;
-using quality::lend_knots;
-using quality::Loss;
-using quality::Losses;
-using quality::losses_of;
-using quality::PlanesOfGroup;
-using quality::pooled;
-using quality::render_size;
-using quality::ShownMip;
-using quality::ShownTexture;
-using quality::ShownTextures;
-using quality::SizeCells;
-using quality::SizeTask;
-using quality::SmallerSize;
-using quality::source_texture;
-using quality::Studio;
-using quality::texture_data;
-using quality::texture_losses;
-using quality::TextureData;
-using quality::TextureSampler;
-using quality::TextureSizes;
-using quality::Together;
-using quality::TogetherCell;
-using quality::TogetherLoss;
-using quality::ViewPart;
 
 /// A displayed height that is rendered whatever comes out, and the one between it and the next lower one.
 struct Height {
@@ -321,12 +279,16 @@ std::vector<double> texel_levels(const SizeCells& size, std::size_t doublings) {
 }
 
 }  // namespace
+}  // namespace texmesh::quality
+
+namespace texmesh {
 
 MeasuredQuality measure_quality(const NestedScales& scales, const PerceptualValues& perceptual,
                                 const std::vector<Material>& materials, const std::vector<Image>& images,
                                 const Fragments& fragments, const std::vector<Pixels>& pixels,
                                 const Ladder& ladder, const Previews& previews, const PackageTables& tables,
                                 const QualityOptions& options, const RunContext& context) {
+  using namespace quality;
   if (scales.mesh.positions.empty()) throw StageError("quality", "S_0", "positions", "none");
   const KeptScales kept = kept_scales(scales, perceptual, context);
   const ShownTextures shown = find_shown(materials, fragments, scales.mesh);

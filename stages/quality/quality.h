@@ -28,7 +28,8 @@ struct QualityOptions {
       "as many of the views show scales at larger heights, and all else");
     v("largest_px", s.largest_px, Range{128, 2048},
       "largest displayed height of the object that is rendered");
-    v("rung_samples", s.rung_samples, Range{1, 16}, "rungs that are rendered, spread over the ladder");
+    v("rung_samples", s.rung_samples, Range{1, 16}, ProfileOnly{},
+      "rungs that are rendered, spread over the ladder");
     v("flip_mean", s.flip_mean, Range{0, 1},
       "mean FLIP of a view up to which a scale counts as equal to S_0");
     v("flip_p95", s.flip_p95, Range{0, 1},

@@ -1,13 +1,10 @@
 #pragma once
 // Inside the room only: pictures beside S_0's.
-#include <cstdint>
 #include <map>
 #include <optional>
 #include <utility>
-#include <vector>
 
 #include "stages/measure/flip.h"
-#include "stages/measure/image_compare.h"
 #include "stages/quality/framing.h"
 #include "stages/render/shade.h"
 
@@ -54,7 +51,7 @@ struct Shot {
 /// Per view; nothing where the shot was not taken.
 using Losses = std::vector<Loss>;
 
-/// Takes shots at one displayed height, large ones in bands of rows (bands.h). The reference is S_0 with
+/// Takes shots at one displayed height, large ones in bands of rows (framing.h). The reference is S_0 with
 /// `source`, prepared once for each view that any shot asks for. One view at a time is in memory, but for
 /// what FLIP and SSIM compare of the references.
 class SizePictures {

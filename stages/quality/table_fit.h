@@ -1,5 +1,21 @@
 #pragma once
 // Inside the room only: from losses of samples to what clients read between them.
+//
+// A client predicts how any choice of mips and rungs looks. It reads a small table: for each of three
+// displayed heights and each group of planes a curve of FLIP over 1 - SSIM, and one exponent that says how
+// losses of geometry and of several groups add up. Only some pictures are rendered. Here the others are
+// filled in, and the curves and the exponent are searched:
+// 1. along_curve() and coarser_along() read what was not rendered at a height from the curves of the height
+//    below, for texels as large on the screen.
+// 2. fit_exponent() tries a grid of exponents on the pictures in which everything was changed at once, and
+// keeps
+//    the one with the least mean error.
+// 3. texture_losses() sorts a group's knots, takes off what its mips lose without coding, and scales the
+// curve
+//    until its mean over fragments is what whole planes lost: three steps, which bring it near enough.
+// 4. lend_knots() gives each height knots of the others; enlarge() adds heights that are not worth rendering.
+// All loops run over knots, heights and fixed numbers of steps, so the fit ends, and equal pictures give
+// equal tables.
 #include "stages/quality/size_cells.h"
 
 namespace texmesh::quality {

@@ -1,10 +1,7 @@
 #pragma once
 // Inside the room only: a triangle as a camera sees it, in homogeneous coordinates (Olano and Greer 1997), so
 // that nothing has to be cut at the near plane.
-#include <array>
 #include <cmath>
-#include <cstdint>
-#include <vector>
 
 #include "stages/render/visibility.h"
 

@@ -1,7 +1,5 @@
 #pragma once
 #include <array>
-#include <cstdint>
-#include <functional>
 #include <vector>
 
 #include "format/base/vec.h"

@@ -3,7 +3,6 @@
 #include <array>
 #include <optional>
 #include <span>
-#include <vector>
 
 #include "stages/render/brdf.h"
 #include "stages/render/edge_planes.h"

@@ -1,10 +1,6 @@
 #pragma once
-#include <cstdint>
-#include <vector>
-
-#include "stages/base/run_context.h"
 #include "stages/data/pixels.h"
-#include "stages/render/render_material.h"
+#include "stages/render/visibility.h"
 
 namespace texmesh {
 

@@ -1,16 +1,11 @@
 #include "stages/render/shade.h"
 
-#include <algorithm>
-#include <array>
-#include <span>
 #include <utility>
 
-#include "format/base/srgb.h"
 #include "stages/base/parallel.h"
 #include "stages/measure/sampled_curve.h"
-#include "stages/render/edge_planes.h"
 #include "stages/render/fragment_shader.h"
-#include "stages/render/srgb_encoder.h"
+#include "stages/render/render_math.h"
 
 namespace texmesh {
 namespace {

@@ -1,12 +1,7 @@
 #pragma once
-#include <span>
-#include <vector>
-
-#include "stages/data/pixels.h"
 #include "stages/measure/image_compare.h"
 #include "stages/render/environment.h"
 #include "stages/render/render_texture.h"
-#include "stages/render/visibility.h"
 
 namespace texmesh {
 

@@ -1,14 +1,89 @@
 #pragma once
-#include <cstdint>
 #include <span>
-#include <vector>
 
 #include "format/model/model.h"
 #include "stages/base/run_context.h"
-#include "stages/render/render_camera.h"
-#include "stages/render/render_material.h"
 
 namespace texmesh {
+
+/// A direction of view: a camera looks along -z at the sphere of radius `radius` around `centre`.
+struct ViewCamera {
+  Vec3d x, y, z;  // unit vectors: x to the right, y up, z towards the viewer
+  Vec3d centre;
+  double radius = 1;
+};
+/// The camera of view `index`, 0 <= index < count. The `count` directions are spread evenly over the sphere.
+/// The directions are the same for every model.
+ViewCamera camera_of(int index, int count, Vec3d centre, double radius);
+
+/// A perspective camera with a square picture.
+struct RenderCamera {
+  Vec3d eye;                  // in the mesh's local frame
+  Vec3d x, y, z;              // unit and orthogonal: x right, y up, z backwards; the camera looks along -z
+  double tan_half_fov = 0.3;  // half the picture's height at distance 1
+  double near = 0;            // what lies nearer along -z is not seen; > 0, object units
+};
+
+inline constexpr double kRenderFovDegrees = 30;  // of the whole picture's height
+
+/// The same direction as `view`, at the distance at which the sphere fills 0.96 of the picture's side. A
+/// radius of 0, or one that is not finite, counts as 1.
+RenderCamera perspective_camera(const ViewCamera& view, double fov_degrees = kRenderFovDegrees);
+
+/// A camera at `eye` that looks at `target`. `up` need not be orthogonal; where it is parallel to the view or
+/// zero another direction serves. `near` as RenderCamera. 0 < fov_degrees < 180.
+RenderCamera look_at_camera(Vec3d eye, Vec3d target, Vec3d up, double fov_degrees, double near);
+
+/// What a material reads of a texture, as glTF has it.
+enum class TextureUse : std::uint8_t {
+  kBaseColour,         // sRGB colour, and alpha as a plain number
+  kMetallicRoughness,  // green = roughness, blue = metallic
+  kNormal,             // tangent space, +Y up
+  kOcclusion,          // red
+  kEmissive            // sRGB colour
+};
+inline constexpr std::size_t kTextureUses = 5;
+/// Colours are sRGB encoded; the others are plain numbers.
+constexpr bool is_srgb(TextureUse use) {
+  return use == TextureUse::kBaseColour || use == TextureUse::kEmissive;
+}
+
+enum class MagFilter : std::uint8_t { kNearest, kLinear };
+/// kLinear reads level 0 alone, kTrilinear blends two levels. Both are bilinear within a level.
+enum class MinFilter : std::uint8_t { kNearest, kLinear, kTrilinear };
+
+/// How a material reads one texture.
+struct TextureSlot {
+  std::int32_t texture = -1;  // index into the textures that shade() gets, -1 = none
+  std::uint8_t uv_set = 0;    // 0 -> Mesh::uv0, 1 -> Mesh::uv1
+  Wrap wrap_s = Wrap::kRepeat, wrap_t = Wrap::kRepeat;
+  MagFilter mag_filter = MagFilter::kLinear;
+  MinFilter min_filter = MinFilter::kTrilinear;
+  UvTransform transform;
+};
+
+/// The metallic-roughness material of glTF 2.0. Factors are linear and lie in the ranges that glTF allows.
+struct RenderMaterial {
+  Vec4f base_colour{1, 1, 1, 1};
+  float metallic = 1, roughness = 1;
+  Vec3f emissive{0, 0, 0};
+  float normal_scale = 1, occlusion_strength = 1;
+  AlphaMode alpha_mode = AlphaMode::kOpaque;
+  float alpha_cutoff = 0.5f;
+  bool double_sided = false;
+  bool unlit = false;  // base colour alone, tone-mapped like the rest
+  std::array<TextureSlot, kTextureUses> textures;
+  TextureSlot& slot(TextureUse use) { return textures[static_cast<std::size_t>(use)]; }
+  const TextureSlot& slot(TextureUse use) const { return textures[static_cast<std::size_t>(use)]; }
+};
+
+/// The material without its extensions, but for the strength of emission. `texture_of` gives the index of the
+/// texture that stands for a used reference, -1 = none. One image may stand for two textures, one sRGB and
+/// one plain. All four of glTF's minification filters with mip levels become kTrilinear. Values that are not
+/// finite become the defaults of glTF, others are clipped to its ranges.
+RenderMaterial render_material(
+    const Material& material,
+    const std::function<std::int32_t(const TextureRef& reference, TextureUse use)>& texture_of);
 
 /// What is shown. Textures are given later, so that one Visibility serves many qualities of them. The scales
 /// of a nest share one Mesh.

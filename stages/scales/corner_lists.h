@@ -2,7 +2,6 @@
 // Inside the room only.
 #include <algorithm>
 #include <array>
-#include <cstdint>
 #include <span>
 #include <vector>
 

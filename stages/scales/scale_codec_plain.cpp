@@ -1,13 +1,10 @@
 #include <meshoptimizer.h>
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
-#include <limits>
 
 #include "format/base/box.h"
-#include "stages/gltf/meshopt_streams.h"
 #include "stages/scales/scale_codecs.h"
 
 namespace texmesh {
@@ -50,13 +47,8 @@ Stream make_stream(std::size_t count, std::size_t stride, const Value& value) {
 
 class PlainPrimitive {
  public:
-  PlainPrimitive(GlbWriter& writer, const ScaleCoding& coding, const ScalePrimitive& primitive,
-                 std::size_t& fallback_bytes)
-      : writer_(writer),
-        coding_(coding),
-        primitive_(primitive),
-        fallback_bytes_(fallback_bytes),
-        n_(primitive.wedges.size()) {}
+  PlainPrimitive(GlbWriter& writer, const ScaleCoding& coding, const ScalePrimitive& primitive)
+      : writer_(writer), coding_(coding), primitive_(primitive), n_(primitive.wedges.size()) {}
 
   CodedPrimitive code() {
     CodedPrimitive coded;
@@ -84,19 +76,7 @@ class PlainPrimitive {
     const std::vector<std::uint8_t> packed = is_index
                                                  ? meshopt_triangles(primitive_.indices, n_, "scales")
                                                  : meshopt_attributes(s.bytes, s.count, s.stride, "scales");
-    const std::size_t offset = writer_.add_bytes(packed);
-    Json view{{"buffer", 1}, {"byteOffset", fallback_bytes_}, {"byteLength", s.bytes.size()}};
-    if (!is_index) view["byteStride"] = s.stride;
-    view["target"] = target;
-    view["extensions"]["EXT_meshopt_compression"] = {{"buffer", 0},
-                                                     {"byteOffset", offset},
-                                                     {"byteLength", packed.size()},
-                                                     {"byteStride", s.stride},
-                                                     {"count", s.count},
-                                                     {"mode", is_index ? "TRIANGLES" : "ATTRIBUTES"}};
-    fallback_bytes_ += (s.bytes.size() + 3) / 4 * 4;
-    writer_.use_extension("EXT_meshopt_compression", true);
-    return writer_.add_json_view(std::move(view));
+    return writer_.add_meshopt_view(packed, s.count, s.stride, is_index, target);
   }
 
   std::size_t positions() {
@@ -266,16 +246,14 @@ class PlainPrimitive {
   GlbWriter& writer_;
   const ScaleCoding& coding_;
   const ScalePrimitive& primitive_;
-  std::size_t& fallback_bytes_;
   std::size_t n_;
 };
 
 }  // namespace
 
-CodedPrimitive code_plain(GlbWriter& writer, const ScaleCoding& coding, ScalePrimitive primitive,
-                          std::size_t& fallback_bytes) {
+CodedPrimitive code_plain(GlbWriter& writer, const ScaleCoding& coding, ScalePrimitive primitive) {
   if (coding.options.mesh_codec != MeshCodec::kNone) order_for_codec(primitive);
-  return PlainPrimitive(writer, coding, primitive, fallback_bytes).code();
+  return PlainPrimitive(writer, coding, primitive).code();
 }
 
 }  // namespace texmesh

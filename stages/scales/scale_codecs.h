@@ -1,12 +1,7 @@
 #pragma once
-#include <cstdint>
-#include <nlohmann/json.hpp>
-#include <vector>
-
 #include "stages/geometry/scale_frames.h"
 #include "stages/gltf/glb_writer.h"
 #include "stages/scales/scale_grid.h"
-#include "stages/scales/scales.h"
 
 namespace texmesh {
 
@@ -44,8 +39,6 @@ struct CodedPrimitive {
 CodedPrimitive code_draco(GlbWriter& writer, const ScaleCoding& coding, const ScalePrimitive& primitive);
 
 /// KHR_mesh_quantization, the same under EXT_meshopt_compression, or plain floats, as the options say.
-/// `fallback_bytes` is the running size of the fallback buffer.
-CodedPrimitive code_plain(GlbWriter& writer, const ScaleCoding& coding, ScalePrimitive primitive,
-                          std::size_t& fallback_bytes);
+CodedPrimitive code_plain(GlbWriter& writer, const ScaleCoding& coding, ScalePrimitive primitive);
 
 }  // namespace texmesh

@@ -1,6 +1,5 @@
 #include "stages/scales/scale_grid.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "format/base/box.h"

@@ -1,8 +1,4 @@
 #pragma once
-#include <cstdint>
-#include <vector>
-
-#include "format/model/model.h"
 #include "stages/scales/scales.h"
 
 namespace texmesh {

@@ -1,9 +1,4 @@
 #pragma once
-#include <cstdint>
-#include <string_view>
-#include <vector>
-
-#include "format/model/model.h"
 #include "format/split/split_stream.h"
 #include "stages/data/fragments.h"
 #include "stages/data/nested_scales.h"
@@ -24,7 +19,7 @@ struct EnumNames<MeshCodec> {
 
 struct ScalesOptions {
   MeshCodec mesh_codec = MeshCodec::kDraco;
-  int draco_level = 7;  // compression level
+  static constexpr int draco_level = 7;  // compression level
   // At most 24 (a float's mantissa; Draco takes minutes beyond) and 16 for the codecs on unsigned shorts;
   // where 0 would need more, coordinates stay floats.
   int position_bits = 0;  // 0 = error <= 1/16 of the mean and 1/4 of the 5th percentile of S_0's edges
@@ -40,20 +35,19 @@ struct ScalesOptions {
   template <class S, class V>
   static void fields(S& s, V&& v) {
     v("mesh_codec", s.mesh_codec, "how the scales' GLB files store their meshes");
-    v("draco_level", s.draco_level, Range{0, 10}, "Draco's compression level");
     v("position_bits", s.position_bits, Range{0, 24},
       "bits per position coordinate, at least 6; 0 = from the edge lengths; quantized and meshopt: at "
       "most 16");
     v("uv_bits", s.uv_bits, Range{0, 24},
       "bits per texture coordinate; 0 = so that the error is under 1/8 texel; quantized and meshopt: 16 "
       "where that is so fine, or floats");
-    v("least_position_bits", s.least_position_bits, Range{1, 24},
+    v("least_position_bits", s.least_position_bits, Range{1, 24}, ProfileOnly{},
       "fewest bits per position coordinate where they follow from the edge lengths");
-    v("least_uv_bits", s.least_uv_bits, Range{1, 24},
+    v("least_uv_bits", s.least_uv_bits, Range{1, 24}, ProfileOnly{},
       "fewest bits per texture coordinate where they follow from the textures");
     v("normal_bits", s.normal_bits, Range{4, 16},
       "bits per normal component; quantized and meshopt: 8 or 16");
-    v("tangent_bits", s.tangent_bits, Range{4, 16},
+    v("tangent_bits", s.tangent_bits, Range{4, 16}, ProfileOnly{},
       "bits per tangent component; quantized and meshopt: 8 or 16");
     v("stream", s.stream, "also write all scales as one stream of vertex splits");
   }

@@ -1,9 +1,5 @@
 #pragma once
-#include <cstdint>
-#include <vector>
-
 #include "format/split/split_source.h"
-#include "format/split/split_stream.h"
 #include "stages/base/run_context.h"
 #include "stages/scales/scale_grid.h"
 

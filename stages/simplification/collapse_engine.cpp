@@ -251,7 +251,8 @@ void CollapseEngine::remove_component(std::uint32_t component) {
   const auto error = static_cast<float>(components_.size[component] * mesh_.diagonal());
   for (std::uint32_t p : points) {
     if (!mesh_.is_alive(p)) continue;
-    for (std::uint32_t position : mesh_.members(p)) collapses_.push_back({position, position, error});
+    for (std::uint32_t position : mesh_.members(p))
+      collapses_.push_back(Collapse::with_component(position, error));
     queue_.erase(Removable::point(p));
   }
   mesh_.remove(points);

@@ -1,15 +1,7 @@
 #pragma once
-#include <cstdint>
-#include <vector>
-
-#include "format/base/no_index.h"
 #include "stages/base/run_context.h"
-#include "stages/simplification/collapse_components.h"
 #include "stages/simplification/collapse_cost.h"
-#include "stages/simplification/collapse_mesh.h"
 #include "stages/simplification/collapse_queue.h"
-#include "stages/simplification/collapse_ring.h"
-#include "stages/simplification/simplification.h"
 
 namespace texmesh {
 

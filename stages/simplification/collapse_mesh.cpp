@@ -1,12 +1,10 @@
 #include "stages/simplification/collapse_mesh.h"
 
-#include <algorithm>
 #include <array>
 #include <map>
 #include <numeric>
 
 #include "format/base/box.h"
-#include "format/base/no_index.h"
 #include "stages/geometry/morton.h"
 
 namespace texmesh {

@@ -1,11 +1,7 @@
 #pragma once
-#include <cstdint>
 #include <span>
-#include <vector>
 
 #include "format/base/no_index.h"
-#include "format/base/vec.h"
-#include "format/model/model.h"
 #include "stages/data/conditioned_mesh.h"
 
 namespace texmesh {

@@ -1,7 +1,6 @@
 #pragma once
 #include <compare>
 #include <cstddef>
-#include <cstdint>
 #include <vector>
 
 #include "format/base/no_index.h"

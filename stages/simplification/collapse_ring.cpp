@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "format/base/no_index.h"
-
 namespace texmesh {
 namespace {
 

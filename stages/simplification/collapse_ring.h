@@ -1,9 +1,6 @@
 #pragma once
 #include <array>
-#include <cstdint>
-#include <vector>
 
-#include "format/base/no_index.h"
 #include "stages/simplification/collapse_mesh.h"
 
 namespace texmesh {

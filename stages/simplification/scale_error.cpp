@@ -8,7 +8,6 @@
 #include "stages/base/parallel.h"
 #include "stages/geometry/component_boxes.h"
 #include "stages/geometry/distance.h"
-#include "stages/geometry/scale_walk.h"
 
 namespace texmesh {
 namespace {

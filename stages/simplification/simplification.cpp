@@ -3,9 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <string>
 
-#include "format/base/no_index.h"
 #include "format/base/portable_math.h"
 #include "stages/simplification/collapse_engine.h"
 #include "stages/simplification/scale_error.h"

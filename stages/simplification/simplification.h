@@ -1,8 +1,5 @@
 #pragma once
-#include <cstdint>
-#include <string>
 #include <string_view>
-#include <vector>
 
 #include "stages/data/conditioned_mesh.h"
 #include "stages/data/nested_scales.h"
@@ -46,18 +43,21 @@ struct SimplificationOptions {
   int coarsest_vertices = 400;
   template <class S, class V>
   static void fields(S& s, V&& v) {
-    v("order", s.order, "texmesh = quadrics weighted by persistence; thesis = scale map, closest neighbour");
-    v("persistence_weight", s.persistence_weight, Range{0, 10},
+    v("order", s.order, ProfileOnly{},
+      "texmesh = quadrics weighted by persistence; thesis = scale map, closest neighbour");
+    v("persistence_weight", s.persistence_weight, Range{0, 10}, ProfileOnly{},
       "cost of removing a vertex grows by this per scale it persists; 0 = quadrics alone");
-    v("uv_weight", s.uv_weight, Range{0, 10}, "weight of the texture's distortion against the shape's");
-    v("normal_weight", s.normal_weight, Range{0, 10}, "weight of the normals' distortion");
-    v("colour_weight", s.colour_weight, Range{0, 10}, "weight of the vertex colours' distortion");
-    v("seam_weight", s.seam_weight, Range{0, 1000}, "weight of seams of the texture");
-    v("boundary_weight", s.boundary_weight, Range{0, 1000}, "weight of open borders");
+    v("uv_weight", s.uv_weight, Range{0, 10}, ProfileOnly{},
+      "weight of the texture's distortion against the shape's");
+    v("normal_weight", s.normal_weight, Range{0, 10}, ProfileOnly{}, "weight of the normals' distortion");
+    v("colour_weight", s.colour_weight, Range{0, 10}, ProfileOnly{},
+      "weight of the vertex colours' distortion");
+    v("seam_weight", s.seam_weight, Range{0, 1000}, ProfileOnly{}, "weight of seams of the texture");
+    v("boundary_weight", s.boundary_weight, Range{0, 1000}, ProfileOnly{}, "weight of open borders");
     v("max_error", s.max_error, Range{0.0001, 1},
       "no scale deviates by more than this fraction of the diagonal; a component that vanishes deviates by "
       "its size; order thesis has no such bound");
-    v("max_shift", s.max_shift, Range{0.0001, 1},
+    v("max_shift", s.max_shift, Range{0.0001, 1}, ProfileOnly{},
       "no collapse shifts the texture by more than this fraction of the diagonal");
     v("coarsest", s.coarsest, Range{0.0001, 1},
       "most vertices that the coarsest scale is asked to have, as a share of all");

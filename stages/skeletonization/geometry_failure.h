@@ -1,4 +1,5 @@
 #pragma once
+#include <exception>
 #include <stdexcept>
 #include <utility>
 
@@ -19,6 +20,21 @@ void try_geometry(Attempt&& attempt, Fallback&& fallback) {
     std::forward<Attempt>(attempt)();
   } catch (const GeometryFailure&) {
     std::forward<Fallback>(fallback)();
+  }
+}
+
+/// Called in a handler: throws a GeometryFailure where the exception in flight is a failed check of CGAL, and
+/// the exception itself where it is another one.
+[[noreturn]] void rethrow_cgal_failure();
+
+/// Runs `work`, a call into CGAL, whose failed checks become GeometryFailure. CGAL derives them from
+/// std::logic_error: nothing above could tell them from our own mistakes.
+template <class Work>
+auto with_cgal_checks(Work&& work) {
+  try {
+    return std::forward<Work>(work)();
+  } catch (const std::exception&) {
+    rethrow_cgal_failure();
   }
 }
 

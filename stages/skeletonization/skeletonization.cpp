@@ -3,15 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
-#include <utility>
 
 #include "stages/base/parallel.h"
-#include "stages/skeletonization/contraction/contraction.h"
+#include "stages/skeletonization/curve_skeleton.h"
 #include "stages/skeletonization/geometry_failure.h"
 #include "stages/skeletonization/local_radius.h"
-#include "stages/skeletonization/segment_tree.h"
-#include "stages/skeletonization/wrap/wrap.h"
-#include "stages/skeletonization/wrap/wrap_soup.h"
 
 namespace texmesh {
 namespace {

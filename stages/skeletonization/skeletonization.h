@@ -1,8 +1,4 @@
 #pragma once
-#include <array>
-#include <cstdint>
-#include <vector>
-
 #include "stages/data/conditioned_mesh.h"
 #include "stages/data/skeleton.h"
 #include "stages/data/stage.h"
@@ -21,23 +17,24 @@ struct SkeletonizationOptions {
   double limb_ratio = 3;
   // Where CGAL would not end, the caps do, and a note names the fallback.
   int max_wrap_steps = 1000000;
-  int max_contractions = 500;
+  static constexpr int max_contractions = 500;
   template <class S, class V>
   static void fields(S& s, V&& v) {
-    v("alpha_divisor", s.alpha_divisor, Range{5, 400}, "alpha of the wrap = bounding-box diagonal / this");
-    v("offset_divisor", s.offset_divisor, Range{50, 6000},
+    v("alpha_divisor", s.alpha_divisor, Range{5, 400}, ProfileOnly{},
+      "alpha of the wrap = bounding-box diagonal / this");
+    v("offset_divisor", s.offset_divisor, Range{50, 6000}, ProfileOnly{},
       "offset of the wrap = bounding-box diagonal / this");
-    v("max_wrap_faces", s.max_wrap_faces, Range{100, 100000},
+    v("max_wrap_faces", s.max_wrap_faces, Range{100, 100000}, ProfileOnly{},
       "most faces of the wrap that is contracted to the skeleton");
-    v("radius_floor", s.radius_floor, Range{0, 1}, "least skeleton distance, as a fraction of its median");
-    v("plate_ratio", s.plate_ratio, Range{1, 1e9},
+    v("radius_floor", s.radius_floor, Range{0, 1}, ProfileOnly{},
+      "least skeleton distance, as a fraction of its median");
+    v("plate_ratio", s.plate_ratio, Range{1, 1e9}, ProfileOnly{},
       "a part whose median distance to the skeleton is more than this many half thicknesses is a plate: "
       "its R is half the local thickness");
-    v("limb_ratio", s.limb_ratio, Range{1, 1e9},
+    v("limb_ratio", s.limb_ratio, Range{1, 1e9}, ProfileOnly{},
       "R is at most this many half thicknesses (thin parts that the skeleton does not reach)");
-    v("max_wrap_steps", s.max_wrap_steps, Range{1000, 2e9},
+    v("max_wrap_steps", s.max_wrap_steps, Range{1000, 2e9}, ProfileOnly{},
       "work cap: steps of a wrap before a coarser one; they may look at 50 times as many triangles");
-    v("max_contractions", s.max_contractions, Range{1, 100000}, "work cap: contractions of a part");
   }
 };
 

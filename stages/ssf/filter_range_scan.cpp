@@ -2,9 +2,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
-#include <vector>
 
-#include "format/base/no_index.h"
 #include "format/base/portable_math.h"
 #include "stages/base/parallel.h"
 #include "stages/geometry/weld.h"

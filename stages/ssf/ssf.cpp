@@ -1,6 +1,5 @@
 #include "stages/ssf/ssf.h"
 
-#include <algorithm>
 #include <cmath>
 #include <string>
 #include <utility>
@@ -8,7 +7,7 @@
 #include "format/base/box.h"
 #include "stages/base/parallel.h"
 #include "stages/geometry/morton.h"
-#include "stages/ssf/heat_levels.h"
+#include "stages/ssf/heat_kernel.h"
 #include "stages/ssf/ssf_component.h"
 
 namespace texmesh {

@@ -1,9 +1,6 @@
 #pragma once
-#include <cstdint>
 #include <string_view>
-#include <vector>
 
-#include "format/model/model.h"
 #include "stages/data/conditioned_mesh.h"
 #include "stages/data/scale_map.h"
 #include "stages/data/skeleton.h"
@@ -31,37 +28,34 @@ struct SsfOptions {
   ScaleSignal signal = ScaleSignal::kCurvature;
   RangeSpacing range_spacing = RangeSpacing::kMean;
   double sigma_max = 0.15;
-  double convergence = 0.3;  // eps_conv
-  double band = 2.75;        // C_i = t_i (H(sigma_i) - H(band * sigma_i))
-  double contrast = 0.3;     // tau
-  double component_cap = 0.25;
+  double convergence = 0.3;                // eps_conv
+  static constexpr double band = 2.75;     // C_i = t_i (H(sigma_i) - H(band * sigma_i))
+  static constexpr double contrast = 0.3;  // tau
+  static constexpr double component_cap = 0.25;
   double rate_cap = 10;    // w_ij <= cap * min(M_i, M_j) / h^2
   double error_ratio = 5;  // more is nearer to the full resolution, and slower
   int max_terms = 3000;
-  double window = 1.4;
-  double range_band = 0;  // the thesis has the Laplacian of Gaussian alone
+  static constexpr double window = 1.4;  // range scans: half-width of the Gaussian, in sigma
+  double range_band = 0;                 // the thesis has the Laplacian of Gaussian alone
   template <class S, class V>
   static void fields(S& s, V&& v) {
     v("scales", s.scales, Range{1, 40}, "smoothed copies beside the original");
-    v("signal", s.signal,
+    v("signal", s.signal, ProfileOnly{},
       "meshes: curvature = band-passed mean curvature; radius = R(v), the distance to the skeleton, whose "
       "Laplacian of Gaussian has its zero crossings marked, as the thesis has it");
-    v("range_spacing", s.range_spacing,
+    v("range_spacing", s.range_spacing, ProfileOnly{},
       "range scans: phi and psi by the mean radius of the scan, or of each row");
-    v("sigma_max", s.sigma_max, Range{0.01, 0.5}, "largest sigma, as a fraction of a component's diagonal");
-    v("convergence", s.convergence, Range{0, 1},
+    v("sigma_max", s.sigma_max, Range{0.01, 0.5}, ProfileOnly{},
+      "largest sigma, as a fraction of a component's diagonal");
+    v("convergence", s.convergence, Range{0, 1}, ProfileOnly{},
       "sigma stops growing where the signal's range falls below this fraction");
-    v("band", s.band, Range{1.5, 6}, "ratio of the two sigmas whose difference is the band-passed signal");
-    v("contrast", s.contrast, Range{0, 3}, "least contrast of a feature, in rms of the response");
-    v("component_cap", s.component_cap, Range{0.05, 1},
-      "persistence ends where sigma exceeds this fraction of the component");
-    v("rate_cap", s.rate_cap, Range{3, 1000}, "cap of the Laplacian's rates, in 1 / (mean edge)^2");
-    v("error_ratio", s.error_ratio, Range{2, 1000},
+    v("rate_cap", s.rate_cap, Range{3, 1000}, ProfileOnly{},
+      "cap of the Laplacian's rates, in 1 / (mean edge)^2");
+    v("error_ratio", s.error_ratio, Range{2, 1000}, ProfileOnly{},
       "least ratio of sigma and vertex spacing on the coarser levels of the solver; 1000 = one level");
-    v("max_terms", s.max_terms, Range{100, 100000},
+    v("max_terms", s.max_terms, Range{100, 100000}, ProfileOnly{},
       "most Chebyshev terms of a level; the level's fastest rates are slowed down to fit");
-    v("window", s.window, Range{1, 6}, "range scans: half-width of the Gaussian's window, in sigma");
-    v("range_band", s.range_band, Range{0, 6},
+    v("range_band", s.range_band, Range{0, 6}, ProfileOnly{},
       "range scans: the same ratio as band; at most 1 = the Laplacian of Gaussian alone");
   }
 };

@@ -1,6 +1,5 @@
 #include "stages/ssf/ssf_component.h"
 
-#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -8,7 +7,7 @@
 #include "format/base/no_index.h"
 #include "format/base/portable_math.h"
 #include "stages/base/parallel.h"
-#include "stages/ssf/heat_levels.h"
+#include "stages/ssf/heat_kernel.h"
 
 namespace texmesh {
 namespace {

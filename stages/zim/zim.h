@@ -12,18 +12,17 @@ inline constexpr int kZimVersion = 2;
 
 struct ZimOptions {
   int difference = 24;  // neighbours that differ by this in any channel count as different
-  double weight_intensity = 0.5, weight_complexity = 0.5;           // of M (8.3)
+  static constexpr double weight_intensity = 0.5, weight_complexity = 0.5;  // of M (8.3)
   double weight_eta = 1, weight_z = 1, weight_i = 1, weight_m = 1;  // of VQP (8.4), relative to their sum
   template <class S, class V>
   static void fields(S& s, V&& v) {
-    v("difference", s.difference, Range{1, 255},
+    v("difference", s.difference, Range{1, 255}, ProfileOnly{},
       "neighbouring texels that differ by this in any channel count as different");
-    v("weight_intensity", s.weight_intensity, Range{0, 1}, "weight of (1 - I) in the masking predictor M");
-    v("weight_complexity", s.weight_complexity, Range{0, 1}, "weight of zeta in the masking predictor M");
-    v("weight_eta", s.weight_eta, Range{0, 100}, "weight of feature density in VQP, relative to the others");
-    v("weight_z", s.weight_z, Range{0, 100}, "weight of Z, the deviation of colours, in VQP");
-    v("weight_i", s.weight_i, Range{0, 100}, "weight of I, the intensity, in VQP");
-    v("weight_m", s.weight_m, Range{0, 100}, "weight of M, the masking, in VQP");
+    v("weight_eta", s.weight_eta, Range{0, 100}, ProfileOnly{},
+      "weight of feature density in VQP, relative to the others");
+    v("weight_z", s.weight_z, Range{0, 100}, ProfileOnly{}, "weight of Z, the deviation of colours, in VQP");
+    v("weight_i", s.weight_i, Range{0, 100}, ProfileOnly{}, "weight of I, the intensity, in VQP");
+    v("weight_m", s.weight_m, Range{0, 100}, ProfileOnly{}, "weight of M, the masking, in VQP");
   }
 };
 

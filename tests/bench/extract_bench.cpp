@@ -172,10 +172,10 @@ Scored best_of(const std::vector<Scored>& roughly, const Scorer& scorer, const f
 
 /// S_0 of the package, whose images take the place of the source's of the same numbers.
 ImportedModel on_coded_mesh(PackageReader& package, const ImportedModel& source, const RunContext& context) {
-  ExtractRequest request;
-  request.scale = 0;
+  ExtractScale scale;
+  scale.scale = 0;
   NoFiles none;
-  ImportedModel out = import_model("S_0", extract_model(package, request, context).glb, none, {}, context);
+  ImportedModel out = import_model("S_0", extract_model(package, {scale}, context).glb, none, {}, context);
   for (Image& image : out.model.images) {
     const auto number = static_cast<std::size_t>(std::stoul(image.name.substr(image.name.rfind('/') + 1)));
     const std::string name = image.name;
@@ -239,10 +239,10 @@ void print_neighbours(const Arguments& a, std::uint64_t limit, const Extracted& 
   for (std::size_t k = 0; k < scales.size(); ++k) {
     const bool finer = k + 1 < scales.size() && scales[k + 1].scale == chosen.scale;
     if (!finer && !(k > 0 && scales[k - 1].scale == chosen.scale)) continue;
-    ExtractRequest request;
-    request.bytes = limit;
-    request.scale = scales[k].scale;
-    const Extracted e = extract_model(package, request, context);
+    ExtractBudget budget;
+    budget.bytes = {limit};
+    budget.scale = scales[k].scale;
+    const Extracted e = extract_model(package, {budget}, context);
     std::cout << fmt::format("           {} S_{}: {} ({:.3f} of the chosen file's difference)\n",
                              finer ? "finer" : "coarser", e.scale,
                              e.within ? fmt::format("{:.4f}", e.difference) : "does not fit",
@@ -265,10 +265,10 @@ void print_table(const Arguments& a, const Scorer& scorer, const RunContext& con
   for (const double kilobytes : a.bytes) {
     const auto limit = static_cast<std::uint64_t>(kilobytes * 1000);
     PackageReader package(open_store(a.package));
-    ExtractRequest request;
-    request.bytes = limit;
+    ExtractBudget budget;
+    budget.bytes = {limit};
     const auto start = std::chrono::steady_clock::now();
-    const Extracted e = extract_model(package, request, context);
+    const Extracted e = extract_model(package, {budget}, context);
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     if (!a.keep.empty()) {
       std::ofstream out(fs::path(a.keep) / fmt::format("{}kB.glb", kilobytes), std::ios::binary);

@@ -10,7 +10,7 @@
 
 #include "stages/data/coverage.h"
 #include "stages/fill/fill.h"
-#include "stages/fragment_codec/decode_rung.h"
+#include "stages/fragment_codec/fragment_codec.h"
 #include "stages/ladder/ladder.h"
 #include "stages/lut/lut.h"
 #include "stages/previews/previews.h"

@@ -16,7 +16,7 @@
 #include <string>
 
 #include "stages/image/decode_image.h"
-#include "stages/ladder/fragment_windows.h"
+#include "stages/ladder/encode_rungs.h"
 #include "stages/ladder/ladder.h"
 #include "stages/ladder/source_codec.h"
 #include "stages/previews/previews.h"

@@ -12,7 +12,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "pipeline/batch/job_selection.h"
+#include "pipeline/batch/build_memo.h"
 #include "pipeline/compile/options.h"
 
 namespace {
@@ -207,10 +207,6 @@ int main(int argc, char** argv) {
   const auto* save_command = app.add_subcommand("save");
   const auto* noop_command = app.add_subcommand("noop");
   CLI11_PARSE(app, argc, argv);
-  // The build's texmesh-core, beside this program: its build id is part of what is remembered.
-  const fs::path self = fs::read_symlink("/proc/self/exe").parent_path();
-  std::error_code ec;
-  fs::create_symlink(fs::path(TEXMESH_BINARY).parent_path() / "texmesh-core", self / "texmesh-core", ec);
   std::string folder = (fs::temp_directory_path() / "texmesh-bench-XXXXXX").string();
   if (!::mkdtemp(folder.data())) return 1;
   if (*save_command) save(folder, models > 0 ? models : 1'000'000);

@@ -12,7 +12,7 @@
 #include <iterator>
 
 #include "stages/fragment_codec/coding_space.h"
-#include "stages/fragment_codec/rebuilt_z.h"
+#include "stages/fragment_codec/fragment_codec.h"
 #include "stages/image/decode_image.h"
 #include "stages/jpeg/jpeg.h"
 #include "stages/jpeg/jpeg_bits.h"

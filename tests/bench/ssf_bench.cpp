@@ -25,7 +25,7 @@
 #include "pipeline/io/file_resolver.h"
 #include "stages/base/parallel.h"
 #include "stages/condition/condition.h"
-#include "stages/ssf/heat_levels.h"
+#include "stages/ssf/heat_kernel.h"
 #include "stages/ssf/ssf.h"
 #include "stages/ssf/ssf_component.h"
 #include "tests/bench/growth.h"

@@ -59,7 +59,7 @@ function addProxies(file, scan, proxies) {
 
 export function makePackages() {
   fs.mkdirSync(packages, {recursive: true});
-  const newest = Math.max(fs.statSync(env.texmesh).mtimeMs, fs.statSync(path.join(path.dirname(env.texmesh), 'texmesh-core')).mtimeMs);
+  const newest = fs.statSync(env.texmesh).mtimeMs;
   for (const [name, p] of Object.entries(kPackages)) {
     const file = path.join(packages, `${name}.texmesh`);
     if (fs.existsSync(file) && fs.statSync(file).mtimeMs > newest) continue;

@@ -11,7 +11,7 @@ import {starvation} from './starved.mjs';
 import './application-tests.mjs';
 import './block-tests.mjs';
 import './display-tests.mjs';
-import './doors-tests.mjs';
+import './publish-tests.mjs';
 import './element-tests.mjs';
 import './limits-tests.mjs';
 import './materials-tests.mjs';

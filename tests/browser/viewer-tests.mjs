@@ -132,7 +132,7 @@ test('viewer: cap, policy, rung and time by hand, then loaded again', () => with
   await phase(page, 'done');
   const free = await live(page, (x) => x.bytes);
   await page.locator('#cap').selectOption({value: '62500'});
-  await page.locator('#policy').selectOption('htc');
+  await page.locator('#policy').selectOption('guard');
   await page.locator('#reload').click();
   await page.waitForFunction(() => Number.isFinite(window.texmeshViewer.session.live.doneS), null, {timeout: 30000});
   const capped = await live(page, (x) => ({bytes: x.bytes, s: x.doneS}));
@@ -311,9 +311,9 @@ test('viewer: without WebGL, or with no address, it says so', async () => {
   }
 }, {seconds: 90});
 
-test('viewer: the picture comes back with the graphics context', () => withViewer('?pkg=packages/maps.texmesh&time=2&mbit=3&policy=htca', async (page) => {
+test('viewer: the picture comes back with the graphics context', () => withViewer('?pkg=packages/maps.texmesh&time=2&mbit=3&policy=guard', async (page) => {
   await phase(page, 'done');
-  check(await page.locator('#cap').inputValue() === '375000' && await page.locator('#policy').inputValue() === 'htc', 'choices are not shown');
+  check(await page.locator('#cap').inputValue() === '375000' && await page.locator('#policy').inputValue() === 'guard', 'choices are not shown');
   const before = await drawnShare(page);
   const loss = await page.evaluateHandle(() => window.texmeshViewer.stage.renderer.getContext().getExtension('WEBGL_lose_context'));
   await loss.evaluate((l) => l.loseContext());

@@ -6,7 +6,6 @@
 #include "format/base/portable_math.h"
 #include "format/rules/allocation.h"
 #include "format/rules/proxy_choice.h"
-#include "format/rules/proxy_steps.h"
 #include "tests/delivery/by_credit.h"
 #include "tests/delivery/vector_decisions.h"
 

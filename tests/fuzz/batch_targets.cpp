@@ -9,9 +9,9 @@
 
 #include "format/base/archive.h"
 #include "format/base/errors.h"
-#include "pipeline/batch/collection.h"
 #include "pipeline/batch/fleet/run_summary.h"
 #include "pipeline/batch/memo/memo_segment.h"
+#include "pipeline/batch/plan.h"
 #include "pipeline/cache/cache_files.h"
 #include "pipeline/compile/options.h"
 #include "pipeline/compile/profile.h"
@@ -63,8 +63,8 @@ bool read_memo(ByteSpan input) {
 /// Packed records alone, without the file around them.
 bool read_memo_record(ByteSpan input) {
   try {
-    const MemoRecord record = unpack_record(input);
-    require(pack_record(unpack_record(pack_record(record))) == pack_record(record),
+    const Bytes once = encode_artefact(decode_artefact<MemoRecord>(input, "memo"));
+    require(encode_artefact(decode_artefact<MemoRecord>(once, "memo")) == once,
             "a memo's record changed by being packed");
     return true;
   } catch (const FormatError& e) {
@@ -122,10 +122,11 @@ bool read_events(ByteSpan input) {
   bool any = false;
   for (std::size_t at = 0; at < text.size();) {
     const std::size_t end = std::min(text.find('\n', at), text.size());
-    any |= apply_event(text.substr(at, end - at), 1, report);
+    const auto event = read_event(text.substr(at, end - at));
+    if (event) apply_event(*event, 1, report);
+    any = any || event;
     at = end + 1;
   }
-  files_from_json(text);
   return any;
 }
 
@@ -214,35 +215,32 @@ std::vector<Bytes> summary_seeds() {
 }
 
 std::vector<Bytes> event_seeds() {
-  WorkerReport report;
-  report.more->error = {"input", "a.obj", "", "", "", "bad"};
-  return {
-      to_bytes(
-          error_event(report) +
-          "\n{\"event\":\"stage-started\",\"stage\":\"import\"}\n{\"event\":\"stage-finished\",\"stage\":\"import\",\"result\":\"hit\"}\n"
-          "{\"event\":\"result\",\"bytes\":5,\"sha256\":\"00\"}\n"),
-      to_bytes(files_to_json(a_record().files))};
+  return {to_bytes(to_json_line(ErrorTold{"", {"input", "a.obj", "", "", "", "bad"}}) + "\n" +
+                   to_json_line(StageStarted{"", "import"}) + "\n" +
+                   to_json_line(StageFinished{"", "import", "hit", 0}) + "\n" +
+                   to_json_line(PackageMade{"", false, 5}) + "\n" +
+                   to_json_line(InputsTold{"", a_record().files, Sha256{}, {{"ssf", Sha256{}}}}))};
 }
 
 }  // namespace
 
 void add_batch_targets(std::vector<Target>& list) {
-  list.insert(
-      list.end(),
-      {{"memo", true, read_memo, memo_seeds, Shape::kBytes, with_block_digests},
-       {"memo_record", true, read_memo_record, [] { return std::vector<Bytes>{pack_record(a_record())}; }},
-       {"cache_record",
-        true,
-        read_cache_record,
-        cache_seeds,
-        Shape::kBytes,
-        sealed_again,
-        {"\"version\": 2", "\"key\": {", "\"outputs\": [", "\"name\":", "\"sha256\":", "\"bytes\":"}},
-       {"profile", false, read_as_profile,
-        [] { return std::vector<Bytes>{to_bytes(write_profile(CompileOptions{}))}; }, Shape::kJson},
-       {"collection", false, read_as_collection, collection_seeds, Shape::kJson},
-       {"summary", false, read_as_summary, summary_seeds, Shape::kJson},
-       {"events", false, read_events, event_seeds}});
+  list.insert(list.end(),
+              {{"memo", true, read_memo, memo_seeds, Shape::kBytes, with_block_digests},
+               {"memo_record", true, read_memo_record,
+                [] { return std::vector<Bytes>{encode_artefact(a_record())}; }},
+               {"cache_record",
+                true,
+                read_cache_record,
+                cache_seeds,
+                Shape::kBytes,
+                sealed_again,
+                {"\"version\": 2", "\"key\": {", "\"outputs\": [", "\"name\":", "\"sha256\":", "\"bytes\":"}},
+               {"profile", false, read_as_profile,
+                [] { return std::vector<Bytes>{to_bytes(write_profile(CompileOptions{}))}; }, Shape::kJson},
+               {"collection", false, read_as_collection, collection_seeds, Shape::kJson},
+               {"summary", false, read_as_summary, summary_seeds, Shape::kJson},
+               {"events", false, read_events, event_seeds}});
 }
 
 }  // namespace texmesh::fuzz

@@ -7,7 +7,6 @@
 #include "format/base/errors.h"
 #include "format/model/codec.h"
 #include "stages/fragment_codec/fragment_codec.h"
-#include "stages/image/colour_profile.h"
 #include "stages/image/decode_image.h"
 #include "stages/image/decode_jpeg.h"
 #include "stages/image/image_metadata.h"

@@ -3,7 +3,7 @@
 #include <utility>
 #include <vector>
 
-#include "stages/ssf/heat_levels.h"
+#include "stages/ssf/heat_kernel.h"
 #include "stages/ssf/ssf_component.h"
 
 namespace texmesh::testing {

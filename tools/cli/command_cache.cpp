@@ -1,13 +1,11 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <iostream>
 #include <nlohmann/json.hpp>
 
 #include "format/base/errors.h"
 #include "pipeline/cache/disk_store.h"
 #include "pipeline/cache/prune.h"
-#include "pipeline/io/exit_codes.h"
 #include "pipeline/io/table.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"
@@ -19,7 +17,8 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 struct CacheArguments {
-  std::string cache, size, age;
+  std::string cache;
+  CacheLimits limits;
   bool json = false;
 };
 
@@ -58,10 +57,7 @@ void statistics(const CacheArguments& args) {
 }
 
 void prune(const CacheArguments& args) {
-  CacheLimits limits;
-  if (!args.size.empty()) limits.max_bytes = parse_bytes(args.size, "--size");
-  if (!args.age.empty()) limits.max_age_s = parse_seconds(args.age, "--age");
-  const PruneResult r = prune_cache(existing_folder_of(args), limits);
+  const PruneResult r = prune_cache(existing_folder_of(args), args.limits);
   if (args.json) {
     std::cout << Json{{"removed_records", r.records}, {"removed_blobs", r.blobs},
                       {"removed_others", r.others},   {"removed_bytes", r.bytes},
@@ -94,7 +90,7 @@ int verify(const CacheArguments& args) {
 
 void add_cache_command(Command& app) {
   auto args = std::make_shared<CacheArguments>();
-  Command c = app.add("cache");
+  Command c = app.add("cache", "Look at, prune or check the cache folder");
   c.needs_command();
   const auto add = [&](const char* name, const char* help, std::function<int(const CacheArguments&)> run) {
     Command command = c.add(name, help);
@@ -102,22 +98,17 @@ void add_cache_command(Command& app) {
         .option("--cache", args->cache, "Cache folder (default: TEXMESH_CACHE, else the user's cache folder)")
         .value_name("DIR");
     if (std::string(name) != "path") command.flag("--json", args->json, "Print JSON");
-    command.on_run([args, run] {
-      try {
-        return run(*args);
-      } catch (const InputError& e) {
-        std::cerr << "texmesh cache: " << e.what() << '\n';
-        return static_cast<int>(kExitUsage);
-      }
-    });
+    command.on_run([args, run] { return as_usage([&] { return run(*args); }); });
     return command;
   };
   add("stat", "Print how much the folder holds",
       [](const CacheArguments& a) { return statistics(a), kExitOk; });
   Command p = add("prune", "Remove the results that have not been used for longest",
                   [](const CacheArguments& a) { return prune(a), kExitOk; });
-  p.option("--size", args->size, "Most bytes that stay (default 20GB, 0 = no limit)").value_name("SIZE");
-  p.option("--age", args->age, "Longest time that an unused result stays (default 90d, 0 = no limit)")
+  p.option("--size", args->limits.max_bytes, parse_bytes, "Most bytes that stay (default 20GB, 0 = no limit)")
+      .value_name("SIZE");
+  p.option("--age", args->limits.max_age_s, parse_seconds,
+           "Longest time that an unused result stays (default 90d, 0 = no limit)")
       .value_name("TIME");
   add("verify", "Read every object and move damaged ones to quarantine (exit code 1 when there are any)",
       verify);

@@ -1,13 +1,8 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <algorithm>
-#include <iostream>
-#include <map>
-#include <memory>
-#include <string_view>
+#include <optional>
 
-#include "format/base/errors.h"
 #include "format/documents/about.h"
 #include "pipeline/about/meta.h"
 #include "pipeline/batch/plan.h"
@@ -15,20 +10,17 @@
 #include "pipeline/batch/write_reports.h"
 #include "pipeline/cache/cache_layer.h"
 #include "pipeline/cache/disk_store.h"
-#include "pipeline/compile/jnd_profile.h"
 #include "pipeline/compile/option_fields.h"
 #include "pipeline/compile/options.h"
 #include "pipeline/compile/profile.h"
-#include "pipeline/io/exit_codes.h"
+#include "pipeline/compile/stage_table.h"
 #include "pipeline/io/file_resolver.h"
 #include "pipeline/io/machine/machine_share.h"
 #include "pipeline/io/resource_error.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"
 #include "tools/cli/options/common_options.h"
-#include "tools/cli/options/shard_options.h"
 #include "tools/cli/options/units.h"
-#include "tools/cli/program.h"
 
 namespace texmesh {
 namespace {
@@ -47,17 +39,14 @@ const std::map<std::string, ShortName> kShortNames{{"package.title", {"--title",
                                                    {"ladder.subsampling", {"--subsampling", true}},
                                                    {"scales.mesh_codec", {"--mesh-codec", true}},
                                                    {"perceptual_values.jnd", {"--jnd", true}},
-                                                   {"fragmentation.fill", {"--fill", true}},
-                                                   {"lut.allocate", {"--allocate", false}},
-                                                   {"simplification.order", {"--order", false}}};
+                                                   {"fragmentation.fill", {"--fill", true}}};
 constexpr const char* kEverydayTitle = "What the package holds";
 
 struct CompileArguments {
   std::vector<std::string> inputs, layers;
-  std::string output, profile, jnd_profile, meta, memory, model_memory = "8GiB", shard, costs,
-                                                          sandbox = "auto";
+  std::string output, profile, jnd_profile, meta, shard, costs;
+  std::optional<std::uint64_t> memory_bytes;  // else four fifths of what the process may use
   CacheChoice cache;
-  std::string cache_size = "20GB", cache_age = "90d";
   int jobs = 0;
   bool json = false, quiet = false, keep_going = false;
   RunSettings run;
@@ -72,63 +61,28 @@ std::string help_of(const OptionField& f) {
   const bool is_name = first.ends_with(':') || help.compare(first.size(), 2, " =") == 0;
   if (!is_name && std::islower(static_cast<unsigned char>(first[first.size() > 1 ? 1 : 0])))
     help[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(help[0])));
-  if (f.range && !std::holds_alternative<std::string*>(f.value))
-    help += fmt::format(" [{:g}..{:g}]", f.range->lo, f.range->hi);
-  if (const auto* e = std::get_if<EnumField>(&f.value))
-    help += fmt::format(" {{{}}}", fmt::join(e->names, "|"));
+  if (f.range && f.kind != OptionKind::kText) help += fmt::format(" [{:g}..{:g}]", f.range->lo, f.range->hi);
+  if (!f.words.empty()) help += fmt::format(" {{{}}}", fmt::join(f.words, "|"));
   std::string text = option_text(f);
   std::erase(text, '"');
   return text.empty() ? help : help + " (default " + text + ")";
 }
 
 const char* value_name_of(const OptionField& f) {
-  struct Name {
-    const char* operator()(bool*) const { return "true|false"; }
-    const char* operator()(int*) const { return "N"; }
-    const char* operator()(double*) const { return "X"; }
-    const char* operator()(std::string*) const { return "TEXT"; }
-    const char* operator()(std::vector<int>*) const { return "N,N..."; }
-    const char* operator()(std::vector<double>*) const { return "X,X..."; }
-    const char* operator()(const EnumField&) const { return "NAME"; }
-  };
-  return std::visit(Name{}, f.value);
+  constexpr const char* kNames[] = {"true|false", "N", "X", "TEXT", "N,N...", "X,X...", "NAME"};
+  return kNames[static_cast<std::size_t>(f.kind)];
 }
-
-/// Which options of stages a command line may mean.
-class AskedOptions {
- public:
-  AskedOptions() = default;  // all
-  explicit AskedOptions(std::span<char* const> words)
-      : words_(words.begin(), words.end()), all_(std::ranges::any_of(words_, asks_for_help)) {}
-
-  bool has(const OptionField& f) const {
-    const auto it = kShortNames.find(f.path());
-    const std::string long_name = "--" + f.path();
-    return all_ || std::ranges::any_of(words_, [&](std::string_view word) {
-             return word.starts_with(long_name) ||
-                    (it != kShortNames.end() && word.starts_with(it->second.name));
-           });
-  }
-
- private:
-  static bool asks_for_help(std::string_view word) {
-    return word.starts_with("--help") || (!word.starts_with("--") && word.starts_with("-") &&
-                                          word.find('h') != std::string_view::npos);  // -h, also as -qh
-  }
-  std::vector<std::string_view> words_;
-  bool all_ = true;
-};
 
 /// The short name of a switch takes no value; --STAGE.OPTION does.
 void add_stage_option(Command& c, const OptionField& f, CompileArguments& args) {
   const auto it = kShortNames.find(f.path());
-  const bool is_short = it != kShortNames.end(), is_switch = std::holds_alternative<bool*>(f.value);
+  const bool is_short = it != kShortNames.end(), is_switch = f.kind == OptionKind::kSwitch;
   std::string names = "--" + f.path();
   if (is_short && !is_switch) names += std::string(",") + it->second.name;
   Option option = c.option(
       names, [&args, path = f.path()](const std::string& text) { args.options[path] = text; }, help_of(f));
   option.value_name(value_name_of(f)).rare();
-  if (const auto* e = std::get_if<EnumField>(&f.value)) option.offers({e->names.begin(), e->names.end()});
+  if (!f.words.empty()) option.offers({f.words.begin(), f.words.end()});
   if (is_short && !is_switch && it->second.everyday) option.everyday(kEverydayTitle);
   if (!is_short || !is_switch) return;
   c.flag(
@@ -138,10 +92,10 @@ void add_stage_option(Command& c, const OptionField& f, CompileArguments& args) 
       .everyday(kEverydayTitle, help_of(f));
 }
 
-void add_stage_options(Command& c, CompileArguments& args, const AskedOptions& asked) {
+void add_stage_options(Command& c, CompileArguments& args) {
   CompileOptions defaults;
   for (const OptionField& f : list_options(defaults)) {
-    if (!asked.has(f)) continue;
+    if (!f.has_flag) continue;
     c.group("Stage " + f.stage);
     add_stage_option(c, f, args);
   }
@@ -179,17 +133,10 @@ OutputMode output_mode(const CompileArguments& args) {
   return ::isatty(STDOUT_FILENO) ? OutputMode::kTerminal : OutputMode::kPlain;
 }
 
-/// Four fifths of what the process may use, unless the user says what there is to use.
-std::uint64_t memory_to_use(const std::string& text, const MachineShare& share) {
-  return text.empty() ? share.memory_bytes / 5 * 4 : parse_bytes(text, "--memory");
-}
-
-SandboxMode sandbox_mode(const std::string& name) {
-  if (name == "off") return SandboxMode::kOff;
-  if (name == "auto") return SandboxMode::kAuto;
+void check_sandbox(SandboxMode mode) {
+  if (mode != SandboxMode::kRequire) return;
   if (const SandboxSupport s = sandbox_support(); !s.complete())
-    throw InputError("--sandbox require", "", "bounds on files and calls", describe_sandbox(s));
-  return SandboxMode::kRequire;
+    throw UsageError("--sandbox require", "", "bounds on files and calls", describe_sandbox(s));
 }
 
 /// What a verbose run says of the processes that it is going to start.
@@ -216,15 +163,12 @@ RunSettings run_settings(const CompileArguments& args) {
   RunSettings run = args.run;
   const MachineShare share = machine_share();
   run.pool.processors = args.jobs > 0 ? args.jobs : share.processors;
-  run.pool.memory_bytes = memory_to_use(args.memory, share);
-  run.pool.limits.memory_bytes = parse_bytes(args.model_memory, "--model-memory");
-  run.pool.limits.sandbox = sandbox_mode(args.sandbox);
+  run.pool.memory_bytes = args.memory_bytes.value_or(share.memory_bytes / 5 * 4);
+  check_sandbox(run.pool.limits.sandbox);
   if (!args.cache.off) run.cache.folder = default_cache_folder(args.cache.folder);
   run.cache.layers = args.layers;
   for (std::string& layer : layers_from_environment()) run.cache.layers.push_back(std::move(layer));
   for (const std::string& layer : run.cache.layers) check_layer(layer);
-  run.cache_limits = {parse_bytes(args.cache_size, "--cache-size"),
-                      parse_seconds(args.cache_age, "--cache-age")};
   run.mode = output_mode(args);
   for (const std::string& file : {args.profile, args.jnd_profile, args.meta})
     if (!file.empty()) run.more_inputs.push_back(file);
@@ -235,25 +179,25 @@ void add_run_options(Command& c, CompileArguments& args) {
   RunSettings& run = args.run;
   c.group("Running");
   add_jobs_option(c, args.jobs);
-  c.option("--memory", args.memory,
+  c.option("--memory", args.memory_bytes, parse_bytes,
            "Most memory of all models that run side by side, by what they took before (default: 4/5 of what "
            "machine, cgroup and Slurm allow). A model that needs more runs alone, see --model-memory")
       .value_name("SIZE")
       .rare();
-  c.option("--model-memory", args.model_memory, "Most memory (address space) of one model's process")
+  c.option("--model-memory", run.pool.limits.memory_bytes, parse_bytes,
+           "Most memory (address space) of one model's process")
       .value_name("SIZE")
-      .shows_default()
+      .shows_default("8GiB")
       .rare();
   c.option("--timeout", run.pool.limits.wall_s, "Most seconds for one model, 0 = no limit").shows_default();
   c.option("--cpu-limit", run.pool.limits.cpu_s, "Most processor seconds for one model, 0 = no limit")
       .shows_default()
       .rare();
-  c.option(
-       "--sandbox", args.sandbox,
+  c.choice(
+       "--sandbox", run.pool.limits.sandbox,
        "What one model's process may touch: auto = the model's folder, its result and the cache, no other "
        "programs, no network but cache layers, as far as the kernel can bound that; require = the same, and "
        "nothing is compiled where it cannot; off")
-      .one_of_explained({"auto", "require", "off"})
       .value_name("NAME")
       .shows_default()
       .rare();
@@ -277,14 +221,27 @@ void add_all_cache_options(Command& c, CompileArguments& args) {
       .rare();
   c.flag("--cache-upload", args.run.cache.upload, "Put what is computed into the layers that are URLs")
       .rare();
-  c.option("--cache-size", args.cache_size, "The cache folder is pruned to this size, 0 = no limit")
+  c.option("--cache-size", args.run.cache_limits.max_bytes, parse_bytes,
+           "The cache folder is pruned to this size, 0 = no limit")
       .value_name("SIZE")
-      .shows_default()
+      .shows_default("20GB")
       .rare();
-  c.option("--cache-age", args.cache_age, "Results unused for this long are pruned, 0 = never")
+  c.option("--cache-age", args.run.cache_limits.max_age_s, parse_seconds,
+           "Results unused for this long are pruned, 0 = never")
       .value_name("TIME")
-      .shows_default()
+      .shows_default("90d")
       .rare();
+}
+
+/// Every stage with its version, what it makes and what it reads.
+std::string graph_text() {
+  std::string text;
+  for (const Stage& s : default_stage_table()) {
+    std::string inputs;
+    for (const auto& input : s.inputs) inputs += (inputs.empty() ? "" : ", ") + input.name;
+    text += fmt::format("{:<18} v{:<4} {}\n{:<25}from {}\n", s.name, s.version, s.summary, "", inputs);
+  }
+  return text;
 }
 
 void add_report_options(Command& c, CompileArguments& args) {
@@ -292,6 +249,7 @@ void add_report_options(Command& c, CompileArguments& args) {
   c.group("Reports");
   c.flag("-n,--dry-run", run.dry_run, "Say what would run and why; write nothing");
   c.flag("--explain", run.explain, "Say of every stage whether it runs, and what has changed");
+  c.text_option("--stages", graph_text, "Print the graph of stages, which --explain and the cache name");
   c.flag("--stats", run.statistics, "Print a table of stages at the end: runs, cache hits, seconds");
   c.flag("-q,--quiet", args.quiet, "Print only warnings and errors");
   c.flag("-v,--verbose", run.verbose, "Print every stage and note");
@@ -323,17 +281,18 @@ constexpr const char* kNotes =
     "changed. A model that fails leaves the package that was there before.\n"
     "Exit code: 0 all well, 1 some model failed, 2 usage, 3 internal, 75 try again.";
 
-void add_compile_options(Command& c, CompileArguments& args, const AskedOptions& asked) {
+void add_compile_options(Command& c, CompileArguments& args) {
   c.option("INPUT", args.inputs,
            "Models (.glb .gltf .obj .ply .stl, range-scan .json), folders of models, or collections (.json)")
       .required();
   c.option("-o,--output", args.output, "NAME.texmesh for one model, a folder for several models")
       .required()
       .value_name("OUTPUT");
-  c.option("--profile", args.profile,
-           "JSON file of options (schemas/profile.v1.schema.json), or thesis = chapters 2 to 8 as printed; "
-           "flags win")
-      .value_name("FILE");
+  c.option(
+       "--profile", args.profile,
+       "small = few bytes; archive = nothing of the source is lost; fast = little time; thesis = chapters 2 "
+       "to 8 as printed; or a JSON file of options (schemas/profile.v1.schema.json). Flags win")
+      .value_name("NAME");
   c.option(
        "--jnd-profile", args.jnd_profile,
        "JSON file of what judges could just tell (schemas/jnd-profile.v1.schema.json). The file wins over "
@@ -343,29 +302,26 @@ void add_compile_options(Command& c, CompileArguments& args, const AskedOptions&
            "JSON file about the object (schemas/meta.v1.schema.json). The file wins over the model's words")
       .value_name("FILE")
       .everyday(kEverydayTitle);
-  c.help_option("--help-stage", "Stage ", "Print the options of one stage (texmesh stages lists the stages)");
+  c.help_option("--help-stage", "Stage ", "Print the options of one stage (--stages lists the stages)");
   add_run_options(c, args);
   add_all_cache_options(c, args);
   add_report_options(c, args);
-  add_stage_options(c, args, asked);
+  add_stage_options(c, args);
 }
 
 int run_compile(CompileArguments& args) {
   RunSettings settings;
-  BatchPlan plan;
-  try {
+  const BatchPlan plan = as_usage([&] {  // nothing has been compiled yet
     read_meta_file(args);
     if (!args.profile.empty()) args.profile = profile_file(args.profile);
     const PlanRequest request = plan_request(args);
     settings = run_settings(args);
-    plan = plan_batch(request);
-    if (!settings.depfile.empty() && plan.models.size() != 1)
-      throw InputError("--depfile", "", "one model", std::to_string(plan.models.size()) + " models");
-    check_reports(plan, settings);
-  } catch (const InputError& e) {  // what was asked for makes no sense: nothing has been compiled yet
-    std::cerr << "texmesh compile: " << e.what() << '\n';
-    return kExitUsage;
-  }
+    BatchPlan models = plan_batch(request);
+    if (!settings.depfile.empty() && models.models.size() != 1)
+      throw InputError("--depfile", "", "one model", std::to_string(models.models.size()) + " models");
+    check_reports(models, settings);
+    return models;
+  });
   if (plan.shard.count > 1 && settings.mode != OutputMode::kJson && settings.mode != OutputMode::kQuiet)
     std::cout << "shard " << plan.shard.index << " of " << plan.shard.count << ": " << plan.models.size()
               << " of " << plan.models_in_collection << " models" << std::endl;
@@ -374,26 +330,20 @@ int run_compile(CompileArguments& args) {
   try {
     return run_batch(plan, settings, std::cout);
   } catch (const ResourceError& e) {
-    std::cerr << "texmesh compile: " << e.what() << '\n';
+    std::cerr << "texmesh: " << e.what() << '\n';
     return kExitTryAgain;
   }
 }
 
-void add_compile(Command& app, const AskedOptions& asked) {
+}  // namespace
+
+void add_compile_command(Command& app) {
   auto args = std::make_shared<CompileArguments>();
-  Command c = app.add("compile");
-  add_compile_options(c, *args, asked);
+  Command c = app.add("compile", "Compile textured scans into packages");
+  add_compile_options(c, *args);
   c.examples(kExamples);
   c.notes(kNotes);
   c.on_run([args] { return run_compile(*args); });
-}
-
-}  // namespace
-
-void add_compile_command(Command& app) { add_compile(app, AskedOptions()); }
-
-void add_compile_command(Command& app, std::span<char* const> words) {
-  add_compile(app, AskedOptions(words));
 }
 
 }  // namespace texmesh

@@ -1,8 +1,5 @@
-#include <iostream>
-#include <memory>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/io/exit_codes.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"
 #include "tools/cli/options/common_options.h"
@@ -20,7 +17,7 @@ struct DiffArguments {
 
 void add_diff_command(Command& app) {
   auto args = std::make_shared<DiffArguments>();
-  Command c = app.add("diff");
+  Command c = app.add("diff", "Say what differs between two packages, and why");
   c.option("A", args->packages[0], "A .texmesh file, or a folder that unpack made").required();
   c.option("B", args->packages[1], "The other package").required();
   c.flag("--json", args->json, "Print one JSON object with every entry (schemas/diff.v1.schema.json)");

@@ -1,15 +1,12 @@
 #include <filesystem>
-#include <iostream>
-#include <memory>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/io/exit_codes.h"
-#include "pipeline/io/text_table.h"
+#include "pipeline/io/table.h"
 #include "tools/cli/check/check_gate.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"
 #include "tools/cli/options/common_options.h"
-#include "tools/inspect/debug/debug_input.h"
+#include "tools/inspect/package_mesh.h"
 
 namespace texmesh {
 namespace {
@@ -39,11 +36,7 @@ int run_doctor(const DoctorArguments& args) {
   const std::vector<std::string> reasons = gate_failures(results);
   const std::string name = std::filesystem::path(args.input).filename().string();
   if (args.json) {
-    nlohmann::ordered_json j{{"input", name}};
-    j.update(atlas_json(diagnosis));
-    j["good"] = reasons.empty();
-    j["reasons"] = reasons;
-    std::cout << j.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) << '\n';
+    std::cout << json_line(doctor_json({name, diagnosis, reasons})) << '\n';
   } else {
     std::cout << printable(name) << "\n" << atlas_text(diagnosis);
     for (const std::string& r : reasons) std::cout << "not good enough: " << r << '\n';
@@ -85,7 +78,7 @@ void add_limits(Command& c, AtlasLimits& limits) {
 
 void add_doctor_command(Command& app) {
   auto args = std::make_shared<DoctorArguments>();
-  Command c = app.add("doctor");
+  Command c = app.add("doctor", "Say what a model's texture atlas costs and what to do: a gate for CI, too");
   c.option("INPUT", args->input,
            "A model that compile takes, or a package: a .texmesh file or a folder that unpack made")
       .required();
@@ -97,7 +90,7 @@ void add_doctor_command(Command& app) {
       "  texmesh doctor scan.glb                                      figures and what to do\n"
       "  texmesh doctor scan.glb --max-charts 500 --min-cover 0.5     refuses a bad atlas in CI\n"
       "  texmesh doctor scan.texmesh --json                           the same of a package's finest scale\n"
-      "  texmesh debug scan.glb --what atlas -o atlas.png             the charts as a picture");
+      "  texmesh render scan.glb --what atlas -o atlas.png            the charts as a picture");
   c.notes(
       "An atlas is a texture with the charts that a surface is cut into. Every chart has borders that no "
       "simplified mesh can give up: an atlas of thousands of charts puts a floor under every coarse mesh, "

@@ -1,40 +1,35 @@
-#include <iostream>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "pipeline/io/exit_codes.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"
 #include "tools/cli/options/common_options.h"
 #include "tools/inspect/dump/dump.h"
 
 namespace texmesh {
+
+template <>
+struct EnumNames<DumpPart> {
+  static constexpr auto names = kDumpParts;
+};
+
 namespace {
 
 struct DumpArguments {
   std::string package;
-  std::string part = "summary";
+  DumpPart part = DumpPart::kSummary;
   std::optional<double> gamma;
   bool json = false;
 };
 
-DumpPart part_of(const std::string& name) {
-  const auto it = std::find(kDumpParts.begin(), kDumpParts.end(), name);
-  return static_cast<DumpPart>(it - kDumpParts.begin());
-}
-
 int run_dump(const DumpArguments& args) {
-  const DumpPart part = part_of(args.part);
-  if (args.gamma && part != DumpPart::kTables && part != DumpPart::kAll) {
-    std::cerr << "texmesh dump: --gamma: expected with tables or all, found with " << args.part << '\n';
-    return kExitUsage;
-  }
+  if (args.gamma && args.part != DumpPart::kTables && args.part != DumpPart::kAll)
+    throw UsageError("--gamma", "", "the part tables or all", std::string(enum_name(args.part)));
   PackageReader package(open_store(args.package));
   if (args.json)
-    std::cout << dump_json(package, part, args.gamma).dump() << '\n';
+    std::cout << dump_json(package, args.part, args.gamma).dump() << '\n';
   else
-    std::cout << dump_text(package, part, args.gamma);
+    std::cout << dump_text(package, args.part, args.gamma);
   return kExitOk;
 }
 
@@ -42,16 +37,15 @@ int run_dump(const DumpArguments& args) {
 
 void add_dump_command(Command& app) {
   auto args = std::make_shared<DumpArguments>();
-  Command c = app.add("dump");
+  Command c = app.add("dump", "Show what a package holds and why it is as large as it is");
   add_package_argument(c, args->package, false);
-  c.option(
+  c.choice(
        "PART", args->part,
        "summary: bounds, scales, textures, bytes by kind, options. scales: the meshes and when each is "
        "enough. fragments: the texture's grid, importance and sizes. ladder: the rungs' bytes and "
        "distortion. tables: size model, allocation, measured quality. perceptual: how much scales differ, the thesis's Tables 7.1 and 7.2. atlas: charts of the textures and what they "
        "cost, as texmesh doctor has it; measured from S_0, which takes a moment. entries: every file with offset and "
        "digest. about: title, licence, unit and all else that is said about the object. provenance: inputs, options, versions. all: everything")
-      .one_of_explained({kDumpParts.begin(), kDumpParts.end()})
       .shows_default();
   c.option(
        "--gamma", args->gamma,

@@ -1,11 +1,7 @@
-#include <algorithm>
 #include <filesystem>
-#include <iostream>
-#include <memory>
 
 #include "format/container/layout.h"
 #include "pipeline/io/atomic_file.h"
-#include "pipeline/io/exit_codes.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"
 #include "tools/cli/options/common_options.h"
@@ -16,35 +12,38 @@
 namespace texmesh {
 namespace {
 
-struct ExtractArguments {
-  std::string package, output, bytes, rung = "max", images = "auto";
-  int scale = -1, proxy = -1, jobs = 0;
-  double display_px = 0;
-  bool recentre = false, lods = false, plain = false, json = false;
-};
-
-std::uint32_t rung_of(const std::string& text) {
-  if (text == "max") return kBestRung;
-  if (text.empty() || text.size() > 3 || text.find_first_not_of("0123456789") != std::string::npos)
-    throw UsageError("--rung", "", "a rung's number (texmesh dump PKG ladder lists them) or max", text);
-  return static_cast<std::uint32_t>(std::stoul(text));
-}
-
 /// A number of bytes, as the user wrote it.
 struct AskedBytes {
   std::string text;
   std::uint64_t bytes = 0;
 };
 
-std::vector<AskedBytes> asked_bytes(const std::string& list) {
+struct ExtractArguments {
+  std::string package, output;
+  std::vector<AskedBytes> bytes;
+  std::uint32_t rung = kBestRung;
+  ExtractImages images = ExtractImages::kAuto;
+  std::optional<int> scale, proxy;
+  double display_px = 0;
+  int jobs = 0;
+  bool recentre = false, levels = false, plain = false, json = false;
+};
+
+std::uint32_t rung_of(const std::string& text, const std::string& flag) {
+  if (text == "max") return kBestRung;
+  if (text.empty() || text.size() > 3 || text.find_first_not_of("0123456789") != std::string::npos)
+    throw UsageError(flag, "", "a rung's number (texmesh dump PKG ladder lists them) or max", text);
+  return static_cast<std::uint32_t>(std::stoul(text));
+}
+
+std::vector<AskedBytes> asked_bytes(const std::string& list, const std::string& flag) {
   std::vector<AskedBytes> out;
   for (std::size_t at = 0; at <= list.size() && !list.empty();) {
     const std::size_t end = std::min(list.find(',', at), list.size());
     AskedBytes one{list.substr(at, end - at), 0};
-    one.bytes = parse_bytes(one.text, "--bytes");
-    if (one.bytes == 0) throw UsageError("--bytes", "", "numbers above 0", list);
+    one.bytes = parse_some_bytes(one.text, flag);
     if (std::ranges::find(out, one.text, &AskedBytes::text) != out.end())
-      throw UsageError("--bytes", "", "every number once", list);
+      throw UsageError(flag, "", "every number once", list);
     out.push_back(std::move(one));
     at = end + 1;
   }
@@ -60,52 +59,46 @@ std::string output_for(const std::string& output, const AskedBytes& asked) {
 }
 
 ExtractRequest request_of(const ExtractArguments& a) {
-  ExtractRequest r;
-  if (a.scale >= 0) r.scale = a.scale;
-  if (a.proxy >= 0) r.proxy = static_cast<std::uint32_t>(a.proxy);
-  r.rung = rung_of(a.rung);
-  r.display_px = a.display_px;
-  r.recentre = a.recentre;
-  r.lods = a.lods;
-  r.plain = a.plain;
-  if (a.plain && a.images == "webp") throw UsageError("--plain", "", "--image-format jpeg or png", "webp");
-  if (a.images == "jpeg") r.images = ExtractImages::kJpeg;
-  if (a.images == "webp") r.images = ExtractImages::kWebp;
-  if (a.images == "png") r.images = ExtractImages::kPng;
-  return r;
+  if (a.plain && a.images == ExtractImages::kWebp)
+    throw UsageError("--plain", "", "--image-format jpeg or png", "webp");
+  if (a.proxy) return {ExtractProxy{static_cast<std::uint32_t>(*a.proxy), a.plain}, a.recentre};
+  if (a.bytes.empty()) {
+    const auto form = a.plain    ? ExtractScale::Form::kPlain
+                      : a.levels ? ExtractScale::Form::kLevels
+                                 : ExtractScale::Form::kCoded;
+    return {ExtractScale{a.scale, a.rung, a.display_px, a.images, form}, a.recentre};
+  }
+  ExtractBudget budget;
+  for (const AskedBytes& one : a.bytes) budget.bytes.push_back(one.bytes);
+  budget.scale = a.scale;
+  if (a.display_px > 0) budget.display_px = a.display_px;
+  budget.images = a.images;
+  budget.levels = a.levels;
+  return {budget, a.recentre};
 }
 
-void write_extracted(const ExtractArguments& args, const Extracted& extracted, const ExtractRequest& request,
-                     const std::string& output) {
+void write_extracted(const ExtractArguments& args, const Extracted& extracted, const std::string& output) {
   write_output_file(output, extracted.glb);
   const std::string file = std::filesystem::path(output).filename().string();
-  std::cout << (args.json ? extract_json(extracted, request, file) + "\n"
-                          : extract_text(extracted, request, file));
+  std::cout << (args.json ? extract_json(extracted, file) + "\n" : extract_text(extracted, file));
 }
 
 int run_extract(const ExtractArguments& args) {
-  ExtractRequest request = request_of(args);
-  const std::vector<AskedBytes> asked = asked_bytes(args.bytes);
+  const ExtractRequest request = request_of(args);
   std::vector<std::string> outputs;
-  std::vector<std::uint64_t> bytes;
-  for (const AskedBytes& one : asked) {
-    outputs.push_back(asked.size() > 1 ? output_for(args.output, one) : args.output);
-    bytes.push_back(one.bytes);
-  }
-  if (asked.empty()) outputs.push_back(args.output);
+  for (const AskedBytes& one : args.bytes)
+    outputs.push_back(args.bytes.size() > 1 ? output_for(args.output, one) : args.output);
+  if (outputs.empty()) outputs.push_back(args.output);
   for (const std::string& output : outputs) check_output_file(output);  // not after the search
   PackageReader package(open_store(args.package));
   PercentLine progress("extract");
   RunContext context = context_of(args.jobs);
   context.progress = [&](double fraction) { progress.show(fraction); };
-  const std::vector<Extracted> files = asked.empty()
-                                           ? std::vector<Extracted>{extract_model(package, request, context)}
-                                           : extract_budgets(package, request, bytes, context);
+  const std::vector<Extracted> files = extract_files(package, request, context);
   progress.end();
   bool within = true;
   for (std::size_t k = 0; k < files.size(); ++k) {
-    if (!asked.empty()) request.bytes = bytes[k];
-    write_extracted(args, files[k], request, outputs[k]);
+    write_extracted(args, files[k], outputs[k]);
     within = within && files[k].within;
   }
   return within ? kExitOk : kExitDifferent;
@@ -115,7 +108,7 @@ void add_extract_options(Command& c, ExtractArguments& args) {
   add_package_argument(c, args.package, true);
   c.option("-o,--output", args.output, "The GLB to write").required().value_name("GLB");
   const Option bytes =
-      c.option("--bytes", args.bytes,
+      c.option("--bytes", args.bytes, asked_bytes,
                "The best-looking file of at most so many bytes, and at least 98 % of them: 500kB, 2MB. "
                "Several (50kB,500kB) give a file each, bust-50kB.glb and bust-500kB.glb for -o bust.glb, and "
                "share the search")
@@ -130,8 +123,8 @@ void add_extract_options(Command& c, ExtractArguments& args) {
       .integer_in(0, kMaxPackageProxies - 1)
       .excludes(bytes)
       .excludes(scale);
-  c.option("--rung", args.rung, "Quality of the textures: a rung's number, 0 = lowest, or max")
-      .shows_default()
+  c.option("--rung", args.rung, rung_of, "Quality of the textures: a rung's number, 0 = lowest, or max")
+      .shows_default("max")
       .value_name("RUNG")
       .excludes(bytes);
   c.option(
@@ -140,15 +133,15 @@ void add_extract_options(Command& c, ExtractArguments& args) {
        "with --bytes files are compared at it (default 512)")
       .number_in(1, 1e6)
       .value_name("PX");
-  c.option(
+  c.choice(
        "--image-format", args.images,
        "auto = with --bytes the format that looks better, otherwise jpeg. png is without loss. Images with "
        "alpha are png where jpeg is asked for")
-      .one_of({"auto", "jpeg", "webp", "png"})
+      .lists_words()
       .value_name("FORMAT")
       .shows_default();
   const Option lods = c.flag(
-      "--lods", args.lods,
+      "--lods", args.levels,
       "All major scales from the chosen one on as levels of detail of one file (MSFT_lod), which share "
       "textures");
   c.flag(
@@ -169,7 +162,7 @@ void add_extract_options(Command& c, ExtractArguments& args) {
 
 void add_extract_command(Command& app) {
   auto args = std::make_shared<ExtractArguments>();
-  Command c = app.add("extract");
+  Command c = app.add("extract", "Write one GLB that any viewer opens: a scale with whole textures");
   add_extract_options(c, *args);
   c.examples(
       "  texmesh extract bust.texmesh --bytes 500kB -o bust.glb\n"

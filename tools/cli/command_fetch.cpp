@@ -467,7 +467,7 @@ void add_fetch_options(Command& c, FetchArguments& args) {
 
 void add_fetch_command(Command& app) {
   auto args = std::make_shared<FetchArguments>();
-  Command c = app.add("fetch");
+  Command c = app.add("fetch", "Fetch from web servers what a viewer would get within a time");
   add_fetch_options(c, *args);
   c.examples(
       "  texmesh fetch https://host/bust.texmesh --time 4 --display 800\n"

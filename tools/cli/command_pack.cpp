@@ -1,6 +1,3 @@
-#include <memory>
-
-#include "pipeline/io/exit_codes.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"
 #include "tools/cli/options/common_options.h"
@@ -14,7 +11,8 @@ void add_unpack_command(Command& app) {
     bool force = false;
   };
   auto args = std::make_shared<Arguments>();
-  Command c = app.add("unpack");
+  Command c =
+      app.add("unpack", "Write a package's entries as files, for servers or tools that want a folder");
   c.option("PACKAGE", args->package, "A .texmesh file").required();
   c.option("-o,--output", args->folder, "The folder to make; it must be empty or not exist")
       .required()
@@ -45,7 +43,7 @@ void add_pack_command(Command& app) {
     std::string folder, package;
   };
   auto args = std::make_shared<Arguments>();
-  Command c = app.add("pack");
+  Command c = app.add("pack", "Put an unpacked package together again, byte for byte");
   c.option("DIR", args->folder, "A folder that unpack made").required();
   c.option("-o,--output", args->package, "The .texmesh file to write").required().value_name("PKG");
   c.examples("  texmesh pack www/bust -o bust.texmesh");

@@ -164,7 +164,7 @@ int run_check(const CheckArguments& args) {
 
 void add_plan_command(Command& app) {
   auto args = std::make_shared<PlanArguments>();
-  Command c = app.add("plan");
+  Command c = app.add("plan", "Say what a viewer will get in a time over a link, or in a number of bytes");
   add_delivery_options(c, *args);
   c.option(
        "--budget", [a = args.get()](const std::string& text) { a->budget = parse_bytes(text, "--budget"); },
@@ -189,7 +189,7 @@ void add_plan_command(Command& app) {
 
 void add_check_command(Command& app) {
   auto args = std::make_shared<CheckArguments>();
-  Command c = app.add("check");
+  Command c = app.add("check", "Fail when a package does not show well enough in a time: a gate for CI");
   add_delivery_options(c, *args);
   c.option(
        "--max-flip", args->gate.max_flip,

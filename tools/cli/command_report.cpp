@@ -1,8 +1,5 @@
 #include <filesystem>
-#include <iostream>
-#include <memory>
 
-#include "pipeline/io/exit_codes.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"
 #include "tools/cli/options/common_options.h"
@@ -59,7 +56,7 @@ void add_options(Command& c, ReportArguments& args) {
 
 void add_report_command(Command& app) {
   auto args = std::make_shared<ReportArguments>();
-  Command c = app.add("report");
+  Command c = app.add("report", "Write a page that shows what viewers of a package see");
   add_options(c, *args);
   c.examples(
       "  texmesh report bust.texmesh -o report/\n"

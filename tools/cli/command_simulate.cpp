@@ -32,7 +32,7 @@ int run_simulate(const SimulateArguments& a) {
 
 void add_simulate_command(Command& app) {
   auto args = std::make_shared<SimulateArguments>();
-  Command c = app.add("simulate");
+  Command c = app.add("simulate", "Play a transfer over a model of a network");
   add_delivery_options(c, *args);
   c.option("--plot", args->plot, "Write an SVG: quality and time by fragment, throughput, credit")
       .value_name("FILE");

@@ -1,11 +1,6 @@
 #include <sys/resource.h>
 
-#include <iostream>
-#include <memory>
-#include <nlohmann/json.hpp>
-
-#include "pipeline/io/exit_codes.h"
-#include "pipeline/io/text_table.h"
+#include "pipeline/io/table.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"
 #include "tools/cli/options/common_options.h"
@@ -13,8 +8,6 @@
 
 namespace texmesh {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 struct VerifyArguments {
   std::vector<std::string> packages;
@@ -48,22 +41,6 @@ VerifyReport verify_path(const std::string& path, const RunContext& context) {
   }
 }
 
-Json to_json(const std::string& path, const VerifyReport& r) {
-  Json findings = Json::array();
-  for (const Finding& f : r.findings)
-    findings.push_back({{"check", f.check},
-                        {"rule", f.rule},
-                        {"entry", f.entry},
-                        {"field", f.field},
-                        {"expected", f.expected},
-                        {"found", f.found}});
-  return {{"package", path},          {"ok", r.findings.empty()},
-          {"entries", r.entries},     {"bytes", r.bytes},
-          {"meshes", r.meshes},       {"previews", r.previews},
-          {"fragments", r.fragments}, {"content_credential", r.content_credential},
-          {"findings", findings}};
-}
-
 void print_verified(const std::string& path, const VerifyReport& r, bool quiet) {
   for (const Finding& f : r.findings) std::cout << path << ": " << printable(to_string(f)) << '\n';
   if (quiet && r.findings.empty()) return;
@@ -80,17 +57,16 @@ int run_verify(const VerifyArguments& args) {
   limit_memory(args.memory_mib);
   const RunContext context = context_of(args.jobs);
   bool clean = true;
-  Json all = Json::array();
+  std::vector<VerifiedPackage> all;
   for (const std::string& path : args.packages) {
     const VerifyReport report = verify_path(path, context);
     clean = clean && report.findings.empty();
     if (args.json)
-      all.push_back(to_json(path, report));
+      all.push_back({path, report});
     else
       print_verified(path, report, args.quiet);
   }
-  if (args.json)
-    std::cout << Json{{"packages", all}}.dump(-1, ' ', false, Json::error_handler_t::replace) << '\n';
+  if (args.json) std::cout << verify_json(all) << '\n';
   return clean ? kExitOk : kExitModelFailed;
 }
 
@@ -98,7 +74,7 @@ int run_verify(const VerifyArguments& args) {
 
 void add_verify_command(Command& app) {
   auto args = std::make_shared<VerifyArguments>();
-  Command c = app.add("verify");
+  Command c = app.add("verify", "Check every byte of packages: digests, documents, meshes, images");
   c.option("PACKAGES", args->packages, ".texmesh files or unpacked folders").required();
   add_jobs_option(c, args->jobs);
   c.option("--memory-mib", args->memory_mib, "Most memory; 0 = no limit").shows_default().value_name("MIB");

@@ -2,12 +2,10 @@
 #include <signal.h>
 #include <unistd.h>
 
-#include <iostream>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "pipeline/io/exit_codes.h"
+#include "pipeline/io/uri.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"
 #include "tools/publish/view/view_server.h"
@@ -25,8 +23,8 @@ std::string url_host(const std::string& host) {
   return host.find(':') == std::string::npos ? host : "[" + host + "]";
 }
 
-void announce(const ViewArguments& args, const Site& site, const std::string& base) {
-  const std::vector<std::string> packages = site.packages();
+void announce(const ViewArguments& args, const ServedFiles& files, const std::string& base) {
+  const std::vector<std::string> packages = files.packages();
   // The package's path is encoded twice: the page decodes the query before it takes the value for a URL.
   const std::string page = packages.size() == 1 ? base + "?pkg=" + percent_encoded(packages[0]) : base;
   if (args.json) {
@@ -46,15 +44,15 @@ void announce(const ViewArguments& args, const Site& site, const std::string& ba
 }
 
 void view(const ViewArguments& args) {
-  const Site site(args.package, viewer_folder(args.viewer));
-  ViewServer server(site);
+  const ServedFiles files(args.package, viewer_folder(args.viewer));
+  ViewServer server(files);
   const int port = server.bind(args.host, args.port);
   sigset_t ends;
   sigemptyset(&ends);
   for (const int s : {SIGINT, SIGTERM, SIGHUP}) sigaddset(&ends, s);
   ::pthread_sigmask(SIG_BLOCK, &ends, nullptr);  // before there are threads, so that none of them takes it
   std::thread serving([&server] { server.serve(); });
-  announce(args, site, "http://" + url_host(args.host) + ":" + std::to_string(port) + "/");
+  announce(args, files, "http://" + url_host(args.host) + ":" + std::to_string(port) + "/");
   int signal = 0;
   ::sigwait(&ends, &signal);
   // Without a stop: connections that browsers keep open would hold the library's threads for seconds. Nothing
@@ -66,7 +64,7 @@ void view(const ViewArguments& args) {
 
 void add_view_command(Command& app) {
   auto args = std::make_shared<ViewArguments>();
-  Command c = app.add("view");
+  Command c = app.add("view", "Look at packages in a browser: serves the packages and the viewer");
   c.option("PACKAGE", args->package,
            "A .texmesh file, a folder that unpack made, or a folder of packages to choose from")
       .required();

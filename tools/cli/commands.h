@@ -4,29 +4,35 @@ namespace texmesh {
 
 class Command;
 
-// Each adds one command to the program, in command_NAME.cpp.
-void add_compile_command(Command& app);
-void add_cache_command(Command& app);
-void add_list_command(Command& app);
-void add_summary_command(Command& app);
-void add_dump_command(Command& app);
-void add_diff_command(Command& app);
-void add_verify_command(Command& app);
-void add_unpack_command(Command& app);  // command_pack.cpp
-void add_pack_command(Command& app);
-void add_debug_command(Command& app);
-void add_doctor_command(Command& app);
-void add_render_command(Command& app);
-void add_report_command(Command& app);
-void add_plan_command(Command& app);
-void add_check_command(Command& app);  // command_plan.cpp
-void add_simulate_command(Command& app);
-void add_fetch_command(Command& app);
-void add_view_command(Command& app);
-void add_extract_command(Command& app);
-void add_export_command(Command& app);
-void add_site_command(Command& app);
-void add_stages_command(Command& app);
-void add_completion_command(Command& app);
+/// The one list of commands, in the help's order: COMMAND(group of the help, name), and RARE(group, name) of
+/// those that only `texmesh --help-all` lists. add_NAME_command() adds the command to the program; it stands
+/// in command_NAME.cpp, or in the file named here.
+#define TEXMESH_COMMANDS(COMMAND, RARE)                           \
+  COMMAND("Make packages", compile)                               \
+  COMMAND("Make packages", cache)                                 \
+  RARE("Make packages", list)    /* command_fleet.cpp */          \
+  RARE("Make packages", summary) /* command_fleet.cpp */          \
+  COMMAND("Look inside", view)                                    \
+  COMMAND("Look inside", dump)                                    \
+  COMMAND("Look inside", verify)                                  \
+  COMMAND("Look inside", diff)                                    \
+  COMMAND("Look inside", render)                                  \
+  COMMAND("Look inside", report)                                  \
+  COMMAND("Look inside", doctor)                                  \
+  COMMAND("Export", extract)                                      \
+  COMMAND("Export", export)                                       \
+  COMMAND("Export", site)                                         \
+  RARE("Export", unpack) /* command_pack.cpp */                   \
+  RARE("Export", pack)                                            \
+  COMMAND("Deliver over a network", plan)                         \
+  COMMAND("Deliver over a network", check) /* command_plan.cpp */ \
+  RARE("Deliver over a network", fetch)                           \
+  RARE("Deliver over a network", simulate)                        \
+  RARE("For other programs", schema)                              \
+  RARE("For other programs", completion)
+
+#define TEXMESH_DECLARE(group, name) void add_##name##_command(Command& program);
+TEXMESH_COMMANDS(TEXMESH_DECLARE, TEXMESH_DECLARE)
+#undef TEXMESH_DECLARE
 
 }  // namespace texmesh

@@ -1,37 +1,62 @@
-// texmesh: compile, cache, help and version without the stages' libraries, whose loading alone takes longer
-// than seeing that a collection of a thousand models is up to date. Every other command is texmesh-core's.
-#include <unistd.h>
-
-#include <cerrno>
+// texmesh: every command, and the workers that compile starts (pipeline/compile/workers/worker_child.h).
 #include <cstring>
-#include <iostream>
 
-#include "pipeline/io/core_path.h"
-#include "pipeline/io/exit_codes.h"
+#include "format/container/format_version.h"
+#include "pipeline/compile/library_versions.h"
+#include "pipeline/compile/workers/sandbox/sandbox.h"
+#include "pipeline/compile/workers/worker_child.h"
+#include "pipeline/io/program.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"
-#include "tools/cli/options/command_list.h"
-#include "tools/cli/options/told_errors.h"
-#include "tools/cli/program.h"
 
 namespace texmesh {
-namespace {
 
-int start_core(char** argv) {
-  const std::string core = core_executable();
-  ::execv(core.c_str(), argv);
-  std::cerr << "texmesh: " << core << ": expected an executable that starts, found " << std::strerror(errno)
-            << '\n';
-  return kExitModelFailed;
+void add_completion_command(Command& app) {
+  auto form = std::make_shared<std::string>();
+  Command c = app.add("completion",
+                      "Print what a shell or man is to know of texmesh, as installing puts it in place");
+  c.hidden();
+  c.option("FORM", *form, "What to print").required().one_of({"bash", "zsh", "man"});
+  c.examples("  source <(texmesh completion bash)\n  texmesh completion man | man -l -");
+  c.on_run([app, form] {
+    std::cout << app.shell_text(*form);
+    return kExitOk;
+  });
 }
 
-/// The program with the names of its commands, and nothing behind them.
-void describe_all(CommandLine& line) {
-  describe_program(line, [] { return std::string(); });  // core's: its libraries are not loaded here
-  Command program = line.program();
-  for (const CommandSummary& command : kCommands) {
-    program.group(command.group);
-    program.add(command.name);
+namespace {
+
+constexpr const char* kLicences =
+    "licence of this program: GPL-3.0-or-later, because parts of CGAL are compiled in (skeleton, alpha wrap, "
+    "triangulations).\n"
+    "licence of the sources of texmesh: Apache-2.0";
+
+/// What reaches the bytes of packages, what bounds a model's process on this machine, and the licences.
+std::string version_details() {
+  std::string text;
+  for (const auto& [name, version] : library_versions()) text += name + " " + version + "\n";
+  return text + "compiler " + compiler_version() + "\nsandbox: " + describe_sandbox(sandbox_support()) +
+         "\n" + kLicences;
+}
+
+struct ListedCommand {
+  const char *group, *name;
+  bool rare;
+  void (*add)(Command& program);
+};
+#define TEXMESH_COMMAND(group, name) {group, #name, false, add_##name##_command},
+#define TEXMESH_RARE(group, name) {group, #name, true, add_##name##_command},
+constexpr ListedCommand kCommands[] = {TEXMESH_COMMANDS(TEXMESH_COMMAND, TEXMESH_RARE)};
+
+/// To declare the options of every command takes longer than to see that 100 models are up to date: where the
+/// first word names a command whose text needs no other command, that one alone.
+void add_commands(Command& program, const char* first_word) {
+  const auto is_first = [&](const ListedCommand& c) { return std::strcmp(c.name, first_word) == 0; };
+  const bool one = std::ranges::any_of(kCommands, is_first) && std::strcmp(first_word, "completion") != 0;
+  for (const ListedCommand& command : kCommands) {
+    if (one && !is_first(command)) continue;
+    program.group(command.group, command.rare);
+    command.add(program);
   }
 }
 
@@ -40,17 +65,21 @@ void describe_all(CommandLine& line) {
 
 int main(int argc, char** argv) {
   using namespace texmesh;
-  const std::string name = argc > 1 ? argv[1] : "";
-  const bool only_tells = argc == 2 && (name == "--version" || name == "--help" || name == "-h");
-  if (!only_tells && name != "compile" && name != "cache")
-    return run_telling_errors([&] { return start_core(argv); });
-  CommandLine line(kProgramSummary);
+  const char* first_word = argc > 1 ? argv[1] : "";
+  if (argc == 2 && std::strcmp(first_word, "worker") == 0) return worker_main();
+  serve_workers();
+
+  CommandLine line("texmesh compiles textured 3D scans into packages that any static web server can stream.");
+  line.version("texmesh " + tool_version() + ", package format " + std::to_string(kFormatMajor) + "." +
+                   std::to_string(kFormatMinor),
+               version_details);
   Command program = line.program();
-  if (name == "compile")
-    add_compile_command(program, {argv, static_cast<std::size_t>(argc)});
-  else if (name == "cache")
-    add_cache_command(program);
-  else
-    describe_all(line);
+  program.examples(
+      "  texmesh compile scan.glb -o scan.texmesh     compile a model\n"
+      "  texmesh dump scan.texmesh                    see what is in the package\n"
+      "  texmesh verify scan.texmesh                  check every byte of the package\n"
+      "  texmesh view scan.texmesh                    look at the package in a browser");
+  program.notes("Every command explains itself: texmesh compile --help");
+  add_commands(program, first_word);
   return line.run(argc, argv);
 }

@@ -1,18 +1,17 @@
 #include "tools/extract/extract.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
-#include <map>
-#include <optional>
+#include <nlohmann/json.hpp>
 
 #include "delivery/cpp/decide/fragment_list.h"
 #include "format/container/layout.h"
 #include "format/rules/viewing.h"
 #include "pipeline/about/gltf_about.h"
+#include "pipeline/io/table.h"
 #include "tools/extract/budget/budget_search.h"
-#include "tools/extract/glb/joined_jpeg.h"
-#include "tools/extract/glb/plain_file.h"
 #include "tools/extract/glb/scale_file.h"
-#include "tools/extract/glb/scale_model.h"
 #include "tools/extract/glb/standalone_glb.h"
 #include "tools/extract/glb/texture_source.h"
 #include "tools/extract/proxy/proxy_search.h"
@@ -28,26 +27,26 @@ const ManifestScale& scale_entry(PackageReader& package, int scale) {
   return package.manifest().scales[package.scale_index(scale)];
 }
 
-int wanted_scale(PackageReader& package, const ExtractRequest& request) {
-  if (request.scale) return scale_entry(package, *request.scale).scale;
-  if (request.lods && request.display_px <= 0) return 0;
-  return select_scale(package.manifest(), request.display_px > 0 ? request.display_px : kExtractDisplayPx);
+int wanted_scale(PackageReader& package, const ExtractScale& wishes) {
+  if (wishes.scale) return scale_entry(package, *wishes.scale).scale;
+  if (wishes.form == ExtractScale::Form::kLevels && wishes.display_px <= 0) return 0;
+  return select_scale(package.manifest(), wishes.display_px > 0 ? wishes.display_px : kExtractDisplayPx);
 }
 
 /// The plane that stands for a full-size one: itself, or where a displayed height is given and no rung, the
 /// smallest mip that has a texel for every pixel.
-std::map<std::uint32_t, std::uint32_t> shown_planes(PackageReader& package, const ExtractRequest& request) {
+std::map<std::uint32_t, std::uint32_t> shown_planes(PackageReader& package, const ExtractScale& wishes) {
   std::map<std::uint32_t, std::uint32_t> out;
-  const bool by_display = request.display_px > 0 && request.rung == kBestRung;
+  const bool by_display = wishes.display_px > 0 && wishes.rung == kBestRung;
   for (const PlaneChoice& c :
-       by_display ? planes_for_display(package, request.display_px) : full_size(package))
+       by_display ? planes_for_display(package, wishes.display_px) : full_size(package))
     out[c.base] = c.plane;
   return out;
 }
 
-FileImage format_of(const ExtractRequest& request, bool alpha) {
-  if (request.images == ExtractImages::kPng) return FileImage::kPng;
-  if (request.images == ExtractImages::kWebp) return FileImage::kWebp;
+FileImage format_of(const ExtractScale& wishes, bool alpha) {
+  if (wishes.images == ExtractImages::kPng) return FileImage::kPng;
+  if (wishes.images == ExtractImages::kWebp) return FileImage::kWebp;
   return alpha ? FileImage::kPng : FileImage::kJpeg;
 }
 
@@ -69,9 +68,9 @@ Pixels fragment_texels(PackageReader& package, std::uint32_t base, std::uint32_t
 }
 
 /// Whether a file's image can be the coefficients that the package has of a plane.
-bool takes_coefficients(PackageReader& package, const ExtractRequest& request, const PackageImage& image,
+bool takes_coefficients(PackageReader& package, const ExtractScale& wishes, const PackageImage& image,
                         std::uint32_t plane) {
-  return plane == image.plane && !image.alpha_plane && format_of(request, false) == FileImage::kJpeg &&
+  return plane == image.plane && !image.alpha_plane && format_of(wishes, false) == FileImage::kJpeg &&
          package.textures()[plane].codec == Codec::kJpeg;
 }
 
@@ -90,26 +89,25 @@ class ShownTexels {
   std::optional<Model> finest_;
 };
 
-FileImageData coefficient_file(PackageReader& package, const ExtractRequest& request,
-                               const PackageImage& image, ShownTexels& shown, const RunContext& context,
-                               ExtractedImage& row) {
+FileImageData coefficient_file(PackageReader& package, const ExtractScale& wishes, const PackageImage& image,
+                               ShownTexels& shown, const RunContext& context, ExtractedImage& row) {
   const std::uint32_t plane = image.plane;
   const std::size_t rung =
-      std::min<std::size_t>(request.rung, package.tables().planes.at(plane).rung_count() - 1);
-  JoinedJpeg joined(package, plane, rung, context);
+      std::min<std::size_t>(wishes.rung, package.tables().planes.at(plane).rung_count() - 1);
+  JoinedJpeg joined = joined_plane(package, plane, rung, context);
   joined.fill_unseen(shown.of(image));
   row.width_px = joined.width_px();
   row.height_px = joined.height_px();
-  row.quality = quality_of_rung(package, plane, request.rung);
+  row.quality = quality_of_rung(package, plane, wishes.rung);
   return {FileImage::kJpeg, joined.file()};
 }
 
 /// From texels: at the quality of the package where the size is the package's.
-FileImageData coded_file(PackageReader& package, const ExtractRequest& request, const PackageImage& image,
+FileImageData coded_file(PackageReader& package, const ExtractScale& wishes, const PackageImage& image,
                          std::uint32_t plane, const RunContext& context, ExtractedImage& row) {
-  Pixels pixels = fragment_texels(package, image.plane, plane, request.rung, image.averaging(), context);
+  Pixels pixels = fragment_texels(package, image.plane, plane, wishes.rung, image.averaging(), context);
   if (image.alpha_plane) {
-    const Pixels alpha = read_plane(package, *image.alpha_plane, request.rung, context);
+    const Pixels alpha = read_plane(package, *image.alpha_plane, wishes.rung, context);
     if (alpha.width_px < pixels.width_px || alpha.height_px < pixels.height_px)
       throw FormatError(kTexturesPath, "alpha", "a plane as large as its colours", "a smaller one");
     pixels = with_alpha(pixels, reduced(alpha, alpha.width_px, alpha.height_px, pixels.width_px,
@@ -119,48 +117,50 @@ FileImageData coded_file(PackageReader& package, const ExtractRequest& request, 
   row.height_px = pixels.height_px;
   row.quality = row.format == FileImage::kPng ? 100
                 : plane != image.plane        ? kDisplayQuality
-                                              : quality_of_rung(package, plane, request.rung);
+                                              : quality_of_rung(package, plane, wishes.rung);
   return {row.format, encode_image(pixels, {row.format, row.quality, !image.colours, false})};
 }
 
-FileImageData image_file(PackageReader& package, const ExtractRequest& request, const PackageImage& image,
+FileImageData image_file(PackageReader& package, const ExtractScale& wishes, const PackageImage& image,
                          const std::map<std::uint32_t, std::uint32_t>& planes, ShownTexels& shown,
                          const RunContext& context, ExtractedImage& row) {
   const std::uint32_t plane = planes.at(image.plane);
   row.image = image.image;
   row.role = image.role;
-  row.format = format_of(request, image.alpha_plane.has_value());
-  FileImageData file = takes_coefficients(package, request, image, plane)
-                           ? coefficient_file(package, request, image, shown, context, row)
-                           : coded_file(package, request, image, plane, context, row);
+  row.format = format_of(wishes, image.alpha_plane.has_value());
+  FileImageData file = takes_coefficients(package, wishes, image, plane)
+                           ? coefficient_file(package, wishes, image, shown, context, row)
+                           : coded_file(package, wishes, image, plane, context, row);
   row.bytes = file.bytes.size();
   return file;
 }
 
-Extracted extract_whole(PackageReader& package, const ExtractRequest& request, const RunContext& context) {
+Extracted extract_scale(PackageReader& package, const ExtractScale& wishes, bool recentre,
+                        const RunContext& context) {
+  const bool has_levels = wishes.form == ExtractScale::Form::kLevels;
   const Manifest& m = package.manifest();
   Extracted out;
-  out.scale = wanted_scale(package, request);
-  require_rung(package, request.rung);
+  out.scale = wanted_scale(package, wishes);
+  require_rung(package, wishes.rung);
   out.triangles = scale_entry(package, out.scale).triangles;
-  out.levels = request.lods ? levels_of(m, out.scale) : std::vector<int>{out.scale};
+  out.levels = has_levels ? levels_of(m, out.scale) : std::vector<int>{out.scale};
   StandaloneGlb file = scale_file(package, out.scale, context);
-  if (request.lods) file.begin_levels(screen_coverage_of(m, out.scale));
+  if (has_levels) file.begin_levels(screen_coverage_of(m, out.scale));
   for (std::size_t l = 1; l < out.levels.size(); ++l)
     file.add_level(scale_file(package, out.levels[l], context), screen_coverage_of(m, out.levels[l]));
-  if (request.plain) file = plain_file(file, mesh_path(out.scale), context);
+  if (wishes.form == ExtractScale::Form::kPlain) file = plain_file(file, mesh_path(out.scale), context);
   About about = package.about();
-  const double unit = request.metres && about.metres_per_unit > 0 ? about.metres_per_unit : 1;
+  const double unit = wishes.metres && about.metres_per_unit > 0 ? about.metres_per_unit : 1;
   if (unit != 1) about.unit = "m", about.metres_per_unit = 1;
-  file.move_to(request.recentre ? Vec3d{} : m.origin, unit);
-  const std::map<std::uint32_t, std::uint32_t> planes = shown_planes(package, request);
+  file.move_to(recentre ? Vec3d{} : m.origin, unit);
+  const std::map<std::uint32_t, std::uint32_t> planes = shown_planes(package, wishes);
   const std::vector<std::uint32_t> used = file.source_images();
   std::map<std::uint32_t, FileImageData> images;
   ShownTexels shown(package, context);
   for (const PackageImage& image : package_images(package)) {
     if (std::find(used.begin(), used.end(), image.image) == used.end()) continue;
     images[image.image] =
-        image_file(package, request, image, planes, shown, context, out.images.emplace_back());
+        image_file(package, wishes, image, planes, shown, context, out.images.emplace_back());
     context.report(static_cast<double>(images.size()) / static_cast<double>(used.size() + 1));
   }
   file.set_images(images);
@@ -171,22 +171,86 @@ Extracted extract_whole(PackageReader& package, const ExtractRequest& request, c
   return out;
 }
 
+const char* format_name(FileImage format) { return mime_type_of(format) + 6; }  // behind "image/"
+
 }  // namespace
 
-Extracted extract_model(PackageReader& package, const ExtractRequest& request, const RunContext& context) {
-  if (request.proxy) return extract_proxy(package, request, *request.proxy, context);
-  if (request.bytes == 0) return extract_whole(package, request, context);
-  return std::move(extract_budgets(package, request, {request.bytes}, context).front());
-}
-
-std::vector<Extracted> extract_budgets(PackageReader& package, const ExtractRequest& request,
-                                       const std::vector<std::uint64_t>& bytes, const RunContext& context) {
-  std::vector<Extracted> out = extract_bytes(package, request, bytes, context);
-  for (std::size_t k = 0; k < out.size(); ++k)
-    if (about_within(package.about(), bytes[k] / kAboutShare) != package.about())
-      out[k].notes.emplace_back(
+std::vector<Extracted> extract_files(PackageReader& package, const ExtractRequest& request,
+                                     const RunContext& context) {
+  std::vector<Extracted> out;
+  if (const auto* scale = std::get_if<ExtractScale>(&request.file))
+    out.push_back(extract_scale(package, *scale, request.recentre, context));
+  else if (const auto* proxy = std::get_if<ExtractProxy>(&request.file))
+    out.push_back(extract_proxy(package, *proxy, request.recentre, context));
+  else
+    out = extract_within_bytes(package, std::get<ExtractBudget>(request.file), request.recentre, context);
+  for (Extracted& file : out)
+    if (file.asked_bytes > 0 &&
+        about_within(package.about(), file.asked_bytes / kAboutShare) != package.about())
+      file.notes.emplace_back(
           "the file is too small for all that is known of the object; see dump PKG about");
   return out;
+}
+
+Extracted extract_model(PackageReader& package, const ExtractRequest& request, const RunContext& context) {
+  return std::move(extract_files(package, request, context).front());
+}
+
+std::string extract_json(const Extracted& e, const std::string& file) {
+  nlohmann::ordered_json images = nlohmann::ordered_json::array();
+  for (const ExtractedImage& i : e.images)
+    images.push_back({{"image", i.image},
+                      {"role", i.role},
+                      {"format", format_name(i.format)},
+                      {"width_px", i.width_px},
+                      {"height_px", i.height_px},
+                      {"quality", i.quality},
+                      {"bytes", i.bytes}});
+  nlohmann::ordered_json out{{"version", 1},
+                             {"file", file},
+                             {"bytes", e.glb.size()},
+                             {"scale", e.scale},
+                             {"levels", e.levels},
+                             {"triangles", e.triangles},
+                             {"mesh_bytes", e.mesh_bytes},
+                             {"images", images}};
+  if (e.proxy) out["proxy"] = *e.proxy;
+  if (e.asked_bytes > 0) {
+    out["asked_bytes"] = e.asked_bytes;
+    out["within"] = e.within;
+    out["difference"] = e.difference;
+    out["mesh_difference"] = e.mesh_difference;
+    out["views"] = e.views;
+    out["side_px"] = e.side_px;
+  }
+  out["notes"] = e.notes;
+  return out.dump();
+}
+
+std::string extract_text(const Extracted& e, const std::string& file) {
+  std::string text = fmt::format("{}: {} bytes, {} with {} triangles", file, grouped(e.glb.size()),
+                                 e.proxy ? fmt::format("proxy {}", *e.proxy) : fmt::format("S_{}", e.scale),
+                                 grouped(e.triangles));
+  for (std::size_t l = 1; l < e.levels.size(); ++l)
+    text += fmt::format("{} S_{}", l == 1 ? ", levels" : ",", e.levels[l]);
+  text += fmt::format("; mesh {} bytes\n", grouped(e.mesh_bytes));
+  for (const ExtractedImage& i : e.images) {
+    text += fmt::format("  image {}, {}: {} x {} px, {}", i.image, i.role, i.width_px, i.height_px,
+                        format_name(i.format));
+    if (i.format != FileImage::kPng) text += fmt::format(" of quality {:.4g}", i.quality);
+    text += fmt::format(", {} bytes\n", grouped(i.bytes));
+  }
+  if (e.asked_bytes > 0)
+    text += fmt::format(
+        "difference to the package's best (FLIP of lit pictures, {} views of {} px): {:.4f}; of the mesh alone "
+        "{:.4f}\n",
+        e.views, e.side_px, e.difference, e.mesh_difference);
+  if (!e.within)
+    text += fmt::format(
+        "{} bytes cannot be reached within 2 %: this is the nearest file that the package gives\n",
+        grouped(e.asked_bytes));
+  for (const std::string& n : e.notes) text += "note: " + n + "\n";
+  return text;
 }
 
 }  // namespace texmesh

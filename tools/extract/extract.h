@@ -1,26 +1,105 @@
 #pragma once
 #include <cstdint>
+#include <optional>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "delivery/cpp/package/package_reader.h"
+#include "format/base/fields.h"
 #include "stages/base/run_context.h"
-#include "tools/extract/glb/extracted.h"
+#include "tools/extract/glb/image_codecs.h"
+#include "tools/render/plane_pixels.h"
 
 namespace texmesh {
 
-/// One glTF file that any viewer opens alone: a scale of the package with whole textures. Deterministic
-/// for any number of threads. InputError for a scale or rung that is not there; FormatError when the
-/// package is damaged.
+/// What kind of images a standalone file gets. kAuto: for a number of bytes what looks best, otherwise JPEG;
+/// images with alpha become PNG where JPEG would be taken.
+enum class ExtractImages : std::uint8_t { kAuto, kJpeg, kWebp, kPng };
+template <>
+struct EnumNames<ExtractImages> {
+  static constexpr std::array<std::string_view, 4> names{"auto", "jpeg", "webp", "png"};
+};
+
+/// Of a file of so many bytes, one in this many may say what the object is (about_within()).
+inline constexpr std::uint64_t kAboutShare = 20;
+
+/// A scale with whole textures.
+struct ExtractScale {
+  /// kCoded: meshes as the package codes them. kPlain: without extensions that compress (plain_file()).
+  /// kLevels: all major scales from the chosen one on, as levels of detail (MSFT_lod).
+  enum class Form : std::uint8_t { kCoded, kPlain, kLevels };
+  std::optional<int> scale;        // else the one that suits `display_px`
+  std::uint32_t rung = kBestRung;  // of full-size planes
+  double display_px = 0;           // displayed height, device px; 0 = not said
+  ExtractImages images = ExtractImages::kAuto;
+  Form form = Form::kCoded;
+  bool metres = false;  // lengths in metres where the object unit is known, by a node that scales
+};
+
+/// The best-looking files of at most so many bytes.
+struct ExtractBudget {
+  std::vector<std::uint64_t> bytes;  // a file for each; above 0
+  std::optional<int> scale;          // else what looks best
+  double display_px = 512;           // displayed height at which files are compared, device px
+  ExtractImages images = ExtractImages::kAuto;
+  bool levels = false;  // as ExtractScale::Form::kLevels
+};
+
+/// A proxy as the package has it.
+struct ExtractProxy {
+  std::uint32_t proxy = 0;
+  bool plain = false;  // as ExtractScale::Form::kPlain
+};
+
+struct ExtractRequest {
+  std::variant<ExtractScale, ExtractBudget, ExtractProxy> file;
+  bool recentre = false;  // the frame of the package's meshes instead of the source's coordinates
+};
+
+struct ExtractedImage {
+  std::uint32_t image = 0;
+  std::string role;
+  FileImage format = FileImage::kJpeg;
+  std::uint32_t width_px = 0, height_px = 0;
+  double quality = 0;  // of its coder; 100 for PNG
+  std::uint64_t bytes = 0;
+};
+
+struct Extracted {
+  std::vector<std::uint8_t> glb;
+  int scale = 0;                                // the finest in the file; of a proxy the package's coarsest
+  std::optional<std::uint32_t> proxy;           // the file is this proxy, or made of it
+  std::vector<int> levels;                      // of levels of detail: all, finest first
+  std::uint64_t triangles = 0, mesh_bytes = 0;  // mesh_bytes: everything but images; all of a whole proxy
+  std::vector<ExtractedImage> images;
+  std::vector<std::string> notes;
+
+  // Of a file for a number of bytes:
+  std::uint64_t asked_bytes = 0;  // 0 for other files
+  /// Whether the file has at most `asked_bytes`, and at least 98 % of them or all that the package has of the
+  /// source, or is a proxy that looks better than any such file. If not, it is the nearest that the package
+  /// can give.
+  bool within = true;
+  /// FLIP of the file's lit pictures against those of the package's best, 0 = equal, measured from `views`
+  /// directions at `side_px`; -1 for other files.
+  double difference = -1;
+  double mesh_difference = -1;  // the same with the best textures instead: what the mesh alone costs
+  int views = 0;
+  std::uint32_t side_px = 0;
+};
+
+/// glTF files that any viewer opens alone: one for each number of bytes of an ExtractBudget, one for other
+/// requests. Files for several numbers of bytes share one search, and are those that each number alone gives.
+/// Deterministic for any number of threads. InputError for a scale, rung or proxy that is not there;
+/// FormatError when the package is damaged.
+std::vector<Extracted> extract_files(PackageReader& package, const ExtractRequest& request,
+                                     const RunContext& context);
+/// The first of these files.
 Extracted extract_model(PackageReader& package, const ExtractRequest& request, const RunContext& context);
 
-/// One such file for each number of bytes, each above 0, instead of request.bytes. They share one search, and
-/// are the files that extract_model() gives for each number.
-std::vector<Extracted> extract_budgets(PackageReader& package, const ExtractRequest& request,
-                                       const std::vector<std::uint64_t>& bytes, const RunContext& context);
-
-/// The answer to --json (schemas/extract.v1.schema.json), and the text for people.
-std::string extract_json(const Extracted& extracted, const ExtractRequest& request, const std::string& file);
-std::string extract_text(const Extracted& extracted, const ExtractRequest& request, const std::string& file);
+/// The answer to --json (schemas/extract.v1.schema.json), and the text for people. `file` is the GLB's name.
+std::string extract_json(const Extracted& extracted, const std::string& file);
+std::string extract_text(const Extracted& extracted, const std::string& file);
 
 }  // namespace texmesh

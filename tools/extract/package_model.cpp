@@ -7,7 +7,6 @@
 #include "pipeline/io/file_resolver.h"
 #include "stages/image/decode_image.h"
 #include "tools/extract/glb/scale_file.h"
-#include "tools/extract/glb/scale_model.h"
 #include "tools/extract/glb/texture_source.h"
 
 namespace texmesh {

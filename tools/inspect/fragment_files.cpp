@@ -10,65 +10,55 @@
 #include "format/base/sha256.h"
 #include "format/container/layout.h"
 #include "format/rules/allocation.h"
+#include "pipeline/io/record.h"
 
 namespace texmesh {
+
+template <>
+struct RecordFields<FragmentIndex::Rung> {
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("bytes", s.bytes, Range{0, 4294967296.0}, "");
+    v("sha256", s.digests, "");
+  }
+};
+template <>
+struct RecordFields<FragmentIndex::Plane> {
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("order", s.order, "");
+    v("rungs", s.rungs, "");
+  }
+};
+template <>
+struct RecordFields<FragmentIndex> {
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("version", Constant{1}, "");
+    v("planes", s.planes, "");
+  }
+};
+
 namespace {
 
-using Json = nlohmann::ordered_json;
 constexpr const char* kNoFile = "0000000000000000";
-
-[[noreturn]] void fail_fragment_index(const std::string& place, const std::string& expected,
-                                      const std::string& found) {
-  throw FormatError(kFragmentIndexPath, place, expected, found);
-}
-
-const Json& list_member(const Json& object, const char* key, const std::string& place) {
-  if (!object.is_object() || !object.contains(key) || !object[key].is_array())
-    fail_fragment_index(place + "/" + key, "a list", "something else");
-  return object[key];
-}
-
-std::uint64_t integer(const Json& value, const std::string& place, std::uint64_t largest) {
-  if (!value.is_number_unsigned() || value.get<std::uint64_t>() > largest)
-    fail_fragment_index(place, "an integer in 0 .. " + std::to_string(largest), value.dump().substr(0, 60));
-  return value.get<std::uint64_t>();
-}
-
-bool is_short_digest(const Json& v) {
-  if (!v.is_string() || v.get_ref<const std::string&>().size() != 16) return false;
-  return v.get_ref<const std::string&>().find_first_not_of("0123456789abcdef") == std::string::npos;
-}
 
 std::string short_digest(const Bytes& bytes) { return to_hex(sha256(bytes)).substr(0, 16); }
 
-FragmentIndex::Rung read_rung(const Json& json, std::size_t fragments, const std::string& place) {
-  FragmentIndex::Rung rung;
-  const Json& bytes = list_member(json, "bytes", place);
-  const Json& digests = list_member(json, "sha256", place);
-  if (bytes.size() != fragments || digests.size() != fragments)
-    fail_fragment_index(
-        place, std::to_string(fragments) + " fragments, as in order",
-        std::to_string(bytes.size()) + " sizes, " + std::to_string(digests.size()) + " digests");
-  for (std::size_t i = 0; i < fragments; ++i) {
-    rung.bytes.push_back(integer(bytes[i], place + "/bytes/" + std::to_string(i), 1ull << 32));
-    if (!is_short_digest(digests[i]))
-      fail_fragment_index(place + "/sha256/" + std::to_string(i), "16 lower-case hexadecimal digits",
-                          digests[i].dump().substr(0, 60));
-    rung.digests.push_back(digests[i].get<std::string>());
-  }
-  return rung;
-}
-
-FragmentIndex::Plane read_plane(const Json& json, const std::string& place) {
-  FragmentIndex::Plane plane;
-  const Json& order = list_member(json, "order", place);
-  for (std::size_t i = 0; i < order.size(); ++i)
-    plane.order.push_back(
-        static_cast<std::uint16_t>(integer(order[i], place + "/order/" + std::to_string(i), 65535)));
-  const Json& rungs = list_member(json, "rungs", place);
-  for (std::size_t r = 0; r < rungs.size(); ++r)
-    plane.rungs.push_back(read_rung(rungs[r], plane.order.size(), place + "/rungs/" + std::to_string(r)));
-  return plane;
+/// As many sizes and digests as the plane has fragments.
+void check_rung_index(const FragmentIndex::Plane& plane, const FragmentIndex::Rung& rung,
+                      const std::string& place) {
+  const auto fail = [&](const std::string& at, const std::string& expected, const std::string& found) {
+    throw FormatError(kFragmentIndexPath, at, expected, found);
+  };
+  const std::size_t fragments = plane.order.size();
+  if (rung.bytes.size() != fragments || rung.digests.size() != fragments)
+    fail(place, std::to_string(fragments) + " fragments, as in order",
+         std::to_string(rung.bytes.size()) + " sizes, " + std::to_string(rung.digests.size()) + " digests");
+  for (std::size_t i = 0; i < fragments; ++i)
+    if (rung.digests[i].size() != 16 ||
+        rung.digests[i].find_first_not_of("0123456789abcdef") != std::string::npos)
+      fail(place + "/sha256/" + std::to_string(i), "16 lower-case hexadecimal digits", rung.digests[i]);
 }
 
 /// Compares the files of one rung (the one added to `streams` last) with the index and the rung's own entry.
@@ -103,24 +93,19 @@ void check_rung_files(PackageStore& folder, const std::map<std::string, std::uin
 
 }  // namespace
 
-std::string write_fragment_index(const FragmentIndex& index) {
-  Json planes = Json::array();
-  for (const FragmentIndex::Plane& p : index.planes) {
-    Json rungs = Json::array();
-    for (const FragmentIndex::Rung& r : p.rungs) rungs.push_back({{"bytes", r.bytes}, {"sha256", r.digests}});
-    planes.push_back({{"order", p.order}, {"rungs", rungs}});
-  }
-  return Json{{"version", 1}, {"planes", planes}}.dump();
-}
+std::string write_fragment_index(const FragmentIndex& index) { return to_json_line(index); }
 
 FragmentIndex read_fragment_index(std::span<const std::uint8_t> json) {
-  const Json root = parse_bounded_json(json, kFragmentIndexPath, 16);
-  if (!root.is_object() || !root.contains("version") || root["version"] != 1)
-    fail_fragment_index("/version", "1", "something else");
   FragmentIndex index;
-  const Json& planes = list_member(root, "planes", "");
-  for (std::size_t k = 0; k < planes.size(); ++k)
-    index.planes.push_back(read_plane(planes[k], "/planes/" + std::to_string(k)));
+  try {
+    index = from_json<FragmentIndex>(parse_bounded_json(json, kFragmentIndexPath, 16), kFragmentIndexPath);
+  } catch (const InputError& e) {  // the package is to blame
+    throw FormatError(e.file(), e.place(), e.expected(), e.found());
+  }
+  for (std::size_t k = 0; k < index.planes.size(); ++k)
+    for (std::size_t r = 0; r < index.planes[k].rungs.size(); ++r)
+      check_rung_index(index.planes[k], index.planes[k].rungs[r],
+                       "/planes/" + std::to_string(k) + "/rungs/" + std::to_string(r));
   return index;
 }
 

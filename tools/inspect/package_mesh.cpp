@@ -1,5 +1,8 @@
 #include "tools/inspect/package_mesh.h"
 
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
 #include <optional>
 
 #include "format/container/layout.h"
@@ -22,6 +25,16 @@ class PreviewsOf : public Resolver {
 };
 
 }  // namespace
+
+bool is_package(const std::string& path) {
+  namespace fs = std::filesystem;
+  std::error_code ec;
+  if (fs::is_directory(path, ec)) return fs::exists(fs::path(path) / kManifestPath, ec);
+  std::ifstream in(path, std::ios::binary);
+  char magic[4]{};
+  in.read(magic, 4);
+  return in.gcount() == 4 && std::equal(magic, magic + 4, "PK\x03\x04");
+}
 
 ImportedModel finest_scale(PackageReader& package, const RunContext& context) {
   PreviewsOf previews(package);

@@ -8,6 +8,9 @@
 
 namespace texmesh {
 
+/// Whether `path` is a package (a .texmesh file, or a folder that unpack made) and not a model.
+bool is_package(const std::string& path);
+
 /// S_0 of a package as its GLB has it; the images are previews. Errors as import_package_glb().
 ImportedModel finest_scale(PackageReader& package, const RunContext& context);
 

@@ -1,99 +1,123 @@
 #include "tools/inspect/provenance.h"
 
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "format/base/bounded_json.h"
 #include "format/base/errors.h"
 #include "format/base/sha256.h"
+#include "pipeline/compile/option_fields.h"
+#include "pipeline/compile/options.h"
+#include "pipeline/io/record.h"
 
 namespace texmesh {
 namespace {
 
-using Json = nlohmann::ordered_json;
 constexpr const char* kDocument = "provenance.json";
+constexpr Range kNotEmptyText{1, 1e6};
+
+struct FormatVersion {
+  int major = 0, minor = 0;
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("major", s.major, Range{0, 65535}, "");
+    v("minor", s.minor, Range{0, 65535}, "");
+  }
+};
+
+}  // namespace
+
+template <>
+struct RecordFields<Provenance::Input> {
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("role", s.role, FieldRule{.words = "model|file"}, "");
+    v("uri", s.uri, kMayMiss, "as the model refers to the file");
+    v("sha256", s.sha256, FieldRule{.pattern = "^[0-9a-f]{64}$"}, "");
+    v("bytes", s.bytes, Range{0, 9007199254740992.0}, "");
+  }
+};
+
+namespace {
+
+struct ProvenanceDocument {
+  std::string tool;
+  FormatVersion format;
+  std::vector<Provenance::Input> inputs;
+  Json options;
+  std::map<std::string, int> stages;
+  std::map<std::string, std::string> libraries;
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("version", Constant{1}, "");
+    v("tool", s.tool, kNotEmptyText, "name and version of what made the package");
+    v("format", s.format, "");
+    v("inputs", s.inputs, FieldRule{.count = Range{1, 1e6}}, "the model, then the files that it refers to");
+    v("options", s.options, "every option, after defaults, as a profile (profile.v1)");
+    v("stages", s.stages, Range{0, 1 << 30}, "stage name: version");
+    v("libraries", s.libraries, kNotEmptyText, "library that can change bytes: version");
+  }
+};
 
 [[noreturn]] void fail_provenance(const std::string& place, const std::string& expected, const Json& found) {
   throw FormatError(kDocument, place, expected, found.is_null() ? "nothing" : found.dump().substr(0, 80));
 }
 
-Json member(const Json& object, const char* key) {
-  const auto it = object.find(key);
-  return it == object.end() ? Json() : *it;
-}
-
-std::string text(const Json& object, const char* key, const std::string& place) {
-  const Json v = member(object, key);
-  if (!v.is_string() || v.get_ref<const std::string&>().empty())
-    fail_provenance(place + "/" + key, "a text that is not empty", v);
-  return v.get<std::string>();
-}
-
-std::uint64_t integer_member(const Json& object, const char* key, const std::string& place,
-                             std::uint64_t largest) {
-  const Json v = member(object, key);
-  if (!v.is_number_unsigned() || v.get<std::uint64_t>() > largest)
-    fail_provenance(place + "/" + key, "an integer in 0 .. " + std::to_string(largest), v);
-  return v.get<std::uint64_t>();
-}
-
-Json object_member(const Json& root, const char* key) {
-  Json v = member(root, key);
-  if (!v.is_object()) fail_provenance(std::string("/") + key, "an object", v);
-  return v;
-}
-
-std::vector<Provenance::Input> read_inputs(const Json& root) {
-  const Json list = member(root, "inputs");
-  if (!list.is_array() || list.empty()) fail_provenance("/inputs", "a list with the model first", list);
-  std::vector<Provenance::Input> inputs;
-  for (std::size_t i = 0; i < list.size(); ++i) {
+void check_inputs(const std::vector<Provenance::Input>& inputs) {
+  for (std::size_t i = 0; i < inputs.size(); ++i) {
     const std::string place = "/inputs/" + std::to_string(i);
-    if (!list[i].is_object()) fail_provenance(place, "an object", list[i]);
-    Provenance::Input input;
-    input.role = text(list[i], "role", place);
-    if (input.role != "model" && input.role != "file")
-      fail_provenance(place + "/role", "model or file", input.role);
-    if ((input.role == "model") != (i == 0))
-      fail_provenance(place + "/role", i == 0 ? "model" : "file", input.role);
-    if (input.role == "file") input.uri = text(list[i], "uri", place);
-    input.sha256 = text(list[i], "sha256", place);
+    const char* role = i == 0 ? "model" : "file";
+    if (inputs[i].role != role) fail_provenance(place + "/role", role, inputs[i].role);
+    if (i > 0 && inputs[i].uri.empty()) fail_provenance(place + "/uri", "a text that is not empty", Json());
     Sha256 digest;
-    if (!from_hex(input.sha256, digest))
-      fail_provenance(place + "/sha256", "64 lower-case hexadecimal digits", input.sha256);
-    input.bytes = integer_member(list[i], "bytes", place, 1ull << 53);
-    inputs.push_back(std::move(input));
+    if (!from_hex(inputs[i].sha256, digest))
+      fail_provenance(place + "/sha256", "64 lower-case hexadecimal digits", inputs[i].sha256);
   }
-  return inputs;
 }
 
-Json read_options(const Json& root) {
-  Json options = object_member(root, "options");
-  if (member(options, "version") != 1) fail_provenance("/options/version", "1", member(options, "version"));
+void check_options(const Json& options) {
+  if (!options.is_object()) fail_provenance("/options", "an object", options);
   for (const auto& [stage, section] : options.items())
     if (stage != "version" && !section.is_object())
       fail_provenance("/options/" + stage, "an object", section);
-  return options;
+  if (options.value("version", Json()) != 1) fail_provenance("/options/version", "1", Json());
 }
 
 }  // namespace
 
 Provenance read_provenance(std::span<const std::uint8_t> json) {
-  const Json root = parse_bounded_json(json, kDocument);
-  if (!root.is_object()) fail_provenance("", "an object", root);
-  if (member(root, "version") != 1) fail_provenance("/version", "1", member(root, "version"));
-  Provenance p;
-  p.tool = text(root, "tool", "");
-  const Json format = object_member(root, "format");
-  p.format_major = static_cast<int>(integer_member(format, "major", "/format", 65535));
-  p.format_minor = static_cast<int>(integer_member(format, "minor", "/format", 65535));
-  p.inputs = read_inputs(root);
-  p.options = std::make_shared<const Json>(read_options(root));
-  const Json stages = object_member(root, "stages"), libraries = object_member(root, "libraries");
-  for (const auto& [name, value] : stages.items())
-    p.stages.emplace_back(name, static_cast<int>(integer_member(stages, name.c_str(), "/stages", 1u << 30)));
-  for (const auto& [name, value] : libraries.items())
-    p.libraries.emplace_back(name, text(libraries, name.c_str(), "/libraries"));
-  return p;
+  try {
+    auto document = from_json<ProvenanceDocument>(parse_bounded_json(json, kDocument), kDocument);
+    check_inputs(document.inputs);
+    check_options(document.options);
+    Provenance p;
+    p.tool = std::move(document.tool);
+    p.format_major = document.format.major, p.format_minor = document.format.minor;
+    p.inputs = std::move(document.inputs);
+    p.options = std::make_shared<const Json>(std::move(document.options));
+    p.stages = std::move(document.stages);
+    p.libraries = std::move(document.libraries);
+    return p;
+  } catch (const InputError& e) {  // the package is to blame
+    throw FormatError(e.file(), e.place(), e.expected(), e.found());
+  }
+}
+
+std::vector<OptionChange> changed_options(const nlohmann::ordered_json& profile) {
+  CompileOptions defaults;
+  std::map<std::string, std::string> fallback;
+  for (const OptionField& f : list_options(defaults)) fallback[f.path()] = option_text(f);
+  std::vector<OptionChange> changes;
+  for (const auto& [stage, section] : profile.items()) {
+    if (!section.is_object()) continue;
+    for (const auto& [name, value] : section.items()) {
+      const std::string path = stage + "." + name, text = value.dump();
+      const auto it = fallback.find(path);
+      if (it == fallback.end() || it->second != text)
+        changes.push_back({path, text, it == fallback.end() ? "" : it->second});
+    }
+  }
+  return changes;
 }
 
 }  // namespace texmesh

@@ -1,10 +1,10 @@
 #pragma once
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <span>
 #include <string>
-#include <utility>
 #include <vector>
 
 namespace texmesh {
@@ -18,13 +18,22 @@ struct Provenance {
   };
   std::string tool;  // "texmesh 1.2.3"
   int format_major = 0, format_minor = 0;
-  std::vector<Input> inputs;                                   // the model first
-  std::shared_ptr<const nlohmann::ordered_json> options;       // a profile with every option, never null
-  std::vector<std::pair<std::string, int>> stages;             // name, version
-  std::vector<std::pair<std::string, std::string>> libraries;  // name, version
+  std::vector<Input> inputs;                              // the model first
+  std::shared_ptr<const nlohmann::ordered_json> options;  // a profile with every option, never null
+  std::map<std::string, int> stages;                      // versions by name
+  std::map<std::string, std::string> libraries;           // versions by name
 };
 
 /// Strict for what version 1 defines, ignores unknown fields. FormatError names the JSON pointer.
 Provenance read_provenance(std::span<const std::uint8_t> json);
+
+/// An option of a package that is not what this build would take by itself.
+struct OptionChange {
+  std::string name;      // "ladder.rungs"
+  std::string value;     // JSON text
+  std::string fallback;  // JSON text; "" where this build has no such option
+};
+/// `profile`: every option of a package, as its provenance holds them.
+std::vector<OptionChange> changed_options(const nlohmann::ordered_json& profile);
 
 }  // namespace texmesh

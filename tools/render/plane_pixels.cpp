@@ -13,7 +13,7 @@
 #include "stages/fill/fill.h"
 #include "stages/fragment_codec/fragment_codec.h"
 #include "stages/image/decode_image.h"
-#include "stages/measure/scale_samples.h"
+#include "stages/measure/fragment_meter.h"
 
 namespace texmesh {
 namespace {

@@ -9,7 +9,7 @@
 #include "delivery/cpp/decide/texture_budget.h"
 #include "delivery/cpp/simulate/network_model.h"
 #include "delivery/cpp/simulate/simulation.h"
-#include "format/rules/proxy_steps.h"
+#include "format/rules/proxy_choice.h"
 #include "format/rules/viewing.h"
 
 namespace texmesh {
@@ -29,7 +29,7 @@ struct DeliveryRequest {
       play;
   /// GPU memory for mesh and textures, see gpu_memory.h. What is least takes its place where nothing fits.
   double memory_bytes = std::numeric_limits<double>::infinity();
-  bool proxy_steps = true;  // a larger proxy may be shown on the way, see format/rules/proxy_steps.h
+  bool proxy_steps = true;  // a larger proxy may be shown on the way, see format/rules/proxy_choice.h
 };
 
 /// The request with chapters 4 and 7 as printed: Policy::kThesis, the JND's rule, one request at a time, hard

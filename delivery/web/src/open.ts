@@ -1,6 +1,6 @@
 import type { Object3D } from 'three';
 import { InputError } from './format/errors';
-import { nowS } from './http/clock';
+import { nowS } from './http/requests';
 import { OpenOptions, PackageReader } from './http/package_reader';
 import type { LoadOptions, LoadedModel } from './scene/api';
 import { loadModel } from './scene/load';
@@ -13,8 +13,7 @@ export type * from './scene/api';
 
 /** Names that options may have; the library chooses options that are left out. */
 const names = {
-  policy: ['guard', 'htc', 'htca', 'price', 'proportional', 'static', 'thesis'],
-  order: ['credit', 'beta0', 'finest'],
+  policy: ['guard', 'thesis'],
   rule: ['flip', 'jnd', 'error', 'edge'],
   meshes: ['glb', 'stream', 'auto'],
 } as const;
@@ -33,7 +32,6 @@ export class TexmeshPackage extends PackageReader {
    * counts from the package's first request, that of others from this call. InputError: an option has a value that it cannot have.
    */
   load(scene: Object3D, options: LoadOptions): LoadedModel {
-    const policy = options.policy === 'htca' ? 'htc' : (options.policy ?? 'guard');
     const { time = 0, display } = options;
     for (const [name, all] of Object.entries(names)) {
       const said = options[name as keyof typeof names];
@@ -49,9 +47,8 @@ export class TexmeshPackage extends PackageReader {
     this.pool = pool; // until a load has the pool: options may be refused
     this.decodeDocument = pool.decodeDocument;
     const forget = (): void => void this.loads_.delete(load);
-    const printed = policy === 'thesis';
-    const { rule = printed ? 'jnd' : undefined, order = printed ? 'beta0' : undefined } = options;
-    const load = loadModel(this, scene, { ...options, policy, rule, order }, pool, this.loaded_ ? nowS() : this.openedS, forget);
+    const { rule = options.policy === 'thesis' ? 'jnd' : undefined } = options;
+    const load = loadModel(this, scene, { ...options, rule }, pool, this.loaded_ ? nowS() : this.openedS, forget);
     this.pool = undefined;
     this.loaded_ = true;
     this.loads_.add(load);

@@ -4,5 +4,5 @@ export * from './decisions';
 export * from './decide/harmonic_time';
 export * from './decide/delivery_plan';
 export * from './decide/proxy_steps';
-export * from './decide/memory/gpu_size';
-export { planesWithin, scaleWithin } from './decide/memory/gpu_memory';
+export * from './decide/gpu_size';
+export { planesWithin, scaleWithin } from './decide/gpu_memory';

@@ -16,10 +16,7 @@ const kCaps: [string, number][] = [
   ['no cap', Infinity], ['0.5 Mbit/s', 62500], ['1 Mbit/s', 125000], ['2 Mbit/s', 250000], ['5 Mbit/s', 625000], ['10 Mbit/s', 1.25e6],
   ['50 Mbit/s', 6.25e6],
 ];
-export const kPolicies: [Policy, string][] = [
-  ['htc', 'harmonic time (HTCA)'], ['guard', 'harmonic, guarded'], ['price', 'price of bytes'], ['proportional', 'proportional'],
-  ['static', 'static'], ['thesis', 'as printed (thesis)'],
-];
+export const kPolicies: [Policy, string][] = [['guard', 'harmonic, guarded'], ['thesis', 'as printed (thesis)']];
 
 /** The bandwidths to choose from, `bytesPerSecond` among them. */
 export function capsWith(bytesPerSecond: number): [string, number][] {
@@ -39,11 +36,10 @@ export function choicesFromAddress(query: URLSearchParams): Choices {
   };
   const time = number('time');
   const mbit = number('mbit');
-  const named = query.get('policy') === 'htca' ? 'htc' : query.get('policy');
   return {
     timeS: query.get('time') === 'none' || (time ?? 0) > kMostTimeS ? Infinity : time !== null && time > 0 ? time : 4,
     capBytesPerSecond: mbit !== null && mbit > 0 ? mbit * 125000 : Infinity,
-    policy: kPolicies.find(([p]) => p === named)?.[0] ?? 'guard',
+    policy: kPolicies.find(([p]) => p === query.get('policy'))?.[0] ?? 'guard',
     scale: whole('scale'),
     rung: whole('rung'),
   };

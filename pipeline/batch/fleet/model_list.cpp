@@ -1,21 +1,158 @@
 #include "pipeline/batch/fleet/model_list.h"
 
+#include <algorithm>
+#include <cstdint>
 #include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
 
-#include "pipeline/batch/find_models.h"
-#include "pipeline/batch/fleet/json_lines.h"
-#include "pipeline/batch/fleet/named_files.h"
+#include "format/base/bounded_json.h"
+#include "format/base/errors.h"
+#include "format/base/note.h"
+#include "pipeline/batch/plan.h"
+#include "pipeline/import/obj/obj_material.h"
+#include "pipeline/import/ply/ply_reader.h"
+#include "pipeline/import/range/range_scan_document.h"
+#include "pipeline/import/text_scan.h"
+#include "pipeline/io/uri.h"
 
 namespace texmesh {
 namespace {
 
+namespace fs = std::filesystem;
+constexpr std::size_t kHeadBytes = 1 << 20, kMostJsonBytes = 256u << 20;
+
+std::vector<std::uint8_t> bytes_at(const std::string& path, std::uint64_t offset, std::size_t most) {
+  std::ifstream in(path, std::ios::binary);
+  in.seekg(0, std::ios::end);
+  const auto end = in.tellg();
+  if (!in || static_cast<std::uint64_t>(end) <= offset) return {};
+  std::vector<std::uint8_t> bytes(
+      static_cast<std::size_t>(std::min<std::uint64_t>(most, static_cast<std::uint64_t>(end) - offset)));
+  in.seekg(static_cast<std::streamoff>(offset));
+  in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  bytes.resize(static_cast<std::size_t>(in.gcount()));
+  return bytes;
+}
+
+class NamedFiles {
+ public:
+  explicit NamedFiles(const std::string& model) : model_(model), folder_(fs::path(model).parent_path()) {}
+
+  std::vector<std::string> find() {
+    std::string ending = fs::path(model_).extension().string();
+    std::transform(ending.begin(), ending.end(), ending.begin(),
+                   [](unsigned char c) { return std::tolower(c); });
+    if (ending == ".gltf") look_at_gltf(bytes_at(model_, 0, kMostJsonBytes));
+    if (ending == ".glb") look_at_glb();
+    if (ending == ".obj") look_at_obj();
+    if (ending == ".ply") look_at_ply();
+    if (ending == ".json") look_at_range_scan();
+    return {found_.begin(), found_.end()};
+  }
+
+ private:
+  bool add(std::string name) {
+    std::replace(name.begin(), name.end(), '\\', '/');
+    try {
+      check_relative_name(name, model_, "");
+    } catch (const InputError&) {
+      return false;
+    }
+    const fs::path path = folder_ / name;
+    std::error_code ec;
+    if (!fs::is_regular_file(path, ec)) return false;
+    found_.insert(path.lexically_normal().string());
+    return true;
+  }
+
+  void add_uri(const std::string& uri) {
+    try {
+      add(decode_uri(uri, model_, ""));
+    } catch (const InputError&) {  // it names nothing beneath the folder
+    }
+  }
+
+  void look_at_gltf(const std::vector<std::uint8_t>& json) {
+    const nlohmann::ordered_json document = parse_bounded_json(json, model_, 64);
+    for (const char* list : {"buffers", "images"})
+      for (const auto& item : document.value(list, nlohmann::ordered_json::array())) {
+        const std::string uri = item.is_object() ? item.value("uri", "") : "";
+        if (!uri.empty() && !is_data_uri(uri)) add_uri(uri);
+      }
+  }
+
+  void look_at_glb() {
+    const std::vector<std::uint8_t> head = bytes_at(model_, 0, 20);
+    if (head.size() < 20) return;
+    std::size_t length = 0;
+    for (int i = 3; i >= 0; --i) length = length << 8 | head[static_cast<std::size_t>(12 + i)];
+    std::vector<std::uint8_t> json = bytes_at(model_, 20, std::min(length, kMostJsonBytes));
+    while (!json.empty() && (json.back() == 0 || json.back() == ' ')) json.pop_back();
+    look_at_gltf(json);
+  }
+
+  void look_at_obj() {
+    const std::vector<std::uint8_t> head = bytes_at(model_, 0, kHeadBytes);
+    std::string_view rest(reinterpret_cast<const char*>(head.data()), head.size());
+    while (!rest.empty()) {
+      std::string_view line = rest.substr(0, rest.find('\n'));
+      rest.remove_prefix(std::min(rest.size(), line.size() + 1));
+      if (next_token(line) != "mtllib") continue;
+      const std::string whole(trim(line));
+      if (add_library(whole)) continue;
+      for (std::string_view name = next_token(line); !name.empty(); name = next_token(line))
+        add_library(std::string(name));
+    }
+  }
+
+  bool add_library(const std::string& name) {
+    if (!add(name)) return false;
+    Notes notes;
+    const MtlFile library = read_mtl(name, bytes_at((folder_ / name).string(), 0, kMostJsonBytes), notes);
+    for (const MtlMaterial& m : library.materials)
+      for (const auto* map :
+           {&m.map_kd, &m.map_ka, &m.map_ke, &m.map_d, &m.map_pr, &m.map_pm, &m.bump, &m.norm})
+        if (*map) add((*map)->file);
+    return true;
+  }
+
+  void look_at_ply() {
+    for (const std::string& comment : read_ply_header(model_, bytes_at(model_, 0, kHeadBytes)).comments) {
+      std::string_view rest = comment;
+      if (same_word(next_token(rest), "TextureFile")) add(std::string(trim(rest)));
+    }
+  }
+
+  void look_at_range_scan() {
+    const RangeScanDescription scan = read_range_scan_description(model_, bytes_at(model_, 0, kHeadBytes));
+    add(scan.grid);
+    if (scan.texture) add(*scan.texture);
+  }
+
+  std::string model_;
+  fs::path folder_;
+  std::set<std::string> found_;
+};
+
 std::uint64_t bytes_of_file(const std::string& path) {
   std::error_code ec;
-  const auto bytes = std::filesystem::file_size(path, ec);
+  const auto bytes = fs::file_size(path, ec);
   return ec ? 0 : bytes;
 }
 
 }  // namespace
+
+std::vector<std::string> named_files(const std::string& model) {
+  try {
+    return NamedFiles(model).find();
+  } catch (const Error&) {
+    return {};
+  } catch (const nlohmann::json::exception&) {  // a list of another type
+    return {};
+  }
+}
 
 ModelList list_collection(const PlanRequest& request, int shards) {
   const BatchPlan plan = plan_collection(request);
@@ -37,14 +174,15 @@ ModelList list_collection(const PlanRequest& request, int shards) {
 }
 
 std::string write_model_list(const ModelList& list) {
-  using ListJson = nlohmann::ordered_json;
-  ListJson head{{"version", 1}, {"shards", list.shards}};
-  if (!list.collection.empty()) head["collection"] = list.collection;
-  head["collections"] = list.collections;
-  return json_with_lines(head, "models", list.models, [](const ListedModel& m) {
-    return ListJson{{"model", m.input}, {"output", m.output}, {"package", m.package},
-                    {"files", m.files}, {"bytes", m.bytes},   {"shard", m.shard}};
-  });
+  return to_json_with_lines(list, "models", list.models);
+}
+
+DocumentSchema list_schema() {
+  return document_schema(
+      "list.v1", "texmesh list, version 1",
+      "What `texmesh list --json` prints: the models of a collection with their packages and the files "
+      "that they name.",
+      schema_of<ModelList>());
 }
 
 }  // namespace texmesh

@@ -1,143 +1,18 @@
+// What a run has done, model by model: written, read again, and merged from the runs of all shards.
 #include "pipeline/batch/fleet/run_summary.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "format/base/bounded_json.h"
 #include "format/base/errors.h"
-#include "pipeline/batch/fleet/json_lines.h"
+#include "pipeline/batch/junit.h"
 #include "pipeline/io/exit_codes.h"
-#include "pipeline/io/markup.h"
+#include "pipeline/io/file_resolver.h"
 
 namespace texmesh {
-namespace {
-
-using SummaryJson = nlohmann::ordered_json;
-
-SummaryJson shard_json(const Shard& s) { return {{"index", s.index}, {"count", s.count}}; }
-
-SummaryJson model_json(const ModelSummary& m) {
-  SummaryJson j{{"model", m.model},
-                {"output", m.output},
-                {"package", m.package},
-                {"result", enum_name(m.result)},
-                {"ran", m.ran},
-                {"bytes", m.bytes},
-                {"seconds", m.seconds},
-                {"peak_memory_bytes", m.peak_memory_bytes},
-                {"stages_ran", m.stages_ran},
-                {"stages_from_cache", m.stages_hit}};
-  if (m.made_s > 0) j["made"] = {{"seconds", m.made_s}, {"peak_memory_bytes", m.made_memory_bytes}};
-  if (!m.error.kind.empty())
-    j["error"] = {{"kind", m.error.kind},         {"file", m.error.file},   {"place", m.error.place},
-                  {"expected", m.error.expected}, {"found", m.error.found}, {"message", m.error.message}};
-  return j;
-}
-
-class SummaryReader {
- public:
-  explicit SummaryReader(const std::string& file) : file_(file) {}
-
-  RunSummary read(const SummaryJson& j) {
-    if (!j.is_object() || j.value("version", SummaryJson()) != 1 || !j.contains("models") ||
-        !j["models"].is_array() || !j.contains("compiled"))
-      fail("", "a summary of texmesh compile, version 1", "another document");
-    RunSummary s;
-    s.seconds = number(j, "", "seconds");
-    if (j.contains("shard")) s.shard = shard(j["shard"], "/shard");
-    s.models_in_collection = static_cast<std::size_t>(whole(j, "", "models_in_collection", 0));
-    s.collection = j.contains("collection") ? text(j, "", "collection") : "";
-    s.models.reserve(j["models"].size());
-    for (const SummaryJson& m : j["models"])
-      s.models.push_back(model(m, "/models/" + std::to_string(s.models.size())));
-    if (j.contains("parts")) read_parts(j["parts"], s);
-    return s;
-  }
-
- private:
-  [[noreturn]] void fail(const std::string& place, const std::string& expected,
-                         const std::string& found) const {
-    throw InputError(file_, place, expected, found.substr(0, 120));
-  }
-  const SummaryJson& member(const SummaryJson& j, const std::string& place, const char* key) const {
-    if (!j.is_object() || !j.contains(key)) fail(place + "/" + key, "a value", "nothing");
-    return j[key];
-  }
-  std::string text(const SummaryJson& j, const std::string& place, const char* key) const {
-    const SummaryJson& v = member(j, place, key);
-    if (!v.is_string()) fail(place + "/" + key, "a text", v.type_name());
-    return v.get<std::string>();
-  }
-  double number(const SummaryJson& j, const std::string& place, const char* key) const {
-    const SummaryJson& v = member(j, place, key);
-    if (!v.is_number() || !(v.get<double>() >= 0 && v.get<double>() <= 1e12))
-      fail(place + "/" + key, "a number from 0", v.dump());
-    return v.get<double>();
-  }
-  std::uint64_t whole(const SummaryJson& j, const std::string& place, const char* key,
-                      std::optional<std::uint64_t> otherwise = {}) const {
-    if (otherwise && !j.contains(key)) return *otherwise;
-    const SummaryJson& v = member(j, place, key);
-    if (!v.is_number_unsigned()) fail(place + "/" + key, "a whole number from 0", v.dump());
-    return v.get<std::uint64_t>();
-  }
-
-  Shard shard(const SummaryJson& j, const std::string& place) const {
-    const std::uint64_t index = whole(j, place, "index"), count = whole(j, place, "count");
-    if (count < 1 || count > 1'000'000 || index >= count) fail(place, "index below count", j.dump());
-    return {static_cast<int>(index), static_cast<int>(count)};
-  }
-
-  ModelSummary model(const SummaryJson& j, const std::string& place) const {
-    ModelSummary m;
-    m.model = text(j, place, "model");
-    m.output = text(j, place, "output");
-    m.package = text(j, place, "package");
-    const auto& names = EnumNames<ModelResult>::names;
-    const std::string result = text(j, place, "result");
-    const auto name = std::find(names.begin(), names.end(), result);
-    if (name == names.end()) fail(place + "/result", "a result", result);
-    m.result = static_cast<ModelResult>(name - names.begin());
-    m.ran = member(j, place, "ran") == true;
-    m.bytes = whole(j, place, "bytes");
-    m.seconds = number(j, place, "seconds");
-    m.peak_memory_bytes = whole(j, place, "peak_memory_bytes");
-    m.stages_ran = static_cast<int>(std::min<std::uint64_t>(whole(j, place, "stages_ran"), 1'000'000));
-    m.stages_hit = static_cast<int>(std::min<std::uint64_t>(whole(j, place, "stages_from_cache"), 1'000'000));
-    if (j.contains("made")) {
-      m.made_s = number(j["made"], place + "/made", "seconds");
-      m.made_memory_bytes = whole(j["made"], place + "/made", "peak_memory_bytes");
-    }
-    if (j.contains("error")) {
-      const SummaryJson& e = j["error"];
-      const std::string at = place + "/error";
-      m.error.kind = text(e, at, "kind"), m.error.file = text(e, at, "file");
-      m.error.place = text(e, at, "place"), m.error.expected = text(e, at, "expected");
-      m.error.found = text(e, at, "found"), m.error.message = text(e, at, "message");
-    }
-    return m;
-  }
-
-  /// What was merged before is merged again like any other summary; its parts stay known.
-  void read_parts(const SummaryJson& list, RunSummary& s) const {
-    if (!list.is_array()) fail("/parts", "a list", list.type_name());
-    for (const SummaryJson& j : list) {
-      const std::string place = "/parts/" + std::to_string(s.parts.size());
-      SummaryPart part{text(j, place, "file"),
-                       {},
-                       static_cast<std::size_t>(whole(j, place, "models")),
-                       number(j, place, "seconds")};
-      if (j.contains("shard")) part.shard = shard(j["shard"], place + "/shard");
-      s.parts.push_back(std::move(part));
-    }
-  }
-
-  const std::string& file_;
-};
-
-}  // namespace
 
 SummaryCounts count_results(const std::vector<ModelSummary>& models) {
   SummaryCounts c;
@@ -153,67 +28,66 @@ RunSummary summarize_run(const BatchPlan& plan, const std::vector<WorkerReport>&
   RunSummary s;
   s.seconds = seconds;
   if (plan.shard.count > 1) s.shard = plan.shard;
-  s.models_in_collection = plan.models_in_collection;
   s.collection = plan.collection;
+  if (!s.collection.empty()) s.models_in_collection = plan.models_in_collection;
   s.models.reserve(plan.models.size());
   for (std::size_t i = 0; i < plan.models.size(); ++i) {
     const PlannedModel& m = plan.models[i];
     const WorkerReport& r = reports[i];
-    s.models.push_back({std::string(m.name()), m.output, package_within(plan, m), r.result, r.ran,
-                        r.package_bytes, r.peak_memory_bytes, r.seconds, r.stages_ran, r.stages_hit, r.made_s,
-                        r.made_memory_bytes, r.more->error});
+    std::optional<EarlierCost> made;
+    if (r.made_s > 0) made = EarlierCost{r.made_s, r.made_memory_bytes};
+    s.models.push_back({r, std::string(m.name()), m.output, package_within(plan, m), made, r.more->error});
   }
+  s.counts = count_results(s.models);
   return s;
 }
 
-std::string write_summary(const RunSummary& s) {
-  const SummaryCounts c = count_results(s.models);
-  SummaryJson head{{"version", 1},       {"compiled", c.compiled},   {"unchanged", c.unchanged},
-                   {"failed", c.failed}, {"cancelled", c.cancelled}, {"seconds", s.seconds}};
-  if (s.shard) head["shard"] = shard_json(*s.shard);
-  if (!s.collection.empty()) {
-    head["models_in_collection"] = s.models_in_collection;
-    head["collection"] = s.collection;
-  }
-  for (const SummaryPart& p : s.parts) {
-    SummaryJson part{{"file", p.file}, {"models", p.models}, {"seconds", p.seconds}};
-    if (p.shard) part["shard"] = shard_json(*p.shard);
-    head["parts"].push_back(std::move(part));
-  }
-  for (const SummaryProblem& p : s.problems)
-    head["problems"].push_back({{"file", p.file}, {"kind", p.kind}, {"text", p.text}});
-  return json_with_lines(head, "models", s.models, model_json);
+std::string write_summary(const RunSummary& s) { return to_json_with_lines(s, "models", s.models); }
+
+namespace {
+
+void check_shard(const std::optional<Shard>& shard, const std::string& file) {
+  if (shard && shard->index >= shard->count)
+    throw InputError(file, "/shard", "index below count", std::to_string(shard->index));
+}
+
+}  // namespace
+
+RunSummary read_summary(std::span<const std::uint8_t> bytes, const std::string& file) {
+  RunSummary s = from_json<RunSummary>(parse_bounded_json(bytes, file, 8), file);
+  for (const SummaryPart& p : s.parts) check_shard(p.shard, file);
+  check_shard(s.shard, file);
+  return s;
+}
+
+DocumentSchema summary_schema() {
+  return document_schema(
+      "summary.v1", "texmesh compile summary, version 1",
+      "What `texmesh compile --summary` and `texmesh summary merge` write: every model of a run, or of "
+      "several, with its result.",
+      schema_of<RunSummary>());
 }
 
 std::string write_junit(const RunSummary& s) {
   const SummaryCounts c = count_results(s.models);
-  std::string out = fmt::format(
-      "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n"
-      "<testsuite name=\"texmesh compile\" tests=\"{}\" failures=\"{}\" errors=\"0\" skipped=\"{}\" "
-      "time=\"{:.3f}\">\n",
-      s.models.size(), c.failed, c.cancelled, s.seconds);
+  JunitReport report({"texmesh compile", s.models.size(), c.failed, c.cancelled, s.seconds});
   for (const ModelSummary& m : s.models) {
-    out += fmt::format("<testcase classname=\"texmesh\" name=\"{}\" time=\"{:.3f}\"", markup_escaped(m.model),
-                       m.seconds);
-    out += fmt::format(
-        ">\n<properties><property name=\"result\" value=\"{}\"/><property name=\"output\" value=\"{}\"/>"
-        "<property name=\"bytes\" value=\"{}\"/><property name=\"peak_memory_bytes\" value=\"{}\"/>"
-        "<property name=\"stages_ran\" value=\"{}\"/><property name=\"stages_from_cache\" value=\"{}\"/>"
-        "</properties>\n",
-        enum_name(m.result), markup_escaped(m.output), m.bytes, m.peak_memory_bytes, m.stages_ran,
-        m.stages_hit);
-    if (m.result == ModelResult::kCancelled)
-      out += "<skipped message=\"not reached\"/>\n";
-    else if (!m.ok())
-      out += fmt::format("<failure type=\"{}\" message=\"{}\"/>\n", markup_escaped(m.error.kind),
-                         markup_escaped(m.error.message));
-    out += "</testcase>\n";
+    JunitCase one{"texmesh",
+                  m.model,
+                  m.seconds,
+                  {{"result", std::string(enum_name(m.result))},
+                   {"output", m.output},
+                   {"bytes", std::to_string(m.bytes)},
+                   {"peak_memory_bytes", std::to_string(m.peak_memory_bytes)},
+                   {"stages_ran", std::to_string(m.stages_ran)},
+                   {"stages_from_cache", std::to_string(m.stages_hit)}},
+                  {},
+                  {},
+                  m.result == ModelResult::kCancelled ? "not reached" : ""};
+    if (!m.ok()) one.failure = m.error.message, one.failure_type = m.error.kind;
+    report.add(one);
   }
-  return out + "</testsuite>\n</testsuites>\n";
-}
-
-RunSummary read_summary(std::span<const std::uint8_t> bytes, const std::string& file) {
-  return SummaryReader(file).read(parse_bounded_json(bytes, file, 8));
+  return report.finish();
 }
 
 std::map<std::string, double> recorded_costs_s(const RunSummary& summary) {
@@ -242,6 +116,162 @@ int graver_exit_code(int a, int b) {
   for (const int code : {kExitInternal, kExitTryAgain, kExitModelFailed})
     if (a == code || b == code) return code;
   return kExitOk;
+}
+
+namespace {
+
+constexpr std::uint64_t kMostSummaryBytes = 1ull << 32;
+
+/// The collection and number of shards that most files are of; of equally many the first file's.
+struct Split {
+  std::string collection;
+  int shards = 1;
+};
+
+Split usual_split(const std::vector<SummaryFile>& files) {
+  std::map<std::string, std::size_t> votes;
+  for (const SummaryFile& f : files)
+    if (f.summary && f.summary->shard) ++votes[f.summary->collection];
+  Split split;
+  std::size_t most = 0;
+  for (const SummaryFile& f : files)
+    if (f.summary && f.summary->shard && votes[f.summary->collection] > most) {
+      most = votes[f.summary->collection];
+      split = {f.summary->collection, f.summary->shard->count};
+    }
+  return split;
+}
+
+std::string shard_text(const Shard& s) {
+  return "shard " + std::to_string(s.index) + " of " + std::to_string(s.count);
+}
+
+/// "0, 3-5"
+std::string ranges_text(const std::vector<int>& numbers) {
+  std::string text;
+  for (std::size_t i = 0; i < numbers.size();) {
+    std::size_t end = i;
+    while (end + 1 < numbers.size() && numbers[end + 1] == numbers[end] + 1) ++end;
+    text += (text.empty() ? "" : ", ") + std::to_string(numbers[i]);
+    if (end > i) text += "-" + std::to_string(numbers[end]);
+    i = end + 1;
+  }
+  return text;
+}
+
+/// Less is better.
+int rank_of(const ModelSummary& m) {
+  switch (m.result) {
+    case ModelResult::kOk:
+      return 0;
+    case ModelResult::kUnchanged:
+      return 1;
+    case ModelResult::kFailed:
+      return 2;
+    case ModelResult::kInternal:
+      return 3;
+    case ModelResult::kCancelled:
+      break;
+  }
+  return 4;
+}
+
+class Merger {
+ public:
+  explicit Merger(std::vector<SummaryFile> files) : files_(std::move(files)), split_(usual_split(files_)) {}
+
+  RunSummary merge() {
+    for (SummaryFile& f : files_) {
+      if (!f.summary)
+        merged_.problems.push_back({f.file, f.kind, f.text});
+      else if (is_foreign(*f.summary))
+        merged_.problems.push_back({f.file, "foreign",
+                                    shard_text(*f.summary->shard) +
+                                        " of another collection, or of this one before its files changed"});
+      else
+        add(f.file, *f.summary);
+      f.summary.reset();  // a million models stand in memory once
+    }
+    name_missing();
+    for (auto& [package, found] : models_) merged_.models.push_back(std::move(found.model));
+    merged_.counts = count_results(merged_.models);
+    return std::move(merged_);
+  }
+
+ private:
+  struct Found {
+    ModelSummary model;
+    std::string file;
+  };
+
+  bool is_foreign(const RunSummary& s) const {
+    return s.shard && (s.collection != split_.collection || s.shard->count != split_.shards);
+  }
+
+  void add(const std::string& file, RunSummary& s) {
+    const std::size_t models = s.models.size();
+    std::map<std::string, std::size_t> doubles;  // by the file that had them first
+    for (ModelSummary& m : s.models) {
+      const auto [at, is_new] = models_.try_emplace(m.package);
+      if (is_new)
+        at->second.file = file;
+      else
+        ++doubles[at->second.file];
+      if (is_new || rank_of(m) < rank_of(at->second.model)) at->second.model = std::move(m);
+    }
+    for (const auto& [other, count] : doubles)
+      merged_.problems.push_back(
+          {file, "double", std::to_string(count) + " of its packages are those of " + other});
+    merged_.seconds += s.seconds;
+    if (s.shard) seen_.insert(s.shard->index);
+    if (s.parts.empty())
+      merged_.parts.push_back({file, s.shard, models, s.seconds});
+    else
+      merged_.parts.insert(merged_.parts.end(), s.parts.begin(), s.parts.end());
+  }
+
+  void name_missing() {
+    if (seen_.empty()) return;
+    std::vector<int> missing;
+    for (int i = 0; i < split_.shards; ++i)
+      if (!seen_.contains(i)) missing.push_back(i);
+    if (!missing.empty())
+      merged_.problems.push_back(
+          {"", "missing",
+           "no summary of shards " + ranges_text(missing) + " of " + std::to_string(split_.shards)});
+  }
+
+  std::vector<SummaryFile> files_;
+  Split split_;
+  RunSummary merged_;
+  std::map<std::string, Found> models_;  // by package
+  std::set<int> seen_;
+};
+
+}  // namespace
+
+SummaryFile open_summary(const std::string& file) {
+  try {
+    return {file, read_summary(read_input_file(file, kMostSummaryBytes), file), "", ""};
+  } catch (const FormatError& e) {
+    return {file, {}, "half-written", e.what()};
+  } catch (const InputError& e) {
+    // A file that is not there is as good as one that was never finished.
+    const bool there = !e.expected().starts_with("a readable") && !e.expected().starts_with("a regular");
+    return {file, {}, there ? "foreign" : "half-written", e.what()};
+  }
+}
+
+RunSummary merge_summaries(std::vector<SummaryFile> files) { return Merger(std::move(files)).merge(); }
+
+int exit_code_of(const RunSummary& merged) {
+  int code = kExitOk;
+  for (const ModelSummary& m : merged.models)
+    code = graver_exit_code(code, exit_code_of(m.result, m.error.kind));
+  for (const SummaryProblem& p : merged.problems)
+    if (p.kind != "double")
+      code = graver_exit_code(code, p.kind == "foreign" ? kExitModelFailed : kExitTryAgain);
+  return code;
 }
 
 }  // namespace texmesh

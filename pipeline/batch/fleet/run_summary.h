@@ -12,27 +12,45 @@
 
 namespace texmesh {
 
-/// What a summary says of one model.
-struct ModelSummary {
-  std::string model, output, package;  // package: the output's path within the output folder
-  ModelResult result = ModelResult::kCancelled;
-  bool ran = false;
-  std::uint64_t bytes = 0, peak_memory_bytes = 0;
+/// What the model took when its package was made.
+struct EarlierCost {
   double seconds = 0;
-  int stages_ran = 0, stages_hit = 0;
-  double made_s =
-      0;  // what the model took when its package was made, where this run did not make it; 0 = not known
-  std::uint64_t made_memory_bytes = 0;
-  ModelError error;
+  std::uint64_t peak_memory_bytes = 0;
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("seconds", s.seconds, kSeconds, "");
+    v("peak_memory_bytes", s.peak_memory_bytes, "");
+  }
+};
 
-  bool ok() const { return result == ModelResult::kOk || result == ModelResult::kUnchanged; }
+/// What a summary says of one model.
+struct ModelSummary : ModelNumbers {
+  std::string model, output, package;  // package: the output's path within the output folder
+  std::optional<EarlierCost> made;     // where this run did not make it, and it is known
+  ModelError error;                    // of empty texts when nothing went wrong
+
   /// Seconds of the run that made the package, 0 where nobody knows.
-  double cost_s() const { return made_s > 0 ? made_s : result == ModelResult::kOk ? seconds : 0; }
+  double cost_s() const { return made ? made->seconds : result == ModelResult::kOk ? seconds : 0; }
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("model", s.model, "as the run names the model");
+    v("output", s.output, "");
+    v("package", s.package, "path of the output within the output folder");
+    ModelNumbers::fields(s, v);
+    v("made", s.made, "what the model took when its package was made, where this run did not make it");
+    v("error", s.error, kMayMiss, "");
+  }
 };
 
 /// A summary that merging could not use, or not as it stands.
 struct SummaryProblem {
-  std::string file, kind, text;  // kind: half-written, foreign, double, missing
+  std::string file, kind, text;
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("file", s.file, "empty where shards are missing");
+    v("kind", s.kind, FieldRule{.words = "half-written|foreign|double|missing"}, "");
+    v("text", s.text, "");
+  }
 };
 
 /// A part of a merged summary.
@@ -41,38 +59,90 @@ struct SummaryPart {
   std::optional<Shard> shard;
   std::size_t models = 0;
   double seconds = 0;
-};
-
-/// A run, or several runs merged, in numbers (schemas/summary.v1.schema.json).
-struct RunSummary {
-  std::vector<ModelSummary> models;
-  double seconds = 0;  // of a merged summary: of all runs together
-  std::optional<Shard> shard;
-  std::size_t models_in_collection = 0;  // of all shards
-  std::string collection;                // collection_digest(); "" where the run was no shard
-  std::vector<SummaryPart> parts;        // of a merged summary
-  std::vector<SummaryProblem> problems;
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("file", s.file, "");
+    v("models", s.models, "");
+    v("seconds", s.seconds, Range{0, 1e12}, "");
+    v("shard", s.shard, "the part of the collection that the run compiled");
+  }
 };
 
 struct SummaryCounts {
   std::size_t compiled = 0, unchanged = 0, failed = 0, cancelled = 0;
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("compiled", s.compiled, "");
+    v("unchanged", s.unchanged, "");
+    v("failed", s.failed, "");
+    v("cancelled", s.cancelled, "");
+  }
 };
+
+/// A run, or several runs merged, in numbers (schemas/summary.v1.schema.json).
+struct RunSummary {
+  SummaryCounts counts;  // of the models' results
+  std::vector<ModelSummary> models;
+  double seconds = 0;  // of a merged summary: of all runs together
+  std::optional<Shard> shard;
+  std::size_t models_in_collection = 0;  // of all shards; 0 where the run was no shard
+  std::string collection;                // collection_digest(); "" where the run was no shard
+  std::vector<SummaryPart> parts;        // of a merged summary
+  std::vector<SummaryProblem> problems;
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("version", Constant{1}, "");
+    SummaryCounts::fields(s.counts, v);
+    v("seconds", s.seconds, Range{0, 1e12}, "of a merged summary: of all its runs together");
+    v("shard", s.shard, "the part of the collection that the run compiled");
+    v("models_in_collection", s.models_in_collection, kMayMiss,
+      "of all shards; one of several counts the .json files of folders that it did not open, too");
+    v("collection", s.collection, FieldRule{.pattern = "^[0-9a-f]{64}$", .may_miss = true},
+      "SHA-256 over the names and costs of all models: runs with equal digests split the same collection alike");
+    v("parts", s.parts, kMayMiss, "the summaries that were merged");
+    v("problems", s.problems, kMayMiss, "what could not be merged, or not as it stands");
+    v("models", s.models, "");
+  }
+};
+
 SummaryCounts count_results(const std::vector<ModelSummary>& models);
 
 RunSummary summarize_run(const BatchPlan& plan, const std::vector<WorkerReport>& reports, double seconds);
 
 std::string write_summary(const RunSummary& summary);
 
-/// The same for CI systems that read JUnit's XML: a test case per model; a model that could not be compiled
-/// is a failure, one that was not reached is skipped.
+/// The same for CI systems: a test case per model; a model that could not be compiled is a failure, one that
+/// was not reached is skipped.
 std::string write_junit(const RunSummary& summary);
 
 /// Reads what write_summary() wrote. FormatError for a text that ends too early or is no JSON, InputError
 /// for JSON that is no summary.
 RunSummary read_summary(std::span<const std::uint8_t> bytes, const std::string& file);
 
+/// summary.v1.
+DocumentSchema summary_schema();
+
 /// What models took, by their packages, for balancing shards.
 std::map<std::string, double> recorded_costs_s(const RunSummary& summary);
+
+/// A summary's file as it was found.
+struct SummaryFile {
+  std::string file;
+  std::optional<RunSummary> summary;  // nothing: `kind` and `text` say why
+  std::string kind, text;             // half-written or foreign
+};
+
+/// Reads a summary; what cannot be used says so, nothing throws.
+SummaryFile open_summary(const std::string& file);
+
+/// One summary of many: every package once, by package. A package in several summaries keeps its best result
+/// (compiled, up to date, failed, not reached). `problems` names
+///   half-written  a file that is not there, ends too early or is no JSON: its shard is to be run again
+///   foreign       another document, or a shard of another collection than most of the files': not merged
+///   double        a file that reports packages which an earlier file reports, too
+///   missing       shards that no file reports
+/// Equal files in equal order give equal bytes.
+RunSummary merge_summaries(std::vector<SummaryFile> files);
 
 /// The exit code that a model's result stands for: kExitTryAgain where another moment, another machine or
 /// wider limits may do (cancelled, time, memory, disk).
@@ -80,5 +150,8 @@ int exit_code_of(ModelResult result, const std::string& error_kind);
 /// Of two exit codes the one that tells: internal error before "try again" before "failed". Who tries again
 /// meets the failed models again, so nothing is lost.
 int graver_exit_code(int a, int b);
+/// Of a merged summary: that of its models, and kExitTryAgain where something is half-written or missing,
+/// kExitModelFailed where something is foreign.
+int exit_code_of(const RunSummary& merged);
 
 }  // namespace texmesh

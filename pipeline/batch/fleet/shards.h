@@ -5,12 +5,19 @@
 #include <string_view>
 #include <vector>
 
+#include "format/base/fields.h"
+
 namespace texmesh {
 
 /// One of the parts that a collection is split into, counted from 0.
 struct Shard {
   int index = 0, count = 1;
   friend bool operator==(const Shard&, const Shard&) = default;
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("index", s.index, Range{0, 999'999}, "");
+    v("count", s.count, Range{1, 1'000'000}, "");
+  }
 };
 
 /// The value of an environment variable; null where it is not set (std::getenv).

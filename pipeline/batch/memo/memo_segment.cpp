@@ -10,15 +10,66 @@
 #include <cstring>
 #include <filesystem>
 #include <numeric>
+#include <string_view>
 
 #include "format/base/archive.h"
 #include "format/base/errors.h"
 #include "format/base/text_bytes.h"
-#include "pipeline/io/file_stamp.h"
+#include "pipeline/cache/cache_files.h"
 #include "pipeline/io/machine/owner_mark.h"
 
 namespace texmesh {
 namespace {
+
+/// Not through symbolic links: import does not follow them either.
+std::optional<FileStamp> look(const std::string& path, bool follow) {
+  struct stat s {};
+  if ((follow ? ::stat(path.c_str(), &s) : ::lstat(path.c_str(), &s)) != 0 || !S_ISREG(s.st_mode))
+    return std::nullopt;
+  return stamp_of(s);
+}
+
+/// The file at `path` still has these bytes.
+bool same_file(const std::string& path, bool follow, std::int64_t looked_at_ns, const Sha256& digest,
+               std::uint64_t bytes, FileStamp& known, bool& refreshed) {
+  const auto now = look(path, follow);
+  if (!now || now->bytes != bytes) return false;
+  if (*now == known && now->is_settled(looked_at_ns)) return true;
+  const auto content = read_whole(path, bytes);
+  if (!content || content->size() != bytes || sha256(*content) != digest) return false;
+  known = *now;
+  refreshed = true;
+  return true;
+}
+
+struct PackedKey {
+  std::uint32_t stage = 0;  // in the segment's names
+  Sha256 key{};
+  template <class S, class A>
+  static void archive(S& s, A& a) {
+    a(s.stage, s.key);
+  }
+};
+struct PackedKeys {
+  std::vector<PackedKey> keys;
+  template <class S, class A>
+  static void archive(S& s, A& a) {
+    a(s.keys);
+  }
+};
+
+Bytes pack_keys(const StageKeys& keys, StageNames& stages) {
+  std::vector<PackedKey> packed;
+  for (const auto& [stage, key] : keys) packed.push_back({stages.number_of(stage), key});
+  return encode_artefact(PackedKeys{std::move(packed)});
+}
+
+StageKeys unpack_keys(std::span<const std::uint8_t> bytes, const StageNames& stages) {
+  StageKeys keys;
+  for (const PackedKey& k : decode_artefact<PackedKeys>(bytes, "memo").keys)
+    keys[stages.name_of(k.stage)] = k.key;
+  return keys;
+}
 
 constexpr std::array<std::uint8_t, 8> kMagic{'T', 'X', 'M', 'E', 'M', 'O', 0, 3};
 constexpr std::size_t kMostBlockBytes = 8u << 20, kFullBlockBytes = 1u << 20;
@@ -73,16 +124,6 @@ bool read_at(int fd, std::uint64_t at, std::span<std::uint8_t> to) {
   return true;
 }
 
-bool write_to_end(int fd, std::span<const std::uint8_t> bytes) {
-  while (!bytes.empty()) {
-    const ssize_t n = ::write(fd, bytes.data(), bytes.size());
-    if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) return false;
-    bytes = bytes.subspan(static_cast<std::size_t>(n));
-  }
-  return true;
-}
-
 void append_bytes(std::vector<std::uint8_t>& to, const void* from, std::size_t size) {
   const auto* p = static_cast<const std::uint8_t*>(from);
   to.insert(to.end(), p, p + size);
@@ -96,6 +137,39 @@ BlockHead head_of(std::span<const std::uint8_t, kBlockHeadBytes> bytes) {
 }
 
 }  // namespace
+
+bool still_holds(MemoRecord& record, const std::string& input, const std::string& output, bool& refreshed) {
+  refreshed = false;
+  const std::int64_t now_ns = wall_clock_ns();
+  const std::string_view folder = std::string_view(input).substr(0, input.rfind('/') + 1);
+  for (FileRequest& f : record.files) {
+    const bool is_model = f.uri.empty();
+    const std::string path = is_model ? input : std::string(folder) + f.uri;
+    if (!f.found) {
+      if (look(path, false)) return false;
+      continue;
+    }
+    if (!same_file(path, is_model, record.looked_at_ns, f.digest, f.bytes, f.stamp, refreshed)) return false;
+  }
+  if (!record.failed && !same_file(output, true, record.looked_at_ns, record.package_digest,
+                                   record.package_bytes, record.package_stamp, refreshed))
+    return false;
+  // What was settled before is so now; what was read just now was true at this moment.
+  if (refreshed) record.looked_at_ns = now_ns;
+  return !record.files.empty();
+}
+
+std::uint32_t StageNames::number_of(const std::string& stage) {
+  const auto at = std::find(names_.begin(), names_.end(), stage);
+  if (at == names_.end()) return names_.push_back(stage), static_cast<std::uint32_t>(names_.size() - 1);
+  return static_cast<std::uint32_t>(at - names_.begin());
+}
+
+const std::string& StageNames::name_of(std::uint32_t number) const {
+  if (number >= names_.size())
+    throw FormatError("memo", "stages", "at most " + std::to_string(names_.size()), std::to_string(number));
+  return names_[number];
+}
 
 MemoName memo_name(const std::string& package) {
   const Sha256 digest = sha256(text_bytes(package));
@@ -190,7 +264,7 @@ std::optional<MemoRecord> MemoSegment::record(const MemoEntry& entry) const {
   const std::span<const std::uint8_t> bytes = checked(look(record_window_, entry.offset, entry.bytes));
   constexpr std::size_t kRestOfHead = kRecordHeadBytes - kCheckBytes;
   try {
-    if (bytes.size() >= kRestOfHead) return unpack_record(bytes.subspan(kRestOfHead));
+    if (bytes.size() >= kRestOfHead) return decode_artefact<MemoRecord>(bytes.subspan(kRestOfHead), "memo");
   } catch (const FormatError&) {
   }
   damaged_ = true;
@@ -212,7 +286,7 @@ StageKeys MemoSegment::keys(const MemoEntry& entry) const {
 }
 
 void MemoSegmentWriter::add(const MemoName& name, const MemoRecord& record) {
-  const std::vector<std::uint8_t> bytes = pack_record(record), keys = pack_keys(record.keys, stages_);
+  const std::vector<std::uint8_t> bytes = encode_artefact(record), keys = pack_keys(record.keys, stages_);
   const std::size_t size = kRecordHeadBytes + bytes.size() + kCheckBytes + keys.size();
   if (size > kMostBlockBytes / 2) return;  // a model of ten thousand files is looked at again
   if (records_.size() + keys_.size() + size > kFullBlockBytes) flush();
@@ -266,7 +340,7 @@ bool MemoSegmentWriter::append(std::span<const std::uint8_t> payload, std::span<
   std::memcpy(bytes.data() + 8, head.digest.data(), 32);
   bytes.insert(bytes.end(), payload.begin(), payload.end());
   bytes.insert(bytes.end(), body.begin(), body.end());
-  failed_ = !write_to_end(file_.get(), bytes);
+  failed_ = !write_all(file_.get(), bytes);
   return !failed_;
 }
 
@@ -283,7 +357,7 @@ bool MemoSegmentWriter::open() {
     file_.reset(::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_APPEND | O_CLOEXEC | O_NOFOLLOW, 0666));
     if (file_.get() < 0 && errno != EEXIST) return false;
   }
-  return file_.get() >= 0 && write_to_end(file_.get(), kMagic);
+  return file_.get() >= 0 && write_all(file_.get(), kMagic);
 }
 
 bool MemoSegmentWriter::finish() {

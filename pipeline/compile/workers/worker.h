@@ -1,55 +1,13 @@
 #pragma once
-#include <array>
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
-#include <string_view>
 #include <vector>
 
-#include "format/base/fields.h"
-#include "pipeline/compile/workers/sandbox/sandbox.h"
-#include "pipeline/compile/workers/seldom.h"
-#include "pipeline/graph/key.h"
-#include "pipeline/io/file_request.h"
+#include "pipeline/compile/workers/worker_messages.h"
 
 namespace texmesh {
-
-/// Bounds of the child process that compiles one model. 0 = none.
-struct WorkerLimits {
-  std::uint64_t memory_bytes = 8ull << 30;  // address space
-  std::uint64_t cpu_s = 0;
-  std::uint64_t wall_s = 3600;
-  SandboxMode sandbox = SandboxMode::kAuto;
-};
-
-/// Where results are kept.
-struct CacheSettings {
-  std::string folder;               // "" = keep nothing
-  std::vector<std::string> layers;  // asked behind the folder: folders and URLs
-  bool upload = false;              // put what was computed into the layers that are URLs
-};
-
-/// One model for a child process.
-struct WorkerJob {
-  std::string input, output;
-  std::shared_ptr<const std::string> profile;  // JSON of every option; jobs may share it
-  CacheSettings cache;
-  bool strict = false;
-  bool explain = false;            // say of every stage why it runs or not
-  bool forecast = false;           // only say so: run and write nothing
-  std::vector<FileRequest> known;  // of an earlier run, see CompileRequest
-  StageKeys earlier_keys;
-  std::uint64_t predicted_memory_bytes = 0;  // peak, from earlier runs or a guess
-  double predicted_s = 0;
-};
-
-enum class ModelResult : std::uint8_t { kOk, kUnchanged, kFailed, kInternal, kCancelled };
-template <>
-struct EnumNames<ModelResult> {
-  static constexpr std::array<std::string_view, 5> names{"ok", "unchanged", "failed", "internal-error",
-                                                         "cancelled"};
-};
 
 /// One stage in the course of a model, in seconds since the pool began.
 struct StageSpan {
@@ -59,9 +17,30 @@ struct StageSpan {
   bool running = false;  // the model ended, by a limit or a crash, before the stage did
 };
 
-/// Why a model failed.
-struct ModelError {
-  std::string kind, file, place, expected, found, message;
+/// A value that few owners have: it takes a pointer until somebody is about to change it. Copies are of the
+/// value.
+template <class T>
+class PointerOnDemand {
+ public:
+  PointerOnDemand() = default;
+  PointerOnDemand(const PointerOnDemand& other)
+      : value_(other.value_ ? std::make_unique<T>(*other.value_) : nullptr) {}
+  PointerOnDemand(PointerOnDemand&&) noexcept = default;
+  PointerOnDemand& operator=(PointerOnDemand other) noexcept { return value_.swap(other.value_), *this; }
+
+  const T& operator*() const {
+    static const T none;
+    return value_ ? *value_ : none;
+  }
+  const T* operator->() const { return &**this; }
+  /// Makes the value.
+  T* operator->() {
+    if (!value_) value_ = std::make_unique<T>();
+    return value_.get();
+  }
+
+ private:
+  std::unique_ptr<T> value_;
 };
 
 /// What only a model that ran, or that failed, has.
@@ -74,23 +53,18 @@ struct WorkerDetails {
 };
 
 /// What became of a model. A run that does nothing holds one of each model of the collection.
-struct WorkerReport {
-  ModelResult result = ModelResult::kInternal;
-  bool ran = false;  // false: known from an earlier run (up to date, or a known failure), or never started
-  int lane = 0;      // which of the side-by-side places it ran in, from 0
-  std::uint64_t package_bytes = 0, peak_memory_bytes = 0;
+struct WorkerReport : ModelNumbers {
+  int lane = 0;  // which of the side-by-side places it ran in, from 0
   Sha256 package_digest{};
-  double start_s = 0, seconds = 0;
+  double start_s = 0;
   // What the model took when its package was made, where this run did not make it; 0 = not known.
   double made_s = 0;
   std::uint64_t made_memory_bytes = 0;
-  int stages_ran = 0, stages_hit = 0;
-  Seldom<WorkerDetails> more;
-  bool ok() const { return result == ModelResult::kOk || result == ModelResult::kUnchanged; }
+  PointerOnDemand<WorkerDetails> more;
 };
 
-/// Told of every event line of a job's child (SPEC of the lines: schemas/event.v1.schema.json), in order.
-using EventSink = std::function<void(std::size_t job, const std::string& json_line)>;
+/// Told of every event of a job's child that is not for the pool alone, in order.
+using EventSink = std::function<void(std::size_t job, WorkerEvent event)>;
 using FinishSink = std::function<void(std::size_t job, const WorkerReport& report)>;
 
 struct PoolSettings {
@@ -100,7 +74,7 @@ struct PoolSettings {
   bool stop_on_failure = false;  // no further child starts after a failure
 };
 
-/// Compiles the jobs, each in a fresh child process of texmesh-core (posix_spawn, never a fork of a threaded
+/// Compiles the jobs, each in a fresh child process of texmesh (posix_spawn, never a fork of a threaded
 /// parent). Returns a report per job, in the order of the jobs.
 /// - Jobs that are predicted to take longest start first. At most `processors` run side by side, fewer when
 ///   the predicted peaks do not fit the memory; one always runs. The last jobs get the free processors as
@@ -111,5 +85,16 @@ struct PoolSettings {
 ///   ended are kCancelled.
 std::vector<WorkerReport> run_workers(const std::vector<WorkerJob>& jobs, const PoolSettings& settings,
                                       const EventSink& sink, const FinishSink& finished);
+
+/// Enters what an event says about the model into the report. False when the event is for the pool alone.
+bool apply_event(const WorkerEvent& event, double now_s, WorkerReport& report);
+
+/// This process's variables for a worker, as NAME=value. With `large_pages` glibc asks the system for large
+/// pages (2 MiB on x86-64), unless GLIBC_TUNABLES is set already.
+std::vector<std::string> worker_environment(bool large_pages);
+
+/// The worker's side of compiling in child processes: reads a task from standard input, writes event lines to
+/// standard output, returns the exit code.
+int worker_main();
 
 }  // namespace texmesh

@@ -1,31 +1,116 @@
 // The parent's side of compiling in child processes.
+#include <fcntl.h>
 #include <poll.h>
 #include <signal.h>
+#include <spawn.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <map>
 #include <numeric>
 #include <optional>
 #include <set>
+#include <stdexcept>
 
 #include "format/base/errors.h"
-#include "pipeline/cache/layer_rest.h"
-#include "pipeline/compile/workers/child_process.h"
+#include "pipeline/cache/cache_layer.h"
 #include "pipeline/compile/workers/worker.h"
-#include "pipeline/compile/workers/worker_messages.h"
 #include "pipeline/io/atomic_file.h"
+#include "pipeline/io/descriptor.h"
 #include "pipeline/io/exit_codes.h"
+#include "pipeline/io/program.h"
+
+extern char** environ;
 
 namespace texmesh {
+
+std::vector<std::string> worker_environment(bool large_pages) {
+  std::vector<std::string> variables;
+  for (char** variable = environ; variable && *variable; ++variable) variables.emplace_back(*variable);
+  if (large_pages && !::getenv("GLIBC_TUNABLES"))
+    variables.emplace_back("GLIBC_TUNABLES=glibc.malloc.hugetlb=1");
+  return variables;
+}
+
 namespace {
 
 using Clock = std::chrono::steady_clock;
+
+/// A running child process. Its owner waits for `pid` and closes the descriptors.
+struct ChildProcess {
+  pid_t pid = -1;
+  int out = -1, err = -1;  // its standard output and error; reading them does not block
+  Clock::time_point start;
+};
+
+struct Pipe {
+  int read = -1, write = -1;
+  Pipe() {
+    int fds[2];
+    if (::pipe2(fds, O_CLOEXEC) != 0) throw std::runtime_error(std::string("pipe: ") + std::strerror(errno));
+    read = fds[0];
+    write = fds[1];
+  }
+};
+
+/// Starts `texmesh worker` (posix_spawn, never a fork of a threaded parent) in worker_environment() and
+/// gives it `input` as the whole of its standard input. Throws std::runtime_error.
+ChildProcess start_worker_process(const std::string& input, bool large_pages) {
+  static const std::string executable = worker_executable();
+  std::vector<std::string> variables = worker_environment(large_pages);
+  std::vector<char*> environment;
+  for (std::string& variable : variables) environment.push_back(variable.data());
+  environment.push_back(nullptr);
+  ChildProcess child;
+  Pipe in, out, err;
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_adddup2(&actions, in.read, 0);
+  posix_spawn_file_actions_adddup2(&actions, out.write, 1);
+  posix_spawn_file_actions_adddup2(&actions, err.write, 2);
+  std::string name = "texmesh", command = "worker";
+  char* argv[] = {name.data(), command.data(), nullptr};
+  const int rc = ::posix_spawn(&child.pid, executable.c_str(), &actions, nullptr, argv, environment.data());
+  posix_spawn_file_actions_destroy(&actions);
+  ::close(in.read);
+  ::close(out.write);
+  ::close(err.write);
+  if (rc != 0) throw std::runtime_error(std::string("cannot start a worker: ") + std::strerror(rc));
+  write_all(in.write, input);  // a child that is gone says the rest by its exit status
+  ::close(in.write);
+  child.out = out.read;
+  child.err = err.read;
+  for (int fd : {child.out, child.err}) ::fcntl(fd, F_SETFL, O_NONBLOCK);
+  child.start = Clock::now();
+  return child;
+}
+
+/// Appends what can be read now; false at the end of the file.
+bool read_available(int fd, std::string& into) {
+  char buffer[65536];
+  for (;;) {
+    const ssize_t n = ::read(fd, buffer, sizeof buffer);
+    if (n > 0)
+      into.append(buffer, static_cast<std::size_t>(n));
+    else if (n == 0)
+      return false;
+    else if (errno != EINTR)
+      return errno == EAGAIN;
+  }
+}
+
+/// Closes a descriptor that is open and sets it to -1.
+void close_fd(int& fd) {
+  if (fd >= 0) ::close(fd);
+  fd = -1;
+}
 
 /// From here on a model gets large pages. Simplification of four million triangles takes a tenth less time
 /// with them, a whole compile of half a million up to 5 % less, and small models nothing but 2 to 6 % more
@@ -72,8 +157,8 @@ void read_events(Worker& worker, WorkerReport& report, double now_s, const Event
   for (std::size_t end; (end = worker.line.find('\n')) != std::string::npos;) {
     const std::string line = worker.line.substr(0, end);
     worker.line.erase(0, end + 1);
-    const bool is_public = apply_event(line, now_s, report);
-    if (sink && is_public && line.find("\"event\":\"result\"") == std::string::npos) sink(worker.job, line);
+    std::optional<WorkerEvent> event = read_event(line);
+    if (event && apply_event(*event, now_s, report) && sink) sink(worker.job, std::move(*event));
   }
 }
 
@@ -201,14 +286,20 @@ class WorkerPool {
     worker.job = index;
     worker.lane = free_lane();
     worker.temporary = job.output.empty() || job.forecast ? "" : temporary_name(job.output, index);
-    std::set<std::string> resting;
-    for (const auto& [layer, rest] : layers_left_out_)
-      if (rest.holds()) resting.insert(layer);
-    worker.process = start_worker_process(job_to_json(job, worker.temporary, limits_, threads, resting),
+    worker.process = start_worker_process(to_json_line(task_of(job, worker.temporary, threads)),
                                           job.predicted_memory_bytes >= kLargeModel_bytes);
     reports_[index].lane = worker.lane;
     reports_[index].start_s = now_s();
     return worker;
+  }
+
+  WorkerTask task_of(const WorkerJob& job, const std::string& temporary, int threads) const {
+    WorkerTask task{job, limits_, temporary, threads, ::getpid()};
+    for (std::string& layer : task.job.cache.layers)
+      if (const auto rest = layers_left_out_.find(layer);
+          rest != layers_left_out_.end() && rest->second.holds())
+        layer.clear();
+    return task;
   }
 
   int free_lane() const {
@@ -275,7 +366,7 @@ class WorkerPool {
       if (w.process.err >= 0) read_available(w.process.err, w.last_words);
       const bool told = !report.more->error.kind.empty();
       finish_report(w, status, usage, limits_, jobs_[w.job], g_interrupted != 0, report);
-      if (!told && !report.more->error.kind.empty() && sink_) sink_(w.job, error_event(report));
+      if (!told && !report.more->error.kind.empty() && sink_) sink_(w.job, ErrorTold{"", report.more->error});
       failed = failed || !report.ok();
       close_fd(w.process.out);
       close_fd(w.process.err);
@@ -298,7 +389,47 @@ class WorkerPool {
   std::optional<Clock::time_point> interrupted_at_;
 };
 
+/// Enters a stage's begin or end into the report's spans.
+void apply_stage(const StageStarted& e, double now_s, WorkerReport& report) {
+  report.more->spans.push_back({e.stage, now_s, now_s, false, true});
+}
+void apply_stage(const StageFinished& e, double now_s, WorkerReport& report) {
+  const bool hit = e.result == "hit";
+  ++(hit ? report.stages_hit : report.stages_ran);
+  auto& spans = report.more->spans;
+  const auto open =
+      std::find_if(spans.rbegin(), spans.rend(), [&](const StageSpan& s) { return s.stage == e.stage; });
+  if (hit || open == spans.rend()) {
+    spans.push_back({e.stage, now_s, now_s, hit});
+  } else {
+    open->end_s = now_s;
+    open->running = false;
+  }
+}
+
 }  // namespace
+
+bool apply_event(const WorkerEvent& event, double now_s, WorkerReport& report) {
+  if (const auto* left_out = std::get_if<LayerLeftOut>(&event)) {
+    report.more->layers_left_out.push_back(left_out->layer);
+    return false;
+  }
+  if (const auto* inputs = std::get_if<InputsTold>(&event)) {
+    report.more->files = inputs->files;
+    report.more->keys = inputs->keys;
+    report.package_digest = inputs->package.value_or(Sha256{});
+    return false;
+  }
+  if (const auto* made = std::get_if<PackageMade>(&event)) {
+    report.bytes = made->bytes;
+    report.result = made->unchanged ? ModelResult::kUnchanged : ModelResult::kOk;
+    return false;
+  }
+  if (const auto* started = std::get_if<StageStarted>(&event)) apply_stage(*started, now_s, report);
+  if (const auto* finished = std::get_if<StageFinished>(&event)) apply_stage(*finished, now_s, report);
+  if (const auto* error = std::get_if<ErrorTold>(&event)) report.more->error = error->error;
+  return true;
+}
 
 std::vector<WorkerReport> run_workers(const std::vector<WorkerJob>& jobs, const PoolSettings& settings,
                                       const EventSink& sink, const FinishSink& finished) {

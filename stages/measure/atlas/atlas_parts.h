@@ -1,9 +1,6 @@
 #pragma once
 // Inside this room only: what the sources of measure_atlases() share.
 #include <array>
-#include <cstdint>
-#include <span>
-#include <vector>
 
 #include "format/base/no_index.h"
 #include "stages/geometry/mesh_topology.h"

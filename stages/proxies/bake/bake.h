@@ -1,9 +1,6 @@
 #pragma once
 // Inside the room only: what S_0 shows, as the texels of an atlas.
-#include <cstdint>
-#include <vector>
-
-#include "stages/base/run_context.h"
+#include "format/base/vec.h"
 #include "stages/proxies/atlas_mesh.h"
 #include "stages/proxies/bake/bake_source.h"
 
@@ -54,5 +51,10 @@ struct BakeOrder {
 /// machine.
 BakedMaps bake(const AtlasMesh& mesh, const std::vector<Vec3f>& normals, const BakeSource& source,
                const BakeOrder& order, const RunContext& context);
+
+/// Gives every value whose `covered` is 0 a smooth continuation of the others (Gortler et al. 1996); the
+/// others stay. Without any covered value nothing changes. Lists are width * height long.
+void push_pull(std::vector<Vec3f>& values, const std::vector<std::uint8_t>& covered, std::uint32_t width,
+               std::uint32_t height);
 
 }  // namespace texmesh::proxies

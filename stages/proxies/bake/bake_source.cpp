@@ -1,6 +1,5 @@
 #include "stages/proxies/bake/bake_source.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "format/base/box.h"

@@ -1,15 +1,10 @@
 #pragma once
 // Inside the room only: S_0 as the baker asks for it.
-#include <array>
 #include <compare>
-#include <cstdint>
 #include <memory>
-#include <optional>
-#include <vector>
 
-#include "format/model/model.h"
 #include "stages/geometry/triangle_tree.h"
-#include "stages/render/materials/shown_materials.h"
+#include "stages/render/shown_materials.h"
 
 namespace texmesh::proxies {
 

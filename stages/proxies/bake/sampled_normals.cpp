@@ -2,7 +2,6 @@
 #include <array>
 #include <cmath>
 #include <map>
-#include <span>
 
 #include "stages/base/parallel.h"
 #include "stages/geometry/mesh_topology.h"

@@ -1,7 +1,6 @@
 #include "stages/proxies/coding/proxy_glb.h"
 
 #include <array>
-#include <nlohmann/json.hpp>
 
 #include "stages/gltf/glb_writer.h"
 
@@ -26,38 +25,21 @@ class ProxyWriter {
     writer_.array("meshes").push_back({{"primitives", std::move(primitives)}});
     Json node{{"mesh", 0}};
     if (is_quantised()) {
-      writer_.use_extension("EXT_meshopt_compression", true);
       writer_.use_extension("KHR_mesh_quantization", true);
       writer_.use_extension("KHR_texture_transform", true);
-      node["translation"] = numbers({mesh.origin.x, mesh.origin.y, mesh.origin.z});
-      node["scale"] = numbers({mesh.step, mesh.step, mesh.step});
+      node["translation"] = GlbWriter::shortest(mesh.origin);
+      node["scale"] = GlbWriter::shortest({mesh.step, mesh.step, mesh.step});
     }
     writer_.array("nodes").push_back(std::move(node));
-    writer_.set_fallback_buffer(fallback_bytes_);
     return writer_.finish();
   }
 
  private:
-  static Json numbers(std::initializer_list<float> values) {
-    Json out = Json::array();
-    for (const float x : values) out.push_back(GlbWriter::shortest(x));
-    return out;
-  }
-
   /// Whether positions and coordinates are places of grids, which node and textures scale.
-  bool is_quantised() const { return fallback_bytes_ > 0; }
+  bool is_quantised() const { return writer_.uses_meshopt(); }
 
   std::size_t view(const MeshStream& s, bool is_index) {
-    Json view{{"buffer", 1}, {"byteOffset", fallback_bytes_}, {"byteLength", s.count * s.stride}};
-    if (!is_index) view["byteStride"] = s.stride;
-    view["extensions"]["EXT_meshopt_compression"] = {{"buffer", 0},
-                                                     {"byteOffset", writer_.add_bytes(s.packed)},
-                                                     {"byteLength", s.packed.size()},
-                                                     {"byteStride", s.stride},
-                                                     {"count", s.count},
-                                                     {"mode", is_index ? "TRIANGLES" : "ATTRIBUTES"}};
-    fallback_bytes_ += (s.count * s.stride + 3) / 4 * 4;
-    return writer_.add_json_view(std::move(view));
+    return writer_.add_meshopt_view(s.packed, s.count, s.stride, is_index);
   }
   Json primitive(const CodedGroup& g) {
     constexpr std::size_t kUvOffset = 8, kNormalOffset = 12;
@@ -88,36 +70,20 @@ class ProxyWriter {
     return {{"attributes", std::move(attributes)}, {"indices", writer_.add_accessor(std::move(indices))}};
   }
 
-  std::size_t empty_accessor(int type, std::size_t count, const char* shape) {
-    return writer_.add_accessor({{"componentType", type}, {"count", count}, {"type", shape}});
-  }
   Json draco_primitive(const CodedGroup& g, const CodedMesh& mesh) {
-    writer_.use_extension("KHR_draco_mesh_compression", true);
     const auto place = [&](const std::array<std::uint32_t, 3>& at) {
       const Vec3f p{static_cast<float>(at[0]), static_cast<float>(at[1]), static_cast<float>(at[2])};
-      const Vec3f q = mesh.origin + p * mesh.step;
-      return numbers({q.x, q.y, q.z});
+      return GlbWriter::shortest(mesh.origin + p * mesh.step);
     };
-    const std::size_t n = g.vertices();
-    Json attributes, ids;
-    attributes["POSITION"] = writer_.add_accessor({{"componentType", kFloat},
-                                                   {"count", n},
-                                                   {"type", "VEC3"},
-                                                   {"min", place(g.least)},
-                                                   {"max", place(g.most)}});
-    ids["POSITION"] = g.draco.ids[0];
-    if (g.has_normals) {
-      attributes["NORMAL"] = empty_accessor(kFloat, n, "VEC3");
-      ids["NORMAL"] = g.draco.ids[1];
-    }
-    attributes["TEXCOORD_0"] = empty_accessor(kFloat, n, "VEC2");
-    ids["TEXCOORD_0"] = g.draco.ids[2];
-    Json out{
-        {"attributes", std::move(attributes)},
-        {"indices", empty_accessor(n > 65535 ? kUnsignedInt : kUnsignedShort, 3 * g.triangles(), "SCALAR")}};
-    out["extensions"]["KHR_draco_mesh_compression"] = {{"bufferView", writer_.add_view(g.draco.stream)},
-                                                       {"attributes", std::move(ids)}};
-    return out;
+    const auto floats = [](const char* type) {
+      return Json{{"componentType", kFloat}, {"count", 0}, {"type", type}};
+    };
+    std::vector<GlbWriter::DracoAccessor> attributes{{"POSITION", floats("VEC3")}};
+    attributes[0].accessor["min"] = place(g.least);
+    attributes[0].accessor["max"] = place(g.most);
+    if (g.has_normals) attributes.push_back({"NORMAL", floats("VEC3")});
+    attributes.push_back({"TEXCOORD_0", floats("VEC2")});
+    return writer_.add_draco(g.draco, std::move(attributes));
   }
 
   /// Of one picture the same texture for all materials.
@@ -140,7 +106,7 @@ class ProxyWriter {
     }
     Json out{{"index", *texture_[slot]}};
     if (is_quantised())
-      out["extensions"]["KHR_texture_transform"] = {{"scale", numbers({uv_step_.x, uv_step_.y})}};
+      out["extensions"]["KHR_texture_transform"] = {{"scale", GlbWriter::shortest({uv_step_.x, uv_step_.y})}};
     return out;
   }
 
@@ -161,8 +127,7 @@ class ProxyWriter {
       if (pictures.normal) out["normalTexture"] = texture(*pictures.normal, 2);
       if (pictures.emission) {
         out["emissiveTexture"] = texture(*pictures.emission, 3);
-        const Vec3f e = pictures.emissive;
-        out["emissiveFactor"] = numbers({e.x, e.y, e.z});
+        out["emissiveFactor"] = GlbWriter::shortest(pictures.emissive);
       }
     } else {
       pbr["metallicFactor"] = 0;
@@ -177,7 +142,6 @@ class ProxyWriter {
   }
 
   GlbWriter writer_;
-  std::size_t fallback_bytes_ = 0;
   Vec2f uv_step_;
   std::array<std::optional<std::size_t>, 4> texture_;
 };

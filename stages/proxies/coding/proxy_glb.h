@@ -1,9 +1,5 @@
 #pragma once
 // Inside the room only: a proxy as a file.
-#include <optional>
-#include <vector>
-
-#include "format/base/bytes.h"
 #include "stages/proxies/bake/bake_source.h"
 #include "stages/proxies/coding/proxy_mesh.h"
 

@@ -1,13 +1,10 @@
 #pragma once
 // Inside the room only: a proxy's mesh as streams of EXT_meshopt_compression or KHR_draco_mesh_compression.
-#include <array>
 #include <cstddef>
-#include <cstdint>
-#include <vector>
 
 #include "format/base/bytes.h"
+#include "stages/gltf/draco_mesh.h"
 #include "stages/proxies/atlas_mesh.h"
-#include "stages/proxies/coding/draco_group.h"
 
 namespace texmesh::proxies {
 
@@ -31,9 +28,9 @@ struct CodedGroup {
   /// normals three i8, normalised, and a byte of 0.
   MeshStream vertex_stream;
   MeshStream indices;                            // u16 or u32
-  DracoGroup draco;                              // instead of both, where its stream is not empty
+  DracoStream draco;                             // instead of both, where it is not empty
   std::array<std::uint32_t, 3> least{}, most{};  // of the positions
-  bool is_draco() const { return !draco.stream.empty(); }
+  bool is_draco() const { return !draco.bytes.empty(); }
   std::size_t triangles() const { return is_draco() ? draco.triangles : indices.count / 3; }
   std::size_t vertices() const { return is_draco() ? draco.vertices : vertex_stream.count; }
 };

@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "format/base/portable_math.h"
-#include "stages/proxies/coding/webp_picture.h"
+#include "stages/image/webp.h"
 #include "stages/render/shade.h"
 
 namespace texmesh::proxies {
@@ -45,13 +45,20 @@ Pixels with_alpha(const Pixels& rgb, const std::vector<float>& alpha) {
   return out;
 }
 
+Bytes coded_picture(const Pixels& pixels, int quality) {
+  WebpOptions options;
+  options.quality = static_cast<float>(quality);
+  options.alpha_quality = quality;
+  return encode_webp(pixels, options);
+}
+
 enum MapKind : std::size_t { kBaseColour, kOrm, kNormal, kEmission };
 
 ProxyPictures code_at(const MapPixels& maps, int quality, CodedPictures& coded) {
   const auto code = [&](MapKind kind, const Pixels& pixels, int its_quality) {
     its_quality = std::clamp(its_quality, 0, 100);
     const auto [at, is_new] = coded.images[kind].try_emplace(its_quality);
-    if (is_new) at->second = {encode_webp(pixels, its_quality), pixels.width_px, pixels.height_px};
+    if (is_new) at->second = {coded_picture(pixels, its_quality), pixels.width_px, pixels.height_px};
     return at->second;
   };
   ProxyPictures out;

@@ -2,7 +2,6 @@
 // Inside the room only: baked maps as pictures of a given size.
 #include <array>
 #include <map>
-#include <vector>
 
 #include "stages/proxies/bake/bake.h"
 #include "stages/proxies/coding/proxy_glb.h"

@@ -6,8 +6,8 @@
 
 int main() {
   std::puts(
-      "// Made by make_studio_table.\n#include \"stages/render/studio/studio_table.h\"\n\n"
-      "namespace texmesh::render {\nnamespace {\n\nconstexpr std::uint32_t kStudioWords[] = {");
+      "// Made by make_studio_table.\n#include <cstdint>\n#include <span>\n\nnamespace texmesh::render {\n"
+      "namespace {\n\nconstexpr std::uint32_t kStudioWords[] = {");
   int column = 0;
   const auto put = [&](std::uint32_t word) {
     std::printf("0x%08x,%c", word, ++column % 8 == 0 ? '\n' : ' ');

@@ -1,11 +1,18 @@
 // Read, not computed: 0.15 s is as long as a small model may take.
 #include <bit>
+#include <span>
 #include <stdexcept>
 
 #include "stages/render/environment.h"
-#include "stages/render/studio/studio_table.h"
 
 namespace texmesh {
+namespace render {
+
+/// The studio's environment as make_studio_table wrote it when the library was built: bits of floats, sides
+/// of levels as numbers, in the order of RenderEnvironment's members without key and background.
+std::span<const std::uint32_t> studio_table();
+
+}  // namespace render
 namespace {
 
 /// Takes the table's words one after the other.

@@ -1,4 +1,3 @@
-#include "format/documents/perceptual_table.h"
 
 #include <gtest/gtest.h>
 

@@ -5,8 +5,8 @@
 #include <nlohmann/json.hpp>
 
 #include "format/base/errors.h"
-#include "pipeline/compile/jnd_profile.h"
 #include "pipeline/compile/options.h"
+#include "pipeline/compile/profile.h"
 #include "tests/lab/experiment/simulated_results.h"
 
 namespace texmesh {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "tests/tools/publish/report/html_check.h"
+#include "tests/tools/publish/pages/html_check.h"
 
 namespace texmesh {
 namespace {

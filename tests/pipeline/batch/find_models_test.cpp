@@ -1,4 +1,4 @@
-#include "pipeline/batch/find_models.h"
+#include "pipeline/batch/plan.h"
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>

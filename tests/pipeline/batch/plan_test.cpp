@@ -8,7 +8,6 @@
 #include <set>
 
 #include "format/base/errors.h"
-#include "pipeline/batch/collection.h"
 #include "pipeline/batch/plan.h"
 #include "pipeline/compile/options.h"
 #include "pipeline/compile/profile.h"

@@ -1,5 +1,5 @@
 // What a run tells people and programs: reports against their schemas, progress lines, events.
-#include "pipeline/batch/reports.h"
+#include "pipeline/batch/write_reports.h"
 
 #include <gtest/gtest.h>
 
@@ -76,6 +76,13 @@ TEST(Trace, ALaneWhoseModelsRanNoStageIsNamedToo) {
   EXPECT_TRUE(named);
 }
 
+/// An event line of a child, which does not know what the run calls its model.
+WorkerEvent told_by_child(const std::string& line) {
+  Json event = Json::parse(line);
+  event["model"] = "";
+  return read_event(event.dump()).value();
+}
+
 /// One model that is compiled, one that fails, one that is known to be up to date.
 std::string told(OutputMode mode, bool verbose, bool explain) {
   std::ostringstream out;
@@ -90,20 +97,25 @@ std::string told(OutputMode mode, bool verbose, bool explain) {
   c.result = ModelResult::kUnchanged;
   progress.recalled(2, c, "c.texmesh");
   progress.started(0, "a.texmesh");
-  progress.event(0, R"({"event":"stage-explained","stage":"zim","verdict":"runs","history":true,
-                        "changes":[{"part":"option zim.difference","from":"24","to":"30"}]})");
-  progress.event(0, R"({"event":"stage-started","stage":"zim"})");
-  progress.event(0, R"({"event":"stage-progress","stage":"zim","fraction":0.5})");
-  progress.event(0, R"({"event":"stage-finished","stage":"zim","result":"ran","seconds":0.25})");
-  progress.event(0, R"({"event":"note","severity":"info","code":"fine","place":"","text":"nothing to see"})");
+  progress.event(0, told_by_child(R"({"event":"stage-explained","stage":"zim","verdict":"runs","history":true,
+                        "changes":[{"part":"option zim.difference","from":"24","to":"30"}]})"));
+  progress.event(0, told_by_child(R"({"event":"stage-started","stage":"zim"})"));
+  progress.event(0, told_by_child(R"({"event":"stage-progress","stage":"zim","fraction":0.5})"));
+  progress.event(0,
+                 told_by_child(R"({"event":"stage-finished","stage":"zim","result":"ran","seconds":0.25})"));
   progress.event(
-      0, R"({"event":"note","severity":"warning","code":"odd","place":"mesh","text":"look at this"})");
+      0, told_by_child(
+             R"({"event":"note","severity":"info","code":"fine","place":"","text":"nothing to see"})"));
+  progress.event(
+      0, told_by_child(
+             R"({"event":"note","severity":"warning","code":"odd","place":"mesh","text":"look at this"})"));
   for (int twice = 0; twice < 2; ++twice)
-    progress.event(0, R"({"event":"cache","code":"cache-entry-damaged","text":"moved away"})");
+    progress.event(0, told_by_child(R"({"event":"cache","code":"cache-entry-damaged","text":"moved away"})"));
   progress.finished(0, a, "a.texmesh");
   progress.started(1, "b.texmesh");
-  progress.event(1, R"({"event":"error","kind":"input","file":"b.obj","place":"","expected":"faces",
-                        "found":"none","message":"b.obj: no faces"})");
+  progress.event(
+      1, told_by_child(R"({"event":"error","kind":"input","file":"b.obj","place":"","expected":"faces",
+                        "found":"none","message":"b.obj: no faces"})"));
   progress.finished(1, b, "b.texmesh");
   progress.summary({a, b, c}, 1.5);
   return out.str();
@@ -145,9 +157,10 @@ TEST(Progress, ABarIsNoWiderThanTheTerminal) {
   const std::string name = "a/" + std::string(60, 'x') + "/L\xc3\xb6we-" + std::string(60, 'y') + ".obj";
   progress.begin({{name, 1}});
   progress.started(0, "a.texmesh");
-  progress.event(0, R"({"event":"stage-started","stage":"simplification"})");
+  progress.event(0, SharesTold{"", {{"simplification", .5}}});
+  progress.event(0, told_by_child(R"({"event":"stage-started","stage":"simplification"})"));
   std::this_thread::sleep_for(std::chrono::milliseconds(110));
-  progress.event(0, R"({"event":"stage-progress","stage":"simplification","fraction":0.5})");
+  progress.event(0, told_by_child(R"({"event":"stage-progress","stage":"simplification","fraction":0.5})"));
   const std::string text = out.str();
   ASSERT_NE(text.find("..."), std::string::npos) << text;
   std::size_t columns = 0;
@@ -157,6 +170,17 @@ TEST(Progress, ABarIsNoWiderThanTheTerminal) {
   EXPECT_GT(columns, 60u);
   EXPECT_NE(text.find("[=", text.rfind("\033[K")), std::string::npos)
       << "half a stage is no progress: " << text;
+}
+
+/// TEXMESH_WRITE_SCHEMAS=1 writes them.
+TEST(Schemas, InTheRepositoryAreWhatTheProgramSays) {
+  for (const DocumentSchema& schema : pipeline_schemas()) {
+    const std::string file = TEXMESH_SOURCE_DIR "/schemas/" + schema.name + ".schema.json";
+    if (std::getenv("TEXMESH_WRITE_SCHEMAS")) std::ofstream(file) << schema.text;
+    std::ostringstream text;
+    text << std::ifstream(file).rdbuf();
+    EXPECT_EQ(text.str(), schema.text) << schema.name;
+  }
 }
 
 TEST(Progress, EventsFollowTheirSchema) {

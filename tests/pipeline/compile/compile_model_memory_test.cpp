@@ -2,10 +2,10 @@
 #include <gtest/gtest.h>
 
 #include "pipeline/compile/compile_model.h"
-#include "pipeline/compile/model_source.h"
 #include "pipeline/graph/store.h"
 #include "pipeline/io/resource_error.h"
 #include "tests/support/command.h"
+#include "tests/support/memory_store.h"
 
 namespace texmesh {
 namespace {

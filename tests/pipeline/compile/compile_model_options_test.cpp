@@ -7,6 +7,7 @@
 #include "pipeline/compile/compile_model.h"
 #include "pipeline/graph/store.h"
 #include "tests/support/command.h"
+#include "tests/support/memory_store.h"
 #include "tools/inspect/provenance.h"
 
 namespace texmesh {

@@ -8,6 +8,7 @@
 #include "pipeline/graph/store.h"
 #include "tests/support/command.h"
 #include "tests/support/images.h"
+#include "tests/support/memory_store.h"
 
 namespace texmesh {
 namespace {

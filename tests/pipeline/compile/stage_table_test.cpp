@@ -4,7 +4,6 @@
 
 #include <set>
 
-#include "pipeline/compile/declare_options.h"
 #include "pipeline/compile/option_fields.h"
 
 namespace texmesh {
@@ -23,6 +22,16 @@ TEST(StageTable, EveryInputIsMadeBeforeItIsUsedAndEveryOptionIsRead) {
   CompileOptions o;
   for (const OptionField& f : list_options(o))
     EXPECT_TRUE(read.contains(f.path())) << f.path() << " is in no key";
+}
+
+/// A stage without a share would let the progress bar stand still.
+TEST(StageTable, EveryStageSaysItsShareOfTheTime) {
+  double all = 0;
+  for (const Stage& s : default_stage_table()) {
+    EXPECT_GT(s.time_share, 0) << s.name;
+    all += s.time_share;
+  }
+  EXPECT_NEAR(all, 1, 1e-9);
 }
 
 TEST(StageTable, AnOptionHasTheNameOfThePlaceWhereItStands) {

@@ -1,10 +1,11 @@
-#include "pipeline/graph/explanation.h"
+#include "pipeline/graph/graph_run.h"
 
 #include <gtest/gtest.h>
 
 #include <map>
 
 #include "tests/pipeline/graph/fake_graph.h"
+#include "tests/support/memory_store.h"
 
 namespace texmesh {
 namespace {

@@ -12,6 +12,7 @@
 
 #include "pipeline/graph/make_stage.h"
 #include "tests/pipeline/graph/fake_graph.h"
+#include "tests/support/memory_store.h"
 
 namespace texmesh {
 namespace {

@@ -6,8 +6,8 @@
 #include <cstdlib>
 
 #include "stages/image/decode_image.h"
-#include "stages/image/halve_pixels.h"
 #include "stages/image/png_writer.h"
+#include "stages/image/resize.h"
 #include "stages/jpeg/jpeg.h"
 #include "tests/support/coverage_bits.h"
 #include "tests/support/meshes.h"
@@ -267,9 +267,9 @@ TEST(Fill, MipsAreHalvesOfTheFinerPlane) {
   image.name = "a.png";
   image.bytes = write_png(source);
   image = probe_image("a.png", image.bytes, {});
-  for (const auto& [role, kind] : {std::pair{TextureRole::kBaseColour, Halving::kLight},
-                                   {TextureRole::kNormal, Halving::kNormals},
-                                   {TextureRole::kData, Halving::kNumbers}})
+  for (const auto& [role, kind] : {std::pair{TextureRole::kBaseColour, Averaging::kLight},
+                                   {TextureRole::kNormal, Averaging::kNormals},
+                                   {TextureRole::kData, Averaging::kNumbers}})
     for (const int threads : {1, 8}) {
       RunContext context;
       context.threads = threads;

@@ -7,7 +7,6 @@
 
 #include "format/base/bytes.h"
 #include "format/base/errors.h"
-#include "stages/fragment_codec/decode_rung.h"
 #include "stages/jpeg/jpeg_coder.h"
 #include "stages/jpeg/jpeg_stream.h"
 #include "stages/ladder/ladder.h"

@@ -1,10 +1,9 @@
-#include "stages/fragment_codec/rebuilt_z.h"
+#include "stages/fragment_codec/fragment_codec.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "stages/fragment_codec/fragment_codec.h"
 #include "stages/jpeg/jpeg.h"
 
 namespace texmesh {

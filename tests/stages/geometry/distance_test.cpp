@@ -7,7 +7,6 @@
 
 #include "stages/base/run_context.h"
 #include "stages/condition/condition.h"
-#include "stages/geometry/scale_walk.h"
 #include "stages/geometry/triangle_tree.h"
 #include "stages/simplification/simplification.h"
 #include "tests/support/meshes.h"

@@ -132,7 +132,7 @@ TEST(ScaleFrames, VanishedComponentsSayNothing) {
     s.mesh.wedge_position.push_back(position + k);
     s.mesh.uv0.push_back({0, 0});
     s.mesh.normals.push_back({-1, 0, 0});
-    s.collapses.push_back({position + k, position + k, 1});
+    s.collapses.push_back(Collapse::with_component(position + k, 1));
   }
   s.mesh.triangles.push_back({first, first + 1, first + 2});
   s.scales[0].triangles = s.mesh.triangles;

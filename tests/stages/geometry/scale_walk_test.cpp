@@ -1,4 +1,4 @@
-#include "stages/geometry/scale_walk.h"
+#include "stages/geometry/distance.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "stages/geometry/stand_in_scale.h"
+#include "stages/geometry/scale_frames.h"
 
 #include <gtest/gtest.h>
 

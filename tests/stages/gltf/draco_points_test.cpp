@@ -1,4 +1,4 @@
-#include "stages/gltf/draco_points.h"
+#include "stages/gltf/draco_mesh.h"
 
 #include <draco/mesh/mesh.h>
 #include <gtest/gtest.h>

@@ -1,11 +1,10 @@
-#include "stages/gltf/glb_copyright.h"
+#include "stages/gltf/glb_container.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
 #include "format/base/errors.h"
-#include "stages/gltf/glb_container.h"
 
 namespace texmesh {
 namespace {

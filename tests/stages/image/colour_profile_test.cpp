@@ -1,4 +1,4 @@
-#include "stages/image/colour_profile.h"
+#include "stages/image/image_metadata.h"
 
 #include <gtest/gtest.h>
 #include <zlib.h>
@@ -10,7 +10,6 @@
 #include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "stages/image/decode_image.h"
-#include "stages/image/image_metadata.h"
 #include "tests/support/images.h"
 
 namespace texmesh {

@@ -1,4 +1,4 @@
-#include "stages/image/decode_png.h"
+#include "stages/image/png_writer.h"
 
 #include <gtest/gtest.h>
 #include <zlib.h>

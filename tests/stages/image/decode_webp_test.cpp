@@ -1,4 +1,4 @@
-#include "stages/image/decode_webp.h"
+#include "stages/image/webp.h"
 
 #include <gtest/gtest.h>
 
@@ -46,6 +46,27 @@ TEST(DecodeWebp, WebpOfOneColourIsSmallAndWhole) {
   const Bytes webp = webp_bytes(512, 512, 3, samples);
   ASSERT_LT(webp.size(), samples.size() / 1000);
   EXPECT_EQ(decode_image(probe(webp)).data, samples);
+}
+
+TEST(EncodeWebp, OptionsCountAndWhatPackagesHoldComesBack) {
+  const Pixels rgb{40, 30, 3, test_picture(40, 30, 3)};
+  const Bytes plain = encode_webp(rgb, {80}), again = encode_webp(rgb, {80});
+  EXPECT_EQ(plain, again);
+  EXPECT_LT(encode_webp(rgb, {10}).size(), plain.size());
+  EXPECT_NE(encode_webp(rgb, {80, 100, 6}), plain);
+  EXPECT_NE(encode_webp(rgb, {80, 100, 4, true}), plain);
+  const Pixels back = decode_lossy_webp(plain, 40 * 30);
+  EXPECT_EQ(back.width_px, 40u);
+  EXPECT_EQ(back.channels, 3u);
+  EXPECT_EQ(decode_webp_rgba(plain).channels, 4u);
+  EXPECT_THROW(decode_lossy_webp(plain, 40 * 30 - 1), FormatError);
+  EXPECT_THROW(decode_lossy_webp(encode_webp({40, 30, 4, test_picture(40, 30, 4)}, {80}), 1200), FormatError);
+  const Pixels grey{8, 8, 1, Bytes(64, 77)};
+  EXPECT_NEAR(decode_lossy_webp(encode_webp(grey, {90}), 64).at(3, 3)[2], 77, 3);
+  EXPECT_THROW(encode_webp({16384, 1, 3, Bytes(3 * 16384)}, {80}), StageError);
+  Bytes two{1, 2};
+  append_webp({rgb.data.data(), 120, 40, 30}, 3, {80}, two);
+  EXPECT_EQ(Bytes(two.begin() + 2, two.end()), plain);
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "stages/image/halve_pixels.h"
+#include "stages/image/resize.h"
 
 #include <gtest/gtest.h>
 
@@ -46,8 +46,8 @@ TEST(HalvePixels, IsTheMeanOverEveryTexelsAreaAtAnySize) {
        {std::array{8u, 6u}, {7u, 5u}, {1u, 1u}, {1u, 9u}, {15u, 2u}, {2u, 3u}, {33u, 1u}})
     for (const std::uint32_t channels : {1u, 3u}) {
       const Pixels padded = noise(w + 5, h + 3, channels);  // what lies beyond must not matter
-      const Pixels numbers = halved(padded, w, h, Halving::kNumbers);
-      const Pixels light = halved(padded, w, h, Halving::kLight);
+      const Pixels numbers = halved(padded, w, h, Averaging::kNumbers);
+      const Pixels light = halved(padded, w, h, Averaging::kLight);
       ASSERT_EQ(numbers.width_px, (w + 1) / 2);
       ASSERT_EQ(numbers.height_px, (h + 1) / 2);
       for (std::uint32_t y = 0; y < numbers.height_px; ++y)
@@ -67,7 +67,7 @@ TEST(HalvePixels, AnEighthIsTheMeanOverEveryTexelsAreaAtAnySize) {
     const Pixels padded = noise(w + 5, h + 3, 3);
     RunContext eight;
     eight.threads = 8;
-    for (const Halving kind : {Halving::kNumbers, Halving::kLight}) {
+    for (const Averaging kind : {Averaging::kNumbers, Averaging::kLight}) {
       const Pixels small = eighth_of(padded, w, h, kind, {});
       EXPECT_EQ(small.data, eighth_of(padded, w, h, kind, eight).data);
       ASSERT_EQ(small.width_px, (w + 7) / 8);
@@ -75,24 +75,24 @@ TEST(HalvePixels, AnEighthIsTheMeanOverEveryTexelsAreaAtAnySize) {
       for (std::uint32_t y = 0; y < small.height_px; ++y)
         for (std::uint32_t x = 0; x < small.width_px; ++x)
           for (std::uint32_t c = 0; c < 3; ++c) {
-            const bool light = kind == Halving::kLight;
+            const bool light = kind == Averaging::kLight;
             const double mean = mean_over(padded, w, h, {small.width_px, small.height_px}, x, y, c, light);
             EXPECT_NEAR(small.at(x, y)[c], light ? encoded(mean) : mean, 0.53);
           }
     }
   }
-  EXPECT_EQ(eighth_of(noise(64, 64, 3), 64, 64, Halving::kNormals, {}).data.size(), 8u * 8u * 3u);
+  EXPECT_EQ(eighth_of(noise(64, 64, 3), 64, 64, Averaging::kNormals, {}).data.size(), 8u * 8u * 3u);
 }
 
 TEST(HalvePixels, ConstantsStayAndLightIsBrighterThanNumbers) {
   for (int v = 0; v < 256; ++v) {
     const Pixels flat{5, 4, 1, std::vector<std::uint8_t>(20, static_cast<std::uint8_t>(v))};
-    EXPECT_EQ(halved(flat, 5, 4, Halving::kLight).data, std::vector<std::uint8_t>(6, flat.data[0]));
-    EXPECT_EQ(halved(flat, 5, 4, Halving::kNumbers).data, std::vector<std::uint8_t>(6, flat.data[0]));
+    EXPECT_EQ(halved(flat, 5, 4, Averaging::kLight).data, std::vector<std::uint8_t>(6, flat.data[0]));
+    EXPECT_EQ(halved(flat, 5, 4, Averaging::kNumbers).data, std::vector<std::uint8_t>(6, flat.data[0]));
   }
   const Pixels board{2, 2, 1, {0, 255, 255, 0}};
-  EXPECT_EQ(halved(board, 2, 2, Halving::kLight).data[0], 188);  // half the light
-  EXPECT_EQ(halved(board, 2, 2, Halving::kNumbers).data[0], 128);
+  EXPECT_EQ(halved(board, 2, 2, Averaging::kLight).data[0], 188);  // half the light
+  EXPECT_EQ(halved(board, 2, 2, Averaging::kNumbers).data[0], 128);
 }
 
 TEST(HalvePixels, NormalsHaveUnitLengthAgain) {
@@ -104,7 +104,7 @@ TEST(HalvePixels, NormalsHaveUnitLengthAgain) {
     for (const double v : {x, y, std::sqrt(1 - x * x - y * y)})
       normals.data.push_back(static_cast<std::uint8_t>(std::lround((v + 1) * 127.5)));
   }
-  const Pixels half = halved(normals, 64, 32, Halving::kNormals);
+  const Pixels half = halved(normals, 64, 32, Averaging::kNormals);
   for (std::uint32_t y = 0; y < 16; ++y)
     for (std::uint32_t x = 0; x < 32; ++x) {
       double squared = 0;
@@ -113,18 +113,18 @@ TEST(HalvePixels, NormalsHaveUnitLengthAgain) {
     }
   // Opposite vectors have no direction: their mean stays.
   const Pixels against{2, 1, 3, {255, 128, 128, 0, 128, 128}};
-  EXPECT_NEAR(halved(against, 2, 1, Halving::kNormals).data[0], 128, 1);
+  EXPECT_NEAR(halved(against, 2, 1, Averaging::kNormals).data[0], 128, 1);
 }
 
 TEST(HalvePixels, WhatIsNotThereIsRefused) {
   const Pixels p = noise(8, 8, 3);
-  EXPECT_THROW(halved(p, 9, 8, Halving::kLight), StageError);
-  EXPECT_THROW(halved(p, 8, 0, Halving::kLight), StageError);
-  EXPECT_THROW(halved(noise(8, 8, 1), 8, 8, Halving::kNormals), StageError);
-  EXPECT_THROW(halved(noise(8, 8, 4), 8, 8, Halving::kNumbers), StageError);
+  EXPECT_THROW(halved(p, 9, 8, Averaging::kLight), StageError);
+  EXPECT_THROW(halved(p, 8, 0, Averaging::kLight), StageError);
+  EXPECT_THROW(halved(noise(8, 8, 1), 8, 8, Averaging::kNormals), StageError);
+  EXPECT_THROW(halved(noise(8, 8, 4), 8, 8, Averaging::kNumbers), StageError);
   Pixels shorter = p;
   shorter.data.pop_back();
-  EXPECT_THROW(halved(shorter, 8, 8, Halving::kLight), StageError);
+  EXPECT_THROW(halved(shorter, 8, 8, Averaging::kLight), StageError);
 }
 
 }  // namespace

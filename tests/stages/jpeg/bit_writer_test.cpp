@@ -1,4 +1,4 @@
-#include "stages/jpeg/bit_writer.h"
+#include "stages/jpeg/block_scan.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "stages/jpeg/huffman_table.h"
+#include "stages/jpeg/jpeg_stream.h"
 
 #include <gtest/gtest.h>
 

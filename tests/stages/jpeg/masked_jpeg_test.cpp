@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "stages/base/run_context.h"
-#include "stages/fragment_codec/decode_rung.h"
+#include "stages/fragment_codec/fragment_codec.h"
 #include "stages/jpeg/jpeg.h"
 #include "stages/jpeg/jpeg_stream.h"
 #include "stages/ladder/ladder.h"

@@ -6,16 +6,15 @@
 #include <numeric>
 
 #include "stages/fragment_codec/fragment_codec.h"
-#include "stages/ladder/rung_loss.h"
 #include "tests/stages/ladder/mip_chain.h"
 
-namespace texmesh {
+namespace texmesh::rungs {
 namespace {
 
 using testing::Chain;
 using testing::encode;
 using testing::make_chain;
-using testing::ways_of;
+using testing::rungs_of;
 
 constexpr std::size_t kAll = 10;  // rungs of colours by default
 
@@ -47,19 +46,19 @@ TEST(ChooseRungs, KeptRungsAreTheirWholeSelves) {
 
 TEST(ChooseRungs, NoRungIsWorseThanThePreviewOrThanACheaperOne) {
   const Chain chain = make_chain(false);
-  const TextureWays ways = ways_of(chain, encode(chain, true));
-  for (std::size_t k = 0; k < ways.pairs.size(); ++k) {
-    const RungPair& pair = ways.pairs[k];
-    EXPECT_LT(pair.loss[pair.level], ways.preview_loss[pair.level]) << k;
-    if (k == 0 || ways.pairs[k - 1].level != pair.level) continue;
-    EXPECT_LT(ways.pairs[k - 1].bytes, pair.bytes) << k;
-    EXPECT_GT(ways.pairs[k - 1].loss[pair.level], pair.loss[pair.level]) << k;
+  const TextureRungs texture = rungs_of(chain, encode(chain, true));
+  for (std::size_t k = 0; k < texture.pairs.size(); ++k) {
+    const RungPair& pair = texture.pairs[k];
+    EXPECT_LT(pair.loss[pair.level], texture.preview_loss[pair.level]) << k;
+    if (k == 0 || texture.pairs[k - 1].level != pair.level) continue;
+    EXPECT_LT(texture.pairs[k - 1].bytes, pair.bytes) << k;
+    EXPECT_GT(texture.pairs[k - 1].loss[pair.level], pair.loss[pair.level]) << k;
   }
 }
 
 TEST(ChooseRungs, AMipHasARungThatShowsItWell) {
   const Chain chain = make_chain(false);
-  EXPECT_LE(ways_of(chain, encode(chain, true)).pairs.back().loss[1], 0.02);
+  EXPECT_LE(rungs_of(chain, encode(chain, true)).pairs.back().loss[1], 0.02);
 }
 
 TEST(ChooseRungs, TheSourcesOwnCoefficientsStay) {
@@ -142,4 +141,4 @@ TEST(ChooseRungs, WithoutAPreviewThereIsNoChoice) {
 }
 
 }  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::rungs

@@ -1,7 +1,7 @@
 // What all rungs of a JPEG take beside it: mips and tables included, at most 1.9 times its bytes.
 #include <gtest/gtest.h>
 
-#include "stages/image/halve_pixels.h"
+#include "stages/image/resize.h"
 #include "stages/previews/previews.h"
 #include "tests/stages/ladder/source_scenes.h"
 #include "tests/support/meshes.h"
@@ -41,9 +41,9 @@ Scene chain_of(Image image, TextureRole role) {
     cover(mip, none);
     mip.surface_fraction.assign(mip.fragment_count(), 1.0f / static_cast<float>(mip.fragment_count()));
     out.pixels.push_back(halved(out.pixels.back(), finer.width_px, finer.height_px,
-                                is_colour(role)                ? Halving::kLight
-                                : role == TextureRole::kNormal ? Halving::kNormals
-                                                               : Halving::kNumbers));
+                                is_colour(role)                ? Averaging::kLight
+                                : role == TextureRole::kNormal ? Averaging::kNormals
+                                                               : Averaging::kNumbers));
     out.fragments.planes.push_back(std::move(mip));
   }
   return out;

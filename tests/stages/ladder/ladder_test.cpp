@@ -6,7 +6,6 @@
 
 #include "format/base/errors.h"
 #include "stages/base/run_context.h"
-#include "stages/fragment_codec/decode_rung.h"
 #include "stages/fragment_codec/fragment_codec.h"
 #include "stages/jpeg/jpeg.h"
 #include "stages/jpeg/jpeg_coder.h"

@@ -4,9 +4,9 @@
 #include <vector>
 
 #include "stages/base/run_context.h"
-#include "stages/image/halve_pixels.h"
+#include "stages/image/resize.h"
+#include "stages/ladder/choose_rungs.h"
 #include "stages/ladder/ladder.h"
-#include "stages/ladder/rung_loss.h"
 #include "stages/previews/previews.h"
 #include "tests/support/meshes.h"
 
@@ -48,7 +48,7 @@ inline Chain make_chain(bool noise, bool with_mip = true) {
   out.pixels.push_back(shades(512, 384, noise));
   out.fragments.planes.push_back(plane_of(out.pixels[0]));
   if (!with_mip) return out;
-  out.pixels.push_back(halved(out.pixels[0], 512, 384, Halving::kLight));
+  out.pixels.push_back(halved(out.pixels[0], 512, 384, Averaging::kLight));
   out.fragments.planes.push_back(plane_of(out.pixels[1]));
   out.fragments.planes[1].mip = 1;
   return out;
@@ -64,9 +64,9 @@ inline Ladder encode(const Chain& chain, bool prune, int threads = 1, LadderMode
   return encode_ladder(chain.fragments, chain.pixels, chain.previews(), {}, options, context);
 }
 
-inline TextureWays ways_of(const Chain& chain, const Ladder& ladder) {
-  return measure_ways(chain.fragments, chain.pixels, ladder.planes, 0, chain.previews().planes[0].file,
-                      RunContext{});
+inline rungs::TextureRungs rungs_of(const Chain& chain, const Ladder& ladder) {
+  return rungs::measure_rungs(chain.fragments, chain.pixels, ladder.planes, 0,
+                              chain.previews().planes[0].file, RunContext{});
 }
 
 }  // namespace texmesh::testing

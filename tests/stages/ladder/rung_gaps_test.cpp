@@ -1,4 +1,4 @@
-#include "stages/ladder/rung_gaps.h"
+#include "stages/ladder/rung_value.h"
 
 #include <gtest/gtest.h>
 
@@ -8,8 +8,8 @@ namespace {
 using Marks = std::vector<std::uint8_t>;
 
 /// One level; the last rung is the source's.
-TextureWays texture(const std::vector<std::pair<std::uint64_t, double>>& rungs) {
-  TextureWays out;
+TextureRungs texture(const std::vector<std::pair<std::uint64_t, double>>& rungs) {
+  TextureRungs out;
   out.surface = 1;
   out.texels_across = 1000;
   out.preview_loss = {0.5};
@@ -25,27 +25,27 @@ const GivenBytes kGiven = [] {
   return out;
 }();
 
-const TextureWays kLadder =
+const TextureRungs kLadder =
     texture({{200'000, 0.3}, {400'000, 0.2}, {900'000, 0.12}, {1'900'000, 0.08}, {2'000'000, 0.01}});
 
 TEST(RungGaps, APairBetweenNeighboursFarApartClosesTheGap) {
-  EXPECT_EQ(gap_closers(kLadder, Marks{1, 1, 1, 0, 1}, kGiven), (Marks{0, 1, 1, 0, 0}));
-  EXPECT_EQ(gap_closers(kLadder, Marks{1, 1, 1, 1, 1}, kGiven), (Marks{0, 1, 1, 0, 0}));
+  EXPECT_EQ(gap_closing_pairs(kLadder, Marks{1, 1, 1, 0, 1}, kGiven), (Marks{0, 1, 1, 0, 0}));
+  EXPECT_EQ(gap_closing_pairs(kLadder, Marks{1, 1, 1, 1, 1}, kGiven), (Marks{0, 1, 1, 0, 0}));
   // Nobody wants the level, or sees the difference.
-  EXPECT_EQ(gap_closers(kLadder, Marks{1, 1, 1, 0, 1}, GivenBytes(1)), Marks(5));
-  TextureWays faint = kLadder;
+  EXPECT_EQ(gap_closing_pairs(kLadder, Marks{1, 1, 1, 0, 1}, GivenBytes(1)), Marks(5));
+  TextureRungs faint = kLadder;
   for (RungPair& pair : faint.pairs) pair.loss[0] *= 0.02;
-  EXPECT_EQ(gap_closers(faint, Marks{1, 1, 1, 0, 1}, kGiven), Marks(5));
+  EXPECT_EQ(gap_closing_pairs(faint, Marks{1, 1, 1, 0, 1}, kGiven), Marks(5));
 }
 
 TEST(RungGaps, WhatIsBeatenInBytesAndLossClosesNone) {
-  TextureWays beaten = kLadder;
+  TextureRungs beaten = kLadder;
   beaten.pairs[1].loss[0] = 0.35;
-  EXPECT_EQ(gap_closers(beaten, Marks{1, 1, 0, 0, 1}, kGiven)[1], 0);
+  EXPECT_EQ(gap_closing_pairs(beaten, Marks{1, 1, 0, 0, 1}, kGiven)[1], 0);
 }
 
 TEST(RungGaps, SwapsCloseGapsWithinTheLimit) {
-  TextureWays one = kLadder;
+  TextureRungs one = kLadder;
   one.most_bytes = 3'600'000;
   Marks keep{0, 0, 0, 0, 1};
   keep[0] = 1;
@@ -61,7 +61,7 @@ TEST(RungGaps, SwapsCloseGapsWithinTheLimit) {
 }
 
 TEST(RungGaps, EveryLevelKeepsAPairAndFixedOnesStay) {
-  TextureWays two = kLadder;
+  TextureRungs two = kLadder;
   two.preview_loss.push_back(0.4);
   two.pairs.push_back({1, 0, 3'000'000, {0.3, 0.2}, false});
   GivenBytes given = kGiven;
@@ -73,7 +73,7 @@ TEST(RungGaps, EveryLevelKeepsAPairAndFixedOnesStay) {
 }
 
 TEST(RungGaps, ALimitThatIsExceededAlreadyIsNotExceededMore) {
-  TextureWays one = kLadder;
+  TextureRungs one = kLadder;
   one.most_bytes = 1;
   Marks keep{1, 0, 1, 0, 1};
   const double before = bytes_of(one, keep);

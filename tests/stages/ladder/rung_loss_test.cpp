@@ -1,4 +1,4 @@
-#include "stages/ladder/rung_loss.h"
+#include "stages/ladder/choose_rungs.h"
 
 #include <gtest/gtest.h>
 
@@ -8,39 +8,39 @@
 
 #include "tests/stages/ladder/mip_chain.h"
 
-namespace texmesh {
+namespace texmesh::rungs {
 namespace {
 
 using testing::Chain;
 using testing::encode;
 using testing::make_chain;
-using testing::ways_of;
+using testing::rungs_of;
 
 TEST(RungLoss, LossFallsAlongEveryPlaneAndBytesAreWhatIsStored) {
   const Chain chain = make_chain(false);
   const Ladder ladder = encode(chain, false);
   ASSERT_EQ(ladder.planes[1].rungs.size(), LadderOptions{}.rungs.size());
-  const TextureWays ways = ways_of(chain, ladder);
-  ASSERT_EQ(ways.pairs.size(), 20u);
-  ASSERT_EQ(ways.preview_loss.size(), 2u);
-  for (const RungPair& pair : ways.pairs) {
+  const TextureRungs texture = rungs_of(chain, ladder);
+  ASSERT_EQ(texture.pairs.size(), 20u);
+  ASSERT_EQ(texture.preview_loss.size(), 2u);
+  for (const RungPair& pair : texture.pairs) {
     const LadderRung& rung = ladder.planes[pair.level].rungs[pair.rung];
     EXPECT_EQ(pair.bytes, rung.data.size() + rung.table_stream.size());
     EXPECT_EQ(pair.loss.size(), pair.level + 1);
     EXPECT_FALSE(pair.fixed);
   }
-  EXPECT_GT(ways.pairs[0].loss[0], ways.pairs[9].loss[0]);
-  EXPECT_LT(ways.pairs[9].loss[0], 0.02);
-  EXPECT_GT(ways.pairs[19].loss[0], ways.pairs[9].loss[0]);  // a mip never shows all of it
-  EXPECT_LT(ways.pairs[19].loss[1], 0.02);                   // but all of itself
-  EXPECT_GT(ways.preview_loss[0], ways.pairs[9].loss[0]);
+  EXPECT_GT(texture.pairs[0].loss[0], texture.pairs[9].loss[0]);
+  EXPECT_LT(texture.pairs[9].loss[0], 0.02);
+  EXPECT_GT(texture.pairs[19].loss[0], texture.pairs[9].loss[0]);  // a mip never shows all of it
+  EXPECT_LT(texture.pairs[19].loss[1], 0.02);                      // but all of itself
+  EXPECT_GT(texture.preview_loss[0], texture.pairs[9].loss[0]);
 }
 
 TEST(RungLoss, ATextureIsAsLargeAsItsTexelsOnABall) {
   const Chain chain = make_chain(false);
-  const TextureWays ways = ways_of(chain, encode(chain, false));
-  EXPECT_NEAR(ways.surface, 1, 1e-5);
-  EXPECT_NEAR(ways.texels_across, std::sqrt(512 * 384 / 3.14159265), 0.01);
+  const TextureRungs texture = rungs_of(chain, encode(chain, false));
+  EXPECT_NEAR(texture.surface, 1, 1e-5);
+  EXPECT_NEAR(texture.texels_across, std::sqrt(512 * 384 / 3.14159265), 0.01);
 }
 
 TEST(RungLoss, ColoursAloneCloseGaps) {
@@ -50,7 +50,7 @@ TEST(RungLoss, ColoursAloneCloseGaps) {
        {std::pair{TextureRole::kBaseColour, true}, std::pair{TextureRole::kEmissive, true},
         std::pair{TextureRole::kNormal, false}, std::pair{TextureRole::kOcclusionRoughnessMetallic, false}}) {
     chain.fragments.planes[0].role = role;
-    EXPECT_EQ(ways_of(chain, ladder).closes_gaps, closes) << static_cast<int>(role);
+    EXPECT_EQ(rungs_of(chain, ladder).closes_gaps, closes) << static_cast<int>(role);
   }
 }
 
@@ -58,8 +58,8 @@ TEST(RungLoss, TheSourcesOwnRungIsFixed) {
   const Chain chain = make_chain(false);
   Ladder ladder = encode(chain, false);
   ladder.planes[0].source_rung = true;
-  const TextureWays ways = ways_of(chain, ladder);
-  for (std::size_t k = 0; k < ways.pairs.size(); ++k) EXPECT_EQ(ways.pairs[k].fixed, k == 9) << k;
+  const TextureRungs texture = rungs_of(chain, ladder);
+  for (std::size_t k = 0; k < texture.pairs.size(); ++k) EXPECT_EQ(texture.pairs[k].fixed, k == 9) << k;
 }
 
 /// The ladder with nothing but the marked fragments.
@@ -85,7 +85,7 @@ TEST(RungLoss, TheSampleShowsAllThatIsMeasuredAndItsBytesStandForThePlanes) {
   ASSERT_EQ(marks.size(), 2u);
   EXPECT_EQ(std::count(marks[0].begin(), marks[0].end(), 1), 6);
   const Ladder all = encode(chain, false), some = only(all, marks);
-  const TextureWays want = ways_of(chain, all), got = ways_of(chain, some);
+  const TextureRungs want = rungs_of(chain, all), got = rungs_of(chain, some);
   EXPECT_EQ(want.preview_loss, got.preview_loss);
   ASSERT_EQ(want.pairs.size(), got.pairs.size());
   for (std::size_t k = 0; k < want.pairs.size(); ++k) {
@@ -122,12 +122,12 @@ TEST(RungLoss, WindowsWeighAsTheSurfaceOfTheirFragments) {
   const auto losses = [&](std::size_t seen) {
     std::fill(plane.surface_fraction.begin(), plane.surface_fraction.end(), 0.0f);
     plane.surface_fraction[seen] = 1;
-    const TextureWays ways = ways_of(chain, ladder);
-    return std::array{ways.pairs[0].loss[0], ways.preview_loss[0]};
+    const TextureRungs texture = rungs_of(chain, ladder);
+    return std::array{texture.pairs[0].loss[0], texture.preview_loss[0]};
   };
   for (const double loss : losses(kNoisy)) EXPECT_GT(loss, 0.3);
   for (const double loss : losses(kOther)) EXPECT_LT(loss, 0.01);
 }
 
 }  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::rungs

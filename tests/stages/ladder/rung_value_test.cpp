@@ -7,14 +7,14 @@
 
 #include "format/rules/ordinary_loads.h"
 
-namespace texmesh {
+namespace texmesh::rungs {
 namespace {
 
 constexpr double kGain = 0.05, kLeast = 0.01;
 
 /// A texture of one level whose rungs have these bytes and losses.
-TextureWays texture(const std::vector<std::pair<std::uint64_t, double>>& rungs, double preview = 0.5) {
-  TextureWays out;
+TextureRungs texture(const std::vector<std::pair<std::uint64_t, double>>& rungs, double preview = 0.5) {
+  TextureRungs out;
   out.surface = 1;
   out.texels_across = 1000;
   out.preview_loss = {preview};
@@ -23,7 +23,7 @@ TextureWays texture(const std::vector<std::pair<std::uint64_t, double>>& rungs, 
   return out;
 }
 
-std::vector<std::size_t> kept(const TextureWays& one, double gain = kGain, double least = kLeast) {
+std::vector<std::size_t> kept(const TextureRungs& one, double gain = kGain, double least = kLeast) {
   std::vector<std::size_t> out;
   const auto keep = pairs_worth_storing({one}, texture_loads(), gain, least)[0];
   for (std::size_t k = 0; k < keep.size(); ++k)
@@ -45,7 +45,7 @@ TEST(RungValue, LoadsAreOrdinaryOnesLessMeshAndTables) {
 }
 
 TEST(RungValue, TheLastPairOfALevelIsACheaperOneWhereAllTakeTooMuch) {
-  TextureWays one = texture({{150'000, 0.001}});
+  TextureRungs one = texture({{150'000, 0.001}});
   one.pairs[0].fixed = true;
   one.closes_gaps = false;
   one.preview_loss = {0.5, 0.4};
@@ -77,7 +77,7 @@ TEST(RungValue, ARungThatOnlyPoorerLoadsWantGoes) {
 }
 
 TEST(RungValue, WhatIsFixedStays) {
-  TextureWays one = texture({{500'000, 0.1}, {4'000'000'000, 0.001}});
+  TextureRungs one = texture({{500'000, 0.1}, {4'000'000'000, 0.001}});
   one.pairs[1].fixed = true;
   EXPECT_EQ(kept(one), (Rungs{0, 1}));
 }
@@ -91,7 +91,7 @@ TEST(RungValue, TheMoreIsAskedTheFewerStay) {
   std::vector<std::pair<std::uint64_t, double>> rungs;
   for (int k = 0; k < 12; ++k)
     rungs.push_back({static_cast<std::uint64_t>(100e3 * std::pow(1.5, k)), 0.2 * std::pow(0.72, k)});
-  const TextureWays one = texture(rungs);
+  const TextureRungs one = texture(rungs);
   std::size_t before = kept(one, 0, 0).size();
   EXPECT_EQ(before, 12u);
   for (const double gain : {0.02, 0.1, 0.5, 1e9}) {
@@ -107,7 +107,7 @@ TEST(RungValue, NeighboursAreNoFurtherApartThanTheLadderCanBring) {
   std::vector<std::pair<std::uint64_t, double>> rungs;
   for (int k = 0; k < 12; ++k)
     rungs.push_back({static_cast<std::uint64_t>(500e3 * std::pow(1.4, k)), 0.3 * std::pow(0.8, k)});
-  TextureWays one = texture(rungs);
+  TextureRungs one = texture(rungs);
   one.pairs.front().fixed = one.pairs.back().fixed = true;
   const Rungs all = kept(one, 1e9);
   EXPECT_GE(all.size(), 5u);
@@ -115,13 +115,13 @@ TEST(RungValue, NeighboursAreNoFurtherApartThanTheLadderCanBring) {
   for (std::size_t k = 1; k < all.size(); ++k)
     EXPECT_LE(static_cast<double>(rungs[all[k]].first), 2.5 * static_cast<double>(rungs[all[k - 1]].first));
   // Where the finer ones save what nobody sees, they may be further apart.
-  TextureWays flat = one;
+  TextureRungs flat = one;
   for (RungPair& pair : flat.pairs) pair.loss[0] *= 0.02;
   EXPECT_EQ(kept(flat, 1e9), (Rungs{0, 11}));
 }
 
 TEST(RungValue, WhatClosesAGapGoesWhereAllTakeTooMuch) {
-  TextureWays one = texture({{300'000, 0.3}, {700'000, 0.2}, {1'500'000, 0.1}, {3'000'000, 0.01}});
+  TextureRungs one = texture({{300'000, 0.3}, {700'000, 0.2}, {1'500'000, 0.1}, {3'000'000, 0.01}});
   one.pairs.front().fixed = one.pairs.back().fixed = true;
   EXPECT_EQ(kept(one, 1e9), (Rungs{0, 1, 2, 3}));
   one.most_bytes = 4'900'000;
@@ -131,14 +131,14 @@ TEST(RungValue, WhatClosesAGapGoesWhereAllTakeTooMuch) {
 }
 
 TEST(RungValue, GapsOfTexturesThatDoNotCloseThemStay) {
-  TextureWays one = texture({{300'000, 0.3}, {700'000, 0.2}, {1'500'000, 0.1}, {3'000'000, 0.01}});
+  TextureRungs one = texture({{300'000, 0.3}, {700'000, 0.2}, {1'500'000, 0.1}, {3'000'000, 0.01}});
   one.pairs.front().fixed = one.pairs.back().fixed = true;
   one.closes_gaps = false;
   EXPECT_EQ(kept(one, 1e9), (Rungs{0, 3}));
 }
 
 TEST(RungValue, EveryLevelKeepsAPair) {
-  TextureWays one = texture({{500'000, 0.1}, {5'000'000, 0.01}});
+  TextureRungs one = texture({{500'000, 0.1}, {5'000'000, 0.01}});
   one.texels_across = 100;  // no display wants the mip
   one.preview_loss.push_back(0.4);
   one.pairs.push_back({1, 0, 100'000, {0.3, 0.1}, false});
@@ -149,7 +149,7 @@ TEST(RungValue, EveryLevelKeepsAPair) {
 
 TEST(RungValue, SmallDisplaysWantTheMip) {
   // More than 4 texels across a pixel of the largest display: always a mip of level 1 or more.
-  TextureWays one = texture({{500'000, 0.1}, {5'000'000, 0.01}});
+  TextureRungs one = texture({{500'000, 0.1}, {5'000'000, 0.01}});
   one.texels_across = 8000;
   one.preview_loss.push_back(0.4);
   one.pairs.push_back({1, 0, 300'000, {0.3, 0.1}, false});
@@ -161,9 +161,9 @@ TEST(RungValue, SmallDisplaysWantTheMip) {
 }
 
 TEST(RungValue, TexturesShareTheBytes) {
-  const TextureWays one = texture({{50'000, 0.2}, {150'000, 0.01}});
+  const TextureRungs one = texture({{50'000, 0.2}, {150'000, 0.01}});
   EXPECT_EQ(kept(one), (Rungs{1}));  // alone it always has enough
-  const std::vector<TextureWays> many(60, one);
+  const std::vector<TextureRungs> many(60, one);
   const auto keep = pairs_worth_storing(many, texture_loads(), kGain, kLeast);
   for (const auto& k : keep) EXPECT_EQ(k, (std::vector<std::uint8_t>{1, 1}));
 }
@@ -174,4 +174,4 @@ TEST(RungValue, NothingOfNothing) {
 }
 
 }  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::rungs

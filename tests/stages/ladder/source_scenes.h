@@ -6,7 +6,7 @@
 #include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "stages/base/run_context.h"
-#include "stages/fragment_codec/decode_rung.h"
+#include "stages/fragment_codec/fragment_codec.h"
 #include "stages/image/decode_image.h"
 #include "stages/image/decode_jpeg.h"
 #include "stages/jpeg/source_jpeg.h"

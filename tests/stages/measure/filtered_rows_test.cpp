@@ -1,4 +1,4 @@
-#include "stages/measure/filtered_rows.h"
+#include "stages/measure/picture.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "stages/measure/pixel_spans.h"
+#include "stages/measure/picture.h"
 
 #include <gtest/gtest.h>
 

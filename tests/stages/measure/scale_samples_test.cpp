@@ -1,4 +1,4 @@
-#include "stages/measure/scale_samples.h"
+#include "stages/measure/fragment_meter.h"
 
 #include <gtest/gtest.h>
 

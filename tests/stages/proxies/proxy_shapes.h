@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "stages/proxies/surface/simplify_surface.h"
+#include "stages/proxies/atlas_mesh.h"
 #include "tests/support/hostile_meshes.h"
 #include "tests/support/meshes.h"
 
@@ -16,11 +16,11 @@ struct Soup {
   std::vector<Triangle> triangles;
   std::vector<std::uint32_t> group;
 
-  std::vector<ProxySurface> simplified(const std::vector<std::uint32_t>& counts) const {
-    return simplify_surface(positions, triangles, group, counts, RunContext{});
+  std::vector<proxies::ProxySurface> simplified(const std::vector<std::uint32_t>& counts) const {
+    return proxies::simplify_surface(positions, triangles, group, counts, RunContext{});
   }
   /// Cleaned, and otherwise as it is.
-  ProxySurface surface() const { return simplified({0xffffffffu}).front(); }
+  proxies::ProxySurface surface() const { return simplified({0xffffffffu}).front(); }
 };
 
 inline Soup soup_of(const Mesh& m) {

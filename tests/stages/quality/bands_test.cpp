@@ -1,4 +1,4 @@
-#include "stages/quality/bands.h"
+#include "stages/quality/framing.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "stages/quality/size_rules.h"
+#include "stages/quality/size_cells.h"
 
 #include "tests/stages/quality/quality_samples.h"
 

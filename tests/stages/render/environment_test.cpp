@@ -4,7 +4,6 @@
 
 #include <cmath>
 
-#include "stages/render/octahedron.h"
 #include "stages/render/render_math.h"
 #include "tests/stages/render/render_fixtures.h"
 

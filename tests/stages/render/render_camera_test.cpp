@@ -1,4 +1,4 @@
-#include "stages/render/render_camera.h"
+#include "stages/render/visibility.h"
 
 #include <gtest/gtest.h>
 

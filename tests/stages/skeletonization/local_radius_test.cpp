@@ -8,9 +8,7 @@
 #include <limits>
 
 #include "format/base/box.h"
-#include "stages/geometry/tetrahedron.h"
 #include "stages/geometry/triangle_tree.h"
-#include "stages/skeletonization/shape_thickness.h"
 #include "tests/support/meshes.h"
 
 namespace texmesh {

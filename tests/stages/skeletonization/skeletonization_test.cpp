@@ -13,8 +13,7 @@
 #include "format/base/portable_math.h"
 #include "stages/base/run_context.h"
 #include "stages/condition/condition.h"
-#include "stages/skeletonization/contraction/contraction.h"
-#include "stages/skeletonization/segment_tree.h"
+#include "stages/skeletonization/curve_skeleton.h"
 #include "tests/support/hostile_meshes.h"
 #include "tests/support/meshes.h"
 

@@ -1,4 +1,4 @@
-#include "stages/ssf/heat_levels.h"
+#include "stages/ssf/heat_kernel.h"
 
 #include <gtest/gtest.h>
 

@@ -10,8 +10,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "pipeline/io/uri.h"
 #include "tests/support/command.h"
-#include "tools/publish/view/site.h"
 #include "tools/publish/view/view_server.h"
 
 namespace texmesh::testing {

@@ -64,17 +64,17 @@ TEST_P(ExtractFar, EveryTriangleIsExtracted) {
   for (const auto& [codec, bits] : {std::pair{MeshCodec::kNone, 0}, {MeshCodec::kDraco, 8}}) {
     SCOPED_TRACE(enum_name(codec));
     compile(codec, bits);
-    ExtractRequest request;
-    request.scale = 0;
-    const GlbFacts whole = extract(request);
+    ExtractScale scale;
+    scale.scale = 0;
+    const GlbFacts whole = extract({scale});
     EXPECT_EQ(whole.triangles, kTriangles);
     if (bits) EXPECT_GT(whole.bounds_max.y, kLargestCoordinate) << "the test's mesh tests nothing";
-    request.plain = true;
-    EXPECT_EQ(extract(request).triangles, kTriangles);
-    request = {};
-    request.bytes = 10'000'000;
-    request.display_px = 64;
-    EXPECT_EQ(extract(request).triangles, kTriangles);
+    scale.form = ExtractScale::Form::kPlain;
+    EXPECT_EQ(extract({scale}).triangles, kTriangles);
+    ExtractBudget budget;
+    budget.bytes = {10'000'000};
+    budget.display_px = 64;
+    EXPECT_EQ(extract({budget}).triangles, kTriangles);
     PackageReader package(open_store(folder_ / "a.texmesh"));
     EXPECT_EQ(bare_scale(package, 0, {}).mesh.triangles.size(), kTriangles);
     EXPECT_EQ(finest_scale(package, {}).model.mesh.triangles.size(), kTriangles);

@@ -23,20 +23,20 @@ TEST(HttpExtract, GivesTheSameBytesAsTheFile) {
   });
   const int port = server.bind_to_any_port("127.0.0.1");
   std::thread thread([&] { server.listen_after_bind(); });
-  ExtractRequest request;
-  request.bytes = 8000;
-  request.display_px = 64;
+  ExtractBudget budget;
+  budget.bytes = {8000};
+  budget.display_px = 64;
   Bytes over_http;
   try {
     PackageReader reader(open_url("http://127.0.0.1:" + std::to_string(port) + "/a.texmesh"));
-    over_http = extract_model(reader, request, {}).glb;
+    over_http = extract_model(reader, {budget}, {}).glb;
   } catch (const Error& e) {
     ADD_FAILURE() << e.what();
   }
   server.stop();
   thread.join();
   PackageReader reader(open_container(memory_source(package)));
-  EXPECT_EQ(over_http, extract_model(reader, request, {}).glb);
+  EXPECT_EQ(over_http, extract_model(reader, {budget}, {}).glb);
 }
 
 }  // namespace

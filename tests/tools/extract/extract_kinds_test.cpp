@@ -10,7 +10,7 @@
 #include "tests/support/gltf_builder.h"
 #include "tests/support/images.h"
 #include "tests/support/meshes.h"
-#include "tools/extract/budget/mesh_candidates.h"
+#include "tools/extract/budget/filling.h"
 #include "tools/extract/extract.h"
 
 namespace texmesh {
@@ -119,12 +119,12 @@ class ExtractKinds : public ::testing::TestWithParam<Kind> {
   }
   Extracted extract(std::uint64_t bytes, int threads = 2) {
     PackageReader package(open_store(folder_ / "a.texmesh"));
-    ExtractRequest request;
-    request.bytes = bytes;
-    request.display_px = 64;  // small pictures, quick tests
+    ExtractBudget budget;
+    budget.bytes = {bytes};
+    budget.display_px = 64;  // small pictures, quick tests
     RunContext context;
     context.threads = threads;
-    const Extracted e = extract_model(package, request, context);
+    const Extracted e = extract_model(package, {budget}, context);
     Findings findings;
     check_glb(e.glb, "x.glb", findings, GlbRules::kStandalone);
     for (const Finding& f : findings.list()) ADD_FAILURE() << to_string(f);
@@ -178,15 +178,15 @@ TEST(ExtractMesh, ALittleLeanerThanStoredItKeepsItsNormals) {
   NullStore store;
   compile_model(request, store, {}, {});
   PackageReader package(open_store(folder / "a.texmesh"));
-  ExtractRequest wanted;
-  wanted.bytes = 100'000;
-  const BudgetSource source(package, wanted, {});
-  MeshCandidates meshes(source);
-  const MeshCandidate stored = meshes.at({0, kMeshCodings - 1, 0}),
-                      leaner = meshes.at({0, kMeshCodings - 1, -1}),
-                      next = meshes.at({0, kMeshCodings - 2, 0});
+  TextureSource textures(package, 1e7, {});
+  const Reference reference(package, {}, false, textures, {});
+  Candidates candidates(reference, textures);
+  const Filling filling(reference, candidates, 100'000);
+  const MeshCandidate &stored = candidates.mesh({0, kMeshCodings - 1, 0}),
+                      &leaner = candidates.mesh({0, kMeshCodings - 1, -1}),
+                      &next = candidates.mesh({0, kMeshCodings - 2, 0});
   EXPECT_EQ(stored.geometry, 0);
-  EXPECT_LT(leaner.fixed_bytes, stored.fixed_bytes);
+  EXPECT_LT(filling.mesh_file(leaner).fixed_bytes, filling.mesh_file(stored).fixed_bytes);
   EXPECT_LT(leaner.geometry, 0.5 * next.geometry);
 }
 

@@ -96,12 +96,14 @@ double farthest_from_sheet(const Mesh& mesh, Vec3d place, Box3d& box) {
 }
 
 std::vector<std::pair<std::string, ExtractRequest>> every_kind_of_request() {
-  ExtractRequest whole, lods, bytes, bytes_lods;
+  ExtractScale whole, lods;
   whole.scale = 0;
-  lods.scale = 0, lods.lods = true;
-  bytes.scale = 0, bytes.bytes = 20000, bytes.display_px = 64;
-  bytes_lods = bytes, bytes_lods.lods = true;
-  return {{"whole", whole}, {"lods", lods}, {"bytes", bytes}, {"bytes and lods", bytes_lods}};
+  lods.scale = 0, lods.form = ExtractScale::Form::kLevels;
+  ExtractBudget bytes;
+  bytes.scale = 0, bytes.bytes = {20000}, bytes.display_px = 64;
+  ExtractBudget bytes_lods = bytes;
+  bytes_lods.levels = true;
+  return {{"whole", {whole}}, {"lods", {lods}}, {"bytes", {bytes}}, {"bytes and lods", {bytes_lods}}};
 }
 
 TEST_F(SourceToExtract, TheModelStandsWhereTheSourceHasIt) {
@@ -167,9 +169,9 @@ TEST_F(SourceToExtract, WithBytesEnoughTheMapsAreTheSourcesOwn) {
   const Bytes source = picture_file("jpg");
   const Pixels expected = decode_image(probe_image("source", source, {}));
   const std::string package = compile(sheet({}, source, "image/jpeg"), MeshCodec::kDraco);
-  ExtractRequest whole, bytes;
-  bytes.bytes = 10'000'000, bytes.display_px = 64;
-  for (const ExtractRequest& request : {whole, bytes}) {
+  ExtractBudget bytes;
+  bytes.bytes = {10'000'000}, bytes.display_px = 64;
+  for (const ExtractRequest& request : {ExtractRequest{}, ExtractRequest{bytes}}) {
     PackageReader reader(open_store(package));
     const Extracted e = extract_model(reader, request, {});
     EXPECT_TRUE(e.within);

@@ -1,4 +1,4 @@
-// extract_model() on small packages made by code.
+// extract_files() on small packages made by code.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -27,12 +27,14 @@ Extracted extract(const ExtractRequest& request, int threads = 2) {
   return extract_model(package, request, context);
 }
 
-ExtractRequest budget(std::uint64_t bytes) {
-  ExtractRequest r;
-  r.bytes = bytes;
-  r.display_px = 64;  // small pictures, quick tests
-  return r;
+ExtractBudget budget(const std::vector<std::uint64_t>& bytes) {
+  ExtractBudget b;
+  b.bytes = bytes;
+  b.display_px = 64;  // small pictures, quick tests
+  return b;
 }
+
+Extracted extract_within(std::uint64_t bytes, int threads = 2) { return extract({budget({bytes})}, threads); }
 
 void expect_valid(const Bytes& glb, const std::string& what) {
   Findings findings;
@@ -65,8 +67,7 @@ Bytes package_with_proxies() {
 TEST(ExtractModel, AProxyIsWrittenAsItIs) {
   const Bytes bytes = package_with_proxies();
   PackageReader package = open(bytes);
-  ExtractRequest r;
-  r.proxy = 1;
+  ExtractRequest r{ExtractProxy{1}};
   const Extracted moved = extract_model(package, r, {});
   expect_valid(moved.glb, "proxy 1");
   EXPECT_EQ(moved.proxy, 1u);
@@ -77,18 +78,18 @@ TEST(ExtractModel, AProxyIsWrittenAsItIs) {
   EXPECT_EQ(facts.largest_image_px, package.manifest().proxies[1].texture_px);
   r.recentre = true;
   EXPECT_NEAR(check_glb(extract_model(package, r, {}).glb, "x.glb", findings).bounds_min.x, -1, 1e-3);
-  r.proxy = 2;
+  r.file = ExtractProxy{2};
   EXPECT_THROW(extract_model(package, r, {}), InputError);
   PackageReader without = open(package_bytes());
-  r.proxy = 0;
+  r.file = ExtractProxy{0};
   EXPECT_THROW(extract_model(without, r, {}), InputError);
 }
 
 TEST(ExtractModel, TheBestRungAsPngIsThePlanePutTogetherAgain) {
-  ExtractRequest r;
+  ExtractScale r;
   r.scale = 0;
   r.images = ExtractImages::kPng;
-  const Extracted e = extract(r);
+  const Extracted e = extract({r});
   expect_valid(e.glb, "png");
   const Pixels image = image_of(e.glb, 0);
   ASSERT_EQ(image.width_px, 64u);
@@ -110,11 +111,11 @@ TEST(ExtractModel, EveryKindOfRequestGivesAValidFile) {
        {ExtractImages::kAuto, ExtractImages::kJpeg, ExtractImages::kWebp, ExtractImages::kPng})
     for (const bool lods : {false, true})
       for (const double display : {0.0, 50.0, 5000.0}) {
-        ExtractRequest r;
+        ExtractScale r;
         r.images = images;
-        r.lods = lods;
+        if (lods) r.form = ExtractScale::Form::kLevels;
         r.display_px = display;
-        const Extracted e = extract(r);
+        const Extracted e = extract({r});
         expect_valid(e.glb, std::to_string(static_cast<int>(images)) + " " + std::to_string(display));
         const nlohmann::json root = json_of(e.glb);
         const bool webp = images == ExtractImages::kWebp;
@@ -127,9 +128,9 @@ TEST(ExtractModel, EveryKindOfRequestGivesAValidFile) {
 }
 
 TEST(ExtractModel, LevelsShareTexturesAndStandBehindTheFinest) {
-  ExtractRequest r;
-  r.lods = true;
-  const Extracted e = extract(r);
+  ExtractScale r;
+  r.form = ExtractScale::Form::kLevels;
+  const Extracted e = extract({r});
   const nlohmann::json root = json_of(e.glb);
   EXPECT_EQ(root["images"].size(), 1u);
   EXPECT_EQ(root["meshes"].size(), 2u);
@@ -146,12 +147,12 @@ TEST(ExtractModel, LevelsShareTexturesAndStandBehindTheFinest) {
 }
 
 TEST(ExtractModel, BytesAreMetWithinTwoPercentFromBelow) {
-  const std::uint64_t smallest = extract(budget(1)).glb.size();
-  const Extracted most = extract(budget(10'000'000));
+  const std::uint64_t smallest = extract_within(1).glb.size();
+  const Extracted most = extract_within(10'000'000);
   EXPECT_FALSE(most.within);
   int within = 0, asked = 0;
   for (std::uint64_t bytes = smallest + 300; bytes < most.glb.size(); bytes += 160, ++asked) {
-    const Extracted e = extract(budget(bytes));
+    const Extracted e = extract_within(bytes);
     EXPECT_LE(e.glb.size(), bytes);
     EXPECT_EQ(e.within, static_cast<double>(e.glb.size()) >= 0.98 * static_cast<double>(bytes));
     expect_valid(e.glb, std::to_string(bytes));
@@ -165,17 +166,17 @@ TEST(ExtractModel, BytesAreMetWithinTwoPercentFromBelow) {
 }
 
 TEST(ExtractModel, OutsideTheReachTheNearestFileIsGiven) {
-  const Extracted small = extract(budget(100));
+  const Extracted small = extract_within(100);
   EXPECT_FALSE(small.within);
   EXPECT_EQ(small.scale, 5);
   expect_valid(small.glb, "smallest");
-  EXPECT_LE(small.glb.size(), extract(budget(small.glb.size() + 200)).glb.size());
+  EXPECT_LE(small.glb.size(), extract_within(small.glb.size() + 200).glb.size());
 }
 
 TEST(ExtractModel, MoreBytesGiveNoWorsePicture) {
   double before = 1;
   for (const std::uint64_t bytes : {5000u, 8000u, 12000u}) {
-    const Extracted e = extract(budget(bytes));
+    const Extracted e = extract_within(bytes);
     EXPECT_LE(e.difference, before + 0.005) << bytes;
     before = e.difference;
   }
@@ -184,12 +185,12 @@ TEST(ExtractModel, MoreBytesGiveNoWorsePicture) {
 TEST(ExtractModel, FilesOfTheOtherScaleAreNotNearer) {
   int compared = 0;
   for (const std::uint64_t bytes : {6000u, 9000u}) {
-    const Extracted chosen = extract(budget(bytes));
+    const Extracted chosen = extract_within(bytes);
     for (const int scale : {0, 5}) {
       if (scale == chosen.scale) continue;
-      ExtractRequest r = budget(bytes);
+      ExtractBudget r = budget({bytes});
       r.scale = scale;
-      const Extracted other = extract(r);
+      const Extracted other = extract({r});
       if (other.glb.size() > bytes) continue;
       EXPECT_LE(chosen.difference, 1.01 * other.difference) << bytes << " S_" << *r.scale;
       ++compared;
@@ -199,34 +200,34 @@ TEST(ExtractModel, FilesOfTheOtherScaleAreNotNearer) {
 }
 
 TEST(ExtractModel, ThreadsDoNotChangeAByte) {
-  EXPECT_EQ(extract(budget(7000), 1).glb, extract(budget(7000), 8).glb);
-  ExtractRequest r;
-  EXPECT_EQ(extract(r, 1).glb, extract(r, 8).glb);
+  EXPECT_EQ(extract_within(7000, 1).glb, extract_within(7000, 8).glb);
+  EXPECT_EQ(extract({}, 1).glb, extract({}, 8).glb);
 }
 
 TEST(ExtractModel, SaysWhichScaleOrRungIsNotThere) {
-  ExtractRequest r;
+  ExtractScale r;
   r.scale = 3;
-  EXPECT_THROW(extract(r), InputError);
-  r.bytes = 9000;
-  EXPECT_THROW(extract(r), InputError);
-  ExtractRequest rung;
+  EXPECT_THROW(extract({r}), InputError);
+  ExtractBudget b = budget({9000});
+  b.scale = 3;
+  EXPECT_THROW(extract({b}), InputError);
+  ExtractScale rung;
   rung.rung = 2;
-  EXPECT_THROW(extract(rung), InputError);
+  EXPECT_THROW(extract({rung}), InputError);
   rung.rung = 0;
-  EXPECT_EQ(extract(rung).images[0].quality, 20);
+  EXPECT_EQ(extract({rung}).images[0].quality, 20);
 }
 
 TEST(ExtractModel, DamageIsAnErrorWhereverItIs) {
   for (const char* entry : {"texture/0/r01.pack", "texture/0/tables.pack", "mesh/s00.glb", "tables.bin"}) {
     testing::PackagePatcher patcher(package_bytes());
     patcher.edit(entry, [](Bytes& b) { b[b.size() / 2] ^= 0x55; });
-    ExtractRequest r;
+    ExtractScale r;
     r.scale = 0;
     EXPECT_THROW(
         {
           PackageReader package = open(patcher.package());
-          extract_model(package, r, {});
+          extract_model(package, {r}, {});
         },
         FormatError)
         << entry;
@@ -236,11 +237,11 @@ TEST(ExtractModel, DamageIsAnErrorWhereverItIs) {
     for (const std::size_t at : {0u, 13u, 40u}) {
       testing::PackagePatcher patcher(package_bytes());
       patcher.edit(entry, [at](Bytes& b) { b[at] ^= 0xff; }).seal();
-      ExtractRequest r = budget(8000);
+      ExtractBudget r = budget({8000});
       r.scale = 0;
       try {
         PackageReader package = open(patcher.package());
-        expect_valid(extract_model(package, r, {}).glb, entry);  // some bytes only change texels
+        expect_valid(extract_model(package, {r}, {}).glb, entry);  // some bytes only change texels
       } catch (const Error& e) {
         EXPECT_FALSE(std::string(e.what()).empty());
       }
@@ -248,25 +249,25 @@ TEST(ExtractModel, DamageIsAnErrorWhereverItIs) {
 }
 
 TEST(ExtractModel, ReportsAreJson) {
-  ExtractRequest r = budget(3000);
+  ExtractBudget r = budget({3000});
   r.images = ExtractImages::kWebp;
-  const auto json = nlohmann::json::parse(extract_json(extract(r), r, "a.glb"));
+  const auto json = nlohmann::json::parse(extract_json(extract({r}), "a.glb"));
   EXPECT_EQ(json["asked_bytes"], 3000);
   EXPECT_EQ(json["images"][0]["format"], "webp");
-  EXPECT_NE(extract_text(extract(r), r, "a.glb").find("a.glb: "), std::string::npos);
+  EXPECT_NE(extract_text(extract({r}), "a.glb").find("a.glb: "), std::string::npos);
 }
 
-TEST(ExtractBudgets, EveryFileIsTheOneThatItsNumberAloneGives) {
+TEST(ExtractFiles, EveryFileIsTheOneThatItsNumberAloneGives) {
   const Bytes with = package_with_proxies();
   for (const Bytes* bytes : {&package_bytes(), &with}) {
     // Out of order, twice the same search, too few bytes for anything, and more than there is.
     const std::vector<std::uint64_t> numbers{9000, 2500, 4000, 10, 2600, 1000000};
     PackageReader package = open(*bytes);
-    const std::vector<Extracted> together = extract_budgets(package, budget(0), numbers, {});
+    const std::vector<Extracted> together = extract_files(package, {budget(numbers)}, {});
     ASSERT_EQ(together.size(), numbers.size());
     for (std::size_t k = 0; k < numbers.size(); ++k) {
       PackageReader fresh = open(*bytes);
-      const Extracted alone = extract_model(fresh, budget(numbers[k]), {});
+      const Extracted alone = extract_model(fresh, {budget({numbers[k]})}, {});
       EXPECT_EQ(together[k].glb, alone.glb) << numbers[k];
       EXPECT_EQ(together[k].difference, alone.difference) << numbers[k];
       EXPECT_EQ(together[k].mesh_difference, alone.mesh_difference) << numbers[k];
@@ -277,24 +278,24 @@ TEST(ExtractBudgets, EveryFileIsTheOneThatItsNumberAloneGives) {
   }
 }
 
-TEST(ExtractBudgets, LevelsOfDetailToo) {
+TEST(ExtractFiles, LevelsOfDetailToo) {
   const std::vector<std::uint64_t> numbers{6000, 12000};
   PackageReader package = open(package_bytes());
-  ExtractRequest r = budget(0);
-  r.lods = true;
-  const std::vector<Extracted> together = extract_budgets(package, r, numbers, {});
+  ExtractBudget r = budget(numbers);
+  r.levels = true;
+  const std::vector<Extracted> together = extract_files(package, {r}, {});
   for (std::size_t k = 0; k < numbers.size(); ++k) {
-    r.bytes = numbers[k];
-    EXPECT_EQ(together[k].glb, extract_model(package, r, {}).glb) << numbers[k];
+    r.bytes = {numbers[k]};
+    EXPECT_EQ(together[k].glb, extract_model(package, {r}, {}).glb) << numbers[k];
   }
 }
 
-TEST(ExtractBudgets, ProgressRisesToOne) {
+TEST(ExtractFiles, ProgressRisesToOne) {
   PackageReader package = open(package_bytes());
   std::vector<double> seen;
   RunContext context;
   context.progress = [&](double fraction) { seen.push_back(fraction); };
-  extract_budgets(package, budget(0), {3000, 5000}, context);
+  extract_files(package, {budget({3000, 5000})}, context);
   ASSERT_FALSE(seen.empty());
   EXPECT_TRUE(std::ranges::is_sorted(seen));
   EXPECT_EQ(seen.back(), 1);

@@ -5,11 +5,10 @@
 #include <algorithm>
 
 #include "format/base/text_bytes.h"
+#include "pipeline/batch/junit.h"
 #include "pipeline/io/atomic_file.h"
-#include "pipeline/io/markup.h"
 #include "pipeline/io/table.h"
 #include "tools/cli/options/delivery_text.h"
-#include "tools/publish/report/html.h"
 #include "tools/publish/report/switch_sizes.h"
 
 namespace texmesh {
@@ -79,9 +78,8 @@ std::vector<GateResult> check_atlases(const AtlasDiagnosis& d, const AtlasLimits
   std::vector<GateResult> out;
   add_most("charts", static_cast<double>(d.charts()), limits.max_charts, out);
   add_most("triangle floor", static_cast<double>(d.triangle_floor()), limits.max_floor_triangles, out);
-  for (std::size_t k = 0; k < d.report.atlases.size(); ++k) {
-    const AtlasFigures& a = d.report.atlases[k];
-    const std::string of = d.names[k] + ": ";
+  for (const NamedAtlas& a : d.atlases) {
+    const std::string of = a.name + ": ";
     add_least(of + "cover", a.cover, limits.min_cover, out);
     add_most(of + "share of texels in thin charts", a.thin_share, limits.max_thin, out);
     add_most(of + "overlap", a.overlap, limits.max_overlap, out);
@@ -98,18 +96,9 @@ std::string gate_junit(const std::string& suite, const std::string& input,
                        const std::vector<GateResult>& results) {
   const auto failures =
       std::ranges::count_if(results, [](const GateResult& r) { return !r.failure.empty(); });
-  const std::string name = markup_escaped(printable(input));
-  std::string out = fmt::format(
-      "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n<testsuite name=\"{}\" "
-      "tests=\"{}\" failures=\"{}\">\n",
-      markup_escaped(suite), results.size(), failures);
-  for (const GateResult& r : results) {
-    out += fmt::format("<testcase classname=\"{}\" name=\"{}\"", name, markup_escaped(r.name));
-    out += r.failure.empty()
-               ? "/>\n"
-               : fmt::format("><failure message=\"{}\"/></testcase>\n", markup_escaped(r.failure));
-  }
-  return out + "</testsuite>\n</testsuites>\n";
+  JunitReport report({suite, results.size(), static_cast<std::size_t>(failures), 0, {}});
+  for (const GateResult& r : results) report.add({printable(input), r.name, {}, {}, r.failure, "", ""});
+  return report.finish();
 }
 
 void write_gate_junit(const std::string& path, const std::string& suite, const std::string& input,

@@ -1,9 +1,12 @@
 #pragma once
+#include <algorithm>
 #include <functional>
+#include <iostream>
 #include <memory>
-#include <string>
 #include <vector>
 
+#include "format/base/fields.h"
+#include "pipeline/io/exit_codes.h"
 #include "tools/cli/options/units.h"
 
 namespace CLI {
@@ -13,12 +16,9 @@ class Option;
 
 namespace texmesh {
 
-/// A thin layer over CLI11, whose headers cost a source file 15 s: only command_line.cpp and help_text.cpp
-/// include them. Every value that an option or an argument stores into must outlive CommandLine::run.
+/// A thin layer over CLI11, whose headers cost a source file 15 s: only command_line.cpp includes them. Every
+/// value that an option or an argument stores into must outlive CommandLine::run.
 struct CommandLineState;
-
-inline constexpr const char* kProgramSummary =
-    "texmesh compiles textured 3D scans into packages that any static web server can stream.";
 
 /// An option or an argument of a command, for saying more about it.
 class Option {
@@ -27,15 +27,16 @@ class Option {
   Option& required();
   /// What stands for the value in the help: FILE, DIR ... (default: N for integers, X, TEXT).
   Option& value_name(const std::string& name);
-  /// The help tells the value that the variable has now.
-  Option& shows_default();
-  Option& shows_default(const std::string& text);  // of an option that a function takes
+  /// The help tells the value that the variable has now, or `text` instead.
+  Option& shows_default(const std::string& text = "");
   Option& integer_in(int least, int most);
   Option& number_in(double least, double most);  // not NaN
   /// One of these words; the help lists them after its text.
   Option& one_of(const std::vector<std::string>& words);
   /// One of these words, which the help's text explains.
   Option& one_of_explained(const std::vector<std::string>& words);
+  /// The help lists the words after its text.
+  Option& lists_words();
   /// Words that shells offer for the value. Who takes the value checks it, and the help's text tells of them.
   Option& offers(const std::vector<std::string>& words);
   Option& separated_by(char delimiter);
@@ -46,6 +47,8 @@ class Option {
   Option& everyday(const std::string& title, const std::string& text = "");
 
  private:
+  friend class Command;
+  Option& remembers_default(const std::string& text);
   CLI::Option* option_;
   CommandLineState* state_;
 };
@@ -55,24 +58,44 @@ class Command {
  public:
   Command(CLI::App* app, CommandLineState& state) : app_(app), state_(&state) {}
 
-  /// Commands and options that are added from here on stand beneath this title in the help.
-  void group(const std::string& title) { group_ = title; }
+  /// Commands and options that are added from here on stand beneath this title in the help; of `rare`
+  /// commands only --help-all tells.
+  void group(const std::string& title, bool rare = false);
   Command add(const std::string& name, const std::string& summary);
-  /// A command of the program, with its summary of command_list.h.
-  Command add(const std::string& name);
   void needs_command();
   /// No help and no shell tells of the command.
   void hidden();
 
   Option flag(const std::string& names, bool& value, const std::string& help);
   Option flag(const std::string& names, std::function<void()> on_given, const std::string& help);
-  /// T: int, std::uint64_t, double, std::string, std::optional<double>, std::vector of int or std::string.
+  /// T: int, std::uint64_t, double, std::string, std::optional of int or double, std::vector of int or
+  /// std::string.
   /// A name without dashes makes an argument.
   template <class T>
   Option option(const std::string& names, T& value, const std::string& help);
   /// Any text; `on_given` takes it.
   Option option(const std::string& names, std::function<void(const std::string&)> on_given,
                 const std::string& help);
+  /// A value that `parse` reads of text and flag: parse_bytes() and others of units.h. It throws UsageErrors.
+  template <class T, class Parsed>
+  Option option(const std::string& names, T& value, Parsed (*parse)(const std::string&, const std::string&),
+                const std::string& help) {
+    const std::string flag = names.substr(names.find("--") == std::string::npos ? 0 : names.find("--"));
+    return option(
+        names, [&value, parse, flag](const std::string& text) { value = parse(text, flag); }, help);
+  }
+  /// One of the names of an enum (EnumNames), which the help's text explains.
+  template <class Enum>
+  Option choice(const std::string& names, Enum& value, const std::string& help) {
+    const std::vector<std::string> words(EnumNames<Enum>::names.begin(), EnumNames<Enum>::names.end());
+    std::function<void(const std::string&)> take = [&value, words](const std::string& text) {
+      value = static_cast<Enum>(std::find(words.begin(), words.end(), text) - words.begin());
+    };
+    Option made = option(names, std::move(take), help);
+    return made.one_of_explained(words).remembers_default(std::string(enum_name(value)));
+  }
+  /// An option that prints a text, and the program does nothing else.
+  void text_option(const std::string& name, std::string (*text)(), const std::string& help);
   /// An option whose value names a group `prefix` + value: its help is printed, nothing else done.
   void help_option(const std::string& name, const std::string& prefix, const std::string& help);
 
@@ -80,7 +103,7 @@ class Command {
   void examples(const std::string& lines);
   /// What the help ends with: paragraphs, one a line; lines that begin with a blank stay as they are.
   void notes(const std::string& text);
-  /// What shells and man know of the command and of all beneath it: form is bash, zsh or man (shell_text.h).
+  /// What shells and man know of the command and of all beneath it: form is bash, zsh or man.
   std::string shell_text(const std::string& form) const;
   /// What the command does, and the exit code of the process.
   void on_run(std::function<int()> run);
@@ -89,6 +112,7 @@ class Command {
   CLI::App* app_;
   CommandLineState* state_;
   std::string group_;
+  bool rare_ = false;
 };
 
 class CommandLine {
@@ -110,5 +134,9 @@ class CommandLine {
   std::unique_ptr<CommandLineState> state_;
   std::unique_ptr<CLI::App> app_;
 };
+
+/// Runs what gives an exit code. What it throws is printed; the exit code is then that of exit_codes.h: 2 for
+/// a UsageError, 1 for other errors of inputs and files, 3 for mistakes of ours.
+int run_and_print_errors(const std::function<int()>& run);
 
 }  // namespace texmesh

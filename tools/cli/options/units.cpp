@@ -44,6 +44,12 @@ std::uint64_t parse_bytes(const std::string& text, const std::string& flag) {
   return static_cast<std::uint64_t>(parse(text, flag, kUnits, "a size such as 500MB or 8GiB", kMostBytes));
 }
 
+std::uint64_t parse_some_bytes(const std::string& text, const std::string& flag) {
+  const std::uint64_t bytes = parse_bytes(text, flag);
+  if (bytes == 0) throw UsageError(flag, "", "a number above 0", text);
+  return bytes;
+}
+
 std::int64_t parse_seconds(const std::string& text, const std::string& flag) {
   static const std::map<std::string, double> kUnits{
       {"", 1}, {"s", 1}, {"min", 60}, {"h", 3600}, {"d", 86400}};

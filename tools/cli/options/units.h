@@ -11,6 +11,16 @@ struct UsageError : InputError {
   using InputError::InputError;
 };
 
+/// Runs what reads what was asked for: an InputError of it becomes a UsageError.
+template <class Run>
+auto as_usage(const Run& run) {
+  try {
+    return run();
+  } catch (const InputError& e) {
+    throw UsageError(e.file(), e.place(), e.expected(), e.found());
+  }
+}
+
 /// A check for options: a number from `least` to `most`, and not NaN, which CLI::Range lets pass.
 class NumberIn {
  public:
@@ -23,6 +33,9 @@ class NumberIn {
 
 /// "500MB", "8GiB", "1234". UsageError that names the flag.
 std::uint64_t parse_bytes(const std::string& text, const std::string& flag);
+
+/// The same, above 0.
+std::uint64_t parse_some_bytes(const std::string& text, const std::string& flag);
 
 /// "90d", "12h", "30min", "45s", "45". UsageError that names the flag.
 std::int64_t parse_seconds(const std::string& text, const std::string& flag);

@@ -1,19 +1,27 @@
+// The search behind extract --bytes. Its story:
+// 1. A Reference is made once: the package's best, S_0 with the best texels, in pictures lit as texmesh
+// render
+//    lights them. Everything is judged by FLIP against these pictures.
+// 2. Candidates are coded meshes and coded images. Each is made when it is first asked for.
+// 3. Small windows of the pictures tell what bytes are worth: S_0 is rendered with one image coded in many
+// ways,
+//    which gives each image a curve of loss against bytes (LossCurves); every coded mesh is rendered with the
+//    best textures. Losses of mesh and textures are added up.
+// 4. From a likely mesh the search walks to neighbours, finer and coarser, while the sum of losses falls.
+// What a
+//    mesh leaves of the bytes is dealt out along the curves, where it takes away most loss.
+// 5. The file is written and filled up to at least 98 % of the bytes (Filling).
+// 6. Sums of losses are guesses. In a small file whole pictures decide: files of other likely meshes, other
+// sizes
+//    and codings of the texture that loses most. In a large file textures may be full: then the mesh is
+//    finer.
+// 7. Last, proxies of the package are tried in its place (offer_proxies()).
 #include "tools/extract/budget/budget_search.h"
 
 #include <algorithm>
-#include <functional>
-#include <map>
-#include <memory>
+#include <cmath>
 #include <numeric>
-#include <optional>
-#include <set>
-#include <utility>
 
-#include "tools/extract/budget/budget_file.h"
-#include "tools/extract/budget/budget_source.h"
-#include "tools/extract/budget/file_looks.h"
-#include "tools/extract/budget/mesh_candidates.h"
-#include "tools/extract/glb/standalone_glb.h"
 #include "tools/extract/proxy/proxy_search.h"
 
 namespace texmesh {
@@ -28,273 +36,386 @@ constexpr std::uint64_t kLookAtFilesBelow = 200000;
 constexpr double kLikely = 1.2;  // times the least joined loss
 constexpr std::size_t kMostLikely = 4;
 constexpr double kUsualBytes = 3.5, kLeastBytes = 1.5;  // of a coded triangle
+constexpr double kTexelsPerByte = 40;                   // more texels than that are never worth a byte
+
+double most_texels(std::uint64_t bytes) {
+  return std::max(kTexelsPerByte * static_cast<double>(bytes), 65536.0);
+}
+
+/// S_0 as it is stored.
+bool is_finest(const MeshKey& key) { return key.scale == 0 && key.coding + 1 == kMeshCodings; }
+
+/// The finest that is likely to leave half of the bytes to textures.
+std::size_t likely_scale(const Reference& reference, std::uint64_t bytes) {
+  const std::vector<ManifestScale>& scales = reference.package.manifest().scales;
+  const double part = reference.images.empty() ? 1.0 : 0.5;
+  for (std::size_t k = 0; k < scales.size(); ++k)
+    if (kUsualBytes * static_cast<double>(scales[k].triangles) <= part * static_cast<double>(bytes)) return k;
+  return scales.size() - 1;
+}
+
+MeshKey first_mesh(const Reference& reference, std::uint64_t bytes) {
+  const std::optional<int>& scale = reference.wishes.scale;
+  return {scale ? reference.package.scale_index(*scale) : likely_scale(reference, bytes), kFirstCoding};
+}
+
+/// What the first mesh leaves.
+double likely_texture_bytes(const Reference& reference, std::uint64_t bytes) {
+  const MeshKey first = first_mesh(reference, bytes);
+  return static_cast<double>(bytes) -
+         kUsualBytes * static_cast<double>(reference.package.manifest().scales[first.scale].triangles);
+}
+
+std::size_t largest_loss(const DealtBytes& images) {
+  const auto most = std::ranges::max_element(images.images, {}, &CodedImage::loss);
+  return static_cast<std::size_t>(most - images.images.begin());
+}
+
+/// Images that take many bytes, but for one.
+std::vector<std::size_t> largest_but(const DealtBytes& images, std::size_t but) {
+  constexpr std::size_t kMost = 3;
+  std::vector<std::size_t> out;
+  for (std::size_t i = 0; i < images.images.size(); ++i)
+    if (i != but) out.push_back(i);
+  std::ranges::stable_sort(out, std::greater{}, [&](std::size_t i) { return images.images[i].bytes; });
+  if (out.size() > kMost) out.resize(kMost);
+  return out;
+}
+
+/// About as many bytes; `steps` below 0 are a larger texture, two of them twice the sides. Nothing where it
+/// has no other size.
+std::optional<DealtBytes> with_largest_loss_resized(DealtBytes images, int steps,
+                                                    const Candidates& candidates) {
+  constexpr double kQualitiesOfStep = 22;
+  images.last = largest_loss(images);
+  ImagePlan& plan = images.images[images.last].plan;
+  const double share = plan.share * std::sqrt(steps < 0 ? 1 << -steps : 1.0 / (1 << steps));
+  if (plan.coding.format == FileImage::kPng || share > 1.01) return std::nullopt;
+  if (plan.coding.stored) plan.coding = candidates.codings(images.last).front();
+  plan.share = std::min(share, 1.0);
+  plan.quality = std::clamp(plan.quality + kQualitiesOfStep * steps, kLowestQuality, kHighestQuality);
+  return images;
+}
 
 /// What searches for several numbers of bytes share.
 struct SharedSearch {
-  SharedSearch(PackageReader& package, const ExtractRequest& request, bool for_several,
+  SharedSearch(PackageReader& package, const ExtractBudget& wishes, bool recentre, std::uint64_t bytes,
                const RunContext& context)
-      : source(package, request, context),
-        meshes(source, for_several),
-        coder(source),
-        curves(source, coder),
-        proxies(source) {}
-  void set_bytes(std::uint64_t bytes) {
-    if (source.request.bytes == bytes) return;
-    source.request.bytes = bytes;
-    meshes.forget_all();
-  }
-  BudgetSource source;
-  MeshCandidates meshes;
-  ImageCoder coder;
-  LossCurves curves;
-  ProxyOffers proxies;
-};
-
-/// Scale, coding of the mesh and textures, chosen together by what files look like.
-class BudgetSearch {
- public:
-  explicit BudgetSearch(SharedSearch& shared)
-      : source_(shared.source),
-        meshes_(shared.meshes),
-        coder_(shared.coder),
-        curves_(shared.curves),
-        filler_(source_, coder_),
-        looks_(source_, meshes_, coder_, filler_) {}
-
-  /// `report`: parts of the way.
-  Extracted run(const std::function<void(double)>& report) {
-    curves_.measure(static_cast<double>(source_.request.bytes) -
-                    kUsualBytes * static_cast<double>(scales()[start().scale].triangles));
-    report(0.4);
-    const MeshKey best = choose_mesh();
-    report(0.6);
-    FoundFile found = looks_.file_of(best, allocation_of(best));
-    if (filler_.fits(found.file)) {
-      if (source_.request.bytes <= kLookAtFilesBelow)
-        look_at_files(found);
-      else
-        looks_.try_smaller_than_stored(found);
-    }
-    report(0.7);
-    const bool fitting = filler_.fits(found.file) && !filler_.fills(found.file);
-    if (fitting) fill_by_mesh(found);
-    return finish(found.key, std::move(found.file));
-  }
-
- private:
-  const std::vector<ManifestScale>& scales() const { return source_.package.manifest().scales; }
-
-  Allocation allocation_of(const MeshKey& key) { return curves_.allocate(bytes_left(meshes_.at(key))); }
-
-  /// What meshes and textures lose is told from parts of pictures, one change at a time. Where files are
-  /// small, which is nearest to the truth is seen in whole pictures: files of the likeliest meshes, and the
-  /// texture that loses most in other sizes.
-  void look_at_files(FoundFile& best) {
-    looks_.look_at(best);
-    for (const MeshKey& key : likeliest())
-      looks_.replace_if_nearer(looks_.file_of(key, allocation_of(key)), best);
-    looks_.try_other_files(curves_, best);
-  }
-
-  /// But for the best.
-  std::vector<MeshKey> likeliest() const {
-    std::vector<std::pair<double, MeshKey>> order;
-    for (const auto& [key, loss] : predicted_)
-      if (key != best_ && loss <= kLikely * least_) order.emplace_back(loss, key);
-    std::ranges::sort(order);
-    if (order.size() > kMostLikely) order.resize(kMostLikely);
-    std::vector<MeshKey> out;
-    for (const auto& [loss, key] : order) out.push_back(key);
-    return out;
-  }
-
-  MeshKey start() {
-    return {source_.request.scale ? source_.package.scale_index(*source_.request.scale) : likely_scale(),
-            kFirstCoding};
-  }
-
-  /// From a likely mesh to its neighbours: finer, coarser, coded finer and leaner, and a finer one
-  /// coded leaner or the other way round, as long as the picture gets better; one that does not is
-  /// passed over once.
-  MeshKey choose_mesh() {
-    best_ = start();
-    least_ = loss_of(best_);
-    for (bool again = true; again;) {
-      const MeshKey before = best_;
-      if (!source_.request.scale) {
-        follow_direction(-1, 0);
-        follow_direction(1, 0);
-      }
-      follow_direction(0, 1);
-      follow_direction(0, -1);
-      if (!source_.request.scale) {
-        follow_direction(-1, -1);
-        follow_direction(1, 1);
-      }
-      again = before != best_;
-    }
-    if (least_ >= kNothing) best_ = {source_.request.scale ? best_.scale : scales().size() - 1, 0};
-    return best_;
-  }
-
-  void follow_direction(int scale_step, int coding_step) {
-    const MeshKey from = best_;
-    int worse = 0;
-    for (int k = 1; worse < 2; ++k) {
-      const int scale = static_cast<int>(from.scale) + k * scale_step, coding = from.coding + k * coding_step;
-      if (scale < 0 || scale >= static_cast<int>(scales().size()) || coding < 0 || coding >= kMeshCodings)
-        return;
-      worse = better({static_cast<std::size_t>(scale), coding}) ? 0 : worse + 1;
-    }
-  }
-
-  bool better(const MeshKey& key) {
-    if (!seen_.insert(key).second) return key == best_;
-    const double found = too_large(key) || least_loss(key) > least_ ? kNothing : loss_of(key);
-    meshes_.forget(found < least_ ? best_ : key);
-    if (!(found < least_)) return false;
-    least_ = found;
-    best_ = key;
-    return true;
-  }
-
-  bool too_large(const MeshKey& key) const {
-    return kLeastBytes * static_cast<double>(scales()[key.scale].triangles) >
-           static_cast<double>(source_.request.bytes);
-  }
-
-  /// What the mesh is expected to lose at least: scale and coding of a mesh lose apart, and finer ones of
-  /// both kinds lose less.
-  double least_loss(const MeshKey& key) const {
-    double least = 0;
-    for (const auto& [known, geometry] : geometry_) {
-      if (known.scale > key.scale) continue;
-      double loss = joined(geometry);
-      if (known.coding < key.coding) {
-        const auto coded = geometry_.find({0, known.coding});
-        if (known.scale == 0 || coded == geometry_.end()) continue;
-        loss -= joined(coded->second);
-      }
-      least = std::max(least, kSurely * loss);
-    }
-    return least;
-  }
-
-  double bytes_left(const MeshCandidate& mesh) const {
-    return static_cast<double>(source_.request.bytes) - static_cast<double>(mesh.fixed_bytes);
-  }
-
-  /// What a file of this mesh is expected to lose.
-  double loss_of(const MeshKey& key) {
-    seen_.insert(key);
-    const MeshCandidate& mesh = meshes_.at(key);
-    geometry_[key] = mesh.geometry;
-    const Allocation images = curves_.allocate(bytes_left(mesh));
-    if (images.bytes > bytes_left(mesh)) return kNothing;
-    return predicted_[key] = joined(mesh.geometry) + images.loss;
-  }
-
-  /// The finest that is likely to leave half of the bytes to textures.
-  std::size_t likely_scale() const {
-    const double part = source_.textures.images().empty() ? 1.0 : 0.5;
-    for (std::size_t k = 0; k < scales().size(); ++k)
-      if (kUsualBytes * static_cast<double>(scales()[k].triangles) <=
-          part * static_cast<double>(source_.request.bytes))
-        return k;
-    return scales().size() - 1;
-  }
-
-  /// `from` with its mesh coded finer by parts of a bit: the largest file that was found. Nothing
-  /// where all that fit are smaller.
-  std::optional<FoundFile> larger_by_bits(const FoundFile& from, std::size_t scale, int coding) {
-    const bool same = scale == from.key.scale && coding == from.key.coding;
-    double low = same ? 0 : kFewestExtraBits, high = kMostExtraBits;
-    std::optional<FoundFile> best;
-    for (int i = 0; i < kMeshTries && !(best && filler_.fills(best->file)); ++i) {
-      FoundFile other = from;
-      other.key = {scale, coding, (low + high) / 2};
-      other.file.glb = meshes_.at(other.key).file_with(from.file.images);
-      meshes_.forget(other.key);
-      (filler_.fits(other.file) ? low : high) = other.key.extra_bits;
-      if (filler_.fits(other.file) && other.file.glb.size() >= (best ? *best : from).file.glb.size())
-        best = std::move(other);
-    }
-    return best;
-  }
-
-  /// Where textures cannot take the bytes that are left: the same mesh coded finer, or a finer scale. Of
-  /// several codings the one that looks nearest.
-  void fill_by_mesh(FoundFile& best) {
-    if (is_finest(best.key) || !meshes_.at(best.key).file->has_draco()) return;
-    const FoundFile from = best;
-    looks_.look_at(best);
-    for (std::size_t scale = from.key.scale;; --scale) {
-      for (int coding = from.key.coding; coding < kMeshCodings; ++coding) {
-        std::optional<FoundFile> other = larger_by_bits(from, scale, coding);
-        if (!other || filler_.fills(other->file) < filler_.fills(best.file)) continue;
-        looks_.look_at(*other);
-        if (filler_.fills(other->file) > filler_.fills(best.file) || other->difference <= best.difference)
-          best = *std::move(other);
-      }
-      if (scale == 0 || filler_.fills(best.file) || source_.request.scale) return;
-    }
-  }
-
-  /// S_0 as it is stored.
-  static bool is_finest(const MeshKey& key) { return key.scale == 0 && key.coding + 1 == kMeshCodings; }
-
-  Extracted finish(const MeshKey& key, BudgetFile file) {
-    const MeshCandidate& mesh = meshes_.at(key);
-    Extracted out;
-    out.scale = mesh.scale;
-    out.levels = mesh.levels;
-    out.triangles = mesh.triangles;
-    out.within = filler_.fills(file) || (filler_.fits(file) && file.has_sources && is_finest(key));
-    out.views = static_cast<int>(source_.cameras.size());
-    out.side_px = source_.side_px;
-    out.images = file.rows;
-    out.mesh_bytes = file.glb.size();
-    for (const ExtractedImage& i : file.rows) out.mesh_bytes -= i.bytes;
-    const std::vector<double> differences = looks_.differences_of(key, file);
-    out.mesh_difference = differences[0];
-    out.difference = differences[1];
-    out.glb = std::move(file.glb);
-    return out;
-  }
-
-  BudgetSource& source_;
-  MeshCandidates& meshes_;
-  ImageCoder& coder_;
-  LossCurves& curves_;
-  BudgetFiller filler_;
-  FileLooks looks_;
-  std::set<MeshKey> seen_;
-  std::map<MeshKey, double> geometry_;   // of meshes looked at: MeshCandidate::geometry
-  std::map<MeshKey, double> predicted_;  // joined losses of files, of meshes whose files fit
-  MeshKey best_;
-  double least_ = kNothing;
+      : textures(package, most_texels(bytes), context),
+        reference(package, wishes, recentre, textures, context),
+        candidates(reference, textures, wishes.bytes.size() > 1) {}
+  TextureSource textures;
+  const Reference reference;
+  Candidates candidates;
+  std::map<std::uint32_t, double> proxies;  // differences of those that were looked at
 };
 
 }  // namespace
 
-std::vector<int> levels_of(const Manifest& manifest, int finest) {
-  std::vector<int> out{finest};
-  for (const ManifestScale& s : manifest.scales)
-    if (s.major && s.scale > finest) out.push_back(s.scale);
+Search::Search(const Reference& reference, Candidates& candidates, std::uint64_t bytes)
+    : reference_(reference),
+      candidates_(candidates),
+      bytes_(bytes),
+      curves_(reference, candidates, likely_texture_bytes(reference, bytes)),
+      filling_(reference, candidates, bytes) {}
+
+Extracted Search::run(const std::function<void(double)>& report) {
+  report(0.4);
+  choose_mesh();
+  report(0.6);
+  FoundFile found = file_of(best_, allocation_of(best_));
+  if (filling_.fits(found.file)) {
+    if (bytes_ <= kLookAtFilesBelow)
+      look_at_files(found);
+    else
+      try_smaller_than_stored(found);
+  }
+  report(0.7);
+  if (filling_.fits(found.file) && !filling_.fills(found.file)) fill_by_mesh(found);
+  return finish(found.key, std::move(found.file));
+}
+
+const MeshFile& Search::mesh(const MeshKey& key) {
+  const auto [it, fresh] = meshes_.try_emplace(key);
+  if (fresh) it->second = filling_.mesh_file(candidates_.mesh(key));
+  return it->second;
+}
+
+void Search::forget(const MeshKey& key) {
+  meshes_.erase(key);
+  candidates_.forget(key);
+}
+
+double Search::bytes_left(const MeshFile& mesh) const {
+  return static_cast<double>(bytes_) - static_cast<double>(mesh.fixed_bytes);
+}
+
+/// From a likely mesh to its neighbours: finer, coarser, coded finer and leaner, and a finer one
+/// coded leaner or the other way round, as long as the picture gets better; one that does not is
+/// passed over once.
+void Search::choose_mesh() {
+  best_ = first_mesh(reference_, bytes_);
+  least_ = loss_of(best_);
+  for (bool again = true; again;) {
+    const MeshKey before = best_;
+    if (!reference_.wishes.scale) {
+      follow_direction(-1, 0);
+      follow_direction(1, 0);
+    }
+    follow_direction(0, 1);
+    follow_direction(0, -1);
+    if (!reference_.wishes.scale) {
+      follow_direction(-1, -1);
+      follow_direction(1, 1);
+    }
+    again = before != best_;
+  }
+  if (least_ >= kNothing) best_ = {reference_.wishes.scale ? best_.scale : scales().size() - 1, 0};
+}
+
+void Search::follow_direction(int scale_step, int coding_step) {
+  const MeshKey from = best_;
+  int worse = 0;
+  for (int k = 1; worse < 2; ++k) {
+    const int scale = static_cast<int>(from.scale) + k * scale_step, coding = from.coding + k * coding_step;
+    if (scale < 0 || scale >= static_cast<int>(scales().size()) || coding < 0 || coding >= kMeshCodings)
+      return;
+    worse = better({static_cast<std::size_t>(scale), coding}) ? 0 : worse + 1;
+  }
+}
+
+bool Search::better(const MeshKey& key) {
+  if (!seen_.insert(key).second) return key == best_;
+  const double found = too_large(key) || least_loss(key) > least_ ? kNothing : loss_of(key);
+  forget(found < least_ ? best_ : key);
+  if (!(found < least_)) return false;
+  least_ = found;
+  best_ = key;
+  return true;
+}
+
+bool Search::too_large(const MeshKey& key) const {
+  return kLeastBytes * static_cast<double>(scales()[key.scale].triangles) > static_cast<double>(bytes_);
+}
+
+/// What the mesh is expected to lose at least: scale and coding of a mesh lose apart, and finer ones of
+/// both kinds lose less.
+double Search::least_loss(const MeshKey& key) const {
+  double least = 0;
+  for (const auto& [known, geometry] : geometry_) {
+    if (known.scale > key.scale) continue;
+    double loss = joined(geometry);
+    if (known.coding < key.coding) {
+      const auto coded = geometry_.find({0, known.coding});
+      if (known.scale == 0 || coded == geometry_.end()) continue;
+      loss -= joined(coded->second);
+    }
+    least = std::max(least, kSurely * loss);
+  }
+  return least;
+}
+
+/// What a file of this mesh is expected to lose.
+double Search::loss_of(const MeshKey& key) {
+  seen_.insert(key);
+  const double geometry = geometry_[key] = candidates_.mesh(key).geometry;
+  const double left = bytes_left(mesh(key));
+  const DealtBytes images = curves_.allocate(left);
+  if (images.bytes > left) return kNothing;
+  return predicted_[key] = joined(geometry) + images.loss;
+}
+
+/// What meshes and textures lose is told from parts of pictures, one change at a time. Where files are
+/// small, which is nearest to the truth is seen in whole pictures: files of the likeliest meshes, and the
+/// texture that loses most in other sizes.
+void Search::look_at_files(FoundFile& best) {
+  look_at(best);
+  for (const MeshKey& key : likeliest()) replace_if_nearer(file_of(key, allocation_of(key)), best);
+  try_other_files(best);
+}
+
+/// But for the best.
+std::vector<MeshKey> Search::likeliest() const {
+  std::vector<std::pair<double, MeshKey>> order;
+  for (const auto& [key, loss] : predicted_)
+    if (key != best_ && loss <= kLikely * least_) order.emplace_back(loss, key);
+  std::ranges::sort(order);
+  if (order.size() > kMostLikely) order.resize(kMostLikely);
+  std::vector<MeshKey> out;
+  for (const auto& [loss, key] : order) out.push_back(key);
   return out;
 }
 
-double screen_coverage_of(const Manifest& manifest, int scale) {
-  constexpr double kScreenPx = 1080;
-  double below = 0;  // displayed height up to which a coarser scale is enough
-  for (const ManifestStep& s : manifest.steps)
-    if (s.scale > scale) below = std::max(below, s.up_to_px);
-  const double share = std::min(1.0, below / kScreenPx);
-  return share * share;
+FoundFile Search::file_of(const MeshKey& key, const DealtBytes& images) {
+  return {key, images, filling_.fill(mesh(key), images)};
 }
 
-std::vector<Extracted> extract_bytes(PackageReader& package, const ExtractRequest& request,
-                                     const std::vector<std::uint64_t>& bytes, const RunContext& context) {
+bool Search::replace_if_nearer(FoundFile found, FoundFile& best) {
+  if (!filling_.fills(found.file)) return false;
+  look_at(found);
+  if (!(found.difference < best.difference)) return false;
+  best = std::move(found);
+  return true;
+}
+
+/// Each is tried once: what the last texture gets depends on the others alone.
+bool Search::try_file(const MeshKey& key, const DealtBytes& images, FoundFile& best) {
+  TriedFile tried{key, images.last, {}};
+  for (const CodedImage& image : images.images) tried.plans.push_back(image.plan);
+  tried.plans[images.last].quality = 0;
+  if (std::ranges::find(tried_, tried) != tried_.end()) return false;
+  tried_.push_back(std::move(tried));
+  return replace_if_nearer(file_of(key, images), best);
+}
+
+bool Search::try_other_sizes(FoundFile& best) {
+  bool nearer = false;
+  for (const int steps : {-1, 1, -2, 2, 3})
+    while (const auto other = with_largest_loss_resized(best.images, steps, candidates_)) {
+      if (!try_file(best.key, *other, best)) break;
+      nearer = true;
+    }
+  return nearer;
+}
+
+bool Search::try_other_codings(FoundFile& best) {
+  bool nearer = false;
+  DealtBytes images = best.images;
+  images.last = largest_loss(images);
+  ImagePlan& plan = images.images[images.last].plan;
+  if (plan.coding.stored) return false;
+  for (const TextureCoding& coding : candidates_.codings(images.last)) {
+    if (coding == plan.coding) continue;
+    DealtBytes other = images;
+    other.images[images.last].plan.coding = coding;
+    nearer |= try_file(best.key, other, best);
+  }
+  return nearer;
+}
+
+bool Search::try_other_shares(FoundFile& best) {
+  const std::size_t most = largest_loss(best.images);
+  DealtBytes same = best.images;
+  same.last = most;
+  bool nearer = try_file(best.key, same, best);
+  for (const std::size_t image : largest_but(best.images, most))
+    for (const int step : {-1, 1})
+      while (const CodedImage* other = curves_.neighbour(image, best.images.images[image], step)) {
+        DealtBytes images = best.images;
+        images.images[image] = *other;
+        images.last = most;
+        if (!try_file(best.key, images, best)) break;
+        nearer = true;
+      }
+  return nearer;
+}
+
+bool Search::try_other_codings_of_mesh(FoundFile& best) {
+  bool nearer = false;
+  for (const int step : {1, -1})
+    for (;;) {
+      MeshKey key = best.key;
+      key.coding += step;
+      if (key.coding < 0 || key.coding >= kMeshCodings) break;
+      if (!try_file(key, best.images, best)) break;
+      nearer = true;
+    }
+  return nearer;
+}
+
+void Search::try_other_files(FoundFile& best) {
+  constexpr int kMostRounds = 3;
+  if (best.images.images.empty()) return;
+  bool nearer = true;
+  for (int i = 0; i < kMostRounds && nearer; ++i) {
+    nearer = try_other_sizes(best);
+    nearer |= try_other_codings(best);
+    nearer |= try_other_shares(best);
+    nearer |= try_other_codings_of_mesh(best);
+  }
+}
+
+void Search::try_smaller_than_stored(FoundFile& best) {
+  if (best.images.images.empty()) return;
+  const ImagePlan& plan = best.images.images[largest_loss(best.images)].plan;
+  if (!plan.coding.stored || plan.is_source()) return;
+  look_at(best);
+  for (const int steps : {1, 2})
+    if (const auto other = with_largest_loss_resized(best.images, steps, candidates_))
+      try_file(best.key, *other, best);
+}
+
+std::vector<double> Search::differences_of(const MeshKey& key, const FilledFile& file) {
+  OtherTextures textures;
+  for (std::size_t i = 0; i < reference_.images.size(); ++i)
+    textures.merge(candidates_.shown_by(i, file.images.at(reference_.images[i].image), reference_.context));
+  const LitViews views(candidates_.lit_mesh(key), reference_.cameras, reference_.context);
+  std::vector<OtherTextures> changes;
+  changes.emplace_back();  // none: what the mesh alone costs
+  changes.push_back(std::move(textures));
+  return reference_.whole_meter->differences(views, reference_.best_textures, std::move(changes),
+                                             reference_.context);
+}
+
+/// `from` with its mesh coded finer by parts of a bit: the largest file that was found. Nothing
+/// where all that fit are smaller.
+std::optional<FoundFile> Search::larger_by_bits(const FoundFile& from, std::size_t scale, int coding) {
+  const bool same = scale == from.key.scale && coding == from.key.coding;
+  double low = same ? 0 : kFewestExtraBits, high = kMostExtraBits;
+  std::optional<FoundFile> best;
+  for (int i = 0; i < kMeshTries && !(best && filling_.fills(best->file)); ++i) {
+    FoundFile other = from;
+    other.key = {scale, coding, (low + high) / 2};
+    other.file.glb = mesh(other.key).with(from.file.images);
+    forget(other.key);
+    (filling_.fits(other.file) ? low : high) = other.key.extra_bits;
+    if (filling_.fits(other.file) && other.file.glb.size() >= (best ? *best : from).file.glb.size())
+      best = std::move(other);
+  }
+  return best;
+}
+
+/// Where textures cannot take the bytes that are left: the same mesh coded finer, or a finer scale. Of
+/// several codings the one that looks nearest.
+void Search::fill_by_mesh(FoundFile& best) {
+  if (is_finest(best.key) || !mesh(best.key).file->has_draco()) return;
+  const FoundFile from = best;
+  look_at(best);
+  for (std::size_t scale = from.key.scale;; --scale) {
+    for (int coding = from.key.coding; coding < kMeshCodings; ++coding) {
+      std::optional<FoundFile> other = larger_by_bits(from, scale, coding);
+      if (!other || filling_.fills(other->file) < filling_.fills(best.file)) continue;
+      look_at(*other);
+      if (filling_.fills(other->file) > filling_.fills(best.file) || other->difference <= best.difference)
+        best = *std::move(other);
+    }
+    if (scale == 0 || filling_.fills(best.file) || reference_.wishes.scale) return;
+  }
+}
+
+Extracted Search::finish(const MeshKey& key, FilledFile file) {
+  const MeshCandidate& mesh = candidates_.mesh(key);
+  Extracted out;
+  out.scale = mesh.scale;
+  out.levels = mesh.levels;
+  out.triangles = mesh.triangles;
+  out.within = filling_.fills(file) || (filling_.fits(file) && file.has_sources && is_finest(key));
+  out.views = static_cast<int>(reference_.cameras.size());
+  out.side_px = reference_.side_px;
+  out.asked_bytes = bytes_;
+  out.images = file.rows;
+  out.mesh_bytes = file.glb.size();
+  for (const ExtractedImage& i : file.rows) out.mesh_bytes -= i.bytes;
+  const std::vector<double> differences = differences_of(key, file);
+  out.mesh_difference = differences[0];
+  out.difference = differences[1];
+  out.glb = std::move(file.glb);
+  return out;
+}
+
+std::vector<Extracted> extract_within_bytes(PackageReader& package, const ExtractBudget& wishes,
+                                            bool recentre, const RunContext& context) {
+  const std::vector<std::uint64_t>& bytes = wishes.bytes;
   std::vector<std::size_t> order(bytes.size());  // rising: neighbours share most
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::ranges::stable_sort(order, {}, [&](std::size_t k) { return bytes[k]; });
@@ -305,18 +426,16 @@ std::vector<Extracted> extract_bytes(PackageReader& package, const ExtractReques
     const auto report = [&](double part) {
       context.report((static_cast<double>(i) + part) / static_cast<double>(order.size()));
     };
-    if (!shared || !shared->source.serves(wanted)) {
-      ExtractRequest one = request;
-      one.bytes = wanted;
+    if (!shared || !shared->textures.serves(most_texels(wanted))) {
       shared.reset();  // before the next one needs the memory
-      shared = std::make_unique<SharedSearch>(package, one, bytes.size() > 1, context);
+      shared = std::make_unique<SharedSearch>(package, wishes, recentre, wanted, context);
     }
-    shared->set_bytes(wanted);
     report(0.2);
     Extracted& found = out[order[i]];
-    found = BudgetSearch(*shared).run(report);
+    found = Search(shared->reference, shared->candidates, wanted).run(report);
+    shared->candidates.forget_lit_meshes();
     report(0.9);
-    shared->proxies.offer(found);
+    offer_proxies(shared->reference, wanted, shared->proxies, found);
     report(1);
   }
   return out;

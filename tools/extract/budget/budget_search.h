@@ -1,27 +1,99 @@
 #pragma once
-#include <cstdint>
-#include <vector>
+#include <set>
 
-#include "tools/extract/glb/extracted.h"
+#include "tools/extract/budget/filling.h"
 
 namespace texmesh {
 
-/// Scales of a file with levels of detail whose finest is `finest`: that one, and all coarser major ones.
-std::vector<int> levels_of(const Manifest& manifest, int finest);
-/// Share of the screen's area that a square around the object has at the displayed height up to which `scale`
-/// is enough, on a screen 1080 px high; what MSFT_lod asks for a level.
-double screen_coverage_of(const Manifest& manifest, int scale);
+/// For each number of bytes of `wishes` the file of at most so many with the least FLIP against the package's
+/// best: scale, coding of the mesh, size and quality of every texture are chosen together, by lit pictures
+/// (stages/render, the studio's light), so that each map gets bytes for what it changes in them. Where a
+/// proxy of the package, made smaller where it must be, looks better in whole pictures, the file is of that
+/// proxy (offer_proxies()). What does not depend on the number of bytes is made once; every file is the one
+/// that its number alone gives. InputError for a scale that is not there. Same bytes for any number of
+/// threads.
+std::vector<Extracted> extract_within_bytes(PackageReader& package, const ExtractBudget& wishes,
+                                            bool recentre, const RunContext& context);
 
-/// For each number of bytes the file of at most so many with the least FLIP against the package's best:
-/// scale, coding of the mesh, size and quality of every texture are chosen together, by lit pictures
-/// (stages/render, the studio's light), so that each map gets bytes for what it changes in them. Small
-/// windows of the pictures, one texture changed at a time, tell what bytes are worth; the mesh is chosen by
-/// what it and its textures lose together; the whole pictures of the file give the difference that is
-/// reported. Where a proxy of the package, made smaller where it must be, looks better in whole pictures, the
-/// file is of that proxy (ProxyOffers). request.bytes does not count. What does not depend on the number of
-/// bytes is made once; every file is the one that its number alone gives. InputError for a scale that is not
-/// there. Same bytes for any number of threads.
-std::vector<Extracted> extract_bytes(PackageReader& package, const ExtractRequest& request,
-                                     const std::vector<std::uint64_t>& bytes, const RunContext& context);
+/// A file of a mesh with textures as `images` plan them, and its difference in whole pictures, where it has
+/// been looked at.
+struct FoundFile {
+  MeshKey key;
+  DealtBytes images;
+  FilledFile file;
+  double difference = 1e9;
+};
+
+/// The search for the file of one number of bytes: see the top of the .cpp.
+class Search {
+ public:
+  /// Measures the curves of the images.
+  Search(const Reference& reference, Candidates& candidates, std::uint64_t bytes);
+  /// `report`: parts of the way.
+  Extracted run(const std::function<void(double)>& report);
+
+  // What run() is made of.
+  const LossCurves& curves() const { return curves_; }
+  const Filling& filling() const { return filling_; }
+  /// The mesh of a file of so many bytes, kept until it is forgotten.
+  const MeshFile& mesh(const MeshKey& key);
+  /// The file that fills the bytes. It is not looked at.
+  FoundFile file_of(const MeshKey& key, const DealtBytes& images);
+  void look_at(FoundFile& found) { found.difference = differences_of(found.key, found.file).back(); }
+  /// The texture that loses most in other sizes and codings, with more or fewer bytes for others, and with
+  /// the mesh coded finer or leaner, as long as that is nearer.
+  void try_other_files(FoundFile& best);
+  /// Where the texture that loses most is to be some of the source's own coefficients: smaller and finer.
+  void try_smaller_than_stored(FoundFile& best);
+
+ private:
+  /// What decides about a file, but for the quality of the texture that takes the bytes that are left.
+  struct TriedFile {
+    MeshKey key;
+    std::size_t last = 0;
+    std::vector<ImagePlan> plans;
+    friend bool operator==(const TriedFile&, const TriedFile&) = default;
+  };
+  const std::vector<ManifestScale>& scales() const { return reference_.package.manifest().scales; }
+  void forget(const MeshKey& key);
+  double bytes_left(const MeshFile& mesh) const;
+  DealtBytes allocation_of(const MeshKey& key) { return curves_.allocate(bytes_left(mesh(key))); }
+
+  void choose_mesh();
+  void follow_direction(int scale_step, int coding_step);
+  bool better(const MeshKey& key);
+  bool too_large(const MeshKey& key) const;
+  double least_loss(const MeshKey& key) const;
+  double loss_of(const MeshKey& key);
+
+  void look_at_files(FoundFile& best);
+  std::vector<MeshKey> likeliest() const;
+  // Whether the best has changed.
+  bool replace_if_nearer(FoundFile found, FoundFile& best);
+  bool try_file(const MeshKey& key, const DealtBytes& images, FoundFile& best);
+  bool try_other_sizes(FoundFile& best);
+  bool try_other_codings(FoundFile& best);
+  bool try_other_codings_of_mesh(FoundFile& best);
+  bool try_other_shares(FoundFile& best);
+
+  std::optional<FoundFile> larger_by_bits(const FoundFile& from, std::size_t scale, int coding);
+  void fill_by_mesh(FoundFile& best);
+  /// Of the mesh alone, and of the file.
+  std::vector<double> differences_of(const MeshKey& key, const FilledFile& file);
+  Extracted finish(const MeshKey& key, FilledFile file);
+
+  const Reference& reference_;
+  Candidates& candidates_;
+  const std::uint64_t bytes_;
+  const LossCurves curves_;
+  const Filling filling_;
+  std::map<MeshKey, MeshFile> meshes_;
+  std::set<MeshKey> seen_;
+  std::map<MeshKey, double> geometry_;   // of meshes looked at: MeshCandidate::geometry
+  std::map<MeshKey, double> predicted_;  // joined losses of files, of meshes whose files fit
+  MeshKey best_;
+  double least_ = 1e9;
+  std::vector<TriedFile> tried_;
+};
 
 }  // namespace texmesh

@@ -4,8 +4,6 @@
 #include <cmath>
 
 #include "format/base/portable_math.h"
-#include "stages/base/parallel.h"
-#include "tools/extract/budget/quality_search.h"
 
 namespace texmesh {
 namespace {
@@ -18,7 +16,6 @@ constexpr double kWebpQuality = 65, kWebpShare = 0.4;  // of a JPEG's bytes at t
 constexpr double kMuch = 0.15, kLittle = 0.05;         // of all images' losses
 constexpr int kWeightings = 3;
 constexpr double kFarAbove = 4;  // of an image's bytes: stored coefficients would have to lose most of theirs
-constexpr std::size_t kTrialsAtOnce = 24;  // a megabyte or two each
 
 /// Files that lie on the lower convex border, by rising bytes.
 std::vector<CodedImage> convex(std::vector<CodedImage> files) {
@@ -57,10 +54,11 @@ int last_step(const PackageImage& image) {
 
 }  // namespace
 
+/// The files of an image that are of use to look at, and new.
 class LossCurves::Trials {
  public:
   Trials(const LossCurves& curves, std::size_t image, double bytes)
-      : curves_(curves), image_(image), bytes_(bytes), last_(last_step(curves.source_.image(image))) {}
+      : curves_(curves), image_(image), bytes_(bytes), last_(last_step(curves.reference_.images[image])) {}
   int last() const { return last_; }
 
   /// Bytes that a file is likely to have, from what was seen of the image.
@@ -82,7 +80,7 @@ class LossCurves::Trials {
     const auto same = [&](const TextureCoding& c, double share, double q) {
       return c == coding && share == size_step(bounded) && q == quality;
     };
-    for (const Trial& t : list_)
+    for (const ImageTrial& t : list_)
       if (same(t.coding, size_step(t.step), t.quality)) return;
     for (const CodedImage& c : curves_.seen_[image_])
       if (same(c.plan.coding, c.plan.share, c.plan.quality)) return;
@@ -95,65 +93,43 @@ class LossCurves::Trials {
     if (stored_bytes < kFarAbove * chosen_bytes)
       for (const double quality : {80.0, 92.0}) list_.push_back({image_, 0, stored, quality});
   }
-  void append_to(std::vector<Trial>& all) const { all.insert(all.end(), list_.begin(), list_.end()); }
+  void append_to(std::vector<ImageTrial>& all) const { all.insert(all.end(), list_.begin(), list_.end()); }
 
  private:
   const LossCurves& curves_;
   std::size_t image_;
   double bytes_;
   int last_;
-  std::vector<Trial> list_;
+  std::vector<ImageTrial> list_;
 };
 
-void LossCurves::render(const std::vector<Trial>& trials) {
-  std::vector<Trial> fresh;
-  for (const Trial& t : trials)
-    if (!measured_.contains(t.key())) fresh.push_back(t);
-  for (std::size_t first = 0; first < fresh.size(); first += kTrialsAtOnce)
-    render_part({fresh.data() + first, std::min(kTrialsAtOnce, fresh.size() - first)});
-  for (const Trial& t : trials) seen_[t.image].push_back(measured_.at(t.key()));
+LossCurves::LossCurves(const Reference& reference, Candidates& candidates, double wanted)
+    : reference_(reference), candidates_(candidates), seen_(reference.images.size()) {
+  const double bytes = std::max(wanted, 1.0);
+  look_at(first_trials(bytes));
+  look_at(trials_around_first(bytes));
+  find_curves();
+  look_at(trials_around(allocate(bytes), bytes));
+  find_curves();
 }
 
-void LossCurves::render_part(std::span<const Trial> trials) {
-  std::vector<CodedImage> found(trials.size());
-  std::vector<OtherTextures> textures(trials.size());
-  std::vector<const Pixels*> pixels;
-  static const Pixels none;
-  for (const Trial& t : trials) {
-    if (t.coding.stored) coder_.load_stored(t.image);
-    pixels.push_back(t.coding.stored ? &none : &coder_.texels(t.image, t.step));
-  }
-  RunContext serial = source_.context;
-  serial.threads = 1;
-  parallel_for(source_.context, trials.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t k = begin; k < end; ++k) {
-      const Trial& t = trials[k];
-      const FileImageData file = coder_.encoded(t.image, *pixels[k], t.coding, t.quality, true);
-      textures[k] = coder_.shown_by(t.image, file, serial);
-      found[k] = {{t.coding, size_step(t.step), t.quality},
-                  static_cast<double>((file.bytes.size() + 3) / 4 * 4)};
-    }
-  });
-  const std::vector<double> losses = source_.window_meter->differences(
-      *source_.finest_windows, source_.best_textures, std::move(textures), source_.context);
-  for (std::size_t k = 0; k < trials.size(); ++k) {
-    found[k].loss = joined(losses[k]);
-    measured_[trials[k].key()] = found[k];
-  }
+void LossCurves::look_at(const std::vector<ImageTrial>& trials) {
+  const std::vector<CodedImage> found = candidates_.measured(trials);
+  for (std::size_t k = 0; k < trials.size(); ++k) seen_[trials[k].image].push_back(found[k]);
 }
 
 double LossCurves::likely_bytes(std::size_t image, double bytes) const {
   double weights = 0;
-  for (std::size_t i = 0; i < source_.image_count(); ++i) weights += weight_of(source_.image(i));
-  return bytes * weight_of(source_.image(image)) / weights;
+  for (std::size_t i = 0; i < reference_.images.size(); ++i) weights += weight_of(reference_.images[i]);
+  return bytes * weight_of(reference_.images[image]) / weights;
 }
 
 /// A likely size, and one of next to no bytes.
-std::vector<LossCurves::Trial> LossCurves::first_trials(double bytes) const {
-  std::vector<Trial> out;
-  for (std::size_t i = 0; i < source_.image_count(); ++i) {
-    const PackageImage& image = source_.image(i);
-    const TextureCoding coding = coder_.codings(i).front();
+std::vector<ImageTrial> LossCurves::first_trials(double bytes) const {
+  std::vector<ImageTrial> out;
+  for (std::size_t i = 0; i < reference_.images.size(); ++i) {
+    const PackageImage& image = reference_.images[i];
+    const TextureCoding coding = candidates_.codings(i).front();
     const double wanted = likely_bytes(i, bytes) * kTypicalTexelsPerByte;
     int step = 0;
     while (step + 2 < last_step(image) && texels_of(image) * size_step(step) * size_step(step) > wanted)
@@ -165,16 +141,16 @@ std::vector<LossCurves::Trial> LossCurves::first_trials(double bytes) const {
 }
 
 /// Sizes and qualities around the likely one. Halves: smaller copies of other sizes lie beside their place.
-std::vector<LossCurves::Trial> LossCurves::trials_around_first(double bytes) const {
+std::vector<ImageTrial> LossCurves::trials_around_first(double bytes) const {
   double sum = 0;
   for (const std::vector<CodedImage>& files : seen_) sum += files.front().loss;
-  std::vector<Trial> out;
-  for (std::size_t i = 0; i < source_.image_count(); ++i) {
+  std::vector<ImageTrial> out;
+  for (std::size_t i = 0; i < reference_.images.size(); ++i) {
     Trials trials(*this, i, bytes);
     const double wanted = likely_bytes(i, bytes);
     int middle = 0;
     while (middle < trials.last() && trials.likely(middle, kUsualQuality) > wanted * 1.4) middle += 2;
-    const TextureCoding coding = coder_.codings(i).front();
+    const TextureCoding coding = candidates_.codings(i).front();
     trials.add(middle, coding, 20);
     if (seen_[i].front().loss > kLittle * sum) {
       for (const double quality : {20.0, 45.0, kUsualQuality}) trials.add(middle - 2, coding, quality);
@@ -189,11 +165,11 @@ std::vector<LossCurves::Trial> LossCurves::trials_around_first(double bytes) con
 
 /// About as many bytes in another way: sizes between halves where an image loses much, other codings where it
 /// has few bytes.
-std::vector<LossCurves::Trial> LossCurves::trials_around(const Allocation& chosen, double bytes) const {
+std::vector<ImageTrial> LossCurves::trials_around(const DealtBytes& chosen, double bytes) const {
   double sum = 0;
   for (const CodedImage& image : chosen.images) sum += image.loss;
-  std::vector<Trial> out;
-  for (std::size_t i = 0; i < source_.image_count(); ++i) {
+  std::vector<ImageTrial> out;
+  for (std::size_t i = 0; i < reference_.images.size(); ++i) {
     Trials trials(*this, i, bytes);
     const ImagePlan& plan = chosen.images[i].plan;
     const int step = Trials::step_of(plan.share);
@@ -201,7 +177,7 @@ std::vector<LossCurves::Trial> LossCurves::trials_around(const Allocation& chose
       trials.add(step + 1, plan.coding, plan.quality + 20);
       trials.add(step - 1, plan.coding, plan.quality - 18);
     }
-    const std::vector<TextureCoding> codings = coder_.codings(i);
+    const std::vector<TextureCoding> codings = candidates_.codings(i);
     const bool few = chosen.images[i].bytes < kFewBytes;
     for (std::size_t k = 1; few && k < codings.size(); ++k) {
       int middle = 0;
@@ -211,7 +187,7 @@ std::vector<LossCurves::Trial> LossCurves::trials_around(const Allocation& chose
       trials.add(middle, codings[k], kWebpQuality);
       trials.add(middle + 2, codings[k], kWebpQuality);
     }
-    if (const auto stored = coder_.stored_bytes(i)) trials.add_stored(*stored, chosen.images[i].bytes);
+    if (const auto stored = candidates_.stored_bytes(i)) trials.add_stored(*stored, chosen.images[i].bytes);
     trials.append_to(out);
   }
   return out;
@@ -222,31 +198,21 @@ void LossCurves::find_curves() {
   for (const std::vector<CodedImage>& files : seen_) curves_.push_back(convex(files));
 }
 
-void LossCurves::measure(double wanted) {
-  const double bytes = std::max(wanted, 1.0);
-  seen_.assign(source_.image_count(), {});
-  render(first_trials(bytes));
-  render(trials_around_first(bytes));
-  find_curves();
-  render(trials_around(allocate(bytes), bytes));
-  find_curves();
-}
-
-std::vector<double> LossCurves::group_losses(const Allocation& allocation) const {
-  std::vector<double> sums(source_.image_count());
+std::vector<double> LossCurves::group_losses(const DealtBytes& allocation) const {
+  std::vector<double> sums(reference_.images.size());
   for (std::size_t i = 0; i < allocation.images.size(); ++i)
-    sums[source_.groups[i]] += allocation.images[i].loss;
+    sums[reference_.groups[i]] += allocation.images[i].loss;
   for (double& s : sums) s = std::sqrt(s);
   return sums;
 }
 
 /// The sum of groups' losses is least where each image gains alike by its group's loss; which is known only
 /// when the bytes are dealt out.
-Allocation LossCurves::allocate(double bytes) const {
-  Allocation best;
-  std::vector<double> weights(source_.image_count(), 1);
+DealtBytes LossCurves::allocate(double bytes) const {
+  DealtBytes best;
+  std::vector<double> weights(reference_.images.size(), 1);
   for (int i = 0; i < kWeightings; ++i) {
-    Allocation found = allocate(bytes, weights);
+    DealtBytes found = allocate(bytes, weights);
     weights = group_losses(found);
     double sum = 0;
     for (double& w : weights) {
@@ -269,8 +235,8 @@ const CodedImage* LossCurves::neighbour(std::size_t image, const CodedImage& fro
   return fewer;
 }
 
-Allocation LossCurves::allocate(double bytes, const std::vector<double>& group_weights) const {
-  Allocation out;
+DealtBytes LossCurves::allocate(double bytes, const std::vector<double>& group_weights) const {
+  DealtBytes out;
   std::vector<std::size_t> at(curves_.size(), 0);
   for (const std::vector<CodedImage>& curve : curves_) {
     out.images.push_back(curve.front());
@@ -282,7 +248,7 @@ Allocation LossCurves::allocate(double bytes, const std::vector<double>& group_w
     for (std::size_t i = 0; i < curves_.size(); ++i) {
       if (at[i] + 1 >= curves_[i].size()) continue;
       const CodedImage &a = curves_[i][at[i]], &b = curves_[i][at[i] + 1];
-      const double gain = (a.loss - b.loss) / (b.bytes - a.bytes) * group_weights[source_.groups[i]];
+      const double gain = (a.loss - b.loss) / (b.bytes - a.bytes) * group_weights[reference_.groups[i]];
       if (gain > best) best = gain, next = i;
     }
     if (next == curves_.size()) return out;

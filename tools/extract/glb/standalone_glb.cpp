@@ -2,11 +2,8 @@
 
 #include <algorithm>
 #include <charconv>
-#include <nlohmann/json.hpp>
 #include <utility>
 
-#include "format/base/bounded_json.h"
-#include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "pipeline/about/gltf_about.h"
 #include "stages/gltf/glb_container.h"
@@ -20,12 +17,6 @@ constexpr const char* kDraco = "KHR_draco_mesh_compression";
 constexpr const char* kMeshopt = "EXT_meshopt_compression";
 constexpr const char* kWebp = "EXT_texture_webp";
 constexpr const char* kLod = "MSFT_lod";
-constexpr int kMaxJsonDepth = 64;
-
-std::uint32_t read_u32(std::span<const std::uint8_t> bytes, std::size_t at) {
-  return static_cast<std::uint32_t>(bytes[at] | bytes[at + 1] << 8 | bytes[at + 2] << 16) |
-         static_cast<std::uint32_t>(bytes[at + 3]) << 24;
-}
 
 std::size_t number(const Json& object, const char* key) {
   return object.contains(key) ? object[key].get<std::size_t>() : 0;
@@ -65,10 +56,6 @@ Json* draco_of(Json& primitive) {
   return &primitive["extensions"][kDraco];
 }
 
-Json vector_json(Vec3f v) {
-  return Json::array({GlbWriter::shortest(v.x), GlbWriter::shortest(v.y), GlbWriter::shortest(v.z)});
-}
-
 void require_valid(std::span<const std::uint8_t> glb, const std::string& entry, GlbRules rules) {
   Findings findings;
   check_glb(glb, entry, findings, rules);
@@ -102,13 +89,9 @@ StandaloneGlb::~StandaloneGlb() = default;
 StandaloneGlb::StandaloneGlb(std::span<const std::uint8_t> glb, std::string entry, GlbRules rules)
     : entry_(std::move(entry)), document_(std::make_unique<Document>()) {
   require_valid(glb, entry_, rules);
-  constexpr std::size_t kHeader = 12, kChunk = 8;
-  const std::size_t json_bytes = read_u32(glb, kHeader);
-  document_->root = parse_bounded_json(glb.subspan(kHeader + kChunk, json_bytes), entry_, kMaxJsonDepth);
-  const std::size_t binary_at = kHeader + kChunk + json_bytes;
-  const std::span<const std::uint8_t> binary = glb.size() > binary_at + kChunk
-                                                   ? glb.subspan(binary_at + kChunk, read_u32(glb, binary_at))
-                                                   : std::span<const std::uint8_t>();
+  GlbParts parts = read_glb(glb, entry_);
+  const Bytes& binary = parts.binary;
+  document_->root = std::move(parts.root);
   if (document_->root.contains("buffers") && document_->root["buffers"].size() > 1)
     fallback_bytes_ = document_->root["buffers"][1].value("byteLength", std::uint64_t{0});
   if (!document_->root.contains("bufferViews")) return;
@@ -135,19 +118,6 @@ void StandaloneGlb::use_extension(const std::string& name, bool required) {
     Json names = document_->root.value(list, Json::array());
     if (std::find(names.begin(), names.end(), Json(name)) == names.end()) names.push_back(name);
     document_->root[list] = names;
-  }
-}
-
-void StandaloneGlb::forget_extension(const std::string& name) {
-  for (const char* list : {"extensionsUsed", "extensionsRequired"}) {
-    if (!document_->root.contains(list)) continue;
-    Json kept = Json::array();
-    for (const Json& n : document_->root[list])
-      if (n != name) kept.push_back(n);
-    if (kept.empty())
-      document_->root.erase(list);
-    else
-      document_->root[list] = kept;
   }
 }
 
@@ -210,7 +180,7 @@ void StandaloneGlb::set_images(const std::map<std::uint32_t, FileImageData>& ima
         texture["source"] = image;
       if (texture.contains("extensions") && texture["extensions"].empty()) texture.erase("extensions");
     }
-  forget_extension(kWebp);
+  forget_extension(document_->root, kWebp);
   if (std::find(webp.begin(), webp.end(), true) != webp.end()) use_extension(kWebp, true);
 }
 
@@ -239,7 +209,7 @@ void StandaloneGlb::recode(const DracoSteps& steps, const NormalSamples* lit_as,
     for (const auto& [name, accessor] : primitive["attributes"].items()) {
       Json& a = document_->root["accessors"].at(accessor.get<std::size_t>());
       a["count"] = s.vertices;
-      if (name == "POSITION") a["min"] = vector_json(s.low), a["max"] = vector_json(s.high);
+      if (name == "POSITION") a["min"] = GlbWriter::shortest(s.low), a["max"] = GlbWriter::shortest(s.high);
     }
     Json& indices = document_->root["accessors"].at(number(primitive, "indices"));
     indices["count"] = std::size_t{s.triangles} * 3;

@@ -1,15 +1,9 @@
 #pragma once
-#include <cstdint>
-#include <map>
-#include <memory>
-#include <span>
-#include <string>
-#include <vector>
 
 #include "format/documents/about.h"
 #include "stages/gltf/check_glb.h"
+#include "stages/gltf/draco_mesh.h"
 #include "stages/scales/scales.h"
-#include "tools/extract/glb/draco_recode.h"
 #include "tools/extract/glb/image_codecs.h"
 
 namespace texmesh {
@@ -67,7 +61,6 @@ class StandaloneGlb {
   /// Appends views, accessors and meshes; gives the index of the first mesh.
   std::size_t append_meshes(StandaloneGlb& other);
   void use_extension(const std::string& name, bool required);
-  void forget_extension(const std::string& name);
   std::string entry_;
   std::shared_ptr<const About> about_;
   std::unique_ptr<Document> document_;

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "delivery/cpp/package/plane_streams.h"
 #include "format/container/layout.h"
-#include "stages/data/coverage.h"
 #include "stages/fill/fill.h"
 #include "stages/geometry/texel_coverage.h"
-#include "tools/extract/glb/scale_model.h"
+#include "tools/extract/glb/scale_file.h"
 #include "tools/render/plane_pixels.h"
 
 namespace texmesh {
@@ -150,6 +150,28 @@ Pixels TextureSource::texels(std::size_t index, std::uint32_t width_px, std::uin
   Pixels colours = plane_texels(index, image.plane, width_px, height_px, coverage, sharpening);
   if (!image.alpha_plane) return colours;
   return with_alpha(colours, plane_texels(index, *image.alpha_plane, width_px, height_px, coverage, 0));
+}
+
+JoinedJpeg joined_plane(PackageReader& package, std::uint32_t plane, std::size_t rung,
+                        const RunContext& context) {
+  const TextureInfo& info = package.textures().at(plane);
+  const std::string& path = info.rungs.at(rung).path;
+  PlaneStreams streams(info.codec, package.tables().planes.at(plane), package.entry(info.tables));
+  if (info.codec != Codec::kJpeg) throw FormatError(path, "", "a plane of codec jpeg", "another");
+  streams.add_pack(rung, package.entry(info.rungs[rung]));
+  JpegFragments fragments{path,
+                          info.width_px,
+                          info.height_px,
+                          info.fragment_width_px,
+                          info.fragment_height_px,
+                          info.columns,
+                          info.channels,
+                          {},
+                          {}};
+  for (std::size_t f = 0; f < package.tables().planes.at(plane).fragment_count(); ++f)
+    fragments.stored.push_back(streams.stream(f).empty() ? 0 : 1);
+  fragments.file = [&](std::size_t fragment) { return streams.file(fragment); };
+  return JoinedJpeg(fragments, context);
 }
 
 Pixels with_alpha(const Pixels& colours, const Pixels& alpha) {

@@ -1,14 +1,10 @@
 #pragma once
-#include <cstdint>
 #include <map>
-#include <optional>
-#include <string>
-#include <vector>
 
 #include "delivery/cpp/package/package_reader.h"
 #include "format/model/model.h"
-#include "stages/base/run_context.h"
-#include "tools/extract/glb/resize.h"
+#include "stages/image/resize.h"
+#include "stages/jpeg/source_jpeg.h"
 
 namespace texmesh {
 
@@ -61,6 +57,10 @@ class TextureSource {
   std::map<std::uint32_t, std::vector<std::uint8_t>> shown_;  // by plane
   std::map<std::uint32_t, std::vector<Pixels>> planes_;       // by plane: halves, halves of them ..
 };
+
+/// One rung of a plane of codec jpeg as one image. FormatError for another codec, and as JoinedJpeg.
+JoinedJpeg joined_plane(PackageReader& package, std::uint32_t plane, std::size_t rung,
+                        const RunContext& context);
 
 /// Colours and alpha as one image of 4 channels; both of one size.
 Pixels with_alpha(const Pixels& colours, const Pixels& alpha);

@@ -2,20 +2,19 @@
 
 #include <algorithm>
 #include <array>
-#include <nlohmann/json.hpp>
 
 #include "format/base/box.h"
-#include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "format/base/srgb.h"
 #include "format/split/split_stream.h"
 #include "pipeline/import/import.h"
 #include "pipeline/io/file_resolver.h"
+#include "stages/condition/condition.h"
 #include "stages/gltf/glb_container.h"
 #include "stages/image/decode_image.h"
-#include "tools/extract/glb/glb_chunks.h"
+#include "stages/simplification/simplification.h"
+#include "tools/extract/glb/scale_file.h"
 #include "tools/extract/glb/texture_source.h"
-#include "tools/extract/proxy/thinner_meshes.h"
 
 namespace texmesh {
 namespace {
@@ -169,7 +168,49 @@ StandaloneGlb uncoded(const Mesh& mesh, const std::string& entry) {
   return {write_streamed_scale(mesh, head, {}), entry};
 }
 
+constexpr double kVertexShare = 0.8;
+constexpr int kThinnerMeshes = 7;
+
+/// Asks for falling numbers of vertices, whichever they are.
+ScaleMap falling_counts(std::size_t positions) {
+  ScaleMap out;
+  out.scales = kThinnerMeshes;
+  for (std::size_t p = 0; p < positions; ++p) {
+    std::uint8_t last = 0;
+    for (double count = kVertexShare * static_cast<double>(positions);
+         last < kThinnerMeshes && static_cast<double>(p) < count; count *= kVertexShare)
+      ++last;
+    out.persistence.push_back(last);
+  }
+  return out;
+}
+
+SimplificationOptions by_shape_alone() {
+  SimplificationOptions out;
+  out.persistence_weight = 0;
+  out.coarsest = 1;
+  out.coarsest_vertices = 0;
+  return out;
+}
+
 }  // namespace
+
+std::vector<Mesh> thinner_meshes(const Mesh& mesh, const RunContext& context) {
+  RunContext inner = context;
+  inner.progress = nullptr;
+  std::vector<Mesh> out{mesh};
+  try {
+    ConditionOptions as_it_is;
+    as_it_is.normals = NormalsPolicy::kKeep;
+    const ConditionedMesh sound = condition_mesh(mesh, true, as_it_is, inner);
+    const NestedScales scales =
+        simplify(sound, falling_counts(sound.mesh.positions.size()), by_shape_alone(), inner);
+    for (std::size_t k = 1; k < scales.scales.size(); ++k)
+      out.push_back(extract_scale(scales, scales.scales[k]));
+  } catch (const StageError&) {  // a mesh without area
+  }
+  return out;
+}
 
 Averaging ProxyMap::averaging() const {
   if (use == Use::kNormal) return Averaging::kNormals;
@@ -186,7 +227,7 @@ std::optional<ProxyParts> ProxyParts::read(std::span<const std::uint8_t> glb, co
   StandaloneGlb(glb, entry, GlbRules::kStandalone);  // checks it
   ProxyParts out;
   out.entry_ = entry;
-  GlbChunks chunks = glb_chunks(glb, entry);
+  GlbParts chunks = read_glb(glb, entry);
   if (!chunks.root.contains("materials")) return std::nullopt;
   out.maps_ = maps_in(chunks.root, chunks.binary);
   NoFiles none;
@@ -223,7 +264,7 @@ StandaloneGlb ProxyParts::file(const ProxyMapChoice& choice, std::size_t mesh, c
                                const RunContext& context) const {
   StandaloneGlb coded = uncoded(meshes_.at(mesh), entry_);
   coded.recode(steps, nullptr, context);
-  GlbChunks chunks = glb_chunks(coded.finish(), entry_);
+  GlbParts chunks = read_glb(coded.finish(), entry_);
   Json root = materials_of(choice);
   keep_used(root);
   for (Json& image : root["images"]) image["bufferView"] = chunks.root["bufferViews"].size();

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "format/model/model.h"
-#include "tools/extract/glb/resize.h"
+#include "stages/image/resize.h"
 #include "tools/extract/glb/standalone_glb.h"
 
 namespace texmesh {
@@ -22,6 +22,11 @@ struct ProxyMap {
 };
 /// At a share of its sides, 0..1, of at least 4 texels.
 Pixels smaller_map(const ProxyMap& map, double share);
+
+/// The mesh, and behind it coarser ones in the same atlas, each with about four fifths of the vertices of the
+/// one before, down to a fifth. Fewer where collapses end: charts stay, and borders keep together. Same
+/// result for any thread count.
+std::vector<Mesh> thinner_meshes(const Mesh& mesh, const RunContext& context);
 
 /// Which maps of a proxy a file keeps.
 struct ProxyMapChoice {

@@ -1,18 +1,15 @@
 #include "tools/extract/proxy/proxy_search.h"
 
 #include <algorithm>
-#include <map>
-#include <optional>
-#include <utility>
 
 #include "format/base/portable_math.h"
 #include "format/container/layout.h"
 #include "pipeline/about/gltf_about.h"
 #include "pipeline/import/import.h"
 #include "pipeline/io/file_resolver.h"
-#include "tools/extract/budget/quality_search.h"
-#include "tools/extract/glb/glb_chunks.h"
-#include "tools/extract/glb/plain_file.h"
+#include "stages/gltf/glb_container.h"
+#include "tools/extract/budget/filling.h"
+#include "tools/extract/glb/scale_file.h"
 #include "tools/extract/proxy/proxy_parts.h"
 #include "tools/render/rendered_model.h"
 
@@ -45,13 +42,15 @@ struct ProxyTrial {
 class ProxySearch {
  public:
   /// `whole`: differences of proxies as they are, for those that are known.
-  ProxySearch(BudgetSource& source, std::map<std::uint32_t, double>& whole, Extracted& found)
-      : source_(source), whole_(whole), best_(found) {}
+  ProxySearch(const Reference& reference, std::uint64_t bytes, std::map<std::uint32_t, double>& whole,
+              Extracted& found)
+      : reference_(reference), bytes_(bytes), whole_(whole), best_(found) {}
 
   void run() {
-    const auto count = static_cast<std::uint32_t>(source_.package.manifest().proxies.size());
+    const auto count = static_cast<std::uint32_t>(reference_.package.manifest().proxies.size());
     for (std::uint32_t k = 0; k < count; ++k) {
-      Extracted whole = extract_proxy(source_.package, source_.request, k, source_.context);
+      Extracted whole =
+          extract_proxy(reference_.package, {k}, reference_.recentre, reference_.context, bytes_);
       measure_whole(k, whole);
       if (!is_wanted_kind(k))
         offer_smaller(k, whole);
@@ -63,13 +62,13 @@ class ProxySearch {
   }
 
  private:
-  bool fits(const Extracted& file) const { return file.glb.size() <= source_.request.bytes; }
+  bool fits(const Extracted& file) const { return file.glb.size() <= bytes_; }
 
   /// Whether the proxy's own images are of the format that is asked for.
   bool is_wanted_kind(std::uint32_t proxy) const {
-    const ExtractImages wanted = source_.request.images;
+    const ExtractImages wanted = reference_.wishes.images;
     if (wanted == ExtractImages::kAuto) return true;
-    const GlbChunks chunks = glb_chunks(source_.package.proxy_glb(proxy), proxy_path(proxy));
+    const GlbParts chunks = read_glb(reference_.package.proxy_glb(proxy), proxy_path(proxy));
     const char* mime = mime_type_of(wanted == ExtractImages::kWebp ? FileImage::kWebp : FileImage::kJpeg);
     const auto images = chunks.root.value("images", nlohmann::ordered_json::array());
     return std::ranges::all_of(images,
@@ -79,23 +78,23 @@ class ProxySearch {
   void measure_whole(std::uint32_t proxy, Extracted& file) {
     if (const auto known = whole_.find(proxy); known != whole_.end())
       return set_difference(known->second, file);
-    measure(source_.package.proxy_glb(proxy), file);
+    measure(reference_.package.proxy_glb(proxy), file);
     whole_[proxy] = file.difference;
   }
 
   void set_difference(double difference, Extracted& file) const {
     file.difference = file.mesh_difference = difference;
-    file.views = static_cast<int>(source_.cameras.size());
-    file.side_px = source_.side_px;
+    file.views = static_cast<int>(reference_.cameras.size());
+    file.side_px = reference_.side_px;
   }
 
   void measure(const Bytes& glb, Extracted& file) {
     NoFiles none;
     RenderedModel model =
-        rendered_model(import_package_glb("proxy.glb", glb, none, source_.context), source_.context);
+        rendered_model(import_package_glb("proxy.glb", glb, none, reference_.context), reference_.context);
     const LitMesh mesh{std::move(model.mesh), std::move(model.materials), model.textures.size()};
-    const LitViews views(mesh, source_.cameras, source_.context);
-    set_difference(source_.whole_pictures().difference(views, model.textures, source_.context), file);
+    const LitViews views(mesh, reference_.cameras, reference_.context);
+    set_difference(reference_.whole_meter->difference(views, model.textures, reference_.context), file);
   }
 
   bool better(const Extracted& a, const Extracted& b) const {
@@ -112,12 +111,13 @@ class ProxySearch {
 
   /// From the usual way to the best one, one choice after the other, as long as the picture gets better.
   void offer_smaller(std::uint32_t proxy, const Extracted& whole) {
-    const auto parts = ProxyParts::read(source_.package.proxy_glb(proxy), proxy_path(proxy), source_.context);
+    const auto parts =
+        ProxyParts::read(reference_.package.proxy_glb(proxy), proxy_path(proxy), reference_.context);
     if (!parts) return;
     files_.clear();
     ProxyTrial trial;
-    if (source_.request.images == ExtractImages::kJpeg) trial.format = FileImage::kJpeg;
-    const double most = kMostMesh * static_cast<double>(source_.request.bytes);
+    if (reference_.wishes.images == ExtractImages::kJpeg) trial.format = FileImage::kJpeg;
+    const double most = kMostMesh * static_cast<double>(bytes_);
     while (trial.mesh + 1 < parts->mesh_count() &&
            static_cast<double>(coded(*parts, trial).finish().size()) > most)
       ++trial.mesh;
@@ -145,7 +145,7 @@ class ProxySearch {
       for (const int bits : {trial.bits - 1, trial.bits + 1})
         if (bits >= 0 && bits <= kFinestBits) again |= try_next(with_bits(trial, bits));
     }
-    if (source_.request.images == ExtractImages::kAuto) {
+    if (reference_.wishes.images == ExtractImages::kAuto) {
       ProxyTrial jpeg = trial;
       jpeg.format = FileImage::kJpeg;
       try_next(jpeg);
@@ -187,7 +187,7 @@ class ProxySearch {
     const auto found = files_.find(key);
     if (found != files_.end()) return found->second;
     return files_
-        .emplace(key, parts.file(trial.maps, trial.mesh, steps_of(parts, trial.bits), source_.context))
+        .emplace(key, parts.file(trial.maps, trial.mesh, steps_of(parts, trial.bits), reference_.context))
         .first->second;
   }
 
@@ -204,9 +204,9 @@ class ProxySearch {
     rows.clear();
     for (const ProxyMap& map : maps) {
       const auto k = static_cast<std::uint32_t>(rows.size());
-      const FileImage format = map.pixels.channels < 4                          ? trial.format
-                               : source_.request.images == ExtractImages::kJpeg ? FileImage::kPng
-                                                                                : FileImage::kWebp;
+      const FileImage format = map.pixels.channels < 4                            ? trial.format
+                               : reference_.wishes.images == ExtractImages::kJpeg ? FileImage::kPng
+                                                                                  : FileImage::kWebp;
       const double q = quality_of(map, quality);
       const bool numbers = map.averaging() != Averaging::kLight;
       out[k] = {format, encode_image(map.pixels, {format, q, numbers, false, true})};
@@ -220,8 +220,8 @@ class ProxySearch {
   /// the file too large; then it is not looked at.
   bool make(const ProxyParts& parts, const ProxyTrial& trial, Extracted& out) {
     StandaloneGlb draft = coded(parts, trial), whole = draft;
-    if (!source_.request.recentre) whole.move_to(source_.package.manifest().origin);
-    whole.set_about(about_within(source_.package.about(), source_.request.bytes / kAboutShare));
+    if (!reference_.recentre) whole.move_to(reference_.package.manifest().origin);
+    whole.set_about(about_within(reference_.package.about(), bytes_ / kAboutShare));
     std::vector<ProxyMap> maps = parts.maps(trial.maps);
     for (ProxyMap& map : maps) map.pixels = smaller_map(map, trial.share);
     std::map<double, Bytes> files;
@@ -229,10 +229,9 @@ class ProxySearch {
       whole.set_images(pictures(maps, trial, quality, out.images));
       return files[quality] = whole.finish();
     };
-    const double best = maps.empty()
-                            ? kHighestQuality
-                            : quality_for(static_cast<double>(source_.request.bytes), 50, kNearlyAll,
-                                          kQualityTries, [&](double q) { return file_at(q).size(); });
+    const double best = maps.empty() ? kHighestQuality
+                                     : quality_for(static_cast<double>(bytes_), 50, kNearlyAll, kQualityTries,
+                                                   [&](double q) { return file_at(q).size(); });
     draft.set_images(pictures(maps, trial, best, out.images));
     out.glb = files.contains(best) ? files[best] : file_at(best);
     out.mesh_bytes = out.glb.size();
@@ -243,7 +242,8 @@ class ProxySearch {
     return best >= kPoorQuality;
   }
 
-  BudgetSource& source_;
+  const Reference& reference_;
+  const std::uint64_t bytes_;
   std::map<std::uint32_t, double>& whole_;
   Extracted& best_;
   std::map<std::tuple<bool, bool, std::size_t, int>, StandaloneGlb> files_;  // of one proxy: maps, mesh, bits
@@ -251,28 +251,31 @@ class ProxySearch {
 
 }  // namespace
 
-Extracted extract_proxy(PackageReader& package, const ExtractRequest& request, std::uint32_t proxy,
-                        const RunContext& context) {
+Extracted extract_proxy(PackageReader& package, const ExtractProxy& wishes, bool recentre,
+                        const RunContext& context, std::uint64_t asked_bytes) {
   const Manifest& m = package.manifest();
-  const Bytes glb = package.proxy_glb(proxy);  // refuses a proxy that is not there
-  StandaloneGlb file(glb, proxy_path(proxy), GlbRules::kStandalone);
-  if (request.plain) file = plain_file(file, proxy_path(proxy), context);
-  if (!request.recentre) file.move_to(m.origin);
-  file.set_about(request.bytes > 0 ? about_within(package.about(), request.bytes / kAboutShare)
-                                   : package.about());
+  const Bytes glb = package.proxy_glb(wishes.proxy);  // refuses a proxy that is not there
+  StandaloneGlb file(glb, proxy_path(wishes.proxy), GlbRules::kStandalone);
+  if (wishes.plain) file = plain_file(file, proxy_path(wishes.proxy), context);
+  if (!recentre) file.move_to(m.origin);
+  file.set_about(asked_bytes > 0 ? about_within(package.about(), asked_bytes / kAboutShare)
+                                 : package.about());
   Extracted out;
   out.scale = m.scales.back().scale;
   out.levels = {out.scale};
-  out.proxy = proxy;
-  out.triangles = m.proxies[proxy].triangles;
+  out.proxy = wishes.proxy;
+  out.triangles = m.proxies[wishes.proxy].triangles;
   out.glb = file.finish();
   out.mesh_bytes = out.glb.size();
+  out.asked_bytes = asked_bytes;
   return out;
 }
 
-void ProxyOffers::offer(Extracted& found) {
-  const ExtractRequest& r = source_.request;
-  if (!r.scale && !r.lods && r.images != ExtractImages::kPng) ProxySearch(source_, whole_, found).run();
+void offer_proxies(const Reference& reference, std::uint64_t bytes,
+                   std::map<std::uint32_t, double>& differences, Extracted& found) {
+  const ExtractBudget& wishes = reference.wishes;
+  if (!wishes.scale && !wishes.levels && wishes.images != ExtractImages::kPng)
+    ProxySearch(reference, bytes, differences, found).run();
 }
 
 }  // namespace texmesh

@@ -1,17 +1,295 @@
+// What an atlas is like, what of it costs, and what to do against that: a subject is measured, advice follows
+// from figures beyond thresholds, and both are told as text and as JSON.
 #include "tools/inspect/atlas/atlas_report.h"
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/io/text_table.h"
-#include "tools/inspect/atlas/atlas_advice.h"
-#include "tools/inspect/dump/dump_cells.h"
+#include "pipeline/io/table.h"
+#include "stages/base/parallel.h"
+#include "stages/image/decode_image.h"
+#include "tools/inspect/package_mesh.h"
+#include "tools/render/plane_pixels.h"
+#include "tools/render/rendered_model.h"
 
 namespace texmesh {
+
+constexpr Range kShare{0, 1}, kPositive{0, 1e300};
+
+template <>
+struct RecordFields<SurfacePercentiles> {
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("p5", s.p5, kPositive, "");
+    v("p50", s.p50, kPositive, "");
+    v("p95", s.p95, kPositive, "");
+    v("p99", s.p99, kPositive, "");
+  }
+};
+
+template <>
+struct RecordFields<SeamColours> {
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("mean", s.mean, kPositive, "");
+    v("p95", s.p95, kPositive, "");
+    v("inside", s.inside, kPositive, "from the seam to one texel further in, in the mean");
+  }
+};
+
+template <>
+struct RecordFields<NamedAtlas> {
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("image", s.image,
+      "index into the model's images, unused ones left out; of a package's S_0, into that file's");
+    v("name", s.name, "as messages call the texture");
+    v("width_px", s.width_px, Range{1, 4294967295.0}, "");
+    v("height_px", s.height_px, Range{1, 4294967295.0}, "");
+    v("materials", s.materials, "whose base-colour texture (without one, first texture) it is");
+    v("triangles", s.triangles, "");
+    v("charts", s.charts, "");
+    v("small_charts", s.small_charts, "of at most 8 triangles");
+    v("thin_charts", s.thin_charts, "thinner than 8 texels");
+    v("mirrored_charts", s.mirrored_charts, "");
+    v("largest_chart", s.largest_chart, kShare, "share of the charts' texels");
+    v("cover", s.cover, kShare, "texels that the surface shows, of all");
+    v("thin", s.thin_share, kShare, "of the charts' texels, those of thin charts");
+    v("overlap", s.overlap, kShare, "of the shown texels, those that two places show");
+    v("density", s.density, "texels per object unit, over the surface");
+    v("density_spread", s.density_spread(), kPositive, "p95 over p5 of density");
+    v("stretch", s.stretch, "longer over shorter axis of a circle of the surface on the texture");
+    v("flat_triangles", s.flat_triangles, "without area on the texture");
+    v("flat_surface", s.flat_surface, kShare, "their share of the surface");
+    v("folded_triangles", s.folded_triangles, "");
+    v("far_triangles", s.far_triangles, "");
+    v("edges", s.edges, "");
+    v("seam_edges", s.seam_edges, "");
+    v("positions", s.positions, "");
+    v("vertices", s.vertices, "positions with different texture coordinates apart");
+    v("triangle_floor", s.triangle_floor,
+      "fewest triangles of a mesh that keeps every chart beside its neighbours");
+    v("seam_colours", OrNull<SeamColours>{s.seam_colours},
+      "CIE 1976 differences across seams; null = not compared");
+  }
+};
+
+template <>
+struct RecordFields<AtlasAdvice> {
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("code", s.code, FieldRule{.words = "charts|thin|cover|overlap|seams|density|stretch|flat|folded|far"},
+      "");
+    v("atlas", s.atlas, "the texture's name; empty = the model as a whole");
+    v("found", s.found, "");
+    v("remedy", s.remedy, "");
+  }
+};
+
+template <>
+struct RecordFields<AtlasDiagnosis> {
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("version", Constant{1}, "");
+    v("triangles", s.triangles, "");
+    v("untextured_triangles", s.untextured_triangles, "");
+    v("charts", s.charts(), "");
+    v("triangle_floor", s.triangle_floor(), "");
+    v("floor_bytes", s.floor_bytes(), "about what a mesh of so many triangles takes");
+    v("nothing", s.nothing, "why there is no atlas; empty = there is one");
+    v("atlases", s.atlases, "");
+    v("advice", s.advice, "");
+  }
+};
+
+template <>
+struct RecordFields<DoctorReport> {
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("input", s.input, "file name, no folder");
+    RecordFields<AtlasDiagnosis>::fields(s.diagnosis, v);
+    v("good", s.reasons.empty(), "every limit is kept");
+    v("reasons", s.reasons, "the limits that are not");
+  }
+};
+
 namespace {
 
-using Json = nlohmann::ordered_json;
+/// By image, whether some material has it as base colour. Other textures' seams say nothing: normals of two
+/// charts differ because their axes do.
+std::vector<bool> colour_images(const Model& model) {
+  std::vector<bool> out(model.images.size());
+  for (const Material& m : model.materials)
+    if (m.base_colour_texture.used()) out.at(static_cast<std::size_t>(m.base_colour_texture.image)) = true;
+  return out;
+}
+
+/// Everything but sides and colours of the images.
+AtlasSubject bare_subject(Model&& model) {
+  AtlasSubject out;
+  for (const Image& image : model.images) out.image_names.push_back(image.name);
+  out.images.resize(model.images.size());
+  out.colours.resize(model.images.size());
+  out.mesh = std::move(model.mesh);
+  out.materials = std::move(model.materials);
+  out.notes = std::move(model.notes);
+  return out;
+}
+
+void point_at_colours(AtlasSubject& subject) {
+  for (std::size_t i = 0; i < subject.images.size(); ++i)
+    if (!subject.colours[i].data.empty()) subject.images[i].colours = &subject.colours[i];
+}
+
+constexpr double kManyFloorTriangles = 1500;  // a first picture of some 10 kB has no more
+constexpr double kMuchThin = 0.05, kLittleCover = 0.5, kMuchOverlap = 0.01, kWideSpread = 4, kMuchStretch = 2;
+constexpr double kVisibleSeams = 5;     // mean CIE difference; 2.3 can just be seen in flat colours
+constexpr double kBeyondTexture = 1.5;  // so many times what the texture has anyway
+constexpr double kManyBroken = 0.002;   // of the triangles, or of the surface
+constexpr double kGoodCover = 0.75;     // what a packer reaches with charts of ordinary shapes
+constexpr double kJustSeen = 2.3;
+
+std::string percents(double share) { return fixed(100 * share, share < 0.0995 ? 1 : 0) + " %"; }
+
+AtlasAdvice about_charts(const AtlasDiagnosis& d) {
+  std::uint64_t small = 0;
+  for (const NamedAtlas& a : d.atlases) small += a.small_charts;
+  return {
+      "charts", "",
+      fmt::format(
+          "The texture is cut into {} charts; {} of them have at most {} triangles. A mesh that keeps "
+          "every chart beside its neighbours has at least {} triangles, about {} kB, however small the "
+          "object is shown. In coarser meshes charts are lost, and the texture tears.",
+          grouped(d.charts()), grouped(small), kSmallChart, grouped(d.triangle_floor()),
+          kilobytes(d.floor_bytes())),
+      "Make a new atlas with fewer and larger charts: remove loose specks, close holes and smooth noise first, "
+      "because unwrappers cut at creases; then unwrap the finished mesh and bake the texture onto it."};
+}
+
+AtlasAdvice about_thin(const AtlasFigures& a, const std::string& name) {
+  return {
+      "thin", name,
+      fmt::format(
+          "{} of the charts' texels lie in {} charts that are thinner than {} texels. Such charts "
+          "mix with their surroundings where the texture is shown smaller, and in every block of a JPEG.",
+          percents(a.thin_share), grouped(a.thin_charts), kThinTexels),
+      "Join thin charts with their neighbours: raise the unwrapper's least chart size, or its limit for the "
+      "angle at which it cuts."};
+}
+
+AtlasAdvice about_cover(const AtlasFigures& a, const std::string& name) {
+  const double shrink = std::sqrt(a.cover / kGoodCover);
+  return {
+      "cover", name,
+      fmt::format("Only {} of the texels are shown. The others take memory on every display, and bytes.",
+                  percents(a.cover)),
+      fmt::format("Pack the charts again, 4 texels apart: {:.0f} x {:.0f} px hold what {} x {} px hold now.",
+                  std::ceil(a.width_px * shrink), std::ceil(a.height_px * shrink), a.width_px, a.height_px)};
+}
+
+AtlasAdvice about_overlap(const AtlasFigures& a, const std::string& name) {
+  return {
+      "overlap", name,
+      fmt::format("{} of the shown texels are shown at two or more places of the surface. That is right for "
+                  "tiles and for mirrored halves, and wrong for a scan: one place has the other's colours.",
+                  percents(a.overlap)),
+      "Where the object was scanned, unwrap it again without overlaps and bake the texture again."};
+}
+
+AtlasAdvice about_density(const AtlasFigures& a, const std::string& name) {
+  return {"density", name,
+          fmt::format(
+              "The finest twentieth of the surface has {} times as many texels per length as the coarsest "
+              "twentieth. The fine parts cost bytes that nobody sees beside the coarse ones.",
+              shortest(a.density_spread(), 3)),
+          "Scale the charts to one density when packing, or on purpose: more for a face than for a base."};
+}
+
+AtlasAdvice about_stretch(const AtlasFigures& a, const std::string& name) {
+  return {"stretch", name,
+          fmt::format(
+              "On a twentieth of the surface texels are more than {} times as long as wide. Details smear "
+              "along them.",
+              shortest(a.stretch.p95, 2)),
+          "Cut strongly curved charts once more, or let the unwrapper relax them with a limit for stretch."};
+}
+
+AtlasAdvice about_seams(const AtlasFigures& a, const std::string& name) {
+  return {
+      "seams", name,
+      fmt::format(
+          "Colours on both sides of seams differ by {} in the mean and {} along the worst twentieth (CIE "
+          "1976; {} can just be seen), and by {} from one texel to the next. Seams show as lines.",
+          shortest(a.seam_colours->mean, 2), shortest(a.seam_colours->p95, 2), kJustSeen,
+          shortest(a.seam_colours->inside, 2)),
+      "Let the texturing equalise exposures and blend photos across charts, and continue each chart's colours "
+      "some 4 texels beyond its border."};
+}
+
+AtlasAdvice about_flat(const AtlasFigures& a, const std::string& name) {
+  return {
+      "flat", name,
+      fmt::format(
+          "{} triangles, {} of the surface, have no area on the texture: they show single texels or lines.",
+          grouped(a.flat_triangles), percents(a.flat_surface)),
+      "Unwrap these triangles, or remove them when they are slivers of the reconstruction."};
+}
+
+AtlasAdvice about_folded(const AtlasFigures& a, const std::string& name) {
+  return {"folded", name,
+          fmt::format(
+              "{} triangles are folded over inside their charts and show their neighbours' texels mirrored.",
+              grouped(a.folded_triangles)),
+          "Unwrap the charts again with a method that forbids flips."};
+}
+
+AtlasAdvice about_far(const AtlasFigures& a, const std::string& name) {
+  return {"far", name,
+          fmt::format(
+              "{} triangles lie too far out on the texture, or over too many of its tiles, to be measured.",
+              grouped(a.far_triangles)),
+          "Look at their texture coordinates: these are tiles or faults, not an atlas."};
+}
+
+void advise_on(const AtlasFigures& a, const std::string& name, std::vector<AtlasAdvice>& out) {
+  const double broken = kManyBroken * static_cast<double>(a.triangles);
+  if (a.thin_share > kMuchThin) out.push_back(about_thin(a, name));
+  if (a.cover < kLittleCover) out.push_back(about_cover(a, name));
+  if (a.overlap > kMuchOverlap) out.push_back(about_overlap(a, name));
+  if (a.seam_colours && a.seam_colours->mean > kVisibleSeams &&
+      a.seam_colours->mean > kBeyondTexture * a.seam_colours->inside)
+    out.push_back(about_seams(a, name));
+  if (a.density_spread() > kWideSpread) out.push_back(about_density(a, name));
+  if (a.stretch.p95 > kMuchStretch) out.push_back(about_stretch(a, name));
+  if (a.flat_surface > kManyBroken) out.push_back(about_flat(a, name));
+  if (static_cast<double>(a.folded_triangles) > broken) out.push_back(about_folded(a, name));
+  if (a.far_triangles > 0) out.push_back(about_far(a, name));
+}
+
+/// What costs, the costliest first. Thresholds are where a good photogrammetry atlas is well clear of.
+std::vector<AtlasAdvice> advise(const AtlasDiagnosis& d) {
+  std::vector<AtlasAdvice> out;
+  if (static_cast<double>(d.triangle_floor()) > kManyFloorTriangles) out.push_back(about_charts(d));
+  for (const NamedAtlas& a : d.atlases) advise_on(a, a.name, out);
+  return out;
+}
+
+/// Why a model has no atlas.
+std::string reason_for_none(const AtlasSubject& subject) {
+  const bool textures = std::ranges::any_of(subject.materials, [](const Material& m) {
+    bool used = false;
+    for_each_texture(m, [&](const TextureRef& t) { used |= t.used(); });
+    return used;
+  });
+  if (!textures) return "No material has a texture, so there is no atlas to look at.";
+  if (subject.mesh.uv0.empty() && subject.mesh.uv1.empty())
+    return "The materials have textures, but the mesh has no texture coordinates: nothing of the textures is "
+           "shown, and there is no atlas to look at.";
+  return "No triangle shows a texture, so there is no atlas to look at.";
+}
 
 std::string atlas_name(const AtlasSubject& subject, std::uint32_t image) {
   const std::string& name = subject.image_names[image];
@@ -34,13 +312,8 @@ std::string materials_of(const AtlasFigures& a, const std::vector<std::string>& 
 }
 
 std::string figures_text(const AtlasFigures& a) {
-  TextTable table;
-  table.column("figure", Align::kLeft);
-  table.column("value");
-  table.column("what it says", Align::kLeft);
-  const auto of = [](std::uint64_t n, std::uint64_t all) {
-    return all > 0 ? static_cast<double>(n) / static_cast<double>(all) : 0;
-  };
+  Table table("", {Column::text("figure"), "value", Column::text("what it says")});
+  const double seams = a.edges > 0 ? static_cast<double>(a.seam_edges) / static_cast<double>(a.edges) : 0;
   table.row(
       {"charts", grouped(a.charts),
        fmt::format("of {} triangles; {} charts have at most {}; the largest has {} % of the texels",
@@ -61,7 +334,7 @@ std::string figures_text(const AtlasFigures& a) {
   table.row({"broken", grouped(a.flat_triangles + a.folded_triangles + a.far_triangles),
              fmt::format("triangles: {} without area on the texture, {} folded over, {} too far out",
                          grouped(a.flat_triangles), grouped(a.folded_triangles), grouped(a.far_triangles))});
-  table.row({"seams", percent(of(a.seam_edges, a.edges)) + " %",
+  table.row({"seams", percent(seams) + " %",
              fmt::format("of the edges; seams make {} vertices of {} positions", grouped(a.vertices),
                          grouped(a.positions))});
   if (a.seam_colours)
@@ -74,55 +347,57 @@ std::string figures_text(const AtlasFigures& a) {
   return table.text();
 }
 
-Json percentiles_json(const SurfacePercentiles& p) {
-  return {{"p5", p.p5}, {"p50", p.p50}, {"p95", p.p95}, {"p99", p.p99}};
-}
+}  // namespace
 
-Json figures_json(const AtlasFigures& a, const std::string& name) {
-  Json out{{"image", a.image},
-           {"name", name},
-           {"width_px", a.width_px},
-           {"height_px", a.height_px},
-           {"materials", a.materials},
-           {"triangles", a.triangles},
-           {"charts", a.charts},
-           {"small_charts", a.small_charts},
-           {"thin_charts", a.thin_charts},
-           {"mirrored_charts", a.mirrored_charts},
-           {"largest_chart", a.largest_chart},
-           {"cover", a.cover},
-           {"thin", a.thin_share},
-           {"overlap", a.overlap},
-           {"density", percentiles_json(a.density)},
-           {"density_spread", a.density_spread()},
-           {"stretch", percentiles_json(a.stretch)},
-           {"flat_triangles", a.flat_triangles},
-           {"flat_surface", a.flat_surface},
-           {"folded_triangles", a.folded_triangles},
-           {"far_triangles", a.far_triangles},
-           {"edges", a.edges},
-           {"seam_edges", a.seam_edges},
-           {"positions", a.positions},
-           {"vertices", a.vertices},
-           {"triangle_floor", a.triangle_floor},
-           {"seam_colours", nullptr}};
-  if (a.seam_colours)
-    out["seam_colours"] = {
-        {"mean", a.seam_colours->mean}, {"p95", a.seam_colours->p95}, {"inside", a.seam_colours->inside}};
+AtlasSubject atlas_subject(Model model, const RunContext& context) {
+  const std::vector<Image> images = std::move(model.images);
+  model.images.clear();
+  for (const Image& image : images) {
+    model.images.emplace_back();
+    model.images.back().name = image.name;
+  }
+  const std::vector<bool> decoded = colour_images(model);
+  AtlasSubject out = bare_subject(std::move(model));
+  parallel_for(context, images.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i)
+      if (decoded[i]) out.colours[i] = decode_image(images[i], FloatEncoding::kSrgb);
+  });
+  for (std::size_t i = 0; i < images.size(); ++i)
+    out.images[i] = {images[i].width_px, images[i].height_px, nullptr};
+  point_at_colours(out);
   return out;
 }
 
-}  // namespace
+AtlasSubject atlas_subject(const std::string& path, const RunContext& context) {
+  return atlas_subject(import_file(path, {}, context).model, context);
+}
+
+AtlasSubject atlas_subject(PackageReader& package, const RunContext& context) {
+  Model model = finest_scale(package, context).model;
+  const std::vector<bool> decoded = colour_images(model);
+  AtlasSubject out = bare_subject(std::move(model));
+  for (std::size_t i = 0; i < out.images.size(); ++i) {
+    const std::int32_t plane = plane_of_image(package.textures(), out.image_names[i]);
+    if (plane < 0) continue;  // a picture that belongs to no texture stays without sides: it is no atlas
+    const TextureInfo& info = package.textures()[static_cast<std::size_t>(plane)];
+    out.images[i] = {info.width_px, info.height_px, nullptr};
+    out.image_names[i] = info.name;
+    if (decoded[i])
+      out.colours[i] = read_plane(package, static_cast<std::uint32_t>(plane), kBestRung, context);
+  }
+  point_at_colours(out);
+  return out;
+}
 
 std::uint64_t AtlasDiagnosis::charts() const {
   std::uint64_t sum = 0;
-  for (const AtlasFigures& a : report.atlases) sum += a.charts;
+  for (const NamedAtlas& a : atlases) sum += a.charts;
   return sum;
 }
 
 std::uint64_t AtlasDiagnosis::triangle_floor() const {
   std::uint64_t sum = 0;
-  for (const AtlasFigures& a : report.atlases) sum += a.triangle_floor;
+  for (const NamedAtlas& a : atlases) sum += a.triangle_floor;
   return sum;
 }
 
@@ -132,11 +407,15 @@ std::uint64_t AtlasDiagnosis::floor_bytes() const {
 
 AtlasDiagnosis diagnose_atlases(const AtlasSubject& subject, const RunContext& context) {
   AtlasDiagnosis out;
-  out.report = measure_atlases(subject.mesh, subject.materials, subject.images, context);
+  AtlasReport report = measure_atlases(subject.mesh, subject.materials, subject.images, context);
   out.triangles = subject.mesh.triangles.size();
-  for (const AtlasFigures& a : out.report.atlases) out.names.push_back(atlas_name(subject, a.image));
+  out.untextured_triangles = report.untextured_triangles;
+  for (AtlasFigures& a : report.atlases) {
+    const std::string name = atlas_name(subject, a.image);
+    out.atlases.push_back({std::move(a), name});
+  }
   for (const Material& m : subject.materials) out.materials.push_back(m.name);
-  if (out.report.atlases.empty()) out.nothing = reason_for_none(subject);
+  if (out.atlases.empty()) out.nothing = reason_for_none(subject);
   out.advice = advise(out);
   return out;
 }
@@ -144,14 +423,12 @@ AtlasDiagnosis diagnose_atlases(const AtlasSubject& subject, const RunContext& c
 std::string atlas_text(const AtlasDiagnosis& d) {
   if (!d.nothing.empty()) return d.nothing + "\n";
   std::string out;
-  for (std::size_t k = 0; k < d.report.atlases.size(); ++k) {
-    const AtlasFigures& a = d.report.atlases[k];
-    out += fmt::format("{}, {} x {} px, {}\n", d.names[k], a.width_px, a.height_px,
-                       materials_of(a, d.materials)) +
-           figures_text(a) + "\n";
-  }
-  if (d.report.untextured_triangles > 0)
-    out += fmt::format("{} triangles show no texture\n", grouped(d.report.untextured_triangles));
+  for (const NamedAtlas& a : d.atlases)
+    out +=
+        fmt::format("{}, {} x {} px, {}\n", a.name, a.width_px, a.height_px, materials_of(a, d.materials)) +
+        figures_text(a) + "\n";
+  if (d.untextured_triangles > 0)
+    out += fmt::format("{} triangles show no texture\n", grouped(d.untextured_triangles));
   out += fmt::format(
       "in all: {} charts; a mesh that keeps them side by side has at least {} of {} triangles, about {} kB\n\n",
       grouped(d.charts()), grouped(d.triangle_floor()), grouped(d.triangles), kilobytes(d.floor_bytes()));
@@ -162,21 +439,16 @@ std::string atlas_text(const AtlasDiagnosis& d) {
   return out;
 }
 
-Json atlas_json(const AtlasDiagnosis& d) {
-  Json atlases = Json::array(), advice = Json::array();
-  for (std::size_t k = 0; k < d.report.atlases.size(); ++k)
-    atlases.push_back(figures_json(d.report.atlases[k], d.names[k]));
-  for (const AtlasAdvice& a : d.advice)
-    advice.push_back({{"code", a.code}, {"atlas", a.atlas}, {"found", a.found}, {"remedy", a.remedy}});
-  return {{"version", 1},
-          {"triangles", d.triangles},
-          {"untextured_triangles", d.report.untextured_triangles},
-          {"charts", d.charts()},
-          {"triangle_floor", d.triangle_floor()},
-          {"floor_bytes", d.floor_bytes()},
-          {"nothing", d.nothing},
-          {"atlases", atlases},
-          {"advice", advice}};
+nlohmann::ordered_json doctor_json(const DoctorReport& report) { return to_json(report); }
+
+nlohmann::ordered_json atlas_json(const AtlasDiagnosis& d) { return to_json(d); }
+
+DocumentSchema doctor_schema() {
+  return document_schema(
+      "doctor.v1", "texmesh atlas figures, version 1",
+      "Output of `texmesh doctor INPUT --json`. `texmesh dump PKG atlas --json` has the same "
+      "under \"atlas\", without input, good and reasons.",
+      schema_of<DoctorReport>());
 }
 
 }  // namespace texmesh

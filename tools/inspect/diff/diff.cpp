@@ -1,5 +1,7 @@
 #include "tools/inspect/diff/diff.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -9,9 +11,96 @@
 #include "format/base/text_bytes.h"
 #include "format/container/layout.h"
 #include "pipeline/compile/stage_table.h"
+#include "pipeline/io/record.h"
+#include "pipeline/io/table.h"
 #include "tools/inspect/provenance.h"
 
 namespace texmesh {
+namespace {
+
+/// A package of a diff as the JSON names it.
+struct DiffedPackage {
+  std::string name, id;
+  std::uint64_t bytes = 0;
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("name", s.name, "");
+    v("id", s.id, FieldRule{.pattern = "^[0-9a-f]{64}$"}, "");
+    v("bytes", s.bytes, "Of all entries.");
+  }
+};
+
+using TwoSizes = std::array<OrNull<std::uint64_t>, 2>;
+constexpr FieldRule kTwo{.count = Range{2, 2}};
+
+TwoSizes sizes(const std::array<std::uint64_t, 2>& bytes, bool a = true, bool b = true) {
+  TwoSizes out;
+  if (a) out[0].value = bytes[0];
+  if (b) out[1].value = bytes[1];
+  return out;
+}
+
+OrNull<std::string> text_or_null(const std::string& text) {
+  return {text.empty() ? std::nullopt : std::optional(text)};
+}
+
+/// What diff --json prints.
+struct DiffReport {
+  PackageDiff diff;
+  std::array<std::string, 2> names;
+  std::array<DiffedPackage, 2> packages() const {
+    return {{{names[0], diff.ids[0], diff.bytes[0]}, {names[1], diff.ids[1], diff.bytes[1]}}};
+  }
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("version", Constant{1}, "");
+    v("equal", s.diff.equal(), "The same package id: every byte is the same.");
+    v("packages", s.packages(), kTwo, "");
+    v("recorded", s.diff.differences, "What the packages were made from and with, where it differs.");
+    v("stages", s.diff.stages, "Stages whose entries differ, in the order of the graph.");
+    v("entries", s.diff.entries, "");
+    v("equal_entries", s.diff.equal_entries, "");
+  }
+};
+
+}  // namespace
+
+template <>
+struct RecordFields<Difference> {
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("kind", s.kind, "");
+    v("name", s.name,
+      "Input: the name by which the model refers to it, empty for the model itself. Option: stage.option.");
+    v("values", std::array{text_or_null(s.values[0]), text_or_null(s.values[1])}, kTwo, "");
+    std::optional<TwoSizes> bytes;
+    if (s.kind == DifferenceKind::kInput) bytes = sizes(s.bytes, !s.values[0].empty(), !s.values[1].empty());
+    v("bytes", bytes, kTwo, "");
+  }
+};
+
+template <>
+struct RecordFields<StageDifference> {
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("stage", s.stage, "");
+    v("entries", s.entries, "");
+    v("bytes", sizes(s.bytes), kTwo, "");
+    v("causes", s.causes, "Indices into `recorded`: what can reach this stage.");
+  }
+};
+
+template <>
+struct RecordFields<EntryDifference> {
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("path", s.path, "");
+    v("stage", text_or_null(s.stage), "");
+    v("in", s.present, kTwo, "");
+    v("bytes", sizes(s.bytes, s.present[0], s.present[1]), kTwo, "");
+  }
+};
+
 namespace {
 
 /// Compares two lists of named things and notes what is not the same, in A's order, then B's own.
@@ -209,6 +298,81 @@ std::vector<StageDifference> by_stage(const PackageDiff& diff) {
   return stages;
 }
 
+/// Entries are many where a rung list changes; a person needs the first few of each stage.
+constexpr std::size_t kEntriesShown = 8;
+
+std::string name_of(const Difference& d) {
+  if (d.kind == DifferenceKind::kInput) return d.name.empty() ? "the model itself" : printable(d.name);
+  return printable(d.name);
+}
+
+std::string value_of(const Difference& d, int side) {
+  const std::string& v = d.values[side];
+  if (v.empty()) return "-";
+  if (d.kind == DifferenceKind::kInput) return grouped(d.bytes[side]) + " bytes, " + v.substr(0, 12);
+  if (d.kind == DifferenceKind::kStageVersion) return "version " + v;
+  return printable(v);
+}
+
+std::string head_text(const PackageDiff& diff, const std::array<std::string, 2>& names) {
+  Table table("", {Column::text(""), Column::text("package"), Column::text("id"), {"bytes", kGrouped}});
+  for (int side = 0; side < 2; ++side)
+    table.row({side ? "B" : "A", names[side], diff.ids[side].substr(0, 16), diff.bytes[side]});
+  return table.text("");
+}
+
+std::string recorded_text(const PackageDiff& diff) {
+  if (diff.differences.empty())
+    return "recorded: inputs, options, what is said of the object, stages, libraries and tool are the same\n";
+  Table table("what the packages were made from and with",
+              {Column::text("recorded"), Column::text("what"), Column::text("A"), Column::text("B")});
+  for (const Difference& d : diff.differences)
+    table.row({enum_name(d.kind), name_of(d), value_of(d, 0), value_of(d, 1)});
+  return table.text();
+}
+
+std::string because(const PackageDiff& diff, const StageDifference& s) {
+  std::string text;
+  for (const std::size_t i : s.causes) {
+    const Difference& d = diff.differences[i];
+    text += (text.empty() ? "" : ", ") + std::string(enum_name(d.kind)) + " " + name_of(d);
+  }
+  return text.empty()
+             ? "nothing recorded: one of the packages was not made by this tool as it says, run verify"
+             : text;
+}
+
+std::string entries_of(const PackageDiff& diff, const StageDifference& s) {
+  std::string text;
+  std::size_t shown = 0;
+  for (const EntryDifference& e : diff.entries) {
+    if (e.stage != s.stage) continue;
+    if (++shown > kEntriesShown) continue;
+    const std::string path = printable(e.path);
+    if (!e.present[1])
+      text += fmt::format("    only in A  {}  {} bytes\n", path, grouped(e.bytes[0]));
+    else if (!e.present[0])
+      text += fmt::format("    only in B  {}  {} bytes\n", path, grouped(e.bytes[1]));
+    else
+      text +=
+          fmt::format("    differs    {}  {} -> {} bytes\n", path, grouped(e.bytes[0]), grouped(e.bytes[1]));
+  }
+  if (shown > kEntriesShown)
+    text += fmt::format("    ... and {} more (--json lists all)\n", shown - kEntriesShown);
+  return text;
+}
+
+std::string contents_text(const PackageDiff& diff) {
+  std::string text;
+  for (const StageDifference& s : diff.stages) {
+    text += fmt::format("{}: {} entr{} differ{}, {} -> {} bytes; can come from: {}\n", s.stage, s.entries,
+                        s.entries == 1 ? "y" : "ies", s.entries == 1 ? "s" : "", grouped(s.bytes[0]),
+                        grouped(s.bytes[1]), because(diff, s));
+    text += entries_of(diff, s);
+  }
+  return text + fmt::format("{} entries are the same\n", grouped(diff.equal_entries));
+}
+
 }  // namespace
 
 PackageDiff diff_packages(PackageReader& a, PackageReader& b) {
@@ -220,6 +384,29 @@ PackageDiff diff_packages(PackageReader& a, PackageReader& b) {
   compare_entries(a, b, diff);
   diff.stages = by_stage(diff);
   return diff;
+}
+
+std::string diff_text(const PackageDiff& diff, const std::array<std::string, 2>& names) {
+  if (diff.equal())
+    return fmt::format("{} and {} are the same package ({})\n", printable(names[0]), printable(names[1]),
+                       diff.ids[0].substr(0, 16));
+  return head_text(diff, names) + "\n" + recorded_text(diff) + "\n" + contents_text(diff);
+}
+
+nlohmann::ordered_json diff_json(const PackageDiff& diff, const std::array<std::string, 2>& names) {
+  return to_json(DiffReport{diff, names});
+}
+
+DocumentSchema diff_schema() {
+  Json body = schema_of<DiffReport>();
+  Json& recorded = body["properties"]["recorded"]["items"];
+  recorded["if"] = {{"properties", {{"kind", {{"const", "input"}}}}}};
+  recorded["then"] = {{"required", {"bytes"}}};
+  return document_schema(
+      "diff.v1", "texmesh diff report, version 1",
+      "Output of `texmesh diff A B --json`. Lists of two hold A's value, then B's; null where "
+      "that package has no such thing.",
+      body);
 }
 
 }  // namespace texmesh

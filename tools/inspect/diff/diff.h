@@ -11,6 +11,8 @@
 
 namespace texmesh {
 
+struct DocumentSchema;  // pipeline/io/record.h
+
 /// What packages can differ in.
 enum class DifferenceKind : std::uint8_t { kInput, kOption, kAbout, kStageVersion, kLibrary, kTool, kFormat };
 template <>
@@ -61,5 +63,6 @@ PackageDiff diff_packages(PackageReader& a, PackageReader& b);
 std::string diff_text(const PackageDiff& diff, const std::array<std::string, 2>& names);
 /// schemas/diff.v1.schema.json.
 nlohmann::ordered_json diff_json(const PackageDiff& diff, const std::array<std::string, 2>& names);
+DocumentSchema diff_schema();
 
 }  // namespace texmesh

@@ -1,11 +1,8 @@
-#include "tools/inspect/dump/dump_perceptual.h"
-
 #include <fmt/format.h>
 
-#include <nlohmann/json.hpp>
-
 #include "format/rules/jnd_choice.h"
-#include "pipeline/io/text_table.h"
+#include "pipeline/io/table.h"
+#include "tools/inspect/dump/dump_parts.h"
 
 namespace texmesh {
 namespace {
@@ -36,78 +33,71 @@ std::vector<int> majors_of(const PerceptualTable& t, const Comparison& c, double
   return out;
 }
 
-std::string value_text(float v) { return fixed(static_cast<double>(v), 4); }
-
-std::string table_7_1(const PerceptualTable& t) {
-  TextTable table;
-  for (const char* header : {"scales", "triangles", "collapses", "average", "deviation", "largest", "least"})
-    table.column(header);
-  for (std::size_t k = 1; k < t.scale.size(); ++k)
-    table.row({fmt::format("{}-{}", t.scale[k - 1], t.scale[k]), grouped(t.triangles[k]),
-               grouped(t.collapses[k]), value_text(t.average[k]), value_text(t.deviation[k]),
-               value_text(t.largest[k]), value_text(t.least[k])});
-  return table.text();
+/// Every step from scale to scale. The first row, S_0, follows no other.
+Table table_7_1(const PerceptualTable& t) {
+  Table table("change of the distance to the skeleton from scale to scale, over collapses (Table 7.1)",
+              {{"scales", 0, "scale"},
+               {"triangles", kGrouped, "triangles"},
+               {"collapses", kGrouped, "collapses"},
+               {"average", 4, "average"},
+               {"deviation", 4, "deviation"},
+               {"largest", 4, "largest"},
+               {"least", 4, "least"}});
+  for (std::size_t k = 0; k < t.scale.size(); ++k)
+    table.row({{t.scale[k], fmt::format("{}-{}", t.scale[k > 0 ? k - 1 : 0], t.scale[k])},
+               t.triangles[k],
+               t.collapses[k],
+               t.average[k],
+               t.deviation[k],
+               t.largest[k],
+               t.least[k]});
+  return table;
 }
 
-std::string table_7_2(const PerceptualTable& t, const std::vector<Comparison>& comparisons) {
-  TextTable table;
-  table.column("from");
-  table.column("to");
-  for (const Comparison& c : comparisons) table.column(c.name);
+Table table_7_2(const PerceptualTable& t, const std::vector<Comparison>& comparisons) {
+  Table table(
+      "cumulative values from S_0 (Table 7.2); of collapses: the root of the sum of squares, and against\n"
+      "the vertex that is left (survivor); --json has all pairs",
+      {"from", "to"});
+  for (const Comparison& c : comparisons) table.column({c.name, 4});
   for (std::size_t j = 1; j < t.scale.size(); ++j) {
-    std::vector<std::string> row{"0", std::to_string(t.scale[j])};
-    for (const Comparison& c : comparisons) row.push_back(value_text(c.value[j]));
-    table.row(std::move(row));
+    table.row({0, t.scale[j]});
+    for (const Comparison& c : comparisons) table.rows.back().emplace_back(c.value[j]);
   }
-  return table.text();
+  return table;
 }
 
-std::string majors_text(const PerceptualTable& t, const std::vector<Comparison>& comparisons, double jnd) {
-  TextTable table;
-  table.column("by", Align::kLeft);
-  table.column("major scales", Align::kLeft);
-  for (const Comparison& c : comparisons)
-    table.row({c.name, fmt::format("{}", fmt::join(majors_of(t, c, jnd), " "))});
-  return table.text();
+Table pairs_of(const PerceptualTable& t, const Comparison& c) {
+  Table table(c.name, {{"from", 0, "from"}, {"to", 0, "to"}, {"value", 4, "value"}});
+  const std::size_t rows = t.scale.size();
+  for (std::size_t i = 0; i < rows; ++i)
+    for (std::size_t j = i + 1; j < rows; ++j) table.row({t.scale[i], t.scale[j], c.value[i * rows + j]});
+  return table;
 }
 
 }  // namespace
 
-std::string perceptual_text(PackageReader& package) {
+std::string perceptual_text(PackageReader& package, DumpGamma) {
   const PerceptualTable* t = package.perceptual_table();
   if (!t || t->scale.size() < 2) return "no perceptual table\n";
   const std::vector<Comparison> comparisons = comparisons_of(*t);
   const double jnd = package.manifest().jnd;
-  return "change of the distance to the skeleton from scale to scale, over collapses (Table 7.1)\n" +
-         table_7_1(*t) +
-         "\ncumulative values from S_0 (Table 7.2); of collapses: the root of the sum of squares, and against\n"
-         "the vertex that is left (survivor); --json has all pairs\n" +
-         table_7_2(*t, comparisons) + fmt::format("\nmajor scales at JND {}\n", shortest(jnd)) +
-         majors_text(*t, comparisons, jnd);
+  Table steps = table_7_1(*t);
+  steps.rows.erase(steps.rows.begin());
+  Table majors("major scales at JND " + shortest(jnd), {Column::text("by"), Column::text("major scales")});
+  for (const Comparison& c : comparisons)
+    majors.row({c.name, fmt::format("{}", fmt::join(majors_of(*t, c, jnd), " "))});
+  return steps.text() + "\n" + table_7_2(*t, comparisons).text() + "\n" + majors.text();
 }
 
-Json perceptual_json(PackageReader& package) {
+Json perceptual_json(PackageReader& package, DumpGamma) {
   const PerceptualTable* t = package.perceptual_table();
   if (!t) return {{"perceptual", nullptr}};
   const double jnd = package.manifest().jnd;
-  const std::size_t rows = t->scale.size();
-  Json steps = Json::array(), values = Json::array();
-  for (std::size_t k = 0; k < rows; ++k)
-    steps.push_back({{"scale", t->scale[k]},
-                     {"triangles", t->triangles[k]},
-                     {"collapses", t->collapses[k]},
-                     {"average", t->average[k]},
-                     {"deviation", t->deviation[k]},
-                     {"largest", t->largest[k]},
-                     {"least", t->least[k]}});
-  for (const Comparison& c : comparisons_of(*t)) {
-    Json pairs = Json::array();
-    for (std::size_t i = 0; i < rows; ++i)
-      for (std::size_t j = i + 1; j < rows; ++j)
-        pairs.push_back({{"from", t->scale[i]}, {"to", t->scale[j]}, {"value", c.value[i * rows + j]}});
-    values.push_back({{"by", c.name}, {"major", majors_of(*t, c, jnd)}, {"pairs", pairs}});
-  }
-  return {{"perceptual", {{"jnd", jnd}, {"steps", steps}, {"values", values}}}};
+  Json values = Json::array();
+  for (const Comparison& c : comparisons_of(*t))
+    values.push_back({{"by", c.name}, {"major", majors_of(*t, c, jnd)}, {"pairs", pairs_of(*t, c).json()}});
+  return {{"perceptual", {{"jnd", jnd}, {"steps", table_7_1(*t).json()}, {"values", values}}}};
 }
 
 }  // namespace texmesh

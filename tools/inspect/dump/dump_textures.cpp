@@ -1,5 +1,5 @@
-#include "tools/inspect/dump/dump_textures.h"
-
+// Of every texture plane: its grid with what each fragment is worth and takes, its rungs, and the tables by
+// which clients choose rungs.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -7,12 +7,22 @@
 
 #include "format/documents/tables.h"
 #include "format/rules/allocation.h"
-#include "pipeline/io/text_table.h"
-#include "tools/inspect/dump/dump_cells.h"
+#include "pipeline/io/table.h"
+#include "tools/inspect/dump/dump_parts.h"
 #include "tools/inspect/dump/package_figures.h"
 
 namespace texmesh {
 namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// The title line of a texture plane.
+std::string plane_title(const TextureInfo& t, std::size_t plane) {
+  const std::string name = t.name.empty() ? "" : " \"" + printable(t.name) + "\"";
+  const std::string mip = t.mip == 0 ? "" : fmt::format(", mip {} of plane {}", t.mip, t.base);
+  return fmt::format("texture plane {}{}, {}{}: {} x {} px, {} channel{}\n", plane, name, t.role, mip,
+                     t.width_px, t.height_px, t.channels, t.channels == 1 ? "" : "s");
+}
 
 /// Where texture detail lies: a digit per fragment, eta of S_0 in tenths, '.' where nothing is stored.
 std::string eta_map(const PlaneTables& t, const std::vector<float>& eta) {
@@ -26,49 +36,150 @@ std::string eta_map(const PlaneTables& t, const std::vector<float>& eta) {
   return map;
 }
 
-std::string allocation_text(const PlaneTables& t, const std::vector<ManifestScale>& scales,
-                            std::optional<double> gamma) {
-  TextTable table;
-  for (const char* header : {"scale", "Q_i", "Gamma", "q_i min", "mean", "max", "D_i kB", "Gamma 0 kB",
-                             "0.25 kB", "0.5 kB", "0.75 kB", "1 kB"})
-    table.column(header);
+Table fragments_table(const TextureInfo& info, const PlaneTables& t, const PlaneThesis* thesis,
+                      const std::vector<float>& eta) {
+  Table table("fragments by falling importance; q_0, d_0: quality and bytes that the tables ask for at S_0",
+              {"rank",
+               "fragment",
+               "column",
+               "row",
+               {"covered %", percent_form()},
+               {"surface %", percent_form(2)},
+               {"eta", 3},
+               {"VQP", 3},
+               {"q_0", 1},
+               "d_0 B"});
+  for (const int q : info.rung_quality) table.column(fmt::format("q{} B", q));
+  const AllocationFigures finest = allocation_figures(t, 0);
+  const double texels = static_cast<double>(info.fragment_width_px) * info.fragment_height_px;
+  for (std::size_t rank = 0; rank < t.order.size(); ++rank) {
+    const std::size_t i = t.order[rank];
+    table.row({rank, i, i % t.columns, i / t.columns, t.covered_texels[i] / texels, t.surface_fraction[i],
+               eta[i], thesis && i < thesis->vqp.size() ? Cell(thesis->vqp[i]) : Cell(),
+               finest.fragment_quality[i], finest.fragment_bytes[i]});
+    for (std::size_t r = 0; r < t.rung_count(); ++r)
+      table.rows.back().emplace_back(t.size_bytes[r * t.fragment_count() + i]);
+  }
+  return table;
+}
+
+Json fragment_json(const PlaneTables& t, const PlaneThesis* thesis, std::size_t i,
+                   const std::vector<float>& eta) {
+  Json bytes = Json::array(), features = Json::array();
+  for (std::size_t r = 0; r < t.rung_count(); ++r) bytes.push_back(t.size_bytes[r * t.fragment_count() + i]);
+  for (std::size_t row = 0; row < t.scale_count(); ++row)
+    features.push_back(t.features[row * t.fragment_count() + i]);
+  Json j{{"fragment", i},
+         {"column", i % t.columns},
+         {"row", i / t.columns},
+         {"covered_texels", t.covered_texels[i]},
+         {"surface_fraction", t.surface_fraction[i]},
+         {"eta", eta[i]},
+         {"features", features},
+         {"bytes", bytes}};
+  if (thesis && i < thesis->vqp.size())
+    j.update(Json{{"vqp", thesis->vqp[i]},
+                  {"z", thesis->z[i]},
+                  {"i", thesis->i[i]},
+                  {"zeta", thesis->zeta[i]},
+                  {"m", thesis->m[i]}});
+  if (thesis && i < thesis->models.size())
+    if (const SizeModel& model = thesis->models[i]; model != SizeModel{})
+      j["size_model"] = {{"a", model.a}, {"b", model.b}, {"correlation", model.correlation}};
+  return j;
+}
+
+Table rungs_table(const TextureInfo& info, const PlaneTables& t) {
+  Table table("", {{"rung", 0, "rung"},
+                   {"quality", 0, "quality"},
+                   {"kB", kKilobytes, "bytes"},
+                   {"tables B", 0, "table_bytes"},
+                   {"mean MSE", 2, "mse"},
+                   {"mean SSIM", 4, "ssim"},
+                   {"surface SSIM", 4, "surface_ssim"},
+                   {"bits/texel", 3},
+                   Column::data("path")});
+  double texels = 0;
+  for (const std::uint16_t i : t.order) texels += t.covered_texels[i];
+  const std::vector<RungFigures> figures = rung_figures(t);
+  for (std::size_t r = 0; r < figures.size(); ++r) {
+    const RungFigures& f = figures[r];
+    table.row({r, f.quality, f.bytes, f.table_bytes, f.mse, f.ssim, f.surface_ssim,
+               texels > 0 ? Cell(8 * static_cast<double>(f.bytes) / texels) : Cell(), info.rungs[r].path});
+  }
+  return table;
+}
+
+Table allocation_table(const PlaneTables& t, const std::vector<ManifestScale>& scales, DumpGamma gamma) {
+  Table table("", {{"scale", kScaleName},
+                   {"Q_i", 1},
+                   {"Gamma", 3},
+                   {"q_i min", 1},
+                   {"mean", 1},
+                   {"max", 1},
+                   {"D_i kB", kKilobytes}});
+  for (const char* heading : {"Gamma 0 kB", "0.25 kB", "0.5 kB", "0.75 kB", "1 kB"})
+    table.column({heading, kKilobytes});
   for (std::size_t s = 0; s < t.scale_count(); ++s) {
     const AllocationFigures f = allocation_figures(t, s, gamma);
-    std::vector<std::string> row{fmt::format("S_{}", scales[s].scale),
-                                 fixed(static_cast<double>(t.quality[s]), 1),
-                                 fixed(f.gamma, 3),
-                                 fixed(f.quality_min, 1),
-                                 fixed(f.quality_mean, 1),
-                                 fixed(f.quality_max, 1),
-                                 kilobytes(f.bytes)};
-    for (const double g : {0.0, 0.25, 0.5, 0.75, 1.0}) row.push_back(kilobytes(bytes_asked_for(t, s, g)));
-    table.row(std::move(row));
+    table.row(
+        {scales[s].scale, t.quality[s], f.gamma, f.quality_min, f.quality_mean, f.quality_max, f.bytes});
+    for (const double g : {0.0, 0.25, 0.5, 0.75, 1.0})
+      table.rows.back().emplace_back(bytes_asked_for(t, s, g));
   }
-  return table.text();
+  return table;
 }
 
 /// q_i(x, y) and d_i(x, y) of every stored fragment and scale at one Gamma.
-std::string gamma_text(const PlaneTables& t, const std::vector<ManifestScale>& scales, double gamma) {
-  TextTable table;
-  table.column("fragment");
+Table gamma_table(const PlaneTables& t, const std::vector<ManifestScale>& scales, double gamma) {
+  Table table(
+      fmt::format("  fragments by falling importance at Gamma {}: quality, 0 = skipped, and bytes at S_i",
+                  shortest(gamma)),
+      {"fragment"});
   std::vector<AllocationFigures> rows;
   for (std::size_t s = 0; s < t.scale_count(); ++s) {
-    table.column(fmt::format("q_{}", scales[s].scale));
+    table.column({fmt::format("q_{}", scales[s].scale), 1});
     table.column(fmt::format("d_{} B", scales[s].scale));
     rows.push_back(allocation_figures(t, s, gamma));
   }
   for (const std::uint16_t i : t.order) {
-    std::vector<std::string> row{std::to_string(i)};
+    table.row({i});
     for (const AllocationFigures& f : rows) {
-      row.push_back(fixed(static_cast<double>(f.fragment_quality[i]), 1));
-      row.push_back(std::to_string(f.fragment_bytes[i]));
+      table.rows.back().emplace_back(f.fragment_quality[i]);
+      table.rows.back().emplace_back(f.fragment_bytes[i]);
     }
-    table.row(std::move(row));
   }
-  return fmt::format(
-             "  fragments by falling importance at Gamma {}: quality, 0 = skipped, and bytes at S_i\n",
-             shortest(gamma)) +
-         table.text();
+  return table;
+}
+
+Json allocation_json(const PlaneTables& t, int scale, std::size_t row, DumpGamma gamma) {
+  const AllocationFigures f = allocation_figures(t, row, gamma);
+  Json q = Json::array(), rungs = Json::array(), bytes = Json::array(), total = Json::array();
+  for (std::size_t i = 0; i < t.fragment_count(); ++i) {
+    const bool stored = f.fragment_rung[i] != kSkipped;
+    q.push_back(stored ? Json(f.fragment_quality[i]) : Json());
+    rungs.push_back(stored ? Json(f.fragment_rung[i]) : Json());
+    bytes.push_back(stored ? Json(f.fragment_bytes[i]) : Json());
+  }
+  for (std::size_t g = 0; g < kGammaSteps; ++g)
+    total.push_back(bytes_asked_for(t, row, static_cast<double>(g) / (kGammaSteps - 1)));
+  return {{"scale", scale},         {"quality", t.quality[row]},
+          {"gamma", f.gamma},       {"bytes_at_gamma", f.bytes},
+          {"total_bytes", total},   {"fragment_quality", q},
+          {"fragment_rung", rungs}, {"fragment_bytes", bytes}};
+}
+
+/// D_i(Gamma) of all scales of the chain.
+Json thesis_json(const PlaneThesis& thesis) {
+  Json scales = Json::array();
+  for (std::size_t s = 0; s < thesis.quality.size(); ++s) {
+    const auto begin = thesis.total_bytes.begin() + static_cast<std::ptrdiff_t>(s * kGammaSteps);
+    scales.push_back({{"scale", s},
+                      {"quality", thesis.quality[s]},
+                      {"total_bytes",
+                       std::vector<std::uint64_t>(begin, begin + static_cast<std::ptrdiff_t>(kGammaSteps))}});
+  }
+  return {{"chain", scales}};
 }
 
 /// The middle one of the fitted models' values.
@@ -91,117 +202,96 @@ std::string size_model_text(const PlaneThesis* thesis) {
       fixed(median_of(models, &SizeModel::correlation), 4));
 }
 
-std::string fraction(float value) { return fixed(static_cast<double>(value), 4); }
+constexpr std::vector<float> PictureLosses::*kLosses[] = {&PictureLosses::flip, &PictureLosses::flip_p95,
+                                                          &PictureLosses::dssim};
 
-std::string geometry_text(const QualityTable& q) {
-  TextTable table;
-  table.column("scale");
+Table geometry_table(const QualityTable& q) {
+  Table table("", {{"scale", kScaleName}});
   for (const char* what : {"FLIP", "p95", "1-SSIM"})
-    for (const std::uint32_t px : q.sizes_px) table.column(fmt::format("{} {} px", what, px));
+    for (const std::uint32_t px : q.sizes_px) table.column({fmt::format("{} {} px", what, px), 4});
   for (std::size_t s = 0; s < q.scales.size(); ++s) {
-    std::vector<std::string> row{fmt::format("S_{}", q.scales[s])};
-    for (const auto list : {&PictureLosses::flip, &PictureLosses::flip_p95, &PictureLosses::dssim})
-      for (const PictureLosses& losses : q.geometry) row.push_back(fraction((losses.*list)[s]));
-    table.row(std::move(row));
+    table.row({q.scales[s]});
+    for (const auto list : kLosses)
+      for (const PictureLosses& losses : q.geometry) table.rows.back().emplace_back((losses.*list)[s]);
   }
-  return table.text();
+  return table;
 }
 
-std::string groups_text(const QualityTable& q) {
-  TextTable table;
-  table.column("planes", Align::kLeft);
-  table.column("px");
-  table.column("shown as", Align::kLeft);
-  for (const char* header : {"texels' 1-SSIM", "FLIP", "p95", "1-SSIM"}) table.column(header);
-  const auto add = [&](const GroupLosses& group, std::uint32_t px, std::vector<std::string> how,
+Table groups_table(const QualityTable& q) {
+  Table table("", {Column::text("planes"),
+                   "px",
+                   Column::text("shown as"),
+                   {"texels' 1-SSIM", 4},
+                   {"FLIP", 4},
+                   {"p95", 4},
+                   {"1-SSIM", 4}});
+  const auto add = [&](const GroupLosses& group, std::uint32_t px, const std::string& how, Cell texel_dssim,
                        const PictureLosses& losses, std::size_t i) {
-    std::vector<std::string> row{std::string(enum_name(group.group)), std::to_string(px)};
-    row.insert(row.end(), how.begin(), how.end());
-    for (const auto list : {&PictureLosses::flip, &PictureLosses::flip_p95, &PictureLosses::dssim})
-      row.push_back(fraction((losses.*list)[i]));
-    table.row(std::move(row));
+    table.row({enum_name(group.group), px, how, std::move(texel_dssim)});
+    for (const auto list : kLosses) table.rows.back().emplace_back((losses.*list)[i]);
   };
   for (const GroupLosses& group : q.groups)
     for (std::size_t i = 0; i < group.sizes.size(); ++i) {
       const TextureLosses& t = group.sizes[i];
+      const std::uint32_t px = q.sizes_px[i];
       for (std::size_t k = 0; k < t.texel_dssim.size(); ++k)
-        add(group, q.sizes_px[i], {"coded", fraction(t.texel_dssim[k])}, t.coded, k);
-      add(group, q.sizes_px[i], {"previews", ""}, t.preview, 0);
+        add(group, px, "coded", t.texel_dssim[k], t.coded, k);
+      add(group, px, "previews", {}, t.preview, 0);
       for (std::size_t l = 0; l < t.finer.size(); ++l)
-        add(group, q.sizes_px[i], {l == 0 ? "mips" : fmt::format("{} mips finer", l), ""}, t.finer, l);
+        add(group, px, l == 0 ? "mips" : fmt::format("{} mips finer", l), {}, t.finer, l);
       for (std::size_t l = 0; l < t.coarser.size(); ++l)
-        add(group, q.sizes_px[i], {fmt::format("{} mips coarser", l + 1), ""}, t.coarser, l);
+        add(group, px, fmt::format("{} mips coarser", l + 1), {}, t.coarser, l);
     }
-  return q.groups.empty() ? "" : table.text();
+  return table;
 }
 
 std::string measured_text(const QualityTable& q) {
   return fmt::format("lit pictures against S_0 with the source's textures ({} views)\n", q.views) +
-         geometry_text(q) + groups_text(q) +
+         geometry_table(q).text() + (q.groups.empty() ? "" : groups_table(q).text()) +
          fmt::format("losses add up with exponent {}; mean error of that {} %\n",
-                     fixed(static_cast<double>(q.exponent), 2), percent(static_cast<double>(q.error), 1));
+                     fixed(static_cast<double>(q.exponent), 2), percent(static_cast<double>(q.error)));
 }
 
 }  // namespace
 
-std::string fragments_text(PackageReader& p) {
+std::string fragments_text(PackageReader& p, DumpGamma) {
   std::string s;
   for (std::size_t k = 0; k < p.textures().size(); ++k) {
     const TextureInfo& info = p.textures()[k];
     const PlaneTables& t = p.tables().planes[k];
-    const PlaneThesis* thesis = p.plane_thesis(k);
     const std::vector<float> eta = eta_of(t, 0);
-    TextTable table;
-    for (const char* header :
-         {"rank", "fragment", "column", "row", "covered %", "surface %", "eta", "VQP", "q_0", "d_0 B"})
-      table.column(header);
-    const AllocationFigures finest = allocation_figures(t, 0);
-    for (const int q : info.rung_quality) table.column(fmt::format("q{} B", q));
-    const double texels = static_cast<double>(info.fragment_width_px) * info.fragment_height_px;
-    for (std::size_t rank = 0; rank < t.order.size(); ++rank) {
-      const std::size_t i = t.order[rank];
-      std::vector<std::string> row{
-          std::to_string(rank),
-          std::to_string(i),
-          std::to_string(i % t.columns),
-          std::to_string(i / t.columns),
-          percent(t.covered_texels[i] / texels),
-          percent(static_cast<double>(t.surface_fraction[i]), 2),
-          fixed(static_cast<double>(eta[i]), 3),
-          thesis && i < thesis->vqp.size() ? fixed(static_cast<double>(thesis->vqp[i]), 3) : std::string(),
-          fixed(static_cast<double>(finest.fragment_quality[i]), 1),
-          std::to_string(finest.fragment_bytes[i])};
-      for (std::size_t r = 0; r < t.rung_count(); ++r)
-        row.push_back(std::to_string(t.size_bytes[r * t.fragment_count() + i]));
-      table.row(std::move(row));
-    }
-    s += plane_title(info, k);
-    s += "grid: " + printable(info.grid_reason) + "\neta of S_0 in tenths, . = not stored\n";
-    s += eta_map(t, eta) +
-         "fragments by falling importance; q_0, d_0: quality and bytes that the tables ask for at S_0\n" +
-         table.text() + "\n";
+    s += plane_title(info, k) + "grid: " + printable(info.grid_reason) +
+         "\neta of S_0 in tenths, . = not stored\n" + eta_map(t, eta) +
+         fragments_table(info, t, p.plane_thesis(k), eta).text() + "\n";
   }
   return s.empty() ? "no textures\n" : s;
 }
 
-std::string ladder_text(PackageReader& p) {
+Json fragments_json(PackageReader& p, DumpGamma) {
+  Json planes = Json::array();
+  for (std::size_t k = 0; k < p.textures().size(); ++k) {
+    const TextureInfo& info = p.textures()[k];
+    const PlaneTables& t = p.tables().planes[k];
+    const std::vector<float> eta = eta_of(t, 0);
+    Json fragments = Json::array();
+    for (const std::uint16_t i : t.order) fragments.push_back(fragment_json(t, p.plane_thesis(k), i, eta));
+    planes.push_back({{"plane", k},
+                      {"columns", info.columns},
+                      {"rows", info.rows},
+                      {"fragment_width_px", info.fragment_width_px},
+                      {"fragment_height_px", info.fragment_height_px},
+                      {"grid_reason", info.grid_reason},
+                      {"rung_quality", info.rung_quality},
+                      {"fragments", fragments}});
+  }
+  return {{"fragments", planes}};
+}
+
+std::string ladder_text(PackageReader& p, DumpGamma) {
   std::string s;
   for (std::size_t k = 0; k < p.textures().size(); ++k) {
-    TextTable table;
-    for (const char* header :
-         {"rung", "quality", "kB", "tables B", "mean MSE", "mean SSIM", "surface SSIM", "bits/texel"})
-      table.column(header);
-    const PlaneTables& t = p.tables().planes[k];
-    double texels = 0;
-    for (const std::uint16_t i : t.order) texels += t.covered_texels[i];
-    const auto figures = rung_figures(t);
-    for (std::size_t r = 0; r < figures.size(); ++r)
-      table.row({std::to_string(r), std::to_string(figures[r].quality), kilobytes(figures[r].bytes),
-                 std::to_string(figures[r].table_bytes), fixed(figures[r].mse, 2), fixed(figures[r].ssim, 4),
-                 fixed(figures[r].surface_ssim, 4),
-                 texels > 0 ? fixed(8 * static_cast<double>(figures[r].bytes) / texels, 3) : ""});
     const TextureInfo& info = p.textures()[k];
-    s += plane_title(info, k) + table.text();
+    s += plane_title(info, k) + rungs_table(info, p.tables().planes[k]).text();
     if (info.source_rung) s += "  the last rung holds the source's coefficients\n";
     if (!info.source_extension.empty())
       s += fmt::format("  {}: the source as it was, {} B{}\n", info.source.path, info.source.bytes,
@@ -213,7 +303,22 @@ std::string ladder_text(PackageReader& p) {
   return s.empty() ? "no textures\n" : s;
 }
 
-std::string tables_text(PackageReader& p, std::optional<double> gamma) {
+Json ladder_json(PackageReader& p, DumpGamma) {
+  Json planes = Json::array();
+  for (std::size_t k = 0; k < p.textures().size(); ++k) {
+    const TextureInfo& info = p.textures()[k];
+    planes.push_back({{"plane", k},
+                      {"codec", codec_traits(info.codec).id},
+                      {"preview_width_px", info.preview_width_px},
+                      {"preview_height_px", info.preview_height_px},
+                      {"preview_bytes", info.preview.bytes},
+                      {"rungs", rungs_table(info, p.tables().planes[k]).json()}});
+  }
+  return {{"ladder", planes}};
+}
+
+std::string tables_text(PackageReader& p, DumpGamma gamma) {
+  const std::vector<ManifestScale>& scales = p.manifest().scales;
   std::string s;
   for (std::size_t k = 0; k < p.textures().size(); ++k) {
     const PlaneTables& t = p.tables().planes[k];
@@ -225,10 +330,29 @@ std::string tables_text(PackageReader& p, std::optional<double> gamma) {
             static_cast<double>(t.allocation == 0 || t.allocation == kByVqp ? t.quality_width : t.log_width)),
         shortest(static_cast<double>(t.quality_min)), shortest(static_cast<double>(t.quality_max)),
         gamma ? "the Gamma asked for" : "the default Gamma");
-    s += allocation_text(t, p.manifest().scales, gamma) +
-         (gamma ? gamma_text(t, p.manifest().scales, *gamma) : "") + "\n";
+    s += allocation_table(t, scales, gamma).text() + (gamma ? gamma_table(t, scales, *gamma).text() : "") +
+         "\n";
   }
   return s + measured_text(p.quality());
+}
+
+Json tables_json(PackageReader& p, DumpGamma gamma) {
+  Json planes = Json::array();
+  for (std::size_t k = 0; k < p.textures().size(); ++k) {
+    const PlaneTables& t = p.tables().planes[k];
+    Json scales = Json::array();
+    for (std::size_t row = 0; row < t.scale_count(); ++row)
+      scales.push_back(allocation_json(t, p.manifest().scales[row].scale, row, gamma));
+    planes.push_back({{"plane", k},
+                      {"allocation", allocation_name(t)},
+                      {"quality_width", t.quality_width},
+                      {"log_width", t.log_width},
+                      {"quality_min", t.quality_min},
+                      {"quality_max", t.quality_max},
+                      {"scales", scales}});
+    if (const PlaneThesis* thesis = p.plane_thesis(k)) planes.back()["thesis"] = thesis_json(*thesis);
+  }
+  return {{"tables", planes}, {"measured_quality", Json::parse(write_quality(p.quality()))}};
 }
 
 }  // namespace texmesh

@@ -9,6 +9,8 @@
 
 namespace texmesh {
 
+struct DocumentSchema;  // pipeline/io/record.h
+
 struct VerifyReport {
   std::vector<Finding> findings;  // in package order; empty = the package is sound
   std::uint64_t entries = 0, bytes = 0, meshes = 0, previews = 0, fragments = 0;  // what was looked at
@@ -22,5 +24,14 @@ struct VerifyReport {
 /// findings for any number of threads. Throws only for what is not the package's fault: reading fails,
 /// cancelled.
 VerifyReport verify_package(PackageStore& store, const RunContext& context);
+
+/// What `verify --json` prints of one package.
+struct VerifiedPackage {
+  std::string package;  // as the user named it
+  VerifyReport report;
+};
+/// One line of JSON (schemas/verify.v1.schema.json).
+std::string verify_json(const std::vector<VerifiedPackage>& packages);
+DocumentSchema verify_schema();
 
 }  // namespace texmesh

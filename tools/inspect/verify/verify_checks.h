@@ -82,13 +82,6 @@ void check_nested(const ManifestScale& finer, const std::vector<Vec3d>& finer_po
 void check_split_stream(const Manifest& manifest, std::span<const std::uint8_t> bytes, const MeshShare& share,
                         const RunContext& context, Findings& findings);
 
-/// What the head of a JPEG (preview or table stream) must not have; see verify_jpeg.cpp.
-void check_jpeg_head(const std::string& entry, const std::string& field, std::span<const std::uint8_t> jpeg,
-                     Findings& findings);
-/// Table streams of a plane with a source rung: one frame for all rungs, on the fragments' grid.
-void check_source_rung(const TextureInfo& texture, std::span<const std::span<const std::uint8_t>> tables,
-                       Findings& findings);
-
 void check_preview(const TextureInfo& texture, std::span<const std::uint8_t> jpeg, Findings& findings);
 
 /// The source image that a plane keeps: of that format and the plane's size, and it decodes.

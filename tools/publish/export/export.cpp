@@ -1,5 +1,7 @@
 #include "tools/publish/export/export.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -8,27 +10,104 @@
 #include "format/base/errors.h"
 #include "format/base/text_bytes.h"
 #include "format/container/layout.h"
+#include "pipeline/io/markup.h"
 #include "pipeline/io/new_folder.h"
+#include "pipeline/io/record.h"
+#include "pipeline/io/table.h"
 #include "pipeline/io/uri.h"
 #include "stages/gltf/check_glb.h"
 #include "tools/extract/extract.h"
 #include "tools/publish/export/oembed.h"
-#include "tools/publish/export/page_files.h"
-#include "tools/publish/export/target_page.h"
 #include "tools/publish/export/tileset.h"
-#include "tools/publish/view/site.h"
+#include "tools/publish/pages/page.h"
+#include "tools/publish/view/served_files.h"
 
 namespace texmesh {
 namespace {
 
+struct ListedFile {
+  std::string path;
+  std::optional<std::uint64_t> bytes;
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("path", s.path, FieldRule{.pattern = "."},
+      "Relative to the folder. Without `bytes` a copy of the package, or of the viewer's folder.");
+    v("bytes", s.bytes, "");
+  }
+};
+
+/// export.json.
+struct ExportList {
+  ExportTarget target = ExportTarget::k3dTiles;
+  std::string package, open;
+  std::vector<ListedFile> files;
+  std::vector<std::string> notes;
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("texmeshExport", Constant{1}, "");
+    v("target", s.target, "");
+    v("package", s.package, FieldRule{.pattern = "^[0-9a-f]{64}$"},
+      "Id of the package: SHA-256 of its manifest.");
+    v("open", s.open, FieldRule{.pattern = "."},
+      "The file that the target's viewer opens, relative to the folder.");
+    v("files", s.files, FieldRule{.count = Range{1, 1e6}}, "");
+    v("notes", s.notes, "");
+  }
+};
+
 namespace fs = std::filesystem;
-using Json = nlohmann::ordered_json;
 
 constexpr const char* kListFile = "export.json";
 constexpr std::string_view kListBegin = "{\n  \"texmeshExport\": 1,";
 /// A level of more than this share of the next finer one's bytes is not worth a request of its own.
 constexpr double kWorthwhile = 0.75;
 constexpr std::uint32_t kPhoneTexturePx = 4096;
+
+std::string_view export_template(std::string_view name) { return built_in_text(export_page_files(), name); }
+
+/// What the package calls itself, or the name of its file without its ending. Plain text.
+std::string page_title(PackageReader& package) {
+  const std::string title = package_title(package);
+  constexpr std::string_view kEnding = ".texmesh";
+  return title.ends_with(kEnding) ? title.substr(0, title.size() - kEnding.size()) : title;
+}
+
+/// index.html beside model.glb, of `glb_bytes` bytes.
+std::string model_viewer_page(PackageReader& package, const ExportOptions& options, std::uint64_t glb_bytes) {
+  const About& about = package.about();
+  const auto& poster = package.manifest().poster;
+  const std::string title = page_title(package);
+  const std::string script = options.script.empty() ? kModelViewerScript : options.script;
+  const std::string integrity =
+      options.script.empty()
+          ? fmt::format(R"( integrity="{}" crossorigin="anonymous")", kModelViewerIntegrity)
+          : "";
+  return filled(export_template("model-viewer.html"),
+                {{"beginning", page_beginning(title, "")},
+                 {"style", page_style(export_template("export.css"))},
+                 {"title", markup_escaped(title)},
+                 {"alt", markup_escaped(about.description.empty() ? title : about.description)},
+                 {"poster", poster ? " poster=\"poster.jpg\"" : ""},
+                 {"script", markup_escaped(script)},
+                 {"integrity", integrity},
+                 {"rights", rights_line(about)},
+                 {"bytes", markup_escaped(format_bytes(glb_bytes))}});
+}
+
+/// index.html that frames `viewer`, an address relative to it, and says where oembed.json stands: `url`.
+std::string oembed_page(const EmbeddedObject& object, const std::string& url, const std::string& viewer) {
+  EmbeddedObject here = object;
+  here.page_url = viewer;
+  constexpr std::string_view kPolicy =
+      "default-src 'none'; frame-src 'self'; img-src 'self' data:; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'";
+  return filled(export_template("oembed.html"), {{"beginning", page_beginning(object.about.title, kPolicy)},
+                                                 {"style", page_style(export_template("export.css"))},
+                                                 {"title", markup_escaped(object.about.title)},
+                                                 {"oembed", markup_escaped(url + "oembed.json")},
+                                                 {"frame", embedded_frame(here)},
+                                                 {"code", markup_escaped(embedded_frame(object))},
+                                                 {"rights", rights_line(object.about)}});
+}
 
 ExportedFile text_file(const char* path, const std::string& text) {
   return {path, {text.begin(), text.end()}};
@@ -42,12 +121,23 @@ void note_large_textures(const Extracted& extracted, Export& made) {
     }
 }
 
-ExtractRequest request_for(const ExportOptions& options) {
-  ExtractRequest request;
-  request.display_px = options.display_px;
-  request.bytes = options.bytes;
-  request.plain = options.plain;
-  return request;
+/// The best-looking file of so many bytes, or the scale that suits the displayed height.
+ExtractRequest request_for(const ExportOptions& options, ExtractScale::Form form) {
+  if (options.bytes == 0) {
+    ExtractScale scale;
+    scale.display_px = options.display_px;
+    scale.form = form;
+    return {scale};
+  }
+  ExtractBudget budget;
+  budget.bytes = {options.bytes};
+  if (options.display_px > 0) budget.display_px = options.display_px;
+  budget.levels = form == ExtractScale::Form::kLevels;
+  return {budget};
+}
+
+ExtractScale::Form form_of(const ExportOptions& options) {
+  return options.plain ? ExtractScale::Form::kPlain : ExtractScale::Form::kCoded;
 }
 
 void add_glb(Export& made, Extracted extracted, const std::string& path) {
@@ -79,14 +169,15 @@ void export_tiles(PackageReader& package, const ExportOptions& options, const Ru
       planes.push_back(c.plane);
     return planes;
   });
-  ExtractRequest request = request_for(options);
-  request.recentre = request.metres = true;
+  ExtractScale scale;
+  scale.form = form_of(options);
+  scale.metres = true;
   std::vector<TileLevel> wanted = std::move(tileset.levels);
   tileset.levels.clear();
   for (std::size_t k = 0; k < wanted.size(); ++k) {
-    request.scale = wanted[k].scale;
-    request.display_px = wanted[k].texture_px;
-    Extracted extracted = extract_model(package, request, context);
+    scale.scale = wanted[k].scale;
+    scale.display_px = wanted[k].texture_px;
+    Extracted extracted = extract_model(package, {scale, true}, context);
     context.report(static_cast<double>(k + 1) / static_cast<double>(wanted.size()));
     if (k > 0 && static_cast<double>(extracted.glb.size()) >
                      kWorthwhile * static_cast<double>(made.files.back().bytes.size()))
@@ -105,9 +196,7 @@ void export_lods(PackageReader& package, const ExportOptions& options, const Run
                  Export& made) {
   if (package.manifest().scales.size() < 2)
     throw InputError(package.store().name(), "scales", "two or more, for levels of detail (MSFT_lod)", "one");
-  ExtractRequest request = request_for(options);
-  request.lods = true;
-  Extracted extracted = extract_model(package, request, context);
+  Extracted extracted = extract_model(package, request_for(options, ExtractScale::Form::kLevels), context);
   if (extracted.levels.size() < 2)
     throw InputError(package.store().name(), "scales",
                      "a major scale coarser than S_" + std::to_string(extracted.scale) +
@@ -125,7 +214,7 @@ void add_poster(PackageReader& package, Export& made) {
 
 void export_model_viewer(PackageReader& package, const ExportOptions& options, const RunContext& context,
                          Export& made) {
-  Extracted extracted = extract_model(package, request_for(options), context);
+  Extracted extracted = extract_model(package, request_for(options, form_of(options)), context);
   note_large_textures(extracted, made);
   made.open = "index.html";
   made.files.push_back(text_file("index.html", model_viewer_page(package, options, extracted.glb.size())));
@@ -170,20 +259,6 @@ FolderRule export_folder_rule() {
 
 }  // namespace
 
-const char* target_name(ExportTarget target) {
-  switch (target) {
-    case ExportTarget::k3dTiles:
-      return "3dtiles";
-    case ExportTarget::kGltfLod:
-      return "gltf-lod";
-    case ExportTarget::kModelViewer:
-      return "model-viewer";
-    case ExportTarget::kOembed:
-      break;
-  }
-  return "oembed";
-}
-
 Export make_export(PackageReader& package, const std::string& path, const ExportOptions& options,
                    const RunContext& context) {
   Export made;
@@ -211,12 +286,17 @@ Export make_export(PackageReader& package, const std::string& path, const Export
 }
 
 std::string export_json(const Export& made) {
-  Json files = Json::array();
-  for (const ExportedFile& f : made.files) files.push_back({{"path", f.path}, {"bytes", f.bytes.size()}});
-  for (const ExportedCopy& c : made.copies) files.push_back({{"path", c.path}});
-  Json out{{"texmeshExport", 1}, {"target", target_name(made.target)}, {"package", made.package_id},
-           {"open", made.open},  {"files", std::move(files)},          {"notes", made.notes}};
-  return out.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  ExportList list{made.target, made.package_id, made.open, {}, made.notes};
+  for (const ExportedFile& f : made.files) list.files.push_back({f.path, f.bytes.size()});
+  for (const ExportedCopy& c : made.copies) list.files.push_back({c.path, {}});
+  return to_json(list).dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+DocumentSchema export_schema() {
+  return document_schema(
+      "export.v1", "texmesh export list, version 1",
+      "Output of `texmesh export PKG --to TARGET -o DIR --json`, and export.json in DIR: what was written.",
+      schema_of<ExportList>());
 }
 
 void write_export(const Export& made, const std::string& folder) {

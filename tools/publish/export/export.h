@@ -1,15 +1,25 @@
 #pragma once
+#include <array>
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "delivery/cpp/package/package_reader.h"
+#include "format/base/fields.h"
 #include "stages/base/run_context.h"
 
 namespace texmesh {
 
+struct DocumentSchema;  // pipeline/io/record.h
+
 /// Whose form a package gets.
 enum class ExportTarget : std::uint8_t { k3dTiles, kGltfLod, kModelViewer, kOembed };
+/// What --to calls the target.
+template <>
+struct EnumNames<ExportTarget> {
+  static constexpr std::array<std::string_view, 4> names{"3dtiles", "gltf-lod", "model-viewer", "oembed"};
+};
 
 struct ExportOptions {
   ExportTarget target = ExportTarget::k3dTiles;
@@ -48,9 +58,6 @@ struct Export {
   std::vector<std::string> notes;
 };
 
-/// What --to calls the target.
-const char* target_name(ExportTarget target);
-
 /// A package in the form of another viewer. `path` is the package's own, for oembed, which copies it. Same
 /// bytes for any thread count and machine. InputError with the reason where the target cannot hold the
 /// package, FormatError when the package is damaged.
@@ -59,6 +66,7 @@ Export make_export(PackageReader& package, const std::string& path, const Export
 
 /// export.json of the folder, which names its files (schemas/export.v1.schema.json).
 std::string export_json(const Export& made);
+DocumentSchema export_schema();
 
 /// Writes the folder, which appears whole or not at all. An earlier export is replaced. InputError when the
 /// folder holds anything else, or cannot be made.

@@ -5,13 +5,32 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/io/markup.h"
+#include "pipeline/io/record.h"
 
 namespace texmesh {
-namespace {
-
-constexpr int kCacheSeconds = 86400;
-
-}  // namespace
+template <>
+struct RecordFields<EmbeddedObject> {
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("version", Constant{"1.0"}, "");
+    v("type", Constant{"rich"}, "");
+    v("title", s.about.title, kMayMiss, "");
+    v("author_name", s.about.creator, kMayMiss, "");
+    v("provider_name", s.provider_name, kMayMiss, "");
+    v("provider_url", s.provider_url, kMayMiss, "");
+    v("cache_age", Constant{86400}, "seconds");
+    v("thumbnail_url", s.thumbnail_url, kMayMiss, "");
+    v("thumbnail_width", s.thumbnail_width_px, kMayMiss, "");
+    v("thumbnail_height", s.thumbnail_height_px, kMayMiss, "");
+    v("width", s.width_px, "");
+    v("height", s.height_px, "");
+    v("html", embedded_frame(s), "");
+    v("license", s.about.licence, kMayMiss, "");
+    v("license_url", s.about.licence_url, kMayMiss, "");
+    v("attribution", s.about.attribution, kMayMiss, "");
+    v("description", s.about.description, kMayMiss, "");
+  }
+};
 
 std::string embedded_frame(const EmbeddedObject& o) {
   return fmt::format(
@@ -20,28 +39,7 @@ std::string embedded_frame(const EmbeddedObject& o) {
 }
 
 std::string oembed_json(const EmbeddedObject& o) {
-  nlohmann::ordered_json out{{"version", "1.0"}, {"type", "rich"}};
-  const auto add = [&](const char* name, const std::string& text) {
-    if (!text.empty()) out[name] = text;
-  };
-  add("title", o.about.title);
-  add("author_name", o.about.creator);
-  add("provider_name", o.provider_name);
-  add("provider_url", o.provider_url);
-  out["cache_age"] = kCacheSeconds;
-  if (!o.thumbnail_url.empty()) {
-    out["thumbnail_url"] = o.thumbnail_url;
-    out["thumbnail_width"] = o.thumbnail_width_px;
-    out["thumbnail_height"] = o.thumbnail_height_px;
-  }
-  out["width"] = o.width_px;
-  out["height"] = o.height_px;
-  out["html"] = embedded_frame(o);
-  add("license", o.about.licence);
-  add("license_url", o.about.licence_url);
-  add("attribution", o.about.attribution);
-  add("description", o.about.description);
-  return out.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+  return to_json(o).dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace texmesh

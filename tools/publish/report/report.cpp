@@ -1,15 +1,458 @@
+// The page in the order of its sections: what holds (switch sizes), the source beside S_0, what bytes buy,
+// where the bytes are, fragments, the step function, proxies, method.
 #include "tools/publish/report/report.h"
 
-#include <nlohmann/json.hpp>
+#include <fmt/format.h>
 
-#include "tools/publish/report/html.h"
-#include "tools/publish/report/package_words.h"
-#include "tools/publish/report/report_page.h"
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "format/base/sha256.h"
+#include "format/container/layout.h"
+#include "format/rules/proxy_choice.h"
+#include "pipeline/io/markup.h"
+#include "pipeline/io/record.h"
+#include "pipeline/io/table.h"
+#include "tools/inspect/dump/package_figures.h"
+#include "tools/publish/pages/page.h"
+#include "tools/publish/pages/plot.h"
 
 namespace texmesh {
 namespace {
 
-using Json = nlohmann::ordered_json;
+constexpr Range kFlip{0, 1}, kPx{0, 1e9};
+
+/// What a list of views says of its worst.
+template <class V>
+void differences_fields(const ViewDifferences& d, V&& v) {
+  v("flip", d.worst_mean(), kFlip, "mean FLIP of the worst view");
+  v("flip_p95", d.worst_p95(), kFlip, "largest 95th percentile of a view's pixels");
+  v("worst_view", d.worst(), Range{0, 63}, "");
+}
+
+struct ReportedSwitch {
+  SwitchSize size;
+  bool holds = false;
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("scale", s.size.scale, Range{1, 99}, "");
+    v("triangles", s.size.triangles, "");
+    v("up_to_px", s.size.up_to_px, kPx, "");
+    v("rendered_px", s.size.rendered_px, kPx, "less than up_to_px where pictures would be too large");
+    differences_fields(s.size.views, v);
+    v("holds", s.holds, "");
+  }
+};
+
+/// What report --json prints.
+struct ReportDocument {
+  Report report;
+  std::vector<ReportedSwitch> switches;
+  std::vector<std::string> files;
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("version", Constant{1}, "");
+    v("title", s.report.title, "");
+    v("holds", s.report.holds, "every switch size is within both limits; the exit code is 0 then, else 4");
+    v("verdict", s.report.verdict, "one sentence");
+    v("worst_flip", worst_flip(s.report.switches), kFlip, "");
+    v("max_flip", s.report.options.limits.mean, kFlip, "");
+    v("max_flip_p95", s.report.options.limits.p95, kFlip, "");
+    v("views", s.report.options.views, Range{1, 64}, "");
+    v("switch_sizes", s.switches, "");
+    v("source", s.report.source, "with --against: S_0 at the highest rung beside the model file");
+    v("files", s.files, FieldRule{.count = Range{1, 1e6}}, "beneath the folder, index.html first");
+  }
+};
+
+}  // namespace
+
+template <>
+struct RecordFields<SourceComparison> {
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("file", s.file, "");
+    v("displayed_px", s.displayed_px, Range{1, 1e9}, "");
+    differences_fields(s.views, v);
+  }
+};
+
+namespace {
+
+std::string answer(bool holds) {
+  return holds ? "<span class=\"good\">holds</span>" : "<span class=\"bad\">does not hold</span>";
+}
+
+/// A pixel height as people read it.
+std::string px(double height) { return height >= kAnyDisplayPx ? "any" : fmt::format("{:.0f}", height); }
+
+/// The colours of maps with their values.
+std::string heat_legend() {
+  std::string out =
+      "<svg role=\"img\" aria-label=\"Colours of FLIP maps, from 0 to 0.4 and more\" width=\"340\" "
+      "height=\"38\" viewBox=\"-6 0 346 38\">\n";
+  constexpr int kCells = 40;
+  for (int i = 0; i < kCells; ++i)
+    out += fmt::format("<rect x=\"{}\" y=\"2\" width=\"8.5\" height=\"14\" fill=\"{}\"/>\n", 8 * i + 10,
+                       heat_hex((i + 0.5) / kCells));
+  for (int i = 0; i <= 4; ++i)
+    out += fmt::format("<text class=\"quiet mid\" x=\"{}\" y=\"32\">{:.1f}</text>\n", 80 * i + 10,
+                       kFullHeat * i / 4);
+  return out + "</svg>\n";
+}
+
+std::string switch_table(const Report& report) {
+  Table table("FLIP of each scale against S_0 at its switch size; the worst view counts.",
+              {{"Scale", kScaleName},
+               {"Triangles", kGrouped},
+               "Up to, px",
+               {"Mean FLIP", 3},
+               {"95th percentile", 3},
+               "Verdict"});
+  for (const SwitchSize& s : report.switches)
+    table.row({s.scale, s.triangles, px(s.up_to_px), s.views.worst_mean(), s.views.worst_p95(),
+               Cell::markup("", answer(s.holds(report.options.limits)))});
+  return table.html();
+}
+
+std::string switch_figure(PackagePictures& pictures, const SwitchSize& s, Report& report) {
+  std::string out = fmt::format(
+      "<figure>\n<figcaption><h3>S_{}, shown up to {} px</h3>{} triangles. Mean FLIP {:.3f} and 95th "
+      "percentile {:.3f} in the worst of {} views: {}.{}</figcaption>\n",
+      s.scale, px(s.up_to_px), thin_grouped(s.triangles), s.views.worst_mean(), s.views.worst_p95(),
+      s.views.mean.size(), answer(s.holds(report.options.limits)),
+      s.rendered_px < s.up_to_px ? fmt::format(" Rendered at {:.0f} px, the largest there is.", s.rendered_px)
+                                 : "");
+  const std::uint32_t side_px = pictures.side_for(s.rendered_px);
+  const auto worst = static_cast<int>(s.views.worst());
+  const struct {
+    ViewNumber view;
+    const char* name;
+  } views[] = {{{worst, report.options.views}, "worst view"}, {{0, 1}, "front view"}};
+  for (const auto& [view, name] : views)
+    out += picture_row({fmt::format("s{:02}-{}", s.scale, view.count == 1 ? "front" : "worst"),
+                        fmt::format("S_0, {}", name), fmt::format("S_{}, {}", s.scale, name),
+                        fmt::format("S_{} at {:.0f} px, {}", s.scale, s.rendered_px, name)},
+                       pictures.picture(0, view, side_px), pictures.picture(s.scale, view, side_px),
+                       report.files);
+  return out + "</figure>\n";
+}
+
+std::string header_section(PackageReader& package, Report& report) {
+  const Manifest& m = package.manifest();
+  const Vec3d size = m.bounds_max - m.bounds_min;
+  std::uint64_t bytes = 0;
+  for (const EntryRef& e : package.index()) bytes = std::max(bytes, e.offset + e.bytes);
+  std::string out = "<header>\n<div>\n<h1>" + markup_escaped(report.title) + "</h1>\n";
+  out += fmt::format("<p class=\"verdict{}\">{}</p>\n", report.holds ? "" : " bad",
+                     markup_escaped(report.verdict));
+  out += fmt::format(
+      "<p class=\"quiet\">A texmesh package of {}: {} scales, S_0 with {} triangles, {} texture planes; "
+      "{:.4g} x {:.4g} x {:.4g} object units.</p>\n",
+      format_bytes(bytes), m.scales.size(), thin_grouped(m.scales.front().triangles), m.plane_count, size.x,
+      size.y, size.z);
+  out += rights_line(package.about());
+  out += "<nav aria-label=\"Sections\"><ul>";
+  for (const auto& [id, name] : {std::pair{"switches", "Switch sizes"},
+                                 {"source", "Against the source"},
+                                 {"curves", "Quality and bytes"},
+                                 {"bytes", "Bytes by kind"},
+                                 {"fragments", "Fragments"},
+                                 {"steps", "Step function"},
+                                 {"proxies", "Proxies"},
+                                 {"method", "Method"}})
+    if ((report.source || std::string_view(id) != "source") &&
+        (!m.proxies.empty() || std::string_view(id) != "proxies"))
+      out += fmt::format("<li><a href=\"#{}\">{}</a></li>", id, name);
+  out += "</ul></nav>\n</div>\n";
+  if (m.poster) {
+    report.files.push_back({kPosterPath, package.entry(*m.poster)});
+    out += fmt::format("<img src=\"{}\" width=\"{}\" height=\"{}\" alt=\"{}\">\n", kPosterPath,
+                       m.poster->width_px, m.poster->height_px, markup_escaped(report.title));
+  }
+  return out + "</header>\n";
+}
+
+std::string switch_section(PackagePictures& pictures, Report& report) {
+  if (report.switches.empty())
+    return html_section("switches", "Switch sizes",
+                        "<p>The package shows S_0 at every size: no coarser scale has a step.</p>\n");
+  std::string body = fmt::format(
+      "<p>A viewer shows a coarse scale up to its switch size, the displayed height of the object in px. "
+      "Each scale is rendered at that height beside S_0, lit, with the textures at their highest rung. It "
+      "holds where no view's mean FLIP is above {:g} and no view's 95th percentile above {:g}.</p>\n",
+      report.options.limits.mean, report.options.limits.p95);
+  body += switch_table(report) +
+          "<p class=\"quiet\">Maps show FLIP by colour. Small pictures are enlarged by whole numbers.</p>\n" +
+          heat_legend();
+  for (const SwitchSize& s : report.switches) body += switch_figure(pictures, s, report);
+  return html_section("switches", "Switch sizes", body);
+}
+
+std::string source_section(PackagePictures& pictures, const RenderedModel& source, Vec3d offset,
+                           Report& report) {
+  const SourceComparison& c = *report.source;
+  const std::uint32_t side_px = pictures.side_for(c.displayed_px);
+  std::string body = fmt::format(
+      "<p>The model file <strong>{}</strong> beside S_0 with its textures at the highest rung, {:.0f} px high: "
+      "mean FLIP {:.3f} and 95th percentile {:.3f} in the worst of {} views. That is what coding costs.</p>\n"
+      "<figure>\n<figcaption class=\"quiet\">The worst view, and one of the front.</figcaption>\n",
+      markup_escaped(c.file), c.displayed_px, c.views.worst_mean(), c.views.worst_p95(), c.views.mean.size());
+  for (const ViewNumber view :
+       {ViewNumber{static_cast<int>(c.views.worst()), report.options.views}, ViewNumber{0, 1}})
+    body += picture_row({view.count == 1 ? "source-front" : "source-worst", "Source", "S_0, highest rung",
+                         "S_0 beside the source"},
+                        pictures.picture_of(source, offset, view, side_px),
+                        pictures.picture(0, view, side_px), report.files);
+  return html_section("source", "Against the source", body + "</figure>\n");
+}
+
+constexpr std::size_t kMostMaps = 8;  // of textures; more would be a page that nobody reads
+constexpr double kLeastHeight = 16;   // px, of the step function's plot
+
+std::string curve_figure(const QualityCurves& curves) {
+  Plot plot;
+  plot.title = fmt::format("Predicted FLIP against bytes at {:.0f} px", curves.displayed_px);
+  plot.x_name = "bytes that a viewer reads";
+  plot.y_name = "predicted FLIP";
+  plot.x_low = 1e30, plot.x_high = 0, plot.y_high = 0;
+  const auto widen = [&](const QualityPoint& p) {
+    plot.x_low = std::min(plot.x_low, static_cast<double>(p.bytes));
+    plot.x_high = std::max(plot.x_high, static_cast<double>(p.bytes));
+    plot.y_high = std::max(plot.y_high, p.flip);
+  };
+  const auto points_of = [&](const std::vector<QualityPoint>& from) {
+    std::vector<std::pair<double, double>> points;
+    for (const QualityPoint& p : from) {
+      points.emplace_back(static_cast<double>(p.bytes), p.flip);
+      widen(p);
+    }
+    return points;
+  };
+  for (std::size_t k = 0; k < curves.scales.size(); ++k)
+    plot.series.push_back({k == 0 ? "each scale at its rungs" : "", "q", points_of(curves.scales[k])});
+  if (!curves.proxies.empty()) plot.series.push_back({"proxies", "b", points_of(curves.proxies), true});
+  plot.series.push_back({"the best choice for a budget", "a", points_of(curves.budgets), true});
+  plot.x_low = std::max(plot.x_low * 0.9, 1.0), plot.x_high = std::max(plot.x_high * 1.1, plot.x_low * 1.5);
+  return fmt::format("<figure>\n<figcaption><h3>Displayed {:.0f} px high</h3></figcaption>\n",
+                     curves.displayed_px) +
+         plot.svg() + "</figure>\n";
+}
+
+Table budget_table(const std::vector<QualityCurves>& curves) {
+  Table table("What a budget buys: bytes in all, the scale or proxy that is chosen, predicted FLIP.",
+              {"Displayed, px", {"Bytes", kGrouped}, "Mesh", {"FLIP", 3}});
+  for (const QualityCurves& c : curves)
+    for (std::size_t i = 0; i < c.budgets.size(); i += 3) {
+      const QualityPoint& b = c.budgets[i];
+      table.row({c.displayed_px, b.bytes,
+                 b.proxy ? fmt::format("proxy {}", *b.proxy) : fmt::format("S_{}", b.scale), b.flip});
+    }
+  return table;
+}
+
+/// Fill of the kind with that number.
+std::string kind_class(std::size_t kind) {
+  constexpr const char* kColours[] = {"fa", "fb", "fc", "fd", "fe"};
+  return std::string(kColours[kind % 5]) + (kind % 10 >= 5 ? " half" : "");
+}
+
+/// One bar of all bytes, in the order of the table.
+std::string kinds_bar(const std::vector<KindBytes>& kinds, double sum) {
+  constexpr double kWidth = 760, kHeight = 28;
+  std::string out = fmt::format(
+      "<svg role=\"img\" aria-label=\"Bytes by kind, as the table lists them\" width=\"{0}\" height=\"{1}\" "
+      "viewBox=\"0 0 {0} {1}\">\n",
+      kWidth, kHeight);
+  double x = 0;
+  for (std::size_t k = 0; k < kinds.size(); ++k) {
+    const double width = kWidth * static_cast<double>(kinds[k].bytes) / sum;
+    out += fmt::format(
+        "<rect class=\"{}\" x=\"{:.1f}\" width=\"{:.1f}\" height=\"{}\"><title>{}: {}</title></rect>\n",
+        kind_class(k), x, width, kHeight, markup_escaped(kinds[k].kind), format_bytes(kinds[k].bytes));
+    x += width;
+  }
+  return out + "</svg>\n";
+}
+
+Table plane_table(PackageReader& package) {
+  Table table("Texture planes: full-size ones and their mips.",
+              {"Plane", "Role", "Size, px", "Fragments", "Rungs", "Lowest rung", "Highest rung", "All"});
+  for (std::size_t p = 0; p < package.textures().size(); ++p) {
+    const TextureInfo& t = package.textures()[p];
+    std::uint64_t all = t.tables.bytes;
+    for (const EntryRef& rung : t.rungs) all += rung.bytes;
+    table.row({t.mip == 0 ? std::to_string(p) : fmt::format("{} (mip {} of {})", p, t.mip, t.base), t.role,
+               fmt::format("{} x {}", t.width_px, t.height_px), stored_fragments(package.tables().planes[p]),
+               t.rungs.size(), t.rungs.empty() ? "" : format_bytes(t.rungs.front().bytes),
+               t.rungs.empty() ? "" : format_bytes(t.rungs.back().bytes), format_bytes(all)});
+  }
+  return table;
+}
+
+struct Rule {
+  StepRule rule;
+  const char* name;
+  const char* colour;
+};
+constexpr Rule kRules[] = {{StepRule::kFlip, "lit pictures (FLIP), the default", "a"},
+                           {StepRule::kJnd, "just-noticeable difference", "b"},
+                           {StepRule::kError, "error of one pixel", "c"},
+                           {StepRule::kEdge, "O_V / E_S", "d"}};
+
+std::string step_plot(const Manifest& m) {
+  Plot plot;
+  plot.title = "Step function: scale shown by displayed height, by each rule";
+  plot.x_name = "displayed height, px";
+  plot.y_name = "scale number; 0 is S_0";
+  plot.x_low = kLeastHeight, plot.x_high = 4096;
+  plot.y_high = m.scales.back().scale;
+  for (const Rule& rule : kRules) {
+    PlotSeries line{rule.name, rule.colour, {}};
+    line.steps = true, line.strong = false, line.dashed = rule.rule != StepRule::kFlip;
+    double from = plot.x_low;
+    for (const ManifestStep& step : step_function(m.scales, rule.rule)) {
+      line.points.emplace_back(std::min(from, plot.x_high), step.scale);
+      from = std::max(step.up_to_px, plot.x_low);
+    }
+    line.points.emplace_back(plot.x_high, line.points.back().second);
+    plot.series.push_back(std::move(line));
+  }
+  return "<figure>\n" + plot.svg() + "</figure>\n";
+}
+
+std::string curve_section(PackageReader& package, const Report& report) {
+  std::string body = fmt::format(
+      "<p>Each grey line is a scale with its textures from previews alone to the highest rung. The coloured "
+      "line is what <code>texmesh plan --budget</code> chooses. FLIP is predicted against S_0 with the "
+      "source's texels; the predictions miss measured values by {:.1f} % in the mean.</p>\n",
+      100 * static_cast<double>(package.quality().error));
+  for (const QualityCurves& c : report.curves) body += curve_figure(c);
+  return html_section("curves", "Quality and bytes", body + budget_table(report.curves).html());
+}
+
+std::string bytes_section(PackageReader& package) {
+  const std::vector<KindBytes> kinds =
+      bytes_by_kind(package.manifest(), package.store().read_manifest().size(), package.index());
+  double sum = 0;
+  for (const KindBytes& k : kinds) sum += static_cast<double>(k.bytes);
+  Table table("Bytes of the package's entries.",
+              {"Kind", "Entries", {"Bytes", kGrouped}, {"Share, %", percent_form()}});
+  for (std::size_t i = 0; i < kinds.size(); ++i)
+    table.row(
+        {Cell::markup(kinds[i].kind,
+                      "<svg class=\"swatch\" aria-hidden=\"true\" width=\"12\" height=\"12\"><rect class=\"" +
+                          kind_class(i) + "\" width=\"12\" height=\"12\"/></svg>" +
+                          markup_escaped(kinds[i].kind)),
+         kinds[i].entries, kinds[i].bytes, static_cast<double>(kinds[i].bytes) / sum});
+  std::string body = kinds_bar(kinds, sum) + table.html();
+  if (!package.textures().empty()) body += plane_table(package).html();
+  return html_section("bytes", "Bytes by kind", body);
+}
+
+std::string fragment_section(PackageReader& package, Report& report) {
+  const std::size_t planes = full_size_planes(package.textures());
+  if (planes == 0) return html_section("fragments", "Fragments", "<p>The package has no textures.</p>\n");
+  std::string body =
+      "<p>Textures are cut into fragments that a viewer fetches one by one. Bright fragments take more, or "
+      "have more features. Outlines alone are fragments that nobody sees; they are not stored.</p>\n";
+  for (std::uint32_t p = 0; p < std::min(planes, kMostMaps); ++p) {
+    const TextureInfo& t = package.textures()[p];
+    report.files.push_back({fmt::format("preview-{:03}.jpg", p), package.preview(p)});
+    const std::string preview = report.files.back().path;
+    body += fmt::format(
+        "<figure>\n<figcaption><h3>Texture {}: {}</h3>{} x {} px in {} x {} fragments</figcaption>\n"
+        "<div class=\"row\">\n",
+        p, markup_escaped(t.role), t.width_px, t.height_px, t.columns, t.rows);
+    std::vector<FragmentHeat> heats = fragment_heats(package, p);
+    heats.insert(heats.begin(), FragmentHeat{"the preview and its grid", {}});
+    for (const FragmentHeat& heat : heats)
+      body += "<div><p class=\"quiet\">" + markup_escaped(heat.name) + "</p>" +
+              fragment_map(package, p, heat, preview) + "</div>\n";
+    body += "</div>\n</figure>\n";
+  }
+  if (planes > kMostMaps)
+    body += fmt::format("<p class=\"quiet\">{} more textures have no map here.</p>\n", planes - kMostMaps);
+  return html_section("fragments", "Fragments", body);
+}
+
+std::string step_section(PackageReader& package) {
+  const Manifest& m = package.manifest();
+  Table table(
+      "Displayed height in px up to which a scale is enough, by each rule; 0 = at no height. Scales that are "
+      "no step of the package's own function serve under limits of time or bytes.",
+      {{"Scale", kScaleName},
+       {"Triangles", kGrouped},
+       {"Bytes", kGrouped},
+       "FLIP",
+       "JND",
+       "Error of 1 px",
+       "O_V / E_S",
+       "Step"});
+  std::set<int> steps;
+  for (const ManifestStep& s : m.steps) steps.insert(s.scale);
+  for (const ManifestScale& s : m.scales)
+    table.row({s.scale, s.triangles, s.glb.bytes, px(s.display_px_flip), px(s.display_px_jnd),
+               px(s.display_px_error), px(s.display_px_edge), steps.contains(s.scale)});
+  return html_section("steps", "Step function", step_plot(m) + table.html());
+}
+
+/// A proxy beside S_0 at the largest measured height, from the front and from another side.
+std::string proxy_figure(PackageReader& package, PackagePictures& pictures, std::uint32_t proxy,
+                         Report& report) {
+  const Manifest& m = package.manifest();
+  const double height = m.proxy_sizes_px.back();
+  const RenderedModel model = package_proxy(package, proxy, pictures.context());
+  std::string out = fmt::format(
+      "<figure>\n<figcaption><h3>Proxy {}, {}</h3>{} triangles. Mean FLIP {:.3f} at {:.0f} px, over all measured "
+      "views.</figcaption>\n",
+      proxy, format_bytes(m.proxies[proxy].glb.bytes), thin_grouped(m.proxies[proxy].triangles),
+      m.proxies[proxy].flip.back(), height);
+  const std::uint32_t side_px = pictures.side_for(height);
+  for (const auto& [view, name] : {std::pair{ViewNumber{0, 1}, "front"}, {ViewNumber{2, 6}, "side"}})
+    out += picture_row({fmt::format("proxy{:02}-{}", proxy, name), fmt::format("S_0, {}", name),
+                        fmt::format("proxy {}, {}", proxy, name),
+                        fmt::format("Proxy {} at {:.0f} px, {}", proxy, height, name)},
+                       pictures.picture(0, view, side_px), pictures.picture_of(model, {}, view, side_px),
+                       report.files);
+  return out + "</figure>\n";
+}
+
+std::string proxy_section(PackageReader& package, PackagePictures& pictures, Report& report) {
+  const Manifest& m = package.manifest();
+  if (m.proxies.empty()) return "";
+  Table table("Proxies: the whole object in one file each, with an atlas of its own.",
+              {"Proxy", {"Bytes", kGrouped}, {"Triangles", kGrouped}, {"Vertices", kGrouped}, "Texture, px"});
+  for (const double px : m.proxy_sizes_px) table.column(fmt::format("FLIP at {:.0f} px", px));
+  for (std::size_t k = 0; k < m.proxies.size(); ++k) {
+    const ManifestProxy& p = m.proxies[k];
+    table.row({k, p.glb.bytes, p.triangles, p.vertices, p.texture_px});
+    for (std::size_t i = 0; i < m.proxy_sizes_px.size(); ++i)
+      table.rows.back().emplace_back(fmt::format("{:.3f}, P95 {:.3f}", p.flip[i], p.flip_p95[i]));
+  }
+  std::string body = fmt::format(
+      "<p>A viewer shows the smallest proxy first: after {} of the package. Where a proxy's mean FLIP is at most "
+      "{:g} and its 95th percentile at most {:g}, nothing else is read.</p>\n",
+      format_bytes(start_bytes(m)), kSameFlip, kSameFlipP95);
+  body += table.html();
+  for (std::uint32_t k = 0; k < m.proxies.size(); ++k) body += proxy_figure(package, pictures, k, report);
+  return html_section("proxies", "Proxies", body);
+}
+
+std::string method_section(PackageReader& package, const Report& report) {
+  std::string body = fmt::format(
+      "<p>All pictures come from texmesh's reference renderer: glTF's metallic-roughness materials with their "
+      "maps, read with mips, one studio light made by code, perspective, 16 samples a pixel. FLIP (Andersson et al. 2020) "
+      "says how different two pictures look when they are flipped, from 0 to 1, at 67 pixels per degree, "
+      "over the pixels that either picture covers. The {} views are spread evenly over the sphere. The limits "
+      "are texmesh's own.</p>\n"
+      "<p>Curves of quality are predictions from the package's own table, which a compile measures.</p>\n"
+      "<p class=\"quiet\">Package {}. The same package gives the same report on every machine.</p>\n",
+      report.options.views, to_hex(package.id()));
+  return html_section("method", "Method", body);
+}
 
 constexpr double kSourceHeight = 512;  // px at which the source stands beside S_0
 
@@ -27,10 +470,6 @@ SourceComparison compare_source(PackageReader& package, const PackagePictures& p
     out.views.p95.push_back(static_cast<float>(flip.percentile(0.95)));
   }
   return out;
-}
-
-Json differences_json(const ViewDifferences& d) {
-  return {{"flip", d.worst_mean()}, {"flip_p95", d.worst_p95()}, {"worst_view", d.worst()}};
 }
 
 }  // namespace
@@ -60,33 +499,20 @@ Report make_report(PackageReader& package, const ReportOptions& options, const R
 }
 
 std::string report_json(const Report& report) {
-  Json switches = Json::array();
-  for (const SwitchSize& s : report.switches) {
-    Json j{{"scale", s.scale},
-           {"triangles", s.triangles},
-           {"up_to_px", s.up_to_px},
-           {"rendered_px", s.rendered_px}};
-    j.update(differences_json(s.views));
-    j["holds"] = s.holds(report.options.limits);
-    switches.push_back(std::move(j));
-  }
-  Json files = Json::array();
-  for (const ReportFile& f : report.files) files.push_back(f.path);
-  Json j{{"version", 1},
-         {"title", report.title},
-         {"holds", report.holds},
-         {"verdict", report.verdict},
-         {"worst_flip", worst_flip(report.switches)},
-         {"max_flip", report.options.limits.mean},
-         {"max_flip_p95", report.options.limits.p95},
-         {"views", report.options.views},
-         {"switch_sizes", std::move(switches)}};
-  if (report.source) {
-    j["source"] = {{"file", report.source->file}, {"displayed_px", report.source->displayed_px}};
-    j["source"].update(differences_json(report.source->views));
-  }
-  j["files"] = std::move(files);
-  return j.dump(-1, ' ', false, Json::error_handler_t::replace);
+  ReportDocument document;
+  document.report = {
+      report.title, report.verdict, report.holds, report.options, report.switches, {}, report.source, {}};
+  for (const SwitchSize& s : report.switches)
+    document.switches.push_back({s, s.holds(report.options.limits)});
+  for (const ReportFile& f : report.files) document.files.push_back(f.path);
+  return to_json_line(document);
+}
+
+DocumentSchema report_schema() {
+  return document_schema(
+      "report.v1", "texmesh report --json, version 1",
+      "What a report says. FLIP is measured by rendering: 0 = equal, 1 = as different as can be.",
+      schema_of<ReportDocument>());
 }
 
 FolderRule report_folder_rule() {

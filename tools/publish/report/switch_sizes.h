@@ -3,9 +3,54 @@
 #include <string>
 #include <vector>
 
-#include "tools/publish/report/package_pictures.h"
+#include "stages/measure/flip.h"
+#include "stages/render/environment.h"
+#include "tools/extract/package_model.h"
 
 namespace texmesh {
+
+/// One of `count` directions that are spread evenly over the sphere.
+struct ViewNumber {
+  int index = 0, count = 1;
+};
+
+/// Lit pictures of a package's scales, all with the same textures and by the same cameras: S_0's bounding
+/// sphere fills 0.96 of the side. Textures of the package are read with mips, as the quality stage reads
+/// them, whatever the samplers say. The displayed height is the length on screen of the object's largest
+/// extent at the sphere's centre. Same pictures for any thread count.
+class PackagePictures {
+ public:
+  /// `package` must outlive this object.
+  PackagePictures(PackageReader& package, const PackageChoice& textures, const RunContext& context);
+  /// Side of a picture in which the object is displayed so high; 1..8192.
+  std::uint32_t side_for(double displayed_px) const;
+  /// The largest displayed height of which there are pictures.
+  double largest_px() const;
+  Picture picture(int scale, ViewNumber view, std::uint32_t side_px);
+  /// A model in the frame that `offset` leads to from the package's, by the same camera.
+  Picture picture_of(const RenderedModel& model, Vec3d offset, ViewNumber view, std::uint32_t side_px) const;
+  const RenderedModel& finest() const { return finest_; }
+  const RunContext& context() const { return context_; }
+
+ private:
+  RenderCamera camera(Vec3d offset, ViewNumber view) const;
+  PackageReader& package_;
+  RunContext context_;
+  RenderedModel finest_;
+  RenderEnvironment environment_;
+  int coarser_number_ = 0;  // 0: none yet
+  RenderedModel coarser_;   // the last one that was asked for
+};
+
+/// How one picture differs from another in the views of one displayed height.
+struct ViewDifferences {
+  std::vector<float> mean, p95;  // FLIP of each view, over the pixels that either picture covers
+  std::size_t worst() const;     // the view of the largest mean
+  double worst_mean() const, worst_p95() const;  // of all views; 0 without views
+};
+
+/// A scale beside S_0.
+ViewDifferences compare_scale(PackagePictures& pictures, int scale, int views, double displayed_px);
 
 /// How far pictures may differ before a scale can be told from S_0. Values of texmesh's own.
 struct FlipLimits {

@@ -4,10 +4,16 @@
 
 #include <algorithm>
 #include <charconv>
+#include <nlohmann/json.hpp>
+#include <optional>
 #include <string_view>
+#include <vector>
 
 #include "format/base/errors.h"
-#include "tools/publish/view/package_card.h"
+#include "format/base/sha256.h"
+#include "format/container/container.h"
+#include "format/container/layout.h"
+#include "format/documents/manifest.h"
 
 namespace texmesh {
 namespace {
@@ -15,6 +21,97 @@ namespace {
 constexpr std::size_t kThreads = 64;  // each open connection holds one, and browsers keep six per page
 constexpr std::size_t kChunkBytes = 64 << 10;
 constexpr std::string_view kPosters = "/posters/";
+
+constexpr std::uint64_t kManifestOffset = 64;  // of the data in a container (SPEC.md, section 2)
+
+std::vector<std::uint8_t> read_part(const ServedFile& file, std::uint64_t offset, std::uint64_t bytes) {
+  std::vector<std::uint8_t> out(static_cast<std::size_t>(bytes));
+  std::size_t at = 0;
+  while (at < out.size()) {
+    const std::size_t n = file.read(offset + at, reinterpret_cast<char*>(out.data()) + at, out.size() - at);
+    if (n == 0) break;
+    at += n;
+  }
+  out.resize(at);
+  return out;
+}
+
+/// Of the container's first bytes, or of a tree's file.
+std::optional<Manifest> manifest_of(const ServedFiles& files, const std::string& path) {
+  const bool tree = path.ends_with("/");
+  const auto file = files.open(tree ? path + kManifestPath : path);
+  if (!file) return std::nullopt;
+  std::vector<std::uint8_t> bytes = read_part(*file, 0, std::min(file->bytes(), kBootstrapBytes));
+  if (!tree) {
+    if (bytes.size() < kManifestOffset) return std::nullopt;
+    std::uint64_t length = 0;
+    for (int i = 3; i >= 0; --i) length = length << 8 | bytes[static_cast<std::size_t>(22 + i)];
+    bytes.erase(bytes.begin(), bytes.begin() + kManifestOffset);
+    if (length > bytes.size()) return std::nullopt;
+    bytes.resize(static_cast<std::size_t>(length));
+  }
+  try {
+    return read_manifest(bytes);
+  } catch (const FormatError&) {
+    return std::nullopt;
+  }
+}
+
+std::string decoded(const std::string& url) {
+  const auto digit = [](char c) { return c <= '9' ? c - '0' : c - 'A' + 10; };
+  std::string out;
+  for (std::size_t i = 0; i < url.size(); ++i)
+    if (url[i] == '%' && i + 2 < url.size()) {
+      out += static_cast<char>(16 * digit(url[i + 1]) + digit(url[i + 2]));
+      i += 2;
+    } else {
+      out += url[i];
+    }
+  return out;
+}
+
+/// What a list shows of a package.
+struct PackageCard {
+  std::string title;  // "" = none
+  bool poster = false;
+};
+
+/// Of a package among the files, by its decoded path ("/packages/bust.texmesh", "/packages/tree/"). Nothing
+/// for what cannot be read: lists show its name then.
+std::optional<PackageCard> package_card(const ServedFiles& files, const std::string& path) {
+  const std::optional<Manifest> m = manifest_of(files, path);
+  if (!m) return std::nullopt;
+  return PackageCard{m->title, m->poster.has_value()};
+}
+
+/// The package's poster, a JPEG, its digest checked; nothing where there is none.
+std::optional<std::vector<std::uint8_t>> package_poster(const ServedFiles& files, const std::string& path) {
+  const std::optional<Manifest> m = manifest_of(files, path);
+  if (!m || !m->poster) return std::nullopt;
+  const bool tree = path.ends_with("/");
+  const auto file = files.open(tree ? path + kPosterPath : path);
+  if (!file) return std::nullopt;
+  std::vector<std::uint8_t> bytes = read_part(*file, tree ? 0 : m->poster->offset, m->poster->bytes);
+  if (bytes.size() != m->poster->bytes || sha256(bytes) != m->poster->digest) return std::nullopt;
+  return bytes;
+}
+
+/// `{"packages":[{"url":"packages/bust.texmesh","title":"A bust","poster":"posters/bust.texmesh"}, ...]}`,
+/// what the viewer offers to choose from, by the names of the files. `title` and `poster` stand where the
+/// package has them.
+std::string package_list(const ServedFiles& files) {
+  constexpr std::string_view kPackages = "packages/";
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const std::string& url : files.packages()) {
+    nlohmann::ordered_json entry{{"url", url}};
+    if (const auto card = package_card(files, "/" + decoded(url))) {
+      if (!card->title.empty()) entry["title"] = card->title;
+      if (card->poster) entry["poster"] = "posters/" + url.substr(kPackages.size());
+    }
+    list.push_back(std::move(entry));
+  }
+  return nlohmann::ordered_json{{"packages", list}}.dump();
+}
 
 bool parse_number(std::string_view text, std::uint64_t& value) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
@@ -37,8 +134,8 @@ bool lists_tag(const std::string& header, const std::string& etag) {
   return header == "*" || header.find(etag) != std::string::npos;
 }
 
-void send_file(SiteFile opened, const httplib::Request& request, httplib::Response& response) {
-  const auto file = std::make_shared<SiteFile>(std::move(opened));
+void send_file(ServedFile opened, const httplib::Request& request, httplib::Response& response) {
+  const auto file = std::make_shared<ServedFile>(std::move(opened));
   response.set_header("ETag", file->etag());
   response.set_header("Accept-Ranges", "bytes");
   if (lists_tag(request.get_header_value("If-None-Match"), file->etag())) {
@@ -70,7 +167,7 @@ void send_file(SiteFile opened, const httplib::Request& request, httplib::Respon
       });
 }
 
-void answer(const Site& site, const httplib::Request& request, httplib::Response& response) {
+void respond(const ServedFiles& files, const httplib::Request& request, httplib::Response& response) {
   common_headers(response);
   if (request.method == "OPTIONS") {
     response.status = 204;
@@ -85,15 +182,15 @@ void answer(const Site& site, const httplib::Request& request, httplib::Response
   }
   if (request.path == "/packages.json") {
     response.status = 200;
-    return response.set_content(package_list(site), "application/json");
+    return response.set_content(package_list(files), "application/json");
   }
   if (request.path.starts_with(kPosters)) {
-    const auto poster = package_poster(site, "/packages/" + request.path.substr(kPosters.size()));
+    const auto poster = package_poster(files, "/packages/" + request.path.substr(kPosters.size()));
     if (!poster) return plain_answer(response, 404, "not found\n");
     response.status = 200;
     return response.set_content(reinterpret_cast<const char*>(poster->data()), poster->size(), "image/jpeg");
   }
-  auto file = site.open(request.path);
+  auto file = files.open(request.path);
   if (!file) return plain_answer(response, 404, "not found\n");
   send_file(std::move(*file), request, response);
 }
@@ -125,16 +222,16 @@ struct ViewServer::Impl {
   httplib::Server server;
 };
 
-ViewServer::ViewServer(const Site& site) : impl_(std::make_unique<Impl>()) {
+ViewServer::ViewServer(const ServedFiles& files) : impl_(std::make_unique<Impl>()) {
   httplib::Server& server = impl_->server;
   server.new_task_queue = [] { return new httplib::ThreadPool(kThreads); };
   server.set_tcp_nodelay(true);
   server.set_payload_max_length(1 << 20);
   server.set_keep_alive_max_count(100000);
-  server.set_pre_routing_handler([&site](const httplib::Request& request, httplib::Response& response) {
+  server.set_pre_routing_handler([&files](const httplib::Request& request, httplib::Response& response) {
     // Ranges are ours: the library's own know neither If-Range nor ranges that lie behind the end.
     const_cast<httplib::Request&>(request).ranges.clear();
-    answer(site, request, response);
+    respond(files, request, response);
     return httplib::Server::HandlerResponse::Handled;
   });
   server.set_exception_handler(

@@ -3,7 +3,7 @@
 #include <memory>
 #include <string>
 
-#include "tools/publish/view/site.h"
+#include "tools/publish/view/served_files.h"
 
 namespace texmesh {
 
@@ -19,11 +19,11 @@ struct RequestedRange {
 /// handler is asked.
 RequestedRange requested_range(const std::string& header, std::uint64_t size);
 
-/// Serves a Site over HTTP: GET and HEAD (OPTIONS for browsers that ask before a request from elsewhere), one
-/// range, ETag with If-None-Match and If-Range, CORS. Everything else is 404 or 405.
+/// Serves a ServedFiles over HTTP: GET and HEAD (OPTIONS for browsers that ask before a request from
+/// elsewhere), one range, ETag with If-None-Match and If-Range, CORS. Everything else is 404 or 405.
 class ViewServer {
  public:
-  explicit ViewServer(const Site& site);
+  explicit ViewServer(const ServedFiles& files);
   ~ViewServer();
   /// Port 0 = any free one; returns the port. InputError where it cannot be had.
   int bind(const std::string& host, int port);

@@ -1,7 +1,6 @@
-import { PlaneTables, bytesToShow, fragmentCount, rungCount } from '../format/tables';
+import { type PlaneTables, fragmentCount } from '../format/tables';
 import { clamp, positive, sumOf } from './numbers';
 import { exp, log } from './portable_math';
-import { allocateRd } from './rate_distortion';
 
 // From feature counts to the quality that a fragment is asked to have (thesis 3.2-3.3): format/rules/allocation.cpp, bit for bit.
 
@@ -41,31 +40,4 @@ export function qualityOf(t: PlaneTables, row: number, gamma: number): Float32Ar
     result[f] = clamp(Math.fround(q), t.qualityMin, t.qualityMax);
   }
   return result;
-}
-
-/** Index of the rung whose quality is nearest in log-quantiser space (ties: the lower). */
-export function nearestRung(t: PlaneTables, quality: number): number {
-  const g = logQuantiser(quality);
-  let best = 0;
-  let bestDistance = Infinity;
-  for (let r = 0; r < rungCount(t); ++r) {
-    const distance = Math.abs(logQuantiser(t.rungQuality[r]) - g);
-    if (distance < bestDistance) {
-      best = r;
-      bestDistance = distance;
-    }
-  }
-  return best;
-}
-
-/** The rung of every fragment at a scale and Gamma (default: mean of eta); -1 for those that are not stored. [F] */
-export function rungsOf(t: PlaneTables, row: number, gamma: number): Int16Array {
-  const quality = qualityOf(t, row, gamma);
-  const rungs = new Int16Array(fragmentCount(t)).fill(-1);
-  let bytes = 0;
-  for (const f of t.order) {
-    rungs[f] = nearestRung(t, quality[f]);
-    bytes += bytesToShow(t, rungs[f], f);
-  }
-  return t.allocation !== 2 ? rungs : allocateRd(t, bytes);
 }

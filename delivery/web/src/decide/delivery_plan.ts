@@ -1,13 +1,14 @@
 import { startBytes } from '../format/layout';
 import { type Manifest, firstPicture } from '../format/manifest';
-import type { PackageData } from '../format/package_data';
-import { scaleWithin } from './memory/gpu_memory';
-import { proxyBytes, scaleBytes, textureBytes } from './memory/gpu_size';
-import { HtcOptions, defaultHtcOptions, planOptions } from './harmonic_time';
-import { LinkOptions, fetchedS } from './network_model';
+import { worthwhileFlip } from '../format/shared_numbers';
+import type { PackageData } from '../format/tables';
+import { scaleWithin } from './gpu_memory';
+import { proxyBytes, scaleBytes, textureBytes } from './gpu_size';
+import type { PlanLimits, TimePlanOptions } from './harmonic_time';
+import { LinkOptions, fetchedS } from './simulation';
 import { beyondStart, proxyBytesBeyondStart, proxyLoss, servingProxy } from './proxy_choice';
 import { proxyStep } from './proxy_steps';
-import { InTime, type InTimeRequest, choiceInTime, worthwhile } from './scale_choice';
+import { InTime, type InTimeRequest, choiceInTime } from './scale_choice';
 import { everyGroup } from './texture_loss';
 import { StepRule, selectScale } from './viewing';
 
@@ -22,18 +23,18 @@ export interface DeliveryRequest {
   timeLimitS: number;
   /** 0: what the mesh's transfer has shown. */
   beta0BytesS: number;
-  /** Its time limit, round trip and first throughput are set from the others. */
-  htc: HtcOptions;
   link: LinkOptions;
   /** GPU memory for mesh and textures; left out: any. What is least takes its place where nothing fits. */
   memoryBytes?: number;
+  /** The plan by which fragments are fetched; left out: that of loads with the policy guard. */
+  plan?: (options: PlanLimits) => TimePlanOptions;
   /** The policy thesis: see asPrinted() of texmesh/thesis. */
   textures?: InTimeRequest['textures'];
 }
 /** 1000 px, 5 s, 100 kB/s. */
 export function defaultDeliveryRequest(): DeliveryRequest {
   const link = { bytesS: 1e5, rttS: 0, connections: 6 };
-  return { displayedPx: 1000, rule: 'flip', scale: -1, timeLimitS: 5, beta0BytesS: 0, htc: defaultHtcOptions(), link };
+  return { displayedPx: 1000, rule: 'flip', scale: -1, timeLimitS: 5, beta0BytesS: 0, link };
 }
 
 /** The delivery that a viewer will get. */
@@ -119,11 +120,12 @@ export function planDelivery(data: PackageData, request: DeliveryRequest): Deliv
   const { link, displayedPx } = request;
   const { scale, rule, timeLimitS } = request;
   const { textures, memoryBytes = Infinity } = request;
+  const plan = request.plan ?? ((options) => ({ policy: 'guard', order: 'finest', ...options }));
   const only = scale >= 0 || !!textures;
   const serving = !only && rule === 'flip' ? servingProxy(manifest, displayedPx) : -1;
   if (serving >= 0 && proxyFits(manifest, serving, memoryBytes)) {
-    const plan = planOfProxy(manifest, request, serving);
-    if (plan.completeS <= timeLimitS) return plan;
+    const alone = planOfProxy(manifest, request, serving);
+    if (alone.completeS <= timeLimitS) return alone;
   }
   const asked = wantedScale(manifest, request);
   const wanted = only ? asked : scaleWithin(manifest.scales, asked, memoryBytes);
@@ -134,9 +136,8 @@ export function planDelivery(data: PackageData, request: DeliveryRequest): Deliv
       // Where the first request has brought all, that request shows the throughput.
       const [shown, shownS] = moved > 0 ? [moved, meshS - fromS] : [firstBytes(manifest), fromS];
       const initialBytesS = request.beta0BytesS > 0 ? request.beta0BytesS : shown / Math.max(1e-9, shownS - link.rttS);
-      const throughput = { ...request.htc.throughput, initialBytesS };
-      const htc = { ...request.htc, timeLimitS: request.timeLimitS - meshS, rttS: link.rttS, throughput };
-      return { plan: planOptions(htc), linkBytesS: link.bytesS };
+      const left = { timeLimitS: timeLimitS - meshS, initialBytesS, rttS: link.rttS };
+      return { plan: plan(left), linkBytesS: link.bytesS };
     },
   });
   let at = steps.next();
@@ -146,7 +147,7 @@ export function planDelivery(data: PackageData, request: DeliveryRequest): Deliv
   const { allBytes, firstPictureS, meshS, step } = timesOf(manifest, request, best.scale);
   const shown = manifest.scales.find((s) => s.scale === best.scale)!;
   const textureSum = best.planes.reduce((sum, { plane }) => sum + textureBytes(data.textures[plane].widthPx, data.textures[plane].heightPx), 0);
-  let plan: DeliveryPlan = {
+  let chosen: DeliveryPlan = {
     ...best, step, fixedBytes: allBytes, firstPictureS, meshS, completeS: meshS + best.endS,
     gpuBytes: { mesh: scaleBytes(shown), textures: textureSum },
   };
@@ -154,8 +155,8 @@ export function planDelivery(data: PackageData, request: DeliveryRequest): Deliv
     manifest.proxies.forEach((_, k) => {
       if (!proxyFits(manifest, k, memoryBytes)) return;
       const other = planOfProxy(manifest, request, k);
-      const needed = plan.meshS >= timeLimitS && other.meshS < plan.meshS;
-      if (needed || (other.meshS < timeLimitS && other.flip < plan.flip - worthwhile)) plan = other;
+      const needed = chosen.meshS >= timeLimitS && other.meshS < chosen.meshS;
+      if (needed || (other.meshS < timeLimitS && other.flip < chosen.flip - worthwhileFlip)) chosen = other;
     });
-  return plan;
+  return chosen;
 }

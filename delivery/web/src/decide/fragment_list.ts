@@ -1,8 +1,7 @@
 import { InputError } from '../format/errors';
-import type { PackageData } from '../format/package_data';
-import { bytesToShow, fragmentCount } from '../format/tables';
+import { type PackageData, bytesToShow, fragmentCount } from '../format/tables';
 import { etaOf, meanEta, qualityOf } from './allocation';
-import { FragmentOffer } from './plan_types';
+import { FragmentOffer } from './harmonic_time';
 import { interpolatedBytes } from './size_curve';
 import { PerGroup, PlaneChoice, TextureLoss, everyGroup, groupIndex, tablesOf } from './texture_loss';
 

@@ -1,13 +1,11 @@
+import { ln2Hi, ln2Lo, pi, pio2Hi, pio2Lo } from '../format/shared_numbers';
+
 // exp, log, sin, cos, atan2, pow with the same bits as format/base/portable_math.h: plain double arithmetic, where Math's
 // functions differ from engine to engine. About 1e-15 relative.
 
-const ln2Hi = 6.93147180369123816490e-1;
-const ln2Lo = 1.90821492927058770002e-10;
 const rootOfHalf = 0.7071067811865475244;
-const pio2Hi = 1.57079632673412561417;
-const pio2Lo = 6.0771005065061922493e-11;
 
-export const pi = 3.14159265358979323846;
+export { pi };
 
 /** 2^k for |k| < 1000, without a power function. */
 function powerOfTwo(k: number): number {

@@ -1,18 +1,13 @@
 import type { PlaneGroup, QualityTable, TextureLosses } from '../format/quality_table';
+import {
+  behindOneSample, flattest, leastDssim, leastFlip, ln2, lossPerDoubling, lossPerHalving, previewLevels,
+  steepest,
+} from '../format/shared_numbers';
 import { clamp } from './numbers';
 import { exp, log, pow } from './portable_math';
 
 // FLIP of lit pictures of a choice against S_0 with the source's texels, read between the samples of a quality table:
 // format/rules/picture_prediction.cpp, bit for bit.
-
-const leastFlip = 1e-6; // what logarithms take for 0
-const leastDssim = 1e-9;
-/** Twice as large texels lose so many times as much. */
-const lossPerDoubling = 1.6;
-/** Half as large ones lose so much less. */
-const lossPerHalving = 1.25;
-/** Previews have 1/8 of the sides. */
-const previewLevels = 3;
 
 const mixed = (a: number, b: number, part: number): number => (1 - part) * a + part * b;
 
@@ -28,7 +23,6 @@ function between(axis: readonly number[], at: number, value: (x: number) => numb
 
 const sizeAt = ({ sizesPx }: QualityTable, displayedPx: number): [number, number, number] => between(sizesPx, Math.max(displayedPx, 1), log);
 
-const ln2 = 0.693147180559945309417;
 /** How much more a picture of a fixed number of texels loses than at the nearest height of the table. */
 function beyondSizes({ sizesPx }: QualityTable, displayedPx: number): number {
   const px = Math.max(displayedPx, 1);
@@ -56,11 +50,12 @@ class Curve {
   at(logDssim: number): number {
     const [x, y] = [this.logDssim_, this.logFlip_];
     let i = 0;
-    if (x.length === 1) return exp(y[0] + (logDssim < x[0] ? 1 : 0.5) * (logDssim - x[0]));
+    if (x.length === 1) return exp(y[0] + (logDssim < x[0] ? steepest : behindOneSample) * (logDssim - x[0]));
     while (i + 2 < x.length && x[i + 1] < logDssim) ++i;
     const slope = (y[i + 1] - y[i]) / (x[i + 1] - x[i]);
     const from = logDssim > x[i + 1] ? i + 1 : i;
-    return exp(y[from] + (from > i || logDssim < x[0] ? clamp(slope, 0.25, 1) : slope) * (logDssim - x[from]));
+    const beyond = from > i || logDssim < x[0];
+    return exp(y[from] + (beyond ? clamp(slope, flattest, steepest) : slope) * (logDssim - x[from]));
   }
   /** Behind the coarsest sampled level towards the preview's. */
   atLevel(level: number, previewLevel: number): number {

@@ -1,5 +1,6 @@
 import { startBytes } from '../format/layout';
 import type { Manifest } from '../format/manifest';
+import { ln2, proxyLossPerDoubling, sameFlip, sameFlipP95 } from '../format/shared_numbers';
 import { log, pow } from './portable_math';
 
 // Which proxies are enough, from the numbers of the manifest alone: format/rules/proxy_choice.cpp, bit for bit.
@@ -9,13 +10,13 @@ export interface ProxyLoss {
   flip: number;
   flipP95: number;
 }
-const ln2 = 0.693147180559945309417;
 
 function lossAt(sizes: readonly number[], losses: readonly number[], displayedPx: number): number {
   const px = Math.max(displayedPx, 1);
   const last = sizes.length - 1;
   if (px <= sizes[0]) return losses[0];
-  if (px >= sizes[last]) return Math.min(1, losses[last] * pow(1.6, log(px / sizes[last]) / ln2));
+  const doublings = log(px / sizes[last]) / ln2;
+  if (px >= sizes[last]) return Math.min(1, losses[last] * pow(proxyLossPerDoubling, doublings));
   const i = sizes.findIndex((size) => size >= px) - 1;
   const from = log(sizes[i]);
   const part = (log(px) - from) / (log(sizes[i + 1]) - from);
@@ -31,7 +32,7 @@ export function proxyLoss({ proxies, proxySizesPx }: Manifest, proxy: number, di
 export function servingProxy(manifest: Manifest, displayedPx: number): number {
   return manifest.proxies.findIndex((_, k) => {
     const { flip, flipP95 } = proxyLoss(manifest, k, displayedPx);
-    return flip <= 0.05 && flipP95 <= 0.15;
+    return flip <= sameFlip && flipP95 <= sameFlipP95;
   });
 }
 /** Bytes of begin .. end behind those that the first request has brought. */

@@ -1,13 +1,10 @@
-import { type Manifest } from '../format/manifest';
+import type { Manifest, ManifestScale } from '../format/manifest';
+import { meshTimeShare, moments, paying } from '../format/shared_numbers';
 import { pow } from './portable_math';
 import { beyondStart, proxyBytesBeyondStart, proxyLoss } from './proxy_choice';
 
-// Which larger proxy is shown on the way from the smallest one to a scale, from the numbers of the manifest alone:
-// format/rules/proxy_steps.cpp, bit for bit.
-
-const moments = 64;
-const meshShare = 0.5;
-const paying = 0.95;
+// Which larger proxy is shown on the way from the smallest one to a scale, from the numbers of the manifest
+// alone: format/rules/proxy_choice.cpp, bit for bit.
 
 /** A link as the first request has shown it, and the seconds that are left until the time limit. */
 export interface StepLink {
@@ -16,15 +13,18 @@ export interface StepLink {
   leftS: number;
 }
 
-/** Bytes behind those of the first request that a client of a package with proxies fetches before it can decide about scales and textures. */
+/**
+ * Bytes behind those of the first request that a client of a package with proxies fetches before it can
+ * decide about scales and textures.
+ */
 export function documentBytes({ index, tables, scales }: Manifest): number {
   const { offset, bytes } = scales[scales.length - 1].glb;
   return beyondStart(index.offset, tables.offset + tables.bytes) + beyondStart(offset, offset + bytes);
 }
 
 /**
- * The proxy that lowers the mean FLIP of what is seen in the time left by at least a twentieth, of several the one that lowers it
- * most; -1 where none does. What scales look like is supposed, see SPEC.md, A.6.
+ * The proxy that lowers the mean FLIP of what is seen in the time left by at least a twentieth, of several
+ * the one that lowers it most; -1 where none does. What scales look like is supposed, see SPEC.md, A.6.
  */
 export function proxyStep(m: Manifest, wanted: number, displayedPx: number, { bytesS, rttS, leftS }: StepLink): number {
   if (m.proxies.length < 2 || !(leftS > 0) || !(bytesS > 0)) return -1;
@@ -32,7 +32,8 @@ export function proxyStep(m: Manifest, wanted: number, displayedPx: number, { by
   const flips = m.proxies.map((_, k) => proxyLoss(m, k, displayedPx).flip);
   const arrivalS = (k: number): number => seconds(proxyBytesBeyondStart(m, k));
   const documents = documentBytes(m);
-  const mesh = m.scales.slice(0, -1).find((s) => s.scale >= wanted && seconds(documents + s.glb.bytes) <= meshShare * leftS);
+  const inTime = ({ glb }: ManifestScale): boolean => seconds(documents + glb.bytes) <= meshTimeShare * leftS;
+  const mesh = m.scales.slice(0, -1).find((s) => s.scale >= wanted && inTime(s));
   const tooCoarse = !mesh && m.scales[m.scales.length - 1].scale > wanted;
   const fixed = documents + (mesh?.glb.bytes ?? 0);
   const all = m.provenance.offset + m.provenance.bytes;

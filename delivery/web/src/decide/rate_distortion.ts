@@ -1,7 +1,7 @@
-import { PlaneTables, bytesToShow, fragmentCount, rungCount } from '../format/tables';
+import type { PlaneTables } from '../format/tables';
 import { positive, sumOf } from './numbers';
 
-// How a budget of bytes is best spent: format/rules/rate_distortion.cpp, bit for bit.
+// How a budget of bytes is best spent: format/rules/allocation.cpp, bit for bit.
 
 /**
  * Weight of a fragment's quality: its surface fraction, with the area per texel capped at the 99th percentile of
@@ -55,34 +55,4 @@ export function spendBytes(curves: readonly RdCurve[], budgetBytes: number): num
     ways[curve] = way;
   }
   return ways;
-}
-
-/** The curves of a plane's stored fragments, in index order; weights default to surfaceWeights(). */
-export function rdCurves(t: PlaneTables, weights: Float32Array = surfaceWeights(t), share = 1): RdCurve[] {
-  let largest = 0;
-  for (const f of t.order) largest = Math.max(largest, weights[f]);
-  const fragments = fragmentCount(t);
-  const curves: RdCurve[] = [];
-  for (const f of Array.from(t.order).sort((a, b) => a - b)) {
-    const unit = largest > 0 ? Math.floor((weights[f] / largest) * share * 1048576 + 0.5) : 0;
-    const loss = (dssim: number): number => Math.floor(unit * (dssim * 16777216));
-    const curve: RdCurve = { bytes: [0], loss: [loss(t.skipDssim[f])] };
-    for (let r = 0; r < rungCount(t); ++r) {
-      const at = r * fragments + f;
-      curve.bytes.push(bytesToShow(t, r, f));
-      curve.loss.push(t.sizeBytes[at] > 0 ? loss(t.dssim[at]) : curve.loss[0]);
-    }
-    curves.push(curve);
-  }
-  return curves;
-}
-
-/** The rung of every fragment (-1 skipped) that loses least for at most `budgetBytes`. [F] */
-export function allocateRd(t: PlaneTables, budgetBytes: number, weights?: Float32Array): Int16Array {
-  const ways = spendBytes(rdCurves(t, weights), budgetBytes);
-  const rungs = new Int16Array(fragmentCount(t)).fill(-1);
-  Array.from(t.order)
-    .sort((a, b) => a - b)
-    .forEach((f, k) => (rungs[f] = ways[k] - 1));
-  return rungs;
 }

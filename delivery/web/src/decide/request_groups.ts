@@ -1,7 +1,7 @@
 import type { RequestRecord } from '../http/requests';
 import type { FragmentList, ListedFragment } from './fragment_list';
 import { clamp, sumOf } from './numbers';
-import type { FragmentOffer } from './plan_types';
+import type { FragmentOffer } from './harmonic_time';
 
 /** Offers of neighbours that are fetched and decided together. */
 export interface GroupedList {

@@ -1,15 +1,13 @@
-import { PackageData } from '../format/package_data';
+import { worthwhileFlip } from '../format/shared_numbers';
+import { PackageData } from '../format/tables';
 import { FragmentList, lossesOf } from './fragment_list';
-import { type BytesOf, planesWithin } from './memory/gpu_memory';
-import { scaleBytes } from './memory/gpu_size';
-import type { TimePlanOptions } from './plan_types';
+import { type BytesOf, planesWithin } from './gpu_memory';
+import { scaleBytes } from './gpu_size';
+import type { TimePlanOptions } from './harmonic_time';
 import { geometryFlip } from './prediction';
 import { Simulated, simulate } from './simulation';
 import { TextureSpending, budgetSteps, spendOn } from './texture_budget';
 import { PlaneChoice, TextureLoss, pictureFlip, textureFlip } from './texture_loss';
-
-/** A coarser scale, or a proxy, has to look better by this much of FLIP. */
-export const worthwhile = 1e-4;
 
 /** A scale and textures as they can be had in a time. */
 export interface InTime extends Simulated {
@@ -79,7 +77,7 @@ export function* choiceInTime(data: PackageData, request: InTimeRequest): Genera
   for (const { scale } of data.manifest.scales) {
     if (scale < request.wanted || (request.only && scale !== request.wanted)) continue;
     // A mesh that comes too late is no picture in the time.
-    const most: number = !best || best.late ? Infinity : best.flip - worthwhile;
+    const most: number = !best || best.late ? Infinity : best.flip - worthwhileFlip;
     // With the source's texels.
     if (geometryFlip(data.quality, request.displayedPx, scale) >= most) continue;
     const now = yield* texturesInTime(loss, request, scale);

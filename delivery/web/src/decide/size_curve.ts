@@ -1,15 +1,9 @@
+import { lumaQuantisers } from '../format/shared_numbers';
 import { PlaneTables, bytesToShow } from '../format/tables';
 import { clamp, sumOf } from './numbers';
 import { exp, log } from './portable_math';
 
 // The bytes of a fragment at a quality that no rung has: format/rules/size_curve.cpp, bit for bit.
-
-// ISO/IEC 10918-1, table K.1: what IJG's scale multiplies; the order does not matter here.
-const lumaQuantisers = [
-  16, 11, 10, 16, 24, 40, 51, 61, 12, 12, 14, 19, 26, 58, 60, 55, 14, 13, 16, 24, 40, 57, 69, 56, 14, 17, 22, 29, 51,
-  87, 80, 62, 18, 22, 37, 56, 68, 109, 103, 77, 24, 35, 55, 64, 81, 104, 113, 92, 49, 64, 78, 87, 103, 121, 120, 101,
-  72, 92, 95, 98, 112, 100, 103, 99,
-];
 
 /** Log of the mean of 1 / (step + 1), by whole quality: how fine it quantises. Strictly rising. */
 const finenessOfWhole = /* @__PURE__ */ Array.from({ length: 101 }, (_, quality) => {

@@ -1,21 +1,16 @@
-import type { PackageData } from '../format/package_data';
+import {
+  leastWeight, lossUnit, reweightings, worthwhileFinerFlip, worthwhilePart,
+} from '../format/shared_numbers';
+import type { PackageData } from '../format/tables';
 import type { QualityTable } from '../format/quality_table';
 import { FragmentList, ListOptions, fragmentList, lossesOf } from './fragment_list';
 import { sumOf } from './numbers';
 import { pow } from './portable_math';
 import { spendBytes } from './rate_distortion';
-import { bytesAtRung } from './rung_choice';
+import { bytesAtRung } from './harmonic_time';
 import { PerGroup, PlaneChoice, TextureLoss, everyGroup, pictureFlip, planesForDisplay } from './texture_loss';
 
 // delivery/cpp/decide/texture_budget.cpp, bit for bit.
-
-/** FLIP that finer planes have to save. */
-const worthwhile = 2e-3;
-const reweightings = 2;
-/** Losses as spendBytes counts them. */
-const lossUnit = 2 ** 40;
-/** Of a group beside the others. */
-const leastWeight = 1e-3;
 
 /** How bytes are best spent on textures. */
 export interface TextureSpending {
@@ -74,7 +69,8 @@ export function* budgetSteps(loss: TextureLoss, options: SpendingOptions, bytes:
       const now = spend(to);
       // Finer planes take memory: they have to look better, not only as good, but not so much better than each other.
       const finer = step.includes(-1);
-      if (!now || now.flip >= best.flip || (finer && now.flip >= withoutFiner - Math.min(worthwhile, withoutFiner / 16))) continue;
+      const least = Math.min(worthwhileFinerFlip, worthwhilePart * withoutFiner);
+      if (!now || now.flip >= best.flip || (finer && now.flip >= withoutFiner - least)) continue;
       best = now;
       if (!finer) withoutFiner = now.flip;
       from = to;

@@ -1,9 +1,9 @@
 import { InputError } from '../format/errors';
 import { fullSizePlanes } from '../format/layout';
 import type { Manifest } from '../format/manifest';
-import type { PackageData } from '../format/package_data';
+import { ln2 } from '../format/shared_numbers';
+import { type PackageData, PlaneTables, fragmentCount } from '../format/tables';
 import { QualityTable, groupOf, planeGroups } from '../format/quality_table';
-import { PlaneTables, fragmentCount } from '../format/tables';
 import { TextureInfo } from '../format/textures';
 import { sumOf } from './numbers';
 import { log } from './portable_math';
@@ -22,7 +22,6 @@ export type PerGroup = readonly [colour: number, normal: number, data: number];
 /** Of every group the same. */
 export const everyGroup = (value: number): PerGroup => [value, value, value];
 
-const ln2 = 0.693147180559945309417;
 
 /** Tables of a plane that were read; InputError where they were not. */
 export function tablesOf(data: PackageData, plane: number): PlaneTables {

@@ -1,5 +1,6 @@
 import { anyDisplayPx } from '../format/layout';
 import type { Manifest, ManifestScale, ManifestStep } from '../format/manifest';
+import { apart, belowAny } from '../format/shared_numbers';
 import { cos, pi, sin } from './portable_math';
 
 // From how an object is looked at to the scale that is enough: format/rules/viewing.h. Lengths on screen are device px;
@@ -10,9 +11,6 @@ export interface CameraView {
   fovDegrees: number;
   viewportPx: number;
 }
-
-const belowAny = 0.999 * anyDisplayPx;
-const apart = 1.0001;
 
 const halfTangent = (degrees: number): number => {
   const half = degrees * (pi / 360);

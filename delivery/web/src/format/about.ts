@@ -1,5 +1,6 @@
 import { aboutPath } from './entry_paths';
 import { JsonAt, parseJson } from './json_fields';
+import { maxAboutBytes } from './shared_numbers';
 
 /** about.json (format/SPEC.md): what the object is, whose it is, what its coordinates mean. Whatever is missing is not known. */
 export interface About {
@@ -44,7 +45,7 @@ export const isWebUrl = (text: string): boolean => webUrl.test(text);
  * document.
  */
 export function readAbout(json: Uint8Array): About {
-  const about = parseJson(json, aboutPath, 262144).by('B01');
+  const about = parseJson(json, aboutPath, maxAboutBytes).by('B01');
   const check = (within: JsonAt, name: string, read: (at: JsonAt) => unknown): void => {
     if (within.has(name)) read(within.at(name));
   };

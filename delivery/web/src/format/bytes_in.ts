@@ -1,4 +1,5 @@
 import { FormatError } from './errors';
+import { formatMajor, otherMajor } from './manifest';
 
 /** Reads little-endian numbers from bytes; FormatError names the place where the bytes end too early, which breaks `rule`. */
 export class BytesIn {
@@ -68,4 +69,12 @@ export class BytesIn {
   fail(expected: string, found: unknown = '', rule = this.rule_): never {
     throw new FormatError(this.name_, `byte ${this.position_}`, expected, `${found}`, rule);
   }
+}
+
+/** Magic word (another breaks `rule`) and version, with which index.bin and tables.bin begin; gives the minor version. */
+export function readEntryStart(input: BytesIn, magic: string, rule: string): number {
+  input.expect(magic, rule);
+  const major = input.u16();
+  if (major !== formatMajor) input.fail(`version ${formatMajor}`, otherMajor(major), 'W03');
+  return input.u16();
 }

@@ -1,11 +1,10 @@
-import { toHex } from './bytes';
+import { sha256, toHex } from './sha256';
 import { codecTraits } from './codec';
 import { FormatError } from './errors';
 import { parseIndexPage, readIndexHead } from './index_table';
 import { ByteRange, EntryRef, Manifest, hasGlb, manifestOfContainer, readManifest } from './manifest';
 import { QualityTable, readQuality } from './quality_table';
 import { parseTablesSection, readTablesHead } from './read_tables';
-import { sha256 } from './sha256';
 import { PlaneTables, fragmentCount, rungCount } from './tables';
 import { TextureInfo, missingFeature, readTextures } from './textures';
 import * as paths from './entry_paths';
@@ -15,8 +14,8 @@ import * as layout from './layout';
 // where there are none. Digests have been checked before.
 
 export { readIndex } from './index_table';
-export { plainGlb } from './glb/plain_glb';
-export { requireSelfContained } from './self_contained_glb';
+export { plainGlb } from './glb';
+export { requireSelfContained } from './glb';
 
 const sum = (values: Uint32Array): number => values.reduce((total, v) => total + v, 0);
 

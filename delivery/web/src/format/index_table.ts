@@ -1,12 +1,11 @@
-import { BytesIn } from './bytes_in';
+import { BytesIn, readEntryStart } from './bytes_in';
 import * as paths from './entry_paths';
-import { readEntryStart } from './entry_start';
 import { FormatError } from './errors';
 import { EntryRef, formatMinor } from './manifest';
 import { requireDigest } from './sha256';
+import { noIndex } from './shared_numbers';
 
 const file = paths.indexPath;
-const noPlane = 0xffffffff;
 
 /** One page of index.bin: the entries of a plane, or (plane -1) of none. */
 export interface IndexPage {
@@ -37,7 +36,7 @@ export function readIndexHead(bytes: Uint8Array): IndexHead {
   for (let i = 0; i < pageCount; ++i) {
     const plane = input.u32();
     const before = i > 1 ? head.pages[i - 1].plane : -1;
-    if (i === 0 ? plane !== noPlane : plane === noPlane || plane <= before)
+    if (i === 0 ? plane !== noIndex : plane === noIndex || plane <= before)
       input.fail('rising planes', plane, 'I02');
     const page: IndexPage = {
       plane: i === 0 ? -1 : plane,

@@ -1,4 +1,5 @@
 import { FormatError } from './errors';
+import { maxJsonInteger } from './shared_numbers';
 
 /** A value in a JSON document: checks type and range before anyone uses the value, and names the place of a wrong one. */
 export class JsonAt {
@@ -43,7 +44,7 @@ export class JsonAt {
     if (typeof v !== 'number' || !(v >= least && v <= most)) this.fail(`a number from ${least} to ${most}`, this.shown_());
     return v;
   }
-  integer(least: number, most = 9007199254740992): number {
+  integer(least: number, most = maxJsonInteger): number {
     const v = this.number(least, most);
     if (!Number.isInteger(v)) this.fail('a whole number', this.shown_());
     return v;

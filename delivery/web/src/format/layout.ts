@@ -1,11 +1,6 @@
 // Paths of a package's entries (format/SPEC.md, section 3), and numbers that all readers go by.
 
-/** The manifest with its ZIP header fits in this many bytes, whatever the model: one request bootstraps a client. */
-export const bootstrapBytes = 16384;
-/** What a client asks for in its first request: the manifest and most first pictures. See format/SPEC.md, section 3. */
-export const startBytes = 45056;
-/** A displayed height that is enough at any size: displayPx... of S_0 and the last step's upToPx. */
-export const anyDisplayPx = 1e9;
+export { anyDisplayPx, bootstrapBytes, startBytes } from './shared_numbers';
 /** Previews are no larger: every GPU takes textures of this size. */
 export const mostPreviewPx = 4096;
 /** Path of the vertex-split stream. */

@@ -2,11 +2,12 @@ import * as paths from './entry_paths';
 import { FormatError } from './errors';
 import { JsonAt, parseJson } from './json_fields';
 import * as layout from './layout';
+import {
+  formatMajor, formatMinor, largest, maxFloorBytes, maxPackagePlanes, maxPosterSide, maxProxySizePx,
+  maxProxySizes, maxProxyTexturePx, maxScales, maxTitleBytes,
+} from './shared_numbers';
 
-/** Major version of the format that this reader is for. */
-export const formatMajor = 2;
-/** Minor version: packages of later ones can be read, too. */
-export const formatMinor = 0;
+export { formatMajor, formatMinor };
 /** Features that packages may require of this reader. */
 export const knownFeatures: readonly string[] = ['codec-jpeg-progressive', 'codec-jpeg-xy', 'codec-webp'];
 
@@ -125,7 +126,6 @@ export interface Manifest {
 /** What is shown first: the smallest proxy, where there is none the GLB of the coarsest scale. */
 export const firstPicture = ({ proxies, scales }: Manifest): EntryRef => (proxies[0] ?? scales[scales.length - 1]).glb;
 
-const largest = 1e300;
 const lengths = ['errorMax', 'errorRms', 'p95', 'p99'] as const;
 const heights = ['displayPxJnd', 'displayPxError', 'displayPxEdge', 'displayPxFlip'] as const;
 
@@ -160,7 +160,7 @@ function readStream(at: JsonAt): StreamRef {
 function readPoster(at: JsonAt): PosterRef {
   const ref = readRef(at, layout.posterPath);
   at.at('bytes').by('O01').integer(1, 1e6);
-  const [widthPx, heightPx] = ['widthPx', 'heightPx'].map((side) => at.at(side).by('O01').integer(1, 4096));
+  const [widthPx, heightPx] = ['widthPx', 'heightPx'].map((side) => at.at(side).by('O01').integer(1, maxPosterSide));
   return { ...ref, widthPx, heightPx };
 }
 
@@ -188,7 +188,7 @@ function readVersion(at: JsonAt): Pick<Manifest, 'version' | 'requiredFeatures'>
 
 /** Scales from an array for each field, all of one length. */
 function readScales(at: JsonAt): ManifestScale[] {
-  const n = at.at('scale').array(1, 100);
+  const n = at.at('scale').array(1, maxScales);
   let before = -1;
   return at.at('scale').each(n, n, (scaleAt, i) => {
     const field = (name: string): JsonAt => {
@@ -209,14 +209,14 @@ function readScales(at: JsonAt): ManifestScale[] {
       major: field('major').boolean(),
       ...numbers(lengths, largest),
       ...numbers(heights, layout.anyDisplayPx, 'M11'),
-      floor: field('floor').text(100),
+      floor: field('floor').text(maxFloorBytes),
     };
   });
 }
 
 function readSteps(at: JsonAt, scales: ManifestScale[]): ManifestStep[] {
   let before: ManifestStep = { upToPx: -1, scale: Infinity };
-  const steps = at.each(1, 100, (pair) => {
+  const steps = at.each(1, maxScales, (pair) => {
     pair.array(2, 2);
     const step = { upToPx: pair.at(0).number(0, layout.anyDisplayPx), scale: pair.at(1).integer(0, 100) };
     if (!scales.some((s) => s.scale === step.scale)) pair.fail('a scale of the package', step.scale);
@@ -240,7 +240,7 @@ function readRising(at: JsonAt, most: number, rule: string, read: (item: JsonAt)
 
 /** Proxies from an array for each field, all of one length. */
 function readProxies(at: JsonAt): Pick<Manifest, 'proxySizesPx' | 'proxies'> {
-  const proxySizesPx = readRising(at.at('sizesPx'), 8, 'M23', (size) => size.number(1, 65536));
+  const proxySizesPx = readRising(at.at('sizesPx'), maxProxySizes, 'M23', (size) => size.number(1, maxProxySizePx));
   const { length: n } = readRising(at.at('bytes'), 8, 'M24', (bytes) => bytes.integer(1));
   const proxies = at.at('bytes').each(n, n, (_, i) => {
     const field = (name: string): JsonAt => {
@@ -252,7 +252,7 @@ function readProxies(at: JsonAt): Pick<Manifest, 'proxySizesPx' | 'proxies'> {
       glb: readRef({ at: field as JsonAt['at'] }, paths.proxyPath(i)),
       triangles: field('triangles').integer(1, 0xffffffff),
       vertices: field('vertices').integer(1, 0xffffffff),
-      texturePx: field('texturePx').integer(0, 8192),
+      texturePx: field('texturePx').integer(0, maxProxyTexturePx),
       flip: losses('flip'),
       flipP95: losses('flipP95'),
     };
@@ -291,7 +291,7 @@ export function readManifest(json: Uint8Array): Manifest {
   if (stream) resolveStreamScales(at.at('scales'), scales, stream);
   return {
     ...version,
-    title: at.at('title').text(200),
+    title: at.at('title').text(maxTitleBytes),
     origin: readVector(at.at('origin')),
     boundsMin,
     boundsMax,
@@ -301,7 +301,7 @@ export function readManifest(json: Uint8Array): Manifest {
     scales,
     steps: readSteps(at.at('steps').by('M21'), scales),
     ...(at.has('proxies') ? readProxies(at.at('proxies').by('M23')) : { proxySizesPx: [], proxies: [] }),
-    planeCount: at.at('planeCount').integer(0, 10000),
+    planeCount: at.at('planeCount').integer(0, maxPackagePlanes),
     index: readPagedRef(at.at('index'), paths.indexPath),
     tables: readPagedRef(at.at('tables'), paths.tablesPath),
     textures: readRef(at.at('textures'), paths.texturesPath),

@@ -1,6 +1,7 @@
 import { qualityPath } from './entry_paths';
 import { FormatError } from './errors';
 import { JsonAt, parseJson } from './json_fields';
+import { maxQualityBytes, maxQualitySamples, maxQualitySizes } from './shared_numbers';
 import type { TextureInfo } from './textures';
 
 /** Planes whose loss shows in the same way. */
@@ -53,7 +54,6 @@ export interface QualityTable {
   groups: { group: PlaneGroup; sizes: TextureLosses[] }[];
 }
 
-const mostSizes = 8;
 
 function readRising(at: JsonAt, mostValues: number, least: number, most: number): number[] {
   let before = -Infinity;
@@ -75,7 +75,7 @@ function readLosses(at: JsonAt, count: number): PictureLosses {
 
 function readTexture(at: JsonAt): TextureLosses {
   let before = 0;
-  const texelDssim = Float32Array.from(at.at('texelDssim').each(1, 100, (one) => {
+  const texelDssim = Float32Array.from(at.at('texelDssim').each(1, maxQualitySamples, (one) => {
     const v = Math.fround(one.number(0, 2));
     if (!(v > before)) one.fail('a rising number above 0', v);
     return (before = v);
@@ -87,8 +87,8 @@ function readTexture(at: JsonAt): TextureLosses {
 
 /** Reads quality.json, strictly; FormatError names the place in the document. */
 export function readQuality(json: Uint8Array): QualityTable {
-  const at = parseJson(json, qualityPath, 4 << 20).by('Q01');
-  const sizesPx = readRising(at.at('sizesPx'), mostSizes, 1, 65536);
+  const at = parseJson(json, qualityPath, maxQualityBytes).by('Q01');
+  const sizesPx = readRising(at.at('sizesPx'), maxQualitySizes, 1, 65536);
   const scales = readRising(at.at('scales'), 100, 0, 99);
   const sizes = sizesPx.length;
   let last = -1;

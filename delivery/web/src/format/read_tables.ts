@@ -1,16 +1,13 @@
-import { BytesIn } from './bytes_in';
+import { BytesIn, readEntryStart } from './bytes_in';
 import { tablesPath as file } from './entry_paths';
-import { readEntryStart } from './entry_start';
 import { FormatError } from './errors';
 import { formatMinor } from './manifest';
 import { requireDigest } from './sha256';
+import {
+  byVqp, largestHalf, largestMse, maxFragments, maxPackageRungs, maxPlaneCells, maxScaleCount,
+} from './shared_numbers';
 import { PlaneTables, TablesHead, fragmentCount } from './tables';
 
-const mostFragments = 65535;
-const mostRungs = 100;
-const mostScales = 100;
-/** Of F * (5 R + N), 4 bytes of memory each: few bytes of a file may tell of many fragments. */
-const mostCells = 1 << 24;
 
 /** Head of tables.bin; the bytes may stop after the head. */
 export function readTablesHead(bytes: Uint8Array): TablesHead {
@@ -29,7 +26,6 @@ export function readTablesHead(bytes: Uint8Array): TablesHead {
   return head;
 }
 
-const largestHalf = 0x7bff;
 const floatBits = new DataView(new ArrayBuffer(4));
 /** binary16, finite and not negative, to a number. */
 function fromHalf(half: number): number {
@@ -92,7 +88,7 @@ function readArrays(input: BytesIn, t: PlaneTables, c: Counts): void {
   t.surfaceFraction = listed(new Float32Array(f), () => input.f32());
   t.features = listed(new Uint32Array(c.scales * f), () => input.number(c.feature));
   t.quality = fill(new Float32Array(c.scales), () => input.f32());
-  if (t.allocation === 3) t.vqp = listed(new Float32Array(f), () => input.u16() / 65535);
+  if (t.allocation === byVqp) t.vqp = listed(new Float32Array(f), () => input.u16() / 65535);
 }
 
 function emptyTables(): PlaneTables {
@@ -133,7 +129,7 @@ function checkPlane(t: PlaneTables, place: string): void {
   within([t.logWidth], 0, 4, 'logWidth');
   within([t.qualityMax], 1, 100, 'qualityMax');
   within([t.qualityMin], 1, t.qualityMax, 'qualityMin');
-  within(t.mse, 0, 65025, 'mse');
+  within(t.mse, 0, largestMse, 'mse');
   within(t.dssim, 0, 2, 'dssim');
   within(t.skipDssim, 0, 2, 'skipDssim');
   t.knotQuality.forEach((q, k) => {
@@ -163,13 +159,13 @@ function readStart(input: BytesIn, t: PlaneTables, minor: number): Counts {
   for (const name of parameters) t[name] = input.f32();
   c.listed = input.u32();
   const { columns, rows } = t;
-  if (columns === 0 || rows === 0 || columns > mostFragments || rows > Math.floor(mostFragments / columns))
+  if (columns === 0 || rows === 0 || columns > maxFragments || rows > Math.floor(maxFragments / columns))
     input.fail('1 to 65535 fragments');
-  const good = c.scales > 0 && c.scales <= mostScales && c.rungs > 0 && c.rungs <= mostRungs && c.listed <= columns * rows;
+  const good = c.scales > 0 && c.scales <= maxScaleCount && c.rungs > 0 && c.rungs <= maxPackageRungs && c.listed <= columns * rows;
   if (!good) input.fail('counts in their ranges');
   if (t.allocation > 3) input.fail('allocation 0 to 3', t.allocation, 'T13');
   const cells = columns * rows * (5 * c.rungs + c.scales);
-  if (cells > mostCells) input.fail('at most 2^24 cells', cells, 'L02');
+  if (cells > maxPlaneCells) input.fail('at most 2^24 cells', cells, 'L02');
   if (c.size < 1 || c.size > 4 || c.feature < 1 || c.feature > 3)
     input.fail('widths of 1 to 4 and 1 to 3 bytes');
   return c;
@@ -180,7 +176,7 @@ export function parseTablesSection(bytes: Uint8Array, minor: number, place: stri
   const input = new BytesIn(bytes, `${file}: ${place}`, 'T03');
   const t = emptyTables();
   const counts = readStart(input, t, minor);
-  const expected = sectionBytes(counts) + (t.allocation === 3 ? 2 * counts.listed : 0);
+  const expected = sectionBytes(counts) + (t.allocation === byVqp ? 2 * counts.listed : 0);
   if (bytes.length < expected) input.fail(`${expected} bytes`, bytes.length);
   readArrays(input, t, counts);
   if (minor <= formatMinor) input.finish();

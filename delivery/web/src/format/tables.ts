@@ -1,3 +1,7 @@
+import type { Manifest } from './manifest';
+import type { QualityTable } from './quality_table';
+import type { TextureInfo } from './textures';
+
 /**
  * Tables of one texture plane (format/SPEC.md, section 8). F = columns * rows fragments, R rungs of rising quality,
  * N rows of feature scales: those of
@@ -71,3 +75,10 @@ export interface TablesHead {
   planes: TablesSection[];
 }
 
+/** Data that decisions about textures are made from. Tables may lack planes that nobody asks about. */
+export interface PackageData {
+  manifest: Manifest;
+  textures: readonly TextureInfo[];
+  tables: readonly (PlaneTables | undefined)[];
+  quality: QualityTable;
+}

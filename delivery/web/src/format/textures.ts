@@ -2,6 +2,9 @@ import { CodecId, codecTraits, isCodec } from './codec';
 import * as paths from './entry_paths';
 import { JsonAt, parseJson } from './json_fields';
 import { fullSizePlanes } from './layout';
+import {
+  maxFragments, maxMip, maxPackagePlanes, maxPackageRungs, maxSide, maxTextBytes, maxTexturesBytes,
+} from './shared_numbers';
 
 /** One texture plane of textures.json (format/SPEC.md, section 7). */
 export interface TextureInfo {
@@ -34,29 +37,28 @@ export interface TextureInfo {
   source: string;
 }
 
-const mostSide = 1 << 20;
 
 function readGrid(at: JsonAt) {
   const integer = (name: string, least: number, most: number): number => at.at(name).integer(least, most);
   const grid = {
-    widthPx: integer('widthPx', 1, mostSide),
-    heightPx: integer('heightPx', 1, mostSide),
+    widthPx: integer('widthPx', 1, maxSide),
+    heightPx: integer('heightPx', 1, maxSide),
     channels: integer('channels', 1, 3),
-    fragmentWidthPx: integer('fragmentWidthPx', 1, mostSide),
-    fragmentHeightPx: integer('fragmentHeightPx', 1, mostSide),
-    columns: integer('columns', 1, 65535),
+    fragmentWidthPx: integer('fragmentWidthPx', 1, maxSide),
+    fragmentHeightPx: integer('fragmentHeightPx', 1, maxSide),
+    columns: integer('columns', 1, maxFragments),
     rows: 0,
     gridReason: '',
   };
   if (grid.channels === 2) at.at('channels').fail('1 or 3');
   if (grid.fragmentWidthPx % 16 || grid.fragmentHeightPx % 16)
     at.fail('sides of fragments that are multiples of 16', '', 'X04');
-  grid.rows = at.at('rows').by('X05').integer(1, Math.floor(65535 / grid.columns));
+  grid.rows = at.at('rows').by('X05').integer(1, Math.floor(maxFragments / grid.columns));
   const tiles = (count: number, side: number, whole: number): boolean =>
     count * side >= whole && (count - 1) * side < whole;
   if (!tiles(grid.columns, grid.fragmentWidthPx, grid.widthPx) || !tiles(grid.rows, grid.fragmentHeightPx, grid.heightPx))
     at.fail('columns and rows that cover the plane', '', 'X05');
-  grid.gridReason = at.at('gridReason').text(1000);
+  grid.gridReason = at.at('gridReason').text(maxTextBytes);
   return grid;
 }
 
@@ -80,9 +82,9 @@ function readTexture(at: JsonAt): TextureInfo {
   const codec = at.at('codec').text(100);
   if (!isCodec(codec)) return at.fail('a known codec', codec, 'X03');
   if (codec === 'jpeg-xy' && (colourSpace !== 'linear' || at.at('channels').integer(1, 3) !== 3)) at.fail('jpeg-xy for three linear channels alone', codec, 'F24');
-  const mip = at.has('mip') ? at.at('mip').integer(1, 20) : 0;
+  const mip = at.has('mip') ? at.at('mip').integer(1, maxMip) : 0;
   const rungQuality: number[] = [];
-  for (let i = 0, n = at.at('rungQuality').array(1, 100); i < n; ++i) {
+  for (let i = 0, n = at.at('rungQuality').array(1, maxPackageRungs); i < n; ++i) {
     const quality = at.at('rungQuality').at(i).integer(1, 100);
     if (i > 0 && quality <= rungQuality[i - 1]) at.at('rungQuality').fail('rising numbers');
     rungQuality.push(quality);
@@ -90,15 +92,15 @@ function readTexture(at: JsonAt): TextureInfo {
   return {
     image: at.at('image').integer(0, 0xffffffff),
     mip,
-    base: mip > 0 ? at.at('base').integer(0, 10000) : 0,
+    base: mip > 0 ? at.at('base').integer(0, maxPackagePlanes) : 0,
     role: at.at('role').text(100),
-    name: at.at('name').text(1000),
+    name: at.at('name').text(maxTextBytes),
     colourSpace: colourSpace as 'srgb' | 'linear',
     codec,
     ...readGrid(at),
     ...readSource(at, codec, mip),
-    previewWidthPx: at.at('previewWidthPx').integer(1, mostSide),
-    previewHeightPx: at.at('previewHeightPx').integer(1, mostSide),
+    previewWidthPx: at.at('previewWidthPx').integer(1, maxSide),
+    previewHeightPx: at.at('previewHeightPx').integer(1, maxSide),
     rungQuality,
   };
 }
@@ -126,9 +128,9 @@ function checkMips(list: JsonAt, textures: TextureInfo[]): void {
 
 /** Reads textures.json, strictly; FormatError names the place in the document. */
 export function readTextures(json: Uint8Array): TextureInfo[] {
-  const list = parseJson(json, paths.texturesPath, 32 << 20).at('textures');
+  const list = parseJson(json, paths.texturesPath, maxTexturesBytes).at('textures');
   const textures: TextureInfo[] = [];
-  for (let i = 0, n = list.array(0, 10000); i < n; ++i) textures.push(readTexture(list.at(i)));
+  for (let i = 0, n = list.array(0, maxPackagePlanes); i < n; ++i) textures.push(readTexture(list.at(i)));
   checkMips(list, textures);
   return textures;
 }

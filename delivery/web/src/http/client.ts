@@ -1,8 +1,7 @@
-import { concat } from '../format/bytes';
+import { concat } from '../format/sha256';
 import { abortError, throwIfAborted } from '../format/errors';
-import { nowS, sleepS } from './clock';
-import { HttpOptions, defaultHttpOptions } from './options';
-import { Answer, GetOptions, RequestRecord, contentRange } from './requests';
+import { Answer, GetOptions, RequestRecord, contentRange, nowS, sleepS } from './requests';
+import { HttpOptions, defaultHttpOptions } from './store';
 
 /** Number of answers that latency is the median of. */
 const latencySamples = 7;

@@ -1,19 +1,60 @@
 import type { About } from '../format/about';
-import { decodeHere, type Documents } from '../format/document_decoder';
+import { type DocumentDecoder, type Documents, decodeHere } from '../format/document_decoder';
 import type { PlaneDocument } from '../format/documents';
 import { planeOfPath } from '../format/entry_paths';
-import { FormatError, InputError, isAbort } from '../format/errors';
+import { FormatError, InputError, abortError, isAbort, throwIfAborted } from '../format/errors';
 import type { FragmentFiles } from '../format/fragment_files';
 import type { ByteRange, EntryRef, Manifest, PagedRef, StreamRef } from '../format/manifest';
-import type { PackageData } from '../format/package_data';
 import { type QualityTable, requireGroups } from '../format/quality_table';
 import { requireDigest } from '../format/sha256';
-import type { PlaneTables } from '../format/tables';
+import type { PackageData, PlaneTables } from '../format/tables';
 import type { TextureInfo } from '../format/textures';
 import type { HttpClient } from './client';
-import { type Decoded, decodeWith } from './decoding';
 import type { RequestKind } from './requests';
 import type { PackageForm, PackageStore, Place, ReadOptions } from './store';
+
+/** Result of a function of format/documents. */
+export type Decoded<K extends keyof Documents> = Awaited<ReturnType<Documents[K]>>;
+
+/** Rejects after so many seconds, or when a signal says so; `clear` ends the waiting. */
+function lateness(mostS: number, signal?: AbortSignal): { late: Promise<never>; clear(): void } {
+  let clear = (): void => undefined;
+  const late = new Promise<never>((_, fail) => {
+    const cancel = (): void => fail(abortError());
+    const timer = setTimeout(cancel, 1000 * mostS);
+    signal?.addEventListener('abort', cancel);
+    clear = () => {
+      clearTimeout(timer);
+      signal?.removeEventListener('abort', cancel);
+    };
+  });
+  return { late, clear: () => clear() };
+}
+
+/**
+ * A document as `decoder` decodes it; decoded on this thread where the decoder fails or does not answer in time: because there are no
+ * workers, or because the workers belong to a load that has ended.
+ */
+export async function decodeWith<K extends keyof Documents>(
+  decoder: DocumentDecoder,
+  mostS: number,
+  signal: AbortSignal | undefined,
+  name: K,
+  ...args: Parameters<Documents[K]>
+): Promise<Decoded<K>> {
+  throwIfAborted(signal);
+  const { late, clear } = lateness(mostS, signal);
+  try {
+    const result = await Promise.race([decoder(name, ...args), late]);
+    throwIfAborted(signal);
+    return result;
+  } catch (error) {
+    if (error instanceof FormatError || signal?.aborted) throw error;
+    return decodeHere(name, ...args);
+  } finally {
+    clear();
+  }
+}
 
 /** Places of the fragments of a plane. */
 export interface PlaneFiles extends PlaneDocument {

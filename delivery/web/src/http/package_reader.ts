@@ -1,21 +1,47 @@
-import { codecTraits } from '../format/codec';
+import { codecTraits, joinFragment } from '../format/codec';
 import { type DocumentDecoder, decodeHere } from '../format/document_decoder';
 import { fragmentFilePath } from '../format/entry_paths';
-import { FormatError, InputError } from '../format/errors';
+import { FormatError, InputError, isAbort } from '../format/errors';
 import type { FragmentFiles } from '../format/fragment_files';
-import { joinFragment } from '../format/join_fragment';
 import { previewPath, rungPath } from '../format/layout';
 import { type ByteRange, hasGlb } from '../format/manifest';
 import { requireDigest } from '../format/sha256';
 import { fragmentCount, rungCount } from '../format/tables';
 import { HttpClient } from './client';
-import { nowS } from './clock';
-import { decodeWith } from './decoding';
-import { openStore } from './open_store';
-import type { HttpOptions } from './options';
-import { PackageDocuments, type PlaneFiles } from './package_documents';
-import type { RequestKind, RequestRecord } from './requests';
-import type { ReadOptions, StoreMode } from './store';
+import { type RequestKind, type RequestRecord, nowS } from './requests';
+import { PackageDocuments, type PlaneFiles, decodeWith } from './package_documents';
+import type { HttpOptions, OpenedStore, ReadOptions, StoreMode } from './store';
+import { RangeStore } from './range_store';
+
+/**
+ * Finds out how the server can be read (SPEC.md, section 19): ranges of the container; the tree beside the container where the server
+ * answers 200 to a range; the whole container where there is no tree. Where a server stops answering ranges, the tree, too.
+ */
+export async function openStore(
+  url: string,
+  mirrors: readonly string[],
+  mode: StoreMode,
+  client: HttpClient,
+  signal?: AbortSignal,
+): Promise<OpenedStore> {
+  const urls = [url, ...mirrors.filter((m) => m !== url)];
+  const files = () => import('./without_ranges');
+  if (mode === 'files' || /^[^?#]*\/([?#]|$)/.test(url)) return (await files()).openTree(urls, client, signal);
+  const openTree = async (manifest: Uint8Array, aborted?: AbortSignal) => (await files()).openSameTree(urls, client, manifest, aborted);
+  const store = new RangeStore(urls, client, mode === 'range' ? undefined : openTree);
+  try {
+    return { store, manifest: await store.manifest(signal) };
+  } catch (error) {
+    const { noRanges } = store;
+    // Whole files are better than nothing, whatever other mirrors answered.
+    if (!noRanges || isAbort(error)) throw error;
+    if (mode === 'range') throw noRanges;
+    const { openWithoutRanges } = await files().catch(() => {
+      throw noRanges;
+    });
+    return openWithoutRanges(urls, client, signal);
+  }
+}
 
 /** Options of a package's opening. */
 export interface OpenOptions extends Partial<HttpOptions> {

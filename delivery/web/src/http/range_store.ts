@@ -1,11 +1,10 @@
-import { concat } from '../format/bytes';
+import { concat } from '../format/sha256';
 import { FormatError, InputError } from '../format/errors';
 import { bootstrapBytes } from '../format/layout';
 import { type ByteRange, manifestOfContainer } from '../format/manifest';
 import type { HttpClient } from './client';
-import { Asking, Mirror, Mirrors } from './mirrors';
+import { Asking, Mirror, Mirrors, retriesOf } from './mirrors';
 import { Answer, isSameFile, shownUrl, whatCame } from './requests';
-import { retriesOf } from './retries';
 import type { PackageForm, PackageStore, Place, ReadOptions } from './store';
 
 /** Whether the page's own origin answers at a URL: other origins may keep headers to themselves (CORS). */

@@ -1,3 +1,5 @@
+import { leastSeconds, windowSamples } from '../format/shared_numbers';
+
 /** Throughput of a connection, or of several, from transfers that have ended: delivery/cpp/decide/throughput.h. */
 export interface TransferRate {
   /**
@@ -6,13 +8,12 @@ export interface TransferRate {
    * between what the link has given with nothing of the others and with all of the others.
    */
   add(bytes: number, seconds: number, others?: number, othersBytes?: number): void;
-  /** Bytes over seconds of at most so many samples (default 10). */
+  /** Bytes over seconds of at most so many samples (default windowSamples). */
   recentBytesS(samples?: number): number;
   /** The mean of the last `seconds` > 0 of transfers; time before the first transfer counts with beta_0. */
   meanBytesS(seconds: number): number;
 }
 
-const leastSeconds = 1e-9;
 const none = { allBytes: 0, allSeconds: 0 };
 
 /** `initialBytesS` is beta_0, until there is a sample; > 0. */
@@ -29,7 +30,7 @@ export function transferRate(initialBytesS: number): TransferRate {
       starting &&= ended.length <= others;
       startBytesS = Math.min(Math.max(initialBytesS, all.allBytes / all.allSeconds), (all.allBytes + othersBytes) / all.allSeconds);
     },
-    recentBytesS(samples = 10) {
+    recentBytesS(samples = windowSamples) {
       if (starting) return startBytesS;
       let [bytes, seconds] = [0, 0];
       for (const sample of ended.slice(-samples).reverse()) {
@@ -49,66 +50,4 @@ export function transferRate(initialBytesS: number): TransferRate {
       return (allBytes - cut.allBytes + part * (cut.allBytes - before.allBytes)) / seconds;
     },
   };
-}
-
-/**
- * How the throughput of the next transfer is guessed from those that have ended: the last one's; bytes over seconds of
- * the last `samples` (harmonic); an exponentially weighted mean.
- */
-export type Estimator = 'last' | 'harmonic' | 'ewma';
-
-/** Options of a Throughput. */
-export interface ThroughputOptions {
-  estimator: Estimator;
-  /** 1 .. 64 */
-  samples: number;
-  /** 0 .. 1 */
-  ewma: number;
-  /** Transfers below weigh less in the mean, > 0. */
-  smallBytes: number;
-  /** beta_0, until there is a sample; > 0. */
-  initialBytesS: number;
-}
-/** The options of delivery/cpp. */
-export const defaultThroughput: ThroughputOptions = {
-  estimator: 'harmonic',
-  samples: 10,
-  ewma: 0.2,
-  smallBytes: 4000,
-  initialBytesS: 1e5,
-};
-
-const mostSamples = 64;
-
-/** A TransferRate with every estimator. */
-export class Throughput implements TransferRate {
-  private readonly rate_: TransferRate;
-  private mean_: number;
-  private ended_ = 0;
-  private starting_ = true;
-
-  constructor(private readonly options_: ThroughputOptions = defaultThroughput) {
-    this.rate_ = transferRate(options_.initialBytesS);
-    this.mean_ = options_.initialBytesS;
-  }
-
-  add(bytes: number, seconds: number, others = 0, othersBytes = 0): void {
-    this.rate_.add(bytes, seconds, others, othersBytes);
-    this.starting_ &&= ++this.ended_ <= others;
-    const weight = this.options_.ewma * Math.min(1, bytes / this.options_.smallBytes);
-    this.mean_ += weight * (bytes / Math.max(seconds, leastSeconds) - this.mean_);
-  }
-
-  /** Bytes per second by the estimator chosen. */
-  bytesS(): number {
-    const { estimator, samples } = this.options_;
-    if (estimator === 'ewma' && !this.starting_) return this.mean_;
-    return this.recentBytesS(estimator === 'last' ? 1 : Math.max(samples, 1));
-  }
-  recentBytesS(samples = defaultThroughput.samples): number {
-    return this.rate_.recentBytesS(Math.min(samples, mostSamples));
-  }
-  meanBytesS(seconds: number): number {
-    return this.rate_.meanBytesS(seconds);
-  }
 }

@@ -46,7 +46,7 @@ export interface PageModelOptions {
   /** Options of the package's opening: mirrors, mode and so on. */
   open?: OpenHow;
   /** Options of the load that the page does not see to itself. */
-  load?: Pick<LoadOptions, 'policy' | 'order' | 'rule' | 'meshes' | 'refineTo' | 'fullSize' | 'decode'>;
+  load?: Pick<LoadOptions, 'policy' | 'rule' | 'meshes' | 'refineTo' | 'fullSize' | 'decode'>;
   /** Changes the scene of the model once its first picture is there, e.g. its light. */
   dress?: (scene: Scene, load: LoadedModel) => void;
 }

@@ -1,6 +1,6 @@
 import type { Camera, Material, Object3D, Texture, WebGLRenderer } from 'three';
 import type { BlockFormat } from '../blocks/formats';
-import type { HtcOrder, Policy } from '../decide/plan_types';
+import type { Policy } from '../decide/harmonic_time';
 import type { StepRule, VisiblePart } from '../decide/viewing';
 import type { RequestRecord } from '../http/requests';
 import type { DecodeHere } from '../worker/pool';
@@ -63,12 +63,10 @@ export interface LoadOptions {
    */
   time?: number;
   /**
-   * Policy that spends the time; htca is another name of htc. thesis is chapters 4 and 7 as printed: rule jnd, order beta0, one request at
-   * a time, textures at full size. Default guard.
+   * Policy that spends the time. guard: what shows most of what the camera sees comes first. thesis: chapters 4
+   * and 7 as printed, with the rule jnd, one request at a time and textures at full size. Default guard.
    */
-  policy?: Policy | 'htca';
-  /** Which fragment of the plan is fetched next. Default finest with guard: what shows most of what the camera sees; else credit. */
-  order?: HtcOrder;
+  policy?: Policy;
   /** First guess of the throughput, bytes per second; left out: the throughput of the first transfers. */
   beta0BytesS?: number;
   /** The rule that says which scale is enough. Default flip: by lit pictures, which the package's build has compared. */

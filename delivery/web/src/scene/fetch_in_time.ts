@@ -1,14 +1,70 @@
 import type { FragmentList } from '../decide/fragment_list';
-import { type HtcStep, type Policy, type TimePlanOptions, defaultOrder } from '../decide/plan_types';
+import { HarmonicTimePlan, type HtcStep, type TimePlanOptions } from '../decide/harmonic_time';
 import { type GroupedList, groupBytes, groupedList } from '../decide/request_groups';
-import type * as Printed from '../decide/thesis/thesis_list';
-import { UncheckedPlan } from '../decide/unchecked_plan';
-import { transferRate } from '../http/throughput';
-import type { FragmentFetch } from './fragment_fetch';
-import { upgradeWishes } from './fragment_wishes';
+import type * as Printed from '../decide/thesis_list';
+import { throwIfAborted } from '../format/errors';
+import { nowS } from '../http/requests';
+import { type FragmentFetch, upgradeWishes } from './fragment_fetch';
 import type { LoadContext } from './load_context';
-import { playPlan } from './play_plan';
-import type { Wish } from './transfers';
+import type { Transfers, Wish } from './transfers';
+
+/** Those who hear of the plan's course. */
+export interface PlayedPlanHooks {
+  /** A decision was taken, or its transfer has ended. */
+  decided(step: HtcStep): void;
+  lost(wish: Wish, error: unknown): void;
+}
+
+/**
+ * Plays a plan over the network: fetches the fragments that the plan asks for, and reports to the plan which have come. Ends when every
+ * fragment has come or was given up; after `mostS` seconds the rest is given up.
+ */
+export async function playPlan(
+  plan: HarmonicTimePlan,
+  { groups }: GroupedList,
+  transfers: Transfers,
+  signal: AbortSignal,
+  mostS: number,
+  hooks: PlayedPlanHooks,
+): Promise<void> {
+  const startS = nowS();
+  const underWay = new Map<number, { step: HtcStep; left: number }>(); // by offer: fragments of it that have not ended
+  const abort = new AbortController();
+  const stop = (): void => abort.abort();
+  signal.addEventListener('abort', stop);
+  const timer = setTimeout(stop, mostS * 1000);
+  let reported = 0;
+  const askForMore = (end: () => void): void => {
+    const wishes: Wish[] = [];
+    for (let step; !signal.aborted && (step = plan.next(nowS() - startS)); ) {
+      const { offer, rung } = step;
+      underWay.set(offer, { step, left: groups[offer].length });
+      for (const f of groups[offer]) wishes.push({ ...f, rung, offer });
+    }
+    while (reported < plan.steps.length) hooks.decided(plan.steps[reported++]);
+    const ended = ({ offer }: Wish, well: boolean): void => {
+      const group = underWay.get(offer)!;
+      if (--group.left > 0) return;
+      underWay.delete(offer);
+      plan.ended(group.step, nowS() - startS, well);
+      hooks.decided(group.step);
+      queueMicrotask(() => askForMore(end));
+    };
+    const lost = (wish: Wish, error: unknown): void => {
+      hooks.lost(wish, error);
+      ended(wish, false);
+    };
+    if (wishes.length > 0) void transfers.fetch(wishes, { gapBytes: 0, mostBytes: Infinity, signal: abort.signal }, (wish) => ended(wish, true), lost);
+    if (plan.finished() || (signal.aborted && underWay.size === 0)) end();
+  };
+  try {
+    await new Promise<void>(askForMore);
+    throwIfAborted(signal);
+  } finally {
+    clearTimeout(timer);
+    signal.removeEventListener('abort', stop);
+  }
+}
 
 /** Decoding and uploading take so long after the last byte: 4 ms, or 11 on a machine without a GPU, were measured. */
 export const composeS = 0.015;
@@ -24,7 +80,7 @@ const mostBusyS = 0.25;
 
 /** Fetches fragments by Harmonic Time Compensation: group by group, so that the last one comes at the limit. */
 export class FetchInTime {
-  private plan_?: UncheckedPlan;
+  private plan_?: HarmonicTimePlan;
 
   /** Policy thesis. */
   printed?: typeof Printed;
@@ -48,10 +104,9 @@ export class FetchInTime {
 
   /** Options of the plan for fragments in so many seconds. */
   planOptions(timeLimitS: number): TimePlanOptions {
-    const { options, reader: { client: { latencyS: rttS } }, beta0 } = this.load_;
-    const policy = options.policy as Policy, order = options.order ?? defaultOrder(policy);
-    const initialBytesS = Math.max(1, beta0);
-    return { policy, order, timeLimitS, rttS, initialBytesS, ...this.printed?.printedPlan(transferRate(initialBytesS), rttS) };
+    const { reader: { client: { latencyS: rttS } }, beta0 } = this.load_;
+    const options = { timeLimitS, rttS, initialBytesS: Math.max(1, beta0) };
+    return this.printed?.printedPlan(options) ?? { policy: 'guard', order: 'finest', ...options };
   }
 
   async run(fragments: FragmentList, timeLimitS: number): Promise<void> {
@@ -59,7 +114,7 @@ export class FetchInTime {
     const whole = fetching.wholeRungs();
     const bytesEach = whole ? Infinity : this.printed ? 0 : groupBytes(load.beta0, load.reader.client.latencyS, timeLimitS);
     const list = groupedList(fragments, bytesEach, load.beta0 * timeLimitS);
-    const plan = (this.plan_ = new UncheckedPlan(list.offers, { ...this.planOptions(timeLimitS), tripS: () => this.tripS_() }));
+    const plan = (this.plan_ = new HarmonicTimePlan(list.offers, { ...this.planOptions(timeLimitS), tripS: () => this.tripS_() }));
     const hooks = {
       decided: (step: HtcStep): void => this.decided_(step, list),
       lost: (wish: Wish, error: unknown): void => fetching.lost(wish, error),

@@ -1,16 +1,92 @@
 import type { Material, Object3D } from 'three';
+import { servingProxy } from '../decide/proxy_choice';
 import { isAbort, throwIfAborted } from '../format/errors';
 import { type Manifest, firstPicture } from '../format/manifest';
 import type { PackageReader } from '../http/package_reader';
 import type { WorkerPool } from '../worker/pool';
 import type { LoadOptions, LoadState, LoadedModel } from './api';
+import { gpuBytes } from './gpu';
 import { LoadContext } from './load_context';
-import { gpuBytes } from './memory/gpu_bytes';
-import { ProxyChoice } from './proxy/proxy_choice';
 import { disposeGeometries, texturesOf } from './scale_parts';
 import { ScaleSource } from './scale_source';
+import type { ShownProxy } from './shown_proxy';
 import { ShownScale } from './shown_scale';
 import type { TextureLoad } from './texture_load';
+
+/** What is fetched on the way to scales. */
+interface Way {
+  /** The larger proxy that is shown meanwhile; -1: none. */
+  step: number;
+  bytes?: Promise<Uint8Array>;
+  /** What scales need is there. */
+  rest: Promise<unknown>;
+}
+
+/** Which proxy a load shows: the smallest first, one that is enough, or a larger one on the way to scales. */
+export class ProxyOnTheWay {
+  private part_?: Promise<typeof import('./texture_load') | undefined>;
+  private way_?: Promise<Way>;
+
+  /** `fetchRest` fetches what scales need. */
+  constructor(
+    private readonly load_: LoadContext,
+    private readonly proxy_: ShownProxy,
+    private readonly fetchRest_: () => Promise<unknown>,
+  ) {}
+
+  /**
+   * Shows the smallest one. What decides about larger ones is loaded meanwhile; and where nobody gives turns, the link goes on with what
+   * comes next while the proxy is decoded.
+   */
+  async showFirst(): Promise<void> {
+    const { load_: { reader: { manifest }, view: { display }, options: { turn } }, proxy_: proxy } = this;
+    const bytes = proxy.fetch(0);
+    const next = (): void => {
+      if (servingProxy(manifest, display.heightPx) >= 0) return;
+      this.part_ = import('./texture_load').catch(() => undefined); // said later
+      if (!turn) this.way_ = this.goOn_();
+    };
+    await Promise.all([proxy.show(0, bytes), bytes.then(next, () => undefined)]);
+  }
+  /** Nothing is chosen by hand. */
+  private get free_(): boolean {
+    const { override: { scale, rung }, options: { rule = 'flip', fullSize } } = this.load_;
+    return scale === undefined && rung === undefined && !fullSize && rule === 'flip';
+  }
+  /** The smallest proxy that cannot be told from S_0 in this view; -1: none, or scales and textures are chosen by hand. */
+  serving(): number {
+    const { view, reader } = this.load_;
+    return this.free_ && this.proxy_.shown >= 0 ? servingProxy(reader.manifest, view.display.heightPx) : -1;
+  }
+  /** Shows a proxy that is enough. False where scales are needed. */
+  async showServing(): Promise<boolean> {
+    const serving = this.serving();
+    try {
+      if (serving > this.proxy_.shown) await this.proxy_.show(serving);
+      return serving >= 0;
+    } catch (error) {
+      this.load_.fail(error, 'proxy');
+      return false;
+    }
+  }
+  /** Fetches what scales need; before that a larger proxy, where one pays on the way to scales. */
+  private async goOn_(): Promise<Way> {
+    const { load_: load, proxy_: proxy } = this;
+    const part = this.free_ && load.options.policy !== 'thesis' ? await this.part_ : undefined;
+    const step = part ? part.stepOf(load) : -1;
+    const bytes = step > Math.max(proxy.shown, 0) ? proxy.fetch(step) : undefined;
+    const rest = (bytes ?? Promise.resolve()).then(this.fetchRest_, this.fetchRest_);
+    rest.catch(() => undefined); // whoever waits hears of it
+    return { step, bytes, rest };
+  }
+  /** Shows the larger proxy that pays, if any; resolves when what scales need is there, too. */
+  async showStep(): Promise<void> {
+    const { load_: load, proxy_: proxy } = this;
+    const { step, bytes, rest } = await (this.way_ ?? this.goOn_());
+    const shown = bytes && proxy.show(step, bytes).catch((error: unknown) => load.fail(error, 'proxy')); // the smaller one stays
+    await Promise.all([shown, rest]);
+  }
+}
 
 /** Loads one package into one scene, from `startS` on; `forget` is called when the load is disposed of. */
 export function loadModel(
@@ -66,7 +142,7 @@ class ModelLoad {
   textures?: TextureLoad;
   private readonly source_: ScaleSource;
   private readonly scale_: ShownScale;
-  private readonly proxies_: ProxyChoice;
+  private readonly proxies_: ProxyOnTheWay;
   private shape_?: Promise<Object3D>; // the coarsest scale's
   private coming_?: Promise<TextureLoad>;
   private refining_?: Promise<void>;
@@ -89,7 +165,7 @@ class ModelLoad {
       problem: (error, what) => context.fail(error, what),
     });
     this.scale_ = new ShownScale(context, scene, this.source_);
-    this.proxies_ = new ProxyChoice(context, this.scale_.proxy, () => this.source_.fetchDocuments(true));
+    this.proxies_ = new ProxyOnTheWay(context, this.scale_.proxy, () => this.source_.fetchDocuments(true));
     this.firstPicture = this.showFirst_();
     this.done = this.firstPicture.then(() => this.showInTime_()).catch((error: unknown) => this.end_(error));
     this.done.catch(() => undefined);

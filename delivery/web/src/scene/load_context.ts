@@ -1,12 +1,12 @@
 import { type Camera, Group, Vector2 } from 'three';
 import { InputError, abortError, isAbort, throwIfAborted } from '../format/errors';
-import { nowS } from '../http/clock';
+import { nowS } from '../http/requests';
 import type { PackageReader } from '../http/package_reader';
 import type { WorkerPool } from '../worker/pool';
 import type { Display, LoadEvents, LoadOptions, LoadPhase } from './api';
 import { displayOf } from './camera';
 import { Emitter } from './events';
-import { GpuRoom } from './memory/gpu_room';
+import { GpuRoom } from './gpu';
 import { MaterialSet } from './scale_parts';
 
 /** The displayed height must change by this factor before another scale or plane is wanted. */

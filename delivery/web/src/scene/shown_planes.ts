@@ -1,12 +1,12 @@
 import type { BlockRequest } from '../blocks/formats';
-import { type BytesOf, planesWithin, rgbaBytes, wayWithin } from '../decide/memory/gpu_memory';
-import { scaleBytes } from '../decide/memory/gpu_size';
+import { type BytesOf, planesWithin, rgbaBytes, wayWithin } from '../decide/gpu_memory';
+import { scaleBytes } from '../decide/gpu_size';
 import { TextureLoss, fullSize, planesForDisplay, type PlaneChoice } from '../decide/texture_loss';
 import { InputError, throwIfAborted } from '../format/errors';
 import { mostPreviewPx } from '../format/layout';
-import type { PackageData } from '../format/package_data';
+import type { PackageData } from '../format/tables';
 import { type TextureInfo } from '../format/textures';
-import { nowS } from '../http/clock';
+import { nowS } from '../http/requests';
 import type { Levels } from '../worker/protocol';
 import type { Compression } from './blocks/compression';
 import type { PlaneComposer } from './composer';

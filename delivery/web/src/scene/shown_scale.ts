@@ -4,7 +4,7 @@ import { throwIfAborted } from '../format/errors';
 import { readyToDraw } from './gpu';
 import { type LoadContext, hysteresis } from './load_context';
 import type { ScaleSource } from './scale_source';
-import { ShownProxy } from './proxy/shown_proxy';
+import { ShownProxy } from './shown_proxy';
 
 /** A scale that could not be had is asked for again after so long, and twice as long each time. */
 const retryScaleS = { first: 2, most: 60 };

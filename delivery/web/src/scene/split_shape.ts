@@ -1,6 +1,6 @@
 import { BufferAttribute, BufferGeometry, Material, Mesh } from 'three';
 import { sumOf } from '../decide/numbers';
-import { concat } from '../format/bytes';
+import { concat } from '../format/sha256';
 import { FormatError } from '../format/errors';
 import type { PackageReader } from '../http/package_reader';
 import type { WorkerPool } from '../worker/pool';

@@ -1,21 +1,54 @@
 import { type FragmentList, type ListOptions, lossesOf } from '../decide/fragment_list';
+import { scaleWithin } from '../decide/gpu_memory';
+import { proxyBytes } from '../decide/gpu_size';
 import { clamp } from '../decide/numbers';
-import { scaleWithin } from '../decide/memory/gpu_memory';
-import { proxyLoss } from '../decide/proxy_choice';
+import { proxyBytesBeyondStart, proxyLoss } from '../decide/proxy_choice';
+import { proxyStep } from '../decide/proxy_steps';
+import { throughputOf } from '../decide/request_groups';
 import { choiceInTime } from '../decide/scale_choice';
 import { type PlaneChoice, pictureFlip } from '../decide/texture_loss';
 import { type VisiblePart, selectScale } from '../decide/viewing';
 import { throwIfAborted } from '../format/errors';
-import { nextTurn, nowS, sleepS } from '../http/clock';
+import { worthwhileFlip } from '../format/shared_numbers';
+import { nextTurn, nowS, sleepS } from '../http/requests';
 import type { PlaneComposer } from './composer';
 import { FetchInTime, composeS } from './fetch_in_time';
-import { FragmentFetch, requestBytes } from './fragment_fetch';
-import { allWishes, bestWishes } from './fragment_wishes';
+import { FragmentFetch, allWishes, bestWishes, requestBytes } from './fragment_fetch';
 import type { LoadContext } from './load_context';
-import { betterThanScales, throughputBytesS } from './proxy/larger_proxies';
 import type { ScaleSource } from './scale_source';
 import { ShownPlanes, readPlaneData } from './shown_planes';
 import type { ShownScale } from './shown_scale';
+
+// Which larger proxy a load shows besides the smallest one.
+
+/** Proxies on the way to scales are chosen as if the limit were no longer. */
+const longestStepS = 60;
+
+/** Throughput that whoever gave the load its turn expects, that options say, or that transfers have shown. */
+export function throughputBytesS({ expectedBytesS, options: { beta0BytesS }, reader: { requests, client } }: LoadContext): number {
+  return expectedBytesS || beta0BytesS || throughputOf(requests, client.latencyS);
+}
+
+const fits = ({ memoryBytes, reader: { manifest } }: LoadContext, proxy: number): boolean => proxyBytes(manifest.proxies[proxy]) <= memoryBytes;
+
+/** The larger proxy that pays on the way to scales; -1: none does. */
+export function stepOf(load: LoadContext): number {
+  const { reader: { manifest, client }, view: { display: { heightPx, part } }, memoryBytes } = load;
+  const wanted = scaleWithin(manifest.scales, selectScale(manifest, heightPx, part), memoryBytes);
+  const leftS = Math.min(load.limitS, longestStepS) - load.elapsedS();
+  const step = proxyStep(manifest, wanted, heightPx, { bytesS: throughputBytesS(load), rttS: client.latencyS, leftS });
+  return step >= 0 && fits(load, step) ? step : -1;
+}
+
+/** The largest proxy behind `shown` that comes in the time left and looks better than scales do at its end; -1: none does. */
+function betterThanScales(load: LoadContext, shown: number, flip: number, leftS: number): number {
+  const { reader: { manifest, client }, view: { display: { heightPx } }, beta0 } = load;
+  const better = (k: number): boolean =>
+    fits(load, k) && client.latencyS + proxyBytesBeyondStart(manifest, k) / beta0 < leftS && proxyLoss(manifest, k, heightPx).flip < flip - worthwhileFlip;
+  let k = manifest.proxies.length - 1;
+  while (k > shown && !better(k)) --k;
+  return k > shown ? k : -1;
+}
 
 /** Bytes of all requests that are made at once while refining. */
 const refineBytes = 4 * requestBytes;
@@ -34,8 +67,6 @@ const showShare = 0.6;
 const defaultRefineTo = 0.003;
 /** Refining ends where so many rounds have brought nothing. */
 const mostFruitlessRounds = 3;
-
-export { stepOf } from './proxy/larger_proxies';
 
 /** Reads the documents that decisions about textures are made from. */
 export async function openTextureLoad(load: LoadContext, scale: ShownScale, source: ScaleSource): Promise<TextureLoad> {
@@ -92,7 +123,7 @@ export class TextureLoad {
     const { load_: load, planes_: planes, fetching_: fetching } = this;
     const { reader, options, signal } = load;
     load.beta0 = throughputBytesS(load);
-    if (options.policy === 'thesis') this.inTime_.printed = await import('../decide/thesis/thesis_list');
+    if (options.policy === 'thesis') this.inTime_.printed = await import('../decide/thesis_list');
     const { scale, planes: chosen, flip } = await this.choice_();
     if (flip !== undefined) await this.showBetterProxy_(flip);
     if (scale !== this.scale_.shown) load.enter('mesh');

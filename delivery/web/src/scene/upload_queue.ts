@@ -1,5 +1,5 @@
 import type { WebGLRenderer } from 'three';
-import { sleepS } from '../http/clock';
+import { sleepS } from '../http/requests';
 import { gpuIdle } from './gpu';
 
 /** Milliseconds and pixels of uploads between two turns of the page. */

@@ -1,10 +1,136 @@
+import type { BlockLevel, BlockRequest, Pixels } from '../blocks/formats';
+import { samePrefix, sha256 } from '../format/sha256';
+import { codecTraits, joinFragment } from '../format/codec';
 import * as documents from '../format/documents';
 import { FormatError, TexmeshError } from '../format/errors';
-import { SplitStreamReader } from '../format/splits/split_stream';
-import { decodePicture, enlargePicture } from './pictures';
-import type { BlockLevel, BlockRequest, Pixels } from '../blocks/formats';
-import type { WorkerAnswer, WorkerRequest } from './protocol';
-import { splitInfo, splitUpdate } from './split_update';
+import { imageSize } from '../format/image_size';
+import { type SplitGrid, type SplitStreamHead, SplitStreamReader } from '../format/splits/split_stream';
+import { octahedralVector } from '../format/splits/split_values';
+import type {
+  DecodeRequest, EnlargeRequest, SplitInfo, SplitUpdate, WorkerAnswer, WorkerRequest,
+} from './protocol';
+
+const asItIs = { premultiplyAlpha: 'none', colorSpaceConversion: 'none', imageOrientation: 'none' } as ImageBitmapOptions;
+
+/** A fragment (or preview) as a picture and its halves; digests and size are checked first. */
+async function decodePicture(request: DecodeRequest): Promise<ImageBitmap[]> {
+  for (const [i, digest] of request.digests.entries())
+    if (!samePrefix(await sha256(request.streams[i]), digest))
+      throw new FormatError('fragment', '', 'the digest of tables.bin', '', 'F03');
+  const file = request.complete
+    ? request.streams[0]
+    : joinFragment(request.codec, request.tables, request.streams);
+  const size = imageSize(file);
+  if (!(size[0] > 0 && size[1] > 0 && size[0] <= request.most[0] && size[1] <= request.most[1]))
+    throw new FormatError('fragment', '', `a picture of at most ${request.most.join(' x ')} px`, size.join(' x '), 'F08');
+  const blob = new Blob([file as BlobPart], { type: codecTraits(request.codec).mediaType });
+  const levels = [await createImageBitmap(blob, asItIs)];
+  while (levels.length < request.levels) {
+    const last = levels[levels.length - 1];
+    const [resizeWidth, resizeHeight] = [last.width >> 1, last.height >> 1];
+    if (resizeWidth < 1 || resizeHeight < 1) break;
+    levels.push(await createImageBitmap(last, { ...asItIs, resizeWidth, resizeHeight, resizeQuality: 'low' }));
+  }
+  return levels;
+}
+
+/** A piece of an enlarged picture. Every piece is drawn as a part of the whole, so that pieces meet without a seam. */
+function enlargePicture({ picture, width, height, x0, x1, y0, y1, levels }: EnlargeRequest): ImageBitmap[] {
+  const out: ImageBitmap[] = [];
+  for (let level = 0; level < levels; ++level) {
+    const [w, h, left, top] = [width >> level, height >> level, x0 >> level, y0 >> level];
+    const columns = (x1 >= width ? w : x1 >> level) - left;
+    const rows = (y1 >= height ? h : y1 >> level) - top;
+    if (columns < 1 || rows < 1) break;
+    const canvas = new OffscreenCanvas(columns, rows);
+    const context = canvas.getContext('2d', { alpha: false, willReadFrequently: true })!;
+    context.imageSmoothingQuality = 'low';
+    context.drawImage(picture, -left, -top, w, h);
+    out.push(canvas.transferToImageBitmap());
+  }
+  picture.close();
+  return out;
+}
+
+const f = Math.fround;
+const names = { uv0: 'uv', uv1: 'uv1', normal: 'normal', colour: 'color' } as const;
+
+/** The facts of a head that the main thread needs. */
+function splitInfo(head: SplitStreamHead): SplitInfo {
+  const scales = head.scales.map(({ scale, blocks, wedges }) => {
+    const last = head.blocks[blocks - 1];
+    return { scale, blocks, wedges, end: last.offset + last.bytes };
+  });
+  return { headBytes: head.bytes, scales };
+}
+
+function gridValues(
+  places: Int32Array,
+  stride: number,
+  grid: SplitGrid,
+  count: number,
+  placeOf: (i: number) => number,
+): Float32Array {
+  const step = f(grid.range / f(2 ** grid.bits - 1));
+  const out = new Float32Array(count * stride);
+  for (let i = 0; i < count; ++i) {
+    const from = placeOf(i) * stride;
+    for (let k = 0; k < stride; ++k) out[i * stride + k] = f(f(places[from + k] * step) + grid.origin[k]);
+  }
+  return out;
+}
+
+function normals(codes: Int32Array, from: number, to: number, bits: number): Float32Array {
+  const out = new Float32Array(3 * (to - from));
+  for (let w = from; w < to; ++w) {
+    const [x, y, z] = octahedralVector(codes[2 * w], codes[2 * w + 1], bits);
+    const length = Math.sqrt(x * x + y * y + z * z);
+    out.set(length > 0 ? [x / length, y / length, z / length] : [0, 0, 1], 3 * (w - from));
+  }
+  return out;
+}
+
+/** Wedges that were added since there were `from` wedges, and the index of all triangles, for append-only buffers. */
+function splitUpdate(reader: SplitStreamReader, from: number): SplitUpdate {
+  const { mesh, head } = reader;
+  const to = mesh.wedges;
+  const points = mesh.wedgePoint.data;
+  const positions = gridValues(mesh.places.data, 3, head.position, to - from, (i) => points[from + i]);
+  const attributes = [{ name: 'position', components: 3, values: positions }];
+  head.attributes.forEach(({ kind, grid }, k) => {
+    const data = mesh.values[k].data;
+    const most = 2 ** grid.bits - 1;
+    const values =
+      kind === 'normal' ? normals(data, from, to, grid.bits)
+      : kind === 'colour' ? Float32Array.from(data.subarray(4 * from, 4 * to), (v) => v / most)
+      : gridValues(data, 2, grid, to - from, (i) => from + i);
+    attributes.push({ name: names[kind], components: kind === 'normal' ? 3 : kind === 'colour' ? 4 : 2, values });
+  });
+  const groupTriangles = new Uint32Array(head.groups.length);
+  const visible = new Uint8Array(mesh.faceCount);
+  for (let face = 0; face < visible.length; ++face)
+    if (mesh.isVisible(face)) {
+      visible[face] = 1;
+      ++groupTriangles[mesh.faceGroup.data[face]];
+    }
+  let total = 0;
+  const next = groupTriangles.map((n) => (total += n) - n);
+  const index = new Uint32Array(3 * total);
+  for (let face = 0; face < visible.length; ++face)
+    if (visible[face])
+      index.set(mesh.faces.data.subarray(3 * face, 3 * face + 3), 3 * next[mesh.faceGroup.data[face]]++);
+  const draws: SplitUpdate['draws'] = [];
+  let start = 0;
+  for (const [g, { material }] of head.groups.entries()) {
+    const count = 3 * groupTriangles[g];
+    const last = draws[draws.length - 1];
+    // Neighbours of one material are drawn together.
+    if (last?.material === material) last.count += count;
+    else if (count > 0) draws.push({ material, start, count });
+    start += count;
+  }
+  return { from, to, blocks: reader.nextBlock, attributes, index, draws };
+}
 
 // The work of workers: documents, digests, images, vertex splits. `handle` works on the main thread, too, where no worker can be
 // had.

@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import { type DeliveryPlan, defaultDeliveryRequest, planDelivery } from '../../src/decide/delivery_plan';
-import type { PackageData } from '../../src/format/package_data';
+import type { PackageData } from '../../src/format/tables';
 import { setUp } from '../support/transferring';
 
 describe('the scale', () => {

@@ -1,5 +1,5 @@
 import { afterEach, expect, it, vi } from 'vitest';
-import { bytesAt, linkBytesS, savesData } from '../../src/element/link';
+import { bytesAt, linkBytesS, savesData } from '../../src/element/wording';
 
 afterEach(() => {
   vi.unstubAllGlobals();

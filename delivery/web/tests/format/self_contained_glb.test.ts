@@ -1,5 +1,5 @@
 import { describe, expect, it } from 'vitest';
-import { requireSelfContained } from '../../src/format/self_contained_glb';
+import { requireSelfContained } from '../../src/format/glb';
 import { hasGlb } from '../../src/format/manifest';
 import { FormatError, PackageReader } from '../../src/reader';
 import { container } from '../support/scan';

@@ -1,7 +1,6 @@
 import { describe, expect, it } from 'vitest';
-import { toHex } from '../../src/format/bytes';
+import { sha256, toHex } from '../../src/format/sha256';
 import { fragmentFilePath } from '../../src/format/entry_paths';
-import { sha256 } from '../../src/format/sha256';
 import { FormatError, InputError, PackageReader, TexmeshError } from '../../src/reader';
 import { fakeServer, FakeServer, Fault, treeFiles } from '../support/fake_server';
 import { golden, goldenNames } from '../support/files';

@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import { absolute, HttpClient } from '../../src/http/client';
-import { openStore } from '../../src/http/open_store';
+import { openStore } from '../../src/http/package_reader';
 import { FormatError, PackageReader, TexmeshError } from '../../src/reader';
 import { bytesAskedTwice, fakeServer, FakeServer, FaultKind } from '../support/fake_server';
 import { expected, once, readSome } from '../support/reading';

@@ -1,6 +1,6 @@
 import { describe, expect, it } from 'vitest';
 import { HttpClient } from '../../src/http/client';
-import { TreeStore } from '../../src/http/tree_store';
+import { TreeStore } from '../../src/http/without_ranges';
 import { FormatError } from '../../src/reader';
 import { fakeServer } from '../support/fake_server';
 import { quick, rejection } from '../support/scan';

@@ -1,16 +1,16 @@
 import { describe, expect, it } from 'vitest';
 import { groupedList } from '../../src/decide/request_groups';
-import { UncheckedPlan } from '../../src/decide/unchecked_plan';
-import { defaultHtcOptions, HtcStep, planOptions } from '../../src/reader';
-import { playPlan } from '../../src/scene/play_plan';
+import { HarmonicTimePlan, type HtcStep } from '../../src/reader';
+import { playPlan } from '../../src/scene/fetch_in_time';
 import { bytesAskedTwice, Fault } from '../support/fake_server';
-import { setUp, url } from '../support/transferring';
+import { defaultTimePlan, setUp, url } from '../support/transferring';
 
 describe('a timed fetch', () => {
+  const options = { ...defaultTimePlan, timeLimitS: 2, rttS: 0.002 };
   async function fetchInTime(fault: Fault | undefined, mostS: number, signal = new AbortController().signal) {
     const s = await setUp(fault);
     const list = groupedList(s.list, 2000, 60000);
-    const plan = new UncheckedPlan(list.offers, planOptions({ ...defaultHtcOptions(), timeLimitS: 2, rttS: 0.002 }));
+    const plan = new HarmonicTimePlan(list.offers, options);
     const ended: HtcStep[] = [];
     const decided = (step: HtcStep): void => void (step.doneS >= 0 && ended.push(step));
     const run = playPlan(plan, list, s.transfers, signal, mostS, { decided, lost: () => undefined });
@@ -30,7 +30,7 @@ describe('a timed fetch', () => {
     const { list } = await setUp(undefined);
     const { offers } = groupedList(list, 2000, 60000);
     const underWay = (tripS: number): number => {
-      const plan = new UncheckedPlan(offers, { ...planOptions({ ...defaultHtcOptions(), timeLimitS: 2, rttS: 0.002 }), tripS: () => tripS });
+      const plan = new HarmonicTimePlan(offers, { ...options, tripS: () => tripS });
       let n = 0;
       while (plan.next(0)) ++n;
       return n;

@@ -1,9 +1,8 @@
 import { BoxGeometry, BufferGeometry, Group, Mesh, MeshStandardMaterial, Scene, Texture, type Vector2, WebGLRenderer } from 'three';
-import { samePrefix } from '../../src/format/bytes';
+import { samePrefix, sha256 } from '../../src/format/sha256';
 import type { LoadEvents, LoadOptions, LoadedModel } from '../../src/scene/api';
 import { FormatError, TexmeshPackage } from '../../src/open';
 import type { OpenOptions } from '../../src/reader';
-import { sha256 } from '../../src/format/sha256';
 import { handle } from '../../src/worker';
 import type { WorkerRequest } from '../../src/worker/protocol';
 import { FakeServer } from './fake_server';

@@ -1,7 +1,7 @@
-import { requireSelfContained } from '../../src/format/self_contained_glb';
+import { requireSelfContained } from '../../src/format/glb';
 import { SplitStreamReader } from '../../src/format/splits/split_stream';
 import { PackageReader } from '../../src/reader';
-import { readThesis } from '../../src/thesis_tables';
+import { readThesis } from '../../src/thesis';
 
 /** Reads all that a client may ever read of a package; gives the mesh that the stream ends with. */
 export async function readAll(bytes: Uint8Array): Promise<SplitStreamReader | undefined> {

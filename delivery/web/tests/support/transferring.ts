@@ -1,9 +1,8 @@
-import { samePrefix } from '../../src/format/bytes';
-import { sha256 } from '../../src/format/sha256';
+import { samePrefix, sha256 } from '../../src/format/sha256';
 import { FormatError, type FragmentList, PackageReader, fragmentList, fullSize } from '../../src/reader';
 import { Transfers, type Wish } from '../../src/scene/transfers';
 import { WorkerPool } from '../../src/worker/pool';
-import type { TimePlanOptions } from '../../src/decide/plan_types';
+import type { TimePlanOptions } from '../../src/decide/harmonic_time';
 import type { WorkerRequest } from '../../src/worker/protocol';
 import { type Fault, fakeServer } from './fake_server';
 import { golden } from './files';

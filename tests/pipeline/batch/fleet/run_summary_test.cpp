@@ -8,7 +8,6 @@
 #include <nlohmann/json.hpp>
 
 #include "format/base/errors.h"
-#include "pipeline/batch/fleet/merge_summaries.h"
 #include "tests/support/command.h"
 #include "tests/support/schema.h"
 
@@ -74,7 +73,7 @@ struct RunOfModels {
 RunOfModels ugly_run() {
   RunOfModels run;
   WorkerReport& ok = run.add("a<b>&\"c\".obj", ModelResult::kOk, 1.5);
-  ok.package_bytes = 1234;
+  ok.bytes = 1234;
   ok.peak_memory_bytes = 1 << 27;
   ok.stages_ran = 3;
   run.add("unchanged\n\x01.obj", ModelResult::kUnchanged).ran = false;
@@ -125,7 +124,7 @@ std::span<const std::uint8_t> span_of(const std::string& text) {
 
 TEST(Summary, IsReadAsItWasWritten) {
   RunOfModels run;
-  run.add("a", ModelResult::kOk, 1.5).package_bytes = 10;
+  run.add("a", ModelResult::kOk, 1.5).bytes = 10;
   WorkerReport& known = run.add("b", ModelResult::kUnchanged);
   known.made_s = 4.5;
   known.made_memory_bytes = 77;

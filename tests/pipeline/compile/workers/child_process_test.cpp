@@ -1,4 +1,4 @@
-#include "pipeline/compile/workers/child_process.h"
+#include "pipeline/compile/workers/worker.h"
 
 #include <gtest/gtest.h>
 

@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Not a test alone: the pool starts the texmesh-core beside the program that it is in, so the tests below
+/// Not a test alone: the pool starts the texmesh beside the program that it is in, so the tests below
 /// let a copy of this one run.
 TEST(WorkerPool, DISABLED_PrintWhatWorkersGet) {
   std::vector<WorkerJob> jobs(3);
@@ -29,8 +29,8 @@ TEST(WorkerPool, DISABLED_PrintWhatWorkersGet) {
 std::vector<std::string> tunables_of_workers(const std::vector<std::string>& environment) {
   const testing::TemporaryFolder folder;
   fs::copy_file(fs::read_symlink("/proc/self/exe"), folder / "pool");
-  testing::write_text(folder / "texmesh-core", "#!/bin/sh\necho \"<${GLIBC_TUNABLES-none}>\" >&2\nexit 1\n");
-  fs::permissions(folder / "texmesh-core", fs::perms::owner_all);
+  testing::write_text(folder / "texmesh", "#!/bin/sh\necho \"<${GLIBC_TUNABLES-none}>\" >&2\nexit 1\n");
+  fs::permissions(folder / "texmesh", fs::perms::owner_all);
   const testing::CommandResult r = testing::run_command(
       {folder / "pool", "--gtest_also_run_disabled_tests", "--gtest_filter=*PrintWhatWorkersGet"},
       environment);

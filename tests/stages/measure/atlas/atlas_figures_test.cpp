@@ -7,7 +7,6 @@
 #include <limits>
 
 #include "format/base/no_index.h"
-#include "stages/measure/atlas/atlas_map.h"
 #include "tests/support/meshes.h"
 
 namespace texmesh::testing {

@@ -1,4 +1,4 @@
-#include "stages/proxies/bake/push_pull.h"
+#include "stages/proxies/bake/bake.h"
 
 #include <gtest/gtest.h>
 

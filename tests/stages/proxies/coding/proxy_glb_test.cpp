@@ -5,8 +5,8 @@
 #include <string>
 
 #include "stages/gltf/check_glb.h"
+#include "stages/image/webp.h"
 #include "stages/proxies/coding/proxy_pictures.h"
-#include "stages/proxies/coding/webp_picture.h"
 #include "tests/stages/proxies/atlas_fixtures.h"
 #include "tests/support/meshes.h"
 
@@ -144,7 +144,8 @@ TEST(ProxyPictures, ASecondChoiceTakesOverWhatTheFirstHasCoded) {
   EXPECT_LE(first, 4u) << "encodes of a search";
   EXPECT_LE(coded.images[0].size(), first + 3);
   const MapPixels pixels = map_pixels(maps, {true, false});
-  EXPECT_EQ(less.base_colour.file, encode_webp(pixels.base_colour, less.quality));
+  EXPECT_EQ(less.base_colour.file,
+            encode_webp(pixels.base_colour, {static_cast<float>(less.quality), less.quality}));
 }
 
 TEST(ProxyPictures, HalfOfTheOcclusionIsInTheColourWhereItHasNoMap) {
@@ -182,7 +183,7 @@ TEST(WebpPicture, AlphaComesBack) {
   Pixels rgba{8, 8, 4, {}};
   for (std::uint32_t i = 0; i < 64; ++i)
     rgba.data.insert(rgba.data.end(), {200, 100, 50, i < 32 ? std::uint8_t{255} : std::uint8_t{0}});
-  const Pixels back = decode_webp_picture(encode_webp(rgba, 80));
+  const Pixels back = decode_webp_rgba(encode_webp(rgba, {80, 80}));
   ASSERT_EQ(back.data.size(), rgba.data.size());
   EXPECT_EQ(back.data[3], 255);
   EXPECT_EQ(back.data[63 * 4 + 3], 0);

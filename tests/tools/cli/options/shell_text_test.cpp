@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <regex>
 
+#include "pipeline/compile/stage_table.h"
 #include "tests/support/command.h"
 
 namespace texmesh::testing {
@@ -107,7 +108,7 @@ TEST(ShellText, GroffReadsThePageWithoutAWarning) {
 }
 
 TEST(ShellText, NothingOfTheHelpIsMissing) {
-  const std::string program = run_command({TEXMESH_BINARY, "--help"}).output;
+  const std::string program = run_command({TEXMESH_BINARY, "--help-all"}).output;
   const std::vector<std::string> forms{told("bash"), told("zsh"),
                                        std::regex_replace(told("man"), std::regex(R"(\\-)"), "-")};
   std::size_t options = 0;
@@ -128,15 +129,16 @@ TEST(ShellText, NothingOfTheHelpIsMissing) {
 TEST(ShellText, TheVersionNamesEveryLibraryThatChangesBytes) {
   const std::string text = run_command({TEXMESH_BINARY, "--version", "--verbose"}).output;
   EXPECT_TRUE(text.starts_with(run_command({TEXMESH_BINARY, "--version"}).output));
-  const auto table = nlohmann::json::parse(run_command({TEXMESH_BINARY, "stages", "--json"}).output);
   std::size_t libraries = 0;
-  for (const auto& stage : table["stages"])
-    for (const std::string name : stage["libraries"]) {
+  for (const Stage& stage : default_stage_table())
+    for (const auto& library : stage.libraries) {
       ++libraries;
-      EXPECT_TRUE(std::regex_search(text, std::regex("\n" + name + " [0-9]"))) << name << text;
+      EXPECT_TRUE(std::regex_search(text, std::regex("\n" + library.name + " [0-9]")))
+          << library.name << text;
     }
   EXPECT_GT(libraries, 5u);
   EXPECT_NE(text.find("\ncompiler "), std::string::npos);
+  EXPECT_NE(text.find("GPL-3.0-or-later"), std::string::npos);
 }
 
 }  // namespace

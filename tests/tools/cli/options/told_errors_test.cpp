@@ -1,4 +1,4 @@
-#include "tools/cli/options/told_errors.h"
+#include "tools/cli/options/command_line.h"
 
 #include <gtest/gtest.h>
 
@@ -19,7 +19,7 @@ struct Told {
 
 Told told_of(const std::function<int()>& run) {
   testing::internal::CaptureStderr();
-  const int code = run_telling_errors(run);
+  const int code = run_and_print_errors(run);
   return {code, testing::internal::GetCapturedStderr()};
 }
 

@@ -4,12 +4,12 @@
 #include <cmath>
 
 #include "stages/condition/condition.h"
+#include "stages/geometry/fit_normals.h"
 #include "stages/scales/scales.h"
 #include "tests/support/meshes.h"
 #include "tests/support/packages.h"
-#include "tools/extract/budget/mesh_candidates.h"
-#include "tools/extract/budget/quality_search.h"
-#include "tools/extract/glb/fit_normals.h"
+#include "tools/extract/budget/filling.h"
+#include "tools/extract/glb/scale_file.h"
 #include "tools/extract/glb/standalone_glb.h"
 
 namespace texmesh {
@@ -128,18 +128,19 @@ TEST(SideOf, LargeSidesCanBeHalvedSeveralTimes) {
   EXPECT_EQ(side_of(3, 0.5), 3u);
 }
 
-TEST(MeshCandidates, ForgottenOnesAreMadeAgainAlike) {
+TEST(Candidates, ForgottenOnesAreMadeAgainAlike) {
   PackageReader package(open_store(kGolden));
-  ExtractRequest request;
-  request.bytes = 20000;
-  request.display_px = 64;  // small pictures, quick tests
-  const BudgetSource source(package, request, {});
-  MeshCandidates meshes(source);
-  const std::uint64_t bytes = meshes.at({1, 1}).fixed_bytes;
-  const double geometry = meshes.at({1, 1}).geometry;
-  meshes.forget({1, 1});
-  EXPECT_EQ(meshes.at({1, 1}).fixed_bytes, bytes);
-  EXPECT_EQ(meshes.at({1, 1}).geometry, geometry);
+  ExtractBudget wishes;
+  wishes.display_px = 64;  // small pictures, quick tests
+  TextureSource textures(package, 1e6, {});
+  const Reference reference(package, wishes, false, textures, {});
+  Candidates candidates(reference, textures);
+  const Filling filling(reference, candidates, 20000);
+  const std::uint64_t bytes = filling.mesh_file(candidates.mesh({1, 1})).fixed_bytes;
+  const double geometry = candidates.mesh({1, 1}).geometry;
+  candidates.forget({1, 1});
+  EXPECT_EQ(filling.mesh_file(candidates.mesh({1, 1})).fixed_bytes, bytes);
+  EXPECT_EQ(candidates.mesh({1, 1}).geometry, geometry);
 }
 
 double lighting_error(const Mesh& coarse, const std::vector<Vec3f>& normals) {

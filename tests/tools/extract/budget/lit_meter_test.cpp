@@ -1,5 +1,5 @@
 // The pictures behind extract --bytes: views of a mesh, their windows, and differences between them.
-#include "tools/extract/budget/lit_meter.h"
+#include "tools/extract/budget/reference.h"
 
 #include <gtest/gtest.h>
 

@@ -8,42 +8,42 @@
 namespace texmesh {
 namespace {
 
+ExtractBudget small_pictures() {
+  ExtractBudget out;
+  out.display_px = 64;  // quick tests
+  return out;
+}
+
 const std::string kGolden = std::string(TEXMESH_SOURCE_DIR) + "/tests/golden/v2.0-scan.texmesh";
 
 TEST(LossCurves, MoreBytesLoseLess) {
   PackageReader package(open_store(kGolden));
-  ExtractRequest request;
-  request.bytes = 60000;
-  request.display_px = 64;  // small pictures, quick tests
-  BudgetSource source(package, request, {});
-  ASSERT_GT(source.image_count(), 0u);
-  ImageCoder coder(source);
-  LossCurves curves(source, coder);
-  curves.measure(40000);
+  TextureSource textures(package, 2.4e6, {});
+  const Reference reference(package, small_pictures(), false, textures, {});
+  ASSERT_GT(reference.images.size(), 0u);
+  Candidates candidates(reference, textures);
+  const LossCurves curves(reference, candidates, 40000);
   double before = 1e9;
   for (const double bytes : {0.0, 2000.0, 8000.0, 20000.0, 40000.0}) {
-    const Allocation found = curves.allocate(bytes);
-    ASSERT_EQ(found.images.size(), source.image_count());
+    const DealtBytes found = curves.allocate(bytes);
+    ASSERT_EQ(found.images.size(), reference.images.size());
     EXPECT_LE(found.loss, before);
     before = found.loss;
     double sum = 0;
     for (const CodedImage& image : found.images) sum += image.bytes;
     EXPECT_NEAR(sum, found.bytes, 1e-6 * sum);
     if (bytes > 2000) EXPECT_LE(found.bytes, bytes);
-    EXPECT_LT(found.last, source.image_count());
+    EXPECT_LT(found.last, reference.images.size());
   }
   EXPECT_GT(curves.allocate(0).loss, before);
 }
 
 TEST(LossCurves, NeighboursAreTheFilesOfACurveInTurn) {
   PackageReader package(open_store(kGolden));
-  ExtractRequest request;
-  request.bytes = 60000;
-  request.display_px = 64;
-  BudgetSource source(package, request, {});
-  ImageCoder coder(source);
-  LossCurves curves(source, coder);
-  curves.measure(40000);
+  TextureSource textures(package, 2.4e6, {});
+  const Reference reference(package, small_pictures(), false, textures, {});
+  Candidates candidates(reference, textures);
+  const LossCurves curves(reference, candidates, 40000);
   CodedImage at = curves.allocate(0).images[0];
   EXPECT_EQ(curves.neighbour(0, at, -1), nullptr);
   std::vector<CodedImage> up{at};
@@ -62,13 +62,11 @@ TEST(LossCurves, NeighboursAreTheFilesOfACurveInTurn) {
 
 TEST(LossCurves, ImagesOfOneMaterialAreOneGroup) {
   PackageReader package(open_store(kGolden));
-  ExtractRequest request;
-  request.bytes = 60000;
-  request.display_px = 64;
-  const BudgetSource source(package, request, {});
-  ASSERT_EQ(source.groups.size(), source.image_count());
-  for (const ShownTexture& t : source.shown)
-    EXPECT_EQ(source.groups[t.image], source.groups[source.shown[0].image]);
+  TextureSource textures(package, 2.4e6, {});
+  const Reference reference(package, small_pictures(), false, textures, {});
+  ASSERT_EQ(reference.groups.size(), reference.images.size());
+  for (const PictureTexture& t : reference.shown)
+    EXPECT_EQ(reference.groups[t.image], reference.groups[reference.shown[0].image]);
 }
 
 }  // namespace

@@ -1,6 +1,4 @@
 // Fragments of a plane put together to one JPEG without coding anew.
-#include "tools/extract/glb/joined_jpeg.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,8 +8,9 @@
 #include "stages/data/coverage.h"
 #include "stages/image/decode_image.h"
 #include "stages/image/decode_jpeg.h"
+#include "stages/jpeg/jpeg_coder.h"
 #include "tests/support/packages.h"
-#include "tools/extract/glb/jpeg_writer.h"
+#include "tools/extract/glb/texture_source.h"
 
 namespace texmesh {
 namespace {
@@ -37,7 +36,7 @@ std::vector<std::int16_t> coefficients_of(const Bytes& file) {
 TEST(JoinedJpeg, HasTheCoefficientsOfEveryFragment) {
   PackageReader package = package_of(testing::make_package_parts());
   for (const std::uint32_t rung : {0u, 1u}) {
-    const JoinedJpeg joined(package, 0, rung, {});
+    const JoinedJpeg joined = joined_plane(package, 0, rung, {});
     EXPECT_EQ(joined.width_px(), kWidth);
     EXPECT_EQ(joined.height_px(), kHeight);
     EXPECT_EQ(joined.channels(), 3u);
@@ -62,7 +61,7 @@ TEST(JoinedJpeg, HasTheCoefficientsOfEveryFragment) {
 
 TEST(JoinedJpeg, DecodesToTheFragmentsTexels) {
   PackageReader package = package_of(testing::make_package_parts());
-  const Pixels whole = decoded(JoinedJpeg(package, 0, 1, {}).file());
+  const Pixels whole = decoded(joined_plane(package, 0, 1, {}).file());
   for (const std::uint32_t f : {0u, 1u, 2u}) {
     const Pixels part = decoded(package.complete_fragment(0, 1, f));
     // Where a fragment ends, chroma of 4:2:0 is interpolated otherwise.
@@ -76,7 +75,7 @@ TEST(JoinedJpeg, DecodesToTheFragmentsTexels) {
 
 TEST(JoinedJpeg, FragmentsThatAreNotStoredTakeTheMeanBesideThem) {
   PackageReader package = package_of(testing::make_package_parts());
-  const Bytes file = JoinedJpeg(package, 0, 1, {}).file();
+  const Bytes file = joined_plane(package, 0, 1, {}).file();
   const JpegCoefficients whole("x", file);
   for (std::uint32_t y = 4; y < 6; ++y)
     for (std::uint32_t x = 4; x < 8; ++x) {
@@ -88,7 +87,7 @@ TEST(JoinedJpeg, FragmentsThatAreNotStoredTakeTheMeanBesideThem) {
 
 TEST(JoinedJpeg, LessQualityRoundsToCoarserSteps) {
   PackageReader package = package_of(testing::make_package_parts());
-  const JoinedJpeg joined(package, 0, 1, {});
+  const JoinedJpeg joined = joined_plane(package, 0, 1, {});
   const Bytes all = joined.file(), less = joined.file(60), least = joined.file(5);
   EXPECT_LT(less.size(), all.size());
   EXPECT_LT(least.size(), less.size());
@@ -107,7 +106,7 @@ bool is_flat(const std::int16_t* block) {
 
 TEST(JoinedJpeg, WhatNobodySeesContinuesWhatIsSeen) {
   PackageReader package = package_of(testing::make_package_parts());
-  const JoinedJpeg whole(package, 0, 1, {});
+  const JoinedJpeg whole = joined_plane(package, 0, 1, {});
   JoinedJpeg filled = whole;
   filled.fill_unseen(std::vector<std::uint8_t>(coverage_size_bytes(kWidth, kHeight), 0));
   const Bytes before = whole.file(), after = filled.file();
@@ -134,7 +133,7 @@ TEST(JoinedJpeg, WhatNobodySeesContinuesWhatIsSeen) {
 
 TEST(JoinedJpeg, FlattensWhatNobodySees) {
   PackageReader package = package_of(testing::make_package_parts());
-  const JoinedJpeg whole(package, 0, 1, {});
+  const JoinedJpeg whole = joined_plane(package, 0, 1, {});
   JoinedJpeg none = whole, all = whole, corner = whole;
   const std::vector<std::uint8_t> nothing(coverage_size_bytes(kWidth, kHeight), 0),
       everything(coverage_size_bytes(kWidth, kHeight), 0xff);
@@ -160,16 +159,16 @@ TEST(JoinedJpeg, FlattensWhatNobodySees) {
 
 TEST(JoinedJpeg, SameBytesForAnyNumberOfThreads) {
   PackageReader package = package_of(testing::make_package_parts());
-  EXPECT_EQ(JoinedJpeg(package, 0, 1, {}).file(), JoinedJpeg(package, 0, 1, {8, {}, nullptr}).file());
-  EXPECT_EQ(coefficients_of(JoinedJpeg(package, 0, 1, {}).file()),
-            coefficients_of(JoinedJpeg(package, 0, 1, {}).file(100)));
+  EXPECT_EQ(joined_plane(package, 0, 1, {}).file(), joined_plane(package, 0, 1, {8, {}, nullptr}).file());
+  EXPECT_EQ(coefficients_of(joined_plane(package, 0, 1, {}).file()),
+            coefficients_of(joined_plane(package, 0, 1, {}).file(100)));
 }
 
 TEST(JoinedJpeg, PartsOfOtherImagesAreRefused) {
   testing::PackageParts parts = testing::make_package_parts();
   parts.textures[0].channels = 1;
   PackageReader package = package_of(parts);
-  EXPECT_THROW(JoinedJpeg(package, 0, 1, {}), FormatError);
+  EXPECT_THROW(joined_plane(package, 0, 1, {}), FormatError);
 }
 
 }  // namespace

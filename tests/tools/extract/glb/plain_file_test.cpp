@@ -1,5 +1,5 @@
 // Files without extensions that compress.
-#include "tools/extract/glb/plain_file.h"
+#include "tools/extract/glb/scale_file.h"
 
 #include <gtest/gtest.h>
 
@@ -71,12 +71,13 @@ TEST(PlainFile, ScalesAndProxiesOfAPackageArePlainWhereItIsAsked) {
   const Bytes bytes = parts.build();
   PackageReader package(open_container(memory_source(bytes)));
   for (const bool of_proxy : {false, true}) {
-    ExtractRequest r;
-    r.plain = true;
-    if (of_proxy)
-      r.proxy = 1;
-    else
-      r.scale = 0;
+    ExtractRequest r{ExtractProxy{1, true}};
+    if (!of_proxy) {
+      ExtractScale scale;
+      scale.scale = 0;
+      scale.form = ExtractScale::Form::kPlain;
+      r.file = scale;
+    }
     const Extracted e = extract_model(package, r, {});
     expect_plain(e.glb, testing::fine_mesh().triangles.size());
     Findings findings;

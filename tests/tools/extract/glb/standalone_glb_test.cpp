@@ -5,9 +5,9 @@
 
 #include "format/base/errors.h"
 #include "stages/image/decode_image.h"
+#include "stages/image/resize.h"
 #include "stages/measure/flip.h"
 #include "tools/extract/glb/image_codecs.h"
-#include "tools/extract/glb/resize.h"
 
 namespace texmesh {
 namespace {

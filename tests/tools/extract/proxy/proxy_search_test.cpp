@@ -20,15 +20,15 @@ Bytes package_bytes(bool with_proxies) {
 }
 
 Extracted extract(const Bytes& bytes, std::uint64_t budget,
-                  const std::function<void(ExtractRequest&)>& wish = {}, int threads = 2) {
+                  const std::function<void(ExtractBudget&)>& wish = {}, int threads = 2) {
   PackageReader package(open_container(memory_source(bytes)));
-  ExtractRequest r;
-  r.bytes = budget;
+  ExtractBudget r;
+  r.bytes = {budget};
   r.display_px = 64;
   if (wish) wish(r);
   RunContext context;
   context.threads = threads;
-  const Extracted out = extract_model(package, r, context);
+  const Extracted out = extract_model(package, {r}, context);
   Findings findings;
   check_glb(out.glb, "x.glb", findings, GlbRules::kStandalone);
   for (const Finding& f : findings.list()) ADD_FAILURE() << to_string(f);
@@ -66,10 +66,10 @@ TEST(ProxySearch, TheNearestFileIsMadeOfAProxyWhereNothingFits) {
 
 TEST(ProxySearch, ScalesLevelsAndPngsAreNotReplaced) {
   const Bytes with = package_bytes(true);
-  EXPECT_FALSE(extract(with, 3000, [](ExtractRequest& r) { r.scale = 5; }).proxy);
-  EXPECT_FALSE(extract(with, 3000, [](ExtractRequest& r) { r.lods = true; }).proxy);
-  EXPECT_FALSE(extract(with, 3000, [](ExtractRequest& r) { r.images = ExtractImages::kPng; }).proxy);
-  const Extracted jpeg = extract(with, 3000, [](ExtractRequest& r) { r.images = ExtractImages::kJpeg; });
+  EXPECT_FALSE(extract(with, 3000, [](ExtractBudget& r) { r.scale = 5; }).proxy);
+  EXPECT_FALSE(extract(with, 3000, [](ExtractBudget& r) { r.levels = true; }).proxy);
+  EXPECT_FALSE(extract(with, 3000, [](ExtractBudget& r) { r.images = ExtractImages::kPng; }).proxy);
+  const Extracted jpeg = extract(with, 3000, [](ExtractBudget& r) { r.images = ExtractImages::kJpeg; });
   EXPECT_EQ(jpeg.proxy, 1u);
   for (const ExtractedImage& i : jpeg.images) EXPECT_EQ(i.format, FileImage::kJpeg);
 }

@@ -1,5 +1,5 @@
 // A proxy's mesh with fewer triangles, in its own atlas.
-#include "tools/extract/proxy/thinner_meshes.h"
+#include "tools/extract/proxy/proxy_parts.h"
 
 #include <gtest/gtest.h>
 

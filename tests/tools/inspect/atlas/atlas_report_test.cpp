@@ -95,7 +95,7 @@ TEST(AtlasReport, ModelsWithoutAnAtlasGetASentence) {
   mesh.uv0.clear();
   const AtlasDiagnosis bare = diagnosis_of(model_of(mesh));
   EXPECT_NE(bare.nothing.find("no texture coordinates"), std::string::npos);
-  EXPECT_EQ(bare.report.untextured_triangles, 12u);
+  EXPECT_EQ(bare.untextured_triangles, 12u);
 }
 
 TEST(AtlasReport, APackageHasTheFiguresOfItsFinestScale) {

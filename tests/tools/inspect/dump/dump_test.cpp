@@ -4,11 +4,11 @@
 #include "format/rules/rate_distortion.h"
 #include "pipeline/compile/options.h"
 #include "pipeline/compile/profile.h"
-#include "pipeline/io/text_table.h"
+#include "pipeline/io/table.h"
 #include "tests/support/packages.h"
 #include "tools/inspect/dump/dump.h"
-#include "tools/inspect/dump/option_changes.h"
 #include "tools/inspect/dump/package_figures.h"
+#include "tools/inspect/provenance.h"
 
 namespace texmesh {
 namespace {

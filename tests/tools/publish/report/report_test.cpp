@@ -13,9 +13,9 @@
 #include "tests/support/command.h"
 #include "tests/support/packages.h"
 #include "tests/support/schema.h"
-#include "tests/tools/publish/report/html_check.h"
-#include "tools/publish/report/flip_colours.h"
-#include "tools/publish/report/html.h"
+#include "tests/tools/publish/pages/html_check.h"
+#include "tools/publish/pages/page.h"
+#include "tools/publish/report/report_pictures.h"
 
 namespace texmesh::testing {
 namespace {

@@ -10,7 +10,7 @@
 #include "pipeline/batch/progress.h"
 #include "pipeline/io/markup.h"
 #include "pipeline/io/table.h"
-#include "tools/publish/report/html.h"
+#include "tools/publish/pages/page.h"
 
 namespace texmesh {
 namespace {
@@ -22,17 +22,14 @@ std::string cut_note(std::size_t all) {
 }
 
 std::string failures_section(const RunSummary& s) {
-  HtmlTable table;
-  table.caption = "What went wrong, model by model";
-  table.header = {"model", "result", "what was found"};
-  table.sentences = true;
+  Table table("What went wrong, model by model",
+              {Column::text("model"), Column::text("result"), Column::text("what was found")});
   std::size_t failures = 0;
   for (const ModelSummary& m : s.models) {
     if (m.ok()) continue;
-    const std::string why =
-        m.result == ModelResult::kCancelled ? "not reached" : markup_escaped(m.error.message);
     if (++failures <= kMostRows)
-      table.rows.push_back({markup_escaped(m.model), std::string(enum_name(m.result)), why});
+      table.row({m.model, enum_name(m.result),
+                 m.result == ModelResult::kCancelled ? "not reached" : m.error.message});
   }
   if (failures == 0) return "";
   return html_section("failures", fmt::format("{} without a new package", failures),
@@ -41,12 +38,9 @@ std::string failures_section(const RunSummary& s) {
 
 std::string problems_section(const RunSummary& s) {
   if (s.problems.empty()) return "";
-  HtmlTable table;
-  table.caption = "Reports of shards that are not as they should be";
-  table.header = {"file", "kind", "what was found"};
-  table.sentences = true;
-  for (const SummaryProblem& p : s.problems)
-    table.rows.push_back({markup_escaped(p.file), p.kind, markup_escaped(p.text)});
+  Table table("Reports of shards that are not as they should be",
+              {Column::text("file"), Column::text("kind"), Column::text("what was found")});
+  for (const SummaryProblem& p : s.problems) table.row({p.file, p.kind, p.text});
   return html_section("problems", "Reports of shards", table.html());
 }
 
@@ -69,18 +63,16 @@ std::string figures_section(const RunSummary& s) {
     all_bytes += m.bytes;
     if (m.cost_s() <= 0) continue;
     seconds.push_back(m.cost_s());
-    memory.push_back(m.made_s > 0 ? m.made_memory_bytes : m.peak_memory_bytes);
+    memory.push_back(m.made ? m.made->peak_memory_bytes : m.peak_memory_bytes);
     all_s += m.cost_s();
   }
-  HtmlTable table;
-  table.caption = "What a model took when its package was made";
-  table.header = {"", "median", "9 of 10", "most", "all"};
-  table.rows = {{"time", format_seconds(quantile(seconds, .5)), format_seconds(quantile(seconds, .9)),
-                 format_seconds(quantile(seconds, 1)), format_seconds(all_s)},
-                {"peak memory", format_bytes(quantile(memory, .5)), format_bytes(quantile(memory, .9)),
-                 format_bytes(quantile(memory, 1)), ""},
-                {"package", format_bytes(quantile(bytes, .5)), format_bytes(quantile(bytes, .9)),
-                 format_bytes(quantile(bytes, 1)), format_bytes(all_bytes)}};
+  Table table("What a model took when its package was made", {"", "median", "9 of 10", "most", "all"});
+  table.row({"time", format_seconds(quantile(seconds, .5)), format_seconds(quantile(seconds, .9)),
+             format_seconds(quantile(seconds, 1)), format_seconds(all_s)});
+  table.row({"peak memory", format_bytes(quantile(memory, .5)), format_bytes(quantile(memory, .9)),
+             format_bytes(quantile(memory, 1))});
+  table.row({"package", format_bytes(quantile(bytes, .5)), format_bytes(quantile(bytes, .9)),
+             format_bytes(quantile(bytes, 1)), format_bytes(all_bytes)});
   return html_section("figures", "Figures", table.html());
 }
 
@@ -91,24 +83,21 @@ class ModelsSection {
       : summary_(s), folder_(folder), posters_(posters), face_(face) {}
 
   std::string html(std::vector<PageFile>& files) {
-    HtmlTable table;
-    table.caption = "Every package";
-    table.header = {"model", "result", "time", "peak memory", "package"};
-    std::string gallery;
+    Table table("Every package", {"model", "result", "time", "peak memory", "package"});
+    std::string posters;
     std::size_t models = 0;
     for (const ModelSummary& m : summary_.models) {
       if (!m.ok()) continue;
-      if (models++ < posters_) gallery += picture(m, files);
+      if (models++ < posters_) posters += picture(m, files);
       if (models > kMostRows) continue;
-      const std::uint64_t memory = m.made_s > 0 ? m.made_memory_bytes : m.peak_memory_bytes;
-      table.rows.push_back({markup_escaped(m.model), std::string(enum_name(m.result)),
-                            m.cost_s() > 0 ? format_seconds(m.cost_s()) : "", format_bytes(memory),
-                            format_bytes(m.bytes)});
+      const std::uint64_t memory = m.made ? m.made->peak_memory_bytes : m.peak_memory_bytes;
+      table.row({m.model, enum_name(m.result), m.cost_s() > 0 ? format_seconds(m.cost_s()) : "",
+                 format_bytes(memory), format_bytes(m.bytes)});
     }
     if (models == 0) return "";
-    if (!gallery.empty()) gallery = "<div class=\"row\">\n" + gallery + "</div>\n";
+    if (!posters.empty()) posters = "<div class=\"row\">\n" + posters + "</div>\n";
     return html_section("models", fmt::format("{} packages", models),
-                        gallery + table.html() + cut_note(models));
+                        posters + table.html() + cut_note(models));
   }
 
  private:

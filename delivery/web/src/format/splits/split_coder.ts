@@ -1,3 +1,5 @@
+import { splitBelow, splitLongest, splitPrior, splitSteps, splitValueLimit } from '../shared_numbers';
+
 // The entropy decoder of mesh/stream.bin: format/split/split_coder.h, with 32-bit numbers.
 
 /** Adaptive probabilities that a bit is 1, by index. */
@@ -58,26 +60,21 @@ export class BitDecoder {
   }
 }
 
-const steps = 20;
-const below = 12;
-const longest = 26;
 /** Number of models of one part of values. */
-export const valueModelCount = 4 * steps + 3 * below + 1;
-const prior = 24;
-const valueLimit = 60;
+export const valueModelCount = 4 * splitSteps + 3 * splitBelow + 1;
 
 /** Decodes the values of one part. Where the part was left out every residual is 0. */
 export class ValueDecoder {
   private present_ = false;
   private bits_ = new BitDecoder(new Uint8Array(0));
-  private readonly models_ = new BitModels(valueModelCount, valueLimit);
+  private readonly models_ = new BitModels(valueModelCount, splitValueLimit);
   private readonly mean_ = new Int32Array(4);
 
   start(bytes: Uint8Array, models: Uint8Array): void {
     this.present_ = bytes.length > 0;
     if (!this.present_) return;
     for (let i = 0; i < models.length; ++i) this.models_.p[i] = models[i] << 8;
-    this.models_.seen.fill(prior);
+    this.models_.seen.fill(splitPrior);
     this.mean_.fill(bytes[0] * 2);
     this.bits_ = new BitDecoder(bytes.subarray(1));
   }
@@ -99,15 +96,15 @@ export class ValueDecoder {
     this.mean_[component] += (length * 16 - this.mean_[component]) >> 3;
     if (length === 0) return 0;
     const { bits_: bits, models_: models } = this;
-    const row = Math.min(length, below - 1);
+    const row = Math.min(length, splitBelow - 1);
     let coded = 1;
     let left = length - 1;
     if (left > 0) {
-      coded = coded * 2 + (bits.bit(models, 4 * steps + row) ? 1 : 0);
+      coded = coded * 2 + (bits.bit(models, 4 * splitSteps + row) ? 1 : 0);
       --left;
     }
     if (left > 0) {
-      coded = coded * 2 + (bits.bit(models, 4 * steps + below + 2 * row + (coded & 1)) ? 1 : 0);
+      coded = coded * 2 + (bits.bit(models, 4 * splitSteps + splitBelow + 2 * row + (coded & 1)) ? 1 : 0);
       --left;
     }
     if (left > 0) coded = coded * 2 ** left + bits.raw(left);
@@ -115,15 +112,15 @@ export class ValueDecoder {
   }
   private length_(mean: number): number {
     const middle = mean >> 4;
-    const row = ((mean >> 2) & 3) * steps;
+    const row = ((mean >> 2) & 3) * splitSteps;
     const longer = (than: number): boolean => {
-      const step = Math.min(Math.max(than - middle + 10, 0), steps - 1);
+      const step = Math.min(Math.max(than - middle + 10, 0), splitSteps - 1);
       return this.bits_.bit(this.models_, row + step);
     };
-    let at = Math.min(Math.max(middle - 2, 0), longest - 1);
+    let at = Math.min(Math.max(middle - 2, 0), splitLongest - 1);
     if (longer(at)) {
       do ++at;
-      while (at < longest && longer(at));
+      while (at < splitLongest && longer(at));
     } else while (at > 0 && !longer(at - 1)) --at;
     return at;
   }

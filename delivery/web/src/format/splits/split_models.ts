@@ -1,11 +1,14 @@
-// Places of the probabilities of the connectivity part: the kinds of SplitModels in format/split/codec/split_models.h, and how many contexts
+import {
+  splitDegrees, splitLefts, splitModelLimit, splitRings, splitRuns, splitValences,
+} from '../shared_numbers';
+
+// Places of the probabilities of the connectivity part: the kinds of SplitModels in format/split/split_element_codec.h, and how many contexts
 // each kind has.
 
-export const degrees = 14;
-export const lefts = 12;
-export const runs = 7;
-export const rings = 8;
-export const valences = 5;
+export {
+  splitDegrees as degrees, splitLefts as lefts, splitModelLimit as limit, splitRings as rings, splitRuns as runs,
+  splitValences as valences,
+};
 
 let count = 0;
 const block = (models: number): number => {
@@ -13,10 +16,10 @@ const block = (models: number): number => {
   count += models;
   return at;
 };
-export const ask = block(degrees * 4 * 2 * 2);
-export const first = block(lefts * 2);
-export const turn = block(2 * 2 * lefts * valences);
-export const turnBack = block(2 * 2 * runs * rings * valences);
+export const ask = block(splitDegrees * 4 * 2 * 2);
+export const first = block(splitLefts * 2);
+export const turn = block(2 * 2 * splitLefts * splitValences);
+export const turnBack = block(2 * 2 * splitRuns * splitRings * splitValences);
 export const turnAgain = block(4);
 export const targetExpected = block(2);
 export const targetCopied = block(2);

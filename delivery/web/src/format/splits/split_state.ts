@@ -2,7 +2,52 @@ import { FormatError } from '../errors';
 import { BitDecoder, BitModels } from './split_coder';
 import { Corners, type Fan, Growing, type SplitMesh, none } from './split_mesh';
 import * as m from './split_models';
-import { SplitQueue } from './split_queue';
+
+/** Points that wait to be asked whether they split, in the order in which they joined; each waits once. */
+class SplitQueue {
+  /** By point: how often the point was asked without a split (3: or more often); 4: the point split the last time. */
+  readonly asks = new Growing();
+  private readonly queued_ = new Growing(); // by point
+  private readonly points_: number[] = [];
+  private next_ = 0;
+
+  addPoint(): void {
+    this.asks.push(0);
+    this.queued_.push(0);
+  }
+  get isEmpty(): boolean {
+    return this.next_ === this.points_.length;
+  }
+  push(point: number): void {
+    if (this.queued_.data[point]) return;
+    this.queued_.data[point] = 1;
+    this.points_.push(point);
+  }
+  shift(): number {
+    const point = this.points_[this.next_++];
+    this.queued_.data[point] = 0;
+    return point;
+  }
+  /** Queues all points of the mesh. */
+  refill(points: number): void {
+    this.points_.length = 0;
+    this.next_ = 0;
+    for (let p = 0; p < points; ++p) this.push(p);
+  }
+  /** Empties the queue, and forgets who was asked. */
+  reset(): void {
+    this.points_.length = 0;
+    this.next_ = 0;
+    this.queued_.data.fill(0);
+    this.asks.data.fill(0);
+  }
+  /** Frees the room of points that wait no more. */
+  compact(): void {
+    if (this.next_ <= 65536 || this.next_ * 2 <= this.points_.length) return;
+    this.points_.splice(0, this.next_);
+    this.next_ = 0;
+  }
+}
 
 /** A mesh never grows beyond these counts. */
 export interface SplitLimits {
@@ -46,7 +91,7 @@ export class SplitState {
   readonly guess = [0, 0, 0, 0];
   readonly wedges = new WedgeNotes();
   readonly queue = new SplitQueue();
-  private readonly models_ = new BitModels(m.modelCount, 200);
+  private readonly models_ = new BitModels(m.modelCount, m.limit);
   private bits_ = new BitDecoder(new Uint8Array(0));
   private work_ = 0;
   private list_ = 0; // number of the list of wedges that is offered

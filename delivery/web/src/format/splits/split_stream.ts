@@ -1,8 +1,8 @@
-import { samePrefix } from '../bytes';
+import { samePrefix, sha256 } from '../sha256';
 import { BytesIn } from '../bytes_in';
 import { FormatError } from '../errors';
 import { splitStreamPath as file } from '../layout';
-import { sha256 } from '../sha256';
+import { mostPerByte, mostSplits, splitStreamMajor } from '../shared_numbers';
 import { SplitCodec } from './split_codec';
 import { ValueDecoder, valueModelCount } from './split_coder';
 import { SplitMesh } from './split_mesh';
@@ -132,11 +132,11 @@ function readBlocks(input: BytesIn, count: number, partCount: number): SplitBloc
     const b: SplitBlock = {
       isPatch: code % 2 === 1, count: Math.floor(code / 2), offset: 0, parts: [], bytes: 0, digest: new Uint8Array(0),
     };
-    if (b.count === 0 || (!b.isPatch && b.count > 4096))
-      input.fail('1 to 4096 splits', b.count, 'S07');
+    if (b.count === 0 || (!b.isPatch && b.count > mostSplits))
+      input.fail(`1 to ${mostSplits} splits`, b.count, 'S07');
     for (let p = 0; p < partCount; ++p) b.parts.push(readVarint(input));
     b.bytes = b.parts.reduce((sum, n) => sum + n, 0);
-    if (b.bytes < Math.floor(b.count / 64)) input.fail('a byte for every 64', b.bytes, 'S07');
+    if (b.bytes < Math.floor(b.count / mostPerByte)) input.fail(`a byte for every ${mostPerByte}`, b.bytes, 'S07');
     b.digest = input.raw(8);
     blocks.push(b);
   }
@@ -144,14 +144,13 @@ function readBlocks(input: BytesIn, count: number, partCount: number): SplitBloc
 }
 
 /** Major version of streams that this reader is for; they have a version of their own. */
-const streamMajor = 2;
 
 /** Reads the head of a stream; checks everything that can be checked without the blocks. */
 export function readSplitHead(bytes: Uint8Array): SplitStreamHead {
   const input = new BytesIn(bytes, file, 'S08');
   input.expect('TXMS', 'S01');
   const major = input.u16();
-  if (major !== streamMajor) input.fail(`version ${streamMajor}`, major, 'S01');
+  if (major !== splitStreamMajor) input.fail(`version ${splitStreamMajor}`, major, 'S01');
   input.u16();
   const positionBits = readBits(input, 1);
   const attributeCount = input.u8();

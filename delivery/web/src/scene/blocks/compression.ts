@@ -1,14 +1,27 @@
 import { Source, type Texture, type WebGLRenderer } from 'three';
 import type { BlockFormat } from '../../blocks/formats';
-import type { BytesOf } from '../../decide/memory/gpu_memory';
+import type { BytesOf } from '../../decide/gpu_memory';
 import type { TextureInfo } from '../../format/textures';
 import type { WorkerPool } from '../../worker/pool';
+import type { PlaneComposer } from '../composer';
+import { eachPiece, uploadAll } from '../enlarge';
 import type { LoadContext } from '../load_context';
 import type { UploadQueue } from '../upload_queue';
-import { BlockStorage } from './block_storage';
+import { BlockStorage, readPicture } from './block_storage';
 import { type Way, blocksFor, bytesBy, formatsOf } from './gpu_formats';
-import { refill } from './refill';
 import { readTwoChannels } from './two_channels';
+
+/** Fills a plane of blocks with a texture, scaled bilinearly: the GPU draws it piece by piece, workers make the blocks. */
+export async function refill(next: PlaneComposer, from: Texture, format: BlockFormat | undefined, renderer: WebGLRenderer, pool: WorkerPool, uploads: UploadQueue): Promise<void> {
+  await eachPiece(next, uploads, async ({ x0, x1, y0, y1 }) => {
+    const [width, height] = [x1 - x0, y1 - y0];
+    let pixels: Uint8Array | undefined;
+    await uploads.enqueue(width * height, () => (pixels = readPicture(renderer, from, format, { x: x0, y: y0, width, height, of: [next.widthPx, next.heightPx] })));
+    if (!pixels) return; // the load has ended
+    const levels = await pool.blocksOf({ pixels, width, height, blocks: next.blocks!.request(x0, y0) });
+    await uploadAll(uploads, next.uploads(levels, x0, y0));
+  });
+}
 
 /** A plane to be stored, and what its load works with. */
 export interface StorageOptions {

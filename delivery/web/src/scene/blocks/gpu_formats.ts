@@ -1,7 +1,7 @@
 import { RED_GREEN_RGTC2_Format, RGBA_ASTC_4x4_Format, RGBA_BPTC_Format, RGBA_S3TC_DXT5_Format, RGB_ETC2_Format, RGB_S3TC_DXT1_Format, type WebGLRenderer } from 'three';
 import { type BlockFormat, blockBytes } from '../../blocks/formats';
-import type { BytesOf } from '../../decide/memory/gpu_memory';
-import { textureBytes } from '../../decide/memory/gpu_size';
+import type { BytesOf } from '../../decide/gpu_memory';
+import { textureBytes } from '../../decide/gpu_size';
 import type { TextureInfo } from '../../format/textures';
 
 /** How the planes of a package are stored: RGBA, or blocks of a format that suits each. */

@@ -1,7 +1,7 @@
 import type { WebGLRenderer } from 'three';
 import { describe, expect, it } from 'vitest';
 import type { BlockFormat } from '../../../src/blocks/formats';
-import { wayWithin } from '../../../src/decide/memory/gpu_memory';
+import { wayWithin } from '../../../src/decide/gpu_memory';
 import type { TextureInfo } from '../../../src/format/textures';
 import { blocksFor, bytesBy, formatsOf } from '../../../src/scene/blocks/gpu_formats';
 

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/tools/publish/report/html_check.h"
+#include "tests/tools/publish/pages/html_check.h"
 
 namespace texmesh {
 namespace {
@@ -47,7 +47,7 @@ TEST(CollectionPage, FailuresComeFirstInTheWordsOfTheErrors) {
 TEST(CollectionPage, PostersStandBesideThePageForTheFirstModels) {
   RunSummary s;
   for (const char* name : {"a", "b", "c"}) s.models.push_back(model(name, ModelResult::kUnchanged));
-  s.models[0].made_s = 90;
+  s.models[0].made = EarlierCost{90, 0};
   const CollectionPage page = collection_page(s, "posters", 2, a_face);
   ASSERT_EQ(page.files.size(), 2u);
   EXPECT_EQ(page.files[1].name, "posters/00001.jpg");

@@ -1,0 +1,103 @@
+#pragma once
+// Meshes as streams of KHR_draco_mesh_compression: one encoder, for meshes that are made and for those of
+// files.
+#include <array>
+#include <cstdint>
+#include <cstring>
+#include <map>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "format/base/vec.h"
+#include "stages/geometry/fit_normals.h"
+
+namespace draco {
+class Mesh;
+}
+
+namespace texmesh {
+
+/// Places that floats are rounded to: 2^bits along each axis, from `origin` to origin + range, ends included.
+struct DracoGrid {
+  int bits = 0;  // 0 = floats stay as they are
+  Vec3f origin;  // a fourth component begins where the third does
+  float range = 1;
+};
+
+/// One primitive of a file: its Draco stream, and the stream's id of every glTF attribute.
+struct DracoStream {
+  std::vector<std::uint8_t> bytes;
+  std::map<std::string, int> attributes;      // "POSITION" -> unique id
+  std::uint32_t vertices = 0, triangles = 0;  // as a decoder gives them
+  Vec3f low, high;                            // of the positions; of recode_draco() alone
+};
+
+/// Triangles and what their vertices have, on the way into a stream.
+class DracoMesh {
+ public:
+  /// `indices`: three a triangle, below `vertices`.
+  DracoMesh(std::span<const std::uint32_t> indices, std::size_t vertices);
+  ~DracoMesh();
+  DracoMesh(const DracoMesh&) = delete;
+  DracoMesh& operator=(const DracoMesh&) = delete;
+
+  /// Adds an attribute with glTF's name, of which vertex i has value(i): a vector of floats, or a std::array
+  /// of codes of 8 or 16 bits. Attributes stand in the stream in the order of the calls. Of normals the grid
+  /// tells the bits alone.
+  template <class Value>
+  void add(const std::string& name, const DracoGrid& grid, const Value& value) {
+    using Element = decltype(value(0u));
+    std::uint8_t* to = values_of(name, component_bytes(Element()), sizeof(Element), grid);
+    for (std::uint32_t i = 0; i < vertices_; ++i) {
+      const Element element = value(i);
+      std::memcpy(to + i * sizeof element, &element, sizeof element);
+    }
+  }
+  /// Edgebreaker, with seams of its own for every attribute, so that positions are stored once. `speed`: 0
+  /// makes the smallest streams, 10 is the fastest. Same bytes for same input. StageError when Draco refuses.
+  DracoStream encode(int speed);
+
+ private:
+  struct State;
+  template <class T, std::size_t N>
+  static std::size_t component_bytes(const std::array<T, N>&) {
+    return sizeof(T);
+  }
+  template <class V>
+  static std::size_t component_bytes(const V&) {
+    return sizeof(float);
+  }
+  std::uint8_t* values_of(const std::string& name, std::size_t component_bytes, std::size_t bytes,
+                          const DracoGrid& grid);
+  std::uint32_t vertices_;
+  std::unique_ptr<State> state_;
+};
+
+/// How fine a mesh is coded anew. Steps are the largest distance between neighbouring places of a grid.
+struct DracoSteps {
+  double position = 0;  // object units, > 0
+  double uv = 0;        // texture coordinates, > 0
+  int normal_bits = 8;
+  int colour_bits = 8;  // of the 8 that vertex colours have
+  /// Steps exactly so long. Otherwise a grid's last place is the end of what it holds, and its steps may be
+  /// half as long.
+  bool exact = false;
+};
+
+/// Codes the primitives of one file anew on coarser grids that all of them share, so that borders between
+/// primitives stay closed. When one stream does not get smaller, all streams of the file stay as they are
+/// (one grid for all). With `lit_as`, normals are fitted to `lit_as`, and the new streams are used however
+/// many bytes they have. FormatError when a stream does not decode; StageError when Draco refuses.
+void recode_draco(std::vector<DracoStream>& primitives, const DracoSteps& steps, const NormalSamples* lit_as,
+                  const std::string& entry, const RunContext& context);
+
+/// Gives values of an attribute that are equal bit for bit one index, and points that have all of their
+/// values in common one index; both are numbered in the order in which they first stand. So does Draco
+/// (DeduplicateAttributeValues, then DeduplicatePointIds), whose streams come out the same; its tables of
+/// nodes took a tenth of the time that writing half a million triangles takes. Fewer than 2^31 values and
+/// points.
+void merge_equal_points(draco::Mesh& mesh);
+
+}  // namespace texmesh

@@ -1,0 +1,62 @@
+#pragma once
+// Inside the room only: a surface contracted to a curve, the curve put into the middle, distances to it.
+#include <array>
+#include <span>
+
+#include "format/base/box.h"
+#include "stages/skeletonization/wrap.h"
+
+namespace texmesh {
+
+/// Line segments between nodes.
+struct CurveSkeleton {
+  std::vector<Vec3d> nodes;
+  std::vector<std::array<std::uint32_t, 2>> segments;
+};
+
+/// The mean curvature flow skeleton (Tagliasacchi et al. 2012, CGAL's defaults) of one connected closed
+/// oriented 2-manifold, contracted at most `max_contractions` times and then recentred (recentre()). CGAL's
+/// test whether a point is inside tries one random ray after the other until one misses every edge, which
+/// never happens on surfaces that lie on themselves (known upstream): after 1,000 rays from one point the
+/// contraction is given up. GeometryFailure for a surface that is not closed, where the contraction is given
+/// up, and where a check of CGAL fails. Deterministic, single-threaded.
+CurveSkeleton contract_to_skeleton(const TriangleSoup& closed, int max_contractions = 500);
+
+/// The poles (voronoi_poles()) of the surface's points that were contracted to a node.
+struct NodePoles {
+  Vec3d sum;
+  double count = 0;
+};
+
+/// Moves the nodes of a contracted curve into the middle of the solid: to the mean of their poles, smoothed
+/// over neighbouring nodes. Where the curve is thin already the contraction goes on to shorten it, and it
+/// cuts the corners of bends. Nodes on the way of the curve and at its ends move across it only, so that it
+/// keeps its length; branching points and lone nodes move anywhere. Nodes without poles within reach stay.
+/// `poles`: one for each node. Deterministic.
+void recentre(CurveSkeleton& curve, std::span<const NodePoles> poles);
+
+/// A bounding-volume tree over line segments for closest-distance queries. Segments of no length are points.
+class SegmentTree {
+ public:
+  /// At least one segment; every index below nodes.size().
+  SegmentTree(std::span<const Vec3d> nodes, std::span<const std::array<std::uint32_t, 2>> segments);
+
+  /// The distance from p to the closest segment. Safe to call from many threads.
+  double distance(Vec3d p) const;
+
+ private:
+  struct Segment {
+    Vec3d a, b;
+  };
+  struct Node {
+    Box3d box;
+    // Of a leaf: its segments. An inner node has count 0 and its children at its index + 1 and at `first`.
+    std::uint32_t first, count;
+  };
+  void build(std::uint32_t first, std::uint32_t count);
+
+  std::vector<Segment> segments_;
+  std::vector<Node> nodes_;
+};
+
+}  // namespace texmesh

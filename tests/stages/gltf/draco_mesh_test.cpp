@@ -1,0 +1,68 @@
+#include "stages/gltf/draco_mesh.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "format/base/errors.h"
+
+namespace texmesh {
+namespace {
+
+constexpr std::uint32_t kSide = 20;  // vertices of a wavy sheet
+
+Vec3f point(std::uint32_t i) {
+  const auto x = static_cast<float>(i % kSide), y = static_cast<float>(i / kSide);
+  return {x / kSide, y / kSide, 0.1f * std::sin(x) * std::cos(y)};
+}
+
+DracoStream sheet(int bits) {
+  std::vector<std::uint32_t> indices;
+  for (std::uint32_t y = 0; y + 1 < kSide; ++y)
+    for (std::uint32_t x = 0; x + 1 < kSide; ++x) {
+      const std::uint32_t a = y * kSide + x, b = a + 1, c = a + kSide, d = c + 1;
+      indices.insert(indices.end(), {a, b, c, c, b, d});
+    }
+  DracoMesh mesh(indices, kSide * kSide);
+  mesh.add("POSITION", {bits, {0, 0, -1}, 2}, point);
+  mesh.add("NORMAL", {8, {}, 1}, [](std::uint32_t) { return Vec3f{0, 0, 1}; });
+  mesh.add("TEXCOORD_0", {12, {}, 1}, [](std::uint32_t i) { return Vec2f{point(i).x, point(i).y}; });
+  mesh.add("COLOR_0", {}, [](std::uint32_t i) {
+    return std::array<std::uint8_t, 4>{static_cast<std::uint8_t>(i % 7), 2, 3, 255};
+  });
+  mesh.add("_FEATURE_ID_0", {}, [](std::uint32_t i) {
+    return std::array<std::uint16_t, 1>{static_cast<std::uint16_t>(i < kSide ? 1 : 300)};
+  });
+  return mesh.encode(3);
+}
+
+TEST(DracoMesh, HasEveryAttributeAndWhatADecoderCounts) {
+  const DracoStream stream = sheet(14);
+  EXPECT_EQ(stream.vertices, kSide * kSide);
+  EXPECT_EQ(stream.triangles, 2 * (kSide - 1) * (kSide - 1));
+  EXPECT_EQ(stream.attributes.size(), 5u);
+  std::vector<int> ids;
+  for (const auto& [name, id] : stream.attributes) ids.push_back(id);
+  std::ranges::sort(ids);
+  EXPECT_EQ(std::ranges::unique(ids).begin(), ids.end());
+  EXPECT_EQ(stream.bytes, sheet(14).bytes);
+  EXPECT_LT(sheet(8).bytes.size(), stream.bytes.size());
+}
+
+TEST(DracoMesh, IsCodedAnewOnACoarserGridWhereThatIsSmaller) {
+  std::vector<DracoStream> coarser{sheet(14)}, finer{sheet(8)};
+  const std::size_t before = coarser[0].bytes.size(), few = finer[0].bytes.size();
+  recode_draco(coarser, {0.01, 0.01, 6, 6}, nullptr, "mesh", {});
+  EXPECT_LT(coarser[0].bytes.size(), before);
+  EXPECT_EQ(coarser[0].triangles, 2 * (kSide - 1) * (kSide - 1));
+  EXPECT_NEAR(coarser[0].high.x, point(kSide - 1).x, 0.01);
+  recode_draco(finer, {1e-6, 1e-6, 10, 8}, nullptr, "mesh", {});
+  EXPECT_EQ(finer[0].bytes.size(), few) << "more bytes are not taken";
+  std::vector<DracoStream> damaged{sheet(14)};
+  damaged[0].bytes.resize(20);
+  EXPECT_THROW(recode_draco(damaged, {0.01, 0.01, 6, 6}, nullptr, "mesh", {}), FormatError);
+}
+
+}  // namespace
+}  // namespace texmesh

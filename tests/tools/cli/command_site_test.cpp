@@ -1,0 +1,163 @@
+// texmesh site as a user runs it: a site of good, damaged and hostile packages.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "tests/support/command.h"
+#include "tests/support/packages.h"
+#include "tests/support/schema.h"
+#include "tests/support/small_builds.h"
+#include "tests/tools/publish/pages/html_check.h"
+
+namespace texmesh::testing {
+namespace {
+
+using Json = nlohmann::json;
+namespace fs = std::filesystem;
+
+const std::string kGolden = TEXMESH_SOURCE_DIR "/tests/golden/";
+
+class SiteCommand : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    fs::create_directories(folder_ / "viewer");
+    fs::create_directories(folder_ / "in/deep");
+    write_text(folder_ / "viewer/index.html", "<!DOCTYPE html>");
+    add("b.texmesh", "Bust", {});
+  }
+  void add(const std::string& path, const std::string& title, const About& about) {
+    PackageParts parts = make_package_parts();
+    parts.manifest.title = title;
+    parts.about = about;
+    const Bytes bytes = parts.build();
+    write_text(folder_ / ("in/" + path), std::string(bytes.begin(), bytes.end()));
+  }
+  CommandResult site(std::vector<std::string> more = {}) {
+    std::vector<std::string> all{TEXMESH_BINARY,  "site",     folder_ / "in",    "-o",
+                                 folder_ / "www", "--viewer", folder_ / "viewer"};
+    all.insert(all.end(), more.begin(), more.end());
+    return run_command(all);
+  }
+  std::string text(const std::string& file) const { return read_text(folder_ / ("www/" + file)); }
+  bool exists(const std::string& file) const { return fs::exists(folder_ / ("www/" + file)); }
+  TemporaryFolder folder_;
+};
+
+/// Addresses of a page that are no file of the site.
+std::vector<std::string> broken_links(const fs::path& www, const std::string& page) {
+  std::vector<std::string> out;
+  const std::string html = read_text((www / page).string());
+  for (const char* name : {"href", "src"})
+    for (std::string link : attributes(html, name)) {
+      if (link.starts_with("#") || link.starts_with("https://")) continue;
+      link = link.substr(0, link.find('?'));
+      if (!fs::exists((www / page).parent_path() / link)) out.push_back(link);
+    }
+  return out;
+}
+
+TEST_F(SiteCommand, HasAPageForEveryPackageAndNoLinkLeadsNowhere) {
+  fs::copy_file(kGolden + "v2.0-scan.texmesh", folder_ / "in/deep/scan.texmesh");
+  fs::copy(kGolden + "v2.0-tree", folder_ / "in/tree", fs::copy_options::recursive);
+  const CommandResult r = site({"--title", "Casts & more", "--json"});
+  ASSERT_EQ(r.exit_code, 0) << r.errors;
+  const Json j = Json::parse(r.output);
+  EXPECT_TRUE(follows_schema(j, "site.v1"));
+  ASSERT_EQ(j["objects"].size(), 3u);
+  for (const Json& o : j["objects"]) {
+    const std::string page = o["page"];
+    EXPECT_EQ(tag_fault(text(page)), "") << page;
+    EXPECT_EQ(broken_links(folder_ / "www", page), std::vector<std::string>{}) << page;
+  }
+  EXPECT_EQ(tag_fault(text("index.html")), "");
+  EXPECT_EQ(broken_links(folder_ / "www", "index.html"), std::vector<std::string>{});
+  EXPECT_NE(text("index.html").find("<h1>Casts &amp; more</h1>"), std::string::npos);
+  EXPECT_EQ(text("packages/deep-scan.texmesh"), read_text(kGolden + "v2.0-scan.texmesh"));
+  EXPECT_TRUE(exists("packages/tree/manifest.json"));
+  EXPECT_EQ(Json::parse(text("viewer/packages.json"))["packages"].size(), 3u);
+}
+
+TEST_F(SiteCommand, SamePackagesGiveTheSameBytes) {
+  ASSERT_EQ(site().exit_code, 0);
+  const Packages first = packages_in(folder_ / "www");
+  ASSERT_EQ(site().exit_code, 0) << "an earlier site is replaced";
+  EXPECT_EQ(packages_in(folder_ / "www"), first);
+}
+
+TEST_F(SiteCommand, ADamagedPackageIsLeftOutAndSaidTheOthersAreThere) {
+  write_text(folder_ / "in/torn.texmesh", "no package");
+  ASSERT_EQ(run_command({"python3", kGolden + "make_later", kGolden + "v2.0-webp.texmesh",
+                         folder_ / "in/later.texmesh"})
+                .exit_code,
+            0);
+  const CommandResult r = site({"--json"});
+  EXPECT_EQ(r.exit_code, 1);
+  EXPECT_NE(r.errors.find("torn.texmesh"), std::string::npos);
+  const Json j = Json::parse(r.output);
+  EXPECT_EQ(j["objects"].size(), 2u);
+  ASSERT_EQ(j["faults"].size(), 1u);
+  EXPECT_EQ(j["faults"][0]["package"], "torn.texmesh");
+  EXPECT_FALSE(exists("packages/torn.texmesh"));
+}
+
+TEST_F(SiteCommand, HostileTextAndNamesStayText) {
+  About about;
+  about.description = "{{facts}}<iframe src=x>";
+  about.attribution = "\" onmouseover=\"alert(1)";
+  about.licence = "</a><script>alert(1)</script>";
+  add("<script>alert(2).texmesh", "\"'><img src=x onerror=alert(1)>", about);
+  add("\xff\xfe \n\".texmesh", "", {});
+  add("a b.texmesh", "", {});
+  add("a-b.texmesh", "", {});
+  add("A-B.texmesh", "", {});
+  const CommandResult r = site({"--json", "--title", "<b>{{cards}}"});
+  ASSERT_EQ(r.exit_code, 0) << r.errors;
+  const Json j = Json::parse(r.output);
+  ASSERT_EQ(j["objects"].size(), 6u);
+  EXPECT_TRUE(follows_schema(j, "site.v1"));
+  std::set<std::string> pages;
+  for (const Json& o : j["objects"]) {
+    std::string page = o["page"];
+    const std::string html = text(page);
+    EXPECT_EQ(tag_fault(html), "") << page;
+    for (const char* tag : {"<iframe", "<script>", "<img src=x", "<b>"})
+      EXPECT_EQ(html.find(tag), std::string::npos) << tag;
+    EXPECT_TRUE(attributes(html, "onmouseover").empty());
+    EXPECT_EQ(broken_links(folder_ / "www", page), std::vector<std::string>{});
+    std::ranges::transform(page, page.begin(), [](unsigned char c) { return std::tolower(c); });
+    pages.insert(page);
+  }
+  EXPECT_EQ(pages.size(), 6u) << "names differ on file systems that know no case, too";
+  EXPECT_EQ(text("index.html").find("<b>"), std::string::npos);
+}
+
+TEST_F(SiteCommand, LinksAndHiddenFilesAreNotFollowed) {
+  write_text(folder_ / "secret.texmesh", read_text(folder_ / "in/b.texmesh"));
+  fs::create_symlink(folder_ / "secret.texmesh", folder_ / "in/link.texmesh");
+  write_text(folder_ / "in/.hidden.texmesh", read_text(folder_ / "in/b.texmesh"));
+  const Json j = Json::parse(site({"--json"}).output);
+  EXPECT_EQ(j["objects"].size(), 1u);
+}
+
+TEST_F(SiteCommand, PackagesMayStandElsewhere) {
+  ASSERT_EQ(site({"--packages-url", "https://files.example/a b"}).exit_code, 2);
+  ASSERT_EQ(site({"--packages-url", "https://files.example/x"}).exit_code, 0);
+  EXPECT_FALSE(exists("packages"));
+  EXPECT_NE(text("objects/b.html").find("pkg=https%3A//files.example/x/b.texmesh"), std::string::npos);
+}
+
+TEST_F(SiteCommand, OtherFoldersAndEmptyOnesAreRefused) {
+  fs::create_directories(folder_ / "www");
+  write_text(folder_ / "www/mine.txt", "x");
+  EXPECT_EQ(site().exit_code, 1);
+  EXPECT_EQ(text("mine.txt"), "x");
+  fs::remove_all(folder_ / "www");
+  fs::remove(folder_ / "in/b.texmesh");
+  EXPECT_EQ(site().exit_code, 1);
+  EXPECT_FALSE(fs::exists(folder_ / "www"));
+  EXPECT_EQ(run_command({TEXMESH_BINARY, "site", folder_ / "in"}).exit_code, 2);
+}
+
+}  // namespace
+}  // namespace texmesh::testing

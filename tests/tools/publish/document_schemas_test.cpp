@@ -1,0 +1,29 @@
+// Schemas of the documents that commands print stand in schemas/ as the program gives them.
+// TEXMESH_WRITE_SCHEMAS=1 writes them.
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+
+#include "pipeline/io/record.h"
+#include "tests/support/command.h"
+#include "tools/inspect/atlas/atlas_report.h"
+#include "tools/inspect/diff/diff.h"
+#include "tools/inspect/verify/verify.h"
+#include "tools/publish/export/export.h"
+#include "tools/publish/report/report.h"
+#include "tools/publish/site/site.h"
+
+namespace texmesh::testing {
+namespace {
+
+TEST(DocumentSchemas, AreThoseOfTheProgram) {
+  for (const DocumentSchema& schema :
+       {diff_schema(), doctor_schema(), export_schema(), report_schema(), site_schema(), verify_schema()}) {
+    const std::string file = std::string(TEXMESH_SOURCE_DIR "/schemas/") + schema.name + ".schema.json";
+    if (std::getenv("TEXMESH_WRITE_SCHEMAS")) write_text(file, schema.text);
+    EXPECT_EQ(read_text(file), schema.text) << file;
+  }
+}
+
+}  // namespace
+}  // namespace texmesh::testing

@@ -1,0 +1,44 @@
+// The JSON Schemas of what texmesh reads and prints. Each is made of the description that also reads and
+// writes the document; schemas/NAME.schema.json in the sources hold the same texts.
+#include <iostream>
+
+#include "pipeline/batch/write_reports.h"
+#include "pipeline/io/record.h"
+#include "tools/cli/commands.h"
+#include "tools/cli/options/command_line.h"
+#include "tools/inspect/atlas/atlas_report.h"
+#include "tools/inspect/diff/diff.h"
+#include "tools/inspect/verify/verify.h"
+#include "tools/publish/export/export.h"
+#include "tools/publish/report/report.h"
+#include "tools/publish/site/site.h"
+
+namespace texmesh {
+namespace {
+
+std::vector<DocumentSchema> command_schemas() {
+  std::vector<DocumentSchema> all = pipeline_schemas();
+  for (DocumentSchema& schema : std::vector{diff_schema(), doctor_schema(), export_schema(), report_schema(),
+                                            site_schema(), verify_schema()})
+    all.push_back(std::move(schema));
+  return all;
+}
+
+}  // namespace
+
+void add_schema_command(Command& app) {
+  auto name = std::make_shared<std::string>();
+  Command c = app.add("schema", "Print the JSON Schema of a document that texmesh reads or prints");
+  c.hidden();
+  std::vector<std::string> names;
+  for (const DocumentSchema& schema : command_schemas()) names.push_back(schema.name);
+  c.option("NAME", *name, "The document").required().one_of(names);
+  c.examples("  texmesh schema profile.v1");
+  c.on_run([name] {
+    for (const DocumentSchema& schema : command_schemas())
+      if (*name == schema.name) std::cout << schema.text;
+    return kExitOk;
+  });
+}
+
+}  // namespace texmesh

@@ -1,0 +1,142 @@
+#include "tools/cli/painting.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "format/base/errors.h"
+#include "pipeline/cache/disk_store.h"
+#include "pipeline/compile/option_fields.h"
+#include "pipeline/compile/profile.h"
+#include "pipeline/io/atomic_file.h"
+#include "pipeline/io/file_resolver.h"
+#include "pipeline/io/record.h"
+#include "pipeline/io/table.h"
+#include "tools/cli/options/command_line.h"
+#include "tools/inspect/package_mesh.h"
+
+namespace texmesh {
+namespace {
+
+std::string hex(Srgb c) { return fmt::format("#{:02x}{:02x}{:02x}", c[0], c[1], c[2]); }
+
+}  // namespace
+
+template <>
+struct RecordFields<LegendStop> {
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("value", s.value, "");
+    v("colour", hex(s.colour), "");
+  }
+};
+
+namespace {
+
+/// What --json prints. Range, stops and the rest of the scale of colours are left out where there is none.
+struct PaintedDocument {
+  const Painting& painting;
+  const ColourLegend& legend;
+  const Notes& notes;
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("what", s.painting.what, "");
+    v("output", s.painting.output, "");
+    v("quantity", s.legend.quantity, "");
+    if (s.legend.coloured) {
+      v("unit", s.legend.unit, "");
+      v("range", std::array{s.legend.lo, s.legend.hi}, "");
+      v("logarithmic", s.legend.logarithmic, "");
+      v("stops", s.legend.stops, "");
+    }
+    v("remarks", s.legend.remarks, "");
+    v("notes", s.notes, "");
+  }
+};
+
+/// Profile first, then --set over it.
+CompileOptions options_of(const Painting& p) {
+  CompileOptions options;
+  if (!p.profile.empty()) {
+    const std::string file = profile_file(p.profile);
+    const auto bytes = read_input_file(file, 1 << 20);
+    read_profile(options, std::string(bytes.begin(), bytes.end()), file);
+  }
+  std::vector<OptionField> fields = list_options(options);
+  for (const std::string& setting : p.settings) {
+    const std::size_t equals = setting.find('=');
+    const std::string path = setting.substr(0, equals);
+    OptionField* field = find_option(fields, path);
+    if (equals == std::string::npos || !field)
+      throw UsageError("--set", "", "STAGE.OPTION=VALUE with an option that texmesh compile --help-all lists",
+                       setting);
+    set_option(*field, setting.substr(equals + 1), "--set " + path);
+  }
+  check_options(options, "command line");
+  return options;
+}
+
+bool ends_with_either(const std::string& path, const char* ending, const char* large) {
+  return path.ends_with(ending) || path.ends_with(large);
+}
+
+CompileRequest painting_request(const Painting& p) {
+  CompileRequest request;
+  request.input = p.input;
+  try {
+    request.options = options_of(p);
+  } catch (const InputError& e) {  // what was asked for makes no sense
+    throw UsageError(e.file(), e.place(), e.expected(), e.found());
+  }
+  return request;
+}
+
+PaintedModel paint(const Painting& p, const PaintedQuantity& what, Notes& notes) {
+  const CompileRequest request = painting_request(p);
+  const RunContext context = context_of(p.jobs);
+  if (is_package(p.input)) return paint_package(p.input, what, context);
+  const std::unique_ptr<Store> store =
+      p.cache.off ? std::make_unique<NullStore>() : open_disk_store(default_cache_folder(p.cache.folder));
+  return paint_model(request, what, *store, context, {}, notes);
+}
+
+void print_legend(const Painting& p, const ColourLegend& legend, const Notes& notes) {
+  std::cout << p.output << "\n" << legend.quantity;
+  if (!legend.unit.empty()) std::cout << ", " << legend.unit;
+  std::cout << '\n';
+  for (const LegendStop& stop : legend.stops)
+    std::cout << fmt::format("  {}  {:<11}  {}\n", hex(stop.colour), stop.name, shortest(stop.value));
+  if (legend.logarithmic) std::cout << "  (equal steps of colour are equal ratios)\n";
+  for (const std::string& remark : legend.remarks) std::cout << "- " << remark << '\n';
+  for (const Note& n : notes)
+    if (n.severity == Severity::kWarning)
+      std::cerr << "warning: " << n.code << (n.place.empty() ? "" : ": " + n.place) << ": " << n.text << '\n';
+}
+
+}  // namespace
+
+void add_painting_options(Command& c, Painting& painting) {
+  c.option("--profile", painting.profile, "JSON file of options, as for compile").value_name("FILE");
+  c.option("--set", painting.settings,
+           "STAGE.OPTION=VALUE over the profile, as compile's --STAGE.OPTION; may be repeated")
+      .value_name("OPTION=VALUE");
+  add_cache_options(c, painting.cache);
+}
+
+int run_painting(const Painting& p, std::span<const PaintedQuantity> quantities) {
+  const bool png = ends_with_either(p.output, ".png", ".PNG");
+  if (!png && !ends_with_either(p.output, ".glb", ".GLB"))
+    throw UsageError("--output", "", "a name that ends in .glb (to turn it in any viewer) or .png", p.output);
+  Notes notes;
+  const auto what = std::ranges::find(quantities, std::string_view(p.what), &PaintedQuantity::name);
+  const PaintedModel model = paint(p, *what, notes);
+  write_output_file(p.output, png ? write_painted_png(model, static_cast<std::uint32_t>(p.size_px))
+                                  : write_painted_glb(model));
+  if (p.json)
+    std::cout << to_json_line(PaintedDocument{p, model.legend, notes}) << '\n';
+  else
+    print_legend(p, model.legend, notes);
+  return kExitOk;
+}
+
+}  // namespace texmesh

@@ -1,0 +1,295 @@
+#include "tools/extract/budget/reference.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "format/base/errors.h"
+#include "format/container/layout.h"
+#include "stages/base/parallel.h"
+#include "tools/extract/glb/scale_file.h"
+
+namespace texmesh {
+namespace {
+
+constexpr int kViews = 5;
+constexpr std::uint32_t kLeastSide = 4;
+constexpr double kWholeBlocks = 16;
+constexpr int kWindowsPerView = 1;
+constexpr std::uint32_t kWindowPx = 80;
+constexpr double kFinestShown = 12;  // texels per pixel: pictures hardly read finer ones
+
+RunContext serial(const RunContext& context) {
+  RunContext one = context;
+  one.threads = 1;
+  return one;
+}
+
+bool covered(const Visibility& view, std::size_t pixel) { return view.first[pixel] < view.first[pixel + 1]; }
+
+/// A camera at the same place that looks at a pixel, with pixels of the same size.
+LitCamera window_at(const Visibility& view, std::size_t pixel, std::uint32_t side_px) {
+  const RenderCamera& from = view.camera;
+  const double pitch = 2 * from.tan_half_fov / view.side_px;
+  const auto offset = [&](std::size_t place) {
+    return (static_cast<double>(place) + 0.5 - 0.5 * view.side_px) * pitch;
+  };
+  const Vec3d towards =
+      from.x * offset(pixel % view.side_px) - from.y * offset(pixel / view.side_px) - from.z;
+  LitCamera out{look_at_camera(from.eye, from.eye + towards, from.y, kRenderFovDegrees, from.near), side_px};
+  out.camera.tan_half_fov = pitch * 0.5 * side_px;
+  return out;
+}
+
+using Materials = std::vector<RenderMaterial>;
+
+/// The materials with slots that read other textures: place[t] instead of t, where it is not negative.
+Materials with_textures(Materials materials, const std::vector<std::int32_t>& place) {
+  for (RenderMaterial& m : materials)
+    for (TextureSlot& slot : m.textures) {
+      const std::int32_t other = slot.texture < 0 ? -1 : place[static_cast<std::size_t>(slot.texture)];
+      if (other >= 0) slot.texture = other;
+    }
+  return materials;
+}
+
+double longest_side(const Mesh& mesh) {
+  const double side = to_double(bounding_box(mesh.positions)).longest_side();
+  return side > 0 ? side : 1;
+}
+
+BoundingSphere sphere_of(const Mesh& mesh) {
+  if (mesh.positions.empty()) throw StageError("extract", "S_0", "positions", "none");
+  const BoundingSphere sphere = bounding_sphere(mesh.positions);
+  if (!(sphere.radius > 0)) throw StageError("extract", "S_0", "an extent above 0", "one point");
+  return sphere;
+}
+
+}  // namespace
+
+std::vector<LitCamera> cameras_around(const BoundingSphere& bounds, int count, std::uint32_t side_px) {
+  std::vector<LitCamera> out;
+  for (int v = 0; v < count; ++v)
+    out.push_back({perspective_camera(camera_of(v, count, bounds.centre, bounds.radius)), side_px});
+  return out;
+}
+
+LitViews::LitViews(const LitMesh& mesh, const std::vector<LitCamera>& cameras, const RunContext& context)
+    : mesh_(&mesh), views_(cameras.size()) {
+  const RenderScene scene = render_scene(mesh.mesh, mesh.materials, mesh.texture_count);
+  parallel_for(context, cameras.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t v = begin; v < end; ++v)
+      views_[v] = look(scene, cameras[v].camera, cameras[v].side_px, serial(context));
+  });
+}
+
+std::uint64_t LitViews::covered_px(std::size_t view) const {
+  std::uint64_t count = 0;
+  for (std::size_t i = 0; i + 1 < views_[view].first.size(); ++i) count += covered(views_[view], i);
+  return count;
+}
+
+Picture LitViews::picture(std::size_t view, const std::vector<RenderTexture>& textures,
+                          const RenderEnvironment& environment, const RunContext& context) const {
+  return shade(render_scene(mesh_->mesh, mesh_->materials, mesh_->texture_count), views_[view], textures,
+               environment, context);
+}
+
+PictureVariants LitViews::pictures(std::size_t view, const std::vector<const Materials*>& materials,
+                                   const std::vector<RenderTexture>& textures,
+                                   const RenderEnvironment& environment, const RunContext& context) const {
+  return shade_variants(render_scene(mesh_->mesh, mesh_->materials, textures.size()), views_[view], materials,
+                        textures, environment, context);
+}
+
+std::vector<LitCamera> windows_of(const LitViews& views, int per_view, std::uint32_t side_px) {
+  std::vector<LitCamera> out;
+  for (std::size_t v = 0; v < views.count(); ++v) {
+    const Visibility& view = views.visibility(v);
+    std::vector<std::size_t> shown;
+    for (std::size_t i = 0; i + 1 < view.first.size(); ++i)
+      if (covered(view, i)) shown.push_back(i);
+    if (shown.empty()) continue;
+    // In raster order, so that the places are spread from top to bottom; by another part of a step in every
+    // view.
+    for (int k = 0; k < per_view; ++k) {
+      const double rank = (k + 0.25 + 0.5 * static_cast<double>(v) / static_cast<double>(views.count())) /
+                          per_view * static_cast<double>(shown.size());
+      out.push_back(
+          window_at(view, shown[std::min(static_cast<std::size_t>(rank), shown.size() - 1)], side_px));
+    }
+  }
+  return out;
+}
+
+LitMeter::LitMeter(const LitViews& views, const std::vector<RenderTexture>& textures,
+                   const RenderEnvironment& environment, const RunContext& context)
+    : environment_(environment), reference_(views.count()), weights_(views.count()) {
+  parallel_for(context, views.count(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t v = begin; v < end; ++v)
+      reference_[v] = prepare_flip(views.picture(v, textures, environment_, serial(context)));
+  });
+  double sum = 0;
+  for (std::size_t v = 0; v < views.count(); ++v)
+    sum += weights_[v] =
+        static_cast<double>(std::count(reference_[v].covered.begin(), reference_[v].covered.end(), 1));
+  for (double& w : weights_) w = sum > 0 ? w / sum : 0;
+}
+
+double LitMeter::difference(const LitViews& views, const std::vector<RenderTexture>& textures,
+                            const RunContext& context) const {
+  std::vector<double> parts(reference_.size());
+  parallel_for(context, parts.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t v = begin; v < end; ++v)
+      parts[v] =
+          flip_of(reference_[v], prepare_flip(views.picture(v, textures, environment_, serial(context))));
+  });
+  double sum = 0;
+  for (std::size_t v = 0; v < parts.size(); ++v) sum += weights_[v] * parts[v];
+  return sum;
+}
+
+std::vector<double> LitMeter::differences(const LitViews& views, const std::vector<RenderTexture>& textures,
+                                          std::vector<OtherTextures>&& changes,
+                                          const RunContext& context) const {
+  std::vector<RenderTexture> all = textures;
+  // First the one that most textures of the others are of: they take over what was found of it.
+  std::vector<Materials> materials(1, views.mesh().materials);
+  for (OtherTextures& change : changes) {
+    std::vector<std::int32_t> place(textures.size(), -1);
+    for (auto& [t, texture] : change) {
+      place.at(t) = static_cast<std::int32_t>(all.size());
+      all.push_back(std::move(texture));
+    }
+    materials.push_back(with_textures(views.mesh().materials, place));
+  }
+  std::vector<const Materials*> lists;
+  for (const Materials& m : materials) lists.push_back(&m);
+  std::vector<double> sums(changes.size());
+  for (std::size_t v = 0; v < reference_.size(); ++v) {
+    const PictureVariants pictures = views.pictures(v, lists, all, environment_, context);
+    parallel_for(context, sums.size(), 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t k = begin; k < end; ++k)
+        sums[k] += weights_[v] * flip_of(reference_[v], prepare_flip(pictures.picture(k + 1)));
+    });
+  }
+  return sums;
+}
+
+Reference::Reference(PackageReader& from, const ExtractBudget& asked, bool keep_near_0,
+                     TextureSource& textures, const RunContext& run)
+    : package(from),
+      wishes(asked),
+      recentre(keep_near_0),
+      context(run),
+      side_px(static_cast<std::uint32_t>(std::clamp(asked.display_px, 64.0, 768.0))),
+      images(textures.images()) {
+  context.progress = nullptr;
+  source = read_model(scale_file(package, 0, context), mesh_path(0), context);
+  const BoundingSphere sphere = sphere_of(source.mesh);
+  light = normal_samples(source.mesh);
+  extent = longest_side(source.mesh);
+  cameras = cameras_around(sphere, kViews, side_px);
+  find_textures();
+  find_groups();
+  finest = lit_mesh(source);
+  {
+    const LitViews views(finest, cameras, context);
+    measure_surface(views);
+    windows = side_px < 2 * kWindowPx ? cameras : windows_of(views, kWindowsPerView, kWindowPx);
+  }
+  read_best_textures(textures);
+  environment = studio_environment();
+  finest_windows = std::make_unique<LitViews>(finest, windows, context);
+  window_meter = std::make_unique<LitMeter>(*finest_windows, best_textures, environment, context);
+  whole_meter =
+      std::make_unique<LitMeter>(LitViews(finest, cameras, context), best_textures, environment, context);
+}
+
+std::int32_t Reference::shown_texture(const Model& model, const TextureRef& reference, TextureUse use) const {
+  const std::vector<Vec2f>& uv = reference.texcoord == 0 ? model.mesh.uv0 : model.mesh.uv1;
+  if (!reference.used() || reference.texcoord > 1 || uv.empty()) return -1;
+  const std::string& name = model.images.at(static_cast<std::size_t>(reference.image)).name;
+  for (std::size_t t = 0; t < shown.size(); ++t)
+    if (shown[t].srgb == is_srgb(use) && image_name(images[shown[t].image].image) == name)
+      return static_cast<std::int32_t>(t);
+  return -1;
+}
+
+void Reference::find_textures() {
+  for (const Material& m : source.materials)
+    render_material(m, [&](const TextureRef& reference, TextureUse use) {
+      if (reference.texcoord > 1 || shown_texture(source, reference, use) >= 0) return -1;
+      for (std::size_t i = 0; i < images.size(); ++i)
+        if (image_name(images[i].image) == source.images.at(static_cast<std::size_t>(reference.image)).name)
+          shown.push_back({i, is_srgb(use)});
+      return -1;
+    });
+}
+
+/// Images of one material are of one group.
+void Reference::find_groups() {
+  for (std::size_t i = 0; i < images.size(); ++i) groups.push_back(i);
+  for (const Material& m : source.materials) {
+    std::vector<std::size_t> together;
+    render_material(m, [&](const TextureRef& reference, TextureUse use) {
+      const std::int32_t t = shown_texture(source, reference, use);
+      if (t >= 0) together.push_back(groups[shown[static_cast<std::size_t>(t)].image]);
+      return -1;
+    });
+    for (std::size_t& g : groups)
+      if (std::find(together.begin(), together.end(), g) != together.end()) g = together.front();
+  }
+}
+
+LitMesh Reference::lit_mesh(Model& model) const {
+  LitMesh out;
+  out.texture_count = shown.size();
+  for (const Material& m : model.materials)
+    out.materials.push_back(render_material(m, [&](const TextureRef& reference, TextureUse use) {
+      return shown_texture(model, reference, use);
+    }));
+  out.mesh = std::move(model.mesh);
+  return out;
+}
+
+/// Texels that S_0 shows over the pixels that its whole surface has on the screen: four times its mean
+/// outline, as if it were convex.
+void Reference::measure_surface(const LitViews& views) {
+  constexpr std::uint32_t kSide = 256;
+  double pixels = 0;
+  for (std::size_t v = 0; v < views.count(); ++v) pixels += static_cast<double>(views.covered_px(v));
+  pixels = std::max(4 * pixels / kViews, 1.0);
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    double covered = 0;
+    for (const std::uint8_t bits : shown_texels(i, kSide, kSide)) covered += std::popcount(bits);
+    texels_per_pixel.push_back(covered / (kSide * kSide) * images[i].width_px * images[i].height_px / pixels);
+  }
+}
+
+void Reference::read_best_textures(TextureSource& textures) {
+  for (std::size_t i = 0; i < images.size() && wishes.images != ExtractImages::kPng; ++i)
+    textures.set_shown(i, shown_texels(i, images[i].width_px, images[i].height_px));
+  for (const PictureTexture& t : shown) {
+    const PackageImage& from = images[t.image];
+    double share = 1;  // halves, not sharpened: the source's own smaller copies
+    while (texels_per_pixel[t.image] * share * share > kFinestShown) share /= 2;
+    best_textures.push_back(render_texture(
+        textures.texels(t.image, side_of(from.width_px, share), side_of(from.height_px, share), {}, 0),
+        t.srgb, 0, context));
+  }
+}
+
+std::vector<std::uint8_t> Reference::shown_texels(std::size_t image, std::uint32_t width_px,
+                                                  std::uint32_t height_px) const {
+  return texmesh::shown_texels(finest.mesh, source, images[image].image, width_px, height_px);
+}
+
+std::uint32_t side_of(std::uint32_t full, double share) {
+  double side = std::floor(static_cast<double>(full) * share + 0.5);
+  if (side >= 8 * kWholeBlocks && side < full) side = std::floor(side / kWholeBlocks + 0.5) * kWholeBlocks;
+  return static_cast<std::uint32_t>(
+      std::clamp(side, std::min<double>(kLeastSide, full), static_cast<double>(full)));
+}
+
+}  // namespace texmesh

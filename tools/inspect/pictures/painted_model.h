@@ -1,0 +1,83 @@
+#pragma once
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "delivery/cpp/package/package_reader.h"
+#include "format/model/model.h"
+#include "stages/base/run_context.h"
+#include "stages/data/conditioned_mesh.h"
+#include "stages/data/fragments.h"
+#include "stages/data/pixels.h"
+#include "stages/data/scale_map.h"
+#include "stages/measure/atlas/atlas_figures.h"
+
+namespace texmesh {
+
+// What a stage computed as something to look at: `texmesh render --what`, and `texmesh-lab picture`.
+
+using Srgb = std::array<std::uint8_t, 3>;
+
+/// A value of the scale of colours, its colour, and what people call that.
+struct LegendStop {
+  double value = 0;
+  Srgb colour{};
+  const char* name = "";
+};
+
+/// What the colours mean. Values outside lo..hi have the colour of the nearer end.
+struct ColourLegend {
+  std::string quantity, unit = {};  // unit "" = a plain number
+  double lo = 0, hi = 1;
+  bool logarithmic = false, coloured = true;  // coloured = false: there is no scale of colours
+  std::vector<LegendStop> stops = {};         // rising values
+  std::vector<std::string> remarks = {};      // sentences without a final full stop
+};
+
+/// A mesh whose colours (or painted textures) show something, and lines beside it. Pictures are a
+/// function of it.
+struct PaintedModel {
+  Mesh mesh;                        // colours: linear RGBA per wedge; empty where textures show
+  std::vector<Material> materials;  // for mesh.triangle_material; texture refs index `textures`
+  std::vector<Pixels> textures;     // 3 channels, sRGB
+  bool shows_layout = false;        // the textures themselves say something: a PNG has them, too
+  bool translucent = false;         // lines inside the mesh must be seen through it
+  std::vector<Vec3f> nodes;
+  std::vector<std::array<std::uint32_t, 2>> lines;  // both ends equal = a point
+  ColourLegend legend;
+};
+
+/// The scale of colours: dark violet for 0, over teal, to yellow for 1; brightness rises all the way.
+Srgb colour_of(double fraction);
+
+/// The mesh alone, one matt material, colours from a value per position; the legend gets its stops.
+/// StageError where the number of values is another; `what` names them in the message.
+PaintedModel paint_values(const Mesh& source, const std::vector<double>& value, ColourLegend legend,
+                          const char* what);
+/// "12.5 %"
+std::string share_text(double count, double of);
+
+/// Up to which scale a vertex stays a feature. Features are painted as far as half the distance that they
+/// keep from others of their scale.
+PaintedModel paint_scales(const ConditionedMesh& mesh, const ScaleMap& scale_map);
+/// eta of feature scale 0 painted over the texture, with the grid's lines.
+PaintedModel paint_fragments(const ConditionedMesh& mesh, const std::vector<Material>& materials,
+                             const std::vector<Image>& images, const Fragments& fragments);
+/// The same from a package: S_0's mesh, previews and tables.
+PaintedModel paint_fragments(PackageReader& package, const RunContext& context);
+/// Every chart in a colour of its own, thin ones red, texels of two places magenta. `images`: sides, as
+/// measure_atlases() takes them. InputError for a mesh without an atlas.
+PaintedModel paint_atlas(const Mesh& mesh, const std::vector<Material>& materials,
+                         std::span<const AtlasImage> images);
+PaintedModel paint_atlas(PackageReader& package, const RunContext& context);
+
+/// GLB: the mesh (COLOR_0 or textures), then the lines as a primitive of mode LINES in a node "lines".
+std::vector<std::uint8_t> write_painted_glb(const PaintedModel& model);
+/// Two views side by side from opposite sides, a little from above, each side_px wide; lines are drawn over
+/// the mesh. A bar at the right shows the scale of colours, hi at the top. With shows_layout the first four
+/// textures stand at the right, each within side_px.
+std::vector<std::uint8_t> write_painted_png(const PaintedModel& model, std::uint32_t side_px);
+
+}  // namespace texmesh

@@ -1,0 +1,51 @@
+#pragma once
+#include <map>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "delivery/cpp/package/package_reader.h"
+
+namespace texmesh {
+
+// How every page of HTML is made: a template that the build puts into the program, values in its places, and
+// the style that all pages share. Tables come from Table::html() (pipeline/io/table.h), curves from
+// Plot::svg().
+
+/// A file of a room's page/, as the build puts it into the program (cmake/PageFiles.cmake).
+struct BuiltInFile {
+  std::string_view name, text;
+};
+std::span<const BuiltInFile> export_page_files();  // of tools/publish/export/page
+std::span<const BuiltInFile> pages_page_files();   // of tools/publish/pages/page
+std::span<const BuiltInFile> site_page_files();    // of tools/publish/site/page
+
+/// The text of the file with that name, which is there.
+std::string_view built_in_text(std::span<const BuiltInFile> files, std::string_view name);
+/// The style that all pages share, with a room's own behind it.
+std::string page_style(std::string_view own);
+
+/// Values by their names; what is HTML already, and what was escaped.
+using TemplateValues = std::map<std::string, std::string, std::less<>>;
+/// `text` with the value of NAME in the place of every {{NAME}}. A value is not looked into, whatever it
+/// holds. std::logic_error for a name without a value.
+std::string filled(std::string_view text, const TemplateValues& values);
+
+/// A page that stands alone: no script, nothing from elsewhere but files beside it. Light and dark by the
+/// reader's choice, and fit to print. `title` is plain text, `body` HTML. The first line is
+/// kReportFirstLine.
+std::string html_page(const std::string& title, const std::string& body);
+/// A section of such a page with a heading; `body` is HTML, `id` a name of letters.
+std::string html_section(const std::string& id, const std::string& heading, const std::string& body);
+/// By this line a report is known from other pages.
+inline constexpr std::string_view kReportFirstLine = "<!DOCTYPE html><!-- texmesh report 1 -->\n";
+
+/// The last part of a path, also where a slash stands behind it.
+std::string last_name(const std::string& path);
+/// Title of a page about the package: what the package calls itself, or its file. Plain text.
+std::string package_title(PackageReader& package);
+/// A paragraph of HTML: whose the object is, and the licence as a link to where it can be read; "" where
+/// nothing is known.
+std::string rights_line(const About& about);
+
+}  // namespace texmesh

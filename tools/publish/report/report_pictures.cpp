@@ -1,0 +1,168 @@
+#include "tools/publish/report/report_pictures.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "format/rules/allocation.h"
+#include "pipeline/io/markup.h"
+#include "stages/image/png_writer.h"
+#include "stages/measure/flip.h"
+#include "stages/render/shade.h"
+
+namespace texmesh {
+namespace {
+
+// Every eighth of the map "magma" (van der Walt and Smith, 2015), the one that FLIP's authors use.
+constexpr std::array<std::array<int, 3>, 9> kStops{{{0, 0, 4},
+                                                    {28, 16, 68},
+                                                    {79, 18, 123},
+                                                    {129, 37, 129},
+                                                    {181, 54, 122},
+                                                    {229, 80, 100},
+                                                    {251, 135, 97},
+                                                    {254, 194, 135},
+                                                    {252, 253, 191}}};
+
+constexpr std::uint32_t kMargin = 6;  // px around the object
+constexpr int kMostEnlarged = 6;
+
+struct Rectangle {
+  std::uint32_t left = 0, top = 0, right = 0, bottom = 0;  // right and bottom are outside
+};
+
+/// What either picture shows with its margin; all where they show nothing.
+Rectangle shown_part(const Picture& a, const Picture& b) {
+  const std::uint32_t side = a.side_px;
+  Rectangle r{side, side, 0, 0};
+  for (std::uint32_t y = 0; y < side; ++y)
+    for (std::uint32_t x = 0; x < side; ++x) {
+      const std::size_t i = std::size_t{y} * side + x;
+      if (!a.covered[i] && !b.covered[i]) continue;
+      r = {std::min(r.left, x), std::min(r.top, y), std::max(r.right, x + 1), std::max(r.bottom, y + 1)};
+    }
+  if (r.left >= r.right) return {0, 0, side, side};
+  return {r.left - std::min(r.left, kMargin), r.top - std::min(r.top, kMargin),
+          std::min(r.right + kMargin, side), std::min(r.bottom + kMargin, side)};
+}
+
+Pixels cut(const Pixels& pixels, const Rectangle& r) {
+  Pixels out{r.right - r.left, r.bottom - r.top, pixels.channels, {}};
+  for (std::uint32_t y = r.top; y < r.bottom; ++y) {
+    const std::uint8_t* row = pixels.at(r.left, y);
+    out.data.insert(out.data.end(), row, row + std::size_t{out.width_px} * pixels.channels);
+  }
+  return out;
+}
+
+constexpr double kLongerSide = 360;  // px on the page
+
+FragmentHeat over_largest(std::string name, std::vector<double> value) {
+  const double most = value.empty() ? 0 : *std::max_element(value.begin(), value.end());
+  if (most > 0)
+    for (double& v : value)
+      if (v > 0) v /= most;
+  return {std::move(name), std::move(value)};
+}
+
+}  // namespace
+
+Vec3<std::uint8_t> heat_colour(double value) {
+  const double at = std::clamp(value, 0.0, 1.0) * (kStops.size() - 1);
+  const std::size_t stop = std::min(static_cast<std::size_t>(at), kStops.size() - 2);
+  const double part = at - static_cast<double>(stop);
+  const auto channel = [&](std::size_t c) {
+    const double mixed = kStops[stop][c] * (1 - part) + kStops[stop + 1][c] * part;
+    return static_cast<std::uint8_t>(std::lround(mixed));
+  };
+  return {channel(0), channel(1), channel(2)};
+}
+
+Pixels heat_picture(const std::vector<float>& values, std::uint32_t side_px, double full) {
+  Pixels out{side_px, side_px, 3, {}};
+  out.data.reserve(values.size() * 3);
+  for (const float v : values) {
+    const Vec3<std::uint8_t> c = heat_colour(static_cast<double>(v) / full);
+    out.data.insert(out.data.end(), {c.x, c.y, c.z});
+  }
+  return out;
+}
+
+std::string heat_hex(double value) {
+  const Vec3<std::uint8_t> c = heat_colour(value);
+  return fmt::format("#{:02x}{:02x}{:02x}", c.x, c.y, c.z);
+}
+
+std::string picture_row(const PictureRow& row, const Picture& reference, const Picture& tested,
+                        std::vector<ReportFile>& files) {
+  const Rectangle part = shown_part(reference, tested);
+  const FlipPicture a = prepare_flip(reference), b = prepare_flip(tested);
+  const Pixels heat = heat_picture(flip_map(a, b), reference.side_px, kFullHeat);
+  const std::uint32_t width = part.right - part.left, height = part.bottom - part.top;
+  const int times =
+      std::clamp(static_cast<int>(row.enlarge_to_px / static_cast<double>(width)), 1, kMostEnlarged);
+  std::string out = "<div class=\"row\">\n";
+  const auto add = [&](const std::string& ending, const std::string& name, const std::string& alt,
+                       const Pixels& pixels) {
+    files.push_back({row.name + ending + ".png", write_png(cut(pixels, part))});
+    out += fmt::format(
+        "<div><p class=\"quiet\">{}</p><img{} src=\"{}\" width=\"{}\" height=\"{}\" alt=\"{}\"></div>\n",
+        name, times > 1 ? " class=\"enlarged\"" : "", markup_escaped(files.back().path),
+        width * static_cast<std::uint32_t>(times), height * static_cast<std::uint32_t>(times),
+        markup_escaped(alt));
+  };
+  add("-reference", row.reference_name, row.alt + ", the reference", encode_srgb(reference));
+  add("-tested", row.tested_name, row.alt, encode_srgb(tested));
+  add("-flip", "FLIP map", row.alt + ": map of the differences", heat);
+  return out + "</div>\n";
+}
+
+std::vector<FragmentHeat> fragment_heats(PackageReader& package, std::uint32_t plane) {
+  const PlaneTables& t = package.tables().planes.at(plane);
+  const std::size_t fragments = t.fragment_count();
+  std::vector<double> bytes(fragments, -1), density(fragments, -1);
+  const std::vector<float> eta = eta_of(t, 0);
+  for (const std::uint16_t f : t.order) {
+    const double texels = std::max<double>(t.covered_texels[f], 1);
+    if (t.rung_count() > 0) bytes[f] = static_cast<double>(bytes_to_show(t, t.rung_count() - 1, f)) / texels;
+    density[f] = static_cast<double>(eta[f]);
+  }
+  return {over_largest("bytes per texel at the best rung", std::move(bytes)),
+          over_largest("feature density of S_0 (eta)", std::move(density))};
+}
+
+std::string fragment_map(PackageReader& package, std::uint32_t plane, const FragmentHeat& heat,
+                         const std::string& preview) {
+  const TextureInfo& t = package.textures().at(plane);
+  const double shrink = kLongerSide / std::max(t.width_px, t.height_px);
+  const double width = t.width_px * shrink, height = t.height_px * shrink;
+  std::string out = fmt::format(
+      "<svg class=\"map{}\" role=\"img\" aria-label=\"{}\" width=\"{:.0f}\" height=\"{:.0f}\" "
+      "viewBox=\"0 0 {:.1f} {:.1f}\"><image href=\"{}\" width=\"{:.1f}\" height=\"{:.1f}\" "
+      "preserveAspectRatio=\"none\"/>\n",
+      heat.value.empty() ? "" : " heat",
+      markup_escaped("Map of texture " + std::to_string(plane) + ": " + heat.name), width, height, width,
+      height, markup_escaped(preview), width, height);
+  const double w = t.fragment_width_px * shrink, h = t.fragment_height_px * shrink;
+  for (std::size_t f = 0; f < std::size_t{t.columns} * t.rows; ++f) {
+    const std::size_t column = f % t.columns, row = f / t.columns;
+    const double x = static_cast<double>(column) * w, y = static_cast<double>(row) * h;
+    if (heat.value.empty() || heat.value[f] < 0)
+      out += fmt::format(
+          "<path d=\"M{:.1f} {:.1f}h{:.1f}v{:.1f}h-{:.1f}z\" fill=\"none\" stroke=\"#888\" "
+          "stroke-width=\".4\"/>\n",
+          x, y, std::min(w, width - x), std::min(h, height - y), std::min(w, width - x));
+    else
+      out += fmt::format(
+          "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"{}\" "
+          "fill-opacity=\".62\" stroke=\"#888\" stroke-width=\".4\"><title>row {}, column {}: "
+          "{:.2f} of the largest</title></rect>\n",
+          x, y, std::min(w, width - x), std::min(h, height - y), heat_hex(heat.value[f]), row, column,
+          heat.value[f]);
+  }
+  return out + "</svg>\n";
+}
+
+}  // namespace texmesh

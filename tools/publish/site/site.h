@@ -1,0 +1,65 @@
+#pragma once
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "format/documents/about.h"
+
+namespace texmesh {
+
+struct DocumentSchema;  // pipeline/io/record.h
+
+struct SiteOptions {
+  std::string title = "Scans";
+  std::string packages_url;  // where the packages stand already, ends with a slash; "" = they are copied
+  std::string viewer;        // folder with the built viewer
+};
+
+/// A package of a site.
+struct SiteObject {
+  std::string path;     // relative to the folder of packages; of an unpacked one with a slash behind
+  std::string name;     // of its files in the site: letters, digits, "-", "_", "."; no two alike in any case
+  std::string address;  // of the package, from a page in the site's folder
+  std::string source;   // file or folder on this machine
+  std::string title;
+  About about;
+  std::vector<std::uint8_t> poster;  // JPEG; empty = none
+  std::uint32_t poster_width_px = 0, poster_height_px = 0;
+  std::uint64_t bytes = 0;        // of the whole package
+  std::uint64_t start_bytes = 0;  // until there is a picture
+  std::uint64_t triangles = 0;
+  std::uint32_t texture_px = 0;  // longest side of its textures; 0 = it has none
+};
+
+/// A package that could not be read, and why.
+struct SiteFault {
+  std::string path, message;
+};
+
+struct Site {
+  SiteOptions options;
+  std::vector<SiteObject> objects;  // by title
+  std::vector<SiteFault> faults;
+};
+
+/// What a folder of packages (or one package) holds: every package beneath it, hidden ones and symbolic links
+/// left out. A package that cannot be read is a fault, the others go on. InputError when there is none at
+/// all.
+Site read_site(const std::string& packages, const SiteOptions& options);
+
+/// Writes a static site: index.html with posters and search, objects/NAME.html, viewer/, posters/ and, unless
+/// they stand elsewhere, packages/. Texts of packages stand in it as text only. It asks nothing of other
+/// servers but packages that stand there. Same packages, same bytes. The folder appears whole or not at all;
+/// an earlier site is replaced. InputError when it holds anything else or cannot be made.
+void write_site(const Site& site, const std::string& folder);
+/// The same refusals, before the work.
+void check_site_folder(const std::string& folder);
+
+/// For programs: schemas/site.v1.schema.json.
+std::string site_json(const Site& site, const std::string& folder);
+DocumentSchema site_schema();
+
+/// A name for the files of the package at `path`, none of `taken` (in lower case), to which it is added.
+std::string object_name(const std::string& path, std::vector<std::string>& taken);
+
+}  // namespace texmesh
