@@ -19,7 +19,8 @@ if(TARGET texmesh AND TARGET make_scan)
   add_executable(export_environment browser/export_environment.cpp)
   target_link_libraries(export_environment PRIVATE texmesh_stages nlohmann_json::nlohmann_json)
   add_test(NAME web_browser COMMAND ${CMAKE_CURRENT_SOURCE_DIR}/browser/run ${CMAKE_CURRENT_BINARY_DIR}/browser
-    $<TARGET_FILE:texmesh> $<TARGET_FILE:make_scan> $<TARGET_FILE:compose_plane> $<TARGET_FILE:export_environment>)
+    $<TARGET_FILE:texmesh> $<TARGET_FILE:make_scan> $<TARGET_FILE:compose_plane> $<TARGET_FILE:export_environment>
+    $<$<BOOL:${TEXMESH_LAB}>:$<TARGET_FILE:texmesh-lab>>)
   # A browser that draws without a GPU takes both cores, and its deadlines are kept only when it has them.
   set_tests_properties(web_browser PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 3600 LABELS web RUN_SERIAL ON)
 endif()

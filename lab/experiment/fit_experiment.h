@@ -4,9 +4,7 @@
 #include <vector>
 
 #include "lab/experiment/design.h"
-#include "lab/experiment/results.h"
-#include "lab/psychometrics/judges.h"
-#include "lab/psychometrics/threshold_study.h"
+#include "lab/psychometrics/psychometrics.h"
 #include "stages/base/run_context.h"
 
 namespace texmesh {
@@ -48,7 +46,7 @@ struct ExperimentFit {
   std::string verdict, distance_verdict;
 };
 
-/// Judges are screened (lab/psychometrics/judges.h), the answers of the others fitted. InputError naming
+/// Judges are screened (lab/psychometrics/psychometrics.h), the answers of the others fitted. InputError naming
 /// the file when two files are of different experiments, when an answer does not agree with `key`, when two
 /// answers give one trial other levels, and when no judge is left.
 ExperimentFit fit_experiment(const std::vector<ExperimentResults>& results,
@@ -57,7 +55,7 @@ ExperimentFit fit_experiment(const std::vector<ExperimentResults>& results,
 
 /// schemas/jnd-profile.v1.schema.json; only where `found`.
 std::string jnd_profile_json(const ExperimentFit& fit);
-/// schemas/experiment-fit.v1.schema.json.
+/// lab/schemas/experiment-fit.v1.schema.json.
 std::string fit_json(const ExperimentFit& fit);
 /// Tables for a terminal.
 std::string fit_text(const ExperimentFit& fit);

@@ -1,12 +1,54 @@
 #pragma once
+#include <array>
+#include <cstdint>
+#include <nlohmann/json_fwd.hpp>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
-#include "lab/thesis/exhibit.h"
+#include "format/base/fields.h"
+#include "pipeline/io/table.h"
 #include "stages/base/run_context.h"
+#include "tools/publish/pages/plot.h"
 
 namespace texmesh {
+
+// A table or figure of the thesis, measured again: the printed values beside ours, and a verdict.
+
+/// kNotComparable: the thesis's data are not printed, so that only its form can be shown.
+enum class Verdict : std::uint8_t { kConfirmed, kInPart, kNotConfirmed, kNotComparable };
+template <>
+struct EnumNames<Verdict> {
+  static constexpr std::array<std::string_view, 4> names{"confirmed", "in part", "not confirmed",
+                                                         "not comparable"};
+};
+
+/// A picture that stands in a file beside the page.
+struct ExhibitPicture {
+  std::string file, caption;
+  std::uint32_t width_px = 0, height_px = 0;
+  std::vector<std::uint8_t> png;
+};
+
+struct Exhibit {
+  std::string id;             // "4.2", "fig-3.9"
+  std::string title;          // plain text, as all texts here
+  std::string claim;          // what the thesis prints or says
+  std::string made_by;        // what was run on which data
+  std::vector<Table> tables;  // the first column names the row
+  std::vector<Plot> plots;
+  std::vector<ExhibitPicture> pictures;
+  Verdict verdict = Verdict::kNotComparable;
+  std::string finding;  // what came out, with figures
+};
+
+/// The page: summary of verdicts, then an exhibit a section.
+std::string exhibits_html(const std::vector<Exhibit>& exhibits);
+/// {"version":1,"exhibits":[..]}: numbers in full, no plots and pictures.
+nlohmann::ordered_json exhibits_json(const std::vector<Exhibit>& exhibits);
+/// For a terminal.
+std::string exhibit_text(const Exhibit& exhibit);
 
 // Every exhibit is made from models, pictures and links that are made by code, by the stages and the delivery
 // themselves. Same result for any thread count and on any machine.

@@ -5,7 +5,7 @@
 
 #include "lab/study/fragment_study.h"
 #include "lab/thesis/exhibits.h"
-#include "lab/thesis/made_scans.h"
+#include "lab/thesis/made_models.h"
 
 namespace texmesh {
 namespace {
@@ -44,19 +44,19 @@ double ratio(std::uint64_t part, std::uint64_t whole) {
 }
 
 Exhibit table_3_1(const RunContext& context) {
-  ExhibitTable table{"One file against fragments of 16 x 16 px, KB",
-                     {{"texture", 0},
-                      {"px", 0},
-                      {"quality", 0},
-                      {"file, printed", 0},
-                      {"ours", 0},
-                      {"sum, printed", 0},
-                      {"ours", 0},
-                      {"ours, shared tables", 0},
-                      {"sum / file, printed", 2},
-                      {"ours", 2},
-                      {"ours, shared tables", 2}},
-                     {}};
+  Table table{"One file against fragments of 16 x 16 px, KB",
+              {{"texture", 0},
+               {"px", 0},
+               {"quality", 0},
+               {"file, printed", 0},
+               {"ours", 0},
+               {"sum, printed", 0},
+               {"ours", 0},
+               {"ours, shared tables", 0},
+               {"sum / file, printed", 2},
+               {"ours", 2},
+               {"ours, shared tables", 2}},
+              {}};
   double least = 1e9, most = 0, most_shared = 0;
   for (const PrintedTexture& p : kTable31) {
     const Pixels pixels = made_texture(p.side_px, contrast_of(p.name), 21, context);
@@ -163,15 +163,15 @@ std::vector<Plot> cut_plots(const std::vector<CutImage>& images) {
 
 Exhibit figures_3_5(const RunContext& context) {
   const std::vector<CutImage> images = cut_images(context);
-  ExhibitTable table{"Sum of the fragments over one file with standard tables",
-                     {{"image, px", 0},
-                      {"fragments", 0},
-                      {"fragment px", 0},
-                      {"quality", 0},
-                      {"file KB", 1},
-                      {"complete files", 3},
-                      {"shared tables", 3}},
-                     {}};
+  Table table{"Sum of the fragments over one file with standard tables",
+              {{"image, px", 0},
+               {"fragments", 0},
+               {"fragment px", 0},
+               {"quality", 0},
+               {"file KB", 1},
+               {"complete files", 3},
+               {"shared tables", 3}},
+              {}};
   std::size_t rows = 0, smaller = 0, shared_smaller = 0;
   double most = 0, most_shared = 0;
   for (const CutImage& image : images)

@@ -7,7 +7,7 @@
 #include "format/rules/jnd_choice.h"
 #include "format/rules/viewing.h"
 #include "lab/thesis/exhibits.h"
-#include "lab/thesis/made_scans.h"
+#include "lab/thesis/made_models.h"
 #include "stages/perceptual_values/perceptual_values.h"
 #include "stages/skeletonization/skeletonization.h"
 
@@ -54,18 +54,18 @@ std::string step_name(const Nutcracker& n, std::size_t k) {
 std::size_t compared_rows(const Nutcracker& n) { return std::min<std::size_t>(5, n.values.step.size() - 1); }
 
 Exhibit table_7_1(const Nutcracker& n) {
-  ExhibitTable table{"Perceptual values between adjacent scales",
-                     {{"scales, printed", 0},
-                      {"ours", 0},
-                      {"faces, printed", 0},
-                      {"ours", 0},
-                      {"average, printed", 4},
-                      {"ours", 4},
-                      {"deviation, printed", 4},
-                      {"ours", 4},
-                      {"largest, ours", 4},
-                      {"least, ours", 4}},
-                     {}};
+  Table table{"Perceptual values between adjacent scales",
+              {{"scales, printed", 0},
+               {"ours", 0},
+               {"faces, printed", 0},
+               {"ours", 0},
+               {"average, printed", 4},
+               {"ours", 4},
+               {"deviation, printed", 4},
+               {"ours", 4},
+               {"largest, ours", 4},
+               {"least, ours", 4}},
+              {}};
   std::size_t rising = 0, small = 0;
   const std::size_t rows = compared_rows(n);
   for (std::size_t k = 1; k <= rows; ++k) {
@@ -98,12 +98,12 @@ Exhibit table_7_1(const Nutcracker& n) {
           n.chain.mesh.mesh.triangles.size() - n.chain.scales.scales[1].triangles.size())};
 }
 
-ExhibitTable table_of_rules(const Nutcracker& n) {
+Table table_of_rules(const Nutcracker& n) {
   std::vector<float> printed_steps{0}, steps;
   for (const PrintedStep& p : kTable71) printed_steps.push_back(static_cast<float>(p.average));
   for (const CollapseStatistics& s : n.values.step) steps.push_back(s.mean);
   const std::vector<float> printed = chained_values(printed_steps), ours = chained_values(steps);
-  ExhibitTable table{
+  Table table{
       "Cumulative values from S_0: printed, by rules from the printed Table 7.1, and of our nutcracker",
       {{"to", 0},
        {"printed", 4},
@@ -118,8 +118,7 @@ ExhibitTable table_of_rules(const Nutcracker& n) {
   double sum = 0, our_sum = 0;
   for (std::size_t j = 1; j <= 5; ++j) {
     sum += kTable71[j - 1].average;
-    std::vector<ExhibitCell> row{fmt::format("S_{}", j), kTable72[j - 1], static_cast<double>(printed[j]),
-                                 sum};
+    std::vector<Cell> row{fmt::format("S_{}", j), kTable72[j - 1], static_cast<double>(printed[j]), sum};
     if (j < steps.size()) {
       our_sum += static_cast<double>(steps[j]);
       row.insert(row.end(),
@@ -165,11 +164,11 @@ std::string majors_of(const Nutcracker& n, const std::vector<std::uint8_t>& majo
 }
 
 Exhibit table_7_2(const Nutcracker& n) {
-  const ExhibitTable table = table_of_rules(n);
+  const Table table = table_of_rules(n);
   double root = 0, sum = 0;
   for (std::size_t j = 0; j < 5; ++j) {
-    root = std::max(root, std::abs(std::get<double>(table.rows[j][2]) / kTable72[j] - 1));
-    sum = std::max(sum, std::abs(std::get<double>(table.rows[j][3]) / kTable72[j] - 1));
+    root = std::max(root, std::abs(std::get<double>(table.rows[j][2].value) / kTable72[j] - 1));
+    sum = std::max(sum, std::abs(std::get<double>(table.rows[j][3].value) / kTable72[j] - 1));
   }
   std::vector<float> printed(36, 0);
   for (std::size_t j = 1; j < 6; ++j) printed[j] = static_cast<float>(kTable72[j - 1]);
@@ -227,18 +226,18 @@ Exhibit table_7_3(const Nutcracker& n) {
   std::ranges::sort(radius);
   const double middle =
       static_cast<double>(radius[radius.size() / 2]) / static_cast<double>(n.values.object_height);
-  ExhibitTable table{"The monitors, with the nutcracker as high as the screen",
-                     {{"monitor", 0},
-                      {"inches", 0},
-                      {"pixels", 0},
-                      {"pixels per inch", 1},
-                      {"px per degree at 18 in", 1},
-                      {"at 30 in", 1},
-                      {"JND of the middle R, px", 1},
-                      {"scale by JND", 0},
-                      {"by one pixel", 0},
-                      {"by O_V / E_S", 0}},
-                     {}};
+  Table table{"The monitors, with the nutcracker as high as the screen",
+              {{"monitor", 0},
+               {"inches", 0},
+               {"pixels", 0},
+               {"pixels per inch", 1},
+               {"px per degree at 18 in", 1},
+               {"at 30 in", 1},
+               {"JND of the middle R, px", 1},
+               {"scale by JND", 0},
+               {"by one pixel", 0},
+               {"by O_V / E_S", 0}},
+              {}};
   std::size_t coarser = 0;
   for (std::size_t k = 0; k < 4; ++k) {
     const Monitor& m = kMonitors[k];

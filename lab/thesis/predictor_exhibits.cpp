@@ -9,7 +9,7 @@
 #include "format/rules/size_curve.h"
 #include "format/rules/size_model.h"
 #include "lab/thesis/exhibits.h"
-#include "lab/thesis/made_patterns.h"
+#include "lab/thesis/made_models.h"
 #include "stages/image/png_writer.h"
 #include "stages/ladder/ladder.h"
 #include "stages/lut/lut.h"
@@ -31,9 +31,9 @@ ZimOptions texture_predictors() {
 Exhibit figure_8_2(const PatternPlane& all, const RunContext& context) {
   const PlanePredictors p =
       predict_quality(all.fragments, all.pixels, texture_predictors(), context).planes[0];
-  ExhibitTable table{"Predictors of 24 patterns",
-                     {{"pattern", 0}, {"Z", 3}, {"I", 3}, {"zeta", 3}, {"M", 3}, {"ZIM", 3}},
-                     {}};
+  Table table{"Predictors of 24 patterns",
+              {{"pattern", 0}, {"Z", 3}, {"I", 3}, {"zeta", 3}, {"M", 3}, {"ZIM", 3}},
+              {}};
   for (std::size_t f = 0; f < kMadePatterns; ++f)
     table.rows.push_back({pattern_name(f), static_cast<double>(p.z[f]), static_cast<double>(p.i[f]),
                           static_cast<double>(p.zeta[f]), static_cast<double>(p.m[f]),
@@ -44,9 +44,9 @@ Exhibit figure_8_2(const PatternPlane& all, const RunContext& context) {
   };
   constexpr Order kOrders[] = {{'j', 'i'}, {'p', 'n'}, {'s', 'l'}, {'s', 'n'}, {'s', 'p'}, {'s', 'q'}};
   std::size_t holds = 0;
-  ExhibitTable orders{"What the thesis says of its patterns, of ours with the same letters",
-                      {{"more than", 0}, {"ZIM", 3}, {"ZIM", 3}, {"holds", 0}},
-                      {}};
+  Table orders{"What the thesis says of its patterns, of ours with the same letters",
+               {{"more than", 0}, {"ZIM", 3}, {"ZIM", 3}, {"holds", 0}},
+               {}};
   for (const Order& o : kOrders) {
     holds += above(o.more, o.less);
     orders.rows.push_back(
@@ -78,9 +78,9 @@ Exhibit figure_8_3(const PatternPlane& all, const RunContext& context) {
   const TexturePlane& plane = all.fragments.planes[0];
   Pixels map{plane.width_px, plane.height_px, 1,
              differing_texels(plane, all.pixels[0], texture_predictors())};
-  ExhibitTable table{"zeta, and the share of texels that the picture marks",
-                     {{"pattern", 0}, {"zeta", 3}, {"marked", 3}},
-                     {}};
+  Table table{"zeta, and the share of texels that the picture marks",
+              {{"pattern", 0}, {"zeta", 3}, {"marked", 3}},
+              {}};
   bool agree = true;
   for (std::size_t f = 0; f < kMadePatterns; ++f) {
     double marked = 0;
@@ -153,13 +153,13 @@ std::size_t rung_of_quality(const PlaneTables& t, int quality) {
   return static_cast<std::size_t>(std::ranges::find(t.rung_quality, quality) - t.rung_quality.begin());
 }
 
-ExhibitTable models_table(const LutTables& made) {
-  ExhibitTable table{
+Table models_table(const LutTables& made) {
+  Table table{
       "Size model S = A (100 p)^(B Q) of the four patterns",
       {{"pattern", 0}, {"p", 3}, {"A", 2}, {"B", 3}, {"correlation", 3}, {"Q of 1123 bytes (8.9)", 3}},
       {}};
   table.rows.push_back(
-      {std::string("(x), printed"), ExhibitCell{}, kPrintedA, kPrintedB, kPrintedCorrelation, ExhibitCell{}});
+      {std::string("(x), printed"), Cell{}, kPrintedA, kPrintedB, kPrintedCorrelation, Cell{}});
   const PlaneThesis& thesis = made.thesis.planes[0];
   for (std::size_t f = 0; f < 4; ++f) {
     const auto p = static_cast<double>(thesis.vqp[f]);
@@ -183,16 +183,16 @@ Exhibit figure_8_5(const RunContext& context) {
   std::ranges::sort(rungs);
   rungs.erase(std::unique(rungs.begin(), rungs.end()), rungs.end());
   const PlaneTables exact = tables_of(four, rungs, context).tables.planes[0];
-  ExhibitTable table{"Quality of four fragments within the bytes of uniform quality 30",
-                     {{"pattern", 0},
-                      {"ZIM", 3},
-                      {"quality, printed", 0},
-                      {"ours", 0},
-                      {"bytes at 30", 0},
-                      {"bytes", 0},
-                      {"1 - SSIM at 30", 4},
-                      {"1 - SSIM", 4}},
-                     {}};
+  Table table{"Quality of four fragments within the bytes of uniform quality 30",
+              {{"pattern", 0},
+               {"ZIM", 3},
+               {"quality, printed", 0},
+               {"ours", 0},
+               {"bytes at 30", 0},
+               {"bytes", 0},
+               {"1 - SSIM at 30", 4},
+               {"1 - SSIM", 4}},
+              {}};
   double uniform_bytes = 0, bytes = 0, uniform_loss = 0, loss = 0;
   for (std::size_t f = 0; f < 4; ++f) {
     const std::size_t at = rung_of_quality(exact, quality[f]) * 4 + f,
@@ -205,8 +205,8 @@ Exhibit figure_8_5(const RunContext& context) {
     uniform_loss += static_cast<double>(exact.dssim[plain]) / 4,
         loss += static_cast<double>(exact.dssim[at]) / 4;
   }
-  table.rows.push_back({std::string("all"), ExhibitCell{}, ExhibitCell{}, ExhibitCell{}, uniform_bytes, bytes,
-                        uniform_loss, loss});
+  table.rows.push_back(
+      {std::string("all"), Cell{}, Cell{}, Cell{}, uniform_bytes, bytes, uniform_loss, loss});
   return {
       "fig-8.5",
       "Fig. 8.5: quality by predictor, and the size model",

@@ -5,7 +5,7 @@
 
 #include "lab/study/allocation_study.h"
 #include "lab/thesis/exhibits.h"
-#include "lab/thesis/made_scans.h"
+#include "lab/thesis/made_models.h"
 #include "stages/fill/fill.h"
 #include "stages/fragmentation/fragmentation.h"
 #include "stages/image/png_writer.h"
@@ -58,15 +58,15 @@ const StudiedChoice& choice_named(const std::vector<StudiedChoice>& choices, con
 
 std::vector<Exhibit> quality_exhibits(const RunContext& context) {
   const std::vector<StudiedChoice> choices = study_head(context);
-  ExhibitTable table{"The same bytes, shared in different ways",
-                     {{"choice", 0},
-                      {"KB", 1},
-                      {"lowest quality", 0},
-                      {"highest", 0},
-                      {"surface SSIM", 4},
-                      {"rendered SSIM", 4},
-                      {"rendered difference", 4}},
-                     {}};
+  Table table{"The same bytes, shared in different ways",
+              {{"choice", 0},
+               {"KB", 1},
+               {"lowest quality", 0},
+               {"highest", 0},
+               {"surface SSIM", 4},
+               {"rendered SSIM", 4},
+               {"rendered difference", 4}},
+              {}};
   for (const StudiedChoice& c : choices)
     if (c.fragments > 0)
       table.rows.push_back({c.name, static_cast<double>(c.bytes) / 1e3, static_cast<double>(c.lowest_quality),

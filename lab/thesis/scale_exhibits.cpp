@@ -5,7 +5,7 @@
 
 #include "format/base/portable_math.h"
 #include "lab/thesis/exhibits.h"
-#include "lab/thesis/made_scans.h"
+#include "lab/thesis/made_models.h"
 #include "stages/ssf/ssf.h"
 
 namespace texmesh {
@@ -34,17 +34,17 @@ Exhibit table_2_1(const RunContext& context) {
   const MadeChain chain =
       thesis_chain(make_scan_model(MadeShape::kHead, kHeadColumns, kHeadRows, 0, context), context);
   const auto vertices = static_cast<double>(chain.mesh.mesh.positions.size());
-  ExhibitTable table{"Head: vertices removed and faces left",
-                     {{"scale", 0},
-                      {"removed, printed", 0},
-                      {"ours", 0},
-                      {"of all %, printed", 1},
-                      {"ours", 1},
-                      {"faces, printed", 0},
-                      {"ours", 0},
-                      {"faces per removed vertex, printed", 2},
-                      {"ours", 2}},
-                     {}};
+  Table table{"Head: vertices removed and faces left",
+              {{"scale", 0},
+               {"removed, printed", 0},
+               {"ours", 0},
+               {"of all %, printed", 1},
+               {"ours", 1},
+               {"faces, printed", 0},
+               {"ours", 0},
+               {"faces per removed vertex, printed", 2},
+               {"ours", 2}},
+              {}};
   double furthest = 0, last = -1;
   bool rises = true;
   for (const PrintedScale& p : kTable21) {
@@ -120,9 +120,9 @@ Exhibit figure_6_2(const RunContext& context) {
             0,
             false,
             {}};
-  ExhibitTable table{"Sigma, in samples, at which max - min has fallen to a share of S_0's",
-                     {{"samples", 0}, {"to 0.9", 1}, {"to 0.5", 1}, {"to 0.3", 1}, {"to 0.1", 1}},
-                     {}};
+  Table table{"Sigma, in samples, at which max - min has fallen to a share of S_0's",
+              {{"samples", 0}, {"to 0.9", 1}, {"to 0.5", 1}, {"to 0.3", 1}, {"to 0.1", 1}},
+              {}};
   const char* colours[] = {"a", "b", "c", "d"};
   for (std::size_t k = 0; k < sets.size(); ++k) {
     PlotSeries line{sets[k].name, colours[k], {}, false, k > 1, false, false};
@@ -130,10 +130,10 @@ Exhibit figure_6_2(const RunContext& context) {
       line.points.emplace_back(static_cast<double>(sets[k].map.sigma[i]) / sets[k].spacing,
                                static_cast<double>(sets[k].map.convergence[i]));
     plot.series.push_back(std::move(line));
-    std::vector<ExhibitCell> row{sets[k].name};
+    std::vector<Cell> row{sets[k].name};
     for (const double share : {0.9, 0.5, 0.3, 0.1}) {
       const double sigma = sigma_at(sets[k], share);
-      row.push_back(sigma > 0 ? ExhibitCell{sigma} : ExhibitCell{std::string("not reached")});
+      row.push_back(sigma > 0 ? Cell{sigma} : Cell{std::string("not reached")});
     }
     table.rows.push_back(std::move(row));
   }

@@ -5,8 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "delivery/cpp/simulate/simulation.h"
 #include "lab/thesis/exhibits.h"
+#include "lab/transfer/chapter_4.h"
+#include "lab/transfer/policies.h"
 
 namespace texmesh {
 namespace {
@@ -20,8 +21,7 @@ constexpr const char* kMadeTraces =
 
 /// The thesis's own way: hard limits of quality; by the sign of the credit, or by throughput against beta_0.
 HtcOptions thesis_options(HtcOrder order) {
-  HtcOptions options;
-  options.order = order;
+  HtcOptions options = options_of({.order = order});
   options.hard_limits = true;
   options.window = 1;
   return options;
@@ -41,9 +41,9 @@ double mean_kb_s(const BandwidthTrace& trace) {
 
 Exhibit table_4_1() {
   constexpr double kPrinted[] = {41.68, 45.64, 42.07};
-  ExhibitTable table{"Average of a sample set, KB/s",
-                     {{"set", 0}, {"printed", 2}, {"ours", 2}, {"least sample", 2}, {"largest sample", 2}},
-                     {}};
+  Table table{"Average of a sample set, KB/s",
+              {{"set", 0}, {"printed", 2}, {"ours", 2}, {"least sample", 2}, {"largest sample", 2}},
+              {}};
   Plot plot{
       "Fig. 4.3: a link that changes, made by code (set 1)", "sample", "KB/s", 0, kSamples, 80, 0, true, {}};
   double furthest = 0;
@@ -88,8 +88,8 @@ struct Runs42 {
   std::vector<Table42Row> credit, credit_ten, printed, printed_ten;
 };
 
-ExhibitTable table_of_surplus(const Runs42& runs) {
-  ExhibitTable table{
+Table table_of_surplus(const Runs42& runs) {
+  Table table{
       "Pi in % of the limit, + = surplus, mean of 20 runs, by order and number of rungs; Lambda in s at 26",
       {{"beta_0", 0},
        {"T_0, printed", 2},
@@ -116,21 +116,21 @@ ExhibitTable table_of_surplus(const Runs42& runs) {
   return table;
 }
 
-ExhibitTable table_of_sizes(const Runs42& runs) {
-  ExhibitTable table{"|Pi| in % of the limit: mean and largest of 20 runs, by order and number of rungs",
-                     {{"beta_0", 0},
-                      {"printed", 3},
-                      {"credit, 26", 3},
-                      {"largest", 3},
-                      {"printed order, 26", 3},
-                      {"largest", 3},
-                      {"credit, 10", 3},
-                      {"largest", 3},
-                      {"printed order, 10", 3},
-                      {"largest", 3}},
-                     {}};
+Table table_of_sizes(const Runs42& runs) {
+  Table table{"|Pi| in % of the limit: mean and largest of 20 runs, by order and number of rungs",
+              {{"beta_0", 0},
+               {"printed", 3},
+               {"credit, 26", 3},
+               {"largest", 3},
+               {"printed order, 26", 3},
+               {"largest", 3},
+               {"credit, 10", 3},
+               {"largest", 3},
+               {"printed order, 10", 3},
+               {"largest", 3}},
+              {}};
   for (std::size_t k = 0; k < std::size(kTable42); ++k) {
-    std::vector<ExhibitCell> row{fmt::format("{:.0f}", kTable42[k].beta0), std::abs(kTable42[k].pi)};
+    std::vector<Cell> row{fmt::format("{:.0f}", kTable42[k].beta0), std::abs(kTable42[k].pi)};
     for (const std::vector<Table42Row>* r :
          {&runs.credit, &runs.printed, &runs.credit_ten, &runs.printed_ten})
       row.insert(row.end(), {(*r)[k].deviation_percent, (*r)[k].worst_percent});
@@ -227,8 +227,8 @@ double surplus_of(const Network& network, double share, std::uint64_t seed,
                   const std::vector<FragmentOffer>& offers) {
   const BandwidthTrace trace = made_trace(network.mean_kb_s, network.cv, seed);
   HtcOptions options = thesis_options(HtcOrder::kCredit);
-  options.throughput.initial_bytes_s = share * network.mean_kb_s * 1e3;
-  options.time_limit_s = kListBytes / options.throughput.initial_bytes_s;
+  options.initial_bytes_s = share * network.mean_kb_s * 1e3;
+  options.time_limit_s = kListBytes / options.initial_bytes_s;
   return simulate_samples(offers, options,
                           [&](std::size_t k, double) { return trace.bytes_s[std::min(k, kSamples)]; })
       .deviation_percent;
@@ -239,13 +239,13 @@ Exhibit networks(const std::string& id, const std::string& title, const std::str
   constexpr double kShares[] = {0.5, 0.6, 0.7, 0.8, 0.9, 1, 1.1, 1.2, 1.3};
   constexpr const char* kColours[] = {"a", "b", "c", "d", "e"};
   const std::vector<FragmentOffer> offers = table_4_2_offers(Table42Rungs::kFine);
-  ExhibitTable table{"Pi in % of the limit, by beta_0 over the average", {{"network", 0}}, {}};
+  Table table{"Pi in % of the limit, by beta_0 over the average", {{"network", 0}}, {}};
   for (const double share : kShares) table.columns.push_back({fmt::format("{:.1f}", share), 3});
   Plot plot{title, "beta_0 over the average", "Pi, % of the limit", 0.5, 1.3, 0.4, -0.4, true, {}};
   double most = 0;
   std::size_t beyond = 0;
   for (std::size_t k = 0; k < list.size(); ++k) {
-    std::vector<ExhibitCell> row{list[k].name};
+    std::vector<Cell> row{list[k].name};
     PlotSeries line{list[k].name, kColours[k % 5], {}, false, false, false, false};
     for (const double share : kShares) {
       const double surplus = surplus_of(list[k], share, 100 + k, offers);

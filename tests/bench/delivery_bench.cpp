@@ -8,8 +8,9 @@
 #include <cstdio>
 
 #include "delivery/cpp/decide/fragment_list.h"
-#include "delivery/cpp/simulate/simulation.h"
 #include "format/rules/rate_distortion.h"
+#include "lab/transfer/chapter_4.h"
+#include "lab/transfer/policies.h"
 
 namespace {
 
@@ -114,24 +115,21 @@ const Link kLinks[] = {
 
 struct Way {
   const char* name;
-  Policy policy;
+  LabPolicy policy;
   bool hard;
 };
-const Way kWays[] = {{"htca, hard limits", Policy::kHtc, true},
-                     {"htca", Policy::kHtc, false},
-                     {"guard", Policy::kGuard, false},
-                     {"price", Policy::kPrice, false},
-                     {"proportional", Policy::kProportional, false},
-                     {"static", Policy::kStatic, false}};
+const Way kWays[] = {{"htca, hard limits", LabPolicy::kHtc, true},
+                     {"htca", LabPolicy::kHtc, false},
+                     {"guard", LabPolicy::kGuard, false},
+                     {"price", LabPolicy::kPrice, false},
+                     {"proportional", LabPolicy::kProportional, false},
+                     {"static", LabPolicy::kStatic, false}};
 
 HtcOptions options_of(const Way& way) {
-  HtcOptions o;
-  o.policy = way.policy;
+  HtcOptions o = texmesh::options_of({.policy = way.policy, .estimator = default_estimator(way.policy)});
   o.hard_limits = way.hard;
   o.time_limit_s = kLimit_s;
-  o.throughput.initial_bytes_s = kLink_s;
-  o.throughput.estimator =
-      way.policy == Policy::kHtc || way.policy == Policy::kGuard ? Estimator::kLast : Estimator::kHarmonic;
+  o.initial_bytes_s = kLink_s;
   return o;
 }
 
@@ -151,7 +149,7 @@ void print_policies(const List& list, double weight, int runs) {
       double late = 0, loss = 0, skipped = 0;
       for (int seed = 1; seed <= runs; ++seed) {
         HtcOptions o = options_of(way);
-        o.throughput.initial_bytes_s = rate;
+        o.initial_bytes_s = rate;
         const SimulationResult r =
             simulate_serial_trace(list.offers, o, link.trace(rate, static_cast<std::uint64_t>(seed)));
         deviation.push_back(std::abs(r.deviation_percent));
@@ -181,8 +179,8 @@ void print_round_trips(const List& list, double weight, int runs) {
       std::vector<double> deviation;
       double loss = 0, mean = 0;
       for (int seed = 1; seed <= runs; ++seed) {
-        HtcOptions o = options_of({"", Policy::kGuard, false});
-        o.throughput.initial_bytes_s = rate;
+        HtcOptions o = options_of({"", LabPolicy::kGuard, false});
+        o.initial_bytes_s = rate;
         o.rtt_s = rtt_s;
         o.window = window;
         NetworkOptions network;

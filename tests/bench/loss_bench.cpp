@@ -7,10 +7,10 @@
 #include <cstdio>
 
 #include "delivery/cpp/package/package_reader.h"
-#include "delivery/cpp/simulate/simulation.h"
 #include "format/base/bytes.h"
 #include "format/container/layout.h"
 #include "format/split/split_reader.h"
+#include "lab/transfer/chapter_4.h"
 
 namespace {
 

@@ -9,7 +9,7 @@ import {serve} from './static-server.mjs';
 
 const here = path.dirname(fileURLToPath(import.meta.url));
 export const env = {
-  texmesh: process.env.TEXMESH_BINARY, makeScan: process.env.TEXMESH_MAKE_SCAN, compose: process.env.TEXMESH_COMPOSE_PLANE,
+  texmesh: process.env.TEXMESH_BINARY, lab: process.env.TEXMESH_LAB_BINARY, makeScan: process.env.TEXMESH_MAKE_SCAN, compose: process.env.TEXMESH_COMPOSE_PLANE,
   exportEnvironment: process.env.TEXMESH_EXPORT_ENVIRONMENT,
   work: process.env.TEXMESH_BROWSER_WORK, viewer: process.env.TEXMESH_VIEWER, full: process.env.TEXMESH_FULL === '1',
   data: process.env.TEXMESH_DATA ?? '', source: process.env.TEXMESH_SOURCE,

@@ -12,7 +12,7 @@ function experiment(name, ...options) {
   const folder = path.join(root, name);
   fs.rmSync(folder, {recursive: true, force: true});
   fs.mkdirSync(root, {recursive: true});
-  run(env.texmesh, 'experiment', 'make', '-o', folder, ...options);
+  run(env.lab, 'experiment', 'make', '-o', folder, ...options);
   return {folder, design: JSON.parse(fs.readFileSync(path.join(folder, 'design.json')))};
 }
 
@@ -123,7 +123,7 @@ test('experiment: simulated judges get their thresholds back', async () => {
   })));
   const profile = path.join(root, 'jnd-profile.json');
   const pageFile = path.join(root, 'fit.html');
-  const fit = JSON.parse(run(env.texmesh, 'experiment', 'fit', ...files, '--design', e.folder, '-o', profile, '--page', pageFile, '--json'));
+  const fit = JSON.parse(run(env.lab, 'experiment', 'fit', ...files, '--design', e.folder, '-o', profile, '--page', pageFile, '--json'));
   check(fit.judges.every((j) => j.verdict === 'kept' && j.answers === e.design.trials.length), JSON.stringify(fit.judges));
   for (const c of fit.conditions) {
     console.log(`         ${c.displayed_px} px: ${c.threshold.value} (${c.threshold.low} to ${c.threshold.high}), of ${threshold[c.displayed_px]}`);

@@ -13,7 +13,6 @@ import './block-tests.mjs';
 import './display-tests.mjs';
 import './publish-tests.mjs';
 import './element-tests.mjs';
-import './experiment-tests.mjs';
 import './limits-tests.mjs';
 import './materials-tests.mjs';
 import './memory-tests.mjs';
@@ -26,6 +25,8 @@ import './viewer-tests.mjs';
 import './viewer-use-tests.mjs';
 import './versions-tests.mjs';
 import './worker-tests.mjs';
+
+if (process.env.TEXMESH_LAB_BINARY) await import('./experiment-tests.mjs');
 
 /** Of the limit, besides the time without a processor: figures.mjs measures what a quiet machine keeps. */
 const kLate = 1.06;

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "lab/study/covered_plane.h"
+#include "lab/study/fragment_study.h"
 #include "stages/base/run_context.h"
 #include "stages/data/fragments.h"
 #include "stages/data/pixels.h"

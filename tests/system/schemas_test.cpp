@@ -2,43 +2,27 @@
 // of such documents; both must say what the file's name says.
 #include <gtest/gtest.h>
 
-#include <filesystem>
-#include <fstream>
+#include <algorithm>
 #include <functional>
 #include <map>
-#include <nlohmann/json.hpp>
-#include <valijson/adapters/nlohmann_json_adapter.hpp>
-#include <valijson/schema.hpp>
-#include <valijson/schema_parser.hpp>
-#include <valijson/validator.hpp>
+#include <span>
 
 #include "format/documents/about.h"
 #include "format/documents/manifest.h"
 #include "format/documents/quality_table.h"
 #include "format/documents/textures.h"
 #include "format/rules/allocation.h"
-#include "lab/experiment/design.h"
-#include "lab/experiment/results.h"
 #include "pipeline/about/meta.h"
 #include "pipeline/batch/plan.h"
 #include "pipeline/compile/options.h"
 #include "pipeline/compile/profile.h"
 #include "pipeline/import/range/range_scan_document.h"
+#include "tests/support/schema.h"
 #include "tools/inspect/fragment_files.h"
 #include "tools/inspect/provenance.h"
 
 namespace texmesh {
 namespace {
-
-namespace fs = std::filesystem;
-using nlohmann::json;
-
-const fs::path kSchemas = fs::path(TEXMESH_SOURCE_DIR) / "schemas";
-
-std::string read_file(const fs::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
 
 std::span<const std::uint8_t> bytes_of(const std::string& s) {
   return {reinterpret_cast<const std::uint8_t*>(s.data()), s.size()};
@@ -62,8 +46,6 @@ const std::map<std::string, Reader>& readers() {
          CompileOptions options;
          read_jnd_profile(options, bytes_of(s), "jnd.json");
        }},
-      {"experiment-design.v1", [](const std::string& s) { read_design(bytes_of(s), "design.json"); }},
-      {"experiment-results.v1", [](const std::string& s) { read_results(bytes_of(s), "results.json"); }},
       {"profile.v1", [](const std::string& s) {
          CompileOptions options;
          read_profile(options, s, "profile.json");
@@ -71,68 +53,20 @@ const std::map<std::string, Reader>& readers() {
   return map;
 }
 
-std::vector<std::string> schema_names() {
-  const std::string suffix = ".schema.json";
-  std::vector<std::string> names;
-  for (const auto& e : fs::directory_iterator(kSchemas)) {
-    const std::string name = e.path().filename().string();
-    if (name.ends_with(suffix)) names.push_back(name.substr(0, name.size() - suffix.size()));
-  }
-  std::sort(names.begin(), names.end());
-  return names;
-}
-
-class SchemaTest : public testing::TestWithParam<std::string> {
- protected:
-  SchemaTest() {
-    document_ = json::parse(read_file(kSchemas / (GetParam() + ".schema.json")));
-    valijson::SchemaParser(valijson::SchemaParser::kDraft7)
-        .populateSchema(valijson::adapters::NlohmannJsonAdapter(document_), schema_);
-  }
-  bool schema_accepts(const json& document) const {
-    valijson::Validator validator;
-    return validator.validate(schema_, valijson::adapters::NlohmannJsonAdapter(document), nullptr);
-  }
-  json document_;
-  valijson::Schema schema_;
-};
-
-TEST_P(SchemaTest, SaysItsDraftAndTitle) {
-  EXPECT_EQ(document_["$schema"], "http://json-schema.org/draft-07/schema#");
-  EXPECT_TRUE(document_["title"].is_string());
-  EXPECT_TRUE(document_["description"].is_string());
-}
+class SchemaTest : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(SchemaTest, AgreesWithExamplesAndReader) {
-  int valid = 0, invalid = 0;
   const auto reader = readers().find(GetParam());
-  for (const auto& e : fs::directory_iterator(kSchemas / "examples" / GetParam())) {
-    SCOPED_TRACE(e.path().filename().string());
-    const bool expected = e.path().filename().string().starts_with("valid-");
-    ASSERT_TRUE(expected || e.path().filename().string().starts_with("invalid-"));
-    ++(expected ? valid : invalid);
-    const std::string text = read_file(e.path());
-    EXPECT_EQ(schema_accepts(json::parse(text)), expected) << "schema";
-    if (reader == readers().end()) continue;
-    std::string message;
-    try {
-      reader->second(text);
-    } catch (const Error& error) {
-      message = error.what();
-      EXPECT_FALSE(error.place().empty() && error.expected().empty());
-    }
-    EXPECT_EQ(message.empty(), expected) << "reader: " << message;
-  }
-  EXPECT_GE(valid, 1);
-  EXPECT_GE(invalid, 2);
+  testing::check_examples("schemas", GetParam(), reader == readers().end() ? Reader() : reader->second);
 }
 
-INSTANTIATE_TEST_SUITE_P(All, SchemaTest, testing::ValuesIn(schema_names()), [](const auto& test) {
-  std::string name = test.param;
-  std::replace_if(
-      name.begin(), name.end(), [](char c) { return !std::isalnum(static_cast<unsigned char>(c)); }, '_');
-  return name;
-});
+INSTANTIATE_TEST_SUITE_P(All, SchemaTest, ::testing::ValuesIn(testing::schema_names("schemas")),
+                         [](const auto& test) {
+                           std::string name = test.param;
+                           std::replace(name.begin(), name.end(), '-', '_');
+                           std::replace(name.begin(), name.end(), '.', '_');
+                           return name;
+                         });
 
 TEST(Collection, ModelOptionsStandOverThoseOfTheCollection) {
   const auto models = read_collection(

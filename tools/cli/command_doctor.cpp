@@ -2,7 +2,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/io/table.h"
-#include "tools/cli/check/atlas_gate.h"
+#include "tools/cli/check/check_gate.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"
 #include "tools/cli/options/common_options.h"

@@ -1,8 +1,17 @@
+// texmesh fetch: what a client would get within a time, fetched from web servers. The first answer says how
+// the server can be read and how far away it is. Then come a proxy, the documents, the mesh and the textures,
+// each chosen by what the link has shown until then (fetch() below is the course of it).
+#include <fmt/format.h>
+
 #include <chrono>
 #include <csignal>
+#include <filesystem>
 #include <iostream>
+#include <map>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
 
 #include "delivery/cpp/client/texture_loader.h"
 #include "delivery/cpp/package/http_store.h"
@@ -10,15 +19,12 @@
 #include "format/base/bytes.h"
 #include "format/container/layout.h"
 #include "format/rules/proxy_choice.h"
+#include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"
+#include "pipeline/io/table.h"
 #include "tools/cli/commands.h"
-#include "tools/cli/fetch/fetched.h"
-#include "tools/cli/fetch/fetched_files.h"
-#include "tools/cli/fetch/link_watch.h"
-#include "tools/cli/options/command_line.h"
 #include "tools/cli/options/delivery_options.h"
-#include "tools/cli/options/probe_options.h"
-#include "tools/cli/options/units.h"
+#include "tools/cli/options/delivery_text.h"
 #include "tools/extract/glb/scale_file.h"
 
 namespace texmesh {
@@ -26,13 +32,82 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+using Json = nlohmann::ordered_json;
+
 struct FetchArguments {
   DeliveryArguments delivery;
-  ProbeArguments probe;
   std::vector<std::string> mirrors;
-  std::string refine = "0", output, record, history;
-  bool whole_rungs = false, json = false;
+  double refine_s = 0;
+  std::string output;
 };
+
+/// What the transfer came to.
+struct Fetched {
+  int scale = 0;
+  std::optional<std::uint32_t> proxy;  // shown instead of the scale
+  struct Step {
+    std::uint32_t proxy = 0;
+    double at_s = 0;
+  };
+  std::optional<Step> step;  // a larger proxy on the way
+  double rtt_s = 0, first_picture_s = 0, mesh_s = 0, end_s = 0;
+  std::uint64_t mesh_bytes = 0, texture_bytes = 0;  // mesh: the documents and the first picture, too
+  HttpPlace place;
+  bool whole_rungs = false;
+  LoadReport load;
+  std::optional<LoadReport> refined;
+  double texture_flip = 0, flip = 0;  // predicted of what has come
+  GpuBytes gpu;
+  std::vector<std::string> urls;  // in the order of load.mirrors
+};
+
+/// What `fetch` writes into its folder: files as `unpack --fragments files` names them, of each fragment the
+/// best rung. Without a folder nothing is written.
+class FetchedFiles {
+ public:
+  FetchedFiles(PackageReader& package, const std::string& folder) : package_(package), folder_(folder) {}
+  /// Keeps a fragment for write().
+  void add(const LoadedFragment& fragment);
+  /// Writes the fragments.
+  void write();
+  /// Writes an entry at once.
+  void write_entry(const std::string& path, const Bytes& bytes);
+
+ private:
+  PackageReader& package_;
+  std::string folder_;
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::vector<Bytes>> streams_;  // by plane and fragment
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::int32_t> rungs_;
+};
+
+void FetchedFiles::add(const LoadedFragment& f) {
+  if (folder_.empty()) return;
+  auto& streams = streams_[{f.plane, f.fragment}];
+  const Codec codec = package_.textures()[f.plane].codec;
+  if (!codec_traits(codec).incremental) streams.clear();
+  streams.insert(streams.end(), f.streams.begin(), f.streams.end());
+  rungs_[{f.plane, f.fragment}] = f.rung;
+}
+
+void FetchedFiles::write() {
+  for (const auto& [where, streams] : streams_) {
+    const auto [plane, fragment] = where;
+    const Codec codec = package_.textures()[plane].codec;
+    const CodecTraits& traits = codec_traits(codec);
+    const auto rung = static_cast<std::uint32_t>(rungs_[where]);
+    const Bytes file =
+        join_fragment(codec, package_.table_stream(plane, traits.incremental ? 0 : rung),
+                      std::vector<std::span<const std::uint8_t>>(streams.begin(), streams.end()));
+    write_entry(fragment_file_path(plane, rung, fragment, traits.extension), file);
+  }
+}
+
+void FetchedFiles::write_entry(const std::string& path, const Bytes& bytes) {
+  if (folder_.empty()) return;
+  const std::filesystem::path file = std::filesystem::path(folder_) / path;
+  std::filesystem::create_directories(file.parent_path());
+  write_file_atomically(file.string(), bytes);
+}
 
 volatile std::sig_atomic_t interrupted = 0;
 
@@ -166,7 +241,7 @@ std::unique_ptr<Transport> fragment_transport(const FetchArguments& a, const Htt
   if (place.in_memory) return open_transport(store);
   TransportOptions options;
   options.http = http;
-  options.connections = a.delivery.connections;
+  options.connections = a.delivery.request.network.connections;
   const std::vector<std::string> all = all_urls(a);
   for (std::size_t i = 0; i < all.size(); ++i)
     if (i != place.mirror) f.urls.push_back(all[i]);
@@ -187,7 +262,7 @@ void predict(PackageReader& package, const TextureLoader& loader, const std::vec
 
 /// The textures for the time, and in `load.list` how they are listed.
 std::vector<PlaneChoice> choose_textures(PackageReader& package, double memory_bytes, LoadOptions& load) {
-  const double budget_bytes = load.htc.time_limit_s * load.htc.throughput.initial_bytes_s;
+  const double budget_bytes = load.htc.time_limit_s * load.htc.initial_bytes_s;
   TextureLoss loss(package, load.list.displayed_px);
   if (load.htc.policy == Policy::kThesis) {
     ThesisTextures as_printed = thesis_textures(loss, load.list, budget_bytes);
@@ -203,19 +278,18 @@ std::vector<PlaneChoice> choose_textures(PackageReader& package, double memory_b
 
 void fetch_textures(const FetchArguments& a, const DeliveryRequest& request, const HttpOptions& http,
                     PackageReader& package, Clock::time_point start, double bytes_s, FetchedFiles& writer,
-                    LinkWatch& watch, Fetched& f) {
-  f.whole_rungs = a.whole_rungs || !f.place.ranges;
+                    Fetched& f) {
+  f.whole_rungs = !f.place.ranges;
   const auto transport = fragment_transport(a, http, package.store(), f);
-  const bool network = !f.place.in_memory && f.place.ranges;
-  TextureLoader loader(package, watch.monitored(*transport, package, network, f.rtt_s), f.whole_rungs);
+  TextureLoader loader(package, *transport, f.whole_rungs);
   LoadOptions load;
   load.list.scale = f.scale;
   load.list.displayed_px = request.displayed_px;
   load.htc = request.htc;
   load.htc.rtt_s = f.rtt_s;
   load.htc.time_limit_s = std::max(1e-3, request.time_limit_s - f.mesh_s);
-  load.htc.throughput.initial_bytes_s = bytes_s;
-  load.group_bytes = group_bytes(load.htc.throughput.initial_bytes_s, f.rtt_s, load.htc.time_limit_s);
+  load.htc.initial_bytes_s = bytes_s;
+  load.group_bytes = group_bytes(load.htc.initial_bytes_s, f.rtt_s, load.htc.time_limit_s);
   const std::vector<PlaneChoice> planes =
       choose_textures(package, texture_memory(package, request, f.scale), load);
   f.gpu = gpu_scale(package, f.scale, planes);
@@ -223,24 +297,15 @@ void fetch_textures(const FetchArguments& a, const DeliveryRequest& request, con
   load.on_fragment = [&](const LoadedFragment& fragment) { writer.add(fragment); };
   f.load = loader.load(planes, load);
   f.end_s = seconds_since(start);
-  if (const double seconds = parse_duration(a.refine, "--refine"); seconds > 0 && !f.load.cancelled)
-    f.refined = loader.refine(planes, load, {seconds, ~0ull});
+  if (a.refine_s > 0 && !f.load.cancelled) f.refined = loader.refine(planes, load, {a.refine_s, ~0ull});
   f.texture_bytes = loader.bytes();
   writer.write();
   predict(package, loader, planes, load.list, f);
 }
 
-/// Bytes per second of all that was fetched.
-double mean_bytes_s(const Fetched& f, Moved moved) {
-  if (f.place.in_memory) return f.place.bytes_s;
-  const double textures_s = f.end_s - f.mesh_s;
-  if (f.load.transfer.bytes > 0 && textures_s > 0) moved.add(f.load.transfer.bytes, textures_s, f.rtt_s);
-  return moved.bytes_s(f.place.bytes_s);
-}
-
-Fetched fetch(const FetchArguments& a, LinkWatch& watch) {
+Fetched fetch(const FetchArguments& a) {
   const DeliveryRequest request = delivery_request(a.delivery);
-  const HttpOptions http = watch.watched(http_options(request.time_limit_s));
+  const HttpOptions http = http_options(request.time_limit_s);
   Fetched f;
   Moved moved;
   const auto start = Clock::now();
@@ -251,8 +316,7 @@ Fetched fetch(const FetchArguments& a, LinkWatch& watch) {
   f.rtt_s = request.network.rtt_s > 0 ? request.network.rtt_s : f.place.rtt_s;
   const auto bytes_s = [&] {
     if (f.place.in_memory) return Moved::kMost_bytes_s;  // all of it is here
-    return request.beta0_bytes_s > 0 ? request.beta0_bytes_s
-                                     : watch.beta0(f.place.url, moved.bytes_s(f.place.bytes_s));
+    return moved.bytes_s(f.place.bytes_s);
   };
   FetchedFiles writer(package, a.output);
   const bool proxies =
@@ -270,15 +334,84 @@ Fetched fetch(const FetchArguments& a, LinkWatch& watch) {
   }
   if (f.proxy) {
     end_with_proxy(package, request.displayed_px, start, writer, f, moved);
-    watch.finish({f.place.url}, f.load, f.rtt_s, mean_bytes_s(f, moved));
     return f;
   }
   writer.write_entry(mesh_path(f.scale), fetch_mesh(package, f, moved));
   f.mesh_s = seconds_since(start);
   f.place = server.place();
-  fetch_textures(a, request, http, package, start, bytes_s(), writer, watch, f);
-  watch.finish(f.urls, f.load, f.rtt_s, mean_bytes_s(f, moved));
+  fetch_textures(a, request, http, package, start, bytes_s(), writer, f);
   return f;
+}
+
+Json fetch_document(const Fetched& f, double limit_s) {
+  Json j{{"version", 1},
+         {"scale", f.scale},
+         {"rtt_s", f.rtt_s},
+         {"url", shown_url(f.place.url)},
+         {"whole_rungs", f.whole_rungs},
+         {"first_picture_s", f.first_picture_s},
+         {"mesh_s", f.mesh_s},
+         {"end_s", f.end_s},
+         {"deviation_percent", 100 * (limit_s - f.end_s) / limit_s},
+         {"mesh_bytes", f.mesh_bytes},
+         {"texture_bytes", f.texture_bytes},
+         {"requests", f.load.transfer.steps.size()},
+         {"fragments", f.load.fragments},
+         {"skipped", f.load.skipped},
+         {"given_up", f.load.given_up},
+         {"problems", f.load.problems},
+         {"cancelled", f.load.cancelled},
+         {"texture_flip", f.texture_flip},
+         {"flip", f.flip},
+         {"gpu_bytes", gpu_json(f.gpu)}};
+  if (f.proxy) j["proxy"] = *f.proxy;
+  if (f.step) j["step"] = {{"proxy", f.step->proxy}, {"at_s", f.step->at_s}};
+  for (std::size_t i = 0; f.load.mirrors.size() > 1 && i < f.load.mirrors.size(); ++i) {
+    j["servers"].push_back({{"url", shown_url(f.urls[i])}});
+    j["servers"].back().update(server_json(f.load.mirrors[i]));
+  }
+  if (f.refined)
+    j["refined"] = {{"seconds", f.refined->transfer.end_s}, {"bytes", f.refined->transfer.bytes}};
+  return j;
+}
+
+std::string load_text(const Fetched& f, double limit_s) {
+  std::string text;
+  if (f.proxy) {
+    text += fmt::format(
+        "{}: first picture after {:.3f} s, {} after {:.3f} s ({} bytes); round trip {:.1f} ms\n"
+        "predicted FLIP {:.4f} (0 = equal to the source): nothing else is needed\n",
+        shown_url(f.place.url), f.first_picture_s, proxy_path(*f.proxy), f.mesh_s, grouped(f.mesh_bytes),
+        1000 * f.rtt_s, f.flip);
+    return text + gpu_text(f.gpu);
+  }
+  if (f.step) text += fmt::format("on the way: {} after {:.3f} s\n", proxy_path(f.step->proxy), f.step->at_s);
+  text += fmt::format(
+      "{}: first picture and tables after {:.3f} s, S_{} after {:.3f} s ({} bytes); round trip {:.1f} ms\n"
+      "textures after {:.3f} s: {:+.2f} % of the limit of {:.2f} s, {} bytes in {} fragments, {} skipped, {} "
+      "given up\n",
+      shown_url(f.place.url), f.first_picture_s, f.scale, f.mesh_s, grouped(f.mesh_bytes), 1000 * f.rtt_s,
+      f.end_s, 100 * (limit_s - f.end_s) / limit_s, limit_s, grouped(f.load.transfer.bytes), f.load.fragments,
+      f.load.skipped, f.load.given_up);
+  if (f.place.in_memory)
+    text += "the server knows no ranges and has no tree: the whole container was fetched\n";
+  else if (f.whole_rungs)
+    text += "whole rungs: all fragments of a texture at once\n";
+  for (const auto& [why, count] : f.load.problems) text += fmt::format("  {} x {}\n", count, why);
+  if (f.refined)
+    text += fmt::format("refined for {:.3f} s with {} bytes{}\n", f.refined->transfer.end_s,
+                        grouped(f.refined->transfer.bytes),
+                        f.refined->out_of_time ? ", until its time was over" : "");
+  text += fmt::format("predicted FLIP {:.4f} (0 = equal to the source), {:.4f} by the textures alone{}\n",
+                      f.flip, f.texture_flip, f.load.cancelled ? "; cancelled" : "");
+  return text + gpu_text(f.gpu);
+}
+
+std::string servers_text(const Fetched& f) {
+  std::string text;
+  for (std::size_t i = 0; f.load.mirrors.size() > 1 && i < f.load.mirrors.size(); ++i)
+    text += server_text(shown_url(f.urls[i]), f.load.mirrors[i]);
+  return text;
 }
 
 int run_fetch(FetchArguments& args) {
@@ -287,20 +420,19 @@ int run_fetch(FetchArguments& args) {
     std::signal(SIGINT, SIG_DFL);  // a second one ends the process
   });
   args.delivery.needs_link = false;
-  const double limit_s = parse_duration(args.delivery.time, "--time");
-  LinkWatch watch(args.record, args.history, probe_options(args.probe));
-  if (!watch.problem().empty()) std::cerr << "warning: no historic average: " << watch.problem() << '\n';
   Fetched f;
   try {
-    f = fetch(args, watch);
+    f = fetch(args);
   } catch (const InputError&) {
     if (interrupted == 0) throw;
     std::cerr << "interrupted\n";
     return 130;
   }
-  if (static_cast<double>(f.gpu.all()) > delivery_request(args.delivery).memory_bytes)
+  if (static_cast<double>(f.gpu.all()) > args.delivery.request.memory_bytes)
     std::cerr << "warning: even the least takes " << f.gpu.all() << " bytes on the GPU\n";
-  std::cout << (args.json ? fetched_json(f, watch, limit_s) : fetched_text(f, watch, limit_s));
+  const double limit_s = args.delivery.request.time_limit_s;
+  std::cout << (args.delivery.json ? fetch_document(f, limit_s).dump() + '\n'
+                                   : load_text(f, limit_s) + servers_text(f));
   return f.load.cancelled ? 130 : f.load.given_up > 0 ? kExitDifferent : kExitOk;
 }
 
@@ -314,32 +446,20 @@ void add_fetch_options(Command& c, FetchArguments& args) {
   add_memory_option(c, d);
   c.option("--mirror", args.mirrors, "URL of the same package on another server; may be given again")
       .value_name("URL");
-  c.option("--refine", args.refine, "Go on for so long after the limit, best upgrades first")
+  c.option(
+       "--refine", [&args](const std::string& text) { args.refine_s = parse_duration(text, "--refine"); },
+       "Go on for so long after the limit, best upgrades first")
       .value_name("TIME")
-      .shows_default();
+      .shows_default("0");
   c.option("-o,--output", args.output,
            "Folder for the scale's GLB and for the fragments as complete image files")
       .value_name("DIR");
-  c.flag("--json", args.json, "Print one JSON object (schemas/fetch.v1.schema.json)");
-  c.option("--rtt", d.rtt, "Round trip, 40 are milliseconds; 0 = as the first answer shows it")
-      .value_name("TIME")
-      .shows_default()
-      .rare();
+  c.flag("--json", d.json, "Print one JSON object (schemas/fetch.v1.schema.json)");
+  add_rtt_option(c, d, "Round trip, 40 are milliseconds; 0 = as the first answer shows it").rare();
   add_policy_option(c, d).rare();
-  add_window_option(c, d).rare();
-  c.option("--connections", d.connections, "Connections per server").integer_in(1, 64).shows_default().rare();
-  c.option("--record", args.record, "Write the link's throughput as a trace for simulate --trace")
-      .value_name("FILE")
-      .rare();
-  c.option(
-       "--history", args.history,
-       "File that keeps each host's average throughput from run to run, the first guess of the next; state "
-       "= links.json in the user's state folder (default: none is kept)")
-      .value_name("FILE")
-      .rare();
-  add_probe_options(c, args.probe);
-  c.flag("--whole-rungs", args.whole_rungs,
-         "Ask for all fragments of a texture at once, as of servers without ranges")
+  c.option("--connections", d.request.network.connections, "Connections per server")
+      .integer_in(1, 64)
+      .shows_default()
       .rare();
 }
 

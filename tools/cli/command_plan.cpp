@@ -9,10 +9,9 @@
 #include "pipeline/io/table.h"
 #include "tools/cli/check/check_gate.h"
 #include "tools/cli/commands.h"
-#include "tools/cli/options/command_line.h"
 #include "tools/cli/options/common_options.h"
 #include "tools/cli/options/delivery_options.h"
-#include "tools/cli/options/units.h"
+#include "tools/cli/options/delivery_text.h"
 
 namespace texmesh {
 namespace {
@@ -92,71 +91,58 @@ std::string textures_text(PackageReader& package, const DeliveryPlan& p, const F
   return text;
 }
 
-std::string plan_text(PackageReader& package, const DeliveryPlan& p, const FragmentList& list) {
-  std::string text = fmt::format(
-      "{}, predicted FLIP {:.4f} (0 = equal to the source), {:.4f} by the textures alone\n"
-      "first picture {} ({} bytes), mesh complete {}, textures {}\n"
-      "bytes: {} start, {} first picture, {} mesh, {} tables, {} textures; {} in all\n",
-      shown_text(p), p.flip, p.texture_flip, moment(p.first_picture_s),
-      grouped(p.bootstrap_bytes + p.first_picture_bytes), moment(p.mesh_s), moment(p.complete_s),
-      grouped(p.bootstrap_bytes), grouped(p.first_picture_bytes), grouped(p.mesh_bytes),
-      grouped(p.table_bytes), grouped(p.texture_bytes), grouped(p.bytes()));
+/// `timed`: of a plan over a link, not of a budget.
+std::string plan_text(PackageReader& package, const DeliveryPlan& p, const FragmentList& list, bool timed) {
+  std::string text =
+      fmt::format("{}, predicted FLIP {:.4f} (0 = equal to the source), {:.4f} by the textures alone\n",
+                  shown_text(p), p.flip, p.texture_flip);
+  if (timed)
+    text += fmt::format("first picture {} ({} bytes), mesh complete {}, textures {}\n",
+                        moment(p.first_picture_s), grouped(p.bootstrap_bytes + p.first_picture_bytes),
+                        moment(p.mesh_s), moment(p.complete_s));
+  text += fmt::format("bytes: {} start, {} first picture, {} mesh, {} tables, {} textures; {} in all\n",
+                      grouped(p.bootstrap_bytes), grouped(p.first_picture_bytes), grouped(p.mesh_bytes),
+                      grouped(p.table_bytes), grouped(p.texture_bytes), grouped(p.bytes()));
   return text + textures_text(package, p, list);
 }
 
-std::string budget_text(PackageReader& package, const DeliveryPlan& p, const FragmentList& list) {
-  return fmt::format(
-             "{}, predicted FLIP {:.4f} (0 = equal to the source), {:.4f} by the textures alone\n"
-             "bytes: {} start, {} first picture, {} mesh, {} tables, {} textures; {} in all\n",
-             shown_text(p), p.flip, p.texture_flip, grouped(p.bootstrap_bytes),
-             grouped(p.first_picture_bytes), grouped(p.mesh_bytes), grouped(p.table_bytes),
-             grouped(p.texture_bytes), grouped(p.bytes())) +
-         textures_text(package, p, list);
-}
-
 struct PlanArguments : DeliveryArguments {
-  std::string budget;
+  std::optional<std::uint64_t> budget;  // bytes
 };
 
 struct CheckArguments : DeliveryArguments {
-  double max_flip = 1, max_texture_flip = 1;
-  std::string max_first_picture, max_bytes, junit;
+  Gate gate;
+  std::string junit;
   int views = 12;
   bool predicted_only = false;
 };
 
 int run_plan(PlanArguments& args) {
-  const bool budget = !args.budget.empty();
-  args.needs_link = !budget;
+  args.needs_link = !args.budget;
   const DeliveryRequest request = delivery_request(args);
-  const std::uint64_t bytes = budget ? parse_bytes(args.budget, "--budget") : 0;
   PackageReader package(open_store(args.package));
-  if (!budget) {
-    const DeliveryPlan plan = plan_delivery(package, request);
-    const FragmentList list = list_of(package, request, plan);
-    std::cout << (args.json ? plan_json(package, plan, list).dump() + "\n" : plan_text(package, plan, list));
-    return kExitOk;
-  }
-  const DeliveryPlan plan = plan_budget(package, request, bytes);
+  const DeliveryPlan plan =
+      args.budget ? plan_budget(package, request, *args.budget) : plan_delivery(package, request);
   const FragmentList list = list_of(package, request, plan);
-  Json j = plan_json(package, plan, list);
-  for (const char* timed : {"first_picture_s", "mesh_s", "complete_s"}) j.erase(timed);
-  std::cout << (args.json ? j.dump() + "\n" : budget_text(package, plan, list));
-  return plan.bytes() <= bytes ? kExitOk : kExitDifferent;
+  if (args.json) {
+    Json j = plan_json(package, plan, list);
+    if (args.budget)
+      for (const char* timed : {"first_picture_s", "mesh_s", "complete_s"}) j.erase(timed);
+    std::cout << j.dump() << '\n';
+  } else {
+    std::cout << plan_text(package, plan, list, !args.budget);
+  }
+  return !args.budget || plan.bytes() <= *args.budget ? kExitOk : kExitDifferent;
 }
 
 int run_check(const CheckArguments& args) {
   const DeliveryRequest request = delivery_request(args);
-  Gate gate{args.max_flip, args.max_texture_flip};
-  if (!args.max_first_picture.empty())
-    gate.max_first_picture_s = parse_duration(args.max_first_picture, "--max-first-picture");
-  if (!args.max_bytes.empty()) gate.max_bytes = parse_bytes(args.max_bytes, "--max-bytes");
   PackageReader package(open_store(args.package));
   const DeliveryPlan plan = plan_delivery(package, request);
   const FragmentList list = list_of(package, request, plan);
-  std::vector<GateResult> results = check_plan(plan, gate, request.time_limit_s);
-  if (args.max_flip < 1 && !args.predicted_only) {
-    const auto sizes = check_switch_sizes(package, args.max_flip, args.views, context_of(0));
+  std::vector<GateResult> results = check_plan(plan, args.gate, request.time_limit_s);
+  if (args.gate.max_flip < 1 && !args.predicted_only) {
+    const auto sizes = check_switch_sizes(package, args.gate.max_flip, args.views, context_of(0));
     results.insert(results.end(), sizes.begin(), sizes.end());
   }
   if (!args.junit.empty()) write_gate_junit(args.junit, "texmesh check", args.package, results);
@@ -167,7 +153,7 @@ int run_check(const CheckArguments& args) {
     j["reasons"] = reasons;
     std::cout << j.dump() << '\n';
   } else {
-    std::cout << plan_text(package, plan, list);
+    std::cout << plan_text(package, plan, list, true);
     for (const std::string& r : reasons) std::cout << "not good enough: " << r << '\n';
     if (reasons.empty()) std::cout << "good enough\n";
   }
@@ -179,9 +165,10 @@ int run_check(const CheckArguments& args) {
 void add_plan_command(Command& app) {
   auto args = std::make_shared<PlanArguments>();
   Command c = app.add("plan", "Say what a viewer will get in a time over a link, or in a number of bytes");
-  add_delivery_options(c, *args, true);
-  c.option("--budget", args->budget,
-           "Bytes instead of time: the mesh and the textures that look best together in 500kB")
+  add_delivery_options(c, *args);
+  c.option(
+       "--budget", [a = args.get()](const std::string& text) { a->budget = parse_bytes(text, "--budget"); },
+       "Bytes instead of time: the mesh and the textures that look best together in 500kB")
       .value_name("SIZE");
   c.flag("--json", args->json, "Print one JSON object (schemas/plan.v1.schema.json)");
   c.examples(
@@ -203,9 +190,9 @@ void add_plan_command(Command& app) {
 void add_check_command(Command& app) {
   auto args = std::make_shared<CheckArguments>();
   Command c = app.add("check", "Fail when a package does not show well enough in a time: a gate for CI");
-  add_delivery_options(c, *args, true);
+  add_delivery_options(c, *args);
   c.option(
-       "--max-flip", args->max_flip,
+       "--max-flip", args->gate.max_flip,
        "Most FLIP of the lit object, 0 = equal to the source: of the plan as predicted, and of each scale at "
        "its switch size beside S_0, rendered, in its worst view")
       .number_in(0, 1);
@@ -214,12 +201,21 @@ void add_check_command(Command& app) {
   c.option("--views", args->views, "Directions from which switch sizes are rendered")
       .integer_in(1, 64)
       .shows_default();
-  c.option("--max-texture-flip", args->max_texture_flip,
+  c.option("--max-texture-flip", args->gate.max_texture_flip,
            "Most predicted FLIP by the textures alone, on the finest scale")
       .number_in(0, 1);
-  c.option("--max-first-picture", args->max_first_picture, "Latest time of the first picture: 1s, 800ms")
+  c.option(
+       "--max-first-picture",
+       [a = args.get()](const std::string& text) {
+         a->gate.max_first_picture_s = parse_duration(text, "--max-first-picture");
+       },
+       "Latest time of the first picture: 1s, 800ms")
       .value_name("TIME");
-  c.option("--max-bytes", args->max_bytes, "Most bytes in all: 500kB").value_name("SIZE");
+  c.option(
+       "--max-bytes",
+       [a = args.get()](const std::string& text) { a->gate.max_bytes = parse_bytes(text, "--max-bytes"); },
+       "Most bytes in all: 500kB")
+      .value_name("SIZE");
   c.option("--junit", args->junit, "Write a test case for every limit as JUnit XML").value_name("FILE");
   c.flag("--json", args->json, "Print one JSON object (schemas/plan.v1.schema.json)");
   c.examples(

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "delivery/cpp/client/request_htc.h"
 #include "format/rules/proxy_choice.h"
 
 namespace texmesh {
@@ -171,9 +170,8 @@ DeliveryPlan plan_at_scale(TextureLoss& loss, const DeliveryRequest& request, in
 
   const HtcOptions htc = request_htc(request, request.time_limit_s - plan.mesh_s,
                                      shown_throughput(plan, manifest_s, request.network.rtt_s));
-  const ChosenTextures chosen =
-      choose_textures(loss, request, list_options(request, scale),
-                      std::max(0.0, htc.time_limit_s) * htc.throughput.initial_bytes_s);
+  const ChosenTextures chosen = choose_textures(loss, request, list_options(request, scale),
+                                                std::max(0.0, htc.time_limit_s) * htc.initial_bytes_s);
   plan.planes = chosen.planes;
   plan.gamma = chosen.gamma;
   const FragmentList& list = chosen.list;
@@ -187,8 +185,10 @@ DeliveryPlan plan_at_scale(TextureLoss& loss, const DeliveryRequest& request, in
     if (htc.time_limit_s < 30 * htc.rtt_s)
       plan.warnings.push_back(
           "less than 30 round trips are left for textures: the limit may be missed by more than 2 %");
-    const NetworkOptions network = without_dead_mirrors(request.network, plan.mesh_s);
-    plan.textures = simulate(list.offers, htc, network_from(network, plan.mesh_s), request.probe);
+    const NetworkOptions network =
+        network_from(without_dead_mirrors(request.network, plan.mesh_s), plan.mesh_s);
+    plan.textures =
+        request.play ? request.play(scale, list.offers, htc, network) : simulate(list.offers, htc, network);
     plan.complete_s = plan.mesh_s + plan.textures.end_s;
   }
   plan.texture_bytes = plan.textures.bytes;
@@ -197,10 +197,6 @@ DeliveryPlan plan_at_scale(TextureLoss& loss, const DeliveryRequest& request, in
   if (!std::isfinite(plan.first_picture_s)) plan.flip = plan.texture_flip = 1;
   return plan;
 }
-
-}  // namespace
-
-namespace {
 
 /// What fits, and of that what looks best; where nothing fits, what takes the fewest bytes.
 void take_better(DeliveryPlan plan, std::uint64_t bytes, std::optional<DeliveryPlan>& best) {
@@ -220,11 +216,18 @@ int wanted_scale(PackageReader& package, const DeliveryRequest& request) {
 DeliveryRequest as_printed(DeliveryRequest request) {
   request.rule = StepRule::kJnd;
   request.htc.policy = Policy::kThesis;
-  request.htc.order = HtcOrder::kBeta0;
-  request.htc.throughput.estimator = Estimator::kLast;
   request.htc.window = 1;
   request.htc.hard_limits = true;
   return request;
+}
+
+HtcOptions request_htc(const DeliveryRequest& request, double left_s, double shown_bytes_s) {
+  HtcOptions htc = request.htc;
+  htc.time_limit_s = left_s;
+  htc.rtt_s = request.network.rtt_s;
+  htc.sites = static_cast<int>(std::clamp<std::size_t>(request.network.mirrors.size(), 1, 64));
+  htc.initial_bytes_s = request.beta0_bytes_s > 0 ? request.beta0_bytes_s : shown_bytes_s;
+  return htc;
 }
 
 ThesisTextures thesis_textures(TextureLoss& loss, const ListOptions& options, double bytes) {

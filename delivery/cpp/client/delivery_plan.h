@@ -1,4 +1,5 @@
 #pragma once
+#include <functional>
 #include <limits>
 #include <optional>
 #include <string>
@@ -20,17 +21,23 @@ struct DeliveryRequest {
   int scale = -1;            // -1 = by the rule
   double time_limit_s = 5;   // from the first request on
   double beta0_bytes_s = 0;  // first guess of the throughput; 0 = what the mesh's transfer has shown
-  HtcOptions htc;            // policy, order, window ..: its time limit and beta_0 are set from the others
+  HtcOptions htc;            // policy, window ..: its time limit and beta_0 are set from the others
   NetworkOptions network;
-  ProbeOptions probe;  // test packets beside the textures
+  /// How the textures of a scale are played; not set: simulate().
+  std::function<SimulationResult(int scale, const std::vector<FragmentOffer>& offers, const HtcOptions& htc,
+                                 const NetworkOptions& network)>
+      play;
   /// GPU memory for mesh and textures, see gpu_memory.h. What is least takes its place where nothing fits.
   double memory_bytes = std::numeric_limits<double>::infinity();
   bool proxy_steps = true;  // a larger proxy may be shown on the way, see format/rules/proxy_choice.h
 };
 
-/// The request with chapters 4 and 7 as printed: Policy::kThesis, the JND's rule, the next fragment by
-/// beta_0, the last transfer's throughput, one request at a time, hard limits.
+/// The request with chapters 4 and 7 as printed: Policy::kThesis, the JND's rule, one request at a time, hard
+/// limits.
 DeliveryRequest as_printed(DeliveryRequest request);
+/// The request's policy for the textures: `left_s` seconds are left for them. `shown_bytes_s`, what transfers
+/// before them have shown, is the first guess of the throughput unless the request has one.
+HtcOptions request_htc(const DeliveryRequest& request, double left_s, double shown_bytes_s);
 
 /// What a viewer will get. The time of a part that never comes, because every server dies before, is
 /// +infinity.

@@ -1,10 +1,10 @@
 #include "delivery/cpp/client/texture_loader.h"
-#include "delivery/cpp/decide/upgrades.h"
-#include "format/base/bytes.h"
 
 #include <algorithm>
 #include <map>
 #include <utility>
+
+#include "format/base/bytes.h"
 
 namespace texmesh {
 namespace {
@@ -113,7 +113,7 @@ class UpgradeSource final : public RequestSource {
 TransferOptions transfer_options(const LoadOptions& options) {
   TransferOptions how;
   how.rtt_s = options.htc.rtt_s;
-  how.initial_bytes_s = options.htc.throughput.initial_bytes_s;
+  how.initial_bytes_s = options.htc.initial_bytes_s;
   how.tries = options.tries;
   how.cancelled = options.cancelled;
   return how;
@@ -260,7 +260,7 @@ bool TextureLoader::keep_sound_fragments(const Wanted& w, std::int32_t rung,
 
 LoadReport TextureLoader::load(const std::vector<PlaneChoice>& planes, const LoadOptions& options) {
   std::vector<Wanted> wanted = this->wanted(planes, options.list);
-  const double initial_bytes_s = options.htc.throughput.initial_bytes_s;
+  const double initial_bytes_s = options.htc.initial_bytes_s;
   if (options.group_bytes > 0 && !whole_rungs_)
     wanted =
         join_neighbours(std::move(wanted), options.group_bytes, initial_bytes_s * options.htc.time_limit_s);

@@ -9,17 +9,15 @@
 namespace texmesh {
 namespace {
 
-constexpr double kWindowFactor = 1.5;     // of throughput x round trip
+constexpr double kWindowFactor = 1.5;  // of throughput x round trip
+constexpr std::uint32_t kMostInFlight = 64;
 constexpr std::size_t kTripSamples = 64;  // a window that follows every swing makes them worse
 constexpr std::size_t kWindowSamples = 10, kGuardSamples = 20;
-constexpr double kBreak = 4;             // a link this many times faster or slower is another link
-constexpr double kLargestExponent = 12;  // of kPrice's factor: 1.6e5 either way
+constexpr double kBreak = 4;    // a link this many times faster or slower is another link
+constexpr double kGuard = 1.5;  // factor of GuardPolicy
 // A stall that is over looks like a slow link until something has been transferred: what is skipped on such
 // evidence is lost for good.
 constexpr int kMostSkipsInARow = 1;
-constexpr double kElasticity = 2.5;  // of the price by bytes, on ladders of photographs
-constexpr double kSpareExponent = 1;
-constexpr double kLateFactor = 1.2;  // what is asked for may take this much longer than is left
 
 void require(bool good, const char* what) {
   if (!good) throw std::invalid_argument(what);
@@ -28,9 +26,9 @@ void require(bool good, const char* what) {
 void check(const std::vector<FragmentOffer>& offers, const HtcOptions& o) {
   require(offers.size() < 1u << 24, "HarmonicTimePlan: fewer than 2^24 fragments");
   require(o.time_limit_s > 0 && o.time_limit_s <= 1e6, "HarmonicTimePlan: time limit in (0, 1e6] s");
-  require(o.throughput.initial_bytes_s > 0, "HarmonicTimePlan: initial throughput > 0");
+  require(o.initial_bytes_s > 0, "HarmonicTimePlan: initial throughput > 0");
   require(o.rtt_s >= 0 && o.rtt_s < 1e4, "HarmonicTimePlan: round trip in [0, 1e4) s");
-  require(o.window >= 0 && o.max_in_flight >= 1 && o.guard > 1, "HarmonicTimePlan: window, guard");
+  require(o.window >= 0, "HarmonicTimePlan: window");
   require(o.sites >= 1 && o.sites <= 64, "HarmonicTimePlan: sites");
   for (const FragmentOffer& f : offers) {
     require(!f.bytes.empty() && f.loss.size() == f.bytes.size() + 1,
@@ -70,8 +68,8 @@ std::uint32_t bytes_at_rung(const FragmentOffer& f, std::int32_t rung) {
 /// The rung from `low` on that costs least (ties: the first), of those that have so few bytes; -1: skipping
 /// does. `cost` of bytes and what is then lost.
 template <typename Cost>
-std::int32_t cheapest_rung(const FragmentOffer& f, std::size_t low, bool may_skip, double most_bytes,
-                           const Cost& cost) {
+std::int32_t least_rung(const FragmentOffer& f, std::size_t low, bool may_skip, double most_bytes,
+                        const Cost& cost) {
   std::int32_t best = may_skip ? -1 : static_cast<std::int32_t>(low);
   double least = may_skip ? cost(0.0, f.loss[0]) : cost(f.bytes[low], f.loss[low + 1]);
   for (std::size_t r = low; r <= highest(f); ++r) {
@@ -84,10 +82,30 @@ std::int32_t cheapest_rung(const FragmentOffer& f, std::size_t low, bool may_ski
   return best;
 }
 
+/// What the link will give in the time left: its mean over as long a time until now, so that bursts shorter
+/// than that do not count; but a link that stalls, falls or comes back by more than kBreak does not return
+/// to its mean.
+double lasting_bytes_s(const HarmonicTimePlan& plan, double now_s) {
+  const double recent = plan.throughput().recent_bytes_s(kGuardSamples);
+  const double left_s = plan.options().time_limit_s - now_s;
+  if (left_s <= 0) return recent;
+  const double mean = plan.throughput().mean_bytes_s(left_s);
+  return recent * kBreak > mean && recent < kBreak * mean ? mean : recent;
+}
+
+std::unique_ptr<TransferPolicy> policy_of(const HtcOptions& o) {
+  if (o.other_policy) return o.other_policy();
+  if (o.policy == Policy::kThesis) return std::make_unique<ThesisPolicy>();
+  return std::make_unique<GuardPolicy>();
+}
+
 }  // namespace
 
 HarmonicTimePlan::HarmonicTimePlan(std::vector<FragmentOffer> offers, const HtcOptions& options)
-    : offers_(std::move(offers)), options_(options), throughput_(options.throughput) {
+    : offers_(std::move(offers)),
+      options_(options),
+      policy_(policy_of(options)),
+      throughput_(options.initial_bytes_s) {
   check(offers_, options_);
   const std::size_t n = offers_.size();
   std::vector<std::size_t> order(n);
@@ -100,68 +118,29 @@ HarmonicTimePlan::HarmonicTimePlan(std::vector<FragmentOffer> offers, const HtcO
   step_of_offer_.assign(n, n);
   taken_.assign(n, false);
   right_ = static_cast<std::uint32_t>(n);
-  mean_ = mean_fragment(offers_, options_.policy == Policy::kThesis);
+  mean_ = mean_fragment(offers_, policy_->counts_from_gamma());
   planned_.reserve(n);
   for (const FragmentOffer& f : offers_) {
     planned_.push_back(f.planned_bytes);
-    planned_total_ += f.planned_bytes;
     smallest_left_ += f.bytes[lowest(f, false)];
     low_left_ += f.bytes[lowest(f, true)];
   }
-  planned_left_ = planned_total_;
   // Nothing can arrive in the first round trip. Counted as a delay it would starve the fragments that come
   // next; with one request at a time every fragment has a round trip of its own.
   if (options_.window != 1) latency_s_ = std::min(options_.rtt_s, options_.time_limit_s / 2);
-  if (options_.policy == Policy::kPrice || options_.policy == Policy::kGuard) plan_prices();
-  if (options_.policy == Policy::kGuard) plan_for_least_loss();
-}
-
-// The price at which the plan for beta_0 spends T_0 x beta_0: bisection on its logarithm.
-void HarmonicTimePlan::plan_prices() {
-  const double budget = options_.time_limit_s * options_.throughput.initial_bytes_s;
-  const auto bytes_at = [&](double price) {
-    double sum = 0;
-    for (const FragmentOffer& f : offers_) sum += bytes_at_rung(f, cheapest_rung_of(f, price, true, budget));
-    return sum;
-  };
-  double low = -60, high = 60;  // of ln(price)
-  for (int i = 0; i < 60; ++i) {
-    const double middle = (low + high) / 2;
-    (bytes_at(portable::exp(middle)) > budget ? low : high) = middle;
-  }
-  price_0_ = portable::exp(high);
-  price_bytes_.reserve(offers_.size());
-  for (const FragmentOffer& f : offers_) {
-    price_bytes_.push_back(bytes_at_rung(f, cheapest_rung_of(f, price_0_, true, budget)));
-    price_total_ += price_bytes_.back();
-  }
-}
-
-void HarmonicTimePlan::plan_for_least_loss() {
-  planned_total_ = 0;
-  for (std::size_t i = 0; i < offers_.size(); ++i) {
-    const FragmentOffer& f = offers_[i];
-    planned_[i] = std::max<double>(price_bytes_[i], f.bytes[lowest(f, false)]);
-    planned_total_ += planned_[i];
-  }
+  policy_->begin(*this, planned_);
+  for (const double bytes : planned_) planned_total_ += bytes;
   planned_left_ = planned_total_;
-}
-
-double HarmonicTimePlan::throughput_bytes_s() const {
-  // With several requests in flight completions come in bunches: only sums over some of them say anything.
-  if (options_.window != 1 && options_.throughput.estimator == Estimator::kLast)
-    return throughput_.recent_bytes_s(kWindowSamples);
-  return throughput_.bytes_s();
 }
 
 bool HarmonicTimePlan::window_open(double now_s) const {
   if (options_.window > 0) return in_flight_ < static_cast<std::uint32_t>(options_.window);
   const std::uint32_t least = 2 * static_cast<std::uint32_t>(options_.sites);
   if (in_flight_ < least) return true;
-  if (in_flight_ >= static_cast<std::uint32_t>(options_.max_in_flight)) return false;
+  if (in_flight_ >= kMostInFlight) return false;
   // What is in flight takes all the time that is left: what is asked for now could only be late.
   const double left_s = options_.time_limit_s - now_s;
-  if (left_s > latency_s_ && room_bytes(throughput_.recent_bytes_s(kWindowSamples), now_s) <= 0) return false;
+  if (left_s > latency_s_ && room_bytes(now_s) <= 0) return false;
   // Counted in fragments of the planned size: counted in bytes, many small ones would be in flight when there
   // is little time, and those are received side by side and late.
   const double fragment_bytes = planned_total_ / static_cast<double>(offers_.size());
@@ -181,8 +160,8 @@ const HtcStep* HarmonicTimePlan::next(double now_s) {
     step.credit_s = credit;
     step.theta_s = theta_of(offer) + credit;
     step.throughput_bytes_s = throughput_bytes_s();
-    step.target_bytes = target_of(offer, step.theta_s, now_s);
-    step.rung = rung_of(offer, step.target_bytes, now_s);
+    step.target_bytes = policy_->target_bytes(*this, offer, step.theta_s, now_s);
+    step.rung = policy_->rung(*this, offer, step.target_bytes, now_s);
     step.bytes = bytes_at_rung(f, step.rung);
     step.issued_s = now_s;
     remove_from_list(offer);
@@ -206,12 +185,8 @@ const HtcStep* HarmonicTimePlan::next(double now_s) {
 }
 
 std::uint32_t HarmonicTimePlan::choose_offer(double credit) const {
-  const bool in_order = options_.policy == Policy::kPrice;
-  if (steps_.empty() && !in_order) return mean_;
-  bool finest = true;
-  if (!in_order && options_.order == HtcOrder::kCredit) finest = credit <= 0;
-  if (!in_order && options_.order == HtcOrder::kBeta0)
-    finest = throughput_bytes_s() <= options_.throughput.initial_bytes_s;
+  if (steps_.empty() && policy_->begins_with_mean()) return mean_;
+  const bool finest = policy_->finest_is_next(*this, credit);
   std::uint32_t left = left_, right = right_;
   while (left < right && taken_[sorted_[left]]) ++left;
   while (left < right && taken_[sorted_[right - 1]]) --right;
@@ -226,13 +201,10 @@ void HarmonicTimePlan::remove_from_list(std::uint32_t offer) {
   planned_left_ -= planned_[offer];
   smallest_left_ -= f.bytes[lowest(f, false)];
   low_left_ -= f.bytes[lowest(f, true)];
-  if (!price_bytes_.empty()) price_done_ += price_bytes_[offer];
 }
 
 double HarmonicTimePlan::theta_of(std::uint32_t offer) const {
-  const double first_list_bytes = options_.time_limit_s * options_.throughput.initial_bytes_s;  // D_1
-  const double whole = options_.policy == Policy::kThesis ? first_list_bytes : planned_total_;
-  return (options_.time_limit_s - latency_s_) * (planned_[offer] / whole);
+  return (options_.time_limit_s - latency_s_) * (planned_[offer] / policy_->list_bytes(*this));
 }
 
 // credit_i: the share 1 / (chi zeta), chi = 2 for the position after the last issued one, of every dT so far.
@@ -252,61 +224,25 @@ void HarmonicTimePlan::spread(double residual_s) {
   credits_.push_back({residual_s / zeta, issued});
 }
 
-/// Bytes that can still arrive in time besides those in flight. What is asked for now arrives a round trip
-/// later, whether or not enough is in flight until then.
+/// What is asked for now arrives a round trip later, whether or not enough is in flight until then.
 double HarmonicTimePlan::room_bytes(double beta, double now_s) const {
   const double left_s = options_.time_limit_s - now_s;
   return std::max(0.0, std::min(beta * left_s - in_flight_bytes_, beta * (left_s - latency_s_)));
 }
 
-/// What a plan in proportion to the planned sizes gives, as a factor of them.
+double HarmonicTimePlan::room_bytes(double now_s) const {
+  return room_bytes(throughput_.recent_bytes_s(kWindowSamples), now_s);
+}
+
 double HarmonicTimePlan::proportional_share(double now_s, double beta) const {
   return room_bytes(beta, now_s) / std::max(planned_left_, 1.0);
-}
-
-/// What the link will give in the time left: its mean over as long a time until now, so that bursts shorter
-/// than that do not count; but a link that stalls, falls or comes back by more than kBreak does not return
-/// to its mean.
-double HarmonicTimePlan::lasting_bytes_s(double now_s) const {
-  const double recent = throughput_.recent_bytes_s(kGuardSamples);
-  const double left_s = options_.time_limit_s - now_s;
-  if (left_s <= 0) return recent;
-  const double mean = throughput_.mean_bytes_s(left_s);
-  return recent * kBreak > mean && recent < kBreak * mean ? mean : recent;
-}
-
-double HarmonicTimePlan::target_of(std::uint32_t offer, double theta_s, double now_s) const {
-  const double planned = planned_[offer];
-  switch (options_.policy) {
-    case Policy::kStatic:
-    case Policy::kPrice:
-      return planned;
-    case Policy::kProportional:
-      return planned * proportional_share(now_s, throughput_bytes_s());
-    case Policy::kHtc:
-    case Policy::kGuard:
-    case Policy::kThesis:
-      break;
-  }
-  if (steps_.empty()) return planned;  // F-bar has the quality Q_i
-  // Alone in flight it has to wait for a round trip first.
-  const double wait = options_.window == 1 ? options_.rtt_s : 0;
-  const double target = throughput_bytes_s() * (theta_s - wait);
-  if (options_.policy != Policy::kGuard) return target;
-  const double even = planned * proportional_share(now_s, lasting_bytes_s(now_s));
-  return std::clamp(target, even / options_.guard, even * options_.guard);
-}
-
-bool HarmonicTimePlan::limits_can_hold(double now_s) const {
-  return options_.hard_limits || low_left_ <= room_bytes(throughput_.recent_bytes_s(kWindowSamples), now_s);
 }
 
 bool HarmonicTimePlan::may_skip(double now_s) const {
   if (options_.hard_limits) return false;
   if (options_.time_limit_s - now_s <= latency_s_) return true;  // it could not arrive in time
   if (skips_in_a_row_ >= kMostSkipsInARow) return false;
-  if (options_.policy == Policy::kHtc || options_.policy == Policy::kStatic) return true;
-  return smallest_left_ > room_bytes(throughput_.recent_bytes_s(kWindowSamples), now_s);
+  return policy_->skips_early() || smallest_left_ > room_bytes(now_s);
 }
 
 /// The lowest rung worth asking for: unless limits are hard, one that shows more than the preview does.
@@ -318,52 +254,29 @@ std::size_t HarmonicTimePlan::lowest(const FragmentOffer& f, bool limits) const 
   return low;
 }
 
-std::int32_t HarmonicTimePlan::cheapest_rung_of(const FragmentOffer& f, double price, bool may_skip,
-                                                double most_bytes) const {
-  return cheapest_rung(f, lowest(f, false), may_skip, most_bytes,
-                       [&](double bytes, double loss) { return loss + price * bytes; });
+std::int32_t HarmonicTimePlan::cheapest_rung(const FragmentOffer& f, double price, bool may_skip,
+                                             double most_bytes) const {
+  return least_rung(f, lowest(f, false), may_skip, most_bytes,
+                    [&](double bytes, double loss) { return loss + price * bytes; });
 }
 
-std::int32_t HarmonicTimePlan::rung_of(std::uint32_t offer, double target, double now_s) const {
-  const FragmentOffer& f = offers_[offer];
+std::int32_t HarmonicTimePlan::nearest_rung(const FragmentOffer& f, double target, double now_s) const {
   const bool skip = may_skip(now_s);
-  if (options_.policy == Policy::kPrice) {
-    const double room = room_bytes(throughput_.recent_bytes_s(kWindowSamples), now_s);
-    return cheapest_rung_of(f, price_at(now_s), skip, kLateFactor * room);
-  }
-  const bool limits = limits_can_hold(now_s);
-  return cheapest_rung(f, lowest(f, limits), skip && !limits, 1e300,
-                       [&](double bytes, double) { return std::abs(target - bytes); });
+  const bool limits = options_.hard_limits || low_left_ <= room_bytes(now_s);
+  return least_rung(f, lowest(f, limits), skip && !limits, 1e300,
+                    [&](double bytes, double) { return std::abs(target - bytes); });
 }
 
-// A lag alone asks for too much after a stall: no higher price than what is left can be sent at.
-double HarmonicTimePlan::most_exponent(double left_s) const {
-  const double room = room_bytes(throughput_.recent_bytes_s(kWindowSamples), options_.time_limit_s - left_s);
-  const double ratio = (price_total_ - price_done_) / std::max(room, 1.0);
-  const double enough = kSpareExponent + kElasticity * portable::log(std::max(ratio, 1.0));
-  return std::min(enough, kLargestExponent);
-}
-
-double HarmonicTimePlan::price_at(double now_s) const {
-  const double planned_s = price_total_ > 0 ? options_.time_limit_s * (price_done_ / price_total_) : 0;
-  // What is in flight has been issued but not paid for yet.
-  const double lag = now_s - (planned_s - in_flight_bytes_ / throughput_bytes_s());
-  const double left = std::max(options_.time_limit_s - now_s, 1e-3 * options_.time_limit_s);
-  const double exponent =
-      std::clamp(options_.price_kappa * lag / left, -kLargestExponent, most_exponent(left));
-  return price_0_ * portable::exp(exponent);
-}
-
-void HarmonicTimePlan::completed(std::uint32_t offer, double now_s) {
+HtcStep& HarmonicTimePlan::issued(std::uint32_t offer) {
   require(offer < offers_.size() && step_of_offer_[offer] < steps_.size(), "HarmonicTimePlan: not issued");
-  finish(steps_[step_of_offer_[offer]], now_s, true);
+  return steps_[step_of_offer_[offer]];
 }
+
+void HarmonicTimePlan::completed(std::uint32_t offer, double now_s) { finish(issued(offer), now_s, true); }
 
 void HarmonicTimePlan::failed(std::uint32_t offer, double now_s) {
-  require(offer < offers_.size() && step_of_offer_[offer] < steps_.size(), "HarmonicTimePlan: not issued");
-  HtcStep& step = steps_[step_of_offer_[offer]];
-  finish(step, now_s, false);
-  step.rung = -1;
+  finish(issued(offer), now_s, false);
+  issued(offer).rung = -1;
 }
 
 void HarmonicTimePlan::finish(HtcStep& step, double now_s, bool sample) {
@@ -377,9 +290,11 @@ void HarmonicTimePlan::finish(HtcStep& step, double now_s, bool sample) {
   std::erase(waiting_, step_of_offer_[step.offer]);
   --in_flight_;
   in_flight_bytes_ -= step.bytes;
-  if (sample)
-    throughput_.add(step.bytes, now_s - std::max(last_done_s_, first_issued_s + options_.rtt_s),
-                    {in_flight_, in_flight_bytes_});
+  if (sample) {
+    const double seconds = now_s - std::max(last_done_s_, first_issued_s + options_.rtt_s);
+    throughput_.add(step.bytes, seconds, {in_flight_, in_flight_bytes_});
+    policy_->measured(step.bytes, seconds);
+  }
   last_done_s_ = now_s;
   spread(step.residual_s);
 }
@@ -388,6 +303,67 @@ std::vector<std::int32_t> HarmonicTimePlan::rungs() const {
   std::vector<std::int32_t> rungs(offers_.size(), -1);
   for (const HtcStep& s : steps_) rungs[s.offer] = s.rung;
   return rungs;
+}
+
+double TransferPolicy::throughput_bytes_s(const HarmonicTimePlan& plan) const {
+  // With several requests in flight completions come in bunches: only sums over some of them say anything.
+  return plan.throughput().recent_bytes_s(plan.options().window != 1 ? kWindowSamples : 1);
+}
+
+double TransferPolicy::list_bytes(const HarmonicTimePlan& plan) const { return plan.planned_total(); }
+
+double TransferPolicy::target_bytes(const HarmonicTimePlan& plan, std::uint32_t offer, double theta_s,
+                                    double) const {
+  if (plan.steps().empty()) return plan.planned_bytes(offer);  // F-bar has the quality Q_i
+  // Alone in flight it has to wait for a round trip first.
+  const double wait = plan.options().window == 1 ? plan.options().rtt_s : 0;
+  return plan.throughput_bytes_s() * (theta_s - wait);
+}
+
+std::int32_t TransferPolicy::rung(const HarmonicTimePlan& plan, std::uint32_t offer, double target_bytes,
+                                  double now_s) const {
+  return plan.nearest_rung(plan.offers()[offer], target_bytes, now_s);
+}
+
+// Bisection on the price's logarithm.
+PricedPlan plan_by_price(const HarmonicTimePlan& plan) {
+  const double budget = plan.options().time_limit_s * plan.options().initial_bytes_s;
+  const auto bytes_at = [&](const FragmentOffer& f, double price) -> double {
+    return bytes_at_rung(f, plan.cheapest_rung(f, price, true, budget));
+  };
+  double low = -60, high = 60;  // of ln(price)
+  for (int i = 0; i < 60; ++i) {
+    const double middle = (low + high) / 2, price = portable::exp(middle);
+    double sum = 0;
+    for (const FragmentOffer& f : plan.offers()) sum += bytes_at(f, price);
+    (sum > budget ? low : high) = middle;
+  }
+  PricedPlan out{portable::exp(high), {}};
+  for (const FragmentOffer& f : plan.offers()) out.bytes.push_back(bytes_at(f, out.price));
+  return out;
+}
+
+void GuardPolicy::begin(const HarmonicTimePlan& plan, std::vector<double>& planned) {
+  planned = plan_by_price(plan).bytes;
+  for (std::uint32_t i = 0; i < planned.size(); ++i)
+    planned[i] = std::max<double>(planned[i], plan.lowest_bytes(plan.offers()[i]));
+}
+
+double GuardPolicy::target_bytes(const HarmonicTimePlan& plan, std::uint32_t offer, double theta_s,
+                                 double now_s) const {
+  if (plan.steps().empty()) return plan.planned_bytes(offer);
+  const double target = TransferPolicy::target_bytes(plan, offer, theta_s, now_s);
+  const double even =
+      plan.planned_bytes(offer) * plan.proportional_share(now_s, lasting_bytes_s(plan, now_s));
+  return std::clamp(target, even / kGuard, even * kGuard);
+}
+
+bool ThesisPolicy::finest_is_next(const HarmonicTimePlan& plan, double) const {
+  return plan.throughput_bytes_s() <= plan.options().initial_bytes_s;
+}
+
+double ThesisPolicy::list_bytes(const HarmonicTimePlan& plan) const {
+  return plan.options().time_limit_s * plan.options().initial_bytes_s;  // D_1
 }
 
 }  // namespace texmesh

@@ -1,7 +1,8 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
-#include <optional>
+#include <functional>
+#include <memory>
 #include <vector>
 
 #include "delivery/cpp/decide/fragment_offer.h"
@@ -18,39 +19,74 @@ namespace texmesh {
 // The plan does no I/O and reads no clock: the caller gives the time. The arithmetic is plain doubles and
 // format/base/portable_math.h, so C++ and TypeScript decide the same, bit for bit (delivery/vectors).
 
-/// How rungs are chosen.
-/// - kHtc: the method, around the plan of Eq. 3.2.
-/// - kGuard: the method around the plan of least loss. A size stays within a factor of the plan's share of
-///   the bytes that the link gives in the time left, so that noisy links make sizes swing less.
-/// - kPrice: one price of bytes, in units of loss, that rises when the plan is late.
-/// - kProportional: planned sizes scaled by the time left over the bytes left.
-/// - kStatic: the planned sizes, whatever happens.
-/// - kThesis: kHtc with (4.1) and (4.2) as printed, theta_g = T_0 d_g / D_1, D_1 = T_0 beta_0. Offers are
-///   those of thesis_list(), whose etas count from Gamma: F-bar is the offer whose eta is nearest to 0.
-enum class Policy : std::uint8_t { kHtc, kGuard, kPrice, kProportional, kStatic, kThesis };
-/// Which end of the list is next. kCredit: by the sign of the next credit (negative: the finest fragment,
-/// positive: the coarsest). kBeta0: by the last throughput against beta_0. kFinest: always the finest.
-enum class HtcOrder : std::uint8_t { kCredit, kBeta0, kFinest };
-/// The order of a client that is told the policy alone. With kGuard what shows most comes first.
-constexpr HtcOrder default_order(Policy policy) {
-  return policy == Policy::kGuard ? HtcOrder::kFinest : HtcOrder::kCredit;
-}
+class HarmonicTimePlan;
+
+/// A policy: which fragment is next, and how large it may be. The plan keeps the list, the time and what was
+/// measured, and asks its policy; one object serves one plan. These functions are the method itself, as
+/// corrected: the sign of the next credit says which end of the list is next, and the target is what the
+/// fragment's time carries. Derived policies replace some of them.
+class TransferPolicy {
+ public:
+  virtual ~TransferPolicy() = default;
+  /// Before the first request: may change the planned sizes d_g, bytes by offer, all > 0.
+  virtual void begin(const HarmonicTimePlan&, std::vector<double>&) {}
+  /// Whether etas count from Gamma: F-bar is the offer whose eta is nearest to 0, not to the mean.
+  virtual bool counts_from_gamma() const { return false; }
+  /// Whether F-bar comes first.
+  virtual bool begins_with_mean() const { return true; }
+  /// Whether the finest fragment is next; else the coarsest.
+  virtual bool finest_is_next(const HarmonicTimePlan&, double credit_s) const { return credit_s <= 0; }
+  /// The throughput that decisions suppose, bytes per second.
+  virtual double throughput_bytes_s(const HarmonicTimePlan& plan) const;
+  /// A transfer has ended: what Throughput::add() is told.
+  virtual void measured(double /*bytes*/, double /*seconds*/) {}
+  /// Bytes of the list that T_0 is divided over.
+  virtual double list_bytes(const HarmonicTimePlan& plan) const;
+  virtual double target_bytes(const HarmonicTimePlan& plan, std::uint32_t offer, double theta_s,
+                              double now_s) const;
+  /// Whether fragments may be skipped though their lowest rungs would come in time.
+  virtual bool skips_early() const { return false; }
+  /// -1: the fragment is skipped.
+  virtual std::int32_t rung(const HarmonicTimePlan& plan, std::uint32_t offer, double target_bytes,
+                            double now_s) const;
+};
+
+/// The method around the plan of least loss. A size stays within a factor of 1.5 of the plan's share of the
+/// bytes that the link gives in the time left, so that noisy links make sizes swing less. What shows most
+/// comes first.
+class GuardPolicy : public TransferPolicy {
+ public:
+  void begin(const HarmonicTimePlan& plan, std::vector<double>& planned) override;
+  bool finest_is_next(const HarmonicTimePlan&, double) const override { return true; }
+  double target_bytes(const HarmonicTimePlan& plan, std::uint32_t offer, double theta_s,
+                      double now_s) const override;
+};
+
+/// The method with (4.1) and (4.2) as printed: theta_g = T_0 d_g / D_1, D_1 = T_0 beta_0, and the last
+/// throughput against beta_0 says which end is next. Offers are those of ListOptions::thesis.
+class ThesisPolicy : public TransferPolicy {
+ public:
+  bool counts_from_gamma() const override { return true; }
+  bool finest_is_next(const HarmonicTimePlan& plan, double) const override;
+  double list_bytes(const HarmonicTimePlan& plan) const override;
+};
+
+/// The policies of clients. They differ in the list, too: plan_delivery() makes it by this.
+enum class Policy : std::uint8_t { kGuard, kThesis };
 
 struct HtcOptions {
-  Policy policy = Policy::kHtc;
-  HtcOrder order = HtcOrder::kCredit;
-  double time_limit_s = 5;  // T_0, of the fragments alone: mesh and preview have their own time before
-  ThroughputOptions throughput{Estimator::kLast, 10, 0.2, 4000, 1e5};  // initial_bytes_s is beta_0
-  double rtt_s = 0;                                                    // round trip, measured or told
-  int window = 0;  // requests in flight; 0 = until 1.5 x throughput x round trip, at least 2 a site
+  Policy policy = Policy::kGuard;
+  /// Where it is set, it makes the policy that decides instead; `policy` then says what the list is made for.
+  std::function<std::unique_ptr<TransferPolicy>()> other_policy;
+  double time_limit_s = 5;       // T_0, of the fragments alone: mesh and preview have their own time before
+  double initial_bytes_s = 1e5;  // beta_0, > 0
+  double rtt_s = 0;              // round trip, measured or told
+  int window = 0;  // requests in flight; 0 = until 1.5 x throughput x round trip, 2 a site to 64
   int sites = 1;   // servers that the fragments are spread over, 1 .. 64
-  int max_in_flight = 64;
   // true: no rung below low_rung and no fragment skipped, as in the thesis. false: the same while there is
   // time enough, then rungs down to the lowest, then skipping. A rung that loses as much as skipping is never
   // chosen.
   bool hard_limits = false;
-  double guard = 1.5;       // factor of kGuard, > 1
-  double price_kappa = 10;  // how fast kPrice's price rises with delay
 };
 
 /// A decision and what became of it.
@@ -83,11 +119,10 @@ class HarmonicTimePlan {
   /// The request failed and was given up: the time is spent, and the fragment counts as skipped.
   void failed(std::uint32_t offer, double now_s);
 
-  bool all_issued() const { return steps_.size() == offers_.size(); }
   bool finished() const { return all_issued() && in_flight_ == 0; }
   const std::vector<FragmentOffer>& offers() const { return offers_; }
   const std::vector<HtcStep>& steps() const { return steps_; }
-  double throughput_bytes_s() const;
+  double throughput_bytes_s() const { return policy_->throughput_bytes_s(*this); }
   /// Pi: T_0 less the time taken. Once finished(), Pi equals the residuals for which no fragment was left.
   double surplus_s() const { return options_.time_limit_s - last_done_s_; }
   double unspent_s() const { return unspent_s_; }
@@ -96,35 +131,47 @@ class HarmonicTimePlan {
   /// A limit under 30 round trips cannot be met well (p95 beyond 2.5 %).
   bool too_short_for_rtt() const { return options_.time_limit_s < 30 * options_.rtt_s; }
 
+  // What policies ask of their plan.
+
+  const HtcOptions& options() const { return options_; }
+  const Throughput& throughput() const { return throughput_; }
+  double planned_bytes(std::uint32_t offer) const { return planned_[offer]; }  // d_g
+  double planned_total() const { return planned_total_; }
+  std::uint32_t lowest_bytes(const FragmentOffer& f) const { return f.bytes[lowest(f, false)]; }
+  double in_flight_bytes() const { return in_flight_bytes_; }
+  /// Bytes that can still arrive in time besides those in flight.
+  double room_bytes(double throughput_bytes_s, double now_s) const;
+  /// The same at the throughput of the last ten transfers.
+  double room_bytes(double now_s) const;
+  /// What a plan in proportion to the planned sizes gives, as a factor of them.
+  double proportional_share(double now_s, double throughput_bytes_s) const;
+  bool may_skip(double now_s) const;
+  /// The rung (-1: skipping) with the least loss + price x bytes of those with at most so many bytes; ties:
+  /// the lowest.
+  std::int32_t cheapest_rung(const FragmentOffer& offer, double price, bool may_skip,
+                             double most_bytes) const;
+  /// The rung whose size is nearest, within the limits of quality while these can hold.
+  std::int32_t nearest_rung(const FragmentOffer& offer, double target_bytes, double now_s) const;
+
  private:
   struct Credit {
     double value = 0;        // dT / zeta
     std::size_t issued = 0;  // positions that were issued when the credit arose
   };
-  void plan_prices();
-  void plan_for_least_loss();
+  bool all_issued() const { return steps_.size() == offers_.size(); }
   bool window_open(double now_s) const;
   double credit_at(std::size_t position) const;
   std::uint32_t choose_offer(double credit) const;
   void remove_from_list(std::uint32_t offer);
   double theta_of(std::uint32_t offer) const;
-  double target_of(std::uint32_t offer, double theta_s, double now_s) const;
-  double room_bytes(double beta, double now_s) const;
-  double proportional_share(double now_s, double beta) const;
-  double lasting_bytes_s(double now_s) const;
-  bool limits_can_hold(double now_s) const;
   std::size_t lowest(const FragmentOffer& offer, bool limits) const;
-  std::int32_t rung_of(std::uint32_t offer, double target, double now_s) const;
-  std::int32_t cheapest_rung_of(const FragmentOffer& offer, double price, bool may_skip,
-                                double most_bytes) const;
-  double price_at(double now_s) const;
-  double most_exponent(double left_s) const;
-  bool may_skip(double now_s) const;
+  HtcStep& issued(std::uint32_t offer);
   void finish(HtcStep& step, double now_s, bool sample);
   void spread(double residual_s);
 
   std::vector<FragmentOffer> offers_;
   HtcOptions options_;
+  std::unique_ptr<TransferPolicy> policy_;
   Throughput throughput_;
   std::vector<double> harmonic_;  // H_0 .. H_{n+1}
   std::vector<Credit> credits_;
@@ -133,13 +180,10 @@ class HarmonicTimePlan {
   std::vector<std::size_t> step_of_offer_;
   std::vector<bool> taken_;
   std::uint32_t left_ = 0, right_ = 0, mean_ = 0;  // remaining: [left_, right_) less what is taken
-  std::vector<double> planned_;                    // d_g in bytes by offer, by the policy's plan
+  std::vector<double> planned_;                    // d_g in bytes by offer, as the policy has them
   double planned_total_ = 0, planned_left_ = 0;    // bytes
   double smallest_left_ = 0;                       // bytes of the offers not issued, at their lowest rungs
   double low_left_ = 0;                            // the same at their low_rung
-  // kPrice: lambda_0; bytes of the policy's plan, and how many of these were issued
-  double price_0_ = 0, price_total_ = 0, price_done_ = 0;
-  std::vector<double> price_bytes_;
   std::uint32_t in_flight_ = 0;
   std::vector<std::size_t> waiting_;  // steps in flight
   int skips_in_a_row_ = 0;
@@ -147,5 +191,12 @@ class HarmonicTimePlan {
   double latency_s_ = 0;  // at the start, in which nothing can arrive
   double last_done_s_ = 0, unspent_s_ = 0;
 };
+
+/// One price of bytes, in units of loss, at which the list takes T_0 x beta_0.
+struct PricedPlan {
+  double price = 0;
+  std::vector<double> bytes;  // by offer, 0 = skipped
+};
+PricedPlan plan_by_price(const HarmonicTimePlan& plan);
 
 }  // namespace texmesh

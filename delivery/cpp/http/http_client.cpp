@@ -114,7 +114,6 @@ std::size_t receive_body(char* data, std::size_t size, std::size_t count, void* 
     return 0;
   }
   answer.body.insert(answer.body.end(), data, data + size * count);
-  if (transfer.options->on_traffic) transfer.options->on_traffic({HttpTraffic::Kind::kBytes, size * count});
   return size * count;
 }
 
@@ -257,7 +256,6 @@ struct HttpPool::State {
     if (it == running.end()) return;
     ::curl_multi_remove_handle(multi, it->second->transfer.handle);
     running.erase(it);
-    if (options.on_traffic) options.on_traffic({HttpTraffic::Kind::kEnded, 0});
   }
   std::optional<Ended> ended() {
     int left = 0;
@@ -299,7 +297,6 @@ void HttpPool::start(std::uint64_t number, const std::string& url, const std::op
   running->headers = prepare(transfer, url);
   ::curl_multi_add_handle(state_->multi, running->transfer.handle);
   state_->running[number] = std::move(running);
-  if (state_->options.on_traffic) state_->options.on_traffic({HttpTraffic::Kind::kAsked, 0});
 }
 
 void HttpPool::cancel(std::uint64_t number) { state_->drop(number); }

@@ -8,13 +8,6 @@
 
 namespace texmesh {
 
-/// What happens to requests, as it happens: one is asked, a part of its body comes, it ends.
-struct HttpTraffic {
-  enum class Kind : std::uint8_t { kAsked, kBytes, kEnded };
-  Kind kind = Kind::kAsked;
-  std::size_t bytes = 0;  // of kBytes
-};
-
 /// Limits of what a server may do to us.
 struct HttpOptions {
   int retries = 3;  // of one request without progress, after cut connections, stalls and 408, 429, 5xx
@@ -25,7 +18,6 @@ struct HttpOptions {
   double least_bytes_s = 1000;    // a request may take the two timeouts and its bytes at this rate in all
   std::uint64_t max_whole_bytes = 1ull << 30;  // of one answer, and of a file from a server without ranges
   std::function<bool()> cancelled;             // asked at least every second while requests are under way
-  std::function<void(const HttpTraffic&)> on_traffic;
 };
 
 /// http://host/path without user and password, for messages.

@@ -1,17 +1,334 @@
 #include "delivery/cpp/package/http_store.h"
 
 #include <algorithm>
+#include <chrono>
+#include <iterator>
+#include <map>
+#include <optional>
+#include <thread>
+#include <utility>
 
-#include "delivery/cpp/package/http_source.h"
-#include "delivery/cpp/package/http_tree.h"
+#include "format/base/bytes.h"
 #include "format/base/errors.h"
+#include "format/container/container.h"
 #include "format/container/layout.h"
+#include "format/documents/entry_ref.h"
 #include "format/documents/manifest.h"
 
+// How a package is read from web servers, from the bottom up. HttpRetries counts the tries of a request, and
+// HttpLink holds the connections that all readers of a package share. HttpSource reads ranges of a container,
+// HttpTree whole files of a tree. UrlStore finds out which of these the servers can serve, and changes from
+// the one to the other when a server stops answering ranges.
 namespace texmesh {
 namespace {
 
-constexpr double kHeadStart_s = 0.5;  // of a mirror before the next is asked
+constexpr int kConnections = 6;  // as browsers have
+constexpr int kStallTries = 2;   // what a try costs that ended with silence
+constexpr double kSlice_s = 0.1;
+constexpr std::uint64_t kJoinBytes = 4096;      // ranges so near to each other are one request
+constexpr double kHeadStart_s = 0.5;            // of a mirror before the next is asked
+constexpr double kRequestWait_s = 3600;         // the pool's own limits end requests sooner
+constexpr std::uint64_t kProgressBytes = 1024;  // a try that brings as many is not counted
+
+/// Counts the tries of one request and waits longer from one to the next.
+class HttpRetries {
+ public:
+  explicit HttpRetries(const HttpOptions& options)
+      : options_(options), left_(options.retries), delay_s_(options.retry_delay_s) {}
+  /// Waits before the next try; false when there have been enough.
+  bool wait(const HttpAnswer& last) {
+    left_ -= last.timed_out ? kStallTries : 1;
+    if (left_ < 0) return false;
+    double s = std::min(std::max(delay_s_, last.retry_after_s), options_.most_retry_delay_s);
+    for (; s > 0; s -= kSlice_s) {
+      if (options_.cancelled && options_.cancelled()) return false;
+      std::this_thread::sleep_for(std::chrono::duration<double>(std::min(s, kSlice_s)));
+    }
+    delay_s_ *= 2;
+    return true;
+  }
+
+ private:
+  HttpOptions options_;
+  int left_;
+  double delay_s_;
+};
+
+/// What all that read from one set of servers share.
+struct HttpLink {
+  explicit HttpLink(const HttpOptions& o) : options(o), pool(o, kConnections) {}
+  HttpOptions options;
+  HttpPool pool;
+};
+
+/// A server that has answered ranges answers 200 for one, and the file is still the same.
+class RangesEnded : public InputError {
+ public:
+  using InputError::InputError;
+};
+
+/// Reads ranges of a container from the first server that delivers them.
+class HttpSource final : public ByteSource {
+ public:
+  /// `first`: the answer of urls[0] to a request for the first kStartBytes, or a part of it.
+  HttpSource(std::vector<std::string> urls, std::shared_ptr<HttpLink> link, HttpAnswer first)
+      : urls_(std::move(urls)), link_(std::move(link)) {
+    check_range(first, 0, kStartBytes);
+    const std::uint64_t bytes = std::min(kStartBytes, *total_);
+    if (first.complete && first.body.size() != bytes)
+      throw FormatError(name(), "byte 0", std::to_string(bytes) + " bytes",
+                        std::to_string(first.body.size()));
+    store(0, std::move(first.body));
+  }
+  std::string name() const override { return shown_url(urls_.front()); }
+  std::uint64_t size() override { return *total_; }
+  const std::string& etag() const { return etag_; }
+
+  Bytes read(std::uint64_t offset, std::uint64_t bytes) override {
+    if (bytes == 0) return {};
+    require(offset, bytes);
+    fetch(missing(offset, bytes, {}));
+    return copy(offset, bytes);
+  }
+
+  /// Fetches all of these ranges at once.
+  void prefetch(std::vector<ByteRange> ranges) {
+    std::ranges::sort(ranges, {}, &ByteRange::offset);
+    std::vector<Piece> pieces;
+    for (const ByteRange& r : ranges) {
+      if (r.bytes == 0) continue;
+      require(r.offset, r.bytes);
+      pieces = missing(r.offset, r.bytes, std::move(pieces));
+    }
+    fetch(std::move(pieces));
+  }
+
+ private:
+  struct Piece {
+    std::uint64_t offset = 0, bytes = 0;
+    Bytes got;
+    std::optional<HttpRetries> retries;
+  };
+
+  void require(std::uint64_t offset, std::uint64_t bytes) const {
+    if (offset > *total_ || bytes > *total_ - offset)
+      throw FormatError(name(), "byte " + std::to_string(offset), std::to_string(bytes) + " bytes",
+                        "a file of " + std::to_string(*total_) + " bytes");
+    if (bytes > link_->options.max_whole_bytes)
+      throw InputError(name(), "byte " + std::to_string(offset),
+                       "at most " + std::to_string(link_->options.max_whole_bytes) + " bytes from a server",
+                       std::to_string(bytes));
+  }
+  /// `pieces` with the parts of a range that are not known, behind them. Where the last piece ends near the
+  /// range, that piece grows.
+  std::vector<Piece> missing(std::uint64_t offset, std::uint64_t bytes, std::vector<Piece> pieces) const {
+    for (std::uint64_t at = offset; at < offset + bytes;) {
+      const auto [known_end, next_begin] = known_from(at);
+      if (known_end > at) {
+        at = known_end;
+        continue;
+      }
+      const std::uint64_t end = std::min(offset + bytes, next_begin);
+      const std::uint64_t last_end = pieces.empty() ? 0 : pieces.back().offset + pieces.back().bytes;
+      if (!pieces.empty() && at <= last_end + kJoinBytes && known_from(last_end).second >= end &&
+          known_from(last_end).first == last_end)
+        pieces.back().bytes = std::max(last_end, end) - pieces.back().offset;
+      else if (at >= last_end)
+        pieces.push_back({at, end - at, {}, {}});
+      at = end;
+    }
+    return pieces;
+  }
+  /// The end of the known part that holds `at` (`at` itself without such a part), and the begin of the next
+  /// one.
+  std::pair<std::uint64_t, std::uint64_t> known_from(std::uint64_t at) const {
+    auto next = parts_.upper_bound(at);
+    const std::uint64_t next_begin = next == parts_.end() ? ~0ull : next->first;
+    if (next == parts_.begin()) return {at, next_begin};
+    const auto& [begin, part] = *std::prev(next);
+    return {std::max(at, begin + part.size()), next_begin};
+  }
+  void store(std::uint64_t begin, Bytes bytes) {
+    if (!bytes.empty()) parts_.emplace(begin, std::move(bytes));
+  }
+  Bytes copy(std::uint64_t offset, std::uint64_t bytes) const {
+    Bytes out;
+    out.reserve(static_cast<std::size_t>(bytes));
+    for (std::uint64_t at = offset; at < offset + bytes;) {
+      const auto& [begin, part] = *std::prev(parts_.upper_bound(at));
+      const std::uint64_t n = std::min<std::uint64_t>(begin + part.size(), offset + bytes) - at;
+      const auto from = part.begin() + static_cast<std::ptrdiff_t>(at - begin);
+      out.insert(out.end(), from, from + static_cast<std::ptrdiff_t>(n));
+      at += n;
+    }
+    return out;
+  }
+
+  /// Fetches the pieces. Bytes that have come are kept even when another piece fails.
+  void fetch(std::vector<Piece> pieces) {
+    const auto store_all = [&] {
+      for (std::size_t i = 0; i < pieces.size(); ++i) {
+        link_->pool.cancel(i);
+        store(pieces[i].offset, std::move(pieces[i].got));
+      }
+    };
+    try {
+      for (std::size_t i = 0; i < pieces.size(); ++i) {
+        pieces[i].retries.emplace(link_->options);
+        start(i, pieces[i]);
+      }
+      while (auto ended = link_->pool.wait(kRequestWait_s)) {
+        Piece& piece = pieces[static_cast<std::size_t>(ended->number)];
+        const std::size_t asked_of = at_;
+        if (accept(piece, ended->answer)) continue;
+        if (at_ != asked_of)  // another server for what is left
+          for (std::size_t i = 0; i < pieces.size(); ++i) {
+            if (&pieces[i] == &piece || !link_->pool.so_far(i)) continue;
+            link_->pool.cancel(i);
+            start(i, pieces[i]);
+          }
+        start(static_cast<std::size_t>(ended->number), piece);
+      }
+    } catch (...) {
+      store_all();
+      throw;
+    }
+    store_all();
+  }
+  void start(std::size_t number, const Piece& p) {
+    const std::uint64_t bytes = p.bytes - p.got.size();
+    link_->pool.start(number, urls_[at_], HttpRange{p.offset + p.got.size(), bytes}, bytes);
+  }
+  /// Takes an answer. False: the piece is not complete and must be asked for again.
+  bool accept(Piece& p, HttpAnswer& a) {
+    const std::uint64_t at = p.offset + p.got.size();
+    const std::string place = "byte " + std::to_string(at);
+    if (a.status == 206 && (a.complete || !a.body.empty())) {
+      check_range(a, at, p.bytes - p.got.size());
+      p.got.insert(p.got.end(), a.body.begin(), a.body.end());
+      if (a.body.size() >= kProgressBytes) p.retries.emplace(link_->options);
+      if (p.got.size() == p.bytes) return true;
+      if (a.complete)
+        throw FormatError(name(), place, std::to_string(p.bytes) + " bytes", std::to_string(p.got.size()));
+    }
+    if (a.too_long && a.status == 206)
+      throw FormatError(name(), place, std::to_string(p.bytes) + " bytes", "more");
+    if (may_retry(a) && p.retries->wait(a)) return false;
+    if (at_ + 1 < urls_.size() && a.problem != "cancelled") {
+      ++at_;
+      etag_.clear();
+      p.retries.emplace(link_->options);
+      return false;
+    }
+    if (a.status == 200 && is_same_file(a, etag_, *total_))
+      throw RangesEnded(name(), place, "an answer with status 206",
+                        "status 200: ranges are no longer answered");
+    if (a.status == 200 || a.status == 416) fail_replaced("status " + std::to_string(a.status));
+    throw InputError(name(), place, "an answer with status 206", describe_answer(a));
+  }
+
+  [[noreturn]] void fail_replaced(const std::string& found) const {
+    throw FormatError(name(), "", "the file that reading began with",
+                      found + ": it was replaced, read it anew");
+  }
+  void check_range(const HttpAnswer& a, std::uint64_t offset, std::uint64_t bytes) {
+    const std::string place = "byte " + std::to_string(offset);
+    if (!a.first) throw FormatError(name(), place, "a Content-Range", "none that can be read");
+    if (total_ && *a.total != *total_) fail_replaced(std::to_string(*a.total) + " bytes");
+    if (total_ && !is_same_file(a, etag_, *total_)) fail_replaced("ETag " + a.etag);
+    if (*a.first != offset || *a.last != std::min(offset + bytes, *a.total) - 1)
+      throw FormatError(name(), place, "the range that was asked for",
+                        std::to_string(*a.first) + "-" + std::to_string(*a.last));
+    total_ = a.total;
+    if (etag_.empty()) etag_ = a.etag;
+  }
+
+  std::vector<std::string> urls_;
+  std::size_t at_ = 0;  // the server that is asked
+  std::shared_ptr<HttpLink> link_;
+  std::optional<std::uint64_t> total_;
+  std::string etag_;                      // of the server that is asked
+  std::map<std::uint64_t, Bytes> parts_;  // by offset, not overlapping
+};
+
+/// Whole files of a tree, from any of its servers.
+class HttpTree {
+ public:
+  HttpTree(std::string root, std::shared_ptr<HttpLink> link, bool ranges)
+      : root_(std::move(root)), link_(std::move(link)), ranges_(ranges) {}
+  const std::string& root() const { return root_; }
+  std::string name() const { return shown_url(root_); }
+  void store(const std::string& path, Bytes bytes) { files_[path] = std::move(bytes); }
+
+  struct Wanted {
+    std::string path;
+    std::uint64_t max_bytes = 0;
+    Bytes got = {};  // of a transfer that broke, where the server knows ranges
+    std::string etag = {};
+  };
+  /// Fetches the file unless it is here.
+  const Bytes& file(const std::string& path, std::uint64_t max_bytes) {
+    fetch({{path, max_bytes}});
+    return files_[path];
+  }
+  /// Fetches all of these at once but those that are here.
+  void fetch(std::vector<Wanted> wanted) {
+    std::erase_if(wanted, [&](const Wanted& w) { return files_.contains(w.path); });
+    std::vector<HttpRetries> retries(wanted.size(), HttpRetries(link_->options));
+    try {
+      for (std::size_t i = 0; i < wanted.size(); ++i) {
+        if (!is_valid_entry_path(wanted[i].path))
+          throw FormatError(name(), wanted[i].path, "a path within the package", "another");
+        start(i, wanted[i]);
+      }
+      while (auto ended = link_->pool.wait(kRequestWait_s)) {
+        const auto i = static_cast<std::size_t>(ended->number);
+        HttpAnswer& a = ended->answer;
+        if (accept(wanted[i], a)) {
+          store(wanted[i].path, std::move(wanted[i].got));
+          continue;
+        }
+        if (a.too_long)
+          throw FormatError(name(), wanted[i].path,
+                            "at most " + std::to_string(wanted[i].max_bytes) + " bytes", "more");
+        if (a.body.size() >= kProgressBytes && ranges_) retries[i] = HttpRetries(link_->options);
+        if (!may_retry(a) || !retries[i].wait(a))
+          throw InputError(name() + wanted[i].path, "", "a file", describe_answer(a));
+        start(i, wanted[i]);
+      }
+    } catch (...) {
+      for (std::size_t i = 0; i < wanted.size(); ++i) link_->pool.cancel(i);
+      throw;
+    }
+  }
+
+ private:
+  void start(std::size_t number, const Wanted& w) {
+    const std::uint64_t have = w.got.size();
+    const HttpRange rest{have, w.max_bytes - have, true};  // all of it where it was replaced
+    link_->pool.start(number, root_ + w.path, have > 0 ? std::optional(rest) : std::nullopt, w.max_bytes);
+  }
+  /// Whether the file is complete now.
+  bool accept(Wanted& w, HttpAnswer& a) const {
+    if (a.status == 206 && !is_same_file(a, w.etag, 0)) {  // replaced meanwhile: all of it anew
+      w.got.clear();
+      w.etag.clear();
+      a.complete = a.too_long = false;  // worth another try
+      return false;
+    }
+    if (a.status == 200) w.got.clear();
+    if (a.status != 200 && (a.status != 206 || !a.first || *a.first != w.got.size())) return false;
+    w.got.insert(w.got.end(), a.body.begin(), a.body.end());
+    if (a.complete) return true;
+    w.etag = a.etag;
+    if (!ranges_ || w.got.size() >= w.max_bytes) w.got.clear();
+    return false;
+  }
+  std::string root_;
+  std::shared_ptr<HttpLink> link_;
+  bool ranges_;
+  std::map<std::string, Bytes> files_;
+};
 
 bool is_tree(const std::string& url) { return url.substr(0, url.find_first_of("?#")).ends_with('/'); }
 

@@ -6,9 +6,6 @@
 #include <map>
 #include <utility>
 
-#include "delivery/cpp/transfer/monitored_transport.h"
-#include "format/base/portable_math.h"
-
 namespace texmesh {
 namespace {
 
@@ -126,22 +123,17 @@ class OneRequest final : public RequestSource {
 }  // namespace
 
 SimulationResult simulate(std::vector<FragmentOffer> offers, const HtcOptions& options,
-                          const NetworkOptions& network, const ProbeOptions& probe) {
+                          const NetworkOptions& network, const TransportAround& around) {
   HarmonicTimePlan plan(std::move(offers), options);
   ModelTransport model(network);
-  BandwidthMonitor monitor(probe);
-  MonitoredTransport transport(model, monitor, network.rtt_s);
   PlanSource source(plan);
   TransferOptions how;
   how.rtt_s = network.rtt_s;
-  how.initial_bytes_s = options.throughput.initial_bytes_s;
-  const TransferEnd end = transfer(source, transport, how);
+  how.initial_bytes_s = options.initial_bytes_s;
+  const TransferEnd end = transfer(source, around ? around(model) : model, how);
   SimulationResult result = result_of(plan, options.time_limit_s, end.given_up > 0 ? kNotInTime : end.last_s);
   result.never = end.given_up > 0;
   result.mirrors = end.mirrors;
-  result.samples = monitor.samples();
-  result.probes = monitor.sent();
-  result.probe_bytes = monitor.sent_bytes();
   return result;
 }
 
@@ -189,53 +181,6 @@ double fetched_s(const NetworkOptions& all, double from_s, std::uint64_t bytes) 
   how.initial_bytes_s = std::max(1.0, std::min(best, network.link.at(from_s)));
   const TransferEnd end = transfer(source, transport, how);
   return end.given_up > 0 ? kNotInTime : end.last_s;
-}
-
-SimulationResult simulate_samples(std::vector<FragmentOffer> offers, const HtcOptions& options,
-                                  const std::function<double(std::size_t, double)>& rate) {
-  HtcOptions serial = options;
-  serial.window = 1;
-  serial.rtt_s = 0;
-  HarmonicTimePlan plan(std::move(offers), serial);
-  double now_s = 0;
-  while (const HtcStep* step = plan.next(now_s)) {
-    now_s += step->bytes / rate(step->position, now_s);
-    plan.completed(step->offer, now_s);
-  }
-  return result_of(plan, options.time_limit_s, now_s);
-}
-
-SimulationResult simulate_serial_trace(std::vector<FragmentOffer> offers, const HtcOptions& options,
-                                       const BandwidthTrace& trace) {
-  HtcOptions serial = options;
-  serial.window = 1;
-  serial.rtt_s = 0;
-  NetworkOptions network;
-  network.link = trace;
-  network.connections = 1;
-  return simulate(std::move(offers), serial, network);
-}
-
-double TraceRandom::uniform() { return numbers_.next() + 1 / 9007199254740992.0; }
-
-double TraceRandom::normal() {
-  const double u = uniform(), v = uniform();
-  return std::sqrt(-2 * portable::log(u)) * portable::cos(2 * portable::kPi * v);
-}
-
-BandwidthTrace random_trace(double mean_bytes_s, double cv, double rho, double step_s, double length_s,
-                            std::uint64_t seed) {
-  const double variance = portable::log(1 + cv * cv), sigma = std::sqrt(variance);
-  TraceRandom random(seed);
-  BandwidthTrace trace{{}, {}};
-  double x = random.normal();
-  const auto steps = static_cast<std::size_t>(std::ceil(length_s / step_s));
-  for (std::size_t i = 0; i <= steps; ++i) {
-    trace.time_s.push_back(static_cast<double>(i) * step_s);
-    trace.bytes_s.push_back(mean_bytes_s * portable::exp(sigma * x - variance / 2));
-    x = rho * x + std::sqrt(1 - rho * rho) * random.normal();
-  }
-  return trace;
 }
 
 }  // namespace texmesh

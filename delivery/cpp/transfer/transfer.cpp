@@ -8,6 +8,7 @@
 namespace texmesh {
 namespace {
 
+constexpr std::size_t kSamples = 10;  // that say what a mirror delivers
 constexpr double kRetryFactor = 4, kLeastRetryRtts = 8, kLeastRetry_s = 0.5;
 constexpr double kProgressBytes = 1024;  // a try that brings as much does not count
 constexpr double kAskCancelled_s = 0.1;
@@ -18,9 +19,7 @@ constexpr const char* kLie = "bytes of another digest";
 class Mirrors {
  public:
   Mirrors(std::size_t count, double initial_bytes_s) {
-    ThroughputOptions options;
-    options.initial_bytes_s = initial_bytes_s;
-    for (std::size_t m = 0; m < count; ++m) mirrors_.push_back({Throughput(options)});
+    for (std::size_t m = 0; m < count; ++m) mirrors_.push_back({Throughput(initial_bytes_s)});
   }
   using Lacks = std::function<bool(std::uint32_t mirror)>;
   /// Nothing when all that have it have failed for good. `but`: the one that has just failed, unless it is
@@ -35,7 +34,7 @@ class Mirrors {
   double ready_s(std::uint32_t m) const { return mirrors_[m].ready_s; }
   double asked(std::uint32_t m, double bytes) {
     mirrors_[m].owed_bytes += bytes;
-    return mirrors_[m].owed_bytes / mirrors_[m].throughput.bytes_s();
+    return mirrors_[m].owed_bytes / mirrors_[m].throughput.recent_bytes_s(kSamples);
   }
   void delivered(std::uint32_t m, double bytes, double from_s, double now_s) {
     Mirror& mirror = mirrors_[m];
@@ -72,7 +71,7 @@ class Mirrors {
     std::vector<MirrorShare> out;
     for (const Mirror& m : mirrors_) {
       out.push_back(m.share);
-      out.back().bytes_s = m.throughput.bytes_s();
+      out.back().bytes_s = m.throughput.recent_bytes_s(kSamples);
     }
     return out;
   }
@@ -114,8 +113,8 @@ class Mirrors {
     for (std::size_t m = 0; m < mirrors_.size(); ++m) {
       const Mirror& mirror = mirrors_[m];
       if (!mirror.alive || (but && *but == m) || lacks(static_cast<std::uint32_t>(m))) continue;
-      const double s =
-          (mirror.owed_bytes + bytes) / mirror.throughput.bytes_s() + std::max(0.0, mirror.ready_s - now_s);
+      const double s = (mirror.owed_bytes + bytes) / mirror.throughput.recent_bytes_s(kSamples) +
+                       std::max(0.0, mirror.ready_s - now_s);
       if (!best || s < best_s) best = static_cast<std::uint32_t>(m), best_s = s;
     }
     return best;

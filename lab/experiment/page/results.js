@@ -28,7 +28,7 @@ export function orderOf(design, judge) {
   return hash % design.orders.length;
 }
 
-/** schemas/experiment-results.v1.schema.json */
+/** lab/schemas/experiment-results.v1.schema.json */
 export function newResults(design, judge, display) {
   const round = (value, digits) => Number(value.toFixed(digits));
   return {

@@ -40,6 +40,14 @@ struct Shown {
   }
 };
 
+/// Asks for the planned sizes, whatever happens: does not depend on how fast this machine is.
+struct PlannedSizes final : TransferPolicy {
+  double target_bytes(const HarmonicTimePlan& plan, std::uint32_t offer, double, double) const override {
+    return plan.planned_bytes(offer);
+  }
+  bool skips_early() const override { return true; }
+};
+
 struct Client {
   explicit Client(const std::vector<std::string>& mirrors, bool whole_rungs = false)
       : package(open_url(mirrors[0], quick())),
@@ -47,10 +55,10 @@ struct Client {
         loader(package, *transport, whole_rungs) {}
   LoadOptions options(double bytes_s = 1e6) {
     LoadOptions o;
-    o.htc.policy = Policy::kStatic;  // does not depend on how fast this machine is
+    o.htc.other_policy = [] { return std::make_unique<PlannedSizes>(); };
     o.htc.time_limit_s = 1;
     o.htc.window = 4;
-    o.htc.throughput.initial_bytes_s = bytes_s;
+    o.htc.initial_bytes_s = bytes_s;
     o.htc.hard_limits = true;
     o.grace_s = 60;  // nor here
     o.on_fragment = [this](const LoadedFragment& f) { shown(f); };

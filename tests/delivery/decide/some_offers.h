@@ -2,14 +2,13 @@
 #include <cstdint>
 #include <vector>
 
-#include "delivery/cpp/decide/fragment_offer.h"
-#include "delivery/cpp/simulate/simulation.h"
+#include "tests/delivery/made_links.h"
 
 namespace texmesh::testing {
 
 /// n fragments with falling eta; rungs of 100, 200, 400 .. bytes times a size of their own.
 inline std::vector<FragmentOffer> some_offers(std::size_t n, std::uint64_t seed = 1) {
-  TraceRandom random(seed);
+  MadeNumbers random(seed);
   std::vector<FragmentOffer> offers(n);
   for (FragmentOffer& f : offers) {
     const double size = 0.5 + random.uniform();

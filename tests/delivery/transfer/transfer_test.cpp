@@ -9,6 +9,7 @@
 #include <set>
 
 #include "delivery/cpp/simulate/simulation.h"
+#include "tests/delivery/made_links.h"
 
 namespace texmesh {
 namespace {
@@ -16,7 +17,7 @@ namespace {
 HtcOptions options(double time_limit_s = 4) {
   HtcOptions o;
   o.time_limit_s = time_limit_s;
-  o.throughput.initial_bytes_s = 1e6;
+  o.initial_bytes_s = 1e6;
   o.rtt_s = 0.02;
   return o;
 }
@@ -42,23 +43,23 @@ void expect_never(const SimulationResult& r) {
 }
 
 TEST(Transfer, AServerThatDiesLeavesATransferThatNeverEnds) {
-  const SimulationResult r = simulate(table_4_2_offers(), options(), network({mirror(1e6, 1)}));
+  const SimulationResult r = simulate(testing::photo_offers(), options(), network({mirror(1e6, 1)}));
   expect_never(r);
   EXPECT_GT(r.bytes, 0u);  // what came before counts
   EXPECT_LT(r.bytes, 1'100'000u);
 }
 
 TEST(Transfer, ServersThatAllDieEndIt) {
-  expect_never(simulate(table_4_2_offers(), options(), network({mirror(1e6, 1), mirror(1e6, 1.2)})));
+  expect_never(simulate(testing::photo_offers(), options(), network({mirror(1e6, 1), mirror(1e6, 1.2)})));
   HtcOptions hard = options();
   hard.hard_limits = true;
-  expect_never(simulate(table_4_2_offers(), hard, network({mirror(1e6, 0), mirror(1e6, 0)})));
+  expect_never(simulate(testing::photo_offers(), hard, network({mirror(1e6, 0), mirror(1e6, 0)})));
 }
 
 TEST(Transfer, OneThatLivesDeliversWhatTheDeadOnesOwe) {
   for (const bool first_dies : {true, false}) {
     const SimulationResult r =
-        simulate(table_4_2_offers(), options(),
+        simulate(testing::photo_offers(), options(),
                  network({mirror(1e6, first_dies ? 1 : 1e300), mirror(1e6, first_dies ? 1e300 : 1)}));
     EXPECT_FALSE(r.never);
     EXPECT_EQ(r.given_up, 0u);
@@ -259,8 +260,8 @@ TEST(Transfer, ALiarIsDroppedAndWhatItOwesIsDealtAnew) {
   mirrors[1].lies_from_s = 1;
   HtcOptions o = options();
   o.sites = 3;
-  o.throughput.initial_bytes_s = 4e5;
-  const SimulationResult r = simulate(table_4_2_offers(), o, network(mirrors));
+  o.initial_bytes_s = 4e5;
+  const SimulationResult r = simulate(testing::photo_offers(), o, network(mirrors));
   EXPECT_EQ(r.given_up, 0u);
   EXPECT_LT(r.late_s, 0.3);
   ASSERT_EQ(r.mirrors.size(), 3u);
@@ -276,7 +277,7 @@ TEST(Transfer, ALiarIsDroppedAndWhatItOwesIsDealtAnew) {
 TEST(Transfer, ALiarAloneIsAskedUntilItsTriesAreOver) {
   MirrorModel liar = mirror(1e6);
   liar.lies_from_s = 0;
-  const SimulationResult r = simulate(table_4_2_offers(), options(), network({liar}));
+  const SimulationResult r = simulate(testing::photo_offers(), options(), network({liar}));
   EXPECT_TRUE(r.never);
   EXPECT_EQ(r.bytes, 0u);
 }
@@ -285,14 +286,14 @@ TEST(Transfer, FragmentsAreDealtToSitesByTheirSpeed) {
   HtcOptions o = options();
   o.sites = 3;
   const SimulationResult r =
-      simulate(table_4_2_offers(), o, network({mirror(1e5), mirror(2e5), mirror(4e5)}));
+      simulate(testing::photo_offers(), o, network({mirror(1e5), mirror(2e5), mirror(4e5)}));
   ASSERT_EQ(r.mirrors.size(), 3u);
   const double all = static_cast<double>(r.bytes);
   EXPECT_NEAR(static_cast<double>(r.mirrors[0].bytes) / all, 1.0 / 7, 0.06);
   EXPECT_NEAR(static_cast<double>(r.mirrors[1].bytes) / all, 2.0 / 7, 0.06);
   EXPECT_NEAR(static_cast<double>(r.mirrors[2].bytes) / all, 4.0 / 7, 0.08);
   // Together they are nearly as fast as one that has all their throughput.
-  const SimulationResult one = simulate(table_4_2_offers(), options(), network({mirror(7e5)}));
+  const SimulationResult one = simulate(testing::photo_offers(), options(), network({mirror(7e5)}));
   EXPECT_LT(r.end_s, 1.15 * one.end_s);
 }
 

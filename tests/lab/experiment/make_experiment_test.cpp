@@ -7,7 +7,7 @@
 #include <fstream>
 
 #include "format/base/errors.h"
-#include "lab/experiment/page_files.h"
+
 #include "stages/image/decode_image.h"
 #include "stages/image/png_writer.h"
 

@@ -1,4 +1,4 @@
-#include "lab/experiment/results.h"
+#include "lab/experiment/design.h"
 
 #include <gtest/gtest.h>
 

@@ -5,7 +5,6 @@
 
 #include "format/rules/split_mix.h"
 #include "lab/experiment/design.h"
-#include "lab/experiment/results.h"
 
 namespace texmesh::testing {
 

@@ -1,4 +1,4 @@
-#include "lab/experiment/stimuli.h"
+#include "lab/experiment/make_experiment.h"
 
 #include <gtest/gtest.h>
 

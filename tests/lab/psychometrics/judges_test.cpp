@@ -1,4 +1,4 @@
-#include "lab/psychometrics/judges.h"
+#include "lab/psychometrics/psychometrics.h"
 
 #include <gtest/gtest.h>
 

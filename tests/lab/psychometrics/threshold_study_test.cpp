@@ -1,4 +1,4 @@
-#include "lab/psychometrics/threshold_study.h"
+#include "lab/psychometrics/psychometrics.h"
 
 #include <gtest/gtest.h>
 

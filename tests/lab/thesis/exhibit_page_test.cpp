@@ -1,11 +1,10 @@
-#include "lab/thesis/exhibit.h"
+#include "lab/thesis/exhibits.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "lab/thesis/exhibits.h"
 #include "tests/tools/publish/pages/html_check.h"
 
 namespace texmesh {
@@ -14,10 +13,9 @@ namespace {
 Exhibit small_exhibit() {
   Exhibit e{"9.9", "Table 9.9: <b> & so on", "printed",  "made", {}, {},
             {},    Verdict::kNotConfirmed,   "no <more>"};
-  e.tables = {
-      {"values",
-       {{"row", 0}, {"printed", 3}, {"ours", 1}},
-       {{std::string("a & b"), 0.12345, ExhibitCell{}}, {std::string("c"), std::string("none"), -2.25}}}};
+  e.tables = {{"values",
+               {{"row", 0}, {"printed", 3}, {"ours", 1}},
+               {{std::string("a & b"), 0.12345, Cell{}}, {std::string("c"), std::string("none"), -2.25}}}};
   e.plots = {{"a plot",
               "x",
               "y",

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "lab/thesis/exhibit.h"
+#include "lab/thesis/exhibits.h"
 
 namespace texmesh::testing {
 
@@ -15,14 +15,14 @@ inline const Exhibit& exhibit_of(const std::vector<Exhibit>& exhibits, const std
 }
 /// A number of an exhibit's table.
 inline double number_at(const Exhibit& e, std::size_t table, std::size_t row, std::size_t column) {
-  return std::get<double>(e.tables.at(table).rows.at(row).at(column));
+  return std::get<double>(e.tables.at(table).rows.at(row).at(column).value);
 }
 /// Every row has the table's columns, and every text is there.
 inline void expect_sound(const std::vector<Exhibit>& exhibits) {
   for (const Exhibit& e : exhibits) {
     EXPECT_FALSE(e.title.empty() || e.claim.empty() || e.made_by.empty() || e.finding.empty()) << e.id;
     EXPECT_FALSE(e.tables.empty()) << e.id;
-    for (const ExhibitTable& t : e.tables)
+    for (const Table& t : e.tables)
       for (const auto& row : t.rows) EXPECT_EQ(row.size(), t.columns.size()) << e.id << " " << t.caption;
   }
 }

@@ -31,12 +31,13 @@ TEST(FragmentExhibits, TablesOfSizes) {
   EXPECT_EQ(rows_of_one, 5u);
   const auto& rows = cut.tables[0].rows;
   EXPECT_EQ(rows.size(), 5u * (5 + 6));
-  EXPECT_EQ(std::get<std::string>(rows.back()[0]), "4096");
+  EXPECT_EQ(std::get<std::string>(rows.back()[0].value), "4096");
   for (std::size_t k = 0; k < rows.size(); ++k)
     if (number_at(cut, 0, k, 2) >= 128) EXPECT_LT(number_at(cut, 0, k, 6), 1) << "shared tables, row " << k;
   for (std::size_t k = 0; k < rows.size(); ++k)
     for (std::size_t other = 0; other < k; ++other)
-      EXPECT_FALSE(rows[k][0] == rows[other][0] && number_at(cut, 0, k, 1) == number_at(cut, 0, other, 1) &&
+      EXPECT_FALSE(rows[k][0].value == rows[other][0].value &&
+                   number_at(cut, 0, k, 1) == number_at(cut, 0, other, 1) &&
                    number_at(cut, 0, k, 3) == number_at(cut, 0, other, 3))
           << "a row stands there twice: " << k;
 }

@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "lab/thesis/exhibits.h"
-#include "lab/thesis/made_patterns.h"
+#include "lab/thesis/made_models.h"
 #include "tests/lab/thesis/exhibit_rows.h"
 
 namespace texmesh {

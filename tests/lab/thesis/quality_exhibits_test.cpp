@@ -13,8 +13,8 @@ TEST(QualityExhibits, Fig39ComparesEqualBytes) {
   expect_sound(made);
   const Exhibit& e = exhibit_of(made, "fig-3.9");
   const std::size_t uniform = 0, variable = 1;
-  EXPECT_EQ(std::get<std::string>(e.tables[0].rows[uniform][0]), "uniform");
-  EXPECT_EQ(std::get<std::string>(e.tables[0].rows[variable][0]), "variable (3.2)");
+  EXPECT_EQ(std::get<std::string>(e.tables[0].rows[uniform][0].value), "uniform");
+  EXPECT_EQ(std::get<std::string>(e.tables[0].rows[variable][0].value), "variable (3.2)");
   EXPECT_EQ(number_at(e, 0, uniform, 2), 11);
   EXPECT_EQ(number_at(e, 0, uniform, 3), 11);
   EXPECT_LE(number_at(e, 0, variable, 1), number_at(e, 0, uniform, 1));

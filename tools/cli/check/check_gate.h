@@ -1,11 +1,13 @@
 #pragma once
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "delivery/cpp/client/delivery_plan.h"
 #include "stages/base/run_context.h"
+#include "tools/inspect/atlas/atlas_report.h"
 
 namespace texmesh {
 
@@ -27,6 +29,18 @@ std::vector<GateResult> check_plan(const DeliveryPlan& plan, const Gate& gate, d
 /// the whole package.
 std::vector<GateResult> check_switch_sizes(PackageReader& package, double max_flip, int views,
                                            const RunContext& context);
+
+/// What `doctor` asks for. Shares are 0..1. Charts and triangles count over the model, the rest for every
+/// texture.
+struct AtlasLimits {
+  std::optional<double> max_charts, max_floor_triangles;
+  std::optional<double> min_cover, max_thin, max_overlap, max_flat, max_density_spread, max_stretch,
+      max_seam_difference;
+};
+
+/// One result for each limit and, where it counts for every texture, each texture; a model without textures
+/// keeps all limits. Seams that were not compared keep theirs.
+std::vector<GateResult> check_atlases(const AtlasDiagnosis& diagnosis, const AtlasLimits& limits);
 
 /// JUnit XML: one test suite of this name ("texmesh check"), a case per result. `input`: what was checked.
 std::string gate_junit(const std::string& suite, const std::string& input,

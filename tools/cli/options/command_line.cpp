@@ -318,9 +318,9 @@ std::string roff_command(const NamedCommand& command, const HelpNotes& notes) {
 }
 
 constexpr const char* kBash =
-    R"(# bash completion for texmesh, made of its list of options: texmesh completion bash
-_texmesh() {{
-  local current=${{COMP_WORDS[COMP_CWORD]}} previous=${{COMP_WORDS[COMP_CWORD - 1]}} path=texmesh k
+    R"(# bash completion for {3}, made of its list of options: {3} completion bash
+{4}() {{
+  local current=${{COMP_WORDS[COMP_CWORD]}} previous=${{COMP_WORDS[COMP_CWORD - 1]}} path={3} k
   local -a values=() options=() words=()
   COMPREPLY=()
   [[ $previous == = ]] && previous=${{COMP_WORDS[COMP_CWORD - 2]}}
@@ -339,13 +339,13 @@ _texmesh() {{
   fi
   COMPREPLY=($(compgen -W "${{words[*]}}" -- "$current"))
 }}
-complete -o default -F _texmesh texmesh
+complete -o default -F {4} {3}
 )";
 
-constexpr const char* kZsh = R"(#compdef texmesh
-# zsh completion for texmesh, made of its list of options: texmesh completion zsh
-_texmesh() {{
-  local at=texmesh k
+constexpr const char* kZsh = R"(#compdef {3}
+# zsh completion for {3}, made of its list of options: {3} completion zsh
+{4}() {{
+  local at={3} k
   local -a values options commands
   for ((k = 2; k < CURRENT; k++)); do
     case "$at $words[k]" in
@@ -362,8 +362,15 @@ _texmesh() {{
   else _files
   fi
 }}
-_texmesh "$@"
+{4} "$@"
 )";
+
+/// The name of a shell's function.
+std::string function_name(const CLI::App& program) {
+  std::string name = "_" + program.get_name();
+  std::ranges::replace(name, '-', '_');
+  return name;
+}
 
 // What shells and `man` know of the program. Equal declarations give equal text. Hidden commands are left
 // out.
@@ -380,7 +387,8 @@ std::string bash_completion(const CLI::App& program, const HelpNotes& notes) {
     cases += fmt::format("    (\"{}\") options=({}); words=({}) ;;\n", c.path, in_a_row(names, " "),
                          in_a_row(words, " "));
   }
-  return fmt::format(kBash, command_pattern(commands), value_cases(commands, notes, "return"), cases);
+  return fmt::format(kBash, command_pattern(commands), value_cases(commands, notes, "return"), cases,
+                     program.get_name(), function_name(program));
 }
 
 /// The same for zsh, with what commands and options do.
@@ -397,15 +405,18 @@ std::string zsh_completion(const CLI::App& program, const HelpNotes& notes) {
     cases += fmt::format("    (\"{}\")\n      options=({})\n      commands=({})\n      ;;\n", c.path,
                          in_a_row(options, between), in_a_row(words, between));
   }
-  return fmt::format(kZsh, command_pattern(commands), value_cases(commands, notes, "_files; return"), cases);
+  return fmt::format(kZsh, command_pattern(commands), value_cases(commands, notes, "_files; return"), cases,
+                     program.get_name(), function_name(program));
 }
 
 /// A page for `man` (roff, macros of man(7)), section 1: every command with every option.
 std::string manual_page(const CLI::App& program, const HelpNotes& notes) {
-  std::string out = ".TH TEXMESH 1 \"\" \"texmesh\" \"User Commands\"\n.SH NAME\n";
   const std::string name = program.get_name(), text = program.get_description();
+  std::string title = name;
+  for (char& c : title) c = static_cast<char>(c >= 'a' && c <= 'z' ? c - 'a' + 'A' : c);
+  std::string out = ".TH " + title + " 1 \"\" \"texmesh\" \"User Commands\"\n.SH NAME\n";
   out += roff(name + " - " + (text.starts_with(name + " ") ? text.substr(name.size() + 1) : text));
-  out += ".SH SYNOPSIS\n.B texmesh\n.I COMMAND\n[\\fIOPTIONS\\fR]\n.SH DESCRIPTION\n";
+  out += ".SH SYNOPSIS\n.B " + name + "\n.I COMMAND\n[\\fIOPTIONS\\fR]\n.SH DESCRIPTION\n";
   out += roff_notes(note_of(notes.notes, &program)) + ".PP\nExamples:\n.PP\n" +
          roff_lines(note_of(notes.examples, &program));
   out += ".SH OPTIONS\n";
@@ -601,9 +612,9 @@ void Command::on_run(std::function<int()> run) {
   app_->callback([state = state_, run = std::move(run)] { state->exit_code = run(); });
 }
 
-CommandLine::CommandLine(const std::string& what_the_program_is)
+CommandLine::CommandLine(const std::string& what_the_program_is, const std::string& program_name)
     : state_(std::make_unique<CommandLineState>()),
-      app_(std::make_unique<CLI::App>(what_the_program_is, "texmesh")) {
+      app_(std::make_unique<CLI::App>(what_the_program_is, program_name)) {
   app_->require_subcommand(1);
   app_->set_help_flag("-h,--help", "Print this help");
   app_->formatter_fn([this](const CLI::App* app, const std::string& name, CLI::AppFormatMode mode) {

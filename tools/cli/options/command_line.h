@@ -117,7 +117,7 @@ class Command {
 
 class CommandLine {
  public:
-  explicit CommandLine(const std::string& what_the_program_is);
+  explicit CommandLine(const std::string& what_the_program_is, const std::string& program_name = "texmesh");
   ~CommandLine();
   CommandLine(const CommandLine&) = delete;
   CommandLine& operator=(const CommandLine&) = delete;

@@ -1,45 +1,67 @@
 #pragma once
-#include <nlohmann/json_fwd.hpp>
+#include <array>
+#include <functional>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "delivery/cpp/client/delivery_plan.h"
+#include "format/base/fields.h"
+#include "tools/cli/options/command_line.h"
+#include "tools/cli/options/units.h"
 
 namespace texmesh {
 
-class Command;
-class Option;
-
-/// What plan, check and simulate ask about how a package is looked at and over what.
-struct DeliveryArguments {
-  std::string package, time = "5", bandwidth, trace, rtt = "0", policy = "guard", order, estimator = "auto",
-                       rule, beta0, memory;  // order and rule: "" = by the policy; memory: "" = any
-  std::vector<std::string> mirrors;
-  double display_px = 1000, distance = 0, loss = 0;  // distance > 0 counts instead of display_px
-  Camera camera;
-  int scale = -1, window = 0, connections = 6, samples = 10;
-  std::uint64_t seed = 1;
-  bool hard_limits = false, slow_start = false, connect_costs = false, json = false;
-  bool needs_link = true;  // false: a budget in bytes, or a real network
+template <>
+struct EnumNames<Policy> {
+  static constexpr std::array<std::string_view, 2> names{"guard", "thesis"};
 };
-void add_delivery_options(Command& command, DeliveryArguments& args, bool package_required);
+template <>
+struct EnumNames<StepRule> {
+  static constexpr std::array<std::string_view, 4> names{"flip", "jnd", "error", "edge"};
+};
 
-// Single options of these, for commands that take some of them only.
+/// An option whose words are the names of an enum; `help` explains them. The value, an E or an optional one,
+/// must outlive the command.
+template <class E, class Value>
+Option enum_option(Command& c, const std::string& flag, Value& value, const std::string& help) {
+  const auto& names = EnumNames<E>::names;
+  const std::function<void(const std::string&)> take = [&value, &names](const std::string& word) {
+    for (std::size_t k = 0; k < names.size(); ++k)
+      if (names[k] == word) value = static_cast<E>(k);
+  };
+  return c.option(flag, take, help).one_of_explained({names.begin(), names.end()}).value_name("NAME");
+}
+
+/// What plan, check, simulate and fetch ask about how a package is looked at and over what. Options write
+/// into `request`; delivery_request() adds what several of them say together.
+struct DeliveryArguments {
+  std::string package;
+  DeliveryRequest request;
+  std::optional<StepRule> rule;              // not given: the policy's
+  double distance = 0;                       // > 0 counts instead of request.displayed_px
+  Camera camera;                             // for the distance
+  std::vector<std::string> mirrors;          // rates of servers; none: one as fast as any link
+  bool has_link = false, needs_link = true;  // needs_link false: a budget in bytes, or a real network
+  bool json = false;
+};
+/// The package, time limit, display and memory; the link; policy and rule.
+void add_delivery_options(Command& command, DeliveryArguments& args);
+
+// Parts of these, for commands that take some of them only.
+void add_package_and_view_options(Command& command, DeliveryArguments& args, bool package_required);
+void add_link_options(Command& command, DeliveryArguments& args);
 Option add_display_option(Command& command, DeliveryArguments& args);
 void add_time_option(Command& command, DeliveryArguments& args);
-void add_rtt_option(Command& command, DeliveryArguments& args);
+Option add_rtt_option(Command& command, DeliveryArguments& args, const std::string& help);
+Option add_bandwidth_option(Command& command, DeliveryArguments& args, const std::string& help);
 Option add_scale_option(Command& command, DeliveryArguments& args);
 Option add_policy_option(Command& command, DeliveryArguments& args);
-Option add_window_option(Command& command, DeliveryArguments& args);
+Option add_rule_option(Command& command, DeliveryArguments& args);
 void add_memory_option(Command& command, DeliveryArguments& args);
 
 /// UsageError names the flag.
 DeliveryRequest delivery_request(const DeliveryArguments& args);
-/// "at 1.25 s", or "never" for what a network does not bring.
-std::string moment(double time_s);
-/// What is shown takes on the GPU, one line.
-std::string gpu_text(const GpuBytes& bytes);
-/// The same as {mesh, textures, all}.
-nlohmann::ordered_json gpu_json(const GpuBytes& bytes);
 
 }  // namespace texmesh

@@ -1,4 +1,4 @@
-#include "tools/cli/check/atlas_gate.h"
+#include "tools/cli/check/check_gate.h"
 
 #include <gtest/gtest.h>
 

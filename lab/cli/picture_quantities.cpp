@@ -1,0 +1,93 @@
+#include "lab/cli/picture_quantities.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "pipeline/compile/artefacts.h"
+#include "pipeline/io/table.h"
+
+namespace texmesh {
+namespace {
+
+double rank(std::vector<double> values, double fraction) {
+  if (values.empty()) return 0;
+  const auto at = static_cast<std::ptrdiff_t>(fraction * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), values.begin() + at, values.end());
+  return values[static_cast<std::size_t>(at)];
+}
+
+/// R's remarks: how the skeleton came about, in the notes' own words.
+void add_remarks(const Notes& notes, ColourLegend& legend) {
+  for (const Note& n : notes) legend.remarks.push_back(n.code + ": " + n.text);
+}
+
+constexpr PaintedQuantity kLaboratoryQuantities[] = {
+    {"skeleton", [] { return painting_stage(inputs(kConditionedMesh, kSkeleton), paint_skeleton); }, nullptr},
+    {"R", [] { return painting_stage(inputs(kConditionedMesh, kSkeleton), paint_radius); }, nullptr},
+    {"collapse-error", [] { return painting_stage(inputs(kNestedScales), paint_collapse_error); }, nullptr}};
+
+}  // namespace
+
+PaintedModel paint_radius(const ConditionedMesh& mesh, const Skeleton& skeleton) {
+  const std::vector<double> value(skeleton.radius.begin(), skeleton.radius.end());
+  ColourLegend legend{"R: distance to the skeleton with its floor, as perceptual values divide by it",
+                      "object units"};
+  legend.lo = rank(value, 0.01), legend.hi = rank(value, 0.99);
+  legend.remarks.push_back("colours run from the 1st to the 99th percentile; median " +
+                           shortest(rank(value, 0.5)));
+  std::size_t floored = 0;
+  for (std::size_t p = 0; p < value.size(); ++p) floored += skeleton.radius[p] > skeleton.distance.at(p);
+  legend.remarks.push_back(share_text(static_cast<double>(floored), static_cast<double>(value.size())) +
+                           " of the vertices have the floor");
+  add_remarks(skeleton.notes, legend);
+  return paint_values(mesh.mesh, value, std::move(legend), "skeleton");
+}
+
+PaintedModel paint_skeleton(const ConditionedMesh& mesh, const Skeleton& skeleton) {
+  PaintedModel view =
+      paint_values(mesh.mesh, std::vector<double>(mesh.mesh.positions.size(), 0), {}, "skeleton");
+  for (Vec4f& c : view.mesh.colours) c = {0.55f, 0.55f, 0.55f, 0.35f};
+  view.translucent = true;
+  view.nodes = skeleton.nodes;
+  view.lines = skeleton.segments;
+  view.legend = {"curve skeleton: red lines through the translucent surface"};
+  view.legend.coloured = false;
+  view.legend.remarks.push_back(
+      fmt::format("{} nodes, {} segments", skeleton.nodes.size(), skeleton.segments.size()));
+  add_remarks(skeleton.notes, view.legend);
+  return view;
+}
+
+PaintedModel paint_collapse_error(const NestedScales& scales) {
+  const Mesh& mesh = scales.mesh;
+  constexpr double kNever = -1;
+  std::vector<double> value(mesh.positions.size(), kNever), removed;
+  for (const Collapse& c : scales.collapses) {
+    value.at(c.from) = static_cast<double>(c.error);
+    if (c.error > 0) removed.push_back(value[c.from]);
+  }
+  const double hi = removed.empty() ? 1 : *std::max_element(removed.begin(), removed.end());
+  const double lo = removed.empty() ? hi : std::max(rank(removed, 0.01), hi * 1e-6);
+  ColourLegend legend{"collapse error: quadric error at which a vertex was removed", "object units"};
+  legend.lo = std::min(lo, hi), legend.hi = hi, legend.logarithmic = true;
+  std::size_t kept = 0;
+  for (double& v : value) {
+    kept += v == kNever;
+    v = v == kNever ? hi : std::max(v, legend.lo);
+  }
+  legend.remarks.push_back(fmt::format(
+      "{} collapses; {} of the vertices are left in the coarsest scale and "
+      "have the highest colour",
+      scales.collapses.size(), share_text(static_cast<double>(kept), static_cast<double>(value.size()))));
+  for (const NestedScale& s : scales.scales)
+    if (!s.floor_reason.empty()) {
+      legend.remarks.push_back(fmt::format("S_{}: {}", s.scale, s.floor_reason));
+      break;
+    }
+  return paint_values(mesh, value, std::move(legend), "collapses");
+}
+
+std::span<const PaintedQuantity> laboratory_quantities() { return kLaboratoryQuantities; }
+
+}  // namespace texmesh

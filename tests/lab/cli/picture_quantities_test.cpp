@@ -1,0 +1,114 @@
+#include "lab/cli/picture_quantities.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <nlohmann/json.hpp>
+
+#include "format/base/errors.h"
+#include "stages/condition/condition.h"
+#include "stages/gltf/check_glb.h"
+#include "stages/image/decode_image.h"
+#include "tests/support/meshes.h"
+
+namespace texmesh {
+namespace {
+
+using nlohmann::json;
+
+const RunContext kOneThread{};
+
+json json_of(const Bytes& glb) {
+  std::uint32_t bytes = 0;
+  std::memcpy(&bytes, glb.data() + 12, 4);
+  return json::parse(glb.begin() + 20, glb.begin() + 20 + bytes);
+}
+
+ConditionedMesh ball() { return condition_mesh(testing::sphere(12, 18), false, {}, kOneThread); }
+
+std::string faults(const Bytes& glb) {
+  Findings findings;
+  check_glb(glb, "painted.glb", findings);
+  std::string text;
+  for (const Finding& f : findings.release()) text += to_string(f) + "\n";
+  return text;
+}
+
+Pixels picture_of(const PaintedModel& view, std::uint32_t side = 64) {
+  return decode_image(probe_image("painted.png", write_painted_png(view, side), {}));
+}
+
+/// How many pixels of the picture have about this colour.
+int count_near(const Pixels& p, Srgb colour, int tolerance = 40) {
+  int count = 0;
+  for (std::uint32_t y = 0; y < p.height_px; ++y)
+    for (std::uint32_t x = 0; x < 2 * p.height_px; ++x) {
+      bool near = true;
+      for (std::size_t k = 0; k < 3; ++k) near = near && std::abs(p.at(x, y)[k] - colour[k]) <= tolerance;
+      count += near;
+    }
+  return count;
+}
+
+Skeleton skeleton_of(const ConditionedMesh& mesh) {
+  Skeleton s;
+  s.nodes = {{0, -0.5f, 0}, {0, 0.5f, 0}, {0.2f, 0, 0}};
+  s.segments = {{0, 1}, {2, 2}};
+  for (Vec3f p : mesh.mesh.positions)
+    s.distance.push_back(std::fabs(p.y)), s.radius.push_back(0.1f + p.y * p.y);
+  add_warning(s.notes, "skeleton-test", "", "made by hand");
+  return s;
+}
+
+TEST(PictureQuantities, SkeletonIsLines) {
+  const ConditionedMesh mesh = ball();
+  const PaintedModel view = paint_skeleton(mesh, skeleton_of(mesh));
+  EXPECT_FALSE(view.legend.coloured);
+  EXPECT_EQ(view.legend.remarks.back(), "skeleton-test: made by hand");
+  const Bytes glb = write_painted_glb(view);
+  // A package's meshes are triangles only, and its check says so of lines; nothing else is wrong.
+  EXPECT_EQ(faults(glb),
+            "painted.glb: /meshes/1/primitives/0/mode: expected 4, triangles, found 1 [glb-reference]\n");
+  const json root = json_of(glb);
+  EXPECT_EQ(root["nodes"][1]["name"], "lines");
+  const json primitive = root["meshes"][1]["primitives"][0];
+  EXPECT_EQ(primitive["mode"], 1);
+  EXPECT_EQ(root["accessors"][primitive["indices"].get<std::size_t>()]["count"], 4);
+  EXPECT_EQ(root["materials"][0]["alphaMode"], "BLEND");
+  const Pixels picture = picture_of(view);
+  EXPECT_EQ(picture.width_px, 2 * 64u);
+  EXPECT_GT(count_near(picture, {255, 40, 40}, 90), 20);  // the lines show through the ball
+  EXPECT_THROW(paint_radius(mesh, {}), StageError);
+}
+
+TEST(PictureQuantities, RadiusNamesItsRangeAndFloor) {
+  const ConditionedMesh mesh = ball();
+  const PaintedModel view = paint_radius(mesh, skeleton_of(mesh));
+  EXPECT_GE(view.legend.lo, 0.1);
+  EXPECT_LE(view.legend.hi, 1.1001);
+  EXPECT_LT(view.legend.lo, view.legend.hi);
+  EXPECT_EQ(faults(write_painted_glb(view)), "");
+}
+
+TEST(PictureQuantities, CollapseErrorIsLogarithmicAndSurvivorsHaveTheHighestColour) {
+  NestedScales scales;
+  scales.mesh = testing::sphere(8, 12);
+  scales.scales.resize(1);
+  for (std::uint32_t p = 0; p < 40; ++p) scales.collapses.push_back({p, 50, 0.001f * static_cast<float>(p)});
+  const PaintedModel view = paint_collapse_error(scales);
+  EXPECT_TRUE(view.legend.logarithmic);
+  EXPECT_FLOAT_EQ(static_cast<float>(view.legend.hi), 0.039f);
+  EXPECT_GT(view.legend.lo, 0);
+  for (std::size_t w = 0; w < scales.mesh.wedge_count(); ++w) {
+    if (scales.mesh.wedge_position[w] >= 40) EXPECT_GT(view.mesh.colours[w].x, 0.9f);
+    if (scales.mesh.wedge_position[w] == 0) EXPECT_LT(view.mesh.colours[w].x, 0.1f);
+  }
+  EXPECT_EQ(faults(write_painted_glb(view)), "");
+  scales.collapses.clear();  // nothing was removed: still a picture
+  EXPECT_EQ(faults(write_painted_glb(paint_collapse_error(scales))), "");
+}
+
+}  // namespace
+}  // namespace texmesh
