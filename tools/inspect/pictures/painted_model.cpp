@@ -15,7 +15,7 @@
 #include "pipeline/io/table.h"
 #include "stages/geometry/component_boxes.h"
 #include "stages/image/decode_image.h"
-#include "stages/measure/atlas/atlas_map.h"
+#include "stages/measure/atlas/atlas_figures.h"
 #include "stages/ssf/ssf.h"
 #include "tools/inspect/atlas/atlas_report.h"
 #include "tools/inspect/package_mesh.h"
