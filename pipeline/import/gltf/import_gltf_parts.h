@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <functional>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <span>
@@ -128,6 +129,22 @@ std::vector<std::uint8_t> decode_meshopt(const Source& source, const std::string
                                          MeshoptFilter filter);
 
 // import_gltf_primitives.cpp
+
+using ReadFloats = std::function<void(std::size_t vertex, float* out)>;
+
+/// Vertices by attribute; an empty function is an attribute that is not there.
+struct VertexData {
+  std::size_t count = 0;
+  ReadFloats position, normal, uv0, uv1, colour, tangent;
+  int colour_components = 4;
+  std::vector<std::uint32_t> indices;  // empty with indexed == false
+  bool indexed = false;
+};
+/// KHR_draco_mesh_compression. Its counts are read from the stream's header and checked before the decoder,
+/// which allocates what a header asks for, sees it. `attributes` maps names to the stream's attribute ids;
+/// `normalized` says what the accessor of a name says.
+VertexData decode_draco(const Source& source, const std::string& place, ByteSpan data, const Json& attributes,
+                        const std::function<bool(const std::string& name)>& normalized);
 
 /// Triangles of one primitive in its mesh's space, with the vertices that they use, in the order of the file.
 struct Primitive {

@@ -12,17 +12,6 @@
 namespace texmesh::gltf {
 namespace {
 
-using ReadFloats = std::function<void(std::size_t vertex, float* out)>;
-
-/// Vertices by attribute; an empty function is an attribute that is not there.
-struct VertexData {
-  std::size_t count = 0;
-  ReadFloats position, normal, uv0, uv1, colour, tangent;
-  int colour_components = 4;
-  std::vector<std::uint32_t> indices;  // empty with indexed == false
-  bool indexed = false;
-};
-
 constexpr std::uint64_t kMinFaceBudget = 1 << 16;
 // The smoothest scans need some tenths of a bit per face; Draco itself would allocate for any number.
 constexpr std::uint64_t kMaxFacesPerByte = 1000;
@@ -181,9 +170,8 @@ ReadFloats reader(std::shared_ptr<const draco::Mesh> mesh, const draco::PointAtt
   };
 }
 
-/// KHR_draco_mesh_compression. Its counts are read from the stream's header and checked before the decoder,
-/// which allocates what a header asks for, sees it. `attributes` maps names to the stream's attribute ids;
-/// `normalized` says what the accessor of a name says.
+}  // namespace
+
 VertexData decode_draco(const Source& source, const std::string& place, ByteSpan data, const Json& attributes,
                         const std::function<bool(const std::string& name)>& normalized) {
   check_header(source, place, data);
@@ -222,6 +210,8 @@ VertexData decode_draco(const Source& source, const std::string& place, ByteSpan
         mesh->GetAttributeByUniqueId(attributes["COLOR_0"].get<std::uint32_t>())->num_components();
   return out;
 }
+
+namespace {
 
 constexpr const char* kDraco = "KHR_draco_mesh_compression";
 
