@@ -6,7 +6,7 @@
 
 #include "format/base/json_fields.h"
 #include "lab/experiment/fit_experiment.h"
-#include "pipeline/io/text_table.h"
+#include "pipeline/io/table.h"
 
 namespace texmesh {
 namespace {
@@ -59,7 +59,7 @@ std::string method_text(const ExperimentFit& fit) {
 }
 
 std::string judges_text(const ExperimentFit& fit) {
-  TextTable table;
+  Table table;
   table.column("judge", Align::kLeft);
   for (const char* header : {"answers", "right %", "left %", "late", "catch trials"}) table.column(header);
   table.column("", Align::kLeft);
@@ -73,7 +73,7 @@ std::string judges_text(const ExperimentFit& fit) {
 }
 
 std::string conditions_text(const ExperimentFit& fit) {
-  TextTable table;
+  Table table;
   for (const char* header : {"displayed px", "answers", "JND", "95 % from", "to", "slope", "lapse %",
                              "deviance", "levels", "JND of the line"})
     table.column(header);

@@ -7,7 +7,7 @@
 #include <map>
 
 #include "format/base/errors.h"
-#include "pipeline/io/text_table.h"
+#include "pipeline/io/table.h"
 
 namespace texmesh {
 namespace {

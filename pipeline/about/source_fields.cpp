@@ -4,11 +4,8 @@
 #include <charconv>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <span>
-#include <string_view>
 
 #include "format/base/clean_text.h"
-#include "format/documents/about.h"
 #include "pipeline/about/code_tables.h"
 
 namespace texmesh {

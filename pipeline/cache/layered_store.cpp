@@ -5,7 +5,6 @@
 #include <set>
 #include <sstream>
 
-#include "format/base/errors.h"
 #include "format/base/text_bytes.h"
 #include "pipeline/cache/cache_files.h"
 #include "pipeline/cache/cache_layer.h"

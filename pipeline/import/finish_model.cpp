@@ -1,13 +1,8 @@
 #include "pipeline/import/mesh_builder.h"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <limits>
 #include <numeric>
 
-#include "format/base/errors.h"
-#include "format/base/no_index.h"
 #include "pipeline/io/table.h"
 
 namespace texmesh {

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "format/base/errors.h"
 #include "format/container/layout.h"
 #include "pipeline/import/text_scan.h"
 #include "pipeline/io/uri.h"

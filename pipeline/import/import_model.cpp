@@ -1,12 +1,7 @@
-#include <algorithm>
-#include <cstring>
 #include <nlohmann/json.hpp>
-#include <string_view>
 
 #include "format/base/bounded_json.h"
-#include "format/base/errors.h"
 #include "pipeline/import/gltf/import_gltf_parts.h"
-#include "pipeline/import/import.h"
 #include "pipeline/import/text_scan.h"
 
 namespace texmesh {

@@ -1,10 +1,6 @@
 #include "pipeline/import/material_images.h"
 
-#include <algorithm>
-#include <cmath>
-
 #include "format/base/srgb.h"
-#include "stages/image/decode_image.h"
 #include "stages/image/png_writer.h"
 #include "stages/measure/sampled_curve.h"
 

@@ -1,13 +1,7 @@
 #include "pipeline/import/mesh_builder.h"
 
-#include <algorithm>
-#include <bit>
-#include <cmath>
-#include <limits>
-
 #include "format/base/box.h"
 #include "format/base/srgb.h"
-#include "pipeline/import/import.h"
 
 namespace texmesh {
 namespace {

@@ -1,13 +1,5 @@
 #include "stages/image/decode_image.h"
 
-#include <algorithm>
-#include <cmath>
-#include <cstring>
-#include <utility>
-#include <variant>
-
-#include "format/base/bytes.h"
-#include "format/base/errors.h"
 #include "format/base/srgb.h"
 #include "stages/image/decode_jpeg.h"
 #include "stages/image/decode_tiff_exr.h"

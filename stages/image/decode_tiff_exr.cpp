@@ -1,9 +1,7 @@
-#include "stages/image/decode_tiff_exr.h"
 
 #include <algorithm>
 #include <map>
 
-#include "format/base/errors.h"
 #include "stages/image/readers_module/readers.h"
 
 namespace texmesh {

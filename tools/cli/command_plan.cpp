@@ -6,7 +6,7 @@
 
 #include "format/container/layout.h"
 #include "pipeline/io/exit_codes.h"
-#include "pipeline/io/text_table.h"
+#include "pipeline/io/table.h"
 #include "tools/cli/check/check_gate.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"

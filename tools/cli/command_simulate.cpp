@@ -8,7 +8,7 @@
 #include "format/base/text_bytes.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"
-#include "pipeline/io/text_table.h"
+#include "pipeline/io/table.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"
 #include "tools/cli/options/delivery_options.h"
@@ -68,7 +68,7 @@ void print_table_4_2(const SimulateArguments& a) {
                                r.trace_worst_percent, r.static_percent);
     return;
   }
-  TextTable table;
+  Table table;
   for (const char* h :
        {"beta_0 [kB/s]", "T_0 [s]", "deviation [%]", "worst [%]", "by time [%]", "worst [%]", "static [%]"})
     table.column(h);
@@ -145,7 +145,7 @@ std::string theorem_csv(const std::vector<HtcTheorem>& runs) {
 
 std::string theorem_text(const std::vector<HtcTheorem>& runs, const TheoremSummary& sum) {
   constexpr std::size_t kShown = 10;
-  TextTable table;
+  Table table;
   for (const char* h : {"run", "Pi [s]", "dT_n [s]", "corrected bound [s]", "published [s]"}) table.column(h);
   for (std::size_t i = 0; i < kShown; ++i) {
     const std::size_t at = (2 * i + 1) * runs.size() / (2 * kShown);

@@ -1,20 +1,13 @@
-#include "tools/extract/extract.h"
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <nlohmann/json.hpp>
-
 #include "delivery/cpp/decide/fragment_list.h"
-#include "format/container/layout.h"
 #include "format/rules/viewing.h"
 #include "pipeline/about/gltf_about.h"
 #include "pipeline/io/record.h"
 #include "pipeline/io/table.h"
 #include "tools/extract/budget/budget_search.h"
 #include "tools/extract/glb/scale_file.h"
-#include "tools/extract/glb/standalone_glb.h"
-#include "tools/extract/glb/texture_source.h"
 #include "tools/extract/proxy/proxy_search.h"
 
 namespace texmesh {

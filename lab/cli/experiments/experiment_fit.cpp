@@ -11,7 +11,7 @@
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/file_resolver.h"
-#include "pipeline/io/text_table.h"
+#include "pipeline/io/table.h"
 #include "tools/cli/options/command_line.h"
 #include "tools/cli/options/common_options.h"
 

@@ -12,7 +12,7 @@
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/file_resolver.h"
-#include "pipeline/io/text_table.h"
+#include "pipeline/io/table.h"
 #include "stages/image/decode_image.h"
 #include "tools/cli/options/command_line.h"
 #include "tools/cli/options/common_options.h"
@@ -69,7 +69,7 @@ Pixels read_pixels(const std::string& path, bool& alpha) {
 }
 
 std::string fragment_text(const StudiedImage& image) {
-  TextTable table;
+  Table table;
   for (const char* header :
        {"n", "fragments", "fragment px", "quality", "file std kB", "file opt kB", "sum std kB", "over std %",
         "sum opt kB", "over opt %", "shared kB", "over std %", "over opt %", "file ms", "fragments ms"})

@@ -15,7 +15,7 @@
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/file_resolver.h"
 #include "pipeline/io/new_folder.h"
-#include "pipeline/io/text_table.h"
+#include "pipeline/io/table.h"
 #include "tools/cli/options/command_line.h"
 #include "tools/cli/options/common_options.h"
 #include "tools/cli/options/delivery_options.h"
@@ -177,7 +177,7 @@ Json method_json(const std::vector<SystemFigures>& all) {
 
 std::string method_text(const std::vector<SystemFigures>& all) {
   std::string text;
-  TextTable table;
+  Table table;
   table.column("px");
   table.column("system", Align::kLeft);
   for (const char* header : {"shown", "triangles", "kB", "textures kB", "FLIP", "scale", "textures", "end s",

@@ -13,7 +13,7 @@
 #include "lab/cli/studies/random_plans.h"
 #include "lab/cli/studies/studies.h"
 #include "pipeline/io/exit_codes.h"
-#include "pipeline/io/text_table.h"
+#include "pipeline/io/table.h"
 #include "tools/cli/options/command_line.h"
 #include "tools/cli/options/common_options.h"
 #include "tools/cli/options/units.h"
@@ -163,7 +163,7 @@ Json prediction_json(const std::vector<Row>& rows) {
 }
 
 std::string prediction_text(const std::vector<Row>& rows) {
-  TextTable table;
+  Table table;
   table.column("package", Align::kLeft);
   table.column("kind", Align::kLeft);
   for (const char* header :

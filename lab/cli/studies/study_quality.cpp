@@ -13,7 +13,7 @@
 #include "pipeline/graph/make_stage.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"
-#include "pipeline/io/text_table.h"
+#include "pipeline/io/table.h"
 #include "stages/image/png_writer.h"
 #include "tools/cli/options/command_line.h"
 #include "tools/cli/options/common_options.h"
@@ -71,7 +71,7 @@ std::vector<std::uint8_t> side_by_side(const Choices& choices) {
 }
 
 std::string quality_text(const Choices& choices) {
-  TextTable table;
+  Table table;
   table.column("choice", Align::kLeft);
   const std::uint64_t budget = choices.size() > 1 ? choices[1].bytes : 0;  // uniform's
   for (const char* header : {"kB", "of budget %", "fragments", "skipped", "lowest q", "highest q",

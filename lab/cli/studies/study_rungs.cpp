@@ -11,7 +11,7 @@
 #include "format/rules/ordinary_loads.h"
 #include "lab/cli/studies/studies.h"
 #include "pipeline/io/exit_codes.h"
-#include "pipeline/io/text_table.h"
+#include "pipeline/io/table.h"
 #include "stages/fragment_codec/fragment_codec.h"
 #include "tools/cli/options/command_line.h"
 #include "tools/cli/options/common_options.h"
@@ -101,7 +101,7 @@ std::string percent_of(std::size_t part, int whole) {
 }
 
 std::string uses_text(PackageReader& package, const PackageUse& use, int loads) {
-  TextTable table;
+  Table table;
   for (const char* header : {"plane", "mip", "quality", "kB", "plane shown %", "rung chosen %"})
     table.column(header);
   for (std::size_t p = 0; p < use.planes.size(); ++p) {

@@ -2,17 +2,12 @@
 // primitive read once; all of them put together in the order of the nodes.
 #include <tiny_gltf.h>
 
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 
 #include "format/model/material_extensions.h"
 #include "pipeline/about/gltf_about.h"
 #include "pipeline/import/gltf/import_gltf_parts.h"
-#include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/text_scan.h"
 
 namespace texmesh {

@@ -1,8 +1,6 @@
 // From accessors to bytes: the buffers of a glTF, views into them, and elements in the views.
 #include <tiny_gltf.h>
 
-#include <algorithm>
-#include <cstring>
 #include <nlohmann/json.hpp>
 
 #include "pipeline/import/gltf/import_gltf_parts.h"

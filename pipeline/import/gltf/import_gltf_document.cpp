@@ -6,12 +6,6 @@
 // is left to it.
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
-#include <cstring>
-#include <functional>
-#include <map>
-#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "format/base/bounded_json.h"

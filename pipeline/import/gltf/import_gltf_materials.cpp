@@ -1,6 +1,5 @@
 #include <tiny_gltf.h>
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "format/model/material_extensions.h"

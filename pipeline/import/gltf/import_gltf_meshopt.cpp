@@ -1,10 +1,5 @@
 #include <meshoptimizer.h>
 
-#include <algorithm>
-#include <array>
-#include <bit>
-#include <cmath>
-#include <cstring>
 #include <limits>
 
 #include "pipeline/import/gltf/import_gltf_parts.h"

@@ -2,14 +2,11 @@
 #include <draco/compression/decode.h>
 #include <tiny_gltf.h>
 
-#include <algorithm>
-#include <functional>
 #include <limits>
 #include <memory>
 #include <new>
 #include <nlohmann/json.hpp>
 
-#include "format/base/no_index.h"
 #include "pipeline/import/gltf/import_gltf_parts.h"
 
 namespace texmesh::gltf {

@@ -1,19 +1,6 @@
-#include <algorithm>
-#include <cmath>
-#include <cstdint>
 #include <limits>
-#include <map>
-#include <optional>
-#include <span>
-#include <string>
-#include <string_view>
-#include <vector>
 
-#include "format/base/errors.h"
-#include "format/base/no_index.h"
-#include "format/base/vec.h"
 #include "pipeline/about/source_fields.h"
-#include "pipeline/import/import.h"
 #include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/obj/obj_material.h"
 #include "pipeline/import/text_scan.h"

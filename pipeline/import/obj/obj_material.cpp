@@ -1,16 +1,11 @@
 #include "pipeline/import/obj/obj_material.h"
 
-#include <algorithm>
-#include <cmath>
-#include <map>
 #include <set>
 
-#include "format/base/errors.h"
 #include "pipeline/import/import_images.h"
 #include "pipeline/import/material_images.h"
 #include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/text_scan.h"
-#include "stages/image/decode_image.h"
 
 namespace texmesh {
 namespace {

@@ -1,18 +1,8 @@
-#include <array>
-#include <cmath>
-#include <cstdint>
-#include <span>
-#include <string>
-#include <vector>
 
-#include "format/base/errors.h"
-#include "format/base/vec.h"
 #include "pipeline/about/source_fields.h"
-#include "pipeline/import/import.h"
 #include "pipeline/import/import_images.h"
 #include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/ply/ply_reader.h"
-#include "pipeline/import/text_scan.h"
 
 // PLY has no specification of names beyond x, y, z. This is what MeshLab, CloudCompare, Metashape, Blender
 // and VTK write, and what is read here:

@@ -1,6 +1,5 @@
 #include <dlfcn.h>
 
-#include "format/base/errors.h"
 #include "stages/image/readers_module/readers.h"
 
 namespace texmesh {

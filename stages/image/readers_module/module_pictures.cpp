@@ -2,14 +2,11 @@
 #include "stages/image/readers_module/readers.h"
 
 #include <algorithm>
-#include <cstring>
 #include <memory>
 #include <mutex>
 
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
-
-#include "format/base/errors.h"
 
 namespace texmesh {
 namespace {

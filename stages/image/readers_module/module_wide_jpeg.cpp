@@ -11,8 +11,6 @@
 #include <dcmtk/dcmjpeg/djdijg12.h>
 #include <dcmtk/dcmjpeg/djdijg16.h>
 
-#include "format/base/errors.h"
-
 namespace texmesh {
 
 std::vector<std::uint16_t> decode_wide_jpeg_file(const std::string& name, ByteSpan bytes,

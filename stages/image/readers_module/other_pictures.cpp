@@ -1,14 +1,10 @@
-#include "stages/image/readers_module/other_pictures.h"
 
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
-#include <cstring>
 #include <limits>
-#include <string_view>
 #include <type_traits>
 
-#include "format/base/errors.h"
 #include "stages/image/png_writer.h"
 #include "stages/image/readers_module/readers.h"
 

@@ -1,8 +1,6 @@
-#include "stages/image/readers_module/wide_jpeg.h"
 
 #include <algorithm>
 
-#include "format/base/errors.h"
 #include "stages/image/jpeg_segments.h"
 #include "stages/image/readers_module/readers.h"
 

@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "format/container/layout.h"
-#include "pipeline/io/text_table.h"
+#include "pipeline/io/table.h"
 #include "tools/cli/fetch/server_share.h"
 #include "tools/cli/options/delivery_options.h"
 

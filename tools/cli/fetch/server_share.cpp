@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/io/text_table.h"
+#include "pipeline/io/table.h"
 
 namespace texmesh {
 

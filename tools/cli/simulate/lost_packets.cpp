@@ -6,7 +6,7 @@
 
 #include "delivery/cpp/simulate/packet_loss.h"
 #include "format/container/layout.h"
-#include "pipeline/io/text_table.h"
+#include "pipeline/io/table.h"
 #include "stages/condition/condition.h"
 #include "stages/image/png_writer.h"
 #include "tools/render/picture_sheet.h"
@@ -84,7 +84,7 @@ LostPacketsTable lost_packets(PackageReader& package, const DeliveryPlan& plan, 
 }
 
 std::string lost_packets_text(const LostPacketsTable& t) {
-  TextTable table;
+  Table table;
   for (const char* h : {"packets lost [%]", "lost points", "neighbours: rms [edges]", "texture: rms [edges]",
                         "p95 [edges]", "lost fragments", "FLIP"})
     table.column(h);

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 #include <cmath>
 
-#include "pipeline/io/text_table.h"
+#include "pipeline/io/table.h"
 #include "tools/cli/fetch/server_share.h"
 
 namespace texmesh {

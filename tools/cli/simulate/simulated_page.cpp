@@ -5,7 +5,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/io/text_table.h"
+#include "pipeline/io/table.h"
 #include "pipeline/io/wire_text.h"
 #include "tools/cli/options/delivery_options.h"
 #include "tools/cli/options/units.h"
@@ -40,7 +40,7 @@ Json page_json(const PagePlan& plan, const std::vector<BesideObject>& objects, d
 }
 
 std::string page_text(const PagePlan& plan, const std::vector<BesideObject>& objects, double limit_s) {
-  TextTable table;
+  Table table;
   for (const char* h : {"object", "px", "shows", "bytes", "FLIP", "by itself"}) table.column(h);
   for (std::size_t i = 0; i < objects.size(); ++i) {
     const DeliveryPlan& p = plan.objects[i];

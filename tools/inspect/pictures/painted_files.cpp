@@ -1,11 +1,6 @@
 // A painted model as files: a GLB to turn in any viewer, and a PNG of two views.
-#include <algorithm>
-#include <cmath>
-#include <cstring>
-#include <nlohmann/json.hpp>
 
 #include "format/base/box.h"
-#include "format/base/portable_math.h"
 #include "format/base/srgb.h"
 #include "format/rules/allocation.h"
 #include "stages/gltf/glb_writer.h"
