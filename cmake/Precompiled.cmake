@@ -10,6 +10,6 @@ endfunction()
 
 # Sources that run once a command, and never once a vertex or texel: what -O1 leaves out of them nobody can measure, and it
 # takes two thirds of the time to compile. With -O1 g++ 12 sees more overflows that are not there (CMakeLists.txt).
-function(texmesh_seldom_run)  # sources
+function(texmesh_optimise_little)  # sources
   set_source_files_properties(${ARGN} PROPERTIES COMPILE_OPTIONS "-O1;-Wno-array-bounds")
 endfunction()

@@ -6,7 +6,7 @@ set(texmesh_unity_most 8)  # sources of a unit
 set(texmesh_unity_bytes 80000)  # of a unit's sources, about: 6 CPU seconds
 
 # Shares the sources of a room evenly among units, by their bytes. Units are named after the room. CMake leaves sources with
-# options of their own out of units; so the units get these options (texmesh_seldom_run).
+# options of their own out of units; so the units get these options (texmesh_optimise_little).
 function(texmesh_unity_room target room options)  # sources
   list(LENGTH ARGN count)
   set(bytes 0)
@@ -59,7 +59,7 @@ function(texmesh_unity target)
       set(room ${target})
     endif()
     if(options)
-      string(APPEND room _seldom)
+      string(APPEND room _little)
     endif()
     list(APPEND rooms ${room})
     list(APPEND sources_of_${room} ${source})

@@ -2,12 +2,10 @@
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
-#include <string>
 #include <thread>
 
 #include "examples/scan_noise.h"
 #include "examples/scan_writers.h"
-#include "format/base/errors.h"
 
 namespace {
 

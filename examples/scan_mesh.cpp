@@ -1,4 +1,3 @@
-#include <algorithm>
 #include <numeric>
 #include <queue>
 #include <tuple>
@@ -6,7 +5,6 @@
 #include "examples/scan_model.h"
 #include "examples/scan_noise.h"
 #include "format/base/box.h"
-#include "format/base/errors.h"
 #include "format/base/no_index.h"
 #include "format/base/portable_math.h"
 

@@ -6,7 +6,6 @@
 
 #include "examples/scan_model.h"
 #include "examples/scan_noise.h"
-#include "format/base/errors.h"
 #include "format/base/no_index.h"
 #include "format/base/portable_math.h"
 #include "stages/base/parallel.h"

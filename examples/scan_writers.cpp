@@ -1,15 +1,11 @@
 #include "examples/scan_writers.h"
 
-#include <algorithm>
-#include <cmath>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "format/base/box.h"
 #include "format/base/bytes.h"
-#include "format/base/errors.h"
 
 namespace texmesh::examples {
 namespace {

@@ -20,7 +20,7 @@ foreach(name batch/build_memo batch/collection batch/find_models batch/fleet/run
     compile/options compile/profile compile/workers/worker_messages)
   list(APPEND sources ${PROJECT_SOURCE_DIR}/pipeline/${name}.cpp)
 endforeach()
-list(FILTER sources EXCLUDE REGEX "/stages/image/seldom/module")
+list(FILTER sources EXCLUDE REGEX "/stages/image/readers_module/module")
 # Sections: what only other targets or stages call is not linked, and
 # its counters with it, with lld alone.
 add_library(texmesh_fuzz STATIC EXCLUDE_FROM_ALL ${sources})

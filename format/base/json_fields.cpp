@@ -3,14 +3,11 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <cstdint>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <set>
 
 #include "format/base/bounded_json.h"
 #include "format/base/clean_text.h"
-#include "format/base/errors.h"
 #include "format/base/rule_error.h"
 
 namespace texmesh {

@@ -1,4 +1,3 @@
-#include "format/base/sha256.h"
 
 #include "format/base/sha256_stream.h"
 

@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstring>
 
 #include "format/base/bytes.h"
 #include "format/base/rule_error.h"

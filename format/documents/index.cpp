@@ -2,10 +2,7 @@
 
 #include <algorithm>
 #include <map>
-#include <set>
 
-#include "format/base/bytes.h"
-#include "format/base/rule_error.h"
 #include "format/container/container.h"
 #include "format/container/format_version.h"
 #include "format/container/layout.h"

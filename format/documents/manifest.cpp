@@ -1,17 +1,11 @@
 #include "format/documents/manifest.h"
 
 #include <algorithm>
-#include <array>
 #include <nlohmann/json.hpp>
-#include <string_view>
 
-#include "format/base/errors.h"
 #include "format/base/json_fields.h"
-#include "format/base/rule_error.h"
 #include "format/base/text_bytes.h"
 #include "format/container/container.h"
-#include "format/container/format_version.h"
-#include "format/container/layout.h"
 
 namespace texmesh {
 namespace {

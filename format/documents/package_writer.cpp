@@ -2,12 +2,8 @@
 
 #include <algorithm>
 #include <map>
-#include <set>
 
-#include "format/base/bytes.h"
-#include "format/base/errors.h"
 #include "format/container/container.h"
-#include "format/container/layout.h"
 #include "format/documents/index.h"
 #include "format/documents/tables.h"
 #include "format/split/split_stream.h"

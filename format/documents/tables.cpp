@@ -1,13 +1,6 @@
 #include "format/documents/tables.h"
 
-#include <algorithm>
-#include <cmath>
-#include <cstdint>
-#include <string>
-
-#include "format/base/bytes.h"
 #include "format/base/number16.h"
-#include "format/base/rule_error.h"
 #include "format/container/format_version.h"
 #include "format/container/layout.h"
 

@@ -4,7 +4,6 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "format/base/errors.h"
 #include "format/base/json_fields.h"
 #include "format/base/rule_error.h"
 #include "format/base/text_bytes.h"

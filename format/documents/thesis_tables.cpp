@@ -1,13 +1,8 @@
 #include "format/documents/thesis_tables.h"
 
-#include <algorithm>
-#include <array>
-#include <string>
 #include <tuple>
 
-#include "format/base/bytes.h"
 #include "format/base/number16.h"
-#include "format/base/rule_error.h"
 #include "format/container/format_version.h"
 #include "format/container/layout.h"
 

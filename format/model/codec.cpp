@@ -1,7 +1,6 @@
 #include "format/model/codec.h"
 
 #include <algorithm>
-#include <string>
 
 #include "format/base/bytes.h"
 #include "format/base/rule_error.h"

@@ -1,12 +1,9 @@
 #include "format/rules/allocation.h"
 
-#include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include "format/base/number16.h"
 #include "format/base/portable_math.h"
-#include "format/documents/tables.h"
 #include "format/rules/rate_distortion.h"
 
 namespace texmesh {

@@ -1,7 +1,6 @@
 #include "format/rules/proxy_choice.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "format/base/portable_math.h"
 

@@ -1,11 +1,9 @@
 #include "format/rules/size_curve.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "format/base/portable_math.h"
-#include "format/documents/tables.h"
 #include "format/rules/allocation.h"
 #include "format/rules/size_model.h"
 

@@ -1,10 +1,8 @@
 #include "format/rules/viewing.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
-#include "format/base/errors.h"
 #include "format/base/portable_math.h"
 #include "format/rules/mip_choice.h"
 

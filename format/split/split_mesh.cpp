@@ -1,5 +1,4 @@
 #include "format/split/split_mesh.h"
-#include "format/base/no_index.h"
 
 namespace texmesh {
 

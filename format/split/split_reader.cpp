@@ -1,17 +1,10 @@
 #include "format/split/split_reader.h"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <limits>
-#include <vector>
 
 #include "format/base/bytes.h"
-#include "format/base/errors.h"
-#include "format/base/no_index.h"
 #include "format/base/sha256.h"
 #include "format/split/split_codec.h"
-#include "format/split/split_coder.h"
 #include "format/split/split_head.h"
 #include "format/split/split_model.h"
 

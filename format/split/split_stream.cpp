@@ -1,13 +1,9 @@
-#include "format/split/split_stream.h"
 
-#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 
 #include "format/base/bytes.h"
-#include "format/base/rule_error.h"
 #include "format/split/split_codec.h"
-#include "format/split/split_coder.h"
 #include "format/split/split_head.h"
 
 namespace texmesh {

@@ -1,21 +1,11 @@
 #include "format/split/split_writer.h"
 
-#include <algorithm>
-#include <array>
 #include <compare>
-#include <cstdint>
 #include <limits>
-#include <span>
-#include <vector>
 
-#include "format/base/errors.h"
-#include "format/base/no_index.h"
 #include "format/base/sha256.h"
 #include "format/split/split_codec.h"
-#include "format/split/split_coder.h"
 #include "format/split/split_head.h"
-#include "format/split/split_mesh.h"
-#include "format/split/split_source.h"
 
 namespace texmesh {
 

@@ -11,7 +11,7 @@
 #include "format/rules/split_mix.h"
 #include "lab/study/fragment_study.h"
 #include "pipeline/import/import.h"
-#include "pipeline/import/memory_files.h"
+#include "pipeline/io/resolver.h"
 #include "stages/base/parallel.h"
 #include "stages/condition/condition.h"
 #include "stages/image/png_writer.h"

@@ -3,13 +3,10 @@
 #include <algorithm>
 #include <initializer_list>
 #include <nlohmann/json.hpp>
-#include <string_view>
 
 #include "format/base/bounded_json.h"
 #include "format/base/errors.h"
 #include "format/base/text_bytes.h"
-#include "format/documents/about.h"
-#include "pipeline/about/licence.h"
 #include "pipeline/about/source_fields.h"
 
 namespace texmesh {

@@ -1,14 +1,9 @@
 // What earlier runs have found out, and which models need not run by it.
 #include "pipeline/batch/build_memo.h"
 
-#include <unistd.h>
-
-#include <algorithm>
 #include <filesystem>
 #include <set>
 
-#include "pipeline/batch/fleet/shards.h"
-#include "pipeline/io/file_stamp.h"
 #include "pipeline/io/program.h"
 
 namespace texmesh {

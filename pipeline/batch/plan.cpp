@@ -4,19 +4,12 @@
 
 #include <fnmatch.h>
 
-#include <algorithm>
 #include <cctype>
-#include <cstddef>
-#include <filesystem>
 #include <fstream>
-#include <functional>
 #include <initializer_list>
-#include <map>
 #include <nlohmann/json.hpp>
-#include <set>
 
 #include "format/base/bounded_json.h"
-#include "format/base/errors.h"
 #include "format/base/text_bytes.h"
 #include "pipeline/about/meta.h"
 #include "pipeline/compile/options.h"

@@ -1,16 +1,10 @@
 // A run of compile: which models must run, by the memo of earlier runs; then their processes, and what they
 // report.
-#include "pipeline/batch/run.h"
 
-#include <algorithm>
-#include <cerrno>
-#include <chrono>
 #include <filesystem>
 #include <ostream>
 #include <set>
-#include <string_view>
 
-#include "format/base/errors.h"
 #include "pipeline/batch/build_memo.h"
 #include "pipeline/batch/fleet/run_summary.h"
 #include "pipeline/batch/write_reports.h"

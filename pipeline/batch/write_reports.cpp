@@ -6,15 +6,10 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cmath>
-#include <cstring>
 #include <filesystem>
 #include <iostream>
-#include <map>
 #include <nlohmann/json.hpp>
-#include <string_view>
 
-#include "format/base/errors.h"
 #include "format/base/text_bytes.h"
 #include "pipeline/batch/fleet/model_list.h"
 #include "pipeline/batch/fleet/run_summary.h"

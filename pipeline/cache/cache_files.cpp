@@ -2,20 +2,13 @@
 
 #include <fcntl.h>
 #include <sys/file.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
-#include <algorithm>
-#include <cerrno>
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <utility>
 
-#include "format/base/errors.h"
 #include "format/base/text_bytes.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/descriptor.h"
-#include "pipeline/io/record.h"
 
 namespace texmesh {
 namespace {

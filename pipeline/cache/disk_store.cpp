@@ -1,22 +1,18 @@
 #include "pipeline/cache/disk_store.h"
 
 #include <fcntl.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
-#include <atomic>
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
 #include <set>
 #include <thread>
 
-#include "format/base/errors.h"
 #include "format/base/text_bytes.h"
 #include "pipeline/cache/cache_files.h"
 #include "pipeline/cache/prune.h"
 #include "pipeline/io/atomic_file.h"
-#include "pipeline/io/file_stamp.h"
 #include "pipeline/io/machine/owner_mark.h"
 
 namespace texmesh {

@@ -1,8 +1,6 @@
 #include <curl/curl.h>
 
 #include <algorithm>
-#include <chrono>
-#include <cstring>
 #include <mutex>
 
 #include "delivery/cpp/http/http_client.h"

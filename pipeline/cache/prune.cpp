@@ -1,20 +1,14 @@
 #include "pipeline/cache/prune.h"
 
 #include <fcntl.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
-#include <functional>
-#include <limits>
-#include <map>
 #include <set>
-#include <string_view>
 
 #include "pipeline/cache/cache_files.h"
 #include "pipeline/io/atomic_file.h"
-#include "pipeline/io/file_stamp.h"
 #include "pipeline/io/machine/owner_mark.h"
 
 namespace texmesh {

@@ -4,9 +4,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cctype>
-#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "format/base/text_bytes.h"
@@ -15,10 +13,8 @@
 #include "pipeline/compile/library_versions.h"
 #include "pipeline/compile/profile.h"
 #include "pipeline/compile/stage_table.h"
-#include "pipeline/import/count_triangles.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/file_resolver.h"
-#include "pipeline/io/record.h"
 #include "pipeline/io/resource_error.h"
 #include "pipeline/io/wire_text.h"
 

@@ -47,4 +47,6 @@ std::string compiler_version() {
 #endif
 }
 
+std::string tool_version() { return TEXMESH_VERSION; }
+
 }  // namespace texmesh

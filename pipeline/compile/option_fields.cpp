@@ -1,11 +1,9 @@
 // Options as generic code sees them: listed from the fields of their structs, as JSON both ways, as schema.
 #include "pipeline/compile/option_fields.h"
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "format/base/errors.h"
 #include "pipeline/io/wire_text.h"
 
 namespace texmesh {

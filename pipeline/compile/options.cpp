@@ -1,6 +1,5 @@
 #include "pipeline/compile/options.h"
 
-#include "format/base/errors.h"
 #include "format/container/layout.h"
 #include "pipeline/about/meta.h"
 #include "pipeline/graph/option_text.h"

@@ -1,15 +1,11 @@
 #include "pipeline/compile/profile.h"
 
-#include <algorithm>
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <optional>
 
 #include "format/base/bounded_json.h"
-#include "format/base/errors.h"
 #include "format/base/text_bytes.h"
 #include "pipeline/compile/option_fields.h"
-#include "pipeline/compile/options.h"
 
 namespace texmesh {
 namespace {

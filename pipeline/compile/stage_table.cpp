@@ -1,7 +1,5 @@
 #include "pipeline/compile/stage_table.h"
 
-#include <algorithm>
-
 #include "pipeline/compile/artefacts.h"
 #include "pipeline/compile/library_versions.h"
 #include "pipeline/compile/option_fields.h"

@@ -14,13 +14,8 @@
 #include <chrono>
 #include <condition_variable>
 #include <exception>
-#include <map>
 #include <mutex>
-#include <optional>
-#include <stdexcept>
 #include <thread>
-
-#include "format/base/errors.h"
 
 namespace texmesh {
 namespace {

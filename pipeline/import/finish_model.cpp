@@ -1,16 +1,188 @@
-#include "pipeline/import/finish_model.h"
+#include "pipeline/import/mesh_builder.h"
 
-#include <algorithm>
-#include <cmath>
+#include <limits>
+#include <numeric>
 
-#include "format/base/errors.h"
-#include "pipeline/import/drop_unused.h"
-#include "pipeline/import/local_frame.h"
-#include "pipeline/import/near_uvs.h"
-#include "pipeline/io/text_table.h"
+#include "pipeline/io/table.h"
 
 namespace texmesh {
 namespace {
+
+template <class T>
+void keep_marked(std::vector<T>& values, const std::vector<std::uint32_t>& new_index) {
+  if (values.empty()) return;
+  // new_index[i] <= i; moving a string or a vector onto itself would empty it.
+  for (std::size_t i = 0; i < values.size(); ++i)
+    if (new_index[i] != kNoIndex && new_index[i] != i) values[new_index[i]] = std::move(values[i]);
+  values.resize(static_cast<std::size_t>(
+      std::count_if(new_index.begin(), new_index.end(), [](auto i) { return i != kNoIndex; })));
+}
+
+/// Marks become consecutive indices in the old order; kNoIndex stays.
+std::uint32_t number_marked(std::vector<std::uint32_t>& marks) {
+  std::uint32_t next = 0;
+  for (std::uint32_t& m : marks)
+    if (m != kNoIndex) m = next++;
+  return next;
+}
+
+/// "1 vertex", "2 vertices".
+std::string count_of(std::size_t n, const char* one, const char* many) {
+  return std::to_string(n) + " " + (n == 1 ? one : many);
+}
+
+/// Positions and wedges that no triangle needs, with a note; indices follow, here and below.
+void drop_unused_vertices(Model& model) {
+  Mesh& mesh = model.mesh;
+  std::vector<std::uint32_t> wedge(mesh.wedge_count(), kNoIndex), position(mesh.positions.size(), kNoIndex);
+  for (const Triangle& t : mesh.triangles)
+    for (std::uint32_t w : t) {
+      wedge[w] = 0;
+      position[mesh.wedge_position[w]] = 0;
+    }
+  const std::uint32_t wedges = number_marked(wedge), positions = number_marked(position);
+  if (wedges == wedge.size() && positions == position.size()) return;
+  if (positions != position.size())
+    add_info(model.notes, "unused-vertices", "",
+             count_of(position.size() - positions, "vertex", "vertices") + " of no triangle left out");
+  keep_marked(mesh.uv0, wedge);
+  keep_marked(mesh.uv1, wedge);
+  keep_marked(mesh.normals, wedge);
+  keep_marked(mesh.colours, wedge);
+  keep_marked(mesh.tangents, wedge);
+  keep_marked(mesh.wedge_position, wedge);
+  keep_marked(mesh.positions, position);
+  for (std::uint32_t& p : mesh.wedge_position) p = position[p];
+  for (Triangle& t : mesh.triangles)
+    for (std::uint32_t& w : t) w = wedge[w];
+  for (std::uint32_t& p : model.range.position)
+    if (p != kNoIndex) p = position[p];
+}
+
+void drop_unused_materials(Model& model) {
+  std::vector<std::uint32_t> material(model.materials.size(), kNoIndex);
+  for (std::uint16_t m : model.mesh.triangle_material) material[m] = 0;
+  number_marked(material);
+  keep_marked(model.materials, material);
+  for (std::uint16_t& m : model.mesh.triangle_material) m = static_cast<std::uint16_t>(material[m]);
+}
+
+void drop_unused_parts(Mesh& mesh) {
+  std::vector<std::uint32_t> part(mesh.part_names.size(), kNoIndex);
+  for (std::uint16_t p : mesh.triangle_part) part[p] = 0;
+  number_marked(part);
+  keep_marked(mesh.part_names, part);
+  for (std::uint16_t& p : mesh.triangle_part) p = static_cast<std::uint16_t>(part[p]);
+}
+
+/// After drop_unused_materials. InputError when a material refers to an image that is not there.
+void drop_unused_images(Model& model, const std::string& file_name) {
+  std::vector<std::uint32_t> image(model.images.size(), kNoIndex);
+  auto mark = [&](TextureRef& ref) {
+    if (!ref.used()) return;
+    if (static_cast<std::size_t>(ref.image) >= image.size())
+      throw InputError(file_name, "imported materials", "textures that refer to images",
+                       std::to_string(ref.image));
+    image[static_cast<std::size_t>(ref.image)] = 0;
+  };
+  for (Material& m : model.materials) for_each_texture(m, mark);
+  number_marked(image);
+  keep_marked(model.images, image);
+  for (Material& m : model.materials)
+    for_each_texture(m, [&image](TextureRef& ref) {
+      if (ref.used()) ref.image = static_cast<std::int32_t>(image[static_cast<std::size_t>(ref.image)]);
+    });
+}
+
+/// Least move in u and in v that a chart's textures do not notice, in repeats; 0 = none.
+struct Period {
+  std::array<int, 2> move{1, 1};
+  void restrict_by(int axis, int other) {
+    int& along = move[static_cast<std::size_t>(axis)];
+    along = along == 0 || other == 0 ? 0 : std::max(along, other);  // 1 or 2
+  }
+};
+
+int period_of(Wrap wrap) { return wrap == Wrap::kRepeat ? 1 : wrap == Wrap::kMirror ? 2 : 0; }
+
+Period period_of(const Material& material, int set) {
+  Period period;
+  bool used = false;
+  for_each_texture(material, [&](const TextureRef& t) {
+    if (!t.used() || t.texcoord != set) return;
+    used = true;
+    // A scale by whole numbers takes whole moves to whole moves.
+    const Vec2f s = t.transform.scale;
+    const bool whole = t.transform.rotation == 0 && s.x == std::floor(s.x) && s.y == std::floor(s.y);
+    period.restrict_by(0, whole ? period_of(t.wrap_s) : 0);
+    period.restrict_by(1, whole ? period_of(t.wrap_t) : 0);
+  });
+  // No texture uses these coordinates: only the application that they are for knows what they mean.
+  if (!used) period.move = {0, 0};
+  return period;
+}
+
+/// Per wedge the lowest wedge of its chart.
+std::vector<std::uint32_t> charts_of(const Mesh& mesh) {
+  std::vector<std::uint32_t> chart(mesh.wedge_count());
+  std::iota(chart.begin(), chart.end(), 0u);
+  const auto root = [&chart](std::uint32_t w) {
+    while (chart[w] != w) w = chart[w] = chart[chart[w]];
+    return w;
+  };
+  for (const Triangle& t : mesh.triangles)
+    for (std::size_t k = 1; k < 3; ++k) {
+      const std::uint32_t a = root(t[0]), b = root(t[k]);
+      chart[std::max(a, b)] = std::min(a, b);
+    }
+  for (std::uint32_t w = 0; w < chart.size(); ++w) chart[w] = root(w);
+  return chart;
+}
+
+void bring_near(const Model& model, const std::vector<std::uint32_t>& chart, int set,
+                std::vector<Vec2f>& uvs) {
+  constexpr float kFar = 2;
+  const auto is_far = [](Vec2f uv) { return !(std::fabs(uv.x) < kFar && std::fabs(uv.y) < kFar); };
+  if (std::none_of(uvs.begin(), uvs.end(), is_far)) return;
+  const Mesh& mesh = model.mesh;
+  std::vector<Period> period_of_material, period(uvs.size());
+  for (const Material& m : model.materials) period_of_material.push_back(period_of(m, set));
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const Period& p = period_of_material[mesh.triangle_material[t]];
+    for (int axis = 0; axis < 2; ++axis)
+      period[chart[mesh.triangles[t][0]]].restrict_by(axis, p.move[static_cast<std::size_t>(axis)]);
+  }
+  constexpr float kMost = std::numeric_limits<float>::max();
+  std::vector<Vec2f> lowest(uvs.size(), {kMost, kMost}), highest(uvs.size(), {-kMost, -kMost});
+  for (std::size_t w = 0; w < uvs.size(); ++w) {
+    Vec2f &lo = lowest[chart[w]], &hi = highest[chart[w]];
+    lo = {std::min(lo.x, uvs[w].x), std::min(lo.y, uvs[w].y)};
+    hi = {std::max(hi.x, uvs[w].x), std::max(hi.y, uvs[w].y)};
+  }
+  const auto move = [](float lo, float hi, int repeats) {
+    if (repeats == 0) return 0.0f;
+    const float whole = std::floor(lo / static_cast<float>(repeats)) * static_cast<float>(repeats);
+    const bool nearer = hi - whole < std::max(std::fabs(lo), std::fabs(hi));
+    return std::fabs(whole) >= kFar && nearer ? whole : 0.0f;
+  };
+  for (std::size_t w = 0; w < uvs.size(); ++w) {
+    const std::array<int, 2>& p = period[chart[w]].move;
+    const Vec2f lo = lowest[chart[w]], hi = highest[chart[w]];
+    uvs[w] = {uvs[w].x - move(lo.x, hi.x, p[0]), uvs[w].y - move(lo.y, hi.y, p[1])};
+  }
+}
+
+/// Moves charts (wedges joined by triangles) that lie far from 0..1 near to it, by whole repeats of their
+/// textures: nobody sees a difference, and coordinates keep the bits that a place 1,500 repeats away costs.
+/// Only where there are textures and every one of the chart's materials repeats in that direction under the
+/// move (wrap mode and texture transform allow it); charts within two repeats stay where they are, and so do
+/// those so long that their other end would only get as far away.
+void bring_uvs_near(Model& model) {
+  if (model.mesh.uv0.empty() && model.mesh.uv1.empty()) return;
+  const std::vector<std::uint32_t> chart = charts_of(model.mesh);
+  bring_near(model, chart, 0, model.mesh.uv0);
+  bring_near(model, chart, 1, model.mesh.uv1);
+}
 
 bool finite(Vec2f a) { return std::isfinite(a.x) && std::isfinite(a.y); }
 bool finite(Vec3f a) { return std::isfinite(a.x) && std::isfinite(a.y) && std::isfinite(a.z); }

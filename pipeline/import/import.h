@@ -78,6 +78,11 @@ struct ImportedModel {
 ImportedModel import_model(const std::string& file_name, std::span<const std::uint8_t> bytes,
                            Resolver& resolver, const ImportOptions& options, const RunContext& context);
 
+/// Triangles that a model file says it has, at least, without reading its meshes: from the JSON of a GLB, the
+/// header of a PLY, the size of a binary STL and the face lines of an OBJ. 0 where the file says nothing, or
+/// more than its bytes could hold (the import finds out what is wrong).
+std::uint64_t count_triangles(const std::string& file_name, std::span<const std::uint8_t> bytes);
+
 /// .gltf and .glb.
 ImportedModel import_gltf(const std::string& file_name, std::span<const std::uint8_t> bytes,
                           Resolver& resolver, const ImportOptions& options, const RunContext& context);

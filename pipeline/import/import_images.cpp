@@ -2,13 +2,13 @@
 
 #include <algorithm>
 
-#include "format/base/errors.h"
 #include "format/container/layout.h"
 #include "pipeline/import/text_scan.h"
 #include "pipeline/io/uri.h"
 #include "stages/image/decode_image.h"
 #include "stages/image/image_metadata.h"
 #include "stages/image/ktx2/read_ktx2.h"
+#include "stages/image/readers_module/other_pictures.h"
 
 namespace texmesh {
 namespace {
@@ -35,9 +35,9 @@ bool extension_fits(const std::string& extension, ImageFormat format) {
 }
 
 void note_foreign_extension(Model& model, const Image& image, const std::string& place) {
-  static constexpr std::string_view kKnown[] = {"jpg",  "jpeg", "jpe", "jfif", "png", "tif",
-                                                "tiff", "webp", "exr", "tga",  "bmp", "gif",
-                                                "ppm",  "pgm",  "hdr", "dds",  "ktx2"};
+  static constexpr std::string_view kKnown[] = {"jpg",  "jpeg", "jpe", "jfif", "png", "tif", "tiff",
+                                                "webp", "exr",  "tga", "bmp",  "gif", "ppm", "pgm",
+                                                "hdr",  "dds",  "jp2", "j2k",  "ktx2"};
   const std::string extension = lower_extension(image.name);
   if (std::find(std::begin(kKnown), std::end(kKnown), extension) == std::end(kKnown)) return;
   if (!extension_fits(extension, image.format))
@@ -80,6 +80,18 @@ void apply_metadata(Model& model, Image& image, const std::string& place, const 
                     "); texture coordinates count from its first stored pixel, so it is not turned");
 }
 
+void note_conversion(Model& model, const Image& image, const std::string& kind,
+                     const ConvertedPicture& picture, const std::string& place) {
+  const std::string what = image.name + " is a " + kind;
+  add_info(model.notes, "converted-image", place,
+           what + ": it goes on as a " + image_format_name(image.format) + " of the same texels");
+  if (picture.more_pictures)
+    add_warning(model.notes, "more-pictures", place, what + " of more than one picture; the first is read");
+  if (picture.profile)
+    add_warning(model.notes, "colour-profile-ignored", place,
+                what + " with an ICC profile that is ignored: its values are taken as sRGB");
+}
+
 }  // namespace
 
 std::int32_t add_image_bytes(Model& model, std::string name, std::vector<std::uint8_t> bytes,
@@ -97,6 +109,13 @@ std::int32_t add_image_bytes(Model& model, std::string name, std::vector<std::ui
   };
   const bool ktx2 = is_ktx2(bytes);
   if (ktx2) bytes = placed([&] { return png_of_ktx2(name, bytes, limits); });
+  ConvertedPicture picture;
+  std::string kind;  // of a picture that is converted
+  if (const auto other = sniff_image_format(bytes) ? std::nullopt : sniff_other_picture(name, bytes)) {
+    kind = other_picture_name(*other);
+    picture = placed([&] { return convert_other_picture(name, *other, bytes, limits); });
+    bytes = std::move(picture.bytes);
+  }
   for (std::size_t i = 0; i < model.images.size(); ++i)
     if (model.images[i].bytes == bytes) return static_cast<std::int32_t>(i);
   if (model.images.size() >= static_cast<std::size_t>(options.max_images))
@@ -106,6 +125,8 @@ std::int32_t add_image_bytes(Model& model, std::string name, std::vector<std::ui
   if (ktx2)
     add_info(model.notes, "ktx2-image", place,
              image.name + " is a KTX2: its largest level is read and goes on as a PNG of the same texels");
+  else if (!kind.empty())
+    note_conversion(model, image, kind, picture, place);
   else
     note_foreign_extension(model, image, place);
   apply_metadata(model, image, place, options);

@@ -1,14 +1,6 @@
-#include <bit>
-#include <cmath>
-#include <cstring>
 
-#include "format/base/errors.h"
-#include "pipeline/import/finish_model.h"
-#include "pipeline/import/import.h"
-#include "pipeline/import/local_frame.h"
 #include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/text_scan.h"
-#include "stages/base/first_use_table.h"
 
 // STL knows triangles only: no colour, no texture, no shared vertices. Its face normals repeat the winding
 // (and are often 0), so they are ignored; the "attribute byte count" has no agreed meaning (VisCAM and Magics

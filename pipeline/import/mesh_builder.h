@@ -6,10 +6,21 @@
 #include <vector>
 
 #include "format/model/model.h"
-#include "pipeline/import/local_frame.h"
+#include "pipeline/import/import.h"
 #include "stages/base/first_use_table.h"
 
 namespace texmesh {
+
+/// Beyond this a coordinate is no measure of anything, and squares of differences would overflow a float.
+inline constexpr double kLargestCoordinate = 1e18;
+/// What a package's own meshes may have: half a step of a grid of one bit reaches twice as far, what is
+/// wrapped around a mesh a little farther, and squares of differences are floats still.
+inline constexpr double kLargestPackedCoordinate = 4 * kLargestCoordinate;
+
+/// Positions in double precision -> mesh.origin and float positions in a local frame. The origin is 0 unless
+/// the bounding box lies so far from it that float would lose more than 1e-7 of the diagonal; then it is the
+/// box's centre, rounded to a float-exact value. What is no number, or beyond `largest`, becomes NaN.
+void set_positions(Mesh& mesh, const std::vector<Vec3d>& positions, double largest = kLargestCoordinate);
 
 /// sRGB in 0..1 to linear light, 0..1; NaN gives 1.
 float linear_from_srgb(double srgb);
@@ -69,5 +80,10 @@ class MeshBuilder {
 void triangulate_polygon(std::span<const Vec3d> points, std::vector<std::array<std::uint32_t, 3>>& triangles,
                          std::uint64_t& work);
 inline constexpr std::uint64_t kMaxEarWork = 400'000'000;  // about two seconds
+
+/// Last step of every reader: drops triangles that refer to non-finite positions or UVs (warnings
+/// "non-finite-position", "non-finite-uv": such UVs become 0), unused images and materials; sets part names;
+/// checks the limits; throws InputError when no triangle is left.
+void finish_model(Model& model, const std::string& file_name, const ImportOptions& options);
 
 }  // namespace texmesh

@@ -1,20 +1,12 @@
 #include "pipeline/io/atomic_file.h"
 
 #include <fcntl.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
-#include <algorithm>
 #include <atomic>
-#include <cerrno>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
-#include <optional>
-#include <string_view>
-#include <vector>
 
-#include "format/base/errors.h"
 #include "pipeline/io/descriptor.h"
 #include "pipeline/io/file_stamp.h"
 #include "pipeline/io/machine/owner_mark.h"

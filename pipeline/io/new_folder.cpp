@@ -2,15 +2,14 @@
 
 #include <fcntl.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
-#include <cerrno>
 #include <cstdio>
 #include <cstring>
 #include <fstream>
 #include <vector>
 
 #include "format/base/errors.h"
+#include "pipeline/io/descriptor.h"
 
 namespace texmesh {
 namespace fs = std::filesystem;
@@ -21,29 +20,21 @@ namespace {
 }
 
 void sync_new_folder(const fs::path& folder) {
-  const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (fd < 0) fail_output(folder, "a folder");
-  const int rc = ::fsync(fd);
-  ::close(fd);
-  if (rc != 0) fail_output(folder, "a folder that can be synced");
+  const Descriptor d{::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)};
+  if (d.get() < 0) fail_output(folder, "a folder");
+  if (::fsync(d.get()) != 0) fail_output(folder, "a folder that can be synced");
 }
 
 void write_new_file(const fs::path& path, std::span<const std::uint8_t> bytes) {
-  const int fd = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644);
-  if (fd < 0) fail_output(path, "a new file");
-  std::size_t at = 0;
-  bool ok = true;
-  while (ok && at < bytes.size()) {
-    const ssize_t n = ::write(fd, bytes.data() + at, bytes.size() - at);
+  const Descriptor d{::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644)};
+  if (d.get() < 0) fail_output(path, "a new file");
+  while (!bytes.empty()) {
+    const ssize_t n = ::write(d.get(), bytes.data(), bytes.size());
     if (n < 0 && errno == EINTR) continue;
-    ok = n > 0;
-    if (ok) at += static_cast<std::size_t>(n);
+    if (n <= 0) fail_output(path, "a writable file");
+    bytes = bytes.subspan(static_cast<std::size_t>(n));
   }
-  ok = ok && ::fdatasync(fd) == 0;
-  const int error = errno;
-  ::close(fd);
-  errno = error;
-  if (!ok) fail_output(path, "a writable file");
+  if (::fdatasync(d.get()) != 0) fail_output(path, "a writable file");
 }
 
 }  // namespace
@@ -99,10 +90,8 @@ void NewFolder::copy_file(const fs::path& file, const fs::path& source) {
   fs::copy_file(source, file, ec);
   if (ec) throw InputError(source.string(), "", "a file that can be copied", ec.message());
   fs::permissions(file, fs::perms{0644});
-  const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
-  const bool ok = fd >= 0 && ::fdatasync(fd) == 0;
-  if (fd >= 0) ::close(fd);
-  if (!ok) fail_output(file, "a writable file");
+  const Descriptor d{::open(file.c_str(), O_RDONLY | O_CLOEXEC)};
+  if (d.get() < 0 || ::fdatasync(d.get()) != 0) fail_output(file, "a writable file");
 }
 
 void NewFolder::publish() {

@@ -1,9 +1,11 @@
 #pragma once
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 
 #include "format/base/bytes.h"
+#include "format/base/errors.h"
 
 namespace texmesh {
 
@@ -16,6 +18,19 @@ class Resolver {
   /// no such file. Throws InputError when the name is not allowed (absolute, drive letter, scheme, "..",
   /// symbolic link, not a regular file) or the file exceeds max_bytes.
   virtual std::optional<Bytes> read(const std::string& uri, std::uint64_t max_bytes) = 0;
+};
+
+/// Files that were made in memory, by their names.
+class MemoryFiles : public Resolver {
+ public:
+  std::map<std::string, Bytes> files;
+  std::optional<Bytes> read(const std::string& uri, std::uint64_t max_bytes) override {
+    const auto it = files.find(uri);
+    if (it == files.end()) return std::nullopt;
+    if (it->second.size() > max_bytes)
+      throw InputError(uri, "", "at most " + std::to_string(max_bytes) + " bytes", "more");
+    return it->second;
+  }
 };
 
 }  // namespace texmesh

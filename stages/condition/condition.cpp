@@ -1,10 +1,8 @@
 #include "stages/condition/condition.h"
 
 #include <cassert>
-#include <cmath>
 #include <numeric>
 #include <tuple>
-#include <utility>
 
 #include "format/base/box.h"
 #include "stages/base/run_context.h"

@@ -1,9 +1,5 @@
 #include "stages/fill/fill.h"
 
-#include <algorithm>
-#include <cmath>
-#include <cstring>
-
 #include "stages/base/parallel.h"
 #include "stages/data/coverage.h"
 #include "stages/image/decode_image.h"

@@ -7,11 +7,6 @@
 // - Lossy WebP: a complete file per fragment and rung.
 #include "stages/fragment_codec/fragment_codec.h"
 
-#include <cmath>
-#include <functional>
-#include <utility>
-
-#include "format/base/errors.h"
 #include "stages/base/parallel.h"
 #include "stages/image/webp.h"
 #include "stages/jpeg/jpeg.h"

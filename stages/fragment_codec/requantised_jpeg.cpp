@@ -1,8 +1,5 @@
 #include "stages/fragment_codec/requantised_jpeg.h"
 
-#include <cstring>
-#include <utility>
-
 #include "stages/jpeg/jpeg_coder.h"
 
 namespace texmesh {

@@ -1,8 +1,6 @@
 #include "stages/fragmentation/fragment_grid.h"
 
-#include <algorithm>
 #include <bit>
-#include <cmath>
 
 #include "stages/data/coverage.h"
 #include "stages/geometry/texel_coverage.h"

@@ -1,10 +1,7 @@
 #include "stages/fragmentation/fragmentation.h"
 
-#include <algorithm>
 #include <bit>
-#include <cmath>
 #include <tuple>
-#include <utility>
 
 #include "format/base/no_index.h"
 #include "format/model/material_extensions.h"

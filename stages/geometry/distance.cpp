@@ -1,10 +1,6 @@
 #include "stages/geometry/distance.h"
 
-#include <algorithm>
-#include <array>
 #include <bit>
-#include <cmath>
-#include <limits>
 
 #include "stages/geometry/morton.h"
 

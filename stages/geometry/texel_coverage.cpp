@@ -1,7 +1,5 @@
 #include "stages/geometry/texel_coverage.h"
 
-#include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include "format/base/portable_math.h"

@@ -1,9 +1,7 @@
 #include "stages/geometry/weld.h"
 
 #include <algorithm>
-#include <array>
 #include <bit>
-#include <cmath>
 #include <cstring>
 #include <numeric>
 

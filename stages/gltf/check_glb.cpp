@@ -5,10 +5,6 @@
 #include <draco/compression/decode.h>
 #include <nlohmann/json.hpp>
 
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <limits>
 #include <tuple>
 
 #include "format/base/box.h"

@@ -4,12 +4,9 @@
 #include <draco/compression/expert_encode.h>
 #include <draco/mesh/mesh.h>
 
-#include <algorithm>
 #include <charconv>
-#include <cmath>
 #include <limits>
 
-#include "format/base/errors.h"
 #include "stages/base/first_use_table.h"
 
 namespace texmesh {

@@ -3,7 +3,6 @@
 #include <limits>
 
 #include "format/base/bounded_json.h"
-#include "format/base/errors.h"
 
 namespace texmesh {
 namespace {

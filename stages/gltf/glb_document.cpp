@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cstring>
 
 #include "format/base/bounded_json.h"
 #include "stages/gltf/glb_container.h"

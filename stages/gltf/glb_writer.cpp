@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <charconv>
 
-#include "format/base/errors.h"
 #include "stages/gltf/glb_container.h"
 
 namespace texmesh {

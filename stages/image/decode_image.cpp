@@ -1,19 +1,11 @@
 #include "stages/image/decode_image.h"
 
-#include <algorithm>
-#include <cmath>
-#include <cstring>
-#include <utility>
-#include <variant>
-
-#include "format/base/bytes.h"
-#include "format/base/errors.h"
 #include "format/base/srgb.h"
 #include "stages/image/decode_jpeg.h"
 #include "stages/image/decode_tiff_exr.h"
 #include "stages/image/image_metadata.h"
 #include "stages/image/png_writer.h"
-#include "stages/image/seldom/wide_jpeg.h"
+#include "stages/image/readers_module/wide_jpeg.h"
 #include "stages/image/webp.h"
 
 namespace texmesh {
@@ -188,8 +180,10 @@ std::optional<ColourProfile> honoured_profile(const Image& image) {
 Image probe_image(std::string name, Bytes bytes, const ImageLimits& limits) {
   const std::optional<ImageFormat> format = sniff_image_format(bytes);
   if (!format)
-    throw InputError(name, "first bytes", "JPEG, PNG, TIFF, WebP or EXR (of models KTX2, too)",
-                     first_bytes(bytes));
+    throw InputError(
+        name, "first bytes",
+        "JPEG, PNG, TIFF, WebP or EXR (of models KTX2, BMP, TGA, GIF, DDS, JPEG 2000 and HDR, too)",
+        first_bytes(bytes));
   const ImageHeader header = read_header(name, *format, bytes, limits);
   check_image_size(name, header.width_px, header.height_px, limits);
   Image image;

@@ -1,16 +1,14 @@
-#include "stages/image/decode_tiff_exr.h"
 
 #include <algorithm>
 #include <map>
 
-#include "format/base/errors.h"
-#include "stages/image/seldom/seldom_readers.h"
+#include "stages/image/readers_module/readers.h"
 
 namespace texmesh {
 namespace {
 
-const SeldomReaders& reader_for(const std::string& name, ImageFormat format) {
-  return seldom_readers(name, image_format_name(format), "libopenimageio2.4");
+const ModuleReaders& reader_for(const std::string& name, ImageFormat format) {
+  return module_readers(name, image_format_name(format), "libopenimageio2.4");
 }
 
 /// Text up to a zero byte, which `at` is then behind; null where there is none within EXR's 255.

@@ -1,10 +1,5 @@
 #include "stages/image/image_format.h"
 
-#include <cstring>
-#include <string_view>
-
-#include "format/base/errors.h"
-
 namespace texmesh {
 
 namespace {

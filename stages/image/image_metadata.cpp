@@ -4,14 +4,9 @@
 #include <zlib.h>
 
 #include <algorithm>
-#include <bit>
-#include <cmath>
 #include <cstdlib>
-#include <cstring>
 #include <map>
 
-#include "format/base/errors.h"
-#include "format/base/portable_math.h"
 #include "stages/image/decode_tiff_exr.h"
 #include "stages/image/jpeg_segments.h"
 #include "stages/image/srgb_encoder.h"

@@ -6,11 +6,8 @@
 #include <algorithm>
 #include <csetjmp>
 #include <cstdlib>
-#include <cstring>
-#include <string_view>
 
 #include "format/base/bytes.h"
-#include "format/base/errors.h"
 
 namespace texmesh {
 namespace {

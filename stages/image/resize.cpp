@@ -1,13 +1,9 @@
 #include "stages/image/resize.h"
 
-#include <algorithm>
 #include <cmath>
 #include <numeric>
-#include <string>
 #include <type_traits>
-#include <vector>
 
-#include "format/base/errors.h"
 #include "stages/base/parallel.h"
 #include "stages/image/srgb_encoder.h"
 

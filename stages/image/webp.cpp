@@ -1,12 +1,9 @@
 #include "stages/image/webp.h"
 
-#include <algorithm>
 #include <memory>
 
 #include <webp/decode.h>
 #include <webp/encode.h>
-
-#include "format/base/errors.h"
 
 namespace texmesh {
 namespace {

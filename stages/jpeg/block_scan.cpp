@@ -1,7 +1,6 @@
 #include "stages/jpeg/block_scan.h"
 
 #include <cmath>
-#include <cstring>
 #include <limits>
 
 namespace texmesh {

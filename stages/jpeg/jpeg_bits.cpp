@@ -1,6 +1,5 @@
 #include "stages/jpeg/jpeg_bits.h"
 
-#include <cstring>
 #include <mutex>
 
 #include "format/base/vec.h"

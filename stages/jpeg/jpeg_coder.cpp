@@ -2,14 +2,11 @@
 // frames. First the compressor behind JpegCoder, then the decoder.
 #include "stages/jpeg/jpeg_coder.h"
 
-#include <algorithm>
 #include <cmath>
 #include <csetjmp>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <string>
-#include <utility>
 
 #include <jpeglib.h>
 // libjpeg needs its own header first.

@@ -1,7 +1,6 @@
 #include "stages/jpeg/jpeg_stream.h"
 
 #include <algorithm>
-#include <string>
 
 #include "format/base/errors.h"
 

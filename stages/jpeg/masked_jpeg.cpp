@@ -1,7 +1,5 @@
 #include "stages/jpeg/masked_jpeg.h"
 
-#include <utility>
-
 namespace texmesh {
 namespace {
 

@@ -1,11 +1,8 @@
 #include "stages/jpeg/source_jpeg.h"
 
-#include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <utility>
 
-#include "format/base/errors.h"
 #include "format/rules/size_curve.h"
 #include "stages/base/parallel.h"
 #include "stages/jpeg/jpeg_coder.h"

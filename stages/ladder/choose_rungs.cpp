@@ -2,11 +2,7 @@
 // their bytes.
 #include "stages/ladder/choose_rungs.h"
 
-#include <algorithm>
-#include <cmath>
 #include <map>
-#include <optional>
-#include <utility>
 
 #include "stages/base/parallel.h"
 #include "stages/fragment_codec/fragment_codec.h"

@@ -1,14 +1,9 @@
 #include "stages/ladder/encode_rungs.h"
 
-#include <algorithm>
-#include <atomic>
 #include <map>
 #include <mutex>
-#include <utility>
 
-#include "format/base/bytes.h"
 #include "stages/base/parallel.h"
-#include "stages/data/coverage.h"
 
 namespace texmesh {
 namespace {

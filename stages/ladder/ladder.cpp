@@ -1,11 +1,7 @@
-#include "stages/ladder/ladder.h"
 
-#include <cstdlib>
 #include <numeric>
-#include <utility>
 
 #include "format/rules/size_curve.h"
-#include "stages/data/coverage.h"
 #include "stages/fragment_codec/coding_space.h"
 #include "stages/image/check_pixels.h"
 #include "stages/image/decode_image.h"

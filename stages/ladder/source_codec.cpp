@@ -1,9 +1,5 @@
-#include "stages/ladder/source_codec.h"
 
-#include <algorithm>
-#include <cmath>
 
-#include "format/base/errors.h"
 #include "format/base/portable_math.h"
 #include "stages/base/parallel.h"
 #include "stages/fragment_codec/requantised_jpeg.h"

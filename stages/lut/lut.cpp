@@ -1,9 +1,6 @@
 #include "stages/lut/lut.h"
 
-#include <atomic>
-
 #include "format/base/number16.h"
-#include "format/base/sha256.h"
 #include "format/rules/allocation.h"
 #include "stages/base/parallel.h"
 #include "stages/image/check_pixels.h"

@@ -1,8 +1,5 @@
 #include "stages/measure/fragment_meter.h"
 
-#include <algorithm>
-#include <utility>
-
 #include "stages/fragment_codec/fragment_codec.h"
 #include "stages/jpeg/jpeg.h"
 

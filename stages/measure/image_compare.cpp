@@ -1,8 +1,5 @@
 #include "stages/measure/image_compare.h"
 
-#include <cmath>
-
-#include "format/base/portable_math.h"
 #include "format/base/srgb.h"
 #include "stages/measure/sampled_curve.h"
 

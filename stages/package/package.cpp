@@ -1,11 +1,9 @@
 #include "stages/package/package.h"
 
-#include <algorithm>
 #include <set>
 
 #include "format/base/box.h"
 #include "format/base/clean_text.h"
-#include "format/container/layout.h"
 #include "format/documents/package_writer.h"
 #include "format/rules/viewing.h"
 #include "stages/base/run_context.h"

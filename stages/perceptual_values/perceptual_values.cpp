@@ -1,9 +1,5 @@
 #include "stages/perceptual_values/perceptual_values.h"
 
-#include <atomic>
-#include <cmath>
-
-#include "format/base/errors.h"
 #include "format/base/portable_math.h"
 #include "format/rules/jnd_choice.h"
 #include "stages/base/parallel.h"

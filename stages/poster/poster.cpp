@@ -1,7 +1,5 @@
 #include "stages/poster/poster.h"
 
-#include <algorithm>
-
 #include "stages/jpeg/jpeg.h"
 #include "stages/poster/poster_camera.h"
 #include "stages/render/shade.h"

@@ -1,8 +1,6 @@
 #include "stages/poster/poster_camera.h"
 
 #include <algorithm>
-#include <array>
-#include <cmath>
 
 #include "format/base/portable_math.h"
 

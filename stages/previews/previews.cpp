@@ -1,7 +1,5 @@
 #include "stages/previews/previews.h"
 
-#include <cstddef>
-
 #include "stages/base/parallel.h"
 #include "stages/image/check_pixels.h"
 #include "stages/image/resize.h"

@@ -1,8 +1,5 @@
 #include "stages/proxies/make_proxy.h"
 
-#include <algorithm>
-#include <cmath>
-
 #include "format/base/portable_math.h"
 
 namespace texmesh::proxies {

@@ -1,10 +1,6 @@
 // Proxies and nested scales are rendered from the same places as S_0, and FLIP tells how they differ.
 #include "stages/proxies/picture_losses.h"
 
-#include <array>
-#include <cmath>
-
-#include "format/base/box.h"
 #include "stages/geometry/scale_frames.h"
 #include "stages/image/webp.h"
 

@@ -1,8 +1,5 @@
 #include "stages/proxies/proxies.h"
 
-#include <string>
-
-#include "format/base/box.h"
 #include "format/base/portable_math.h"
 #include "stages/geometry/scale_frames.h"
 #include "stages/proxies/make_proxy.h"

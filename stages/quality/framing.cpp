@@ -1,9 +1,5 @@
 #include "stages/quality/framing.h"
 
-#include <algorithm>
-#include <cmath>
-#include <string>
-
 #include "stages/data/stage.h"
 
 namespace texmesh::quality {

@@ -1,7 +1,4 @@
-#include "stages/quality/quality.h"
 
-#include <algorithm>
-#include <cmath>
 
 #include "format/documents/manifest.h"
 #include "stages/geometry/scale_frames.h"

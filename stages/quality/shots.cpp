@@ -1,7 +1,5 @@
 #include "stages/quality/shots.h"
 
-#include <algorithm>
-
 #include "stages/base/parallel.h"
 
 namespace texmesh::quality {

@@ -1,11 +1,6 @@
 #include "stages/quality/size_cells.h"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <deque>
-#include <functional>
-#include <map>
 
 #include "format/rules/mip_choice.h"
 

@@ -1,8 +1,5 @@
 #include "stages/quality/table_fit.h"
 
-#include <algorithm>
-#include <cmath>
-
 #include "format/base/portable_math.h"
 #include "format/rules/picture_prediction.h"
 

@@ -2,8 +2,6 @@
 // which rungs are sampled as knots.
 #include "stages/quality/textures.h"
 
-#include <bit>
-#include <cmath>
 #include <cstdlib>
 
 #include "format/rules/mip_choice.h"

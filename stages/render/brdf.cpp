@@ -1,7 +1,5 @@
 #include "stages/render/brdf.h"
 
-#include <cmath>
-
 namespace texmesh::render {
 namespace {
 

@@ -1,11 +1,9 @@
 #include "stages/render/environment.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstring>
 #include <iterator>
 
-#include "format/base/portable_math.h"
 #include "stages/base/parallel.h"
 #include "stages/render/render_math.h"
 

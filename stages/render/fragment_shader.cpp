@@ -1,8 +1,6 @@
 #include "stages/render/fragment_shader.h"
 
 #include <algorithm>
-#include <cmath>
-#include <stdexcept>
 
 #include "stages/render/shade.h"
 

@@ -1,9 +1,6 @@
 #include "stages/render/render_texture.h"
 
 #include <algorithm>
-#include <bit>
-#include <cmath>
-#include <stdexcept>
 
 #include "stages/base/parallel.h"
 #include "stages/render/render_math.h"

@@ -1,11 +1,8 @@
 #include "stages/render/shade.h"
 
-#include <utility>
-
 #include "stages/base/parallel.h"
 #include "stages/measure/sampled_curve.h"
 #include "stages/render/fragment_shader.h"
-#include "stages/render/render_math.h"
 
 namespace texmesh {
 namespace {

@@ -1,6 +1,5 @@
 #include "stages/render/shown_materials.h"
 
-#include <algorithm>
 #include <cstring>
 #include <optional>
 

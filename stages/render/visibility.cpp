@@ -1,9 +1,6 @@
-#include "stages/render/visibility.h"
 
 #include <algorithm>
-#include <cmath>
 #include <initializer_list>
-#include <stdexcept>
 
 #include "format/base/portable_math.h"
 #include "stages/base/parallel.h"

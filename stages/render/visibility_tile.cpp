@@ -1,7 +1,6 @@
 #include "stages/render/visibility_tile.h"
 
 #include <algorithm>
-#include <cmath>
 #include <optional>
 
 #include "format/base/no_index.h"

@@ -1,7 +1,5 @@
-#include <cmath>
 
 #include "format/base/box.h"
-#include "stages/gltf/draco_mesh.h"
 #include "stages/scales/scale_codecs.h"
 
 namespace texmesh {

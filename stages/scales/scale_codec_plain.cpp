@@ -1,9 +1,5 @@
 #include <meshoptimizer.h>
 
-#include <array>
-#include <cmath>
-#include <cstring>
-
 #include "format/base/box.h"
 #include "stages/scales/scale_codecs.h"
 

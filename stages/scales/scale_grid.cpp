@@ -1,9 +1,6 @@
 #include "stages/scales/scale_grid.h"
 
-#include <cmath>
-
 #include "format/base/box.h"
-#include "format/base/errors.h"
 
 namespace texmesh {
 namespace {

@@ -1,10 +1,5 @@
-#include "stages/scales/scales.h"
 
-#include <atomic>
-#include <cmath>
-#include <map>
 
-#include "format/base/no_index.h"
 #include "format/container/layout.h"
 #include "format/split/split_writer.h"
 #include "stages/base/parallel.h"

@@ -3,12 +3,10 @@
 // backwards these are the splits.
 #include "stages/scales/vertex_split.h"
 
-#include <cmath>
 #include <map>
 #include <numeric>
 #include <ranges>
 
-#include "stages/data/nested_scales.h"
 #include "stages/scales/corner_lists.h"
 
 namespace texmesh {

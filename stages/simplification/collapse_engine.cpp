@@ -1,7 +1,6 @@
 #include "stages/simplification/collapse_engine.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "stages/base/parallel.h"
 

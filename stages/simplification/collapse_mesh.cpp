@@ -1,6 +1,5 @@
 #include "stages/simplification/collapse_mesh.h"
 
-#include <array>
 #include <map>
 #include <numeric>
 

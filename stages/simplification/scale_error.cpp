@@ -1,10 +1,5 @@
 #include "stages/simplification/scale_error.h"
 
-#include <algorithm>
-#include <cmath>
-#include <iterator>
-#include <limits>
-
 #include "stages/base/parallel.h"
 #include "stages/geometry/component_boxes.h"
 #include "stages/geometry/distance.h"

@@ -6,7 +6,6 @@
 #include <CGAL/Alpha_wrap_3/internal/Alpha_wrap_3.h>
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 
-#include <limits>
 #include <unordered_map>
 
 #include "stages/geometry/triangle_tree.h"

@@ -1,9 +1,5 @@
 #include "stages/skeletonization/curve_skeleton.h"
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
-
 namespace texmesh {
 namespace {
 

@@ -10,9 +10,6 @@
 #include <CGAL/Uncertain.h>
 #include <CGAL/exceptions.h>
 
-#include <array>
-#include <cstdint>
-
 #include "stages/skeletonization/geometry_failure.h"
 
 namespace texmesh {

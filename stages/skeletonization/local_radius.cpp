@@ -1,7 +1,5 @@
 #include "stages/skeletonization/local_radius.h"
 
-#include <limits>
-
 #include "format/base/portable_math.h"
 #include "stages/base/parallel.h"
 

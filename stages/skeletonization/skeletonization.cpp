@@ -1,9 +1,5 @@
 #include "stages/skeletonization/skeletonization.h"
 
-#include <algorithm>
-#include <cmath>
-#include <string>
-
 #include "stages/base/parallel.h"
 #include "stages/skeletonization/curve_skeleton.h"
 #include "stages/skeletonization/geometry_failure.h"

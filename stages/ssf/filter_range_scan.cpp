@@ -1,7 +1,5 @@
 #include <algorithm>
-#include <cmath>
 #include <limits>
-#include <string>
 
 #include "format/base/portable_math.h"
 #include "stages/base/parallel.h"

@@ -2,10 +2,8 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <limits>
 #include <memory>
-#include <utility>
 
 #include "stages/base/parallel.h"
 #include "stages/geometry/mesh_topology.h"

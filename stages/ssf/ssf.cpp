@@ -1,8 +1,4 @@
-#include "stages/ssf/ssf.h"
 
-#include <cmath>
-#include <string>
-#include <utility>
 
 #include "format/base/box.h"
 #include "stages/base/parallel.h"

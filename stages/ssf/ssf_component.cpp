@@ -1,8 +1,5 @@
 #include "stages/ssf/ssf_component.h"
 
-#include <cmath>
-#include <utility>
-
 #include "format/base/box.h"
 #include "format/base/no_index.h"
 #include "format/base/portable_math.h"

@@ -1,10 +1,7 @@
 #include "stages/zim/zim.h"
 
-#include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdlib>
-#include <string>
 
 #include "stages/base/parallel.h"
 #include "stages/data/coverage.h"

@@ -11,6 +11,7 @@
 #include "stages/image/decode_jpeg.h"
 #include "stages/image/image_metadata.h"
 #include "stages/image/ktx2/read_ktx2.h"
+#include "stages/image/readers_module/other_pictures.h"
 #include "stages/jpeg/source_jpeg.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/fuzz/reader_limits.h"
@@ -51,6 +52,22 @@ bool read_ktx2_file(ByteSpan input) {
     if (pixels.data.size() > kFew) return true;
     const Image png = probe_image("fuzz", png_of_ktx2("fuzz", input, image_limits()), image_limits());
     require(decode_image(png).data == pixels.data, "a PNG of other texels");
+    return true;
+  } catch (const InputError& e) {
+    return refused(e);
+  }
+}
+
+/// What becomes a PNG or a TIFF when it is imported.
+bool read_other_picture(ByteSpan input) {
+  const std::string name = "fuzz.tga";
+  const auto kind = sniff_other_picture(name, input);
+  if (!kind || sniff_image_format(input)) return false;
+  try {
+    const ConvertedPicture picture = convert_other_picture(name, *kind, input, image_limits());
+    const Image image = probe_image(name, picture.bytes, image_limits());
+    require(decode_image(image).data.size() == std::size_t{image.width_px} * image.height_px * image.channels,
+            "an image of another size than its header's");
     return true;
   } catch (const InputError& e) {
     return refused(e);
@@ -203,6 +220,22 @@ std::vector<Bytes> tiff_seeds() {
 }
 std::vector<Bytes> exr_seeds() { return encoded<float>("openexr", OIIO::TypeDesc::FLOAT); }
 
+std::vector<Bytes> picture_seeds() {
+  std::vector<Bytes> list = encoded<float>("hdr", OIIO::TypeDesc::FLOAT, {3});
+  for (const char* writer : {"bmp", "targa", "gif"})
+    list.push_back(encoded<std::uint8_t>(writer, OIIO::TypeDesc::UINT8, {3})[0]);
+  list.push_back(texmesh::testing::encode_image(
+      "jpeg2000", 64, 64, 3, texmesh::testing::test_picture(64, 64, 3), OIIO::TypeDesc::UINT8));
+  BytesOut dds;  // 4 x 4 texels in a block
+  dds.text("DDS "), dds.u32(124), dds.u32(0x1007), dds.u32(4), dds.u32(4);
+  for (int i = 0; i < 14; ++i) dds.u32(0);
+  dds.u32(32), dds.u32(4), dds.text("DXT1");
+  for (const unsigned x : {0, 0, 0, 0, 0, 0x1000, 0, 0, 0, 0}) dds.u32(x);
+  dds.raw(Bytes{0, 0xf8, 0x1f, 0, 0x55, 1, 2, 3});
+  list.push_back(dds.finish());
+  return list;
+}
+
 std::vector<Bytes> ktx2_seeds() {
   using namespace texmesh::testing;  // NOLINT: fixtures
   std::vector<Bytes> list;
@@ -334,6 +367,13 @@ void add_image_targets(std::vector<Target>& list) {
                 Shape::kBytes,
                 nullptr,
                 {"KTXorientation", "KTXswizzle", "rgb1", "rrr1", "rrrg", "ru"}},
+               {"picture",
+                false,
+                read_other_picture,
+                picture_seeds,
+                Shape::kBytes,
+                nullptr,
+                {"BM", "GIF89a", "DXT1", "DXT5", "ATI2", "DX10", "jp2h", "jp2c", "#?RADIANCE", "-Y ", "+X "}},
                {"icc",
                 false,
                 read_icc,

@@ -131,9 +131,11 @@ bool read_accessors(ByteSpan input) {
   tinygltf::Model model;
   json document;
   for (int v = 0; v < 4; ++v) {
-    document["bufferViews"].push_back(
-        {{"buffer", 0}, {"byteOffset", c.number(2)}, {"byteLength", c.number(2)}});
-    model.bufferViews.emplace_back().byteStride = c.number(1) & 0xfc;
+    document["bufferViews"].push_back(json::object());
+    tinygltf::BufferView& view = model.bufferViews.emplace_back();
+    view.buffer = 0;
+    view.byteOffset = c.number(2), view.byteLength = c.number(2);
+    view.byteStride = c.number(1) & 0xfc;
   }
   for (int a = 0; a < 5; ++a) {
     model.accessors.push_back(checked_accessor(c));
@@ -141,7 +143,7 @@ bool read_accessors(ByteSpan input) {
   }
   document["buffers"] = {{{"byteLength", c.rest().size()}}};
   Given given;
-  gltf::Buffers buffers(given.source, document, c.rest());
+  gltf::Buffers buffers(given.source, document, model, c.rest());
   bool any = false;
   for (std::size_t a = 0; a < model.accessors.size(); ++a) try {
       read_elements(gltf::AccessorReader(given.source, model, buffers, a));

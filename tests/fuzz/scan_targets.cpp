@@ -2,7 +2,7 @@
 #include <algorithm>
 
 #include "format/base/errors.h"
-#include "pipeline/import/memory_files.h"
+#include "pipeline/io/resolver.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/fuzz/reader_limits.h"
 

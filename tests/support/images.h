@@ -15,7 +15,8 @@
 namespace texmesh::testing {
 
 /// Encodes `samples` (rows top first, interleaved) with OpenImageIO's writer `writer` ("png", "jpeg", "tiff",
-/// "webp", "openexr"). `type` is the type of the samples and of the file.
+/// "webp", "openexr", "bmp", "targa", "gif", "jpeg2000", "hdr"). `type` is the type of the samples and of the
+/// file.
 template <class T>
 std::vector<std::uint8_t> encode_image(const std::string& writer, int width, int height, int channels,
                                        const std::vector<T>& samples, OIIO::TypeDesc type,
@@ -27,7 +28,9 @@ std::vector<std::uint8_t> encode_image(const std::string& writer, int width, int
   auto output = OIIO::ImageOutput::create(writer);
   if (!output || !output->supports("ioproxy")) throw std::runtime_error(writer + ": no writer to memory");
   output->set_ioproxy(&memory);
-  if (!output->open(writer, spec) || !output->write_image(type, samples.data()) || !output->close())
+  // The name says which of its kinds a writer takes. (JP2: of 64 x 64 texels or more.)
+  const std::string name = writer == "jpeg2000" ? "x.jp2" : writer;
+  if (!output->open(name, spec) || !output->write_image(type, samples.data()) || !output->close())
     throw std::runtime_error(writer + ": " + output->geterror());
   return {bytes.begin(), bytes.end()};
 }

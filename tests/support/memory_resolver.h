@@ -5,7 +5,7 @@
 #include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "pipeline/import/import.h"
-#include "pipeline/import/memory_files.h"
+#include "pipeline/io/resolver.h"
 
 namespace texmesh::testing {
 

@@ -248,8 +248,8 @@ void add_report_options(Command& c, CompileArguments& args) {
   RunSettings& run = args.run;
   c.group("Reports");
   c.flag("-n,--dry-run", run.dry_run, "Say what would run and why; write nothing");
-  c.flag("--explain", run.explain, "Say of every stage whether it runs, and what has changed");
-  c.text_option("--stages", graph_text, "Print the graph of stages, which --explain and the cache name");
+  c.flag("--explain", run.explain, "Say whether each stage runs, and why (--stages lists them)");
+  c.text_option("--stages", graph_text, "Print the graph of stages").rare();
   c.flag("--stats", run.statistics, "Print a table of stages at the end: runs, cache hits, seconds");
   c.flag("-q,--quiet", args.quiet, "Print only warnings and errors");
   c.flag("-v,--verbose", run.verbose, "Print every stage and note");
@@ -290,14 +290,15 @@ void add_compile_options(Command& c, CompileArguments& args) {
       .value_name("OUTPUT");
   c.option(
        "--profile", args.profile,
-       "small = few bytes; archive = nothing of the source is lost; fast = little time; thesis = chapters 2 "
-       "to 8 as printed; or a JSON file of options (schemas/profile.v1.schema.json). Flags win")
+       "small = few bytes, archive = loses nothing, fast = little time, thesis = as printed; or a JSON file of "
+       "options. Flags win")
       .value_name("NAME");
   c.option(
        "--jnd-profile", args.jnd_profile,
        "JSON file of what judges could just tell (schemas/jnd-profile.v1.schema.json). The file wins over "
        "--profile, flags win over the file")
-      .value_name("FILE");
+      .value_name("FILE")
+      .rare();
   c.option("--meta", args.meta,
            "JSON file about the object (schemas/meta.v1.schema.json). The file wins over the model's words")
       .value_name("FILE")

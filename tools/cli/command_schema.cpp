@@ -6,6 +6,7 @@
 #include "pipeline/io/record.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"
+#include "tools/extract/extract.h"
 #include "tools/inspect/atlas/atlas_report.h"
 #include "tools/inspect/diff/diff.h"
 #include "tools/inspect/verify/verify.h"
@@ -18,8 +19,8 @@ namespace {
 
 std::vector<DocumentSchema> command_schemas() {
   std::vector<DocumentSchema> all = pipeline_schemas();
-  for (DocumentSchema& schema : std::vector{diff_schema(), doctor_schema(), export_schema(), report_schema(),
-                                            site_schema(), verify_schema()})
+  for (DocumentSchema& schema : std::vector{diff_schema(), doctor_schema(), export_schema(), extract_schema(),
+                                            report_schema(), site_schema(), verify_schema()})
     all.push_back(std::move(schema));
   return all;
 }

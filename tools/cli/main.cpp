@@ -1,10 +1,8 @@
-// texmesh: every command, and the workers that compile starts (pipeline/compile/workers/worker_child.h).
-#include <cstring>
-
+// texmesh: every command, and the workers that compile starts (pipeline/compile/workers/worker_child.cpp).
 #include "format/container/format_version.h"
 #include "pipeline/compile/library_versions.h"
-#include "pipeline/compile/workers/sandbox/sandbox.h"
-#include "pipeline/compile/workers/worker_child.h"
+#include "pipeline/compile/workers/sandbox.h"
+#include "pipeline/compile/workers/worker.h"
 #include "pipeline/io/program.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"
@@ -49,10 +47,12 @@ struct ListedCommand {
 constexpr ListedCommand kCommands[] = {TEXMESH_COMMANDS(TEXMESH_COMMAND, TEXMESH_RARE)};
 
 /// To declare the options of every command takes longer than to see that 100 models are up to date: where the
-/// first word names a command whose text needs no other command, that one alone.
-void add_commands(Command& program, const char* first_word) {
-  const auto is_first = [&](const ListedCommand& c) { return std::strcmp(c.name, first_word) == 0; };
-  const bool one = std::ranges::any_of(kCommands, is_first) && std::strcmp(first_word, "completion") != 0;
+/// first word names a command, that one alone, but for `completion`, which tells of all. --version needs
+/// none.
+void add_commands(Command& program, const std::string& first_word) {
+  const auto is_first = [&](const ListedCommand& c) { return c.name == first_word; };
+  const bool one =
+      first_word == "--version" || (std::ranges::any_of(kCommands, is_first) && first_word != "completion");
   for (const ListedCommand& command : kCommands) {
     if (one && !is_first(command)) continue;
     program.group(command.group, command.rare);
@@ -65,8 +65,8 @@ void add_commands(Command& program, const char* first_word) {
 
 int main(int argc, char** argv) {
   using namespace texmesh;
-  const char* first_word = argc > 1 ? argv[1] : "";
-  if (argc == 2 && std::strcmp(first_word, "worker") == 0) return worker_main();
+  const std::string first_word = argc > 1 ? argv[1] : "";
+  if (argc == 2 && first_word == "worker") return worker_main();
   serve_workers();
 
   CommandLine line("texmesh compiles textured 3D scans into packages that any static web server can stream.");

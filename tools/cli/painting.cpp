@@ -68,8 +68,8 @@ CompileOptions options_of(const Painting& p) {
     const std::string path = setting.substr(0, equals);
     OptionField* field = find_option(fields, path);
     if (equals == std::string::npos || !field)
-      throw UsageError("--set", "", "STAGE.OPTION=VALUE with an option that texmesh compile --help-all lists",
-                       setting);
+      throw UsageError("--set", "",
+                       "STAGE.OPTION=VALUE with an option of profiles (texmesh schema profile.v1)", setting);
     set_option(*field, setting.substr(equals + 1), "--set " + path);
   }
   check_options(options, "command line");
@@ -117,8 +117,7 @@ void print_legend(const Painting& p, const ColourLegend& legend, const Notes& no
 
 void add_painting_options(Command& c, Painting& painting) {
   c.option("--profile", painting.profile, "JSON file of options, as for compile").value_name("FILE");
-  c.option("--set", painting.settings,
-           "STAGE.OPTION=VALUE over the profile, as compile's --STAGE.OPTION; may be repeated")
+  c.option("--set", painting.settings, "STAGE.OPTION=VALUE over the profile; may be repeated")
       .value_name("OPTION=VALUE");
   add_cache_options(c, painting.cache);
 }

@@ -1,22 +1,37 @@
-#include "tools/extract/extract.h"
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <nlohmann/json.hpp>
-
 #include "delivery/cpp/decide/fragment_list.h"
-#include "format/container/layout.h"
 #include "format/rules/viewing.h"
 #include "pipeline/about/gltf_about.h"
+#include "pipeline/io/record.h"
 #include "pipeline/io/table.h"
 #include "tools/extract/budget/budget_search.h"
 #include "tools/extract/glb/scale_file.h"
-#include "tools/extract/glb/standalone_glb.h"
-#include "tools/extract/glb/texture_source.h"
 #include "tools/extract/proxy/proxy_search.h"
 
 namespace texmesh {
+
+constexpr double kMostGlbBytes = 4294967295;  // of a GLB
+
+template <>
+struct EnumNames<FileImage> {
+  static constexpr std::array<std::string_view, 3> names{"jpeg", "webp", "png"};
+};
+template <>
+struct RecordFields<ExtractedImage> {
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("image", s.image, "Number of the source image: texture/<image>.");
+    v("role", s.role, "As in textures.json.");
+    v("format", s.format, "");
+    v("width_px", s.width_px, Range{1, 65536}, "");
+    v("height_px", s.height_px, Range{1, 65536}, "");
+    v("quality", s.quality, Range{0, 100}, "Of the coder; 100 for png.");
+    v("bytes", s.bytes, Range{1, kMostGlbBytes}, "");
+  }
+};
+
 namespace {
 
 constexpr double kExtractDisplayPx = 1000;
@@ -171,7 +186,50 @@ Extracted extract_scale(PackageReader& package, const ExtractScale& wishes, bool
   return out;
 }
 
-const char* format_name(FileImage format) { return mime_type_of(format) + 6; }  // behind "image/"
+/// What --json prints.
+struct ExtractReport {
+  std::string file;
+  std::uint64_t bytes = 0;
+  int scale = 0;
+  std::vector<int> levels;
+  std::uint64_t triangles = 0, mesh_bytes = 0;
+  std::vector<ExtractedImage> images;
+  std::optional<std::uint32_t> proxy;
+  std::optional<std::uint64_t> asked_bytes = {};
+  std::optional<bool> within = {};
+  std::optional<double> difference = {}, mesh_difference = {};
+  std::optional<int> views = {};
+  std::optional<std::uint32_t> side_px = {};
+  std::vector<std::string> notes = {};
+  template <class S, class V>
+  static void fields(S& s, V&& v) {
+    v("version", Constant{1}, "");
+    v("file", s.file, "Name of the GLB, without its folder.");
+    v("bytes", s.bytes, Range{20, kMostGlbBytes}, "");
+    v("scale", s.scale, Range{0, 99},
+      "Number of the finest scale in the file; with `proxy` the package's coarsest one.");
+    v("levels", s.levels, FieldRule{.range = Range{0, 99}, .count = Range{1, 100}},
+      "Scales of the file, finest first; more than one with --lods.");
+    v("triangles", s.triangles, Range{1, kMostGlbBytes}, "Of the finest scale.");
+    v("mesh_bytes", s.mesh_bytes, "Everything but the images; of a whole proxy the whole file.");
+    v("images", s.images, "");
+    v("proxy", s.proxy, Range{0, kMaxPackageProxies - 1},
+      "The file is this proxy of the package, or made of it: its mesh coded coarser, its pictures smaller, maps "
+      "left out; 0 = the smallest.");
+    v("asked_bytes", s.asked_bytes, "--bytes.");
+    v("within", s.within,
+      "bytes is at most asked_bytes, and at least 98 % of it unless the file has S_0 and all of the source's "
+      "JPEG coefficients; otherwise the file is the nearest possible one.");
+    v("difference", s.difference, Range{0, 1},
+      "Mean FLIP of the file's lit pictures against those of the package's best, over the object's pixels; 0 = "
+      "equal.");
+    v("mesh_difference", s.mesh_difference, Range{0, 1},
+      "The same with the best textures instead: what the mesh alone costs.");
+    v("views", s.views, Range{1, 1000}, "Directions from which it was measured.");
+    v("side_px", s.side_px, Range{1, 65536}, "Side of those pictures.");
+    v("notes", s.notes, "");
+  }
+};
 
 }  // namespace
 
@@ -197,34 +255,29 @@ Extracted extract_model(PackageReader& package, const ExtractRequest& request, c
 }
 
 std::string extract_json(const Extracted& e, const std::string& file) {
-  nlohmann::ordered_json images = nlohmann::ordered_json::array();
-  for (const ExtractedImage& i : e.images)
-    images.push_back({{"image", i.image},
-                      {"role", i.role},
-                      {"format", format_name(i.format)},
-                      {"width_px", i.width_px},
-                      {"height_px", i.height_px},
-                      {"quality", i.quality},
-                      {"bytes", i.bytes}});
-  nlohmann::ordered_json out{{"version", 1},
-                             {"file", file},
-                             {"bytes", e.glb.size()},
-                             {"scale", e.scale},
-                             {"levels", e.levels},
-                             {"triangles", e.triangles},
-                             {"mesh_bytes", e.mesh_bytes},
-                             {"images", images}};
-  if (e.proxy) out["proxy"] = *e.proxy;
+  ExtractReport out{file, e.glb.size(), e.scale, e.levels, e.triangles, e.mesh_bytes, e.images, e.proxy};
   if (e.asked_bytes > 0) {
-    out["asked_bytes"] = e.asked_bytes;
-    out["within"] = e.within;
-    out["difference"] = e.difference;
-    out["mesh_difference"] = e.mesh_difference;
-    out["views"] = e.views;
-    out["side_px"] = e.side_px;
+    out.asked_bytes = e.asked_bytes;
+    out.within = e.within;
+    out.difference = e.difference;
+    out.mesh_difference = e.mesh_difference;
+    out.views = e.views;
+    out.side_px = e.side_px;
   }
-  out["notes"] = e.notes;
-  return out.dump();
+  out.notes = e.notes;
+  return to_json(out).dump();
+}
+
+DocumentSchema extract_schema() {
+  Json body = schema_of<ExtractReport>();
+  body["dependencies"] = {
+      {"asked_bytes", Json::array({"within", "difference", "mesh_difference", "views", "side_px"})},
+      {"within", Json::array({"asked_bytes"})}};
+  return document_schema(
+      "extract.v1", "texmesh extract report, version 1",
+      "Output of `texmesh extract PKG -o GLB --json`: what the file holds and how it was chosen. Several numbers "
+      "for --bytes give one such object for each file, a line each.",
+      body);
 }
 
 std::string extract_text(const Extracted& e, const std::string& file) {
@@ -236,7 +289,7 @@ std::string extract_text(const Extracted& e, const std::string& file) {
   text += fmt::format("; mesh {} bytes\n", grouped(e.mesh_bytes));
   for (const ExtractedImage& i : e.images) {
     text += fmt::format("  image {}, {}: {} x {} px, {}", i.image, i.role, i.width_px, i.height_px,
-                        format_name(i.format));
+                        enum_name(i.format));
     if (i.format != FileImage::kPng) text += fmt::format(" of quality {:.4g}", i.quality);
     text += fmt::format(", {} bytes\n", grouped(i.bytes));
   }

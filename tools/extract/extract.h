@@ -13,6 +13,8 @@
 
 namespace texmesh {
 
+struct DocumentSchema;  // pipeline/io/record.h
+
 /// What kind of images a standalone file gets. kAuto: for a number of bytes what looks best, otherwise JPEG;
 /// images with alpha become PNG where JPEG would be taken.
 enum class ExtractImages : std::uint8_t { kAuto, kJpeg, kWebp, kPng };
@@ -100,6 +102,7 @@ Extracted extract_model(PackageReader& package, const ExtractRequest& request, c
 
 /// The answer to --json (schemas/extract.v1.schema.json), and the text for people. `file` is the GLB's name.
 std::string extract_json(const Extracted& extracted, const std::string& file);
+DocumentSchema extract_schema();
 std::string extract_text(const Extracted& extracted, const std::string& file);
 
 }  // namespace texmesh

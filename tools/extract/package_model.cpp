@@ -1,9 +1,5 @@
 #include "tools/extract/package_model.h"
 
-#include <algorithm>
-
-#include "format/container/layout.h"
-#include "pipeline/import/import.h"
 #include "pipeline/io/file_resolver.h"
 #include "stages/image/decode_image.h"
 #include "tools/extract/glb/scale_file.h"

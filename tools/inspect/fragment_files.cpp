@@ -1,14 +1,10 @@
 #include "tools/inspect/fragment_files.h"
 
 #include <algorithm>
-#include <map>
 #include <nlohmann/json.hpp>
 
 #include "delivery/cpp/package/plane_streams.h"
 #include "format/base/bounded_json.h"
-#include "format/base/bytes.h"
-#include "format/base/sha256.h"
-#include "format/container/layout.h"
 #include "format/rules/allocation.h"
 #include "pipeline/io/record.h"
 

@@ -3,9 +3,6 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
-#include <optional>
-
-#include "format/container/layout.h"
 
 namespace texmesh {
 namespace {

@@ -3,15 +3,7 @@
 #include <zlib.h>
 
 #include <algorithm>
-#include <filesystem>
-#include <map>
-#include <optional>
-#include <set>
 
-#include "delivery/cpp/package/package_reader.h"
-#include "format/base/bytes.h"
-#include "format/base/sha256.h"
-#include "format/container/layout.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/new_folder.h"
 #include "tools/inspect/fragment_files.h"

@@ -1,14 +1,9 @@
 #include "tools/inspect/provenance.h"
 
-#include <map>
 #include <nlohmann/json.hpp>
 
 #include "format/base/bounded_json.h"
-#include "format/base/errors.h"
-#include "format/base/sha256.h"
 #include "pipeline/compile/option_fields.h"
-#include "pipeline/compile/options.h"
-#include "pipeline/io/record.h"
 
 namespace texmesh {
 namespace {

@@ -1,9 +1,5 @@
 #include "tools/render/picture_sheet.h"
 
-#include <algorithm>
-#include <cstring>
-#include <stdexcept>
-
 #include "stages/render/shade.h"
 
 namespace texmesh {

@@ -1,15 +1,7 @@
 #include "tools/render/plane_pixels.h"
 
-#include <algorithm>
-#include <cstring>
-#include <stdexcept>
-#include <string>
-
 #include "delivery/cpp/package/plane_streams.h"
-#include "format/base/errors.h"
-#include "format/container/layout.h"
 #include "stages/base/parallel.h"
-#include "stages/data/coverage.h"
 #include "stages/fill/fill.h"
 #include "stages/fragment_codec/fragment_codec.h"
 #include "stages/image/decode_image.h"

@@ -1,8 +1,5 @@
 #include "tools/render/rendered_model.h"
 
-#include <algorithm>
-#include <filesystem>
-#include <optional>
 #include <set>
 
 #include "format/container/layout.h"

@@ -1,20 +1,15 @@
 #include "pipeline/batch/fleet/model_list.h"
 
 #include <algorithm>
-#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <set>
 
 #include "format/base/bounded_json.h"
-#include "format/base/errors.h"
-#include "format/base/note.h"
-#include "pipeline/batch/plan.h"
 #include "pipeline/import/obj/obj_material.h"
 #include "pipeline/import/ply/ply_reader.h"
 #include "pipeline/import/range/range_scan_document.h"
-#include "pipeline/import/text_scan.h"
 #include "pipeline/io/uri.h"
 
 namespace texmesh {

@@ -2,12 +2,10 @@
 #include "pipeline/batch/fleet/run_summary.h"
 
 #include <algorithm>
-#include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 
 #include "format/base/bounded_json.h"
-#include "format/base/errors.h"
 #include "pipeline/batch/junit.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/file_resolver.h"

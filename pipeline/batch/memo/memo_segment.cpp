@@ -1,19 +1,11 @@
 #include "pipeline/batch/memo/memo_segment.h"
 
 #include <fcntl.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
-#include <algorithm>
-#include <atomic>
-#include <cerrno>
-#include <cstring>
 #include <filesystem>
 #include <numeric>
-#include <string_view>
 
 #include "format/base/archive.h"
-#include "format/base/errors.h"
 #include "format/base/text_bytes.h"
 #include "pipeline/cache/cache_files.h"
 #include "pipeline/io/machine/owner_mark.h"

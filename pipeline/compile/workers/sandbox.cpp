@@ -11,14 +11,11 @@
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
-#include <unistd.h>
 
-#include <cerrno>
 #include <charconv>
 #include <cstddef>
 #include <cstdlib>
 #include <filesystem>
-#include <span>
 
 #include "pipeline/io/descriptor.h"
 

@@ -4,8 +4,8 @@
 #include <signal.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
-#include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <iostream>
@@ -106,7 +106,7 @@ StageObserver stage_events(EventWriter& events) {
       case StageEvent::kProgress:
         if (now - last < std::chrono::milliseconds(100)) return;
         last = now;
-        return events.write(StageProgress{"", stage.name, fraction});
+        return events.write(StageProgress{"", stage.name, std::clamp(fraction, 0.0, 1.0)});
       case StageEvent::kHit:
         return events.write(StageFinished{"", stage.name, "hit", 0});
       case StageEvent::kRan:

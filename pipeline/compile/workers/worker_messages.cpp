@@ -2,8 +2,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "format/base/errors.h"
-
 namespace texmesh {
 namespace {
 

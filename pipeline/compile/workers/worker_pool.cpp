@@ -5,21 +5,12 @@
 #include <spawn.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
-#include <algorithm>
-#include <cerrno>
-#include <chrono>
 #include <cstdlib>
-#include <cstring>
 #include <filesystem>
-#include <map>
 #include <numeric>
-#include <optional>
 #include <set>
-#include <stdexcept>
 
-#include "format/base/errors.h"
 #include "pipeline/cache/cache_layer.h"
 #include "pipeline/compile/workers/worker.h"
 #include "pipeline/io/atomic_file.h"

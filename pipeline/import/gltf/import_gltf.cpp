@@ -1,14 +1,14 @@
+// A glTF scene becomes one mesh: the nodes that show meshes, with their maps to the scene's space; every
+// primitive read once; all of them put together in the order of the nodes.
 #include <tiny_gltf.h>
 
-#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "format/model/material_extensions.h"
 #include "pipeline/about/gltf_about.h"
-#include "pipeline/import/finish_model.h"
-#include "pipeline/import/gltf/import_gltf_assembler.h"
-#include "pipeline/import/gltf/import_gltf_nodes.h"
 #include "pipeline/import/gltf/import_gltf_parts.h"
+#include "pipeline/import/text_scan.h"
 
 namespace texmesh {
 namespace gltf {
@@ -16,6 +16,254 @@ namespace {
 
 constexpr std::size_t kMaxParts = 65535;          // Mesh::triangle_part is 16 bits wide
 constexpr std::size_t kMaxGltfMaterials = 65535;  // and so is triangle_material
+
+/// Affine map, row-major 3 x 4, in double precision: georeferenced scenes place small meshes
+/// with large translations.
+struct Affine {
+  std::array<double, 12> m{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+  double at(int row, int column) const { return m[static_cast<std::size_t>(row * 4 + column)]; }
+  double& at(int row, int column) { return m[static_cast<std::size_t>(row * 4 + column)]; }
+};
+
+Affine operator*(const Affine& a, const Affine& b) {
+  Affine c;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 4; ++j) {
+      c.at(i, j) = a.at(i, 0) * b.at(0, j) + a.at(i, 1) * b.at(1, j) + a.at(i, 2) * b.at(2, j) +
+                   (j == 3 ? a.at(i, 3) : 0);
+    }
+  }
+  return c;
+}
+
+Vec3d operator*(const Affine& a, Vec3d p) {
+  Vec3d r;
+  for (int i = 0; i < 3; ++i) r[i] = a.at(i, 0) * p.x + a.at(i, 1) * p.y + a.at(i, 2) * p.z + a.at(i, 3);
+  return r;
+}
+
+/// A node that shows a mesh, with its map to the scene's space.
+struct Instance {
+  std::size_t node = 0, mesh = 0;
+  Affine to_scene;
+};
+
+Affine from_matrix(const Source& source, const std::vector<double>& v, const std::string& place) {
+  Affine a;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 4; ++j) a.at(i, j) = v[static_cast<std::size_t>(j * 4 + i)];
+  }
+  if (v[3] != 0 || v[7] != 0 || v[11] != 0 || v[15] != 1) {
+    source.note_once(Severity::kWarning, "projective-matrix", place,
+                     "the last row of a matrix is taken as 0 0 0 1");
+  }
+  return a;
+}
+
+Affine from_rotation(const Source& source, const std::vector<double>& q, const std::string& place) {
+  const double l = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+  if (!(l > 0) || !std::isfinite(l)) {
+    source.note_once(Severity::kWarning, "bad-rotation", place,
+                     "a quaternion of no length is taken as no rotation");
+    return {};
+  }
+  const double x = q[0] / l, y = q[1] / l, z = q[2] / l, w = q[3] / l;
+  Affine a;
+  a.m = {1 - 2 * (y * y + z * z), 2 * (x * y - z * w),     2 * (x * z + y * w),     0,
+         2 * (x * y + z * w),     1 - 2 * (x * x + z * z), 2 * (y * z - x * w),     0,
+         2 * (x * z - y * w),     2 * (y * z + x * w),     1 - 2 * (x * x + y * y), 0};
+  return a;
+}
+
+Affine local_map(const Source& source, const tinygltf::Node& node, std::size_t index) {
+  const std::string place = "/nodes/" + std::to_string(index);
+  if (!node.matrix.empty()) return from_matrix(source, node.matrix, place + "/matrix");
+  Affine a;
+  if (!node.rotation.empty()) a = from_rotation(source, node.rotation, place + "/rotation");
+  for (int i = 0; i < 3 && !node.scale.empty(); ++i) {
+    for (int j = 0; j < 3; ++j) a.at(j, i) *= node.scale[static_cast<std::size_t>(i)];
+  }
+  for (int i = 0; i < 3 && !node.translation.empty(); ++i) {
+    a.at(i, 3) = node.translation[static_cast<std::size_t>(i)];
+  }
+  return a;
+}
+
+std::vector<int> scene_roots(const Source& source, const tinygltf::Model& model) {
+  if (!model.scenes.empty()) {
+    const auto scene = static_cast<std::size_t>(std::max(model.defaultScene, 0));
+    if (model.scenes.size() > 1) {
+      add_info(
+          source.notes, "other-scenes", "/scenes",
+          "only scene " + std::to_string(scene) + " of " + std::to_string(model.scenes.size()) + " is read");
+    }
+    return model.scenes[scene].nodes;
+  }
+  std::vector<bool> is_child(model.nodes.size());
+  for (const tinygltf::Node& node : model.nodes) {
+    for (const int c : node.children) is_child[static_cast<std::size_t>(c)] = true;
+  }
+  std::vector<int> roots;
+  for (std::size_t n = 0; n < is_child.size(); ++n) {
+    if (!is_child[n]) roots.push_back(static_cast<int>(n));
+  }
+  return roots;
+}
+
+/// The instances of the scene that is read, depth first in the order of the file. InputError when the nodes
+/// are no tree.
+std::vector<Instance> find_instances(const Source& source, const tinygltf::Model& model) {
+  // No recursion: a chain may be as long as the file allows.
+  struct Pending {
+    int node;
+    Affine to_scene;
+  };
+  std::vector<Pending> stack;
+  const std::vector<int> roots = scene_roots(source, model);
+  for (auto r = roots.rbegin(); r != roots.rend(); ++r) stack.push_back({*r, {}});
+  std::vector<bool> seen(model.nodes.size());
+  std::vector<Instance> found;
+  while (!stack.empty()) {
+    const Pending p = stack.back();
+    stack.pop_back();
+    const auto n = static_cast<std::size_t>(p.node);
+    if (seen[n]) {
+      source.fail("/nodes/" + std::to_string(n), "a tree of nodes", "a node with two parents, or a cycle");
+    }
+    seen[n] = true;
+    const tinygltf::Node& node = model.nodes[n];
+    const Affine to_scene = p.to_scene * local_map(source, node, n);
+    if (node.mesh >= 0) found.push_back({n, static_cast<std::size_t>(node.mesh), to_scene});
+    for (auto c = node.children.rbegin(); c != node.children.rend(); ++c) stack.push_back({*c, to_scene});
+  }
+  return found;
+}
+
+/// Puts primitives together to one mesh in the scene's space.
+class Assembler {
+ public:
+  Assembler(const Source& source, Mesh& mesh, bool with_normals)
+      : source_(source), mesh_(mesh), with_normals_(with_normals) {}
+  void add(const Primitive& primitive, const Affine& to_scene, std::uint16_t material, std::uint16_t part);
+  void finish();
+
+ private:
+  void check_room(const Primitive& primitive, std::size_t new_wedges) const;
+  void add_wedge(const Primitive& primitive, std::uint32_t vertex, std::uint32_t first_position,
+                 Vec3f normal);
+  void add_tangents(const Primitive& primitive, const Affine& to_scene, bool mirrored);
+
+  const Source& source_;
+  Mesh& mesh_;
+  const bool with_normals_;
+  std::vector<Vec3d> positions_;
+};
+
+/// Columns of the cofactor matrix: maps normals up to a positive factor when the determinant is positive.
+struct NormalMap {
+  std::array<Vec3d, 3> column;
+  double determinant = 1;
+};
+
+NormalMap normal_map(const Affine& a) {
+  const auto column = [&](int j) { return Vec3d{a.at(0, j), a.at(1, j), a.at(2, j)}; };
+  const Vec3d x = column(0), y = column(1), z = column(2);
+  NormalMap n{{cross(y, z), cross(z, x), cross(x, y)}, 0};
+  n.determinant = dot(x, n.column[0]);
+  return n;
+}
+
+void Assembler::check_room(const Primitive& primitive, std::size_t new_wedges) const {
+  const auto check = [&](const char* what, std::size_t count, int limit) {
+    if (count > static_cast<std::size_t>(limit)) {
+      source_.fail(what, "at most " + std::to_string(limit), std::to_string(count) + " or more");
+    }
+  };
+  check("vertices of all meshes", positions_.size() + primitive.positions.size(),
+        source_.options.max_vertices);
+  check("wedges of all meshes", mesh_.wedge_count() + new_wedges, source_.options.max_vertices);
+  check("triangles of all meshes", mesh_.triangles.size() + primitive.triangles.size(),
+        source_.options.max_triangles);
+}
+
+/// Attributes that only some primitives have are 0 (colours: white) on the others.
+void Assembler::add_wedge(const Primitive& primitive, std::uint32_t vertex, std::uint32_t first_position,
+                          Vec3f normal) {
+  const std::size_t before = mesh_.wedge_position.size();
+  mesh_.wedge_position.push_back(first_position + vertex);
+  const auto add_to = [&](auto& all, const auto& given, auto otherwise) {
+    if (given.empty() && all.empty()) return;
+    all.resize(before, otherwise);
+    all.push_back(given.empty() ? otherwise : given[vertex]);
+  };
+  add_to(mesh_.uv0, primitive.uv0, Vec2f{});
+  add_to(mesh_.uv1, primitive.uv1, Vec2f{});
+  add_to(mesh_.colours, primitive.colours, Vec4f{1, 1, 1, 1});
+  if (with_normals_) mesh_.normals.push_back(normal);
+}
+
+/// Directions on the surface go the way of positions. A mirrored surface has its bitangents the
+/// other way round.
+void Assembler::add_tangents(const Primitive& primitive, const Affine& to_scene, bool mirrored) {
+  if (primitive.tangents.empty()) return;
+  mesh_.tangents.resize(mesh_.wedge_count() - primitive.tangents.size());
+  for (const Vec4f& t : primitive.tangents) {
+    Vec3d d;
+    for (int i = 0; i < 3; ++i)
+      d[i] = to_scene.at(i, 0) * t.x + to_scene.at(i, 1) * t.y + to_scene.at(i, 2) * t.z;
+    const Vec3f unit = to_float(normalized(d));
+    mesh_.tangents.push_back({unit.x, unit.y, unit.z, mirrored ? -t.w : t.w});
+  }
+}
+
+void Assembler::add(const Primitive& primitive, const Affine& to_scene, std::uint16_t material,
+                    std::uint16_t part) {
+  // glTF: without normals a primitive is flat. Where others have normals that means a wedge per corner.
+  const bool flat = with_normals_ && primitive.normals.empty();
+  check_room(primitive, flat ? primitive.triangles.size() * 3 : primitive.positions.size());
+  const NormalMap normals = normal_map(to_scene);
+  const double sign = normals.determinant < 0 ? -1 : 1;
+  const auto first_position = static_cast<std::uint32_t>(positions_.size());
+  const auto first_wedge = static_cast<std::uint32_t>(mesh_.wedge_count());
+  for (const Vec3f& p : primitive.positions) positions_.push_back(to_scene * to_double(p));
+  for (std::uint32_t v = 0; v < primitive.positions.size() && !flat; ++v) {
+    Vec3d n;
+    if (with_normals_) {
+      const Vec3f& given = primitive.normals[v];
+      n = (normals.column[0] * given.x + normals.column[1] * given.y + normals.column[2] * given.z) * sign;
+    }
+    add_wedge(primitive, v, first_position, to_float(normalized(n)));
+  }
+  if (!flat) add_tangents(primitive, to_scene, sign < 0);
+  for (std::size_t t = 0; t < primitive.triangles.size(); ++t) {
+    Triangle corners = primitive.triangles[t];
+    if (sign < 0) std::swap(corners[1], corners[2]);  // a mirrored front face would be seen from behind
+    Triangle wedges;
+    if (flat) {
+      const Vec3d a = positions_[first_position + corners[0]];
+      const Vec3d n = normalized(
+          cross(positions_[first_position + corners[1]] - a, positions_[first_position + corners[2]] - a));
+      for (std::size_t i = 0; i < 3; ++i) {
+        wedges[i] = static_cast<std::uint32_t>(mesh_.wedge_count());
+        add_wedge(primitive, corners[i], first_position, to_float(n));
+      }
+    } else {
+      for (std::size_t i = 0; i < 3; ++i) wedges[i] = first_wedge + corners[i];
+    }
+    mesh_.triangles.push_back(wedges);
+    mesh_.triangle_material.push_back(material);
+    mesh_.triangle_part.push_back(part);
+  }
+}
+
+void Assembler::finish() {
+  const std::size_t n = mesh_.wedge_count();
+  if (!mesh_.uv0.empty()) mesh_.uv0.resize(n);
+  if (!mesh_.uv1.empty()) mesh_.uv1.resize(n);
+  if (!mesh_.colours.empty()) mesh_.colours.resize(n, {1, 1, 1, 1});
+  if (!mesh_.tangents.empty()) mesh_.tangents.resize(n);
+  set_positions(mesh_, positions_, source_.largest_coordinate);
+}
 
 /// Reads each primitive once; keeps it only while further nodes show the same mesh.
 class PrimitiveCache {
@@ -42,21 +290,23 @@ class GltfReader {
   GltfReader(const Source& source, ByteSpan bytes, Model& model)
       : source_(source),
         container_(split_container(source, bytes)),
-        document_(checked(source, container_, about_)),
-        structure_(parse_structure(source, document_)),
-        buffers_(source, document_, container_.bin),
+        document_(look(container_, about_)),
+        structure_(read_structure(source, document_)),
+        buffers_(source, document_, structure_, container_.bin),
         model_(model) {}
   void read();
   bool is_glb() const { return container_.is_glb; }
   const About& about() const { return about_; }
 
  private:
-  static Json checked(const Source& source, const Container& container, About& about) {
-    Json document = parse_json(source, container.json);
-    about = about_from_gltf(document, container.is_glb ? "glb" : "gltf", source.notes);
-    check_document(source, document);
+  Json look(const Container& container, About& about) const {
+    Json document = parse_json(source_, container.json);
+    about = about_from_gltf(document, container.is_glb ? "glb" : "gltf", source_.notes);
+    look_through(source_, document);
     return document;
   }
+  void check_document() const;
+  void note_what_is_left_out() const;
   std::map<int, std::uint16_t> read_used_materials(const std::vector<Instance>& instances);
   std::uint16_t add_part(const Instance& instance);
   void drop_textures_without_uv();
@@ -69,6 +319,52 @@ class GltfReader {
   Buffers buffers_;
   Model& model_;
 };
+
+bool is_supported(const std::string& extension) {
+  static constexpr std::array<std::string_view, 8> kSupported{
+      "KHR_draco_mesh_compression", "KHR_mesh_quantization", "EXT_meshopt_compression",
+      "KHR_meshopt_compression",    "KHR_texture_transform", "EXT_texture_webp",
+      "KHR_texture_basisu",         "KHR_materials_unlit"};
+  return find_material_extension(extension) ||
+         std::find(kSupported.begin(), kSupported.end(), extension) != kSupported.end();
+}
+
+void GltfReader::check_document() const {
+  const tinygltf::Asset& asset = structure_.asset;
+  if (!asset.version.starts_with("2.")) source_.fail("/asset/version", "2.0", quote(asset.version));
+  if (!asset.minVersion.empty() && asset.minVersion != "2.0")
+    source_.fail("/asset/minVersion", "2.0", quote(asset.minVersion));
+  const auto each_unknown = [&](const std::string& list, auto&& tell) {
+    const Json names = document_.value(list, Json::array());
+    for (std::size_t i = 0; i < names.size(); ++i)
+      if (const std::string name = names[i]; !is_supported(name))
+        tell("/" + list + "/" + std::to_string(i), name);
+  };
+  each_unknown("extensionsRequired", [&](const std::string& place, const std::string& name) {
+    source_.fail(place, "an extension that texmesh reads", quote(name));
+  });
+  const Json images = document_.value("images", Json::array());
+  for (std::size_t i = 0; i < images.size(); ++i)
+    if (images[i].contains("uri") == images[i].contains("bufferView"))
+      source_.fail("/images/" + std::to_string(i), "either \"uri\" or \"bufferView\"",
+                   images[i].contains("uri") ? "both" : "neither");
+  each_unknown("extensionsUsed", [&](const std::string& place, const std::string& name) {
+    add_info(source_.notes, "unknown-extension", place, name + " is left out");
+  });
+}
+
+void GltfReader::note_what_is_left_out() const {
+  Notes& notes = source_.notes;
+  const auto any = [&](const char* key) { return document_.contains(key) && !document_[key].empty(); };
+  if (any("animations")) add_info(notes, "animation", "/animations", "animations are left out");
+  if (any("skins")) add_info(notes, "skin", "/skins", "skins are left out: the mesh keeps its default pose");
+  if (any("cameras")) add_info(notes, "camera", "/cameras", "cameras are left out");
+  for (const tinygltf::Mesh& mesh : structure_.meshes)
+    for (const tinygltf::Primitive& primitive : mesh.primitives)
+      if (!primitive.targets.empty())
+        source_.note_once(Severity::kInfo, "morph-targets", "/meshes",
+                          "morph targets are left out: the mesh keeps its default pose");
+}
 
 /// In the order of the file, -1 (glTF's default material) first.
 std::map<int, std::uint16_t> GltfReader::read_used_materials(const std::vector<Instance>& instances) {
@@ -114,12 +410,13 @@ void GltfReader::drop_textures_without_uv() {
 }
 
 void GltfReader::read() {
+  check_document();
+  note_what_is_left_out();
   const std::vector<Instance> instances = find_instances(source_, structure_);
   bool with_normals = false;
   for (const Instance& i : instances) {
-    for (std::size_t p = 0; p < structure_.meshes[i.mesh].primitives.size(); ++p) {
-      with_normals |= primitive_has(structure_, i.mesh, p, "NORMAL");
-    }
+    for (const tinygltf::Primitive& p : structure_.meshes[i.mesh].primitives)
+      with_normals |= p.attributes.count("NORMAL") != 0;
   }
   const std::map<int, std::uint16_t> materials = read_used_materials(instances);
   PrimitiveCache cache(instances);

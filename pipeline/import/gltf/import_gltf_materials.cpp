@@ -1,12 +1,11 @@
 #include <tiny_gltf.h>
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "format/model/material_extensions.h"
 #include "pipeline/import/gltf/import_gltf_parts.h"
 #include "pipeline/import/import_images.h"
-#include "pipeline/import/specular_glossiness.h"
+#include "pipeline/import/material_images.h"
 #include "pipeline/io/uri.h"
 
 namespace texmesh::gltf {

@@ -10,15 +10,15 @@
 
 #include "format/base/bytes.h"
 #include "pipeline/import/import.h"
-#include "pipeline/import/local_frame.h"
+#include "pipeline/import/mesh_builder.h"
 
 namespace tinygltf {
 class Model;
 }
 
-// The parts of the glTF reader (import_gltf.cpp puts them together). tinygltf turns the JSON into structures;
-// it lets dangling indices, wrapped integers and much else through, so check_document looks at every value
-// first, and bytes are only ever reached through Buffers and AccessorReader, which know their lengths.
+// The parts of the glTF reader (import_gltf.cpp puts them together). The JSON is parsed once, within bounds;
+// look_through() checks what tinygltf's structures would not show; tinygltf makes structures of it. Bytes are
+// only ever reached through Buffers and AccessorReader, which know their lengths.
 namespace texmesh::gltf {
 
 using Json = nlohmann::json;
@@ -37,7 +37,7 @@ struct Source {
                  const std::string& text) const;
 };
 
-// import_gltf_container.cpp
+// import_gltf_document.cpp
 
 struct Container {
   std::string_view json;
@@ -47,21 +47,21 @@ struct Container {
 /// Header and chunk lengths of a GLB checked against the file; anything else is taken for JSON.
 Container split_container(const Source& source, ByteSpan bytes);
 
-/// Parses after a look at the brackets alone: at most 64 levels deep (parsers recurse) and 8 million values.
+/// Bounds of a stranger's JSON. Parsers recurse; a value costs them at most a few hundred bytes, and real
+/// scans have some thousands.
+inline constexpr int kMaxJsonDepth = 64;
+inline constexpr std::uint64_t kMaxJsonValues = 8'000'000;
+/// Parses after a look at the brackets alone. A warning says that an object names a member twice.
 Json parse_json(const Source& source, std::string_view text);
-
-// import_gltf_check.cpp
-
-/// Checks types, ranges and indices of every property that the reader uses, takes out `extras`, and
-/// refuses versions and required extensions that the reader does not know. Notes what it leaves out
-/// (skins, animations, ...).
-void check_document(const Source& source, Json& document);
+/// Takes out `extras` and null, and checks types, lengths, whole numbers and indices of every property that
+/// the reader uses.
+void look_through(const Source& source, Json& document);
 
 // import_gltf_structure.cpp
 
-/// The checked document as tinygltf sees it, without buffers, images and extensions: nothing of it is opened
-/// or decoded by tinygltf.
-tinygltf::Model parse_structure(const Source& source, const Json& document);
+/// What has been looked through, read by tinygltf but for buffers and images: tinygltf opens and decodes
+/// nothing. InputError where it misses a property or knows no such value.
+tinygltf::Model read_structure(const Source& source, const Json& document);
 
 // import_gltf_buffers.cpp
 
@@ -69,7 +69,8 @@ tinygltf::Model parse_structure(const Source& source, const Json& document);
 /// with EXT_meshopt_compression or KHR_meshopt_compression undone.
 class Buffers {
  public:
-  Buffers(const Source& source, const Json& document, std::optional<ByteSpan> bin);
+  Buffers(const Source& source, const Json& document, const tinygltf::Model& structure,
+          std::optional<ByteSpan> bin);
   /// `place` is who asks, for messages.
   ByteSpan view(std::size_t index, const std::string& place);
 
@@ -81,33 +82,11 @@ class Buffers {
 
   const Source& source_;
   const Json& document_;
+  const tinygltf::Model& structure_;
   std::optional<ByteSpan> bin_;
   std::uint64_t decompressed_bytes_ = 0;
   std::vector<std::optional<std::vector<std::uint8_t>>> buffers_, views_;
 };
-
-// import_gltf_meshopt.cpp
-
-enum class MeshoptMode : std::uint8_t { kAttributes, kTriangles, kIndices };
-enum class MeshoptFilter : std::uint8_t { kNone, kOctahedral, kQuaternion, kExponential, kColour };
-/// count * stride bytes, of EXT_meshopt_compression or KHR_meshopt_compression: the latter adds version 1 of
-/// attribute streams and the filter of colours. Throws InputError; allocates at most in proportion to `data`.
-std::vector<std::uint8_t> decode_meshopt(const Source& source, const std::string& place, ByteSpan data,
-                                         std::uint64_t count, std::uint64_t stride, MeshoptMode mode,
-                                         MeshoptFilter filter);
-
-// import_gltf_meshopt_attributes.cpp
-
-/// Whether the data say that they are version 1.
-bool is_attributes_v1(ByteSpan data);
-/// Fewest bytes that so many elements take.
-std::uint64_t fewest_attribute_bytes_v1(std::uint64_t count, std::uint64_t stride);
-/// Fills `out`, which has count * stride bytes; `stride` is a multiple of 4 from 4 to 256. False when the
-/// data are broken.
-bool decode_attributes_v1(ByteSpan data, std::size_t count, std::size_t stride,
-                          std::vector<std::uint8_t>& out);
-
-// import_gltf_accessors.cpp
 
 /// One accessor over checked bytes. Elements are read one by one with memcpy: alignment does not matter, and
 /// sparse accessors need no copy.
@@ -139,7 +118,17 @@ class AccessorReader {
   const std::uint8_t* sparse_values_ = nullptr;
 };
 
-// import_gltf_draco.cpp
+// import_gltf_meshopt.cpp
+
+enum class MeshoptMode : std::uint8_t { kAttributes, kTriangles, kIndices };
+enum class MeshoptFilter : std::uint8_t { kNone, kOctahedral, kQuaternion, kExponential, kColour };
+/// count * stride bytes, of EXT_meshopt_compression or KHR_meshopt_compression: the latter adds version 1 of
+/// attribute streams and the filter of colours. Throws InputError; allocates at most in proportion to `data`.
+std::vector<std::uint8_t> decode_meshopt(const Source& source, const std::string& place, ByteSpan data,
+                                         std::uint64_t count, std::uint64_t stride, MeshoptMode mode,
+                                         MeshoptFilter filter);
+
+// import_gltf_primitives.cpp
 
 using ReadFloats = std::function<void(std::size_t vertex, float* out)>;
 
@@ -157,8 +146,6 @@ struct VertexData {
 VertexData decode_draco(const Source& source, const std::string& place, ByteSpan data, const Json& attributes,
                         const std::function<bool(const std::string& name)>& normalized);
 
-// import_gltf_primitives.cpp
-
 /// Triangles of one primitive in its mesh's space, with the vertices that they use, in the order of the file.
 struct Primitive {
   std::vector<Triangle> triangles;
@@ -166,8 +153,6 @@ struct Primitive {
   std::vector<Vec2f> uv0, uv1;
   std::vector<Vec4f> colours, tangents;
 };
-bool primitive_has(const tinygltf::Model& model, std::size_t mesh, std::size_t primitive,
-                   const char* attribute);
 /// Empty for points, lines and primitives without positions.
 Primitive read_primitive(const Source& source, const Json& document, const tinygltf::Model& model,
                          Buffers& buffers, std::size_t mesh, std::size_t primitive);

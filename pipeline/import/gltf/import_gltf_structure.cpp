@@ -1,5 +1,8 @@
 // The only implementation of tinygltf in texmesh: without its image codecs and without its file system, so
-// that it can neither open nor decode anything.
+// that it can neither open nor decode anything. Its loader takes the text of a file, loads every buffer and
+// refuses index accessors without a bufferView, which is what Draco primitives have. So its readers of single
+// elements, which the loader calls, are called here, on the document that is parsed already. They belong to
+// tinygltf 2.7: another version that has them not, or others, does not compile.
 // nlohmann's header comes first: tinygltf would include it with hidden visibility.
 #include <fstream>
 #include <limits>
@@ -17,57 +20,61 @@
 namespace texmesh::gltf {
 namespace {
 
-/// Extensions are read from the document itself: tinygltf would wrap their integers to 32 bits.
-void drop_extensions(Json& value) {
-  if (value.is_object()) value.erase("extensions");
-  if (value.is_structured()) {
-    for (Json& child : value) drop_extensions(child);
-  }
-}
+class StructureReader {
+ public:
+  StructureReader(const Source& source, const Json& document) : source_(source), document_(document) {}
 
-/// tinygltf refuses index accessors without a bufferView, which is what Draco primitives have.
-void drop_draco_indices(Json& core) {
-  if (!core.contains("meshes")) return;
-  for (Json& mesh : core["meshes"]) {
-    for (Json& primitive : mesh["primitives"]) {
-      const auto e = primitive.find("extensions");
-      if (e != primitive.end() && e->contains("KHR_draco_mesh_compression")) primitive.erase("indices");
+  /// read(element, error, JSON) for every element of an array of the document. What tinygltf complains about
+  /// is an error, even where it would go on.
+  template <class T, class Read>
+  void read_array(const std::string& array, std::vector<T>& elements, const Read& read) const {
+    const auto it = document_.find(array);
+    if (it == document_.end()) return;
+    for (const Json& declared : *it) {
+      const std::string place = "/" + array + "/" + std::to_string(elements.size());
+      read_element(place, declared, elements.emplace_back(), read);
     }
   }
-}
+  template <class T, class Read>
+  void read_element(const std::string& place, const Json& declared, T& element, const Read& read) const {
+    std::string error;
+    const bool is_read = read(&element, &error, declared);
+    if (is_read && error.empty()) return;
+    const std::string words = error.substr(0, std::min<std::size_t>(error.find('\n'), 200));
+    source_.fail(place, "glTF 2.0", words.empty() ? "something else" : words);
+  }
+
+ private:
+  const Source& source_;
+  const Json& document_;
+};
 
 }  // namespace
 
-tinygltf::Model parse_structure(const Source& source, const Json& document) {
-  Json core;
-  for (const char* key : {"asset", "accessors", "bufferViews", "materials", "meshes", "nodes", "samplers",
-                          "scene", "scenes", "textures"}) {
-    if (const auto it = document.find(key); it != document.end()) core[key] = *it;
-  }
-  drop_draco_indices(core);
-  drop_extensions(core);
-  const std::string text = core.dump();
-  if (text.size() > std::numeric_limits<unsigned>::max()) {
-    source.fail("", "JSON under 4 GiB", std::to_string(text.size()));
-  }
-  core = nullptr;
-  tinygltf::Model model;
-  tinygltf::TinyGLTF parser;
-  std::string error, warning;
-  bool ok = false;
-  try {
-    ok = parser.LoadASCIIFromString(&model, &error, &warning, text.data(), static_cast<unsigned>(text.size()),
-                                    "");
-  } catch (const Json::exception& e) {
-    error = e.what();
-  }
-  if (!ok) source.fail("", "glTF 2.0", error.empty() ? "something else" : error.substr(0, 200));
-  // tinygltf leaves out primitives that it cannot read; indices of ours would then mean other ones.
-  for (std::size_t m = 0; m < model.meshes.size(); ++m) {
-    if (model.meshes[m].primitives.size() != document["meshes"][m]["primitives"].size()) {
-      source.fail("/meshes/" + std::to_string(m), "readable primitives", error.substr(0, 200));
-    }
-  }
+tinygltf::Model read_structure(const Source& source, const Json& document) {
+  namespace tiny = tinygltf;
+  tiny::Model model;
+  const StructureReader in(source, document);
+  const auto plain = [](auto read) {
+    return [read](auto* to, std::string* error, const Json& o) { return read(to, error, o, false); };
+  };
+  in.read_element("/asset", document["asset"], model.asset, plain(tiny::ParseAsset));
+  in.read_array("bufferViews", model.bufferViews, plain(tiny::ParseBufferView));
+  in.read_array("accessors", model.accessors, plain(tiny::ParseAccessor));
+  in.read_array("meshes", model.meshes, [&](tiny::Mesh* mesh, std::string* error, const Json& o) {
+    return tiny::ParseMesh(mesh, &model, error, o, false);
+  });
+  in.read_array("nodes", model.nodes, plain(tiny::ParseNode));
+  in.read_array("scenes", model.scenes, [](tiny::Scene* scene, std::string* error, const Json& o) {
+    tiny::ParseIntegerArrayProperty(&scene->nodes, error, o, "nodes", false);
+    return true;
+  });
+  tiny::ParseIntegerProperty(&model.defaultScene, nullptr, document, "scene", false);
+  in.read_array("materials", model.materials, plain(tiny::ParseMaterial));
+  in.read_array("samplers", model.samplers, plain(tiny::ParseSampler));
+  in.read_array("textures", model.textures, [](tiny::Texture* texture, std::string* error, const Json& o) {
+    return tiny::ParseTexture(texture, error, o, false, "");
+  });
   return model;
 }
 

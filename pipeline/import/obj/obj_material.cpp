@@ -1,14 +1,11 @@
 #include "pipeline/import/obj/obj_material.h"
 
-#include <algorithm>
-#include <cmath>
+#include <set>
 
-#include "format/base/errors.h"
-#include "pipeline/import/combine_images.h"
 #include "pipeline/import/import_images.h"
+#include "pipeline/import/material_images.h"
 #include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/text_scan.h"
-#include "stages/image/decode_image.h"
 
 namespace texmesh {
 namespace {
@@ -128,37 +125,23 @@ class MtlReader {
   }
 
   void statement(const std::string& word, std::string_view rest, MtlMaterial& m) {
-    if (word == "kd")
-      m.diffuse = colour(rest);
-    else if (word == "ke")
-      m.emission = colour(rest);
-    else if (word == "d")
-      m.opacity = number(rest);
-    else if (word == "tr")
-      m.transparency = number(rest);
-    else if (word == "pr")
-      m.roughness = number(rest);
-    else if (word == "pm")
-      m.metallic = number(rest);
-    else if (word == "map_kd")
-      m.map_kd = read_texture(rest, lines_.number());
-    else if (word == "map_ka")
-      m.map_ka = read_texture(rest, lines_.number());
-    else if (word == "map_ke" || word == "map_emissive")
-      m.map_ke = read_texture(rest, lines_.number());
-    else if (word == "map_d" || word == "map_opacity")
-      m.map_d = read_texture(rest, lines_.number());
-    else if (word == "map_pr")
-      m.map_pr = read_texture(rest, lines_.number());
-    else if (word == "map_pm")
-      m.map_pm = read_texture(rest, lines_.number());
-    else if (word == "map_ks" || word == "map_ns" || word == "map_ps" || word == "disp" ||
-             word == "map_disp" || word == "decal" || word == "refl" || word == "map_refl")
-      m.left_out.push_back(word + " line " + std::to_string(lines_.number()));
-    else if (word == "norm" || word == "map_kn")
-      m.norm = read_texture(rest, lines_.number());
-    else if (word == "bump" || word == "map_bump")
-      m.bump = read_texture(rest, lines_.number());
+    using M = MtlMaterial;
+    static const std::map<std::string, std::optional<Vec3d> M::*> colours{{"kd", &M::diffuse},
+                                                                          {"ke", &M::emission}};
+    static const std::map<std::string, std::optional<double> M::*> numbers{
+        {"d", &M::opacity}, {"tr", &M::transparency}, {"pr", &M::roughness}, {"pm", &M::metallic}};
+    static const std::map<std::string, std::optional<MtlTexture> M::*> textures{
+        {"map_kd", &M::map_kd},       {"map_ka", &M::map_ka}, {"map_ke", &M::map_ke},
+        {"map_emissive", &M::map_ke}, {"map_d", &M::map_d},   {"map_opacity", &M::map_d},
+        {"map_pr", &M::map_pr},       {"map_pm", &M::map_pm}, {"norm", &M::norm},
+        {"map_kn", &M::norm},         {"bump", &M::bump},     {"map_bump", &M::bump}};
+    static const std::set<std::string> left_out{"map_ks",   "map_ns", "map_ps", "disp",
+                                                "map_disp", "decal",  "refl",   "map_refl"};
+    if (const auto it = colours.find(word); it != colours.end()) m.*it->second = colour(rest);
+    if (const auto it = numbers.find(word); it != numbers.end()) m.*it->second = number(rest);
+    if (const auto it = textures.find(word); it != textures.end())
+      m.*it->second = read_texture(rest, lines_.number());
+    if (left_out.contains(word)) m.left_out.push_back(word + " line " + std::to_string(lines_.number()));
   }
 
   const std::string& name_;

@@ -1,11 +1,8 @@
-#include "format/base/errors.h"
+
 #include "pipeline/about/source_fields.h"
-#include "pipeline/import/finish_model.h"
-#include "pipeline/import/import.h"
 #include "pipeline/import/import_images.h"
 #include "pipeline/import/mesh_builder.h"
-#include "pipeline/import/ply/ply_surface.h"
-#include "pipeline/import/text_scan.h"
+#include "pipeline/import/ply/ply_reader.h"
 
 // PLY has no specification of names beyond x, y, z. This is what MeshLab, CloudCompare, Metashape, Blender
 // and VTK write, and what is read here:
@@ -21,6 +18,291 @@
 
 namespace texmesh {
 namespace {
+
+// What the vertices and faces of a file say, before a mesh is made of them.
+
+struct PlyVertices {
+  std::vector<Vec3d> positions;
+  std::vector<Vec2f> uv;  // each empty or one per position
+  std::vector<Vec3f> normals;
+  std::vector<Vec4f> colours;
+};
+
+/// Faces as they stand in the file; corners of face f are begin[f] .. begin[f + 1].
+struct PlyFaces {
+  std::vector<std::size_t> begin{0};
+  std::vector<std::uint32_t> index;
+  std::vector<Vec2f> uv;              // per corner, or empty
+  std::vector<std::uint8_t> has_uv;   // per face, or empty
+  std::vector<Vec4f> colours;         // per corner, or empty
+  std::vector<std::int32_t> texture;  // per face, or empty
+  std::size_t count() const { return begin.size() - 1; }
+};
+
+struct PlySurface {
+  PlyVertices vertices;
+  PlyFaces faces;                     // every index below the number of vertices
+  std::vector<std::string> comments;  // of the header, in order
+  // Faults that are passed over, with their numbers:
+  std::uint64_t long_lines = 0, odd_texcoords = 0;
+  std::string first_long_line;  // where it stands
+};
+
+double scale_of_type(PlyType type) {
+  switch (type) {
+    case PlyType::kFloat:
+    case PlyType::kDouble:
+      return 1;
+    case PlyType::kInt16:
+    case PlyType::kUint16:
+      return 1 / 65535.0;
+    default:
+      return 1 / 255.0;  // int too: the range of the type would leave everything black
+  }
+}
+
+/// Where an element keeps red, green, blue and alpha.
+struct ColourColumns {
+  std::array<int, 4> column{-1, -1, -1, -1};
+  std::array<double, 4> scale{1, 1, 1, 1};
+  std::array<float, 256> table{};  // linear light of an 8-bit value
+
+  explicit ColourColumns(const PlyElement& element) {
+    column = {element.find_property({"red", "r", "diffuse_red"}),
+              element.find_property({"green", "g", "diffuse_green"}),
+              element.find_property({"blue", "b", "diffuse_blue"}),
+              element.find_property({"alpha", "a", "diffuse_alpha"})};
+    for (std::size_t i = 0; i < 4; ++i) {
+      if (column[i] < 0) continue;
+      const PlyProperty& p = element.properties[static_cast<std::size_t>(column[i])];
+      if (p.is_list) column[i] = -1;
+      scale[i] = scale_of_type(p.type);
+    }
+    for (std::size_t i = 0; i < 256; ++i) table[i] = linear_from_srgb(static_cast<double>(i) / 255.0);
+  }
+  bool any() const { return column[0] >= 0 && column[1] >= 0 && column[2] >= 0; }
+  float linear(double value, double unit) const {
+    if (unit == 1 / 255.0 && value >= 0 && value <= 255 && value == std::floor(value))
+      return table[static_cast<std::size_t>(value)];
+    return linear_from_srgb(value * unit);
+  }
+  Vec4f read(const PlyRow& row) const {
+    auto value = [&](std::size_t i) { return row.values[static_cast<std::size_t>(column[i])]; };
+    return {linear(value(0), scale[0]), linear(value(1), scale[1]), linear(value(2), scale[2]),
+            column[3] >= 0 ? static_cast<float>(value(3) * scale[3]) : 1.0f};
+  }
+};
+
+int find_scalar(const PlyElement& e, std::initializer_list<std::string_view> names) {
+  const int i = e.find_property(names);
+  return i >= 0 && !e.properties[static_cast<std::size_t>(i)].is_list ? i : -1;
+}
+int find_list(const PlyElement& e, std::initializer_list<std::string_view> names) {
+  const int i = e.find_property(names);
+  return i >= 0 && e.properties[static_cast<std::size_t>(i)].is_list ? i : -1;
+}
+
+/// Reads the elements vertex, face and tristrips. InputError for a file without faces, for indices that are
+/// no vertices, and for more than the options allow.
+class SurfaceReader {
+ public:
+  SurfaceReader(const std::string& file, std::span<const std::uint8_t> bytes, const ImportOptions& options,
+                const RunContext& context)
+      : file_(file),
+        header_(read_ply_header(file, bytes)),
+        rows_(file, bytes, header_),
+        options_(options),
+        context_(context) {}
+
+  PlySurface read() {
+    read_elements();
+    if (surface_.vertices.positions.empty())
+      throw InputError(file_, "header", "an element vertex with x, y and z", "none");
+    if (surface_.faces.count() == 0)
+      throw InputError(
+          file_, "", "faces",
+          "none (a point cloud of " + std::to_string(surface_.vertices.positions.size()) + " points)");
+    check_indices();
+    surface_.comments = header_.comments;
+    return std::move(surface_);
+  }
+
+ private:
+  void read_elements() {
+    for (const PlyElement& element : header_.elements) {
+      if (element.properties.empty()) continue;
+      rows_.begin(element);
+      if (element.name == "vertex")
+        read_vertices(element);
+      else if (element.name == "face")
+        read_faces(element);
+      else if (element.name == "tristrips")
+        read_strips(element);
+      else
+        skip(element);
+    }
+  }
+
+  void check_cancelled(std::uint64_t row) const {
+    if (row % 65536 == 0) context_.check_cancelled();
+  }
+
+  void skip(const PlyElement& element) {
+    for (std::uint64_t i = 0; i < element.count; ++i) {
+      check_cancelled(i);
+      rows_.next(row_);
+    }
+  }
+
+  void note_extra() {
+    if (!row_.extra.empty() && surface_.long_lines++ == 0) surface_.first_long_line = rows_.place();
+  }
+
+  void check_count(const PlyElement& element, int limit) const {
+    if (element.count > static_cast<std::uint64_t>(limit))
+      throw InputError(file_, "element " + element.name, "at most " + std::to_string(limit),
+                       std::to_string(element.count));
+  }
+
+  void read_vertices(const PlyElement& element) {
+    check_count(element, options_.max_vertices);
+    const std::array<int, 3> xyz{find_scalar(element, {"x"}), find_scalar(element, {"y"}),
+                                 find_scalar(element, {"z"})};
+    if (xyz[0] < 0 || xyz[1] < 0 || xyz[2] < 0)
+      throw InputError(file_, "element vertex", "properties x, y and z", "not all of them");
+    const std::array<int, 3> n{find_scalar(element, {"nx"}), find_scalar(element, {"ny"}),
+                               find_scalar(element, {"nz"})};
+    const std::array<int, 2> st{
+        find_scalar(element, {"s", "u", "texture_u", "texture_s", "texcoord_u", "tu"}),
+        find_scalar(element, {"t", "v", "texture_v", "texture_t", "texcoord_v", "tv"})};
+    const ColourColumns colours(element);
+    const bool has_normals = n[0] >= 0 && n[1] >= 0 && n[2] >= 0, has_uv = st[0] >= 0 && st[1] >= 0;
+    for (std::uint64_t i = 0; i < element.count; ++i) {
+      check_cancelled(i);
+      rows_.next(row_);
+      note_extra();
+      auto value = [this](int column) { return row_.values[static_cast<std::size_t>(column)]; };
+      surface_.vertices.positions.push_back({value(xyz[0]), value(xyz[1]), value(xyz[2])});
+      if (has_normals)
+        surface_.vertices.normals.push_back(to_float(Vec3d{value(n[0]), value(n[1]), value(n[2])}));
+      if (has_uv) surface_.vertices.uv.push_back(flipped(value(st[0]), value(st[1])));
+      if (colours.any()) surface_.vertices.colours.push_back(colours.read(row_));
+    }
+  }
+
+  static Vec2f flipped(double u, double v) { return {static_cast<float>(u), static_cast<float>(1 - v)}; }
+
+  std::uint32_t index_of(double value) const {
+    if (!(value >= 0) || value > 4294967294.0 || value != std::floor(value))
+      throw InputError(file_, rows_.place(), "a vertex index", std::to_string(value));
+    return static_cast<std::uint32_t>(value);
+  }
+
+  void add_index(double value) {
+    surface_.faces.index.push_back(index_of(value));
+    if (surface_.faces.index.back() > largest_index_) {
+      largest_index_ = surface_.faces.index.back();
+      largest_index_place_ = rows_.place();
+    }
+  }
+
+  void read_faces(const PlyElement& element) {
+    const int corners = find_list(element, {"vertex_indices", "vertex_index"});
+    if (corners < 0) throw InputError(file_, "element face", "a list vertex_indices", "none");
+    const int texcoord = find_list(element, {"texcoord"}), texnumber = find_scalar(element, {"texnumber"});
+    const ColourColumns colours(element);
+    for (std::uint64_t i = 0; i < element.count; ++i) {
+      check_cancelled(i);
+      rows_.next(row_);
+      note_extra();
+      const auto& indices = row_.lists[static_cast<std::size_t>(corners)];
+      for (double index : indices) add_index(index);
+      if (texcoord >= 0) add_face_uvs(row_.lists[static_cast<std::size_t>(texcoord)], indices.size());
+      add_face_colours(colours, indices.size());
+      if (texnumber >= 0)
+        surface_.faces.texture.push_back(texture_number(row_.values[static_cast<std::size_t>(texnumber)]));
+      surface_.faces.begin.push_back(surface_.faces.index.size());
+    }
+  }
+
+  static std::int32_t texture_number(double value) {
+    return value >= 0 && value < 65536 && value == std::floor(value) ? static_cast<std::int32_t>(value) : -1;
+  }
+
+  void add_face_uvs(const std::vector<double>& uvs, std::size_t corners) {
+    const bool good = uvs.size() == 2 * corners;
+    if (!good && !uvs.empty()) ++surface_.odd_texcoords;
+    surface_.faces.uv.resize(surface_.faces.begin.back());  // faces before this element's have none
+    for (std::size_t k = 0; k < corners; ++k)
+      surface_.faces.uv.push_back(good ? flipped(uvs[2 * k], uvs[2 * k + 1]) : Vec2f{});
+    surface_.faces.has_uv.push_back(good);
+  }
+
+  // VCG's exporter has a bug: where it writes a colour per corner it declares a colour per face. Such a
+  // line ends in `9 r g b r g b r g b`, so the declared columns hold the wrong numbers and the tail
+  // holds the colours.
+  bool add_vcg_corner_colours(std::size_t declared, std::size_t corners) {
+    if (row_.extra.empty()) return false;
+    std::vector<double> tail(row_.values.end() - static_cast<std::ptrdiff_t>(declared), row_.values.end());
+    tail.insert(tail.end(), row_.extra.begin(), row_.extra.end());
+    const double n = 3.0 * static_cast<double>(corners);
+    if (tail.front() != n || static_cast<double>(tail.size()) != n + 1) return false;
+    for (std::size_t k = 0; k < corners; ++k)
+      surface_.faces.colours.push_back({linear_from_srgb(tail[3 * k + 1]), linear_from_srgb(tail[3 * k + 2]),
+                                        linear_from_srgb(tail[3 * k + 3]), 1});
+    return true;
+  }
+
+  void add_face_colours(const ColourColumns& columns, std::size_t corners) {
+    if (!columns.any()) return;
+    surface_.faces.colours.resize(surface_.faces.begin.back(), {1, 1, 1, 1});
+    const auto red = static_cast<std::size_t>(columns.column[0]);
+    if (add_vcg_corner_colours(row_.values.size() - red, corners)) return;
+    // Numbers too many of any other kind: which of them is the colour cannot be told.
+    const Vec4f colour = row_.extra.empty() ? columns.read(row_) : Vec4f{1, 1, 1, 1};
+    surface_.faces.colours.insert(surface_.faces.colours.end(), corners, colour);
+  }
+
+  void read_strips(const PlyElement& element) {
+    const int corners = find_list(element, {"vertex_indices", "vertex_index"});
+    if (corners < 0) throw InputError(file_, "element tristrips", "a list vertex_indices", "none");
+    for (std::uint64_t i = 0; i < element.count; ++i) {
+      rows_.next(row_);
+      std::size_t start = 0;
+      const auto& strip = row_.lists[static_cast<std::size_t>(corners)];
+      for (std::size_t k = 0; k < strip.size(); ++k) {
+        check_cancelled(k);
+        if (strip[k] < 0) {
+          start = k + 1;
+        } else if (k >= start + 2) {
+          const bool odd = (k - start) % 2 != 0;
+          for (std::size_t c : {k - 2, odd ? k : k - 1, odd ? k - 1 : k}) add_index(strip[c]);
+          surface_.faces.begin.push_back(surface_.faces.index.size());
+        }
+      }
+    }
+  }
+
+  void check_indices() const {
+    if (!surface_.faces.index.empty() && largest_index_ >= surface_.vertices.positions.size())
+      throw InputError(file_, largest_index_place_,
+                       "a vertex index below " + std::to_string(surface_.vertices.positions.size()),
+                       std::to_string(largest_index_));
+    if (surface_.faces.count() > static_cast<std::size_t>(options_.max_triangles))
+      throw InputError(file_, "element face", "at most " + std::to_string(options_.max_triangles),
+                       std::to_string(surface_.faces.count()));
+  }
+
+  const std::string& file_;
+  PlyHeader header_;
+  PlyRows rows_;
+  const ImportOptions& options_;
+  const RunContext& context_;
+  PlyRow row_;
+  PlySurface surface_;
+  std::uint32_t largest_index_ = 0;
+  std::string largest_index_place_;
+};
 
 /// Makes a model of a file's vertices and faces.
 class PlyModel {
@@ -149,7 +431,7 @@ class PlyModel {
 ImportedModel import_ply(const std::string& file_name, std::span<const std::uint8_t> bytes,
                          Resolver& resolver, const ImportOptions& options, const RunContext& context) {
   ImportedModel out;
-  PlySurface surface = read_ply_surface(file_name, bytes, options, context);
+  PlySurface surface = SurfaceReader(file_name, bytes, options, context).read();
   out.format = "ply";
   Notes notes;
   out.about = about_from_comments(surface.comments, out.format, notes);

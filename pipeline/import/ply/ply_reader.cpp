@@ -6,7 +6,6 @@
 #include <optional>
 
 #include "format/base/errors.h"
-#include "pipeline/import/text_scan.h"
 
 namespace texmesh {
 namespace {

@@ -1,15 +1,6 @@
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <cstring>
 
-#include "format/base/errors.h"
-#include "format/base/no_index.h"
 #include "format/base/portable_math.h"
-#include "pipeline/import/finish_model.h"
-#include "pipeline/import/import.h"
 #include "pipeline/import/import_images.h"
-#include "pipeline/import/local_frame.h"
 #include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/range/range_scan_document.h"
 #include "pipeline/import/text_scan.h"

@@ -1,11 +1,8 @@
 #include "pipeline/import/range/range_scan_document.h"
 
-#include <cmath>
-#include <map>
 #include <nlohmann/json.hpp>
 
 #include "format/base/bounded_json.h"
-#include "format/base/errors.h"
 #include "pipeline/import/text_scan.h"
 
 namespace texmesh {

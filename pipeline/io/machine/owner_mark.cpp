@@ -1,7 +1,6 @@
 #include "pipeline/io/machine/owner_mark.h"
 
 #include <signal.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -10,7 +9,6 @@
 #include <charconv>
 #include <fstream>
 
-#include "format/base/sha256.h"
 #include "format/base/text_bytes.h"
 #include "pipeline/io/file_stamp.h"
 

@@ -3,12 +3,8 @@
 #include <zstd.h>
 
 #include <algorithm>
-#include <array>
-#include <bit>
 #include <memory>
-#include <string_view>
 
-#include "format/base/errors.h"
 #include "stages/image/png_writer.h"
 
 namespace texmesh {

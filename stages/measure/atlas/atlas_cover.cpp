@@ -1,6 +1,5 @@
 // How much of a texture triangles show, and how much more than once: the triangles are filled on a grid.
 #include <algorithm>
-#include <cmath>
 #include <tuple>
 
 #include "stages/measure/atlas/atlas_parts.h"

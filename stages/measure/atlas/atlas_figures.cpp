@@ -2,7 +2,6 @@
 // what charts, seams (atlas_charts.cpp) and cover (atlas_cover.cpp) add up to.
 
 #include <algorithm>
-#include <cmath>
 
 #include "stages/measure/atlas/atlas_parts.h"
 

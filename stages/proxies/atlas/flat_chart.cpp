@@ -1,7 +1,6 @@
 #include "stages/proxies/atlas/flat_chart.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <limits>
 #include <utility>

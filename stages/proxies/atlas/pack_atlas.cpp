@@ -4,10 +4,8 @@
 #include "stages/proxies/atlas_mesh.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <numeric>
-#include <utility>
 
 #include "format/base/no_index.h"
 #include "stages/proxies/atlas/packing_grid.h"

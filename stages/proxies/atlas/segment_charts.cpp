@@ -7,7 +7,6 @@
 
 #include <complex>
 #include <numeric>
-#include <utility>
 
 #include "format/base/no_index.h"
 #include "format/base/portable_math.h"

@@ -1,8 +1,5 @@
 #include "stages/proxies/bake/bake_source.h"
 
-#include <cmath>
-
-#include "format/base/box.h"
 #include "format/base/no_index.h"
 
 namespace texmesh::proxies {

@@ -1,7 +1,5 @@
 #include "stages/proxies/coding/proxy_glb.h"
 
-#include <array>
-
 #include "stages/gltf/glb_writer.h"
 
 namespace texmesh::proxies {

@@ -1,9 +1,62 @@
 #pragma once
 // Inside the room only: a proxy as a file.
+#include <cstddef>
+
+#include "format/base/bytes.h"
+#include "stages/gltf/draco_mesh.h"
+#include "stages/proxies/atlas_mesh.h"
 #include "stages/proxies/bake/bake_source.h"
-#include "stages/proxies/coding/proxy_mesh.h"
 
 namespace texmesh::proxies {
+
+/// One stream. `packed` is what the file holds; decoded it has count * stride bytes.
+struct MeshStream {
+  Bytes packed;
+  std::size_t stride = 0, count = 0;
+};
+
+/// How a mesh is stored. Draco takes half of meshopt's bytes and a decoder that clients load.
+struct MeshCoding {
+  bool draco = false;
+  int position_bits = 12;  // 4..16, along the longest side of the box
+};
+
+/// The triangles of one group.
+struct CodedGroup {
+  std::uint32_t group = 0;
+  bool has_normals = false;
+  /// Per vertex three u16 on the positions' grid, two bytes of 0, two u16 on the coordinates' grid; with
+  /// normals three i8, normalised, and a byte of 0.
+  MeshStream vertex_stream;
+  MeshStream indices;                            // u16 or u32
+  DracoStream draco;                             // instead of both, where it is not empty
+  std::array<std::uint32_t, 3> least{}, most{};  // of the positions
+  bool is_draco() const { return !draco.bytes.empty(); }
+  std::size_t triangles() const { return is_draco() ? draco.triangles : indices.count / 3; }
+  std::size_t vertices() const { return is_draco() ? draco.vertices : vertex_stream.count; }
+};
+
+/// position = origin + step * grid place; of meshopt, uv = uv_step * grid place.
+struct CodedMesh {
+  Vec3f origin;
+  float step = 1;
+  Vec2f uv_step;
+  std::vector<CodedGroup> groups;  // rising; none without triangles
+  std::size_t bytes() const;       // of all packed streams
+};
+
+/// `normals`: per vertex, unit; empty for none. `with_normals`: per group. Triangles with two corners in one
+/// place of the grid go. No group is left where nothing is left.
+/// What Draco refuses is coded by meshopt.
+CodedMesh code_mesh(const AtlasMesh& mesh, const std::vector<Vec3f>& normals,
+                    const std::vector<bool>& with_normals, const MeshCoding& coding);
+
+/// The mesh that a reader gets: positions, normals and coordinates rounded as coded, but no triangle gone.
+struct RoundedMesh {
+  std::vector<Vec3f> positions, normals;
+  std::vector<Vec2f> uvs;
+};
+RoundedMesh rounded_mesh(const AtlasMesh& mesh, const std::vector<Vec3f>& normals, const MeshCoding& coding);
 
 /// A coded picture: lossy WebP.
 struct ProxyImage {

@@ -1,11 +1,7 @@
-#include "stages/proxies/coding/proxy_mesh.h"
+#include "stages/proxies/coding/proxy_glb.h"
 
 #include <meshoptimizer.h>
 
-#include <cmath>
-
-#include "format/base/box.h"
-#include "format/base/errors.h"
 #include "format/base/no_index.h"
 #include "stages/gltf/glb_writer.h"
 

@@ -1,9 +1,5 @@
 #include "stages/proxies/coding/proxy_pictures.h"
 
-#include <algorithm>
-#include <cmath>
-#include <optional>
-
 #include "format/base/portable_math.h"
 #include "stages/image/webp.h"
 #include "stages/render/shade.h"

@@ -1,7 +1,6 @@
 // Read, not computed: 0.15 s is as long as a small model may take.
 #include <bit>
 #include <span>
-#include <stdexcept>
 
 #include "stages/render/environment.h"
 

@@ -1,4 +1,4 @@
-#include "pipeline/about/licence.h"
+#include "pipeline/about/source_fields.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "pipeline/about/xmp.h"
+#include "pipeline/about/gltf_about.h"
 
 #include <gtest/gtest.h>
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -33,6 +34,18 @@ TEST(Options, EveryFieldHasAHelpTextAndAUniquePath) {
 TEST(Options, DefaultsLieInTheirRanges) {
   CompileOptions o;
   EXPECT_NO_THROW(read_profile(o, write_profile(o), "defaults"));
+}
+
+TEST(Options, InstalledProfilesAreRead) {
+  std::set<std::string> names;
+  for (const auto& entry : std::filesystem::directory_iterator(TEXMESH_SOURCE_DIR "/profiles")) {
+    std::ifstream in(entry.path());
+    CompileOptions o;
+    EXPECT_NO_THROW(read_profile(o, std::string(std::istreambuf_iterator<char>(in), {}), entry.path()));
+    EXPECT_FALSE(o.set_by_user.empty()) << entry.path();
+    names.insert(entry.path().stem());
+  }
+  EXPECT_EQ(names, (std::set<std::string>{"archive", "fast", "small", "thesis"}));
 }
 
 TEST(Options, ProfileRoundTripKeepsEveryChangedValue) {

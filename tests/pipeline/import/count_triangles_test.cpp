@@ -1,4 +1,4 @@
-#include "pipeline/import/count_triangles.h"
+#include "pipeline/import/import.h"
 
 #include <gtest/gtest.h>
 
@@ -56,6 +56,13 @@ TEST(CountTriangles, WhatIsBrokenOrBoastsSaysNothing) {
         R"({"accessors":[{"count":4000000000}],"meshes":[{"primitives":[{"indices":0}]}]})",
         R"({"accessors":[{"count":1e300}],"meshes":[{"primitives":[{"indices":0}]}]})"})
     EXPECT_EQ(count_triangles("a.glb", glb(json, 100)), 0u) << json;
+  const std::string triangles = R"("accessors":[{"count":300}],"meshes":[{"primitives":[{"indices":0}]}])";
+  EXPECT_EQ(count_triangles("a.glb", glb("{" + triangles + "}", 100)), 100u);
+  EXPECT_EQ(
+      count_triangles(
+          "a.glb", glb("{\"a\":" + std::string(64, '[') + std::string(64, ']') + "," + triangles + "}", 100)),
+      0u);
+  EXPECT_EQ(count_triangles("a.glb", glb("{\"a\":" + std::string(300'000, '['), 100)), 0u);
   Bytes cut = glb("{}", 0);
   for (std::size_t size = 0; size <= cut.size(); ++size)
     EXPECT_EQ(count_triangles("a.glb", {cut.data(), size}), 0u) << size;

@@ -1,4 +1,4 @@
-#include "pipeline/import/finish_model.h"
+#include "pipeline/import/mesh_builder.h"
 
 #include <cmath>
 #include <limits>
@@ -8,8 +8,6 @@
 #include "format/base/errors.h"
 #include "pipeline/import/import.h"
 #include "pipeline/import/import_images.h"
-#include "pipeline/import/local_frame.h"
-#include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/text_scan.h"
 #include "tests/support/images.h"
 #include "tests/support/memory_resolver.h"

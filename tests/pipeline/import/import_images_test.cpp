@@ -43,6 +43,28 @@ TEST(AddImage, OneEntryPerContentOneWarningPerName) {
   EXPECT_NE(error.find("c.png"), std::string::npos) << error;
 }
 
+TEST(AddImage, OtherPicturesBecomeThoseThatPackagesKeep) {
+  Model m;
+  MemoryResolver resolver;
+  const Bytes texels = testing::test_picture(8, 8, 3);
+  for (const auto& [name, writer] : {std::pair{"a.bmp", "bmp"}, {"b.TGA", "targa"}})
+    resolver.files[name] = testing::encode_image(writer, 8, 8, 3, texels, OIIO::TypeDesc::UINT8);
+  const std::vector<float> light(4 * 4 * 3, 0.5f);
+  resolver.files["c.hdr"] = testing::encode_image("hdr", 4, 4, 3, light, OIIO::TypeDesc::FLOAT);
+  EXPECT_EQ(add_image(m, "a.bmp", resolver, "f", "p", {}), 0);
+  EXPECT_EQ(add_image(m, "b.TGA", resolver, "f", "p", {}), 0) << "the same texels are the same image";
+  EXPECT_EQ(add_image(m, "c.hdr", resolver, "f", "p", {}), 1);
+  EXPECT_EQ(add_image(m, "a.bmp", resolver, "f", "q", {}), 0);
+  EXPECT_EQ(count_notes(m, "converted-image"), 2);
+  EXPECT_EQ(decode_image(m.images[0], FloatEncoding::kSrgb).data, texels);
+  EXPECT_EQ(decode_image(m.images[1], FloatEncoding::kSrgb).data[0], 188);
+  resolver.files["cut.bmp"] = {resolver.files["a.bmp"].begin(), resolver.files["a.bmp"].begin() + 100};
+  const std::string error =
+      input_error([&] { add_image(m, "cut.bmp", resolver, "model.obj", "material", {}); });
+  EXPECT_NE(error.find("model.obj"), std::string::npos) << error;
+  EXPECT_NE(error.find("cut.bmp"), std::string::npos) << error;
+}
+
 TEST(AddImage, AKtx2IsReadByItsContentAndOnce) {
   Model m;
   MemoryResolver resolver;

@@ -1,4 +1,4 @@
-#include "pipeline/import/local_frame.h"
+#include "pipeline/import/mesh_builder.h"
 
 #include <cmath>
 #include <limits>

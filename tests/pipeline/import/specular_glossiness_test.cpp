@@ -1,4 +1,4 @@
-#include "pipeline/import/specular_glossiness.h"
+#include "pipeline/import/material_images.h"
 
 #include <gtest/gtest.h>
 

@@ -14,6 +14,7 @@ TEST(Markup, WhatHasAMeaningThereIsEscaped) {
 TEST(Markup, WhatIsNoUtf8IsReplaced) {
   EXPECT_EQ(markup_escaped("a\xff<"), "a\xef\xbf\xbd&lt;");
   EXPECT_EQ(markup_escaped("\xc3"), "\xef\xbf\xbd");
+  EXPECT_EQ(markup_escaped("\xe2\x82z"), "\xef\xbf\xbd\xef\xbf\xbdz");  // a byte at a time
 }
 
 TEST(Markup, ControlCharactersDoNotPass) {

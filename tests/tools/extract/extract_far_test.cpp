@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "pipeline/compile/compile_model.h"
-#include "pipeline/import/local_frame.h"
+#include "pipeline/import/mesh_builder.h"
 #include "stages/gltf/check_glb.h"
 #include "tests/support/command.h"
 #include "tests/support/meshes.h"

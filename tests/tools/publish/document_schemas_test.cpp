@@ -6,6 +6,7 @@
 
 #include "pipeline/io/record.h"
 #include "tests/support/command.h"
+#include "tools/extract/extract.h"
 #include "tools/inspect/atlas/atlas_report.h"
 #include "tools/inspect/diff/diff.h"
 #include "tools/inspect/verify/verify.h"
@@ -17,8 +18,8 @@ namespace texmesh::testing {
 namespace {
 
 TEST(DocumentSchemas, AreThoseOfTheProgram) {
-  for (const DocumentSchema& schema :
-       {diff_schema(), doctor_schema(), export_schema(), report_schema(), site_schema(), verify_schema()}) {
+  for (const DocumentSchema& schema : {diff_schema(), doctor_schema(), export_schema(), extract_schema(),
+                                       report_schema(), site_schema(), verify_schema()}) {
     const std::string file = std::string(TEXMESH_SOURCE_DIR "/schemas/") + schema.name + ".schema.json";
     if (std::getenv("TEXMESH_WRITE_SCHEMAS")) write_text(file, schema.text);
     EXPECT_EQ(read_text(file), schema.text) << file;

@@ -595,13 +595,12 @@ void Command::help_option(const std::string& name, const std::string& prefix, co
   app_->add_option_function<std::string>(name, print, help)->type_name("NAME");
 }
 
-void Command::text_option(const std::string& name, std::string (*text)(), const std::string& help) {
+Option Command::text_option(const std::string& name, std::string (*text)(), const std::string& help) {
   const auto print = [text] {
     std::cout << text();
     throw CLI::Success();
   };
-  CLI::Option* option = app_->add_flag_callback(name, print, help);
-  if (!group_.empty()) option->group(group_);
+  return flag(name, print, help);
 }
 
 void Command::examples(const std::string& lines) { state_->help.examples[app_] = lines; }

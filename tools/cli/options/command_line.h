@@ -95,7 +95,7 @@ class Command {
     return made.one_of_explained(words).remembers_default(std::string(enum_name(value)));
   }
   /// An option that prints a text, and the program does nothing else.
-  void text_option(const std::string& name, std::string (*text)(), const std::string& help);
+  Option text_option(const std::string& name, std::string (*text)(), const std::string& help);
   /// An option whose value names a group `prefix` + value: its help is printed, nothing else done.
   void help_option(const std::string& name, const std::string& prefix, const std::string& help);
 

@@ -18,8 +18,6 @@
 // 7. Last, proxies of the package are tried in its place (offer_proxies()).
 #include "tools/extract/budget/budget_search.h"
 
-#include <algorithm>
-#include <cmath>
 #include <numeric>
 
 #include "tools/extract/proxy/proxy_search.h"

@@ -1,10 +1,6 @@
 #include "tools/extract/budget/candidates.h"
 
-#include <algorithm>
-#include <cmath>
-
 #include "format/base/portable_math.h"
-#include "format/container/layout.h"
 #include "stages/base/parallel.h"
 #include "stages/image/decode_image.h"
 #include "tools/extract/glb/scale_file.h"

@@ -1,6 +1,5 @@
 #include "tools/extract/budget/filling.h"
 
-#include <algorithm>
 #include <numeric>
 
 #include "format/base/portable_math.h"

@@ -1,8 +1,5 @@
 #include "tools/extract/budget/loss_curves.h"
 
-#include <algorithm>
-#include <cmath>
-
 #include "format/base/portable_math.h"
 
 namespace texmesh {

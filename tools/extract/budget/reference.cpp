@@ -1,11 +1,5 @@
 #include "tools/extract/budget/reference.h"
 
-#include <algorithm>
-#include <bit>
-#include <cmath>
-
-#include "format/base/errors.h"
-#include "format/container/layout.h"
 #include "stages/base/parallel.h"
 #include "tools/extract/glb/scale_file.h"
 

@@ -1,8 +1,5 @@
 #include "tools/extract/glb/image_codecs.h"
 
-#include <algorithm>
-
-#include "format/base/errors.h"
 #include "stages/image/png_writer.h"
 #include "stages/image/webp.h"
 #include "stages/jpeg/jpeg_coder.h"

@@ -1,12 +1,7 @@
 #include "tools/extract/glb/scale_file.h"
 
-#include <algorithm>
-#include <set>
-
-#include "format/container/layout.h"
 #include "format/split/split_model.h"
 #include "format/split/split_reader.h"
-#include "format/split/split_stream.h"
 #include "pipeline/import/import.h"
 #include "pipeline/io/file_resolver.h"
 #include "stages/gltf/glb_container.h"

@@ -1,10 +1,7 @@
 #include "tools/extract/glb/standalone_glb.h"
 
-#include <algorithm>
 #include <charconv>
-#include <utility>
 
-#include "format/base/errors.h"
 #include "pipeline/about/gltf_about.h"
 #include "stages/gltf/glb_container.h"
 #include "stages/gltf/glb_writer.h"

@@ -1,10 +1,6 @@
 #include "tools/extract/glb/texture_source.h"
 
-#include <algorithm>
-#include <cmath>
-
 #include "delivery/cpp/package/plane_streams.h"
-#include "format/container/layout.h"
 #include "stages/fill/fill.h"
 #include "stages/geometry/texel_coverage.h"
 #include "tools/extract/glb/scale_file.h"

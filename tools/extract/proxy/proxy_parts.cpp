@@ -1,12 +1,7 @@
 #include "tools/extract/proxy/proxy_parts.h"
 
-#include <algorithm>
-#include <array>
-
 #include "format/base/box.h"
-#include "format/base/errors.h"
 #include "format/base/srgb.h"
-#include "format/split/split_stream.h"
 #include "pipeline/import/import.h"
 #include "pipeline/io/file_resolver.h"
 #include "stages/condition/condition.h"

@@ -1,11 +1,7 @@
 #include "tools/extract/proxy/proxy_search.h"
 
-#include <algorithm>
-
 #include "format/base/portable_math.h"
-#include "format/container/layout.h"
 #include "pipeline/about/gltf_about.h"
-#include "pipeline/import/import.h"
 #include "pipeline/io/file_resolver.h"
 #include "stages/gltf/glb_container.h"
 #include "tools/extract/budget/filling.h"

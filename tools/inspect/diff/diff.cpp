@@ -3,15 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <map>
 #include <nlohmann/json.hpp>
-#include <set>
 
-#include "format/base/sha256.h"
 #include "format/base/text_bytes.h"
-#include "format/container/layout.h"
 #include "pipeline/compile/stage_table.h"
-#include "pipeline/io/record.h"
 #include "pipeline/io/table.h"
 #include "tools/inspect/provenance.h"
 

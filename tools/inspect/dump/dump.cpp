@@ -4,7 +4,6 @@
 
 #include <algorithm>
 
-#include "format/container/layout.h"
 #include "pipeline/io/table.h"
 #include "tools/inspect/atlas/atlas_report.h"
 #include "tools/inspect/dump/dump_parts.h"

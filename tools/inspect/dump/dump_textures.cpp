@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <iterator>
 
-#include "format/documents/tables.h"
 #include "format/rules/allocation.h"
 #include "pipeline/io/table.h"
 #include "tools/inspect/dump/dump_parts.h"

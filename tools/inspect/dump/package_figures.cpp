@@ -1,9 +1,7 @@
 #include "tools/inspect/dump/package_figures.h"
 
 #include <algorithm>
-#include <array>
 
-#include "format/container/layout.h"
 #include "format/rules/allocation.h"
 #include "format/rules/rate_distortion.h"
 

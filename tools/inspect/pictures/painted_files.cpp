@@ -1,11 +1,6 @@
 // A painted model as files: a GLB to turn in any viewer, and a PNG of two views.
-#include <algorithm>
-#include <cmath>
-#include <cstring>
-#include <nlohmann/json.hpp>
 
 #include "format/base/box.h"
-#include "format/base/portable_math.h"
 #include "format/base/srgb.h"
 #include "format/rules/allocation.h"
 #include "stages/gltf/glb_writer.h"
@@ -34,15 +29,12 @@ std::size_t add_attribute(GlbWriter& glb, const std::vector<T>& values, const ch
 std::size_t add_positions(GlbWriter& glb, const std::vector<Vec3f>& points) {
   const Box3f box = bounding_box(points);
   const std::size_t view = glb.add_view(bytes_of(points), 0, kArrayBuffer);
-  const auto list = [](Vec3f p) {
-    return Json::array({GlbWriter::shortest(p.x), GlbWriter::shortest(p.y), GlbWriter::shortest(p.z)});
-  };
   return glb.add_accessor({{"bufferView", view},
                            {"componentType", kFloat},
                            {"count", points.size()},
                            {"type", "VEC3"},
-                           {"min", list(box.min)},
-                           {"max", list(box.max)}});
+                           {"min", GlbWriter::shortest(box.min)},
+                           {"max", GlbWriter::shortest(box.max)}});
 }
 
 std::size_t add_indices(GlbWriter& glb, const std::vector<std::uint32_t>& indices) {
@@ -76,18 +68,16 @@ Json texture_info(GlbWriter& glb, const TextureRef& ref) {
   if (ref.transform.is_identity()) return info;
   glb.use_extension("KHR_texture_transform", true);
   const UvTransform& t = ref.transform;
-  const auto number = [](float x) { return GlbWriter::shortest(x); };
   info["extensions"] = {{"KHR_texture_transform",
-                         {{"offset", {number(t.offset.x), number(t.offset.y)}},
-                          {"scale", {number(t.scale.x), number(t.scale.y)}},
-                          {"rotation", number(t.rotation)}}}};
+                         {{"offset", GlbWriter::shortest({t.offset.x, t.offset.y})},
+                          {"scale", GlbWriter::shortest({t.scale.x, t.scale.y})},
+                          {"rotation", GlbWriter::shortest(t.rotation)}}}};
   return info;
 }
 
 void add_material(GlbWriter& glb, const Material& m, bool translucent) {
   Json pbr{{"baseColorFactor",
-            {GlbWriter::shortest(m.base_colour.x), GlbWriter::shortest(m.base_colour.y),
-             GlbWriter::shortest(m.base_colour.z), GlbWriter::shortest(m.base_colour.w)}},
+            GlbWriter::shortest({m.base_colour.x, m.base_colour.y, m.base_colour.z, m.base_colour.w})},
            {"metallicFactor", 0},
            {"roughnessFactor", 1}};
   if (m.base_colour_texture.used()) pbr["baseColorTexture"] = texture_info(glb, m.base_colour_texture);

@@ -4,18 +4,12 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
-
-#include "format/base/errors.h"
 #include "format/base/no_index.h"
-#include "format/base/portable_math.h"
 #include "format/base/srgb.h"
 #include "format/rules/allocation.h"
 #include "pipeline/io/table.h"
 #include "stages/geometry/component_boxes.h"
 #include "stages/image/decode_image.h"
-#include "stages/measure/atlas/atlas_map.h"
 #include "stages/ssf/ssf.h"
 #include "tools/inspect/atlas/atlas_report.h"
 #include "tools/inspect/package_mesh.h"

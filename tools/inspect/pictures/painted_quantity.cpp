@@ -1,6 +1,5 @@
 #include "tools/inspect/pictures/painted_quantity.h"
 
-#include "format/base/errors.h"
 #include "pipeline/compile/artefacts.h"
 
 namespace texmesh {

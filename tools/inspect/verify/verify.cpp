@@ -3,31 +3,13 @@
 #include <zlib.h>
 
 #include <algorithm>
-#include <cstdint>
 #include <cstdio>
-#include <map>
 #include <new>
 #include <nlohmann/json.hpp>
-#include <optional>
-#include <string>
-#include <vector>
 
-#include "delivery/cpp/package/package_reader.h"
-#include "delivery/cpp/package/plane_streams.h"
-#include "format/base/bytes.h"
-#include "format/base/errors.h"
-#include "format/base/finding.h"
 #include "format/base/json_fields.h"
-#include "format/base/sha256.h"
-#include "format/container/format_version.h"
-#include "format/container/layout.h"
-#include "format/documents/entry_ref.h"
 #include "format/documents/index.h"
-#include "format/documents/manifest.h"
-#include "format/documents/tables.h"
-#include "format/documents/textures.h"
 #include "pipeline/io/record.h"
-#include "stages/base/run_context.h"
 #include "stages/jpeg/jpeg.h"
 #include "tools/inspect/fragment_files.h"
 #include "tools/inspect/provenance.h"

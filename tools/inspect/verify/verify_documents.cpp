@@ -1,14 +1,10 @@
 // The documents of a package against each other: manifest, index, about.json, quality.bin, provenance.json,
 // thesis.bin.
 #include <algorithm>
-#include <cmath>
-#include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 
 #include "format/base/json_fields.h"
-#include "format/container/layout.h"
-#include "format/documents/textures.h"
 #include "format/rules/allocation.h"
 #include "pipeline/io/table.h"
 #include "stages/data/ladder.h"

@@ -3,9 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <tuple>
 
-#include "format/container/layout.h"
 #include "format/split/split_reader.h"
-#include "format/split/split_stream.h"
 #include "pipeline/io/table.h"
 #include "stages/gltf/check_glb.h"
 #include "tools/inspect/verify/verify_checks.h"

@@ -1,12 +1,8 @@
 // Texture planes: their tables, previews, table streams, fragments, and the source images that they keep.
-#include <algorithm>
 #include <numeric>
 #include <set>
 #include <tuple>
 
-#include "format/base/sha256.h"
-#include "format/container/layout.h"
-#include "format/documents/tables.h"
 #include "format/rules/allocation.h"
 #include "pipeline/io/table.h"
 #include "stages/base/parallel.h"

@@ -2,14 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "delivery/cpp/decide/texture_loss.h"
-#include "format/base/errors.h"
 #include "format/base/text_bytes.h"
-#include "format/container/layout.h"
 #include "pipeline/io/markup.h"
 #include "pipeline/io/new_folder.h"
 #include "pipeline/io/record.h"

@@ -1,6 +1,5 @@
 #include "tools/publish/export/tileset.h"
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "format/rules/viewing.h"

@@ -1,10 +1,7 @@
 // What bytes buy at each displayed height: every scale at its rungs, proxies, and the best choice for a
 // budget.
-#include <algorithm>
-#include <cmath>
 
 #include "format/base/portable_math.h"
-#include "format/rules/proxy_choice.h"
 #include "tools/publish/report/report.h"
 
 namespace texmesh {

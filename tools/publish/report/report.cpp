@@ -4,14 +4,8 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
 #include <nlohmann/json.hpp>
-#include <set>
 
-#include "format/base/sha256.h"
-#include "format/container/layout.h"
-#include "format/rules/proxy_choice.h"
 #include "pipeline/io/markup.h"
 #include "pipeline/io/record.h"
 #include "pipeline/io/table.h"

@@ -3,15 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <tuple>
 
-#include "delivery/cpp/package/package_reader.h"
-#include "format/base/errors.h"
-#include "format/base/sha256.h"
 #include "format/base/text_bytes.h"
-#include "format/container/layout.h"
 #include "pipeline/io/markup.h"
 #include "pipeline/io/new_folder.h"
 #include "pipeline/io/record.h"

@@ -9,8 +9,6 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
-#include <string_view>
-#include <utility>
 
 #include "format/base/errors.h"
 #include "format/container/layout.h"

@@ -5,14 +5,8 @@
 #include <algorithm>
 #include <charconv>
 #include <nlohmann/json.hpp>
-#include <optional>
-#include <string_view>
-#include <vector>
 
-#include "format/base/errors.h"
-#include "format/base/sha256.h"
 #include "format/container/container.h"
-#include "format/container/layout.h"
 #include "format/documents/manifest.h"
 
 namespace texmesh {

@@ -126,7 +126,9 @@ TEST(HostileGltf, RefusesAccessorsBeyondTheirBytes) {
   }
   expect_refused("/accessors/0", [](json& j) { j["bufferViews"][0]["byteLength"] = 47; });
   for (const json& stride : {json(2), json(6), json(256), json(-4), json("12")}) {
-    expect_refused("/bufferViews/0/byteStride", [&](json& j) { j["bufferViews"][0]["byteStride"] = stride; });
+    const auto change = [&](json& j) { j["bufferViews"][0]["byteStride"] = stride; };
+    expect_refused("/bufferViews/0", change);
+    expect_refused("byteStride", change);
   }
   expect_refused("/bufferViews/0/byteStride", [](json& j) { j["bufferViews"][0]["byteStride"] = 8; });
   expect_refused("/accessors/0", [](json& j) { j["bufferViews"][0]["byteStride"] = 16; });

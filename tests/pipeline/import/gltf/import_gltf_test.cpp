@@ -39,6 +39,20 @@ bool has_note(const Model& m, const std::string& code, Severity severity) {
                      [&](const Note& n) { return n.code == code && n.severity == severity; });
 }
 
+TEST(ImportGltf, AMemberThatIsNamedTwiceIsToldAndItsLastValueCounts) {
+  const auto imported = [](const std::string& more) {
+    MemoryResolver resolver;
+    const GltfBuilder b = quad();
+    resolver.files["a.bin"] = b.bin;
+    const Bytes text = b.gltf("a.bin");
+    const std::string changed = "{" + more + std::string(text.begin() + 1, text.end());
+    return import_gltf("m.gltf", Bytes(changed.begin(), changed.end()), resolver, {}, {}).model;
+  };
+  EXPECT_FALSE(has_note(imported("\"a\":[{},[],\"{,\",[{}]],"), "duplicate-member", Severity::kWarning));
+  for (const char* twice : {"\"meshes\":7,", "\"a\":[{\"b\":1,\"c\":[],\"b\":2}],", "\"a\":{},\"a\":{},"})
+    EXPECT_TRUE(has_note(imported(twice), "duplicate-member", Severity::kWarning)) << twice;
+}
+
 TEST(ImportGltf, ReadsAQuad) {
   MemoryResolver resolver;
   const ImportedModel m = import(quad().glb(), resolver);

@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "delivery/cpp/package/package_reader.h"
-#include "format/base/errors.h"
 #include "pipeline/batch/progress.h"
 #include "pipeline/io/markup.h"
 #include "pipeline/io/table.h"

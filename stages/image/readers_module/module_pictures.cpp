@@ -1,21 +1,24 @@
-// The module texmesh_readers.so: see stages/image/seldom/load_readers.cpp.
-#include "stages/image/seldom/module_wide_jpeg.h"
-#include "stages/image/seldom/seldom_readers.h"
+// The module texmesh_readers.so: see stages/image/readers_module/load_readers.cpp.
+#include "stages/image/readers_module/readers.h"
 
 #include <algorithm>
-#include <cstring>
 #include <memory>
 #include <mutex>
 
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 
-#include "format/base/errors.h"
-
 namespace texmesh {
 namespace {
 
-const char* reader_name(ImageFormat format) { return format == ImageFormat::kTiff ? "tiff" : "openexr"; }
+/// What a message calls the kind of a file, and OpenImageIO its reader.
+struct FileKind {
+  const char *name, *reader;
+};
+
+FileKind kind_of(ImageFormat format) {
+  return {image_format_name(format), format == ImageFormat::kTiff ? "tiff" : "openexr"};
+}
 
 /// OpenImageIO's own IOMemReader believes a place before the begin, which an EXR's table of rows can name.
 class MemoryFile final : public OIIO::Filesystem::IOProxy {
@@ -55,25 +58,24 @@ std::string reader_error(OIIO::ImageInput& input) {
   return s.empty() ? "an error without a message" : s;
 }
 
-OpenImage open_image(const std::string& name, ImageFormat format, ByteSpan bytes) {
+OpenImage open_image(const std::string& name, FileKind kind, ByteSpan bytes) {
   static std::once_flag once;
   std::call_once(once, [] {
     // One model, one child process, --jobs of them: the pools of OpenImageIO and OpenEXR would only add
     // threads.
     OIIO::attribute("threads", 1);
     OIIO::attribute("exr_threads", -1);
+    OIIO::attribute("dds:bc5normal", 1);  // the third channel of normals, which have two in the file
   });
   OpenImage open;
   open.memory = std::make_unique<MemoryFile>(bytes);
-  open.input = OIIO::ImageInput::create(reader_name(format));
-  if (!open.input)
-    throw InputError(name, "", std::string("OpenImageIO's reader for ") + image_format_name(format), "none");
+  open.input = OIIO::ImageInput::create(kind.reader);
+  if (!open.input) throw InputError(name, "", std::string("OpenImageIO's reader for ") + kind.name, "none");
   OIIO::ImageSpec config;
   config.attribute("oiio:UnassociatedAlpha", 1);
   open.input->set_ioproxy(open.memory.get());
   if (!open.input->open("memory", open.spec, config))
-    throw InputError(name, "image header", std::string("a readable ") + image_format_name(format),
-                     reader_error(*open.input));
+    throw InputError(name, "image header", std::string("a readable ") + kind.name, reader_error(*open.input));
   return open;
 }
 
@@ -138,7 +140,7 @@ void check_plausible(const Image& image, const OIIO::ImageSpec& spec) {
 }
 
 OpenImage open_checked(const Image& image) {
-  OpenImage open = open_image(image.name, image.format, image.bytes);
+  OpenImage open = open_image(image.name, kind_of(image.format), image.bytes);
   if (static_cast<std::uint32_t>(open.spec.width) != image.width_px ||
       static_cast<std::uint32_t>(open.spec.height) != image.height_px ||
       colour_channels(open.spec, image.format) != image.channels)
@@ -147,21 +149,20 @@ OpenImage open_checked(const Image& image) {
   return open;
 }
 
-[[noreturn]] void fail_pixels(const Image& image, OpenImage& open, const std::string& place) {
-  throw InputError(image.name, place, std::string("a whole ") + image_format_name(image.format),
-                   reader_error(*open.input));
-}
-
 // The file's own samples as T. Errors of the reader, truncation included, are InputError and name the rows.
 template <class T>
-std::vector<T> read_samples(const Image& image, OpenImage& open, OIIO::TypeDesc type) {
-  const int channels = static_cast<int>(image.channels), height = static_cast<int>(image.height_px);
-  const std::size_t row = static_cast<std::size_t>(image.width_px) * image.channels;
+std::vector<T> read_samples(const std::string& name, FileKind kind, std::uint32_t channels, OpenImage& open,
+                            OIIO::TypeDesc type) {
+  const int n = static_cast<int>(channels), height = open.spec.height;
+  const std::size_t row = static_cast<std::size_t>(open.spec.width) * channels;
+  const auto check = [&](bool is_read, const auto& place) {
+    if (!is_read || open.input->has_error())
+      throw InputError(name, place(), std::string("a whole ") + kind.name, reader_error(*open.input));
+  };
   std::vector<T> samples;
   if (open.spec.tile_width > 0) {
-    samples.resize(row * image.height_px);
-    if (!open.input->read_image(0, 0, 0, channels, type, samples.data()) || open.input->has_error())
-      fail_pixels(image, open, "pixels");
+    samples.resize(row * static_cast<std::size_t>(height));
+    check(open.input->read_image(0, 0, 0, n, type, samples.data()), [] { return "pixels"; });
     return samples;
   }
   // OpenImageIO takes and frees 64 MB at every call that names a type, be it the file's own: none is named
@@ -169,24 +170,33 @@ std::vector<T> read_samples(const Image& image, OpenImage& open, OIIO::TypeDesc 
   const bool as_stored = open.spec.format == type && open.spec.channelformats.empty();
   const OIIO::TypeDesc asked = as_stored ? OIIO::TypeDesc() : type;
   const int rows = std::max(64, height / 16);
-  samples.reserve(row * image.height_px);  // not touched before it is read
-  const int first = open.spec.y;           // the data window of an EXR may begin anywhere
+  samples.reserve(row * static_cast<std::size_t>(height));  // not touched before it is read
+  const int first = open.spec.y;                            // the data window of an EXR may begin anywhere
   for (int y = 0; y < height; y += rows) {
     const int end = std::min(height, y + rows);
     samples.resize(row * static_cast<std::size_t>(end));
     T* to = samples.data() + row * static_cast<std::size_t>(y);
-    if (!open.input->read_scanlines(0, 0, first + y, first + end, 0, 0, channels, asked, to) ||
-        open.input->has_error())
-      fail_pixels(
-          image, open,
-          "rows " + std::to_string(y) + " to " + std::to_string(end - 1) + " of " + std::to_string(height));
+    check(open.input->read_scanlines(0, 0, first + y, first + end, 0, 0, n, asked, to), [&] {
+      return "rows " + std::to_string(y) + " to " + std::to_string(end - 1) + " of " + std::to_string(height);
+    });
   }
   return samples;
 }
 
+StoredSamples read_stored(const std::string& name, FileKind kind, std::uint32_t channels, OpenImage& open) {
+  switch (bits_of(open.spec)) {
+    case 8:
+      return read_samples<std::uint8_t>(name, kind, channels, open, OIIO::TypeDesc::UINT8);
+    case 16:
+      return read_samples<std::uint16_t>(name, kind, channels, open, OIIO::TypeDesc::UINT16);
+    default:
+      return read_samples<float>(name, kind, channels, open, OIIO::TypeDesc::FLOAT);
+  }
+}
+
 ImageHeader read_module_header(const std::string& name, ImageFormat format, ByteSpan bytes,
                                const ImageLimits& limits) {
-  const OpenImage open = open_image(name, format, bytes);
+  const OpenImage open = open_image(name, kind_of(format), bytes);
   check_spec(name, open.spec, limits);
   return {static_cast<std::uint32_t>(open.spec.width), static_cast<std::uint32_t>(open.spec.height),
           static_cast<std::uint8_t>(colour_channels(open.spec, format)), bits_of(open.spec)};
@@ -194,21 +204,33 @@ ImageHeader read_module_header(const std::string& name, ImageFormat format, Byte
 
 StoredSamples decode(const Image& image) {
   OpenImage open = open_checked(image);
-  switch (bits_of(open.spec)) {
-    case 8:
-      return read_samples<std::uint8_t>(image, open, OIIO::TypeDesc::UINT8);
-    case 16:
-      return read_samples<std::uint16_t>(image, open, OIIO::TypeDesc::UINT16);
-    default:
-      return read_samples<float>(image, open, OIIO::TypeDesc::FLOAT);
-  }
+  return read_stored(image.name, kind_of(image.format), image.channels, open);
 }
 
-constexpr SeldomReaders kReader{&read_module_header, &decode, &decode_wide_jpeg_file};
+PictureSamples read_picture(const std::string& name, OtherPicture other, ByteSpan bytes,
+                            const PictureSize& size) {
+  constexpr const char* kReaders[] = {"bmp", "targa", "gif", "dds", "jpeg2000", "hdr"};
+  const FileKind kind{other_picture_name(other), kReaders[static_cast<std::size_t>(other)]};
+  OpenImage open = open_image(name, kind, bytes);
+  const OIIO::ImageSpec& spec = open.spec;
+  if (spec.width != static_cast<int>(size.width_px) || spec.height != static_cast<int>(size.height_px) ||
+      spec.depth > 1 || spec.nchannels < 1)
+    throw InputError(name, "image header", "the size that its first bytes say, and channels",
+                     std::to_string(spec.width) + " x " + std::to_string(spec.height) + " in " +
+                         std::to_string(spec.nchannels) + " channels");
+  PictureSamples out;
+  out.channels = colour_channels(spec, ImageFormat::kTiff);
+  out.profile = spec.find_attribute("ICCProfile") != nullptr;
+  out.samples = read_stored(name, kind, out.channels, open);
+  out.more_pictures = other == OtherPicture::kGif && open.input->seek_subimage(1, 0);
+  return out;
+}
+
+constexpr ModuleReaders kReader{&read_module_header, &decode, &read_picture, &decode_wide_jpeg_file};
 
 }  // namespace
 }  // namespace texmesh
 
-__attribute__((visibility("default"))) const texmesh::SeldomReaders* texmesh_seldom_readers_2() {
+__attribute__((visibility("default"))) const texmesh::ModuleReaders* texmesh_readers_3() {
   return &texmesh::kReader;
 }

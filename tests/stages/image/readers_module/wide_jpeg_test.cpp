@@ -1,4 +1,4 @@
-#include "stages/image/seldom/wide_jpeg.h"
+#include "stages/image/readers_module/wide_jpeg.h"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,6 @@
 #include <dlfcn.h>
 
-#include "format/base/errors.h"
-#include "stages/image/seldom/seldom_readers.h"
+#include "stages/image/readers_module/readers.h"
 
 namespace texmesh {
 namespace {
@@ -9,7 +8,7 @@ namespace {
 constexpr const char* kModule = "texmesh_readers.so";
 
 struct ReaderModule {
-  const SeldomReaders* readers = nullptr;
+  const ModuleReaders* readers = nullptr;
   std::string problem;
 };
 
@@ -20,15 +19,15 @@ ReaderModule load_module() {
   // the module throws outlive any call.
   void* const module = ::dlopen(kModule, RTLD_NOW | RTLD_LOCAL);
   if (module)
-    if (void* const symbol = ::dlsym(module, kSeldomReadersSymbol))
-      return {reinterpret_cast<const SeldomReaders* (*)()>(symbol)(), ""};
+    if (void* const symbol = ::dlsym(module, kReadersSymbol))
+      return {reinterpret_cast<const ModuleReaders* (*)()>(symbol)(), ""};
   const char* const why = ::dlerror();
   return {nullptr, why ? why : "an error without a message"};
 }
 
 }  // namespace
 
-const SeldomReaders& seldom_readers(const std::string& name, const std::string& what,
+const ModuleReaders& module_readers(const std::string& name, const std::string& what,
                                     const std::string& package) {
   static const ReaderModule module = load_module();
   if (module.readers) return *module.readers;

@@ -1,10 +1,8 @@
-#include "stages/image/seldom/wide_jpeg.h"
 
 #include <algorithm>
 
-#include "format/base/errors.h"
 #include "stages/image/jpeg_segments.h"
-#include "stages/image/seldom/seldom_readers.h"
+#include "stages/image/readers_module/readers.h"
 
 namespace texmesh {
 
@@ -34,7 +32,7 @@ std::vector<std::uint16_t> decode_wide_jpeg(const Image& image) {
     throw InputError(image.name, "JPEG header",
                      "a size that its " + std::to_string(image.bytes.size()) + " bytes can hold",
                      std::to_string(image.width_px) + " x " + std::to_string(image.height_px));
-  std::vector<std::uint16_t> samples = seldom_readers(image.name, "JPEGs of more than 8 bits", "libdcmtk17")
+  std::vector<std::uint16_t> samples = module_readers(image.name, "JPEGs of more than 8 bits", "libdcmtk17")
                                            .decode_wide_jpeg(image.name, image.bytes, *header);
   const std::uint32_t most = (1u << header->bits) - 1;
   for (std::uint16_t& sample : samples)

@@ -1,4 +1,4 @@
-#include "stages/image/seldom/seldom_readers.h"
+#include "stages/image/readers_module/readers.h"
 
 #include <dlfcn.h>
 #include <gtest/gtest.h>
@@ -8,17 +8,17 @@
 namespace texmesh {
 namespace {
 
-TEST(SeldomReaders, TheModuleIsFoundByItsNameAndShowsOneSymbol) {
+TEST(ReadersModule, TheModuleIsFoundByItsNameAndShowsOneSymbol) {
   void* const module = ::dlopen("texmesh_readers.so", RTLD_NOW | RTLD_LOCAL);
   ASSERT_NE(module, nullptr) << ::dlerror();
-  EXPECT_NE(::dlsym(module, kSeldomReadersSymbol), nullptr);
-  EXPECT_EQ(::dlsym(module, "texmesh_seldom_readers_1"), nullptr) << "the module of another build";
+  EXPECT_NE(::dlsym(module, kReadersSymbol), nullptr);
+  EXPECT_EQ(::dlsym(module, "texmesh_readers_2"), nullptr) << "the module of another build";
 }
 
-TEST(SeldomReaders, ItsErrorsAreThoseOfTheProgram) {
+TEST(ReadersModule, ItsErrorsAreThoseOfTheProgram) {
   void* const module = ::dlopen("texmesh_readers.so", RTLD_NOW | RTLD_LOCAL);
   ASSERT_NE(module, nullptr) << ::dlerror();
-  const auto reader = reinterpret_cast<const SeldomReaders* (*)()>(::dlsym(module, kSeldomReadersSymbol));
+  const auto reader = reinterpret_cast<const ModuleReaders* (*)()>(::dlsym(module, kReadersSymbol));
   ASSERT_NE(reader, nullptr);
   const Bytes no_tiff{'I', 'I', 42, 0, 1};
   try {

@@ -1,6 +1,0 @@
-#pragma once
-#include "pipeline/io/table.h"
-
-namespace texmesh {
-using TextTable = Table;
-}
