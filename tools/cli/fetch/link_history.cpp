@@ -10,7 +10,7 @@
 #include "pipeline/compile/user_document.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/file_resolver.h"
-#include "pipeline/io/resource_error.h"
+#include "pipeline/io/resolver.h"
 
 namespace texmesh {
 namespace {
