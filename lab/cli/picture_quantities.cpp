@@ -1,6 +1,4 @@
 // texmesh-lab picture: what stages of the method computed.
-#include "lab/cli/picture_quantities.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,6 +6,8 @@
 #include "lab/cli/commands.h"
 #include "pipeline/compile/artefacts.h"
 #include "pipeline/io/table.h"
+#include "stages/data/nested_scales.h"
+#include "stages/data/skeleton.h"
 #include "tools/cli/options/command_line.h"
 #include "tools/cli/painting.h"
 
@@ -92,8 +92,6 @@ PaintedModel paint_collapse_error(const NestedScales& scales) {
   return paint_values(mesh, value, std::move(legend), "collapses");
 }
 
-std::span<const PaintedQuantity> laboratory_quantities() { return kLaboratoryQuantities; }
-
 void add_picture_command(Command& app) {
   auto args = std::make_shared<Painting>();
   Command c = app.add("picture", "Picture what a stage of the method computed, with a legend of its colours");
@@ -118,7 +116,7 @@ void add_picture_command(Command& app) {
       "Colours run from dark violet (low) over teal to yellow (high); the legend on standard output gives their "
       "values. A GLB holds the colours as vertex colours and the skeleton as lines.\n"
       "Exit code: 0, 1 when the input cannot be shown, 2 usage, 3 internal error.");
-  c.on_run([args] { return run_painting(*args, laboratory_quantities()); });
+  c.on_run([args] { return run_painting(*args, kLaboratoryQuantities); });
 }
 
 }  // namespace texmesh
