@@ -1,4 +1,6 @@
 // texmesh-lab picture: what stages of the method computed.
+#include "tools/inspect/pictures/painted_quantity.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
