@@ -1,11 +1,17 @@
-#include "lab/cli/picture_quantities.h"
+// texmesh-lab picture: what stages of the method computed.
+#include "tools/inspect/pictures/painted_quantity.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
+#include "lab/cli/commands.h"
 #include "pipeline/compile/artefacts.h"
 #include "pipeline/io/table.h"
+#include "stages/data/nested_scales.h"
+#include "stages/data/skeleton.h"
+#include "tools/cli/options/command_line.h"
+#include "tools/cli/painting.h"
 
 namespace texmesh {
 namespace {
@@ -88,6 +94,31 @@ PaintedModel paint_collapse_error(const NestedScales& scales) {
   return paint_values(mesh, value, std::move(legend), "collapses");
 }
 
-std::span<const PaintedQuantity> laboratory_quantities() { return kLaboratoryQuantities; }
+void add_picture_command(Command& app) {
+  auto args = std::make_shared<Painting>();
+  Command c = app.add("picture", "Picture what a stage of the method computed, with a legend of its colours");
+  c.option("INPUT", args->input, "A model; the stages that are needed run, through the cache").required();
+  c.option("--what", args->what,
+           "skeleton: the curve skeleton inside the shape. R: the distance to the skeleton, which errors are "
+           "measured against. collapse-error: at which error a vertex was removed")
+      .required()
+      .one_of_explained({"skeleton", "R", "collapse-error"})
+      .value_name("QUANTITY");
+  c.option("-o,--output", args->output, "x.glb to turn in any viewer, or x.png for two views side by side")
+      .required()
+      .value_name("FILE");
+  c.option("--size", args->size_px, "Side of one view of a PNG, px").integer_in(64, 4096).shows_default();
+  add_painting_options(c, *args);
+  add_jobs_option(c, args->jobs);
+  c.flag("--json", args->json, "Print the legend as one JSON object");
+  c.examples(
+      "  texmesh-lab picture turtle.glb --what R -o turtle.png\n"
+      "  texmesh-lab picture turtle.glb --what skeleton -o turtle.glb --set skeletonization.alpha_divisor=120");
+  c.notes(
+      "Colours run from dark violet (low) over teal to yellow (high); the legend on standard output gives their "
+      "values. A GLB holds the colours as vertex colours and the skeleton as lines.\n"
+      "Exit code: 0, 1 when the input cannot be shown, 2 usage, 3 internal error.");
+  c.on_run([args] { return run_painting(*args, kLaboratoryQuantities); });
+}
 
 }  // namespace texmesh

@@ -46,9 +46,9 @@ struct ExperimentFit {
   std::string verdict, distance_verdict;
 };
 
-/// Judges are screened (lab/psychometrics/psychometrics.h), the answers of the others fitted. InputError naming
-/// the file when two files are of different experiments, when an answer does not agree with `key`, when two
-/// answers give one trial other levels, and when no judge is left.
+/// Judges are screened (lab/psychometrics/psychometrics.h), the answers of the others fitted. InputError
+/// naming the file when two files are of different experiments, when an answer does not agree with `key`,
+/// when two answers give one trial other levels, and when no judge is left.
 ExperimentFit fit_experiment(const std::vector<ExperimentResults>& results,
                              const std::optional<DesignKey>& key, const FitOptions& options,
                              const RunContext& context);

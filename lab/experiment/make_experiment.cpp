@@ -13,16 +13,19 @@
 #include "format/base/errors.h"
 #include "format/base/portable_math.h"
 #include "format/rules/split_mix.h"
-#include "lab/experiment/page_files.h"
 #include "pipeline/io/markup.h"
 #include "pipeline/io/new_folder.h"
 #include "pipeline/io/uri.h"
 #include "stages/image/png_writer.h"
 #include "stages/render/shade.h"
 #include "tools/extract/package_model.h"
+#include "tools/publish/pages/page.h"
 #include "tools/render/picture_sheet.h"
 
 namespace texmesh {
+
+std::span<const BuiltInFile> experiment_page_files();  // of page/, made by CMake
+
 namespace {
 
 constexpr std::uint32_t kRings = 72, kSegments = 144;

@@ -11,7 +11,7 @@
 #include "pipeline/cache/disk_store.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"
-#include "pipeline/io/resource_error.h"
+#include "pipeline/io/resolver.h"
 
 namespace texmesh {
 namespace {

@@ -15,7 +15,7 @@
 #include "pipeline/compile/stage_table.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/file_resolver.h"
-#include "pipeline/io/resource_error.h"
+#include "pipeline/io/resolver.h"
 #include "pipeline/io/wire_text.h"
 
 namespace texmesh {

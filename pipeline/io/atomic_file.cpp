@@ -10,7 +10,7 @@
 #include "pipeline/io/descriptor.h"
 #include "pipeline/io/file_stamp.h"
 #include "pipeline/io/machine/owner_mark.h"
-#include "pipeline/io/resource_error.h"
+#include "pipeline/io/resolver.h"
 
 namespace texmesh {
 namespace {

@@ -7,7 +7,7 @@
 #include <system_error>
 
 #include "pipeline/io/descriptor.h"
-#include "pipeline/io/resource_error.h"
+#include "pipeline/io/resolver.h"
 #include "pipeline/io/uri.h"
 
 namespace texmesh {

@@ -5,7 +5,6 @@
 #include "stages/image/decode_tiff_exr.h"
 #include "stages/image/image_metadata.h"
 #include "stages/image/png_writer.h"
-#include "stages/image/readers_module/wide_jpeg.h"
 #include "stages/image/webp.h"
 
 namespace texmesh {

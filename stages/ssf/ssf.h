@@ -35,8 +35,9 @@ struct SsfOptions {
   double rate_cap = 10;    // w_ij <= cap * min(M_i, M_j) / h^2
   double error_ratio = 5;  // more is nearer to the full resolution, and slower
   int max_terms = 3000;
-  static constexpr double window = 1.4;  // range scans: half-width of the Gaussian, in sigma
-  double range_band = 0;                 // the thesis has the Laplacian of Gaussian alone
+  double window = 1.4;    // range scans: half-width of the Gaussian, in sigma; no option: a test compares it
+                          // with a wider one
+  double range_band = 0;  // the thesis has the Laplacian of Gaussian alone
   template <class S, class V>
   static void fields(S& s, V&& v) {
     v("scales", s.scales, Range{1, 40}, "smoothed copies beside the original");

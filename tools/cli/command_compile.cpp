@@ -16,7 +16,7 @@
 #include "pipeline/compile/stage_table.h"
 #include "pipeline/io/file_resolver.h"
 #include "pipeline/io/machine/machine_share.h"
-#include "pipeline/io/resource_error.h"
+#include "pipeline/io/resolver.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"
 #include "tools/cli/options/common_options.h"

@@ -8,7 +8,7 @@
 #include "pipeline/batch/fleet/run_summary.h"
 #include "pipeline/batch/progress.h"
 #include "pipeline/io/atomic_file.h"
-#include "pipeline/io/resource_error.h"
+#include "pipeline/io/resolver.h"
 #include "pipeline/io/table.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"

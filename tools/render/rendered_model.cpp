@@ -5,7 +5,7 @@
 #include "format/container/layout.h"
 #include "pipeline/import/import_images.h"
 #include "pipeline/io/file_resolver.h"
-#include "pipeline/io/resource_error.h"
+#include "pipeline/io/resolver.h"
 #include "stages/base/parallel.h"
 #include "stages/condition/condition.h"
 #include "stages/image/decode_image.h"

@@ -22,7 +22,7 @@
 #include "pipeline/io/descriptor.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/machine/owner_mark.h"
-#include "pipeline/io/resource_error.h"
+#include "pipeline/io/resolver.h"
 
 namespace texmesh {
 namespace {

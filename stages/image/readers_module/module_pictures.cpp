@@ -1,4 +1,4 @@
-// The module texmesh_readers.so: see stages/image/readers_module/load_readers.cpp.
+// The module texmesh_readers.so: see stages/image/decode_tiff_exr.cpp.
 #include "stages/image/readers_module/readers.h"
 
 #include <algorithm>

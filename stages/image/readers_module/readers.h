@@ -7,7 +7,6 @@
 #include "format/base/bytes.h"
 #include "stages/image/decode_tiff_exr.h"
 #include "stages/image/readers_module/other_pictures.h"
-#include "stages/image/readers_module/wide_jpeg.h"
 
 namespace texmesh {
 

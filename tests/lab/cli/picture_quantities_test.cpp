@@ -1,5 +1,3 @@
-#include "lab/cli/picture_quantities.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,10 +6,14 @@
 #include <nlohmann/json.hpp>
 
 #include "format/base/errors.h"
+#include "lab/cli/commands.h"
 #include "stages/condition/condition.h"
+#include "stages/data/nested_scales.h"
+#include "stages/data/skeleton.h"
 #include "stages/gltf/check_glb.h"
 #include "stages/image/decode_image.h"
 #include "tests/support/meshes.h"
+#include "tools/inspect/pictures/painted_model.h"
 
 namespace texmesh {
 namespace {

@@ -1,7 +1,7 @@
 // The vectors in delivery/vectors of which the laboratory knows all cases: written and compared whole.
-#include "lab/transfer/acuity.h"
 #include "lab/transfer/chapter_4.h"
 #include "lab/transfer/policies.h"
+#include "lab/transfer/several_objects.h"
 #include "tests/delivery/vector_decisions.h"
 #include "tests/delivery/vector_packages.h"
 

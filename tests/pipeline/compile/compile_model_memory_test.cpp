@@ -3,7 +3,7 @@
 
 #include "pipeline/compile/compile_model.h"
 #include "pipeline/graph/store.h"
-#include "pipeline/io/resource_error.h"
+#include "pipeline/io/resolver.h"
 #include "tests/support/command.h"
 #include "tests/support/memory_store.h"
 

@@ -1,5 +1,5 @@
 #include "pipeline/io/file_resolver.h"
-#include "pipeline/io/resource_error.h"
+#include "pipeline/io/resolver.h"
 
 #include <gtest/gtest.h>
 #include <sys/socket.h>

@@ -54,7 +54,7 @@ TEST(EncodeWebp, OptionsCountAndWhatPackagesHoldComesBack) {
   EXPECT_EQ(plain, again);
   EXPECT_LT(encode_webp(rgb, {10}).size(), plain.size());
   EXPECT_NE(encode_webp(rgb, {80, 100, 6}), plain);
-  EXPECT_NE(encode_webp(rgb, {80, 100, 4, true}), plain);
+  EXPECT_LT(encode_webp(rgb, {10, 100, 4, true}).size(), encode_webp(rgb, {10}).size());
   const Pixels back = decode_lossy_webp(plain, 40 * 30);
   EXPECT_EQ(back.width_px, 40u);
   EXPECT_EQ(back.channels, 3u);

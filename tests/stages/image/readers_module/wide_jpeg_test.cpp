@@ -1,4 +1,4 @@
-#include "stages/image/readers_module/wide_jpeg.h"
+#include "stages/image/decode_tiff_exr.h"
 
 #include <gtest/gtest.h>
 

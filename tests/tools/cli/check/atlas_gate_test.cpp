@@ -9,9 +9,9 @@ namespace {
 
 AtlasDiagnosis two_textures() {
   AtlasDiagnosis d;
-  d.report.atlases.resize(2);
-  d.names = {"texture 0 (a)", "texture 1"};
-  for (AtlasFigures& a : d.report.atlases) {
+  d.atlases.resize(2);
+  d.atlases[0].name = "texture 0 (a)", d.atlases[1].name = "texture 1";
+  for (NamedAtlas& a : d.atlases) {
     a.charts = 10, a.triangle_floor = 30;
     a.cover = 0.5, a.thin_share = 0.1, a.overlap = 0.2, a.flat_surface = 0.01;
     a.density = {1, 2, 3, 4}, a.stretch = {1, 1.2, 2, 3};
@@ -38,13 +38,13 @@ TEST(AtlasGate, EveryLimitIsKeptAtItsValueAndBrokenBeyond) {
 
 TEST(AtlasGate, OneBadTextureIsEnoughAndNanKeepsNoLimit) {
   AtlasDiagnosis d = two_textures();
-  d.report.atlases[0].cover = 0.9;
+  d.atlases[0].cover = 0.9;
   AtlasLimits limits;
   limits.min_cover = 0.8;
   EXPECT_EQ(gate_failures(check_atlases(d, limits)).size(), 1u);
   limits = {};
   limits.max_stretch = 10;
-  d.report.atlases[1].stretch.p95 = std::numeric_limits<double>::quiet_NaN();
+  d.atlases[1].stretch.p95 = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(gate_failures(check_atlases(d, limits)).size(), 1u);
 }
 
@@ -53,8 +53,8 @@ TEST(AtlasGate, NoAtlasAndNoSeamsKeepEveryLimit) {
   limits.min_cover = 1, limits.max_charts = 0, limits.max_seam_difference = 0;
   EXPECT_TRUE(gate_failures(check_atlases({}, limits)).empty());
   AtlasDiagnosis d = two_textures();
-  d.report.atlases.resize(1);
-  d.report.atlases[0].seam_colours.reset();
+  d.atlases.resize(1);
+  d.atlases[0].seam_colours.reset();
   limits = {};
   limits.max_seam_difference = 0;
   EXPECT_TRUE(check_atlases(d, limits).empty());

@@ -1,5 +1,6 @@
-// The JSON Schemas of what texmesh reads and prints. Each is made of the description that also reads and
-// writes the document; schemas/NAME.schema.json in the sources hold the same texts.
+// Commands for other programs: the JSON Schemas of what texmesh reads and prints (each is made of the
+// description that also reads and writes the document; schemas/NAME.schema.json hold the same texts), and
+// what shells and man show.
 #include <iostream>
 
 #include "pipeline/batch/write_reports.h"
@@ -38,6 +39,19 @@ void add_schema_command(Command& app) {
   c.on_run([name] {
     for (const DocumentSchema& schema : command_schemas())
       if (*name == schema.name) std::cout << schema.text;
+    return kExitOk;
+  });
+}
+
+void add_completion_command(Command& app) {
+  auto form = std::make_shared<std::string>();
+  Command c = app.add("completion",
+                      "Print what a shell or man is to know of texmesh, as installing puts it in place");
+  c.hidden();
+  c.option("FORM", *form, "What to print").required().one_of({"bash", "zsh", "man"});
+  c.examples("  source <(texmesh completion bash)\n  texmesh completion man | man -l -");
+  c.on_run([app, form] {
+    std::cout << app.shell_text(*form);
     return kExitOk;
   });
 }
