@@ -37,7 +37,7 @@ int main(int argc, char** argv) {
   program.examples(
       "  texmesh-lab study thesis -o thesis/                                 the thesis's tables, measured again\n"
       "  texmesh-lab simulate scan.texmesh --bandwidth 2Mbit/s --policy htca  play a transfer\n"
-      "  texmesh-lab experiment make scan.glb -o page/                       a page for judges");
+      "  texmesh-lab experiment make scan.texmesh -o page/                    a page for judges");
   program.notes("Every command explains itself: texmesh-lab study --help");
   add_study_command(program);
   add_experiment_command(program);

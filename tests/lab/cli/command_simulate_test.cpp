@@ -141,12 +141,12 @@ TEST(LabSimulate, ObjectsShareALink) {
 
 TEST(LabSimulate, LostPacketsCostPointsAndFragments) {
   TemporaryFolder folder;
-  std::vector<std::string> arguments{"simulate", kGolden, "--time", "9",    "--bandwidth", "1MB/s",
-                                     "--scale",  "0",     "--loss", "0.05", "--no-repeat"};
+  std::vector<std::string> arguments{"simulate", kGolden, "--time", "9",   "--bandwidth", "1MB/s",
+                                     "--scale",  "0",     "--loss", "0.4", "--no-repeat"};
   const Json j = json_of(arguments);
   ASSERT_EQ(j["rows"].size(), 4u);
   EXPECT_EQ(j["rows"][0]["lost_points"], 0);
-  EXPECT_GT(j["rows"][3]["lost_points"], 0);
+  EXPECT_GT(j["rows"][3]["lost_points"], 0);  // few packets hold the golden package's 384 points
   arguments.insert(arguments.end(), {"--picture", folder / "lost.png"});
   const CommandResult text = lab(arguments);
   EXPECT_EQ(text.exit_code, 0) << text.errors;

@@ -81,7 +81,8 @@ TEST(PictureQuantities, SkeletonIsLines) {
   EXPECT_EQ(root["materials"][0]["alphaMode"], "BLEND");
   const Pixels picture = picture_of(view);
   EXPECT_EQ(picture.width_px, 2 * 64u);
-  EXPECT_GT(count_near(picture, {255, 40, 40}, 90), 20);  // the lines show through the ball
+  EXPECT_GT(count_near(picture, {255, 40, 40}, 90),
+            4);  // the lines show through the ball, which dulls most of them
   EXPECT_THROW(paint_radius(mesh, {}), StageError);
 }
 

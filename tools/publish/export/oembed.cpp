@@ -38,7 +38,9 @@ std::string embedded_frame(const EmbeddedObject& o) {
       markup_escaped(o.page_url), o.width_px, o.height_px, markup_escaped(o.about.title));
 }
 
-std::string oembed_json(const EmbeddedObject& o) {
+std::string oembed_json(const EmbeddedObject& object) {
+  EmbeddedObject o = object;
+  if (o.thumbnail_url.empty()) o.thumbnail_width_px = o.thumbnail_height_px = 0;  // a size alone says nothing
   return to_json(o).dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 

@@ -117,7 +117,7 @@ TEST(CommandHelp, RareOptionsAreInTheFullHelpAndWork) {
   EXPECT_EQ(times_listed(help({"plan", "--help-all"}), "--policy"), 1u);
   const CommandResult r =
       run_command({TEXMESH_BINARY, "plan", TEXMESH_SOURCE_DIR "/tests/golden/v2.0-scan.texmesh", "--policy",
-                   "htca", "--bandwidth", "2Mbit/s"});
+                   "thesis", "--bandwidth", "2Mbit/s"});
   EXPECT_EQ(r.exit_code, 0) << r.errors;
 }
 
