@@ -179,9 +179,11 @@ void add_run_options(Command& c, CompileArguments& args) {
   RunSettings& run = args.run;
   c.group("Running");
   add_jobs_option(c, args.jobs);
-  c.option("--memory", args.memory_bytes, parse_bytes,
-           "Most memory of all models that run side by side, by what they took before (default: 4/5 of what "
-           "machine, cgroup and Slurm allow). A model that needs more runs alone, see --model-memory")
+  c.option(
+       "--memory", args.memory_bytes, parse_bytes,
+       "Limit for the memory of all models that run at the same time; compile estimates each model by its "
+       "last run (default: 4/5 of what machine, cgroup and Slurm allow). A model that needs more runs "
+       "alone, see --model-memory")
       .value_name("SIZE")
       .rare();
   c.option("--model-memory", run.pool.limits.memory_bytes, parse_bytes,
@@ -195,9 +197,9 @@ void add_run_options(Command& c, CompileArguments& args) {
       .rare();
   c.choice(
        "--sandbox", run.pool.limits.sandbox,
-       "What one model's process may touch: auto = the model's folder, its result and the cache, no other "
-       "programs, no network but cache layers, as far as the kernel can bound that; require = the same, and "
-       "nothing is compiled where it cannot; off")
+       "Limits a model's process. auto = it reaches the model's folder, its result and the cache, starts no "
+       "program, and has no network but cache layers, as far as the kernel can enforce this; require = the "
+       "same, and compile stops if the kernel cannot; off = no limits")
       .value_name("NAME")
       .shows_default()
       .rare();
@@ -290,7 +292,8 @@ void add_compile_options(Command& c, CompileArguments& args) {
       .value_name("OUTPUT");
   c.option(
        "--profile", args.profile,
-       "small = few bytes, archive = loses nothing, fast = little time, thesis = as printed; or a JSON file of "
+       "small = few bytes, archive = loses nothing, fast = little time, thesis = as printed; or a JSON file "
+       "of "
        "options. Flags win")
       .value_name("NAME");
   c.option(

@@ -47,30 +47,33 @@ int run_doctor(const DoctorArguments& args) {
 
 void add_limits(Command& c, AtlasLimits& limits) {
   c.group("Limits (exit code 4 beyond one)");
-  c.option("--max-charts", limits.max_charts,
-           "Most charts of the model. Some 20 to 300 are usual for a scan that was unwrapped with care")
+  c.option(
+       "--max-charts", limits.max_charts,
+       "Largest number of charts of the model. Some 20 to 300 are usual for a scan that was unwrapped with "
+       "care")
       .number_in(0, 1e9);
   c.option("--max-floor", limits.max_floor_triangles,
-           "Most triangles that the coarsest mesh with all charts needs; 8 bytes each")
+           "Largest number of triangles that the coarsest mesh with all charts needs; 8 bytes each")
       .number_in(0, 1e9);
   c.option("--min-cover", limits.min_cover, "Least share of each texture that is shown, 0 to 1")
       .number_in(0, 1);
   c.option("--max-thin", limits.max_thin,
-           "Most of a texture's shown texels in charts thinner than 8 texels, 0 to 1")
+           "Largest share of a texture's shown texels in charts thinner than 8 texels, 0 to 1")
       .number_in(0, 1);
   c.option("--max-overlap", limits.max_overlap,
-           "Most of the shown texels that two places of the surface show, 0 to 1")
+           "Largest share of the shown texels that two places of the surface show, 0 to 1")
       .number_in(0, 1);
-  c.option("--max-flat", limits.max_flat, "Most of the surface that has no area on the texture, 0 to 1")
+  c.option("--max-flat", limits.max_flat,
+           "Largest share of the surface that has no area on the texture, 0 to 1")
       .number_in(0, 1);
   c.option("--max-density-spread", limits.max_density_spread,
-           "Most that texels per length differ between the finest and the coarsest twentieth of the surface")
+           "Largest ratio of texels per length between the finest and the coarsest twentieth of the surface")
       .number_in(1, 1e9);
   c.option("--max-stretch", limits.max_stretch,
-           "Most that texels are longer than wide, on 95 % of the surface; 1 = square everywhere")
+           "Largest ratio of a texel's length to its width, on 95 % of the surface; 1 = square everywhere")
       .number_in(1, 1e9);
   c.option("--max-seam-difference", limits.max_seam_difference,
-           "Most that colours differ across seams, in the mean (CIE 1976; 2.3 can just be seen)")
+           "Largest difference of colours across seams, in the mean (CIE 1976; 2.3 can just be seen)")
       .number_in(0, 1000);
 }
 
@@ -95,7 +98,8 @@ void add_doctor_command(Command& app) {
       "An atlas is a texture with the charts that a surface is cut into. Every chart has borders that no "
       "simplified mesh can give up: an atlas of thousands of charts puts a floor under every coarse mesh, "
       "whoever makes it. docs/atlas.md explains the figures.\n"
-      "A model without textures or texture coordinates has no atlas: doctor says so, and every limit is kept.\n"
+      "A model without textures or texture coordinates has no atlas: doctor says so, and every limit is "
+      "kept.\n"
       "Exit code: 0, 4 beyond a limit, 1 when the input cannot be read, 2 usage, 3 internal error.");
   c.on_run([args] { return run_doctor(*args); });
 }

@@ -171,15 +171,16 @@ void add_extract_command(Command& app) {
       "  texmesh extract https://host/bust.texmesh --display 800 -o bust.glb\n"
       "  texmesh extract bust.texmesh --lods --bytes 2MB -o bust.glb");
   c.notes(
-      "--bytes chooses scale, size of the textures and their quality together: candidates are rendered lit, "
-      "as texmesh render does, and compared with the package's best (FLIP). Colours, normals, roughness and "
-      "the other maps get bytes for what they change in the picture, and the file is filled up to the last "
-      "2 %. A proxy of the package, made smaller where it has to be, is taken where it looks better. Many triangles with a small texture nearly always look better than the reverse.\n"
+      "--bytes chooses the scale and the size and quality of the textures together. It renders candidates "
+      "lit, as texmesh render does, and compares them with the package's best (FLIP). Maps that change the "
+      "picture more get more bytes, and the file is filled up to the last 2 %. If a proxy looks better, "
+      "extract takes it, and makes it smaller if needed. Many triangles with a small texture nearly always "
+      "look better than the reverse.\n"
       "Meshes stay Draco coded (KHR_draco_mesh_compression), a whole proxy's is coded by meshopt "
       "(EXT_meshopt_compression), and WebP needs EXT_texture_webp. For programs without them use --plain.\n"
-      "Exit code: 0, 1 when the package is damaged or the GLB cannot be written, 2 usage, 4 when the "
-      "package cannot give a file within 2 % below --bytes (extract writes the nearest possible file then), "
-      "unless the file has all that the package holds of a source of JPEGs.");
+      "Exit code: 0, 1 when the package is damaged or the GLB cannot be written, 2 usage, 4 when no file "
+      "between 98 % and 100 % of --bytes is possible: extract then writes the nearest file. A file that "
+      "already holds everything in a package of JPEG sources is no failure.");
   c.on_run([args] { return run_extract(*args); });
 }
 

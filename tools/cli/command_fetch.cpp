@@ -474,10 +474,11 @@ void add_fetch_command(Command& app) {
       "  texmesh fetch https://host/bust.texmesh --time 4 --memory 64MB\n"
       "  texmesh fetch https://a/bust.texmesh --mirror https://b/bust.texmesh --time 2 --refine 10 -o got");
   c.notes(
-      "fetch checks every fragment against its digest. The fragments of a texture are dealt to the servers by "
-      "their speed. A server whose bytes are wrong is dropped; what a server fails to deliver, fetch asks of "
-      "another one. A folder (URL with a slash) may lack some of the files. The package is read from the first server that answers. A server that knows no "
-      "ranges is asked for whole rungs of the tree beside the container.\n"
+      "fetch checks every fragment against its digest. It shares the fragments among the servers by their "
+      "speed. It drops a server that sends wrong bytes, and asks another server for what one fails to "
+      "deliver. A folder (URL with a slash) may lack some of the files. The package is read from the first "
+      "server that answers. If a server does not support ranges, fetch reads whole rungs from the unpacked "
+      "folder beside the package.\n"
       "Exit code: 0, 1 when the package cannot be read, 2 usage, 4 when fragments were given up, 130 when "
       "interrupted.");
   c.on_run([args] { return run_fetch(*args); });

@@ -180,9 +180,9 @@ void add_plan_command(Command& app) {
       "plan plays the transfer over a model of the network and needs nothing but the package. FLIP is "
       "how much a lit picture of that height differs from one of the source, in the mean over the object: 0 "
       "= equal, 1 = as different as can be. It comes from the table that compile measured.\n"
-      "A proxy, a small file with an atlas of its own, is shown where it cannot be told from the source at "
-      "that height, or where it looks better than any scale in the time or the bytes; on a slow link a larger "
-      "one may be shown on the way to a scale.\n"
+      "A proxy is a small file with an atlas of its own. The plan shows it if nobody can tell it from the "
+      "source at that height, or if it looks better than any scale in the time or the bytes. On a slow link "
+      "a larger proxy may come before a scale.\n"
       "Exit code: 0, 1 when the package cannot be read, 2 usage, 4 when not even the least fits the budget.");
   c.on_run([args] { return run_plan(*args); });
 }
@@ -193,8 +193,8 @@ void add_check_command(Command& app) {
   add_delivery_options(c, *args);
   c.option(
        "--max-flip", args->gate.max_flip,
-       "Most FLIP of the lit object, 0 = equal to the source: of the plan as predicted, and of each scale at "
-       "its switch size beside S_0, rendered, in its worst view")
+       "Largest FLIP of the lit object, 0 = equal to the source. It limits the predicted FLIP of the plan, "
+       "and the rendered FLIP of each scale beside S_0 at its switch size, in the worst view")
       .number_in(0, 1);
   c.flag("--predicted-only", args->predicted_only,
          "--max-flip goes by the plan alone: nothing is rendered, and little of the package is read");

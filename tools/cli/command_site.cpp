@@ -49,7 +49,7 @@ void add_site_command(Command& app) {
       .value_name("DIR");
   c.option("--title", args->options.title, "Title of the collection").shows_default().value_name("TEXT");
   c.option("--packages-url", args->options.packages_url,
-           "Where the packages stand on the web already, as they stand in PACKAGES; default: they are copied")
+           "URL of a folder on the web that has the same packages as PACKAGES (default: site copies them)")
       .value_name("URL");
   c.option("--viewer", args->viewer, "Folder with the built viewer, instead of the viewer of this build")
       .value_name("DIR");
@@ -58,12 +58,14 @@ void add_site_command(Command& app) {
       "  texmesh site packages/ -o www/\n"
       "  texmesh site packages/ -o www/ --title \"Casts\" --packages-url https://files.museum.example/casts/");
   c.notes(
-      "A list with posters, creators, licences and sizes that can be searched, and a page for each object, which "
-      "loads the viewer when somebody wants to see it in 3D. Static files for any web server, also in a folder "
+      "A list with posters, creators, licences and sizes that can be searched, and a page for each object, "
+      "which "
+      "loads the viewer when somebody wants to see it in 3D. Static files for any web server, also in a "
+      "folder "
       "of it; they ask no other server for anything but packages at --packages-url. That server must allow "
       "pages of others to read ranges (CORS). From files, without a server, browsers show the list but no "
       "objects in 3D.\n"
-      "A package that cannot be read is left out, and said.\n"
+      "If a package cannot be read, site leaves it out and says so.\n"
       "Exit code: 0, 1 when a package could not be read (the site has the others) or DIR not be written, "
       "2 usage.");
   c.on_run([args] { return run_site(*args); });

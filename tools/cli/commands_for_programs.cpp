@@ -45,8 +45,7 @@ void add_schema_command(Command& app) {
 
 void add_completion_command(Command& app) {
   auto form = std::make_shared<std::string>();
-  Command c = app.add("completion",
-                      "Print what a shell or man is to know of texmesh, as installing puts it in place");
+  Command c = app.add("completion", "Print the shell completion or the manual page");
   c.hidden();
   c.option("FORM", *form, "What to print").required().one_of({"bash", "zsh", "man"});
   c.examples("  source <(texmesh completion bash)\n  texmesh completion man | man -l -");
