@@ -70,7 +70,7 @@ struct StageResult {
 struct Stage {
   std::string name;
   int version = 1;
-  std::string summary;    // one line for `texmesh stages`
+  std::string summary;    // one line for `texmesh compile --stages`
   double time_share = 0;  // of a model's time, about: it only shapes the progress bar
   std::vector<ArtefactName> inputs;
   std::vector<StageOutput> outputs;
