@@ -137,7 +137,7 @@ DocumentSchema jnd_profile_schema() {
       "jnd-profile.v1", "texmesh JND profile, version 1",
       "What an experiment with judges found to be just noticeable: texmesh compile --jnd-profile FILE. texmesh-lab "
       "experiment fit writes it. Without a profile a relative change of 0.10 x 512 / D holds at a displayed height of D "
-      "px, which is a guess (docs/experiments.md).",
+      "px, which is a guess (docs/lab/experiments.md).",
       schema_of<JndProfile>());
 }
 

@@ -41,7 +41,7 @@ struct PerceptualValuesOptions {
     v("jnd_distance_exponent", s.jnd_distance_exponent, Range{0, 2}, ProfileOnly{},
       "e of the change that is just noticeable at D px: jnd x (jnd_reference_px / D)^e. 0 = the same at "
       "every "
-      "distance, as the thesis prints; 1 is a guess until judges have been asked (docs/experiments.md)");
+      "distance, as the thesis prints; 1 is a guess until judges have been asked (docs/lab/experiments.md)");
     v("statistic", s.statistic, ProfileOnly{},
       "what decides about major scales: p95 of the relative distance, or the thesis's average, "
       "conservative (largest) and aggressive (smallest) change of the skeleton distance");

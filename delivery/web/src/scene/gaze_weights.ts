@@ -7,7 +7,7 @@ import { type LookedSurface, sampleFragments } from './visible_fragments';
 /**
  * What somebody resolves so many degrees beside the point that they look at, as a part of what they resolve at that point: 1 in the
  * fovea, the central degree; outside of it the finest detail that is seen grows in proportion to the distance and has doubled 2.3
- * degrees beyond. The same bits as delivery/cpp/decide/acuity.h.
+ * degrees beyond. The same bits as gaze_weight() in lab/transfer/several_objects.h.
  */
 export function acuityAt(degrees: number): number {
   return halfAcuityDegrees / (halfAcuityDegrees + Math.max(0, degrees - foveaRadiusDegrees));
