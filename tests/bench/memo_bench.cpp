@@ -125,7 +125,6 @@ void make_collection(const std::string& in, const std::string& out, const std::s
     report.result = ModelResult::kOk;
     const FileStamp stamp = *stamp_of(j.input);
     report.more->files = {{"", true, digest_of(j.input), stamp.bytes, stamp}};
-    report.package_bytes = stamp_of(j.output)->bytes;
     report.more->keys = keys_of(static_cast<int>(job));
     selection.remember(job, report);
   }
