@@ -48,7 +48,7 @@ if(TEXMESH_COMPILER)
     "graph/(graph_run|key|option_text|stage|store)\\.h")
   texmesh_install_headers(tools "inspect/(dump/dump|verify/verify|diff/diff)\\.h" "extract/extract\\.h" "publish/export/export\\.h"
     "publish/site/site\\.h" "extract/glb/image_codecs\\.h" "render/plane_pixels\\.h")
-  install(FILES cmake/FindWebP.cmake DESTINATION ${texmesh_cmake_dir})
+  install(FILES cmake/FindUtf8proc.cmake cmake/FindWebP.cmake DESTINATION ${texmesh_cmake_dir})
   install(TARGETS texmesh EXPORT texmeshTool RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT tool)
   install(TARGETS texmesh_readers LIBRARY DESTINATION ${TEXMESH_MODULE_FOLDER} COMPONENT tool)
   install(DIRECTORY ${PROJECT_BINARY_DIR}/viewer/ DESTINATION ${CMAKE_INSTALL_DATADIR}/texmesh/viewer COMPONENT tool OPTIONAL)

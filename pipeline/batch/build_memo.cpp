@@ -40,7 +40,7 @@ bool is_lasting(const WorkerReport& r) {
 
 BuildMemo::BuildMemo(const std::string& cache_folder, const std::string& outputs) {
   if (cache_folder.empty()) return;
-  Key name("memo", 2);
+  Key name("memo", 3);
   name.add("outputs", outputs);
   folder_ = cache_folder + "/memo/" + to_hex(name.digest()).substr(0, 32);
   writer_ = std::make_unique<MemoSegmentWriter>(folder_);
@@ -168,6 +168,7 @@ const Sha256& JobSelection::request_of(const std::shared_ptr<const std::string>&
   if (fresh) {
     Key key("compile", 1);
     key.add("tool", tool_seed_).add("profile", *profile).add("strict", settings_.strict ? "1" : "0");
+    for (const std::string& folder : settings_.links_within) key.add("links within " + folder, "1");
     it->second = key.digest();
   }
   return it->second;
@@ -216,6 +217,9 @@ void JobSelection::add_job(std::size_t i, bool remembered) {
   job.strict = settings_.strict;
   job.explain = settings_.explain;
   job.forecast = settings_.dry_run;
+  job.links_within = settings_.links_within;
+  for (const std::string& folder : plan_.folders)
+    if (m.input.starts_with(folder)) job.links_within.push_back(folder.empty() ? "." : folder);
   if (remembered) {
     for (FileRequest& f : record.files)
       if (f.found && f.stamp.is_settled(record.looked_at_ns)) job.known.push_back(std::move(f));

@@ -415,6 +415,7 @@ void add_collection(const std::string& file, const PlanRequest& request, const C
         {input, (fs::path(request.output) / m.output).string(), false, m.unread, profiles.of(m.options)});
   }
   plan.files.push_back(file);
+  plan.folders.push_back((folder / "").string());
 }
 
 /// Unread files that `chosen` names leave the plan where they are no models.
@@ -476,6 +477,8 @@ BatchPlan plan_collection(const PlanRequest& request) {
       add_collection(input, request, *base, profiles, plan);
     else
       others.push_back(input);
+  for (const std::string& input : others)
+    if (fs::is_directory(input)) plan.folders.push_back((fs::path(input) / "").string());
   const bool names_package =
       fs::path(request.output).extension() == ".texmesh" && !fs::is_directory(request.output);
   if (!plan.files.empty() && names_package)

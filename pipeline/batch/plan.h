@@ -83,6 +83,8 @@ struct PlanRequest {
 struct BatchPlan {
   std::vector<PlannedModel> models;
   std::vector<std::string> files;  // collections that were read: a make-style rule depends on them
+  std::vector<std::string>
+      folders;          // that the command line or a collection stands for, with a slash at the end
   std::string outputs;  // absolute path of the output folder, or of the package where there can be one only
   std::string output_prefix;  // what the models' outputs begin with: the output folder and a slash
   Shard shard;

@@ -18,6 +18,7 @@ struct RunSettings {
   bool verbose = false, strict = false, explain = false, dry_run = false, retry_failed = false,
        statistics = false;
   std::string depfile, summary, junit, trace;  // files to write, "" = none
+  std::vector<std::string> links_within;       // CompileRequest::links_within, beside the folders of the plan
   std::vector<std::string> more_inputs;  // read for the whole run (a profile): dependencies of every package
 };
 

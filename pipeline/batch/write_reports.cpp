@@ -89,7 +89,7 @@ std::vector<std::string> dependencies(const BatchPlan& plan, const RunSettings& 
   const fs::path folder = fs::path(plan.models[0].input).parent_path();
   std::vector<std::string> all;
   for (const FileRequest& f : report.more->files)
-    if (f.found) all.push_back(f.uri.empty() ? plan.models[0].input : (folder / f.uri).string());
+    if (!f.similar) all.push_back(f.uri.empty() ? plan.models[0].input : (folder / f.uri).string());
   all.insert(all.end(), settings.more_inputs.begin(), settings.more_inputs.end());
   return all;
 }

@@ -40,12 +40,9 @@ std::string note_of(std::vector<FileRequest> requests) {
   return json_line_of([&](Json& to) { put_value(to, requests); });
 }
 
-std::optional<std::vector<std::string>> uris_of(const std::string& note) {
+std::optional<std::vector<FileRequest>> requests_of(const std::string& note) {
   try {
-    std::vector<std::string> uris;
-    for (FileRequest& r : from_json<std::vector<FileRequest>>(Json::parse(note, nullptr, false), "note"))
-      uris.push_back(std::move(r.uri));
-    return uris;
+    return from_json<std::vector<FileRequest>>(Json::parse(note, nullptr, false), "note");
   } catch (const InputError&) {
     return std::nullopt;
   }
@@ -75,6 +72,7 @@ class ModelSource {
       : path_(request.input),
         options_(request.options.import),
         memory_bytes_(request.memory_bytes),
+        links_within_(request.links_within),
         known_(request.known) {}
 
   /// Reads what is needed to know parts(). Before anything else. `may_write_notes`: the store may be told the
@@ -93,7 +91,9 @@ class ModelSource {
     key.add("extension", lower_extension(path_));
     key.add_input("model", main_.digest, main_.bytes);
     for (const FileRequest& r : requests_)
-      if (r.found)
+      if (r.similar)
+        key.add("input names like " + to_wire(r.uri), to_hex(r.digest));
+      else if (r.found)
         key.add_input("file " + to_wire(r.uri), r.digest, r.bytes);
       else
         key.add("input file " + to_wire(r.uri), "not there");
@@ -119,7 +119,7 @@ class ModelSource {
   Json inputs() const {
     Json list = Json::array({{{"role", "model"}, {"sha256", to_hex(main_.digest)}, {"bytes", main_.bytes}}});
     for (const FileRequest& r : requests_)
-      if (r.found)
+      if (r.found && !r.similar)
         list.push_back({{"role", "file"},
                         {"uri", readable_name(r.uri)},
                         {"sha256", to_hex(r.digest)},
@@ -154,7 +154,7 @@ class ModelSource {
     FileStamp stamp;
     bytes_ = read_input_file(path_, static_cast<std::uint64_t>(options_.max_file_bytes), &stamp);
     has_bytes_ = true;
-    const FileRequest found{"", true, sha256(bytes_), bytes_.size(), stamp};
+    const FileRequest found{"", true, sha256(bytes_), bytes_.size(), stamp, false};
     if (main_.found && (found.digest != main_.digest || found.bytes != main_.bytes))
       throw InputError(path_.filename().string(), "", "a file that stays as it is while it is compiled",
                        "one that has changed meanwhile");
@@ -170,13 +170,17 @@ class ModelSource {
     return key.digest();
   }
   bool unchanged_since(const std::string& note) {
-    const auto uris = uris_of(note);
-    if (!uris) return false;
-    FileResolver resolver(path_.parent_path());
+    const auto asked = requests_of(note);
+    if (!asked) return false;
+    FileResolver resolver(path_.parent_path(), links_within_);
     resolver.expect(known_);
-    for (const std::string& uri : *uris) {
+    for (const FileRequest& r : *asked) {
       try {
-        resolver.look(uri, static_cast<std::uint64_t>(options_.max_file_bytes));
+        if (r.similar)
+          resolver.similar(r.uri);
+        else
+          resolver.look(r.uri, static_cast<std::uint64_t>(options_.max_file_bytes));
+      } catch (const FileRefused&) {  // counts as missing
       } catch (const InputError&) {
         return false;  // the import itself must say what is wrong
       }
@@ -188,7 +192,7 @@ class ModelSource {
   ImportedModel import(const ImportOptions& options, const RunContext& context,
                        std::vector<FileRequest>& requests) {
     if (!has_bytes_) read_model();
-    FileResolver resolver(path_.parent_path());
+    FileResolver resolver(path_.parent_path(), links_within_);
     try {
       refuse_too_large(path_.filename().string(), bytes_, memory_bytes_);
       ImportedModel m = import_model(path_.filename().string(), bytes_, resolver, options, context);
@@ -210,6 +214,7 @@ class ModelSource {
   std::filesystem::path path_;
   ImportOptions options_;  // of open()
   std::uint64_t memory_bytes_ = 0;
+  std::vector<std::string> links_within_;
   std::vector<FileRequest> known_;
   Bytes bytes_;
   bool has_bytes_ = false;

@@ -15,6 +15,8 @@ struct CompileRequest {
   std::string temporary;   // sibling of output that is renamed to it; "" = a name of its own
   CompileOptions options;  // resolved or not
   bool strict = false;     // warnings are errors
+  std::vector<std::string>
+      links_within;  // folders within which symbolic links are followed, beside the model's
   /// What this process may take; a model that surely needs more is refused before its meshes are read. 0 = no
   /// limit but the machine's memory.
   std::uint64_t memory_bytes = 0;

@@ -2,9 +2,7 @@
 
 #include <algorithm>
 
-#include "format/container/layout.h"
 #include "pipeline/import/text_scan.h"
-#include "pipeline/io/uri.h"
 #include "stages/image/decode_image.h"
 #include "stages/image/image_metadata.h"
 #include "stages/image/ktx2/read_ktx2.h"
@@ -133,16 +131,13 @@ std::int32_t add_image_bytes(Model& model, std::string name, std::vector<std::ui
   return static_cast<std::int32_t>(model.images.size() - 1);
 }
 
-bool is_preview_uri(const std::string& uri) {
-  return uri.starts_with("../") && parse_entry_path(uri.substr(3)).kind == EntryKind::kPreview;
-}
-
-std::int32_t add_image(Model& model, const std::string& uri, Resolver& resolver, const std::string& file_name,
-                       const std::string& place, const ImportOptions& options) {
-  if (!is_preview_uri(uri)) check_relative_name(uri, file_name, place);
-  auto bytes = resolver.read(uri, static_cast<std::uint64_t>(options.max_file_bytes));
-  if (bytes) return add_image_bytes(model, uri, std::move(*bytes), file_name, place, options);
-  const std::string text = "texture " + uri + " not found; the material stays without it";
+std::int32_t add_image(Model& model, const NameInModel& name, Resolver& resolver,
+                       const std::string& file_name, const std::string& place, const ImportOptions& options) {
+  NamedFile file =
+      find_file(name, resolver, static_cast<std::uint64_t>(options.max_file_bytes), model.notes, place);
+  if (file.bytes) return add_image_bytes(model, file.name, std::move(*file.bytes), file_name, place, options);
+  const std::string text =
+      "texture " + quote(name.text) + " not found: " + file.looked_for + "; the material stays without it";
   const bool is_noted =
       std::any_of(model.notes.begin(), model.notes.end(), [&text](const Note& n) { return n.text == text; });
   if (!is_noted) add_warning(model.notes, "missing-texture", place, text);

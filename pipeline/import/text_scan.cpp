@@ -5,6 +5,8 @@
 #include <cstring>
 #include <limits>
 
+#include "pipeline/io/wire_text.h"
+
 namespace texmesh {
 namespace {
 
@@ -105,6 +107,49 @@ bool LineReader::next(std::string_view& line) {
   line = rest_.substr(0, end);
   rest_.remove_prefix(skip);
   return true;
+}
+
+namespace {
+
+std::string from_utf16(std::string_view bytes, bool big) {
+  std::string text;
+  text.reserve(bytes.size() / 2);
+  char32_t high = 0;
+  for (std::size_t i = 2; i + 1 < bytes.size(); i += 2) {
+    const auto byte = [&](bool first) { return static_cast<unsigned char>(bytes[first == big ? i : i + 1]); };
+    const char32_t unit = static_cast<char32_t>(byte(true)) << 8 | byte(false);
+    const bool low = unit >= 0xdc00 && unit < 0xe000;
+    if (high != 0 && low)
+      append_utf8(text, 0x10000 + ((high - 0xd800) << 10) + (unit - 0xdc00));
+    else if (unit < 0xd800 || unit >= 0xe000)
+      append_utf8(text, unit);
+    high = unit >= 0xd800 && unit < 0xdc00 ? unit : 0;
+  }
+  return text;
+}
+
+}  // namespace
+
+SourceText::SourceText(std::string_view bytes, const std::string& file, Notes& notes) : text_(bytes) {
+  const bool little = bytes.starts_with("\xff\xfe"), big = bytes.starts_with("\xfe\xff");
+  if (little || big) {
+    own_ = from_utf16(bytes, big);
+    text_ = own_;
+    add_info(notes, "utf-16-text", file, "the file is UTF-16 and is read as such");
+    return;
+  }
+  if (text_.starts_with("\xef\xbb\xbf")) text_.remove_prefix(3);
+  if (is_utf8(text_)) return;
+  own_ = source_text(text_, file, notes);
+  text_ = own_;
+}
+
+std::string source_text(std::string_view bytes, const std::string& file, Notes& notes) {
+  constexpr const char* kCode = "text-encoding";
+  const auto told = [](const Note& n) { return n.code == kCode; };
+  if (!is_utf8(bytes) && std::none_of(notes.begin(), notes.end(), told))
+    add_warning(notes, kCode, file, "the file is not UTF-8; its text is read as Windows-1252");
+  return utf8_of(bytes);
 }
 
 std::string quote(std::string_view s) {

@@ -5,6 +5,8 @@
 #include <string>
 #include <string_view>
 
+#include "format/base/note.h"
+
 namespace texmesh {
 
 // Small pieces of the text formats' readers (OBJ, MTL, PLY, STL). Everything is bounded by the view it works
@@ -31,6 +33,24 @@ bool parse_integer(std::string_view token, std::int64_t& value);
 inline std::string_view text_of(std::span<const std::uint8_t> bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
+
+/// What the bytes of a text file say, as UTF-8: without a byte order mark; UTF-16 with such a mark is
+/// converted with a note, and what is neither counts as Windows-1252, with the warning "text-encoding" once a
+/// model.
+class SourceText {
+ public:
+  /// `bytes` must outlive the text.
+  SourceText(std::string_view bytes, const std::string& file, Notes& notes);
+  SourceText(const SourceText&) = delete;
+  SourceText& operator=(const SourceText&) = delete;
+  std::string_view text() const { return text_; }
+
+ private:
+  std::string own_;
+  std::string_view text_;
+};
+/// The same for a part of a file that is no text as a whole.
+std::string source_text(std::string_view bytes, const std::string& file, Notes& notes);
 
 /// Lines of a text, one by one; "\n", "\r\n" and a lone "\r" end a line.
 class LineReader {

@@ -8,6 +8,7 @@
 
 #include "pipeline/io/descriptor.h"
 #include "pipeline/io/resolver.h"
+#include "pipeline/io/similar_names.h"
 #include "pipeline/io/uri.h"
 
 namespace texmesh {
@@ -15,7 +16,7 @@ namespace {
 
 // O_NONBLOCK: opening a FIFO or a device returns at once, fstat then refuses it.
 constexpr int kReadFlags = O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY;
-constexpr const char* kRegularFile = "a regular file, no symbolic link, beneath the model's folder";
+constexpr const char* kRegularFile = "a regular file";
 
 std::string message(int error) { return std::generic_category().message(error); }
 
@@ -99,7 +100,7 @@ const char* kind_of(mode_t mode) {
 FileStamp checked_stamp(int fd, const std::string& name, const std::string& expected) {
   struct stat s {};
   if (::fstat(fd, &s) != 0) fail_to_read(name, "", "a readable file", errno);
-  if (!S_ISREG(s.st_mode)) throw InputError(name, "", expected, kind_of(s.st_mode));
+  if (!S_ISREG(s.st_mode)) throw FileRefused(name, "", expected, kind_of(s.st_mode));
   return stamp_of(s);
 }
 
@@ -130,34 +131,62 @@ std::vector<std::uint8_t> read_all(int fd, std::uint64_t max_bytes, const std::s
 
 }  // namespace
 
-FileResolver::FileResolver(const std::filesystem::path& folder, Method method)
-    : walk_(method == Method::kWalk) {
+FileResolver::FileResolver(const std::filesystem::path& folder, std::vector<std::string> links_within,
+                           Method method)
+    : roots_(std::move(links_within)), walk_(method == Method::kWalk) {
   const std::string name = folder.empty() ? "." : folder.string();
   folder_ = ::open(name.c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC);
   if (folder_ < 0) throw InputError(name, "", "the model's folder", message(errno));
+  roots_.insert(roots_.begin(), name);
 }
 
 FileResolver::~FileResolver() { ::close(folder_); }
 
 std::size_t FileResolver::record(const std::string& uri) {
   const auto [it, is_new] = index_of_.try_emplace(uri, requests_.size());
-  if (is_new) requests_.push_back({uri, false, {}, 0, {}});
+  if (is_new) requests_.push_back({uri, false, {}, 0, {}, false});
   return it->second;
 }
 
-int FileResolver::open_beneath(const std::string& uri) {
+int FileResolver::open_beneath(int folder, const std::string& name) {
   if (!walk_) {
-    const int fd = open_with_openat2(folder_, uri);
+    const int fd = open_with_openat2(folder, name);
     if (fd >= 0 || errno != ENOSYS) return fd;
     walk_ = true;
   }
-  return open_component_wise(folder_, uri);
+  return open_component_wise(folder, name);
+}
+
+/// git-annex, DVC and Bazel keep what they manage elsewhere in the repository, and links in its place.
+int FileResolver::open_link(const std::string& uri) {
+  namespace fs = std::filesystem;
+  std::error_code ec;
+  const fs::path target = fs::canonical(fs::path(roots_[0]) / uri, ec);
+  if (ec && !fs::is_symlink(fs::symlink_status(fs::path(roots_[0]) / uri, ec))) return -1;
+  if (target.empty()) throw FileRefused(uri, "", kRegularFile, "a symbolic link to a place where nothing is");
+  for (const std::string& root : roots_) {
+    const fs::path real = fs::canonical(root.empty() ? "." : root, ec);
+    if (ec) continue;
+    const std::string name = target.lexically_relative(real).string();
+    const Descriptor folder(::open(real.c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC));
+    if (name.empty() || name == "." || name == ".." || name.starts_with("../") || folder.get() < 0) continue;
+    const int fd = open_beneath(folder.get(), name);
+    if (fd >= 0) return fd;
+    if (errno != ELOOP && errno != EXDEV && errno != ENOENT) fail_to_read(uri, "", "a readable file", errno);
+  }
+  throw FileRefused(uri, "", kRegularFile,
+                    "a symbolic link that leads out of the folder that was named (--links-within DIR allows "
+                    "links that stay within DIR)");
 }
 
 /// Opens a uri that was recorded; -1 when there is no such file.
 int FileResolver::open_regular(const std::string& uri) {
-  check_relative_name(uri, "", "");
-  const int fd = open_beneath(uri);
+  try {
+    check_relative_name(uri, "", "");
+  } catch (const InputError& e) {
+    throw FileRefused(uri, "", e.expected(), e.found());
+  }
+  const int fd = open_beneath(folder_, uri);
   if (fd >= 0) return fd;
   switch (errno) {
     case ENOENT:
@@ -166,9 +195,9 @@ int FileResolver::open_regular(const std::string& uri) {
       return -1;
     case ELOOP:
     case EXDEV:
-      throw InputError(uri, "", kRegularFile, "a symbolic link");
+      return open_link(uri);
     case ENXIO:
-      throw InputError(uri, "", kRegularFile, "a socket");
+      throw FileRefused(uri, "", kRegularFile, "a socket");
     default:
       fail_to_read(uri, "", "a readable file", errno);
   }
@@ -181,7 +210,7 @@ std::optional<std::vector<std::uint8_t>> FileResolver::read(const std::string& u
     if (fd.get() < 0) return std::nullopt;
     FileStamp stamp;
     std::vector<std::uint8_t> bytes = read_all(fd.get(), max_bytes, uri, kRegularFile, stamp);
-    requests_[index] = {uri, true, sha256(bytes), bytes.size(), stamp};
+    requests_[index] = {uri, true, sha256(bytes), bytes.size(), stamp, false};
     return bytes;
   } catch (const ResourceError&) {
     failed_for_resources_ = true;
@@ -189,9 +218,25 @@ std::optional<std::vector<std::uint8_t>> FileResolver::read(const std::string& u
   }
 }
 
+std::vector<std::string> FileResolver::similar(const std::string& uri) {
+  SimilarNames found = similar_names(roots_[0], uri);
+  if (asked_similar_.insert(uri).second) requests_.push_back(found.request(uri));
+  return std::move(found.names);
+}
+
+bool FileResolver::is_there(const std::string& uri) {
+  try {
+    const Descriptor fd(open_regular(uri));
+    struct stat s {};
+    return fd.get() >= 0 && ::fstat(fd.get(), &s) == 0 && S_ISREG(s.st_mode);
+  } catch (const InputError&) {
+    return false;
+  }
+}
+
 void FileResolver::expect(std::vector<FileRequest> known) {
   for (FileRequest& r : known)
-    if (r.found) expected_[r.uri] = std::move(r);
+    if (r.found && !r.similar) expected_[r.uri] = std::move(r);
 }
 
 bool FileResolver::look(const std::string& uri, std::uint64_t max_bytes) {

@@ -38,18 +38,22 @@ struct FileStamp {
   static constexpr std::int64_t kSettleNs = 2'000'000'000;
 };
 
-/// A file that a model asked for. `digest`, `bytes` and `stamp` are zero unless found. Uri, found, digest and
-/// bytes become part of the cache key: the same requests with the same answers give the same model.
+/// What a model asked of the files beside it: a file, or (`similar`) which names there are like one that is
+/// not there (similar_names.h): then `digest` and `bytes` are of their list, `found` says that it is not
+/// empty, and `stamp` is that of the folder. `digest`, `bytes` and `stamp` of a file are zero unless found.
+/// All but the stamp become part of the cache key: the same requests with the same answers give the same
+/// model.
 struct FileRequest {
-  std::string uri;  // as the model names it; "" = the model itself
+  std::string uri;  // relative to the model's folder; "" = the model itself
   bool found = false;
   Sha256 digest{};
   std::uint64_t bytes = 0;
   FileStamp stamp;  // when it was read; no part of any key
+  bool similar = false;
   friend bool operator==(const FileRequest&, const FileRequest&) = default;
   template <class S, class A>
   static void archive(S& s, A& a) {
-    a(s.uri, s.found, s.digest, s.bytes, s.stamp);
+    a(s.uri, s.found, s.digest, s.bytes, s.stamp, s.similar);
   }
   template <class S, class V>
   static void fields(S& s, V&& v) {
@@ -58,6 +62,7 @@ struct FileRequest {
     v("sha256", s.digest, "");
     v("bytes", s.bytes, "");
     v("stamp", s.stamp, kMayMiss, "");
+    v("similar", s.similar, kMayMiss, "");
   }
 };
 

@@ -6,18 +6,27 @@
 
 #include "format/base/bytes.h"
 #include "format/base/errors.h"
+#include "pipeline/io/wire_text.h"
 
 namespace texmesh {
 
-/// Gives import the files a model refers to. The pipeline's resolver opens beneath the model's folder only;
-/// tests use memory. What was asked for, found or not, becomes part of the cache key.
+/// Gives import the files a model refers to, by names that are relative to the model's folder
+/// (pipeline/import/named_files.h makes them of what stands in a model). What was asked for, found or not,
+/// becomes part of the cache key.
 class Resolver {
  public:
   virtual ~Resolver() = default;
-  /// The bytes of `uri` (relative, already percent-decoded where the format says so), nothing when there is
-  /// no such file. Throws InputError when the name is not allowed (absolute, drive letter, scheme, "..",
-  /// symbolic link, not a regular file) or the file exceeds max_bytes.
+  /// The bytes of a file, nothing when there is no such file. Throws FileRefused when the name is not allowed
+  /// (absolute, drive letter, scheme, "..", a symbolic link that leads elsewhere, not a regular file), and
+  /// InputError when the file exceeds max_bytes.
   virtual std::optional<Bytes> read(const std::string& uri, std::uint64_t max_bytes) = 0;
+  /// Files whose names differ from `uri` only in case or composition (name_key()), sorted.
+  virtual std::vector<std::string> similar(const std::string&) { return {}; }
+};
+
+/// What lies under a name must not be read.
+struct FileRefused : InputError {
+  using InputError::InputError;
 };
 
 /// Files that were made in memory, by their names.
@@ -30,6 +39,12 @@ class MemoryFiles : public Resolver {
     if (it->second.size() > max_bytes)
       throw InputError(uri, "", "at most " + std::to_string(max_bytes) + " bytes", "more");
     return it->second;
+  }
+  std::vector<std::string> similar(const std::string& uri) override {
+    std::vector<std::string> names;
+    for (const auto& [name, bytes] : files)
+      if (name != uri && name_key(name) == name_key(uri)) names.push_back(name);
+    return names;
   }
 };
 

@@ -20,16 +20,6 @@ std::string shown(std::string_view name) {
 
 bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
 
-/// RFC 3986: letter, then letters, digits, '+', '-', '.', then ':'. Takes drive letters as well.
-bool has_scheme(std::string_view name) {
-  if (name.empty() || !is_letter(name[0])) return false;
-  for (const char c : name) {
-    if (c == ':') return true;
-    if (!is_letter(c) && !(c >= '0' && c <= '9') && c != '+' && c != '-' && c != '.') return false;
-  }
-  return false;
-}
-
 const char* why_refused(std::string_view name) {
   if (name.empty()) return "an empty name";
   if (name.size() > kMaxNameBytes) return "a name of over 4096 bytes";
@@ -72,6 +62,15 @@ constexpr std::array<std::int8_t, 256> base64_values() {
 
 }  // namespace
 
+bool has_scheme(std::string_view name) {
+  if (name.empty() || !is_letter(name[0])) return false;
+  for (const char c : name) {
+    if (c == ':') return true;
+    if (!is_letter(c) && !(c >= '0' && c <= '9') && c != '+' && c != '-' && c != '.') return false;
+  }
+  return false;
+}
+
 void check_relative_name(std::string_view name, const std::string& file, const std::string& place) {
   if (const char* why = why_refused(name)) {
     throw InputError(file, place, std::string(kAllowed),
@@ -79,21 +78,15 @@ void check_relative_name(std::string_view name, const std::string& file, const s
   }
 }
 
-std::string decode_uri(std::string_view uri, const std::string& file, const std::string& place) {
+std::string percent_decoded(std::string_view uri) {
   std::string name;
   name.reserve(uri.size());
   for (std::size_t i = 0; i < uri.size(); ++i) {
-    if (uri[i] != '%') {
-      name += uri[i];
-      continue;
-    }
-    const int hi = i + 2 < uri.size() ? hex_digit(uri[i + 1]) : -1;
-    const int lo = i + 2 < uri.size() ? hex_digit(uri[i + 2]) : -1;
-    if (hi < 0 || lo < 0) throw InputError(file, place, "two hexadecimal digits after '%'", shown(uri));
-    name += static_cast<char>(hi * 16 + lo);
-    i += 2;
+    const int hi = uri[i] == '%' && i + 2 < uri.size() ? hex_digit(uri[i + 1]) : -1;
+    const int lo = hi >= 0 ? hex_digit(uri[i + 2]) : -1;
+    name += lo >= 0 ? static_cast<char>(hi * 16 + lo) : uri[i];
+    if (lo >= 0) i += 2;
   }
-  check_relative_name(name, file, place);
   return name;
 }
 

@@ -15,10 +15,11 @@ namespace texmesh {
 /// InputError.
 void check_relative_name(std::string_view name, const std::string& file, const std::string& place);
 
-/// A glTF URI to a name: "%41" -> "A", once (a decoded '%' stays). The result passes check_relative_name;
-/// query and fragment are not split off, as glTF names files. Throws InputError for broken escapes and
-/// refused names.
-std::string decode_uri(std::string_view uri, const std::string& file, const std::string& place);
+/// "%41" -> "A", once (a decoded '%' stays); what is no escape stays as it is.
+std::string percent_decoded(std::string_view uri);
+
+/// Letter, then letters, digits, '+', '-', '.', then ':' (RFC 3986). Takes drive letters as well.
+bool has_scheme(std::string_view name);
 
 /// Scheme, host and port of a URL: "https://museum.example" of "https://museum.example/a?b"; "" for an
 /// address without a host.

@@ -1,8 +1,12 @@
 #include "pipeline/io/wire_text.h"
 
 #include <fmt/format.h>
+#include <utf8proc.h>
 
 #include <cstdint>
+#include <cstdlib>
+#include <cstring>
+#include <memory>
 
 namespace texmesh {
 namespace {
@@ -51,11 +55,59 @@ std::size_t utf8_character_bytes(std::string_view s) {
 
 bool is_utf8(std::string_view bytes) {
   while (!bytes.empty()) {
+    // Scans of a gigabyte are ASCII: eight characters at a time.
+    for (std::uint64_t eight = 0; bytes.size() >= 8; bytes.remove_prefix(8)) {
+      std::memcpy(&eight, bytes.data(), 8);
+      if ((eight & 0x8080808080808080u) != 0) break;
+    }
+    if (bytes.empty()) break;
     const std::size_t n = utf8_character_bytes(bytes);
     if (n == 0) return false;
     bytes.remove_prefix(n);
   }
   return true;
+}
+
+void append_utf8(std::string& text, char32_t c) {
+  const auto add = [&](char32_t byte) { text += static_cast<char>(byte); };
+  if (c < 0x80) return add(c);
+  if (c < 0x800) {
+    add(0xc0 | c >> 6);
+  } else {
+    if (c < 0x10000) {
+      add(0xe0 | c >> 12);
+    } else {
+      add(0xf0 | c >> 18);
+      add(0x80 | (c >> 12 & 0x3f));
+    }
+    add(0x80 | (c >> 6 & 0x3f));
+  }
+  add(0x80 | (c & 0x3f));
+}
+
+std::string utf8_of(std::string_view bytes) {
+  if (is_utf8(bytes)) return std::string(bytes);
+  // Where Windows-1252 differs from Latin-1: 0x80 to 0x9f. What it leaves open stays a control character.
+  static constexpr char16_t kFrom0x80[] =
+      u"\u20ac\x0081\u201a\u0192\u201e\u2026\u2020\u2021\u02c6\u2030\u0160\u2039\u0152\x008d\u017d\x008f"
+      u"\x0090\u2018\u2019\u201c\u201d\u2022\u2013\u2014\u02dc\u2122\u0161\u203a\u0153\x009d\u017e\u0178";
+  std::string text;
+  text.reserve(bytes.size() + bytes.size() / 8);
+  for (const char byte : bytes) {
+    const auto c = static_cast<unsigned char>(byte);
+    append_utf8(text, c >= 0x80 && c < 0xa0 ? char32_t{kFrom0x80[c - 0x80]} : char32_t{c});
+  }
+  return text;
+}
+
+std::string name_key(std::string_view name) {
+  const std::string text = utf8_of(name);
+  utf8proc_uint8_t* key = nullptr;
+  const auto bytes = utf8proc_map(
+      reinterpret_cast<const utf8proc_uint8_t*>(text.data()), static_cast<utf8proc_ssize_t>(text.size()),
+      &key, static_cast<utf8proc_option_t>(UTF8PROC_STABLE | UTF8PROC_COMPOSE | UTF8PROC_CASEFOLD));
+  const std::unique_ptr<utf8proc_uint8_t, void (*)(void*)> held(key, std::free);
+  return bytes < 0 ? text : std::string(reinterpret_cast<const char*>(key), static_cast<std::size_t>(bytes));
 }
 
 std::string to_wire(std::string_view bytes) {

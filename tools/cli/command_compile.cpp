@@ -169,6 +169,9 @@ RunSettings run_settings(const CompileArguments& args) {
   run.cache.layers = args.layers;
   for (std::string& layer : layers_from_environment()) run.cache.layers.push_back(std::move(layer));
   for (const std::string& layer : run.cache.layers) check_layer(layer);
+  for (const std::string& folder : run.links_within)
+    if (!std::filesystem::is_directory(folder))
+      throw UsageError("--links-within", "", "a folder that is there", folder);
   run.mode = output_mode(args);
   for (const std::string& file : {args.profile, args.jnd_profile, args.meta})
     if (!file.empty()) run.more_inputs.push_back(file);
@@ -202,6 +205,12 @@ void add_run_options(Command& c, CompileArguments& args) {
        "same, and compile stops if the kernel cannot; off = no limits")
       .value_name("NAME")
       .shows_default()
+      .rare();
+  c.option(
+       "--links-within", run.links_within,
+       "Follow a model's symbolic links where they lead to a file within DIR, too (git-annex, DVC, Bazel); "
+       "may be given several times. Links within the folder that INPUT names are always followed")
+      .value_name("DIR")
       .rare();
   add_shard_options(c, args.shard, args.costs);
   Option keep_going =

@@ -3,7 +3,7 @@
 #include <set>
 
 #include "format/container/layout.h"
-#include "pipeline/import/import_images.h"
+#include "pipeline/import/named_files.h"
 #include "pipeline/io/file_resolver.h"
 #include "pipeline/io/resolver.h"
 #include "stages/base/parallel.h"
@@ -38,6 +38,7 @@ class ModelFiles : public Resolver {
     if (!package_) package_.emplace(folder_ / "..");
     return package_->read(uri.substr(std::string_view("../").size()), max_bytes);
   }
+  std::vector<std::string> similar(const std::string& uri) override { return files_.similar(uri); }
   bool failed_for_resources() const {
     return files_.failed_for_resources() || (package_ && package_->failed_for_resources());
   }

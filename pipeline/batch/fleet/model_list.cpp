@@ -7,9 +7,13 @@
 #include <set>
 
 #include "format/base/bounded_json.h"
+#include "format/base/text_bytes.h"
+#include "pipeline/import/named_files.h"
 #include "pipeline/import/obj/obj_material.h"
 #include "pipeline/import/ply/ply_reader.h"
 #include "pipeline/import/range/range_scan_document.h"
+#include "pipeline/import/text_scan.h"
+#include "pipeline/io/file_resolver.h"
 #include "pipeline/io/uri.h"
 
 namespace texmesh {
@@ -31,42 +35,42 @@ std::vector<std::uint8_t> bytes_at(const std::string& path, std::uint64_t offset
   return bytes;
 }
 
-class NamedFiles {
+/// Which files there are; reads none of them.
+class FilesThere : public Resolver {
  public:
-  explicit NamedFiles(const std::string& model) : model_(model), folder_(fs::path(model).parent_path()) {}
+  FilesThere(const std::string& folder, const std::vector<std::string>& links_within)
+      : files_(folder, links_within) {}
+  std::optional<Bytes> read(const std::string& uri, std::uint64_t) override {
+    return files_.is_there(uri) ? std::optional<Bytes>(Bytes{}) : std::nullopt;
+  }
+  std::vector<std::string> similar(const std::string& uri) override { return files_.similar(uri); }
+
+ private:
+  FileResolver files_;
+};
+
+class ListedFiles {
+ public:
+  ListedFiles(const std::string& model, const std::vector<std::string>& links_within)
+      : model_(model), folder_(fs::path(model).parent_path()), files_(folder_.string(), links_within) {}
 
   std::vector<std::string> find() {
-    std::string ending = fs::path(model_).extension().string();
-    std::transform(ending.begin(), ending.end(), ending.begin(),
-                   [](unsigned char c) { return std::tolower(c); });
-    if (ending == ".gltf") look_at_gltf(bytes_at(model_, 0, kMostJsonBytes));
-    if (ending == ".glb") look_at_glb();
-    if (ending == ".obj") look_at_obj();
-    if (ending == ".ply") look_at_ply();
-    if (ending == ".json") look_at_range_scan();
+    const std::string ending = lower_extension(model_);
+    if (ending == "gltf") look_at_gltf(bytes_at(model_, 0, kMostJsonBytes));
+    if (ending == "glb") look_at_glb();
+    if (ending == "obj") look_at_obj();
+    if (ending == "ply") look_at_ply();
+    if (ending == "json") look_at_range_scan();
     return {found_.begin(), found_.end()};
   }
 
  private:
-  bool add(std::string name) {
-    std::replace(name.begin(), name.end(), '\\', '/');
-    try {
-      check_relative_name(name, model_, "");
-    } catch (const InputError&) {
-      return false;
-    }
-    const fs::path path = folder_ / name;
-    std::error_code ec;
-    if (!fs::is_regular_file(path, ec)) return false;
-    found_.insert(path.lexically_normal().string());
-    return true;
-  }
-
-  void add_uri(const std::string& uri) {
-    try {
-      add(decode_uri(uri, model_, ""));
-    } catch (const InputError&) {  // it names nothing beneath the folder
-    }
+  /// The file's name beneath the model's folder, "" where there is none.
+  std::string add(const NameInModel& name) {
+    const NamedFile file = find_file(name, files_, kMostJsonBytes, notes_, "");
+    if (!file.bytes) return "";
+    found_.insert((folder_ / file.name).lexically_normal().string());
+    return file.name;
   }
 
   void look_at_gltf(const std::vector<std::uint8_t>& json) {
@@ -74,7 +78,7 @@ class NamedFiles {
     for (const char* list : {"buffers", "images"})
       for (const auto& item : document.value(list, nlohmann::ordered_json::array())) {
         const std::string uri = item.is_object() ? item.value("uri", "") : "";
-        if (!uri.empty() && !is_data_uri(uri)) add_uri(uri);
+        if (!uri.empty() && !is_data_uri(uri)) add({uri, "", true});
       }
   }
 
@@ -90,44 +94,44 @@ class NamedFiles {
 
   void look_at_obj() {
     const std::vector<std::uint8_t> head = bytes_at(model_, 0, kHeadBytes);
-    std::string_view rest(reinterpret_cast<const char*>(head.data()), head.size());
-    while (!rest.empty()) {
-      std::string_view line = rest.substr(0, rest.find('\n'));
-      rest.remove_prefix(std::min(rest.size(), line.size() + 1));
-      if (next_token(line) != "mtllib") continue;
-      const std::string whole(trim(line));
-      if (add_library(whole)) continue;
-      for (std::string_view name = next_token(line); !name.empty(); name = next_token(line))
-        add_library(std::string(name));
+    const SourceText text(text_of(head), model_, notes_);
+    LineReader lines(text.text());
+    for (std::string_view line; lines.next(line);) {
+      if (!same_word(next_token(line), "mtllib") || add_library(std::string(line))) continue;
+      for (const std::string& name : names_of_libraries(line)) add_library(name);
     }
   }
 
-  bool add_library(const std::string& name) {
-    if (!add(name)) return false;
-    Notes notes;
-    const MtlFile library = read_mtl(name, bytes_at((folder_ / name).string(), 0, kMostJsonBytes), notes);
+  bool add_library(const std::string& written) {
+    const std::string name = add({written, "", false});
+    if (name.empty()) return false;
+    const MtlFile library = read_mtl(name, bytes_at((folder_ / name).string(), 0, kMostJsonBytes), notes_);
     for (const MtlMaterial& m : library.materials)
       for (const auto* map :
            {&m.map_kd, &m.map_ka, &m.map_ke, &m.map_d, &m.map_pr, &m.map_pm, &m.bump, &m.norm})
-        if (*map) add((*map)->file);
+        if (*map) add({(*map)->file, name, false});
     return true;
   }
 
   void look_at_ply() {
     for (const std::string& comment : read_ply_header(model_, bytes_at(model_, 0, kHeadBytes)).comments) {
       std::string_view rest = comment;
-      if (same_word(next_token(rest), "TextureFile")) add(std::string(trim(rest)));
+      if (same_word(next_token(rest), "TextureFile")) add({std::string(rest), "", false});
     }
   }
 
   void look_at_range_scan() {
-    const RangeScanDescription scan = read_range_scan_description(model_, bytes_at(model_, 0, kHeadBytes));
-    add(scan.grid);
-    if (scan.texture) add(*scan.texture);
+    const std::vector<std::uint8_t> bytes = bytes_at(model_, 0, kHeadBytes);
+    const SourceText text(text_of(bytes), model_, notes_);
+    const RangeScanDescription scan = read_range_scan_description(model_, text_bytes(text.text()));
+    add({scan.grid, "", false});
+    if (scan.texture) add({*scan.texture, "", false});
   }
 
   std::string model_;
   fs::path folder_;
+  FilesThere files_;
+  Notes notes_;  // of no interest here
   std::set<std::string> found_;
 };
 
@@ -139,9 +143,9 @@ std::uint64_t bytes_of_file(const std::string& path) {
 
 }  // namespace
 
-std::vector<std::string> named_files(const std::string& model) {
+std::vector<std::string> named_files(const std::string& model, const std::vector<std::string>& links_within) {
   try {
-    return NamedFiles(model).find();
+    return ListedFiles(model, links_within).find();
   } catch (const Error&) {
     return {};
   } catch (const nlohmann::json::exception&) {  // a list of another type
@@ -159,9 +163,12 @@ ModelList list_collection(const PlanRequest& request, int shards) {
   for (std::size_t i = 0; i < plan.models.size(); ++i) {
     const PlannedModel& m = plan.models[i];
     if (m.unread && !is_range_scan(m.input)) continue;
-    ListedModel listed{
-        m.input,          m.output, split.packages[i], named_files(m.input), bytes_of_file(m.input),
-        split.shard_of[i]};
+    ListedModel listed{m.input,
+                       m.output,
+                       split.packages[i],
+                       named_files(m.input, plan.folders),
+                       bytes_of_file(m.input),
+                       split.shard_of[i]};
     for (const std::string& file : listed.files) listed.bytes += bytes_of_file(file);
     list.models.push_back(std::move(listed));
   }

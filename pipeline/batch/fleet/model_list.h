@@ -54,6 +54,6 @@ DocumentSchema list_schema();
 /// scan. Only what is there. No picture is opened and no mesh read: of OBJ the first MiB is looked through,
 /// of the others the part that holds names. A file that is not as it should be names nothing; compiling says
 /// why.
-std::vector<std::string> named_files(const std::string& model);
+std::vector<std::string> named_files(const std::string& model, const std::vector<std::string>& links_within);
 
 }  // namespace texmesh

@@ -9,27 +9,41 @@
 #include "format/base/text_bytes.h"
 #include "pipeline/cache/cache_files.h"
 #include "pipeline/io/machine/owner_mark.h"
+#include "pipeline/io/similar_names.h"
 
 namespace texmesh {
 namespace {
 
-/// Not through symbolic links: import does not follow them either.
-std::optional<FileStamp> look(const std::string& path, bool follow) {
-  struct stat s {};
-  if ((follow ? ::stat(path.c_str(), &s) : ::lstat(path.c_str(), &s)) != 0 || !S_ISREG(s.st_mode))
-    return std::nullopt;
-  return stamp_of(s);
-}
-
 /// The file at `path` still has these bytes.
-bool same_file(const std::string& path, bool follow, std::int64_t looked_at_ns, const Sha256& digest,
-               std::uint64_t bytes, FileStamp& known, bool& refreshed) {
-  const auto now = look(path, follow);
+bool same_file(const std::string& path, std::int64_t looked_at_ns, const Sha256& digest, std::uint64_t bytes,
+               FileStamp& known, bool& refreshed) {
+  const auto now = stamp_of(path);
   if (!now || now->bytes != bytes) return false;
   if (*now == known && now->is_settled(looked_at_ns)) return true;
   const auto content = read_whole(path, bytes);
   if (!content || content->size() != bytes || sha256(*content) != digest) return false;
   known = *now;
+  refreshed = true;
+  return true;
+}
+
+/// The folder of `path`, or the nearest one above it that is there, is as it was.
+bool same_folder(std::string path, std::int64_t looked_at_ns, const FileStamp& known) {
+  struct stat s {};
+  do {
+    const std::size_t slash = path.rfind('/');
+    path = slash == std::string::npos ? "." : path.substr(0, std::max<std::size_t>(slash, 1));
+    if (::stat(path.c_str(), &s) == 0) return stamp_of(s) == known && known.is_settled(looked_at_ns);
+  } while (path != "." && path != "/");
+  return false;
+}
+
+/// As many names like that of `f` are beneath the folder as there were, and the same.
+bool same_names(const std::string& folder, std::int64_t looked_at_ns, FileRequest& f, bool& refreshed) {
+  if (f.stamp != FileStamp{} && same_folder(folder + f.uri, looked_at_ns, f.stamp)) return true;
+  const FileRequest now = similar_names(folder, f.uri).request(f.uri);
+  if (now.digest != f.digest || now.bytes != f.bytes) return false;
+  f.stamp = now.stamp;
   refreshed = true;
   return true;
 }
@@ -135,16 +149,14 @@ bool still_holds(MemoRecord& record, const std::string& input, const std::string
   const std::int64_t now_ns = wall_clock_ns();
   const std::string_view folder = std::string_view(input).substr(0, input.rfind('/') + 1);
   for (FileRequest& f : record.files) {
-    const bool is_model = f.uri.empty();
-    const std::string path = is_model ? input : std::string(folder) + f.uri;
-    if (!f.found) {
-      if (look(path, false)) return false;
-      continue;
-    }
-    if (!same_file(path, is_model, record.looked_at_ns, f.digest, f.bytes, f.stamp, refreshed)) return false;
+    const std::string path = f.uri.empty() ? input : std::string(folder) + f.uri;
+    const bool same = f.similar ? same_names(std::string(folder), record.looked_at_ns, f, refreshed)
+                      : f.found ? same_file(path, record.looked_at_ns, f.digest, f.bytes, f.stamp, refreshed)
+                                : !stamp_of(path);
+    if (!same) return false;
   }
-  if (!record.failed && !same_file(output, true, record.looked_at_ns, record.package_digest,
-                                   record.package_bytes, record.package_stamp, refreshed))
+  if (!record.failed && !same_file(output, record.looked_at_ns, record.package_digest, record.package_bytes,
+                                   record.package_stamp, refreshed))
     return false;
   // What was settled before is so now; what was read just now was true at this moment.
   if (refreshed) record.looked_at_ns = now_ns;

@@ -299,6 +299,7 @@ SandboxSupport enter_sandbox(const SandboxRules& rules) {
 SandboxRules sandbox_rules(const WorkerPlaces& places) {
   SandboxRules rules;
   rules.read = {folder_of_file(places.input), real_path(places.input)};
+  rules.read.insert(rules.read.end(), places.links_within.begin(), places.links_within.end());
   if (!places.program.empty())
     for (const char* modules : {"/../stages", "/../lib", "/../lib64"})
       rules.read.push_back(folder_of_file(places.program) + modules);

@@ -48,14 +48,15 @@ SandboxSupport enter_sandbox(const SandboxRules& rules);
 struct WorkerPlaces {
   std::string input, output, cache;
   std::string program;  // the executable, by whose folder the modules that it loads later are found
-  std::vector<std::string> layers;  // folders and URLs
-  bool only_looks = false;          // the cache is read only
+  std::vector<std::string> layers;        // folders and URLs
+  std::vector<std::string> links_within;  // folders that symbolic links of the model may lead into
+  bool only_looks = false;                // the cache is read only
 };
 
 /// What the process keeps: its modules (../stages of a build tree, ../../lib of an installation), the model's
-/// folder and the file that the model is a link to are read, the result's folder and the cache are written,
-/// layers are read. With layers that are URLs: the network, to the ports of these URLs and of name servers,
-/// or to every port where the environment names a proxy.
+/// folder, the file that the model is a link to and the folders of its links are read, the result's folder
+/// and the cache are written, layers are read. With layers that are URLs: the network, to the ports of these
+/// URLs and of name servers, or to every port where the environment names a proxy.
 SandboxRules sandbox_rules(const WorkerPlaces& places);
 
 }  // namespace texmesh

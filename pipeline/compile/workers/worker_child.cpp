@@ -81,6 +81,7 @@ void enter_sandbox_of(const WorkerTask& task, [[maybe_unused]] EventWriter& even
     !defined(__SANITIZE_THREAD__)  // they look into the process as debuggers do
   WorkerPlaces places;
   places.input = task.job.input;
+  places.links_within = task.job.links_within;
   places.cache = task.job.cache.folder;
   places.only_looks = task.job.forecast;
   places.program = real_program();
@@ -126,6 +127,7 @@ CompileRequest request_of(const WorkerTask& task) {
   request.output = task.job.output;
   request.temporary = task.temporary;
   request.strict = task.job.strict;
+  request.links_within = task.job.links_within;
   request.memory_bytes = task.limits.memory_bytes;
   request.known = task.job.known;
   request.earlier_keys = task.job.earlier_keys;

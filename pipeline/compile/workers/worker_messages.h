@@ -55,9 +55,10 @@ struct WorkerJob {
   std::shared_ptr<const std::string> profile;  // JSON of every option; jobs may share it
   CacheSettings cache;
   bool strict = false;
-  bool explain = false;            // say of every stage why it runs or not
-  bool forecast = false;           // only say so: run and write nothing
-  std::vector<FileRequest> known;  // of an earlier run, see CompileRequest
+  bool explain = false;                   // say of every stage why it runs or not
+  bool forecast = false;                  // only say so: run and write nothing
+  std::vector<std::string> links_within;  // see CompileRequest
+  std::vector<FileRequest> known;         // of an earlier run, see CompileRequest
   StageKeys earlier_keys;
   std::uint64_t predicted_memory_bytes = 0;  // peak, from earlier runs or a guess
   double predicted_s = 0;
@@ -71,6 +72,7 @@ struct WorkerJob {
     v("strict", s.strict, "");
     v("explain", s.explain, "");
     v("forecast", s.forecast, "");
+    v("links_within", s.links_within, kNamesFile, "");
     v("known", s.known, "");
     v("keys", s.earlier_keys, "");
   }

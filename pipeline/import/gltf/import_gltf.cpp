@@ -300,7 +300,8 @@ class GltfReader {
 
  private:
   Json look(const Container& container, About& about) const {
-    Json document = parse_json(source_, container.json);
+    const SourceText text(container.json, source_.file, source_.notes);
+    Json document = parse_json(source_, text.text());
     about = about_from_gltf(document, container.is_glb ? "glb" : "gltf", source_.notes);
     look_through(source_, document);
     return document;

@@ -4,6 +4,8 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/import/gltf/import_gltf_parts.h"
+#include "pipeline/import/named_files.h"
+#include "pipeline/import/text_scan.h"
 #include "pipeline/io/uri.h"
 
 namespace texmesh::gltf {
@@ -48,13 +50,17 @@ ByteSpan Buffers::buffer(std::size_t index) {
       if (is_data_uri(uri)) {
         buffers_[index] = decode_data_uri(uri, max_bytes, source_.file, place + "/uri");
       } else {
-        const std::string name = decode_uri(uri, source_.file, place + "/uri");
+        NamedFile file;
         try {
-          buffers_[index] = source_.resolver.read(name, max_bytes);
-        } catch (const InputError& e) {
-          source_.fail(place + "/uri", e.expected(), e.found() + " (" + name + ")");
+          file = find_file({uri, "", true}, source_.resolver, max_bytes, source_.notes, place + "/uri");
+        } catch (const ResourceError&) {
+          throw;
+        } catch (const InputError& e) {  // it knows the name alone
+          source_.fail(place + "/uri", e.expected(), e.found() + " (" + e.file() + ")");
         }
-        if (!buffers_[index]) source_.fail(place + "/uri", "the file " + name, "no such file");
+        if (!file.bytes)
+          source_.fail(place + "/uri", "the file " + quote(uri), "no such file: " + file.looked_for);
+        buffers_[index] = std::move(file.bytes);
       }
     }
     bytes = *buffers_[index];

@@ -103,13 +103,15 @@ std::int32_t MaterialReader::read_image(std::size_t index) {
                                            source_.file, place + "/uri"),
                            source_.file, place, source_.options);
   }
-  const std::string file = is_preview_uri(uri) ? uri : decode_uri(uri, source_.file, place + "/uri");
   try {
-    return add_image(model_, file, source_.resolver, source_.file, place + "/uri", source_.options);
+    return add_image(model_, {uri, "", true}, source_.resolver, source_.file, place + "/uri",
+                     source_.options);
+  } catch (const ResourceError&) {
+    throw;
   } catch (const InputError& e) {
     if (e.file() == source_.file) throw;
     source_.fail(place + "/uri", e.expected(),
-                 e.found() + " (" + file + ")");  // the resolver knows the name alone
+                 e.found() + " (" + e.file() + ")");  // the resolver knows the name alone
   }
 }
 

@@ -2,9 +2,9 @@
 
 #include "pipeline/about/source_fields.h"
 #include "pipeline/import/mesh_builder.h"
+#include "pipeline/import/named_files.h"
 #include "pipeline/import/obj/obj_material.h"
 #include "pipeline/import/text_scan.h"
-#include "pipeline/io/uri.h"
 
 // OBJ is read here and not by tinyobjloader 2.0rc10, which (measured on Debian 12) turns "nan", "inf" and
 // words into 0 without a word, wraps the index 99999999999 onto another vertex, gives a polygon of 300
@@ -43,6 +43,7 @@ struct ObjData {
   };
   std::vector<Library> libraries;
   std::uint64_t small_faces = 0, lines_and_points = 0;  // left out
+  std::map<std::string, std::uint64_t> unread;          // statements, by their first word
   bool parts_full = false;                              // the last part stands for all further ones
   std::span<const ObjCorner> corners_of(std::size_t f) const {
     const std::uint64_t end = f + 1 < faces.size() ? faces[f + 1].begin : corners.size();
@@ -52,6 +53,7 @@ struct ObjData {
 
 constexpr std::int64_t kMaxIndex = 2'000'000'000;
 constexpr std::size_t kMaxNames = 65535;  // parts, materials
+constexpr std::size_t kMaxWordBytes = 24, kMaxWords = 32;
 
 /// Names to numbers by first use.
 class NameTable {
@@ -76,7 +78,7 @@ class ObjReader {
  public:
   ObjReader(const std::string& file, std::string_view text, const ImportOptions& options,
             const RunContext& context)
-      : file_(file), lines_(without_bom(text)), options_(options), context_(context) {}
+      : file_(file), lines_(text), options_(options), context_(context) {}
 
   ObjData read() {
     material_ = material_numbers_.number_of("", data_.materials, materials_full_);
@@ -92,10 +94,6 @@ class ObjReader {
   }
 
  private:
-  static std::string_view without_bom(std::string_view text) {
-    return text.substr(0, 3) == "\xef\xbb\xbf" ? text.substr(3) : text;
-  }
-
   [[noreturn]] void fail(std::string expected, std::string found) const {
     throw InputError(file_, lines_.place(), std::move(expected), std::move(found));
   }
@@ -113,7 +111,19 @@ class ObjReader {
 
   void statement(std::string_view rest) {
     const std::string_view word = next_token(rest);
-    if (word.empty() || word[0] == '#') return;
+    if (word.empty() || word[0] == '#' || read_statement(word, rest)) return;
+    const std::string small = lower(word);
+    if (small == word || !read_statement(small, rest)) count_unread(small);
+  }
+
+  void count_unread(const std::string& word) {
+    const std::string short_word = word.substr(0, kMaxWordBytes);
+    const bool room = data_.unread.size() < kMaxWords || data_.unread.contains(short_word);
+    ++data_.unread[room ? short_word : "others"];
+  }
+
+  /// False for a statement that is not known.
+  bool read_statement(std::string_view word, std::string_view rest) {
     if (word == "v")
       vertex(rest);
     else if (word == "vt")
@@ -132,6 +142,9 @@ class ObjReader {
       data_.libraries.push_back({std::string(trim(rest)), lines_.number()});
     else if (word == "l" || word == "p")
       ++data_.lines_and_points;
+    else
+      return false;
+    return true;
   }
 
   // Up to `most` numbers; stops at a comment.
@@ -272,58 +285,69 @@ struct LoadedLibrary {
   MtlFile file;
   std::map<std::string, std::size_t> by_name;  // the first material so named
 
+  /// `name` as an OBJ uses it; what follows a blank and # may be a comment.
+  const MtlMaterial* find(const std::string& wanted) const {
+    auto it = by_name.find(wanted);
+    if (const std::size_t comment = wanted.find(" #"); it == by_name.end() && comment != wanted.npos)
+      it = by_name.find(std::string(trim(std::string_view(wanted).substr(0, comment))));
+    return it == by_name.end() ? nullptr : &file.materials[it->second];
+  }
+
   LoadedLibrary(std::string library_name, MtlFile library_file)
       : name(std::move(library_name)), file(std::move(library_file)) {
     for (std::size_t i = 0; i < file.materials.size(); ++i) by_name.try_emplace(file.materials[i].name, i);
   }
 };
 
-std::optional<LoadedLibrary> load_library(std::string name, const std::string& file, const std::string& place,
-                                          Model& model, Resolver& resolver, const ImportOptions& options) {
-  std::replace(name.begin(), name.end(), '\\', '/');
-  check_relative_name(name, file, place);
-  const auto bytes = resolver.read(name, static_cast<std::uint64_t>(options.max_file_bytes));
-  if (!bytes) return std::nullopt;
-  return LoadedLibrary(name, read_mtl(name, *bytes, model.notes));
-}
+class LibraryLoader {
+ public:
+  LibraryLoader(Model& model, Resolver& resolver, const ImportOptions& options)
+      : model_(model), resolver_(resolver), max_bytes_(static_cast<std::uint64_t>(options.max_file_bytes)) {}
 
-/// `mtllib a.mtl b.mtl` names two files, `mtllib my scan.mtl` one: the whole is tried first.
-void load_libraries(const ObjData::Library& library, const std::string& file, Model& model,
-                    Resolver& resolver, const ImportOptions& options, std::vector<LoadedLibrary>& loaded) {
-  const std::string place = "line " + std::to_string(library.line);
-  auto load = [&](const std::string& name) {
-    auto found = load_library(name, file, place, model, resolver, options);
-    if (found) loaded.push_back(std::move(*found));
-    return found.has_value();
-  };
-  auto missing = [&](const std::string& name) {
-    add_warning(model.notes, "missing-mtl", place,
-                "material library " + name + " not found; its materials stay untextured");
-  };
-  if (library.name.empty() || load(library.name)) return;
-  std::string_view rest = library.name;
-  const std::string first(next_token(rest));
-  if (trim(rest).empty()) return missing(library.name);
-  bool any = false;
-  std::vector<std::string> absent;
-  rest = library.name;
-  for (std::string_view token = next_token(rest); !token.empty(); token = next_token(rest)) {
-    if (load(std::string(token)))
-      any = true;
-    else
-      absent.emplace_back(token);
+  /// `mtllib a.mtl b.mtl` names two files, `mtllib my scan.mtl` one: the whole is tried first.
+  void load(const ObjData::Library& library) {
+    place_ = "line " + std::to_string(library.line);
+    const std::vector<std::string> names = names_of_libraries(library.name);
+    if (names.empty()) return;
+    const std::string whole = load_one(library.name);
+    if (whole.empty() || names.size() == 1) return missing(library.name, whole);
+    std::vector<std::pair<std::string, std::string>> absent;
+    for (const std::string& name : names)
+      if (const std::string looked_for = load_one(name); !looked_for.empty())
+        absent.emplace_back(name, looked_for);
+    if (absent.size() == names.size()) return missing(library.name, whole);
+    for (const auto& [name, looked_for] : absent) missing(name, looked_for);
   }
-  if (!any) return missing(library.name);
-  for (const std::string& name : absent) missing(name);
-}
+  std::vector<LoadedLibrary> take() { return std::move(loaded_); }
+
+ private:
+  /// Where it was looked for; "" when it was found.
+  std::string load_one(const std::string& name) {
+    NamedFile found = find_file({name, "", false}, resolver_, max_bytes_, model_.notes, place_);
+    if (!found.bytes) return found.looked_for;
+    loaded_.emplace_back(found.name, read_mtl(found.name, *found.bytes, model_.notes));
+    return "";
+  }
+  void missing(const std::string& name, const std::string& looked_for) {
+    if (!looked_for.empty())
+      add_warning(model_.notes, "missing-mtl", place_,
+                  "material library " + quote(name) + " not found: " + looked_for +
+                      "; its materials stay untextured");
+  }
+
+  Model& model_;
+  Resolver& resolver_;
+  const std::uint64_t max_bytes_;
+  std::string place_;
+  std::vector<LoadedLibrary> loaded_;
+};
 
 Material make_material(const std::string& name, const std::vector<LoadedLibrary>& libraries, bool any_library,
                        const std::string& file, Model& model, Resolver& resolver,
                        const ImportOptions& options) {
   for (const LoadedLibrary& library : libraries)
-    if (const auto it = library.by_name.find(name); it != library.by_name.end())
-      return material_from_mtl(library.file.materials[it->second], library.file, library.name, model,
-                               resolver, options);
+    if (const MtlMaterial* material = library.find(name))
+      return material_from_mtl(*material, library.file, library.name, model, resolver, options);
   if (!libraries.empty())
     add_warning(model.notes, "missing-material", file,
                 "material " + quote(name) + " is in no material library");
@@ -337,12 +361,13 @@ Material make_material(const std::string& name, const std::vector<LoadedLibrary>
 /// names. What is missing gives a warning and a material without texture.
 void add_obj_materials(const ObjData& data, const std::string& file, Model& model, Resolver& resolver,
                        const ImportOptions& options) {
-  std::vector<LoadedLibrary> libraries;
+  LibraryLoader loader(model, resolver, options);
   for (const ObjData::Library& library : data.libraries) {
     const auto same = [&library](const ObjData::Library& other) { return other.name == library.name; };
     const auto first = std::find_if(data.libraries.begin(), data.libraries.end(), same);
-    if (&*first == &library) load_libraries(library, file, model, resolver, options, libraries);
+    if (&*first == &library) loader.load(library);
   }
+  const std::vector<LoadedLibrary> libraries = loader.take();
   std::vector<std::uint8_t> used(data.materials.size(), 0);
   for (const ObjFace& f : data.faces) used[f.material] = 1;
   for (std::size_t i = 0; i < data.materials.size(); ++i) {
@@ -449,12 +474,13 @@ void add_notes(const ObjData& data, Model& model) {
 
 ImportedModel import_obj(const std::string& file_name, std::span<const std::uint8_t> bytes,
                          Resolver& resolver, const ImportOptions& options, const RunContext& context) {
-  const ObjData data = read_obj(file_name, text_of(bytes), options, context);
+  ImportedModel out;
+  const SourceText text(text_of(bytes), file_name, out.model.notes);
+  const ObjData data = read_obj(file_name, text.text(), options, context);
   if (data.positions.empty()) throw InputError(file_name, "", "an OBJ with v statements", "none");
   if (data.faces.empty()) throw InputError(file_name, "", "faces", "none");
-  ImportedModel out;
   out.format = "obj";
-  out.about = about_from_comments(obj_comments(text_of(bytes)), out.format, out.model.notes);
+  out.about = about_from_comments(obj_comments(text.text()), out.format, out.model.notes);
   add_obj_materials(data, file_name, out.model, resolver, options);
   out.model.mesh = build_mesh(data, out.model, options, context);
   out.model.mesh.part_names = data.parts;

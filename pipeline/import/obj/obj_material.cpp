@@ -60,13 +60,8 @@ std::optional<MtlTexture> read_texture(std::string_view rest, std::size_t line) 
   texture.line = line;
   while (consume_option(rest, texture)) {
   }
-  std::string_view file = trim(rest);
-  if (file.size() >= 2 && file.front() == '"' && file.back() == '"')
-    file = trim(file.substr(1, file.size() - 2));
-  if (file.empty()) return std::nullopt;
-  texture.file = file;
-  std::replace(texture.file.begin(), texture.file.end(), '\\', '/');
-  return texture;
+  texture.file = trim(rest);
+  return texture.file.empty() ? std::nullopt : std::optional(texture);
 }
 
 class MtlReader {
@@ -215,7 +210,7 @@ struct Converter {
   TextureRef texture(const std::optional<MtlTexture>& t) const {
     TextureRef ref;
     if (!t) return ref;
-    ref.image = add_image(model, t->file, resolver, mtl_name, place(*t), options);
+    ref.image = add_image(model, {t->file, mtl_name, false}, resolver, mtl_name, place(*t), options);
     if (!ref.used()) return {};
     ref.transform = transform_of(*t);
     if (t->clamp) ref.wrap_s = ref.wrap_t = Wrap::kClamp;
@@ -315,8 +310,23 @@ struct Converter {
 
 }  // namespace
 
+std::vector<std::string> names_of_libraries(std::string_view rest) {
+  std::vector<std::string> names;
+  while (!(rest = trim(rest)).empty() && rest.front() != '#') {
+    const std::size_t end = rest.front() == '"' ? rest.find('"', 1) : rest.npos;
+    if (end == rest.npos) {
+      names.emplace_back(next_token(rest));
+    } else {
+      names.emplace_back(rest.substr(0, end + 1));
+      rest.remove_prefix(end + 1);
+    }
+  }
+  return names;
+}
+
 MtlFile read_mtl(const std::string& name, std::span<const std::uint8_t> bytes, Notes& notes) {
-  return MtlReader(name, text_of(bytes), notes).read();
+  const SourceText text(text_of(bytes), name, notes);
+  return MtlReader(name, text.text(), notes).read();
 }
 
 Material material_from_mtl(const MtlMaterial& mtl, const MtlFile& file, const std::string& mtl_name,

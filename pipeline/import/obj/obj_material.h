@@ -12,7 +12,7 @@ namespace texmesh {
 /// A texture statement of an MTL: options come before the file name, which runs to the end of the
 /// line, blanks included.
 struct MtlTexture {
-  std::string file;  // '/' for '\'
+  std::string file;  // as written
   std::size_t line = 0;
   Vec2d scale{1, 1}, offset{0, 0};  // -s, -o: uv' = scale * uv + offset, v upwards
   bool clamp = false;               // -clamp on
@@ -33,6 +33,10 @@ struct MtlFile {
   std::vector<MtlMaterial> materials;
   bool by_meshlab = false;  // its Tr is an opacity
 };
+
+/// The names in a line `mtllib`, taken as several: in quotes, or between blanks. The line may as well be one
+/// name with blanks.
+std::vector<std::string> names_of_libraries(std::string_view rest);
 
 /// Never fails: what is no statement is ignored, a number that is none leaves the default (Kd and the like
 /// are looks, not geometry) with one warning.

@@ -341,7 +341,7 @@ class PlyModel {
       material.name = name;
       if (has_uv())
         material.base_colour_texture.image =
-            add_image(model_, name, resolver_, file_, "comment TextureFile", options_);
+            add_image(model_, {name, "", false}, resolver_, file_, "comment TextureFile", options_);
       model_.materials.push_back(std::move(material));
     }
     if (model_.materials.size() > 1 && !has_uv())

@@ -1,10 +1,10 @@
 
 #include "format/base/portable_math.h"
+#include "format/base/text_bytes.h"
 #include "pipeline/import/import_images.h"
 #include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/range/range_scan_document.h"
 #include "pipeline/import/text_scan.h"
-#include "pipeline/io/uri.h"
 #include "stages/image/decode_image.h"
 
 namespace texmesh {
@@ -94,11 +94,11 @@ bool is_full_turn(double alpha_step_rad, std::uint32_t columns) {
 }
 
 RangeScan scan_from_json(const std::string& file, const RangeScanDescription& d, Resolver& resolver,
-                         const ImportOptions& options) {
-  check_relative_name(d.grid, file, "/grid");
-  auto bytes = resolver.read(d.grid, static_cast<std::uint64_t>(options.max_file_bytes));
-  if (!bytes) throw InputError(file, "/grid", "a file", d.grid + ", which is not there");
-  const Values values = read_values(d.grid, std::move(*bytes), options);
+                         const ImportOptions& options, Notes& notes) {
+  NamedFile grid = find_file({d.grid, "", false}, resolver,
+                             static_cast<std::uint64_t>(options.max_file_bytes), notes, "/grid");
+  if (!grid.bytes) throw InputError(file, "/grid", "the file " + quote(d.grid), "none: " + grid.looked_for);
+  const Values values = read_values(grid.name, std::move(*grid.bytes), options);
   RangeScan scan;
   scan.columns = values.columns;
   scan.rows = values.rows;
@@ -259,7 +259,8 @@ void add_material(const std::string& file, const std::optional<std::string>& tex
                   const ImportOptions& options, Model& model) {
   Material material = scan_material(texture ? *texture : "untextured");
   if (texture) {
-    material.base_colour_texture.image = add_image(model, *texture, resolver, file, "/texture", options);
+    material.base_colour_texture.image =
+        add_image(model, {*texture, "", false}, resolver, file, "/texture", options);
     material.base_colour_texture.wrap_t = Wrap::kClamp;
   }
   model.materials.push_back(std::move(material));
@@ -276,8 +277,9 @@ ImportedModel import_range_scan(const std::string& file_name, std::span<const st
   if (text_of(bytes).substr(0, 9) == "Cyberware") {
     scan = read_cyberware(file_name, bytes, options, out.model.notes);
   } else {
-    const RangeScanDescription description = read_range_scan_description(file_name, bytes);
-    scan = scan_from_json(file_name, description, resolver, options);
+    const SourceText text(text_of(bytes), file_name, out.model.notes);
+    const RangeScanDescription description = read_range_scan_description(file_name, text_bytes(text.text()));
+    scan = scan_from_json(file_name, description, resolver, options, out.model.notes);
     texture = description.texture;
   }
   check_scan(file_name, scan, options);

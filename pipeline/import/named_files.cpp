@@ -1,0 +1,163 @@
+#include "pipeline/import/named_files.h"
+
+#include <algorithm>
+
+#include "format/container/layout.h"
+#include "pipeline/import/text_scan.h"
+#include "pipeline/io/uri.h"
+
+namespace texmesh {
+namespace {
+
+constexpr std::size_t kMostParts = 256;
+
+std::string_view without_quotes(std::string_view s) {
+  s = trim(s);
+  if (s.size() >= 2 && (s.front() == '"' || s.front() == '\'') && s.back() == s.front())
+    s = trim(s.substr(1, s.size() - 2));
+  return s;
+}
+
+/// What may be meant by the text, in order.
+std::vector<std::string> readings_of(const NameInModel& name) {
+  std::vector<std::string> readings;
+  const auto add = [&](std::string text) {
+    std::replace(text.begin(), text.end(), '\\', '/');
+    if (!text.empty() && std::find(readings.begin(), readings.end(), text) == readings.end())
+      readings.push_back(std::move(text));
+  };
+  if (name.is_uri) {
+    add(percent_decoded(name.text));
+    add(name.text);
+    return readings;
+  }
+  add(std::string(without_quotes(name.text)));
+  for (const char* mark : {" #", "\t#"})
+    if (const std::size_t at = name.text.find(mark); at != std::string::npos)
+      add(std::string(without_quotes(std::string_view(name.text).substr(0, at))));
+  return readings;
+}
+
+/// `name` from `folder`, without "." and ".."; nothing when it leaves the model's folder or names none of its
+/// files.
+std::optional<std::string> inside(std::string_view folder, std::string_view name) {
+  if (name.starts_with('/') || has_scheme(name)) return std::nullopt;
+  std::vector<std::string_view> parts;
+  for (std::string_view path : {folder, name})
+    while (!path.empty()) {
+      const std::string_view part = path.substr(0, path.find('/'));
+      path.remove_prefix(std::min(path.size(), part.size() + 1));
+      if (part.empty() || part == ".") continue;
+      if (part != "..") {
+        if (parts.size() == kMostParts) return std::nullopt;
+        parts.push_back(part);
+      } else if (parts.empty()) {
+        return std::nullopt;
+      } else {
+        parts.pop_back();
+      }
+    }
+  std::string joined;
+  for (const std::string_view part : parts) joined.append(joined.empty() ? "" : "/").append(part);
+  const bool is_folder = name.ends_with('/') || name.ends_with("/.") || name.ends_with("/..");
+  return joined.empty() || is_folder ? std::nullopt : std::optional(joined);
+}
+
+std::string_view last_part(std::string_view name) {
+  if (name.find("://") != name.npos) name = name.substr(0, name.find_first_of("?#"));
+  return name.substr(std::min(name.size(), name.find_last_of("/:") + 1));
+}
+
+class Finder {
+ public:
+  Finder(const NameInModel& name, Resolver& resolver, std::uint64_t max_bytes, Notes& notes,
+         const std::string& place)
+      : name_(name), resolver_(resolver), max_bytes_(max_bytes), notes_(notes), place_(place) {}
+
+  NamedFile find() {
+    if (is_preview_uri(name_.text) && read(name_.text)) return std::move(found_);
+    for (const std::string& reading : readings_of(name_)) list(reading);
+    for (const std::string& name : inside_)
+      if (read(name)) return std::move(found_);
+    for (const std::string& name : beside_)
+      if (read(name)) {
+        warn("outside-name",
+             " is no name within the model's folder and is not followed; " + quote(name) + " is taken");
+        return std::move(found_);
+      }
+    if (const auto similar = only_similar(); similar && read(*similar)) {
+      warn("similar-name", " is not there; " + quote(*similar) +
+                               ", which differs in the case of letters or their composition only, is taken");
+      return std::move(found_);
+    }
+    if (found_.looked_for.empty()) found_.looked_for = "it names no file beneath the model's folder";
+    return std::move(found_);
+  }
+
+ private:
+  static void add(std::vector<std::string>& names, std::optional<std::string> name) {
+    if (name && std::find(names.begin(), names.end(), *name) == names.end()) names.push_back(*name);
+  }
+
+  void list(const std::string& reading) {
+    const std::string_view said_in = name_.said_in;
+    const std::string_view folder = said_in.substr(0, said_in.find_last_of('/') + 1);  // npos + 1 = 0
+    const std::size_t before = inside_.size();
+    add(inside_, inside(folder, reading));
+    add(inside_, inside("", reading));
+    if (inside_.size() > before) return;
+    add(beside_, inside(folder, last_part(reading)));
+    add(beside_, inside("", last_part(reading)));
+  }
+
+  bool read(const std::string& name) {
+    std::string refused;
+    try {
+      found_.bytes = resolver_.read(name, max_bytes_);
+    } catch (const FileRefused& e) {
+      refused = " (" + e.found() + ")";
+    }
+    found_.name = name;
+    if (!found_.bytes)
+      found_.looked_for += (found_.looked_for.empty() ? "looked for " : ", ") + quote(name) + refused;
+    return found_.bytes.has_value();
+  }
+
+  std::optional<std::string> only_similar() {
+    std::vector<std::string> similar;
+    for (const auto* names : {&inside_, &beside_})
+      for (const std::string& name : *names)
+        for (std::string& other : resolver_.similar(name)) add(similar, std::move(other));
+    if (similar.size() == 1) return similar[0];
+    for (const std::string& name : similar)
+      found_.looked_for += (&name == &similar[0] ? "; any of these may be meant: " : ", ") + quote(name);
+    return std::nullopt;
+  }
+
+  void warn(const char* code, const std::string& what) {
+    const std::string text = quote(name_.text) + what;
+    const auto same = [&](const Note& n) { return n.code == code && n.text == text; };
+    if (std::none_of(notes_.begin(), notes_.end(), same)) add_warning(notes_, code, place_, text);
+  }
+
+  const NameInModel& name_;
+  Resolver& resolver_;
+  const std::uint64_t max_bytes_;
+  Notes& notes_;
+  const std::string& place_;
+  std::vector<std::string> inside_, beside_;  // names to try
+  NamedFile found_;
+};
+
+}  // namespace
+
+NamedFile find_file(const NameInModel& name, Resolver& resolver, std::uint64_t max_bytes, Notes& notes,
+                    const std::string& place) {
+  return Finder(name, resolver, max_bytes, notes, place).find();
+}
+
+bool is_preview_uri(const std::string& uri) {
+  return uri.starts_with("../") && parse_entry_path(uri.substr(3)).kind == EntryKind::kPreview;
+}
+
+}  // namespace texmesh
