@@ -77,6 +77,16 @@ std::string depfile_escaped(const std::string& path) {
   return out;
 }
 
+/// What is not there may have any name.
+bool can_be_dependency(const std::string& path) {
+  try {
+    depfile_escaped(path);
+    return true;
+  } catch (const InputError&) {
+    return false;
+  }
+}
+
 void write_text(const std::string& path, const std::string& text) {
   if (path.empty()) return;
   if (is_special_file(path)) return write_output_file(path, text_bytes(text));
@@ -88,8 +98,11 @@ std::vector<std::string> dependencies(const BatchPlan& plan, const RunSettings& 
                                       const WorkerReport& report) {
   const fs::path folder = fs::path(plan.models[0].input).parent_path();
   std::vector<std::string> all;
-  for (const FileRequest& f : report.more->files)
-    if (!f.similar) all.push_back(f.uri.empty() ? plan.models[0].input : (folder / f.uri).string());
+  for (const FileRequest& f : report.more->files) {
+    if (f.similar) continue;
+    const std::string path = f.uri.empty() ? plan.models[0].input : (folder / f.uri).string();
+    if (f.found || can_be_dependency(path)) all.push_back(path);
+  }
   all.insert(all.end(), settings.more_inputs.begin(), settings.more_inputs.end());
   return all;
 }

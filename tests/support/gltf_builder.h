@@ -10,6 +10,7 @@
 #include "format/base/bytes.h"
 #include "pipeline/import/import.h"
 #include "pipeline/io/uri.h"
+#include "tests/support/memory_resolver.h"
 
 namespace texmesh::testing {
 
@@ -28,21 +29,6 @@ inline Bytes png() {
       "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg==");
 }
 inline Bytes webp() { return from_base64("UklGRhoAAABXRUJQVlA4TA0AAAAvAAAAEAcQERGIiP4HAA=="); }
-
-/// Files in memory; refuses the names that the pipeline's resolver refuses.
-class MemoryResolver : public Resolver {
- public:
-  std::map<std::string, Bytes> files;
-  std::vector<std::string> asked;
-  std::optional<Bytes> read(const std::string& uri, std::uint64_t max_bytes) override {
-    asked.push_back(uri);
-    check_relative_name(uri, uri, "");
-    const auto it = files.find(uri);
-    if (it == files.end()) return std::nullopt;
-    if (it->second.size() > max_bytes) throw InputError(uri, "", "a smaller file", "a larger one");
-    return it->second;
-  }
-};
 
 /// A container around any text and bytes, right or wrong.
 inline Bytes make_glb(const std::string& json, const std::optional<Bytes>& bin) {

@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "pipeline/batch/build_memo.h"
+#include "pipeline/io/similar_names.h"
 #include "tests/support/command.h"
 
 namespace texmesh {
@@ -24,7 +25,7 @@ class Memo : public ::testing::Test {
   /// A file, and what a run that has read it knows.
   FileRequest write(const std::string& name, const std::string& text) {
     testing::write_text(folder_ / name, text);
-    return {name, true, digest_of(text), text.size(), *stamp_of(folder_ / name)};
+    return {name, true, digest_of(text), text.size(), *stamp_of(folder_ / name), false};
   }
 
   /// A record whose stamps prove something: as if the files had been old when they were looked at.
@@ -32,12 +33,18 @@ class Memo : public ::testing::Test {
     MemoRecord r;
     FileRequest model = write("model.obj", "v 0 0 0");
     model.uri = "";
-    r.files = {model, write("model.mtl", "newmtl a"), {"missing.jpg", false, {}, 0, {}}};
+    r.files = {model, write("model.mtl", "newmtl a"), {"missing.jpg", false, {}, 0, {}, false}, similar()};
     const FileRequest package = write("model.texmesh", "a package");
     r.package_stamp = package.stamp;
     r.package_digest = package.digest;
     r.package_bytes = package.bytes;
     r.looked_at_ns = wall_clock_ns() + kMinute_ns;
+    return r;
+  }
+  /// Names like that of the missing file, of a folder that may have changed since.
+  FileRequest similar() const {
+    FileRequest r = similar_names(folder_ / "", "missing.jpg").request("missing.jpg");
+    r.stamp = {};
     return r;
   }
   bool holds(MemoRecord& r) {
@@ -50,6 +57,7 @@ class Memo : public ::testing::Test {
     change();
     EXPECT_FALSE(holds(r));
     fs::remove(folder_ / "missing.jpg");
+    fs::remove(folder_ / "Missing.JPG");
   }
 
   std::string cache() const { return folder_ / "cache"; }
@@ -253,6 +261,17 @@ TEST_F(Memo, HoldsWhileEveryFileIsAsItWas) {
   EXPECT_FALSE(refreshed_);
 }
 
+TEST_F(Memo, NamesLikeAMissingOneAreListedAgainOnlyWhenTheFolderHasChanged) {
+  MemoRecord r = record();
+  ASSERT_TRUE(holds(r));
+  EXPECT_TRUE(refreshed_) << "listed";
+  ASSERT_TRUE(holds(r));
+  EXPECT_FALSE(refreshed_) << "known by the folder's stamp";
+  testing::write_text(folder_ / "Missing.JPG", "x");
+  r.files.back().stamp = {};
+  EXPECT_FALSE(holds(r));
+}
+
 TEST_F(Memo, AnotherContentOfTheSameSizeIsSeen) {
   expect_not_holding_after([&] { testing::write_text(folder_ / "model.obj", "v 1 0 0"); });
   expect_not_holding_after([&] { testing::write_text(folder_ / "model.mtl", "newmtl b"); });
@@ -271,6 +290,7 @@ TEST_F(Memo, AContentOfTheSameSizeAndTimeIsSeen) {  // what comparing mtimes alo
 
 TEST_F(Memo, FilesThatComeAndGoAreSeen) {
   expect_not_holding_after([&] { testing::write_text(folder_ / "missing.jpg", "now it is there"); });
+  expect_not_holding_after([&] { testing::write_text(folder_ / "Missing.JPG", "this may be meant"); });
   expect_not_holding_after([&] { fs::remove(folder_ / "model.mtl"); });
   expect_not_holding_after([&] { fs::remove(folder_ / "model.texmesh"); });
   expect_not_holding_after([&] {

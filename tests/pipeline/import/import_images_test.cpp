@@ -26,19 +26,20 @@ TEST(AddImage, OneEntryPerContentOneWarningPerName) {
   MemoryResolver resolver;
   resolver.files["a/x.png"] = testing::png_bytes(4, 4, 3);
   resolver.files["b/x.png"] = testing::png_bytes(4, 4, 4);
-  EXPECT_EQ(add_image(m, "a/x.png", resolver, "f", "p", {}), 0);
-  EXPECT_EQ(add_image(m, "b/x.png", resolver, "f", "p", {}), 1);
-  EXPECT_EQ(add_image(m, "a/x.png", resolver, "f", "p", {}), 0);
+  EXPECT_EQ(add_image(m, {"a/x.png", "", false}, resolver, "f", "p", {}), 0);
+  EXPECT_EQ(add_image(m, {"b/x.png", "", false}, resolver, "f", "p", {}), 1);
+  EXPECT_EQ(add_image(m, {"a/x.png", "", false}, resolver, "f", "p", {}), 0);
   EXPECT_EQ(m.images[0].name, "x.png");
-  EXPECT_EQ(add_image(m, "gone.png", resolver, "f", "p", {}), -1);
-  EXPECT_EQ(add_image(m, "gone.png", resolver, "f", "q", {}), -1);
+  EXPECT_EQ(add_image(m, {"gone.png", "", false}, resolver, "f", "p", {}), -1);
+  EXPECT_EQ(add_image(m, {"gone.png", "", false}, resolver, "f", "q", {}), -1);
   EXPECT_EQ(count_notes(m, "missing-texture"), 1);
-  EXPECT_THROW(add_image(m, "../x.png", resolver, "f", "p", {}), InputError);
+  EXPECT_EQ(add_image(m, {"../x.png", "", false}, resolver, "f", "p", {}), -1);
   ImportOptions options;
   options.max_image_pixels = 15;
   resolver.files["c.png"] = testing::png_bytes(4, 4, 1);
-  const std::string error =
-      input_error([&] { add_image(m, "c.png", resolver, "model.obj", "material", options); });
+  const std::string error = input_error([&] {
+    add_image(m, {"c.png", "", false}, resolver, "model.obj", "material", options);
+  });
   EXPECT_NE(error.find("model.obj"), std::string::npos) << error;
   EXPECT_NE(error.find("c.png"), std::string::npos) << error;
 }
@@ -51,16 +52,18 @@ TEST(AddImage, OtherPicturesBecomeThoseThatPackagesKeep) {
     resolver.files[name] = testing::encode_image(writer, 8, 8, 3, texels, OIIO::TypeDesc::UINT8);
   const std::vector<float> light(4 * 4 * 3, 0.5f);
   resolver.files["c.hdr"] = testing::encode_image("hdr", 4, 4, 3, light, OIIO::TypeDesc::FLOAT);
-  EXPECT_EQ(add_image(m, "a.bmp", resolver, "f", "p", {}), 0);
-  EXPECT_EQ(add_image(m, "b.TGA", resolver, "f", "p", {}), 0) << "the same texels are the same image";
-  EXPECT_EQ(add_image(m, "c.hdr", resolver, "f", "p", {}), 1);
-  EXPECT_EQ(add_image(m, "a.bmp", resolver, "f", "q", {}), 0);
+  EXPECT_EQ(add_image(m, {"a.bmp", "", false}, resolver, "f", "p", {}), 0);
+  EXPECT_EQ(add_image(m, {"b.TGA", "", false}, resolver, "f", "p", {}), 0)
+      << "the same texels are the same image";
+  EXPECT_EQ(add_image(m, {"c.hdr", "", false}, resolver, "f", "p", {}), 1);
+  EXPECT_EQ(add_image(m, {"a.bmp", "", false}, resolver, "f", "q", {}), 0);
   EXPECT_EQ(count_notes(m, "converted-image"), 2);
   EXPECT_EQ(decode_image(m.images[0], FloatEncoding::kSrgb).data, texels);
   EXPECT_EQ(decode_image(m.images[1], FloatEncoding::kSrgb).data[0], 188);
   resolver.files["cut.bmp"] = {resolver.files["a.bmp"].begin(), resolver.files["a.bmp"].begin() + 100};
-  const std::string error =
-      input_error([&] { add_image(m, "cut.bmp", resolver, "model.obj", "material", {}); });
+  const std::string error = input_error([&] {
+    add_image(m, {"cut.bmp", "", false}, resolver, "model.obj", "material", {});
+  });
   EXPECT_NE(error.find("model.obj"), std::string::npos) << error;
   EXPECT_NE(error.find("cut.bmp"), std::string::npos) << error;
 }
@@ -72,20 +75,21 @@ TEST(AddImage, AKtx2IsReadByItsContentAndOnce) {
   resolver.files["x.ktx2"] = testing::ktx2_bytes(testing::ktx2_parts(4, 4, 3, texels));
   resolver.files["y.png"] = resolver.files["x.ktx2"];
   resolver.files["light.ktx2"] = testing::ktx2_bytes(testing::ktx2_parts(4, 4, 3, texels, false));
-  EXPECT_EQ(add_image(m, "x.ktx2", resolver, "f", "p", {}), 0);
-  EXPECT_EQ(add_image(m, "y.png", resolver, "f", "p", {}), 0);
+  EXPECT_EQ(add_image(m, {"x.ktx2", "", false}, resolver, "f", "p", {}), 0);
+  EXPECT_EQ(add_image(m, {"y.png", "", false}, resolver, "f", "p", {}), 0);
   EXPECT_EQ(count_notes(m, "ktx2-image"), 1);
   EXPECT_EQ(count_notes(m, "colour-profile"), 0);
   EXPECT_EQ(decode_image(m.images[0], FloatEncoding::kSrgb).data, texels);
-  EXPECT_EQ(add_image(m, "light.ktx2", resolver, "f", "p", {}), 1);
+  EXPECT_EQ(add_image(m, {"light.ktx2", "", false}, resolver, "f", "p", {}), 1);
   EXPECT_EQ(count_notes(m, "colour-profile"), 1);
   EXPECT_EQ(decode_image(m.images[1]).data, texels);
   const Bytes lit = decode_image(m.images[1], FloatEncoding::kSrgb).data;
   for (std::size_t i = 0; i < texels.size(); ++i) EXPECT_GE(lit[i], texels[i]);
   EXPECT_NE(lit, texels) << "light becomes sRGB where it gives colours";
   resolver.files["z.ktx2"] = {resolver.files["x.ktx2"].begin(), resolver.files["x.ktx2"].end() - 1};
-  const std::string error =
-      input_error([&] { add_image(m, "z.ktx2", resolver, "model.obj", "material", {}); });
+  const std::string error = input_error([&] {
+    add_image(m, {"z.ktx2", "", false}, resolver, "model.obj", "material", {});
+  });
   EXPECT_NE(error.find("z.ktx2"), std::string::npos) << error;
   EXPECT_NE(error.find("level 0"), std::string::npos) << error;
 }
@@ -100,8 +104,8 @@ TEST(AddImage, NotesSayWhatBecomesOfColoursAndOrientation) {
   resolver.files["turned.jpg"] = exif;
   resolver.files["inks.jpg"] = testing::cmyk_jpeg(8, 8, {1, 2, 3, 4}, true);
   Model m;
-  add_image(m, "turned.jpg", resolver, "f", "p", {});
-  add_image(m, "inks.jpg", resolver, "f", "p", {.colour_profiles = ProfilePolicy::kIgnore});
+  add_image(m, {"turned.jpg", "", false}, resolver, "f", "p", {});
+  add_image(m, {"inks.jpg", "", false}, resolver, "f", "p", {.colour_profiles = ProfilePolicy::kIgnore});
   EXPECT_EQ(count_notes(m, "exif-orientation"), 1);
   EXPECT_EQ(count_notes(m, "cmyk-image"), 1);
   for (const Note& note : m.notes) EXPECT_EQ(note.severity, Severity::kWarning) << note.code;
@@ -120,9 +124,9 @@ TEST(AddImage, NotesSayThatTheFirstOfMorePicturesIsRead) {
   resolver.files["frames.png"] = frames;
   resolver.files["still.png"] = png;
   Model m;
-  add_image(m, "still.png", resolver, "f", "p", {});
+  add_image(m, {"still.png", "", false}, resolver, "f", "p", {});
   EXPECT_EQ(count_notes(m, "more-pictures"), 0);
-  add_image(m, "frames.png", resolver, "f", "p", {});
+  add_image(m, {"frames.png", "", false}, resolver, "f", "p", {});
   EXPECT_EQ(count_notes(m, "more-pictures"), 1);
 }
 

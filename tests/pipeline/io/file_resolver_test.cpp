@@ -38,13 +38,13 @@ class FileResolverTest : public ::testing::TestWithParam<FileResolver::Method> {
   void TearDown() override { fs::remove_all(root_); }
 
   void expect_refused(const std::string& uri) {
-    FileResolver resolver(folder_, GetParam());
+    FileResolver resolver(folder_, {}, GetParam());
     EXPECT_THROW(resolver.read(uri, 1000), InputError) << uri;
     ASSERT_EQ(resolver.requests().size(), 1u);
     EXPECT_FALSE(resolver.requests()[0].found);
   }
   void expect_missing(const std::string& uri) {
-    FileResolver resolver(folder_, GetParam());
+    FileResolver resolver(folder_, {}, GetParam());
     EXPECT_EQ(text(resolver.read(uri, 1000)), "(none)") << uri;
   }
 
@@ -52,7 +52,7 @@ class FileResolverTest : public ::testing::TestWithParam<FileResolver::Method> {
 };
 
 TEST_P(FileResolverTest, ReadsFilesBeneathItsFolder) {
-  FileResolver resolver(folder_, GetParam());
+  FileResolver resolver(folder_, {}, GetParam());
   EXPECT_EQ(text(resolver.read("a.bin", 1000)), "alpha");
   EXPECT_EQ(text(resolver.read("tex/deep/b c.png", 1000)), "beta");
   EXPECT_EQ(text(resolver.read("./tex//./deep/b c.png", 1000)), "beta");
@@ -60,7 +60,7 @@ TEST_P(FileResolverTest, ReadsFilesBeneathItsFolder) {
 }
 
 TEST_P(FileResolverTest, RecordsEveryRequestOnceInOrder) {
-  FileResolver resolver(folder_, GetParam());
+  FileResolver resolver(folder_, {}, GetParam());
   resolver.read("tex/none", 1000);
   resolver.read("a.bin", 1000);
   resolver.read("tex/none", 1000);
@@ -68,8 +68,8 @@ TEST_P(FileResolverTest, RecordsEveryRequestOnceInOrder) {
   const std::vector<std::uint8_t> alpha{'a', 'l', 'p', 'h', 'a'};
   std::vector<FileRequest> requests = resolver.requests();
   for (FileRequest& request : requests) request.stamp = {};  // inode and times differ from run to run
-  EXPECT_EQ(requests, (std::vector<FileRequest>{{"tex/none", false, {}, 0, {}},
-                                                {"a.bin", true, sha256(alpha), 5, {}}}));
+  EXPECT_EQ(requests, (std::vector<FileRequest>{{"tex/none", false, {}, 0, {}, false},
+                                                {"a.bin", true, sha256(alpha), 5, {}, false}}));
 }
 
 TEST_P(FileResolverTest, MissingFilesAreNoError) {
@@ -108,13 +108,76 @@ TEST_P(FileResolverTest, RefusesNamesThatLeaveTheFolder) {
   expect_refused(std::string(5000, 'x'));
 }
 
-TEST_P(FileResolverTest, RefusesSymbolicLinksAnywhereInTheName) {
-  fs::create_symlink(root_ / "secret", folder_ / "out");
+TEST_P(FileResolverTest, FollowsLinksThatStayWithinTheFolder) {
   fs::create_symlink("a.bin", folder_ / "inside");
-  fs::create_symlink("nowhere", folder_ / "dangling");
-  fs::create_directory_symlink(root_, folder_ / "up");
+  fs::create_symlink(folder_ / "a.bin", folder_ / "absolute");
+  fs::create_symlink("inside", folder_ / "twice");
+  fs::create_symlink("../../model/a.bin", folder_ / "tex/around");
   fs::create_directory_symlink("tex", folder_ / "tex2");
-  for (const char* uri : {"out", "inside", "dangling", "up/secret", "tex2/deep/b c.png"}) expect_refused(uri);
+  FileResolver resolver(folder_, {}, GetParam());
+  for (const char* uri : {"inside", "absolute", "twice", "tex/around"})
+    EXPECT_EQ(text(resolver.read(uri, 9)), "alpha") << uri;
+  EXPECT_EQ(text(resolver.read("tex2/deep/b c.png", 9)), "beta");
+  EXPECT_EQ(text(resolver.read("tex2/none", 9)), "(none)");
+  EXPECT_TRUE(resolver.is_there("inside"));
+}
+
+TEST_P(FileResolverTest, RefusesLinksThatLeadOut) {
+  fs::create_symlink(root_ / "secret", folder_ / "out");
+  fs::create_symlink("nowhere", folder_ / "dangling");
+  fs::create_symlink("loop", folder_ / "loop");
+  fs::create_symlink("/proc/self/status", folder_ / "process");
+  fs::create_symlink("/dev/zero", folder_ / "device");
+  fs::create_symlink("tex", folder_ / "folder");
+  fs::create_directory_symlink(root_, folder_ / "up");
+  fs::create_directory_symlink("/", folder_ / "slash");
+  fs::create_directories(root_ / "model2");
+  write(root_ / "model2/x", "other");
+  fs::create_symlink("../model2/x", folder_ / "sibling");
+  for (const char* uri : {"out", "dangling", "loop", "process", "device", "folder", "up/secret",
+                          "slash/etc/hostname", "sibling"})
+    expect_refused(uri);
+}
+
+TEST_P(FileResolverTest, FollowsLinksWithinFoldersThatTheUserNames) {
+  write(root_ / "repository/.git/annex/objects/k", "kept");
+  write(root_ / "repository/scans/own", "own");
+  fs::create_symlink("../.git/annex/objects/k", root_ / "repository/scans/t.png");
+  fs::create_symlink(root_ / "secret", root_ / "repository/scans/out");
+  ASSERT_EQ(::mkfifo((root_ / "repository/fifo").c_str(), 0600), 0);
+  fs::create_symlink("../fifo", root_ / "repository/scans/pipe");
+  fs::create_directory_symlink(root_ / "repository", root_ / "by another name");
+  EXPECT_THROW(FileResolver(root_ / "repository/scans", {}, GetParam()).read("t.png", 9), FileRefused);
+  for (const char* within : {"repository", "repository/", "by another name", "repository/.git"}) {
+    FileResolver resolver(root_ / "repository/scans", {(root_ / within).string()}, GetParam());
+    EXPECT_EQ(text(resolver.read("t.png", 9)), "kept") << within;
+    EXPECT_EQ(text(resolver.read("own", 9)), "own");
+    EXPECT_THROW(resolver.read("out", 9), FileRefused) << within;
+    EXPECT_THROW(resolver.read("pipe", 9), FileRefused) << within;
+  }
+}
+
+TEST_P(FileResolverTest, RecordsWhatNamesThereAreLikeOne) {
+  write(folder_ / "Tex2/B.png", "1");
+  FileResolver resolver(folder_, {}, GetParam());
+  EXPECT_EQ(resolver.similar("A.BIN"), std::vector<std::string>{"a.bin"});
+  EXPECT_EQ(resolver.similar("TEX/deep/B C.PNG"), std::vector<std::string>{"tex/deep/b c.png"});
+  EXPECT_EQ(resolver.similar("tex2/b.PNG"), std::vector<std::string>{"Tex2/B.png"});
+  EXPECT_TRUE(resolver.similar("a.bin").empty());
+  EXPECT_TRUE(resolver.similar("none/b").empty());
+  ASSERT_EQ(resolver.requests().size(), 5u);
+  EXPECT_TRUE(resolver.requests()[0].similar && resolver.requests()[0].found);
+  EXPECT_NE(resolver.requests()[0].stamp, FileStamp{});
+  EXPECT_EQ(resolver.requests()[2].stamp, FileStamp{}) << "it hangs on two folders";
+  EXPECT_FALSE(resolver.requests()[4].found);
+  const Sha256 none = resolver.requests()[4].digest;
+  fs::create_directory_symlink(root_ / "model", folder_ / "none");
+  EXPECT_TRUE(FileResolver(folder_, {}, GetParam()).similar("none/A.BIN").empty())
+      << "links are not followed";
+  write(folder_ / "NONE/B", "2");
+  FileResolver again(folder_, {}, GetParam());
+  again.similar("none/b");
+  EXPECT_NE(again.requests()[0].digest, none);
 }
 
 TEST_P(FileResolverTest, RefusesWhatIsNoRegularFileWithoutWaitingForIt) {
@@ -129,22 +192,22 @@ TEST_P(FileResolverTest, RefusesWhatIsNoRegularFileWithoutWaitingForIt) {
 }
 
 TEST_P(FileResolverTest, RefusesFilesOverTheLimit) {
-  FileResolver resolver(folder_, GetParam());
+  FileResolver resolver(folder_, {}, GetParam());
   EXPECT_EQ(text(resolver.read("a.bin", 5)), "alpha");
   EXPECT_THROW(resolver.read("a.bin", 4), InputError);
 }
 
 TEST_P(FileResolverTest, FolderMayBeALinkButMustBeAFolder) {
   fs::create_directory_symlink(folder_, root_ / "link");
-  EXPECT_EQ(text(FileResolver(root_ / "link", GetParam()).read("a.bin", 9)), "alpha");
-  EXPECT_THROW(FileResolver(root_ / "secret", GetParam()), InputError);
-  EXPECT_THROW(FileResolver(root_ / "none", GetParam()), InputError);
+  EXPECT_EQ(text(FileResolver(root_ / "link", {}, GetParam()).read("a.bin", 9)), "alpha");
+  EXPECT_THROW(FileResolver(root_ / "secret", {}, GetParam()), InputError);
+  EXPECT_THROW(FileResolver(root_ / "none", {}, GetParam()), InputError);
 }
 
 TEST_P(FileResolverTest, UnreadableFilesAreNoMatterOfTheModel) {
   ASSERT_EQ(::chmod((folder_ / "a.bin").c_str(), 0), 0);
   if (::access((folder_ / "a.bin").c_str(), R_OK) == 0) GTEST_SKIP() << "this user may read everything";
-  FileResolver resolver(folder_, GetParam());
+  FileResolver resolver(folder_, {}, GetParam());
   EXPECT_THROW(resolver.read("a.bin", 9), ResourceError);
   EXPECT_TRUE(resolver.failed_for_resources());
 }

@@ -22,7 +22,7 @@ class ModelFiles : public ::testing::Test {
   }
   /// What the model names, relative to the folder.
   std::vector<std::string> named_by(const std::string& model) const {
-    std::vector<std::string> names = named_files(model);
+    std::vector<std::string> names = named_files(model, {});
     for (std::string& name : names) name = fs::path(name).lexically_relative(folder_.path()).string();
     return names;
   }
@@ -68,6 +68,14 @@ TEST_F(ModelFiles, OfPlyAndRangeScans) {
   EXPECT_EQ(named_by(add("x.json", R"({"version":1,"type":"cylindrical-range-scan","grid":"grid.tif",
     "texture":"skin.png","y_step":1})")),
             (Names{"grid.tif", "skin.png"}));
+}
+
+TEST_F(ModelFiles, AreThoseThatCompilingReads) {
+  add("m/mats/A.mtl", "\xef\xbb\xbfnewmtl a\nmap_Kd skin.jpg\nmap_Ke C:\\x\\glow.jpg\n");
+  add("m/mats/skin.jpg");
+  add("m/glow.jpg");
+  EXPECT_EQ(named_by(add("m/x.obj", "\xef\xbb\xbfMtlLib mats\\a.mtl\n")),
+            (Names{"m/glow.jpg", "m/mats/A.mtl", "m/mats/skin.jpg"}));
 }
 
 TEST_F(ModelFiles, OfBrokenAndHostileFilesAreNone) {

@@ -119,7 +119,7 @@ TEST(ImportGltfImages, NeverOpensImagesOfUnusedMaterials) {
   EXPECT_EQ(resolver.asked, (std::vector<std::string>{"a.png"}));
 }
 
-TEST(ImportGltfImages, RefusesImagesOfForeignContentAndForeignPlaces) {
+TEST(ImportGltfImages, RefusesImagesOfForeignContent) {
   const auto refused = [](const char* uri, Bytes bytes) {
     GltfBuilder b = textured(base_colour());
     b.json["images"][0]["uri"] = uri;
@@ -135,10 +135,6 @@ TEST(ImportGltfImages, RefusesImagesOfForeignContentAndForeignPlaces) {
   };
   refused("a.png", {'G', 'I', 'F', '8', '9', 'a'});
   refused("a.png", {});
-  for (const char* uri :
-       {"../a.png", "%2e%2e/a.png", "/a.png", "http://x/a.png", "file:///a.png", ".", "a%00.png"}) {
-    refused(uri, png());
-  }
 }
 
 }  // namespace

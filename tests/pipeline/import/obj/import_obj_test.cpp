@@ -134,13 +134,6 @@ TEST(ImportObj, PartsAndMaterials) {
   EXPECT_EQ(count_notes(m, "missing-material"), 2) << "usemtl without mtllib";
 }
 
-TEST(ImportObj, NamesThatLeaveTheFolderAreRefused) {
-  for (const char* name :
-       {"../c.png", "/etc/c.png", "C:\\c.png", "http://x/c.png", "file:c.png", "a/../../c.png", "..\\c.png"})
-    EXPECT_THROW(MtlCase(std::string("map_Kd ") + name + "\n"), InputError) << name;
-  EXPECT_THROW(import("mtllib ../a.mtl\n" + kVertices + "f 1 2 3\n"), InputError);
-}
-
 TEST(ImportObj, ForeignContentIsRefusedAndForeignNamesAreNoted) {
   MemoryResolver resolver;
   resolver.files["a.mtl"] = bytes_of("newmtl m\nmap_Kd t.jpg\n");

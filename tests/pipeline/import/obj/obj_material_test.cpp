@@ -42,7 +42,7 @@ TEST(ObjMaterial, TextureNamesWithBlanksOptionsAndTrailingBlanks) {
                            "map_Kd -clamp on a b.png", "map_Kd -blendu on -mm 0 1 -texres 512 a b.png\r",
                            "map_Kd \"a b.png\"", "map_Ka a b.png", "MAP_KD a b.png"})
     EXPECT_EQ(MtlCase(std::string(line) + "\n").image_name(), "a b.png") << line;
-  EXPECT_EQ(MtlCase("map_Kd .\\c.png\n").resolver.asked.back(), "./c.png");
+  EXPECT_EQ(MtlCase("map_Kd .\\c.png\n").resolver.asked.back(), "c.png");
   EXPECT_EQ(MtlCase("map_Kd -clamp on c.png\n").material().base_colour_texture.wrap_s, Wrap::kClamp);
   EXPECT_EQ(MtlCase("map_Kd -clamp off c.png\n").material().base_colour_texture.wrap_s, Wrap::kRepeat);
 }
