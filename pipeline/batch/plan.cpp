@@ -224,7 +224,12 @@ class CollectionReader {
     for (const char c : v.get_ref<const std::string&>())
       if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f)
         fail(place + "/" + key, "a path without control characters", v.dump());
-    return v.get<std::string>();
+    return with_slashes(v.get<std::string>());
+  }
+
+  static std::string with_slashes(std::string path) {
+    std::replace(path.begin(), path.end(), '\\', '/');
+    return path;
   }
 
   void apply(CompileOptions& options, const Json& body, const std::string& place) const {
@@ -292,7 +297,7 @@ class CollectionReader {
       const std::string place = "/folders/" + std::to_string(i);
       if (!folders[i].is_string() || folders[i].get_ref<const std::string&>().empty())
         fail(place, "a path", folders[i].dump());
-      const std::string folder = folders[i].get<std::string>();
+      const std::string folder = with_slashes(folders[i].get<std::string>());
       if (!list_folder_) continue;
       const std::vector<std::string> found = list_folder_(folder);
       std::map<std::string, std::pair<int, int>> sharing;  // files, those that are no .json

@@ -60,7 +60,7 @@ std::optional<std::string> inside(std::string_view folder, std::string_view name
   std::string joined;
   for (const std::string_view part : parts) joined.append(joined.empty() ? "" : "/").append(part);
   const bool is_folder = name.ends_with('/') || name.ends_with("/.") || name.ends_with("/..");
-  return joined.empty() || is_folder ? std::nullopt : std::optional(joined);
+  return joined.empty() || is_folder || has_scheme(joined) ? std::nullopt : std::optional(joined);
 }
 
 std::string_view last_part(std::string_view name) {

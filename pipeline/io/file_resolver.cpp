@@ -257,6 +257,14 @@ std::vector<std::uint8_t> read_input_file(const std::filesystem::path& path, std
                                           FileStamp* stamp) {
   const std::string name = path.string();
   const Descriptor fd(retry_on_signal([&] { return ::open(name.c_str(), kReadFlags); }));
+  if (fd.get() < 0 && errno == ENOENT) {
+    const std::filesystem::path folder = path.parent_path();
+    const SimilarNames similar = similar_names(folder.string(), path.filename().string());
+    throw InputError(name, "", "a readable file",
+                     similar.names.empty()
+                         ? message(ENOENT)
+                         : "only " + similar.names[0] + ", whose name differs in case or composition");
+  }
   if (fd.get() < 0) fail_to_read(name, "", "a readable file", errno);
   FileStamp own;
   return read_all(fd.get(), max_bytes, name, "a regular file", stamp ? *stamp : own);

@@ -2,7 +2,9 @@
 #include <algorithm>
 
 #include "format/base/errors.h"
+#include "pipeline/import/named_files.h"
 #include "pipeline/io/resolver.h"
+#include "pipeline/io/uri.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/fuzz/reader_limits.h"
 
@@ -67,7 +69,32 @@ bool read_cyberware(ByteSpan input) {
   return unless_input_error([&] { import_range_scan("fuzz.cyl", input, files, reader_limits(), {}); });
 }
 
+/// A name, a NUL, the name of a file that says it. Whatever the name is, no resolver is asked for one that
+/// leads out of the model's folder.
+bool read_name(ByteSpan input) {
+  struct Beneath : MemoryFiles {
+    std::optional<Bytes> read(const std::string& uri, std::uint64_t) override {
+      if (is_preview_uri(uri)) return std::nullopt;
+      if (uri.starts_with('/') || has_scheme(uri) || ("/" + uri + "/").find("/../") != uri.npos) std::abort();
+      return std::nullopt;
+    }
+  } files;
+  files.files["Scan.JPG"] = {};
+  const auto [name, said_in] = at_nul(input);
+  return unless_input_error([&, n = name, s = said_in] {
+    for (const bool is_uri : {false, true}) {
+      Notes notes;
+      find_file({{n.begin(), n.end()}, {s.begin(), s.end()}, is_uri}, files, 1, notes, "");
+    }
+  });
+}
+
 // ---- seeds
+
+std::vector<Bytes> name_seeds() {
+  return {to_bytes("\"C:\\scans\\a b.png\" # c"sv), to_bytes("../tex/./%2e%2e/scan%20a.jpg\0mats/m.mtl"sv),
+          to_bytes("scan.jpg"sv), to_bytes("http://h/x/scan.jpg?a#b"sv)};
+}
 
 std::vector<Bytes> obj_seeds() {
   return {
@@ -191,6 +218,8 @@ constexpr std::string_view kPlyWords[] = {"ply\n",
                                           "-1",
                                           "nan",
                                           "1e300"};
+constexpr std::string_view kNameWords[] = {"..", "/",       "\\", "%2f", "%2e", "%00",
+                                           "C:", "file://", "\"", " #",  ".",   "a"};
 constexpr std::string_view kStlWords[] = {"solid ",    "facet normal ", "outer loop\n", "vertex ",
                                           "endloop\n", "endfacet\n",    "endsolid",     "color",
                                           "COLOR=",    "nan",           "1e300"};
@@ -221,12 +250,13 @@ Target text_target(const char* name, bool (*run)(ByteSpan), std::vector<Bytes> (
 }  // namespace
 
 void add_scan_targets(std::vector<Target>& list) {
-  list.insert(
-      list.end(),
-      {text_target("obj", read_obj, obj_seeds, kObjWords), text_target("mtl", read_mtl, mtl_seeds, kMtlWords),
-       text_target("ply", read_ply, ply_seeds, kPlyWords), text_target("stl", read_stl, stl_seeds, kStlWords),
-       text_target("range", read_range, range_seeds, kRangeWords),
-       text_target("cyberware", read_cyberware, cyberware_seeds, kCyberwareWords)});
+  list.insert(list.end(), {text_target("obj", read_obj, obj_seeds, kObjWords),
+                           text_target("mtl", read_mtl, mtl_seeds, kMtlWords),
+                           text_target("ply", read_ply, ply_seeds, kPlyWords),
+                           text_target("name", read_name, name_seeds, kNameWords),
+                           text_target("stl", read_stl, stl_seeds, kStlWords),
+                           text_target("range", read_range, range_seeds, kRangeWords),
+                           text_target("cyberware", read_cyberware, cyberware_seeds, kCyberwareWords)});
 }
 
 }  // namespace texmesh::fuzz

@@ -123,7 +123,7 @@ class SurfaceReader {
           file_, "", "faces",
           "none (a point cloud of " + std::to_string(surface_.vertices.positions.size()) + " points)");
     check_indices();
-    surface_.comments = header_.comments;
+    surface_.comments = std::move(header_.comments);
     return std::move(surface_);
   }
 
@@ -434,6 +434,7 @@ ImportedModel import_ply(const std::string& file_name, std::span<const std::uint
   PlySurface surface = SurfaceReader(file_name, bytes, options, context).read();
   out.format = "ply";
   Notes notes;
+  for (std::string& comment : surface.comments) comment = source_text(comment, file_name, notes);
   out.about = about_from_comments(surface.comments, out.format, notes);
   out.model = PlyModel(file_name, std::move(surface), resolver, options, context).build();
   out.model.notes.insert(out.model.notes.end(), notes.begin(), notes.end());

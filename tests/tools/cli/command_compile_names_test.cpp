@@ -1,0 +1,103 @@
+// Files that a model names, as a user meets them: links, files that come later, dependencies.
+#include <gtest/gtest.h>
+
+#include "pipeline/compile/workers/sandbox.h"
+#include "tests/support/small_builds.h"
+
+namespace texmesh::testing {
+namespace {
+namespace fs = std::filesystem;
+
+class Names : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    write_text(folder_ / "profile.json", kCheapProfile);
+    fs::create_directories(folder_ / "repository/scans");
+    const CommandResult made = run_command({TEXMESH_MAKE_SCAN, "--triangles", "48", "--texture", "32", "-o",
+                                            folder_ / "repository/scans/a.obj"});
+    ASSERT_EQ(made.exit_code, 0) << made.errors;
+    for (const std::string& file : files_beneath(folder_ / "repository/scans"))
+      if (file.ends_with(".jpg") || file.ends_with(".png")) texture_ = file;
+    ASSERT_FALSE(texture_.empty());
+  }
+  std::string scans(const std::string& name) const { return folder_ / ("repository/scans/" + name); }
+  /// What is said; the package is compiled again only where something has changed.
+  std::string compile(const std::string& input, const std::vector<std::string>& more = {}) {
+    std::vector<std::string> arguments{TEXMESH_BINARY,
+                                       "compile",
+                                       input,
+                                       "-o",
+                                       folder_ / "out",
+                                       "--cache",
+                                       folder_ / "cache",
+                                       "--profile",
+                                       folder_ / "profile.json"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const CommandResult r = run_command(arguments);
+    EXPECT_EQ(r.exit_code, 0) << r.output << r.errors;
+    return r.output;
+  }
+  TemporaryFolder folder_;
+  std::string texture_;  // the picture that the model names
+};
+
+TEST_F(Names, AFileThatComesLaterIsSeen) {
+  fs::rename(scans(texture_), folder_ / "kept");
+  EXPECT_NE(compile(scans("a.obj")).find("missing-texture"), std::string::npos);
+  EXPECT_NE(compile(scans("a.obj")).find("up to date"), std::string::npos);
+  std::string upper = texture_;
+  std::transform(upper.begin(), upper.end(), upper.begin(), [](unsigned char c) { return std::toupper(c); });
+  fs::copy_file(folder_ / "kept", scans(upper));
+  EXPECT_NE(compile(scans("a.obj")).find("similar-name"), std::string::npos);
+  EXPECT_NE(compile(scans("a.obj")).find("up to date"), std::string::npos);
+  fs::copy_file(folder_ / "kept", scans(texture_));
+  const std::string exact = compile(scans("a.obj"));
+  EXPECT_EQ(exact.find("warning"), std::string::npos) << exact;
+  EXPECT_EQ(exact.find("up to date"), std::string::npos) << exact;
+}
+
+TEST_F(Names, LinksAreFollowedWithinTheFolderThatWasNamed) {
+  fs::create_directories(folder_ / "repository/.annex");
+  fs::rename(scans(texture_), folder_ / "repository/.annex/key");
+  fs::create_symlink("../.annex/key", scans(texture_));
+  const std::vector<std::string> required = sandbox_support().complete()
+                                                ? std::vector<std::string>{"--sandbox", "require"}
+                                                : std::vector<std::string>{};
+  const std::string refused = compile(scans("a.obj"), required);
+  EXPECT_NE(refused.find("missing-texture"), std::string::npos) << refused;
+  EXPECT_NE(refused.find("--links-within DIR"), std::string::npos) << refused;
+  std::vector<std::string> more = required;
+  more.insert(more.end(), {"--links-within", folder_ / "repository"});
+  EXPECT_EQ(compile(scans("a.obj"), more).find("warning"), std::string::npos);
+  EXPECT_NE(compile(scans("a.obj"), more).find("up to date"), std::string::npos);
+  EXPECT_NE(compile(scans("a.obj"), required).find("missing-texture"), std::string::npos)
+      << "not what was found with the option";
+  fs::remove_all(folder_ / "out");
+  EXPECT_EQ(compile(folder_ / "repository", required).find("warning"), std::string::npos);
+}
+
+TEST_F(Names, ALinkToAFolderThatIsNotThereIsAUsageError) {
+  EXPECT_EQ(run_command({TEXMESH_BINARY, "compile", scans("a.obj"), "-o", folder_ / "x.texmesh",
+                         "--links-within", folder_ / "none"})
+                .exit_code,
+            2);
+}
+
+TEST_F(Names, DependenciesHoldNamesThatAreNotThere) {
+  fs::remove(scans(texture_));
+  compile(scans("a.obj"), {"--depfile", folder_ / "d"});
+  const std::string rule = read_text(folder_ / "d");
+  EXPECT_NE(rule.find(scans(texture_)), std::string::npos) << rule;
+}
+
+TEST_F(Names, AModelThatIsNotThereButForItsCaseIsNamed) {
+  write_text(folder_ / "c.json", R"({"version":1,"models":[{"input":"repository\\scans\\A.OBJ"}]})");
+  const CommandResult r =
+      run_command({TEXMESH_BINARY, "compile", folder_ / "c.json", "-o", folder_ / "out", "--no-cache"});
+  EXPECT_EQ(r.exit_code, 1) << r.output << r.errors;
+  EXPECT_NE(r.output.find("only a.obj, whose name differs in case"), std::string::npos)
+      << r.output << r.errors;
+}
+
+}  // namespace
+}  // namespace texmesh::testing
