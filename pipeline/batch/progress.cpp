@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <ostream>
 
+#include "pipeline/import/import.h"
 #include "pipeline/io/table.h"
 
 namespace texmesh {
@@ -154,7 +155,8 @@ void Progress::show(std::size_t, const CacheTold& e) {
 
 void Progress::show(std::size_t, const NoteTold& e) {
   const bool warns = e.note.severity == Severity::kWarning;
-  if (warns || verbose_)
+  const bool lost = e.note.code == kLostNote && mode_ != OutputMode::kQuiet;
+  if (warns || lost || verbose_)
     line(fmt::format("{}: {}: {}", e.model, warns ? "warning" : "note", sentence(e.note)));
 }
 

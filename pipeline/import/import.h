@@ -1,5 +1,6 @@
 #pragma once
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <span>
 #include <string>
@@ -15,7 +16,7 @@
 
 namespace texmesh {
 
-inline constexpr int kImportVersion = 9;
+inline constexpr int kImportVersion = 10;
 
 enum class KdPolicy : std::uint8_t { kIgnore, kMultiply };
 template <>
@@ -59,12 +60,18 @@ struct ImportOptions {
   }
 };
 
+/// What a reader has left out, by what it is ("animations", "statements vp"), with its number.
+using Lost = std::map<std::string, std::uint64_t>;
+/// The code of the note that says so: one a model, shown without --verbose.
+inline constexpr const char* kLostNote = "left-out";
+
 struct ImportedModel {
   Model model;
   /// What the source's format says about meshes without normals (glTF: flat), for ConditionOptions::normals.
   bool normals_by_specification = false;
   std::string format;  // "glb", "gltf", "obj", "ply", "stl", "range"
   About about;         // what the source says about itself; unit and up axis as ImportOptions leave them
+  Lost lost;           // import_model() puts it into the notes and into about.source; not archived
   template <class S, class A>
   static void archive(S& s, A& a) {
     a(s.model, s.normals_by_specification, s.format, s.about);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "pipeline/import/foreign_file.h"
 #include "pipeline/import/text_scan.h"
 #include "stages/image/decode_image.h"
 #include "stages/image/image_metadata.h"
@@ -97,12 +98,13 @@ std::int32_t add_image_bytes(Model& model, std::string name, std::vector<std::ui
                              const ImportOptions& options) {
   ImageLimits limits;
   limits.max_pixels = static_cast<std::uint64_t>(options.max_image_pixels);
+  const std::string foreign = foreign_file(bytes);
   const auto placed = [&](auto&& read) {
     try {
       return read();
     } catch (const InputError& e) {
       throw InputError(file_name, place + " (" + name + ")" + (e.place().empty() ? "" : ": " + e.place()),
-                       e.expected(), e.found());
+                       e.expected(), foreign.empty() ? e.found() : foreign);
     }
   };
   const bool ktx2 = is_ktx2(bytes);

@@ -1,6 +1,8 @@
 #include <nlohmann/json.hpp>
 
 #include "format/base/bounded_json.h"
+#include "format/base/clean_text.h"
+#include "pipeline/import/foreign_file.h"
 #include "pipeline/import/gltf/import_gltf_parts.h"
 #include "pipeline/import/text_scan.h"
 
@@ -21,10 +23,14 @@ bool is_binary_stl(std::span<const std::uint8_t> bytes) {
 
 enum class Kind { kGltf, kObj, kPly, kStl, kRange };
 
+constexpr const char* kExpected = "a glTF, GLB, OBJ, PLY or STL model or a range scan (.json, Cyberware)";
+
 Kind kind_of(const std::string& file_name, std::span<const std::uint8_t> bytes) {
   if (starts_with(bytes, "glTF")) return Kind::kGltf;
   if (starts_with(bytes, "ply\n") || starts_with(bytes, "ply\r")) return Kind::kPly;
   if (starts_with(bytes, "Cyberware")) return Kind::kRange;
+  if (const std::string foreign = foreign_file(bytes); !foreign.empty() && !is_binary_stl(bytes))
+    throw InputError(file_name, "first bytes", kExpected, foreign);
   const std::string extension = lower_extension(file_name);
   if (extension == "gltf" || extension == "glb") return Kind::kGltf;
   if (extension == "obj") return Kind::kObj;
@@ -32,7 +38,15 @@ Kind kind_of(const std::string& file_name, std::span<const std::uint8_t> bytes) 
   if (extension == "stl") return Kind::kStl;
   if (extension == "json" || extension == "cyl") return Kind::kRange;
   if (is_binary_stl(bytes)) return Kind::kStl;
-  throw InputError(file_name, "", "a glTF, GLB, OBJ, PLY or STL model or a range scan (.json, Cyberware)",
+  constexpr std::string_view kPointClouds = " xyz pts ptx las laz e57 pcd ",
+                             kSplats = " splat ksplat spz sog ";
+  const std::string named = " " + extension + " ";
+  if (kPointClouds.find(named) != kPointClouds.npos || kSplats.find(named) != kSplats.npos)
+    throw InputError(file_name, "", kExpected,
+                     kSplats.find(named) != kSplats.npos
+                         ? "Gaussian splats: texmesh reads surfaces"
+                         : "a point cloud: texmesh reads surfaces; mesh it first");
+  throw InputError(file_name, "", kExpected,
                    extension.empty() ? "a name without extension and content of another kind"
                                      : "content of another kind named ." + extension);
 }
@@ -54,6 +68,26 @@ ImportedModel import_kind(Kind kind, const std::string& file_name, std::span<con
   return import_range_scan(file_name, bytes, resolver, options, context);
 }
 
+/// One line, and the same for those who get the package.
+void tell_what_is_lost(ImportedModel& imported) {
+  if (imported.lost.empty()) return;
+  constexpr std::size_t kMostTold = 6;
+  std::string text;
+  std::size_t told = 0;
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const auto& [what, count] : imported.lost) {
+    list.push_back({{"what", clean_text(what, kMaxAboutNameBytes)}, {"count", count}});
+    if (told++ < kMostTold) text += (text.empty() ? "" : ", ") + std::to_string(count) + " " + what;
+  }
+  if (told > kMostTold) text += " and " + std::to_string(told - kMostTold) + " more kinds";
+  add_info(imported.model.notes, kLostNote, "", text + " of the source are not in the package");
+  auto source = nlohmann::ordered_json::parse(imported.about.source, nullptr, false);
+  if (!source.is_object()) return;
+  source["lost"] = std::move(list);
+  std::string with_list = source.dump();
+  if (with_list.size() <= kMaxAboutSourceBytes) imported.about.source = std::move(with_list);
+}
+
 }  // namespace
 
 ImportedModel import_model(const std::string& file_name, std::span<const std::uint8_t> bytes,
@@ -67,6 +101,7 @@ ImportedModel import_model(const std::string& file_name, std::span<const std::ui
   ImportedModel imported =
       import_kind(kind_of(file_name, bytes), file_name, bytes, resolver, options, context);
   if (imported.about.source.empty()) imported.about.source = "{\"format\":\"" + imported.format + "\"}";
+  tell_what_is_lost(imported);
   // The user has said which axis is up, or the model has been turned.
   if (options.up != UpAxis::kKeep) imported.about.up_axis = "y";
   return imported;

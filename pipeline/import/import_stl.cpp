@@ -49,6 +49,16 @@ std::vector<Vec3f> read_binary(const std::string& file, std::span<const std::uin
   return points;
 }
 
+/// Triangles whose attribute bytes are not 0.
+std::uint64_t with_attributes(std::span<const std::uint8_t> bytes, std::size_t triangles) {
+  std::uint64_t count = 0;
+  for (std::size_t t = 1; t <= triangles; ++t) {
+    const std::uint8_t* end = bytes.data() + kStlHeaderBytes + t * kTriangleBytes;
+    count += end[-1] != 0 || end[-2] != 0;
+  }
+  return count;
+}
+
 std::vector<Vec3f> read_ascii(const std::string& file, std::span<const std::uint8_t> bytes) {
   LineReader lines(text_of(bytes));
   std::string_view line;
@@ -118,6 +128,8 @@ ImportedModel import_stl(const std::string& file_name, std::span<const std::uint
   context.check_cancelled();
   ImportedModel out;
   out.format = "stl";
+  if (const std::uint64_t coloured = is_binary(bytes) ? with_attributes(bytes, points.size() / 3) : 0)
+    out.lost["colours or other attributes of triangles"] = coloured;
   Mesh& mesh = out.model.mesh;
   std::vector<Vec3d> unique;
   const std::vector<std::uint32_t> index = weld(points, unique);

@@ -16,6 +16,8 @@ namespace {
 
 constexpr std::size_t kMaxParts = 65535;          // Mesh::triangle_part is 16 bits wide
 constexpr std::size_t kMaxGltfMaterials = 65535;  // and so is triangle_material
+constexpr const char* kVariants = "KHR_materials_variants";
+constexpr std::size_t kMostKinds = 100;  // of what is lost
 
 /// Affine map, row-major 3 x 4, in double precision: georeferenced scenes place small meshes
 /// with large translations.
@@ -93,6 +95,7 @@ std::vector<int> scene_roots(const Source& source, const tinygltf::Model& model)
   if (!model.scenes.empty()) {
     const auto scene = static_cast<std::size_t>(std::max(model.defaultScene, 0));
     if (model.scenes.size() > 1) {
+      source.lost["further scenes"] = model.scenes.size() - 1;
       add_info(
           source.notes, "other-scenes", "/scenes",
           "only scene " + std::to_string(scene) + " of " + std::to_string(model.scenes.size()) + " is read");
@@ -308,6 +311,7 @@ class GltfReader {
   }
   void check_document() const;
   void note_what_is_left_out() const;
+  void count_attributes(const tinygltf::Primitive& primitive) const;
   std::map<int, std::uint16_t> read_used_materials(const std::vector<Instance>& instances);
   std::uint16_t add_part(const Instance& instance);
   void drop_textures_without_uv();
@@ -351,20 +355,41 @@ void GltfReader::check_document() const {
                    images[i].contains("uri") ? "both" : "neither");
   each_unknown("extensionsUsed", [&](const std::string& place, const std::string& name) {
     add_info(source_.notes, "unknown-extension", place, name + " is left out");
+    if (name != kVariants) ++source_.lost["extension " + quote(name)];
   });
+}
+
+/// JOINTS and WEIGHTS say nothing without the skins.
+void GltfReader::count_attributes(const tinygltf::Primitive& primitive) const {
+  static constexpr std::string_view kRead[] = {"POSITION",   "NORMAL",     "TANGENT",
+                                               "TEXCOORD_0", "TEXCOORD_1", "COLOR_0"};
+  for (const auto& [name, accessor] : primitive.attributes)
+    if (std::find(std::begin(kRead), std::end(kRead), name) == std::end(kRead) &&
+        !name.starts_with("JOINTS") && !name.starts_with("WEIGHTS") && source_.lost.size() < kMostKinds)
+      ++source_.lost["attributes " + quote(name)];
 }
 
 void GltfReader::note_what_is_left_out() const {
   Notes& notes = source_.notes;
-  const auto any = [&](const char* key) { return document_.contains(key) && !document_[key].empty(); };
+  const auto any = [&](const char* key) {
+    const bool is_there = document_.contains(key) && !document_[key].empty();
+    if (is_there) source_.lost[key] += document_[key].size();
+    return is_there;
+  };
   if (any("animations")) add_info(notes, "animation", "/animations", "animations are left out");
   if (any("skins")) add_info(notes, "skin", "/skins", "skins are left out: the mesh keeps its default pose");
   if (any("cameras")) add_info(notes, "camera", "/cameras", "cameras are left out");
+  const Json variants =
+      document_.value(Json::json_pointer("/extensions/" + std::string(kVariants) + "/variants"), Json());
+  if (variants.is_array() && !variants.empty()) source_.lost["material variants"] = variants.size();
   for (const tinygltf::Mesh& mesh : structure_.meshes)
-    for (const tinygltf::Primitive& primitive : mesh.primitives)
-      if (!primitive.targets.empty())
-        source_.note_once(Severity::kInfo, "morph-targets", "/meshes",
-                          "morph targets are left out: the mesh keeps its default pose");
+    for (const tinygltf::Primitive& primitive : mesh.primitives) {
+      count_attributes(primitive);
+      if (primitive.targets.empty()) continue;
+      source_.lost["morph targets"] += primitive.targets.size();
+      source_.note_once(Severity::kInfo, "morph-targets", "/meshes",
+                        "morph targets are left out: the mesh keeps its default pose");
+    }
 }
 
 /// In the order of the file, -1 (glTF's default material) first.
@@ -450,7 +475,8 @@ ImportedModel read_gltf(const std::string& file_name, ByteSpan bytes, Resolver& 
   ImportOptions by_specification = options;
   if (by_specification.colour_profiles == ProfilePolicy::kAuto)
     by_specification.colour_profiles = ProfilePolicy::kIgnore;
-  const Source source{file_name, resolver, by_specification, context, out.model.notes, largest_coordinate};
+  const Source source{file_name,       resolver, by_specification,  context,
+                      out.model.notes, out.lost, largest_coordinate};
   GltfReader reader(source, bytes, out.model);
   reader.read();
   out.format = reader.is_glb() ? "glb" : "gltf";

@@ -3,6 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "pipeline/import/foreign_file.h"
 #include "pipeline/import/gltf/import_gltf_parts.h"
 #include "pipeline/import/named_files.h"
 #include "pipeline/import/text_scan.h"
@@ -66,6 +67,8 @@ ByteSpan Buffers::buffer(std::size_t index) {
     bytes = *buffers_[index];
   }
   if (length > bytes.size()) {
+    if (const std::string foreign = foreign_file(bytes); !foreign.empty())
+      source_.fail(place, "a buffer of " + std::to_string(length) + " bytes", foreign);
     source_.fail(place + "/byteLength", "at most " + std::to_string(bytes.size()), std::to_string(length));
   }
   return bytes.first(length);

@@ -29,6 +29,7 @@ struct Source {
   const ImportOptions& options;
   const RunContext& context;
   Notes& notes;
+  Lost& lost;
   double largest_coordinate = kLargestCoordinate;  // beyond it a position is left out
   [[noreturn]] void fail(const std::string& place, const std::string& expected,
                          const std::string& found) const;

@@ -273,6 +273,7 @@ void PrimitiveReader::check_zeros(const AccessorReader& reader, const std::strin
 bool PrimitiveReader::is_drawn() const {
   if (primitive_.mode < TINYGLTF_MODE_TRIANGLES) {
     source_.note_once(Severity::kInfo, "skipped-primitive", place_.text(), "points and lines are left out");
+    ++source_.lost["primitives of points and lines"];
     return false;
   }
   if (primitive_.attributes.count("POSITION") == 0) {

@@ -1,6 +1,8 @@
+#include <charconv>
 #include <limits>
 
 #include "pipeline/about/source_fields.h"
+#include "pipeline/import/foreign_file.h"
 #include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/named_files.h"
 #include "pipeline/import/obj/obj_material.h"
@@ -42,7 +44,10 @@ struct ObjData {
     std::size_t line;
   };
   std::vector<Library> libraries;
+  std::vector<bool> flat;                               // per face: `s off`; empty where nothing is
+  std::vector<Vec3f> zbrush_colours;                    // one per position, 0..255, where their number fits
   std::uint64_t small_faces = 0, lines_and_points = 0;  // left out
+  std::uint64_t zero_indices = 0;                       // of normals and texture coordinates: there is none
   std::map<std::string, std::uint64_t> unread;          // statements, by their first word
   bool parts_full = false;                              // the last part stands for all further ones
   std::span<const ObjCorner> corners_of(std::size_t f) const {
@@ -90,6 +95,8 @@ class ObjReader {
       statement(line);
     }
     check_references();
+    if (data_.colours.empty() && data_.zbrush_colours.size() == data_.positions.size())
+      data_.colours.swap(data_.zbrush_colours);
     return std::move(data_);
   }
 
@@ -111,7 +118,8 @@ class ObjReader {
 
   void statement(std::string_view rest) {
     const std::string_view word = next_token(rest);
-    if (word.empty() || word[0] == '#' || read_statement(word, rest)) return;
+    if (word.empty() || (word[0] != '#' && read_statement(word, rest))) return;
+    if (word[0] == '#') return word == "#MRGB" ? zbrush_colours(trim(rest)) : void();
     const std::string small = lower(word);
     if (small == word || !read_statement(small, rest)) count_unread(small);
   }
@@ -142,9 +150,26 @@ class ObjReader {
       data_.libraries.push_back({std::string(trim(rest)), lines_.number()});
     else if (word == "l" || word == "p")
       ++data_.lines_and_points;
+    else if (word == "s")
+      smoothing(next_token(rest));
     else
       return false;
     return true;
+  }
+
+  void smoothing(std::string_view group) { is_flat_ = group == "0" || same_word(group, "off"); }
+
+  // ZBrush: a mask and a colour per vertex, eight hexadecimal digits each, many in a comment.
+  void zbrush_colours(std::string_view digits) {
+    for (;
+         digits.size() >= 8 && data_.zbrush_colours.size() < static_cast<std::size_t>(options_.max_vertices);
+         digits.remove_prefix(8)) {
+      std::uint32_t value = 0;
+      const auto end = std::from_chars(digits.data(), digits.data() + 8, value, 16);
+      if (end.ec != std::errc() || end.ptr != digits.data() + 8) return;
+      data_.zbrush_colours.push_back({static_cast<float>(value >> 16 & 255),
+                                      static_cast<float>(value >> 8 & 255), static_cast<float>(value & 255)});
+    }
   }
 
   // Up to `most` numbers; stops at a comment.
@@ -201,17 +226,24 @@ class ObjReader {
     return static_cast<std::uint32_t>(i - 1);
   }
 
-  ObjCorner corner(std::string_view token) const {
+  /// Cinema 4D writes 0 for "none".
+  std::uint32_t index_or_none(std::string_view token, std::size_t count) {
+    if (token != "0") return index(token, count);
+    ++data_.zero_indices;
+    return kNoIndex;
+  }
+
+  ObjCorner corner(std::string_view token) {
     ObjCorner r;
     const std::size_t slash = token.find('/');
     r.position = index(token.substr(0, slash), data_.positions.size());
     if (slash == std::string_view::npos) return r;
     token.remove_prefix(slash + 1);
     const std::size_t second = token.find('/');
-    if (second != 0 && !token.empty()) r.uv = index(token.substr(0, second), data_.uvs.size());
+    if (second != 0 && !token.empty()) r.uv = index_or_none(token.substr(0, second), data_.uvs.size());
     if (second == std::string_view::npos) return r;
     token.remove_prefix(second + 1);
-    if (!token.empty()) r.normal = index(token, data_.normals.size());
+    if (!token.empty()) r.normal = index_or_none(token, data_.normals.size());
     return r;
   }
 
@@ -230,6 +262,9 @@ class ObjReader {
     data_.faces.push_back({begin,
                            static_cast<std::uint32_t>(std::min<std::size_t>(lines_.number(), kNoIndex)),
                            material_, part_});
+    if (!is_flat_ && data_.flat.empty()) return;
+    data_.flat.resize(data_.faces.size() - 1);
+    data_.flat.push_back(is_flat_);
   }
 
   void use_material(const std::string& name) {
@@ -270,7 +305,7 @@ class ObjReader {
   NameTable material_numbers_, part_numbers_;
   std::string object_, group_, joined_;
   std::uint16_t material_ = 0, part_ = 0;
-  bool materials_full_ = false;
+  bool materials_full_ = false, is_flat_ = false;
 };
 
 ObjData read_obj(const std::string& file, std::string_view text, const ImportOptions& options,
@@ -325,6 +360,8 @@ class LibraryLoader {
   std::string load_one(const std::string& name) {
     NamedFile found = find_file({name, "", false}, resolver_, max_bytes_, model_.notes, place_);
     if (!found.bytes) return found.looked_for;
+    if (const std::string foreign = foreign_file(*found.bytes); !foreign.empty())
+      return quote(found.name) + " is " + foreign;
     loaded_.emplace_back(found.name, read_mtl(found.name, *found.bytes, model_.notes));
     return "";
   }
@@ -360,7 +397,7 @@ Material make_material(const std::string& name, const std::vector<LoadedLibrary>
 /// Adds a material to the model for each name in data.materials, in order, from the libraries that the file
 /// names. What is missing gives a warning and a material without texture.
 void add_obj_materials(const ObjData& data, const std::string& file, Model& model, Resolver& resolver,
-                       const ImportOptions& options) {
+                       const ImportOptions& options, Lost& lost) {
   LibraryLoader loader(model, resolver, options);
   for (const ObjData::Library& library : data.libraries) {
     const auto same = [&library](const ObjData::Library& other) { return other.name == library.name; };
@@ -368,6 +405,9 @@ void add_obj_materials(const ObjData& data, const std::string& file, Model& mode
     if (&*first == &library) loader.load(library);
   }
   const std::vector<LoadedLibrary> libraries = loader.take();
+  for (const LoadedLibrary& library : libraries)
+    for (const auto& [word, count] : library.file.unread)
+      lost["statements " + quote(word) + " of materials"] += count;
   std::vector<std::uint8_t> used(data.materials.size(), 0);
   for (const ObjFace& f : data.faces) used[f.material] = 1;
   for (std::size_t i = 0; i < data.materials.size(); ++i) {
@@ -398,7 +438,7 @@ bool textured(const Model& model, std::uint16_t material) {
 
 /// Colours count on untextured faces only, and there they are the colour: Kd is not multiplied in (but with
 // obj_kd multiply).
-bool choose_colours(const ObjData& data, Model& model, const ImportOptions& options) {
+bool choose_colours(const ObjData& data, Model& model, const ImportOptions& options, Lost& lost) {
   if (data.colours.empty()) return false;
   std::vector<std::uint8_t> coloured(model.materials.size(), 0);
   bool any = false, beside_texture = false;
@@ -411,6 +451,7 @@ bool choose_colours(const ObjData& data, Model& model, const ImportOptions& opti
       else
         coloured[m] = 1, any = true;
     }
+  if (beside_texture) ++lost["vertex colours beside a texture"];
   if (beside_texture)
     add_info(model.notes, "colours-beside-texture", "", "vertex colours are left out where a texture shows");
   for (std::size_t m = 0; m < coloured.size(); ++m)
@@ -419,15 +460,50 @@ bool choose_colours(const ObjData& data, Model& model, const ImportOptions& opti
   return any;
 }
 
-Mesh build_mesh(const ObjData& data, Model& model, const ImportOptions& options, const RunContext& context) {
+/// Normals for a file without any where `s off` stands before some of its faces: those are flat.
+class MadeNormals {
+ public:
+  explicit MadeNormals(const ObjData& data) : data_(data), smooth_(data.positions.size()) {
+    for (std::size_t f = 0; f < data.faces.size(); ++f)
+      for (const ObjCorner& r : data.corners_of(f))
+        if (!data.flat[f]) smooth_[r.position] = smooth_[r.position] + of_face(f);
+  }
+  Vec3f of(std::size_t face, std::uint32_t position) const {
+    return to_float(normalized(data_.flat[face] ? of_face(face) : smooth_[position]));
+  }
+
+ private:
+  Vec3d of_face(std::size_t face) const {
+    const std::span<const ObjCorner> corners = data_.corners_of(face);
+    const Vec3d first = data_.positions[corners[0].position];
+    Vec3d sum;
+    for (std::size_t k = 1; k + 1 < corners.size(); ++k)
+      sum = sum + cross(data_.positions[corners[k].position] - first,
+                        data_.positions[corners[k + 1].position] - first);
+    return sum;
+  }
+  const ObjData& data_;
+  std::vector<Vec3d> smooth_;  // per position
+};
+
+/// All of them are: then none has to be written, as in glTF.
+bool is_all_flat(const ObjData& data) {
+  const auto is_flat = [](bool flat) { return flat; };
+  return !data.flat.empty() && std::all_of(data.flat.begin(), data.flat.end(), is_flat);
+}
+
+Mesh build_mesh(const ObjData& data, Model& model, const ImportOptions& options, const RunContext& context,
+                Lost& lost) {
   bool any_uv = false, any_normal = false;
   for (const ObjCorner& r : data.corners) {
     any_uv = any_uv || r.uv != kNoIndex;
     any_normal = any_normal || r.normal != kNoIndex;
   }
-  const bool any_colour = choose_colours(data, model, options);
+  const bool any_colour = choose_colours(data, model, options, lost);
   const double scale = scale_of_largest(data);
-  MeshBuilder builder(data.positions, {any_uv, any_normal, any_colour});
+  std::optional<MadeNormals> made;
+  if (!any_normal && !data.flat.empty() && !is_all_flat(data)) made.emplace(data);
+  MeshBuilder builder(data.positions, {any_uv, any_normal || made, any_colour});
   std::vector<Corner> corners;
   std::uint64_t without_uv = 0;
   for (std::size_t f = 0; f < data.faces.size(); ++f) {
@@ -444,6 +520,7 @@ Mesh build_mesh(const ObjData& data, Model& model, const ImportOptions& options,
       else
         lacks_uv = true;
       if (r.normal != kNoIndex) c.normal = data.normals[r.normal];
+      if (made) c.normal = made->of(f, r.position);
       if (any_colour && !face_textured && has_colour(data, r.position)) {
         const Vec3d rgb = to_double(data.colours[r.position]) * scale;
         c.colour = {linear_from_srgb(rgb.x), linear_from_srgb(rgb.y), linear_from_srgb(rgb.z), 1};
@@ -459,7 +536,15 @@ Mesh build_mesh(const ObjData& data, Model& model, const ImportOptions& options,
   return builder.finish();
 }
 
-void add_notes(const ObjData& data, Model& model) {
+void add_notes(const ObjData& data, Model& model, Lost& lost) {
+  if (data.zero_indices)
+    add_warning(model.notes, "index-0", "",
+                std::to_string(data.zero_indices) +
+                    " corners name normal or texture coordinate 0, which is none; they go without");
+  for (const auto& [word, count] : data.unread) lost["statements " + quote(word)] += count;
+  if (data.lines_and_points) lost["line and point elements"] = data.lines_and_points;
+  if (!data.zbrush_colours.empty()) lost["colours of ZBrush"] = data.zbrush_colours.size();
+
   if (data.small_faces)
     add_warning(model.notes, "face-without-area", "",
                 std::to_string(data.small_faces) + " faces of fewer than three corners left out");
@@ -478,13 +563,16 @@ ImportedModel import_obj(const std::string& file_name, std::span<const std::uint
   const SourceText text(text_of(bytes), file_name, out.model.notes);
   const ObjData data = read_obj(file_name, text.text(), options, context);
   if (data.positions.empty()) throw InputError(file_name, "", "an OBJ with v statements", "none");
-  if (data.faces.empty()) throw InputError(file_name, "", "faces", "none");
+  if (data.faces.empty())
+    throw InputError(file_name, "", "faces",
+                     "none (a point cloud of " + std::to_string(data.positions.size()) + " points)");
   out.format = "obj";
   out.about = about_from_comments(obj_comments(text.text()), out.format, out.model.notes);
-  add_obj_materials(data, file_name, out.model, resolver, options);
-  out.model.mesh = build_mesh(data, out.model, options, context);
+  add_obj_materials(data, file_name, out.model, resolver, options, out.lost);
+  out.model.mesh = build_mesh(data, out.model, options, context, out.lost);
   out.model.mesh.part_names = data.parts;
-  add_notes(data, out.model);
+  out.normals_by_specification = out.model.mesh.normals.empty() && is_all_flat(data);
+  add_notes(data, out.model, out.lost);
   finish_model(out.model, file_name, options);
   return out;
 }

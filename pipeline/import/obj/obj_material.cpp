@@ -10,7 +10,7 @@
 namespace texmesh {
 namespace {
 
-constexpr std::size_t kMaxObjMaterials = 65000;
+constexpr std::size_t kMaxObjMaterials = 65000, kMaxUnread = 32, kMaxWordBytes = 24;
 
 // Numbers at the front of `rest`, at most `most`; `rest` moves past them. The last token is never taken: a
 // file may be named "1".
@@ -130,12 +130,18 @@ class MtlReader {
         {"map_emissive", &M::map_ke}, {"map_d", &M::map_d},   {"map_opacity", &M::map_d},
         {"map_pr", &M::map_pr},       {"map_pm", &M::map_pm}, {"norm", &M::norm},
         {"map_kn", &M::norm},         {"bump", &M::bump},     {"map_bump", &M::bump}};
+    static const std::set<std::string> of_other_lights{
+        "", "ka", "ks", "ns", "ni", "tf", "illum", "km", "ps", "sharpness", "pc", "pcr", "aniso", "anisor"};
     static const std::set<std::string> left_out{"map_ks",   "map_ns", "map_ps", "disp",
                                                 "map_disp", "decal",  "refl",   "map_refl"};
     if (const auto it = colours.find(word); it != colours.end()) m.*it->second = colour(rest);
     if (const auto it = numbers.find(word); it != numbers.end()) m.*it->second = number(rest);
     if (const auto it = textures.find(word); it != textures.end())
       m.*it->second = read_texture(rest, lines_.number());
+    const bool is_read = colours.contains(word) || numbers.contains(word) || textures.contains(word);
+    if (!is_read && !of_other_lights.contains(word) && !left_out.contains(word) &&
+        file_.unread.size() < kMaxUnread)
+      ++file_.unread[word.substr(0, kMaxWordBytes)];
     if (left_out.contains(word)) m.left_out.push_back(word + " line " + std::to_string(lines_.number()));
   }
 

@@ -31,7 +31,8 @@ struct MtlMaterial {
 
 struct MtlFile {
   std::vector<MtlMaterial> materials;
-  bool by_meshlab = false;  // its Tr is an opacity
+  bool by_meshlab = false;                      // its Tr is an opacity
+  std::map<std::string, std::uint64_t> unread;  // statements, by their first word
 };
 
 /// The names in a line `mtllib`, taken as several: in quotes, or between blanks. The line may as well be one

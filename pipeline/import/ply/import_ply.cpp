@@ -1,7 +1,10 @@
 
+#include <span>
+
 #include "pipeline/about/source_fields.h"
 #include "pipeline/import/import_images.h"
 #include "pipeline/import/mesh_builder.h"
+#include "pipeline/import/named_files.h"
 #include "pipeline/import/ply/ply_reader.h"
 
 // PLY has no specification of names beyond x, y, z. This is what MeshLab, CloudCompare, Metashape, Blender
@@ -12,6 +15,10 @@
 //              red green blue alpha (of the whole face)
 //   tristrips  vertex_indices; -1 ends a strip
 //   comment TextureFile NAME: one per texture, in texnumber's order
+//   multi_texture_vertex, multi_texture_face (Artec Studio): tx u v; tx tn texture_vertex_indices, where tx
+//   is
+//              the texture and tn the face; without comments the textures are STEM_0.jpg, STEM_1.jpg ...
+// What else stands in a file is counted and said.
 // UVs run upwards as in OBJ. Colours are sRGB, integers in the range of their type and floats in 0..1.
 // Colours beside a texture are a second record of the same surface: as in MeshLab, the texture shows and the
 // colours do not.
@@ -43,10 +50,14 @@ struct PlySurface {
   PlyVertices vertices;
   PlyFaces faces;                     // every index below the number of vertices
   std::vector<std::string> comments;  // of the header, in order
+  std::int32_t artec_textures = 0;    // that multi_texture_face names
+  Lost lost;
   // Faults that are passed over, with their numbers:
   std::uint64_t long_lines = 0, odd_texcoords = 0;
   std::string first_long_line;  // where it stands
 };
+
+constexpr std::size_t kMostKinds = 100;  // of what is lost
 
 double scale_of_type(PlyType type) {
   switch (type) {
@@ -102,8 +113,19 @@ int find_list(const PlyElement& e, std::initializer_list<std::string_view> names
   return i >= 0 && e.properties[static_cast<std::size_t>(i)].is_list ? i : -1;
 }
 
-/// Reads the elements vertex, face and tristrips. InputError for a file without faces, for indices that are
-/// no vertices, and for more than the options allow.
+/// Artec's elements, until the faces are known to which they belong.
+struct ArtecTexturing {
+  struct Face {
+    std::size_t face = 0, begin = 0;  // of its corners in `corners`
+    std::int32_t texture = 0;
+  };
+  std::vector<Vec2f> uv;  // of all textures
+  std::vector<Face> faces;
+  std::vector<std::uint32_t> corners;  // indices into uv
+};
+
+/// Reads the elements vertex, face, tristrips and those of Artec. InputError for a file without faces, for
+/// indices that are no vertices, and for more than the options allow.
 class SurfaceReader {
  public:
   SurfaceReader(const std::string& file, std::span<const std::uint8_t> bytes, const ImportOptions& options,
@@ -119,9 +141,9 @@ class SurfaceReader {
     if (surface_.vertices.positions.empty())
       throw InputError(file_, "header", "an element vertex with x, y and z", "none");
     if (surface_.faces.count() == 0)
-      throw InputError(
-          file_, "", "faces",
-          "none (a point cloud of " + std::to_string(surface_.vertices.positions.size()) + " points)");
+      throw InputError(file_, "", "faces",
+                       std::string(is_splats_ ? "none (Gaussian splats: " : "none (a point cloud of ") +
+                           std::to_string(surface_.vertices.positions.size()) + " points)");
     check_indices();
     surface_.comments = std::move(header_.comments);
     return std::move(surface_);
@@ -138,8 +160,79 @@ class SurfaceReader {
         read_faces(element);
       else if (element.name == "tristrips")
         read_strips(element);
+      else if (element.name == "multi_texture_vertex")
+        read_artec_vertices(element);
+      else if (element.name == "multi_texture_face")
+        read_artec_faces(element);
       else
         skip(element);
+    }
+    place_artec_uvs();
+  }
+
+  void read_artec_vertices(const PlyElement& element) {
+    check_count(element, options_.max_vertices);
+    const int u = find_scalar(element, {"u", "s"}), v = find_scalar(element, {"v", "t"});
+    if (u < 0 || v < 0) return skip(element);
+    for (std::uint64_t i = 0; i < element.count; ++i) {
+      check_cancelled(i);
+      rows_.next(row_);
+      artec_.uv.push_back(
+          flipped(row_.values[static_cast<std::size_t>(u)], row_.values[static_cast<std::size_t>(v)]));
+    }
+  }
+
+  void read_artec_faces(const PlyElement& element) {
+    check_count(element, options_.max_triangles);
+    const int texture = find_scalar(element, {"tx"}), face = find_scalar(element, {"tn"}),
+              corners = find_list(element, {"texture_vertex_indices"});
+    if (corners < 0) return skip(element);
+    for (std::uint64_t i = 0; i < element.count; ++i) {
+      check_cancelled(i);
+      rows_.next(row_);
+      const std::int32_t number =
+          texture < 0 ? 0 : texture_number(row_.values[static_cast<std::size_t>(texture)]);
+      const double of = face < 0 ? static_cast<double>(i) : row_.values[static_cast<std::size_t>(face)];
+      artec_.faces.push_back({index_of(of), artec_.corners.size(), number});
+      for (const double index : row_.lists[static_cast<std::size_t>(corners)])
+        artec_.corners.push_back(index_of(index));
+      surface_.artec_textures = std::max(surface_.artec_textures, number + 1);
+    }
+  }
+
+  void place_artec_uvs() {
+    PlyFaces& faces = surface_.faces;
+    if (artec_.uv.empty() || artec_.faces.empty()) return;
+    faces.uv.resize(faces.index.size());
+    faces.has_uv.resize(faces.count());
+    faces.texture.resize(faces.count(), -1);
+    for (std::size_t i = 0; i < artec_.faces.size(); ++i) {
+      const ArtecTexturing::Face& of = artec_.faces[i];
+      const std::size_t end = i + 1 < artec_.faces.size() ? artec_.faces[i + 1].begin : artec_.corners.size();
+      const std::span<const std::uint32_t> corners(artec_.corners.data() + of.begin, end - of.begin);
+      const auto is_there = [&](std::uint32_t c) { return c < artec_.uv.size(); };
+      if (of.face >= faces.count() || corners.size() != faces.begin[of.face + 1] - faces.begin[of.face] ||
+          !std::all_of(corners.begin(), corners.end(), is_there)) {
+        ++surface_.odd_texcoords;
+        continue;
+      }
+      for (std::size_t k = 0; k < corners.size(); ++k)
+        faces.uv[faces.begin[of.face] + k] = artec_.uv[corners[k]];
+      faces.has_uv[of.face] = 1;
+      faces.texture[of.face] = of.texture;
+    }
+  }
+
+  /// What is read of an element has these columns.
+  void count_unread(const PlyElement& element, std::initializer_list<int> columns,
+                    const ColourColumns* colours) {
+    for (std::size_t p = 0; p < element.properties.size(); ++p) {
+      const auto is_column = [p](int c) { return c == static_cast<int>(p); };
+      const bool is_read =
+          std::any_of(columns.begin(), columns.end(), is_column) ||
+          (colours && std::any_of(colours->column.begin(), colours->column.end(), is_column));
+      if (!is_read && surface_.lost.size() < kMostKinds)
+        surface_.lost["values " + quote(element.properties[p].name) + " of " + element.name] += element.count;
     }
   }
 
@@ -148,6 +241,7 @@ class SurfaceReader {
   }
 
   void skip(const PlyElement& element) {
+    if (surface_.lost.size() < kMostKinds) surface_.lost["elements " + quote(element.name)] += element.count;
     for (std::uint64_t i = 0; i < element.count; ++i) {
       check_cancelled(i);
       rows_.next(row_);
@@ -175,8 +269,10 @@ class SurfaceReader {
     const std::array<int, 2> st{
         find_scalar(element, {"s", "u", "texture_u", "texture_s", "texcoord_u", "tu"}),
         find_scalar(element, {"t", "v", "texture_v", "texture_t", "texcoord_v", "tv"})};
+    is_splats_ = element.find_property({"f_dc_0"}) >= 0 && element.find_property({"scale_0"}) >= 0;
     const ColourColumns colours(element);
     const bool has_normals = n[0] >= 0 && n[1] >= 0 && n[2] >= 0, has_uv = st[0] >= 0 && st[1] >= 0;
+    count_unread(element, {xyz[0], xyz[1], xyz[2], n[0], n[1], n[2], st[0], st[1]}, &colours);
     for (std::uint64_t i = 0; i < element.count; ++i) {
       check_cancelled(i);
       rows_.next(row_);
@@ -211,6 +307,7 @@ class SurfaceReader {
     if (corners < 0) throw InputError(file_, "element face", "a list vertex_indices", "none");
     const int texcoord = find_list(element, {"texcoord"}), texnumber = find_scalar(element, {"texnumber"});
     const ColourColumns colours(element);
+    count_unread(element, {corners, texcoord, texnumber}, &colours);
     for (std::uint64_t i = 0; i < element.count; ++i) {
       check_cancelled(i);
       rows_.next(row_);
@@ -300,6 +397,8 @@ class SurfaceReader {
   const RunContext& context_;
   PlyRow row_;
   PlySurface surface_;
+  ArtecTexturing artec_;
+  bool is_splats_ = false;
   std::uint32_t largest_index_ = 0;
   std::string largest_index_place_;
 };
@@ -344,9 +443,36 @@ class PlyModel {
             add_image(model_, {name, "", false}, resolver_, file_, "comment TextureFile", options_);
       model_.materials.push_back(std::move(material));
     }
+    if (model_.materials.size() == 1) add_artec_materials(plain);
     if (model_.materials.size() > 1 && !has_uv())
       add_warning(model_.notes, "texture-without-uv", "header",
                   "a TextureFile is named but there are no texture coordinates");
+  }
+
+  /// Artec Studio names the pictures after the model.
+  void add_artec_materials(const Material& plain) {
+    const std::string stem = file_.substr(0, file_.find_last_of('.'));
+    for (std::int32_t t = 0; t < surface_.artec_textures && t < 65534; ++t) {
+      Material material = plain;
+      material.name = stem + "_" + std::to_string(t);
+      const std::string place = "element multi_texture_face";
+      for (const char* ending : {".jpg", ".png", ".bmp", ".tif", ".jpeg"}) {
+        Notes notes;
+        NamedFile file = find_file({material.name + ending, "", false}, resolver_,
+                                   static_cast<std::uint64_t>(options_.max_file_bytes), notes, place);
+        if (!file.bytes) continue;
+        model_.notes.insert(model_.notes.end(), notes.begin(), notes.end());
+        material.base_colour_texture.image =
+            add_image_bytes(model_, file.name, std::move(*file.bytes), file_, place, options_);
+        break;
+      }
+      if (!material.base_colour_texture.used())
+        add_warning(model_.notes, "missing-texture", place,
+                    "texture " + std::to_string(t) + " not found: looked for " +
+                        quote(material.name + ".jpg") +
+                        ", .png, .bmp, .tif and .jpeg; the material stays without it");
+      model_.materials.push_back(std::move(material));
+    }
   }
 
   std::uint16_t material_of(std::size_t face) const {
@@ -434,6 +560,7 @@ ImportedModel import_ply(const std::string& file_name, std::span<const std::uint
   PlySurface surface = SurfaceReader(file_name, bytes, options, context).read();
   out.format = "ply";
   Notes notes;
+  out.lost = std::move(surface.lost);
   for (std::string& comment : surface.comments) comment = source_text(comment, file_name, notes);
   out.about = about_from_comments(surface.comments, out.format, notes);
   out.model = PlyModel(file_name, std::move(surface), resolver, options, context).build();

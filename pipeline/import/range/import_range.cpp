@@ -276,6 +276,8 @@ ImportedModel import_range_scan(const std::string& file_name, std::span<const st
   std::optional<std::string> texture;
   if (text_of(bytes).substr(0, 9) == "Cyberware") {
     scan = read_cyberware(file_name, bytes, options, out.model.notes);
+    for (const Note& n : out.model.notes)
+      if (n.code == "colour-not-read") out.lost["colour files"] = 1;
   } else {
     const SourceText text(text_of(bytes), file_name, out.model.notes);
     const RangeScanDescription description = read_range_scan_description(file_name, text_bytes(text.text()));
