@@ -1,0 +1,13 @@
+#pragma once
+#include "format/model/model.h"
+#include "stages/base/run_context.h"
+
+namespace texmesh {
+
+/// For formats whose materials say nothing of alpha modes (OBJ, PLY, range scans): an opaque material whose
+/// base colour has an alpha channel becomes cut-out or blended where texels that its triangles show are not
+/// opaque; what no triangle shows decides nothing. A picture that would hide all of it leaves it opaque, with
+/// a warning. After finish_model().
+void judge_alpha(Model& model, const RunContext& context);
+
+}  // namespace texmesh
