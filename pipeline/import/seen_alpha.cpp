@@ -12,7 +12,10 @@ namespace {
 class SeenTexels {
  public:
   SeenTexels(std::uint32_t width_px, std::uint32_t height_px, const TextureRef& reference)
-      : width_(width_px), height_(height_px), reference_(reference), seen_(std::size_t{width_px} * height_px) {}
+      : width_(width_px),
+        height_(height_px),
+        reference_(reference),
+        seen_(std::size_t{width_px} * height_px) {}
 
   void add(const std::array<Vec2d, 3>& t) {
     double lo = t[0].y, hi = t[0].y;
@@ -24,7 +27,8 @@ class SeenTexels {
     // Tiles upon tiles: every texel is seen, or it takes too long to find out.
     all_ = all_ || far || hi - lo > 4.0 * height_ || work_ > 16 * seen_.size();
     if (all_) return;
-    for (auto row = static_cast<std::int64_t>(std::ceil(lo - 0.5)); static_cast<double>(row) + 0.5 <= hi; ++row)
+    for (auto row = static_cast<std::int64_t>(std::ceil(lo - 0.5)); static_cast<double>(row) + 0.5 <= hi;
+         ++row)
       add_row(t, row);
   }
   bool all() const { return all_; }
@@ -46,7 +50,8 @@ class SeenTexels {
     if (hi - lo > 4.0 * width_) all_ = true;
     if (all_ || !(lo <= hi)) return;
     const std::size_t line = std::size_t{wrapped(row, height_, reference_.wrap_t)} * width_;
-    for (auto x = static_cast<std::int64_t>(std::ceil(lo - 0.5)); static_cast<double>(x) + 0.5 <= hi; ++x, ++work_)
+    for (auto x = static_cast<std::int64_t>(std::ceil(lo - 0.5)); static_cast<double>(x) + 0.5 <= hi;
+         ++x, ++work_)
       seen_[line + wrapped(x, width_, reference_.wrap_s)] = true;
   }
 
@@ -63,8 +68,8 @@ bool is_opaque(const Pixels& pixels) {
   return true;
 }
 
-void judge(Model& model, std::size_t material, const std::vector<std::uint32_t>& triangles, const Pixels& pixels,
-           const RunContext& context) {
+void judge(Model& model, std::size_t material, const std::vector<std::uint32_t>& triangles,
+           const Pixels& pixels, const RunContext& context) {
   Material& m = model.materials[material];
   const TextureRef& reference = m.base_colour_texture;
   const std::vector<Vec2f>& uvs = reference.texcoord == 0 ? model.mesh.uv0 : model.mesh.uv1;
@@ -78,7 +83,8 @@ void judge(Model& model, std::size_t material, const std::vector<std::uint32_t>&
   }
   std::uint64_t n = 0, opaque = 0, between = 0;
   const std::uint8_t* alpha = pixels.data.data() + pixels.channels - 1;
-  for (std::size_t i = 0; i < std::size_t{pixels.width_px} * pixels.height_px; ++i, alpha += pixels.channels) {
+  for (std::size_t i = 0; i < std::size_t{pixels.width_px} * pixels.height_px;
+       ++i, alpha += pixels.channels) {
     if (!seen.at(i)) continue;
     ++n;
     opaque += *alpha >= 250;

@@ -1,6 +1,6 @@
 #pragma once
-// Inside stages only: where on a texture a triangle lies. Texel coordinates: p = uv * size in texels, texel
-// (i, j) is the unit square [i, i + 1) x [j, j + 1) with its centre at + 0.5.
+// Inside the compiler only: where on a texture a triangle lies. Texel coordinates: p = uv * size in texels,
+// texel (i, j) is the unit square [i, i + 1) x [j, j + 1) with its centre at + 0.5.
 #include "format/model/model.h"
 
 namespace texmesh {

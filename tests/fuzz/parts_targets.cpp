@@ -26,7 +26,8 @@ struct Given {
   ImportOptions options = reader_limits();
   RunContext context;
   Notes notes;
-  gltf::Source source{file, files, options, context, notes};
+  Lost lost;
+  gltf::Source source{file, files, options, context, notes, lost};
 };
 
 /// For what takes several times as long as the rest.

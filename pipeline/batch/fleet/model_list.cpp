@@ -106,11 +106,16 @@ class ListedFiles {
     const std::string name = add({written, "", false});
     if (name.empty()) return false;
     const MtlFile library = read_mtl(name, bytes_at((folder_ / name).string(), 0, kMostJsonBytes), notes_);
+    for (const MtlMaterial& m : library.materials) add_maps(m, name);
     for (const MtlMaterial& m : library.materials)
-      for (const auto* map :
-           {&m.map_kd, &m.map_ka, &m.map_ke, &m.map_d, &m.map_pr, &m.map_pm, &m.bump, &m.norm})
-        if (*map) add({(*map)->file, name, false});
+      for (std::uint16_t tile = 1001; has_tiles(m) && tile < 1100; ++tile) add_maps(of_tile(m, tile), name);
     return true;
+  }
+
+  void add_maps(const MtlMaterial& m, const std::string& said_in) {
+    for (const auto* map :
+         {&m.map_kd, &m.map_ka, &m.map_ke, &m.map_d, &m.map_pr, &m.map_pm, &m.bump, &m.norm})
+      if (*map) add({(*map)->file, said_in, false});
   }
 
   void look_at_ply() {

@@ -6,6 +6,7 @@
 #include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/named_files.h"
 #include "pipeline/import/obj/obj_material.h"
+#include "pipeline/import/seen_alpha.h"
 #include "pipeline/import/text_scan.h"
 
 // OBJ is read here and not by tinyobjloader 2.0rc10, which (measured on Debian 12) turns "nan", "inf" and
@@ -39,6 +40,7 @@ struct ObjData {
   std::vector<ObjCorner> corners;
   std::vector<ObjFace> faces;
   std::vector<std::string> materials, parts;  // by first use; materials[0] is "" (before any usemtl)
+  std::vector<std::uint16_t> tiles;  // per material: the UDIM tile that it stands for, 0 = none; or empty
   struct Library {
     std::string name;
     std::size_t line;
@@ -50,6 +52,9 @@ struct ObjData {
   std::uint64_t zero_indices = 0;                       // of normals and texture coordinates: there is none
   std::map<std::string, std::uint64_t> unread;          // statements, by their first word
   bool parts_full = false;                              // the last part stands for all further ones
+  std::uint16_t tile(std::size_t material) const {
+    return tiles.empty() ? std::uint16_t{0} : tiles[material];
+  }
   std::span<const ObjCorner> corners_of(std::size_t f) const {
     const std::uint64_t end = f + 1 < faces.size() ? faces[f + 1].begin : corners.size();
     return {corners.data() + faces[f].begin, static_cast<std::size_t>(end - faces[f].begin)};
@@ -379,12 +384,54 @@ class LibraryLoader {
   std::vector<LoadedLibrary> loaded_;
 };
 
-Material make_material(const std::string& name, const std::vector<LoadedLibrary>& libraries, bool any_library,
-                       const std::string& file, Model& model, Resolver& resolver,
-                       const ImportOptions& options) {
+constexpr std::uint16_t kFirstTile = 1001, kTilesInARow = 10, kLastTile = 9999;
+
+/// The UDIM tile that a face lies in: 1001 + u + 10 v, from whole numbers of repeats, v upwards.
+std::uint16_t tile_of(const ObjData& data, std::size_t face) {
+  Vec2d sum;
+  const std::span<const ObjCorner> corners = data.corners_of(face);
+  for (const ObjCorner& r : corners)
+    if (r.uv != kNoIndex) sum = sum + Vec2d{data.uvs[r.uv].x, 1 - static_cast<double>(data.uvs[r.uv].y)};
+  const double u = std::floor(sum.x / static_cast<double>(corners.size())),
+               v = std::floor(sum.y / static_cast<double>(corners.size()));
+  const double tile = kFirstTile + u + kTilesInARow * v;
+  return u >= 0 && u < kTilesInARow && v >= 0 && tile <= kLastTile ? static_cast<std::uint16_t>(tile)
+                                                                   : kFirstTile;
+}
+
+/// Faces of a material whose maps are named after tiles ("scan.<UDIM>.png") come to have one of each tile.
+void split_into_tiles(ObjData& data, const std::vector<LoadedLibrary>& libraries) {
+  std::vector<bool> tiled(data.materials.size());
+  for (std::size_t m = 0; m < data.materials.size(); ++m)
+    for (const LoadedLibrary& library : libraries)
+      if (const MtlMaterial* material = library.find(data.materials[m])) {
+        tiled[m] = has_tiles(*material);
+        break;
+      }
+  if (std::find(tiled.begin(), tiled.end(), true) == tiled.end()) return;
+  data.tiles.resize(data.materials.size());
+  std::map<std::pair<std::uint16_t, std::uint16_t>, std::uint16_t> made;
+  for (std::size_t f = 0; f < data.faces.size(); ++f) {
+    std::uint16_t& material = data.faces[f].material;
+    if (material >= tiled.size() || !tiled[material]) continue;
+    const std::uint16_t tile = tile_of(data, f);
+    auto [it, is_new] = made.try_emplace({material, tile}, static_cast<std::uint16_t>(data.materials.size()));
+    if (is_new && data.materials.size() >= kMaxNames) it->second = material;
+    if (is_new && data.materials.size() < kMaxNames) {
+      data.materials.push_back(data.materials[material]);
+      data.tiles.push_back(tile);
+    }
+    material = it->second;
+  }
+}
+
+Material make_material(const std::string& name, std::uint16_t tile,
+                       const std::vector<LoadedLibrary>& libraries, bool any_library, const std::string& file,
+                       Model& model, Resolver& resolver, const ImportOptions& options) {
   for (const LoadedLibrary& library : libraries)
     if (const MtlMaterial* material = library.find(name))
-      return material_from_mtl(*material, library.file, library.name, model, resolver, options);
+      return material_from_mtl(tile == 0 ? *material : of_tile(*material, tile), library.file, library.name,
+                               model, resolver, options);
   if (!libraries.empty())
     add_warning(model.notes, "missing-material", file,
                 "material " + quote(name) + " is in no material library");
@@ -396,7 +443,7 @@ Material make_material(const std::string& name, const std::vector<LoadedLibrary>
 
 /// Adds a material to the model for each name in data.materials, in order, from the libraries that the file
 /// names. What is missing gives a warning and a material without texture.
-void add_obj_materials(const ObjData& data, const std::string& file, Model& model, Resolver& resolver,
+void add_obj_materials(ObjData& data, const std::string& file, Model& model, Resolver& resolver,
                        const ImportOptions& options, Lost& lost) {
   LibraryLoader loader(model, resolver, options);
   for (const ObjData::Library& library : data.libraries) {
@@ -408,13 +455,14 @@ void add_obj_materials(const ObjData& data, const std::string& file, Model& mode
   for (const LoadedLibrary& library : libraries)
     for (const auto& [word, count] : library.file.unread)
       lost["statements " + quote(word) + " of materials"] += count;
+  split_into_tiles(data, libraries);
   std::vector<std::uint8_t> used(data.materials.size(), 0);
   for (const ObjFace& f : data.faces) used[f.material] = 1;
   for (std::size_t i = 0; i < data.materials.size(); ++i) {
     // Textures of materials without faces are never asked for.
     const bool named = used[i] && !(i == 0 && data.materials[0].empty());
-    model.materials.push_back(named ? make_material(data.materials[i], libraries, !data.libraries.empty(),
-                                                    file, model, resolver, options)
+    model.materials.push_back(named ? make_material(data.materials[i], data.tile(i), libraries,
+                                                    !data.libraries.empty(), file, model, resolver, options)
                                     : scan_material(i == 0 ? "untextured" : data.materials[i]));
   }
 }
@@ -510,13 +558,18 @@ Mesh build_mesh(const ObjData& data, Model& model, const ImportOptions& options,
     if (f % 65536 == 0) context.check_cancelled();
     const ObjFace& face = data.faces[f];
     const bool face_textured = textured(model, face.material);
+    const std::uint16_t tile = data.tile(face.material);
+    Vec2f moved;  // back to the first tile
+    if (tile != 0)
+      moved = {static_cast<float>((tile - kFirstTile) % kTilesInARow),
+               static_cast<float>((tile - kFirstTile) / kTilesInARow)};
     bool lacks_uv = false;
     corners.clear();
     for (const ObjCorner& r : data.corners_of(f)) {
       Corner c;
       c.position = r.position;
       if (r.uv != kNoIndex)
-        c.uv = data.uvs[r.uv];
+        c.uv = tile == 0 ? data.uvs[r.uv] : Vec2f{data.uvs[r.uv].x - moved.x, data.uvs[r.uv].y + moved.y};
       else
         lacks_uv = true;
       if (r.normal != kNoIndex) c.normal = data.normals[r.normal];
@@ -561,7 +614,7 @@ ImportedModel import_obj(const std::string& file_name, std::span<const std::uint
                          Resolver& resolver, const ImportOptions& options, const RunContext& context) {
   ImportedModel out;
   const SourceText text(text_of(bytes), file_name, out.model.notes);
-  const ObjData data = read_obj(file_name, text.text(), options, context);
+  ObjData data = read_obj(file_name, text.text(), options, context);
   if (data.positions.empty()) throw InputError(file_name, "", "an OBJ with v statements", "none");
   if (data.faces.empty())
     throw InputError(file_name, "", "faces",
@@ -574,6 +627,7 @@ ImportedModel import_obj(const std::string& file_name, std::span<const std::uint
   out.normals_by_specification = out.model.mesh.normals.empty() && is_all_flat(data);
   add_notes(data, out.model, out.lost);
   finish_model(out.model, file_name, options);
+  judge_alpha(out.model, context);
   return out;
 }
 

@@ -177,20 +177,6 @@ bool looks_like_normal_map(const Image& image) {
   return blue * 10 >= n * 8 && near_middle(sum[0]) && near_middle(sum[1]) && sum[2] >= 160 * n;
 }
 
-AlphaMode alpha_of(const Image& image) {
-  if (image.channels != 2 && image.channels != 4) return AlphaMode::kOpaque;
-  const Pixels pixels = decode_image(image);
-  std::uint64_t n = 0, opaque = 0, between = 0;
-  const std::size_t step = pixels.channels;
-  for (std::size_t i = step - 1; i < pixels.data.size(); i += step) {
-    ++n;
-    opaque += pixels.data[i] >= 250;
-    between += pixels.data[i] > 10 && pixels.data[i] < 250;
-  }
-  if (opaque == n) return AlphaMode::kOpaque;
-  return between * 20 <= n ? AlphaMode::kMask : AlphaMode::kBlend;
-}
-
 // ---- to glTF
 
 // uv' = scale * uv + offset with v upwards, said with v downwards.
@@ -285,10 +271,7 @@ struct Converter {
     if (d <= 0)
       add_warning(model.notes, "invisible-material", mtl_name,
                   "material " + quote(mtl.name) + " has no opacity");
-    if (mtl.map_d && !(mtl.map_kd && mtl.map_kd->file == mtl.map_d->file)) return separate_alpha(out);
-    if (!out.base_colour_texture.used()) return;
-    const AlphaMode mode = alpha_of(image_of(out.base_colour_texture));
-    if (out.alpha_mode == AlphaMode::kOpaque) out.alpha_mode = mode;
+    if (mtl.map_d && !(mtl.map_kd && mtl.map_kd->file == mtl.map_d->file)) separate_alpha(out);
   }
 
   void normal(Material& out) const {
@@ -315,6 +298,35 @@ struct Converter {
 };
 
 }  // namespace
+
+namespace {
+
+template <class M, class F>
+void for_each_map(M& material, F&& f) {
+  for (auto* map : {&material.map_kd, &material.map_ka, &material.map_ke, &material.map_d, &material.map_pr,
+                    &material.map_pm, &material.bump, &material.norm})
+    if (*map) f((*map)->file);
+}
+
+constexpr std::string_view kTileMark = "<udim>";
+
+}  // namespace
+
+bool has_tiles(const MtlMaterial& material) {
+  bool any = false;
+  for_each_map(material,
+               [&](const std::string& file) { any = any || lower(file).find(kTileMark) != file.npos; });
+  return any;
+}
+
+MtlMaterial of_tile(MtlMaterial material, std::uint16_t tile) {
+  for_each_map(material, [&](std::string& file) {
+    if (const std::size_t at = lower(file).find(kTileMark); at != file.npos)
+      file.replace(at, kTileMark.size(), std::to_string(tile));
+  });
+  material.name += "." + std::to_string(tile);
+  return material;
+}
 
 std::vector<std::string> names_of_libraries(std::string_view rest) {
   std::vector<std::string> names;

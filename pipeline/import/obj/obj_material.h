@@ -35,6 +35,11 @@ struct MtlFile {
   std::map<std::string, std::uint64_t> unread;  // statements, by their first word
 };
 
+/// Whether a map is named after UDIM tiles: "scan.<UDIM>.png".
+bool has_tiles(const MtlMaterial& material);
+/// The material with the maps of one tile.
+MtlMaterial of_tile(MtlMaterial material, std::uint16_t tile);
+
 /// The names in a line `mtllib`, taken as several: in quotes, or between blanks. The line may as well be one
 /// name with blanks.
 std::vector<std::string> names_of_libraries(std::string_view rest);
@@ -48,8 +53,7 @@ MtlFile read_mtl(const std::string& name, std::span<const std::uint8_t> bytes, N
 ///   options.obj_kd.
 /// - `d` is opacity. `Tr` is transparency, but opacity in files that MeshLab wrote. Tr 1 without d, literally
 ///   an invisible material, is opaque with a note: exporters mean that.
-/// - The alpha of map_Kd counts where the image has any that is not opaque: cut-out where nearly all texels
-///   are either or, blended otherwise. map_d becomes the alpha of map_Kd's image, blended.
+/// - The alpha of map_Kd is judged later (judge_alpha()). map_d becomes the alpha of map_Kd's image, blended.
 /// - map_Pr and map_Pm become one image, roughness in green and metallic in blue. Where two such images do
 ///   not have the same -s, -o and -clamp the second is left out with a warning.
 /// - map_Ks, map_Ns, disp, decal and refl have no counterpart: a warning names them.

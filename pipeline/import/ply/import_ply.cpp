@@ -6,6 +6,7 @@
 #include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/named_files.h"
 #include "pipeline/import/ply/ply_reader.h"
+#include "pipeline/import/seen_alpha.h"
 
 // PLY has no specification of names beyond x, y, z. This is what MeshLab, CloudCompare, Metashape, Blender
 // and VTK write, and what is read here:
@@ -419,6 +420,7 @@ class PlyModel {
     build_mesh();
     add_notes();
     finish_model(model_, file_, options_);
+    judge_alpha(model_, context_);
     return std::move(model_);
   }
 

@@ -4,6 +4,7 @@
 #include "pipeline/import/import_images.h"
 #include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/range/range_scan_document.h"
+#include "pipeline/import/seen_alpha.h"
 #include "pipeline/import/text_scan.h"
 #include "stages/image/decode_image.h"
 
@@ -289,6 +290,7 @@ ImportedModel import_range_scan(const std::string& file_name, std::span<const st
   GridMesher(scan, out.model).run();
   add_material(file_name, texture, resolver, options, out.model);
   finish_model(out.model, file_name, options);
+  judge_alpha(out.model, context);
   return out;
 }
 

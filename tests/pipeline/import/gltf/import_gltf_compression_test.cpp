@@ -319,7 +319,8 @@ TEST(ImportGltfMeshopt, FiltersAgreeWithMeshoptimizer) {
   const ImportOptions options;
   Notes notes;
   const std::string file = "m";
-  const gltf::Source source{file, resolver, options, {}, notes};
+  Lost lost;
+  const gltf::Source source{file, resolver, options, {}, notes, lost};
   testing::Random random{7};
   float unit[4 * 64];
   for (std::size_t i = 0; i < 64; ++i) {

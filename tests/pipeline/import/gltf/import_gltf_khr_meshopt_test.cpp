@@ -58,7 +58,8 @@ Bytes decoded(ByteSpan data, std::size_t count, std::size_t stride,
   const ImportOptions options;
   Notes notes;
   const std::string file = "m";
-  const gltf::Source source{file, resolver, options, {}, notes};
+  Lost lost;
+  const gltf::Source source{file, resolver, options, {}, notes, lost};
   return gltf::decode_meshopt(source, "", data, count, stride, gltf::MeshoptMode::kAttributes, filter);
 }
 
