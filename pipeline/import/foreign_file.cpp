@@ -24,23 +24,28 @@ constexpr Beginning kTexts[] = {
     {"#usda", "a USD file (export it as glTF)"},
     {"off\n", "an OFF file (convert it to PLY)"}};
 
-using namespace std::string_view_literals;
-constexpr Beginning kBytes[] = {{"PK\3\4"sv, "a ZIP archive (unpack it first)"},
-                                {"\x1f\x8b"sv, "a gzip archive (unpack it first)"},
-                                {"7z\xbc\xaf\x27\x1c"sv, "a 7z archive (unpack it first)"},
-                                {"Rar!\x1a\7"sv, "a RAR archive (unpack it first)"},
-                                {"BZh"sv, "a bzip2 archive (unpack it first)"},
-                                {"\xfd"
-                                 "7zXZ"sv,
-                                 "an xz archive (unpack it first)"},
-                                {"\x28\xb5\x2f\xfd"sv, "a Zstandard archive (unpack it first)"},
-                                {"%PDF-"sv, "a PDF"},
-                                {"Kaydara FBX Binary"sv, "an FBX file (export it as glTF)"},
-                                {"BLENDER"sv, "a Blender file (export it as glTF)"},
-                                {"PXR-USDC"sv, "a USD file (export it as glTF)"},
-                                {"LASF"sv, "a point cloud (LAS): texmesh reads surfaces; mesh it first"},
-                                {"ASTM-E57"sv, "a point cloud (E57): texmesh reads surfaces; mesh it first"},
-                                {"NGSP"sv, "Gaussian splats: texmesh reads surfaces"}};
+/// With the NULs in it.
+template <std::size_t kSize>
+constexpr std::string_view whole(const char (&magic)[kSize]) {
+  return {magic, kSize - 1};
+}
+constexpr Beginning kBytes[] = {
+    {whole("PK\3\4"), "a ZIP archive (unpack it first)"},
+    {whole("\x1f\x8b"), "a gzip archive (unpack it first)"},
+    {whole("7z\xbc\xaf\x27\x1c"), "a 7z archive (unpack it first)"},
+    {whole("Rar!\x1a\7"), "a RAR archive (unpack it first)"},
+    {whole("BZh"), "a bzip2 archive (unpack it first)"},
+    {whole("\xfd"
+           "7zXZ"),
+     "an xz archive (unpack it first)"},
+    {whole("\x28\xb5\x2f\xfd"), "a Zstandard archive (unpack it first)"},
+    {whole("%PDF-"), "a PDF"},
+    {whole("Kaydara FBX Binary"), "an FBX file (export it as glTF)"},
+    {whole("BLENDER"), "a Blender file (export it as glTF)"},
+    {whole("PXR-USDC"), "a USD file (export it as glTF)"},
+    {whole("LASF"), "a point cloud (LAS): texmesh reads surfaces; mesh it first"},
+    {whole("ASTM-E57"), "a point cloud (E57): texmesh reads surfaces; mesh it first"},
+    {whole("NGSP"), "Gaussian splats: texmesh reads surfaces"}};
 
 }  // namespace
 

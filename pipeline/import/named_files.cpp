@@ -40,7 +40,7 @@ std::vector<std::string> readings_of(const NameInModel& name) {
 
 /// `name` from `folder`, without "." and ".."; nothing when it leaves the model's folder or names none of its
 /// files.
-std::optional<std::string> inside(std::string_view folder, std::string_view name) {
+std::optional<std::string> beneath_model(std::string_view folder, std::string_view name) {
   if (name.starts_with('/') || has_scheme(name)) return std::nullopt;
   std::vector<std::string_view> parts;
   for (std::string_view path : {folder, name})
@@ -103,11 +103,11 @@ class Finder {
     const std::string_view said_in = name_.said_in;
     const std::string_view folder = said_in.substr(0, said_in.find_last_of('/') + 1);  // npos + 1 = 0
     const std::size_t before = inside_.size();
-    add(inside_, inside(folder, reading));
-    add(inside_, inside("", reading));
+    add(inside_, beneath_model(folder, reading));
+    add(inside_, beneath_model("", reading));
     if (inside_.size() > before) return;
-    add(beside_, inside(folder, last_part(reading)));
-    add(beside_, inside("", last_part(reading)));
+    add(beside_, beneath_model(folder, last_part(reading)));
+    add(beside_, beneath_model("", last_part(reading)));
   }
 
   bool read(const std::string& name) {

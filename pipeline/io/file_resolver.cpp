@@ -7,8 +7,8 @@
 #include <system_error>
 
 #include "pipeline/io/descriptor.h"
+#include "pipeline/io/names/similar_names.h"
 #include "pipeline/io/resolver.h"
-#include "pipeline/io/similar_names.h"
 #include "pipeline/io/uri.h"
 
 namespace texmesh {

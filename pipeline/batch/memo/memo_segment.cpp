@@ -9,7 +9,7 @@
 #include "format/base/text_bytes.h"
 #include "pipeline/cache/cache_files.h"
 #include "pipeline/io/machine/owner_mark.h"
-#include "pipeline/io/similar_names.h"
+#include "pipeline/io/names/similar_names.h"
 
 namespace texmesh {
 namespace {

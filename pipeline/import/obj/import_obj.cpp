@@ -63,7 +63,7 @@ struct ObjData {
 
 constexpr std::int64_t kMaxIndex = 2'000'000'000;
 constexpr std::size_t kMaxNames = 65535;  // parts, materials
-constexpr std::size_t kMaxWordBytes = 24, kMaxWords = 32;
+constexpr std::size_t kMaxStatementBytes = 24, kMaxWords = 32;
 
 /// Names to numbers by first use.
 class NameTable {
@@ -130,7 +130,7 @@ class ObjReader {
   }
 
   void count_unread(const std::string& word) {
-    const std::string short_word = word.substr(0, kMaxWordBytes);
+    const std::string short_word = word.substr(0, kMaxStatementBytes);
     const bool room = data_.unread.size() < kMaxWords || data_.unread.contains(short_word);
     ++data_.unread[room ? short_word : "others"];
   }

@@ -58,7 +58,7 @@ struct PlySurface {
   std::string first_long_line;  // where it stands
 };
 
-constexpr std::size_t kMostKinds = 100;  // of what is lost
+constexpr std::size_t kMostLostKinds = 100;  // of what is lost
 
 double scale_of_type(PlyType type) {
   switch (type) {
@@ -232,7 +232,7 @@ class SurfaceReader {
       const bool is_read =
           std::any_of(columns.begin(), columns.end(), is_column) ||
           (colours && std::any_of(colours->column.begin(), colours->column.end(), is_column));
-      if (!is_read && surface_.lost.size() < kMostKinds)
+      if (!is_read && surface_.lost.size() < kMostLostKinds)
         surface_.lost["values " + quote(element.properties[p].name) + " of " + element.name] += element.count;
     }
   }
@@ -242,7 +242,8 @@ class SurfaceReader {
   }
 
   void skip(const PlyElement& element) {
-    if (surface_.lost.size() < kMostKinds) surface_.lost["elements " + quote(element.name)] += element.count;
+    if (surface_.lost.size() < kMostLostKinds)
+      surface_.lost["elements " + quote(element.name)] += element.count;
     for (std::uint64_t i = 0; i < element.count; ++i) {
       check_cancelled(i);
       rows_.next(row_);

@@ -6,7 +6,7 @@
 #include <fstream>
 
 #include "pipeline/batch/build_memo.h"
-#include "pipeline/io/similar_names.h"
+#include "pipeline/io/names/similar_names.h"
 #include "tests/support/command.h"
 
 namespace texmesh {

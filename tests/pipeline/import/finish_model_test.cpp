@@ -51,7 +51,8 @@ TEST(FinishModel, KeepsTheImagesThatAreUsedWithTheirBytes) {
   MemoryResolver resolver;
   for (const char* name : {"a.png", "b.png", "c.png"})
     resolver.files[name] = testing::png_bytes(4 + name[0] - 'a', 4, 3);
-  for (const char* name : {"a.png", "b.png", "c.png"}) add_image(m, {name, "", false}, resolver, "f", "p", {});
+  for (const char* name : {"a.png", "b.png", "c.png"})
+    add_image(m, {name, "", false}, resolver, "f", "p", {});
   m.materials.resize(3);
   m.materials[2].normal_texture.image = 2;
   m.materials[1].base_colour_texture.image = 1;

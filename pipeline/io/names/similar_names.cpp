@@ -1,4 +1,4 @@
-#include "pipeline/io/similar_names.h"
+#include "pipeline/io/names/similar_names.h"
 
 #include <dirent.h>
 #include <fcntl.h>
