@@ -379,9 +379,10 @@ void GltfReader::note_what_is_left_out() const {
   if (any("animations")) add_info(notes, "animation", "/animations", "animations are left out");
   if (any("skins")) add_info(notes, "skin", "/skins", "skins are left out: the mesh keeps its default pose");
   if (any("cameras")) add_info(notes, "camera", "/cameras", "cameras are left out");
-  const Json variants =
-      document_.value(Json::json_pointer("/extensions/" + std::string(kVariants) + "/variants"), Json());
-  if (variants.is_array() && !variants.empty()) source_.lost["material variants"] = variants.size();
+  const Json extensions = document_.value("extensions", Json());
+  if (extensions.is_object() && extensions.contains(kVariants) && extensions[kVariants].is_object())
+    if (const Json variants = extensions[kVariants].value("variants", Json()); variants.is_array())
+      source_.lost["material variants"] += variants.size();
   for (const tinygltf::Mesh& mesh : structure_.meshes)
     for (const tinygltf::Primitive& primitive : mesh.primitives) {
       count_attributes(primitive);
