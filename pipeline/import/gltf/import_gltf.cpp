@@ -381,7 +381,8 @@ void GltfReader::note_what_is_left_out() const {
   if (any("cameras")) add_info(notes, "camera", "/cameras", "cameras are left out");
   const Json extensions = document_.value("extensions", Json());
   if (extensions.is_object() && extensions.contains(kVariants) && extensions[kVariants].is_object())
-    if (const Json variants = extensions[kVariants].value("variants", Json()); variants.is_array())
+    if (const Json variants = extensions[kVariants].value("variants", Json());
+        variants.is_array() && !variants.empty())
       source_.lost["material variants"] += variants.size();
   for (const tinygltf::Mesh& mesh : structure_.meshes)
     for (const tinygltf::Primitive& primitive : mesh.primitives) {

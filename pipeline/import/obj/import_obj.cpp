@@ -592,8 +592,8 @@ Mesh build_mesh(const ObjData& data, Model& model, const ImportOptions& options,
 void add_notes(const ObjData& data, Model& model, Lost& lost) {
   if (data.zero_indices)
     add_warning(model.notes, "index-0", "",
-                std::to_string(data.zero_indices) +
-                    " corners name normal or texture coordinate 0, which is none; they go without");
+                "0 stands for the normal or texture coordinate of a corner, " +
+                    std::to_string(data.zero_indices) + " times; such corners go without");
   for (const auto& [word, count] : data.unread) lost["statements " + quote(word)] += count;
   if (data.lines_and_points) lost["line and point elements"] = data.lines_and_points;
   if (!data.zbrush_colours.empty()) lost["colours of ZBrush"] = data.zbrush_colours.size();

@@ -452,31 +452,43 @@ class PlyModel {
                   "a TextureFile is named but there are no texture coordinates");
   }
 
-  /// Artec Studio names the pictures after the model.
+  /// Artec Studio names the pictures after the model. A model that was renamed has often got a longer name:
+  /// "plate-small.ply" takes plate_0.jpg where there is no plate-small_0.jpg.
   void add_artec_materials(const Material& plain) {
     const std::string stem = file_.substr(0, file_.find_last_of('.'));
     for (std::int32_t t = 0; t < surface_.artec_textures && t < 65534; ++t) {
       Material material = plain;
       material.name = stem + "_" + std::to_string(t);
-      const std::string place = "element multi_texture_face";
-      for (const char* ending : {".jpg", ".png", ".bmp", ".tif", ".jpeg"}) {
-        Notes notes;
-        NamedFile file = find_file({material.name + ending, "", false}, resolver_,
-                                   static_cast<std::uint64_t>(options_.max_file_bytes), notes, place);
-        if (!file.bytes) continue;
-        model_.notes.insert(model_.notes.end(), notes.begin(), notes.end());
+      std::string looked_for;
+      for (std::size_t end = stem.size();
+           end != 0 && end != stem.npos && !material.base_colour_texture.used();
+           end = stem.find_last_of("-_ .", end - 1))
         material.base_colour_texture.image =
-            add_image_bytes(model_, file.name, std::move(*file.bytes), file_, place, options_);
-        break;
-      }
+            artec_image(stem.substr(0, end) + "_" + std::to_string(t), looked_for);
       if (!material.base_colour_texture.used())
-        add_warning(model_.notes, "missing-texture", place,
-                    "texture " + std::to_string(t) + " not found: looked for " +
-                        quote(material.name + ".jpg") +
-                        ", .png, .bmp, .tif and .jpeg; the material stays without it");
+        add_warning(model_.notes, "missing-texture", kArtecPlace,
+                    "texture " + std::to_string(t) + " not found: looked for " + looked_for +
+                        "; the material stays without it");
       model_.materials.push_back(std::move(material));
     }
   }
+
+  std::int32_t artec_image(const std::string& name, std::string& looked_for) {
+    static constexpr std::string_view kEndings[] = {".jpg", ".png", ".bmp", ".tif", ".jpeg"};
+    for (const std::string_view ending : kEndings) {
+      Notes notes;
+      NamedFile file = find_file({name + std::string(ending), "", false}, resolver_,
+                                 static_cast<std::uint64_t>(options_.max_file_bytes), notes, kArtecPlace);
+      if (!file.bytes) continue;
+      model_.notes.insert(model_.notes.end(), notes.begin(), notes.end());
+      add_info(model_.notes, "texture-by-name", kArtecPlace,
+               "no comment names the textures; " + quote(file.name) + " is taken by its name");
+      return add_image_bytes(model_, file.name, std::move(*file.bytes), file_, kArtecPlace, options_);
+    }
+    looked_for += (looked_for.empty() ? "" : ", ") + quote(name + ".jpg") + " (.png, .bmp, .tif, .jpeg)";
+    return -1;
+  }
+  static constexpr const char* kArtecPlace = "element multi_texture_face";
 
   std::uint16_t material_of(std::size_t face) const {
     if (face < surface_.faces.has_uv.size() && !surface_.faces.has_uv[face] && surface_.vertices.uv.empty())

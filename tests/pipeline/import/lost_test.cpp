@@ -135,6 +135,10 @@ TEST(Artec, BothElementsTextureTheFaces) {
   }
   EXPECT_EQ(testing::count_notes(import("s.ply", "ply\nformat ascii 1.0\n" + artec).model, "missing-texture"),
             2);
+  MemoryResolver files;
+  files.files["s_0.jpg"] = files.files["s_1.jpg"] = testing::png_bytes(8, 8, 3);
+  EXPECT_EQ(import("s-small_2.ply", bytes_of("ply\nformat ascii 1.0\n" + artec), files).model.images.size(),
+            1u);
   std::string wrong = artec;
   wrong.replace(wrong.find("1 1 3 3 4 5"), 11, "1 9 3 3 4 9");
   EXPECT_EQ(
