@@ -117,7 +117,7 @@ int find_list(const PlyElement& e, std::initializer_list<std::string_view> names
 /// Artec's elements, until the faces are known to which they belong.
 struct ArtecTexturing {
   struct Face {
-    std::size_t face = 0, begin = 0;  // of its corners in `corners`
+    std::size_t begin = 0;  // of its corners in `corners`
     std::int32_t texture = 0;
   };
   std::vector<Vec2f> uv;  // of all textures
@@ -185,7 +185,7 @@ class SurfaceReader {
 
   void read_artec_faces(const PlyElement& element) {
     check_count(element, options_.max_triangles);
-    const int texture = find_scalar(element, {"tx"}), face = find_scalar(element, {"tn"}),
+    const int texture = find_scalar(element, {"tx"}),
               corners = find_list(element, {"texture_vertex_indices"});
     if (corners < 0) return skip(element);
     for (std::uint64_t i = 0; i < element.count; ++i) {
@@ -193,8 +193,7 @@ class SurfaceReader {
       rows_.next(row_);
       const std::int32_t number =
           texture < 0 ? 0 : texture_number(row_.values[static_cast<std::size_t>(texture)]);
-      const double of = face < 0 ? static_cast<double>(i) : row_.values[static_cast<std::size_t>(face)];
-      artec_.faces.push_back({index_of(of), artec_.corners.size(), number});
+      artec_.faces.push_back({artec_.corners.size(), number});
       for (const double index : row_.lists[static_cast<std::size_t>(corners)])
         artec_.corners.push_back(index_of(index));
       surface_.artec_textures = std::max(surface_.artec_textures, number + 1);
@@ -212,15 +211,14 @@ class SurfaceReader {
       const std::size_t end = i + 1 < artec_.faces.size() ? artec_.faces[i + 1].begin : artec_.corners.size();
       const std::span<const std::uint32_t> corners(artec_.corners.data() + of.begin, end - of.begin);
       const auto is_there = [&](std::uint32_t c) { return c < artec_.uv.size(); };
-      if (of.face >= faces.count() || corners.size() != faces.begin[of.face + 1] - faces.begin[of.face] ||
+      if (i >= faces.count() || corners.size() != faces.begin[i + 1] - faces.begin[i] ||
           !std::all_of(corners.begin(), corners.end(), is_there)) {
         ++surface_.odd_texcoords;
         continue;
       }
-      for (std::size_t k = 0; k < corners.size(); ++k)
-        faces.uv[faces.begin[of.face] + k] = artec_.uv[corners[k]];
-      faces.has_uv[of.face] = 1;
-      faces.texture[of.face] = of.texture;
+      for (std::size_t k = 0; k < corners.size(); ++k) faces.uv[faces.begin[i] + k] = artec_.uv[corners[k]];
+      faces.has_uv[i] = 1;
+      faces.texture[i] = of.texture;
     }
   }
 
