@@ -18,7 +18,8 @@
 //   comment TextureFile NAME: one per texture, in texnumber's order
 //   multi_texture_vertex, multi_texture_face (Artec Studio): tx u v; tx tn texture_vertex_indices, where tx
 //   is
-//              the texture and tn the face; without comments the textures are STEM_0.jpg, STEM_1.jpg ...
+//              the texture, and which go with the faces in order; without comments the textures are
+//              STEM_0.jpg, STEM_1.jpg ...
 // What else stands in a file is counted and said.
 // UVs run upwards as in OBJ. Colours are sRGB, integers in the range of their type and floats in 0..1.
 // Colours beside a texture are a second record of the same surface: as in MeshLab, the texture shows and the
