@@ -16,9 +16,8 @@
 //              red green blue alpha (of the whole face)
 //   tristrips  vertex_indices; -1 ends a strip
 //   comment TextureFile NAME: one per texture, in texnumber's order
-//   multi_texture_vertex, multi_texture_face (Artec Studio): tx u v; tx tn texture_vertex_indices, where tx
-//   is
-//              the texture, and which go with the faces in order; without comments the textures are
+//   multi_texture_vertex (tx u v), multi_texture_face (tx tn texture_vertex_indices) of Artec Studio: tx is
+//              the texture, and the latter go with the faces in order; without comments the textures are
 //              STEM_0.jpg, STEM_1.jpg ...
 // What else stands in a file is counted and said.
 // UVs run upwards as in OBJ. Colours are sRGB, integers in the range of their type and floats in 0..1.
