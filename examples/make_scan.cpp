@@ -9,8 +9,8 @@
 
 namespace {
 
-using namespace texmesh;            // NOLINT: an example's main file
-using namespace texmesh::examples;  // NOLINT
+using namespace texmesh;  // NOLINT: an example's main file
+using namespace texmesh;  // NOLINT
 
 void write_model(const ScanOptions& options, const std::string& path, const RunContext& context) {
   const Model model = make_scan(options, context);

@@ -8,7 +8,7 @@
 #include "format/base/no_index.h"
 #include "format/base/portable_math.h"
 
-namespace texmesh::examples {
+namespace texmesh {
 namespace {
 
 using Corners = std::vector<std::array<std::uint32_t, 3>>;  // position indices
@@ -318,4 +318,4 @@ ScanMesh make_scan_mesh(const ScanShape& shape, const ScanOptions& options) {
   return scan;
 }
 
-}  // namespace texmesh::examples
+}  // namespace texmesh

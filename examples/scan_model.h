@@ -7,7 +7,7 @@
 #include "stages/base/run_context.h"
 #include "stages/data/pixels.h"
 
-namespace texmesh::examples {
+namespace texmesh {
 
 /// A made scan: an organic object with the habits of photogrammetry (irregular triangles, measuring noise,
 /// holes, an atlas of many charts with black gutters, exposure that jumps at seams). The same bytes on every
@@ -26,7 +26,7 @@ struct ScanOptions {
 };
 
 /// What a point of the made surface looks like.
-struct SurfaceSample {
+struct ShapeSample {
   Vec3d colour;       // sRGB, 0..1
   double height = 0;  // relief too fine for the mesh, object units
   double occlusion = 1, roughness = 0.8;
@@ -44,7 +44,7 @@ class ScanShape {
   double range_radius(double alpha, double t) const;
   static constexpr double range_height() { return 0.3; }
   /// `finest` is the size of the smallest detail to paint, object units: that of a texel.
-  SurfaceSample sample(Vec3d position, Vec3d normal, double finest) const;
+  ShapeSample sample(Vec3d position, Vec3d normal, double finest) const;
 
  private:
   struct Lobe {
@@ -88,4 +88,4 @@ struct MadeRangeScan {
 };
 MadeRangeScan make_range_scan(const ScanOptions& options, const RunContext& context);
 
-}  // namespace texmesh::examples
+}  // namespace texmesh

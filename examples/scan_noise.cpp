@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace texmesh::examples {
+namespace texmesh {
 namespace {
 
 double fade(double t) { return t * t * t * (t * (t * 6 - 15) + 10); }
@@ -68,4 +68,4 @@ double spots(Vec3d p, std::uint32_t seed, double density) {
   return std::max(0.0, 1 - length(d) / radius);
 }
 
-}  // namespace texmesh::examples
+}  // namespace texmesh

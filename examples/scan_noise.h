@@ -4,7 +4,7 @@
 
 #include "format/base/vec.h"
 
-namespace texmesh::examples {
+namespace texmesh {
 
 /// A 32-bit hash of a lattice point; the source of everything random in a made scan. Integer arithmetic only,
 /// so the same on every machine.
@@ -37,4 +37,4 @@ inline double smoothstep(double lo, double hi, double x) {
   return t * t * (3 - 2 * t);
 }
 
-}  // namespace texmesh::examples
+}  // namespace texmesh

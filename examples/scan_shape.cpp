@@ -4,7 +4,7 @@
 #include "examples/scan_noise.h"
 #include "format/base/portable_math.h"
 
-namespace texmesh::examples {
+namespace texmesh {
 namespace {
 
 constexpr double kUnit = 0.11;  // object units of a radius of 1
@@ -62,7 +62,7 @@ double ScanShape::range_radius(double alpha, double t) const {
   return outline * std::max(0.3, 1 + relief);
 }
 
-SurfaceSample ScanShape::sample(Vec3d position, Vec3d normal, double finest) const {
+ShapeSample ScanShape::sample(Vec3d position, Vec3d normal, double finest) const {
   const Vec3d p = position * (1 / kUnit);
   const Vec3d q = p + Vec3d{fractal(p * 1.7, seed_ + 50, 3), fractal(p * 1.7, seed_ + 53, 3),
                             fractal(p * 1.7, seed_ + 56, 3)} *
@@ -88,7 +88,7 @@ SurfaceSample ScanShape::sample(Vec3d position, Vec3d normal, double finest) con
   c = mix(c, palette_[3], 0.6 * smoothstep(0, 0.5, pits));
   c = mix(c, Vec3d{0.86, 0.84, 0.78}, 0.45 * smoothstep(0.2, 0.6, flecks) * (1 - growth));
 
-  SurfaceSample s;
+  ShapeSample s;
   s.height = kUnit * (0.010 * fine - 0.012 * cracks - 0.010 * smoothstep(0, 0.7, pits) + 0.006 * growth);
   s.occlusion = clamp01(1 - 0.5 * cracks - 0.35 * smoothstep(0, 0.7, pits) + 0.15 * std::min(0.0, fine));
   s.roughness = clamp01(0.62 + 0.2 * growth + 0.12 * fine - 0.25 * drip);
@@ -98,4 +98,4 @@ SurfaceSample ScanShape::sample(Vec3d position, Vec3d normal, double finest) con
   return s;
 }
 
-}  // namespace texmesh::examples
+}  // namespace texmesh

@@ -7,7 +7,7 @@
 #include "format/base/box.h"
 #include "format/base/bytes.h"
 
-namespace texmesh::examples {
+namespace texmesh {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -242,4 +242,4 @@ void write_range_scan(const MadeRangeScan& scan, int jpeg_quality, const std::st
   write_file(path, text);
 }
 
-}  // namespace texmesh::examples
+}  // namespace texmesh

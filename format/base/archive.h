@@ -22,7 +22,6 @@ namespace texmesh {
 static_assert(std::endian::native == std::endian::little,
               "artefact and package codecs copy little-endian memory");
 
-namespace archive_detail {
 template <class T>
 struct IsFlat : std::bool_constant<std::is_arithmetic_v<T> || std::is_enum_v<T>> {};
 template <class T>
@@ -33,7 +32,6 @@ template <class T>
 struct IsFlat<Vec4<T>> : std::true_type {};
 template <class T, std::size_t N>
 struct IsFlat<std::array<T, N>> : IsFlat<T> {};
-}  // namespace archive_detail
 
 /// Hands the bytes of what it is called with to `Sink`, piece by piece: a function of ByteSpan.
 template <class Sink>
@@ -51,7 +49,7 @@ class ArchiveTo {
   }
   template <class T>
   void put(const T& value) {
-    if constexpr (archive_detail::IsFlat<T>::value) {
+    if constexpr (IsFlat<T>::value) {
       raw(&value, sizeof value);
     } else {
       T::archive(value, *this);
@@ -64,7 +62,7 @@ class ArchiveTo {
   template <class T>
   void put(const std::vector<T>& v) {
     put(static_cast<std::uint64_t>(v.size()));
-    if constexpr (archive_detail::IsFlat<T>::value) {
+    if constexpr (IsFlat<T>::value) {
       raw(v.data(), v.size() * sizeof(T));
     } else {
       for (const T& x : v) put(x);
@@ -73,24 +71,22 @@ class ArchiveTo {
   Sink sink_;
 };
 
-namespace archive_detail {
-struct SizeSink {
+struct ArchiveSizeSink {
   std::size_t bytes = 0;
   void operator()(std::span<const std::uint8_t> piece) { bytes += piece.size(); }
 };
-struct MemorySink {
+struct ArchiveMemorySink {
   std::vector<std::uint8_t> bytes;
   void operator()(std::span<const std::uint8_t> piece) {
     bytes.insert(bytes.end(), piece.begin(), piece.end());
   }
 };
-struct DigestSink {
+struct ArchiveDigestSink {
   Sha256Stream stream;
   void operator()(std::span<const std::uint8_t> piece) { stream.add(piece); }
 };
-}  // namespace archive_detail
 
-class ArchiveWriter : public ArchiveTo<archive_detail::MemorySink> {
+class ArchiveWriter : public ArchiveTo<ArchiveMemorySink> {
  public:
   void reserve(std::size_t bytes) { sink().bytes.reserve(bytes); }
   /// The bytes; the writer is empty afterwards.
@@ -129,7 +125,7 @@ class ArchiveReader {
   }
   template <class T>
   void get(T& value) {
-    if constexpr (archive_detail::IsFlat<T>::value) {
+    if constexpr (IsFlat<T>::value) {
       raw(&value, sizeof value);
     } else {
       T::archive(value, *this);
@@ -147,7 +143,7 @@ class ArchiveReader {
   }
   template <class T>
   void get(std::vector<T>& v) {
-    if constexpr (archive_detail::IsFlat<T>::value) {
+    if constexpr (IsFlat<T>::value) {
       v.resize(count(sizeof(T)));
       raw(v.data(), v.size() * sizeof(T));
     } else {
@@ -164,7 +160,7 @@ class ArchiveReader {
 /// Bytes that grow would for a moment take three times their memory: gigabytes where a scan is large.
 template <class T>
 std::vector<std::uint8_t> encode_artefact(const T& value) {
-  ArchiveTo<archive_detail::SizeSink> size;
+  ArchiveTo<ArchiveSizeSink> size;
   size(value);
   ArchiveWriter w;
   w.reserve(size.sink().bytes);
@@ -178,7 +174,7 @@ struct ArtefactDigest {
 };
 template <class T>
 ArtefactDigest digest_artefact(const T& value) {
-  ArchiveTo<archive_detail::DigestSink> w;
+  ArchiveTo<ArchiveDigestSink> w;
   w(value);
   Sha256Stream& stream = w.sink().stream;
   const std::uint64_t bytes = stream.bytes();

@@ -31,7 +31,7 @@ namespace texmesh {
 // The artefacts of the graph: who makes or reads one goes by its handle.
 
 /// The model file behind its import.
-struct Source {
+struct SourceModel {
   std::function<ImportedModel(const ImportOptions&, const RunContext&)> import;
 };
 
@@ -48,7 +48,7 @@ struct ImportedMesh {
 };
 
 // From outside the graph:
-inline constexpr Artefact<Source> kSource{"source"};
+inline constexpr Artefact<SourceModel> kSource{"source"};
 inline constexpr Artefact<std::string> kProvenance{"provenance"};  // JSON
 
 inline constexpr Artefact<ImportedMesh> kImportedMesh{"import.mesh"};

@@ -103,7 +103,7 @@ class ModelSource {
 
   /// Imports the model, unless open() has. InputError when a file is not what it was at open(). Refers to
   /// this object.
-  Source source() {
+  SourceModel source() {
     return {[this](const ImportOptions& options, const RunContext& context) {
       if (imported_) return std::move(*std::exchange(imported_, nullptr));
       std::vector<FileRequest> again;

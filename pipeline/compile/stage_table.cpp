@@ -15,7 +15,7 @@ using Planes = std::vector<Pixels>;
 
 // Adapters, where a stage's function does not take its inputs and options as the graph gives them.
 
-Results<ImportedMesh, Materials, Images, About> import_source(const Source& source,
+Results<ImportedMesh, Materials, Images, About> import_source(const SourceModel& source,
                                                               const ImportOptions& options,
                                                               const RunContext& context) {
   ImportedModel m = source.import(options, context);

@@ -99,8 +99,6 @@ struct StageTitle {
   double time_share = 0;
 };
 
-namespace make_stage_detail {
-
 template <class T>
 StageOutput stored_output(Artefact<T> artefact) {
   StageOutput output{ArtefactName(artefact), {}, {}, {}};
@@ -146,8 +144,8 @@ auto bind_function(Inputs<I...>, const std::tuple<O...>*, Options<P...> options,
 }
 
 template <class... I, class... P>
-Stage describe(StageTitle title, const Inputs<I...>& read, const Options<P...>& options,
-               std::vector<StageLibrary> libraries) {
+Stage describe_stage(StageTitle title, const Inputs<I...>& read, const Options<P...>& options,
+                     std::vector<StageLibrary> libraries) {
   Stage stage;
   stage.name = std::move(title.name);
   stage.version = title.version;
@@ -160,29 +158,25 @@ Stage describe(StageTitle title, const Inputs<I...>& read, const Options<P...>& 
   return stage;
 }
 
-}  // namespace make_stage_detail
-
 template <class... I, class... O, class... P, class F>
 Stage make_stage(StageTitle title, Inputs<I...> read, Outputs<O...> made, Options<P...> options,
                  std::vector<StageLibrary> libraries, F function) {
-  namespace detail = make_stage_detail;
-  Stage stage = detail::describe(std::move(title), read, options, std::move(libraries));
-  std::apply([&](auto... artefact) { (stage.outputs.push_back(detail::stored_output(artefact)), ...); },
+  Stage stage = describe_stage(std::move(title), read, options, std::move(libraries));
+  std::apply([&](auto... artefact) { (stage.outputs.push_back(stored_output(artefact)), ...); },
              made.artefacts);
-  stage.run = detail::bind_function(read, static_cast<const std::tuple<O...>*>(nullptr), std::move(options),
-                                    std::move(function));
+  stage.run = bind_function(read, static_cast<const std::tuple<O...>*>(nullptr), std::move(options),
+                            std::move(function));
   return stage;
 }
 
 template <class... I, class O, class... P, class F>
 Stage make_stage(StageTitle title, Inputs<I...> read, DerivedOutput<O> made, Options<P...> options,
                  std::vector<StageLibrary> libraries, F function) {
-  namespace detail = make_stage_detail;
-  Stage stage = detail::describe(std::move(title), read, options, std::move(libraries));
+  Stage stage = describe_stage(std::move(title), read, options, std::move(libraries));
   stage.outputs.push_back({ArtefactName(made.artefact), {}, {}, {}});
   stage.stored = false;
-  stage.run = detail::bind_function(read, static_cast<const std::tuple<O>*>(nullptr), std::move(options),
-                                    std::move(function));
+  stage.run = bind_function(read, static_cast<const std::tuple<O>*>(nullptr), std::move(options),
+                            std::move(function));
   return stage;
 }
 

@@ -11,7 +11,7 @@ namespace texmesh {
 /// The value of an option as JSON: what keys hold and --explain compares. Doubles have the fewest digits that
 /// give the same double back.
 template <class T>
-requires(!std::is_class_v<T> || std::is_same_v<T, std::string> || record_detail::IsList<T>::value) std::string
+requires(!std::is_class_v<T> || std::is_same_v<T, std::string> || IsList<T>::value) std::string
     option_text(const T& value) {
   return to_json_line(value);
 }

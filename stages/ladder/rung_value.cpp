@@ -6,19 +6,19 @@
 #include "format/base/portable_math.h"
 #include "format/rules/ordinary_loads.h"
 
-namespace texmesh::rungs {
+namespace texmesh {
 
 Hull hull_of(const TextureRungs& texture, const std::vector<std::uint8_t>& keep, std::size_t wanted,
-             Levels levels) {
+             LevelRange levels) {
   Hull hull{{kPreview, 0, texture.preview_loss[wanted]}};
   for (;;) {
-    const Vertex at = hull.back();
-    Vertex best;
+    const HullVertex at = hull.back();
+    HullVertex best;
     double steepest = 0;
     for (std::size_t k = 0; k < texture.pairs.size(); ++k) {
       const RungPair& pair = texture.pairs[k];
       if (!keep[k] || pair.level < levels.first || pair.level > levels.last) continue;
-      const Vertex to{k, static_cast<double>(pair.bytes), pair.loss[wanted]};
+      const HullVertex to{k, static_cast<double>(pair.bytes), pair.loss[wanted]};
       if (to.bytes <= at.bytes || to.loss >= at.loss) continue;
       const double slope = (at.loss - to.loss) / (to.bytes - at.bytes);
       if (slope > steepest || (slope == steepest && to.bytes > best.bytes)) steepest = slope, best = to;
@@ -45,7 +45,7 @@ std::size_t segment_of(const Hull& hull, double bytes) {
 double loss_at(const Hull& hull, double bytes) {
   const std::size_t k = segment_of(hull, bytes);
   if (k + 1 == hull.size()) return hull[k].loss;
-  const Vertex &a = hull[k], &b = hull[k + 1];
+  const HullVertex &a = hull[k], &b = hull[k + 1];
   return a.loss + (b.loss - a.loss) * ((bytes - a.bytes) / (b.bytes - a.bytes));
 }
 
@@ -459,4 +459,4 @@ std::vector<std::vector<std::uint8_t>> pairs_worth_storing(const std::vector<Tex
   return keep;
 }
 
-}  // namespace texmesh::rungs
+}  // namespace texmesh

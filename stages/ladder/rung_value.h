@@ -21,7 +21,7 @@
 #include <limits>
 #include <vector>
 
-namespace texmesh::rungs {
+namespace texmesh {
 
 /// One way to store a texture: a plane of the chain (0 = full size, 1 = its first mip, ...) at one rung.
 struct RungPair {
@@ -67,14 +67,14 @@ inline constexpr double kUnseen = 0.01;
 inline constexpr std::size_t kPreview = std::numeric_limits<std::size_t>::max();
 
 /// A vertex of a lower hull.
-struct Vertex {
+struct HullVertex {
   std::size_t pair = kPreview;
   double bytes = 0, loss = 0;
 };
-using Hull = std::vector<Vertex>;
+using Hull = std::vector<HullVertex>;
 
 /// Levels of a texture, the last one included.
-struct Levels {
+struct LevelRange {
   std::size_t first = 0, last = 0;
 };
 
@@ -84,7 +84,7 @@ using GivenBytes = std::vector<std::vector<double>>;
 /// The lower hull of loss over bytes where a level is wanted: from the preview on along the kept pairs of
 /// some levels.
 Hull hull_of(const TextureRungs& texture, const std::vector<std::uint8_t>& keep, std::size_t wanted,
-             Levels levels);
+             LevelRange levels);
 /// Those of the wanted level and of each coarser one.
 std::vector<Hull> hulls_of(const TextureRungs& texture, const std::vector<std::uint8_t>& keep,
                            std::size_t wanted);
@@ -112,4 +112,4 @@ std::vector<std::uint8_t> gap_closing_pairs(const TextureRungs& texture,
 /// take at most TextureRungs::most_bytes, if they did before. Same result anywhere.
 void swap_pairs(const TextureRungs& texture, const GivenBytes& given, std::vector<std::uint8_t>& keep);
 
-}  // namespace texmesh::rungs
+}  // namespace texmesh

@@ -10,11 +10,8 @@ namespace {
 constexpr double kPixelsPerDegree = 67.0206432765;  // 0.7 m from a screen 0.7 m wide with 3840 px
 
 using FlipCurve = SampledCurve<16384>;
-using measure::FilteredRows;
-using measure::Kernel;
-using measure::PixelSpans;
 
-double sum_of(const Kernel& kernel) {
+double sum_of(const FilterKernel& kernel) {
   double sum = 0;
   for (const float k : kernel) sum += static_cast<double>(k);
   return sum;
@@ -22,10 +19,10 @@ double sum_of(const Kernel& kernel) {
 
 /// exp(-pi^2 x^2 / b), x in degrees: one term of a contrast sensitivity function. Three deviations of the
 /// widest term; narrow ones end where single precision no longer sees them.
-Kernel sensitivity(double b) {
+FilterKernel sensitivity(double b) {
   constexpr double kUnseen = 1e-9;
-  Kernel out;
-  for (int i = -measure::kFilterReach; i <= measure::kFilterReach; ++i) {
+  FilterKernel out;
+  for (int i = -kFilterReach; i <= kFilterReach; ++i) {
     const double x = i / kPixelsPerDegree;
     const double weight = portable::exp(-portable::kPi * portable::kPi * x * x / b);
     if (weight > kUnseen) out.push_back(static_cast<float>(weight));
@@ -35,7 +32,7 @@ Kernel sensitivity(double b) {
 
 /// A term a sqrt(pi / b) exp(-pi^2 z / b) of an eye's filter: its row and its part of the sum over the plane.
 struct Term {
-  Kernel kernel;
+  FilterKernel kernel;
   float weight = 0;
 };
 std::vector<Term> eye_filter(std::initializer_list<std::array<double, 2>> terms) {
@@ -67,7 +64,7 @@ const FlipCurve& flip_lab_curve() {
 /// Derivatives of a Gaussian as wide as features that the eye looks for: first (edges), second (points); the
 /// weights of either sign sum to 1.
 struct FeatureKernels {
-  Kernel smooth, edge, point;
+  FilterKernel smooth, edge, point;
 };
 const FeatureKernels& feature_kernels() {
   static const FeatureKernels kernels = [] {
@@ -81,7 +78,7 @@ const FeatureKernels& feature_kernels() {
       k.edge.push_back(static_cast<float>(-i * g));
       k.point.push_back(static_cast<float>((i * i / (deviation * deviation) - 1) * g));
     }
-    const auto balance = [](Kernel& kernel) {
+    const auto balance = [](FilterKernel& kernel) {
       double positive = 0, negative = 0;
       for (const float v : kernel) (v > 0 ? positive : negative) += std::fabs(static_cast<double>(v));
       for (float& v : kernel) v = static_cast<float>(static_cast<double>(v) / (v > 0 ? positive : negative));
@@ -123,15 +120,15 @@ class FlipFilter {
     for (std::size_t c = 0; c < 3; ++c)
       for (const Term& term : eye_filters()[c])
         eyes_.push_back({c, term, {spans, plain_.opponent[static_cast<int>(c)], term.kernel}});
-    for (const Kernel* kernel : {&features.smooth, &features.edge, &features.point})
+    for (const FilterKernel* kernel : {&features.smooth, &features.edge, &features.point})
       luma_.emplace_back(spans, plain_.luma, *kernel);
-    for (auto& row : opponent_) row.resize(measure::whole_blocks(spans.side_px));
-    for (auto& row : {&luma_row_, &part_, &other_}) row->resize(measure::whole_blocks(spans.side_px));
+    for (auto& row : opponent_) row.resize(whole_blocks(spans.side_px));
+    for (auto& row : {&luma_row_, &part_, &other_}) row->resize(whole_blocks(spans.side_px));
   }
 
   /// Rows are asked for one after the other.
   void read(std::size_t y, FlipPicture& out) {
-    for (; made_ < std::min(spans_.rows.size(), y + measure::kFilterReach + 1); ++made_) make(made_);
+    for (; made_ < std::min(spans_.rows.size(), y + kFilterReach + 1); ++made_) make(made_);
     const PixelSpans::Row& row = spans_.rows[y];
     const std::size_t count = row.last - row.first;
     if (count == 0) return;
@@ -153,11 +150,11 @@ class FlipFilter {
     Vec3f opponent;
     for (const Eye& eye : eyes_)
       opponent[static_cast<int>(eye.channel)] +=
-          eye.term.weight * measure::filtered_plain(eye.rows.plain(), eye.term.kernel);
+          eye.term.weight * filtered_plain(eye.rows.plain(), eye.term.kernel);
     out.plain_lab = flip_lab(opponent);
     for (std::size_t k = 0; k < 2; ++k)
-      out.plain_detail[k] = strength(measure::filtered_plain(luma_[k + 1].plain(), feature_kernels().smooth),
-                                     measure::filtered_plain(luma_[0].plain(), derivative(k)));
+      out.plain_detail[k] = strength(filtered_plain(luma_[k + 1].plain(), feature_kernels().smooth),
+                                     filtered_plain(luma_[0].plain(), derivative(k)));
   }
 
  private:
@@ -166,7 +163,7 @@ class FlipFilter {
     const Term& term;
     FilteredRows rows;
   };
-  static const Kernel& derivative(std::size_t k) {
+  static const FilterKernel& derivative(std::size_t k) {
     return k == 0 ? feature_kernels().edge : feature_kernels().point;
   }
 
@@ -296,9 +293,7 @@ double FlipSum::percentile(double part) const {
   return 0;
 }
 
-FlipPicture prepare_flip(const Picture& picture) {
-  return prepare_flip(picture, measure::shown_spans(picture));
-}
+FlipPicture prepare_flip(const Picture& picture) { return prepare_flip(picture, shown_spans(picture)); }
 
 FlipPicture prepare_flip(const Picture& picture, const PixelSpans& spans) {
   FlipPicture out;

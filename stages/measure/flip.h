@@ -22,7 +22,7 @@ struct FlipPicture {
 /// Costs by what the picture shows; the values are those of the whole picture.
 FlipPicture prepare_flip(const Picture& picture);
 /// `spans`: shown_spans() of the picture.
-FlipPicture prepare_flip(const Picture& picture, const measure::PixelSpans& spans);
+FlipPicture prepare_flip(const Picture& picture, const PixelSpans& spans);
 
 inline constexpr int kFlipSteps = 1024;
 

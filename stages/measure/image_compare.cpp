@@ -12,10 +12,10 @@ const Curve& srgb_curve() {
   static const Curve curve(srgb_of_light);
   return curve;
 }
-const measure::Kernel& window() {
-  static const measure::Kernel kernel = [] {
+const FilterKernel& window() {
+  static const FilterKernel kernel = [] {
     constexpr double kDeviation = 1.5;
-    measure::Kernel k;
+    FilterKernel k;
     double sum = 0;
     for (int i = -5; i <= 5; ++i) sum += portable::exp(-i * i / (2 * kDeviation * kDeviation));
     for (int i = -5; i <= 5; ++i)
@@ -28,9 +28,9 @@ const measure::Kernel& window() {
 /// Values under the window, row by row as they come: all that is in memory at once fits into a cache.
 class Windowed {
  public:
-  Windowed(const measure::PixelSpans& spans, float plain)
-      : spans_(spans), rows_(spans, plain, window()), row_(measure::whole_blocks(spans.side_px)) {}
-  float plain() const { return measure::filtered_plain(rows_.plain(), window()); }
+  Windowed(const PixelSpans& spans, float plain)
+      : spans_(spans), rows_(spans, plain, window()), row_(whole_blocks(spans.side_px)) {}
+  float plain() const { return filtered_plain(rows_.plain(), window()); }
   /// Row y. Rows are asked for one after the other; `values_of(row)` gives those of its span.
   template <class ValuesOf>
   const std::vector<float>& row(std::size_t y, ValuesOf&& values_of) {
@@ -41,8 +41,8 @@ class Windowed {
   }
 
  private:
-  const measure::PixelSpans& spans_;
-  measure::FilteredRows rows_;
+  const PixelSpans& spans_;
+  FilteredRows rows_;
   std::vector<float> row_;
   std::size_t made_ = 0;
 };
@@ -64,35 +64,32 @@ double ssim_of(const Windows& w) {
 
 }  // namespace
 
-LumaPicture prepare_luma(const Picture& picture) {
-  return prepare_luma(picture, measure::shown_spans(picture));
-}
+LumaPicture prepare_luma(const Picture& picture) { return prepare_luma(picture, shown_spans(picture)); }
 
-LumaPicture prepare_luma(const Picture& picture, const measure::PixelSpans& spans) {
+LumaPicture prepare_luma(const Picture& picture, const PixelSpans& spans) {
   LumaPicture out;
   out.covered = picture.covered;
   if (picture.linear.empty()) return out;
   out.spans = spans;
-  for (measure::SpanImage* image : {&out.luma, &out.mean, &out.square_mean})
-    image->values.resize(out.spans.count);
+  for (SpanImage* image : {&out.luma, &out.mean, &out.square_mean}) image->values.resize(out.spans.count);
   out.luma.plain = luma_of(picture.linear[0]);
   Windowed mean(out.spans, out.luma.plain), square_mean(out.spans, out.luma.plain * out.luma.plain);
   std::vector<float> squares(picture.side_px);
   const auto values_of = [&](std::size_t y) {
-    const measure::PixelSpans::Row& row = out.spans.rows[y];
+    const PixelSpans::Row& row = out.spans.rows[y];
     float* const luma = out.luma.values.data() + row.offset;
     for (std::size_t x = row.first; x < row.last; ++x)
       luma[x - row.first] = luma_of(picture.linear[y * picture.side_px + x]);
     return luma;
   };
   const auto squares_of = [&](std::size_t y) {
-    const measure::PixelSpans::Row& row = out.spans.rows[y];
+    const PixelSpans::Row& row = out.spans.rows[y];
     const float* const luma = out.luma.values.data() + row.offset;
     for (std::size_t i = 0; i < row.last - row.first; ++i) squares[i] = luma[i] * luma[i];
     return squares.data();
   };
   for (std::size_t y = 0; y < out.spans.rows.size(); ++y) {
-    const measure::PixelSpans::Row& row = out.spans.rows[y];
+    const PixelSpans::Row& row = out.spans.rows[y];
     const std::size_t count = row.last - row.first;
     std::copy_n(mean.row(y, values_of).begin(), count, out.mean.values.data() + row.offset);
     std::copy_n(square_mean.row(y, squares_of).begin(), count, out.square_mean.values.data() + row.offset);
@@ -103,19 +100,19 @@ LumaPicture prepare_luma(const Picture& picture, const measure::PixelSpans& span
 }
 
 PictureDifference compare_luma(const LumaPicture& reference, const LumaPicture& test) {
-  const measure::PixelSpans both = measure::union_of(reference.spans, test.spans);
+  const PixelSpans both = union_of(reference.spans, test.spans);
   Windowed products(both, reference.luma.plain * test.luma.plain);
   std::vector<float> row_products(both.side_px);
   const auto products_of = [&](std::size_t at) {
     const auto y = static_cast<std::uint32_t>(at);
-    const measure::PixelSpans::Row& row = both.rows[y];
+    const PixelSpans::Row& row = both.rows[y];
     for (std::uint32_t x = row.first; x < row.last; ++x)
       row_products[x - row.first] = reference.luma.at(reference.spans, x, y) * test.luma.at(test.spans, x, y);
     return row_products.data();
   };
   PictureDifference sum;
   for (std::uint32_t y = 0; y < both.rows.size(); ++y) {
-    const measure::PixelSpans::Row& row = both.rows[y];
+    const PixelSpans::Row& row = both.rows[y];
     const std::vector<float>& product = products.row(y, products_of);
     for (std::uint32_t x = row.first; x < row.last; ++x) {
       const std::size_t at = std::size_t{y} * both.side_px + x;

@@ -7,14 +7,14 @@ namespace texmesh {
 /// What SSIM compares, computed once for many comparisons. Costs by what the picture shows; the values are
 /// those of the whole picture.
 struct LumaPicture {
-  measure::PixelSpans spans;
-  measure::SpanImage luma;               // sRGB-encoded, 0..1
-  measure::SpanImage mean, square_mean;  // under a Gaussian of deviation 1.5 px
-  std::vector<std::uint8_t> covered;     // of the whole picture
+  PixelSpans spans;
+  SpanImage luma;                     // sRGB-encoded, 0..1
+  SpanImage mean, square_mean;        // under a Gaussian of deviation 1.5 px
+  std::vector<std::uint8_t> covered;  // of the whole picture
 };
 LumaPicture prepare_luma(const Picture& picture);
 /// `spans`: shown_spans() of the picture.
-LumaPicture prepare_luma(const Picture& picture, const measure::PixelSpans& spans);
+LumaPicture prepare_luma(const Picture& picture, const PixelSpans& spans);
 
 struct PictureDifference {
   double ssim = 0;  // the sum over the pixels that either picture covers

@@ -49,7 +49,7 @@ Poster make_poster(const NestedScales& scales, const std::vector<Material>& mate
                        shown.textures.size()};
   };
   const RenderScene scene = scene_of(scales.scales.front());
-  const RenderCamera camera = poster::poster_camera(scene, scene_of(coarse_scale(scales)), inner);
+  const RenderCamera camera = poster_camera(scene, scene_of(coarse_scale(scales)), inner);
   const RenderEnvironment environment = studio_environment();
   for (std::uint32_t side_px = wanted_px;; side_px /= 2) {
     context.check_cancelled();

@@ -4,7 +4,7 @@
 
 #include "format/base/portable_math.h"
 
-namespace texmesh::poster {
+namespace texmesh {
 namespace {
 
 constexpr double kMargin = 0.04;  // of the picture's side
@@ -116,4 +116,4 @@ RenderCamera poster_camera(const RenderScene& scene, const RenderScene& coarse, 
   return best;
 }
 
-}  // namespace texmesh::poster
+}  // namespace texmesh

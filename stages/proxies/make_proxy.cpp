@@ -2,7 +2,7 @@
 
 #include "format/base/portable_math.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 namespace {
 
 constexpr double kJsonBytes = 1900;  // about, of a GLB with one material
@@ -217,4 +217,4 @@ bool is_smooth(const Mesh& mesh) {
   return all > 0 && turning >= all / 2;
 }
 
-}  // namespace texmesh::proxies
+}  // namespace texmesh

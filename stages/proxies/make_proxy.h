@@ -5,7 +5,7 @@
 #include "stages/proxies/coding/proxy_pictures.h"
 #include "stages/proxies/picture_losses.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 
 /// What a proxy is made of. Fitted, see first_form() and best_of() in proxies.cpp.
 struct ProxyForm {
@@ -76,4 +76,4 @@ std::optional<double> texel_bits_of(const MadeProxy& made);
 /// Whether vertices' normals turn within triangles on at least half of the area: a surface without facets.
 bool is_smooth(const Mesh& mesh);
 
-}  // namespace texmesh::proxies
+}  // namespace texmesh

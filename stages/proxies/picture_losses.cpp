@@ -4,7 +4,7 @@
 #include "stages/geometry/scale_frames.h"
 #include "stages/image/webp.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 namespace {
 
 constexpr int kViews = 4;
@@ -205,4 +205,4 @@ bool CompetingScales::likeliest_wins(std::uint64_t bytes, double flip, const Run
   return !all.empty() && flip_of(all.front(), flip, context) <= flip;
 }
 
-}  // namespace texmesh::proxies
+}  // namespace texmesh

@@ -10,7 +10,7 @@
 #include "stages/render/shade.h"
 #include "stages/render/shown_materials.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 
 /// A mesh with materials and textures of its own.
 struct ShownModel {
@@ -81,4 +81,4 @@ double whole_mesh_bytes(const NestedScales& scales);
 /// for longer.
 bool whole_mesh_is_small(const NestedScales& scales, std::uint64_t bytes);
 
-}  // namespace texmesh::proxies
+}  // namespace texmesh

@@ -2,7 +2,7 @@
 
 #include "stages/data/stage.h"
 
-namespace texmesh::quality {
+namespace texmesh {
 namespace {
 
 /// Of what views show of the object, on average: more say hardly more.
@@ -49,7 +49,7 @@ Bands choose_bands(const ShownRows& view, std::uint32_t side_px, double pixels) 
   const std::uint32_t begin = (shown.first + shown.end - kBandTiles) / 2 % cycle;
   Bands out;
   for (std::uint32_t t = 0; t < tiles; ++t) out.rendered.push_back((t + cycle - begin) % cycle < kBandTiles);
-  constexpr std::uint32_t kReach = measure::kFilterReach;
+  constexpr std::uint32_t kReach = kFilterReach;
   for (std::uint32_t y = 0; y < side_px; ++y) {
     const std::uint32_t first = y - std::min(y, kReach), last = std::min(y + kReach, side_px - 1);
     out.compared.push_back(out.rendered[first / kBandPx] && out.rendered[last / kBandPx]);
@@ -111,10 +111,10 @@ ShownRows shown_rows(const Visibility& view) {
   return out;
 }
 
-Seen look_around(const RenderScene& scene, const Frame& frame, const TextureSizes& sizes, int views,
+Seen look_around(const RenderScene& scene, const PictureFrame& frame, const TextureSizes& sizes, int views,
                  double largest_px, const RunContext& context) {
   Seen seen;
-  LevelCount levels(sizes.size());
+  WantedMips levels(sizes.size());
   for (int v = 0; v < views; ++v) {
     context.check_cancelled();
     const PicturePlace place = place_picture(frame, v, views, kLookedAtPx);
@@ -146,7 +146,7 @@ ViewChoice choose_views(int views, int large_views) {
   return out;
 }
 
-PicturePlace place_picture(const Frame& frame, int view, int views, double displayed_px) {
+PicturePlace place_picture(const PictureFrame& frame, int view, int views, double displayed_px) {
   constexpr double kLargestSide = 8192;
   PicturePlace out{perspective_camera(camera_of(view, views, frame.sphere.centre, frame.sphere.radius)), 0};
   const double distance = length(out.camera.eye - frame.sphere.centre);
@@ -166,7 +166,7 @@ Coverage frame_object(const RenderScene& scene, const TextureSizes& sizes, doubl
   Seen seen = look_around(scene, out.frame, sizes, views, largest_px, context);
   if (static_cast<double>(seen.pixels) < kLeastCovered * static_cast<double>(seen.of)) {
     const BoundingSphere crowd = crowd_sphere(*scene.mesh, out.frame.sphere);
-    const Frame closer{crowd, 2 * crowd.radius};
+    const PictureFrame closer{crowd, 2 * crowd.radius};
     if (crowd.radius < out.frame.sphere.radius) {
       Seen more = look_around(scene, closer, sizes, views, largest_px, context);
       if (more.pixels > seen.pixels) {
@@ -185,4 +185,4 @@ Coverage frame_object(const RenderScene& scene, const TextureSizes& sizes, doubl
   return out;
 }
 
-}  // namespace texmesh::quality
+}  // namespace texmesh

@@ -5,7 +5,7 @@
 #include "stages/measure/picture.h"
 #include "stages/quality/textures.h"
 
-namespace texmesh::quality {
+namespace texmesh {
 
 /// Where a view shows S_0.
 struct ShownRows {
@@ -27,7 +27,7 @@ struct Bands {
 Bands choose_bands(const ShownRows& view, std::uint32_t side_px, double pixels);
 
 /// The sphere that all pictures frame, and the extent whose length on screen is the displayed height.
-struct Frame {
+struct PictureFrame {
   BoundingSphere sphere;
   double extent = 0;
 };
@@ -47,7 +47,7 @@ struct PicturePlace {
   std::uint32_t side_px = 0;
 };
 /// The whole frame, at exactly that displayed height.
-PicturePlace place_picture(const Frame& frame, int view, int views, double displayed_px);
+PicturePlace place_picture(const PictureFrame& frame, int view, int views, double displayed_px);
 
 using TextureSizes = std::vector<Vec2<std::uint32_t>>;  // per shown texture, px
 
@@ -55,7 +55,7 @@ inline constexpr double kLookedAtPx = 192;  // displayed height at which the cov
 
 /// What the views show of S_0.
 struct Coverage {
-  Frame frame;
+  PictureFrame frame;
   std::uint64_t pixels = 0;                 // of all views, at kLookedAtPx
   std::vector<ShownRows> rows;              // by view
   std::vector<std::uint32_t> first_levels;  // per shown texture, the finest mip that pictures ask for
@@ -66,4 +66,4 @@ struct Coverage {
 Coverage frame_object(const RenderScene& scene, const TextureSizes& sizes, double extent, int views,
                       double largest_px, Notes& notes, const RunContext& context);
 
-}  // namespace texmesh::quality
+}  // namespace texmesh

@@ -2,7 +2,7 @@
 
 #include "stages/base/parallel.h"
 
-namespace texmesh::quality {
+namespace texmesh {
 
 namespace {
 
@@ -36,7 +36,7 @@ std::vector<SizePictures::ScaleShots> SizePictures::by_scale(const std::vector<S
 
 /// One picture per list of materials.
 PictureVariants SizePictures::pictures(std::size_t scale, const PictureView& at,
-                                       const std::vector<const Materials*>& materials,
+                                       const std::vector<const ShotMaterials*>& materials,
                                        const RunContext& context) {
   const std::size_t shown = shown_scale(studio_.scenes, scale, displayed_px_);
   RenderScene scene = studio_.scenes[shown];
@@ -55,7 +55,7 @@ PictureVariants SizePictures::pictures(std::size_t scale, const PictureView& at,
 }
 
 Loss SizePictures::compare(const Reference& reference, const Picture& test) const {
-  const measure::PixelSpans spans = measure::shown_spans(test);
+  const PixelSpans spans = shown_spans(test);
   Loss loss{compare_flip(reference.flip, prepare_flip(test, spans)), 0};
   if (with_ssim_) {
     const PictureDifference d = compare_luma(reference.luma, prepare_luma(test, spans));
@@ -78,7 +78,7 @@ void SizePictures::compare_view(std::size_t view, const std::vector<Shot>& shots
     at.bands.cut(to);
   };
   const auto compare_group = [&](const ScaleShots& group, const Reference* seen, const RunContext& run) {
-    std::vector<const Materials*> materials;
+    std::vector<const ShotMaterials*> materials;
     if (!seen) materials.push_back(&source_);
     for (const std::size_t i : group.shots) materials.push_back(shots[i].materials);
     if (materials.empty()) return;
@@ -125,7 +125,7 @@ std::vector<Losses> SizePictures::take(const std::vector<Shot>& shots, const Run
   return out;
 }
 
-bool FlipLimits::hold(const Loss& loss) const {
+bool ShotLimits::hold(const Loss& loss) const {
   constexpr double kPart = 0.95;
   return loss.flip.mean() <= mean && loss.flip.percentile(kPart) <= p95;
 }
@@ -152,4 +152,4 @@ Loss pooled(const Losses& losses, const Losses& like) {
   return sum;
 }
 
-}  // namespace texmesh::quality
+}  // namespace texmesh

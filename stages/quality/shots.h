@@ -8,13 +8,13 @@
 #include "stages/quality/framing.h"
 #include "stages/render/shade.h"
 
-namespace texmesh::quality {
+namespace texmesh {
 
-using Materials = std::vector<RenderMaterial>;
+using ShotMaterials = std::vector<RenderMaterial>;
 
 /// What all pictures share.
 struct Studio {
-  Frame frame;
+  PictureFrame frame;
   ViewChoice views;
   std::vector<ShownRows> rows;  // by view
   double pixels_of_unit = 0;    // that views show on average at a displayed height of 1 px
@@ -36,7 +36,7 @@ struct Loss {
 };
 
 /// Up to which a view looks like S_0.
-struct FlipLimits {
+struct ShotLimits {
   double mean = 0, p95 = 0;
   bool hold(const Loss& loss) const;
 };
@@ -44,9 +44,9 @@ struct FlipLimits {
 /// A scale with materials, whose slots count the studio's textures.
 struct Shot {
   std::size_t scale = 0;  // index into Studio::scenes
-  const Materials* materials = nullptr;
+  const ShotMaterials* materials = nullptr;
   ViewPart views = ViewPart::kAll;
-  std::optional<FlipLimits> ends_beyond = std::nullopt;  // views behind the first such one are left out
+  std::optional<ShotLimits> ends_beyond = std::nullopt;  // views behind the first such one are left out
 };
 /// Per view; nothing where the shot was not taken.
 using Losses = std::vector<Loss>;
@@ -58,7 +58,7 @@ class SizePictures {
  public:
   /// `with_ssim`: else dssim stays 0. `studio` and `source` must outlive the pictures; the studio's textures
   /// may change between shots, but for those that `source` reads.
-  SizePictures(const Studio& studio, const Materials& source, double displayed_px, bool with_ssim)
+  SizePictures(const Studio& studio, const ShotMaterials& source, double displayed_px, bool with_ssim)
       : studio_(studio), source_(source), displayed_px_(displayed_px), with_ssim_(with_ssim) {}
   std::vector<Losses> take(const std::vector<Shot>& shots, const RunContext& context);
 
@@ -81,12 +81,12 @@ class SizePictures {
     Bands bands;
   };
   PictureVariants pictures(std::size_t scale, const PictureView& at,
-                           const std::vector<const Materials*>& materials, const RunContext& context);
+                           const std::vector<const ShotMaterials*>& materials, const RunContext& context);
   Loss compare(const Reference& reference, const Picture& test) const;
   void compare_view(std::size_t view, const std::vector<Shot>& shots, const std::vector<std::size_t>& taken,
                     std::vector<Losses>& out, const RunContext& context);
   const Studio& studio_;
-  const Materials& source_;
+  const ShotMaterials& source_;
   double displayed_px_;
   bool with_ssim_;
   std::map<std::size_t, Reference> seen_;  // by view
@@ -98,4 +98,4 @@ class SizePictures {
 Loss pooled(const Losses& losses);
 Loss pooled(const Losses& losses, const Losses& like);
 
-}  // namespace texmesh::quality
+}  // namespace texmesh

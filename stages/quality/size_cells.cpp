@@ -4,7 +4,7 @@
 
 #include "format/rules/mip_choice.h"
 
-namespace texmesh::quality {
+namespace texmesh {
 namespace {
 
 /// Of the least size, and of all where nothing follows from it.
@@ -22,7 +22,7 @@ std::size_t fewer_heights(const TextureSampler& sampler, std::size_t triangles, 
   constexpr double kLeastEnlargedPx = 128;  // below, a half height hardly costs anything
   constexpr double kTrianglePixels = 16, kSeenArea = 0.25, kSeenTriangles = 0.5;
   std::size_t fewer = 0;
-  while (fewer + 1 < kSizes) {
+  while (fewer + 1 < kTextureSizes) {
     const double px = std::ldexp(options.largest_px, -static_cast<int>(fewer + 1));
     const double per_unit = px / object_height;
     const double pixels = kSeenArea * sampler.surface_area * per_unit * per_unit;
@@ -69,8 +69,8 @@ constexpr double kHigh = 0.95;  // the percentile
 /// Which textures stand for the source's: per shown texture an index into the studio's, -1 = the source's.
 using Replaced = std::vector<std::int32_t>;
 
-Materials materials_with(const Materials& source, const Replaced& replaced) {
-  Materials out = source;
+ShotMaterials materials_with(const ShotMaterials& source, const Replaced& replaced) {
+  ShotMaterials out = source;
   for (RenderMaterial& m : out)
     for (TextureSlot& slot : m.textures)
       if (slot.texture >= 0 && replaced[static_cast<std::size_t>(slot.texture)] >= 0)
@@ -116,7 +116,7 @@ class SizeShots {
   }
 
   /// A scale with the source's texels, all read with mips.
-  void take_scale(std::size_t scale, Losses& to, ViewPart views, const std::optional<FlipLimits>& limits) {
+  void take_scale(std::size_t scale, Losses& to, ViewPart views, const std::optional<ShotLimits>& limits) {
     scale_shots_.push_back({scale, &sampler_.shown.materials, views, limits});
     scales_.push_back(&to);
   }
@@ -208,7 +208,7 @@ class SizeShots {
     }
   }
   /// Those that are not there. Returns their bytes.
-  std::size_t make_textures(const Materials& materials) {
+  std::size_t make_textures(const ShotMaterials& materials) {
     std::size_t bytes = 0;
     for (const RenderMaterial& m : materials)
       for (const TextureSlot& slot : m.textures) {
@@ -231,7 +231,7 @@ class SizeShots {
   std::size_t source_;
   std::vector<TextureMaker> makers_;  // of the studio's textures behind the source's
   std::map<MipShown, std::int32_t> uncoded_;
-  std::deque<Materials> materials_;
+  std::deque<ShotMaterials> materials_;
   std::vector<Taken> taken_;
   std::vector<std::pair<const Losses*, Losses*>> repeated_;
   std::vector<Shot> shots_, scale_shots_;
@@ -349,7 +349,7 @@ void render_size(const TextureSampler& sampler, const SizeTask& task, Studio& st
       if (repeats(group.knots[k], group.knots[k - 1])) group.coded[k] = group.coded[k - 1];
 }
 
-PictureLosses losses_of(const Cells& cells, const SmallerSize* smaller) {
+PictureLosses losses_of(const LossCells& cells, const SmallerSize* smaller) {
   constexpr double kNothing = 1e-5;  // curves of logarithms do not reach 0
   PictureLosses out;
   for (std::size_t kind = 0; kind < kKinds; ++kind) {
@@ -377,4 +377,4 @@ PictureLosses losses_of(const Cells& cells, const SmallerSize* smaller) {
   return out;
 }
 
-}  // namespace texmesh::quality
+}  // namespace texmesh

@@ -10,10 +10,10 @@
 #include "stages/quality/shots.h"
 #include "stages/quality/textures.h"
 
-namespace texmesh::quality {
+namespace texmesh {
 
 /// What pictures of one list lose; an element without losses was not rendered.
-using Cells = std::vector<Losses>;
+using LossCells = std::vector<Losses>;
 
 /// How all groups are shown together: at their last knot, in the coarsest mips, by previews.
 enum class Together : std::uint8_t { kCoded, kCoarser, kPreview };
@@ -27,15 +27,15 @@ struct GroupCells {
   std::vector<Knot> knots;
   double texel_level = 0;  // texel_level() of the planes
   std::vector<ShownMip> mips;
-  Cells coded;    // per knot
-  Cells preview;  // one
-  Cells finer;    // 0, 1, 2 .. levels
-  Cells coarser;  // 1, 2 .. levels
+  LossCells coded;    // per knot
+  LossCells preview;  // one
+  LossCells finer;    // 0, 1, 2 .. levels
+  LossCells coarser;  // 1, 2 .. levels
 };
 
 struct SizeCells {
   double displayed_px = 0;
-  Cells geometry;  // per kept scale; S_0 stays empty
+  LossCells geometry;  // per kept scale; S_0 stays empty
   std::vector<GroupCells> groups;
   std::vector<TogetherCell> together;
 };
@@ -55,7 +55,7 @@ struct TextureSampler {
 struct SizeTask {
   /// Per kept scale: the views in which it is rendered with the source's texels. S_0 is not.
   std::vector<std::optional<ViewPart>> scales;
-  std::optional<FlipLimits> ends_beyond;  // scales: of no more use behind the first view that is beyond
+  std::optional<ShotLimits> ends_beyond;  // scales: of no more use behind the first view that is beyond
   std::optional<std::size_t>
       rank;  // of the table's sizes, 0 = the least: textures are rendered as quality.h says
 };
@@ -65,7 +65,7 @@ void render_size(const TextureSampler& sampler, const SizeTask& task, Studio& st
 
 /// Losses of a list of cells at the size below, and what they say of cells that were not rendered.
 struct SmallerSize {
-  const Cells& cells;
+  const LossCells& cells;
   const PictureLosses& measured;  // losses_of() them
   PictureLosses losses;           // per cell of the larger size: what the smaller one would have
   bool first_follows = false;     // the first cell is as at the smaller size, where it was not rendered
@@ -73,13 +73,13 @@ struct SmallerSize {
 /// Losses of a list of cells. Those with fewer views than at the size below are corrected by what these views
 /// were there beside the cell's losses. Those that were not rendered follow by the ratio of rendered
 /// neighbours.
-PictureLosses losses_of(const Cells& cells, const SmallerSize* smaller);
+PictureLosses losses_of(const LossCells& cells, const SmallerSize* smaller);
 
-inline constexpr std::size_t kSizes = 3;  // that show textures
+inline constexpr std::size_t kTextureSizes = 3;  // that show textures
 
-/// How often the largest height is halved for pictures of textures, below kSizes. Beyond the height at which
-/// texels are as large as pixels and triangles as large as 16 pixels, pictures are enlarged ones: what they
-/// lose follows (enlarge()). `triangles` of the finest scale.
+/// How often the largest height is halved for pictures of textures, below kTextureSizes. Beyond the height at
+/// which texels are as large as pixels and triangles as large as 16 pixels, pictures are enlarged ones: what
+/// they lose follows (enlarge()). `triangles` of the finest scale.
 std::size_t fewer_heights(const TextureSampler& sampler, std::size_t triangles, double object_height,
                           const QualityOptions& options);
 
@@ -105,4 +105,4 @@ struct MipSamples {
 MipSamples mip_samples(const TextureSampler& sampler, std::size_t rank, const Display& display,
                        const PlanesOfGroup& group);
 
-}  // namespace texmesh::quality
+}  // namespace texmesh

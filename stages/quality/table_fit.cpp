@@ -3,7 +3,7 @@
 #include "format/base/portable_math.h"
 #include "format/rules/picture_prediction.h"
 
-namespace texmesh::quality {
+namespace texmesh {
 namespace {
 
 constexpr float kLeastDssim = 1e-6f;  // of the one knot of textures that lose nothing
@@ -261,4 +261,4 @@ void fit_exponent(const std::vector<TogetherLoss>& samples, QualityTable& table)
   }
 }
 
-}  // namespace texmesh::quality
+}  // namespace texmesh

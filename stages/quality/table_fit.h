@@ -18,7 +18,7 @@
 // equal tables.
 #include "stages/quality/size_cells.h"
 
-namespace texmesh::quality {
+namespace texmesh {
 
 /// What the pictures of one group and size lose.
 struct GroupPictures {
@@ -61,4 +61,4 @@ struct TogetherLoss {
 /// error. 1 and 0 without samples.
 void fit_exponent(const std::vector<TogetherLoss>& samples, QualityTable& table);
 
-}  // namespace texmesh::quality
+}  // namespace texmesh

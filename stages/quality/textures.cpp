@@ -12,7 +12,7 @@
 #include "stages/image/decode_image.h"
 #include "stages/jpeg/jpeg.h"
 
-namespace texmesh::quality {
+namespace texmesh {
 namespace {
 
 /// The full-size plane of an image; `alpha` = that of its alpha channel.
@@ -91,7 +91,7 @@ ShownTextures find_shown(const std::vector<Material>& materials, const Fragments
 }
 
 // By areas: the renderer goes by the longer side of a pixel's footprint, so it never asks for a finer mip.
-void LevelCount::add(const RenderScene& scene, const Visibility& view,
+void WantedMips::add(const RenderScene& scene, const Visibility& view,
                      const std::vector<Vec2<std::uint32_t>>& sizes, double magnification) {
   for (const RenderFragment& fragment : view.fragments) {
     const Triangle& triangle = (*scene.triangles)[fragment.triangle];
@@ -108,7 +108,7 @@ void LevelCount::add(const RenderScene& scene, const Visibility& view,
   }
 }
 
-std::vector<std::uint32_t> LevelCount::first_levels() const {
+std::vector<std::uint32_t> WantedMips::first_levels() const {
   std::vector<std::uint32_t> first(wanted_.size(), 0);
   for (std::size_t t = 0; t < first.size(); ++t) {
     std::uint64_t total = 0, finer = 0;
@@ -440,4 +440,4 @@ std::optional<RenderTexture> preview_at(const TextureData& data, const ShownText
   return preview_texture(data, shown, context);
 }
 
-}  // namespace texmesh::quality
+}  // namespace texmesh

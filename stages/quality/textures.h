@@ -11,7 +11,7 @@
 #include "stages/data/previews.h"
 #include "stages/render/render_texture.h"
 
-namespace texmesh::quality {
+namespace texmesh {
 
 inline constexpr std::uint32_t kMaxFirstLevel = 4;  // fragments' sides are multiples of 16
 
@@ -36,9 +36,9 @@ ShownTextures find_shown(const std::vector<Material>& materials, const Fragments
                          const Mesh& mesh);
 
 /// Per shown texture, the finest mip that more than 2 % of its fragments in pictures ask for.
-class LevelCount {
+class WantedMips {
  public:
-  explicit LevelCount(std::size_t textures) : wanted_(textures) {}
+  explicit WantedMips(std::size_t textures) : wanted_(textures) {}
   /// A view of S_0 that stands for one so many times as large. `sizes`: width and height of each texture, px.
   void add(const RenderScene& scene, const Visibility& view, const std::vector<Vec2<std::uint32_t>>& sizes,
            double magnification);
@@ -143,4 +143,4 @@ TextureMaker texture_at(const TextureData& data, const ShownTexture& shown, cons
 std::optional<RenderTexture> preview_at(const TextureData& data, const ShownTexture& shown,
                                         const PlanesOfGroup& group, const RunContext& context);
 
-}  // namespace texmesh::quality
+}  // namespace texmesh

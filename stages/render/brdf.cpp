@@ -1,10 +1,10 @@
 #include "stages/render/brdf.h"
 
-namespace texmesh::render {
+namespace texmesh {
 namespace {
 
 Vec3f mixed(Vec3f a, Vec3f b, float part) { return a + (b - a) * part; }
-Vec3f f0_of(const Surface& s) { return mixed({0.04f, 0.04f, 0.04f}, s.base_colour, s.metallic); }
+Vec3f f0_of(const LitSurface& s) { return mixed({0.04f, 0.04f, 0.04f}, s.base_colour, s.metallic); }
 
 /// Lagarde and de Rousiers 2014: occlusion of what comes from the direction of the mirror.
 float specular_occlusion(float n_dot_v, float occlusion, float roughness) {
@@ -16,9 +16,9 @@ float specular_occlusion(float n_dot_v, float occlusion, float roughness) {
 }
 
 /// Light of a unit of irradiance from one direction.
-Vec3f reflected_from_key(const Surface& s, const Lighting& lighting) {
+Vec3f reflected_from_key(const LitSurface& s, const Lighting& lighting) {
   if (lighting.n_dot_l == 0) return {};
-  const float lambert = (1 - s.metallic) / kPi;
+  const float lambert = (1 - s.metallic) / kFloatPi;
   const Vec3f f0 = f0_of(s);
   Vec3f out;
   for (int k = 0; k < 3; ++k) {
@@ -28,7 +28,7 @@ Vec3f reflected_from_key(const Surface& s, const Lighting& lighting) {
   return out;
 }
 
-void add_key(const Surface& s, Vec3f to_light, Vec3f to_viewer, Lighting& out) {
+void add_key(const LitSurface& s, Vec3f to_light, Vec3f to_viewer, Lighting& out) {
   out.n_dot_l = saturated(dot(s.normal, to_light));
   if (out.n_dot_l == 0) return;
   const Vec3f half = normalized(to_light + to_viewer);
@@ -41,7 +41,7 @@ void add_key(const Surface& s, Vec3f to_light, Vec3f to_viewer, Lighting& out) {
 
 /// Light from all around, with what a second and later reflection between microfacets adds (Fdez-Aguera
 /// 2019).
-Vec3f reflected_surroundings(const Surface& s, const Lighting& lighting) {
+Vec3f reflected_surroundings(const LitSurface& s, const Lighting& lighting) {
   const Vec3f f0 = f0_of(s);
   const Vec2f ab = lighting.split;
   Vec3f single, multiple;
@@ -71,13 +71,13 @@ Vec2f split_sum(float roughness, float n_dot_v) {
   return {z - 1.04f * a004, w + 1.04f * a004};
 }
 
-Vec3f reflected_by_brdf(const Surface& s, Vec3f to_light, Vec3f to_viewer) {
+Vec3f reflected_by_brdf(const LitSurface& s, Vec3f to_light, Vec3f to_viewer) {
   Lighting lighting;
   add_key(s, to_light, to_viewer, lighting);
   return reflected_from_key(s, lighting);
 }
 
-Lighting lighting_of(const Surface& s, Vec3f to_viewer, const RenderEnvironment& environment,
+Lighting lighting_of(const LitSurface& s, Vec3f to_viewer, const RenderEnvironment& environment,
                      const Lighting* same_normal) {
   Lighting out;
   add_key(s, environment.key.towards, to_viewer, out);
@@ -94,13 +94,13 @@ Lighting lighting_of(const Surface& s, Vec3f to_viewer, const RenderEnvironment&
   return out;
 }
 
-Vec3f radiance_of(const Surface& s, const Lighting& lighting, const RenderEnvironment& environment) {
+Vec3f radiance_of(const LitSurface& s, const Lighting& lighting, const RenderEnvironment& environment) {
   return product(reflected_from_key(s, lighting), environment.key.irradiance) +
          reflected_surroundings(s, lighting) + s.emission;
 }
 
-Vec3f radiance_towards(const Surface& surface, Vec3f to_viewer, const RenderEnvironment& environment) {
+Vec3f radiance_towards(const LitSurface& surface, Vec3f to_viewer, const RenderEnvironment& environment) {
   return radiance_of(surface, lighting_of(surface, to_viewer, environment, nullptr), environment);
 }
 
-}  // namespace texmesh::render
+}  // namespace texmesh

@@ -3,24 +3,24 @@
 #include "stages/render/environment.h"
 #include "stages/render/render_math.h"
 
-namespace texmesh::render {
+namespace texmesh {
 
 inline constexpr float kLeastRoughness = 0.0525f;  // three.js r170: what its prefiltered maps resolve
 
 /// A point of a surface, lit or not yet. Linear RGB; directions in world axes.
-struct Surface {
+struct LitSurface {
   Vec3f normal{0, 0, 1};  // unit, what a normal map makes of it
   Vec3f base_colour{1, 1, 1}, emission{0, 0, 0};
   float metallic = 0;
   float roughness = 1;  // kLeastRoughness..1
   float occlusion = 1;  // 1 = open to the environment
-  friend bool operator==(const Surface&, const Surface&) = default;
+  friend bool operator==(const LitSurface&, const LitSurface&) = default;
 };
 
 /// GGX distribution of half vectors; alpha = roughness^2.
 inline float ggx_distribution(float alpha, float n_dot_h) {
   const float a2 = alpha * alpha, d = n_dot_h * n_dot_h * (a2 - 1) + 1;
-  return a2 / (kPi * d * d);
+  return a2 / (kFloatPi * d * d);
 }
 /// Smith's height-correlated masking and shadowing, over 4 (n.l) (n.v).
 inline float smith_visibility(float alpha, float n_dot_l, float n_dot_v) {
@@ -38,7 +38,7 @@ inline float schlick_weight(float cosine) {
 Vec2f split_sum(float roughness, float n_dot_v);
 
 /// Reflected radiance for one direction of light, per irradiance on a surface that faces it: BRDF x (n.l).
-Vec3f reflected_by_brdf(const Surface& surface, Vec3f to_light, Vec3f to_viewer);
+Vec3f reflected_by_brdf(const LitSurface& surface, Vec3f to_light, Vec3f to_viewer);
 
 /// What reaches a viewer by a surface of that normal and roughness, whatever its colours.
 struct Lighting {
@@ -53,12 +53,12 @@ struct Lighting {
   float occluded = 1;   // what that leaves of glossy light
 };
 /// `same_normal`, where there is one, has been found with the same normal.
-Lighting lighting_of(const Surface& surface, Vec3f to_viewer, const RenderEnvironment& environment,
+Lighting lighting_of(const LitSurface& surface, Vec3f to_viewer, const RenderEnvironment& environment,
                      const Lighting* same_normal);
 /// radiance_towards() with the surface's lighting.
-Vec3f radiance_of(const Surface& surface, const Lighting& lighting, const RenderEnvironment& environment);
+Vec3f radiance_of(const LitSurface& surface, const Lighting& lighting, const RenderEnvironment& environment);
 
 /// Radiance that leaves a surface towards a unit direction: the key light, the environment and emission.
-Vec3f radiance_towards(const Surface& surface, Vec3f to_viewer, const RenderEnvironment& environment);
+Vec3f radiance_towards(const LitSurface& surface, Vec3f to_viewer, const RenderEnvironment& environment);
 
-}  // namespace texmesh::render
+}  // namespace texmesh

@@ -5,7 +5,7 @@
 
 #include "stages/render/visibility.h"
 
-namespace texmesh::render {
+namespace texmesh {
 
 /// Places of a picture in samples from its middle, x to the right and y down.
 struct SampleFrame {
@@ -22,7 +22,7 @@ inline Vec3d seen_from(const RenderCamera& camera, const SampleFrame& frame, Vec
 }
 
 /// value(x, y) = a x + b y + c
-struct Plane {
+struct EdgePlane {
   double a = 0, b = 0, c = 0;
   double at(double x, double y) const { return a * x + (b * y + c); }
 };
@@ -31,8 +31,8 @@ struct Plane {
 /// other, see it with exactly opposite numbers: every operation keeps its value when the signs change. So no
 /// sample falls between them.
 struct EdgePlanes {
-  std::array<Plane, 3> edge;  // opposite to corner k: its weight, but for a common factor
-  Plane nearness;             // 1 / w
+  std::array<EdgePlane, 3> edge;  // opposite to corner k: its weight, but for a common factor
+  EdgePlane nearness;             // 1 / w
   bool front = false;
   bool visible = false;  // has an area and is finite
 };
@@ -72,6 +72,6 @@ inline Vec2d mean_of_samples(std::uint16_t mask) {
 }
 
 /// Whether a sample just on the edge belongs to the triangle: of two neighbours to one.
-inline bool owns_edge(const Plane& edge) { return edge.a > 0 || (edge.a == 0 && edge.b > 0); }
+inline bool owns_edge(const EdgePlane& edge) { return edge.a > 0 || (edge.a == 0 && edge.b > 0); }
 
-}  // namespace texmesh::render
+}  // namespace texmesh

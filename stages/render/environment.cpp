@@ -66,8 +66,7 @@ Level make_level(std::uint32_t inner_side, const RunContext& context, F value_of
       auto place = [&](std::size_t at) {
         return (static_cast<float>(at) - 0.5f) * 2 / static_cast<float>(inner_side) - 1;
       };
-      const Vec3f value =
-          value_of(render::octahedral_direction({place(i % level.side), place(i / level.side)}));
+      const Vec3f value = value_of(octahedral_direction({place(i % level.side), place(i / level.side)}));
       level.texels[i] =
           padded({clamped(value.x, 0, 65504), clamped(value.y, 0, 65504), clamped(value.z, 0, 65504)});
     }
@@ -106,9 +105,8 @@ Vec3f filtered(const Level& radiance, const std::vector<LobeSample>& lobe, Vec3f
   const Vec3f y = cross(z, x);
   Quad sum{};
   for (const LobeSample& s : lobe)
-    sum +=
-        read_level(radiance, render::octahedral(x * s.direction.x + y * s.direction.y + z * s.direction.z)) *
-        s.weight;
+    sum += read_level(radiance, octahedral(x * s.direction.x + y * s.direction.y + z * s.direction.z)) *
+           s.weight;
   return colour_of(sum);
 }
 
@@ -191,9 +189,9 @@ Vec3f diffuse_light(const RenderEnvironment& environment, Vec3f normal) {
 }
 
 Vec3f specular_light(const RenderEnvironment& environment, Vec3f direction, float roughness) {
-  const float at = render::saturated(roughness) * static_cast<float>(environment.levels.size() - 1);
+  const float at = saturated(roughness) * static_cast<float>(environment.levels.size() - 1);
   const auto sharp = std::min(static_cast<std::size_t>(at), environment.levels.size() - 2);
-  const Vec2f place = render::octahedral(direction);
+  const Vec2f place = octahedral(direction);
   const Quad a = read_level(environment.levels[sharp], place),
              b = read_level(environment.levels[sharp + 1], place);
   return colour_of(a + (b - a) * (at - static_cast<float>(sharp)));
@@ -224,8 +222,8 @@ float lobe(Vec3f direction, Vec3f axis, float sharpness) {
 Vec3f studio_radiance(Vec3f direction) {
   const float up = clamped(direction.y, -1, 1);
   // The sky turns into the ground within about 20 degrees around the horizon.
-  const float t = render::saturated((up + 0.18f) / 0.36f), sky = t * t * (3 - 2 * t);
-  const float high = render::saturated(up);
+  const float t = saturated((up + 0.18f) / 0.36f), sky = t * t * (3 - 2 * t);
+  const float high = saturated(up);
   const Vec3f above = kHorizon + (kZenith - kHorizon) * high;
   Vec3f sum = kGround + (above - kGround) * sky;
   for (const SoftBox& box : kBoxes) sum = sum + box.peak * lobe(direction, box.direction, box.sharpness);

@@ -4,7 +4,7 @@
 
 #include "stages/render/shade.h"
 
-namespace texmesh::render {
+namespace texmesh {
 namespace {
 
 constexpr float kNone = 1e-20f;  // squares below this are no length
@@ -97,7 +97,7 @@ FragmentPlace FragmentShader::place_of(std::uint32_t pixel, const RenderFragment
 
   const EdgePlanes& planes = triangle.planes;
   double sum = 0, a = 0, b = 0;
-  for (const Plane& e : planes.edge) sum += e.at(x, y), a += e.a, b += e.b;
+  for (const EdgePlane& e : planes.edge) sum += e.at(x, y), a += e.a, b += e.b;
   const double step = kSamplesPerSide / sum;
   if (!std::isfinite(step)) return out;
   auto change = [&](std::size_t k) {
@@ -212,7 +212,7 @@ class FragmentShader::Fragment {
   /// Of the first variant that was lit.
   struct Known {
     Vec4f normal_texel;
-    Surface surface;
+    LitSurface surface;
     Lighting lighting;
     Vec3f linear;
   };
@@ -268,9 +268,9 @@ class FragmentShader::Fragment {
   }
 
   /// All but the normal.
-  Surface surface_of(const Reads& reads, Vec4f base) {
+  LitSurface surface_of(const Reads& reads, Vec4f base) {
     const RenderMaterial& material = *prepared_.material;
-    Surface out;
+    LitSurface out;
     out.base_colour = xyz(base);
     out.metallic = material.metallic;
     out.roughness = material.roughness;
@@ -296,7 +296,7 @@ class FragmentShader::Fragment {
   Vec3f lit(const Reads& reads, Vec4f base) {
     const bool first = !has_known_;
     if (first) normal_ = shader_.interpolated_normal(place_, geometry_roughness_);
-    Surface surface = surface_of(reads, base);
+    LitSurface surface = surface_of(reads, base);
     const Vec4f normal_texel =
         has(reads, TextureUse::kNormal) ? texel(reads, TextureUse::kNormal) : Vec4f{0, 0, 0, -1};
     const bool same_normal = !first && normal_texel == known_.normal_texel;
@@ -343,4 +343,4 @@ void FragmentShader::colours_of(std::uint32_t pixel, const RenderFragment& fragm
   }
 }
 
-}  // namespace texmesh::render
+}  // namespace texmesh

@@ -8,7 +8,7 @@
 #include "stages/render/edge_planes.h"
 #include "stages/render/render_texture.h"
 
-namespace texmesh::render {
+namespace texmesh {
 
 /// What all fragments of a triangle have in common.
 struct TriangleInView {
@@ -106,4 +106,4 @@ class FragmentShader {
   std::vector<Prepared> materials_;
 };
 
-}  // namespace texmesh::render
+}  // namespace texmesh

@@ -4,9 +4,9 @@
 #include "format/base/vec.h"
 #include "stages/base/float_math.h"
 
-namespace texmesh::render {
+namespace texmesh {
 
-inline constexpr float kPi = 3.14159265358979323846f;
+inline constexpr float kFloatPi = 3.14159265358979323846f;
 
 /// 0..1; NaN becomes 0.
 inline float saturated(float x) { return clamped(x, 0, 1); }
@@ -75,4 +75,4 @@ inline const SrgbEncoder& srgb_encoder() {
   return encoder;
 }
 
-}  // namespace texmesh::render
+}  // namespace texmesh

@@ -43,7 +43,7 @@ Pixels next_level(const Pixels& fine, bool srgb, const RunContext& context) {
   const std::size_t n = fine.channels;
   const std::size_t colours = !srgb ? 0 : n % 2 == 0 ? n - 1 : n;  // alpha stays a plain number
   const bool even = fine.width_px == 2 * out.width_px && fine.height_px == 2 * out.height_px;
-  const render::SrgbEncoder& encode = render::srgb_encoder();
+  const SrgbEncoder& encode = srgb_encoder();
   const auto& light = light_of_bytes();
   parallel_for(context, out.height_px, 64, [&](std::size_t begin, std::size_t end) {
     for (std::size_t y = begin; y < end; ++y) {
@@ -119,7 +119,7 @@ using Place = TextureSite::Place;
 float folded(float u, Wrap wrap) {
   constexpr float kMost = 1e6f;
   if (!(u >= -kMost && u <= kMost)) return 0;
-  if (wrap == Wrap::kClamp) return render::saturated(u);
+  if (wrap == Wrap::kClamp) return saturated(u);
   if (wrap == Wrap::kRepeat) return u - static_cast<float>(floor_of(u));
   const float t = u - 2 * static_cast<float>(floor_of(u * 0.5f));
   return t > 1 ? 2 - t : t;

@@ -134,12 +134,6 @@ RenderMaterial render_material(const Material& material,
 
 namespace {
 
-using render::kTilePx;
-using render::kTileSamples;
-using render::SampleBox;
-using render::TileFragments;
-using render::TileInput;
-
 constexpr std::uint32_t kMostSide = 8192;
 
 void require(bool held, const char* what) {
@@ -205,20 +199,20 @@ Bins sorted_into_tiles(const std::vector<SampleBox>& boxes, std::uint32_t tiles,
 
 TileInput tile_input(const RenderScene& scene, const RenderCamera& camera, std::uint32_t side_px,
                      const RunContext& context) {
-  TileInput input{&scene, render::SampleFrame(camera, side_px), camera.near, side_px, {}, {}, true};
+  TileInput input{&scene, SampleFrame(camera, side_px), camera.near, side_px, {}, {}, true};
   input.seen.resize(scene.mesh->positions.size());
   parallel_for(context, input.seen.size(), 4096, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i)
-      input.seen[i] = render::seen_from(camera, input.frame, scene.mesh->positions[i]);
+      input.seen[i] = seen_from(camera, input.frame, scene.mesh->positions[i]);
   });
   input.boxes.resize(scene.triangles->size());
   parallel_for(context, input.boxes.size(), 4096, [&](std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t) {
       const auto triangle = static_cast<std::uint32_t>(t);
       const std::array<Vec3d, 3> corners = input.corners_of(triangle);
-      const render::EdgePlanes planes = render::edge_planes(corners);
+      const EdgePlanes planes = edge_planes(corners);
       if (planes.visible && (planes.front || scene.material_of(triangle).double_sided))
-        input.boxes[t] = render::sample_box(corners, input.frame, camera.near);
+        input.boxes[t] = sample_box(corners, input.frame, camera.near);
     }
   });
   return input;
@@ -234,9 +228,8 @@ std::vector<TileFragments> look_into_tiles(const RenderScene& scene, const Rende
   parallel_for(context, parts.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const auto tile = static_cast<std::uint32_t>(i);
-      parts[i] =
-          render::look_into_tile(input, tile % tiles, tile / tiles,
-                                 {bins.triangles.data() + bins.first[i], bins.first[i + 1] - bins.first[i]});
+      parts[i] = look_into_tile(input, tile % tiles, tile / tiles,
+                                {bins.triangles.data() + bins.first[i], bins.first[i + 1] - bins.first[i]});
     }
   });
   return parts;

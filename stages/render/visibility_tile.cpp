@@ -9,7 +9,7 @@
 #include <emmintrin.h>
 #endif
 
-namespace texmesh::render {
+namespace texmesh {
 namespace {
 
 constexpr std::uint32_t kTilePixels = kTilePx * kTilePx;
@@ -98,7 +98,7 @@ class TileTriangle {
       offset[k] = _mm_set1_pd(row[k]);
       owned[k] = owns_edge(planes_.edge[k]) ? _mm_cmpeq_pd(none, none) : none;
     }
-    const Plane& plane = planes_.nearness;
+    const EdgePlane& plane = planes_.nearness;
     const __m128d near_slope = _mm_set1_pd(plane.a), near_offset = _mm_set1_pd(plane.b * (y_ + y) + plane.c),
                   low = _mm_set1_pd(nearest_), high = _mm_set1_pd(farthest_);
     for (__m128d column = _mm_set_pd(x + 1, x); x <= last; x += 2, column = _mm_add_pd(column, two)) {
@@ -358,4 +358,4 @@ TileFragments look_into_tile(const TileInput& input, std::uint32_t tile_x, std::
   return tile.finish();
 }
 
-}  // namespace texmesh::render
+}  // namespace texmesh

@@ -6,7 +6,7 @@
 
 #include "stages/render/edge_planes.h"
 
-namespace texmesh::render {
+namespace texmesh {
 
 inline constexpr std::uint32_t kTilePx = 32;
 inline constexpr std::uint32_t kTileSamples = kTilePx * kSamplesPerSide;
@@ -42,4 +42,4 @@ struct TileFragments {
 TileFragments look_into_tile(const TileInput& input, std::uint32_t tile_x, std::uint32_t tile_y,
                              std::span<const std::uint32_t> triangles);
 
-}  // namespace texmesh::render
+}  // namespace texmesh

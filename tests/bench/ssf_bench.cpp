@@ -83,9 +83,9 @@ double processor_seconds() {
 }
 
 ConditionedMesh made_scan(int triangles, const RunContext& context) {
-  examples::ScanOptions options;
+  ScanOptions options;
   options.triangles = triangles;
-  const examples::ScanMesh scan = make_scan_mesh(examples::ScanShape(1), options);
+  const ScanMesh scan = make_scan_mesh(ScanShape(1), options);
   return condition_mesh(scan.mesh, true, {}, context);
 }
 

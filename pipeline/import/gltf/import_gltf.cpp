@@ -11,7 +11,6 @@
 #include "pipeline/import/text_scan.h"
 
 namespace texmesh {
-namespace gltf {
 namespace {
 
 constexpr std::size_t kMaxParts = 65535;          // Mesh::triangle_part is 16 bits wide
@@ -299,8 +298,8 @@ class GltfReader {
   const About& about() const { return about_; }
 
  private:
-  Json look(const Container& container, About& about) const {
-    Json document = parse_json(source_, container.json);
+  GltfJson look(const Container& container, About& about) const {
+    GltfJson document = parse_gltf_json(source_, container.json);
     about = about_from_gltf(document, container.is_glb ? "glb" : "gltf", source_.notes);
     look_through(source_, document);
     return document;
@@ -314,7 +313,7 @@ class GltfReader {
   const Source& source_;
   const Container container_;
   About about_;
-  const Json document_;
+  const GltfJson document_;
   const tinygltf::Model structure_;
   Buffers buffers_;
   Model& model_;
@@ -335,7 +334,7 @@ void GltfReader::check_document() const {
   if (!asset.minVersion.empty() && asset.minVersion != "2.0")
     source_.fail("/asset/minVersion", "2.0", quote(asset.minVersion));
   const auto each_unknown = [&](const std::string& list, auto&& tell) {
-    const Json names = document_.value(list, Json::array());
+    const GltfJson names = document_.value(list, GltfJson::array());
     for (std::size_t i = 0; i < names.size(); ++i)
       if (const std::string name = names[i]; !is_supported(name))
         tell("/" + list + "/" + std::to_string(i), name);
@@ -343,7 +342,7 @@ void GltfReader::check_document() const {
   each_unknown("extensionsRequired", [&](const std::string& place, const std::string& name) {
     source_.fail(place, "an extension that texmesh reads", quote(name));
   });
-  const Json images = document_.value("images", Json::array());
+  const GltfJson images = document_.value("images", GltfJson::array());
   for (std::size_t i = 0; i < images.size(); ++i)
     if (images[i].contains("uri") == images[i].contains("bufferView"))
       source_.fail("/images/" + std::to_string(i), "either \"uri\" or \"bufferView\"",
@@ -460,16 +459,15 @@ ImportedModel read_gltf(const std::string& file_name, ByteSpan bytes, Resolver& 
 }
 
 }  // namespace
-}  // namespace gltf
 
 ImportedModel import_gltf(const std::string& file_name, std::span<const std::uint8_t> bytes,
                           Resolver& resolver, const ImportOptions& options, const RunContext& context) {
-  return gltf::read_gltf(file_name, bytes, resolver, options, context, kLargestCoordinate);
+  return read_gltf(file_name, bytes, resolver, options, context, kLargestCoordinate);
 }
 
 ImportedModel import_package_glb(const std::string& file_name, std::span<const std::uint8_t> bytes,
                                  Resolver& resolver, const RunContext& context) {
-  return gltf::read_gltf(file_name, bytes, resolver, {}, context, kLargestPackedCoordinate);
+  return read_gltf(file_name, bytes, resolver, {}, context, kLargestPackedCoordinate);
 }
 
 }  // namespace texmesh

@@ -7,7 +7,7 @@
 
 #include "stages/geometry/mesh_topology.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 namespace {
 
 struct BorderSegment {
@@ -115,4 +115,4 @@ Vec2d smallest_box_side(std::vector<Vec2d> points) {
   return best;
 }
 
-}  // namespace texmesh::proxies
+}  // namespace texmesh

@@ -6,7 +6,7 @@
 
 #include "format/base/vec.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 
 /// Two unit vectors of the plane across a normal: x to the right and y up for who looks at the front.
 struct PlaneAxes {
@@ -40,4 +40,4 @@ bool border_is_simple(std::span<const std::uint32_t> half_edges, const std::vect
 /// The unit vector along one side of the smallest box around the points; {1, 0} when they have no extent.
 Vec2d smallest_box_side(std::vector<Vec2d> points);
 
-}  // namespace texmesh::proxies
+}  // namespace texmesh

@@ -10,7 +10,7 @@
 #include "format/base/no_index.h"
 #include "stages/proxies/atlas/packing_grid.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 namespace {
 
 // Larger textures are packed in cells of several texels: the search's time grows with the third power of the
@@ -233,4 +233,4 @@ std::optional<AtlasMesh> pack_atlas(const ProxySurface& surface, const SurfaceCh
   return mesh;
 }
 
-}  // namespace texmesh::proxies
+}  // namespace texmesh

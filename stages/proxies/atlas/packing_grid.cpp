@@ -6,7 +6,7 @@
 #include <functional>
 #include <utility>
 
-namespace texmesh::proxies {
+namespace texmesh {
 namespace {
 
 // What reaches less than this into a cell, in cells, comes from rounding.
@@ -189,4 +189,4 @@ void PackingGrid::take(const ChartMask& mask, Place place) {
   for (std::uint32_t r = place.y - std::min(place.y, gutter_); r < end; ++r) gaps_[r] = widest_gap(r);
 }
 
-}  // namespace texmesh::proxies
+}  // namespace texmesh

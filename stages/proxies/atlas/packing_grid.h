@@ -7,7 +7,7 @@
 
 #include "format/base/vec.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 
 /// Cells that are touched, as runs of each row.
 struct ChartMask {
@@ -60,4 +60,4 @@ class PackingGrid {
   std::vector<std::uint64_t> forbidden_;  // one row
 };
 
-}  // namespace texmesh::proxies
+}  // namespace texmesh

@@ -6,7 +6,7 @@
 #include <tuple>
 #include <vector>
 
-namespace texmesh::proxies {
+namespace texmesh {
 
 /// Two members and what it costs to join them. An entry is stale when one of the two has changed since: then
 /// the sum of their versions is another.
@@ -72,4 +72,4 @@ class PairQueue {
   std::size_t sweep_at_ = kLeastSweep;
 };
 
-}  // namespace texmesh::proxies
+}  // namespace texmesh

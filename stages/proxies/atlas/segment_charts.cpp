@@ -14,7 +14,7 @@
 #include "stages/proxies/atlas/flat_chart.h"
 #include "stages/proxies/atlas/pair_queue.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 namespace {
 
 using Complex = std::complex<double>;
@@ -500,4 +500,4 @@ SurfaceCharts segment_charts(const ProxySurface& surface, const RunContext& cont
   return out;
 }
 
-}  // namespace texmesh::proxies
+}  // namespace texmesh

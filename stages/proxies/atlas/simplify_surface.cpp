@@ -10,7 +10,7 @@
 #include "stages/geometry/weld.h"
 #include "stages/proxies/atlas/pair_queue.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 namespace {
 
 /// Whether triangles without an area stay: in a source they close cracks between their neighbours.
@@ -586,4 +586,4 @@ std::vector<ProxySurface> simplify_surface(std::span<const Vec3f> positions,
   return surfaces;
 }
 
-}  // namespace texmesh::proxies
+}  // namespace texmesh

@@ -5,7 +5,7 @@
 #include "format/base/no_index.h"
 #include "stages/base/parallel.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 namespace {
 
 struct PullLevel {
@@ -163,7 +163,7 @@ struct TexelSum {
   Vec3f base, emission, orm;
   Vec3d normal;
   float alpha = 0, count = 0, colours = 0;
-  void add(const SurfaceSample& s, Vec3d tangent_normal) {
+  void add(const BakeSample& s, Vec3d tangent_normal) {
     const float weight = s.alpha > 1e-3f ? s.alpha : 1e-3f;
     base = base + s.base_colour * weight;
     colours += weight;
@@ -214,7 +214,7 @@ class Baker {
     guess = place;
     const double texels = std::fabs(cross(c.uv[1] - c.uv[0], c.uv[2] - c.uv[0]));
     const double footprint = texels > 0 ? std::sqrt(length(face) / texels) : 0;
-    const SurfaceSample sample =
+    const BakeSample sample =
         source_.sample(*place, footprint / static_cast<double>(grid_.per_side), {true, true, normal_map_});
     if (!normal_map_) return sum.add(sample, {});
     const TextureFrame frame = texture_frame(c.position, c.uv, normal);
@@ -296,4 +296,4 @@ BakedMaps bake(const AtlasMesh& mesh, const std::vector<Vec3f>& normals, const B
   return out;
 }
 
-}  // namespace texmesh::proxies
+}  // namespace texmesh

@@ -4,7 +4,7 @@
 #include "stages/proxies/atlas_mesh.h"
 #include "stages/proxies/bake/bake_source.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 
 /// A mesh with unit normals per vertex. Vertices at creases stand there once for each side.
 struct SmoothMesh {
@@ -57,4 +57,4 @@ BakedMaps bake(const AtlasMesh& mesh, const std::vector<Vec3f>& normals, const B
 void push_pull(std::vector<Vec3f>& values, const std::vector<std::uint8_t>& covered, std::uint32_t width,
                std::uint32_t height);
 
-}  // namespace texmesh::proxies
+}  // namespace texmesh

@@ -2,7 +2,7 @@
 
 #include "format/base/no_index.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 namespace {
 
 constexpr double kCage = 0.03;       // of the diagonal, to both sides
@@ -201,7 +201,7 @@ Vec3f BakeSource::mapped_normal(Reader& reader, const RenderMaterial& material) 
                  normal);
 }
 
-void BakeSource::add_colours(Reader& reader, const RenderMaterial& m, SurfaceSample& out) const {
+void BakeSource::add_colours(Reader& reader, const RenderMaterial& m, BakeSample& out) const {
   const SurfacePlace& place = reader.place();
   Vec4f base = m.base_colour;
   const auto multiply = [&base](Vec4f by) {
@@ -230,7 +230,7 @@ void BakeSource::add_colours(Reader& reader, const RenderMaterial& m, SurfaceSam
   }
 }
 
-void BakeSource::add_data(Reader& reader, const RenderMaterial& m, SurfaceSample& out) const {
+void BakeSource::add_data(Reader& reader, const RenderMaterial& m, BakeSample& out) const {
   const TextureSlot &rough_metal = m.slot(TextureUse::kMetallicRoughness),
                     &occlusion = m.slot(TextureUse::kOcclusion);
   Vec4f texel{1, 1, 1, 1};
@@ -242,10 +242,9 @@ void BakeSource::add_data(Reader& reader, const RenderMaterial& m, SurfaceSample
   out.occlusion = within_unit(1 + (texel.x - 1) * m.occlusion_strength);
 }
 
-SurfaceSample BakeSource::sample(const SurfacePlace& place, double footprint,
-                                 const SampleParts& parts) const {
+BakeSample BakeSource::sample(const SurfacePlace& place, double footprint, const SampleParts& parts) const {
   const RenderMaterial& m = shown_.materials[mesh_.triangle_material[place.triangle]];
-  SurfaceSample out;
+  BakeSample out;
   Reader reader(*this, place, footprint);
   if (parts.colours) add_colours(reader, m, out);
   if (m.unlit) return out;
@@ -254,4 +253,4 @@ SurfaceSample BakeSource::sample(const SurfacePlace& place, double footprint,
   return out;
 }
 
-}  // namespace texmesh::proxies
+}  // namespace texmesh

@@ -6,7 +6,7 @@
 #include "stages/geometry/triangle_tree.h"
 #include "stages/render/shown_materials.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 
 /// Materials that one material of a proxy may stand for.
 struct MaterialGroup {
@@ -39,7 +39,7 @@ struct SampleParts {
 };
 
 /// What S_0 shows in one place, linear.
-struct SurfaceSample {
+struct BakeSample {
   Vec3f base_colour{1, 1, 1}, emission;
   float alpha = 1;  // of a mask 0 or 1
   float occlusion = 1, metallic = 0, roughness = 1;
@@ -66,7 +66,7 @@ class BakeSource {
                                    const std::optional<SurfacePlace>& guess) const;
 
   /// Textures are read at the mip whose texels are as large as `footprint`, object units.
-  SurfaceSample sample(const SurfacePlace& place, double footprint, const SampleParts& parts) const;
+  BakeSample sample(const SurfacePlace& place, double footprint, const SampleParts& parts) const;
 
   double diagonal() const { return diagonal_; }
 
@@ -76,8 +76,8 @@ class BakeSource {
     std::unique_ptr<TriangleTree> tree;    // null: none
   };
   class Reader;
-  void add_colours(Reader& reader, const RenderMaterial& material, SurfaceSample& out) const;
-  void add_data(Reader& reader, const RenderMaterial& material, SurfaceSample& out) const;
+  void add_colours(Reader& reader, const RenderMaterial& material, BakeSample& out) const;
+  void add_data(Reader& reader, const RenderMaterial& material, BakeSample& out) const;
   Vec3f mapped_normal(Reader& reader, const RenderMaterial& material) const;
 
   const Mesh& mesh_;
@@ -87,4 +87,4 @@ class BakeSource {
   double diagonal_ = 0;
 };
 
-}  // namespace texmesh::proxies
+}  // namespace texmesh

@@ -4,7 +4,7 @@
 #include "stages/geometry/mesh_topology.h"
 #include "stages/proxies/bake/bake.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 namespace {
 
 using Weights = std::array<double, 3>;
@@ -191,4 +191,4 @@ SmoothMesh sampled_normals(const AtlasMesh& mesh, const BakeSource& source, Crea
   return out;
 }
 
-}  // namespace texmesh::proxies
+}  // namespace texmesh

@@ -2,7 +2,7 @@
 
 #include "stages/gltf/glb_writer.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 namespace {
 
 using Json = GlbWriter::Json;
@@ -158,4 +158,4 @@ Bytes proxy_glb(const CodedMesh& mesh, const std::vector<MaterialGroup>& groups,
   return ProxyWriter().write(mesh, groups, pictures);
 }
 
-}  // namespace texmesh::proxies
+}  // namespace texmesh

@@ -7,7 +7,7 @@
 #include "stages/proxies/atlas_mesh.h"
 #include "stages/proxies/bake/bake_source.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 
 /// One stream. `packed` is what the file holds; decoded it has count * stride bytes.
 struct MeshStream {
@@ -80,4 +80,4 @@ struct ProxyPictures {
 Bytes proxy_glb(const CodedMesh& mesh, const std::vector<MaterialGroup>& groups,
                 const ProxyPictures& pictures);
 
-}  // namespace texmesh::proxies
+}  // namespace texmesh

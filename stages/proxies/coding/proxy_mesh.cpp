@@ -5,7 +5,7 @@
 #include "format/base/no_index.h"
 #include "stages/gltf/glb_writer.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 namespace {
 
 struct PositionGrid {
@@ -230,4 +230,4 @@ RoundedMesh rounded_mesh(const AtlasMesh& mesh, const std::vector<Vec3f>& normal
   return out;
 }
 
-}  // namespace texmesh::proxies
+}  // namespace texmesh

@@ -4,7 +4,7 @@
 #include "stages/image/webp.h"
 #include "stages/render/shade.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 namespace {
 
 constexpr float kOcclusionInColour = 0.5f;
@@ -142,4 +142,4 @@ ProxyPictures code_pictures(const MapPixels& maps, std::size_t max_bytes, CodedP
   return std::move(*best);
 }
 
-}  // namespace texmesh::proxies
+}  // namespace texmesh

@@ -7,7 +7,7 @@
 #include "stages/proxies/coding/proxy_glb.h"
 #include "stages/render/render_texture.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 
 /// Which maps get a picture of their own. Without `orm`, half of the occlusion is multiplied into the base
 /// colour, and metal and roughness are means.
@@ -37,4 +37,4 @@ struct CodedPictures {
 /// them; at the lowest where none does.
 ProxyPictures code_pictures(const MapPixels& maps, std::size_t max_bytes, CodedPictures& coded);
 
-}  // namespace texmesh::proxies
+}  // namespace texmesh

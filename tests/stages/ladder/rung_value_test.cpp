@@ -7,7 +7,7 @@
 
 #include "format/rules/ordinary_loads.h"
 
-namespace texmesh::rungs {
+namespace texmesh {
 namespace {
 
 constexpr double kGain = 0.05, kLeast = 0.01;
@@ -174,4 +174,4 @@ TEST(RungValue, NothingOfNothing) {
 }
 
 }  // namespace
-}  // namespace texmesh::rungs
+}  // namespace texmesh

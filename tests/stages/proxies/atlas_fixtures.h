@@ -7,8 +7,8 @@
 namespace texmesh::testing {
 
 /// A square of side 2 around the origin that faces +Z, over the whole of a texture.
-inline proxies::AtlasMesh square_atlas(std::uint32_t side_px, std::uint32_t group = 0, float z = 0) {
-  proxies::AtlasMesh out;
+inline AtlasMesh square_atlas(std::uint32_t side_px, std::uint32_t group = 0, float z = 0) {
+  AtlasMesh out;
   const Mesh square = testing::square();
   for (const Vec3f p : square.positions) out.positions.push_back({p.x, p.y, z});
   out.uvs = square.uv0;

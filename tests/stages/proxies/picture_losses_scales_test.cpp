@@ -4,7 +4,7 @@
 
 #include "tests/support/meshes.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 namespace {
 
 NestedScales alone(Mesh mesh) {
@@ -79,4 +79,4 @@ TEST_F(Competitors, ManyQuestionsHaveTheAnswersOfOne) {
 }
 
 }  // namespace
-}  // namespace texmesh::proxies
+}  // namespace texmesh

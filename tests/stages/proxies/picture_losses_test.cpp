@@ -5,7 +5,7 @@
 #include "stages/proxies/coding/proxy_pictures.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 namespace {
 
 ShownModel plain_model(const Mesh& mesh, Vec4f colour) {
@@ -80,4 +80,4 @@ TEST(ShownProxy, AProxyIsShownAsItsFileSaysIt) {
 }
 
 }  // namespace
-}  // namespace texmesh::proxies
+}  // namespace texmesh

@@ -2,7 +2,7 @@
 
 #include "tests/stages/quality/quality_samples.h"
 
-namespace texmesh::quality {
+namespace texmesh {
 namespace {
 
 /// What fewer_heights() says of the textured sheet when half of the largest height shows so many texels per
@@ -42,4 +42,4 @@ TEST(SizeRules, WithoutMipsOnlyTexelsOfAPixelAre) {
 }
 
 }  // namespace
-}  // namespace texmesh::quality
+}  // namespace texmesh

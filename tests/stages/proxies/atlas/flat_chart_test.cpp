@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace texmesh::proxies {
+namespace texmesh {
 namespace {
 
 TEST(FlatChart, AxesAreRightHandedForEveryNormal) {
@@ -52,4 +52,4 @@ TEST(FlatChart, SmallestBoxOfATurnedRectangle) {
 }
 
 }  // namespace
-}  // namespace texmesh::proxies
+}  // namespace texmesh

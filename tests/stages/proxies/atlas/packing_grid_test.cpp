@@ -4,7 +4,7 @@
 
 #include "tests/support/meshes.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 namespace {
 
 ChartMask block(std::uint32_t width, std::uint32_t height) {
@@ -87,4 +87,4 @@ TEST(ChartMask, HoldsTheCellsThatTrianglesTouch) {
 }
 
 }  // namespace
-}  // namespace texmesh::proxies
+}  // namespace texmesh

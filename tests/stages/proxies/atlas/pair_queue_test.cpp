@@ -4,7 +4,7 @@
 
 #include "tests/support/meshes.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 namespace {
 
 TEST(PairQueue, GivesTheCheapestFirstAndOfEqualOnesTheLowest) {
@@ -43,4 +43,4 @@ TEST(PairQueue, SweepsWhatIsStaleAndLosesNothing) {
 }
 
 }  // namespace
-}  // namespace texmesh::proxies
+}  // namespace texmesh

@@ -11,7 +11,7 @@
 #include "stages/proxies/atlas/flat_chart.h"
 #include "tests/stages/proxies/proxy_shapes.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 namespace {
 
 using testing::Soup;
@@ -202,4 +202,4 @@ TEST(SegmentCharts, IsCancelled) {
 }
 
 }  // namespace
-}  // namespace texmesh::proxies
+}  // namespace texmesh

@@ -8,7 +8,7 @@
 #include "tests/stages/proxies/atlas_fixtures.h"
 #include "tests/support/even_sphere.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 namespace {
 
 using testing::square_atlas;
@@ -251,4 +251,4 @@ TEST(SampledNormals, HardEdgesHaveNormalsOfTheirOwnOnBothSides) {
 }
 
 }  // namespace
-}  // namespace texmesh::proxies
+}  // namespace texmesh

@@ -10,7 +10,7 @@
 #include "tests/stages/proxies/atlas_fixtures.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 namespace {
 
 BakedMaps noise_maps(std::uint32_t side_px, bool alpha) {
@@ -191,4 +191,4 @@ TEST(WebpPicture, AlphaComesBack) {
 }
 
 }  // namespace
-}  // namespace texmesh::proxies
+}  // namespace texmesh
