@@ -1,10 +1,6 @@
 #pragma once
-#include <array>
 #include <bit>
-#include <cstdint>
 #include <cstring>
-#include <span>
-#include <string>
 #include <type_traits>
 #include <vector>
 

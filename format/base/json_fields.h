@@ -1,8 +1,5 @@
 #pragma once
-#include <cstdint>
 #include <nlohmann/json_fwd.hpp>
-#include <span>
-#include <string>
 #include <string_view>
 
 #include "format/base/sha256.h"

@@ -1,6 +1,4 @@
 #pragma once
-#include <string>
-#include <utility>
 
 #include "format/base/errors.h"
 

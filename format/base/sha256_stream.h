@@ -1,9 +1,6 @@
 #pragma once
 #include <nettle/sha2.h>
 
-#include <cstdint>
-#include <span>
-
 #include "format/base/sha256.h"
 
 namespace texmesh {

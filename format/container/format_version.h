@@ -1,5 +1,4 @@
 #pragma once
-#include <string>
 
 #include "format/base/bytes.h"
 #include "format/base/rule_error.h"

@@ -1,6 +1,4 @@
 #pragma once
-#include <cstdint>
-#include <string>
 
 #include "format/base/sha256.h"
 

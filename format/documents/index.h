@@ -1,10 +1,7 @@
 #pragma once
-#include <cstdint>
-#include <span>
 #include <vector>
 
 #include "format/base/no_index.h"
-#include "format/base/sha256.h"
 #include "format/documents/entry_ref.h"
 
 namespace texmesh {

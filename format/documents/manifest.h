@@ -1,11 +1,6 @@
 #pragma once
-#include <cstdint>
 #include <optional>
-#include <span>
-#include <string>
-#include <vector>
 
-#include "format/base/sha256.h"
 #include "format/base/vec.h"
 #include "format/container/format_version.h"
 #include "format/container/layout.h"

@@ -1,7 +1,5 @@
 #pragma once
 #include <cstddef>
-#include <cstdint>
-#include <span>
 #include <vector>
 
 #include "format/base/sha256.h"

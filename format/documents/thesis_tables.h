@@ -1,10 +1,5 @@
 #pragma once
-#include <array>
 #include <cstddef>
-#include <cstdint>
-#include <span>
-#include <string_view>
-#include <vector>
 
 #include "format/base/bytes.h"
 #include "format/base/fields.h"

@@ -1,6 +1,4 @@
 #pragma once
-#include <cstdint>
-#include <span>
 
 #include "format/documents/tables.h"
 #include "format/documents/textures.h"

@@ -1,12 +1,5 @@
 #pragma once
-#include <algorithm>
-#include <array>
-#include <bit>
-#include <cstdint>
-#include <string>
-#include <vector>
 
-#include "format/base/no_index.h"
 #include "format/base/rule_error.h"
 #include "format/split/split_coder.h"
 #include "format/split/split_mesh.h"

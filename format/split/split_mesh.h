@@ -1,6 +1,5 @@
 #pragma once
 #include <array>
-#include <cstdint>
 #include <vector>
 
 #include "format/base/no_index.h"

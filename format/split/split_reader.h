@@ -1,8 +1,5 @@
 #pragma once
-#include <cstdint>
 #include <memory>
-#include <span>
-#include <vector>
 
 #include "format/split/split_mesh.h"
 #include "format/split/split_stream.h"

@@ -1,8 +1,5 @@
 #pragma once
-#include <array>
-#include <cstdint>
 #include <string>
-#include <vector>
 
 #include "format/split/split_mesh.h"
 #include "format/split/split_stream.h"

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <bit>
 #include <cstddef>
-#include <cstdint>
 #include <vector>
 
 #include "format/base/no_index.h"

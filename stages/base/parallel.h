@@ -1,6 +1,5 @@
 #pragma once
 #include <cstddef>
-#include <functional>
 
 #include "stages/base/run_context.h"
 

@@ -1,8 +1,5 @@
 #pragma once
-#include <cstdint>
-#include <string_view>
 
-#include "format/model/model.h"
 #include "stages/data/conditioned_mesh.h"
 #include "stages/data/stage.h"
 

@@ -1,8 +1,5 @@
 #pragma once
-#include <cstdint>
-#include <vector>
 
-#include "format/model/model.h"
 #include "stages/data/uv_sets.h"
 
 namespace texmesh {

@@ -1,7 +1,4 @@
 #pragma once
-#include <cstddef>
-#include <cstdint>
-#include <vector>
 
 #include "stages/data/fragments.h"
 

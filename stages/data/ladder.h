@@ -1,7 +1,4 @@
 #pragma once
-#include <cstdint>
-#include <span>
-#include <vector>
 
 #include "format/base/note.h"
 #include "format/model/codec.h"

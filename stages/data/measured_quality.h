@@ -1,5 +1,4 @@
 #pragma once
-#include <vector>
 
 #include "format/base/note.h"
 #include "format/documents/quality_table.h"

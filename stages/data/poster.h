@@ -1,5 +1,4 @@
 #pragma once
-#include <cstdint>
 
 #include "format/base/bytes.h"
 

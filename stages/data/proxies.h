@@ -1,7 +1,4 @@
 #pragma once
-#include <cstdint>
-#include <string>
-#include <vector>
 
 #include "format/base/bytes.h"
 #include "format/base/note.h"

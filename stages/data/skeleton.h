@@ -1,7 +1,5 @@
 #pragma once
 #include <array>
-#include <cstdint>
-#include <vector>
 
 #include "format/base/note.h"
 #include "format/base/vec.h"

@@ -1,6 +1,4 @@
 #pragma once
-#include <cstdint>
-#include <string_view>
 
 #include "format/base/fields.h"
 

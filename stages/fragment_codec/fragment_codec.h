@@ -1,6 +1,5 @@
 #pragma once
 
-#include "format/model/codec.h"
 #include "stages/base/run_context.h"
 #include "stages/data/ladder.h"
 #include "stages/data/pixels.h"

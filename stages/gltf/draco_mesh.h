@@ -1,16 +1,10 @@
 #pragma once
 // Meshes as streams of KHR_draco_mesh_compression: one encoder, for meshes that are made and for those of
 // files.
-#include <array>
-#include <cstdint>
 #include <cstring>
 #include <map>
 #include <memory>
-#include <span>
-#include <string>
-#include <vector>
 
-#include "format/base/vec.h"
 #include "stages/geometry/fit_normals.h"
 
 namespace draco {

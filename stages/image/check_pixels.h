@@ -1,8 +1,5 @@
 #pragma once
 // Inside stages only.
-#include <cstdint>
-#include <string>
-#include <vector>
 
 #include "format/base/errors.h"
 #include "stages/data/fragments.h"

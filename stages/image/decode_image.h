@@ -1,8 +1,5 @@
 #pragma once
-#include <string>
 
-#include "format/base/bytes.h"
-#include "format/model/model.h"
 #include "stages/data/pixels.h"
 #include "stages/image/image_format.h"
 

@@ -1,7 +1,5 @@
 #pragma once
 // Inside the room only.
-#include <array>
-#include <cstddef>
 #include <cstdint>
 
 #include "format/base/srgb.h"

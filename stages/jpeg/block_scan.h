@@ -2,8 +2,6 @@
 // Inside stages only: blocks of a baseline scan, each coded at several rungs by what of it is seen. A block
 // becomes coefficients (quantise_whole(), MaskedBlock, flat_block()), these become symbols (emit_block()),
 // and a sink writes or counts them.
-#include <algorithm>
-#include <bit>
 #include <cstdlib>
 
 #include "format/base/bytes.h"

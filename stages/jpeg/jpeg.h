@@ -1,8 +1,5 @@
 #pragma once
-#include <cstdint>
 #include <span>
-#include <string_view>
-#include <vector>
 
 #include "stages/data/pixels.h"
 #include "stages/data/subsampling.h"

@@ -1,6 +1,4 @@
 #pragma once
-#include <string_view>
-#include <vector>
 
 #include "format/documents/tables.h"
 #include "format/documents/thesis_tables.h"

@@ -1,5 +1,4 @@
 #pragma once
-#include <vector>
 
 #include "format/documents/tables.h"
 #include "format/documents/thesis_tables.h"

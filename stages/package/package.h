@@ -1,7 +1,4 @@
 #pragma once
-#include <cstdint>
-#include <string>
-#include <vector>
 
 #include "format/documents/about.h"
 #include "format/documents/tables.h"

@@ -1,5 +1,4 @@
 #pragma once
-#include <vector>
 
 #include "format/documents/thesis_tables.h"
 #include "stages/data/nested_scales.h"

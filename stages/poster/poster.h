@@ -1,7 +1,5 @@
 #pragma once
-#include <vector>
 
-#include "format/model/model.h"
 #include "stages/data/fragments.h"
 #include "stages/data/nested_scales.h"
 #include "stages/data/pixels.h"

@@ -1,8 +1,6 @@
 #pragma once
 // Inside the room only: from where the picture is taken.
-#include <vector>
 
-#include "stages/base/run_context.h"
 #include "stages/render/visibility.h"
 
 namespace texmesh {

@@ -1,5 +1,4 @@
 #pragma once
-#include <vector>
 
 #include "stages/data/fragments.h"
 #include "stages/data/pixels.h"

@@ -1,6 +1,5 @@
 #pragma once
 // Inside the room only: one proxy of a given number of bytes.
-#include <optional>
 
 #include "stages/proxies/coding/proxy_pictures.h"
 #include "stages/proxies/picture_losses.h"

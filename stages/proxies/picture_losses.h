@@ -1,14 +1,12 @@
 #pragma once
 // Inside the room only: how a proxy looks beside S_0, and how a nested scale with the source's atlas looks
 // for the same bytes.
-#include <map>
 
 #include "stages/data/nested_scales.h"
 #include "stages/data/proxies.h"
 #include "stages/measure/flip.h"
 #include "stages/proxies/coding/proxy_glb.h"
 #include "stages/render/shade.h"
-#include "stages/render/shown_materials.h"
 
 namespace texmesh {
 

@@ -1,7 +1,6 @@
 #pragma once
 // Inside the room only: what the pictures show of the object, and the rows in which large ones are rendered.
 #include "format/base/box.h"
-#include "format/base/note.h"
 #include "stages/measure/picture.h"
 #include "stages/quality/textures.h"
 

@@ -1,8 +1,6 @@
 #pragma once
 // Inside the room only: pictures beside S_0's.
 #include <map>
-#include <optional>
-#include <utility>
 
 #include "stages/measure/flip.h"
 #include "stages/quality/framing.h"

@@ -4,11 +4,9 @@
 // Samplers that read level 0 alone have rules of their own: their texels flicker where they are smaller than
 // pixels. What is lost there is a matter of chance, so it follows neither from a smaller size nor from
 // pictures of the same texels read with mips.
-#include <cstddef>
 
 #include "stages/quality/quality.h"
 #include "stages/quality/shots.h"
-#include "stages/quality/textures.h"
 
 namespace texmesh {
 

@@ -1,7 +1,6 @@
 #pragma once
 // Inside the room only: which textures show, what they are made from, and how they look at one displayed
 // height.
-#include <optional>
 
 #include "format/documents/quality_table.h"
 #include "format/documents/tables.h"

@@ -1,7 +1,6 @@
 #pragma once
 // Inside the room only: a triangle as a camera sees it, in homogeneous coordinates (Olano and Greer 1997), so
 // that nothing has to be cut at the near plane.
-#include <cmath>
 
 #include "stages/render/visibility.h"
 

@@ -1,8 +1,6 @@
 #pragma once
 // Inside the room only: the colours of a triangle within a pixel.
-#include <array>
 #include <optional>
-#include <span>
 
 #include "stages/render/brdf.h"
 #include "stages/render/edge_planes.h"

@@ -1,8 +1,5 @@
 #pragma once
 // Inside the room only: what is seen in one square of a picture.
-#include <cstdint>
-#include <span>
-#include <vector>
 
 #include "stages/render/edge_planes.h"
 

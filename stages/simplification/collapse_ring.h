@@ -1,5 +1,4 @@
 #pragma once
-#include <array>
 
 #include "stages/simplification/collapse_mesh.h"
 

@@ -1,6 +1,5 @@
 #pragma once
 // Inside the room only: a surface contracted to a curve, the curve put into the middle, distances to it.
-#include <array>
 #include <span>
 
 #include "format/base/box.h"

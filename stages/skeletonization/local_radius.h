@@ -1,5 +1,4 @@
 #pragma once
-#include "format/base/vec.h"
 #include "stages/geometry/triangle_tree.h"
 #include "stages/skeletonization/wrap.h"
 

@@ -1,5 +1,4 @@
 #pragma once
-#include <string_view>
 
 #include "stages/data/conditioned_mesh.h"
 #include "stages/data/scale_map.h"

@@ -2,11 +2,7 @@
 // What textures of OBJ, PLY and older glTF are beside the kinds of Image. Packages keep sources of a closed
 // list of kinds (SPEC.md X03, W06), so these files become others with the same texels when they are imported.
 #include <cstddef>
-#include <cstdint>
-#include <optional>
-#include <string>
 
-#include "format/base/bytes.h"
 #include "stages/image/image_format.h"
 
 namespace texmesh {

@@ -1,10 +1,6 @@
 #pragma once
 // What the program and its module texmesh_readers.so say to each other.
-#include <cstdint>
-#include <string>
-#include <vector>
 
-#include "format/base/bytes.h"
 #include "stages/image/decode_tiff_exr.h"
 #include "stages/image/readers_module/other_pictures.h"
 

@@ -1,8 +1,6 @@
 #pragma once
-#include <cstdint>
 #include <optional>
 #include <span>
-#include <vector>
 
 #include "format/model/model.h"
 #include "stages/base/run_context.h"

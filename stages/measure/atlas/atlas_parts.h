@@ -1,6 +1,5 @@
 #pragma once
 // Inside this room only: what the sources of measure_atlases() share.
-#include <array>
 
 #include "format/base/no_index.h"
 #include "stages/geometry/mesh_topology.h"

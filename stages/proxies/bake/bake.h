@@ -1,6 +1,5 @@
 #pragma once
 // Inside the room only: what S_0 shows, as the texels of an atlas.
-#include "format/base/vec.h"
 #include "stages/proxies/atlas_mesh.h"
 #include "stages/proxies/bake/bake_source.h"
 

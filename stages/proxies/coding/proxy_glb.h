@@ -1,6 +1,5 @@
 #pragma once
 // Inside the room only: a proxy as a file.
-#include <cstddef>
 
 #include "format/base/bytes.h"
 #include "stages/gltf/draco_mesh.h"

@@ -1,11 +1,8 @@
 #pragma once
 // Inside the room only: baked maps as pictures of a given size.
-#include <array>
-#include <map>
 
 #include "stages/proxies/bake/bake.h"
 #include "stages/proxies/coding/proxy_glb.h"
-#include "stages/render/render_texture.h"
 
 namespace texmesh {
 
