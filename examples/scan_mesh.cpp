@@ -5,8 +5,8 @@
 #include "examples/scan_model.h"
 #include "examples/scan_noise.h"
 #include "format/base/box.h"
-#include "format/base/no_index.h"
 #include "format/base/portable_math.h"
+#include "format/base/vec.h"
 
 namespace texmesh {
 namespace {

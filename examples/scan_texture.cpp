@@ -6,8 +6,8 @@
 
 #include "examples/scan_model.h"
 #include "examples/scan_noise.h"
-#include "format/base/no_index.h"
 #include "format/base/portable_math.h"
+#include "format/base/vec.h"
 #include "stages/base/parallel.h"
 
 namespace texmesh {

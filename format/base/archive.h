@@ -5,14 +5,14 @@
 #include <vector>
 
 #include "format/base/errors.h"
-#include "format/base/sha256_stream.h"
+#include "format/base/sha256.h"
 #include "format/base/vec.h"
 
 namespace texmesh {
 
 // Serialisation of plain data for cached stage artefacts (not for packages: their layouts stand in SPEC.md).
 // A struct names its members once, in
-//   template <class S, class A> static void archive(S& s, A& a)
+//   static void archive(auto& s, auto& a)
 // and both archives below go through that list. Numbers are little-endian. A vector or string is a u64 count
 // and its elements.
 static_assert(std::endian::native == std::endian::little,
@@ -154,8 +154,7 @@ class ArchiveReader {
 };
 
 /// Bytes that grow would for a moment take three times their memory: gigabytes where a scan is large.
-template <class T>
-std::vector<std::uint8_t> encode_artefact(const T& value) {
+std::vector<std::uint8_t> encode_artefact(const auto& value) {
   ArchiveTo<ArchiveSizeSink> size;
   size(value);
   ArchiveWriter w;
@@ -168,8 +167,7 @@ struct ArtefactDigest {
   Sha256 digest{};
   std::uint64_t bytes = 0;
 };
-template <class T>
-ArtefactDigest digest_artefact(const T& value) {
+ArtefactDigest digest_artefact(const auto& value) {
   ArchiveTo<ArchiveDigestSink> w;
   w(value);
   Sha256Stream& stream = w.sink().stream;

@@ -43,8 +43,7 @@ using Box3d = Box3<double>;
 inline Box3d to_double(const Box3f& b) { return {to_double(b.min), to_double(b.max)}; }
 
 /// The box around points: a range of Vec3<T>.
-template <class Points>
-auto bounding_box(const Points& points) {
+auto bounding_box(const auto& points) {
   Box3<decltype(std::begin(points)->x)> box;
   for (const auto& p : points) box.extend(p);
   return box;
@@ -56,8 +55,7 @@ struct BoundingSphere {
 };
 
 /// The sphere around the middle of the points' box that holds them all. At least one point.
-template <class Points>
-BoundingSphere bounding_sphere(const Points& points) {
+BoundingSphere bounding_sphere(const auto& points) {
   BoundingSphere sphere{to_double(bounding_box(points)).centre()};
   for (const Vec3f p : points) sphere.radius = std::max(sphere.radius, length(to_double(p) - sphere.centre));
   return sphere;

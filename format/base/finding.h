@@ -1,7 +1,7 @@
 #pragma once
 #include <vector>
 
-#include "format/base/rule_error.h"
+#include "format/base/errors.h"
 
 namespace texmesh {
 

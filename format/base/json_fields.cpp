@@ -7,8 +7,8 @@
 #include <set>
 
 #include "format/base/bounded_json.h"
-#include "format/base/clean_text.h"
-#include "format/base/rule_error.h"
+#include "format/base/errors.h"
+#include "format/base/text_bytes.h"
 
 namespace texmesh {
 

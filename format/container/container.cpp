@@ -9,7 +9,6 @@
 #include <cerrno>
 
 #include "format/base/bytes.h"
-#include "format/base/rule_error.h"
 #include "format/container/layout.h"
 
 namespace texmesh {

@@ -1,7 +1,6 @@
 #pragma once
 
 #include "format/base/bytes.h"
-#include "format/base/rule_error.h"
 
 namespace texmesh {
 

@@ -1,7 +1,7 @@
 #pragma once
 #include <vector>
 
-#include "format/base/no_index.h"
+#include "format/base/vec.h"
 #include "format/documents/entry_ref.h"
 
 namespace texmesh {

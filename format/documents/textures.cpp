@@ -4,8 +4,8 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "format/base/errors.h"
 #include "format/base/json_fields.h"
-#include "format/base/rule_error.h"
 #include "format/base/text_bytes.h"
 #include "format/container/layout.h"
 #include "format/documents/quality_table.h"

@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "format/base/bytes.h"
-#include "format/base/rule_error.h"
 
 namespace texmesh {
 namespace {

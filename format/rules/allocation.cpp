@@ -4,7 +4,6 @@
 
 #include "format/base/number16.h"
 #include "format/base/portable_math.h"
-#include "format/rules/rate_distortion.h"
 
 namespace texmesh {
 

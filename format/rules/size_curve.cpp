@@ -5,7 +5,6 @@
 
 #include "format/base/portable_math.h"
 #include "format/rules/allocation.h"
-#include "format/rules/size_model.h"
 
 namespace texmesh {
 namespace {

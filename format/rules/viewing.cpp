@@ -4,7 +4,7 @@
 #include <limits>
 
 #include "format/base/portable_math.h"
-#include "format/rules/mip_choice.h"
+#include "format/rules/split_mix.h"
 
 namespace texmesh {
 namespace {
@@ -159,6 +159,23 @@ std::uint32_t plane_at_level(std::span<const TextureInfo> textures, std::uint32_
     best = p;
   }
   return best;
+}
+
+std::vector<OrdinaryLoad> ordinary_loads(std::size_t count) {
+  std::vector<OrdinaryLoad> out;
+  SplitMix random(18);
+  // Logarithms are equally likely.
+  const auto between = [&random](double least, double most) {
+    return least * portable::exp(random.next() * portable::log(most / least));
+  };
+  for (std::size_t k = 0; k < count; ++k) {
+    OrdinaryLoad load;
+    load.bytes_s = between(2e6, 50e6) / 8;
+    load.displayed_px = between(200, 2000);
+    load.time_limit_s = between(1, 10);
+    out.push_back(load);
+  }
+  return out;
 }
 
 }  // namespace texmesh

@@ -16,8 +16,7 @@ struct LookAhead {
   static constexpr std::size_t kFarthest =
       kSteps * apart;  // items from the one at hand to that of the first step
   /// For every item: ask(step, ahead) for the one that comes `ahead` items later, the farthest first.
-  template <class Ask>
-  static void each_step(Ask&& ask) {
+  static void each_step(auto&& ask) {
     for (std::size_t step = 0; step < kSteps; ++step) ask(static_cast<Step>(step), (kSteps - step) * apart);
   }
 };

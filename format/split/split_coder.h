@@ -157,8 +157,7 @@ class ResidualCodec {
   ValueModels models;
   void start(int mean) { mean_.fill(mean); }  // in sixteenths of a bit
 
-  template <class Bits>
-  std::int32_t residual(Bits& bits, int component, std::int32_t value) {
+  std::int32_t residual(auto& bits, int component, std::int32_t value) {
     int& mean = mean_[static_cast<std::size_t>(component)];
     const int length = code_length(bits, mean, residual_length(value));
     mean += (length * 16 - mean) >> 3;
@@ -171,14 +170,10 @@ class ResidualCodec {
     const auto signed_value = static_cast<std::int32_t>(coded);
     return bits.raw(value < 0, 1) ? -signed_value : signed_value;
   }
-  template <class Bits>
-  bool same(Bits& bits, bool value) {
-    return bits.bit(models.same(), value);
-  }
+  bool same(auto& bits, bool value) { return bits.bit(models.same(), value); }
 
  private:
-  template <class Bits>
-  int code_length(Bits& bits, int mean, int length) {
+  int code_length(auto& bits, int mean, int length) {
     const int middle = mean >> 4;
     auto is_longer = [&](int than) {
       const int step = std::clamp(than - middle + 10, 0, ValueModels::kSteps - 1);

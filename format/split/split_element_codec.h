@@ -1,6 +1,6 @@
 #pragma once
 
-#include "format/base/rule_error.h"
+#include "format/base/errors.h"
 #include "format/split/split_coder.h"
 #include "format/split/split_mesh.h"
 #include "format/split/split_stream.h"
@@ -215,8 +215,7 @@ class SplitElementCodec {
     return static_cast<std::uint16_t>(code_index(groups_, [](auto& t) { return t.wanted_group(); }));
   }
   /// An index below `count`, every one as probable as the others.
-  template <class Truth>
-  std::uint32_t code_index(std::size_t count, Truth&& truth) {
+  std::uint32_t code_index(std::size_t count, auto&& truth) {
     const std::uint32_t value = channel.raw(std::bit_width(count - 1), truth);
     if (value >= count) fail_split_stream("S19", "an index that exists", std::to_string(value));
     return value;

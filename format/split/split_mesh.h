@@ -2,7 +2,7 @@
 #include <array>
 #include <vector>
 
-#include "format/base/no_index.h"
+#include "format/base/vec.h"
 #include "format/split/look_ahead.h"
 
 namespace texmesh {
@@ -60,8 +60,7 @@ class SplitMesh {
     return faces_[face].wedge[corner % 3];
   }
   /// Calls visit(face, corner) for the corners at a point.
-  template <class Visit>
-  void each_corner(std::uint32_t point, Visit&& visit) const {
+  void each_corner(std::uint32_t point, auto&& visit) const {
     for (std::uint32_t c = ring_[point].head; c != kNoIndex; c = next_of(c)) visit(c / 3, c % 3);
   }
   /// The corners at a point, sorted into fans: open fans first, each in the order of its first corner in

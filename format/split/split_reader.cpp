@@ -6,7 +6,6 @@
 #include "format/base/sha256.h"
 #include "format/split/split_codec.h"
 #include "format/split/split_head.h"
-#include "format/split/split_model.h"
 
 namespace texmesh {
 
@@ -198,18 +197,10 @@ class DecodingChannel {
     connectivity_ = BitDecoder(parts[0]);
     for (std::size_t i = 0; i < parts_.size(); ++i) parts_[i].start(parts[i + 1], head_.models[i]);
   }
-  template <class Truth>
-  bool bit(BitModel& model, Truth&&) {
-    return connectivity_.decode(model, SplitModels::kLimit);
-  }
-  template <class Truth>
-  std::uint32_t raw(int count, Truth&&) {
-    return connectivity_.decode_raw(count);
-  }
-  template <class Note>
-  void update_truth(Note&&) {}
-  template <class Truth>
-  void point(SplitMesh::Point& point, const SplitMesh::Point& guess, Truth&&) {
+  bool bit(BitModel& model, auto&&) { return connectivity_.decode(model, SplitModels::kLimit); }
+  std::uint32_t raw(int count, auto&&) { return connectivity_.decode_raw(count); }
+  void update_truth(auto&&) {}
+  void point(SplitMesh::Point& point, const SplitMesh::Point& guess, auto&&) {
     parts_[0].values(point.data(), guess.data(), 3, head_.position.bits);
   }
   void finish_point(SplitMesh& mesh, std::uint32_t point) {
@@ -218,12 +209,8 @@ class DecodingChannel {
     if (fill_ == SplitFill::kTexture) fill_lost_point(head_, mesh, point);
   }
   const std::vector<std::uint32_t>& lost() const { return lost_; }
-  template <class Truth>
-  bool same(std::size_t k, Truth&&) {
-    return parts_[k + 1].same();
-  }
-  template <class Truth>
-  void value(std::size_t k, std::int32_t* value, const std::array<std::int32_t, 4>& guess, Truth&&) {
+  bool same(std::size_t k, auto&&) { return parts_[k + 1].same(); }
+  void value(std::size_t k, std::int32_t* value, const std::array<std::int32_t, 4>& guess, auto&&) {
     const SplitAttribute& a = head_.attributes[k];
     parts_[k + 1].values(value, guess.data(), split_components(a.kind), a.grid.bits);
   }

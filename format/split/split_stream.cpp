@@ -1,5 +1,4 @@
 
-#include <cmath>
 #include <cstdlib>
 
 #include "format/base/bytes.h"

@@ -7,7 +7,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "format/base/clean_text.h"
+#include "format/base/text_bytes.h"
 #include "lab/cli/commands.h"
 #include "lab/experiment/make_experiment.h"
 #include "pipeline/io/exit_codes.h"

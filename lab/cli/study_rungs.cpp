@@ -8,7 +8,7 @@
 #include <span>
 
 #include "delivery/cpp/client/delivery_plan.h"
-#include "format/rules/ordinary_loads.h"
+#include "format/rules/viewing.h"
 #include "lab/cli/commands.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/table.h"

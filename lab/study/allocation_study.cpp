@@ -6,7 +6,6 @@
 
 #include "format/base/box.h"
 #include "format/rules/allocation.h"
-#include "format/rules/rate_distortion.h"
 #include "stages/base/parallel.h"
 #include "stages/fragment_codec/fragment_codec.h"
 #include "stages/jpeg/jpeg.h"

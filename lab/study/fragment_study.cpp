@@ -6,7 +6,7 @@
 #include <string>
 
 #include "stages/base/parallel.h"
-#include "stages/data/coverage.h"
+#include "stages/data/fragments.h"
 #include "stages/fragment_codec/fragment_codec.h"
 #include "stages/jpeg/jpeg.h"
 #include "stages/jpeg/jpeg_coder.h"

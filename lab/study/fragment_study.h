@@ -6,7 +6,6 @@
 #include "stages/base/run_context.h"
 #include "stages/data/fragments.h"
 #include "stages/data/pixels.h"
-#include "stages/data/subsampling.h"
 
 namespace texmesh {
 

@@ -7,7 +7,6 @@
 
 #include "format/rules/allocation.h"
 #include "format/rules/size_curve.h"
-#include "format/rules/size_model.h"
 #include "lab/thesis/exhibits.h"
 #include "lab/thesis/made_models.h"
 #include "stages/image/png_writer.h"

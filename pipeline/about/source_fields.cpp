@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "format/base/clean_text.h"
+#include "format/base/text_bytes.h"
 #include "pipeline/about/code_tables.h"
 
 namespace texmesh {

@@ -17,14 +17,10 @@
 #include "stages/data/nested_scales.h"
 #include "stages/data/perceptual_values.h"
 #include "stages/data/pixels.h"
-#include "stages/data/poster.h"
-#include "stages/data/predictors.h"
 #include "stages/data/previews.h"
 #include "stages/data/proxies.h"
-#include "stages/data/scale_files.h"
 #include "stages/data/scale_map.h"
 #include "stages/data/skeleton.h"
-#include "stages/data/uv_sets.h"
 
 namespace texmesh {
 

@@ -7,7 +7,6 @@
 #include "format/base/box.h"
 #include "stages/base/run_context.h"
 #include "stages/geometry/mesh_topology.h"
-#include "stages/geometry/weld.h"
 
 namespace texmesh {
 namespace {

@@ -11,10 +11,7 @@ struct MeasuredQuality {
   /// Per QualityTable::scales: ManifestScale::display_px_flip.
   std::vector<float> display_px_flip;
   Notes notes;  // what of the object the pictures do not show
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.table, s.display_px_flip, s.notes);
-  }
+  static void archive(auto& s, auto& a) { a(s.table, s.display_px_flip, s.notes); }
 };
 
 }  // namespace texmesh

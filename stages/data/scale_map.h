@@ -17,8 +17,7 @@ struct ScaleMap {
   // a range scan the samples at a zero crossing of the raw grid.
   std::vector<std::uint32_t> crossings_at;
   Notes notes;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
+  static void archive(auto& s, auto& a) {
     a(s.scales, s.sigma, s.persistence, s.crossing, s.convergence, s.crossings_at, s.notes);
   }
 };

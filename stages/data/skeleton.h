@@ -17,8 +17,7 @@ struct Skeleton {
   std::vector<float> radius;       // R_eff(v) per position = max(R, floor * median R); > 0
   bool fallback_centroid = false;  // there was no wrap: distances are to the component's centroid
   Notes notes;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
+  static void archive(auto& s, auto& a) {
     a(s.nodes, s.segments, s.distance, s.radius, s.fallback_centroid, s.notes);
   }
 };

@@ -1,7 +1,6 @@
 #include "stages/fill/fill.h"
 
 #include "stages/base/parallel.h"
-#include "stages/data/coverage.h"
 #include "stages/image/decode_image.h"
 #include "stages/image/resize.h"
 #include "stages/jpeg/block_transform.h"
@@ -269,9 +268,8 @@ class PushPull {
   }
 
   /// Mean of the covered among the four texels at (2x, 2y).
-  template <class Covered>
   static void push_texel(const std::uint8_t* from, std::uint32_t width, std::uint32_t height, std::uint32_t x,
-                         std::uint32_t y, const Covered& is_covered, Level& to) {
+                         std::uint32_t y, const auto& is_covered, Level& to) {
     std::uint32_t sum[C] = {}, count = 0;
     for (std::uint32_t v = 2 * y; v < std::min(2 * y + 2, height); ++v)
       for (std::uint32_t u = 2 * x; u < std::min(2 * x + 2, width); ++u) {

@@ -2,7 +2,6 @@
 #include <span>
 
 #include "stages/base/run_context.h"
-#include "stages/data/subsampling.h"
 #include "stages/image/pixel_window.h"
 
 namespace texmesh {

@@ -2,7 +2,6 @@
 
 #include "stages/base/run_context.h"
 #include "stages/data/ladder.h"
-#include "stages/data/pixels.h"
 #include "stages/jpeg/jpeg_coder.h"
 
 namespace texmesh {

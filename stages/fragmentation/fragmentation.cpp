@@ -3,10 +3,8 @@
 #include <bit>
 #include <tuple>
 
-#include "format/base/no_index.h"
 #include "format/model/material_extensions.h"
 #include "stages/base/parallel.h"
-#include "stages/data/coverage.h"
 #include "stages/fragmentation/fragment_grid.h"
 #include "stages/geometry/texel_coverage.h"
 
@@ -171,8 +169,7 @@ double area_in_space(const Mesh& mesh, std::size_t triangle) {
 
 /// Calls body(triangle, use, whether it is the first use of that material, corners in texels) for the
 /// triangles of every use, and returns what it had to leave out.
-template <class Body>
-TriangleFaults for_each_triangle(const Mesh& mesh, const Job& job, const Body& body) {
+TriangleFaults for_each_triangle(const Mesh& mesh, const Job& job, const auto& body) {
   TriangleFaults faults;
   for (std::size_t u = 0; u < job.uses.size(); ++u) {
     const Use& use = job.uses[u];

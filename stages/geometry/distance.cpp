@@ -25,8 +25,7 @@ void sort_by_code(std::vector<CurvedTriangle>& items) {
 }
 
 /// The triangles in the order of a space-filling curve through their centres.
-template <class Centre>
-std::vector<CurvedTriangle> along_curve(std::size_t count, Centre&& centre) {
+std::vector<CurvedTriangle> along_curve(std::size_t count, auto&& centre) {
   std::vector<CurvedTriangle> order(count);
   if (count == 0) return order;
   Box3f centres;

@@ -3,7 +3,7 @@
 #include <limits>
 
 #include "format/base/portable_math.h"
-#include "stages/data/coverage.h"
+#include "stages/data/fragments.h"
 
 namespace texmesh {
 namespace {

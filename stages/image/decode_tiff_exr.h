@@ -5,7 +5,7 @@
 #include <functional>
 #include <variant>
 
-#include "stages/image/image_format.h"
+#include "stages/image/decode_image.h"
 
 namespace texmesh {
 

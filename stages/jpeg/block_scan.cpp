@@ -48,8 +48,7 @@ void store_quad(BlockValues& to, std::size_t k, Quad q) { std::memcpy(to.data() 
 Quad magnitude(Quad q) { return (Quad)((Bits)q & 0x7fffffff); }
 
 /// Bit k: coefficient k is one of those that a comparison of quads says.
-template <class Compare>
-std::uint64_t mask_where(const Compare& compare) {
+std::uint64_t mask_where(const auto& compare) {
   Bits low{}, high{}, bit{1, 2, 4, 8};
   for (std::size_t k = 0; k < 32; k += 4, bit <<= 4) {
     low |= compare(k) & bit;
@@ -374,8 +373,7 @@ std::uint32_t reach_end(std::uint32_t place, std::uint32_t factor, std::uint32_t
 }
 
 /// A row or column of `count` samples becomes one of count / factor; `at` gives a sample by its place.
-template <class At>
-float triangle_mean(std::uint32_t place, std::uint32_t factor, std::uint32_t count, const At& at) {
+float triangle_mean(std::uint32_t place, std::uint32_t factor, std::uint32_t count, const auto& at) {
   if (factor == 1) return at(place);
   float sum = 0;
   for (std::uint32_t d = 0; d < 2 * factor; ++d) {

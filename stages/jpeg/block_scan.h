@@ -225,8 +225,7 @@ class CountSink {
 };
 
 /// The symbols of a block, ISO 10918-1 F.1.2.
-template <class Sink>
-void emit_block(const CodedBlock& block, int dc_before, std::size_t component, Sink& sink) {
+void emit_block(const CodedBlock& block, int dc_before, std::size_t component, auto& sink) {
   const auto size = [](int v) {
     return static_cast<unsigned>(std::bit_width(static_cast<unsigned>(std::abs(v))));
   };

@@ -2,7 +2,6 @@
 #include <span>
 
 #include "stages/data/pixels.h"
-#include "stages/data/subsampling.h"
 
 namespace texmesh {
 

@@ -12,7 +12,6 @@
 // libjpeg needs its own header first.
 #include <jerror.h>
 
-#include "format/base/errors.h"
 #include "stages/jpeg/jpeg.h"
 
 namespace texmesh {
@@ -43,8 +42,7 @@ struct JpegErrors {
 /// Runs body(); false when libjpeg failed, with the reason in errors.message. libjpeg is C and leaves by
 /// longjmp, so the body must own nothing: no automatic object with a destructor may live in it while it calls
 /// libjpeg.
-template <class Body>
-bool jpeg_guarded(JpegErrors& errors, Body&& body) {
+bool jpeg_guarded(JpegErrors& errors, auto&& body) {
   if (setjmp(errors.jump)) return false;
   body();
   return true;
@@ -179,8 +177,7 @@ struct Compressor {
   Compressor(const Compressor&) = delete;
   Compressor& operator=(const Compressor&) = delete;
 
-  template <class Body>
-  void run(Body&& body) {
+  void run(auto&& body) {
     if (jpeg_guarded(errors, body)) return;
     const std::string message = errors.message;
     jpeg_abort_compress(&info);

@@ -73,8 +73,7 @@ struct Support {
 };
 
 /// Calls visit(fragment) for every fragment of the plane that the rectangle touches.
-template <class Visit>
-void for_each_fragment(const TexturePlane& plane, const TexelRectangle& rectangle, const Visit& visit) {
+void for_each_fragment(const TexturePlane& plane, const TexelRectangle& rectangle, const auto& visit) {
   const std::uint32_t w = plane.fragment_width_px, h = plane.fragment_height_px;
   for (std::uint32_t row = rectangle.top_px / h; row <= (rectangle.bottom_px() - 1) / h; ++row)
     for (std::uint32_t column = rectangle.left_px / w; column <= (rectangle.right_px() - 1) / w; ++column)
@@ -176,8 +175,7 @@ class WantedLevel {
   }
   /// The mean over the windows, each of which weighs as much as its fragment's surface; 0 where nothing is
   /// covered. shown(window) gives the samples of a window.
-  template <class Shown>
-  double loss(const Shown& shown) const {
+  double loss(const auto& shown) const {
     double sum = 0, whole = 0;
     for (std::size_t w = 0; w < windows_.size(); ++w) {
       const double weight =

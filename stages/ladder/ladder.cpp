@@ -3,7 +3,6 @@
 
 #include "format/rules/size_curve.h"
 #include "stages/fragment_codec/coding_space.h"
-#include "stages/image/check_pixels.h"
 #include "stages/image/decode_image.h"
 #include "stages/jpeg/jpeg_bits.h"
 #include "stages/ladder/choose_rungs.h"

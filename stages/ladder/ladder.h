@@ -5,7 +5,6 @@
 #include "stages/data/pixels.h"
 #include "stages/data/previews.h"
 #include "stages/data/stage.h"
-#include "stages/data/subsampling.h"
 
 namespace texmesh {
 
@@ -41,8 +40,7 @@ struct LadderOptions {
   int preview_quality = 60;  // stages/previews reads it; the ladder is made from the previews
   bool prune = true;
   bool keep_source = false;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("mode", s.mode,
       "jpeg = baseline JPEGs; progressive = one progressive JPEG per fragment, of which each rung is a "
       "beginning (fragments then have 256 px or more, unless min_fragment_px is set); webp = lossy WebP for "

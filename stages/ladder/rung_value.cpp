@@ -1,10 +1,9 @@
 #include "stages/ladder/rung_value.h"
 
 #include <algorithm>
-#include <array>
 
 #include "format/base/portable_math.h"
-#include "format/rules/ordinary_loads.h"
+#include "format/rules/viewing.h"
 
 namespace texmesh {
 

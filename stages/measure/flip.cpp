@@ -2,7 +2,6 @@
 
 #include "stages/base/float_math.h"
 #include "stages/measure/cie_lab.h"
-#include "stages/measure/sampled_curve.h"
 
 namespace texmesh {
 namespace {
@@ -251,8 +250,7 @@ Seen seen_at(const FlipPicture& picture, const FlipPicture::Row& row, std::uint3
 }
 
 /// Calls visit(x, y, FLIP) for every pixel that either picture covers, row by row.
-template <class Visit>
-void for_each_flip(const FlipPicture& reference, const FlipPicture& test, Visit&& visit) {
+void for_each_flip(const FlipPicture& reference, const FlipPicture& test, auto&& visit) {
   FlipBlock block;
   for (std::size_t y = 0; y < reference.rows.size(); ++y) {
     const auto finish = [&] {

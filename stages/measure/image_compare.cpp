@@ -1,7 +1,7 @@
 #include "stages/measure/image_compare.h"
 
 #include "format/base/srgb.h"
-#include "stages/measure/sampled_curve.h"
+#include "stages/base/float_math.h"
 
 namespace texmesh {
 namespace {
@@ -32,8 +32,7 @@ class Windowed {
       : spans_(spans), rows_(spans, plain, window()), row_(whole_blocks(spans.side_px)) {}
   float plain() const { return filtered_plain(rows_.plain(), window()); }
   /// Row y. Rows are asked for one after the other; `values_of(row)` gives those of its span.
-  template <class ValuesOf>
-  const std::vector<float>& row(std::size_t y, ValuesOf&& values_of) {
+  const std::vector<float>& row(std::size_t y, auto&& values_of) {
     for (; made_ < std::min(spans_.rows.size(), y + window().size() / 2 + 1); ++made_)
       rows_.make(made_, values_of(made_));
     rows_.read(y, window(), row_.data());

@@ -3,7 +3,7 @@
 #include <set>
 
 #include "format/base/box.h"
-#include "format/base/clean_text.h"
+#include "format/base/text_bytes.h"
 #include "format/documents/package_writer.h"
 #include "format/rules/viewing.h"
 #include "stages/base/run_context.h"

@@ -195,8 +195,7 @@ std::vector<double> compare_scales(const NestedScales& scales, const Skeleton& s
 /// Of kept scales with nearly the same number of triangles only the finest stays, and the coarsest of all.
 /// The finest is enough wherever the others are, major ones too, and the others would only add bytes to the
 /// package. Atlases whose vertices are nearly all locked give rows of such scales.
-template <class LogTriangles>
-void drop_neighbours(std::size_t n, const LogTriangles& log_triangles, std::vector<std::uint8_t>& kept) {
+void drop_neighbours(std::size_t n, const auto& log_triangles, std::vector<std::uint8_t>& kept) {
   const double least = portable::log(1.5);
   std::size_t finer = 0;
   for (std::size_t k = 1; k + 1 < n; ++k) {

@@ -3,7 +3,6 @@
 #include "stages/jpeg/jpeg.h"
 #include "stages/poster/poster_camera.h"
 #include "stages/render/shade.h"
-#include "stages/render/shown_materials.h"
 
 namespace texmesh {
 namespace {

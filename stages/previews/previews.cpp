@@ -1,7 +1,7 @@
 #include "stages/previews/previews.h"
 
 #include "stages/base/parallel.h"
-#include "stages/image/check_pixels.h"
+#include "stages/image/pixel_window.h"
 #include "stages/image/resize.h"
 #include "stages/jpeg/jpeg.h"
 

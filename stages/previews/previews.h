@@ -4,7 +4,6 @@
 #include "stages/data/pixels.h"
 #include "stages/data/previews.h"
 #include "stages/data/stage.h"
-#include "stages/data/subsampling.h"
 
 namespace texmesh {
 

@@ -20,8 +20,7 @@ struct QualityOptions {
   int rung_samples = 3;
   double flip_mean = 0.05;
   double flip_p95 = 0.15;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("views", s.views, Range{1, 64},
       "directions in which a scale must pass at displayed heights up to a quarter of the largest");
     v("large_views", s.large_views, Range{1, 64},
@@ -82,7 +81,7 @@ struct QualityOptions {
 ///   ratio to it where both were rendered; a highest rung that was not has a ratio of 1. Each size has the
 ///   knots of the others that lie far from its own: mips have few rungs. Of a model with a sampler that reads
 ///   level 0 alone, all of this is rendered at every size. Planes are those that a client shows at the size
-///   (format/rules/mip_choice.h). Planes of one group have the rung whose quality is nearest to that of the
+///   (format/rules/viewing.h). Planes of one group have the rung whose quality is nearest to that of the
 ///   group's first plane. FLIP of knots is scaled so that the mean over fragments of GroupCurve::coded() is
 ///   what was measured for whole planes.
 /// - Exponent and error: of samples with all groups changed, on S_0 and on coarser scales, with the lowest

@@ -2,7 +2,7 @@
 
 #include <deque>
 
-#include "format/rules/mip_choice.h"
+#include "format/rules/viewing.h"
 
 namespace texmesh {
 namespace {

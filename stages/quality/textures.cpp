@@ -4,8 +4,8 @@
 
 #include <cstdlib>
 
-#include "format/rules/mip_choice.h"
-#include "format/rules/rate_distortion.h"
+#include "format/rules/allocation.h"
+#include "format/rules/viewing.h"
 #include "stages/base/parallel.h"
 #include "stages/data/stage.h"
 #include "stages/fragment_codec/fragment_codec.h"

@@ -5,7 +5,6 @@
 #include "format/documents/quality_table.h"
 #include "format/documents/tables.h"
 #include "format/documents/textures.h"
-#include "stages/data/fragments.h"
 #include "stages/data/ladder.h"
 #include "stages/data/previews.h"
 #include "stages/render/render_texture.h"
@@ -112,7 +111,7 @@ struct Display {
   double displayed_px = 0;
 };
 
-/// The mip of a full-size plane that a client shows (format/rules/mip_choice.h), at most the last one
+/// The mip of a full-size plane that a client shows (format/rules/viewing.h), at most the last one
 /// with whole texels along both axes.
 std::uint32_t shown_plane(const TextureData& data, std::uint32_t full_size, const Display& display);
 

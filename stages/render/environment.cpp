@@ -1,6 +1,5 @@
 #include "stages/render/environment.h"
 
-#include <algorithm>
 #include <cstring>
 #include <iterator>
 
@@ -56,8 +55,7 @@ Quad read_level(const Level& level, Vec2f place) {
   return top + (bottom - top) * fy;
 }
 
-template <class F>
-Level make_level(std::uint32_t inner_side, const RunContext& context, F value_of) {
+Level make_level(std::uint32_t inner_side, const RunContext& context, auto value_of) {
   Level level;
   level.side = inner_side + 2;
   level.texels.resize(static_cast<std::size_t>(level.side) * level.side);

@@ -1,7 +1,5 @@
 #include "stages/render/fragment_shader.h"
 
-#include <algorithm>
-
 #include "stages/render/shade.h"
 
 namespace texmesh {

@@ -3,8 +3,8 @@
 #include <optional>
 
 #include "stages/render/brdf.h"
-#include "stages/render/edge_planes.h"
 #include "stages/render/render_texture.h"
+#include "stages/render/visibility_tile.h"
 
 namespace texmesh {
 

@@ -1,4 +1,5 @@
 #pragma once
+#include "stages/data/fragments.h"
 #include "stages/data/pixels.h"
 #include "stages/render/visibility.h"
 
@@ -80,5 +81,16 @@ struct UvMatrix {
   Vec2f direction(Vec2f uv) const { return {a * uv.x + b * uv.y, d * uv.x + e * uv.y}; }
 };
 UvMatrix uv_matrix(const UvTransform& transform);
+
+struct ShownMaterials {
+  std::vector<RenderMaterial> materials;  // their slots count `textures`
+  std::vector<RenderTexture> textures;
+};
+
+/// Textures come from the coarsest mip whose longer side has `least_side_px`, or from the full size.
+/// References to texture coordinates that the mesh does not have show nothing.
+ShownMaterials shown_materials(const std::vector<Material>& materials, const Fragments& fragments,
+                               const std::vector<Pixels>& pixels, const Mesh& mesh,
+                               std::uint32_t least_side_px, const RunContext& context);
 
 }  // namespace texmesh

@@ -1,7 +1,6 @@
 #include "stages/render/shade.h"
 
 #include "stages/base/parallel.h"
-#include "stages/measure/sampled_curve.h"
 #include "stages/render/fragment_shader.h"
 
 namespace texmesh {

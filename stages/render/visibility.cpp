@@ -169,8 +169,7 @@ struct Bins {
   std::vector<std::uint32_t> triangles;
 };
 
-template <class F>
-void for_each_tile(const SampleBox& box, std::uint32_t tiles, F f) {
+void for_each_tile(const SampleBox& box, std::uint32_t tiles, auto f) {
   if (box.empty()) return;
   constexpr auto kSide = static_cast<std::int32_t>(kTileSamples);
   for (std::int32_t y = box.y_first / kSide; y <= box.y_last / kSide; ++y)

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <optional>
 
-#include "format/base/no_index.h"
-
 #ifdef __SSE2__
 #include <emmintrin.h>
 #endif
@@ -57,8 +55,7 @@ class TileTriangle {
   }
 
   /// Calls f(x, y, nearness) for every sample of the tile that the triangle covers.
-  template <class F>
-  void for_each_sample(F f) const {
+  void for_each_sample(auto f) const {
     const auto& e = planes_.edge;
     const bool owns[3] = {owns_edge(e[0]), owns_edge(e[1]), owns_edge(e[2])};
     auto inside = [](double value, bool own) { return value > 0 || (value == 0 && own); };
@@ -89,8 +86,7 @@ class TileTriangle {
  private:
 #ifdef __SSE2__
   /// The samples x to `last` of a row; as one after the other, of triangles wholly in front.
-  template <class F>
-  void for_each_pair(const double row[3], std::int32_t y, std::int32_t x, std::int32_t last, F f) const {
+  void for_each_pair(const double row[3], std::int32_t y, std::int32_t x, std::int32_t last, auto f) const {
     const __m128d none = _mm_setzero_pd(), left = _mm_set1_pd(x_), two = _mm_set1_pd(2);
     __m128d slope[3], offset[3], owned[3];
     for (std::size_t k = 0; k < 3; ++k) {

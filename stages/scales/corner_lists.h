@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "format/base/errors.h"
-#include "format/base/no_index.h"
+#include "format/base/vec.h"
 #include "format/split/look_ahead.h"
 
 namespace texmesh {

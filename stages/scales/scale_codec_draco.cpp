@@ -42,8 +42,7 @@ class DracoPrimitive {
   static DracoGrid draco_grid(const QuantisationGrid& grid) { return {grid.bits, grid.origin, grid.range}; }
 
   /// Floats of the wedges.
-  template <class Value>
-  void add(const std::string& name, const char* type, const DracoGrid& grid, const Value& of_wedge) {
+  void add(const std::string& name, const char* type, const DracoGrid& grid, const auto& of_wedge) {
     mesh_.add(name, grid, [&](std::uint32_t i) { return of_wedge(primitive_.wedges[i]); });
     accessors_.push_back({name, {{"componentType", kFloat}, {"count", 0}, {"type", type}}});
   }

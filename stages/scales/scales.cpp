@@ -1,7 +1,6 @@
 
 
 #include "format/container/layout.h"
-#include "format/split/split_writer.h"
 #include "stages/base/parallel.h"
 #include "stages/image/png_writer.h"
 #include "stages/jpeg/jpeg.h"

@@ -1,5 +1,5 @@
 #pragma once
-#include "format/split/split_source.h"
+#include "format/split/split_writer.h"
 #include "stages/base/run_context.h"
 #include "stages/scales/scale_grid.h"
 

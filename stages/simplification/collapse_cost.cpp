@@ -43,8 +43,7 @@ double mean_edge(const CollapseMesh& mesh) {
   return sum / (3 * static_cast<double>(std::max<std::size_t>(mesh.faces().size(), 1)));
 }
 
-template <class Same>
-bool colours_vary(const Mesh& input, Same&& same) {
+bool colours_vary(const Mesh& input, auto&& same) {
   return !std::all_of(input.colours.begin(), input.colours.end(),
                       [&](const Vec4f& c) { return same(c, input.colours[0]); });
 }

@@ -1,5 +1,4 @@
 #pragma once
-#include "stages/base/run_context.h"
 #include "stages/simplification/collapse_cost.h"
 #include "stages/simplification/collapse_queue.h"
 

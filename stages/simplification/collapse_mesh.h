@@ -1,7 +1,6 @@
 #pragma once
 #include <span>
 
-#include "format/base/no_index.h"
 #include "stages/data/conditioned_mesh.h"
 
 namespace texmesh {
@@ -59,8 +58,7 @@ class CollapseMesh {
   std::uint32_t add_wedge(std::uint32_t wedge, std::uint32_t position);
   /// Merges `from` into `to`: faces with both are removed, other corners of `from` get point `to` and the
   /// wedge that `wedge_map(old wedge)` names.
-  template <class WedgeMap>
-  void collapse(std::uint32_t from, std::uint32_t to, WedgeMap&& wedge_map) {
+  void collapse(std::uint32_t from, std::uint32_t to, auto&& wedge_map) {
     moved_.clear();
     const List list = lists_[from];
     for (std::uint32_t i = 0; i < list.count; ++i) {

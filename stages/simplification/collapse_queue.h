@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "format/base/no_index.h"
+#include "format/base/vec.h"
 
 namespace texmesh {
 

@@ -170,8 +170,7 @@ bool CollapseRing::keeps_positions(std::uint32_t slot) const {
 }
 
 /// Texture triangles without area may become anything.
-template <class Uv>
-bool CollapseRing::turns_over(const Corner& c, const WedgeMap& map, Uv&& uv) const {
+bool CollapseRing::turns_over(const Corner& c, const WedgeMap& map, auto&& uv) const {
   const CollapseMesh::Face& face = mesh_.faces()[c.face];
   const Vec2d a = uv(face.wedge[(c.corner + 1) % 3]), b = uv(face.wedge[(c.corner + 2) % 3]);
   const Vec2d from = uv(wedges_[c.wedge]), to = uv(map.target[c.wedge]);

@@ -70,8 +70,7 @@ class CollapseRing {
   std::uint32_t slot_of(std::uint32_t point);
   bool positions_agree(const Neighbour& n) const;
   bool keeps_positions(std::uint32_t slot) const;
-  template <class Uv>
-  bool turns_over(const Corner& c, const WedgeMap& map, Uv&& uv) const;
+  bool turns_over(const Corner& c, const WedgeMap& map, auto&& uv) const;
 
   const CollapseMesh& mesh_;
   std::uint32_t centre_ = kNone, now_ = 0;

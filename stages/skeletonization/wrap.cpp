@@ -7,8 +7,6 @@
 #include <numeric>
 
 #include "format/base/box.h"
-#include "format/base/no_index.h"
-#include "stages/skeletonization/geometry_failure.h"
 
 namespace texmesh {
 namespace {

@@ -3,7 +3,7 @@
 
 #include "format/base/portable_math.h"
 #include "stages/base/parallel.h"
-#include "stages/geometry/weld.h"
+#include "stages/geometry/mesh_topology.h"
 #include "stages/ssf/ssf.h"
 
 namespace texmesh {

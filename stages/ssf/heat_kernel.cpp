@@ -1,7 +1,6 @@
 #include "stages/ssf/heat_kernel.h"
 
 #include <algorithm>
-#include <array>
 #include <limits>
 #include <memory>
 

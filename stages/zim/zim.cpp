@@ -4,7 +4,6 @@
 #include <cstdlib>
 
 #include "stages/base/parallel.h"
-#include "stages/data/coverage.h"
 
 namespace texmesh {
 namespace {

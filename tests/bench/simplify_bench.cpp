@@ -15,7 +15,7 @@
 #include "examples/scan_model.h"
 #include "stages/condition/condition.h"
 #include "stages/simplification/collapse_engine.h"
-#include "stages/simplification/scale_error.h"
+#include "stages/simplification/simplification.h"
 
 namespace {
 

@@ -12,7 +12,6 @@
 #include <filesystem>
 
 #include "format/split/split_reader.h"
-#include "format/split/split_source.h"
 #include "format/split/split_writer.h"
 #include "pipeline/import/import.h"
 #include "pipeline/io/file_resolver.h"

@@ -5,7 +5,6 @@
 #include "delivery/cpp/client/delivery_plan.h"
 #include "format/container/layout.h"
 #include "format/rules/allocation.h"
-#include "format/rules/rate_distortion.h"
 #include "format/rules/size_curve.h"
 #include "format/split/split_reader.h"
 #include "format/split/split_stream.h"

@@ -6,7 +6,7 @@
 
 #include "delivery/cpp/decide/gpu_memory.h"
 #include "format/base/portable_math.h"
-#include "format/rules/rate_distortion.h"
+#include "format/rules/allocation.h"
 
 namespace texmesh {
 namespace {

@@ -3,8 +3,8 @@
 #include <algorithm>
 
 #include "format/base/errors.h"
-#include "format/rules/mip_choice.h"
-#include "format/rules/rate_distortion.h"
+#include "format/rules/allocation.h"
+#include "format/rules/viewing.h"
 
 namespace texmesh {
 namespace {

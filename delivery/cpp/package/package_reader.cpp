@@ -5,7 +5,7 @@
 #include <set>
 
 #include "format/base/bytes.h"
-#include "format/base/rule_error.h"
+#include "format/base/errors.h"
 #include "format/container/layout.h"
 #include "format/documents/index.h"
 

@@ -11,7 +11,7 @@
 #include "delivery/cpp/package/http_store.h"
 #include "delivery/cpp/package/package_reader.h"
 #include "format/base/bytes.h"
-#include "format/base/rule_error.h"
+#include "format/base/errors.h"
 #include "format/container/layout.h"
 
 namespace texmesh {

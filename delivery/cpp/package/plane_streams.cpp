@@ -4,7 +4,7 @@
 #include <string>
 #include <utility>
 
-#include "format/base/rule_error.h"
+#include "format/base/errors.h"
 
 namespace texmesh {
 namespace {

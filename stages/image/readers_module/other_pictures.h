@@ -3,7 +3,7 @@
 // list of kinds (SPEC.md X03, W06), so these files become others with the same texels when they are imported.
 #include <cstddef>
 
-#include "stages/image/image_format.h"
+#include "stages/image/decode_image.h"
 
 namespace texmesh {
 

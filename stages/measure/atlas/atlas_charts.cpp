@@ -5,7 +5,6 @@
 
 #include "format/base/srgb.h"
 #include "stages/base/parallel.h"
-#include "stages/geometry/weld.h"
 #include "stages/measure/atlas/atlas_parts.h"
 #include "stages/measure/cie_lab.h"
 

@@ -7,7 +7,6 @@
 #include <cstddef>
 #include <numeric>
 
-#include "format/base/no_index.h"
 #include "stages/proxies/atlas/packing_grid.h"
 
 namespace texmesh {

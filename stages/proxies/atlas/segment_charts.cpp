@@ -8,7 +8,6 @@
 #include <complex>
 #include <numeric>
 
-#include "format/base/no_index.h"
 #include "format/base/portable_math.h"
 #include "stages/geometry/mesh_topology.h"
 #include "stages/proxies/atlas/flat_chart.h"

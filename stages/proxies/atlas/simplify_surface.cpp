@@ -7,7 +7,6 @@
 #include "format/base/box.h"
 #include "stages/geometry/mesh_topology.h"
 #include "stages/geometry/quadric.h"
-#include "stages/geometry/weld.h"
 #include "stages/proxies/atlas/pair_queue.h"
 
 namespace texmesh {

@@ -2,7 +2,6 @@
 // What no chart covers continues the charts smoothly (push_pull()).
 #include "stages/proxies/bake/bake.h"
 
-#include "format/base/no_index.h"
 #include "stages/base/parallel.h"
 
 namespace texmesh {

@@ -1,7 +1,5 @@
 #include "stages/proxies/bake/bake_source.h"
 
-#include "format/base/no_index.h"
-
 namespace texmesh {
 namespace {
 

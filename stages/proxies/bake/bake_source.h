@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "stages/geometry/triangle_tree.h"
-#include "stages/render/shown_materials.h"
+#include "stages/render/render_texture.h"
 
 namespace texmesh {
 

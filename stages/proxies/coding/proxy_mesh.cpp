@@ -2,7 +2,6 @@
 
 #include <meshoptimizer.h>
 
-#include "format/base/no_index.h"
 #include "stages/gltf/glb_writer.h"
 
 namespace texmesh {

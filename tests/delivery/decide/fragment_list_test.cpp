@@ -9,7 +9,6 @@
 #include "delivery/cpp/client/delivery_plan.h"
 #include "format/base/errors.h"
 #include "format/rules/allocation.h"
-#include "format/rules/rate_distortion.h"
 #include "format/rules/size_curve.h"
 #include "tests/support/packages.h"
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "format/rules/ordinary_loads.h"
+#include "format/rules/viewing.h"
 
 namespace texmesh {
 namespace {

@@ -1,7 +1,7 @@
 #pragma once
 // Small atlases made by hand.
 #include "stages/proxies/atlas_mesh.h"
-#include "stages/render/shown_materials.h"
+#include "stages/render/render_texture.h"
 #include "tests/stages/render/render_fixtures.h"
 
 namespace texmesh::testing {

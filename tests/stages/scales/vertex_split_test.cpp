@@ -8,7 +8,6 @@
 
 #include "format/base/sha256.h"
 #include "format/split/split_reader.h"
-#include "format/split/split_source.h"
 #include "format/split/split_writer.h"
 #include "stages/condition/condition.h"
 #include "stages/scales/scale_grid.h"

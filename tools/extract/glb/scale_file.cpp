@@ -1,6 +1,5 @@
 #include "tools/extract/glb/scale_file.h"
 
-#include "format/split/split_model.h"
 #include "format/split/split_reader.h"
 #include "pipeline/import/import.h"
 #include "pipeline/io/file_resolver.h"

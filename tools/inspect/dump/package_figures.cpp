@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "format/rules/allocation.h"
-#include "format/rules/rate_distortion.h"
 
 namespace texmesh {
 namespace {

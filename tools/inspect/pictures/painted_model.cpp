@@ -4,8 +4,8 @@
 
 #include <fmt/format.h>
 
-#include "format/base/no_index.h"
 #include "format/base/srgb.h"
+#include "format/base/vec.h"
 #include "format/rules/allocation.h"
 #include "pipeline/io/table.h"
 #include "stages/geometry/component_boxes.h"

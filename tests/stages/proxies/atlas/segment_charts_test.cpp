@@ -7,7 +7,7 @@
 #include <cmath>
 #include <map>
 
-#include "format/base/no_index.h"
+#include "format/base/vec.h"
 #include "stages/proxies/atlas/flat_chart.h"
 #include "tests/stages/proxies/proxy_shapes.h"
 

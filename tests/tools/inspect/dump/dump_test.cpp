@@ -1,7 +1,6 @@
 #include <gtest/gtest.h>
 
 #include "format/rules/allocation.h"
-#include "format/rules/rate_distortion.h"
 #include "pipeline/compile/options.h"
 #include "pipeline/compile/profile.h"
 #include "pipeline/io/table.h"
