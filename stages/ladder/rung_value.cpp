@@ -9,7 +9,7 @@ namespace texmesh {
 
 Hull hull_of(const TextureRungs& texture, const std::vector<std::uint8_t>& keep, std::size_t wanted,
              LevelRange levels) {
-  Hull hull{{kPreview, 0, texture.preview_loss[wanted]}};
+  Hull hull{{kPreviewPair, 0, texture.preview_loss[wanted]}};
   for (;;) {
     const HullVertex at = hull.back();
     HullVertex best;
@@ -22,7 +22,7 @@ Hull hull_of(const TextureRungs& texture, const std::vector<std::uint8_t>& keep,
       const double slope = (at.loss - to.loss) / (to.bytes - at.bytes);
       if (slope > steepest || (slope == steepest && to.bytes > best.bytes)) steepest = slope, best = to;
     }
-    if (best.pair == kPreview) return hull;
+    if (best.pair == kPreviewPair) return hull;
     hull.push_back(best);
   }
 }
@@ -226,15 +226,15 @@ std::vector<std::uint8_t> better_than_the_preview(const TextureRungs& texture) {
 /// One pair of every level: of those that have none the best one.
 void keep_one_of_each_level(const TextureRungs& texture, std::vector<std::uint8_t>& keep) {
   for (std::size_t level = 0; level < texture.preview_loss.size(); ++level) {
-    std::size_t best = kPreview;
+    std::size_t best = kPreviewPair;
     bool any = false;
     for (std::size_t k = 0; k < keep.size(); ++k) {
       const RungPair& pair = texture.pairs[k];
       if (pair.level != level) continue;
       any = any || keep[k];
-      if (best == kPreview || pair.loss[level] < texture.pairs[best].loss[level]) best = k;
+      if (best == kPreviewPair || pair.loss[level] < texture.pairs[best].loss[level]) best = k;
     }
-    if (!any && best != kPreview) keep[best] = 1;
+    if (!any && best != kPreviewPair) keep[best] = 1;
   }
 }
 
@@ -355,7 +355,7 @@ struct LeastWorth {
   double rise_per_byte = 0;  // PairWorth::rise
 };
 
-/// The pair to go next; kPreview for none. Fixed pairs and the last one of every level stay, and those of
+/// The pair to go next; kPreviewPair for none. Fixed pairs and the last one of every level stay, and those of
 /// `gap_closing` as long as another one can go.
 std::size_t next_to_go(const TextureRungs& texture, const std::vector<std::uint8_t>& keep,
                        const std::vector<std::uint8_t>& gap_closing, const std::vector<PairWorth>& worth,
@@ -363,7 +363,7 @@ std::size_t next_to_go(const TextureRungs& texture, const std::vector<std::uint8
   std::vector<std::size_t> of_level(texture.preview_loss.size());
   for (std::size_t k = 0; k < keep.size(); ++k) of_level[texture.pairs[k].level] += keep[k];
   const bool too_much = bytes_of(texture, keep) > texture.most_bytes;
-  std::size_t next = kPreview;
+  std::size_t next = kPreviewPair;
   bool next_closes = false;
   double least = 0;
   for (std::size_t k = 0; k < keep.size(); ++k) {
@@ -372,7 +372,8 @@ std::size_t next_to_go(const TextureRungs& texture, const std::vector<std::uint8
     const double per_byte = worth[k].rise / static_cast<double>(std::max<std::uint64_t>(pair.bytes, 1));
     const bool chosen = worth[k].loads >= least_worth.loads, closes = chosen && gap_closing[k];
     if (!too_much && (closes || (chosen && per_byte >= least_worth.rise_per_byte))) continue;
-    if (next != kPreview && (closes > next_closes || (closes == next_closes && per_byte >= least))) continue;
+    if (next != kPreviewPair && (closes > next_closes || (closes == next_closes && per_byte >= least)))
+      continue;
     next = k, next_closes = closes, least = per_byte;
   }
   return next;
@@ -384,7 +385,7 @@ std::size_t next_to_go(const TextureRungs& texture, const std::vector<std::uint8
 void take_cheaper(const TextureRungs& texture, std::vector<std::uint8_t>& keep) {
   constexpr double kRoom = 0.97;
   while (bytes_of(texture, keep) > texture.most_bytes) {
-    std::size_t out = kPreview, in = kPreview;
+    std::size_t out = kPreviewPair, in = kPreviewPair;
     double least = 0;
     for (std::size_t k = 0; k < keep.size(); ++k)
       for (std::size_t c = 0; c < keep.size(); ++c) {
@@ -396,9 +397,9 @@ void take_cheaper(const TextureRungs& texture, std::vector<std::uint8_t>& keep) 
         const double enough = bytes_of(texture, keep) - kRoom * texture.most_bytes;
         const double rise = std::max(cheap.loss[cheap.level] - dear.loss[dear.level], 0.0);
         const double per_byte = (rise + kUnseen) / std::min(saved, enough);
-        if (in == kPreview || per_byte < least) out = k, in = c, least = per_byte;
+        if (in == kPreviewPair || per_byte < least) out = k, in = c, least = per_byte;
       }
-    if (in == kPreview) return;
+    if (in == kPreviewPair) return;
     keep[out] = 0, keep[in] = 1;
   }
 }
@@ -416,7 +417,7 @@ void drop_pairs(const TextureRungs& texture, const GivenBytes& given, const Leas
                                                         : std::vector<std::uint8_t>(keep.size());
       const std::size_t next =
           next_to_go(texture, keep, gap_closing, worth_of(texture, keep, given, whole), least_worth);
-      if (next == kPreview) return;
+      if (next == kPreviewPair) return;
       bound = bound || bytes_of(texture, keep) > texture.most_bytes;
       keep[next] = 0;
     }

@@ -64,11 +64,11 @@ std::vector<std::vector<std::uint8_t>> pairs_worth_storing(const std::vector<Tex
 /// 1 - SSIM that nobody sees: a rung that saves half of less is not worth twice as much.
 inline constexpr double kUnseen = 0.01;
 /// The preview, where pairs are numbered.
-inline constexpr std::size_t kPreview = std::numeric_limits<std::size_t>::max();
+inline constexpr std::size_t kPreviewPair = std::numeric_limits<std::size_t>::max();
 
 /// A vertex of a lower hull.
 struct HullVertex {
-  std::size_t pair = kPreview;
+  std::size_t pair = kPreviewPair;
   double bytes = 0, loss = 0;
 };
 using Hull = std::vector<HullVertex>;
