@@ -80,22 +80,6 @@ class MemorySource final : public ByteSource {
   std::string name_;
 };
 
-}  // namespace
-
-std::unique_ptr<ByteSource> open_file_source(const std::string& path) {
-  return std::make_unique<FileSource>(path);
-}
-
-std::unique_ptr<ByteSource> memory_source(std::span<const std::uint8_t> bytes, std::string name) {
-  return std::make_unique<MemorySource>(bytes, std::move(name));
-}
-
-std::unique_ptr<ByteSource> memory_source(std::vector<std::uint8_t>&& bytes, std::string name) {
-  return std::make_unique<MemorySource>(std::move(bytes), std::move(name));
-}
-
-namespace {
-
 constexpr std::uint64_t kAlignment = 64;
 constexpr std::uint64_t kMax16 = 0xffff, kMax32 = 0xffffffff;  // also what says "see ZIP64"
 constexpr std::uint16_t kDate1980 = 0x0021;
@@ -367,6 +351,18 @@ std::uint32_t crc_of(std::uint32_t crc, std::span<const std::uint8_t> bytes) {
 }
 
 }  // namespace
+
+std::unique_ptr<ByteSource> open_file_source(const std::string& path) {
+  return std::make_unique<FileSource>(path);
+}
+
+std::unique_ptr<ByteSource> memory_source(std::span<const std::uint8_t> bytes, std::string name) {
+  return std::make_unique<MemorySource>(bytes, std::move(name));
+}
+
+std::unique_ptr<ByteSource> memory_source(std::vector<std::uint8_t>&& bytes, std::string name) {
+  return std::make_unique<MemorySource>(std::move(bytes), std::move(name));
+}
 
 bool is_valid_entry_path(const std::string& path) {
   if (path == kContentCredentialPath) return true;

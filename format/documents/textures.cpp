@@ -113,52 +113,6 @@ TextureInfo read_texture(const JsonAt& at, std::uint32_t plane) {
   return t;
 }
 
-}  // namespace
-
-std::size_t full_size_planes(const std::vector<TextureInfo>& textures) {
-  return static_cast<std::size_t>(
-      std::ranges::find_if(textures, [](const TextureInfo& t) { return t.mip > 0; }) - textures.begin());
-}
-
-std::string write_textures(const std::vector<TextureInfo>& textures) {
-  Json j;
-  MemberWriter(j).list("textures", textures, 0, kMaxPackagePlanes,
-                       [](auto& to, const TextureInfo& t, std::size_t) { texture_members(to, t); });
-  std::string json = dump_json(j, kTexturesFile);
-  read_textures(text_bytes(json));
-  return json;
-}
-
-std::vector<TextureInfo> read_textures(std::span<const std::uint8_t> json) {
-  const nlohmann::json document = parse_json(json, kTexturesFile, kMaxTexturesBytes);
-  const JsonAt list = JsonAt(document, kTexturesFile)["textures"];
-  std::vector<TextureInfo> textures;
-  for (std::size_t i = 0, n = list.array(0, kMaxPackagePlanes); i < n; ++i)
-    textures.push_back(read_texture(list[i], static_cast<std::uint32_t>(i)));
-  check_mips(list, textures);
-  return textures;
-}
-
-void resolve_textures(std::vector<TextureInfo>& textures, const std::vector<EntryRef>& index) {
-  std::map<std::string, const EntryRef*> by_path;
-  for (const EntryRef& e : index) by_path[e.path] = &e;
-  const auto resolve = [&](EntryRef& ref) {
-    const auto it = by_path.find(ref.path);
-    if (it == by_path.end())
-      throw RuleError("R07", kIndexPath, ref.path, "an entry, for " + kTexturesFile + " speaks of it",
-                      "none");
-    ref = *it->second;
-  };
-  for (TextureInfo& t : textures) {
-    resolve(t.preview);
-    resolve(t.tables);
-    for (EntryRef& rung : t.rungs) resolve(rung);
-    if (!t.source_extension.empty()) resolve(t.source);
-  }
-}
-
-namespace {
-
 const std::string kQualityFile = kQualityPath;
 constexpr std::uint64_t kMaxQualityBytes = 4u << 20;
 
@@ -208,6 +162,48 @@ void quality_members(auto& v, auto& table) {
 }
 
 }  // namespace
+
+std::size_t full_size_planes(const std::vector<TextureInfo>& textures) {
+  return static_cast<std::size_t>(
+      std::ranges::find_if(textures, [](const TextureInfo& t) { return t.mip > 0; }) - textures.begin());
+}
+
+std::string write_textures(const std::vector<TextureInfo>& textures) {
+  Json j;
+  MemberWriter(j).list("textures", textures, 0, kMaxPackagePlanes,
+                       [](auto& to, const TextureInfo& t, std::size_t) { texture_members(to, t); });
+  std::string json = dump_json(j, kTexturesFile);
+  read_textures(text_bytes(json));
+  return json;
+}
+
+std::vector<TextureInfo> read_textures(std::span<const std::uint8_t> json) {
+  const nlohmann::json document = parse_json(json, kTexturesFile, kMaxTexturesBytes);
+  const JsonAt list = JsonAt(document, kTexturesFile)["textures"];
+  std::vector<TextureInfo> textures;
+  for (std::size_t i = 0, n = list.array(0, kMaxPackagePlanes); i < n; ++i)
+    textures.push_back(read_texture(list[i], static_cast<std::uint32_t>(i)));
+  check_mips(list, textures);
+  return textures;
+}
+
+void resolve_textures(std::vector<TextureInfo>& textures, const std::vector<EntryRef>& index) {
+  std::map<std::string, const EntryRef*> by_path;
+  for (const EntryRef& e : index) by_path[e.path] = &e;
+  const auto resolve = [&](EntryRef& ref) {
+    const auto it = by_path.find(ref.path);
+    if (it == by_path.end())
+      throw RuleError("R07", kIndexPath, ref.path, "an entry, for " + kTexturesFile + " speaks of it",
+                      "none");
+    ref = *it->second;
+  };
+  for (TextureInfo& t : textures) {
+    resolve(t.preview);
+    resolve(t.tables);
+    for (EntryRef& rung : t.rungs) resolve(rung);
+    if (!t.source_extension.empty()) resolve(t.source);
+  }
+}
 
 PlaneGroup group_of(std::string_view role) {
   if (role == "normal") return PlaneGroup::kNormal;

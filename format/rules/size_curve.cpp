@@ -81,6 +81,13 @@ double axis_at(const PlaneTables& t, double quality) {
   return low + (a.position + part * (b.position - a.position)) * (high - low);
 }
 
+/// log R = B log(100 p), by (8.8).
+double log_r(const SizeModel& model, double vqp) {
+  return static_cast<double>(model.b) * portable::log(100 * std::max(vqp, kLeastModelVqp));
+}
+
+bool has_model(const SizeModel& model) { return model.a > 0 && model.b > 0; }
+
 }  // namespace
 
 double fineness_of(std::span<const std::uint16_t> quantisers) {
@@ -146,17 +153,6 @@ std::vector<float> knot_positions(const std::vector<std::uint8_t>& rung_quality,
   }
   return out;
 }
-
-namespace {
-
-/// log R = B log(100 p), by (8.8).
-double log_r(const SizeModel& model, double vqp) {
-  return static_cast<double>(model.b) * portable::log(100 * std::max(vqp, kLeastModelVqp));
-}
-
-bool has_model(const SizeModel& model) { return model.a > 0 && model.b > 0; }
-
-}  // namespace
 
 double modelled_bytes(const SizeModel& model, double vqp, double quality) {
   if (!has_model(model)) return 0;

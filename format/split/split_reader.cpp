@@ -128,35 +128,6 @@ void add_attribute(const SplitAttribute& a, const std::vector<std::int32_t>& val
   }
 }
 
-}  // namespace
-
-Mesh split_model(const SplitStreamHead& head, const SplitMesh& mesh) {
-  Mesh out;
-  Numbering points(mesh.points().size()), wedges(mesh.wedge_point().size());
-  std::uint16_t parts = 0;
-  for (const std::uint32_t f : mesh.visible_faces()) {
-    Triangle t;
-    for (std::size_t k = 0; k < 3; ++k) t[k] = wedges.of(mesh.wedge_at(f, static_cast<std::uint32_t>(k)));
-    const SplitGroup group = head.groups[mesh.face_group()[f]];
-    out.triangles.push_back(t);
-    out.triangle_material.push_back(group.material);
-    out.triangle_part.push_back(group.part);
-    parts = std::max(parts, group.part);
-  }
-  for (const std::uint32_t w : wedges.used()) out.wedge_position.push_back(points.of(mesh.wedge_point()[w]));
-  for (const std::uint32_t p : points.used()) {
-    const SplitMesh::Point& place = mesh.points()[p];
-    out.positions.push_back({head.position.value(place[0], 0), head.position.value(place[1], 1),
-                             head.position.value(place[2], 2)});
-  }
-  for (std::size_t k = 0; k < head.attributes.size(); ++k)
-    add_attribute(head.attributes[k], mesh.values(k), wedges.used(), out);
-  out.part_names.resize(parts + std::size_t{1});
-  return out;
-}
-
-namespace {
-
 /// Decodes the values of one part. Where the part was left out every residual is 0.
 class PartDecoder {
  public:
@@ -244,6 +215,31 @@ SplitLimits checked_limits(const SplitStreamHead& head, const SplitLimits& limit
 }
 
 }  // namespace
+
+Mesh split_model(const SplitStreamHead& head, const SplitMesh& mesh) {
+  Mesh out;
+  Numbering points(mesh.points().size()), wedges(mesh.wedge_point().size());
+  std::uint16_t parts = 0;
+  for (const std::uint32_t f : mesh.visible_faces()) {
+    Triangle t;
+    for (std::size_t k = 0; k < 3; ++k) t[k] = wedges.of(mesh.wedge_at(f, static_cast<std::uint32_t>(k)));
+    const SplitGroup group = head.groups[mesh.face_group()[f]];
+    out.triangles.push_back(t);
+    out.triangle_material.push_back(group.material);
+    out.triangle_part.push_back(group.part);
+    parts = std::max(parts, group.part);
+  }
+  for (const std::uint32_t w : wedges.used()) out.wedge_position.push_back(points.of(mesh.wedge_point()[w]));
+  for (const std::uint32_t p : points.used()) {
+    const SplitMesh::Point& place = mesh.points()[p];
+    out.positions.push_back({head.position.value(place[0], 0), head.position.value(place[1], 1),
+                             head.position.value(place[2], 2)});
+  }
+  for (std::size_t k = 0; k < head.attributes.size(); ++k)
+    add_attribute(head.attributes[k], mesh.values(k), wedges.used(), out);
+  out.part_names.resize(parts + std::size_t{1});
+  return out;
+}
 
 std::array<std::int32_t, 4> split_mean(const SplitAttribute& attribute, std::size_t k, SplitMesh& mesh,
                                        const std::vector<std::uint32_t>& wedges) {

@@ -83,6 +83,8 @@ double triangle_distance2(Vec3d a, Vec3d b, Vec3d c) {
   return best;
 }
 
+constexpr int kMostCorners = 4;
+
 }  // namespace
 
 SurfaceDistance::SurfaceDistance(const std::vector<Vec3f>& positions,
@@ -269,12 +271,6 @@ std::vector<SurfaceSample> sample_surface(const std::vector<Vec3f>& positions,
   }
   return samples;
 }
-
-namespace {
-
-constexpr int kMostCorners = 4;
-
-}  // namespace
 
 std::vector<std::uint32_t> survivors(std::size_t positions, std::span<const Collapse> collapses,
                                      std::size_t count) {

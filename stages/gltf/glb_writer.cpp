@@ -12,6 +12,12 @@ namespace {
 
 constexpr int kUnsignedShort = 5123, kUnsignedInt = 5125;
 
+std::vector<std::uint8_t> of_size(std::vector<std::uint8_t> packed, std::size_t size, const char* stage) {
+  if (size == 0) throw StageError(stage, "meshopt", "a compressed stream", "nothing");
+  packed.resize(size);
+  return packed;
+}
+
 }  // namespace
 
 struct GlbWriter::Elements {
@@ -127,16 +133,6 @@ std::vector<std::uint8_t> GlbWriter::finish() const {
 
   return glb_container(root.dump(-1, ' ', false, Json::error_handler_t::replace), bin);
 }
-
-namespace {
-
-std::vector<std::uint8_t> of_size(std::vector<std::uint8_t> packed, std::size_t size, const char* stage) {
-  if (size == 0) throw StageError(stage, "meshopt", "a compressed stream", "nothing");
-  packed.resize(size);
-  return packed;
-}
-
-}  // namespace
 
 std::vector<std::uint8_t> meshopt_attributes(std::span<const std::uint8_t> bytes, std::size_t count,
                                              std::size_t stride, const char* stage) {

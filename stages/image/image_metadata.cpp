@@ -259,32 +259,6 @@ void read_exr(ByteSpan bytes, ImageMetadata& out) {
   });
 }
 
-}  // namespace
-
-ImageMetadata read_image_metadata(ImageFormat format, std::span<const std::uint8_t> bytes) {
-  ImageMetadata out;
-  switch (format) {
-    case ImageFormat::kJpeg:
-      read_jpeg(bytes, out);
-      break;
-    case ImageFormat::kPng:
-      read_png_metadata(bytes, out);
-      break;
-    case ImageFormat::kTiff:
-      read_tiff(bytes, out);
-      break;
-    case ImageFormat::kWebp:
-      read_webp(bytes, out);
-      break;
-    case ImageFormat::kExr:
-      read_exr(bytes, out);
-      break;
-  }
-  return out;
-}
-
-namespace {
-
 using Matrix = std::array<std::array<double, 3>, 3>;
 
 /// Columns: X, Y, Z (D50, as all profiles speak) of sRGB's red, green and blue at full light.
@@ -469,6 +443,28 @@ void convert_all(const ColourProfile& profile, const Sample* in, Pixels& pixels)
 }
 
 }  // namespace
+
+ImageMetadata read_image_metadata(ImageFormat format, std::span<const std::uint8_t> bytes) {
+  ImageMetadata out;
+  switch (format) {
+    case ImageFormat::kJpeg:
+      read_jpeg(bytes, out);
+      break;
+    case ImageFormat::kPng:
+      read_png_metadata(bytes, out);
+      break;
+    case ImageFormat::kTiff:
+      read_tiff(bytes, out);
+      break;
+    case ImageFormat::kWebp:
+      read_webp(bytes, out);
+      break;
+    case ImageFormat::kExr:
+      read_exr(bytes, out);
+      break;
+  }
+  return out;
+}
 
 ColourProfile read_icc_profile(const std::string& name, std::span<const std::uint8_t> bytes,
                                std::uint32_t channels, std::size_t codes) {

@@ -220,6 +220,39 @@ void measure_size(const TexturePlane& full, TextureRungs& out) {
   if (out.surface > 0) out.texels_across = std::sqrt(texels / (out.surface * kBallSurface));
 }
 
+// A rung with a tenth of a texture's bytes must lower the loss of loads by so many tenths of this part.
+constexpr double kGain = 0.05;
+constexpr double kLeastLoads = 0.01;
+// Of a JPEG's bytes.
+constexpr double kMostOfJpeg = 1.9;
+// Of the bytes of a source without loss, for its finest rung to stay whatever it is worth.
+constexpr double kMostOfLossless = 1.25;
+
+/// Indices of the rungs that `keep` marks, with those that they lean on.
+std::vector<std::size_t> kept_indices(std::vector<std::uint8_t> keep, bool incremental) {
+  if (incremental)
+    for (std::size_t r = keep.size() - 1; r-- > 0;) keep[r] |= keep[r + 1];
+  std::vector<std::size_t> out;
+  for (std::size_t r = 0; r < keep.size(); ++r)
+    if (keep[r]) out.push_back(r);
+  return out;
+}
+
+/// Fixes the rung that stands for a source without loss. The others are judged as if it were not there: it
+/// has two to three times the bytes of the next one, beside which too many of the others would seem cheap.
+void fix_finest(const TexturePlane& base, const PlaneLadder& ladder, const std::vector<Image>& images,
+                TextureRungs& texture) {
+  if (images.empty() || !is_lossless(images[base.image])) return;
+  const double most = kMostOfLossless * static_cast<double>(images[base.image].bytes.size());
+  for (RungPair& pair : texture.pairs) {
+    const bool finest = pair.level == 0 && ladder.rungs[pair.rung].quality == kFinestQuality;
+    if (finest && static_cast<double>(pair.bytes) <= most)
+      pair.fixed = true;
+    else
+      texture.whole_bytes = std::max(texture.whole_bytes, pair.bytes);
+  }
+}
+
 }  // namespace
 
 std::vector<std::size_t> chain_of(const Fragments& fragments, std::size_t base) {
@@ -281,43 +314,6 @@ TextureRungs measure_rungs(const Fragments& fragments, const std::vector<Pixels>
   });
   return out;
 }
-
-namespace {
-
-// A rung with a tenth of a texture's bytes must lower the loss of loads by so many tenths of this part.
-constexpr double kGain = 0.05;
-constexpr double kLeastLoads = 0.01;
-// Of a JPEG's bytes.
-constexpr double kMostOfJpeg = 1.9;
-// Of the bytes of a source without loss, for its finest rung to stay whatever it is worth.
-constexpr double kMostOfLossless = 1.25;
-
-/// Indices of the rungs that `keep` marks, with those that they lean on.
-std::vector<std::size_t> kept_indices(std::vector<std::uint8_t> keep, bool incremental) {
-  if (incremental)
-    for (std::size_t r = keep.size() - 1; r-- > 0;) keep[r] |= keep[r + 1];
-  std::vector<std::size_t> out;
-  for (std::size_t r = 0; r < keep.size(); ++r)
-    if (keep[r]) out.push_back(r);
-  return out;
-}
-
-/// Fixes the rung that stands for a source without loss. The others are judged as if it were not there: it
-/// has two to three times the bytes of the next one, beside which too many of the others would seem cheap.
-void fix_finest(const TexturePlane& base, const PlaneLadder& ladder, const std::vector<Image>& images,
-                TextureRungs& texture) {
-  if (images.empty() || !is_lossless(images[base.image])) return;
-  const double most = kMostOfLossless * static_cast<double>(images[base.image].bytes.size());
-  for (RungPair& pair : texture.pairs) {
-    const bool finest = pair.level == 0 && ladder.rungs[pair.rung].quality == kFinestQuality;
-    if (finest && static_cast<double>(pair.bytes) <= most)
-      pair.fixed = true;
-    else
-      texture.whole_bytes = std::max(texture.whole_bytes, pair.bytes);
-  }
-}
-
-}  // namespace
 
 bool is_lossless(const Image& image) {
   return image.format != ImageFormat::kJpeg && image.format != ImageFormat::kWebp;

@@ -154,49 +154,6 @@ bool every_level_has_one(const TextureRungs& texture, const std::vector<std::uin
   return std::ranges::count(has, 0) == 0;
 }
 
-}  // namespace
-
-std::vector<std::uint8_t> gap_closing_pairs(const TextureRungs& texture,
-                                            const std::vector<std::uint8_t>& keep, const GivenBytes& given) {
-  std::vector<std::uint8_t> out(keep.size());
-  for (std::size_t level = 0; level < given.size(); ++level)
-    for (std::size_t k = 0; k < keep.size() && !given[level].empty(); ++k)
-      if (keep[k] && texture.pairs[k].level >= level && !out[k]) out[k] = opens_gap(texture, keep, k, level);
-  return out;
-}
-
-void swap_pairs(const TextureRungs& texture, const GivenBytes& given, std::vector<std::uint8_t>& keep) {
-  const std::vector<std::vector<double>> units = units_of(texture, given);
-  const double most = std::max(texture.most_bytes, bytes_of(texture, keep));
-  Choice best{keep, gaps_of(texture, keep, given), loss_of(texture, keep, given, units)};
-  for (int swap = 0; swap < kMostSwaps; ++swap) {
-    const std::vector<std::uint8_t> from = best.keep;
-    const auto consider = [&](const std::vector<std::uint8_t>& choice) {
-      if (bytes_of(texture, choice) > most || !every_level_has_one(texture, choice)) return;
-      Choice next{choice, gaps_of(texture, choice, given), best.loss};
-      if (next.gaps > best.gaps) return;
-      next.loss = loss_of(texture, choice, given, units);
-      if (next.is_better_than(best)) best = std::move(next);
-    };
-    for (std::size_t in = 0; in < from.size(); ++in) {
-      if (from[in]) continue;
-      std::vector<std::uint8_t> choice = from;
-      choice[in] = 1;
-      consider(choice);
-      for (std::size_t out = 0; out < from.size(); ++out) {
-        if (!from[out] || texture.pairs[out].fixed) continue;
-        choice[out] = 0;
-        consider(choice);
-        choice[out] = 1;
-      }
-    }
-    if (best.keep == from) break;
-  }
-  keep = best.keep;
-}
-
-namespace {
-
 // Of a load's bytes textures have so much; mesh and tables take the rest.
 constexpr double kTextureShare = 0.75;
 // Prices of a byte in loss, from dear to cheap: four an octave.
@@ -431,6 +388,45 @@ void drop_pairs(const TextureRungs& texture, const GivenBytes& given, const Leas
 }
 
 }  // namespace
+
+std::vector<std::uint8_t> gap_closing_pairs(const TextureRungs& texture,
+                                            const std::vector<std::uint8_t>& keep, const GivenBytes& given) {
+  std::vector<std::uint8_t> out(keep.size());
+  for (std::size_t level = 0; level < given.size(); ++level)
+    for (std::size_t k = 0; k < keep.size() && !given[level].empty(); ++k)
+      if (keep[k] && texture.pairs[k].level >= level && !out[k]) out[k] = opens_gap(texture, keep, k, level);
+  return out;
+}
+
+void swap_pairs(const TextureRungs& texture, const GivenBytes& given, std::vector<std::uint8_t>& keep) {
+  const std::vector<std::vector<double>> units = units_of(texture, given);
+  const double most = std::max(texture.most_bytes, bytes_of(texture, keep));
+  Choice best{keep, gaps_of(texture, keep, given), loss_of(texture, keep, given, units)};
+  for (int swap = 0; swap < kMostSwaps; ++swap) {
+    const std::vector<std::uint8_t> from = best.keep;
+    const auto consider = [&](const std::vector<std::uint8_t>& choice) {
+      if (bytes_of(texture, choice) > most || !every_level_has_one(texture, choice)) return;
+      Choice next{choice, gaps_of(texture, choice, given), best.loss};
+      if (next.gaps > best.gaps) return;
+      next.loss = loss_of(texture, choice, given, units);
+      if (next.is_better_than(best)) best = std::move(next);
+    };
+    for (std::size_t in = 0; in < from.size(); ++in) {
+      if (from[in]) continue;
+      std::vector<std::uint8_t> choice = from;
+      choice[in] = 1;
+      consider(choice);
+      for (std::size_t out = 0; out < from.size(); ++out) {
+        if (!from[out] || texture.pairs[out].fixed) continue;
+        choice[out] = 0;
+        consider(choice);
+        choice[out] = 1;
+      }
+    }
+    if (best.keep == from) break;
+  }
+  keep = best.keep;
+}
 
 std::vector<TextureLoad> texture_loads() {
   std::vector<TextureLoad> out;

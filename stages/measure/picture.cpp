@@ -38,42 +38,6 @@ void extend(PixelSpans::Row& row, const PixelSpans::Row& by) {
   row.last = std::max(row.last, by.last);
 }
 
-}  // namespace
-
-PixelSpans shown_spans(const Picture& picture) {
-  constexpr std::uint32_t kReach = kFilterReach;
-  PixelSpans spans;
-  spans.side_px = picture.side_px;
-  std::vector<PixelSpans::Row> shown(picture.side_px);
-  for (std::size_t y = 0; y < shown.size(); ++y) {
-    PixelSpans::Row& row = shown[y] = shown_columns(picture, y);
-    if (row.first == row.last) continue;
-    row.first = std::max(row.first, kReach) - kReach;
-    row.last = std::min(row.last + kReach, picture.side_px);
-  }
-  spans.rows.resize(shown.size());
-  for (std::size_t y = 0; y < shown.size(); ++y)
-    for (std::size_t k = std::max<std::size_t>(y, kReach) - kReach;
-         k < std::min<std::size_t>(y + kReach + 1, shown.size()); ++k)
-      extend(spans.rows[y], shown[k]);
-  number_pixels(spans);
-  return spans;
-}
-
-PixelSpans union_of(const PixelSpans& a, const PixelSpans& b) {
-  PixelSpans out;
-  out.side_px = a.side_px;
-  out.rows.resize(a.rows.size());
-  for (std::size_t y = 0; y < out.rows.size(); ++y) {
-    extend(out.rows[y], a.rows[y]);
-    extend(out.rows[y], b.rows[y]);
-  }
-  number_pixels(out);
-  return out;
-}
-
-namespace {
-
 // Products are rounded before they are added (-ffp-contract=off), so that vectors change no bit. By hand: of
 // loops over the numbers of a block g++ makes one number at a time at -O3.
 #ifdef TEXMESH_HAS_AVX2_TWIN
@@ -120,6 +84,38 @@ void add_blocks_plain(const FilterKernel& kernel, const float* const* lines, std
 using Lines = std::array<const float*, 2 * kFilterReach + 1>;
 
 }  // namespace
+
+PixelSpans shown_spans(const Picture& picture) {
+  constexpr std::uint32_t kReach = kFilterReach;
+  PixelSpans spans;
+  spans.side_px = picture.side_px;
+  std::vector<PixelSpans::Row> shown(picture.side_px);
+  for (std::size_t y = 0; y < shown.size(); ++y) {
+    PixelSpans::Row& row = shown[y] = shown_columns(picture, y);
+    if (row.first == row.last) continue;
+    row.first = std::max(row.first, kReach) - kReach;
+    row.last = std::min(row.last + kReach, picture.side_px);
+  }
+  spans.rows.resize(shown.size());
+  for (std::size_t y = 0; y < shown.size(); ++y)
+    for (std::size_t k = std::max<std::size_t>(y, kReach) - kReach;
+         k < std::min<std::size_t>(y + kReach + 1, shown.size()); ++k)
+      extend(spans.rows[y], shown[k]);
+  number_pixels(spans);
+  return spans;
+}
+
+PixelSpans union_of(const PixelSpans& a, const PixelSpans& b) {
+  PixelSpans out;
+  out.side_px = a.side_px;
+  out.rows.resize(a.rows.size());
+  for (std::size_t y = 0; y < out.rows.size(); ++y) {
+    extend(out.rows[y], a.rows[y]);
+    extend(out.rows[y], b.rows[y]);
+  }
+  number_pixels(out);
+  return out;
+}
 
 bool has_avx2() {
 #ifdef TEXMESH_HAS_AVX2_TWIN

@@ -32,34 +32,6 @@ double share_compared(const ShownRows& view, const std::vector<std::uint8_t>& co
   return all > 0 ? sum / all : 0;
 }
 
-}  // namespace
-
-void Bands::cut(Picture& picture) const {
-  for (std::size_t y = 0; y < compared.size(); ++y)
-    if (!compared[y]) std::fill_n(picture.covered.data() + y * picture.side_px, picture.side_px, 0);
-}
-
-Bands choose_bands(const ShownRows& view, std::uint32_t side_px, double pixels) {
-  const TileRange shown = shown_tiles(view, side_px);
-  const auto enough = static_cast<std::uint32_t>(std::clamp(pixels / kEnoughPixels, 1.0, 1e6));
-  const std::uint32_t period = std::min(enough, (shown.end - shown.first) / (kBandTiles * kLeastBands));
-  if (period <= 1) return {};
-  const std::uint32_t tiles = tiles_of(side_px), cycle = period * kBandTiles;
-  // A band lies in the middle of what is shown.
-  const std::uint32_t begin = (shown.first + shown.end - kBandTiles) / 2 % cycle;
-  Bands out;
-  for (std::uint32_t t = 0; t < tiles; ++t) out.rendered.push_back((t + cycle - begin) % cycle < kBandTiles);
-  constexpr std::uint32_t kReach = kFilterReach;
-  for (std::uint32_t y = 0; y < side_px; ++y) {
-    const std::uint32_t first = y - std::min(y, kReach), last = std::min(y + kReach, side_px - 1);
-    out.compared.push_back(out.rendered[first / kBandPx] && out.rendered[last / kBandPx]);
-  }
-  if (share_compared(view, out.compared) < 0.4 / period) return {};  // of 76 rows in 96
-  return out;
-}
-
-namespace {
-
 /// Of all pixels of all views: where S_0 covers less, the pictures compare next to nothing. A thread across
 /// the whole picture, one pixel wide, covers 0.5 %.
 constexpr double kLeastCovered = 0.002;
@@ -136,6 +108,30 @@ std::string count_outside(const Mesh& mesh, const BoundingSphere& sphere) {
 }
 
 }  // namespace
+
+void Bands::cut(Picture& picture) const {
+  for (std::size_t y = 0; y < compared.size(); ++y)
+    if (!compared[y]) std::fill_n(picture.covered.data() + y * picture.side_px, picture.side_px, 0);
+}
+
+Bands choose_bands(const ShownRows& view, std::uint32_t side_px, double pixels) {
+  const TileRange shown = shown_tiles(view, side_px);
+  const auto enough = static_cast<std::uint32_t>(std::clamp(pixels / kEnoughPixels, 1.0, 1e6));
+  const std::uint32_t period = std::min(enough, (shown.end - shown.first) / (kBandTiles * kLeastBands));
+  if (period <= 1) return {};
+  const std::uint32_t tiles = tiles_of(side_px), cycle = period * kBandTiles;
+  // A band lies in the middle of what is shown.
+  const std::uint32_t begin = (shown.first + shown.end - kBandTiles) / 2 % cycle;
+  Bands out;
+  for (std::uint32_t t = 0; t < tiles; ++t) out.rendered.push_back((t + cycle - begin) % cycle < kBandTiles);
+  constexpr std::uint32_t kReach = kFilterReach;
+  for (std::uint32_t y = 0; y < side_px; ++y) {
+    const std::uint32_t first = y - std::min(y, kReach), last = std::min(y + kReach, side_px - 1);
+    out.compared.push_back(out.rendered[first / kBandPx] && out.rendered[last / kBandPx]);
+  }
+  if (share_compared(view, out.compared) < 0.4 / period) return {};  // of 76 rows in 96
+  return out;
+}
 
 ViewChoice choose_views(int views, int large_views) {
   ViewChoice out{views, std::vector<ViewPart>(static_cast<std::size_t>(views), ViewPart::kAll)};

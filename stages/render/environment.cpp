@@ -162,6 +162,24 @@ std::array<Vec4f, kHarmonics> irradiance_of(const Radiance& radiance) {
   return out;
 }
 
+/// A soft box: a lobe exp(sharpness (cos - 1)) around a direction.
+struct SoftBox {
+  Vec3f direction;  // not unit
+  float sharpness;
+  Vec3f peak;
+};
+
+// Their sum is grey. The main box stands where the key light comes from.
+constexpr SoftBox kBoxes[] = {{{0.62f, 0.72f, 0.55f}, 26, {4.6f, 4.5f, 4.35f}},
+                              {{-0.85f, 0.35f, 0.45f}, 14, {1.15f, 1.2f, 1.3f}},
+                              {{-0.15f, 0.45f, -0.9f}, 18, {2.15f, 2.2f, 2.3f}}};
+constexpr Vec3f kZenith{0.33f, 0.35f, 0.39f}, kHorizon{0.45f, 0.44f, 0.43f}, kGround{0.255f, 0.235f, 0.205f};
+constexpr float kLog2E = 1.44269504f;
+
+float lobe(Vec3f direction, Vec3f axis, float sharpness) {
+  return exp2_of(kLog2E * sharpness * (dot(direction, normalized(axis)) - 1));
+}
+
 }  // namespace
 
 RenderEnvironment prepare_environment(const Radiance& radiance, const KeyLight& key,
@@ -194,28 +212,6 @@ Vec3f specular_light(const RenderEnvironment& environment, Vec3f direction, floa
              b = read_level(environment.levels[sharp + 1], place);
   return colour_of(a + (b - a) * (at - static_cast<float>(sharp)));
 }
-
-namespace {
-
-/// A soft box: a lobe exp(sharpness (cos - 1)) around a direction.
-struct SoftBox {
-  Vec3f direction;  // not unit
-  float sharpness;
-  Vec3f peak;
-};
-
-// Their sum is grey. The main box stands where the key light comes from.
-constexpr SoftBox kBoxes[] = {{{0.62f, 0.72f, 0.55f}, 26, {4.6f, 4.5f, 4.35f}},
-                              {{-0.85f, 0.35f, 0.45f}, 14, {1.15f, 1.2f, 1.3f}},
-                              {{-0.15f, 0.45f, -0.9f}, 18, {2.15f, 2.2f, 2.3f}}};
-constexpr Vec3f kZenith{0.33f, 0.35f, 0.39f}, kHorizon{0.45f, 0.44f, 0.43f}, kGround{0.255f, 0.235f, 0.205f};
-constexpr float kLog2E = 1.44269504f;
-
-float lobe(Vec3f direction, Vec3f axis, float sharpness) {
-  return exp2_of(kLog2E * sharpness * (dot(direction, normalized(axis)) - 1));
-}
-
-}  // namespace
 
 Vec3f studio_radiance(Vec3f direction) {
   const float up = clamped(direction.y, -1, 1);

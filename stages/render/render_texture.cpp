@@ -135,38 +135,6 @@ RenderTexture texture_of(const Fragments& fragments, const std::vector<Pixels>& 
   return render_texture(std::move(image), use.srgb, 0, context);
 }
 
-}  // namespace
-
-Pixels coarser_level(Pixels image, bool srgb, std::uint32_t levels, const RunContext& context) {
-  for (; levels > 0 && (image.width_px > 1 || image.height_px > 1); --levels)
-    image = next_level(image, srgb, context);
-  return image;
-}
-
-void complete_mips(RenderTexture& texture, const RunContext& context) {
-  while (texture.levels.back().width_px > 1 || texture.levels.back().height_px > 1)
-    texture.levels.push_back(next_level(texture.levels.back(), texture.srgb, context));
-}
-
-RenderTexture render_texture(Pixels image, bool srgb, std::uint32_t first_level, const RunContext& context) {
-  if (image.width_px == 0 || image.height_px == 0 || image.channels < 1 || image.channels > 4 ||
-      image.data.size() != static_cast<std::size_t>(image.width_px) * image.height_px * image.channels)
-    throw std::invalid_argument("render_texture: no image of 1 to 4 channels");
-  RenderTexture out;
-  out.width_px = image.width_px;
-  out.height_px = image.height_px;
-  out.srgb = srgb;
-  out.levels.push_back(std::move(image));
-  while (out.first_level < first_level && (out.levels[0].width_px > 1 || out.levels[0].height_px > 1)) {
-    out.levels[0] = next_level(out.levels[0], srgb, context);
-    ++out.first_level;
-  }
-  complete_mips(out, context);
-  return out;
-}
-
-namespace {
-
 using ByteCurve = std::array<float, 256>;
 
 const ByteCurve& numbers_of_bytes() {
@@ -267,6 +235,34 @@ float level_of(Vec2<std::uint32_t> size_px, const TextureFootprint& footprint) {
 }
 
 }  // namespace
+
+Pixels coarser_level(Pixels image, bool srgb, std::uint32_t levels, const RunContext& context) {
+  for (; levels > 0 && (image.width_px > 1 || image.height_px > 1); --levels)
+    image = next_level(image, srgb, context);
+  return image;
+}
+
+void complete_mips(RenderTexture& texture, const RunContext& context) {
+  while (texture.levels.back().width_px > 1 || texture.levels.back().height_px > 1)
+    texture.levels.push_back(next_level(texture.levels.back(), texture.srgb, context));
+}
+
+RenderTexture render_texture(Pixels image, bool srgb, std::uint32_t first_level, const RunContext& context) {
+  if (image.width_px == 0 || image.height_px == 0 || image.channels < 1 || image.channels > 4 ||
+      image.data.size() != static_cast<std::size_t>(image.width_px) * image.height_px * image.channels)
+    throw std::invalid_argument("render_texture: no image of 1 to 4 channels");
+  RenderTexture out;
+  out.width_px = image.width_px;
+  out.height_px = image.height_px;
+  out.srgb = srgb;
+  out.levels.push_back(std::move(image));
+  while (out.first_level < first_level && (out.levels[0].width_px > 1 || out.levels[0].height_px > 1)) {
+    out.levels[0] = next_level(out.levels[0], srgb, context);
+    ++out.first_level;
+  }
+  complete_mips(out, context);
+  return out;
+}
 
 TextureSite::TextureSite(Vec2<std::uint32_t> size_px, std::uint32_t first_level, const TextureSlot& slot,
                          const TextureFootprint& footprint)

@@ -17,54 +17,6 @@ double tan_of_half(double degrees) {
   return portable::sin(half) / portable::cos(half);
 }
 
-}  // namespace
-
-ViewCamera camera_of(int index, int count, Vec3d centre, double radius) {
-  // A Fibonacci lattice on the sphere, starting a little to the side of the front.
-  const double golden = portable::kPi * (3 - std::sqrt(5.0));
-  const double height = count == 1 ? 0.2 : 1 - 2 * (index + 0.5) / count,
-               ring = std::sqrt(1 - height * height);
-  const double angle = 0.4 + golden * index;
-  ViewCamera camera;
-  camera.z = {ring * portable::sin(angle), height, ring * portable::cos(angle)};
-  camera.x = normalized(cross(Vec3d{0, 1, 0}, camera.z));
-  camera.y = cross(camera.z, camera.x);
-  camera.centre = centre;
-  camera.radius = radius;
-  return camera;
-}
-
-RenderCamera perspective_camera(const ViewCamera& view, double fov_degrees) {
-  const double radius = std::isfinite(view.radius) && view.radius > 0 ? view.radius : 1;
-  RenderCamera camera;
-  camera.x = view.x, camera.y = view.y, camera.z = view.z;
-  camera.tan_half_fov = tan_of_half(fov_degrees);
-  // The rays that touch the sphere have the tangent radius / sqrt(distance^2 - radius^2).
-  const double tangent = kFill * camera.tan_half_fov;
-  const double distance = radius * std::sqrt(1 + 1 / (tangent * tangent));
-  camera.eye = view.centre + view.z * distance;
-  camera.near = distance * kNearOfDistance;
-  return camera;
-}
-
-RenderCamera look_at_camera(Vec3d eye, Vec3d target, Vec3d up, double fov_degrees, double near) {
-  RenderCamera camera;
-  camera.eye = eye;
-  camera.z = normalized(eye - target);
-  if (!(length(camera.z) > 0)) camera.z = {0, 0, 1};
-  for (const Vec3d direction : {normalized(up), Vec3d{0, 1, 0}, Vec3d{0, 0, -1}}) {
-    camera.x = cross(direction, camera.z);
-    if (length(camera.x) > 1e-9) break;
-  }
-  camera.x = normalized(camera.x);
-  camera.y = cross(camera.z, camera.x);
-  camera.tan_half_fov = tan_of_half(fov_degrees);
-  camera.near = near;
-  return camera;
-}
-
-namespace {
-
 float within(float value, float low, float high, float otherwise) {
   if (!std::isfinite(value)) return otherwise;
   return value < low ? low : value > high ? high : value;
@@ -95,44 +47,6 @@ UvTransform finite_transform(const UvTransform& t) {
                       std::isfinite(t.scale.y) && std::fabs(t.rotation) <= 1e6f;
   return finite ? t : UvTransform{};
 }
-
-}  // namespace
-
-RenderMaterial render_material(const Material& material,
-                               const std::function<std::int32_t(const TextureRef&, TextureUse)>& texture_of) {
-  constexpr float kMost = 1e6f;
-  RenderMaterial out;
-  const Vec4f c = material.base_colour;
-  out.base_colour = {within(c.x, 0, 1, 1), within(c.y, 0, 1, 1), within(c.z, 0, 1, 1), within(c.w, 0, 1, 1)};
-  out.metallic = within(material.metallic, 0, 1, 1);
-  out.roughness = within(material.roughness, 0, 1, 1);
-  for (int k = 0; k < 3; ++k)
-    out.emissive[k] = within(material.emissive[k], 0, 1, 0) * emission_strength(material);
-  out.normal_scale = within(material.normal_scale, -kMost, kMost, 1);
-  out.occlusion_strength = within(material.occlusion_strength, 0, 1, 1);
-  out.alpha_mode = material.alpha_mode;
-  out.alpha_cutoff = within(material.alpha_cutoff, 0, kMost, 0.5f);
-  out.double_sided = material.double_sided;
-  out.unlit = material.unlit;
-  const TextureRef* refs[kTextureUses] = {&material.base_colour_texture, &material.metallic_roughness_texture,
-                                          &material.normal_texture, &material.occlusion_texture,
-                                          &material.emissive_texture};
-  for (std::size_t use = 0; use < kTextureUses; ++use) {
-    const TextureRef& ref = *refs[use];
-    if (!ref.used()) continue;
-    TextureSlot& slot = out.textures[use];
-    slot.texture = texture_of(ref, static_cast<TextureUse>(use));
-    slot.uv_set = ref.texcoord;
-    slot.wrap_s = ref.wrap_s;
-    slot.wrap_t = ref.wrap_t;
-    slot.mag_filter = ref.nearest ? MagFilter::kNearest : MagFilter::kLinear;
-    slot.min_filter = min_filter_of(ref.minification);
-    slot.transform = finite_transform(ref.transform);
-  }
-  return out;
-}
-
-namespace {
 
 constexpr std::uint32_t kMostSide = 8192;
 
@@ -264,6 +178,84 @@ void join_tiles(std::vector<TileFragments>& parts, std::uint32_t tiles, const Ru
 }
 
 }  // namespace
+
+ViewCamera camera_of(int index, int count, Vec3d centre, double radius) {
+  // A Fibonacci lattice on the sphere, starting a little to the side of the front.
+  const double golden = portable::kPi * (3 - std::sqrt(5.0));
+  const double height = count == 1 ? 0.2 : 1 - 2 * (index + 0.5) / count,
+               ring = std::sqrt(1 - height * height);
+  const double angle = 0.4 + golden * index;
+  ViewCamera camera;
+  camera.z = {ring * portable::sin(angle), height, ring * portable::cos(angle)};
+  camera.x = normalized(cross(Vec3d{0, 1, 0}, camera.z));
+  camera.y = cross(camera.z, camera.x);
+  camera.centre = centre;
+  camera.radius = radius;
+  return camera;
+}
+
+RenderCamera perspective_camera(const ViewCamera& view, double fov_degrees) {
+  const double radius = std::isfinite(view.radius) && view.radius > 0 ? view.radius : 1;
+  RenderCamera camera;
+  camera.x = view.x, camera.y = view.y, camera.z = view.z;
+  camera.tan_half_fov = tan_of_half(fov_degrees);
+  // The rays that touch the sphere have the tangent radius / sqrt(distance^2 - radius^2).
+  const double tangent = kFill * camera.tan_half_fov;
+  const double distance = radius * std::sqrt(1 + 1 / (tangent * tangent));
+  camera.eye = view.centre + view.z * distance;
+  camera.near = distance * kNearOfDistance;
+  return camera;
+}
+
+RenderCamera look_at_camera(Vec3d eye, Vec3d target, Vec3d up, double fov_degrees, double near) {
+  RenderCamera camera;
+  camera.eye = eye;
+  camera.z = normalized(eye - target);
+  if (!(length(camera.z) > 0)) camera.z = {0, 0, 1};
+  for (const Vec3d direction : {normalized(up), Vec3d{0, 1, 0}, Vec3d{0, 0, -1}}) {
+    camera.x = cross(direction, camera.z);
+    if (length(camera.x) > 1e-9) break;
+  }
+  camera.x = normalized(camera.x);
+  camera.y = cross(camera.z, camera.x);
+  camera.tan_half_fov = tan_of_half(fov_degrees);
+  camera.near = near;
+  return camera;
+}
+
+RenderMaterial render_material(const Material& material,
+                               const std::function<std::int32_t(const TextureRef&, TextureUse)>& texture_of) {
+  constexpr float kMost = 1e6f;
+  RenderMaterial out;
+  const Vec4f c = material.base_colour;
+  out.base_colour = {within(c.x, 0, 1, 1), within(c.y, 0, 1, 1), within(c.z, 0, 1, 1), within(c.w, 0, 1, 1)};
+  out.metallic = within(material.metallic, 0, 1, 1);
+  out.roughness = within(material.roughness, 0, 1, 1);
+  for (int k = 0; k < 3; ++k)
+    out.emissive[k] = within(material.emissive[k], 0, 1, 0) * emission_strength(material);
+  out.normal_scale = within(material.normal_scale, -kMost, kMost, 1);
+  out.occlusion_strength = within(material.occlusion_strength, 0, 1, 1);
+  out.alpha_mode = material.alpha_mode;
+  out.alpha_cutoff = within(material.alpha_cutoff, 0, kMost, 0.5f);
+  out.double_sided = material.double_sided;
+  out.unlit = material.unlit;
+  const TextureRef* refs[kTextureUses] = {&material.base_colour_texture, &material.metallic_roughness_texture,
+                                          &material.normal_texture, &material.occlusion_texture,
+                                          &material.emissive_texture};
+  for (std::size_t use = 0; use < kTextureUses; ++use) {
+    const TextureRef& ref = *refs[use];
+    if (!ref.used()) continue;
+    TextureSlot& slot = out.textures[use];
+    slot.texture = texture_of(ref, static_cast<TextureUse>(use));
+    slot.uv_set = ref.texcoord;
+    slot.wrap_s = ref.wrap_s;
+    slot.wrap_t = ref.wrap_t;
+    slot.mag_filter = ref.nearest ? MagFilter::kNearest : MagFilter::kLinear;
+    slot.min_filter = min_filter_of(ref.minification);
+    slot.transform = finite_transform(ref.transform);
+  }
+  return out;
+}
 
 RenderScene render_scene(const Mesh& mesh, const std::vector<RenderMaterial>& materials,
                          std::size_t texture_count) {

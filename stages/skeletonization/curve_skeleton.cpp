@@ -38,6 +38,17 @@ std::vector<Vec3d> directions_along(const CurveSkeleton& curve) {
   return along;
 }
 
+constexpr std::uint32_t kLeaf = 4;
+
+double square(double x) { return x * x; }
+
+double segment_distance_squared(Vec3d a, Vec3d b, Vec3d p) {
+  const Vec3d along = b - a;
+  const double l = dot(along, along), t = l > 0 ? std::clamp(dot(p - a, along) / l, 0.0, 1.0) : 0;
+  const Vec3d d = p - (a + along * t);
+  return dot(d, d);
+}
+
 }  // namespace
 
 void recentre(CurveSkeleton& curve, std::span<const NodePoles> poles) {
@@ -51,21 +62,6 @@ void recentre(CurveSkeleton& curve, std::span<const NodePoles> poles) {
     curve.nodes[n] = curve.nodes[n] + move - along[n] * dot(move, along[n]);
   }
 }
-
-namespace {
-
-constexpr std::uint32_t kLeaf = 4;
-
-double square(double x) { return x * x; }
-
-double segment_distance_squared(Vec3d a, Vec3d b, Vec3d p) {
-  const Vec3d along = b - a;
-  const double l = dot(along, along), t = l > 0 ? std::clamp(dot(p - a, along) / l, 0.0, 1.0) : 0;
-  const Vec3d d = p - (a + along * t);
-  return dot(d, d);
-}
-
-}  // namespace
 
 SegmentTree::SegmentTree(std::span<const Vec3d> nodes,
                          std::span<const std::array<std::uint32_t, 2>> segments) {

@@ -79,38 +79,6 @@ std::vector<double> filtered(const TriangleSoup& soup, const Fans& fans, const s
   return out;
 }
 
-}  // namespace
-
-std::vector<double> half_thickness(const TriangleSoup& closed, const TriangleTree& tree,
-                                   const RunContext& context) {
-  const std::array<ConeRay, TriangleTree::kRays> rays = cone();
-  std::vector<double> face(closed.triangles.size()), area(face.size());
-  parallel_for(context, face.size(), 64, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t t = begin; t < end; ++t) {
-      const auto [a, b, c] = closed.triangles[t];
-      const Vec3d p = closed.points[a], q = closed.points[b], r = closed.points[c];
-      const Vec3d n = cross(q - p, r - p);
-      area[t] = length(n);
-      face[t] = area[t] > 0 ? measure(tree, rays, (p + q + r) * (1.0 / 3), normalized(n)) : kInfinity;
-    }
-  });
-  const Fans fans(closed);
-  for (int pass = 0; pass < kFilterPasses; ++pass) face = filtered(closed, fans, face);
-  std::vector<double> point(closed.points.size(), kInfinity);
-  for (std::size_t p = 0; p < point.size(); ++p) {
-    double sum = 0, weight = 0;
-    for (std::uint32_t i = fans.begin[p]; i < fans.begin[p + 1]; ++i) {
-      const std::uint32_t t = fans.triangles[i];
-      if (face[t] == kInfinity) continue;
-      sum += face[t] * area[t], weight += area[t];
-    }
-    if (weight > 0) point[p] = sum / weight;
-  }
-  return point;
-}
-
-namespace {
-
 /// What the wrap says at a point.
 struct Local {
   double half = 0;    // half thickness of the shape
@@ -182,6 +150,34 @@ std::vector<PartKind> sort_parts(const std::vector<Local>& local, std::span<cons
 }
 
 }  // namespace
+
+std::vector<double> half_thickness(const TriangleSoup& closed, const TriangleTree& tree,
+                                   const RunContext& context) {
+  const std::array<ConeRay, TriangleTree::kRays> rays = cone();
+  std::vector<double> face(closed.triangles.size()), area(face.size());
+  parallel_for(context, face.size(), 64, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t < end; ++t) {
+      const auto [a, b, c] = closed.triangles[t];
+      const Vec3d p = closed.points[a], q = closed.points[b], r = closed.points[c];
+      const Vec3d n = cross(q - p, r - p);
+      area[t] = length(n);
+      face[t] = area[t] > 0 ? measure(tree, rays, (p + q + r) * (1.0 / 3), normalized(n)) : kInfinity;
+    }
+  });
+  const Fans fans(closed);
+  for (int pass = 0; pass < kFilterPasses; ++pass) face = filtered(closed, fans, face);
+  std::vector<double> point(closed.points.size(), kInfinity);
+  for (std::size_t p = 0; p < point.size(); ++p) {
+    double sum = 0, weight = 0;
+    for (std::uint32_t i = fans.begin[p]; i < fans.begin[p + 1]; ++i) {
+      const std::uint32_t t = fans.triangles[i];
+      if (face[t] == kInfinity) continue;
+      sum += face[t] * area[t], weight += area[t];
+    }
+    if (weight > 0) point[p] = sum / weight;
+  }
+  return point;
+}
 
 LocalRadius limit_by_thickness(const std::vector<TriangleSoup>& parts, std::span<const Vec3d> points,
                                std::span<const double> distance, const LocalRadiusOptions& options,

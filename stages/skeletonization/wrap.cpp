@@ -109,28 +109,6 @@ TriangleSoup used_part(const Gathered& g) {
   return soup;
 }
 
-}  // namespace
-
-UnitFrame unit_frame_of(const std::vector<Vec3f>& positions) {
-  const Box3d box = to_double(bounding_box(positions));
-  return {box.centre(), box.diagonal()};
-}
-
-TriangleSoup make_wrap_soup(const ConditionedMesh& mesh, const UnitFrame& frame) {
-  Gathered g;
-  // Float, as clustering has it: the wrap does not depend on whether there was something to cluster.
-  for (Vec3f p : mesh.mesh.positions) g.points.push_back(to_double(to_float(frame.to_unit(p))));
-  for (std::uint32_t t = 0; t < mesh.mesh.triangles.size(); ++t)
-    for (int k = 0; k < 3; ++k) g.indices.push_back(mesh.mesh.position_of(t, k));
-  close_holes(mesh, g);
-  thin_out(g);
-  TriangleSoup soup = used_part(g);
-  if (soup.triangles.empty()) throw GeometryFailure("no triangle has an area");
-  return soup;
-}
-
-namespace {
-
 std::uint32_t root_of(std::vector<std::uint32_t>& parent, std::uint32_t p) {
   while (parent[p] != p) p = parent[p] = parent[parent[p]];
   return p;
@@ -164,6 +142,24 @@ std::vector<TriangleSoup> split_parts(const TriangleSoup& wrap) {
 }
 
 }  // namespace
+
+UnitFrame unit_frame_of(const std::vector<Vec3f>& positions) {
+  const Box3d box = to_double(bounding_box(positions));
+  return {box.centre(), box.diagonal()};
+}
+
+TriangleSoup make_wrap_soup(const ConditionedMesh& mesh, const UnitFrame& frame) {
+  Gathered g;
+  // Float, as clustering has it: the wrap does not depend on whether there was something to cluster.
+  for (Vec3f p : mesh.mesh.positions) g.points.push_back(to_double(to_float(frame.to_unit(p))));
+  for (std::uint32_t t = 0; t < mesh.mesh.triangles.size(); ++t)
+    for (int k = 0; k < 3; ++k) g.indices.push_back(mesh.mesh.position_of(t, k));
+  close_holes(mesh, g);
+  thin_out(g);
+  TriangleSoup soup = used_part(g);
+  if (soup.triangles.empty()) throw GeometryFailure("no triangle has an area");
+  return soup;
+}
 
 std::vector<TriangleSoup> wrap_surface(const TriangleSoup& soup, double alpha, double offset,
                                        std::size_t max_faces, std::size_t max_steps,

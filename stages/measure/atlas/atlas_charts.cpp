@@ -198,15 +198,6 @@ AtlasCharts ChartFinder::find() {
   return std::move(out_);
 }
 
-}  // namespace
-
-AtlasCharts find_charts(const AtlasLayout& layout, std::span<const std::uint32_t> atlas_of_triangle,
-                        std::size_t atlases) {
-  return ChartFinder(layout, atlas_of_triangle, atlases).find();
-}
-
-namespace {
-
 constexpr double kTexelsPerSample = 4;
 constexpr double kMostSamples = 8;  // of one edge
 
@@ -288,6 +279,11 @@ SeamDifference difference_along(const AtlasLayout& layout, const AtlasSeam& seam
 }
 
 }  // namespace
+
+AtlasCharts find_charts(const AtlasLayout& layout, std::span<const std::uint32_t> atlas_of_triangle,
+                        std::size_t atlases) {
+  return ChartFinder(layout, atlas_of_triangle, atlases).find();
+}
 
 std::vector<std::optional<SeamColours>> measure_seams(const AtlasLayout& layout, const AtlasCharts& charts,
                                                       std::span<const AtlasImage> images, std::size_t atlases,

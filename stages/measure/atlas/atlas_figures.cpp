@@ -192,36 +192,6 @@ std::uint64_t fill_triangles(const Grid& grid, const AtlasLayout& layout,
 
 void count_layer(std::uint8_t& layers) { layers = layers == 0 ? 1 : 2; }
 
-}  // namespace
-
-AtlasLayout::AtlasLayout(const Mesh& mesh, const std::vector<Material>& materials,
-                         std::span<const AtlasImage> images)
-    : mesh_(mesh) {
-  for (const Material& m : materials) {
-    guide_.push_back(guide_of(m, mesh, images));
-    const TextureRef& g = guide_.back();
-    const AtlasImage image = g.used() ? images[static_cast<std::size_t>(g.image)] : AtlasImage{1, 1, nullptr};
-    map_.emplace_back(g.transform, image.width_px, image.height_px);
-  }
-}
-
-std::array<Vec2d, 3> AtlasLayout::texels(std::uint32_t triangle) const {
-  const TexelMap& map = map_[mesh_.triangle_material[triangle]];
-  return {map(uv(triangle, 0)), map(uv(triangle, 1)), map(uv(triangle, 2))};
-}
-
-std::array<Vec3d, 3> AtlasLayout::points(std::uint32_t triangle) const {
-  const auto at = [&](int k) { return to_double(mesh_.positions[mesh_.position_of(triangle, k)]); };
-  return {at(0), at(1), at(2)};
-}
-
-double doubled_texels(const std::array<Vec2d, 3>& corners) {
-  const double twice = cross(corners[1] - corners[0], corners[2] - corners[0]);
-  return std::isfinite(twice) ? twice : 0;
-}
-
-namespace {
-
 // Smaller than this, in texels, a triangle is folded to a line: its stretch would be a play of rounding.
 constexpr double kFlatTexels = 1e-6;
 
@@ -248,47 +218,6 @@ SurfacePercentiles percentiles_of(std::vector<WeighedValue>& values) {
   return {weighed_percentile(values, 0.05), weighed_percentile(values, 0.5), weighed_percentile(values, 0.95),
           weighed_percentile(values, 0.99)};
 }
-
-}  // namespace
-
-double weighed_percentile(std::span<const WeighedValue> sorted, double share) {
-  double all = 0, sum = 0;
-  for (const WeighedValue& v : sorted) all += v.weight;
-  for (const WeighedValue& v : sorted) {
-    sum += v.weight;
-    if (sum >= share * all) return v.value;
-  }
-  return sorted.empty() ? 0 : sorted.back().value;
-}
-
-void measure_shape(const AtlasLayout& layout, const AtlasCharts& charts,
-                   std::span<const std::uint32_t> triangles, AtlasFigures& figures) {
-  std::vector<WeighedValue> density, stretch;
-  double surface = 0, flat = 0;
-  for (const std::uint32_t t : triangles) {
-    const std::array<Vec3d, 3> p = layout.points(t);
-    const double area = length(cross(p[1] - p[0], p[2] - p[0])) / 2;
-    if (!(area > 0) || !std::isfinite(area)) continue;
-    surface += area;
-    const std::array<Vec2d, 3> at = layout.texels(t);
-    const double texels = doubled_texels(at) / 2;
-    const Axes axes = axes_of(p, at);
-    if (!(std::fabs(texels) > kFlatTexels) || !std::isfinite(axes.longer / axes.shorter)) {
-      ++figures.flat_triangles;
-      flat += area;
-      continue;
-    }
-    density.push_back({std::sqrt(std::fabs(texels) / area), area});
-    stretch.push_back({axes.longer / axes.shorter, area});
-    const std::uint32_t chart = charts.chart_of_triangle[t];
-    if (chart != kNoIndex) figures.folded_triangles += (texels > 0) != charts.charts[chart].is_mirrored();
-  }
-  if (surface > 0) figures.flat_surface = flat / surface;
-  figures.density = percentiles_of(density);
-  figures.stretch = percentiles_of(stretch);
-}
-
-namespace {
 
 /// One of every image that triangles show.
 std::vector<AtlasFigures> list_atlases(const AtlasLayout& layout, std::span<const AtlasImage> images) {
@@ -342,6 +271,69 @@ void sum_charts(const AtlasCharts& charts, std::vector<AtlasFigures>& atlases) {
 }
 
 }  // namespace
+
+AtlasLayout::AtlasLayout(const Mesh& mesh, const std::vector<Material>& materials,
+                         std::span<const AtlasImage> images)
+    : mesh_(mesh) {
+  for (const Material& m : materials) {
+    guide_.push_back(guide_of(m, mesh, images));
+    const TextureRef& g = guide_.back();
+    const AtlasImage image = g.used() ? images[static_cast<std::size_t>(g.image)] : AtlasImage{1, 1, nullptr};
+    map_.emplace_back(g.transform, image.width_px, image.height_px);
+  }
+}
+
+std::array<Vec2d, 3> AtlasLayout::texels(std::uint32_t triangle) const {
+  const TexelMap& map = map_[mesh_.triangle_material[triangle]];
+  return {map(uv(triangle, 0)), map(uv(triangle, 1)), map(uv(triangle, 2))};
+}
+
+std::array<Vec3d, 3> AtlasLayout::points(std::uint32_t triangle) const {
+  const auto at = [&](int k) { return to_double(mesh_.positions[mesh_.position_of(triangle, k)]); };
+  return {at(0), at(1), at(2)};
+}
+
+double doubled_texels(const std::array<Vec2d, 3>& corners) {
+  const double twice = cross(corners[1] - corners[0], corners[2] - corners[0]);
+  return std::isfinite(twice) ? twice : 0;
+}
+
+double weighed_percentile(std::span<const WeighedValue> sorted, double share) {
+  double all = 0, sum = 0;
+  for (const WeighedValue& v : sorted) all += v.weight;
+  for (const WeighedValue& v : sorted) {
+    sum += v.weight;
+    if (sum >= share * all) return v.value;
+  }
+  return sorted.empty() ? 0 : sorted.back().value;
+}
+
+void measure_shape(const AtlasLayout& layout, const AtlasCharts& charts,
+                   std::span<const std::uint32_t> triangles, AtlasFigures& figures) {
+  std::vector<WeighedValue> density, stretch;
+  double surface = 0, flat = 0;
+  for (const std::uint32_t t : triangles) {
+    const std::array<Vec3d, 3> p = layout.points(t);
+    const double area = length(cross(p[1] - p[0], p[2] - p[0])) / 2;
+    if (!(area > 0) || !std::isfinite(area)) continue;
+    surface += area;
+    const std::array<Vec2d, 3> at = layout.texels(t);
+    const double texels = doubled_texels(at) / 2;
+    const Axes axes = axes_of(p, at);
+    if (!(std::fabs(texels) > kFlatTexels) || !std::isfinite(axes.longer / axes.shorter)) {
+      ++figures.flat_triangles;
+      flat += area;
+      continue;
+    }
+    density.push_back({std::sqrt(std::fabs(texels) / area), area});
+    stretch.push_back({axes.longer / axes.shorter, area});
+    const std::uint32_t chart = charts.chart_of_triangle[t];
+    if (chart != kNoIndex) figures.folded_triangles += (texels > 0) != charts.charts[chart].is_mirrored();
+  }
+  if (surface > 0) figures.flat_surface = flat / surface;
+  figures.density = percentiles_of(density);
+  figures.stretch = percentiles_of(stretch);
+}
 
 double ChartFigures::width_texels() const {
   const double half = border_texels / 2, root = half * half - 4 * texels;

@@ -68,6 +68,20 @@ class MaskBits {
   std::vector<std::uint8_t> bits_;
 };
 
+/// out[x] |= in[x + offset]; `in` has one word of 0 behind its `words`.
+void join_moved(const std::uint64_t* in, std::uint64_t* out, std::uint32_t words, std::uint32_t offset) {
+  const std::uint32_t whole = offset / 64, part = offset % 64;
+  in += whole;
+  if (part == 0)
+    for (std::uint32_t w = 0; w + whole < words; ++w) out[w] |= in[w];
+  else
+    for (std::uint32_t w = 0; w + whole < words; ++w) out[w] |= in[w] >> part | in[w + 1] << (64 - part);
+}
+
+void set_bits(std::uint64_t* row, std::uint32_t first, std::uint32_t end) {
+  for (std::uint32_t x = first; x < end; ++x) row[x / 64] |= std::uint64_t{1} << x % 64;
+}
+
 }  // namespace
 
 std::uint64_t ChartMask::cell_count() const {
@@ -89,24 +103,6 @@ ChartMask quarter_turned(const ChartMask& mask) {
     for (std::uint32_t x = run.first; x < run.first + run.count; ++x) bits.set(mask.height - 1 - run.row, x);
   return bits.mask();
 }
-
-namespace {
-
-/// out[x] |= in[x + offset]; `in` has one word of 0 behind its `words`.
-void join_moved(const std::uint64_t* in, std::uint64_t* out, std::uint32_t words, std::uint32_t offset) {
-  const std::uint32_t whole = offset / 64, part = offset % 64;
-  in += whole;
-  if (part == 0)
-    for (std::uint32_t w = 0; w + whole < words; ++w) out[w] |= in[w];
-  else
-    for (std::uint32_t w = 0; w + whole < words; ++w) out[w] |= in[w] >> part | in[w + 1] << (64 - part);
-}
-
-void set_bits(std::uint64_t* row, std::uint32_t first, std::uint32_t end) {
-  for (std::uint32_t x = first; x < end; ++x) row[x / 64] |= std::uint64_t{1} << x % 64;
-}
-
-}  // namespace
 
 PackingGrid::PackingGrid(std::uint32_t width, std::uint32_t height, std::uint32_t gutter)
     : width_(width),

@@ -45,30 +45,6 @@ Vec3f read_coarse(const PullLevel& coarse, std::uint32_t x, std::uint32_t y) {
          (at(x0, y1) * 0.75f + at(x1, y1) * 0.25f) * 0.25f;
 }
 
-}  // namespace
-
-void push_pull(std::vector<Vec3f>& values, const std::vector<std::uint8_t>& covered, std::uint32_t width,
-               std::uint32_t height) {
-  if (std::find(covered.begin(), covered.end(), 1) == covered.end()) return;
-  std::vector<PullLevel> levels(1);
-  levels[0] = {width, height, std::move(values), {}};
-  for (const std::uint8_t c : covered) levels[0].weight.push_back(c ? 1 : 0);
-  while (levels.back().width > 1 || levels.back().height > 1) levels.push_back(halved(levels.back()));
-  for (std::size_t l = levels.size() - 1; l-- > 0;) {
-    PullLevel& fine = levels[l];
-    for (std::uint32_t y = 0; y < fine.height; ++y)
-      for (std::uint32_t x = 0; x < fine.width; ++x) {
-        const std::size_t i = std::size_t{y} * fine.width + x;
-        if (fine.weight[i] >= 1) continue;
-        const Vec3f known = fine.weight[i] > 0 ? fine.value[i] : Vec3f{};
-        fine.value[i] = known * fine.weight[i] + read_coarse(levels[l + 1], x, y) * (1 - fine.weight[i]);
-      }
-  }
-  values = std::move(levels[0].value);
-}
-
-namespace {
-
 constexpr std::size_t kMostPerSide = 4;  // of the places of a texel
 
 struct Corners {
@@ -271,6 +247,26 @@ void finish_maps(BakedMaps& maps) {
 }
 
 }  // namespace
+
+void push_pull(std::vector<Vec3f>& values, const std::vector<std::uint8_t>& covered, std::uint32_t width,
+               std::uint32_t height) {
+  if (std::find(covered.begin(), covered.end(), 1) == covered.end()) return;
+  std::vector<PullLevel> levels(1);
+  levels[0] = {width, height, std::move(values), {}};
+  for (const std::uint8_t c : covered) levels[0].weight.push_back(c ? 1 : 0);
+  while (levels.back().width > 1 || levels.back().height > 1) levels.push_back(halved(levels.back()));
+  for (std::size_t l = levels.size() - 1; l-- > 0;) {
+    PullLevel& fine = levels[l];
+    for (std::uint32_t y = 0; y < fine.height; ++y)
+      for (std::uint32_t x = 0; x < fine.width; ++x) {
+        const std::size_t i = std::size_t{y} * fine.width + x;
+        if (fine.weight[i] >= 1) continue;
+        const Vec3f known = fine.weight[i] > 0 ? fine.value[i] : Vec3f{};
+        fine.value[i] = known * fine.weight[i] + read_coarse(levels[l + 1], x, y) * (1 - fine.weight[i]);
+      }
+  }
+  values = std::move(levels[0].value);
+}
 
 BakedMaps bake(const AtlasMesh& mesh, const std::vector<Vec3f>& normals, const BakeSource& source,
                const BakeOrder& order, const RunContext& context) {
