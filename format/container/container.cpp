@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <cerrno>
 
-#include "format/base/bytes.h"
 #include "format/container/layout.h"
 
 namespace texmesh {

@@ -5,7 +5,6 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "format/base/errors.h"
 #include "format/base/json_fields.h"
 #include "format/base/text_bytes.h"
 #include "format/container/layout.h"

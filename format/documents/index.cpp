@@ -4,7 +4,6 @@
 #include <map>
 
 #include "format/container/container.h"
-#include "format/container/format_version.h"
 #include "format/container/layout.h"
 
 namespace texmesh {

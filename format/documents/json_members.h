@@ -1,11 +1,6 @@
 #pragma once
 // Inside the room only: one description of a document's members writes them and reads them.
 //
-//   void ref_members(auto& v, auto& ref) {
-//     v.by("M05").integer("offset", ref.offset, 64);
-//     v.integer("bytes", ref.bytes, 1);
-//   }
-//
 // A description calls a visitor, MemberWriter or MemberReader, once for each member, in the order of the
 // document. Ranges and rules are those that a reader checks. A writer puts every value down as it is: what
 // it has written is read again.

@@ -1,10 +1,8 @@
 #pragma once
 #include <optional>
 
-#include "format/base/vec.h"
-#include "format/container/format_version.h"
 #include "format/container/layout.h"
-#include "format/documents/entry_ref.h"
+#include "format/documents/index.h"
 
 namespace texmesh {
 

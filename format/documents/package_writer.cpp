@@ -4,7 +4,6 @@
 #include <map>
 
 #include "format/container/container.h"
-#include "format/documents/index.h"
 #include "format/documents/tables.h"
 #include "format/split/split_stream.h"
 

@@ -1,7 +1,6 @@
 #include "format/documents/tables.h"
 
 #include "format/base/number16.h"
-#include "format/container/format_version.h"
 #include "format/container/layout.h"
 
 namespace texmesh {

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <map>
 
-#include "format/base/errors.h"
 #include "format/base/text_bytes.h"
 #include "format/container/layout.h"
 #include "format/documents/json_members.h"

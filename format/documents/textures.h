@@ -1,6 +1,6 @@
 #pragma once
 
-#include "format/documents/entry_ref.h"
+#include "format/documents/index.h"
 #include "format/model/codec.h"
 
 namespace texmesh {

@@ -3,7 +3,6 @@
 #include <tuple>
 
 #include "format/base/number16.h"
-#include "format/container/format_version.h"
 #include "format/container/layout.h"
 
 namespace texmesh {

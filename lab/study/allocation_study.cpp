@@ -10,7 +10,6 @@
 #include "stages/fragment_codec/fragment_codec.h"
 #include "stages/jpeg/jpeg.h"
 #include "stages/measure/flip.h"
-#include "stages/measure/image_compare.h"
 #include "stages/render/shade.h"
 
 namespace texmesh {

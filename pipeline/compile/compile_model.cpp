@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "format/base/text_bytes.h"
-#include "format/container/format_version.h"
+#include "format/container/layout.h"
 #include "pipeline/compile/artefacts.h"
 #include "pipeline/compile/library_versions.h"
 #include "pipeline/compile/profile.h"

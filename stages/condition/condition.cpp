@@ -4,7 +4,6 @@
 #include <numeric>
 #include <tuple>
 
-#include "format/base/box.h"
 #include "stages/base/run_context.h"
 #include "stages/geometry/mesh_topology.h"
 

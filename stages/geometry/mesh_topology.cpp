@@ -1,6 +1,5 @@
 #include "stages/geometry/mesh_topology.h"
 
-#include <algorithm>
 #include <bit>
 #include <cstring>
 #include <numeric>

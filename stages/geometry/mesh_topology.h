@@ -1,6 +1,7 @@
 #pragma once
 #include <span>
 
+#include "format/base/box.h"
 #include "format/model/model.h"
 
 namespace texmesh {
@@ -45,5 +46,16 @@ std::vector<std::uint32_t> weld_positions(const std::vector<Vec3f>& positions, d
 /// Per wedge: the lowest index of the wedges with the same welded position and bit-equal attributes, or
 /// kNoIndex where the position has none. Only wedge_position and the attributes of `mesh` are read.
 std::vector<std::uint32_t> weld_wedges(const Mesh& mesh, const std::vector<std::uint32_t>& position_weld);
+
+/// The box of every connected component, by the components' numbers. `component`: per position.
+inline std::vector<Box3f> component_boxes(const std::vector<std::uint32_t>& component,
+                                          const std::vector<Vec3f>& positions) {
+  std::vector<Box3f> boxes;
+  for (std::size_t p = 0; p < component.size(); ++p) {
+    if (component[p] >= boxes.size()) boxes.resize(component[p] + 1);
+    boxes[component[p]].extend(positions[p]);
+  }
+  return boxes;
+}
 
 }  // namespace texmesh

@@ -5,7 +5,7 @@
 #include <map>
 #include <memory>
 
-#include "stages/geometry/fit_normals.h"
+#include "stages/geometry/scale_frames.h"
 
 namespace draco {
 class Mesh;

@@ -1,4 +1,3 @@
-#include "stages/image/decode_image.h"
 
 #include "format/base/srgb.h"
 #include "stages/image/decode_jpeg.h"

@@ -3,13 +3,12 @@
 
 #include <zlib.h>
 
-#include <algorithm>
 #include <cstdlib>
 #include <map>
 
+#include "stages/base/float_math.h"
 #include "stages/image/decode_tiff_exr.h"
 #include "stages/image/jpeg_segments.h"
-#include "stages/image/srgb_encoder.h"
 
 namespace texmesh {
 namespace {

@@ -4,8 +4,8 @@
 #include <numeric>
 #include <type_traits>
 
+#include "stages/base/float_math.h"
 #include "stages/base/parallel.h"
-#include "stages/image/srgb_encoder.h"
 
 namespace texmesh {
 namespace {

@@ -2,7 +2,6 @@
 #include <numeric>
 
 #include "format/rules/size_curve.h"
-#include "stages/fragment_codec/coding_space.h"
 #include "stages/image/decode_image.h"
 #include "stages/jpeg/jpeg_bits.h"
 #include "stages/ladder/choose_rungs.h"

@@ -77,16 +77,16 @@ inline bool encoder_frees_uncovered(LadderMode mode, Uncovered uncovered) {
 
 /// Encodes every covered fragment at rungs of its plane's role.
 /// - JPEGs by libjpeg-turbo, ISLOW DCT: colours as YCbCr with the chroma resolution of `subsampling`, data in
-///   the space that has the least error for its bytes (stages/fragment_codec/coding_space.h). Fragments with
-///   uncovered texels go through stages/jpeg/masked_jpeg.h where such texels are free, so that only covered
-///   texels cost bytes.
+///   the space that has the least error for its bytes (stages/fragment_codec/fragment_codec.h). Fragments
+///   with uncovered texels go through stages/jpeg/masked_jpeg.h where such texels are free, so that only
+///   covered texels cost bytes.
 /// - Tables are trained on covered fragments spread over the plane. The tables have a code for every symbol,
 ///   so that no fragment needs tables of its own. A plane without a covered fragment has tables but no data.
 /// - A few fragments are encoded at every rung. With `prune` they decide which rungs are worth storing
 ///   (stages/ladder/choose_rungs.h); the others are encoded at these only.
 /// - Mode jpeg: full-size planes whose source is a JPEG keep its coefficients as their last rung, and the
 /// rungs
-///   below are made from these (stages/ladder/source_codec.h). A note says why a JPEG's plane is coded from
+///   below are made from these (encode_rungs.h). A note says why a JPEG's plane is coded from
 ///   pixels instead, and how far its last rung is off.
 /// - With `keep_source` full-size planes but alpha name their image's file for the package: an alpha plane
 ///   relies on its image's colour plane.

@@ -1,7 +1,6 @@
 #include "stages/proxies/proxies.h"
 
 #include "format/base/portable_math.h"
-#include "stages/geometry/scale_frames.h"
 #include "stages/proxies/make_proxy.h"
 
 namespace texmesh {

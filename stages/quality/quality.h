@@ -39,7 +39,7 @@ struct QualityOptions {
 /// Renders kept scales and sampled rungs with the reference renderer (stages/render), in the studio's light,
 /// and compares each picture with that of S_0 and the source's images, over the pixels that either covers.
 /// The reference is what viewers of the source show: its mips mix what no chart covers into charts' borders.
-/// FLIP as published (stages/measure/flip.h) and SSIM of luma (stages/measure/image_compare.h). Means and
+/// FLIP as published and SSIM of luma (stages/measure/flip.h). Means and
 /// percentiles are of the pixels of all views together.
 /// - Pictures: perspective, 4 x 4 samples a pixel. The camera frames the object's bounding sphere. The
 ///   displayed height is the length on screen that O_V has at the sphere's centre. All maps of the material

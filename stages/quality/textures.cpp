@@ -1,7 +1,6 @@
 // Textures of the pictures: which ones show, how they are made of the source, of rungs, mips or previews, and
 // which rungs are sampled as knots.
 #include "stages/quality/textures.h"
-
 #include <cstdlib>
 
 #include "format/rules/allocation.h"

@@ -44,7 +44,7 @@ Pixels next_level(const Pixels& fine, bool srgb, const RunContext& context) {
   const std::size_t n = fine.channels;
   const std::size_t colours = !srgb ? 0 : n % 2 == 0 ? n - 1 : n;  // alpha stays a plain number
   const bool even = fine.width_px == 2 * out.width_px && fine.height_px == 2 * out.height_px;
-  const SrgbEncoder& encode = srgb_encoder();
+  const auto& encode = srgb_encoder();
   const auto& light = light_of_bytes();
   parallel_for(context, out.height_px, 64, [&](std::size_t begin, std::size_t end) {
     for (std::size_t y = begin; y < end; ++y) {

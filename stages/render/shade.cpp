@@ -232,7 +232,7 @@ Vec3f tone_mapped(Vec3f linear) {
 Pixels encode_srgb(const Picture& picture) {
   Pixels out{picture.side_px, picture.side_px, 3, {}};
   out.data.reserve(picture.linear.size() * 3);
-  const SrgbEncoder& encode = srgb_encoder();
+  const auto& encode = srgb_encoder();
   for (const Vec3f c : picture.linear)
     for (int k = 0; k < 3; ++k) out.data.push_back(encode(c[k]));
   return out;

@@ -4,7 +4,6 @@
 #include "stages/base/parallel.h"
 #include "stages/image/png_writer.h"
 #include "stages/jpeg/jpeg.h"
-#include "stages/scales/scale_codecs.h"
 #include "stages/scales/vertex_split.h"
 
 namespace texmesh {

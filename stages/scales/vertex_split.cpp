@@ -3,7 +3,6 @@
 // backwards these are the splits.
 #include "stages/scales/vertex_split.h"
 
-#include <map>
 #include <numeric>
 #include <ranges>
 

@@ -1,7 +1,6 @@
 #pragma once
 #include "format/split/split_writer.h"
-#include "stages/base/run_context.h"
-#include "stages/scales/scale_grid.h"
+#include "stages/scales/scale_codecs.h"
 
 namespace texmesh {
 

@@ -2,7 +2,7 @@
 #include <cstddef>
 
 #include "stages/geometry/quadric.h"
-#include "stages/simplification/collapse_ring.h"
+#include "stages/simplification/collapse_mesh.h"
 #include "stages/simplification/simplification.h"
 
 namespace texmesh {

@@ -2,8 +2,8 @@
 
 #include "format/base/portable_math.h"
 #include "stages/base/parallel.h"
-#include "stages/geometry/component_boxes.h"
 #include "stages/geometry/distance.h"
+#include "stages/geometry/mesh_topology.h"
 #include "stages/simplification/collapse_engine.h"
 
 namespace texmesh {

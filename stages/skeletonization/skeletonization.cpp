@@ -2,7 +2,6 @@
 
 #include "stages/base/parallel.h"
 #include "stages/skeletonization/curve_skeleton.h"
-#include "stages/skeletonization/local_radius.h"
 
 namespace texmesh {
 namespace {

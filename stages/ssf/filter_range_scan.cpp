@@ -1,5 +1,3 @@
-#include <algorithm>
-#include <limits>
 
 #include "format/base/portable_math.h"
 #include "stages/base/parallel.h"

@@ -1,7 +1,5 @@
 #include "stages/ssf/heat_kernel.h"
 
-#include <algorithm>
-#include <limits>
 #include <memory>
 
 #include "stages/base/parallel.h"

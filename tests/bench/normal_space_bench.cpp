@@ -11,7 +11,6 @@
 #include <iostream>
 #include <iterator>
 
-#include "stages/fragment_codec/coding_space.h"
 #include "stages/fragment_codec/fragment_codec.h"
 #include "stages/image/decode_image.h"
 #include "stages/jpeg/jpeg.h"

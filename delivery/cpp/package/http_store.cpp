@@ -12,7 +12,7 @@
 #include "format/base/errors.h"
 #include "format/container/container.h"
 #include "format/container/layout.h"
-#include "format/documents/entry_ref.h"
+#include "format/documents/index.h"
 #include "format/documents/manifest.h"
 
 // How a package is read from web servers, from the bottom up. HttpRetries counts the tries of a request, and

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "delivery/cpp/decide/harmonic_time.h"
-#include "format/documents/entry_ref.h"
+#include "format/documents/index.h"
 
 namespace texmesh {
 

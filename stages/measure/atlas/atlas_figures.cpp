@@ -1,6 +1,5 @@
 // What one image of a model is like as an atlas: where triangles lie on it, how they are stretched there, and
 // what charts, seams (atlas_charts.cpp) and cover add up to.
-#include <algorithm>
 #include <tuple>
 
 #include "stages/measure/atlas/atlas_parts.h"

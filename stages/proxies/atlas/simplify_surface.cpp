@@ -4,7 +4,6 @@
 // smallest triangles are dropped, so that every count is reached.
 #include "stages/proxies/atlas_mesh.h"
 
-#include "format/base/box.h"
 #include "stages/geometry/mesh_topology.h"
 #include "stages/geometry/quadric.h"
 #include "stages/proxies/atlas/pair_queue.h"

@@ -1,4 +1,4 @@
-#include "stages/proxies/bake/bake_source.h"
+#include "stages/proxies/bake/bake.h"
 
 namespace texmesh {
 namespace {

@@ -1,4 +1,4 @@
-#include "format/split/split_coder.h"
+#include "format/split/split_element_codec.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "stages/proxies/picture_losses.h"
+#include "stages/proxies/make_proxy.h"
 
 #include <gtest/gtest.h>
 

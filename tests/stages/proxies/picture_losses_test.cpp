@@ -1,8 +1,8 @@
-#include "stages/proxies/picture_losses.h"
+#include "stages/proxies/make_proxy.h"
 
 #include <gtest/gtest.h>
 
-#include "stages/proxies/coding/proxy_pictures.h"
+#include "stages/proxies/coding/proxy_glb.h"
 #include "tests/support/meshes.h"
 
 namespace texmesh {

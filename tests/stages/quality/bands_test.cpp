@@ -1,4 +1,4 @@
-#include "stages/quality/framing.h"
+#include "stages/quality/shots.h"
 
 #include <gtest/gtest.h>
 

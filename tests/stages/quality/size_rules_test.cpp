@@ -1,4 +1,4 @@
-#include "stages/quality/size_cells.h"
+#include "stages/quality/table_fit.h"
 
 #include "tests/stages/quality/quality_samples.h"
 

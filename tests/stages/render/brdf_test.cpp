@@ -1,4 +1,4 @@
-#include "stages/render/brdf.h"
+#include "stages/render/fragment_shader.h"
 
 #include <gtest/gtest.h>
 

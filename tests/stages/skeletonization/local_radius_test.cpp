@@ -1,4 +1,4 @@
-#include "stages/skeletonization/local_radius.h"
+#include "stages/skeletonization/curve_skeleton.h"
 
 #include <gtest/gtest.h>
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "format/base/box.h"
-#include "stages/geometry/fit_normals.h"
+#include "stages/geometry/scale_frames.h"
 #include "stages/measure/flip.h"
 #include "stages/render/shade.h"
 #include "tools/extract/extract.h"

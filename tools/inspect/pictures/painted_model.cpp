@@ -8,7 +8,7 @@
 #include "format/base/vec.h"
 #include "format/rules/allocation.h"
 #include "pipeline/io/table.h"
-#include "stages/geometry/component_boxes.h"
+#include "stages/geometry/mesh_topology.h"
 #include "stages/image/decode_image.h"
 #include "stages/ssf/ssf.h"
 #include "tools/inspect/atlas/atlas_report.h"

@@ -6,7 +6,6 @@
 
 #include "stages/gltf/check_glb.h"
 #include "stages/image/webp.h"
-#include "stages/proxies/coding/proxy_pictures.h"
 #include "tests/stages/proxies/atlas_fixtures.h"
 #include "tests/support/meshes.h"
 

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "stages/condition/condition.h"
-#include "stages/geometry/fit_normals.h"
+#include "stages/geometry/scale_frames.h"
 #include "stages/scales/scales.h"
 #include "tests/support/meshes.h"
 #include "tests/support/packages.h"

@@ -1,6 +1,6 @@
 import { splitBelow, splitLongest, splitPrior, splitSteps, splitValueLimit } from '../shared_numbers';
 
-// The entropy decoder of mesh/stream.bin: format/split/split_coder.h, with 32-bit numbers.
+// The entropy decoder of mesh/stream.bin: format/split/split_element_codec.h, with 32-bit numbers.
 
 /** Adaptive probabilities that a bit is 1, by index. */
 export class BitModels {

@@ -1,7 +1,8 @@
+#include "stages/scales/scale_codecs.h"
+
 #include <meshoptimizer.h>
 
 #include "format/base/box.h"
-#include "stages/scales/scale_codecs.h"
 
 namespace texmesh {
 namespace {
@@ -245,11 +246,236 @@ class PlainPrimitive {
   std::size_t n_;
 };
 
+using Json = GlbWriter::Json;
+
+/// The attributes of a primitive under way: what Draco needs to know about each, and what glTF says about it.
+class DracoPrimitive {
+ public:
+  DracoPrimitive(const ScaleCoding& coding, const ScalePrimitive& primitive)
+      : coding_(coding), primitive_(primitive), mesh_(primitive.indices, primitive.wedges.size()) {
+    add_positions();
+    if (!coding.mesh.normals.empty())
+      add("NORMAL", "VEC3", {coding.options.normal_bits, {}, 1},
+          [&](std::uint32_t w) { return coding.frames.normals[w]; });
+    for (int set = 0; set < 2; ++set)
+      if (coding.write_uv[set])
+        add("TEXCOORD_" + std::to_string(set), "VEC2", draco_grid(coding.uv[set]),
+            [&](std::uint32_t w) { return coding.uv_values(set)[w]; });
+    if (!coding.mesh.colours.empty()) add_colours();
+    if (coding.writes_tangents(primitive))  // from -1 to 1, so that w stays 1 or -1
+      add("TANGENT", "VEC4", {coding.options.tangent_bits, {-1, -1, -1}, 2},
+          [&](std::uint32_t w) { return coding.frames.tangents[w]; });
+    if (primitive.wedge_part.empty()) return;
+    mesh_.add("_FEATURE_ID_0", {},
+              [&](std::uint32_t i) { return std::array<std::uint16_t, 1>{primitive.wedge_part[i]}; });
+    accessors_.push_back(
+        {"_FEATURE_ID_0", {{"componentType", kUnsignedShort}, {"count", 0}, {"type", "SCALAR"}}});
+  }
+
+  CodedPrimitive code(GlbWriter& writer) {
+    const DracoStream stream = mesh_.encode(10 - coding_.options.draco_level);
+    return {writer.add_draco(stream, std::move(accessors_)), stream.triangles, stream.vertices};
+  }
+
+ private:
+  static constexpr int kUnsignedByte = 5121, kUnsignedShort = 5123, kFloat = 5126;
+
+  static DracoGrid draco_grid(const QuantisationGrid& grid) { return {grid.bits, grid.origin, grid.range}; }
+
+  /// Floats of the wedges.
+  void add(const std::string& name, const char* type, const DracoGrid& grid, const auto& of_wedge) {
+    mesh_.add(name, grid, [&](std::uint32_t i) { return of_wedge(primitive_.wedges[i]); });
+    accessors_.push_back({name, {{"componentType", kFloat}, {"count", 0}, {"type", type}}});
+  }
+
+  void add_positions() {
+    const Mesh& m = coding_.mesh;
+    Box3f box;
+    add("POSITION", "VEC3", draco_grid(coding_.position), [&](std::uint32_t w) {
+      const Vec3f p = m.positions[m.wedge_position[w]];
+      box.extend(coding_.position.bits > 0 ? coding_.position.rounded(p) : p);
+      return p;
+    });
+    accessors_.back().accessor["min"] = {box.min.x, box.min.y, box.min.z};
+    accessors_.back().accessor["max"] = {box.max.x, box.max.y, box.max.z};
+  }
+
+  template <class Element>
+  void add_colour_values() {
+    constexpr float kOne = std::numeric_limits<Element>::max();
+    mesh_.add("COLOR_0", {}, [&](std::uint32_t i) {
+      const Vec4f c = coding_.mesh.colours[primitive_.wedges[i]];
+      const auto code = [](float x) {
+        return static_cast<Element>(std::floor(std::clamp(x, 0.0f, 1.0f) * kOne + 0.5f));
+      };
+      return std::array<Element, 4>{code(c.x), code(c.y), code(c.z), code(c.w)};
+    });
+  }
+
+  void add_colours() {
+    if (coding_.fine_colours)
+      add_colour_values<std::uint16_t>();
+    else
+      add_colour_values<std::uint8_t>();
+    accessors_.push_back({"COLOR_0",
+                          {{"componentType", coding_.fine_colours ? kUnsignedShort : kUnsignedByte},
+                           {"normalized", true},
+                           {"count", 0},
+                           {"type", "VEC4"}}});
+  }
+
+  const ScaleCoding& coding_;
+  const ScalePrimitive& primitive_;
+  DracoMesh mesh_;
+  std::vector<GlbWriter::DracoAccessor> accessors_;
+};
+
+// With fewer a surface is off its own bounds by more than readers may take for damage.
+constexpr int kLeastAskedBits = 6;
+
+/// Least bits whose step is at most `step`.
+int bits_for(double range, double step) {
+  int bits = 1;
+  while (bits < 31 && range / static_cast<double>((std::uint64_t{1} << bits) - 1) > step) ++bits;
+  return bits;
+}
+
+std::vector<float> edge_lengths(const Mesh& mesh) {
+  std::vector<float> lengths;
+  lengths.reserve(3 * mesh.triangles.size());
+  for (const Triangle& t : mesh.triangles)
+    for (std::size_t k = 0; k < 3; ++k)
+      lengths.push_back(length(mesh.positions[mesh.wedge_position[t[k]]] -
+                               mesh.positions[mesh.wedge_position[t[(k + 1) % 3]]]));
+  return lengths;
+}
+
+/// The least mean edge of a part that can be seen beside the whole (1/4096 of its size, a pixel of a large
+/// screen), or 0: a small part under a node of its own scale needs finer steps than the average says.
+double finest_part_edge(const Mesh& mesh, double whole) {
+  struct Part {
+    double edges = 0;
+    std::size_t count = 0;
+    Box3f box;
+  };
+  std::vector<Part> parts(mesh.part_names.size());
+  for (std::size_t t = 0; t < mesh.triangles.size() && !parts.empty(); ++t) {
+    Part& part = parts.at(mesh.triangle_part[t]);
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec3f p = mesh.positions[mesh.wedge_position[mesh.triangles[t][k]]];
+      const Vec3f q = mesh.positions[mesh.wedge_position[mesh.triangles[t][(k + 1) % 3]]];
+      part.box.extend(p);
+      part.edges += length(q - p);
+      ++part.count;
+    }
+  }
+  double finest = 0;
+  for (const Part& part : parts) {
+    if (part.count == 0 || part.box.diagonal() * 4096 < whole) continue;
+    const double mean = part.edges / static_cast<double>(part.count);
+    if (finest == 0 || mean < finest) finest = mean;
+  }
+  return finest;
+}
+
+std::size_t collapsed_triangles(const Mesh& mesh, const QuantisationGrid& grid) {
+  std::size_t count = 0;
+  for (const Triangle& t : mesh.triangles) {
+    const Vec3f a = grid.place(mesh.positions[mesh.wedge_position[t[0]]]);
+    const Vec3f b = grid.place(mesh.positions[mesh.wedge_position[t[1]]]);
+    const Vec3f c = grid.place(mesh.positions[mesh.wedge_position[t[2]]]);
+    const Vec3d p = to_double(mesh.positions[mesh.wedge_position[t[0]]]);
+    const Vec3d area = cross(to_double(mesh.positions[mesh.wedge_position[t[1]]]) - p,
+                             to_double(mesh.positions[mesh.wedge_position[t[2]]]) - p);
+    if (area != Vec3d{} && cross(to_double(b) - to_double(a), to_double(c) - to_double(a)) == Vec3d{})
+      ++count;
+  }
+  return count;
+}
+
 }  // namespace
 
 CodedPrimitive code_plain(GlbWriter& writer, const ScaleCoding& coding, ScalePrimitive primitive) {
   if (coding.options.mesh_codec != MeshCodec::kNone) order_for_codec(primitive);
   return PlainPrimitive(writer, coding, primitive).code();
+}
+
+CodedPrimitive code_draco(GlbWriter& writer, const ScaleCoding& coding, const ScalePrimitive& primitive) {
+  return DracoPrimitive(coding, primitive).code(writer);
+}
+
+std::uint32_t QuantisationGrid::index(float x, int axis) const {
+  const float scale = static_cast<float>((std::uint32_t{1} << bits) - 1) / range;
+  return static_cast<std::uint32_t>(std::max(std::floor((x - origin[axis]) * scale + 0.5f), 0.0f));
+}
+
+Vec3f QuantisationGrid::rounded(Vec3f p) const {
+  return {value(index(p.x, 0), 0), value(index(p.y, 1), 1), value(index(p.z, 2), 2)};
+}
+
+Vec3f QuantisationGrid::place(Vec3f p) const {
+  return {static_cast<float>(index(p.x, 0)), static_cast<float>(index(p.y, 1)),
+          static_cast<float>(index(p.z, 2))};
+}
+
+QuantisationGrid position_grid(const Mesh& mesh, const ScalesOptions& options, int max_bits) {
+  QuantisationGrid grid;
+  if (mesh.positions.empty()) throw StageError("scales", "mesh", "positions", "none");
+  const Box3f box = bounding_box(mesh.positions);
+  grid.origin = box.min;
+  grid.range = box.longest_side();
+  if (!(grid.range > 0)) grid.range = 1;
+  if (options.position_bits > 0) {
+    grid.bits = std::clamp(options.position_bits, kLeastAskedBits, max_bits);
+    return grid;
+  }
+  std::vector<float> edges = edge_lengths(mesh);
+  double sum = 0;
+  for (float e : edges) sum += e;
+  const std::size_t rank = edges.size() / 20;
+  std::nth_element(edges.begin(), edges.begin() + static_cast<std::ptrdiff_t>(rank), edges.end());
+  const double error =
+      std::min(sum / static_cast<double>(edges.size()) / 16, static_cast<double>(edges[rank]) / 4);
+  // The farthest that a point moves is half the diagonal of a cell.
+  grid.bits = bits_for(grid.range, error > 0 ? error * 2 / std::sqrt(3.0) : grid.range);
+  if (const double part = finest_part_edge(mesh, box.diagonal()); part > 0 && grid.bits <= max_bits)
+    grid.bits = std::max(grid.bits, std::min(max_bits, bits_for(grid.range, part / 8 * 2 / std::sqrt(3.0))));
+  if (grid.bits <= max_bits) grid.bits = std::max(grid.bits, std::min(max_bits, options.least_position_bits));
+  while (grid.bits < max_bits && collapsed_triangles(mesh, grid) * 1000 > mesh.triangles.size()) ++grid.bits;
+  if (grid.bits > max_bits) grid.bits = 0;
+  return grid;
+}
+
+QuantisationGrid uv_grid(const std::vector<Vec2f>& uv, double largest_texture_px,
+                         const ScalesOptions& options, int max_bits) {
+  QuantisationGrid grid;
+  if (uv.empty()) return grid;
+  Vec2f lo = uv[0], hi = uv[0];
+  for (Vec2f p : uv) {
+    lo = {std::min(lo.x, p.x), std::min(lo.y, p.y)};
+    hi = {std::max(hi.x, p.x), std::max(hi.y, p.y)};
+  }
+  grid.origin = {lo.x, lo.y, 0};
+  grid.range = std::max(hi.x - lo.x, hi.y - lo.y);
+  if (!(grid.range > 0)) grid.range = 1;
+  if (options.uv_bits > 0) {
+    grid.bits = std::min(options.uv_bits, max_bits);
+    return grid;
+  }
+  const double texels = std::max(largest_texture_px, 1.0);
+  if (bits_for(grid.range, 0.5 / texels) > max_bits) return grid;
+  grid.bits = std::min(max_bits, std::max(options.least_uv_bits, bits_for(grid.range, 0.25 / texels)));
+  return grid;
+}
+
+double largest_rounding(const Mesh& mesh, const QuantisationGrid& grid) {
+  double largest = 0;
+  if (grid.bits == 0) return largest;
+  for (Vec3f p : mesh.positions) {
+    const Vec3f q = grid.rounded(p);
+    for (int k = 0; k < 3; ++k) largest = std::max(largest, std::fabs(static_cast<double>(q[k]) - p[k]));
+  }
+  return largest;
 }
 
 }  // namespace texmesh
