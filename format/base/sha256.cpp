@@ -1,4 +1,3 @@
-
 #include "format/base/sha256.h"
 
 namespace texmesh {

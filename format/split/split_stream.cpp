@@ -1,4 +1,3 @@
-
 #include <cstdlib>
 
 #include "format/base/bytes.h"

@@ -23,6 +23,11 @@ inline std::uint32_t previous_corner(std::uint32_t corner) {
   return corner % 3 == 0 ? corner + 2 : corner - 1;
 }
 
+/// All corners of triangles, which must outlive them: 3 t + k is corner k of triangle t.
+inline std::span<const std::uint32_t> corners_of(std::span<const Triangle> triangles) {
+  return {reinterpret_cast<const std::uint32_t*>(triangles.data()), 3 * triangles.size()};
+}
+
 /// `corner_position`: three position indices (< position_count) per triangle, all three different. O(n log
 /// n).
 EdgeTable group_edges(std::span<const std::uint32_t> corner_position, std::size_t position_count);

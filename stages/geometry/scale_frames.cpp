@@ -39,6 +39,42 @@ std::vector<double> wedge_areas(const Mesh& mesh, const std::vector<Triangle>& t
   return area;
 }
 
+/// What a sample says about the normals of a face's corners.
+struct Tie {
+  std::array<std::uint32_t, 3> corner{};  // index of normals
+  std::array<double, 3> weight{};
+  Vec3f normal;
+  double area = 0;
+};
+
+/// Steps of least squares with lumped weights, which never overshoot. `tie_of(sample)`: nothing for a sample
+/// that no face takes.
+void improve(std::size_t samples, auto&& tie_of, std::vector<Vec3d>& normals) {
+  std::vector<Vec3d> change(normals.size());
+  std::vector<double> weight(normals.size());
+  for (int step = 0; step < kSteps; ++step) {
+    std::fill(change.begin(), change.end(), Vec3d{});
+    std::fill(weight.begin(), weight.end(), 0);
+    for (std::size_t s = 0; s < samples; ++s) {
+      const std::optional<Tie> tie = tie_of(s);
+      if (!tie) continue;
+      Vec3d here;
+      for (std::size_t k = 0; k < 3; ++k) here = here + normals[tie->corner[k]] * tie->weight[k];
+      const Vec3d missing = to_double(tie->normal) - normalized(here);
+      for (std::size_t k = 0; k < 3; ++k) {
+        const double w = tie->weight[k] * tie->area;
+        change[tie->corner[k]] = change[tie->corner[k]] + missing * w;
+        weight[tie->corner[k]] += w;
+      }
+    }
+    for (std::size_t i = 0; i < normals.size(); ++i) {
+      if (!(weight[i] > 0)) continue;
+      const Vec3d next = normals[i] + change[i] * (1 / weight[i]);
+      if (dot(next, next) > 1e-6) normals[i] = normalized(next);
+    }
+  }
+}
+
 /// The scale's triangles, around each place, and the normals that are sought.
 class Fit {
  public:
@@ -50,7 +86,16 @@ class Fit {
     add_faces(scale);
   }
   void take_samples(const std::vector<Triangle>& finest, const RunContext& context);
-  void improve();
+  void improve_normals() {
+    improve(
+        samples_.size(),
+        [this](std::size_t i) -> std::optional<Tie> {
+          const Sample& s = samples_[i];
+          if (s.face == kNoIndex) return std::nullopt;
+          return Tie{faces_[s.face].normal, s.weight, mesh_.normals[s.wedge], s.area};
+        },
+        normals_);
+  }
   ScaleFrames frames() const;
 
  private:
@@ -135,33 +180,6 @@ void Fit::take_samples(const std::vector<Triangle>& finest, const RunContext& co
   });
 }
 
-/// Steps of least squares with lumped weights, which never overshoot.
-void Fit::improve() {
-  std::vector<Vec3d> change(normals_.size());
-  std::vector<double> weight(normals_.size());
-  for (int step = 0; step < kSteps; ++step) {
-    std::fill(change.begin(), change.end(), Vec3d{});
-    std::fill(weight.begin(), weight.end(), 0);
-    for (const Sample& s : samples_) {
-      if (s.face == kNoIndex) continue;
-      const std::array<std::uint32_t, 3>& corner = faces_[s.face].normal;
-      Vec3d here;
-      for (std::size_t k = 0; k < 3; ++k) here = here + normals_[corner[k]] * s.weight[k];
-      const Vec3d missing = to_double(mesh_.normals[s.wedge]) - normalized(here);
-      for (std::size_t k = 0; k < 3; ++k) {
-        const double w = s.weight[k] * s.area;
-        change[corner[k]] = change[corner[k]] + missing * w;
-        weight[corner[k]] += w;
-      }
-    }
-    for (std::size_t i = 0; i < normals_.size(); ++i) {
-      if (!(weight[i] > 0)) continue;
-      const Vec3d next = normals_[i] + change[i] * (1 / weight[i]);
-      if (dot(next, next) > 1e-6) normals_[i] = normalized(next);
-    }
-  }
-}
-
 ScaleFrames Fit::frames() const {
   ScaleFrames out{mesh_.normals, mesh_.tangents};
   for (std::uint32_t w = 0; w < normal_of_.size(); ++w) {
@@ -179,53 +197,21 @@ ScaleFrames Fit::frames() const {
 }
 
 constexpr std::size_t kMostSamples = 400000;
-constexpr int kFitSteps = 4;
-constexpr double kLeastCosine = 0.25;  // cosine between a sample and the face that it is put on
 
-/// What a sample says about three normals.
-struct Tie {
-  std::array<double, 3> weight{};
-  std::uint32_t triangle = 0;
-  bool used = false;
-};
-
-std::vector<Tie> ties_of(std::span<const Vec3d> points, std::span<const Triangle> triangles,
-                         const NormalSamples& samples, const RunContext& context) {
+std::vector<std::optional<Tie>> ties_of(std::span<const Vec3d> points, std::span<const Triangle> triangles,
+                                        const NormalSamples& samples, const RunContext& context) {
   const TriangleTree tree(points, triangles);
-  std::vector<Tie> out(samples.places.size());
+  std::vector<std::optional<Tie>> out(samples.places.size());
   parallel_for(context, out.size(), 256, [&](std::size_t begin, std::size_t end) {
     for (std::size_t s = begin; s < end; ++s) {
       const TriangleTree::Nearest found = tree.nearest(samples.places[s]);
       const Triangle& t = triangles[found.triangle];
       const Vec3d face = normalized(cross(points[t[1]] - points[t[0]], points[t[2]] - points[t[0]]));
-      out[s] = {found.weight, found.triangle, dot(face, to_double(samples.normals[s])) > kLeastCosine};
+      if (dot(face, to_double(samples.normals[s])) > kLeastFacing)
+        out[s] = Tie{t, found.weight, samples.normals[s], samples.areas[s]};
     }
   });
   return out;
-}
-
-/// One step of least squares with lumped weights, which never overshoots.
-void improve(std::span<const Triangle> triangles, const std::vector<Tie>& ties, const NormalSamples& samples,
-             std::vector<Vec3d>& normals) {
-  std::vector<Vec3d> change(normals.size());
-  std::vector<double> weight(normals.size());
-  for (std::size_t s = 0; s < ties.size(); ++s) {
-    if (!ties[s].used) continue;
-    const Triangle& t = triangles[ties[s].triangle];
-    Vec3d here;
-    for (std::size_t k = 0; k < 3; ++k) here = here + normals[t[k]] * ties[s].weight[k];
-    const Vec3d missing = to_double(samples.normals[s]) - normalized(here);
-    for (std::size_t k = 0; k < 3; ++k) {
-      const double w = ties[s].weight[k] * samples.areas[s];
-      change[t[k]] = change[t[k]] + missing * w;
-      weight[t[k]] += w;
-    }
-  }
-  for (std::size_t i = 0; i < normals.size(); ++i) {
-    if (!(weight[i] > 0)) continue;
-    const Vec3d next = normals[i] + change[i] * (1 / weight[i]);
-    if (dot(next, next) > 1e-6) normals[i] = normalized(next);
-  }
 }
 
 }  // namespace
@@ -234,7 +220,7 @@ ScaleFrames scale_frames(const NestedScales& scales, std::size_t index, const Ru
   if (index == 0 || scales.mesh.normals.empty()) return {scales.mesh.normals, scales.mesh.tangents};
   Fit fit(scales, scales.scales.at(index));
   fit.take_samples(scales.scales[0].triangles, context);
-  fit.improve();
+  fit.improve_normals();
   return fit.frames();
 }
 
@@ -263,12 +249,7 @@ std::size_t stand_in_scale(const NestedScales& scales, std::size_t most_triangle
 NormalSamples normal_samples(const Mesh& mesh) {
   NormalSamples out;
   if (mesh.normals.empty()) return out;
-  std::vector<double> areas(mesh.wedge_count());
-  for (const Triangle& t : mesh.triangles) {
-    const auto at = [&](std::size_t k) { return to_double(mesh.positions[mesh.wedge_position[t[k]]]); };
-    const double area = length(cross(at(1) - at(0), at(2) - at(0))) / 6;
-    for (const std::uint32_t w : t) areas[w] += area;
-  }
+  const std::vector<double> areas = wedge_areas(mesh, mesh.triangles);
   const std::size_t every = mesh.wedge_count() / kMostSamples + 1;
   for (std::size_t w = 0; w < mesh.wedge_count(); w += every) {
     if (!(areas[w] > 0)) continue;
@@ -283,10 +264,11 @@ std::vector<Vec3f> fit_normals(std::span<const Vec3d> points, std::span<const Tr
                                std::vector<Vec3f> normals, const NormalSamples& samples,
                                const RunContext& context) {
   if (triangles.empty() || samples.places.empty()) return normals;
-  const std::vector<Tie> ties = ties_of(points, triangles, samples, context);
+  const std::vector<std::optional<Tie>> ties = ties_of(points, triangles, samples, context);
   std::vector<Vec3d> fitted;
   for (const Vec3f n : normals) fitted.push_back(to_double(n));
-  for (int i = 0; i < kFitSteps; ++i) improve(triangles, ties, samples, fitted);
+  improve(
+      ties.size(), [&](std::size_t s) { return ties[s]; }, fitted);
   for (std::size_t i = 0; i < normals.size(); ++i) normals[i] = to_float(fitted[i]);
   return normals;
 }

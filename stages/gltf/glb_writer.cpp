@@ -3,8 +3,8 @@
 #include <meshoptimizer.h>
 
 #include <algorithm>
-#include <charconv>
 
+#include "format/base/json_fields.h"
 #include "stages/gltf/glb_container.h"
 
 namespace texmesh {
@@ -97,13 +97,7 @@ void GlbWriter::use_extension(const std::string& name, bool required) {
   if (required) add(required_);
 }
 
-double GlbWriter::shortest(float x) {
-  std::array<char, 64> text;
-  const auto end = std::to_chars(text.data(), text.data() + text.size(), x).ptr;
-  double d = 0;
-  std::from_chars(text.data(), end, d);
-  return d;
-}
+double GlbWriter::shortest(float x) { return shortest_double(x); }
 
 GlbWriter::Json GlbWriter::shortest(std::initializer_list<float> numbers) {
   Json out = Json::array();

@@ -1,4 +1,3 @@
-
 #include <numeric>
 
 #include "format/rules/size_curve.h"

@@ -1,5 +1,3 @@
-
-
 #include "format/documents/manifest.h"
 #include "stages/geometry/scale_frames.h"
 #include "stages/quality/table_fit.h"

@@ -32,15 +32,34 @@ struct Stream {
   std::size_t stride = 0, count = 0;
 };
 
-template <class T, std::size_t N, class Value>
-Stream make_stream(std::size_t count, std::size_t stride, const Value& value) {
-  Stream s{std::vector<std::uint8_t>(count * stride), stride, count};
+/// `value(i)` gives an element as an array of numbers.
+Stream make_stream(std::size_t count, const auto& value) {
+  using Element = std::remove_cvref_t<decltype(value(std::size_t{0}))>;
+  Stream s{{}, (sizeof(Element) + 3) / 4 * 4, count};
+  s.bytes.resize(count * s.stride);
   for (std::size_t i = 0; i < count; ++i) {
-    const std::array<T, N> element = value(i);
-    std::memcpy(s.bytes.data() + i * stride, element.data(), sizeof element);
+    const Element element = value(i);
+    std::memcpy(s.bytes.data() + i * s.stride, element.data(), sizeof element);
   }
   return s;
 }
+
+/// Numbers from -1 or, without a sign, 0 to 1 as normalised integers; floats as they are.
+template <class T, std::size_t N>
+std::array<T, N> coded(const std::array<float, N>& values) {
+  if constexpr (std::is_same_v<T, float>) {
+    return values;
+  } else {
+    constexpr float kOne = std::numeric_limits<T>::max(), kLeast = std::is_signed_v<T> ? -1 : 0;
+    std::array<T, N> out;
+    for (std::size_t k = 0; k < N; ++k)
+      out[k] = static_cast<T>(std::floor(std::clamp(values[k], kLeast, 1.0f) * kOne + 0.5f));
+    return out;
+  }
+}
+
+std::array<float, 3> numbers_of(Vec3f v) { return {v.x, v.y, v.z}; }
+std::array<float, 4> numbers_of(Vec4f v) { return {v.x, v.y, v.z, v.w}; }
 
 class PlainPrimitive {
  public:
@@ -86,18 +105,13 @@ class PlainPrimitive {
       box.extend(q);
       return q;
     };
-    const Stream s = on_grid ? make_stream<std::uint16_t, 3>(n_, 8,
-                                                             [&](std::size_t i) {
-                                                               const Vec3f q = position(i);
-                                                               return std::array<std::uint16_t, 3>{
-                                                                   static_cast<std::uint16_t>(q.x),
-                                                                   static_cast<std::uint16_t>(q.y),
-                                                                   static_cast<std::uint16_t>(q.z)};
-                                                             })
-                             : make_stream<float, 3>(n_, 12, [&](std::size_t i) {
-                                 const Vec3f q = position(i);
-                                 return std::array<float, 3>{q.x, q.y, q.z};
-                               });
+    const auto as = [&]<class T>(T) {
+      return make_stream(n_, [&](std::size_t i) {
+        const Vec3f q = position(i);
+        return std::array<T, 3>{static_cast<T>(q.x), static_cast<T>(q.y), static_cast<T>(q.z)};
+      });
+    };
+    const Stream s = on_grid ? as(std::uint16_t{}) : as(float{});
     if (on_grid) writer_.use_extension("KHR_mesh_quantization", true);
     Json accessor{{"bufferView", add(s, false)},
                   {"componentType", on_grid ? 5123 : 5126},
@@ -115,125 +129,65 @@ class PlainPrimitive {
     return writer_.add_accessor(std::move(accessor));
   }
 
+  /// An attribute of T, `of_wedge(w)` as numbers.
   template <class T>
-  Stream coded_normals() const {
-    constexpr float kOne = std::numeric_limits<T>::max();
-    return make_stream<T, 3>(n_, 4 * sizeof(T), [&](std::size_t i) {
-      const Vec3f n = coding_.frames.normals[primitive_.wedges[i]];
-      auto code = [](float x) {
-        return static_cast<T>(std::floor(std::clamp(x, -1.0f, 1.0f) * kOne + 0.5f));
-      };
-      return std::array<T, 3>{code(n.x), code(n.y), code(n.z)};
-    });
+  std::size_t attribute(const auto& of_wedge) {
+    using Numbers = std::remove_cvref_t<decltype(of_wedge(0u))>;
+    constexpr bool kIsFloat = std::is_same_v<T, float>;
+    constexpr int kType = kIsFloat ? 5126 : 5119 + 2 * static_cast<int>(sizeof(T)) - std::is_signed_v<T>;
+    const Stream s = make_stream(n_, [&](std::size_t i) { return coded<T>(of_wedge(primitive_.wedges[i])); });
+    Json accessor{{"bufferView", add(s, false)}, {"componentType", kType}};
+    if (!kIsFloat) accessor["normalized"] = true;
+    accessor["count"] = n_;
+    accessor["type"] = "VEC" + std::to_string(std::tuple_size_v<Numbers>);
+    return writer_.add_accessor(std::move(accessor));
+  }
+  std::size_t signed_attribute(int bits, const auto& of_wedge) {
+    if (!compact()) return attribute<float>(of_wedge);
+    return bits > 8 ? attribute<std::int16_t>(of_wedge) : attribute<std::int8_t>(of_wedge);
   }
 
   std::size_t normals() {
-    const bool fine = coding_.options.normal_bits > 8;
     if (compact()) writer_.use_extension("KHR_mesh_quantization", true);
-    const Stream s = !compact() ? make_stream<float, 3>(n_, 12,
-                                                        [&](std::size_t i) {
-                                                          const Vec3f n =
-                                                              coding_.frames.normals[primitive_.wedges[i]];
-                                                          return std::array<float, 3>{n.x, n.y, n.z};
-                                                        })
-                     : fine     ? coded_normals<std::int16_t>()
-                                : coded_normals<std::int8_t>();
-    Json accessor{{"bufferView", add(s, false)}, {"componentType", !compact() ? 5126 : fine ? 5122 : 5120}};
-    if (compact()) accessor["normalized"] = true;
-    accessor["count"] = n_;
-    accessor["type"] = "VEC3";
-    return writer_.add_accessor(std::move(accessor));
+    return signed_attribute(coding_.options.normal_bits,
+                            [&](std::uint32_t w) { return numbers_of(coding_.frames.normals[w]); });
   }
 
   std::size_t parts() {
-    const Stream s = make_stream<std::uint16_t, 1>(
-        n_, 4, [&](std::size_t i) { return std::array<std::uint16_t, 1>{primitive_.wedge_part[i]}; });
+    const Stream s = make_stream(n_, [&](std::size_t i) { return std::array{primitive_.wedge_part[i]}; });
     return writer_.add_accessor(
         {{"bufferView", add(s, false)}, {"componentType", 5123}, {"count", n_}, {"type", "SCALAR"}});
   }
 
-  template <class T>
-  Stream coded_tangents() const {
-    constexpr float kOne = std::numeric_limits<T>::max();
-    return make_stream<T, 4>(n_, 4 * sizeof(T), [&](std::size_t i) {
-      const Vec4f t = coding_.frames.tangents[primitive_.wedges[i]];
-      auto code = [](float x) {
-        return static_cast<T>(std::floor(std::clamp(x, -1.0f, 1.0f) * kOne + 0.5f));
-      };
-      return std::array<T, 4>{code(t.x), code(t.y), code(t.z), code(t.w)};
-    });
-  }
-
   std::size_t tangents() {
-    const bool fine = coding_.options.tangent_bits > 8;
-    const Stream s = !compact() ? make_stream<float, 4>(n_, 16,
-                                                        [&](std::size_t i) {
-                                                          const Vec4f t =
-                                                              coding_.frames.tangents[primitive_.wedges[i]];
-                                                          return std::array<float, 4>{t.x, t.y, t.z, t.w};
-                                                        })
-                     : fine     ? coded_tangents<std::int16_t>()
-                                : coded_tangents<std::int8_t>();
-    Json accessor{{"bufferView", add(s, false)}, {"componentType", !compact() ? 5126 : fine ? 5122 : 5120}};
-    if (compact()) accessor["normalized"] = true;
-    accessor["count"] = n_;
-    accessor["type"] = "VEC4";
-    return writer_.add_accessor(std::move(accessor));
+    return signed_attribute(coding_.options.tangent_bits,
+                            [&](std::uint32_t w) { return numbers_of(coding_.frames.tangents[w]); });
   }
 
   /// 16 normalised bits where all coordinates lie in 0..1 and the step is fine enough; floats elsewhere,
   /// because another range would need a texture transform that may clash with the material's own.
   std::size_t uvs(int set) {
-    const std::vector<Vec2f>& uv = coding_.uv_values(set);
     const QuantisationGrid& grid = coding_.uv[set];
     const bool unit = compact() && grid.bits > 0 && grid.origin == Vec3f{} && grid.range == 1;
-    const Stream s =
-        unit ? make_stream<std::uint16_t, 2>(n_, 4,
-                                             [&](std::size_t i) {
-                                               const Vec2f p = uv[primitive_.wedges[i]];
-                                               return std::array<std::uint16_t, 2>{
-                                                   static_cast<std::uint16_t>(grid.index(p.x, 0)),
-                                                   static_cast<std::uint16_t>(grid.index(p.y, 1))};
-                                             })
-             : make_stream<float, 2>(n_, 8, [&](std::size_t i) {
-                 const Vec2f p = uv[primitive_.wedges[i]];
-                 return std::array<float, 2>{p.x, p.y};
-               });
-    Json accessor{{"bufferView", add(s, false)}, {"componentType", unit ? 5123 : 5126}};
-    if (unit) accessor["normalized"] = true;
-    accessor["count"] = n_;
-    accessor["type"] = "VEC2";
-    return writer_.add_accessor(std::move(accessor));
-  }
-
-  template <class T>
-  Stream coded_colours() const {
-    constexpr float kOne = std::numeric_limits<T>::max();
-    return make_stream<T, 4>(n_, 4 * sizeof(T), [&](std::size_t i) {
-      const Vec4f c = coding_.mesh.colours[primitive_.wedges[i]];
-      auto code = [](float x) { return static_cast<T>(std::floor(std::clamp(x, 0.0f, 1.0f) * kOne + 0.5f)); };
-      return std::array<T, 4>{code(c.x), code(c.y), code(c.z), code(c.w)};
-    });
+    const auto of_wedge = [&](std::uint32_t w) {
+      const Vec2f p = coding_.uv_values(set)[w];
+      return std::array<float, 2>{p.x, p.y};
+    };
+    return unit ? attribute<std::uint16_t>(of_wedge) : attribute<float>(of_wedge);
   }
 
   std::size_t colours() {
-    const Stream s = coding_.fine_colours ? coded_colours<std::uint16_t>() : coded_colours<std::uint8_t>();
-    return writer_.add_accessor({{"bufferView", add(s, false)},
-                                 {"componentType", coding_.fine_colours ? 5123 : 5121},
-                                 {"normalized", true},
-                                 {"count", n_},
-                                 {"type", "VEC4"}});
+    const auto of_wedge = [&](std::uint32_t w) { return numbers_of(coding_.mesh.colours[w]); };
+    return coding_.fine_colours ? attribute<std::uint16_t>(of_wedge) : attribute<std::uint8_t>(of_wedge);
   }
 
   std::size_t indices() {
     const bool wide = n_ > 65535;  // 65535 itself is not an index: it means "restart"
     const std::vector<std::uint32_t>& in = primitive_.indices;
-    const Stream s =
-        wide ? make_stream<std::uint32_t, 1>(
-                   in.size(), 4, [&](std::size_t i) { return std::array<std::uint32_t, 1>{in[i]}; })
-             : make_stream<std::uint16_t, 1>(in.size(), 2, [&](std::size_t i) {
-                 return std::array<std::uint16_t, 1>{static_cast<std::uint16_t>(in[i])};
-               });
+    const auto as = [&]<class T>(T) {
+      return make_stream(in.size(), [&](std::size_t i) { return std::array{static_cast<T>(in[i])}; });
+    };
+    const Stream s = wide ? as(std::uint32_t{}) : as(std::uint16_t{});
     return writer_.add_accessor({{"bufferView", add(s, true)},
                                  {"componentType", wide ? 5125 : 5123},
                                  {"count", in.size()},
@@ -300,23 +254,16 @@ class DracoPrimitive {
     accessors_.back().accessor["max"] = {box.max.x, box.max.y, box.max.z};
   }
 
-  template <class Element>
-  void add_colour_values() {
-    constexpr float kOne = std::numeric_limits<Element>::max();
-    mesh_.add("COLOR_0", {}, [&](std::uint32_t i) {
-      const Vec4f c = coding_.mesh.colours[primitive_.wedges[i]];
-      const auto code = [](float x) {
-        return static_cast<Element>(std::floor(std::clamp(x, 0.0f, 1.0f) * kOne + 0.5f));
-      };
-      return std::array<Element, 4>{code(c.x), code(c.y), code(c.z), code(c.w)};
-    });
-  }
-
   void add_colours() {
+    const auto add_as = [&]<class T>(T) {
+      mesh_.add("COLOR_0", {}, [&](std::uint32_t i) {
+        return coded<T>(numbers_of(coding_.mesh.colours[primitive_.wedges[i]]));
+      });
+    };
     if (coding_.fine_colours)
-      add_colour_values<std::uint16_t>();
+      add_as(std::uint16_t{});
     else
-      add_colour_values<std::uint8_t>();
+      add_as(std::uint8_t{});
     accessors_.push_back({"COLOR_0",
                           {{"componentType", coding_.fine_colours ? kUnsignedShort : kUnsignedByte},
                            {"normalized", true},

@@ -2,6 +2,7 @@
 
 #include "format/base/portable_math.h"
 #include "stages/base/parallel.h"
+#include "stages/geometry/distance.h"
 
 namespace texmesh {
 namespace {
@@ -99,27 +100,12 @@ double measure(const TriangleTree& tree, const std::array<ConeRay, TriangleTree:
   return lengths.empty() ? kInfinity : median(lengths) / 2;
 }
 
-/// For each point the triangles around it.
-struct Fans {
-  std::vector<std::uint32_t> begin, triangles;
-  explicit Fans(const TriangleSoup& soup) : begin(soup.points.size() + 1, 0) {
-    for (const Triangle& t : soup.triangles)
-      for (std::uint32_t p : t) ++begin[p + 1];
-    for (std::size_t p = 0; p < soup.points.size(); ++p) begin[p + 1] += begin[p];
-    triangles.resize(begin.back());
-    std::vector<std::uint32_t> at(begin.begin(), begin.end() - 1);
-    for (std::uint32_t t = 0; t < soup.triangles.size(); ++t)
-      for (std::uint32_t p : soup.triangles[t]) triangles[at[p]++] = t;
-  }
-};
-
-std::vector<double> filtered(const TriangleSoup& soup, const Fans& fans, const std::vector<double>& value) {
+std::vector<double> filtered(const TriangleSoup& soup, const Spokes& fans, const std::vector<double>& value) {
   std::vector<double> out(value.size()), near;
   for (std::size_t t = 0; t < value.size(); ++t) {
     near.clear();
     for (std::uint32_t p : soup.triangles[t])
-      for (std::uint32_t i = fans.begin[p]; i < fans.begin[p + 1]; ++i)
-        near.push_back(value[fans.triangles[i]]);
+      for (const Spokes::Spoke& s : fans.at(p)) near.push_back(value[s.triangle]);
     out[t] = median(near);
   }
   return out;
@@ -273,16 +259,14 @@ std::vector<double> half_thickness(const TriangleSoup& closed, const TriangleTre
       face[t] = area[t] > 0 ? measure(tree, rays, (p + q + r) * (1.0 / 3), normalized(n)) : kInfinity;
     }
   });
-  const Fans fans(closed);
+  const Spokes fans(closed.points.size(), closed.triangles, [](std::uint32_t p) { return p; });
   for (int pass = 0; pass < kFilterPasses; ++pass) face = filtered(closed, fans, face);
   std::vector<double> point(closed.points.size(), kInfinity);
-  for (std::size_t p = 0; p < point.size(); ++p) {
+  for (std::uint32_t p = 0; p < point.size(); ++p) {
     double sum = 0, weight = 0;
-    for (std::uint32_t i = fans.begin[p]; i < fans.begin[p + 1]; ++i) {
-      const std::uint32_t t = fans.triangles[i];
-      if (face[t] == kInfinity) continue;
-      sum += face[t] * area[t], weight += area[t];
-    }
+    for (const Spokes::Spoke& s : fans.at(p))
+      if (face[s.triangle] != kInfinity)
+        sum += face[s.triangle] * area[s.triangle], weight += area[s.triangle];
     if (weight > 0) point[p] = sum / weight;
   }
   return point;

@@ -4,9 +4,8 @@
 
 #include <meshoptimizer.h>
 
-#include <numeric>
-
 #include "format/base/box.h"
+#include "stages/geometry/mesh_topology.h"
 
 namespace texmesh {
 namespace {
@@ -109,21 +108,14 @@ TriangleSoup used_part(const Gathered& g) {
   return soup;
 }
 
-std::uint32_t root_of(std::vector<std::uint32_t>& parent, std::uint32_t p) {
-  while (parent[p] != p) p = parent[p] = parent[parent[p]];
-  return p;
-}
-
 /// Parts in the order of their first triangles, triangles in the order of the whole.
 std::vector<TriangleSoup> split_parts(const TriangleSoup& wrap) {
-  std::vector<std::uint32_t> parent(wrap.points.size());
-  std::iota(parent.begin(), parent.end(), 0);
-  for (const Triangle& t : wrap.triangles)
-    for (std::size_t k = 1; k < 3; ++k) parent[root_of(parent, t[k])] = root_of(parent, t[0]);
+  DisjointSets sets(wrap.points.size());
+  for (const Triangle& t : wrap.triangles) sets.join(t[0], t[1]), sets.join(t[0], t[2]);
   std::vector<TriangleSoup> parts;
   std::vector<std::uint32_t> part(wrap.points.size(), kNoIndex), number(wrap.points.size(), kNoIndex);
   for (const Triangle& t : wrap.triangles) {
-    std::uint32_t& n = part[root_of(parent, t[0])];
+    std::uint32_t& n = part[sets.find(t[0])];
     if (n == kNoIndex) {
       n = static_cast<std::uint32_t>(parts.size());
       parts.emplace_back();

@@ -1,4 +1,3 @@
-
 #include "format/base/portable_math.h"
 #include "stages/base/parallel.h"
 #include "stages/geometry/mesh_topology.h"

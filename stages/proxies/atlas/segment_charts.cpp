@@ -252,9 +252,7 @@ class ChartMerge {
   }
 
   void find_opposites() {
-    std::vector<std::uint32_t> corners;
-    corners.reserve(3 * surface_.triangles.size());
-    for (const Triangle& t : surface_.triangles) corners.insert(corners.end(), t.begin(), t.end());
+    const std::span<const std::uint32_t> corners = corners_of(surface_.triangles);
     opposites_.assign(corners.size(), kNoIndex);
     const EdgeTable edges = group_edges(corners, surface_.positions.size());
     for (std::size_t e = 0; e < edges.edge_count(); ++e)
