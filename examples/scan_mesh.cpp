@@ -4,7 +4,6 @@
 
 #include "examples/scan_model.h"
 #include "examples/scan_noise.h"
-#include "format/base/box.h"
 #include "format/base/portable_math.h"
 #include "format/base/vec.h"
 

@@ -4,8 +4,8 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "format/base/box.h"
 #include "format/base/bytes.h"
+#include "format/base/vec.h"
 
 namespace texmesh {
 namespace {

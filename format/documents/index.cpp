@@ -1,6 +1,5 @@
 #include "format/documents/index.h"
 
-#include <algorithm>
 #include <map>
 
 #include "format/container/container.h"

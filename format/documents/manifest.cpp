@@ -1,7 +1,5 @@
 #include "format/documents/manifest.h"
 
-#include <algorithm>
-
 #include "format/base/text_bytes.h"
 #include "format/container/container.h"
 #include "format/documents/json_members.h"

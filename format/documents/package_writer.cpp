@@ -1,6 +1,5 @@
 #include "format/documents/package_writer.h"
 
-#include <algorithm>
 #include <map>
 
 #include "format/container/container.h"

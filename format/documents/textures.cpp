@@ -1,6 +1,5 @@
 #include "format/documents/textures.h"
 
-#include <algorithm>
 #include <map>
 
 #include "format/base/text_bytes.h"

@@ -1,7 +1,5 @@
 #include "format/rules/proxy_choice.h"
 
-#include <algorithm>
-
 #include "format/base/portable_math.h"
 
 namespace texmesh {

@@ -1,8 +1,5 @@
 #include "format/rules/viewing.h"
 
-#include <algorithm>
-#include <limits>
-
 #include "format/base/portable_math.h"
 #include "format/rules/split_mix.h"
 

@@ -1,5 +1,4 @@
 #pragma once
-#include <algorithm>
 #include <bit>
 
 #include "format/base/errors.h"

@@ -1,7 +1,5 @@
 #include "format/split/split_reader.h"
 
-#include <limits>
-
 #include "format/base/bytes.h"
 #include "format/base/sha256.h"
 #include "format/split/split_codec.h"

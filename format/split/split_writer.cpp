@@ -1,7 +1,6 @@
 #include "format/split/split_writer.h"
 
 #include <compare>
-#include <limits>
 
 #include "format/base/sha256.h"
 #include "format/split/split_codec.h"

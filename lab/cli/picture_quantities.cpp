@@ -9,7 +9,7 @@
 #include "pipeline/compile/artefacts.h"
 #include "pipeline/io/table.h"
 #include "stages/data/nested_scales.h"
-#include "stages/data/skeleton.h"
+#include "stages/data/scale_map.h"
 #include "tools/cli/options/command_line.h"
 #include "tools/cli/painting.h"
 

@@ -9,9 +9,9 @@
 #include <cmath>
 #include <map>
 
-#include "format/base/box.h"
 #include "format/base/errors.h"
 #include "format/base/portable_math.h"
+#include "format/base/vec.h"
 #include "format/rules/split_mix.h"
 #include "pipeline/io/markup.h"
 #include "pipeline/io/new_folder.h"

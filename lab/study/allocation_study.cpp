@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "format/base/box.h"
+#include "format/base/vec.h"
 #include "format/rules/allocation.h"
 #include "stages/base/parallel.h"
 #include "stages/fragment_codec/fragment_codec.h"

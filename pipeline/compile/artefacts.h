@@ -13,14 +13,12 @@
 #include "stages/data/conditioned_mesh.h"
 #include "stages/data/fragments.h"
 #include "stages/data/ladder.h"
-#include "stages/data/measured_quality.h"
 #include "stages/data/nested_scales.h"
 #include "stages/data/perceptual_values.h"
 #include "stages/data/pixels.h"
 #include "stages/data/previews.h"
 #include "stages/data/proxies.h"
 #include "stages/data/scale_map.h"
-#include "stages/data/skeleton.h"
 
 namespace texmesh {
 

@@ -5,7 +5,7 @@
 #include <bit>
 #include <cstdint>
 
-#include "format/base/srgb.h"
+#include "format/base/portable_math.h"
 
 namespace texmesh {
 

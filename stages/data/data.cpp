@@ -1,5 +1,4 @@
 // What the artefacts of stages say of themselves.
-#include <algorithm>
 
 #include "stages/data/conditioned_mesh.h"
 #include "stages/data/ladder.h"

@@ -11,7 +11,6 @@
 #include "stages/base/parallel.h"
 #include "stages/image/webp.h"
 #include "stages/jpeg/jpeg.h"
-#include "stages/jpeg/jpeg_bits.h"
 #include "stages/jpeg/masked_jpeg.h"
 
 namespace texmesh {

@@ -2,7 +2,6 @@
 
 #include "stages/base/run_context.h"
 #include "stages/data/ladder.h"
-#include "stages/image/pixel_window.h"
 #include "stages/jpeg/jpeg_coder.h"
 
 namespace texmesh {

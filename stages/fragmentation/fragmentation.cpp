@@ -6,6 +6,7 @@
 #include "format/model/material_extensions.h"
 #include "stages/base/parallel.h"
 #include "stages/fragmentation/fragment_grid.h"
+#include "stages/geometry/mesh_topology.h"
 #include "stages/geometry/texel_coverage.h"
 
 namespace texmesh {
@@ -160,10 +161,8 @@ void list_mips(const std::vector<Image>& images, Fragments& out, std::vector<std
 }
 
 double area_in_space(const Mesh& mesh, std::size_t triangle) {
-  Vec3d p[3];
-  for (int c = 0; c < 3; ++c)
-    p[c] = to_double(mesh.positions[mesh.position_of(static_cast<std::uint32_t>(triangle), c)]);
-  const double area = length(cross(p[1] - p[0], p[2] - p[0])) / 2;
+  const auto [a, b, c] = corner_points(mesh, mesh.triangles[triangle]);
+  const double area = length(cross(b - a, c - a)) / 2;
   return std::isfinite(area) ? area : 0;
 }
 

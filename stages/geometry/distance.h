@@ -1,7 +1,6 @@
 #pragma once
 #include <span>
 
-#include "format/base/box.h"
 #include "stages/data/nested_scales.h"
 
 namespace texmesh {

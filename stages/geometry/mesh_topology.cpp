@@ -135,6 +135,15 @@ EdgeTable group_edges(std::span<const std::uint32_t> corner_position, std::size_
   return table;
 }
 
+double surface_area(const Mesh& mesh, const std::vector<Triangle>& triangles) {
+  double area = 0;
+  for (const Triangle& t : triangles) {
+    const auto [a, b, c] = corner_points(mesh, t);
+    area += 0.5 * length(cross(b - a, c - a));
+  }
+  return area;
+}
+
 DisjointSets::DisjointSets(std::size_t count) : parent_(count) {
   std::iota(parent_.begin(), parent_.end(), 0u);
 }

@@ -1,7 +1,6 @@
 #pragma once
 #include <span>
 
-#include "format/base/box.h"
 #include "format/model/model.h"
 
 namespace texmesh {
@@ -22,6 +21,15 @@ inline std::uint32_t next_corner(std::uint32_t corner) { return corner % 3 == 2 
 inline std::uint32_t previous_corner(std::uint32_t corner) {
   return corner % 3 == 0 ? corner + 2 : corner - 1;
 }
+
+/// Where the corners of a triangle are, which indexes the mesh's wedges.
+inline std::array<Vec3d, 3> corner_points(const Mesh& mesh, const Triangle& t) {
+  const auto at = [&](std::size_t k) { return to_double(mesh.positions[mesh.wedge_position[t[k]]]); };
+  return {at(0), at(1), at(2)};
+}
+
+/// Of all triangles, which index the mesh's wedges.
+double surface_area(const Mesh& mesh, const std::vector<Triangle>& triangles);
 
 /// All corners of triangles, which must outlive them: 3 t + k is corner k of triangle t.
 inline std::span<const std::uint32_t> corners_of(std::span<const Triangle> triangles) {

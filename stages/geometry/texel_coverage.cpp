@@ -1,7 +1,5 @@
 #include "stages/geometry/texel_coverage.h"
 
-#include <limits>
-
 #include "format/base/portable_math.h"
 #include "stages/data/fragments.h"
 

@@ -7,7 +7,6 @@
 
 #include <tuple>
 
-#include "format/base/box.h"
 #include "format/container/layout.h"
 #include "stages/gltf/glb_document.h"
 #include "stages/image/decode_image.h"

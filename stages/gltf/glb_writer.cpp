@@ -2,8 +2,6 @@
 
 #include <meshoptimizer.h>
 
-#include <algorithm>
-
 #include "format/base/json_fields.h"
 #include "stages/gltf/glb_container.h"
 

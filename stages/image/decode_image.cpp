@@ -1,4 +1,4 @@
-#include "format/base/srgb.h"
+#include "format/base/portable_math.h"
 #include "stages/image/decode_jpeg.h"
 #include "stages/image/decode_tiff_exr.h"
 #include "stages/image/image_metadata.h"

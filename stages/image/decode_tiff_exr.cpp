@@ -1,10 +1,9 @@
 #include <dlfcn.h>
 
-#include <algorithm>
 #include <map>
 
 #include "stages/image/jpeg_segments.h"
-#include "stages/image/readers_module/readers.h"
+#include "stages/image/readers_module/other_pictures.h"
 
 namespace texmesh {
 namespace {

@@ -7,7 +7,7 @@
 #include "stages/base/parallel.h"
 #include "stages/fragment_codec/requantised_jpeg.h"
 #include "stages/image/decode_image.h"
-#include "stages/jpeg/jpeg_bits.h"
+#include "stages/jpeg/masked_jpeg.h"
 
 namespace texmesh {
 namespace {

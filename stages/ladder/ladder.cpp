@@ -2,7 +2,7 @@
 
 #include "format/rules/size_curve.h"
 #include "stages/image/decode_image.h"
-#include "stages/jpeg/jpeg_bits.h"
+#include "stages/jpeg/masked_jpeg.h"
 #include "stages/ladder/choose_rungs.h"
 #include "stages/ladder/encode_rungs.h"
 

@@ -1,7 +1,5 @@
 #include "stages/ladder/rung_value.h"
 
-#include <algorithm>
-
 #include "format/base/portable_math.h"
 #include "format/rules/viewing.h"
 

@@ -1,7 +1,6 @@
 #pragma once
 // Colours as the eye tells them apart, for FLIP (Andersson et al. 2020) and for seams. Linear colours are
 // those of sRGB's primaries, 0 .. 1; XYZ is relative to a white of Y = 1.
-#include <algorithm>
 
 #include "format/base/portable_math.h"
 #include "format/base/vec.h"

@@ -1,6 +1,5 @@
 #include "stages/measure/picture.h"
 
-#include <algorithm>
 #include <array>
 
 #if defined(__x86_64__) && defined(__GNUC__)

@@ -5,7 +5,6 @@
 #include "format/documents/thesis_tables.h"
 #include "stages/data/fragments.h"
 #include "stages/data/ladder.h"
-#include "stages/data/measured_quality.h"
 #include "stages/data/nested_scales.h"
 #include "stages/data/perceptual_values.h"
 #include "stages/data/previews.h"

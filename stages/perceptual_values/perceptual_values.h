@@ -3,7 +3,7 @@
 #include "format/documents/thesis_tables.h"
 #include "stages/data/nested_scales.h"
 #include "stages/data/perceptual_values.h"
-#include "stages/data/skeleton.h"
+#include "stages/data/scale_map.h"
 #include "stages/data/stage.h"
 
 namespace texmesh {

@@ -1,6 +1,7 @@
 #include "stages/proxies/make_proxy.h"
 
 #include "format/base/portable_math.h"
+#include "stages/geometry/mesh_topology.h"
 #include "stages/image/webp.h"
 
 namespace texmesh {
@@ -287,9 +288,7 @@ bool is_smooth(const Mesh& mesh) {
   double all = 0, turning = 0;
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
     const Triangle& corner = mesh.triangles[t];
-    const Vec3d a = to_double(mesh.positions[mesh.position_of(t, 0)]),
-                b = to_double(mesh.positions[mesh.position_of(t, 1)]),
-                c = to_double(mesh.positions[mesh.position_of(t, 2)]);
+    const auto [a, b, c] = corner_points(mesh, corner);
     const double area = length(cross(b - a, c - a));
     const Vec3f first = mesh.normals[corner[0]], turn1 = mesh.normals[corner[1]] - first,
                 turn2 = mesh.normals[corner[2]] - first;

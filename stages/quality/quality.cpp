@@ -1,4 +1,5 @@
 #include "format/documents/manifest.h"
+#include "stages/geometry/mesh_topology.h"
 #include "stages/geometry/scale_frames.h"
 #include "stages/quality/table_fit.h"
 
@@ -24,15 +25,6 @@ std::vector<Height> heights_below(double largest_px, std::size_t fewer) {
   }
   std::reverse(heights.begin(), heights.end());
   return heights;
-}
-
-double surface_area_of(const Mesh& mesh, const std::vector<Triangle>& triangles) {
-  double area = 0;
-  for (const Triangle& t : triangles) {
-    const auto at = [&](std::size_t k) { return to_double(mesh.positions[mesh.wedge_position[t[k]]]); };
-    area += 0.5 * length(cross(at(1) - at(0), at(2) - at(0)));
-  }
-  return area;
 }
 
 /// Scales with meshes of their own, as their files light them: a view costs by the positions that it looks
@@ -309,7 +301,7 @@ MeasuredQuality measure_quality(const NestedScales& scales, const PerceptualValu
         data, shown.textures[t], shown.textures[t].with_mips ? seen.first_levels[t] : 0, context));
 
   const TextureSampler sampler{data, shown, groups, options.rung_samples,
-                               surface_area_of(scales.mesh, scales.scales[0].triangles)};
+                               surface_area(scales.mesh, scales.scales[0].triangles)};
   SwitchSizes switch_sizes(kept.numbers.size(), options);
   const std::size_t fewer =
       fewer_heights(sampler, scales.scales[0].triangles.size(), studio.frame.extent, options);

@@ -2,7 +2,6 @@
 #include "format/documents/tables.h"
 #include "stages/data/fragments.h"
 #include "stages/data/ladder.h"
-#include "stages/data/measured_quality.h"
 #include "stages/data/nested_scales.h"
 #include "stages/data/perceptual_values.h"
 #include "stages/data/pixels.h"

@@ -3,7 +3,6 @@
 // pictures beside S_0's.
 #include <map>
 
-#include "format/base/box.h"
 #include "stages/quality/textures.h"
 #include "stages/render/shade.h"
 

@@ -1,7 +1,6 @@
 #include "stages/render/environment.h"
 
 #include <cstring>
-#include <iterator>
 
 #include "stages/base/parallel.h"
 #include "stages/render/render_math.h"

@@ -2,7 +2,7 @@
 
 #include <meshoptimizer.h>
 
-#include "format/base/box.h"
+#include "stages/geometry/mesh_topology.h"
 
 namespace texmesh {
 namespace {
@@ -331,10 +331,9 @@ std::size_t collapsed_triangles(const Mesh& mesh, const QuantisationGrid& grid) 
     const Vec3f a = grid.place(mesh.positions[mesh.wedge_position[t[0]]]);
     const Vec3f b = grid.place(mesh.positions[mesh.wedge_position[t[1]]]);
     const Vec3f c = grid.place(mesh.positions[mesh.wedge_position[t[2]]]);
-    const Vec3d p = to_double(mesh.positions[mesh.wedge_position[t[0]]]);
-    const Vec3d area = cross(to_double(mesh.positions[mesh.wedge_position[t[1]]]) - p,
-                             to_double(mesh.positions[mesh.wedge_position[t[2]]]) - p);
-    if (area != Vec3d{} && cross(to_double(b) - to_double(a), to_double(c) - to_double(a)) == Vec3d{})
+    const auto [p, q, r] = corner_points(mesh, t);
+    if (cross(q - p, r - p) != Vec3d{} &&
+        cross(to_double(b) - to_double(a), to_double(c) - to_double(a)) == Vec3d{})
       ++count;
   }
   return count;

@@ -6,8 +6,6 @@
 #include <numeric>
 #include <ranges>
 
-#include "stages/scales/corner_lists.h"
-
 namespace texmesh {
 namespace {
 

@@ -3,7 +3,6 @@
 #include <map>
 #include <numeric>
 
-#include "format/base/box.h"
 #include "stages/geometry/morton.h"
 
 namespace texmesh {

@@ -1,6 +1,6 @@
 #pragma once
 #include "stages/data/conditioned_mesh.h"
-#include "stages/data/skeleton.h"
+#include "stages/data/scale_map.h"
 #include "stages/data/stage.h"
 
 namespace texmesh {

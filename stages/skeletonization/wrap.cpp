@@ -4,7 +4,6 @@
 
 #include <meshoptimizer.h>
 
-#include "format/base/box.h"
 #include "stages/geometry/mesh_topology.h"
 
 namespace texmesh {

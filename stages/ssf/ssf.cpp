@@ -1,4 +1,3 @@
-#include "format/base/box.h"
 #include "stages/base/parallel.h"
 #include "stages/geometry/morton.h"
 #include "stages/ssf/heat_kernel.h"

@@ -2,7 +2,6 @@
 
 #include "stages/data/conditioned_mesh.h"
 #include "stages/data/scale_map.h"
-#include "stages/data/skeleton.h"
 #include "stages/data/stage.h"
 
 namespace texmesh {

@@ -1,6 +1,5 @@
 #include "stages/ssf/ssf_component.h"
 
-#include "format/base/box.h"
 #include "format/base/portable_math.h"
 #include "stages/base/parallel.h"
 #include "stages/ssf/heat_kernel.h"

@@ -24,7 +24,7 @@
 #include <iterator>
 
 #include "format/base/bytes.h"
-#include "format/base/srgb.h"
+#include "format/base/portable_math.h"
 #include "pipeline/import/import.h"
 #include "pipeline/io/file_resolver.h"
 #include "stages/image/decode_image.h"

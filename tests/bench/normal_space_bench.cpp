@@ -14,7 +14,7 @@
 #include "stages/fragment_codec/fragment_codec.h"
 #include "stages/image/decode_image.h"
 #include "stages/jpeg/jpeg.h"
-#include "stages/jpeg/jpeg_bits.h"
+#include "stages/jpeg/masked_jpeg.h"
 
 namespace texmesh {
 namespace {

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "format/base/box.h"
+#include "format/base/vec.h"
 #include "format/model/model.h"
 #include "pipeline/import/import.h"
 #include "stages/render/render_texture.h"

@@ -1,7 +1,6 @@
 // The module texmesh_readers.so: see stages/image/decode_tiff_exr.cpp.
-#include "stages/image/readers_module/readers.h"
+#include "stages/image/readers_module/other_pictures.h"
 
-#include <algorithm>
 #include <memory>
 #include <mutex>
 

@@ -3,7 +3,6 @@
 #include <bit>
 #include <tuple>
 
-#include "format/base/srgb.h"
 #include "stages/base/parallel.h"
 #include "stages/measure/atlas/atlas_parts.h"
 #include "stages/measure/cie_lab.h"

@@ -288,8 +288,7 @@ std::array<Vec2d, 3> AtlasLayout::texels(std::uint32_t triangle) const {
 }
 
 std::array<Vec3d, 3> AtlasLayout::points(std::uint32_t triangle) const {
-  const auto at = [&](int k) { return to_double(mesh_.positions[mesh_.position_of(triangle, k)]); };
-  return {at(0), at(1), at(2)};
+  return corner_points(mesh_, mesh_.triangles[triangle]);
 }
 
 double doubled_texels(const std::array<Vec2d, 3>& corners) {

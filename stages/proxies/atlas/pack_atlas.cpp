@@ -1,12 +1,10 @@
 // How charts are packed. All have one scale. The scale falls until all charts find a place one after the
 // other, and rises again by halves of what lies between. Then other orders of the charts are tried for a
 // larger one.
-#include <algorithm>
 #include <bit>
-#include <cstddef>
 #include <numeric>
 
-#include "stages/proxies/atlas/packing_grid.h"
+#include "stages/proxies/atlas/chart_parts.h"
 #include "stages/proxies/atlas_mesh.h"
 
 namespace texmesh {

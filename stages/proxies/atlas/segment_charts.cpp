@@ -7,8 +7,7 @@
 
 #include "format/base/portable_math.h"
 #include "stages/geometry/mesh_topology.h"
-#include "stages/proxies/atlas/flat_chart.h"
-#include "stages/proxies/atlas/pair_queue.h"
+#include "stages/proxies/atlas/chart_parts.h"
 #include "stages/proxies/atlas_mesh.h"
 
 namespace texmesh {

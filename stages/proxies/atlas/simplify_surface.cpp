@@ -6,7 +6,7 @@
 
 #include "stages/geometry/mesh_topology.h"
 #include "stages/geometry/quadric.h"
-#include "stages/proxies/atlas/pair_queue.h"
+#include "stages/proxies/atlas/chart_parts.h"
 
 namespace texmesh {
 namespace {

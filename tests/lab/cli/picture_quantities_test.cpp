@@ -9,7 +9,7 @@
 #include "lab/cli/commands.h"
 #include "stages/condition/condition.h"
 #include "stages/data/nested_scales.h"
-#include "stages/data/skeleton.h"
+#include "stages/data/scale_map.h"
 #include "stages/gltf/check_glb.h"
 #include "stages/image/decode_image.h"
 #include "tests/support/meshes.h"

@@ -7,7 +7,6 @@
 #include <stdexcept>
 
 #include "format/base/portable_math.h"
-#include "format/base/srgb.h"
 #include "stages/render/render_math.h"
 #include "tests/stages/render/render_fixtures.h"
 

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-#include "format/base/box.h"
+#include "format/base/vec.h"
 #include "stages/geometry/triangle_tree.h"
 #include "tests/support/meshes.h"
 

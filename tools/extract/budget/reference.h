@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "format/base/box.h"
+#include "format/base/vec.h"
 #include "stages/geometry/scale_frames.h"
 #include "stages/measure/flip.h"
 #include "stages/render/shade.h"

@@ -1,7 +1,7 @@
 #include "tools/extract/proxy/proxy_parts.h"
 
-#include "format/base/box.h"
-#include "format/base/srgb.h"
+#include "format/base/portable_math.h"
+#include "format/base/vec.h"
 #include "pipeline/import/import.h"
 #include "pipeline/io/file_resolver.h"
 #include "stages/condition/condition.h"

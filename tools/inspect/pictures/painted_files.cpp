@@ -1,7 +1,7 @@
 // A painted model as files: a GLB to turn in any viewer, and a PNG of two views.
 
-#include "format/base/box.h"
-#include "format/base/srgb.h"
+#include "format/base/portable_math.h"
+#include "format/base/vec.h"
 #include "format/rules/allocation.h"
 #include "stages/gltf/glb_writer.h"
 #include "stages/image/png_writer.h"

@@ -4,7 +4,7 @@
 
 #include <fmt/format.h>
 
-#include "format/base/srgb.h"
+#include "format/base/portable_math.h"
 #include "format/base/vec.h"
 #include "format/rules/allocation.h"
 #include "pipeline/io/table.h"

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "format/base/box.h"
+#include "format/base/vec.h"
 #include "format/documents/about.h"
 #include "format/documents/manifest.h"
 

@@ -1,4 +1,4 @@
-#include "stages/proxies/atlas/packing_grid.h"
+#include "stages/proxies/atlas/chart_parts.h"
 
 #include <gtest/gtest.h>
 

@@ -8,7 +8,7 @@
 #include <map>
 
 #include "format/base/vec.h"
-#include "stages/proxies/atlas/flat_chart.h"
+#include "stages/proxies/atlas/chart_parts.h"
 #include "tests/stages/proxies/proxy_shapes.h"
 
 namespace texmesh {

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "format/base/srgb.h"
+#include "format/base/portable_math.h"
 #include "tests/stages/proxies/atlas_fixtures.h"
 #include "tests/support/even_sphere.h"
 
