@@ -35,17 +35,10 @@ double edge_limit_of_first(std::span<const ManifestScale> scales) {
 }
 
 double limit_of(std::span<const ManifestScale> scales, std::size_t k, StepRule rule) {
-  switch (rule) {
-    case StepRule::kJnd:
-      return scales[k].display_px_jnd;
-    case StepRule::kError:
-      return scales[k].display_px_error;
-    case StepRule::kEdge:
-      return k == 1 ? edge_limit_of_first(scales) : edge_limit(scales, k);
-    case StepRule::kFlip:
-      break;
-  }
-  return scales[k].display_px_flip;
+  if (rule == StepRule::kJnd) return scales[k].display_px_jnd;
+  if (rule == StepRule::kError) return scales[k].display_px_error;
+  if (rule == StepRule::kFlip) return scales[k].display_px_flip;
+  return k == 1 ? edge_limit_of_first(scales) : edge_limit(scales, k);
 }
 
 /// By how much a relative distance grows when R can be no more than half the part's shorter side.

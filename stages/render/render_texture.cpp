@@ -212,16 +212,9 @@ Vec4f bilinear(const Pixels& level, const ByteCurve& colour, const Place& place)
 
 Vec4f read_bilinear(const Pixels& level, bool srgb, const Place& place) {
   const ByteCurve& colour = srgb ? light_of_bytes() : numbers_of_bytes();
-  switch (level.channels) {
-    case 1:
-      return bilinear<1>(level, colour, place);
-    case 2:
-      return bilinear<2>(level, colour, place);
-    case 3:
-      return bilinear<3>(level, colour, place);
-    default:
-      return bilinear<4>(level, colour, place);
-  }
+  if (level.channels == 3) return bilinear<3>(level, colour, place);
+  if (level.channels == 4) return bilinear<4>(level, colour, place);
+  return level.channels == 1 ? bilinear<1>(level, colour, place) : bilinear<2>(level, colour, place);
 }
 
 float level_of(Vec2<std::uint32_t> size_px, const TextureFootprint& footprint) {

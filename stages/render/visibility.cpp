@@ -35,14 +35,9 @@ float emission_strength(const Material& material) {
 }
 
 MinFilter min_filter_of(Minification minification) {
-  switch (minification) {
-    case Minification::kNearest:
-      return MinFilter::kNearest;
-    case Minification::kLinear:
-      return MinFilter::kLinear;
-    default:  // the renderer has one filter with mip levels
-      return MinFilter::kTrilinear;
-  }
+  if (minification == Minification::kNearest) return MinFilter::kNearest;
+  // The renderer has one filter with mip levels.
+  return minification == Minification::kLinear ? MinFilter::kLinear : MinFilter::kTrilinear;
 }
 
 UvTransform finite_transform(const UvTransform& t) {
@@ -204,10 +199,9 @@ class TileTriangle {
     box_ = {std::max(box.x_first - left, 0), std::max(box.y_first - top, 0),
             std::min(box.x_last - left, last), std::min(box.y_last - top, last)};
     nearest_ = 0, farthest_ = 1 / input.near;
-    for (const Vec3d& c : input.corners_of(triangle)) {
-      if (c.z < input.near) return;  // the range below holds for what is wholly in front
-    }
     const std::array<Vec3d, 3> c = input.corners_of(triangle);
+    for (const Vec3d& corner : c)
+      if (corner.z < input.near) return;  // the range below holds for what is wholly in front
     nearest_ = 1 / std::max({c[0].z, c[1].z, c[2].z});
     farthest_ = 1 / std::min({c[0].z, c[1].z, c[2].z});
     clamps_ = true;

@@ -59,17 +59,9 @@ SimplificationOptions without_bounds_of_thesis(SimplificationOptions options) {
 }
 
 std::string stop_reason(CollapseStop stop, const SimplificationOptions& options) {
-  switch (stop) {
-    case CollapseStop::kReached:
-      return "";
-    case CollapseStop::kFewTriangles:
-      return "min_triangles is " + std::to_string(options.min_triangles);
-    case CollapseStop::kTooFar:
-      return "every collapse left exceeds max_error or max_shift";
-    case CollapseStop::kLocked:
-      return "no collapse is left that keeps seams, borders and orientation";
-  }
-  return "";
+  if (stop == CollapseStop::kFewTriangles) return "min_triangles is " + std::to_string(options.min_triangles);
+  if (stop == CollapseStop::kTooFar) return "every collapse left exceeds max_error or max_shift";
+  return stop == CollapseStop::kLocked ? "no collapse is left that keeps seams, borders and orientation" : "";
 }
 
 NestedScale scale_at_this_point(CollapseEngine& engine, int scale, std::string reason) {

@@ -95,14 +95,8 @@ std::uint32_t colour_channels(const OIIO::ImageSpec& spec, ImageFormat format) {
 }
 
 std::uint8_t bits_of(const OIIO::ImageSpec& spec) {
-  switch (spec.format.basetype) {
-    case OIIO::TypeDesc::UINT8:
-      return 8;
-    case OIIO::TypeDesc::UINT16:
-      return 16;
-    default:
-      return 32;
-  }
+  const auto type = spec.format.basetype;
+  return type == OIIO::TypeDesc::UINT8 ? 8 : type == OIIO::TypeDesc::UINT16 ? 16 : 32;
 }
 
 void check_spec(const std::string& name, const OIIO::ImageSpec& spec, const ImageLimits& limits) {
@@ -183,14 +177,10 @@ std::vector<T> read_samples(const std::string& name, FileKind kind, std::uint32_
 }
 
 StoredSamples read_stored(const std::string& name, FileKind kind, std::uint32_t channels, OpenImage& open) {
-  switch (bits_of(open.spec)) {
-    case 8:
-      return read_samples<std::uint8_t>(name, kind, channels, open, OIIO::TypeDesc::UINT8);
-    case 16:
-      return read_samples<std::uint16_t>(name, kind, channels, open, OIIO::TypeDesc::UINT16);
-    default:
-      return read_samples<float>(name, kind, channels, open, OIIO::TypeDesc::FLOAT);
-  }
+  const std::uint8_t bits = bits_of(open.spec);
+  if (bits == 8) return read_samples<std::uint8_t>(name, kind, channels, open, OIIO::TypeDesc::UINT8);
+  if (bits == 16) return read_samples<std::uint16_t>(name, kind, channels, open, OIIO::TypeDesc::UINT16);
+  return read_samples<float>(name, kind, channels, open, OIIO::TypeDesc::FLOAT);
 }
 
 ImageHeader read_module_header(const std::string& name, ImageFormat format, ByteSpan bytes,
