@@ -12,6 +12,13 @@ namespace texmesh {
 void parallel_for(const RunContext& context, std::size_t count, std::size_t grain,
                   const std::function<void(std::size_t begin, std::size_t end)>& body);
 
+/// The same for body(index).
+void parallel_each(const RunContext& context, std::size_t count, std::size_t grain, const auto& body) {
+  parallel_for(context, count, grain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) body(i);
+  });
+}
+
 /// Deterministic sum: pieces of exactly `piece` items are summed by part(begin, end) and added in index
 /// order.
 double parallel_sum(const RunContext& context, std::size_t count, std::size_t piece,

@@ -215,9 +215,7 @@ class JpegCodec : public TextureCodec {
 
   static void for_each(const RunContext& context, std::size_t count,
                        const std::function<void(std::size_t)>& body) {
-    parallel_for(context, count, 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t k = begin; k < end; ++k) body(k);
-    });
+    parallel_each(context, count, 1, [&](std::size_t k) { body(k); });
   }
 
   static HuffmanTables tables_for(const JpegCoder& coder, const SymbolCounts& counts) {
@@ -350,9 +348,8 @@ class ProgressiveCodec : public TextureCodec {
     rungs[0].table_stream = coder.head_stream(plane_.fragment_width_px, plane_.fragment_height_px);
     const auto measured = sample.first(std::min(sample.size(), kMeasuredWindows));
     const std::vector<double> errors = errors_of_rungs(measured);
-    parallel_for(context, rungs.size(), 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t r = begin; r < end; ++r)
-        rungs[r].quality = r + 1 == rungs.size() ? quality_ : equal_quality(errors[r], measured);
+    parallel_each(context, rungs.size(), 1, [&](std::size_t r) {
+      rungs[r].quality = r + 1 == rungs.size() ? quality_ : equal_quality(errors[r], measured);
     });
     make_strictly_rising(rungs);
     return rungs;

@@ -345,9 +345,8 @@ Fragments fragment_textures(const ConditionedMesh& mesh, const std::vector<Mater
     jobs.push_back({width_px, height_px, uses[p]});
   }
   std::vector<Measure> measured(jobs.size());
-  parallel_for(context, jobs.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t j = begin; j < end; ++j) measured[j] = measure(mesh, scale_map, jobs[j], options);
-  });
+  parallel_each(context, jobs.size(), 1,
+                [&](std::size_t j) { measured[j] = measure(mesh, scale_map, jobs[j], options); });
   context.report(0.9);
 
   double whole_surface = 0;

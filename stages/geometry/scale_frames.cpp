@@ -175,9 +175,7 @@ void Fit::take_samples(const std::vector<Triangle>& finest, const RunContext& co
   std::size_t count = 0;
   for (std::size_t i = 0; i < samples_.size(); i += every) samples_[count++] = samples_[i];
   samples_.resize(count);
-  parallel_for(context, count, 4096, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) put_on_face(samples_[i]);
-  });
+  parallel_each(context, count, 4096, [&](std::size_t i) { put_on_face(samples_[i]); });
 }
 
 ScaleFrames Fit::frames() const {
@@ -202,14 +200,12 @@ std::vector<std::optional<Tie>> ties_of(std::span<const Vec3d> points, std::span
                                         const NormalSamples& samples, const RunContext& context) {
   const TriangleTree tree(points, triangles);
   std::vector<std::optional<Tie>> out(samples.places.size());
-  parallel_for(context, out.size(), 256, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t s = begin; s < end; ++s) {
-      const TriangleTree::Nearest found = tree.nearest(samples.places[s]);
-      const Triangle& t = triangles[found.triangle];
-      const Vec3d face = normalized(cross(points[t[1]] - points[t[0]], points[t[2]] - points[t[0]]));
-      if (dot(face, to_double(samples.normals[s])) > kLeastFacing)
-        out[s] = Tie{t, found.weight, samples.normals[s], samples.areas[s]};
-    }
+  parallel_each(context, out.size(), 256, [&](std::size_t s) {
+    const TriangleTree::Nearest found = tree.nearest(samples.places[s]);
+    const Triangle& t = triangles[found.triangle];
+    const Vec3d face = normalized(cross(points[t[1]] - points[t[0]], points[t[2]] - points[t[0]]));
+    if (dot(face, to_double(samples.normals[s])) > kLeastFacing)
+      out[s] = Tie{t, found.weight, samples.normals[s], samples.areas[s]};
   });
   return out;
 }

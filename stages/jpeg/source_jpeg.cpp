@@ -163,9 +163,7 @@ JoinedJpeg::JoinedJpeg(const JpegFragments& from, const RunContext& context)
     if (from.stored[f]) parts.push_back(f);
   if (parts.empty()) throw FormatError(from.entry, "", "a stored fragment", "none");
   set_components(from, parts.front());
-  parallel_for(context, parts.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) put_fragment(from, parts[i]);
-  });
+  parallel_each(context, parts.size(), 1, [&](std::size_t i) { put_fragment(from, parts[i]); });
   fill_gaps(from.stored);
 }
 

@@ -165,12 +165,10 @@ class WantedLevel {
  public:
   WantedLevel(const TexturePlane& plane, const Pixels& pixels, const RunContext& context)
       : plane_(plane), windows_(sample_windows(plane)), meters_(windows_.size()) {
-    parallel_for(context, windows_.size(), 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t w = begin; w < end; ++w) {
-        const TexelRectangle& window = windows_[w].rectangle;
-        meters_[w].emplace(rectangle_samples(plane, pixels, window), coverage_samples(plane, window),
-                           window.width_px, window.height_px);
-      }
+    parallel_each(context, windows_.size(), 1, [&](std::size_t w) {
+      const TexelRectangle& window = windows_[w].rectangle;
+      meters_[w].emplace(rectangle_samples(plane, pixels, window), coverage_samples(plane, window),
+                         window.width_px, window.height_px);
     });
   }
   /// The mean over the windows, each of which weighs as much as its fragment's surface; 0 where nothing is
@@ -300,16 +298,14 @@ TextureRungs measure_rungs(const Fragments& fragments, const std::vector<Pixels>
   for (const std::size_t p : chain) levels.emplace_back(fragments.planes[p], pixels[p], context);
   const SamplePatch preview = preview_samples(fragments.planes[base], preview_file);
   for (const WantedLevel& level : levels) out.preview_loss.push_back(level.loss_of(preview));
-  parallel_for(context, out.pairs.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t k = begin; k < end; ++k) {
-      RungPair& pair = out.pairs[k];
-      const std::size_t p = chain[pair.level];
-      const bool halved = out.closes_gaps && !pair.fixed && has_halved_chroma(planes[p].rungs[pair.rung]);
-      ShownRung shown(fragments.planes[p], pixels[p], planes[p], pair.rung);
-      for (std::size_t wanted = 0; wanted <= pair.level; ++wanted) {
-        const double loss = levels[wanted].loss_of(shown);
-        pair.loss.push_back(loss + (halved ? std::min(loss, kHalvedChroma) : 0));
-      }
+  parallel_each(context, out.pairs.size(), 1, [&](std::size_t k) {
+    RungPair& pair = out.pairs[k];
+    const std::size_t p = chain[pair.level];
+    const bool halved = out.closes_gaps && !pair.fixed && has_halved_chroma(planes[p].rungs[pair.rung]);
+    ShownRung shown(fragments.planes[p], pixels[p], planes[p], pair.rung);
+    for (std::size_t wanted = 0; wanted <= pair.level; ++wanted) {
+      const double loss = levels[wanted].loss_of(shown);
+      pair.loss.push_back(loss + (halved ? std::min(loss, kHalvedChroma) : 0));
     }
   });
   return out;

@@ -176,17 +176,14 @@ LutTables build_tables(const Fragments& fragments, const std::vector<Pixels>& pi
     for (std::uint16_t f : tables[p].order) tasks.emplace_back(p, f);
   }
   std::atomic<std::size_t> done{0};
-  parallel_for(context, tasks.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t t = begin; t < end; ++t) {
-      const auto [p, f] = tasks[t];
-      measure_fragment(fragments.planes[p], pixels[p], ladder.planes[p], skipped[p], f, tables[p]);
-      context.report(0.95 * static_cast<double>(++done) / static_cast<double>(tasks.size()));
-    }
+  parallel_each(context, tasks.size(), 1, [&](std::size_t t) {
+    const auto [p, f] = tasks[t];
+    measure_fragment(fragments.planes[p], pixels[p], ladder.planes[p], skipped[p], f, tables[p]);
+    context.report(0.95 * static_cast<double>(++done) / static_cast<double>(tasks.size()));
   });
   out.thesis.planes.resize(tables.size());
-  parallel_for(context, tables.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t p = begin; p < end; ++p)
-      out.thesis.planes[p] = describe_thesis(predictors.planes[p], ladder.planes[p], tables[p]);
+  parallel_each(context, tables.size(), 1, [&](std::size_t p) {
+    out.thesis.planes[p] = describe_thesis(predictors.planes[p], ladder.planes[p], tables[p]);
   });
   return out;
 }

@@ -210,9 +210,7 @@ void SizePictures::compare_view(std::size_t view, const std::vector<Shot>& shots
   const Reference& seen = seen_.at(view);
   RunContext serial = context;
   serial.threads = 1;
-  parallel_for(context, groups.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t g = begin; g < end; ++g) compare_group(groups[g], &seen, serial);
-  });
+  parallel_each(context, groups.size(), 1, [&](std::size_t g) { compare_group(groups[g], &seen, serial); });
 }
 
 std::vector<Losses> SizePictures::take(const std::vector<Shot>& shots, const RunContext& context) {

@@ -108,14 +108,12 @@ void put_plane(const TextureData& data, const PlaneTexels& from, std::uint32_t f
       static_cast<std::uint64_t>(plane.fragment_width_px) * plane.fragment_height_px;
   RunContext serial = context;
   serial.threads = 1;
-  parallel_for(context, plane.fragment_count(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t f = begin; f < end; ++f) {
-      const bool stored = from.rung && !fragment_stream(ladder.rungs[*from.rung], f).empty();
-      const TexelRectangle place = padded_fragment_rectangle(plane, f);
-      Pixels block = stored ? decode_fragment(ladder, *from.rung, f, most_pixels) : cut(pixels, place);
-      block = coarser_level(std::move(block), from.srgb, halvings, serial);
-      put_block(block, place.left_px >> halvings, place.top_px >> halvings, channels, level);
-    }
+  parallel_each(context, plane.fragment_count(), 1, [&](std::size_t f) {
+    const bool stored = from.rung && !fragment_stream(ladder.rungs[*from.rung], f).empty();
+    const TexelRectangle place = padded_fragment_rectangle(plane, f);
+    Pixels block = stored ? decode_fragment(ladder, *from.rung, f, most_pixels) : cut(pixels, place);
+    block = coarser_level(std::move(block), from.srgb, halvings, serial);
+    put_block(block, place.left_px >> halvings, place.top_px >> halvings, channels, level);
   });
 }
 

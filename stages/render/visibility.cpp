@@ -112,19 +112,16 @@ TileInput tile_input(const RenderScene& scene, const RenderCamera& camera, std::
                      const RunContext& context) {
   TileInput input{&scene, SampleFrame(camera, side_px), camera.near, side_px, {}, {}, true};
   input.seen.resize(scene.mesh->positions.size());
-  parallel_for(context, input.seen.size(), 4096, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i)
-      input.seen[i] = seen_from(camera, input.frame, scene.mesh->positions[i]);
+  parallel_each(context, input.seen.size(), 4096, [&](std::size_t i) {
+    input.seen[i] = seen_from(camera, input.frame, scene.mesh->positions[i]);
   });
   input.boxes.resize(scene.triangles->size());
-  parallel_for(context, input.boxes.size(), 4096, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t t = begin; t < end; ++t) {
-      const auto triangle = static_cast<std::uint32_t>(t);
-      const std::array<Vec3d, 3> corners = input.corners_of(triangle);
-      const EdgePlanes planes = edge_planes(corners);
-      if (planes.visible && (planes.front || scene.material_of(triangle).double_sided))
-        input.boxes[t] = sample_box(corners, input.frame, camera.near);
-    }
+  parallel_each(context, input.boxes.size(), 4096, [&](std::size_t t) {
+    const auto triangle = static_cast<std::uint32_t>(t);
+    const std::array<Vec3d, 3> corners = input.corners_of(triangle);
+    const EdgePlanes planes = edge_planes(corners);
+    if (planes.visible && (planes.front || scene.material_of(triangle).double_sided))
+      input.boxes[t] = sample_box(corners, input.frame, camera.near);
   });
   return input;
 }
@@ -136,12 +133,10 @@ std::vector<TileFragments> look_into_tiles(const RenderScene& scene, const Rende
   const TileInput input = tile_input(scene, camera, side_px, context);
   const Bins bins = sorted_into_tiles(input.boxes, tiles, bands);
   std::vector<TileFragments> parts(bins.first.size() - 1);
-  parallel_for(context, parts.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      const auto tile = static_cast<std::uint32_t>(i);
-      parts[i] = look_into_tile(input, tile % tiles, tile / tiles,
-                                {bins.triangles.data() + bins.first[i], bins.first[i + 1] - bins.first[i]});
-    }
+  parallel_each(context, parts.size(), 1, [&](std::size_t i) {
+    const auto tile = static_cast<std::uint32_t>(i);
+    parts[i] = look_into_tile(input, tile % tiles, tile / tiles,
+                              {bins.triangles.data() + bins.first[i], bins.first[i + 1] - bins.first[i]});
   });
   return parts;
 }

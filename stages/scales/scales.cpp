@@ -505,14 +505,12 @@ ScaleFiles write_scales(const NestedScales& scales, const PerceptualValues& perc
   const auto made_one = [&] { context.report(static_cast<double>(++made) / static_cast<double>(tasks + 1)); };
   // The stream and S_0's file take about as long. These two scales have files beside any stream.
   const std::size_t always = std::min<std::size_t>(kept.size(), 2);
-  parallel_for(context, 1 + always, 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t task = begin; task < end; ++task) {
-      if (task == 0)
-        write_stream(coding, scales, kept, materials, images, context, result);
-      else
-        write_file(task == 1 ? 0 : kept.size() - 1);
-      made_one();
-    }
+  parallel_each(context, 1 + always, 1, [&](std::size_t task) {
+    if (task == 0)
+      write_stream(coding, scales, kept, materials, images, context, result);
+    else
+      write_file(task == 1 ? 0 : kept.size() - 1);
+    made_one();
   });
   const std::size_t between = kept.size() - always;
   if (!result.stream.empty()) {

@@ -141,16 +141,14 @@ std::vector<Local> nearest_parts(const JoinedParts& wrap, std::span<const Vec3d>
   const TriangleTree tree(wrap.soup.points, wrap.soup.triangles);
   const std::vector<double> thickness = half_thickness(wrap.soup, tree, context);
   std::vector<Local> local(points.size());
-  parallel_for(context, points.size(), 1024, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t p = begin; p < end; ++p) {
-      const TriangleTree::Nearest at = tree.nearest(points[p]);
-      double half = 0;
-      for (std::size_t k = 0; k < 3; ++k)
-        if (at.weight[k] > 0) half += at.weight[k] * thickness[wrap.soup.triangles[at.triangle][k]];
-      local[p].part = wrap.part[at.triangle];
-      local[p].half = std::max(half - offset, 0.0);
-      local[p].weight = std::clamp(local[p].half / offset - 0.5, 0.0, 1.0);
-    }
+  parallel_each(context, points.size(), 1024, [&](std::size_t p) {
+    const TriangleTree::Nearest at = tree.nearest(points[p]);
+    double half = 0;
+    for (std::size_t k = 0; k < 3; ++k)
+      if (at.weight[k] > 0) half += at.weight[k] * thickness[wrap.soup.triangles[at.triangle][k]];
+    local[p].part = wrap.part[at.triangle];
+    local[p].half = std::max(half - offset, 0.0);
+    local[p].weight = std::clamp(local[p].half / offset - 0.5, 0.0, 1.0);
   });
   return local;
 }
@@ -250,14 +248,12 @@ std::vector<double> half_thickness(const TriangleSoup& closed, const TriangleTre
                                    const RunContext& context) {
   const std::array<ConeRay, TriangleTree::kRays> rays = cone();
   std::vector<double> face(closed.triangles.size()), area(face.size());
-  parallel_for(context, face.size(), 64, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t t = begin; t < end; ++t) {
-      const auto [a, b, c] = closed.triangles[t];
-      const Vec3d p = closed.points[a], q = closed.points[b], r = closed.points[c];
-      const Vec3d n = cross(q - p, r - p);
-      area[t] = length(n);
-      face[t] = area[t] > 0 ? measure(tree, rays, (p + q + r) * (1.0 / 3), normalized(n)) : kInfinity;
-    }
+  parallel_each(context, face.size(), 64, [&](std::size_t t) {
+    const auto [a, b, c] = closed.triangles[t];
+    const Vec3d p = closed.points[a], q = closed.points[b], r = closed.points[c];
+    const Vec3d n = cross(q - p, r - p);
+    area[t] = length(n);
+    face[t] = area[t] > 0 ? measure(tree, rays, (p + q + r) * (1.0 / 3), normalized(n)) : kInfinity;
   });
   const Spokes fans(closed.points.size(), closed.triangles, [](std::uint32_t p) { return p; });
   for (int pass = 0; pass < kFilterPasses; ++pass) face = filtered(closed, fans, face);

@@ -194,14 +194,12 @@ class Chebyshev {
     source_ = std::make_unique<Quad[]>(n_);
     for (auto& t : ring_) t = std::make_unique<Quad[]>(n_);  // zeroed: D_0
     const double factor = 4 / l.bound;
-    parallel_for(context_, n_, kHeatGrain, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) {
-        Vec3d sum;
-        for (std::uint32_t e = l.first[i]; e < l.first[i + 1]; ++e)
-          sum = sum + (points[i] - points[l.column[e]]) * double{l.rate[e]};
-        sum = sum * factor;
-        source_[i] = Quad{static_cast<Real>(sum.x), static_cast<Real>(sum.y), static_cast<Real>(sum.z), 0};
-      }
+    parallel_each(context_, n_, kHeatGrain, [&](std::size_t i) {
+      Vec3d sum;
+      for (std::uint32_t e = l.first[i]; e < l.first[i + 1]; ++e)
+        sum = sum + (points[i] - points[l.column[e]]) * double{l.rate[e]};
+      sum = sum * factor;
+      source_[i] = Quad{static_cast<Real>(sum.x), static_cast<Real>(sum.y), static_cast<Real>(sum.z), 0};
     });
   }
 

@@ -288,10 +288,8 @@ std::vector<std::optional<SeamColours>> measure_seams(const AtlasLayout& layout,
                                                       std::span<const AtlasImage> images, std::size_t atlases,
                                                       const RunContext& context) {
   std::vector<SeamDifference> differences(charts.seams.size());
-  parallel_for(context, differences.size(), 1024, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t s = begin; s < end; ++s)
-      differences[s] = difference_along(layout, charts.seams[s], images);
-  });
+  parallel_each(context, differences.size(), 1024,
+                [&](std::size_t s) { differences[s] = difference_along(layout, charts.seams[s], images); });
   std::vector<std::vector<WeighedValue>> of_atlas(atlases);
   std::vector<double> inside(atlases);
   for (std::size_t s = 0; s < differences.size(); ++s) {

@@ -413,9 +413,7 @@ BakedMaps bake(const AtlasMesh& mesh, const std::vector<Vec3f>& normals, const B
   out.alpha.resize(texels, 1);
   out.covered.resize(texels, 0);
   const Baker baker(mesh, normals, source, std::move(grid), order.normal_map);
-  parallel_for(context, mesh.height_px, 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t y = begin; y < end; ++y) baker.bake_row(y, out);
-  });
+  parallel_each(context, mesh.height_px, 1, [&](std::size_t y) { baker.bake_row(y, out); });
   finish_maps(out);
   return out;
 }
@@ -443,9 +441,8 @@ SmoothMesh sampled_normals(const AtlasMesh& mesh, const BakeSource& source, Crea
 
   const std::vector<Weights> places = places_of_triangles(mesh.triangles.size());
   std::vector<CornerSums> sums(mesh.triangles.size());
-  parallel_for(context, sums.size(), 64, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t t = begin; t < end; ++t) sums[t] = sums_of(mesh, t, smooth, places, source);
-  });
+  parallel_each(context, sums.size(), 64,
+                [&](std::size_t t) { sums[t] = sums_of(mesh, t, smooth, places, source); });
   DisjointSets sets = smooth_corners(mesh, shared, shared.size(), sums, use);
   std::vector<Vec3d> total(3 * sums.size());  // per set, at its name
   for (std::uint32_t c = 0; c < total.size(); ++c) {
