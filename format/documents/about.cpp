@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
-#include <optional>
 
 #include "format/base/json_fields.h"
 #include "format/base/text_bytes.h"

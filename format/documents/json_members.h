@@ -5,7 +5,6 @@
 // document. Ranges and rules are those that a reader checks. A writer puts every value down as it is: what
 // it has written is read again.
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <type_traits>
 
 #include "format/base/json_fields.h"

@@ -1,7 +1,6 @@
 #include "format/rules/size_curve.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "format/base/portable_math.h"
 #include "format/rules/allocation.h"

@@ -283,7 +283,6 @@ SplitStreamReader& SplitStreamReader::operator=(SplitStreamReader&&) noexcept = 
 
 const SplitStreamHead& SplitStreamReader::head() const { return state_->head; }
 const SplitMesh& SplitStreamReader::mesh() const { return state_->mesh; }
-std::size_t SplitStreamReader::next_block() const { return state_->block; }
 
 void SplitStreamReader::add_block(ByteSpan block) {
   State& s = *state_;

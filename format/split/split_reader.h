@@ -24,7 +24,6 @@ class SplitStreamReader {
 
   const SplitStreamHead& head() const;
   const SplitMesh& mesh() const;
-  std::size_t next_block() const;  // number of blocks decoded so far
   /// The next block, digest checked. FormatError when it is not what the head says; the reader is then of
   /// no more use.
   void add_block(std::span<const std::uint8_t> block);

@@ -1,5 +1,4 @@
 #pragma once
-#include <cstddef>
 
 #include "stages/base/run_context.h"
 

@@ -1,6 +1,5 @@
 #pragma once
 #include <algorithm>
-#include <cstddef>
 
 #include "format/base/fields.h"
 #include "format/base/note.h"

@@ -1,7 +1,6 @@
 #include "stages/fragmentation/fragmentation.h"
 
 #include <bit>
-#include <tuple>
 
 #include "format/model/material_extensions.h"
 #include "stages/base/parallel.h"

@@ -1,7 +1,6 @@
 #include "stages/geometry/triangle_tree.h"
 
 #include <bit>
-#include <cstddef>
 #include <numeric>
 
 namespace texmesh {

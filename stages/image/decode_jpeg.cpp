@@ -2,9 +2,7 @@
 
 #include <algorithm>
 #include <csetjmp>
-#include <cstddef>
 #include <cstdio>
-#include <exception>
 
 #include <jpeglib.h>
 // jerror.h needs jpeglib.h first.

@@ -1,7 +1,6 @@
 #pragma once
 // Inside stages: what the module texmesh_readers.so reads, which is loaded when it is first needed: TIFF and
 // EXR by OpenImageIO, and JPEGs of 9 to 16 bits a sample, which libjpeg-turbo does not read, by DCMTK.
-#include <cstddef>
 #include <functional>
 #include <variant>
 

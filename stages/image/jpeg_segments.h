@@ -1,5 +1,4 @@
 #pragma once
-#include <cstddef>
 
 #include "format/base/bytes.h"
 

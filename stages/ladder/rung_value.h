@@ -16,7 +16,6 @@
 // 5. What still takes too much has cheaper pairs in the place of the last ones of levels.
 // Each step removes pairs or makes them cheaper, or improves one number in a bounded number of rounds; so it
 // ends.
-#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <vector>

@@ -1,6 +1,5 @@
 #pragma once
 // Pictures, and what of them filters have to look at: filters cost by what a picture shows, not by its size.
-#include <cstddef>
 #include <vector>
 
 #include "format/base/vec.h"

@@ -435,8 +435,4 @@ Vec3f radiance_of(const LitSurface& s, const Lighting& lighting, const RenderEnv
          reflected_surroundings(s, lighting) + s.emission;
 }
 
-Vec3f radiance_towards(const LitSurface& surface, Vec3f to_viewer, const RenderEnvironment& environment) {
-  return radiance_of(surface, lighting_of(surface, to_viewer, environment, nullptr), environment);
-}
-
 }  // namespace texmesh

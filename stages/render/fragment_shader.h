@@ -60,11 +60,8 @@ struct Lighting {
 /// `same_normal`, where there is one, has been found with the same normal.
 Lighting lighting_of(const LitSurface& surface, Vec3f to_viewer, const RenderEnvironment& environment,
                      const Lighting* same_normal);
-/// radiance_towards() with the surface's lighting.
+/// Radiance that leaves a surface towards the viewer: the key light, the environment and emission.
 Vec3f radiance_of(const LitSurface& surface, const Lighting& lighting, const RenderEnvironment& environment);
-
-/// Radiance that leaves a surface towards a unit direction: the key light, the environment and emission.
-Vec3f radiance_towards(const LitSurface& surface, Vec3f to_viewer, const RenderEnvironment& environment);
 
 /// What all fragments of a triangle have in common.
 struct TriangleInView {

@@ -1,6 +1,5 @@
 #include "stages/render/render_texture.h"
 
-#include <cstring>
 #include <optional>
 
 #include "stages/base/parallel.h"
@@ -336,11 +335,6 @@ void TextureSite::prefetch(const RenderTexture& texture) const {
       __builtin_prefetch(
           level.at(static_cast<std::uint32_t>(places_[k].x.first), static_cast<std::uint32_t>(row)));
   }
-}
-
-Vec4f read_texture(const RenderTexture& texture, const TextureSlot& slot, const TextureFootprint& footprint) {
-  return TextureSite({texture.width_px, texture.height_px}, texture.first_level, slot, footprint)
-      .read(texture);
 }
 
 UvMatrix uv_matrix(const UvTransform& t) {

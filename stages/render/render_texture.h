@@ -43,7 +43,10 @@ class TextureSite {
   /// `size_px` of level 0. Textures that are read keep no level finer than `first_level`.
   TextureSite(Vec2<std::uint32_t> size_px, std::uint32_t first_level, const TextureSlot& slot,
               const TextureFootprint& footprint);
-  /// What read_texture() gives of a texture of that size.
+  /// RGBA as a shader reads it, of a texture of that size: linear light for sRGB colours, else 0..1; grey in
+  /// all three channels; alpha 1 where there is none. The level is log2 of the longer of the two derivatives
+  /// in texels (OpenGL 4.6, 8.14, anisotropy 1), at least the first level kept. Not finite coordinates read
+  /// the texture's corner.
   Vec4f read(const RenderTexture& texture) const;
   /// Asks for the texels that read() will need: large textures lie in memory, not in caches.
   void prefetch(const RenderTexture& texture) const;
@@ -68,11 +71,6 @@ class TextureSite {
   std::size_t fine_ = 0;  // level_ rounded down
   Place places_[2];       // in levels fine_ and fine_ + 1
 };
-
-/// RGBA as a shader reads it: linear light for sRGB colours, else 0..1; grey in all three channels; alpha 1
-/// where there is none. The level is log2 of the longer of the two derivatives in texels (OpenGL 4.6, 8.14,
-/// anisotropy 1), at least the first level kept. Not finite coordinates read the texture's corner.
-Vec4f read_texture(const RenderTexture& texture, const TextureSlot& slot, const TextureFootprint& footprint);
 
 /// KHR_texture_transform as 2 x 3 numbers: uv' = (a u + b v + c, d u + e v + f).
 struct UvMatrix {

@@ -1,4 +1,3 @@
-#include <initializer_list>
 #include <optional>
 
 #ifdef __SSE2__

@@ -1,6 +1,5 @@
 #pragma once
 #include <compare>
-#include <cstddef>
 
 #include "stages/geometry/quadric.h"
 #include "stages/simplification/collapse_mesh.h"

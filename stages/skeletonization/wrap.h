@@ -1,6 +1,5 @@
 #pragma once
 // Inside the room only: the closed surface around a mesh that is contracted to the skeleton.
-#include <cstddef>
 #include <exception>
 
 #include "stages/base/run_context.h"

@@ -454,12 +454,6 @@ std::vector<HeatFlow> diffuse(const HeatOperator& laplacian, std::span<const Vec
   return Chebyshev<float>(laplacian, points, start, times, context).run();
 }
 
-double heat_term_bytes(const HeatOperator& l) {
-  const double rows = static_cast<double>(l.vertex_count()), entries = static_cast<double>(l.column.size());
-  return rows * (sizeof(std::uint32_t) + 4 * sizeof(FloatQuad)) +
-         entries * (sizeof(std::uint32_t) + sizeof(float));
-}
-
 HeatLevel finest_level(std::vector<Vec3d> points, std::vector<std::uint32_t> corners, double spacing,
                        double rate_cap) {
   HeatLevel level;

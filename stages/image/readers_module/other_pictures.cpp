@@ -1,5 +1,4 @@
 #include <cstdio>
-#include <cstdlib>
 #include <type_traits>
 
 #include "stages/image/png_writer.h"

@@ -11,6 +11,10 @@ namespace {
 
 constexpr double kTurn = 3.14159265358979323846;
 
+Vec3f radiance_towards(const LitSurface& surface, Vec3f to_viewer, const RenderEnvironment& environment) {
+  return radiance_of(surface, lighting_of(surface, to_viewer, environment, nullptr), environment);
+}
+
 Vec3f direction(double polar, double turn) {
   return to_float(Vec3d{std::sin(polar) * std::cos(turn), std::sin(polar) * std::sin(turn), std::cos(polar)});
 }

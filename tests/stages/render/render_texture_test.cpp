@@ -15,6 +15,11 @@ namespace {
 
 using testing::texture_of;
 
+Vec4f read_texture(const RenderTexture& texture, const TextureSlot& slot, const TextureFootprint& footprint) {
+  return TextureSite({texture.width_px, texture.height_px}, texture.first_level, slot, footprint)
+      .read(texture);
+}
+
 TextureFootprint point(float u, float v) { return {{u, v}, {}, {}}; }
 
 // 4 x 1 texels of 0, 60, 120, 180.
