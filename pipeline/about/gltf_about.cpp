@@ -1,7 +1,5 @@
 #include "pipeline/about/gltf_about.h"
 
-#include <algorithm>
-#include <map>
 #include <nlohmann/json.hpp>
 
 #include "pipeline/about/source_fields.h"

@@ -1,14 +1,7 @@
 #pragma once
-#include <cstdint>
-#include <map>
-#include <memory>
-#include <string>
-#include <vector>
 
 #include "pipeline/batch/memo/memo_segment.h"
-#include "pipeline/batch/plan.h"
 #include "pipeline/batch/run.h"
-#include "pipeline/compile/workers/worker.h"
 
 namespace texmesh {
 

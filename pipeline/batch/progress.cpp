@@ -1,11 +1,9 @@
 #include "pipeline/batch/progress.h"
 
 #include <sys/ioctl.h>
-#include <unistd.h>
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <ostream>
 
 #include "pipeline/io/table.h"

@@ -1,11 +1,6 @@
 #pragma once
 #include <chrono>
-#include <cstdint>
 #include <iosfwd>
-#include <map>
-#include <string>
-#include <string_view>
-#include <vector>
 
 #include "pipeline/compile/workers/worker.h"
 

@@ -1,11 +1,8 @@
 // What a run leaves beside its packages: a trace, statistics, a dependency file, and the summaries.
-#include "pipeline/batch/write_reports.h"
+#include "pipeline/batch/run.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
-#include <algorithm>
-#include <cerrno>
 #include <filesystem>
 #include <iostream>
 #include <nlohmann/json.hpp>
@@ -13,7 +10,7 @@
 #include "format/base/text_bytes.h"
 #include "pipeline/batch/fleet/model_list.h"
 #include "pipeline/batch/fleet/run_summary.h"
-#include "pipeline/compile/profile.h"
+#include "pipeline/compile/options.h"
 #include "pipeline/io/atomic_file.h"
 
 namespace texmesh {

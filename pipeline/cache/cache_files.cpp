@@ -8,7 +8,6 @@
 
 #include "format/base/text_bytes.h"
 #include "pipeline/io/atomic_file.h"
-#include "pipeline/io/descriptor.h"
 
 namespace texmesh {
 namespace {
@@ -29,7 +28,7 @@ bool sync_folder(const std::string& folder) {
 }
 
 /// For file systems without O_TMPFILE (NFS): a named sibling. Pruning removes what a killed process leaves.
-bool publish_by_rename(const std::string& path, std::span<const std::uint8_t> bytes) {
+bool publish_by_rename(const std::string& path, ByteSpan bytes) {
   try {
     write_file_atomically(path, bytes);
     return true;
@@ -42,15 +41,14 @@ bool publish_by_rename(const std::string& path, std::span<const std::uint8_t> by
 struct RecordText {
   Json key;  // Key::preimage
   std::vector<StoredBlob> outputs;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("version", Constant{kRecordVersion}, "");
     v("key", s.key, "");
     v("outputs", s.outputs, "");
   }
 };
 
-std::optional<CacheRecord> parse_record(std::span<const std::uint8_t> bytes, const Sha256* key) {
+std::optional<CacheRecord> parse_record(ByteSpan bytes, const Sha256* key) {
   const auto body = unseal(bytes);
   if (!body) return std::nullopt;
   try {
@@ -70,13 +68,13 @@ std::string object_path(const char* kind, const Sha256& digest) {
   return std::string(kind) + "/" + hex.substr(0, 2) + "/" + hex;
 }
 
-std::optional<std::vector<std::uint8_t>> read_whole(const std::string& path, std::uint64_t max_bytes) {
+std::optional<Bytes> read_whole(const std::string& path, std::uint64_t max_bytes) {
   const Descriptor d{::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)};
   struct stat s {};
   if (d.get() < 0 || ::fstat(d.get(), &s) != 0 || !S_ISREG(s.st_mode) ||
       static_cast<std::uint64_t>(s.st_size) > max_bytes)
     return std::nullopt;
-  std::vector<std::uint8_t> bytes(static_cast<std::size_t>(s.st_size));
+  Bytes bytes(static_cast<std::size_t>(s.st_size));
   for (std::size_t at = 0; at < bytes.size();) {
     const ssize_t n = ::read(d.get(), bytes.data() + at, bytes.size() - at);
     if (n < 0 && errno == EINTR) continue;
@@ -86,7 +84,7 @@ std::optional<std::vector<std::uint8_t>> read_whole(const std::string& path, std
   return bytes;
 }
 
-bool publish_object(const std::string& path, std::span<const std::uint8_t> bytes) {
+bool publish_object(const std::string& path, ByteSpan bytes) {
   const std::string folder = fs::path(path).parent_path().string();
   std::error_code ec;
   fs::create_directories(folder, ec);
@@ -122,7 +120,7 @@ QuarantineResult move_to_quarantine(const std::string& folder, const std::string
 
 std::string seal(const std::string& body) { return body + "\n" + to_hex(sha256(text_bytes(body))) + "\n"; }
 
-std::optional<std::string> unseal(std::span<const std::uint8_t> bytes) {
+std::optional<std::string> unseal(ByteSpan bytes) {
   if (bytes.size() < kSealBytes) return std::nullopt;
   const std::string text(bytes.begin(), bytes.end());
   std::string body = text.substr(0, text.size() - kSealBytes);
@@ -134,12 +132,10 @@ std::string write_record(const CacheRecord& record) {
   return seal(to_json(RecordText{Json::parse(record.preimage), record.outputs}).dump(1));
 }
 
-std::optional<CacheRecord> read_record(std::span<const std::uint8_t> bytes, const Sha256& key) {
+std::optional<CacheRecord> read_record(ByteSpan bytes, const Sha256& key) {
   return parse_record(bytes, &key);
 }
-std::optional<CacheRecord> read_record(std::span<const std::uint8_t> bytes) {
-  return parse_record(bytes, nullptr);
-}
+std::optional<CacheRecord> read_record(ByteSpan bytes) { return parse_record(bytes, nullptr); }
 
 FileLock::~FileLock() {
   if (fd_ >= 0) ::close(fd_);

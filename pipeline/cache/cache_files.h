@@ -1,9 +1,4 @@
 #pragma once
-#include <cstdint>
-#include <optional>
-#include <span>
-#include <string>
-#include <vector>
 
 #include "pipeline/graph/store.h"
 #include "pipeline/io/file_stamp.h"
@@ -25,12 +20,12 @@ namespace texmesh {
 std::string object_path(const char* kind, const Sha256& digest);
 
 /// The whole of a regular file; nothing when it is not there, longer than max_bytes or cannot be read.
-std::optional<std::vector<std::uint8_t>> read_whole(const std::string& path, std::uint64_t max_bytes = ~0ull);
+std::optional<Bytes> read_whole(const std::string& path, std::uint64_t max_bytes = ~0ull);
 
 /// Puts `bytes` under a new name: an unnamed temporary file, fdatasync, link, fsync of the folder. A file
 /// that has the name already stays, and counts as success when it is as long as `bytes`. False when that
 /// fails. A failure, or the end of the process at any point, leaves nothing behind.
-bool publish_object(const std::string& path, std::span<const std::uint8_t> bytes);
+bool publish_object(const std::string& path, ByteSpan bytes);
 
 /// What became of a file that was found damaged.
 struct QuarantineResult {
@@ -46,7 +41,7 @@ QuarantineResult move_to_quarantine(const std::string& folder, const std::string
 
 /// Text with its digest behind it, so that a cut or changed text is noticed; and back.
 std::string seal(const std::string& body);
-std::optional<std::string> unseal(std::span<const std::uint8_t> bytes);
+std::optional<std::string> unseal(ByteSpan bytes);
 
 /// A record of ac/: sealed JSON.
 struct CacheRecord {
@@ -55,9 +50,9 @@ struct CacheRecord {
 };
 std::string write_record(const CacheRecord& record);
 /// Nothing when the record is damaged, of another version, or its parts do not give `key`.
-std::optional<CacheRecord> read_record(std::span<const std::uint8_t> bytes, const Sha256& key);
+std::optional<CacheRecord> read_record(ByteSpan bytes, const Sha256& key);
 /// The same for a record whose key the caller knows by its name only (pruning).
-std::optional<CacheRecord> read_record(std::span<const std::uint8_t> bytes);
+std::optional<CacheRecord> read_record(ByteSpan bytes);
 
 /// flock on a file, which is made where it is missing. Released with the object.
 class FileLock {

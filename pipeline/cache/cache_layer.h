@@ -1,12 +1,5 @@
 #pragma once
 #include <chrono>
-#include <functional>
-#include <memory>
-#include <optional>
-#include <span>
-#include <stdexcept>
-#include <string>
-#include <vector>
 
 #include "pipeline/graph/store.h"
 
@@ -20,14 +13,13 @@ class CacheLayer {
   virtual std::string name() const = 0;
   /// An object (`kind`: ac, cas or notes); nothing when the layer has none. Throws LayerError when the layer
   /// does not work.
-  virtual std::optional<std::vector<std::uint8_t>> get(const char* kind, const Sha256& digest,
-                                                       std::uint64_t max_bytes) = 0;
+  virtual std::optional<Bytes> get(const char* kind, const Sha256& digest, std::uint64_t max_bytes) = 0;
   /// The layer holds an object of this many bytes under the digest. False also where it does not tell. Throws
   /// LayerError.
   virtual bool has(const char* /*kind*/, const Sha256& /*digest*/, std::uint64_t /*bytes*/) { return false; }
   /// Only for layers that take results. Throws LayerError; LayerRefusal where the layer works but does not
   /// take this.
-  virtual void put(const char* kind, const Sha256& digest, std::span<const std::uint8_t> bytes) = 0;
+  virtual void put(const char* kind, const Sha256& digest, ByteSpan bytes) = 0;
 };
 
 /// Tells the time; tests give one of their own.

@@ -1,7 +1,6 @@
 #include "pipeline/cache/disk_store.h"
 
 #include <fcntl.h>
-#include <unistd.h>
 
 #include <chrono>
 #include <cstdlib>
@@ -11,9 +10,8 @@
 
 #include "format/base/text_bytes.h"
 #include "pipeline/cache/cache_files.h"
-#include "pipeline/cache/prune.h"
 #include "pipeline/io/atomic_file.h"
-#include "pipeline/io/machine/owner_mark.h"
+#include "pipeline/io/machine.h"
 
 namespace texmesh {
 namespace {

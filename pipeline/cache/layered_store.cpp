@@ -1,5 +1,4 @@
 // A store with layers behind it: shared folders and servers that hold what other machines computed.
-#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <set>
@@ -18,12 +17,11 @@ class FolderLayer : public CacheLayer {
  public:
   explicit FolderLayer(std::string folder) : folder_(std::move(folder)) {}
   std::string name() const override { return folder_; }
-  std::optional<std::vector<std::uint8_t>> get(const char* kind, const Sha256& digest,
-                                               std::uint64_t max_bytes) override {
+  std::optional<Bytes> get(const char* kind, const Sha256& digest, std::uint64_t max_bytes) override {
     if (!std::filesystem::is_directory(folder_)) throw LayerError("no such folder");
     return read_whole(folder_ + "/" + object_path(kind, digest), max_bytes);
   }
-  void put(const char*, const Sha256&, std::span<const std::uint8_t>) override {}
+  void put(const char*, const Sha256&, ByteSpan) override {}
 
  private:
   std::string folder_;
@@ -54,7 +52,7 @@ class LayeredStore : public Store {
     if (SharedBytes bytes = local_->load(blob)) return bytes;
     for (Layer& layer : layers_)
       if (auto bytes = get(layer, "cas", blob.digest, blob.bytes)) {
-        if (is(blob, *bytes)) return std::make_shared<const std::vector<std::uint8_t>>(std::move(*bytes));
+        if (is(blob, *bytes)) return std::make_shared<const Bytes>(std::move(*bytes));
         remember_damage(layer, blob.digest);
       }
     return nullptr;
@@ -134,7 +132,7 @@ class LayeredStore : public Store {
     return rejected_.contains(key);
   }
 
-  static bool is(const StoredBlob& blob, const std::vector<std::uint8_t>& bytes) {
+  static bool is(const StoredBlob& blob, const Bytes& bytes) {
     return bytes.size() == blob.bytes && sha256(bytes) == blob.digest;
   }
 
@@ -184,9 +182,8 @@ class LayeredStore : public Store {
     }
   }
 
-  std::optional<std::vector<std::uint8_t>> get(Layer& layer, const char* kind, const Sha256& digest,
-                                               std::uint64_t max_bytes) {
-    std::optional<std::vector<std::uint8_t>> bytes;
+  std::optional<Bytes> get(Layer& layer, const char* kind, const Sha256& digest, std::uint64_t max_bytes) {
+    std::optional<Bytes> bytes;
     guarded(layer, [&] { bytes = layer.layer->get(kind, digest, max_bytes); });
     return bytes;
   }
@@ -213,8 +210,7 @@ class LayeredStore : public Store {
         remember_damage(layer, blob.digest);
         return report_damaged(layer, "the result " + blob.name + ", which does not have its digest,");
       }
-      outputs.emplace_back(blob.name,
-                           std::make_shared<const std::vector<std::uint8_t>>(std::move(*blob_bytes)));
+      outputs.emplace_back(blob.name, std::make_shared<const Bytes>(std::move(*blob_bytes)));
     }
     if (use_ == LayerUse::kLook) return record->outputs;
     const auto original = key_from_preimage(record->preimage);

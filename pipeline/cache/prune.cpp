@@ -1,15 +1,13 @@
-#include "pipeline/cache/prune.h"
+#include "pipeline/cache/disk_store.h"
 
 #include <fcntl.h>
-#include <unistd.h>
 
-#include <algorithm>
 #include <filesystem>
 #include <set>
 
 #include "pipeline/cache/cache_files.h"
 #include "pipeline/io/atomic_file.h"
-#include "pipeline/io/machine/owner_mark.h"
+#include "pipeline/io/machine.h"
 
 namespace texmesh {
 namespace {

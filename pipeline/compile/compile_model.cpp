@@ -2,21 +2,17 @@
 #include "pipeline/compile/compile_model.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <cctype>
 #include <nlohmann/json.hpp>
 
 #include "format/base/text_bytes.h"
 #include "format/container/format_version.h"
-#include "pipeline/compile/artefacts.h"
-#include "pipeline/compile/library_versions.h"
-#include "pipeline/compile/profile.h"
 #include "pipeline/compile/stage_table.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/file_resolver.h"
-#include "pipeline/io/resolver.h"
-#include "pipeline/io/wire_text.h"
+#include "pipeline/io/program.h"
+#include "pipeline/io/uri.h"
 
 namespace texmesh {
 namespace fs = std::filesystem;

@@ -1,15 +1,11 @@
 #include "pipeline/io/new_folder.h"
 
 #include <fcntl.h>
-#include <sys/stat.h>
 
 #include <cstdio>
-#include <cstring>
 #include <fstream>
-#include <vector>
 
-#include "format/base/errors.h"
-#include "pipeline/io/descriptor.h"
+#include "pipeline/io/file_stamp.h"
 
 namespace texmesh {
 namespace fs = std::filesystem;
@@ -25,7 +21,7 @@ void sync_new_folder(const fs::path& folder) {
   if (::fsync(d.get()) != 0) fail_output(folder, "a folder that can be synced");
 }
 
-void write_new_file(const fs::path& path, std::span<const std::uint8_t> bytes) {
+void write_new_file(const fs::path& path, ByteSpan bytes) {
   const Descriptor d{::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644)};
   if (d.get() < 0) fail_output(path, "a new file");
   while (!bytes.empty()) {
@@ -65,7 +61,7 @@ NewFolder::~NewFolder() {
   if (!tree_.empty()) fs::remove_all(tree_, ec);
 }
 
-void NewFolder::add(const std::string& path, std::span<const std::uint8_t> bytes) {
+void NewFolder::add(const std::string& path, ByteSpan bytes) {
   const fs::path file = tree_ / path, folder = file.parent_path();
   if (folders_.insert(folder).second) fs::create_directories(folder);
   write_new_file(file, bytes);

@@ -2,12 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "format/base/errors.h"
-#include "pipeline/io/wire_text.h"
+#include "pipeline/io/uri.h"
 
 namespace texmesh {
 namespace {

@@ -1,18 +1,10 @@
 #pragma once
-#include <array>
 #include <concepts>
-#include <cstdint>
 #include <functional>
 #include <limits>
-#include <map>
-#include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
-#include <span>
-#include <string>
-#include <string_view>
 #include <type_traits>
-#include <vector>
 
 #include "format/base/fields.h"
 #include "format/base/note.h"
@@ -75,10 +67,7 @@ inline constexpr FieldRule kSeconds{.range = Range{0, 1e9}};
 /// Specialise with `fields` for a type that cannot have it.
 template <class T>
 struct RecordFields {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
-    T::fields(s, v);
-  }
+  static void fields(auto& s, auto&& v) { T::fields(s, v); }
 };
 
 template <>
@@ -87,8 +76,7 @@ struct EnumNames<Severity> {
 };
 template <>
 struct RecordFields<Note> {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("severity", s.severity, "");
     v("code", s.code, FieldRule{.pattern = "^[a-z0-9-]+$"}, "");
     v("place", s.place, "");

@@ -2,11 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "pipeline/io/markup.h"
-#include "pipeline/io/wire_text.h"
+#include "pipeline/io/uri.h"
 
 namespace texmesh {
 namespace {

@@ -2,7 +2,7 @@
 #include <functional>
 #include <tuple>
 
-#include "delivery/cpp/decide/gpu_memory.h"
+#include "delivery/cpp/decide/texture_budget.h"
 #include "format/base/portable_math.h"
 #include "format/rules/allocation.h"
 #include "format/rules/proxy_choice.h"

@@ -14,8 +14,7 @@
 #include "pipeline/batch/plan.h"
 #include "pipeline/cache/cache_files.h"
 #include "pipeline/compile/options.h"
-#include "pipeline/compile/profile.h"
-#include "pipeline/compile/workers/worker_messages.h"
+#include "pipeline/compile/workers/worker.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace texmesh::fuzz {

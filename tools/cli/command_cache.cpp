@@ -5,7 +5,6 @@
 
 #include "format/base/errors.h"
 #include "pipeline/cache/disk_store.h"
-#include "pipeline/cache/prune.h"
 #include "pipeline/io/table.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"

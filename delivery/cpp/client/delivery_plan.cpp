@@ -1,9 +1,6 @@
 #include "delivery/cpp/client/delivery_plan.h"
 
 #include <algorithm>
-#include <cmath>
-
-#include "format/rules/proxy_choice.h"
 
 namespace texmesh {
 namespace {

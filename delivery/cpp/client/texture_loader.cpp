@@ -1,10 +1,6 @@
 #include "delivery/cpp/client/texture_loader.h"
 
 #include <algorithm>
-#include <map>
-#include <utility>
-
-#include "format/base/bytes.h"
 
 namespace texmesh {
 namespace {
@@ -241,7 +237,7 @@ bool TextureLoader::keep_sound_fragments(const Wanted& w, std::int32_t rung,
       if (range.bytes == 0) continue;
       good = part < outcome.parts.size() && outcome.parts[part].size() == asked[part].range.bytes;
       if (!good) break;
-      const auto stream = std::span<const std::uint8_t>(outcome.parts[part])
+      const auto stream = ByteSpan(outcome.parts[part])
                               .subspan(static_cast<std::size_t>(range.offset - asked[part].range.offset),
                                        static_cast<std::size_t>(range.bytes));
       ++part;

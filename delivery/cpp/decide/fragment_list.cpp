@@ -1,7 +1,6 @@
 #include "delivery/cpp/decide/fragment_list.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "format/rules/allocation.h"
 #include "format/rules/size_curve.h"

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "format/base/errors.h"
 #include "format/rules/mip_choice.h"
 #include "format/rules/rate_distortion.h"
 

@@ -7,7 +7,6 @@
 #include <chrono>
 #include <map>
 #include <mutex>
-#include <string_view>
 
 namespace texmesh {
 namespace {

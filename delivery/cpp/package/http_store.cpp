@@ -3,17 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <iterator>
-#include <map>
-#include <optional>
 #include <thread>
-#include <utility>
-
-#include "format/base/bytes.h"
-#include "format/base/errors.h"
-#include "format/container/container.h"
-#include "format/container/layout.h"
-#include "format/documents/entry_ref.h"
-#include "format/documents/manifest.h"
 
 // How a package is read from web servers, from the bottom up. HttpRetries counts the tries of a request, and
 // HttpLink holds the connections that all readers of a package share. HttpSource reads ranges of a container,

@@ -1,7 +1,4 @@
 #pragma once
-#include <memory>
-#include <string>
-#include <vector>
 
 #include "delivery/cpp/http/http_client.h"
 #include "delivery/cpp/package/package_reader.h"

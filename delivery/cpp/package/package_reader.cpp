@@ -2,11 +2,7 @@
 
 #include <algorithm>
 #include <numeric>
-#include <set>
 
-#include "format/base/bytes.h"
-#include "format/base/rule_error.h"
-#include "format/container/layout.h"
 #include "format/documents/index.h"
 
 namespace texmesh {
@@ -371,7 +367,7 @@ Bytes PackageReader::complete_fragment(std::uint32_t plane, std::uint32_t rung, 
   std::vector<Bytes> streams;
   for (std::uint32_t r = first; r <= rung; ++r) streams.push_back(this->fragment(plane, r, fragment));
   return join_fragment(codec, table_stream(plane, first),
-                       std::vector<std::span<const std::uint8_t>>(streams.begin(), streams.end()));
+                       std::vector<ByteSpan>(streams.begin(), streams.end()));
 }
 
 int select_scale(const Manifest& manifest, double displayed_px) {

@@ -4,15 +4,9 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstring>
 #include <filesystem>
-#include <utility>
 
 #include "delivery/cpp/package/http_store.h"
-#include "delivery/cpp/package/package_reader.h"
-#include "format/base/bytes.h"
-#include "format/base/rule_error.h"
-#include "format/container/layout.h"
 
 namespace texmesh {
 namespace {

@@ -1,8 +1,6 @@
 #include "delivery/cpp/package/plane_streams.h"
 
 #include <numeric>
-#include <string>
-#include <utility>
 
 #include "format/base/rule_error.h"
 
@@ -17,7 +15,7 @@ void require_size(const char* rule, const char* what, std::uint64_t expected, st
 
 }  // namespace
 
-PlaneStreams::PlaneStreams(Codec codec, const PlaneTables& tables, std::vector<std::uint8_t> table_pack)
+PlaneStreams::PlaneStreams(Codec codec, const PlaneTables& tables, Bytes table_pack)
     : codec_(codec),
       tables_(tables),
       table_pack_(std::move(table_pack)),
@@ -28,7 +26,7 @@ PlaneStreams::PlaneStreams(Codec codec, const PlaneTables& tables, std::vector<s
                table_pack_.size());
 }
 
-void PlaneStreams::add_pack(std::size_t rung, std::vector<std::uint8_t> pack) {
+void PlaneStreams::add_pack(std::size_t rung, Bytes pack) {
   const std::size_t fragments = tables_.fragment_count();
   const bool incremental = codec_traits(codec_).incremental;
   if (rung >= packs_.size() || (incremental && rung > 0 && offsets_[rung - 1].empty()))
@@ -46,24 +44,22 @@ void PlaneStreams::add_pack(std::size_t rung, std::vector<std::uint8_t> pack) {
   offsets_[rung] = std::move(offsets);
 }
 
-std::span<const std::uint8_t> PlaneStreams::stream(std::size_t rung, std::size_t fragment) const {
+ByteSpan PlaneStreams::stream(std::size_t rung, std::size_t fragment) const {
   return std::span(packs_[rung])
       .subspan(static_cast<std::size_t>(offsets_[rung].at(fragment)),
                tables_.size_bytes[rung * tables_.fragment_count() + fragment]);
 }
 
-std::span<const std::uint8_t> PlaneStreams::stream(std::size_t fragment) const {
-  return stream(rung_, fragment);
-}
+ByteSpan PlaneStreams::stream(std::size_t fragment) const { return stream(rung_, fragment); }
 
-std::vector<std::uint8_t> PlaneStreams::file(std::size_t fragment) const {
+Bytes PlaneStreams::file(std::size_t fragment) const {
   const std::size_t first = codec_traits(codec_).incremental ? 0 : rung_;
-  std::vector<std::span<const std::uint8_t>> streams;
+  std::vector<ByteSpan> streams;
   for (std::size_t r = first; r <= rung_; ++r) streams.push_back(stream(r, fragment));
   return join_fragment(codec_, table_stream(first), streams);
 }
 
-std::span<const std::uint8_t> PlaneStreams::table_stream(std::size_t rung) const {
+ByteSpan PlaneStreams::table_stream(std::size_t rung) const {
   std::uint64_t at = 0;
   for (std::size_t r = 0; r < rung; ++r) at += tables_.table_bytes[r];
   return std::span(table_pack_).subspan(static_cast<std::size_t>(at), tables_.table_bytes[rung]);

@@ -1,8 +1,6 @@
 #pragma once
-#include <cstdint>
-#include <span>
-#include <vector>
 
+#include "format/base/bytes.h"
 #include "format/documents/tables.h"
 #include "format/model/codec.h"
 
@@ -13,22 +11,22 @@ namespace texmesh {
 class PlaneStreams {
  public:
   /// `table_pack`: the table streams of all rungs. FormatError when it has another size than the tables say.
-  PlaneStreams(Codec codec, const PlaneTables& tables, std::vector<std::uint8_t> table_pack);
+  PlaneStreams(Codec codec, const PlaneTables& tables, Bytes table_pack);
   /// A rung's pack; with an incremental codec from the lowest rung upwards. FormatError when it has another
   /// size than the tables say or is not the next one.
-  void add_pack(std::size_t rung, std::vector<std::uint8_t> pack);
+  void add_pack(std::size_t rung, Bytes pack);
   /// Of the rung added last: the rung's own stream of a fragment (empty: not stored), and the complete file.
-  std::span<const std::uint8_t> stream(std::size_t fragment) const;
-  std::vector<std::uint8_t> file(std::size_t fragment) const;
-  std::span<const std::uint8_t> table_stream(std::size_t rung) const;
+  ByteSpan stream(std::size_t fragment) const;
+  Bytes file(std::size_t fragment) const;
+  ByteSpan table_stream(std::size_t rung) const;
 
  private:
-  std::span<const std::uint8_t> stream(std::size_t rung, std::size_t fragment) const;
+  ByteSpan stream(std::size_t rung, std::size_t fragment) const;
   Codec codec_;
   const PlaneTables& tables_;
-  std::vector<std::uint8_t> table_pack_;
+  Bytes table_pack_;
   std::size_t rung_ = 0;                             // the one added last
-  std::vector<std::vector<std::uint8_t>> packs_;     // [rung]; empty where not needed
+  std::vector<Bytes> packs_;                         // [rung]; empty where not needed
   std::vector<std::vector<std::uint64_t>> offsets_;  // [rung][fragment]
 };
 

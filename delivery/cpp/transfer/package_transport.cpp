@@ -1,11 +1,9 @@
-#include "delivery/cpp/transfer/package_transport.h"
+#include "delivery/cpp/transfer/transfer.h"
 
 #include <algorithm>
 #include <chrono>
 #include <deque>
 #include <thread>
-
-#include "format/base/errors.h"
 
 namespace texmesh {
 namespace {
@@ -124,7 +122,7 @@ class HttpTransport final : public Transport {
   };
   struct Open {
     std::vector<PackagePart> wanted;
-    std::vector<std::vector<std::uint8_t>> parts;  // as much as has come
+    std::vector<Bytes> parts;  // as much as has come
     std::size_t left = 0;
     std::uint32_t mirror = 0;
     bool under_way = false;

@@ -1,9 +1,6 @@
 #include "delivery/cpp/transfer/transfer.h"
 
 #include <algorithm>
-#include <map>
-#include <set>
-#include <utility>
 
 namespace texmesh {
 namespace {

@@ -1,16 +1,54 @@
 // What a run has done, model by model: written, read again, and merged from the runs of all shards.
 #include "pipeline/batch/fleet/run_summary.h"
 
-#include <algorithm>
+#include <fmt/format.h>
+
 #include <nlohmann/json.hpp>
 #include <set>
 
 #include "format/base/bounded_json.h"
-#include "pipeline/batch/junit.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/file_resolver.h"
+#include "pipeline/io/markup.h"
 
 namespace texmesh {
+namespace {
+
+std::string time_attribute(const std::optional<double>& seconds) {
+  return seconds ? fmt::format(" time=\"{:.3f}\"", *seconds) : "";
+}
+
+std::string attribute(const char* name, const std::string& value) {
+  return value.empty() ? "" : fmt::format(" {}=\"{}\"", name, markup_escaped(value));
+}
+
+}  // namespace
+
+JunitReport::JunitReport(const JunitSuite& s)
+    : text_(fmt::format(
+          "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n<testsuite name=\"{}\" tests=\"{}\" "
+          "failures=\"{}\" errors=\"0\" skipped=\"{}\"{}>\n",
+          markup_escaped(s.name), s.tests, s.failures, s.skipped, time_attribute(s.seconds))) {}
+
+void JunitReport::add(const JunitCase& c) {
+  std::string body;
+  if (!c.properties.empty()) {
+    body += "\n<properties>";
+    for (const auto& [name, value] : c.properties)
+      body += fmt::format("<property name=\"{}\" value=\"{}\"/>", name, markup_escaped(value));
+    body += "</properties>\n";
+  }
+  if (!c.skipped.empty())
+    body += fmt::format("<skipped message=\"{}\"/>\n", markup_escaped(c.skipped));
+  else if (!c.failure.empty() || !c.failure_type.empty())
+    body += fmt::format("<failure{} message=\"{}\"/>\n", attribute("type", c.failure_type),
+                        markup_escaped(c.failure));
+  text_ += fmt::format("<testcase classname=\"{}\" name=\"{}\"{}", markup_escaped(c.class_name),
+                       markup_escaped(c.name), time_attribute(c.seconds));
+  text_ += body.empty() ? "/>\n" : ">" + body + "</testcase>\n";
+}
+
+std::string JunitReport::finish() { return std::exchange(text_, {}) + "</testsuite>\n</testsuites>\n"; }
 
 SummaryCounts count_results(const std::vector<ModelSummary>& models) {
   SummaryCounts c;
@@ -51,7 +89,7 @@ void check_shard(const std::optional<Shard>& shard, const std::string& file) {
 
 }  // namespace
 
-RunSummary read_summary(std::span<const std::uint8_t> bytes, const std::string& file) {
+RunSummary read_summary(ByteSpan bytes, const std::string& file) {
   RunSummary s = from_json<RunSummary>(parse_bounded_json(bytes, file, 8), file);
   for (const SummaryPart& p : s.parts) check_shard(p.shard, file);
   check_shard(s.shard, file);

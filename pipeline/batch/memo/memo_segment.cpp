@@ -8,7 +8,7 @@
 #include "format/base/archive.h"
 #include "format/base/text_bytes.h"
 #include "pipeline/cache/cache_files.h"
-#include "pipeline/io/machine/owner_mark.h"
+#include "pipeline/io/machine.h"
 
 namespace texmesh {
 namespace {
@@ -37,17 +37,11 @@ bool same_file(const std::string& path, bool follow, std::int64_t looked_at_ns, 
 struct PackedKey {
   std::uint32_t stage = 0;  // in the segment's names
   Sha256 key{};
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.stage, s.key);
-  }
+  static void archive(auto& s, auto& a) { a(s.stage, s.key); }
 };
 struct PackedKeys {
   std::vector<PackedKey> keys;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.keys);
-  }
+  static void archive(auto& s, auto& a) { a(s.keys); }
 };
 
 Bytes pack_keys(const StageKeys& keys, StageNames& stages) {
@@ -56,7 +50,7 @@ Bytes pack_keys(const StageKeys& keys, StageNames& stages) {
   return encode_artefact(PackedKeys{std::move(packed)});
 }
 
-StageKeys unpack_keys(std::span<const std::uint8_t> bytes, const StageNames& stages) {
+StageKeys unpack_keys(ByteSpan bytes, const StageNames& stages) {
   StageKeys keys;
   for (const PackedKey& k : decode_artefact<PackedKeys>(bytes, "memo").keys)
     keys[stages.name_of(k.stage)] = k.key;
@@ -79,10 +73,7 @@ struct Block {
   std::vector<std::int64_t> times;
   std::vector<std::uint32_t> sizes;
   std::uint64_t body_bytes = 0;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.new_stages, s.names, s.times, s.sizes, s.body_bytes);
-  }
+  static void archive(auto& s, auto& a) { a(s.new_stages, s.names, s.times, s.sizes, s.body_bytes); }
 };
 
 /// In front of a record. What check is of begins behind it.
@@ -94,15 +85,14 @@ struct RecordHead {
 constexpr std::size_t kCheckBytes = 8, kRecordHeadBytes = 16;
 static_assert(sizeof(RecordHead) == kRecordHeadBytes);
 
-std::uint64_t check_of(std::span<const std::uint8_t> bytes) { return truncated(sha256(bytes)); }
+std::uint64_t check_of(ByteSpan bytes) { return truncated(sha256(bytes)); }
 
 /// The bytes behind a check that holds; none where it does not.
-std::span<const std::uint8_t> checked(std::span<const std::uint8_t> bytes) {
+ByteSpan checked(ByteSpan bytes) {
   if (bytes.size() < kCheckBytes) return {};
   std::uint64_t check = 0;
   std::memcpy(&check, bytes.data(), kCheckBytes);
-  return check == check_of(bytes.subspan(kCheckBytes)) ? bytes.subspan(kCheckBytes)
-                                                       : std::span<const std::uint8_t>{};
+  return check == check_of(bytes.subspan(kCheckBytes)) ? bytes.subspan(kCheckBytes) : ByteSpan{};
 }
 
 bool read_at(int fd, std::uint64_t at, std::span<std::uint8_t> to) {
@@ -116,7 +106,7 @@ bool read_at(int fd, std::uint64_t at, std::span<std::uint8_t> to) {
   return true;
 }
 
-void append_bytes(std::vector<std::uint8_t>& to, const void* from, std::size_t size) {
+void append_bytes(Bytes& to, const void* from, std::size_t size) {
   const auto* p = static_cast<const std::uint8_t*>(from);
   to.insert(to.end(), p, p + size);
 }
@@ -201,7 +191,7 @@ bool MemoSegment::read_blocks(const std::function<void(MemoEntry)>& entry) {
     const BlockHead head = head_of(bytes);
     if (head.bytes > kMostBlockBytes) return false;
     if (head.bytes > bytes_ - at - kBlockHeadBytes) break;
-    std::vector<std::uint8_t> payload(static_cast<std::size_t>(head.bytes));
+    Bytes payload(static_cast<std::size_t>(head.bytes));
     if (!read_at(file_.get(), at + kBlockHeadBytes, payload) || sha256(payload) != head.digest) return false;
     at += kBlockHeadBytes + head.bytes;
     const auto body_bytes = tell_block(payload, at, entry, last);
@@ -212,8 +202,7 @@ bool MemoSegment::read_blocks(const std::function<void(MemoEntry)>& entry) {
   return is_finished() ? last && at == bytes_ : true;
 }
 
-std::optional<std::uint64_t> MemoSegment::tell_block(std::span<const std::uint8_t> payload,
-                                                     std::uint64_t body,
+std::optional<std::uint64_t> MemoSegment::tell_block(ByteSpan payload, std::uint64_t body,
                                                      const std::function<void(MemoEntry)>& entry,
                                                      bool& last) {
   Block block;
@@ -239,7 +228,7 @@ std::optional<std::uint64_t> MemoSegment::tell_block(std::span<const std::uint8_
 }
 
 /// Models are asked for about in the order in which they were remembered: one read serves many.
-std::span<const std::uint8_t> MemoSegment::look(Window& window, std::uint64_t at, std::size_t bytes) const {
+ByteSpan MemoSegment::look(Window& window, std::uint64_t at, std::size_t bytes) const {
   constexpr std::size_t kWindowBytes = 8 << 10;
   if (at < window.at || at + bytes > window.at + window.bytes.size()) {
     const std::uint64_t rest = at < bytes_ ? bytes_ - at : 0;
@@ -253,7 +242,7 @@ std::span<const std::uint8_t> MemoSegment::look(Window& window, std::uint64_t at
 }
 
 std::optional<MemoRecord> MemoSegment::record(const MemoEntry& entry) const {
-  const std::span<const std::uint8_t> bytes = checked(look(record_window_, entry.offset, entry.bytes));
+  const ByteSpan bytes = checked(look(record_window_, entry.offset, entry.bytes));
   constexpr std::size_t kRestOfHead = kRecordHeadBytes - kCheckBytes;
   try {
     if (bytes.size() >= kRestOfHead) return decode_artefact<MemoRecord>(bytes.subspan(kRestOfHead), "memo");
@@ -264,7 +253,7 @@ std::optional<MemoRecord> MemoSegment::record(const MemoEntry& entry) const {
 }
 
 StageKeys MemoSegment::keys(const MemoEntry& entry) const {
-  const std::span<const std::uint8_t> bytes = look(record_window_, entry.offset, entry.bytes);
+  const ByteSpan bytes = look(record_window_, entry.offset, entry.bytes);
   RecordHead head;
   if (bytes.size() >= kRecordHeadBytes && !checked(bytes).empty())
     std::memcpy(&head, bytes.data(), kRecordHeadBytes);
@@ -278,7 +267,7 @@ StageKeys MemoSegment::keys(const MemoEntry& entry) const {
 }
 
 void MemoSegmentWriter::add(const MemoName& name, const MemoRecord& record) {
-  const std::vector<std::uint8_t> bytes = encode_artefact(record), keys = pack_keys(record.keys, stages_);
+  const Bytes bytes = encode_artefact(record), keys = pack_keys(record.keys, stages_);
   const std::size_t size = kRecordHeadBytes + bytes.size() + kCheckBytes + keys.size();
   if (size > kMostBlockBytes / 2) return;  // a model of ten thousand files is looked at again
   if (records_.size() + keys_.size() + size > kFullBlockBytes) flush();
@@ -324,9 +313,9 @@ bool MemoSegmentWriter::flush() {
   return written;
 }
 
-bool MemoSegmentWriter::append(std::span<const std::uint8_t> payload, std::span<const std::uint8_t> body) {
+bool MemoSegmentWriter::append(ByteSpan payload, ByteSpan body) {
   if (failed_ || !open()) return failed_ = true, false;
-  std::vector<std::uint8_t> bytes(kBlockHeadBytes);
+  Bytes bytes(kBlockHeadBytes);
   const BlockHead head{payload.size(), sha256(payload)};
   std::memcpy(bytes.data(), &head.bytes, 8);
   std::memcpy(bytes.data() + 8, head.digest.data(), 32);

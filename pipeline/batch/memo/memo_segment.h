@@ -1,16 +1,7 @@
 #pragma once
 // The records of a memo, and its files: blocks of records, each file appended by one process.
-#include <array>
-#include <cstdint>
-#include <functional>
-#include <memory>
-#include <optional>
-#include <span>
-#include <string>
-#include <vector>
 
-#include "pipeline/graph/key.h"
-#include "pipeline/io/descriptor.h"
+#include "pipeline/graph/store.h"
 #include "pipeline/io/file_stamp.h"
 
 namespace texmesh {
@@ -29,8 +20,7 @@ struct MemoRecord {
   StageKeys keys;
   std::vector<std::string> error;  // kind, file, place, expected, found, message; empty unless failed
   /// Keys go apart: a model that is up to date needs none of them.
-  template <class S, class A>
-  static void archive(S& s, A& a) {
+  static void archive(auto& s, auto& a) {
     a(s.request, s.package_digest, s.failed, s.looked_at_ns, s.files, s.package_stamp, s.package_bytes,
       s.peak_memory_bytes, s.seconds, s.error);
   }
@@ -99,17 +89,17 @@ class MemoSegment {
 
  private:
   struct Window {
-    std::vector<std::uint8_t> bytes;
+    Bytes bytes;
     std::uint64_t at = 0;
   };
   MemoSegment() = default;
   bool read_blocks(const std::function<void(MemoEntry)>& entry);
   /// The body's size, whose records begin at `body` in the file; nothing for a payload that contradicts
   /// itself.
-  std::optional<std::uint64_t> tell_block(std::span<const std::uint8_t> payload, std::uint64_t body,
+  std::optional<std::uint64_t> tell_block(ByteSpan payload, std::uint64_t body,
                                           const std::function<void(MemoEntry)>& entry, bool& last);
   /// Bytes of the file; fewer when it has changed.
-  std::span<const std::uint8_t> look(Window& window, std::uint64_t at, std::size_t bytes) const;
+  ByteSpan look(Window& window, std::uint64_t at, std::size_t bytes) const;
   std::string path_;
   Descriptor file_;
   std::uint64_t bytes_ = 0;
@@ -140,7 +130,7 @@ class MemoSegmentWriter {
  private:
   bool open();
   void end_records();
-  bool append(std::span<const std::uint8_t> payload, std::span<const std::uint8_t> body);
+  bool append(ByteSpan payload, ByteSpan body);
   std::string folder_, path_;  // of the file while it is written
   Descriptor file_;
   bool failed_ = false;
@@ -149,7 +139,7 @@ class MemoSegmentWriter {
   std::vector<MemoName> names_;
   std::vector<std::int64_t> times_;
   std::vector<std::uint32_t> sizes_;
-  std::vector<std::uint8_t> records_, keys_;
+  Bytes records_, keys_;
 };
 
 }  // namespace texmesh

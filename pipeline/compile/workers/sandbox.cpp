@@ -9,7 +9,6 @@
 #include <linux/seccomp.h>
 #include <sys/prctl.h>
 #include <sys/socket.h>
-#include <sys/stat.h>
 #include <sys/syscall.h>
 
 #include <charconv>
@@ -17,7 +16,7 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "pipeline/io/descriptor.h"
+#include "pipeline/io/file_stamp.h"
 
 namespace texmesh {
 namespace {

@@ -5,8 +5,6 @@
 #include <sys/prctl.h>
 #include <sys/resource.h>
 
-#include <algorithm>
-#include <chrono>
 #include <filesystem>
 #include <iostream>
 #include <mutex>
@@ -16,13 +14,10 @@
 #include "pipeline/cache/cache_layer.h"
 #include "pipeline/cache/disk_store.h"
 #include "pipeline/compile/compile_model.h"
-#include "pipeline/compile/profile.h"
 #include "pipeline/compile/stage_table.h"
 #include "pipeline/compile/workers/worker.h"
-#include "pipeline/io/descriptor.h"
 #include "pipeline/io/exit_codes.h"
-#include "pipeline/io/machine/owner_mark.h"
-#include "pipeline/io/resolver.h"
+#include "pipeline/io/machine.h"
 
 namespace texmesh {
 namespace {

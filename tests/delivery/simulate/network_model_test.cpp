@@ -1,5 +1,4 @@
 // The model of a network: exact times for what can be worked out by hand.
-#include "delivery/cpp/simulate/network_model.h"
 
 #include <gtest/gtest.h>
 

@@ -9,7 +9,6 @@
 
 #include "format/base/errors.h"
 #include "pipeline/cache/cache_files.h"
-#include "pipeline/cache/prune.h"
 #include "tests/pipeline/cache/cache_fixtures.h"
 
 namespace texmesh {

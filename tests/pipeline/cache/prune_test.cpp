@@ -1,4 +1,3 @@
-#include "pipeline/cache/prune.h"
 
 #include <gtest/gtest.h>
 

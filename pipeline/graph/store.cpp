@@ -1,4 +1,4 @@
-#include "pipeline/graph/key.h"
+#include "pipeline/graph/store.h"
 
 #include <nlohmann/json.hpp>
 
@@ -30,7 +30,7 @@ std::vector<std::pair<std::string, std::string>> Key::added_parts() const {
 Sha256 Key::digest() const { return digest_of_parts(parts_); }
 
 Sha256 digest_of_parts(const std::vector<std::pair<std::string, std::string>>& parts) {
-  std::vector<std::uint8_t> record;
+  Bytes record;
   auto put = [&record](const std::string& s) {
     for (int i = 0; i < 8; ++i) record.push_back(static_cast<std::uint8_t>(s.size() >> (8 * i)));
     record.insert(record.end(), s.begin(), s.end());
