@@ -26,6 +26,9 @@ bool is_epsg_code(std::uint64_t code);
 /// then clean_text().
 std::string clean_about_text(const std::string& text, std::size_t max_bytes);
 
+/// Adds such a text to a list of about.json, unless the list has it already or is full.
+void add_about_value(std::vector<NamedText>& list, const std::string& name, const std::string& value);
+
 /// A unit of length by its name ("mm", "metre", "feet" ...): the name and its metres. False for others.
 bool find_unit(const std::string& name, About& about);
 

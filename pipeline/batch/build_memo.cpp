@@ -227,9 +227,7 @@ void JobSelection::add_job(std::size_t i, bool remembered) {
     job.predicted_memory_bytes = record.peak_memory_bytes;
     job.predicted_s = record.seconds;
   } else {
-    std::error_code ec;
-    const auto size = fs::file_size(m.input, ec);
-    const std::uint64_t bytes = ec ? 0 : size;
+    const std::uint64_t bytes = bytes_of_file(m.input);
     job.predicted_memory_bytes = kBaseMemory_bytes + kMemoryPerByte * bytes;
     job.predicted_s = guessed_seconds(bytes);
   }

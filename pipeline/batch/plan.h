@@ -42,6 +42,8 @@ std::vector<int> balance_shards(const std::vector<ModelCost>& models, int shards
 /// the same collection the same way.
 std::string collection_digest(const std::vector<ModelCost>& models);
 
+/// 0 where it is not there.
+std::uint64_t bytes_of_file(const std::string& path);
 /// What a model takes that was never compiled, by the bytes of its file: measured on the sample scans,
 /// rounded up.
 double guessed_seconds(std::uint64_t model_bytes);
@@ -67,7 +69,7 @@ std::vector<ModelPath> find_models(const std::vector<std::string>& inputs, const
 std::vector<std::string> list_models(const std::string& folder);
 
 /// By its name: only what it holds tells whether it is a model.
-bool is_json(const std::string& path);
+bool has_json_ending(const std::string& path);
 
 /// A JSON file that says within its first bytes that it is a range scan; other JSON files are collections.
 bool is_range_scan(const std::string& path);

@@ -22,11 +22,6 @@ bool is_there(const std::string& path, std::size_t bytes) {
   return ::stat(path.c_str(), &s) == 0 && S_ISREG(s.st_mode) && static_cast<std::size_t>(s.st_size) == bytes;
 }
 
-bool sync_folder(const std::string& folder) {
-  const Descriptor d{::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)};
-  return d.get() >= 0 && (::fsync(d.get()) == 0 || errno == EINVAL || errno == ENOTSUP);
-}
-
 /// For file systems without O_TMPFILE (NFS): a named sibling. Pruning removes what a killed process leaves.
 bool publish_by_rename(const std::string& path, ByteSpan bytes) {
   try {
@@ -47,19 +42,6 @@ struct RecordText {
     v("outputs", s.outputs, "");
   }
 };
-
-std::optional<CacheRecord> parse_record(ByteSpan bytes, const Sha256* key) {
-  const auto body = unseal(bytes);
-  if (!body) return std::nullopt;
-  try {
-    auto text = from_json<RecordText>(Json::parse(*body, nullptr, false), "record");
-    const auto parts = key_from_json(text.key);
-    if (!parts || (key && parts->digest() != *key)) return std::nullopt;
-    return CacheRecord{parts->preimage(), std::move(text.outputs)};
-  } catch (const InputError&) {
-    return std::nullopt;
-  }
-}
 
 }  // namespace
 
@@ -132,63 +114,42 @@ std::string write_record(const CacheRecord& record) {
   return seal(to_json(RecordText{Json::parse(record.preimage), record.outputs}).dump(1));
 }
 
-std::optional<CacheRecord> read_record(ByteSpan bytes, const Sha256& key) {
-  return parse_record(bytes, &key);
-}
-std::optional<CacheRecord> read_record(ByteSpan bytes) { return parse_record(bytes, nullptr); }
-
-FileLock::~FileLock() {
-  if (fd_ >= 0) ::close(fd_);
-}
-FileLock::FileLock(FileLock&& other) noexcept : fd_(std::exchange(other.fd_, -1)), busy_(other.busy_) {}
-FileLock& FileLock::operator=(FileLock&& other) noexcept {
-  std::swap(fd_, other.fd_);
-  std::swap(busy_, other.busy_);
-  return *this;
+std::optional<CacheRecord> read_record(ByteSpan bytes, const std::optional<Sha256>& key) {
+  const auto body = unseal(bytes);
+  if (!body) return std::nullopt;
+  try {
+    auto text = from_json<RecordText>(Json::parse(*body, nullptr, false), "record");
+    const auto parts = key_from_json(text.key);
+    if (!parts || (key && parts->digest() != *key)) return std::nullopt;
+    return CacheRecord{parts->preimage(), std::move(text.outputs)};
+  } catch (const InputError&) {
+    return std::nullopt;
+  }
 }
 
 bool FileLock::is_of(const std::string& path) const {
   struct stat own {
   }, there{};
-  return fd_ >= 0 && ::fstat(fd_, &own) == 0 && ::lstat(path.c_str(), &there) == 0 &&
+  return held() && ::fstat(file_.get(), &own) == 0 && ::lstat(path.c_str(), &there) == 0 &&
          own.st_dev == there.st_dev && own.st_ino == there.st_ino;
 }
 
-namespace {
-
-int open_lock(const std::string& path) {
-  return ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
+FileLock FileLock::take(const std::string& path, int operation) {
+  FileLock lock;
+  Descriptor file{::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666)};
+  if (file.get() < 0) return lock;
+  int rc;
+  do rc = ::flock(file.get(), operation);
+  while (rc != 0 && errno == EINTR && (operation & LOCK_NB) == 0);
+  lock.busy_ = rc != 0 && (errno == EWOULDBLOCK || errno == EINTR);
+  if (rc == 0) lock.file_ = std::move(file);
+  return lock;
 }
-
-int operation(FileLock::Mode mode) { return mode == FileLock::Mode::kShared ? LOCK_SH : LOCK_EX; }
-
-}  // namespace
 
 FileLock FileLock::wait(const std::string& path, Mode mode) {
-  FileLock lock;
-  const int fd = open_lock(path);
-  if (fd < 0) return lock;
-  int rc;
-  do rc = ::flock(fd, operation(mode));
-  while (rc != 0 && errno == EINTR);
-  if (rc == 0)
-    lock.fd_ = fd;
-  else
-    ::close(fd);
-  return lock;
+  return take(path, mode == Mode::kShared ? LOCK_SH : LOCK_EX);
 }
 
-FileLock FileLock::attempt(const std::string& path, Mode mode) {
-  FileLock lock;
-  const int fd = open_lock(path);
-  if (fd < 0) return lock;
-  if (::flock(fd, operation(mode) | LOCK_NB) == 0) {
-    lock.fd_ = fd;
-  } else {
-    lock.busy_ = errno == EWOULDBLOCK || errno == EINTR;
-    ::close(fd);
-  }
-  return lock;
-}
+FileLock FileLock::attempt(const std::string& path) { return take(path, LOCK_EX | LOCK_NB); }
 
 }  // namespace texmesh

@@ -49,31 +49,27 @@ struct CacheRecord {
   std::vector<StoredBlob> outputs;
 };
 std::string write_record(const CacheRecord& record);
-/// Nothing when the record is damaged, of another version, or its parts do not give `key`.
-std::optional<CacheRecord> read_record(ByteSpan bytes, const Sha256& key);
-/// The same for a record whose key the caller knows by its name only (pruning).
-std::optional<CacheRecord> read_record(ByteSpan bytes);
+/// Nothing when the record is damaged, of another version, or its parts do not give `key`; without a key the
+/// caller knows it by its name only (pruning).
+std::optional<CacheRecord> read_record(ByteSpan bytes, const std::optional<Sha256>& key = {});
 
 /// flock on a file, which is made where it is missing. Released with the object.
 class FileLock {
  public:
   enum class Mode : std::uint8_t { kShared, kExclusive };
-  FileLock() = default;
-  ~FileLock();
-  FileLock(FileLock&& other) noexcept;
-  FileLock& operator=(FileLock&& other) noexcept;
   /// Waits. Not held when locks do not work there.
   static FileLock wait(const std::string& path, Mode mode);
-  /// Does not wait.
-  static FileLock attempt(const std::string& path, Mode mode);
-  bool held() const { return fd_ >= 0; }
+  /// An exclusive one; does not wait.
+  static FileLock attempt(const std::string& path);
+  bool held() const { return file_.get() >= 0; }
   /// attempt() failed because somebody else holds the lock, not because locks do not work.
   bool busy() const { return busy_; }
   /// Whether the locked file still stands under this path and was not removed meanwhile.
   bool is_of(const std::string& path) const;
 
  private:
-  int fd_ = -1;
+  static FileLock take(const std::string& path, int operation);
+  Descriptor file_;
   bool busy_ = false;
 };
 

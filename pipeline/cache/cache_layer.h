@@ -61,9 +61,6 @@ struct LayerPatience {
 /// A build waits for a layer a quarter of the model's time limit at most (seconds, 0 = no limit).
 LayerPatience patience_within(double limit_s);
 
-/// A folder laid out as a cache folder. A layer never writes to the folder.
-std::unique_ptr<CacheLayer> open_folder_layer(const std::string& folder);
-
 /// GET, HEAD and PUT of URL/ac/<key> and URL/cas/<digest> (the paths of Bazel's remote caches; bazel-remote
 /// must be told not to validate action results; any WebDAV-like server does); notes stand under ac/ too. http
 /// and https only, no redirects; a layer that has failed, or is slower than its patience allows, fails for a
@@ -75,7 +72,7 @@ std::unique_ptr<CacheLayer> open_http_layer(const std::string& url, const LayerP
 /// InputError for a text that names no layer. Touches no layer.
 void check_layer(const std::string& place);
 
-/// http(s)://... or a folder.
+/// http(s)://..., or a folder laid out as a cache folder, which is never written to.
 std::unique_ptr<CacheLayer> open_layer(const std::string& place, const LayerPatience& patience = {});
 
 enum class LayerUse : std::uint8_t {

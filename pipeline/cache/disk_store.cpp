@@ -35,7 +35,7 @@ class RunningBuild {
     constexpr int kAttempts = 1000;
     for (int i = 0; i < kAttempts; ++i) {
       path_ = folder + "/running/" + owner_mark() + "-" + std::to_string(counter++);
-      lock_ = FileLock::attempt(path_, FileLock::Mode::kExclusive);
+      lock_ = FileLock::attempt(path_);
       if (!lock_.held() && !lock_.busy()) return;  // locks do not work here
       if (!lock_.is_of(path_)) continue;
       ::utimensat(AT_FDCWD, path_.c_str(), nullptr, 0);  // this build's start
@@ -153,7 +153,7 @@ class DiskStore : public Store {
     if (!writes_) return nullptr;
     const std::string path = folder_ + "/locks/" + to_hex(key).substr(0, 3);
     for (;;) {
-      FileLock lock = FileLock::attempt(path, FileLock::Mode::kExclusive);
+      FileLock lock = FileLock::attempt(path);
       if (lock.held()) return std::make_unique<LockClaim>(std::move(lock));
       if (!lock.busy()) return nullptr;
       context.check_cancelled();

@@ -228,12 +228,9 @@ class LayeredStore : public Store {
 
 }  // namespace
 
-std::unique_ptr<CacheLayer> open_folder_layer(const std::string& folder) {
-  return std::make_unique<FolderLayer>(folder);
-}
-
 std::unique_ptr<CacheLayer> open_layer(const std::string& place, const LayerPatience& patience) {
-  return place.find("://") != std::string::npos ? open_http_layer(place, patience) : open_folder_layer(place);
+  if (place.find("://") != std::string::npos) return open_http_layer(place, patience);
+  return std::make_unique<FolderLayer>(place);
 }
 
 std::unique_ptr<Store> layered_store(std::unique_ptr<Store> local,

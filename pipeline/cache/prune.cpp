@@ -50,7 +50,7 @@ bool build_is_over(const Entry& e) {
 std::int64_t oldest_running_ns(const std::string& folder, std::uint64_t* count = nullptr) {
   std::int64_t oldest = std::numeric_limits<std::int64_t>::max();
   for (const Entry& e : list(folder, "running")) {
-    const FileLock lock = FileLock::attempt(e.path, FileLock::Mode::kExclusive);
+    const FileLock lock = FileLock::attempt(e.path);
     if (lock.held() && build_is_over(e)) {
       if (lock.is_of(e.path)) ::unlink(e.path.c_str());
       continue;
@@ -218,43 +218,6 @@ class Pruning {
   PruneResult result_;
 };
 
-}  // namespace
-
-CacheStatistics cache_statistics(const std::string& folder) {
-  CacheStatistics s;
-  std::int64_t oldest = wall_clock_ns();
-  const std::int64_t now = oldest;
-  for (const Entry& e : list(folder, "ac")) {
-    ++s.records;
-    s.record_bytes += e.stamp.bytes;
-    oldest = std::min(oldest, e.stamp.modified_ns);
-  }
-  for (const Entry& e : list(folder, "cas")) ++s.blobs, s.blob_bytes += e.stamp.bytes;
-  for (const char* part : {"notes", "memo"})
-    for (const Entry& e : list(folder, part)) ++s.notes, s.note_bytes += e.stamp.bytes;
-  for (const Entry& e : list(folder, "quarantine")) ++s.quarantined, s.quarantined_bytes += e.stamp.bytes;
-  oldest_running_ns(folder, &s.running);
-  s.oldest_use_s = (now - oldest) / kSecond_ns;
-  return s;
-}
-
-PruneResult prune_cache(const std::string& folder, const CacheLimits& limits) {
-  return Pruning(folder, limits).run(true);
-}
-
-void prune_now_and_then(const std::string& folder, const CacheLimits& limits) {
-  const std::string stamp_path = folder + "/pruned";
-  const auto last = stamp_of(stamp_path);
-  if (last && last->modified_ns > wall_clock_ns() - kTouchInterval_s / 10 * kSecond_ns) return;
-  const int fd = ::open(stamp_path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666);
-  if (fd < 0) return;
-  ::futimens(fd, nullptr);
-  ::close(fd);
-  Pruning(folder, limits).run(false);
-}
-
-namespace {
-
 /// Reads every object beneath a cache folder, beside builds and pruning: what disappears meanwhile is no
 /// damage, and a record is listed before the blobs that were put before it.
 class Verification {
@@ -323,6 +286,39 @@ class Verification {
 };
 
 }  // namespace
+
+CacheStatistics cache_statistics(const std::string& folder) {
+  CacheStatistics s;
+  std::int64_t oldest = wall_clock_ns();
+  const std::int64_t now = oldest;
+  for (const Entry& e : list(folder, "ac")) {
+    ++s.records;
+    s.record_bytes += e.stamp.bytes;
+    oldest = std::min(oldest, e.stamp.modified_ns);
+  }
+  for (const Entry& e : list(folder, "cas")) ++s.blobs, s.blob_bytes += e.stamp.bytes;
+  for (const char* part : {"notes", "memo"})
+    for (const Entry& e : list(folder, part)) ++s.notes, s.note_bytes += e.stamp.bytes;
+  for (const Entry& e : list(folder, "quarantine")) ++s.quarantined, s.quarantined_bytes += e.stamp.bytes;
+  oldest_running_ns(folder, &s.running);
+  s.oldest_use_s = (now - oldest) / kSecond_ns;
+  return s;
+}
+
+PruneResult prune_cache(const std::string& folder, const CacheLimits& limits) {
+  return Pruning(folder, limits).run(true);
+}
+
+void prune_now_and_then(const std::string& folder, const CacheLimits& limits) {
+  const std::string stamp_path = folder + "/pruned";
+  const auto last = stamp_of(stamp_path);
+  if (last && last->modified_ns > wall_clock_ns() - kTouchInterval_s / 10 * kSecond_ns) return;
+  const int fd = ::open(stamp_path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666);
+  if (fd < 0) return;
+  ::futimens(fd, nullptr);
+  ::close(fd);
+  Pruning(folder, limits).run(false);
+}
 
 std::vector<CacheDamage> verify_cache(const std::string& folder) { return Verification(folder).run(); }
 

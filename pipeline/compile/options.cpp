@@ -5,7 +5,6 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "format/base/bounded_json.h"
 #include "format/base/text_bytes.h"
 #include "format/container/layout.h"
 #include "pipeline/about/source_fields.h"
@@ -14,22 +13,15 @@
 namespace texmesh {
 namespace {
 
-void check_proxies(const std::vector<int>& sizes, const std::string& source) {
-  if (sizes.size() > kMaxPackageProxies)
-    throw InputError(source, "proxies.sizes", "at most " + std::to_string(kMaxPackageProxies) + " sizes",
-                     std::to_string(sizes.size()));
-  for (std::size_t i = 1; i < sizes.size(); ++i)
-    if (sizes[i] <= sizes[i - 1])
-      throw InputError(source, "proxies.sizes", "strictly rising sizes",
-                       std::to_string(sizes[i - 1]) + " before " + std::to_string(sizes[i]));
-}
-
-void check_rungs(const std::vector<int>& rungs, const std::string& source, const char* name) {
-  if (rungs.size() > 16) throw InputError(source, name, "at most 16 qualities", std::to_string(rungs.size()));
-  for (std::size_t i = 1; i < rungs.size(); ++i)
-    if (rungs[i] <= rungs[i - 1])
-      throw InputError(source, name, "strictly rising qualities",
-                       std::to_string(rungs[i - 1]) + " before " + std::to_string(rungs[i]));
+void check_rising(const std::vector<int>& list, std::size_t most, const std::string& source, const char* name,
+                  const std::string& what) {
+  if (list.size() > most)
+    throw InputError(source, name, "at most " + std::to_string(most) + " " + what,
+                     std::to_string(list.size()));
+  const auto fall = std::ranges::adjacent_find(list, std::greater_equal<>());
+  if (fall != list.end())
+    throw InputError(source, name, "strictly rising " + what,
+                     std::to_string(fall[0]) + " before " + std::to_string(fall[1]));
 }
 
 void check_meta(const CompileOptions& o, const std::string& source) {
@@ -39,50 +31,6 @@ void check_meta(const CompileOptions& o, const std::string& source) {
   if (o.import.up != UpAxis::kKeep && !up.empty() && up != "y")
     throw InputError(source, "package.meta/upAxis", "y, as import.up has it, or no upAxis", up);
 }
-
-}  // namespace
-
-CompileOptions resolve_options(CompileOptions o) {
-  const auto is_default = [&](const char* path, const auto& value, const auto& fallback) {
-    return value == fallback && !o.set_by_user.contains(path);
-  };
-  if (o.ladder.mode == LadderMode::kProgressive &&
-      is_default("fragmentation.min_fragment_px", o.fragmentation.min_fragment_px,
-                 FragmentationOptions{}.min_fragment_px))
-    o.fragmentation.min_fragment_px = static_cast<int>(kLeastProgressiveSide);
-  if (o.fragmentation.fill == Fill::kNone &&
-      is_default("ladder.uncovered", o.ladder.uncovered, LadderOptions{}.uncovered))
-    o.ladder.uncovered = Uncovered::kKept;
-  if (!o.package.meta.empty()) o.package.meta = read_meta(o.package.meta, "package.meta");
-  const LadderOptions usual;
-  if (is_default("ladder.prune", o.ladder.prune, usual.prune))
-    o.ladder.prune = is_default("ladder.rungs", o.ladder.rungs, usual.rungs) &&
-                     is_default("ladder.normal_rungs", o.ladder.normal_rungs, usual.normal_rungs) &&
-                     is_default("ladder.data_rungs", o.ladder.data_rungs, usual.data_rungs) &&
-                     is_default("ladder.alpha_rungs", o.ladder.alpha_rungs, usual.alpha_rungs);
-  return o;
-}
-
-void check_options(const CompileOptions& o, const std::string& source) {
-  check_meta(o, source);
-  check_proxies(o.proxies.sizes, source);
-  check_rungs(o.ladder.rungs, source, "ladder.rungs");
-  check_rungs(o.ladder.normal_rungs, source, "ladder.normal_rungs");
-  check_rungs(o.ladder.data_rungs, source, "ladder.data_rungs");
-  check_rungs(o.ladder.alpha_rungs, source, "ladder.alpha_rungs");
-  if (o.lut.quality_min > o.lut.quality_max)
-    throw InputError(source, "lut.quality_min", "<= lut.quality_max (" + option_text(o.lut.quality_max) + ")",
-                     option_text(o.lut.quality_min));
-  if (o.lut.quality_fine < o.lut.quality_coarse)
-    throw InputError(source, "lut.quality_fine",
-                     ">= lut.quality_coarse (" + option_text(o.lut.quality_coarse) + ")",
-                     option_text(o.lut.quality_fine));
-  if (!(o.zim.weight_eta + o.zim.weight_z + o.zim.weight_i + o.zim.weight_m > 0))
-    throw InputError(source, "zim.weight_eta", "> 0, or weight_z, weight_i or weight_m > 0",
-                     option_text(o.zim.weight_eta));
-}
-
-namespace {
 
 template <class T>
 constexpr OptionKind kind_of() {
@@ -143,64 +91,7 @@ Json parse_text(const OptionField& field, const std::string& text) {
   return list;
 }
 
-}  // namespace
-
-std::vector<OptionField> list_options(CompileOptions& options) {
-  std::vector<OptionField> fields;
-  CompileOptions::sections(options, [&](const char* stage, auto& section) {
-    FieldCollector collect{stage, options.set_by_user, fields};
-    std::remove_reference_t<decltype(section)>::fields(section, collect);
-  });
-  return fields;
-}
-
-OptionField* find_option(std::vector<OptionField>& fields, std::string_view path) {
-  const auto it =
-      std::find_if(fields.begin(), fields.end(), [&](const OptionField& f) { return f.path() == path; });
-  return it == fields.end() ? nullptr : &*it;
-}
-
-Json option_json(const OptionField& field) {
-  Json json;
-  field.put(json);
-  return json;
-}
-
-std::string option_text(const OptionField& field) { return option_json(field).dump(); }
-
-void set_option_json(OptionField& field, const Json& json, const std::string& file,
-                     const std::string& place) {
-  field.get(json, RecordPlace{file, nullptr, place});
-  field.set_by_user->insert(field.path());
-}
-
-void set_option(OptionField& field, const std::string& text, const std::string& source) {
-  if (!is_utf8(text)) throw InputError(source, "", "UTF-8", readable_name(text));
-  set_option_json(field, parse_text(field, text), source, "");
-}
-
-Json option_schema(const OptionField& field) {
-  Json schema;
-  field.put_schema(schema);
-  schema["description"] = field.help;
-  schema["default"] = option_json(field);
-  return schema;
-}
-
-namespace {
-
 namespace fs = std::filesystem;
-
-Json parse_document(ByteSpan json, std::size_t most_bytes, int most_depth, const std::string& file) {
-  if (json.size() > most_bytes)
-    throw InputError(file, "", "at most " + std::to_string(most_bytes) + " bytes of JSON",
-                     std::to_string(json.size()));
-  try {
-    return parse_bounded_json(json, file, most_depth);
-  } catch (const FormatError& e) {
-    throw InputError(file, e.place(), e.expected(), e.found());
-  }
-}
 
 /// An experiment's result. Title and method are what people write down about it.
 struct JndProfile {
@@ -226,6 +117,79 @@ struct JndProfile {
 };
 
 }  // namespace
+
+CompileOptions resolve_options(CompileOptions o) {
+  const auto is_default = [&](const char* path, const auto& value, const auto& fallback) {
+    return value == fallback && !o.set_by_user.contains(path);
+  };
+  if (o.ladder.mode == LadderMode::kProgressive &&
+      is_default("fragmentation.min_fragment_px", o.fragmentation.min_fragment_px,
+                 FragmentationOptions{}.min_fragment_px))
+    o.fragmentation.min_fragment_px = static_cast<int>(kLeastProgressiveSide);
+  if (o.fragmentation.fill == Fill::kNone &&
+      is_default("ladder.uncovered", o.ladder.uncovered, LadderOptions{}.uncovered))
+    o.ladder.uncovered = Uncovered::kKept;
+  if (!o.package.meta.empty()) o.package.meta = read_meta(o.package.meta, "package.meta");
+  const LadderOptions usual;
+  if (is_default("ladder.prune", o.ladder.prune, usual.prune))
+    o.ladder.prune = is_default("ladder.rungs", o.ladder.rungs, usual.rungs) &&
+                     is_default("ladder.normal_rungs", o.ladder.normal_rungs, usual.normal_rungs) &&
+                     is_default("ladder.data_rungs", o.ladder.data_rungs, usual.data_rungs) &&
+                     is_default("ladder.alpha_rungs", o.ladder.alpha_rungs, usual.alpha_rungs);
+  return o;
+}
+
+void check_options(const CompileOptions& o, const std::string& source) {
+  check_meta(o, source);
+  check_rising(o.proxies.sizes, kMaxPackageProxies, source, "proxies.sizes", "sizes");
+  check_rising(o.ladder.rungs, 16, source, "ladder.rungs", "qualities");
+  check_rising(o.ladder.normal_rungs, 16, source, "ladder.normal_rungs", "qualities");
+  check_rising(o.ladder.data_rungs, 16, source, "ladder.data_rungs", "qualities");
+  check_rising(o.ladder.alpha_rungs, 16, source, "ladder.alpha_rungs", "qualities");
+  if (o.lut.quality_min > o.lut.quality_max)
+    throw InputError(source, "lut.quality_min", "<= lut.quality_max (" + option_text(o.lut.quality_max) + ")",
+                     option_text(o.lut.quality_min));
+  if (o.lut.quality_fine < o.lut.quality_coarse)
+    throw InputError(source, "lut.quality_fine",
+                     ">= lut.quality_coarse (" + option_text(o.lut.quality_coarse) + ")",
+                     option_text(o.lut.quality_fine));
+  if (!(o.zim.weight_eta + o.zim.weight_z + o.zim.weight_i + o.zim.weight_m > 0))
+    throw InputError(source, "zim.weight_eta", "> 0, or weight_z, weight_i or weight_m > 0",
+                     option_text(o.zim.weight_eta));
+}
+
+std::vector<OptionField> list_options(CompileOptions& options) {
+  std::vector<OptionField> fields;
+  CompileOptions::sections(options, [&](const char* stage, auto& section) {
+    FieldCollector collect{stage, options.set_by_user, fields};
+    std::remove_reference_t<decltype(section)>::fields(section, collect);
+  });
+  return fields;
+}
+
+OptionField* find_option(std::vector<OptionField>& fields, std::string_view path) {
+  const auto it = std::ranges::find(fields, path, &OptionField::path);
+  return it == fields.end() ? nullptr : &*it;
+}
+
+Json option_json(const OptionField& field) {
+  Json json;
+  field.put(json);
+  return json;
+}
+
+std::string option_text(const OptionField& field) { return option_json(field).dump(); }
+
+void set_option_json(OptionField& field, const Json& json, const std::string& file,
+                     const std::string& place) {
+  field.get(json, RecordPlace{file, nullptr, place});
+  field.set_by_user->insert(field.path());
+}
+
+void set_option(OptionField& field, const std::string& text, const std::string& source) {
+  if (!is_utf8(text)) throw InputError(source, "", "UTF-8", readable_name(text));
+  set_option_json(field, parse_text(field, text), source, "");
+}
 
 void read_profile(CompileOptions& options, const std::string& json, const std::string& file_name) {
   apply_profile(options, parse_document(text_bytes(json), 1 << 20, 16, file_name), file_name);
@@ -288,7 +252,10 @@ DocumentSchema profile_schema() {
     Json& section = sections[f.stage];
     if (section.is_null())
       section = Json{{"type", "object"}, {"additionalProperties", false}, {"properties", Json::object()}};
-    section["properties"][f.name] = option_schema(f);
+    Json& schema = section["properties"][f.name];
+    f.put_schema(schema);
+    schema["description"] = f.help;
+    schema["default"] = option_json(f);
   }
   Json properties{{"$schema", {{"type", "string"}}}, {"version", {{"const", 1}}}};
   for (auto& [stage, section] : sections.items()) properties[stage] = section;

@@ -105,9 +105,6 @@ void set_option_json(OptionField& field, const Json& json, const std::string& fi
 /// Sets a field from text as given on a command line ("20", "draco", "5,8,11"). InputError names the flag.
 void set_option(OptionField& field, const std::string& text, const std::string& source);
 
-/// What a schema says of a field: type, range, help, default.
-Json option_schema(const OptionField& field);
-
 /// The name of a part of `all`: "ssf" of a section, "ladder.mode" of a field. Throws std::logic_error for
 /// what is no part of it.
 template <class T>

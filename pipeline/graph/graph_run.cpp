@@ -37,8 +37,7 @@ std::vector<KeyChange> changes_between(const Key& before, const Key& after) {
   return changes;
 }
 
-}  // namespace
-
+/// Compares a stage's key with the key of an earlier run, whose parts the store remembers.
 StageExplanation explain_key(const Stage& stage, const Key& key, StageExplanation::Verdict verdict,
                              const StageKeys& earlier, Store& store) {
   StageExplanation e;
@@ -56,8 +55,6 @@ StageExplanation explain_key(const Stage& stage, const Key& key, StageExplanatio
   e.changes = changes_between(*before, key);
   return e;
 }
-
-namespace {
 
 // A stage's results in a store: one blob per output, and the stage's notes as the last blob. Blobs with the
 // right key and digests that are no results of the stage all the same are rejected.
@@ -549,24 +546,18 @@ void return_free_memory() {
 }  // namespace
 
 struct GraphRun::Parts {
-  Parts(const std::vector<Stage>& all, Store& store_of_results, const RunContext& run_context,
-        StageObserver observer)
-      : stages(all),
-        store(store_of_results),
-        context(run_context),
-        artefacts(all),
-        executor(all, artefacts, store_of_results, run_context, std::move(observer)) {}
   const std::vector<Stage>& stages;
   Store& store;
   const RunContext& context;
-  ArtefactTable artefacts;
-  StageExecutor executor;
+  StageObserver observer;
+  ArtefactTable artefacts{stages};
+  StageExecutor executor{stages, artefacts, store, context, std::move(observer)};
   bool has_run = false;
 };
 
 GraphRun::GraphRun(const std::vector<Stage>& stages, Store& store, const RunContext& context,
                    StageObserver observer)
-    : parts_(std::make_unique<Parts>(stages, store, context, std::move(observer))) {}
+    : parts_(new Parts{stages, store, context, std::move(observer)}) {}
 GraphRun::~GraphRun() = default;
 
 void GraphRun::give_object(const ArtefactName& artefact, Object object, const Sha256& digest,

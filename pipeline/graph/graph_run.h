@@ -43,10 +43,6 @@ struct StageExplanation {
 };
 using StageExplainer = std::function<void(const Stage& stage, const StageExplanation& explanation)>;
 
-/// Compares a stage's key with the key of an earlier run, whose parts the store remembers.
-StageExplanation explain_key(const Stage& stage, const Key& key, StageExplanation::Verdict verdict,
-                             const StageKeys& earlier, Store& store);
-
 /// Runs a graph of stages for one model over a store, once. Stages whose inputs are known run side by side,
 /// at most context.threads at a time. A stage whose key is in the store is not run, and its result is loaded
 /// only when another stage needs it. Objects are dropped after their last use. Of options the graph knows

@@ -3,7 +3,6 @@
 #include <typeindex>
 
 #include "format/base/archive.h"
-#include "format/base/bytes.h"
 #include "pipeline/io/record.h"
 #include "stages/base/run_context.h"
 

@@ -3,11 +3,8 @@
 #include <nlohmann/json.hpp>
 
 namespace texmesh {
-namespace {
-constexpr std::ptrdiff_t kConstructorParts = 3;
-}
 
-/// Adds kConstructorParts parts.
+/// added_parts() begins behind these three.
 Key::Key(std::string_view stage, int stage_version) {
   add("key schema", std::to_string(kKeySchema));
   add("stage", std::string(stage));
@@ -24,7 +21,7 @@ Key& Key::add_input(std::string_view role, const Sha256& digest, std::uint64_t b
 }
 
 std::vector<std::pair<std::string, std::string>> Key::added_parts() const {
-  return {parts_.begin() + kConstructorParts, parts_.end()};
+  return {parts_.begin() + 3, parts_.end()};
 }
 
 Sha256 Key::digest() const { return digest_of_parts(parts_); }

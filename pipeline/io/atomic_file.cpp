@@ -19,15 +19,6 @@ constexpr std::string_view kTemporaryMark = ".tmp-";
   throw ResourceError(path, "", "a writable file", std::string(step) + ": " + std::strerror(errno));
 }
 
-void sync_folder(const std::string& path) {
-  const std::string folder = std::filesystem::path(path).parent_path().string();
-  Descriptor d{::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)};
-  if (d.get() < 0 || ::fsync(d.get()) != 0) {
-    // Some file systems cannot sync folders; the rename itself stands.
-    if (errno != EINVAL && errno != ENOTSUP) fail(path, "fsync of the folder");
-  }
-}
-
 std::string own_temporary(const std::string& path) {
   static std::atomic<std::size_t> counter{0};
   return temporary_name(path, counter++);
@@ -98,7 +89,7 @@ void write_file_atomically(const std::string& path, ByteSpan bytes, const std::s
     ::unlink(temp.c_str());
     throw;
   }
-  sync_folder(path);
+  if (!sync_folder(folder_of_file(path))) fail(path, "fsync of the folder");
 }
 
 bool is_special_file(const std::string& path) {
@@ -117,8 +108,7 @@ void check_output_file(const std::string& path) {
   if (is_special_file(path) || std::filesystem::is_symlink(file, error)) return;
   if (std::filesystem::is_directory(file, error))
     throw InputError(path, "", "a file that can be written", "a folder");
-  const std::string folder = file.parent_path().string();
-  if (::access(folder.empty() ? "." : folder.c_str(), W_OK) != 0)
+  if (::access(folder_of_file(path).c_str(), W_OK) != 0)
     throw InputError(path, "", "a file that can be written", std::strerror(errno));
 }
 

@@ -1,32 +1,12 @@
 #pragma once
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 
-#include "format/base/bytes.h"
+#include "format/base/descriptor.h"
 #include "pipeline/io/record.h"
 
 namespace texmesh {
-
-/// An open file of the operating system, or none (-1). The destructor closes the file.
-class Descriptor {
- public:
-  explicit Descriptor(int fd = -1) : fd_(fd) {}
-  ~Descriptor() { reset(); }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  int get() const { return fd_; }
-  int release() { return std::exchange(fd_, -1); }
-  void reset(int fd = -1) {
-    if (fd_ >= 0) ::close(fd_);
-    fd_ = fd;
-  }
-
- private:
-  int fd_;
-};
 
 /// Writes all of it, in pieces that every system takes at once; false, with errno, where that fails.
 inline bool write_all(int fd, ByteSpan bytes) {
@@ -39,9 +19,12 @@ inline bool write_all(int fd, ByteSpan bytes) {
   }
   return true;
 }
-inline bool write_all(int fd, std::string_view text) {
-  return write_all(fd, {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
-}
+
+/// The folder that a file stands in; "." for a name alone.
+std::string folder_of_file(const std::string& path);
+/// False, with errno, where what a folder lists is not on the disk yet. Some file systems cannot sync
+/// folders; what was renamed in them stands all the same.
+bool sync_folder(const std::string& folder);
 
 /// What tells, without reading a file, that it has not changed: device, inode, size, and the times of the
 /// last change of content and of inode, in nanoseconds since 1970. Device is 0 where its number is that of a

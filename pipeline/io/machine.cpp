@@ -4,7 +4,6 @@
 #include <signal.h>
 
 #include <cctype>
-#include <charconv>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
@@ -13,6 +12,7 @@
 
 #include "format/base/text_bytes.h"
 #include "pipeline/io/file_stamp.h"
+#include "pipeline/io/uri.h"
 
 namespace texmesh {
 namespace {
@@ -23,13 +23,6 @@ std::pair<std::string, std::string> words_of(const std::string& path) {
   std::pair<std::string, std::string> words;
   in >> words.first >> words.second;
   return words;
-}
-
-std::optional<std::uint64_t> number_in(const std::string& text) {
-  std::uint64_t value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (text.empty() || error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  return value;  // "max" and "-1" are none
 }
 
 class Shares {
@@ -61,12 +54,12 @@ class Shares {
     for (;;) {
       if (path == "/") path.clear();
       const std::string folder = mount + path;
-      limit_memory(number_in(words_of(folder + "/memory.max").first));
-      limit_memory(number_in(words_of(folder + "/memory.limit_in_bytes").first));
+      limit_memory(whole_number<std::uint64_t>(words_of(folder + "/memory.max").first));
+      limit_memory(whole_number<std::uint64_t>(words_of(folder + "/memory.limit_in_bytes").first));
       const auto [quota, period] = words_of(folder + "/cpu.max");
-      limit_processors(number_in(quota), number_in(period));
-      limit_processors(number_in(words_of(folder + "/cpu.cfs_quota_us").first),
-                       number_in(words_of(folder + "/cpu.cfs_period_us").first));
+      limit_processors(whole_number<std::uint64_t>(quota), whole_number<std::uint64_t>(period));
+      limit_processors(whole_number<std::uint64_t>(words_of(folder + "/cpu.cfs_quota_us").first),
+                       whole_number<std::uint64_t>(words_of(folder + "/cpu.cfs_period_us").first));
       if (path.empty()) return;
       path.resize(std::min(path.rfind('/'), path.size() - 1));
     }
@@ -84,7 +77,7 @@ class Shares {
 
   std::optional<std::uint64_t> variable(const char* name) const {
     const char* text = view_.environment ? view_.environment(name) : nullptr;
-    return text ? number_in(text) : std::nullopt;
+    return text ? whole_number<std::uint64_t>(text) : std::nullopt;
   }
 
   void limit_memory(std::optional<std::uint64_t> bytes) {
@@ -101,26 +94,6 @@ class Shares {
   const MachineView& view_;
   MachineShare share_;
 };
-
-}  // namespace
-
-MachineView this_machine() {
-  MachineView view;
-  cpu_set_t set;
-  CPU_ZERO(&set);
-  view.processors = ::sched_getaffinity(0, sizeof set, &set) == 0
-                        ? CPU_COUNT(&set)
-                        : static_cast<int>(std::thread::hardware_concurrency());
-  const long pages = ::sysconf(_SC_PHYS_PAGES), page_bytes = ::sysconf(_SC_PAGE_SIZE);
-  if (pages > 0 && page_bytes > 0)
-    view.memory_bytes = static_cast<std::uint64_t>(pages) * static_cast<std::uint64_t>(page_bytes);
-  view.environment = [](const char* name) -> const char* { return std::getenv(name); };
-  return view;
-}
-
-MachineShare machine_share(const MachineView& view) { return Shares(view).find(); }
-
-namespace {
 
 constexpr std::size_t kMachineDigits = 12, kMostHostLetters = 16;
 constexpr std::int64_t kDay_ns = 86'400'000'000'000;
@@ -158,11 +131,9 @@ bool read_mark(std::string_view mark, MarkParts& parts) {
   const std::size_t first = mark.find('-'), second = mark.find('-', first + 1);
   if (first == 0 || first == std::string_view::npos || second == std::string_view::npos) return false;
   parts.machine = mark.substr(first + 1, second - first - 1);
-  const std::string_view pid = mark.substr(second + 1);
-  const auto [end, error] = std::from_chars(pid.data(), pid.data() + pid.size(), parts.pid);
+  parts.pid = whole_number<pid_t>(mark.substr(second + 1)).value_or(0);
   return parts.machine.size() == kMachineDigits &&
-         parts.machine.find_first_not_of("0123456789abcdef") == std::string_view::npos &&
-         error == std::errc() && end == pid.data() + pid.size() && parts.pid > 0;
+         parts.machine.find_first_not_of("0123456789abcdef") == std::string_view::npos && parts.pid > 0;
 }
 
 /// A process that has ended stays in the table until its parent asks, and some parents never do.
@@ -177,6 +148,22 @@ bool is_alive(pid_t pid) {
 }
 
 }  // namespace
+
+MachineView this_machine() {
+  MachineView view;
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  view.processors = ::sched_getaffinity(0, sizeof set, &set) == 0
+                        ? CPU_COUNT(&set)
+                        : static_cast<int>(std::thread::hardware_concurrency());
+  const long pages = ::sysconf(_SC_PHYS_PAGES), page_bytes = ::sysconf(_SC_PAGE_SIZE);
+  if (pages > 0 && page_bytes > 0)
+    view.memory_bytes = static_cast<std::uint64_t>(pages) * static_cast<std::uint64_t>(page_bytes);
+  view.environment = [](const char* name) -> const char* { return std::getenv(name); };
+  return view;
+}
+
+MachineShare machine_share(const MachineView& view) { return Shares(view).find(); }
 
 std::string owner_mark() {
   static const std::string host = host_letters();

@@ -50,6 +50,11 @@ int find_build_id(dl_phdr_info* program, std::size_t, void* out) {
   return 1;  // the first is the program; the others are its libraries
 }
 
+std::string webp_version() {  // its headers carry the version of the interface only
+  const int v = WebPGetEncoderVersion();
+  return std::to_string(v >> 16) + "." + std::to_string(v >> 8 & 255) + "." + std::to_string(v & 255);
+}
+
 }  // namespace
 
 void serve_workers() { serves_workers = true; }
@@ -71,13 +76,6 @@ std::string program_build() {
 
 #define TEXMESH_TEXT_(x) #x
 #define TEXMESH_TEXT(x) TEXMESH_TEXT_(x)
-
-namespace {
-std::string webp_version() {  // its headers carry the version of the interface only
-  const int v = WebPGetEncoderVersion();
-  return std::to_string(v >> 16) + "." + std::to_string(v >> 8 & 255) + "." + std::to_string(v & 255);
-}
-}  // namespace
 
 const std::map<std::string, std::string>& library_versions() {
   static const std::map<std::string, std::string> versions{

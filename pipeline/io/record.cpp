@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "format/base/bounded_json.h"
 #include "pipeline/io/uri.h"
 
 namespace texmesh {
@@ -235,6 +236,17 @@ void describe_schema(Json& member, const char* text) {
 }
 
 }  // namespace record_detail
+
+Json parse_document(ByteSpan json, std::size_t most_bytes, int most_depth, const std::string& file) {
+  if (json.size() > most_bytes)
+    throw InputError(file, "", fmt::format("at most {} bytes of JSON", most_bytes),
+                     std::to_string(json.size()));
+  try {
+    return parse_bounded_json(json, file, most_depth);
+  } catch (const FormatError& e) {
+    throw InputError(file, e.place(), e.expected(), e.found());
+  }
+}
 
 std::string json_line(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
 

@@ -6,6 +6,7 @@
 #include <optional>
 #include <type_traits>
 
+#include "format/base/bytes.h"
 #include "format/base/fields.h"
 #include "format/base/note.h"
 #include "format/base/sha256.h"
@@ -21,8 +22,7 @@ using Json = nlohmann::ordered_json;
 //     std::string file, place;
 //     std::uint64_t bytes = 0;
 //     std::optional<Shard> shard;
-//     template <class S, class V>
-//     static void fields(S& s, V&& v) {
+//     static void fields(auto& s, auto&& v) {
 //       v("version", Constant{1}, "");
 //       v("file", s.file, "as the run names the file");
 //       v("place", s.place, kMayMiss, "JSON pointer");
@@ -381,6 +381,10 @@ std::string to_json_with_lines(const T& record, const char* list, const std::vec
   }
   return out + "\n]}\n";
 }
+
+/// JSON from outside. InputError {file, byte, expected, found} for more than `most_bytes` of it, for what
+/// nests deeper than `most_depth`, and for what is no JSON.
+Json parse_document(ByteSpan json, std::size_t most_bytes, int most_depth, const std::string& file);
 
 /// A record of JSON from outside. InputError {file, JSON pointer, expected, found}; `refuse_others`: also for
 /// members that the description does not name.

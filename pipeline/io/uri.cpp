@@ -70,6 +70,21 @@ constexpr std::array<std::int8_t, 256> base64_values() {
   return v;
 }
 
+constexpr char kMark = 1;
+
+std::string escaped(std::string_view bytes) {
+  std::string out;
+  while (!bytes.empty()) {
+    const std::size_t n = utf8_character_bytes(bytes);
+    if (n == 0 || bytes[0] == kMark || bytes[0] == '\\')
+      out += fmt::format("\\x{:02x}", static_cast<std::uint8_t>(bytes[0]));
+    else
+      out += bytes.substr(0, n);
+    bytes.remove_prefix(n == 0 ? 1 : n);
+  }
+  return out;
+}
+
 }  // namespace
 
 void check_relative_name(std::string_view name, const std::string& file, const std::string& place) {
@@ -119,11 +134,8 @@ std::string percent_encoded(const std::string& path) {
 }
 
 bool is_data_uri(std::string_view uri) {
-  if (uri.size() < 5) return false;
-  for (std::size_t i = 0; i < 4; ++i) {
-    if ((uri[i] | 0x20) != "data"[i]) return false;
-  }
-  return uri[4] == ':';
+  return uri.size() > 4 && uri[4] == ':' &&
+         std::ranges::equal(uri.substr(0, 4), std::string_view("data"), {}, [](char c) { return c | 0x20; });
 }
 
 Bytes decode_data_uri(std::string_view uri, std::uint64_t max_bytes, const std::string& file,
@@ -165,29 +177,6 @@ Bytes decode_data_uri(std::string_view uri, std::uint64_t max_bytes, const std::
   return bytes;
 }
 
-namespace {
-
-constexpr char kMark = 1;
-
-std::string escaped(std::string_view bytes) {
-  std::string out;
-  while (!bytes.empty()) {
-    const std::size_t n = utf8_character_bytes(bytes);
-    if (n == 0 || bytes[0] == kMark || bytes[0] == '\\')
-      out += fmt::format("\\x{:02x}", static_cast<std::uint8_t>(bytes[0]));
-    else
-      out += bytes.substr(0, n);
-    bytes.remove_prefix(n == 0 ? 1 : n);
-  }
-  return out;
-}
-
-int lower_hex_digit(char c) {
-  return c >= '0' && c <= '9' ? c - '0' : c >= 'a' && c <= 'f' ? c - 'a' + 10 : -1;
-}
-
-}  // namespace
-
 std::size_t utf8_character_bytes(std::string_view s) {
   const auto at = [&](std::size_t i) {
     return i < s.size() ? static_cast<std::uint8_t>(s[i]) : std::uint8_t{0};
@@ -218,6 +207,14 @@ bool is_utf8(std::string_view bytes) {
   return true;
 }
 
+std::string lower_ending(std::string_view path) {
+  path.remove_prefix(path.rfind('/') + 1);
+  const std::size_t dot = path.rfind('.');
+  std::string extension(dot == 0 || dot == path.npos ? "" : path.substr(dot));
+  for (char& c : extension) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  return extension;
+}
+
 std::string to_wire(std::string_view bytes) {
   if (is_utf8(bytes) && (bytes.empty() || bytes[0] != kMark)) return std::string(bytes);
   return kMark + escaped(bytes);
@@ -227,8 +224,8 @@ std::string from_wire(std::string_view text) {
   if (text.empty() || text[0] != kMark) return std::string(text);
   std::string out;
   for (std::size_t i = 1; i < text.size(); ++i) {
-    const int high = i + 3 < text.size() ? lower_hex_digit(text[i + 2]) : -1,
-              low = i + 3 < text.size() ? lower_hex_digit(text[i + 3]) : -1;
+    const int high = i + 3 < text.size() ? hex_digit(text[i + 2]) : -1,
+              low = i + 3 < text.size() ? hex_digit(text[i + 3]) : -1;
     if (text[i] == '\\' && text[i + 1] == 'x' && high >= 0 && low >= 0) {
       out += static_cast<char>(16 * high + low);
       i += 3;

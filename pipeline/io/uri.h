@@ -1,5 +1,7 @@
 #pragma once
+#include <charconv>
 #include <cstddef>
+#include <optional>
 
 #include "format/base/bytes.h"
 
@@ -32,6 +34,17 @@ bool is_data_uri(std::string_view uri);
 /// hostile file must not mean two things. Throws InputError, also for more than max_bytes.
 Bytes decode_data_uri(std::string_view uri, std::uint64_t max_bytes, const std::string& file,
                       const std::string& place);
+
+/// The number that a text is and nothing besides.
+template <class T>
+std::optional<T> whole_number(std::string_view text) {
+  T value{};
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return error == std::errc() && end == text.data() + text.size() ? std::optional(value) : std::nullopt;
+}
+
+/// ".glb" of "a/Bust.GLB"; "" of a name without an extension, or that begins with its only dot.
+std::string lower_ending(std::string_view path);
 
 // File names are bytes, JSON is UTF-8. What is no UTF-8 goes through JSON as U+0001 and the bytes with those
 // that are none, U+0001 and backslashes as \xHH; everything else goes as it is.

@@ -45,8 +45,8 @@ void join(FragmentOffer& all, const FragmentOffer& one) {
 /// The upgrades that are left, asked for in order with a few requests in flight.
 class UpgradeSource final : public RequestSource {
  public:
-  using Parts = std::function<std::vector<PackagePart>(std::uint32_t, std::int32_t)>;
-  using Accept = std::function<bool(std::uint32_t, std::int32_t, const Transport::Outcome&)>;
+  using Parts = PlanSource::Parts;
+  using Accept = PlanSource::Accept;
   UpgradeSource(std::vector<Upgrade> upgrades, std::size_t offers, std::uint64_t bytes, int window,
                 Parts parts, Accept accept)
       : upgrades_(std::move(upgrades)),

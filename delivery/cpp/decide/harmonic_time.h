@@ -216,7 +216,6 @@ class HarmonicTimePlan {
   double credit_at(std::size_t position) const;
   std::uint32_t choose_offer(double credit) const;
   void remove_from_list(std::uint32_t offer);
-  double theta_of(std::uint32_t offer) const;
   std::size_t lowest(const FragmentOffer& offer, bool limits) const;
   HtcStep& issued(std::uint32_t offer);
   void finish(HtcStep& step, double now_s, bool sample);

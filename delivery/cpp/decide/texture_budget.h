@@ -8,15 +8,8 @@ namespace texmesh {
 // What choices take on the GPU, and which choices fit: known from manifest and textures.json before a mesh or
 // a fragment is asked for. The browser client counts and chooses the same (decide/memory).
 
-/// How texels are stored: RGBA of 8 bits, or blocks of 4 x 4 texels.
-enum class GpuTexels : std::uint8_t {
-  kRgba8,
-  kBlock8,  // 8 bytes a block: BC1, ETC2 of three channels
-  kBlock16  // 16 bytes a block: BC3, BC7, ETC2 of four channels, ASTC 4x4
-};
-/// Of a texture with all its mip levels, down to one texel.
-std::uint64_t gpu_texture_bytes(std::uint32_t width_px, std::uint32_t height_px,
-                                GpuTexels texels = GpuTexels::kRgba8);
+/// Of a texture with all its mip levels, down to one texel, as RGBA of 8 bits.
+std::uint64_t gpu_texture_bytes(std::uint32_t width_px, std::uint32_t height_px);
 
 /// Most bytes of a scale's vertex and index buffers: position, normal, texture coordinates and tangent as
 /// 32-bit floats, indices of 32 bits. The browser keeps as many in main memory.
@@ -60,7 +53,7 @@ struct TextureBudget {
 /// QualityTable::exponent says, so the groups' weights become those of that sum's slope where the bytes were
 /// spent, and the bytes are spent again; the better choice stays. FragmentList::group_weights has its
 /// weights.
-TextureBudget texture_for_budget(PackageReader& package, const ListOptions& options, std::uint64_t bytes);
+///
 /// `loss` is for options.displayed_px. Where the planes take more than `memory_bytes` on the GPU, coarser
 /// mips take their places (planes_within), and the bytes are spent on these.
 TextureBudget texture_for_budget(TextureLoss& loss, const ListOptions& options, std::uint64_t bytes,

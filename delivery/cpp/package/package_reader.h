@@ -92,7 +92,8 @@ class PackageReader {
   Bytes complete_fragment(std::uint32_t plane, std::uint32_t rung, std::uint32_t fragment);
 
  private:
-  Bytes read_all(const EntryRef& ref);
+  [[noreturn]] void refuse(const char* rule, const std::string& place, const std::string& expected,
+                           const std::string& found) const;
   Bytes read_paged(const PagedRef& ref);
   void require_head(const PagedRef& ref, std::uint64_t head_bytes) const;
   void require_minor(const std::string& path, int minor) const;
@@ -116,5 +117,29 @@ class PackageReader {
 
 /// The step function: the scale to show an object at that is `displayed_px` pixels high on screen.
 int select_scale(const Manifest& manifest, double displayed_px);
+
+/// The streams of one plane while its packs are gone through. Keeps lower packs only where the codec's upper
+/// rungs need them. Sizes are checked; contents are not.
+class PlaneStreams {
+ public:
+  /// `table_pack`: the table streams of all rungs. FormatError when it has another size than the tables say.
+  PlaneStreams(Codec codec, const PlaneTables& tables, Bytes table_pack);
+  /// A rung's pack; with an incremental codec from the lowest rung upwards. FormatError when it has another
+  /// size than the tables say or is not the next one.
+  void add_pack(std::size_t rung, Bytes pack);
+  /// Of the rung added last: the rung's own stream of a fragment (empty: not stored), and the complete file.
+  ByteSpan stream(std::size_t fragment) const;
+  Bytes file(std::size_t fragment) const;
+  ByteSpan table_stream(std::size_t rung) const;
+
+ private:
+  ByteSpan stream(std::size_t rung, std::size_t fragment) const;
+  Codec codec_;
+  const PlaneTables& tables_;
+  Bytes table_pack_;
+  std::size_t rung_ = 0;                             // the one added last
+  std::vector<Bytes> packs_;                         // [rung]; empty where not needed
+  std::vector<std::vector<std::uint64_t>> offsets_;  // [rung][fragment]
+};
 
 }  // namespace texmesh

@@ -42,6 +42,101 @@ void share_evenly(double capacity, const std::vector<double>& caps, std::vector<
   }
 }
 
+double loss_of(const FragmentOffer& f, std::int32_t rung) {
+  return f.loss[static_cast<std::size_t>(rung + 1)];
+}
+
+std::int32_t nearest_rung_to(const FragmentOffer& f, double bytes) {
+  std::int32_t best = 0;
+  for (std::size_t r = 1; r < f.bytes.size(); ++r)
+    if (std::abs(f.bytes[r] - bytes) < std::abs(f.bytes[static_cast<std::size_t>(best)] - bytes))
+      best = static_cast<std::int32_t>(r);
+  return best;
+}
+
+constexpr double kNotInTime = std::numeric_limits<double>::infinity();
+constexpr double kFoundDead_s = 0.5;  // what transfer() waits for an answer at least
+
+/// A model of a network as a transport.
+class ModelTransport final : public Transport {
+ public:
+  explicit ModelTransport(const NetworkOptions& network) : model_(network), mirrors_(network.mirrors) {}
+  std::size_t mirrors() const override { return mirrors_.size(); }
+  double now_s() override { return model_.now_s(); }
+  void start(const TransferRequest& request, std::uint32_t mirror) override {
+    Part& part = parts_[request.number];
+    if (part.left <= 0)
+      part = {static_cast<double>(request.bytes), static_cast<double>(request.bytes), mirror};
+    part.mirror = mirror;
+    model_.request(request.number, mirror, part.left);
+  }
+  void forget(std::uint32_t number) override {
+    model_.cancel(number);
+    parts_.erase(number);
+  }
+  void cancel(std::uint32_t number) override {
+    if (const auto left = model_.bytes_left(number)) parts_[number].left = *left;
+    model_.cancel(number);
+  }
+  double received(std::uint32_t number) override {
+    const auto part = parts_.find(number);
+    if (part == parts_.end()) return 0;
+    return part->second.bytes - model_.bytes_left(number).value_or(part->second.left);
+  }
+  std::optional<Outcome> wait(double until_s) override {
+    const auto arrival = model_.advance(until_s);
+    if (!arrival) return std::nullopt;
+    Outcome outcome{arrival->request, arrival->time_s, true, {}, {}, 0, false};
+    const auto part = parts_.find(arrival->request);
+    if (mirrors_[part->second.mirror].lies_from_s <= arrival->time_s) {
+      outcome.good = false;
+      outcome.lied = true;
+      outcome.problem = "bytes of another digest";
+    }
+    parts_.erase(part);
+    return outcome;
+  }
+  void move_to(double time_s) {
+    while (model_.now_s() < time_s) model_.advance(time_s);
+  }
+
+ private:
+  struct Part {
+    double bytes = 0, left = 0;
+    std::uint32_t mirror = 0;
+  };
+  NetworkModel model_;
+  std::vector<MirrorModel> mirrors_;
+  std::map<std::uint32_t, Part> parts_;  // by request, of what is still to come
+};
+
+/// One request and nothing more.
+class OneRequest final : public RequestSource {
+ public:
+  explicit OneRequest(std::uint64_t bytes) : bytes_(bytes) {}
+  std::optional<TransferRequest> next(double) override {
+    if (std::exchange(asked_, true)) return std::nullopt;
+    return TransferRequest{0, bytes_, {}};
+  }
+  bool arrived(const Transport::Outcome&) override { return ended_ = true; }
+  void failed(std::uint32_t, double) override { ended_ = true; }
+  bool finished() const override { return ended_; }
+
+ private:
+  std::uint64_t bytes_;
+  bool asked_ = false, ended_ = false;
+};
+
+BandwidthTrace trace_from(const BandwidthTrace& trace, double by_s) {
+  BandwidthTrace out{{0}, {trace.at(by_s)}};
+  for (std::size_t i = 0; i < trace.time_s.size(); ++i)
+    if (trace.time_s[i] > by_s) {
+      out.time_s.push_back(trace.time_s[i] - by_s);
+      out.bytes_s.push_back(trace.bytes_s[i]);
+    }
+  return out;
+}
+
 }  // namespace
 
 BandwidthTrace BandwidthTrace::constant(double bytes_s) { return {{0}, {bytes_s}}; }
@@ -70,23 +165,18 @@ BandwidthTrace read_trace_csv(std::string_view text, const std::string& name) {
     std::string_view line = text.substr(0, end);
     text.remove_prefix(std::min(end + 1, text.size()));
     ++line_number;
-    while (!line.empty() && (line.back() == '\r' || line.back() == ' ')) line.remove_suffix(1);
-    while (!line.empty() && line.front() == ' ') line.remove_prefix(1);
+    line.remove_suffix(line.size() - (line.find_last_not_of("\r ") + 1));
+    line.remove_prefix(std::min(line.find_first_not_of(' '), line.size()));
     if (line.empty() || line.front() == '#') continue;
     const std::string place = "line " + std::to_string(line_number);
     double t = 0, rate = 0;
     const auto first = std::from_chars(line.data(), line.data() + line.size(), t);
     std::string_view rest(first.ptr, static_cast<std::size_t>(line.data() + line.size() - first.ptr));
-    while (!rest.empty() && (rest.front() == ',' || rest.front() == ' ' || rest.front() == ';'))
-      rest.remove_prefix(1);
+    rest.remove_prefix(std::min(rest.find_first_not_of(", ;"), rest.size()));
     const auto second = std::from_chars(rest.data(), rest.data() + rest.size(), rate);
     const bool numbers =
         first.ec == std::errc() && second.ec == std::errc() && second.ptr == rest.data() + rest.size();
-    if (!numbers && heading_allowed) {
-      heading_allowed = false;
-      continue;
-    }
-    heading_allowed = false;
+    if (std::exchange(heading_allowed, false) && !numbers) continue;
     if (!numbers || !(t >= 0 && t <= 1e9) || !(rate >= 0 && rate <= 1e15))
       throw InputError(name, place, "seconds,bytes per second", std::string(line.substr(0, 60)));
     if (trace.time_s.empty() ? t != 0 : t <= trace.time_s.back())
@@ -222,7 +312,6 @@ void NetworkModel::move_to(double time_s) {
     const double moved = f.rate * seconds;
     f.bytes_left -= moved;
     f.next_loss -= moved;
-    bytes_moved_ += moved;
     if (f.starts_s >= kNever) continue;
     Connection& c = connections_[f.mirror][f.connection];
     if (f.next_loss <= kDone && f.bytes_left > kDone) {
@@ -266,22 +355,6 @@ double NetworkModel::random() {
   return (static_cast<double>((random_state_ * 0x2545f4914f6cdd1dull) >> 11) + 1.0) / 9007199254740992.0;
 }
 
-namespace {
-
-double loss_of(const FragmentOffer& f, std::int32_t rung) {
-  return f.loss[static_cast<std::size_t>(rung + 1)];
-}
-
-std::int32_t nearest_rung_to(const FragmentOffer& f, double bytes) {
-  std::int32_t best = 0;
-  for (std::size_t r = 1; r < f.bytes.size(); ++r)
-    if (std::abs(f.bytes[r] - bytes) < std::abs(f.bytes[static_cast<std::size_t>(best)] - bytes))
-      best = static_cast<std::int32_t>(r);
-  return best;
-}
-
-}  // namespace
-
 SimulationResult result_of(const HarmonicTimePlan& plan, double limit_s, double end_s) {
   SimulationResult r;
   r.time_limit_s = limit_s;
@@ -304,83 +377,6 @@ SimulationResult result_of(const HarmonicTimePlan& plan, double limit_s, double 
   return r;
 }
 
-namespace {
-
-constexpr double kNotInTime = std::numeric_limits<double>::infinity();
-constexpr double kFoundDead_s = 0.5;  // what transfer() waits for an answer at least
-
-/// A model of a network as a transport.
-class ModelTransport final : public Transport {
- public:
-  explicit ModelTransport(const NetworkOptions& network) : model_(network), mirrors_(network.mirrors) {}
-  std::size_t mirrors() const override { return mirrors_.size(); }
-  double now_s() override { return model_.now_s(); }
-  void start(const TransferRequest& request, std::uint32_t mirror) override {
-    Part& part = parts_[request.number];
-    if (part.left <= 0)
-      part = {static_cast<double>(request.bytes), static_cast<double>(request.bytes), mirror};
-    part.mirror = mirror;
-    model_.request(request.number, mirror, part.left);
-  }
-  void forget(std::uint32_t number) override {
-    model_.cancel(number);
-    parts_.erase(number);
-  }
-  void cancel(std::uint32_t number) override {
-    if (const auto left = model_.bytes_left(number)) parts_[number].left = *left;
-    model_.cancel(number);
-  }
-  double received(std::uint32_t number) override {
-    const auto part = parts_.find(number);
-    if (part == parts_.end()) return 0;
-    return part->second.bytes - model_.bytes_left(number).value_or(part->second.left);
-  }
-  std::optional<Outcome> wait(double until_s) override {
-    const auto arrival = model_.advance(until_s);
-    if (!arrival) return std::nullopt;
-    Outcome outcome{arrival->request, arrival->time_s, true, {}, {}, 0, false};
-    const auto part = parts_.find(arrival->request);
-    if (mirrors_[part->second.mirror].lies_from_s <= arrival->time_s) {
-      outcome.good = false;
-      outcome.lied = true;
-      outcome.problem = "bytes of another digest";
-    }
-    parts_.erase(part);
-    return outcome;
-  }
-  void move_to(double time_s) {
-    while (model_.now_s() < time_s) model_.advance(time_s);
-  }
-
- private:
-  struct Part {
-    double bytes = 0, left = 0;
-    std::uint32_t mirror = 0;
-  };
-  NetworkModel model_;
-  std::vector<MirrorModel> mirrors_;
-  std::map<std::uint32_t, Part> parts_;  // by request, of what is still to come
-};
-
-/// One request and nothing more.
-class OneRequest final : public RequestSource {
- public:
-  explicit OneRequest(std::uint64_t bytes) : bytes_(bytes) {}
-  std::optional<TransferRequest> next(double) override {
-    if (std::exchange(asked_, true)) return std::nullopt;
-    return TransferRequest{0, bytes_, {}};
-  }
-  bool arrived(const Transport::Outcome&) override { return ended_ = true; }
-  void failed(std::uint32_t, double) override { ended_ = true; }
-  bool finished() const override { return ended_; }
-
- private:
-  std::uint64_t bytes_;
-  bool asked_ = false, ended_ = false;
-};
-
-}  // namespace
-
 SimulationResult simulate(std::vector<FragmentOffer> offers, const HtcOptions& options,
                           const NetworkOptions& network, const TransportAround& around) {
   HarmonicTimePlan plan(std::move(offers), options);
@@ -401,20 +397,6 @@ NetworkOptions without_dead_mirrors(NetworkOptions network, double now_s) {
   if (!std::ranges::all_of(network.mirrors, dead)) std::erase_if(network.mirrors, dead);
   return network;
 }
-
-namespace {
-
-BandwidthTrace trace_from(const BandwidthTrace& trace, double by_s) {
-  BandwidthTrace out{{0}, {trace.at(by_s)}};
-  for (std::size_t i = 0; i < trace.time_s.size(); ++i)
-    if (trace.time_s[i] > by_s) {
-      out.time_s.push_back(trace.time_s[i] - by_s);
-      out.bytes_s.push_back(trace.bytes_s[i]);
-    }
-  return out;
-}
-
-}  // namespace
 
 NetworkOptions network_from(NetworkOptions network, double by_s) {
   network.link = trace_from(network.link, by_s);

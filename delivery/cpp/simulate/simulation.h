@@ -54,7 +54,6 @@ class NetworkModel {
   /// Runs until a request is complete or the time comes, whichever is first. Nothing, and no time passes,
   /// when all that is under way was asked of dead mirrors and `until_s` is 1e9 or more.
   std::optional<Arrival> advance(double until_s);
-  double bytes_moved() const { return bytes_moved_; }
 
  private:
   struct Flow {
@@ -81,7 +80,7 @@ class NetworkModel {
   NetworkOptions options_;
   std::vector<std::vector<Connection>> connections_;  // [mirror]
   std::vector<Flow> flows_;                           // by order of request
-  double now_s_ = 0, bytes_moved_ = 0;
+  double now_s_ = 0;
   std::uint64_t random_state_;
 };
 

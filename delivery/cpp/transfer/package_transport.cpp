@@ -39,7 +39,7 @@ class HttpTransport final : public Transport {
       return;
     }
     Open& open = open_[request.number];
-    if (!same(open.wanted, request.parts)) {  // another request of the same number
+    if (open.wanted != request.parts) {  // another request of the same number
       open = {};
       open.wanted = request.parts;
       open.parts.resize(request.parts.size());
@@ -129,11 +129,6 @@ class HttpTransport final : public Transport {
   };
   static std::uint64_t number_of(std::uint32_t request, std::uint32_t part) {
     return static_cast<std::uint64_t>(request) * kMaxParts + part;
-  }
-  static bool same(const std::vector<PackagePart>& a, const std::vector<PackagePart>& b) {
-    return std::ranges::equal(a, b, [](const PackagePart& x, const PackagePart& y) {
-      return x.entry == y.entry && x.range == y.range;
-    });
   }
   /// Ends what is under way and keeps what it has brought.
   void stop(std::uint32_t number) {

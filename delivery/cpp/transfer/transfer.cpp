@@ -59,9 +59,10 @@ class Mirrors {
     mirrors_[m].share.dropped = why;
     revive();
   }
-  bool another_is_alive(std::uint32_t but) const {
+  /// `that_delivers`: that has shown that it does.
+  bool another_is_alive(std::uint32_t but, bool that_delivers = false) const {
     for (std::size_t m = 0; m < mirrors_.size(); ++m)
-      if (m != but && mirrors_[m].alive) return true;
+      if (m != but && mirrors_[m].alive && (mirrors_[m].has_delivered || !that_delivers)) return true;
     return false;
   }
   std::vector<MirrorShare> shares() const {
@@ -77,12 +78,6 @@ class Mirrors {
     Mirror& mirror = mirrors_[m];
     const double growing_s = kFirstPause_s * static_cast<double>(1 << std::min(mirror.failures++, 6));
     mirror.ready_s = std::max(mirror.ready_s, now_s + std::min(kMostPause_s, std::max(wait_s, growing_s)));
-  }
-  /// Another one that has shown that it delivers.
-  bool another_delivers(std::uint32_t but) const {
-    for (std::size_t m = 0; m < mirrors_.size(); ++m)
-      if (m != but && mirrors_[m].alive && mirrors_[m].has_delivered) return true;
-    return false;
   }
 
  private:
@@ -138,15 +133,11 @@ class TransferRun {
         mirrors_(transport.mirrors(), options.initial_bytes_s) {}
 
   TransferEnd run() {
-    TransferEnd end = run_to_end();
-    end.mirrors = mirrors_.shares();
-    return end;
-  }
-
- private:
-  TransferEnd run_to_end() {
     while (!source_.finished()) {
-      if (over()) return stop();
+      if (over()) {
+        stop();
+        break;
+      }
       start_waiting();
       while (auto request = source_.next(transport_.now_s())) ask({std::move(*request)}, {});
       if (source_.finished()) break;
@@ -160,19 +151,21 @@ class TransferRun {
       else
         ask_late_ones_elsewhere();
     }
+    end_.mirrors = mirrors_.shares();
     return end_;
   }
+
+ private:
   bool over() {
     end_.cancelled = options_.cancelled && options_.cancelled();
     end_.out_of_time = transport_.now_s() > options_.until_s;
     return end_.cancelled || end_.out_of_time;
   }
-  TransferEnd stop() {
+  void stop() {
     for (const auto& [number, a] : asked_) transport_.cancel(number);
     end_.unfinished = static_cast<std::uint32_t>(asked_.size() + waiting_.size());
     for (const auto& [number, a] : asked_) source_.failed(number, transport_.now_s());
     for (const Asked& a : waiting_) source_.failed(a.request.number, transport_.now_s());
-    return end_;
   }
   /// No server will ever answer.
   void give_up_all() {
@@ -311,7 +304,7 @@ class TransferRun {
       if (a.at_s + a.patience_s > transport_.now_s()) continue;
       // Slow, but nobody is known to be faster.
       const double received = transport_.received(number);
-      if (received > a.received && !mirrors_.another_delivers(a.mirror)) {
+      if (received > a.received && !mirrors_.another_is_alive(a.mirror, true)) {
         a.received = received;
         a.at_s = transport_.now_s();
         continue;

@@ -10,6 +10,7 @@ namespace texmesh {
 struct PackagePart {
   EntryRef entry;
   ByteRange range;  // within the entry
+  friend bool operator==(const PackagePart&, const PackagePart&) = default;
 };
 
 /// One request. The asker chooses the number, which comes back with the outcome.
@@ -96,8 +97,7 @@ struct TransferEnd {
 /// - A mirror that lacks an entry is not asked for that entry again; a package may be spread over mirrors of
 ///   which none has all of it.
 /// - A mirror that lies (bytes of another digest) is dropped, and all that it still owes goes to others. It
-/// is
-///   asked again only where there is no other.
+///   is asked again only where there is no other.
 /// - A request is late when it is not there after four times the expected time (at least 8 round trips and
 ///   half a second) while another mirror delivers. It goes to another mirror. A mirror that has brought
 ///   nothing of it is left alone as long as another answers; one that has brought a part is slower than was

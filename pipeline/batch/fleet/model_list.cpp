@@ -35,9 +35,7 @@ class NamedFiles {
   explicit NamedFiles(const std::string& model) : model_(model), folder_(fs::path(model).parent_path()) {}
 
   std::vector<std::string> find() {
-    std::string ending = fs::path(model_).extension().string();
-    std::transform(ending.begin(), ending.end(), ending.begin(),
-                   [](unsigned char c) { return std::tolower(c); });
+    const std::string ending = lower_ending(model_);
     if (ending == ".gltf") look_at_gltf(bytes_at(model_, 0, kMostJsonBytes));
     if (ending == ".glb") look_at_glb();
     if (ending == ".obj") look_at_obj();
@@ -129,12 +127,6 @@ class NamedFiles {
   fs::path folder_;
   std::set<std::string> found_;
 };
-
-std::uint64_t bytes_of_file(const std::string& path) {
-  std::error_code ec;
-  const auto bytes = fs::file_size(path, ec);
-  return ec ? 0 : bytes;
-}
 
 }  // namespace
 

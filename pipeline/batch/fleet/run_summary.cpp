@@ -18,9 +18,121 @@ std::string time_attribute(const std::optional<double>& seconds) {
   return seconds ? fmt::format(" time=\"{:.3f}\"", *seconds) : "";
 }
 
-std::string attribute(const char* name, const std::string& value) {
-  return value.empty() ? "" : fmt::format(" {}=\"{}\"", name, markup_escaped(value));
+void check_shard(const std::optional<Shard>& shard, const std::string& file) {
+  if (shard && shard->index >= shard->count)
+    throw InputError(file, "/shard", "index below count", std::to_string(shard->index));
 }
+
+constexpr std::uint64_t kMostSummaryBytes = 1ull << 32;
+
+/// The collection and number of shards that most files are of; of equally many the first file's.
+struct Split {
+  std::string collection;
+  int shards = 1;
+};
+
+Split usual_split(const std::vector<SummaryFile>& files) {
+  std::map<std::string, std::size_t> votes;
+  for (const SummaryFile& f : files)
+    if (f.summary && f.summary->shard) ++votes[f.summary->collection];
+  Split split;
+  std::size_t most = 0;
+  for (const SummaryFile& f : files)
+    if (f.summary && f.summary->shard && votes[f.summary->collection] > most) {
+      most = votes[f.summary->collection];
+      split = {f.summary->collection, f.summary->shard->count};
+    }
+  return split;
+}
+
+std::string shard_text(const Shard& s) {
+  return "shard " + std::to_string(s.index) + " of " + std::to_string(s.count);
+}
+
+/// "0, 3-5"
+std::string ranges_text(const std::vector<int>& numbers) {
+  std::string text;
+  for (std::size_t i = 0; i < numbers.size();) {
+    std::size_t end = i;
+    while (end + 1 < numbers.size() && numbers[end + 1] == numbers[end] + 1) ++end;
+    text += (text.empty() ? "" : ", ") + std::to_string(numbers[i]);
+    if (end > i) text += "-" + std::to_string(numbers[end]);
+    i = end + 1;
+  }
+  return text;
+}
+
+class Merger {
+ public:
+  explicit Merger(std::vector<SummaryFile> files) : files_(std::move(files)), split_(usual_split(files_)) {}
+
+  RunSummary merge() {
+    for (SummaryFile& f : files_) {
+      if (!f.summary)
+        merged_.problems.push_back({f.file, f.kind, f.text});
+      else if (is_foreign(*f.summary))
+        merged_.problems.push_back({f.file, "foreign",
+                                    shard_text(*f.summary->shard) +
+                                        " of another collection, or of this one before its files changed"});
+      else
+        add(f.file, *f.summary);
+      f.summary.reset();  // a million models stand in memory once
+    }
+    name_missing();
+    for (auto& [package, found] : models_) merged_.models.push_back(std::move(found.model));
+    merged_.counts = count_results(merged_.models);
+    return std::move(merged_);
+  }
+
+ private:
+  struct Found {
+    ModelSummary model;
+    std::string file;
+  };
+
+  bool is_foreign(const RunSummary& s) const {
+    return s.shard && (s.collection != split_.collection || s.shard->count != split_.shards);
+  }
+
+  void add(const std::string& file, RunSummary& s) {
+    const std::size_t models = s.models.size();
+    std::map<std::string, std::size_t> doubles;  // by the file that had them first
+    for (ModelSummary& m : s.models) {
+      const auto [at, is_new] = models_.try_emplace(m.package);
+      if (is_new)
+        at->second.file = file;
+      else
+        ++doubles[at->second.file];
+      if (is_new || m.result < at->second.model.result) at->second.model = std::move(m);
+    }
+    for (const auto& [other, count] : doubles)
+      merged_.problems.push_back(
+          {file, "double", std::to_string(count) + " of its packages are those of " + other});
+    merged_.seconds += s.seconds;
+    if (s.shard) seen_.insert(s.shard->index);
+    if (s.parts.empty())
+      merged_.parts.push_back({file, s.shard, models, s.seconds});
+    else
+      merged_.parts.insert(merged_.parts.end(), s.parts.begin(), s.parts.end());
+  }
+
+  void name_missing() {
+    if (seen_.empty()) return;
+    std::vector<int> missing;
+    for (int i = 0; i < split_.shards; ++i)
+      if (!seen_.contains(i)) missing.push_back(i);
+    if (!missing.empty())
+      merged_.problems.push_back(
+          {"", "missing",
+           "no summary of shards " + ranges_text(missing) + " of " + std::to_string(split_.shards)});
+  }
+
+  std::vector<SummaryFile> files_;
+  Split split_;
+  RunSummary merged_;
+  std::map<std::string, Found> models_;  // by package
+  std::set<int> seen_;
+};
 
 }  // namespace
 
@@ -41,8 +153,10 @@ void JunitReport::add(const JunitCase& c) {
   if (!c.skipped.empty())
     body += fmt::format("<skipped message=\"{}\"/>\n", markup_escaped(c.skipped));
   else if (!c.failure.empty() || !c.failure_type.empty())
-    body += fmt::format("<failure{} message=\"{}\"/>\n", attribute("type", c.failure_type),
-                        markup_escaped(c.failure));
+    body +=
+        fmt::format("<failure{} message=\"{}\"/>\n",
+                    c.failure_type.empty() ? "" : fmt::format(" type=\"{}\"", markup_escaped(c.failure_type)),
+                    markup_escaped(c.failure));
   text_ += fmt::format("<testcase classname=\"{}\" name=\"{}\"{}", markup_escaped(c.class_name),
                        markup_escaped(c.name), time_attribute(c.seconds));
   text_ += body.empty() ? "/>\n" : ">" + body + "</testcase>\n";
@@ -79,15 +193,6 @@ RunSummary summarize_run(const BatchPlan& plan, const std::vector<WorkerReport>&
 }
 
 std::string write_summary(const RunSummary& s) { return to_json_with_lines(s, "models", s.models); }
-
-namespace {
-
-void check_shard(const std::optional<Shard>& shard, const std::string& file) {
-  if (shard && shard->index >= shard->count)
-    throw InputError(file, "/shard", "index below count", std::to_string(shard->index));
-}
-
-}  // namespace
 
 RunSummary read_summary(ByteSpan bytes, const std::string& file) {
   RunSummary s = from_json<RunSummary>(parse_bounded_json(bytes, file, 8), file);
@@ -153,138 +258,6 @@ int graver_exit_code(int a, int b) {
     if (a == code || b == code) return code;
   return kExitOk;
 }
-
-namespace {
-
-constexpr std::uint64_t kMostSummaryBytes = 1ull << 32;
-
-/// The collection and number of shards that most files are of; of equally many the first file's.
-struct Split {
-  std::string collection;
-  int shards = 1;
-};
-
-Split usual_split(const std::vector<SummaryFile>& files) {
-  std::map<std::string, std::size_t> votes;
-  for (const SummaryFile& f : files)
-    if (f.summary && f.summary->shard) ++votes[f.summary->collection];
-  Split split;
-  std::size_t most = 0;
-  for (const SummaryFile& f : files)
-    if (f.summary && f.summary->shard && votes[f.summary->collection] > most) {
-      most = votes[f.summary->collection];
-      split = {f.summary->collection, f.summary->shard->count};
-    }
-  return split;
-}
-
-std::string shard_text(const Shard& s) {
-  return "shard " + std::to_string(s.index) + " of " + std::to_string(s.count);
-}
-
-/// "0, 3-5"
-std::string ranges_text(const std::vector<int>& numbers) {
-  std::string text;
-  for (std::size_t i = 0; i < numbers.size();) {
-    std::size_t end = i;
-    while (end + 1 < numbers.size() && numbers[end + 1] == numbers[end] + 1) ++end;
-    text += (text.empty() ? "" : ", ") + std::to_string(numbers[i]);
-    if (end > i) text += "-" + std::to_string(numbers[end]);
-    i = end + 1;
-  }
-  return text;
-}
-
-/// Less is better.
-int rank_of(const ModelSummary& m) {
-  switch (m.result) {
-    case ModelResult::kOk:
-      return 0;
-    case ModelResult::kUnchanged:
-      return 1;
-    case ModelResult::kFailed:
-      return 2;
-    case ModelResult::kInternal:
-      return 3;
-    case ModelResult::kCancelled:
-      break;
-  }
-  return 4;
-}
-
-class Merger {
- public:
-  explicit Merger(std::vector<SummaryFile> files) : files_(std::move(files)), split_(usual_split(files_)) {}
-
-  RunSummary merge() {
-    for (SummaryFile& f : files_) {
-      if (!f.summary)
-        merged_.problems.push_back({f.file, f.kind, f.text});
-      else if (is_foreign(*f.summary))
-        merged_.problems.push_back({f.file, "foreign",
-                                    shard_text(*f.summary->shard) +
-                                        " of another collection, or of this one before its files changed"});
-      else
-        add(f.file, *f.summary);
-      f.summary.reset();  // a million models stand in memory once
-    }
-    name_missing();
-    for (auto& [package, found] : models_) merged_.models.push_back(std::move(found.model));
-    merged_.counts = count_results(merged_.models);
-    return std::move(merged_);
-  }
-
- private:
-  struct Found {
-    ModelSummary model;
-    std::string file;
-  };
-
-  bool is_foreign(const RunSummary& s) const {
-    return s.shard && (s.collection != split_.collection || s.shard->count != split_.shards);
-  }
-
-  void add(const std::string& file, RunSummary& s) {
-    const std::size_t models = s.models.size();
-    std::map<std::string, std::size_t> doubles;  // by the file that had them first
-    for (ModelSummary& m : s.models) {
-      const auto [at, is_new] = models_.try_emplace(m.package);
-      if (is_new)
-        at->second.file = file;
-      else
-        ++doubles[at->second.file];
-      if (is_new || rank_of(m) < rank_of(at->second.model)) at->second.model = std::move(m);
-    }
-    for (const auto& [other, count] : doubles)
-      merged_.problems.push_back(
-          {file, "double", std::to_string(count) + " of its packages are those of " + other});
-    merged_.seconds += s.seconds;
-    if (s.shard) seen_.insert(s.shard->index);
-    if (s.parts.empty())
-      merged_.parts.push_back({file, s.shard, models, s.seconds});
-    else
-      merged_.parts.insert(merged_.parts.end(), s.parts.begin(), s.parts.end());
-  }
-
-  void name_missing() {
-    if (seen_.empty()) return;
-    std::vector<int> missing;
-    for (int i = 0; i < split_.shards; ++i)
-      if (!seen_.contains(i)) missing.push_back(i);
-    if (!missing.empty())
-      merged_.problems.push_back(
-          {"", "missing",
-           "no summary of shards " + ranges_text(missing) + " of " + std::to_string(split_.shards)});
-  }
-
-  std::vector<SummaryFile> files_;
-  Split split_;
-  RunSummary merged_;
-  std::map<std::string, Found> models_;  // by package
-  std::set<int> seen_;
-};
-
-}  // namespace
 
 SummaryFile open_summary(const std::string& file) {
   try {

@@ -95,17 +95,6 @@ ByteSpan checked(ByteSpan bytes) {
   return check == check_of(bytes.subspan(kCheckBytes)) ? bytes.subspan(kCheckBytes) : ByteSpan{};
 }
 
-bool read_at(int fd, std::uint64_t at, std::span<std::uint8_t> to) {
-  while (!to.empty()) {
-    const ssize_t n = ::pread(fd, to.data(), to.size(), static_cast<off_t>(at));
-    if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) return false;
-    at += static_cast<std::uint64_t>(n);
-    to = to.subspan(static_cast<std::size_t>(n));
-  }
-  return true;
-}
-
 void append_bytes(Bytes& to, const void* from, std::size_t size) {
   const auto* p = static_cast<const std::uint8_t*>(from);
   to.insert(to.end(), p, p + size);

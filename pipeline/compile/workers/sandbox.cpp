@@ -245,11 +245,6 @@ bool bound_files(const SandboxRules& rules, int version) {
   return ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0 && set.enforce();
 }
 
-std::string folder_of_file(const std::string& path) {
-  const std::string folder = fs::path(path).parent_path().string();
-  return folder.empty() ? "." : folder;
-}
-
 /// Where symbolic links lead in the end; "" when nothing is there.
 std::string real_path(const std::string& path) {
   std::error_code ec;

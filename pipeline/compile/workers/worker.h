@@ -80,6 +80,7 @@ struct WorkerTask {
   }
 };
 
+/// The better ones first.
 enum class ModelResult : std::uint8_t { kOk, kUnchanged, kFailed, kInternal, kCancelled };
 template <>
 struct EnumNames<ModelResult> {

@@ -11,6 +11,7 @@
 #include <new>
 #include <nlohmann/json.hpp>
 
+#include "format/base/text_bytes.h"
 #include "pipeline/cache/cache_layer.h"
 #include "pipeline/cache/disk_store.h"
 #include "pipeline/compile/compile_model.h"
@@ -32,7 +33,7 @@ class EventWriter {
   void write(const Event& event) {
     const std::string line = to_json_line(event) + "\n";
     const std::lock_guard lock(mutex_);
-    write_all(fd_, line);  // false: the parent is gone, and this process with it in a moment
+    write_all(fd_, text_bytes(line));  // false: the parent is gone, and this process with it in a moment
   }
 
  private:

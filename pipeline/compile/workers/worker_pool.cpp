@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "format/base/text_bytes.h"
 #include "pipeline/cache/cache_layer.h"
 #include "pipeline/compile/workers/worker.h"
 #include "pipeline/io/atomic_file.h"
@@ -72,7 +73,7 @@ ChildProcess start_worker_process(const std::string& input, bool large_pages) {
   ::close(out.write);
   ::close(err.write);
   if (rc != 0) throw std::runtime_error(std::string("cannot start a worker: ") + std::strerror(rc));
-  write_all(in.write, input);  // a child that is gone says the rest by its exit status
+  write_all(in.write, text_bytes(input));  // a child that is gone says the rest by its exit status
   ::close(in.write);
   child.out = out.read;
   child.err = err.read;
@@ -410,11 +411,6 @@ std::optional<std::variant<E...>> event_of(const Json& json, const std::variant<
   return event;
 }
 
-template <class... Event>
-Json one_of_events() {
-  return Json{{"oneOf", Json::array({schema_of<Event>()...})}};
-}
-
 }  // namespace
 
 bool apply_event(const WorkerEvent& event, double now_s, WorkerReport& report) {
@@ -457,11 +453,15 @@ std::optional<WorkerEvent> read_event(const std::string& line) {
 }
 
 DocumentSchema event_schema() {
+  const auto one_of = []<class... Event>(std::tuple<Event...>*) {
+    return Json{{"oneOf", Json::array({schema_of<Event>()...})}};
+  };
+  using Shown = std::tuple<ModelStarted, StageStarted, StageProgress, StageFinished, StageExplained,
+                           CacheTold, NoteTold, ErrorTold, PackageMade, ModelFinished, RunFinished>;
   return document_schema(
       "event.v1", "texmesh log event, version 1",
       "One line of `texmesh compile --json`. Programs ignore events that they do not know.",
-      one_of_events<ModelStarted, StageStarted, StageProgress, StageFinished, StageExplained, CacheTold,
-                    NoteTold, ErrorTold, PackageMade, ModelFinished, RunFinished>());
+      one_of(static_cast<Shown*>(nullptr)));
 }
 
 }  // namespace texmesh
