@@ -14,7 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kRecordVersion = 2;
+constexpr int kEntryVersion = 2;
 constexpr std::size_t kSealBytes = 66;  // newline, 64 digits, newline
 
 bool is_there(const std::string& path, std::size_t bytes) {
@@ -32,12 +32,12 @@ bool publish_by_rename(const std::string& path, ByteSpan bytes) {
   }
 }
 
-/// A record as its file has it.
-struct RecordText {
+/// An entry as its file has it.
+struct EntryText {
   Json key;  // Key::preimage
   std::vector<StoredBlob> outputs;
   static void fields(auto& s, auto&& v) {
-    v("version", Constant{kRecordVersion}, "");
+    v("version", Constant{kEntryVersion}, "");
     v("key", s.key, "");
     v("outputs", s.outputs, "");
   }
@@ -110,18 +110,18 @@ std::optional<std::string> unseal(ByteSpan bytes) {
   return body;
 }
 
-std::string write_record(const CacheRecord& record) {
-  return seal(to_json(RecordText{Json::parse(record.preimage), record.outputs}).dump(1));
+std::string write_entry(const CacheEntry& entry) {
+  return seal(to_json(EntryText{Json::parse(entry.preimage), entry.outputs}).dump(1));
 }
 
-std::optional<CacheRecord> read_record(ByteSpan bytes, const std::optional<Sha256>& key) {
+std::optional<CacheEntry> read_entry(ByteSpan bytes, const std::optional<Sha256>& key) {
   const auto body = unseal(bytes);
   if (!body) return std::nullopt;
   try {
-    auto text = from_json<RecordText>(Json::parse(*body, nullptr, false), "record");
+    auto text = from_json<EntryText>(Json::parse(*body, nullptr, false), "entry");
     const auto parts = key_from_json(text.key);
     if (!parts || (key && parts->digest() != *key)) return std::nullopt;
-    return CacheRecord{parts->preimage(), std::move(text.outputs)};
+    return CacheEntry{parts->preimage(), std::move(text.outputs)};
   } catch (const InputError&) {
     return std::nullopt;
   }

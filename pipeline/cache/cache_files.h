@@ -3,15 +3,15 @@
 #include "pipeline/graph/store.h"
 #include "pipeline/io/file_stamp.h"
 
-// The cache folder's own files: what stands where, how a file is published, what a record looks like.
+// The cache folder's own files: what stands where, how a file is published, what an entry looks like.
 //
-//   ac/<k[0:2]>/<key>        a record: the key's parts in the clear, the outputs' digests, its own digest
+//   ac/<k[0:2]>/<key>        an entry: the key's parts in the clear, the outputs' digests, its own digest
 //   cas/<d[0:2]>/<digest>    the bytes of an output
 //   notes/<k[0:2]>/<key>     small facts that are not results
 //   memo/<name>/<segment>    what runs of a collection have found out (pipeline/batch/build_memo.h)
 //   locks/<k[0:3]>           flock: held while a key that begins with these digits is computed
 //   locks/quarantine         flock: held while a damaged file is moved away
-//   gate                     flock: shared by lookups and puts of records and blobs, exclusive for pruning
+//   gate                     flock: shared by lookups and puts of entries and blobs, exclusive for pruning
 //   running/<name>           one per running build, locked until the build ends; its time is the start's
 //   quarantine/<name>        objects that were found damaged
 namespace texmesh {
@@ -43,15 +43,15 @@ QuarantineResult move_to_quarantine(const std::string& folder, const std::string
 std::string seal(const std::string& body);
 std::optional<std::string> unseal(ByteSpan bytes);
 
-/// A record of ac/: sealed JSON.
-struct CacheRecord {
+/// An entry of ac/: sealed JSON.
+struct CacheEntry {
   std::string preimage;  // Key::preimage
   std::vector<StoredBlob> outputs;
 };
-std::string write_record(const CacheRecord& record);
-/// Nothing when the record is damaged, of another version, or its parts do not give `key`; without a key the
+std::string write_entry(const CacheEntry& entry);
+/// Nothing when the entry is damaged, of another version, or its parts do not give `key`; without a key the
 /// caller knows it by its name only (pruning).
-std::optional<CacheRecord> read_record(ByteSpan bytes, const std::optional<Sha256>& key = {});
+std::optional<CacheEntry> read_entry(ByteSpan bytes, const std::optional<Sha256>& key = {});
 
 /// flock on a file, which is made where it is missing. Released with the object.
 class FileLock {

@@ -68,15 +68,15 @@ class DiskStore : public Store {
     const std::string path = place("ac", key);
     const auto file = read(path);
     if (!file) return std::nullopt;
-    auto record = read_record(file->bytes, key);
-    if (!record) {
-      quarantine(path, *file, "the record of a result does not have its digest");
+    auto entry = read_entry(file->bytes, key);
+    if (!entry) {
+      quarantine(path, *file, "the entry of a result does not have its digest");
       return std::nullopt;
     }
-    for (const StoredBlob& b : record->outputs)
+    for (const StoredBlob& b : entry->outputs)
       if (!verify(b)) return std::nullopt;
     touch(path);
-    return std::move(record->outputs);
+    return std::move(entry->outputs);
   }
 
   SharedBytes load(const StoredBlob& blob) override {
@@ -90,7 +90,7 @@ class DiskStore : public Store {
   bool put(const Key& key, const std::vector<std::pair<std::string, SharedBytes>>& outputs) override {
     if (!writes_) return false;
     const FileLock gate = pass_gate();
-    CacheRecord record{key.preimage(), {}};
+    CacheEntry entry{key.preimage(), {}};
     for (const auto& [name, bytes] : outputs) {
       const StoredBlob blob{name, sha256(*bytes), bytes->size()};
       const std::string path = place("cas", blob.digest);
@@ -100,25 +100,25 @@ class DiskStore : public Store {
         ::utimensat(AT_FDCWD, path.c_str(), nullptr, 0);
       else if (!publish_object(path, *bytes))
         return not_written();
-      record.outputs.push_back(blob);
+      entry.outputs.push_back(blob);
     }
-    const std::string text = write_record(record);
+    const std::string text = write_entry(entry);
     return publish_object(place("ac", key.digest()), text_bytes(text)) || not_written();
   }
 
   std::optional<std::string> preimage(const Sha256& key) override {
     const auto bytes = read_whole(place("ac", key));
-    const auto record = bytes ? read_record(*bytes, key) : std::nullopt;
-    return record ? std::optional(record->preimage) : std::nullopt;
+    const auto entry = bytes ? read_entry(*bytes, key) : std::nullopt;
+    return entry ? std::optional(entry->preimage) : std::nullopt;
   }
 
   void reject(const Sha256& key, const std::vector<StoredBlob>& found, const std::string& reason) override {
     const FileLock gate = pass_gate();
     const std::string path = place("ac", key);
     const auto file = read(path);
-    const auto record = file ? read_record(file->bytes, key) : std::nullopt;
-    if (record && record->outputs == found)  // not what somebody else has put in its place meanwhile
-      quarantine(path, *file, "the record of a result names what is none (" + reason + ")");
+    const auto entry = file ? read_entry(file->bytes, key) : std::nullopt;
+    if (entry && entry->outputs == found)  // not what somebody else has put in its place meanwhile
+      quarantine(path, *file, "the entry of a result names what is none (" + reason + ")");
   }
 
   std::optional<std::string> find_note(const Sha256& key) override {

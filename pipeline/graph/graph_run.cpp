@@ -1,6 +1,6 @@
 // A run of the graph over one model, from below:
 // - the results of one stage in a store: found, looked for, loaded, put;
-// - ArtefactTable knows which artefacts are known, under which digests, and who still needs their objects;
+// - Artefacts knows which artefacts are known, under which digests, and who still needs their objects;
 // - StageExecutor brings single stages up to date by them, and explains what it does;
 // - StageScheduler runs the stages that are ready side by side;
 // - GraphRun joins these.
@@ -138,7 +138,7 @@ std::vector<StoredBlob> put_results(Store& store, const Stage& stage, const Key&
 
 /// The artefacts of one run of a graph: of each, the stage that makes the artefact, the digest or parts that
 /// stand for it in keys, and its object while a stage needs the object. Safe from several threads.
-class ArtefactTable {
+class Artefacts {
  public:
   static constexpr std::size_t kGiven = static_cast<std::size_t>(-1);
   /// Where an artefact comes from.
@@ -149,7 +149,7 @@ class ArtefactTable {
 
   /// `stages` must outlive the table. Throws std::logic_error where an artefact is made twice, or is made as
   /// one type and read as another.
-  explicit ArtefactTable(const std::vector<Stage>& stages) : stages_(stages) {
+  explicit Artefacts(const std::vector<Stage>& stages) : stages_(stages) {
     for (std::size_t i = 0; i < stages.size(); ++i)
       for (std::size_t k = 0; k < stages[i].outputs.size(); ++k) {
         Slot& slot = slot_of(stages[i].outputs[k]);
@@ -288,13 +288,13 @@ class ArtefactTable {
 /// Safe from several threads: a stage is never run by two of them at once, however many results it has.
 ///
 /// The order of locks, outermost first: the `running` of a stage, held while that stage is looked up, loaded
-/// or run; then one of those inside ArtefactTable, the store or this class. Whoever holds the `running` of a
+/// or run; then one of those inside Artefacts, the store or this class. Whoever holds the `running` of a
 /// stage takes only those of stages before it in the graph, whose results it reads. The graph has no circle,
 /// so no two threads wait for each other.
 class StageExecutor {
  public:
   /// All arguments must outlive the executor.
-  StageExecutor(const std::vector<Stage>& stages, ArtefactTable& artefacts, Store& store,
+  StageExecutor(const std::vector<Stage>& stages, Artefacts& artefacts, Store& store,
                 const RunContext& context, StageObserver observer)
       : stages_(stages),
         artefacts_(artefacts),
@@ -333,8 +333,8 @@ class StageExecutor {
 
   /// The object of an artefact that is known: at hand, from the store, or by running its stage (again).
   Object fetch(const std::string& artefact) {
-    const ArtefactTable::Origin origin = artefacts_.origin_of(artefact);
-    if (origin.stage == ArtefactTable::kGiven) {
+    const Artefacts::Origin origin = artefacts_.origin_of(artefact);
+    if (origin.stage == Artefacts::kGiven) {
       if (Object given = artefacts_.object(artefact)) return given;
       throw std::logic_error("artefact " + artefact + " was not given");
     }
@@ -445,7 +445,7 @@ class StageExecutor {
   }
 
   const std::vector<Stage>& stages_;
-  ArtefactTable& artefacts_;
+  Artefacts& artefacts_;
   Store& store_;
   const RunContext& context_;
   StageObserver observer_;
@@ -550,7 +550,7 @@ struct GraphRun::Parts {
   Store& store;
   const RunContext& context;
   StageObserver observer;
-  ArtefactTable artefacts{stages};
+  Artefacts artefacts{stages};
   StageExecutor executor{stages, artefacts, store, context, std::move(observer)};
   bool has_run = false;
 };
@@ -574,7 +574,7 @@ Notes GraphRun::notes() const { return parts_->executor.notes(); }
 
 /// False while an input is unknown.
 bool GraphRun::forecast_stage(const Stage& stage, StageExplanation& explanation) {
-  ArtefactTable& artefacts = parts_->artefacts;
+  Artefacts& artefacts = parts_->artefacts;
   if (!artefacts.first_unknown_input(stage).empty()) return false;
   const Key key = artefacts.key_of(stage);
   if (!stage.stored) {

@@ -27,16 +27,16 @@ std::vector<std::pair<std::string, std::string>> Key::added_parts() const {
 Sha256 Key::digest() const { return digest_of_parts(parts_); }
 
 Sha256 digest_of_parts(const std::vector<std::pair<std::string, std::string>>& parts) {
-  Bytes record;
-  auto put = [&record](const std::string& s) {
-    for (int i = 0; i < 8; ++i) record.push_back(static_cast<std::uint8_t>(s.size() >> (8 * i)));
-    record.insert(record.end(), s.begin(), s.end());
+  Bytes all;
+  auto put = [&all](const std::string& s) {
+    for (int i = 0; i < 8; ++i) all.push_back(static_cast<std::uint8_t>(s.size() >> (8 * i)));
+    all.insert(all.end(), s.begin(), s.end());
   };
   for (const auto& [label, value] : parts) {
     put(label);
     put(value);
   }
-  return sha256(record);
+  return sha256(all);
 }
 
 std::optional<Key> key_from_preimage(const std::string& preimage) {

@@ -135,7 +135,7 @@ FileResolver::FileResolver(const std::filesystem::path& folder, Method method)
 
 FileResolver::~FileResolver() { ::close(folder_); }
 
-std::size_t FileResolver::record(const std::string& uri) {
+std::size_t FileResolver::number_of(const std::string& uri) {
   const auto [it, is_new] = index_of_.try_emplace(uri, requests_.size());
   if (is_new) requests_.push_back({uri, false, {}, 0, {}});
   return it->second;
@@ -150,7 +150,7 @@ int FileResolver::open_beneath(const std::string& uri) {
   return open_component_wise(folder_, uri);
 }
 
-/// Opens a uri that was recorded; -1 when there is no such file.
+/// Opens a uri that has a number; -1 when there is no such file.
 int FileResolver::open_regular(const std::string& uri) {
   check_relative_name(uri, "", "");
   const int fd = open_beneath(uri);
@@ -171,7 +171,7 @@ int FileResolver::open_regular(const std::string& uri) {
 }
 
 std::optional<Bytes> FileResolver::read(const std::string& uri, std::uint64_t max_bytes) {
-  const std::size_t index = record(uri);
+  const std::size_t index = number_of(uri);
   try {
     const Descriptor fd(open_regular(uri));
     if (fd.get() < 0) return std::nullopt;
@@ -193,7 +193,7 @@ void FileResolver::expect(std::vector<FileRequest> known) {
 bool FileResolver::look(const std::string& uri, std::uint64_t max_bytes) {
   const auto known = expected_.find(uri);
   if (known != expected_.end()) {
-    const std::size_t index = record(uri);
+    const std::size_t index = number_of(uri);
     const Descriptor fd(open_regular(uri));
     if (fd.get() < 0) return false;
     if (checked_stamp(fd.get(), uri, kRegularFile) == known->second.stamp) {

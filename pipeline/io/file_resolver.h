@@ -37,7 +37,7 @@ class FileResolver : public Resolver {
  private:
   int open_beneath(const std::string& uri);
   int open_regular(const std::string& uri);
-  std::size_t record(const std::string& uri);
+  std::size_t number_of(const std::string& uri);
 
   int folder_ = -1;
   bool walk_ = false, failed_for_resources_ = false;

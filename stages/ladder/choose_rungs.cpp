@@ -9,7 +9,7 @@
 #include "stages/image/jpeg_segments.h"
 #include "stages/measure/fragment_meter.h"
 
-namespace texmesh::rungs {
+namespace texmesh::ladder {
 namespace {
 
 constexpr std::size_t kWindows = 6;
@@ -357,4 +357,4 @@ std::vector<std::vector<std::size_t>> choose_rungs(const Fragments& fragments,
   return kept;
 }
 
-}  // namespace texmesh::rungs
+}  // namespace texmesh::ladder

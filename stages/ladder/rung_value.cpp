@@ -6,7 +6,7 @@
 #include "format/base/portable_math.h"
 #include "format/rules/ordinary_loads.h"
 
-namespace texmesh::rungs {
+namespace texmesh::ladder {
 
 Hull hull_of(const TextureRungs& texture, const std::vector<std::uint8_t>& keep, std::size_t wanted,
              Levels levels) {
@@ -459,4 +459,4 @@ std::vector<std::vector<std::uint8_t>> pairs_worth_storing(const std::vector<Tex
   return keep;
 }
 
-}  // namespace texmesh::rungs
+}  // namespace texmesh::ladder

@@ -21,7 +21,7 @@
 #include <limits>
 #include <vector>
 
-namespace texmesh::rungs {
+namespace texmesh::ladder {
 
 /// One way to store a texture: a plane of the chain (0 = full size, 1 = its first mip, ...) at one rung.
 struct RungPair {
@@ -112,4 +112,4 @@ std::vector<std::uint8_t> gap_closing_pairs(const TextureRungs& texture,
 /// take at most TextureRungs::most_bytes, if they did before. Same result anywhere.
 void swap_pairs(const TextureRungs& texture, const GivenBytes& given, std::vector<std::uint8_t>& keep);
 
-}  // namespace texmesh::rungs
+}  // namespace texmesh::ladder

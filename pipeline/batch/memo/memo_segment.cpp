@@ -76,14 +76,14 @@ struct Block {
   static void archive(auto& s, auto& a) { a(s.new_stages, s.names, s.times, s.sizes, s.body_bytes); }
 };
 
-/// In front of a record. What check is of begins behind it.
-struct RecordHead {
+/// In front of a memo. What check is of begins behind it.
+struct MemoHead {
   std::uint64_t check = 0;
   std::uint32_t keys_ahead = 0;  // bytes from this head to the keys' check
   std::uint32_t key_bytes = 0;   // with the check
 };
-constexpr std::size_t kCheckBytes = 8, kRecordHeadBytes = 16;
-static_assert(sizeof(RecordHead) == kRecordHeadBytes);
+constexpr std::size_t kCheckBytes = 8, kMemoHeadBytes = 16;
+static_assert(sizeof(MemoHead) == kMemoHeadBytes);
 
 std::uint64_t check_of(ByteSpan bytes) { return truncated(sha256(bytes)); }
 
@@ -109,25 +109,25 @@ BlockHead head_of(std::span<const std::uint8_t, kBlockHeadBytes> bytes) {
 
 }  // namespace
 
-bool still_holds(MemoRecord& record, const std::string& input, const std::string& output, bool& refreshed) {
+bool still_holds(PackageMemo& memo, const std::string& input, const std::string& output, bool& refreshed) {
   refreshed = false;
   const std::int64_t now_ns = wall_clock_ns();
   const std::string_view folder = std::string_view(input).substr(0, input.rfind('/') + 1);
-  for (FileRequest& f : record.files) {
+  for (FileRequest& f : memo.files) {
     const bool is_model = f.uri.empty();
     const std::string path = is_model ? input : std::string(folder) + f.uri;
     if (!f.found) {
       if (look(path, false)) return false;
       continue;
     }
-    if (!same_file(path, is_model, record.looked_at_ns, f.digest, f.bytes, f.stamp, refreshed)) return false;
+    if (!same_file(path, is_model, memo.looked_at_ns, f.digest, f.bytes, f.stamp, refreshed)) return false;
   }
-  if (!record.failed && !same_file(output, true, record.looked_at_ns, record.package_digest,
-                                   record.package_bytes, record.package_stamp, refreshed))
+  if (!memo.failed && !same_file(output, true, memo.looked_at_ns, memo.package_digest, memo.package_bytes,
+                                 memo.package_stamp, refreshed))
     return false;
   // What was settled before is so now; what was read just now was true at this moment.
-  if (refreshed) record.looked_at_ns = now_ns;
-  return !record.files.empty();
+  if (refreshed) memo.looked_at_ns = now_ns;
+  return !memo.files.empty();
 }
 
 std::uint32_t StageNames::number_of(const std::string& stage) {
@@ -201,8 +201,8 @@ std::optional<std::uint64_t> MemoSegment::tell_block(ByteSpan payload, std::uint
     return std::nullopt;
   }
   const std::size_t count = block.names.size();
-  const auto records_bytes = std::accumulate(block.sizes.begin(), block.sizes.end(), std::uint64_t{0});
-  if (block.times.size() != count || block.sizes.size() != count || records_bytes > block.body_bytes ||
+  const auto memos_bytes = std::accumulate(block.sizes.begin(), block.sizes.end(), std::uint64_t{0});
+  if (block.times.size() != count || block.sizes.size() != count || memos_bytes > block.body_bytes ||
       block.body_bytes > kMostBlockBytes)
     return std::nullopt;
   for (const std::string& stage : block.new_stages) stages_.number_of(stage);
@@ -230,11 +230,11 @@ ByteSpan MemoSegment::look(Window& window, std::uint64_t at, std::size_t bytes) 
   return std::span(window.bytes).subspan(static_cast<std::size_t>(at - window.at), bytes);
 }
 
-std::optional<MemoRecord> MemoSegment::record(const MemoEntry& entry) const {
-  const ByteSpan bytes = checked(look(record_window_, entry.offset, entry.bytes));
-  constexpr std::size_t kRestOfHead = kRecordHeadBytes - kCheckBytes;
+std::optional<PackageMemo> MemoSegment::memo(const MemoEntry& entry) const {
+  const ByteSpan bytes = checked(look(memo_window_, entry.offset, entry.bytes));
+  constexpr std::size_t kRestOfHead = kMemoHeadBytes - kCheckBytes;
   try {
-    if (bytes.size() >= kRestOfHead) return decode_artefact<MemoRecord>(bytes.subspan(kRestOfHead), "memo");
+    if (bytes.size() >= kRestOfHead) return decode_artefact<PackageMemo>(bytes.subspan(kRestOfHead), "memo");
   } catch (const FormatError&) {
   }
   damaged_ = true;
@@ -242,10 +242,10 @@ std::optional<MemoRecord> MemoSegment::record(const MemoEntry& entry) const {
 }
 
 StageKeys MemoSegment::keys(const MemoEntry& entry) const {
-  const ByteSpan bytes = look(record_window_, entry.offset, entry.bytes);
-  RecordHead head;
-  if (bytes.size() >= kRecordHeadBytes && !checked(bytes).empty())
-    std::memcpy(&head, bytes.data(), kRecordHeadBytes);
+  const ByteSpan bytes = look(memo_window_, entry.offset, entry.bytes);
+  MemoHead head;
+  if (bytes.size() >= kMemoHeadBytes && !checked(bytes).empty())
+    std::memcpy(&head, bytes.data(), kMemoHeadBytes);
   try {
     if (head.key_bytes > 0 && head.key_bytes <= kMostBlockBytes && head.keys_ahead <= kMostBlockBytes)
       return unpack_keys(checked(look(key_window_, entry.offset + head.keys_ahead, head.key_bytes)), stages_);
@@ -255,50 +255,50 @@ StageKeys MemoSegment::keys(const MemoEntry& entry) const {
   return {};
 }
 
-void MemoSegmentWriter::add(const MemoName& name, const MemoRecord& record) {
-  const Bytes bytes = encode_artefact(record), keys = pack_keys(record.keys, stages_);
-  const std::size_t size = kRecordHeadBytes + bytes.size() + kCheckBytes + keys.size();
+void MemoSegmentWriter::add(const MemoName& name, const PackageMemo& memo) {
+  const Bytes bytes = encode_artefact(memo), keys = pack_keys(memo.keys, stages_);
+  const std::size_t size = kMemoHeadBytes + bytes.size() + kCheckBytes + keys.size();
   if (size > kMostBlockBytes / 2) return;  // a model of ten thousand files is looked at again
-  if (records_.size() + keys_.size() + size > kFullBlockBytes) flush();
+  if (memos_.size() + keys_.size() + size > kFullBlockBytes) flush();
   names_.push_back(name);
-  times_.push_back(record.looked_at_ns);
-  const RecordHead head{0, static_cast<std::uint32_t>(keys_.size()),
-                        static_cast<std::uint32_t>(kCheckBytes + keys.size())};
-  sizes_.push_back(static_cast<std::uint32_t>(kRecordHeadBytes + bytes.size()));
-  append_bytes(records_, &head, sizeof head);
-  records_.insert(records_.end(), bytes.begin(), bytes.end());
+  times_.push_back(memo.looked_at_ns);
+  const MemoHead head{0, static_cast<std::uint32_t>(keys_.size()),
+                      static_cast<std::uint32_t>(kCheckBytes + keys.size())};
+  sizes_.push_back(static_cast<std::uint32_t>(kMemoHeadBytes + bytes.size()));
+  append_bytes(memos_, &head, sizeof head);
+  memos_.insert(memos_.end(), bytes.begin(), bytes.end());
   const std::uint64_t check = check_of(keys);
   append_bytes(keys_, &check, sizeof check);
   keys_.insert(keys_.end(), keys.begin(), keys.end());
 }
 
-/// Where the keys begin is known when the block's last record is.
-void MemoSegmentWriter::end_records() {
+/// Where the keys begin is known when the block's last memo is.
+void MemoSegmentWriter::end_memos() {
   std::size_t at = 0;
   for (const std::uint32_t size : sizes_) {
-    RecordHead head;
-    std::memcpy(&head, records_.data() + at, sizeof head);
-    head.keys_ahead += static_cast<std::uint32_t>(records_.size() - at);
-    std::memcpy(records_.data() + at, &head, sizeof head);
-    head.check = check_of(std::span(records_).subspan(at + kCheckBytes, size - kCheckBytes));
-    std::memcpy(records_.data() + at, &head.check, kCheckBytes);
+    MemoHead head;
+    std::memcpy(&head, memos_.data() + at, sizeof head);
+    head.keys_ahead += static_cast<std::uint32_t>(memos_.size() - at);
+    std::memcpy(memos_.data() + at, &head, sizeof head);
+    head.check = check_of(std::span(memos_).subspan(at + kCheckBytes, size - kCheckBytes));
+    std::memcpy(memos_.data() + at, &head.check, kCheckBytes);
     at += size;
   }
 }
 
 bool MemoSegmentWriter::flush() {
   if (names_.empty()) return !failed_;
-  end_records();
+  end_memos();
   const auto first_new = stages_.all().begin() + static_cast<std::ptrdiff_t>(stages_written_);
   const Block block{{first_new, stages_.all().end()},
                     std::move(names_),
                     std::move(times_),
                     std::move(sizes_),
-                    records_.size() + keys_.size()};
-  records_.insert(records_.end(), keys_.begin(), keys_.end());
+                    memos_.size() + keys_.size()};
+  memos_.insert(memos_.end(), keys_.begin(), keys_.end());
   stages_written_ = stages_.all().size();
-  const bool written = append(encode_artefact(block), records_);
-  names_.clear(), times_.clear(), sizes_.clear(), keys_.clear(), records_.clear();
+  const bool written = append(encode_artefact(block), memos_);
+  names_.clear(), times_.clear(), sizes_.clear(), keys_.clear(), memos_.clear();
   return written;
 }
 
