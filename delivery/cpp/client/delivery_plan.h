@@ -20,7 +20,8 @@ struct DeliveryRequest {
   std::function<SimulationResult(int scale, const std::vector<FragmentOffer>& offers, const HtcOptions& htc,
                                  const NetworkOptions& network)>
       play;
-  /// GPU memory for mesh and textures, see texture_budget.h. What is least takes its place where nothing fits.
+  /// GPU memory for mesh and textures, see texture_budget.h. What is least takes its place where nothing
+  /// fits.
   double memory_bytes = std::numeric_limits<double>::infinity();
   bool proxy_steps = true;  // a larger proxy may be shown on the way, see format/rules/proxy_choice.h
 };

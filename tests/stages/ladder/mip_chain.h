@@ -66,7 +66,7 @@ inline Ladder encode(const Chain& chain, bool prune, int threads = 1, LadderMode
 
 inline ladder::TextureRungs rungs_of(const Chain& chain, const Ladder& ladder) {
   return ladder::measure_rungs(chain.fragments, chain.pixels, ladder.planes, 0,
-                              chain.previews().planes[0].file, RunContext{});
+                               chain.previews().planes[0].file, RunContext{});
 }
 
 }  // namespace texmesh::testing
