@@ -6,7 +6,6 @@
 #include <charconv>
 #include <chrono>
 #include <map>
-#include <mutex>
 
 namespace texmesh {
 namespace {
@@ -145,11 +144,6 @@ int look(void* user, curl_off_t, curl_off_t received, curl_off_t, curl_off_t) {
   return 1;
 }
 
-void start_curl() {
-  static std::once_flag once;
-  std::call_once(once, [] { ::curl_global_init(CURL_GLOBAL_DEFAULT); });
-}
-
 /// Sets the handle up for a GET; the headers belong to the caller and must live as long as the transfer.
 curl_slist* prepare(Transfer& transfer, const std::string& url) {
   CURL* h = transfer.handle;
@@ -270,7 +264,7 @@ struct HttpPool::State {
 
 HttpPool::HttpPool(const HttpOptions& options, int connections_per_server)
     : state_(std::make_unique<State>()) {
-  start_curl();
+  [[maybe_unused]] static const CURLcode started = ::curl_global_init(CURL_GLOBAL_DEFAULT);
   state_->multi = ::curl_multi_init();
   state_->options = options;
   ::curl_multi_setopt(state_->multi, CURLMOPT_MAX_HOST_CONNECTIONS,

@@ -45,10 +45,6 @@ Split usual_split(const std::vector<SummaryFile>& files) {
   return split;
 }
 
-std::string shard_text(const Shard& s) {
-  return "shard " + std::to_string(s.index) + " of " + std::to_string(s.count);
-}
-
 /// "0, 3-5"
 std::string ranges_text(const std::vector<int>& numbers) {
   std::string text;
@@ -71,9 +67,10 @@ class Merger {
       if (!f.summary)
         merged_.problems.push_back({f.file, f.kind, f.text});
       else if (is_foreign(*f.summary))
-        merged_.problems.push_back({f.file, "foreign",
-                                    shard_text(*f.summary->shard) +
-                                        " of another collection, or of this one before its files changed"});
+        merged_.problems.push_back(
+            {f.file, "foreign",
+             fmt::format("shard {} of {}", f.summary->shard->index, f.summary->shard->count) +
+                 " of another collection, or of this one before its files changed"});
       else
         add(f.file, *f.summary);
       f.summary.reset();  // a million models stand in memory once
