@@ -120,11 +120,6 @@ Cell Cell::markup(std::string text, std::string code) {
   return out;
 }
 
-void Table::column(std::string heading, Align align) {
-  columns.emplace_back(std::move(heading));
-  columns.back().align = align;
-}
-
 std::string Table::text(std::string_view indent) const {
   std::vector<std::vector<std::string>> lines(rows.size() + 1);  // headings first
   std::vector<std::size_t> widths;

@@ -92,7 +92,6 @@ struct Table {
   Table(std::string of_caption, std::vector<Column> of_columns, std::vector<std::vector<Cell>> of_rows = {})
       : caption(std::move(of_caption)), columns(std::move(of_columns)), rows(std::move(of_rows)) {}
   void column(Column c) { columns.push_back(std::move(c)); }
-  void column(std::string heading, Align align);
   void row(std::vector<Cell> cells) { rows.push_back(std::move(cells)); }
   template <class T>
   requires std::is_same_v<T, std::vector<std::string>>
