@@ -22,7 +22,7 @@
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/table.h"
-#include "pipeline/io/wire_text.h"
+#include "pipeline/io/uri.h"
 #include "stages/condition/condition.h"
 #include "stages/image/png_writer.h"
 #include "tools/cli/options/delivery_options.h"

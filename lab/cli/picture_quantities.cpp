@@ -6,7 +6,7 @@
 #include <algorithm>
 
 #include "lab/cli/commands.h"
-#include "pipeline/compile/artefacts.h"
+#include "pipeline/compile/stage_table.h"
 #include "pipeline/io/table.h"
 #include "stages/data/nested_scales.h"
 #include "stages/data/scale_map.h"

@@ -12,7 +12,7 @@
 #include "lab/transfer/chapter_4.h"
 #include "pipeline/cache/disk_store.h"
 #include "pipeline/compile/compile_model.h"
-#include "pipeline/compile/profile.h"
+#include "pipeline/compile/options.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/file_resolver.h"
 #include "pipeline/io/new_folder.h"

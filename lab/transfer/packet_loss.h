@@ -3,7 +3,7 @@
 #include <span>
 #include <vector>
 
-#include "delivery/cpp/decide/fragment_offer.h"
+#include "delivery/cpp/decide/harmonic_time.h"
 #include "format/split/split_reader.h"
 
 namespace texmesh {

@@ -1,8 +1,6 @@
 #include "pipeline/compile/stage_table.h"
 
-#include "pipeline/compile/artefacts.h"
-#include "pipeline/compile/library_versions.h"
-#include "pipeline/compile/option_fields.h"
+#include "pipeline/io/program.h"
 #include "stages/fill/fill.h"
 #include "stages/previews/previews.h"
 

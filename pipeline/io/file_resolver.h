@@ -1,10 +1,5 @@
 #pragma once
-#include <cstdint>
 #include <filesystem>
-#include <map>
-#include <optional>
-#include <string>
-#include <vector>
 
 #include "pipeline/io/file_stamp.h"
 #include "pipeline/io/resolver.h"
@@ -25,7 +20,7 @@ class FileResolver : public Resolver {
   FileResolver(const FileResolver&) = delete;
   FileResolver& operator=(const FileResolver&) = delete;
 
-  std::optional<std::vector<std::uint8_t>> read(const std::string& uri, std::uint64_t max_bytes) override;
+  std::optional<Bytes> read(const std::string& uri, std::uint64_t max_bytes) override;
 
   /// What was known of files before: a file that has exactly such a stamp is not read to learn its digest.
   void expect(std::vector<FileRequest> known);
@@ -42,7 +37,7 @@ class FileResolver : public Resolver {
  private:
   int open_beneath(const std::string& uri);
   int open_regular(const std::string& uri);
-  std::size_t record(const std::string& uri);
+  std::size_t number_of(const std::string& uri);
 
   int folder_ = -1;
   bool walk_ = false, failed_for_resources_ = false;
@@ -54,8 +49,7 @@ class FileResolver : public Resolver {
 /// The model file itself, as the user names it (symbolic links are followed). Throws InputError when it is
 /// missing, not a regular file, unreadable or longer than max_bytes; ResourceError where the machine is to
 /// blame.
-std::vector<std::uint8_t> read_input_file(const std::filesystem::path& path, std::uint64_t max_bytes,
-                                          FileStamp* stamp = nullptr);
+Bytes read_input_file(const std::filesystem::path& path, std::uint64_t max_bytes, FileStamp* stamp = nullptr);
 
 /// For models that have everything inside.
 class NoFiles : public Resolver {

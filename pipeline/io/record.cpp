@@ -2,12 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "format/base/errors.h"
-#include "pipeline/io/wire_text.h"
+#include "format/base/bounded_json.h"
+#include "pipeline/io/uri.h"
 
 namespace texmesh {
 namespace {
@@ -233,6 +231,17 @@ Json& schema_of_member(Json& object, const char* name, bool may_miss) {
 
 void describe_schema(Json& member, const char* text) {
   if (*text != '\0') member["description"] = text;
+}
+
+Json parse_document(ByteSpan json, std::size_t most_bytes, int most_depth, const std::string& file) {
+  if (json.size() > most_bytes)
+    throw InputError(file, "", fmt::format("at most {} bytes of JSON", most_bytes),
+                     std::to_string(json.size()));
+  try {
+    return parse_bounded_json(json, file, most_depth);
+  } catch (const FormatError& e) {
+    throw InputError(file, e.place(), e.expected(), e.found());
+  }
 }
 
 std::string json_line(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }

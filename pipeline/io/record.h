@@ -1,19 +1,12 @@
 #pragma once
-#include <array>
 #include <concepts>
-#include <cstdint>
 #include <functional>
 #include <limits>
-#include <map>
-#include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
-#include <span>
-#include <string>
-#include <string_view>
 #include <type_traits>
-#include <vector>
 
+#include "format/base/bytes.h"
 #include "format/base/fields.h"
 #include "format/base/note.h"
 #include "format/base/sha256.h"
@@ -29,8 +22,7 @@ using Json = nlohmann::ordered_json;
 //     std::string file, place;
 //     std::uint64_t bytes = 0;
 //     std::optional<Shard> shard;
-//     template <class S, class V>
-//     static void fields(S& s, V&& v) {
+//     static void fields(auto& s, auto&& v) {
 //       v("version", Constant{1}, "");
 //       v("file", s.file, "as the run names the file");
 //       v("place", s.place, kMayMiss, "JSON pointer");
@@ -75,10 +67,7 @@ inline constexpr FieldRule kSeconds{.range = Range{0, 1e9}};
 /// Specialise with `fields` for a type that cannot have it.
 template <class T>
 struct RecordFields {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
-    T::fields(s, v);
-  }
+  static void fields(auto& s, auto&& v) { T::fields(s, v); }
 };
 
 template <>
@@ -87,8 +76,7 @@ struct EnumNames<Severity> {
 };
 template <>
 struct RecordFields<Note> {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("severity", s.severity, "");
     v("code", s.code, FieldRule{.pattern = "^[a-z0-9-]+$"}, "");
     v("place", s.place, "");
@@ -385,6 +373,10 @@ std::string to_json_with_lines(const T& record, const char* list, const std::vec
   }
   return out + "\n]}\n";
 }
+
+/// JSON from outside. InputError {file, byte, expected, found} for more than `most_bytes` of it, for what
+/// nests deeper than `most_depth`, and for what is no JSON.
+Json parse_document(ByteSpan json, std::size_t most_bytes, int most_depth, const std::string& file);
 
 /// A record of JSON from outside. InputError {file, JSON pointer, expected, found}; `refuse_others`: also for
 /// members that the description does not name.

@@ -1,11 +1,8 @@
 #pragma once
-#include <cstdint>
 #include <map>
 #include <optional>
-#include <string>
 
 #include "format/base/bytes.h"
-#include "format/base/errors.h"
 
 namespace texmesh {
 

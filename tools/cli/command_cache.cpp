@@ -5,7 +5,6 @@
 
 #include "format/base/errors.h"
 #include "pipeline/cache/disk_store.h"
-#include "pipeline/cache/prune.h"
 #include "pipeline/io/table.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"
@@ -40,7 +39,7 @@ void statistics(const CacheArguments& args) {
   const CacheStatistics s = cache_statistics(existing_folder_of(args));
   if (args.json) {
     std::cout << Json{{"folder", folder_of(args)},    {"bytes", s.bytes()},
-                      {"records", s.records},         {"blobs", s.blobs},
+                      {"records", s.entries},         {"blobs", s.blobs},
                       {"blob_bytes", s.blob_bytes},   {"notes", s.notes},
                       {"quarantined", s.quarantined}, {"quarantined_bytes", s.quarantined_bytes},
                       {"running_builds", s.running},  {"oldest_use_s", s.oldest_use_s}}
@@ -52,14 +51,14 @@ void statistics(const CacheArguments& args) {
       "folder         {}\nsize           {}\nresults        {} runs of stages, {} outputs of {}\nquarantined "
       "   {} of {}\n"
       "oldest use     {:.1f} days ago\nrunning builds {}\n",
-      folder_of(args), format_bytes(s.bytes()), s.records, s.blobs, format_bytes(s.blob_bytes), s.quarantined,
+      folder_of(args), format_bytes(s.bytes()), s.entries, s.blobs, format_bytes(s.blob_bytes), s.quarantined,
       format_bytes(s.quarantined_bytes), static_cast<double>(s.oldest_use_s) / 86400, s.running);
 }
 
 void prune(const CacheArguments& args) {
   const PruneResult r = prune_cache(existing_folder_of(args), args.limits);
   if (args.json) {
-    std::cout << Json{{"removed_records", r.records}, {"removed_blobs", r.blobs},
+    std::cout << Json{{"removed_records", r.entries}, {"removed_blobs", r.blobs},
                       {"removed_others", r.others},   {"removed_bytes", r.bytes},
                       {"kept_bytes", r.kept_bytes},   {"kept_in_use", r.kept_in_use}}
                      .dump(1)
@@ -67,7 +66,7 @@ void prune(const CacheArguments& args) {
     return;
   }
   std::cout << fmt::format(
-      "removed {} results with {} outputs, {}; {} are left{}\n", r.records, r.blobs, format_bytes(r.bytes),
+      "removed {} results with {} outputs, {}; {} are left{}\n", r.entries, r.blobs, format_bytes(r.bytes),
       format_bytes(r.kept_bytes),
       r.kept_in_use ? fmt::format(" ({} results are in use by running builds)", r.kept_in_use) : "");
 }

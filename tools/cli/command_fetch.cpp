@@ -15,7 +15,7 @@
 
 #include "delivery/cpp/client/texture_loader.h"
 #include "delivery/cpp/package/http_store.h"
-#include "delivery/cpp/transfer/package_transport.h"
+#include "delivery/cpp/transfer/transfer.h"
 #include "format/base/bytes.h"
 #include "format/container/layout.h"
 #include "format/rules/proxy_choice.h"

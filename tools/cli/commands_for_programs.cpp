@@ -3,7 +3,7 @@
 // what shells and man show.
 #include <iostream>
 
-#include "pipeline/batch/write_reports.h"
+#include "pipeline/batch/run.h"
 #include "pipeline/io/record.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"

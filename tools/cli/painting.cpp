@@ -6,8 +6,7 @@
 
 #include "format/base/errors.h"
 #include "pipeline/cache/disk_store.h"
-#include "pipeline/compile/option_fields.h"
-#include "pipeline/compile/profile.h"
+#include "pipeline/compile/options.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/file_resolver.h"
 #include "pipeline/io/record.h"

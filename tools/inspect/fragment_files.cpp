@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "delivery/cpp/package/plane_streams.h"
+#include "delivery/cpp/package/package_reader.h"
 #include "format/base/bounded_json.h"
 #include "format/rules/allocation.h"
 #include "pipeline/io/record.h"

@@ -3,7 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "format/base/bounded_json.h"
-#include "pipeline/compile/option_fields.h"
+#include "pipeline/compile/options.h"
 
 namespace texmesh {
 namespace {

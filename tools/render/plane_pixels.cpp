@@ -1,6 +1,6 @@
 #include "tools/render/plane_pixels.h"
 
-#include "delivery/cpp/package/plane_streams.h"
+#include "delivery/cpp/package/package_reader.h"
 #include "stages/base/parallel.h"
 #include "stages/fill/fill.h"
 #include "stages/fragment_codec/fragment_codec.h"

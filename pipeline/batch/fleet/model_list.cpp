@@ -1,6 +1,5 @@
 #include "pipeline/batch/fleet/model_list.h"
 
-#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -18,12 +17,12 @@ namespace {
 namespace fs = std::filesystem;
 constexpr std::size_t kHeadBytes = 1 << 20, kMostJsonBytes = 256u << 20;
 
-std::vector<std::uint8_t> bytes_at(const std::string& path, std::uint64_t offset, std::size_t most) {
+Bytes bytes_at(const std::string& path, std::uint64_t offset, std::size_t most) {
   std::ifstream in(path, std::ios::binary);
   in.seekg(0, std::ios::end);
   const auto end = in.tellg();
   if (!in || static_cast<std::uint64_t>(end) <= offset) return {};
-  std::vector<std::uint8_t> bytes(
+  Bytes bytes(
       static_cast<std::size_t>(std::min<std::uint64_t>(most, static_cast<std::uint64_t>(end) - offset)));
   in.seekg(static_cast<std::streamoff>(offset));
   in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
@@ -36,9 +35,7 @@ class NamedFiles {
   explicit NamedFiles(const std::string& model) : model_(model), folder_(fs::path(model).parent_path()) {}
 
   std::vector<std::string> find() {
-    std::string ending = fs::path(model_).extension().string();
-    std::transform(ending.begin(), ending.end(), ending.begin(),
-                   [](unsigned char c) { return std::tolower(c); });
+    const std::string ending = lower_ending(model_);
     if (ending == ".gltf") look_at_gltf(bytes_at(model_, 0, kMostJsonBytes));
     if (ending == ".glb") look_at_glb();
     if (ending == ".obj") look_at_obj();
@@ -69,7 +66,7 @@ class NamedFiles {
     }
   }
 
-  void look_at_gltf(const std::vector<std::uint8_t>& json) {
+  void look_at_gltf(const Bytes& json) {
     const nlohmann::ordered_json document = parse_bounded_json(json, model_, 64);
     for (const char* list : {"buffers", "images"})
       for (const auto& item : document.value(list, nlohmann::ordered_json::array())) {
@@ -79,17 +76,17 @@ class NamedFiles {
   }
 
   void look_at_glb() {
-    const std::vector<std::uint8_t> head = bytes_at(model_, 0, 20);
+    const Bytes head = bytes_at(model_, 0, 20);
     if (head.size() < 20) return;
     std::size_t length = 0;
     for (int i = 3; i >= 0; --i) length = length << 8 | head[static_cast<std::size_t>(12 + i)];
-    std::vector<std::uint8_t> json = bytes_at(model_, 20, std::min(length, kMostJsonBytes));
+    Bytes json = bytes_at(model_, 20, std::min(length, kMostJsonBytes));
     while (!json.empty() && (json.back() == 0 || json.back() == ' ')) json.pop_back();
     look_at_gltf(json);
   }
 
   void look_at_obj() {
-    const std::vector<std::uint8_t> head = bytes_at(model_, 0, kHeadBytes);
+    const Bytes head = bytes_at(model_, 0, kHeadBytes);
     std::string_view rest(reinterpret_cast<const char*>(head.data()), head.size());
     while (!rest.empty()) {
       std::string_view line = rest.substr(0, rest.find('\n'));
@@ -130,12 +127,6 @@ class NamedFiles {
   fs::path folder_;
   std::set<std::string> found_;
 };
-
-std::uint64_t bytes_of_file(const std::string& path) {
-  std::error_code ec;
-  const auto bytes = fs::file_size(path, ec);
-  return ec ? 0 : bytes;
-}
 
 }  // namespace
 

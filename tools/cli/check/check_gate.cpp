@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "format/base/text_bytes.h"
-#include "pipeline/batch/junit.h"
+#include "pipeline/batch/fleet/run_summary.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/table.h"
 #include "tools/cli/options/delivery_text.h"

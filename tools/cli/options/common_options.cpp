@@ -4,7 +4,7 @@
 
 #include "pipeline/batch/fleet/run_summary.h"
 #include "pipeline/io/file_resolver.h"
-#include "pipeline/io/machine/machine_share.h"
+#include "pipeline/io/machine.h"
 #include "stages/base/run_context.h"
 #include "tools/cli/options/command_line.h"
 

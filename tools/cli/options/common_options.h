@@ -2,7 +2,7 @@
 #include <map>
 #include <string>
 
-#include "pipeline/batch/fleet/shards.h"
+#include "pipeline/batch/plan.h"
 
 namespace texmesh {
 

@@ -1,6 +1,6 @@
 #include "tools/extract/glb/texture_source.h"
 
-#include "delivery/cpp/package/plane_streams.h"
+#include "delivery/cpp/package/package_reader.h"
 #include "stages/fill/fill.h"
 #include "stages/geometry/texel_coverage.h"
 #include "tools/extract/glb/scale_file.h"

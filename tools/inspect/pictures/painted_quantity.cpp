@@ -1,6 +1,6 @@
 #include "tools/inspect/pictures/painted_quantity.h"
 
-#include "pipeline/compile/artefacts.h"
+#include "pipeline/compile/stage_table.h"
 
 namespace texmesh {
 namespace {

@@ -3,7 +3,7 @@
 #include <string_view>
 
 #include "pipeline/compile/compile_model.h"
-#include "pipeline/graph/make_stage.h"
+#include "pipeline/graph/stage.h"
 #include "tools/inspect/pictures/painted_model.h"
 
 namespace texmesh {

@@ -3,7 +3,7 @@
 #include <span>
 #include <vector>
 
-#include "delivery/cpp/package/plane_streams.h"
+#include "delivery/cpp/package/package_reader.h"
 #include "format/base/finding.h"
 #include "format/base/vec.h"
 #include "format/documents/about.h"

@@ -1,7 +1,7 @@
 import type { ManifestProxy, ManifestScale } from '../format/manifest';
 import { proxyTextures, triangleBytes, vertexBytes } from '../format/shared_numbers';
 
-// What choices take on the GPU, from manifest and textures.json alone: delivery/cpp/decide/gpu_memory.cpp.
+// What choices take on the GPU, from manifest and textures.json alone: delivery/cpp/decide/texture_budget.cpp.
 
 const levelsOf = (widthPx: number, heightPx: number): number => 32 - Math.clz32(Math.max(widthPx, heightPx));
 /** How texels are stored: RGBA of 8 bits, or blocks of 4 x 4 texels: block8 = BC1, ETC2 of three channels; block16 = BC3, BC7, ETC2 of four, ASTC. */

@@ -2,7 +2,7 @@ import { doneBytes, forEver } from '../format/shared_numbers';
 import { FragmentOffer, HarmonicTimePlan, HtcStep, TimePlanOptions, bytesAtRung } from './harmonic_time';
 import { sumOf } from './numbers';
 
-// delivery/cpp/simulate/network_model.h for one server on a link of constant rate: the same arithmetic, the
+// delivery/cpp/simulate/simulation.h for one server on a link of constant rate: the same arithmetic, the
 // same bits.
 
 /** A link as a plan supposes it. */

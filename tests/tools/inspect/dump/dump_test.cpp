@@ -2,7 +2,6 @@
 
 #include "format/rules/allocation.h"
 #include "pipeline/compile/options.h"
-#include "pipeline/compile/profile.h"
 #include "pipeline/io/table.h"
 #include "tests/support/packages.h"
 #include "tools/inspect/dump/dump.h"

@@ -1,16 +1,18 @@
-#include "pipeline/io/machine/machine_share.h"
+#include "pipeline/io/machine.h"
 
 #include <sched.h>
-#include <unistd.h>
+#include <signal.h>
 
-#include <algorithm>
-#include <charconv>
+#include <cctype>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
 #include <sstream>
 #include <thread>
-#include <vector>
+
+#include "format/base/text_bytes.h"
+#include "pipeline/io/file_stamp.h"
+#include "pipeline/io/uri.h"
 
 namespace texmesh {
 namespace {
@@ -21,13 +23,6 @@ std::pair<std::string, std::string> words_of(const std::string& path) {
   std::pair<std::string, std::string> words;
   in >> words.first >> words.second;
   return words;
-}
-
-std::optional<std::uint64_t> number_in(const std::string& text) {
-  std::uint64_t value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (text.empty() || error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  return value;  // "max" and "-1" are none
 }
 
 class Shares {
@@ -59,12 +54,12 @@ class Shares {
     for (;;) {
       if (path == "/") path.clear();
       const std::string folder = mount + path;
-      limit_memory(number_in(words_of(folder + "/memory.max").first));
-      limit_memory(number_in(words_of(folder + "/memory.limit_in_bytes").first));
+      limit_memory(whole_number<std::uint64_t>(words_of(folder + "/memory.max").first));
+      limit_memory(whole_number<std::uint64_t>(words_of(folder + "/memory.limit_in_bytes").first));
       const auto [quota, period] = words_of(folder + "/cpu.max");
-      limit_processors(number_in(quota), number_in(period));
-      limit_processors(number_in(words_of(folder + "/cpu.cfs_quota_us").first),
-                       number_in(words_of(folder + "/cpu.cfs_period_us").first));
+      limit_processors(whole_number<std::uint64_t>(quota), whole_number<std::uint64_t>(period));
+      limit_processors(whole_number<std::uint64_t>(words_of(folder + "/cpu.cfs_quota_us").first),
+                       whole_number<std::uint64_t>(words_of(folder + "/cpu.cfs_period_us").first));
       if (path.empty()) return;
       path.resize(std::min(path.rfind('/'), path.size() - 1));
     }
@@ -82,7 +77,7 @@ class Shares {
 
   std::optional<std::uint64_t> variable(const char* name) const {
     const char* text = view_.environment ? view_.environment(name) : nullptr;
-    return text ? number_in(text) : std::nullopt;
+    return text ? whole_number<std::uint64_t>(text) : std::nullopt;
   }
 
   void limit_memory(std::optional<std::uint64_t> bytes) {
@@ -99,6 +94,58 @@ class Shares {
   const MachineView& view_;
   MachineShare share_;
 };
+
+constexpr std::size_t kMachineDigits = 12, kMostHostLetters = 16;
+constexpr std::int64_t kDay_ns = 86'400'000'000'000;
+
+std::string host_letters() {
+  char name[256] = "";
+  ::gethostname(name, sizeof name - 1);
+  std::string letters;
+  for (const char* c = name; *c != '\0' && *c != '.' && letters.size() < kMostHostLetters; ++c)
+    if (std::isalnum(static_cast<unsigned char>(*c))) letters += *c;
+  return letters.empty() ? "host" : letters;
+}
+
+/// "" where the system does not tell.
+std::string machine_digits() {
+  std::string boot;
+  std::getline(std::ifstream("/proc/sys/kernel/random/boot_id"), boot);
+  struct stat processes {};
+  if (boot.empty() || ::stat("/proc/self/ns/pid", &processes) != 0) return "";
+  const std::string text = boot + " " + std::to_string(processes.st_ino);
+  return to_hex(sha256(text_bytes(text))).substr(0, kMachineDigits);
+}
+
+const std::string& machine_id() {
+  static const std::string digits = machine_digits();
+  return digits;
+}
+
+struct MarkParts {
+  std::string_view machine;
+  pid_t pid = 0;
+};
+
+bool read_mark(std::string_view mark, MarkParts& parts) {
+  const std::size_t first = mark.find('-'), second = mark.find('-', first + 1);
+  if (first == 0 || first == std::string_view::npos || second == std::string_view::npos) return false;
+  parts.machine = mark.substr(first + 1, second - first - 1);
+  parts.pid = whole_number<pid_t>(mark.substr(second + 1)).value_or(0);
+  return parts.machine.size() == kMachineDigits &&
+         parts.machine.find_first_not_of("0123456789abcdef") == std::string_view::npos && parts.pid > 0;
+}
+
+/// A process that has ended stays in the table until its parent asks, and some parents never do.
+bool is_alive(pid_t pid) {
+  if (::kill(pid, 0) != 0 && errno != EPERM) return false;
+  std::string stat;
+  std::getline(std::ifstream("/proc/" + std::to_string(pid) + "/stat"), stat);
+  const std::size_t name_end = stat.rfind(')');
+  if (name_end == std::string::npos || name_end + 2 >= stat.size()) return true;
+  const char state = stat[name_end + 2];
+  return state != 'Z' && state != 'X';
+}
 
 }  // namespace
 
@@ -117,5 +164,23 @@ MachineView this_machine() {
 }
 
 MachineShare machine_share(const MachineView& view) { return Shares(view).find(); }
+
+std::string owner_mark() {
+  static const std::string host = host_letters();
+  const std::string machine = machine_id().empty() ? std::string(kMachineDigits, '0') : machine_id();
+  return host + "-" + machine + "-" + std::to_string(::getpid());
+}
+
+bool is_owner_mark(std::string_view text) {
+  MarkParts parts;
+  return read_mark(text, parts);
+}
+
+bool owner_may_live(std::string_view mark, std::int64_t modified_ns) {
+  MarkParts parts;
+  if (read_mark(mark, parts) && !machine_id().empty() && parts.machine == machine_id())
+    return is_alive(parts.pid);
+  return modified_ns > wall_clock_ns() - kDay_ns;
+}
 
 }  // namespace texmesh

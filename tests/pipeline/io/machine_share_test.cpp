@@ -1,4 +1,4 @@
-#include "pipeline/io/machine/machine_share.h"
+#include "pipeline/io/machine.h"
 
 #include <gtest/gtest.h>
 

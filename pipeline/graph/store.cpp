@@ -1,13 +1,10 @@
-#include "pipeline/graph/key.h"
+#include "pipeline/graph/store.h"
 
 #include <nlohmann/json.hpp>
 
 namespace texmesh {
-namespace {
-constexpr std::ptrdiff_t kConstructorParts = 3;
-}
 
-/// Adds kConstructorParts parts.
+/// added_parts() begins behind these three.
 Key::Key(std::string_view stage, int stage_version) {
   add("key schema", std::to_string(kKeySchema));
   add("stage", std::string(stage));
@@ -24,22 +21,22 @@ Key& Key::add_input(std::string_view role, const Sha256& digest, std::uint64_t b
 }
 
 std::vector<std::pair<std::string, std::string>> Key::added_parts() const {
-  return {parts_.begin() + kConstructorParts, parts_.end()};
+  return {parts_.begin() + 3, parts_.end()};
 }
 
 Sha256 Key::digest() const { return digest_of_parts(parts_); }
 
 Sha256 digest_of_parts(const std::vector<std::pair<std::string, std::string>>& parts) {
-  std::vector<std::uint8_t> record;
-  auto put = [&record](const std::string& s) {
-    for (int i = 0; i < 8; ++i) record.push_back(static_cast<std::uint8_t>(s.size() >> (8 * i)));
-    record.insert(record.end(), s.begin(), s.end());
+  Bytes all;
+  auto put = [&all](const std::string& s) {
+    for (int i = 0; i < 8; ++i) all.push_back(static_cast<std::uint8_t>(s.size() >> (8 * i)));
+    all.insert(all.end(), s.begin(), s.end());
   };
   for (const auto& [label, value] : parts) {
     put(label);
     put(value);
   }
-  return sha256(record);
+  return sha256(all);
 }
 
 std::optional<Key> key_from_preimage(const std::string& preimage) {

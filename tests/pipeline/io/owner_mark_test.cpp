@@ -1,4 +1,4 @@
-#include "pipeline/io/machine/owner_mark.h"
+#include "pipeline/io/machine.h"
 
 #include <gtest/gtest.h>
 #include <sys/wait.h>
