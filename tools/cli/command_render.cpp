@@ -75,8 +75,7 @@ std::array<double, 3> numbers(Vec3d v) { return {v.x, v.y, v.z}; }
 struct PrintedView {
   SheetView view;
   Vec3d origin;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("left_px", s.view.left_px, "");
     v("top_px", s.view.top_px, "");
     v("covered_px", s.view.covered_px, "");
@@ -92,8 +91,7 @@ struct PrintedView {
 struct PrintedTexture {
   std::uint32_t width_px = 0, height_px = 0;
   bool colours = false;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("width_px", s.width_px, "");
     v("height_px", s.height_px, "");
     v("colours", s.colours, "");
@@ -107,8 +105,7 @@ struct RenderDocument {
   const Pixels& pixels;
   std::vector<PrintedTexture> textures = {};
   std::vector<PrintedView> views = {};
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("file", last_name(s.args.output), "");
     v("width_px", s.pixels.width_px, "");
     v("height_px", s.pixels.height_px, "");

@@ -24,8 +24,7 @@ std::string hex(Srgb c) { return fmt::format("#{:02x}{:02x}{:02x}", c[0], c[1], 
 
 template <>
 struct RecordFields<LegendStop> {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("value", s.value, "");
     v("colour", hex(s.colour), "");
   }
@@ -38,8 +37,7 @@ struct PaintedDocument {
   const Painting& painting;
   const ColourLegend& legend;
   const Notes& notes;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("what", s.painting.what, "");
     v("output", s.painting.output, "");
     v("quantity", s.legend.quantity, "");

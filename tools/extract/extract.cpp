@@ -20,8 +20,7 @@ struct EnumNames<FileImage> {
 };
 template <>
 struct RecordFields<ExtractedImage> {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("image", s.image, "Number of the source image: texture/<image>.");
     v("role", s.role, "As in textures.json.");
     v("format", s.format, "");
@@ -201,8 +200,7 @@ struct ExtractReport {
   std::optional<int> views = {};
   std::optional<std::uint32_t> side_px = {};
   std::vector<std::string> notes = {};
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("version", Constant{1}, "");
     v("file", s.file, "Name of the GLB, without its folder.");
     v("bytes", s.bytes, Range{20, kMostGlbBytes}, "");

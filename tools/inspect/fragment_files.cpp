@@ -12,24 +12,21 @@ namespace texmesh {
 
 template <>
 struct RecordFields<FragmentIndex::Rung> {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("bytes", s.bytes, Range{0, 4294967296.0}, "");
     v("sha256", s.digests, "");
   }
 };
 template <>
 struct RecordFields<FragmentIndex::Plane> {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("order", s.order, "");
     v("rungs", s.rungs, "");
   }
 };
 template <>
 struct RecordFields<FragmentIndex> {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("version", Constant{1}, "");
     v("planes", s.planes, "");
   }

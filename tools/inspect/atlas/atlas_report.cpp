@@ -19,8 +19,7 @@ constexpr Range kShare{0, 1}, kPositive{0, 1e300};
 
 template <>
 struct RecordFields<SurfacePercentiles> {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("p5", s.p5, kPositive, "");
     v("p50", s.p50, kPositive, "");
     v("p95", s.p95, kPositive, "");
@@ -30,8 +29,7 @@ struct RecordFields<SurfacePercentiles> {
 
 template <>
 struct RecordFields<SeamColours> {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("mean", s.mean, kPositive, "");
     v("p95", s.p95, kPositive, "");
     v("inside", s.inside, kPositive, "from the seam to one texel further in, in the mean");
@@ -40,8 +38,7 @@ struct RecordFields<SeamColours> {
 
 template <>
 struct RecordFields<NamedAtlas> {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("image", s.image,
       "index into the model's images, unused ones left out; of a package's S_0, into that file's");
     v("name", s.name, "as messages call the texture");
@@ -77,8 +74,7 @@ struct RecordFields<NamedAtlas> {
 
 template <>
 struct RecordFields<AtlasAdvice> {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("code", s.code, FieldRule{.words = "charts|thin|cover|overlap|seams|density|stretch|flat|folded|far"},
       "");
     v("atlas", s.atlas, "the texture's name; empty = the model as a whole");
@@ -89,8 +85,7 @@ struct RecordFields<AtlasAdvice> {
 
 template <>
 struct RecordFields<AtlasDiagnosis> {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("version", Constant{1}, "");
     v("triangles", s.triangles, "");
     v("untextured_triangles", s.untextured_triangles, "");
@@ -105,8 +100,7 @@ struct RecordFields<AtlasDiagnosis> {
 
 template <>
 struct RecordFields<DoctorReport> {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("input", s.input, "file name, no folder");
     RecordFields<AtlasDiagnosis>::fields(s.diagnosis, v);
     v("good", s.reasons.empty(), "every limit is kept");

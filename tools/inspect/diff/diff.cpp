@@ -17,8 +17,7 @@ namespace {
 struct DiffedPackage {
   std::string name, id;
   std::uint64_t bytes = 0;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("name", s.name, "");
     v("id", s.id, FieldRule{.pattern = "^[0-9a-f]{64}$"}, "");
     v("bytes", s.bytes, "Of all entries.");
@@ -46,8 +45,7 @@ struct DiffReport {
   std::array<DiffedPackage, 2> packages() const {
     return {{{names[0], diff.ids[0], diff.bytes[0]}, {names[1], diff.ids[1], diff.bytes[1]}}};
   }
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("version", Constant{1}, "");
     v("equal", s.diff.equal(), "The same package id: every byte is the same.");
     v("packages", s.packages(), kTwo, "");
@@ -62,8 +60,7 @@ struct DiffReport {
 
 template <>
 struct RecordFields<Difference> {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("kind", s.kind, "");
     v("name", s.name,
       "Input: the name by which the model refers to it, empty for the model itself. Option: stage.option.");
@@ -76,8 +73,7 @@ struct RecordFields<Difference> {
 
 template <>
 struct RecordFields<StageDifference> {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("stage", s.stage, "");
     v("entries", s.entries, "");
     v("bytes", sizes(s.bytes), kTwo, "");
@@ -87,8 +83,7 @@ struct RecordFields<StageDifference> {
 
 template <>
 struct RecordFields<EntryDifference> {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("path", s.path, "");
     v("stage", text_or_null(s.stage), "");
     v("in", s.present, kTwo, "");

@@ -19,8 +19,7 @@ namespace texmesh {
 
 template <>
 struct RecordFields<Finding> {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("check", s.check, FieldRule{.pattern = "^[a-z0-9-]+$"}, "");
     v("rule", s.rule, FieldRule{.pattern = "^([A-Z][0-9][0-9])?$"},
       "the rule of format/SPEC.md that is broken");
@@ -33,8 +32,7 @@ struct RecordFields<Finding> {
 
 template <>
 struct RecordFields<VerifiedPackage> {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("package", s.package, "");
     v("ok", s.report.findings.empty(), "");
     v("entries", s.report.entries, "");
@@ -52,8 +50,7 @@ namespace {
 /// What verify --json prints.
 struct VerifiedPackages {
   std::vector<VerifiedPackage> packages;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("packages", s.packages, "");
   }
 };

@@ -24,8 +24,7 @@ namespace {
 struct ListedFile {
   std::string path;
   std::optional<std::uint64_t> bytes;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("path", s.path, FieldRule{.pattern = "."},
       "Relative to the folder. Without `bytes` a copy of the package, or of the viewer's folder.");
     v("bytes", s.bytes, "");
@@ -38,8 +37,7 @@ struct ExportList {
   std::string package, open;
   std::vector<ListedFile> files;
   std::vector<std::string> notes;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("texmeshExport", Constant{1}, "");
     v("target", s.target, "");
     v("package", s.package, FieldRule{.pattern = "^[0-9a-f]{64}$"},

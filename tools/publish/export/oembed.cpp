@@ -10,8 +10,7 @@
 namespace texmesh {
 template <>
 struct RecordFields<EmbeddedObject> {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("version", Constant{"1.0"}, "");
     v("type", Constant{"rich"}, "");
     v("title", s.about.title, kMayMiss, "");

@@ -29,8 +29,7 @@ void differences_fields(const ViewDifferences& d, V&& v) {
 struct ReportedSwitch {
   SwitchSize size;
   bool holds = false;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("scale", s.size.scale, Range{1, 99}, "");
     v("triangles", s.size.triangles, "");
     v("up_to_px", s.size.up_to_px, kPx, "");
@@ -45,8 +44,7 @@ struct ReportDocument {
   Report report;
   std::vector<ReportedSwitch> switches;
   std::vector<std::string> files;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("version", Constant{1}, "");
     v("title", s.report.title, "");
     v("holds", s.report.holds, "every switch size is within both limits; the exit code is 0 then, else 4");
@@ -65,8 +63,7 @@ struct ReportDocument {
 
 template <>
 struct RecordFields<SourceComparison> {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("file", s.file, "");
     v("displayed_px", s.displayed_px, Range{1, 1e9}, "");
     differences_fields(s.views, v);

@@ -19,8 +19,7 @@ namespace texmesh {
 
 template <>
 struct RecordFields<SiteFault> {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("package", s.path, "");
     v("error", s.message, FieldRule{.pattern = "."}, "");
   }
@@ -31,8 +30,7 @@ namespace {
 struct ReportedObject {
   std::string package, page, title;
   std::uint64_t bytes = 0;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("package", s.package, FieldRule{.pattern = "."},
       "Relative to the folder of packages; an unpacked one ends with a slash.");
     v("page", s.page, FieldRule{.pattern = "^objects/[A-Za-z0-9._-]+\\.html$"}, "Relative to DIR.");
@@ -46,8 +44,7 @@ struct SiteReport {
   std::string page;
   std::vector<ReportedObject> objects;
   std::vector<SiteFault> faults;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("version", Constant{1}, "");
     v("page", s.page, FieldRule{.pattern = "."}, "Path of index.html.");
     v("objects", s.objects, "In the order of the page.");
