@@ -1,14 +1,11 @@
 // The documents of an experiment: design.json, which says what judges are asked, and what they answered.
 #include "lab/experiment/design.h"
 
-#include <algorithm>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <set>
 #include <tuple>
 
 #include "format/base/bounded_json.h"
-#include "format/base/sha256.h"
 #include "format/base/text_bytes.h"
 #include "format/rules/split_mix.h"
 #include "pipeline/compile/user_document.h"

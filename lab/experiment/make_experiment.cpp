@@ -4,13 +4,6 @@
 #include <fmt/format.h>
 #include <zlib.h>
 
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <map>
-
-#include "format/base/box.h"
-#include "format/base/errors.h"
 #include "format/base/portable_math.h"
 #include "format/rules/split_mix.h"
 #include "pipeline/io/markup.h"
@@ -20,7 +13,6 @@
 #include "stages/render/shade.h"
 #include "tools/extract/package_model.h"
 #include "tools/publish/pages/page.h"
-#include "tools/render/picture_sheet.h"
 
 namespace texmesh {
 

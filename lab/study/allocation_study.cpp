@@ -1,9 +1,5 @@
 #include "lab/study/allocation_study.h"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
-
 #include "format/base/box.h"
 #include "format/rules/allocation.h"
 #include "format/rules/rate_distortion.h"
@@ -11,7 +7,6 @@
 #include "stages/fragment_codec/fragment_codec.h"
 #include "stages/jpeg/jpeg.h"
 #include "stages/measure/flip.h"
-#include "stages/measure/image_compare.h"
 #include "stages/render/shade.h"
 
 namespace texmesh {

@@ -1,7 +1,4 @@
 #pragma once
-#include <cstdint>
-#include <span>
-#include <vector>
 
 #include "delivery/cpp/decide/fragment_offer.h"
 #include "format/split/split_reader.h"

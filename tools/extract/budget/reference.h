@@ -1,15 +1,9 @@
 #pragma once
-#include <cstdint>
-#include <map>
-#include <memory>
-#include <vector>
 
-#include "format/base/box.h"
 #include "stages/geometry/fit_normals.h"
 #include "stages/measure/flip.h"
 #include "stages/render/shade.h"
 #include "tools/extract/extract.h"
-#include "tools/extract/glb/texture_source.h"
 
 namespace texmesh {
 
