@@ -1,6 +1,4 @@
 #pragma once
-#include <cmath>
-#include <cstdint>
 
 #include "format/base/vec.h"
 

@@ -1,28 +1,10 @@
 #include "lab/cli/plan_pictures.h"
 
-#include <algorithm>
-#include <cmath>
-
-#include "format/container/layout.h"
-#include "stages/image/resize.h"
-#include "tools/extract/glb/scale_file.h"
-#include "tools/extract/glb/texture_source.h"
+#include "tools/extract/glb/standalone_glb.h"
 #include "tools/extract/package_model.h"
-#include "tools/render/picture_sheet.h"
-#include "tools/render/plane_pixels.h"
 
 namespace texmesh {
 namespace {
-
-/// The planes of an image as one picture; alpha may be shown at another size.
-Pixels with_alpha_of(const PackageImage& image, const Pixels& colours, const Pixels& alpha) {
-  const std::uint32_t width = std::min(colours.width_px, alpha.width_px),
-                      height = std::min(colours.height_px, alpha.height_px);
-  const auto fitted = [&](const Pixels& p, Averaging kind) {
-    return reduced(p, p.width_px, p.height_px, width, height, kind);
-  };
-  return with_alpha(fitted(colours, image.averaging()), fitted(alpha, Averaging::kNumbers));
-}
 
 const ShownPlane& shown_plane(const ShownPackage& shown, std::uint32_t base) {
   const auto found =

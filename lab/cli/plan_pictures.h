@@ -1,13 +1,7 @@
 #pragma once
-#include <cstdint>
-#include <map>
-#include <optional>
-#include <string>
-#include <vector>
 
 #include "delivery/cpp/client/delivery_plan.h"
 #include "stages/measure/flip.h"
-#include "stages/render/environment.h"
 #include "stages/render/shade.h"
 #include "tools/render/rendered_model.h"
 

@@ -1,9 +1,7 @@
 // The documents of an experiment: design.json, which says what judges are asked, and what they answered.
 #include "lab/experiment/design.h"
 
-#include <algorithm>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <set>
 #include <tuple>
 

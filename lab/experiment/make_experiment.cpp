@@ -1,9 +1,9 @@
 // What judges are shown, and the page that shows it to them.
 #include "lab/experiment/make_experiment.h"
 
-#include <fmt/format.h>
 #include <zlib.h>
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -20,7 +20,6 @@
 #include "stages/render/shade.h"
 #include "tools/extract/package_model.h"
 #include "tools/publish/pages/page.h"
-#include "tools/render/picture_sheet.h"
 
 namespace texmesh {
 

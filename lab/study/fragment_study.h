@@ -1,7 +1,4 @@
 #pragma once
-#include <cstdint>
-#include <functional>
-#include <vector>
 
 #include "stages/base/run_context.h"
 #include "stages/data/fragments.h"

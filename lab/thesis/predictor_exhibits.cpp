@@ -1,8 +1,6 @@
 // Figs. 8.2, 8.3 and 8.5: texture predictors, the size model, and quality by predictor.
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
 #include <numeric>
 
 #include "format/rules/allocation.h"

@@ -1,7 +1,4 @@
 #pragma once
-#include <cstdint>
-#include <span>
-#include <vector>
 
 #include "delivery/cpp/decide/harmonic_time.h"
 #include "format/split/split_reader.h"

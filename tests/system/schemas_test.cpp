@@ -17,7 +17,7 @@
 #include "pipeline/compile/options.h"
 #include "pipeline/import/range/range_scan_document.h"
 #include "tests/support/schema.h"
-#include "tools/inspect/fragment_files.h"
+#include "tools/inspect/package_tree.h"
 #include "tools/inspect/provenance.h"
 
 namespace texmesh {

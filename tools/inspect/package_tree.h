@@ -1,5 +1,7 @@
 #pragma once
-#include <string>
+
+#include "delivery/cpp/package/package_reader.h"
+#include "format/base/finding.h"
 
 namespace texmesh {
 
@@ -18,5 +20,45 @@ void unpack_package(const std::string& package, const std::string& folder, const
 /// from them. A content credential stays the last entry. Throws FormatError when a file is missing, too many,
 /// or not what its digest says.
 void pack_folder(const std::string& folder, const std::string& package);
+
+/// A tree made with `unpack --fragments files` holds, beside the entries of the package, every fragment as a
+/// complete image file (fragment_file_path) for servers without Range requests, and this index of them
+/// (schemas/fragments.v1.schema.json). Neither is part of the package: `pack` leaves them out again.
+inline constexpr const char* kFragmentIndexPath = "fragments.json";
+
+/// Bytes and digests of the fragment files of one package, in the order in which a client wants them.
+struct FragmentIndex {
+  struct Rung {
+    std::vector<std::uint64_t> bytes;  // per fragment of the plane's order: of the complete file; 0 = no file
+    std::vector<std::string> digests;  // its SHA-256's first 8 bytes, 16 lower-case digits; zeros = no file
+  };
+  struct Plane {
+    std::vector<std::uint16_t> order;  // as PlaneTables::order
+    std::vector<Rung> rungs;
+  };
+  std::vector<Plane> planes;
+};
+std::string write_fragment_index(const FragmentIndex& index);
+/// Strict; FormatError names the JSON pointer.
+FragmentIndex read_fragment_index(std::span<const std::uint8_t> json);
+
+/// Cuts a package's rungs into complete files, hands each to `sink` in order of plane, rung and importance,
+/// and returns their index.
+using FragmentFileSink = std::function<void(const std::string& path, const std::vector<std::uint8_t>& file)>;
+FragmentIndex make_fragment_files(PackageReader& package, const FragmentFileSink& sink);
+
+/// One rung's entry put together again from fragment files: each without what it shares with others.
+/// FormatError when a file does not begin with the tables. `table_stream` is the rung's, or the lowest rung's
+/// for an incremental codec; `read_file` gives the bytes of a path.
+std::vector<std::uint8_t> join_fragment_files(
+    Codec codec, const PlaneTables& tables, std::uint32_t plane, std::uint32_t rung,
+    const std::vector<std::uint8_t>& table_stream,
+    const std::function<std::vector<std::uint8_t>(const std::string&)>& read_file);
+
+/// Every fragment file of a tree against the index and against the tree's own rung entries: all there, none
+/// besides, bytes and digests as stated, contents equal. Findings of check "fragment-file".
+void check_fragment_files(PackageStore& folder, const std::vector<ContainerEntry>& listed,
+                          const std::vector<TextureInfo>& textures, const PackageTables& tables,
+                          Findings& findings);
 
 }  // namespace texmesh

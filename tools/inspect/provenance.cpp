@@ -13,8 +13,7 @@ constexpr Range kNotEmptyText{1, 1e6};
 
 struct FormatVersion {
   int major = 0, minor = 0;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("major", s.major, Range{0, 65535}, "");
     v("minor", s.minor, Range{0, 65535}, "");
   }
@@ -24,8 +23,7 @@ struct FormatVersion {
 
 template <>
 struct RecordFields<Provenance::Input> {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("role", s.role, FieldRule{.words = "model|file"}, "");
     v("uri", s.uri, kMayMiss, "as the model refers to the file");
     v("sha256", s.sha256, FieldRule{.pattern = "^[0-9a-f]{64}$"}, "");
@@ -42,8 +40,7 @@ struct ProvenanceDocument {
   Json options;
   std::map<std::string, int> stages;
   std::map<std::string, std::string> libraries;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("version", Constant{1}, "");
     v("tool", s.tool, kNotEmptyText, "name and version of what made the package");
     v("format", s.format, "");

@@ -457,11 +457,6 @@ Option& Option::required() {
   return *this;
 }
 
-Option& Option::value_name(const std::string& name) {
-  option_->type_name(name);
-  return *this;
-}
-
 Option& Option::shows_default(const std::string& text) {
   option_->capture_default_str();
   if (!text.empty()) option_->default_str(text);
@@ -558,25 +553,31 @@ Option Command::flag(const std::string& names, std::function<void()> on_given, c
 }
 
 template <class T>
-Option Command::option(const std::string& names, T& value, const std::string& help) {
-  CLI::Option* option = app_->add_option(names, value, help)->type_name(default_value_name<T>());
+Option Command::option(const std::string& names, T& value, const std::string& help,
+                       const std::string& value_name) {
+  CLI::Option* option = app_->add_option(names, value, help);
+  option->type_name(value_name.empty() ? default_value_name<T>() : value_name);
   if (!group_.empty()) option->group(group_);
   return {option, *state_};
 }
-template Option Command::option(const std::string&, int&, const std::string&);
-template Option Command::option(const std::string&, std::uint64_t&, const std::string&);
-template Option Command::option(const std::string&, double&, const std::string&);
-template Option Command::option(const std::string&, std::string&, const std::string&);
-template Option Command::option(const std::string&, std::optional<int>&, const std::string&);
-template Option Command::option(const std::string&, std::optional<double>&, const std::string&);
-template Option Command::option(const std::string&, std::vector<int>&, const std::string&);
-template Option Command::option(const std::string&, std::vector<std::string>&, const std::string&);
+template Option Command::option(const std::string&, int&, const std::string&, const std::string&);
+template Option Command::option(const std::string&, std::uint64_t&, const std::string&, const std::string&);
+template Option Command::option(const std::string&, double&, const std::string&, const std::string&);
+template Option Command::option(const std::string&, std::string&, const std::string&, const std::string&);
+template Option Command::option(const std::string&, std::optional<int>&, const std::string&,
+                                const std::string&);
+template Option Command::option(const std::string&, std::optional<double>&, const std::string&,
+                                const std::string&);
+template Option Command::option(const std::string&, std::vector<int>&, const std::string&,
+                                const std::string&);
+template Option Command::option(const std::string&, std::vector<std::string>&, const std::string&,
+                                const std::string&);
 
 Option Command::option(const std::string& names, std::function<void(const std::string&)> on_given,
-                       const std::string& help) {
+                       const std::string& help, const std::string& value_name) {
   CLI::Option* option = app_->add_option_function<std::string>(names, std::move(on_given), help);
   if (!group_.empty()) option->group(group_);
-  return {option->type_name("TEXT"), *state_};
+  return {option->type_name(value_name), *state_};
 }
 
 void Command::help_option(const std::string& name, const std::string& prefix, const std::string& help) {

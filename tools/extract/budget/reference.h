@@ -1,15 +1,10 @@
 #pragma once
-#include <cstdint>
-#include <map>
-#include <memory>
-#include <vector>
 
 #include "format/base/vec.h"
 #include "stages/geometry/scale_frames.h"
 #include "stages/measure/flip.h"
 #include "stages/render/shade.h"
 #include "tools/extract/extract.h"
-#include "tools/extract/glb/texture_source.h"
 
 namespace texmesh {
 

@@ -1,19 +1,19 @@
 // Of every texture plane: its grid with what each fragment is worth and takes, its rungs, and the tables by
 // which clients choose rungs.
+#include "tools/inspect/dump/dump.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <iterator>
+#include <nlohmann/json.hpp>
 
 #include "format/rules/allocation.h"
 #include "pipeline/io/table.h"
-#include "tools/inspect/dump/dump_parts.h"
 #include "tools/inspect/dump/package_figures.h"
 
 namespace texmesh {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 /// The title line of a texture plane.
 std::string plane_title(const TextureInfo& t, std::size_t plane) {
@@ -60,32 +60,6 @@ Table fragments_table(const TextureInfo& info, const PlaneTables& t, const Plane
       table.rows.back().emplace_back(t.size_bytes[r * t.fragment_count() + i]);
   }
   return table;
-}
-
-Json fragment_json(const PlaneTables& t, const PlaneThesis* thesis, std::size_t i,
-                   const std::vector<float>& eta) {
-  Json bytes = Json::array(), features = Json::array();
-  for (std::size_t r = 0; r < t.rung_count(); ++r) bytes.push_back(t.size_bytes[r * t.fragment_count() + i]);
-  for (std::size_t row = 0; row < t.scale_count(); ++row)
-    features.push_back(t.features[row * t.fragment_count() + i]);
-  Json j{{"fragment", i},
-         {"column", i % t.columns},
-         {"row", i / t.columns},
-         {"covered_texels", t.covered_texels[i]},
-         {"surface_fraction", t.surface_fraction[i]},
-         {"eta", eta[i]},
-         {"features", features},
-         {"bytes", bytes}};
-  if (thesis && i < thesis->vqp.size())
-    j.update(Json{{"vqp", thesis->vqp[i]},
-                  {"z", thesis->z[i]},
-                  {"i", thesis->i[i]},
-                  {"zeta", thesis->zeta[i]},
-                  {"m", thesis->m[i]}});
-  if (thesis && i < thesis->models.size())
-    if (const SizeModel& model = thesis->models[i]; model != SizeModel{})
-      j["size_model"] = {{"a", model.a}, {"b", model.b}, {"correlation", model.correlation}};
-  return j;
 }
 
 Table rungs_table(const TextureInfo& info, const PlaneTables& t) {
@@ -166,19 +140,6 @@ Json allocation_json(const PlaneTables& t, int scale, std::size_t row, DumpGamma
           {"gamma", f.gamma},       {"bytes_at_gamma", f.bytes},
           {"total_bytes", total},   {"fragment_quality", q},
           {"fragment_rung", rungs}, {"fragment_bytes", bytes}};
-}
-
-/// D_i(Gamma) of all scales of the chain.
-Json thesis_json(const PlaneThesis& thesis) {
-  Json scales = Json::array();
-  for (std::size_t s = 0; s < thesis.quality.size(); ++s) {
-    const auto begin = thesis.total_bytes.begin() + static_cast<std::ptrdiff_t>(s * kGammaSteps);
-    scales.push_back({{"scale", s},
-                      {"quality", thesis.quality[s]},
-                      {"total_bytes",
-                       std::vector<std::uint64_t>(begin, begin + static_cast<std::ptrdiff_t>(kGammaSteps))}});
-  }
-  return {{"chain", scales}};
 }
 
 /// The middle one of the fitted models' values.
@@ -273,7 +234,31 @@ Json fragments_json(PackageReader& p, DumpGamma) {
     const PlaneTables& t = p.tables().planes[k];
     const std::vector<float> eta = eta_of(t, 0);
     Json fragments = Json::array();
-    for (const std::uint16_t i : t.order) fragments.push_back(fragment_json(t, p.plane_thesis(k), i, eta));
+    const PlaneThesis* thesis = p.plane_thesis(k);
+    for (const std::uint16_t i : t.order) {
+      Json bytes = Json::array(), features = Json::array();
+      for (std::size_t r = 0; r < t.rung_count(); ++r)
+        bytes.push_back(t.size_bytes[r * t.fragment_count() + i]);
+      for (std::size_t row = 0; row < t.scale_count(); ++row)
+        features.push_back(t.features[row * t.fragment_count() + i]);
+      Json& j = fragments.emplace_back(Json{{"fragment", i},
+                                            {"column", i % t.columns},
+                                            {"row", i / t.columns},
+                                            {"covered_texels", t.covered_texels[i]},
+                                            {"surface_fraction", t.surface_fraction[i]},
+                                            {"eta", eta[i]},
+                                            {"features", features},
+                                            {"bytes", bytes}});
+      if (thesis && i < thesis->vqp.size())
+        j.update(Json{{"vqp", thesis->vqp[i]},
+                      {"z", thesis->z[i]},
+                      {"i", thesis->i[i]},
+                      {"zeta", thesis->zeta[i]},
+                      {"m", thesis->m[i]}});
+      if (thesis && i < thesis->models.size())
+        if (const SizeModel& model = thesis->models[i]; model != SizeModel{})
+          j["size_model"] = {{"a", model.a}, {"b", model.b}, {"correlation", model.correlation}};
+    }
     planes.push_back({{"plane", k},
                       {"columns", info.columns},
                       {"rows", info.rows},
@@ -349,7 +334,15 @@ Json tables_json(PackageReader& p, DumpGamma gamma) {
                       {"quality_min", t.quality_min},
                       {"quality_max", t.quality_max},
                       {"scales", scales}});
-    if (const PlaneThesis* thesis = p.plane_thesis(k)) planes.back()["thesis"] = thesis_json(*thesis);
+    const PlaneThesis* thesis = p.plane_thesis(k);
+    if (!thesis) continue;
+    Json& chain = planes.back()["thesis"]["chain"] = Json::array();  // D_i(Gamma) of all scales
+    for (std::size_t s = 0; s < thesis->quality.size(); ++s) {
+      const auto begin = thesis->total_bytes.begin() + static_cast<std::ptrdiff_t>(s * kGammaSteps);
+      chain.push_back({{"scale", s},
+                       {"quality", thesis->quality[s]},
+                       {"total_bytes", std::vector<std::uint64_t>(begin, begin + kGammaSteps)}});
+    }
   }
   return {{"tables", planes}, {"measured_quality", Json::parse(write_quality(p.quality()))}};
 }

@@ -1,13 +1,9 @@
 #pragma once
-#include <cstdint>
-#include <string>
-#include <vector>
 
 #include "format/documents/about.h"
+#include "pipeline/io/record.h"
 
 namespace texmesh {
-
-struct DocumentSchema;  // pipeline/io/record.h
 
 struct SiteOptions {
   std::string title = "Scans";
@@ -34,6 +30,10 @@ struct SiteObject {
 /// A package that could not be read, and why.
 struct SiteFault {
   std::string path, message;
+  static void fields(auto& s, auto&& v) {
+    v("package", s.path, "");
+    v("error", s.message, FieldRule{.pattern = "."}, "");
+  }
 };
 
 struct Site {
@@ -55,8 +55,30 @@ void write_site(const Site& site, const std::string& folder);
 /// The same refusals, before the work.
 void check_site_folder(const std::string& folder);
 
-/// For programs: schemas/site.v1.schema.json.
-std::string site_json(const Site& site, const std::string& folder);
+struct ReportedObject {
+  std::string package, page, title;
+  std::uint64_t bytes = 0;
+  static void fields(auto& s, auto&& v) {
+    v("package", s.package, FieldRule{.pattern = "."},
+      "Relative to the folder of packages; an unpacked one ends with a slash.");
+    v("page", s.page, FieldRule{.pattern = "^objects/[A-Za-z0-9._-]+\\.html$"}, "Relative to DIR.");
+    v("title", s.title, "");
+    v("bytes", s.bytes, "Of the whole package.");
+  }
+};
+/// What site --json prints.
+struct SiteReport {
+  std::string page;
+  std::vector<ReportedObject> objects;
+  std::vector<SiteFault> faults;
+  static void fields(auto& s, auto&& v) {
+    v("version", Constant{1}, "");
+    v("page", s.page, FieldRule{.pattern = "."}, "Path of index.html.");
+    v("objects", s.objects, "In the order of the page.");
+    v("faults", s.faults, "Packages that could not be read and are not in the site.");
+  }
+};
+SiteReport site_report(const Site& site, const std::string& folder);
 DocumentSchema site_schema();
 
 /// A name for the files of the package at `path`, none of `taken` (in lower case), to which it is added.

@@ -9,7 +9,6 @@
 #include "tests/support/meshes.h"
 #include "tests/support/packages.h"
 #include "tools/extract/budget/filling.h"
-#include "tools/extract/glb/scale_file.h"
 #include "tools/extract/glb/standalone_glb.h"
 
 namespace texmesh {

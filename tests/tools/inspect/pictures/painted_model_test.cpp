@@ -11,7 +11,7 @@
 #include "tests/support/meshes.h"
 #include "tests/support/packages.h"
 #include "tools/inspect/package_mesh.h"
-#include "tools/inspect/pictures/painted_quantity.h"
+#include "tools/inspect/pictures/painted_model.h"
 
 namespace texmesh {
 namespace {
