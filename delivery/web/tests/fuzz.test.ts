@@ -11,7 +11,6 @@ import { readQuality } from '../src/format/quality_table';
 import { parseTablesSection, readTablesHead } from '../src/format/read_tables';
 import { SplitStreamReader } from '../src/format/splits/split_stream';
 import { readTextures } from '../src/format/textures';
-import { parseThesis } from '../src/format/thesis_tables';
 import { FormatError, manifestOfContainer, PackageReader, readManifest } from '../src/reader';
 import { golden, goldenSet } from './support/files';
 import { readAll } from './support/read_all';
@@ -68,7 +67,6 @@ const packages = await Promise.all(
 const entries = (path: RegExp): Uint8Array[] =>
   packages.flatMap(({ bytes, index }) => index.filter((e) => path.test(e.path)).map((e) => bytes.slice(e.offset, e.offset + e.bytes)));
 const indexes = packages.map(({ bytes, manifest: { index } }) => bytes.slice(index.offset, index.offset + index.bytes));
-const first = packages[0];
 
 /** A reader, the inputs it starts from, and the fuzz targets (tests/fuzz) that read the same. */
 interface Reader {
@@ -83,7 +81,6 @@ const readers: Reader[] = [
   { name: 'textures', inputs: entries(/^textures\.json$/), targets: ['textures'], read: readTextures },
   { name: 'quality', inputs: entries(/^quality\.json$/), targets: ['quality'], read: readQuality },
   { name: 'about', inputs: entries(/^about\.json$/), targets: ['about'], read: readAbout },
-  { name: 'thesis', inputs: entries(/^thesis\.bin$/), targets: ['thesis'], read: (b) => parseThesis(b, first.manifest, first.textures) },
   {
     name: 'index', inputs: indexes, targets: ['index'],
     read: (b) => {
@@ -127,10 +124,7 @@ describe('readers give an answer or a FormatError', () => {
     it(`${reader.name}, changed`, async () => {
       expect(reader.inputs.length).toBeGreaterThan(0);
       const input = fc.constantFrom(...reader.inputs);
-      await fc.assert(
-        fc.asyncProperty(input, changes, (bytes, list) => expectAnswerOrFormatError(reader, changed(bytes, list))),
-        { numRuns: reader.name === 'package' ? runs / 4 : runs, seed: 2024 },
-      );
+      await fc.assert(fc.asyncProperty(input, changes, (bytes, list) => expectAnswerOrFormatError(reader, changed(bytes, list))), { numRuns: reader.name === 'package' ? runs / 4 : runs, seed: 2024 });
     }, 600_000);
     it.skipIf(!corpus)(`${reader.name}, as libFuzzer has kept it`, async () => {
       for (const bytes of kept(reader)) await expectAnswerOrFormatError(reader, bytes);

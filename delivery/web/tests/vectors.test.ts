@@ -147,11 +147,7 @@ function checkViewing(manifest: t.Manifest, v: Json): void {
   }
   const camera = { fovDegrees: 45, viewportPx: 1080 };
   expectBits([t.viewingDistance(manifest.objectHeight, 300, camera)], [v.distance_at_300_px], 'distance');
-  expectBits(
-    [t.displayedHeightPx(manifest.objectHeight, 3 * manifest.objectHeight, camera)],
-    [v.displayed_px_at_distance_3_heights],
-    'displayed height',
-  );
+  expectBits([t.displayedHeightPx(manifest.objectHeight, 3 * manifest.objectHeight, camera)], [v.displayed_px_at_distance_3_heights], 'displayed height');
   for (const [scale, ...errors] of v.scale_error_p95_rms_max_at_700_px) {
     const e = t.pixelError(manifest, manifest.scales.find((s) => s.scale === scale)!, 700);
     expectBits([e.p95, e.rms, e.max], errors, `errors of S_${scale}`);

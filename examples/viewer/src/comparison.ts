@@ -7,10 +7,7 @@ export class Comparison {
   private readonly divider = byId('divider');
   private share = 0.5; // of the picture's width, left of the border
 
-  constructor(
-    private readonly stage: Stage,
-    private readonly session: Session,
-  ) {
+  constructor(private readonly stage: Stage, private readonly session: Session) {
     const { divider } = this;
     divider.addEventListener('pointerdown', (e) => divider.setPointerCapture(e.pointerId));
     divider.addEventListener('pointermove', (e) => {

@@ -77,12 +77,7 @@ function addPlane(loss: TextureLoss, plane: number, surface: number, options: Li
  * Ordered by plane and importance; offers carry feature density times what showing the fragment saves in lit pictures. Needs the
  * planes' tables, and those of the full-size planes. `loss` is for the options' displayed height.
  */
-export function fragmentList(
-  data: PackageData,
-  planes: readonly PlaneChoice[],
-  options: Partial<ListOptions> = {},
-  loss = new TextureLoss(data, options.displayedPx ?? defaultListOptions.displayedPx),
-): FragmentList {
+export function fragmentList(data: PackageData, planes: readonly PlaneChoice[], options: Partial<ListOptions> = {}, loss = new TextureLoss(data, options.displayedPx ?? defaultListOptions.displayedPx)): FragmentList {
   const all = { ...defaultListOptions, ...options };
   const previewLoss: [number, number, number] = [0, 0, 0];
   const list: FragmentList = { offers: [], fragments: [], groups: [], groupWeights: all.groupWeights, previewLoss };

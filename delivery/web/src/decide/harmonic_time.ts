@@ -101,10 +101,7 @@ function lowestShown(f: FragmentOffer, limits: boolean): number {
  * The rung from `low` on that costs least (ties: the first), among rungs of at most `mostBytes`; -1: skipping
  * costs least. `cost` is that of a fragment of so many bytes and so much loss.
  */
-function cheapestRung(
-  { bytes, loss, highRung }: FragmentOffer, low: number, skip: boolean, mostBytes: number,
-  cost: (bytes: number, loss: number) => number,
-): number {
+function cheapestRung({ bytes, loss, highRung }: FragmentOffer, low: number, skip: boolean, mostBytes: number, cost: (bytes: number, loss: number) => number): number {
   let best = skip ? -1 : low;
   let least = skip ? cost(0, loss[0]) : cost(bytes[low], loss[low + 1]);
   for (let r = low; r < bytes.length && !(r > highRung); ++r) {
@@ -194,10 +191,7 @@ export class HarmonicTimePlan {
   private nowS_ = 0;
   private lastDoneS_ = 0;
 
-  constructor(
-    private readonly offers_: readonly FragmentOffer[],
-    options: TimePlanOptions,
-  ) {
+  constructor(private readonly offers_: readonly FragmentOffer[], options: TimePlanOptions) {
     this.options_ = completed(options);
     const { policy, timeLimitS, initialBytesS, lowestRung } = this.options_;
     this.remaining_ = [...offers_.keys()].sort((a, b) => offers_[b].eta - offers_[a].eta);

@@ -95,10 +95,7 @@ export class TextureLoss {
   private readonly planes_ = new Map<number, PlaneLoss>();
   private readonly previewMeans_ = new Map<number, number>();
 
-  constructor(
-    readonly data: PackageData,
-    readonly displayedPx: number,
-  ) {
+  constructor(readonly data: PackageData, readonly displayedPx: number) {
     this.curves_ = planeGroups.map((group) => new GroupCurve(data.quality, group, displayedPx));
   }
   plane(plane: number): PlaneLoss {

@@ -71,11 +71,7 @@ export function scaleAt(steps: readonly ManifestStep[], displayedPx: number): nu
  * How far a scale's surface is from S_0's on screen, px at most; `max` is the largest of some thousand sampled
  * distances, never less than `p95`, which comes from samples of its own.
  */
-export function pixelError(
-  manifest: Manifest,
-  scale: ManifestScale,
-  displayedPx: number,
-): { p95: number; rms: number; max: number } {
+export function pixelError(manifest: Manifest, scale: ManifestScale, displayedPx: number): { p95: number; rms: number; max: number } {
   if (scale.scale === 0 || !(manifest.objectHeight > 0)) return { p95: 0, rms: 0, max: 0 };
   const pxPerUnit = displayedPx / manifest.objectHeight;
   const p95 = scale.displayPxError >= anyDisplayPx ? 0 : displayedPx / scale.displayPxError;
@@ -119,13 +115,7 @@ function growthOfValue(s: ManifestScale, displayedPx: number, part: VisiblePart)
   return Math.max(1, value / s.p95);
 }
 
-function accepts(
-  scales: readonly ManifestScale[],
-  k: number,
-  displayedPx: number,
-  part: VisiblePart,
-  rule: StepRule,
-): boolean {
+function accepts(scales: readonly ManifestScale[], k: number, displayedPx: number, part: VisiblePart, rule: StepRule): boolean {
   const s = scales[k];
   if (rule === 'jnd') return Math.max(part.widthPx, part.heightPx) * growthOfValue(s, displayedPx, part) <= s.displayPxJnd;
   return displayedPx <= limitOf(scales, k, rule);
@@ -135,12 +125,7 @@ function accepts(
  * The scale for an object displayed `displayedPx` high (the whole of it, seen or not) of which only a part is visible
  * (Fig. 7.5). Nothing visible: the coarsest scale. Not clipped: by the step function.
  */
-export function selectScale(
-  manifest: Manifest,
-  displayedPx: number,
-  part: VisiblePart = wholeObject,
-  rule: StepRule = 'flip',
-): number {
+export function selectScale(manifest: Manifest, displayedPx: number, part: VisiblePart = wholeObject, rule: StepRule = 'flip'): number {
   const { scales } = manifest;
   if (!part.clipped) return scaleAt(stepFunction(scales, rule), displayedPx);
   if (!(part.widthPx > 0 && part.heightPx > 0)) return scales[scales.length - 1].scale;

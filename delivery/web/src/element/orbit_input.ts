@@ -14,12 +14,7 @@ export class OrbitInput {
   private readonly ended_ = new AbortController();
 
   /** `moved` hears of each new orbit; `zooms`: the distance changes, too. The wheel zooms only while the canvas has the focus: a page that scrolls by goes on scrolling. */
-  constructor(
-    private readonly canvas_: HTMLElement,
-    private home_: Orbit,
-    private readonly moved_: () => void,
-    private readonly zooms_ = true,
-  ) {
+  constructor(private readonly canvas_: HTMLElement, private home_: Orbit, private readonly moved_: () => void, private readonly zooms_ = true) {
     this.orbit = { ...home_ };
     const { signal } = this.ended_;
     canvas_.addEventListener('pointerdown', (e) => this.down_(e), { signal });

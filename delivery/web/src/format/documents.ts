@@ -114,13 +114,7 @@ export interface PlaneDocument {
 }
 
 /** Tables from a section of tables.bin; textures.json and the index must speak of the same fragments and bytes. */
-export function planeTables(
-  bytes: Uint8Array,
-  { minor, scales }: SectionRef,
-  plane: number,
-  info: TextureInfo,
-  entries: Map<string, EntryRef>,
-): PlaneDocument {
+export function planeTables(bytes: Uint8Array, { minor, scales }: SectionRef, plane: number, info: TextureInfo, entries: Map<string, EntryRef>): PlaneDocument {
   const tables = parseTablesSection(bytes, minor, `plane ${plane}`);
   const requireHere = (good: boolean, rule: string, expected: string): void =>
     require(good, rule, paths.tablesPath, `texture plane ${plane}`, expected);

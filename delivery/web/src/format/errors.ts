@@ -3,13 +3,7 @@
  * format/SPEC.md that is broken. Any of these may be empty; the message joins those that are not and ends with the rule: "[K03]".
  */
 export class TexmeshError extends Error {
-  constructor(
-    readonly file: string,
-    readonly place: string,
-    readonly expected: string,
-    readonly found = '',
-    readonly rule = '',
-  ) {
+  constructor(readonly file: string, readonly place: string, readonly expected: string, readonly found = '', readonly rule = '') {
     const facts = [expected && `expected ${expected}`, found && `found ${found}`].filter(Boolean).join(', ');
     super([file, place, facts].filter(Boolean).join(': ') + (rule && ` [${rule}]`));
   }

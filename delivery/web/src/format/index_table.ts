@@ -102,9 +102,7 @@ export async function readIndex(bytes: Uint8Array): Promise<EntryRef[]> {
   const last = head.pages[head.pages.length - 1];
   if (last.offset + last.bytes !== bytes.length)
     throw new FormatError(file, '', `${last.offset + last.bytes} bytes`, `${bytes.length}`, 'I03');
-  const pages = await Promise.all(
-    head.pages.map((p, i) => readIndexPage(head, i, bytes.subarray(p.offset, p.offset + p.bytes))),
-  );
+  const pages = await Promise.all(head.pages.map((p, i) => readIndexPage(head, i, bytes.subarray(p.offset, p.offset + p.bytes))));
   const entries = pages.flat().sort((a, b) => a.offset - b.offset);
   checkOrder(entries);
   return entries;

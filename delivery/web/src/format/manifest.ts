@@ -118,7 +118,7 @@ export interface Manifest {
   provenance: EntryRef;
   about: EntryRef;
   stream?: StreamRef;
-  /** thesis.bin: see readThesis. */
+  /** thesis.bin, which no load reads. */
   thesis?: EntryRef;
   poster?: PosterRef;
 }

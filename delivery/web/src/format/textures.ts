@@ -119,9 +119,7 @@ function checkMips(list: JsonAt, textures: TextureInfo[]): void {
     const side = (px: number): number => Math.ceil(px / (1 << t.mip));
     if (t.widthPx !== side(base.widthPx) || t.heightPx !== side(base.heightPx))
       list.at(p).fail('sides of 1 / 2^mip of the full size', '', 'X07');
-    const same = (['image', 'role', 'channels', 'colourSpace', 'previewWidthPx', 'previewHeightPx'] as const).every(
-      (name) => t[name] === base[name],
-    );
+    const same = (['image', 'role', 'channels', 'colourSpace', 'previewWidthPx', 'previewHeightPx'] as const).every((name) => t[name] === base[name]);
     if (!same) list.at(p).fail(`what plane ${t.base} has`, '', 'X07');
   }
 }

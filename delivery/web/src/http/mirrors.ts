@@ -51,10 +51,7 @@ export interface Asking {
 export class Mirrors {
   readonly all: Mirror[];
 
-  constructor(
-    urls: readonly string[],
-    readonly client: HttpClient,
-  ) {
+  constructor(urls: readonly string[], readonly client: HttpClient) {
     this.all = urls.map((url) => ({ url, at: url, alive: true, etag: '', total: -1, throughput: transferRate(1e5), owedBytes: 0, lastS: 0 }));
   }
   private get alive_(): Mirror[] {

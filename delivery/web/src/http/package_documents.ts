@@ -148,11 +148,7 @@ export class PackageDocuments {
     return this.readParts_(ref, part, how, headOf(ref), part);
   }
   /** Reads and decodes a document once for all who ask. */
-  private document_<K extends 'indexPages' | 'tableSections' | 'textures' | 'quality'>(
-    name: K,
-    signal: AbortSignal | undefined,
-    read: (m: Manifest) => Promise<Uint8Array>,
-  ): Promise<Decoded<K>> {
+  private document_<K extends 'indexPages' | 'tableSections' | 'textures' | 'quality'>(name: K, signal: AbortSignal | undefined, read: (m: Manifest) => Promise<Uint8Array>): Promise<Decoded<K>> {
     const { manifest } = this;
     const decode = (bytes: Uint8Array) => this.decoded(signal, name, ...([bytes, manifest] as Parameters<Documents[K]>));
     return this.readOnce_(name, () => read(manifest).then(decode), signal);

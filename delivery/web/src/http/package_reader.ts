@@ -17,13 +17,7 @@ import { RangeStore } from './range_store';
  * Finds out how the server can be read (SPEC.md, section 19): ranges of the container; the tree beside the container where the server
  * answers 200 to a range; the whole container where there is no tree. Where a server stops answering ranges, the tree, too.
  */
-export async function openStore(
-  url: string,
-  mirrors: readonly string[],
-  mode: StoreMode,
-  client: HttpClient,
-  signal?: AbortSignal,
-): Promise<OpenedStore> {
+export async function openStore(url: string, mirrors: readonly string[], mode: StoreMode, client: HttpClient, signal?: AbortSignal): Promise<OpenedStore> {
   const urls = [url, ...mirrors.filter((m) => m !== url)];
   const files = () => import('./without_ranges');
   if (mode === 'files' || /^[^?#]*\/([?#]|$)/.test(url)) return (await files()).openTree(urls, client, signal);
@@ -64,12 +58,7 @@ const withoutRanges = () => import('./without_ranges');
  */
 export class PackageReader extends PackageDocuments {
   /** Reads the manifest of a package at a URL; see OpenOptions. */
-  static async openUrl<T extends PackageReader>(
-    this: new (...args: ConstructorParameters<typeof PackageReader>) => T,
-    url: string,
-    options: OpenOptions = {},
-    decoder: DocumentDecoder = decodeHere,
-  ): Promise<T> {
+  static async openUrl<T extends PackageReader>(this: new (...args: ConstructorParameters<typeof PackageReader>) => T, url: string, options: OpenOptions = {}, decoder: DocumentDecoder = decodeHere): Promise<T> {
     const client = new HttpClient(options);
     const { signal, mode = 'auto', mirrors = [] } = options;
     const openedS = nowS();
@@ -80,11 +69,7 @@ export class PackageReader extends PackageDocuments {
   }
 
   /** Reads a container that is in memory. */
-  static async openBytes<T extends PackageReader>(
-    this: new (...args: ConstructorParameters<typeof PackageReader>) => T,
-    bytes: Uint8Array,
-    name = 'package',
-  ): Promise<T> {
+  static async openBytes<T extends PackageReader>(this: new (...args: ConstructorParameters<typeof PackageReader>) => T, bytes: Uint8Array, name = 'package'): Promise<T> {
     const store = (await withoutRanges()).openBytes(bytes, name);
     const { parsed, id } = await decodeHere('manifest', await store.manifest());
     return new this(store, new HttpClient(), name, parsed, id, nowS());

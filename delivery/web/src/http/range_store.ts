@@ -28,11 +28,7 @@ export class RangeStore implements PackageStore {
   private parts_: { begin: number; bytes: Uint8Array }[] = []; // the last read first
   private readonly mirrors_: Mirrors;
 
-  constructor(
-    urls: readonly string[],
-    client: HttpClient,
-    private readonly openTree_?: (manifest: Uint8Array, signal?: AbortSignal) => Promise<PackageStore>,
-  ) {
+  constructor(urls: readonly string[], client: HttpClient, private readonly openTree_?: (manifest: Uint8Array, signal?: AbortSignal) => Promise<PackageStore>) {
     this.mirrors_ = new Mirrors(urls, client);
   }
   get form(): PackageForm {

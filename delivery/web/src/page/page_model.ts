@@ -87,12 +87,7 @@ export class PageModel {
   private abort_ = new AbortController();
   private settle_!: { shown: () => void; failed: (error: unknown) => void };
 
-  constructor(
-    private readonly host_: Host,
-    readonly canvas: HTMLCanvasElement,
-    readonly url: string,
-    private readonly options_: PageModelOptions,
-  ) {
+  constructor(private readonly host_: Host, readonly canvas: HTMLCanvasElement, readonly url: string, private readonly options_: PageModelOptions) {
     this.camera = options_.camera ?? new PerspectiveCamera(32, 1, 0.01, 100);
     const lamp = new DirectionalLight(0xffffff, 2.2);
     lamp.position.set(-0.5, 0.7, 1);

@@ -74,13 +74,7 @@ function* pieces(next: PlaneComposer): Generator<Piece> {
       }
 }
 
-async function enlargePiece(
-  next: PlaneComposer,
-  image: ImageBitmap | HTMLImageElement,
-  piece: Piece,
-  pool: WorkerPool,
-  uploads: UploadQueue,
-): Promise<void> {
+async function enlargePiece(next: PlaneComposer, image: ImageBitmap | HTMLImageElement, piece: Piece, pool: WorkerPool, uploads: UploadQueue): Promise<void> {
   const picture = await createImageBitmap(image, { premultiplyAlpha: 'none', colorSpaceConversion: 'none' });
   const { widthPx: width, heightPx: height } = next;
   const { x0, x1, y0, y1 } = piece;

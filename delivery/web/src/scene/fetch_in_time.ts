@@ -19,14 +19,7 @@ export interface PlayedPlanHooks {
  * Plays a plan over the network: fetches the fragments that the plan asks for, and reports to the plan which have come. Ends when every
  * fragment has come or was given up; after `mostS` seconds the rest is given up.
  */
-export async function playPlan(
-  plan: HarmonicTimePlan,
-  { groups }: GroupedList,
-  transfers: Transfers,
-  signal: AbortSignal,
-  mostS: number,
-  hooks: PlayedPlanHooks,
-): Promise<void> {
+export async function playPlan(plan: HarmonicTimePlan, { groups }: GroupedList, transfers: Transfers, signal: AbortSignal, mostS: number, hooks: PlayedPlanHooks): Promise<void> {
   const startS = nowS();
   const underWay = new Map<number, { step: HtcStep; left: number }>(); // by offer: fragments of it that have not ended
   const abort = new AbortController();

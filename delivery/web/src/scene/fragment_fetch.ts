@@ -64,10 +64,7 @@ export class FragmentFetch {
   /** How fragments are listed besides scale and display. */
   listOptions: Partial<ListOptions> = {};
 
-  constructor(
-    private readonly load_: LoadContext,
-    readonly planes: ShownPlanes,
-  ) {
+  constructor(private readonly load_: LoadContext, readonly planes: ShownPlanes) {
     this.transfers = new Transfers(load_.reader, planes.textures, load_.pool, {
       decoded: (wish, levels) => void this.show_(wish, levels),
       lost: (wish, error) => this.lost(wish, error),

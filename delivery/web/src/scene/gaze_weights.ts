@@ -25,13 +25,7 @@ const usualPxPerDegree = 40;
  * What the losses of each fragment count for somebody who looks at a point of the picture: the mean over the fragment's surface, from a
  * sample of the triangles. Behind the eye a surface counts as farthest away. [fragments]
  */
-export function gazeWeights(
-  plane: TextureInfo,
-  surface: LookedSurface,
-  camera: Camera,
-  renderer: WebGLRenderer,
-  { x, y, pxPerDegree = usualPxPerDegree }: Gaze,
-): Float32Array {
+export function gazeWeights(plane: TextureInfo, surface: LookedSurface, camera: Camera, renderer: WebGLRenderer, { x, y, pxPerDegree = usualPxPerDegree }: Gaze): Float32Array {
   const count = plane.columns * plane.rows;
   const [weights, all] = [new Float32Array(count), new Float32Array(count)];
   const size = renderer.getDrawingBufferSize(new Vector2());

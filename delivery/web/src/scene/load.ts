@@ -89,14 +89,7 @@ export class ProxyOnTheWay {
 }
 
 /** Loads one package into one scene, from `startS` on; `forget` is called when the load is disposed of. */
-export function loadModel(
-  reader: PackageReader,
-  scene: Object3D,
-  options: LoadOptions,
-  pool: WorkerPool,
-  startS: number,
-  forget: () => void,
-): LoadedModel {
+export function loadModel(reader: PackageReader, scene: Object3D, options: LoadOptions, pool: WorkerPool, startS: number, forget: () => void): LoadedModel {
   const load = new ModelLoad(new LoadContext(reader, options, pool, startS), scene, forget);
   const { context } = load;
   return {
@@ -152,11 +145,7 @@ class ModelLoad {
   private readonly endRequests_: () => void;
   private readonly leaveRoom_: () => void;
 
-  constructor(
-    readonly context: LoadContext,
-    scene: Object3D,
-    private readonly forget_: () => void,
-  ) {
+  constructor(readonly context: LoadContext, scene: Object3D, private readonly forget_: () => void) {
     const { reader, options, materials, pool, signal, disposal } = context;
     pool.onUnavailable = (error) => context.fail(error, 'workers');
     this.source_ = new ScaleSource({
@@ -374,10 +363,7 @@ class ModelLoad {
   private makeAnew_(): void {
     const { context } = this;
     if (context.signal.aborted) return;
-    this.restoring_ = this.textures?.restore().then(
-      (coarser) => coarser && context.emit('memory', { gpuBytes: this.state.gpuBytes, limitBytes: context.memoryBytes }),
-      (error) => context.fail(error, 'what the GPU has lost'),
-    );
+    this.restoring_ = this.textures?.restore().then((coarser) => coarser && context.emit('memory', { gpuBytes: this.state.gpuBytes, limitBytes: context.memoryBytes }), (error) => context.fail(error, 'what the GPU has lost'));
     if (!context.resting) return;
     context.enter('refining');
     this.refineAgain_ ||= context.options.autoRefine ?? true;

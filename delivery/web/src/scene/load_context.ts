@@ -43,12 +43,7 @@ export class LoadContext {
   private readonly abort_ = new AbortController();
   private readonly disposed_ = new AbortController();
 
-  constructor(
-    readonly reader: PackageReader,
-    readonly options: LoadOptions,
-    readonly pool: WorkerPool,
-    private readonly startS_: number,
-  ) {
+  constructor(readonly reader: PackageReader, readonly options: LoadOptions, readonly pool: WorkerPool, private readonly startS_: number) {
     const { time = 5, camera } = options;
     this.room = GpuRoom.of(options.renderer);
     this.object.name = reader.manifest.title || 'texmesh';

@@ -14,10 +14,7 @@ export class PlaneStorage {
   private readonly storages_ = new Map<WebGLTexture, number>(); // how many levels each has
   private stale_ = false; // the smallest levels
 
-  constructor(
-    private readonly renderer_: WebGLRenderer,
-    private readonly info_: TextureInfo,
-  ) {
+  constructor(private readonly renderer_: WebGLRenderer, private readonly info_: TextureInfo) {
     this.gl_ = renderer_.getContext() as WebGL2RenderingContext;
   }
 

@@ -52,11 +52,7 @@ export function disposeTexture(texture: Texture): void {
  * Parses a scale. Later scales do not decode the previews again: their textures are placeholders, since materials are
  * shared with the first scale.
  */
-export async function parseScale(
-  loader: GltfLoaderLike,
-  glb: Uint8Array,
-  placeholders: boolean,
-): Promise<ParsedGltf> {
+export async function parseScale(loader: GltfLoaderLike, glb: Uint8Array, placeholders: boolean): Promise<ParsedGltf> {
   if (placeholders)
     loader.register((parser: { json: GltfJson }) => ({
       name: 'TEXMESH_placeholders',

@@ -23,11 +23,7 @@ export class ShownScale {
   private retryTimer_: ReturnType<typeof setTimeout> | undefined;
   private retryS_ = retryScaleS.first;
 
-  constructor(
-    private readonly load_: LoadContext,
-    private readonly scene_: Object3D,
-    private readonly source_: ScaleSource,
-  ) {
+  constructor(private readonly load_: LoadContext, private readonly scene_: Object3D, private readonly source_: ScaleSource) {
     this.proxy = new ShownProxy(load_, scene_);
   }
   /** Scales stay out of the scene: a proxy is there. */

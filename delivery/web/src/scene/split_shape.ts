@@ -15,14 +15,7 @@ const leastRequestBytes = 32 << 10;
 let streamCount = 0;
 
 /** Reads the head of a package's stream of vertex splits. `added` hears of materials' slots that no GLB had; see ScaleSourceParts for `leadBytes`. */
-export async function openSplitShapes(
-  reader: PackageReader,
-  pool: WorkerPool,
-  materials: MaterialSet,
-  added: (slot: Slot) => void,
-  leadBytes: () => number,
-  signal: AbortSignal,
-): Promise<SplitShapes> {
+export async function openSplitShapes(reader: PackageReader, pool: WorkerPool, materials: MaterialSet, added: (slot: Slot) => void, leadBytes: () => number, signal: AbortSignal): Promise<SplitShapes> {
   const key = ++streamCount;
   const known = (await reader.splitStreamStart(withHeadBytes, signal))!; // the head, and some bytes that came with it
   const info = await pool.openSplits(key, known.subarray(0, reader.manifest.stream!.headBytes));
@@ -42,16 +35,7 @@ export class SplitShapes {
   private decoded_: number; // bytes of the stream
   private lastLoad_: Promise<unknown> = Promise.resolve();
 
-  constructor(
-    private readonly reader_: PackageReader,
-    private readonly pool_: WorkerPool,
-    private readonly materials_: MaterialSet,
-    private readonly added_: (slot: Slot) => void,
-    private readonly leadBytes_: () => number,
-    private readonly key_: number,
-    private readonly known_: Uint8Array,
-    private readonly info_: SplitInfo,
-  ) {
+  constructor(private readonly reader_: PackageReader, private readonly pool_: WorkerPool, private readonly materials_: MaterialSet, private readonly added_: (slot: Slot) => void, private readonly leadBytes_: () => number, private readonly key_: number, private readonly known_: Uint8Array, private readonly info_: SplitInfo) {
     this.decoded_ = info_.headBytes;
   }
 
@@ -74,13 +58,7 @@ export class SplitShapes {
     this.meshes_.forEach((mesh) => mesh.geometry.dispose());
   }
 
-  private async loadNow_(
-    scale: number,
-    gltf: ParsedGltf,
-    signal: AbortSignal,
-    arrived: () => void,
-    passed: (scale: number, mesh: Mesh) => void,
-  ): Promise<Mesh> {
+  private async loadNow_(scale: number, gltf: ParsedGltf, signal: AbortSignal, arrived: () => void, passed: (scale: number, mesh: Mesh) => void): Promise<Mesh> {
     const runs = this.runsUpTo_(scale);
     const left = runs.map(() => Infinity);
     const come = (run: number, bytes: number): void => {

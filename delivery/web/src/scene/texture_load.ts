@@ -85,12 +85,7 @@ export class TextureLoad {
   private lookedS_ = 0; // when the proxy and the scale were compared last
   private fruitlessRounds_ = 0; // rounds of refining that brought nothing, one after the other
 
-  constructor(
-    private readonly load_: LoadContext,
-    private readonly scale_: ShownScale,
-    private readonly source_: ScaleSource,
-    private readonly fetching_: FragmentFetch,
-  ) {
+  constructor(private readonly load_: LoadContext, private readonly scale_: ShownScale, private readonly source_: ScaleSource, private readonly fetching_: FragmentFetch) {
     this.planes_ = fetching_.planes;
     this.inTime_ = new FetchInTime(load_, fetching_);
     scale_.scaleFor = (heightPx, part) => this.scaleFor_(heightPx, part);

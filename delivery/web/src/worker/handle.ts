@@ -64,13 +64,7 @@ function splitInfo(head: SplitStreamHead): SplitInfo {
   return { headBytes: head.bytes, scales };
 }
 
-function gridValues(
-  places: Int32Array,
-  stride: number,
-  grid: SplitGrid,
-  count: number,
-  placeOf: (i: number) => number,
-): Float32Array {
+function gridValues(places: Int32Array, stride: number, grid: SplitGrid, count: number, placeOf: (i: number) => number): Float32Array {
   const step = f(grid.range / f(2 ** grid.bits - 1));
   const out = new Float32Array(count * stride);
   for (let i = 0; i < count; ++i) {

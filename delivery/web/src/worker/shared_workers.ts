@@ -37,10 +37,7 @@ export class SharedWorkers {
   private pools_ = 0;
 
   /** `count` >= 1; workers start when a pool first asks for them. */
-  constructor(
-    count: number,
-    private readonly workerUrl_?: string | URL,
-  ) {
+  constructor(count: number, private readonly workerUrl_?: string | URL) {
     this.workers_ = new Array<undefined>(Math.max(1, Math.floor(count))).fill(undefined);
   }
 

@@ -72,9 +72,7 @@ describe('transfers', () => {
     const s = await setUp();
     const abort = new AbortController();
     const failed: Wish[] = [];
-    const done = s.transfers.fetch(
-      wishesOf(s.list, 2), { gapBytes: 0, mostBytes: 3000, signal: abort.signal }, () => undefined, (w) => failed.push(w),
-    );
+    const done = s.transfers.fetch(wishesOf(s.list, 2), { gapBytes: 0, mostBytes: 3000, signal: abort.signal }, () => undefined, (w) => failed.push(w));
     abort.abort();
     await done;
     expect(failed.length).toBe(s.list.offers.length);

@@ -95,12 +95,7 @@ function stream(body: Uint8Array, kind: FaultKind | undefined, signal: AbortSign
 }
 
 /** The tree beside a container: its entries as files beneath a path. */
-export function treeFiles(
-  path: string,
-  container: Uint8Array,
-  manifest: Uint8Array,
-  entries: readonly { path: string; offset: number; bytes: number }[],
-): Record<string, Uint8Array> {
+export function treeFiles(path: string, container: Uint8Array, manifest: Uint8Array, entries: readonly { path: string; offset: number; bytes: number }[]): Record<string, Uint8Array> {
   const files: Record<string, Uint8Array> = { [`${path}manifest.json`]: manifest };
   for (const e of entries) files[path + e.path] = container.slice(e.offset, e.offset + e.bytes);
   return files;

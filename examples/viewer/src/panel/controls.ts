@@ -18,10 +18,7 @@ export class Controls {
   private readonly rungSelect: HTMLSelectElement;
 
   /** Writes what is chosen into `choices`. */
-  constructor(
-    private readonly choices: Choices,
-    private readonly actions: ControlActions,
-  ) {
+  constructor(private readonly choices: Choices, private readonly actions: ControlActions) {
     const c = choices;
     const cap = this.select('cap', capsWith(c.capBytesPerSecond).map(([text, v]) => [String(v), text]), String(c.capBytesPerSecond), (v) => { c.capBytesPerSecond = Number(v); });
     const policy = this.select('policy', kPolicies, c.policy, (v) => { c.policy = v as Choices['policy']; });

@@ -17,10 +17,7 @@ export class FragmentSection {
   private textureChosen = false;
 
   /** Calls `onTexture` when a person has chosen a texture. */
-  constructor(
-    private readonly live: () => Live,
-    onTexture: () => void,
-  ) {
+  constructor(private readonly live: () => Live, onTexture: () => void) {
     for (const [by, text] of kColourings) {
       const button = make('button', { type: 'button', 'aria-pressed': String(by === this.colourBy), onclick: () => this.choose(by, button) }, text);
       this.colourings.append(button);

@@ -50,10 +50,7 @@ export class Plot {
   private mark: Mark | null | undefined;
   private width = 0;
 
-  constructor(
-    private readonly box: HTMLElement,
-    private readonly options: PlotOptions,
-  ) {
+  constructor(private readonly box: HTMLElement, private readonly options: PlotOptions) {
     box.classList.add('plot');
     new ResizeObserver(() => this.fit()).observe(box);
     onTheme(() => this.rebuild());

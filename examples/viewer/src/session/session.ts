@@ -20,10 +20,7 @@ export class Session {
   private listener: Listener;
   private originalLoad: Original;
 
-  constructor(
-    private readonly stage: Stage,
-    private readonly url: string,
-  ) {
+  constructor(private readonly stage: Stage, private readonly url: string) {
     this.listener = this.newListener();
     this.originalLoad = this.newOriginal();
     stage.onFrame = () => {

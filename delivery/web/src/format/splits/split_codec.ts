@@ -177,15 +177,7 @@ class SplitVertices {
     const forward = this.state_.raw(1) !== 0;
     this.finishFace_(x, forward, none, none, none, 1, none);
   }
-  private finishFace_(
-    x: number,
-    forward: boolean,
-    expectedParent: number,
-    expectedChild: number,
-    expectedThird: number,
-    seam: number,
-    beside: number,
-  ): void {
+  private finishFace_(x: number, forward: boolean, expectedParent: number, expectedChild: number, expectedThird: number, seam: number, beside: number): void {
     const v = this.state_.codeWedge(expectedParent, m.cornerExpected + seam, this.state_.parent);
     const u = this.state_.codeWedge(expectedChild, m.cornerExpected + 2 + seam, this.state_.child);
     const w = this.state_.codeWedge(expectedThird, m.cornerExpected + 4 + seam, x);
@@ -313,15 +305,7 @@ export class SplitCodec {
   private lastAnswer_ = false;
   private fruitless_ = false; // nobody has split since all points were queued
 
-  constructor(
-    mesh: SplitMesh,
-    attributes: readonly CodedAttribute[],
-    positionBits: number,
-    groups: number,
-    limits: SplitLimits,
-    positions: ValueDecoder,
-    values: readonly ValueDecoder[],
-  ) {
+  constructor(mesh: SplitMesh, attributes: readonly CodedAttribute[], positionBits: number, groups: number, limits: SplitLimits, positions: ValueDecoder, values: readonly ValueDecoder[]) {
     this.state_ = new SplitState(mesh, groups, limits);
     const coded = new SplitValues(this.state_, attributes, positionBits, positions, values);
     this.vertices_ = new SplitVertices(this.state_, coded);

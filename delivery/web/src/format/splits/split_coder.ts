@@ -6,10 +6,7 @@ import { splitBelow, splitLongest, splitPrior, splitSteps, splitValueLimit } fro
 export class BitModels {
   readonly p: Uint16Array;
   readonly seen: Uint8Array;
-  constructor(
-    count: number,
-    readonly limit: number,
-  ) {
+  constructor(count: number, readonly limit: number) {
     this.p = new Uint16Array(count).fill(0x8000);
     this.seen = new Uint8Array(count);
   }
