@@ -11,7 +11,7 @@ import { Emitter } from './scene/events';
 import { GpuRoom } from './scene/gpu';
 import { SharedWorkers } from './worker/shared_workers';
 
-/** The renderer that draws all models of a page: browsers give a page few contexts. Pictures are copied to the models' own canvases. */
+/** The renderer of all models of a page, as browsers give few contexts. It copies pictures to canvases. */
 class Painter {
   private own_?: WebGLRenderer;
 
@@ -32,7 +32,7 @@ class Painter {
     const renderer = this.given_ ?? this.own_;
     return renderer ? GpuRoom.of(renderer).limitBytes : Infinity;
   }
-  /** Draws a scene as large as the canvas has pixels. False: nothing can be drawn now, the context is lost. */
+  /** Draws a scene as large as the canvas has pixels. False: the context is lost. */
   draw(scene: Scene, camera: Camera, canvas: HTMLCanvasElement): boolean {
     const { renderer } = this;
     const { width, height } = canvas;
@@ -58,7 +58,7 @@ class Painter {
 export type * from './page/page_model';
 export type { Orbit } from './page/framing';
 
-/** So many packages share the link without harm: one round trip each costs as much as the bytes behind the first pictures. */
+/** So many packages share the link without harm: a round trip costs what the first pictures' bytes cost. */
 const fewModels = 2;
 /** Share of the time behind the last bytes: they are decoded, go to the GPU, and are drawn. */
 const drawingShare = 0.01;
@@ -69,11 +69,11 @@ export interface PageOptions {
   gltfLoader: () => GltfLoaderLike;
   /** Draws all models; left out: a renderer of the page's own. */
   renderer?: WebGLRenderer;
-  /** Seconds from the first model that comes to a quiet page until all that is seen is as good as the time allows. Default 5. */
+  /** Seconds from the first new model until all that is seen is as good as the time allows. Default 5. */
   time?: number;
   /** Bytes that all models may take on the GPU. Default: by the device. */
   memoryBytes?: number;
-  /** Packages whose manifests and first pictures come at once. Default 6, the connections that a browser has for a server. */
+  /** Packages whose first pictures come at once. Default 6: a browser's connections for a server. */
   openAtOnce?: number;
   /** Workers of all models. Default: 2 to 4 by the number of cores. */
   workers?: number;
@@ -86,7 +86,7 @@ export interface PageEvents {
   'first-pictures': { at: number; seconds: number; models: number };
   /** Every model that is seen has had its turn: the limit and the actual time. */
   deadline: { at: number; limit: number; actual: number };
-  /** All have had their turn, or the GPU has shown that it holds less: bytes on the GPU, and the limit from now on. */
+  /** All had their turn, or the GPU holds less than thought: bytes on the GPU, and the limit from now on. */
   memory: { at: number; gpuBytes: number; limitBytes: number };
 }
 
@@ -120,7 +120,7 @@ export class TexmeshPage {
     this.visibility_ = new Visibility((canvas, resized) => this.placeChanged_(canvas, resized));
   }
 
-  /** Shows a package on a canvas, as soon as the canvas is seen. A canvas that has a model gets the new one instead. */
+  /** Shows a package on a canvas, as soon as it is seen. It replaces the model that the canvas had. */
   add(canvas: HTMLCanvasElement, url: string, options: PageModelOptions = {}): PageModel {
     this.models_.get(canvas)?.remove();
     const model = new PageModel(this.host_, canvas, url, options);
@@ -221,7 +221,7 @@ export class TexmeshPage {
       this.tell_();
     });
   }
-  /** Makes the graphics context while the first bytes come: nobody is asked for bytes while a context is being made. */
+  /** Makes the graphics context while the first bytes come, as nothing is asked for while it is made. */
   private prepare_(): void {
     this.preparing_ ??= setTimeout(() => {
       try {

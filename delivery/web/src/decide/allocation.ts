@@ -12,7 +12,7 @@ export function logQuantiser(quality: number): number {
 
 const qualityOfScale = (scale: number): number => (scale > 1 ? 50 / scale : 100 - 50 * scale);
 
-/** eta_i (3.1) of one scale, by its row: feature counts min-max over covered fragments; 0 for the others. With allocation 3 VQP. [F] */
+/** [F]: eta_i (3.1) of a scale: min-max of counts over covered fragments, else 0; VQP in allocation 3. */
 export function etaOf(t: PlaneTables, row: number): Float32Array {
   if (t.allocation === 3) return t.vqp.slice();
   const covered = positive(t.coveredTexels);

@@ -43,7 +43,7 @@ export interface DeliveryPlan extends InTime {
   proxy?: number;
   /** The larger proxy that is shown on the way to the scale. */
   step?: { proxy: number; atS: number };
-  /** On the GPU: buffers, and textures with their mip levels; most bytes. The buffers are kept in main memory, too. */
+  /** On the GPU, at most: buffers, and textures with mip levels. Main memory keeps the buffers, too. */
   gpuBytes: { mesh: number; textures: number };
   /** Besides fragments. */
   fixedBytes: number;

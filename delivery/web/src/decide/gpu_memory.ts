@@ -17,7 +17,7 @@ export const rgbaBytes = (textures: readonly TextureInfo[]): BytesOf => (plane) 
 /** Bytes of a plane on the GPU, as its texels are stored. */
 export type BytesOf = (plane: number) => number;
 
-/** The first way to store texels by which these planes take at most `mostBytes`; the last one where none is. */
+/** The first way to store texels by which these planes take at most `mostBytes`; else the last one. */
 export function wayWithin(planes: readonly PlaneChoice[], mostBytes: number, ways: readonly BytesOf[]): number {
   const way = ways.findIndex((bytesOf) => planes.reduce((sum, { plane }) => sum + bytesOf(plane), 0) <= mostBytes);
   return way < 0 ? ways.length - 1 : way;

@@ -15,7 +15,7 @@ function powerOfTwo(k: number): number {
   return power;
 }
 
-/** Nearest whole number, ties to even, of what is far below 2^52: above that there are no fractions to keep. */
+/** Nearest whole number, ties to even, far below 2^52: above that there are no fractions. */
 const nearestInteger = (x: number): number => x + 6755399441055744 - 6755399441055744;
 
 function sinReduced(r: number): number {

@@ -34,7 +34,7 @@ function beyondSizes({ sizesPx }: QualityTable, displayedPx: number): number {
 class Curve {
   private readonly logDssim_: number[];
   private readonly logFlip_: number[];
-  /** Loss of mips from the finest sampled level on, and how many levels finer than the planes shown the first is. */
+  /** Loss of mips from the finest sampled level on; how many levels finer than the shown planes it is. */
   private readonly mips_: number[];
   private readonly finer_: number;
   readonly preview: number;
@@ -77,7 +77,7 @@ export function sizesAround(table: QualityTable, displayedPx: number): readonly 
   const [first, second] = sizeAt(table, displayedPx);
   return [table.sizesPx[first] ?? 1, table.sizesPx[second] ?? 1];
 }
-/** How many times twice as large texels are on the screen as those that were sampled at each of sizesAround(). */
+/** How many times twice as large texels are on the screen as the samples of sizesAround(). */
 export type TexelGrowth = readonly [number, number];
 
 /** What textures of one group lose at one displayed height; without samples 1 - SSIM of their texels, and nothing by coarser mips. */
@@ -106,7 +106,7 @@ export class GroupCurve {
     const [first, second] = this.curves_;
     return first ? mixed(first.preview, second.preview, this.part_) : 1;
   }
-  /** FLIP of the texels that rungs code, halved `mip` times; for full size that of the finest sampled level. */
+  /** FLIP of the texels that rungs code, halved `mip` times; 0: that of the finest sampled level. */
   halved(growth: TexelGrowth, mip: number): number {
     const [first, second] = this.curves_;
     const at = (curve: Curve, level: number): number => {

@@ -47,7 +47,7 @@ export function groupedList(list: FragmentList, bytesEach: number, budget: numbe
   return { offers, groups: members.map((group) => group.map((i) => list.fragments[i])) };
 }
 
-/** Bytes per second while bytes were coming: of requests so far, without the time that their answers took to begin. */
+/** Bytes per second while bytes came: of requests so far, without the time before their answers. */
 export function throughputOf(requests: readonly RequestRecord[], rttS: number): number {
   const begun = requests.filter((r) => r.received > 0).map((r) => ({ ...r, from: Math.min(r.started + rttS, r.firstByte) }));
   let [seconds, bytes, end] = [0, 0, 0];

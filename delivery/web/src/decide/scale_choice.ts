@@ -14,7 +14,7 @@ export interface InTime extends Simulated {
   scale: number;
   planes: PlaneChoice[];
   list: FragmentList;
-  /** Predicted FLIP of the lit picture: 0 = equal to S_0 with the source's texels, 1 = as different as can be. */
+  /** Predicted FLIP of the lit picture: 0 = equal to S_0 with the source's texels, 1 = the most. */
   flip: number;
   /** What it would be of S_0 with these textures. */
   textureFlip: number;

@@ -44,7 +44,7 @@ function surfaceOf({ surfaceArea, boundsMin, boundsMax }: Manifest): number {
   return surfaceArea > 0 ? surfaceArea : 2 * (x * y + y * z + z * x);
 }
 
-/** How often the texels of a full-size plane may be halved until one stands for a pixel; below 0 where one covers more. */
+/** How often full-size texels may be halved until one covers a pixel; below 0 where it covers more. */
 function displayLevel(data: PackageData, base: number, displayedPx: number): number {
   const { coveredTexels, surfaceFraction } = tablesOf(data, base);
   const texelsPerArea = sumOf(coveredTexels) / (sumOf(surfaceFraction) * surfaceOf(data.manifest));
@@ -70,7 +70,7 @@ export function planesForDisplay(data: PackageData, displayedPx: number, levels:
   });
 }
 
-/** FLIP of the textures alone: 0 = equal to S_0 with the source's texels. `losses`: of each group by itself, on S_0. */
+/** FLIP of the textures alone, 0 = equal to S_0 with the source's texels. `losses`: by group, on S_0. */
 export function textureFlip(table: QualityTable, losses: PerGroup): number {
   return combinedFlip(table, [0, ...losses]);
 }
@@ -85,7 +85,7 @@ interface PlaneLoss {
   weights: Float32Array;
   /** Of the stored fragments together. */
   weight: number;
-  /** [(rungs + 1) * F], index way * F + fragment; way 0 shows the preview, others lose by their mip and their rung. */
+  /** [(rungs + 1) * F], index way * F + fragment; way 0 is the preview, others lose by mip and rung. */
   shown: Float64Array;
 }
 
@@ -103,7 +103,7 @@ export class TextureLoss {
     if (!loss) this.planes_.set(plane, (loss = this.measure_(plane)));
     return loss;
   }
-  /** What a mip loses of the source's texels; 0 for full size. Needs the tables of the full-size plane alone. */
+  /** What a mip loses of the source's texels; 0 for full size. Needs that plane's tables alone. */
   mip(plane: number): number {
     return this.curves_[groupIndex(this.data, plane)].halved(this.growth_(plane), this.data.textures[plane].mip);
   }

@@ -24,7 +24,7 @@ export function degreesOf(said: string | null | undefined, otherwise: number): n
   const found = /^(-?(?:\d+\.?\d*|\.\d+))(deg|rad)$/.exec(said?.trim() ?? '');
   return found ? Number(found[1]) * (found[2] === 'rad' ? 180 / Math.PI : 1) : otherwise;
 }
-/** "28deg 72deg 105%" or parts of it, as model-viewer writes them: round the vertical axis, from the axis, distance. What cannot be read is the default's. */
+/** "28deg 72deg 105%" or parts of it: angles round and from the vertical axis, distance. Else the default. */
 export function orbitOf(text: string | null): Orbit {
   const [theta, phi, distance] = (text ?? '').trim().split(/\s+/).filter(Boolean);
   const share = /^(\d+(?:\.\d+)?)%$/.exec(distance ?? '');

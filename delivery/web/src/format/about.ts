@@ -2,7 +2,7 @@ import { aboutPath } from './entry_paths';
 import { JsonAt, parseJson } from './json_fields';
 import { maxAboutBytes } from './shared_numbers';
 
-/** about.json (format/SPEC.md): what the object is, whose it is, what its coordinates mean. Whatever is missing is not known. */
+/** about.json: what the object is, whose it is, what its coordinates mean. Missing is not known. */
 export interface About {
   title?: string;
   description?: string;

@@ -23,7 +23,7 @@ function require(good: boolean, rule: string, file: string, place: string, expec
   if (!good) throw new FormatError(file, place, expected, `${found}`, rule);
 }
 
-/** Manifest and package id from manifest.json, or from the first bytes of a container where `container` names one. */
+/** Manifest and package id from manifest.json, or from the start of a container that `container` names. */
 export async function manifest(bytes: Uint8Array, container = ''): Promise<{ parsed: Manifest; id: string }> {
   const json = container ? manifestOfContainer(bytes, container) : bytes;
   return { parsed: readManifest(json), id: toHex(await sha256(json)) };
@@ -50,7 +50,7 @@ export function indexPages(bytes: Uint8Array, m: Manifest): PageRef[] {
   return pages.map((p) => ({ ...p, minor, rule: 'I04', path: `index of plane ${p.plane}`, offset: index.offset + p.offset }));
 }
 
-/** The entries of a page of index.bin by their paths. Entries without a plane must be as the manifest says. */
+/** The entries of a page of index.bin by path. Those without a plane must be as the manifest says. */
 export function indexPage(bytes: Uint8Array, { plane, entries: count, minor }: PageRef, m: Manifest): Map<string, EntryRef> {
   const entries = new Map(parseIndexPage(bytes, plane, count, minor).map((e) => [e.path, e]));
   if (plane >= 0) return entries;
@@ -113,7 +113,7 @@ export interface PlaneDocument {
   offsets: Float64Array;
 }
 
-/** Tables from a section of tables.bin; textures.json and the index must speak of the same fragments and bytes. */
+/** Tables from a section of tables.bin, which must agree with textures.json and the index. */
 export function planeTables(bytes: Uint8Array, { minor, scales }: SectionRef, plane: number, info: TextureInfo, entries: Map<string, EntryRef>): PlaneDocument {
   const tables = parseTablesSection(bytes, minor, `plane ${plane}`);
   const requireHere = (good: boolean, rule: string, expected: string): void =>

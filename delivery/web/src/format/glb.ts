@@ -14,7 +14,7 @@ function require(good: unknown, rule: string, what: string): asserts good {
   if (!good) throw new FormatError('mesh', '', what, '', rule);
 }
 
-/** JSON and bytes of a GLB of at most two chunks. glTF has no further chunks, and loaders differ in what they make of those. */
+/** JSON and bytes of a GLB of at most two chunks: glTF has no others, and loaders differ in those. */
 function partsOfGlb(glb: Uint8Array): { json: Embedding; bytes: Uint8Array } {
   const view = new DataView(glb.buffer, glb.byteOffset, glb.byteLength);
   const at = (i: number): number => (i + 4 <= glb.length ? view.getUint32(i, true) : -1);

@@ -1,7 +1,7 @@
 import { FormatError } from './errors';
 import { maxJsonInteger } from './shared_numbers';
 
-/** A value in a JSON document: checks type and range before anyone uses the value, and names the place of a wrong one. */
+/** A value in a JSON document, which checks type and range, and names the place of a wrong value. */
 export class JsonAt {
   constructor(
     private readonly value_: unknown,
@@ -72,7 +72,7 @@ export class JsonAt {
   }
 }
 
-/** Bounded JSON: a document of at most so many bytes of UTF-8. FormatError where the document is longer, or no JSON. */
+/** Bounded JSON of at most so many bytes of UTF-8. FormatError where it is longer, or no JSON. */
 export function parseJson(bytes: Uint8Array, file: string, mostBytes: number): JsonAt {
   if (bytes.length > mostBytes) throw new FormatError(file, '', `at most ${mostBytes} bytes`, `${bytes.length}`, 'L09');
   try {

@@ -65,7 +65,7 @@ export interface ManifestScale {
   displayPxEdge: number;
   /** By lit pictures: up to this height no view of the scale can be told from S_0's; 0 = at no height. */
   displayPxFlip: number;
-  /** Why the scale has more vertices than it should, or (of the last scale) why none is coarser; mostly "". */
+  /** Why the scale has too many vertices, or why (the last scale) none is coarser; mostly "". */
   floor: string;
 }
 /** Whether a scale has a file of its own; the others stand in the vertex-split stream alone. */

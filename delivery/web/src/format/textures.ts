@@ -14,7 +14,7 @@ export interface TextureInfo {
   mip: number;
   /** The full-size plane of a mip. */
   base: number;
-  /** base-colour, emissive, normal, occlusion-roughness-metallic, alpha, colour, data, or one of a later version. */
+  /** base-colour, emissive, normal, occlusion-roughness-metallic, alpha, colour, data, or a later one. */
   role: string;
   name: string;
   colourSpace: 'srgb' | 'linear';

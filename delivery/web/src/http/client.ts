@@ -29,7 +29,7 @@ export class HttpClient {
     this.limit_ = this.options.connections;
   }
 
-  /** Median time from request to answer over the last requests: servers and busy pages add to the round trip. */
+  /** Median time from request to answer: servers and busy pages add to the round trip. */
   get latencyS(): number {
     const sorted = [...this.waits_].sort((a, b) => a - b);
     return sorted[sorted.length >> 1] ?? this.rttS;

@@ -9,7 +9,7 @@ function mayRetry({ status, complete, tooLong }: Answer): boolean {
   return status === 0 || status === 408 || status === 429 || status >= 500;
 }
 
-/** A function that waits before the next try, longer from try to try; false: enough tries, or another would be no better. */
+/** A function that waits before the next try, ever longer; false: no further try helps. */
 export function retriesOf({ options }: HttpClient, signal?: AbortSignal): (a: Answer) => Promise<boolean> {
   let [left, delayS] = [options.retries, options.retryDelayS];
   return async (a) => {

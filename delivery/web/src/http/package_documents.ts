@@ -211,7 +211,7 @@ export class PackageDocuments {
   async provenance(): Promise<unknown> {
     return JSON.parse(new TextDecoder().decode(await this.readChecked(this.manifest.provenance, { kind: 'other' })));
   }
-  /** What the object is, whose it is, what its coordinates mean: about.json, fetched when it is first asked for. */
+  /** about.json: what the object is, whose it is, what its coordinates mean; fetched when first asked for. */
   about(signal?: AbortSignal): Promise<About> {
     const read = async (): Promise<About> => {
       const bytes = await this.readChecked(this.manifest.about, { kind: 'other', signal });

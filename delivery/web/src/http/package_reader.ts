@@ -104,7 +104,7 @@ export class PackageReader extends PackageDocuments {
     if (!hasGlb(s)) throw new InputError(this.store.name, `scale ${scale}`, 'a scale with a file of its own', 'one of the stream');
     return this.readChecked(s.glb, { kind: 'mesh', once: true, ...how });
   }
-  /** The GLB of a proxy as it is stored; no index is needed. 0 = the smallest. InputError where there is none. */
+  /** The GLB of a proxy as it is stored, without an index. 0 = the smallest. InputError: there is none. */
   async proxyGlb(proxy: number, how: Partial<ReadOptions> = {}): Promise<Uint8Array> {
     const found = this.manifest.proxies[proxy];
     if (!found) throw new InputError(this.store.name, `proxy ${proxy}`, 'a proxy of the package', 'none');
@@ -157,7 +157,7 @@ export class PackageReader extends PackageDocuments {
     const how = { kind: 'texture', once: this.form !== 'files', signal } as const;
     return this.readChecked({ path, offset: pack.offset + offset, bytes, sha256, rule: 'F03' }, how, pack);
   }
-  /** The image file that any decoder takes: table stream and fragment joined, with the lower rungs' where needed. */
+  /** The image file that any decoder takes: table stream and fragment, with lower rungs where needed. */
   async completeFragment(plane: number, rung: number, fragment: number, signal?: AbortSignal): Promise<Uint8Array> {
     const { codec } = (await this.textures(signal))[plane];
     const first = codecTraits(codec).incremental ? 0 : rung;
@@ -190,12 +190,12 @@ export class PackageReader extends PackageDocuments {
   async splitStreamHead(signal?: AbortSignal): Promise<Uint8Array | undefined> {
     return (await this.splitStreamStart(0, signal))?.subarray(0, this.manifest.stream!.headBytes);
   }
-  /** The head of the vertex-split stream and so many bytes behind the head (or all there are); the head is checked. */
+  /** The checked head of the vertex-split stream, and so many bytes behind it (or all there are). */
   async splitStreamStart(more: number, signal?: AbortSignal): Promise<Uint8Array | undefined> {
     const { stream: s } = this.manifest;
     return s && this.readWithHead_(s, Math.min(s.bytes, s.headBytes + more), { kind: 'stream', signal });
   }
-  /** Bytes of the vertex-split stream; InputError where there is none. The caller checks blocks by the stream's head. */
+  /** Bytes of the vertex-split stream, not checked; InputError where there is none. */
   async splitStream(offset: number, bytes: number, how: Partial<ReadOptions> = {}): Promise<Uint8Array> {
     const { stream } = this.manifest;
     if (!stream) throw new InputError(this.store.name, '', 'a stream of vertex splits', 'none');

@@ -1,6 +1,6 @@
 import { leastSeconds, windowSamples } from '../format/shared_numbers';
 
-/** Throughput of a connection, or of several, from transfers that have ended: delivery/cpp/decide/throughput.h. */
+/** Throughput of connections from transfers that have ended: delivery/cpp/decide/throughput.h. */
 export interface TransferRate {
   /**
    * `seconds`: since the end of the transfer before, latency taken off; less than 1 ns counts as 1 ns. `others`: how many transfers are

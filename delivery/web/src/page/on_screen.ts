@@ -1,6 +1,6 @@
 import type { Place } from './schedule';
 
-/** Models are prepared when they are so far from the screen, as a share of its height, and released when they are further. */
+/** Models are prepared so far from the screen (by its height), and released when they are further. */
 const nearShare = 1;
 
 /** From the middle of a box to the middle of a screen. */

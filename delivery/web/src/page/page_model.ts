@@ -80,7 +80,7 @@ export class PageModel {
   coming = false;
   /** All that the display can show is there. */
   complete = false;
-  /** Resolves when the first picture is on the canvas; rejects when the package cannot be had or is removed before. */
+  /** Resolves when the first picture is on the canvas; rejects when it fails or is removed before. */
   readonly firstPicture: Promise<void>;
   private readonly events_ = new Emitter<PageModelEvents>();
   private unpainted_ = false; // the first picture waits for a frame

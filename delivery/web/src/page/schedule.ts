@@ -14,12 +14,12 @@ export interface Place {
   distancePx: number;
 }
 
-/** Order of interest: what is regarded, what is seen, larger pictures, what is nearer to the middle of the screen. */
+/** Order of interest: what is regarded, what is seen, larger pictures, what is nearer to the middle. */
 export function byInterest(a: Place, b: Place): number {
   return Number(b.regarded) - Number(a.regarded) || Number(b.visible) - Number(a.visible) || b.areaPx - a.areaPx || a.distancePx - b.distancePx;
 }
 
-/** A model's share of something that all of `areas`, its own among them, have a part in: by area, in equal parts where there is none. */
+/** A model's share, by area, of what all of `areas` have a part in; equal parts where none has an area. */
 export function shareOf(area: number, areas: readonly number[]): number {
   const sum = areas.reduce((all, a) => all + a, 0);
   return sum > 0 ? area / sum : 1 / Math.max(1, areas.length);
@@ -29,7 +29,7 @@ export function shareOf(area: number, areas: readonly number[]): number {
 const leastTurnS = 0.1;
 /** Requests of a turn that wait for one another, at least. */
 const roundTrips = 2;
-/** Seconds that a turn takes at least which fetches so many bytes whatever it is given; `bytesS` 0: nobody knows the link. */
+/** The least seconds of a turn that fetches so many bytes in any case; `bytesS` 0: nobody knows the link. */
 export function leastS(bytes: number, bytesS: number, latencyS: number): number {
   return bytes > 0 ? Math.max(leastTurnS, roundTrips * latencyS + (bytesS > 0 ? bytes / bytesS : 0)) : leastTurnS;
 }
@@ -44,7 +44,7 @@ export function turnS(leftS: number, area: number, areas: readonly number[], lea
 
 /** Earlier transfers say nothing of the link now, seconds. */
 const recentS = 10;
-/** What the link has carried, bytes per second of the time in which bytes came, over the last seconds before `nowS`; 0: nothing is known. */
+/** Bytes per second while bytes came, over the last seconds before `nowS`; 0: nothing is known. */
 export function linkBytesS(records: readonly RequestRecord[], nowS: number): number {
   const came = records.filter((r) => r.received > 0 && r.firstByte >= 0 && r.ended > nowS - recentS).sort((a, b) => a.firstByte - b.firstByte);
   let [bytes, seconds, until] = [0, 0, -Infinity];
@@ -57,7 +57,7 @@ export function linkBytesS(records: readonly RequestRecord[], nowS: number): num
 }
 
 const mega = 1e6;
-/** GPU memory that a page takes by default, bytes: by the device's memory where it says so, else by screen and touch. */
+/** GPU memory that a page takes by default, bytes: by the device's memory, else by screen and touch. */
 export function defaultMemoryBytes({ deviceMemoryGb, screenPx, touch }: { deviceMemoryGb?: number; screenPx: number; touch: boolean }): number {
   if (deviceMemoryGb !== undefined && deviceMemoryGb > 0) return Math.min(64 * mega * 2 ** Math.floor(Math.log2(Math.max(deviceMemoryGb, 0.5))), 512 * mega);
   return (touch || screenPx < 1e6 ? 128 : 256) * mega;

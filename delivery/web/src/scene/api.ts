@@ -19,7 +19,7 @@ export interface Gaze {
   x: number;
   /** -1 (bottom) to 1 (top). */
   y: number;
-  /** Device pixels that one degree of the visual field has on this screen. Default 40: 96 to the inch at 60 cm. */
+  /** Device pixels for one degree of the visual field. Default 40: 96 to the inch at 60 cm. */
   pxPerDegree?: number;
 }
 
@@ -33,9 +33,9 @@ export interface GltfLoaderLike {
 
 /** A model's turn at the link. */
 export interface Turn {
-  /** From now on; Infinity: no limit. 0: the first picture stays until refine() or another view asks for more. */
+  /** From now on; Infinity: no limit. 0: the first picture stays until refine() or another view. */
   seconds: number;
-  /** What the link is expected to carry, bytes per second; left out: what the model's own transfers have shown. */
+  /** Expected bytes per second of the link; left out: what the model's own transfers have shown. */
   bytesS?: number;
 }
 
@@ -55,7 +55,7 @@ export interface LoadOptions {
    * of the eye. Needs a camera. Left out: the whole picture counts alike.
    */
   gaze?: () => Gaze | undefined;
-  /** Displayed height in device px, or a function that gives the height; stands in for the camera. Default 1000. */
+  /** Displayed height in device px, or a function that gives it; replaces the camera. Default 1000. */
   display?: number | Display | (() => number | Display);
   /**
    * Seconds from the package's opening (the first load) or from load() (further ones) until everything is there.
@@ -69,23 +69,23 @@ export interface LoadOptions {
   policy?: Policy;
   /** First guess of the throughput, bytes per second; left out: the throughput of the first transfers. */
   beta0BytesS?: number;
-  /** The rule that says which scale is enough. Default flip: by lit pictures, which the package's build has compared. */
+  /** The rule that says which scale is enough. Default flip: by lit pictures that the build compared. */
   rule?: StepRule;
   /** This scale (or the nearest one that the package has) instead of the scale for the display. */
   scale?: number;
-  /** This rung of every fragment (the highest one where there are fewer) instead of rungs that fit the time. */
+  /** This rung of every fragment (at most the highest) instead of rungs that fit the time. */
   rung?: number;
   /** Textures have full size, whatever the display can show. */
   fullSize?: boolean;
   /** Meshes: as GLB files, by the vertex-split stream, or by whichever needs fewer bytes. Default auto. */
   meshes?: 'glb' | 'stream' | 'auto';
-  /** The load goes on after the deadline (and when the view changes) until the display can show no more. Default true. */
+  /** Whether the load goes on after the deadline until the display can show no more. Default true. */
   autoRefine?: boolean;
-  /** Refining ends where a fragment's 1 - SSIM is no more than this: higher rungs cannot be told apart. Default 0.003. */
+  /** Refining ends where 1 - SSIM of a fragment is no more than this. Default 0.003: not to be seen. */
   refineTo?: number;
   /** Address of worker.js, where that file does not stand beside the library. */
   workerUrl?: string | URL;
-  /** `handle` of texmesh/worker, for pages that may have no workers: `handle` then works on the main thread. */
+  /** `handle` of texmesh/worker, for pages without workers: it works on the main thread. */
   decode?: DecodeHere;
   /** Workers that decode images. Default: 2 to 4 by the number of cores. */
   workers?: number;
@@ -115,7 +115,7 @@ export interface LoadOptions {
 /** Phases of a load, in their order. */
 export type LoadPhase = 'first-picture' | 'tables' | 'mesh' | 'textures' | 'refining' | 'done' | 'cancelled' | 'failed';
 
-/** A decision of the plan for a fragment or some neighbours; sent when it is taken and again when its transfer has ended. */
+/** A decision for a fragment or some neighbours; sent when taken and when its transfer has ended. */
 export interface DecisionEvent {
   /** k = 1 .. n */
   position: number;
@@ -151,7 +151,7 @@ export interface DecisionEvent {
 export interface LoadEvents {
   /** A request of the package has ended. */
   request: RequestRecord & { at: number };
-  /** The smallest proxy (`scale` is -1 then), or the coarsest mesh with its previews (`proxy` is -1), stands in the scene. */
+  /** The smallest proxy (`scale` is -1), or the coarsest mesh with its previews (`proxy` is -1), is shown. */
   'first-picture': { at: number; scale: number; proxy: number; bytes: number };
   /** A proxy stands in the scene: the first one, a larger one on the way to scales, or one that is enough. */
   proxy: { at: number; proxy: number; triangles: number };
@@ -245,7 +245,7 @@ export interface LoadedModel {
    * fragments to refine first. Cheap when nothing has changed.
    */
   update(camera?: Camera): void;
-  /** Fetches fragments that the display can show but the time did not allow; resolves when nothing is left to fetch. */
+  /** Fetches fragments that the display can show but the time did not allow; resolves when none is left. */
   refine(): Promise<void>;
   /**
    * Changes scale and rung that were chosen at loading; fetches at once, or when the timed part is over, and shows lower rungs in place
@@ -254,7 +254,7 @@ export interface LoadedModel {
   setOverride(override: { scale?: number; rung?: number }): void;
   /** Stops all transfers; the picture stays. */
   cancel(): void;
-  /** Stops all transfers, takes the object out of the scene and frees geometries, materials, textures and workers. */
+  /** Stops all transfers, takes the object out of the scene, frees its memory and its workers. */
   dispose(): void;
   /** RGBA bytes of a composed plane, row 0 at the top: read back from the GPU, for tests. */
   readPlane(base: number): Uint8Array;

@@ -59,7 +59,7 @@ export async function playPlan(plan: HarmonicTimePlan, { groups }: GroupedList, 
   }
 }
 
-/** Decoding and uploading take so long after the last byte: 4 ms, or 11 on a machine without a GPU, were measured. */
+/** Decoding and uploading after the last byte: 4 ms, or 11 without a GPU, were measured. */
 export const composeS = 0.015;
 /** Fragments that are later than this share of the limit are given up. */
 const mostLate = 0.01;
@@ -68,10 +68,10 @@ const leastRest = 0.004;
 /** Share of the bytes promised by the throughput that a request may count on. */
 const certain = 0.85;
 
-/** A page that is busy hears of answers late, and asks late: so many seconds more of the link are asked for at once, at most. */
+/** A busy page hears late, and asks late: it asks for at most so many seconds more of the link at once. */
 const mostBusyS = 0.25;
 
-/** Fetches fragments by Harmonic Time Compensation: group by group, so that the last one comes at the limit. */
+/** Fetches fragments by Harmonic Time Compensation, in groups. The last one comes at the limit. */
 export class FetchInTime {
   private plan_?: HarmonicTimePlan;
 
@@ -87,7 +87,7 @@ export class FetchInTime {
   throughputBytesS(): number | undefined {
     return this.plan_?.throughputBytesS();
   }
-  /** A plan has run, and fragments may be asked for one by one: not where rungs come as a whole, nor by the printed policy. */
+  /** A plan has run, and fragments may be asked for one by one: no whole rungs, no printed policy. */
   get hasPlan(): boolean {
     return !!this.plan_ && !this.printed && !this.fetching_.wholeRungs();
   }

@@ -17,7 +17,7 @@ export interface HeldFragments {
   fates: FragmentFates;
 }
 
-/** Upgrades that save most for these bytes, by plane and importance. Fragments under way count as if they had come. */
+/** Upgrades that save most for these bytes. Fragments under way count as if they had come. */
 export function upgradeWishes({ offers, fragments }: FragmentList, mostBytes: number, { planes, fates }: HeldFragments): Wish[] {
   const curves = offers.map(({ bytes, loss }, offer) => {
     const f = fragments[offer];
@@ -83,7 +83,7 @@ export class FragmentFetch {
     this.planes.finishMips();
     for (; this.pending() > 0; await sleepS(0.004)) throwIfAborted(this.load_.signal); // of blocks a worker makes them
   }
-  /** Whether rungs come as a whole, whichever fragment is asked for: from a tree without files of fragments. */
+  /** Whether rungs come as a whole: from a tree without files of fragments. */
   wholeRungs(): boolean {
     const [first] = this.planes.all();
     return this.load_.reader.form === 'files' && !!first && !this.transfers.filesOf(first.plane).complete;

@@ -17,7 +17,7 @@ interface FirstDrawing {
 /** The first picture waits for its programs no longer than this. */
 const mostCompileS = 0.5;
 
-/** Resolves when the GPU has done all its work, or after `mostS`. A question to a GPU without work does not hold the page up. */
+/** Resolves when the GPU has done its work, or after `mostS`. A GPU without work answers at once. */
 export async function gpuIdle(renderer: WebGLRenderer, mostS = 0.5): Promise<void> {
   const gl = renderer.getContext() as WebGL2RenderingContext;
   const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
@@ -45,7 +45,7 @@ async function programsReady(renderer: WebGLRenderer, mostS: number, stopIfCance
   }
 }
 
-/** Prepares programs and previews for the first frame, each in a turn of its own: the page goes on while the GPU's process makes them. */
+/** Prepares programs and previews for the first frame, each in a turn of its own: the page goes on. */
 export async function readyToDraw(load: FirstDrawing, scene: Object3D, shape: Object3D): Promise<void> {
   const { signal, options: { renderer } } = load;
   const stopIfCancelled = (): void => throwIfAborted(signal);
@@ -64,7 +64,7 @@ export async function readyToDraw(load: FirstDrawing, scene: Object3D, shape: Ob
   await gpuIdle(renderer, mostCompileS);
 }
 
-/** Whether the processor draws for want of a GPU: the processor takes seconds for what a GPU does at once, and workers take less. */
+/** Whether the processor draws for want of a GPU: it is slow at what a GPU does; workers are faster. */
 export async function isSoftware(renderer: WebGLRenderer): Promise<boolean> {
   await gpuIdle(renderer);
   const gl = renderer.getContext();
@@ -127,7 +127,7 @@ export class GpuRoom {
     this.users_.add(user);
     return () => void this.users_.delete(user);
   }
-  /** To be called when something new goes to the GPU: asks the GPU, a little later, whether it has taken all. */
+  /** To be called when something new goes to the GPU: asks the GPU a little later whether it took all. */
   async ask(): Promise<void> {
     if (this.asking_) return;
     this.asking_ = true;

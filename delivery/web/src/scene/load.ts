@@ -53,7 +53,7 @@ export class ProxyOnTheWay {
     const { override: { scale, rung }, options: { rule = 'flip', fullSize } } = this.load_;
     return scale === undefined && rung === undefined && !fullSize && rule === 'flip';
   }
-  /** The smallest proxy that cannot be told from S_0 in this view; -1: none, or scales and textures are chosen by hand. */
+  /** The smallest proxy that is as good as S_0 in this view; -1: none, or somebody chooses by hand. */
   serving(): number {
     const { view, reader } = this.load_;
     return this.free_ && this.proxy_.shown >= 0 ? servingProxy(reader.manifest, view.display.heightPx) : -1;
@@ -118,7 +118,7 @@ function bytesOfAnyTurn({ proxies, scales, index, tables }: Manifest, serving: n
   return tables.offset + tables.bytes - index.offset + (withMesh ? scales[scales.length - 1].glb.bytes : 0);
 }
 
-/** What three.js keeps of a lost context is dropped while nothing of it can be deleted: a later context would not know it. */
+/** three.js drops what it keeps of a lost context, as a later context could not delete it. */
 function forgetGpu(objects: readonly Object3D[], planes: LoadState['planes'], materials: readonly Material[]): void {
   objects.forEach(disposeGeometries);
   for (const texture of planes.flatMap((p) => p.textures)) texture.dispose();
@@ -354,7 +354,7 @@ class ModelLoad {
     forgetGpu(this.scale_.objects(), this.textures?.planes() ?? [], this.materials);
     this.context.emit('context', { lost: true });
   }
-  /** After a lost context: three.js makes its geometries and pictures anew, but composed textures are gone. */
+  /** After a lost context: three.js makes geometries and pictures anew; composed textures are gone. */
   private restore_(): void {
     this.context.emit('context', { lost: false });
     this.makeAnew_();

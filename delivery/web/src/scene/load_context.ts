@@ -112,7 +112,7 @@ export class LoadContext {
 
   // ---- what is wanted
 
-  /** The override with the nearest scale that the package has. InputError: scale or rung is no whole number from 0 on. */
+  /** The override with the nearest scale of the package. InputError: no whole number from 0 on. */
   snapped({ scale, rung }: Override): Override {
     for (const [name, v] of Object.entries({ scale, rung }))
       if (v !== undefined && !(Number.isInteger(v) && v >= 0)) throw new InputError('options', name, 'a whole number from 0 on', String(v));

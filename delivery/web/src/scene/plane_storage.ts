@@ -1,13 +1,13 @@
 import { FramebufferTexture, type Texture, type WebGLRenderer } from 'three';
 import type { TextureInfo } from '../format/textures';
 
-/** Levels that come with every fragment. The further levels, 1/256 of the whole and less, are made of the last of these. */
+/** Levels that come with every fragment. Further levels, 1/256 of the whole, are made of the last one. */
 export const ownLevels = 5;
 
 /** Filters of three.js behind NearestFilter (1003) and LinearFilter (1006) ask for mip levels. */
 const linearFilter = 1006;
 
-/** The storage on the GPU of one texture plane: views for materials share the storage as long as their samplers are alike. */
+/** The storage on the GPU of a plane: views for materials share it where their samplers are alike. */
 export class PlaneStorage {
   private readonly gl_: WebGL2RenderingContext;
   private readonly views_ = new Map<Texture, FramebufferTexture>(); // by the texture that each view is like

@@ -96,7 +96,7 @@ export class MaterialSet {
     return [...this.byKey_.values()];
   }
 
-  /** Gives the meshes of a scale the shared materials. `added` hears of every slot with a texture of the package. */
+  /** Gives meshes the shared materials. `added` hears of every slot with a texture of the package. */
   shareMaterials(gltf: ParsedGltf, meshes: readonly Mesh[], added: (slot: Slot) => void): void {
     for (const mesh of meshes) mesh.material = this.shared_(gltf, mesh.material as Material, added);
   }

@@ -38,7 +38,7 @@ export class ShownPlanes {
   private compression_?: Compression;
   private considered_ = false;
   private texelS_ = 0; // seconds that showing planes has taken at most, by their texels
-  /** How texels are stored, from the first planes that are shown on: other texels would have to be fetched again. */
+  /** How texels are stored, for the whole load: other texels would have to be fetched again. */
   private way_?: number;
 
   constructor(
@@ -147,7 +147,7 @@ export class ShownPlanes {
       this.load_.fail(error, 'compressed textures'); // RGBA it is
     }
   }
-  /** Planes with more texels where the view has come nearer; never planes with fewer, as the texels are there already. */
+  /** Planes with more texels where the view came nearer. Texels that are there stay. */
   finer(scale: number): PlaneChoice[] {
     const { planes } = this.set_;
     const wanted = planesFor(this.load_, this.data, this.load_.view.display.heightPx / hysteresis).filter((c) => planes.has(c.base));

@@ -55,7 +55,7 @@ export class ShownScale {
       this.lost(error, scale);
     }
   }
-  /** The shown scale stays. The lost scale, or the scale that is wanted by then, is asked for again a little later. */
+  /** The shown scale stays. A little later, the lost or the then wanted scale is asked for again. */
   lost(error: unknown, scale: number): void {
     this.load_.fail(error, `scale ${scale}`);
     if (this.wanted === scale) this.wanted = this.shown;

@@ -28,7 +28,7 @@ interface ScaleRun {
   scales: SplitInfo['scales'];
 }
 
-/** The scales of a model out of its vertex-split stream: one set of buffers that is appended to, an index per scale. */
+/** The scales of a vertex-split stream: one set of buffers that grows, and an index for each scale. */
 export class SplitShapes {
   private readonly attributes_ = new Map<string, BufferAttribute>();
   private readonly meshes_ = new Map<number, Mesh>();
@@ -135,7 +135,7 @@ export class SplitShapes {
     attribute.array.set(values, components * from);
     attribute.needsUpdate = true;
   }
-  /** The material that a mesh of this geometry gets: the GLB's material with this number, or the GLB's first. */
+  /** The material of a mesh of this geometry: the GLB's with this number, or its first. */
   private async materialOf_(gltf: ParsedGltf, index: number, geometry: BufferGeometry): Promise<Material> {
     const { parser, scene } = gltf;
     const there = index < (parser.json.materials ?? []).length;

@@ -40,7 +40,7 @@ export function stepOf(load: LoadContext): number {
   return step >= 0 && fits(load, step) ? step : -1;
 }
 
-/** The largest proxy behind `shown` that comes in the time left and looks better than scales do at its end; -1: none does. */
+/** The largest proxy behind `shown` that comes in time and looks better than scales do then; -1: none. */
 function betterThanScales(load: LoadContext, shown: number, flip: number, leftS: number): number {
   const { reader: { manifest, client }, view: { display: { heightPx } }, beta0 } = load;
   const better = (k: number): boolean =>
@@ -59,7 +59,7 @@ const meshShare = 0.5;
 const longestTimerS = 1e6;
 /** The scale is compared with the proxy in the scene this often, seconds. */
 const lookEachS = 0.1;
-/** In the timed part a surface that the camera does not see is worth this much of a surface that the camera sees. */
+/** In the timed part, an unseen surface is worth this much of a seen one. */
 const unseen = 1e-3;
 /** Share of the time left that showing a plane may take, by what earlier ones took: without a graphics card .1 to .8 s for 4 million texels. */
 const showShare = 0.6;
@@ -238,7 +238,7 @@ export class TextureLoad {
 
   // ---- refining
 
-  /** Fetches what the camera sees and the display can show, until there is nothing left or somebody asks for another turn. */
+  /** Fetches what camera and display can show, until nothing is left or somebody asks for another turn. */
   async refine(again: () => boolean): Promise<void> {
     this.fetching_.fates.allowLostAgain();
     await this.showFinerPlanes_();

@@ -45,7 +45,7 @@ interface Part {
   offset: number;
   bytes: number;
 }
-/** Those who hear when all bytes of a wish are there (before the bytes are checked), and when they cannot be had. */
+/** They hear when all bytes of a wish are there (not yet checked), and when they cannot be had. */
 interface Askers {
   arrived(wish: Wish): void;
   failed(wish: Wish, error: unknown): void;
@@ -58,7 +58,7 @@ export interface GroupOptions {
   signal?: AbortSignal;
 }
 
-/** Files of fragments count as so far from each other, further than any pack is long: requests for files are not joined. */
+/** Distance between files of fragments, more than any pack's length: requests for files are not joined. */
 const fileSpacing = 2 ** 40;
 
 /**

@@ -14,7 +14,7 @@ const longestFenceS = 0.25;
 /** The smallest mip levels follow this often while fragments come. */
 const mipsEveryMs = 200;
 
-/** Uploads that wait for their turn: a few between two turns of the page, and never more than the GPU has done. */
+/** Uploads that wait for their turn: a few between two turns of the page; the GPU must keep up. */
 export class UploadQueue {
   /** Uploads that still wait are left out from now on. */
   disposed = false;
@@ -30,7 +30,7 @@ export class UploadQueue {
     private readonly updateMips_: () => void,
   ) {}
 
-  /** Puts off `run`, which gives so many pixels to the GPU; resolves when `run` has ended, or was left out. */
+  /** Puts off `run`, which uploads so many pixels; resolves when `run` has ended, or was left out. */
   enqueue(pixels: number, run: () => void): Promise<void> {
     return new Promise((ended) => {
       this.uploads_.push({ pixels, run, ended });

@@ -34,7 +34,7 @@ async function decodePicture(request: DecodeRequest): Promise<ImageBitmap[]> {
   return levels;
 }
 
-/** A piece of an enlarged picture. Every piece is drawn as a part of the whole, so that pieces meet without a seam. */
+/** A piece of an enlarged picture, drawn as a part of the whole: pieces meet without a seam. */
 function enlargePicture({ picture, width, height, x0, x1, y0, y1, levels }: EnlargeRequest): ImageBitmap[] {
   const out: ImageBitmap[] = [];
   for (let level = 0; level < levels; ++level) {
@@ -84,7 +84,7 @@ function normals(codes: Int32Array, from: number, to: number, bits: number): Flo
   return out;
 }
 
-/** Wedges that were added since there were `from` wedges, and the index of all triangles, for append-only buffers. */
+/** Wedges from number `from` on, and the index of all triangles, for append-only buffers. */
 function splitUpdate(reader: SplitStreamReader, from: number): SplitUpdate {
   const { mesh, head } = reader;
   const to = mesh.wedges;

@@ -136,7 +136,7 @@ export class WorkerPool {
       postWaitingJobs();
     });
   }
-  /** Gives a job whose turn it is to the worker that has least to do; splits are decoded where their stream was opened. */
+  /** Gives a job to the worker that has least to do; splits go where their stream was opened. */
   post(job: Job): void {
     const busy = this.helpers_.map(() => 0);
     for (const { worker = -1 } of this.jobs_.values()) if (worker >= 0) ++busy[worker];

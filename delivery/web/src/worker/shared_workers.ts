@@ -41,7 +41,7 @@ export class SharedWorkers {
     this.workers_ = new Array<undefined>(Math.max(1, Math.floor(count))).fill(undefined);
   }
 
-  /** To be called once by each pool: the pool's first worker, so that not all pools begin with the same one. */
+  /** Called once by each pool: its first worker, so that not all pools begin with the same one. */
   nextPool(): number {
     return this.pools_++;
   }

@@ -4,7 +4,7 @@ import { type SplitLimits, SplitState } from './split_state';
 import * as m from './split_models';
 import { type CodedAttribute, SplitValues } from './split_values';
 
-/** Splits of a point, the parent, which gets a child: parent and child share the corners, and get new faces between them. */
+/** Splits of a point, the parent: its child shares the corners, and new faces stand between the two. */
 class SplitVertices {
   private staysNow_ = 0;
 
@@ -85,7 +85,7 @@ class SplitVertices {
     for (let i = 0; i < corners.count; ++i)
       if (!corners.moves[i]) this.state_.wedges.stays.data[corners.wedge[i]] = this.staysNow_;
   }
-  /** Codes the child's wedge at a corner that moves: mostly the wedge that corners of the same wedge got before. */
+  /** Codes the child's wedge at a corner that moves: mostly that of earlier corners of the same wedge. */
   private codeTarget_(i: number): void {
     if (this.staysNow_ !== this.splitNumber_) this.noteStays_();
     const wedge = this.state_.corners.wedge[i];

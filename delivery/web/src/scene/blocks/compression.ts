@@ -11,7 +11,7 @@ import { BlockStorage, readPicture } from './block_storage';
 import { type Way, blocksFor, bytesBy, formatsOf } from './gpu_formats';
 import { readTwoChannels } from './two_channels';
 
-/** Fills a plane of blocks with a texture, scaled bilinearly: the GPU draws it piece by piece, workers make the blocks. */
+/** Fills a plane of blocks with a texture: the GPU draws it piece by piece, workers make the blocks. */
 export async function refill(next: PlaneComposer, from: Texture, format: BlockFormat | undefined, renderer: WebGLRenderer, pool: WorkerPool, uploads: UploadQueue): Promise<void> {
   await eachPiece(next, uploads, async ({ x0, x1, y0, y1 }) => {
     const [width, height] = [x1 - x0, y1 - y0];
