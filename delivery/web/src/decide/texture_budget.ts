@@ -1,13 +1,10 @@
 import {
   leastWeight, lossUnit, reweightings, worthwhileFinerFlip, worthwhilePart,
 } from '../format/shared_numbers';
-import type { PackageData } from '../format/tables';
 import type { QualityTable } from '../format/quality_table';
 import { FragmentList, ListOptions, fragmentList, lossesOf } from './fragment_list';
-import { sumOf } from './numbers';
 import { pow } from './portable_math';
 import { spendBytes } from './rate_distortion';
-import { bytesAtRung } from './harmonic_time';
 import { PerGroup, PlaneChoice, TextureLoss, everyGroup, pictureFlip, planesForDisplay } from './texture_loss';
 
 // delivery/cpp/decide/texture_budget.cpp, bit for bit.
@@ -42,7 +39,12 @@ function slopesOf({ exponent }: QualityTable, { flip, losses }: TextureSpending)
   return losses.map((loss) => Math.max(leastWeight, pow(Math.max(loss / flip, 1e-9), exponent - 1))) as unknown as PerGroup;
 }
 
-/** The steps of textureForBudget, so that a page can breathe between them; the last value is the result. */
+/**
+ * The best textures for so many bytes of fragments, step by step, so that a page can breathe; the last value is the result.
+ * Planes may be coarser than the display asks for, so that few bytes are not spread over too many texels, or finer, so that
+ * bytes that are left are not lost. Fragments share the bytes by rate and distortion. What counts is the FLIP that is
+ * predicted of the picture. Needs the tables of all planes.
+ */
 export function* budgetSteps(loss: TextureLoss, options: SpendingOptions, bytes: number): Generator<TextureSpending> {
   const { data, displayedPx } = loss;
   const tried = new Set<string>();
@@ -83,20 +85,4 @@ export function* budgetSteps(loss: TextureLoss, options: SpendingOptions, bytes:
     best = now;
   }
   yield best;
-}
-
-/** The best texture that so many bytes can show. */
-export interface TextureBudget extends TextureSpending {
-  /** Bytes of fragments, at most the budget. */
-  bytes: number;
-}
-
-/**
- * Chooses between the planes for the display and coarser and finer ones, so that few bytes are not spread over texels that they
- * cannot make good, and bytes that are left are not lost; fragments share the bytes by rate and distortion. What counts is the FLIP that is predicted of the picture. Needs
- * the tables of all planes.
- */
-export function textureForBudget(data: PackageData, displayedPx: number, options: SpendingOptions, bytes: number): TextureBudget {
-  const best = [...budgetSteps(new TextureLoss(data, displayedPx), options, bytes)].pop()!;
-  return { ...best, bytes: sumOf(best.list.offers.map((f, i) => bytesAtRung(f, best.rungs[i]))) };
 }

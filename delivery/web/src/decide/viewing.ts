@@ -22,13 +22,6 @@ export function displayedHeightPx(objectHeight: number, distance: number, camera
   return (objectHeight / (2 * distance * halfTangent(camera.fovDegrees))) * camera.viewportPx;
 }
 
-/** The distance at which the object is displayed that high; infinite for 0 px, 0 for "any". */
-export function viewingDistance(objectHeight: number, heightPx: number, camera: CameraView): number {
-  if (heightPx >= anyDisplayPx) return 0;
-  if (!(heightPx > 0)) return Infinity;
-  return (objectHeight / (2 * heightPx * halfTangent(camera.fovDegrees))) * camera.viewportPx;
-}
-
 /**
  * The rule that decides about the scale: flip (default) = lit pictures that cannot be told from those of S_0, which is what Manifest.steps
  * holds; jnd = the just-noticeable difference; error = an error of one pixel; edge = the O_V / E_S that matches the displayed height best.
@@ -67,24 +60,6 @@ export function scaleAt(steps: readonly ManifestStep[], displayedPx: number): nu
   return steps.length === 0 ? 0 : steps[steps.length - 1].scale;
 }
 
-/**
- * How far a scale's surface is from S_0's on screen, px at most; `max` is the largest of some thousand sampled
- * distances, never less than `p95`, which comes from samples of its own.
- */
-export function pixelError(manifest: Manifest, scale: ManifestScale, displayedPx: number): { p95: number; rms: number; max: number } {
-  if (scale.scale === 0 || !(manifest.objectHeight > 0)) return { p95: 0, rms: 0, max: 0 };
-  const pxPerUnit = displayedPx / manifest.objectHeight;
-  const p95 = scale.displayPxError >= anyDisplayPx ? 0 : displayedPx / scale.displayPxError;
-  return { p95, rms: scale.errorRms * pxPerUnit, max: Math.max(p95, scale.errorMax * pxPerUnit) };
-}
-
-/** A rectangle on the screen in px, y downwards. */
-export interface ScreenRect {
-  x0: number;
-  y0: number;
-  x1: number;
-  y1: number;
-}
 /** The shape that the visible part of an object makes (thesis 7.2, Fig. 7.5). */
 export interface VisiblePart {
   /** Both 0: nothing of the object is to be seen. */
@@ -95,17 +70,6 @@ export interface VisiblePart {
 }
 /** The visible part of an object of which nothing is cut off. */
 export const wholeObject: VisiblePart = { widthPx: 0, heightPx: 0, clipped: false };
-
-/** The part of an object's bounding box on the screen that lies within the view. */
-export function clipTo(object: ScreenRect, view: ScreenRect): VisiblePart {
-  const x0 = Math.max(object.x0, view.x0);
-  const x1 = Math.min(object.x1, view.x1);
-  const y0 = Math.max(object.y0, view.y0);
-  const y1 = Math.min(object.y1, view.y1);
-  if (!(x1 > x0) || !(y1 > y0)) return { widthPx: 0, heightPx: 0, clipped: true };
-  const whole = x0 <= object.x0 && x1 >= object.x1 && y0 <= object.y0 && y1 >= object.y1;
-  return { widthPx: x1 - x0, heightPx: y1 - y0, clipped: !whole };
-}
 
 /** By how much a relative distance grows when R can be no more than half the part's shorter side. */
 function growthOfValue(s: ManifestScale, displayedPx: number, part: VisiblePart): number {

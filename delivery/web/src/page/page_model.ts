@@ -188,9 +188,6 @@ export class PageModel {
     this.events_.emit('first-picture', { bytes: this.package?.client.received ?? 0 });
     this.settle_.shown();
   }
-  get isBusy(): boolean {
-    return this.phase === 'opening' || this.phase === 'turn';
-  }
 
   /** While the picture is decoded, the link is the next model's. */
   private awaitBytes_(pkg: ShowablePackage, signal: AbortSignal): void {

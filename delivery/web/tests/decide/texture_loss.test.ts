@@ -1,12 +1,13 @@
 import { describe, expect, it } from 'vitest';
-import { shownFlip, textureForBudget } from '../../src/reader';
+import { shownFlip } from '../../src/reader';
+import { textureForBudget } from '../support/texture_budget';
 import { setUp } from '../support/transferring';
 
 describe('what is shown', () => {
   it('is predicted as the plan of the same rungs', async () => {
     const { data } = await setUp();
     for (const bytes of [0, 20000, 1e6]) {
-      const { planes, list, rungs, flip } = textureForBudget(data, 200, { scale: 0 }, bytes);
+      const { planes, list, rungs, flip } = textureForBudget(data, 200, 0, bytes);
       const shown = planes.map((p) => ({ ...p, rungs: new Int16Array(data.tables[p.plane]!.columns * data.tables[p.plane]!.rows).fill(-1) }));
       list.fragments.forEach(({ plane, fragment }, i) => (shown.find((p) => p.plane === plane)!.rungs[fragment] = rungs[i]));
       expect(shownFlip(data, 200, 0, shown)).toBeCloseTo(flip, 9);
