@@ -187,14 +187,11 @@ export class TexmeshPage {
       this.advance_();
     },
   };
-  /** Of several packages, each asks for its manifest and little more: what stands behind one's first picture would keep the others' waiting. */
+  /** Each of several packages asks for its manifest and little more, so that none keeps others waiting. */
   private get startBytes_(): number {
     return this.waiting_.length > fewModels ? bootstrapBytes : startBytes;
   }
-  /**
-   * What is seen has nearly all of the memory; what is only close by has a picture. Some models take more than their share however coarse they
-   * are: those that come later have the less.
-   */
+  /** What is seen has nearly all memory. Some models take more than their share: later ones have less. */
   private memoryOf_(model: PageModel): number {
     const areas = this.models.filter((m) => m.place.visible || m === model).map((m) => m.place.areaPx);
     const free = this.memoryBytes - (this.gpuBytes - model.gpuBytes);

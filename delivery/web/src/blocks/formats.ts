@@ -9,7 +9,7 @@ export const blockBytes = (format: BlockFormat): 8 | 16 => (format === 'bc1' || 
 export interface BlockRequest {
   url: string;
   format: BlockFormat;
-  /** Levels that become blocks. One more comes as RGBA where there is one: the caller makes the smallest ones of that. */
+  /** Levels that become blocks. One more may come as RGBA, from which the caller makes the smallest ones. */
   own: number;
   /** Width and height that count; what lies beyond is left out. */
   size: [number, number];

@@ -61,7 +61,7 @@ export function wantedScale(manifest: Manifest, { scale, displayedPx, rule }: De
 /** Bytes of the first request; provenance.json is the last entry. */
 const firstBytes = ({ provenance }: Manifest): number => Math.min(startBytes, provenance.offset + provenance.bytes);
 
-/** When the first picture is there and, with so many bytes more, the mesh: by the last request, which moved `moved` bytes from `fromS` on. */
+/** When the first picture is there, and the mesh: the last request moved `moved` bytes from `fromS` on. */
 function timesWith(m: Manifest, link: LinkOptions, more: number) {
   const { offset, bytes } = firstPicture(m);
   const firstPictureBytes = beyondStart(offset, offset + bytes);

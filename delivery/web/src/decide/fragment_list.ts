@@ -35,7 +35,7 @@ export interface ListOptions {
   qualityHigh: number;
   /** What a group's losses weigh beside the others', > 0. */
   groupWeights: PerGroup;
-  /** Chapter 4's list as printed, where the policy is thesis: makes it of a list of all fragments, ordered by feature density alone. */
+  /** Chapter 4's list as printed (policy thesis), of all fragments ordered by feature density alone. */
   printed?: (data: PackageData, list: FragmentList, options: ListOptions) => void;
 }
 /** S_0 at 1000 px, the mean of eta, the qualities of delivery/cpp. */

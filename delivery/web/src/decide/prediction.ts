@@ -80,7 +80,7 @@ export function sizesAround(table: QualityTable, displayedPx: number): readonly 
 /** How many times twice as large texels are on the screen as the samples of sizesAround(). */
 export type TexelGrowth = readonly [number, number];
 
-/** What textures of one group lose at one displayed height; without samples 1 - SSIM of their texels, and nothing by coarser mips. */
+/** What textures of a group lose at one height; without samples 1 - SSIM, and 0 by coarser mips. */
 export class GroupCurve {
   private readonly curves_: Curve[];
   private readonly part_: number;

@@ -13,10 +13,7 @@ export interface StepLink {
   leftS: number;
 }
 
-/**
- * Bytes behind those of the first request that a client of a package with proxies fetches before it can
- * decide about scales and textures.
- */
+/** Bytes behind the first request that a package with proxies needs before scales can be chosen. */
 export function documentBytes({ index, tables, scales }: Manifest): number {
   const { offset, bytes } = scales[scales.length - 1].glb;
   return beyondStart(index.offset, tables.offset + tables.bytes) + beyondStart(offset, offset + bytes);

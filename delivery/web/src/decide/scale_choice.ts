@@ -33,7 +33,7 @@ export interface InTimeRequest {
   memoryBytes?: number;
   /** Ways to store texels, the best first; left out: RGBA. */
   ways?: readonly BytesOf[];
-  /** When a scale's mesh is chosen: the plan of what comes after it (limit <= 0: no time is left), and the link that is supposed. */
+  /** The plan of what comes after a scale's mesh (limit <= 0: no time is left), and its link. */
   afterMesh(scale: number): { plan: TimePlanOptions; linkBytesS: number };
   /** Chooses what bytes are spent on in the place of rate and distortion. */
   textures?: (loss: TextureLoss, scale: number, bytes: number) => { planes: PlaneChoice[]; list: FragmentList };

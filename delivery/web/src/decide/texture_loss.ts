@@ -124,7 +124,7 @@ export class TextureLoss {
     }
     return { weights, weight: sumOf([...t.order].map((f) => weights[f])), shown };
   }
-  /** What skipped fragments are to each other: the mean over the plane's surface of what the group's curve says of their texels. */
+  /** Loss of skipped fragments: the mean over the surface of what the group's curve says of their texels. */
   private previewMean_(plane: number): number {
     let mean = this.previewMeans_.get(plane);
     if (mean !== undefined) return mean;
@@ -181,10 +181,7 @@ export class TextureLoss {
 export interface ShownTexture extends PlaneChoice {
   rungs: ArrayLike<number>;
 }
-/**
- * FLIP that is predicted of a picture that shows this scale and these textures. Needs the tables of their planes, and of the full-size
- * ones.
- */
+/** Predicted FLIP of this scale with these textures. Needs their planes' tables and the full-size ones'. */
 export function shownFlip(data: PackageData, displayedPx: number, scale: number, planes: readonly ShownTexture[]): number {
   const loss = new TextureLoss(data, displayedPx);
   const surface = loss.weights(planes);

@@ -33,10 +33,7 @@ export function gammaForBytes(data: PackageData, planes: readonly PlaneChoice[],
   return high;
 }
 
-/**
- * A list of all fragments as printed: etas count from Gamma, the limits are Q_i - dQ and Q_i + dQ, and F-bar,
- * the fragment nearest to Gamma, is sent at Q_i itself.
- */
+/** All fragments as printed: etas from Gamma, limits Q_i - dQ and Q_i + dQ, and F-bar (at Gamma) at Q_i. */
 function asPrintedList(data: PackageData, { offers, fragments }: FragmentList, { scale, gamma, qualityLow, qualityHigh }: ListOptions): void {
   const row = data.manifest.scales.findIndex((s) => s.scale === scale);
   offers.forEach((offer, i) => {

@@ -13,7 +13,7 @@ export class OrbitInput {
   private readonly pointers_ = new Map<number, { x: number; y: number }>();
   private readonly ended_ = new AbortController();
 
-  /** `moved` hears of each new orbit; `zooms`: the distance changes, too. The wheel zooms only while the canvas has the focus: a page that scrolls by goes on scrolling. */
+  /** `moved` hears of each new orbit. With `zooms`, the wheel zooms while the canvas has the focus. */
   constructor(private readonly canvas_: HTMLElement, private home_: Orbit, private readonly moved_: () => void, private readonly zooms_ = true) {
     this.orbit = { ...home_ };
     const { signal } = this.ended_;

@@ -12,7 +12,7 @@ export function bytesInWords(n: number): string {
 /** Seconds as people read them. */
 export const secondsInWords = (s: number): string => (s < 1 ? 'under a second' : s < 9.5 ? `about ${Math.round(s)} s` : `about ${Math.round(s / 5) * 5} s`);
 
-/** What a click costs: bytes of the first picture, of all that may follow (0: nobody has said), and the link's bytes per second (0: nobody knows). */
+/** What a click costs: bytes of the first picture and of all (0: unknown), bytes per second (0: unknown). */
 export function offerInWords(firstBytes: number, allBytes: number, linkBytesS: number): string {
   const wait = linkBytesS > 0 ? `, ${secondsInWords(firstBytes / linkBytesS)}` : '';
   const more = allBytes > firstBytes ? `; up to ${bytesInWords(allBytes)} in all` : '';

@@ -40,10 +40,7 @@ const webUrl = /^https?:\/\/(?!\/)[^\s"<>\\^`{|}\u0000-\u001f\u007f]+$/;
 /** Whether a text is an absolute http or https URL: a link of anything else may run a script. */
 export const isWebUrl = (text: string): boolean => webUrl.test(text);
 
-/**
- * Reads about.json: strict about fields of this version; unknown ones are handed on as they are. FormatError names the place in the
- * document.
- */
+/** about.json: strict about fields of this version; others stay as they are. FormatError names the place. */
 export function readAbout(json: Uint8Array): About {
   const about = parseJson(json, aboutPath, maxAboutBytes).by('B01');
   const check = (within: JsonAt, name: string, read: (at: JsonAt) => unknown): void => {

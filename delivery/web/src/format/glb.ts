@@ -213,10 +213,7 @@ function bytesOfView({ buffer, byteOffset = 0, byteLength, extensions }: View, b
   return new Uint8Array((stride === 2 ? Uint16Array.from(indices) : indices).buffer);
 }
 
-/**
- * A GLB that any loader reads without a decoder, from one whose views EXT_meshopt_compression codes without filters. All data must be in
- * the file. FormatError otherwise.
- */
+/** A GLB without EXT_meshopt_compression, from one whose data is all in the file. FormatError otherwise. */
 export function plainGlb(glb: Uint8Array): Uint8Array {
   const { json, bytes } = partsOfGlb(glb);
   const gltf = json as Gltf;

@@ -31,9 +31,9 @@ export interface TextureInfo {
   previewHeightPx: number;
   /** IJG quality per rung, strictly rising. */
   rungQuality: number[];
-  /** The last rung holds the coefficients of the source, a JPEG. That rung is shown as any other, and fetched where a load asks for it or refines so far. */
+  /** The last rung has the coefficients of the source, a JPEG. Loads that ask or refine so far fetch it. */
   sourceRung: boolean;
-  /** Ending of the source file among the entries, source/PPP.EXT; "" = none. Loads leave that file alone; PackageReader.entry reads it. */
+  /** Ending of the source file source/PPP.EXT; "" = none. PackageReader.entry reads it, no load does. */
   source: string;
 }
 

@@ -31,10 +31,7 @@ function lateness(mostS: number, signal?: AbortSignal): { late: Promise<never>; 
   return { late, clear: () => clear() };
 }
 
-/**
- * A document as `decoder` decodes it; decoded on this thread where the decoder fails or does not answer in time: because there are no
- * workers, or because the workers belong to a load that has ended.
- */
+/** A document by `decoder`, or on this thread where `decoder` fails or does not answer in time. */
 export async function decodeWith<K extends keyof Documents>(
   decoder: DocumentDecoder,
   mostS: number,
@@ -241,10 +238,7 @@ export class PackageDocuments {
   async planeTables(plane: number, signal?: AbortSignal): Promise<PlaneTables> {
     return (await this.tables([plane], signal))[plane]!;
   }
-  /**
-   * Tables by plane number: of these planes (and of those read before), or of all. Sections that stand together are
-   * read by one request.
-   */
+  /** Tables by plane: of these planes and those read before, or of all. One request reads neighbours. */
   async tables(planes?: readonly number[], signal?: AbortSignal): Promise<(PlaneTables | undefined)[]> {
     const { tables } = this.manifest;
     const how = { kind: 'tables', signal } as const;

@@ -94,10 +94,7 @@ export class PackageReader extends PackageDocuments {
 
   // ---- meshes and previews
 
-  /**
-   * The GLB of a scale as it is stored; no index is needed. Images of all but the coarsest scale's may be relative URIs of previews.
-   * InputError where the scale has no file of its own: see hasGlb.
-   */
+  /** The GLB of a scale as it is stored, without an index. InputError: no file of its own, see hasGlb. */
   async scaleGlb(scale: number, how: Partial<ReadOptions> = {}): Promise<Uint8Array> {
     const s = this.manifest.scales.find((k) => k.scale === scale);
     if (!s) throw new InputError(this.store.name, `scale ${scale}`, 'a scale of the package', 'none');

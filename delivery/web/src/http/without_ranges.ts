@@ -127,7 +127,7 @@ export function openBytes(bytes: Uint8Array, name: string): PackageStore {
   return new WholeStore(bytes, name);
 }
 
-/** URL of the tree beside a container: https://host/a/NAME.texmesh -> https://host/a/NAME/ ; '' when the URL is not of that form. */
+/** URL of the tree of a container: https://host/a/NAME.texmesh -> https://host/a/NAME/ ; '' else. */
 export function treeUrl(url: string): string {
   const m = /^([^?#]*)\.texmesh([?#].*)?$/.exec(url);
   return m ? `${m[1]}/${m[2] ?? ''}` : '';

@@ -42,10 +42,7 @@ export class Visibility {
     this.places_.set(canvas, place);
     for (const observer of [this.seen_, this.near_, this.sized_]) observer.observe(canvas);
   }
-  /**
-   * Looks by itself where canvases lie that were followed just now: the observers speak up with the next frame only, and by then bytes can
-   * have been asked for.
-   */
+  /** Looks where new canvases lie: the observers speak up with the next frame only, which is late. */
   glance(): void {
     for (const [canvas, place] of this.places_) {
       if (this.lookedAt_.has(canvas)) continue;

@@ -33,10 +33,7 @@ const roundTrips = 2;
 export function leastS(bytes: number, bytesS: number, latencyS: number): number {
   return bytes > 0 ? Math.max(leastTurnS, roundTrips * latencyS + (bytesS > 0 ? bytes / bytesS : 0)) : leastTurnS;
 }
-/**
- * Seconds of a model's turn of at least `leastS` while `leftS` are left for it and the others that wait; 0: so many are not left, and what
- * stands stays.
- */
+/** Seconds of a turn, at least `leastS`, out of `leftS` for all that wait; 0: there are not so many. */
 export function turnS(leftS: number, area: number, areas: readonly number[], leastS: number): number {
   if (leftS === Infinity) return Infinity;
   return leftS < leastS ? 0 : Math.max(leastS, leftS * shareOf(area, areas));

@@ -43,10 +43,7 @@ export interface Turn {
 export interface LoadOptions {
   /** The renderer of the scene: textures are composed in the renderer's context. */
   renderer: WebGLRenderer;
-  /**
-   * Makes a GLTFLoader with whatever decoders the package's meshes need: `() => new GLTFLoader().setDRACOLoader(...)`.
-   * Called once for every mesh.
-   */
+  /** Makes a GLTFLoader with the decoders that the package's meshes need. Called for every mesh. */
   gltfLoader: () => GltfLoaderLike;
   /** Camera that looks at the object; scale and textures follow the camera's view, see LoadedModel.update. */
   camera?: Camera;
@@ -167,10 +164,7 @@ export interface LoadEvents {
   progress: { at: number; phase: LoadPhase; bytes: number; bytesExpected: number };
   /** The timed part is over: limit and actual time, seconds from the same start. */
   deadline: { at: number; limit: number; actual: number; skipped: number };
-  /**
-   * The renderer's context was lost, or is there again. After that, textures begin with their previews and their fragments are fetched
-   * again; event `done` tells when all have come.
-   */
+  /** The context was lost, or is back: fragments are fetched again; `done` tells when all have come. */
   context: { at: number; lost: boolean };
   /** The GPU holds less than it was thought to: a coarser picture is shown from now on, within this limit. */
   memory: { at: number; gpuBytes: number; limitBytes: number };
@@ -236,7 +230,7 @@ export interface LoadedModel {
   readonly state: LoadState;
   /** Resolves when the first picture stands in the scene. */
   readonly firstPicture: Promise<void>;
-  /** Resolves when the timed part is over: every fragment decided, fetched and composed. Rejects when the load fails or is cancelled. */
+  /** Resolves when the timed part is over and all is shown. Rejects when the load fails or is cancelled. */
   readonly done: Promise<void>;
   /** Calls the listener at every such event; gives a function that ends the calls. */
   on<K extends keyof LoadEvents>(name: K, listener: (event: LoadEvents[K]) => void): () => void;

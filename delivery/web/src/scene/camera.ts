@@ -6,7 +6,7 @@ import { sampleTriangles } from './scale_parts';
 /** Triangles whose first corners are looked at. */
 const mostPoints = 600;
 
-/** How a camera shows the object in a picture of `size` device px: displayed height, and the visible part of the object (Fig. 7.5). */
+/** How a camera shows the object in a picture of `size` px: displayed height, visible part (Fig. 7.5). */
 export function displayOf(manifest: Manifest, object: Object3D, camera: Camera, size: Vector2Like): Display {
   object.updateWorldMatrix(true, true);
   camera.updateWorldMatrix(true, false);

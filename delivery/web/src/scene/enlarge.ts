@@ -23,10 +23,7 @@ export interface Piece {
 /** Resolves when no piece may come over this fragment any more; rejects where workers cannot draw. */
 export type Clear = (fragment: number) => Promise<unknown>;
 
-/**
- * Enlarges a preview off the main thread, piece by piece: a processor that draws takes seconds for a large texture. Fragments that have
- * come meanwhile need no preview.
- */
+/** Enlarges a preview in workers, piece by piece. Pieces that fragments cover already need none. */
 export function enlarge(next: PlaneComposer, image: ImageBitmap | HTMLImageElement, pool: WorkerPool, uploads: UploadQueue): { clear?: Clear; done: Promise<void> } {
   const underWay = new Map<Piece, Promise<void>>();
   let first: Promise<void> | undefined;

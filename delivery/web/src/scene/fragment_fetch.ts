@@ -40,7 +40,7 @@ export function allWishes({ offers, fragments }: FragmentList, only: number | un
   return wishes.filter((w) => w.rung >= 0 && (w.replaces ? planes.rungOf(w) !== w.rung : planes.rungOf(w) < w.rung));
 }
 
-/** Upgrades that save most for these bytes, to where a fragment's 1 - SSIM is no more than `enoughDssim`. The list's offers are cut off there. */
+/** Upgrades that save most for these bytes, until 1 - SSIM is at most `enoughDssim`. Cuts the offers. */
 export function bestWishes(list: FragmentList, mostBytes: number, enoughDssim: number, { tables }: PackageData, held: HeldFragments): Wish[] {
   list.offers.forEach((o, i) => {
     const { plane, fragment } = list.fragments[i];

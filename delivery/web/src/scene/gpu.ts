@@ -30,7 +30,7 @@ export async function gpuIdle(renderer: WebGLRenderer, mostS = 0.5): Promise<voi
 /** Programs that were waited for: models of one page share them. */
 const ready = new WeakSet<WebGLProgram>();
 
-/** Waits for each program, then asks the program for its uniforms, in a turn of its own: the first frame would wait for the linker otherwise. */
+/** Waits for each program and asks for its uniforms, in a turn of its own, before the first frame. */
 async function programsReady(renderer: WebGLRenderer, mostS: number, stopIfCancelled: () => void): Promise<void> {
   const end = nowS() + mostS;
   const programs = (renderer.info?.programs ?? []) as (WebGLProgram & { isReady?(): boolean })[];
@@ -98,10 +98,7 @@ const mostBusyS = 10;
 /** WebGL keeps one flag for each kind of error. */
 const errorKinds = 8;
 
-/**
- * What the GPU of a renderer has shown to hold: a context that is lost with much in it, and storage that is refused, lower the limit for
- * all who draw with the renderer.
- */
+/** What the GPU has shown to hold: a context lost with much in it, and refused storage, lower the limit. */
 export class GpuRoom {
   /** Most bytes that all users together may have; Infinity: nothing has been refused. */
   limitBytes = Infinity;
@@ -172,7 +169,7 @@ function texelsOf({ isCompressedTexture, format }: Partial<CompressedTexture>): 
   return format === RGB_S3TC_DXT1_Format || format === RGB_ETC2_Format ? 'block8' : 'block16';
 }
 
-/** Bytes that shapes, and the textures of materials and of composed planes, take on the GPU once they have been drawn. What is shared counts once. */
+/** Bytes that drawn shapes, materials' textures and planes take on the GPU. Shared ones count once. */
 export function gpuBytes(shapes: readonly Object3D[], materials: readonly Material[], planes: readonly { textures: readonly Texture[] }[]): number {
   const arrays = new Set<{ byteLength: number }>();
   for (const { geometry } of shapes.flatMap(meshesOf))

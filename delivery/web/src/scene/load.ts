@@ -34,10 +34,7 @@ export class ProxyOnTheWay {
     private readonly fetchRest_: () => Promise<unknown>,
   ) {}
 
-  /**
-   * Shows the smallest one. What decides about larger ones is loaded meanwhile; and where nobody gives turns, the link goes on with what
-   * comes next while the proxy is decoded.
-   */
+  /** Shows the smallest one. Meanwhile the next parts are loaded, and without turns the link goes on. */
   async showFirst(): Promise<void> {
     const { load_: { reader: { manifest }, view: { display }, options: { turn } }, proxy_: proxy } = this;
     const bytes = proxy.fetch(0);

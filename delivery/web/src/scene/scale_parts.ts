@@ -48,10 +48,7 @@ export function disposeTexture(texture: Texture): void {
   (texture.image as Partial<ImageBitmap> | null | undefined)?.close?.();
 }
 
-/**
- * Parses a scale. Later scales do not decode the previews again: their textures are placeholders, since materials are
- * shared with the first scale.
- */
+/** Parses a scale. Later scales have placeholders for previews, since materials are shared. */
 export async function parseScale(loader: GltfLoaderLike, glb: Uint8Array, placeholders: boolean): Promise<ParsedGltf> {
   if (placeholders)
     loader.register((parser: { json: GltfJson }) => ({

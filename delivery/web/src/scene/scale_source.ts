@@ -29,10 +29,7 @@ export interface ScaleSourceParts {
   problem: (error: unknown, what: string) => void;
 }
 
-/**
- * The scales of a model as objects, each loaded once: as GLB, or out of the vertex-split stream. A scale that the stream alone has is
- * shown by the next finer GLB where the stream is not read.
- */
+/** The scales of a model as objects: GLBs or splits. Without its stream, the next finer GLB stands in. */
 export class ScaleSource {
   private readonly shapes_ = new Map<number, Object3D>();
   private readonly offGpu_ = new Set<Object3D>(); // scales that were there and are not drawn

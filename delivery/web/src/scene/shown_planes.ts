@@ -20,7 +20,7 @@ function planesFor({ options, view }: LoadContext, data: PackageData, displayedP
   return options.fullSize ? fullSize(data.textures) : planesForDisplay(data, displayedPx);
 }
 
-/** Reads the data for decisions about textures: all tables where they are small or a time limit leaves a choice, else those for this display. */
+/** The data for decisions about textures: all tables if small or if time matters, else this display's. */
 export async function readPlaneData(load: LoadContext, scales: ScaleSource): Promise<PackageData> {
   const { reader, pool, signal } = load;
   pool.start();
@@ -104,10 +104,7 @@ export class ShownPlanes {
   forDisplay(): PlaneChoice[] {
     return planesFor(this.load_, this.data);
   }
-  /**
-   * Planes that the GPU can hold: a mip where the plane is too large; without such a mip the picture of the mesh stays. Beside a scale
-   * they fit the memory that there is.
-   */
+  /** Planes that the GPU can hold: a mip of a plane that is too large, or none; within the memory left. */
   fitting(choices: readonly PlaneChoice[], scale: number): PlaneChoice[] {
     const most = this.load_.options.renderer.capabilities.maxTextureSize;
     const fits = (t: TextureInfo): boolean => Math.max(t.widthPx, t.heightPx) <= most;
@@ -135,7 +132,7 @@ export class ShownPlanes {
   get ways(): readonly BytesOf[] {
     return this.compression_?.bytes ?? [rgbaBytes(this.textures)];
   }
-  /** Finds out, before planes are chosen beside a scale, whether they may be blocks: where all of them as RGBA take more than there is. */
+  /** Finds out, before planes are chosen, whether they may be blocks: RGBA takes more than there is. */
   async considerCompression(scale: number): Promise<void> {
     const { compress = 'auto' } = this.load_.options;
     const fits = compress === 'auto' && wayWithin(this.forDisplay(), this.room_(scale), [rgbaBytes(this.textures), () => 0]) === 0;
@@ -155,7 +152,7 @@ export class ShownPlanes {
     const all = wanted.map(({ base, plane }) => ({ base, plane: larger(plane, planes.get(base)!.plane) }));
     return this.fitting(all, scale).filter((c) => planes.get(c.base)!.widthPx < this.textures[c.plane].widthPx);
   }
-  /** Of the textures with finer() planes the one that loses most by the plane that it shows; its finest plane that is likely to show within so many seconds. */
+  /** The texture that loses most by its plane, and its finest plane that shows within so many seconds. */
   nextFiner(scale: number, withinS: number): PlaneChoice | undefined {
     const { textures, set_: { planes }, data, load_ } = this;
     const loss = new TextureLoss(data, load_.view.display.heightPx);

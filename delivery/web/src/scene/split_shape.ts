@@ -14,7 +14,7 @@ const leastRequestBytes = 32 << 10;
 
 let streamCount = 0;
 
-/** Reads the head of a package's stream of vertex splits. `added` hears of materials' slots that no GLB had; see ScaleSourceParts for `leadBytes`. */
+/** Reads the stream's head. `added` hears of slots that no GLB had; see ScaleSourceParts for `leadBytes`. */
 export async function openSplitShapes(reader: PackageReader, pool: WorkerPool, materials: MaterialSet, added: (slot: Slot) => void, leadBytes: () => number, signal: AbortSignal): Promise<SplitShapes> {
   const key = ++streamCount;
   const known = (await reader.splitStreamStart(withHeadBytes, signal))!; // the head, and some bytes that came with it
@@ -44,10 +44,7 @@ export class SplitShapes {
     const s = this.info_.scales.find((k) => k.scale === scale);
     return s ? Math.max(0, s.end - Math.max(this.decoded_, this.known_.length)) : Infinity;
   }
-  /**
-   * Fetches and decodes up to a scale. `arrived` is called when all bytes but `leadBytes` are there, once or again; `passed` hears of every scale on the way,
-   * the wanted one included.
-   */
+  /** Fetches and decodes up to a scale. `arrived`: all but `leadBytes` are there; `passed`: each scale. */
   load(scale: number, gltf: ParsedGltf, signal: AbortSignal, arrived: () => void, passed: (scale: number, mesh: Mesh) => void): Promise<Mesh> {
     const mesh = this.lastLoad_.then(() => this.loadNow_(scale, gltf, signal, arrived, passed));
     this.lastLoad_ = mesh.catch(() => undefined);

@@ -74,10 +74,7 @@ export async function openTextureLoad(load: LoadContext, scale: ShownScale, sour
   return new TextureLoad(load, scale, source, new FragmentFetch(load, new ShownPlanes(load, data)));
 }
 
-/**
- * The second part of a load: decides which fragments to fetch, fetches them in time, refines. This module is loaded while the
- * first picture comes, so that nobody waits for the module.
- */
+/** The second part of a load, loaded on the way: chooses fragments, fetches them in time, refines. */
 export class TextureLoad {
   private readonly planes_: ShownPlanes;
   private readonly inTime_: FetchInTime;
@@ -169,10 +166,7 @@ export class TextureLoad {
     if (given || !Number.isFinite(fragmentsS)) while (given === (load.override.rung !== undefined) && (await this.refineSome_(true)));
     else if (fragmentsS > 0 && !load.pool.isUnavailable && list.offers.length > 0) await this.inTime_.run(list, fragmentsS);
   }
-  /**
-   * All that was chosen is there before the time is over, as the link is faster than was to be expected: planes with more texels take the
-   * rest, one after the other, each with fragments of it.
-   */
+  /** All that was chosen came early: planes with more texels take the rest, each with fragments of it. */
   private async useRest_(): Promise<void> {
     const { load_: load, planes_: planes, fetching_: fetching, inTime_: inTime } = this;
     if (load.options.turn || !inTime.hasPlan) return; // other models wait for the link
@@ -295,7 +289,7 @@ export class TextureLoad {
     await this.planes_.readTables(asked);
     await this.fetching_.transfers.prepare(asked, this.load_.signal);
   }
-  /** Fetches some fragments that are still wanted, `all` or those that the camera sees. False: nothing is left, or going on is of no use. */
+  /** Fetches some wanted fragments, `all` or those that are seen. False: nothing is left, or of use. */
   private async refineSome_(all = this.load_.override.rung !== undefined || this.fetching_.wholeRungs()): Promise<boolean> {
     const { load_: load, fetching_: fetching } = this;
     await sleepS(0);

@@ -76,7 +76,7 @@ export class TextureSet {
   showInNewMaterials(): void {
     this.planes.forEach((plane) => plane.filled && this.showInMaterials_(plane));
   }
-  /** Queues a fragment; resolves when the fragment is in its texture (true), or was not better than the rung there by then (false). */
+  /** Queues a fragment; resolves with true when it is shown, with false when its rung is no better. */
   async upload(plane: PlaneComposer, levels: Levels, fragment: number, rung: number, better: (there: number) => boolean): Promise<boolean> {
     ++this.pending;
     plane.come.add(fragment);
@@ -102,7 +102,7 @@ export class TextureSet {
     this.planes.clear();
   }
 
-  /** Slots of materials that show this plane. Coverage has the slots beside its colours, in materials that ask for coverage. */
+  /** Slots of materials that show this plane; coverage stands beside its colours where a material asks. */
   private slotsOf_(base: number): Slot[] {
     const { image, role } = this.textures_[base];
     const slots = this.materials_.slots.filter((s) => s.image === image);

@@ -61,10 +61,7 @@ export interface GroupOptions {
 /** Distance between files of fragments, more than any pack's length: requests for files are not joined. */
 const fileSpacing = 2 ** 40;
 
-/**
- * Fetches fragments: streams of one rung that stand together by one request, lower rungs of incremental codecs once
- * only, decoding off the main thread.
- */
+/** Fetches fragments: neighbours of a rung by one request, lower rungs once; workers decode. */
 export class Transfers {
   private readonly planes_ = new Map<number, PlaneFiles>();
   private readonly heldStreams_ = new Map<string, Uint8Array[]>(); // streams of incremental codecs, from rung 0 on

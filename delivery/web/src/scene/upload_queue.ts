@@ -5,10 +5,7 @@ import { gpuIdle } from './gpu';
 /** Milliseconds and pixels of uploads between two turns of the page. */
 const sliceMs = 4;
 const slicePx = 1 << 19;
-/**
- * The GPU may be so many slices behind: a further upload would wait in the middle of a page's turn. Nobody waits for the GPU longer
- * than longestFenceS.
- */
+/** The GPU may be so many slices behind, and nobody waits for it longer than longestFenceS. */
 const mostBehind = 3;
 const longestFenceS = 0.25;
 /** The smallest mip levels follow this often while fragments come. */

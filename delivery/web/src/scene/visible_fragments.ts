@@ -21,7 +21,7 @@ export interface LookedSurface {
   within?: Object3D;
 }
 
-/** A sample of the triangles that show a plane, in the world, by the fragment in the middle of each. The triangle is another's after `use`. */
+/** A sample of a plane's triangles, in the world, by fragment. `use` may keep no triangle. */
 export function sampleFragments(plane: TextureInfo, { object, shows, within }: LookedSurface, use: (fragment: number, at: Triangle, mesh: Mesh, world: Matrix4) => void): void {
   object.updateWorldMatrix(true, true);
   const [at, uv, middle, world] = [new Triangle(), new Triangle(), new Vector3(), new Matrix4()];
@@ -38,10 +38,7 @@ export function sampleFragments(plane: TextureInfo, { object, shows, within }: L
   });
 }
 
-/**
- * Share of each fragment's surface that the camera sees, from a sample of the triangles. Seen: within the camera's frustum and turned to
- * the camera, by the material's side. [fragments]
- */
+/** [fragments] Share of a surface that the camera sees, from a sample of triangles that face it. */
 export function seenShares(plane: TextureInfo, surface: LookedSurface, camera: Camera): Float32Array {
   const { columns, rows } = plane;
   const seen = new Float32Array(columns * rows);

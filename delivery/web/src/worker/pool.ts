@@ -31,7 +31,7 @@ function postWaitingJobs(): void {
   }
 }
 
-/** A value whose byte arrays have buffers of their own: a posted array takes its whole buffer along, which may be the whole package. */
+/** A value whose byte arrays have their own buffers: posting takes a whole buffer, maybe the package. */
 function inBuffersOfItsOwn(value: unknown): unknown {
   if (Array.isArray(value)) return value.map(inBuffersOfItsOwn);
   return value instanceof Uint8Array && value.length < value.buffer.byteLength ? value.slice() : value;

@@ -71,7 +71,7 @@ function alignedLevels({ fragmentWidthPx: width, fragmentHeightPx: height }: Tex
   return levels;
 }
 
-/** The storage on the GPU of a texture plane as blocks: what PlaneStorage is to RGBA. The smallest levels are made of a copy of the largest of them. */
+/** PlaneStorage of blocks. The smallest levels are made of a copy of the largest one of them. */
 export class BlockStorage {
   /** Levels that fragments bring as blocks. */
   readonly own: number;

@@ -11,7 +11,7 @@ const chunks: Record<string, 'normal_fragment_maps' | 'clearcoat_normal_fragment
 /** The channels that a slot of a material is read from by now. */
 const known = new WeakMap<Material, Record<string, string>>();
 
-/** Normals of a material are made of two channels from now on; z is what makes their length 1. False: the format has three. */
+/** Normals of a material have two channels from now on; their length is 1. False: they have three. */
 export function readTwoChannels(material: Material, slot: string, format: Stored): boolean {
   const [two, chunk] = [channels[format], chunks[slot]];
   if (!two || !chunk) return false;
