@@ -20,8 +20,10 @@ class Painter {
   /** Made when it is first asked for. Throws where the browser has no WebGL. */
   get renderer(): WebGLRenderer {
     if (this.given_ ?? this.own_) return (this.given_ ?? this.own_)!;
-    const renderer = (this.own_ = new WebGLRenderer({ antialias: true, alpha: true, powerPreference: 'high-performance' }));
-    renderer.debug.checkShaderErrors = false; // each question waits for the compiler, and the programs are three.js's own
+    const renderer =
+      (this.own_ = new WebGLRenderer({ antialias: true, alpha: true, powerPreference: 'high-performance' }));
+    // each question waits for the compiler, and the programs are three.js's own
+    renderer.debug.checkShaderErrors = false;
     renderer.toneMapping = NeutralToneMapping;
     renderer.setClearAlpha(0);
     return renderer;
@@ -40,13 +42,15 @@ class Painter {
     if (!to || width < 1 || height < 1 || renderer.getContext().isContextLost()) return false;
     const size = renderer.getDrawingBufferSize(new Vector2());
     // The buffer grows to the largest picture: to make it anew for each would take longer than to draw.
-    if (size.x < width || size.y < height) renderer.setDrawingBufferSize(Math.max(size.x, width), Math.max(size.y, height), 1);
+    if (size.x < width || size.y < height)
+      renderer.setDrawingBufferSize(Math.max(size.x, width), Math.max(size.y, height), 1);
     renderer.setViewport(0, 0, width, height);
     renderer.setScissor(0, 0, width, height);
     renderer.setScissorTest(true);
     renderer.render(scene, camera);
     to.globalCompositeOperation = 'copy';
-    to.drawImage(renderer.domElement, 0, renderer.domElement.height - height, width, height, 0, 0, width, height);
+    to.drawImage(renderer.domElement, 0, renderer.domElement.height - height, width, height, 0, 0, width,
+      height);
     return true;
   }
   dispose(): void {
@@ -91,8 +95,9 @@ export interface PageEvents {
 }
 
 /**
- * Any number of packages on one page: one time limit, one link, one limit of memory and one graphics context for all. What is seen comes
- * first, then what is close by; models far from the screen are released and keep their last picture.
+ * Any number of packages on one page: one time limit, one link, one limit of memory and one graphics context
+ * for all. What is seen comes first, then what is close by; models far from the screen are released and keep
+ * their last picture.
  */
 export class TexmeshPage {
   private readonly mostBytes_: number;
@@ -116,7 +121,8 @@ export class TexmeshPage {
     const { hardwareConcurrency: cores = 2 } = globalThis.navigator ?? {};
     this.mostBytes_ = options_.memoryBytes ?? deviceMemoryBytes();
     this.painter_ = new Painter(options_.renderer);
-    this.workers_ = new SharedWorkers(options_.workers ?? Math.min(4, Math.max(2, cores - 1)), options_.workerUrl);
+    this.workers_ = new SharedWorkers(options_.workers ?? Math.min(4, Math.max(2, cores - 1)),
+      options_.workerUrl);
     this.visibility_ = new Visibility((canvas, resized) => this.placeChanged_(canvas, resized));
   }
 
@@ -170,8 +176,10 @@ export class TexmeshPage {
 
   private readonly host_: Host = {
     open: (url: string, options: OpenHow): Promise<TexmeshPackage> =>
-      open(url, { startBytes: this.startBytes_, ...options, shared: this.workers_, workerUrl: this.options_.workerUrl }),
-    loadOptions: () => ({ renderer: this.painter_.renderer, gltfLoader: this.options_.gltfLoader, workers: 2 }),
+      open(url, { startBytes: this.startBytes_, ...options, shared: this.workers_,
+        workerUrl: this.options_.workerUrl }),
+    loadOptions: () => ({ renderer: this.painter_.renderer, gltfLoader: this.options_.gltfLoader,
+      workers: 2 }),
     memoryBytes: (model) => this.memoryOf_(model),
     turn: (model, bytes) =>
       new Promise((given) => {
@@ -228,7 +236,8 @@ export class TexmeshPage {
   }
   private nextStep_(): ReturnType<typeof nextStep> {
     return nextStep({
-      models: this.models, openAtOnce: this.options_.openAtOnce ?? 6, askedForTurn: new Set(this.turns_.keys()), refining: this.refining_,
+      models: this.models, openAtOnce: this.options_.openAtOnce ?? 6,
+      askedForTurn: new Set(this.turns_.keys()), refining: this.refining_,
       memoryShare: this.gpuBytes / this.memoryBytes, isNear: ({ canvas }) => this.visibility_.isNear(canvas),
     });
   }
@@ -264,7 +273,8 @@ export class TexmeshPage {
     return this.options_.time ?? 5;
   }
   private get waiting_(): PageModel[] {
-    return this.models.filter((m) => m.place.visible && ['waiting', 'released', 'opening', 'first-picture', 'turn'].includes(m.phase));
+    return this.models.filter((m) => m.place.visible &&
+      ['waiting', 'released', 'opening', 'first-picture', 'turn'].includes(m.phase));
   }
   /** Time counts from the first model that comes to a page where nothing is under way. */
   private beginPeriod_(): void {
@@ -320,7 +330,9 @@ export class TexmeshPage {
 }
 
 function deviceMemoryBytes(): number {
-  const { deviceMemory, maxTouchPoints = 0 } = (globalThis.navigator ?? {}) as Partial<Navigator> & { deviceMemory?: number };
+  const { deviceMemory, maxTouchPoints = 0 } = (globalThis.navigator ?? {}) as Partial<Navigator>
+    & { deviceMemory?: number };
   const { width = 1920, height = 1080 } = globalThis.screen ?? {};
-  return defaultMemoryBytes({ deviceMemoryGb: deviceMemory, screenPx: width * height, touch: maxTouchPoints > 0 });
+  return defaultMemoryBytes({ deviceMemoryGb: deviceMemory, screenPx: width * height,
+    touch: maxTouchPoints > 0 });
 }

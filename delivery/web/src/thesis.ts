@@ -1,3 +1,3 @@
-// Chapter 4 as printed, for planDelivery(). Apart from the library, which loads this where the policy is thesis.
+// Chapter 4 as printed, for planDelivery(). The library loads this part where the policy is thesis.
 
 export * from './decide/thesis_list';

@@ -1,4 +1,7 @@
-/** Formats of the encoder, numbered as encoder/encoder.cpp has them. Two channels of a normal stand where `channels` of two_channels.ts says. */
+/**
+ * Formats of the encoder, numbered as encoder/encoder.cpp has them. Two channels of a normal stand where
+ * `channels` of two_channels.ts says.
+ */
 export const blockFormats = ['bc1', 'bc3-normal', 'bc5', 'bc7', 'etc2', 'astc', 'astc-normal'] as const;
 /** A format of blocks. */
 export type BlockFormat = (typeof blockFormats)[number];

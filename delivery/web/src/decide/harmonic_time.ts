@@ -7,8 +7,7 @@ import { exp } from './portable_math';
 // so that the whole ends at the time limit T_0, though throughput moves. Each fragment has its share of the
 // time by the bytes that a plan made before the first request gives it. What one transfer takes less or more
 // than its share is spread over the next ones with weights 1/2, 1/3, .. The same decisions, bit for bit, as
-// delivery/cpp/decide/harmonic_time.h. The plan does no I/O and knows no clock. Its arguments are not
-// checked.
+// delivery/cpp/decide/harmonic_time.h. It does no I/O, knows no clock, checks no argument.
 
 /** One fragment as the plan sees it. */
 export interface FragmentOffer {
@@ -95,7 +94,8 @@ function lowestShown(f: FragmentOffer, limits: boolean): number {
 }
 
 /** The rung from `low` on, of at most `mostBytes`, with the least `cost`; -1: skipping costs least. */
-function cheapestRung({ bytes, loss, highRung }: FragmentOffer, low: number, skip: boolean, mostBytes: number, cost: (bytes: number, loss: number) => number): number {
+function cheapestRung({ bytes, loss, highRung }: FragmentOffer, low: number, skip: boolean, mostBytes: number,
+    cost: (bytes: number, loss: number) => number): number {
   let best = skip ? -1 : low;
   let least = skip ? cost(0, loss[0]) : cost(bytes[low], loss[low + 1]);
   for (let r = low; r < bytes.length && !(r > highRung); ++r) {

@@ -1,7 +1,7 @@
 import { ln2Hi, ln2Lo, pi, pio2Hi, pio2Lo } from '../format/shared_numbers';
 
-// exp, log, sin, cos, pow with the same bits as format/base/portable_math.h: plain double arithmetic, where Math's
-// functions differ from engine to engine. About 1e-15 relative.
+// exp, log, sin, cos, pow with the same bits as format/base/portable_math.h: plain double arithmetic, where
+// Math's functions differ from engine to engine. About 1e-15 relative.
 
 const rootOfHalf = 0.7071067811865475244;
 

@@ -36,7 +36,8 @@ export function spendBytes(curves: readonly RdCurve[], budgetBytes: number): num
       bytes.forEach((all, way) => {
         const more = all - bytes[at];
         const slope = (loss[at] - loss[way]) / more;
-        if (more > 0 && (slope > best.slope || (slope === best.slope && more > best.bytes))) best = { slope, curve, way, bytes: more };
+        if (more > 0 && (slope > best.slope || (slope === best.slope && more > best.bytes)))
+          best = { slope, curve, way, bytes: more };
       });
       if (best.way === 0) return;
       steps.push(best);

@@ -31,7 +31,8 @@ export function tablesOf(data: PackageData, plane: number): PlaneTables {
 }
 
 /** Number of the group of a plane. */
-export const groupIndex = (data: PackageData, plane: number): number => planeGroups.indexOf(groupOf(data.textures[plane].role));
+export const groupIndex = (data: PackageData, plane: number): number =>
+  planeGroups.indexOf(groupOf(data.textures[plane].role));
 
 /** Every texture at full size. */
 export function fullSize(textures: readonly TextureInfo[]): PlaneChoice[] {
@@ -60,10 +61,12 @@ function planeAtLevel({ textures }: PackageData, base: number, level: number): n
 }
 
 /**
- * The smallest mips that still have a texel for every pixel where the object is displayed `displayedPx` high (device
- * px), or by group so many `levels` coarser, or finer where below 0. Needs the tables of the full-size planes.
+ * The smallest mips that still have a texel for every pixel where the object is displayed `displayedPx` high
+ * (device px), or by group so many `levels` coarser, or finer where below 0. Needs the tables of the
+ * full-size planes.
  */
-export function planesForDisplay(data: PackageData, displayedPx: number, levels: PerGroup = everyGroup(0)): PlaneChoice[] {
+export function planesForDisplay(data: PackageData, displayedPx: number,
+    levels: PerGroup = everyGroup(0)): PlaneChoice[] {
   return fullSize(data.textures).map(({ base }) => {
     const level = Math.max(0, displayLevel(data, base, displayedPx)) + levels[groupIndex(data, base)];
     return { base, plane: planeAtLevel(data, base, level) };
@@ -75,7 +78,8 @@ export function textureFlip(table: QualityTable, losses: PerGroup): number {
   return combinedFlip(table, [0, ...losses]);
 }
 /** FLIP of a scale with textures. */
-export function pictureFlip(table: QualityTable, displayedPx: number, scale: number, losses: PerGroup): number {
+export function pictureFlip(table: QualityTable, displayedPx: number, scale: number,
+    losses: PerGroup): number {
   return combinedFlip(table, [geometryFlip(table, displayedPx, scale), ...losses]);
 }
 
@@ -105,7 +109,8 @@ export class TextureLoss {
   }
   /** What a mip loses of the source's texels; 0 for full size. Needs that plane's tables alone. */
   mip(plane: number): number {
-    return this.curves_[groupIndex(this.data, plane)].halved(this.growth_(plane), this.data.textures[plane].mip);
+    return this.curves_[groupIndex(this.data, plane)].halved(this.growth_(plane),
+      this.data.textures[plane].mip);
   }
   private measure_(plane: number): PlaneLoss {
     const t = tablesOf(this.data, plane);
@@ -115,12 +120,14 @@ export class TextureLoss {
     const growth = this.growth_(plane);
     const shown = new Float64Array((t.rungQuality.length + 1) * fragments);
     const mip = this.mip(plane);
-    const withMip = (coded: number): number => (mip > 0 ? combinedFlip(this.data.quality, [coded, mip]) : coded);
+    const withMip = (coded: number): number =>
+      (mip > 0 ? combinedFlip(this.data.quality, [coded, mip]) : coded);
     const mean = this.previewMean_(plane);
     const preview = this.previewLoss_(plane);
     for (const f of t.order) {
       shown[f] = mean > 0 ? Math.min(1, preview * (curve.coded(t.skipDssim[f]) / mean)) : 0;
-      for (let r = 0; r < t.rungQuality.length; ++r) shown[(r + 1) * fragments + f] = withMip(curve.coded(t.dssim[r * fragments + f], growth));
+      for (let r = 0; r < t.rungQuality.length; ++r)
+        shown[(r + 1) * fragments + f] = withMip(curve.coded(t.dssim[r * fragments + f], growth));
     }
     return { weights, weight: sumOf([...t.order].map((f) => weights[f])), shown };
   }
@@ -182,7 +189,8 @@ export interface ShownTexture extends PlaneChoice {
   rungs: ArrayLike<number>;
 }
 /** Predicted FLIP of this scale with these textures. Needs their planes' tables and the full-size ones'. */
-export function shownFlip(data: PackageData, displayedPx: number, scale: number, planes: readonly ShownTexture[]): number {
+export function shownFlip(data: PackageData, displayedPx: number, scale: number,
+    planes: readonly ShownTexture[]): number {
   const loss = new TextureLoss(data, displayedPx);
   const surface = loss.weights(planes);
   const all: [number, number, number] = [0, 0, 0];
@@ -190,7 +198,8 @@ export function shownFlip(data: PackageData, displayedPx: number, scale: number,
     const { weights, shown } = loss.plane(plane);
     const t = tablesOf(data, plane);
     const group = groupIndex(data, plane);
-    for (const f of t.order) all[group] += (weights[f] / (surface[group] || 1)) * shown[((rungs[f] ?? -1) + 1) * fragmentCount(t) + f];
+    for (const f of t.order) all[group] +=
+      (weights[f] / (surface[group] || 1)) * shown[((rungs[f] ?? -1) + 1) * fragmentCount(t) + f];
   }
   return pictureFlip(data.quality, displayedPx, scale, all);
 }

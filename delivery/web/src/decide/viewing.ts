@@ -3,8 +3,8 @@ import type { Manifest, ManifestScale, ManifestStep } from '../format/manifest';
 import { apart, belowAny } from '../format/shared_numbers';
 import { cos, pi, sin } from './portable_math';
 
-// From how an object is looked at to the scale that is enough: format/rules/viewing.h. Lengths on screen are device px;
-// "displayed height" is the length on screen of the object's largest extent.
+// From how an object is looked at to the scale that is enough: format/rules/viewing.h. Lengths on screen are
+// device px; "displayed height" is the length on screen of the object's largest extent.
 
 /** A perspective camera: vertical field of view, and the picture's height in device px. */
 export interface CameraView {
@@ -23,8 +23,9 @@ export function displayedHeightPx(objectHeight: number, distance: number, camera
 }
 
 /**
- * The rule that decides about the scale: flip (default) = lit pictures that cannot be told from those of S_0, which is what Manifest.steps
- * holds; jnd = the just-noticeable difference; error = an error of one pixel; edge = the O_V / E_S that matches the displayed height best.
+ * The rule that decides about the scale: flip (default) = lit pictures that cannot be told from those of S_0,
+ * which is what Manifest.steps holds; jnd = the just-noticeable difference; error = an error of one pixel;
+ * edge = the O_V / E_S that matches the displayed height best.
  */
 export type StepRule = 'flip' | 'jnd' | 'error' | 'edge';
 
@@ -79,17 +80,20 @@ function growthOfValue(s: ManifestScale, displayedPx: number, part: VisiblePart)
   return Math.max(1, value / s.p95);
 }
 
-function accepts(scales: readonly ManifestScale[], k: number, displayedPx: number, part: VisiblePart, rule: StepRule): boolean {
+function accepts(scales: readonly ManifestScale[], k: number, displayedPx: number, part: VisiblePart,
+    rule: StepRule): boolean {
   const s = scales[k];
-  if (rule === 'jnd') return Math.max(part.widthPx, part.heightPx) * growthOfValue(s, displayedPx, part) <= s.displayPxJnd;
+  if (rule === 'jnd')
+    return Math.max(part.widthPx, part.heightPx) * growthOfValue(s, displayedPx, part) <= s.displayPxJnd;
   return displayedPx <= limitOf(scales, k, rule);
 }
 
 /**
- * The scale for an object displayed `displayedPx` high (the whole of it, seen or not) of which only a part is visible
- * (Fig. 7.5). Nothing visible: the coarsest scale. Not clipped: by the step function.
+ * The scale for an object displayed `displayedPx` high (the whole of it, seen or not) of which only a part is
+ * visible (Fig. 7.5). Nothing visible: the coarsest scale. Not clipped: by the step function.
  */
-export function selectScale(manifest: Manifest, displayedPx: number, part: VisiblePart = wholeObject, rule: StepRule = 'flip'): number {
+export function selectScale(manifest: Manifest, displayedPx: number, part: VisiblePart = wholeObject,
+    rule: StepRule = 'flip'): number {
   const { scales } = manifest;
   if (!part.clipped) return scaleAt(stepFunction(scales, rule), displayedPx);
   if (!(part.widthPx > 0 && part.heightPx > 0)) return scales[scales.length - 1].scale;

@@ -10,7 +10,8 @@ export function bytesInWords(n: number): string {
   return `${value < 9.95 ? value.toFixed(1).replace('.0', '') : value.toFixed(0)} ${name}`;
 }
 /** Seconds as people read them. */
-export const secondsInWords = (s: number): string => (s < 1 ? 'under a second' : s < 9.5 ? `about ${Math.round(s)} s` : `about ${Math.round(s / 5) * 5} s`);
+export const secondsInWords = (s: number): string =>
+  (s < 1 ? 'under a second' : s < 9.5 ? `about ${Math.round(s)} s` : `about ${Math.round(s / 5) * 5} s`);
 
 /** What a click costs: bytes of the first picture and of all (0: unknown), bytes per second (0: unknown). */
 export function offerInWords(firstBytes: number, allBytes: number, linkBytesS: number): string {
@@ -48,7 +49,8 @@ interface Connection {
   /** Mbit/s */
   downlink?: number;
 }
-const connection = (): Connection => (globalThis.navigator as { connection?: Connection } | undefined)?.connection ?? {};
+const connection = (): Connection =>
+  (globalThis.navigator as { connection?: Connection } | undefined)?.connection ?? {};
 const bytesPerMegabit = 125e3;
 /** Smaller files say how long the way is, not how wide. */
 const tellingBytes = 3e4;
@@ -60,7 +62,8 @@ export const savesData = (): boolean => connection().saveData === true;
 /** Bytes per second of the link: as the browser says, else as the page's own files came; 0: nobody knows. */
 export function linkBytesS(): number {
   const files = performance.getEntriesByType('resource') as PerformanceResourceTiming[];
-  const rates = files.filter((f) => f.transferSize > tellingBytes).map((f) => f.transferSize / Math.max(1e-3, (f.responseEnd - f.responseStart) / 1000));
+  const rates = files.filter((f) => f.transferSize > tellingBytes)
+    .map((f) => f.transferSize / Math.max(1e-3, (f.responseEnd - f.responseStart) / 1000));
   return (connection().downlink ?? 0) * bytesPerMegabit || Math.max(0, ...rates);
 }
 /** Bytes of a file as its server says without sending it; 0: unknown. */

@@ -32,7 +32,8 @@ export interface About {
   extras?: unknown;
 }
 
-const texts = { title: 200, description: 10000, creator: 2000, attribution: 2000, licence: 2000, capture: 2000, licenceUrl: 2000, sourceUrl: 2000 };
+const texts = { title: 200, description: 10000, creator: 2000, attribution: 2000, licence: 2000,
+  capture: 2000, licenceUrl: 2000, sourceUrl: 2000 };
 const lists = { identifiers: ['scheme', 'value'], dates: ['event', 'text'] };
 
 const webUrl = /^https?:\/\/(?!\/)[^\s"<>\\^`{|}\u0000-\u001f\u007f]+$/;
@@ -47,11 +48,14 @@ export function readAbout(json: Uint8Array): About {
     if (within.has(name)) read(within.at(name));
   };
   const text = (most: number, good = /[^]/) => (at: JsonAt): void => {
-    if (!good.test(at.text(most))) at.fail(`a text like ${good.source}`, '', good === webUrl ? 'B02' : undefined);
+    if (!good.test(at.text(most)))
+      at.fail(`a text like ${good.source}`, '', good === webUrl ? 'B02' : undefined);
   };
-  for (const [name, most] of Object.entries(texts)) check(about, name, text(most, /Url/.test(name) ? webUrl : undefined));
+  for (const [name, most] of Object.entries(texts))
+    check(about, name, text(most, /Url/.test(name) ? webUrl : undefined));
   for (const [name, [kind, value]] of Object.entries(lists))
-    check(about, name, (list) => list.each(1, 32, (pair) => { text(100)(pair.at(kind)); text(500)(pair.at(value)); }));
+    check(about, name,
+      (list) => list.each(1, 32, (pair) => { text(100)(pair.at(kind)); text(500)(pair.at(value)); }));
   check(about, 'unit', (unit) => { text(50)(unit.at('name')); unit.at('metres').number(1e-12, 1e12); });
   check(about, 'upAxis', text(1, /[xyz]/));
   check(about, 'coordinateReference', (at) => {

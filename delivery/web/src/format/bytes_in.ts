@@ -6,7 +6,8 @@ export class BytesIn {
   private readonly view_: DataView;
   private position_ = 0;
 
-  constructor(private readonly bytes_: Uint8Array, private readonly name_: string, private readonly rule_: string) {
+  constructor(private readonly bytes_: Uint8Array, private readonly name_: string,
+      private readonly rule_: string) {
     this.view_ = new DataView(bytes_.buffer, bytes_.byteOffset, bytes_.byteLength);
   }
 

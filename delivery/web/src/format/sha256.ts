@@ -34,7 +34,8 @@ export async function sha256(bytes: Uint8Array): Promise<Uint8Array> {
 }
 
 /** FormatError by a rule where bytes have another SHA-256; a shorter digest holds its first bytes. */
-export async function requireDigest(bytes: Uint8Array, digest: Uint8Array, file: string, place: string, rule = 'I08'): Promise<void> {
+export async function requireDigest(bytes: Uint8Array, digest: Uint8Array, file: string, place: string,
+    rule = 'I08'): Promise<void> {
   const [wanted, found] = [digest, await sha256(bytes)].map((d) => toHex(d.subarray(0, digest.length)));
   if (found !== wanted) throw new FormatError(file, place, `SHA-256 ${wanted}`, found, rule);
 }

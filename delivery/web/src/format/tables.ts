@@ -3,9 +3,8 @@ import type { QualityTable } from './quality_table';
 import type { TextureInfo } from './textures';
 
 /**
- * Tables of one texture plane (format/SPEC.md, section 8). F = columns * rows fragments, R rungs of rising quality,
- * N rows of feature scales: those of
- * the manifest, in its order.
+ * Tables of one texture plane (format/SPEC.md, section 8). F = columns * rows fragments, R rungs of rising
+ * quality, N rows of feature scales: those of the manifest, in its order.
  */
 export interface PlaneTables {
   columns: number;

@@ -52,7 +52,8 @@ export class Mirrors {
   readonly all: Mirror[];
 
   constructor(urls: readonly string[], readonly client: HttpClient) {
-    this.all = urls.map((url) => ({ url, at: url, alive: true, etag: '', total: -1, throughput: transferRate(1e5), owedBytes: 0, lastS: 0 }));
+    this.all = urls.map((url) => ({ url, at: url, alive: true, etag: '', total: -1,
+      throughput: transferRate(1e5), owedBytes: 0, lastS: 0 }));
   }
   private get alive_(): Mirror[] {
     return this.all.filter((m) => m.alive);
@@ -65,8 +66,9 @@ export class Mirrors {
   }
 
   /**
-   * Asks the mirror that should deliver first, by the throughput and the bytes under way of each; then the next. The failure of the last
-   * mirror is thrown. A last mirror whose bytes are damaged is asked once more: a cache on the way may hold bad bytes.
+   * Asks the mirror that should deliver first, by the throughput and the bytes under way of each; then the
+   * next. The failure of the last mirror is thrown. A last mirror whose bytes are damaged is asked once more:
+   * a cache on the way may hold bad bytes.
    */
   async ask<T>(bytes: number, ask: (m: Mirror, how: Asking) => Promise<T>): Promise<T> {
     for (let reload = false; ; ) {

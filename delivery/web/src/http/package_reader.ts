@@ -14,14 +14,18 @@ import type { HttpOptions, OpenedStore, ReadOptions, StoreMode } from './store';
 import { RangeStore } from './range_store';
 
 /**
- * Finds out how the server can be read (SPEC.md, section 19): ranges of the container; the tree beside the container where the server
- * answers 200 to a range; the whole container where there is no tree. Where a server stops answering ranges, the tree, too.
+ * Finds out how the server can be read (SPEC.md, section 19): ranges of the container; the tree beside the
+ * container where the server answers 200 to a range; the whole container where there is no tree. Where a
+ * server stops answering ranges, the tree, too.
  */
-export async function openStore(url: string, mirrors: readonly string[], mode: StoreMode, client: HttpClient, signal?: AbortSignal): Promise<OpenedStore> {
+export async function openStore(url: string, mirrors: readonly string[], mode: StoreMode, client: HttpClient,
+    signal?: AbortSignal): Promise<OpenedStore> {
   const urls = [url, ...mirrors.filter((m) => m !== url)];
   const files = () => import('./without_ranges');
-  if (mode === 'files' || /^[^?#]*\/([?#]|$)/.test(url)) return (await files()).openTree(urls, client, signal);
-  const openTree = async (manifest: Uint8Array, aborted?: AbortSignal) => (await files()).openSameTree(urls, client, manifest, aborted);
+  if (mode === 'files' || /^[^?#]*\/([?#]|$)/.test(url))
+    return (await files()).openTree(urls, client, signal);
+  const openTree = async (manifest: Uint8Array, aborted?: AbortSignal) =>
+    (await files()).openSameTree(urls, client, manifest, aborted);
   const store = new RangeStore(urls, client, mode === 'range' ? undefined : openTree);
   try {
     return { store, manifest: await store.manifest(signal) };
@@ -40,8 +44,8 @@ export async function openStore(url: string, mirrors: readonly string[], mode: S
 /** Options of a package's opening. */
 export interface OpenOptions extends Partial<HttpOptions> {
   /**
-   * range: byte ranges of the container, nothing else. files: the tree beside the container. auto: ranges, and the tree
-   * (or at last the whole container) where the server answers 200 to a range.
+   * range: byte ranges of the container, nothing else. files: the tree beside the container. auto: ranges,
+   * and the tree (or at last the whole container) where the server answers 200 to a range.
    */
   mode?: StoreMode;
   /** Further URLs of the same container. */
@@ -52,24 +56,29 @@ export interface OpenOptions extends Partial<HttpOptions> {
 const withoutRanges = () => import('./without_ranges');
 
 /**
- * Reads a package on demand. Opening reads the manifest only; index, textures and tables are read when they are first
- * asked for, and never twice. Everything handed out has been checked: entries against their SHA-256, fragments against
- * the truncated digest in the tables, documents against each other.
+ * Reads a package on demand. Opening reads the manifest only; index, textures and tables are read when they
+ * are first asked for, and never twice. Everything handed out has been checked: entries against their
+ * SHA-256, fragments against the truncated digest in the tables, documents against each other.
  */
 export class PackageReader extends PackageDocuments {
   /** Reads the manifest of a package at a URL; see OpenOptions. */
-  static async openUrl<T extends PackageReader>(this: new (...args: ConstructorParameters<typeof PackageReader>) => T, url: string, options: OpenOptions = {}, decoder: DocumentDecoder = decodeHere): Promise<T> {
+  static async openUrl<T extends PackageReader>(
+      this: new (...args: ConstructorParameters<typeof PackageReader>) => T, url: string,
+      options: OpenOptions = {}, decoder: DocumentDecoder = decodeHere): Promise<T> {
     const client = new HttpClient(options);
     const { signal, mode = 'auto', mirrors = [] } = options;
     const openedS = nowS();
     const { store, manifest } = await openStore(url, mirrors, mode, client, signal);
     const container = store.form === 'range' ? store.name : '';
-    const { parsed, id } = await decodeWith(decoder, client.options.stallTimeoutS, signal, 'manifest', manifest, container);
+    const { parsed, id } =
+      await decodeWith(decoder, client.options.stallTimeoutS, signal, 'manifest', manifest, container);
     return new this(store, client, url, parsed, id, openedS, decoder);
   }
 
   /** Reads a container that is in memory. */
-  static async openBytes<T extends PackageReader>(this: new (...args: ConstructorParameters<typeof PackageReader>) => T, bytes: Uint8Array, name = 'package'): Promise<T> {
+  static async openBytes<T extends PackageReader>(
+      this: new (...args: ConstructorParameters<typeof PackageReader>) => T, bytes: Uint8Array,
+      name = 'package'): Promise<T> {
     const store = (await withoutRanges()).openBytes(bytes, name);
     const { parsed, id } = await decodeHere('manifest', await store.manifest());
     return new this(store, new HttpClient(), name, parsed, id, nowS());
@@ -98,7 +107,8 @@ export class PackageReader extends PackageDocuments {
   async scaleGlb(scale: number, how: Partial<ReadOptions> = {}): Promise<Uint8Array> {
     const s = this.manifest.scales.find((k) => k.scale === scale);
     if (!s) throw new InputError(this.store.name, `scale ${scale}`, 'a scale of the package', 'none');
-    if (!hasGlb(s)) throw new InputError(this.store.name, `scale ${scale}`, 'a scale with a file of its own', 'one of the stream');
+    if (!hasGlb(s)) throw new InputError(this.store.name, `scale ${scale}`, 'a scale with a file of its own',
+      'one of the stream');
     return this.readChecked(s.glb, { kind: 'mesh', once: true, ...how });
   }
   /** The GLB of a proxy as it is stored, without an index. 0 = the smallest. InputError: there is none. */
@@ -120,8 +130,10 @@ export class PackageReader extends PackageDocuments {
   async tableStream(plane: number, rung: number, signal?: AbortSignal): Promise<Uint8Array> {
     const { tableBytes } = await this.planeTables(plane, signal);
     const { tableStreams } = this.planeDocument_(plane);
-    const streams = await this.readOnce_(`streams/${plane}`, () => this.readChecked(tableStreams, { kind: 'texture', signal }), signal);
-    if (!(rung in tableBytes)) throw new InputError(this.store.name, `texture plane ${plane}`, `a rung under ${tableBytes.length}`, `${rung}`);
+    const streams = await this.readOnce_(`streams/${plane}`,
+      () => this.readChecked(tableStreams, { kind: 'texture', signal }), signal);
+    if (!(rung in tableBytes)) throw new InputError(this.store.name, `texture plane ${plane}`,
+      `a rung under ${tableBytes.length}`, `${rung}`);
     const begin = tableBytes.subarray(0, rung).reduce((sum, n) => sum + n, 0);
     return streams.subarray(begin, begin + tableBytes[rung]);
   }
@@ -135,7 +147,8 @@ export class PackageReader extends PackageDocuments {
     const { tables: t, offsets } = await this.planeFiles(plane);
     const at = rung * fragmentCount(t) + fragment;
     if (!(rung >= 0 && rung < rungCount(t) && fragment >= 0 && fragment < fragmentCount(t)))
-      throw new InputError(this.store.name, `texture plane ${plane}`, 'a rung and a fragment of it', `${rung}, ${fragment}`);
+      throw new InputError(this.store.name, `texture plane ${plane}`, 'a rung and a fragment of it',
+        `${rung}, ${fragment}`);
     return { offset: offsets[at], bytes: t.sizeBytes[at] };
   }
   /** The first 8 bytes of the SHA-256 of a fragment's stream. */
@@ -155,7 +168,8 @@ export class PackageReader extends PackageDocuments {
     return this.readChecked({ path, offset: pack.offset + offset, bytes, sha256, rule: 'F03' }, how, pack);
   }
   /** The image file that any decoder takes: table stream and fragment, with lower rungs where needed. */
-  async completeFragment(plane: number, rung: number, fragment: number, signal?: AbortSignal): Promise<Uint8Array> {
+  async completeFragment(plane: number, rung: number, fragment: number,
+      signal?: AbortSignal): Promise<Uint8Array> {
     const { codec } = (await this.textures(signal))[plane];
     const first = codecTraits(codec).incremental ? 0 : rung;
     const streams: Uint8Array[] = [];
@@ -166,10 +180,12 @@ export class PackageReader extends PackageDocuments {
   /** Files of fragments that `unpack --fragments files` added to a tree; undefined where there are none. */
   async fragmentFiles(signal?: AbortSignal): Promise<FragmentFiles | undefined> {
     if (this.form !== 'files') return undefined;
-    return this.readOnce_('files', async () => (await withoutRanges()).readFragmentList(this.store, signal), signal);
+    return this.readOnce_('files', async () => (await withoutRanges()).readFragmentList(this.store, signal),
+      signal);
   }
   /** A fragment's complete file of such a tree, digest checked. */
-  async fragmentFile(plane: number, rung: number, fragment: number, signal?: AbortSignal): Promise<Uint8Array> {
+  async fragmentFile(plane: number, rung: number, fragment: number,
+      signal?: AbortSignal): Promise<Uint8Array> {
     const { store } = this;
     const { extension } = codecTraits((await this.textures(signal))[plane].codec);
     const path = fragmentFilePath(plane, rung, fragment, extension);
@@ -196,6 +212,7 @@ export class PackageReader extends PackageDocuments {
   async splitStream(offset: number, bytes: number, how: Partial<ReadOptions> = {}): Promise<Uint8Array> {
     const { stream } = this.manifest;
     if (!stream) throw new InputError(this.store.name, '', 'a stream of vertex splits', 'none');
-    return this.store.read(stream, { offset: stream.offset + offset, bytes }, { kind: 'stream', once: true, ...how });
+    return this.store.read(stream, { offset: stream.offset + offset, bytes },
+      { kind: 'stream', once: true, ...how });
   }
 }

@@ -105,7 +105,8 @@ export function shownUrl(url: string): string {
 
 /** Whether an error says that asking later is of no use, either. */
 export function isForGood(error: unknown): boolean {
-  return error instanceof FormatError || (error instanceof InputError && /^status 4(?!08|29)/.test(error.found));
+  return error instanceof FormatError ||
+    (error instanceof InputError && /^status 4(?!08|29)/.test(error.found));
 }
 
 /** An answer's problem or status, for messages. */

@@ -4,7 +4,8 @@ import type { Place } from './schedule';
 const nearShare = 1;
 
 /** From the middle of a box to the middle of a screen. */
-const distance = ({ top, left, width, height }: DOMRectReadOnly, screenWidth: number, screenHeight: number): number =>
+const distance = ({ top, left, width, height }: DOMRectReadOnly, screenWidth: number,
+  screenHeight: number): number =>
   Math.hypot(left + width / 2 - screenWidth / 2, top + height / 2 - screenHeight / 2);
 
 /** Follows where canvases lie on the page and how large they are. */
@@ -35,7 +36,8 @@ export class Visibility {
         this.changed_(target, false);
       }
     }, { rootMargin: `${100 * nearShare}% 0%` });
-    this.sized_ = new ResizeObserver((entries) => this.fit_(entries.map(({ target }) => target as HTMLCanvasElement)));
+    this.sized_ =
+      new ResizeObserver((entries) => this.fit_(entries.map(({ target }) => target as HTMLCanvasElement)));
   }
   /** Follows a canvas; its place is kept up to date. */
   follow(canvas: HTMLCanvasElement, place: Place): void {
@@ -49,7 +51,8 @@ export class Visibility {
       const rect = canvas.getBoundingClientRect();
       const { innerWidth, innerHeight, devicePixelRatio: ratio = 1 } = globalThis;
       place.areaPx = Math.round(rect.width * ratio) * Math.round(rect.height * ratio);
-      place.visible = place.areaPx > 0 && rect.bottom > 0 && rect.right > 0 && rect.top < innerHeight && rect.left < innerWidth;
+      place.visible = place.areaPx > 0 && rect.bottom > 0 && rect.right > 0 && rect.top < innerHeight &&
+        rect.left < innerWidth;
       place.distancePx = distance(rect, innerWidth, innerHeight);
     }
   }
@@ -70,10 +73,14 @@ export class Visibility {
     this.lookedAt_.clear();
   }
 
-  /** As many pixels as the device shows of the canvases. A size that is read behind one that is written makes the browser lay out all anew. */
+  /**
+   * As many pixels as the device shows of the canvases. A size that is read behind one that is written makes
+   * the browser lay out all anew.
+   */
   private fit_(canvases: readonly HTMLCanvasElement[]): void {
     const ratio = globalThis.devicePixelRatio || 1;
-    const sizes = canvases.map((canvas) => [canvas.clientWidth, canvas.clientHeight].map((px) => Math.round(px * ratio)));
+    const sizes =
+      canvases.map((canvas) => [canvas.clientWidth, canvas.clientHeight].map((px) => Math.round(px * ratio)));
     canvases.forEach((canvas, i) => {
       const [width, height] = sizes[i];
       const place = this.places_.get(canvas);

@@ -13,8 +13,12 @@ export interface ShowablePackage extends PackageReader {
   /** See TexmeshPackage. */
   load(scene: Object3D, options: LoadOptions): LoadedModel;
 }
-/** What a model of a page is doing: it waits to be opened, for its first picture, for its turn; has its turn; is shown; was released because nobody sees it. */
-export type ModelPhase = 'waiting' | 'opening' | 'first-picture' | 'turn' | 'shown' | 'released' | 'failed' | 'removed';
+/**
+ * What a model of a page is doing: it waits to be opened, for its first picture, for its turn; has its turn;
+ * is shown; was released because nobody sees it.
+ */
+export type ModelPhase = 'waiting' | 'opening' | 'first-picture' | 'turn' | 'shown' | 'released' | 'failed'
+  | 'removed';
 
 /** Events of a model of a page. */
 export interface PageModelEvents {
@@ -87,7 +91,8 @@ export class PageModel {
   private abort_ = new AbortController();
   private settle_!: { shown: () => void; failed: (error: unknown) => void };
 
-  constructor(private readonly host_: Host, readonly canvas: HTMLCanvasElement, readonly url: string, private readonly options_: PageModelOptions) {
+  constructor(private readonly host_: Host, readonly canvas: HTMLCanvasElement, readonly url: string,
+      private readonly options_: PageModelOptions) {
     this.camera = options_.camera ?? new PerspectiveCamera(32, 1, 0.01, 100);
     const lamp = new DirectionalLight(0xffffff, 2.2);
     lamp.position.set(-0.5, 0.7, 1);
@@ -196,7 +201,8 @@ export class PageModel {
       this.coming = false;
       this.host_.changed(this);
     };
-    if (pkg.requests.some((r) => r.ok && r.offset <= offset && r.offset + r.received >= offset + bytes)) return came();
+    if (pkg.requests.some((r) => r.ok && r.offset <= offset && r.offset + r.received >= offset + bytes))
+      return came();
     const end = pkg.onRequest(({ kind }) => {
       if (kind !== 'mesh') return;
       end();
@@ -207,7 +213,8 @@ export class PageModel {
   private startLoad_(pkg: ShowablePackage, signal: AbortSignal): void {
     const { host_: host, camera } = this;
     const load = pkg.load(this.scene, {
-      meshes: 'auto', ...this.options_.load, ...host.loadOptions(), camera, signal, time: Infinity, autoRefine: false,
+      meshes: 'auto', ...this.options_.load, ...host.loadOptions(), camera, signal, time: Infinity,
+      autoRefine: false,
       display: () => this.display_(pkg),
       memoryBytes: () => host.memoryBytes(this),
       turn: async (bytes) => {
@@ -226,7 +233,8 @@ export class PageModel {
       host.changed(this);
     });
     load.on('memory', (event) => {
-      this.complete = false; // the coarser planes have a first rung of all fragments, not yet what the display can show
+      // the coarser planes have a first rung of all fragments, not yet what the display can show
+      this.complete = false;
       this.events_.emit('memory', event);
       host.changed(this);
     });
@@ -243,7 +251,8 @@ export class PageModel {
   }
   private display_(pkg: ShowablePackage): ReturnType<typeof displayOf> | number {
     const { canvas, load } = this;
-    return load ? displayOf(pkg.manifest, load.object, this.camera, { x: canvas.width, y: canvas.height }) : Math.max(1, canvas.height);
+    return load ? displayOf(pkg.manifest, load.object, this.camera, { x: canvas.width, y: canvas.height })
+      : Math.max(1, canvas.height);
   }
   private enter_(phase: ModelPhase): void {
     this.phase = phase;
@@ -251,7 +260,8 @@ export class PageModel {
     this.host_.changed(this);
   }
   private say_(error: unknown, fatal: boolean): void {
-    this.events_.emit('error', { fatal, error, message: error instanceof Error ? error.message : String(error) });
+    this.events_.emit('error',
+      { fatal, error, message: error instanceof Error ? error.message : String(error) });
   }
   private fail_(error: unknown): void {
     if (this.phase === 'failed' || this.phase === 'removed') return;

@@ -1,6 +1,6 @@
 import type { RequestRecord } from '../http/requests';
 
-// What a page decides about its models: who is next, for how long, and what the link carries. Nothing here knows a canvas.
+// What a page decides about its models: who is next, how long, and what the link carries. No canvas is here.
 
 /** How a model lies on the page. */
 export interface Place {
@@ -16,7 +16,8 @@ export interface Place {
 
 /** Order of interest: what is regarded, what is seen, larger pictures, what is nearer to the middle. */
 export function byInterest(a: Place, b: Place): number {
-  return Number(b.regarded) - Number(a.regarded) || Number(b.visible) - Number(a.visible) || b.areaPx - a.areaPx || a.distancePx - b.distancePx;
+  return Number(b.regarded) - Number(a.regarded) || Number(b.visible) - Number(a.visible) ||
+    b.areaPx - a.areaPx || a.distancePx - b.distancePx;
 }
 
 /** A model's share, by area, of what all of `areas` have a part in; equal parts where none has an area. */
@@ -31,7 +32,8 @@ const leastTurnS = 0.1;
 const roundTrips = 2;
 /** The least seconds of a turn that fetches so many bytes in any case; `bytesS` 0: nobody knows the link. */
 export function leastS(bytes: number, bytesS: number, latencyS: number): number {
-  return bytes > 0 ? Math.max(leastTurnS, roundTrips * latencyS + (bytesS > 0 ? bytes / bytesS : 0)) : leastTurnS;
+  return bytes > 0 ? Math.max(leastTurnS, roundTrips * latencyS + (bytesS > 0 ? bytes / bytesS : 0))
+    : leastTurnS;
 }
 /** Seconds of a turn, at least `leastS`, out of `leftS` for all that wait; 0: there are not so many. */
 export function turnS(leftS: number, area: number, areas: readonly number[], leastS: number): number {
@@ -43,7 +45,8 @@ export function turnS(leftS: number, area: number, areas: readonly number[], lea
 const recentS = 10;
 /** Bytes per second while bytes came, over the last seconds before `nowS`; 0: nothing is known. */
 export function linkBytesS(records: readonly RequestRecord[], nowS: number): number {
-  const came = records.filter((r) => r.received > 0 && r.firstByte >= 0 && r.ended > nowS - recentS).sort((a, b) => a.firstByte - b.firstByte);
+  const came = records.filter((r) => r.received > 0 && r.firstByte >= 0 && r.ended > nowS - recentS)
+    .sort((a, b) => a.firstByte - b.firstByte);
   let [bytes, seconds, until] = [0, 0, -Infinity];
   for (const { firstByte, ended, received } of came) {
     bytes += received;
@@ -55,7 +58,9 @@ export function linkBytesS(records: readonly RequestRecord[], nowS: number): num
 
 const mega = 1e6;
 /** GPU memory that a page takes by default, bytes: by the device's memory, else by screen and touch. */
-export function defaultMemoryBytes({ deviceMemoryGb, screenPx, touch }: { deviceMemoryGb?: number; screenPx: number; touch: boolean }): number {
-  if (deviceMemoryGb !== undefined && deviceMemoryGb > 0) return Math.min(64 * mega * 2 ** Math.floor(Math.log2(Math.max(deviceMemoryGb, 0.5))), 512 * mega);
+export function defaultMemoryBytes({ deviceMemoryGb, screenPx, touch }: { deviceMemoryGb?: number;
+    screenPx: number; touch: boolean }): number {
+  if (deviceMemoryGb !== undefined && deviceMemoryGb > 0)
+    return Math.min(64 * mega * 2 ** Math.floor(Math.log2(Math.max(deviceMemoryGb, 0.5))), 512 * mega);
   return (touch || screenPx < 1e6 ? 128 : 256) * mega;
 }

@@ -48,20 +48,20 @@ export interface LoadOptions {
   /** Camera that looks at the object; scale and textures follow the camera's view, see LoadedModel.update. */
   camera?: Camera;
   /**
-   * Where somebody looks, asked before every list of fragments (an eye tracker, the pointer): what lies beside counts less, by the acuity
-   * of the eye. Needs a camera. Left out: the whole picture counts alike.
+   * Where somebody looks, asked before every list of fragments (an eye tracker, the pointer): what lies
+   * beside counts less, by the acuity of the eye. Needs a camera. Left out: the whole picture counts alike.
    */
   gaze?: () => Gaze | undefined;
   /** Displayed height in device px, or a function that gives it; replaces the camera. Default 1000. */
   display?: number | Display | (() => number | Display);
   /**
-   * Seconds from the package's opening (the first load) or from load() (further ones) until everything is there.
-   * Infinity: no limit, everything that the display can show. Default 5.
+   * Seconds from the package's opening (the first load) or from load() (further ones) until everything is
+   * there. Infinity: no limit, everything that the display can show. Default 5.
    */
   time?: number;
   /**
-   * Policy that spends the time. guard: what shows most of what the camera sees comes first. thesis: chapters 4
-   * and 7 as printed, with the rule jnd, one request at a time and textures at full size. Default guard.
+   * Policy that spends the time. guard: what shows most of what the camera sees comes first. thesis: chapters
+   * 4 and 7 as printed, with the rule jnd, one request at a time and textures at full size. Default guard.
    */
   policy?: Policy;
   /** First guess of the throughput, bytes per second; left out: the throughput of the first transfers. */
@@ -87,20 +87,22 @@ export interface LoadOptions {
   /** Workers that decode images. Default: 2 to 4 by the number of cores. */
   workers?: number;
   /**
-   * Asked once the first picture stands; the timed part begins when the answer comes, and lasts as long as the answer says. So several
-   * models of a page have the link one after the other. `bytes` are fetched in any turn, before anything can be chosen. `time` counts where
-   * this is left out.
+   * Asked once the first picture stands; the timed part begins when the answer comes, and lasts as long as
+   * the answer says. So several models of a page have the link one after the other. `bytes` are fetched in
+   * any turn, before anything can be chosen. `time` counts where this is left out.
    */
   turn?: (bytes: number) => Promise<Turn>;
   /**
-   * Bytes that textures and meshes may take on the GPU: textures get coarser mips, meshes coarser scales, until all fits or nothing is
-   * coarser. Left out: no limit but the one that the GPU shows by losing its context, or by refusing storage.
+   * Bytes that textures and meshes may take on the GPU: textures get coarser mips, meshes coarser scales,
+   * until all fits or nothing is coarser. Left out: no limit but the one that the GPU shows by losing its
+   * context, or by refusing storage.
    */
   memoryBytes?: number | (() => number);
   /**
-   * Textures as blocks of 4 x 4 texels: auto = where memoryBytes would take coarser mips otherwise, as BC7 or ASTC, and normals as BC5, ASTC
-   * or BC3, which take a quarter of the memory; always = whatever memory there is, at last as BC1 or ETC2, which take an eighth and look
-   * worse; never. What the GPU has decides. Default auto.
+   * Textures as blocks of 4 x 4 texels: auto = where memoryBytes would take coarser mips otherwise, as BC7 or
+   * ASTC, and normals as BC5, ASTC or BC3, which take a quarter of the memory; always = whatever memory there
+   * is, at last as BC1 or ETC2, which take an eighth and look worse; never. What the GPU has decides. Default
+   * auto.
    */
   compress?: 'auto' | 'always' | 'never';
   /** Address of blocks.js, which makes blocks, where that file does not stand beside the library. */
@@ -110,7 +112,8 @@ export interface LoadOptions {
 }
 
 /** Phases of a load, in their order. */
-export type LoadPhase = 'first-picture' | 'tables' | 'mesh' | 'textures' | 'refining' | 'done' | 'cancelled' | 'failed';
+export type LoadPhase = 'first-picture' | 'tables' | 'mesh' | 'textures' | 'refining' | 'done' | 'cancelled'
+  | 'failed';
 
 /** A decision for a fragment or some neighbours; sent when taken and when its transfer has ended. */
 export interface DecisionEvent {
@@ -235,15 +238,16 @@ export interface LoadedModel {
   /** Calls the listener at every such event; gives a function that ends the calls. */
   on<K extends keyof LoadEvents>(name: K, listener: (event: LoadEvents[K]) => void): () => void;
   /**
-   * Follows the view: to be called for every frame, or when the camera moves. Picks the scale (with hysteresis), finer planes, and
-   * fragments to refine first. Cheap when nothing has changed.
+   * Follows the view: to be called for every frame, or when the camera moves. Picks the scale (with
+   * hysteresis), finer planes, and fragments to refine first. Cheap when nothing has changed.
    */
   update(camera?: Camera): void;
   /** Fetches fragments that the display can show but the time did not allow; resolves when none is left. */
   refine(): Promise<void>;
   /**
-   * Changes scale and rung that were chosen at loading; fetches at once, or when the timed part is over, and shows lower rungs in place
-   * of higher ones, too. undefined: by the display again. InputError: scale or rung is no whole number from 0 on.
+   * Changes scale and rung that were chosen at loading; fetches at once, or when the timed part is over, and
+   * shows lower rungs in place of higher ones, too. undefined: by the display again. InputError: scale or
+   * rung is no whole number from 0 on.
    */
   setOverride(override: { scale?: number; rung?: number }): void;
   /** Stops all transfers; the picture stays. */

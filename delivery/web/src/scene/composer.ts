@@ -32,7 +32,8 @@ export interface PlaneComposer extends ComposedPlane {
 }
 
 /** A plane to be composed in the renderer's context. */
-export function planeComposer(renderer: WebGLRenderer, info: TextureInfo, base: number, plane: number, blocks?: BlockStorage): PlaneComposer {
+export function planeComposer(renderer: WebGLRenderer, info: TextureInfo, base: number, plane: number,
+    blocks?: BlockStorage): PlaneComposer {
   const { image, role, widthPx, heightPx, columns, rows, fragmentWidthPx, fragmentHeightPx } = info;
   const rgba = blocks ? undefined : new PlaneStorage(renderer, info);
   const storage = (blocks ?? rgba)!;
@@ -47,8 +48,10 @@ export function planeComposer(renderer: WebGLRenderer, info: TextureInfo, base: 
     view: (old) => storage.view(old, !!composer.filled),
     fill: (from) => rgba?.fillAll(from),
     uploads: (levels, x, y) =>
-      blocks?.uploads(levels, x, y) ?? [{ pixels: levels[0].width * levels[0].height, run: () => rgba!.upload(levels as ImageBitmap[], x, y) }],
-    placeOf: (fragment) => [(fragment % columns) * fragmentWidthPx, Math.floor(fragment / columns) * fragmentHeightPx],
+      blocks?.uploads(levels, x, y) ?? [{ pixels: levels[0].width * levels[0].height,
+        run: () => rgba!.upload(levels as ImageBitmap[], x, y) }],
+    placeOf: (fragment) =>
+      [(fragment % columns) * fragmentWidthPx, Math.floor(fragment / columns) * fragmentHeightPx],
     updateMips: () => storage.updateMips(),
     read: () => storage.read(),
     dispose: () => storage.dispose(),

@@ -16,12 +16,14 @@ export interface PlayedPlanHooks {
 }
 
 /**
- * Plays a plan over the network: fetches the fragments that the plan asks for, and reports to the plan which have come. Ends when every
- * fragment has come or was given up; after `mostS` seconds the rest is given up.
+ * Plays a plan over the network: fetches the fragments that the plan asks for, and reports to the plan which
+ * have come. Ends when every fragment has come or was given up; after `mostS` seconds the rest is given up.
  */
-export async function playPlan(plan: HarmonicTimePlan, { groups }: GroupedList, transfers: Transfers, signal: AbortSignal, mostS: number, hooks: PlayedPlanHooks): Promise<void> {
+export async function playPlan(plan: HarmonicTimePlan, { groups }: GroupedList, transfers: Transfers,
+    signal: AbortSignal, mostS: number, hooks: PlayedPlanHooks): Promise<void> {
   const startS = nowS();
-  const underWay = new Map<number, { step: HtcStep; left: number }>(); // by offer: fragments of it that have not ended
+  // by offer: fragments of it that have not ended
+  const underWay = new Map<number, { step: HtcStep; left: number }>();
   const abort = new AbortController();
   const stop = (): void => abort.abort();
   signal.addEventListener('abort', stop);
@@ -47,7 +49,8 @@ export async function playPlan(plan: HarmonicTimePlan, { groups }: GroupedList, 
       hooks.lost(wish, error);
       ended(wish, false);
     };
-    if (wishes.length > 0) void transfers.fetch(wishes, { gapBytes: 0, mostBytes: Infinity, signal: abort.signal }, (wish) => ended(wish, true), lost);
+    if (wishes.length > 0) void transfers.fetch(wishes,
+      { gapBytes: 0, mostBytes: Infinity, signal: abort.signal }, (wish) => ended(wish, true), lost);
     if (plan.finished() || (signal.aborted && underWay.size === 0)) end();
   };
   try {
@@ -105,9 +108,11 @@ export class FetchInTime {
   async run(fragments: FragmentList, timeLimitS: number): Promise<void> {
     const { load_: load, fetching_: fetching } = this;
     const whole = fetching.wholeRungs();
-    const bytesEach = whole ? Infinity : this.printed ? 0 : groupBytes(load.beta0, load.reader.client.latencyS, timeLimitS);
+    const bytesEach = whole ? Infinity
+      : this.printed ? 0 : groupBytes(load.beta0, load.reader.client.latencyS, timeLimitS);
     const list = groupedList(fragments, bytesEach, load.beta0 * timeLimitS);
-    const plan = (this.plan_ = new HarmonicTimePlan(list.offers, { ...this.planOptions(timeLimitS), tripS: () => this.tripS_() }));
+    const plan = (this.plan_ = new HarmonicTimePlan(list.offers,
+      { ...this.planOptions(timeLimitS), tripS: () => this.tripS_() }));
     const hooks = {
       decided: (step: HtcStep): void => this.decided_(step, list),
       lost: (wish: Wish, error: unknown): void => fetching.lost(wish, error),
@@ -148,9 +153,11 @@ export class FetchInTime {
       if (afterS < leastRest * limitS) return;
       // More requests at once would wait for connections.
       const most = 2 * client.options.connections;
-      const wishes = upgradeWishes(list, certain * plan.throughputBytesS() * afterS, this.fetching_).slice(0, most);
+      const wishes = upgradeWishes(list, certain * plan.throughputBytesS() * afterS, this.fetching_).slice(0,
+        most);
       const late = AbortSignal.timeout(Math.ceil(1000 * (restS + mostLate * limitS)));
-      if (wishes.length === 0 || (await this.fetching_.fetch(wishes, AbortSignal.any?.([late, signal]) ?? late)) === 0) return;
+      if (wishes.length === 0 ||
+          (await this.fetching_.fetch(wishes, AbortSignal.any?.([late, signal]) ?? late)) === 0) return;
     }
   }
 }

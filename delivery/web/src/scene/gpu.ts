@@ -21,9 +21,11 @@ const mostCompileS = 0.5;
 export async function gpuIdle(renderer: WebGLRenderer, mostS = 0.5): Promise<void> {
   const gl = renderer.getContext() as WebGL2RenderingContext;
   const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
-  const lives = () => fence !== null && gl.isSync(fence); // not behind a lost context, which may stand again by then
+  // not behind a lost context, which may stand again by then
+  const lives = () => fence !== null && gl.isSync(fence);
   gl.flush();
-  for (const end = nowS() + mostS; lives() && nowS() < end && gl.getSyncParameter(fence!, gl.SYNC_STATUS) !== gl.SIGNALED; ) await sleepS(0.004);
+  for (const end = nowS() + mostS; lives() && nowS() < end &&
+      gl.getSyncParameter(fence!, gl.SYNC_STATUS) !== gl.SIGNALED; ) await sleepS(0.004);
   if (lives()) gl.deleteSync(fence);
 }
 
@@ -31,7 +33,8 @@ export async function gpuIdle(renderer: WebGLRenderer, mostS = 0.5): Promise<voi
 const ready = new WeakSet<WebGLProgram>();
 
 /** Waits for each program and asks for its uniforms, in a turn of its own, before the first frame. */
-async function programsReady(renderer: WebGLRenderer, mostS: number, stopIfCancelled: () => void): Promise<void> {
+async function programsReady(renderer: WebGLRenderer, mostS: number,
+    stopIfCancelled: () => void): Promise<void> {
   const end = nowS() + mostS;
   const programs = (renderer.info?.programs ?? []) as (WebGLProgram & { isReady?(): boolean })[];
   for (const program of programs.filter((p) => !ready.has(p))) {
@@ -90,8 +93,9 @@ const shareAfter = { lost: 0.5, refused: 0.75 };
 const askAfterS = 0.25;
 const mostIdleS = 1;
 /**
- * A question holds the page up until the GPU has done all that stands before it: half a second to one and a half were measured where the
- * processor draws. A GPU that does nothing says so soon. One that never rests is asked at last.
+ * A question holds the page up until the GPU has done all that stands before it: half a second to one and a
+ * half were measured where the processor draws. A GPU that does nothing says so soon. One that never rests is
+ * asked at last.
  */
 const soonS = 0.03;
 const mostBusyS = 10;
@@ -170,15 +174,21 @@ function texelsOf({ isCompressedTexture, format }: Partial<CompressedTexture>): 
 }
 
 /** Bytes that drawn shapes, materials' textures and planes take on the GPU. Shared ones count once. */
-export function gpuBytes(shapes: readonly Object3D[], materials: readonly Material[], planes: readonly { textures: readonly Texture[] }[]): number {
+export function gpuBytes(shapes: readonly Object3D[], materials: readonly Material[],
+    planes: readonly { textures: readonly Texture[] }[]): number {
   const arrays = new Set<{ byteLength: number }>();
   for (const { geometry } of shapes.flatMap(meshesOf))
-    for (const a of [...Object.values(geometry.attributes), geometry.index] as (BufferAttribute | InterleavedBufferAttribute | null)[])
+    for (const a of [...Object.values(geometry.attributes), geometry.index] as (BufferAttribute
+        | InterleavedBufferAttribute | null)[])
       if (a) arrays.add('data' in a ? (a.data.array as Float32Array) : (a.array as Float32Array));
   const pictures = new Map<unknown, number>();
-  for (const texture of [...materials.flatMap((m) => texturesOf(m).map(([, t]) => t)), ...planes.flatMap((p) => [...p.textures])]) {
+  for (const texture of [...materials.flatMap((m) => texturesOf(m).map(([, t]) => t)),
+        ...planes.flatMap((p) => [...p.textures])]) {
     const { width = 0, height = 0 } = (texture.image ?? {}) as Partial<ImageBitmap>;
-    if (width > 0) pictures.set(texture.source, Math.max(pictures.get(texture.source) ?? 0, textureBytes(width, height, (texture.minFilter as number) > LinearFilter ? undefined : 1, texelsOf(texture as Partial<CompressedTexture>))));
+    if (width > 0) pictures.set(texture.source, Math.max(pictures.get(texture.source) ?? 0,
+      textureBytes(width, height, (texture.minFilter as number) > LinearFilter ? undefined : 1,
+        texelsOf(texture as Partial<CompressedTexture>))));
   }
-  return [...arrays].reduce((sum, a) => sum + a.byteLength, 0) + [...pictures.values()].reduce((sum, bytes) => sum + bytes, 0);
+  return [...arrays].reduce((sum, a) => sum + a.byteLength, 0) +
+    [...pictures.values()].reduce((sum, bytes) => sum + bytes, 0);
 }

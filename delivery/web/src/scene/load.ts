@@ -80,13 +80,15 @@ export class ProxyOnTheWay {
   async showStep(): Promise<void> {
     const { load_: load, proxy_: proxy } = this;
     const { step, bytes, rest } = await (this.way_ ?? this.goOn_());
-    const shown = bytes && proxy.show(step, bytes).catch((error: unknown) => load.fail(error, 'proxy')); // the smaller one stays
+    // the smaller one stays
+    const shown = bytes && proxy.show(step, bytes).catch((error: unknown) => load.fail(error, 'proxy'));
     await Promise.all([shown, rest]);
   }
 }
 
 /** Loads one package into one scene, from `startS` on; `forget` is called when the load is disposed of. */
-export function loadModel(reader: PackageReader, scene: Object3D, options: LoadOptions, pool: WorkerPool, startS: number, forget: () => void): LoadedModel {
+export function loadModel(reader: PackageReader, scene: Object3D, options: LoadOptions, pool: WorkerPool,
+    startS: number, forget: () => void): LoadedModel {
   const load = new ModelLoad(new LoadContext(reader, options, pool, startS), scene, forget);
   const { context } = load;
   return {
@@ -109,14 +111,19 @@ export function loadModel(reader: PackageReader, scene: Object3D, options: LoadO
   };
 }
 
-/** Bytes that a turn fetches however short it is: a larger proxy that is enough, or documents, and the coarsest mesh where it is not there yet. */
-function bytesOfAnyTurn({ proxies, scales, index, tables }: Manifest, serving: number, shown: number, withMesh: boolean): number {
+/**
+ * Bytes that a turn fetches however short it is: a larger proxy that is enough, or documents, and the
+ * coarsest mesh where it is not there yet.
+ */
+function bytesOfAnyTurn({ proxies, scales, index, tables }: Manifest, serving: number, shown: number,
+    withMesh: boolean): number {
   if (serving >= 0) return serving > shown ? proxies[serving].glb.bytes : 0;
   return tables.offset + tables.bytes - index.offset + (withMesh ? scales[scales.length - 1].glb.bytes : 0);
 }
 
 /** three.js drops what it keeps of a lost context, as a later context could not delete it. */
-function forgetGpu(objects: readonly Object3D[], planes: LoadState['planes'], materials: readonly Material[]): void {
+function forgetGpu(objects: readonly Object3D[], planes: LoadState['planes'],
+    materials: readonly Material[]): void {
   objects.forEach(disposeGeometries);
   for (const texture of planes.flatMap((p) => p.textures)) texture.dispose();
   for (const material of materials) {
@@ -158,8 +165,10 @@ class ModelLoad {
     const whileThere = { signal: disposal };
     options.signal?.addEventListener('abort', () => this.cancel(), whileThere);
     if (options.signal?.aborted) this.cancel();
-    this.leaveRoom_ = context.room.add({ gpuBytes: () => this.state.gpuBytes, refused: () => this.makeAnew_() });
-    for (const name of ['proxy', 'scale', 'plane'] as const) context.events.on(name, () => void context.room.ask());
+    this.leaveRoom_ =
+      context.room.add({ gpuBytes: () => this.state.gpuBytes, refused: () => this.makeAnew_() });
+    for (const name of ['proxy', 'scale', 'plane'] as const)
+      context.events.on(name, () => void context.room.ask());
     const { domElement } = options.renderer;
     domElement?.addEventListener('webglcontextlost', () => this.lose_(), whileThere);
     domElement?.addEventListener('webglcontextrestored', () => this.restore_(), whileThere);
@@ -204,30 +213,38 @@ class ModelLoad {
       } catch (error) {
         context.fail(error, 'proxy'); // scales do, too
       }
-    // On a slow link nothing shares the link with the first picture. The documents are asked for while the GPU prepares for the picture.
+    // On a slow link nothing shares the link with the first picture. The documents are asked for while the
+    // GPU prepares for the picture.
     if (!scales.held) await this.startScales_();
-    this.update(context.view.camera ?? context.options.camera); // by the mesh that is there, not by its bounding box alone
-    context.emit('first-picture', { scale: scales.held ? -1 : scales.shown, proxy: scales.proxy.shown, bytes: client.received });
+    // by the mesh that is there, not by its bounding box alone
+    this.update(context.view.camera ?? context.options.camera);
+    context.emit('first-picture',
+      { scale: scales.held ? -1 : scales.shown, proxy: scales.proxy.shown, bytes: client.received });
   }
   /** Starts with the coarsest scale, which has the materials; resolves when the scale is shown. */
   private startScales_(): Promise<void> {
     const { context } = this;
     const { arrived, shape, shown } = this.scale_.load(context.reader.manifest.scales.at(-1)!.scale);
     this.shape_ = shape;
-    if (!context.options.turn || context.phase !== 'first-picture') void this.openTextures_(arrived); // others wait for their first pictures
+    // others wait for their first pictures
+    if (!context.options.turn || context.phase !== 'first-picture') void this.openTextures_(arrived);
     return shown;
   }
   private openTextures_(arrived?: Promise<void>): Promise<TextureLoad> {
-    arrived?.then(() => this.source_.fetchDocuments()).catch(() => undefined); // whoever takes them asks again
-    this.coming_ ??= Promise.all([import('./texture_load'), this.shape_]).then(([part]) => part.openTextureLoad(this.context, this.scale_, this.source_));
+    // whoever takes them asks again
+    arrived?.then(() => this.source_.fetchDocuments()).catch(() => undefined);
+    this.coming_ ??= Promise.all([import('./texture_load'), this.shape_])
+      .then(([part]) => part.openTextureLoad(this.context, this.scale_, this.source_));
     this.coming_.catch(() => undefined);
     return this.coming_;
   }
   private async showInTime_(): Promise<void> {
     const { context } = this;
-    await context.turn(bytesOfAnyTurn(context.reader.manifest, this.proxies_.serving(), this.scale_.proxy.shown, !this.shape_));
+    await context.turn(bytesOfAnyTurn(context.reader.manifest, this.proxies_.serving(),
+      this.scale_.proxy.shown, !this.shape_));
     // A turn without time leaves what stands: other models' turns would begin later.
-    if ((context.options.turn && context.limitS <= context.elapsedS()) || (await this.proxies_.showServing())) {
+    if ((context.options.turn && context.limitS <= context.elapsedS()) ||
+          (await this.proxies_.showServing())) {
       context.emit('deadline', { limit: context.limitS, actual: context.elapsedS(), skipped: 0 });
       return this.rest_();
     }
@@ -300,7 +317,8 @@ class ModelLoad {
   private followByProxies_(): Promise<void> {
     return (this.leaving_ ??= (async () => {
       let enough = true;
-      while (enough && this.proxies_.serving() > this.scale_.proxy.shown) enough = await this.proxies_.showServing();
+      while (enough && this.proxies_.serving() > this.scale_.proxy.shown)
+        enough = await this.proxies_.showServing();
       if (!enough || this.proxies_.serving() < 0) await this.showTextures_();
     })()
       .catch((error: unknown) => this.context.fail(error, 'scales behind a proxy'))
@@ -360,7 +378,9 @@ class ModelLoad {
   private makeAnew_(): void {
     const { context } = this;
     if (context.signal.aborted) return;
-    this.restoring_ = this.textures?.restore().then((coarser) => coarser && context.emit('memory', { gpuBytes: this.state.gpuBytes, limitBytes: context.memoryBytes }), (error) => context.fail(error, 'what the GPU has lost'));
+    this.restoring_ = this.textures?.restore().then((coarser) => coarser &&
+      context.emit('memory', { gpuBytes: this.state.gpuBytes, limitBytes: context.memoryBytes }),
+      (error) => context.fail(error, 'what the GPU has lost'));
     if (!context.resting) return;
     context.enter('refining');
     this.refineAgain_ ||= context.options.autoRefine ?? true;

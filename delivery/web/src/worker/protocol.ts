@@ -72,7 +72,8 @@ export interface DocumentRequest {
   args: unknown[];
 }
 /** Anything that a worker is asked. */
-export type WorkerRequest = DocumentRequest | DecodeRequest | EnlargeRequest | PixelsRequest | SplitOpenRequest | SplitCheckRequest | SplitAddRequest | SplitCloseRequest;
+export type WorkerRequest = DocumentRequest | DecodeRequest | EnlargeRequest | PixelsRequest
+  | SplitOpenRequest | SplitCheckRequest | SplitAddRequest | SplitCloseRequest;
 
 /** Facts about a stream from its head. */
 export interface SplitInfo {

@@ -20,7 +20,8 @@ interface Shared {
 /** Starts a worker that tells `events`. Throws where a page may have none. */
 export function startWorker(workerUrl: string | URL | undefined, events: WorkerEvents): Worker {
   // Bundlers see a worker that is written so.
-  const worker = workerUrl ? new Worker(workerUrl, { type: 'module' }) : new Worker(new URL('./worker.js', import.meta.url), { type: 'module' });
+  const worker = workerUrl ? new Worker(workerUrl, { type: 'module' })
+    : new Worker(new URL('./worker.js', import.meta.url), { type: 'module' });
   worker.onmessage = (event: MessageEvent<WorkerAnswer>) => events.answered(event.data);
   worker.onerror = (event) => {
     event.preventDefault();

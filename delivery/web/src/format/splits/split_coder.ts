@@ -12,7 +12,8 @@ export class BitModels {
   }
 }
 
-const weights = /* @__PURE__ */ Uint32Array.from({ length: 256 }, (_, seen) => Math.floor(65535 / (seen + 2)));
+const weights =
+  Uint32Array.from({ length: 256 }, (_, seen) => Math.floor(65535 / (seen + 2)));
 
 /** Decodes bits; behind the end of the bytes are zeros. */
 export class BitDecoder {
