@@ -1,4 +1,4 @@
-import type { Place } from './schedule';
+import type { PagePlace } from './schedule';
 
 /** Models are prepared so far from the screen (by its height), and released when they are further. */
 const nearShare = 1;
@@ -15,7 +15,7 @@ export class Visibility {
   private readonly sized_: ResizeObserver;
   private readonly nearby_ = new Set<Element>();
   private readonly lookedAt_ = new Set<Element>(); // whether they are seen is known
-  private readonly places_ = new Map<Element, Place>();
+  private readonly places_ = new Map<Element, PagePlace>();
 
   /** `changed` hears of a canvas that has come, gone, or has another size: `resized` then. */
   constructor(private readonly changed_: (canvas: Element, resized: boolean) => void) {
@@ -40,7 +40,7 @@ export class Visibility {
       new ResizeObserver((entries) => this.fit_(entries.map(({ target }) => target as HTMLCanvasElement)));
   }
   /** Follows a canvas; its place is kept up to date. */
-  follow(canvas: HTMLCanvasElement, place: Place): void {
+  follow(canvas: HTMLCanvasElement, place: PagePlace): void {
     this.places_.set(canvas, place);
     for (const observer of [this.seen_, this.near_, this.sized_]) observer.observe(canvas);
   }

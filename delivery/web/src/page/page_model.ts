@@ -6,7 +6,7 @@ import type { LoadEvents, LoadOptions, LoadedModel, Turn } from '../scene/api';
 import { displayOf } from '../scene/camera';
 import { Emitter } from '../scene/events';
 import { type Orbit, defaultOrbit, frame } from './framing';
-import type { Place } from './schedule';
+import type { PagePlace } from './schedule';
 
 /** A package that can be shown: TexmeshPackage. */
 export interface ShowablePackage extends PackageReader {
@@ -76,7 +76,7 @@ export interface Host {
 export class PageModel {
   readonly scene = new Scene();
   readonly camera: PerspectiveCamera;
-  readonly place: Place = { visible: false, regarded: false, areaPx: 0, distancePx: 0 };
+  readonly place: PagePlace = { visible: false, regarded: false, areaPx: 0, distancePx: 0 };
   phase: ModelPhase = 'waiting';
   package?: ShowablePackage;
   load?: LoadedModel;

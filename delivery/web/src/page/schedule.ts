@@ -3,7 +3,7 @@ import type { RequestRecord } from '../http/requests';
 // What a page decides about its models: who is next, how long, and what the link carries. No canvas is here.
 
 /** How a model lies on the page. */
-export interface Place {
+export interface PagePlace {
   /** Some of it is on the screen. */
   visible: boolean;
   /** The user points at it, or has it in focus. */
@@ -15,7 +15,7 @@ export interface Place {
 }
 
 /** Order of interest: what is regarded, what is seen, larger pictures, what is nearer to the middle. */
-export function byInterest(a: Place, b: Place): number {
+export function byInterest(a: PagePlace, b: PagePlace): number {
   return Number(b.regarded) - Number(a.regarded) || Number(b.visible) - Number(a.visible) ||
     b.areaPx - a.areaPx || a.distancePx - b.distancePx;
 }

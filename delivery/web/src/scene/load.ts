@@ -14,7 +14,7 @@ import { ShownScale } from './shown_scale';
 import type { TextureLoad } from './texture_load';
 
 /** What is fetched on the way to scales. */
-interface Way {
+interface OnTheWay {
   /** The larger proxy that is shown meanwhile; -1: none. */
   step: number;
   bytes?: Promise<Uint8Array>;
@@ -25,7 +25,7 @@ interface Way {
 /** Which proxy a load shows: the smallest first, one that is enough, or a larger one on the way to scales. */
 export class ProxyOnTheWay {
   private part_?: Promise<typeof import('./texture_load') | undefined>;
-  private way_?: Promise<Way>;
+  private way_?: Promise<OnTheWay>;
 
   /** `fetchRest` fetches what scales need. */
   constructor(
@@ -67,7 +67,7 @@ export class ProxyOnTheWay {
     }
   }
   /** Fetches what scales need; before that a larger proxy, where one pays on the way to scales. */
-  private async goOn_(): Promise<Way> {
+  private async goOn_(): Promise<OnTheWay> {
     const { load_: load, proxy_: proxy } = this;
     const part = this.free_ && load.options.policy !== 'thesis' ? await this.part_ : undefined;
     const step = part ? part.stepOf(load) : -1;

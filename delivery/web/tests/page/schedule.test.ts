@@ -1,9 +1,9 @@
 import { expect, it } from 'vitest';
-import { type Place, byInterest, defaultMemoryBytes, leastS, linkBytesS, shareOf,
+import { type PagePlace, byInterest, defaultMemoryBytes, leastS, linkBytesS, shareOf,
   turnS } from '../../src/page/schedule';
 import type { RequestRecord } from '../../src/http/requests';
 
-const place = (p: Partial<Place>): Place =>
+const place = (p: Partial<PagePlace>): PagePlace =>
   ({ visible: true, regarded: false, areaPx: 100, distancePx: 0, ...p });
 const record = (firstByte: number, ended: number, received: number): RequestRecord =>
   ({ url: '', offset: 0, bytes: received, received, kind: 'texture', started: firstByte - 0.1, firstByte,

@@ -12,7 +12,7 @@ import { threeFormats } from './gpu_formats';
 import { unpacked } from './two_channels';
 
 /** A part of a picture that has, or would have if it were enlarged, a size `of` so many px. */
-export interface Part {
+export interface PicturePart {
   x: number;
   y: number;
   width: number;
@@ -22,7 +22,7 @@ export interface Part {
 
 /** RGBA bytes of a texture's part, row 0 first: blocks cannot be read, so they are drawn. */
 export function readPicture(renderer: WebGLRenderer, texture: Texture, format: BlockFormat | undefined,
-    { x, y, width, height, of }: Part): Uint8Array {
+    { x, y, width, height, of }: PicturePart): Uint8Array {
   const target = new WebGLRenderTarget(width, height,
     { colorSpace: texture.colorSpace, depthBuffer: false, minFilter: LinearFilter, magFilter: LinearFilter });
   const material = new ShaderMaterial({

@@ -8,7 +8,7 @@ import { eachPiece, uploadAll } from '../enlarge';
 import type { LoadContext } from '../load_context';
 import type { UploadQueue } from '../upload_queue';
 import { BlockStorage, readPicture } from './block_storage';
-import { type Way, blocksFor, bytesBy, formatsOf } from './gpu_formats';
+import { type BlockChoice, blocksFor, bytesBy, formatsOf } from './gpu_formats';
 import { readTwoChannels } from './two_channels';
 
 /** Fills a plane of blocks with a texture: the GPU draws it piece by piece, workers make the blocks. */
@@ -40,7 +40,7 @@ export interface StorageOptions {
 /** Textures as blocks; this module is loaded where a load wants them. */
 export interface Compression {
   /** Ways to store the planes, the best pictures first, and the bytes of each. */
-  ways: Way[];
+  ways: BlockChoice[];
   bytes: BytesOf[];
   storage(of: StorageOptions): BlockStorage;
   refill: typeof refill;
@@ -68,6 +68,6 @@ export async function openCompression({ options, pool }: LoadContext,
     }, filled);
   const always = compress === 'always';
   const blocks = blocksFor(textures, formats, always);
-  const ways: Way[] = always ? [blocks] : [() => undefined, blocks];
+  const ways: BlockChoice[] = always ? [blocks] : [() => undefined, blocks];
   return { ways, bytes: ways.map((way) => bytesBy(textures, way)), refill, readTwoChannels, storage };
 }

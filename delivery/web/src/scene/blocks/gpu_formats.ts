@@ -6,7 +6,7 @@ import { textureBytes } from '../../decide/gpu_size';
 import type { TextureInfo } from '../../format/textures';
 
 /** How the planes of a package are stored: RGBA, or blocks of a format that suits each. */
-export type Way = (plane: number) => BlockFormat | undefined;
+export type BlockChoice = (plane: number) => BlockFormat | undefined;
 
 /** three.js's number for a format. */
 export const threeFormats = {
@@ -45,7 +45,7 @@ export function formatsOf(renderer: WebGLRenderer): Set<BlockFormat> {
  * Coverage has edges, which those blur.
  */
 export function blocksFor(textures: readonly TextureInfo[], formats: ReadonlySet<BlockFormat>,
-    any: boolean): Way {
+    any: boolean): BlockChoice {
   const first = (of: readonly BlockFormat[], { widthPx, heightPx }: TextureInfo): BlockFormat | undefined => {
     const whole = widthPx % 4 === 0 && heightPx % 4 === 0; // what BC wants of level 0
     return Math.min(widthPx, heightPx) < leastPx ? undefined
@@ -58,7 +58,7 @@ export function blocksFor(textures: readonly TextureInfo[], formats: ReadonlySet
 }
 
 /** Bytes of planes that are stored this way. */
-export function bytesBy(textures: readonly TextureInfo[], way: Way): BytesOf {
+export function bytesBy(textures: readonly TextureInfo[], way: BlockChoice): BytesOf {
   return (plane) => {
     const format = way(plane);
     return textureBytes(textures[plane].widthPx, textures[plane].heightPx, undefined,
