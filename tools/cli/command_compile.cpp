@@ -255,7 +255,7 @@ void add_report_options(Command& c, CompileArguments& args) {
   c.flag("--stats", run.statistics, "Print a table of stages at the end: runs, cache hits, seconds");
   c.flag("-q,--quiet", args.quiet, "Print only warnings and errors");
   c.flag("-v,--verbose", run.verbose, "Print every stage and note");
-  c.flag("--json", args.json, "Print one JSON event a line (schemas/event.v1.schema.json)");
+  c.flag("--json", args.json, "Print one JSON event on each line (schemas/event.v1.schema.json)");
   c.option("--summary", run.summary, "Write every model's result as JSON (schemas/summary.v1.schema.json)")
       .value_name("FILE");
   c.option("--junit", run.junit, "Write every model's result as JUnit XML").value_name("FILE");

@@ -96,8 +96,8 @@ void add_doctor_command(Command& app) {
       "  texmesh render scan.glb --what atlas -o atlas.png            the charts as a picture");
   c.notes(
       "An atlas is a texture with the charts that a surface is cut into. Every chart has borders that no "
-      "simplified mesh can give up: an atlas of thousands of charts puts a floor under every coarse mesh, "
-      "whoever makes it. docs/atlas.md explains the figures.\n"
+      "simplified mesh can give up. So no program makes a small coarse mesh of an atlas of thousands of "
+      "charts. docs/atlas.md explains the figures.\n"
       "A model without textures or texture coordinates has no atlas: doctor says so, and every limit is "
       "kept.\n"
       "Exit code: 0, 4 beyond a limit, 1 when the input cannot be read, 2 usage, 3 internal error.");

@@ -141,9 +141,8 @@ void add_export_command(Command& app) {
       "gltf-lod: all major scales from the finest on; levels share materials and textures.\n"
       "model-viewer: index.html, model.glb and the poster. Draco meshes make the script fetch a decoder from "
       "gstatic.com; with --plain it needs none.\n"
-      "oembed: a copy of the package, the viewer and oembed.json, to be put at --url. A package that is "
-      "named by "
-      "a URL stays there.\n"
+      "oembed: a copy of the package, the viewer and oembed.json, to be put at --url. If a URL names "
+      "the package, the package stays there.\n"
       "export.json in the folder lists what was written. The same package gives the same files.\n"
       "Exit code: 0, 1 when the package is damaged, the target cannot hold it (the message says why) or DIR "
       "cannot be written, 2 usage.");

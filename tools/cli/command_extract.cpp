@@ -176,8 +176,8 @@ void add_extract_command(Command& app) {
       "picture more get more bytes, and the file is filled up to the last 2 %. If a proxy looks better, "
       "extract takes it, and makes it smaller if needed. Many triangles with a small texture nearly always "
       "look better than the reverse.\n"
-      "Meshes stay Draco coded (KHR_draco_mesh_compression), a whole proxy's is coded by meshopt "
-      "(EXT_meshopt_compression), and WebP needs EXT_texture_webp. For programs without them use --plain.\n"
+      "Meshes of scales stay coded by Draco (KHR_draco_mesh_compression), those of whole proxies by meshopt "
+      "(EXT_meshopt_compression). WebP needs EXT_texture_webp. For programs without these use --plain.\n"
       "Exit code: 0, 1 when the package is damaged or the GLB cannot be written, 2 usage, 4 when no file "
       "between 98 % and 100 % of --bytes is possible: extract then writes the nearest file. A file that "
       "already holds everything in a package of JPEG sources is no failure.");

@@ -107,8 +107,8 @@ void add_list_command(Command& app) {
       "  texmesh list scans/ -o packages/                      what compile would make\n"
       "  texmesh list scans/ -o packages/ --shards 40 --json   for another engine");
   c.notes(
-      "For Snakemake (examples/snakemake), Nextflow, make: names of packages, the files that each model names, "
-      "and sizes. Nothing is compiled and no picture is opened.");
+      "list tells Snakemake (examples/snakemake), Nextflow or make the names of packages, the files that each "
+      "model names, and sizes. It compiles nothing and opens no picture.");
   c.on_run([args] { return as_usage([&] { return run_list(*args); }); });
 }
 
@@ -128,8 +128,8 @@ void add_summary_command(Command& app) {
   merge.option("--posters", args->posters, "Most posters on the page").integer_in(0, 100'000).shows_default();
   merge.examples("  texmesh summary merge report/*.json -o all.json --junit all.xml --html all.html");
   merge.notes(
-      "Summaries that are half-written, foreign (of another collection) or double, and shards without one, are "
-      "named.\n"
+      "merge names summaries that are half-written, foreign (of another collection) or double, and shards "
+      "without a summary.\n"
       "Exit code: as compile's for the models of all runs; 75 also where a shard is missing or half-written, 1 "
       "also where a summary is foreign.");
   merge.on_run([args] { return as_usage([&] { return run_merge(*args); }); });

@@ -202,7 +202,7 @@ void add_check_command(Command& app) {
       .integer_in(1, 64)
       .shows_default();
   c.option("--max-texture-flip", args->gate.max_texture_flip,
-           "Most predicted FLIP by the textures alone, on the finest scale")
+           "Largest predicted FLIP by the textures alone, on the finest scale")
       .number_in(0, 1);
   c.option(
        "--max-first-picture",

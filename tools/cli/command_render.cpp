@@ -274,8 +274,8 @@ void add_render_command(Command& app) {
       "emission, alpha and vertex colours, in perspective, tone-mapped (Khronos PBR Neutral), 16 samples a "
       "pixel. Other extensions of materials are not rendered; a warning names them.\n"
       "--what: colours run from dark violet (low) over teal to yellow (high); the legend on standard output gives "
-      "their values. A GLB holds the colours as vertex colours, those of fragments and atlas as textures. Of a model "
-      "the stages that are needed run, through the cache.\n"
+      "their values. A GLB holds the colours as vertex colours, those of fragments and atlas as textures. For a "
+      "model, render runs the stages that it needs, through the cache.\n"
       "The same input gives the same bytes on every machine.\n"
       "Exit code: 0, 1 when the input cannot be shown or the picture not be written, 2 usage, 3 internal "
       "error.");

@@ -42,7 +42,7 @@ void add_simulate_command(Command& app) {
       "  texmesh simulate bust.texmesh --time 5 --trace monday.csv --plot monday.svg\n"
       "  texmesh simulate bust.texmesh --bandwidth 2Mbit/s --mirror 1Mbit/s --mirror 500kbit/s");
   c.notes(
-      "The deviation is of the time limit: positive when the transfer ended early.\n"
+      "The deviation is a share of the time limit. It is positive when the transfer ended early.\n"
       "Exit code: 0, 1 when the package or the trace cannot be read, 2 usage.");
   c.on_run([args] { return run_simulate(*args); });
 }

@@ -58,13 +58,11 @@ void add_site_command(Command& app) {
       "  texmesh site packages/ -o www/\n"
       "  texmesh site packages/ -o www/ --title \"Casts\" --packages-url https://files.museum.example/casts/");
   c.notes(
-      "A list with posters, creators, licences and sizes that can be searched, and a page for each object, "
-      "which "
-      "loads the viewer when somebody wants to see it in 3D. Static files for any web server, also in a "
-      "folder "
-      "of it; they ask no other server for anything but packages at --packages-url. That server must allow "
-      "pages of others to read ranges (CORS). From files, without a server, browsers show the list but no "
-      "objects in 3D.\n"
+      "The site has a list with posters, creators, licences and sizes, which visitors can search. Each object "
+      "has a page, which loads the viewer when somebody asks for it. The files are static: any web server "
+      "can serve them from any folder. They ask other servers for packages at --packages-url alone. That "
+      "server must allow pages of others to read ranges (CORS). If you open the files without a server, "
+      "browsers show the list but no object in 3D.\n"
       "If a package cannot be read, site leaves it out and says so.\n"
       "Exit code: 0, 1 when a package could not be read (the site has the others) or DIR not be written, "
       "2 usage.");
