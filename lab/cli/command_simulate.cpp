@@ -590,8 +590,8 @@ void add_lab_simulate_command(Command& app) {
       "  texmesh-lab simulate bust.texmesh --bandwidth 2Mbit/s --loss 0.05 --no-repeat --picture lost.png\n"
       "  texmesh-lab simulate --table 4.2 --json");
   c.notes(
-      "The deviation is of the time limit: positive when the transfer ended early. --table and --theorem play the "
-      "method itself and take --order, --seeds and the form of the output only.\n"
+      "The deviation is a share of the time limit. It is positive when the transfer ended early. --table and "
+      "--theorem play the method itself and take --order, --seeds and the form of the output only.\n"
       "Exit code: 0, 1 when the package or the trace cannot be read, 2 usage.");
 }
 

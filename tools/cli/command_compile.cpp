@@ -254,7 +254,7 @@ void add_report_options(Command& c, CompileArguments& args) {
   c.flag("--stats", run.statistics, "Print a table of stages at the end: runs, cache hits, seconds");
   c.flag("-q,--quiet", args.quiet, "Print only warnings and errors");
   c.flag("-v,--verbose", run.verbose, "Print every stage and note");
-  c.flag("--json", args.json, "Print one JSON event a line (schemas/event.v1.schema.json)");
+  c.flag("--json", args.json, "Print one JSON event on each line (schemas/event.v1.schema.json)");
   c.option("--summary", run.summary, "Write every model's result as JSON (schemas/summary.v1.schema.json)",
            "FILE");
   c.option("--junit", run.junit, "Write every model's result as JUnit XML", "FILE");
@@ -534,8 +534,8 @@ void add_list_command(Command& app) {
       "  texmesh list scans/ -o packages/                      what compile would make\n"
       "  texmesh list scans/ -o packages/ --shards 40 --json   for another engine");
   c.notes(
-      "For Snakemake (examples/snakemake), Nextflow, make: names of packages, the files that each model names, "
-      "and sizes. Nothing is compiled and no picture is opened.");
+      "list tells Snakemake (examples/snakemake), Nextflow or make the names of packages, the files that each "
+      "model names, and sizes. It compiles nothing and opens no picture.");
   c.on_run([args] { return as_usage([&] { return run_list(*args); }); });
 }
 
@@ -554,8 +554,8 @@ void add_summary_command(Command& app) {
   merge.option("--posters", args->posters, "Most posters on the page").integer_in(0, 100'000).shows_default();
   merge.examples("  texmesh summary merge report/*.json -o all.json --junit all.xml --html all.html");
   merge.notes(
-      "Summaries that are half-written, foreign (of another collection) or double, and shards without one, are "
-      "named.\n"
+      "merge names summaries that are half-written, foreign (of another collection) or double, and shards "
+      "without a summary.\n"
       "Exit code: as compile's for the models of all runs; 75 also where a shard is missing or half-written, 1 "
       "also where a summary is foreign.");
   merge.on_run([args] { return as_usage([&] { return run_merge(*args); }); });

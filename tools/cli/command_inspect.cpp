@@ -535,8 +535,8 @@ void add_doctor_command(Command& app) {
       "  texmesh render scan.glb --what atlas -o atlas.png            the charts as a picture");
   c.notes(
       "An atlas is a texture with the charts that a surface is cut into. Every chart has borders that no "
-      "simplified mesh can give up: an atlas of thousands of charts puts a floor under every coarse mesh, "
-      "whoever makes it. docs/atlas.md explains the figures.\n"
+      "simplified mesh can give up. So no program makes a small coarse mesh of an atlas of thousands of "
+      "charts. docs/atlas.md explains the figures.\n"
       "A model without textures or texture coordinates has no atlas: doctor says so, and every limit is "
       "kept.\n"
       "Exit code: 0, 4 beyond a limit, 1 when the input cannot be read, 2 usage, 3 internal error.");
@@ -557,8 +557,8 @@ void add_render_command(Command& app) {
       "emission, alpha and vertex colours, in perspective, tone-mapped (Khronos PBR Neutral), 16 samples a "
       "pixel. Other extensions of materials are not rendered; a warning names them.\n"
       "--what: colours run from dark violet (low) over teal to yellow (high); the legend on standard output gives "
-      "their values. A GLB holds the colours as vertex colours, those of fragments and atlas as textures. Of a model "
-      "the stages that are needed run, through the cache.\n"
+      "their values. A GLB holds the colours as vertex colours, those of fragments and atlas as textures. For a "
+      "model, render runs the stages that it needs, through the cache.\n"
       "The same input gives the same bytes on every machine.\n"
       "Exit code: 0, 1 when the input cannot be shown or the picture not be written, 2 usage, 3 internal "
       "error.");

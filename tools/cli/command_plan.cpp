@@ -266,7 +266,7 @@ void add_check_command(Command& app) {
       .integer_in(1, 64)
       .shows_default();
   c.option("--max-texture-flip", args.gate.max_texture_flip,
-           "Most predicted FLIP by the textures alone, on the finest scale")
+           "Largest predicted FLIP by the textures alone, on the finest scale")
       .number_in(0, 1);
   c.option("--max-first-picture", args.gate.max_first_picture_s, parse_duration,
            "Latest time of the first picture: 1s, 800ms", "TIME");
@@ -291,7 +291,7 @@ void add_simulate_command(Command& app) {
       "  texmesh simulate bust.texmesh --time 5 --trace monday.csv --plot monday.svg\n"
       "  texmesh simulate bust.texmesh --bandwidth 2Mbit/s --mirror 1Mbit/s --mirror 500kbit/s");
   c.notes(
-      "The deviation is of the time limit: positive when the transfer ended early.\n"
+      "The deviation is a share of the time limit. It is positive when the transfer ended early.\n"
       "Exit code: 0, 1 when the package or the trace cannot be read, 2 usage.");
 }
 

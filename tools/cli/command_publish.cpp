@@ -450,9 +450,8 @@ void add_export_command(Command& app) {
       "gltf-lod: all major scales from the finest on; levels share materials and textures.\n"
       "model-viewer: index.html, model.glb and the poster. Draco meshes make the script fetch a decoder from "
       "gstatic.com; with --plain it needs none.\n"
-      "oembed: a copy of the package, the viewer and oembed.json, to be put at --url. A package that is "
-      "named by "
-      "a URL stays there.\n"
+      "oembed: a copy of the package, the viewer and oembed.json, to be put at --url. If a URL names "
+      "the package, the package stays there.\n"
       "export.json in the folder lists what was written. The same package gives the same files.\n"
       "Exit code: 0, 1 when the package is damaged, the target cannot hold it (the message says why) or DIR "
       "cannot be written, 2 usage.");
@@ -480,13 +479,11 @@ void add_site_command(Command& app) {
       "  texmesh site packages/ -o www/\n"
       "  texmesh site packages/ -o www/ --title \"Casts\" --packages-url https://files.museum.example/casts/");
   c.notes(
-      "A list with posters, creators, licences and sizes that can be searched, and a page for each object, "
-      "which "
-      "loads the viewer when somebody wants to see it in 3D. Static files for any web server, also in a "
-      "folder "
-      "of it; they ask no other server for anything but packages at --packages-url. That server must allow "
-      "pages of others to read ranges (CORS). From files, without a server, browsers show the list but no "
-      "objects in 3D.\n"
+      "The site has a list with posters, creators, licences and sizes, which visitors can search. Each object "
+      "has a page, which loads the viewer when somebody asks for it. The files are static: any web server "
+      "can serve them from any folder. They ask other servers for packages at --packages-url alone. That "
+      "server must allow pages of others to read ranges (CORS). If you open the files without a server, "
+      "browsers show the list but no object in 3D.\n"
       "If a package cannot be read, site leaves it out and says so.\n"
       "Exit code: 0, 1 when a package could not be read (the site has the others) or DIR not be written, "
       "2 usage.");
@@ -508,8 +505,8 @@ void add_extract_command(Command& app) {
       "picture more get more bytes, and the file is filled up to the last 2 %. If a proxy looks better, "
       "extract takes it, and makes it smaller if needed. Many triangles with a small texture nearly always "
       "look better than the reverse.\n"
-      "Meshes stay Draco coded (KHR_draco_mesh_compression), a whole proxy's is coded by meshopt "
-      "(EXT_meshopt_compression), and WebP needs EXT_texture_webp. For programs without them use --plain.\n"
+      "Meshes of scales stay coded by Draco (KHR_draco_mesh_compression), those of whole proxies by meshopt "
+      "(EXT_meshopt_compression). WebP needs EXT_texture_webp. For programs without these use --plain.\n"
       "Exit code: 0, 1 when the package is damaged or the GLB cannot be written, 2 usage, 4 when no file "
       "between 98 % and 100 % of --bytes is possible: extract then writes the nearest file. A file that "
       "already holds everything in a package of JPEG sources is no failure.");

@@ -6,16 +6,14 @@ import { splitBelow, splitLongest, splitPrior, splitSteps, splitValueLimit } fro
 export class BitModels {
   readonly p: Uint16Array;
   readonly seen: Uint8Array;
-  constructor(
-    count: number,
-    readonly limit: number,
-  ) {
+  constructor(count: number, readonly limit: number) {
     this.p = new Uint16Array(count).fill(0x8000);
     this.seen = new Uint8Array(count);
   }
 }
 
-const weights = /* @__PURE__ */ Uint32Array.from({ length: 256 }, (_, seen) => Math.floor(65535 / (seen + 2)));
+const weights =
+  Uint32Array.from({ length: 256 }, (_, seen) => Math.floor(65535 / (seen + 2)));
 
 /** Decodes bits; behind the end of the bytes are zeros. */
 export class BitDecoder {
