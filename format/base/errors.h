@@ -1,8 +1,6 @@
 #pragma once
 #include <stdexcept>
 #include <string>
-#include <string_view>
-#include <utility>
 
 namespace texmesh {
 
@@ -11,12 +9,7 @@ namespace texmesh {
 /// /accessors/3/count: expected <= 100000, found 2147483648`.
 class Error : public std::runtime_error {
  public:
-  Error(std::string file, std::string place, std::string expected, std::string found)
-      : std::runtime_error(join(file, place, expected, found)),
-        file_(std::move(file)),
-        place_(std::move(place)),
-        expected_(std::move(expected)),
-        found_(std::move(found)) {}
+  Error(std::string file, std::string place, std::string expected, std::string found);
 
   const std::string& file() const { return file_; }
   const std::string& place() const { return place_; }
@@ -24,20 +17,6 @@ class Error : public std::runtime_error {
   const std::string& found() const { return found_; }
 
  private:
-  static std::string join(std::string_view file, std::string_view place, std::string_view expected,
-                          std::string_view found) {
-    std::string s;
-    auto add = [&s](std::string_view separator, std::string_view prefix, std::string_view text) {
-      if (text.empty()) return;
-      if (!s.empty()) s += separator;
-      s.append(prefix).append(text);
-    };
-    add(": ", "", file);
-    add(": ", "", place);
-    add(": ", "expected ", expected);
-    add(expected.empty() ? ": " : ", ", "found ", found);
-    return s;
-  }
   std::string file_, place_, expected_, found_;
 };
 

@@ -49,9 +49,10 @@ struct FieldCollector {
   std::set<std::string>& set_by_user;
   std::vector<OptionField>& out;
 
-  /// `rest`: a Range or none, ProfileOnly or not, the help.
+  /// `rest`: a Range or none, ProfileOnly or not, the help. By value: a reference to a text has the text's
+  /// length in its type, and each field would be compiled on its own.
   template <class T, class... Rest>
-  void operator()(const char* name, T& value, const Rest&... rest) {
+  void operator()(const char* name, T& value, Rest... rest) {
     OptionField field;
     field.stage = stage, field.name = name, field.kind = kind_of<T>(), field.set_by_user = &set_by_user;
     (take(field, rest), ...);
@@ -116,6 +117,12 @@ struct JndProfile {
   }
 };
 
+/// Whether `part` is `candidate` itself.
+template <class T>
+bool is_same_object(const T& candidate, const void* part, const std::type_info& type) {
+  return &candidate == part && typeid(T) == type;
+}
+
 }  // namespace
 
 CompileOptions resolve_options(CompileOptions o) {
@@ -165,6 +172,20 @@ std::vector<OptionField> list_options(CompileOptions& options) {
     std::remove_reference_t<decltype(section)>::fields(section, collect);
   });
   return fields;
+}
+
+std::string option_name(const CompileOptions& all, const void* part, const std::type_info& type) {
+  std::string found;
+  CompileOptions::sections(all, [&](const std::string& name, const auto& section) {
+    if (is_same_object(section, part, type)) found = name;
+    std::remove_cvref_t<decltype(section)>::fields(section,
+                                                   [&](const char* field, const auto& value, auto...) {
+                                                     if (is_same_object(value, part, type))
+                                                       found = name + "." + field;
+                                                   });
+  });
+  if (found.empty()) throw std::logic_error("not an option");
+  return found;
 }
 
 OptionField* find_option(std::vector<OptionField>& fields, std::string_view path) {

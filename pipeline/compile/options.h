@@ -106,25 +106,11 @@ void set_option_json(OptionField& field, const Json& json, const std::string& fi
 void set_option(OptionField& field, const std::string& text, const std::string& source);
 
 /// The name of a part of `all`: "ssf" of a section, "ladder.mode" of a field. Throws std::logic_error for
-/// what is no part of it.
+/// what is no part of it. The type tells a section from its first field, which stands at the same place.
+std::string option_name(const CompileOptions& all, const void* part, const std::type_info& type);
 template <class T>
 std::string option_name(const CompileOptions& all, const T& part) {
-  const auto is_part = [&part](const auto& candidate) {
-    if constexpr (std::is_same_v<std::remove_cvref_t<decltype(candidate)>, T>)
-      return &candidate == &part;
-    else
-      return false;
-  };
-  std::string found;
-  CompileOptions::sections(all, [&](const std::string& name, const auto& section) {
-    if (is_part(section)) found = name;
-    std::remove_cvref_t<decltype(section)>::fields(section,
-                                                   [&](const char* field, const auto& value, auto&&...) {
-                                                     if (is_part(value)) found = name + "." + field;
-                                                   });
-  });
-  if (found.empty()) throw std::logic_error("not an option");
-  return found;
+  return option_name(all, &part, typeid(T));
 }
 
 /// Declares what a stage reads of `all`: whole sections or single fields, as they stand there.

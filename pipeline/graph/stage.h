@@ -22,7 +22,7 @@ using OptionTexts = std::vector<std::pair<std::string, std::string>>;
 /// Adds the texts of every field of an options struct, labelled "section.field".
 template <class T>
 void append_field_texts(const std::string& section, const T& value, OptionTexts& texts) {
-  T::fields(value, [&](const char* field, const auto& v, const auto&...) {
+  T::fields(value, [&](const char* field, const auto& v, auto...) {
     texts.emplace_back(section + "." + field, option_text(v));
   });
 }
