@@ -131,7 +131,7 @@ class BitDecoder {
 /// relative to a running mean of lengths, then the two bits below the leading one, then the rest raw.
 struct ValueModels {
   static constexpr int kSteps = 20, kBelow = 12;
-  static constexpr std::uint8_t kLimit = 60, kPrior = 24;  // a stream's models count as so many symbols seen
+  static constexpr std::uint8_t kValueLimit = 60, kPrior = 24;  // a stream's models count as so many symbols seen
   static constexpr std::size_t kCount = 4 * kSteps + 3 * kBelow + 1;
   std::array<BitModel, kCount> all;
   BitModel& longer(int quarter, int step) { return all[static_cast<std::size_t>(quarter * kSteps + step)]; }
@@ -323,7 +323,7 @@ class SplitValueCodec {
 
 /// Probabilities of the connectivity part; they go on learning through the whole stream.
 struct SplitModels {
-  static constexpr std::uint8_t kLimit = 200;
+  static constexpr std::uint8_t kModelLimit = 200;
   static constexpr int kDegrees = 14, kAsks = 4, kLeft = 12, kRun = 7, kRing = 8, kValence = 5;
   using Pair = std::array<BitModel, 2>;
   using PerValence = std::array<BitModel, kValence>;

@@ -148,7 +148,7 @@ class PartDecoder {
   bool same() { return present_ && residuals_.same(*this, false); }
 
   // What ResidualCodec asks of its bits:
-  bool bit(BitModel& model, bool) { return bits_.decode(model, ValueModels::kLimit); }
+  bool bit(BitModel& model, bool) { return bits_.decode(model, ValueModels::kValueLimit); }
   std::uint32_t raw(std::uint32_t, int count) { return bits_.decode_raw(count); }
 
  private:
@@ -166,7 +166,7 @@ class DecodingChannel {
     connectivity_ = BitDecoder(parts[0]);
     for (std::size_t i = 0; i < parts_.size(); ++i) parts_[i].start(parts[i + 1], head_.models[i]);
   }
-  bool bit(BitModel& model, auto&&) { return connectivity_.decode(model, SplitModels::kLimit); }
+  bool bit(BitModel& model, auto&&) { return connectivity_.decode(model, SplitModels::kModelLimit); }
   std::uint32_t raw(int count, auto&&) { return connectivity_.decode_raw(count); }
   void update_truth(auto&&) {}
   void point(SplitMesh::Point& point, const SplitMesh::Point& guess, auto&&) {

@@ -395,7 +395,7 @@ struct CountingBits {
 struct CodingBits {
   BitEncoder encoder;
   bool bit(BitModel& model, bool value) {
-    encoder.encode(model, value, ValueModels::kLimit);
+    encoder.encode(model, value, ValueModels::kValueLimit);
     return value;
   }
   std::uint32_t raw(std::uint32_t value, int count) {
@@ -480,7 +480,7 @@ class EncodingChannel {
 
   bool bit(BitModel& model, auto&& truth) {
     const bool value = truth(truth_);
-    bits_.encode(model, value, SplitModels::kLimit);
+    bits_.encode(model, value, SplitModels::kModelLimit);
     return value;
   }
   std::uint32_t raw(int count, auto&& truth) {

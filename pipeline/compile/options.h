@@ -1,5 +1,6 @@
 #pragma once
 #include <set>
+#include <typeinfo>
 
 #include "pipeline/graph/stage.h"
 #include "pipeline/import/import.h"

@@ -11,6 +11,7 @@ import { readQuality } from '../src/format/quality_table';
 import { parseTablesSection, readTablesHead } from '../src/format/read_tables';
 import { SplitStreamReader } from '../src/format/splits/split_stream';
 import { readTextures } from '../src/format/textures';
+import { parseThesis } from '../src/format/thesis_tables';
 import { FormatError, manifestOfContainer, PackageReader, readManifest } from '../src/reader';
 import { golden, goldenSet } from './support/files';
 import { readAll } from './support/read_all';
@@ -88,6 +89,10 @@ const readers: Reader[] = [
   { name: 'textures', inputs: entries(/^textures\.json$/), targets: ['textures'], read: readTextures },
   { name: 'quality', inputs: entries(/^quality\.json$/), targets: ['quality'], read: readQuality },
   { name: 'about', inputs: entries(/^about\.json$/), targets: ['about'], read: readAbout },
+  {
+    name: 'thesis', inputs: entries(/^thesis\.bin$/), targets: ['thesis'],
+    read: (b) => parseThesis(b, first.manifest, first.textures),
+  },
   {
     name: 'index', inputs: indexes, targets: ['index'],
     read: (b) => {

@@ -48,6 +48,11 @@ export const maxQualityBytes = 2 ** 22;
 export const maxQualitySizes = 8;
 export const maxQualitySamples = 100;
 export const maxAboutBytes = 262144;
+/** Values of Gamma that tables hold sizes for: 0, 0.05 .. 1. */
+export const gammaSteps = 21;
+/** Most scales of a chain, S_0 among them. */
+export const mostChainScales = 100;
+export const mostTotalBytes = 2 ** 53;
 /** The stream's own version, which may stay while that of packages moves. */
 export const splitStreamMajor = 2;
 export const mostSplits = 4096; // of a block

@@ -1,14 +1,16 @@
 import { requireSelfContained } from '../../src/format/glb';
 import { SplitStreamReader } from '../../src/format/splits/split_stream';
 import { PackageReader } from '../../src/reader';
+import { readThesis } from '../../src/thesis';
 
-/** Reads all that a client may read of a package, no thesis.bin; gives the mesh at the end of the stream. */
+/** Reads all that a client may read of a package; gives the mesh at the end of the stream. */
 export async function readAll(bytes: Uint8Array): Promise<SplitStreamReader | undefined> {
   const reader = await PackageReader.openBytes(bytes, 'package');
   await reader.find('about.json');
   await reader.index();
   await reader.quality();
   await reader.about();
+  await readThesis(reader);
   const coarsest = reader.manifest.scales.at(-1)!.scale;
   for (const { scale, glb } of reader.manifest.scales) if (glb.path.endsWith('.glb'))
     requireSelfContained(await reader.scaleGlb(scale), scale !== coarsest);
