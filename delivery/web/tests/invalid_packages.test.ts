@@ -7,7 +7,8 @@ import { FormatError } from '../src/reader';
 import { golden, root } from './support/files';
 import { readAll } from './support/read_all';
 
-// Packages that break one rule of format/SPEC.md each. A client sees what it reads: documents, fragments, the stream.
+// Packages that break one rule of format/SPEC.md each. A client sees what it reads: documents, fragments, the
+// stream.
 const ofClients =
   /^([IRXTQS]\d\d|B0[12]|F0[3567]|F24|G0[156]|G13|J0[1347]|K1[12]|M0[1235]|O0[45]|M1[0189]|M2[134]|W0[356])-/;
 const ofCheckers = [

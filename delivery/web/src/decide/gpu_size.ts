@@ -1,7 +1,8 @@
 import type { ManifestProxy, ManifestScale } from '../format/manifest';
 import { proxyTextures, triangleBytes, vertexBytes } from '../format/shared_numbers';
 
-// What choices take on the GPU, from manifest and textures.json alone: delivery/cpp/decide/texture_budget.cpp.
+// What choices take on the GPU, from manifest and textures.json alone:
+// delivery/cpp/decide/texture_budget.cpp.
 
 const levelsOf = (widthPx: number, heightPx: number): number => 32 - Math.clz32(Math.max(widthPx, heightPx));
 /**
