@@ -1,6 +1,7 @@
 // texmesh-lab picture: what stages of the method computed.
 #include <fmt/format.h>
 
+#include "format/container/layout.h"
 #include "lab/cli/commands.h"
 #include "pipeline/compile/stage_table.h"
 #include "pipeline/io/table.h"

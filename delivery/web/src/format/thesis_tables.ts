@@ -140,7 +140,8 @@ function readPerceptual(input: BytesIn, minor: number, manifest: Manifest): Perc
   for (const s of manifest.scales)
     if (!scale.includes(s.scale)) input.fail(`scale ${s.scale}`, 'none', 'R16');
   return {
-    scale, triangles, collapses, average, largest, least, deviation, p95, chainAverage, chainLargest, chainLeast,
+    scale, triangles, collapses, average, largest, least, deviation, p95,
+    chainAverage, chainLargest, chainLeast,
   };
 }
 
