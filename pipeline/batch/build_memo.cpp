@@ -208,13 +208,12 @@ void JobSelection::recall(const PackageMemo& memo, WorkerReport& r) {
 void JobSelection::add_job(std::size_t i, bool remembered) {
   const PlannedModel& m = plan_.models[i];
   PackageMemo& memo = memos_[i];
-  WorkerJob job{.input = m.input,
-                .output = m.output,
-                .profile = m.profile,
-                .cache = settings_.cache,
-                .strict = settings_.strict,
-                .explain = settings_.explain,
-                .forecast = settings_.dry_run};
+  WorkerJob job;
+  std::tie(job.input, job.output, job.profile, job.cache) =
+      std::tie(m.input, m.output, m.profile, settings_.cache);
+  job.strict = settings_.strict;
+  job.explain = settings_.explain;
+  job.forecast = settings_.dry_run;
   if (remembered) {
     for (FileRequest& f : memo.files)
       if (f.found && f.stamp.is_settled(memo.looked_at_ns)) job.known.push_back(std::move(f));
