@@ -284,8 +284,8 @@ void add_compile_options(Command& c, CompileArguments& args) {
       .required();
   c.option(
       "--profile", args.profile,
-      "small = few bytes, archive = loses nothing, fast = little time, thesis = as printed; or a JSON file "
-      "of "
+      "small = few bytes, archive = loses nothing, fast = little time, thesis = as printed; or a JSON "
+      "file of "
       "options. Flags win",
       "NAME");
   c.option(
@@ -550,8 +550,8 @@ void add_summary_command(Command& app) {
   merge.option("--posters", args->posters, "Most posters on the page").integer_in(0, 100'000).shows_default();
   merge.examples("  texmesh summary merge report/*.json -o all.json --junit all.xml --html all.html");
   merge.notes(
-      "Summaries that are half-written, foreign (of another collection) or double, and shards without one, are "
-      "named.\n"
+      "Summaries that are half-written, foreign (of another collection) or double, and shards without "
+      "one, are named.\n"
       "Exit code: as compile's for the models of all runs; 75 also where a shard is missing or half-written, 1 "
       "also where a summary is foreign.");
   merge.on_run([args] { return as_usage([&] { return run_merge(*args); }); });

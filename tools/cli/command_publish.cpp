@@ -85,7 +85,7 @@ struct ReportArguments {
 };
 
 int run_report(const ReportArguments& args) {
-  check_report_folder(args.folder);  // not after the work
+  NewFolder(args.folder, report_folder_rule());  // not after the work
   PackageReader package(open_store(args.package));
   const Report report = make_report(package, args.options, context_of(args.jobs));
   write_report(report, args.folder);
@@ -137,7 +137,7 @@ ExportOptions export_options_of(const ExportArguments& a) {
 
 int run_export(const ExportArguments& args) {
   const ExportOptions options = export_options_of(args);
-  check_export_folder(args.folder);  // not after the work
+  NewFolder(args.folder, export_folder_rule());  // not after the work
   PackageReader package(open_store(args.package));
   PercentLine progress("export");
   RunContext context = context_of(args.jobs);
@@ -209,14 +209,15 @@ int run_site(SiteArguments& args) {
     throw UsageError("--packages-url", "", "an http or https URL", options.packages_url);
   if (!options.packages_url.empty() && !options.packages_url.ends_with("/")) options.packages_url += "/";
   options.viewer = viewer_folder(args.viewer);
-  check_site_folder(args.folder);  // not after the work
+  NewFolder(args.folder, site_folder_rule());  // not after the work
   const Site site = read_site(args.packages, options);
   for (const SiteFault& f : site.faults) std::cerr << "texmesh: " << printable(f.message) << '\n';
   write_site(site, args.folder);
+  const std::string page = (std::filesystem::path(args.folder) / "index.html").string();
   if (args.json)
-    std::cout << to_json_line(site_report(site, args.folder)) << '\n';
+    std::cout << to_json_line(SiteReport{page, site.objects, site.faults}) << '\n';
   else
-    std::cout << (std::filesystem::path(args.folder) / "index.html").string() << ", " << site.objects.size()
+    std::cout << page << ", " << site.objects.size()
               << (site.objects.size() == 1 ? " object\n" : " objects\n");
   return site.faults.empty() ? kExitOk : kExitModelFailed;
 }
@@ -326,9 +327,10 @@ void add_extract_options(Command& c, ExtractArguments& args) {
       c.option("--scale", args.scale,
                "This scale (texmesh dump lists the scales); default: the scale that suits --display")
           .integer_in(0, 99);
-  c.option("--proxy", args.proxy,
-           "This proxy, a small file with an atlas of its own (texmesh dump lists them), as it is: 0 = the "
-           "smallest")
+  c.option(
+       "--proxy", args.proxy,
+       "This proxy, a small file with an atlas of its own (texmesh dump lists them), as it is: 0 = the "
+       "smallest")
       .integer_in(0, kMaxPackageProxies - 1)
       .excludes(bytes)
       .excludes(scale);
@@ -465,8 +467,8 @@ void add_site_command(Command& app) {
       .required();
   c.option(
        "-o,--output", args.folder,
-       "The folder to make, with index.html in it. An earlier site is replaced; any other folder with files "
-       "is refused",
+       "The folder to make, with index.html in it. An earlier site is replaced; any other folder with "
+       "files is refused",
        "DIR")
       .required();
   c.option("--title", args.options.title, "Title of the collection", "TEXT").shows_default();
@@ -480,8 +482,8 @@ void add_site_command(Command& app) {
       "  texmesh site packages/ -o www/\n"
       "  texmesh site packages/ -o www/ --title \"Casts\" --packages-url https://files.museum.example/casts/");
   c.notes(
-      "A list with posters, creators, licences and sizes that can be searched, and a page for each object, "
-      "which "
+      "A list with posters, creators, licences and sizes that can be searched, and a page for each "
+      "object, which "
       "loads the viewer when somebody wants to see it in 3D. Static files for any web server, also in a "
       "folder "
       "of it; they ask no other server for anything but packages at --packages-url. That server must allow "
