@@ -274,8 +274,8 @@ void simulate_lost_packets(const SimulateArguments& a, DeliveryRequest request) 
           "lost packets are not sent again, as over UDP; HTTP loses none. Of {} points and {} fragments:\n",
           grouped(whole.points().size()), grouped(fragments)),
       "lost points stand where their texture coordinates lie among their neighbours' (chapter 10), or at the mean "
-      "of these;\nlost fragments show their preview. FLIP is predicted of the textures; it does not see the "
-      "points\n");
+      "of these;\nlost fragments show their preview. FLIP is predicted of the textures; it does not see "
+      "the points\n");
 }
 
 // ---- several objects
@@ -553,10 +553,9 @@ void add_play_options(Command& c, SimulateArguments& a) {
       "--beside", a.beside,
       "Another package that shares link and time limit, and its displayed height in px; may be given again",
       "PKG[,PX]");
-  c.flag(
-       "--no-repeat", a.no_repeat,
-       "Packets of --loss are not sent again: a table of what that costs mesh and textures (HTTP sends them "
-       "again)")
+  c.flag("--no-repeat", a.no_repeat,
+         "Packets of --loss are not sent again: a table of what that costs mesh and textures (HTTP sends "
+         "them again)")
       .excludes(beside);
   c.option("--picture", a.picture,
            "With --no-repeat: a PNG of the mesh as it should be, with lost points at the mean of their "

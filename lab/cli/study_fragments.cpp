@@ -171,7 +171,14 @@ int study_fragments_of(const FragmentArguments& args) {
   return kExitOk;
 }
 
-void add_fragment_options(Command& c, FragmentArguments& args) {
+}  // namespace
+
+void add_fragments_study(Command& study) {
+  auto [c, args] =
+      study.add("fragments",
+                "Does cutting a texture cost bytes? The sum of its fragments against one file (Table "
+                "3.1, Figs. 3.5-3.8)",
+                study_fragments_of);
   c.option("IMAGES", args.images, "JPEG, PNG, TIFF, WebP or EXR images").required();
   c.option("--grids", args.grids, "Fragments in a row and a column: 16 cuts into 16 x 16")
       .separated_by(',')
@@ -190,17 +197,6 @@ void add_fragment_options(Command& c, FragmentArguments& args) {
   c.option("--csv", args.csv, "Write the figures, in bytes, to this file as well", "FILE");
   add_jobs_option(c, args.jobs);
   c.flag("--json", args.json, "Print one JSON object");
-}
-
-}  // namespace
-
-void add_fragments_study(Command& study) {
-  auto [c, args] =
-      study.add("fragments",
-                "Does cutting a texture cost bytes? The sum of its fragments against one file (Table "
-                "3.1, Figs. 3.5-3.8)",
-                study_fragments_of);
-  add_fragment_options(c, args);
   c.examples(
       "  texmesh-lab study fragments atlas.jpg\n"
       "  texmesh-lab study fragments *.jpg --grids 4,8,16 --qualities 20,60,90 --csv figures.csv");

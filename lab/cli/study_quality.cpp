@@ -99,7 +99,14 @@ int study_quality_of(const QualityArguments& args) {
   return kExitOk;
 }
 
-void add_quality_options(Command& c, QualityArguments& args) {
+}  // namespace
+
+void add_quality_study(Command& study) {
+  auto [c, args] =
+      study.add("quality",
+                "Is variable texture quality better than one for all, within the same bytes? Rendered "
+                "and scored (Fig. 3.9)",
+                study_quality_of);
   AllocationStudyOptions& options = args.options;
   c.option("MODEL", args.model, "A textured model; runs the stages that are needed, through the cache")
       .required();
@@ -121,17 +128,6 @@ void add_quality_options(Command& c, QualityArguments& args) {
   add_jobs_option(c, args.jobs);
   add_cache_options(c, args.cache);
   c.flag("--json", args.json, "Print one JSON object");
-}
-
-}  // namespace
-
-void add_quality_study(Command& study) {
-  auto [c, args] =
-      study.add("quality",
-                "Is variable texture quality better than one for all, within the same bytes? Rendered "
-                "and scored (Fig. 3.9)",
-                study_quality_of);
-  add_quality_options(c, args);
   c.examples(
       "  texmesh-lab study quality turtle.glb -o turtle.png\n"
       "  texmesh-lab study quality bust.obj --quality 30 --views 12 --json");

@@ -5,7 +5,6 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/io/atomic_file.h"
-#include "pipeline/io/table.h"
 #include "stages/image/png_writer.h"
 #include "tools/cli/check/check_gate.h"
 #include "tools/cli/commands.h"
@@ -164,35 +163,32 @@ int run_doctor(const DoctorArguments& args) {
 }
 
 void add_limits(Command& c, AtlasLimits& limits) {
+  const struct {
+    const char* name;
+    std::optional<double>& limit;
+    double least, most;
+    const char* help;
+  } all[] = {
+      {"--max-charts", limits.max_charts, 0, 1e9,
+       "Largest number of charts of the model. Some 20 to 300 are usual for a scan that was unwrapped "
+       "with care"},
+      {"--max-floor", limits.max_floor_triangles, 0, 1e9,
+       "Largest number of triangles that the coarsest mesh with all charts needs; 8 bytes each"},
+      {"--min-cover", limits.min_cover, 0, 1, "Least share of each texture that is shown, 0 to 1"},
+      {"--max-thin", limits.max_thin, 0, 1,
+       "Largest share of a texture's shown texels in charts thinner than 8 texels, 0 to 1"},
+      {"--max-overlap", limits.max_overlap, 0, 1,
+       "Largest share of the shown texels that two places of the surface show, 0 to 1"},
+      {"--max-flat", limits.max_flat, 0, 1,
+       "Largest share of the surface that has no area on the texture, 0 to 1"},
+      {"--max-density-spread", limits.max_density_spread, 1, 1e9,
+       "Largest ratio of texels per length between the finest and the coarsest twentieth of the surface"},
+      {"--max-stretch", limits.max_stretch, 1, 1e9,
+       "Largest ratio of a texel's length to its width, on 95 % of the surface; 1 = square everywhere"},
+      {"--max-seam-difference", limits.max_seam_difference, 0, 1000,
+       "Largest difference of colours across seams, in the mean (CIE 1976; 2.3 can just be seen)"}};
   c.group("Limits (exit code 4 beyond one)");
-  c.option(
-       "--max-charts", limits.max_charts,
-       "Largest number of charts of the model. Some 20 to 300 are usual for a scan that was unwrapped with "
-       "care")
-      .number_in(0, 1e9);
-  c.option("--max-floor", limits.max_floor_triangles,
-           "Largest number of triangles that the coarsest mesh with all charts needs; 8 bytes each")
-      .number_in(0, 1e9);
-  c.option("--min-cover", limits.min_cover, "Least share of each texture that is shown, 0 to 1")
-      .number_in(0, 1);
-  c.option("--max-thin", limits.max_thin,
-           "Largest share of a texture's shown texels in charts thinner than 8 texels, 0 to 1")
-      .number_in(0, 1);
-  c.option("--max-overlap", limits.max_overlap,
-           "Largest share of the shown texels that two places of the surface show, 0 to 1")
-      .number_in(0, 1);
-  c.option("--max-flat", limits.max_flat,
-           "Largest share of the surface that has no area on the texture, 0 to 1")
-      .number_in(0, 1);
-  c.option("--max-density-spread", limits.max_density_spread,
-           "Largest ratio of texels per length between the finest and the coarsest twentieth of the surface")
-      .number_in(1, 1e9);
-  c.option("--max-stretch", limits.max_stretch,
-           "Largest ratio of a texel's length to its width, on 95 % of the surface; 1 = square everywhere")
-      .number_in(1, 1e9);
-  c.option("--max-seam-difference", limits.max_seam_difference,
-           "Largest difference of colours across seams, in the mean (CIE 1976; 2.3 can just be seen)")
-      .number_in(0, 1000);
+  for (const auto& x : all) c.option(x.name, x.limit, x.help).number_in(x.least, x.most);
 }
 
 struct RenderArguments {

@@ -85,7 +85,7 @@ struct ReportArguments {
 };
 
 int run_report(const ReportArguments& args) {
-  check_report_folder(args.folder);  // not after the work
+  NewFolder(args.folder, report_folder_rule());  // not after the work
   PackageReader package(open_store(args.package));
   const Report report = make_report(package, args.options, context_of(args.jobs));
   write_report(report, args.folder);
@@ -137,7 +137,7 @@ ExportOptions export_options_of(const ExportArguments& a) {
 
 int run_export(const ExportArguments& args) {
   const ExportOptions options = export_options_of(args);
-  check_export_folder(args.folder);  // not after the work
+  NewFolder(args.folder, export_folder_rule());  // not after the work
   PackageReader package(open_store(args.package));
   PercentLine progress("export");
   RunContext context = context_of(args.jobs);
@@ -209,14 +209,15 @@ int run_site(SiteArguments& args) {
     throw UsageError("--packages-url", "", "an http or https URL", options.packages_url);
   if (!options.packages_url.empty() && !options.packages_url.ends_with("/")) options.packages_url += "/";
   options.viewer = viewer_folder(args.viewer);
-  check_site_folder(args.folder);  // not after the work
+  NewFolder(args.folder, site_folder_rule());  // not after the work
   const Site site = read_site(args.packages, options);
   for (const SiteFault& f : site.faults) std::cerr << "texmesh: " << printable(f.message) << '\n';
   write_site(site, args.folder);
+  const std::string page = (std::filesystem::path(args.folder) / "index.html").string();
   if (args.json)
-    std::cout << to_json_line(site_report(site, args.folder)) << '\n';
+    std::cout << to_json_line(SiteReport{page, site.objects, site.faults}) << '\n';
   else
-    std::cout << (std::filesystem::path(args.folder) / "index.html").string() << ", " << site.objects.size()
+    std::cout << page << ", " << site.objects.size()
               << (site.objects.size() == 1 ? " object\n" : " objects\n");
   return site.faults.empty() ? kExitOk : kExitModelFailed;
 }
@@ -462,11 +463,10 @@ void add_site_command(Command& app) {
       app.add("site", "Write a static site of a collection: posters, search, licences, a viewer", run_site);
   c.option("PACKAGES", args.packages, "A folder of packages, whose folders are looked into; or one package")
       .required();
-  c.option(
-       "-o,--output", args.folder,
-       "The folder to make, with index.html in it. An earlier site is replaced; any other folder with files "
-       "is refused",
-       "DIR")
+  c.option("-o,--output", args.folder,
+           "The folder to make, with index.html in it. An earlier site is replaced; any other folder with "
+           "files is refused",
+           "DIR")
       .required();
   c.option("--title", args.options.title, "Title of the collection", "TEXT").shows_default();
   c.option("--packages-url", args.options.packages_url,

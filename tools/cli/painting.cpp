@@ -13,17 +13,12 @@
 #include "tools/inspect/package_mesh.h"
 
 namespace texmesh {
-namespace {
-
-std::string hex(Srgb c) { return fmt::format("#{:02x}{:02x}{:02x}", c[0], c[1], c[2]); }
-
-}  // namespace
 
 template <>
 struct RecordFields<LegendStop> {
   static void fields(auto& s, auto&& v) {
     v("value", s.value, "");
-    v("colour", hex(s.colour), "");
+    v("colour", hex_of(s.colour), "");
   }
 };
 
@@ -85,7 +80,7 @@ void print_legend(const Painting& p, const ColourLegend& legend, const Notes& no
   if (!legend.unit.empty()) std::cout << ", " << legend.unit;
   std::cout << '\n';
   for (const LegendStop& stop : legend.stops)
-    std::cout << fmt::format("  {}  {:<11}  {}\n", hex(stop.colour), stop.name, shortest(stop.value));
+    std::cout << fmt::format("  {}  {:<11}  {}\n", hex_of(stop.colour), stop.name, shortest(stop.value));
   if (legend.logarithmic) std::cout << "  (equal steps of colour are equal ratios)\n";
   for (const std::string& remark : legend.remarks) std::cout << "- " << remark << '\n';
   print_warnings(notes);

@@ -64,8 +64,7 @@ RenderedModel package_model(PackageReader& package, const PackageChoice& choice,
   if (choice.scale != 0) model.bounds = bounding_sphere(scale_model(package, 0, context).mesh.positions);
   const std::vector<PackageImage> images = package_images(package);
   for (const TextureImage& from : model.texture_images) {
-    const auto image = std::find_if(images.begin(), images.end(),
-                                    [&](const PackageImage& i) { return i.image == from.image; });
+    const auto image = std::ranges::find(images, from.image, &PackageImage::image);
     model.textures.push_back(
         render_texture(image_texels(package, *image, choice, context), from.srgb, 0, context));
   }

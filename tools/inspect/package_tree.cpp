@@ -10,12 +10,115 @@
 #include "format/rules/allocation.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/new_folder.h"
-#include "pipeline/io/record.h"
 
 namespace texmesh {
 
 namespace fs = std::filesystem;
 namespace {
+
+constexpr const char* kNoFile = "0000000000000000";
+
+std::string short_digest(const Bytes& bytes) { return to_hex(sha256(bytes)).substr(0, 16); }
+
+/// As many sizes and digests as the plane has fragments.
+void check_rung_index(const FragmentIndex::Plane& plane, const FragmentIndex::Rung& rung,
+                      const std::string& place) {
+  const auto fail = [&](const std::string& at, const std::string& expected, const std::string& found) {
+    throw FormatError(kFragmentIndexPath, at, expected, found);
+  };
+  const std::size_t fragments = plane.order.size();
+  if (rung.bytes.size() != fragments || rung.digests.size() != fragments)
+    fail(place, std::to_string(fragments) + " fragments, as in order",
+         std::to_string(rung.bytes.size()) + " sizes, " + std::to_string(rung.digests.size()) + " digests");
+  for (std::size_t i = 0; i < fragments; ++i)
+    if (rung.digests[i].size() != 16 ||
+        rung.digests[i].find_first_not_of("0123456789abcdef") != std::string::npos)
+      fail(place + "/sha256/" + std::to_string(i), "16 lower-case hexadecimal digits", rung.digests[i]);
+}
+
+/// Compares the files of one rung (the one added to `streams` last) with the index and the rung's own entry.
+void check_rung_files(PackageStore& folder, const std::map<std::string, std::uint64_t>& files,
+                      const TextureInfo& info, const PlaneTables& t, const PlaneStreams& streams,
+                      std::uint32_t plane, std::uint32_t rung, const FragmentIndex::Rung& stated,
+                      Findings& findings) {
+  for (std::size_t k = 0; k < t.order.size(); ++k) {
+    const std::uint32_t fragment = t.order[k];
+    const std::string path = fragment_file_path(plane, rung, fragment, codec_traits(info.codec).extension);
+    if (streams.stream(fragment).empty()) {
+      findings.require(stated.bytes[k] == 0, "fragment-file", kFragmentIndexPath, path,
+                       "0 bytes, as the rung does not store it", std::to_string(stated.bytes[k]));
+      continue;
+    }
+    const Bytes whole = streams.file(fragment);
+    const auto file = files.find(path);
+    if (!findings.require(file != files.end(), "fragment-file", path, "", "a file", "none")) continue;
+    if (!findings.require_equal<std::uint64_t>(whole.size(), file->second, "fragment-file", path, "bytes"))
+      continue;
+    EntryRef ref;
+    ref.path = path;
+    ref.bytes = whole.size();
+    findings.require(folder.read(ref, 0, ref.bytes) == whole, "fragment-file", path, "",
+                     "the fragment of " + info.rungs[rung].path, "other bytes");
+    findings.require(stated.bytes[k] == whole.size() && stated.digests[k] == short_digest(whole),
+                     "fragment-file", kFragmentIndexPath, path,
+                     std::to_string(whole.size()) + " bytes, " + short_digest(whole),
+                     std::to_string(stated.bytes[k]) + " bytes, " + stated.digests[k]);
+  }
+}
+
+/// Cuts a package's rungs into complete files, hands each to `sink` in order of plane, rung and importance,
+/// and returns their index.
+using FragmentFileSink = std::function<void(const std::string& path, const std::vector<std::uint8_t>& file)>;
+FragmentIndex make_fragment_files(PackageReader& package, const FragmentFileSink& sink) {
+  FragmentIndex index;
+  for (std::uint32_t plane = 0; plane < package.textures().size(); ++plane) {
+    const PlaneTables& t = package.tables().planes[plane];
+    const TextureInfo& info = package.textures()[plane];
+    FragmentIndex::Plane entry{t.order, {}};
+    PlaneStreams streams(info.codec, t, package.entry(info.tables));
+    for (std::uint32_t rung = 0; rung < t.rung_count(); ++rung) {
+      streams.add_pack(rung, package.entry(info.rungs[rung]));
+      FragmentIndex::Rung files;
+      for (const std::uint16_t fragment : t.order) {
+        if (streams.stream(fragment).empty()) {  // not stored on this rung
+          files.bytes.push_back(0);
+          files.digests.push_back(kNoFile);
+          continue;
+        }
+        const Bytes file = streams.file(fragment);
+        files.bytes.push_back(file.size());
+        files.digests.push_back(short_digest(file));
+        sink(fragment_file_path(plane, rung, fragment, codec_traits(info.codec).extension), file);
+      }
+      entry.rungs.push_back(std::move(files));
+    }
+    index.planes.push_back(std::move(entry));
+  }
+  return index;
+}
+
+/// One rung's entry put together again from fragment files: each without what it shares with others.
+/// FormatError when a file does not begin with the tables. `table_stream` is the rung's, or the lowest rung's
+/// for an incremental codec; `read_file` gives the bytes of a path.
+Bytes join_fragment_files(Codec codec, const PlaneTables& t, std::uint32_t plane, std::uint32_t rung,
+                          const Bytes& table_stream,
+                          const std::function<Bytes(const std::string&)>& read_file) {
+  const std::size_t fragments = t.fragment_count();
+  Bytes pack;
+  for (const std::uint16_t fragment : t.order) {
+    const std::uint32_t bytes = t.size_bytes[rung * fragments + fragment];
+    if (bytes == 0) continue;
+    const std::string path = fragment_file_path(plane, rung, fragment, codec_traits(codec).extension);
+    try {
+      const Bytes stream =
+          split_fragment(codec, table_stream, read_file(path), bytes_to_show(t, rung, fragment) - bytes);
+      pack.insert(pack.end(), stream.begin(), stream.end());
+    } catch (const FormatError& e) {
+      throw FormatError(path, e.place(), e.expected(), e.found());
+    }
+  }
+  return pack;
+}
 
 bool holds_unpacked_package(const fs::path& folder) {
   return fs::is_regular_file(fs::symlink_status(folder / kManifestPath));
@@ -130,121 +233,6 @@ void check_offset(const ContainerEntry& written, const EntryRef& stated) {
 
 }  // namespace
 
-void unpack_package(const std::string& package_path, const std::string& folder,
-                    const UnpackOptions& options) {
-  PackageReader package(open_store(package_path));
-  const Bytes manifest = manifest_bytes(package);
-  NewTree tree(folder, options.force);
-  tree.add(kManifestPath, manifest);
-  for (const EntryRef& e : container_order(package)) tree.add(e.path, package.entry(e));
-  if (const auto credential = content_credential(package.store()))
-    tree.add(kContentCredentialPath, *credential);
-  if (options.fragment_files) {
-    const FragmentIndex index = make_fragment_files(
-        package, [&](const std::string& path, const Bytes& jpeg) { tree.add(path, jpeg); });
-    const std::string json = write_fragment_index(index);
-    tree.add(kFragmentIndexPath, Bytes(json.begin(), json.end()));
-  }
-  tree.publish();
-}
-
-void pack_folder(const std::string& folder, const std::string& package_path) {
-  PackageReader package(open_folder(folder));
-  TreeFiles files(package);
-  Bytes container;
-  ContainerWriter writer([&](std::span<const std::uint8_t> bytes) {
-    container.insert(container.end(), bytes.begin(), bytes.end());
-  });
-  writer.add(kManifestPath, manifest_bytes(package));
-  const std::vector<EntryRef> order = container_order(package);
-  for (const EntryRef& e : order) {
-    writer.add(e.path, files.entry(e));
-    check_offset(writer.entries().back(), e);
-  }
-  if (const auto credential = content_credential(package.store()))
-    writer.add(kContentCredentialPath, *credential);
-  writer.finish();
-  write_output_file(package_path, container);
-}
-
-template <>
-struct RecordFields<FragmentIndex::Rung> {
-  static void fields(auto& s, auto&& v) {
-    v("bytes", s.bytes, Range{0, 4294967296.0}, "");
-    v("sha256", s.digests, "");
-  }
-};
-template <>
-struct RecordFields<FragmentIndex::Plane> {
-  static void fields(auto& s, auto&& v) {
-    v("order", s.order, "");
-    v("rungs", s.rungs, "");
-  }
-};
-template <>
-struct RecordFields<FragmentIndex> {
-  static void fields(auto& s, auto&& v) {
-    v("version", Constant{1}, "");
-    v("planes", s.planes, "");
-  }
-};
-
-namespace {
-
-constexpr const char* kNoFile = "0000000000000000";
-
-std::string short_digest(const Bytes& bytes) { return to_hex(sha256(bytes)).substr(0, 16); }
-
-/// As many sizes and digests as the plane has fragments.
-void check_rung_index(const FragmentIndex::Plane& plane, const FragmentIndex::Rung& rung,
-                      const std::string& place) {
-  const auto fail = [&](const std::string& at, const std::string& expected, const std::string& found) {
-    throw FormatError(kFragmentIndexPath, at, expected, found);
-  };
-  const std::size_t fragments = plane.order.size();
-  if (rung.bytes.size() != fragments || rung.digests.size() != fragments)
-    fail(place, std::to_string(fragments) + " fragments, as in order",
-         std::to_string(rung.bytes.size()) + " sizes, " + std::to_string(rung.digests.size()) + " digests");
-  for (std::size_t i = 0; i < fragments; ++i)
-    if (rung.digests[i].size() != 16 ||
-        rung.digests[i].find_first_not_of("0123456789abcdef") != std::string::npos)
-      fail(place + "/sha256/" + std::to_string(i), "16 lower-case hexadecimal digits", rung.digests[i]);
-}
-
-/// Compares the files of one rung (the one added to `streams` last) with the index and the rung's own entry.
-void check_rung_files(PackageStore& folder, const std::map<std::string, std::uint64_t>& files,
-                      const TextureInfo& info, const PlaneTables& t, const PlaneStreams& streams,
-                      std::uint32_t plane, std::uint32_t rung, const FragmentIndex::Rung& stated,
-                      Findings& findings) {
-  for (std::size_t k = 0; k < t.order.size(); ++k) {
-    const std::uint32_t fragment = t.order[k];
-    const std::string path = fragment_file_path(plane, rung, fragment, codec_traits(info.codec).extension);
-    if (streams.stream(fragment).empty()) {
-      findings.require(stated.bytes[k] == 0, "fragment-file", kFragmentIndexPath, path,
-                       "0 bytes, as the rung does not store it", std::to_string(stated.bytes[k]));
-      continue;
-    }
-    const Bytes whole = streams.file(fragment);
-    const auto file = files.find(path);
-    if (!findings.require(file != files.end(), "fragment-file", path, "", "a file", "none")) continue;
-    if (!findings.require_equal<std::uint64_t>(whole.size(), file->second, "fragment-file", path, "bytes"))
-      continue;
-    EntryRef ref;
-    ref.path = path;
-    ref.bytes = whole.size();
-    findings.require(folder.read(ref, 0, ref.bytes) == whole, "fragment-file", path, "",
-                     "the fragment of " + info.rungs[rung].path, "other bytes");
-    findings.require(stated.bytes[k] == whole.size() && stated.digests[k] == short_digest(whole),
-                     "fragment-file", kFragmentIndexPath, path,
-                     std::to_string(whole.size()) + " bytes, " + short_digest(whole),
-                     std::to_string(stated.bytes[k]) + " bytes, " + stated.digests[k]);
-  }
-}
-
-}  // namespace
-
-std::string write_fragment_index(const FragmentIndex& index) { return to_json_line(index); }
-
 FragmentIndex read_fragment_index(std::span<const std::uint8_t> json) {
   FragmentIndex index;
   try {
@@ -257,54 +245,6 @@ FragmentIndex read_fragment_index(std::span<const std::uint8_t> json) {
       check_rung_index(index.planes[k], index.planes[k].rungs[r],
                        "/planes/" + std::to_string(k) + "/rungs/" + std::to_string(r));
   return index;
-}
-
-FragmentIndex make_fragment_files(PackageReader& package, const FragmentFileSink& sink) {
-  FragmentIndex index;
-  for (std::uint32_t plane = 0; plane < package.textures().size(); ++plane) {
-    const PlaneTables& t = package.tables().planes[plane];
-    const TextureInfo& info = package.textures()[plane];
-    FragmentIndex::Plane entry{t.order, {}};
-    PlaneStreams streams(info.codec, t, package.entry(info.tables));
-    for (std::uint32_t rung = 0; rung < t.rung_count(); ++rung) {
-      streams.add_pack(rung, package.entry(info.rungs[rung]));
-      FragmentIndex::Rung files;
-      for (const std::uint16_t fragment : t.order) {
-        if (streams.stream(fragment).empty()) {  // not stored on this rung
-          files.bytes.push_back(0);
-          files.digests.push_back(kNoFile);
-          continue;
-        }
-        const Bytes file = streams.file(fragment);
-        files.bytes.push_back(file.size());
-        files.digests.push_back(short_digest(file));
-        sink(fragment_file_path(plane, rung, fragment, codec_traits(info.codec).extension), file);
-      }
-      entry.rungs.push_back(std::move(files));
-    }
-    index.planes.push_back(std::move(entry));
-  }
-  return index;
-}
-
-Bytes join_fragment_files(Codec codec, const PlaneTables& t, std::uint32_t plane, std::uint32_t rung,
-                          const Bytes& table_stream,
-                          const std::function<Bytes(const std::string&)>& read_file) {
-  const std::size_t fragments = t.fragment_count();
-  Bytes pack;
-  for (const std::uint16_t fragment : t.order) {
-    const std::uint32_t bytes = t.size_bytes[rung * fragments + fragment];
-    if (bytes == 0) continue;
-    const std::string path = fragment_file_path(plane, rung, fragment, codec_traits(codec).extension);
-    try {
-      const Bytes stream =
-          split_fragment(codec, table_stream, read_file(path), bytes_to_show(t, rung, fragment) - bytes);
-      pack.insert(pack.end(), stream.begin(), stream.end());
-    } catch (const FormatError& e) {
-      throw FormatError(path, e.place(), e.expected(), e.found());
-    }
-  }
-  return pack;
 }
 
 void check_fragment_files(PackageStore& folder, const std::vector<ContainerEntry>& listed,
@@ -345,6 +285,43 @@ void check_fragment_files(PackageStore& folder, const std::vector<ContainerEntry
                        findings);
     }
   }
+}
+
+void unpack_package(const std::string& package_path, const std::string& folder,
+                    const UnpackOptions& options) {
+  PackageReader package(open_store(package_path));
+  const Bytes manifest = manifest_bytes(package);
+  NewTree tree(folder, options.force);
+  tree.add(kManifestPath, manifest);
+  for (const EntryRef& e : container_order(package)) tree.add(e.path, package.entry(e));
+  if (const auto credential = content_credential(package.store()))
+    tree.add(kContentCredentialPath, *credential);
+  if (options.fragment_files) {
+    const FragmentIndex index = make_fragment_files(
+        package, [&](const std::string& path, const Bytes& jpeg) { tree.add(path, jpeg); });
+    const std::string json = to_json_line(index);
+    tree.add(kFragmentIndexPath, Bytes(json.begin(), json.end()));
+  }
+  tree.publish();
+}
+
+void pack_folder(const std::string& folder, const std::string& package_path) {
+  PackageReader package(open_folder(folder));
+  TreeFiles files(package);
+  Bytes container;
+  ContainerWriter writer([&](std::span<const std::uint8_t> bytes) {
+    container.insert(container.end(), bytes.begin(), bytes.end());
+  });
+  writer.add(kManifestPath, manifest_bytes(package));
+  const std::vector<EntryRef> order = container_order(package);
+  for (const EntryRef& e : order) {
+    writer.add(e.path, files.entry(e));
+    check_offset(writer.entries().back(), e);
+  }
+  if (const auto credential = content_credential(package.store()))
+    writer.add(kContentCredentialPath, *credential);
+  writer.finish();
+  write_output_file(package_path, container);
 }
 
 }  // namespace texmesh

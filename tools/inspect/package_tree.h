@@ -2,11 +2,12 @@
 
 #include "delivery/cpp/package/package_reader.h"
 #include "format/base/finding.h"
+#include "pipeline/io/record.h"
 
 namespace texmesh {
 
 struct UnpackOptions {
-  bool fragment_files = false;  // also every fragment as a complete JPEG (fragment_files.h)
+  bool fragment_files = false;  // also every fragment as a complete JPEG
   bool force = false;  // replace a folder that holds an unpacked package; any other folder is refused even so
 };
 
@@ -31,29 +32,27 @@ struct FragmentIndex {
   struct Rung {
     std::vector<std::uint64_t> bytes;  // per fragment of the plane's order: of the complete file; 0 = no file
     std::vector<std::string> digests;  // its SHA-256's first 8 bytes, 16 lower-case digits; zeros = no file
+    static void fields(auto& s, auto&& v) {
+      v("bytes", s.bytes, Range{0, 4294967296.0}, "");
+      v("sha256", s.digests, "");
+    }
   };
   struct Plane {
     std::vector<std::uint16_t> order;  // as PlaneTables::order
     std::vector<Rung> rungs;
+    static void fields(auto& s, auto&& v) {
+      v("order", s.order, "");
+      v("rungs", s.rungs, "");
+    }
   };
   std::vector<Plane> planes;
+  static void fields(auto& s, auto&& v) {
+    v("version", Constant{1}, "");
+    v("planes", s.planes, "");
+  }
 };
-std::string write_fragment_index(const FragmentIndex& index);
 /// Strict; FormatError names the JSON pointer.
 FragmentIndex read_fragment_index(std::span<const std::uint8_t> json);
-
-/// Cuts a package's rungs into complete files, hands each to `sink` in order of plane, rung and importance,
-/// and returns their index.
-using FragmentFileSink = std::function<void(const std::string& path, const std::vector<std::uint8_t>& file)>;
-FragmentIndex make_fragment_files(PackageReader& package, const FragmentFileSink& sink);
-
-/// One rung's entry put together again from fragment files: each without what it shares with others.
-/// FormatError when a file does not begin with the tables. `table_stream` is the rung's, or the lowest rung's
-/// for an incremental codec; `read_file` gives the bytes of a path.
-std::vector<std::uint8_t> join_fragment_files(
-    Codec codec, const PlaneTables& tables, std::uint32_t plane, std::uint32_t rung,
-    const std::vector<std::uint8_t>& table_stream,
-    const std::function<std::vector<std::uint8_t>(const std::string&)>& read_file);
 
 /// Every fragment file of a tree against the index and against the tree's own rung entries: all there, none
 /// besides, bytes and digests as stated, contents equal. Findings of check "fragment-file".

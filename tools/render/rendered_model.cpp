@@ -227,52 +227,19 @@ void require_size(const TextureInfo& info, std::uint32_t plane) {
                       std::to_string(info.width_px) + " x " + std::to_string(info.height_px));
 }
 
-/// The preview of a full-size plane at the size of `info`.
-Pixels enlarged_preview(PackageReader& package, std::uint32_t base, const TextureInfo& info) {
-  const Pixels preview =
-      decode_image(probe_image(package.textures().at(base).preview.path, package.preview(base), {}));
-  SamplePatch patch{{0, 0, preview.width_px, preview.height_px}, Samples(info.channels)};
-  for (std::size_t c = 0; c < info.channels; ++c)
-    for (std::size_t i = 0; i < std::size_t{preview.width_px} * preview.height_px; ++i)
-      patch.samples[c].push_back(
-          preview.data[i * preview.channels + std::min<std::size_t>(c, preview.channels - 1)]);
-  const Samples large = scaled_up(patch, bilinear_places(0, info.width_px, info.width_px, preview.width_px),
-                                  bilinear_places(0, info.height_px, info.height_px, preview.height_px));
-  Pixels out{info.width_px, info.height_px, info.channels, {}};
-  out.data.resize(std::size_t{out.width_px} * out.height_px * out.channels);
-  for (std::size_t c = 0; c < info.channels; ++c)
-    for (std::size_t i = 0; i < large[c].size(); ++i) out.data[i * info.channels + c] = large[c][i];
-  return out;
-}
-
 }  // namespace
 
-Pixels read_shown_plane(PackageReader& package, std::uint32_t base, std::uint32_t plane,
-                        std::span<const std::int32_t> rungs, const RunContext& context) {
-  const TextureInfo& info = package.textures().at(plane);
-  const PlaneTables& tables = package.tables().planes.at(plane);
-  require_size(info, plane);
-  if (rungs.size() != tables.fragment_count())
-    throw std::invalid_argument("read_shown_plane: a rung for each fragment");
+void decode_fragments(const TextureInfo& info, const std::string& rung_path, const PlaneStreams& streams,
+                      std::span<const std::uint16_t> fragments, Pixels& plane, const RunContext& context) {
   const std::uint64_t fragment_pixels = std::uint64_t{info.fragment_width_px} * info.fragment_height_px;
-  Pixels out = enlarged_preview(package, base, info);
-  PlaneStreams streams(info.codec, tables, package.entry(info.tables));
-  for (std::uint32_t r = 0; r < tables.rung_count(); ++r) {
-    std::vector<std::uint16_t> shown;
-    for (const std::uint16_t f : tables.order)
-      if (rungs[f] == static_cast<std::int32_t>(r)) shown.push_back(f);
-    if (shown.empty() && !codec_traits(info.codec).incremental) continue;
-    streams.add_pack(r, package.entry(info.rungs[r]));
-    parallel_for(context, shown.size(), 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t k = begin; k < end; ++k) {
-        if (streams.stream(shown[k]).empty()) continue;
-        const Pixels pixels = decode_fragment_file(info.codec, streams.file(shown[k]), fragment_pixels);
-        require_fragment(pixels, info, info.rungs[r].path, shown[k]);
-        place(pixels, info, shown[k], out);
-      }
-    });
-  }
-  return out;
+  parallel_for(context, fragments.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) {
+      if (streams.stream(fragments[k]).empty()) continue;
+      const Pixels pixels = decode_fragment_file(info.codec, streams.file(fragments[k]), fragment_pixels);
+      require_fragment(pixels, info, rung_path, fragments[k]);
+      place(pixels, info, fragments[k], plane);
+    }
+  });
 }
 
 Pixels read_plane(PackageReader& package, std::uint32_t plane, std::uint32_t rung,
@@ -287,18 +254,9 @@ Pixels read_plane(PackageReader& package, std::uint32_t plane, std::uint32_t run
 
   Pixels out{info.width_px, info.height_px, info.channels, {}};
   out.data.resize(std::size_t{out.width_px} * out.height_px * out.channels);
-  const std::uint64_t fragment_pixels = std::uint64_t{info.fragment_width_px} * info.fragment_height_px;
   std::vector<bool> known(tables.fragment_count());
   for (const std::uint16_t f : tables.order) known[f] = !streams.stream(f).empty();
-  parallel_for(context, tables.order.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t k = begin; k < end; ++k) {
-      const std::uint16_t f = tables.order[k];
-      if (!known[f]) continue;
-      const Pixels pixels = decode_fragment_file(info.codec, streams.file(f), fragment_pixels);
-      require_fragment(pixels, info, info.rungs[top].path, f);
-      place(pixels, info, f, out);
-    }
-  });
+  decode_fragments(info, info.rungs[top].path, streams, tables.order, out, context);
   if (std::find(known.begin(), known.end(), false) != known.end())
     fill_uncovered(out, known_texels(info, known), context);
   return out;

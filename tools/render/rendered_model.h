@@ -9,6 +9,8 @@
 
 namespace texmesh {
 
+class PlaneStreams;
+
 /// What a texture of a RenderedModel is made from: an image, read as colours (sRGB) or as plain numbers.
 struct TextureImage {
   std::uint32_t image = 0;  // as the materials count images
@@ -100,11 +102,10 @@ inline constexpr std::uint32_t kBestRung = 0xffffffffu;
 /// damaged or the plane has more than 4e8 texels. Same result for any thread count.
 Pixels read_plane(PackageReader& package, std::uint32_t plane, std::uint32_t rung, const RunContext& context);
 
-/// A plane as a client shows it: each fragment at its rung, row by row; -1, and what is not stored = as the
-/// preview of the full-size plane `base` shows it, scaled up bilinearly. Errors as read_plane();
-/// std::invalid_argument where the number of rungs is another. Same result for any thread count.
-Pixels read_shown_plane(PackageReader& package, std::uint32_t base, std::uint32_t plane,
-                        std::span<const std::int32_t> rungs, const RunContext& context);
+/// Decodes fragments of a plane, of those that `streams` has, into their places in it. FormatError naming
+/// `rung_path` for a fragment of another size.
+void decode_fragments(const TextureInfo& info, const std::string& rung_path, const PlaneStreams& streams,
+                      std::span<const std::uint16_t> fragments, Pixels& plane, const RunContext& context);
 
 /// InputError where no plane of the package has that rung. kBestRung is always there.
 void require_rung(PackageReader& package, std::uint32_t rung);

@@ -10,7 +10,6 @@
 #include <cstdlib>
 #include <filesystem>
 #include <map>
-#include <optional>
 #include <set>
 #include <sstream>
 
@@ -439,12 +438,6 @@ const char* default_value_name() {
     return "TEXT";
 }
 
-std::string in_braces(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "{" : "|") + word;
-  return text + "}";
-}
-
 }  // namespace
 
 struct CommandLineState {
@@ -470,7 +463,7 @@ Option& Option::integer_in(int least, int most) {
 }
 
 Option& Option::number_in(double least, double most) {
-  option_->check(NumberIn(least, most));
+  option_->check([least, most](const std::string& text) { return number_fault(text, least, most); });
   return *this;
 }
 
@@ -479,7 +472,7 @@ Option& Option::one_of(const std::vector<std::string>& words) {
 }
 
 Option& Option::lists_words() {
-  state_->help.choices[option_] = in_braces(state_->help.words[option_]);
+  state_->help.choices[option_] = "{" + in_a_row(state_->help.words[option_], "|") + "}";
   return *this;
 }
 

@@ -1,22 +1,9 @@
 #include "tools/cli/options/delivery_options.h"
 
-#include <fstream>
-#include <sstream>
-
+#include "pipeline/io/file_resolver.h"
 #include "pipeline/io/table.h"
 
 namespace texmesh {
-namespace {
-
-std::string read_file(const std::string& path) {
-  std::ifstream in(path, std::ios::binary);
-  std::ostringstream text;
-  if (!in || !(text << in.rdbuf())) throw InputError(path, "", "a readable file", "none");
-  return text.str();
-}
-
-}  // namespace
-
 Option add_display_option(Command& c, DeliveryArguments& a) {
   return c.option("--display", a.request.displayed_px, "Displayed height of the object, device pixels", "PX")
       .number_in(1, 1e6)
@@ -80,8 +67,8 @@ void add_memory_option(Command& c, DeliveryArguments& a) {
       [&a](const std::string& text) {
         a.request.memory_bytes = static_cast<double>(parse_bytes(text, "--memory"));
       },
-      "GPU memory for mesh and textures, 64MB: coarser scales and mips where more would be taken (default: "
-      "any)",
+      "GPU memory for mesh and textures, 64MB: coarser scales and mips where more would be taken "
+      "(default: any)",
       "SIZE");
 }
 
@@ -113,7 +100,8 @@ void add_link_options(Command& c, DeliveryArguments& a) {
   c.option(
        "--trace",
        [&a](const std::string& file) {
-         a.request.network.link = read_trace_csv(read_file(file), file);
+         const auto bytes = read_input_file(file, 1u << 30);
+         a.request.network.link = read_trace_csv(std::string(bytes.begin(), bytes.end()), file);
          a.has_link = true;
        },
        "CSV of the link's throughput: lines of seconds,bytes per second", "FILE")

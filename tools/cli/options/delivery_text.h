@@ -20,7 +20,7 @@ struct RecordFields<MirrorShare> {
   static void fields(auto& s, auto&& v) {
     v("requests", s.requests, "");
     v("bytes", s.bytes, "");
-    v("bytes_s", s.bytes_s, kSeconds,
+    v("bytes_s", s.bytes_s, Range{0, 1e300},
       "As it is expected to go on; the first guess where it has brought nothing.");
     v("dropped", s.dropped, kMayMiss, "Why it is asked no more.");
   }

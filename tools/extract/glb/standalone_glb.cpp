@@ -7,7 +7,6 @@
 #include "pipeline/about/gltf_about.h"
 #include "pipeline/import/import.h"
 #include "pipeline/io/file_resolver.h"
-#include "stages/gltf/glb_container.h"
 #include "stages/gltf/glb_writer.h"
 #include "stages/image/decode_image.h"
 
@@ -165,8 +164,6 @@ void StandaloneGlb::set_images(const std::map<std::uint32_t, FileImageData>& ima
   forget_extension(root_, kWebp);
   if (std::find(webp.begin(), webp.end(), true) != webp.end()) use_extension(kWebp, true);
 }
-
-bool StandaloneGlb::has_draco() const { return codec() == MeshCodec::kDraco; }
 
 void StandaloneGlb::recode(const DracoSteps& steps, const NormalSamples* lit_as, const RunContext& context) {
   std::vector<DracoStream> streams;

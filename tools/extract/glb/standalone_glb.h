@@ -1,5 +1,4 @@
 #pragma once
-#include <nlohmann/json.hpp>
 
 #include "stages/gltf/check_glb.h"
 #include "stages/gltf/draco_mesh.h"
@@ -30,7 +29,7 @@ class StandaloneGlb {
   void take_meshes(StandaloneGlb other);
   /// Codes Draco streams anew, see recode_draco(); other codecs stay as they are.
   void recode(const DracoSteps& steps, const NormalSamples* lit_as, const RunContext& context);
-  bool has_draco() const;
+  bool has_draco() const { return codec() == MeshCodec::kDraco; }
 
   /// Makes the nodes of the scene the children of one node, the first level of detail.
   /// Once, before add_level().

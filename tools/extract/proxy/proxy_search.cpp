@@ -4,7 +4,6 @@
 #include "pipeline/about/gltf_about.h"
 #include "pipeline/io/file_resolver.h"
 #include "stages/condition/condition.h"
-#include "stages/gltf/glb_container.h"
 #include "stages/image/decode_image.h"
 #include "stages/simplification/simplification.h"
 #include "tools/extract/budget/filling.h"

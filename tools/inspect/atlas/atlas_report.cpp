@@ -272,15 +272,9 @@ AtlasSubject atlas_subject(PackageReader& package, const RunContext& context) {
   return out;
 }
 
-std::uint64_t AtlasDiagnosis::charts() const {
+std::uint64_t AtlasDiagnosis::sum(std::uint64_t AtlasFigures::*figure) const {
   std::uint64_t sum = 0;
-  for (const NamedAtlas& a : atlases) sum += a.charts;
-  return sum;
-}
-
-std::uint64_t AtlasDiagnosis::triangle_floor() const {
-  std::uint64_t sum = 0;
-  for (const NamedAtlas& a : atlases) sum += a.triangle_floor;
+  for (const NamedAtlas& a : atlases) sum += a.*figure;
   return sum;
 }
 

@@ -68,8 +68,7 @@ std::vector<Difference> differences_of(const std::array<Provenance, 2>& p,
     for (const auto& [name, version] : p[side].stages) stages.add(side, name, std::to_string(version));
     for (const auto& [name, version] : p[side].libraries) libraries.add(side, name, version);
     tool.add(side, "tool", p[side].tool);
-    format.add(side, "package format",
-               std::to_string(p[side].format_major) + "." + std::to_string(p[side].format_minor));
+    format.add(side, "package format", p[side].format.text());
   }
   std::vector<Difference> all;
   for (const NamedDifferences* list : {&inputs, &options, &fields, &stages, &libraries, &tool, &format})
@@ -77,31 +76,16 @@ std::vector<Difference> differences_of(const std::array<Provenance, 2>& p,
   return all;
 }
 
+/// The stage that makes an entry.
 std::string maker(const std::string& path) {
-  switch (parse_entry_path(path).kind) {
-    case EntryKind::kMesh:
-    case EntryKind::kSplitStream:
-      return "scales";
-    case EntryKind::kProxy:
-      return "proxies";
-    case EntryKind::kPoster:
-      return "poster";
-    case EntryKind::kTables:
-    case EntryKind::kThesis:
-      return "lut";
-    case EntryKind::kQuality:
-      return "quality";
-    case EntryKind::kPreview:
-      return "previews";
-    case EntryKind::kTableStreams:
-    case EntryKind::kRung:
-    case EntryKind::kTextures:
-      return "ladder";
-    case EntryKind::kProvenance:
-      return "";
-    default:
-      return "package";
-  }
+  using Kind = EntryKind;
+  static const std::map<Kind, std::string> makers{
+      {Kind::kMesh, "scales"},     {Kind::kSplitStream, "scales"}, {Kind::kProxy, "proxies"},
+      {Kind::kPoster, "poster"},   {Kind::kTables, "lut"},         {Kind::kThesis, "lut"},
+      {Kind::kQuality, "quality"}, {Kind::kPreview, "previews"},   {Kind::kTableStreams, "ladder"},
+      {Kind::kRung, "ladder"},     {Kind::kTextures, "ladder"},    {Kind::kProvenance, ""}};
+  const auto found = makers.find(parse_entry_path(path).kind);
+  return found == makers.end() ? "package" : found->second;
 }
 
 void compare_entries(PackageReader& a, PackageReader& b, PackageDiff& diff) {

@@ -12,7 +12,6 @@
 #include "format/rules/viewing.h"
 #include "pipeline/io/table.h"
 #include "tools/inspect/atlas/atlas_report.h"
-#include "tools/inspect/dump/package_figures.h"
 #include "tools/inspect/provenance.h"
 
 namespace texmesh {
@@ -47,6 +46,54 @@ struct DumpedScales {
     v("scales", s.scales, FieldRule{.count = Range{1, 100}}, "S_0 first");
   }
 };
+
+struct Kind {
+  const char* name;
+  std::vector<EntryKind> kinds;
+};
+
+const std::array<Kind, 11>& kinds() {
+  static const std::array<Kind, 11> list{
+      {{"manifest and index", {EntryKind::kManifest, EntryKind::kIndex}},
+       {"tables", {EntryKind::kTables, EntryKind::kTextures, EntryKind::kQuality}},
+       {"meshes", {EntryKind::kMesh}},
+       {"proxies", {EntryKind::kProxy}},
+       {"vertex-split stream", {EntryKind::kSplitStream}},
+       {"previews", {EntryKind::kPreview}},
+       {"poster", {EntryKind::kPoster}},
+       {"textures", {EntryKind::kTableStreams, EntryKind::kRung}},
+       {"source images", {EntryKind::kSource}},
+       {"the thesis's tables", {EntryKind::kThesis}},
+       {"about, provenance and others",
+        {EntryKind::kAbout, EntryKind::kProvenance, EntryKind::kOther, EntryKind::kContentCredential}}}};
+  return list;
+}
+
+/// A scale of the vertex-split stream: its counts, and the bytes from the stream's start to it.
+struct StreamFigures {
+  int scale = 0;
+  std::uint32_t points = 0, triangles = 0, blocks = 0;
+  std::uint64_t bytes = 0;  // all of: head, connectivity, positions, texture coordinates, others
+  std::uint64_t connectivity = 0, positions = 0, uv = 0, others = 0;
+};
+std::vector<StreamFigures> stream_figures(const SplitStreamHead& head) {
+  std::vector<StreamFigures> scales;
+  StreamFigures sum;
+  sum.bytes = head.bytes;
+  for (const SplitScale& s : head.scales) {
+    for (; sum.blocks < s.blocks; ++sum.blocks) {
+      const SplitBlock& b = head.blocks[sum.blocks];
+      sum.bytes += b.bytes();
+      sum.connectivity += b.parts[0];
+      sum.positions += b.parts[1];
+      for (std::size_t k = 0; k < head.attributes.size(); ++k)
+        (head.attributes[k].kind <= SplitKind::kUv1 ? sum.uv : sum.others) += b.parts[k + 2];
+    }
+    sum.scale = s.scale, sum.points = s.points, sum.triangles = s.triangles;
+    scales.push_back(sum);
+  }
+  return scales;
+}
 
 std::string vector_text(const Vec3d& v) {
   return fmt::format("{}  {}  {}", shortest(v.x, 7), shortest(v.y, 7), shortest(v.z, 7));
@@ -170,8 +217,8 @@ Table textures_table(PackageReader& p) {
     std::uint64_t all = t.tables.bytes;
     for (const EntryRef& rung : t.rungs) all += rung.bytes;
     table.row({k, t.image, t.mip, t.mip > 0 ? t.base : k, t.role, t.name, t.width_px, t.height_px, t.channels,
-               fmt::format("{}x{}", t.columns, t.rows), stored_fragments(p.tables().planes[k]),
-               t.rungs.size(), t.rungs.empty() ? Cell() : t.rungs.front().bytes,
+               fmt::format("{}x{}", t.columns, t.rows), p.tables().planes[k].order.size(), t.rungs.size(),
+               t.rungs.empty() ? Cell() : t.rungs.front().bytes,
                t.rungs.empty() ? Cell() : t.rungs.back().bytes, all, t.source_rung ? Cell(true) : Cell(),
                t.source_extension.empty() ? Cell() : Cell(t.source.path)});
   }
@@ -441,8 +488,7 @@ std::string provenance_text(PackageReader& p, DumpGamma) {
   Table versions("versions", {Column::text("stage or library"), "version"});
   for (const auto& [name, version] : provenance.stages) versions.row({name, version});
   for (const auto& [name, version] : provenance.libraries) versions.row({name, version});
-  return fmt::format("made by   {}, format {}.{}\n\n", printable(provenance.tool), provenance.format_major,
-                     provenance.format_minor) +
+  return fmt::format("made by   {}, format {}\n\n", printable(provenance.tool), provenance.format.text()) +
          inputs.text() + "\n" + options.text() + "\n" + versions.text();
 }
 
@@ -501,6 +547,26 @@ constexpr PartWriters kWriters[] = {
      }}};
 
 }  // namespace
+
+std::vector<KindBytes> bytes_by_kind(const Manifest& manifest, std::uint64_t manifest_bytes,
+                                     const std::vector<EntryRef>& index) {
+  std::vector<KindBytes> sums;
+  for (const Kind& kind : kinds()) sums.push_back({kind.name, 0, 0});
+  const auto add = [&](const std::string& path, std::uint64_t bytes) {
+    const EntryKind found = parse_entry_path(path).kind;
+    for (std::size_t k = 0; k < sums.size(); ++k) {
+      const auto& members = kinds()[k].kinds;
+      if (std::find(members.begin(), members.end(), found) == members.end()) continue;
+      ++sums[k].entries;
+      sums[k].bytes += bytes;
+    }
+  };
+  add(kManifestPath, manifest_bytes);
+  add(kIndexPath, manifest.index.bytes);
+  for (const EntryRef& e : index) add(e.path, e.bytes);
+  std::erase_if(sums, [](const KindBytes& k) { return k.entries == 0; });
+  return sums;
+}
 
 std::string dump_text(PackageReader& package, DumpPart part, DumpGamma gamma) {
   if (part != DumpPart::kAll) return kWriters[static_cast<std::size_t>(part)].text(package, gamma);

@@ -38,6 +38,24 @@ std::string dump_text(PackageReader& package, DumpPart part, DumpGamma gamma = {
 nlohmann::ordered_json dump_json(PackageReader& package, DumpPart part, DumpGamma gamma = {});
 DocumentSchema dump_scales_schema();
 
+/// Entries by what they are for.
+struct KindBytes {
+  std::string kind;  // "meshes", "textures", ...
+  std::uint64_t entries = 0, bytes = 0;
+};
+/// Entries of a package by what they are for, in a fixed order; kinds without entries are left out.
+std::vector<KindBytes> bytes_by_kind(const Manifest& manifest, std::uint64_t manifest_bytes,
+                                     const std::vector<EntryRef>& index);
+
+/// Sums and means of a rung.
+struct RungFigures {
+  int quality = 0;
+  std::uint64_t bytes = 0, table_bytes = 0;  // of all fragments; of the table stream
+  double mse = 0, ssim = 1;                  // means over covered texels
+  double surface_ssim = 1;                   // mean over the object's surface, see surface_weights()
+};
+std::vector<RungFigures> rung_figures(const PlaneTables& tables);
+
 // Inside the room only: the parts that tell of texture planes (dump_textures.cpp).
 std::string fragments_text(PackageReader& package, DumpGamma);
 nlohmann::ordered_json fragments_json(PackageReader& package, DumpGamma);

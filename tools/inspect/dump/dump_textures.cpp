@@ -10,10 +10,45 @@
 
 #include "format/rules/allocation.h"
 #include "pipeline/io/table.h"
-#include "tools/inspect/dump/package_figures.h"
 
 namespace texmesh {
 namespace {
+
+/// The texture quality that the tables ask for at the scale of a row and Gamma.
+struct AllocationFigures {
+  double gamma = 0, quality_min = 0, quality_mean = 0, quality_max = 0;  // quality 0: skipped
+  std::uint64_t bytes = 0;  // of the chosen rungs, table streams not counted
+  // Per fragment: q_i(x, y) (with rd: the quality of the rung), its rung, d_i(x, y)
+  std::vector<float> fragment_quality;
+  std::vector<std::int16_t> fragment_rung;
+  std::vector<std::uint32_t> fragment_bytes;
+};
+/// Without `gamma` (0..1): at the default one, the mean of eta.
+AllocationFigures allocation_figures(const PlaneTables& t, std::size_t row, DumpGamma gamma = {}) {
+  AllocationFigures f;
+  f.gamma = gamma ? *gamma : mean_eta(t, row);
+  f.fragment_quality = quality_of(t, row, f.gamma);
+  f.fragment_rung = rungs_of(t, row, f.gamma);
+  f.fragment_bytes = bytes_of(t, f.fragment_rung);
+  f.bytes = sum_of(f.fragment_bytes);
+  if (t.order.empty()) return f;
+  f.quality_min = 1e9;
+  for (const std::uint16_t i : t.order) {
+    if (t.allocation == 2)  // what was bought, not what was asked for
+      f.fragment_quality[i] =
+          f.fragment_rung[i] == kSkipped ? 0 : t.rung_quality[static_cast<std::size_t>(f.fragment_rung[i])];
+    const double q = static_cast<double>(f.fragment_quality[i]);
+    f.quality_min = std::min(f.quality_min, q);
+    f.quality_max = std::max(f.quality_max, q);
+    f.quality_mean += q;
+  }
+  f.quality_mean /= static_cast<double>(t.order.size());
+  return f;
+}
+
+std::string allocation_name(const PlaneTables& t) {
+  return t.allocation == 0 ? "thesis" : t.allocation == 1 ? "log" : t.allocation == 2 ? "rd" : "vqp";
+}
 
 /// The title line of a texture plane.
 std::string plane_title(const TextureInfo& t, std::size_t plane) {
@@ -213,6 +248,29 @@ std::string measured_text(const QualityTable& q) {
 }
 
 }  // namespace
+
+std::vector<RungFigures> rung_figures(const PlaneTables& t) {
+  std::vector<RungFigures> rungs;
+  const std::size_t fragments = t.fragment_count();
+  for (std::size_t r = 0; r < t.rung_count(); ++r) {
+    RungFigures f{t.rung_quality[r], 0, t.table_bytes[r], 0, 0};
+    double texels = 0, dssim = 0;
+    for (const std::uint16_t i : t.order) {
+      const double weight = t.covered_texels[i];
+      f.bytes += t.size_bytes[r * fragments + i];
+      f.mse += weight * static_cast<double>(t.mse[r * fragments + i]);
+      dssim += weight * static_cast<double>(t.dssim[r * fragments + i]);
+      texels += weight;
+    }
+    if (texels > 0) f.mse /= texels, dssim /= texels;
+    f.ssim = 1 - dssim;
+    std::vector<std::int16_t> all(fragments, kSkipped);
+    for (const std::uint16_t i : t.order) all[i] = static_cast<std::int16_t>(r);
+    f.surface_ssim = 1 - surface_dssim(t, all);
+    rungs.push_back(f);
+  }
+  return rungs;
+}
 
 std::string fragments_text(PackageReader& p, DumpGamma) {
   std::string s;

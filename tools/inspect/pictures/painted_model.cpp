@@ -275,16 +275,20 @@ ColourLegend atlas_legend(const AtlasReport& report) {
 
 }  // namespace
 
-Srgb colour_of(double fraction) {
-  const double at = std::clamp(fraction, 0.0, 1.0) * (kScale.size() - 1);
-  const auto low = std::min(static_cast<std::size_t>(at), kScale.size() - 2);
+Srgb colour_on(std::span<const Srgb> scale, double fraction) {
+  const double at = std::clamp(fraction, 0.0, 1.0) * static_cast<double>(scale.size() - 1);
+  const auto low = std::min(static_cast<std::size_t>(at), scale.size() - 2);
   Srgb out{};
   for (std::size_t k = 0; k < 3; ++k) {
-    const double x = kScale[low][k] + (at - static_cast<double>(low)) * (kScale[low + 1][k] - kScale[low][k]);
+    const double x = scale[low][k] + (at - static_cast<double>(low)) * (scale[low + 1][k] - scale[low][k]);
     out[k] = static_cast<std::uint8_t>(x + 0.5);
   }
   return out;
 }
+
+Srgb colour_of(double fraction) { return colour_on(kScale, fraction); }
+
+std::string hex_of(Srgb c) { return fmt::format("#{:02x}{:02x}{:02x}", c[0], c[1], c[2]); }
 
 std::string share_text(double count, double of) { return percent(of > 0 ? count / of : 0) + " %"; }
 

@@ -40,8 +40,13 @@ struct PaintedModel {
   ColourLegend legend;
 };
 
+/// The colour of 0..1 (clipped) on a scale of two or more colours at equal distances.
+Srgb colour_on(std::span<const Srgb> scale, double fraction);
 /// The scale of colours: dark violet for 0, over teal, to yellow for 1; brightness rises all the way.
 Srgb colour_of(double fraction);
+
+/// "#rrggbb"
+std::string hex_of(Srgb colour);
 
 /// The mesh alone, one matt material, colours from a value per position; the legend gets its stops.
 /// StageError where the number of values is another; `what` names them in the message.

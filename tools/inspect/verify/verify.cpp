@@ -1,5 +1,6 @@
 #include "tools/inspect/verify/verify.h"
 
+#include <fmt/format.h>
 #include <zlib.h>
 #include <cstdio>
 #include <new>
@@ -23,8 +24,12 @@
 namespace texmesh {
 namespace {
 
-std::string plane_field(std::uint32_t plane, const std::string& member) {
+std::string plane_field(std::size_t plane, const std::string& member) {
   return "plane " + std::to_string(plane) + ", " + member;
+}
+
+std::string shape_text(std::uint32_t width_px, std::uint32_t height_px, std::uint32_t channels) {
+  return fmt::format("{} x {} px, {} channels", width_px, height_px, channels);
 }
 
 std::uint64_t sum(const std::vector<std::uint32_t>& v) {
@@ -69,14 +74,12 @@ void check_fragment(const TextureInfo& texture, const PlaneTables& t, std::uint3
     const std::uint64_t texels =
         static_cast<std::uint64_t>(texture.fragment_width_px) * texture.fragment_height_px;
     const Pixels pixels = decode_fragment_file(texture.codec, streams.file(i), texels);
-    findings.require(
-        pixels.width_px == texture.fragment_width_px && pixels.height_px == texture.fragment_height_px &&
-            pixels.channels == texture.channels,
-        {"fragment-decode", "F08"}, entry, field,
-        std::to_string(texture.fragment_width_px) + " x " + std::to_string(texture.fragment_height_px) +
-            " px, " + std::to_string(texture.channels) + " channels",
-        std::to_string(pixels.width_px) + " x " + std::to_string(pixels.height_px) + " px, " +
-            std::to_string(pixels.channels) + " channels");
+    findings.require(pixels.width_px == texture.fragment_width_px &&
+                         pixels.height_px == texture.fragment_height_px &&
+                         pixels.channels == texture.channels,
+                     {"fragment-decode", "F08"}, entry, field,
+                     shape_text(texture.fragment_width_px, texture.fragment_height_px, texture.channels),
+                     shape_text(pixels.width_px, pixels.height_px, pixels.channels));
   } catch (const Error& e) {
     const std::string rule = rule_of(e);
     findings.add({"fragment-decode", rule.empty() ? "F08" : rule.c_str()}, entry, field, e.expected(),
@@ -150,21 +153,19 @@ void check_textures(const Manifest& m, const std::vector<TextureInfo>& textures,
                          std::to_string(info.image) + " at every size",
                      "another");
     findings.require(info.columns == t.columns && info.rows == t.rows, {"tables-grid", "R08"}, kTablesPath,
-                     plane_field(static_cast<std::uint32_t>(k), "grid"),
-                     std::to_string(info.columns) + " x " + std::to_string(info.rows),
+                     plane_field(k, "grid"), std::to_string(info.columns) + " x " + std::to_string(info.rows),
                      std::to_string(t.columns) + " x " + std::to_string(t.rows));
     findings.require_equal<std::uint64_t>(m.scales.size(), t.scale_count(), {"tables-scales", "R11"},
-                                          kTablesPath, plane_field(static_cast<std::uint32_t>(k), "scales"));
+                                          kTablesPath, plane_field(k, "scales"));
     findings.require(std::equal(info.rung_quality.begin(), info.rung_quality.end(), t.rung_quality.begin(),
                                 t.rung_quality.end()) &&
                          info.rungs.size() == info.rung_quality.size(),
-                     {"tables-rungs", "R09"}, kTablesPath,
-                     plane_field(static_cast<std::uint32_t>(k), "rungs"),
+                     {"tables-rungs", "R09"}, kTablesPath, plane_field(k, "rungs"),
                      std::to_string(info.rung_quality.size()) + " rungs of the qualities in textures.json",
                      std::to_string(t.rung_quality.size()) + " rungs");
     const CodecTraits& codec = codec_traits(info.codec);
     findings.require(codec.incremental == t.incremental, {"tables-codec", "R10"}, kTablesPath,
-                     plane_field(static_cast<std::uint32_t>(k), "incremental"),
+                     plane_field(k, "incremental"),
                      codec.incremental ? "set, for codec " + std::string(codec.id) : "not set",
                      "the opposite");
     findings.require(
@@ -206,11 +207,8 @@ void check_preview(const TextureInfo& texture, std::span<const std::uint8_t> jpe
     findings.require(p.width_px == texture.preview_width_px && p.height_px == texture.preview_height_px &&
                          p.channels == texture.channels,
                      {"preview", "F16"}, texture.preview.path, "",
-                     std::to_string(texture.preview_width_px) + " x " +
-                         std::to_string(texture.preview_height_px) + " px, " +
-                         std::to_string(texture.channels) + " channels",
-                     std::to_string(p.width_px) + " x " + std::to_string(p.height_px) + " px, " +
-                         std::to_string(p.channels) + " channels");
+                     shape_text(texture.preview_width_px, texture.preview_height_px, texture.channels),
+                     shape_text(p.width_px, p.height_px, p.channels));
   } catch (const Error& e) {
     findings.add({"preview", "F16"}, texture.preview.path, e.place(), e.expected(), e.found());
   }

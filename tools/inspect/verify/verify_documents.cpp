@@ -209,10 +209,10 @@ static std::string rungs_option(const TextureInfo& texture) {
 
 void check_provenance(const Manifest& m, const std::vector<TextureInfo>& textures, const Provenance& p,
                       Findings& findings) {
-  findings.require(p.format_major == m.major && p.format_minor == m.minor, {"provenance", "O03"},
+  findings.require(p.format.major == m.major && p.format.minor == m.minor, {"provenance", "O03"},
                    kProvenancePath, "/format",
                    std::to_string(m.major) + "." + std::to_string(m.minor) + ", as the manifest",
-                   std::to_string(p.format_major) + "." + std::to_string(p.format_minor));
+                   p.format.text());
   const auto option = [&](const char* stage, const char* name) {
     const auto section = p.options->find(stage);
     if (section == p.options->end() || !section->contains(name)) return nlohmann::ordered_json();

@@ -8,7 +8,6 @@
 #include "format/base/text_bytes.h"
 #include "format/rules/viewing.h"
 #include "pipeline/io/markup.h"
-#include "pipeline/io/new_folder.h"
 #include "pipeline/io/table.h"
 #include "pipeline/io/uri.h"
 #include "stages/gltf/check_glb.h"
@@ -267,10 +266,6 @@ void export_oembed(PackageReader& package, const std::string& path, const Export
   add_poster(package, made);
 }
 
-FolderRule export_folder_rule() {
-  return marked_folder_rule(kListFile, kListBegin, "an empty folder, an earlier export, or nothing yet");
-}
-
 }  // namespace
 
 std::vector<TileLevel> tile_levels(const Manifest& manifest, double display_px,
@@ -357,6 +352,10 @@ DocumentSchema export_schema() {
       schema_of<Export>());
 }
 
+FolderRule export_folder_rule() {
+  return marked_folder_rule(kListFile, kListBegin, "an empty folder, an earlier export, or nothing yet");
+}
+
 void write_export(const Export& made, const std::string& folder) {
   NewFolder out(folder, export_folder_rule());
   for (const ExportedFile& f : made.files) out.add(f.path, f.bytes);
@@ -364,7 +363,5 @@ void write_export(const Export& made, const std::string& folder) {
   out.add(kListFile, text_bytes(export_list(made)));
   out.publish();
 }
-
-void check_export_folder(const std::string& folder) { NewFolder(folder, export_folder_rule()); }
 
 }  // namespace texmesh

@@ -2,6 +2,7 @@
 
 #include "delivery/cpp/package/package_reader.h"
 #include "format/base/vec.h"
+#include "pipeline/io/new_folder.h"
 #include "pipeline/io/record.h"
 #include "stages/base/run_context.h"
 
@@ -91,8 +92,8 @@ DocumentSchema export_schema();
 /// Writes the folder, which appears whole or not at all. An earlier export is replaced. InputError when the
 /// folder holds anything else, or cannot be made.
 void write_export(const Export& made, const std::string& folder);
-/// The same refusals, before the work.
-void check_export_folder(const std::string& folder);
+/// The folder that this is: new, empty, or an earlier one.
+FolderRule export_folder_rule();
 
 // The parts of exports that tests look at by themselves.
 

@@ -166,7 +166,8 @@ class Canvas {
   double step_ = 1, top_value_ = 1, low_value_ = 0;
 };
 
-std::string legend(const std::vector<PlotSeries>& series, double top) {
+/// And the height of its lines.
+std::pair<std::string, double> legend(const std::vector<PlotSeries>& series, double top) {
   std::string svg;
   double x = kLeft, y = top;
   for (const PlotSeries& s : series) {
@@ -179,27 +180,15 @@ std::string legend(const std::vector<PlotSeries>& series, double top) {
         markup_escaped(s.name));
     x += width;
   }
-  return svg;
-}
-
-/// How many lines the legend takes.
-double legend_height(const std::vector<PlotSeries>& series) {
-  double x = kLeft, lines = 0;
-  for (const PlotSeries& s : series) {
-    if (s.name.empty()) continue;
-    const double width = 34 + 7.0 * static_cast<double>(s.name.size());
-    if (lines == 0) lines = 1;
-    if (x > kLeft && x + width > kWidth) x = kLeft, ++lines;
-    x += width;
-  }
-  return lines * kLegendLine;
+  return {svg, svg.empty() ? 0 : y - top + kLegendLine};
 }
 
 }  // namespace
 
 std::string Plot::svg() const {
   const Canvas canvas(*this);
-  const double height = kHeight + legend_height(series) + 8;
+  const auto [names, names_height] = legend(series, kHeight + kLegendLine);
+  const double height = kHeight + names_height + 8;
   std::string out =
       fmt::format("<svg role=\"img\" aria-label=\"{}\" width=\"{}\" height=\"{}\" viewBox=\"0 0 {} {}\">\n",
                   markup_escaped(title), kWidth, height, kWidth, height);
@@ -215,7 +204,7 @@ std::string Plot::svg() const {
         out += fmt::format("<circle class=\"f{}\" cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"2.6\"/>\n", s.colour,
                            canvas.x(px), canvas.y(py));
   }
-  return out + legend(series, kHeight + kLegendLine) + "</svg>\n";
+  return out + names + "</svg>\n";
 }
 
 }  // namespace texmesh

@@ -1,6 +1,7 @@
 // The page in the order of its sections: what holds (switch sizes), the source beside S_0, what bytes buy,
 // where the bytes are, fragments, the step function, proxies, method.
 #include "tools/publish/report/report.h"
+#include "pipeline/io/table.h"
 
 #include <fmt/format.h>
 
@@ -8,8 +9,7 @@
 
 #include "format/base/portable_math.h"
 #include "pipeline/io/markup.h"
-#include "pipeline/io/table.h"
-#include "tools/inspect/dump/package_figures.h"
+#include "tools/inspect/dump/dump.h"
 #include "tools/publish/pages/page.h"
 
 namespace texmesh {
@@ -219,7 +219,7 @@ Table plane_table(PackageReader& package) {
     std::uint64_t all = t.tables.bytes;
     for (const EntryRef& rung : t.rungs) all += rung.bytes;
     table.row({t.mip == 0 ? std::to_string(p) : fmt::format("{} (mip {} of {})", p, t.mip, t.base), t.role,
-               fmt::format("{} x {}", t.width_px, t.height_px), stored_fragments(package.tables().planes[p]),
+               fmt::format("{} x {}", t.width_px, t.height_px), package.tables().planes[p].order.size(),
                t.rungs.size(), t.rungs.empty() ? "" : format_bytes(t.rungs.front().bytes),
                t.rungs.empty() ? "" : format_bytes(t.rungs.back().bytes), format_bytes(all)});
   }
@@ -546,7 +546,5 @@ void write_report(const Report& report, const std::string& folder) {
   for (const ReportFile& f : report.files) out.add(f.path, f.bytes);
   out.publish();
 }
-
-void check_report_folder(const std::string& folder) { NewFolder(folder, report_folder_rule()); }
 
 }  // namespace texmesh

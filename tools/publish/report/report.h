@@ -2,7 +2,6 @@
 
 #include "delivery/cpp/client/delivery_plan.h"
 #include "pipeline/io/new_folder.h"
-#include "pipeline/io/record.h"
 #include "tools/publish/report/report_pictures.h"
 
 namespace texmesh {
@@ -122,7 +121,5 @@ FolderRule report_folder_rule();
 /// Writes the files; the folder appears whole or not at all. An earlier report is replaced. InputError when
 /// the folder holds anything else, or cannot be made.
 void write_report(const Report& report, const std::string& folder);
-/// The same refusals, before the work.
-void check_report_folder(const std::string& folder);
 
 }  // namespace texmesh

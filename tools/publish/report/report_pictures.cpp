@@ -11,15 +11,15 @@ namespace texmesh {
 namespace {
 
 // Every eighth of the map "magma" (van der Walt and Smith, 2015), the one that FLIP's authors use.
-constexpr std::array<std::array<int, 3>, 9> kStops{{{0, 0, 4},
-                                                    {28, 16, 68},
-                                                    {79, 18, 123},
-                                                    {129, 37, 129},
-                                                    {181, 54, 122},
-                                                    {229, 80, 100},
-                                                    {251, 135, 97},
-                                                    {254, 194, 135},
-                                                    {252, 253, 191}}};
+constexpr std::array<Srgb, 9> kStops{{{0, 0, 4},
+                                      {28, 16, 68},
+                                      {79, 18, 123},
+                                      {129, 37, 129},
+                                      {181, 54, 122},
+                                      {229, 80, 100},
+                                      {251, 135, 97},
+                                      {254, 194, 135},
+                                      {252, 253, 191}}};
 
 constexpr std::uint32_t kMargin = 6;  // px around the object
 constexpr int kMostEnlarged = 6;
@@ -64,31 +64,21 @@ FragmentHeat over_largest(std::string name, std::vector<double> value) {
 
 }  // namespace
 
-Vec3<std::uint8_t> heat_colour(double value) {
-  const double at = std::clamp(value, 0.0, 1.0) * (kStops.size() - 1);
-  const std::size_t stop = std::min(static_cast<std::size_t>(at), kStops.size() - 2);
-  const double part = at - static_cast<double>(stop);
-  const auto channel = [&](std::size_t c) {
-    const double mixed = kStops[stop][c] * (1 - part) + kStops[stop + 1][c] * part;
-    return static_cast<std::uint8_t>(std::lround(mixed));
-  };
-  return {channel(0), channel(1), channel(2)};
-}
+Srgb heat_colour(double value) { return colour_on(kStops, value); }
 
-Pixels heat_picture(const std::vector<float>& values, std::uint32_t side_px, double full) {
+/// A square picture of FLIP values, `side_px` a side, in heat colours: 0 is black, `full` and more is the
+/// last colour.
+static Pixels heat_picture(const std::vector<float>& values, std::uint32_t side_px, double full) {
   Pixels out{side_px, side_px, 3, {}};
   out.data.reserve(values.size() * 3);
   for (const float v : values) {
-    const Vec3<std::uint8_t> c = heat_colour(static_cast<double>(v) / full);
-    out.data.insert(out.data.end(), {c.x, c.y, c.z});
+    const Srgb c = heat_colour(static_cast<double>(v) / full);
+    out.data.insert(out.data.end(), c.begin(), c.end());
   }
   return out;
 }
 
-std::string heat_hex(double value) {
-  const Vec3<std::uint8_t> c = heat_colour(value);
-  return fmt::format("#{:02x}{:02x}{:02x}", c.x, c.y, c.z);
-}
+std::string heat_hex(double value) { return hex_of(heat_colour(value)); }
 
 std::string picture_row(const PictureRow& row, const Picture& reference, const Picture& tested,
                         std::vector<ReportFile>& files) {
@@ -235,7 +225,8 @@ std::size_t ViewDifferences::worst() const {
 double ViewDifferences::worst_mean() const { return static_cast<double>(largest(mean)); }
 double ViewDifferences::worst_p95() const { return static_cast<double>(largest(p95)); }
 
-ViewDifferences compare_scale(PackagePictures& pictures, int scale, int views, double displayed_px) {
+/// A scale beside S_0.
+static ViewDifferences compare_scale(PackagePictures& pictures, int scale, int views, double displayed_px) {
   ViewDifferences out;
   const std::uint32_t side_px = pictures.side_for(displayed_px);
   for (int v = 0; v < views; ++v) {

@@ -3,16 +3,13 @@
 
 #include "stages/measure/flip.h"
 #include "tools/extract/package_model.h"
+#include "tools/inspect/pictures/painted_model.h"
 
 namespace texmesh {
 
 /// The colour of a value 0..1 (clipped) on a scale from black over purple and orange to pale yellow, whose
 /// lightness rises evenly: it reads in grey, too. sRGB, 0..255.
-Vec3<std::uint8_t> heat_colour(double value);
-
-/// A square picture of FLIP values, `side_px` a side, in heat colours: 0 is black, `full` and more is the
-/// last colour.
-Pixels heat_picture(const std::vector<float>& values, std::uint32_t side_px, double full);
+Srgb heat_colour(double value);
 
 /// Such a colour for HTML: "#rrggbb".
 std::string heat_hex(double value);
@@ -89,9 +86,6 @@ struct ViewDifferences {
   std::size_t worst() const;     // the view of the largest mean
   double worst_mean() const, worst_p95() const;  // of all views; 0 without views
 };
-
-/// A scale beside S_0.
-ViewDifferences compare_scale(PackagePictures& pictures, int scale, int views, double displayed_px);
 
 /// How far pictures may differ before a scale can be told from S_0. Values of texmesh's own.
 struct FlipLimits {

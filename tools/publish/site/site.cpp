@@ -8,7 +8,6 @@
 
 #include "format/base/text_bytes.h"
 #include "pipeline/io/markup.h"
-#include "pipeline/io/new_folder.h"
 #include "pipeline/io/table.h"
 #include "pipeline/io/uri.h"
 #include "tools/publish/pages/page.h"
@@ -168,10 +167,6 @@ std::string viewer_list(const Site& site) {
   return to_json_line(list);
 }
 
-FolderRule site_folder_rule() {
-  return marked_folder_rule("index.html", kSiteFirstLine, "an empty folder, an earlier site, or nothing yet");
-}
-
 }  // namespace
 
 std::string object_name(const std::string& path, std::vector<std::string>& taken) {
@@ -217,17 +212,14 @@ Site read_site(const std::string& packages, const SiteOptions& options) {
   return site;
 }
 
-SiteReport site_report(const Site& site, const std::string& folder) {
-  SiteReport report{(fs::path(folder) / "index.html").string(), {}, site.faults};
-  for (const SiteObject& o : site.objects)
-    report.objects.push_back({o.path, "objects/" + o.name + ".html", o.title, o.bytes});
-  return report;
-}
-
 DocumentSchema site_schema() {
   return document_schema("site.v1", "texmesh site report, version 1",
                          "Output of `texmesh site PACKAGES -o DIR --json`: what the site shows.",
                          schema_of<SiteReport>());
+}
+
+FolderRule site_folder_rule() {
+  return marked_folder_rule("index.html", kSiteFirstLine, "an empty folder, an earlier site, or nothing yet");
 }
 
 void write_site(const Site& site, const std::string& folder) {
@@ -245,7 +237,5 @@ void write_site(const Site& site, const std::string& folder) {
   out.add("viewer/packages.json", text_bytes(viewer_list(site)));
   out.publish();
 }
-
-void check_site_folder(const std::string& folder) { NewFolder(folder, site_folder_rule()); }
 
 }  // namespace texmesh

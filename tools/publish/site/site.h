@@ -1,6 +1,7 @@
 #pragma once
 
 #include "format/documents/about.h"
+#include "pipeline/io/new_folder.h"
 #include "pipeline/io/record.h"
 
 namespace texmesh {
@@ -25,6 +26,14 @@ struct SiteObject {
   std::uint64_t start_bytes = 0;  // until there is a picture
   std::uint64_t triangles = 0;
   std::uint32_t texture_px = 0;  // longest side of its textures; 0 = it has none
+  static void fields(auto& s, auto&& v) {
+    v("package", s.path, FieldRule{.pattern = "."},
+      "Relative to the folder of packages; an unpacked one ends with a slash.");
+    v("page", "objects/" + s.name + ".html", FieldRule{.pattern = "^objects/[A-Za-z0-9._-]+\\.html$"},
+      "Relative to DIR.");
+    v("title", s.title, "");
+    v("bytes", s.bytes, "Of the whole package.");
+  }
 };
 
 /// A package that could not be read, and why.
@@ -52,24 +61,13 @@ Site read_site(const std::string& packages, const SiteOptions& options);
 /// servers but packages that stand there. Same packages, same bytes. The folder appears whole or not at all;
 /// an earlier site is replaced. InputError when it holds anything else or cannot be made.
 void write_site(const Site& site, const std::string& folder);
-/// The same refusals, before the work.
-void check_site_folder(const std::string& folder);
+/// The folder that this is: new, empty, or an earlier one.
+FolderRule site_folder_rule();
 
-struct ReportedObject {
-  std::string package, page, title;
-  std::uint64_t bytes = 0;
-  static void fields(auto& s, auto&& v) {
-    v("package", s.package, FieldRule{.pattern = "."},
-      "Relative to the folder of packages; an unpacked one ends with a slash.");
-    v("page", s.page, FieldRule{.pattern = "^objects/[A-Za-z0-9._-]+\\.html$"}, "Relative to DIR.");
-    v("title", s.title, "");
-    v("bytes", s.bytes, "Of the whole package.");
-  }
-};
 /// What site --json prints.
 struct SiteReport {
   std::string page;
-  std::vector<ReportedObject> objects;
+  std::vector<SiteObject> objects;
   std::vector<SiteFault> faults;
   static void fields(auto& s, auto&& v) {
     v("version", Constant{1}, "");
@@ -78,7 +76,6 @@ struct SiteReport {
     v("faults", s.faults, "Packages that could not be read and are not in the site.");
   }
 };
-SiteReport site_report(const Site& site, const std::string& folder);
 DocumentSchema site_schema();
 
 /// A name for the files of the package at `path`, none of `taken` (in lower case), to which it is added.

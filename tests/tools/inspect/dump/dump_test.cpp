@@ -5,7 +5,6 @@
 #include "pipeline/io/table.h"
 #include "tests/support/packages.h"
 #include "tools/inspect/dump/dump.h"
-#include "tools/inspect/dump/package_figures.h"
 #include "tools/inspect/provenance.h"
 
 namespace texmesh {

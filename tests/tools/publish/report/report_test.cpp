@@ -175,10 +175,10 @@ TEST(Report, TheFolderAppearsWholeAndReplacesReportsOnly) {
 
   std::filesystem::create_directories(folder / "other");
   write_text(folder / "other/index.html", "<!DOCTYPE html>\n<title>somebody's</title>");
-  EXPECT_THROW(check_report_folder(folder / "other"), InputError);
+  EXPECT_THROW(NewFolder(folder / "other", report_folder_rule()), InputError);
   EXPECT_THROW(write_report(report, folder / "other"), InputError);
   EXPECT_EQ(files_beneath(folder / "other").size(), 1u);
-  check_report_folder(folder / "new");
+  NewFolder(folder / "new", report_folder_rule());
   EXPECT_FALSE(std::filesystem::exists(folder / "new"));
 }
 
@@ -186,7 +186,7 @@ TEST(HeatColour, GrowsLighterFromBlack) {
   int before = -1;
   for (int i = 0; i <= 16; ++i) {
     const auto c = heat_colour(i / 16.0);
-    const int light = 2 * c.x + 5 * c.y + c.z;
+    const int light = 2 * c[0] + 5 * c[1] + c[2];
     EXPECT_GT(light, before);
     before = light;
   }
