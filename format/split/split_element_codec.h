@@ -131,7 +131,8 @@ class BitDecoder {
 /// relative to a running mean of lengths, then the two bits below the leading one, then the rest raw.
 struct ValueModels {
   static constexpr int kSteps = 20, kBelow = 12;
-  static constexpr std::uint8_t kValueLimit = 60, kPrior = 24;  // a stream's models count as so many symbols seen
+  static constexpr std::uint8_t kValueLimit = 60,
+                                kPrior = 24;  // a stream's models count as so many symbols seen
   static constexpr std::size_t kCount = 4 * kSteps + 3 * kBelow + 1;
   std::array<BitModel, kCount> all;
   BitModel& longer(int quarter, int step) { return all[static_cast<std::size_t>(quarter * kSteps + step)]; }
