@@ -269,6 +269,7 @@ std::vector<Proxy> measured_proxies(const ProxySubject& subject, std::vector<Kep
 }
 
 }  // namespace
+
 Proxies make_proxies(const NestedScales& scales, const std::vector<Material>& materials,
                      const std::vector<Image>& images, const Fragments& fragments,
                      const std::vector<Pixels>& pixels, const ProxiesOptions& options,

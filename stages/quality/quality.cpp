@@ -270,6 +270,7 @@ std::vector<double> texel_levels(const SizeCells& size, std::size_t doublings) {
 }
 
 }  // namespace
+
 MeasuredQuality measure_quality(const NestedScales& scales, const PerceptualValues& perceptual,
                                 const std::vector<Material>& materials, const std::vector<Image>& images,
                                 const Fragments& fragments, const std::vector<Pixels>& pixels,

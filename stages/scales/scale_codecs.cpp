@@ -32,10 +32,10 @@ struct Stream {
   std::size_t stride = 0, count = 0;
 };
 
-/// `value(i)` gives an element as an array of numbers.
-Stream make_stream(std::size_t count, const auto& value) {
+/// `value(i)` gives an element as an array of numbers. Elements are padded to a multiple of `align`.
+Stream make_stream(std::size_t count, const auto& value, std::size_t align = 4) {
   using Element = std::remove_cvref_t<decltype(value(std::size_t{0}))>;
-  Stream s{{}, (sizeof(Element) + 3) / 4 * 4, count};
+  Stream s{{}, (sizeof(Element) + align - 1) / align * align, count};
   s.bytes.resize(count * s.stride);
   for (std::size_t i = 0; i < count; ++i) {
     const Element element = value(i);
@@ -185,7 +185,8 @@ class PlainPrimitive {
     const bool wide = n_ > 65535;  // 65535 itself is not an index: it means "restart"
     const std::vector<std::uint32_t>& in = primitive_.indices;
     const auto as = [&]<class T>(T) {
-      return make_stream(in.size(), [&](std::size_t i) { return std::array{static_cast<T>(in[i])}; });
+      return make_stream(
+          in.size(), [&](std::size_t i) { return std::array{static_cast<T>(in[i])}; }, sizeof(T));
     };
     const Stream s = wide ? as(std::uint32_t{}) : as(std::uint16_t{});
     return writer_.add_accessor({{"bufferView", add(s, true)},
