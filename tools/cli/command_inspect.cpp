@@ -1,10 +1,12 @@
 // The commands that look into packages, and the two that take a package apart and put it together again.
 #include <fmt/format.h>
 #include <sys/resource.h>
+
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "pipeline/io/atomic_file.h"
+#include "pipeline/io/table.h"
 #include "stages/image/png_writer.h"
 #include "tools/cli/check/check_gate.h"
 #include "tools/cli/commands.h"
