@@ -1,9 +1,9 @@
 #pragma once
 #include <variant>
 
+#include "delivery/cpp/package/package_reader.h"
 #include "pipeline/io/record.h"
-#include "tools/extract/glb/texture_source.h"
-#include "tools/render/rendered_model.h"
+#include "stages/base/run_context.h"
 
 namespace texmesh {
 
@@ -53,6 +53,7 @@ struct ExtractRequest {
 
 inline constexpr double kMostGlbBytes = 4294967295;
 
+enum class FileImage : std::uint8_t { kJpeg, kWebp, kPng };
 template <>
 struct EnumNames<FileImage> {
   static constexpr std::array<std::string_view, 3> names{"jpeg", "webp", "png"};

@@ -93,9 +93,6 @@ std::array<std::uint8_t, 3> background_colour(const RenderEnvironment& environme
 /// How many views stand side by side.
 std::uint32_t sheet_columns(int count);
 
-/// A rung beyond the last one stands for the last one.
-inline constexpr std::uint32_t kBestRung = 0xffffffffu;
-
 /// A plane put together again from all its fragments at one rung: width x height texels without the
 /// fragments' overhang. What is not stored (nobody sees it) continues its neighbours smoothly, so that
 /// smaller copies show no seams. Reads the rung as one entry, digest checked. FormatError when the package is

@@ -12,6 +12,9 @@
 
 namespace texmesh {
 
+/// A rung beyond the last one stands for the last one.
+inline constexpr std::uint32_t kBestRung = 0xffffffffu;
+
 /// Where a package's entries come from: a .texmesh file (or anything that serves ranges of one), or the same
 /// tree unpacked into a folder.
 class PackageStore {

@@ -220,6 +220,6 @@ constexpr ModuleReaders kReader{&read_module_header, &decode, &read_picture, &de
 }  // namespace
 }  // namespace texmesh
 
-__attribute__((visibility("default"))) const texmesh::ModuleReaders* texmesh_readers_3() {
+extern "C" __attribute__((visibility("default"))) const texmesh::ModuleReaders* texmesh_readers_3() {
   return &texmesh::kReader;
 }

@@ -4,7 +4,8 @@
 #include "stages/geometry/scale_frames.h"
 #include "stages/measure/flip.h"
 #include "stages/render/shade.h"
-#include "tools/extract/extract.h"
+#include "tools/extract/glb/texture_source.h"
+#include "tools/render/rendered_model.h"
 
 namespace texmesh {
 

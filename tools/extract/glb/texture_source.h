@@ -1,9 +1,9 @@
 #pragma once
 
-#include "delivery/cpp/package/package_reader.h"
 #include "format/model/model.h"
 #include "stages/image/resize.h"
 #include "stages/jpeg/source_jpeg.h"
+#include "tools/extract/extract.h"
 
 namespace texmesh {
 
@@ -72,8 +72,6 @@ Pixels with_alpha_of(const PackageImage& image, const Pixels& colours, const Pix
 /// texels of an image that no material shows by one of the first two sets of coordinates.
 std::vector<std::uint8_t> shown_texels(const Mesh& mesh, const Model& model, std::uint32_t image,
                                        std::uint32_t width_px, std::uint32_t height_px);
-
-enum class FileImage : std::uint8_t { kJpeg, kWebp, kPng };
 
 /// An image as a file holds it.
 struct FileImageData {
