@@ -42,12 +42,11 @@ if(TEXMESH_COMPILER)
     endif()
   endforeach()
   # Of pipeline and tools what a program calls, and what those headers name; tests/house/check_install sees that none misses.
-  texmesh_install_headers(pipeline "import/import\\.h" "compile/(compile_model|options|profile)\\.h"
-    "batch/(plan|run|fleet/shards)\\.h" "cache/(disk_store|cache_layer|prune)\\.h"
-    "io/(file_resolver|file_stamp|record|resolver)\\.h" "compile/workers/(sandbox|worker|worker_messages)\\.h" "batch/progress\\.h"
-    "graph/(graph_run|key|option_text|stage|store)\\.h")
+  texmesh_install_headers(pipeline "import/import\\.h" "compile/(compile_model|options)\\.h" "batch/(plan|progress|run)\\.h"
+    "cache/(disk_store|cache_layer)\\.h" "io/(file_resolver|file_stamp|new_folder|record|resolver|uri)\\.h" "compile/workers/(sandbox|worker)\\.h"
+    "graph/(graph_run|stage|store)\\.h")
   texmesh_install_headers(tools "inspect/(dump/dump|verify/verify|diff/diff)\\.h" "extract/extract\\.h" "publish/export/export\\.h"
-    "publish/site/site\\.h" "extract/glb/image_codecs\\.h" "render/plane_pixels\\.h")
+    "publish/site/site\\.h")
   install(FILES cmake/FindUtf8proc.cmake cmake/FindWebP.cmake DESTINATION ${texmesh_cmake_dir})
   install(TARGETS texmesh EXPORT texmeshTool RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT tool)
   install(TARGETS texmesh_readers LIBRARY DESTINATION ${TEXMESH_MODULE_FOLDER} COMPONENT tool)

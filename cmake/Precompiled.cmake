@@ -4,6 +4,9 @@
 set(texmesh_std_headers <algorithm> <array> <cmath> <cstdint> <functional> <map> <memory> <optional> <set> <span> <string>
   <string_view> <utility> <vector>)
 
+# What all sources pay for, even those that name no JSON, is what g++ leaves for the end of each: templates that inline functions call.
+set(texmesh_json_header ${PROJECT_SOURCE_DIR}/cmake/json_without_literals.h)
+
 function(texmesh_precompile target)  # target, then headers beside those of the standard library
   target_precompile_headers(${target} PRIVATE ${texmesh_std_headers} ${ARGN})
 endfunction()

@@ -33,6 +33,11 @@ function(texmesh_unity_room target room options)  # sources
   endforeach()
 endfunction()
 
+# Sources that take as long as a unit: each is a unit.
+function(texmesh_unity_apart)  # sources
+  set_source_files_properties(${ARGN} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+endfunction()
+
 # To be called when the properties of all sources are set.
 function(texmesh_unity target)
   if(NOT TEXMESH_UNITY)
@@ -48,7 +53,8 @@ function(texmesh_unity target)
     file(STRINGS ${source} macro REGEX "^#define " LIMIT_COUNT 1)
     get_source_file_property(options ${source} COMPILE_OPTIONS)
     get_source_file_property(alone ${source} SKIP_PRECOMPILE_HEADERS)
-    if(macro OR alone)  # would reach the neighbours, or is compiled in another way
+    get_source_file_property(apart ${source} SKIP_UNITY_BUILD_INCLUSION)
+    if(macro OR alone OR apart)  # would reach the neighbours, is compiled in another way, or takes as long as a unit
       set_source_files_properties(${source} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
       continue()
     endif()

@@ -2,28 +2,26 @@
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
+#include <map>
 #include <thread>
 
+#include "examples/scan_model.h"
 #include "examples/scan_noise.h"
-#include "examples/scan_writers.h"
 
 namespace {
 
-using namespace texmesh;            // NOLINT: an example's main file
-using namespace texmesh::examples;  // NOLINT
+using namespace texmesh;  // NOLINT: an example's main file
+using namespace texmesh;  // NOLINT
 
 void write_model(const ScanOptions& options, const std::string& path, const RunContext& context) {
   const Model model = make_scan(options, context);
   const std::string extension = std::filesystem::path(path).extension().string();
-  if (extension == ".glb") {
-    write_scan_glb(model, path);
-  } else if (extension == ".obj") {
-    write_scan_obj(model, path);
-  } else if (extension == ".ply") {
-    write_scan_ply(model, path);
-  } else {
+  const std::map<std::string, void (*)(const Model&, const std::string&)> writers{
+      {".glb", write_scan_glb}, {".obj", write_scan_obj}, {".ply", write_scan_ply}};
+  const auto writer = writers.find(extension);
+  if (writer == writers.end())
     throw InputError("make_scan", "-o", "a name that ends in .glb, .obj or .ply", path);
-  }
+  writer->second(model, path);
   std::printf("%s: %zu triangles, %zu positions, %zu wedges, %zu textures of %d px\n", path.c_str(),
               model.mesh.triangles.size(), model.mesh.positions.size(), model.mesh.wedge_count(),
               model.images.size(), options.texture_px);

@@ -4,11 +4,10 @@
 
 #include "examples/scan_model.h"
 #include "examples/scan_noise.h"
-#include "format/base/box.h"
-#include "format/base/no_index.h"
 #include "format/base/portable_math.h"
+#include "format/base/vec.h"
 
-namespace texmesh::examples {
+namespace texmesh {
 namespace {
 
 using Corners = std::vector<std::array<std::uint32_t, 3>>;  // position indices
@@ -21,11 +20,7 @@ struct Sphere {
 // A cube's surface as a lattice of 6 n^2 cells, blown up to a sphere, its vertices shaken within their cells
 // and its diagonals drawn at random, so that triangles are as irregular as a scanner's.
 Sphere irregular_sphere(std::uint32_t n, std::uint32_t seed) {
-  auto lattice_key = [n](std::uint32_t i, std::uint32_t j, std::uint32_t k) {
-    return (static_cast<std::uint64_t>(i) * (n + 1) + j) * (n + 1) + k;
-  };
   std::vector<std::array<std::uint64_t, 4>> cells;
-  cells.reserve(static_cast<std::size_t>(6) * n * n);
   for (int axis = 0; axis < 3; ++axis)
     for (std::uint32_t side = 0; side < 2; ++side)
       for (std::uint32_t a = 0; a < n; ++a)
@@ -35,14 +30,13 @@ Sphere irregular_sphere(std::uint32_t n, std::uint32_t seed) {
             c[axis] = side * n;
             c[(axis + 1) % 3] = u;
             c[(axis + 2) % 3] = v;
-            return lattice_key(c[0], c[1], c[2]);
+            return (static_cast<std::uint64_t>(c[0]) * (n + 1) + c[1]) * (n + 1) + c[2];
           };
           std::array<std::uint64_t, 4> cell{key(a, b), key(a + 1, b), key(a + 1, b + 1), key(a, b + 1)};
           if (side == 0) std::swap(cell[1], cell[3]);
           cells.push_back(cell);
         }
   std::vector<std::uint64_t> keys;
-  keys.reserve(cells.size() * 4);
   for (const auto& cell : cells) keys.insert(keys.end(), cell.begin(), cell.end());
   std::sort(keys.begin(), keys.end());
   keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
@@ -318,4 +312,4 @@ ScanMesh make_scan_mesh(const ScanShape& shape, const ScanOptions& options) {
   return scan;
 }
 
-}  // namespace texmesh::examples
+}  // namespace texmesh

@@ -1,13 +1,10 @@
 #pragma once
-#include <array>
-#include <cstdint>
-#include <vector>
 
 #include "format/model/model.h"
 #include "stages/base/run_context.h"
 #include "stages/data/pixels.h"
 
-namespace texmesh::examples {
+namespace texmesh {
 
 /// A made scan: an organic object with the habits of photogrammetry (irregular triangles, measuring noise,
 /// holes, an atlas of many charts with black gutters, exposure that jumps at seams). The same bytes on every
@@ -26,7 +23,7 @@ struct ScanOptions {
 };
 
 /// What a point of the made surface looks like.
-struct SurfaceSample {
+struct ShapeSample {
   Vec3d colour;       // sRGB, 0..1
   double height = 0;  // relief too fine for the mesh, object units
   double occlusion = 1, roughness = 0.8;
@@ -44,7 +41,7 @@ class ScanShape {
   double range_radius(double alpha, double t) const;
   static constexpr double range_height() { return 0.3; }
   /// `finest` is the size of the smallest detail to paint, object units: that of a texel.
-  SurfaceSample sample(Vec3d position, Vec3d normal, double finest) const;
+  ShapeSample sample(Vec3d position, Vec3d normal, double finest) const;
 
  private:
   struct Lobe {
@@ -88,4 +85,15 @@ struct MadeRangeScan {
 };
 MadeRangeScan make_range_scan(const ScanOptions& options, const RunContext& context);
 
-}  // namespace texmesh::examples
+// Write a made scan to disk; InputError when a file cannot be written. Files beside the named one (MTL,
+// textures, grid) take its stem.
+
+void write_scan_glb(const Model& model, const std::string& path);
+void write_scan_obj(const Model& model, const std::string& path);
+/// Binary PLY with texture coordinates per face and a TextureFile comment (base colour only), as MeshLab
+/// writes it.
+void write_scan_ply(const Model& model, const std::string& path);
+/// JSON, a 16-bit PGM grid and a JPEG; see schemas/range-scan.v1.schema.json.
+void write_range_scan(const MadeRangeScan& scan, int jpeg_quality, const std::string& path);
+
+}  // namespace texmesh

@@ -1,10 +1,8 @@
 #pragma once
-#include <cmath>
-#include <cstdint>
 
 #include "format/base/vec.h"
 
-namespace texmesh::examples {
+namespace texmesh {
 
 /// A 32-bit hash of a lattice point; the source of everything random in a made scan. Integer arithmetic only,
 /// so the same on every machine.
@@ -37,4 +35,4 @@ inline double smoothstep(double lo, double hi, double x) {
   return t * t * (3 - 2 * t);
 }
 
-}  // namespace texmesh::examples
+}  // namespace texmesh

@@ -1,11 +1,46 @@
-#include <algorithm>
-
 #include "examples/scan_model.h"
 #include "examples/scan_noise.h"
 #include "format/base/portable_math.h"
 
-namespace texmesh::examples {
+namespace texmesh {
 namespace {
+
+double fade(double t) { return t * t * t * (t * (t * 6 - 15) + 10); }
+
+// The dot product of one of twelve edge directions of a cube with (x, y, z).
+double gradient(std::uint32_t h, double x, double y, double z) {
+  const std::uint32_t g = h >> 28;
+  const double u = g < 8 ? x : y, v = g < 4 ? y : (g == 12 || g == 14) ? x : z;
+  return ((g & 1) ? -u : u) + ((g & 2) ? -v : v);
+}
+
+// Octaves are shifted against each other so that their lattices never line up.
+Vec3d next_octave(Vec3d p) { return {p.x * 2 + 17.31, p.y * 2 - 9.57, p.z * 2 + 5.13}; }
+
+/// The lattice cell that a point lies in, and where.
+struct LatticeCell {
+  std::uint32_t x, y, z;
+  Vec3d at;
+  explicit LatticeCell(Vec3d p) {
+    const Vec3d low{std::floor(p.x), std::floor(p.y), std::floor(p.z)};
+    const auto number = [](double v) { return static_cast<std::uint32_t>(static_cast<std::int64_t>(v)); };
+    x = number(low.x), y = number(low.y), z = number(low.z);
+    at = p - low;
+  }
+};
+
+/// The sum of `of` each octave's noise, and the sum of their amplitudes.
+template <class Of>
+std::pair<double, double> octave_sum(Vec3d p, std::uint32_t seed, int octaves, double gain, const Of& of) {
+  double sum = 0, amplitude = 1, total = 0;
+  for (int i = 0; i < octaves; ++i) {
+    sum += amplitude * of(noise(p, seed + static_cast<std::uint32_t>(i)));
+    total += amplitude;
+    amplitude *= gain;
+    p = next_octave(p);
+  }
+  return {sum, total};
+}
 
 constexpr double kUnit = 0.11;  // object units of a radius of 1
 
@@ -24,6 +59,40 @@ Vec3d random_direction(std::uint32_t index, std::uint32_t seed) {
 }
 
 }  // namespace
+
+double noise(Vec3d p, std::uint32_t seed) {
+  const LatticeCell cell(p);
+  const auto [x, y, z] = cell.at;
+  const double u = fade(x), v = fade(y), w = fade(z);
+  auto corner = [&](std::uint32_t i, std::uint32_t j, std::uint32_t k) {
+    const Vec3d& at = cell.at;
+    return gradient(hash(cell.x + i, cell.y + j, cell.z + k, seed), at.x - i, at.y - j, at.z - k);
+  };
+  const double a = mix(mix(corner(0, 0, 0), corner(1, 0, 0), u), mix(corner(0, 1, 0), corner(1, 1, 0), u), v);
+  const double b = mix(mix(corner(0, 0, 1), corner(1, 0, 1), u), mix(corner(0, 1, 1), corner(1, 1, 1), u), v);
+  return mix(a, b, w);
+}
+
+double fractal(Vec3d p, std::uint32_t seed, int octaves, double gain) {
+  return octave_sum(p, seed, octaves, gain, [](double x) { return x; }).first;
+}
+
+double ridged(Vec3d p, std::uint32_t seed, int octaves, double gain) {
+  const auto [sum, amplitudes] =
+      octave_sum(p, seed, octaves, gain, [](double x) { return 1 - std::fabs(x); });
+  return sum / amplitudes;
+}
+
+double spots(Vec3d p, std::uint32_t seed, double density) {
+  const LatticeCell cell(p);
+  const auto drawn = [&](std::uint32_t k) { return hash01(cell.x, cell.y, cell.z, seed + k); };
+  if (drawn(0) >= density) return 0;
+  // Radius and centre are such that a spot never leaves its cell: one cell to look at instead of 27.
+  const double radius = 0.12 + 0.34 * drawn(1);
+  auto centre = [&](std::uint32_t k) { return radius + (1 - 2 * radius) * drawn(k); };
+  const Vec3d d{cell.at.x - centre(2), cell.at.y - centre(3), cell.at.z - centre(4)};
+  return std::max(0.0, 1 - length(d) / radius);
+}
 
 ScanShape::ScanShape(std::uint32_t seed) : seed_(seed * 1000003u + 17u) {
   twist_ = mix(-0.6, 0.6, hash01(1, 0, 0, seed_));
@@ -62,7 +131,7 @@ double ScanShape::range_radius(double alpha, double t) const {
   return outline * std::max(0.3, 1 + relief);
 }
 
-SurfaceSample ScanShape::sample(Vec3d position, Vec3d normal, double finest) const {
+ShapeSample ScanShape::sample(Vec3d position, Vec3d normal, double finest) const {
   const Vec3d p = position * (1 / kUnit);
   const Vec3d q = p + Vec3d{fractal(p * 1.7, seed_ + 50, 3), fractal(p * 1.7, seed_ + 53, 3),
                             fractal(p * 1.7, seed_ + 56, 3)} *
@@ -88,7 +157,7 @@ SurfaceSample ScanShape::sample(Vec3d position, Vec3d normal, double finest) con
   c = mix(c, palette_[3], 0.6 * smoothstep(0, 0.5, pits));
   c = mix(c, Vec3d{0.86, 0.84, 0.78}, 0.45 * smoothstep(0.2, 0.6, flecks) * (1 - growth));
 
-  SurfaceSample s;
+  ShapeSample s;
   s.height = kUnit * (0.010 * fine - 0.012 * cracks - 0.010 * smoothstep(0, 0.7, pits) + 0.006 * growth);
   s.occlusion = clamp01(1 - 0.5 * cracks - 0.35 * smoothstep(0, 0.7, pits) + 0.15 * std::min(0.0, fine));
   s.roughness = clamp01(0.62 + 0.2 * growth + 0.12 * fine - 0.25 * drip);
@@ -98,4 +167,4 @@ SurfaceSample ScanShape::sample(Vec3d position, Vec3d normal, double finest) con
   return s;
 }
 
-}  // namespace texmesh::examples
+}  // namespace texmesh

@@ -6,11 +6,11 @@
 
 #include "examples/scan_model.h"
 #include "examples/scan_noise.h"
-#include "format/base/no_index.h"
 #include "format/base/portable_math.h"
+#include "format/base/vec.h"
 #include "stages/base/parallel.h"
 
-namespace texmesh::examples {
+namespace texmesh {
 namespace {
 
 struct TriangleInAtlas {
@@ -153,7 +153,7 @@ ScanTextures paint_atlas(const ScanShape& shape, const ScanMesh& scan, const Sca
           position = position + scan.surface[scan.mesh.position_of(t, k)] * b[k];
           normal = normal + scan.normal[scan.mesh.position_of(t, k)] * b[k];
         }
-        const SurfaceSample s = shape.sample(position, normalized(normal), texel);
+        const ShapeSample s = shape.sample(position, normalized(normal), texel);
         put(out.base_colour, i,
             through_camera(s.colour, scan.chart[t], x, static_cast<std::uint32_t>(y), seed));
         if (!options.all_textures) continue;
@@ -333,4 +333,4 @@ MadeRangeScan make_range_scan(const ScanOptions& options, const RunContext& cont
   return scan;
 }
 
-}  // namespace texmesh::examples
+}  // namespace texmesh

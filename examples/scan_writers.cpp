@@ -1,13 +1,13 @@
-#include "examples/scan_writers.h"
-
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "format/base/box.h"
+#include "examples/scan_model.h"
 #include "format/base/bytes.h"
+#include "format/base/text_bytes.h"
+#include "format/base/vec.h"
 
-namespace texmesh::examples {
+namespace texmesh {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -19,7 +19,7 @@ void append(Bytes& out, const std::vector<T>& values) {
 }
 void append(Bytes& out, const std::string& text) { out.insert(out.end(), text.begin(), text.end()); }
 
-void write_file(const std::string& path, const Bytes& bytes) {
+void write_file(const std::string& path, std::span<const std::uint8_t> bytes) {
   std::ofstream file(path, std::ios::binary);
   file.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
   file.close();
@@ -35,22 +35,6 @@ std::string image_name(const std::string& path, const Image& image) {
   return stem_of(path) + (image.name == "base_colour" ? "" : "_" + image.name) + ".jpg";
 }
 
-std::vector<float> flat(const std::vector<Vec3f>& values) {
-  std::vector<float> out;
-  for (Vec3f v : values) out.insert(out.end(), {v.x, v.y, v.z});
-  return out;
-}
-std::vector<float> flat(const std::vector<Vec2f>& values) {
-  std::vector<float> out;
-  for (Vec2f v : values) out.insert(out.end(), {v.x, v.y});
-  return out;
-}
-std::vector<float> flat(const std::vector<Vec4f>& values) {
-  std::vector<float> out;
-  for (Vec4f v : values) out.insert(out.end(), {v.x, v.y, v.z, v.w});
-  return out;
-}
-
 struct GlbBuilder {
   Json json;
   Bytes bin;
@@ -64,13 +48,12 @@ struct GlbBuilder {
     return static_cast<int>(json["bufferViews"].size()) - 1;
   }
   template <class T>
-  int accessor(const std::vector<T>& values, int component_type, const char* type, std::size_t count,
-               int target) {
+  int accessor(const std::vector<T>& values, int component_type, const char* type, int target) {
     Bytes bytes;
     append(bytes, values);
     json["accessors"].push_back(Json{{"bufferView", view(bytes, target)},
                                      {"componentType", component_type},
-                                     {"count", count},
+                                     {"count", values.size()},
                                      {"type", type}});
     return static_cast<int>(json["accessors"].size()) - 1;
   }
@@ -96,20 +79,18 @@ Json primitive_of(GlbBuilder& glb, const Mesh& mesh) {
   std::vector<Vec3f> positions;
   for (std::uint32_t p : mesh.wedge_position) positions.push_back(mesh.positions[p]);
   Json attributes;
-  const int at = glb.accessor(flat(positions), kFloat, "VEC3", positions.size(), kVertices);
+  const int at = glb.accessor(positions, kFloat, "VEC3", kVertices);
   const auto [lo, hi] = bounding_box(positions);
   glb.json["accessors"][static_cast<std::size_t>(at)]["min"] = {lo.x, lo.y, lo.z};
   glb.json["accessors"][static_cast<std::size_t>(at)]["max"] = {hi.x, hi.y, hi.z};
   attributes["POSITION"] = at;
-  attributes["NORMAL"] = glb.accessor(flat(mesh.normals), kFloat, "VEC3", mesh.normals.size(), kVertices);
-  if (!mesh.uv0.empty())
-    attributes["TEXCOORD_0"] = glb.accessor(flat(mesh.uv0), kFloat, "VEC2", mesh.uv0.size(), kVertices);
-  if (!mesh.colours.empty())
-    attributes["COLOR_0"] = glb.accessor(flat(mesh.colours), kFloat, "VEC4", mesh.colours.size(), kVertices);
+  attributes["NORMAL"] = glb.accessor(mesh.normals, kFloat, "VEC3", kVertices);
+  if (!mesh.uv0.empty()) attributes["TEXCOORD_0"] = glb.accessor(mesh.uv0, kFloat, "VEC2", kVertices);
+  if (!mesh.colours.empty()) attributes["COLOR_0"] = glb.accessor(mesh.colours, kFloat, "VEC4", kVertices);
   std::vector<std::uint32_t> indices;
   for (const Triangle& t : mesh.triangles) indices.insert(indices.end(), t.begin(), t.end());
   return Json{{"attributes", attributes},
-              {"indices", glb.accessor(indices, kUnsigned, "SCALAR", indices.size(), kIndices)},
+              {"indices", glb.accessor(indices, kUnsigned, "SCALAR", kIndices)},
               {"material", 0}};
 }
 
@@ -168,19 +149,14 @@ void write_scan_obj(const Model& model, const std::string& path) {
     }
     text += '\n';
   }
-  Bytes bytes;
-  append(bytes, text);
-  write_file(path, bytes);
-
+  write_file(path, text_bytes(text));
   std::string mtl = "newmtl surface\nKd 1 1 1\nillum 1\n";
   for (const Image& image : model.images) {
     const char* key = image.name == "base_colour" ? "map_Kd" : image.name == "normal" ? "map_Bump" : "";
     if (*key) mtl += std::string(key) + " " + image_name(path, image) + "\n";
     write_file(beside(path, image_name(path, image)), image.bytes);
   }
-  bytes.clear();
-  append(bytes, mtl);
-  write_file(beside(path, stem + ".mtl"), bytes);
+  write_file(beside(path, stem + ".mtl"), text_bytes(mtl));
 }
 
 void write_scan_ply(const Model& model, const std::string& path) {
@@ -237,9 +213,7 @@ void write_range_scan(const MadeRangeScan& scan, int jpeg_quality, const std::st
                   {"y_top", scan.height / 2},
                   {"y_step", scan.height / (scan.rows - 1)},
                   {"texture", stem + ".jpg"}};
-  Bytes text;
-  append(text, json.dump(2) + "\n");
-  write_file(path, text);
+  write_file(path, text_bytes(json.dump(2) + "\n"));
 }
 
-}  // namespace texmesh::examples
+}  // namespace texmesh

@@ -16,8 +16,7 @@ foreach(room ${rooms})
   file(GLOB_RECURSE found CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${room}/*.cpp)
   list(APPEND sources ${found})
 endforeach()
-foreach(name batch/build_memo batch/collection batch/find_models batch/fleet/run_summary batch/fleet/shards batch/plan compile/jnd_profile compile/option_fields compile/option_json
-    compile/options compile/profile compile/workers/worker_messages)
+foreach(name batch/build_memo batch/fleet/run_summary batch/plan compile/options compile/workers/worker_pool)
   list(APPEND sources ${PROJECT_SOURCE_DIR}/pipeline/${name}.cpp)
 endforeach()
 list(FILTER sources EXCLUDE REGEX "/stages/image/readers_module/module")
@@ -30,7 +29,7 @@ set_target_properties(texmesh_fuzz PROPERTIES POSITION_INDEPENDENT_CODE OFF)
 target_link_libraries(texmesh_fuzz PUBLIC texmesh_format Nettle::nettle ZLIB::ZLIB nlohmann_json::nlohmann_json CURL::libcurl
   TBB::tbb Eigen3::Eigen WebP::webp zstd::libzstd_shared Utf8proc::utf8proc draco::draco meshoptimizer::meshoptimizer JPEG::JPEG PNG::PNG fmt::fmt OpenImageIO::OpenImageIO
   ${CMAKE_DL_LIBS})
-texmesh_precompile(texmesh_fuzz <filesystem> <sstream> <nlohmann/json.hpp>)
+texmesh_precompile(texmesh_fuzz <filesystem> <sstream> ${texmesh_json_header})
 texmesh_unity(texmesh_fuzz)
 # Nothing of it, and of the copies of readers in it, is seen from outside: the program's own functions stay those with sanitizers.
 file(GLOB_RECURSE copies ${PROJECT_SOURCE_DIR}/format/base/*.cpp ${PROJECT_SOURCE_DIR}/format/container/*.cpp)

@@ -1,6 +1,7 @@
-// Bundles the library: dist/texmesh.js (everything; three.js stays outside), dist/open.js (to show packages), dist/page.js (many on one
-// page), dist/reader.js (without three.js), dist/thesis.js (chapter 4 as printed, thesis.bin), dist/worker.js, dist/viewer/ (an element by one script tag, with three.js inside). Each entry stands alone: the parts
-// that an entry loads by import() belong to that entry.
+// Bundles the library: dist/texmesh.js (everything; three.js stays outside), dist/open.js (to show packages), dist/page.js
+// (many on one page), dist/reader.js (without three.js), dist/thesis.js (chapter 4 as printed, thesis.bin), dist/worker.js, dist/viewer/
+// (an element by one script tag, with three.js inside). Each entry stands alone: the parts that an entry loads by import()
+// belong to that entry.
 //   node build.mjs               builds
 //   node build.mjs --types       after tsc: names files in full in dist/types, as Node.js resolves them
 //   node build.mjs --license     copies the project's LICENSE here, for npm pack

@@ -17,7 +17,8 @@ function dracoDecoder(): Plugin {
     closeBundle() {
       const three = dirname(dirname(createRequire(import.meta.url).resolve('three')));
       mkdirSync(out, { recursive: true });
-      for (const file of kDraco) copyFileSync(join(three, 'examples/jsm/libs/draco/gltf', file), join(out, file));
+      for (const file of kDraco)
+        copyFileSync(join(three, 'examples/jsm/libs/draco/gltf', file), join(out, file));
     },
   };
 }
@@ -27,7 +28,7 @@ export default defineConfig({
   base: './',
   plugins: [dracoDecoder()],
   resolve: {
-    // The library beside this example; an application of its own has `npm install texmesh` instead of this line.
+    // The library beside this example; other applications `npm install texmesh` instead.
     alias: { texmesh: fileURLToPath(new URL('../../delivery/web/dist/texmesh.js', import.meta.url)) },
     dedupe: ['three'],
   },

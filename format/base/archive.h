@@ -1,28 +1,23 @@
 #pragma once
-#include <array>
 #include <bit>
-#include <cstdint>
 #include <cstring>
-#include <span>
-#include <string>
 #include <type_traits>
 #include <vector>
 
 #include "format/base/errors.h"
-#include "format/base/sha256_stream.h"
+#include "format/base/sha256.h"
 #include "format/base/vec.h"
 
 namespace texmesh {
 
 // Serialisation of plain data for cached stage artefacts (not for packages: their layouts stand in SPEC.md).
 // A struct names its members once, in
-//   template <class S, class A> static void archive(S& s, A& a)
+//   static void archive(auto& s, auto& a)
 // and both archives below go through that list. Numbers are little-endian. A vector or string is a u64 count
 // and its elements.
 static_assert(std::endian::native == std::endian::little,
               "artefact and package codecs copy little-endian memory");
 
-namespace archive_detail {
 template <class T>
 struct IsFlat : std::bool_constant<std::is_arithmetic_v<T> || std::is_enum_v<T>> {};
 template <class T>
@@ -33,7 +28,6 @@ template <class T>
 struct IsFlat<Vec4<T>> : std::true_type {};
 template <class T, std::size_t N>
 struct IsFlat<std::array<T, N>> : IsFlat<T> {};
-}  // namespace archive_detail
 
 /// Hands the bytes of what it is called with to `Sink`, piece by piece: a function of ByteSpan.
 template <class Sink>
@@ -51,7 +45,7 @@ class ArchiveTo {
   }
   template <class T>
   void put(const T& value) {
-    if constexpr (archive_detail::IsFlat<T>::value) {
+    if constexpr (IsFlat<T>::value) {
       raw(&value, sizeof value);
     } else {
       T::archive(value, *this);
@@ -64,7 +58,7 @@ class ArchiveTo {
   template <class T>
   void put(const std::vector<T>& v) {
     put(static_cast<std::uint64_t>(v.size()));
-    if constexpr (archive_detail::IsFlat<T>::value) {
+    if constexpr (IsFlat<T>::value) {
       raw(v.data(), v.size() * sizeof(T));
     } else {
       for (const T& x : v) put(x);
@@ -73,24 +67,22 @@ class ArchiveTo {
   Sink sink_;
 };
 
-namespace archive_detail {
-struct SizeSink {
+struct ArchiveSizeSink {
   std::size_t bytes = 0;
   void operator()(std::span<const std::uint8_t> piece) { bytes += piece.size(); }
 };
-struct MemorySink {
+struct ArchiveMemorySink {
   std::vector<std::uint8_t> bytes;
   void operator()(std::span<const std::uint8_t> piece) {
     bytes.insert(bytes.end(), piece.begin(), piece.end());
   }
 };
-struct DigestSink {
+struct ArchiveDigestSink {
   Sha256Stream stream;
   void operator()(std::span<const std::uint8_t> piece) { stream.add(piece); }
 };
-}  // namespace archive_detail
 
-class ArchiveWriter : public ArchiveTo<archive_detail::MemorySink> {
+class ArchiveWriter : public ArchiveTo<ArchiveMemorySink> {
  public:
   void reserve(std::size_t bytes) { sink().bytes.reserve(bytes); }
   /// The bytes; the writer is empty afterwards.
@@ -129,7 +121,7 @@ class ArchiveReader {
   }
   template <class T>
   void get(T& value) {
-    if constexpr (archive_detail::IsFlat<T>::value) {
+    if constexpr (IsFlat<T>::value) {
       raw(&value, sizeof value);
     } else {
       T::archive(value, *this);
@@ -147,7 +139,7 @@ class ArchiveReader {
   }
   template <class T>
   void get(std::vector<T>& v) {
-    if constexpr (archive_detail::IsFlat<T>::value) {
+    if constexpr (IsFlat<T>::value) {
       v.resize(count(sizeof(T)));
       raw(v.data(), v.size() * sizeof(T));
     } else {
@@ -162,9 +154,8 @@ class ArchiveReader {
 };
 
 /// Bytes that grow would for a moment take three times their memory: gigabytes where a scan is large.
-template <class T>
-std::vector<std::uint8_t> encode_artefact(const T& value) {
-  ArchiveTo<archive_detail::SizeSink> size;
+std::vector<std::uint8_t> encode_artefact(const auto& value) {
+  ArchiveTo<ArchiveSizeSink> size;
   size(value);
   ArchiveWriter w;
   w.reserve(size.sink().bytes);
@@ -176,9 +167,8 @@ struct ArtefactDigest {
   Sha256 digest{};
   std::uint64_t bytes = 0;
 };
-template <class T>
-ArtefactDigest digest_artefact(const T& value) {
-  ArchiveTo<archive_detail::DigestSink> w;
+ArtefactDigest digest_artefact(const auto& value) {
+  ArchiveTo<ArchiveDigestSink> w;
   w(value);
   Sha256Stream& stream = w.sink().stream;
   const std::uint64_t bytes = stream.bytes();

@@ -1,8 +1,6 @@
 #pragma once
 #include <stdexcept>
 #include <string>
-#include <string_view>
-#include <utility>
 
 namespace texmesh {
 
@@ -11,12 +9,7 @@ namespace texmesh {
 /// /accessors/3/count: expected <= 100000, found 2147483648`.
 class Error : public std::runtime_error {
  public:
-  Error(std::string file, std::string place, std::string expected, std::string found)
-      : std::runtime_error(join(file, place, expected, found)),
-        file_(std::move(file)),
-        place_(std::move(place)),
-        expected_(std::move(expected)),
-        found_(std::move(found)) {}
+  Error(std::string file, std::string place, std::string expected, std::string found);
 
   const std::string& file() const { return file_; }
   const std::string& place() const { return place_; }
@@ -24,20 +17,6 @@ class Error : public std::runtime_error {
   const std::string& found() const { return found_; }
 
  private:
-  static std::string join(std::string_view file, std::string_view place, std::string_view expected,
-                          std::string_view found) {
-    std::string s;
-    auto add = [&s](std::string_view separator, std::string_view prefix, std::string_view text) {
-      if (text.empty()) return;
-      if (!s.empty()) s += separator;
-      s.append(prefix).append(text);
-    };
-    add(": ", "", file);
-    add(": ", "", place);
-    add(": ", "expected ", expected);
-    add(expected.empty() ? ": " : ", ", "found ", found);
-    return s;
-  }
   std::string file_, place_, expected_, found_;
 };
 
@@ -61,5 +40,51 @@ struct StageError : Error {
 struct Cancelled : std::runtime_error {
   Cancelled() : std::runtime_error("cancelled") {}
 };
+
+/// A package breaks a rule of format/SPEC.md. what() ends with the rule's name: `... expected 1, found 2
+/// [K03]`.
+class RuleError : public FormatError {
+ public:
+  RuleError(std::string rule, const FormatError& error)
+      : FormatError(error),
+        rule_(std::move(rule)),
+        message_(std::string(error.FormatError::what()) + " [" + rule_ + "]") {}
+  RuleError(std::string rule, std::string file, std::string place, std::string expected, std::string found)
+      : RuleError(std::move(rule),
+                  FormatError(std::move(file), std::move(place), std::move(expected), std::move(found))) {}
+  const std::string& rule() const { return rule_; }
+  const char* what() const noexcept override { return message_.c_str(); }
+
+ private:
+  std::string rule_, message_;
+};
+
+/// The rule that an error names; "" where the error names none.
+inline std::string rule_of(const Error& error) {
+  const auto* breach = dynamic_cast<const RuleError*>(&error);
+  return breach ? breach->rule() : "";
+}
+
+/// Runs `body`. A FormatError that names no rule leaves as a breach of `rule`.
+template <class Body>
+decltype(auto) under_rule(const char* rule, Body&& body) {
+  try {
+    return body();
+  } catch (const RuleError&) {
+    throw;
+  } catch (const FormatError& e) {
+    throw RuleError(rule, e);
+  }
+}
+
+/// Calls fail(expected, found) of a reader of bytes (BytesIn), which says where it stands; the error is a
+/// breach of `rule`.
+[[noreturn]] void fail_by(const char* rule, const auto& reader, std::string expected, std::string found) {
+  try {
+    reader.fail(std::move(expected), std::move(found));
+  } catch (const FormatError& e) {
+    throw RuleError(rule, e);
+  }
+}
 
 }  // namespace texmesh

@@ -12,8 +12,7 @@ namespace texmesh {
 //
 //   struct SsfOptions {
 //     int scales = 20;
-//     template <class S, class V>
-//     static void fields(S& s, V&& v) {
+//     static void fields(auto& s, auto&& v) {
 //       v("scales", s.scales, Range{1, 64}, "smoothed copies beside the original");
 //     }
 //   };

@@ -1,9 +1,7 @@
 #pragma once
-#include <string>
-#include <utility>
 #include <vector>
 
-#include "format/base/rule_error.h"
+#include "format/base/errors.h"
 
 namespace texmesh {
 

@@ -7,8 +7,8 @@
 #include <set>
 
 #include "format/base/bounded_json.h"
-#include "format/base/clean_text.h"
-#include "format/base/rule_error.h"
+#include "format/base/errors.h"
+#include "format/base/text_bytes.h"
 
 namespace texmesh {
 
@@ -135,12 +135,6 @@ void check_integers(const Json& json, const std::string& file) {
   if (large) throw RuleError("J02", file, "", "whole numbers up to 2^53", excerpt(json));
 }
 
-std::string print(double v) {
-  char text[32];
-  const auto result = std::to_chars(text, text + sizeof text, v);
-  return {text, result.ptr};
-}
-
 }  // namespace
 
 Json parse_json(std::span<const std::uint8_t> bytes, const std::string& file, std::uint64_t max_bytes) {
@@ -170,6 +164,11 @@ std::string dump_json(const nlohmann::ordered_json& json, const std::string& fil
   } catch (const nlohmann::ordered_json::exception&) {
     throw FormatError(file, "", "texts in UTF-8", "other bytes");
   }
+}
+
+std::string shortest_text(double value) {
+  char text[32];
+  return {text, std::to_chars(text, text + sizeof text, value).ptr};
 }
 
 double shortest_double(float value) {
@@ -234,7 +233,7 @@ std::uint64_t JsonAt::integer(std::uint64_t lo, std::uint64_t hi) const {
 double JsonAt::number(double lo, double hi) const {
   if (!value_.is_number()) fail_type("a number");
   const auto v = value_.get<double>();
-  if (!(v >= lo && v <= hi)) fail(print(lo) + " to " + print(hi), print(v));
+  if (!(v >= lo && v <= hi)) fail(shortest_text(lo) + " to " + shortest_text(hi), shortest_text(v));
   return v;
 }
 

@@ -1,8 +1,5 @@
 #pragma once
-#include <cstdint>
 #include <nlohmann/json_fwd.hpp>
-#include <span>
-#include <string>
 #include <string_view>
 
 #include "format/base/sha256.h"
@@ -24,6 +21,8 @@ nlohmann::json parse_json(std::span<const std::uint8_t> bytes, const std::string
 /// is not UTF-8.
 std::string dump_json(const nlohmann::ordered_json& json, const std::string& file);
 
+/// In the shortest form that reads back the same.
+std::string shortest_text(double value);
 /// The double whose decimal form is the shortest for this float, so that dump_json writes no noise digits.
 double shortest_double(float value);
 /// `value` rounded to six significant decimal digits.

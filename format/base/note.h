@@ -17,10 +17,7 @@ struct Note {
   std::string text;   // one sentence without a final full stop
 
   friend bool operator==(const Note&, const Note&) = default;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.severity, s.code, s.place, s.text);
-  }
+  static void archive(auto& s, auto& a) { a(s.severity, s.code, s.place, s.text); }
 };
 using Notes = std::vector<Note>;
 

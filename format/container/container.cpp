@@ -2,14 +2,12 @@
 
 #include <fcntl.h>
 #include <sys/stat.h>
-#include <unistd.h>
 #include <zlib.h>
 
 #include <algorithm>
-#include <cerrno>
 
 #include "format/base/bytes.h"
-#include "format/base/rule_error.h"
+#include "format/base/descriptor.h"
 #include "format/container/layout.h"
 
 namespace texmesh {
@@ -19,18 +17,13 @@ class FileSource final : public ByteSource {
  public:
   explicit FileSource(std::string path) : path_(std::move(path)) {
     // Non-blocking, so that a FIFO does not hang us before fstat can tell.
-    fd_ = ::open(path_.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-    if (fd_ < 0) throw InputError(path_, "", "a readable file", std::strerror(errno));
+    fd_.reset(::open(path_.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+    if (fd_.get() < 0) throw InputError(path_, "", "a readable file", std::strerror(errno));
     struct stat st {};
-    if (::fstat(fd_, &st) != 0 || !S_ISREG(st.st_mode)) {
-      ::close(fd_);
+    if (::fstat(fd_.get(), &st) != 0 || !S_ISREG(st.st_mode))
       throw InputError(path_, "", "a regular file", "something else");
-    }
     size_ = static_cast<std::uint64_t>(st.st_size);
   }
-  ~FileSource() override { ::close(fd_); }
-  FileSource(const FileSource&) = delete;
-  FileSource& operator=(const FileSource&) = delete;
   std::string name() const override { return path_; }
   std::uint64_t size() override { return size_; }
   Bytes read(std::uint64_t offset, std::uint64_t bytes) override {
@@ -38,24 +31,16 @@ class FileSource final : public ByteSource {
       throw RuleError("K01", path_, "byte " + std::to_string(offset), std::to_string(bytes) + " bytes",
                       "a file of " + std::to_string(size_) + " bytes");
     Bytes out(static_cast<std::size_t>(bytes));
-    std::size_t done = 0;
-    while (done < out.size()) {
-      const ssize_t n = ::pread(fd_, out.data() + done, out.size() - done, static_cast<off_t>(offset + done));
-      if (n < 0 && errno == EINTR) continue;
-      if (n < 0)
-        throw InputError(path_, "byte " + std::to_string(offset + done), "readable bytes",
-                         std::strerror(errno));
-      if (n == 0)
-        throw RuleError("K01", path_, "byte " + std::to_string(offset + done), "more bytes",
-                        "the file became shorter");
-      done += static_cast<std::size_t>(n);
-    }
-    return out;
+    if (read_at(fd_.get(), offset, out)) return out;
+    if (errno == 0)
+      throw RuleError("K01", path_, "byte " + std::to_string(offset), "more bytes",
+                      "the file became shorter");
+    throw InputError(path_, "byte " + std::to_string(offset), "readable bytes", std::strerror(errno));
   }
 
  private:
   std::string path_;
-  int fd_ = -1;
+  Descriptor fd_;
   std::uint64_t size_ = 0;
 };
 
@@ -80,22 +65,6 @@ class MemorySource final : public ByteSource {
   std::span<const std::uint8_t> bytes_;
   std::string name_;
 };
-
-}  // namespace
-
-std::unique_ptr<ByteSource> open_file_source(const std::string& path) {
-  return std::make_unique<FileSource>(path);
-}
-
-std::unique_ptr<ByteSource> memory_source(std::span<const std::uint8_t> bytes, std::string name) {
-  return std::make_unique<MemorySource>(bytes, std::move(name));
-}
-
-std::unique_ptr<ByteSource> memory_source(std::vector<std::uint8_t>&& bytes, std::string name) {
-  return std::make_unique<MemorySource>(std::move(bytes), std::move(name));
-}
-
-namespace {
 
 constexpr std::uint64_t kAlignment = 64;
 constexpr std::uint64_t kMax16 = 0xffff, kMax32 = 0xffffffff;  // also what says "see ZIP64"
@@ -368,6 +337,18 @@ std::uint32_t crc_of(std::uint32_t crc, std::span<const std::uint8_t> bytes) {
 }
 
 }  // namespace
+
+std::unique_ptr<ByteSource> open_file_source(const std::string& path) {
+  return std::make_unique<FileSource>(path);
+}
+
+std::unique_ptr<ByteSource> memory_source(std::span<const std::uint8_t> bytes, std::string name) {
+  return std::make_unique<MemorySource>(bytes, std::move(name));
+}
+
+std::unique_ptr<ByteSource> memory_source(std::vector<std::uint8_t>&& bytes, std::string name) {
+  return std::make_unique<MemorySource>(std::move(bytes), std::move(name));
+}
 
 bool is_valid_entry_path(const std::string& path) {
   if (path == kContentCredentialPath) return true;

@@ -4,8 +4,6 @@
 #include <array>
 #include <charconv>
 #include <cstdio>
-#include <cstring>
-#include <span>
 #include <tuple>
 
 namespace texmesh {

@@ -1,11 +1,8 @@
 #include "format/documents/about.h"
 
 #include <algorithm>
-#include <charconv>
 #include <nlohmann/json.hpp>
-#include <optional>
 
-#include "format/base/errors.h"
 #include "format/base/json_fields.h"
 #include "format/base/text_bytes.h"
 #include "format/container/layout.h"
@@ -100,11 +97,6 @@ std::string verbatim(const nlohmann::json& document, const JsonAt& at, const cha
   return text;
 }
 
-std::string number_text(double value) {
-  char text[32];
-  return {text, std::to_chars(text, text + sizeof text, value).ptr};
-}
-
 }  // namespace
 
 std::string write_about(const About& about) {
@@ -184,7 +176,7 @@ std::vector<NamedText> about_lines(const About& about) {
   add_list("identifier", about.identifiers);
   add("capture", about.capture);
   add_list("date", about.dates);
-  if (about.metres_per_unit > 0) add("unit", about.unit + ", " + number_text(about.metres_per_unit) + " m");
+  if (about.metres_per_unit > 0) add("unit", about.unit + ", " + shortest_text(about.metres_per_unit) + " m");
   add("up axis", about.up_axis);
   add("coordinate reference",
       about.epsg == 0 ? about.crs

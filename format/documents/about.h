@@ -19,10 +19,7 @@ inline constexpr std::uint32_t kMaxEpsgCode = 999'999;
 struct NamedText {
   std::string name, text;
   friend bool operator==(const NamedText&, const NamedText&) = default;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.name, s.text);
-  }
+  static void archive(auto& s, auto& a) { a(s.name, s.text); }
 };
 
 /// about.json: what the object is, whose it is, and what its coordinates mean. Everything may be missing:
@@ -40,8 +37,7 @@ struct About {
   std::string source;  // JSON object: what the source file said, verbatim
   std::string extras;  // JSON: what the publisher added
   friend bool operator==(const About&, const About&) = default;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
+  static void archive(auto& s, auto& a) {
     a(s.title, s.description, s.creator, s.attribution, s.licence, s.licence_url, s.source_url, s.capture,
       s.identifiers, s.dates, s.unit, s.metres_per_unit, s.up_axis, s.crs, s.epsg, s.source, s.extras);
   }

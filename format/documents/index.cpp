@@ -1,10 +1,8 @@
 #include "format/documents/index.h"
 
-#include <algorithm>
 #include <map>
 
 #include "format/container/container.h"
-#include "format/container/format_version.h"
 #include "format/container/layout.h"
 
 namespace texmesh {

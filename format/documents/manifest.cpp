@@ -1,11 +1,8 @@
 #include "format/documents/manifest.h"
 
-#include <algorithm>
-#include <nlohmann/json.hpp>
-
-#include "format/base/json_fields.h"
 #include "format/base/text_bytes.h"
 #include "format/container/container.h"
+#include "format/documents/json_members.h"
 
 namespace texmesh {
 namespace {
@@ -26,119 +23,108 @@ bool is_known_feature(const std::string& name) {
   return std::ranges::find(kKnownFeatures, name) != kKnownFeatures.end();
 }
 
-Json vector_json(Vec3d v) { return Json::array({v.x, v.y, v.z}); }
-
-Json ref_json(const EntryRef& ref) {
-  Json j;
-  j["offset"] = ref.offset;
-  j["bytes"] = ref.bytes;
-  j["sha256"] = to_hex(ref.digest);
-  return j;
+/// Where an entry's data stand.
+void place_members(auto& v, auto& ref) {
+  v.by("M05").integer("offset", ref.offset, 64);
+  v.by("M05").check("offset", ref.offset % 64 == 0, "a multiple of 64", std::to_string(ref.offset));
+  v.integer("bytes", ref.bytes, 1);
 }
 
-Json ref_json(const PagedRef& ref) {
-  Json j = ref_json(static_cast<const EntryRef&>(ref));
-  j["headBytes"] = ref.head_bytes;
-  j["headSha256"] = to_hex(ref.head_digest);
-  return j;
+void ref_members(auto& v, auto& ref) {
+  place_members(v, ref);
+  v.digest("sha256", ref.digest);
 }
 
-Json stream_json(const StreamRef& ref) {
-  Json j;
-  j["offset"] = ref.offset;
-  j["bytes"] = ref.bytes;
-  j["headBytes"] = ref.head_bytes;
-  j["headSha256"] = to_hex(ref.head_digest);
-  return j;
+void head_members(auto& v, auto& ref) {
+  v.integer("headBytes", ref.head_bytes, 16, ref.bytes);
+  v.digest("headSha256", ref.head_digest);
 }
 
-Json poster_json(const PosterRef& ref) {
-  Json j = ref_json(static_cast<const EntryRef&>(ref));
-  j["widthPx"] = ref.width_px;
-  j["heightPx"] = ref.height_px;
-  return j;
+void poster_members(auto& v, auto& ref) {
+  ref_members(v, ref);
+  v.by("O01").check("bytes", ref.bytes <= kMaxPosterBytes, "at most " + std::to_string(kMaxPosterBytes),
+                    std::to_string(ref.bytes));
+  v.by("O01").integer("widthPx", ref.width_px, 1, kMaxPosterSide);
+  v.by("O01").integer("heightPx", ref.height_px, 1, kMaxPosterSide);
 }
 
-/// One array per property: as objects, forty scales would spend half of the 16 KiB on names.
-Json scales_json(const std::vector<ManifestScale>& scales) {
-  Json j;
-  for (const char* name :
-       {"scale", "triangles", "vertices", "offset", "bytes", "sha256", "major", "errorMax", "errorRms", "p95",
-        "p99", "displayPxJnd", "displayPxError", "displayPxEdge", "displayPxFlip", "floor"})
-    j[name] = Json::array();
-  for (const ManifestScale& s : scales) {
-    j["scale"].push_back(s.scale);
-    j["triangles"].push_back(s.triangles);
-    j["vertices"].push_back(s.vertices);
-    j["offset"].push_back(s.glb.offset);
-    j["bytes"].push_back(s.glb.bytes);
-    j["sha256"].push_back(to_hex(s.glb.digest));
-    j["major"].push_back(s.major);
-    j["errorMax"].push_back(six_digits(s.error_max));
-    j["errorRms"].push_back(six_digits(s.error_rms));
-    j["p95"].push_back(six_digits(s.p95));
-    j["p99"].push_back(six_digits(s.p99));
-    j["displayPxJnd"].push_back(six_digits(s.display_px_jnd));
-    j["displayPxError"].push_back(six_digits(s.display_px_error));
-    j["displayPxEdge"].push_back(six_digits(s.display_px_edge));
-    j["displayPxFlip"].push_back(six_digits(s.display_px_flip));
-    j["floor"].push_back(s.floor);
-  }
-  return j;
+void scale_members(auto& v, auto& s, int before) {
+  v.integer("scale", s.scale, 0, kMaxScales - 1);
+  v.by("M10").check("scale", before < 0 ? s.scale == 0 : s.scale > before,
+                    before < 0 ? "0" : "a rising number", std::to_string(s.scale));
+  v.integer("triangles", s.triangles, 1, 0xffffffffu);
+  v.integer("vertices", s.vertices, 1, 0xffffffffu);
+  ref_members(v, s.glb);
+  v.boolean("major", s.major);
+  v.measured("errorMax", s.error_max, 0, kLargest);
+  v.measured("errorRms", s.error_rms, 0, kLargest);
+  v.measured("p95", s.p95, 0, kLargest);
+  v.measured("p99", s.p99, 0, kLargest);
+  v.by("M11").measured("displayPxJnd", s.display_px_jnd, 0, kAnyDisplayPx);
+  v.by("M11").measured("displayPxError", s.display_px_error, 0, kAnyDisplayPx);
+  v.by("M11").measured("displayPxEdge", s.display_px_edge, 0, kAnyDisplayPx);
+  v.by("M11").measured("displayPxFlip", s.display_px_flip, 0, kAnyDisplayPx);
+  v.text("floor", s.floor, kMaxFloorBytes);
 }
 
-Json proxies_json(const Manifest& m) {
-  Json j;
-  j["sizesPx"] = m.proxy_sizes_px;
-  for (const char* name :
-       {"offset", "bytes", "sha256", "triangles", "vertices", "texturePx", "flip", "flipP95"})
-    j[name] = Json::array();
-  const auto digits = [](const std::vector<double>& values) {
-    Json out = Json::array();
-    for (const double v : values) out.push_back(six_digits(v));
-    return out;
+void proxies_members(auto& v, auto& m) {
+  v.rising("sizesPx", m.proxy_sizes_px, kMaxProxySizes, 1, kMaxProxySizePx);
+  const std::size_t sizes = m.proxy_sizes_px.size();
+  v.rows("bytes", m.proxies, 1, kMaxPackageProxies, [&](auto& row, auto& p, std::size_t i) {
+    ref_members(row, p.glb);
+    row.by("M24").check("bytes", i == 0 || p.glb.bytes > m.proxies[i - 1].glb.bytes, "a rising number",
+                        std::to_string(p.glb.bytes));
+    row.integer("triangles", p.triangles, 1, 0xffffffffu);
+    row.integer("vertices", p.vertices, 1, 0xffffffffu);
+    row.integer("texturePx", p.texture_px, 0, kMaxProxyTexturePx);
+    row.measured("flip", p.flip, sizes, sizes, 1);
+    row.measured("flipP95", p.flip_p95, sizes, sizes, 1);
+  });
+}
+
+/// What stands before the steps.
+void shape_members(auto& v, auto& m) {
+  v.text("title", m.title, kMaxTitleBytes);
+  v.vector("origin", m.origin, kLargest);
+  v.object("bounds", [&](auto& bounds) {
+    bounds.vector("min", m.bounds_min, kLargest);
+    bounds.vector("max", m.bounds_max, kLargest);
+  });
+  v.number("objectHeight", m.object_height, 0, kLargest);
+  v.measured("surfaceArea", m.surface_area, 0, kLargest);
+  v.number("jnd", m.jnd, 0, 1);
+  v.object("scales", [&](auto& columns) {
+    columns.by("M10").rows("scale", m.scales, 1, kMaxScales, [&](auto& row, auto& s, std::size_t i) {
+      scale_members(row, s, i > 0 ? m.scales[i - 1].scale : -1);
+    });
+  });
+}
+
+/// What stands behind them.
+void entry_members(auto& v, auto& m) {
+  const auto optional = [&v](const char* name, auto& value, auto&& describe) {
+    if (!v.has(name, value.has_value())) return;
+    if constexpr (requires { value.emplace(); }) value.emplace();
+    v.object(name, [&](auto& inner) { describe(inner, *value); });
   };
-  for (const ManifestProxy& p : m.proxies) {
-    j["offset"].push_back(p.glb.offset);
-    j["bytes"].push_back(p.glb.bytes);
-    j["sha256"].push_back(to_hex(p.glb.digest));
-    j["triangles"].push_back(p.triangles);
-    j["vertices"].push_back(p.vertices);
-    j["texturePx"].push_back(p.texture_px);
-    j["flip"].push_back(digits(p.flip));
-    j["flipP95"].push_back(digits(p.flip_p95));
-  }
-  return j;
-}
-
-Json manifest_json(const Manifest& m) {
-  Json j;
-  j["format"] = "texmesh";
-  j["version"]["major"] = m.major;
-  j["version"]["minor"] = m.minor;
-  j["requiredFeatures"] = m.required_features;
-  j["title"] = m.title;
-  j["origin"] = vector_json(m.origin);
-  j["bounds"]["min"] = vector_json(m.bounds_min);
-  j["bounds"]["max"] = vector_json(m.bounds_max);
-  j["objectHeight"] = m.object_height;
-  j["surfaceArea"] = six_digits(m.surface_area);
-  j["jnd"] = m.jnd;
-  j["scales"] = scales_json(m.scales);
-  j["steps"] = Json::array();
-  for (const ManifestStep& s : m.steps) j["steps"].push_back(Json::array({six_digits(s.up_to_px), s.scale}));
-  if (!m.proxies.empty()) j["proxies"] = proxies_json(m);
-  j["planeCount"] = m.plane_count;
-  j["index"] = ref_json(m.index);
-  j["tables"] = ref_json(m.tables);
-  j["textures"] = ref_json(m.textures);
-  j["quality"] = ref_json(m.quality);
-  j["provenance"] = ref_json(m.provenance);
-  j["about"] = ref_json(m.about);
-  if (m.stream) j["stream"] = stream_json(*m.stream);
-  if (m.thesis) j["thesis"] = ref_json(*m.thesis);
-  if (m.poster) j["poster"] = poster_json(*m.poster);
-  return j;
+  const auto ref = [](auto& inner, auto& r) { ref_members(inner, r); };
+  if (v.has("proxies", !m.proxies.empty()))
+    v.by("M23").object("proxies", [&](auto& inner) { proxies_members(inner, m); });
+  v.integer("planeCount", m.plane_count, 0, kMaxPackagePlanes);
+  for (const auto& [name, paged] : {std::pair("index", &m.index), std::pair("tables", &m.tables)})
+    v.object(name, [&, to = paged](auto& inner) {
+      ref_members(inner, *to);
+      head_members(inner, *to);
+    });
+  for (const auto& [name, entry] : {std::pair("textures", &m.textures), std::pair("quality", &m.quality),
+                                    std::pair("provenance", &m.provenance), std::pair("about", &m.about)})
+    v.object(name, [&, to = entry](auto& inner) { ref_members(inner, *to); });
+  optional("stream", m.stream, [](auto& inner, auto& stream) {
+    place_members(inner, stream);
+    head_members(inner, stream);
+  });
+  optional("thesis", m.thesis, ref);
+  optional("poster", m.poster, [](auto& inner, auto& poster) { poster_members(inner, poster); });
 }
 
 void read_version(const JsonAt& at, Manifest& m) {
@@ -154,94 +140,6 @@ void read_version(const JsonAt& at, Manifest& m) {
     m.required_features.push_back(features[i].text(100));
     if (!is_known_feature(m.required_features.back()))
       features[i].by("M02").fail("a feature that this reader knows", m.required_features.back());
-  }
-}
-
-Vec3d read_vector(const JsonAt& at) {
-  at.array(3, 3);
-  return {at[0].number(-kLargest, kLargest), at[1].number(-kLargest, kLargest),
-          at[2].number(-kLargest, kLargest)};
-}
-
-std::uint64_t read_offset(const JsonAt& at) {
-  const std::uint64_t offset = at.by("M05").integer(64);
-  if (offset % 64 != 0) at.by("M05").fail("a multiple of 64", std::to_string(offset));
-  return offset;
-}
-
-void read_ref(const JsonAt& at, const char* path, EntryRef& ref) {
-  ref.path = path;
-  ref.offset = read_offset(at["offset"]);
-  ref.bytes = at["bytes"].integer(1);
-  ref.digest = at["sha256"].digest();
-}
-
-void read_paged_ref(const JsonAt& at, const char* path, PagedRef& ref) {
-  read_ref(at, path, ref);
-  ref.head_bytes = at["headBytes"].integer(16, ref.bytes);
-  ref.head_digest = at["headSha256"].digest();
-}
-
-StreamRef read_stream(const JsonAt& at) {
-  StreamRef ref;
-  ref.offset = read_offset(at["offset"]);
-  ref.bytes = at["bytes"].integer(1);
-  ref.head_bytes = at["headBytes"].integer(16, ref.bytes);
-  ref.head_digest = at["headSha256"].digest();
-  return ref;
-}
-
-PosterRef read_poster(const JsonAt& at) {
-  PosterRef ref;
-  read_ref(at, kPosterPath, ref);
-  if (ref.bytes > kMaxPosterBytes)
-    at["bytes"].by("O01").fail("at most " + std::to_string(kMaxPosterBytes), std::to_string(ref.bytes));
-  ref.width_px = static_cast<std::uint32_t>(at["widthPx"].by("O01").integer(1, kMaxPosterSide));
-  ref.height_px = static_cast<std::uint32_t>(at["heightPx"].by("O01").integer(1, kMaxPosterSide));
-  return ref;
-}
-
-void read_shape(const JsonAt& at, Manifest& m) {
-  m.title = at["title"].text(kMaxTitleBytes);
-  m.origin = read_vector(at["origin"]);
-  const JsonAt bounds = at["bounds"];
-  m.bounds_min = read_vector(bounds["min"]);
-  m.bounds_max = read_vector(bounds["max"]);
-  for (int i = 0; i < 3; ++i)
-    if (m.bounds_min[i] > m.bounds_max[i])
-      bounds["max"][static_cast<std::size_t>(i)].by("M03").fail("at least the minimum", "less");
-  m.object_height = at["objectHeight"].number(0, kLargest);
-  m.surface_area = at["surfaceArea"].number(0, kLargest);
-  m.jnd = at["jnd"].number(0, 1);
-}
-
-void read_scales(const JsonAt& at, Manifest& m) {
-  const std::size_t n = at["scale"].array(1, kMaxScales);
-  for (const char* column :
-       {"triangles", "vertices", "offset", "bytes", "sha256", "major", "errorMax", "errorRms", "p95", "p99",
-        "displayPxJnd", "displayPxError", "displayPxEdge", "displayPxFlip", "floor"})
-    at[column].by("M10").array(n, n);
-  for (std::size_t i = 0; i < n; ++i) {
-    ManifestScale s;
-    s.scale = static_cast<int>(at["scale"][i].integer(0, kMaxScales - 1));
-    if (i == 0 && s.scale != 0) at["scale"][i].by("M10").fail("0", std::to_string(s.scale));
-    if (i > 0 && s.scale <= m.scales.back().scale)
-      at["scale"][i].by("M10").fail("a rising number", std::to_string(s.scale));
-    s.triangles = static_cast<std::uint32_t>(at["triangles"][i].integer(1, 0xffffffffu));
-    s.vertices = static_cast<std::uint32_t>(at["vertices"][i].integer(1, 0xffffffffu));
-    s.glb = {mesh_path(s.scale), read_offset(at["offset"][i]), at["bytes"][i].integer(1),
-             at["sha256"][i].digest()};
-    s.major = at["major"][i].boolean();
-    s.error_max = at["errorMax"][i].number(0, kLargest);
-    s.error_rms = at["errorRms"][i].number(0, kLargest);
-    s.p95 = at["p95"][i].number(0, kLargest);
-    s.p99 = at["p99"][i].number(0, kLargest);
-    s.display_px_jnd = at["displayPxJnd"][i].by("M11").number(0, kAnyDisplayPx);
-    s.display_px_error = at["displayPxError"][i].by("M11").number(0, kAnyDisplayPx);
-    s.display_px_edge = at["displayPxEdge"][i].by("M11").number(0, kAnyDisplayPx);
-    s.display_px_flip = at["displayPxFlip"][i].by("M11").number(0, kAnyDisplayPx);
-    s.floor = at["floor"][i].text(kMaxFloorBytes);
-    m.scales.push_back(std::move(s));
   }
 }
 
@@ -261,35 +159,19 @@ void read_steps(const JsonAt& at, Manifest& m) {
   if (m.steps.back().scale != 0) at[n - 1][1].fail("0", std::to_string(m.steps.back().scale));
 }
 
-std::vector<double> read_proxy_losses(const JsonAt& at, std::size_t sizes) {
-  at.array(sizes, sizes);
-  std::vector<double> losses;
-  for (std::size_t i = 0; i < sizes; ++i) losses.push_back(at[i].number(0, 1));
-  return losses;
-}
-
-void read_proxies(const JsonAt& at, Manifest& m) {
-  const JsonAt sizes = at["sizesPx"];
-  for (std::size_t i = 0, n = sizes.array(1, kMaxProxySizes); i < n; ++i) {
-    m.proxy_sizes_px.push_back(sizes[i].number(1, kMaxProxySizePx));
-    if (i > 0 && m.proxy_sizes_px[i] <= m.proxy_sizes_px[i - 1]) sizes[i].fail("a rising number", "another");
-  }
-  const std::size_t n = at["bytes"].array(1, kMaxPackageProxies);
-  for (const char* column : {"offset", "sha256", "triangles", "vertices", "texturePx", "flip", "flipP95"})
-    at[column].array(n, n);
-  for (std::size_t i = 0; i < n; ++i) {
-    ManifestProxy p;
-    p.glb = {proxy_path(static_cast<std::uint32_t>(i)), read_offset(at["offset"][i]),
-             at["bytes"][i].integer(1), at["sha256"][i].digest()};
-    if (i > 0 && p.glb.bytes <= m.proxies.back().glb.bytes)
-      at["bytes"][i].by("M24").fail("a rising number", std::to_string(p.glb.bytes));
-    p.triangles = static_cast<std::uint32_t>(at["triangles"][i].integer(1, 0xffffffffu));
-    p.vertices = static_cast<std::uint32_t>(at["vertices"][i].integer(1, 0xffffffffu));
-    p.texture_px = static_cast<std::uint32_t>(at["texturePx"][i].integer(0, kMaxProxyTexturePx));
-    p.flip = read_proxy_losses(at["flip"][i], m.proxy_sizes_px.size());
-    p.flip_p95 = read_proxy_losses(at["flipP95"][i], m.proxy_sizes_px.size());
-    m.proxies.push_back(std::move(p));
-  }
+/// What the places of entries say of their paths.
+void set_paths(Manifest& m) {
+  for (ManifestScale& s : m.scales) s.glb.path = mesh_path(s.scale);
+  for (std::size_t k = 0; k < m.proxies.size(); ++k)
+    m.proxies[k].glb.path = proxy_path(static_cast<std::uint32_t>(k));
+  m.index.path = kIndexPath;
+  m.tables.path = kTablesPath;
+  m.textures.path = kTexturesPath;
+  m.quality.path = kQualityPath;
+  m.provenance.path = kProvenancePath;
+  m.about.path = kAboutPath;
+  if (m.thesis) m.thesis->path = kThesisPath;
+  if (m.poster) m.poster->path = kPosterPath;
 }
 
 /// Scales whose column says the stream's offset are prefixes of it.
@@ -319,8 +201,18 @@ std::uint64_t start_bytes(const Manifest& manifest) {
   return first.offset + first.bytes;
 }
 
-std::string write_manifest(const Manifest& manifest) {
-  const std::string json = dump_json(manifest_json(manifest), kManifestFile);
+std::string write_manifest(const Manifest& m) {
+  Json j;
+  j["format"] = "texmesh";
+  j["version"]["major"] = m.major;
+  j["version"]["minor"] = m.minor;
+  j["requiredFeatures"] = m.required_features;
+  MemberWriter to(j);
+  shape_members(to, m);
+  j["steps"] = Json::array();
+  for (const ManifestStep& s : m.steps) j["steps"].push_back(Json::array({six_digits(s.up_to_px), s.scale}));
+  entry_members(to, m);
+  const std::string json = dump_json(j, kManifestFile);
   const std::uint64_t room = kBootstrapBytes - ContainerWriter::data_offset(0, kManifestPath, json.size());
   if (json.size() > room)
     throw RuleError("K12", kManifestFile, "", "at most " + std::to_string(room) + " bytes",
@@ -332,25 +224,17 @@ std::string write_manifest(const Manifest& manifest) {
 Manifest read_manifest(std::span<const std::uint8_t> json) {
   const nlohmann::json document = parse_json(json, kManifestFile, kBootstrapBytes);
   const JsonAt at(document, kManifestFile);
+  const MemberReader from(at);
   Manifest m;
   read_version(at, m);
-  read_shape(at, m);
-  read_scales(at["scales"], m);
+  shape_members(from, m);
+  for (int i = 0; i < 3; ++i)
+    if (m.bounds_min[i] > m.bounds_max[i])
+      at["bounds"]["max"][static_cast<std::size_t>(i)].by("M03").fail("at least the minimum", "less");
   read_steps(at["steps"].by("M21"), m);
-  if (document.contains("proxies")) read_proxies(at["proxies"].by("M23"), m);
-  m.plane_count = static_cast<std::uint32_t>(at["planeCount"].integer(0, kMaxPackagePlanes));
-  read_paged_ref(at["index"], kIndexPath, m.index);
-  read_paged_ref(at["tables"], kTablesPath, m.tables);
-  read_ref(at["textures"], kTexturesPath, m.textures);
-  read_ref(at["quality"], kQualityPath, m.quality);
-  read_ref(at["provenance"], kProvenancePath, m.provenance);
-  read_ref(at["about"], kAboutPath, m.about);
-  if (document.contains("stream")) {
-    m.stream = read_stream(at["stream"]);
-    resolve_stream_scales(at["scales"], m);
-  }
-  if (document.contains("thesis")) read_ref(at["thesis"], kThesisPath, m.thesis.emplace());
-  if (document.contains("poster")) m.poster = read_poster(at["poster"]);
+  entry_members(from, m);
+  set_paths(m);
+  if (m.stream) resolve_stream_scales(at["scales"], m);
   return m;
 }
 

@@ -1,15 +1,8 @@
 #pragma once
-#include <cstdint>
 #include <optional>
-#include <span>
-#include <string>
-#include <vector>
 
-#include "format/base/sha256.h"
-#include "format/base/vec.h"
-#include "format/container/format_version.h"
 #include "format/container/layout.h"
-#include "format/documents/entry_ref.h"
+#include "format/documents/index.h"
 
 namespace texmesh {
 

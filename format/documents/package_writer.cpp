@@ -1,10 +1,8 @@
 #include "format/documents/package_writer.h"
 
-#include <algorithm>
 #include <map>
 
 #include "format/container/container.h"
-#include "format/documents/index.h"
 #include "format/documents/tables.h"
 #include "format/split/split_stream.h"
 

@@ -1,7 +1,4 @@
 #pragma once
-#include <cstdint>
-#include <string>
-#include <vector>
 
 #include "format/documents/manifest.h"
 #include "format/documents/textures.h"

@@ -1,11 +1,5 @@
 #pragma once
-#include <array>
-#include <cstddef>
-#include <cstdint>
 #include <span>
-#include <string>
-#include <string_view>
-#include <vector>
 
 #include "format/base/fields.h"
 
@@ -31,17 +25,14 @@ struct PictureLosses {
   std::vector<float> flip_p95;  // 95th percentile of FLIP over those pixels, 0..1
   std::vector<float> dssim;     // 1 - mean SSIM of luma, 0..1
   std::size_t size() const { return flip.size(); }
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.flip, s.flip_p95, s.dssim);
-  }
+  static void archive(auto& s, auto& a) { a(s.flip, s.flip_p95, s.dssim); }
   friend bool operator==(const PictureLosses&, const PictureLosses&) = default;
 };
 
 /// What a group's textures lose at one displayed height, on S_0, with all other groups as in the source.
 struct TextureLosses {
   /// Mean of 1 - SSIM of the group's texels over the object's surface, rising, > 0; one per sampled rung. Of
-  /// the planes that a client shows at that height (mip_choice.h).
+  /// the planes that a client shows at that height (format/rules/viewing.h).
   std::vector<float> texel_dssim;
   /// Per texel_dssim. `flip` is what coding adds to the mips' own loss: together with finer.flip[0], by
   /// QualityTable::exponent, it is the picture's. The others are the picture's.
@@ -54,20 +45,14 @@ struct TextureLosses {
   PictureLosses finer;
   /// The same of mips that are 1, 2 .. levels coarser than the planes shown at that height.
   PictureLosses coarser;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.texel_dssim, s.coded, s.preview, s.finer, s.coarser);
-  }
+  static void archive(auto& s, auto& a) { a(s.texel_dssim, s.coded, s.preview, s.finer, s.coarser); }
   friend bool operator==(const TextureLosses&, const TextureLosses&) = default;
 };
 
 struct GroupLosses {
   PlaneGroup group = PlaneGroup::kColour;
   std::vector<TextureLosses> sizes;  // per QualityTable::sizes_px
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.group, s.sizes);
-  }
+  static void archive(auto& s, auto& a) { a(s.group, s.sizes); }
   friend bool operator==(const GroupLosses&, const GroupLosses&) = default;
 };
 
@@ -84,8 +69,7 @@ struct QualityTable {
   /// Mean of |predicted - measured| / measured of FLIP, over samples with a coarser scale and coded textures
   /// of all groups together; 0 where nothing was sampled.
   float error = 0;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
+  static void archive(auto& s, auto& a) {
     a(s.views, s.sizes_px, s.scales, s.geometry, s.groups, s.exponent, s.error);
   }
   friend bool operator==(const QualityTable&, const QualityTable&) = default;

@@ -1,7 +1,6 @@
 #include "format/documents/tables.h"
 
 #include "format/base/number16.h"
-#include "format/container/format_version.h"
 #include "format/container/layout.h"
 
 namespace texmesh {
@@ -178,8 +177,7 @@ struct SectionCounts {
 };
 
 /// Runs `put` with the index in an array [lines * F] of what is stored, in the file's sequence.
-template <class Put>
-void for_each_listed(const PlaneTables& t, std::uint64_t lines, Put put) {
+void for_each_listed(const PlaneTables& t, std::uint64_t lines, auto put) {
   for (std::uint64_t line = 0; line < lines; ++line)
     for (const std::uint16_t f : t.order) put(static_cast<std::size_t>(line * t.fragment_count() + f));
 }

@@ -1,7 +1,4 @@
 #pragma once
-#include <cstddef>
-#include <cstdint>
-#include <span>
 #include <vector>
 
 #include "format/base/sha256.h"
@@ -50,8 +47,7 @@ struct PlaneTables {
   std::size_t fragment_count() const { return static_cast<std::size_t>(columns) * rows; }
   std::size_t rung_count() const { return rung_quality.size(); }
   std::size_t scale_count() const { return quality.size(); }  // N
-  template <class S, class A>
-  static void archive(S& s, A& a) {
+  static void archive(auto& s, auto& a) {
     a(s.columns, s.rows, s.incremental, s.rung_quality, s.table_bytes, s.order, s.size_bytes, s.digest, s.mse,
       s.dssim, s.skip_dssim, s.covered_texels, s.surface_fraction, s.knot_quality, s.knot_position,
       s.features, s.quality, s.allocation, s.quality_width, s.log_width, s.quality_min, s.quality_max, s.vqp);
@@ -60,10 +56,7 @@ struct PlaneTables {
 
 struct PackageTables {
   std::vector<PlaneTables> planes;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.planes);
-  }
+  static void archive(auto& s, auto& a) { a(s.planes); }
 };
 
 /// The tables with the rows of these scales only, in this order; `rows` are indices of rows that are there.

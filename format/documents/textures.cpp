@@ -1,13 +1,10 @@
 #include "format/documents/textures.h"
 
-#include <algorithm>
 #include <map>
-#include <nlohmann/json.hpp>
 
-#include "format/base/json_fields.h"
-#include "format/base/rule_error.h"
 #include "format/base/text_bytes.h"
 #include "format/container/layout.h"
+#include "format/documents/json_members.h"
 #include "format/documents/quality_table.h"
 
 namespace texmesh {
@@ -23,53 +20,41 @@ constexpr std::uint64_t kMaxTexturesBytes = 32u << 20;
 constexpr std::size_t kMaxTextBytes = 1000;
 constexpr std::uint64_t kMaxSide = 1u << 20, kMaxMip = 20;
 
-Json texture_json(const TextureInfo& t) {
-  Json j;
-  j["image"] = t.image;
-  if (t.mip > 0) {
-    j["mip"] = t.mip;
-    j["base"] = t.base;
-  }
-  j["role"] = t.role;
-  j["name"] = t.name;
-  j["colourSpace"] = t.colour_space;
-  j["codec"] = codec_traits(t.codec).id;
-  j["widthPx"] = t.width_px;
-  j["heightPx"] = t.height_px;
-  j["channels"] = t.channels;
-  j["fragmentWidthPx"] = t.fragment_width_px;
-  j["fragmentHeightPx"] = t.fragment_height_px;
-  j["columns"] = t.columns;
-  j["rows"] = t.rows;
-  j["gridReason"] = t.grid_reason;
-  j["previewWidthPx"] = t.preview_width_px;
-  j["previewHeightPx"] = t.preview_height_px;
-  j["rungQuality"] = t.rung_quality;
-  if (t.source_rung) j["sourceRung"] = true;
-  if (!t.source_extension.empty()) {
-    j["source"] = t.source_extension;
-    j["sourceColours"] = t.source_colours;
-  }
-  return j;
-}
-
-std::uint32_t u32(const JsonAt& at, std::uint64_t lo, std::uint64_t hi) {
-  return static_cast<std::uint32_t>(at.integer(lo, hi));
+void texture_members(auto& v, auto& t) {
+  v.integer("image", t.image, 0, 0xffffffffu);
+  if (v.has("mip", t.mip > 0)) v.integer("mip", t.mip, 1, kMaxMip);  // 0 is said by leaving it out
+  if (t.mip > 0) v.integer("base", t.base, 0, kMaxPackagePlanes);
+  v.text("role", t.role, 100);
+  v.text("name", t.name, kMaxTextBytes);
+  v.text("colourSpace", t.colour_space, 100);
+  v.by("X03").check("colourSpace", t.colour_space == "srgb" || t.colour_space == "linear", "srgb or linear",
+                    t.colour_space);
+  v.by("X03").named(
+      "codec", t.codec, [](Codec codec) { return codec_traits(codec).id; }, find_codec,
+      "jpeg, jpeg-progressive, webp or jpeg-xy");
+  v.integer("widthPx", t.width_px, 1, kMaxSide);
+  v.integer("heightPx", t.height_px, 1, kMaxSide);
+  v.integer("channels", t.channels, 1, 3);
+  v.integer("fragmentWidthPx", t.fragment_width_px, 1, kMaxSide);
+  v.integer("fragmentHeightPx", t.fragment_height_px, 1, kMaxSide);
+  v.integer("columns", t.columns, 1, 65535);
+  v.by("X05").integer("rows", t.rows, 1, 65535 / std::max<std::uint64_t>(t.columns, 1));
+  v.text("gridReason", t.grid_reason, kMaxTextBytes);
+  v.integer("previewWidthPx", t.preview_width_px, 1, kMaxSide);
+  v.integer("previewHeightPx", t.preview_height_px, 1, kMaxSide);
+  v.rising("rungQuality", t.rung_quality, kMaxPackageRungs, 1, 100);
+  if (v.has("sourceRung", t.source_rung)) v.boolean("sourceRung", t.source_rung);
+  if (!v.has("source", !t.source_extension.empty())) return;
+  v.text("source", t.source_extension, 100);
+  v.boolean("sourceColours", t.source_colours);
 }
 
 /// Fragments tile the plane: the last row and column may be partly outside, none wholly.
-void read_grid(const JsonAt& at, TextureInfo& t) {
-  t.width_px = u32(at["widthPx"], 1, kMaxSide);
-  t.height_px = u32(at["heightPx"], 1, kMaxSide);
-  t.channels = u32(at["channels"], 1, 3);
+void check_grid(const JsonAt& at, const TextureInfo& t) {
   if (t.channels == 2) at["channels"].fail("1 or 3", "2");
-  t.fragment_width_px = u32(at["fragmentWidthPx"], 1, kMaxSide);
-  t.fragment_height_px = u32(at["fragmentHeightPx"], 1, kMaxSide);
   for (const char* side : {"fragmentWidthPx", "fragmentHeightPx"})  // whole MCUs even with 4:2:0
     if (at[side].integer(1) % 16 != 0)
       at[side].by("X04").fail("a multiple of 16", std::to_string(at[side].integer(1)));
-  t.columns = u32(at["columns"], 1, 65535);
-  t.rows = u32(at["rows"].by("X05"), 1, 65535 / t.columns);
   const auto tiles = [](std::uint64_t count, std::uint64_t side, std::uint64_t whole) {
     return count * side >= whole && (count - 1) * side < whole;
   };
@@ -77,25 +62,15 @@ void read_grid(const JsonAt& at, TextureInfo& t) {
     at["columns"].by("X05").fail("as many as cover the width", std::to_string(t.columns));
   if (!tiles(t.rows, t.fragment_height_px, t.height_px))
     at["rows"].by("X05").fail("as many as cover the height", std::to_string(t.rows));
-  t.grid_reason = at["gridReason"].text(kMaxTextBytes);
 }
 
-void read_mip(const JsonAt& at, TextureInfo& t) {
-  if (at.has("mip")) t.mip = u32(at["mip"], 1, kMaxMip);  // 0 is said by leaving it out
-  if (t.mip > 0) t.base = u32(at["base"], 0, kMaxPackagePlanes);
-}
-
-void read_source(const JsonAt& at, std::uint32_t plane, TextureInfo& t) {
-  if (at.has("sourceRung")) t.source_rung = at["sourceRung"].boolean();
+void check_source(const JsonAt& at, const TextureInfo& t) {
   if (t.source_rung && (t.codec != Codec::kJpeg || t.mip > 0))
     at["sourceRung"].by("X11").fail("a full-size plane of codec jpeg", "another");
-  if (!at.has("source")) return;
-  t.source_extension = at["source"].text(100);
+  if (t.source_extension.empty() && !at.has("source")) return;
   if (std::ranges::find(kSourceExtensions, t.source_extension) == std::end(kSourceExtensions))
     at["source"].by("X03").fail("jpg, png, tif, webp or exr", t.source_extension);
   if (t.mip > 0) at["source"].by("X11").fail("none, for a mip", t.source_extension);
-  t.source_colours = at["sourceColours"].boolean();
-  t.source.path = source_path(plane, t.source_extension);
 }
 
 /// Full-size planes first, then mips by (base, mip), each of its base's image and size.
@@ -123,33 +98,65 @@ void check_mips(const JsonAt& list, const std::vector<TextureInfo>& textures) {
 
 TextureInfo read_texture(const JsonAt& at, std::uint32_t plane) {
   TextureInfo t;
-  t.image = u32(at["image"], 0, 0xffffffffu);
-  t.role = at["role"].text(100);
-  t.name = at["name"].text(kMaxTextBytes);
-  t.colour_space = at["colourSpace"].text(100);
-  if (t.colour_space != "srgb" && t.colour_space != "linear")
-    at["colourSpace"].by("X03").fail("srgb or linear", t.colour_space);
-  const std::string codec = at["codec"].text(100);
-  if (!find_codec(codec)) at["codec"].by("X03").fail("jpeg, jpeg-progressive, webp or jpeg-xy", codec);
-  t.codec = *find_codec(codec);
-  read_grid(at, t);
+  const MemberReader from(at);
+  texture_members(from, t);
+  check_grid(at, t);
   if (t.codec == Codec::kJpegXy && (t.channels != 3 || t.colour_space != "linear"))
-    at["codec"].by("F24").fail("jpeg-xy for three linear channels alone", codec);
-  t.preview_width_px = u32(at["previewWidthPx"], 1, kMaxSide);
-  t.preview_height_px = u32(at["previewHeightPx"], 1, kMaxSide);
-  const JsonAt qualities = at["rungQuality"];
-  for (std::size_t i = 0, n = qualities.array(1, kMaxPackageRungs); i < n; ++i) {
-    const int quality = static_cast<int>(qualities[i].integer(1, 100));
-    if (i > 0 && quality <= t.rung_quality.back())
-      qualities[i].fail("a rising number", std::to_string(quality));
-    t.rung_quality.push_back(quality);
-    t.rungs.emplace_back().path = rung_path(plane, static_cast<std::uint32_t>(i));
-  }
-  read_mip(at, t);
-  read_source(at, plane, t);
+    at["codec"].by("F24").fail("jpeg-xy for three linear channels alone", "another plane");
+  check_source(at, t);
+  for (std::uint32_t i = 0; i < t.rung_quality.size(); ++i) t.rungs.emplace_back().path = rung_path(plane, i);
+  if (!t.source_extension.empty()) t.source.path = source_path(plane, t.source_extension);
   t.preview.path = preview_path(t.mip > 0 ? t.base : plane);
   t.tables.path = table_streams_path(plane);
   return t;
+}
+
+const std::string kQualityFile = kQualityPath;
+constexpr std::uint64_t kMaxQualityBytes = 4u << 20;
+
+/// `fewest` to `most` losses of each kind, as many of all.
+void losses_members(auto& v, auto& losses, std::size_t fewest, std::size_t most) {
+  v.numbers("flip", losses.flip, fewest, most, 1);
+  const std::size_t count = losses.flip.size();
+  v.numbers("flipP95", losses.flip_p95, count, count, 1);
+  v.numbers("dssim", losses.dssim, count, count, 1);
+}
+
+void texture_losses_members(auto& v, auto& t) {
+  const auto losses = [&v](const char* name, auto& of, std::size_t fewest, std::size_t most) {
+    v.object(name, [&](auto& inner) { losses_members(inner, of, fewest, most); });
+  };
+  v.rising("texelDssim", t.texel_dssim, kMaxQualitySamples, 0, 2);
+  v.check("texelDssim", t.texel_dssim.empty() || t.texel_dssim[0] > 0, "numbers above 0", "0");
+  losses("coded", t.coded, t.texel_dssim.size(), t.texel_dssim.size());
+  losses("preview", t.preview, 1, 1);
+  losses("finer", t.finer, 1, kMaxFinerLevels + 1);
+  losses("coarser", t.coarser, 0, kMaxCoarserLevels);
+}
+
+std::optional<PlaneGroup> find_group(const std::string& name) {
+  const auto& names = EnumNames<PlaneGroup>::names;
+  const auto found = std::ranges::find(names, name);
+  if (found == names.end()) return std::nullopt;
+  return static_cast<PlaneGroup>(found - names.begin());
+}
+
+void quality_members(auto& v, auto& table) {
+  v.integer("views", table.views, 1, 10000);
+  v.rising("sizesPx", table.sizes_px, kMaxQualitySizes, 1, 65536);
+  v.number("exponent", table.exponent, 1, 4);
+  v.number("error", table.error, 0, 1e6);
+  v.rising("scales", table.scales, 100, 0, 99);
+  const std::size_t sizes = table.sizes_px.size(), scales = table.scales.size();
+  v.list("geometry", table.geometry, sizes, sizes,
+         [&](auto& inner, auto& losses, std::size_t) { losses_members(inner, losses, scales, scales); });
+  v.list("groups", table.groups, 0, kPlaneGroups, [&](auto& inner, auto& group, std::size_t i) {
+    inner.by("W06").named("group", group.group, enum_name<PlaneGroup>, find_group, "colour, normal or data");
+    inner.by("Q03").check("group", i == 0 || group.group > table.groups[i - 1].group,
+                          "groups in the order colour, normal, data", "another order");
+    inner.list("sizes", group.sizes, sizes, sizes,
+               [](auto& size, auto& losses, std::size_t) { texture_losses_members(size, losses); });
+  });
 }
 
 }  // namespace
@@ -161,8 +168,8 @@ std::size_t full_size_planes(const std::vector<TextureInfo>& textures) {
 
 std::string write_textures(const std::vector<TextureInfo>& textures) {
   Json j;
-  j["textures"] = Json::array();
-  for (const TextureInfo& t : textures) j["textures"].push_back(texture_json(t));
+  MemberWriter(j).list("textures", textures, 0, kMaxPackagePlanes,
+                       [](auto& to, const TextureInfo& t, std::size_t) { texture_members(to, t); });
   std::string json = dump_json(j, kTexturesFile);
   read_textures(text_bytes(json));
   return json;
@@ -196,89 +203,6 @@ void resolve_textures(std::vector<TextureInfo>& textures, const std::vector<Entr
   }
 }
 
-namespace {
-
-using Json = nlohmann::ordered_json;
-
-const std::string kQualityFile = kQualityPath;
-constexpr std::uint64_t kMaxQualityBytes = 4u << 20;
-
-Json floats_json(const std::vector<float>& values) {
-  Json j = Json::array();
-  for (const float v : values) j.push_back(shortest_double(v));
-  return j;
-}
-
-Json losses_json(const PictureLosses& losses) {
-  return {{"flip", floats_json(losses.flip)},
-          {"flipP95", floats_json(losses.flip_p95)},
-          {"dssim", floats_json(losses.dssim)}};
-}
-
-Json group_json(const GroupLosses& group) {
-  Json sizes = Json::array();
-  for (const TextureLosses& t : group.sizes)
-    sizes.push_back({{"texelDssim", floats_json(t.texel_dssim)},
-                     {"coded", losses_json(t.coded)},
-                     {"preview", losses_json(t.preview)},
-                     {"finer", losses_json(t.finer)},
-                     {"coarser", losses_json(t.coarser)}});
-  return {{"group", enum_name(group.group)}, {"sizes", std::move(sizes)}};
-}
-
-std::vector<float> read_fractions(const JsonAt& at, std::size_t count) {
-  at.array(count, count);
-  std::vector<float> values;
-  for (std::size_t i = 0; i < count; ++i) values.push_back(static_cast<float>(at[i].number(0, 1)));
-  return values;
-}
-
-template <class T>
-std::vector<T> read_rising(const JsonAt& at, std::size_t most, std::uint64_t lo, std::uint64_t hi) {
-  std::vector<T> values;
-  for (std::size_t i = 0, n = at.array(1, most); i < n; ++i) {
-    const T v = static_cast<T>(at[i].integer(lo, hi));
-    if (i > 0 && v <= values.back()) at[i].fail("a rising number", std::to_string(v));
-    values.push_back(v);
-  }
-  return values;
-}
-
-PictureLosses read_losses(const JsonAt& at, std::size_t count) {
-  return {read_fractions(at["flip"], count), read_fractions(at["flipP95"], count),
-          read_fractions(at["dssim"], count)};
-}
-
-TextureLosses read_texture_losses(const JsonAt& at) {
-  TextureLosses t;
-  const JsonAt dssim = at["texelDssim"];
-  for (std::size_t i = 0, n = dssim.array(1, kMaxQualitySamples); i < n; ++i) {
-    const auto v = static_cast<float>(dssim[i].number(0, 2));
-    if (!(v > (i > 0 ? t.texel_dssim.back() : 0)))
-      dssim[i].fail("a rising number above 0", std::to_string(v));
-    t.texel_dssim.push_back(v);
-  }
-  t.coded = read_losses(at["coded"], t.texel_dssim.size());
-  t.preview = read_losses(at["preview"], 1);
-  t.finer = read_losses(at["finer"], at["finer"]["flip"].array(1, kMaxFinerLevels + 1));
-  t.coarser = read_losses(at["coarser"], at["coarser"]["flip"].array(0, kMaxCoarserLevels));
-  return t;
-}
-
-GroupLosses read_group(const JsonAt& at, std::size_t sizes) {
-  GroupLosses group;
-  const std::string name = at["group"].text(20);
-  const auto& names = EnumNames<PlaneGroup>::names;
-  const auto found = std::ranges::find(names, name);
-  if (found == names.end()) at["group"].by("W06").fail("colour, normal or data", name);
-  group.group = static_cast<PlaneGroup>(found - names.begin());
-  at["sizes"].array(sizes, sizes);
-  for (std::size_t i = 0; i < sizes; ++i) group.sizes.push_back(read_texture_losses(at["sizes"][i]));
-  return group;
-}
-
-}  // namespace
-
 PlaneGroup group_of(std::string_view role) {
   if (role == "normal") return PlaneGroup::kNormal;
   return role == "data" || role == "occlusion-roughness-metallic" ? PlaneGroup::kData : PlaneGroup::kColour;
@@ -286,15 +210,8 @@ PlaneGroup group_of(std::string_view role) {
 
 std::string write_quality(const QualityTable& table) {
   Json j;
-  j["views"] = table.views;
-  j["sizesPx"] = table.sizes_px;
-  j["exponent"] = shortest_double(table.exponent);
-  j["error"] = shortest_double(table.error);
-  j["scales"] = table.scales;
-  j["geometry"] = Json::array();
-  for (const PictureLosses& losses : table.geometry) j["geometry"].push_back(losses_json(losses));
-  j["groups"] = Json::array();
-  for (const GroupLosses& group : table.groups) j["groups"].push_back(group_json(group));
+  MemberWriter to(j);
+  quality_members(to, table);
   std::string json = dump_json(j, kQualityFile);
   read_quality(text_bytes(json));
   return json;
@@ -302,23 +219,9 @@ std::string write_quality(const QualityTable& table) {
 
 QualityTable read_quality(std::span<const std::uint8_t> json) {
   const nlohmann::json document = parse_json(json, kQualityFile, kMaxQualityBytes);
-  const JsonAt at = JsonAt(document, kQualityFile).by("Q01");
+  const MemberReader from(JsonAt(document, kQualityFile).by("Q01"));
   QualityTable table;
-  table.views = static_cast<std::uint32_t>(at["views"].integer(1, 10000));
-  table.sizes_px = read_rising<std::uint32_t>(at["sizesPx"], kMaxQualitySizes, 1, 65536);
-  table.exponent = static_cast<float>(at["exponent"].number(1, 4));
-  table.error = static_cast<float>(at["error"].number(0, 1e6));
-  table.scales = read_rising<int>(at["scales"], 100, 0, 99);
-  const std::size_t sizes = table.sizes_px.size();
-  at["geometry"].array(sizes, sizes);
-  for (std::size_t i = 0; i < sizes; ++i)
-    table.geometry.push_back(read_losses(at["geometry"][i], table.scales.size()));
-  for (std::size_t i = 0, n = at["groups"].array(0, kPlaneGroups); i < n; ++i) {
-    table.groups.push_back(read_group(at["groups"][i], sizes));
-    if (i > 0 && table.groups[i].group <= table.groups[i - 1].group)
-      at["groups"][i]["group"].by("Q03").fail("groups in the order colour, normal, data",
-                                              std::string(enum_name(table.groups[i].group)));
-  }
+  quality_members(from, table);
   return table;
 }
 

@@ -1,11 +1,6 @@
 #pragma once
-#include <cstddef>
-#include <cstdint>
-#include <span>
-#include <string>
-#include <vector>
 
-#include "format/documents/entry_ref.h"
+#include "format/documents/index.h"
 #include "format/model/codec.h"
 
 namespace texmesh {

@@ -3,7 +3,6 @@
 #include <tuple>
 
 #include "format/base/number16.h"
-#include "format/container/format_version.h"
 #include "format/container/layout.h"
 
 namespace texmesh {
@@ -38,43 +37,6 @@ void check_perceptual_table(const PerceptualTable& t) {
   for (const Values step : kStepValues) require(t.*step, rows);
   for (const Values pair : kPairValues) require(t.*pair, pair_count(rows));
 }
-
-}  // namespace
-
-Bytes write_perceptual_section(const PerceptualTable& t) {
-  check_perceptual_table(t);
-  BytesOut out;
-  out.u8(t.scale.size());
-  out.u8(0);
-  out.u16(0);
-  out.raw(t.scale);
-  for (const std::uint32_t v : t.triangles) out.u32(v);
-  for (const std::uint32_t v : t.collapses) out.u32(v);
-  for (const auto& group : {kStepValues, kPairValues})
-    for (const Values values : group)
-      for (const float v : t.*values) out.f32(v);
-  return out.finish();
-}
-
-PerceptualTable read_perceptual_section(BytesIn& in, bool reserved_is_zero) {
-  PerceptualTable t;
-  const std::size_t rows = in.u8(), pairs = pair_count(rows);
-  if (in.number(3) != 0 && reserved_is_zero) fail_by("W05", in, "3 zero bytes", "others");
-  if (rows == 0 || rows > kMostChainScales || in.left() < rows * kBytesOfRow + pairs * kBytesOfPair)
-    in.fail("a table of 1 to 100 scales", std::to_string(rows));
-  const ByteSpan scale = in.raw(rows);
-  t.scale.assign(scale.begin(), scale.end());
-  for (std::size_t k = 0; k < rows; ++k) t.triangles.push_back(in.u32());
-  for (std::size_t k = 0; k < rows; ++k) t.collapses.push_back(in.u32());
-  for (const Values values : kStepValues)
-    for (std::size_t k = 0; k < rows; ++k) (t.*values).push_back(in.f32());
-  for (const Values values : kPairValues)
-    for (std::size_t k = 0; k < pairs; ++k) (t.*values).push_back(in.f32());
-  check_perceptual_table(t);
-  return t;
-}
-
-namespace {
 
 const std::string kThesisFile = kThesisPath;
 constexpr std::string_view kThesisMagic = "TXTH";
@@ -214,6 +176,39 @@ void read_plane_section(const ThesisSection& section, int minor, ThesisTables& t
 }
 
 }  // namespace
+
+Bytes write_perceptual_section(const PerceptualTable& t) {
+  check_perceptual_table(t);
+  BytesOut out;
+  out.u8(t.scale.size());
+  out.u8(0);
+  out.u16(0);
+  out.raw(t.scale);
+  for (const std::uint32_t v : t.triangles) out.u32(v);
+  for (const std::uint32_t v : t.collapses) out.u32(v);
+  for (const auto& group : {kStepValues, kPairValues})
+    for (const Values values : group)
+      for (const float v : t.*values) out.f32(v);
+  return out.finish();
+}
+
+PerceptualTable read_perceptual_section(BytesIn& in, bool reserved_is_zero) {
+  PerceptualTable t;
+  const std::size_t rows = in.u8(), pairs = pair_count(rows);
+  if (in.number(3) != 0 && reserved_is_zero) fail_by("W05", in, "3 zero bytes", "others");
+  if (rows == 0 || rows > kMostChainScales || in.left() < rows * kBytesOfRow + pairs * kBytesOfPair)
+    in.fail("a table of 1 to 100 scales", std::to_string(rows));
+  const ByteSpan scale = in.raw(rows);
+  t.scale.assign(scale.begin(), scale.end());
+  for (std::size_t k = 0; k < rows; ++k) t.triangles.push_back(in.u32());
+  for (std::size_t k = 0; k < rows; ++k) t.collapses.push_back(in.u32());
+  for (const Values values : kStepValues)
+    for (std::size_t k = 0; k < rows; ++k) (t.*values).push_back(in.f32());
+  for (const Values values : kPairValues)
+    for (std::size_t k = 0; k < pairs; ++k) (t.*values).push_back(in.f32());
+  check_perceptual_table(t);
+  return t;
+}
 
 std::vector<std::uint8_t> write_thesis(const ThesisTables& tables) {
   std::vector<ThesisSection> sections;

@@ -1,10 +1,4 @@
 #pragma once
-#include <array>
-#include <cstddef>
-#include <cstdint>
-#include <span>
-#include <string_view>
-#include <vector>
 
 #include "format/base/bytes.h"
 #include "format/base/fields.h"
@@ -34,8 +28,7 @@ struct PerceptualTable {
   // [pairs]: of rho over all collapses from S_i to S_j, each against the vertex that is left in S_j.
   std::vector<float> chain_average, chain_largest, chain_least;
   bool empty() const { return scale.empty(); }
-  template <class S, class A>
-  static void archive(S& s, A& a) {
+  static void archive(auto& s, auto& a) {
     a(s.scale, s.triangles, s.collapses, s.average, s.largest, s.least, s.deviation, s.p95, s.chain_average,
       s.chain_largest, s.chain_least);
   }
@@ -62,10 +55,7 @@ inline constexpr std::size_t kGammaSteps = 21;
 struct SizeModel {
   float a = 0, b = 0;
   float correlation = 0;  // of Q and log S
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.a, s.b, s.correlation);
-  }
+  static void archive(auto& s, auto& a) { a(s.a, s.b, s.correlation); }
   friend bool operator==(const SizeModel&, const SizeModel&) = default;
 };
 
@@ -78,8 +68,7 @@ struct PlaneThesis {
   std::vector<float> quality;     // [M]: Q_i
   // [M * 21]: D_i(Gamma), Gamma = 0, 0.05 .. 1: bytes of the plane at the rungs nearest to q_i(x, y)
   std::vector<std::uint64_t> total_bytes;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
+  static void archive(auto& s, auto& a) {
     a(s.z, s.i, s.zeta, s.m, s.vqp, s.models, s.quality, s.total_bytes);
   }
 };
@@ -88,10 +77,7 @@ struct ThesisTables {
   std::vector<PlaneThesis> planes;
   PerceptualTable perceptual;
   bool empty() const { return planes.empty() && perceptual.empty(); }
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.planes, s.perceptual);
-  }
+  static void archive(auto& s, auto& a) { a(s.planes, s.perceptual); }
 };
 
 /// thesis.bin (SPEC.md). Planes at the end without any section do not come back, what the file stores in 16

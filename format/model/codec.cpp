@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "format/base/bytes.h"
-#include "format/base/rule_error.h"
 
 namespace texmesh {
 namespace {
@@ -90,15 +89,8 @@ Bytes join_fragment(Codec codec, Span tables, std::span<const Span> streams) {
   if (streams.empty() || (streams.size() > 1 && !codec_traits(codec).incremental))
     throw FormatError("fragment", "streams", "one, or those of all lower rungs for an incremental codec",
                       std::to_string(streams.size()));
-  switch (codec) {
-    case Codec::kJpeg:
-    case Codec::kJpegXy:
-      return join_jpeg(tables, streams.front());
-    case Codec::kJpegProgressive:
-      return join_progressive(tables, streams);
-    case Codec::kWebp:
-      break;
-  }
+  if (codec == Codec::kJpegProgressive) return join_progressive(tables, streams);
+  if (codec != Codec::kWebp) return join_jpeg(tables, streams.front());
   if (!is_webp(streams.front()))
     throw RuleError("F07", "WebP", "fragment", "RIFF ... WEBP",
                     std::to_string(streams.front().size()) + " other bytes");

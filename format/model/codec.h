@@ -1,11 +1,6 @@
 #pragma once
-#include <array>
-#include <cstddef>
-#include <cstdint>
 #include <optional>
 #include <span>
-#include <string_view>
-#include <vector>
 
 #include "format/base/fields.h"
 

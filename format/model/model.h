@@ -1,8 +1,5 @@
 #pragma once
 #include <array>
-#include <cstdint>
-#include <string>
-#include <vector>
 
 #include "format/base/note.h"
 #include "format/base/vec.h"
@@ -36,8 +33,7 @@ struct Mesh {
     return wedge_position[triangles[triangle][static_cast<std::size_t>(corner)]];
   }
   friend bool operator==(const Mesh&, const Mesh&) = default;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
+  static void archive(auto& s, auto& a) {
     a(s.origin, s.positions, s.wedge_position, s.uv0, s.uv1, s.normals, s.colours, s.tangents, s.triangles,
       s.triangle_material, s.triangle_part, s.part_names);
   }
@@ -64,10 +60,7 @@ struct UvTransform {
   float rotation = 0;  // radians, counter-clockwise in the extension's sense
   bool is_identity() const { return *this == UvTransform{}; }
   friend bool operator==(const UvTransform&, const UvTransform&) = default;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.offset, s.scale, s.rotation);
-  }
+  static void archive(auto& s, auto& a) { a(s.offset, s.scale, s.rotation); }
 };
 
 /// Use of an image by a material.
@@ -80,8 +73,7 @@ struct TextureRef {
   UvTransform transform;
   bool used() const { return image >= 0; }
   friend bool operator==(const TextureRef&, const TextureRef&) = default;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
+  static void archive(auto& s, auto& a) {
     a(s.image, s.texcoord, s.wrap_s, s.wrap_t, s.nearest, s.minification, s.transform);
   }
 };
@@ -92,10 +84,7 @@ struct ExtensionTexture {
   TextureRef texture;
   float scale = 1;  // of a normal map
   friend bool operator==(const ExtensionTexture&, const ExtensionTexture&) = default;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.key, s.texture, s.scale);
-  }
+  static void archive(auto& s, auto& a) { a(s.key, s.texture, s.scale); }
 };
 
 /// Numbers of a material extension.
@@ -103,10 +92,7 @@ struct ExtensionFactor {
   std::string key;
   std::vector<float> values;
   friend bool operator==(const ExtensionFactor&, const ExtensionFactor&) = default;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.key, s.values);
-  }
+  static void archive(auto& s, auto& a) { a(s.key, s.values); }
 };
 
 /// A glTF material extension of those that format/model/material_extensions.h lists, with what
@@ -116,10 +102,7 @@ struct MaterialExtension {
   std::vector<ExtensionFactor> factors;
   std::vector<ExtensionTexture> textures;
   friend bool operator==(const MaterialExtension&, const MaterialExtension&) = default;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.name, s.factors, s.textures);
-  }
+  static void archive(auto& s, auto& a) { a(s.name, s.factors, s.textures); }
 };
 
 /// The glTF metallic-roughness material with its extensions. Factors are linear.
@@ -136,8 +119,7 @@ struct Material {
       emissive_texture;
   std::vector<MaterialExtension> extensions;  // by name
   friend bool operator==(const Material&, const Material&) = default;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
+  static void archive(auto& s, auto& a) {
     a(s.name, s.base_colour, s.metallic, s.roughness, s.emissive, s.normal_scale, s.occlusion_strength,
       s.alpha_mode, s.alpha_cutoff, s.double_sided, s.unlit, s.base_colour_texture,
       s.metallic_roughness_texture, s.normal_texture, s.occlusion_texture, s.emissive_texture, s.extensions);
@@ -148,8 +130,7 @@ struct Material {
 bool needs_tangents(const Material& material);
 
 /// Calls f with every texture reference of a material, used or not; extensions' after the core's.
-template <class M, class F>
-void for_each_texture(M& material, F&& f) {
+void for_each_texture(auto& material, auto&& f) {
   f(material.base_colour_texture);
   f(material.metallic_roughness_texture);
   f(material.normal_texture);
@@ -173,8 +154,7 @@ struct Image {
   bool accept_damage = false;         // a JPEG that ends early or is corrupt is shown as viewers show it
   std::vector<std::uint8_t> bytes;    // the file
   friend bool operator==(const Image&, const Image&) = default;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
+  static void archive(auto& s, auto& a) {
     a(s.name, s.format, s.width_px, s.height_px, s.channels, s.bits_per_channel, s.honour_profile,
       s.accept_damage, s.bytes);
   }
@@ -188,8 +168,7 @@ struct RangeGrid {
   bool full_turn = true;
   std::vector<std::uint32_t> position;  // per sample: index of the mesh position, kNoIndex = none
   friend bool operator==(const RangeGrid&, const RangeGrid&) = default;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
+  static void archive(auto& s, auto& a) {
     a(s.columns, s.rows, s.radius, s.alpha_step_rad, s.y_step, s.full_turn, s.position);
   }
 };
@@ -203,10 +182,7 @@ struct Model {
   RangeGrid range;  // columns == 0 unless the source is a range scan
   Notes notes;
   friend bool operator==(const Model&, const Model&) = default;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.mesh, s.materials, s.images, s.range, s.notes);
-  }
+  static void archive(auto& s, auto& a) { a(s.mesh, s.materials, s.images, s.range, s.notes); }
 };
 
 }  // namespace texmesh

@@ -4,7 +4,6 @@
 
 #include "format/base/number16.h"
 #include "format/base/portable_math.h"
-#include "format/rules/rate_distortion.h"
 
 namespace texmesh {
 
@@ -22,6 +21,35 @@ double ijg_scale(double quality) {
 }
 
 double quality_of_scale(double scale) { return scale > 1 ? 50 / scale : 100 - 50 * scale; }
+
+/// As the file has it, so that tables fresh from the compiler and read back ones give the same choice.
+double half_of(float dssim) { return static_cast<double>(from_half(to_half(std::clamp(dssim, 0.0f, 2.0f)))); }
+
+/// A step from one vertex of a curve's hull to the next: `way` instead of the one before.
+struct Step {
+  double slope = 0;  // loss saved per byte
+  std::uint32_t curve = 0, way = 0;
+  std::uint32_t bytes = 0;  // more than before
+};
+
+/// Walks along the lower convex hull of a curve from way 0. Each step takes the steepest way on (ties: the
+/// one that costs more), so the slopes fall.
+void add_steps(const RdCurve& curve, std::uint32_t index, std::vector<Step>& steps) {
+  std::uint32_t at = 0;
+  for (;;) {
+    Step best;
+    for (std::uint32_t way = 1; way < curve.bytes.size(); ++way) {
+      if (curve.bytes[way] <= curve.bytes[at] || curve.loss[way] >= curve.loss[at]) continue;
+      const std::uint32_t bytes = curve.bytes[way] - curve.bytes[at];
+      const double slope = static_cast<double>(curve.loss[at] - curve.loss[way]) / bytes;
+      if (slope > best.slope || (slope == best.slope && bytes > best.bytes))
+        best = {slope, index, way, bytes};
+    }
+    if (best.way == 0) return;
+    steps.push_back(best);
+    at = best.way;
+  }
+}
 
 }  // namespace
 
@@ -124,39 +152,6 @@ std::uint64_t sum_of(const std::vector<std::uint32_t>& bytes) {
   for (const std::uint32_t b : bytes) sum += b;
   return sum;
 }
-
-namespace {
-
-/// As the file has it, so that tables fresh from the compiler and read back ones give the same choice.
-double half_of(float dssim) { return static_cast<double>(from_half(to_half(std::clamp(dssim, 0.0f, 2.0f)))); }
-
-/// A step from one vertex of a curve's hull to the next: `way` instead of the one before.
-struct Step {
-  double slope = 0;  // loss saved per byte
-  std::uint32_t curve = 0, way = 0;
-  std::uint32_t bytes = 0;  // more than before
-};
-
-/// Walks along the lower convex hull of a curve from way 0. Each step takes the steepest way on (ties: the
-/// one that costs more), so the slopes fall.
-void add_steps(const RdCurve& curve, std::uint32_t index, std::vector<Step>& steps) {
-  std::uint32_t at = 0;
-  for (;;) {
-    Step best;
-    for (std::uint32_t way = 1; way < curve.bytes.size(); ++way) {
-      if (curve.bytes[way] <= curve.bytes[at] || curve.loss[way] >= curve.loss[at]) continue;
-      const std::uint32_t bytes = curve.bytes[way] - curve.bytes[at];
-      const double slope = static_cast<double>(curve.loss[at] - curve.loss[way]) / bytes;
-      if (slope > best.slope || (slope == best.slope && bytes > best.bytes))
-        best = {slope, index, way, bytes};
-    }
-    if (best.way == 0) return;
-    steps.push_back(best);
-    at = best.way;
-  }
-}
-
-}  // namespace
 
 std::vector<std::uint32_t> spend_bytes(const std::vector<RdCurve>& curves, std::uint64_t budget_bytes) {
   std::vector<Step> steps;

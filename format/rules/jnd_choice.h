@@ -1,8 +1,4 @@
 #pragma once
-#include <cstddef>
-#include <cstdint>
-#include <span>
-#include <vector>
 
 #include "format/documents/thesis_tables.h"
 

@@ -19,8 +19,7 @@ struct Between {
   std::size_t first = 0, second = 0;
   double part = 0;
 };
-template <class Axis, class Value>
-Between between(std::size_t count, double at, Axis&& axis, Value&& value) {
+Between between(std::size_t count, double at, auto&& axis, auto&& value) {
   Between b;
   while (b.first + 2 < count && axis(b.first + 1) < at) ++b.first;
   b.second = std::min(b.first + 1, count - 1);

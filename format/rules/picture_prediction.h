@@ -1,7 +1,4 @@
 #pragma once
-#include <array>
-#include <span>
-#include <vector>
 
 #include "format/documents/quality_table.h"
 

@@ -1,7 +1,5 @@
 #include "format/rules/proxy_choice.h"
 
-#include <algorithm>
-
 #include "format/base/portable_math.h"
 
 namespace texmesh {
@@ -20,31 +18,6 @@ double loss_at(const std::vector<double>& sizes, const std::vector<double>& loss
   const double part = (portable::log(px) - from) / (portable::log(sizes[i + 1]) - from);
   return (1 - part) * losses[i] + part * losses[i + 1];
 }
-
-}  // namespace
-
-ProxyLoss proxy_loss(const Manifest& manifest, std::size_t proxy, double displayed_px) {
-  const ManifestProxy& p = manifest.proxies[proxy];
-  return {loss_at(manifest.proxy_sizes_px, p.flip, displayed_px),
-          loss_at(manifest.proxy_sizes_px, p.flip_p95, displayed_px)};
-}
-
-std::optional<std::size_t> serving_proxy(const Manifest& manifest, double displayed_px) {
-  for (std::size_t k = 0; k < manifest.proxies.size(); ++k) {
-    const ProxyLoss loss = proxy_loss(manifest, k, displayed_px);
-    if (loss.flip <= kSameFlip && loss.flip_p95 <= kSameFlipP95) return k;
-  }
-  return std::nullopt;
-}
-
-std::uint64_t proxy_bytes_beyond_start(const Manifest& manifest, std::size_t proxy) {
-  if (proxy == 0) return 0;  // the first picture
-  const EntryRef& glb = manifest.proxies[proxy].glb;
-  const std::uint64_t end = glb.offset + glb.bytes;
-  return end - std::min(end, std::max(glb.offset, kStartBytes));
-}
-
-namespace {
 
 constexpr int kMoments = 64;            // at which the time left is looked at
 constexpr double kMeshTimeShare = 0.5;  // of the time left
@@ -127,6 +100,27 @@ class StepModel {
 };
 
 }  // namespace
+
+ProxyLoss proxy_loss(const Manifest& manifest, std::size_t proxy, double displayed_px) {
+  const ManifestProxy& p = manifest.proxies[proxy];
+  return {loss_at(manifest.proxy_sizes_px, p.flip, displayed_px),
+          loss_at(manifest.proxy_sizes_px, p.flip_p95, displayed_px)};
+}
+
+std::optional<std::size_t> serving_proxy(const Manifest& manifest, double displayed_px) {
+  for (std::size_t k = 0; k < manifest.proxies.size(); ++k) {
+    const ProxyLoss loss = proxy_loss(manifest, k, displayed_px);
+    if (loss.flip <= kSameFlip && loss.flip_p95 <= kSameFlipP95) return k;
+  }
+  return std::nullopt;
+}
+
+std::uint64_t proxy_bytes_beyond_start(const Manifest& manifest, std::size_t proxy) {
+  if (proxy == 0) return 0;  // the first picture
+  const EntryRef& glb = manifest.proxies[proxy].glb;
+  const std::uint64_t end = glb.offset + glb.bytes;
+  return end - std::min(end, std::max(glb.offset, kStartBytes));
+}
 
 std::uint64_t document_bytes(const Manifest& m) {
   const EntryRef& materials = m.scales.back().glb;

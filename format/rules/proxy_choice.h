@@ -1,6 +1,4 @@
 #pragma once
-#include <cstdint>
-#include <optional>
 
 #include "format/documents/manifest.h"
 

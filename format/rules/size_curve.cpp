@@ -1,11 +1,9 @@
 #include "format/rules/size_curve.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "format/base/portable_math.h"
 #include "format/rules/allocation.h"
-#include "format/rules/size_model.h"
 
 namespace texmesh {
 namespace {
@@ -82,6 +80,13 @@ double axis_at(const PlaneTables& t, double quality) {
   return low + (a.position + part * (b.position - a.position)) * (high - low);
 }
 
+/// log R = B log(100 p), by (8.8).
+double log_r(const SizeModel& model, double vqp) {
+  return static_cast<double>(model.b) * portable::log(100 * std::max(vqp, kLeastModelVqp));
+}
+
+bool has_model(const SizeModel& model) { return model.a > 0 && model.b > 0; }
+
 }  // namespace
 
 double fineness_of(std::span<const std::uint16_t> quantisers) {
@@ -147,17 +152,6 @@ std::vector<float> knot_positions(const std::vector<std::uint8_t>& rung_quality,
   }
   return out;
 }
-
-namespace {
-
-/// log R = B log(100 p), by (8.8).
-double log_r(const SizeModel& model, double vqp) {
-  return static_cast<double>(model.b) * portable::log(100 * std::max(vqp, kLeastModelVqp));
-}
-
-bool has_model(const SizeModel& model) { return model.a > 0 && model.b > 0; }
-
-}  // namespace
 
 double modelled_bytes(const SizeModel& model, double vqp, double quality) {
   if (!has_model(model)) return 0;

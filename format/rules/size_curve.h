@@ -1,9 +1,6 @@
 #pragma once
-#include <cstdint>
-#include <span>
-#include <vector>
-
 #include "format/documents/tables.h"
+#include "format/documents/thesis_tables.h"
 
 namespace texmesh {
 
@@ -23,5 +20,16 @@ std::vector<float> knot_positions(const std::vector<std::uint8_t>& rung_quality,
                                   const std::vector<double>& rung_bytes,
                                   const std::vector<std::uint8_t>& knot_quality,
                                   const std::vector<double>& knot_bytes);
+
+// The thesis's size model of a fragment (8.5 to 8.9); `vqp` is its p, in 0..1. Pure functions, the same bits
+// everywhere.
+
+/// Least VQP that has a model: (8.8) divides by log(100 p), which is 0 at 0.01 and negative below.
+inline constexpr double kLeastModelVqp = 0.02;
+
+/// (8.5): bytes at a quality in 0..1; 0 without a model.
+double modelled_bytes(const SizeModel& model, double vqp, double quality);
+/// (8.9): the quality whose bytes these are (> 0). Not clipped to 0..1; 0 without a model.
+double modelled_quality(const SizeModel& model, double vqp, double bytes);
 
 }  // namespace texmesh

@@ -1,7 +1,7 @@
 #pragma once
-#include <cstddef>
 #include <cstdint>
 #include <utility>
+#include <vector>
 
 namespace texmesh {
 
@@ -19,8 +19,7 @@ class SplitMix {
   double between(double low, double high) { return low + (high - low) * next(); }
   std::size_t below(std::size_t n) { return static_cast<std::size_t>(next() * static_cast<double>(n)); }
   /// Every order is equally likely (Fisher, Yates).
-  template <class List>
-  void shuffle(List& list) {
+  void shuffle(auto& list) {
     for (std::size_t i = list.size(); i > 1; --i) {
       using std::swap;
       swap(list[i - 1], list[below(i)]);

@@ -1,10 +1,7 @@
 #include "format/rules/viewing.h"
 
-#include <algorithm>
-#include <limits>
-
 #include "format/base/portable_math.h"
-#include "format/rules/mip_choice.h"
+#include "format/rules/split_mix.h"
 
 namespace texmesh {
 namespace {
@@ -38,17 +35,10 @@ double edge_limit_of_first(std::span<const ManifestScale> scales) {
 }
 
 double limit_of(std::span<const ManifestScale> scales, std::size_t k, StepRule rule) {
-  switch (rule) {
-    case StepRule::kJnd:
-      return scales[k].display_px_jnd;
-    case StepRule::kError:
-      return scales[k].display_px_error;
-    case StepRule::kEdge:
-      return k == 1 ? edge_limit_of_first(scales) : edge_limit(scales, k);
-    case StepRule::kFlip:
-      break;
-  }
-  return scales[k].display_px_flip;
+  if (rule == StepRule::kJnd) return scales[k].display_px_jnd;
+  if (rule == StepRule::kError) return scales[k].display_px_error;
+  if (rule == StepRule::kFlip) return scales[k].display_px_flip;
+  return k == 1 ? edge_limit_of_first(scales) : edge_limit(scales, k);
 }
 
 /// By how much a relative distance grows when R can be no more than half the part's shorter side.
@@ -159,6 +149,23 @@ std::uint32_t plane_at_level(std::span<const TextureInfo> textures, std::uint32_
     best = p;
   }
   return best;
+}
+
+std::vector<OrdinaryLoad> ordinary_loads(std::size_t count) {
+  std::vector<OrdinaryLoad> out;
+  SplitMix random(18);
+  // Logarithms are equally likely.
+  const auto between = [&random](double least, double most) {
+    return least * portable::exp(random.next() * portable::log(most / least));
+  };
+  for (std::size_t k = 0; k < count; ++k) {
+    OrdinaryLoad load;
+    load.bytes_s = between(2e6, 50e6) / 8;
+    load.displayed_px = between(200, 2000);
+    load.time_limit_s = between(1, 10);
+    out.push_back(load);
+  }
+  return out;
 }
 
 }  // namespace texmesh

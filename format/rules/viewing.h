@@ -1,8 +1,7 @@
 #pragma once
-#include <span>
-#include <vector>
-
 #include "format/documents/manifest.h"
+#include "format/documents/tables.h"
+#include "format/documents/textures.h"
 
 namespace texmesh {
 
@@ -71,5 +70,26 @@ double fovea_radius_px(double eye_distance_px, double degrees = kFoveaDegrees);
 /// are. Nothing visible: the coarsest scale. Not clipped: scale_at(step_function(...)).
 int select_scale(const Manifest& manifest, double displayed_px, const VisiblePart& part,
                  StepRule rule = StepRule::kFlip);
+
+/// How often the texels of a full-size plane may be halved until one stands for a pixel: log2 of texels per
+/// pixel along a line, below 0 where there are fewer texels than pixels; 0 without covered texels.
+/// `surface_area` of the object, object units squared; `object_height` = O_V.
+double display_level(const PlaneTables& full_size, double surface_area, double object_height,
+                     double displayed_px);
+
+/// The plane of texture `base` with the largest mip that is at most `level`; `base` itself where there is
+/// none.
+std::uint32_t plane_at_level(std::span<const TextureInfo> textures, std::uint32_t base, double level);
+
+/// Somebody loads an object.
+struct OrdinaryLoad {
+  double bytes_s = 0;       // of the link: 2 to 50 Mbit/s
+  double displayed_px = 0;  // height of the object: 200 to 2,000
+  double time_limit_s = 0;  // 1 to 10
+};
+
+/// The loads that a writer chooses rungs for. Each number is drawn from a logarithmic scale, the three of
+/// them independently; the same ones on every machine. Fewer loads are the first ones of more.
+std::vector<OrdinaryLoad> ordinary_loads(std::size_t count = 1000);
 
 }  // namespace texmesh

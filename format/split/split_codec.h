@@ -1,11 +1,5 @@
 #pragma once
-#include <algorithm>
-#include <array>
-#include <bit>
-#include <cstdint>
-#include <vector>
 
-#include "format/split/look_ahead.h"
 #include "format/split/split_element_codec.h"
 
 namespace texmesh {

@@ -1,7 +1,4 @@
 #pragma once
-#include <array>
-#include <cstdint>
-#include <vector>
 
 #include "format/split/split_mesh.h"
 #include "format/split/split_stream.h"

@@ -1,12 +1,28 @@
 #pragma once
 #include <array>
-#include <cstdint>
 #include <vector>
 
-#include "format/base/no_index.h"
-#include "format/split/look_ahead.h"
+#include "format/base/vec.h"
 
 namespace texmesh {
+
+/// Asks memory for what stands there, which will be read soon. Any address will do.
+inline void ask_memory(const void* place) { __builtin_prefetch(place); }
+
+/// Items in a row whose data lie anywhere in memory would wait for it a dozen times each. So memory is asked
+/// for what the next ones read, in steps, each of which reads what the one before it has asked for. `Step`:
+/// the steps in their order, an enumeration that ends with kCount. An item takes a step every `apart` items,
+/// the last one `apart` items before its turn.
+template <class Step, std::size_t apart>
+struct LookAhead {
+  static constexpr std::size_t kSteps = static_cast<std::size_t>(Step::kCount);
+  static constexpr std::size_t kFarthest =
+      kSteps * apart;  // items from the one at hand to that of the first step
+  /// For every item: ask(step, ahead) for the one that comes `ahead` items later, the farthest first.
+  static void each_step(auto&& ask) {
+    for (std::size_t step = 0; step < kSteps; ++step) ask(static_cast<Step>(step), (kSteps - step) * apart);
+  }
+};
 
 /// A mesh under refinement by vertex splits. Points and wedges are only ever appended; splits change which
 /// wedges a face has.
@@ -61,8 +77,7 @@ class SplitMesh {
     return faces_[face].wedge[corner % 3];
   }
   /// Calls visit(face, corner) for the corners at a point.
-  template <class Visit>
-  void each_corner(std::uint32_t point, Visit&& visit) const {
+  void each_corner(std::uint32_t point, auto&& visit) const {
     for (std::uint32_t c = ring_[point].head; c != kNoIndex; c = next_of(c)) visit(c / 3, c % 3);
   }
   /// The corners at a point, sorted into fans: open fans first, each in the order of its first corner in

@@ -1,12 +1,9 @@
 #include "format/split/split_reader.h"
 
-#include <limits>
-
 #include "format/base/bytes.h"
 #include "format/base/sha256.h"
 #include "format/split/split_codec.h"
 #include "format/split/split_head.h"
-#include "format/split/split_model.h"
 
 namespace texmesh {
 
@@ -129,35 +126,6 @@ void add_attribute(const SplitAttribute& a, const std::vector<std::int32_t>& val
   }
 }
 
-}  // namespace
-
-Mesh split_model(const SplitStreamHead& head, const SplitMesh& mesh) {
-  Mesh out;
-  Numbering points(mesh.points().size()), wedges(mesh.wedge_point().size());
-  std::uint16_t parts = 0;
-  for (const std::uint32_t f : mesh.visible_faces()) {
-    Triangle t;
-    for (std::size_t k = 0; k < 3; ++k) t[k] = wedges.of(mesh.wedge_at(f, static_cast<std::uint32_t>(k)));
-    const SplitGroup group = head.groups[mesh.face_group()[f]];
-    out.triangles.push_back(t);
-    out.triangle_material.push_back(group.material);
-    out.triangle_part.push_back(group.part);
-    parts = std::max(parts, group.part);
-  }
-  for (const std::uint32_t w : wedges.used()) out.wedge_position.push_back(points.of(mesh.wedge_point()[w]));
-  for (const std::uint32_t p : points.used()) {
-    const SplitMesh::Point& place = mesh.points()[p];
-    out.positions.push_back({head.position.value(place[0], 0), head.position.value(place[1], 1),
-                             head.position.value(place[2], 2)});
-  }
-  for (std::size_t k = 0; k < head.attributes.size(); ++k)
-    add_attribute(head.attributes[k], mesh.values(k), wedges.used(), out);
-  out.part_names.resize(parts + std::size_t{1});
-  return out;
-}
-
-namespace {
-
 /// Decodes the values of one part. Where the part was left out every residual is 0.
 class PartDecoder {
  public:
@@ -180,7 +148,7 @@ class PartDecoder {
   bool same() { return present_ && residuals_.same(*this, false); }
 
   // What ResidualCodec asks of its bits:
-  bool bit(BitModel& model, bool) { return bits_.decode(model, ValueModels::kLimit); }
+  bool bit(BitModel& model, bool) { return bits_.decode(model, ValueModels::kValueLimit); }
   std::uint32_t raw(std::uint32_t, int count) { return bits_.decode_raw(count); }
 
  private:
@@ -198,18 +166,10 @@ class DecodingChannel {
     connectivity_ = BitDecoder(parts[0]);
     for (std::size_t i = 0; i < parts_.size(); ++i) parts_[i].start(parts[i + 1], head_.models[i]);
   }
-  template <class Truth>
-  bool bit(BitModel& model, Truth&&) {
-    return connectivity_.decode(model, SplitModels::kLimit);
-  }
-  template <class Truth>
-  std::uint32_t raw(int count, Truth&&) {
-    return connectivity_.decode_raw(count);
-  }
-  template <class Note>
-  void update_truth(Note&&) {}
-  template <class Truth>
-  void point(SplitMesh::Point& point, const SplitMesh::Point& guess, Truth&&) {
+  bool bit(BitModel& model, auto&&) { return connectivity_.decode(model, SplitModels::kModelLimit); }
+  std::uint32_t raw(int count, auto&&) { return connectivity_.decode_raw(count); }
+  void update_truth(auto&&) {}
+  void point(SplitMesh::Point& point, const SplitMesh::Point& guess, auto&&) {
     parts_[0].values(point.data(), guess.data(), 3, head_.position.bits);
   }
   void finish_point(SplitMesh& mesh, std::uint32_t point) {
@@ -218,12 +178,8 @@ class DecodingChannel {
     if (fill_ == SplitFill::kTexture) fill_lost_point(head_, mesh, point);
   }
   const std::vector<std::uint32_t>& lost() const { return lost_; }
-  template <class Truth>
-  bool same(std::size_t k, Truth&&) {
-    return parts_[k + 1].same();
-  }
-  template <class Truth>
-  void value(std::size_t k, std::int32_t* value, const std::array<std::int32_t, 4>& guess, Truth&&) {
+  bool same(std::size_t k, auto&&) { return parts_[k + 1].same(); }
+  void value(std::size_t k, std::int32_t* value, const std::array<std::int32_t, 4>& guess, auto&&) {
     const SplitAttribute& a = head_.attributes[k];
     parts_[k + 1].values(value, guess.data(), split_components(a.kind), a.grid.bits);
   }
@@ -257,6 +213,31 @@ SplitLimits checked_limits(const SplitStreamHead& head, const SplitLimits& limit
 }
 
 }  // namespace
+
+Mesh split_model(const SplitStreamHead& head, const SplitMesh& mesh) {
+  Mesh out;
+  Numbering points(mesh.points().size()), wedges(mesh.wedge_point().size());
+  std::uint16_t parts = 0;
+  for (const std::uint32_t f : mesh.visible_faces()) {
+    Triangle t;
+    for (std::size_t k = 0; k < 3; ++k) t[k] = wedges.of(mesh.wedge_at(f, static_cast<std::uint32_t>(k)));
+    const SplitGroup group = head.groups[mesh.face_group()[f]];
+    out.triangles.push_back(t);
+    out.triangle_material.push_back(group.material);
+    out.triangle_part.push_back(group.part);
+    parts = std::max(parts, group.part);
+  }
+  for (const std::uint32_t w : wedges.used()) out.wedge_position.push_back(points.of(mesh.wedge_point()[w]));
+  for (const std::uint32_t p : points.used()) {
+    const SplitMesh::Point& place = mesh.points()[p];
+    out.positions.push_back({head.position.value(place[0], 0), head.position.value(place[1], 1),
+                             head.position.value(place[2], 2)});
+  }
+  for (std::size_t k = 0; k < head.attributes.size(); ++k)
+    add_attribute(head.attributes[k], mesh.values(k), wedges.used(), out);
+  out.part_names.resize(parts + std::size_t{1});
+  return out;
+}
 
 std::array<std::int32_t, 4> split_mean(const SplitAttribute& attribute, std::size_t k, SplitMesh& mesh,
                                        const std::vector<std::uint32_t>& wedges) {
@@ -302,7 +283,6 @@ SplitStreamReader& SplitStreamReader::operator=(SplitStreamReader&&) noexcept = 
 
 const SplitStreamHead& SplitStreamReader::head() const { return state_->head; }
 const SplitMesh& SplitStreamReader::mesh() const { return state_->mesh; }
-std::size_t SplitStreamReader::next_block() const { return state_->block; }
 
 void SplitStreamReader::add_block(ByteSpan block) {
   State& s = *state_;

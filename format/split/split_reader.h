@@ -1,9 +1,7 @@
 #pragma once
-#include <cstdint>
 #include <memory>
-#include <span>
-#include <vector>
 
+#include "format/model/model.h"
 #include "format/split/split_mesh.h"
 #include "format/split/split_stream.h"
 
@@ -26,7 +24,6 @@ class SplitStreamReader {
 
   const SplitStreamHead& head() const;
   const SplitMesh& mesh() const;
-  std::size_t next_block() const;  // number of blocks decoded so far
   /// The next block, digest checked. FormatError when it is not what the head says; the reader is then of
   /// no more use.
   void add_block(std::span<const std::uint8_t> block);
@@ -46,5 +43,10 @@ class SplitStreamReader {
   struct State;
   std::unique_ptr<State> state_;
 };
+
+/// The visible faces of a mesh that a stream has built, with the values that the head's grids give its
+/// places. Points and wedges are numbered by their first use. Parts have the numbers of the head's groups and
+/// no names.
+Mesh split_model(const SplitStreamHead& head, const SplitMesh& mesh);
 
 }  // namespace texmesh

@@ -1,5 +1,3 @@
-
-#include <cmath>
 #include <cstdlib>
 
 #include "format/base/bytes.h"

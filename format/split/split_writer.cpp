@@ -1,7 +1,6 @@
 #include "format/split/split_writer.h"
 
 #include <compare>
-#include <limits>
 
 #include "format/base/sha256.h"
 #include "format/split/split_codec.h"
@@ -396,7 +395,7 @@ struct CountingBits {
 struct CodingBits {
   BitEncoder encoder;
   bool bit(BitModel& model, bool value) {
-    encoder.encode(model, value, ValueModels::kLimit);
+    encoder.encode(model, value, ValueModels::kValueLimit);
     return value;
   }
   std::uint32_t raw(std::uint32_t value, int count) {
@@ -417,8 +416,7 @@ std::uint8_t first_mean(const Symbols& symbols) {
   return static_cast<std::uint8_t>(count > 0 ? (8 * sum + count / 2) / count : 0);
 }
 
-template <class Bits>
-void code_all(ResidualCodec& residuals, Bits& bits, const Symbols& symbols, int components) {
+void code_all(ResidualCodec& residuals, auto& bits, const Symbols& symbols, int components) {
   residuals.start(first_mean(symbols) * 2);
   int component = 0;
   for (std::int32_t s : symbols) {
@@ -480,36 +478,28 @@ class EncodingChannel {
     return out;
   }
 
-  template <class Truth>
-  bool bit(BitModel& model, Truth&& truth) {
+  bool bit(BitModel& model, auto&& truth) {
     const bool value = truth(truth_);
-    bits_.encode(model, value, SplitModels::kLimit);
+    bits_.encode(model, value, SplitModels::kModelLimit);
     return value;
   }
-  template <class Truth>
-  std::uint32_t raw(int count, Truth&& truth) {
+  std::uint32_t raw(int count, auto&& truth) {
     const auto value = static_cast<std::uint32_t>(truth(truth_));
     bits_.encode_raw(value, count);
     return value;
   }
-  template <class Note>
-  void update_truth(Note&& note) {
-    note(truth_);
-  }
-  template <class Truth>
-  void point(SplitMesh::Point& point, const SplitMesh::Point& guess, Truth&& truth) {
+  void update_truth(auto&& note) { note(truth_); }
+  void point(SplitMesh::Point& point, const SplitMesh::Point& guess, auto&& truth) {
     point = truth(truth_);
     put(0, point.data(), guess.data(), 3, source_.position.bits);
   }
   void finish_point(SplitMesh&, std::uint32_t) {}
-  template <class Truth>
-  bool same(std::size_t k, Truth&& truth) {
+  bool same(std::size_t k, auto&& truth) {
     const bool same = truth(truth_);
     symbols_[k + 1].push_back(same ? kSame : kOther);
     return same;
   }
-  template <class Truth>
-  void value(std::size_t k, std::int32_t* value, const std::array<std::int32_t, 4>& guess, Truth&& truth) {
+  void value(std::size_t k, std::int32_t* value, const std::array<std::int32_t, 4>& guess, auto&& truth) {
     const SplitAttribute& a = source_.attributes[k];
     std::copy_n(truth(truth_), split_components(a.kind), value);
     put(k + 1, value, guess.data(), split_components(a.kind), a.grid.bits);

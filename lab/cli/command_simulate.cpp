@@ -2,17 +2,10 @@
 // several objects or lost packets; and chapter 4's own experiments, Table 4.2 and Theorem 4.1.
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <charconv>
-#include <cmath>
-#include <iostream>
-#include <map>
-#include <memory>
 #include <nlohmann/json.hpp>
-#include <utility>
 
 #include "format/base/text_bytes.h"
-#include "format/container/layout.h"
 #include "lab/cli/commands.h"
 #include "lab/transfer/chapter_4.h"
 #include "lab/transfer/packet_loss.h"
@@ -20,14 +13,13 @@
 #include "lab/transfer/probes.h"
 #include "lab/transfer/several_objects.h"
 #include "pipeline/io/atomic_file.h"
-#include "pipeline/io/exit_codes.h"
 #include "pipeline/io/table.h"
-#include "pipeline/io/wire_text.h"
+#include "pipeline/io/uri.h"
 #include "stages/condition/condition.h"
 #include "stages/image/png_writer.h"
 #include "tools/cli/options/delivery_options.h"
 #include "tools/cli/options/delivery_text.h"
-#include "tools/render/picture_sheet.h"
+#include "tools/render/rendered_model.h"
 
 namespace texmesh {
 
@@ -282,8 +274,8 @@ void simulate_lost_packets(const SimulateArguments& a, DeliveryRequest request) 
           "lost packets are not sent again, as over UDP; HTTP loses none. Of {} points and {} fragments:\n",
           grouped(whole.points().size()), grouped(fragments)),
       "lost points stand where their texture coordinates lie among their neighbours' (chapter 10), or at the mean "
-      "of these;\nlost fragments show their preview. FLIP is predicted of the textures; it does not see the "
-      "points\n");
+      "of these;\nlost fragments show their preview. FLIP is predicted of the textures; it does not see "
+      "the points\n");
 }
 
 // ---- several objects
@@ -405,7 +397,7 @@ void simulate_package(const SimulateArguments& a, DeliveryRequest request) {
   }
   const double error = mean_probe_error(probes, request.network.link, plan.mesh_s);
   if (a.json) {
-    Json j = simulated_json(plan, request.time_limit_s);
+    Json j = to_json(SimulatedDelivery{plan, request.time_limit_s});
     if (probes.packets > 0)
       j["probes"] = {{"packets", probes.packets},
                      {"bytes", probes.bytes},
@@ -475,8 +467,8 @@ void add_network_options(Command& c, SimulateArguments& a) {
   NetworkOptions& network = a.request.network;
   c.option("--mirror", a.mirrors,
            "A server's own rate, 2Mbit/s; with ,dead=3s it dies then, with ,lies=3s its bytes are wrong from "
-           "then on; several times for several servers")
-      .value_name("RATE");
+           "then on; several times for several servers",
+           "RATE");
   c.flag("--connect-costs", network.connect_costs, "A connection's first request takes another round trip")
       .rare();
   c.flag("--slow-start", network.slow_start, "Connections begin slowly, as TCP's do").rare();
@@ -486,31 +478,29 @@ void add_network_options(Command& c, SimulateArguments& a) {
 
 void add_method_options(Command& c, SimulateArguments& a) {
   c.group("Method");
-  enum_option<LabPolicy>(
-      c, "--policy", a.method.policy,
-      "htca = the thesis's method; guard = htca around the plan of least loss, with sizes within a factor of 1.5 "
-      "of that plan's share; price = one price of bytes, which rises when the transfer is late; proportional = "
-      "planned sizes scaled by the time left; static = planned sizes, always; thesis = chapters 4 and 7 as "
-      "printed: htca with --rule jnd, --order beta0, --window 1 and --hard-limits, textures at full size, the "
-      "list that T_0 beta_0 pays")
+  c.choice(
+       "--policy", a.method.policy,
+       "htca = the thesis's method; guard = htca around the plan of least loss, with sizes within a factor of 1.5 "
+       "of that plan's share; price = one price of bytes, which rises when the transfer is late; proportional = "
+       "planned sizes scaled by the time left; static = planned sizes, always; thesis = chapters 4 and 7 as "
+       "printed: htca with --rule jnd, --order beta0, --window 1 and --hard-limits, textures at full size, the "
+       "list that T_0 beta_0 pays")
       .shows_default("guard");
-  enum_option<HtcOrder>(
-      c, "--order", a.order,
-      "Next fragment: credit = by the sign of the credit; beta0 = by the throughput, as first "
-      "published; finest = always the finest. Default: finest with --policy guard, beta0 with "
-      "thesis, else credit");
-  enum_option<Estimator>(
-      c, "--estimator", a.estimator,
+  c.choice("--order", a.order,
+           "Next fragment: credit = by the sign of the credit; beta0 = by the throughput, as first "
+           "published; finest = always the finest. Default: finest with --policy guard, beta0 with "
+           "thesis, else credit");
+  c.choice(
+      "--estimator", a.estimator,
       "Throughput: last = of the last transfer; harmonic = harmonic mean of several; ewma = mean that forgets "
       "older transfers. Default: harmonic with --policy price, proportional and static, else last");
   c.option("--samples", a.method.samples, "Transfers that the harmonic mean takes")
       .integer_in(1, 64)
       .shows_default();
   c.option(
-       "--beta0",
-       [&a](const std::string& text) { a.request.beta0_bytes_s = parse_bandwidth(text, "--beta0"); },
-       "First guess of the throughput (default: what the mesh's transfer has shown)")
-      .value_name("RATE");
+      "--beta0",
+      [&a](const std::string& text) { a.request.beta0_bytes_s = parse_bandwidth(text, "--beta0"); },
+      "First guess of the throughput (default: what the mesh's transfer has shown)", "RATE");
   c.option("--window", a.window, "Requests in flight; 0 = by throughput and round trip")
       .integer_in(0, 64)
       .shows_default();
@@ -523,10 +513,10 @@ void add_method_options(Command& c, SimulateArguments& a) {
 
 void add_probe_options(Command& c, ProbeOptions& probe) {
   c.group("Test packets");
-  enum_option<ProbeMode>(
-      c, "--probe", probe.mode,
-      "Test packets beside the textures, which measure the link and cost a part of it: fixed = of one size at "
-      "regular intervals; adaptive = half as large and as frequent below a threshold, twice from it on")
+  c.choice(
+       "--probe", probe.mode,
+       "Test packets beside the textures, which measure the link and cost a part of it: fixed = of one size at "
+       "regular intervals; adaptive = half as large and as frequent below a threshold, twice from it on")
       .shows_default("off");
   c.option(
        "--probe-size",
@@ -535,8 +525,7 @@ void add_probe_options(Command& c, ProbeOptions& probe) {
          if (!(probe.packet_bytes >= 64 && probe.packet_bytes <= 1 << 24))
            throw UsageError("--probe-size", "", "64 B to 16 MiB", text);
        },
-       "A test packet, of adaptive ones the first: 64 B to 16 MiB")
-      .value_name("BYTES")
+       "A test packet, of adaptive ones the first: 64 B to 16 MiB", "BYTES")
       .shows_default("8kB");
   c.option(
        "--probe-interval",
@@ -545,8 +534,7 @@ void add_probe_options(Command& c, ProbeOptions& probe) {
          if (!(probe.interval_s >= 0.01 && probe.interval_s <= 3600))
            throw UsageError("--probe-interval", "", "10 ms to an hour", text);
        },
-       "From one test packet to the next: 10 ms to an hour")
-      .value_name("TIME")
+       "From one test packet to the next: 10 ms to an hour", "TIME")
       .shows_default("500ms");
   c.option(
        "--probe-threshold",
@@ -555,30 +543,26 @@ void add_probe_options(Command& c, ProbeOptions& probe) {
          if (!(probe.threshold_bytes_s > 0))
            throw UsageError("--probe-threshold", "", "a rate above 0", text);
        },
-       "The threshold of adaptive test packets")
-      .value_name("RATE")
+       "The threshold of adaptive test packets", "RATE")
       .shows_default("1Mbit/s");
 }
 
 void add_play_options(Command& c, SimulateArguments& a) {
   c.group("What is played");
-  Option beside =
-      c.option(
-           "--beside", a.beside,
-           "Another package that shares link and time limit, and its displayed height in px; may be given again")
-          .value_name("PKG[,PX]");
-  c.flag(
-       "--no-repeat", a.no_repeat,
-       "Packets of --loss are not sent again: a table of what that costs mesh and textures (HTTP sends them "
-       "again)")
+  Option beside = c.option(
+      "--beside", a.beside,
+      "Another package that shares link and time limit, and its displayed height in px; may be given again",
+      "PKG[,PX]");
+  c.flag("--no-repeat", a.no_repeat,
+         "Packets of --loss are not sent again: a table of what that costs mesh and textures (HTTP sends "
+         "them again)")
       .excludes(beside);
   c.option("--picture", a.picture,
            "With --no-repeat: a PNG of the mesh as it should be, with lost points at the mean of their "
-           "neighbours, and by their texture coordinates")
-      .value_name("FILE");
-  Option table = c.option("--table", a.table, "4.2: the experiment of Table 4.2 instead of a package")
-                     .one_of_explained({"4.2"})
-                     .value_name("4.2");
+           "neighbours, and by their texture coordinates",
+           "FILE");
+  Option table = c.option("--table", a.table, "4.2: the experiment of Table 4.2 instead of a package", "4.2")
+                     .one_of_explained({"4.2"});
   c.flag("--theorem", a.theorem, "What Theorem 4.1 says and what holds, over random links").excludes(table);
   c.option("--seeds", a.seeds, "Runs per row of the table").integer_in(1, 10000).shows_default();
 }
@@ -586,19 +570,18 @@ void add_play_options(Command& c, SimulateArguments& a) {
 }  // namespace
 
 void add_lab_simulate_command(Command& app) {
-  auto args = std::make_shared<SimulateArguments>();
-  args->probe.packet_bytes = 8000, args->probe.threshold_bytes_s = 125e3;
-  Command c = app.add("simulate", "Play any policy over a model of a network, and chapter 4's experiments");
-  add_package_and_view_options(c, *args, false);
-  c.option("--plot", args->plot, "Write an SVG: quality and time by fragment, throughput, credit")
-      .value_name("FILE");
+  auto [c, args] = app.add(
+      "simulate", "Play any policy over a model of a network, and chapter 4's experiments", run_simulate);
+  args.probe.packet_bytes = 8000, args.probe.threshold_bytes_s = 125e3;
+  add_package_and_view_options(c, args, false);
+  c.option("--plot", args.plot, "Write an SVG: quality and time by fragment, throughput, credit", "FILE");
   Option json =
-      c.flag("--json", args->json, "Print one JSON object (lab/schemas/lab-simulate.v1.schema.json)");
-  c.flag("--csv", args->csv, "Print every decision, run or row as a line").excludes(json);
-  add_network_options(c, *args);
-  add_method_options(c, *args);
-  add_probe_options(c, args->probe);
-  add_play_options(c, *args);
+      c.flag("--json", args.json, "Print one JSON object (lab/schemas/lab-simulate.v1.schema.json)");
+  c.flag("--csv", args.csv, "Print every decision, run or row as a line").excludes(json);
+  add_network_options(c, args);
+  add_method_options(c, args);
+  add_probe_options(c, args.probe);
+  add_play_options(c, args);
   c.examples(
       "  texmesh-lab simulate bust.texmesh --time 5 --bandwidth 2Mbit/s --rtt 50 --policy htca\n"
       "  texmesh-lab simulate bust.texmesh --bandwidth 2Mbit/s --mirror 1Mbit/s --mirror 1Mbit/s,dead=2s\n"
@@ -606,10 +589,9 @@ void add_lab_simulate_command(Command& app) {
       "  texmesh-lab simulate bust.texmesh --bandwidth 2Mbit/s --loss 0.05 --no-repeat --picture lost.png\n"
       "  texmesh-lab simulate --table 4.2 --json");
   c.notes(
-      "The deviation is of the time limit: positive when the transfer ended early. --table and --theorem play the "
-      "method itself and take --order, --seeds and the form of the output only.\n"
+      "The deviation is a share of the time limit. It is positive when the transfer ended early. --table and "
+      "--theorem play the method itself and take --order, --seeds and the form of the output only.\n"
       "Exit code: 0, 1 when the package or the trace cannot be read, 2 usage.");
-  c.on_run([args] { return run_simulate(*args); });
 }
 
 }  // namespace texmesh

@@ -1,15 +1,10 @@
 // texmesh-lab experiment fit: thresholds from what judges have answered.
 #include <fmt/format.h>
 
-#include <filesystem>
-#include <iostream>
-#include <memory>
-
 #include "format/base/text_bytes.h"
 #include "lab/cli/commands.h"
 #include "lab/experiment/fit_experiment.h"
 #include "pipeline/io/atomic_file.h"
-#include "pipeline/io/exit_codes.h"
 #include "pipeline/io/file_resolver.h"
 #include "pipeline/io/table.h"
 #include "tools/cli/options/command_line.h"
@@ -74,27 +69,25 @@ int run_fit(const FitArguments& args) {
 }  // namespace
 
 void add_fit_experiment(Command& experiment) {
-  auto args = std::make_shared<FitArguments>();
-  Command c = experiment.add("fit", "Find the just noticeable difference in judges' results");
-  c.option("RESULTS", args->files, "Files that judges have saved, of one experiment").required();
-  c.option("-o,--output", args->profile, "The JND profile to write, for texmesh compile --jnd-profile")
-      .value_name("FILE");
-  c.option("--page", args->page, "A page to write: curves as SVG, judges, verdicts").value_name("HTML");
-  c.option("--design", args->design,
-           "The experiment's folder or its design.json: every answer is compared with it")
-      .value_name("DIR");
+  auto [c, args] = experiment.add("fit", "Find the just noticeable difference in judges' results", run_fit);
+  c.option("RESULTS", args.files, "Files that judges have saved, of one experiment").required();
+  c.option("-o,--output", args.profile, "The JND profile to write, for texmesh compile --jnd-profile",
+           "FILE");
+  c.option("--page", args.page, "A page to write: curves as SVG, judges, verdicts", "HTML");
+  c.option("--design", args.design,
+           "The experiment's folder or its design.json: every answer is compared with it", "DIR");
   c.option(
-       "--curve", args->curve,
+       "--curve", args.curve,
        "sigmoid = logistic in the logarithm of the change, with lapses, of greatest likelihood (7.3.4). line = "
-       "straight, of least squares, as Fig. 7.7; one threshold for all sizes")
+       "straight, of least squares, as Fig. 7.7; one threshold for all sizes",
+       "KIND")
       .one_of_explained({"sigmoid", "line"})
-      .value_name("KIND")
       .shows_default();
-  c.option("--draws", args->draws, "Draws of the bootstrap").integer_in(40, 20000).shows_default();
-  c.option("--seed", args->seed, "Of the draws").shows_default();
-  c.flag("--skip", args->skip, "Leave out files that cannot be read, and say which");
-  add_jobs_option(c, args->jobs);
-  c.flag("--json", args->json, "Print one JSON object (lab/schemas/experiment-fit.v1.schema.json)");
+  c.option("--draws", args.draws, "Draws of the bootstrap").integer_in(40, 20000).shows_default();
+  c.option("--seed", args.seed, "Of the draws").shows_default();
+  c.flag("--skip", args.skip, "Leave out files that cannot be read, and say which");
+  add_jobs_option(c, args.jobs);
+  c.flag("--json", args.json, "Print one JSON object (lab/schemas/experiment-fit.v1.schema.json)");
   c.examples(
       "  texmesh-lab experiment fit results/*.json -o jnd-profile.json\n"
       "  texmesh-lab experiment fit results/*.json --design judges/ --page fit.html -o jnd-profile.json\n"
@@ -109,7 +102,6 @@ void add_fit_experiment(Command& experiment) {
       "The same files and seed give the same output on every machine.\n"
       "Exit code: 0 the threshold was found, 4 it lies outside the levels (no profile is written), 1 when a file is of "
       "another experiment, was changed or cannot be read, or no judge is left, 2 usage.");
-  c.on_run([args] { return run_fit(*args); });
 }
 
 }  // namespace texmesh

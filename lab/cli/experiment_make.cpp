@@ -2,15 +2,11 @@
 #include <fmt/format.h>
 
 #include <charconv>
-#include <filesystem>
-#include <iostream>
-#include <memory>
 #include <nlohmann/json.hpp>
 
-#include "format/base/clean_text.h"
+#include "format/base/text_bytes.h"
 #include "lab/cli/commands.h"
 #include "lab/experiment/make_experiment.h"
-#include "pipeline/io/exit_codes.h"
 #include "pipeline/io/file_resolver.h"
 #include "pipeline/io/table.h"
 #include "tools/cli/options/command_line.h"
@@ -183,26 +179,25 @@ int run_make(const MakeArguments& args) {
 void add_stimulus_options(Command& c, MakeArguments& args) {
   c.option("PKG", args.package, "A package: its scales are compared with S_0 (thesis 7.3.4)");
   c.option("-o,--output", args.folder,
-           "The folder to make, with index.html in it. A folder with files is refused")
-      .required()
-      .value_name("DIR");
+           "The folder to make, with index.html in it. A folder with files is refused", "DIR")
+      .required();
   c.option(
        "--stimuli", args.stimuli,
        "ellipsoids = drawn ones, of which one to three axes change (7.3.2). quadrics = irregular ones, of which "
-       "the depth changes (7.3.3). mesh = the scales of PKG")
-      .one_of_explained({"ellipsoids", "quadrics", "mesh"})
-      .value_name("KIND");
+       "the depth changes (7.3.3). mesh = the scales of PKG",
+       "KIND")
+      .one_of_explained({"ellipsoids", "quadrics", "mesh"});
   c.option(
        "--sizes", args.sizes,
        "Displayed sizes of the object in px, with commas between (default: 160). Two or more make the experiment "
-       "on distance (6.2): fit says whether what is just noticeable depends on the size")
-      .separated_by(',')
-      .value_name("PX,..");
+       "on distance (6.2): fit says whether what is just noticeable depends on the size",
+       "PX,..")
+      .separated_by(',');
   c.option(
        "--levels", args.levels,
-       "Relative changes, with commas between. Default: 0.01 to 0.15 for ellipsoids, 0.02 to 0.27 for quadrics")
-      .separated_by(',')
-      .value_name("X,..");
+       "Relative changes, with commas between. Default: 0.01 to 0.15 for ellipsoids, 0.02 to 0.27 for quadrics",
+       "X,..")
+      .separated_by(',');
   c.option("--objects", args.options.objects, "How many ellipsoids or quadrics")
       .integer_in(1, kMostObjects)
       .shows_default();
@@ -236,10 +231,10 @@ void add_trial_options(Command& c, MakeArguments& args) {
       .shows_default();
   c.option("--seed", args.options.seed, "Of objects, orders and names of files").shows_default();
   c.option("--title", args.title, "Heading of the page");
-  c.option("--consent", args.consent, "File with the text that judges agree to, in place of the page's own")
-      .value_name("FILE");
-  c.option("--post", args.post, "Address to which judges may send their results at the end, as JSON by POST")
-      .value_name("URL");
+  c.option("--consent", args.consent, "File with the text that judges agree to, in place of the page's own",
+           "FILE");
+  c.option("--post", args.post, "Address to which judges may send their results at the end, as JSON by POST",
+           "URL");
   add_jobs_option(c, args.jobs);
   c.flag("--json", args.json, "Print id, levels, sizes and trials as one JSON object");
 }
@@ -247,10 +242,10 @@ void add_trial_options(Command& c, MakeArguments& args) {
 }  // namespace
 
 void add_make_experiment(Command& experiment) {
-  auto args = std::make_shared<MakeArguments>();
-  Command c = experiment.add("make", "Write a page of forced choices between two alternatives");
-  add_stimulus_options(c, *args);
-  add_trial_options(c, *args);
+  auto [c, args] =
+      experiment.add("make", "Write a page of forced choices between two alternatives", run_make);
+  add_stimulus_options(c, args);
+  add_trial_options(c, args);
   c.examples(
       "  texmesh-lab experiment make --stimuli quadrics -o judges/\n"
       "  texmesh-lab experiment make --stimuli quadrics --sizes 64,128,256 -o distance/\n"
@@ -265,7 +260,6 @@ void add_make_experiment(Command& experiment) {
       "Names and sizes of the pictures tell nothing; design.json tells all, so judges must not read it.\n"
       "The same options give the same files on every machine.\n"
       "Exit code: 0, 1 when the package cannot be read or DIR not be written, 2 usage.");
-  c.on_run([args] { return run_make(*args); });
 }
 
 }  // namespace texmesh

@@ -1,6 +1,6 @@
 // texmesh-lab: measures the method on packages and models. It is not part of what users of scans install.
 #include "lab/cli/commands.h"
-#include "pipeline/compile/library_versions.h"
+#include "pipeline/io/program.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"
 

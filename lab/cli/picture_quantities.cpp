@@ -1,15 +1,12 @@
 // texmesh-lab picture: what stages of the method computed.
-#include "tools/inspect/pictures/painted_quantity.h"
-
 #include <fmt/format.h>
 
-#include <algorithm>
-
+#include "format/container/layout.h"
 #include "lab/cli/commands.h"
-#include "pipeline/compile/artefacts.h"
+#include "pipeline/compile/stage_table.h"
 #include "pipeline/io/table.h"
 #include "stages/data/nested_scales.h"
-#include "stages/data/skeleton.h"
+#include "stages/data/scale_map.h"
 #include "tools/cli/options/command_line.h"
 #include "tools/cli/painting.h"
 
@@ -100,13 +97,13 @@ void add_picture_command(Command& app) {
   c.option("INPUT", args->input, "A model; the stages that are needed run, through the cache").required();
   c.option("--what", args->what,
            "skeleton: the curve skeleton inside the shape. R: the distance to the skeleton, which errors are "
-           "measured against. collapse-error: at which error a vertex was removed")
+           "measured against. collapse-error: at which error a vertex was removed",
+           "QUANTITY")
       .required()
-      .one_of_explained({"skeleton", "R", "collapse-error"})
-      .value_name("QUANTITY");
-  c.option("-o,--output", args->output, "x.glb to turn in any viewer, or x.png for two views side by side")
-      .required()
-      .value_name("FILE");
+      .one_of_explained({"skeleton", "R", "collapse-error"});
+  c.option("-o,--output", args->output, "x.glb to turn in any viewer, or x.png for two views side by side",
+           "FILE")
+      .required();
   c.option("--size", args->size_px, "Side of one view of a PNG, px").integer_in(64, 4096).shows_default();
   add_painting_options(c, *args);
   add_jobs_option(c, args->jobs);

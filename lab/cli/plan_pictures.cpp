@@ -1,28 +1,13 @@
 #include "lab/cli/plan_pictures.h"
 
-#include <algorithm>
-#include <cmath>
-
-#include "format/container/layout.h"
-#include "stages/image/resize.h"
-#include "tools/extract/glb/scale_file.h"
-#include "tools/extract/glb/texture_source.h"
+#include "delivery/cpp/package/package_reader.h"
+#include "stages/image/decode_image.h"
+#include "stages/measure/fragment_meter.h"
+#include "tools/extract/glb/standalone_glb.h"
 #include "tools/extract/package_model.h"
-#include "tools/render/picture_sheet.h"
-#include "tools/render/plane_pixels.h"
 
 namespace texmesh {
 namespace {
-
-/// The planes of an image as one picture; alpha may be shown at another size.
-Pixels with_alpha_of(const PackageImage& image, const Pixels& colours, const Pixels& alpha) {
-  const std::uint32_t width = std::min(colours.width_px, alpha.width_px),
-                      height = std::min(colours.height_px, alpha.height_px);
-  const auto fitted = [&](const Pixels& p, Averaging kind) {
-    return reduced(p, p.width_px, p.height_px, width, height, kind);
-  };
-  return with_alpha(fitted(colours, image.averaging()), fitted(alpha, Averaging::kNumbers));
-}
 
 const ShownPlane& shown_plane(const ShownPackage& shown, std::uint32_t base) {
   const auto found =
@@ -46,7 +31,44 @@ std::vector<RenderTexture> source_textures(const std::string& source, const std:
   return out;
 }
 
+/// The preview of a full-size plane at the size of `info`.
+Pixels enlarged_preview(PackageReader& package, std::uint32_t base, const TextureInfo& info) {
+  const Pixels preview =
+      decode_image(probe_image(package.textures().at(base).preview.path, package.preview(base), {}));
+  SamplePatch patch{{0, 0, preview.width_px, preview.height_px}, Samples(info.channels)};
+  for (std::size_t c = 0; c < info.channels; ++c)
+    for (std::size_t i = 0; i < std::size_t{preview.width_px} * preview.height_px; ++i)
+      patch.samples[c].push_back(
+          preview.data[i * preview.channels + std::min<std::size_t>(c, preview.channels - 1)]);
+  const Samples large = scaled_up(patch, bilinear_places(0, info.width_px, info.width_px, preview.width_px),
+                                  bilinear_places(0, info.height_px, info.height_px, preview.height_px));
+  Pixels out{info.width_px, info.height_px, info.channels, {}};
+  out.data.resize(std::size_t{out.width_px} * out.height_px * out.channels);
+  for (std::size_t c = 0; c < info.channels; ++c)
+    for (std::size_t i = 0; i < large[c].size(); ++i) out.data[i * info.channels + c] = large[c][i];
+  return out;
+}
+
 }  // namespace
+
+Pixels read_shown_plane(PackageReader& package, std::uint32_t base, std::uint32_t plane,
+                        std::span<const std::int32_t> rungs, const RunContext& context) {
+  const TextureInfo& info = package.textures().at(plane);
+  const PlaneTables& tables = package.tables().planes.at(plane);
+  if (rungs.size() != tables.fragment_count())
+    throw std::invalid_argument("read_shown_plane: a rung for each fragment");
+  Pixels out = enlarged_preview(package, base, info);
+  PlaneStreams streams(info.codec, tables, package.entry(info.tables));
+  for (std::uint32_t r = 0; r < tables.rung_count(); ++r) {
+    std::vector<std::uint16_t> shown;
+    for (const std::uint16_t f : tables.order)
+      if (rungs[f] == static_cast<std::int32_t>(r)) shown.push_back(f);
+    if (shown.empty() && !codec_traits(info.codec).incremental) continue;
+    streams.add_pack(r, package.entry(info.rungs[r]));
+    decode_fragments(info, info.rungs[r].path, streams, shown, out, context);
+  }
+  return out;
+}
 
 ShownPackage shown_by(PackageReader& package, const DeliveryPlan& plan, const FragmentList& list) {
   ShownPackage shown{plan.scale, {}, plan.proxy};
@@ -99,8 +121,7 @@ std::vector<RenderTexture> PlanPictures::textures_of(const ShownPackage& shown) 
   const std::vector<PackageImage> images = package_images(package_);
   std::vector<RenderTexture> out;
   for (const TextureImage& from : finest_.texture_images) {
-    const auto image =
-        std::ranges::find_if(images, [&](const PackageImage& i) { return i.image == from.image; });
+    const auto image = std::ranges::find(images, from.image, &PackageImage::image);
     if (image == images.end())
       throw FormatError(kTexturesPath, "", image_name(from.image) + ", which a mesh uses", "none");
     Pixels pixels = texels(image->plane);

@@ -1,13 +1,7 @@
 #pragma once
-#include <cstdint>
-#include <map>
-#include <optional>
-#include <string>
-#include <vector>
 
 #include "delivery/cpp/client/delivery_plan.h"
 #include "stages/measure/flip.h"
-#include "stages/render/environment.h"
 #include "stages/render/shade.h"
 #include "tools/render/rendered_model.h"
 
@@ -33,6 +27,12 @@ struct RenderedFlip {
   double geometry = 0;  // of the scale with the source's texels; 0 for a proxy
   double textures = 0;  // of S_0 with the textures that are shown; for a proxy the same as `whole`
 };
+
+/// A plane as a client shows it: each fragment at its rung, row by row; -1, and what is not stored = as the
+/// preview of the full-size plane `base` shows it, scaled up bilinearly. Errors as read_plane(), but for its
+/// size; std::invalid_argument where the number of rungs is another. Same result for any thread count.
+Pixels read_shown_plane(PackageReader& package, std::uint32_t base, std::uint32_t plane,
+                        std::span<const std::int32_t> rungs, const RunContext& context);
 
 /// Renders what clients would show of a package, and compares it with the source: the truth that quality.json
 /// predicts. Same result for any thread count.

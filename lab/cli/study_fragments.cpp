@@ -2,16 +2,12 @@
 #include <fmt/format.h>
 #include <time.h>
 
-#include <iostream>
-#include <memory>
 #include <nlohmann/json.hpp>
-#include <span>
 
 #include "format/base/text_bytes.h"
 #include "lab/cli/commands.h"
 #include "lab/study/fragment_study.h"
 #include "pipeline/io/atomic_file.h"
-#include "pipeline/io/exit_codes.h"
 #include "pipeline/io/file_resolver.h"
 #include "pipeline/io/table.h"
 #include "stages/image/decode_image.h"
@@ -175,7 +171,14 @@ int study_fragments_of(const FragmentArguments& args) {
   return kExitOk;
 }
 
-void add_fragment_options(Command& c, FragmentArguments& args) {
+}  // namespace
+
+void add_fragments_study(Command& study) {
+  auto [c, args] =
+      study.add("fragments",
+                "Does cutting a texture cost bytes? The sum of its fragments against one file (Table "
+                "3.1, Figs. 3.5-3.8)",
+                study_fragments_of);
   c.option("IMAGES", args.images, "JPEG, PNG, TIFF, WebP or EXR images").required();
   c.option("--grids", args.grids, "Fragments in a row and a column: 16 cuts into 16 x 16")
       .separated_by(',')
@@ -185,26 +188,15 @@ void add_fragment_options(Command& c, FragmentArguments& args) {
       .separated_by(',')
       .integer_in(1, 100)
       .shows_default();
-  c.option("--subsampling", args.subsampling, "Chroma resolution")
+  c.option("--subsampling", args.subsampling, "Chroma resolution", "NAME")
       .one_of({"420", "444"})
-      .value_name("NAME")
       .shows_default();
   c.flag(
       "--decode", args.decode,
       "Time decoding, too, in CPU time of one thread: one file against all fragments, each made a whole file again");
-  c.option("--csv", args.csv, "Write the figures, in bytes, to this file as well").value_name("FILE");
+  c.option("--csv", args.csv, "Write the figures, in bytes, to this file as well", "FILE");
   add_jobs_option(c, args.jobs);
   c.flag("--json", args.json, "Print one JSON object");
-}
-
-}  // namespace
-
-void add_fragments_study(Command& study) {
-  auto args = std::make_shared<FragmentArguments>();
-  Command c = study.add("fragments",
-                        "Does cutting a texture cost bytes? The sum of its fragments against one file (Table "
-                        "3.1, Figs. 3.5-3.8)");
-  add_fragment_options(c, *args);
   c.examples(
       "  texmesh-lab study fragments atlas.jpg\n"
       "  texmesh-lab study fragments *.jpg --grids 4,8,16 --qualities 20,60,90 --csv figures.csv");
@@ -216,7 +208,6 @@ void add_fragments_study(Command& study) {
       "Sides of fragments are multiples of 16: the image's edges are repeated to fill the last fragments, "
       "and small images are cut into fewer than n x n.\n"
       "Exit code: 0, 1 when an image cannot be read, 2 usage, 3 internal error.");
-  c.on_run([args] { return study_fragments_of(*args); });
 }
 
 }  // namespace texmesh

@@ -1,10 +1,5 @@
 // texmesh-lab study method: the thesis as printed beside what texmesh does by default, on one model.
 #include <fmt/format.h>
-
-#include <cmath>
-#include <filesystem>
-#include <iostream>
-#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "lab/cli/commands.h"
@@ -12,12 +7,11 @@
 #include "lab/transfer/chapter_4.h"
 #include "pipeline/cache/disk_store.h"
 #include "pipeline/compile/compile_model.h"
-#include "pipeline/compile/profile.h"
+#include "pipeline/compile/options.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/file_resolver.h"
 #include "pipeline/io/new_folder.h"
 #include "pipeline/io/table.h"
-#include "tools/cli/options/command_line.h"
 #include "tools/cli/options/common_options.h"
 #include "tools/cli/options/delivery_options.h"
 #include "tools/inspect/package_mesh.h"
@@ -72,15 +66,8 @@ std::string compiled(const MethodArguments& args, const fs::path& folder, const 
   CompileRequest request;
   request.input = args.input;
   request.output = (folder / ((profile.empty() ? "texmesh" : profile) + ".texmesh")).string();
-  if (!profile.empty()) {
-    const std::string file = profile_file(profile);
-    const auto bytes = read_input_file(file, 1 << 20);
-    read_profile(request.options, std::string(bytes.begin(), bytes.end()), file);
-  }
-  const std::unique_ptr<Store> store = args.cache.off
-                                           ? std::make_unique<NullStore>()
-                                           : open_disk_store(default_cache_folder(args.cache.folder));
-  compile_model(request, *store, context_of(args.jobs), {});
+  apply_profile(profile, request.options);
+  compile_model(request, *store_of(args.cache), context_of(args.jobs), {});
   return request.output;
 }
 
@@ -218,10 +205,9 @@ void add_method_arguments(Command& c, MethodArguments& args) {
            "A model, which is compiled twice, by default and with --profile thesis; or a package, which both "
            "systems read")
       .required();
-  c.option("--thesis", args.thesis, "The package of --profile thesis, where INPUT is a package")
-      .value_name("PKG");
-  c.option("--against", args.against, "The model, for the source's texels, where INPUT is a package")
-      .value_name("MODEL");
+  c.option("--thesis", args.thesis, "The package of --profile thesis, where INPUT is a package", "PKG");
+  c.option("--against", args.against, "The model, for the source's texels, where INPUT is a package",
+           "MODEL");
   c.option("--display", args.displays_px, "Displayed heights, px")
       .separated_by(',')
       .integer_in(16, 2048)
@@ -241,9 +227,9 @@ void add_method_arguments(Command& c, MethodArguments& args) {
 }  // namespace
 
 void add_method_study(Command& study) {
-  auto args = std::make_shared<MethodArguments>();
-  Command c = study.add("method", "The thesis as printed beside texmesh's defaults, on one model");
-  add_method_arguments(c, *args);
+  auto [c, args] =
+      study.add("method", "The thesis as printed beside texmesh's defaults, on one model", study_method_of);
+  add_method_arguments(c, args);
   c.examples(
       "  texmesh-lab study method turtle.glb --display 300,1000\n"
       "  texmesh-lab study method turtle.texmesh --thesis printed.texmesh --against turtle.glb --json");
@@ -254,7 +240,6 @@ void add_method_study(Command& study) {
       "\"end s\" is over the link as told. Bursts: ten links of that mean whose rate varies by half of it "
       "(correlation 0.9 between tenths of a second); how late the last fragment is, and how far from the limit.\n"
       "Exit code: 0, 1 when a file cannot be read or compiled, 2 usage, 3 internal error.");
-  c.on_run([args] { return study_method_of(*args); });
 }
 
 }  // namespace texmesh

@@ -1,28 +1,17 @@
 // texmesh-lab study prediction: what plans are predicted to look like, beside what they look like.
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <cstdint>
 #include <fstream>
-#include <iostream>
-#include <memory>
 #include <nlohmann/json.hpp>
-#include <string>
-#include <vector>
 
-#include "delivery/cpp/client/delivery_plan.h"
 #include "format/base/json_fields.h"
 #include "format/base/portable_math.h"
 #include "format/rules/split_mix.h"
 #include "lab/cli/commands.h"
 #include "lab/cli/plan_pictures.h"
-#include "pipeline/io/exit_codes.h"
 #include "pipeline/io/table.h"
 #include "tools/cli/options/command_line.h"
 #include "tools/cli/options/common_options.h"
-#include "tools/cli/options/units.h"
 
 namespace texmesh {
 namespace {
@@ -286,33 +275,32 @@ int run_prediction(const PredictionArguments& args) {
 }  // namespace
 
 void add_prediction_study(Command& study) {
-  auto args = std::make_shared<PredictionArguments>();
-  Command c = study.add("prediction", "Does a plan look as quality.json predicts? FLIP of plans, rendered");
-  c.option("PKG", args->packages, "Packages").required();
+  auto [c, args] = study.add(
+      "prediction", "Does a plan look as quality.json predicts? FLIP of plans, rendered", run_prediction);
+  c.option("PKG", args.packages, "Packages").required();
   c.option(
-       "--plans", args->plans,
+       "--plans", args.plans,
        "Random plans per package, in turn: what clients choose for a number of bytes, for a link and a time, "
        "and drawn mips and rungs")
       .integer_in(1, 10000)
       .shows_default();
-  c.option("--seed", args->seed, "Seed of the plans").shows_default();
-  c.option("--budget", args->budgets,
-           "What plan --budget chooses, instead of random plans; may be given again")
-      .value_name("SIZE");
-  c.flag("--every-scale", args->every_scale,
+  c.option("--seed", args.seed, "Seed of the plans").shows_default();
+  c.option("--budget", args.budgets,
+           "What plan --budget chooses, instead of random plans; may be given again", "SIZE");
+  c.flag("--every-scale", args.every_scale,
          "With --budget: the best of every scale, not only of the best one");
-  c.option("--plan", args->plan, "What plan --json printed, instead of random plans").value_name("FILE");
-  c.option("--display", args->display_px, "Displayed height with --budget and --plan, px")
+  c.option("--plan", args.plan, "What plan --json printed, instead of random plans", "FILE");
+  c.option("--display", args.display_px, "Displayed height with --budget and --plan, px")
       .number_in(16, 2048)
       .shows_default();
   c.option(
-       "--against", args->against,
-       "The model file that the package was made from, for the source's texels; without it the best rungs "
-       "stand for them")
-      .value_name("MODEL");
-  c.option("--views", args->views, "Directions that are rendered").integer_in(1, 64).shows_default();
-  add_jobs_option(c, args->jobs);
-  c.flag("--json", args->json, "Print one JSON object");
+      "--against", args.against,
+      "The model file that the package was made from, for the source's texels; without it the best rungs "
+      "stand for them",
+      "MODEL");
+  c.option("--views", args.views, "Directions that are rendered").integer_in(1, 64).shows_default();
+  add_jobs_option(c, args.jobs);
+  c.flag("--json", args.json, "Print one JSON object");
   c.examples(
       "  texmesh-lab study prediction turtle.texmesh --against turtle.glb --plans 20 --seed 7\n"
       "  texmesh-lab study prediction turtle.texmesh --against turtle.glb --budget 200kB --budget 1MB");
@@ -320,7 +308,6 @@ void add_prediction_study(Command& study) {
       "FLIP is of lit pictures against S_0 with the source's texels, 0 = equal: of the plan, of its scale "
       "with the source's texels, of S_0 with its textures.\n"
       "Exit code: 0, 1 when a file cannot be read, 2 usage.");
-  c.on_run([args] { return run_prediction(*args); });
 }
 
 }  // namespace texmesh

@@ -1,18 +1,15 @@
 // texmesh-lab study quality: variable texture quality against one for all, within the same bytes.
 #include <fmt/format.h>
 
-#include <iostream>
-#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "lab/cli/commands.h"
 #include "lab/study/allocation_study.h"
 #include "pipeline/cache/disk_store.h"
-#include "pipeline/compile/artefacts.h"
 #include "pipeline/compile/compile_model.h"
-#include "pipeline/graph/make_stage.h"
+#include "pipeline/compile/stage_table.h"
+#include "pipeline/graph/stage.h"
 #include "pipeline/io/atomic_file.h"
-#include "pipeline/io/exit_codes.h"
 #include "pipeline/io/table.h"
 #include "stages/image/png_writer.h"
 #include "tools/cli/options/command_line.h"
@@ -50,11 +47,9 @@ Choices study_model(const QualityArguments& args) {
   CompileRequest request;
   request.input = args.model;
   request.options.ladder.prune = false;  // qualities to choose from, also those that no load would take
-  const std::unique_ptr<Store> store = args.cache.off
-                                           ? std::make_unique<NullStore>()
-                                           : open_disk_store(default_cache_folder(args.cache.folder));
   Notes notes;
-  return *run_towards(request, std::move(stage), kStudy, *store, context_of(args.jobs), {}, notes);
+  return *run_towards(request, std::move(stage), kStudy, *store_of(args.cache), context_of(args.jobs), {},
+                      notes);
 }
 
 /// Uniform and what is compared with it, side by side, the source last.
@@ -104,13 +99,19 @@ int study_quality_of(const QualityArguments& args) {
   return kExitOk;
 }
 
-void add_quality_options(Command& c, QualityArguments& args) {
+}  // namespace
+
+void add_quality_study(Command& study) {
+  auto [c, args] =
+      study.add("quality",
+                "Is variable texture quality better than one for all, within the same bytes? Rendered "
+                "and scored (Fig. 3.9)",
+                study_quality_of);
   AllocationStudyOptions& options = args.options;
   c.option("MODEL", args.model, "A textured model; runs the stages that are needed, through the cache")
       .required();
   c.option("-o,--output", args.output,
-           "Pictures side by side: uniform, variable (3.2), variable (log), rate-distortion, source")
-      .value_name("PNG");
+           "Pictures side by side: uniform, variable (3.2), variable (log), rate-distortion, source", "PNG");
   c.option("--quality", options.quality, "Quality of the uniform choice, whose bytes are the budget")
       .integer_in(1, 100)
       .shows_default();
@@ -127,17 +128,6 @@ void add_quality_options(Command& c, QualityArguments& args) {
   add_jobs_option(c, args.jobs);
   add_cache_options(c, args.cache);
   c.flag("--json", args.json, "Print one JSON object");
-}
-
-}  // namespace
-
-void add_quality_study(Command& study) {
-  auto args = std::make_shared<QualityArguments>();
-  Command c =
-      study.add("quality",
-                "Is variable texture quality better than one for all, within the same bytes? Rendered "
-                "and scored (Fig. 3.9)");
-  add_quality_options(c, *args);
   c.examples(
       "  texmesh-lab study quality turtle.glb -o turtle.png\n"
       "  texmesh-lab study quality bust.obj --quality 30 --views 12 --json");
@@ -149,7 +139,6 @@ void add_quality_study(Command& study) {
       "Surface SSIM is that of the tables. Rendered SSIM and difference (FLIP-like) compare S_0 with these "
       "textures with S_0 and the source's.\n"
       "Exit code: 0, 1 when the model cannot be compiled, 2 usage, 3 internal error.");
-  c.on_run([args] { return study_quality_of(*args); });
 }
 
 }  // namespace texmesh

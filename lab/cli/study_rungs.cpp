@@ -1,16 +1,11 @@
 // texmesh-lab study rungs: which rungs loads choose.
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <iostream>
-#include <memory>
 #include <nlohmann/json.hpp>
-#include <span>
 
 #include "delivery/cpp/client/delivery_plan.h"
-#include "format/rules/ordinary_loads.h"
+#include "format/rules/viewing.h"
 #include "lab/cli/commands.h"
-#include "pipeline/io/exit_codes.h"
 #include "pipeline/io/table.h"
 #include "stages/fragment_codec/fragment_codec.h"
 #include "tools/cli/options/command_line.h"
@@ -154,12 +149,12 @@ int run_rungs(const RungArguments& args) {
 }  // namespace
 
 void add_rungs_study(Command& study) {
-  auto args = std::make_shared<RungArguments>();
-  Command c = study.add("rungs", "Is every stored rung of use? How often ordinary loads choose it");
-  c.option("PKG", args->packages, "Packages").required();
-  c.option("--loads", args->loads, "Loads that are played").integer_in(1, 100000).shows_default();
-  c.option("--rtt", args->rtt_ms, "Round trip, ms").number_in(0, 10000).shows_default();
-  c.flag("--json", args->json, "Print one JSON object");
+  auto [c, args] =
+      study.add("rungs", "Is every stored rung of use? How often ordinary loads choose it", run_rungs);
+  c.option("PKG", args.packages, "Packages").required();
+  c.option("--loads", args.loads, "Loads that are played").integer_in(1, 100000).shows_default();
+  c.option("--rtt", args.rtt_ms, "Round trip, ms").number_in(0, 10000).shows_default();
+  c.flag("--json", args.json, "Print one JSON object");
   c.examples(
       "  texmesh-lab study rungs turtle.texmesh\n  texmesh-lab study rungs *.texmesh --loads 200 --json");
   c.notes(
@@ -169,7 +164,6 @@ void add_rungs_study(Command& study) {
       "at least has the rung. compile stores the rungs that are worth their bytes in such loads "
       "(--ladder.prune).\n"
       "Exit code: 0, 1 when a package cannot be read, 2 usage.");
-  c.on_run([args] { return run_rungs(*args); });
 }
 
 }  // namespace texmesh

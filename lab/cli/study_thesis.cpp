@@ -1,13 +1,9 @@
 // texmesh-lab study thesis: the thesis's tables and figures, measured again.
-#include <filesystem>
-#include <iostream>
-#include <memory>
 #include <nlohmann/json.hpp>
 
 #include "format/base/text_bytes.h"
 #include "lab/cli/commands.h"
 #include "lab/thesis/exhibits.h"
-#include "pipeline/io/exit_codes.h"
 #include "tools/cli/options/command_line.h"
 #include "tools/cli/options/common_options.h"
 #include "tools/publish/report/report.h"
@@ -55,18 +51,16 @@ int run_thesis(const ThesisArguments& args) {
 }  // namespace
 
 void add_thesis_study(Command& study) {
-  auto args = std::make_shared<ThesisArguments>();
-  Command c =
-      study.add("thesis", "The thesis's tables and figures, measured again: printed values beside ours");
-  c.option("--table", args->exhibits, "Only these, as 4.2,fig-6.2; without it all of them")
+  auto [c, args] = study.add(
+      "thesis", "The thesis's tables and figures, measured again: printed values beside ours", run_thesis);
+  c.option("--table", args.exhibits, "Only these, as 4.2,fig-6.2; without it all of them", "IDS")
       .separated_by(',')
-      .one_of_explained(all_exhibit_ids())
-      .value_name("IDS");
-  c.option("-o,--output", args->folder,
-           "Write a page with plots and pictures into this folder, which is new or has an earlier page")
-      .value_name("DIR");
-  add_jobs_option(c, args->jobs);
-  c.flag("--json", args->json, "Print one JSON object");
+      .one_of_explained(all_exhibit_ids());
+  c.option("-o,--output", args.folder,
+           "Write a page with plots and pictures into this folder, which is new or has an earlier page",
+           "DIR");
+  add_jobs_option(c, args.jobs);
+  c.flag("--json", args.json, "Print one JSON object");
   c.examples(
       "  texmesh-lab study thesis --table 4.2\n"
       "  texmesh-lab study thesis -o thesis/\n"
@@ -76,7 +70,6 @@ void add_thesis_study(Command& study) {
       "fetch run. Each table says what it was made from, and has a verdict: confirmed, in part, not confirmed, not "
       "comparable. The page needs no script and no network. The same bytes on every machine.\n"
       "Exit code: 0, 1 when DIR cannot be written, 2 usage, 3 internal error.");
-  c.on_run([args] { return run_thesis(*args); });
 }
 
 }  // namespace texmesh

@@ -1,17 +1,16 @@
 // The documents of an experiment: design.json, which says what judges are asked, and what they answered.
 #include "lab/experiment/design.h"
 
-#include <algorithm>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <set>
 #include <tuple>
 
 #include "format/base/bounded_json.h"
+#include "format/base/errors.h"
+#include "format/base/json_fields.h"
 #include "format/base/sha256.h"
 #include "format/base/text_bytes.h"
 #include "format/rules/split_mix.h"
-#include "pipeline/compile/user_document.h"
 
 namespace texmesh {
 namespace {
@@ -20,6 +19,25 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kIdDigits = 16;
 constexpr std::uint64_t kMaxDesignBytes = 16u << 20;
+
+/// What `read` returns. Its FormatErrors become InputErrors {file, JSON pointer, ...}.
+template <class Read>
+auto read_document(const std::string& file, Read&& read) {
+  try {
+    return std::forward<Read>(read)();
+  } catch (const FormatError& e) {
+    throw InputError(file, e.place().empty() ? "/" : e.place(), e.expected(), e.found());
+  }
+}
+
+/// Fails at `at` when the object has a field of another name. What is no object is left to its reader.
+void check_field_names(const nlohmann::json& object, std::initializer_list<std::string_view> known,
+                       const JsonAt& at) {
+  if (!object.is_object()) return;
+  for (const auto& [name, value] : object.items())
+    if (std::ranges::find(known, name) == known.end())
+      at.fail("only known fields", "\"" + name.substr(0, 40) + "\"");
+}
 
 /// Names of pictures, drawn once for each picture.
 class PictureNames {

@@ -4,17 +4,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
-#include <map>
 #include <nlohmann/json.hpp>
 
-#include "format/base/errors.h"
 #include "format/base/json_fields.h"
 #include "format/base/portable_math.h"
 #include "pipeline/io/markup.h"
 #include "pipeline/io/table.h"
 #include "tools/publish/pages/page.h"
-#include "tools/publish/pages/plot.h"
 
 namespace texmesh {
 namespace {

@@ -1,11 +1,8 @@
 #pragma once
 #include <optional>
-#include <string>
-#include <vector>
 
 #include "lab/experiment/design.h"
 #include "lab/psychometrics/psychometrics.h"
-#include "stages/base/run_context.h"
 
 namespace texmesh {
 

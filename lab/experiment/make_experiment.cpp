@@ -1,17 +1,17 @@
 // What judges are shown, and the page that shows it to them.
 #include "lab/experiment/make_experiment.h"
 
-#include <fmt/format.h>
 #include <zlib.h>
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
 
-#include "format/base/box.h"
 #include "format/base/errors.h"
 #include "format/base/portable_math.h"
+#include "format/base/vec.h"
 #include "format/rules/split_mix.h"
 #include "pipeline/io/markup.h"
 #include "pipeline/io/new_folder.h"
@@ -20,7 +20,6 @@
 #include "stages/render/shade.h"
 #include "tools/extract/package_model.h"
 #include "tools/publish/pages/page.h"
-#include "tools/render/picture_sheet.h"
 
 namespace texmesh {
 

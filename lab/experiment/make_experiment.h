@@ -1,12 +1,5 @@
 #pragma once
-#include <array>
-#include <cstdint>
-#include <functional>
-#include <memory>
-#include <string>
-#include <vector>
 
-#include "delivery/cpp/package/package_reader.h"
 #include "lab/experiment/design.h"
 #include "tools/render/rendered_model.h"
 

@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 
 #include "format/base/portable_math.h"
 #include "format/rules/split_mix.h"

@@ -4,14 +4,12 @@
 #include <array>
 #include <cmath>
 
-#include "format/base/box.h"
+#include "format/base/vec.h"
 #include "format/rules/allocation.h"
-#include "format/rules/rate_distortion.h"
 #include "stages/base/parallel.h"
 #include "stages/fragment_codec/fragment_codec.h"
 #include "stages/jpeg/jpeg.h"
 #include "stages/measure/flip.h"
-#include "stages/measure/image_compare.h"
 #include "stages/render/shade.h"
 
 namespace texmesh {

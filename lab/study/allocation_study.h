@@ -1,6 +1,4 @@
 #pragma once
-#include <string>
-#include <vector>
 
 #include "format/documents/tables.h"
 #include "stages/base/run_context.h"

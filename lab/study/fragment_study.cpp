@@ -1,15 +1,11 @@
 #include "lab/study/fragment_study.h"
 
-#include <algorithm>
-#include <cstring>
 #include <limits>
-#include <string>
 
 #include "stages/base/parallel.h"
-#include "stages/data/coverage.h"
+#include "stages/data/fragments.h"
 #include "stages/fragment_codec/fragment_codec.h"
 #include "stages/jpeg/jpeg.h"
-#include "stages/jpeg/jpeg_coder.h"
 #include "stages/ladder/ladder.h"
 
 namespace texmesh {

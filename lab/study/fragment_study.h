@@ -1,12 +1,8 @@
 #pragma once
-#include <cstdint>
-#include <functional>
-#include <vector>
 
 #include "stages/base/run_context.h"
 #include "stages/data/fragments.h"
 #include "stages/data/pixels.h"
-#include "stages/data/subsampling.h"
 
 namespace texmesh {
 

@@ -8,7 +8,6 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/io/markup.h"
-#include "tools/publish/pages/page.h"
 
 namespace texmesh {
 

@@ -1,16 +1,8 @@
 #pragma once
-#include <array>
-#include <cstdint>
-#include <nlohmann/json_fwd.hpp>
-#include <span>
-#include <string>
-#include <string_view>
-#include <vector>
 
-#include "format/base/fields.h"
 #include "pipeline/io/table.h"
 #include "stages/base/run_context.h"
-#include "tools/publish/pages/plot.h"
+#include "tools/publish/pages/page.h"
 
 namespace texmesh {
 

@@ -1,8 +1,6 @@
 // Table 3.1 and Figs. 3.5 to 3.9: what fragments cost, and what variable quality is worth.
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "lab/study/allocation_study.h"
 #include "lab/study/fragment_study.h"
 #include "lab/thesis/exhibits.h"

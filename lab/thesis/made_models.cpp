@@ -1,17 +1,12 @@
 // Pictures and scans that are made by code: the thesis's own are not available.
 #include "lab/thesis/made_models.h"
 
-#include <algorithm>
-#include <array>
-#include <cmath>
 #include <nlohmann/json.hpp>
-#include <string>
 
 #include "format/base/portable_math.h"
 #include "format/rules/split_mix.h"
 #include "lab/study/fragment_study.h"
 #include "pipeline/import/import.h"
-#include "pipeline/io/resolver.h"
 #include "stages/base/parallel.h"
 #include "stages/condition/condition.h"
 #include "stages/image/png_writer.h"

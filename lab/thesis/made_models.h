@@ -1,9 +1,5 @@
 #pragma once
-#include <cstdint>
-#include <string>
-#include <vector>
 
-#include "format/model/model.h"
 #include "stages/base/run_context.h"
 #include "stages/data/conditioned_mesh.h"
 #include "stages/data/fragments.h"

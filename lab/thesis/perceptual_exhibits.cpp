@@ -1,9 +1,6 @@
 // Tables 2.1, 7.1 to 7.3 and Fig. 6.2: scales, and the perceptual values between them.
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
-
 #include "format/base/portable_math.h"
 #include "format/rules/jnd_choice.h"
 #include "format/rules/viewing.h"

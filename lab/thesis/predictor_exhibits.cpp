@@ -1,13 +1,10 @@
 // Figs. 8.2, 8.3 and 8.5: texture predictors, the size model, and quality by predictor.
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
 #include <numeric>
 
 #include "format/rules/allocation.h"
 #include "format/rules/size_curve.h"
-#include "format/rules/size_model.h"
 #include "lab/thesis/exhibits.h"
 #include "lab/thesis/made_models.h"
 #include "stages/image/png_writer.h"

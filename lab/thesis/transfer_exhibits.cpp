@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "lab/thesis/exhibits.h"
 #include "lab/transfer/chapter_4.h"

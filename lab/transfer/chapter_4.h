@@ -1,7 +1,4 @@
 #pragma once
-#include <cstdint>
-#include <functional>
-#include <vector>
 
 #include "delivery/cpp/simulate/simulation.h"
 #include "format/rules/split_mix.h"

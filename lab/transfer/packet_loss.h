@@ -1,9 +1,6 @@
 #pragma once
-#include <cstdint>
-#include <span>
-#include <vector>
 
-#include "delivery/cpp/decide/fragment_offer.h"
+#include "delivery/cpp/decide/harmonic_time.h"
 #include "format/split/split_reader.h"
 
 namespace texmesh {

@@ -1,5 +1,4 @@
 #pragma once
-#include <cstdint>
 
 #include "delivery/cpp/decide/harmonic_time.h"
 

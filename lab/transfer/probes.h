@@ -1,10 +1,6 @@
 #pragma once
-#include <cstdint>
-#include <map>
-#include <vector>
 
 #include "delivery/cpp/simulate/simulation.h"
-#include "delivery/cpp/transfer/transfer.h"
 
 namespace texmesh {
 

@@ -1,11 +1,5 @@
 #include "lab/transfer/several_objects.h"
 
-#include <algorithm>
-#include <cmath>
-#include <stdexcept>
-
-#include "format/rules/proxy_choice.h"
-
 namespace texmesh {
 namespace {
 

@@ -1,6 +1,5 @@
 #pragma once
 #include <algorithm>
-#include <vector>
 
 #include "delivery/cpp/client/delivery_plan.h"
 

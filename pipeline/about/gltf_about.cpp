@@ -1,7 +1,5 @@
 #include "pipeline/about/gltf_about.h"
 
-#include <algorithm>
-#include <map>
 #include <nlohmann/json.hpp>
 
 #include "pipeline/about/source_fields.h"
@@ -120,79 +118,26 @@ void apply_rights(About& about, const Packet& packet, const std::string& place, 
 }
 
 void add_items(std::vector<NamedText>& list, const std::string& name, const std::vector<std::string>& texts) {
-  for (const std::string& text : texts) {
-    const NamedText item{name, clean_about_text(text, kMaxAboutValueBytes)};
-    if (!item.text.empty() && list.size() < kMaxAboutList &&
-        std::find(list.begin(), list.end(), item) == list.end())
-      list.push_back(item);
-  }
+  for (const std::string& text : texts) add_about_value(list, name, text);
 }
-
-}  // namespace
-
-void apply_xmp(About& about, const Json& json, const std::string& place, Notes& notes) {
-  if (!json.is_object()) return;
-  const Packet packet(json);
-  for (const char* name : {"title", "creator", "description"})
-    if (const std::string text = joined(packet.texts(kDublinCore, name)); !text.empty())
-      set_source_field(about, name, text, place, notes);
-  apply_rights(about, packet, place, notes);
-  for (const std::string& url : packet.texts(kDublinCore, "source"))
-    if (url.size() <= kMaxAboutTextBytes && is_web_url(url)) about.source_url = url;
-  add_items(about.identifiers, "dc:identifier", packet.texts(kDublinCore, "identifier"));
-  add_items(about.dates, "dc:date", packet.texts(kDublinCore, "date"));
-  add_items(about.dates, "xmp:CreateDate", packet.texts(kXmpBasic, "CreateDate"));
-}
-
-nlohmann::ordered_json xmp_packet(const About& about, nlohmann::ordered_json packet) {
-  if (!packet.is_object()) packet = Ordered::object();
-  About said;
-  Notes ignored;
-  const Json before(packet);
-  apply_xmp(said, before, "", ignored);
-  const Packet names(before);
-  const auto set = [&](const char* name_space, const char* name, const std::string& text,
-                       const std::string& already, const Ordered& value) {
-    if (text.empty() || text == already) return;
-    const std::string key = names.key(name_space, name), prefix = key.substr(0, key.find(':'));
-    if (!packet.contains("@context") || !packet["@context"].is_object())
-      packet["@context"] = Ordered::object();
-    packet["@context"][prefix] = name_space;
-    packet[key] = value;
-  };
-  const auto in_default_language = [](const std::string& text) {
-    return Ordered{{"@type", "rdf:Alt"}, {"rdf:_1", {{"@language", "x-default"}, {"@value", text}}}};
-  };
-  set(kDublinCore, "title", about.title, said.title, in_default_language(about.title));
-  set(kDublinCore, "creator", about.creator, said.creator, {{"@list", Ordered::array({about.creator})}});
-  set(kDublinCore, "description", about.description, said.description,
-      in_default_language(about.description));
-  set(kDublinCore, "rights", about.attribution, said.attribution, in_default_language(about.attribution));
-  set(kDublinCore, "source", about.source_url, said.source_url, about.source_url);
-  set(kXmpRights, "UsageTerms", about.licence, said.licence, in_default_language(about.licence));
-  set(kXmpRights, "WebStatement", about.licence_url, said.licence_url, about.licence_url);
-  Ordered identifiers = Ordered::array();
-  for (const NamedText& item : about.identifiers)
-    identifiers.push_back(item.name == "dc:identifier" ? item.text : item.name + ":" + item.text);
-  if (!identifiers.empty() && about.identifiers != said.identifiers)
-    set(kDublinCore, "identifier", "identifiers", "", {{"@set", identifiers}});
-  if (packet.contains("@context") && packet.dump().find("\"rdf:") != std::string::npos)
-    packet["@context"]["rdf"] = "http://www.w3.org/1999/02/22-rdf-syntax-ns#";
-  return packet;
-}
-
-namespace {
 
 constexpr const char* kXmpExtension = "KHR_xmp_json_ld";
+constexpr const char* kPackets = "/extensions/KHR_xmp_json_ld/packets";
 constexpr const char* kArrays[] = {"scenes",   "nodes",  "meshes",   "materials",
                                    "textures", "images", "samplers", "cameras"};
 constexpr std::size_t kRoomForCuts = 4096;  // of About::source, for the list of what does not fit
 constexpr int kMaxKeptDepth = 48;           // of a value; about.json has 64 levels in all
 
-const Json* member(const Json& object, const char* name) {
-  if (!object.is_object()) return nullptr;
-  const auto it = object.find(name);
-  return it == object.end() ? nullptr : &*it;
+/// What stands at a JSON pointer of names; null where nothing does.
+const Json* find(const Json& document, const std::string& pointer) {
+  const Json::json_pointer place(pointer);
+  return document.contains(place) ? &document.at(place) : nullptr;
+}
+
+/// The number of the packet that an object refers to.
+std::optional<std::size_t> packet_number(const Json* object) {
+  const Json* packet = object ? find(*object, "/extensions/KHR_xmp_json_ld/packet") : nullptr;
+  return packet && packet->is_number_unsigned() ? std::optional(packet->get<std::size_t>()) : std::nullopt;
 }
 
 std::string text_of(const Json* value) {
@@ -251,32 +196,11 @@ template <class F>
 void for_each_object(const Json& document, const F& f) {
   f(document, std::string());
   for (const char* name : kArrays) {
-    const Json* list = member(document, name);
+    const Json* list = find(document, "/" + std::string(name));
     if (!list || !list->is_array()) continue;
     for (std::size_t i = 0; i < list->size(); ++i)
       f((*list)[i], "/" + std::string(name) + "/" + std::to_string(i));
   }
-}
-
-const Json* xmp_reference(const Json* object) {
-  const Json* extensions = object ? member(*object, "extensions") : nullptr;
-  const Json* extension = extensions ? member(*extensions, kXmpExtension) : nullptr;
-  const Json* packet = extension ? member(*extension, "packet") : nullptr;
-  return packet && packet->is_number_unsigned() ? packet : nullptr;
-}
-
-const Json* xmp_packets(const Json& document) {
-  const Json* extensions = member(document, "extensions");
-  const Json* extension = extensions ? member(*extensions, kXmpExtension) : nullptr;
-  const Json* packets = extension ? member(*extension, "packets") : nullptr;
-  return packets && packets->is_array() ? packets : nullptr;
-}
-
-const Json* shown_scene(const Json& document) {
-  const Json* scenes = member(document, "scenes");
-  const Json* number = member(document, "scene");
-  const std::size_t scene = number && number->is_number_unsigned() ? number->get<std::size_t>() : 0;
-  return scenes && scenes->is_array() && scene < scenes->size() ? &(*scenes)[scene] : nullptr;
 }
 
 /// Names that say what a coordinate is do not count: glTF has metres and y up.
@@ -290,44 +214,19 @@ void apply_extras(About& about, const Json* extras, const std::string& place, No
 
 std::string keep_source(const Json& document, const std::string& format, Notes& notes) {
   KeptSource kept(format);
-  if (const Json* asset = member(document, "asset")) kept.keep("asset", *asset, "/asset");
-  const Json* packets = xmp_packets(document);
-  if (packets && !packets->empty()) kept.keep("xmpPackets", *packets, "/extensions/KHR_xmp_json_ld/packets");
+  if (const Json* asset = find(document, "/asset")) kept.keep("asset", *asset, "/asset");
+  if (const Json* packets = find(document, kPackets); packets && packets->is_array() && !packets->empty())
+    kept.keep("xmpPackets", *packets, kPackets);
   for_each_object(document, [&](const Json& object, const std::string& path) {
-    if (const Json* packet = xmp_reference(&object))
+    if (const auto packet = packet_number(&object))
       kept.keep_in_list("xmp", "packet", *packet, path + "/extensions/KHR_xmp_json_ld", path);
   });
   for_each_object(document, [&](const Json& object, const std::string& path) {
-    if (const Json* extras = member(object, "extras"))
+    if (const Json* extras = find(object, "/extras"))
       kept.keep_in_list("extras", "value", *extras, path + "/extras", path);
   });
   return kept.finish(notes);
 }
-
-}  // namespace
-
-About about_from_gltf(const Json& document, const std::string& format, Notes& notes) {
-  About about;
-  const Json* asset = member(document, "asset");
-  const Json* scene = shown_scene(document);
-  if (asset) {
-    about.attribution = clean_about_text(text_of(member(*asset, "copyright")), kMaxAboutTextBytes);
-    apply_extras(about, member(*asset, "extras"), "/asset/extras", notes);
-  }
-  apply_extras(about, member(document, "extras"), "/extras", notes);
-  if (scene) apply_extras(about, member(*scene, "extras"), "/scenes/extras", notes);
-  const Json* packets = xmp_packets(document);
-  const Json* reference = xmp_reference(asset) ? xmp_reference(asset) : xmp_reference(scene);
-  if (packets && reference && reference->get<std::size_t>() < packets->size())
-    apply_xmp(about, (*packets)[reference->get<std::size_t>()], "KHR_xmp_json_ld", notes);
-  about.unit = "metre";
-  about.metres_per_unit = 1;
-  about.up_axis = "y";
-  about.source = keep_source(document, format, notes);
-  return about;
-}
-
-namespace {
 
 /// The member, made an object where it is none. Not to be kept: an ordered_json moves its members when one is
 /// added.
@@ -350,6 +249,80 @@ void write_coordinates(const About& about, Ordered& root) {
 
 }  // namespace
 
+void apply_xmp(About& about, const Json& json, const std::string& place, Notes& notes) {
+  if (!json.is_object()) return;
+  const Packet packet(json);
+  for (const char* name : {"title", "creator", "description"})
+    if (const std::string text = joined(packet.texts(kDublinCore, name)); !text.empty())
+      set_source_field(about, name, text, place, notes);
+  apply_rights(about, packet, place, notes);
+  for (const std::string& url : packet.texts(kDublinCore, "source"))
+    if (url.size() <= kMaxAboutTextBytes && is_web_url(url)) about.source_url = url;
+  add_items(about.identifiers, "dc:identifier", packet.texts(kDublinCore, "identifier"));
+  add_items(about.dates, "dc:date", packet.texts(kDublinCore, "date"));
+  add_items(about.dates, "xmp:CreateDate", packet.texts(kXmpBasic, "CreateDate"));
+}
+
+nlohmann::ordered_json xmp_packet(const About& about, nlohmann::ordered_json packet) {
+  if (!packet.is_object()) packet = Ordered::object();
+  About said;
+  Notes ignored;
+  const Json before(packet);
+  apply_xmp(said, before, "", ignored);
+  const Packet names(before);
+  const auto set = [&](const char* name_space, const char* name, const std::string& text,
+                       const std::string& already, const Ordered& value) {
+    if (text.empty() || text == already) return;
+    const std::string key = names.key(name_space, name), prefix = key.substr(0, key.find(':'));
+    if (!packet.contains("@context") || !packet["@context"].is_object())
+      packet["@context"] = Ordered::object();
+    packet["@context"][prefix] = name_space;
+    packet[key] = value;
+  };
+  const auto in_default_language = [](const std::string& text) {
+    return Ordered{{"@type", "rdf:Alt"}, {"rdf:_1", {{"@language", "x-default"}, {"@value", text}}}};
+  };
+  set(kDublinCore, "title", about.title, said.title, in_default_language(about.title));
+  set(kDublinCore, "creator", about.creator, said.creator, {{"@list", Ordered::array({about.creator})}});
+  set(kDublinCore, "description", about.description, said.description,
+      in_default_language(about.description));
+  set(kDublinCore, "rights", about.attribution, said.attribution, in_default_language(about.attribution));
+  set(kDublinCore, "source", about.source_url, said.source_url, about.source_url);
+  set(kXmpRights, "UsageTerms", about.licence, said.licence, in_default_language(about.licence));
+  set(kXmpRights, "WebStatement", about.licence_url, said.licence_url, about.licence_url);
+  Ordered identifiers = Ordered::array();
+  for (const NamedText& item : about.identifiers)
+    identifiers.push_back(item.name == "dc:identifier" ? item.text : item.name + ":" + item.text);
+  if (!identifiers.empty() && about.identifiers != said.identifiers)
+    set(kDublinCore, "identifier", "identifiers", "", {{"@set", identifiers}});
+  if (packet.contains("@context") && packet.dump().find("\"rdf:") != std::string::npos)
+    packet["@context"]["rdf"] = "http://www.w3.org/1999/02/22-rdf-syntax-ns#";
+  return packet;
+}
+
+About about_from_gltf(const Json& document, const std::string& format, Notes& notes) {
+  About about;
+  const Json* asset = find(document, "/asset");
+  const Json *scenes = find(document, "/scenes"), *number = find(document, "/scene");
+  const std::size_t shown = number && number->is_number_unsigned() ? number->get<std::size_t>() : 0;
+  const Json* scene = scenes && scenes->is_array() && shown < scenes->size() ? &(*scenes)[shown] : nullptr;
+  if (asset) {
+    about.attribution = clean_about_text(text_of(find(*asset, "/copyright")), kMaxAboutTextBytes);
+    apply_extras(about, find(*asset, "/extras"), "/asset/extras", notes);
+  }
+  apply_extras(about, find(document, "/extras"), "/extras", notes);
+  if (scene) apply_extras(about, find(*scene, "/extras"), "/scenes/extras", notes);
+  const Json* packets = find(document, kPackets);
+  const auto packet = packet_number(asset) ? packet_number(asset) : packet_number(scene);
+  if (packets && packets->is_array() && packet && *packet < packets->size())
+    apply_xmp(about, (*packets)[*packet], "KHR_xmp_json_ld", notes);
+  about.unit = "metre";
+  about.metres_per_unit = 1;
+  about.up_axis = "y";
+  about.source = keep_source(document, format, notes);
+  return about;
+}
+
 void write_gltf_about(const About& about, Ordered& root) {
   write_coordinates(about, root);
   const Ordered source = about.source.empty() ? Ordered::object() : Ordered::parse(about.source);
@@ -361,8 +334,7 @@ void write_gltf_about(const About& about, Ordered& root) {
   Ordered packets = source.value("xmpPackets", Ordered::array());
   if (!packets.is_array()) packets = Ordered::array();
   const Json from_unordered(from);
-  const Json* reference = xmp_reference(&from_unordered);
-  std::size_t shown = reference ? reference->get<std::size_t>() : packets.size();
+  std::size_t shown = packet_number(&from_unordered).value_or(packets.size());
   const Ordered before = shown < packets.size() ? packets[shown] : Ordered::object();
   const Ordered after = xmp_packet(about, before);
   if (after != before) {

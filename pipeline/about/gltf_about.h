@@ -1,7 +1,5 @@
 #pragma once
-#include <cstdint>
 #include <nlohmann/json_fwd.hpp>
-#include <string>
 
 #include "format/base/note.h"
 #include "format/documents/about.h"

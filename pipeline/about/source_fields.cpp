@@ -1,12 +1,11 @@
 #include "pipeline/about/source_fields.h"
 
-#include <algorithm>
-#include <charconv>
 #include <nlohmann/json.hpp>
-#include <optional>
 
-#include "format/base/clean_text.h"
+#include "format/base/text_bytes.h"
 #include "pipeline/about/code_tables.h"
+#include "pipeline/io/record.h"
+#include "pipeline/io/uri.h"
 
 namespace texmesh {
 namespace {
@@ -134,39 +133,6 @@ std::string_view without_blanks(std::string_view text) {
   return text;
 }
 
-}  // namespace
-
-Licence read_licence(const std::string& given) {
-  const std::string text(without_blanks(given));
-  Licence licence{Licence::Kind::kOther, text, "", ""};
-  if (is_web_url(text)) return {Licence::Kind::kUrl, text, text, ""};
-  if (const auto bracket = text.find(" (http"); bracket != std::string::npos && text.ends_with(")")) {
-    const std::string url = text.substr(bracket + 2, text.size() - bracket - 3);
-    Licence named = read_licence(text.substr(0, bracket));
-    if (named.kind == Licence::Kind::kSpdx && is_web_url(url)) {
-      named.url = url;
-      return named;
-    }
-  }
-  SpdxExpression expression(text);
-  if (!expression.read()) {
-    licence.wrong = expression.wrong();
-    return licence;
-  }
-  licence.kind = Licence::Kind::kSpdx;
-  licence.text = expression.spelled();
-  if (expression.is_single()) licence.url = kListedLicences + licence.text + ".html";
-  return licence;
-}
-
-bool is_epsg_code(std::uint64_t code) {
-  const std::span<const EpsgRun> runs(kEpsgRuns, kEpsgRunCount);
-  const auto after = std::ranges::upper_bound(runs, code, {}, &EpsgRun::first);
-  return after != runs.begin() && code <= std::prev(after)->last;
-}
-
-namespace {
-
 constexpr std::size_t kObjHeadBytes = 64 * 1024;
 
 struct Unit {
@@ -199,19 +165,11 @@ std::string canonical_name(std::string_view name) {
   return out;
 }
 
-void add_to_list(std::vector<NamedText>& list, const std::string& name, const std::string& value) {
-  const NamedText item{name, clean_about_text(value, kMaxAboutValueBytes)};
-  if (!item.text.empty() && list.size() < kMaxAboutList && std::ranges::find(list, item) == list.end())
-    list.push_back(item);
-}
-
 void set_epsg(About& about, const std::string& value, const std::string& place, Notes& notes) {
   std::string_view digits = value;
   if (canonical_name(digits.substr(0, 5)) == "epsg:") digits.remove_prefix(5);
-  std::uint32_t code = 0;
-  const auto end = std::from_chars(digits.data(), digits.data() + digits.size(), code);
-  if (end.ec == std::errc() && end.ptr == digits.data() + digits.size() && is_epsg_code(code))
-    about.epsg = code;
+  if (const auto code = whole_number<std::uint32_t>(digits); code && is_epsg_code(*code))
+    about.epsg = *code;
   else
     note_value(notes, place, "epsg", "a code that EPSG has given to a coordinate reference system", value);
 }
@@ -254,15 +212,129 @@ bool set_words(About& about, const std::string& name, const std::string& value) 
   else if (name == "capture" || name == "capture method")
     about.capture = clean_about_text(value, kMaxAboutTextBytes);
   else if (name == "identifier" || name == "doi")
-    add_to_list(about.identifiers, name, value);
+    add_about_value(about.identifiers, name, value);
   else if (name == "date" || name == "created")
-    add_to_list(about.dates, name, value);
+    add_about_value(about.dates, name, value);
   else
     return false;
   return true;
 }
 
+class MetaReader {
+ public:
+  MetaReader(const std::string& file, const std::string& place) : file_(file), place_(place) {}
+
+  std::string read(Json json) const {
+    check_names(
+        json, "",
+        {"$schema", "title", "description", "creator", "attribution", "licence", "licenceUrl", "sourceUrl",
+         "identifiers", "capture", "dates", "unit", "upAxis", "coordinateReference", "extras"});
+    json.erase("$schema");
+    check_nested(json);
+    replace_unit(json);
+    check_licence(json);
+    check_epsg(json);
+    const std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
+    return json.empty() ? "" : write_about(read_about(text_bytes(text)));
+  }
+
+  [[noreturn]] void fail(const std::string& at, const std::string& expected, const std::string& found) const {
+    throw InputError(file_, place_ + at, expected, found.substr(0, 120));
+  }
+
+ private:
+  void check_names(const Json& object, const std::string& at,
+                   std::initializer_list<std::string_view> known) const {
+    if (!object.is_object()) fail(at, "an object", object.type_name());
+    for (const auto& [name, value] : object.items())
+      if (std::find(known.begin(), known.end(), name) == known.end())
+        fail(at + "/" + name, "a known field", "\"" + name + "\"");
+  }
+
+  void check_list(const Json& json, const char* name, const char* kind, const char* text) const {
+    if (!json.contains(name) || !json[name].is_array()) return;  // read_about says what is wrong
+    for (std::size_t i = 0; i < json[name].size(); ++i)
+      check_names(json[name][i], "/" + std::string(name) + "/" + std::to_string(i), {kind, text});
+  }
+
+  void check_nested(const Json& json) const {
+    check_list(json, "identifiers", "scheme", "value");
+    check_list(json, "dates", "event", "text");
+    if (json.contains("unit") && !json["unit"].is_string())
+      check_names(json["unit"], "/unit", {"name", "metres"});
+    if (json.contains("coordinateReference"))
+      check_names(json["coordinateReference"], "/coordinateReference", {"text", "epsg"});
+  }
+
+  /// "mm" stands for {"name": "mm", "metres": 0.001}.
+  void replace_unit(Json& json) const {
+    if (!json.contains("unit") || !json["unit"].is_string()) return;
+    About unit;
+    if (!find_unit(json["unit"].get<std::string>(), unit))
+      fail("/unit", "m, mm, cm, dm, km, um, in, ft, yd or {\"name\",\"metres\"}", json["unit"].dump());
+    json["unit"] = {{"name", unit.unit}, {"metres", unit.metres_per_unit}};
+  }
+
+  void check_licence(Json& json) const {
+    if (!json.contains("licence") || !json["licence"].is_string()) return;
+    const Licence licence = read_licence(json["licence"].get<std::string>());
+    if (licence.kind == Licence::Kind::kOther)
+      fail("/licence", "an SPDX licence expression or an http or https URL",
+           licence.wrong.empty() || licence.wrong == licence.text
+               ? "\"" + licence.text + "\""
+               : "\"" + licence.wrong + "\" in \"" + licence.text + "\"");
+    json["licence"] = licence.text;
+    if (!json.contains("licenceUrl") && !licence.url.empty()) json["licenceUrl"] = licence.url;
+  }
+
+  void check_epsg(const Json& json) const {
+    if (!json.contains("coordinateReference")) return;
+    const auto epsg = json["coordinateReference"].find("epsg");
+    if (epsg == json["coordinateReference"].end() || !epsg->is_number_unsigned()) return;
+    if (!is_epsg_code(epsg->get<std::uint64_t>()))
+      fail("/coordinateReference/epsg", "a code that EPSG has given to a coordinate reference system",
+           epsg->dump());
+  }
+
+  const std::string& file_;
+  const std::string& place_;
+};
+
+About about_of_meta(const std::string& meta) {
+  const std::string canonical = meta.empty() ? "" : read_meta(meta, "package.meta");
+  return canonical.empty() ? About() : read_about(text_bytes(canonical));
+}
+
 }  // namespace
+
+Licence read_licence(const std::string& given) {
+  const std::string text(without_blanks(given));
+  Licence licence{Licence::Kind::kOther, text, "", ""};
+  if (is_web_url(text)) return {Licence::Kind::kUrl, text, text, ""};
+  if (const auto bracket = text.find(" (http"); bracket != std::string::npos && text.ends_with(")")) {
+    const std::string url = text.substr(bracket + 2, text.size() - bracket - 3);
+    Licence named = read_licence(text.substr(0, bracket));
+    if (named.kind == Licence::Kind::kSpdx && is_web_url(url)) {
+      named.url = url;
+      return named;
+    }
+  }
+  SpdxExpression expression(text);
+  if (!expression.read()) {
+    licence.wrong = expression.wrong();
+    return licence;
+  }
+  licence.kind = Licence::Kind::kSpdx;
+  licence.text = expression.spelled();
+  if (expression.is_single()) licence.url = kListedLicences + licence.text + ".html";
+  return licence;
+}
+
+bool is_epsg_code(std::uint64_t code) {
+  const std::span<const EpsgRun> runs(kEpsgRuns, kEpsgRunCount);
+  const auto after = std::ranges::upper_bound(runs, code, {}, &EpsgRun::first);
+  return after != runs.begin() && code <= std::prev(after)->last;
+}
 
 std::string clean_about_text(const std::string& text, std::size_t max_bytes) {
   std::string line = text;
@@ -272,6 +344,12 @@ std::string clean_about_text(const std::string& text, std::size_t max_bytes) {
   line = clean_text(line, max_bytes);
   line.erase(line.find_last_not_of(' ') + 1);
   return line;
+}
+
+void add_about_value(std::vector<NamedText>& list, const std::string& name, const std::string& value) {
+  const NamedText item{name, clean_about_text(value, kMaxAboutValueBytes)};
+  if (!item.text.empty() && list.size() < kMaxAboutList && std::ranges::find(list, item) == list.end())
+    list.push_back(item);
 }
 
 bool find_unit(const std::string& name, About& about) {
@@ -320,7 +398,7 @@ bool set_source_field(About& about, std::string_view given_name, const std::stri
 
 About about_from_comments(std::span<const std::string> comments, const std::string& format, Notes& notes) {
   About about;
-  nlohmann::ordered_json source{{"format", format}}, used = nlohmann::ordered_json::array();
+  Json source{{"format", format}}, used = Json::array();
   for (const std::string& comment : comments) {
     const auto colon = comment.find(':');
     if (colon == std::string::npos || colon > kMaxAboutNameBytes || used.size() == kMaxAboutList) continue;
@@ -343,5 +421,21 @@ std::vector<std::string> obj_comments(std::string_view text) {
   }
   return comments;
 }
+
+std::string read_meta(const std::string& json, const std::string& file, const std::string& place) {
+  Json document = parse_document(text_bytes(json), kMaxAboutBytes, 64, file);
+  try {
+    return MetaReader(file, place).read(std::move(document));
+  } catch (const FormatError& e) {
+    throw InputError(file, place + (e.place() == "/" ? "" : e.place()), e.expected(), e.found());
+  }
+}
+
+std::string merge_meta(const std::string& under, const std::string& over) {
+  const About merged = merge_about(about_of_meta(under), about_of_meta(over));
+  return merged == About() ? "" : write_about(merged);
+}
+
+std::string up_axis_of_meta(const std::string& meta) { return about_of_meta(meta).up_axis; }
 
 }  // namespace texmesh

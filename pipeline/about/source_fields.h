@@ -1,8 +1,4 @@
 #pragma once
-#include <cstdint>
-#include <span>
-#include <string>
-#include <string_view>
 
 #include "format/base/note.h"
 #include "format/documents/about.h"
@@ -30,6 +26,9 @@ bool is_epsg_code(std::uint64_t code);
 /// then clean_text().
 std::string clean_about_text(const std::string& text, std::size_t max_bytes);
 
+/// Adds such a text to a list of about.json, unless the list has it already or is full.
+void add_about_value(std::vector<NamedText>& list, const std::string& name, const std::string& value);
+
 /// A unit of length by its name ("mm", "metre", "feet" ...): the name and its metres. False for others.
 bool find_unit(const std::string& name, About& about);
 
@@ -50,5 +49,17 @@ About about_from_comments(std::span<const std::string> comments, const std::stri
 
 /// The comment lines ("# ...") of the first 64 KiB of an OBJ, without the mark.
 std::vector<std::string> obj_comments(std::string_view text);
+
+/// Reads what a curator says about a model (schemas/meta.v1.schema.json): the file of --meta, or `about` of a
+/// collection. Strict: InputError{file, place + JSON pointer, ...} for unknown members, wrong types, texts
+/// over their limits, a licence that is neither of SPDX nor a URL, and a code that EPSG has not given.
+/// Returns the canonical text that the option package.meta holds; "" for an object that says nothing.
+std::string read_meta(const std::string& json, const std::string& file, const std::string& place = "");
+
+/// Two such texts, `over` winning field by field. "" is one that says nothing.
+std::string merge_meta(const std::string& under, const std::string& over);
+
+/// The axis that such a text says is up, or "".
+std::string up_axis_of_meta(const std::string& meta);
 
 }  // namespace texmesh

@@ -93,12 +93,12 @@ const BuildMemo::Place* BuildMemo::place_of(const std::string& package) const {
   return at == places_.end() || at->entry.name != name ? nullptr : &*at;
 }
 
-bool BuildMemo::find(const std::string& package, MemoRecord& record) const {
+bool BuildMemo::find(const std::string& package, PackageMemo& memo) const {
   const Place* const place = place_of(package);
   if (!place) return false;
-  auto found = segments_[place->segment]->record(place->entry);
+  auto found = segments_[place->segment]->memo(place->entry);
   if (!found) return false;
-  record = std::move(*found);
+  memo = std::move(*found);
   return true;
 }
 
@@ -107,16 +107,16 @@ StageKeys BuildMemo::keys(const std::string& package) const {
   return place ? segments_[place->segment]->keys(place->entry) : StageKeys{};
 }
 
-void BuildMemo::set(const std::string& package, const MemoRecord& record) {
+void BuildMemo::set(const std::string& package, const PackageMemo& memo) {
   if (!writer_) return;
-  writer_->add(memo_name(package), record);
+  writer_->add(memo_name(package), memo);
   wrote_ = true;
 }
 
 bool BuildMemo::save() { return !writer_ || writer_->flush(); }
 
 /// Which segments become one: the small ones, while each is at most as large as those before it together, so
-/// that a record is copied as often as the memo's size doubles. And what is damaged, or left by a killed run.
+/// that a memo is copied as often as the size of all doubles. And what is damaged, or left by a killed run.
 std::vector<std::uint32_t> BuildMemo::segments_to_merge() const {
   std::vector<std::uint32_t> finished, merged;
   for (std::uint32_t i = 0; i < segments_.size(); ++i) {
@@ -140,18 +140,18 @@ std::vector<std::uint32_t> BuildMemo::segments_to_merge() const {
   return merged;
 }
 
-/// Two runs may merge the same segments at the same time: both then hold all their records. A reader that has
+/// Two runs may merge the same segments at the same time: both then hold all their memos. A reader that has
 /// listed a segment before it was removed lists again.
 void BuildMemo::merge() {
   const std::vector<std::uint32_t> chosen = segments_to_merge();
   const std::set<std::uint32_t> merged(chosen.begin(), chosen.end());
   for (const Place& place : places_) {
     if (!merged.contains(place.segment)) continue;
-    // A later record may be in the new segment by now: the time tells which counts.
-    auto record = segments_[place.segment]->record(place.entry);
-    if (!record) continue;
-    record->keys = segments_[place.segment]->keys(place.entry);
-    writer_->add(place.entry.name, *record);
+    // A later memo may be in the new segment by now: the time tells which counts.
+    auto memo = segments_[place.segment]->memo(place.entry);
+    if (!memo) continue;
+    memo->keys = segments_[place.segment]->keys(place.entry);
+    writer_->add(place.entry.name, *memo);
   }
   if (!writer_->finish()) return;
   for (const std::uint32_t i : merged) ::unlink(segments_[i]->path().c_str());
@@ -178,37 +178,37 @@ void JobSelection::select(std::vector<WorkerReport>& reports) {
   for (std::size_t i = 0; i < plan_.models.size(); ++i) {
     const PlannedModel& m = plan_.models[i];
     const std::string package = package_within(plan_, m);
-    MemoRecord record;
-    const bool remembered = memo_.find(package, record);
+    PackageMemo memo;
+    const bool remembered = memo_.find(package, memo);
     bool refreshed = false;
-    if (remembered && record.request == request_of(m.profile) && !(record.failed && settings_.retry_failed) &&
-        still_holds(record, m.input, m.output, refreshed)) {
+    if (remembered && memo.request == request_of(m.profile) && !(memo.failed && settings_.retry_failed) &&
+        still_holds(memo, m.input, m.output, refreshed)) {
       if (refreshed && !settings_.dry_run) {
-        record.keys = memo_.keys(package);
-        memo_.set(package, record);
+        memo.keys = memo_.keys(package);
+        memo_.set(package, memo);
       }
-      recall(record, reports[i]);
+      recall(memo, reports[i]);
       continue;
     }
-    if (remembered) record.keys = memo_.keys(package);
-    records_[i] = std::move(record);
+    if (remembered) memo.keys = memo_.keys(package);
+    memos_[i] = std::move(memo);
     add_job(i, remembered);
   }
 }
 
-void JobSelection::recall(const MemoRecord& record, WorkerReport& r) {
-  has_recalled_failure_ = has_recalled_failure_ || record.failed;
-  r.result = record.failed ? ModelResult::kFailed : ModelResult::kUnchanged;
-  r.bytes = record.package_bytes;
-  if (!record.failed) r.made_s = record.seconds, r.made_memory_bytes = record.peak_memory_bytes;
-  if (!settings_.depfile.empty()) r.more->files = record.files;
-  if (const auto& e = record.error; record.failed && e.size() == 6)
+void JobSelection::recall(const PackageMemo& memo, WorkerReport& r) {
+  has_recalled_failure_ = has_recalled_failure_ || memo.failed;
+  r.result = memo.failed ? ModelResult::kFailed : ModelResult::kUnchanged;
+  r.bytes = memo.package_bytes;
+  if (!memo.failed) r.made_s = memo.seconds, r.made_memory_bytes = memo.peak_memory_bytes;
+  if (!settings_.depfile.empty()) r.more->files = memo.files;
+  if (const auto& e = memo.error; memo.failed && e.size() == 6)
     r.more->error = {e[0], e[1], e[2], e[3], e[4], e[5]};
 }
 
 void JobSelection::add_job(std::size_t i, bool remembered) {
   const PlannedModel& m = plan_.models[i];
-  MemoRecord& record = records_[i];
+  PackageMemo& memo = memos_[i];
   WorkerJob job;
   job.input = m.input;
   job.output = m.output;
@@ -221,19 +221,17 @@ void JobSelection::add_job(std::size_t i, bool remembered) {
   for (const std::string& folder : plan_.folders)
     if (m.input.starts_with(folder)) job.links_within.push_back(folder.empty() ? "." : folder);
   if (remembered) {
-    for (FileRequest& f : record.files)
-      if (f.found && f.stamp.is_settled(record.looked_at_ns)) job.known.push_back(std::move(f));
-    job.earlier_keys = std::move(record.keys);
-    record.files = {};  // of 100,000 models there is no room for both
-    record.keys = {};
+    for (FileRequest& f : memo.files)
+      if (f.found && f.stamp.is_settled(memo.looked_at_ns)) job.known.push_back(std::move(f));
+    job.earlier_keys = std::move(memo.keys);
+    memo.files = {};  // of 100,000 models there is no room for both
+    memo.keys = {};
   }
-  if (remembered && record.peak_memory_bytes > 0) {
-    job.predicted_memory_bytes = record.peak_memory_bytes;
-    job.predicted_s = record.seconds;
+  if (remembered && memo.peak_memory_bytes > 0) {
+    job.predicted_memory_bytes = memo.peak_memory_bytes;
+    job.predicted_s = memo.seconds;
   } else {
-    std::error_code ec;
-    const auto size = fs::file_size(m.input, ec);
-    const std::uint64_t bytes = ec ? 0 : size;
+    const std::uint64_t bytes = bytes_of_file(m.input);
     job.predicted_memory_bytes = kBaseMemory_bytes + kMemoryPerByte * bytes;
     job.predicted_s = guessed_seconds(bytes);
   }
@@ -242,7 +240,7 @@ void JobSelection::add_job(std::size_t i, bool remembered) {
 }
 
 void JobSelection::tell_earlier_cost(std::size_t job, WorkerReport& report) const {
-  const MemoRecord& earlier = records_.at(model_of_job_[job]);
+  const PackageMemo& earlier = memos_.at(model_of_job_[job]);
   if (!report.ok() || earlier.failed || report.stages_ran >= report.stages_hit) return;
   report.made_s = earlier.seconds;
   report.made_memory_bytes = earlier.peak_memory_bytes;
@@ -252,33 +250,33 @@ void JobSelection::remember(std::size_t job, const WorkerReport& report) {
   const std::size_t i = model_of_job_[job];
   if (report.more->files.empty() || (!report.ok() && !is_lasting(report))) return;
   const PlannedModel& m = plan_.models[i];
-  MemoRecord record;
-  record.request = request_of(m.profile);
-  record.failed = !report.ok();
-  record.files = report.more->files;
-  record.peak_memory_bytes = report.peak_memory_bytes;
-  record.seconds = report.seconds;
-  record.keys = report.more->keys;
-  const bool known = records_[i].peak_memory_bytes > 0;
+  PackageMemo memo;
+  memo.request = request_of(m.profile);
+  memo.failed = !report.ok();
+  memo.files = report.more->files;
+  memo.peak_memory_bytes = report.peak_memory_bytes;
+  memo.seconds = report.seconds;
+  memo.keys = report.more->keys;
+  const bool known = memos_[i].peak_memory_bytes > 0;
   // A run that found everything in the cache, or that failed on the way, says little about what the model
   // costs, and a failure nothing about what the stages that it did not reach would run with.
   if (known && (!report.ok() || report.stages_hit > report.stages_ran)) {
-    record.peak_memory_bytes = records_[i].peak_memory_bytes;
-    record.seconds = records_[i].seconds;
+    memo.peak_memory_bytes = memos_[i].peak_memory_bytes;
+    memo.seconds = memos_[i].seconds;
   }
-  if (!report.ok()) record.keys.insert(jobs_[job].earlier_keys.begin(), jobs_[job].earlier_keys.end());
+  if (!report.ok()) memo.keys.insert(jobs_[job].earlier_keys.begin(), jobs_[job].earlier_keys.end());
   if (report.ok()) {
     const auto stamp = stamp_of(m.output);
     if (!stamp) return;
-    record.package_stamp = *stamp;
-    record.package_digest = report.package_digest;
-    record.package_bytes = report.bytes;
+    memo.package_stamp = *stamp;
+    memo.package_digest = report.package_digest;
+    memo.package_bytes = report.bytes;
   } else {
     const ModelError& e = report.more->error;
-    record.error = {e.kind, e.file, e.place, e.expected, e.found, e.message};
+    memo.error = {e.kind, e.file, e.place, e.expected, e.found, e.message};
   }
-  record.looked_at_ns = wall_clock_ns();
-  memo_.set(package_within(plan_, m), record);
+  memo.looked_at_ns = wall_clock_ns();
+  memo_.set(package_within(plan_, m), memo);
 }
 
 }  // namespace texmesh

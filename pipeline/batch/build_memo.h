@@ -1,25 +1,18 @@
 #pragma once
-#include <cstdint>
-#include <map>
-#include <memory>
-#include <string>
-#include <vector>
 
 #include "pipeline/batch/memo/memo_segment.h"
-#include "pipeline/batch/plan.h"
 #include "pipeline/batch/run.h"
-#include "pipeline/compile/workers/worker.h"
 
 namespace texmesh {
 
 /// The memos of the packages of one output folder (or of one single package): a folder of segments in the
 /// cache folder. Each run appends to a segment of its own, and every run reads all of them, so runs on
-/// several machines need no lock and wait for nothing. Of two records of a package the later one counts.
+/// several machines need no lock and wait for nothing. Of two memos of a package the later one counts.
 /// Losing any of it costs looking models over again in their child processes, never a wrong result. Not
 /// thread-safe.
 ///
-/// In memory: 56 bytes a record that was read. Written: what has changed; a run that has written something
-/// also merges segments of about the same size once there are many, so that a record is copied a few times in
+/// In memory: 56 bytes a memo that was read. Written: what has changed; a run that has written something
+/// also merges segments of about the same size once there are many, so that a memo is copied a few times in
 /// its life.
 class BuildMemo {
  public:
@@ -34,11 +27,11 @@ class BuildMemo {
   /// Some segment has bytes without their digest: what they said is not remembered.
   bool was_damaged() const;
   /// `package`: its path within the output folder. Finds what had been saved when this object was made.
-  /// The record's keys are left out.
-  bool find(const std::string& package, MemoRecord& record) const;
-  /// The keys of the record that find() finds.
+  /// The memo's keys are left out.
+  bool find(const std::string& package, PackageMemo& memo) const;
+  /// The keys of the memo that find() finds.
   StageKeys keys(const std::string& package) const;
-  void set(const std::string& package, const MemoRecord& record);
+  void set(const std::string& package, const PackageMemo& memo);
   /// Others can read from now on what was set. False when it cannot be written.
   bool save();
 
@@ -83,13 +76,13 @@ class JobSelection {
 
  private:
   const Sha256& request_of(const std::shared_ptr<const std::string>& profile);
-  void recall(const MemoRecord& record, WorkerReport& report);
+  void recall(const PackageMemo& memo, WorkerReport& report);
   void add_job(std::size_t i, bool remembered);
 
   const BatchPlan& plan_;
   const RunSettings& settings_;
   BuildMemo memo_;
-  std::map<std::size_t, MemoRecord> records_;  // of an earlier run, for the models that run again
+  std::map<std::size_t, PackageMemo> memos_;  // of an earlier run, for the models that run again
   std::vector<WorkerJob> jobs_;
   std::vector<std::size_t> model_of_job_;
   std::map<const std::string*, Sha256> requests_;

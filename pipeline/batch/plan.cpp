@@ -4,44 +4,117 @@
 
 #include <fnmatch.h>
 
-#include <cctype>
 #include <fstream>
-#include <initializer_list>
 #include <nlohmann/json.hpp>
+#include <queue>
 
-#include "format/base/bounded_json.h"
 #include "format/base/text_bytes.h"
-#include "pipeline/about/meta.h"
+#include "pipeline/about/source_fields.h"
 #include "pipeline/compile/options.h"
-#include "pipeline/compile/profile.h"
 #include "pipeline/io/file_resolver.h"
+#include "pipeline/io/uri.h"
 
 namespace texmesh {
-
-bool is_json(const std::string& path) {
-  constexpr std::string_view kEnd = ".json";
-  return path.size() > kEnd.size() &&
-         std::ranges::equal(std::string_view(path).substr(path.size() - kEnd.size()), kEnd, {},
-                            [](unsigned char c) { return std::tolower(c); });
-}
-
-bool is_range_scan(const std::string& path) {
-  std::error_code ec;
-  if (!std::filesystem::is_regular_file(path, ec)) return false;  // to open a FIFO is to wait
-  std::ifstream in(path, std::ios::binary);
-  std::string head(4096, '\0');
-  in.read(head.data(), static_cast<std::streamsize>(head.size()));
-  head.resize(static_cast<std::size_t>(in.gcount()));
-  return head.find("\"cylindrical-range-scan\"") != std::string::npos;
-}
-
 namespace {
+
+constexpr int kMaxShards = 1'000'000;
+constexpr const char* kFlag = "--shard";
+
+/// What one batch system says.
+struct TaskNumber {
+  std::string found;  // for messages: "SLURM_ARRAY_TASK_ID=3 SLURM_ARRAY_TASK_COUNT=8"
+  int index = 0;
+  std::optional<int> count;
+};
+
+class TaskReader {
+ public:
+  explicit TaskReader(const EnvironmentLookup& environment) : environment_(environment) {}
+
+  bool has(const char* name) const {
+    const char* text = environment_(name);
+    return text != nullptr && *text != '\0';
+  }
+  /// The variable's number, and its text for messages.
+  int number(const char* name) {
+    const std::string text = environment_(name);
+    found_ += (found_.empty() ? "" : " ") + std::string(name) + "=" + text;
+    const std::optional<int> value = whole_number<int>(text);
+    if (!value || *value < 0) throw InputError(kFlag, name, "a number from 0", text);
+    return *value;
+  }
+  std::optional<int> number_if_set(const char* name) {
+    return has(name) ? std::optional(number(name)) : std::nullopt;
+  }
+  const std::string& found() const { return found_; }
+
+ private:
+  const EnvironmentLookup& environment_;
+  std::string found_;
+};
+
+/// Tasks of an array are numbered from MIN in steps. An array of which some tasks run again ("3,5") looks
+/// like a smaller one: its numbers have gaps or begin elsewhere, and are refused.
+TaskNumber slurm_task(const EnvironmentLookup& environment) {
+  TaskReader read(environment);
+  TaskNumber task;
+  const int id = read.number("SLURM_ARRAY_TASK_ID");
+  task.count = read.number_if_set("SLURM_ARRAY_TASK_COUNT");
+  const int least = read.number_if_set("SLURM_ARRAY_TASK_MIN").value_or(0);
+  const std::optional<int> most = read.number_if_set("SLURM_ARRAY_TASK_MAX");
+  const int step = read.number_if_set("SLURM_ARRAY_TASK_STEP").value_or(1);
+  task.found = read.found();
+  const bool whole = least <= 1 && step >= 1 && id >= least && (id - least) % step == 0;
+  if (!whole || (most && (*most < id || !task.count || (*most - least) / step + 1 != *task.count)))
+    throw InputError(kFlag, "", "an array that begins at 0 or 1 and leaves no task out (or --shard I/N)",
+                     task.found);
+  task.index = (id - least) / step;
+  return task;
+}
+
+std::vector<TaskNumber> tasks_of(const EnvironmentLookup& environment) {
+  std::vector<TaskNumber> tasks;
+  if (TaskReader(environment).has("SLURM_ARRAY_TASK_ID")) tasks.push_back(slurm_task(environment));
+  for (const auto& [index, count] :
+       {std::pair{"AWS_BATCH_JOB_ARRAY_INDEX", "AWS_BATCH_JOB_ARRAY_SIZE"}, {"JOB_COMPLETION_INDEX", ""}}) {
+    TaskReader read(environment);
+    if (!read.has(index)) continue;
+    TaskNumber task;
+    task.index = read.number(index);
+    if (*count != '\0') task.count = read.number_if_set(count);
+    task.found = read.found();
+    tasks.push_back(std::move(task));
+  }
+  return tasks;
+}
+
+/// "auto" and, where it is told, the number of shards.
+Shard task_shard(const std::optional<int>& told, const EnvironmentLookup& environment) {
+  const std::vector<TaskNumber> tasks = tasks_of(environment);
+  if (tasks.empty())
+    throw InputError(kFlag, "",
+                     "SLURM_ARRAY_TASK_ID, AWS_BATCH_JOB_ARRAY_INDEX or JOB_COMPLETION_INDEX, or --shard I/N",
+                     "none of them set");
+  std::string found;
+  std::optional<int> count = told;
+  bool agree = true;
+  for (const TaskNumber& task : tasks) {
+    found += (found.empty() ? "" : ", ") + task.found;
+    agree = agree && task.index == tasks[0].index && (!count || !task.count || *count == *task.count);
+    if (!count) count = task.count;
+  }
+  if (told) found += ", --shard auto/" + std::to_string(*told);
+  if (!agree) throw InputError(kFlag, "", "numbers that agree", found);
+  if (!count) throw InputError(kFlag, "", "the number of shards: --shard auto/N", found);
+  if (*count < 1 || *count > kMaxShards || tasks[0].index >= *count)
+    throw InputError(kFlag, "", "a task in 0 .. N - 1 of N", found);
+  return {tasks[0].index, *count};
+}
 
 namespace fs = std::filesystem;
 
-bool may_be_model(const fs::path& path) {
-  std::string e = path.extension().string();
-  std::transform(e.begin(), e.end(), e.begin(), [](unsigned char c) { return std::tolower(c); });
+bool may_be_model(const std::string& path) {
+  const std::string e = lower_ending(path);
   return e == ".glb" || e == ".gltf" || e == ".obj" || e == ".ply" || e == ".stl" || e == ".json";
 }
 
@@ -74,7 +147,7 @@ std::vector<std::string> model_paths(const std::string& folder) {
     std::string path = it->path().string();
     if (it->path().filename().string().front() == '.')
       it.disable_recursion_pending();
-    else if (it->is_regular_file(ec) && may_be_model(it->path()))
+    else if (it->is_regular_file(ec) && may_be_model(path))
       models.push_back(path);
     it.increment(ec);  // a folder that is left out without a word is a collection without its models
     if (ec) throw InputError(path, "", "a folder that can be listed", ec.message());
@@ -83,99 +156,29 @@ std::vector<std::string> model_paths(const std::string& folder) {
             [same = prefix_bytes(folder)](std::string_view a, std::string_view b) {
               return path_less(a.substr(same), b.substr(same));
             });
-  if (std::ranges::all_of(models, is_json) && std::ranges::none_of(models, is_range_scan))
+  if (std::ranges::all_of(models, has_json_ending) && std::ranges::none_of(models, is_range_scan))
     throw InputError(folder, "", "a folder with models", "none");
   return models;
 }
 
-/// The texts that `text_of` gives for more than one of the items; the views point to what it gives.
-/// 8 bytes an item: a map of the texts of 100,000 models took a sixth of a run that does nothing.
-template <class Item, class TextOf>
-std::set<std::string_view> repeated_texts(const std::vector<Item>& items, const TextOf& text_of) {
+/// The outputs that more than one of the models have; the views point into the models.
+/// 8 bytes a model: a map of the outputs of 100,000 models took a sixth of a run that does nothing.
+template <class Model>
+std::set<std::string_view> repeated_outputs(const std::vector<Model>& models) {
   const std::hash<std::string_view> hash;
   std::vector<std::size_t> hashes;
-  hashes.reserve(items.size());
-  for (const Item& item : items) hashes.push_back(hash(text_of(item)));
+  hashes.reserve(models.size());
+  for (const Model& m : models) hashes.push_back(hash(m.output));
   std::sort(hashes.begin(), hashes.end());
   std::set<std::size_t> shared;
   for (auto at = hashes.begin(); (at = std::adjacent_find(at, hashes.end())) != hashes.end(); ++at)
     shared.insert(*at);
   std::set<std::string_view> seen, repeated;
   if (shared.empty()) return repeated;
-  for (const Item& item : items)
-    if (const std::string_view text = text_of(item); shared.contains(hash(text)) && !seen.insert(text).second)
-      repeated.insert(text);
+  for (const Model& m : models)
+    if (shared.contains(hash(m.output)) && !seen.insert(m.output).second) repeated.insert(m.output);
   return repeated;
 }
-
-/// The first item whose text an earlier one has, and that one; nulls when there is none.
-template <class Item, class TextOf>
-std::pair<const Item*, const Item*> first_repetition(const std::vector<Item>& items, const TextOf& text_of) {
-  const std::set<std::string_view> repeated = repeated_texts(items, text_of);
-  std::map<std::string_view, const Item*> taken;
-  if (repeated.empty()) return {};
-  for (const Item& item : items) {
-    if (!repeated.contains(text_of(item))) continue;
-    const auto [earlier, fresh] = taken.emplace(text_of(item), &item);
-    if (!fresh) return {&item, earlier->second};
-  }
-  return {};
-}
-
-}  // namespace
-
-std::vector<std::string> list_models(const std::string& folder) {
-  std::vector<std::string> models = model_paths(folder);
-  for (std::string& path : models) path.erase(0, prefix_bytes(folder));
-  return models;
-}
-
-std::vector<ModelPath> find_models(const std::vector<std::string>& inputs, const std::string& output) {
-  std::vector<Found> found;
-  bool any_folder = false;
-  for (const std::string& input : inputs) {
-    if (fs::is_directory(input)) {
-      any_folder = true;
-      for (std::string& path : model_paths(input)) {
-        const bool unread = is_json(path);
-        found.push_back({std::move(path), prefix_bytes(input), unread});
-      }
-    } else {
-      found.push_back({input, input.size() - fs::path(input).filename().string().size()});
-    }
-  }
-  const bool one_file = inputs.size() == 1 && !any_folder && fs::path(output).extension() == ".texmesh" &&
-                        !fs::is_directory(output);
-  if (one_file) return {{inputs[0], output}};
-  if (fs::path(output).extension() == ".texmesh" && !fs::is_directory(output))
-    throw InputError(output, "", "a folder for the packages of several models", "the name of one package");
-
-  const std::string prefix = (fs::path(output) / "").string();
-  std::vector<ModelPath> models;
-  models.reserve(found.size());
-  for (Found& f : found) {
-    const std::size_t slash = f.path.rfind('/') + 1, dot = f.path.rfind('.');
-    const bool extension = dot != std::string::npos && dot > std::max(slash, f.relative);
-    const std::string_view relative = std::string_view(f.path).substr(f.relative);
-    std::string package = prefix;
-    package.reserve(prefix.size() + relative.size() + 8);  // of 100,000, what growing leaves free counts
-    package.append(relative.substr(0, extension ? dot - f.relative : relative.npos)).append(".texmesh");
-    models.push_back({std::move(f.path), std::move(package), f.unread});
-  }
-  std::map<std::string_view, int> others;  // by shared package: its files that are not unread
-  const auto shared = repeated_texts(models, [](const ModelPath& m) { return std::string_view(m.output); });
-  for (const ModelPath& m : models)
-    if (shared.contains(m.output)) others[m.output] += m.unread ? 0 : 1;
-  std::vector<std::size_t> longer;
-  for (const ModelPath& m : models)
-    if (const auto it = others.find(m.output); it != others.end() && (m.unread || it->second > 1))
-      longer.push_back(static_cast<std::size_t>(&m - models.data()));
-  for (const std::size_t i : longer)
-    models[i].output = prefix + models[i].input.substr(found[i].relative) + ".texmesh";
-  return models;
-}
-
-namespace {
 
 constexpr std::size_t kMaxFileBytes = 256u << 20, kMaxModels = 1'000'000, kMaxPathBytes = 1000;
 
@@ -217,14 +220,13 @@ class CollectionReader {
   }
 
   std::string path_at(const Json& object, const char* key, const std::string& place) const {
-    const Json& v = object[key];
-    if (!v.is_string() || v.get_ref<const std::string&>().empty() ||
-        v.get_ref<const std::string&>().size() > kMaxPathBytes)
-      fail(place + "/" + key, "a path of 1 to " + std::to_string(kMaxPathBytes) + " bytes", v.dump());
-    for (const char c : v.get_ref<const std::string&>())
+    std::string path;
+    get_value(object[key], path, FieldRule{.range = Range{1, kMaxPathBytes}},
+              RecordPlace{file_, nullptr, place + "/" + key});
+    for (const char c : path)
       if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f)
-        fail(place + "/" + key, "a path without control characters", v.dump());
-    return with_slashes(v.get<std::string>());
+        fail(place + "/" + key, "a path without control characters", path);
+    return with_slashes(std::move(path));
   }
 
   static std::string with_slashes(std::string path) {
@@ -306,13 +308,13 @@ class CollectionReader {
       };
       for (const std::string& relative : found) {
         auto& [files, others] = sharing[package_of(relative)];
-        ++files, others += is_json(relative) ? 0 : 1;
+        ++files, others += has_json_ending(relative) ? 0 : 1;
       }
       for (const std::string& relative : found) {
         const std::string input = (fs::path(folder) / relative).string();
         if (!listed.insert(fs::path(input).lexically_normal().string()).second) continue;
         const std::string package = package_of(relative);
-        const bool unread = is_json(relative);
+        const bool unread = has_json_ending(relative);
         const auto [files, others] = sharing[package];
         const bool longer = unread ? files > 1 : others > 1;
         add(models, {input, longer ? relative + ".texmesh" : package, options_for(input), unread}, place);
@@ -363,24 +365,6 @@ class CollectionReader {
   std::set<std::string> outputs_;
 };
 
-}  // namespace
-
-std::vector<CollectionModel> read_collection(const std::string& json, const std::string& file_name,
-                                             const CompileOptions& base, const FolderLister& list_folder) {
-  if (json.size() > kMaxFileBytes)
-    throw InputError(file_name, "", "at most 256 MiB", std::to_string(json.size()) + " bytes");
-  try {
-    const auto bytes = text_bytes(json);
-    return CollectionReader(file_name, base, list_folder).read(parse_bounded_json(bytes, file_name, 16));
-  } catch (const FormatError& e) {
-    throw InputError(file_name, e.place(), e.expected(), e.found());
-  }
-}
-
-namespace {
-
-constexpr std::uint64_t kMaxCollectionBytes = 256u << 20;
-
 bool is_collection(const std::string& input) {
   return fs::path(input).extension() == ".json" && fs::is_regular_file(input) && !is_range_scan(input);
 }
@@ -410,7 +394,7 @@ class Profiles {
 
 void add_collection(const std::string& file, const PlanRequest& request, const CompileOptions& base,
                     Profiles& profiles, BatchPlan& plan) {
-  const auto bytes = read_input_file(file, kMaxCollectionBytes);
+  const auto bytes = read_input_file(file, kMaxFileBytes);
   const fs::path folder = fs::path(file).parent_path();
   const auto list = [&](const std::string& name) { return list_models((folder / name).string()); };
   for (const CollectionModel& m :
@@ -435,22 +419,23 @@ void read_unread(BatchPlan& plan, const Chosen& chosen) {
 }
 
 void refuse_shared_outputs(BatchPlan& plan) {
-  const auto output_of = [](const PlannedModel& m) { return std::string_view(m.output); };
-  const auto shared = repeated_texts(plan.models, output_of);
+  const auto shared = repeated_outputs(plan.models);
   if (shared.empty()) return;
   // The few that must be opened by every shard, such as a meta.json in each of two folders.
   read_unread(plan, [&](const PlannedModel& m) { return shared.contains(m.output); });
-  if (const auto [m, other] = first_repetition(plan.models, output_of); m)
-    throw InputError(m->input, "", "a package of its own", m->output + ", which is that of " + other->input);
+  const auto repeated = repeated_outputs(plan.models);
+  std::map<std::string_view, std::string_view> input_of;
+  for (const PlannedModel& m : plan.models)
+    if (repeated.contains(m.output) && !input_of.emplace(m.output, m.input).second)
+      throw InputError(m.input, "", "a package of its own",
+                       m.output + ", which is that of " + std::string(input_of[m.output]));
 }
 
 /// Costs are whole microseconds: sums of them do not depend on their order.
 std::uint64_t cost_us(const PlannedModel& m, const std::string& package, const PlanRequest& request) {
   const auto known = request.costs_s.find(package);
   if (known != request.costs_s.end()) return static_cast<std::uint64_t>(known->second * 1e6);
-  std::error_code ec;
-  const auto bytes = fs::file_size(m.input, ec);
-  return static_cast<std::uint64_t>(guessed_seconds(ec ? 0 : bytes) * 1e6);
+  return static_cast<std::uint64_t>(guessed_seconds(bytes_of_file(m.input)) * 1e6);
 }
 
 void drop_other_shards(BatchPlan& plan, const PlanRequest& request) {
@@ -461,6 +446,134 @@ void drop_other_shards(BatchPlan& plan, const PlanRequest& request) {
 }
 
 }  // namespace
+
+Shard read_shard(const std::string& text, const EnvironmentLookup& environment) {
+  if (text == "auto") return task_shard(std::nullopt, environment);
+  const std::size_t slash = text.find('/');
+  const std::string_view before = std::string_view(text).substr(0, slash);
+  const std::optional<int> count =
+      slash == std::string::npos ? std::nullopt : whole_number<int>(std::string_view(text).substr(slash + 1));
+  if (count && *count >= 1 && *count <= kMaxShards) {
+    if (before == "auto") return task_shard(count, environment);
+    const std::optional<int> index = whole_number<int>(before);
+    if (index && *index >= 0 && *index < *count) return {*index, *count};
+  }
+  throw InputError(kFlag, "", "I/N with I in 0 .. N - 1, auto, or auto/N", text);
+}
+
+std::vector<int> balance_shards(const std::vector<ModelCost>& models, int shards) {
+  std::vector<std::size_t> order(models.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    if (models[a].cost_us != models[b].cost_us) return models[a].cost_us > models[b].cost_us;
+    return models[a].name < models[b].name;
+  });
+  using Load = std::pair<std::uint64_t, int>;  // cost so far, shard: equal costs go to the first shard
+  std::priority_queue<Load, std::vector<Load>, std::greater<>> loads;
+  for (int s = 0; s < shards; ++s) loads.emplace(0, s);
+  std::vector<int> shard_of(models.size());
+  for (const std::size_t i : order) {
+    const auto [cost, shard] = loads.top();
+    loads.pop();
+    shard_of[i] = shard;
+    loads.emplace(cost + std::max<std::uint64_t>(models[i].cost_us, 1), shard);
+  }
+  return shard_of;
+}
+
+std::string collection_digest(const std::vector<ModelCost>& models) {
+  std::vector<const ModelCost*> order;
+  order.reserve(models.size());
+  for (const ModelCost& m : models) order.push_back(&m);
+  std::sort(order.begin(), order.end(),
+            [](const ModelCost* a, const ModelCost* b) { return a->name < b->name; });
+  std::string text;
+  for (const ModelCost* m : order) {
+    text += m->name;
+    text += '\0' + std::to_string(m->cost_us) + '\n';
+  }
+  return to_hex(sha256(text_bytes(text)));
+}
+
+std::uint64_t bytes_of_file(const std::string& path) {
+  std::error_code ec;
+  const auto bytes = fs::file_size(path, ec);
+  return ec ? 0 : bytes;
+}
+
+double guessed_seconds(std::uint64_t model_bytes) {
+  constexpr double kBaseSeconds = 1, kSecondsPerByte = 5e-7;
+  return kBaseSeconds + kSecondsPerByte * static_cast<double>(model_bytes);
+}
+
+bool has_json_ending(const std::string& path) { return lower_ending(path) == ".json"; }
+
+bool is_range_scan(const std::string& path) {
+  std::error_code ec;
+  if (!std::filesystem::is_regular_file(path, ec)) return false;  // to open a FIFO is to wait
+  std::ifstream in(path, std::ios::binary);
+  std::string head(4096, '\0');
+  in.read(head.data(), static_cast<std::streamsize>(head.size()));
+  head.resize(static_cast<std::size_t>(in.gcount()));
+  return head.find("\"cylindrical-range-scan\"") != std::string::npos;
+}
+
+std::vector<std::string> list_models(const std::string& folder) {
+  std::vector<std::string> models = model_paths(folder);
+  for (std::string& path : models) path.erase(0, prefix_bytes(folder));
+  return models;
+}
+
+std::vector<ModelPath> find_models(const std::vector<std::string>& inputs, const std::string& output) {
+  std::vector<Found> found;
+  bool any_folder = false;
+  for (const std::string& input : inputs) {
+    if (fs::is_directory(input)) {
+      any_folder = true;
+      for (std::string& path : model_paths(input)) {
+        const bool unread = has_json_ending(path);
+        found.push_back({std::move(path), prefix_bytes(input), unread});
+      }
+    } else {
+      found.push_back({input, input.size() - fs::path(input).filename().string().size()});
+    }
+  }
+  const bool one_file = inputs.size() == 1 && !any_folder && fs::path(output).extension() == ".texmesh" &&
+                        !fs::is_directory(output);
+  if (one_file) return {{inputs[0], output}};
+  if (fs::path(output).extension() == ".texmesh" && !fs::is_directory(output))
+    throw InputError(output, "", "a folder for the packages of several models", "the name of one package");
+
+  const std::string prefix = (fs::path(output) / "").string();
+  std::vector<ModelPath> models;
+  models.reserve(found.size());
+  for (Found& f : found) {
+    const std::size_t slash = f.path.rfind('/') + 1, dot = f.path.rfind('.');
+    const bool extension = dot != std::string::npos && dot > std::max(slash, f.relative);
+    const std::string_view relative = std::string_view(f.path).substr(f.relative);
+    std::string package = prefix;
+    package.reserve(prefix.size() + relative.size() + 8);  // of 100,000, what growing leaves free counts
+    package.append(relative.substr(0, extension ? dot - f.relative : relative.npos)).append(".texmesh");
+    models.push_back({std::move(f.path), std::move(package), f.unread});
+  }
+  std::map<std::string_view, int> others;  // by shared package: its files that are not unread
+  const auto shared = repeated_outputs(models);
+  for (const ModelPath& m : models)
+    if (shared.contains(m.output)) others[m.output] += m.unread ? 0 : 1;
+  std::vector<std::size_t> longer;
+  for (const ModelPath& m : models)
+    if (const auto it = others.find(m.output); it != others.end() && (m.unread || it->second > 1))
+      longer.push_back(static_cast<std::size_t>(&m - models.data()));
+  for (const std::size_t i : longer)
+    models[i].output = prefix + models[i].input.substr(found[i].relative) + ".texmesh";
+  return models;
+}
+
+std::vector<CollectionModel> read_collection(const std::string& json, const std::string& file_name,
+                                             const CompileOptions& base, const FolderLister& list_folder) {
+  return CollectionReader(file_name, base, list_folder)
+      .read(parse_document(text_bytes(json), kMaxFileBytes, 16, file_name));
+}
 
 BatchPlan plan_batch(const PlanRequest& request) {
   BatchPlan plan = plan_collection(request);

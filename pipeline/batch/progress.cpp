@@ -1,11 +1,9 @@
 #include "pipeline/batch/progress.h"
 
 #include <sys/ioctl.h>
-#include <unistd.h>
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <ostream>
 
 #include "pipeline/import/import.h"
@@ -37,6 +35,18 @@ std::string last_columns(const std::string& text, std::size_t columns) {
   return "..." + text.substr(at);
 }
 
+/// "runs: ladder.rungs [5,8] -> [8]" and the like.
+std::string verdict(const StageExplanation& e) {
+  if (e.verdict == StageVerdict::kHit) return "from the cache";
+  if (e.verdict == StageVerdict::kUnknown) return "depends on what becomes of " + e.waits_for;
+  if (!e.has_history) return "runs: no earlier run of it is known";
+  if (e.changes.empty()) return "runs: nothing has changed, but its result is no longer in the cache";
+  std::string text;
+  for (const KeyChange& c : e.changes)
+    text += (text.empty() ? "runs: " : "; ") + describe_change(c.label, c.from, c.to);
+  return text;
+}
+
 }  // namespace
 
 std::string format_seconds(double seconds) {
@@ -57,22 +67,6 @@ std::string describe_change(const std::string& part, const std::string& from, co
   return name + " " + shorten(from) + " -> " + shorten(to);
 }
 
-namespace {
-
-/// "runs: ladder.rungs [5,8] -> [8]" and the like.
-std::string verdict(const StageExplanation& e) {
-  if (e.verdict == StageVerdict::kHit) return "from the cache";
-  if (e.verdict == StageVerdict::kUnknown) return "depends on what becomes of " + e.waits_for;
-  if (!e.has_history) return "runs: no earlier run of it is known";
-  if (e.changes.empty()) return "runs: nothing has changed, but its result is no longer in the cache";
-  std::string text;
-  for (const KeyChange& c : e.changes)
-    text += (text.empty() ? "runs: " : "; ") + describe_change(c.label, c.from, c.to);
-  return text;
-}
-
-}  // namespace
-
 Progress::Progress(std::ostream& out, OutputMode mode, bool verbose, bool explain)
     : out_(out), mode_(mode), verbose_(verbose), explain_(explain) {}
 
@@ -84,7 +78,7 @@ void Progress::begin(std::vector<ProgressModel> models) {
 void Progress::recalled(std::size_t model, const WorkerReport& r, const std::string& output) {
   if (const ModelError& e = r.more->error; !e.message.empty()) {
     if (mode_ == OutputMode::kJson)
-      json_event(ErrorTold{name_of(model), e});
+      write_event(ErrorTold{name_of(model), e});
     else
       line("error: " + e.message + " (nothing has changed since; --retry-failed tries again)");
   }
@@ -97,14 +91,14 @@ void Progress::recalled(std::size_t model, const WorkerReport& r, const std::str
 }
 
 template <class Event>
-void Progress::json_event(const Event& event) {
+void Progress::write_event(const Event& event) {
   out_ << to_json_line(event) << '\n';
 }
 
 void Progress::started(std::size_t model, const std::string& output) {
   running_[model].start = std::chrono::steady_clock::now();
   if (mode_ != OutputMode::kJson) return;
-  json_event(ModelStarted{name_of(model), output});
+  write_event(ModelStarted{name_of(model), output});
   out_ << std::flush;
 }
 
@@ -117,7 +111,7 @@ void Progress::event(std::size_t model, WorkerEvent event) {
       [&](auto& e) {
         e.model = name_of(model);
         if (mode_ == OutputMode::kJson)
-          json_event(e);
+          write_event(e);
         else
           show(model, e);
       },
@@ -164,7 +158,7 @@ void Progress::show(std::size_t, const ErrorTold& e) { line("error: " + e.error.
 
 void Progress::cache_event(const std::string& code, const std::string& text) {
   if (mode_ != OutputMode::kJson) return line("cache: " + text);
-  json_event(CacheTold{"", code, text});
+  write_event(CacheTold{"", code, text});
   out_ << std::flush;
 }
 
@@ -174,7 +168,7 @@ void Progress::finished(std::size_t model, const WorkerReport& r, const std::str
   done_weight_ += models_[model].weight - (it == running_.end() ? 0 : it->second.fraction);
   running_.erase(model);
   if (mode_ == OutputMode::kJson) {
-    json_event(ModelFinished{name_of(model), output, r});
+    write_event(ModelFinished{name_of(model), output, r});
     if (r.ran) out_ << std::flush;
     return;
   }
@@ -200,7 +194,7 @@ void Progress::summary(const std::vector<WorkerReport>& reports, double seconds)
   if (mode_ == OutputMode::kTerminal) out_ << "\r\033[K" << std::flush;
   if (mode_ == OutputMode::kJson) {
     const auto number = [](std::ptrdiff_t n) { return static_cast<std::uint64_t>(n); };
-    json_event(
+    write_event(
         RunFinished{number(models), number(ok), number(same), number(failed), number(cancelled), seconds});
     out_ << std::flush;
     return;

@@ -1,11 +1,6 @@
 #pragma once
 #include <chrono>
-#include <cstdint>
 #include <iosfwd>
-#include <map>
-#include <string>
-#include <string_view>
-#include <vector>
 
 #include "pipeline/compile/workers/worker.h"
 
@@ -55,7 +50,7 @@ class Progress {
   template <class Other>
   void show(std::size_t, const Other&) {}
   template <class Event>
-  void json_event(const Event& event);
+  void write_event(const Event& event);
   std::string name_of(std::size_t model) const { return std::string(models_[model].name); }
   void line(const std::string& text);  // a lasting line
   void redraw(bool now);

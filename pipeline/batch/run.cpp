@@ -7,8 +7,7 @@
 
 #include "pipeline/batch/build_memo.h"
 #include "pipeline/batch/fleet/run_summary.h"
-#include "pipeline/batch/write_reports.h"
-#include "pipeline/cache/disk_store.h"
+#include "pipeline/batch/run.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/resolver.h"

@@ -1,11 +1,8 @@
 // What a run leaves beside its packages: a trace, statistics, a dependency file, and the summaries.
-#include "pipeline/batch/write_reports.h"
+#include "pipeline/batch/run.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
-#include <algorithm>
-#include <cerrno>
 #include <filesystem>
 #include <iostream>
 #include <nlohmann/json.hpp>
@@ -13,7 +10,7 @@
 #include "format/base/text_bytes.h"
 #include "pipeline/batch/fleet/model_list.h"
 #include "pipeline/batch/fleet/run_summary.h"
-#include "pipeline/compile/profile.h"
+#include "pipeline/compile/options.h"
 #include "pipeline/io/atomic_file.h"
 
 namespace texmesh {
@@ -23,19 +20,46 @@ namespace fs = std::filesystem;
 
 double microseconds(double s) { return std::round(s * 1e6); }
 
-Json span(const std::string& name, const char* category, double start_s, double end_s, int process,
-          int thread) {
-  return {{"name", name},
-          {"cat", category},
-          {"ph", "X"},
-          {"ts", microseconds(start_s)},
-          {"dur", std::max(1.0, microseconds(end_s - start_s))},
-          {"pid", process},
-          {"tid", thread}};
+struct TraceName {
+  std::string name;
+  static void fields(auto& s, auto&& v) { v("name", s.name, ""); }
+};
+/// A span of time, or the name of a process or a thread.
+struct TraceEvent {
+  std::string name;
+  std::optional<std::string> category = {};
+  std::string phase;
+  std::optional<double> start_us = {}, duration_us = {};
+  int process = 0, thread = 0;
+  std::optional<TraceName> named = {};
+  static void fields(auto& s, auto&& v) {
+    v("name", s.name, "");
+    v("cat", s.category, "");
+    v("ph", s.phase, "");
+    v("ts", s.start_us, "");
+    v("dur", s.duration_us, "");
+    v("pid", s.process, "");
+    v("tid", s.thread, "");
+    v("args", s.named, "");
+  }
+};
+struct Trace {
+  std::string unit = "ms";
+  std::vector<TraceEvent> events;
+  static void fields(auto& s, auto&& v) {
+    v("displayTimeUnit", s.unit, "");
+    v("traceEvents", s.events, "");
+  }
+};
+
+TraceEvent span(const std::string& name, const char* category, double start_s, double end_s, int process,
+                int thread) {
+  return {name,    category, "X", microseconds(start_s), std::max(1.0, microseconds(end_s - start_s)),
+          process, thread};
 }
 
-Json named(const char* what, int process, int thread, const std::string& name) {
-  return {{"name", what}, {"ph", "M"}, {"pid", process}, {"tid", thread}, {"args", {{"name", name}}}};
+TraceEvent named(const char* what, int process, int thread, const std::string& name) {
+  return {.name = what, .phase = "M", .process = process, .thread = thread, .named = TraceName{name}};
 }
 
 /// Stages of a model overlap; each goes to the first thread that is free at its start.
@@ -107,39 +131,31 @@ std::vector<std::string> dependencies(const BatchPlan& plan, const RunSettings& 
   return all;
 }
 
-void check_report(const std::string& path) {
-  if (path.empty() || is_special_file(path)) return;
-  const std::string folder = fs::path(path).parent_path().string();
-  if (fs::is_directory(path) || ::access(folder.empty() ? "." : folder.c_str(), W_OK) != 0)
-    throw InputError(path, "", "a file that can be written",
-                     fs::is_directory(path) ? "a folder" : std::strerror(errno));
-}
-
 }  // namespace
 
 std::string write_trace(const std::vector<PlannedModel>& models, const std::vector<WorkerReport>& reports) {
-  Json events = Json::array();
+  Trace trace;
   std::map<int, int> lanes;  // most threads of stages
   for (std::size_t i = 0; i < models.size(); ++i) {
     const WorkerReport& r = reports[i];
     if (!r.ran) continue;
     lanes.try_emplace(r.lane, 0);
-    events.push_back(
+    trace.events.push_back(
         span(std::string(models[i].name()), "model", r.start_s, r.start_s + r.seconds, r.lane, 0));
     const std::vector<int> threads = threads_of(r.more->spans);
     for (std::size_t k = 0; k < r.more->spans.size(); ++k) {
       const StageSpan& s = r.more->spans[k];
-      events.push_back(span(s.stage, s.hit ? "hit" : "stage", s.start_s, s.end_s, r.lane, threads[k]));
+      trace.events.push_back(span(s.stage, s.hit ? "hit" : "stage", s.start_s, s.end_s, r.lane, threads[k]));
       lanes[r.lane] = std::max(lanes[r.lane], threads[k]);
     }
   }
   for (const auto& [lane, threads] : lanes) {
-    events.push_back(named("process_name", lane, 0, "worker " + std::to_string(lane)));
-    events.push_back(named("thread_name", lane, 0, "models"));
+    trace.events.push_back(named("process_name", lane, 0, "worker " + std::to_string(lane)));
+    trace.events.push_back(named("thread_name", lane, 0, "models"));
     for (int t = 1; t <= threads; ++t)
-      events.push_back(named("thread_name", lane, t, "stages " + std::to_string(t)));
+      trace.events.push_back(named("thread_name", lane, t, "stages " + std::to_string(t)));
   }
-  return json_line(Json{{"displayTimeUnit", "ms"}, {"traceEvents", std::move(events)}}) + "\n";
+  return to_json_line(trace) + "\n";
 }
 
 std::string write_statistics(const std::vector<WorkerReport>& reports) {
@@ -178,7 +194,7 @@ std::string write_depfile(const std::string& target, const std::vector<std::stri
 
 void check_reports(const BatchPlan& plan, const RunSettings& settings) {
   for (const std::string* path : {&settings.summary, &settings.junit, &settings.trace, &settings.depfile})
-    check_report(*path);
+    if (!path->empty()) check_output_file(*path);
   if (!settings.depfile.empty()) write_depfile(plan.models.at(0).output, {plan.models[0].input});
 }
 

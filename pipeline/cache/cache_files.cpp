@@ -8,14 +8,13 @@
 
 #include "format/base/text_bytes.h"
 #include "pipeline/io/atomic_file.h"
-#include "pipeline/io/descriptor.h"
 
 namespace texmesh {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kRecordVersion = 2;
+constexpr int kEntryVersion = 2;
 constexpr std::size_t kSealBytes = 66;  // newline, 64 digits, newline
 
 bool is_there(const std::string& path, std::size_t bytes) {
@@ -23,13 +22,8 @@ bool is_there(const std::string& path, std::size_t bytes) {
   return ::stat(path.c_str(), &s) == 0 && S_ISREG(s.st_mode) && static_cast<std::size_t>(s.st_size) == bytes;
 }
 
-bool sync_folder(const std::string& folder) {
-  const Descriptor d{::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)};
-  return d.get() >= 0 && (::fsync(d.get()) == 0 || errno == EINVAL || errno == ENOTSUP);
-}
-
 /// For file systems without O_TMPFILE (NFS): a named sibling. Pruning removes what a killed process leaves.
-bool publish_by_rename(const std::string& path, std::span<const std::uint8_t> bytes) {
+bool publish_by_rename(const std::string& path, ByteSpan bytes) {
   try {
     write_file_atomically(path, bytes);
     return true;
@@ -38,30 +32,16 @@ bool publish_by_rename(const std::string& path, std::span<const std::uint8_t> by
   }
 }
 
-/// A record as its file has it.
-struct RecordText {
+/// An entry as its file has it.
+struct EntryText {
   Json key;  // Key::preimage
   std::vector<StoredBlob> outputs;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
-    v("version", Constant{kRecordVersion}, "");
+  static void fields(auto& s, auto&& v) {
+    v("version", Constant{kEntryVersion}, "");
     v("key", s.key, "");
     v("outputs", s.outputs, "");
   }
 };
-
-std::optional<CacheRecord> parse_record(std::span<const std::uint8_t> bytes, const Sha256* key) {
-  const auto body = unseal(bytes);
-  if (!body) return std::nullopt;
-  try {
-    auto text = from_json<RecordText>(Json::parse(*body, nullptr, false), "record");
-    const auto parts = key_from_json(text.key);
-    if (!parts || (key && parts->digest() != *key)) return std::nullopt;
-    return CacheRecord{parts->preimage(), std::move(text.outputs)};
-  } catch (const InputError&) {
-    return std::nullopt;
-  }
-}
 
 }  // namespace
 
@@ -70,13 +50,13 @@ std::string object_path(const char* kind, const Sha256& digest) {
   return std::string(kind) + "/" + hex.substr(0, 2) + "/" + hex;
 }
 
-std::optional<std::vector<std::uint8_t>> read_whole(const std::string& path, std::uint64_t max_bytes) {
+std::optional<Bytes> read_whole(const std::string& path, std::uint64_t max_bytes) {
   const Descriptor d{::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)};
   struct stat s {};
   if (d.get() < 0 || ::fstat(d.get(), &s) != 0 || !S_ISREG(s.st_mode) ||
       static_cast<std::uint64_t>(s.st_size) > max_bytes)
     return std::nullopt;
-  std::vector<std::uint8_t> bytes(static_cast<std::size_t>(s.st_size));
+  Bytes bytes(static_cast<std::size_t>(s.st_size));
   for (std::size_t at = 0; at < bytes.size();) {
     const ssize_t n = ::read(d.get(), bytes.data() + at, bytes.size() - at);
     if (n < 0 && errno == EINTR) continue;
@@ -86,7 +66,7 @@ std::optional<std::vector<std::uint8_t>> read_whole(const std::string& path, std
   return bytes;
 }
 
-bool publish_object(const std::string& path, std::span<const std::uint8_t> bytes) {
+bool publish_object(const std::string& path, ByteSpan bytes) {
   const std::string folder = fs::path(path).parent_path().string();
   std::error_code ec;
   fs::create_directories(folder, ec);
@@ -122,7 +102,7 @@ QuarantineResult move_to_quarantine(const std::string& folder, const std::string
 
 std::string seal(const std::string& body) { return body + "\n" + to_hex(sha256(text_bytes(body))) + "\n"; }
 
-std::optional<std::string> unseal(std::span<const std::uint8_t> bytes) {
+std::optional<std::string> unseal(ByteSpan bytes) {
   if (bytes.size() < kSealBytes) return std::nullopt;
   const std::string text(bytes.begin(), bytes.end());
   std::string body = text.substr(0, text.size() - kSealBytes);
@@ -130,69 +110,46 @@ std::optional<std::string> unseal(std::span<const std::uint8_t> bytes) {
   return body;
 }
 
-std::string write_record(const CacheRecord& record) {
-  return seal(to_json(RecordText{Json::parse(record.preimage), record.outputs}).dump(1));
+std::string write_entry(const CacheEntry& entry) {
+  return seal(to_json(EntryText{Json::parse(entry.preimage), entry.outputs}).dump(1));
 }
 
-std::optional<CacheRecord> read_record(std::span<const std::uint8_t> bytes, const Sha256& key) {
-  return parse_record(bytes, &key);
-}
-std::optional<CacheRecord> read_record(std::span<const std::uint8_t> bytes) {
-  return parse_record(bytes, nullptr);
-}
-
-FileLock::~FileLock() {
-  if (fd_ >= 0) ::close(fd_);
-}
-FileLock::FileLock(FileLock&& other) noexcept : fd_(std::exchange(other.fd_, -1)), busy_(other.busy_) {}
-FileLock& FileLock::operator=(FileLock&& other) noexcept {
-  std::swap(fd_, other.fd_);
-  std::swap(busy_, other.busy_);
-  return *this;
+std::optional<CacheEntry> read_entry(ByteSpan bytes, const std::optional<Sha256>& key) {
+  const auto body = unseal(bytes);
+  if (!body) return std::nullopt;
+  try {
+    auto text = from_json<EntryText>(Json::parse(*body, nullptr, false), "entry");
+    const auto parts = key_from_json(text.key);
+    if (!parts || (key && parts->digest() != *key)) return std::nullopt;
+    return CacheEntry{parts->preimage(), std::move(text.outputs)};
+  } catch (const InputError&) {
+    return std::nullopt;
+  }
 }
 
 bool FileLock::is_of(const std::string& path) const {
   struct stat own {
   }, there{};
-  return fd_ >= 0 && ::fstat(fd_, &own) == 0 && ::lstat(path.c_str(), &there) == 0 &&
+  return held() && ::fstat(file_.get(), &own) == 0 && ::lstat(path.c_str(), &there) == 0 &&
          own.st_dev == there.st_dev && own.st_ino == there.st_ino;
 }
 
-namespace {
-
-int open_lock(const std::string& path) {
-  return ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
+FileLock FileLock::take(const std::string& path, int operation) {
+  FileLock lock;
+  Descriptor file{::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666)};
+  if (file.get() < 0) return lock;
+  int rc;
+  do rc = ::flock(file.get(), operation);
+  while (rc != 0 && errno == EINTR && (operation & LOCK_NB) == 0);
+  lock.busy_ = rc != 0 && (errno == EWOULDBLOCK || errno == EINTR);
+  if (rc == 0) lock.file_ = std::move(file);
+  return lock;
 }
-
-int operation(FileLock::Mode mode) { return mode == FileLock::Mode::kShared ? LOCK_SH : LOCK_EX; }
-
-}  // namespace
 
 FileLock FileLock::wait(const std::string& path, Mode mode) {
-  FileLock lock;
-  const int fd = open_lock(path);
-  if (fd < 0) return lock;
-  int rc;
-  do rc = ::flock(fd, operation(mode));
-  while (rc != 0 && errno == EINTR);
-  if (rc == 0)
-    lock.fd_ = fd;
-  else
-    ::close(fd);
-  return lock;
+  return take(path, mode == Mode::kShared ? LOCK_SH : LOCK_EX);
 }
 
-FileLock FileLock::attempt(const std::string& path, Mode mode) {
-  FileLock lock;
-  const int fd = open_lock(path);
-  if (fd < 0) return lock;
-  if (::flock(fd, operation(mode) | LOCK_NB) == 0) {
-    lock.fd_ = fd;
-  } else {
-    lock.busy_ = errno == EWOULDBLOCK || errno == EINTR;
-    ::close(fd);
-  }
-  return lock;
-}
+FileLock FileLock::attempt(const std::string& path) { return take(path, LOCK_EX | LOCK_NB); }
 
 }  // namespace texmesh

@@ -1,12 +1,5 @@
 #pragma once
 #include <chrono>
-#include <functional>
-#include <memory>
-#include <optional>
-#include <span>
-#include <stdexcept>
-#include <string>
-#include <vector>
 
 #include "pipeline/graph/store.h"
 
@@ -20,14 +13,13 @@ class CacheLayer {
   virtual std::string name() const = 0;
   /// An object (`kind`: ac, cas or notes); nothing when the layer has none. Throws LayerError when the layer
   /// does not work.
-  virtual std::optional<std::vector<std::uint8_t>> get(const char* kind, const Sha256& digest,
-                                                       std::uint64_t max_bytes) = 0;
+  virtual std::optional<Bytes> get(const char* kind, const Sha256& digest, std::uint64_t max_bytes) = 0;
   /// The layer holds an object of this many bytes under the digest. False also where it does not tell. Throws
   /// LayerError.
   virtual bool has(const char* /*kind*/, const Sha256& /*digest*/, std::uint64_t /*bytes*/) { return false; }
   /// Only for layers that take results. Throws LayerError; LayerRefusal where the layer works but does not
   /// take this.
-  virtual void put(const char* kind, const Sha256& digest, std::span<const std::uint8_t> bytes) = 0;
+  virtual void put(const char* kind, const Sha256& digest, ByteSpan bytes) = 0;
 };
 
 /// Tells the time; tests give one of their own.
@@ -69,9 +61,6 @@ struct LayerPatience {
 /// A build waits for a layer a quarter of the model's time limit at most (seconds, 0 = no limit).
 LayerPatience patience_within(double limit_s);
 
-/// A folder laid out as a cache folder. A layer never writes to the folder.
-std::unique_ptr<CacheLayer> open_folder_layer(const std::string& folder);
-
 /// GET, HEAD and PUT of URL/ac/<key> and URL/cas/<digest> (the paths of Bazel's remote caches; bazel-remote
 /// must be told not to validate action results; any WebDAV-like server does); notes stand under ac/ too. http
 /// and https only, no redirects; a layer that has failed, or is slower than its patience allows, fails for a
@@ -83,7 +72,7 @@ std::unique_ptr<CacheLayer> open_http_layer(const std::string& url, const LayerP
 /// InputError for a text that names no layer. Touches no layer.
 void check_layer(const std::string& place);
 
-/// http(s)://... or a folder.
+/// http(s)://..., or a folder laid out as a cache folder, which is never written to.
 std::unique_ptr<CacheLayer> open_layer(const std::string& place, const LayerPatience& patience = {});
 
 enum class LayerUse : std::uint8_t {

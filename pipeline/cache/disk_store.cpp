@@ -1,7 +1,6 @@
 #include "pipeline/cache/disk_store.h"
 
 #include <fcntl.h>
-#include <unistd.h>
 
 #include <chrono>
 #include <cstdlib>
@@ -11,9 +10,8 @@
 
 #include "format/base/text_bytes.h"
 #include "pipeline/cache/cache_files.h"
-#include "pipeline/cache/prune.h"
 #include "pipeline/io/atomic_file.h"
-#include "pipeline/io/machine/owner_mark.h"
+#include "pipeline/io/machine.h"
 
 namespace texmesh {
 namespace {
@@ -37,7 +35,7 @@ class RunningBuild {
     constexpr int kAttempts = 1000;
     for (int i = 0; i < kAttempts; ++i) {
       path_ = folder + "/running/" + owner_mark() + "-" + std::to_string(counter++);
-      lock_ = FileLock::attempt(path_, FileLock::Mode::kExclusive);
+      lock_ = FileLock::attempt(path_);
       if (!lock_.held() && !lock_.busy()) return;  // locks do not work here
       if (!lock_.is_of(path_)) continue;
       ::utimensat(AT_FDCWD, path_.c_str(), nullptr, 0);  // this build's start
@@ -70,15 +68,15 @@ class DiskStore : public Store {
     const std::string path = place("ac", key);
     const auto file = read(path);
     if (!file) return std::nullopt;
-    auto record = read_record(file->bytes, key);
-    if (!record) {
-      quarantine(path, *file, "the record of a result does not have its digest");
+    auto entry = read_entry(file->bytes, key);
+    if (!entry) {
+      quarantine(path, *file, "the entry of a result does not have its digest");
       return std::nullopt;
     }
-    for (const StoredBlob& b : record->outputs)
+    for (const StoredBlob& b : entry->outputs)
       if (!verify(b)) return std::nullopt;
     touch(path);
-    return std::move(record->outputs);
+    return std::move(entry->outputs);
   }
 
   SharedBytes load(const StoredBlob& blob) override {
@@ -92,7 +90,7 @@ class DiskStore : public Store {
   bool put(const Key& key, const std::vector<std::pair<std::string, SharedBytes>>& outputs) override {
     if (!writes_) return false;
     const FileLock gate = pass_gate();
-    CacheRecord record{key.preimage(), {}};
+    CacheEntry entry{key.preimage(), {}};
     for (const auto& [name, bytes] : outputs) {
       const StoredBlob blob{name, sha256(*bytes), bytes->size()};
       const std::string path = place("cas", blob.digest);
@@ -102,25 +100,25 @@ class DiskStore : public Store {
         ::utimensat(AT_FDCWD, path.c_str(), nullptr, 0);
       else if (!publish_object(path, *bytes))
         return not_written();
-      record.outputs.push_back(blob);
+      entry.outputs.push_back(blob);
     }
-    const std::string text = write_record(record);
+    const std::string text = write_entry(entry);
     return publish_object(place("ac", key.digest()), text_bytes(text)) || not_written();
   }
 
   std::optional<std::string> preimage(const Sha256& key) override {
     const auto bytes = read_whole(place("ac", key));
-    const auto record = bytes ? read_record(*bytes, key) : std::nullopt;
-    return record ? std::optional(record->preimage) : std::nullopt;
+    const auto entry = bytes ? read_entry(*bytes, key) : std::nullopt;
+    return entry ? std::optional(entry->preimage) : std::nullopt;
   }
 
   void reject(const Sha256& key, const std::vector<StoredBlob>& found, const std::string& reason) override {
     const FileLock gate = pass_gate();
     const std::string path = place("ac", key);
     const auto file = read(path);
-    const auto record = file ? read_record(file->bytes, key) : std::nullopt;
-    if (record && record->outputs == found)  // not what somebody else has put in its place meanwhile
-      quarantine(path, *file, "the record of a result names what is none (" + reason + ")");
+    const auto entry = file ? read_entry(file->bytes, key) : std::nullopt;
+    if (entry && entry->outputs == found)  // not what somebody else has put in its place meanwhile
+      quarantine(path, *file, "the entry of a result names what is none (" + reason + ")");
   }
 
   std::optional<std::string> find_note(const Sha256& key) override {
@@ -155,7 +153,7 @@ class DiskStore : public Store {
     if (!writes_) return nullptr;
     const std::string path = folder_ + "/locks/" + to_hex(key).substr(0, 3);
     for (;;) {
-      FileLock lock = FileLock::attempt(path, FileLock::Mode::kExclusive);
+      FileLock lock = FileLock::attempt(path);
       if (lock.held()) return std::make_unique<LockClaim>(std::move(lock));
       if (!lock.busy()) return nullptr;
       context.check_cancelled();

@@ -10,11 +10,11 @@ namespace texmesh {
 namespace {
 
 struct Sink {
-  std::vector<std::uint8_t> bytes;
+  Bytes bytes;
   std::uint64_t max_bytes = 0;
 };
 struct Upload {
-  std::span<const std::uint8_t> rest;
+  ByteSpan rest;
 };
 
 std::size_t receive_body(char* data, std::size_t size, std::size_t count, void* user) {
@@ -68,8 +68,7 @@ class HttpLayer : public CacheLayer {
   }
   std::string name() const override { return shown_url(url_); }
 
-  std::optional<std::vector<std::uint8_t>> get(const char* kind, const Sha256& digest,
-                                               std::uint64_t max_bytes) override {
+  std::optional<Bytes> get(const char* kind, const Sha256& digest, std::uint64_t max_bytes) override {
     const std::lock_guard lock(mutex_);
     Sink sink{{}, max_bytes};
     prepare(kind, digest);
@@ -97,7 +96,7 @@ class HttpLayer : public CacheLayer {
     return status_code() == 200 && length >= 0 && static_cast<std::uint64_t>(length) == bytes;
   }
 
-  void put(const char* kind, const Sha256& digest, std::span<const std::uint8_t> bytes) override {
+  void put(const char* kind, const Sha256& digest, ByteSpan bytes) override {
     const std::lock_guard lock(mutex_);
     Upload upload{bytes};
     prepare(kind, digest);

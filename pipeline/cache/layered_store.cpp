@@ -1,5 +1,4 @@
 // A store with layers behind it: shared folders and servers that hold what other machines computed.
-#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <set>
@@ -12,18 +11,17 @@
 namespace texmesh {
 namespace {
 
-constexpr std::uint64_t kMaxRecordBytes = 1 << 22, kMaxBlobBytes = 1ull << 34;
+constexpr std::uint64_t kMaxEntryBytes = 1 << 22, kMaxBlobBytes = 1ull << 34;
 
 class FolderLayer : public CacheLayer {
  public:
   explicit FolderLayer(std::string folder) : folder_(std::move(folder)) {}
   std::string name() const override { return folder_; }
-  std::optional<std::vector<std::uint8_t>> get(const char* kind, const Sha256& digest,
-                                               std::uint64_t max_bytes) override {
+  std::optional<Bytes> get(const char* kind, const Sha256& digest, std::uint64_t max_bytes) override {
     if (!std::filesystem::is_directory(folder_)) throw LayerError("no such folder");
     return read_whole(folder_ + "/" + object_path(kind, digest), max_bytes);
   }
-  void put(const char*, const Sha256&, std::span<const std::uint8_t>) override {}
+  void put(const char*, const Sha256&, ByteSpan) override {}
 
  private:
   std::string folder_;
@@ -54,7 +52,7 @@ class LayeredStore : public Store {
     if (SharedBytes bytes = local_->load(blob)) return bytes;
     for (Layer& layer : layers_)
       if (auto bytes = get(layer, "cas", blob.digest, blob.bytes)) {
-        if (is(blob, *bytes)) return std::make_shared<const std::vector<std::uint8_t>>(std::move(*bytes));
+        if (is(blob, *bytes)) return std::make_shared<const Bytes>(std::move(*bytes));
         remember_damage(layer, blob.digest);
       }
     return nullptr;
@@ -63,13 +61,13 @@ class LayeredStore : public Store {
   bool put(const Key& key, const std::vector<std::pair<std::string, SharedBytes>>& outputs) override {
     const bool kept = local_->put(key, outputs);
     if (use_ != LayerUse::kUpload) return kept;
-    CacheRecord record{key.preimage(), {}};
-    for (const auto& [name, bytes] : outputs) record.outputs.push_back({name, sha256(*bytes), bytes->size()});
-    const std::string text = write_record(record);
+    CacheEntry entry{key.preimage(), {}};
+    for (const auto& [name, bytes] : outputs) entry.outputs.push_back({name, sha256(*bytes), bytes->size()});
+    const std::string text = write_entry(entry);
     for (Layer& layer : layers_)
-      give(layer, [&] {  // blobs first: a record must never name what is not there
+      give(layer, [&] {  // blobs first: an entry must never name what is not there
         for (std::size_t i = 0; i < outputs.size(); ++i) {
-          const Sha256& digest = record.outputs[i].digest;
+          const Sha256& digest = entry.outputs[i].digest;
           if (was_damaged(layer, digest) || !layer.layer->has("cas", digest, outputs[i].second->size()))
             layer.layer->put("cas", digest, *outputs[i].second);
         }
@@ -92,7 +90,7 @@ class LayeredStore : public Store {
   std::optional<std::string> find_note(const Sha256& key) override {
     if (auto note = local_->find_note(key)) return note;
     for (Layer& layer : layers_)
-      if (const auto bytes = get(layer, "notes", key, kMaxRecordBytes))
+      if (const auto bytes = get(layer, "notes", key, kMaxEntryBytes))
         if (auto text = unseal(*bytes)) {
           local_->put_note(key, *text);
           return text;
@@ -134,7 +132,7 @@ class LayeredStore : public Store {
     return rejected_.contains(key);
   }
 
-  static bool is(const StoredBlob& blob, const std::vector<std::uint8_t>& bytes) {
+  static bool is(const StoredBlob& blob, const Bytes& bytes) {
     return bytes.size() == blob.bytes && sha256(bytes) == blob.digest;
   }
 
@@ -184,9 +182,8 @@ class LayeredStore : public Store {
     }
   }
 
-  std::optional<std::vector<std::uint8_t>> get(Layer& layer, const char* kind, const Sha256& digest,
-                                               std::uint64_t max_bytes) {
-    std::optional<std::vector<std::uint8_t>> bytes;
+  std::optional<Bytes> get(Layer& layer, const char* kind, const Sha256& digest, std::uint64_t max_bytes) {
+    std::optional<Bytes> bytes;
     guarded(layer, [&] { bytes = layer.layer->get(kind, digest, max_bytes); });
     return bytes;
   }
@@ -200,12 +197,12 @@ class LayeredStore : public Store {
   /// Copies a run of a stage from a layer into the local store (unless that is only looked at), if all of it
   /// is there and sound.
   std::optional<std::vector<StoredBlob>> bring(Layer& layer, const Sha256& key) {
-    const auto bytes = get(layer, "ac", key, kMaxRecordBytes);
+    const auto bytes = get(layer, "ac", key, kMaxEntryBytes);
     if (!bytes) return std::nullopt;
-    const auto record = read_record(*bytes, key);
-    if (!record) return report_damaged(layer, "what is no record of its key");
+    const auto entry = read_entry(*bytes, key);
+    if (!entry) return report_damaged(layer, "what is no entry of its key");
     std::vector<std::pair<std::string, SharedBytes>> outputs;
-    for (const StoredBlob& blob : record->outputs) {
+    for (const StoredBlob& blob : entry->outputs) {
       if (blob.bytes > kMaxBlobBytes) return std::nullopt;
       auto blob_bytes = get(layer, "cas", blob.digest, blob.bytes);
       if (!blob_bytes) return std::nullopt;
@@ -213,13 +210,12 @@ class LayeredStore : public Store {
         remember_damage(layer, blob.digest);
         return report_damaged(layer, "the result " + blob.name + ", which does not have its digest,");
       }
-      outputs.emplace_back(blob.name,
-                           std::make_shared<const std::vector<std::uint8_t>>(std::move(*blob_bytes)));
+      outputs.emplace_back(blob.name, std::make_shared<const Bytes>(std::move(*blob_bytes)));
     }
-    if (use_ == LayerUse::kLook) return record->outputs;
-    const auto original = key_from_preimage(record->preimage);
+    if (use_ == LayerUse::kLook) return entry->outputs;
+    const auto original = key_from_preimage(entry->preimage);
     if (!original || !local_->put(*original, outputs)) return std::nullopt;
-    return record->outputs;
+    return entry->outputs;
   }
 
   std::unique_ptr<Store> local_;
@@ -232,12 +228,9 @@ class LayeredStore : public Store {
 
 }  // namespace
 
-std::unique_ptr<CacheLayer> open_folder_layer(const std::string& folder) {
-  return std::make_unique<FolderLayer>(folder);
-}
-
 std::unique_ptr<CacheLayer> open_layer(const std::string& place, const LayerPatience& patience) {
-  return place.find("://") != std::string::npos ? open_http_layer(place, patience) : open_folder_layer(place);
+  if (place.find("://") != std::string::npos) return open_http_layer(place, patience);
+  return std::make_unique<FolderLayer>(place);
 }
 
 std::unique_ptr<Store> layered_store(std::unique_ptr<Store> local,

@@ -2,37 +2,21 @@
 #include "pipeline/compile/compile_model.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
-#include <cctype>
 #include <nlohmann/json.hpp>
 
 #include "format/base/text_bytes.h"
-#include "format/container/format_version.h"
-#include "pipeline/compile/artefacts.h"
-#include "pipeline/compile/library_versions.h"
-#include "pipeline/compile/profile.h"
+#include "format/container/layout.h"
 #include "pipeline/compile/stage_table.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/file_resolver.h"
-#include "pipeline/io/resolver.h"
-#include "pipeline/io/wire_text.h"
+#include "pipeline/io/machine.h"
+#include "pipeline/io/program.h"
+#include "pipeline/io/uri.h"
 
 namespace texmesh {
 namespace fs = std::filesystem;
 namespace {
-
-std::uint64_t machine_memory_bytes() {
-  const long pages = ::sysconf(_SC_PHYS_PAGES), page = ::sysconf(_SC_PAGESIZE);
-  return pages > 0 && page > 0 ? static_cast<std::uint64_t>(pages) * static_cast<std::uint64_t>(page)
-                               : ~std::uint64_t{0};
-}
-
-std::string lower_extension(const fs::path& path) {
-  std::string e = path.extension().string();
-  std::transform(e.begin(), e.end(), e.begin(), [](unsigned char c) { return std::tolower(c); });
-  return e;
-}
 
 /// What is asked of files, without the stamps, which are no part of any key.
 std::string note_of(std::vector<FileRequest> requests) {
@@ -50,7 +34,7 @@ std::optional<std::vector<FileRequest>> requests_of(const std::string& note) {
 
 /// Before work begins, instead of after minutes of it.
 void refuse_too_large(const std::string& name, const Bytes& bytes, std::uint64_t limit_bytes) {
-  const std::uint64_t machine = machine_memory_bytes();
+  const std::uint64_t known = this_machine().memory_bytes, machine = known > 0 ? known : ~0ull;
   const std::uint64_t most = limit_bytes > 0 ? std::min(limit_bytes, machine) : machine;
   const std::uint64_t triangles = count_triangles(name, bytes), needed = least_memory_bytes(triangles);
   if (needed <= most) return;
@@ -62,6 +46,19 @@ void refuse_too_large(const std::string& name, const Bytes& bytes, std::uint64_t
                                   most == machine ? "the machine's" : "--model-memory"),
                       fmt::format("{} triangles, which take {} or more", triangles, gigabytes(needed)));
 }
+
+/// A file that the package was made from, as provenance.json has it.
+struct ProvenanceInput {
+  std::string role, uri;
+  Sha256 digest{};
+  std::uint64_t bytes = 0;
+  static void fields(auto& s, auto&& v) {
+    v("role", s.role, "");
+    v("uri", s.uri, kMayMiss, "");
+    v("sha256", s.digest, "");
+    v("bytes", s.bytes, "");
+  }
+};
 
 /// The model file with the files it refers to. Which those are is known only after an import, so the store
 /// remembers the list of the last one (as ccache's manifest does): while every file on it reads as it did,
@@ -88,7 +85,7 @@ class ModelSource {
   /// What the model is made of: its own bytes, and every file that it asked for, found or not.
   std::vector<std::pair<std::string, std::string>> parts() const {
     Key key("source", 1);
-    key.add("extension", lower_extension(path_));
+    key.add("extension", lower_ending(path_.native()));
     key.add_input("model", main_.digest, main_.bytes);
     for (const FileRequest& r : requests_)
       if (r.similar)
@@ -103,7 +100,7 @@ class ModelSource {
 
   /// Imports the model, unless open() has. InputError when a file is not what it was at open(). Refers to
   /// this object.
-  Source source() {
+  SourceModel source() {
     return {[this](const ImportOptions& options, const RunContext& context) {
       if (imported_) return std::move(*std::exchange(imported_, nullptr));
       std::vector<FileRequest> again;
@@ -115,16 +112,12 @@ class ModelSource {
     }};
   }
 
-  /// Input digests for provenance: the model's own references, never the paths of this machine.
-  Json inputs() const {
-    Json list = Json::array({{{"role", "model"}, {"sha256", to_hex(main_.digest)}, {"bytes", main_.bytes}}});
+  /// For provenance: the model's own references, never the paths of this machine.
+  std::vector<ProvenanceInput> inputs() const {
+    std::vector<ProvenanceInput> all{{"model", "", main_.digest, main_.bytes}};
     for (const FileRequest& r : requests_)
-      if (r.found && !r.similar)
-        list.push_back({{"role", "file"},
-                        {"uri", readable_name(r.uri)},
-                        {"sha256", to_hex(r.digest)},
-                        {"bytes", r.bytes}});
-    return list;
+      if (r.found && !r.similar) all.push_back({"file", readable_name(r.uri), r.digest, r.bytes});
+    return all;
   }
 
   /// The model, then what it asked for, in that order.
@@ -162,7 +155,7 @@ class ModelSource {
   }
   Sha256 list_key() const {
     Key key("import-files", kImportVersion);
-    key.add("extension", lower_extension(path_));
+    key.add("extension", lower_ending(path_.native()));
     key.add_input("model", main_.digest, main_.bytes);
     OptionTexts texts;
     append_field_texts("import", options_, texts);
@@ -234,7 +227,7 @@ std::string provenance(const ModelSource& source, const CompileOptions& options)
   return Json{{"version", 1},
               {"tool", "texmesh " + tool_version()},
               {"format", {{"major", kFormatMajor}, {"minor", kFormatMinor}}},
-              {"inputs", source.inputs()},
+              {"inputs", to_json(source.inputs())},
               {"options", profile_json(recorded)},
               {"stages", stages},
               {"libraries", libraries}}

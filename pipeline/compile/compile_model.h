@@ -1,10 +1,7 @@
 #pragma once
-#include <atomic>
-#include <string>
 
 #include "pipeline/compile/options.h"
 #include "pipeline/graph/graph_run.h"
-#include "pipeline/graph/store.h"
 #include "pipeline/io/file_stamp.h"
 
 namespace texmesh {

@@ -1,8 +1,6 @@
 #include "pipeline/compile/stage_table.h"
 
-#include "pipeline/compile/artefacts.h"
-#include "pipeline/compile/library_versions.h"
-#include "pipeline/compile/option_fields.h"
+#include "pipeline/io/program.h"
 #include "stages/fill/fill.h"
 #include "stages/previews/previews.h"
 
@@ -15,7 +13,7 @@ using Planes = std::vector<Pixels>;
 
 // Adapters, where a stage's function does not take its inputs and options as the graph gives them.
 
-Results<ImportedMesh, Materials, Images, About> import_source(const Source& source,
+Results<ImportedMesh, Materials, Images, About> import_source(const SourceModel& source,
                                                               const ImportOptions& options,
                                                               const RunContext& context) {
   ImportedModel m = source.import(options, context);

@@ -1,6 +1,6 @@
 // A run of the graph over one model, from below:
 // - the results of one stage in a store: found, looked for, loaded, put;
-// - ArtefactTable knows which artefacts are known, under which digests, and who still needs their objects;
+// - Artefacts knows which artefacts are known, under which digests, and who still needs their objects;
 // - StageExecutor brings single stages up to date by them, and explains what it does;
 // - StageScheduler runs the stages that are ready side by side;
 // - GraphRun joins these.
@@ -37,8 +37,7 @@ std::vector<KeyChange> changes_between(const Key& before, const Key& after) {
   return changes;
 }
 
-}  // namespace
-
+/// Compares a stage's key with the key of an earlier run, whose parts the store remembers.
 StageExplanation explain_key(const Stage& stage, const Key& key, StageExplanation::Verdict verdict,
                              const StageKeys& earlier, Store& store) {
   StageExplanation e;
@@ -56,8 +55,6 @@ StageExplanation explain_key(const Stage& stage, const Key& key, StageExplanatio
   e.changes = changes_between(*before, key);
   return e;
 }
-
-namespace {
 
 // A stage's results in a store: one blob per output, and the stage's notes as the last blob. Blobs with the
 // right key and digests that are no results of the stage all the same are rejected.
@@ -141,7 +138,7 @@ std::vector<StoredBlob> put_results(Store& store, const Stage& stage, const Key&
 
 /// The artefacts of one run of a graph: of each, the stage that makes the artefact, the digest or parts that
 /// stand for it in keys, and its object while a stage needs the object. Safe from several threads.
-class ArtefactTable {
+class Artefacts {
  public:
   static constexpr std::size_t kGiven = static_cast<std::size_t>(-1);
   /// Where an artefact comes from.
@@ -152,7 +149,7 @@ class ArtefactTable {
 
   /// `stages` must outlive the table. Throws std::logic_error where an artefact is made twice, or is made as
   /// one type and read as another.
-  explicit ArtefactTable(const std::vector<Stage>& stages) : stages_(stages) {
+  explicit Artefacts(const std::vector<Stage>& stages) : stages_(stages) {
     for (std::size_t i = 0; i < stages.size(); ++i)
       for (std::size_t k = 0; k < stages[i].outputs.size(); ++k) {
         Slot& slot = slot_of(stages[i].outputs[k]);
@@ -291,13 +288,13 @@ class ArtefactTable {
 /// Safe from several threads: a stage is never run by two of them at once, however many results it has.
 ///
 /// The order of locks, outermost first: the `running` of a stage, held while that stage is looked up, loaded
-/// or run; then one of those inside ArtefactTable, the store or this class. Whoever holds the `running` of a
+/// or run; then one of those inside Artefacts, the store or this class. Whoever holds the `running` of a
 /// stage takes only those of stages before it in the graph, whose results it reads. The graph has no circle,
 /// so no two threads wait for each other.
 class StageExecutor {
  public:
   /// All arguments must outlive the executor.
-  StageExecutor(const std::vector<Stage>& stages, ArtefactTable& artefacts, Store& store,
+  StageExecutor(const std::vector<Stage>& stages, Artefacts& artefacts, Store& store,
                 const RunContext& context, StageObserver observer)
       : stages_(stages),
         artefacts_(artefacts),
@@ -336,8 +333,8 @@ class StageExecutor {
 
   /// The object of an artefact that is known: at hand, from the store, or by running its stage (again).
   Object fetch(const std::string& artefact) {
-    const ArtefactTable::Origin origin = artefacts_.origin_of(artefact);
-    if (origin.stage == ArtefactTable::kGiven) {
+    const Artefacts::Origin origin = artefacts_.origin_of(artefact);
+    if (origin.stage == Artefacts::kGiven) {
       if (Object given = artefacts_.object(artefact)) return given;
       throw std::logic_error("artefact " + artefact + " was not given");
     }
@@ -448,7 +445,7 @@ class StageExecutor {
   }
 
   const std::vector<Stage>& stages_;
-  ArtefactTable& artefacts_;
+  Artefacts& artefacts_;
   Store& store_;
   const RunContext& context_;
   StageObserver observer_;
@@ -549,24 +546,18 @@ void return_free_memory() {
 }  // namespace
 
 struct GraphRun::Parts {
-  Parts(const std::vector<Stage>& all, Store& store_of_results, const RunContext& run_context,
-        StageObserver observer)
-      : stages(all),
-        store(store_of_results),
-        context(run_context),
-        artefacts(all),
-        executor(all, artefacts, store_of_results, run_context, std::move(observer)) {}
   const std::vector<Stage>& stages;
   Store& store;
   const RunContext& context;
-  ArtefactTable artefacts;
-  StageExecutor executor;
+  StageObserver observer;
+  Artefacts artefacts{stages};
+  StageExecutor executor{stages, artefacts, store, context, std::move(observer)};
   bool has_run = false;
 };
 
 GraphRun::GraphRun(const std::vector<Stage>& stages, Store& store, const RunContext& context,
                    StageObserver observer)
-    : parts_(std::make_unique<Parts>(stages, store, context, std::move(observer))) {}
+    : parts_(new Parts{stages, store, context, std::move(observer)}) {}
 GraphRun::~GraphRun() = default;
 
 void GraphRun::give_object(const ArtefactName& artefact, Object object, const Sha256& digest,
@@ -583,7 +574,7 @@ Notes GraphRun::notes() const { return parts_->executor.notes(); }
 
 /// False while an input is unknown.
 bool GraphRun::forecast_stage(const Stage& stage, StageExplanation& explanation) {
-  ArtefactTable& artefacts = parts_->artefacts;
+  Artefacts& artefacts = parts_->artefacts;
   if (!artefacts.first_unknown_input(stage).empty()) return false;
   const Key key = artefacts.key_of(stage);
   if (!stage.stored) {

@@ -1,23 +1,14 @@
 #pragma once
-#include <cstdint>
-#include <functional>
-#include <memory>
-#include <string>
-#include <utility>
-#include <vector>
 
-#include "pipeline/graph/key.h"
 #include "pipeline/graph/stage.h"
 #include "pipeline/graph/store.h"
-#include "pipeline/io/record.h"
 
 namespace texmesh {
 
 /// One labelled part of a key that has changed; "" where the key had, or has, no such part.
 struct KeyChange {
   std::string label, from, to;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("part", s.label, kNotEmpty, "");
     v("from", s.from, "empty = was not there");
     v("to", s.to, "empty = is not there");
@@ -41,8 +32,7 @@ struct StageExplanation {
   bool has_history = false;        // a key of an earlier run of this stage for this model is known
   std::vector<KeyChange> changes;  // against that key, in the order of its parts; empty where nothing changed
   std::string waits_for;           // kUnknown: the artefact
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("verdict", s.verdict,
       "hit = from the cache; unknown = in a dry run, depends on what an earlier stage gives");
     v("history", s.has_history, "an earlier run of this stage for this model is known");
@@ -52,10 +42,6 @@ struct StageExplanation {
   }
 };
 using StageExplainer = std::function<void(const Stage& stage, const StageExplanation& explanation)>;
-
-/// Compares a stage's key with the key of an earlier run, whose parts the store remembers.
-StageExplanation explain_key(const Stage& stage, const Key& key, StageExplanation::Verdict verdict,
-                             const StageKeys& earlier, Store& store);
 
 /// Runs a graph of stages for one model over a store, once. Stages whose inputs are known run side by side,
 /// at most context.threads at a time. A stage whose key is in the store is not run, and its result is loaded

@@ -1,7 +1,7 @@
 #include <nlohmann/json.hpp>
 
 #include "format/base/bounded_json.h"
-#include "format/base/clean_text.h"
+#include "format/base/text_bytes.h"
 #include "pipeline/import/foreign_file.h"
 #include "pipeline/import/gltf/import_gltf_parts.h"
 #include "pipeline/import/text_scan.h"
@@ -139,8 +139,8 @@ std::uint64_t triangles_of_primitive(const Json& primitive, const Json& accessor
 std::uint64_t triangles_of_glb(std::span<const std::uint8_t> bytes) {
   if (bytes.size() < 20 || word(bytes, 12) > bytes.size() - 20) return 0;
   const auto* text = reinterpret_cast<const char*>(bytes.data()) + 20;
-  const JsonShape shape = scan_json_shape(bytes.subspan(20, word(bytes, 12)), gltf::kMaxJsonDepth);
-  if (shape.too_deep || shape.values > gltf::kMaxJsonValues) return 0;
+  const JsonShape shape = scan_json_shape(bytes.subspan(20, word(bytes, 12)), kMaxGltfJsonDepth);
+  if (shape.too_deep || shape.values > kMaxGltfJsonValues) return 0;
   const Json root = Json::parse(text, text + word(bytes, 12), nullptr, false);
   if (!root.is_object() || !root.contains("meshes") || !root.contains("accessors") ||
       !root["meshes"].is_array() || !root["accessors"].is_array())

@@ -1,8 +1,8 @@
 #include "pipeline/import/material_images.h"
 
-#include "format/base/srgb.h"
+#include "format/base/portable_math.h"
+#include "stages/base/float_math.h"
 #include "stages/image/png_writer.h"
-#include "stages/measure/sampled_curve.h"
 
 namespace texmesh {
 namespace {

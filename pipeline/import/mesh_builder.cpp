@@ -1,7 +1,7 @@
 #include "pipeline/import/mesh_builder.h"
 
-#include "format/base/box.h"
-#include "format/base/srgb.h"
+#include "format/base/portable_math.h"
+#include "format/base/vec.h"
 
 namespace texmesh {
 namespace {

@@ -5,7 +5,7 @@
 #include <cstring>
 #include <limits>
 
-#include "pipeline/io/wire_text.h"
+#include "pipeline/io/uri.h"
 
 namespace texmesh {
 namespace {

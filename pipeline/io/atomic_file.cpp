@@ -4,12 +4,10 @@
 
 #include <atomic>
 #include <cstdio>
-#include <cstring>
 #include <filesystem>
 
-#include "pipeline/io/descriptor.h"
 #include "pipeline/io/file_stamp.h"
-#include "pipeline/io/machine/owner_mark.h"
+#include "pipeline/io/machine.h"
 #include "pipeline/io/resolver.h"
 
 namespace texmesh {
@@ -19,15 +17,6 @@ constexpr std::string_view kTemporaryMark = ".tmp-";
 
 [[noreturn]] void fail(const std::string& path, const char* step) {
   throw ResourceError(path, "", "a writable file", std::string(step) + ": " + std::strerror(errno));
-}
-
-void sync_folder(const std::string& path) {
-  const std::string folder = std::filesystem::path(path).parent_path().string();
-  Descriptor d{::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)};
-  if (d.get() < 0 || ::fsync(d.get()) != 0) {
-    // Some file systems cannot sync folders; the rename itself stands.
-    if (errno != EINVAL && errno != ENOTSUP) fail(path, "fsync of the folder");
-  }
 }
 
 std::string own_temporary(const std::string& path) {
@@ -84,8 +73,7 @@ std::string temporary_name(const std::string& path, std::size_t number) {
   return path + std::string(kTemporaryMark) + owner_mark() + "-" + std::to_string(number);
 }
 
-void write_file_atomically(const std::string& path, std::span<const std::uint8_t> bytes,
-                           const std::string& temporary) {
+void write_file_atomically(const std::string& path, ByteSpan bytes, const std::string& temporary) {
   std::string temp = temporary.empty() ? own_temporary(path) : temporary;
   Descriptor d{open_temporary(temp)};
   for (int i = 0; d.get() < 0 && errno == EEXIST && i < 100; ++i) {
@@ -101,7 +89,7 @@ void write_file_atomically(const std::string& path, std::span<const std::uint8_t
     ::unlink(temp.c_str());
     throw;
   }
-  sync_folder(path);
+  if (!sync_folder(folder_of_file(path))) fail(path, "fsync of the folder");
 }
 
 bool is_special_file(const std::string& path) {
@@ -120,13 +108,11 @@ void check_output_file(const std::string& path) {
   if (is_special_file(path) || std::filesystem::is_symlink(file, error)) return;
   if (std::filesystem::is_directory(file, error))
     throw InputError(path, "", "a file that can be written", "a folder");
-  const std::string folder = file.parent_path().string();
-  if (::access(folder.empty() ? "." : folder.c_str(), W_OK) != 0)
+  if (::access(folder_of_file(path).c_str(), W_OK) != 0)
     throw InputError(path, "", "a file that can be written", std::strerror(errno));
 }
 
-void write_output_file(const std::string& path, std::span<const std::uint8_t> bytes,
-                       const std::string& temporary) {
+void write_output_file(const std::string& path, ByteSpan bytes, const std::string& temporary) {
   if (is_special_file(path)) {
     const Descriptor d{::open(path.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC)};
     if (d.get() < 0) fail(path, "open");
@@ -157,13 +143,13 @@ std::size_t remove_stale_temporaries(const std::string& folder, const std::strin
   return static_cast<std::size_t>(std::count_if(found.begin(), found.end(), remove_stale_temporary));
 }
 
-bool file_holds(const std::string& path, std::span<const std::uint8_t> bytes) {
+bool file_holds(const std::string& path, ByteSpan bytes) {
   Descriptor d{::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)};
   struct stat st {};
   if (d.get() < 0 || ::fstat(d.get(), &st) != 0 || !S_ISREG(st.st_mode) ||
       static_cast<std::uint64_t>(st.st_size) != bytes.size())
     return false;
-  std::vector<std::uint8_t> buffer(1 << 20);
+  Bytes buffer(1 << 20);
   while (!bytes.empty()) {
     const ssize_t n = ::read(d.get(), buffer.data(), std::min(buffer.size(), bytes.size()));
     if (n <= 0 || std::memcmp(buffer.data(), bytes.data(), static_cast<std::size_t>(n)) != 0) return false;

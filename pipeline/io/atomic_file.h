@@ -1,8 +1,7 @@
 #pragma once
 #include <cstddef>
-#include <cstdint>
-#include <span>
-#include <string>
+
+#include "format/base/bytes.h"
 
 namespace texmesh {
 
@@ -11,8 +10,7 @@ namespace texmesh {
 /// temporary is removed and ResourceError{path, "", "a writable file", reason} is thrown. `temporary` may
 /// name the sibling (a parent process that wants to remove it if this one is killed; should somebody else be
 /// writing a file of that name, another one is taken); "" makes a name of its own.
-void write_file_atomically(const std::string& path, std::span<const std::uint8_t> bytes,
-                           const std::string& temporary = "");
+void write_file_atomically(const std::string& path, ByteSpan bytes, const std::string& temporary = "");
 
 /// A device, a pipe, a socket, a link to one, or a name beneath /dev or /proc: it is written into, never
 /// replaced by a file.
@@ -20,8 +18,7 @@ bool is_special_file(const std::string& path);
 
 /// Writes a file that a user has named: where a special file stands, into it; where a symbolic link stands,
 /// what it leads to (atomically, and the link stays); else as write_file_atomically.
-void write_output_file(const std::string& path, std::span<const std::uint8_t> bytes,
-                       const std::string& temporary = "");
+void write_output_file(const std::string& path, ByteSpan bytes, const std::string& temporary = "");
 
 /// Throws InputError when write_output_file() could not write there: for commands that work long before they
 /// do.
@@ -40,6 +37,6 @@ bool remove_stale_temporary(const std::string& path);
 std::size_t remove_stale_temporaries(const std::string& folder, const std::string& ending);
 
 /// True when `path` is a regular file that holds exactly these bytes.
-bool file_holds(const std::string& path, std::span<const std::uint8_t> bytes);
+bool file_holds(const std::string& path, ByteSpan bytes);
 
 }  // namespace texmesh

@@ -4,11 +4,7 @@
 #include <linux/openat2.h>
 #include <sys/syscall.h>
 
-#include <system_error>
-
-#include "pipeline/io/descriptor.h"
 #include "pipeline/io/names/similar_names.h"
-#include "pipeline/io/resolver.h"
 #include "pipeline/io/uri.h"
 
 namespace texmesh {
@@ -104,8 +100,8 @@ FileStamp checked_stamp(int fd, const std::string& name, const std::string& expe
   return stamp_of(s);
 }
 
-std::vector<std::uint8_t> read_all(int fd, std::uint64_t max_bytes, const std::string& name,
-                                   const std::string& expected, FileStamp& stamp) {
+Bytes read_all(int fd, std::uint64_t max_bytes, const std::string& name, const std::string& expected,
+               FileStamp& stamp) {
   stamp = checked_stamp(fd, name, expected);
   const auto too_long = [&](std::uint64_t size) {
     return InputError(name, "", "a file of at most " + std::to_string(max_bytes) + " bytes",
@@ -115,7 +111,7 @@ std::vector<std::uint8_t> read_all(int fd, std::uint64_t max_bytes, const std::s
   if (declared > max_bytes) throw too_long(declared);
   // The file may grow or shrink meanwhile, and files of /proc declare 0 bytes: read until its end, not until
   // st_size.
-  std::vector<std::uint8_t> bytes(declared + 1);
+  Bytes bytes(declared + 1);
   for (std::size_t size = 0;;) {
     if (size > max_bytes) throw too_long(size);
     if (size == bytes.size()) bytes.resize(size + (std::size_t{1} << 16));
@@ -142,7 +138,7 @@ FileResolver::FileResolver(const std::filesystem::path& folder, std::vector<std:
 
 FileResolver::~FileResolver() { ::close(folder_); }
 
-std::size_t FileResolver::record(const std::string& uri) {
+std::size_t FileResolver::number_of(const std::string& uri) {
   const auto [it, is_new] = index_of_.try_emplace(uri, requests_.size());
   if (is_new) requests_.push_back({uri, false, {}, 0, {}, false});
   return it->second;
@@ -179,7 +175,7 @@ int FileResolver::open_link(const std::string& uri) {
                     "links that stay within DIR)");
 }
 
-/// Opens a uri that was recorded; -1 when there is no such file.
+/// Opens a uri that has a number; -1 when there is no such file.
 int FileResolver::open_regular(const std::string& uri) {
   try {
     check_relative_name(uri, "", "");
@@ -203,13 +199,13 @@ int FileResolver::open_regular(const std::string& uri) {
   }
 }
 
-std::optional<std::vector<std::uint8_t>> FileResolver::read(const std::string& uri, std::uint64_t max_bytes) {
-  const std::size_t index = record(uri);
+std::optional<Bytes> FileResolver::read(const std::string& uri, std::uint64_t max_bytes) {
+  const std::size_t index = number_of(uri);
   try {
     const Descriptor fd(open_regular(uri));
     if (fd.get() < 0) return std::nullopt;
     FileStamp stamp;
-    std::vector<std::uint8_t> bytes = read_all(fd.get(), max_bytes, uri, kRegularFile, stamp);
+    Bytes bytes = read_all(fd.get(), max_bytes, uri, kRegularFile, stamp);
     requests_[index] = {uri, true, sha256(bytes), bytes.size(), stamp, false};
     return bytes;
   } catch (const ResourceError&) {
@@ -242,7 +238,7 @@ void FileResolver::expect(std::vector<FileRequest> known) {
 bool FileResolver::look(const std::string& uri, std::uint64_t max_bytes) {
   const auto known = expected_.find(uri);
   if (known != expected_.end()) {
-    const std::size_t index = record(uri);
+    const std::size_t index = number_of(uri);
     const Descriptor fd(open_regular(uri));
     if (fd.get() < 0) return false;
     if (checked_stamp(fd.get(), uri, kRegularFile) == known->second.stamp) {
@@ -253,8 +249,7 @@ bool FileResolver::look(const std::string& uri, std::uint64_t max_bytes) {
   return read(uri, max_bytes).has_value();
 }
 
-std::vector<std::uint8_t> read_input_file(const std::filesystem::path& path, std::uint64_t max_bytes,
-                                          FileStamp* stamp) {
+Bytes read_input_file(const std::filesystem::path& path, std::uint64_t max_bytes, FileStamp* stamp) {
   const std::string name = path.string();
   const Descriptor fd(retry_on_signal([&] { return ::open(name.c_str(), kReadFlags); }));
   if (fd.get() < 0 && errno == ENOENT) {

@@ -1,11 +1,6 @@
 #pragma once
-#include <cstdint>
 #include <filesystem>
-#include <map>
-#include <optional>
 #include <set>
-#include <string>
-#include <vector>
 
 #include "pipeline/io/file_stamp.h"
 #include "pipeline/io/resolver.h"
@@ -28,7 +23,7 @@ class FileResolver : public Resolver {
   FileResolver(const FileResolver&) = delete;
   FileResolver& operator=(const FileResolver&) = delete;
 
-  std::optional<std::vector<std::uint8_t>> read(const std::string& uri, std::uint64_t max_bytes) override;
+  std::optional<Bytes> read(const std::string& uri, std::uint64_t max_bytes) override;
   std::vector<std::string> similar(const std::string& uri) override;
 
   /// What was known of files before: a file that has exactly such a stamp is not read to learn its digest.
@@ -49,7 +44,7 @@ class FileResolver : public Resolver {
   int open_beneath(int folder, const std::string& name);
   int open_link(const std::string& uri);
   int open_regular(const std::string& uri);
-  std::size_t record(const std::string& uri);
+  std::size_t number_of(const std::string& uri);
 
   int folder_ = -1;
   std::vector<std::string> roots_;  // the folder, then those of links
@@ -63,8 +58,7 @@ class FileResolver : public Resolver {
 /// The model file itself, as the user names it (symbolic links are followed). Throws InputError when it is
 /// missing, not a regular file, unreadable or longer than max_bytes; ResourceError where the machine is to
 /// blame.
-std::vector<std::uint8_t> read_input_file(const std::filesystem::path& path, std::uint64_t max_bytes,
-                                          FileStamp* stamp = nullptr);
+Bytes read_input_file(const std::filesystem::path& path, std::uint64_t max_bytes, FileStamp* stamp = nullptr);
 
 /// For models that have everything inside.
 class NoFiles : public Resolver {

@@ -1,8 +1,10 @@
 #include "pipeline/io/file_stamp.h"
 
+#include <fcntl.h>
 #include <sys/sysmacros.h>
 
 #include <ctime>
+#include <filesystem>
 
 namespace texmesh {
 namespace {
@@ -10,6 +12,16 @@ namespace {
 std::int64_t nanoseconds(const timespec& t) { return std::int64_t{t.tv_sec} * 1'000'000'000 + t.tv_nsec; }
 
 }  // namespace
+
+std::string folder_of_file(const std::string& path) {
+  const std::string folder = std::filesystem::path(path).parent_path().string();
+  return folder.empty() ? "." : folder;
+}
+
+bool sync_folder(const std::string& folder) {
+  const Descriptor d{::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)};
+  return d.get() >= 0 && (::fsync(d.get()) == 0 || errno == EINVAL || errno == ENOTSUP);
+}
 
 FileStamp stamp_of(const struct stat& s) {
   // Numbers of major 0 belong to the mount: NFS gives the same file another one on every node and after every

@@ -1,14 +1,30 @@
 #pragma once
 #include <sys/stat.h>
 
-#include <cstdint>
-#include <optional>
-#include <string>
+#include <algorithm>
 
-#include "format/base/sha256.h"
+#include "format/base/descriptor.h"
 #include "pipeline/io/record.h"
 
 namespace texmesh {
+
+/// Writes all of it, in pieces that every system takes at once; false, with errno, where that fails.
+inline bool write_all(int fd, ByteSpan bytes) {
+  constexpr std::size_t kPieceBytes = 1 << 24;
+  while (!bytes.empty()) {
+    const ssize_t n = ::write(fd, bytes.data(), std::min(bytes.size(), kPieceBytes));
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) return false;
+    bytes = bytes.subspan(static_cast<std::size_t>(n));
+  }
+  return true;
+}
+
+/// The folder that a file stands in; "." for a name alone.
+std::string folder_of_file(const std::string& path);
+/// False, with errno, where what a folder lists is not on the disk yet. Some file systems cannot sync
+/// folders; what was renamed in them stands all the same.
+bool sync_folder(const std::string& folder);
 
 /// What tells, without reading a file, that it has not changed: device, inode, size, and the times of the
 /// last change of content and of inode, in nanoseconds since 1970. Device is 0 where its number is that of a
@@ -17,12 +33,8 @@ struct FileStamp {
   std::uint64_t device = 0, inode = 0, bytes = 0;
   std::int64_t modified_ns = 0, changed_ns = 0;
   friend bool operator==(const FileStamp&, const FileStamp&) = default;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.device, s.inode, s.bytes, s.modified_ns, s.changed_ns);
-  }
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void archive(auto& s, auto& a) { a(s.device, s.inode, s.bytes, s.modified_ns, s.changed_ns); }
+  static void fields(auto& s, auto&& v) {
     v("device", s.device, "");
     v("inode", s.inode, "");
     v("bytes", s.bytes, "");
@@ -51,12 +63,8 @@ struct FileRequest {
   FileStamp stamp;  // when it was read; no part of any key
   bool similar = false;
   friend bool operator==(const FileRequest&, const FileRequest&) = default;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.uri, s.found, s.digest, s.bytes, s.stamp, s.similar);
-  }
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void archive(auto& s, auto& a) { a(s.uri, s.found, s.digest, s.bytes, s.stamp, s.similar); }
+  static void fields(auto& s, auto&& v) {
     v("uri", s.uri, kNamesFile, "");
     v("found", s.found, "");
     v("sha256", s.digest, "");

@@ -1,6 +1,6 @@
 #include "pipeline/io/markup.h"
 
-#include "pipeline/io/wire_text.h"
+#include "pipeline/io/uri.h"
 
 namespace texmesh {
 namespace {

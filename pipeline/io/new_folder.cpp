@@ -1,15 +1,11 @@
 #include "pipeline/io/new_folder.h"
 
 #include <fcntl.h>
-#include <sys/stat.h>
 
 #include <cstdio>
-#include <cstring>
 #include <fstream>
-#include <vector>
 
-#include "format/base/errors.h"
-#include "pipeline/io/descriptor.h"
+#include "pipeline/io/file_stamp.h"
 
 namespace texmesh {
 namespace fs = std::filesystem;
@@ -20,21 +16,13 @@ namespace {
 }
 
 void sync_new_folder(const fs::path& folder) {
-  const Descriptor d{::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)};
-  if (d.get() < 0) fail_output(folder, "a folder");
-  if (::fsync(d.get()) != 0) fail_output(folder, "a folder that can be synced");
+  if (!sync_folder(folder.string())) fail_output(folder, "a folder that can be synced");
 }
 
-void write_new_file(const fs::path& path, std::span<const std::uint8_t> bytes) {
+void write_new_file(const fs::path& path, ByteSpan bytes) {
   const Descriptor d{::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644)};
   if (d.get() < 0) fail_output(path, "a new file");
-  while (!bytes.empty()) {
-    const ssize_t n = ::write(d.get(), bytes.data(), bytes.size());
-    if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) fail_output(path, "a writable file");
-    bytes = bytes.subspan(static_cast<std::size_t>(n));
-  }
-  if (::fdatasync(d.get()) != 0) fail_output(path, "a writable file");
+  if (!write_all(d.get(), bytes) || ::fdatasync(d.get()) != 0) fail_output(path, "a writable file");
 }
 
 }  // namespace
@@ -65,7 +53,7 @@ NewFolder::~NewFolder() {
   if (!tree_.empty()) fs::remove_all(tree_, ec);
 }
 
-void NewFolder::add(const std::string& path, std::span<const std::uint8_t> bytes) {
+void NewFolder::add(const std::string& path, ByteSpan bytes) {
   const fs::path file = tree_ / path, folder = file.parent_path();
   if (folders_.insert(folder).second) fs::create_directories(folder);
   write_new_file(file, bytes);

@@ -1,11 +1,9 @@
 #pragma once
-#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <set>
-#include <span>
-#include <string>
-#include <string_view>
+
+#include "format/base/bytes.h"
 
 namespace texmesh {
 
@@ -33,7 +31,7 @@ class NewFolder {
   NewFolder& operator=(const NewFolder&) = delete;
 
   /// A file of the folder; `path` is relative, the caller vouches that it leads nowhere else. No path twice.
-  void add(const std::string& path, std::span<const std::uint8_t> bytes);
+  void add(const std::string& path, ByteSpan bytes);
   /// A file that stands on this machine, or all files beneath a folder but hidden ones; symbolic links are
   /// left out. `path` as of add(). InputError where one cannot be read.
   void copy(const std::string& path, const std::filesystem::path& source);

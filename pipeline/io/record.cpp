@@ -2,12 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "format/base/errors.h"
-#include "pipeline/io/wire_text.h"
+#include "format/base/bounded_json.h"
+#include "pipeline/io/uri.h"
 
 namespace texmesh {
 namespace {
@@ -55,25 +53,23 @@ void RecordPlace::fail(const std::string& expected, const Json& found) const {
                    found.dump(-1, ' ', false, Json::error_handler_t::replace).substr(0, kMostShownBytes));
 }
 
-namespace record_detail {
-
-Json& member(Json& object, std::string_view name) { return object[std::string(name)]; }
-Json& append(Json& list) { return list.emplace_back(); }
-void make_list(Json& to) { to = Json::array(); }
-void make_object(Json& to) {
+Json& member_of(Json& object, std::string_view name) { return object[std::string(name)]; }
+Json& appended(Json& list) { return list.emplace_back(); }
+void make_json_list(Json& to) { to = Json::array(); }
+void make_json_object(Json& to) {
   if (!to.is_object()) to = Json::object();
 }
-void put(Json& to, bool value) { to = value; }
-void put(Json& to, std::int64_t value) { to = value; }
-void put(Json& to, std::uint64_t value) { to = value; }
-void put(Json& to, double value) { to = value; }
-void put(Json& to, std::string_view value, const FieldRule& rule) {
+void put_json(Json& to, bool value) { to = value; }
+void put_json(Json& to, std::int64_t value) { to = value; }
+void put_json(Json& to, std::uint64_t value) { to = value; }
+void put_json(Json& to, double value) { to = value; }
+void put_json(Json& to, std::string_view value, const FieldRule& rule) {
   to = rule.names_file ? to_wire(value) : std::string(value);
 }
-void put(Json& to, const Json& value) { to = value; }
-void put(Json& to, const Constant& value) { to = value.text ? Json(value.text) : Json(value.number); }
+void put_json(Json& to, const Json& value) { to = value; }
+void put_json(Json& to, const Constant& value) { to = value.text ? Json(value.text) : Json(value.number); }
 
-const Json* find(const Json& object, const char* name, bool may_miss, const RecordPlace& at) {
+const Json* find_member(const Json& object, const char* name, bool may_miss, const RecordPlace& at) {
   if (!object.is_object()) at.fail("an object", object);
   const auto found = object.find(name);
   if (found != object.end()) return &*found;
@@ -81,7 +77,7 @@ const Json* find(const Json& object, const char* name, bool may_miss, const Reco
   return nullptr;
 }
 
-void get(const Json& from, bool& value, const RecordPlace& at) {
+void get_json(const Json& from, bool& value, const RecordPlace& at) {
   if (!from.is_boolean()) at.fail("true or false", from);
   value = from.get<bool>();
 }
@@ -103,14 +99,14 @@ std::uint64_t get_unsigned(const Json& from, double most, const FieldRule& rule,
   return from.get<std::uint64_t>();
 }
 
-void get(const Json& from, double& value, const FieldRule& rule, const RecordPlace& at) {
+void get_json(const Json& from, double& value, const FieldRule& rule, const RecordPlace& at) {
   if (!from.is_number()) at.fail("a number", from);
   value = from.get<double>();
   if (rule.range && !(value >= rule.range->lo && value <= rule.range->hi))
     at.fail(range_text("a number", *rule.range), from);
 }
 
-void get(const Json& from, std::string& value, const FieldRule& rule, const RecordPlace& at) {
+void get_json(const Json& from, std::string& value, const FieldRule& rule, const RecordPlace& at) {
   const std::string* const text = from.get_ptr<const std::string*>();
   const Range bytes = rule.range.value_or(Range{0, std::numeric_limits<double>::infinity()});
   if (!text || static_cast<double>(text->size()) > bytes.hi)
@@ -124,11 +120,11 @@ void get(const Json& from, std::string& value, const FieldRule& rule, const Reco
   if (std::find(words.begin(), words.end(), value) == words.end()) at.fail(one_of(words), from);
 }
 
-void get(const Json& from, Sha256& value, const RecordPlace& at) {
+void get_json(const Json& from, Sha256& value, const RecordPlace& at) {
   if (!from.is_string() || !from_hex(from.get<std::string>(), value)) at.fail("64 hexadecimal digits", from);
 }
 
-void get(const Json& from, Json& value) { value = from; }
+void get_json(const Json& from, Json& value) { value = from; }
 
 std::size_t get_enum(const Json& from, std::span<const std::string_view> names, const RecordPlace& at) {
   const std::string* const text = from.get_ptr<const std::string*>();
@@ -139,7 +135,7 @@ std::size_t get_enum(const Json& from, std::span<const std::string_view> names, 
 
 void check_constant(const Json& from, const Constant& value, const RecordPlace& at) {
   Json expected;
-  put(expected, value);
+  put_json(expected, value);
   if (from != expected) at.fail(value.text ? value.text : expected.dump(), from);
 }
 
@@ -157,7 +153,7 @@ std::size_t size_of_list(const Json& from, const FieldRule& rule, const RecordPl
   return from.size();
 }
 
-const Json& element(const Json& list, std::size_t index) { return list[index]; }
+const Json& element_of(const Json& list, std::size_t index) { return list[index]; }
 
 void for_members(const Json& object, const RecordPlace& at,
                  const std::function<void(const std::string& name, const Json& value)>& use) {
@@ -200,7 +196,7 @@ void schema_of_enum(Json& to, std::span<const std::string_view> names) {
   to["enum"] = std::vector<std::string>(names.begin(), names.end());
 }
 
-void schema_of_constant(Json& to, const Constant& value) { put(to["const"], value); }
+void schema_of_constant(Json& to, const Constant& value) { put_json(to["const"], value); }
 
 Json& schema_of_list(Json& to, const FieldRule& rule) {
   to["type"] = "array";
@@ -237,7 +233,16 @@ void describe_schema(Json& member, const char* text) {
   if (*text != '\0') member["description"] = text;
 }
 
-}  // namespace record_detail
+Json parse_document(ByteSpan json, std::size_t most_bytes, int most_depth, const std::string& file) {
+  if (json.size() > most_bytes)
+    throw InputError(file, "", fmt::format("at most {} bytes of JSON", most_bytes),
+                     std::to_string(json.size()));
+  try {
+    return parse_bounded_json(json, file, most_depth);
+  } catch (const FormatError& e) {
+    throw InputError(file, e.place(), e.expected(), e.found());
+  }
+}
 
 std::string json_line(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
 

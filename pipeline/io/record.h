@@ -1,19 +1,12 @@
 #pragma once
-#include <array>
 #include <concepts>
-#include <cstdint>
 #include <functional>
 #include <limits>
-#include <map>
-#include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
-#include <span>
-#include <string>
-#include <string_view>
 #include <type_traits>
-#include <vector>
 
+#include "format/base/bytes.h"
 #include "format/base/fields.h"
 #include "format/base/note.h"
 #include "format/base/sha256.h"
@@ -29,8 +22,7 @@ using Json = nlohmann::ordered_json;
 //     std::string file, place;
 //     std::uint64_t bytes = 0;
 //     std::optional<Shard> shard;
-//     template <class S, class V>
-//     static void fields(S& s, V&& v) {
+//     static void fields(auto& s, auto&& v) {
 //       v("version", Constant{1}, "");
 //       v("file", s.file, "as the run names the file");
 //       v("place", s.place, kMayMiss, "JSON pointer");
@@ -75,10 +67,7 @@ inline constexpr FieldRule kSeconds{.range = Range{0, 1e9}};
 /// Specialise with `fields` for a type that cannot have it.
 template <class T>
 struct RecordFields {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
-    T::fields(s, v);
-  }
+  static void fields(auto& s, auto&& v) { T::fields(s, v); }
 };
 
 template <>
@@ -87,8 +76,7 @@ struct EnumNames<Severity> {
 };
 template <>
 struct RecordFields<Note> {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("severity", s.severity, "");
     v("code", s.code, FieldRule{.pattern = "^[a-z0-9-]+$"}, "");
     v("place", s.place, "");
@@ -107,8 +95,6 @@ struct RecordPlace {
   /// Throws InputError.
   [[noreturn]] void fail(const std::string& expected, const Json& found) const;
 };
-
-namespace record_detail {
 
 template <class T>
 struct IsList : std::false_type {};
@@ -146,33 +132,33 @@ bool is_missing(const T& value) {
     return false;
 }
 
-Json& member(Json& object, std::string_view name);  // makes it
-Json& append(Json& list);
-void make_list(Json& to);
-void make_object(Json& to);
-void put(Json& to, bool value);
-void put(Json& to, std::int64_t value);
-void put(Json& to, std::uint64_t value);
-void put(Json& to, double value);
-void put(Json& to, std::string_view value, const FieldRule& rule);
-void put(Json& to, const Json& value);
-void put(Json& to, const Constant& value);
+Json& member_of(Json& object, std::string_view name);  // makes it
+Json& appended(Json& list);
+void make_json_list(Json& to);
+void make_json_object(Json& to);
+void put_json(Json& to, bool value);
+void put_json(Json& to, std::int64_t value);
+void put_json(Json& to, std::uint64_t value);
+void put_json(Json& to, double value);
+void put_json(Json& to, std::string_view value, const FieldRule& rule);
+void put_json(Json& to, const Json& value);
+void put_json(Json& to, const Constant& value);
 
 /// The member, or null where it is missing and may be; fails where `object` is none.
-const Json* find(const Json& object, const char* name, bool may_miss, const RecordPlace& at);
-void get(const Json& from, bool& value, const RecordPlace& at);
+const Json* find_member(const Json& object, const char* name, bool may_miss, const RecordPlace& at);
+void get_json(const Json& from, bool& value, const RecordPlace& at);
 std::int64_t get_signed(const Json& from, double least, double most, const FieldRule& rule,
                         const RecordPlace& at);
 std::uint64_t get_unsigned(const Json& from, double most, const FieldRule& rule, const RecordPlace& at);
-void get(const Json& from, double& value, const FieldRule& rule, const RecordPlace& at);
-void get(const Json& from, std::string& value, const FieldRule& rule, const RecordPlace& at);
-void get(const Json& from, Sha256& value, const RecordPlace& at);
-void get(const Json& from, Json& value);
+void get_json(const Json& from, double& value, const FieldRule& rule, const RecordPlace& at);
+void get_json(const Json& from, std::string& value, const FieldRule& rule, const RecordPlace& at);
+void get_json(const Json& from, Sha256& value, const RecordPlace& at);
+void get_json(const Json& from, Json& value);
 std::size_t get_enum(const Json& from, std::span<const std::string_view> names, const RecordPlace& at);
 void check_constant(const Json& from, const Constant& value, const RecordPlace& at);
 void check_names(const Json& object, const std::vector<const char*>& known, const RecordPlace& at);
 std::size_t size_of_list(const Json& from, const FieldRule& rule, const RecordPlace& at);
-const Json& element(const Json& list, std::size_t index);
+const Json& element_of(const Json& list, std::size_t index);
 void for_members(const Json& object, const RecordPlace& at,
                  const std::function<void(const std::string& name, const Json& value)>& use);
 
@@ -212,8 +198,6 @@ class FieldVisitor {
   Visit visit_;
 };
 
-}  // namespace record_detail
-
 /// Puts a value into `to`. Nobody who calls needs json.hpp.
 template <class T>
 void put_value(Json& to, const T& value, const FieldRule& rule = {});
@@ -221,34 +205,32 @@ void put_value(Json& to, const T& value, const FieldRule& rule = {});
 /// Puts the members of a record into `to`, but for the list called `left_out`.
 template <class T>
 void put_members(Json& to, const T& record, std::string_view left_out = "") {
-  using namespace record_detail;
-  make_object(to);
+  make_json_object(to);
   RecordFields<T>::fields(
       record, FieldVisitor([&](const char* name, const auto& x, const FieldRule& rule, const char*) {
         using X = std::remove_cvref_t<decltype(x)>;
         if (name == left_out) return;
         if constexpr (!std::is_same_v<X, Constant>)
           if ((rule.may_miss || IsOptional<X>::value) && is_missing(x)) return;
-        put_value(member(to, name), x, rule);
+        put_value(member_of(to, name), x, rule);
       }));
 }
 
 template <class T>
 void put_value(Json& to, const T& value, const FieldRule& rule) {
-  using namespace record_detail;
   if constexpr (std::is_same_v<T, bool> || std::is_same_v<T, double> || std::is_same_v<T, Json> ||
                 std::is_same_v<T, Constant>) {
-    put(to, value);
+    put_json(to, value);
   } else if constexpr (std::is_enum_v<T>) {
-    put(to, enum_name(value), rule);
+    put_json(to, enum_name(value), rule);
   } else if constexpr (std::signed_integral<T>) {
-    put(to, static_cast<std::int64_t>(value));
+    put_json(to, static_cast<std::int64_t>(value));
   } else if constexpr (std::unsigned_integral<T>) {
-    put(to, static_cast<std::uint64_t>(value));
+    put_json(to, static_cast<std::uint64_t>(value));
   } else if constexpr (std::is_convertible_v<const T&, std::string_view>) {
-    put(to, std::string_view(value), rule);
+    put_json(to, std::string_view(value), rule);
   } else if constexpr (std::is_same_v<T, Sha256>) {
-    put(to, std::string_view(to_hex(value)), rule);
+    put_json(to, std::string_view(to_hex(value)), rule);
   } else if constexpr (IsOptional<T>::value) {
     if (value) put_value(to, *value, rule);
   } else if constexpr (IsOrNull<T>::value) {
@@ -256,11 +238,11 @@ void put_value(Json& to, const T& value, const FieldRule& rule) {
   } else if constexpr (IsShared<T>::value) {
     put_value(to, *value, rule);
   } else if constexpr (IsList<T>::value) {
-    make_list(to);
-    for (const auto& x : value) put_value(append(to), x, rule);
+    make_json_list(to);
+    for (const auto& x : value) put_value(appended(to), x, rule);
   } else if constexpr (IsMap<T>::value) {
-    make_object(to);
-    for (const auto& [name, x] : value) put_value(member(to, name), x, rule);
+    make_json_object(to);
+    for (const auto& [name, x] : value) put_value(member_of(to, name), x, rule);
   } else {
     put_members(to, value);
   }
@@ -269,13 +251,12 @@ void put_value(Json& to, const T& value, const FieldRule& rule) {
 /// Reads a value. InputError {file, JSON pointer, expected, found} for what the description does not allow.
 template <class T>
 void get_value(const Json& from, T& value, const FieldRule& rule, const RecordPlace& at) {
-  using namespace record_detail;
   if constexpr (std::is_same_v<T, bool> || std::is_same_v<T, Sha256>) {
-    get(from, value, at);
+    get_json(from, value, at);
   } else if constexpr (std::is_same_v<T, Json>) {
-    get(from, value);
+    get_json(from, value);
   } else if constexpr (std::is_same_v<T, double> || std::is_same_v<T, std::string>) {
-    get(from, value, rule, at);
+    get_json(from, value, rule, at);
   } else if constexpr (std::is_enum_v<T>) {
     value = static_cast<T>(get_enum(from, EnumNames<T>::names, at));
   } else if constexpr (std::signed_integral<T>) {
@@ -295,7 +276,7 @@ void get_value(const Json& from, T& value, const FieldRule& rule, const RecordPl
     value.clear();
     value.reserve(count);
     for (std::size_t i = 0; i < count; ++i)
-      get_value(element(from, i), value.emplace_back(), rule, {at.file, &at, {}, i, at.refuses_others});
+      get_value(element_of(from, i), value.emplace_back(), rule, {at.file, &at, {}, i, at.refuses_others});
   } else if constexpr (IsMap<T>::value) {
     value.clear();
     for_members(from, at, [&](const std::string& name, const Json& x) {
@@ -305,7 +286,7 @@ void get_value(const Json& from, T& value, const FieldRule& rule, const RecordPl
     std::vector<const char*> known;
     const auto read = [&](const char* name, auto& x, const FieldRule& r, const char*) {
       using X = std::remove_cvref_t<decltype(x)>;
-      const Json* const found = find(from, name, r.may_miss || IsOptional<X>::value, at);
+      const Json* const found = find_member(from, name, r.may_miss || IsOptional<X>::value, at);
       const RecordPlace place{at.file, &at, name, 0, at.refuses_others};
       if (at.refuses_others) known.push_back(name);
       if constexpr (std::is_same_v<X, Constant>) {
@@ -324,11 +305,10 @@ void get_value(const Json& from, T& value, const FieldRule& rule, const RecordPl
 /// The JSON Schema of a value of this type.
 template <class T>
 void put_schema(Json& to, const FieldRule& rule = {}) {
-  using namespace record_detail;
   if constexpr (std::is_same_v<T, bool>) {
     schema_of_bool(to);
   } else if constexpr (std::is_same_v<T, Json>) {
-    make_object(to);
+    make_json_object(to);
   } else if constexpr (std::is_enum_v<T>) {
     schema_of_enum(to, EnumNames<T>::names);
   } else if constexpr (std::integral<T>) {
@@ -393,6 +373,10 @@ std::string to_json_with_lines(const T& record, const char* list, const std::vec
   }
   return out + "\n]}\n";
 }
+
+/// JSON from outside. InputError {file, byte, expected, found} for more than `most_bytes` of it, for what
+/// nests deeper than `most_depth`, and for what is no JSON.
+Json parse_document(ByteSpan json, std::size_t most_bytes, int most_depth, const std::string& file);
 
 /// A record of JSON from outside. InputError {file, JSON pointer, expected, found}; `refuse_others`: also for
 /// members that the description does not name.

@@ -1,12 +1,9 @@
 #pragma once
-#include <cstdint>
 #include <map>
 #include <optional>
-#include <string>
 
 #include "format/base/bytes.h"
-#include "format/base/errors.h"
-#include "pipeline/io/wire_text.h"
+#include "pipeline/io/uri.h"
 
 namespace texmesh {
 

@@ -2,11 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "pipeline/io/markup.h"
-#include "pipeline/io/wire_text.h"
+#include "pipeline/io/uri.h"
 
 namespace texmesh {
 namespace {
@@ -119,11 +118,6 @@ Cell Cell::markup(std::string text, std::string code) {
   Cell out(std::move(text));
   out.html = std::move(code);
   return out;
-}
-
-void Table::column(std::string heading, Align align) {
-  columns.emplace_back(std::move(heading));
-  columns.back().align = align;
 }
 
 std::string Table::text(std::string_view indent) const {

@@ -1,13 +1,8 @@
 #pragma once
-#include <cstdint>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
-#include <string>
-#include <string_view>
 #include <type_traits>
-#include <utility>
 #include <variant>
-#include <vector>
 
 namespace texmesh {
 
@@ -97,7 +92,6 @@ struct Table {
   Table(std::string of_caption, std::vector<Column> of_columns, std::vector<std::vector<Cell>> of_rows = {})
       : caption(std::move(of_caption)), columns(std::move(of_columns)), rows(std::move(of_rows)) {}
   void column(Column c) { columns.push_back(std::move(c)); }
-  void column(std::string heading, Align align);
   void row(std::vector<Cell> cells) { rows.push_back(std::move(cells)); }
   template <class T>
   requires std::is_same_v<T, std::vector<std::string>>

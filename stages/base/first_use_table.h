@@ -1,11 +1,8 @@
 #pragma once
-#include <algorithm>
 #include <bit>
-#include <cstddef>
-#include <cstdint>
 #include <vector>
 
-#include "format/base/no_index.h"
+#include "format/base/vec.h"
 
 namespace texmesh {
 
@@ -23,8 +20,7 @@ class FirstUseTable {
 
   /// Of a record with this hash: the number n that `same(n)` holds for, or the next new one, which is
   /// size() - 1 then. `hash_of(n)` is asked when the table grows.
-  template <class Same, class HashOf>
-  std::uint32_t number_of(std::uint64_t hash, const Same& same, const HashOf& hash_of) {
+  std::uint32_t number_of(std::uint64_t hash, const auto& same, const auto& hash_of) {
     if (2 * std::size_t{size_} >= slots_.size()) grow(hash_of);
     std::size_t at = slot_of(hash);
     for (; slots_[at] != kNoIndex; at = next(at))
@@ -41,8 +37,7 @@ class FirstUseTable {
     return hash * 0xbf58476d1ce4e5b9u >> (64 - std::countr_zero(slots_.size()));
   }
   std::size_t next(std::size_t at) const { return (at + 1) & (slots_.size() - 1); }
-  template <class HashOf>
-  void grow(const HashOf& hash_of) {
+  void grow(const auto& hash_of) {
     slots_.assign(slots_.size() * 4, kNoIndex);
     for (std::uint32_t n = 0; n < size_; ++n) {
       std::size_t at = slot_of(hash_of(n));

@@ -1,8 +1,11 @@
 #pragma once
 // Functions of single precision with the same bits on every machine, plain enough for a compiler to take
 // several values at once.
+#include <algorithm>
 #include <bit>
 #include <cstdint>
+
+#include "format/base/portable_math.h"
 
 namespace texmesh {
 
@@ -38,5 +41,53 @@ inline float exp2_of(float x) {
                                     f * (0.0416666667f + f * (0.00833333333f + f * 0.00138888889f)))));
   return value * std::bit_cast<float>(static_cast<std::uint32_t>(whole + 127) << 23);
 }
+
+/// A function of 0 .. 1 by linear interpolation between kSteps + 1 samples.
+template <int kSteps>
+class SampledCurve {
+ public:
+  template <class F>
+  explicit SampledCurve(F f) {
+    for (std::size_t i = 0; i < table_.size(); ++i)
+      table_[i] = static_cast<float>(f(static_cast<double>(i) / kSteps));
+  }
+  float operator()(float x) const {
+    const float at = std::clamp(x, 0.f, 1.f) * kSteps;
+    const auto i = std::min(static_cast<std::size_t>(at), static_cast<std::size_t>(kSteps - 1));
+    return table_[i] + (table_[i + 1] - table_[i]) * (at - static_cast<float>(i));
+  }
+
+ private:
+  std::array<float, kSteps + 1> table_;
+};
+
+/// Light as the nearest sRGB code of 8 bits, as exactly as with the formula, by a table; what lies beyond
+/// 0..1 is cut off, NaN is 0. kLowerAtBorder: light in the very middle between two codes gets the lower one.
+template <class Real, bool kLowerAtBorder>
+class SrgbEncoder {
+ public:
+  SrgbEncoder() {
+    for (std::size_t c = 0; c < 255; ++c)
+      border_[c] = static_cast<Real>(light_of_srgb((static_cast<double>(c) + 0.5) / 255));
+    border_[255] = 2;  // above all light
+    std::uint8_t code = 0;
+    for (std::size_t i = 0; i <= kSteps; ++i)
+      first_[i] = code = code_from(code, static_cast<Real>(i) / kSteps);
+  }
+  std::uint8_t operator()(Real light) const {
+    if (!(light > 0)) return 0;
+    if (light >= 1) return 255;
+    return code_from(first_[static_cast<std::size_t>(light * kSteps)], light);
+  }
+
+ private:
+  static constexpr std::size_t kSteps = 4096;  // below the steepest steps of two codes
+  std::uint8_t code_from(std::uint8_t code, Real light) const {
+    while (kLowerAtBorder ? light > border_[code] : light >= border_[code]) ++code;
+    return code;
+  }
+  std::array<Real, 256> border_{};  // between each code and the next
+  std::array<std::uint8_t, kSteps + 1> first_{};
+};
 
 }  // namespace texmesh

@@ -1,6 +1,4 @@
 #pragma once
-#include <cstddef>
-#include <functional>
 
 #include "stages/base/run_context.h"
 
@@ -12,6 +10,13 @@ namespace texmesh {
 /// depend on the threads. Rethrows the first exception of a piece; checks for cancellation between pieces.
 void parallel_for(const RunContext& context, std::size_t count, std::size_t grain,
                   const std::function<void(std::size_t begin, std::size_t end)>& body);
+
+/// The same for body(index).
+void parallel_each(const RunContext& context, std::size_t count, std::size_t grain, const auto& body) {
+  parallel_for(context, count, grain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) body(i);
+  });
+}
 
 /// Deterministic sum: pieces of exactly `piece` items are summed by part(begin, end) and added in index
 /// order.

@@ -4,10 +4,8 @@
 #include <numeric>
 #include <tuple>
 
-#include "format/base/box.h"
 #include "stages/base/run_context.h"
 #include "stages/geometry/mesh_topology.h"
-#include "stages/geometry/weld.h"
 
 namespace texmesh {
 namespace {

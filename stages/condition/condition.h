@@ -1,8 +1,5 @@
 #pragma once
-#include <cstdint>
-#include <string_view>
 
-#include "format/model/model.h"
 #include "stages/data/conditioned_mesh.h"
 #include "stages/data/stage.h"
 
@@ -20,8 +17,7 @@ struct EnumNames<NormalsPolicy> {
 struct ConditionOptions {
   double weld_distance = 0;
   NormalsPolicy normals = NormalsPolicy::kAuto;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("weld_distance", s.weld_distance, Range{0, 0.001},
       "positions closer than this fraction of the diagonal become one; 0 = only equal ones");
     v("normals", s.normals,

@@ -1,11 +1,18 @@
 #pragma once
-#include <cstdint>
-#include <vector>
-
 #include "format/model/model.h"
-#include "stages/data/uv_sets.h"
 
 namespace texmesh {
+
+/// Which sets of texture coordinates a material's textures use (0 -> uv0, 1 -> uv1).
+struct UvSets {
+  std::uint8_t guide = 0;  // the base colour's set; where that has no texture, the first texture's
+  std::uint8_t both = 0;   // 1 = some texture uses the other set
+  friend bool operator==(const UvSets&, const UvSets&) = default;
+  static void archive(auto& s, auto& a) { a(s.guide, s.both); }
+};
+
+/// Per material; empty when all textures use the first set, as with nearly every model.
+std::vector<UvSets> uv_sets_of(const std::vector<Material>& materials);
 
 /// What condition found and changed. For a clean mesh all counts are 0 but the last three.
 struct ConditionReport {
@@ -23,8 +30,7 @@ struct ConditionReport {
   std::uint64_t components = 0;
   // Edges of one triangle and of more than two, between welded positions, before splits.
   std::uint64_t boundary_edges = 0, non_manifold_edges_found = 0;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
+  static void archive(auto& s, auto& a) {
     a(s.welded_positions, s.welded_wedges, s.unused_positions, s.degenerate_triangles, s.slivers_kept,
       s.duplicate_triangles, s.non_finite_triangles, s.repaired_wedges, s.split_non_manifold_edges,
       s.split_bow_ties, s.components, s.boundary_edges, s.non_manifold_edges_found);
@@ -47,8 +53,7 @@ struct ConditionedMesh {
   std::vector<UvSets> uv_sets;
   ConditionReport report;
   Notes notes;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
+  static void archive(auto& s, auto& a) {
     a(s.mesh, s.twin, s.component, s.component_count, s.position_source, s.triangle_source, s.uv_sets,
       s.report, s.notes);
   }

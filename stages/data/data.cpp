@@ -1,10 +1,8 @@
 // What the artefacts of stages say of themselves.
-#include <algorithm>
 
-#include "format/base/no_index.h"
+#include "stages/data/conditioned_mesh.h"
 #include "stages/data/ladder.h"
 #include "stages/data/nested_scales.h"
-#include "stages/data/uv_sets.h"
 
 namespace texmesh {
 

@@ -1,10 +1,5 @@
 #pragma once
 #include <algorithm>
-#include <cstddef>
-#include <cstdint>
-#include <string>
-#include <string_view>
-#include <vector>
 
 #include "format/base/fields.h"
 #include "format/base/note.h"
@@ -46,7 +41,7 @@ struct TexturePlane {
   // The grid of fragments; their sides are multiples of 16.
   std::uint32_t fragment_width_px = 0, fragment_height_px = 0, columns = 0, rows = 0;
   std::string grid_reason;             // why this grid was chosen
-  std::vector<std::uint8_t> coverage;  // 1 bit per texel, see coverage.h
+  std::vector<std::uint8_t> coverage;  // 1 bit per texel, see CoverageMask
   // Per fragment, row by row from the top left:
   std::vector<std::uint32_t> covered_texels;  // 0 = never stored
   std::vector<float> surface_fraction;        // of the object's whole surface area
@@ -54,8 +49,7 @@ struct TexturePlane {
   std::vector<std::uint32_t> features;  // f_i
   std::vector<float> eta;               // eta_i (3.1), 0..1, min-max over covered fragments
   std::size_t fragment_count() const { return static_cast<std::size_t>(columns) * rows; }
-  template <class S, class A>
-  static void archive(S& s, A& a) {
+  static void archive(auto& s, auto& a) {
     a(s.image, s.mip, s.base, s.role, s.width_px, s.height_px, s.channels, s.fragment_width_px,
       s.fragment_height_px, s.columns, s.rows, s.grid_reason, s.coverage, s.covered_texels,
       s.surface_fraction, s.features, s.eta);
@@ -92,10 +86,7 @@ struct Fragments {
   // An untextured model has none.
   std::vector<TexturePlane> planes;
   Notes notes;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.scales, s.planes, s.notes);
-  }
+  static void archive(auto& s, auto& a) { a(s.scales, s.planes, s.notes); }
 };
 
 /// What texels become that no chart covers: a smooth continuation of the covered ones, or the source's
@@ -104,6 +95,41 @@ enum class Fill : std::uint8_t { kPushPull, kNone };
 template <>
 struct EnumNames<Fill> {
   static constexpr std::array<std::string_view, 2> names{"push-pull", "none"};
+};
+
+/// Bytes of one row of coverage bits: ceil(width / 8).
+constexpr std::size_t coverage_stride_bytes(std::uint32_t width_px) {
+  return (std::size_t{width_px} + 7) / 8;
+}
+
+/// Bytes of the coverage bits of an image.
+constexpr std::size_t coverage_size_bytes(std::uint32_t width_px, std::uint32_t height_px) {
+  return coverage_stride_bytes(width_px) * height_px;
+}
+
+/// Coverage bits of an image, as TexturePlane::coverage has them: 1 bit per texel, rows of
+/// coverage_stride_bytes(), bit 7 first. A view: whoever owns the bits keeps them alive.
+struct CoverageMask {
+  const std::uint8_t* bits = nullptr;
+  std::size_t stride_bytes = 0;
+  std::uint32_t width_px = 0, height_px = 0;
+
+  CoverageMask() = default;
+  /// `coverage` holds coverage_size_bytes(width, height) bytes.
+  CoverageMask(const std::vector<std::uint8_t>& coverage, std::uint32_t width, std::uint32_t height)
+      : bits(coverage.data()),
+        stride_bytes(coverage_stride_bytes(width)),
+        width_px(width),
+        height_px(height) {}
+  explicit CoverageMask(const TexturePlane& plane)
+      : CoverageMask(plane.coverage, plane.width_px, plane.height_px) {}
+
+  /// Without bits, which stands for a mask of full coverage.
+  bool empty() const { return bits == nullptr; }
+  /// x < width_px, y < height_px.
+  bool covered(std::uint32_t x, std::uint32_t y) const { return byte_at(x, y) >> (7 - x % 8) & 1; }
+  /// The byte that holds the texel's bit: the eight texels from x / 8 * 8 on.
+  std::uint8_t byte_at(std::uint32_t x, std::uint32_t y) const { return bits[y * stride_bytes + x / 8]; }
 };
 
 }  // namespace texmesh

@@ -1,7 +1,4 @@
 #pragma once
-#include <cstdint>
-#include <span>
-#include <vector>
 
 #include "format/base/note.h"
 #include "format/model/codec.h"
@@ -12,10 +9,7 @@ namespace texmesh {
 struct SizeKnots {
   std::vector<std::uint8_t> quality;
   std::vector<float> position;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.quality, s.position);
-  }
+  static void archive(auto& s, auto& a) { a(s.quality, s.position); }
 };
 
 /// One rung of one plane: the table stream and the fragments' streams, as SPEC.md has them.
@@ -24,10 +18,7 @@ struct LadderRung {
   std::vector<std::uint8_t> table_stream;  // what the rung's streams share: Huffman and quantiser tables
   std::vector<std::uint8_t> data;          // the fragments' streams, in fragment order
   std::vector<std::uint64_t> offset;       // [fragments + 1] into data; empty range = fragment not stored
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.quality, s.table_stream, s.data, s.offset);
-  }
+  static void archive(auto& s, auto& a) { a(s.quality, s.table_stream, s.data, s.offset); }
 };
 
 /// Whether the package holds the plane's source image as a file, and whether its colours are the plane's.
@@ -41,19 +32,13 @@ struct PlaneLadder {
   // Sizes between the rungs; of full-size colours as baseline JPEGs only: halving a texture takes the traces
   // of its source's quantisers away
   SizeKnots knots;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.codec, s.source_rung, s.source, s.rungs, s.knots);
-  }
+  static void archive(auto& s, auto& a) { a(s.codec, s.source_rung, s.source, s.rungs, s.knots); }
 };
 
 struct Ladder {
   std::vector<PlaneLadder> planes;
   Notes notes;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.planes, s.notes);
-  }
+  static void archive(auto& s, auto& a) { a(s.planes, s.notes); }
 };
 
 /// The rung's own stream of one fragment; empty when it is not stored.

@@ -1,8 +1,4 @@
 #pragma once
-#include <cstdint>
-#include <string>
-#include <vector>
-
 #include "format/model/model.h"
 
 namespace texmesh {
@@ -15,10 +11,7 @@ struct Collapse {
   float error = 0;                 // square root of the quadric error, object units
   static Collapse with_component(std::uint32_t position, float error) { return {position, position, error}; }
   bool vanishes_with_component() const { return to == from; }
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.from, s.to, s.error);
-  }
+  static void archive(auto& s, auto& a) { a(s.from, s.to, s.error); }
 };
 
 /// One scale S_i. Triangles index the wedges of NestedScales::mesh.
@@ -37,8 +30,7 @@ struct NestedScale {
   float deviation = 0;
   // Why the scale has more vertices than asked for, or why no coarser scale follows; "" when neither is so.
   std::string floor_reason;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
+  static void archive(auto& s, auto& a) {
     a(s.scale, s.collapse_count, s.triangles, s.triangle_source, s.position_count, s.error_max, s.error_rms,
       s.deviation, s.floor_reason);
   }
@@ -53,14 +45,29 @@ struct NestedScales {
   // more than max_error are left out.
   std::vector<NestedScale> scales;
   Notes notes;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.mesh, s.twin, s.collapses, s.scales, s.notes);
-  }
+  static void archive(auto& s, auto& a) { a(s.mesh, s.twin, s.collapses, s.scales, s.notes); }
 };
 
 /// The mesh of one scale, without the positions and wedges that it does not use. Materials, parts and
 /// attributes are those of S_0.
 Mesh extract_scale(const NestedScales& scales, const NestedScale& scale);
+
+struct ScaleFile {
+  int scale = 0;                              // scale number
+  std::vector<std::uint8_t> glb;              // glTF 2.0 binary; empty: the stream alone has the scale
+  std::uint32_t triangles = 0, vertices = 0;  // as stored: a vertex is a wedge
+  static void archive(auto& s, auto& a) { a(s.scale, s.glb, s.triangles, s.vertices); }
+};
+
+struct ScaleFiles {
+  std::vector<ScaleFile> files;        // the kept scales, S_0 first
+  int position_bits = 0, uv_bits = 0;  // as used; 0 = float
+  double position_error = 0;           // the largest rounding of a coordinate, object units
+  std::vector<std::uint8_t> stream;    // mesh/stream.bin; empty when there is none
+  Notes notes;
+  static void archive(auto& s, auto& a) {
+    a(s.files, s.position_bits, s.uv_bits, s.position_error, s.stream, s.notes);
+  }
+};
 
 }  // namespace texmesh

@@ -1,6 +1,7 @@
 #pragma once
-#include <cstdint>
-#include <vector>
+
+#include "format/base/note.h"
+#include "format/documents/quality_table.h"
 
 namespace texmesh {
 
@@ -12,10 +13,7 @@ struct CollapseStatistics {
   float mean = 0, max = 0, min = 0, deviation = 0, sum = 0;
   float rss = 0;  // root of the sum of squares: it fits the cumulative Table 7.2, which the sum does not
   std::uint32_t collapses = 0;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.mean, s.max, s.min, s.deviation, s.sum, s.rss, s.collapses);
-  }
+  static void archive(auto& s, auto& a) { a(s.mean, s.max, s.min, s.deviation, s.sum, s.rss, s.collapses); }
 };
 
 /// How much scales differ. rho_ij(p) = dist(p, S_j) / R_eff(p) for points p spread over S_i by area; p95 and
@@ -43,11 +41,36 @@ struct PerceptualValues {
   // noticeable there, jnd * (jnd_reference_px / D)^exponent. With an exponent of 0: any height or none (0).
   std::vector<float> display_px_jnd;
   float object_height = 0;  // O_V: the longest side of the bounding box, object units
-  template <class S, class A>
-  static void archive(S& s, A& a) {
+  static void archive(auto& s, auto& a) {
     a(s.step, s.p95, s.p99, s.chain_average, s.chain_largest, s.chain_least, s.major, s.kept,
       s.display_px_edge, s.display_px_error, s.display_px_jnd, s.object_height);
   }
+};
+
+/// Per plane and fragment; 0 for fragments without coverage. z, i, zeta, m are raw (8.1-8.3), 0..1:
+///   z = mean over the channels of the standard deviation / 127.5, i = mean / 255, m = 1 - (w_I (1 - i) +
+///   w_zeta zeta), zeta = share of the pairs of neighbours, east and south, that differ (of 2 (w-1)(h-1)
+///   pairs in a whole fragment).
+/// Where a fragment is covered in part only its covered texels count, and pairs of them: what fills the rest
+/// is never seen. Grey planes count as three equal channels. vqp (8.4) is the weighted mean of eta,
+/// z, i and m, each min-max over the covered fragments of the plane (0 where all are equal).
+struct PlanePredictors {
+  std::vector<float> z, i, zeta, m, vqp;
+  static void archive(auto& s, auto& a) { a(s.z, s.i, s.zeta, s.m, s.vqp); }
+};
+
+struct Predictors {
+  std::vector<PlanePredictors> planes;
+  static void archive(auto& s, auto& a) { a(s.planes); }
+};
+
+/// What lit pictures say about the kept scales and their textures.
+struct MeasuredQuality {
+  QualityTable table;
+  /// Per QualityTable::scales: ManifestScale::display_px_flip.
+  std::vector<float> display_px_flip;
+  Notes notes;  // what of the object the pictures do not show
+  static void archive(auto& s, auto& a) { a(s.table, s.display_px_flip, s.notes); }
 };
 
 }  // namespace texmesh

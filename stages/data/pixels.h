@@ -1,6 +1,6 @@
 #pragma once
-#include <cstdint>
-#include <vector>
+
+#include "format/base/fields.h"
 
 namespace texmesh {
 
@@ -18,6 +18,13 @@ struct Pixels {
 struct FloatPixels {
   std::uint32_t width_px = 0, height_px = 0, channels = 0;
   std::vector<float> data;
+};
+
+enum class Subsampling : std::uint8_t { k420, k444 };
+
+template <>
+struct EnumNames<Subsampling> {
+  static constexpr std::array<std::string_view, 2> names{"420", "444"};
 };
 
 }  // namespace texmesh

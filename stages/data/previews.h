@@ -1,7 +1,4 @@
 #pragma once
-#include <cstdint>
-#include <vector>
-
 #include "format/base/bytes.h"
 
 namespace texmesh {
@@ -10,18 +7,19 @@ namespace texmesh {
 struct PlanePreview {
   Bytes file;  // a complete JPEG; empty for mips, whose full-size plane's preview serves
   std::uint32_t width_px = 0, height_px = 0;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.file, s.width_px, s.height_px);
-  }
+  static void archive(auto& s, auto& a) { a(s.file, s.width_px, s.height_px); }
 };
 
 struct Previews {
   std::vector<PlanePreview> planes;  // as Fragments::planes
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.planes);
-  }
+  static void archive(auto& s, auto& a) { a(s.planes); }
+};
+
+/// One picture of the whole object, for lists and search engines.
+struct Poster {
+  Bytes file;  // a baseline JPEG, sRGB; empty = the package has no poster
+  std::uint32_t width_px = 0, height_px = 0;
+  static void archive(auto& s, auto& a) { a(s.file, s.width_px, s.height_px); }
 };
 
 }  // namespace texmesh

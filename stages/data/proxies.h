@@ -1,7 +1,4 @@
 #pragma once
-#include <cstdint>
-#include <string>
-#include <vector>
 
 #include "format/base/bytes.h"
 #include "format/base/note.h"
@@ -14,10 +11,7 @@ struct ProxyTexture {
   std::uint32_t width_px = 0, height_px = 0;
   std::uint64_t bytes = 0;  // of the image file
   friend bool operator==(const ProxyTexture&, const ProxyTexture&) = default;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.use, s.width_px, s.height_px, s.bytes);
-  }
+  static void archive(auto& s, auto& a) { a(s.use, s.width_px, s.height_px, s.bytes); }
 };
 
 /// Lit FLIP against S_0 with the source's texels, over the pixels of all views that either picture covers.
@@ -25,10 +19,7 @@ struct ProxyPictureLoss {
   double displayed_px = 0;  // height of the object in the pictures
   double flip_mean = 0, flip_p95 = 0;
   friend bool operator==(const ProxyPictureLoss&, const ProxyPictureLoss&) = default;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.displayed_px, s.flip_mean, s.flip_p95);
-  }
+  static void archive(auto& s, auto& a) { a(s.displayed_px, s.flip_mean, s.flip_p95); }
 };
 
 /// The whole object in one small file: a coarse mesh with an atlas of its own and textures baked from S_0.
@@ -38,8 +29,7 @@ struct Proxy {
   std::uint32_t triangles = 0, vertices = 0;  // as stored
   std::vector<ProxyTexture> textures;
   std::vector<ProxyPictureLoss> losses;  // by rising displayed_px, the same sizes in all proxies of a model
-  template <class S, class A>
-  static void archive(S& s, A& a) {
+  static void archive(auto& s, auto& a) {
     a(s.glb, s.target_bytes, s.triangles, s.vertices, s.textures, s.losses);
   }
 };
@@ -47,10 +37,7 @@ struct Proxy {
 struct Proxies {
   std::vector<Proxy> proxies;  // strictly rising in bytes
   Notes notes;                 // why a size has none
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.proxies, s.notes);
-  }
+  static void archive(auto& s, auto& a) { a(s.proxies, s.notes); }
 };
 
 }  // namespace texmesh

@@ -1,7 +1,6 @@
 #include "stages/fill/fill.h"
 
 #include "stages/base/parallel.h"
-#include "stages/data/coverage.h"
 #include "stages/image/decode_image.h"
 #include "stages/image/resize.h"
 #include "stages/jpeg/block_transform.h"
@@ -173,19 +172,17 @@ class Mcu {
 template <int C>
 void flatten_rows(Pixels& pixels, const std::vector<std::uint8_t>& coverage, PartBlocks part,
                   const RunContext& context) {
-  parallel_for(context, pixels.height_px / kMcu, 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t row = begin; row < end; ++row) {
-      std::array<int, C> before{};
-      bool flat = false;  // is the block to the left?
-      for (std::uint32_t x = 0; x + kMcu <= pixels.width_px; x += kMcu) {
-        Mcu<C> mcu(pixels, coverage, x, static_cast<std::uint32_t>(row) * kMcu);
-        const bool none = mcu.none_covered();
-        if (none)
-          before = mcu.flatten(flat ? &before : nullptr);
-        else if (part == PartBlocks::kSparse && !mcu.all_covered())
-          mcu.extrapolate_all();
-        flat = none;
-      }
+  parallel_each(context, pixels.height_px / kMcu, 1, [&](std::size_t row) {
+    std::array<int, C> before{};
+    bool flat = false;  // is the block to the left?
+    for (std::uint32_t x = 0; x + kMcu <= pixels.width_px; x += kMcu) {
+      Mcu<C> mcu(pixels, coverage, x, static_cast<std::uint32_t>(row) * kMcu);
+      const bool none = mcu.none_covered();
+      if (none)
+        before = mcu.flatten(flat ? &before : nullptr);
+      else if (part == PartBlocks::kSparse && !mcu.all_covered())
+        mcu.extrapolate_all();
+      flat = none;
     }
   });
 }
@@ -269,9 +266,8 @@ class PushPull {
   }
 
   /// Mean of the covered among the four texels at (2x, 2y).
-  template <class Covered>
   static void push_texel(const std::uint8_t* from, std::uint32_t width, std::uint32_t height, std::uint32_t x,
-                         std::uint32_t y, const Covered& is_covered, Level& to) {
+                         std::uint32_t y, const auto& is_covered, Level& to) {
     std::uint32_t sum[C] = {}, count = 0;
     for (std::uint32_t v = 2 * y; v < std::min(2 * y + 2, height); ++v)
       for (std::uint32_t u = 2 * x; u < std::min(2 * x + 2, width); ++u) {
@@ -504,18 +500,16 @@ void decode_and_fill(const std::vector<TexturePlane>& planes, std::size_t full,
   RunContext inner = context;
   inner.progress = nullptr;
   inner.threads = std::max(1, context.threads / static_cast<int>(std::max<std::size_t>(starts.size(), 1)));
-  parallel_for(context, starts.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t s = begin; s < end; ++s) {
-      const Image& image = images[planes[starts[s]].image];
-      Pixels decoded = decode_for(image, planes[starts[s]]);
-      for (std::size_t p = starts[s]; p < full && planes[p].image == planes[starts[s]].image; ++p) {
-        if (planes[p].role == TextureRole::kAlpha && decoded.channels < 2)
-          throw StageError("fragmentation", image.name, "an alpha channel", "none");
-        const bool last = p + 1 == full || planes[p + 1].image != planes[p].image;
-        Pixels plane = last && decoded.channels == planes[p].channels ? std::move(decoded)
-                                                                      : channels_of(decoded, planes[p]);
-        fill_chain(planes, p, mips[p], std::move(plane), choice, inner, out);
-      }
+  parallel_each(context, starts.size(), 1, [&](std::size_t s) {
+    const Image& image = images[planes[starts[s]].image];
+    Pixels decoded = decode_for(image, planes[starts[s]]);
+    for (std::size_t p = starts[s]; p < full && planes[p].image == planes[starts[s]].image; ++p) {
+      if (planes[p].role == TextureRole::kAlpha && decoded.channels < 2)
+        throw StageError("fragmentation", image.name, "an alpha channel", "none");
+      const bool last = p + 1 == full || planes[p + 1].image != planes[p].image;
+      Pixels plane = last && decoded.channels == planes[p].channels ? std::move(decoded)
+                                                                    : channels_of(decoded, planes[p]);
+      fill_chain(planes, p, mips[p], std::move(plane), choice, inner, out);
     }
   });
 }

@@ -1,7 +1,4 @@
 #pragma once
-#include <cstdint>
-#include <string_view>
-#include <vector>
 
 #include "format/model/model.h"
 #include "stages/data/fragments.h"

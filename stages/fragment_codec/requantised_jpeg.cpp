@@ -1,5 +1,4 @@
 #include "stages/fragment_codec/requantised_jpeg.h"
-
 #include "stages/jpeg/jpeg_coder.h"
 
 namespace texmesh {

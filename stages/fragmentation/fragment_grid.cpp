@@ -2,7 +2,7 @@
 
 #include <bit>
 
-#include "stages/data/coverage.h"
+#include "stages/data/fragments.h"
 #include "stages/geometry/texel_coverage.h"
 
 namespace texmesh {

@@ -1,9 +1,5 @@
 #pragma once
 // Inside stages only: how a texture is cut, and how a triangle spreads over the pieces.
-#include <array>
-#include <cstdint>
-#include <string>
-#include <vector>
 
 #include "format/model/model.h"
 

@@ -1,13 +1,11 @@
 #include "stages/fragmentation/fragmentation.h"
 
 #include <bit>
-#include <tuple>
 
-#include "format/base/no_index.h"
 #include "format/model/material_extensions.h"
 #include "stages/base/parallel.h"
-#include "stages/data/coverage.h"
 #include "stages/fragmentation/fragment_grid.h"
+#include "stages/geometry/mesh_topology.h"
 #include "stages/geometry/texel_coverage.h"
 
 namespace texmesh {
@@ -162,17 +160,14 @@ void list_mips(const std::vector<Image>& images, Fragments& out, std::vector<std
 }
 
 double area_in_space(const Mesh& mesh, std::size_t triangle) {
-  Vec3d p[3];
-  for (int c = 0; c < 3; ++c)
-    p[c] = to_double(mesh.positions[mesh.position_of(static_cast<std::uint32_t>(triangle), c)]);
-  const double area = length(cross(p[1] - p[0], p[2] - p[0])) / 2;
+  const auto [a, b, c] = corner_points(mesh, mesh.triangles[triangle]);
+  const double area = length(cross(b - a, c - a)) / 2;
   return std::isfinite(area) ? area : 0;
 }
 
 /// Calls body(triangle, use, whether it is the first use of that material, corners in texels) for the
 /// triangles of every use, and returns what it had to leave out.
-template <class Body>
-TriangleFaults for_each_triangle(const Mesh& mesh, const Job& job, const Body& body) {
+TriangleFaults for_each_triangle(const Mesh& mesh, const Job& job, const auto& body) {
   TriangleFaults faults;
   for (std::size_t u = 0; u < job.uses.size(); ++u) {
     const Use& use = job.uses[u];
@@ -349,9 +344,8 @@ Fragments fragment_textures(const ConditionedMesh& mesh, const std::vector<Mater
     jobs.push_back({width_px, height_px, uses[p]});
   }
   std::vector<Measure> measured(jobs.size());
-  parallel_for(context, jobs.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t j = begin; j < end; ++j) measured[j] = measure(mesh, scale_map, jobs[j], options);
-  });
+  parallel_each(context, jobs.size(), 1,
+                [&](std::size_t j) { measured[j] = measure(mesh, scale_map, jobs[j], options); });
   context.report(0.9);
 
   double whole_surface = 0;

@@ -1,10 +1,5 @@
 #pragma once
-#include <cstdint>
-#include <string>
-#include <string_view>
-#include <vector>
 
-#include "format/model/model.h"
 #include "stages/data/conditioned_mesh.h"
 #include "stages/data/fragments.h"
 #include "stages/data/scale_map.h"
@@ -19,8 +14,7 @@ struct FragmentationOptions {
   int min_fragment_px = 128;
   Fill fill = Fill::kPushPull;
   bool mips = true;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("max_fragments", s.max_fragments, Range{1, 256}, "most fragments of one texture");
     v("min_fragment_px", s.min_fragment_px, Range{16, 4096},
       "least side of a fragment, where the image allows; 256 instead of the default with ladder.mode "

@@ -25,8 +25,7 @@ void sort_by_code(std::vector<CurvedTriangle>& items) {
 }
 
 /// The triangles in the order of a space-filling curve through their centres.
-template <class Centre>
-std::vector<CurvedTriangle> along_curve(std::size_t count, Centre&& centre) {
+std::vector<CurvedTriangle> along_curve(std::size_t count, auto&& centre) {
   std::vector<CurvedTriangle> order(count);
   if (count == 0) return order;
   Box3f centres;
@@ -83,6 +82,8 @@ double triangle_distance2(Vec3d a, Vec3d b, Vec3d c) {
   if (any || out_ca) best = std::min(best, segment_distance2(c, a));
   return best;
 }
+
+constexpr int kMostCorners = 4;
 
 }  // namespace
 
@@ -270,12 +271,6 @@ std::vector<SurfaceSample> sample_surface(const std::vector<Vec3f>& positions,
   }
   return samples;
 }
-
-namespace {
-
-constexpr int kMostCorners = 4;
-
-}  // namespace
 
 std::vector<std::uint32_t> survivors(std::size_t positions, std::span<const Collapse> collapses,
                                      std::size_t count) {

@@ -1,8 +1,6 @@
 #pragma once
 #include <span>
 
-#include "format/base/box.h"
-#include "format/base/no_index.h"
 #include "stages/data/nested_scales.h"
 
 namespace texmesh {
@@ -96,8 +94,7 @@ class Spokes {
     std::uint32_t triangle, next;
   };
   /// `place_of` gives a wedge's place, below `places`. Triangles of a place keep their order.
-  template <class PlaceOf>
-  Spokes(std::size_t places, std::span<const Triangle> triangles, PlaceOf&& place_of)
+  Spokes(std::size_t places, std::span<const Triangle> triangles, auto&& place_of)
       : begin_(places + 1, 0), spoke_(3 * triangles.size()) {
     for (const Triangle& t : triangles)
       for (const std::uint32_t w : t) ++begin_[place_of(w) + 1];

@@ -1,10 +1,108 @@
 #include "stages/geometry/mesh_topology.h"
 
-#include <algorithm>
+#include <bit>
+#include <cstring>
 #include <numeric>
 #include <utility>
 
 namespace texmesh {
+namespace {
+
+bool finite(Vec3f p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
+
+std::vector<std::uint32_t> weld_equal(const std::vector<Vec3f>& positions) {
+  struct Key {
+    std::uint64_t xy;
+    std::uint32_t z, index;
+  };
+  const auto bits = [](float x) { return std::bit_cast<std::uint32_t>(x + 0.0f); };  // + 0 turns -0 into +0
+  std::vector<Key> keys;
+  keys.reserve(positions.size());
+  for (std::size_t i = 0; i < positions.size(); ++i)
+    if (const Vec3f p = positions[i]; finite(p))
+      keys.push_back({std::uint64_t{bits(p.x)} << 32 | bits(p.y), bits(p.z), static_cast<std::uint32_t>(i)});
+  std::sort(keys.begin(), keys.end(), [](const Key& a, const Key& b) {
+    if (a.xy != b.xy) return a.xy < b.xy;
+    return a.z != b.z ? a.z < b.z : a.index < b.index;
+  });
+  std::vector<std::uint32_t> weld(positions.size(), kNoIndex);
+  for (std::size_t i = 0; i < keys.size(); ++i) {
+    const bool first = i == 0 || keys[i].xy != keys[i - 1].xy || keys[i].z != keys[i - 1].z;
+    weld[keys[i].index] = first ? keys[i].index : weld[keys[i - 1].index];
+  }
+  return weld;
+}
+
+/// A grid whose cells have the side of the weld distance: what a position can be welded with lies in the 27
+/// cells around it, and at most a handful of kept positions share a cell.
+class WeldGrid {
+ public:
+  using Cell = std::array<std::int64_t, 3>;
+  WeldGrid(const std::vector<Vec3f>& positions, const std::vector<std::uint32_t>& weld, double side)
+      : positions_(positions), side_(side) {
+    for (std::uint32_t i = 0; i < positions.size(); ++i)
+      if (weld[i] == i) cells_.push_back(cell_of(i));
+    std::sort(cells_.begin(), cells_.end());
+    cells_.erase(std::unique(cells_.begin(), cells_.end()), cells_.end());
+    head_.assign(cells_.size(), kNoIndex);
+    next_.assign(positions.size(), kNoIndex);
+  }
+
+  /// The lowest kept position within the side's length of position i.
+  std::uint32_t find(std::uint32_t i) const {
+    const Cell at = cell_of(i);
+    std::uint32_t best = kNoIndex;
+    for (std::int64_t dx = -1; dx <= 1; ++dx)
+      for (std::int64_t dy = -1; dy <= 1; ++dy)
+        best = std::min(best, find_in_row({at[0] + dx, at[1] + dy, at[2] - 1}, i));
+    return best;
+  }
+
+  void keep(std::uint32_t i) {
+    const auto c =
+        static_cast<std::size_t>(std::lower_bound(cells_.begin(), cells_.end(), cell_of(i)) - cells_.begin());
+    next_[i] = head_[c];
+    head_[c] = i;
+  }
+
+ private:
+  Cell cell_of(std::uint32_t i) const {
+    const auto index = [&](float x) { return static_cast<std::int64_t>(std::floor(x / side_)); };
+    return {index(positions_[i].x), index(positions_[i].y), index(positions_[i].z)};
+  }
+
+  std::uint32_t find_in_row(Cell first, std::uint32_t i) const {
+    std::uint32_t best = kNoIndex;
+    const Vec3d p = to_double(positions_[i]);
+    auto c = static_cast<std::size_t>(std::lower_bound(cells_.begin(), cells_.end(), first) - cells_.begin());
+    for (; c < cells_.size() && cells_[c] <= Cell{first[0], first[1], first[2] + 2}; ++c)
+      for (std::uint32_t j = head_[c]; j != kNoIndex; j = next_[j])
+        if (length(to_double(positions_[j]) - p) <= side_) best = std::min(best, j);
+    return best;
+  }
+
+  const std::vector<Vec3f>& positions_;
+  double side_;
+  std::vector<Cell> cells_;
+  std::vector<std::uint32_t> head_, next_;
+};
+
+/// All attributes of a wedge, compared as bits.
+struct Attributes {
+  std::array<float, 15> values{};
+  Attributes(const Mesh& m, std::uint32_t w) {
+    if (!m.uv0.empty()) std::memcpy(&values[0], &m.uv0[w], sizeof(Vec2f));
+    if (!m.uv1.empty()) std::memcpy(&values[2], &m.uv1[w], sizeof(Vec2f));
+    if (!m.normals.empty()) std::memcpy(&values[4], &m.normals[w], sizeof(Vec3f));
+    if (!m.colours.empty()) std::memcpy(&values[7], &m.colours[w], sizeof(Vec4f));
+    if (!m.tangents.empty()) std::memcpy(&values[11], &m.tangents[w], sizeof(Vec4f));
+  }
+  int compare(const Attributes& other) const {
+    return std::memcmp(values.data(), other.values.data(), sizeof values);
+  }
+};
+
+}  // namespace
 
 EdgeTable group_edges(std::span<const std::uint32_t> corner_position, std::size_t position_count) {
   // One bucket per lower end, then a sort within the bucket: several times faster than one sort over all
@@ -37,6 +135,15 @@ EdgeTable group_edges(std::span<const std::uint32_t> corner_position, std::size_
   return table;
 }
 
+double surface_area(const Mesh& mesh, const std::vector<Triangle>& triangles) {
+  double area = 0;
+  for (const Triangle& t : triangles) {
+    const auto [a, b, c] = corner_points(mesh, t);
+    area += 0.5 * length(cross(b - a, c - a));
+  }
+  return area;
+}
+
 DisjointSets::DisjointSets(std::size_t count) : parent_(count) {
   std::iota(parent_.begin(), parent_.end(), 0u);
 }
@@ -54,6 +161,57 @@ void DisjointSets::join(std::uint32_t a, std::uint32_t b) {
   b = find(b);
   if (a < b) parent_[b] = a;
   if (b < a) parent_[a] = b;
+}
+
+std::vector<std::uint32_t> weld_positions(const std::vector<Vec3f>& positions, double distance) {
+  std::vector<std::uint32_t> weld = weld_equal(positions);
+  double extent = 0;
+  for (std::size_t i = 0; i < positions.size(); ++i)
+    if (weld[i] != kNoIndex)
+      for (int k = 0; k < 3; ++k) extent = std::max(extent, std::fabs(double{positions[i][k]}));
+  // Below 2^-40 of the coordinates cell numbers would lose their meaning, and a float holds 2^-24 of its
+  // value anyway.
+  if (!(distance > extent * 0x1p-40)) return weld;
+  WeldGrid grid(positions, weld, distance);
+  for (std::uint32_t i = 0; i < positions.size(); ++i) {
+    if (weld[i] == kNoIndex) continue;
+    if (weld[i] != i) {
+      weld[i] = weld[weld[i]];
+      continue;
+    }
+    if (const std::uint32_t kept = grid.find(i); kept != kNoIndex)
+      weld[i] = kept;
+    else
+      grid.keep(i);
+  }
+  return weld;
+}
+
+std::vector<std::uint32_t> weld_wedges(const Mesh& mesh, const std::vector<std::uint32_t>& position_weld) {
+  const std::size_t count = mesh.wedge_count();
+  const auto position = [&](std::size_t w) { return position_weld[mesh.wedge_position[w]]; };
+  std::vector<std::uint32_t> start(mesh.positions.size() + 1, 0);
+  for (std::size_t w = 0; w < count; ++w)
+    if (position(w) != kNoIndex) ++start[position(w) + 1];
+  std::partial_sum(start.begin(), start.end(), start.begin());
+  std::vector<std::uint32_t> order(start.back()), at(start.begin(), start.end() - 1);
+  for (std::size_t w = 0; w < count; ++w)
+    if (position(w) != kNoIndex) order[at[position(w)]++] = static_cast<std::uint32_t>(w);
+
+  std::vector<std::uint32_t> weld(count, kNoIndex);
+  for (std::size_t p = 0; p < mesh.positions.size(); ++p) {
+    const auto begin = order.begin() + start[p], end = order.begin() + start[p + 1];
+    if (end - begin > 1)
+      std::sort(begin, end, [&](std::uint32_t a, std::uint32_t b) {
+        const int c = Attributes(mesh, a).compare(Attributes(mesh, b));
+        return c != 0 ? c < 0 : a < b;
+      });
+    for (auto i = begin; i != end; ++i) {
+      const bool same = i != begin && Attributes(mesh, *i).compare(Attributes(mesh, *(i - 1))) == 0;
+      weld[*i] = same ? weld[*(i - 1)] : *i;
+    }
+  }
+  return weld;
 }
 
 }  // namespace texmesh

@@ -1,7 +1,7 @@
 #pragma once
-#include <cstdint>
 #include <span>
-#include <vector>
+
+#include "format/model/model.h"
 
 namespace texmesh {
 
@@ -22,6 +22,20 @@ inline std::uint32_t previous_corner(std::uint32_t corner) {
   return corner % 3 == 0 ? corner + 2 : corner - 1;
 }
 
+/// Where the corners of a triangle are, which indexes the mesh's wedges.
+inline std::array<Vec3d, 3> corner_points(const Mesh& mesh, const Triangle& t) {
+  const auto at = [&](std::size_t k) { return to_double(mesh.positions[mesh.wedge_position[t[k]]]); };
+  return {at(0), at(1), at(2)};
+}
+
+/// Of all triangles, which index the mesh's wedges.
+double surface_area(const Mesh& mesh, const std::vector<Triangle>& triangles);
+
+/// All corners of triangles, which must outlive them: 3 t + k is corner k of triangle t.
+inline std::span<const std::uint32_t> corners_of(std::span<const Triangle> triangles) {
+  return {reinterpret_cast<const std::uint32_t*>(triangles.data()), 3 * triangles.size()};
+}
+
 /// `corner_position`: three position indices (< position_count) per triangle, all three different. O(n log
 /// n).
 EdgeTable group_edges(std::span<const std::uint32_t> corner_position, std::size_t position_count);
@@ -36,5 +50,25 @@ class DisjointSets {
  private:
   std::vector<std::uint32_t> parent_;
 };
+
+/// Per position: the lowest index of the positions that it is welded with, itself included; kNoIndex for
+/// positions that are not finite. Bit-equal positions are welded (-0 equals +0), and, for distance > 0,
+/// greedily by index each position with the lowest kept one within `distance`. O(n log n).
+std::vector<std::uint32_t> weld_positions(const std::vector<Vec3f>& positions, double distance);
+
+/// Per wedge: the lowest index of the wedges with the same welded position and bit-equal attributes, or
+/// kNoIndex where the position has none. Only wedge_position and the attributes of `mesh` are read.
+std::vector<std::uint32_t> weld_wedges(const Mesh& mesh, const std::vector<std::uint32_t>& position_weld);
+
+/// The box of every connected component, by the components' numbers. `component`: per position.
+inline std::vector<Box3f> component_boxes(const std::vector<std::uint32_t>& component,
+                                          const std::vector<Vec3f>& positions) {
+  std::vector<Box3f> boxes;
+  for (std::size_t p = 0; p < component.size(); ++p) {
+    if (component[p] >= boxes.size()) boxes.resize(component[p] + 1);
+    boxes[component[p]].extend(positions[p]);
+  }
+  return boxes;
+}
 
 }  // namespace texmesh

@@ -39,6 +39,42 @@ std::vector<double> wedge_areas(const Mesh& mesh, const std::vector<Triangle>& t
   return area;
 }
 
+/// What a sample says about the normals of a face's corners.
+struct Tie {
+  std::array<std::uint32_t, 3> corner{};  // index of normals
+  std::array<double, 3> weight{};
+  Vec3f normal;
+  double area = 0;
+};
+
+/// Steps of least squares with lumped weights, which never overshoot. `tie_of(sample)`: nothing for a sample
+/// that no face takes.
+void improve(std::size_t samples, auto&& tie_of, std::vector<Vec3d>& normals) {
+  std::vector<Vec3d> change(normals.size());
+  std::vector<double> weight(normals.size());
+  for (int step = 0; step < kSteps; ++step) {
+    std::fill(change.begin(), change.end(), Vec3d{});
+    std::fill(weight.begin(), weight.end(), 0);
+    for (std::size_t s = 0; s < samples; ++s) {
+      const std::optional<Tie> tie = tie_of(s);
+      if (!tie) continue;
+      Vec3d here;
+      for (std::size_t k = 0; k < 3; ++k) here = here + normals[tie->corner[k]] * tie->weight[k];
+      const Vec3d missing = to_double(tie->normal) - normalized(here);
+      for (std::size_t k = 0; k < 3; ++k) {
+        const double w = tie->weight[k] * tie->area;
+        change[tie->corner[k]] = change[tie->corner[k]] + missing * w;
+        weight[tie->corner[k]] += w;
+      }
+    }
+    for (std::size_t i = 0; i < normals.size(); ++i) {
+      if (!(weight[i] > 0)) continue;
+      const Vec3d next = normals[i] + change[i] * (1 / weight[i]);
+      if (dot(next, next) > 1e-6) normals[i] = normalized(next);
+    }
+  }
+}
+
 /// The scale's triangles, around each place, and the normals that are sought.
 class Fit {
  public:
@@ -50,7 +86,16 @@ class Fit {
     add_faces(scale);
   }
   void take_samples(const std::vector<Triangle>& finest, const RunContext& context);
-  void improve();
+  void improve_normals() {
+    improve(
+        samples_.size(),
+        [this](std::size_t i) -> std::optional<Tie> {
+          const Sample& s = samples_[i];
+          if (s.face == kNoIndex) return std::nullopt;
+          return Tie{faces_[s.face].normal, s.weight, mesh_.normals[s.wedge], s.area};
+        },
+        normals_);
+  }
   ScaleFrames frames() const;
 
  private:
@@ -130,36 +175,7 @@ void Fit::take_samples(const std::vector<Triangle>& finest, const RunContext& co
   std::size_t count = 0;
   for (std::size_t i = 0; i < samples_.size(); i += every) samples_[count++] = samples_[i];
   samples_.resize(count);
-  parallel_for(context, count, 4096, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) put_on_face(samples_[i]);
-  });
-}
-
-/// Steps of least squares with lumped weights, which never overshoot.
-void Fit::improve() {
-  std::vector<Vec3d> change(normals_.size());
-  std::vector<double> weight(normals_.size());
-  for (int step = 0; step < kSteps; ++step) {
-    std::fill(change.begin(), change.end(), Vec3d{});
-    std::fill(weight.begin(), weight.end(), 0);
-    for (const Sample& s : samples_) {
-      if (s.face == kNoIndex) continue;
-      const std::array<std::uint32_t, 3>& corner = faces_[s.face].normal;
-      Vec3d here;
-      for (std::size_t k = 0; k < 3; ++k) here = here + normals_[corner[k]] * s.weight[k];
-      const Vec3d missing = to_double(mesh_.normals[s.wedge]) - normalized(here);
-      for (std::size_t k = 0; k < 3; ++k) {
-        const double w = s.weight[k] * s.area;
-        change[corner[k]] = change[corner[k]] + missing * w;
-        weight[corner[k]] += w;
-      }
-    }
-    for (std::size_t i = 0; i < normals_.size(); ++i) {
-      if (!(weight[i] > 0)) continue;
-      const Vec3d next = normals_[i] + change[i] * (1 / weight[i]);
-      if (dot(next, next) > 1e-6) normals_[i] = normalized(next);
-    }
-  }
+  parallel_each(context, count, 4096, [&](std::size_t i) { put_on_face(samples_[i]); });
 }
 
 ScaleFrames Fit::frames() const {
@@ -178,13 +194,29 @@ ScaleFrames Fit::frames() const {
   return out;
 }
 
+constexpr std::size_t kMostSamples = 400000;
+
+std::vector<std::optional<Tie>> ties_of(std::span<const Vec3d> points, std::span<const Triangle> triangles,
+                                        const NormalSamples& samples, const RunContext& context) {
+  const TriangleTree tree(points, triangles);
+  std::vector<std::optional<Tie>> out(samples.places.size());
+  parallel_each(context, out.size(), 256, [&](std::size_t s) {
+    const TriangleTree::Nearest found = tree.nearest(samples.places[s]);
+    const Triangle& t = triangles[found.triangle];
+    const Vec3d face = normalized(cross(points[t[1]] - points[t[0]], points[t[2]] - points[t[0]]));
+    if (dot(face, to_double(samples.normals[s])) > kLeastFacing)
+      out[s] = Tie{t, found.weight, samples.normals[s], samples.areas[s]};
+  });
+  return out;
+}
+
 }  // namespace
 
 ScaleFrames scale_frames(const NestedScales& scales, std::size_t index, const RunContext& context) {
   if (index == 0 || scales.mesh.normals.empty()) return {scales.mesh.normals, scales.mesh.tangents};
   Fit fit(scales, scales.scales.at(index));
   fit.take_samples(scales.scales[0].triangles, context);
-  fit.improve();
+  fit.improve_normals();
   return fit.frames();
 }
 
@@ -208,6 +240,33 @@ std::size_t stand_in_scale(const NestedScales& scales, std::size_t most_triangle
          2 * all[i + 1].triangles.size() >= most_triangles && double{all[i + 1].error_rms} <= farthest)
     ++i;
   return i;
+}
+
+NormalSamples normal_samples(const Mesh& mesh) {
+  NormalSamples out;
+  if (mesh.normals.empty()) return out;
+  const std::vector<double> areas = wedge_areas(mesh, mesh.triangles);
+  const std::size_t every = mesh.wedge_count() / kMostSamples + 1;
+  for (std::size_t w = 0; w < mesh.wedge_count(); w += every) {
+    if (!(areas[w] > 0)) continue;
+    out.places.push_back(to_double(mesh.positions[mesh.wedge_position[w]]));
+    out.normals.push_back(mesh.normals[w]);
+    out.areas.push_back(areas[w]);
+  }
+  return out;
+}
+
+std::vector<Vec3f> fit_normals(std::span<const Vec3d> points, std::span<const Triangle> triangles,
+                               std::vector<Vec3f> normals, const NormalSamples& samples,
+                               const RunContext& context) {
+  if (triangles.empty() || samples.places.empty()) return normals;
+  const std::vector<std::optional<Tie>> ties = ties_of(points, triangles, samples, context);
+  std::vector<Vec3d> fitted;
+  for (const Vec3f n : normals) fitted.push_back(to_double(n));
+  improve(
+      ties.size(), [&](std::size_t s) { return ties[s]; }, fitted);
+  for (std::size_t i = 0; i < normals.size(); ++i) normals[i] = to_float(fitted[i]);
+  return normals;
 }
 
 }  // namespace texmesh

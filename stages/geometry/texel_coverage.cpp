@@ -1,9 +1,7 @@
 #include "stages/geometry/texel_coverage.h"
 
-#include <limits>
-
 #include "format/base/portable_math.h"
-#include "stages/data/coverage.h"
+#include "stages/data/fragments.h"
 
 namespace texmesh {
 namespace {

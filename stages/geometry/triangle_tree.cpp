@@ -1,7 +1,6 @@
 #include "stages/geometry/triangle_tree.h"
 
 #include <bit>
-#include <cstddef>
 #include <numeric>
 
 namespace texmesh {
@@ -25,6 +24,38 @@ struct Polygon {
   std::array<Vec3d, 8> corner;
   std::size_t count = 0;
 };
+
+constexpr std::uint32_t kLeaf = 4;
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+double leaving_hit(const std::array<Vec3d, 3>& c, Vec3d origin, Vec3d direction) {
+  const Vec3d u = c[1] - c[0], v = c[2] - c[0], h = cross(direction, v);
+  const double det = dot(u, h);
+  if (!(det < 0)) return kInfinity;  // dot(direction, normal) = -det: only what looks along the ray
+  const Vec3d s = origin - c[0];
+  const double a = dot(s, h);
+  if (!(a <= 0 && a >= det)) return kInfinity;
+  const Vec3d q = cross(s, u);
+  const double b = dot(direction, q);
+  if (!(b <= 0 && a + b >= det)) return kInfinity;
+  const double t = dot(v, q) / det;
+  return t > 0 ? t : kInfinity;
+}
+
+void try_segment(Vec3d p, const std::array<Vec3d, 3>& c, std::size_t i, std::size_t j, OnTriangle& best) {
+  const Vec3d along = c[j] - c[i];
+  const double l = dot(along, along), t = l > 0 ? std::clamp(dot(p - c[i], along) / l, 0.0, 1.0) : 0;
+  const Vec3d d = p - (c[i] + along * t);
+  if (dot(d, d) >= best.distance2) return;
+  best.distance2 = dot(d, d);
+  best.weight = {};
+  best.weight[i] = 1 - t, best.weight[j] += t;
+}
+
+bool faces(const std::array<Vec3d, 3>& c, const TriangleTree::Facing& facing) {
+  const Vec3d n = cross(c[1] - c[0], c[2] - c[0]);
+  return dot(n, facing.direction) > facing.least_cosine * length(n);
+}
 
 }  // namespace
 
@@ -87,37 +118,6 @@ bool Tetrahedron::clipped(const std::array<Vec3d, 3>& triangle) const {
   }
   return true;
 }
-
-namespace {
-
-constexpr std::uint32_t kLeaf = 4;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-double leaving_hit(const std::array<Vec3d, 3>& c, Vec3d origin, Vec3d direction) {
-  const Vec3d u = c[1] - c[0], v = c[2] - c[0], h = cross(direction, v);
-  const double det = dot(u, h);
-  if (!(det < 0)) return kInfinity;  // dot(direction, normal) = -det: only what looks along the ray
-  const Vec3d s = origin - c[0];
-  const double a = dot(s, h);
-  if (!(a <= 0 && a >= det)) return kInfinity;
-  const Vec3d q = cross(s, u);
-  const double b = dot(direction, q);
-  if (!(b <= 0 && a + b >= det)) return kInfinity;
-  const double t = dot(v, q) / det;
-  return t > 0 ? t : kInfinity;
-}
-
-void try_segment(Vec3d p, const std::array<Vec3d, 3>& c, std::size_t i, std::size_t j, OnTriangle& best) {
-  const Vec3d along = c[j] - c[i];
-  const double l = dot(along, along), t = l > 0 ? std::clamp(dot(p - c[i], along) / l, 0.0, 1.0) : 0;
-  const Vec3d d = p - (c[i] + along * t);
-  if (dot(d, d) >= best.distance2) return;
-  best.distance2 = dot(d, d);
-  best.weight = {};
-  best.weight[i] = 1 - t, best.weight[j] += t;
-}
-
-}  // namespace
 
 OnTriangle closest_on_triangle(const std::array<Vec3d, 3>& c, Vec3d p) {
   OnTriangle best;
@@ -335,15 +335,6 @@ bool TriangleTree::meets(const Tetrahedron& solid, std::uint64_t& tried) const {
   }
   return false;
 }
-
-namespace {
-
-bool faces(const std::array<Vec3d, 3>& c, const TriangleTree::Facing& facing) {
-  const Vec3d n = cross(c[1] - c[0], c[2] - c[0]);
-  return dot(n, facing.direction) > facing.least_cosine * length(n);
-}
-
-}  // namespace
 
 /// A line, and the least crossing that has been found of it.
 struct TriangleTree::LineSearch {

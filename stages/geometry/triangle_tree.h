@@ -7,7 +7,6 @@
 #include <optional>
 #include <span>
 
-#include "format/base/box.h"
 #include "format/model/model.h"
 
 namespace texmesh {

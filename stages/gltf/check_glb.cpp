@@ -7,7 +7,6 @@
 
 #include <tuple>
 
-#include "format/base/box.h"
 #include "format/container/layout.h"
 #include "stages/gltf/glb_document.h"
 #include "stages/image/decode_image.h"
@@ -370,8 +369,7 @@ void check_glb_material(GlbDocument& d, std::size_t i) {
 }
 
 /// Runs body(i) for every element of the array `key`; a fault is a finding and ends that element only.
-template <class Body>
-void for_each_element(GlbDocument& d, const char* key, const char* check, Body&& body) {
+void for_each_element(GlbDocument& d, const char* key, const char* check, auto&& body) {
   d.guarded(check, std::string("/") + key, [&] {
     const std::size_t count = d.array(d.root(), key, "").size();
     for (std::size_t i = 0; i < count; ++i) d.guarded(check, GlbDocument::element(key, i), [&] { body(i); });

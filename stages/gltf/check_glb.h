@@ -1,8 +1,4 @@
 #pragma once
-#include <cstdint>
-#include <span>
-#include <string>
-#include <vector>
 
 #include "format/base/finding.h"
 #include "format/base/sha256.h"

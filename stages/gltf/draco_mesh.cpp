@@ -5,7 +5,6 @@
 #include <draco/mesh/mesh.h>
 
 #include <charconv>
-#include <limits>
 
 #include "stages/base/first_use_table.h"
 

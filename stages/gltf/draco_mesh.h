@@ -1,17 +1,11 @@
 #pragma once
 // Meshes as streams of KHR_draco_mesh_compression: one encoder, for meshes that are made and for those of
 // files.
-#include <array>
-#include <cstdint>
 #include <cstring>
 #include <map>
 #include <memory>
-#include <span>
-#include <string>
-#include <vector>
 
-#include "format/base/vec.h"
-#include "stages/geometry/fit_normals.h"
+#include "stages/geometry/scale_frames.h"
 
 namespace draco {
 class Mesh;
@@ -46,8 +40,7 @@ class DracoMesh {
   /// Adds an attribute with glTF's name, of which vertex i has value(i): a vector of floats, or a std::array
   /// of codes of 8 or 16 bits. Attributes stand in the stream in the order of the calls. Of normals the grid
   /// tells the bits alone.
-  template <class Value>
-  void add(const std::string& name, const DracoGrid& grid, const Value& value) {
+  void add(const std::string& name, const DracoGrid& grid, const auto& value) {
     using Element = decltype(value(0u));
     std::uint8_t* to = values_of(name, component_bytes(Element()), sizeof(Element), grid);
     for (std::uint32_t i = 0; i < vertices_; ++i) {
@@ -65,10 +58,7 @@ class DracoMesh {
   static std::size_t component_bytes(const std::array<T, N>&) {
     return sizeof(T);
   }
-  template <class V>
-  static std::size_t component_bytes(const V&) {
-    return sizeof(float);
-  }
+  static std::size_t component_bytes(const auto&) { return sizeof(float); }
   std::uint8_t* values_of(const std::string& name, std::size_t component_bytes, std::size_t bytes,
                           const DracoGrid& grid);
   std::uint32_t vertices_;

@@ -26,19 +26,8 @@ std::uint32_t read_u32(std::span<const std::uint8_t> bytes, std::size_t at) {
 }
 
 std::size_t bytes_of_component(std::uint64_t type) {
-  switch (type) {
-    case 5120:
-    case 5121:
-      return 1;
-    case 5122:
-    case 5123:
-      return 2;
-    case 5125:
-    case 5126:
-      return 4;
-    default:
-      return 0;
-  }
+  constexpr std::array<std::uint8_t, 7> kBytes{1, 1, 2, 2, 0, 4, 4};
+  return type >= 5120 && type - 5120 < kBytes.size() ? kBytes[type - 5120] : 0;
 }
 
 std::size_t components_of_type(const std::string& type) {

@@ -3,8 +3,6 @@
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <span>
-#include <string>
-#include <vector>
 
 #include "format/base/finding.h"
 
@@ -64,8 +62,7 @@ class GlbDocument {
   /// A required index below `size`.
   std::size_t index(const Json& object, const char* key, std::size_t size, const std::string& place);
   /// Runs `body`; a Broken ends it, other exceptions become findings of `check`.
-  template <class F>
-  bool guarded(const char* check, const std::string& place, F&& body) {
+  bool guarded(const char* check, const std::string& place, auto&& body) {
     try {
       body();
       return true;

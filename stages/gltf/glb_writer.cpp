@@ -2,15 +2,19 @@
 
 #include <meshoptimizer.h>
 
-#include <algorithm>
-#include <charconv>
-
+#include "format/base/json_fields.h"
 #include "stages/gltf/glb_container.h"
 
 namespace texmesh {
 namespace {
 
 constexpr int kUnsignedShort = 5123, kUnsignedInt = 5125;
+
+std::vector<std::uint8_t> of_size(std::vector<std::uint8_t> packed, std::size_t size, const char* stage) {
+  if (size == 0) throw StageError(stage, "meshopt", "a compressed stream", "nothing");
+  packed.resize(size);
+  return packed;
+}
 
 }  // namespace
 
@@ -91,13 +95,7 @@ void GlbWriter::use_extension(const std::string& name, bool required) {
   if (required) add(required_);
 }
 
-double GlbWriter::shortest(float x) {
-  std::array<char, 64> text;
-  const auto end = std::to_chars(text.data(), text.data() + text.size(), x).ptr;
-  double d = 0;
-  std::from_chars(text.data(), end, d);
-  return d;
-}
+double GlbWriter::shortest(float x) { return shortest_double(x); }
 
 GlbWriter::Json GlbWriter::shortest(std::initializer_list<float> numbers) {
   Json out = Json::array();
@@ -127,16 +125,6 @@ std::vector<std::uint8_t> GlbWriter::finish() const {
 
   return glb_container(root.dump(-1, ' ', false, Json::error_handler_t::replace), bin);
 }
-
-namespace {
-
-std::vector<std::uint8_t> of_size(std::vector<std::uint8_t> packed, std::size_t size, const char* stage) {
-  if (size == 0) throw StageError(stage, "meshopt", "a compressed stream", "nothing");
-  packed.resize(size);
-  return packed;
-}
-
-}  // namespace
 
 std::vector<std::uint8_t> meshopt_attributes(std::span<const std::uint8_t> bytes, std::size_t count,
                                              std::size_t stride, const char* stage) {

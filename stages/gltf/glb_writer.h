@@ -2,9 +2,6 @@
 // The bitstreams of EXT_meshopt_compression without filters: attributes of version 0, triangles of version 1.
 #include <nlohmann/json.hpp>
 
-#include <cstddef>
-#include <initializer_list>
-
 #include "stages/gltf/draco_mesh.h"
 
 namespace texmesh {

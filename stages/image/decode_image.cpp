@@ -1,6 +1,4 @@
-#include "stages/image/decode_image.h"
-
-#include "format/base/srgb.h"
+#include "format/base/portable_math.h"
 #include "stages/image/decode_jpeg.h"
 #include "stages/image/decode_tiff_exr.h"
 #include "stages/image/image_metadata.h"
@@ -59,16 +57,24 @@ Pixels decode_jpeg_pixels(const Image& image, std::string& damage) {
   return pixels;
 }
 
-void check_png_unchanged(const Image& image) {
-  const PngHeader header = read_png_header(image.name, image.bytes);
+ImageHeader header_of(const JpegHeader& h) {
+  return {h.width_px, h.height_px, static_cast<std::uint8_t>(h.channels), 8};
+}
+
+ImageHeader header_of(const PngHeader& h) {
+  return {h.width_px, h.height_px, static_cast<std::uint8_t>(h.channels), static_cast<std::uint8_t>(h.bits)};
+}
+
+void check_unchanged(const Image& image, const char* place, const ImageHeader& header) {
   if (header.width_px != image.width_px || header.height_px != image.height_px ||
-      header.channels != image.channels || header.bits != image.bits_per_channel)
-    throw InputError(image.name, "PNG header", "the size that import had found", "another one");
+      header.channels != image.channels || header.bits_per_channel != image.bits_per_channel)
+    throw InputError(image.name, place, "the size that import had found", "another one");
 }
 
 // Every sample of a PNG, 16-bit ones as words.
 template <class T>
 std::vector<T> png_pixels(const Image& image) {
+  check_unchanged(image, "PNG header", header_of(read_png_header(image.name, image.bytes)));
   const std::size_t row = static_cast<std::size_t>(image.width_px) * image.channels;
   std::vector<T> samples;
   samples.reserve(row * image.height_px);  // filled row by row, so that a header that lies costs nothing
@@ -78,13 +84,6 @@ std::vector<T> png_pixels(const Image& image) {
     std::memcpy(samples.data() + before, from, row * sizeof(T));
   });
   return samples;
-}
-
-void check_jpeg_unchanged(const Image& image) {
-  const JpegHeader header = read_jpeg_header(image.name, image.bytes);
-  if (header.width_px != image.width_px || header.height_px != image.height_px ||
-      header.channels != image.channels)
-    throw InputError(image.name, "JPEG header", "the size that import had found", "another one");
 }
 
 void store_words(const std::vector<std::uint16_t>& words, const ColourProfile* profile, Pixels& pixels) {
@@ -102,7 +101,7 @@ void store_floats(const std::vector<float>& values, FloatEncoding encoding, cons
 Pixels decode_stored(const Image& image, FloatEncoding encoding, const ColourProfile* profile,
                      std::string& damage) {
   if (image.format == ImageFormat::kJpeg && image.bits_per_channel == 8) {
-    check_jpeg_unchanged(image);
+    check_unchanged(image, "JPEG header", header_of(read_jpeg_header(image.name, image.bytes)));
     return decode_jpeg_pixels(image, damage);
   }
   Pixels pixels{image.width_px, image.height_px, image.channels, {}};
@@ -115,7 +114,6 @@ Pixels decode_stored(const Image& image, FloatEncoding encoding, const ColourPro
     return pixels;
   }
   if (image.format == ImageFormat::kPng) {
-    check_png_unchanged(image);
     if (image.bits_per_channel == 16)
       store_words(png_pixels<std::uint16_t>(image), profile, pixels);
     else
@@ -130,14 +128,6 @@ Pixels decode_stored(const Image& image, FloatEncoding encoding, const ColourPro
   else
     store_floats(std::get<std::vector<float>>(samples), encoding, profile, pixels);
   return pixels;
-}
-
-ImageHeader header_of(const JpegHeader& h) {
-  return {h.width_px, h.height_px, static_cast<std::uint8_t>(h.channels), 8};
-}
-
-ImageHeader header_of(const PngHeader& h) {
-  return {h.width_px, h.height_px, static_cast<std::uint8_t>(h.channels), static_cast<std::uint8_t>(h.bits)};
 }
 
 ImageHeader read_header(const std::string& name, ImageFormat format, ByteSpan bytes,
@@ -220,7 +210,6 @@ FloatPixels decode_float(const Image& image) {
   FloatPixels pixels{image.width_px, image.height_px, image.channels, {}};
   auto widen = [&pixels](const auto& samples) { pixels.data.assign(samples.begin(), samples.end()); };
   if (image.format == ImageFormat::kPng && image.bits_per_channel == 16) {
-    check_png_unchanged(image);
     widen(png_pixels<std::uint16_t>(image));
     return pixels;
   }

@@ -2,9 +2,7 @@
 
 #include <algorithm>
 #include <csetjmp>
-#include <cstddef>
 #include <cstdio>
-#include <exception>
 
 #include <jpeglib.h>
 // jerror.h needs jpeglib.h first.
@@ -70,16 +68,10 @@ void on_damage(j_common_ptr info) {
 
 void on_message(j_common_ptr info, int level) {
   if (level >= 0) return;  // a trace
-  switch (info->err->msg_code) {
-    case JWRN_JPEG_EOF:
-    case JWRN_HIT_MARKER:
-    case JWRN_HUFF_BAD_CODE:
-    case JWRN_ARITH_BAD_CODE:
-    case JWRN_MUST_RESYNC:
-      return on_damage(info);
-    default:
-      return;  // stray bytes between markers and the like: every viewer shows such files
-  }
+  // The others are stray bytes between markers and the like: every viewer shows such files.
+  for (const int damage :
+       {JWRN_JPEG_EOF, JWRN_HIT_MARKER, JWRN_HUFF_BAD_CODE, JWRN_ARITH_BAD_CODE, JWRN_MUST_RESYNC})
+    if (info->err->msg_code == damage) return on_damage(info);
 }
 
 void on_progress(j_common_ptr info) {

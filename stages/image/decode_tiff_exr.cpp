@@ -1,10 +1,9 @@
 #include <dlfcn.h>
 
-#include <algorithm>
 #include <map>
 
 #include "stages/image/jpeg_segments.h"
-#include "stages/image/readers_module/readers.h"
+#include "stages/image/readers_module/other_pictures.h"
 
 namespace texmesh {
 namespace {
@@ -28,20 +27,6 @@ ReaderModule load_module() {
   const char* const why = ::dlerror();
   return {nullptr, why ? why : "an error without a message"};
 }
-
-}  // namespace
-
-const ModuleReaders& module_readers(const std::string& name, const std::string& what,
-                                    const std::string& package) {
-  static const ReaderModule module = load_module();
-  if (module.readers) return *module.readers;
-  throw InputError(name, "",
-                   "a reader for " + what + ": " + kModule +
-                       ", which is installed with texmesh, and Debian's package " + package,
-                   module.problem);
-}
-
-namespace {
 
 const ModuleReaders& reader_for(const std::string& name, ImageFormat format) {
   return module_readers(name, image_format_name(format), "libopenimageio2.4");
@@ -118,33 +103,6 @@ bool has_right_length(const ExrAttribute& a) {
   return width < a.bytes && height < a.bytes && a.bytes == 8 + 4 * width * height;
 }
 
-}  // namespace
-
-void for_each_exr_attribute(ByteSpan exr,
-                            const std::function<void(std::size_t part, const ExrAttribute&)>& f) {
-  constexpr std::size_t kFlagsAt = 5, kHead = 8;
-  constexpr std::uint8_t kParts = 0x10;
-  if (exr.size() < kHead) return;
-  const bool many = (exr[kFlagsAt] & kParts) != 0;
-  std::size_t part = 0;
-  for (std::size_t at = kHead; at < exr.size();) {
-    if (exr[at] == 0) {  // the end of a part's header; two of them end the headers
-      if (!many || ++at >= exr.size() || exr[at] == 0) return;
-      ++part;
-    }
-    ExrAttribute a;
-    a.name = exr_text(exr, at), a.type = exr_text(exr, at);
-    if (!a.name.data() || !a.type.data() || exr.size() - at < 4) return;
-    a.bytes = BytesIn(exr.subspan(at, 4), "EXR").u32();
-    at += 4;
-    a.value = exr.subspan(at, std::min<std::size_t>(a.bytes, exr.size() - at));
-    f(part, a);
-    at += a.value.size();
-  }
-}
-
-namespace {
-
 /// What OpenEXR takes memory for when it opens a file: attributes, and its packers' buffers for up to 256
 /// lines of all channels of the first part.
 void check_exr_header(const std::string& name, ByteSpan bytes, const ImageLimits& limits) {
@@ -171,6 +129,39 @@ void check_exr_header(const std::string& name, ByteSpan bytes, const ImageLimits
 }
 
 }  // namespace
+
+const ModuleReaders& module_readers(const std::string& name, const std::string& what,
+                                    const std::string& package) {
+  static const ReaderModule module = load_module();
+  if (module.readers) return *module.readers;
+  throw InputError(name, "",
+                   "a reader for " + what + ": " + kModule +
+                       ", which is installed with texmesh, and Debian's package " + package,
+                   module.problem);
+}
+
+void for_each_exr_attribute(ByteSpan exr,
+                            const std::function<void(std::size_t part, const ExrAttribute&)>& f) {
+  constexpr std::size_t kFlagsAt = 5, kHead = 8;
+  constexpr std::uint8_t kParts = 0x10;
+  if (exr.size() < kHead) return;
+  const bool many = (exr[kFlagsAt] & kParts) != 0;
+  std::size_t part = 0;
+  for (std::size_t at = kHead; at < exr.size();) {
+    if (exr[at] == 0) {  // the end of a part's header; two of them end the headers
+      if (!many || ++at >= exr.size() || exr[at] == 0) return;
+      ++part;
+    }
+    ExrAttribute a;
+    a.name = exr_text(exr, at), a.type = exr_text(exr, at);
+    if (!a.name.data() || !a.type.data() || exr.size() - at < 4) return;
+    a.bytes = BytesIn(exr.subspan(at, 4), "EXR").u32();
+    at += 4;
+    a.value = exr.subspan(at, std::min<std::size_t>(a.bytes, exr.size() - at));
+    f(part, a);
+    at += a.value.size();
+  }
+}
 
 ImageHeader read_tiff_exr_header(const std::string& name, ImageFormat format, ByteSpan bytes,
                                  const ImageLimits& limits) {

@@ -1,17 +1,10 @@
 #pragma once
 // Inside stages: what the module texmesh_readers.so reads, which is loaded when it is first needed: TIFF and
 // EXR by OpenImageIO, and JPEGs of 9 to 16 bits a sample, which libjpeg-turbo does not read, by DCMTK.
-#include <cstddef>
-#include <cstdint>
 #include <functional>
-#include <optional>
-#include <string>
-#include <string_view>
 #include <variant>
-#include <vector>
 
-#include "format/base/bytes.h"
-#include "stages/image/image_format.h"
+#include "stages/image/decode_image.h"
 
 namespace texmesh {
 

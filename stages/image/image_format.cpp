@@ -1,34 +1,16 @@
-#include "stages/image/image_format.h"
+#include "stages/image/decode_image.h"
 
 namespace texmesh {
 
-namespace {
-
-struct FormatWords {
-  const char *name, *extension;
-};
-
-FormatWords words_of(ImageFormat format) {
-  switch (format) {
-    case ImageFormat::kJpeg:
-      return {"JPEG", "jpg"};
-    case ImageFormat::kPng:
-      return {"PNG", "png"};
-    case ImageFormat::kTiff:
-      return {"TIFF", "tif"};
-    case ImageFormat::kWebp:
-      return {"WebP", "webp"};
-    case ImageFormat::kExr:
-      return {"EXR", "exr"};
-  }
-  return {"", ""};
+const char* image_format_name(ImageFormat format) {
+  constexpr const char* kNames[] = {"JPEG", "PNG", "TIFF", "WebP", "EXR"};
+  return kNames[static_cast<std::size_t>(format)];
 }
 
-}  // namespace
-
-const char* image_format_name(ImageFormat format) { return words_of(format).name; }
-
-const char* image_extension(ImageFormat format) { return words_of(format).extension; }
+const char* image_extension(ImageFormat format) {
+  constexpr const char* kExtensions[] = {"jpg", "png", "tif", "webp", "exr"};
+  return kExtensions[static_cast<std::size_t>(format)];
+}
 
 std::optional<ImageFormat> sniff_image_format(ByteSpan bytes) {
   auto has = [bytes](std::size_t at, std::string_view magic) {

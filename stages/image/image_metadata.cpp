@@ -3,13 +3,12 @@
 
 #include <zlib.h>
 
-#include <algorithm>
 #include <cstdlib>
 #include <map>
 
+#include "stages/base/float_math.h"
 #include "stages/image/decode_tiff_exr.h"
 #include "stages/image/jpeg_segments.h"
-#include "stages/image/srgb_encoder.h"
 
 namespace texmesh {
 namespace {
@@ -115,27 +114,11 @@ void read_exif(ByteSpan exif, ImageMetadata& out) {
 /// Of the photometric interpretations that libtiff knows, those whose values are no plain colours. Nothing
 /// for white or black is zero, RGB, palette, CMYK, YCbCr.
 std::string foreign_name(std::uint32_t photometric) {
-  switch (photometric) {
-    case 0:
-    case 1:
-    case 2:
-    case 3:
-    case 5:
-    case 6:
-      return "";
-    case 8:
-    case 9:
-    case 10:
-      return "CIE L*a*b*";
-    case 32844:
-    case 32845:
-      return "CIE log L";
-    case 32803:
-    case 34892:
-      return "raw camera data";
-    default:
-      return "photometric interpretation " + std::to_string(photometric);
-  }
+  if (photometric <= 6 && photometric != 4) return "";
+  if (photometric >= 8 && photometric <= 10) return "CIE L*a*b*";
+  if (photometric == 32844 || photometric == 32845) return "CIE log L";
+  if (photometric == 32803 || photometric == 34892) return "raw camera data";
+  return "photometric interpretation " + std::to_string(photometric);
 }
 
 void read_tiff(ByteSpan bytes, ImageMetadata& out) {
@@ -143,9 +126,7 @@ void read_tiff(ByteSpan bytes, ImageMetadata& out) {
   read_orientation(bytes, out);
   const Tiff tiff(bytes);
   out.more_pictures = tiff.more();
-  if (const std::size_t at = tiff.entry(kProfile)) {
-    read_profile(tiff.far_value(at), out);
-  }
+  if (const std::size_t at = tiff.entry(kProfile)) read_profile(tiff.far_value(at), out);
   if (const std::size_t at = tiff.entry(kPhotometric)) {
     const std::uint32_t colours = tiff.short_value(at);
     out.cmyk = colours == kSeparated;
@@ -259,32 +240,6 @@ void read_exr(ByteSpan bytes, ImageMetadata& out) {
   });
 }
 
-}  // namespace
-
-ImageMetadata read_image_metadata(ImageFormat format, std::span<const std::uint8_t> bytes) {
-  ImageMetadata out;
-  switch (format) {
-    case ImageFormat::kJpeg:
-      read_jpeg(bytes, out);
-      break;
-    case ImageFormat::kPng:
-      read_png_metadata(bytes, out);
-      break;
-    case ImageFormat::kTiff:
-      read_tiff(bytes, out);
-      break;
-    case ImageFormat::kWebp:
-      read_webp(bytes, out);
-      break;
-    case ImageFormat::kExr:
-      read_exr(bytes, out);
-      break;
-  }
-  return out;
-}
-
-namespace {
-
 using Matrix = std::array<std::array<double, 3>, 3>;
 
 /// Columns: X, Y, Z (D50, as all profiles speak) of sRGB's red, green and blue at full light.
@@ -363,10 +318,7 @@ class IccReader {
     return bytes_.subspan(at, count);
   }
   std::uint32_t u32(std::size_t at) const { return u32_of(part(at, 4), 0); }
-  static std::uint32_t u32_of(ByteSpan b, std::size_t at) {
-    return static_cast<std::uint32_t>(b[at]) << 24 | static_cast<std::uint32_t>(b[at + 1]) << 16 |
-           static_cast<std::uint32_t>(b[at + 2]) << 8 | b[at + 3];
-  }
+  static std::uint32_t u32_of(ByteSpan b, std::size_t at) { return big(b.subspan(at, 4)); }
   static double fixed(ByteSpan b, std::size_t at) {
     return static_cast<std::int32_t>(u32_of(b, at)) / 65536.0;
   }
@@ -469,6 +421,13 @@ void convert_all(const ColourProfile& profile, const Sample* in, Pixels& pixels)
 }
 
 }  // namespace
+
+ImageMetadata read_image_metadata(ImageFormat format, std::span<const std::uint8_t> bytes) {
+  ImageMetadata out;
+  constexpr std::array kReaders{read_jpeg, read_png_metadata, read_tiff, read_webp, read_exr};
+  kReaders.at(static_cast<std::size_t>(format))(bytes, out);
+  return out;
+}
 
 ColourProfile read_icc_profile(const std::string& name, std::span<const std::uint8_t> bytes,
                                std::uint32_t channels, std::size_t codes) {

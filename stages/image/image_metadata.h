@@ -1,10 +1,6 @@
 #pragma once
-#include <array>
-#include <cstdint>
 #include <optional>
 #include <span>
-#include <string>
-#include <vector>
 
 #include "format/model/model.h"
 #include "stages/data/pixels.h"

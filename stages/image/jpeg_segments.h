@@ -1,6 +1,4 @@
 #pragma once
-#include <cstddef>
-#include <cstdint>
 
 #include "format/base/bytes.h"
 
@@ -13,8 +11,7 @@ inline bool is_jpeg_frame(std::uint8_t marker) {
 
 /// Calls f(marker, body) for every whole segment in front of a JPEG's first scan, as long as segments follow
 /// each other; what is no JPEG has none. ITU-T T.81, annex B.
-template <class F>
-void for_each_jpeg_segment(ByteSpan jpeg, const F& f) {
+void for_each_jpeg_segment(ByteSpan jpeg, const auto& f) {
   constexpr std::uint8_t kFill = 0xff, kScan = 0xda, kEndOfImage = 0xd9;
   for (std::size_t at = 2; at + 4 <= jpeg.size() && jpeg[at] == 0xff;) {
     const std::uint8_t marker = jpeg[at + 1];

@@ -52,45 +52,6 @@ long cost(const std::vector<std::uint8_t>& row) {
   return sum;
 }
 
-}  // namespace
-
-std::vector<std::uint8_t> write_png(const Pixels& image, const PngOptions& options) {
-  const std::uint32_t channels = image.channels;
-  if (image.width_px == 0 || image.height_px == 0 || (channels != 1 && channels != 3 && channels != 4))
-    throw StageError("png", "image", "1, 3 or 4 channels and at least one pixel",
-                     std::to_string(channels) + " channels");
-  std::vector<std::uint8_t> rows;
-  for (std::uint32_t y = 0; y < image.height_px; ++y) {
-    std::vector<std::uint8_t> best = filter_row(image, y, 0);
-    for (int filter = 1; filter < 5; ++filter) {
-      std::vector<std::uint8_t> row = filter_row(image, y, filter);
-      if (cost(row) < cost(best)) best = std::move(row);
-    }
-    rows.insert(rows.end(), best.begin(), best.end());
-  }
-  uLongf size = compressBound(static_cast<uLong>(rows.size()));
-  std::vector<std::uint8_t> packed(size);
-  if (compress2(packed.data(), &size, rows.data(), static_cast<uLong>(rows.size()), options.level) != Z_OK)
-    throw StageError("png", "deflate", "a compressed stream", "an error");
-  packed.resize(size);
-  std::vector<std::uint8_t> header;
-  put_u32(header, image.width_px);
-  put_u32(header, image.height_px);
-  header.insert(header.end(), {8,
-                               static_cast<std::uint8_t>(channels == 1   ? 0
-                                                         : channels == 3 ? 2
-                                                                         : 6),
-                               0, 0, 0});
-  std::vector<std::uint8_t> out{0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
-  put_chunk(out, "IHDR", header);
-  if (options.linear) put_chunk(out, "gAMA", {0, 1, 0x86, 0xa0});  // 100,000 / 100,000
-  put_chunk(out, "IDAT", packed);
-  put_chunk(out, "IEND", {});
-  return out;
-}
-
-namespace {
-
 // libpng leaves by longjmp: functions that call it own nothing with a destructor, everything lives here.
 struct PngDecoder {
   std::span<const std::uint8_t> bytes;
@@ -226,6 +187,41 @@ void decode_interlaced(const std::string& name, PngDecoder& d, const PngHeader& 
 }
 
 }  // namespace
+
+std::vector<std::uint8_t> write_png(const Pixels& image, const PngOptions& options) {
+  const std::uint32_t channels = image.channels;
+  if (image.width_px == 0 || image.height_px == 0 || (channels != 1 && channels != 3 && channels != 4))
+    throw StageError("png", "image", "1, 3 or 4 channels and at least one pixel",
+                     std::to_string(channels) + " channels");
+  std::vector<std::uint8_t> rows;
+  for (std::uint32_t y = 0; y < image.height_px; ++y) {
+    std::vector<std::uint8_t> best = filter_row(image, y, 0);
+    for (int filter = 1; filter < 5; ++filter) {
+      std::vector<std::uint8_t> row = filter_row(image, y, filter);
+      if (cost(row) < cost(best)) best = std::move(row);
+    }
+    rows.insert(rows.end(), best.begin(), best.end());
+  }
+  uLongf size = compressBound(static_cast<uLong>(rows.size()));
+  std::vector<std::uint8_t> packed(size);
+  if (compress2(packed.data(), &size, rows.data(), static_cast<uLong>(rows.size()), options.level) != Z_OK)
+    throw StageError("png", "deflate", "a compressed stream", "an error");
+  packed.resize(size);
+  std::vector<std::uint8_t> header;
+  put_u32(header, image.width_px);
+  put_u32(header, image.height_px);
+  header.insert(header.end(), {8,
+                               static_cast<std::uint8_t>(channels == 1   ? 0
+                                                         : channels == 3 ? 2
+                                                                         : 6),
+                               0, 0, 0});
+  std::vector<std::uint8_t> out{0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
+  put_chunk(out, "IHDR", header);
+  if (options.linear) put_chunk(out, "gAMA", {0, 1, 0x86, 0xa0});  // 100,000 / 100,000
+  put_chunk(out, "IDAT", packed);
+  put_chunk(out, "IEND", {});
+  return out;
+}
 
 PngHeader read_png_header(const std::string& name, std::span<const std::uint8_t> bytes) {
   PngDecoder d(bytes);

@@ -1,9 +1,6 @@
 #pragma once
-#include <cstdint>
 #include <functional>
 #include <span>
-#include <string>
-#include <vector>
 
 #include "stages/data/pixels.h"
 

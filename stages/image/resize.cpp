@@ -4,8 +4,8 @@
 #include <numeric>
 #include <type_traits>
 
+#include "stages/base/float_math.h"
 #include "stages/base/parallel.h"
-#include "stages/image/srgb_encoder.h"
 
 namespace texmesh {
 namespace {
@@ -222,9 +222,8 @@ Pixels reduced(const Pixels& from, std::uint32_t used_width, std::uint32_t used_
                      std::to_string(width) + " x " + std::to_string(height));
   if (width == used_width && height == used_height) return cropped(from, width, height);
   std::array<float, 256> value;
-  for (std::size_t v = 0; v < 256; ++v)
-    value[v] = kind == Averaging::kLight ? static_cast<float>(light_of_srgb(static_cast<double>(v) / 255))
-                                         : static_cast<float>(v);
+  std::iota(value.begin(), value.end(), 0.f);
+  if (kind == Averaging::kLight) value = light_of_bytes();
   const Axis columns = axis_of(used_width, width), rows = axis_of(used_height, height);
   const std::vector<float> column_shares = shares_of(columns), row_shares = shares_of(rows);
   const float scale = static_cast<float>(static_cast<double>(width) * height /

@@ -1,6 +1,5 @@
 #pragma once
 // Pixels averaged over areas: the levels of a texture, and any smaller size.
-#include <cstdint>
 
 #include "stages/base/run_context.h"
 #include "stages/data/fragments.h"

@@ -1,8 +1,7 @@
 #pragma once
 // WebP by libwebp itself, both ways: OpenImageIO 2.4 multiplies alpha into the colours whatever it is asked.
 
-#include "stages/data/pixels.h"
-#include "stages/image/image_format.h"
+#include "stages/image/decode_image.h"
 #include "stages/image/pixel_window.h"
 
 namespace texmesh {

@@ -2,8 +2,6 @@
 // Inside stages only: blocks of a baseline scan, each coded at several rungs by what of it is seen. A block
 // becomes coefficients (quantise_whole(), MaskedBlock, flat_block()), these become symbols (emit_block()),
 // and a sink writes or counts them.
-#include <algorithm>
-#include <bit>
 #include <cstdlib>
 
 #include "format/base/bytes.h"
@@ -227,8 +225,7 @@ class CountSink {
 };
 
 /// The symbols of a block, ISO 10918-1 F.1.2.
-template <class Sink>
-void emit_block(const CodedBlock& block, int dc_before, std::size_t component, Sink& sink) {
+void emit_block(const CodedBlock& block, int dc_before, std::size_t component, auto& sink) {
   const auto size = [](int v) {
     return static_cast<unsigned>(std::bit_width(static_cast<unsigned>(std::abs(v))));
   };

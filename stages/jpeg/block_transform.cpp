@@ -1,7 +1,6 @@
 #include "stages/jpeg/block_transform.h"
 
 #include <cmath>
-#include <cstddef>
 #include <cstring>
 
 #include "format/base/portable_math.h"

@@ -1,11 +1,7 @@
 #pragma once
-#include <cstdint>
 #include <span>
-#include <string_view>
-#include <vector>
 
 #include "stages/data/pixels.h"
-#include "stages/data/subsampling.h"
 
 namespace texmesh {
 

@@ -5,7 +5,6 @@
 #include <memory>
 #include <optional>
 
-#include "stages/data/subsampling.h"
 #include "stages/image/pixel_window.h"
 #include "stages/jpeg/jpeg_stream.h"
 

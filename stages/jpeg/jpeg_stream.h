@@ -1,7 +1,6 @@
 #pragma once
 // Huffman tables, and what is in the entropy-coded data of a JPEG.
 #include <array>
-#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>

@@ -49,6 +49,44 @@ std::string obstacle(const SourceLayout& layout, std::uint32_t width_px, std::ui
   return "";
 }
 
+std::uint32_t divided_up(std::uint64_t a, std::uint64_t b) {
+  return static_cast<std::uint32_t>((a + b - 1) / b);
+}
+
+struct TexelRange {
+  std::int64_t begin, end;
+};
+
+bool shows_any(const CoverageMask& mask, TexelRange x, TexelRange y) {
+  x = {std::max<std::int64_t>(x.begin, 0), std::min<std::int64_t>(x.end, mask.width_px)};
+  y = {std::max<std::int64_t>(y.begin, 0), std::min<std::int64_t>(y.end, mask.height_px)};
+  for (auto v = static_cast<std::uint32_t>(y.begin); v < y.end; ++v)
+    for (auto u = static_cast<std::uint32_t>(x.begin); u < x.end;) {
+      const bool whole = u % 8 == 0 && u + 8 <= x.end;
+      if (whole ? mask.byte_at(u, v) != 0 : mask.covered(u, v)) return true;
+      u += whole ? 8 : 1;
+    }
+  return false;
+}
+
+std::int16_t requantised(std::int16_t value, std::uint16_t from, std::uint16_t to) {
+  const int product = std::abs(int{value}) * from, rounded = (2 * product + to) / (2 * to);
+  return static_cast<std::int16_t>(value < 0 ? -rounded : rounded);
+}
+
+[[noreturn]] void fail_fragment(const JpegFragments& fragments, std::size_t fragment, std::string expected) {
+  throw FormatError(fragments.entry, "fragment " + std::to_string(fragment), std::move(expected), "another");
+}
+
+JpegCoefficients coefficients_of(const JpegFragments& fragments, std::size_t fragment) {
+  try {
+    return JpegCoefficients(fragments.entry, fragments.file(fragment));
+  } catch (const InputError& e) {  // of no model, but of the package
+    throw FormatError(fragments.entry, "fragment " + std::to_string(fragment) + ", " + e.place(),
+                      e.expected(), e.found());
+  }
+}
+
 }  // namespace
 
 std::optional<SourceLayout> source_layout(const JpegCoefficients& source, std::uint32_t fragment_width_px,
@@ -114,48 +152,6 @@ int quality_of(const SourceLayout::Quantisers& quantisers) {
   return best;
 }
 
-namespace {
-
-std::uint32_t divided_up(std::uint64_t a, std::uint64_t b) {
-  return static_cast<std::uint32_t>((a + b - 1) / b);
-}
-
-struct TexelRange {
-  std::int64_t begin, end;
-};
-
-bool shows_any(const CoverageMask& mask, TexelRange x, TexelRange y) {
-  x = {std::max<std::int64_t>(x.begin, 0), std::min<std::int64_t>(x.end, mask.width_px)};
-  y = {std::max<std::int64_t>(y.begin, 0), std::min<std::int64_t>(y.end, mask.height_px)};
-  for (auto v = static_cast<std::uint32_t>(y.begin); v < y.end; ++v)
-    for (auto u = static_cast<std::uint32_t>(x.begin); u < x.end;) {
-      const bool whole = u % 8 == 0 && u + 8 <= x.end;
-      if (whole ? mask.byte_at(u, v) != 0 : mask.covered(u, v)) return true;
-      u += whole ? 8 : 1;
-    }
-  return false;
-}
-
-std::int16_t requantised(std::int16_t value, std::uint16_t from, std::uint16_t to) {
-  const int product = std::abs(int{value}) * from, rounded = (2 * product + to) / (2 * to);
-  return static_cast<std::int16_t>(value < 0 ? -rounded : rounded);
-}
-
-[[noreturn]] void fail_fragment(const JpegFragments& fragments, std::size_t fragment, std::string expected) {
-  throw FormatError(fragments.entry, "fragment " + std::to_string(fragment), std::move(expected), "another");
-}
-
-JpegCoefficients coefficients_of(const JpegFragments& fragments, std::size_t fragment) {
-  try {
-    return JpegCoefficients(fragments.entry, fragments.file(fragment));
-  } catch (const InputError& e) {  // of no model, but of the package
-    throw FormatError(fragments.entry, "fragment " + std::to_string(fragment) + ", " + e.place(),
-                      e.expected(), e.found());
-  }
-}
-
-}  // namespace
-
 JoinedJpeg::JoinedJpeg(const JpegFragments& from, const RunContext& context)
     : width_px_(from.width_px),
       height_px_(from.height_px),
@@ -167,9 +163,7 @@ JoinedJpeg::JoinedJpeg(const JpegFragments& from, const RunContext& context)
     if (from.stored[f]) parts.push_back(f);
   if (parts.empty()) throw FormatError(from.entry, "", "a stored fragment", "none");
   set_components(from, parts.front());
-  parallel_for(context, parts.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) put_fragment(from, parts[i]);
-  });
+  parallel_each(context, parts.size(), 1, [&](std::size_t i) { put_fragment(from, parts[i]); });
   fill_gaps(from.stored);
 }
 

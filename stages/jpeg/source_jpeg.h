@@ -5,7 +5,7 @@
 
 #include "format/base/bytes.h"
 #include "stages/base/run_context.h"
-#include "stages/data/coverage.h"
+#include "stages/data/fragments.h"
 #include "stages/image/decode_jpeg.h"
 #include "stages/jpeg/jpeg_stream.h"
 

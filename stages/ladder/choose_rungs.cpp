@@ -9,7 +9,7 @@
 #include "stages/image/jpeg_segments.h"
 #include "stages/measure/fragment_meter.h"
 
-namespace texmesh::rungs {
+namespace texmesh {
 namespace {
 
 constexpr std::size_t kWindows = 6;
@@ -73,8 +73,7 @@ struct Support {
 };
 
 /// Calls visit(fragment) for every fragment of the plane that the rectangle touches.
-template <class Visit>
-void for_each_fragment(const TexturePlane& plane, const TexelRectangle& rectangle, const Visit& visit) {
+void for_each_fragment(const TexturePlane& plane, const TexelRectangle& rectangle, const auto& visit) {
   const std::uint32_t w = plane.fragment_width_px, h = plane.fragment_height_px;
   for (std::uint32_t row = rectangle.top_px / h; row <= (rectangle.bottom_px() - 1) / h; ++row)
     for (std::uint32_t column = rectangle.left_px / w; column <= (rectangle.right_px() - 1) / w; ++column)
@@ -166,18 +165,15 @@ class WantedLevel {
  public:
   WantedLevel(const TexturePlane& plane, const Pixels& pixels, const RunContext& context)
       : plane_(plane), windows_(sample_windows(plane)), meters_(windows_.size()) {
-    parallel_for(context, windows_.size(), 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t w = begin; w < end; ++w) {
-        const TexelRectangle& window = windows_[w].rectangle;
-        meters_[w].emplace(rectangle_samples(plane, pixels, window), coverage_samples(plane, window),
-                           window.width_px, window.height_px);
-      }
+    parallel_each(context, windows_.size(), 1, [&](std::size_t w) {
+      const TexelRectangle& window = windows_[w].rectangle;
+      meters_[w].emplace(rectangle_samples(plane, pixels, window), coverage_samples(plane, window),
+                         window.width_px, window.height_px);
     });
   }
   /// The mean over the windows, each of which weighs as much as its fragment's surface; 0 where nothing is
   /// covered. shown(window) gives the samples of a window.
-  template <class Shown>
-  double loss(const Shown& shown) const {
+  double loss(const auto& shown) const {
     double sum = 0, whole = 0;
     for (std::size_t w = 0; w < windows_.size(); ++w) {
       const double weight =
@@ -220,6 +216,39 @@ void measure_size(const TexturePlane& full, TextureRungs& out) {
     out.surface += static_cast<double>(full.surface_fraction[f]);
   }
   if (out.surface > 0) out.texels_across = std::sqrt(texels / (out.surface * kBallSurface));
+}
+
+// A rung with a tenth of a texture's bytes must lower the loss of loads by so many tenths of this part.
+constexpr double kGain = 0.05;
+constexpr double kLeastLoads = 0.01;
+// Of a JPEG's bytes.
+constexpr double kMostOfJpeg = 1.9;
+// Of the bytes of a source without loss, for its finest rung to stay whatever it is worth.
+constexpr double kMostOfLossless = 1.25;
+
+/// Indices of the rungs that `keep` marks, with those that they lean on.
+std::vector<std::size_t> kept_indices(std::vector<std::uint8_t> keep, bool incremental) {
+  if (incremental)
+    for (std::size_t r = keep.size() - 1; r-- > 0;) keep[r] |= keep[r + 1];
+  std::vector<std::size_t> out;
+  for (std::size_t r = 0; r < keep.size(); ++r)
+    if (keep[r]) out.push_back(r);
+  return out;
+}
+
+/// Fixes the rung that stands for a source without loss. The others are judged as if it were not there: it
+/// has two to three times the bytes of the next one, beside which too many of the others would seem cheap.
+void fix_finest(const TexturePlane& base, const PlaneLadder& ladder, const std::vector<Image>& images,
+                TextureRungs& texture) {
+  if (images.empty() || !is_lossless(images[base.image])) return;
+  const double most = kMostOfLossless * static_cast<double>(images[base.image].bytes.size());
+  for (RungPair& pair : texture.pairs) {
+    const bool finest = pair.level == 0 && ladder.rungs[pair.rung].quality == kFinestQuality;
+    if (finest && static_cast<double>(pair.bytes) <= most)
+      pair.fixed = true;
+    else
+      texture.whole_bytes = std::max(texture.whole_bytes, pair.bytes);
+  }
 }
 
 }  // namespace
@@ -269,57 +298,18 @@ TextureRungs measure_rungs(const Fragments& fragments, const std::vector<Pixels>
   for (const std::size_t p : chain) levels.emplace_back(fragments.planes[p], pixels[p], context);
   const SamplePatch preview = preview_samples(fragments.planes[base], preview_file);
   for (const WantedLevel& level : levels) out.preview_loss.push_back(level.loss_of(preview));
-  parallel_for(context, out.pairs.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t k = begin; k < end; ++k) {
-      RungPair& pair = out.pairs[k];
-      const std::size_t p = chain[pair.level];
-      const bool halved = out.closes_gaps && !pair.fixed && has_halved_chroma(planes[p].rungs[pair.rung]);
-      ShownRung shown(fragments.planes[p], pixels[p], planes[p], pair.rung);
-      for (std::size_t wanted = 0; wanted <= pair.level; ++wanted) {
-        const double loss = levels[wanted].loss_of(shown);
-        pair.loss.push_back(loss + (halved ? std::min(loss, kHalvedChroma) : 0));
-      }
+  parallel_each(context, out.pairs.size(), 1, [&](std::size_t k) {
+    RungPair& pair = out.pairs[k];
+    const std::size_t p = chain[pair.level];
+    const bool halved = out.closes_gaps && !pair.fixed && has_halved_chroma(planes[p].rungs[pair.rung]);
+    ShownRung shown(fragments.planes[p], pixels[p], planes[p], pair.rung);
+    for (std::size_t wanted = 0; wanted <= pair.level; ++wanted) {
+      const double loss = levels[wanted].loss_of(shown);
+      pair.loss.push_back(loss + (halved ? std::min(loss, kHalvedChroma) : 0));
     }
   });
   return out;
 }
-
-namespace {
-
-// A rung with a tenth of a texture's bytes must lower the loss of loads by so many tenths of this part.
-constexpr double kGain = 0.05;
-constexpr double kLeastLoads = 0.01;
-// Of a JPEG's bytes.
-constexpr double kMostOfJpeg = 1.9;
-// Of the bytes of a source without loss, for its finest rung to stay whatever it is worth.
-constexpr double kMostOfLossless = 1.25;
-
-/// Indices of the rungs that `keep` marks, with those that they lean on.
-std::vector<std::size_t> kept_indices(std::vector<std::uint8_t> keep, bool incremental) {
-  if (incremental)
-    for (std::size_t r = keep.size() - 1; r-- > 0;) keep[r] |= keep[r + 1];
-  std::vector<std::size_t> out;
-  for (std::size_t r = 0; r < keep.size(); ++r)
-    if (keep[r]) out.push_back(r);
-  return out;
-}
-
-/// Fixes the rung that stands for a source without loss. The others are judged as if it were not there: it
-/// has two to three times the bytes of the next one, beside which too many of the others would seem cheap.
-void fix_finest(const TexturePlane& base, const PlaneLadder& ladder, const std::vector<Image>& images,
-                TextureRungs& texture) {
-  if (images.empty() || !is_lossless(images[base.image])) return;
-  const double most = kMostOfLossless * static_cast<double>(images[base.image].bytes.size());
-  for (RungPair& pair : texture.pairs) {
-    const bool finest = pair.level == 0 && ladder.rungs[pair.rung].quality == kFinestQuality;
-    if (finest && static_cast<double>(pair.bytes) <= most)
-      pair.fixed = true;
-    else
-      texture.whole_bytes = std::max(texture.whole_bytes, pair.bytes);
-  }
-}
-
-}  // namespace
 
 bool is_lossless(const Image& image) {
   return image.format != ImageFormat::kJpeg && image.format != ImageFormat::kWebp;
@@ -357,4 +347,4 @@ std::vector<std::vector<std::size_t>> choose_rungs(const Fragments& fragments,
   return kept;
 }
 
-}  // namespace texmesh::rungs
+}  // namespace texmesh

@@ -8,7 +8,7 @@
 #include "stages/data/previews.h"
 #include "stages/ladder/rung_value.h"
 
-namespace texmesh::rungs {
+namespace texmesh {
 
 /// The full-size plane `base` and its mips, by level.
 std::vector<std::size_t> chain_of(const Fragments& fragments, std::size_t base);
@@ -48,4 +48,4 @@ bool is_lossless(const Image& image);
 /// What all rungs of the texture of plane `base` may take together.
 double most_bytes(const TexturePlane& base, const std::vector<Image>& images);
 
-}  // namespace texmesh::rungs
+}  // namespace texmesh

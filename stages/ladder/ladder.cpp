@@ -1,11 +1,8 @@
-
 #include <numeric>
 
 #include "format/rules/size_curve.h"
-#include "stages/fragment_codec/coding_space.h"
-#include "stages/image/check_pixels.h"
 #include "stages/image/decode_image.h"
-#include "stages/jpeg/jpeg_bits.h"
+#include "stages/jpeg/masked_jpeg.h"
 #include "stages/ladder/choose_rungs.h"
 #include "stages/ladder/encode_rungs.h"
 
@@ -159,7 +156,7 @@ PlaneCoding coding_of(const TexturePlane& plane, Codec codec, const LadderOption
 void add_finest(const TexturePlane& plane, const std::vector<Image>& images, const LadderOptions& options,
                 PlaneCoding& coding) {
   if (options.prune && options.mode == LadderMode::kJpeg && plane.mip == 0 && !images.empty() &&
-      rungs::is_lossless(images[plane.image]) && coding.qualities.back() < kFinestQuality)
+      is_lossless(images[plane.image]) && coding.qualities.back() < kFinestQuality)
     coding.qualities.push_back(kFinestQuality);
 }
 
@@ -246,7 +243,7 @@ std::vector<PlaneWork> sample_work(const Fragments& fragments, const std::vector
                                    bool prune) {
   std::vector<PlaneWork> work(trained.size());
   std::vector<std::vector<std::uint8_t>> sample;
-  if (prune) sample = rungs::choice_sample(fragments);
+  if (prune) sample = choice_sample(fragments);
   for (std::size_t p = 0; p < work.size(); ++p) {
     if (prune)
       work[p].wanted = std::move(sample[p]);
@@ -285,7 +282,7 @@ bool take_too_much(const Fragments& fragments, const std::vector<PlaneLadder>& p
       bytes[fragments.planes[p].mip > 0 ? fragments.planes[p].base : p] +=
           static_cast<double>(rung.data.size() + rung.table_stream.size());
   for (std::size_t p = 0; p < planes.size(); ++p)
-    if (bytes[p] > 0 && bytes[p] > rungs::most_bytes(fragments.planes[p], images)) return true;
+    if (bytes[p] > 0 && bytes[p] > most_bytes(fragments.planes[p], images)) return true;
   return false;
 }
 
@@ -352,12 +349,11 @@ Ladder encode_ladder(const Fragments& fragments, const std::vector<Pixels>& pixe
   std::vector<PlaneLadder> sample =
       encode(sample_work(fragments, trained, options.prune), {kTrained, kSampled});
   auto kept = all_rungs(trained);
-  if (options.prune) kept = rungs::choose_rungs(fragments, pixels, sample, previews, images, context);
+  if (options.prune) kept = choose_rungs(fragments, pixels, sample, previews, images, context);
   ladder.planes = encode(whole_work(fragments, std::move(sample), std::move(kept)), {kChosen, 1});
   // What a sample lets expect of a texture's bytes is some hundredths off.
   if (options.prune && take_too_much(fragments, ladder.planes, images))
-    keep_rungs(rungs::choose_rungs(fragments, pixels, ladder.planes, previews, images, context),
-               ladder.planes);
+    keep_rungs(choose_rungs(fragments, pixels, ladder.planes, previews, images, context), ladder.planes);
   measure_knots(fragments, pixels, options, trained, ladder.planes, context);
   for (std::size_t p = 0; p < fragments.planes.size(); ++p)
     finish_plane(fragments.planes[p], pixels[p], images, trained[p], options, ladder.planes[p], ladder.notes);

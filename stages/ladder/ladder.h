@@ -5,7 +5,6 @@
 #include "stages/data/pixels.h"
 #include "stages/data/previews.h"
 #include "stages/data/stage.h"
-#include "stages/data/subsampling.h"
 
 namespace texmesh {
 
@@ -41,8 +40,7 @@ struct LadderOptions {
   int preview_quality = 60;  // stages/previews reads it; the ladder is made from the previews
   bool prune = true;
   bool keep_source = false;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("mode", s.mode,
       "jpeg = baseline JPEGs; progressive = one progressive JPEG per fragment, of which each rung is a "
       "beginning (fragments then have 256 px or more, unless min_fragment_px is set); webp = lossy WebP for "
@@ -79,16 +77,16 @@ inline bool encoder_frees_uncovered(LadderMode mode, Uncovered uncovered) {
 
 /// Encodes every covered fragment at rungs of its plane's role.
 /// - JPEGs by libjpeg-turbo, ISLOW DCT: colours as YCbCr with the chroma resolution of `subsampling`, data in
-///   the space that has the least error for its bytes (stages/fragment_codec/coding_space.h). Fragments with
-///   uncovered texels go through stages/jpeg/masked_jpeg.h where such texels are free, so that only covered
-///   texels cost bytes.
+///   the space that has the least error for its bytes (stages/fragment_codec/fragment_codec.h). Fragments
+///   with uncovered texels go through stages/jpeg/masked_jpeg.h where such texels are free, so that only
+///   covered texels cost bytes.
 /// - Tables are trained on covered fragments spread over the plane. The tables have a code for every symbol,
 ///   so that no fragment needs tables of its own. A plane without a covered fragment has tables but no data.
 /// - A few fragments are encoded at every rung. With `prune` they decide which rungs are worth storing
 ///   (stages/ladder/choose_rungs.h); the others are encoded at these only.
 /// - Mode jpeg: full-size planes whose source is a JPEG keep its coefficients as their last rung, and the
 /// rungs
-///   below are made from these (stages/ladder/source_codec.h). A note says why a JPEG's plane is coded from
+///   below are made from these (encode_rungs.h). A note says why a JPEG's plane is coded from
 ///   pixels instead, and how far its last rung is off.
 /// - With `keep_source` full-size planes but alpha name their image's file for the package: an alpha plane
 ///   relies on its image's colour plane.

@@ -1,29 +1,26 @@
 #include "stages/ladder/rung_value.h"
 
-#include <algorithm>
-#include <array>
-
 #include "format/base/portable_math.h"
-#include "format/rules/ordinary_loads.h"
+#include "format/rules/viewing.h"
 
-namespace texmesh::rungs {
+namespace texmesh {
 
 Hull hull_of(const TextureRungs& texture, const std::vector<std::uint8_t>& keep, std::size_t wanted,
-             Levels levels) {
-  Hull hull{{kPreview, 0, texture.preview_loss[wanted]}};
+             LevelRange levels) {
+  Hull hull{{kPreviewPair, 0, texture.preview_loss[wanted]}};
   for (;;) {
-    const Vertex at = hull.back();
-    Vertex best;
+    const HullVertex at = hull.back();
+    HullVertex best;
     double steepest = 0;
     for (std::size_t k = 0; k < texture.pairs.size(); ++k) {
       const RungPair& pair = texture.pairs[k];
       if (!keep[k] || pair.level < levels.first || pair.level > levels.last) continue;
-      const Vertex to{k, static_cast<double>(pair.bytes), pair.loss[wanted]};
+      const HullVertex to{k, static_cast<double>(pair.bytes), pair.loss[wanted]};
       if (to.bytes <= at.bytes || to.loss >= at.loss) continue;
       const double slope = (at.loss - to.loss) / (to.bytes - at.bytes);
       if (slope > steepest || (slope == steepest && to.bytes > best.bytes)) steepest = slope, best = to;
     }
-    if (best.pair == kPreview) return hull;
+    if (best.pair == kPreviewPair) return hull;
     hull.push_back(best);
   }
 }
@@ -45,7 +42,7 @@ std::size_t segment_of(const Hull& hull, double bytes) {
 double loss_at(const Hull& hull, double bytes) {
   const std::size_t k = segment_of(hull, bytes);
   if (k + 1 == hull.size()) return hull[k].loss;
-  const Vertex &a = hull[k], &b = hull[k + 1];
+  const HullVertex &a = hull[k], &b = hull[k + 1];
   return a.loss + (b.loss - a.loss) * ((bytes - a.bytes) / (b.bytes - a.bytes));
 }
 
@@ -155,49 +152,6 @@ bool every_level_has_one(const TextureRungs& texture, const std::vector<std::uin
   return std::ranges::count(has, 0) == 0;
 }
 
-}  // namespace
-
-std::vector<std::uint8_t> gap_closing_pairs(const TextureRungs& texture,
-                                            const std::vector<std::uint8_t>& keep, const GivenBytes& given) {
-  std::vector<std::uint8_t> out(keep.size());
-  for (std::size_t level = 0; level < given.size(); ++level)
-    for (std::size_t k = 0; k < keep.size() && !given[level].empty(); ++k)
-      if (keep[k] && texture.pairs[k].level >= level && !out[k]) out[k] = opens_gap(texture, keep, k, level);
-  return out;
-}
-
-void swap_pairs(const TextureRungs& texture, const GivenBytes& given, std::vector<std::uint8_t>& keep) {
-  const std::vector<std::vector<double>> units = units_of(texture, given);
-  const double most = std::max(texture.most_bytes, bytes_of(texture, keep));
-  Choice best{keep, gaps_of(texture, keep, given), loss_of(texture, keep, given, units)};
-  for (int swap = 0; swap < kMostSwaps; ++swap) {
-    const std::vector<std::uint8_t> from = best.keep;
-    const auto consider = [&](const std::vector<std::uint8_t>& choice) {
-      if (bytes_of(texture, choice) > most || !every_level_has_one(texture, choice)) return;
-      Choice next{choice, gaps_of(texture, choice, given), best.loss};
-      if (next.gaps > best.gaps) return;
-      next.loss = loss_of(texture, choice, given, units);
-      if (next.is_better_than(best)) best = std::move(next);
-    };
-    for (std::size_t in = 0; in < from.size(); ++in) {
-      if (from[in]) continue;
-      std::vector<std::uint8_t> choice = from;
-      choice[in] = 1;
-      consider(choice);
-      for (std::size_t out = 0; out < from.size(); ++out) {
-        if (!from[out] || texture.pairs[out].fixed) continue;
-        choice[out] = 0;
-        consider(choice);
-        choice[out] = 1;
-      }
-    }
-    if (best.keep == from) break;
-  }
-  keep = best.keep;
-}
-
-namespace {
-
 // Of a load's bytes textures have so much; mesh and tables take the rest.
 constexpr double kTextureShare = 0.75;
 // Prices of a byte in loss, from dear to cheap: four an octave.
@@ -227,15 +181,15 @@ std::vector<std::uint8_t> better_than_the_preview(const TextureRungs& texture) {
 /// One pair of every level: of those that have none the best one.
 void keep_one_of_each_level(const TextureRungs& texture, std::vector<std::uint8_t>& keep) {
   for (std::size_t level = 0; level < texture.preview_loss.size(); ++level) {
-    std::size_t best = kPreview;
+    std::size_t best = kPreviewPair;
     bool any = false;
     for (std::size_t k = 0; k < keep.size(); ++k) {
       const RungPair& pair = texture.pairs[k];
       if (pair.level != level) continue;
       any = any || keep[k];
-      if (best == kPreview || pair.loss[level] < texture.pairs[best].loss[level]) best = k;
+      if (best == kPreviewPair || pair.loss[level] < texture.pairs[best].loss[level]) best = k;
     }
-    if (!any && best != kPreview) keep[best] = 1;
+    if (!any && best != kPreviewPair) keep[best] = 1;
   }
 }
 
@@ -356,7 +310,7 @@ struct LeastWorth {
   double rise_per_byte = 0;  // PairWorth::rise
 };
 
-/// The pair to go next; kPreview for none. Fixed pairs and the last one of every level stay, and those of
+/// The pair to go next; kPreviewPair for none. Fixed pairs and the last one of every level stay, and those of
 /// `gap_closing` as long as another one can go.
 std::size_t next_to_go(const TextureRungs& texture, const std::vector<std::uint8_t>& keep,
                        const std::vector<std::uint8_t>& gap_closing, const std::vector<PairWorth>& worth,
@@ -364,7 +318,7 @@ std::size_t next_to_go(const TextureRungs& texture, const std::vector<std::uint8
   std::vector<std::size_t> of_level(texture.preview_loss.size());
   for (std::size_t k = 0; k < keep.size(); ++k) of_level[texture.pairs[k].level] += keep[k];
   const bool too_much = bytes_of(texture, keep) > texture.most_bytes;
-  std::size_t next = kPreview;
+  std::size_t next = kPreviewPair;
   bool next_closes = false;
   double least = 0;
   for (std::size_t k = 0; k < keep.size(); ++k) {
@@ -373,7 +327,8 @@ std::size_t next_to_go(const TextureRungs& texture, const std::vector<std::uint8
     const double per_byte = worth[k].rise / static_cast<double>(std::max<std::uint64_t>(pair.bytes, 1));
     const bool chosen = worth[k].loads >= least_worth.loads, closes = chosen && gap_closing[k];
     if (!too_much && (closes || (chosen && per_byte >= least_worth.rise_per_byte))) continue;
-    if (next != kPreview && (closes > next_closes || (closes == next_closes && per_byte >= least))) continue;
+    if (next != kPreviewPair && (closes > next_closes || (closes == next_closes && per_byte >= least)))
+      continue;
     next = k, next_closes = closes, least = per_byte;
   }
   return next;
@@ -385,7 +340,7 @@ std::size_t next_to_go(const TextureRungs& texture, const std::vector<std::uint8
 void take_cheaper(const TextureRungs& texture, std::vector<std::uint8_t>& keep) {
   constexpr double kRoom = 0.97;
   while (bytes_of(texture, keep) > texture.most_bytes) {
-    std::size_t out = kPreview, in = kPreview;
+    std::size_t out = kPreviewPair, in = kPreviewPair;
     double least = 0;
     for (std::size_t k = 0; k < keep.size(); ++k)
       for (std::size_t c = 0; c < keep.size(); ++c) {
@@ -397,9 +352,9 @@ void take_cheaper(const TextureRungs& texture, std::vector<std::uint8_t>& keep) 
         const double enough = bytes_of(texture, keep) - kRoom * texture.most_bytes;
         const double rise = std::max(cheap.loss[cheap.level] - dear.loss[dear.level], 0.0);
         const double per_byte = (rise + kUnseen) / std::min(saved, enough);
-        if (in == kPreview || per_byte < least) out = k, in = c, least = per_byte;
+        if (in == kPreviewPair || per_byte < least) out = k, in = c, least = per_byte;
       }
-    if (in == kPreview) return;
+    if (in == kPreviewPair) return;
     keep[out] = 0, keep[in] = 1;
   }
 }
@@ -417,7 +372,7 @@ void drop_pairs(const TextureRungs& texture, const GivenBytes& given, const Leas
                                                         : std::vector<std::uint8_t>(keep.size());
       const std::size_t next =
           next_to_go(texture, keep, gap_closing, worth_of(texture, keep, given, whole), least_worth);
-      if (next == kPreview) return;
+      if (next == kPreviewPair) return;
       bound = bound || bytes_of(texture, keep) > texture.most_bytes;
       keep[next] = 0;
     }
@@ -431,6 +386,45 @@ void drop_pairs(const TextureRungs& texture, const GivenBytes& given, const Leas
 }
 
 }  // namespace
+
+std::vector<std::uint8_t> gap_closing_pairs(const TextureRungs& texture,
+                                            const std::vector<std::uint8_t>& keep, const GivenBytes& given) {
+  std::vector<std::uint8_t> out(keep.size());
+  for (std::size_t level = 0; level < given.size(); ++level)
+    for (std::size_t k = 0; k < keep.size() && !given[level].empty(); ++k)
+      if (keep[k] && texture.pairs[k].level >= level && !out[k]) out[k] = opens_gap(texture, keep, k, level);
+  return out;
+}
+
+void swap_pairs(const TextureRungs& texture, const GivenBytes& given, std::vector<std::uint8_t>& keep) {
+  const std::vector<std::vector<double>> units = units_of(texture, given);
+  const double most = std::max(texture.most_bytes, bytes_of(texture, keep));
+  Choice best{keep, gaps_of(texture, keep, given), loss_of(texture, keep, given, units)};
+  for (int swap = 0; swap < kMostSwaps; ++swap) {
+    const std::vector<std::uint8_t> from = best.keep;
+    const auto consider = [&](const std::vector<std::uint8_t>& choice) {
+      if (bytes_of(texture, choice) > most || !every_level_has_one(texture, choice)) return;
+      Choice next{choice, gaps_of(texture, choice, given), best.loss};
+      if (next.gaps > best.gaps) return;
+      next.loss = loss_of(texture, choice, given, units);
+      if (next.is_better_than(best)) best = std::move(next);
+    };
+    for (std::size_t in = 0; in < from.size(); ++in) {
+      if (from[in]) continue;
+      std::vector<std::uint8_t> choice = from;
+      choice[in] = 1;
+      consider(choice);
+      for (std::size_t out = 0; out < from.size(); ++out) {
+        if (!from[out] || texture.pairs[out].fixed) continue;
+        choice[out] = 0;
+        consider(choice);
+        choice[out] = 1;
+      }
+    }
+    if (best.keep == from) break;
+  }
+  keep = best.keep;
+}
 
 std::vector<TextureLoad> texture_loads() {
   std::vector<TextureLoad> out;
@@ -459,4 +453,4 @@ std::vector<std::vector<std::uint8_t>> pairs_worth_storing(const std::vector<Tex
   return keep;
 }
 
-}  // namespace texmesh::rungs
+}  // namespace texmesh

@@ -16,12 +16,11 @@
 // 5. What still takes too much has cheaper pairs in the place of the last ones of levels.
 // Each step removes pairs or makes them cheaper, or improves one number in a bounded number of rounds; so it
 // ends.
-#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <vector>
 
-namespace texmesh::rungs {
+namespace texmesh {
 
 /// One way to store a texture: a plane of the chain (0 = full size, 1 = its first mip, ...) at one rung.
 struct RungPair {
@@ -64,17 +63,17 @@ std::vector<std::vector<std::uint8_t>> pairs_worth_storing(const std::vector<Tex
 /// 1 - SSIM that nobody sees: a rung that saves half of less is not worth twice as much.
 inline constexpr double kUnseen = 0.01;
 /// The preview, where pairs are numbered.
-inline constexpr std::size_t kPreview = std::numeric_limits<std::size_t>::max();
+inline constexpr std::size_t kPreviewPair = std::numeric_limits<std::size_t>::max();
 
 /// A vertex of a lower hull.
-struct Vertex {
-  std::size_t pair = kPreview;
+struct HullVertex {
+  std::size_t pair = kPreviewPair;
   double bytes = 0, loss = 0;
 };
-using Hull = std::vector<Vertex>;
+using Hull = std::vector<HullVertex>;
 
 /// Levels of a texture, the last one included.
-struct Levels {
+struct LevelRange {
   std::size_t first = 0, last = 0;
 };
 
@@ -84,7 +83,7 @@ using GivenBytes = std::vector<std::vector<double>>;
 /// The lower hull of loss over bytes where a level is wanted: from the preview on along the kept pairs of
 /// some levels.
 Hull hull_of(const TextureRungs& texture, const std::vector<std::uint8_t>& keep, std::size_t wanted,
-             Levels levels);
+             LevelRange levels);
 /// Those of the wanted level and of each coarser one.
 std::vector<Hull> hulls_of(const TextureRungs& texture, const std::vector<std::uint8_t>& keep,
                            std::size_t wanted);
@@ -112,4 +111,4 @@ std::vector<std::uint8_t> gap_closing_pairs(const TextureRungs& texture,
 /// take at most TextureRungs::most_bytes, if they did before. Same result anywhere.
 void swap_pairs(const TextureRungs& texture, const GivenBytes& given, std::vector<std::uint8_t>& keep);
 
-}  // namespace texmesh::rungs
+}  // namespace texmesh

@@ -1,10 +1,11 @@
 #include "stages/lut/lut.h"
 
 #include "format/base/number16.h"
+#include "format/base/portable_math.h"
 #include "format/rules/allocation.h"
+#include "format/rules/size_curve.h"
 #include "stages/base/parallel.h"
-#include "stages/image/check_pixels.h"
-#include "stages/lut/size_model.h"
+#include "stages/image/pixel_window.h"
 #include "stages/measure/fragment_meter.h"
 
 namespace texmesh {
@@ -133,6 +134,27 @@ PlaneThesis describe_thesis(const PlanePredictors& predictors, const PlaneLadder
   return out;
 }
 
+/// y = offset + slope x.
+struct Line {
+  double slope = 0, offset = 0, correlation = 0;
+};
+
+Line least_squares(const std::vector<double>& x, const std::vector<double>& y) {
+  const auto n = static_cast<double>(x.size());
+  double mean_x = 0, mean_y = 0, xx = 0, xy = 0, yy = 0;
+  for (std::size_t k = 0; k < x.size(); ++k) {
+    mean_x += x[k] / n;
+    mean_y += y[k] / n;
+  }
+  for (std::size_t k = 0; k < x.size(); ++k) {
+    xx += (x[k] - mean_x) * (x[k] - mean_x);
+    xy += (x[k] - mean_x) * (y[k] - mean_y);
+    yy += (y[k] - mean_y) * (y[k] - mean_y);
+  }
+  const double slope = xy / xx;
+  return {slope, mean_y - slope * mean_x, yy > 0 ? xy / std::sqrt(xx * yy) : 0};
+}
+
 }  // namespace
 
 LutTables build_tables(const Fragments& fragments, const std::vector<Pixels>& pixels,
@@ -154,19 +176,38 @@ LutTables build_tables(const Fragments& fragments, const std::vector<Pixels>& pi
     for (std::uint16_t f : tables[p].order) tasks.emplace_back(p, f);
   }
   std::atomic<std::size_t> done{0};
-  parallel_for(context, tasks.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t t = begin; t < end; ++t) {
-      const auto [p, f] = tasks[t];
-      measure_fragment(fragments.planes[p], pixels[p], ladder.planes[p], skipped[p], f, tables[p]);
-      context.report(0.95 * static_cast<double>(++done) / static_cast<double>(tasks.size()));
-    }
+  parallel_each(context, tasks.size(), 1, [&](std::size_t t) {
+    const auto [p, f] = tasks[t];
+    measure_fragment(fragments.planes[p], pixels[p], ladder.planes[p], skipped[p], f, tables[p]);
+    context.report(0.95 * static_cast<double>(++done) / static_cast<double>(tasks.size()));
   });
   out.thesis.planes.resize(tables.size());
-  parallel_for(context, tables.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t p = begin; p < end; ++p)
-      out.thesis.planes[p] = describe_thesis(predictors.planes[p], ladder.planes[p], tables[p]);
+  parallel_each(context, tables.size(), 1, [&](std::size_t p) {
+    out.thesis.planes[p] = describe_thesis(predictors.planes[p], ladder.planes[p], tables[p]);
   });
   return out;
+}
+
+std::vector<SizeModel> fit_size_models(const PlaneLadder& ladder, const PlaneTables& t,
+                                       const std::vector<float>& vqp) {
+  std::vector<SizeModel> models(t.fragment_count());
+  std::vector<double> quality, log_size;
+  for (std::size_t r = 0; r + (ladder.source_rung ? 1 : 0) < ladder.rungs.size(); ++r)
+    quality.push_back(t.rung_quality[r] / 100.0);
+  if (quality.size() < 2) return models;
+  for (const std::uint16_t f : t.order) {
+    const auto p = static_cast<double>(vqp[f]);
+    if (!(p >= kLeastModelVqp)) continue;
+    log_size.clear();
+    for (std::size_t r = 0; r < quality.size(); ++r)
+      log_size.push_back(portable::log(static_cast<double>(bytes_to_show(t, r, f))));
+    const Line line = least_squares(quality, log_size);
+    if (!(line.slope > 0)) continue;
+    models[f].a = static_cast<float>(portable::exp(line.offset));
+    models[f].b = static_cast<float>(line.slope / portable::log(100 * p));
+    models[f].correlation = static_cast<float>(line.correlation);
+  }
+  return models;
 }
 
 }  // namespace texmesh

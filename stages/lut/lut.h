@@ -1,13 +1,10 @@
 #pragma once
-#include <string_view>
-#include <vector>
-
 #include "format/documents/tables.h"
 #include "format/documents/thesis_tables.h"
 #include "stages/data/fragments.h"
 #include "stages/data/ladder.h"
+#include "stages/data/perceptual_values.h"
 #include "stages/data/pixels.h"
-#include "stages/data/predictors.h"
 #include "stages/data/previews.h"
 #include "stages/data/stage.h"
 
@@ -28,8 +25,7 @@ struct LutOptions {
   double log_width = 0.42;                        // dg of the log-quantiser form
   double quality_min = 5, quality_max = 97;       // q_i is clipped to them
   double normal_quality_min = 30, data_quality_min = 18, alpha_quality_min = 18;  // beside quality_min
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("allocate", s.allocate, ProfileOnly{},
       "how bytes are shared among fragments: thesis = equation 3.2 in quality; vqp = the same by VQP (8.4) in "
       "the place of feature density; log = the same in the "
@@ -68,11 +64,19 @@ struct LutTables {
 /// - The order of falling importance: eta of scale 0, with `allocate = vqp` VQP, then surface, then index.
 /// - Q_i, and for the thesis D_i over 21 values of Gamma: bytes of the fragments' streams, table streams not
 ///   counted. With `allocate = rd` they are the bytes of log, which rungs_of() spends.
-/// - For the thesis the predictors, and the size models (stages/lut/size_model.h).
+/// - For the thesis the predictors, and the size models.
 /// `pixels` are fill_planes()'s, `previews` make_previews()'s. Throws StageError for parts that do not fit
 /// each other, FormatError for a stream that does not decode. Same result for any thread count.
 LutTables build_tables(const Fragments& fragments, const std::vector<Pixels>& pixels,
                        const Predictors& predictors, const Ladder& ladder, const Previews& previews,
                        const LutOptions& options, const RunContext& context);
+
+/// The size model (thesis 8.5 to 8.8) of every fragment of a plane whose sizes, qualities and order are
+/// there: S = A R^Q by least squares on ln S over the rungs, Q = quality / 100, and R = (100 p)^B for the
+/// fragment's VQP p. The rung of a source's coefficients never takes part: its bytes are not a quality's.
+/// [F]; all 0 for fragments that are not stored, whose p is below kLeastModelVqp, or whose bytes do not grow,
+/// and for fewer than two rungs. `vqp` [F] are the plane's.
+std::vector<SizeModel> fit_size_models(const PlaneLadder& ladder, const PlaneTables& tables,
+                                       const std::vector<float>& vqp);
 
 }  // namespace texmesh

@@ -1,8 +1,6 @@
 #pragma once
 // Colours as the eye tells them apart, for FLIP (Andersson et al. 2020) and for seams. Linear colours are
 // those of sRGB's primaries, 0 .. 1; XYZ is relative to a white of Y = 1.
-#include <algorithm>
-#include <cmath>
 
 #include "format/base/portable_math.h"
 #include "format/base/vec.h"
@@ -48,16 +46,12 @@ inline Vec3f over_white(Vec3d xyz) {
 }
 /// L*a*b* of what over_white() gives, with colours counting for less in the dark (Hunt). `root`: lab_root(),
 /// or samples of it.
-template <class Root>
-Vec3f hunt_lab_of(Vec3f relative, const Root& root) {
+Vec3f hunt_lab_of(Vec3f relative, const auto& root) {
   const float fx = root(relative.x), fy = root(relative.y), fz = root(relative.z);
   const float lightness = 116 * fy - 16, share = 0.01f * lightness;
   return {lightness, share * 500 * (fx - fy), share * 200 * (fy - fz)};
 }
-template <class Root>
-Vec3f hunt_lab(Vec3d xyz, const Root& root) {
-  return hunt_lab_of(over_white(xyz), root);
-}
+Vec3f hunt_lab(Vec3d xyz, const auto& root) { return hunt_lab_of(over_white(xyz), root); }
 
 /// HyAB, the distance of two colours in L*a*b* that suits large differences, too.
 template <class T>

@@ -2,7 +2,6 @@
 
 #include "stages/base/float_math.h"
 #include "stages/measure/cie_lab.h"
-#include "stages/measure/sampled_curve.h"
 
 namespace texmesh {
 namespace {
@@ -10,11 +9,8 @@ namespace {
 constexpr double kPixelsPerDegree = 67.0206432765;  // 0.7 m from a screen 0.7 m wide with 3840 px
 
 using FlipCurve = SampledCurve<16384>;
-using measure::FilteredRows;
-using measure::Kernel;
-using measure::PixelSpans;
 
-double sum_of(const Kernel& kernel) {
+double sum_of(const FilterKernel& kernel) {
   double sum = 0;
   for (const float k : kernel) sum += static_cast<double>(k);
   return sum;
@@ -22,10 +18,10 @@ double sum_of(const Kernel& kernel) {
 
 /// exp(-pi^2 x^2 / b), x in degrees: one term of a contrast sensitivity function. Three deviations of the
 /// widest term; narrow ones end where single precision no longer sees them.
-Kernel sensitivity(double b) {
+FilterKernel sensitivity(double b) {
   constexpr double kUnseen = 1e-9;
-  Kernel out;
-  for (int i = -measure::kFilterReach; i <= measure::kFilterReach; ++i) {
+  FilterKernel out;
+  for (int i = -kFilterReach; i <= kFilterReach; ++i) {
     const double x = i / kPixelsPerDegree;
     const double weight = portable::exp(-portable::kPi * portable::kPi * x * x / b);
     if (weight > kUnseen) out.push_back(static_cast<float>(weight));
@@ -35,7 +31,7 @@ Kernel sensitivity(double b) {
 
 /// A term a sqrt(pi / b) exp(-pi^2 z / b) of an eye's filter: its row and its part of the sum over the plane.
 struct Term {
-  Kernel kernel;
+  FilterKernel kernel;
   float weight = 0;
 };
 std::vector<Term> eye_filter(std::initializer_list<std::array<double, 2>> terms) {
@@ -67,7 +63,7 @@ const FlipCurve& flip_lab_curve() {
 /// Derivatives of a Gaussian as wide as features that the eye looks for: first (edges), second (points); the
 /// weights of either sign sum to 1.
 struct FeatureKernels {
-  Kernel smooth, edge, point;
+  FilterKernel smooth, edge, point;
 };
 const FeatureKernels& feature_kernels() {
   static const FeatureKernels kernels = [] {
@@ -81,7 +77,7 @@ const FeatureKernels& feature_kernels() {
       k.edge.push_back(static_cast<float>(-i * g));
       k.point.push_back(static_cast<float>((i * i / (deviation * deviation) - 1) * g));
     }
-    const auto balance = [](Kernel& kernel) {
+    const auto balance = [](FilterKernel& kernel) {
       double positive = 0, negative = 0;
       for (const float v : kernel) (v > 0 ? positive : negative) += std::fabs(static_cast<double>(v));
       for (float& v : kernel) v = static_cast<float>(static_cast<double>(v) / (v > 0 ? positive : negative));
@@ -123,15 +119,15 @@ class FlipFilter {
     for (std::size_t c = 0; c < 3; ++c)
       for (const Term& term : eye_filters()[c])
         eyes_.push_back({c, term, {spans, plain_.opponent[static_cast<int>(c)], term.kernel}});
-    for (const Kernel* kernel : {&features.smooth, &features.edge, &features.point})
+    for (const FilterKernel* kernel : {&features.smooth, &features.edge, &features.point})
       luma_.emplace_back(spans, plain_.luma, *kernel);
-    for (auto& row : opponent_) row.resize(measure::whole_blocks(spans.side_px));
-    for (auto& row : {&luma_row_, &part_, &other_}) row->resize(measure::whole_blocks(spans.side_px));
+    for (auto& row : opponent_) row.resize(whole_blocks(spans.side_px));
+    for (auto& row : {&luma_row_, &part_, &other_}) row->resize(whole_blocks(spans.side_px));
   }
 
   /// Rows are asked for one after the other.
   void read(std::size_t y, FlipPicture& out) {
-    for (; made_ < std::min(spans_.rows.size(), y + measure::kFilterReach + 1); ++made_) make(made_);
+    for (; made_ < std::min(spans_.rows.size(), y + kFilterReach + 1); ++made_) make(made_);
     const PixelSpans::Row& row = spans_.rows[y];
     const std::size_t count = row.last - row.first;
     if (count == 0) return;
@@ -153,11 +149,11 @@ class FlipFilter {
     Vec3f opponent;
     for (const Eye& eye : eyes_)
       opponent[static_cast<int>(eye.channel)] +=
-          eye.term.weight * measure::filtered_plain(eye.rows.plain(), eye.term.kernel);
+          eye.term.weight * filtered_plain(eye.rows.plain(), eye.term.kernel);
     out.plain_lab = flip_lab(opponent);
     for (std::size_t k = 0; k < 2; ++k)
-      out.plain_detail[k] = strength(measure::filtered_plain(luma_[k + 1].plain(), feature_kernels().smooth),
-                                     measure::filtered_plain(luma_[0].plain(), derivative(k)));
+      out.plain_detail[k] = strength(filtered_plain(luma_[k + 1].plain(), feature_kernels().smooth),
+                                     filtered_plain(luma_[0].plain(), derivative(k)));
   }
 
  private:
@@ -166,7 +162,7 @@ class FlipFilter {
     const Term& term;
     FilteredRows rows;
   };
-  static const Kernel& derivative(std::size_t k) {
+  static const FilterKernel& derivative(std::size_t k) {
     return k == 0 ? feature_kernels().edge : feature_kernels().point;
   }
 
@@ -254,8 +250,7 @@ Seen seen_at(const FlipPicture& picture, const FlipPicture::Row& row, std::uint3
 }
 
 /// Calls visit(x, y, FLIP) for every pixel that either picture covers, row by row.
-template <class Visit>
-void for_each_flip(const FlipPicture& reference, const FlipPicture& test, Visit&& visit) {
+void for_each_flip(const FlipPicture& reference, const FlipPicture& test, auto&& visit) {
   FlipBlock block;
   for (std::size_t y = 0; y < reference.rows.size(); ++y) {
     const auto finish = [&] {
@@ -274,6 +269,61 @@ void for_each_flip(const FlipPicture& reference, const FlipPicture& test, Visit&
     }
     if (block.count() > 0) finish();
   }
+}
+
+using Curve = SampledCurve<8192>;  // finer than 8-bit pictures can show
+
+const Curve& srgb_curve() {
+  static const Curve curve(srgb_of_light);
+  return curve;
+}
+const FilterKernel& window() {
+  static const FilterKernel kernel = [] {
+    constexpr double kDeviation = 1.5;
+    FilterKernel k;
+    double sum = 0;
+    for (int i = -5; i <= 5; ++i) sum += portable::exp(-i * i / (2 * kDeviation * kDeviation));
+    for (int i = -5; i <= 5; ++i)
+      k.push_back(static_cast<float>(portable::exp(-i * i / (2 * kDeviation * kDeviation)) / sum));
+    return k;
+  }();
+  return kernel;
+}
+
+/// Values under the window, row by row as they come: all that is in memory at once fits into a cache.
+class Windowed {
+ public:
+  Windowed(const PixelSpans& spans, float plain)
+      : spans_(spans), rows_(spans, plain, window()), row_(whole_blocks(spans.side_px)) {}
+  float plain() const { return filtered_plain(rows_.plain(), window()); }
+  /// Row y. Rows are asked for one after the other; `values_of(row)` gives those of its span.
+  const std::vector<float>& row(std::size_t y, auto&& values_of) {
+    for (; made_ < std::min(spans_.rows.size(), y + window().size() / 2 + 1); ++made_)
+      rows_.make(made_, values_of(made_));
+    rows_.read(y, window(), row_.data());
+    return row_;
+  }
+
+ private:
+  const PixelSpans& spans_;
+  FilteredRows rows_;
+  std::vector<float> row_;
+  std::size_t made_ = 0;
+};
+
+float luma_of(Vec3f c) {
+  return 0.2126f * srgb_curve()(c.x) + 0.7152f * srgb_curve()(c.y) + 0.0722f * srgb_curve()(c.z);
+}
+
+struct Windows {
+  float a_mean, b_mean, a_square, b_square, product;
+};
+double ssim_of(const Windows& w) {
+  constexpr double kC1 = 0.01 * 0.01, kC2 = 0.03 * 0.03;
+  const double a = static_cast<double>(w.a_mean), b = static_cast<double>(w.b_mean);
+  const double va = static_cast<double>(w.a_square) - a * a, vb = static_cast<double>(w.b_square) - b * b;
+  const double covariance = static_cast<double>(w.product) - a * b;
+  return (2 * a * b + kC1) * (2 * covariance + kC2) / ((a * a + b * b + kC1) * (va + vb + kC2));
 }
 
 }  // namespace
@@ -296,9 +346,7 @@ double FlipSum::percentile(double part) const {
   return 0;
 }
 
-FlipPicture prepare_flip(const Picture& picture) {
-  return prepare_flip(picture, measure::shown_spans(picture));
-}
+FlipPicture prepare_flip(const Picture& picture) { return prepare_flip(picture, shown_spans(picture)); }
 
 FlipPicture prepare_flip(const Picture& picture, const PixelSpans& spans) {
   FlipPicture out;
@@ -337,6 +385,68 @@ std::vector<float> flip_map(const FlipPicture& reference, const FlipPicture& tes
 
 double flip_of(const FlipPicture& reference, const FlipPicture& test) {
   return compare_flip(reference, test).mean();
+}
+
+LumaPicture prepare_luma(const Picture& picture) { return prepare_luma(picture, shown_spans(picture)); }
+
+LumaPicture prepare_luma(const Picture& picture, const PixelSpans& spans) {
+  LumaPicture out;
+  out.covered = picture.covered;
+  if (picture.linear.empty()) return out;
+  out.spans = spans;
+  for (SpanImage* image : {&out.luma, &out.mean, &out.square_mean}) image->values.resize(out.spans.count);
+  out.luma.plain = luma_of(picture.linear[0]);
+  Windowed mean(out.spans, out.luma.plain), square_mean(out.spans, out.luma.plain * out.luma.plain);
+  std::vector<float> squares(picture.side_px);
+  const auto values_of = [&](std::size_t y) {
+    const PixelSpans::Row& row = out.spans.rows[y];
+    float* const luma = out.luma.values.data() + row.offset;
+    for (std::size_t x = row.first; x < row.last; ++x)
+      luma[x - row.first] = luma_of(picture.linear[y * picture.side_px + x]);
+    return luma;
+  };
+  const auto squares_of = [&](std::size_t y) {
+    const PixelSpans::Row& row = out.spans.rows[y];
+    const float* const luma = out.luma.values.data() + row.offset;
+    for (std::size_t i = 0; i < row.last - row.first; ++i) squares[i] = luma[i] * luma[i];
+    return squares.data();
+  };
+  for (std::size_t y = 0; y < out.spans.rows.size(); ++y) {
+    const PixelSpans::Row& row = out.spans.rows[y];
+    const std::size_t count = row.last - row.first;
+    std::copy_n(mean.row(y, values_of).begin(), count, out.mean.values.data() + row.offset);
+    std::copy_n(square_mean.row(y, squares_of).begin(), count, out.square_mean.values.data() + row.offset);
+  }
+  out.mean.plain = mean.plain();
+  out.square_mean.plain = square_mean.plain();
+  return out;
+}
+
+PictureDifference compare_luma(const LumaPicture& reference, const LumaPicture& test) {
+  const PixelSpans both = union_of(reference.spans, test.spans);
+  Windowed products(both, reference.luma.plain * test.luma.plain);
+  std::vector<float> row_products(both.side_px);
+  const auto products_of = [&](std::size_t at) {
+    const auto y = static_cast<std::uint32_t>(at);
+    const PixelSpans::Row& row = both.rows[y];
+    for (std::uint32_t x = row.first; x < row.last; ++x)
+      row_products[x - row.first] = reference.luma.at(reference.spans, x, y) * test.luma.at(test.spans, x, y);
+    return row_products.data();
+  };
+  PictureDifference sum;
+  for (std::uint32_t y = 0; y < both.rows.size(); ++y) {
+    const PixelSpans::Row& row = both.rows[y];
+    const std::vector<float>& product = products.row(y, products_of);
+    for (std::uint32_t x = row.first; x < row.last; ++x) {
+      const std::size_t at = std::size_t{y} * both.side_px + x;
+      if (!reference.covered[at] && !test.covered[at]) continue;
+      sum.ssim += ssim_of({reference.mean.at(reference.spans, x, y), test.mean.at(test.spans, x, y),
+                           reference.square_mean.at(reference.spans, x, y),
+                           test.square_mean.at(test.spans, x, y), product[x - row.first]});
+      ++sum.pixels;
+    }
+  }
+  return sum;
 }
 
 }  // namespace texmesh

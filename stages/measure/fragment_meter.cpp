@@ -15,6 +15,42 @@ double ssim(double n, double sx, double sxx, double sy, double syy, double sxy) 
   return (2 * sx * sy + c1) * (2 * covariance + c2) / ((sx * sx + sy * sy + c1) * (variances + c2));
 }
 
+/// Channel `c` of `measured` of a row of texels.
+template <std::size_t kChannels>
+void measure_row(const std::uint8_t* texels, std::size_t count, std::size_t measured, std::size_t c,
+                 std::uint8_t* to) {
+  if (kChannels == 1 || measured > 1)
+    for (std::size_t i = 0; i < count; ++i) to[i] = texels[kChannels * i + c];
+  else
+    for (std::size_t i = 0; i < count; ++i) to[i] = measured_value(texels + kChannels * i, kChannels, 1, 0);
+}
+void measure_row(const std::uint8_t* texels, std::size_t channels, std::size_t count, std::size_t measured,
+                 std::size_t c, std::uint8_t* to) {
+  const auto rows = channels == 1   ? measure_row<1>
+                    : channels == 2 ? measure_row<2>
+                    : channels == 3 ? measure_row<3>
+                                    : measure_row<4>;
+  rows(texels, count, measured, c, to);
+}
+
+bool varies(const std::vector<std::uint8_t>& values, const std::vector<std::uint8_t>& mask) {
+  std::uint8_t low = 255, high = 0;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (!mask[i]) continue;
+    low = std::min(low, values[i]);
+    high = std::max(high, values[i]);
+  }
+  return low < high;
+}
+
+BilinearPlace place_of(std::uint32_t at, std::uint32_t size, std::uint32_t coarse_size) {
+  // Centres of texels, in 1/256 of a coarse texel.
+  const std::int64_t centre = (2 * std::int64_t{at} + 1) * coarse_size * 128 / size - 128;
+  const auto clamped =
+      static_cast<std::uint32_t>(std::clamp<std::int64_t>(centre, 0, (std::int64_t{coarse_size} - 1) * 256));
+  return {clamped / 256, std::min(clamped / 256 + 1, coarse_size - 1), clamped % 256};
+}
+
 }  // namespace
 
 DistortionMeter::DistortionMeter(std::vector<std::uint8_t> source, std::vector<std::uint8_t> mask,
@@ -94,38 +130,6 @@ Distortion DistortionMeter::against(const std::vector<std::uint8_t>& decoded) co
           1 - similarity / static_cast<double>(weight)};
 }
 
-namespace {
-
-/// Channel `c` of `measured` of a row of texels.
-template <std::size_t kChannels>
-void measure_row(const std::uint8_t* texels, std::size_t count, std::size_t measured, std::size_t c,
-                 std::uint8_t* to) {
-  if (kChannels == 1 || measured > 1)
-    for (std::size_t i = 0; i < count; ++i) to[i] = texels[kChannels * i + c];
-  else
-    for (std::size_t i = 0; i < count; ++i) to[i] = measured_value(texels + kChannels * i, kChannels, 1, 0);
-}
-void measure_row(const std::uint8_t* texels, std::size_t channels, std::size_t count, std::size_t measured,
-                 std::size_t c, std::uint8_t* to) {
-  const auto rows = channels == 1   ? measure_row<1>
-                    : channels == 2 ? measure_row<2>
-                    : channels == 3 ? measure_row<3>
-                                    : measure_row<4>;
-  rows(texels, count, measured, c, to);
-}
-
-bool varies(const std::vector<std::uint8_t>& values, const std::vector<std::uint8_t>& mask) {
-  std::uint8_t low = 255, high = 0;
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    if (!mask[i]) continue;
-    low = std::min(low, values[i]);
-    high = std::max(high, values[i]);
-  }
-  return low < high;
-}
-
-}  // namespace
-
 std::size_t measured_channels(const TexturePlane& plane) {
   return is_colour(plane.role) ? 1 : plane.channels;
 }
@@ -190,18 +194,6 @@ Distortion FragmentMeter::against(const Samples& shown) const {
   }
   return out;
 }
-
-namespace {
-
-BilinearPlace place_of(std::uint32_t at, std::uint32_t size, std::uint32_t coarse_size) {
-  // Centres of texels, in 1/256 of a coarse texel.
-  const std::int64_t centre = (2 * std::int64_t{at} + 1) * coarse_size * 128 / size - 128;
-  const auto clamped =
-      static_cast<std::uint32_t>(std::clamp<std::int64_t>(centre, 0, (std::int64_t{coarse_size} - 1) * 256));
-  return {clamped / 256, std::min(clamped / 256 + 1, coarse_size - 1), clamped % 256};
-}
-
-}  // namespace
 
 std::vector<BilinearPlace> bilinear_places(std::uint32_t first, std::uint32_t count, std::uint32_t size,
                                            std::uint32_t coarse_size) {

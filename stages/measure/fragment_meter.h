@@ -1,9 +1,6 @@
 #pragma once
 // Inside stages only: how far a decoded fragment, or a preview scaled up as clients do it, is from its
 // source, over covered texels.
-#include <cstddef>
-#include <cstdint>
-#include <vector>
 
 #include "stages/data/fragments.h"
 #include "stages/data/ladder.h"

@@ -1,6 +1,5 @@
 #include "stages/measure/picture.h"
 
-#include <algorithm>
 #include <array>
 
 #if defined(__x86_64__) && defined(__GNUC__)
@@ -8,7 +7,7 @@
 #define TEXMESH_HAS_AVX2_TWIN 1
 #endif
 
-namespace texmesh::measure {
+namespace texmesh {
 namespace {
 
 /// The columns that are not plain, without what lies around them.
@@ -37,6 +36,51 @@ void extend(PixelSpans::Row& row, const PixelSpans::Row& by) {
   row.first = row.first == row.last ? by.first : std::min(row.first, by.first);
   row.last = std::max(row.last, by.last);
 }
+
+// Products are rounded before they are added (-ffp-contract=off), so that vectors change no bit. By hand: of
+// loops over the numbers of a block g++ makes one number at a time at -O3.
+#ifdef TEXMESH_HAS_AVX2_TWIN
+void add_blocks_plain(const FilterKernel& kernel, const float* const* lines, std::size_t count, float* out) {
+  const std::size_t taps = kernel.size();
+  const float* weights = kernel.data();
+  for (std::size_t i = 0; i < whole_blocks(count); i += 8) {
+    __m128 left = _mm_setzero_ps(), right = left;
+    for (std::size_t k = 0; k < taps; ++k) {
+      const __m128 weight = _mm_set1_ps(weights[k]);
+      left = _mm_add_ps(left, _mm_mul_ps(_mm_loadu_ps(lines[k] + i), weight));
+      right = _mm_add_ps(right, _mm_mul_ps(_mm_loadu_ps(lines[k] + i + 4), weight));
+    }
+    _mm_storeu_ps(out + i, left);
+    _mm_storeu_ps(out + i + 4, right);
+  }
+}
+
+[[gnu::target("avx2")]] void add_blocks_avx2(const FilterKernel& kernel, const float* const* lines,
+                                             std::size_t count, float* out) {
+  const std::size_t taps = kernel.size();
+  const float* weights = kernel.data();
+  for (std::size_t i = 0; i < whole_blocks(count); i += 16) {
+    __m256 left = _mm256_setzero_ps(), right = left;
+    for (std::size_t k = 0; k < taps; ++k) {
+      const __m256 weight = _mm256_set1_ps(weights[k]);
+      left = _mm256_add_ps(left, _mm256_mul_ps(_mm256_loadu_ps(lines[k] + i), weight));
+      right = _mm256_add_ps(right, _mm256_mul_ps(_mm256_loadu_ps(lines[k] + i + 8), weight));
+    }
+    _mm256_storeu_ps(out + i, left);
+    _mm256_storeu_ps(out + i + 8, right);
+  }
+}
+#else
+void add_blocks_plain(const FilterKernel& kernel, const float* const* lines, std::size_t count, float* out) {
+  for (std::size_t i = 0; i < whole_blocks(count); ++i) {
+    float sum = 0;
+    for (std::size_t k = 0; k < kernel.size(); ++k) sum += lines[k][i] * kernel[k];
+    out[i] = sum;
+  }
+}
+#endif
+
+using Lines = std::array<const float*, 2 * kFilterReach + 1>;
 
 }  // namespace
 
@@ -72,55 +116,6 @@ PixelSpans union_of(const PixelSpans& a, const PixelSpans& b) {
   return out;
 }
 
-namespace {
-
-// Products are rounded before they are added (-ffp-contract=off), so that vectors change no bit. By hand: of
-// loops over the numbers of a block g++ makes one number at a time at -O3.
-#ifdef TEXMESH_HAS_AVX2_TWIN
-void add_blocks_plain(const Kernel& kernel, const float* const* lines, std::size_t count, float* out) {
-  const std::size_t taps = kernel.size();
-  const float* weights = kernel.data();
-  for (std::size_t i = 0; i < whole_blocks(count); i += 8) {
-    __m128 left = _mm_setzero_ps(), right = left;
-    for (std::size_t k = 0; k < taps; ++k) {
-      const __m128 weight = _mm_set1_ps(weights[k]);
-      left = _mm_add_ps(left, _mm_mul_ps(_mm_loadu_ps(lines[k] + i), weight));
-      right = _mm_add_ps(right, _mm_mul_ps(_mm_loadu_ps(lines[k] + i + 4), weight));
-    }
-    _mm_storeu_ps(out + i, left);
-    _mm_storeu_ps(out + i + 4, right);
-  }
-}
-
-[[gnu::target("avx2")]] void add_blocks_avx2(const Kernel& kernel, const float* const* lines,
-                                             std::size_t count, float* out) {
-  const std::size_t taps = kernel.size();
-  const float* weights = kernel.data();
-  for (std::size_t i = 0; i < whole_blocks(count); i += 16) {
-    __m256 left = _mm256_setzero_ps(), right = left;
-    for (std::size_t k = 0; k < taps; ++k) {
-      const __m256 weight = _mm256_set1_ps(weights[k]);
-      left = _mm256_add_ps(left, _mm256_mul_ps(_mm256_loadu_ps(lines[k] + i), weight));
-      right = _mm256_add_ps(right, _mm256_mul_ps(_mm256_loadu_ps(lines[k] + i + 8), weight));
-    }
-    _mm256_storeu_ps(out + i, left);
-    _mm256_storeu_ps(out + i + 8, right);
-  }
-}
-#else
-void add_blocks_plain(const Kernel& kernel, const float* const* lines, std::size_t count, float* out) {
-  for (std::size_t i = 0; i < whole_blocks(count); ++i) {
-    float sum = 0;
-    for (std::size_t k = 0; k < kernel.size(); ++k) sum += lines[k][i] * kernel[k];
-    out[i] = sum;
-  }
-}
-#endif
-
-using Lines = std::array<const float*, 2 * kFilterReach + 1>;
-
-}  // namespace
-
 bool has_avx2() {
 #ifdef TEXMESH_HAS_AVX2_TWIN
   static const bool has = __builtin_cpu_supports("avx2");
@@ -130,28 +125,29 @@ bool has_avx2() {
 #endif
 }
 
-void add_lines_by(bool avx2, const Kernel& kernel, const float* const* lines, std::size_t count, float* out) {
+void add_lines_by(bool avx2, const FilterKernel& kernel, const float* const* lines, std::size_t count,
+                  float* out) {
 #ifdef TEXMESH_HAS_AVX2_TWIN
   if (avx2) return add_blocks_avx2(kernel, lines, count, out);
 #endif
   add_blocks_plain(kernel, lines, count, out);
 }
 
-void add_lines(const Kernel& kernel, const float* const* lines, std::size_t count, float* out) {
+void add_lines(const FilterKernel& kernel, const float* const* lines, std::size_t count, float* out) {
   add_lines_by(has_avx2(), kernel, lines, count, out);
 }
 
-float filtered_plain(float plain, const Kernel& kernel) {
+float filtered_plain(float plain, const FilterKernel& kernel) {
   float sum = 0;
   for (const float weight : kernel) sum += plain * weight;
   return sum;
 }
 
-FilteredRows::FilteredRows(const PixelSpans& spans, float plain, const Kernel& kernel)
+FilteredRows::FilteredRows(const PixelSpans& spans, float plain, const FilterKernel& kernel)
     : spans_(spans),
       kernel_(kernel),
       plain_(plain),
-      filtered_plain_(measure::filtered_plain(plain, kernel)),
+      filtered_plain_(filtered_plain(plain, kernel)),
       width_(whole_blocks(spans.side_px) + kFilterBlock),
       padded_(width_ + 2 * kFilterReach + kFilterBlock),
       lines_(kKept * width_, filtered_plain_),
@@ -177,7 +173,7 @@ void FilteredRows::make(std::size_t y, const float* values) {
   std::fill(out + row.last, out + row.first + whole_blocks(count), filtered_plain_);
 }
 
-void FilteredRows::read(std::size_t y, const Kernel& along_y, float* out) const {
+void FilteredRows::read(std::size_t y, const FilterKernel& along_y, float* out) const {
   const PixelSpans::Row& row = spans_.rows[y];
   const std::size_t rows = spans_.rows.size(), radius = along_y.size() / 2;
   Lines taps{};
@@ -188,4 +184,4 @@ void FilteredRows::read(std::size_t y, const Kernel& along_y, float* out) const 
   add_lines(along_y, taps.data(), row.last - row.first, out);
 }
 
-}  // namespace texmesh::measure
+}  // namespace texmesh

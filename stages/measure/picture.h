@@ -1,7 +1,5 @@
 #pragma once
 // Pictures, and what of them filters have to look at: filters cost by what a picture shows, not by its size.
-#include <cstddef>
-#include <cstdint>
 #include <vector>
 
 #include "format/base/vec.h"
@@ -14,10 +12,6 @@ struct Picture {
   std::vector<Vec3f> linear;          // RGB of BT.709 primaries, 0..1 (brighter is cut off)
   std::vector<std::uint8_t> covered;  // 0 or 1
 };
-
-}  // namespace texmesh
-
-namespace texmesh::measure {
 
 /// How far from what is shown a filter may still see it, px; no filter reaches farther.
 inline constexpr int kFilterReach = 10;
@@ -39,7 +33,7 @@ PixelSpans shown_spans(const Picture& picture);
 PixelSpans union_of(const PixelSpans& a, const PixelSpans& b);
 
 /// One row of a separable filter, at most 2 kFilterReach + 1 values, an odd number.
-using Kernel = std::vector<float>;
+using FilterKernel = std::vector<float>;
 
 /// Values of the spans' pixels; all others have the plain value.
 struct SpanImage {
@@ -59,36 +53,37 @@ constexpr std::size_t whole_blocks(std::size_t n) {
 
 /// out[i] = sum over k of kernel[k] * lines[k][i], i < whole_blocks(count). Sums run by rising k: the same
 /// bits with AVX2 and without.
-void add_lines(const Kernel& kernel, const float* const* lines, std::size_t count, float* out);
+void add_lines(const FilterKernel& kernel, const float* const* lines, std::size_t count, float* out);
 /// add_lines() by one way; `avx2` where the processor has it.
-void add_lines_by(bool avx2, const Kernel& kernel, const float* const* lines, std::size_t count, float* out);
+void add_lines_by(bool avx2, const FilterKernel& kernel, const float* const* lines, std::size_t count,
+                  float* out);
 bool has_avx2();
 
 /// What a filter makes of a plain picture.
-float filtered_plain(float plain, const Kernel& kernel);
+float filtered_plain(float plain, const FilterKernel& kernel);
 
 /// The last rows of a picture, filtered along x. All have the picture's whole width, with plain values beside
 /// the spans.
 class FilteredRows {
  public:
-  FilteredRows(const PixelSpans& spans, float plain, const Kernel& kernel);
+  FilteredRows(const PixelSpans& spans, float plain, const FilterKernel& kernel);
   /// Of the whole picture.
   float plain() const { return filtered_plain_; }
   /// Row y from `values` of its span. Rows are made in rising order; the last 2 kFilterReach + 1 stay.
   void make(std::size_t y, const float* values);
   /// Writes row y's span, filtered along y. The rows within the kernel's reach must be made; borders are
   /// replicated. `out` has room for whole_blocks(count).
-  void read(std::size_t y, const Kernel& along_y, float* out) const;
+  void read(std::size_t y, const FilterKernel& along_y, float* out) const;
 
  private:
   static constexpr std::size_t kKept = 2 * kFilterReach + 1;
   const float* line(std::size_t y) const { return lines_.data() + y % kKept * width_; }
   const PixelSpans& spans_;
-  const Kernel& kernel_;
+  const FilterKernel& kernel_;
   float plain_, filtered_plain_;
   std::size_t width_ = 0;
   std::vector<float> padded_, lines_;
   std::vector<PixelSpans::Row> written_;
 };
 
-}  // namespace texmesh::measure
+}  // namespace texmesh

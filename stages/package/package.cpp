@@ -2,11 +2,11 @@
 
 #include <set>
 
-#include "format/base/box.h"
-#include "format/base/clean_text.h"
+#include "format/base/text_bytes.h"
 #include "format/documents/package_writer.h"
 #include "format/rules/viewing.h"
 #include "stages/base/run_context.h"
+#include "stages/geometry/mesh_topology.h"
 #include "stages/gltf/glb_container.h"
 #include "stages/image/decode_image.h"
 
@@ -124,15 +124,6 @@ PerceptualTable describe_perceptual(const NestedScales& scales, const Perceptual
   return t;
 }
 
-double surface_area(const Mesh& mesh, const NestedScale& scale) {
-  double area = 0;
-  for (const Triangle& t : scale.triangles) {
-    const auto at = [&](std::size_t k) { return to_double(mesh.positions[mesh.wedge_position[t[k]]]); };
-    area += 0.5 * length(cross(at(1) - at(0), at(2) - at(0)));
-  }
-  return area;
-}
-
 Manifest describe_model(const NestedScales& scales, const PerceptualValues& perceptual,
                         const ScaleFiles& files, const Fragments& fragments, const MeasuredQuality& quality,
                         double jnd, const std::string& title) {
@@ -145,7 +136,7 @@ Manifest describe_model(const NestedScales& scales, const PerceptualValues& perc
   m.bounds_min = box.min;
   m.bounds_max = box.max;
   m.object_height = static_cast<double>(perceptual.object_height);
-  m.surface_area = surface_area(scales.mesh, scales.scales.front());
+  m.surface_area = surface_area(scales.mesh, scales.scales.front().triangles);
   m.jnd = jnd;
   m.scales = describe_scales(scales, perceptual, files, quality);
   m.steps = step_function(m.scales, StepRule::kFlip);

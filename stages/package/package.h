@@ -1,20 +1,14 @@
 #pragma once
-#include <cstdint>
-#include <string>
-#include <vector>
 
 #include "format/documents/about.h"
 #include "format/documents/tables.h"
 #include "format/documents/thesis_tables.h"
 #include "stages/data/fragments.h"
 #include "stages/data/ladder.h"
-#include "stages/data/measured_quality.h"
 #include "stages/data/nested_scales.h"
 #include "stages/data/perceptual_values.h"
-#include "stages/data/poster.h"
 #include "stages/data/previews.h"
 #include "stages/data/proxies.h"
-#include "stages/data/scale_files.h"
 #include "stages/data/stage.h"
 
 namespace texmesh {
@@ -23,8 +17,7 @@ inline constexpr int kPackageVersion = 6;
 
 struct PackageOptions {
   std::string title, meta;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("title", s.title, "shown by viewers, before any other title");
     v("meta", s.meta, Range{0, static_cast<double>(kMaxAboutBytes)}, ProfileOnly{},
       "about.json without what the source says, as one text; --meta FILE sets it");

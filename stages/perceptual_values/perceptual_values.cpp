@@ -172,10 +172,9 @@ std::vector<double> compare_scales(const NestedScales& scales, const Skeleton& s
                                    const RunContext& context, PerceptualValues& out) {
   const std::size_t n = scales.scales.size();
   std::vector<std::vector<ScalePoint>> sampled(n);
-  parallel_for(context, n - 1, 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i)
-      sampled[i] = sample_scale(scales.mesh, scales.scales[i], skeleton.radius,
-                                enough_samples(scales.scales[i].triangles.size(), samples));
+  parallel_each(context, n - 1, 1, [&](std::size_t i) {
+    sampled[i] = sample_scale(scales.mesh, scales.scales[i], skeleton.radius,
+                              enough_samples(scales.scales[i].triangles.size(), samples));
   });
   std::vector<double> error(n, 0);
   std::atomic<std::size_t> done = 0;
@@ -195,8 +194,7 @@ std::vector<double> compare_scales(const NestedScales& scales, const Skeleton& s
 /// Of kept scales with nearly the same number of triangles only the finest stays, and the coarsest of all.
 /// The finest is enough wherever the others are, major ones too, and the others would only add bytes to the
 /// package. Atlases whose vertices are nearly all locked give rows of such scales.
-template <class LogTriangles>
-void drop_neighbours(std::size_t n, const LogTriangles& log_triangles, std::vector<std::uint8_t>& kept) {
+void drop_neighbours(std::size_t n, const auto& log_triangles, std::vector<std::uint8_t>& kept) {
   const double least = portable::log(1.5);
   std::size_t finer = 0;
   for (std::size_t k = 1; k + 1 < n; ++k) {
@@ -263,9 +261,8 @@ void find_displayed_heights(const NestedScales& scales, const std::vector<double
                             const RunContext& context, PerceptualValues& out) {
   out.object_height = bounding_box(scales.mesh.positions).longest_side();
   std::vector<double> edge(scales.scales.size());
-  parallel_for(context, edge.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t k = begin; k < end; ++k)
-      edge[k] = shortest_edge(scales.mesh, scales.scales[k], options.edge_percentile);
+  parallel_each(context, edge.size(), 1, [&](std::size_t k) {
+    edge[k] = shortest_edge(scales.mesh, scales.scales[k], options.edge_percentile);
   });
   for (std::size_t k = 0; k < scales.scales.size(); ++k) {
     out.display_px_edge.push_back(height_px(out.object_height, edge[k]));

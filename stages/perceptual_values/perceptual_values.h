@@ -1,10 +1,9 @@
 #pragma once
-#include <vector>
 
 #include "format/documents/thesis_tables.h"
 #include "stages/data/nested_scales.h"
 #include "stages/data/perceptual_values.h"
-#include "stages/data/skeleton.h"
+#include "stages/data/scale_map.h"
 #include "stages/data/stage.h"
 
 namespace texmesh {
@@ -33,8 +32,7 @@ struct PerceptualValuesOptions {
   int samples = 4000;          // the percentiles' ranks are within 0.5 % then
   int kept_scales = 8;         // beside S_0 and the major ones
   double edge_percentile = 5;  // gives E_S of the O_V / E_S rule; 0 = the shortest edge
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("jnd", s.jnd, Range{0.001, 1}, "just-noticeable relative change of the distance to the skeleton");
     v("jnd_reference_px", s.jnd_reference_px, Range{1, 100000}, ProfileOnly{},
       "displayed height of the object in px at which that difference is just noticeable");

@@ -1,11 +1,9 @@
 #pragma once
-#include <vector>
 
-#include "format/model/model.h"
 #include "stages/data/fragments.h"
 #include "stages/data/nested_scales.h"
 #include "stages/data/pixels.h"
-#include "stages/data/poster.h"
+#include "stages/data/previews.h"
 #include "stages/data/stage.h"
 
 namespace texmesh {
@@ -15,8 +13,7 @@ inline constexpr int kPosterVersion = 3;
 struct PosterOptions {
   int size_px = 512;
   int max_bytes = 40000;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("size_px", s.size_px, Range{0, 4096},
       "side of the poster, the picture of the object for lists and search engines; 0 = no poster");
     v("max_bytes", s.max_bytes, Range{1000, 1000000}, ProfileOnly{}, "most bytes of the poster's JPEG");

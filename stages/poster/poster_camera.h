@@ -1,11 +1,9 @@
 #pragma once
 // Inside the room only: from where the picture is taken.
-#include <vector>
 
-#include "stages/base/run_context.h"
 #include "stages/render/visibility.h"
 
-namespace texmesh::poster {
+namespace texmesh {
 
 /// A camera that looks along -z of this frame at the positions. Its picture is the smallest square, with a
 /// margin of 4 % of its side, that holds all of them but the share `left_out` (0..1) on each of its sides.
@@ -16,4 +14,4 @@ RenderCamera fitted_camera(const std::vector<Vec3d>& positions, Vec3d x, Vec3d y
 /// few triangles, by which directions are compared.
 RenderCamera poster_camera(const RenderScene& scene, const RenderScene& coarse, const RunContext& context);
 
-}  // namespace texmesh::poster
+}  // namespace texmesh

@@ -1,7 +1,7 @@
 #include "stages/previews/previews.h"
 
 #include "stages/base/parallel.h"
-#include "stages/image/check_pixels.h"
+#include "stages/image/pixel_window.h"
 #include "stages/image/resize.h"
 #include "stages/jpeg/jpeg.h"
 
@@ -32,10 +32,9 @@ Previews make_previews(const Fragments& fragments, const std::vector<Pixels>& pi
   inner.progress = nullptr;
   Previews previews;
   previews.planes.resize(fragments.planes.size());
-  parallel_for(context, fragments.planes.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t p = begin; p < end; ++p)
-      if (fragments.planes[p].mip == 0)
-        previews.planes[p] = make_preview(fragments.planes[p], pixels[p], options, inner);
+  parallel_each(context, fragments.planes.size(), 1, [&](std::size_t p) {
+    if (fragments.planes[p].mip == 0)
+      previews.planes[p] = make_preview(fragments.planes[p], pixels[p], options, inner);
   });
   context.report(1);
   return previews;

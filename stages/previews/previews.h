@@ -1,11 +1,9 @@
 #pragma once
-#include <vector>
 
 #include "stages/data/fragments.h"
 #include "stages/data/pixels.h"
 #include "stages/data/previews.h"
 #include "stages/data/stage.h"
-#include "stages/data/subsampling.h"
 
 namespace texmesh {
 

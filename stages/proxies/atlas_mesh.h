@@ -6,7 +6,7 @@
 #include "format/model/model.h"
 #include "stages/base/run_context.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 
 /// A triangle soup whose equal positions are one. A group is a class of materials that must stay apart, such
 /// as unlit, blended or double-sided ones: no chart holds triangles of two groups.
@@ -81,4 +81,4 @@ std::optional<AtlasMesh> pack_atlas(const ProxySurface& surface, const SurfaceCh
                                     std::uint32_t width_px, std::uint32_t height_px, std::uint32_t gutter_px,
                                     const RunContext& context);
 
-}  // namespace texmesh::proxies
+}  // namespace texmesh

@@ -1,10 +1,9 @@
 #include "stages/proxies/proxies.h"
 
 #include "format/base/portable_math.h"
-#include "stages/geometry/scale_frames.h"
 #include "stages/proxies/make_proxy.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 namespace {
 
 constexpr std::uint32_t kLeastTriangles = 60;
@@ -270,15 +269,11 @@ std::vector<Proxy> measured_proxies(const ProxySubject& subject, std::vector<Kep
 }
 
 }  // namespace
-}  // namespace texmesh::proxies
-
-namespace texmesh {
 
 Proxies make_proxies(const NestedScales& scales, const std::vector<Material>& materials,
                      const std::vector<Image>& images, const Fragments& fragments,
                      const std::vector<Pixels>& pixels, const ProxiesOptions& options,
                      const RunContext& context) {
-  using namespace proxies;
   Proxies out;
   if (options.mode == ProxyMode::kNone) return out;
   if (scales.scales.empty()) throw StageError("proxies", "scales", "S_0", "none");

@@ -19,8 +19,7 @@ struct EnumNames<ProxyMode> {
 struct ProxiesOptions {
   ProxyMode mode = ProxyMode::kAuto;
   std::vector<int> sizes{36000, 50000, 150000};
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("mode", s.mode,
       "whether coarse meshes with atlases of their own are baked: auto = where they beat the scales with the "
       "source's atlas for the same bytes");

@@ -1,10 +1,9 @@
-
-
 #include "format/documents/manifest.h"
+#include "stages/geometry/mesh_topology.h"
 #include "stages/geometry/scale_frames.h"
 #include "stages/quality/table_fit.h"
 
-namespace texmesh::quality {
+namespace texmesh {
 namespace {
 
 /// A displayed height that is rendered whatever comes out, and the one between it and the next lower one.
@@ -12,28 +11,20 @@ struct Height {
   double displayed_px = 0, between_px = 0;
   std::optional<std::size_t> rank;  // among the sizes that show textures
 };
-/// Rising, each twice the one before, up to `largest_px` halved no time. Textures show at kSizes of them, the
-/// last of which is `largest_px` halved `fewer` times.
+/// Rising, each twice the one before, up to `largest_px` halved no time. Textures show at kTextureSizes of
+/// them, the last of which is `largest_px` halved `fewer` times.
 std::vector<Height> heights_below(double largest_px, std::size_t fewer) {
   std::vector<Height> heights;
   for (std::size_t halvings = 0;; ++halvings) {
     const double px = std::ldexp(largest_px, -static_cast<int>(halvings));
-    const bool shows = halvings >= fewer && halvings < fewer + kSizes;
-    if (halvings < fewer + kSizes ? px < 1 : px < kLeastSwitchPx) break;  // the table holds whole pixels
-    heights.push_back(
-        {px, px * std::sqrt(0.5), shows ? std::optional(fewer + kSizes - 1 - halvings) : std::nullopt});
+    const bool shows = halvings >= fewer && halvings < fewer + kTextureSizes;
+    if (halvings < fewer + kTextureSizes ? px < 1 : px < kLeastSwitchPx)
+      break;  // the table holds whole pixels
+    heights.push_back({px, px * std::sqrt(0.5),
+                       shows ? std::optional(fewer + kTextureSizes - 1 - halvings) : std::nullopt});
   }
   std::reverse(heights.begin(), heights.end());
   return heights;
-}
-
-double surface_area_of(const Mesh& mesh, const std::vector<Triangle>& triangles) {
-  double area = 0;
-  for (const Triangle& t : triangles) {
-    const auto at = [&](std::size_t k) { return to_double(mesh.positions[mesh.wedge_position[t[k]]]); };
-    area += 0.5 * length(cross(at(1) - at(0), at(2) - at(0)));
-  }
-  return area;
 }
 
 /// Scales with meshes of their own, as their files light them: a view costs by the positions that it looks
@@ -64,7 +55,7 @@ std::vector<RenderScene> scenes_of(const NestedScales& scales, const KeptScales&
 }
 
 /// Whether nobody can tell the scale from S_0 in any view.
-bool passes(const Losses& losses, const FlipLimits& limits) {
+bool passes(const Losses& losses, const ShotLimits& limits) {
   return std::ranges::all_of(losses, [&](const Loss& loss) { return limits.hold(loss); });
 }
 
@@ -74,7 +65,7 @@ bool is_small(double displayed_px, const QualityOptions& options) {
 }
 
 /// The worst of 12 views is up to 1.24 times the worse of two (saxophone and turtle, 256 and 1024 px).
-FlipLimits limits_at(double displayed_px, const QualityOptions& options) {
+ShotLimits limits_at(double displayed_px, const QualityOptions& options) {
   const int views =
       is_small(displayed_px, options) ? options.views : std::min(options.views, options.large_views);
   const double share = views >= 12 ? 1 : views >= 6 ? 0.9 : 0.8;
@@ -93,7 +84,7 @@ class SwitchSizes {
   const std::vector<float>& display_px() const { return display_px_; }
 
   /// Of scales that have passed all heights so far. Returns those that fail here.
-  std::vector<std::uint8_t> judge(const Cells& geometry, double displayed_px) {
+  std::vector<std::uint8_t> judge(const LossCells& geometry, double displayed_px) {
     std::vector<std::uint8_t> failed(alive_.size(), 0);
     for (std::size_t k = 1; k < alive_.size(); ++k) {
       if (!alive_[k]) continue;
@@ -104,7 +95,8 @@ class SwitchSizes {
     return failed;
   }
   /// Of scales that have passed the height below and failed the one above.
-  void judge_between(const Cells& geometry, const std::vector<std::uint8_t>& scales, double displayed_px) {
+  void judge_between(const LossCells& geometry, const std::vector<std::uint8_t>& scales,
+                     double displayed_px) {
     for (std::size_t k = 1; k < scales.size(); ++k)
       if (scales[k] && passes(geometry[k], limits_at(displayed_px, options_)))
         display_px_[k] = static_cast<float>(displayed_px);
@@ -198,7 +190,9 @@ struct RawLosses {
 
 GroupPictures group_pictures(const GroupCells& group, const GroupCells& smaller,
                              const GroupPictures& measured) {
-  const auto follow = [](const Cells& cells, const SmallerSize& below) { return losses_of(cells, &below); };
+  const auto follow = [](const LossCells& cells, const SmallerSize& below) {
+    return losses_of(cells, &below);
+  };
   PictureLosses finer =
       follow(group.finer, {smaller.finer, measured.finer, finer_along(measured.finer, smaller, group)});
   PictureLosses coded = along_curve(group, smaller, measured, finer);
@@ -276,16 +270,12 @@ std::vector<double> texel_levels(const SizeCells& size, std::size_t doublings) {
 }
 
 }  // namespace
-}  // namespace texmesh::quality
-
-namespace texmesh {
 
 MeasuredQuality measure_quality(const NestedScales& scales, const PerceptualValues& perceptual,
                                 const std::vector<Material>& materials, const std::vector<Image>& images,
                                 const Fragments& fragments, const std::vector<Pixels>& pixels,
                                 const Ladder& ladder, const Previews& previews, const PackageTables& tables,
                                 const QualityOptions& options, const RunContext& context) {
-  using namespace quality;
   if (scales.mesh.positions.empty()) throw StageError("quality", "S_0", "positions", "none");
   const KeptScales kept = kept_scales(scales, perceptual, context);
   const ShownTextures shown = find_shown(materials, fragments, scales.mesh);
@@ -305,15 +295,14 @@ MeasuredQuality measure_quality(const NestedScales& scales, const PerceptualValu
                 "no picture shows anything of the object; its scales count as equal");
   studio.frame = seen.frame;
   studio.rows = seen.rows;
-  studio.pixels_of_unit =
-      static_cast<double>(seen.pixels) / (options.views * quality::kLookedAtPx * quality::kLookedAtPx);
+  studio.pixels_of_unit = static_cast<double>(seen.pixels) / (options.views * kLookedAtPx * kLookedAtPx);
   studio.environment = studio_environment();
   for (std::size_t t = 0; t < shown.textures.size(); ++t)
     studio.textures.push_back(source_texture(
         data, shown.textures[t], shown.textures[t].with_mips ? seen.first_levels[t] : 0, context));
 
   const TextureSampler sampler{data, shown, groups, options.rung_samples,
-                               surface_area_of(scales.mesh, scales.scales[0].triangles)};
+                               surface_area(scales.mesh, scales.scales[0].triangles)};
   SwitchSizes switch_sizes(kept.numbers.size(), options);
   const std::size_t fewer =
       fewer_heights(sampler, scales.scales[0].triangles.size(), studio.frame.extent, options);

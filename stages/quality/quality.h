@@ -2,7 +2,6 @@
 #include "format/documents/tables.h"
 #include "stages/data/fragments.h"
 #include "stages/data/ladder.h"
-#include "stages/data/measured_quality.h"
 #include "stages/data/nested_scales.h"
 #include "stages/data/perceptual_values.h"
 #include "stages/data/pixels.h"
@@ -20,8 +19,7 @@ struct QualityOptions {
   int rung_samples = 3;
   double flip_mean = 0.05;
   double flip_p95 = 0.15;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("views", s.views, Range{1, 64},
       "directions in which a scale must pass at displayed heights up to a quarter of the largest");
     v("large_views", s.large_views, Range{1, 64},
@@ -40,7 +38,7 @@ struct QualityOptions {
 /// Renders kept scales and sampled rungs with the reference renderer (stages/render), in the studio's light,
 /// and compares each picture with that of S_0 and the source's images, over the pixels that either covers.
 /// The reference is what viewers of the source show: its mips mix what no chart covers into charts' borders.
-/// FLIP as published (stages/measure/flip.h) and SSIM of luma (stages/measure/image_compare.h). Means and
+/// FLIP as published and SSIM of luma (stages/measure/flip.h). Means and
 /// percentiles are of the pixels of all views together.
 /// - Pictures: perspective, 4 x 4 samples a pixel. The camera frames the object's bounding sphere. The
 ///   displayed height is the length on screen that O_V has at the sphere's centre. All maps of the material
@@ -82,7 +80,7 @@ struct QualityOptions {
 ///   ratio to it where both were rendered; a highest rung that was not has a ratio of 1. Each size has the
 ///   knots of the others that lie far from its own: mips have few rungs. Of a model with a sampler that reads
 ///   level 0 alone, all of this is rendered at every size. Planes are those that a client shows at the size
-///   (format/rules/mip_choice.h). Planes of one group have the rung whose quality is nearest to that of the
+///   (format/rules/viewing.h). Planes of one group have the rung whose quality is nearest to that of the
 ///   group's first plane. FLIP of knots is scaled so that the mean over fragments of GroupCurve::coded() is
 ///   what was measured for whole planes.
 /// - Exponent and error: of samples with all groups changed, on S_0 and on coarser scales, with the lowest

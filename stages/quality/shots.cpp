@@ -1,14 +1,116 @@
 #include "stages/quality/shots.h"
 
 #include "stages/base/parallel.h"
+#include "stages/data/stage.h"
 
-namespace texmesh::quality {
-
+namespace texmesh {
 namespace {
 
 bool ended(const Shot& shot, const Losses& so_far) {
   return shot.ends_beyond &&
          !std::ranges::all_of(so_far, [&](const Loss& l) { return shot.ends_beyond->hold(l); });
+}
+
+/// Of what views show of the object, on average: more say hardly more.
+constexpr double kEnoughPixels = 30000;
+/// In units of kBandPx: of 96 rows 76 are compared.
+constexpr std::uint32_t kBandTiles = 3, kLeastBands = 2;
+
+std::uint32_t tiles_of(std::uint32_t side_px) { return (side_px + kBandPx - 1) / kBandPx; }
+
+struct TileRange {
+  std::uint32_t first = 0, end = 0;
+};
+TileRange shown_tiles(const ShownRows& view, std::uint32_t side_px) {
+  const double side = side_px;
+  const auto tile = [&](double row) { return static_cast<std::uint32_t>(row) / kBandPx; };
+  return {tile(view.first * side), std::min(tile(view.end * side) + 1, tiles_of(side_px))};
+}
+
+/// The share of what a view shows that is compared.
+double share_compared(const ShownRows& view, const std::vector<std::uint8_t>& compared) {
+  const std::size_t rows = view.pixels.size();
+  double sum = 0, all = 0;
+  for (std::size_t i = 0; i < rows; ++i) {
+    all += view.pixels[i];
+    if (compared[(2 * i + 1) * compared.size() / (2 * rows)]) sum += view.pixels[i];
+  }
+  return all > 0 ? sum / all : 0;
+}
+
+/// Of all pixels of all views: where S_0 covers less, the pictures compare next to nothing. A thread across
+/// the whole picture, one pixel wide, covers 0.5 %.
+constexpr double kLeastCovered = 0.002;
+
+BoundingSphere sphere_of(const Mesh& mesh) {
+  if (mesh.positions.empty()) throw StageError("quality", "S_0", "positions", "none");
+  const BoundingSphere sphere = bounding_sphere(mesh.positions);
+  if (!(sphere.radius > 0)) throw StageError("quality", "S_0", "an extent above 0", "one point");
+  return sphere;
+}
+
+/// The sphere around the place where nearly all positions lie, whatever a few others do.
+BoundingSphere crowd_sphere(const Mesh& mesh, const BoundingSphere& bounds) {
+  constexpr double kCrowd = 0.98, kMargin = 1.25;
+  const std::size_t n = mesh.positions.size();
+  BoundingSphere s;
+  std::vector<double> values(n);
+  const auto at_rank = [&](std::size_t rank) {
+    std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(rank), values.end());
+    return values[rank];
+  };
+  for (int k = 0; k < 3; ++k) {
+    for (std::size_t p = 0; p < n; ++p) values[p] = static_cast<double>(mesh.positions[p][k]);
+    s.centre[k] = at_rank(n / 2);
+  }
+  for (std::size_t p = 0; p < n; ++p) values[p] = length(to_double(mesh.positions[p]) - s.centre);
+  s.radius = kMargin * at_rank(static_cast<std::size_t>(kCrowd * static_cast<double>(n - 1)));
+  return s.radius > 0 && s.radius < bounds.radius ? s : bounds;
+}
+
+struct Seen {
+  std::uint64_t pixels = 0, of = 0;
+  std::vector<ShownRows> rows;
+  std::vector<std::uint32_t> first_levels;
+};
+
+ShownRows shown_rows(const Visibility& view) {
+  ShownRows out;
+  out.pixels.resize(view.side_px);
+  for (std::size_t i = 0; i + 1 < view.first.size(); ++i)
+    out.pixels[i / view.side_px] += view.first[i] < view.first[i + 1];
+  const auto shows = [](std::uint32_t pixels) { return pixels > 0; };
+  const auto first = std::ranges::find_if(out.pixels, shows);
+  if (first == out.pixels.end()) return out;
+  const auto last = std::find_if(out.pixels.rbegin(), out.pixels.rend(), shows);
+  const double side = view.side_px;
+  out.first = static_cast<double>(first - out.pixels.begin()) / side;
+  out.end = static_cast<double>(out.pixels.rend() - last) / side;
+  return out;
+}
+
+Seen look_around(const RenderScene& scene, const PictureFrame& frame, const TextureSizes& sizes, int views,
+                 double largest_px, const RunContext& context) {
+  Seen seen;
+  WantedMips levels(sizes.size());
+  for (int v = 0; v < views; ++v) {
+    context.check_cancelled();
+    const PicturePlace place = place_picture(frame, v, views, kLookedAtPx);
+    const Visibility view = look(scene, place.camera, place.side_px, context);
+    seen.rows.push_back(shown_rows(view));
+    for (const std::uint32_t pixels : seen.rows.back().pixels) seen.pixels += pixels;
+    seen.of += static_cast<std::uint64_t>(place.side_px) * place.side_px;
+    levels.add(scene, view, sizes, largest_px / kLookedAtPx);
+  }
+  seen.first_levels = levels.first_levels();
+  return seen;
+}
+
+std::string count_outside(const Mesh& mesh, const BoundingSphere& sphere) {
+  const auto outside = std::count_if(mesh.positions.begin(), mesh.positions.end(), [&](Vec3f p) {
+    return length(to_double(p) - sphere.centre) > sphere.radius;
+  });
+  return std::to_string(outside) + " of " + std::to_string(mesh.positions.size());
 }
 
 }  // namespace
@@ -36,7 +138,7 @@ std::vector<SizePictures::ScaleShots> SizePictures::by_scale(const std::vector<S
 
 /// One picture per list of materials.
 PictureVariants SizePictures::pictures(std::size_t scale, const PictureView& at,
-                                       const std::vector<const Materials*>& materials,
+                                       const std::vector<const ShotMaterials*>& materials,
                                        const RunContext& context) {
   const std::size_t shown = shown_scale(studio_.scenes, scale, displayed_px_);
   RenderScene scene = studio_.scenes[shown];
@@ -55,7 +157,7 @@ PictureVariants SizePictures::pictures(std::size_t scale, const PictureView& at,
 }
 
 Loss SizePictures::compare(const Reference& reference, const Picture& test) const {
-  const measure::PixelSpans spans = measure::shown_spans(test);
+  const PixelSpans spans = shown_spans(test);
   Loss loss{compare_flip(reference.flip, prepare_flip(test, spans)), 0};
   if (with_ssim_) {
     const PictureDifference d = compare_luma(reference.luma, prepare_luma(test, spans));
@@ -78,7 +180,7 @@ void SizePictures::compare_view(std::size_t view, const std::vector<Shot>& shots
     at.bands.cut(to);
   };
   const auto compare_group = [&](const ScaleShots& group, const Reference* seen, const RunContext& run) {
-    std::vector<const Materials*> materials;
+    std::vector<const ShotMaterials*> materials;
     if (!seen) materials.push_back(&source_);
     for (const std::size_t i : group.shots) materials.push_back(shots[i].materials);
     if (materials.empty()) return;
@@ -108,9 +210,7 @@ void SizePictures::compare_view(std::size_t view, const std::vector<Shot>& shots
   const Reference& seen = seen_.at(view);
   RunContext serial = context;
   serial.threads = 1;
-  parallel_for(context, groups.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t g = begin; g < end; ++g) compare_group(groups[g], &seen, serial);
-  });
+  parallel_each(context, groups.size(), 1, [&](std::size_t g) { compare_group(groups[g], &seen, serial); });
 }
 
 std::vector<Losses> SizePictures::take(const std::vector<Shot>& shots, const RunContext& context) {
@@ -125,7 +225,7 @@ std::vector<Losses> SizePictures::take(const std::vector<Shot>& shots, const Run
   return out;
 }
 
-bool FlipLimits::hold(const Loss& loss) const {
+bool ShotLimits::hold(const Loss& loss) const {
   constexpr double kPart = 0.95;
   return loss.flip.mean() <= mean && loss.flip.percentile(kPart) <= p95;
 }
@@ -152,4 +252,76 @@ Loss pooled(const Losses& losses, const Losses& like) {
   return sum;
 }
 
-}  // namespace texmesh::quality
+void Bands::cut(Picture& picture) const {
+  for (std::size_t y = 0; y < compared.size(); ++y)
+    if (!compared[y]) std::fill_n(picture.covered.data() + y * picture.side_px, picture.side_px, 0);
+}
+
+Bands choose_bands(const ShownRows& view, std::uint32_t side_px, double pixels) {
+  const TileRange shown = shown_tiles(view, side_px);
+  const auto enough = static_cast<std::uint32_t>(std::clamp(pixels / kEnoughPixels, 1.0, 1e6));
+  const std::uint32_t period = std::min(enough, (shown.end - shown.first) / (kBandTiles * kLeastBands));
+  if (period <= 1) return {};
+  const std::uint32_t tiles = tiles_of(side_px), cycle = period * kBandTiles;
+  // A band lies in the middle of what is shown.
+  const std::uint32_t begin = (shown.first + shown.end - kBandTiles) / 2 % cycle;
+  Bands out;
+  for (std::uint32_t t = 0; t < tiles; ++t) out.rendered.push_back((t + cycle - begin) % cycle < kBandTiles);
+  constexpr std::uint32_t kReach = kFilterReach;
+  for (std::uint32_t y = 0; y < side_px; ++y) {
+    const std::uint32_t first = y - std::min(y, kReach), last = std::min(y + kReach, side_px - 1);
+    out.compared.push_back(out.rendered[first / kBandPx] && out.rendered[last / kBandPx]);
+  }
+  if (share_compared(view, out.compared) < 0.4 / period) return {};  // of 76 rows in 96
+  return out;
+}
+
+ViewChoice choose_views(int views, int large_views) {
+  ViewChoice out{views, std::vector<ViewPart>(static_cast<std::size_t>(views), ViewPart::kAll)};
+  const int wanted = std::min(views, large_views);
+  for (int i = 0; i < wanted; ++i)
+    out.part[static_cast<std::size_t>((2 * i + 1) * views / (2 * wanted))] =
+        i % 2 == 0 ? ViewPart::kLargest : ViewPart::kLarge;
+  return out;
+}
+
+PicturePlace place_picture(const PictureFrame& frame, int view, int views, double displayed_px) {
+  constexpr double kLargestSide = 8192;
+  PicturePlace out{perspective_camera(camera_of(view, views, frame.sphere.centre, frame.sphere.radius)), 0};
+  const double distance = length(out.camera.eye - frame.sphere.centre);
+  const double side = displayed_px * 2 * distance * out.camera.tan_half_fov / frame.extent;
+  out.side_px = static_cast<std::uint32_t>(std::clamp(std::ceil(side), 1.0, kLargestSide));
+  // A little more is seen than the frame, so that the height is exact.
+  out.camera.tan_half_fov *= out.side_px / std::clamp(side, 0.5, kLargestSide);
+  return out;
+}
+
+Coverage frame_object(const RenderScene& scene, const TextureSizes& sizes, double extent, int views,
+                      double largest_px, Notes& notes, const RunContext& context) {
+  Coverage out{{sphere_of(*scene.mesh), extent}, 0, {}, {}};
+  // A sphere around a box is at most so much wider than its longest side: O_V of other positions than these
+  // would ask for huge pictures.
+  out.frame.extent = std::max(extent, 1.15 * out.frame.sphere.radius);
+  Seen seen = look_around(scene, out.frame, sizes, views, largest_px, context);
+  if (static_cast<double>(seen.pixels) < kLeastCovered * static_cast<double>(seen.of)) {
+    const BoundingSphere crowd = crowd_sphere(*scene.mesh, out.frame.sphere);
+    const PictureFrame closer{crowd, 2 * crowd.radius};
+    if (crowd.radius < out.frame.sphere.radius) {
+      Seen more = look_around(scene, closer, sizes, views, largest_px, context);
+      if (more.pixels > seen.pixels) {
+        out.frame = closer;
+        add_warning(notes, "far-outliers", "",
+                    "quality was measured without the " + count_outside(*scene.mesh, crowd) +
+                        " positions that lie so far from all others that pictures of the whole object show "
+                        "next to nothing");
+        seen = std::move(more);
+      }
+    }
+  }
+  out.pixels = seen.pixels;
+  out.rows = std::move(seen.rows);
+  out.first_levels = std::move(seen.first_levels);
+  return out;
+}
+
+}  // namespace texmesh

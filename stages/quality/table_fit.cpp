@@ -1,9 +1,12 @@
 #include "stages/quality/table_fit.h"
 
+#include <deque>
+
 #include "format/base/portable_math.h"
 #include "format/rules/picture_prediction.h"
+#include "format/rules/viewing.h"
 
-namespace texmesh::quality {
+namespace texmesh {
 namespace {
 
 constexpr float kLeastDssim = 1e-6f;  // of the one knot of textures that lose nothing
@@ -103,6 +106,281 @@ PictureLosses enlarged(const PictureLosses& from, const PictureLosses& smaller, 
     }
   for (float& v : out.dssim) v = static_cast<float>(static_cast<double>(v) * kSmoother);
   return out;
+}
+
+/// Of the least size, and of all where nothing follows from it.
+bool is_all_rendered(const TextureSampler& sampler, std::size_t rank) {
+  return rank == 0 || !sampler.shown.with_mips();
+}
+
+constexpr double kHigh = 0.95;  // the percentile
+
+/// Which textures stand for the source's: per shown texture an index into the studio's, -1 = the source's.
+using Replaced = std::vector<std::int32_t>;
+
+ShotMaterials materials_with(const ShotMaterials& source, const Replaced& replaced) {
+  ShotMaterials out = source;
+  for (RenderMaterial& m : out)
+    for (TextureSlot& slot : m.textures)
+      if (slot.texture >= 0 && replaced[static_cast<std::size_t>(slot.texture)] >= 0)
+        slot.texture = replaced[static_cast<std::size_t>(slot.texture)];
+  return out;
+}
+
+/// Shots of one size, each with the place where its losses go.
+class SizeShots {
+ public:
+  SizeShots(const TextureSampler& sampler, Studio& studio, const RunContext& context)
+      : sampler_(sampler), studio_(studio), context_(context), source_(studio.textures.size()) {}
+
+  /// Textures of the knot, made when they are first asked for.
+  Replaced coded(const GroupCells& group, std::size_t knot) {
+    Replaced out(source_, -1);
+    for (std::size_t t = 0; t < source_; ++t)
+      if (TextureMaker texture = texture_at(sampler_.data, sampler_.shown.textures[t], group.knots[knot],
+                                            studio_.textures[t].first_level))
+        out[t] = add(std::move(texture));
+    return out;
+  }
+
+  Replaced previews(const PlanesOfGroup& group) {
+    Replaced out(source_, -1);
+    for (std::size_t t = 0; t < source_; ++t)
+      if (auto texture = preview_at(sampler_.data, sampler_.shown.textures[t], group, context_))
+        out[t] = add([small = std::move(*texture)](const RunContext&) { return small; });
+    return out;
+  }
+
+  /// Mips that are not coded, `levels` coarser than those of the group's planes at this size, or finer where
+  /// below 0; of full size the source's texels, where a rung has them.
+  Replaced mips(const GroupCells& group, int levels) {
+    Replaced out(source_, -1);
+    for (const MipShown& mip : mips_shown(group, levels)) out[mip.texture] = uncoded(mip);
+    return out;
+  }
+
+  Replaced none() const { return Replaced(source_, -1); }
+  static bool is_source(const Replaced& replaced) {
+    return std::ranges::all_of(replaced, [](std::int32_t t) { return t < 0; });
+  }
+
+  /// A scale with the source's texels, all read with mips.
+  void take_scale(std::size_t scale, Losses& to, ViewPart views, const std::optional<ShotLimits>& limits) {
+    scale_shots_.push_back({scale, &sampler_.shown.materials, views, limits});
+    scales_.push_back(&to);
+  }
+
+  /// Textures, as samplers read them.
+  void take(std::size_t scale, const Replaced& replaced, Losses& to, ViewPart views) {
+    if (scale == 0 && is_source(replaced)) {
+      to.assign(static_cast<std::size_t>(studio_.views.views), {});  // as the reference
+      return;
+    }
+    for (const Taken& taken : taken_)
+      if (taken.scale == scale && taken.views == views && taken.replaced == replaced) {
+        repeated_.push_back({taken.to, &to});
+        return;
+      }
+    taken_.push_back({scale, replaced, views, &to});
+    materials_.push_back(materials_with(sampler_.shown.sampled, replaced));
+    shots_.push_back({scale, &materials_.back(), views});
+    to_.push_back(&to);
+  }
+
+  void render(double displayed_px, bool with_ssim) {
+    if (have_one_reference(sampler_.shown)) {
+      shots_.insert(shots_.end(), scale_shots_.begin(), scale_shots_.end());
+      to_.insert(to_.end(), scales_.begin(), scales_.end());
+    } else {
+      SizePictures pictures(studio_, sampler_.shown.materials, displayed_px, with_ssim);
+      take(pictures, scale_shots_, scales_);
+    }
+    SizePictures pictures(studio_, sampler_.shown.sampled, displayed_px, with_ssim);
+    take(pictures, shots_, to_);
+    for (const auto& [from, to] : repeated_) *to = *from;
+    studio_.textures.resize(source_);
+  }
+
+ private:
+  struct Taken {
+    std::size_t scale;
+    Replaced replaced;
+    ViewPart views;
+    const Losses* to;
+  };
+  struct MipShown {
+    std::size_t texture;
+    std::uint32_t level;
+    bool is_source;  // the full size has a rung with the source's texels
+    auto operator<=>(const MipShown&) const = default;
+  };
+  std::vector<MipShown> mips_shown(const GroupCells& group, int levels) const {
+    std::vector<MipShown> out;
+    for (std::size_t t = 0; t < source_; ++t) {
+      const ShownTexture& shown = sampler_.shown.textures[t];
+      const std::uint32_t asked_for = studio_.textures[t].first_level;
+      for (const PlaneRung& r : group.knots[0].rungs) {
+        const TexturePlane& plane = sampler_.data.fragments.planes[r.plane];
+        if ((plane.mip > 0 ? plane.base : r.plane) != shown.plane) continue;
+        const auto level = static_cast<std::uint32_t>(std::max(0, static_cast<int>(plane.mip) + levels));
+        const bool is_source = shows_source(sampler_.data, shown, level);
+        out.push_back({t, std::max(level, asked_for), is_source});
+      }
+    }
+    return out;
+  }
+  /// A texture's plane from that level on, made when it is first asked for.
+  std::int32_t uncoded(const MipShown& mip) {
+    const auto [found, is_new] = uncoded_.try_emplace(mip, -1);
+    const ShownTexture& shown = sampler_.shown.textures[mip.texture];
+    if (is_new)
+      found->second = add([this, &shown, mip](const RunContext& context) {
+        return mip.is_source ? best_texture(sampler_.data, shown, 0, mip.level, context)
+                             : uncoded_texture(sampler_.data, shown, mip.level, context);
+      });
+    return found->second;
+  }
+
+  /// Shots one after the other, with the textures that they read, as long as these are not too large
+  /// together.
+  void take(SizePictures& pictures, const std::vector<Shot>& shots, const std::vector<Losses*>& to) {
+    constexpr std::size_t kTogetherBytes = std::size_t{32} << 20;
+    for (std::size_t begin = 0; begin < shots.size();) {
+      std::size_t end = begin, bytes = 0;
+      while (end < shots.size() && bytes <= kTogetherBytes) bytes += make_textures(*shots[end++].materials);
+      const auto at = [](std::size_t i) { return static_cast<std::ptrdiff_t>(i); };
+      std::vector<Losses> losses =
+          pictures.take({shots.begin() + at(begin), shots.begin() + at(end)}, context_);
+      for (std::size_t i = begin; i < end; ++i) *to[i] = std::move(losses[i - begin]);
+      for (std::size_t t = source_; t < studio_.textures.size(); ++t) studio_.textures[t] = {};
+      begin = end;
+    }
+  }
+  /// Those that are not there. Returns their bytes.
+  std::size_t make_textures(const ShotMaterials& materials) {
+    std::size_t bytes = 0;
+    for (const RenderMaterial& m : materials)
+      for (const TextureSlot& slot : m.textures) {
+        const auto t = static_cast<std::size_t>(slot.texture);
+        if (slot.texture < 0 || t < source_ || !studio_.textures[t].levels.empty()) continue;
+        studio_.textures[t] = makers_[t - source_](context_);
+        for (const Pixels& level : studio_.textures[t].levels) bytes += level.data.size();
+      }
+    return bytes;
+  }
+  std::int32_t add(TextureMaker maker) {
+    makers_.push_back(std::move(maker));
+    studio_.textures.emplace_back();
+    return static_cast<std::int32_t>(studio_.textures.size() - 1);
+  }
+
+  const TextureSampler& sampler_;
+  Studio& studio_;
+  const RunContext& context_;
+  std::size_t source_;
+  std::vector<TextureMaker> makers_;  // of the studio's textures behind the source's
+  std::map<MipShown, std::int32_t> uncoded_;
+  std::deque<ShotMaterials> materials_;
+  std::vector<Taken> taken_;
+  std::vector<std::pair<const Losses*, Losses*>> repeated_;
+  std::vector<Shot> shots_, scale_shots_;
+  std::vector<Losses*> to_, scales_;
+};
+
+/// The samples that tell how losses add up: parts that lose little and much.
+struct TogetherSample {
+  std::size_t scale;
+  Together shown;
+};
+
+std::vector<TogetherSample> together_samples(std::size_t scales, std::size_t rank) {
+  using enum Together;
+  const std::size_t near = std::min(scales - 1, 1 + (scales - 1) / 3),
+                    far = std::min(scales - 1, 1 + 2 * (scales - 1) / 3);
+  if (rank == 0)
+    return {{0, kCoarser},    {0, kPreview},   {near, kCoded}, {near, kCoarser},
+            {near, kPreview}, {far, kCoarser}, {far, kPreview}};
+  if (rank == 1) return {{near, kCoded}};
+  return {};
+}
+
+Replaced both(Replaced a, const Replaced& b) {
+  for (std::size_t i = 0; i < a.size(); ++i)
+    if (b[i] >= 0) a[i] = b[i];
+  return a;
+}
+
+constexpr std::size_t kKinds = 3;  // of losses
+double value_of(const Loss& loss, std::size_t kind) {
+  return kind == 0 ? loss.flip.mean() : kind == 1 ? loss.flip.percentile(kHigh) : loss.mean_dssim();
+}
+constexpr std::vector<float> PictureLosses::*kLists[kKinds] = {&PictureLosses::flip, &PictureLosses::flip_p95,
+                                                               &PictureLosses::dssim};
+
+/// Linear in the index between the neighbours that have a value; beyond them theirs. Some must have one.
+double interpolated(const std::vector<std::optional<double>>& values, std::size_t at) {
+  std::size_t below = at, above = at;
+  while (below > 0 && !values[below]) --below;
+  while (above + 1 < values.size() && !values[above]) ++above;
+  if (!values[below]) return values[above].value_or(1);
+  if (!values[above]) return *values[below];
+  if (above == below) return *values[at];
+  const double part = static_cast<double>(at - below) / static_cast<double>(above - below);
+  return (1 - part) * *values[below] + part * *values[above];
+}
+
+ViewPart coded_views(std::size_t rank) { return rank == 0 ? ViewPart::kAll : ViewPart::kLargest; }
+/// Of what is compared with coded planes.
+ViewPart other_views(std::size_t rank) { return rank == 0 ? ViewPart::kLarge : ViewPart::kLargest; }
+
+/// A group's textures in each way of Together.
+using TogetherTextures = std::array<Replaced, 3>;
+
+TogetherTextures add_group(const TextureSampler& sampler, std::size_t rank, const Display& display,
+                           const PlanesOfGroup& planes, GroupCells& group, SizeShots& shots) {
+  group.knots = sample_knots(sampler.data, planes, sampler.rung_samples, display);
+  group.texel_level = texel_level(sampler.data, planes, display);
+  const std::size_t knots = group.knots.size();
+  group.mips = shown_mips(sampler.data, planes, display);
+  group.coded.resize(knots);
+  Replaced coded = shots.none();
+  group.finer.resize(kFinerLevels + 1);
+  group.coarser.resize(kCoarserLevels);
+  for (std::size_t k = 0; k < knots; ++k) {
+    if (!is_sampled(sampler, group.knots, k, rank)) continue;
+    coded = shots.coded(group, k);
+    shots.take(0, coded, group.coded[k], coded_views(rank));
+  }
+  group.preview.resize(1);
+  const Replaced preview = shots.previews(planes);
+  shots.take(0, preview, group.preview[0], coded_views(rank));
+  const MipSamples mips = mip_samples(sampler, rank, display, planes);
+  for (std::size_t l = 0; l < mips.finer; ++l)
+    shots.take(0, shots.mips(group, -static_cast<int>(l)), group.finer[l], coded_views(rank));
+  for (std::size_t l = 0; l < mips.coarser; ++l)
+    shots.take(0, shots.mips(group, static_cast<int>(l) + 1), group.coarser[l], other_views(rank));
+  const bool coarsest = mips.coarser == kCoarserLevels;
+  return {coded, coarsest ? shots.mips(group, static_cast<int>(kCoarserLevels)) : shots.none(), preview};
+}
+
+void add_textures(const TextureSampler& sampler, std::size_t rank, const Studio& studio, SizeCells& cells,
+                  SizeShots& shots) {
+  const Display display{sampler.surface_area, studio.frame.extent, cells.displayed_px};
+  cells.groups.resize(sampler.groups.size());
+  std::vector<TogetherTextures> textures;
+  for (std::size_t g = 0; g < cells.groups.size(); ++g)
+    textures.push_back(add_group(sampler, rank, display, sampler.groups[g], cells.groups[g], shots));
+  const std::vector<TogetherSample> samples = together_samples(studio.scenes.size(), rank);
+  cells.together.resize(samples.size());  // shots hold places in it
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    TogetherCell& cell = cells.together[i];
+    cell.scale = samples[i].scale;
+    cell.shown = samples[i].shown;
+    Replaced all = shots.none();
+    for (const TogetherTextures& of : textures)
+      all = both(std::move(all), of[static_cast<std::size_t>(cell.shown)]);
+    shots.take(cell.scale, all, cell.losses, other_views(rank));
+  }
 }
 
 }  // namespace
@@ -261,4 +539,93 @@ void fit_exponent(const std::vector<TogetherLoss>& samples, QualityTable& table)
   }
 }
 
-}  // namespace texmesh::quality
+std::size_t fewer_heights(const TextureSampler& sampler, std::size_t triangles, double object_height,
+                          const QualityOptions& options) {
+  // Texels of 0.7 pixels are the least. Those of a sampler that reads level 0 alone flicker where they are
+  // smaller than pixels.
+  constexpr double kTexelLevel = 0.5, kSharpTexelLevel = 0;
+  constexpr double kLeastEnlargedPx = 128;  // below, a half height hardly costs anything
+  constexpr double kTrianglePixels = 16, kSeenArea = 0.25, kSeenTriangles = 0.5;
+  std::size_t fewer = 0;
+  while (fewer + 1 < kTextureSizes) {
+    const double px = std::ldexp(options.largest_px, -static_cast<int>(fewer + 1));
+    const double per_unit = px / object_height;
+    const double pixels = kSeenArea * sampler.surface_area * per_unit * per_unit;
+    if (px < kLeastEnlargedPx || pixels < kTrianglePixels * kSeenTriangles * static_cast<double>(triangles))
+      break;
+    const bool finer = std::ranges::any_of(sampler.shown.textures, [&](const ShownTexture& t) {
+      return display_level(sampler.data.tables.planes[t.plane], sampler.surface_area, object_height, px) >
+             (t.with_mips ? kTexelLevel : kSharpTexelLevel);
+    });
+    if (finer) break;
+    ++fewer;
+  }
+  return fewer;
+}
+
+bool have_one_reference(const ShownTextures& shown) { return shown.with_mips(); }
+
+bool repeats(const Knot& knot, const Knot& before) {
+  return std::ranges::equal(knot.rungs, before.rungs,
+                            [](const PlaneRung& a, const PlaneRung& b) { return a.rung == b.rung; });
+}
+
+bool is_sampled(const TextureSampler& sampler, const std::vector<Knot>& knots, std::size_t knot,
+                std::size_t rank) {
+  if (knot > 0 && repeats(knots[knot], knots[knot - 1])) return false;
+  return is_all_rendered(sampler, rank) || repeats(knots[knot], knots.back()) || (rank == 1 && knot == 0);
+}
+
+MipSamples mip_samples(const TextureSampler& sampler, std::size_t rank, const Display& display,
+                       const PlanesOfGroup& group) {
+  if (is_all_rendered(sampler, rank)) return {kFinerLevels + 1, kCoarserLevels};
+  Display smaller = display;
+  smaller.displayed_px /= 2;
+  const bool again = rank == 1 || std::ranges::any_of(group.planes, [&](std::uint32_t p) {
+                       return shown_plane(sampler.data, p, smaller) == shown_plane(sampler.data, p, display);
+                     });
+  return {1, again ? std::size_t{1} : 0};
+}
+
+void render_size(const TextureSampler& sampler, const SizeTask& task, Studio& studio, SizeCells& cells,
+                 const RunContext& context) {
+  SizeShots shots(sampler, studio, context);
+  cells.geometry.resize(studio.scenes.size());
+  for (std::size_t k = 1; k < task.scales.size(); ++k)
+    if (task.scales[k]) shots.take_scale(k, cells.geometry[k], *task.scales[k], task.ends_beyond);
+  if (task.rank && !sampler.groups.empty()) add_textures(sampler, *task.rank, studio, cells, shots);
+  shots.render(cells.displayed_px, task.rank.has_value());
+  for (GroupCells& group : cells.groups)
+    for (std::size_t k = 1; k < group.knots.size(); ++k)
+      if (repeats(group.knots[k], group.knots[k - 1])) group.coded[k] = group.coded[k - 1];
+}
+
+PictureLosses losses_of(const LossCells& cells, const SmallerSize* smaller) {
+  constexpr double kNothing = 1e-5;  // curves of logarithms do not reach 0
+  PictureLosses out;
+  for (std::size_t kind = 0; kind < kKinds; ++kind) {
+    const auto below = [&](std::size_t i) { return static_cast<double>((smaller->losses.*kLists[kind])[i]); };
+    std::vector<std::optional<double>> found(cells.size()), ratio(cells.size());
+    for (std::size_t i = 0; i < cells.size(); ++i) {
+      if (cells[i].empty()) continue;
+      found[i] = value_of(pooled(cells[i]), kind);
+      if (!smaller) continue;
+      // Fewer views than at the size below: as far as these were like all of them there.
+      if (const Losses& there = smaller->cells[i]; !there.empty()) {
+        const double same = value_of(pooled(there, cells[i]), kind);
+        if (same > kNothing) *found[i] *= static_cast<double>((smaller->measured.*kLists[kind])[i]) / same;
+      }
+      if (below(i) > kNothing) ratio[i] = *found[i] / below(i);
+    }
+    // What was not rendered at all does not follow from its neighbours alone: little is lost alike.
+    if (smaller && smaller->first_follows && !ratio.empty() && !ratio[0]) ratio[0] = 1;
+    for (std::size_t i = 0; i < cells.size(); ++i) {
+      const double rest = smaller && below(i) > kNothing ? below(i) * interpolated(ratio, i) : 0;
+      const double value = found[i].value_or(rest);
+      (out.*kLists[kind]).push_back(static_cast<float>(std::clamp(value, 0.0, 1.0)));
+    }
+  }
+  return out;
+}
+
+}  // namespace texmesh

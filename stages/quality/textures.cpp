@@ -1,18 +1,17 @@
 // Textures of the pictures: which ones show, how they are made of the source, of rungs, mips or previews, and
 // which rungs are sampled as knots.
 #include "stages/quality/textures.h"
-
 #include <cstdlib>
 
-#include "format/rules/mip_choice.h"
-#include "format/rules/rate_distortion.h"
+#include "format/rules/allocation.h"
+#include "format/rules/viewing.h"
 #include "stages/base/parallel.h"
 #include "stages/data/stage.h"
 #include "stages/fragment_codec/fragment_codec.h"
 #include "stages/image/decode_image.h"
 #include "stages/jpeg/jpeg.h"
 
-namespace texmesh::quality {
+namespace texmesh {
 namespace {
 
 /// The full-size plane of an image; `alpha` = that of its alpha channel.
@@ -58,70 +57,6 @@ double area_in_texture(const Mesh& mesh, const TextureSlot& slot, const Triangle
                     static_cast<double>(a.y) * static_cast<double>(b.x)) *
                    static_cast<double>(s.x) * static_cast<double>(s.y) * size.x * size.y);
 }
-
-}  // namespace
-
-ShownTextures find_shown(const std::vector<Material>& materials, const Fragments& fragments,
-                         const Mesh& mesh) {
-  ShownTextures shown;
-  auto texture_of = [&](const TextureRef& ref, bool srgb) -> std::int32_t {
-    const std::vector<Vec2f>& uv = ref.texcoord == 0 ? mesh.uv0 : mesh.uv1;
-    const auto plane = plane_of(fragments, ref.image, false);
-    if (ref.texcoord > 1 || uv.empty() || !plane) return -1;
-    for (std::size_t t = 0; t < shown.textures.size(); ++t)
-      if (shown.textures[t].plane == *plane && shown.textures[t].srgb == srgb)
-        return static_cast<std::int32_t>(t);
-    shown.textures.push_back({*plane, plane_of(fragments, ref.image, true), srgb, true});
-    return static_cast<std::int32_t>(shown.textures.size() - 1);
-  };
-  for (const Material& m : materials)
-    shown.materials.push_back(render_material(m, [&](const TextureRef& ref, TextureUse use) {
-      return shows(m, use) ? texture_of(ref, is_srgb(use)) : -1;
-    }));
-  shown.sampled = shown.materials;
-  // Of scales, small pictures stand for larger ones, in which a sampler without mips would not have to
-  // flicker.
-  for (RenderMaterial& m : shown.materials)
-    for (TextureSlot& slot : m.textures) {
-      if (slot.texture >= 0 && slot.min_filter != MinFilter::kTrilinear)
-        shown.textures[static_cast<std::size_t>(slot.texture)].with_mips = false;
-      slot.min_filter = MinFilter::kTrilinear;
-    }
-  return shown;
-}
-
-// By areas: the renderer goes by the longer side of a pixel's footprint, so it never asks for a finer mip.
-void LevelCount::add(const RenderScene& scene, const Visibility& view,
-                     const std::vector<Vec2<std::uint32_t>>& sizes, double magnification) {
-  for (const RenderFragment& fragment : view.fragments) {
-    const Triangle& triangle = (*scene.triangles)[fragment.triangle];
-    const double pixels = area_in_picture(scene, view, triangle) * magnification * magnification;
-    if (!(pixels > 0)) continue;
-    for (const TextureSlot& slot : scene.material_of(fragment.triangle).textures) {
-      if (slot.texture < 0) continue;
-      const auto t = static_cast<std::size_t>(slot.texture);
-      const double texels = area_in_texture(*scene.mesh, slot, triangle, sizes[t]);
-      std::size_t level = 0;
-      for (double limit = 4 * pixels; texels >= limit && level < kMaxFirstLevel; limit *= 4) ++level;
-      ++wanted_[t][level];
-    }
-  }
-}
-
-std::vector<std::uint32_t> LevelCount::first_levels() const {
-  std::vector<std::uint32_t> first(wanted_.size(), 0);
-  for (std::size_t t = 0; t < first.size(); ++t) {
-    std::uint64_t total = 0, finer = 0;
-    for (const std::uint64_t n : wanted_[t]) total += n;
-    for (; first[t] < kMaxFirstLevel; ++first[t]) {
-      finer += wanted_[t][first[t]];
-      if (50 * finer > total) break;
-    }
-  }
-  return first;
-}
-
-namespace {
 
 // A fragment of the source, cut out of the plane's pixels.
 Pixels cut(const Pixels& pixels, const TexelRectangle& r) {
@@ -173,14 +108,12 @@ void put_plane(const TextureData& data, const PlaneTexels& from, std::uint32_t f
       static_cast<std::uint64_t>(plane.fragment_width_px) * plane.fragment_height_px;
   RunContext serial = context;
   serial.threads = 1;
-  parallel_for(context, plane.fragment_count(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t f = begin; f < end; ++f) {
-      const bool stored = from.rung && !fragment_stream(ladder.rungs[*from.rung], f).empty();
-      const TexelRectangle place = padded_fragment_rectangle(plane, f);
-      Pixels block = stored ? decode_fragment(ladder, *from.rung, f, most_pixels) : cut(pixels, place);
-      block = coarser_level(std::move(block), from.srgb, halvings, serial);
-      put_block(block, place.left_px >> halvings, place.top_px >> halvings, channels, level);
-    }
+  parallel_each(context, plane.fragment_count(), 1, [&](std::size_t f) {
+    const bool stored = from.rung && !fragment_stream(ladder.rungs[*from.rung], f).empty();
+    const TexelRectangle place = padded_fragment_rectangle(plane, f);
+    Pixels block = stored ? decode_fragment(ladder, *from.rung, f, most_pixels) : cut(pixels, place);
+    block = coarser_level(std::move(block), from.srgb, halvings, serial);
+    put_block(block, place.left_px >> halvings, place.top_px >> halvings, channels, level);
   });
 }
 
@@ -216,7 +149,112 @@ Pixels decoded_preview(const TextureData& data, std::uint32_t plane) {
   return decode_jpeg(data.previews.planes[plane].file, kMaxPreviewPixels);
 }
 
+/// Indices of `wanted` rungs spread over `count`, lowest and highest among them (one: the highest). Short
+/// ladders repeat some, so that all sizes have the same number of knots.
+std::vector<std::size_t> spread_rungs(std::size_t count, int wanted) {
+  std::vector<std::size_t> out;
+  const auto n = static_cast<std::size_t>(wanted);
+  for (std::size_t i = 0; i < n; ++i)
+    out.push_back(n == 1 ? count - 1 : (i * (count - 1) + (n - 1) / 2) / (n - 1));
+  return out;
+}
+
+/// Planes of other codecs or roles have other rungs.
+std::size_t nearest_rung(const PlaneLadder& plane, int quality) {
+  std::size_t best = 0;
+  for (std::size_t r = 1; r < plane.rungs.size(); ++r)
+    if (std::abs(plane.rungs[r].quality - quality) < std::abs(plane.rungs[best].quality - quality)) best = r;
+  return best;
+}
+
+void add_texels(const PlaneTables& tables, std::size_t rung, Knot& knot) {
+  const std::vector<float> weights = surface_weights(tables);
+  const std::size_t fragments = tables.fragment_count();
+  for (std::size_t f = 0; f < fragments; ++f) {
+    knot.dssim.push_back(static_cast<double>(tables.dssim[rung * fragments + f]));
+    knot.weight.push_back(static_cast<double>(weights[f]));
+  }
+}
+
+void weigh(Knot& knot) {
+  double sum = 0, total = 0;
+  for (std::size_t i = 0; i < knot.dssim.size(); ++i) {
+    sum += knot.weight[i] * knot.dssim[i];
+    total += knot.weight[i];
+  }
+  knot.mean_dssim = total > 0 ? sum / total : 0;
+}
+
+/// The knot's rung of a texture's plane or of one of its mips.
+std::optional<PlaneRung> rung_of(const TextureData& data, const Knot& knot, std::uint32_t full_size) {
+  for (const PlaneRung& r : knot.rungs) {
+    const TexturePlane& plane = data.fragments.planes[r.plane];
+    if ((plane.mip > 0 ? plane.base : r.plane) == full_size) return r;
+  }
+  return std::nullopt;
+}
+
 }  // namespace
+
+ShownTextures find_shown(const std::vector<Material>& materials, const Fragments& fragments,
+                         const Mesh& mesh) {
+  ShownTextures shown;
+  auto texture_of = [&](const TextureRef& ref, bool srgb) -> std::int32_t {
+    const std::vector<Vec2f>& uv = ref.texcoord == 0 ? mesh.uv0 : mesh.uv1;
+    const auto plane = plane_of(fragments, ref.image, false);
+    if (ref.texcoord > 1 || uv.empty() || !plane) return -1;
+    for (std::size_t t = 0; t < shown.textures.size(); ++t)
+      if (shown.textures[t].plane == *plane && shown.textures[t].srgb == srgb)
+        return static_cast<std::int32_t>(t);
+    shown.textures.push_back({*plane, plane_of(fragments, ref.image, true), srgb, true});
+    return static_cast<std::int32_t>(shown.textures.size() - 1);
+  };
+  for (const Material& m : materials)
+    shown.materials.push_back(render_material(m, [&](const TextureRef& ref, TextureUse use) {
+      return shows(m, use) ? texture_of(ref, is_srgb(use)) : -1;
+    }));
+  shown.sampled = shown.materials;
+  // Of scales, small pictures stand for larger ones, in which a sampler without mips would not have to
+  // flicker.
+  for (RenderMaterial& m : shown.materials)
+    for (TextureSlot& slot : m.textures) {
+      if (slot.texture >= 0 && slot.min_filter != MinFilter::kTrilinear)
+        shown.textures[static_cast<std::size_t>(slot.texture)].with_mips = false;
+      slot.min_filter = MinFilter::kTrilinear;
+    }
+  return shown;
+}
+
+// By areas: the renderer goes by the longer side of a pixel's footprint, so it never asks for a finer mip.
+void WantedMips::add(const RenderScene& scene, const Visibility& view,
+                     const std::vector<Vec2<std::uint32_t>>& sizes, double magnification) {
+  for (const RenderFragment& fragment : view.fragments) {
+    const Triangle& triangle = (*scene.triangles)[fragment.triangle];
+    const double pixels = area_in_picture(scene, view, triangle) * magnification * magnification;
+    if (!(pixels > 0)) continue;
+    for (const TextureSlot& slot : scene.material_of(fragment.triangle).textures) {
+      if (slot.texture < 0) continue;
+      const auto t = static_cast<std::size_t>(slot.texture);
+      const double texels = area_in_texture(*scene.mesh, slot, triangle, sizes[t]);
+      std::size_t level = 0;
+      for (double limit = 4 * pixels; texels >= limit && level < kMaxFirstLevel; limit *= 4) ++level;
+      ++wanted_[t][level];
+    }
+  }
+}
+
+std::vector<std::uint32_t> WantedMips::first_levels() const {
+  std::vector<std::uint32_t> first(wanted_.size(), 0);
+  for (std::size_t t = 0; t < first.size(); ++t) {
+    std::uint64_t total = 0, finer = 0;
+    for (const std::uint64_t n : wanted_[t]) total += n;
+    for (; first[t] < kMaxFirstLevel; ++first[t]) {
+      finer += wanted_[t][first[t]];
+      if (50 * finer > total) break;
+    }
+  }
+  return first;
+}
 
 TextureData texture_data(const std::vector<Image>& images, const Fragments& fragments,
                          const std::vector<Pixels>& pixels, const Ladder& ladder, const Previews& previews,
@@ -299,55 +337,6 @@ bool shows_source(const TextureData& data, const ShownTexture& shown, std::uint3
   };
   return is_source(shown.plane);
 }
-
-namespace {
-
-/// Indices of `wanted` rungs spread over `count`, lowest and highest among them (one: the highest). Short
-/// ladders repeat some, so that all sizes have the same number of knots.
-std::vector<std::size_t> spread_rungs(std::size_t count, int wanted) {
-  std::vector<std::size_t> out;
-  const auto n = static_cast<std::size_t>(wanted);
-  for (std::size_t i = 0; i < n; ++i)
-    out.push_back(n == 1 ? count - 1 : (i * (count - 1) + (n - 1) / 2) / (n - 1));
-  return out;
-}
-
-/// Planes of other codecs or roles have other rungs.
-std::size_t nearest_rung(const PlaneLadder& plane, int quality) {
-  std::size_t best = 0;
-  for (std::size_t r = 1; r < plane.rungs.size(); ++r)
-    if (std::abs(plane.rungs[r].quality - quality) < std::abs(plane.rungs[best].quality - quality)) best = r;
-  return best;
-}
-
-void add_texels(const PlaneTables& tables, std::size_t rung, Knot& knot) {
-  const std::vector<float> weights = surface_weights(tables);
-  const std::size_t fragments = tables.fragment_count();
-  for (std::size_t f = 0; f < fragments; ++f) {
-    knot.dssim.push_back(static_cast<double>(tables.dssim[rung * fragments + f]));
-    knot.weight.push_back(static_cast<double>(weights[f]));
-  }
-}
-
-void weigh(Knot& knot) {
-  double sum = 0, total = 0;
-  for (std::size_t i = 0; i < knot.dssim.size(); ++i) {
-    sum += knot.weight[i] * knot.dssim[i];
-    total += knot.weight[i];
-  }
-  knot.mean_dssim = total > 0 ? sum / total : 0;
-}
-
-/// The knot's rung of a texture's plane or of one of its mips.
-std::optional<PlaneRung> rung_of(const TextureData& data, const Knot& knot, std::uint32_t full_size) {
-  for (const PlaneRung& r : knot.rungs) {
-    const TexturePlane& plane = data.fragments.planes[r.plane];
-    if ((plane.mip > 0 ? plane.base : r.plane) == full_size) return r;
-  }
-  return std::nullopt;
-}
-
-}  // namespace
 
 std::vector<PlanesOfGroup> find_groups(const ShownTextures& shown, const Fragments& fragments) {
   std::vector<PlanesOfGroup> out;
@@ -440,4 +429,4 @@ std::optional<RenderTexture> preview_at(const TextureData& data, const ShownText
   return preview_texture(data, shown, context);
 }
 
-}  // namespace texmesh::quality
+}  // namespace texmesh

@@ -1,17 +1,15 @@
 #pragma once
 // Inside the room only: which textures show, what they are made from, and how they look at one displayed
 // height.
-#include <optional>
 
 #include "format/documents/quality_table.h"
 #include "format/documents/tables.h"
 #include "format/documents/textures.h"
-#include "stages/data/fragments.h"
 #include "stages/data/ladder.h"
 #include "stages/data/previews.h"
 #include "stages/render/render_texture.h"
 
-namespace texmesh::quality {
+namespace texmesh {
 
 inline constexpr std::uint32_t kMaxFirstLevel = 4;  // fragments' sides are multiples of 16
 
@@ -36,9 +34,9 @@ ShownTextures find_shown(const std::vector<Material>& materials, const Fragments
                          const Mesh& mesh);
 
 /// Per shown texture, the finest mip that more than 2 % of its fragments in pictures ask for.
-class LevelCount {
+class WantedMips {
  public:
-  explicit LevelCount(std::size_t textures) : wanted_(textures) {}
+  explicit WantedMips(std::size_t textures) : wanted_(textures) {}
   /// A view of S_0 that stands for one so many times as large. `sizes`: width and height of each texture, px.
   void add(const RenderScene& scene, const Visibility& view, const std::vector<Vec2<std::uint32_t>>& sizes,
            double magnification);
@@ -113,7 +111,7 @@ struct Display {
   double displayed_px = 0;
 };
 
-/// The mip of a full-size plane that a client shows (format/rules/mip_choice.h), at most the last one
+/// The mip of a full-size plane that a client shows (format/rules/viewing.h), at most the last one
 /// with whole texels along both axes.
 std::uint32_t shown_plane(const TextureData& data, std::uint32_t full_size, const Display& display);
 
@@ -143,4 +141,4 @@ TextureMaker texture_at(const TextureData& data, const ShownTexture& shown, cons
 std::optional<RenderTexture> preview_at(const TextureData& data, const ShownTexture& shown,
                                         const PlanesOfGroup& group, const RunContext& context);
 
-}  // namespace texmesh::quality
+}  // namespace texmesh

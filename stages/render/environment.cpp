@@ -1,8 +1,6 @@
 #include "stages/render/environment.h"
 
-#include <algorithm>
 #include <cstring>
-#include <iterator>
 
 #include "stages/base/parallel.h"
 #include "stages/render/render_math.h"
@@ -56,8 +54,7 @@ Quad read_level(const Level& level, Vec2f place) {
   return top + (bottom - top) * fy;
 }
 
-template <class F>
-Level make_level(std::uint32_t inner_side, const RunContext& context, F value_of) {
+Level make_level(std::uint32_t inner_side, const RunContext& context, auto value_of) {
   Level level;
   level.side = inner_side + 2;
   level.texels.resize(static_cast<std::size_t>(level.side) * level.side);
@@ -66,8 +63,7 @@ Level make_level(std::uint32_t inner_side, const RunContext& context, F value_of
       auto place = [&](std::size_t at) {
         return (static_cast<float>(at) - 0.5f) * 2 / static_cast<float>(inner_side) - 1;
       };
-      const Vec3f value =
-          value_of(render::octahedral_direction({place(i % level.side), place(i / level.side)}));
+      const Vec3f value = value_of(octahedral_direction({place(i % level.side), place(i / level.side)}));
       level.texels[i] =
           padded({clamped(value.x, 0, 65504), clamped(value.y, 0, 65504), clamped(value.z, 0, 65504)});
     }
@@ -106,9 +102,8 @@ Vec3f filtered(const Level& radiance, const std::vector<LobeSample>& lobe, Vec3f
   const Vec3f y = cross(z, x);
   Quad sum{};
   for (const LobeSample& s : lobe)
-    sum +=
-        read_level(radiance, render::octahedral(x * s.direction.x + y * s.direction.y + z * s.direction.z)) *
-        s.weight;
+    sum += read_level(radiance, octahedral(x * s.direction.x + y * s.direction.y + z * s.direction.z)) *
+           s.weight;
   return colour_of(sum);
 }
 
@@ -166,6 +161,24 @@ std::array<Vec4f, kHarmonics> irradiance_of(const Radiance& radiance) {
   return out;
 }
 
+/// A soft box: a lobe exp(sharpness (cos - 1)) around a direction.
+struct SoftBox {
+  Vec3f direction;  // not unit
+  float sharpness;
+  Vec3f peak;
+};
+
+// Their sum is grey. The main box stands where the key light comes from.
+constexpr SoftBox kBoxes[] = {{{0.62f, 0.72f, 0.55f}, 26, {4.6f, 4.5f, 4.35f}},
+                              {{-0.85f, 0.35f, 0.45f}, 14, {1.15f, 1.2f, 1.3f}},
+                              {{-0.15f, 0.45f, -0.9f}, 18, {2.15f, 2.2f, 2.3f}}};
+constexpr Vec3f kZenith{0.33f, 0.35f, 0.39f}, kHorizon{0.45f, 0.44f, 0.43f}, kGround{0.255f, 0.235f, 0.205f};
+constexpr float kLog2E = 1.44269504f;
+
+float lobe(Vec3f direction, Vec3f axis, float sharpness) {
+  return exp2_of(kLog2E * sharpness * (dot(direction, normalized(axis)) - 1));
+}
+
 }  // namespace
 
 RenderEnvironment prepare_environment(const Radiance& radiance, const KeyLight& key,
@@ -191,41 +204,19 @@ Vec3f diffuse_light(const RenderEnvironment& environment, Vec3f normal) {
 }
 
 Vec3f specular_light(const RenderEnvironment& environment, Vec3f direction, float roughness) {
-  const float at = render::saturated(roughness) * static_cast<float>(environment.levels.size() - 1);
+  const float at = saturated(roughness) * static_cast<float>(environment.levels.size() - 1);
   const auto sharp = std::min(static_cast<std::size_t>(at), environment.levels.size() - 2);
-  const Vec2f place = render::octahedral(direction);
+  const Vec2f place = octahedral(direction);
   const Quad a = read_level(environment.levels[sharp], place),
              b = read_level(environment.levels[sharp + 1], place);
   return colour_of(a + (b - a) * (at - static_cast<float>(sharp)));
 }
 
-namespace {
-
-/// A soft box: a lobe exp(sharpness (cos - 1)) around a direction.
-struct SoftBox {
-  Vec3f direction;  // not unit
-  float sharpness;
-  Vec3f peak;
-};
-
-// Their sum is grey. The main box stands where the key light comes from.
-constexpr SoftBox kBoxes[] = {{{0.62f, 0.72f, 0.55f}, 26, {4.6f, 4.5f, 4.35f}},
-                              {{-0.85f, 0.35f, 0.45f}, 14, {1.15f, 1.2f, 1.3f}},
-                              {{-0.15f, 0.45f, -0.9f}, 18, {2.15f, 2.2f, 2.3f}}};
-constexpr Vec3f kZenith{0.33f, 0.35f, 0.39f}, kHorizon{0.45f, 0.44f, 0.43f}, kGround{0.255f, 0.235f, 0.205f};
-constexpr float kLog2E = 1.44269504f;
-
-float lobe(Vec3f direction, Vec3f axis, float sharpness) {
-  return exp2_of(kLog2E * sharpness * (dot(direction, normalized(axis)) - 1));
-}
-
-}  // namespace
-
 Vec3f studio_radiance(Vec3f direction) {
   const float up = clamped(direction.y, -1, 1);
   // The sky turns into the ground within about 20 degrees around the horizon.
-  const float t = render::saturated((up + 0.18f) / 0.36f), sky = t * t * (3 - 2 * t);
-  const float high = render::saturated(up);
+  const float t = saturated((up + 0.18f) / 0.36f), sky = t * t * (3 - 2 * t);
+  const float high = saturated(up);
   const Vec3f above = kHorizon + (kZenith - kHorizon) * high;
   Vec3f sum = kGround + (above - kGround) * sky;
   for (const SoftBox& box : kBoxes) sum = sum + box.peak * lobe(direction, box.direction, box.sharpness);

@@ -1,12 +1,11 @@
 #pragma once
 // Inside the room only: functions of shading with the same bits on every machine.
-#include "format/base/srgb.h"
 #include "format/base/vec.h"
 #include "stages/base/float_math.h"
 
-namespace texmesh::render {
+namespace texmesh {
 
-inline constexpr float kPi = 3.14159265358979323846f;
+inline constexpr float kFloatPi = 3.14159265358979323846f;
 
 /// 0..1; NaN becomes 0.
 inline float saturated(float x) { return clamped(x, 0, 1); }
@@ -42,37 +41,10 @@ inline Vec3f octahedral_direction(Vec2f place) {
   return normalized(Vec3f{(1 - size(y)) * (x < 0 ? -1.f : 1.f), up, (1 - size(x)) * (y < 0 ? -1.f : 1.f)});
 }
 
-/// Light as the nearest sRGB code of 8 bits; what lies beyond 0..1 is cut off.
-class SrgbEncoder {
- public:
-  SrgbEncoder() {
-    std::size_t code = 0;
-    for (std::size_t i = 0; i <= kSteps; ++i) {
-      while (code < 255 && static_cast<double>(i) / kSteps >= border(code)) ++code;
-      first_[i] = static_cast<std::uint8_t>(code);
-    }
-    for (std::size_t c = 0; c < 255; ++c) border_[c] = static_cast<float>(border(c));
-    border_[255] = 2;  // above all light
-  }
-  std::uint8_t operator()(float light) const {
-    const float within = clamped(light, 0, 1);
-    std::uint8_t code = first_[static_cast<std::size_t>(within * kSteps)];
-    while (within >= border_[code]) ++code;
-    return code;
-  }
-
- private:
-  static constexpr std::size_t kSteps = 4096;  // below the steepest steps of two codes
-  /// Light between the codes c and c + 1.
-  static double border(std::size_t c) { return light_of_srgb((static_cast<double>(c) + 0.5) / 255); }
-  std::array<std::uint8_t, kSteps + 1> first_{};
-  std::array<float, 256> border_{};
-};
-
 /// One for all; the same on every machine.
-inline const SrgbEncoder& srgb_encoder() {
-  static const SrgbEncoder encoder;
+inline const SrgbEncoder<float, false>& srgb_encoder() {
+  static const SrgbEncoder<float, false> encoder;
   return encoder;
 }
 
-}  // namespace texmesh::render
+}  // namespace texmesh

@@ -1,6 +1,6 @@
 #include "stages/render/render_texture.h"
 
-#include <algorithm>
+#include <optional>
 
 #include "stages/base/parallel.h"
 #include "stages/render/render_math.h"
@@ -43,7 +43,7 @@ Pixels next_level(const Pixels& fine, bool srgb, const RunContext& context) {
   const std::size_t n = fine.channels;
   const std::size_t colours = !srgb ? 0 : n % 2 == 0 ? n - 1 : n;  // alpha stays a plain number
   const bool even = fine.width_px == 2 * out.width_px && fine.height_px == 2 * out.height_px;
-  const render::SrgbEncoder& encode = render::srgb_encoder();
+  const auto& encode = srgb_encoder();
   const auto& light = light_of_bytes();
   parallel_for(context, out.height_px, 64, [&](std::size_t begin, std::size_t end) {
     for (std::size_t y = begin; y < end; ++y) {
@@ -69,37 +69,70 @@ Pixels next_level(const Pixels& fine, bool srgb, const RunContext& context) {
   return out;
 }
 
-}  // namespace
+/// A texture that materials read: an image as colours or as plain numbers.
+struct ImageUse {
+  std::uint32_t image = 0;
+  bool srgb = false;
+  friend bool operator==(const ImageUse&, const ImageUse&) = default;
+};
 
-Pixels coarser_level(Pixels image, bool srgb, std::uint32_t levels, const RunContext& context) {
-  for (; levels > 0 && (image.width_px > 1 || image.height_px > 1); --levels)
-    image = next_level(image, srgb, context);
-  return image;
-}
-
-void complete_mips(RenderTexture& texture, const RunContext& context) {
-  while (texture.levels.back().width_px > 1 || texture.levels.back().height_px > 1)
-    texture.levels.push_back(next_level(texture.levels.back(), texture.srgb, context));
-}
-
-RenderTexture render_texture(Pixels image, bool srgb, std::uint32_t first_level, const RunContext& context) {
-  if (image.width_px == 0 || image.height_px == 0 || image.channels < 1 || image.channels > 4 ||
-      image.data.size() != static_cast<std::size_t>(image.width_px) * image.height_px * image.channels)
-    throw std::invalid_argument("render_texture: no image of 1 to 4 channels");
-  RenderTexture out;
-  out.width_px = image.width_px;
-  out.height_px = image.height_px;
-  out.srgb = srgb;
-  out.levels.push_back(std::move(image));
-  while (out.first_level < first_level && (out.levels[0].width_px > 1 || out.levels[0].height_px > 1)) {
-    out.levels[0] = next_level(out.levels[0], srgb, context);
-    ++out.first_level;
+std::optional<std::size_t> plane_of(const Fragments& fragments, std::uint32_t image, bool alpha,
+                                    std::uint32_t mip) {
+  for (std::size_t p = 0; p < fragments.planes.size(); ++p) {
+    const TexturePlane& plane = fragments.planes[p];
+    if (plane.image == image && plane.mip == mip && (plane.role == TextureRole::kAlpha) == alpha) return p;
   }
-  complete_mips(out, context);
-  return out;
+  return std::nullopt;
 }
 
-namespace {
+/// Colours and alpha of one size.
+struct PlanePair {
+  std::size_t colours = 0;
+  std::optional<std::size_t> alpha;
+};
+
+/// The coarsest size that has the side; one at which the alpha has a plane, too, where there is an alpha.
+PlanePair planes_for(const Fragments& fragments, std::uint32_t image, std::size_t full,
+                     std::uint32_t least_side_px) {
+  const bool has_alpha = plane_of(fragments, image, true, 0).has_value();
+  PlanePair best{full, plane_of(fragments, image, true, 0)};
+  for (std::uint32_t mip = 1;; ++mip) {
+    const auto colours = plane_of(fragments, image, false, mip);
+    if (!colours) return best;
+    const TexturePlane& plane = fragments.planes[*colours];
+    if (std::max(plane.width_px, plane.height_px) < least_side_px) return best;
+    const auto alpha = plane_of(fragments, image, true, mip);
+    if (alpha.has_value() == has_alpha) best = {*colours, alpha};
+  }
+}
+
+/// Writes a plane's texels into channels of the image, from channel `first` on.
+void put_plane(const TexturePlane& plane, const Pixels& pixels, std::uint32_t first, std::uint32_t count,
+               Pixels& image) {
+  if (pixels.width_px < image.width_px || pixels.height_px < image.height_px ||
+      pixels.data.size() != std::size_t{pixels.width_px} * pixels.height_px * pixels.channels)
+    throw StageError("render", "pixels of image " + std::to_string(plane.image), "as large as their plane",
+                     std::to_string(pixels.width_px) + " x " + std::to_string(pixels.height_px));
+  for (std::uint32_t y = 0; y < image.height_px; ++y)
+    for (std::uint32_t x = 0; x < image.width_px; ++x) {
+      const std::uint8_t* from = pixels.at(x, y);
+      std::uint8_t* to = image.data.data() + (std::size_t{y} * image.width_px + x) * image.channels + first;
+      for (std::uint32_t c = 0; c < count; ++c) to[c] = from[pixels.channels >= 3 ? c : 0];
+    }
+}
+
+RenderTexture texture_of(const Fragments& fragments, const std::vector<Pixels>& pixels, const ImageUse& use,
+                         std::uint32_t least_side_px, const RunContext& context) {
+  const std::size_t full = *plane_of(fragments, use.image, false, 0);
+  const PlanePair pair = planes_for(fragments, use.image, full, least_side_px);
+  const TexturePlane& plane = fragments.planes[pair.colours];
+  const std::uint32_t colours = plane.channels >= 3 ? 3 : 1;
+  Pixels image{plane.width_px, plane.height_px, colours + (pair.alpha ? 1 : 0), {}};
+  image.data.resize(std::size_t{image.width_px} * image.height_px * image.channels);
+  put_plane(plane, pixels.at(pair.colours), 0, colours, image);
+  if (pair.alpha) put_plane(fragments.planes[*pair.alpha], pixels.at(*pair.alpha), colours, 1, image);
+  return render_texture(std::move(image), use.srgb, 0, context);
+}
 
 using ByteCurve = std::array<float, 256>;
 
@@ -119,7 +152,7 @@ using Place = TextureSite::Place;
 float folded(float u, Wrap wrap) {
   constexpr float kMost = 1e6f;
   if (!(u >= -kMost && u <= kMost)) return 0;
-  if (wrap == Wrap::kClamp) return render::saturated(u);
+  if (wrap == Wrap::kClamp) return saturated(u);
   if (wrap == Wrap::kRepeat) return u - static_cast<float>(floor_of(u));
   const float t = u - 2 * static_cast<float>(floor_of(u * 0.5f));
   return t > 1 ? 2 - t : t;
@@ -178,16 +211,9 @@ Vec4f bilinear(const Pixels& level, const ByteCurve& colour, const Place& place)
 
 Vec4f read_bilinear(const Pixels& level, bool srgb, const Place& place) {
   const ByteCurve& colour = srgb ? light_of_bytes() : numbers_of_bytes();
-  switch (level.channels) {
-    case 1:
-      return bilinear<1>(level, colour, place);
-    case 2:
-      return bilinear<2>(level, colour, place);
-    case 3:
-      return bilinear<3>(level, colour, place);
-    default:
-      return bilinear<4>(level, colour, place);
-  }
+  if (level.channels == 3) return bilinear<3>(level, colour, place);
+  if (level.channels == 4) return bilinear<4>(level, colour, place);
+  return level.channels == 1 ? bilinear<1>(level, colour, place) : bilinear<2>(level, colour, place);
 }
 
 float level_of(Vec2<std::uint32_t> size_px, const TextureFootprint& footprint) {
@@ -201,6 +227,34 @@ float level_of(Vec2<std::uint32_t> size_px, const TextureFootprint& footprint) {
 }
 
 }  // namespace
+
+Pixels coarser_level(Pixels image, bool srgb, std::uint32_t levels, const RunContext& context) {
+  for (; levels > 0 && (image.width_px > 1 || image.height_px > 1); --levels)
+    image = next_level(image, srgb, context);
+  return image;
+}
+
+void complete_mips(RenderTexture& texture, const RunContext& context) {
+  while (texture.levels.back().width_px > 1 || texture.levels.back().height_px > 1)
+    texture.levels.push_back(next_level(texture.levels.back(), texture.srgb, context));
+}
+
+RenderTexture render_texture(Pixels image, bool srgb, std::uint32_t first_level, const RunContext& context) {
+  if (image.width_px == 0 || image.height_px == 0 || image.channels < 1 || image.channels > 4 ||
+      image.data.size() != static_cast<std::size_t>(image.width_px) * image.height_px * image.channels)
+    throw std::invalid_argument("render_texture: no image of 1 to 4 channels");
+  RenderTexture out;
+  out.width_px = image.width_px;
+  out.height_px = image.height_px;
+  out.srgb = srgb;
+  out.levels.push_back(std::move(image));
+  while (out.first_level < first_level && (out.levels[0].width_px > 1 || out.levels[0].height_px > 1)) {
+    out.levels[0] = next_level(out.levels[0], srgb, context);
+    ++out.first_level;
+  }
+  complete_mips(out, context);
+  return out;
+}
 
 TextureSite::TextureSite(Vec2<std::uint32_t> size_px, std::uint32_t first_level, const TextureSlot& slot,
                          const TextureFootprint& footprint)
@@ -283,16 +337,37 @@ void TextureSite::prefetch(const RenderTexture& texture) const {
   }
 }
 
-Vec4f read_texture(const RenderTexture& texture, const TextureSlot& slot, const TextureFootprint& footprint) {
-  return TextureSite({texture.width_px, texture.height_px}, texture.first_level, slot, footprint)
-      .read(texture);
-}
-
 UvMatrix uv_matrix(const UvTransform& t) {
   if (t.is_identity()) return {};
   const auto c = static_cast<float>(portable::cos(t.rotation)),
              s = static_cast<float>(portable::sin(t.rotation));
   return {c * t.scale.x, s * t.scale.y, t.offset.x, -s * t.scale.x, c * t.scale.y, t.offset.y};
+}
+
+ShownMaterials shown_materials(const std::vector<Material>& materials, const Fragments& fragments,
+                               const std::vector<Pixels>& pixels, const Mesh& mesh,
+                               std::uint32_t least_side_px, const RunContext& context) {
+  if (pixels.size() != fragments.planes.size())
+    throw StageError("render", "planes of pixels", std::to_string(fragments.planes.size()),
+                     std::to_string(pixels.size()));
+  ShownMaterials out;
+  std::vector<ImageUse> uses;
+  const auto index_of = [&](const TextureRef& ref, TextureUse use) -> std::int32_t {
+    const std::vector<Vec2f>& uv = ref.texcoord == 0 ? mesh.uv0 : mesh.uv1;
+    const ImageUse wanted{static_cast<std::uint32_t>(ref.image), is_srgb(use)};
+    if (ref.texcoord > 1 || uv.empty() || !plane_of(fragments, wanted.image, false, 0)) return -1;
+    const auto found = std::find(uses.begin(), uses.end(), wanted);
+    const auto index = static_cast<std::int32_t>(found - uses.begin());
+    if (found == uses.end()) uses.push_back(wanted);
+    return index;
+  };
+  for (const Material& m : materials) out.materials.push_back(render_material(m, index_of));
+  // The picture is much smaller than textures are. Samplers without mips would show noise.
+  for (RenderMaterial& m : out.materials)
+    for (TextureSlot& slot : m.textures) slot.min_filter = MinFilter::kTrilinear;
+  for (const ImageUse& use : uses)
+    out.textures.push_back(texture_of(fragments, pixels, use, least_side_px, context));
+  return out;
 }
 
 }  // namespace texmesh

@@ -1,4 +1,5 @@
 #pragma once
+#include "stages/data/fragments.h"
 #include "stages/data/pixels.h"
 #include "stages/render/visibility.h"
 
@@ -42,7 +43,10 @@ class TextureSite {
   /// `size_px` of level 0. Textures that are read keep no level finer than `first_level`.
   TextureSite(Vec2<std::uint32_t> size_px, std::uint32_t first_level, const TextureSlot& slot,
               const TextureFootprint& footprint);
-  /// What read_texture() gives of a texture of that size.
+  /// RGBA as a shader reads it, of a texture of that size: linear light for sRGB colours, else 0..1; grey in
+  /// all three channels; alpha 1 where there is none. The level is log2 of the longer of the two derivatives
+  /// in texels (OpenGL 4.6, 8.14, anisotropy 1), at least the first level kept. Not finite coordinates read
+  /// the texture's corner.
   Vec4f read(const RenderTexture& texture) const;
   /// Asks for the texels that read() will need: large textures lie in memory, not in caches.
   void prefetch(const RenderTexture& texture) const;
@@ -68,11 +72,6 @@ class TextureSite {
   Place places_[2];       // in levels fine_ and fine_ + 1
 };
 
-/// RGBA as a shader reads it: linear light for sRGB colours, else 0..1; grey in all three channels; alpha 1
-/// where there is none. The level is log2 of the longer of the two derivatives in texels (OpenGL 4.6, 8.14,
-/// anisotropy 1), at least the first level kept. Not finite coordinates read the texture's corner.
-Vec4f read_texture(const RenderTexture& texture, const TextureSlot& slot, const TextureFootprint& footprint);
-
 /// KHR_texture_transform as 2 x 3 numbers: uv' = (a u + b v + c, d u + e v + f).
 struct UvMatrix {
   float a = 1, b = 0, c = 0, d = 0, e = 1, f = 0;
@@ -80,5 +79,16 @@ struct UvMatrix {
   Vec2f direction(Vec2f uv) const { return {a * uv.x + b * uv.y, d * uv.x + e * uv.y}; }
 };
 UvMatrix uv_matrix(const UvTransform& transform);
+
+struct ShownMaterials {
+  std::vector<RenderMaterial> materials;  // their slots count `textures`
+  std::vector<RenderTexture> textures;
+};
+
+/// Textures come from the coarsest mip whose longer side has `least_side_px`, or from the full size.
+/// References to texture coordinates that the mesh does not have show nothing.
+ShownMaterials shown_materials(const std::vector<Material>& materials, const Fragments& fragments,
+                               const std::vector<Pixels>& pixels, const Mesh& mesh,
+                               std::uint32_t least_side_px, const RunContext& context);
 
 }  // namespace texmesh

@@ -1,13 +1,10 @@
 #include "stages/render/shade.h"
 
 #include "stages/base/parallel.h"
-#include "stages/measure/sampled_curve.h"
 #include "stages/render/fragment_shader.h"
 
 namespace texmesh {
 namespace {
-
-using render::FragmentColour;
 
 /// Triangles of an opaque pixel that are shaded: as many as a graphics processor with four samples a pixel
 /// shades at most. In pictures of at most kSmallPx all of them are: with a dozen a pixel four are noise, and
@@ -26,7 +23,7 @@ Vec3f encoded(Vec3f light) { return curved<srgb_of_light>(light); }
 Vec3f decoded(Vec3f code) { return curved<light_of_srgb>(code); }
 
 float share_of(const RenderFragment& fragment) {
-  return static_cast<float>(render::sample_count(fragment.mask)) / static_cast<float>(kSamples);
+  return static_cast<float>(sample_count(fragment.mask)) / static_cast<float>(kSamples);
 }
 
 /// The samples of one pixel, filled from the nearest fragment to the farthest.
@@ -58,8 +55,7 @@ class Samples {
 /// The fragments of one pixel at a time, in all variants.
 class PixelShader {
  public:
-  PixelShader(const render::FragmentShader& shader, PictureVariants& pictures, Vec3f background,
-              bool all_shaded)
+  PixelShader(const FragmentShader& shader, PictureVariants& pictures, Vec3f background, bool all_shaded)
       : shader_(shader),
         pictures_(pictures),
         background_(background),
@@ -95,9 +91,8 @@ class PixelShader {
     std::array<std::size_t, kSamples> order;
     for (std::size_t i = 0; i < fragments.size(); ++i) {
       std::size_t to = i;
-      const int samples = render::sample_count(fragments[i].mask);
-      for (; to > 0 && render::sample_count(fragments[order[to - 1]].mask) < samples; --to)
-        order[to] = order[to - 1];
+      const int samples = sample_count(fragments[i].mask);
+      for (; to > 0 && sample_count(fragments[order[to - 1]].mask) < samples; --to) order[to] = order[to - 1];
       order[to] = i;
     }
     std::sort(order.begin(), order.begin() + kMostShaded);
@@ -135,11 +130,11 @@ class PixelShader {
     pictures_.set(variant, at, samples.mean(), covered);
   }
 
-  const render::FragmentShader& shader_;
+  const FragmentShader& shader_;
   PictureVariants& pictures_;
   Vec3f background_;
   bool all_shaded_;
-  render::FragmentShader::Scratch scratch_;
+  FragmentShader::Scratch scratch_;
   std::vector<FragmentColour> colours_;  // [fragment][variant]
   std::array<RenderFragment, kMostShaded> most_seen_;
 };
@@ -196,7 +191,7 @@ PictureVariants shade_variants(const RenderScene& scene, const Visibility& visib
                                std::span<const std::vector<RenderMaterial>* const> variants,
                                const std::vector<RenderTexture>& textures,
                                const RenderEnvironment& environment, const RunContext& context) {
-  const render::FragmentShader shader(scene, visibility, variants, textures, environment);
+  const FragmentShader shader(scene, visibility, variants, textures, environment);
   PictureVariants out(visibility, variants.size(), environment.background);
   const std::vector<std::uint32_t>& places = out.places();
   const std::vector<std::uint32_t> order = by_squares(places, visibility.side_px);
@@ -224,20 +219,20 @@ Vec3f tone_mapped(Vec3f linear) {
   const float xy = c.x < c.y ? c.x : c.y, least = xy < c.z ? xy : c.z;
   const float offset = least < 0.08f ? least - 6.25f * least * least : 0.04f;
   c = c - Vec3f{offset, offset, offset};
-  const float peak = render::largest(c);
+  const float peak = largest(c);
   if (peak >= kStart) {
     const float new_peak = 1 - kRoom * kRoom / (peak + kRoom - kStart);
     const float grey = 1 - 1 / (kDesaturation * (peak - new_peak) + 1);
     c = c * (new_peak / peak);
     c = c + (Vec3f{new_peak, new_peak, new_peak} - c) * grey;
   }
-  return {render::saturated(c.x), render::saturated(c.y), render::saturated(c.z)};
+  return {saturated(c.x), saturated(c.y), saturated(c.z)};
 }
 
 Pixels encode_srgb(const Picture& picture) {
   Pixels out{picture.side_px, picture.side_px, 3, {}};
   out.data.reserve(picture.linear.size() * 3);
-  const render::SrgbEncoder& encode = render::srgb_encoder();
+  const auto& encode = srgb_encoder();
   for (const Vec3f c : picture.linear)
     for (int k = 0; k < 3; ++k) out.data.push_back(encode(c[k]));
   return out;

@@ -1,5 +1,5 @@
 #pragma once
-#include "stages/measure/image_compare.h"
+#include "stages/measure/flip.h"
 #include "stages/render/environment.h"
 #include "stages/render/render_texture.h"
 

@@ -1,9 +1,38 @@
 #pragma once
-#include "stages/geometry/scale_frames.h"
 #include "stages/gltf/glb_writer.h"
-#include "stages/scales/scale_grid.h"
+#include "stages/scales/scales.h"
 
 namespace texmesh {
+
+/// A cube of evenly spaced places that coordinates are rounded to, the same for every scale and primitive, so
+/// that a vertex that several scales share has the same bits in all of them.
+struct QuantisationGrid {
+  int bits = 0;  // 0 = coordinates stay floats
+  Vec3f origin;
+  float range = 1;  // side of the cube, > 0
+  float step() const { return range / static_cast<float>((std::uint32_t{1} << bits) - 1); }
+  /// Nearest place; in float, operation by operation as Draco's encoder and decoder compute.
+  std::uint32_t index(float x, int axis) const;
+  float value(std::uint32_t index, int axis) const {
+    return static_cast<float>(index) * step() + origin[axis];
+  }
+  Vec3f rounded(Vec3f p) const;
+  Vec3f place(Vec3f p) const;  // the three indices, as floats
+};
+
+/// Bits from the options, or so that a rounded position moves by at most 1/16 of the mean and 1/4 of the
+/// shorter edges and 1/8 of the mean edge of any part that can be seen, and at most one triangle in a
+/// thousand loses its area; but at least options.least_position_bits. `max_bits` is what the codec can hold;
+/// where the edges need more, coordinates stay floats.
+QuantisationGrid position_grid(const Mesh& mesh, const ScalesOptions& options, int max_bits);
+
+/// Bits from the options, or so that a rounded texture coordinate moves by at most 1/8 texel of the largest
+/// texture, and at least options.least_uv_bits. Floats only where max_bits do not hold even 1/4 texel.
+QuantisationGrid uv_grid(const std::vector<Vec2f>& uv, double largest_texture_px,
+                         const ScalesOptions& options, int max_bits);
+
+/// How far rounding moves a position at most, along an axis.
+double largest_rounding(const Mesh& mesh, const QuantisationGrid& grid);
 
 /// The triangles of one part and material. `indices` index `wedges`, which index the mesh's wedges.
 struct ScalePrimitive {

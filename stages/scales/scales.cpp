@@ -1,11 +1,7 @@
-
-
 #include "format/container/layout.h"
-#include "format/split/split_writer.h"
 #include "stages/base/parallel.h"
 #include "stages/image/png_writer.h"
 #include "stages/jpeg/jpeg.h"
-#include "stages/scales/scale_codecs.h"
 #include "stages/scales/vertex_split.h"
 
 namespace texmesh {
@@ -41,12 +37,6 @@ std::vector<std::uint8_t> combine(const Pixels& colour, const Pixels& alpha) {
   return write_png(out);
 }
 
-Json vector_json(std::initializer_list<float> values) {
-  Json out = Json::array();
-  for (float x : values) out.push_back(GlbWriter::shortest(x));
-  return out;
-}
-
 float unit(float x) { return std::clamp(x, 0.0f, 1.0f); }
 
 /// Hands out texture and sampler indices, equal ones once.
@@ -76,10 +66,10 @@ class TextureTable {
     if (!ref.transform.is_identity()) {
       Json transform;
       if (ref.transform.offset != Vec2f{0, 0})
-        transform["offset"] = vector_json({ref.transform.offset.x, ref.transform.offset.y});
+        transform["offset"] = GlbWriter::shortest({ref.transform.offset.x, ref.transform.offset.y});
       if (ref.transform.rotation != 0) transform["rotation"] = GlbWriter::shortest(ref.transform.rotation);
       if (ref.transform.scale != Vec2f{1, 1})
-        transform["scale"] = vector_json({ref.transform.scale.x, ref.transform.scale.y});
+        transform["scale"] = GlbWriter::shortest({ref.transform.scale.x, ref.transform.scale.y});
       out["extensions"]["KHR_texture_transform"] = transform;
       writer_.use_extension("KHR_texture_transform", false);
     }
@@ -136,7 +126,7 @@ Json material_json(const Material& m, TextureTable& textures, GlbWriter& writer)
   Json out;
   if (!m.name.empty()) out["name"] = m.name;
   Json pbr;
-  pbr["baseColorFactor"] = vector_json(
+  pbr["baseColorFactor"] = GlbWriter::shortest(
       {unit(m.base_colour.x), unit(m.base_colour.y), unit(m.base_colour.z), unit(m.base_colour.w)});
   if (Json t = textures.info(m.base_colour_texture); !t.is_null()) pbr["baseColorTexture"] = t;
   pbr["metallicFactor"] = GlbWriter::shortest(unit(m.metallic));
@@ -153,7 +143,7 @@ Json material_json(const Material& m, TextureTable& textures, GlbWriter& writer)
   }
   if (Json t = textures.info(m.emissive_texture); !t.is_null()) out["emissiveTexture"] = t;
   if (m.emissive != Vec3f{})
-    out["emissiveFactor"] = vector_json({unit(m.emissive.x), unit(m.emissive.y), unit(m.emissive.z)});
+    out["emissiveFactor"] = GlbWriter::shortest({unit(m.emissive.x), unit(m.emissive.y), unit(m.emissive.z)});
   if (m.alpha_mode == AlphaMode::kMask) {
     out["alphaMode"] = "MASK";
     out["alphaCutoff"] = GlbWriter::shortest(std::max(m.alpha_cutoff, 0.0f));
@@ -201,8 +191,6 @@ void write_materials(GlbWriter& writer, const std::vector<Material>& materials,
   TextureTable textures(writer, previews, form, {has_uv0, has_uv1});
   for (const Material& m : materials) writer.array("materials").push_back(material_json(m, textures, writer));
 }
-
-using Json = GlbWriter::Json;
 
 /// Largest factor by which a material stretches texture coordinates, times the largest image's side.
 double largest_texture_px(const std::vector<Material>& materials, const std::vector<Image>& images, int set) {
@@ -517,14 +505,12 @@ ScaleFiles write_scales(const NestedScales& scales, const PerceptualValues& perc
   const auto made_one = [&] { context.report(static_cast<double>(++made) / static_cast<double>(tasks + 1)); };
   // The stream and S_0's file take about as long. These two scales have files beside any stream.
   const std::size_t always = std::min<std::size_t>(kept.size(), 2);
-  parallel_for(context, 1 + always, 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t task = begin; task < end; ++task) {
-      if (task == 0)
-        write_stream(coding, scales, kept, materials, images, context, result);
-      else
-        write_file(task == 1 ? 0 : kept.size() - 1);
-      made_one();
-    }
+  parallel_each(context, 1 + always, 1, [&](std::size_t task) {
+    if (task == 0)
+      write_stream(coding, scales, kept, materials, images, context, result);
+    else
+      write_file(task == 1 ? 0 : kept.size() - 1);
+    made_one();
   });
   const std::size_t between = kept.size() - always;
   if (!result.stream.empty()) {

@@ -4,7 +4,6 @@
 #include "stages/data/nested_scales.h"
 #include "stages/data/perceptual_values.h"
 #include "stages/data/previews.h"
-#include "stages/data/scale_files.h"
 #include "stages/data/stage.h"
 
 namespace texmesh {
@@ -32,8 +31,7 @@ struct ScalesOptions {
   int normal_bits = 11;
   int tangent_bits = 8;
   bool stream = true;  // the vertex-split stream beside the files
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("mesh_codec", s.mesh_codec, "how the scales' GLB files store their meshes");
     v("position_bits", s.position_bits, Range{0, 24},
       "bits per position coordinate, at least 6; 0 = from the edge lengths; quantized and meshopt: at "

@@ -3,11 +3,8 @@
 // backwards these are the splits.
 #include "stages/scales/vertex_split.h"
 
-#include <map>
 #include <numeric>
 #include <ranges>
-
-#include "stages/scales/corner_lists.h"
 
 namespace texmesh {
 namespace {

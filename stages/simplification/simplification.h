@@ -1,6 +1,4 @@
 #pragma once
-#include <string_view>
-
 #include "stages/data/conditioned_mesh.h"
 #include "stages/data/nested_scales.h"
 #include "stages/data/scale_map.h"
@@ -41,8 +39,7 @@ struct SimplificationOptions {
   // A smaller scale would be good for a thumbnail of 50..100 px and save 2..4 kB. As a first picture it shows
   // corners for outlines and blurs faces.
   int coarsest_vertices = 400;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("order", s.order, ProfileOnly{},
       "texmesh = quadrics weighted by persistence; thesis = scale map, closest neighbour");
     v("persistence_weight", s.persistence_weight, Range{0, 10}, ProfileOnly{},
@@ -78,5 +75,12 @@ struct SimplificationOptions {
 /// Deterministic: among equals the place along a space-filling curve decides.
 NestedScales simplify(const ConditionedMesh& mesh, const ScaleMap& scale_map,
                       const SimplificationOptions& options, const RunContext& context);
+
+/// Fills error_max, error_rms and deviation of all scales but the first, S_0: distances of 500 to 4,000
+/// points spread over S_0 to S_i and over S_i to S_0, and, for the largest, of S_0's vertices. `component`:
+/// per position. Each scale takes time linear in S_0's positions, collapses and the scale's triangles, plus a
+/// fixed number of distances.
+void measure_scale_errors(const std::vector<std::uint32_t>& component, NestedScales& scales,
+                          const RunContext& context);
 
 }  // namespace texmesh

@@ -9,7 +9,6 @@
 #include <unordered_map>
 
 #include "stages/geometry/triangle_tree.h"
-#include "stages/skeletonization/geometry_failure.h"
 
 namespace texmesh {
 namespace {
@@ -46,10 +45,7 @@ class WorkCap {
 class StepCounter : public aw3::Wrapping_default_visitor {
  public:
   explicit StepCounter(WorkCap& cap) : cap_(cap) {}
-  template <class Wrapper, class Gate>
-  void before_facet_treatment(const Wrapper&, const Gate&) {
-    cap_.count_step();
-  }
+  void before_facet_treatment(const auto&, const auto&) { cap_.count_step(); }
 
  private:
   WorkCap& cap_;

@@ -8,7 +8,6 @@
 #include <type_traits>
 
 #include "stages/skeletonization/contraction_parts.h"
-#include "stages/skeletonization/geometry_failure.h"
 
 namespace texmesh {
 namespace {
@@ -114,10 +113,7 @@ using MesoSkeleton = Contraction::Meso_skeleton;
 
 static_assert(std::is_same_v<MesoSkeleton::Allocator, ContractionAllocator<int>>);
 
-template <class PointOrVector>
-Vec3d vec(const PointOrVector& p) {
-  return {p.x(), p.y(), p.z()};
-}
+Vec3d vec(const auto& p) { return {p.x(), p.y(), p.z()}; }
 
 /// The poles of the contraction that this thread is in, by the surface's points: CGAL keeps a few of them.
 thread_local std::vector<Vec3d> poles_found;

@@ -2,7 +2,6 @@
 // Inside the room only: what CGAL's contraction asks for. Each has a source of its own: together they take
 // long to compile.
 #include <array>
-#include <cstddef>
 #include <memory>
 #include <vector>
 

@@ -10,8 +10,6 @@
 #include <CGAL/Uncertain.h>
 #include <CGAL/exceptions.h>
 
-#include "stages/skeletonization/geometry_failure.h"
-
 namespace texmesh {
 namespace {
 

@@ -9,7 +9,7 @@
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Polygon_mesh_processing/internal/Side_of_triangle_mesh/Point_inside_vertical_ray_cast.h>
 
-#include "stages/skeletonization/geometry_failure.h"
+#include "stages/skeletonization/wrap.h"
 
 namespace texmesh {
 namespace {

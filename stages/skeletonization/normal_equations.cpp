@@ -2,7 +2,7 @@
 
 #include <Eigen/SparseCholesky>
 
-#include "stages/skeletonization/geometry_failure.h"
+#include "stages/skeletonization/wrap.h"
 
 namespace texmesh {
 

@@ -2,8 +2,6 @@
 
 #include "stages/base/parallel.h"
 #include "stages/skeletonization/curve_skeleton.h"
-#include "stages/skeletonization/geometry_failure.h"
-#include "stages/skeletonization/local_radius.h"
 
 namespace texmesh {
 namespace {
@@ -106,9 +104,7 @@ std::vector<double> distances_to(const CurveSkeleton& skeleton, const std::vecto
                                  const RunContext& context) {
   const SegmentTree tree(skeleton.nodes, skeleton.segments);
   std::vector<double> distance(points.size());
-  parallel_for(context, points.size(), 1024, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t p = begin; p < end; ++p) distance[p] = tree.distance(points[p]);
-  });
+  parallel_each(context, points.size(), 1024, [&](std::size_t p) { distance[p] = tree.distance(points[p]); });
   return distance;
 }
 

@@ -1,6 +1,6 @@
 #pragma once
 #include "stages/data/conditioned_mesh.h"
-#include "stages/data/skeleton.h"
+#include "stages/data/scale_map.h"
 #include "stages/data/stage.h"
 
 namespace texmesh {
@@ -18,8 +18,7 @@ struct SkeletonizationOptions {
   // Where CGAL would not end, the caps do, and a note names the fallback.
   int max_wrap_steps = 1000000;
   static constexpr int max_contractions = 500;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("alpha_divisor", s.alpha_divisor, Range{5, 400}, ProfileOnly{},
       "alpha of the wrap = bounding-box diagonal / this");
     v("offset_divisor", s.offset_divisor, Range{50, 6000}, ProfileOnly{},

@@ -10,8 +10,6 @@
 
 #include <utility>
 
-#include "format/base/no_index.h"
-
 namespace texmesh {
 namespace {
 

@@ -1,9 +1,6 @@
-#include <algorithm>
-#include <limits>
-
 #include "format/base/portable_math.h"
 #include "stages/base/parallel.h"
-#include "stages/geometry/weld.h"
+#include "stages/geometry/mesh_topology.h"
 #include "stages/ssf/ssf.h"
 
 namespace texmesh {

@@ -1,8 +1,5 @@
 #include "stages/ssf/heat_kernel.h"
 
-#include <algorithm>
-#include <array>
-#include <limits>
 #include <memory>
 
 #include "stages/base/parallel.h"
@@ -197,14 +194,12 @@ class Chebyshev {
     source_ = std::make_unique<Quad[]>(n_);
     for (auto& t : ring_) t = std::make_unique<Quad[]>(n_);  // zeroed: D_0
     const double factor = 4 / l.bound;
-    parallel_for(context_, n_, kHeatGrain, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) {
-        Vec3d sum;
-        for (std::uint32_t e = l.first[i]; e < l.first[i + 1]; ++e)
-          sum = sum + (points[i] - points[l.column[e]]) * double{l.rate[e]};
-        sum = sum * factor;
-        source_[i] = Quad{static_cast<Real>(sum.x), static_cast<Real>(sum.y), static_cast<Real>(sum.z), 0};
-      }
+    parallel_each(context_, n_, kHeatGrain, [&](std::size_t i) {
+      Vec3d sum;
+      for (std::uint32_t e = l.first[i]; e < l.first[i + 1]; ++e)
+        sum = sum + (points[i] - points[l.column[e]]) * double{l.rate[e]};
+      sum = sum * factor;
+      source_[i] = Quad{static_cast<Real>(sum.x), static_cast<Real>(sum.y), static_cast<Real>(sum.z), 0};
     });
   }
 
@@ -290,65 +285,6 @@ class Chebyshev {
   std::unique_ptr<Quad[]> ring_[kBlock + 2];  // D_k at k % (kBlock + 2)
   std::vector<HeatFlow> flows_;
 };
-
-}  // namespace
-
-HeatOperator make_heat_operator(const HeatSurface& surface, std::vector<double> mass, double mean_edge,
-                                double rate_cap) {
-  std::vector<HeatChord> edges = weigh_edges(surface);
-  HeatOperator l;
-  l.mean_edge = mean_edge;
-  l.mass = mass.empty() ? lump_masses(surface, edges, mean_edge) : std::move(mass);
-  std::size_t capped = 0;
-  for (HeatChord& e : edges) {
-    const double cap = rate_cap * std::min(l.mass[e.lo], l.mass[e.hi]) / (mean_edge * mean_edge);
-    capped += e.weight > cap;
-    e.weight = std::min(e.weight, cap);
-  }
-  fill_rows(edges, l);
-  l.bound = bound_spectrum(l);
-  l.capped = edges.empty() ? 0 : static_cast<double>(capped) / static_cast<double>(edges.size());
-  return l;
-}
-
-void limit_spectrum(HeatOperator& l, double bound) {
-  std::vector<double> factor = sums_of_rates(l);
-  for (double& f : factor) f = f > 0.5 * bound ? 0.5 * bound / f : 1;
-  for (std::size_t i = 0; i < factor.size(); ++i)
-    for (std::uint32_t k = l.first[i]; k < l.first[i + 1]; ++k)
-      l.rate[k] = static_cast<float>(double{l.rate[k]} * std::min(factor[i], factor[l.column[k]]));
-  l.bound = bound_spectrum(l);
-}
-
-void trim_spectrum(HeatOperator& l, double share) {
-  if (share * static_cast<double>(l.vertex_count()) < 1) return;
-  std::vector<double> leaving = sums_of_rates(l);
-  const auto rank = static_cast<std::size_t>((1 - share) * static_cast<double>(leaving.size() - 1));
-  std::nth_element(leaving.begin(), leaving.begin() + static_cast<std::ptrdiff_t>(rank), leaving.end());
-  const double bound = 2 * leaving[rank];
-  if (bound > 0 && bound < l.bound) limit_spectrum(l, bound);
-}
-
-int heat_terms(double time, double bound) {
-  return static_cast<int>(std::ceil(std::sqrt(kTruncationLog * time * bound) + kTruncationLog));
-}
-
-std::vector<HeatFlow> diffuse(const HeatOperator& laplacian, std::span<const Vec3d> points, double start,
-                              std::span<const double> times, const RunContext& context,
-                              HeatPrecision precision) {
-  if (times.empty()) return {};
-  if (precision == HeatPrecision::kDouble)
-    return Chebyshev<double>(laplacian, points, start, times, context).run();
-  return Chebyshev<float>(laplacian, points, start, times, context).run();
-}
-
-double heat_term_bytes(const HeatOperator& l) {
-  const double rows = static_cast<double>(l.vertex_count()), entries = static_cast<double>(l.column.size());
-  return rows * (sizeof(std::uint32_t) + 4 * sizeof(FloatQuad)) +
-         entries * (sizeof(std::uint32_t) + sizeof(float));
-}
-
-namespace {
 
 /// A level carries sigmas up to kReach error_ratio spacings; the next one's seeds are kSeed sigma /
 /// error_ratio apart, so that a cell holds some eight vertices. Switching at 1.4 made cells of one to four,
@@ -468,6 +404,55 @@ double mean_length(const std::vector<Vec3d>& points, const std::vector<HeatChord
 }
 
 }  // namespace
+
+HeatOperator make_heat_operator(const HeatSurface& surface, std::vector<double> mass, double mean_edge,
+                                double rate_cap) {
+  std::vector<HeatChord> edges = weigh_edges(surface);
+  HeatOperator l;
+  l.mean_edge = mean_edge;
+  l.mass = mass.empty() ? lump_masses(surface, edges, mean_edge) : std::move(mass);
+  std::size_t capped = 0;
+  for (HeatChord& e : edges) {
+    const double cap = rate_cap * std::min(l.mass[e.lo], l.mass[e.hi]) / (mean_edge * mean_edge);
+    capped += e.weight > cap;
+    e.weight = std::min(e.weight, cap);
+  }
+  fill_rows(edges, l);
+  l.bound = bound_spectrum(l);
+  l.capped = edges.empty() ? 0 : static_cast<double>(capped) / static_cast<double>(edges.size());
+  return l;
+}
+
+void limit_spectrum(HeatOperator& l, double bound) {
+  std::vector<double> factor = sums_of_rates(l);
+  for (double& f : factor) f = f > 0.5 * bound ? 0.5 * bound / f : 1;
+  for (std::size_t i = 0; i < factor.size(); ++i)
+    for (std::uint32_t k = l.first[i]; k < l.first[i + 1]; ++k)
+      l.rate[k] = static_cast<float>(double{l.rate[k]} * std::min(factor[i], factor[l.column[k]]));
+  l.bound = bound_spectrum(l);
+}
+
+void trim_spectrum(HeatOperator& l, double share) {
+  if (share * static_cast<double>(l.vertex_count()) < 1) return;
+  std::vector<double> leaving = sums_of_rates(l);
+  const auto rank = static_cast<std::size_t>((1 - share) * static_cast<double>(leaving.size() - 1));
+  std::nth_element(leaving.begin(), leaving.begin() + static_cast<std::ptrdiff_t>(rank), leaving.end());
+  const double bound = 2 * leaving[rank];
+  if (bound > 0 && bound < l.bound) limit_spectrum(l, bound);
+}
+
+int heat_terms(double time, double bound) {
+  return static_cast<int>(std::ceil(std::sqrt(kTruncationLog * time * bound) + kTruncationLog));
+}
+
+std::vector<HeatFlow> diffuse(const HeatOperator& laplacian, std::span<const Vec3d> points, double start,
+                              std::span<const double> times, const RunContext& context,
+                              HeatPrecision precision) {
+  if (times.empty()) return {};
+  if (precision == HeatPrecision::kDouble)
+    return Chebyshev<double>(laplacian, points, start, times, context).run();
+  return Chebyshev<float>(laplacian, points, start, times, context).run();
+}
 
 HeatLevel finest_level(std::vector<Vec3d> points, std::vector<std::uint32_t> corners, double spacing,
                        double rate_cap) {

@@ -75,10 +75,6 @@ std::vector<HeatFlow> diffuse(const HeatOperator& laplacian, std::span<const Vec
                               std::span<const double> times, const RunContext& context,
                               HeatPrecision precision = HeatPrecision::kFloat);
 
-/// The fewest bytes that one term of the single-precision recurrence moves: the operator and the vectors once
-/// each.
-double heat_term_bytes(const HeatOperator& laplacian);
-
 /// A surface at one level of detail, fine enough for heat that has already flowed further than its spacing.
 struct HeatLevel {
   std::vector<std::uint32_t> vertex;   // per vertex: its vertex on the level that this one was made from

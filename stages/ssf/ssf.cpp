@@ -1,6 +1,3 @@
-
-
-#include "format/base/box.h"
 #include "stages/base/parallel.h"
 #include "stages/geometry/morton.h"
 #include "stages/ssf/heat_kernel.h"
@@ -219,13 +216,11 @@ class MeshFilter {
     alone.progress = nullptr;
     for (std::size_t batch = 0; batch < small.size(); batch += kBatch) {
       std::vector<ComponentScales> done(std::min(kBatch, small.size() - batch));
-      parallel_for(context_, done.size(), 1, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) {
-          done[i] = filter_component(cut_out(mesh_, layout_, small[batch + i], radius_), whole_sigma_,
-                                     options_, alone);
-          place(small[batch + i], done[i]);
-          done[i].persistence = done[i].crossing = {};
-        }
+      parallel_each(context_, done.size(), 1, [&](std::size_t i) {
+        done[i] = filter_component(cut_out(mesh_, layout_, small[batch + i], radius_), whole_sigma_, options_,
+                                   alone);
+        place(small[batch + i], done[i]);
+        done[i].persistence = done[i].crossing = {};
       });
       for (const ComponentScales& s : done) {
         totals_.add(s);

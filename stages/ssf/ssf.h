@@ -1,9 +1,7 @@
 #pragma once
-#include <string_view>
 
 #include "stages/data/conditioned_mesh.h"
 #include "stages/data/scale_map.h"
-#include "stages/data/skeleton.h"
 #include "stages/data/stage.h"
 
 namespace texmesh {
@@ -38,8 +36,7 @@ struct SsfOptions {
   double window = 1.4;    // range scans: half-width of the Gaussian, in sigma; no option: a test compares it
                           // with a wider one
   double range_band = 0;  // the thesis has the Laplacian of Gaussian alone
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("scales", s.scales, Range{1, 40}, "smoothed copies beside the original");
     v("signal", s.signal, ProfileOnly{},
       "meshes: curvature = band-passed mean curvature; radius = R(v), the distance to the skeleton, whose "

@@ -1,7 +1,5 @@
 #include "stages/ssf/ssf_component.h"
 
-#include "format/base/box.h"
-#include "format/base/no_index.h"
 #include "format/base/portable_math.h"
 #include "stages/base/parallel.h"
 #include "stages/ssf/heat_kernel.h"
@@ -65,9 +63,8 @@ class FeatureFinder {
   /// none of a kind closer than `apart` to another along the surface.
   std::vector<std::uint8_t> find(double apart, const RunContext& context) const {
     std::vector<std::uint8_t> found(g_.size(), 0);
-    parallel_for(context, found.size(), kCrossingGrain, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t v = begin; v < end; ++v) found[v] = feature_kind(static_cast<std::uint32_t>(v));
-    });
+    parallel_each(context, found.size(), kCrossingGrain,
+                  [&](std::size_t v) { found[v] = feature_kind(static_cast<std::uint32_t>(v)); });
     for (std::uint8_t kind : {kExtremum, kCrossing}) thin_out(found, kind, apart);
     return found;
   }

@@ -1,8 +1,6 @@
 #pragma once
 #include <span>
-#include <vector>
 
-#include "format/base/vec.h"
 #include "stages/base/run_context.h"
 #include "stages/ssf/ssf.h"
 

@@ -4,7 +4,6 @@
 #include <cstdlib>
 
 #include "stages/base/parallel.h"
-#include "stages/data/coverage.h"
 
 namespace texmesh {
 namespace {
@@ -162,15 +161,13 @@ Predictors predict_quality(const Fragments& fragments, const std::vector<Pixels>
     for (auto* values : {&predictors.z, &predictors.i, &predictors.zeta, &predictors.m})
       values->resize(plane.fragment_count());
     const FragmentReader reader(plane, pixels[p], options.difference);
-    parallel_for(context, plane.fragment_count(), 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t f = begin; f < end; ++f) {
-        if (plane.covered_texels[f] == 0) continue;
-        const Sums sums = reader.read(f);
-        if (sums.count != plane.covered_texels[f])
-          fail("plane " + std::to_string(p) + " fragment " + std::to_string(f),
-               std::to_string(plane.covered_texels[f]) + " covered texels", std::to_string(sums.count));
-        predict_fragment(sums, plane.channels, options, f, predictors);
-      }
+    parallel_each(context, plane.fragment_count(), 1, [&](std::size_t f) {
+      if (plane.covered_texels[f] == 0) return;
+      const Sums sums = reader.read(f);
+      if (sums.count != plane.covered_texels[f])
+        fail("plane " + std::to_string(p) + " fragment " + std::to_string(f),
+             std::to_string(plane.covered_texels[f]) + " covered texels", std::to_string(sums.count));
+      predict_fragment(sums, plane.channels, options, f, predictors);
     });
     predictors.vqp = visual_quality(plane, predictors, options);
     context.report(static_cast<double>(p + 1) / static_cast<double>(out.planes.size()));

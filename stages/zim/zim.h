@@ -1,9 +1,8 @@
 #pragma once
-#include <vector>
 
 #include "stages/data/fragments.h"
+#include "stages/data/perceptual_values.h"
 #include "stages/data/pixels.h"
-#include "stages/data/predictors.h"
 #include "stages/data/stage.h"
 
 namespace texmesh {
@@ -14,8 +13,7 @@ struct ZimOptions {
   int difference = 24;  // neighbours that differ by this in any channel count as different
   static constexpr double weight_intensity = 0.5, weight_complexity = 0.5;  // of M (8.3)
   double weight_eta = 1, weight_z = 1, weight_i = 1, weight_m = 1;  // of VQP (8.4), relative to their sum
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("difference", s.difference, Range{1, 255}, ProfileOnly{},
       "neighbouring texels that differ by this in any channel count as different");
     v("weight_eta", s.weight_eta, Range{0, 100}, ProfileOnly{},

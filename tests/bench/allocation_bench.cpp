@@ -14,7 +14,6 @@
 
 #include "delivery/cpp/package/package_reader.h"
 #include "format/rules/size_curve.h"
-#include "format/rules/size_model.h"
 #include "stages/fill/fill.h"
 #include "stages/ladder/ladder.h"
 #include "stages/lut/lut.h"

@@ -8,7 +8,7 @@
 #include <cstdio>
 
 #include "delivery/cpp/decide/fragment_list.h"
-#include "format/rules/rate_distortion.h"
+#include "format/rules/allocation.h"
 #include "lab/transfer/chapter_4.h"
 #include "lab/transfer/policies.h"
 

@@ -24,7 +24,7 @@
 #include <iterator>
 
 #include "format/base/bytes.h"
-#include "format/base/srgb.h"
+#include "format/base/portable_math.h"
 #include "pipeline/import/import.h"
 #include "pipeline/io/file_resolver.h"
 #include "stages/image/decode_image.h"
@@ -32,8 +32,7 @@
 #include "stages/measure/flip.h"
 #include "stages/render/shade.h"
 #include "tools/extract/extract.h"
-#include "tools/extract/glb/image_codecs.h"
-#include "tools/render/picture_sheet.h"
+#include "tools/extract/glb/texture_source.h"
 #include "tools/render/rendered_model.h"
 
 namespace texmesh {

@@ -8,7 +8,7 @@
 #include <iostream>
 #include <utility>
 
-#include "stages/data/coverage.h"
+#include "stages/data/fragments.h"
 #include "stages/fill/fill.h"
 #include "stages/fragment_codec/fragment_codec.h"
 #include "stages/ladder/ladder.h"

@@ -18,7 +18,6 @@
 #include "stages/image/decode_image.h"
 #include "stages/ladder/encode_rungs.h"
 #include "stages/ladder/ladder.h"
-#include "stages/ladder/source_codec.h"
 #include "stages/previews/previews.h"
 #include "tests/bench/bench_texture.h"
 #include "tests/support/all_rungs.h"

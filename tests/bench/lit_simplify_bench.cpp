@@ -26,7 +26,7 @@
 #include "stages/ssf/ssf.h"
 #include "tests/bench/bench_model.h"
 #include "tools/extract/package_model.h"
-#include "tools/render/picture_sheet.h"
+#include "tools/render/rendered_model.h"
 
 namespace {
 

@@ -46,8 +46,8 @@ StageKeys keys_of(int i) {
 }
 
 /// What a run would have found out of a model with two images.
-MemoRecord record_of(int i) {
-  MemoRecord r;
+PackageMemo record_of(int i) {
+  PackageMemo r;
   r.request = digest_of("options");
   r.looked_at_ns = 1'700'000'000'000'000'000 + i;
   r.keys = keys_of(i);
@@ -82,7 +82,7 @@ void save(const std::string& folder, int models) {
   auto start = Clock::now();
   BuildMemo memo(folder, "/out");
   const double read_ms = ms_since(start), read_mib = peak_mib();
-  MemoRecord found;
+  PackageMemo found;
   int known = 0;
   for (int i = 0; i < models; i += 1000) known += memo.find(package_of(i), found) ? 1 : 0;
   constexpr int kModelsIn30s = 60;

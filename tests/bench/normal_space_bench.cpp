@@ -11,11 +11,10 @@
 #include <iostream>
 #include <iterator>
 
-#include "stages/fragment_codec/coding_space.h"
 #include "stages/fragment_codec/fragment_codec.h"
 #include "stages/image/decode_image.h"
 #include "stages/jpeg/jpeg.h"
-#include "stages/jpeg/jpeg_bits.h"
+#include "stages/jpeg/masked_jpeg.h"
 
 namespace texmesh {
 namespace {

@@ -11,8 +11,8 @@
 #include <fstream>
 #include <map>
 
-#include "format/base/box.h"
 #include "format/base/portable_math.h"
+#include "format/base/vec.h"
 #include "pipeline/import/import.h"
 #include "pipeline/io/file_resolver.h"
 #include "stages/image/decode_image.h"

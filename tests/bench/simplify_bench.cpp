@@ -15,7 +15,7 @@
 #include "examples/scan_model.h"
 #include "stages/condition/condition.h"
 #include "stages/simplification/collapse_engine.h"
-#include "stages/simplification/scale_error.h"
+#include "stages/simplification/simplification.h"
 
 namespace {
 
@@ -99,11 +99,10 @@ struct Row {
 Row measure(int triangles, int repeats, int threads) {
   RunContext context;
   context.threads = threads;
-  examples::ScanOptions scan;
+  ScanOptions scan;
   scan.triangles = triangles;
   scan.charts = 60;
-  const ConditionedMesh mesh =
-      condition_mesh(examples::make_scan_mesh(examples::ScanShape(1), scan).mesh, false, {}, context);
+  const ConditionedMesh mesh = condition_mesh(make_scan_mesh(ScanShape(1), scan).mesh, false, {}, context);
   const ScaleMap map = made_scale_map(mesh.mesh.positions.size());
   std::vector<Vec3f> points;
   for (std::uint32_t p : mesh.mesh.wedge_position) points.push_back(mesh.mesh.positions[p]);

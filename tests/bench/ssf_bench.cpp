@@ -33,6 +33,14 @@
 
 namespace {
 
+// The fewest bytes that one term of the single-precision recurrence moves: the operator and the vectors, of
+// four floats a row, once each.
+double heat_term_bytes(const texmesh::HeatOperator& l) {
+  const double rows = static_cast<double>(l.vertex_count()), entries = static_cast<double>(l.column.size());
+  return rows * (sizeof(std::uint32_t) + 16 * sizeof(float)) +
+         entries * (sizeof(std::uint32_t) + sizeof(float));
+}
+
 // Every allocation of the process is counted: what the stage asks for, not what the system keeps mapped.
 std::atomic<std::size_t> live_bytes{0}, peak_bytes{0};
 
@@ -83,9 +91,9 @@ double processor_seconds() {
 }
 
 ConditionedMesh made_scan(int triangles, const RunContext& context) {
-  examples::ScanOptions options;
+  ScanOptions options;
   options.triangles = triangles;
-  const examples::ScanMesh scan = make_scan_mesh(examples::ScanShape(1), options);
+  const ScanMesh scan = make_scan_mesh(ScanShape(1), options);
   return condition_mesh(scan.mesh, true, {}, context);
 }
 

@@ -12,12 +12,11 @@
 #include <filesystem>
 
 #include "format/split/split_reader.h"
-#include "format/split/split_source.h"
 #include "format/split/split_writer.h"
 #include "pipeline/import/import.h"
 #include "pipeline/io/file_resolver.h"
 #include "stages/condition/condition.h"
-#include "stages/scales/scale_grid.h"
+#include "stages/scales/scale_codecs.h"
 #include "stages/scales/vertex_split.h"
 #include "stages/simplification/simplification.h"
 #include "stages/ssf/ssf.h"

@@ -4,7 +4,7 @@
 #include <iostream>
 #include <iterator>
 
-#include "format/base/srgb.h"
+#include "format/base/portable_math.h"
 #include "stages/image/decode_image.h"
 #include "stages/measure/flip.h"
 

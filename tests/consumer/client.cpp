@@ -4,7 +4,7 @@
 
 #include "delivery/cpp/client/delivery_plan.h"
 #include "delivery/cpp/client/texture_loader.h"
-#include "delivery/cpp/transfer/package_transport.h"
+#include "delivery/cpp/transfer/transfer.h"
 #include "format/base/errors.h"
 #include "format/container/layout.h"
 #include "format/split/split_reader.h"

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "delivery/cpp/decide/fragment_offer.h"
-#include "delivery/cpp/simulate/network_model.h"
+#include "delivery/cpp/decide/harmonic_time.h"
+#include "delivery/cpp/simulate/simulation.h"
 #include "format/base/portable_math.h"
 #include "format/rules/split_mix.h"
 

@@ -3,7 +3,7 @@
 // that are known.
 #include <cmath>
 
-#include "delivery/cpp/simulate/network_model.h"
+#include "delivery/cpp/simulate/simulation.h"
 #include "format/base/portable_math.h"
 #include "format/rules/allocation.h"
 #include "tests/delivery/made_links.h"

@@ -5,7 +5,6 @@
 #include "delivery/cpp/client/delivery_plan.h"
 #include "format/container/layout.h"
 #include "format/rules/allocation.h"
-#include "format/rules/rate_distortion.h"
 #include "format/rules/size_curve.h"
 #include "format/split/split_reader.h"
 #include "format/split/split_stream.h"
@@ -134,9 +133,10 @@ inline Json planes_json(const std::vector<PlaneChoice>& planes) {
 }
 
 inline Json budgets(PackageReader& package, const ListOptions& options) {
+  TextureLoss loss(package, options.displayed_px);
   Json out = Json::array();
   for (const std::uint64_t bytes : {0ull, 1500ull, 6000ull, 20000ull, 1000000ull}) {
-    const TextureBudget b = texture_for_budget(package, options, bytes);
+    const TextureBudget b = texture_for_budget(loss, options, bytes);
     out.push_back({{"budget_bytes", bytes},
                    {"planes", planes_json(b.planes)},
                    {"group_weights", b.list.group_weights},

@@ -2,7 +2,7 @@
 #include <functional>
 #include <tuple>
 
-#include "delivery/cpp/decide/gpu_memory.h"
+#include "delivery/cpp/decide/texture_budget.h"
 #include "format/base/portable_math.h"
 #include "format/rules/allocation.h"
 #include "format/rules/proxy_choice.h"
@@ -118,13 +118,21 @@ Json proxy_steps() {
   return entry;
 }
 
+/// Blocks of 4 x 4 texels of a texture with all its mip levels: the browser client alone stores textures so.
+std::uint64_t blocks_of(std::uint32_t width_px, std::uint32_t height_px) {
+  std::uint64_t blocks = 0;
+  for (std::uint32_t longest = std::max(width_px, height_px), level = 0; longest > 0; longest >>= 1, ++level)
+    blocks +=
+        (std::max(1u, width_px >> level) + 3) / 4 * std::uint64_t{(std::max(1u, height_px >> level) + 3) / 4};
+  return blocks;
+}
+
 /// [width, height, RGBA, blocks of 8 bytes, of 16] and [vertices, triangles, bytes].
 Json gpu_sizes() {
   Json textures = Json::array(), meshes = Json::array();
   for (const auto& [w, h] :
        {std::pair{0u, 0u}, {1u, 1u}, {5u, 3u}, {256u, 256u}, {1000u, 3u}, {4096u, 2048u}})
-    textures.push_back({w, h, gpu_texture_bytes(w, h), gpu_texture_bytes(w, h, GpuTexels::kBlock8),
-                        gpu_texture_bytes(w, h, GpuTexels::kBlock16)});
+    textures.push_back({w, h, gpu_texture_bytes(w, h), 8 * blocks_of(w, h), 16 * blocks_of(w, h)});
   for (const auto& [v, t] : {std::pair{0u, 0u}, {3u, 1u}, {71831u, 98516u}})
     meshes.push_back({v, t, gpu_mesh_bytes(v, t)});
   return {{"name", "bytes on the GPU"}, {"textures", textures}, {"meshes", meshes}};

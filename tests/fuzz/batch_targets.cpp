@@ -14,8 +14,7 @@
 #include "pipeline/batch/plan.h"
 #include "pipeline/cache/cache_files.h"
 #include "pipeline/compile/options.h"
-#include "pipeline/compile/profile.h"
-#include "pipeline/compile/workers/worker_messages.h"
+#include "pipeline/compile/workers/worker.h"
 #include "tests/fuzz/fuzz_target.h"
 
 namespace texmesh::fuzz {
@@ -52,7 +51,7 @@ bool read_memo(ByteSpan input) {
   require(segment != nullptr, "a segment that cannot be opened");
   for (const MemoEntry& e : entries) {
     try {
-      segment->record(e);
+      segment->memo(e);
       segment->keys(e);
     } catch (const FormatError&) {
     }
@@ -63,8 +62,8 @@ bool read_memo(ByteSpan input) {
 /// Packed records alone, without the file around them.
 bool read_memo_record(ByteSpan input) {
   try {
-    const Bytes once = encode_artefact(decode_artefact<MemoRecord>(input, "memo"));
-    require(encode_artefact(decode_artefact<MemoRecord>(once, "memo")) == once,
+    const Bytes once = encode_artefact(decode_artefact<PackageMemo>(input, "memo"));
+    require(encode_artefact(decode_artefact<PackageMemo>(once, "memo")) == once,
             "a memo's record changed by being packed");
     return true;
   } catch (const FormatError& e) {
@@ -73,10 +72,10 @@ bool read_memo_record(ByteSpan input) {
 }
 
 bool read_cache_record(ByteSpan input) {
-  const auto record = read_record(input);
+  const auto record = read_entry(input);
   if (!record) return false;
-  const std::string again = write_record(*record);
-  const auto twice = read_record({reinterpret_cast<const std::uint8_t*>(again.data()), again.size()});
+  const std::string again = write_entry(*record);
+  const auto twice = read_entry({reinterpret_cast<const std::uint8_t*>(again.data()), again.size()});
   require(twice && twice->outputs == record->outputs, "a record changed by being written");
   return true;
 }
@@ -132,8 +131,8 @@ bool read_events(ByteSpan input) {
 
 // ---- seeds
 
-MemoRecord a_record() {
-  MemoRecord r;
+PackageMemo a_record() {
+  PackageMemo r;
   r.seconds = 1.5;
   r.looked_at_ns = 7;
   r.files = {{"", true, {}, 5, {0, 1, 5, 2, 3}}, {"a.png", false, {}, 0, {}}};
@@ -182,7 +181,7 @@ Bytes with_block_digests(ByteSpan input) {
 std::vector<Bytes> cache_seeds() {
   Key key("ladder", 3);
   key.add("option ladder.rungs", "4").add_input("mesh", {}, 17);
-  return {to_bytes(write_record({key.preimage(), {{"ladder", {}, 12}, {"ladder.tables", {}, 0}}}))};
+  return {to_bytes(write_entry({key.preimage(), {{"ladder", {}, 12}, {"ladder.tables", {}, 0}}}))};
 }
 
 /// The digest behind the text: the last 66 bytes (cache_files.h).

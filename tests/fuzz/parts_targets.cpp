@@ -27,7 +27,7 @@ struct Given {
   RunContext context;
   Notes notes;
   Lost lost;
-  gltf::Source source{file, files, options, context, notes, lost};
+  Source source{file, files, options, context, notes, lost};
 };
 
 /// For what takes several times as long as the rest.
@@ -114,7 +114,7 @@ tinygltf::Accessor checked_accessor(Choices& c) {
 }
 
 /// The elements of an accessor, which may claim any number of zeros: the first ones and the last.
-void read_elements(const gltf::AccessorReader& reader) {
+void read_elements(const AccessorReader& reader) {
   constexpr std::size_t kFew = 300;
   const int type = reader.component_type();
   const bool is_index = reader.components() == 1 && (type == 5121 || type == 5123 || type == 5125);
@@ -144,10 +144,10 @@ bool read_accessors(ByteSpan input) {
   }
   document["buffers"] = {{{"byteLength", c.rest().size()}}};
   Given given;
-  gltf::Buffers buffers(given.source, document, model, c.rest());
+  Buffers buffers(given.source, document, model, c.rest());
   bool any = false;
   for (std::size_t a = 0; a < model.accessors.size(); ++a) try {
-      read_elements(gltf::AccessorReader(given.source, model, buffers, a));
+      read_elements(AccessorReader(given.source, model, buffers, a));
       any = true;
     } catch (const InputError& e) {
       refused(e);
@@ -220,10 +220,10 @@ bool read_draco(ByteSpan input) {
   for (const char* name : {"POSITION", "TEXCOORD_0", "NORMAL"}) attributes[name] = c.number(1);
   Given given;
   try {
-    const gltf::VertexData data = gltf::decode_draco(given.source, "stream", c.rest(), attributes,
-                                                     [&](const std::string&) { return (flags & 2) != 0; });
+    const VertexData data = decode_draco(given.source, "stream", c.rest(), attributes,
+                                         [&](const std::string&) { return (flags & 2) != 0; });
     std::array<float, 4> value{};
-    for (const gltf::ReadFloats* read : {&data.position, &data.uv0, &data.normal})
+    for (const ReadFloats* read : {&data.position, &data.uv0, &data.normal})
       for (std::size_t v = 0; *read && v < data.count; ++v) (*read)(v, value.data());
     return true;
   } catch (const InputError& e) {
@@ -316,13 +316,13 @@ bool import_meshopt(ByteSpan input) {
 bool read_meshopt(ByteSpan input) {
   if (is_one_of_sixteen(input)) return import_meshopt(input);
   Choices c(input);
-  const auto mode = static_cast<gltf::MeshoptMode>(c.below(3));
-  const auto filter = static_cast<gltf::MeshoptFilter>(c.below(5));
+  const auto mode = static_cast<MeshoptMode>(c.below(3));
+  const auto filter = static_cast<MeshoptFilter>(c.below(5));
   const std::uint32_t stride = c.number(1), count = c.number(2);
   c.number(3);  // of the accessor
   Given given;
   try {
-    const Bytes bytes = gltf::decode_meshopt(given.source, "stream", c.rest(), count, stride, mode, filter);
+    const Bytes bytes = decode_meshopt(given.source, "stream", c.rest(), count, stride, mode, filter);
     require(bytes.size() == std::size_t{count} * stride, "fewer elements than asked for");
     return true;
   } catch (const InputError& e) {

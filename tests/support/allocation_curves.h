@@ -8,7 +8,6 @@
 
 #include "format/documents/tables.h"
 #include "format/rules/allocation.h"
-#include "format/rules/rate_distortion.h"
 
 namespace texmesh::testing {
 

@@ -2,7 +2,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "stages/data/coverage.h"
+#include "stages/data/fragments.h"
 
 namespace texmesh::testing {
 

@@ -6,7 +6,6 @@
 #include <stdexcept>
 
 #include "format/container/container.h"
-#include "format/container/format_version.h"
 #include "format/container/layout.h"
 #include "format/documents/index.h"
 #include "format/documents/package_writer.h"

@@ -13,7 +13,7 @@
 #include "tests/support/command.h"
 #include "tests/support/gltf_builder.h"
 #include "tests/support/images.h"
-#include "tools/extract/glb/scale_file.h"
+#include "tools/extract/glb/standalone_glb.h"
 
 namespace texmesh {
 namespace {

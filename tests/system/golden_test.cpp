@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "format/container/format_version.h"
+#include "format/container/layout.h"
 #include "format/documents/manifest.h"
 #include "format/documents/textures.h"
 #include "stages/fragment_codec/fragment_codec.h"

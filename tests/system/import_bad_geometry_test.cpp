@@ -13,7 +13,7 @@
 #include "tests/support/gltf_builder.h"
 #include "tests/support/hostile_meshes.h"
 #include "tests/support/packages.h"
-#include "tools/extract/glb/scale_file.h"
+#include "tools/extract/glb/standalone_glb.h"
 #include "tools/inspect/verify/verify.h"
 
 namespace texmesh::testing {

@@ -12,13 +12,12 @@
 #include "format/documents/quality_table.h"
 #include "format/documents/textures.h"
 #include "format/rules/allocation.h"
-#include "pipeline/about/meta.h"
+#include "pipeline/about/source_fields.h"
 #include "pipeline/batch/plan.h"
 #include "pipeline/compile/options.h"
-#include "pipeline/compile/profile.h"
 #include "pipeline/import/range/range_scan_document.h"
 #include "tests/support/schema.h"
-#include "tools/inspect/fragment_files.h"
+#include "tools/inspect/package_tree.h"
 #include "tools/inspect/provenance.h"
 
 namespace texmesh {

@@ -1,26 +1,30 @@
-#include <fmt/format.h>
+// The commands that make packages: compile, and what serves it. cache; of large collections on many machines
+// the list of models, and one summary of many runs.
 #include <unistd.h>
 
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
 #include <optional>
 
+#include "format/base/text_bytes.h"
 #include "format/documents/about.h"
-#include "pipeline/about/meta.h"
+#include "pipeline/about/source_fields.h"
+#include "pipeline/batch/fleet/model_list.h"
 #include "pipeline/batch/plan.h"
 #include "pipeline/batch/run.h"
-#include "pipeline/batch/write_reports.h"
 #include "pipeline/cache/cache_layer.h"
 #include "pipeline/cache/disk_store.h"
-#include "pipeline/compile/option_fields.h"
 #include "pipeline/compile/options.h"
-#include "pipeline/compile/profile.h"
 #include "pipeline/compile/stage_table.h"
+#include "pipeline/io/atomic_file.h"
 #include "pipeline/io/file_resolver.h"
-#include "pipeline/io/machine/machine_share.h"
+#include "pipeline/io/machine.h"
 #include "pipeline/io/resolver.h"
+#include "pipeline/io/table.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"
 #include "tools/cli/options/common_options.h"
-#include "tools/cli/options/units.h"
+#include "tools/publish/report/collection/collection_page.h"
 
 namespace texmesh {
 namespace {
@@ -80,8 +84,9 @@ void add_stage_option(Command& c, const OptionField& f, CompileArguments& args) 
   std::string names = "--" + f.path();
   if (is_short && !is_switch) names += std::string(",") + it->second.name;
   Option option = c.option(
-      names, [&args, path = f.path()](const std::string& text) { args.options[path] = text; }, help_of(f));
-  option.value_name(value_name_of(f)).rare();
+      names, [&args, path = f.path()](const std::string& text) { args.options[path] = text; }, help_of(f),
+      value_name_of(f));
+  option.rare();
   if (!f.words.empty()) option.offers({f.words.begin(), f.words.end()});
   if (is_short && !is_switch && it->second.everyday) option.everyday(kEverydayTitle);
   if (!is_short || !is_switch) return;
@@ -104,10 +109,7 @@ void add_stage_options(Command& c, CompileArguments& args) {
 /// Defaults, the profile, then the JND profile over it.
 CompileOptions base_options(const CompileArguments& args) {
   CompileOptions options;
-  if (!args.profile.empty()) {
-    const auto bytes = read_input_file(args.profile, 1 << 20);
-    read_profile(options, std::string(bytes.begin(), bytes.end()), args.profile);
-  }
+  apply_profile(args.profile, options);
   if (!args.jnd_profile.empty())
     read_jnd_profile(options, read_input_file(args.jnd_profile, 1 << 16), args.jnd_profile);
   return options;
@@ -186,12 +188,11 @@ void add_run_options(Command& c, CompileArguments& args) {
        "--memory", args.memory_bytes, parse_bytes,
        "Limit for the memory of all models that run at the same time; compile estimates each model by its "
        "last run (default: 4/5 of what machine, cgroup and Slurm allow). A model that needs more runs "
-       "alone, see --model-memory")
-      .value_name("SIZE")
+       "alone, see --model-memory",
+       "SIZE")
       .rare();
   c.option("--model-memory", run.pool.limits.memory_bytes, parse_bytes,
-           "Most memory (address space) of one model's process")
-      .value_name("SIZE")
+           "Most memory (address space) of one model's process", "SIZE")
       .shows_default("8GiB")
       .rare();
   c.option("--timeout", run.pool.limits.wall_s, "Most seconds for one model, 0 = no limit").shows_default();
@@ -202,15 +203,15 @@ void add_run_options(Command& c, CompileArguments& args) {
        "--sandbox", run.pool.limits.sandbox,
        "Limits a model's process. auto = it reaches the model's folder, its result and the cache, starts no "
        "program, and has no network but cache layers, as far as the kernel can enforce this; require = the "
-       "same, and compile stops if the kernel cannot; off = no limits")
-      .value_name("NAME")
+       "same, and compile stops if the kernel cannot; off = no limits",
+       "NAME")
       .shows_default()
       .rare();
   c.option(
        "--links-within", run.links_within,
        "Follow a model's symbolic links where they lead to a file within DIR, too (git-annex, DVC, Bazel); "
-       "may be given several times. Links within the folder that INPUT names are always followed")
-      .value_name("DIR")
+       "may be given several times. Links within the folder that INPUT names are always followed",
+       "DIR")
       .rare();
   add_shard_options(c, args.shard, args.costs);
   Option keep_going =
@@ -227,19 +228,17 @@ void add_all_cache_options(Command& c, CompileArguments& args) {
   add_cache_options(c, args.cache);
   c.option("--cache-layer", args.layers,
            "Folder or http(s) URL to ask behind the cache folder; may be given several times (also "
-           "TEXMESH_CACHE_LAYERS, separated by blanks)")
-      .value_name("PLACE")
+           "TEXMESH_CACHE_LAYERS, separated by blanks)",
+           "PLACE")
       .rare();
   c.flag("--cache-upload", args.run.cache.upload, "Put what is computed into the layers that are URLs")
       .rare();
   c.option("--cache-size", args.run.cache_limits.max_bytes, parse_bytes,
-           "The cache folder is pruned to this size, 0 = no limit")
-      .value_name("SIZE")
+           "The cache folder is pruned to this size, 0 = no limit", "SIZE")
       .shows_default("20GB")
       .rare();
   c.option("--cache-age", args.run.cache_limits.max_age_s, parse_seconds,
-           "Results unused for this long are pruned, 0 = never")
-      .value_name("TIME")
+           "Results unused for this long are pruned, 0 = never", "TIME")
       .shows_default("90d")
       .rare();
 }
@@ -264,16 +263,14 @@ void add_report_options(Command& c, CompileArguments& args) {
   c.flag("--stats", run.statistics, "Print a table of stages at the end: runs, cache hits, seconds");
   c.flag("-q,--quiet", args.quiet, "Print only warnings and errors");
   c.flag("-v,--verbose", run.verbose, "Print every stage and note");
-  c.flag("--json", args.json, "Print one JSON event a line (schemas/event.v1.schema.json)");
-  c.option("--summary", run.summary, "Write every model's result as JSON (schemas/summary.v1.schema.json)")
-      .value_name("FILE");
-  c.option("--junit", run.junit, "Write every model's result as JUnit XML").value_name("FILE");
-  c.option("--depfile", run.depfile, "Write the package's dependencies for make and ninja (one model only)")
-      .value_name("FILE")
+  c.flag("--json", args.json, "Print one JSON event on each line (schemas/event.v1.schema.json)");
+  c.option("--summary", run.summary, "Write every model's result as JSON (schemas/summary.v1.schema.json)",
+           "FILE");
+  c.option("--junit", run.junit, "Write every model's result as JUnit XML", "FILE");
+  c.option("--depfile", run.depfile, "Write the package's dependencies for make and ninja (one model only)",
+           "FILE")
       .rare();
-  c.option("--trace", run.trace, "Write what ran when, for chrome://tracing or Perfetto")
-      .value_name("FILE")
-      .rare();
+  c.option("--trace", run.trace, "Write what ran when, for chrome://tracing or Perfetto", "FILE").rare();
 }
 
 constexpr const char* kExamples =
@@ -296,24 +293,22 @@ void add_compile_options(Command& c, CompileArguments& args) {
   c.option("INPUT", args.inputs,
            "Models (.glb .gltf .obj .ply .stl, range-scan .json), folders of models, or collections (.json)")
       .required();
-  c.option("-o,--output", args.output, "NAME.texmesh for one model, a folder for several models")
-      .required()
-      .value_name("OUTPUT");
-  c.option(
-       "--profile", args.profile,
-       "small = few bytes, archive = loses nothing, fast = little time, thesis = as printed; or a JSON file "
-       "of "
-       "options. Flags win")
-      .value_name("NAME");
+  c.option("-o,--output", args.output, "NAME.texmesh for one model, a folder for several models", "OUTPUT")
+      .required();
+  c.option("--profile", args.profile,
+           "small = few bytes, archive = loses nothing, fast = little time, thesis = as printed; or a JSON "
+           "file of "
+           "options. Flags win",
+           "NAME");
   c.option(
        "--jnd-profile", args.jnd_profile,
        "JSON file of what judges could just tell (schemas/jnd-profile.v1.schema.json). The file wins over "
-       "--profile, flags win over the file")
-      .value_name("FILE")
+       "--profile, flags win over the file",
+       "FILE")
       .rare();
   c.option("--meta", args.meta,
-           "JSON file about the object (schemas/meta.v1.schema.json). The file wins over the model's words")
-      .value_name("FILE")
+           "JSON file about the object (schemas/meta.v1.schema.json). The file wins over the model's words",
+           "FILE")
       .everyday(kEverydayTitle);
   c.help_option("--help-stage", "Stage ", "Print the options of one stage (--stages lists the stages)");
   add_run_options(c, args);
@@ -348,15 +343,230 @@ int run_compile(CompileArguments& args) {
   }
 }
 
+using Json = nlohmann::ordered_json;
+
+struct CacheArguments {
+  std::string cache;
+  CacheLimits limits;
+  bool json = false;
+};
+
+std::string folder_of(const CacheArguments& args) {
+  std::string folder = default_cache_folder(args.cache);
+  if (folder.empty())
+    throw InputError("--cache", "", "a cache folder (--cache, TEXMESH_CACHE, XDG_CACHE_HOME or HOME)",
+                     "none of them");
+  return folder;
+}
+
+std::string existing_folder_of(const CacheArguments& args) {
+  std::string folder = folder_of(args);
+  if (!std::filesystem::is_directory(folder)) throw InputError(folder, "", "a cache folder", "nothing there");
+  return folder;
+}
+
+void statistics(const CacheArguments& args) {
+  const CacheStatistics s = cache_statistics(existing_folder_of(args));
+  if (args.json) {
+    std::cout << Json{{"folder", folder_of(args)},    {"bytes", s.bytes()},
+                      {"records", s.entries},         {"blobs", s.blobs},
+                      {"blob_bytes", s.blob_bytes},   {"notes", s.notes},
+                      {"quarantined", s.quarantined}, {"quarantined_bytes", s.quarantined_bytes},
+                      {"running_builds", s.running},  {"oldest_use_s", s.oldest_use_s}}
+                     .dump(1)
+              << '\n';
+    return;
+  }
+  std::cout << fmt::format(
+      "folder         {}\nsize           {}\nresults        {} runs of stages, {} outputs of {}\nquarantined "
+      "   {} of {}\n"
+      "oldest use     {:.1f} days ago\nrunning builds {}\n",
+      folder_of(args), format_bytes(s.bytes()), s.entries, s.blobs, format_bytes(s.blob_bytes), s.quarantined,
+      format_bytes(s.quarantined_bytes), static_cast<double>(s.oldest_use_s) / 86400, s.running);
+}
+
+void prune(const CacheArguments& args) {
+  const PruneResult r = prune_cache(existing_folder_of(args), args.limits);
+  if (args.json) {
+    std::cout << Json{{"removed_records", r.entries}, {"removed_blobs", r.blobs},
+                      {"removed_others", r.others},   {"removed_bytes", r.bytes},
+                      {"kept_bytes", r.kept_bytes},   {"kept_in_use", r.kept_in_use}}
+                     .dump(1)
+              << '\n';
+    return;
+  }
+  std::cout << fmt::format(
+      "removed {} results with {} outputs, {}; {} are left{}\n", r.entries, r.blobs, format_bytes(r.bytes),
+      format_bytes(r.kept_bytes),
+      r.kept_in_use ? fmt::format(" ({} results are in use by running builds)", r.kept_in_use) : "");
+}
+
+int verify(const CacheArguments& args) {
+  const std::vector<CacheDamage> damage = verify_cache(existing_folder_of(args));
+  Json list = Json::array();
+  for (const CacheDamage& d : damage) {
+    list.push_back({{"path", d.path}, {"reason", d.reason}});
+    if (!args.json) std::cout << d.path << ": " << d.reason << "; moved to quarantine\n";
+  }
+  if (args.json)
+    std::cout << Json{{"damaged", list}}.dump(1) << '\n';
+  else if (damage.empty())
+    std::cout << "every object has its digest\n";
+  return damage.empty() ? kExitOk : kExitModelFailed;
+}
+
+namespace fs = std::filesystem;
+
+struct ListArguments {
+  std::vector<std::string> inputs;
+  std::string output, costs;
+  int shards = 1;
+  bool json = false;
+};
+
+int run_list(const ListArguments& args) {
+  PlanRequest request;
+  request.inputs = args.inputs;
+  request.output = args.output;
+  request.costs_s = costs_option(args.costs);
+  const ModelList list = list_collection(request, args.shards);
+  if (args.json) {
+    std::cout << write_model_list(list);
+    return kExitOk;
+  }
+  for (const ListedModel& m : list.models) {
+    std::cout << m.input << " -> " << m.output << "  " << format_bytes(m.bytes);
+    if (args.shards > 1) std::cout << "  shard " << m.shard;
+    std::cout << '\n';
+  }
+  return kExitOk;
+}
+
+struct MergeArguments {
+  std::vector<std::string> files;
+  std::string output, junit, html;
+  int posters = 1000;
+};
+
+void write_text_file(const std::string& path, const std::string& text) {
+  if (!path.empty()) write_output_file(path, text_bytes(text));
+}
+
+/// The page's pictures stand in a folder beside it: page.html, page-posters/00000.jpg.
+void write_collection_page(const RunSummary& merged, const MergeArguments& args) {
+  if (args.html.empty()) return;
+  const fs::path folder = fs::path(args.html).parent_path();
+  const std::string posters = fs::path(args.html).stem().string() + "-posters";
+  const CollectionPage page = collection_page(merged, posters, static_cast<std::size_t>(args.posters),
+                                              [](const ModelSummary& m) { return package_face(m.output); });
+  std::error_code error;
+  if (!page.files.empty()) fs::create_directories(folder / posters, error);
+  if (error)
+    throw ResourceError((folder / posters).string(), "", "a folder that can be made", error.message());
+  for (const PageFile& file : page.files) write_file_atomically((folder / file.name).string(), file.bytes);
+  write_text_file(args.html, page.html);
+}
+
+int run_merge(const MergeArguments& args) {
+  for (const std::string* path : {&args.output, &args.junit, &args.html})
+    if (!path->empty()) check_output_file(*path);
+  std::vector<SummaryFile> files;
+  for (const std::string& file : args.files) files.push_back(open_summary(file));
+  const RunSummary merged = merge_summaries(std::move(files));
+  write_text_file(args.output, write_summary(merged));
+  if (!args.junit.empty()) write_text_file(args.junit, write_junit(merged));
+  write_collection_page(merged, args);
+  for (const SummaryProblem& p : merged.problems)
+    std::cerr << "texmesh summary: " << p.kind << ": " << (p.file.empty() ? "" : p.file + ": ") << p.text
+              << '\n';
+  const SummaryCounts c = count_results(merged.models);
+  std::cout << fmt::format("{} compiled, {} up to date, {} failed, {} cancelled in {} {}, {}\n", c.compiled,
+                           c.unchanged, c.failed, c.cancelled, merged.parts.size(),
+                           merged.parts.size() == 1 ? "run" : "runs", format_seconds(merged.seconds));
+  return exit_code_of(merged);
+}
+
 }  // namespace
 
 void add_compile_command(Command& app) {
-  auto args = std::make_shared<CompileArguments>();
-  Command c = app.add("compile", "Compile textured scans into packages");
-  add_compile_options(c, *args);
+  auto [c, args] = app.add("compile", "Compile textured scans into packages", run_compile);
+  add_compile_options(c, args);
   c.examples(kExamples);
   c.notes(kNotes);
-  c.on_run([args] { return run_compile(*args); });
+}
+
+void add_cache_command(Command& app) {
+  auto args = std::make_shared<CacheArguments>();
+  Command c = app.add("cache", "Look at, prune or check the cache folder");
+  c.needs_command();
+  const auto add = [&](const char* name, const char* help, std::function<int(const CacheArguments&)> run) {
+    Command command = c.add(name, help);
+    command.option("--cache", args->cache,
+                   "Cache folder (default: TEXMESH_CACHE, else the user's cache folder)", "DIR");
+    if (std::string(name) != "path") command.flag("--json", args->json, "Print JSON");
+    command.on_run([args, run] { return as_usage([&] { return run(*args); }); });
+    return command;
+  };
+  add("stat", "Print how much the folder holds",
+      [](const CacheArguments& a) { return statistics(a), kExitOk; });
+  Command p = add("prune", "Remove the results that have not been used for longest",
+                  [](const CacheArguments& a) { return prune(a), kExitOk; });
+  p.option("--size", args->limits.max_bytes, parse_bytes, "Most bytes that stay (default 20GB, 0 = no limit)",
+           "SIZE");
+  p.option("--age", args->limits.max_age_s, parse_seconds,
+           "Longest time that an unused result stays (default 90d, 0 = no limit)", "TIME");
+  add("verify", "Read every object and move damaged ones to quarantine (exit code 1 when there are any)",
+      verify);
+  add("path", "Print the folder", [](const CacheArguments& a) {
+    std::cout << folder_of(a) << '\n';
+    return kExitOk;
+  });
+  c.notes(
+      "Builds prune the folder (compile --cache-size, --cache-age). Pruning never touches what a running "
+      "build uses.\n"
+      "The folder may be deleted: everything in it can be computed again.");
+}
+
+void add_list_command(Command& app) {
+  auto args = std::make_shared<ListArguments>();
+  Command c = app.add("list", "List the models of a collection with their packages and files");
+  c.option("INPUT", args->inputs, "Models, folders of models, or collections (.json), as compile takes them")
+      .required();
+  c.option("-o,--output", args->output, "Where the packages would go, as compile takes it", "OUTPUT")
+      .required();
+  c.option("--shards", args->shards, "Say of every model which of so many shards compile --shard gives it to")
+      .integer_in(1, 1'000'000);
+  c.option("--costs", args->costs, "As for compile --shard", "FILE");
+  c.flag("--json", args->json, "Print JSON (schemas/list.v1.schema.json)");
+  c.examples(
+      "  texmesh list scans/ -o packages/                      what compile would make\n"
+      "  texmesh list scans/ -o packages/ --shards 40 --json   for another engine");
+  c.notes(
+      "list tells Snakemake (examples/snakemake), Nextflow or make the names of packages, the files that each "
+      "model names, and sizes. It compiles nothing and opens no picture.");
+  c.on_run([args] { return as_usage([&] { return run_list(*args); }); });
+}
+
+void add_summary_command(Command& app) {
+  auto args = std::make_shared<MergeArguments>();
+  Command c = app.add("summary", "Merge the reports of many runs of compile into one");
+  c.needs_command();
+  Command merge = c.add("merge", "Merge what compile --summary wrote for each shard");
+  merge.option("SUMMARY", args->files, "Files of compile --summary").required();
+  merge.option("-o,--output", args->output, "Write the merged summary (schemas/summary.v1.schema.json)",
+               "FILE");
+  merge.option("--junit", args->junit, "Write every model's result as JUnit XML", "FILE");
+  merge.option("--html", args->html,
+               "Write a page: what went wrong first, then figures, then the packages with their posters",
+               "FILE");
+  merge.option("--posters", args->posters, "Most posters on the page").integer_in(0, 100'000).shows_default();
+  merge.examples("  texmesh summary merge report/*.json -o all.json --junit all.xml --html all.html");
+  merge.notes(
+      "merge names summaries that are half-written, foreign (of another collection) or double, and shards "
+      "without a summary.\n"
+      "Exit code: as compile's for the models of all runs; 75 also where a shard is missing or half-written, 1 "
+      "also where a summary is foreign.");
+  merge.on_run([args] { return as_usage([&] { return run_merge(*args); }); });
 }
 
 }  // namespace texmesh

@@ -2,37 +2,27 @@
 // the server can be read and how far away it is. Then come a proxy, the documents, the mesh and the textures,
 // each chosen by what the link has shown until then (fetch() below is the course of it).
 #include <fmt/format.h>
-
 #include <chrono>
 #include <csignal>
 #include <filesystem>
-#include <iostream>
-#include <map>
-#include <memory>
-#include <nlohmann/json.hpp>
-#include <optional>
-#include <span>
 
 #include "delivery/cpp/client/texture_loader.h"
 #include "delivery/cpp/package/http_store.h"
-#include "delivery/cpp/transfer/package_transport.h"
+#include "delivery/cpp/transfer/transfer.h"
 #include "format/base/bytes.h"
 #include "format/container/layout.h"
 #include "format/rules/proxy_choice.h"
 #include "pipeline/io/atomic_file.h"
-#include "pipeline/io/exit_codes.h"
 #include "pipeline/io/table.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/delivery_options.h"
 #include "tools/cli/options/delivery_text.h"
-#include "tools/extract/glb/scale_file.h"
+#include "tools/extract/glb/standalone_glb.h"
 
 namespace texmesh {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-using Json = nlohmann::ordered_json;
 
 struct FetchArguments {
   DeliveryArguments delivery;
@@ -41,24 +31,74 @@ struct FetchArguments {
   std::string output;
 };
 
-/// What the transfer came to.
+struct FetchedServer {
+  std::string url;
+  MirrorShare share;
+  static void fields(auto& s, auto&& v) {
+    v("url", s.url, "");
+    RecordFields<MirrorShare>::fields(s.share, v);
+  }
+};
+
+struct Refined {
+  LoadReport load;
+  static void fields(auto& s, auto&& v) {
+    v("seconds", s.load.transfer.end_s, kSeconds, "");
+    v("bytes", s.load.transfer.bytes, "");
+  }
+};
+
+/// What the transfer came to, as --json prints it.
 struct Fetched {
   int scale = 0;
   std::optional<std::uint32_t> proxy;  // shown instead of the scale
-  struct Step {
-    std::uint32_t proxy = 0;
-    double at_s = 0;
-  };
-  std::optional<Step> step;  // a larger proxy on the way
-  double rtt_s = 0, first_picture_s = 0, mesh_s = 0, end_s = 0;
+  std::optional<ShownStep> step;
+  double limit_s = 1, rtt_s = 0, first_picture_s = 0, mesh_s = 0, end_s = 0;
   std::uint64_t mesh_bytes = 0, texture_bytes = 0;  // mesh: the documents and the first picture, too
   HttpPlace place;
   bool whole_rungs = false;
   LoadReport load;
-  std::optional<LoadReport> refined;
+  std::optional<Refined> refined;
   double texture_flip = 0, flip = 0;  // predicted of what has come
   GpuBytes gpu;
   std::vector<std::string> urls;  // in the order of load.mirrors
+  double deviation_percent() const { return 100 * (limit_s - end_s) / limit_s; }
+  /// What each has brought, where there are several.
+  std::vector<FetchedServer> servers() const {
+    std::vector<FetchedServer> out;
+    for (std::size_t i = 0; load.mirrors.size() > 1 && i < load.mirrors.size(); ++i)
+      out.push_back({shown_url(urls[i]), load.mirrors[i]});
+    return out;
+  }
+  static void fields(auto& s, auto&& v) {
+    v("version", Constant{1}, "");
+    v("scale", s.scale, kScaleNumbers, "");
+    v("rtt_s", s.rtt_s, kSeconds, "");
+    v("url", shown_url(s.place.url), "Where the package was read, without secrets.");
+    v("whole_rungs", s.whole_rungs, "The server knows no ranges: all fragments of a texture at one rung.");
+    v("first_picture_s", s.first_picture_s, kSeconds, "");
+    v("mesh_s", s.mesh_s, kSeconds, "");
+    v("end_s", s.end_s, kSeconds, "");
+    v("deviation_percent", s.deviation_percent(), kDeviations, "(limit - end) / limit; negative when late.");
+    v("mesh_bytes", s.mesh_bytes, "");
+    v("texture_bytes", s.texture_bytes, "");
+    v("requests", s.load.transfer.steps.size(), "For fragments.");
+    v("fragments", s.load.fragments, "That were wanted.");
+    v("skipped", s.load.skipped, "By decision.");
+    v("given_up", s.load.given_up, "Asked for in vain.");
+    v("problems", s.load.problems, Range{1, 4294967295.0},
+      "Why requests failed, and how many, tries included.");
+    v("cancelled", s.load.cancelled, "");
+    v("texture_flip", s.texture_flip, kFlips, "");
+    v("flip", s.flip, kFlips, kFlipMeans);
+    v("gpu_bytes", s.gpu, "What was chosen takes at most so much on the GPU.");
+    v("proxy", s.proxy, kProxyNumbers,
+      "The proxy that was fetched instead of a scale; 0 = the smallest. `scale` is the coarsest one then.");
+    v("step", s.step, "The larger proxy that was fetched before documents and mesh, and when it was there.");
+    v("servers", s.servers(), FieldRule{.count = Range{2, 1000}, .may_miss = true},
+      "With --mirror: what each server has brought of the fragments.");
+    v("refined", s.refined, "With --refine.");
+  }
 };
 
 /// What `fetch` writes into its folder: files as `unpack --fragments files` names them, of each fragment the
@@ -67,11 +107,33 @@ class FetchedFiles {
  public:
   FetchedFiles(PackageReader& package, const std::string& folder) : package_(package), folder_(folder) {}
   /// Keeps a fragment for write().
-  void add(const LoadedFragment& fragment);
+  void add(const LoadedFragment& f) {
+    if (folder_.empty()) return;
+    auto& streams = streams_[{f.plane, f.fragment}];
+    if (!codec_traits(package_.textures()[f.plane].codec).incremental) streams.clear();
+    streams.insert(streams.end(), f.streams.begin(), f.streams.end());
+    rungs_[{f.plane, f.fragment}] = f.rung;
+  }
   /// Writes the fragments.
-  void write();
+  void write() {
+    for (const auto& [where, streams] : streams_) {
+      const auto [plane, fragment] = where;
+      const Codec codec = package_.textures()[plane].codec;
+      const CodecTraits& traits = codec_traits(codec);
+      const auto rung = static_cast<std::uint32_t>(rungs_[where]);
+      const Bytes file =
+          join_fragment(codec, package_.table_stream(plane, traits.incremental ? 0 : rung),
+                        std::vector<std::span<const std::uint8_t>>(streams.begin(), streams.end()));
+      write_entry(fragment_file_path(plane, rung, fragment, traits.extension), file);
+    }
+  }
   /// Writes an entry at once.
-  void write_entry(const std::string& path, const Bytes& bytes);
+  void write_entry(const std::string& path, const Bytes& bytes) {
+    if (folder_.empty()) return;
+    const std::filesystem::path file = std::filesystem::path(folder_) / path;
+    std::filesystem::create_directories(file.parent_path());
+    write_file_atomically(file.string(), bytes);
+  }
 
  private:
   PackageReader& package_;
@@ -79,35 +141,6 @@ class FetchedFiles {
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::vector<Bytes>> streams_;  // by plane and fragment
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::int32_t> rungs_;
 };
-
-void FetchedFiles::add(const LoadedFragment& f) {
-  if (folder_.empty()) return;
-  auto& streams = streams_[{f.plane, f.fragment}];
-  const Codec codec = package_.textures()[f.plane].codec;
-  if (!codec_traits(codec).incremental) streams.clear();
-  streams.insert(streams.end(), f.streams.begin(), f.streams.end());
-  rungs_[{f.plane, f.fragment}] = f.rung;
-}
-
-void FetchedFiles::write() {
-  for (const auto& [where, streams] : streams_) {
-    const auto [plane, fragment] = where;
-    const Codec codec = package_.textures()[plane].codec;
-    const CodecTraits& traits = codec_traits(codec);
-    const auto rung = static_cast<std::uint32_t>(rungs_[where]);
-    const Bytes file =
-        join_fragment(codec, package_.table_stream(plane, traits.incremental ? 0 : rung),
-                      std::vector<std::span<const std::uint8_t>>(streams.begin(), streams.end()));
-    write_entry(fragment_file_path(plane, rung, fragment, traits.extension), file);
-  }
-}
-
-void FetchedFiles::write_entry(const std::string& path, const Bytes& bytes) {
-  if (folder_.empty()) return;
-  const std::filesystem::path file = std::filesystem::path(folder_) / path;
-  std::filesystem::create_directories(file.parent_path());
-  write_file_atomically(file.string(), bytes);
-}
 
 volatile std::sig_atomic_t interrupted = 0;
 
@@ -297,7 +330,7 @@ void fetch_textures(const FetchArguments& a, const DeliveryRequest& request, con
   load.on_fragment = [&](const LoadedFragment& fragment) { writer.add(fragment); };
   f.load = loader.load(planes, load);
   f.end_s = seconds_since(start);
-  if (a.refine_s > 0 && !f.load.cancelled) f.refined = loader.refine(planes, load, {a.refine_s, ~0ull});
+  if (a.refine_s > 0 && !f.load.cancelled) f.refined = {loader.refine(planes, load, {a.refine_s, ~0ull})};
   f.texture_bytes = loader.bytes();
   writer.write();
   predict(package, loader, planes, load.list, f);
@@ -307,6 +340,7 @@ Fetched fetch(const FetchArguments& a) {
   const DeliveryRequest request = delivery_request(a.delivery);
   const HttpOptions http = http_options(request.time_limit_s);
   Fetched f;
+  f.limit_s = request.time_limit_s;
   Moved moved;
   const auto start = Clock::now();
   auto opened = open_urls(all_urls(a), http);
@@ -343,39 +377,7 @@ Fetched fetch(const FetchArguments& a) {
   return f;
 }
 
-Json fetch_document(const Fetched& f, double limit_s) {
-  Json j{{"version", 1},
-         {"scale", f.scale},
-         {"rtt_s", f.rtt_s},
-         {"url", shown_url(f.place.url)},
-         {"whole_rungs", f.whole_rungs},
-         {"first_picture_s", f.first_picture_s},
-         {"mesh_s", f.mesh_s},
-         {"end_s", f.end_s},
-         {"deviation_percent", 100 * (limit_s - f.end_s) / limit_s},
-         {"mesh_bytes", f.mesh_bytes},
-         {"texture_bytes", f.texture_bytes},
-         {"requests", f.load.transfer.steps.size()},
-         {"fragments", f.load.fragments},
-         {"skipped", f.load.skipped},
-         {"given_up", f.load.given_up},
-         {"problems", f.load.problems},
-         {"cancelled", f.load.cancelled},
-         {"texture_flip", f.texture_flip},
-         {"flip", f.flip},
-         {"gpu_bytes", gpu_json(f.gpu)}};
-  if (f.proxy) j["proxy"] = *f.proxy;
-  if (f.step) j["step"] = {{"proxy", f.step->proxy}, {"at_s", f.step->at_s}};
-  for (std::size_t i = 0; f.load.mirrors.size() > 1 && i < f.load.mirrors.size(); ++i) {
-    j["servers"].push_back({{"url", shown_url(f.urls[i])}});
-    j["servers"].back().update(server_json(f.load.mirrors[i]));
-  }
-  if (f.refined)
-    j["refined"] = {{"seconds", f.refined->transfer.end_s}, {"bytes", f.refined->transfer.bytes}};
-  return j;
-}
-
-std::string load_text(const Fetched& f, double limit_s) {
+std::string load_text(const Fetched& f) {
   std::string text;
   if (f.proxy) {
     text += fmt::format(
@@ -391,7 +393,7 @@ std::string load_text(const Fetched& f, double limit_s) {
       "textures after {:.3f} s: {:+.2f} % of the limit of {:.2f} s, {} bytes in {} fragments, {} skipped, {} "
       "given up\n",
       shown_url(f.place.url), f.first_picture_s, f.scale, f.mesh_s, grouped(f.mesh_bytes), 1000 * f.rtt_s,
-      f.end_s, 100 * (limit_s - f.end_s) / limit_s, limit_s, grouped(f.load.transfer.bytes), f.load.fragments,
+      f.end_s, f.deviation_percent(), f.limit_s, grouped(f.load.transfer.bytes), f.load.fragments,
       f.load.skipped, f.load.given_up);
   if (f.place.in_memory)
     text += "the server knows no ranges and has no tree: the whole container was fetched\n";
@@ -399,9 +401,9 @@ std::string load_text(const Fetched& f, double limit_s) {
     text += "whole rungs: all fragments of a texture at once\n";
   for (const auto& [why, count] : f.load.problems) text += fmt::format("  {} x {}\n", count, why);
   if (f.refined)
-    text += fmt::format("refined for {:.3f} s with {} bytes{}\n", f.refined->transfer.end_s,
-                        grouped(f.refined->transfer.bytes),
-                        f.refined->out_of_time ? ", until its time was over" : "");
+    text += fmt::format("refined for {:.3f} s with {} bytes{}\n", f.refined->load.transfer.end_s,
+                        grouped(f.refined->load.transfer.bytes),
+                        f.refined->load.out_of_time ? ", until its time was over" : "");
   text += fmt::format("predicted FLIP {:.4f} (0 = equal to the source), {:.4f} by the textures alone{}\n",
                       f.flip, f.texture_flip, f.load.cancelled ? "; cancelled" : "");
   return text + gpu_text(f.gpu);
@@ -409,8 +411,7 @@ std::string load_text(const Fetched& f, double limit_s) {
 
 std::string servers_text(const Fetched& f) {
   std::string text;
-  for (std::size_t i = 0; f.load.mirrors.size() > 1 && i < f.load.mirrors.size(); ++i)
-    text += server_text(shown_url(f.urls[i]), f.load.mirrors[i]);
+  for (const FetchedServer& server : f.servers()) text += server_text(server.url, server.share);
   return text;
 }
 
@@ -430,9 +431,7 @@ int run_fetch(FetchArguments& args) {
   }
   if (static_cast<double>(f.gpu.all()) > args.delivery.request.memory_bytes)
     std::cerr << "warning: even the least takes " << f.gpu.all() << " bytes on the GPU\n";
-  const double limit_s = args.delivery.request.time_limit_s;
-  std::cout << (args.delivery.json ? fetch_document(f, limit_s).dump() + '\n'
-                                   : load_text(f, limit_s) + servers_text(f));
+  std::cout << (args.delivery.json ? to_json_line(f) + '\n' : load_text(f) + servers_text(f));
   return f.load.cancelled ? 130 : f.load.given_up > 0 ? kExitDifferent : kExitOk;
 }
 
@@ -444,16 +443,12 @@ void add_fetch_options(Command& c, FetchArguments& args) {
   add_display_option(c, d);
   add_scale_option(c, d);
   add_memory_option(c, d);
-  c.option("--mirror", args.mirrors, "URL of the same package on another server; may be given again")
-      .value_name("URL");
-  c.option(
-       "--refine", [&args](const std::string& text) { args.refine_s = parse_duration(text, "--refine"); },
-       "Go on for so long after the limit, best upgrades first")
-      .value_name("TIME")
+  c.option("--mirror", args.mirrors, "URL of the same package on another server; may be given again", "URL");
+  c.option("--refine", args.refine_s, parse_duration,
+           "Go on for so long after the limit, best upgrades first", "TIME")
       .shows_default("0");
   c.option("-o,--output", args.output,
-           "Folder for the scale's GLB and for the fragments as complete image files")
-      .value_name("DIR");
+           "Folder for the scale's GLB and for the fragments as complete image files", "DIR");
   c.flag("--json", d.json, "Print one JSON object (schemas/fetch.v1.schema.json)");
   add_rtt_option(c, d, "Round trip, 40 are milliseconds; 0 = as the first answer shows it").rare();
   add_policy_option(c, d).rare();
@@ -465,10 +460,17 @@ void add_fetch_options(Command& c, FetchArguments& args) {
 
 }  // namespace
 
+DocumentSchema fetch_schema() {
+  return document_schema("fetch.v1", "texmesh fetch, version 1",
+                         "Output of `texmesh fetch URL --json`: what a real transfer brought within its "
+                         "time. Times in seconds from the first request on.",
+                         schema_of<Fetched>());
+}
+
 void add_fetch_command(Command& app) {
-  auto args = std::make_shared<FetchArguments>();
-  Command c = app.add("fetch", "Fetch from web servers what a viewer would get within a time");
-  add_fetch_options(c, *args);
+  auto [c, args] =
+      app.add("fetch", "Fetch from web servers what a viewer would get within a time", run_fetch);
+  add_fetch_options(c, args);
   c.examples(
       "  texmesh fetch https://host/bust.texmesh --time 4 --display 800\n"
       "  texmesh fetch https://host/bust.texmesh --time 4 --memory 64MB\n"
@@ -481,7 +483,6 @@ void add_fetch_command(Command& app) {
       "folder beside the package.\n"
       "Exit code: 0, 1 when the package cannot be read, 2 usage, 4 when fragments were given up, 130 when "
       "interrupted.");
-  c.on_run([args] { return run_fetch(*args); });
 }
 
 }  // namespace texmesh

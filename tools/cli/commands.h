@@ -5,30 +5,32 @@ namespace texmesh {
 class Command;
 
 /// The one list of commands, in the help's order: COMMAND(group of the help, name), and RARE(group, name) of
-/// those that only `texmesh --help-all` lists. add_NAME_command() adds the command to the program; it stands
-/// in command_NAME.cpp, or in the file named here.
-#define TEXMESH_COMMANDS(COMMAND, RARE)                           \
-  COMMAND("Make packages", compile)                               \
-  COMMAND("Make packages", cache)                                 \
-  RARE("Make packages", list)    /* command_fleet.cpp */          \
-  RARE("Make packages", summary) /* command_fleet.cpp */          \
-  COMMAND("Look inside", view)                                    \
-  COMMAND("Look inside", dump)                                    \
-  COMMAND("Look inside", verify)                                  \
-  COMMAND("Look inside", diff)                                    \
-  COMMAND("Look inside", render)                                  \
-  COMMAND("Look inside", report)                                  \
-  COMMAND("Look inside", doctor)                                  \
-  COMMAND("Export", extract)                                      \
-  COMMAND("Export", export)                                       \
-  COMMAND("Export", site)                                         \
-  RARE("Export", unpack) /* command_pack.cpp */                   \
-  RARE("Export", pack)                                            \
-  COMMAND("Deliver over a network", plan)                         \
-  COMMAND("Deliver over a network", check) /* command_plan.cpp */ \
-  RARE("Deliver over a network", fetch)                           \
-  RARE("Deliver over a network", simulate)                        \
-  RARE("For other programs", schema)                              \
+/// those that only `texmesh --help-all` lists. add_NAME_command() adds the command to the program. The
+/// sources: command_compile.cpp makes packages, command_inspect.cpp looks inside (and packs),
+/// command_publish.cpp exports (and views and reports), command_plan.cpp and command_fetch.cpp deliver,
+/// commands_for_programs.cpp.
+#define TEXMESH_COMMANDS(COMMAND, RARE)    \
+  COMMAND("Make packages", compile)        \
+  COMMAND("Make packages", cache)          \
+  RARE("Make packages", list)              \
+  RARE("Make packages", summary)           \
+  COMMAND("Look inside", view)             \
+  COMMAND("Look inside", dump)             \
+  COMMAND("Look inside", verify)           \
+  COMMAND("Look inside", diff)             \
+  COMMAND("Look inside", render)           \
+  COMMAND("Look inside", report)           \
+  COMMAND("Look inside", doctor)           \
+  COMMAND("Export", extract)               \
+  COMMAND("Export", export)                \
+  COMMAND("Export", site)                  \
+  RARE("Export", unpack)                   \
+  RARE("Export", pack)                     \
+  COMMAND("Deliver over a network", plan)  \
+  COMMAND("Deliver over a network", check) \
+  RARE("Deliver over a network", fetch)    \
+  RARE("Deliver over a network", simulate) \
+  RARE("For other programs", schema)       \
   RARE("For other programs", completion)
 
 #define TEXMESH_DECLARE(group, name) void add_##name##_command(Command& program);

@@ -1,15 +1,16 @@
 // Commands for other programs: the JSON Schemas of what texmesh reads and prints (each is made of the
 // description that also reads and writes the document; schemas/NAME.schema.json hold the same texts), and
 // what shells and man show.
-#include <iostream>
 
-#include "pipeline/batch/write_reports.h"
+#include "pipeline/batch/run.h"
 #include "pipeline/io/record.h"
 #include "tools/cli/commands.h"
 #include "tools/cli/options/command_line.h"
+#include "tools/cli/options/delivery_text.h"
 #include "tools/extract/extract.h"
 #include "tools/inspect/atlas/atlas_report.h"
 #include "tools/inspect/diff/diff.h"
+#include "tools/inspect/dump/dump.h"
 #include "tools/inspect/verify/verify.h"
 #include "tools/publish/export/export.h"
 #include "tools/publish/report/report.h"
@@ -20,9 +21,10 @@ namespace {
 
 std::vector<DocumentSchema> command_schemas() {
   std::vector<DocumentSchema> all = pipeline_schemas();
-  for (DocumentSchema& schema : std::vector{diff_schema(), doctor_schema(), export_schema(), extract_schema(),
-                                            report_schema(), site_schema(), verify_schema()})
-    all.push_back(std::move(schema));
+  for (const auto of_command :
+       {diff_schema, doctor_schema, dump_scales_schema, export_schema, extract_schema, fetch_schema,
+        plan_schema, report_schema, simulate_schema, site_schema, verify_schema})
+    all.push_back(of_command());
   return all;
 }
 

@@ -4,30 +4,21 @@
 
 #include <nlohmann/json.hpp>
 
-#include "format/base/errors.h"
 #include "pipeline/cache/disk_store.h"
-#include "pipeline/compile/option_fields.h"
-#include "pipeline/compile/profile.h"
+#include "pipeline/compile/options.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/file_resolver.h"
-#include "pipeline/io/record.h"
 #include "pipeline/io/table.h"
 #include "tools/cli/options/command_line.h"
 #include "tools/inspect/package_mesh.h"
 
 namespace texmesh {
-namespace {
-
-std::string hex(Srgb c) { return fmt::format("#{:02x}{:02x}{:02x}", c[0], c[1], c[2]); }
-
-}  // namespace
 
 template <>
 struct RecordFields<LegendStop> {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("value", s.value, "");
-    v("colour", hex(s.colour), "");
+    v("colour", hex_of(s.colour), "");
   }
 };
 
@@ -38,8 +29,7 @@ struct PaintedDocument {
   const Painting& painting;
   const ColourLegend& legend;
   const Notes& notes;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("what", s.painting.what, "");
     v("output", s.painting.output, "");
     v("quantity", s.legend.quantity, "");
@@ -57,11 +47,7 @@ struct PaintedDocument {
 /// Profile first, then --set over it.
 CompileOptions options_of(const Painting& p) {
   CompileOptions options;
-  if (!p.profile.empty()) {
-    const std::string file = profile_file(p.profile);
-    const auto bytes = read_input_file(file, 1 << 20);
-    read_profile(options, std::string(bytes.begin(), bytes.end()), file);
-  }
+  apply_profile(p.profile, options);
   std::vector<OptionField> fields = list_options(options);
   for (const std::string& setting : p.settings) {
     const std::size_t equals = setting.find('=');
@@ -80,24 +66,13 @@ bool ends_with_either(const std::string& path, const char* ending, const char* l
   return path.ends_with(ending) || path.ends_with(large);
 }
 
-CompileRequest painting_request(const Painting& p) {
+PaintedModel paint(const Painting& p, const PaintedQuantity& what, Notes& notes) {
   CompileRequest request;
   request.input = p.input;
-  try {
-    request.options = options_of(p);
-  } catch (const InputError& e) {  // what was asked for makes no sense
-    throw UsageError(e.file(), e.place(), e.expected(), e.found());
-  }
-  return request;
-}
-
-PaintedModel paint(const Painting& p, const PaintedQuantity& what, Notes& notes) {
-  const CompileRequest request = painting_request(p);
+  request.options = as_usage([&] { return options_of(p); });
   const RunContext context = context_of(p.jobs);
   if (is_package(p.input)) return paint_package(p.input, what, context);
-  const std::unique_ptr<Store> store =
-      p.cache.off ? std::make_unique<NullStore>() : open_disk_store(default_cache_folder(p.cache.folder));
-  return paint_model(request, what, *store, context, {}, notes);
+  return paint_model(request, what, *store_of(p.cache), context, {}, notes);
 }
 
 void print_legend(const Painting& p, const ColourLegend& legend, const Notes& notes) {
@@ -105,20 +80,18 @@ void print_legend(const Painting& p, const ColourLegend& legend, const Notes& no
   if (!legend.unit.empty()) std::cout << ", " << legend.unit;
   std::cout << '\n';
   for (const LegendStop& stop : legend.stops)
-    std::cout << fmt::format("  {}  {:<11}  {}\n", hex(stop.colour), stop.name, shortest(stop.value));
+    std::cout << fmt::format("  {}  {:<11}  {}\n", hex_of(stop.colour), stop.name, shortest(stop.value));
   if (legend.logarithmic) std::cout << "  (equal steps of colour are equal ratios)\n";
   for (const std::string& remark : legend.remarks) std::cout << "- " << remark << '\n';
-  for (const Note& n : notes)
-    if (n.severity == Severity::kWarning)
-      std::cerr << "warning: " << n.code << (n.place.empty() ? "" : ": " + n.place) << ": " << n.text << '\n';
+  print_warnings(notes);
 }
 
 }  // namespace
 
 void add_painting_options(Command& c, Painting& painting) {
-  c.option("--profile", painting.profile, "JSON file of options, as for compile").value_name("FILE");
-  c.option("--set", painting.settings, "STAGE.OPTION=VALUE over the profile; may be repeated")
-      .value_name("OPTION=VALUE");
+  c.option("--profile", painting.profile, "JSON file of options, as for compile", "FILE");
+  c.option("--set", painting.settings, "STAGE.OPTION=VALUE over the profile; may be repeated",
+           "OPTION=VALUE");
   add_cache_options(c, painting.cache);
 }
 

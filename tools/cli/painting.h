@@ -1,9 +1,7 @@
 #pragma once
-#include <string>
-#include <vector>
 
 #include "tools/cli/options/common_options.h"
-#include "tools/inspect/pictures/painted_quantity.h"
+#include "tools/inspect/pictures/painted_model.h"
 
 namespace texmesh {
 

@@ -1,19 +1,11 @@
 #pragma once
-#include <cstdint>
-#include <optional>
-#include <string>
 #include <variant>
-#include <vector>
 
 #include "delivery/cpp/package/package_reader.h"
-#include "format/base/fields.h"
+#include "pipeline/io/record.h"
 #include "stages/base/run_context.h"
-#include "tools/extract/glb/image_codecs.h"
-#include "tools/render/plane_pixels.h"
 
 namespace texmesh {
-
-struct DocumentSchema;  // pipeline/io/record.h
 
 /// What kind of images a standalone file gets. kAuto: for a number of bytes what looks best, otherwise JPEG;
 /// images with alpha become PNG where JPEG would be taken.
@@ -59,17 +51,35 @@ struct ExtractRequest {
   bool recentre = false;  // the frame of the package's meshes instead of the source's coordinates
 };
 
+inline constexpr double kMostGlbBytes = 4294967295;
+
+enum class FileImage : std::uint8_t { kJpeg, kWebp, kPng };
+template <>
+struct EnumNames<FileImage> {
+  static constexpr std::array<std::string_view, 3> names{"jpeg", "webp", "png"};
+};
+
 struct ExtractedImage {
   std::uint32_t image = 0;
   std::string role;
   FileImage format = FileImage::kJpeg;
   std::uint32_t width_px = 0, height_px = 0;
-  double quality = 0;  // of its coder; 100 for PNG
+  double quality = 0;
   std::uint64_t bytes = 0;
+  static void fields(auto& s, auto&& v) {
+    v("image", s.image, "Number of the source image: texture/<image>.");
+    v("role", s.role, "As in textures.json.");
+    v("format", s.format, "");
+    v("width_px", s.width_px, Range{1, 65536}, "");
+    v("height_px", s.height_px, Range{1, 65536}, "");
+    v("quality", s.quality, Range{0, 100}, "Of the coder; 100 for png.");
+    v("bytes", s.bytes, Range{1, kMostGlbBytes}, "");
+  }
 };
 
 struct Extracted {
   std::vector<std::uint8_t> glb;
+  std::string name;                             // of the GLB; who writes it says so
   int scale = 0;                                // the finest in the file; of a proxy the package's coarsest
   std::optional<std::uint32_t> proxy;           // the file is this proxy, or made of it
   std::vector<int> levels;                      // of levels of detail: all, finest first
@@ -89,6 +99,39 @@ struct Extracted {
   double mesh_difference = -1;  // the same with the best textures instead: what the mesh alone costs
   int views = 0;
   std::uint32_t side_px = 0;
+
+  /// `value`, of a file for a number of bytes.
+  template <class T>
+  std::optional<T> asked(T value) const {
+    return asked_bytes > 0 ? std::optional(value) : std::nullopt;
+  }
+  static void fields(auto& s, auto&& v) {
+    v("version", Constant{1}, "");
+    v("file", s.name, "Name of the GLB, without its folder.");
+    v("bytes", s.glb.size(), Range{20, kMostGlbBytes}, "");
+    v("scale", s.scale, Range{0, 99},
+      "Number of the finest scale in the file; with `proxy` the package's coarsest one.");
+    v("levels", s.levels, FieldRule{.range = Range{0, 99}, .count = Range{1, 100}},
+      "Scales of the file, finest first; more than one with --lods.");
+    v("triangles", s.triangles, Range{1, kMostGlbBytes}, "Of the finest scale.");
+    v("mesh_bytes", s.mesh_bytes, "Everything but the images; of a whole proxy the whole file.");
+    v("images", s.images, "");
+    v("proxy", s.proxy, Range{0, kMaxPackageProxies - 1},
+      "The file is this proxy of the package, or made of it: its mesh coded coarser, its pictures smaller, maps "
+      "left out; 0 = the smallest.");
+    v("asked_bytes", s.asked(s.asked_bytes), "--bytes.");
+    v("within", s.asked(s.within),
+      "bytes is at most asked_bytes, and at least 98 % of it unless the file has S_0 and all of the source's "
+      "JPEG coefficients; otherwise the file is the nearest possible one.");
+    v("difference", s.asked(s.difference), Range{0, 1},
+      "Mean FLIP of the file's lit pictures against those of the package's best, over the object's pixels; 0 = "
+      "equal.");
+    v("mesh_difference", s.asked(s.mesh_difference), Range{0, 1},
+      "The same with the best textures instead: what the mesh alone costs.");
+    v("views", s.asked(s.views), Range{1, 1000}, "Directions from which it was measured.");
+    v("side_px", s.asked(s.side_px), Range{1, 65536}, "Side of those pictures.");
+    v("notes", s.notes, "");
+  }
 };
 
 /// glTF files that any viewer opens alone: one for each number of bytes of an ExtractBudget, one for other
@@ -100,9 +143,8 @@ std::vector<Extracted> extract_files(PackageReader& package, const ExtractReques
 /// The first of these files.
 Extracted extract_model(PackageReader& package, const ExtractRequest& request, const RunContext& context);
 
-/// The answer to --json (schemas/extract.v1.schema.json), and the text for people. `file` is the GLB's name.
-std::string extract_json(const Extracted& extracted, const std::string& file);
 DocumentSchema extract_schema();
-std::string extract_text(const Extracted& extracted, const std::string& file);
+/// For people.
+std::string extract_text(const Extracted& extracted);
 
 }  // namespace texmesh

@@ -2,8 +2,7 @@
 
 #include "pipeline/io/file_resolver.h"
 #include "stages/image/decode_image.h"
-#include "tools/extract/glb/scale_file.h"
-#include "tools/extract/glb/texture_source.h"
+#include "tools/extract/glb/standalone_glb.h"
 
 namespace texmesh {
 namespace {
@@ -30,14 +29,8 @@ Pixels image_texels(PackageReader& package, const PackageImage& image, const Pac
         image.colours ? FloatEncoding::kSrgb : FloatEncoding::kAsIs);
   const Pixels colours = plane_texels(package, image.plane, choice, context);
   if (!image.alpha_plane) return colours;
-  const Pixels alpha = plane_texels(package, *image.alpha_plane, choice, context);
   // Previews that would take too many bytes are smaller than others of their image.
-  const std::uint32_t width = std::min(colours.width_px, alpha.width_px),
-                      height = std::min(colours.height_px, alpha.height_px);
-  const auto fitted = [&](const Pixels& p, Averaging kind) {
-    return reduced(p, p.width_px, p.height_px, width, height, kind);
-  };
-  return with_alpha(fitted(colours, image.averaging()), fitted(alpha, Averaging::kNumbers));
+  return with_alpha_of(image, colours, plane_texels(package, *image.alpha_plane, choice, context));
 }
 
 /// The image of the package that a scale's image of this name stands for.
@@ -71,8 +64,7 @@ RenderedModel package_model(PackageReader& package, const PackageChoice& choice,
   if (choice.scale != 0) model.bounds = bounding_sphere(scale_model(package, 0, context).mesh.positions);
   const std::vector<PackageImage> images = package_images(package);
   for (const TextureImage& from : model.texture_images) {
-    const auto image = std::find_if(images.begin(), images.end(),
-                                    [&](const PackageImage& i) { return i.image == from.image; });
+    const auto image = std::ranges::find(images, from.image, &PackageImage::image);
     model.textures.push_back(
         render_texture(image_texels(package, *image, choice, context), from.srgb, 0, context));
   }

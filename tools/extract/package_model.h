@@ -1,8 +1,5 @@
 #pragma once
-#include <cstdint>
 
-#include "delivery/cpp/package/package_reader.h"
-#include "tools/render/plane_pixels.h"
 #include "tools/render/rendered_model.h"
 
 namespace texmesh {

@@ -1,7 +1,4 @@
 #pragma once
-#include <cstdint>
-#include <string>
-#include <vector>
 
 #include "delivery/cpp/package/package_reader.h"
 #include "pipeline/import/import.h"

@@ -1,10 +1,13 @@
 #pragma once
-#include <string>
+
+#include "delivery/cpp/package/package_reader.h"
+#include "format/base/finding.h"
+#include "pipeline/io/record.h"
 
 namespace texmesh {
 
 struct UnpackOptions {
-  bool fragment_files = false;  // also every fragment as a complete JPEG (fragment_files.h)
+  bool fragment_files = false;  // also every fragment as a complete JPEG
   bool force = false;  // replace a folder that holds an unpacked package; any other folder is refused even so
 };
 
@@ -18,5 +21,43 @@ void unpack_package(const std::string& package, const std::string& folder, const
 /// from them. A content credential stays the last entry. Throws FormatError when a file is missing, too many,
 /// or not what its digest says.
 void pack_folder(const std::string& folder, const std::string& package);
+
+/// A tree made with `unpack --fragments files` holds, beside the entries of the package, every fragment as a
+/// complete image file (fragment_file_path) for servers without Range requests, and this index of them
+/// (schemas/fragments.v1.schema.json). Neither is part of the package: `pack` leaves them out again.
+inline constexpr const char* kFragmentIndexPath = "fragments.json";
+
+/// Bytes and digests of the fragment files of one package, in the order in which a client wants them.
+struct FragmentIndex {
+  struct Rung {
+    std::vector<std::uint64_t> bytes;  // per fragment of the plane's order: of the complete file; 0 = no file
+    std::vector<std::string> digests;  // its SHA-256's first 8 bytes, 16 lower-case digits; zeros = no file
+    static void fields(auto& s, auto&& v) {
+      v("bytes", s.bytes, Range{0, 4294967296.0}, "");
+      v("sha256", s.digests, "");
+    }
+  };
+  struct Plane {
+    std::vector<std::uint16_t> order;  // as PlaneTables::order
+    std::vector<Rung> rungs;
+    static void fields(auto& s, auto&& v) {
+      v("order", s.order, "");
+      v("rungs", s.rungs, "");
+    }
+  };
+  std::vector<Plane> planes;
+  static void fields(auto& s, auto&& v) {
+    v("version", Constant{1}, "");
+    v("planes", s.planes, "");
+  }
+};
+/// Strict; FormatError names the JSON pointer.
+FragmentIndex read_fragment_index(std::span<const std::uint8_t> json);
+
+/// Every fragment file of a tree against the index and against the tree's own rung entries: all there, none
+/// besides, bytes and digests as stated, contents equal. Findings of check "fragment-file".
+void check_fragment_files(PackageStore& folder, const std::vector<ContainerEntry>& listed,
+                          const std::vector<TextureInfo>& textures, const PackageTables& tables,
+                          Findings& findings);
 
 }  // namespace texmesh

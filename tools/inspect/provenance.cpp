@@ -3,57 +3,12 @@
 #include <nlohmann/json.hpp>
 
 #include "format/base/bounded_json.h"
-#include "pipeline/compile/option_fields.h"
+#include "pipeline/compile/options.h"
 
 namespace texmesh {
 namespace {
 
 constexpr const char* kDocument = "provenance.json";
-constexpr Range kNotEmptyText{1, 1e6};
-
-struct FormatVersion {
-  int major = 0, minor = 0;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
-    v("major", s.major, Range{0, 65535}, "");
-    v("minor", s.minor, Range{0, 65535}, "");
-  }
-};
-
-}  // namespace
-
-template <>
-struct RecordFields<Provenance::Input> {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
-    v("role", s.role, FieldRule{.words = "model|file"}, "");
-    v("uri", s.uri, kMayMiss, "as the model refers to the file");
-    v("sha256", s.sha256, FieldRule{.pattern = "^[0-9a-f]{64}$"}, "");
-    v("bytes", s.bytes, Range{0, 9007199254740992.0}, "");
-  }
-};
-
-namespace {
-
-struct ProvenanceDocument {
-  std::string tool;
-  FormatVersion format;
-  std::vector<Provenance::Input> inputs;
-  Json options;
-  std::map<std::string, int> stages;
-  std::map<std::string, std::string> libraries;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
-    v("version", Constant{1}, "");
-    v("tool", s.tool, kNotEmptyText, "name and version of what made the package");
-    v("format", s.format, "");
-    v("inputs", s.inputs, FieldRule{.count = Range{1, 1e6}}, "the model, then the files that it refers to");
-    v("options", s.options, "every option, after defaults, as a profile (profile.v1)");
-    v("stages", s.stages, Range{0, 1 << 30}, "stage name: version");
-    v("libraries", s.libraries, kNotEmptyText, "library that can change bytes: version");
-  }
-};
-
 [[noreturn]] void fail_provenance(const std::string& place, const std::string& expected, const Json& found) {
   throw FormatError(kDocument, place, expected, found.is_null() ? "nothing" : found.dump().substr(0, 80));
 }
@@ -82,16 +37,9 @@ void check_options(const Json& options) {
 
 Provenance read_provenance(std::span<const std::uint8_t> json) {
   try {
-    auto document = from_json<ProvenanceDocument>(parse_bounded_json(json, kDocument), kDocument);
-    check_inputs(document.inputs);
-    check_options(document.options);
-    Provenance p;
-    p.tool = std::move(document.tool);
-    p.format_major = document.format.major, p.format_minor = document.format.minor;
-    p.inputs = std::move(document.inputs);
-    p.options = std::make_shared<const Json>(std::move(document.options));
-    p.stages = std::move(document.stages);
-    p.libraries = std::move(document.libraries);
+    auto p = from_json<Provenance>(parse_bounded_json(json, kDocument), kDocument);
+    check_inputs(p.inputs);
+    check_options(*p.options);
     return p;
   } catch (const InputError& e) {  // the package is to blame
     throw FormatError(e.file(), e.place(), e.expected(), e.found());

@@ -1,15 +1,15 @@
 #pragma once
-#include <cstdint>
-#include <string>
-#include <vector>
 
-#include "format/base/box.h"
+#include "delivery/cpp/package/package_reader.h"
+#include "format/base/vec.h"
 #include "format/model/model.h"
 #include "pipeline/import/import.h"
+#include "stages/render/environment.h"
 #include "stages/render/render_texture.h"
-#include "stages/render/visibility.h"
 
 namespace texmesh {
+
+class PlaneStreams;
 
 /// What a texture of a RenderedModel is made from: an image, read as colours (sRGB) or as plain numbers.
 struct TextureImage {
@@ -52,5 +52,59 @@ RenderedModel load_rendered_model(const std::string& path, const ImportOptions& 
 
 /// Base colours alone: every material becomes unlit.
 void make_unlit(RenderedModel& model);
+
+/// Lights that can be asked for by name.
+enum class RenderLight : std::uint8_t {
+  kStudio,  // that of all measurements
+  kWhite    // radiance 1 from everywhere, no key light
+};
+RenderEnvironment environment_of(RenderLight light, const RunContext& context);
+
+inline constexpr int kMaxSheetViews = 64;
+inline constexpr std::uint32_t kMaxSheetSide = 16384;  // px
+
+/// One view of a sheet.
+struct SheetView {
+  RenderCamera camera;                    // in the mesh's local frame
+  std::uint32_t covered_px = 0;           // pixels that show the object
+  std::uint32_t left_px = 0, top_px = 0;  // where it stands
+};
+
+/// Views of a model in one picture, row by row on a grid as square as they allow.
+struct PictureSheet {
+  Pixels pixels;  // RGB, sRGB encoded
+  std::uint32_t columns = 0, rows = 0;
+  std::vector<SheetView> views;
+};
+
+/// `count` views, each `side_px` square, from directions spread evenly over the sphere; a single one shows
+/// the front from its right, a little from above. Cells that are left over show the background.
+/// std::invalid_argument for a count outside 1..kMaxSheetViews and for a sheet wider than kMaxSheetSide. Same
+/// bytes for any thread count.
+PictureSheet render_sheet(const RenderedModel& model, const RenderEnvironment& environment, int count,
+                          std::uint32_t side_px, const RunContext& context);
+
+/// Copies `picture` into the sheet, which has as many channels and room for it there.
+void paste(const Pixels& picture, std::uint32_t left_px, std::uint32_t top_px, Pixels& sheet);
+
+/// What stands where nothing does, sRGB encoded.
+std::array<std::uint8_t, 3> background_colour(const RenderEnvironment& environment);
+
+/// How many views stand side by side.
+std::uint32_t sheet_columns(int count);
+
+/// A plane put together again from all its fragments at one rung: width x height texels without the
+/// fragments' overhang. What is not stored (nobody sees it) continues its neighbours smoothly, so that
+/// smaller copies show no seams. Reads the rung as one entry, digest checked. FormatError when the package is
+/// damaged or the plane has more than 4e8 texels. Same result for any thread count.
+Pixels read_plane(PackageReader& package, std::uint32_t plane, std::uint32_t rung, const RunContext& context);
+
+/// Decodes fragments of a plane, of those that `streams` has, into their places in it. FormatError naming
+/// `rung_path` for a fragment of another size.
+void decode_fragments(const TextureInfo& info, const std::string& rung_path, const PlaneStreams& streams,
+                      std::span<const std::uint16_t> fragments, Pixels& plane, const RunContext& context);
+
+/// InputError where no plane of the package has that rung. kBestRung is always there.
+void require_rung(PackageReader& package, std::uint32_t rung);
 
 }  // namespace texmesh

@@ -1,16 +1,14 @@
 #include "delivery/cpp/client/delivery_plan.h"
 
 #include <algorithm>
-#include <cmath>
-
-#include "format/rules/proxy_choice.h"
 
 namespace texmesh {
 namespace {
 
 constexpr double kWorthwhileFlip = 1e-4;  // a coarser scale must look better, not only as good
 
-void rate_textures(PackageReader& package, const FragmentList& list, DeliveryPlan& plan) {
+/// Of the textures' rungs in the plan.
+void rate(PackageReader& package, double displayed_px, const FragmentList& list, DeliveryPlan& plan) {
   double weight = 0, mean = 0;
   plan.worst_quality = list.offers.empty() ? 100 : 1e9;
   for (std::size_t i = 0; i < list.offers.size(); ++i) {
@@ -23,9 +21,6 @@ void rate_textures(PackageReader& package, const FragmentList& list, DeliveryPla
     plan.worst_quality = std::min(plan.worst_quality, quality);
   }
   plan.mean_quality = list.offers.empty() ? 100 : weight > 0 ? mean / weight : 0;
-}
-
-void predict(PackageReader& package, double displayed_px, const FragmentList& list, DeliveryPlan& plan) {
   const PerGroup losses = losses_of(list, plan.textures.rungs);
   plan.group_weights = list.group_weights;
   plan.texture_flip = texture_flip(package.quality(), losses);
@@ -82,15 +77,6 @@ DeliveryPlan timed_plan_of_proxy(const Manifest& m, const DeliveryRequest& reque
 /// The smallest proxy is shown first, whatever it takes.
 bool proxy_fits(const Manifest& m, const DeliveryRequest& request, std::size_t proxy) {
   return proxy == 0 || static_cast<double>(gpu_proxy(m.proxies[proxy]).all()) <= request.memory_bytes;
-}
-
-/// A proxy that no one can tell from S_0, in the time.
-std::optional<DeliveryPlan> serving_plan(const Manifest& m, const DeliveryRequest& request) {
-  const std::optional<std::size_t> proxy = proxy_instead(m, request);
-  if (!proxy) return std::nullopt;
-  DeliveryPlan plan = timed_plan_of_proxy(m, request, *proxy);
-  if (plan.complete_s > request.time_limit_s) return std::nullopt;
-  return plan;
 }
 
 /// What the first request has shown, bytes/s.
@@ -192,8 +178,7 @@ DeliveryPlan plan_at_scale(TextureLoss& loss, const DeliveryRequest& request, in
     plan.complete_s = plan.mesh_s + plan.textures.end_s;
   }
   plan.texture_bytes = plan.textures.bytes;
-  rate_textures(package, list, plan);
-  predict(package, request.displayed_px, list, plan);
+  rate(package, request.displayed_px, list, plan);
   if (!std::isfinite(plan.first_picture_s)) plan.flip = plan.texture_flip = 1;
   return plan;
 }
@@ -269,11 +254,10 @@ FragmentList list_of(PackageReader& package, const DeliveryRequest& request, con
 DeliveryPlan plan_delivery(PackageReader& package, const DeliveryRequest& request) {
   const Manifest& m = package.manifest();
   const bool printed = request.htc.policy == Policy::kThesis, only = request.scale >= 0 || printed;
-  if (!printed)
-    if (std::optional<DeliveryPlan> serving = serving_plan(m, request)) {
-      count_memory(package, request, *serving);
-      return *serving;
-    }
+  if (const auto proxy = printed ? std::nullopt : proxy_instead(m, request)) {
+    DeliveryPlan serving = timed_plan_of_proxy(m, request, *proxy);
+    if (serving.complete_s <= request.time_limit_s) return count_memory(package, request, serving), serving;
+  }
   const int asked = wanted_scale(package, request);
   const int wanted = only ? asked : scale_within(m.scales, asked, request.memory_bytes);
   TextureLoss loss(package, request.displayed_px);
@@ -329,8 +313,7 @@ DeliveryPlan plan_budget(PackageReader& package, const DeliveryRequest& request,
     plan.textures.rungs = budget.rungs;
     plan.textures.bytes = budget.bytes;
     plan.textures.skipped = static_cast<std::uint32_t>(std::ranges::count(budget.rungs, -1));
-    rate_textures(package, budget.list, plan);
-    predict(package, request.displayed_px, budget.list, plan);
+    rate(package, request.displayed_px, budget.list, plan);
     if (fixed > bytes)
       plan.warnings.push_back("mesh and tables alone take " + std::to_string(fixed) + " bytes");
     take_better(std::move(plan), bytes, best);

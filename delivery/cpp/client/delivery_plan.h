@@ -1,13 +1,6 @@
 #pragma once
-#include <functional>
-#include <limits>
-#include <optional>
-#include <string>
-#include <vector>
 
-#include "delivery/cpp/decide/gpu_memory.h"
 #include "delivery/cpp/decide/texture_budget.h"
-#include "delivery/cpp/simulate/network_model.h"
 #include "delivery/cpp/simulate/simulation.h"
 #include "format/rules/proxy_choice.h"
 #include "format/rules/viewing.h"
@@ -27,7 +20,8 @@ struct DeliveryRequest {
   std::function<SimulationResult(int scale, const std::vector<FragmentOffer>& offers, const HtcOptions& htc,
                                  const NetworkOptions& network)>
       play;
-  /// GPU memory for mesh and textures, see gpu_memory.h. What is least takes its place where nothing fits.
+  /// GPU memory for mesh and textures, see texture_budget.h. What is least takes its place where nothing
+  /// fits.
   double memory_bytes = std::numeric_limits<double>::infinity();
   bool proxy_steps = true;  // a larger proxy may be shown on the way, see format/rules/proxy_choice.h
 };

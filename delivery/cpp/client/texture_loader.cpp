@@ -1,10 +1,6 @@
 #include "delivery/cpp/client/texture_loader.h"
 
 #include <algorithm>
-#include <map>
-#include <utility>
-
-#include "format/base/bytes.h"
 
 namespace texmesh {
 namespace {
@@ -49,8 +45,8 @@ void join(FragmentOffer& all, const FragmentOffer& one) {
 /// The upgrades that are left, asked for in order with a few requests in flight.
 class UpgradeSource final : public RequestSource {
  public:
-  using Parts = std::function<std::vector<PackagePart>(std::uint32_t, std::int32_t)>;
-  using Accept = std::function<bool(std::uint32_t, std::int32_t, const Transport::Outcome&)>;
+  using Parts = PlanSource::Parts;
+  using Accept = PlanSource::Accept;
   UpgradeSource(std::vector<Upgrade> upgrades, std::size_t offers, std::uint64_t bytes, int window,
                 Parts parts, Accept accept)
       : upgrades_(std::move(upgrades)),
@@ -241,7 +237,7 @@ bool TextureLoader::keep_sound_fragments(const Wanted& w, std::int32_t rung,
       if (range.bytes == 0) continue;
       good = part < outcome.parts.size() && outcome.parts[part].size() == asked[part].range.bytes;
       if (!good) break;
-      const auto stream = std::span<const std::uint8_t>(outcome.parts[part])
+      const auto stream = ByteSpan(outcome.parts[part])
                               .subspan(static_cast<std::size_t>(range.offset - asked[part].range.offset),
                                        static_cast<std::size_t>(range.bytes));
       ++part;

@@ -1,12 +1,7 @@
 #pragma once
-#include <functional>
-#include <map>
-#include <string>
-#include <vector>
 
 #include "delivery/cpp/decide/fragment_list.h"
 #include "delivery/cpp/simulate/simulation.h"
-#include "delivery/cpp/transfer/transfer.h"
 
 namespace texmesh {
 
@@ -16,7 +11,7 @@ struct LoadedFragment {
   std::int32_t rung = 0;
   /// The rung's stream. Of incremental codecs: the streams of all rungs above the rung held before, up to
   /// `rung`.
-  std::vector<std::vector<std::uint8_t>> streams;
+  std::vector<Bytes> streams;
 };
 
 struct LoadOptions {

@@ -1,7 +1,6 @@
 #include "delivery/cpp/decide/fragment_list.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "format/rules/allocation.h"
 #include "format/rules/size_curve.h"
@@ -49,18 +48,11 @@ void add_fragment(const PlaneTables& t, const TextureLoss::Plane& losses, const 
   list.offers.push_back(std::move(o));
 }
 
-struct QualityLimits {
-  double low = 0, high = 100;
-};
-
-/// dQ is the tolerance on both sides of Q_i (3.3.3).
-QualityLimits quality_limits(const PlaneTables& t, std::size_t row, const ListOptions& options) {
-  QualityLimits limits{options.quality_low, options.quality_high};
-  if (!options.thesis) return limits;
+/// The least and the highest. dQ is the tolerance on both sides of Q_i (3.3.3).
+std::pair<double, double> quality_limits(const PlaneTables& t, std::size_t row, const ListOptions& options) {
+  if (!options.thesis) return {options.quality_low, options.quality_high};
   const auto middle = static_cast<double>(t.quality[row]), width = static_cast<double>(t.quality_width);
-  limits.low = std::max(limits.low, middle - width);
-  limits.high = std::min(limits.high, middle + width);
-  return limits;
+  return {std::max(options.quality_low, middle - width), std::min(options.quality_high, middle + width)};
 }
 
 /// F-bar, the fragment nearest to Gamma, is sent at Q_i itself.
@@ -81,8 +73,8 @@ void add_plane(TextureLoss& loss, const PlaneEntry& entry, const ListOptions& op
   const std::vector<float> eta = eta_of(t, row);
   const double gamma = options.gamma < 0 ? mean_eta(t, row) : options.gamma;
   const std::vector<float> quality = quality_of(t, row, gamma);
-  const QualityLimits limits = quality_limits(t, row, options);
-  const std::uint16_t low = limit_rung(t, limits.low, true), high = limit_rung(t, limits.high, false);
+  const auto [least, highest] = quality_limits(t, row, options);
+  const std::uint16_t low = limit_rung(t, least, true), high = limit_rung(t, highest, false);
   for (const std::uint16_t f : t.order) {
     FragmentOffer o;
     bool stored = true;

@@ -1,11 +1,7 @@
 #pragma once
-#include <cstdint>
-#include <span>
-#include <vector>
 
-#include "delivery/cpp/decide/fragment_offer.h"
+#include "delivery/cpp/decide/harmonic_time.h"
 #include "delivery/cpp/decide/texture_loss.h"
-#include "delivery/cpp/package/package_reader.h"
 
 namespace texmesh {
 

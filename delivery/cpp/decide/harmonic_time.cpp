@@ -2,12 +2,28 @@
 
 #include <algorithm>
 #include <cmath>
+#include <queue>
 #include <stdexcept>
 
 #include "format/base/portable_math.h"
 
 namespace texmesh {
 namespace {
+
+constexpr std::size_t kRing = 64;  // samples of throughput that are kept
+
+/// The upgrade that saves most loss per byte, from this rung on; gain 0 when none saves any.
+Upgrade best_upgrade(const FragmentOffer& f, std::uint32_t offer, std::int32_t rung, bool incremental) {
+  Upgrade best{offer, rung, 0, 0};
+  std::uint64_t bytes = 0;
+  for (std::size_t r = static_cast<std::size_t>(rung + 1); r < f.bytes.size(); ++r) {
+    bytes = incremental ? bytes + f.bytes[r] : f.bytes[r];
+    const double gain =
+        (f.loss[static_cast<std::size_t>(rung + 1)] - f.loss[r + 1]) / static_cast<double>(bytes);
+    if (gain > best.gain_per_byte) best = {offer, static_cast<std::int32_t>(r), bytes, gain};
+  }
+  return best;
+}
 
 constexpr double kWindowFactor = 1.5;  // of throughput x round trip
 constexpr std::uint32_t kMostInFlight = 64;
@@ -101,6 +117,63 @@ std::unique_ptr<TransferPolicy> policy_of(const HtcOptions& o) {
 
 }  // namespace
 
+std::vector<Upgrade> upgrades_in_order(const std::vector<FragmentOffer>& offers,
+                                       const std::vector<std::int32_t>& rungs, bool incremental) {
+  const auto later = [](const Upgrade& a, const Upgrade& b) {
+    return a.gain_per_byte != b.gain_per_byte ? a.gain_per_byte < b.gain_per_byte : a.offer > b.offer;
+  };
+  std::priority_queue<Upgrade, std::vector<Upgrade>, decltype(later)> heap(later);
+  const auto push = [&](std::uint32_t offer, std::int32_t rung) {
+    const Upgrade u = best_upgrade(offers[offer], offer, rung, incremental);
+    if (u.gain_per_byte > 0) heap.push(u);
+  };
+  for (std::uint32_t i = 0; i < offers.size(); ++i) push(i, rungs[i]);
+  std::vector<Upgrade> order;
+  while (!heap.empty()) {
+    order.push_back(heap.top());
+    heap.pop();
+    push(order.back().offer, order.back().rung);
+  }
+  return order;
+}
+
+Throughput::Throughput(double initial_bytes_s)
+    : initial_bytes_s_(initial_bytes_s), ring_(kRing), start_bytes_s_(initial_bytes_s) {}
+
+void Throughput::add(double bytes, double seconds, const OtherTransfers& others) {
+  const Sample sample{bytes, std::max(seconds, kLeastSeconds)};
+  ring_[count_++ % kRing] = sample;
+  const Sample before = sums_.empty() ? Sample{} : sums_.back();
+  sums_.push_back({before.bytes + sample.bytes, before.seconds + sample.seconds});
+  starting_ = starting_ && count_ <= others.count;
+  const Sample all = sums_.back();
+  start_bytes_s_ =
+      std::clamp(initial_bytes_s_, all.bytes / all.seconds, (all.bytes + others.bytes) / all.seconds);
+}
+
+double Throughput::recent_bytes_s(std::size_t samples) const {
+  const std::size_t n = std::min({samples, count_, kRing});
+  if (n == 0 || starting_) return start_bytes_s_;
+  double bytes = 0, seconds = 0;
+  for (std::size_t i = 1; i <= n; ++i) {
+    const Sample& s = ring_[(count_ - i) % kRing];
+    bytes += s.bytes;
+    seconds += s.seconds;
+  }
+  return bytes / seconds;
+}
+
+double Throughput::mean_bytes_s(double seconds) const {
+  const Sample all = sums_.empty() ? Sample{} : sums_.back();
+  const double from = all.seconds - seconds;
+  if (from <= 0) return (all.bytes - from * initial_bytes_s_) / seconds;
+  const auto cut = std::upper_bound(sums_.begin(), sums_.end() - 1, from,
+                                    [](double s, const Sample& sum) { return s < sum.seconds; });
+  const Sample before = cut == sums_.begin() ? Sample{} : cut[-1];
+  const double part = (cut->seconds - from) / (cut->seconds - before.seconds);
+  return (all.bytes - cut->bytes + part * (cut->bytes - before.bytes)) / seconds;
+}
+
 HarmonicTimePlan::HarmonicTimePlan(std::vector<FragmentOffer> offers, const HtcOptions& options)
     : offers_(std::move(offers)),
       options_(options),
@@ -158,7 +231,8 @@ const HtcStep* HarmonicTimePlan::next(double now_s) {
     step.position = static_cast<std::uint32_t>(position);
     step.offer = offer;
     step.credit_s = credit;
-    step.theta_s = theta_of(offer) + credit;
+    step.theta_s =
+        (options_.time_limit_s - latency_s_) * (planned_[offer] / policy_->list_bytes(*this)) + credit;
     step.throughput_bytes_s = throughput_bytes_s();
     step.target_bytes = policy_->target_bytes(*this, offer, step.theta_s, now_s);
     step.rung = policy_->rung(*this, offer, step.target_bytes, now_s);
@@ -201,10 +275,6 @@ void HarmonicTimePlan::remove_from_list(std::uint32_t offer) {
   planned_left_ -= planned_[offer];
   smallest_left_ -= f.bytes[lowest(f, false)];
   low_left_ -= f.bytes[lowest(f, true)];
-}
-
-double HarmonicTimePlan::theta_of(std::uint32_t offer) const {
-  return (options_.time_limit_s - latency_s_) * (planned_[offer] / policy_->list_bytes(*this));
 }
 
 // credit_i: the share 1 / (chi zeta), chi = 2 for the position after the last issued one, of every dT so far.

@@ -5,9 +5,6 @@
 #include <memory>
 #include <vector>
 
-#include "delivery/cpp/decide/fragment_offer.h"
-#include "delivery/cpp/decide/throughput.h"
-
 namespace texmesh {
 
 // Harmonic Time Compensation (thesis ch. 4 and Appendix A, as corrected): a list of fragments is transferred
@@ -18,6 +15,62 @@ namespace texmesh {
 //
 // The plan does no I/O and reads no clock: the caller gives the time. The arithmetic is plain doubles and
 // format/base/portable_math.h, so C++ and TypeScript decide the same, bit for bit (delivery/vectors).
+
+/// One fragment as the plan sees it.
+struct FragmentOffer {
+  std::vector<std::uint32_t> bytes;  // by rung, lowest first; at least one, all > 0
+  std::vector<double> loss;  // [rungs + 1]: what is lost when it is skipped, then by rung; any unit, >= 0
+  double eta = 0;            // feature density times weights; orders the list
+  double planned_bytes = 0;  // d_g > 0: what it gets by Eq. 3.2
+  std::uint16_t low_rung = 0, high_rung = 0xffff;  // limits of quality, see HtcOptions::hard_limits
+};
+
+/// What may be fetched after the deadline: upgrades of fragments in order of loss saved per byte, each from
+/// the rung before. `rungs` by offer, -1 = skipped. With `incremental` rungs (each continues the one below)
+/// only the missing bytes count.
+struct Upgrade {
+  std::uint32_t offer = 0;
+  std::int32_t rung = 0;
+  std::uint64_t bytes = 0;
+  double gain_per_byte = 0;
+};
+std::vector<Upgrade> upgrades_in_order(const std::vector<FragmentOffer>& offers,
+                                       const std::vector<std::int32_t>& rungs, bool incremental = false);
+
+/// Other transfers that are under way when one ends.
+struct OtherTransfers {
+  std::size_t count = 0;
+  double bytes = 0;  // of all of them, whatever has arrived already
+};
+
+/// Throughput of a connection or a group of them. Plain double arithmetic: the same bits everywhere.
+class Throughput {
+ public:
+  static constexpr double kLeastSeconds = 1e-9;
+  explicit Throughput(double initial_bytes_s);  // beta_0 > 0, the estimate until there is a sample
+  /// `seconds`: since the end of the transfer before, latency taken off; less than kLeastSeconds counts as
+  /// that. The link's first seconds serve all transfers under way, and what has arrived of `others` is not
+  /// known. So, until more transfers have ended than are under way, the estimate is beta_0, as far as it lies
+  /// between what the link has given if nothing of the others has arrived, and if all of it has.
+  void add(double bytes, double seconds, const OtherTransfers& others = {});
+  /// Bytes over seconds of at most so many samples: a harmonic mean in which large transfers count more,
+  /// since small ones mostly measure latency.
+  double recent_bytes_s(std::size_t samples) const;
+  bool starting() const { return starting_; }  // no more transfers have ended than are under way
+  /// The mean of the last `seconds` > 0 of transfers; what lies before the first counts as beta_0.
+  double mean_bytes_s(double seconds) const;
+
+ private:
+  struct Sample {
+    double bytes = 0, seconds = 0;
+  };
+  double initial_bytes_s_;
+  std::vector<Sample> ring_;  // the newest at (count_ - 1) % size
+  std::vector<Sample> sums_;  // of all samples up to each
+  std::size_t count_ = 0;
+  bool starting_ = true;
+  double start_bytes_s_ = 0;  // the estimate while starting_
+};
 
 class HarmonicTimePlan;
 
@@ -163,7 +216,6 @@ class HarmonicTimePlan {
   double credit_at(std::size_t position) const;
   std::uint32_t choose_offer(double credit) const;
   void remove_from_list(std::uint32_t offer);
-  double theta_of(std::uint32_t offer) const;
   std::size_t lowest(const FragmentOffer& offer, bool limits) const;
   HtcStep& issued(std::uint32_t offer);
   void finish(HtcStep& step, double now_s, bool sample);

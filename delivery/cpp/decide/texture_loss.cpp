@@ -3,8 +3,8 @@
 #include <algorithm>
 
 #include "format/base/errors.h"
-#include "format/rules/mip_choice.h"
-#include "format/rules/rate_distortion.h"
+#include "format/rules/allocation.h"
+#include "format/rules/viewing.h"
 
 namespace texmesh {
 namespace {
@@ -20,10 +20,6 @@ double surface_of(const Manifest& m) {
 double signed_level(PackageReader& package, std::uint32_t base, double displayed_px) {
   const Manifest& m = package.manifest();
   return display_level(package.tables().planes[base], surface_of(m), m.object_height, displayed_px);
-}
-
-double level_for_display(PackageReader& package, std::uint32_t base, double displayed_px) {
-  return std::max(0.0, signed_level(package, base, displayed_px));
 }
 
 double combined(const QualityTable& table, double geometry, const PerGroup& losses) {
@@ -45,8 +41,8 @@ std::vector<PlaneChoice> planes_for_display(PackageReader& package, double displ
   std::vector<PlaneChoice> planes = full_size(package);
   for (PlaneChoice& choice : planes) {
     const auto group = static_cast<std::size_t>(group_of(package.textures()[choice.base].role));
-    choice.plane = plane_at_level(package.textures(), choice.base,
-                                  level_for_display(package, choice.base, displayed_px) + levels[group]);
+    const double level = std::max(0.0, signed_level(package, choice.base, displayed_px));
+    choice.plane = plane_at_level(package.textures(), choice.base, level + levels[group]);
   }
   return planes;
 }

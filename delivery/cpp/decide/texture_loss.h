@@ -1,8 +1,4 @@
 #pragma once
-#include <array>
-#include <cstdint>
-#include <map>
-#include <vector>
 
 #include "delivery/cpp/package/package_reader.h"
 #include "format/rules/picture_prediction.h"

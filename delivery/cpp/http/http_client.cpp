@@ -6,8 +6,6 @@
 #include <charconv>
 #include <chrono>
 #include <map>
-#include <mutex>
-#include <string_view>
 
 namespace texmesh {
 namespace {
@@ -41,9 +39,8 @@ bool starts_with_name(std::string_view line, std::string_view name, std::string_
   for (std::size_t i = 0; i < name.size(); ++i)
     if ((line[i] | 0x20) != name[i]) return false;
   value = line.substr(name.size() + 1);
-  while (!value.empty() && value.front() == ' ') value.remove_prefix(1);
-  while (!value.empty() && (value.back() == '\r' || value.back() == '\n' || value.back() == ' '))
-    value.remove_suffix(1);
+  value.remove_prefix(std::min(value.find_first_not_of(' '), value.size()));
+  value.remove_suffix(value.size() - (value.find_last_not_of("\r\n ") + 1));
   return true;
 }
 
@@ -147,25 +144,6 @@ int look(void* user, curl_off_t, curl_off_t received, curl_off_t, curl_off_t) {
   return 1;
 }
 
-}  // namespace
-
-std::string shown_url(const std::string& url) {
-  const std::size_t scheme = url.find("://");
-  if (scheme == std::string::npos) return url;
-  const std::size_t host = scheme + 3, path = std::min(url.find('/', host), url.size());
-  const std::size_t at = url.rfind('@', path);
-  return at == std::string::npos || at < host ? url : url.substr(0, host) + url.substr(at + 1);
-}
-
-bool is_url(const std::string& text) { return text.starts_with("http://") || text.starts_with("https://"); }
-
-namespace {
-
-void start_curl() {
-  static std::once_flag once;
-  std::call_once(once, [] { ::curl_global_init(CURL_GLOBAL_DEFAULT); });
-}
-
 /// Sets the handle up for a GET; the headers belong to the caller and must live as long as the transfer.
 curl_slist* prepare(Transfer& transfer, const std::string& url) {
   CURL* h = transfer.handle;
@@ -216,6 +194,16 @@ void conclude(Transfer& transfer, CURLcode rc) {
 }
 
 }  // namespace
+
+std::string shown_url(const std::string& url) {
+  const std::size_t scheme = url.find("://");
+  if (scheme == std::string::npos) return url;
+  const std::size_t host = scheme + 3, path = std::min(url.find('/', host), url.size());
+  const std::size_t at = url.rfind('@', path);
+  return at == std::string::npos || at < host ? url : url.substr(0, host) + url.substr(at + 1);
+}
+
+bool is_url(const std::string& text) { return text.starts_with("http://") || text.starts_with("https://"); }
 
 bool is_same_file(const HttpAnswer& a, const std::string& etag, std::uint64_t total) {
   if (!a.etag.empty() && !etag.empty()) return a.etag == etag;
@@ -276,7 +264,7 @@ struct HttpPool::State {
 
 HttpPool::HttpPool(const HttpOptions& options, int connections_per_server)
     : state_(std::make_unique<State>()) {
-  start_curl();
+  [[maybe_unused]] static const CURLcode started = ::curl_global_init(CURL_GLOBAL_DEFAULT);
   state_->multi = ::curl_multi_init();
   state_->options = options;
   ::curl_multi_setopt(state_->multi, CURLMOPT_MAX_HOST_CONNECTIONS,
@@ -309,13 +297,12 @@ const HttpAnswer* HttpPool::so_far(std::uint64_t number) const {
 }
 
 std::optional<HttpPool::Ended> HttpPool::wait(double seconds) {
-  const auto start = std::chrono::steady_clock::now();
+  const Clock::time_point start = Clock::now();
   for (;;) {
     int active = 0;
     ::curl_multi_perform(state_->multi, &active);
     if (auto ended = state_->ended()) return ended;
-    const std::chrono::duration<double> gone = std::chrono::steady_clock::now() - start;
-    const double left_ms = 1000 * (seconds - gone.count());
+    const double left_ms = 1000 * (seconds - seconds_since(start));
     if (left_ms <= 0 || idle()) return std::nullopt;
     ::curl_multi_poll(state_->multi, nullptr, 0, static_cast<int>(std::clamp(left_ms, 1.0, kMostPoll_ms)),
                       nullptr);

@@ -1,10 +1,9 @@
 #pragma once
-#include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
-#include <string>
-#include <vector>
+
+#include "format/base/bytes.h"
 
 namespace texmesh {
 
@@ -29,7 +28,7 @@ bool is_url(const std::string& text);
 struct HttpAnswer {
   long status = 0;  // 0: no answer at all, see `problem`
   std::string problem;
-  std::vector<std::uint8_t> body;
+  Bytes body;
   std::string etag;                                 // strong ones only
   std::optional<std::uint64_t> first, last, total;  // of Content-Range; total of a 200: Content-Length
   bool complete = false;                            // the body ended as the server said it would

@@ -3,20 +3,17 @@
 #include <algorithm>
 #include <chrono>
 #include <iterator>
-#include <map>
-#include <optional>
 #include <thread>
-#include <utility>
 
 #include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "format/container/container.h"
 #include "format/container/layout.h"
-#include "format/documents/entry_ref.h"
+#include "format/documents/index.h"
 #include "format/documents/manifest.h"
 
-// How a package is read from web servers, from the bottom up. HttpRetries counts the tries of a request, and
-// HttpLink holds the connections that all readers of a package share. HttpSource reads ranges of a container,
+// How a package is read from web servers, from the bottom up. All readers of a package share the connections
+// of one HttpPool. HttpRetries counts the tries of a request. HttpSource reads ranges of a container,
 // HttpTree whole files of a tree. UrlStore finds out which of these the servers can serve, and changes from
 // the one to the other when a server stops answering ranges.
 namespace texmesh {
@@ -54,13 +51,6 @@ class HttpRetries {
   double delay_s_;
 };
 
-/// What all that read from one set of servers share.
-struct HttpLink {
-  explicit HttpLink(const HttpOptions& o) : options(o), pool(o, kConnections) {}
-  HttpOptions options;
-  HttpPool pool;
-};
-
 /// A server that has answered ranges answers 200 for one, and the file is still the same.
 class RangesEnded : public InputError {
  public:
@@ -71,8 +61,8 @@ class RangesEnded : public InputError {
 class HttpSource final : public ByteSource {
  public:
   /// `first`: the answer of urls[0] to a request for the first kStartBytes, or a part of it.
-  HttpSource(std::vector<std::string> urls, std::shared_ptr<HttpLink> link, HttpAnswer first)
-      : urls_(std::move(urls)), link_(std::move(link)) {
+  HttpSource(std::vector<std::string> urls, std::shared_ptr<HttpPool> pool, HttpAnswer first)
+      : urls_(std::move(urls)), pool_(std::move(pool)) {
     check_range(first, 0, kStartBytes);
     const std::uint64_t bytes = std::min(kStartBytes, *total_);
     if (first.complete && first.body.size() != bytes)
@@ -114,9 +104,9 @@ class HttpSource final : public ByteSource {
     if (offset > *total_ || bytes > *total_ - offset)
       throw FormatError(name(), "byte " + std::to_string(offset), std::to_string(bytes) + " bytes",
                         "a file of " + std::to_string(*total_) + " bytes");
-    if (bytes > link_->options.max_whole_bytes)
+    if (bytes > pool_->options().max_whole_bytes)
       throw InputError(name(), "byte " + std::to_string(offset),
-                       "at most " + std::to_string(link_->options.max_whole_bytes) + " bytes from a server",
+                       "at most " + std::to_string(pool_->options().max_whole_bytes) + " bytes from a server",
                        std::to_string(bytes));
   }
   /// `pieces` with the parts of a range that are not known, behind them. Where the last piece ends near the
@@ -168,26 +158,26 @@ class HttpSource final : public ByteSource {
   void fetch(std::vector<Piece> pieces) {
     const auto store_all = [&] {
       for (std::size_t i = 0; i < pieces.size(); ++i) {
-        link_->pool.cancel(i);
+        pool_->cancel(i);
         store(pieces[i].offset, std::move(pieces[i].got));
       }
     };
     try {
       for (std::size_t i = 0; i < pieces.size(); ++i) {
-        pieces[i].retries.emplace(link_->options);
+        pieces[i].retries.emplace(pool_->options());
         start(i, pieces[i]);
       }
-      while (auto ended = link_->pool.wait(kRequestWait_s)) {
-        Piece& piece = pieces[static_cast<std::size_t>(ended->number)];
+      while (auto ended = pool_->wait(kRequestWait_s)) {
+        Piece& piece = pieces[ended->number];
         const std::size_t asked_of = at_;
         if (accept(piece, ended->answer)) continue;
         if (at_ != asked_of)  // another server for what is left
           for (std::size_t i = 0; i < pieces.size(); ++i) {
-            if (&pieces[i] == &piece || !link_->pool.so_far(i)) continue;
-            link_->pool.cancel(i);
+            if (&pieces[i] == &piece || !pool_->so_far(i)) continue;
+            pool_->cancel(i);
             start(i, pieces[i]);
           }
-        start(static_cast<std::size_t>(ended->number), piece);
+        start(ended->number, piece);
       }
     } catch (...) {
       store_all();
@@ -197,7 +187,7 @@ class HttpSource final : public ByteSource {
   }
   void start(std::size_t number, const Piece& p) {
     const std::uint64_t bytes = p.bytes - p.got.size();
-    link_->pool.start(number, urls_[at_], HttpRange{p.offset + p.got.size(), bytes}, bytes);
+    pool_->start(number, urls_[at_], HttpRange{p.offset + p.got.size(), bytes}, bytes);
   }
   /// Takes an answer. False: the piece is not complete and must be asked for again.
   bool accept(Piece& p, HttpAnswer& a) {
@@ -206,7 +196,7 @@ class HttpSource final : public ByteSource {
     if (a.status == 206 && (a.complete || !a.body.empty())) {
       check_range(a, at, p.bytes - p.got.size());
       p.got.insert(p.got.end(), a.body.begin(), a.body.end());
-      if (a.body.size() >= kProgressBytes) p.retries.emplace(link_->options);
+      if (a.body.size() >= kProgressBytes) p.retries.emplace(pool_->options());
       if (p.got.size() == p.bytes) return true;
       if (a.complete)
         throw FormatError(name(), place, std::to_string(p.bytes) + " bytes", std::to_string(p.got.size()));
@@ -217,7 +207,7 @@ class HttpSource final : public ByteSource {
     if (at_ + 1 < urls_.size() && a.problem != "cancelled") {
       ++at_;
       etag_.clear();
-      p.retries.emplace(link_->options);
+      p.retries.emplace(pool_->options());
       return false;
     }
     if (a.status == 200 && is_same_file(a, etag_, *total_))
@@ -245,7 +235,7 @@ class HttpSource final : public ByteSource {
 
   std::vector<std::string> urls_;
   std::size_t at_ = 0;  // the server that is asked
-  std::shared_ptr<HttpLink> link_;
+  std::shared_ptr<HttpPool> pool_;
   std::optional<std::uint64_t> total_;
   std::string etag_;                      // of the server that is asked
   std::map<std::uint64_t, Bytes> parts_;  // by offset, not overlapping
@@ -254,8 +244,8 @@ class HttpSource final : public ByteSource {
 /// Whole files of a tree, from any of its servers.
 class HttpTree {
  public:
-  HttpTree(std::string root, std::shared_ptr<HttpLink> link, bool ranges)
-      : root_(std::move(root)), link_(std::move(link)), ranges_(ranges) {}
+  HttpTree(std::string root, std::shared_ptr<HttpPool> pool, bool ranges)
+      : root_(std::move(root)), pool_(std::move(pool)), ranges_(ranges) {}
   const std::string& root() const { return root_; }
   std::string name() const { return shown_url(root_); }
   void store(const std::string& path, Bytes bytes) { files_[path] = std::move(bytes); }
@@ -274,15 +264,15 @@ class HttpTree {
   /// Fetches all of these at once but those that are here.
   void fetch(std::vector<Wanted> wanted) {
     std::erase_if(wanted, [&](const Wanted& w) { return files_.contains(w.path); });
-    std::vector<HttpRetries> retries(wanted.size(), HttpRetries(link_->options));
+    std::vector<HttpRetries> retries(wanted.size(), HttpRetries(pool_->options()));
     try {
       for (std::size_t i = 0; i < wanted.size(); ++i) {
         if (!is_valid_entry_path(wanted[i].path))
           throw FormatError(name(), wanted[i].path, "a path within the package", "another");
         start(i, wanted[i]);
       }
-      while (auto ended = link_->pool.wait(kRequestWait_s)) {
-        const auto i = static_cast<std::size_t>(ended->number);
+      while (auto ended = pool_->wait(kRequestWait_s)) {
+        const auto i = ended->number;
         HttpAnswer& a = ended->answer;
         if (accept(wanted[i], a)) {
           store(wanted[i].path, std::move(wanted[i].got));
@@ -291,13 +281,13 @@ class HttpTree {
         if (a.too_long)
           throw FormatError(name(), wanted[i].path,
                             "at most " + std::to_string(wanted[i].max_bytes) + " bytes", "more");
-        if (a.body.size() >= kProgressBytes && ranges_) retries[i] = HttpRetries(link_->options);
+        if (a.body.size() >= kProgressBytes && ranges_) retries[i] = HttpRetries(pool_->options());
         if (!may_retry(a) || !retries[i].wait(a))
           throw InputError(name() + wanted[i].path, "", "a file", describe_answer(a));
         start(i, wanted[i]);
       }
     } catch (...) {
-      for (std::size_t i = 0; i < wanted.size(); ++i) link_->pool.cancel(i);
+      for (std::size_t i = 0; i < wanted.size(); ++i) pool_->cancel(i);
       throw;
     }
   }
@@ -306,7 +296,7 @@ class HttpTree {
   void start(std::size_t number, const Wanted& w) {
     const std::uint64_t have = w.got.size();
     const HttpRange rest{have, w.max_bytes - have, true};  // all of it where it was replaced
-    link_->pool.start(number, root_ + w.path, have > 0 ? std::optional(rest) : std::nullopt, w.max_bytes);
+    pool_->start(number, root_ + w.path, have > 0 ? std::optional(rest) : std::nullopt, w.max_bytes);
   }
   /// Whether the file is complete now.
   bool accept(Wanted& w, HttpAnswer& a) const {
@@ -325,7 +315,7 @@ class HttpTree {
     return false;
   }
   std::string root_;
-  std::shared_ptr<HttpLink> link_;
+  std::shared_ptr<HttpPool> pool_;
   bool ranges_;
   std::map<std::string, Bytes> files_;
 };
@@ -343,7 +333,9 @@ std::string tree_beside(const std::string& url) {
 class UrlStore final : public HttpStore {
  public:
   UrlStore(std::vector<std::string> urls, const HttpOptions& options)
-      : urls_(std::move(urls)), link_(std::make_shared<HttpLink>(options)), refused_(urls_.size(), false) {}
+      : urls_(std::move(urls)),
+        pool_(std::make_shared<HttpPool>(options, kConnections)),
+        refused_(urls_.size(), false) {}
   std::string name() const override { return shown_url(place_.url.empty() ? urls_.front() : place_.url); }
   bool is_folder() const override { return tree_ != nullptr; }
   HttpPlace place() const override {
@@ -356,8 +348,8 @@ class UrlStore final : public HttpStore {
     if (container_) return container_->read_manifest();
     if (tree_) return tree_->file(kManifestPath, kBootstrapBytes);
     for (;;) {
-      FirstAnswer first = first_answer();
-      place_.mirror = first.mirror;
+      HttpPool::Ended first = first_answer();
+      place_.mirror = first.number;
       place_.rtt_s = first.answer.first_byte_s;
       place_.bytes_s =
           static_cast<double>(first.answer.body.size()) / std::max(1e-6, first.answer.received_s);
@@ -419,13 +411,10 @@ class UrlStore final : public HttpStore {
   }
 
  private:
-  struct FirstAnswer {
-    std::size_t mirror = 0;
-    HttpAnswer answer;
-  };
-  /// The first that answers with the beginning of a package, or says that it knows no ranges.
-  FirstAnswer first_answer() {
-    HttpRetries retries(link_->options);
+  /// The first mirror, by its number, that answers with the beginning of a package, or says that it knows no
+  /// ranges.
+  HttpPool::Ended first_answer() {
+    HttpRetries retries(pool_->options());
     for (;;) {
       std::vector<std::size_t> order;
       for (std::size_t m = 0; m < urls_.size(); ++m)
@@ -434,22 +423,21 @@ class UrlStore final : public HttpStore {
       std::size_t started = 0, ended_count = 0;
       const auto start_next = [&] { ask_first(order[started++]); };
       for (start_next(); ended_count < order.size();) {
-        auto ended = link_->pool.wait(started < order.size() ? kHeadStart_s : kRequestWait_s);
+        auto ended = pool_->wait(started < order.size() ? kHeadStart_s : kRequestWait_s);
         if (!ended) {
-          if (started == order.size() && link_->pool.idle()) break;
+          if (started == order.size() && pool_->idle()) break;
           if (started < order.size()) start_next();
           continue;
         }
         HttpAnswer& a = ended->answer;
         const bool whole = a.status == 200 && (a.complete || a.too_long);
-        const bool cut =
-            !a.too_long && !a.body.empty() && !is_tree(urls_[static_cast<std::size_t>(ended->number)]);
+        const bool cut = !a.too_long && !a.body.empty() && !is_tree(urls_[ended->number]);
         if (whole || (a.status == 206 && (a.complete || cut))) {
-          for (const std::size_t m : order) link_->pool.cancel(m);
-          return {static_cast<std::size_t>(ended->number), std::move(a)};
+          for (const std::size_t m : order) pool_->cancel(m);
+          return std::move(*ended);
         }
         ++ended_count;
-        if (!may_retry(a)) refused_[static_cast<std::size_t>(ended->number)] = true;
+        if (!may_retry(a)) refused_[ended->number] = true;
         last = std::move(a);
         if (started < order.size()) start_next();
       }
@@ -461,8 +449,8 @@ class UrlStore final : public HttpStore {
   static std::uint64_t first_bytes(bool tree) { return tree ? kBootstrapBytes : kStartBytes; }
   void ask_first(std::size_t mirror) {
     const bool tree = is_tree(urls_[mirror]);
-    link_->pool.start(mirror, tree ? urls_[mirror] + kManifestPath : urls_[mirror],
-                      HttpRange{0, first_bytes(tree), tree}, first_bytes(tree));
+    pool_->start(mirror, tree ? urls_[mirror] + kManifestPath : urls_[mirror],
+                 HttpRange{0, first_bytes(tree), tree}, first_bytes(tree));
   }
   [[noreturn]] void throw_problem(const HttpAnswer& a) const {
     std::string names = shown_url(urls_.front());
@@ -473,18 +461,18 @@ class UrlStore final : public HttpStore {
     throw InputError(names, "byte 0", "an answer with status 206", describe_answer(a));
   }
 
-  Bytes open_by(FirstAnswer first) {
-    const std::string& url = urls_[first.mirror];
+  Bytes open_by(HttpPool::Ended first) {
+    const std::string& url = urls_[first.number];
     if (is_tree(url)) {
       if (first.answer.too_long)
         throw FormatError(shown_url(url), kManifestPath,
                           "at most " + std::to_string(kBootstrapBytes) + " bytes", "more");
       return open_tree(url, std::move(first.answer));
     }
-    if (first.answer.status == 206) return open_ranges(first.mirror, std::move(first.answer));
+    if (first.answer.status == 206) return open_ranges(first.number, std::move(first.answer));
     if (const std::string root = tree_beside(url); !root.empty()) {
-      link_->pool.start(0, root + kManifestPath, HttpRange{0, kBootstrapBytes, true}, kBootstrapBytes);
-      const auto ended = link_->pool.wait(kRequestWait_s);
+      pool_->start(0, root + kManifestPath, HttpRange{0, kBootstrapBytes, true}, kBootstrapBytes);
+      const auto ended = pool_->wait(kRequestWait_s);
       if (ended && ended->answer.complete && (ended->answer.status == 200 || ended->answer.status == 206))
         return open_tree(root, std::move(ended->answer));
     }
@@ -499,7 +487,7 @@ class UrlStore final : public HttpStore {
     place_.ranges = manifest.status == 206;
     if (place_.ranges && (!manifest.first || *manifest.first != 0 || *manifest.last + 1 != *manifest.total))
       throw FormatError(shown_url(root), kManifestPath, "the range that was asked for", "another");
-    tree_ = std::make_unique<HttpTree>(root, link_, place_.ranges);
+    tree_ = std::make_unique<HttpTree>(root, pool_, place_.ranges);
     tree_->store(kManifestPath, manifest.body);
     return std::move(manifest.body);
   }
@@ -508,8 +496,8 @@ class UrlStore final : public HttpStore {
     const std::string root = tree_beside(place_.url);
     if (root.empty()) return false;
     const Bytes known = container_->read_manifest();
-    link_->pool.start(0, root + kManifestPath, std::nullopt, kBootstrapBytes);
-    auto ended = link_->pool.wait(kRequestWait_s);
+    pool_->start(0, root + kManifestPath, std::nullopt, kBootstrapBytes);
+    auto ended = pool_->wait(kRequestWait_s);
     if (!ended || !ended->answer.complete || ended->answer.status != 200) return false;
     if (ended->answer.body != known)
       throw FormatError(shown_url(root), kManifestPath, "the package that reading began with",
@@ -523,17 +511,17 @@ class UrlStore final : public HttpStore {
     std::vector<std::string> urls{urls_[mirror]};
     for (std::size_t m = 0; m < urls_.size(); ++m)
       if (m != mirror && !refused_[m] && !is_tree(urls_[m])) urls.push_back(urls_[m]);
-    auto source = std::make_unique<HttpSource>(std::move(urls), link_, std::move(first));
+    auto source = std::make_unique<HttpSource>(std::move(urls), pool_, std::move(first));
     source_ = source.get();
     place_.url = urls_[mirror];
     container_ = open_container(std::move(source));
     return container_->read_manifest();
   }
   Bytes whole_file(const std::string& url) {
-    HttpRetries retries(link_->options);
+    HttpRetries retries(pool_->options());
     for (;;) {
-      link_->pool.start(0, url, std::nullopt, link_->options.max_whole_bytes);
-      auto ended = link_->pool.wait(kRequestWait_s);
+      pool_->start(0, url, std::nullopt, pool_->options().max_whole_bytes);
+      auto ended = pool_->wait(kRequestWait_s);
       HttpAnswer a = ended ? std::move(ended->answer) : HttpAnswer{};
       if (a.status == 200 && a.complete) {
         // The answer before was broken off, and says nothing of the link.
@@ -542,7 +530,7 @@ class UrlStore final : public HttpStore {
       }
       if (a.too_long)
         throw InputError(shown_url(url), "",
-                         "at most " + std::to_string(link_->options.max_whole_bytes) +
+                         "at most " + std::to_string(pool_->options().max_whole_bytes) +
                              " bytes from a server without ranges",
                          "more");
       if (!may_retry(a) || !retries.wait(a))
@@ -551,7 +539,7 @@ class UrlStore final : public HttpStore {
   }
 
   std::vector<std::string> urls_;
-  std::shared_ptr<HttpLink> link_;
+  std::shared_ptr<HttpPool> pool_;
   std::vector<bool> refused_;  // by mirror: never to be asked again
   HttpPlace place_;
   std::unique_ptr<PackageStore> container_;  // or
@@ -566,10 +554,6 @@ std::unique_ptr<HttpStore> open_urls(const std::vector<std::string>& urls, const
   for (const std::string& url : urls)
     if (!is_url(url)) throw InputError(url, "", "an http or https URL", "another text");
   return std::make_unique<UrlStore>(urls, options);
-}
-
-std::unique_ptr<PackageStore> open_url(const std::string& url, const HttpOptions& options) {
-  return open_urls({url}, options);
 }
 
 }  // namespace texmesh

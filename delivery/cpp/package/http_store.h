@@ -1,7 +1,4 @@
 #pragma once
-#include <memory>
-#include <string>
-#include <vector>
 
 #include "delivery/cpp/http/http_client.h"
 #include "delivery/cpp/package/package_reader.h"
@@ -36,9 +33,12 @@ class HttpStore : public PackageStore {
 ///   again.
 /// InputError when the server does not deliver. FormatError when an answer cannot be true (other ranges or
 /// lengths than asked for, a package that was replaced meanwhile).
-std::unique_ptr<PackageStore> open_url(const std::string& url, const HttpOptions& options = {});
-/// The same package on several servers. The next server is asked when the one before has not answered within
-/// half a second. The first server to answer is read from; when it fails later, the others take its place.
+/// The same package may be on several servers. The next server is asked when the one before has not answered
+/// within half a second. The first server to answer is read from; when it fails later, the others take its
+/// place.
 std::unique_ptr<HttpStore> open_urls(const std::vector<std::string>& urls, const HttpOptions& options = {});
+inline std::unique_ptr<PackageStore> open_url(const std::string& url, const HttpOptions& options = {}) {
+  return open_urls({url}, options);
+}
 
 }  // namespace texmesh

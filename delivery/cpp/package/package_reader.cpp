@@ -2,10 +2,9 @@
 
 #include <algorithm>
 #include <numeric>
-#include <set>
 
 #include "format/base/bytes.h"
-#include "format/base/rule_error.h"
+#include "format/base/errors.h"
 #include "format/container/layout.h"
 #include "format/documents/index.h"
 
@@ -17,6 +16,12 @@ std::string plane_place(std::size_t plane) { return "texture plane " + std::to_s
 // Far above what packages have: 10,000 planes with all their rungs, 65,535 fragments each in several.
 constexpr std::uint64_t kMostIndexBytes = 64ull << 20, kMostTablesBytes = 512ull << 20;
 constexpr std::uint64_t kMostDocumentBytes = 64ull << 20, kMostImageBytes = 1ull << 30;
+
+void require_size(const char* rule, const char* what, std::uint64_t expected, std::uint64_t found) {
+  if (expected != found)
+    throw RuleError(rule, what, "", std::to_string(expected) + " bytes, as the tables say",
+                    std::to_string(found));
+}
 
 }  // namespace
 
@@ -35,39 +40,40 @@ PackageReader::PackageReader(std::unique_ptr<PackageStore> store) : store_(std::
   id_ = sha256(bytes);
 }
 
-Bytes PackageReader::read_all(const EntryRef& ref) {
+void PackageReader::refuse(const char* rule, const std::string& place, const std::string& expected,
+                           const std::string& found) const {
+  throw RuleError(rule, store_->name(), place, expected, found);
+}
+
+Bytes PackageReader::entry(const EntryRef& ref) {
   if (ref.bytes > most_entry_bytes(ref.path))
-    throw RuleError("L09", store_->name(), "entry " + ref.path,
-                    "at most " + std::to_string(most_entry_bytes(ref.path)) + " bytes",
-                    std::to_string(ref.bytes));
+    refuse("L09", "entry " + ref.path, "at most " + std::to_string(most_entry_bytes(ref.path)) + " bytes",
+           std::to_string(ref.bytes));
   Bytes bytes = store_->read(ref, 0, ref.bytes);
   const Sha256 digest = sha256(bytes);
   if (digest != ref.digest)
-    throw RuleError("I08", store_->name(), "entry " + ref.path, "SHA-256 " + to_hex(ref.digest),
-                    to_hex(digest));
+    refuse("I08", "entry " + ref.path, "SHA-256 " + to_hex(ref.digest), to_hex(digest));
   return bytes;
 }
 
 Bytes PackageReader::read_paged(const PagedRef& ref) {
-  Bytes bytes = read_all(ref);
+  Bytes bytes = entry(ref);
   const Sha256 digest = sha256(std::span(bytes).first(static_cast<std::size_t>(ref.head_bytes)));
   if (digest != ref.head_digest)
-    throw RuleError("R02", store_->name(), "head of " + ref.path, "SHA-256 " + to_hex(ref.head_digest),
-                    to_hex(digest));
+    refuse("R02", "head of " + ref.path, "SHA-256 " + to_hex(ref.head_digest), to_hex(digest));
   return bytes;
 }
 
 void PackageReader::require_minor(const std::string& path, int minor) const {
   if (minor != manifest_.minor)
-    throw RuleError("R01", store_->name(), path,
-                    "the manifest's minor version, " + std::to_string(manifest_.minor),
-                    std::to_string(minor));
+    refuse("R01", path, "the manifest's minor version, " + std::to_string(manifest_.minor),
+           std::to_string(minor));
 }
 
 void PackageReader::require_head(const PagedRef& ref, std::uint64_t head_bytes) const {
   if (ref.head_bytes != head_bytes)
-    throw RuleError("R02", store_->name(), "head of " + ref.path, std::to_string(ref.head_bytes) + " bytes",
-                    std::to_string(head_bytes));
+    refuse("R02", "head of " + ref.path, std::to_string(ref.head_bytes) + " bytes",
+           std::to_string(head_bytes));
 }
 
 const std::vector<EntryRef>& PackageReader::index() {
@@ -80,8 +86,8 @@ const std::vector<EntryRef>& PackageReader::index() {
   const auto require_entry = [&](const EntryRef& ref) {
     const auto it = std::ranges::find(entries, ref.path, &EntryRef::path);
     if (it == entries.end() || !(*it == ref))
-      throw RuleError("R03", store_->name(), "index entry " + ref.path, "what the manifest says of it",
-                      it == entries.end() ? "none" : "another offset, size or digest");
+      refuse("R03", "index entry " + ref.path, "what the manifest says of it",
+             it == entries.end() ? "none" : "another offset, size or digest");
   };
   for (const EntryRef& ref : {static_cast<EntryRef>(manifest_.tables), manifest_.textures, manifest_.quality,
                               manifest_.provenance, manifest_.about})
@@ -94,8 +100,8 @@ const std::vector<EntryRef>& PackageReader::index() {
   if (manifest_.stream) {
     const auto it = std::ranges::find(entries, std::string(kSplitStreamPath), &EntryRef::path);
     if (it == entries.end() || it->offset != manifest_.stream->offset || it->bytes != manifest_.stream->bytes)
-      throw RuleError("R03", store_->name(), std::string("index entry ") + kSplitStreamPath,
-                      "what the manifest says of it", it == entries.end() ? "none" : "another place");
+      refuse("R03", std::string("index entry ") + kSplitStreamPath, "what the manifest says of it",
+             it == entries.end() ? "none" : "another place");
   }
   index_ = std::move(entries);
   return *index_;
@@ -103,22 +109,21 @@ const std::vector<EntryRef>& PackageReader::index() {
 
 const EntryRef& PackageReader::find(const std::string& path) {
   const auto it = std::ranges::find(index(), path, &EntryRef::path);
-  if (it == index_->end())
-    throw RuleError("R07", store_->name(), "entry " + path, "an entry of the index", "none");
+  if (it == index_->end()) refuse("R07", "entry " + path, "an entry of the index", "none");
   return *it;
 }
 
 const std::vector<TextureInfo>& PackageReader::textures() {
   if (textures_) return *textures_;
-  std::vector<TextureInfo> textures = read_textures(read_all(manifest_.textures));
+  std::vector<TextureInfo> textures = read_textures(entry(manifest_.textures));
   if (textures.size() != manifest_.plane_count)
-    throw RuleError("R04", store_->name(), kTexturesPath, std::to_string(manifest_.plane_count) + " planes",
-                    std::to_string(textures.size()));
+    refuse("R04", kTexturesPath, std::to_string(manifest_.plane_count) + " planes",
+           std::to_string(textures.size()));
   for (const TextureInfo& t : textures)
     if (const auto feature = codec_traits(t.codec).required_feature;
         !feature.empty() &&
         std::ranges::find(manifest_.required_features, feature) == manifest_.required_features.end())
-      throw RuleError("R05", store_->name(), "/requiredFeatures", std::string(feature), "a codec without it");
+      refuse("R05", "/requiredFeatures", std::string(feature), "a codec without it");
   resolve_textures(textures, index());
   textures_ = std::move(textures);
   return *textures_;
@@ -129,23 +134,19 @@ void PackageReader::check_plane(std::size_t plane, const PlaneTables& tables) {
   const bool same_rungs = std::ranges::equal(tables.rung_quality, texture.rung_quality, {},
                                              [](std::uint8_t q) { return int{q}; });
   if (tables.columns != texture.columns || tables.rows != texture.rows)
-    throw RuleError("R08", store_->name(), plane_place(plane), "the grid of textures.json in tables.bin",
-                    "another");
-  if (!same_rungs)
-    throw RuleError("R09", store_->name(), plane_place(plane), "the rungs of textures.json in tables.bin",
-                    "others");
+    refuse("R08", plane_place(plane), "the grid of textures.json in tables.bin", "another");
+  if (!same_rungs) refuse("R09", plane_place(plane), "the rungs of textures.json in tables.bin", "others");
   if (tables.scale_count() != manifest_.scales.size())
-    throw RuleError("R11", store_->name(), plane_place(plane),
-                    "a row in tables.bin for each of the manifest's " +
-                        std::to_string(manifest_.scales.size()) + " scales",
-                    std::to_string(tables.scale_count()));
+    refuse("R11", plane_place(plane),
+           "a row in tables.bin for each of the manifest's " + std::to_string(manifest_.scales.size()) +
+               " scales",
+           std::to_string(tables.scale_count()));
   if (tables.incremental != codec_traits(texture.codec).incremental)
-    throw RuleError("R10", store_->name(), plane_place(plane), "tables of the codec in textures.json",
-                    "others");
+    refuse("R10", plane_place(plane), "tables of the codec in textures.json", "others");
   const auto require_sum = [&](const char* rule, const EntryRef& ref, std::uint64_t sum) {
     if (ref.bytes != sum)
-      throw RuleError(rule, store_->name(), "entry " + ref.path,
-                      std::to_string(sum) + " bytes, as tables.bin adds up", std::to_string(ref.bytes));
+      refuse(rule, "entry " + ref.path, std::to_string(sum) + " bytes, as tables.bin adds up",
+             std::to_string(ref.bytes));
   };
   require_sum("R12", texture.tables,
               std::accumulate(tables.table_bytes.begin(), tables.table_bytes.end(), std::uint64_t{0}));
@@ -169,8 +170,8 @@ const PackageTables& PackageReader::tables() {
   require_head(manifest_.tables, head.bytes);
   PackageTables tables = read_tables(bytes);
   if (tables.planes.size() != manifest_.plane_count)
-    throw RuleError("R04", store_->name(), kTablesPath, std::to_string(manifest_.plane_count) + " planes",
-                    std::to_string(tables.planes.size()));
+    refuse("R04", kTablesPath, std::to_string(manifest_.plane_count) + " planes",
+           std::to_string(tables.planes.size()));
   fragment_offsets_.clear();
   for (std::size_t p = 0; p < tables.planes.size(); ++p) {
     const PlaneTables& t = tables.planes[p];
@@ -205,12 +206,10 @@ const ThesisTables* PackageReader::thesis() {
 }
 
 ThesisTables PackageReader::read_thesis_entry() {
-  ThesisFile file = read_thesis(read_all(*manifest_.thesis));
+  ThesisFile file = read_thesis(entry(*manifest_.thesis));
   require_minor(kThesisPath, file.minor);
   const auto require = [&](bool good, std::size_t plane, const char* expected) {
-    if (!good)
-      throw RuleError("R16", store_->name(), std::string(kThesisPath) + ", " + plane_place(plane), expected,
-                      "others");
+    if (!good) refuse("R16", kThesisPath + std::string(", ") + plane_place(plane), expected, "others");
   };
   const auto last_scale = static_cast<std::size_t>(manifest_.scales.back().scale);
   for (std::size_t p = 0; p < file.tables.planes.size(); ++p) {
@@ -225,40 +224,36 @@ ThesisTables PackageReader::read_thesis_entry() {
   if (const PerceptualTable& perceptual = file.tables.perceptual; !perceptual.empty())
     for (const ManifestScale& s : manifest_.scales)
       if (!std::ranges::binary_search(perceptual.scale, s.scale))
-        throw RuleError("R16", store_->name(), std::string(kThesisPath) + ", perceptual table",
-                        "scale " + std::to_string(s.scale), "none");
+        refuse("R16", kThesisPath + std::string(", perceptual table"), "scale " + std::to_string(s.scale),
+               "none");
   return std::move(file.tables);
 }
 
 const QualityTable& PackageReader::quality() {
   if (quality_) return *quality_;
-  QualityTable table = read_quality(read_all(manifest_.quality));
+  QualityTable table = read_quality(entry(manifest_.quality));
   const auto number_of = [](const ManifestScale& s) { return s.scale; };
   if (!std::ranges::equal(table.scales, manifest_.scales, {}, {}, number_of))
-    throw RuleError("R14", store_->name(), kQualityPath, "the manifest's scales", "others");
+    refuse("R14", kQualityPath, "the manifest's scales", "others");
   std::set<PlaneGroup> planes, found;
   for (const TextureInfo& t : textures()) planes.insert(group_of(t.role));
   for (const GroupLosses& g : table.groups) found.insert(g.group);
-  if (planes != found)
-    throw RuleError("R15", store_->name(), kQualityPath, "the groups of the planes in textures.json",
-                    "others");
+  if (planes != found) refuse("R15", kQualityPath, "the groups of the planes in textures.json", "others");
   quality_ = std::move(table);
   return *quality_;
 }
 
 const About& PackageReader::about() {
-  if (!about_) about_ = read_about(read_all(manifest_.about));
+  if (!about_) about_ = read_about(entry(manifest_.about));
   return *about_;
 }
-
-Bytes PackageReader::entry(const EntryRef& ref) { return read_all(ref); }
 
 Bytes PackageReader::scale_glb(int scale) {
   const ManifestScale& s = manifest_.scales[scale_index(scale)];
   if (!s.has_glb())
     throw InputError(store_->name(), mesh_path(scale), "a scale with a file of its own",
                      "one that the stream alone has");
-  return read_all(s.glb);
+  return entry(s.glb);
 }
 
 Bytes PackageReader::proxy_glb(std::size_t proxy) {
@@ -268,7 +263,7 @@ Bytes PackageReader::proxy_glb(std::size_t proxy) {
                          ? "a package with proxies"
                          : "0 to " + std::to_string(manifest_.proxies.size() - 1) + ", smallest first",
                      "none");
-  return read_all(manifest_.proxies[proxy].glb);
+  return entry(manifest_.proxies[proxy].glb);
 }
 
 Bytes PackageReader::split_prefix(int scale) {
@@ -280,8 +275,8 @@ Bytes PackageReader::split_prefix(int scale) {
       store_->read({kSplitStreamPath, manifest_.stream->offset, manifest_.stream->bytes, {}}, 0, s.glb.bytes);
   const Sha256 digest = sha256(bytes);
   if (digest != s.glb.digest)
-    throw RuleError("M17", store_->name(), std::string("prefix of ") + kSplitStreamPath,
-                    "SHA-256 " + to_hex(s.glb.digest), to_hex(digest));
+    refuse("M17", std::string("prefix of ") + kSplitStreamPath, "SHA-256 " + to_hex(s.glb.digest),
+           to_hex(digest));
   return bytes;
 }
 
@@ -300,16 +295,15 @@ SplitStreamHead PackageReader::split_stream_head() {
   const StreamRef& ref = *manifest_.stream;
   const Bytes head = store_->read({kSplitStreamPath, ref.offset, ref.bytes, {}}, 0, ref.head_bytes);
   if (sha256(head) != ref.head_digest)
-    throw RuleError("R02", store_->name(), std::string("head of ") + kSplitStreamPath,
-                    to_hex(ref.head_digest), to_hex(sha256(head)));
+    refuse("R02", std::string("head of ") + kSplitStreamPath, to_hex(ref.head_digest), to_hex(sha256(head)));
   SplitStreamHead parsed = read_split_head(head);
   if (parsed.bytes != ref.head_bytes)
-    throw RuleError("S08", store_->name(), std::string("head of ") + kSplitStreamPath,
-                    std::to_string(ref.head_bytes) + " bytes", std::to_string(parsed.bytes));
+    refuse("S08", std::string("head of ") + kSplitStreamPath, std::to_string(ref.head_bytes) + " bytes",
+           std::to_string(parsed.bytes));
   const SplitBlock& last = parsed.blocks.back();
   if (last.offset + last.bytes() != ref.bytes)
-    throw RuleError("S08", store_->name(), kSplitStreamPath, "blocks that end with the entry",
-                    "an end at byte " + std::to_string(last.offset + last.bytes()));
+    refuse("S08", kSplitStreamPath, "blocks that end with the entry",
+           "an end at byte " + std::to_string(last.offset + last.bytes()));
   return parsed;
 }
 
@@ -320,13 +314,13 @@ const TextureInfo& PackageReader::texture(std::uint32_t plane) {
   return (*textures_)[plane];
 }
 
-Bytes PackageReader::preview(std::uint32_t plane) { return read_all(texture(plane).preview); }
+Bytes PackageReader::preview(std::uint32_t plane) { return entry(texture(plane).preview); }
 
 Bytes PackageReader::source(std::uint32_t plane) {
   const TextureInfo& info = texture(plane);
   if (info.source_extension.empty())
     throw FormatError(store_->name(), plane_place(plane), "a source image in the package", "none");
-  return read_all(info.source);
+  return entry(info.source);
 }
 
 Bytes PackageReader::table_stream(std::uint32_t plane, std::uint32_t rung) {
@@ -336,7 +330,7 @@ Bytes PackageReader::table_stream(std::uint32_t plane, std::uint32_t rung) {
     throw FormatError(store_->name(), plane_place(plane), "a rung under " + std::to_string(t.rung_count()),
                       std::to_string(rung));
   auto it = table_streams_.find(plane);
-  if (it == table_streams_.end()) it = table_streams_.emplace(plane, read_all(info.tables)).first;
+  if (it == table_streams_.end()) it = table_streams_.emplace(plane, entry(info.tables)).first;
   const auto begin = std::accumulate(t.table_bytes.begin(), t.table_bytes.begin() + rung, std::uint64_t{0});
   const auto stream = std::span(it->second).subspan(static_cast<std::size_t>(begin), t.table_bytes[rung]);
   return {stream.begin(), stream.end()};
@@ -357,11 +351,11 @@ Bytes PackageReader::fragment(std::uint32_t plane, std::uint32_t rung, std::uint
   const ByteRange range = fragment_range(plane, rung, fragment);
   const EntryRef& pack = textures()[plane].rungs[rung];
   const std::string place = "fragment " + std::to_string(fragment) + " of " + pack.path;
-  if (range.bytes == 0) throw RuleError("T07", store_->name(), place, "a stored fragment", "none");
+  if (range.bytes == 0) refuse("T07", place, "a stored fragment", "none");
   Bytes bytes = store_->read(pack, range.offset, range.bytes);
   const PlaneTables& t = tables().planes[plane];
   if (truncated(sha256(bytes)) != t.digest[rung * t.fragment_count() + fragment])
-    throw RuleError("F03", store_->name(), place, "bytes of the digest in tables.bin", "others");
+    refuse("F03", place, "bytes of the digest in tables.bin", "others");
   return bytes;
 }
 
@@ -371,13 +365,63 @@ Bytes PackageReader::complete_fragment(std::uint32_t plane, std::uint32_t rung, 
   std::vector<Bytes> streams;
   for (std::uint32_t r = first; r <= rung; ++r) streams.push_back(this->fragment(plane, r, fragment));
   return join_fragment(codec, table_stream(plane, first),
-                       std::vector<std::span<const std::uint8_t>>(streams.begin(), streams.end()));
+                       std::vector<ByteSpan>(streams.begin(), streams.end()));
 }
 
 int select_scale(const Manifest& manifest, double displayed_px) {
   for (const ManifestStep& step : manifest.steps)
     if (displayed_px <= step.up_to_px) return step.scale;
   return 0;
+}
+
+PlaneStreams::PlaneStreams(Codec codec, const PlaneTables& tables, Bytes table_pack)
+    : codec_(codec),
+      tables_(tables),
+      table_pack_(std::move(table_pack)),
+      packs_(tables.rung_count()),
+      offsets_(tables.rung_count()) {
+  require_size("R12", "table streams",
+               std::accumulate(tables.table_bytes.begin(), tables.table_bytes.end(), std::uint64_t{0}),
+               table_pack_.size());
+}
+
+void PlaneStreams::add_pack(std::size_t rung, Bytes pack) {
+  const std::size_t fragments = tables_.fragment_count();
+  const bool incremental = codec_traits(codec_).incremental;
+  if (rung >= packs_.size() || (incremental && rung > 0 && offsets_[rung - 1].empty()))
+    throw FormatError("rung " + std::to_string(rung), "", "the next one", "another");
+  std::vector<std::uint64_t> offsets(fragments);
+  std::uint64_t at = 0;
+  for (const std::uint16_t f : tables_.order) {
+    offsets[f] = at;
+    at += tables_.size_bytes[rung * fragments + f];
+  }
+  require_size("R13", "rung", at, pack.size());
+  if (!incremental) packs_[rung_].clear();
+  rung_ = rung;
+  packs_[rung] = std::move(pack);
+  offsets_[rung] = std::move(offsets);
+}
+
+ByteSpan PlaneStreams::stream(std::size_t rung, std::size_t fragment) const {
+  return std::span(packs_[rung])
+      .subspan(static_cast<std::size_t>(offsets_[rung].at(fragment)),
+               tables_.size_bytes[rung * tables_.fragment_count() + fragment]);
+}
+
+ByteSpan PlaneStreams::stream(std::size_t fragment) const { return stream(rung_, fragment); }
+
+Bytes PlaneStreams::file(std::size_t fragment) const {
+  const std::size_t first = codec_traits(codec_).incremental ? 0 : rung_;
+  std::vector<ByteSpan> streams;
+  for (std::size_t r = first; r <= rung_; ++r) streams.push_back(stream(r, fragment));
+  return join_fragment(codec_, table_stream(first), streams);
+}
+
+ByteSpan PlaneStreams::table_stream(std::size_t rung) const {
+  std::uint64_t at = 0;
+  for (std::size_t r = 0; r < rung; ++r) at += tables_.table_bytes[r];
+  return std::span(table_pack_).subspan(static_cast<std::size_t>(at), tables_.table_bytes[rung]);
 }
 
 }  // namespace texmesh

@@ -1,10 +1,5 @@
 #pragma once
-#include <cstdint>
 #include <map>
-#include <memory>
-#include <optional>
-#include <string>
-#include <vector>
 
 #include "format/container/container.h"
 #include "format/documents/about.h"
@@ -17,6 +12,9 @@
 
 namespace texmesh {
 
+/// A rung beyond the last one stands for the last one.
+inline constexpr std::uint32_t kBestRung = 0xffffffffu;
+
 /// Where a package's entries come from: a .texmesh file (or anything that serves ranges of one), or the same
 /// tree unpacked into a folder.
 class PackageStore {
@@ -25,11 +23,10 @@ class PackageStore {
   virtual std::string name() const = 0;  // for errors
   virtual bool is_folder() const = 0;
   /// The bytes of manifest.json. From a container this is one read of kBootstrapBytes at offset 0.
-  virtual std::vector<std::uint8_t> read_manifest() = 0;
+  virtual Bytes read_manifest() = 0;
   /// Exactly `bytes` bytes from `offset` within an entry. A container goes by entry.offset, a folder by
   /// entry.path. FormatError when they are not there.
-  virtual std::vector<std::uint8_t> read(const EntryRef& entry, std::uint64_t offset,
-                                         std::uint64_t bytes) = 0;
+  virtual Bytes read(const EntryRef& entry, std::uint64_t offset, std::uint64_t bytes) = 0;
   /// These will be read soon, in whole: a server is asked for all of them at once. Errors as of read().
   virtual void prefetch(const std::vector<EntryRef>&) {}
   /// What is really there, manifest.json and index.bin included: a container's entries in file order (every
@@ -71,36 +68,36 @@ class PackageReader {
   /// How much any two scales differ, from thesis.bin; nullptr where the package does not say.
   const PerceptualTable* perceptual_table();
 
-  std::vector<std::uint8_t> entry(const EntryRef& ref);
-  std::vector<std::uint8_t> entry(const std::string& path) { return entry(find(path)); }
+  Bytes entry(const EntryRef& ref);
+  Bytes entry(const std::string& path) { return entry(find(path)); }
   /// The GLB of a scale, as it is stored; needs no index. InputError where the scale has none: then
   /// split_prefix() has it. Images of all but the coarsest scale's may be relative URIs of previews.
-  std::vector<std::uint8_t> scale_glb(int scale);
+  Bytes scale_glb(int scale);
   /// A proxy's GLB, which stands alone; needs no index. 0 = the smallest. InputError where there is none.
-  std::vector<std::uint8_t> proxy_glb(std::size_t proxy);
+  Bytes proxy_glb(std::size_t proxy);
   /// The bytes of the vertex-split stream that hold a scale without a GLB: head and blocks, digest checked.
-  std::vector<std::uint8_t> split_prefix(int scale);
+  Bytes split_prefix(int scale);
   /// Index into manifest().scales. Without such a scale: InputError that names the scales there are.
   std::size_t scale_index(int scale) const;
   const EntryRef& scale_entry(int scale) const { return manifest_.scales[scale_index(scale)].glb; }
   /// Head of the vertex-split stream, needs no index; FormatError when the package has none. Blocks are read
   /// with store() or entry(kSplitStreamPath).
   SplitStreamHead split_stream_head();
-  std::vector<std::uint8_t> preview(std::uint32_t plane);
+  Bytes preview(std::uint32_t plane);
   /// The plane's source image as it was; FormatError when the package does not keep it as a file.
-  std::vector<std::uint8_t> source(std::uint32_t plane);
-  std::vector<std::uint8_t> table_stream(std::uint32_t plane, std::uint32_t rung);
+  Bytes source(std::uint32_t plane);
+  Bytes table_stream(std::uint32_t plane, std::uint32_t rung);
   /// Where a fragment's stream stands within its rung's entry; bytes 0 = not stored.
   ByteRange fragment_range(std::uint32_t plane, std::uint32_t rung, std::uint32_t fragment);
-  std::vector<std::uint8_t> fragment(std::uint32_t plane, std::uint32_t rung, std::uint32_t fragment);
+  Bytes fragment(std::uint32_t plane, std::uint32_t rung, std::uint32_t fragment);
   /// The image file, of the plane's codec, that any decoder takes: table stream and fragment joined; for
   /// incremental codecs with the streams of the lower rungs between them.
-  std::vector<std::uint8_t> complete_fragment(std::uint32_t plane, std::uint32_t rung,
-                                              std::uint32_t fragment);
+  Bytes complete_fragment(std::uint32_t plane, std::uint32_t rung, std::uint32_t fragment);
 
  private:
-  std::vector<std::uint8_t> read_all(const EntryRef& ref);
-  std::vector<std::uint8_t> read_paged(const PagedRef& ref);
+  [[noreturn]] void refuse(const char* rule, const std::string& place, const std::string& expected,
+                           const std::string& found) const;
+  Bytes read_paged(const PagedRef& ref);
   void require_head(const PagedRef& ref, std::uint64_t head_bytes) const;
   void require_minor(const std::string& path, int minor) const;
   const ThesisTables* thesis();
@@ -118,10 +115,34 @@ class PackageReader {
   std::optional<About> about_;
   // [plane][rung][fragment]: running sums of sizes in PlaneTables::order
   std::vector<std::vector<std::vector<std::uint64_t>>> fragment_offsets_;
-  std::map<std::uint32_t, std::vector<std::uint8_t>> table_streams_;  // by plane
+  std::map<std::uint32_t, Bytes> table_streams_;  // by plane
 };
 
 /// The step function: the scale to show an object at that is `displayed_px` pixels high on screen.
 int select_scale(const Manifest& manifest, double displayed_px);
+
+/// The streams of one plane while its packs are gone through. Keeps lower packs only where the codec's upper
+/// rungs need them. Sizes are checked; contents are not.
+class PlaneStreams {
+ public:
+  /// `table_pack`: the table streams of all rungs. FormatError when it has another size than the tables say.
+  PlaneStreams(Codec codec, const PlaneTables& tables, Bytes table_pack);
+  /// A rung's pack; with an incremental codec from the lowest rung upwards. FormatError when it has another
+  /// size than the tables say or is not the next one.
+  void add_pack(std::size_t rung, Bytes pack);
+  /// Of the rung added last: the rung's own stream of a fragment (empty: not stored), and the complete file.
+  ByteSpan stream(std::size_t fragment) const;
+  Bytes file(std::size_t fragment) const;
+  ByteSpan table_stream(std::size_t rung) const;
+
+ private:
+  ByteSpan stream(std::size_t rung, std::size_t fragment) const;
+  Codec codec_;
+  const PlaneTables& tables_;
+  Bytes table_pack_;
+  std::size_t rung_ = 0;                             // the one added last
+  std::vector<Bytes> packs_;                         // [rung]; empty where not needed
+  std::vector<std::vector<std::uint64_t>> offsets_;  // [rung][fragment]
+};
 
 }  // namespace texmesh

@@ -1,17 +1,14 @@
 #include <fcntl.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
 #include <filesystem>
-#include <utility>
 
 #include "delivery/cpp/package/http_store.h"
 #include "delivery/cpp/package/package_reader.h"
 #include "format/base/bytes.h"
-#include "format/base/rule_error.h"
+#include "format/base/descriptor.h"
+#include "format/base/errors.h"
 #include "format/container/layout.h"
 
 namespace texmesh {
@@ -62,23 +59,6 @@ class ContainerStore final : public PackageStore {
 
  private:
   std::unique_ptr<ByteSource> source_;
-};
-
-class Descriptor {
- public:
-  explicit Descriptor(int fd) : fd_(fd) {}
-  ~Descriptor() {
-    if (fd_ >= 0) ::close(fd_);
-  }
-  Descriptor(Descriptor&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
-  Descriptor& operator=(Descriptor&& other) noexcept {
-    std::swap(fd_, other.fd_);
-    return *this;
-  }
-  int get() const { return fd_; }
-
- private:
-  int fd_;
 };
 
 class FolderStore final : public PackageStore {
@@ -152,15 +132,9 @@ class FolderStore final : public PackageStore {
   Bytes read_file(const Descriptor& file, const std::string& path, std::uint64_t offset,
                   std::uint64_t bytes) const {
     Bytes out(static_cast<std::size_t>(bytes));
-    for (std::size_t done = 0; done < out.size();) {
-      const ssize_t n =
-          ::pread(file.get(), out.data() + done, out.size() - done, static_cast<off_t>(offset + done));
-      if (n < 0 && errno == EINTR) continue;
-      if (n < 0) throw InputError(root_, path, "readable bytes", std::strerror(errno));
-      if (n == 0) throw RuleError("I08", root_, path, "more bytes", "the file became shorter");
-      done += static_cast<std::size_t>(n);
-    }
-    return out;
+    if (read_at(file.get(), offset, out)) return out;
+    if (errno == 0) throw RuleError("I08", root_, path, "more bytes", "the file became shorter");
+    throw InputError(root_, path, "readable bytes", std::strerror(errno));
   }
 
   std::string root_;

@@ -1,11 +1,9 @@
-#include "delivery/cpp/transfer/package_transport.h"
+#include "delivery/cpp/transfer/transfer.h"
 
 #include <algorithm>
 #include <chrono>
 #include <deque>
 #include <thread>
-
-#include "format/base/errors.h"
 
 namespace texmesh {
 namespace {
@@ -41,7 +39,7 @@ class HttpTransport final : public Transport {
       return;
     }
     Open& open = open_[request.number];
-    if (!same(open.wanted, request.parts)) {  // another request of the same number
+    if (open.wanted != request.parts) {  // another request of the same number
       open = {};
       open.wanted = request.parts;
       open.parts.resize(request.parts.size());
@@ -124,18 +122,13 @@ class HttpTransport final : public Transport {
   };
   struct Open {
     std::vector<PackagePart> wanted;
-    std::vector<std::vector<std::uint8_t>> parts;  // as much as has come
+    std::vector<Bytes> parts;  // as much as has come
     std::size_t left = 0;
     std::uint32_t mirror = 0;
     bool under_way = false;
   };
   static std::uint64_t number_of(std::uint32_t request, std::uint32_t part) {
     return static_cast<std::uint64_t>(request) * kMaxParts + part;
-  }
-  static bool same(const std::vector<PackagePart>& a, const std::vector<PackagePart>& b) {
-    return std::ranges::equal(a, b, [](const PackagePart& x, const PackagePart& y) {
-      return x.entry == y.entry && x.range == y.range;
-    });
   }
   /// Ends what is under way and keeps what it has brought.
   void stop(std::uint32_t number) {

@@ -1,9 +1,6 @@
 #include "delivery/cpp/transfer/transfer.h"
 
 #include <algorithm>
-#include <map>
-#include <set>
-#include <utility>
 
 namespace texmesh {
 namespace {
@@ -62,9 +59,10 @@ class Mirrors {
     mirrors_[m].share.dropped = why;
     revive();
   }
-  bool another_is_alive(std::uint32_t but) const {
+  /// `that_delivers`: that has shown that it does.
+  bool another_is_alive(std::uint32_t but, bool that_delivers = false) const {
     for (std::size_t m = 0; m < mirrors_.size(); ++m)
-      if (m != but && mirrors_[m].alive) return true;
+      if (m != but && mirrors_[m].alive && (mirrors_[m].has_delivered || !that_delivers)) return true;
     return false;
   }
   std::vector<MirrorShare> shares() const {
@@ -80,12 +78,6 @@ class Mirrors {
     Mirror& mirror = mirrors_[m];
     const double growing_s = kFirstPause_s * static_cast<double>(1 << std::min(mirror.failures++, 6));
     mirror.ready_s = std::max(mirror.ready_s, now_s + std::min(kMostPause_s, std::max(wait_s, growing_s)));
-  }
-  /// Another one that has shown that it delivers.
-  bool another_delivers(std::uint32_t but) const {
-    for (std::size_t m = 0; m < mirrors_.size(); ++m)
-      if (m != but && mirrors_[m].alive && mirrors_[m].has_delivered) return true;
-    return false;
   }
 
  private:
@@ -122,7 +114,7 @@ class Mirrors {
   std::vector<Mirror> mirrors_;
 };
 
-struct Asked {
+struct PendingRequest {
   TransferRequest request;
   std::uint32_t mirror = 0;
   double at_s = 0, patience_s = 0;
@@ -141,15 +133,11 @@ class TransferRun {
         mirrors_(transport.mirrors(), options.initial_bytes_s) {}
 
   TransferEnd run() {
-    TransferEnd end = run_to_end();
-    end.mirrors = mirrors_.shares();
-    return end;
-  }
-
- private:
-  TransferEnd run_to_end() {
     while (!source_.finished()) {
-      if (over()) return stop();
+      if (over()) {
+        stop();
+        break;
+      }
       start_waiting();
       while (auto request = source_.next(transport_.now_s())) ask({std::move(*request)}, {});
       if (source_.finished()) break;
@@ -163,19 +151,21 @@ class TransferRun {
       else
         ask_late_ones_elsewhere();
     }
+    end_.mirrors = mirrors_.shares();
     return end_;
   }
+
+ private:
   bool over() {
     end_.cancelled = options_.cancelled && options_.cancelled();
     end_.out_of_time = transport_.now_s() > options_.until_s;
     return end_.cancelled || end_.out_of_time;
   }
-  TransferEnd stop() {
+  void stop() {
     for (const auto& [number, a] : asked_) transport_.cancel(number);
     end_.unfinished = static_cast<std::uint32_t>(asked_.size() + waiting_.size());
     for (const auto& [number, a] : asked_) source_.failed(number, transport_.now_s());
-    for (const Asked& a : waiting_) source_.failed(a.request.number, transport_.now_s());
-    return end_;
+    for (const PendingRequest& a : waiting_) source_.failed(a.request.number, transport_.now_s());
   }
   /// No server will ever answer.
   void give_up_all() {
@@ -187,14 +177,14 @@ class TransferRun {
       give_up(a, "no answer");
     }
   }
-  void give_up(const Asked& a, const std::string& why) {
+  void give_up(const PendingRequest& a, const std::string& why) {
     ++end_.problems[why];
     ++end_.given_up;
     source_.failed(a.request.number, transport_.now_s());
   }
 
   /// Asks a mirror, or notes that one is to be asked when its pause is over.
-  void ask(Asked a, std::optional<std::uint32_t> but) {
+  void ask(PendingRequest a, std::optional<std::uint32_t> but) {
     const double now_s = transport_.now_s();
     const auto bytes = static_cast<double>(a.request.bytes);
     const auto mirror = mirrors_.choose(bytes, but, now_s, [&](std::uint32_t m) {
@@ -221,13 +211,13 @@ class TransferRun {
   }
   void start_waiting() {
     const double now_s = transport_.now_s();
-    std::vector<Asked> due;
-    std::erase_if(waiting_, [&](Asked& a) {
+    std::vector<PendingRequest> due;
+    std::erase_if(waiting_, [&](PendingRequest& a) {
       if (a.at_s > now_s) return false;
       due.push_back(std::move(a));
       return true;
     });
-    for (Asked& a : due) ask(std::move(a), {});
+    for (PendingRequest& a : due) ask(std::move(a), {});
   }
 
   double next_look_s() const {
@@ -235,7 +225,7 @@ class TransferRun {
         options_.until_s < kForEver_s ? std::max(options_.until_s, transport_.now_s()) + 1e-3 : kForEver_s;
     if (transport_.mirrors() > 1)  // a single one can only be waited for
       for (const auto& [number, a] : asked_) until = std::min(until, a.at_s + a.patience_s);
-    for (const Asked& a : waiting_) until = std::min(until, a.at_s);
+    for (const PendingRequest& a : waiting_) until = std::min(until, a.at_s);
     if (options_.cancelled) until = std::min(until, transport_.now_s() + kAskCancelled_s);
     return until;
   }
@@ -243,7 +233,7 @@ class TransferRun {
   void end_try(const Transport::Outcome& outcome) {
     const auto it = asked_.find(outcome.number);
     if (it == asked_.end()) return;
-    Asked a = std::move(it->second);
+    PendingRequest a = std::move(it->second);
     asked_.erase(it);
     const auto bytes = static_cast<double>(a.request.bytes);
     if (outcome.good && source_.arrived(outcome)) {
@@ -266,7 +256,7 @@ class TransferRun {
     if (drop && mirrors_.another_is_alive(by)) deal_anew(by, lied);
   }
   /// Another mirror may have the entry: that is no failure.
-  void note_lacking(Asked a, const std::string& why) {
+  void note_lacking(PendingRequest a, const std::string& why) {
     const std::uint32_t by = a.mirror;
     mirrors_.released(by, static_cast<double>(a.request.bytes));
     lacking_.insert({by, entry_of(a)});
@@ -276,10 +266,10 @@ class TransferRun {
   }
   /// What a dropped mirror still owes goes to the others. What a liar has brought of it counts for nothing.
   void deal_anew(std::uint32_t mirror, bool lied) {
-    std::vector<Asked> owed;
+    std::vector<PendingRequest> owed;
     for (const auto& [number, a] : asked_)
       if (a.mirror == mirror) owed.push_back(a);
-    for (Asked& a : owed) {
+    for (PendingRequest& a : owed) {
       lied ? transport_.forget(a.request.number) : transport_.cancel(a.request.number);
       asked_.erase(a.request.number);
       mirrors_.released(mirror, static_cast<double>(a.request.bytes));
@@ -288,10 +278,10 @@ class TransferRun {
     }
   }
   /// By which mirrors are told apart that have it: the first entry; models have requests alone.
-  static std::uint64_t entry_of(const Asked& a) {
+  static std::uint64_t entry_of(const PendingRequest& a) {
     return a.request.parts.empty() ? a.request.number : a.request.parts.front().entry.offset;
   }
-  void retry_or_give_up(Asked a, const std::string& why) {
+  void retry_or_give_up(PendingRequest a, const std::string& why) {
     mirrors_.released(a.mirror, static_cast<double>(a.request.bytes));
     mirrors_.failed(a.mirror);
     if (const double kept = transport_.received(a.request.number); kept >= a.kept + kProgressBytes) {
@@ -309,19 +299,19 @@ class TransferRun {
 
   void ask_late_ones_elsewhere() {
     if (transport_.mirrors() < 2) return;
-    std::vector<Asked> late;
+    std::vector<PendingRequest> late;
     for (auto& [number, a] : asked_) {
       if (a.at_s + a.patience_s > transport_.now_s()) continue;
       // Slow, but nobody is known to be faster.
       const double received = transport_.received(number);
-      if (received > a.received && !mirrors_.another_delivers(a.mirror)) {
+      if (received > a.received && !mirrors_.another_is_alive(a.mirror, true)) {
         a.received = received;
         a.at_s = transport_.now_s();
         continue;
       }
       late.push_back(a);
     }
-    for (Asked& a : late) {
+    for (PendingRequest& a : late) {
       const double come = transport_.received(a.request.number) - a.received;
       if (come >= kProgressBytes) {
         move_elsewhere(std::move(a), come);
@@ -333,7 +323,7 @@ class TransferRun {
     }
   }
   /// A mirror that is slower than was thought keeps what it can deliver: by its new estimate it gets less.
-  void move_elsewhere(Asked a, double come) {
+  void move_elsewhere(PendingRequest a, double come) {
     const auto beside =
         std::ranges::count_if(asked_, [&](const auto& other) { return other.second.mirror == a.mirror; });
     mirrors_.slow(a.mirror, come * static_cast<double>(beside), transport_.now_s() - a.at_s);
@@ -350,8 +340,8 @@ class TransferRun {
   Transport& transport_;
   TransferOptions options_;
   Mirrors mirrors_;
-  std::map<std::uint32_t, Asked> asked_;
-  std::vector<Asked> waiting_;                                 // for the end of their mirror's pause, at_s
+  std::map<std::uint32_t, PendingRequest> asked_;
+  std::vector<PendingRequest> waiting_;                        // for the end of their mirror's pause, at_s
   std::set<std::pair<std::uint32_t, std::uint64_t>> lacking_;  // mirror and entry
   TransferEnd end_;
 };

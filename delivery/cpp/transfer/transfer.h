@@ -1,13 +1,9 @@
 #pragma once
-#include <cstdint>
-#include <functional>
-#include <map>
-#include <optional>
-#include <string>
-#include <vector>
 
 #include "delivery/cpp/decide/harmonic_time.h"
-#include "format/documents/entry_ref.h"
+#include "delivery/cpp/http/http_client.h"
+#include "delivery/cpp/package/package_reader.h"
+#include "format/documents/index.h"
 
 namespace texmesh {
 
@@ -15,6 +11,7 @@ namespace texmesh {
 struct PackagePart {
   EntryRef entry;
   ByteRange range;  // within the entry
+  friend bool operator==(const PackagePart&, const PackagePart&) = default;
 };
 
 /// One request. The asker chooses the number, which comes back with the outcome.
@@ -30,13 +27,13 @@ class Transport {
   struct Outcome {
     std::uint32_t number = 0;
     double time_s = 0;
-    bool good = false;                             // false: the mirror has failed to deliver
-    std::vector<std::vector<std::uint8_t>> parts;  // as asked for
-    std::string problem;                           // why not good, in a few words
-    double wait_s = 0;      // above 0: the mirror is to be left alone, at least for so long (429, 5xx)
-    bool for_good = false;  // the mirror will never deliver: has another file by now, knows no ranges
-    bool absent = false;    // the mirror does not have this entry; it may have others
-    bool lied = false;      // of models: the bytes are wrong
+    bool good = false;         // false: the mirror has failed to deliver
+    std::vector<Bytes> parts;  // as asked for
+    std::string problem;       // why not good, in a few words
+    double wait_s = 0;         // above 0: the mirror is to be left alone, at least for so long (429, 5xx)
+    bool for_good = false;     // the mirror will never deliver: has another file by now, knows no ranges
+    bool absent = false;       // the mirror does not have this entry; it may have others
+    bool lied = false;         // of models: the bytes are wrong
   };
   virtual ~Transport() = default;
   virtual std::size_t mirrors() const = 0;  // at least one
@@ -101,8 +98,7 @@ struct TransferEnd {
 /// - A mirror that lacks an entry is not asked for that entry again; a package may be spread over mirrors of
 ///   which none has all of it.
 /// - A mirror that lies (bytes of another digest) is dropped, and all that it still owes goes to others. It
-/// is
-///   asked again only where there is no other.
+///   is asked again only where there is no other.
 /// - A request is late when it is not there after four times the expected time (at least 8 round trips and
 ///   half a second) while another mirror delivers. It goes to another mirror. A mirror that has brought
 ///   nothing of it is left alone as long as another answers; one that has brought a part is slower than was
@@ -132,5 +128,21 @@ class PlanSource final : public RequestSource {
   Accept accept_;
   std::vector<std::int32_t> rung_;  // by offer: the rung that was asked for
 };
+
+struct TransportOptions {
+  HttpOptions http;
+  int connections = 6;                       // per mirror, as browsers have; a request beyond them waits
+  std::map<std::string, std::string> etags;  // by URL, what is known of containers already
+};
+
+/// Over HTTP, from one or more mirrors that serve the same package: URLs of containers (ranges) or, ending in
+/// a slash, of trees (ranges of an entry, the whole entry where that is asked for). InputError for anything
+/// that is no URL. Requests are tried once: transfer() asks elsewhere or again; what a cut answer has brought
+/// is kept until then. A container that is replaced meanwhile (ETag, length), or that is not
+/// answered in ranges, has failed for good.
+std::unique_ptr<Transport> open_transport(const std::vector<std::string>& mirrors,
+                                          const TransportOptions& options = {});
+/// From a store that is here, without a network: every request is answered at once.
+std::unique_ptr<Transport> open_transport(PackageStore& store);
 
 }  // namespace texmesh

@@ -1,12 +1,13 @@
 import wasm from 'encoder.wasm';
 import { type BlockLevel, type BlockRequest, type Pixels, blockBytes, blockFormats } from './blocks/formats';
 
-// What workers fetch where textures become blocks of 4 x 4 texels on the way to the GPU: encoder/ as WASM, and its use.
+// What workers fetch where textures become blocks of 4 x 4 texels: encoder/ as WASM, and its use.
 
 interface Encoder {
   memory: WebAssembly.Memory;
   __heap_base: WebAssembly.Global;
-  encode(format: number, blockBytes: number, pixels: number, width: number, height: number, out: number): void;
+  encode(format: number, blockBytes: number, pixels: number, width: number, height: number,
+    out: number): void;
   halve(pixels: number, width: number, height: number): void;
 }
 let encoder: Promise<Encoder> | undefined;
@@ -16,14 +17,16 @@ async function start(): Promise<Encoder> {
   return (await WebAssembly.instantiate(bytes)).instance.exports as unknown as Encoder;
 }
 function pixelsOf(picture: ImageBitmap, [width, height]: [number, number]): Uint8ClampedArray {
-  const context = new OffscreenCanvas(width, height).getContext('2d', { alpha: false, willReadFrequently: true })!;
+  const context =
+    new OffscreenCanvas(width, height).getContext('2d', { alpha: false, willReadFrequently: true })!;
   context.drawImage(picture, 0, 0);
   return context.getImageData(0, 0, width, height).data;
 }
 const pageBytes = 65536;
 
 /** A picture and its halves as blocks; the picture is closed. */
-export async function toBlocks(from: ImageBitmap | Pixels, { format, own, size: [mostWidth, mostHeight] }: BlockRequest): Promise<BlockLevel[]> {
+export async function toBlocks(from: ImageBitmap | Pixels,
+    { format, own, size: [mostWidth, mostHeight] }: BlockRequest): Promise<BlockLevel[]> {
   let [width, height] = [Math.min(from.width, mostWidth), Math.min(from.height, mostHeight)];
   const { memory, __heap_base: base, encode, halve } = await (encoder ??= start());
   const pixels = 'pixels' in from ? from.pixels : pixelsOf(from, [width, height]);
@@ -39,8 +42,9 @@ export async function toBlocks(from: ImageBitmap | Pixels, { format, own, size: 
   for (let level = 0; ; ++level) {
     const blocks = level < own;
     if (blocks) encode(blockFormats.indexOf(format), blockBytes(format), at, width, height, out);
-    levels.push({ width, height, data: blocks ? heap.slice(out, out + bytesOf()) : heap.slice(at, at + 4 * width * height) });
-    // A piece that is narrower than a texel of the next level has no part in that. Whole pictures end with one texel.
+    levels.push({ width, height,
+      data: blocks ? heap.slice(out, out + bytesOf()) : heap.slice(at, at + 4 * width * height) });
+    // A piece that is narrower than a texel of the next level has no part in it. Wholes end with a texel.
     const last = Number.isFinite(own) ? Math.min(width, height) < 2 : Math.max(width, height) < 2;
     if (!blocks || last) return levels;
     halve(at, width, height);

@@ -28,17 +28,20 @@ export class TexmeshPackage extends PackageReader {
   shared?: SharedWorkers;
 
   /**
-   * Shows the package in a scene: at once at its coarsest, then as well as time and display allow. The time of the first load
-   * counts from the package's first request, that of others from this call. InputError: an option has a value that it cannot have.
+   * Shows the package in a scene: at once at its coarsest, then as well as time and display allow. The time
+   * of the first load counts from the package's first request, that of others from this call. InputError: an
+   * option has a value that it cannot have.
    */
   load(scene: Object3D, options: LoadOptions): LoadedModel {
     const { time = 0, display } = options;
     for (const [name, all] of Object.entries(names)) {
       const said = options[name as keyof typeof names];
-      if (said !== undefined && !(all as readonly string[]).includes(said)) throw new InputError('options', name, all.join(', '), String(said));
+      if (said !== undefined && !(all as readonly string[]).includes(said))
+        throw new InputError('options', name, all.join(', '), String(said));
     }
     if (!(time >= -Infinity)) throw new InputError('options', 'time', 'seconds', String(time));
-    if (typeof display === 'number' && !(display >= 0)) throw new InputError('options', 'display', 'pixels', String(display));
+    if (typeof display === 'number' && !(display >= 0))
+      throw new InputError('options', 'display', 'pixels', String(display));
     let { pool } = this;
     if (!pool || pool.isUnavailable || options.workerUrl || options.decode) {
       pool?.dispose();
@@ -48,7 +51,8 @@ export class TexmeshPackage extends PackageReader {
     this.decodeDocument = pool.decodeDocument;
     const forget = (): void => void this.loads_.delete(load);
     const { rule = options.policy === 'thesis' ? 'jnd' : undefined } = options;
-    const load = loadModel(this, scene, { ...options, rule }, pool, this.loaded_ ? nowS() : this.openedS, forget);
+    const load = loadModel(this, scene, { ...options, rule }, pool, this.loaded_ ? nowS() : this.openedS,
+      forget);
     this.pool = undefined;
     this.loaded_ = true;
     this.loads_.add(load);
@@ -65,10 +69,12 @@ export class TexmeshPackage extends PackageReader {
 }
 
 /**
- * Opens a package: one request of 44 KiB, which brings most first pictures along. `url` is that of a .texmesh file, or of the folder that `texmesh unpack` made
- * of one, ending in a slash. InputError when the server does not deliver, FormatError when it is no package.
+ * Opens a package: one request of 44 KiB, which brings most first pictures along. `url` is that of a .texmesh
+ * file, or of the folder that `texmesh unpack` made of one, ending in a slash. InputError when the server
+ * does not deliver, FormatError when it is no package.
  */
-export async function open(url: string, options: OpenOptions & Omit<PoolOptions, 'workers'> = {}): Promise<TexmeshPackage> {
+export async function open(url: string,
+    options: OpenOptions & Omit<PoolOptions, 'workers'> = {}): Promise<TexmeshPackage> {
   const pool = new WorkerPool({ ...options, workers: 1 }); // the worker starts while the manifest comes
   try {
     const opened = await TexmeshPackage.openUrl(url, options, pool.decodeDocument);

@@ -11,7 +11,7 @@ import { Emitter } from './scene/events';
 import { GpuRoom } from './scene/gpu';
 import { SharedWorkers } from './worker/shared_workers';
 
-/** The renderer that draws all models of a page: browsers give a page few contexts. Pictures are copied to the models' own canvases. */
+/** The renderer of all models of a page, as browsers give few contexts. It copies pictures to canvases. */
 class Painter {
   private own_?: WebGLRenderer;
 
@@ -20,8 +20,10 @@ class Painter {
   /** Made when it is first asked for. Throws where the browser has no WebGL. */
   get renderer(): WebGLRenderer {
     if (this.given_ ?? this.own_) return (this.given_ ?? this.own_)!;
-    const renderer = (this.own_ = new WebGLRenderer({ antialias: true, alpha: true, powerPreference: 'high-performance' }));
-    renderer.debug.checkShaderErrors = false; // each question waits for the compiler, and the programs are three.js's own
+    const renderer =
+      (this.own_ = new WebGLRenderer({ antialias: true, alpha: true, powerPreference: 'high-performance' }));
+    // each question waits for the compiler, and the programs are three.js's own
+    renderer.debug.checkShaderErrors = false;
     renderer.toneMapping = NeutralToneMapping;
     renderer.setClearAlpha(0);
     return renderer;
@@ -32,7 +34,7 @@ class Painter {
     const renderer = this.given_ ?? this.own_;
     return renderer ? GpuRoom.of(renderer).limitBytes : Infinity;
   }
-  /** Draws a scene as large as the canvas has pixels. False: nothing can be drawn now, the context is lost. */
+  /** Draws a scene as large as the canvas has pixels. False: the context is lost. */
   draw(scene: Scene, camera: Camera, canvas: HTMLCanvasElement): boolean {
     const { renderer } = this;
     const { width, height } = canvas;
@@ -40,13 +42,15 @@ class Painter {
     if (!to || width < 1 || height < 1 || renderer.getContext().isContextLost()) return false;
     const size = renderer.getDrawingBufferSize(new Vector2());
     // The buffer grows to the largest picture: to make it anew for each would take longer than to draw.
-    if (size.x < width || size.y < height) renderer.setDrawingBufferSize(Math.max(size.x, width), Math.max(size.y, height), 1);
+    if (size.x < width || size.y < height)
+      renderer.setDrawingBufferSize(Math.max(size.x, width), Math.max(size.y, height), 1);
     renderer.setViewport(0, 0, width, height);
     renderer.setScissor(0, 0, width, height);
     renderer.setScissorTest(true);
     renderer.render(scene, camera);
     to.globalCompositeOperation = 'copy';
-    to.drawImage(renderer.domElement, 0, renderer.domElement.height - height, width, height, 0, 0, width, height);
+    to.drawImage(renderer.domElement, 0, renderer.domElement.height - height, width, height, 0, 0, width,
+      height);
     return true;
   }
   dispose(): void {
@@ -58,7 +62,7 @@ class Painter {
 export type * from './page/page_model';
 export type { Orbit } from './page/framing';
 
-/** So many packages share the link without harm: one round trip each costs as much as the bytes behind the first pictures. */
+/** So many packages share the link without harm: a round trip costs what the first pictures' bytes cost. */
 const fewModels = 2;
 /** Share of the time behind the last bytes: they are decoded, go to the GPU, and are drawn. */
 const drawingShare = 0.01;
@@ -69,11 +73,11 @@ export interface PageOptions {
   gltfLoader: () => GltfLoaderLike;
   /** Draws all models; left out: a renderer of the page's own. */
   renderer?: WebGLRenderer;
-  /** Seconds from the first model that comes to a quiet page until all that is seen is as good as the time allows. Default 5. */
+  /** Seconds from the first new model until all that is seen is as good as the time allows. Default 5. */
   time?: number;
   /** Bytes that all models may take on the GPU. Default: by the device. */
   memoryBytes?: number;
-  /** Packages whose manifests and first pictures come at once. Default 6, the connections that a browser has for a server. */
+  /** Packages whose first pictures come at once. Default 6: a browser's connections for a server. */
   openAtOnce?: number;
   /** Workers of all models. Default: 2 to 4 by the number of cores. */
   workers?: number;
@@ -86,13 +90,14 @@ export interface PageEvents {
   'first-pictures': { at: number; seconds: number; models: number };
   /** Every model that is seen has had its turn: the limit and the actual time. */
   deadline: { at: number; limit: number; actual: number };
-  /** All have had their turn, or the GPU has shown that it holds less: bytes on the GPU, and the limit from now on. */
+  /** All had their turn, or the GPU holds less than thought: bytes on the GPU, and the limit from now on. */
   memory: { at: number; gpuBytes: number; limitBytes: number };
 }
 
 /**
- * Any number of packages on one page: one time limit, one link, one limit of memory and one graphics context for all. What is seen comes
- * first, then what is close by; models far from the screen are released and keep their last picture.
+ * Any number of packages on one page: one time limit, one link, one limit of memory and one graphics context
+ * for all. What is seen comes first, then what is close by; models far from the screen are released and keep
+ * their last picture.
  */
 export class TexmeshPage {
   private readonly mostBytes_: number;
@@ -116,11 +121,12 @@ export class TexmeshPage {
     const { hardwareConcurrency: cores = 2 } = globalThis.navigator ?? {};
     this.mostBytes_ = options_.memoryBytes ?? deviceMemoryBytes();
     this.painter_ = new Painter(options_.renderer);
-    this.workers_ = new SharedWorkers(options_.workers ?? Math.min(4, Math.max(2, cores - 1)), options_.workerUrl);
+    this.workers_ = new SharedWorkers(options_.workers ?? Math.min(4, Math.max(2, cores - 1)),
+      options_.workerUrl);
     this.visibility_ = new Visibility((canvas, resized) => this.placeChanged_(canvas, resized));
   }
 
-  /** Shows a package on a canvas, as soon as the canvas is seen. A canvas that has a model gets the new one instead. */
+  /** Shows a package on a canvas, as soon as it is seen. It replaces the model that the canvas had. */
   add(canvas: HTMLCanvasElement, url: string, options: PageModelOptions = {}): PageModel {
     this.models_.get(canvas)?.remove();
     const model = new PageModel(this.host_, canvas, url, options);
@@ -170,8 +176,10 @@ export class TexmeshPage {
 
   private readonly host_: Host = {
     open: (url: string, options: OpenHow): Promise<TexmeshPackage> =>
-      open(url, { startBytes: this.startBytes_, ...options, shared: this.workers_, workerUrl: this.options_.workerUrl }),
-    loadOptions: () => ({ renderer: this.painter_.renderer, gltfLoader: this.options_.gltfLoader, workers: 2 }),
+      open(url, { startBytes: this.startBytes_, ...options, shared: this.workers_,
+        workerUrl: this.options_.workerUrl }),
+    loadOptions: () => ({ renderer: this.painter_.renderer, gltfLoader: this.options_.gltfLoader,
+      workers: 2 }),
     memoryBytes: (model) => this.memoryOf_(model),
     turn: (model, bytes) =>
       new Promise((given) => {
@@ -187,14 +195,11 @@ export class TexmeshPage {
       this.advance_();
     },
   };
-  /** Of several packages, each asks for its manifest and little more: what stands behind one's first picture would keep the others' waiting. */
+  /** Each of several packages asks for its manifest and little more, so that none keeps others waiting. */
   private get startBytes_(): number {
     return this.waiting_.length > fewModels ? bootstrapBytes : startBytes;
   }
-  /**
-   * What is seen has nearly all of the memory; what is only close by has a picture. Some models take more than their share however coarse they
-   * are: those that come later have the less.
-   */
+  /** What is seen has nearly all memory. Some models take more than their share: later ones have less. */
   private memoryOf_(model: PageModel): number {
     const areas = this.models.filter((m) => m.place.visible || m === model).map((m) => m.place.areaPx);
     const free = this.memoryBytes - (this.gpuBytes - model.gpuBytes);
@@ -221,7 +226,7 @@ export class TexmeshPage {
       this.tell_();
     });
   }
-  /** Makes the graphics context while the first bytes come: nobody is asked for bytes while a context is being made. */
+  /** Makes the graphics context while the first bytes come, as nothing is asked for while it is made. */
   private prepare_(): void {
     this.preparing_ ??= setTimeout(() => {
       try {
@@ -231,7 +236,8 @@ export class TexmeshPage {
   }
   private nextStep_(): ReturnType<typeof nextStep> {
     return nextStep({
-      models: this.models, openAtOnce: this.options_.openAtOnce ?? 6, askedForTurn: new Set(this.turns_.keys()), refining: this.refining_,
+      models: this.models, openAtOnce: this.options_.openAtOnce ?? 6,
+      askedForTurn: new Set(this.turns_.keys()), refining: this.refining_,
       memoryShare: this.gpuBytes / this.memoryBytes, isNear: ({ canvas }) => this.visibility_.isNear(canvas),
     });
   }
@@ -267,7 +273,8 @@ export class TexmeshPage {
     return this.options_.time ?? 5;
   }
   private get waiting_(): PageModel[] {
-    return this.models.filter((m) => m.place.visible && ['waiting', 'released', 'opening', 'first-picture', 'turn'].includes(m.phase));
+    return this.models.filter((m) => m.place.visible &&
+      ['waiting', 'released', 'opening', 'first-picture', 'turn'].includes(m.phase));
   }
   /** Time counts from the first model that comes to a page where nothing is under way. */
   private beginPeriod_(): void {
@@ -323,7 +330,9 @@ export class TexmeshPage {
 }
 
 function deviceMemoryBytes(): number {
-  const { deviceMemory, maxTouchPoints = 0 } = (globalThis.navigator ?? {}) as Partial<Navigator> & { deviceMemory?: number };
+  const { deviceMemory, maxTouchPoints = 0 } = (globalThis.navigator ?? {}) as Partial<Navigator>
+    & { deviceMemory?: number };
   const { width = 1920, height = 1080 } = globalThis.screen ?? {};
-  return defaultMemoryBytes({ deviceMemoryGb: deviceMemory, screenPx: width * height, touch: maxTouchPoints > 0 });
+  return defaultMemoryBytes({ deviceMemoryGb: deviceMemory, screenPx: width * height,
+    touch: maxTouchPoints > 0 });
 }

@@ -1,4 +1,5 @@
-// One script tag: defines <texmesh-viewer>. three.js and its decoders are inside; worker.js and draco/ stand beside this file.
+// One script tag: defines <texmesh-viewer>. three.js and its decoders are inside; worker.js and draco/ stand
+// beside this file.
 import { HemisphereLight, type Material, type Mesh, PMREMGenerator, type Scene, type Texture } from 'three';
 import { DRACOLoader } from 'three/addons/loaders/DRACOLoader.js';
 import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
@@ -45,7 +46,8 @@ function surroundings(): Promise<Texture> {
 async function surroundMetals(scene: Scene): Promise<void> {
   let metallic = false;
   scene.traverse((o) => {
-    for (const m of [(o as Mesh).material].flat() as (Material & { metalness?: number })[]) metallic ||= (m?.metalness ?? 0) > 0.5;
+    for (const m of [(o as Mesh).material].flat() as (Material & { metalness?: number })[])
+      metallic ||= (m?.metalness ?? 0) > 0.5;
   });
   if (!metallic || scene.environment) return;
   mirror(scene, await surroundings());

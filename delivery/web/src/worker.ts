@@ -12,8 +12,6 @@ interface WorkerScope {
 const scope = globalThis as unknown as WorkerScope & { WorkerGlobalScope?: unknown };
 if (typeof scope.WorkerGlobalScope !== 'undefined')
   scope.onmessage = ({ data }) => {
-    handle(data).then(
-      ([result, transfer]) => scope.postMessage({ id: data.id, result }, transfer),
-      (error: unknown) => scope.postMessage({ id: data.id, error: packError(error) }, []),
-    );
+    handle(data).then(([result, transfer]) => scope.postMessage({ id: data.id, result }, transfer),
+      (error: unknown) => scope.postMessage({ id: data.id, error: packError(error) }, []));
   };

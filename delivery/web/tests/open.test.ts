@@ -11,8 +11,10 @@ import { files, quick, range, rejection, turns, url } from './support/scan';
 import { withWorkers } from './support/workers';
 
 describe('a load', () => {
-  const options = { renderer: {}, gltfLoader: () => { throw new Error('not asked for here'); } } as unknown as LoadOptions;
-  const pkg = async (server: FakeServer): Promise<TexmeshPackage> => TexmeshPackage.openUrl(url, { fetch: server.fetch, ...quick });
+  const options =
+    { renderer: {}, gltfLoader: () => { throw new Error('not asked for here'); } } as unknown as LoadOptions;
+  const pkg = async (server: FakeServer): Promise<TexmeshPackage> =>
+    TexmeshPackage.openUrl(url, { fetch: server.fetch, ...quick });
   it('takes every policy by its names, and no other', async () => {
     const opened = await pkg(range());
     for (const policy of ['guard', 'thesis', undefined] as const)
@@ -24,13 +26,16 @@ describe('a load', () => {
     const opened = await pkg(range());
     const good = { rule: 'edge', meshes: 'auto', time: Infinity, display: 0 } as const;
     opened.load(new Scene(), { ...options, ...good }).dispose();
-    for (const bad of [{ rule: 'foo' }, { meshes: '' }, { time: NaN }, { time: 'soon' }, { display: NaN }, { display: -5 }])
-      expect(() => opened.load(new Scene(), { ...options, ...(bad as Partial<LoadOptions>) })).toThrow(InputError);
+    for (const bad of [{ rule: 'foo' }, { meshes: '' }, { time: NaN }, { time: 'soon' }, { display: NaN },
+        { display: -5 }])
+      expect(() => opened.load(new Scene(), { ...options, ...(bad as Partial<LoadOptions>) }))
+        .toThrow(InputError);
   });
   it('takes whole numbers for scale and rung', async () => {
     const opened = await pkg(range());
     for (const v of [1.5, -1, NaN, Infinity, '1' as unknown as number])
-      for (const name of ['scale', 'rung']) expect(() => opened.load(new Scene(), { ...options, [name]: v })).toThrow(InputError);
+      for (const name of ['scale', 'rung'])
+        expect(() => opened.load(new Scene(), { ...options, [name]: v })).toThrow(InputError);
     const model = opened.load(new Scene(), { ...options, rung: 99, scale: 0 });
     expect(() => model.setOverride({ rung: 0.5 })).toThrow(InputError);
     model.setOverride({});
@@ -67,7 +72,8 @@ describe('open() that is cancelled while the manifest is decoded', () => {
       asked.push(request.op);
       return new Promise(() => undefined);
     };
-    const opening = open(url, { fetch: fakeServer(files).fetch, signal: abort.signal, decode }).then(() => 'opened', (error: Error) => error.name);
+    const opening = open(url, { fetch: fakeServer(files).fetch, signal: abort.signal, decode })
+      .then(() => 'opened', (error: Error) => error.name);
     expect(await until(() => asked.length > 0)).toBe(true);
     abort.abort();
     expect(await Promise.race([opening, turns(500).then(() => 'still waits')])).toBe('AbortError');
@@ -78,7 +84,8 @@ describe('open() that is cancelled while the manifest is decoded', () => {
       abort.abort();
       return handle(request);
     };
-    const opening = open(url, { fetch: fakeServer(files).fetch, signal: abort.signal, decode }).then(() => 'opened', (error: Error) => error.name);
+    const opening = open(url, { fetch: fakeServer(files).fetch, signal: abort.signal, decode })
+      .then(() => 'opened', (error: Error) => error.name);
     expect(await opening).toBe('AbortError');
   });
 });
@@ -97,7 +104,8 @@ it('a load whose options are refused leaves no worker behind', async () => {
   await withWorkers(worker, async (all) => {
     const pkg = await open(url, { fetch: fakeServer(files).fetch });
     expect(all.map((w) => w.ended)).toEqual([false]);
-    expect(() => pkg.load({} as never, { renderer: {}, gltfLoader: () => ({}), scale: 1.5 } as never)).toThrow('scale');
+    expect(() => pkg.load({} as never, { renderer: {}, gltfLoader: () => ({}), scale: 1.5 } as never))
+      .toThrow('scale');
     pkg.dispose();
     expect(all.length).toBeGreaterThan(0);
     expect(all.every((w) => w.ended)).toBe(true);

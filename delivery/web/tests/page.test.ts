@@ -10,7 +10,8 @@ const hosts = Array.from({ length: 20 }, (_, i) => `http://host/${i}/scan.texmes
 const files = Object.fromEntries([...hosts, url].map((u) => [new URL(u).pathname, container]));
 const options = (fault?: Fault): { how: PageModelOptions; server: ReturnType<typeof fakeServer> } => {
   const server = fakeServer(files, { fault });
-  return { server, how: { open: { fetch: server.fetch, retries: 0, retryDelayS: 0.001, decode: decodeNothing }, load: { decode: decodeNothing, meshes: 'glb' } } };
+  return { server, how: { open: { fetch: server.fetch, retries: 0, retryDelayS: 0.001,
+    decode: decodeNothing }, load: { decode: decodeNothing, meshes: 'glb' } } };
 };
 const isShown = (m: PageModel): boolean => m.phase === 'shown';
 const picturesOf = (m: PageModel): number => (m.canvas as unknown as FakeCanvas).pictures;
@@ -64,13 +65,15 @@ describe('a page', () => {
       for (let at = 0; at < 3; ++at) {
         canvases.forEach((c, i) => ((c as unknown as FakeCanvas).top = (i - 2 * at) * 0.6));
         scrolled();
-        expect(await until(() => [2 * at, 2 * at + 1].every((i) => models[i].phase === 'shown' && models[i].complete))).toBe(true);
+        expect(await until(() =>
+          [2 * at, 2 * at + 1].every((i) => models[i].phase === 'shown' && models[i].complete))).toBe(true);
         most = Math.max(most, page.gpuBytes);
       }
       expect(most).toBeGreaterThan(1e5);
       expect(most).toBeLessThanOrEqual(2e6);
     }));
-  it('fetches nothing for what is far from the screen, releases what has gone there, and shows it again', () =>
+  it('fetches nothing for what is far from the screen, releases what has gone there, and shows it again',
+    () =>
     withPage({ time: 1 }, async ({ page, canvas, scrolled }) => {
       const { how, server } = options();
       const [here, far] = [canvas(0), canvas(7)];
@@ -98,7 +101,8 @@ describe('a page', () => {
       const { how } = options(({ url: asked }) => (dead && asked === hosts[1] ? 'status-404' : false));
       const models = hosts.slice(0, 3).map((u) => page.add(canvas(), u, how));
       const errors: string[] = [];
-      models.forEach((m, i) => m.on('error', ({ fatal, message }) => errors.push(`${i} ${fatal} ${/404/.test(message)}`)));
+      models.forEach((m, i) =>
+        m.on('error', ({ fatal, message }) => errors.push(`${i} ${fatal} ${/404/.test(message)}`)));
       expect(await until(() => models[0].phase === 'shown' && models[2].phase === 'shown')).toBe(true);
       expect(errors).toEqual(['1 true true']);
       expect(models[1].phase).toBe('failed');

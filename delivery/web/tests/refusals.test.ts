@@ -4,8 +4,8 @@ import { golden } from './support/files';
 import { Json, Mutant } from './support/mutate';
 import { rejection } from './support/scan';
 
-// Documents that do not fit each other, by the number of the rule in format/SPEC.md. Digests are right throughout: whoever makes such
-// a package on purpose writes them, too.
+// Documents that do not fit each other, by the number of the rule in format/SPEC.md. Digests are right
+// throughout: whoever makes such a package on purpose writes them, too.
 
 const container = golden('v2.0-scan');
 
@@ -94,6 +94,7 @@ describe('documents that do not fit each other are refused', () => {
   });
   it('a package of major version 1 is to be compiled again', async () => {
     const bytes = new Mutant(container).seal((m) => (m.version.major = 1));
-    expect(`${await rejection(readDocuments(bytes))}`).toContain('1, which is no longer read: compile the model again');
+    expect(`${await rejection(readDocuments(bytes))}`)
+      .toContain('1, which is no longer read: compile the model again');
   });
 });

@@ -3,7 +3,8 @@ import { describe, expect, it } from 'vitest';
 import { type About, type Manifest, PackageReader, type PlaneTables } from '../src/reader';
 import { golden, readText, root } from './support/files';
 
-interface Choices { timeS: number; capBytesPerSecond: number; policy: string; scale: number | null; rung: number | null }
+interface Choices { timeS: number; capBytesPerSecond: number; policy: string; scale: number
+  | null; rung: number | null }
 interface Turn { at: number; plannedS: number; actualS: number; skipped: boolean }
 const viewer = (file: string): Promise<unknown> => import(join(root, 'examples/viewer/src', file));
 const { capsWith, choicesFromAddress, kPolicies, readable } = (await viewer('choices.ts')) as {
@@ -14,13 +15,16 @@ const { capsWith, choicesFromAddress, kPolicies, readable } = (await viewer('cho
 };
 const { stepData } = (await viewer('panel/scale_plot.ts')) as { stepData(m: Manifest): number[][] };
 const { ladderData } = (await viewer('panel/ladder_plot.ts')) as { ladderData(t: PlaneTables): number[][] };
-const { turnData } = (await viewer('panel/time_plots.ts')) as { turnData(turns: Turn[], of: (t: Turn) => (number | null)[]): (number | null)[][] | null };
-const { rightsOf } = (await viewer('rights.ts')) as { rightsOf(about: About | null): { by: string; licence: string; url: string } };
+const { turnData } = (await viewer('panel/time_plots.ts')) as { turnData(turns: Turn[],
+  of: (t: Turn) => (number | null)[]): (number | null)[][] | null };
+const { rightsOf } = (await viewer('rights.ts')) as { rightsOf(about: About | null): { by: string;
+  licence: string; url: string } };
 const at = (query: string): Choices => choicesFromAddress(new URLSearchParams(query));
 
 describe("the viewer's line about rights", () => {
   it('says whose the object is, and links the licence', () => {
-    expect(rightsOf({ creator: 'A', attribution: 'B', licence: 'MIT', licenceUrl: 'https://a.b/' })).toEqual({ by: 'B', licence: 'MIT', url: 'https://a.b/' });
+    expect(rightsOf({ creator: 'A', attribution: 'B', licence: 'MIT', licenceUrl: 'https://a.b/' }))
+      .toEqual({ by: 'B', licence: 'MIT', url: 'https://a.b/' });
     expect(rightsOf({ creator: 'A', licence: 'ask' })).toEqual({ by: 'A', licence: 'ask', url: '' });
     expect(rightsOf({ licenceUrl: 'https://a.b/' })).toEqual({ by: '', licence: '', url: '' });
     expect(rightsOf(null)).toEqual({ by: '', licence: '', url: '' });
@@ -36,7 +40,8 @@ describe("the viewer's choices", () => {
   it('of a link are in the list, whatever an address asks for', () => {
     expect(capsWith(at('mbit=3').capBytesPerSecond)).toContainEqual(['3 Mbit/s', 375000]);
     expect(capsWith(at('mbit=2').capBytesPerSecond).filter(([, v]) => v === 250000).length).toBe(1);
-    for (const other of ['', 'mbit=0', 'mbit=-1', 'mbit=x']) expect(capsWith(at(other).capBytesPerSecond)[0][1]).toBe(Infinity);
+    for (const other of ['', 'mbit=0', 'mbit=-1', 'mbit=x'])
+      expect(capsWith(at(other).capBytesPerSecond)[0][1]).toBe(Infinity);
   });
   it('of time and scale are numbers or nothing', () => {
     expect(at('time=none').timeS).toBe(Infinity);
@@ -52,8 +57,10 @@ describe("the viewer's choices", () => {
 
 /** Two fragments of equal surface and two rungs; `more` in place of some of it. */
 const tables = (more: Partial<PlaneTables> = {}): PlaneTables => ({
-  columns: 2, rows: 1, incremental: false, order: Uint16Array.of(1, 0), rungQuality: Uint8Array.of(20, 80), tableBytes: Uint32Array.of(5, 7),
-  sizeBytes: Uint32Array.of(10, 20, 30, 40), dssim: Float32Array.of(0.25, 0.125, 0.125, 0.0625), skipDssim: Float32Array.of(0.5, 0.75),
+  columns: 2, rows: 1, incremental: false, order: Uint16Array.of(1, 0), rungQuality: Uint8Array.of(20, 80),
+  tableBytes: Uint32Array.of(5, 7),
+  sizeBytes: Uint32Array.of(10, 20, 30, 40), dssim: Float32Array.of(0.25, 0.125, 0.125, 0.0625),
+  skipDssim: Float32Array.of(0.5, 0.75),
   coveredTexels: Uint32Array.of(100, 100), surfaceFraction: Float32Array.of(0.5, 0.5), ...more,
 } as PlaneTables);
 
@@ -76,10 +83,12 @@ describe("the viewer's plots", () => {
     const ssim = [1 - (0.25 + 0.125) / 2, 1 - (0.125 + 0.0625) / 2];
     expect(ladderData(tables())).toEqual([[20, 80], sums, ssim]);
     expect(ladderData(tables({ incremental: true }))).toEqual([[20, 80], [sums[0], sums[0] + sums[1]], ssim]);
-    expect(ladderData(tables({ order: new Uint16Array() }))).toEqual([[20, 80], [5, 7], [1, 1]]); // nothing is stored
+    // nothing is stored
+    expect(ladderData(tables({ order: new Uint16Array() }))).toEqual([[20, 80], [5, 7], [1, 1]]);
   });
   it('of time are in the order in which fragments came, without those that were skipped', () => {
-    const turn = (t: number, skipped = false): Turn => ({ at: t, plannedS: 10 * t, actualS: 100 * t, skipped });
+    const turn = (t: number, skipped = false): Turn =>
+      ({ at: t, plannedS: 10 * t, actualS: 100 * t, skipped });
     const of = (t: Turn): (number | null)[] => [t.plannedS, t.at > 2 ? null : t.actualS];
     expect(turnData([turn(3), turn(2, true), turn(1)], of)).toEqual([[1, 3], [10, 30], [100, null]]);
     expect(turnData([turn(1), turn(2, true)], of)).toBe(null);
@@ -94,7 +103,8 @@ describe("the viewer's colours", () => {
   };
   /** WCAG 2: relative luminance, contrast. */
   const luminance = (colour: string): number => {
-    const [r, g, b] = [1, 3, 5].map((i) => parseInt(colour.slice(i, i + 2), 16) / 255).map((v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4));
+    const [r, g, b] = [1, 3, 5].map((i) => parseInt(colour.slice(i, i + 2), 16) / 255)
+      .map((v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4));
     return 0.2126 * r + 0.7152 * g + 0.0722 * b;
   };
   const contrast = (a: string, b: string): number => {
@@ -109,10 +119,13 @@ describe("the viewer's colours", () => {
     const c = theme(selector);
     const grounds = ['panel', 'paper', 'paper-far'];
     it(`of curves and fragments stand out by 3 : 1 (${name})`, () => {
-      for (const colour of ['k1', 'k2', 'k3', 'k4', 'warm', 'skipped', 'accent']) for (const ground of ['panel', 'paper']) expect([colour, ground, contrast(c[colour], c[ground]) >= 3]).toEqual([colour, ground, true]);
+      for (const colour of ['k1', 'k2', 'k3', 'k4', 'warm', 'skipped', 'accent'])
+        for (const ground of ['panel', 'paper'])
+          expect([colour, ground, contrast(c[colour], c[ground]) >= 3]).toEqual([colour, ground, true]);
     });
     it(`of words by 4.5 : 1 (${name})`, () => {
-      for (const colour of ['ink', 'muted']) for (const ground of grounds) expect([colour, ground, contrast(c[colour], c[ground]) >= 4.5]).toEqual([colour, ground, true]);
+      for (const colour of ['ink', 'muted']) for (const ground of grounds)
+        expect([colour, ground, contrast(c[colour], c[ground]) >= 4.5]).toEqual([colour, ground, true]);
       expect(contrast(c.warm, c['paper-far'])).toBeGreaterThanOrEqual(4.5); // what went wrong
       expect(contrast(c['accent-ink'], c.accent)).toBeGreaterThanOrEqual(4.5);
     });

@@ -13,10 +13,12 @@ export interface Choices {
 const kMostTimeS = 3600;
 export const kTimes = [0.5, 1, 1.5, 2, 3, 4, 6, 8, 12, 20, 30, 60, Infinity];
 const kCaps: [string, number][] = [
-  ['no cap', Infinity], ['0.5 Mbit/s', 62500], ['1 Mbit/s', 125000], ['2 Mbit/s', 250000], ['5 Mbit/s', 625000], ['10 Mbit/s', 1.25e6],
+  ['no cap', Infinity], ['0.5 Mbit/s', 62500], ['1 Mbit/s', 125000], ['2 Mbit/s', 250000],
+  ['5 Mbit/s', 625000], ['10 Mbit/s', 1.25e6],
   ['50 Mbit/s', 6.25e6],
 ];
-export const kPolicies: [Policy, string][] = [['guard', 'harmonic, guarded'], ['thesis', 'as printed (thesis)']];
+export const kPolicies: [Policy, string][] =
+  [['guard', 'harmonic, guarded'], ['thesis', 'as printed (thesis)']];
 
 /** The bandwidths to choose from, `bytesPerSecond` among them. */
 export function capsWith(bytesPerSecond: number): [string, number][] {
@@ -24,7 +26,10 @@ export function capsWith(bytesPerSecond: number): [string, number][] {
   return [...kCaps, [`${Number((bytesPerSecond / 125000).toPrecision(3))} Mbit/s`, bytesPerSecond]];
 }
 
-/** The choices that the page's address makes, so that a link shows others the same. A value that cannot be chosen counts as none. */
+/**
+ * The choices that the page's address makes, so that a link shows others the same. A value that cannot be
+ * chosen counts as none.
+ */
 export function choicesFromAddress(query: URLSearchParams): Choices {
   const number = (name: string): number | null => {
     const v = query.get(name);
@@ -37,7 +42,8 @@ export function choicesFromAddress(query: URLSearchParams): Choices {
   const time = number('time');
   const mbit = number('mbit');
   return {
-    timeS: query.get('time') === 'none' || (time ?? 0) > kMostTimeS ? Infinity : time !== null && time > 0 ? time : 4,
+    timeS: query.get('time') === 'none' || (time ?? 0) > kMostTimeS ? Infinity
+      : time !== null && time > 0 ? time : 4,
     capBytesPerSecond: mbit !== null && mbit > 0 ? mbit * 125000 : Infinity,
     policy: kPolicies.find(([p]) => p === query.get('policy'))?.[0] ?? 'guard',
     scale: whole('scale'),

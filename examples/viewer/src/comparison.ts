@@ -7,10 +7,7 @@ export class Comparison {
   private readonly divider = byId('divider');
   private share = 0.5; // of the picture's width, left of the border
 
-  constructor(
-    private readonly stage: Stage,
-    private readonly session: Session,
-  ) {
+  constructor(private readonly stage: Stage, private readonly session: Session) {
     const { divider } = this;
     divider.addEventListener('pointerdown', (e) => divider.setPointerCapture(e.pointerId));
     divider.addEventListener('pointermove', (e) => {
@@ -33,13 +30,15 @@ export class Comparison {
     this.load();
   }
 
-  /** Loads the original where the comparison is open; where that fails, the whole picture is the current one again. */
+  /** Loads the original where the comparison is open; a failure shows the current picture again. */
   load(): void {
     if (!this.divider.hidden) void this.loadOriginal();
   }
 
   private async loadOriginal(): Promise<void> {
-    const loading = (is: boolean): void => { byId('side-original').textContent = is ? 'original, loading' : 'original'; };
+    const loading = (is: boolean): void => {
+      byId('side-original').textContent = is ? 'original, loading' : 'original';
+    };
     try {
       await this.session.showOriginal(loading);
     } catch (error) {

@@ -6,7 +6,7 @@ export function byId<T extends HTMLElement>(id: string): T {
   return e as T;
 }
 
-/** Makes an element. A function is a listener, its name begins with `on`; true sets an empty attribute, false none. */
+/** Makes an element. Functions, whose names begin with `on`, are listeners; true is an empty attribute. */
 export function make<K extends keyof HTMLElementTagNameMap>(
   tag: K,
   attributes: Record<string, string | boolean | ((e: Event) => void)> = {},

@@ -19,13 +19,6 @@ export function seconds(s: number): string {
   return `${s < 10 ? s.toFixed(2) : s.toFixed(1)} s`;
 }
 
-/** Bytes per second as bits, which is how links are sold. */
-export function rate(bytesPerSecond: number): string {
-  if (!Number.isFinite(bytesPerSecond) || bytesPerSecond <= 0) return '–';
-  const mbit = (bytesPerSecond * 8) / 1e6;
-  return mbit >= 0.1 ? `${mbit < 10 ? mbit.toFixed(1) : mbit.toFixed(0)} Mbit/s` : `${(mbit * 1000).toFixed(0)} kbit/s`;
-}
-
 export function count(n: number): string {
   return n.toLocaleString('en').replaceAll(',', '\u202f');
 }

@@ -57,8 +57,10 @@ export interface Live {
 
 export function emptyLive(): Live {
   return {
-    manifest: null, textures: [], tables: [], packageBytes: 0, title: '', about: null, phase: 'opening', scale: null, proxy: -1, displayedPx: 0, startedAt: 0,
-    firstPictureS: NaN, doneS: NaN, limitS: NaN, predictedFlip: NaN, bytes: 0, expected: 0, requests: 0, shownPlane: new Map(),
+    manifest: null, textures: [], tables: [], packageBytes: 0, title: '', about: null, phase: 'opening',
+    scale: null, proxy: -1, displayedPx: 0, startedAt: 0,
+    firstPictureS: NaN, doneS: NaN, limitS: NaN, predictedFlip: NaN, bytes: 0, expected: 0, requests: 0,
+    shownPlane: new Map(),
     rungs: new Map(), skipped: new Map(), turns: [], transfers: [], problem: '', problems: 0,
   };
 }

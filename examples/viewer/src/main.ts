@@ -4,7 +4,7 @@ import { graphics } from './stage/gpu';
 import { showError } from './message';
 import { startTheme } from './theme';
 
-// This file is small, so that the page has its colours and a graphics context while the rest is being fetched.
+// This file is small, so that colours and a graphics context are there while the rest comes.
 startTheme();
 const query = new URLSearchParams(location.search);
 const address = query.get('pkg') ?? '';

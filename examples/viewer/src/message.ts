@@ -27,12 +27,18 @@ function headline(error: unknown, text: string): string {
 }
 
 function advice(error: unknown, text: string, url: string): string {
-  const elsewhere = URL.canParse(url, document.baseURI) && new URL(url, document.baseURI).origin !== location.origin;
-  if (/webgl/i.test(text)) return 'This browser, or its graphics driver, gives pages no WebGL. Another browser may.';
+  const elsewhere = URL.canParse(url, document.baseURI) &&
+    new URL(url, document.baseURI).origin !== location.origin;
+  if (/webgl/i.test(text))
+    return 'This browser, or its graphics driver, gives pages no WebGL. Another browser may.';
   if (!URL.canParse(url, document.baseURI)) return 'Look at the address behind ?pkg= in the address bar.';
-  if (error instanceof FormatError) return 'The file may be damaged, or is of a later version. texmesh verify says more.';
-  if (/404|not found/i.test(text)) return 'Look at the address behind ?pkg= in the address bar; it is relative to this page.';
-  if (elsewhere) return 'It stands on another server, which must be reachable and allow this page to read (CORS: Access-Control-Allow-Origin).';
+  if (error instanceof FormatError)
+    return 'The file may be damaged, or is of a later version. texmesh verify says more.';
+  if (/404|not found/i.test(text))
+    return 'Look at the address behind ?pkg= in the address bar; it is relative to this page.';
+  if (elsewhere)
+    return 'It stands on another server, which must be reachable and allow this page to read ' +
+      '(CORS: Access-Control-Allow-Origin).';
   return 'The server may be down, or the connection broken. Loading again may help.';
 }
 
@@ -56,13 +62,16 @@ export async function offerPackages(): Promise<boolean> {
   }
   const items = list.filter((p) => typeof p.url === 'string').map((p) => {
     const name = p.name ?? readable(p.url).replace(/^packages\//, '').replace(/\.texmesh$/, '');
-    const poster = typeof p.poster === 'string' ? [make('img', { src: p.poster, alt: p.title ?? '', loading: 'lazy', width: '72', height: '72' })] : [];
-    return make('li', {}, make('a', { href: `?pkg=${encodeURIComponent(p.url)}` }, ...poster, make('span', {}, name)));
+    const poster = typeof p.poster === 'string'
+      ? [make('img', { src: p.poster, alt: p.title ?? '', loading: 'lazy', width: '72', height: '72' })] : [];
+    return make('li', {},
+      make('a', { href: `?pkg=${encodeURIComponent(p.url)}` }, ...poster, make('span', {}, name)));
   });
   if (items.length) box().replaceChildren(make('h2', {}, 'Packages'), make('ul', {}, ...items));
   else {
     box().replaceChildren(make('h2', {}, 'No package'),
-      make('p', {}, 'Name one in the address: ', make('code', {}, '?pkg=URL-of.texmesh'), ', or put a ', make('code', {}, 'packages.json'), ' beside this page.'));
+      make('p', {}, 'Name one in the address: ', make('code', {}, '?pkg=URL-of.texmesh'), ', or put a ',
+        make('code', {}, 'packages.json'), ' beside this page.'));
   }
   box().hidden = false;
   return items.length > 0;

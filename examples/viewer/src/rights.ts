@@ -9,5 +9,6 @@ export interface Rights {
 
 /** What the viewer shows of about.json beside the title. */
 export function rightsOf(about: About | null): Rights {
-  return { by: about?.attribution ?? about?.creator ?? '', licence: about?.licence ?? '', url: (about?.licence && about.licenceUrl) || '' };
+  return { by: about?.attribution ?? about?.creator ?? '', licence: about?.licence ?? '',
+    url: (about?.licence && about.licenceUrl) || '' };
 }

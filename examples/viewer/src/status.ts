@@ -6,7 +6,8 @@ import type { Live } from './live';
 import { rightsOf } from './rights';
 
 const kPhases: Record<string, string> = {
-  opening: 'Opening', 'first-picture': 'First picture', tables: 'Tables', mesh: 'Mesh', textures: 'Textures', refining: 'Refining', done: '',
+  opening: 'Opening', 'first-picture': 'First picture', tables: 'Tables', mesh: 'Mesh', textures: 'Textures',
+  refining: 'Refining', done: '',
   cancelled: 'Stopped', failed: 'Failed',
 };
 
@@ -16,18 +17,22 @@ export function showStatus(live: Live, packageUrl: string): void {
   const phase = kPhases[live.phase] ?? live.phase;
   const busy = !['done', 'failed', 'cancelled'].includes(live.phase);
   showProgress(shareLoaded(live), busy);
-  byId('phase').textContent = busy ? phase : live.phase === 'done' ? 'Complete' : phase; // what screen readers say
+  // what screen readers say
+  byId('phase').textContent = busy ? phase : live.phase === 'done' ? 'Complete' : phase;
   showProblem(live);
-  byId('status').textContent = [phase, live.bytes > 0 ? `${format.bytes(live.bytes)} in ${live.requests} requests` : '',
-    Number.isFinite(live.doneS) && !busy ? `complete after ${format.seconds(live.doneS)}` : ''].filter(Boolean).join(' · ');
+  byId('status').textContent =
+    [phase, live.bytes > 0 ? `${format.bytes(live.bytes)} in ${live.requests} requests` : '',
+    Number.isFinite(live.doneS) && !busy ? `complete after ${format.seconds(live.doneS)}`
+      : ''].filter(Boolean).join(' · ');
 }
 
 /** A package's name by its URL. */
 function shortName(url: string): string {
-  return readable(url.split(/[?#]/)[0] ?? '').replace(/\/$/, '').split('/').pop()?.replace(/\.texmesh$/, '') || 'texmesh';
+  return readable(url.split(/[?#]/)[0] ?? '').replace(/\/$/, '').split('/').pop()?.replace(/\.texmesh$/,
+    '') || 'texmesh';
 }
 
-/** The attribution, and the licence as a link to where it can be read. Written once: a link under the pointer must stay. */
+/** Attribution, and licence as a link. Written once: a link under the pointer must stay. */
 let shownRights: About | null = null;
 function showRights(about: About | null): void {
   if (about === shownRights) return;
@@ -37,7 +42,8 @@ function showRights(about: About | null): void {
   line.replaceChildren(by);
   if (by !== '' && licence !== '') line.append(' · ');
   // Only http and https: the library has refused any other URL.
-  if (url !== '') line.append(make('a', { href: url, rel: 'license noopener noreferrer', target: '_blank' }, licence));
+  if (url !== '')
+    line.append(make('a', { href: url, rel: 'license noopener noreferrer', target: '_blank' }, licence));
   else line.append(licence);
   line.hidden = by === '' && licence === '';
 }
@@ -48,15 +54,19 @@ function showTitle({ manifest, textures: planes, packageBytes, about }: Live, na
   const finest = manifest.scales[0];
   const textures = planes.filter((p) => p.mip === 0).length;
   byId('subtitle').textContent = [
-    finest ? `${format.count(finest.triangles)} triangles` : '', textures ? `${textures} ${textures === 1 ? 'texture' : 'textures'}` : 'no texture',
+    finest ? `${format.count(finest.triangles)} triangles` : '',
+    textures ? `${textures} ${textures === 1 ? 'texture' : 'textures'}` : 'no texture',
     format.bytes(packageBytes)].filter(Boolean).join(' · ');
   showRights(about);
   document.title = `${name} · texmesh`;
 }
 
-/** With a time limit the share of the time that has passed, without one the share of the bytes that have come. */
+/**
+ * With a time limit the share of the time that has passed, without one the share of the bytes that have come.
+ */
 function shareLoaded(live: Live): number {
-  if (Number.isFinite(live.limitS)) return Math.min((performance.now() - live.startedAt) / 1000 / live.limitS, 1);
+  if (Number.isFinite(live.limitS))
+    return Math.min((performance.now() - live.startedAt) / 1000 / live.limitS, 1);
   return live.expected > 0 ? Math.min(live.bytes / live.expected, 1) : 0.02;
 }
 

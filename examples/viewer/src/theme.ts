@@ -44,6 +44,7 @@ export function onTheme(f: () => void): void {
 /** A colour of style.css, by the name of its variable. */
 export function colour(name: string): string {
   let value = known.get(name);
-  if (value === undefined) known.set(name, (value = getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim()));
+  if (value === undefined) known.set(name,
+    (value = getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim()));
   return value;
 }

@@ -14,8 +14,10 @@ export function wireTools(stage: Stage, comparison: Comparison): void {
   byId('toggle').addEventListener('click', togglePanel);
   byId('toggle').setAttribute('aria-expanded', String(!document.body.classList.contains('wide')));
   document.addEventListener('keydown', (e) => {
-    if (e.ctrlKey || e.metaKey || e.altKey || /^(INPUT|SELECT|TEXTAREA)$/.test((e.target as HTMLElement).tagName)) return;
-    const action = { s: () => comparison.toggle(), t: toggleTheme, p: togglePanel, '0': () => stage.home() }[e.key];
+    if (e.ctrlKey || e.metaKey || e.altKey ||
+        /^(INPUT|SELECT|TEXTAREA)$/.test((e.target as HTMLElement).tagName)) return;
+    const action =
+      { s: () => comparison.toggle(), t: toggleTheme, p: togglePanel, '0': () => stage.home() }[e.key];
     action?.();
   });
 }

@@ -1,6 +1,5 @@
 #include "pipeline/batch/fleet/model_list.h"
 
-#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -22,12 +21,12 @@ namespace {
 namespace fs = std::filesystem;
 constexpr std::size_t kHeadBytes = 1 << 20, kMostJsonBytes = 256u << 20;
 
-std::vector<std::uint8_t> bytes_at(const std::string& path, std::uint64_t offset, std::size_t most) {
+Bytes bytes_at(const std::string& path, std::uint64_t offset, std::size_t most) {
   std::ifstream in(path, std::ios::binary);
   in.seekg(0, std::ios::end);
   const auto end = in.tellg();
   if (!in || static_cast<std::uint64_t>(end) <= offset) return {};
-  std::vector<std::uint8_t> bytes(
+  Bytes bytes(
       static_cast<std::size_t>(std::min<std::uint64_t>(most, static_cast<std::uint64_t>(end) - offset)));
   in.seekg(static_cast<std::streamoff>(offset));
   in.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
@@ -55,12 +54,12 @@ class ListedFiles {
       : model_(model), folder_(fs::path(model).parent_path()), files_(folder_.string(), links_within) {}
 
   std::vector<std::string> find() {
-    const std::string ending = lower_extension(model_);
-    if (ending == "gltf") look_at_gltf(bytes_at(model_, 0, kMostJsonBytes));
-    if (ending == "glb") look_at_glb();
-    if (ending == "obj") look_at_obj();
-    if (ending == "ply") look_at_ply();
-    if (ending == "json") look_at_range_scan();
+    const std::string ending = lower_ending(model_);
+    if (ending == ".gltf") look_at_gltf(bytes_at(model_, 0, kMostJsonBytes));
+    if (ending == ".glb") look_at_glb();
+    if (ending == ".obj") look_at_obj();
+    if (ending == ".ply") look_at_ply();
+    if (ending == ".json") look_at_range_scan();
     return {found_.begin(), found_.end()};
   }
 
@@ -73,7 +72,7 @@ class ListedFiles {
     return file.name;
   }
 
-  void look_at_gltf(const std::vector<std::uint8_t>& json) {
+  void look_at_gltf(const Bytes& json) {
     const nlohmann::ordered_json document = parse_bounded_json(json, model_, 64);
     for (const char* list : {"buffers", "images"})
       for (const auto& item : document.value(list, nlohmann::ordered_json::array())) {
@@ -83,17 +82,17 @@ class ListedFiles {
   }
 
   void look_at_glb() {
-    const std::vector<std::uint8_t> head = bytes_at(model_, 0, 20);
+    const Bytes head = bytes_at(model_, 0, 20);
     if (head.size() < 20) return;
     std::size_t length = 0;
     for (int i = 3; i >= 0; --i) length = length << 8 | head[static_cast<std::size_t>(12 + i)];
-    std::vector<std::uint8_t> json = bytes_at(model_, 20, std::min(length, kMostJsonBytes));
+    Bytes json = bytes_at(model_, 20, std::min(length, kMostJsonBytes));
     while (!json.empty() && (json.back() == 0 || json.back() == ' ')) json.pop_back();
     look_at_gltf(json);
   }
 
   void look_at_obj() {
-    const std::vector<std::uint8_t> head = bytes_at(model_, 0, kHeadBytes);
+    const Bytes head = bytes_at(model_, 0, kHeadBytes);
     const SourceText text(text_of(head), model_, notes_);
     LineReader lines(text.text());
     for (std::string_view line; lines.next(line);) {
@@ -126,7 +125,7 @@ class ListedFiles {
   }
 
   void look_at_range_scan() {
-    const std::vector<std::uint8_t> bytes = bytes_at(model_, 0, kHeadBytes);
+    const Bytes bytes = bytes_at(model_, 0, kHeadBytes);
     const SourceText text(text_of(bytes), model_, notes_);
     const RangeScanDescription scan = read_range_scan_description(model_, text_bytes(text.text()));
     add({scan.grid, "", false});
@@ -139,12 +138,6 @@ class ListedFiles {
   Notes notes_;  // of no interest here
   std::set<std::string> found_;
 };
-
-std::uint64_t bytes_of_file(const std::string& path) {
-  std::error_code ec;
-  const auto bytes = fs::file_size(path, ec);
-  return ec ? 0 : bytes;
-}
 
 }  // namespace
 

@@ -1,7 +1,4 @@
 #pragma once
-#include <cstdint>
-#include <string>
-#include <vector>
 
 #include "pipeline/batch/plan.h"
 #include "pipeline/io/record.h"
@@ -14,8 +11,7 @@ struct ListedModel {
   std::vector<std::string> files;      // beside the model, see named_files()
   std::uint64_t bytes = 0;             // of the model and these files
   int shard = 0;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("model", s.input, "");
     v("output", s.output, "");
     v("package", s.package, "path of the output within the output folder");
@@ -30,8 +26,7 @@ struct ModelList {
   int shards = 1;
   std::string collection;                // collection_digest() where there are several shards
   std::vector<std::string> collections;  // files that were read to find the models
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("version", Constant{1}, "");
     v("shards", s.shards, Range{1, 1'000'000}, "");
     v("collection", s.collection, FieldRule{.pattern = "^[0-9a-f]{64}$", .may_miss = true},

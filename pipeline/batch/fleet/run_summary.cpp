@@ -1,16 +1,165 @@
 // What a run has done, model by model: written, read again, and merged from the runs of all shards.
 #include "pipeline/batch/fleet/run_summary.h"
 
-#include <algorithm>
+#include <fmt/format.h>
+
 #include <nlohmann/json.hpp>
 #include <set>
 
 #include "format/base/bounded_json.h"
-#include "pipeline/batch/junit.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/file_resolver.h"
+#include "pipeline/io/markup.h"
 
 namespace texmesh {
+namespace {
+
+std::string time_attribute(const std::optional<double>& seconds) {
+  return seconds ? fmt::format(" time=\"{:.3f}\"", *seconds) : "";
+}
+
+void check_shard(const std::optional<Shard>& shard, const std::string& file) {
+  if (shard && shard->index >= shard->count)
+    throw InputError(file, "/shard", "index below count", std::to_string(shard->index));
+}
+
+constexpr std::uint64_t kMostSummaryBytes = 1ull << 32;
+
+/// The collection and number of shards that most files are of; of equally many the first file's.
+struct Split {
+  std::string collection;
+  int shards = 1;
+};
+
+Split usual_split(const std::vector<SummaryFile>& files) {
+  std::map<std::string, std::size_t> votes;
+  for (const SummaryFile& f : files)
+    if (f.summary && f.summary->shard) ++votes[f.summary->collection];
+  Split split;
+  std::size_t most = 0;
+  for (const SummaryFile& f : files)
+    if (f.summary && f.summary->shard && votes[f.summary->collection] > most) {
+      most = votes[f.summary->collection];
+      split = {f.summary->collection, f.summary->shard->count};
+    }
+  return split;
+}
+
+/// "0, 3-5"
+std::string ranges_text(const std::vector<int>& numbers) {
+  std::string text;
+  for (std::size_t i = 0; i < numbers.size();) {
+    std::size_t end = i;
+    while (end + 1 < numbers.size() && numbers[end + 1] == numbers[end] + 1) ++end;
+    text += (text.empty() ? "" : ", ") + std::to_string(numbers[i]);
+    if (end > i) text += "-" + std::to_string(numbers[end]);
+    i = end + 1;
+  }
+  return text;
+}
+
+class Merger {
+ public:
+  explicit Merger(std::vector<SummaryFile> files) : files_(std::move(files)), split_(usual_split(files_)) {}
+
+  RunSummary merge() {
+    for (SummaryFile& f : files_) {
+      if (!f.summary)
+        merged_.problems.push_back({f.file, f.kind, f.text});
+      else if (is_foreign(*f.summary))
+        merged_.problems.push_back(
+            {f.file, "foreign",
+             fmt::format("shard {} of {}", f.summary->shard->index, f.summary->shard->count) +
+                 " of another collection, or of this one before its files changed"});
+      else
+        add(f.file, *f.summary);
+      f.summary.reset();  // a million models stand in memory once
+    }
+    name_missing();
+    for (auto& [package, found] : models_) merged_.models.push_back(std::move(found.model));
+    merged_.counts = count_results(merged_.models);
+    return std::move(merged_);
+  }
+
+ private:
+  struct Found {
+    ModelSummary model;
+    std::string file;
+  };
+
+  bool is_foreign(const RunSummary& s) const {
+    return s.shard && (s.collection != split_.collection || s.shard->count != split_.shards);
+  }
+
+  void add(const std::string& file, RunSummary& s) {
+    const std::size_t models = s.models.size();
+    std::map<std::string, std::size_t> doubles;  // by the file that had them first
+    for (ModelSummary& m : s.models) {
+      const auto [at, is_new] = models_.try_emplace(m.package);
+      if (is_new)
+        at->second.file = file;
+      else
+        ++doubles[at->second.file];
+      if (is_new || m.result < at->second.model.result) at->second.model = std::move(m);
+    }
+    for (const auto& [other, count] : doubles)
+      merged_.problems.push_back(
+          {file, "double", std::to_string(count) + " of its packages are those of " + other});
+    merged_.seconds += s.seconds;
+    if (s.shard) seen_.insert(s.shard->index);
+    if (s.parts.empty())
+      merged_.parts.push_back({file, s.shard, models, s.seconds});
+    else
+      merged_.parts.insert(merged_.parts.end(), s.parts.begin(), s.parts.end());
+  }
+
+  void name_missing() {
+    if (seen_.empty()) return;
+    std::vector<int> missing;
+    for (int i = 0; i < split_.shards; ++i)
+      if (!seen_.contains(i)) missing.push_back(i);
+    if (!missing.empty())
+      merged_.problems.push_back(
+          {"", "missing",
+           "no summary of shards " + ranges_text(missing) + " of " + std::to_string(split_.shards)});
+  }
+
+  std::vector<SummaryFile> files_;
+  Split split_;
+  RunSummary merged_;
+  std::map<std::string, Found> models_;  // by package
+  std::set<int> seen_;
+};
+
+}  // namespace
+
+JunitReport::JunitReport(const JunitSuite& s)
+    : text_(fmt::format(
+          "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n<testsuite name=\"{}\" tests=\"{}\" "
+          "failures=\"{}\" errors=\"0\" skipped=\"{}\"{}>\n",
+          markup_escaped(s.name), s.tests, s.failures, s.skipped, time_attribute(s.seconds))) {}
+
+void JunitReport::add(const JunitCase& c) {
+  std::string body;
+  if (!c.properties.empty()) {
+    body += "\n<properties>";
+    for (const auto& [name, value] : c.properties)
+      body += fmt::format("<property name=\"{}\" value=\"{}\"/>", name, markup_escaped(value));
+    body += "</properties>\n";
+  }
+  if (!c.skipped.empty())
+    body += fmt::format("<skipped message=\"{}\"/>\n", markup_escaped(c.skipped));
+  else if (!c.failure.empty() || !c.failure_type.empty())
+    body +=
+        fmt::format("<failure{} message=\"{}\"/>\n",
+                    c.failure_type.empty() ? "" : fmt::format(" type=\"{}\"", markup_escaped(c.failure_type)),
+                    markup_escaped(c.failure));
+  text_ += fmt::format("<testcase classname=\"{}\" name=\"{}\"{}", markup_escaped(c.class_name),
+                       markup_escaped(c.name), time_attribute(c.seconds));
+  text_ += body.empty() ? "/>\n" : ">" + body + "</testcase>\n";
+}
+
+std::string JunitReport::finish() { return std::exchange(text_, {}) + "</testsuite>\n</testsuites>\n"; }
 
 SummaryCounts count_results(const std::vector<ModelSummary>& models) {
   SummaryCounts c;
@@ -42,16 +191,7 @@ RunSummary summarize_run(const BatchPlan& plan, const std::vector<WorkerReport>&
 
 std::string write_summary(const RunSummary& s) { return to_json_with_lines(s, "models", s.models); }
 
-namespace {
-
-void check_shard(const std::optional<Shard>& shard, const std::string& file) {
-  if (shard && shard->index >= shard->count)
-    throw InputError(file, "/shard", "index below count", std::to_string(shard->index));
-}
-
-}  // namespace
-
-RunSummary read_summary(std::span<const std::uint8_t> bytes, const std::string& file) {
+RunSummary read_summary(ByteSpan bytes, const std::string& file) {
   RunSummary s = from_json<RunSummary>(parse_bounded_json(bytes, file, 8), file);
   for (const SummaryPart& p : s.parts) check_shard(p.shard, file);
   check_shard(s.shard, file);
@@ -115,138 +255,6 @@ int graver_exit_code(int a, int b) {
     if (a == code || b == code) return code;
   return kExitOk;
 }
-
-namespace {
-
-constexpr std::uint64_t kMostSummaryBytes = 1ull << 32;
-
-/// The collection and number of shards that most files are of; of equally many the first file's.
-struct Split {
-  std::string collection;
-  int shards = 1;
-};
-
-Split usual_split(const std::vector<SummaryFile>& files) {
-  std::map<std::string, std::size_t> votes;
-  for (const SummaryFile& f : files)
-    if (f.summary && f.summary->shard) ++votes[f.summary->collection];
-  Split split;
-  std::size_t most = 0;
-  for (const SummaryFile& f : files)
-    if (f.summary && f.summary->shard && votes[f.summary->collection] > most) {
-      most = votes[f.summary->collection];
-      split = {f.summary->collection, f.summary->shard->count};
-    }
-  return split;
-}
-
-std::string shard_text(const Shard& s) {
-  return "shard " + std::to_string(s.index) + " of " + std::to_string(s.count);
-}
-
-/// "0, 3-5"
-std::string ranges_text(const std::vector<int>& numbers) {
-  std::string text;
-  for (std::size_t i = 0; i < numbers.size();) {
-    std::size_t end = i;
-    while (end + 1 < numbers.size() && numbers[end + 1] == numbers[end] + 1) ++end;
-    text += (text.empty() ? "" : ", ") + std::to_string(numbers[i]);
-    if (end > i) text += "-" + std::to_string(numbers[end]);
-    i = end + 1;
-  }
-  return text;
-}
-
-/// Less is better.
-int rank_of(const ModelSummary& m) {
-  switch (m.result) {
-    case ModelResult::kOk:
-      return 0;
-    case ModelResult::kUnchanged:
-      return 1;
-    case ModelResult::kFailed:
-      return 2;
-    case ModelResult::kInternal:
-      return 3;
-    case ModelResult::kCancelled:
-      break;
-  }
-  return 4;
-}
-
-class Merger {
- public:
-  explicit Merger(std::vector<SummaryFile> files) : files_(std::move(files)), split_(usual_split(files_)) {}
-
-  RunSummary merge() {
-    for (SummaryFile& f : files_) {
-      if (!f.summary)
-        merged_.problems.push_back({f.file, f.kind, f.text});
-      else if (is_foreign(*f.summary))
-        merged_.problems.push_back({f.file, "foreign",
-                                    shard_text(*f.summary->shard) +
-                                        " of another collection, or of this one before its files changed"});
-      else
-        add(f.file, *f.summary);
-      f.summary.reset();  // a million models stand in memory once
-    }
-    name_missing();
-    for (auto& [package, found] : models_) merged_.models.push_back(std::move(found.model));
-    merged_.counts = count_results(merged_.models);
-    return std::move(merged_);
-  }
-
- private:
-  struct Found {
-    ModelSummary model;
-    std::string file;
-  };
-
-  bool is_foreign(const RunSummary& s) const {
-    return s.shard && (s.collection != split_.collection || s.shard->count != split_.shards);
-  }
-
-  void add(const std::string& file, RunSummary& s) {
-    const std::size_t models = s.models.size();
-    std::map<std::string, std::size_t> doubles;  // by the file that had them first
-    for (ModelSummary& m : s.models) {
-      const auto [at, is_new] = models_.try_emplace(m.package);
-      if (is_new)
-        at->second.file = file;
-      else
-        ++doubles[at->second.file];
-      if (is_new || rank_of(m) < rank_of(at->second.model)) at->second.model = std::move(m);
-    }
-    for (const auto& [other, count] : doubles)
-      merged_.problems.push_back(
-          {file, "double", std::to_string(count) + " of its packages are those of " + other});
-    merged_.seconds += s.seconds;
-    if (s.shard) seen_.insert(s.shard->index);
-    if (s.parts.empty())
-      merged_.parts.push_back({file, s.shard, models, s.seconds});
-    else
-      merged_.parts.insert(merged_.parts.end(), s.parts.begin(), s.parts.end());
-  }
-
-  void name_missing() {
-    if (seen_.empty()) return;
-    std::vector<int> missing;
-    for (int i = 0; i < split_.shards; ++i)
-      if (!seen_.contains(i)) missing.push_back(i);
-    if (!missing.empty())
-      merged_.problems.push_back(
-          {"", "missing",
-           "no summary of shards " + ranges_text(missing) + " of " + std::to_string(split_.shards)});
-  }
-
-  std::vector<SummaryFile> files_;
-  Split split_;
-  RunSummary merged_;
-  std::map<std::string, Found> models_;  // by package
-  std::set<int> seen_;
-};
-
-}  // namespace
 
 SummaryFile open_summary(const std::string& file) {
   try {

@@ -1,23 +1,43 @@
 #pragma once
-#include <cstdint>
-#include <map>
-#include <optional>
-#include <span>
-#include <string>
-#include <vector>
+#include <cstddef>
 
-#include "pipeline/batch/fleet/shards.h"
 #include "pipeline/batch/plan.h"
 #include "pipeline/compile/workers/worker.h"
 
 namespace texmesh {
 
+/// A test case of a report; texts may hold anything.
+struct JunitCase {
+  std::string class_name, name;
+  std::optional<double> seconds;
+  std::vector<std::pair<std::string, std::string>> properties;
+  std::string failure, failure_type;  // the case failed where there is a text
+  std::string skipped;                // it was not reached where there is one
+};
+
+struct JunitSuite {
+  std::string name;
+  std::size_t tests = 0, failures = 0, skipped = 0;
+  std::optional<double> seconds;
+};
+
+/// Results for CI systems that read JUnit's XML.
+class JunitReport {
+ public:
+  explicit JunitReport(const JunitSuite& suite);
+  void add(const JunitCase& one);
+  /// The report, which is empty afterwards.
+  std::string finish();
+
+ private:
+  std::string text_;
+};
+
 /// What the model took when its package was made.
 struct EarlierCost {
   double seconds = 0;
   std::uint64_t peak_memory_bytes = 0;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("seconds", s.seconds, kSeconds, "");
     v("peak_memory_bytes", s.peak_memory_bytes, "");
   }
@@ -31,8 +51,7 @@ struct ModelSummary : ModelNumbers {
 
   /// Seconds of the run that made the package, 0 where nobody knows.
   double cost_s() const { return made ? made->seconds : result == ModelResult::kOk ? seconds : 0; }
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("model", s.model, "as the run names the model");
     v("output", s.output, "");
     v("package", s.package, "path of the output within the output folder");
@@ -45,8 +64,7 @@ struct ModelSummary : ModelNumbers {
 /// A summary that merging could not use, or not as it stands.
 struct SummaryProblem {
   std::string file, kind, text;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("file", s.file, "empty where shards are missing");
     v("kind", s.kind, FieldRule{.words = "half-written|foreign|double|missing"}, "");
     v("text", s.text, "");
@@ -59,8 +77,7 @@ struct SummaryPart {
   std::optional<Shard> shard;
   std::size_t models = 0;
   double seconds = 0;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("file", s.file, "");
     v("models", s.models, "");
     v("seconds", s.seconds, Range{0, 1e12}, "");
@@ -70,8 +87,7 @@ struct SummaryPart {
 
 struct SummaryCounts {
   std::size_t compiled = 0, unchanged = 0, failed = 0, cancelled = 0;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("compiled", s.compiled, "");
     v("unchanged", s.unchanged, "");
     v("failed", s.failed, "");
@@ -89,8 +105,7 @@ struct RunSummary {
   std::string collection;                // collection_digest(); "" where the run was no shard
   std::vector<SummaryPart> parts;        // of a merged summary
   std::vector<SummaryProblem> problems;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
+  static void fields(auto& s, auto&& v) {
     v("version", Constant{1}, "");
     SummaryCounts::fields(s.counts, v);
     v("seconds", s.seconds, Range{0, 1e12}, "of a merged summary: of all its runs together");
@@ -117,7 +132,7 @@ std::string write_junit(const RunSummary& summary);
 
 /// Reads what write_summary() wrote. FormatError for a text that ends too early or is no JSON, InputError
 /// for JSON that is no summary.
-RunSummary read_summary(std::span<const std::uint8_t> bytes, const std::string& file);
+RunSummary read_summary(ByteSpan bytes, const std::string& file);
 
 /// summary.v1.
 DocumentSchema summary_schema();

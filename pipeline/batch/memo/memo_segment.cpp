@@ -8,7 +8,7 @@
 #include "format/base/archive.h"
 #include "format/base/text_bytes.h"
 #include "pipeline/cache/cache_files.h"
-#include "pipeline/io/machine/owner_mark.h"
+#include "pipeline/io/machine.h"
 #include "pipeline/io/names/similar_names.h"
 
 namespace texmesh {
@@ -51,17 +51,11 @@ bool same_names(const std::string& folder, std::int64_t looked_at_ns, FileReques
 struct PackedKey {
   std::uint32_t stage = 0;  // in the segment's names
   Sha256 key{};
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.stage, s.key);
-  }
+  static void archive(auto& s, auto& a) { a(s.stage, s.key); }
 };
 struct PackedKeys {
   std::vector<PackedKey> keys;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.keys);
-  }
+  static void archive(auto& s, auto& a) { a(s.keys); }
 };
 
 Bytes pack_keys(const StageKeys& keys, StageNames& stages) {
@@ -70,7 +64,7 @@ Bytes pack_keys(const StageKeys& keys, StageNames& stages) {
   return encode_artefact(PackedKeys{std::move(packed)});
 }
 
-StageKeys unpack_keys(std::span<const std::uint8_t> bytes, const StageNames& stages) {
+StageKeys unpack_keys(ByteSpan bytes, const StageNames& stages) {
   StageKeys keys;
   for (const PackedKey& k : decode_artefact<PackedKeys>(bytes, "memo").keys)
     keys[stages.name_of(k.stage)] = k.key;
@@ -93,44 +87,29 @@ struct Block {
   std::vector<std::int64_t> times;
   std::vector<std::uint32_t> sizes;
   std::uint64_t body_bytes = 0;
-  template <class S, class A>
-  static void archive(S& s, A& a) {
-    a(s.new_stages, s.names, s.times, s.sizes, s.body_bytes);
-  }
+  static void archive(auto& s, auto& a) { a(s.new_stages, s.names, s.times, s.sizes, s.body_bytes); }
 };
 
-/// In front of a record. What check is of begins behind it.
-struct RecordHead {
+/// In front of a memo. What check is of begins behind it.
+struct MemoHead {
   std::uint64_t check = 0;
   std::uint32_t keys_ahead = 0;  // bytes from this head to the keys' check
   std::uint32_t key_bytes = 0;   // with the check
 };
-constexpr std::size_t kCheckBytes = 8, kRecordHeadBytes = 16;
-static_assert(sizeof(RecordHead) == kRecordHeadBytes);
+constexpr std::size_t kCheckBytes = 8, kMemoHeadBytes = 16;
+static_assert(sizeof(MemoHead) == kMemoHeadBytes);
 
-std::uint64_t check_of(std::span<const std::uint8_t> bytes) { return truncated(sha256(bytes)); }
+std::uint64_t check_of(ByteSpan bytes) { return truncated(sha256(bytes)); }
 
 /// The bytes behind a check that holds; none where it does not.
-std::span<const std::uint8_t> checked(std::span<const std::uint8_t> bytes) {
+ByteSpan checked(ByteSpan bytes) {
   if (bytes.size() < kCheckBytes) return {};
   std::uint64_t check = 0;
   std::memcpy(&check, bytes.data(), kCheckBytes);
-  return check == check_of(bytes.subspan(kCheckBytes)) ? bytes.subspan(kCheckBytes)
-                                                       : std::span<const std::uint8_t>{};
+  return check == check_of(bytes.subspan(kCheckBytes)) ? bytes.subspan(kCheckBytes) : ByteSpan{};
 }
 
-bool read_at(int fd, std::uint64_t at, std::span<std::uint8_t> to) {
-  while (!to.empty()) {
-    const ssize_t n = ::pread(fd, to.data(), to.size(), static_cast<off_t>(at));
-    if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) return false;
-    at += static_cast<std::uint64_t>(n);
-    to = to.subspan(static_cast<std::size_t>(n));
-  }
-  return true;
-}
-
-void append_bytes(std::vector<std::uint8_t>& to, const void* from, std::size_t size) {
+void append_bytes(Bytes& to, const void* from, std::size_t size) {
   const auto* p = static_cast<const std::uint8_t*>(from);
   to.insert(to.end(), p, p + size);
 }
@@ -144,23 +123,23 @@ BlockHead head_of(std::span<const std::uint8_t, kBlockHeadBytes> bytes) {
 
 }  // namespace
 
-bool still_holds(MemoRecord& record, const std::string& input, const std::string& output, bool& refreshed) {
+bool still_holds(PackageMemo& memo, const std::string& input, const std::string& output, bool& refreshed) {
   refreshed = false;
   const std::int64_t now_ns = wall_clock_ns();
   const std::string_view folder = std::string_view(input).substr(0, input.rfind('/') + 1);
-  for (FileRequest& f : record.files) {
+  for (FileRequest& f : memo.files) {
     const std::string path = f.uri.empty() ? input : std::string(folder) + f.uri;
-    const bool same = f.similar ? same_names(std::string(folder), record.looked_at_ns, f, refreshed)
-                      : f.found ? same_file(path, record.looked_at_ns, f.digest, f.bytes, f.stamp, refreshed)
+    const bool same = f.similar ? same_names(std::string(folder), memo.looked_at_ns, f, refreshed)
+                      : f.found ? same_file(path, memo.looked_at_ns, f.digest, f.bytes, f.stamp, refreshed)
                                 : !stamp_of(path);
     if (!same) return false;
   }
-  if (!record.failed && !same_file(output, record.looked_at_ns, record.package_digest, record.package_bytes,
-                                   record.package_stamp, refreshed))
+  if (!memo.failed && !same_file(output, memo.looked_at_ns, memo.package_digest, memo.package_bytes,
+                                 memo.package_stamp, refreshed))
     return false;
   // What was settled before is so now; what was read just now was true at this moment.
-  if (refreshed) record.looked_at_ns = now_ns;
-  return !record.files.empty();
+  if (refreshed) memo.looked_at_ns = now_ns;
+  return !memo.files.empty();
 }
 
 std::uint32_t StageNames::number_of(const std::string& stage) {
@@ -213,7 +192,7 @@ bool MemoSegment::read_blocks(const std::function<void(MemoEntry)>& entry) {
     const BlockHead head = head_of(bytes);
     if (head.bytes > kMostBlockBytes) return false;
     if (head.bytes > bytes_ - at - kBlockHeadBytes) break;
-    std::vector<std::uint8_t> payload(static_cast<std::size_t>(head.bytes));
+    Bytes payload(static_cast<std::size_t>(head.bytes));
     if (!read_at(file_.get(), at + kBlockHeadBytes, payload) || sha256(payload) != head.digest) return false;
     at += kBlockHeadBytes + head.bytes;
     const auto body_bytes = tell_block(payload, at, entry, last);
@@ -224,8 +203,7 @@ bool MemoSegment::read_blocks(const std::function<void(MemoEntry)>& entry) {
   return is_finished() ? last && at == bytes_ : true;
 }
 
-std::optional<std::uint64_t> MemoSegment::tell_block(std::span<const std::uint8_t> payload,
-                                                     std::uint64_t body,
+std::optional<std::uint64_t> MemoSegment::tell_block(ByteSpan payload, std::uint64_t body,
                                                      const std::function<void(MemoEntry)>& entry,
                                                      bool& last) {
   Block block;
@@ -235,8 +213,8 @@ std::optional<std::uint64_t> MemoSegment::tell_block(std::span<const std::uint8_
     return std::nullopt;
   }
   const std::size_t count = block.names.size();
-  const auto records_bytes = std::accumulate(block.sizes.begin(), block.sizes.end(), std::uint64_t{0});
-  if (block.times.size() != count || block.sizes.size() != count || records_bytes > block.body_bytes ||
+  const auto memos_bytes = std::accumulate(block.sizes.begin(), block.sizes.end(), std::uint64_t{0});
+  if (block.times.size() != count || block.sizes.size() != count || memos_bytes > block.body_bytes ||
       block.body_bytes > kMostBlockBytes)
     return std::nullopt;
   for (const std::string& stage : block.new_stages) stages_.number_of(stage);
@@ -251,7 +229,7 @@ std::optional<std::uint64_t> MemoSegment::tell_block(std::span<const std::uint8_
 }
 
 /// Models are asked for about in the order in which they were remembered: one read serves many.
-std::span<const std::uint8_t> MemoSegment::look(Window& window, std::uint64_t at, std::size_t bytes) const {
+ByteSpan MemoSegment::look(Window& window, std::uint64_t at, std::size_t bytes) const {
   constexpr std::size_t kWindowBytes = 8 << 10;
   if (at < window.at || at + bytes > window.at + window.bytes.size()) {
     const std::uint64_t rest = at < bytes_ ? bytes_ - at : 0;
@@ -264,11 +242,11 @@ std::span<const std::uint8_t> MemoSegment::look(Window& window, std::uint64_t at
   return std::span(window.bytes).subspan(static_cast<std::size_t>(at - window.at), bytes);
 }
 
-std::optional<MemoRecord> MemoSegment::record(const MemoEntry& entry) const {
-  const std::span<const std::uint8_t> bytes = checked(look(record_window_, entry.offset, entry.bytes));
-  constexpr std::size_t kRestOfHead = kRecordHeadBytes - kCheckBytes;
+std::optional<PackageMemo> MemoSegment::memo(const MemoEntry& entry) const {
+  const ByteSpan bytes = checked(look(memo_window_, entry.offset, entry.bytes));
+  constexpr std::size_t kRestOfHead = kMemoHeadBytes - kCheckBytes;
   try {
-    if (bytes.size() >= kRestOfHead) return decode_artefact<MemoRecord>(bytes.subspan(kRestOfHead), "memo");
+    if (bytes.size() >= kRestOfHead) return decode_artefact<PackageMemo>(bytes.subspan(kRestOfHead), "memo");
   } catch (const FormatError&) {
   }
   damaged_ = true;
@@ -276,10 +254,10 @@ std::optional<MemoRecord> MemoSegment::record(const MemoEntry& entry) const {
 }
 
 StageKeys MemoSegment::keys(const MemoEntry& entry) const {
-  const std::span<const std::uint8_t> bytes = look(record_window_, entry.offset, entry.bytes);
-  RecordHead head;
-  if (bytes.size() >= kRecordHeadBytes && !checked(bytes).empty())
-    std::memcpy(&head, bytes.data(), kRecordHeadBytes);
+  const ByteSpan bytes = look(memo_window_, entry.offset, entry.bytes);
+  MemoHead head;
+  if (bytes.size() >= kMemoHeadBytes && !checked(bytes).empty())
+    std::memcpy(&head, bytes.data(), kMemoHeadBytes);
   try {
     if (head.key_bytes > 0 && head.key_bytes <= kMostBlockBytes && head.keys_ahead <= kMostBlockBytes)
       return unpack_keys(checked(look(key_window_, entry.offset + head.keys_ahead, head.key_bytes)), stages_);
@@ -289,56 +267,56 @@ StageKeys MemoSegment::keys(const MemoEntry& entry) const {
   return {};
 }
 
-void MemoSegmentWriter::add(const MemoName& name, const MemoRecord& record) {
-  const std::vector<std::uint8_t> bytes = encode_artefact(record), keys = pack_keys(record.keys, stages_);
-  const std::size_t size = kRecordHeadBytes + bytes.size() + kCheckBytes + keys.size();
+void MemoSegmentWriter::add(const MemoName& name, const PackageMemo& memo) {
+  const Bytes bytes = encode_artefact(memo), keys = pack_keys(memo.keys, stages_);
+  const std::size_t size = kMemoHeadBytes + bytes.size() + kCheckBytes + keys.size();
   if (size > kMostBlockBytes / 2) return;  // a model of ten thousand files is looked at again
-  if (records_.size() + keys_.size() + size > kFullBlockBytes) flush();
+  if (memos_.size() + keys_.size() + size > kFullBlockBytes) flush();
   names_.push_back(name);
-  times_.push_back(record.looked_at_ns);
-  const RecordHead head{0, static_cast<std::uint32_t>(keys_.size()),
-                        static_cast<std::uint32_t>(kCheckBytes + keys.size())};
-  sizes_.push_back(static_cast<std::uint32_t>(kRecordHeadBytes + bytes.size()));
-  append_bytes(records_, &head, sizeof head);
-  records_.insert(records_.end(), bytes.begin(), bytes.end());
+  times_.push_back(memo.looked_at_ns);
+  const MemoHead head{0, static_cast<std::uint32_t>(keys_.size()),
+                      static_cast<std::uint32_t>(kCheckBytes + keys.size())};
+  sizes_.push_back(static_cast<std::uint32_t>(kMemoHeadBytes + bytes.size()));
+  append_bytes(memos_, &head, sizeof head);
+  memos_.insert(memos_.end(), bytes.begin(), bytes.end());
   const std::uint64_t check = check_of(keys);
   append_bytes(keys_, &check, sizeof check);
   keys_.insert(keys_.end(), keys.begin(), keys.end());
 }
 
-/// Where the keys begin is known when the block's last record is.
-void MemoSegmentWriter::end_records() {
+/// Where the keys begin is known when the block's last memo is.
+void MemoSegmentWriter::end_memos() {
   std::size_t at = 0;
   for (const std::uint32_t size : sizes_) {
-    RecordHead head;
-    std::memcpy(&head, records_.data() + at, sizeof head);
-    head.keys_ahead += static_cast<std::uint32_t>(records_.size() - at);
-    std::memcpy(records_.data() + at, &head, sizeof head);
-    head.check = check_of(std::span(records_).subspan(at + kCheckBytes, size - kCheckBytes));
-    std::memcpy(records_.data() + at, &head.check, kCheckBytes);
+    MemoHead head;
+    std::memcpy(&head, memos_.data() + at, sizeof head);
+    head.keys_ahead += static_cast<std::uint32_t>(memos_.size() - at);
+    std::memcpy(memos_.data() + at, &head, sizeof head);
+    head.check = check_of(std::span(memos_).subspan(at + kCheckBytes, size - kCheckBytes));
+    std::memcpy(memos_.data() + at, &head.check, kCheckBytes);
     at += size;
   }
 }
 
 bool MemoSegmentWriter::flush() {
   if (names_.empty()) return !failed_;
-  end_records();
+  end_memos();
   const auto first_new = stages_.all().begin() + static_cast<std::ptrdiff_t>(stages_written_);
   const Block block{{first_new, stages_.all().end()},
                     std::move(names_),
                     std::move(times_),
                     std::move(sizes_),
-                    records_.size() + keys_.size()};
-  records_.insert(records_.end(), keys_.begin(), keys_.end());
+                    memos_.size() + keys_.size()};
+  memos_.insert(memos_.end(), keys_.begin(), keys_.end());
   stages_written_ = stages_.all().size();
-  const bool written = append(encode_artefact(block), records_);
-  names_.clear(), times_.clear(), sizes_.clear(), keys_.clear(), records_.clear();
+  const bool written = append(encode_artefact(block), memos_);
+  names_.clear(), times_.clear(), sizes_.clear(), keys_.clear(), memos_.clear();
   return written;
 }
 
-bool MemoSegmentWriter::append(std::span<const std::uint8_t> payload, std::span<const std::uint8_t> body) {
+bool MemoSegmentWriter::append(ByteSpan payload, ByteSpan body) {
   if (failed_ || !open()) return failed_ = true, false;
-  std::vector<std::uint8_t> bytes(kBlockHeadBytes);
+  Bytes bytes(kBlockHeadBytes);
   const BlockHead head{payload.size(), sha256(payload)};
   std::memcpy(bytes.data(), &head.bytes, 8);
   std::memcpy(bytes.data() + 8, head.digest.data(), 32);

@@ -1,23 +1,15 @@
 #pragma once
-// The records of a memo, and its files: blocks of records, each file appended by one process.
-#include <array>
-#include <cstdint>
-#include <functional>
-#include <memory>
-#include <optional>
-#include <span>
-#include <string>
-#include <vector>
+// What runs have found out about each package, and the files that hold it: blocks of memos, each file
+// appended by one process.
 
-#include "pipeline/graph/key.h"
-#include "pipeline/io/descriptor.h"
+#include "pipeline/graph/store.h"
 #include "pipeline/io/file_stamp.h"
 
 namespace texmesh {
 
 /// What the last run left of one package: enough to see, by looking at files' stamps alone, that
 /// nothing has changed.
-struct MemoRecord {
+struct PackageMemo {
   Sha256 request{};  // of everything but files: options, strictness, tool
   bool failed = false;
   std::int64_t looked_at_ns = 0;  // when the stamps were true
@@ -29,20 +21,19 @@ struct MemoRecord {
   StageKeys keys;
   std::vector<std::string> error;  // kind, file, place, expected, found, message; empty unless failed
   /// Keys go apart: a model that is up to date needs none of them.
-  template <class S, class A>
-  static void archive(S& s, A& a) {
+  static void archive(auto& s, auto& a) {
     a(s.request, s.package_digest, s.failed, s.looked_at_ns, s.files, s.package_stamp, s.package_bytes,
       s.peak_memory_bytes, s.seconds, s.error);
   }
 };
 
-/// Whether every file is as the record says: the model at `input`, what it refers to beneath its folder, and,
-/// unless the record is of a failure, the package at `output`. A file whose stamp proves nothing (changed
-/// just before it was looked at, or touched since) is read and compared by digest; the record's stamps are
+/// Whether every file is as the memo says: the model at `input`, what it refers to beneath its folder, and,
+/// unless the memo is of a failure, the package at `output`. A file whose stamp proves nothing (changed
+/// just before it was looked at, or touched since) is read and compared by digest; the memo's stamps are
 /// then brought up to date and `refreshed` set.
-bool still_holds(MemoRecord& record, const std::string& input, const std::string& output, bool& refreshed);
+bool still_holds(PackageMemo& memo, const std::string& input, const std::string& output, bool& refreshed);
 
-/// The names of stages, which the records of a file share: a record's keys name them by number.
+/// The names of stages, which the memos of a file share: a memo's keys name them by number.
 class StageNames {
  public:
   StageNames() = default;
@@ -61,7 +52,7 @@ class StageNames {
 using MemoName = std::array<std::uint8_t, 16>;
 MemoName memo_name(const std::string& package);
 
-/// A packed record in a segment.
+/// A packed memo in a segment.
 struct MemoEntry {
   MemoName name{};
   std::int64_t looked_at_ns = 0;
@@ -71,17 +62,17 @@ struct MemoEntry {
 
 // File: 8 bytes of magic; then blocks of at most kMostBlockBytes and as much again:
 //   u64 size of the payload, SHA-256 of the payload, payload = archive of
-//   names of stages that are new in this block, names and times of the records, sizes of each, size of the
-//   body; body = the records, then the keys of each. Each of both begins with the first 8 bytes of the
+//   names of stages that are new in this block, names and times of the memos, sizes of each, size of the
+//   body; body = the memos, then the keys of each. Each of both begins with the first 8 bytes of the
 //   SHA-256 of its rest, and is checked when it is asked for: a run that finds everything up to date reads no
 //   keys, which are two thirds.
-// A finished file ends with a block without records, and its name with ".seg"; that of a file that is being
+// A finished file ends with a block without memos, and its name with ".seg"; that of a file that is being
 // written ends with ".open", and what is cut off at its end is no damage.
 
 /// Reads a segment. Not thread-safe.
 class MemoSegment {
  public:
-  /// Opens the file, checks every block's payload, and tells of each record that a sound block names. Nothing
+  /// Opens the file, checks every block's payload, and tells of each memo that a sound block names. Nothing
   /// when there is no such file (it has been merged into another), or when it cannot be opened.
   static std::unique_ptr<MemoSegment> read(const std::string& path,
                                            const std::function<void(MemoEntry)>& entry);
@@ -90,36 +81,36 @@ class MemoSegment {
   std::uint64_t bytes() const { return bytes_; }
   std::int64_t modified_ns() const { return modified_ns_; }
   bool is_finished() const;
-  /// Not all of it was believed: a block, or a record or keys that were asked for.
+  /// Not all of it was believed: a block, or a memo or keys that were asked for.
   bool is_damaged() const { return damaged_; }
-  /// The record of an entry that read() told of, without its keys; nothing where its bytes are damaged.
-  std::optional<MemoRecord> record(const MemoEntry& entry) const;
-  /// The record's keys; none where the bytes of either are damaged.
+  /// The memo of an entry that read() told of, without its keys; nothing where its bytes are damaged.
+  std::optional<PackageMemo> memo(const MemoEntry& entry) const;
+  /// The memo's keys; none where the bytes of either are damaged.
   StageKeys keys(const MemoEntry& entry) const;
 
  private:
   struct Window {
-    std::vector<std::uint8_t> bytes;
+    Bytes bytes;
     std::uint64_t at = 0;
   };
   MemoSegment() = default;
   bool read_blocks(const std::function<void(MemoEntry)>& entry);
-  /// The body's size, whose records begin at `body` in the file; nothing for a payload that contradicts
+  /// The body's size, whose memos begin at `body` in the file; nothing for a payload that contradicts
   /// itself.
-  std::optional<std::uint64_t> tell_block(std::span<const std::uint8_t> payload, std::uint64_t body,
+  std::optional<std::uint64_t> tell_block(ByteSpan payload, std::uint64_t body,
                                           const std::function<void(MemoEntry)>& entry, bool& last);
   /// Bytes of the file; fewer when it has changed.
-  std::span<const std::uint8_t> look(Window& window, std::uint64_t at, std::size_t bytes) const;
+  ByteSpan look(Window& window, std::uint64_t at, std::size_t bytes) const;
   std::string path_;
   Descriptor file_;
   std::uint64_t bytes_ = 0;
   std::int64_t modified_ns_ = 0;
   mutable bool damaged_ = false;
   StageNames stages_;
-  mutable Window record_window_, key_window_;
+  mutable Window memo_window_, key_window_;
 };
 
-/// Writes a segment of its own, which no other process writes. The file is made with the first record. Losing
+/// Writes a segment of its own, which no other process writes. The file is made with the first memo. Losing
 /// the end of it, when the machine stops, costs looking again: nothing waits for the disk.
 class MemoSegmentWriter {
  public:
@@ -130,7 +121,7 @@ class MemoSegmentWriter {
   ~MemoSegmentWriter() { finish(); }
 
   /// Kept in memory until flush(), or until a block is full.
-  void add(const MemoName& name, const MemoRecord& record);
+  void add(const MemoName& name, const PackageMemo& memo);
   /// False when something cannot be written; nothing is written from then on.
   bool flush();
   /// Ends the file, under its final name. False when that fails, or when nothing was written.
@@ -139,8 +130,8 @@ class MemoSegmentWriter {
 
  private:
   bool open();
-  void end_records();
-  bool append(std::span<const std::uint8_t> payload, std::span<const std::uint8_t> body);
+  void end_memos();
+  bool append(ByteSpan payload, ByteSpan body);
   std::string folder_, path_;  // of the file while it is written
   Descriptor file_;
   bool failed_ = false;
@@ -149,7 +140,7 @@ class MemoSegmentWriter {
   std::vector<MemoName> names_;
   std::vector<std::int64_t> times_;
   std::vector<std::uint32_t> sizes_;
-  std::vector<std::uint8_t> records_, keys_;
+  Bytes memos_, keys_;
 };
 
 }  // namespace texmesh

@@ -9,7 +9,6 @@
 #include <linux/seccomp.h>
 #include <sys/prctl.h>
 #include <sys/socket.h>
-#include <sys/stat.h>
 #include <sys/syscall.h>
 
 #include <charconv>
@@ -17,7 +16,7 @@
 #include <cstdlib>
 #include <filesystem>
 
-#include "pipeline/io/descriptor.h"
+#include "pipeline/io/file_stamp.h"
 
 namespace texmesh {
 namespace {
@@ -244,11 +243,6 @@ bool bound_files(const SandboxRules& rules, int version) {
   for (const std::string& path : rules.write) set.allow(path, kWrite);
   for (const std::uint16_t port : rules.ports) set.allow_port(port);
   return ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0 && set.enforce();
-}
-
-std::string folder_of_file(const std::string& path) {
-  const std::string folder = fs::path(path).parent_path().string();
-  return folder.empty() ? "." : folder;
 }
 
 /// Where symbolic links lead in the end; "" when nothing is there.

@@ -1,9 +1,4 @@
 #pragma once
-#include <array>
-#include <cstdint>
-#include <string>
-#include <string_view>
-#include <vector>
 
 #include "format/base/fields.h"
 

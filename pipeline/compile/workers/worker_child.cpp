@@ -5,24 +5,20 @@
 #include <sys/prctl.h>
 #include <sys/resource.h>
 
-#include <algorithm>
-#include <chrono>
 #include <filesystem>
 #include <iostream>
 #include <mutex>
 #include <new>
 #include <nlohmann/json.hpp>
 
+#include "format/base/text_bytes.h"
 #include "pipeline/cache/cache_layer.h"
 #include "pipeline/cache/disk_store.h"
 #include "pipeline/compile/compile_model.h"
-#include "pipeline/compile/profile.h"
 #include "pipeline/compile/stage_table.h"
 #include "pipeline/compile/workers/worker.h"
-#include "pipeline/io/descriptor.h"
 #include "pipeline/io/exit_codes.h"
-#include "pipeline/io/machine/owner_mark.h"
-#include "pipeline/io/resolver.h"
+#include "pipeline/io/machine.h"
 
 namespace texmesh {
 namespace {
@@ -37,7 +33,7 @@ class EventWriter {
   void write(const Event& event) {
     const std::string line = to_json_line(event) + "\n";
     const std::lock_guard lock(mutex_);
-    write_all(fd_, line);  // false: the parent is gone, and this process with it in a moment
+    write_all(fd_, text_bytes(line));  // false: the parent is gone, and this process with it in a moment
   }
 
  private:

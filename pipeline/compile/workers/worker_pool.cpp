@@ -6,15 +6,14 @@
 #include <sys/resource.h>
 #include <sys/wait.h>
 
-#include <cstdlib>
 #include <filesystem>
-#include <numeric>
+#include <nlohmann/json.hpp>
 #include <set>
 
+#include "format/base/text_bytes.h"
 #include "pipeline/cache/cache_layer.h"
 #include "pipeline/compile/workers/worker.h"
 #include "pipeline/io/atomic_file.h"
-#include "pipeline/io/descriptor.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/program.h"
 
@@ -74,7 +73,7 @@ ChildProcess start_worker_process(const std::string& input, bool large_pages) {
   ::close(out.write);
   ::close(err.write);
   if (rc != 0) throw std::runtime_error(std::string("cannot start a worker: ") + std::strerror(rc));
-  write_all(in.write, input);  // a child that is gone says the rest by its exit status
+  write_all(in.write, text_bytes(input));  // a child that is gone says the rest by its exit status
   ::close(in.write);
   child.out = out.read;
   child.err = err.read;
@@ -398,6 +397,20 @@ void apply_stage(const StageFinished& e, double now_s, WorkerReport& report) {
   }
 }
 
+/// The event of the list whose name the line has.
+template <class... E>
+std::optional<std::variant<E...>> event_of(const Json& json, const std::variant<E...>*) {
+  std::optional<std::variant<E...>> event;
+  const auto name = json.find("event");
+  if (name == json.end()) return event;
+  const auto read = [&](const auto* type) {
+    using Event = std::remove_cvref_t<decltype(*type)>;
+    if (*name == Event::kEvent) event = from_json<Event>(json, "event");
+  };
+  (read(static_cast<const E*>(nullptr)), ...);
+  return event;
+}
+
 }  // namespace
 
 bool apply_event(const WorkerEvent& event, double now_s, WorkerReport& report) {
@@ -427,6 +440,28 @@ std::vector<WorkerReport> run_workers(const std::vector<WorkerJob>& jobs, const 
   if (jobs.empty()) return {};
   const InterruptGuard guard;
   return WorkerPool(jobs, settings, sink, finished).run();
+}
+
+std::optional<WorkerEvent> read_event(const std::string& line) {
+  const Json json = Json::parse(line, nullptr, false);
+  if (!json.is_object()) return std::nullopt;
+  try {
+    return event_of(json, static_cast<const WorkerEvent*>(nullptr));
+  } catch (const InputError&) {
+    return std::nullopt;
+  }
+}
+
+DocumentSchema event_schema() {
+  const auto one_of = []<class... Event>(std::tuple<Event...>*) {
+    return Json{{"oneOf", Json::array({schema_of<Event>()...})}};
+  };
+  using Shown = std::tuple<ModelStarted, StageStarted, StageProgress, StageFinished, StageExplained,
+                           CacheTold, NoteTold, ErrorTold, PackageMade, ModelFinished, RunFinished>;
+  return document_schema(
+      "event.v1", "texmesh log event, version 1",
+      "One line of `texmesh compile --json`. Programs ignore events that they do not know.",
+      one_of(static_cast<Shown*>(nullptr)));
 }
 
 }  // namespace texmesh

@@ -11,7 +11,6 @@
 #include "pipeline/import/text_scan.h"
 
 namespace texmesh {
-namespace gltf {
 namespace {
 
 constexpr std::size_t kMaxParts = 65535;          // Mesh::triangle_part is 16 bits wide
@@ -302,9 +301,9 @@ class GltfReader {
   const About& about() const { return about_; }
 
  private:
-  Json look(const Container& container, About& about) const {
+  GltfJson look(const Container& container, About& about) const {
     const SourceText text(container.json, source_.file, source_.notes);
-    Json document = parse_json(source_, text.text());
+    GltfJson document = parse_gltf_json(source_, text.text());
     about = about_from_gltf(document, container.is_glb ? "glb" : "gltf", source_.notes);
     look_through(source_, document);
     return document;
@@ -319,7 +318,7 @@ class GltfReader {
   const Source& source_;
   const Container container_;
   About about_;
-  const Json document_;
+  const GltfJson document_;
   const tinygltf::Model structure_;
   Buffers buffers_;
   Model& model_;
@@ -340,7 +339,7 @@ void GltfReader::check_document() const {
   if (!asset.minVersion.empty() && asset.minVersion != "2.0")
     source_.fail("/asset/minVersion", "2.0", quote(asset.minVersion));
   const auto each_unknown = [&](const std::string& list, auto&& tell) {
-    const Json names = document_.value(list, Json::array());
+    const GltfJson names = document_.value(list, GltfJson::array());
     for (std::size_t i = 0; i < names.size(); ++i)
       if (const std::string name = names[i]; !is_supported(name))
         tell("/" + list + "/" + std::to_string(i), name);
@@ -348,7 +347,7 @@ void GltfReader::check_document() const {
   each_unknown("extensionsRequired", [&](const std::string& place, const std::string& name) {
     source_.fail(place, "an extension that texmesh reads", quote(name));
   });
-  const Json images = document_.value("images", Json::array());
+  const GltfJson images = document_.value("images", GltfJson::array());
   for (std::size_t i = 0; i < images.size(); ++i)
     if (images[i].contains("uri") == images[i].contains("bufferView"))
       source_.fail("/images/" + std::to_string(i), "either \"uri\" or \"bufferView\"",
@@ -379,9 +378,9 @@ void GltfReader::note_what_is_left_out() const {
   if (any("animations")) add_info(notes, "animation", "/animations", "animations are left out");
   if (any("skins")) add_info(notes, "skin", "/skins", "skins are left out: the mesh keeps its default pose");
   if (any("cameras")) add_info(notes, "camera", "/cameras", "cameras are left out");
-  const Json extensions = document_.value("extensions", Json());
+  const GltfJson extensions = document_.value("extensions", GltfJson());
   if (extensions.is_object() && extensions.contains(kVariants) && extensions[kVariants].is_object())
-    if (const Json variants = extensions[kVariants].value("variants", Json());
+    if (const GltfJson variants = extensions[kVariants].value("variants", GltfJson());
         variants.is_array() && !variants.empty())
       source_.lost["material variants"] += variants.size();
   for (const tinygltf::Mesh& mesh : structure_.meshes)
@@ -489,16 +488,15 @@ ImportedModel read_gltf(const std::string& file_name, ByteSpan bytes, Resolver& 
 }
 
 }  // namespace
-}  // namespace gltf
 
 ImportedModel import_gltf(const std::string& file_name, std::span<const std::uint8_t> bytes,
                           Resolver& resolver, const ImportOptions& options, const RunContext& context) {
-  return gltf::read_gltf(file_name, bytes, resolver, options, context, kLargestCoordinate);
+  return read_gltf(file_name, bytes, resolver, options, context, kLargestCoordinate);
 }
 
 ImportedModel import_package_glb(const std::string& file_name, std::span<const std::uint8_t> bytes,
                                  Resolver& resolver, const RunContext& context) {
-  return gltf::read_gltf(file_name, bytes, resolver, {}, context, kLargestPackedCoordinate);
+  return read_gltf(file_name, bytes, resolver, {}, context, kLargestPackedCoordinate);
 }
 
 }  // namespace texmesh

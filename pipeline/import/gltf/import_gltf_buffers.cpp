@@ -9,7 +9,7 @@
 #include "pipeline/import/text_scan.h"
 #include "pipeline/io/uri.h"
 
-namespace texmesh::gltf {
+namespace texmesh {
 namespace {
 
 MeshoptMode mode_of(const std::string& name) {
@@ -29,7 +29,7 @@ MeshoptFilter filter_of(const Source& source, const std::string& name, const std
 
 }  // namespace
 
-Buffers::Buffers(const Source& source, const Json& document, const tinygltf::Model& structure,
+Buffers::Buffers(const Source& source, const GltfJson& document, const tinygltf::Model& structure,
                  std::optional<ByteSpan> bin)
     : source_(source), document_(document), structure_(structure), bin_(bin) {
   if (const auto it = document_.find("buffers"); it != document_.end()) buffers_.resize(it->size());
@@ -37,7 +37,7 @@ Buffers::Buffers(const Source& source, const Json& document, const tinygltf::Mod
 }
 
 ByteSpan Buffers::buffer(std::size_t index) {
-  const Json& declared = document_["buffers"][index];
+  const GltfJson& declared = document_["buffers"][index];
   const std::uint64_t length = declared["byteLength"];
   const std::string place = "/buffers/" + std::to_string(index);
   const auto max_bytes = static_cast<std::uint64_t>(source_.options.max_file_bytes);
@@ -84,7 +84,7 @@ ByteSpan Buffers::range(std::size_t buffer_index, std::uint64_t offset, std::uin
   return bytes.subspan(offset, length);
 }
 
-std::vector<std::uint8_t> Buffers::decompressed(const Json& extension, const std::string& place) {
+std::vector<std::uint8_t> Buffers::decompressed(const GltfJson& extension, const std::string& place) {
   const std::uint64_t count = extension["count"], stride = extension["byteStride"];
   const auto max_bytes = static_cast<std::uint64_t>(source_.options.max_file_bytes);
   // All views together, since many of them may share one range of bytes.
@@ -102,8 +102,8 @@ std::vector<std::uint8_t> Buffers::decompressed(const Json& extension, const std
 ByteSpan Buffers::view(std::size_t index, const std::string& place) {
   if (index >= views_.size()) source_.fail(place, "an element of /bufferViews", std::to_string(index));
   const std::string view_place = "/bufferViews/" + std::to_string(index);
-  if (const Json& declared = document_["bufferViews"][index]; declared.contains("extensions")) {
-    const Json& extensions = declared["extensions"];
+  if (const GltfJson& declared = document_["bufferViews"][index]; declared.contains("extensions")) {
+    const GltfJson& extensions = declared["extensions"];
     const bool old = extensions.contains("EXT_meshopt_compression");
     const char* name = old ? "EXT_meshopt_compression" : "KHR_meshopt_compression";
     if (old && extensions.contains("KHR_meshopt_compression"))
@@ -259,4 +259,4 @@ std::uint32_t AccessorReader::read_index(std::size_t element) const {
   return at ? load_index(at, component_type_) : 0;
 }
 
-}  // namespace texmesh::gltf
+}  // namespace texmesh

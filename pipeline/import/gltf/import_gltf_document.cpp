@@ -14,7 +14,7 @@
 #include "pipeline/import/gltf/import_gltf_parts.h"
 #include "stages/gltf/glb_container.h"
 
-namespace texmesh::gltf {
+namespace texmesh {
 namespace {
 
 constexpr std::size_t kHeaderBytes = 12, kChunkHeaderBytes = 8;
@@ -91,22 +91,22 @@ namespace {
 
 /// `extras` may hold anything, and nothing reads them any more. null counts as absent, as some exporters
 /// write it, but not to tinygltf.
-void drop_extras_and_nulls(Json& value) {
+void drop_extras_and_nulls(GltfJson& value) {
   if (value.is_object()) {
     value.erase("extras");
     for (auto it = value.begin(); it != value.end();) it = it->is_null() ? value.erase(it) : std::next(it);
   }
   if (value.is_structured()) {
-    for (Json& child : value) drop_extras_and_nulls(child);
+    for (GltfJson& child : value) drop_extras_and_nulls(child);
   }
 }
 
 /// Brackets that open and commas: what JsonShape counts in a text, unless an object in it names a member
 /// twice.
-std::uint64_t values_in(const Json& value) {
+std::uint64_t values_in(const GltfJson& value) {
   if (!value.is_structured()) return 0;
   std::uint64_t sum = std::max<std::uint64_t>(value.size(), 1);
-  for (const Json& child : value) sum += values_in(child);
+  for (const GltfJson& child : value) sum += values_in(child);
   return sum;
 }
 
@@ -151,20 +151,21 @@ scene nodes=@nodes[]
 
 struct Look {
   const Source& source;
-  const Json& document;
-  [[noreturn]] void refuse(const std::string& place, const std::string& expected, const Json& found) const {
+  const GltfJson& document;
+  [[noreturn]] void refuse(const std::string& place, const std::string& expected,
+                           const GltfJson& found) const {
     const std::string text = found.is_structured() ? found.type_name() : found.dump();
     source.fail(place, expected, text.size() > 80 ? text.substr(0, 80) + "..." : text);
   }
   /// "3.0" is an integer to JSON Schema, but not to tinygltf: rewritten here.
-  void integer(Json& v, const std::string& place, std::uint64_t lo, std::uint64_t hi) const {
+  void integer(GltfJson& v, const std::string& place, std::uint64_t lo, std::uint64_t hi) const {
     const double real = v.is_number_float() ? v.get<double>() : -1;
     if (real >= 0 && real < 0x1p53 && std::floor(real) == real) v = static_cast<std::uint64_t>(real);
     if (!v.is_number_unsigned() || v.get<std::uint64_t>() < lo || v.get<std::uint64_t>() > hi)
       refuse(place, fmt::format("an integer from {} to {}", lo, hi), v);
   }
 };
-using Rule = std::function<void(const Look& look, Json& value, const std::string& place)>;
+using Rule = std::function<void(const Look& look, GltfJson& value, const std::string& place)>;
 
 /// kShapes and materials' extensions as rules.
 class Shapes {
@@ -200,26 +201,26 @@ class Shapes {
 };
 
 Rule Shapes::rule_of(const std::string& type) {
-  const auto of_type = [](bool (Json::*is)() const noexcept, const char* expected) {
-    return [=](const Look& look, const Json& v, const std::string& place) {
+  const auto of_type = [](bool (GltfJson::*is)() const noexcept, const char* expected) {
+    return [=](const Look& look, const GltfJson& v, const std::string& place) {
       if (!(v.*is)()) look.refuse(place, expected, v);
     };
   };
-  if (type == "text") return of_type(&Json::is_string, "a string");
-  if (type == "number") return of_type(&Json::is_number, "a number");
-  if (type == "truth") return of_type(&Json::is_boolean, "true or false");
+  if (type == "text") return of_type(&GltfJson::is_string, "a string");
+  if (type == "number") return of_type(&GltfJson::is_number, "a number");
+  if (type == "truth") return of_type(&GltfJson::is_boolean, "true or false");
   if (type == "int") return rule_of("0..2147483647");  // tinygltf keeps some sizes as int
   if (type == "size") return rule_of("0..9007199254740991");
   if (type.ends_with("[]") || type.ends_with("{}"))
     return [rule = rule_of(type.substr(0, type.size() - 2)), array = type.ends_with("[]")](
-               const Look& look, Json& v, const std::string& place) {
+               const Look& look, GltfJson& v, const std::string& place) {
       constexpr std::size_t kMost = 1'000'000;
       if (array ? !v.is_array() : !v.is_object()) look.refuse(place, array ? "an array" : "an object", v);
       if (v.size() > kMost) look.refuse(place, fmt::format("at most {} elements", kMost), v.size());
       for (auto& [name, value] : v.items()) rule(look, value, place + "/" + name);
     };
   if (type[0] == '@')
-    return [array = type.substr(1)](const Look& look, Json& v, const std::string& place) {
+    return [array = type.substr(1)](const Look& look, GltfJson& v, const std::string& place) {
       const auto it = look.document.find(array);
       const std::size_t size = it != look.document.end() && it->is_array() ? it->size() : 0;
       if (size == 0) look.refuse(place, "an element of /" + array + ", which is empty", v);
@@ -227,19 +228,21 @@ Rule Shapes::rule_of(const std::string& type) {
     };
   if (const std::size_t dots = type.find(".."); dots != type.npos)
     return [lo = std::stoull(type), hi = std::stoull(type.substr(dots + 2))](
-               const Look& look, Json& v, const std::string& place) { look.integer(v, place, lo, hi); };
+               const Look& look, GltfJson& v, const std::string& place) { look.integer(v, place, lo, hi); };
   if (const std::size_t star = type.find('*'); star != type.npos)
-    return [count = std::stoull(type.substr(star + 1))](const Look& look, Json& v, const std::string& place) {
+    return [count = std::stoull(type.substr(star + 1))](const Look& look, GltfJson& v,
+                                                        const std::string& place) {
       if (!v.is_array() || v.size() != count ||
-          !std::all_of(v.begin(), v.end(), std::mem_fn(&Json::is_number)))
+          !std::all_of(v.begin(), v.end(), std::mem_fn(&GltfJson::is_number)))
         look.refuse(place, std::to_string(count) + " numbers", v);
     };
   if (type.find(',') != type.npos)
-    return [choice = Json::parse("[" + type + "]")](const Look& look, Json& v, const std::string& place) {
+    return [choice = GltfJson::parse("[" + type + "]")](const Look& look, GltfJson& v,
+                                                        const std::string& place) {
       if (std::find(choice.begin(), choice.end(), v) == choice.end())
         look.refuse(place, "one of " + choice.dump(), v);
     };
-  return [members = &objects_[type]](const Look& look, Json& v, const std::string& place) {
+  return [members = &objects_[type]](const Look& look, GltfJson& v, const std::string& place) {
     if (!v.is_object()) look.refuse(place, "an object", v);
     for (const Member& member : *members) {
       if (const auto it = v.find(member.name); it != v.end())
@@ -252,32 +255,32 @@ Rule Shapes::rule_of(const std::string& type) {
 
 }  // namespace
 
-Json parse_json(const Source& source, std::string_view text) {
-  const JsonShape shape = scan_json_shape(text_bytes(text), kMaxJsonDepth);
+GltfJson parse_gltf_json(const Source& source, std::string_view text) {
+  const JsonShape shape = scan_json_shape(text_bytes(text), kMaxGltfJsonDepth);
   if (shape.too_deep)
     source.fail("byte " + std::to_string(*shape.too_deep), "JSON of at most 64 levels", "deeper nesting");
-  if (shape.values > kMaxJsonValues)
-    source.fail("", "JSON of at most " + std::to_string(kMaxJsonValues) + " values",
+  if (shape.values > kMaxGltfJsonValues)
+    source.fail("", "JSON of at most " + std::to_string(kMaxGltfJsonValues) + " values",
                 std::to_string(shape.values));
   try {
-    Json document = Json::parse(text);
+    GltfJson document = GltfJson::parse(text);
     if (!document.is_object()) source.fail("", "a JSON object", document.type_name());
     if (values_in(document) != shape.values)
       add_warning(source.notes, "duplicate-member", "",
                   "an object of the JSON names a member twice; the last one counts");
     return document;
-  } catch (const Json::parse_error& e) {
+  } catch (const GltfJson::parse_error& e) {
     source.fail("byte " + std::to_string(e.byte), "JSON", "a syntax error or the end of the text");
-  } catch (const Json::exception&) {
+  } catch (const GltfJson::exception&) {
     source.fail("", "numbers that fit a double", "a larger one");
   }
 }
 
-void look_through(const Source& source, Json& document) {
+void look_through(const Source& source, GltfJson& document) {
   static Shapes shapes;
   static const Rule rule = shapes.rule_of("document");
   drop_extras_and_nulls(document);
   rule({source, document}, document, "");
 }
 
-}  // namespace texmesh::gltf
+}  // namespace texmesh

@@ -8,18 +8,18 @@
 #include "pipeline/import/material_images.h"
 #include "pipeline/io/uri.h"
 
-namespace texmesh::gltf {
+namespace texmesh {
 namespace {
 
 constexpr std::int32_t kNotRead = -2;
 
-const Json* member(const Json& object, const char* key) {
+const GltfJson* member(const GltfJson& object, const char* key) {
   const auto it = object.find(key);
   return it == object.end() || it->is_null() ? nullptr : &*it;
 }
 
-const Json* extension(const Json& object, const char* name) {
-  const Json* e = member(object, "extensions");
+const GltfJson* extension(const GltfJson& object, const char* name) {
+  const GltfJson* e = member(object, "extensions");
   return e && e->is_object() ? member(*e, name) : nullptr;
 }
 
@@ -57,10 +57,10 @@ Minification minification_of(int filter) {
 
 class MaterialReader {
  public:
-  MaterialReader(const Source& source, const Json& document, const tinygltf::Model& structure,
+  MaterialReader(const Source& source, const GltfJson& document, const tinygltf::Model& structure,
                  Buffers& buffers, Model& model)
       : source_(source), document_(document), structure_(structure), buffers_(buffers), model_(model) {
-    if (const Json* images = member(document_, "images")) image_of_.assign(images->size(), kNotRead);
+    if (const GltfJson* images = member(document_, "images")) image_of_.assign(images->size(), kNotRead);
   }
   Material read(std::size_t index);
 
@@ -69,14 +69,14 @@ class MaterialReader {
   std::int32_t read_image(std::size_t index);
   std::int32_t ktx2_image(std::size_t index, bool has_other, const std::string& place);
   std::int32_t image_of_texture(std::size_t index);
-  TextureRef texture(const Json* info, const std::string& place);
-  void read_specular_glossiness(const Json& e, const std::string& place, Material& out);
-  MaterialExtension read_extension(const Json& e, const MaterialExtensionKind& kind,
+  TextureRef texture(const GltfJson* info, const std::string& place);
+  void read_specular_glossiness(const GltfJson& e, const std::string& place, Material& out);
+  MaterialExtension read_extension(const GltfJson& e, const MaterialExtensionKind& kind,
                                    const std::string& place);
-  void read_extensions(const Json& material, const std::string& place, Material& out);
+  void read_extensions(const GltfJson& material, const std::string& place, Material& out);
 
   const Source& source_;
-  const Json& document_;
+  const GltfJson& document_;
   const tinygltf::Model& structure_;
   Buffers& buffers_;
   Model& model_;
@@ -84,15 +84,15 @@ class MaterialReader {
 };
 
 std::int32_t MaterialReader::read_image(std::size_t index) {
-  const Json& declared = document_["images"][index];
+  const GltfJson& declared = document_["images"][index];
   const std::string place = "/images/" + std::to_string(index);
   if (model_.images.size() >= static_cast<std::size_t>(source_.options.max_images)) {
     source_.fail(place, "at most " + std::to_string(source_.options.max_images) + " images", "more");
   }
-  const Json* name_value = member(declared, "name");
+  const GltfJson* name_value = member(declared, "name");
   std::string name = name_value && name_value->is_string() ? name_value->get<std::string>() : "";
   if (name.empty()) name = "image " + std::to_string(index);
-  if (const Json* view = member(declared, "bufferView")) {
+  if (const GltfJson* view = member(declared, "bufferView")) {
     const ByteSpan bytes = buffers_.view(view->get<std::size_t>(), place);
     return add_image_bytes(model_, name, {bytes.begin(), bytes.end()}, source_.file, place, source_.options);
   }
@@ -135,13 +135,13 @@ std::int32_t MaterialReader::ktx2_image(std::size_t index, bool has_other, const
 /// The KTX2 image where there is one, else (or when its file is missing or cannot be read) the WebP one, else
 /// the plain one.
 std::int32_t MaterialReader::image_of_texture(std::size_t index) {
-  const Json& texture = document_["textures"][index];
+  const GltfJson& texture = document_["textures"][index];
   const std::string place = "/textures/" + std::to_string(index);
   const auto source_of = [&](const char* name) {
-    const Json* e = extension(texture, name);
+    const GltfJson* e = extension(texture, name);
     return e ? member(*e, "source") : nullptr;
   };
-  const Json *ktx2 = source_of("KHR_texture_basisu"), *webp = source_of("EXT_texture_webp");
+  const GltfJson *ktx2 = source_of("KHR_texture_basisu"), *webp = source_of("EXT_texture_webp");
   const int source = structure_.textures[index].source;
   std::int32_t found = -1;
   if (ktx2) found = ktx2_image(ktx2->get<std::size_t>(), webp || source >= 0, place);
@@ -154,14 +154,14 @@ std::int32_t MaterialReader::image_of_texture(std::size_t index) {
   return found;
 }
 
-TextureRef MaterialReader::texture(const Json* info, const std::string& place) {
+TextureRef MaterialReader::texture(const GltfJson* info, const std::string& place) {
   TextureRef ref;
   if (!info) return ref;
   const auto index = (*info)["index"].get<std::size_t>();
   std::uint64_t texcoord = info->value("texCoord", std::uint64_t{0});
-  if (const Json* t = extension(*info, "KHR_texture_transform")) {
+  if (const GltfJson* t = extension(*info, "KHR_texture_transform")) {
     const auto pair = [&](const char* key, Vec2f otherwise) {
-      const Json* v = member(*t, key);
+      const GltfJson* v = member(*t, key);
       return v ? Vec2f{to_float((*v)[0].get<double>()), to_float((*v)[1].get<double>())} : otherwise;
     };
     ref.transform.offset = pair("offset", {0, 0});
@@ -189,11 +189,11 @@ TextureRef MaterialReader::texture(const Json* info, const std::string& place) {
 }
 
 /// The older PBR model, which most viewers have dropped, becomes the newer one.
-void MaterialReader::read_specular_glossiness(const Json& e, const std::string& place, Material& out) {
+void MaterialReader::read_specular_glossiness(const GltfJson& e, const std::string& place, Material& out) {
   source_.note_once(Severity::kInfo, "specular-glossiness", place,
                     "KHR_materials_pbrSpecularGlossiness is converted to metallic-roughness");
   const auto factor = [&](const char* key, std::size_t i) {
-    const Json* f = member(e, key);
+    const GltfJson* f = member(e, key);
     return f ? to_unit((*f)[i].get<double>()) : 1.0f;
   };
   SpecularGlossiness factors;
@@ -227,23 +227,23 @@ void MaterialReader::read_specular_glossiness(const Json& e, const std::string& 
   out.metallic = out.roughness = 1;
 }
 
-MaterialExtension MaterialReader::read_extension(const Json& e, const MaterialExtensionKind& kind,
+MaterialExtension MaterialReader::read_extension(const GltfJson& e, const MaterialExtensionKind& kind,
                                                  const std::string& place) {
   MaterialExtension out;
   out.name = kind.name;
   for (const ExtensionFactorKind& f : kind.factors) {
-    const Json* value = member(e, std::string(f.key).c_str());
+    const GltfJson* value = member(e, std::string(f.key).c_str());
     if (!value) continue;
     ExtensionFactor factor{std::string(f.key), {}};
     for (int i = 0; i < f.components; ++i) {
-      const Json& number = f.components == 1 ? *value : (*value)[static_cast<std::size_t>(i)];
+      const GltfJson& number = f.components == 1 ? *value : (*value)[static_cast<std::size_t>(i)];
       factor.values.push_back(to_float(std::clamp(number.get<double>(), f.lowest, f.highest)));
     }
     out.factors.push_back(std::move(factor));
   }
   for (const ExtensionTextureKind& t : kind.textures) {
     const std::string key(t.key);
-    const Json* info = member(e, key.c_str());
+    const GltfJson* info = member(e, key.c_str());
     const TextureRef ref = texture(info, place + "/" + key);
     if (ref.used()) out.textures.push_back({key, ref, to_float(info->value("scale", 1.0))});
   }
@@ -251,7 +251,7 @@ MaterialExtension MaterialReader::read_extension(const Json& e, const MaterialEx
 }
 
 /// Keys of the textures that `value` names: "brightnessTexture, maskTexture".
-std::string texture_names(const Json& value) {
+std::string texture_names(const GltfJson& value) {
   std::string names;
   for (const auto& [key, v] : value.items())
     if (v.is_object() && v.contains("index")) names += (names.empty() ? "" : ", ") + key;
@@ -259,8 +259,8 @@ std::string texture_names(const Json& value) {
 }
 
 /// Extensions that texmesh knows become part of the material; of others a note says what is lost.
-void MaterialReader::read_extensions(const Json& material, const std::string& place, Material& out) {
-  const Json* extensions = member(material, "extensions");
+void MaterialReader::read_extensions(const GltfJson& material, const std::string& place, Material& out) {
+  const GltfJson* extensions = member(material, "extensions");
   if (!extensions) return;
   for (const auto& [name, value] : extensions->items()) {
     if (name == "KHR_materials_unlit") continue;
@@ -282,10 +282,10 @@ void MaterialReader::read_extensions(const Json& material, const std::string& pl
 }
 
 Material MaterialReader::read(std::size_t index) {
-  const Json& declared = document_["materials"][index];
+  const GltfJson& declared = document_["materials"][index];
   const tinygltf::Material& m = structure_.materials[index];
   const std::string place = "/materials/" + std::to_string(index);
-  const auto texture_of = [&](const Json* holder, const char* key) {
+  const auto texture_of = [&](const GltfJson* holder, const char* key) {
     return texture(holder ? member(*holder, key) : nullptr, place + "/" + key);
   };
   Material out;
@@ -302,8 +302,8 @@ Material MaterialReader::read(std::size_t index) {
   out.alpha_cutoff = to_float(m.alphaCutoff);
   out.double_sided = m.doubleSided;
   out.unlit = extension(declared, "KHR_materials_unlit") != nullptr;
-  const Json* specular = extension(declared, "KHR_materials_pbrSpecularGlossiness");
-  if (const Json* pbr = member(declared, "pbrMetallicRoughness"); pbr && !specular) {
+  const GltfJson* specular = extension(declared, "KHR_materials_pbrSpecularGlossiness");
+  if (const GltfJson* pbr = member(declared, "pbrMetallicRoughness"); pbr && !specular) {
     out.base_colour_texture = texture_of(pbr, "baseColorTexture");
     out.metallic_roughness_texture = texture_of(pbr, "metallicRoughnessTexture");
   }
@@ -317,7 +317,7 @@ Material MaterialReader::read(std::size_t index) {
 
 }  // namespace
 
-std::vector<std::uint16_t> read_materials(const Source& source, const Json& document,
+std::vector<std::uint16_t> read_materials(const Source& source, const GltfJson& document,
                                           const tinygltf::Model& structure, Buffers& buffers,
                                           const std::vector<int>& used, Model& model) {
   MaterialReader reader(source, document, structure, buffers, model);
@@ -330,4 +330,4 @@ std::vector<std::uint16_t> read_materials(const Source& source, const Json& docu
   return indices;
 }
 
-}  // namespace texmesh::gltf
+}  // namespace texmesh

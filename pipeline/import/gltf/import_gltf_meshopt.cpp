@@ -4,7 +4,7 @@
 
 #include "pipeline/import/gltf/import_gltf_parts.h"
 
-namespace texmesh::gltf {
+namespace texmesh {
 namespace {
 
 // Attribute streams of version 1 (KHR_meshopt_compression, mode ATTRIBUTES). Debian's meshoptimizer knows
@@ -330,4 +330,4 @@ std::vector<std::uint8_t> decode_meshopt(const Source& source, const std::string
   return out;
 }
 
-}  // namespace texmesh::gltf
+}  // namespace texmesh

@@ -19,9 +19,9 @@ class Model;
 // The parts of the glTF reader (import_gltf.cpp puts them together). The JSON is parsed once, within bounds;
 // look_through() checks what tinygltf's structures would not show; tinygltf makes structures of it. Bytes are
 // only ever reached through Buffers and AccessorReader, which know their lengths.
-namespace texmesh::gltf {
+namespace texmesh {
 
-using Json = nlohmann::json;
+using GltfJson = nlohmann::json;
 /// What every part is given. Places in messages are JSON pointers: "/accessors/3/count".
 struct Source {
   const std::string& file;
@@ -50,19 +50,19 @@ Container split_container(const Source& source, ByteSpan bytes);
 
 /// Bounds of a stranger's JSON. Parsers recurse; a value costs them at most a few hundred bytes, and real
 /// scans have some thousands.
-inline constexpr int kMaxJsonDepth = 64;
-inline constexpr std::uint64_t kMaxJsonValues = 8'000'000;
+inline constexpr int kMaxGltfJsonDepth = 64;
+inline constexpr std::uint64_t kMaxGltfJsonValues = 8'000'000;
 /// Parses after a look at the brackets alone. A warning says that an object names a member twice.
-Json parse_json(const Source& source, std::string_view text);
+GltfJson parse_gltf_json(const Source& source, std::string_view text);
 /// Takes out `extras` and null, and checks types, lengths, whole numbers and indices of every property that
 /// the reader uses.
-void look_through(const Source& source, Json& document);
+void look_through(const Source& source, GltfJson& document);
 
 // import_gltf_structure.cpp
 
 /// What has been looked through, read by tinygltf but for buffers and images: tinygltf opens and decodes
 /// nothing. InputError where it misses a property or knows no such value.
-tinygltf::Model read_structure(const Source& source, const Json& document);
+tinygltf::Model read_structure(const Source& source, const GltfJson& document);
 
 // import_gltf_buffers.cpp
 
@@ -70,7 +70,7 @@ tinygltf::Model read_structure(const Source& source, const Json& document);
 /// with EXT_meshopt_compression or KHR_meshopt_compression undone.
 class Buffers {
  public:
-  Buffers(const Source& source, const Json& document, const tinygltf::Model& structure,
+  Buffers(const Source& source, const GltfJson& document, const tinygltf::Model& structure,
           std::optional<ByteSpan> bin);
   /// `place` is who asks, for messages.
   ByteSpan view(std::size_t index, const std::string& place);
@@ -79,10 +79,10 @@ class Buffers {
   ByteSpan buffer(std::size_t index);
   ByteSpan range(std::size_t buffer_index, std::uint64_t offset, std::uint64_t length,
                  const std::string& place);
-  std::vector<std::uint8_t> decompressed(const Json& extension, const std::string& place);
+  std::vector<std::uint8_t> decompressed(const GltfJson& extension, const std::string& place);
 
   const Source& source_;
-  const Json& document_;
+  const GltfJson& document_;
   const tinygltf::Model& structure_;
   std::optional<ByteSpan> bin_;
   std::uint64_t decompressed_bytes_ = 0;
@@ -144,7 +144,8 @@ struct VertexData {
 /// KHR_draco_mesh_compression. Its counts are read from the stream's header and checked before the decoder,
 /// which allocates what a header asks for, sees it. `attributes` maps names to the stream's attribute ids;
 /// `normalized` says what the accessor of a name says.
-VertexData decode_draco(const Source& source, const std::string& place, ByteSpan data, const Json& attributes,
+VertexData decode_draco(const Source& source, const std::string& place, ByteSpan data,
+                        const GltfJson& attributes,
                         const std::function<bool(const std::string& name)>& normalized);
 
 /// Triangles of one primitive in its mesh's space, with the vertices that they use, in the order of the file.
@@ -155,15 +156,15 @@ struct Primitive {
   std::vector<Vec4f> colours, tangents;
 };
 /// Empty for points, lines and primitives without positions.
-Primitive read_primitive(const Source& source, const Json& document, const tinygltf::Model& model,
+Primitive read_primitive(const Source& source, const GltfJson& document, const tinygltf::Model& model,
                          Buffers& buffers, std::size_t mesh, std::size_t primitive);
 
 // import_gltf_materials.cpp
 
 /// Appends the glTF materials that `used` names (and glTF's default material for -1) to `model`, with their
 /// images. The result gives, per entry of `used`, the index in model.materials.
-std::vector<std::uint16_t> read_materials(const Source& source, const Json& document,
+std::vector<std::uint16_t> read_materials(const Source& source, const GltfJson& document,
                                           const tinygltf::Model& structure, Buffers& buffers,
                                           const std::vector<int>& used, Model& model);
 
-}  // namespace texmesh::gltf
+}  // namespace texmesh

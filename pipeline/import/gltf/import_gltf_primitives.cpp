@@ -9,7 +9,7 @@
 
 #include "pipeline/import/gltf/import_gltf_parts.h"
 
-namespace texmesh::gltf {
+namespace texmesh {
 namespace {
 
 constexpr std::uint64_t kMinFaceBudget = 1 << 16;
@@ -172,7 +172,8 @@ ReadFloats reader(std::shared_ptr<const draco::Mesh> mesh, const draco::PointAtt
 
 }  // namespace
 
-VertexData decode_draco(const Source& source, const std::string& place, ByteSpan data, const Json& attributes,
+VertexData decode_draco(const Source& source, const std::string& place, ByteSpan data,
+                        const GltfJson& attributes,
                         const std::function<bool(const std::string& name)>& normalized) {
   check_header(source, place, data);
   const std::shared_ptr<const draco::Mesh> mesh = decode_mesh(source, place, data);
@@ -222,8 +223,8 @@ struct PrimitivePath {
   }
 };
 
-const Json* draco_extension(const Json& document, const PrimitivePath& place) {
-  const Json& primitive = document["meshes"][place.mesh]["primitives"][place.primitive];
+const GltfJson* draco_extension(const GltfJson& document, const PrimitivePath& place) {
+  const GltfJson& primitive = document["meshes"][place.mesh]["primitives"][place.primitive];
   const auto e = primitive.find("extensions");
   if (e == primitive.end() || !e->is_object()) return nullptr;
   const auto d = e->find(kDraco);
@@ -232,8 +233,8 @@ const Json* draco_extension(const Json& document, const PrimitivePath& place) {
 
 class PrimitiveReader {
  public:
-  PrimitiveReader(const Source& source, const Json& document, const tinygltf::Model& model, Buffers& buffers,
-                  const PrimitivePath& place)
+  PrimitiveReader(const Source& source, const GltfJson& document, const tinygltf::Model& model,
+                  Buffers& buffers, const PrimitivePath& place)
       : source_(source),
         document_(document),
         model_(model),
@@ -254,7 +255,7 @@ class PrimitiveReader {
   std::vector<Triangle> triangles(const VertexData& data, int mode) const;
 
   const Source& source_;
-  const Json& document_;
+  const GltfJson& document_;
   const tinygltf::Model& model_;
   Buffers& buffers_;
   const PrimitivePath place_;
@@ -322,7 +323,7 @@ ReadFloats PrimitiveReader::attribute(const std::string& name, VertexData& data,
 
 VertexData PrimitiveReader::vertices() const {
   VertexData data;
-  const Json* draco = draco_extension(document_, place_);
+  const GltfJson* draco = draco_extension(document_, place_);
   if (draco) {
     const std::string place = at("extensions/" + std::string(kDraco));
     const auto normalized = [&](const std::string& name) {
@@ -480,9 +481,9 @@ Primitive PrimitiveReader::read() {
 
 }  // namespace
 
-Primitive read_primitive(const Source& source, const Json& document, const tinygltf::Model& model,
+Primitive read_primitive(const Source& source, const GltfJson& document, const tinygltf::Model& model,
                          Buffers& buffers, std::size_t mesh, std::size_t primitive) {
   return PrimitiveReader(source, document, model, buffers, {mesh, primitive}).read();
 }
 
-}  // namespace texmesh::gltf
+}  // namespace texmesh

@@ -17,12 +17,12 @@
 
 #include "pipeline/import/gltf/import_gltf_parts.h"
 
-namespace texmesh::gltf {
+namespace texmesh {
 namespace {
 
 class StructureReader {
  public:
-  StructureReader(const Source& source, const Json& document) : source_(source), document_(document) {}
+  StructureReader(const Source& source, const GltfJson& document) : source_(source), document_(document) {}
 
   /// read(element, error, JSON) for every element of an array of the document. What tinygltf complains about
   /// is an error, even where it would go on.
@@ -30,13 +30,13 @@ class StructureReader {
   void read_array(const std::string& array, std::vector<T>& elements, const Read& read) const {
     const auto it = document_.find(array);
     if (it == document_.end()) return;
-    for (const Json& declared : *it) {
+    for (const GltfJson& declared : *it) {
       const std::string place = "/" + array + "/" + std::to_string(elements.size());
       read_element(place, declared, elements.emplace_back(), read);
     }
   }
   template <class T, class Read>
-  void read_element(const std::string& place, const Json& declared, T& element, const Read& read) const {
+  void read_element(const std::string& place, const GltfJson& declared, T& element, const Read& read) const {
     std::string error;
     const bool is_read = read(&element, &error, declared);
     if (is_read && error.empty()) return;
@@ -46,36 +46,37 @@ class StructureReader {
 
  private:
   const Source& source_;
-  const Json& document_;
+  const GltfJson& document_;
 };
 
 }  // namespace
 
-tinygltf::Model read_structure(const Source& source, const Json& document) {
+tinygltf::Model read_structure(const Source& source, const GltfJson& document) {
   namespace tiny = tinygltf;
   tiny::Model model;
   const StructureReader in(source, document);
   const auto plain = [](auto read) {
-    return [read](auto* to, std::string* error, const Json& o) { return read(to, error, o, false); };
+    return [read](auto* to, std::string* error, const GltfJson& o) { return read(to, error, o, false); };
   };
   in.read_element("/asset", document["asset"], model.asset, plain(tiny::ParseAsset));
   in.read_array("bufferViews", model.bufferViews, plain(tiny::ParseBufferView));
   in.read_array("accessors", model.accessors, plain(tiny::ParseAccessor));
-  in.read_array("meshes", model.meshes, [&](tiny::Mesh* mesh, std::string* error, const Json& o) {
+  in.read_array("meshes", model.meshes, [&](tiny::Mesh* mesh, std::string* error, const GltfJson& o) {
     return tiny::ParseMesh(mesh, &model, error, o, false);
   });
   in.read_array("nodes", model.nodes, plain(tiny::ParseNode));
-  in.read_array("scenes", model.scenes, [](tiny::Scene* scene, std::string* error, const Json& o) {
+  in.read_array("scenes", model.scenes, [](tiny::Scene* scene, std::string* error, const GltfJson& o) {
     tiny::ParseIntegerArrayProperty(&scene->nodes, error, o, "nodes", false);
     return true;
   });
   tiny::ParseIntegerProperty(&model.defaultScene, nullptr, document, "scene", false);
   in.read_array("materials", model.materials, plain(tiny::ParseMaterial));
   in.read_array("samplers", model.samplers, plain(tiny::ParseSampler));
-  in.read_array("textures", model.textures, [](tiny::Texture* texture, std::string* error, const Json& o) {
-    return tiny::ParseTexture(texture, error, o, false, "");
-  });
+  in.read_array("textures", model.textures,
+                [](tiny::Texture* texture, std::string* error, const GltfJson& o) {
+                  return tiny::ParseTexture(texture, error, o, false, "");
+                });
   return model;
 }
 
-}  // namespace texmesh::gltf
+}  // namespace texmesh

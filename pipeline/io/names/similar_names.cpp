@@ -6,8 +6,7 @@
 #include <memory>
 
 #include "format/base/text_bytes.h"
-#include "pipeline/io/descriptor.h"
-#include "pipeline/io/wire_text.h"
+#include "pipeline/io/uri.h"
 
 namespace texmesh {
 namespace {

@@ -1,7 +1,6 @@
 #pragma once
 
-#include "stages/data/pixels.h"
-#include "stages/image/image_format.h"
+#include "stages/image/decode_image.h"
 
 namespace texmesh {
 

@@ -1,7 +1,6 @@
 // The module texmesh_readers.so: see stages/image/decode_tiff_exr.cpp.
-#include "stages/image/readers_module/readers.h"
+#include "stages/image/readers_module/other_pictures.h"
 
-#include <algorithm>
 #include <memory>
 #include <mutex>
 
@@ -96,14 +95,8 @@ std::uint32_t colour_channels(const OIIO::ImageSpec& spec, ImageFormat format) {
 }
 
 std::uint8_t bits_of(const OIIO::ImageSpec& spec) {
-  switch (spec.format.basetype) {
-    case OIIO::TypeDesc::UINT8:
-      return 8;
-    case OIIO::TypeDesc::UINT16:
-      return 16;
-    default:
-      return 32;
-  }
+  const auto type = spec.format.basetype;
+  return type == OIIO::TypeDesc::UINT8 ? 8 : type == OIIO::TypeDesc::UINT16 ? 16 : 32;
 }
 
 void check_spec(const std::string& name, const OIIO::ImageSpec& spec, const ImageLimits& limits) {
@@ -184,14 +177,10 @@ std::vector<T> read_samples(const std::string& name, FileKind kind, std::uint32_
 }
 
 StoredSamples read_stored(const std::string& name, FileKind kind, std::uint32_t channels, OpenImage& open) {
-  switch (bits_of(open.spec)) {
-    case 8:
-      return read_samples<std::uint8_t>(name, kind, channels, open, OIIO::TypeDesc::UINT8);
-    case 16:
-      return read_samples<std::uint16_t>(name, kind, channels, open, OIIO::TypeDesc::UINT16);
-    default:
-      return read_samples<float>(name, kind, channels, open, OIIO::TypeDesc::FLOAT);
-  }
+  const std::uint8_t bits = bits_of(open.spec);
+  if (bits == 8) return read_samples<std::uint8_t>(name, kind, channels, open, OIIO::TypeDesc::UINT8);
+  if (bits == 16) return read_samples<std::uint16_t>(name, kind, channels, open, OIIO::TypeDesc::UINT16);
+  return read_samples<float>(name, kind, channels, open, OIIO::TypeDesc::FLOAT);
 }
 
 ImageHeader read_module_header(const std::string& name, ImageFormat format, ByteSpan bytes,
@@ -231,6 +220,6 @@ constexpr ModuleReaders kReader{&read_module_header, &decode, &read_picture, &de
 }  // namespace
 }  // namespace texmesh
 
-__attribute__((visibility("default"))) const texmesh::ModuleReaders* texmesh_readers_3() {
+extern "C" __attribute__((visibility("default"))) const texmesh::ModuleReaders* texmesh_readers_3() {
   return &texmesh::kReader;
 }

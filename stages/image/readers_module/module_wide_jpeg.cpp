@@ -1,6 +1,6 @@
 // Inside the module texmesh_readers.so: JPEGs of 9 to 16 bits a sample, which libjpeg-turbo 2 refuses, and
 // OpenImageIO, which asks it. DCMTK has the Independent JPEG Group's decoder built for 12 and for 16 bits.
-#include "stages/image/readers_module/readers.h"
+#include "stages/image/readers_module/other_pictures.h"
 
 #include <memory>
 #include <mutex>

@@ -1,12 +1,8 @@
-
-#include <algorithm>
 #include <cstdio>
-#include <cstdlib>
-#include <limits>
 #include <type_traits>
 
 #include "stages/image/png_writer.h"
-#include "stages/image/readers_module/readers.h"
+#include "stages/image/readers_module/other_pictures.h"
 
 namespace texmesh {
 namespace {

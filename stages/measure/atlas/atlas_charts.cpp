@@ -3,9 +3,7 @@
 #include <bit>
 #include <tuple>
 
-#include "format/base/srgb.h"
 #include "stages/base/parallel.h"
-#include "stages/geometry/weld.h"
 #include "stages/measure/atlas/atlas_parts.h"
 #include "stages/measure/cie_lab.h"
 
@@ -199,15 +197,6 @@ AtlasCharts ChartFinder::find() {
   return std::move(out_);
 }
 
-}  // namespace
-
-AtlasCharts find_charts(const AtlasLayout& layout, std::span<const std::uint32_t> atlas_of_triangle,
-                        std::size_t atlases) {
-  return ChartFinder(layout, atlas_of_triangle, atlases).find();
-}
-
-namespace {
-
 constexpr double kTexelsPerSample = 4;
 constexpr double kMostSamples = 8;  // of one edge
 
@@ -290,14 +279,17 @@ SeamDifference difference_along(const AtlasLayout& layout, const AtlasSeam& seam
 
 }  // namespace
 
+AtlasCharts find_charts(const AtlasLayout& layout, std::span<const std::uint32_t> atlas_of_triangle,
+                        std::size_t atlases) {
+  return ChartFinder(layout, atlas_of_triangle, atlases).find();
+}
+
 std::vector<std::optional<SeamColours>> measure_seams(const AtlasLayout& layout, const AtlasCharts& charts,
                                                       std::span<const AtlasImage> images, std::size_t atlases,
                                                       const RunContext& context) {
   std::vector<SeamDifference> differences(charts.seams.size());
-  parallel_for(context, differences.size(), 1024, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t s = begin; s < end; ++s)
-      differences[s] = difference_along(layout, charts.seams[s], images);
-  });
+  parallel_each(context, differences.size(), 1024,
+                [&](std::size_t s) { differences[s] = difference_along(layout, charts.seams[s], images); });
   std::vector<std::vector<WeighedValue>> of_atlas(atlases);
   std::vector<double> inside(atlases);
   for (std::size_t s = 0; s < differences.size(); ++s) {

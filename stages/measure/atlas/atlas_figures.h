@@ -1,8 +1,6 @@
 #pragma once
-#include <cstdint>
 #include <optional>
 #include <span>
-#include <vector>
 
 #include "format/model/model.h"
 #include "stages/base/run_context.h"
@@ -52,7 +50,7 @@ struct SeamColours {
 struct AtlasFigures {
   std::uint32_t image = 0;  // index into the model's images
   std::uint32_t width_px = 0, height_px = 0;
-  std::vector<std::uint32_t> materials;  // whose guide texture it is (uv_sets.h)
+  std::vector<std::uint32_t> materials;  // whose guide texture it is (UvSets)
   std::uint64_t triangles = 0, charts = 0, small_charts = 0, thin_charts = 0, mirrored_charts = 0;
   std::uint64_t flat_triangles = 0;    // without area on the texture, though they have one in space
   double flat_surface = 0;             // their share of the surface that the image is meant for

@@ -1,8 +1,6 @@
 #pragma once
 // Inside this room only: what the sources of measure_atlases() share.
-#include <array>
 
-#include "format/base/no_index.h"
 #include "stages/geometry/mesh_topology.h"
 #include "stages/geometry/texel_coverage.h"
 #include "stages/measure/atlas/atlas_figures.h"

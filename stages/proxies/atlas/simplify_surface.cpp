@@ -4,13 +4,11 @@
 // smallest triangles are dropped, so that every count is reached.
 #include "stages/proxies/atlas_mesh.h"
 
-#include "format/base/box.h"
 #include "stages/geometry/mesh_topology.h"
 #include "stages/geometry/quadric.h"
-#include "stages/geometry/weld.h"
-#include "stages/proxies/atlas/pair_queue.h"
+#include "stages/proxies/atlas/chart_parts.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 namespace {
 
 /// Whether triangles without an area stay: in a source they close cracks between their neighbours.
@@ -291,9 +289,7 @@ class SurfaceQuadrics {
   void add_borders(const std::vector<Triangle>& triangles, const std::vector<std::uint32_t>& group,
                    double border_width) {
     const std::vector<double> area = component_areas(places_, triangles);
-    std::vector<std::uint32_t> corners;
-    corners.reserve(3 * triangles.size());
-    for (const Triangle& t : triangles) corners.insert(corners.end(), t.begin(), t.end());
+    const std::span<const std::uint32_t> corners = corners_of(triangles);
     const EdgeTable edges = group_edges(corners, places_.size());
     for (std::size_t e = 0; e < edges.edge_count(); ++e) {
       const std::span<const std::uint32_t> half_edges = edges.edge(e);
@@ -379,25 +375,17 @@ class SurfaceCollapse {
 
  private:
   void queue_all_edges() {
-    for (std::uint32_t v = 0; v < rings_.vertex_count(); ++v) {
-      if (rings_.valence(v) == 0) continue;
-      rings_.triangles_at(v, at_a_);
-      neighbours_.clear();
-      for (const std::uint32_t t : at_a_)
-        for (const std::uint32_t w : rings_.triangles()[t])
-          if (w > v) neighbours_.push_back(w);
-      std::sort(neighbours_.begin(), neighbours_.end());
-      neighbours_.erase(std::unique(neighbours_.begin(), neighbours_.end()), neighbours_.end());
-      for (const std::uint32_t w : neighbours_) queue_.push(v, w, quadrics_.best_target(v, w).cost);
-    }
+    for (std::uint32_t v = 0; v < rings_.vertex_count(); ++v)
+      if (rings_.valence(v) > 0) queue_edges_of(v, v + 1);
   }
 
-  void queue_edges_of(std::uint32_t vertex) {
+  /// Those to vertices from `first` on.
+  void queue_edges_of(std::uint32_t vertex, std::uint32_t first) {
     rings_.triangles_at(vertex, at_a_);
     neighbours_.clear();
     for (const std::uint32_t t : at_a_)
       for (const std::uint32_t w : rings_.triangles()[t])
-        if (w != vertex) neighbours_.push_back(w);
+        if (w >= first && w != vertex) neighbours_.push_back(w);
     std::sort(neighbours_.begin(), neighbours_.end());
     neighbours_.erase(std::unique(neighbours_.begin(), neighbours_.end()), neighbours_.end());
     for (const std::uint32_t w : neighbours_) queue_.push(vertex, w, quadrics_.best_target(vertex, w).cost);
@@ -495,7 +483,7 @@ class SurfaceCollapse {
     quadrics_.merge(b, a, place);
     queue_.touch(a);
     queue_.touch(b);
-    queue_edges_of(a);
+    queue_edges_of(a, 0);
   }
 
   void drop_smallest(std::size_t triangle_count) {
@@ -510,9 +498,7 @@ class SurfaceCollapse {
   }
 
   Vec3d doubled_area(std::uint32_t triangle) const {
-    const Triangle& t = rings_.triangles()[triangle];
-    const Vec3d p = quadrics_.place(t[0]);
-    return cross(quadrics_.place(t[1]) - p, quadrics_.place(t[2]) - p);
+    return texmesh::doubled_area(quadrics_.places(), rings_.triangles()[triangle]);
   }
 
   CornerRings rings_;
@@ -586,4 +572,4 @@ std::vector<ProxySurface> simplify_surface(std::span<const Vec3f> positions,
   return surfaces;
 }
 
-}  // namespace texmesh::proxies
+}  // namespace texmesh

@@ -1,8 +1,8 @@
-#include "stages/proxies/bake/bake_source.h"
+#include "stages/proxies/bake/bake.h"
 
-#include "format/base/no_index.h"
+#include "stages/geometry/mesh_topology.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 namespace {
 
 constexpr double kCage = 0.03;       // of the diagonal, to both sides
@@ -22,12 +22,6 @@ Vec3f unit_or(Vec3f v, Vec3f otherwise) {
 }
 
 float within_unit(float x) { return x > 0 ? (x < 1 ? x : 1) : 0; }
-
-std::array<Vec3d, 3> corners_of(const Mesh& mesh, const Triangle& t) {
-  std::array<Vec3d, 3> out;
-  for (std::size_t k = 0; k < 3; ++k) out[k] = to_double(mesh.positions[mesh.wedge_position[t[k]]]);
-  return out;
-}
 
 Vec3d area_normal(const std::array<Vec3d, 3>& c) { return cross(c[1] - c[0], c[2] - c[0]); }
 
@@ -103,7 +97,7 @@ BakeSource::BakeSource(const Mesh& mesh, const ShownMaterials& shown, const Mate
   for (const Vec3f p : mesh.positions) points.push_back(to_double(p));
   std::vector<std::vector<Triangle>> positions(groups_.size());
   for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
-    const std::array<Vec3d, 3> c = corners_of(mesh, mesh.triangles[i]);
+    const std::array<Vec3d, 3> c = corner_points(mesh, mesh.triangles[i]);
     for (const Vec3d& p : c) box.extend(p);
     const Vec3d n = area_normal(c);
     if (!(dot(n, n) > 0)) continue;
@@ -159,7 +153,7 @@ class BakeSource::Reader {
     const Vec2d along1 = to_double(matrix.direction(uv[corner[1]] - uv[corner[0]])),
                 along2 = to_double(matrix.direction(uv[corner[2]] - uv[corner[0]]));
     const double texels = std::fabs(cross(along1, along2)) * texture.width_px * texture.height_px;
-    const double area = length(area_normal(corners_of(mesh, corner)));
+    const double area = length(area_normal(corner_points(mesh, corner)));
     const double side = footprint_ * std::sqrt(texels / area);  // of the footprint in texels
     if (std::isfinite(side)) {
       at.uv_dx = {static_cast<float>(side / texture.width_px), 0};
@@ -179,7 +173,7 @@ class BakeSource::Reader {
 Vec3f BakeSource::mapped_normal(Reader& reader, const RenderMaterial& material) const {
   const SurfacePlace& place = reader.place();
   const Triangle& corner = mesh_.triangles[place.triangle];
-  const std::array<Vec3d, 3> corners = corners_of(mesh_, corner);
+  const std::array<Vec3d, 3> corners = corner_points(mesh_, corner);
   const Vec3f face = to_float(normalized(area_normal(corners)));
   const Vec3f normal =
       mesh_.normals.empty() ? face : unit_or(mean_of(mesh_.normals, corner, place.weight), face);
@@ -201,7 +195,7 @@ Vec3f BakeSource::mapped_normal(Reader& reader, const RenderMaterial& material) 
                  normal);
 }
 
-void BakeSource::add_colours(Reader& reader, const RenderMaterial& m, SurfaceSample& out) const {
+void BakeSource::add_colours(Reader& reader, const RenderMaterial& m, BakeSample& out) const {
   const SurfacePlace& place = reader.place();
   Vec4f base = m.base_colour;
   const auto multiply = [&base](Vec4f by) {
@@ -230,7 +224,7 @@ void BakeSource::add_colours(Reader& reader, const RenderMaterial& m, SurfaceSam
   }
 }
 
-void BakeSource::add_data(Reader& reader, const RenderMaterial& m, SurfaceSample& out) const {
+void BakeSource::add_data(Reader& reader, const RenderMaterial& m, BakeSample& out) const {
   const TextureSlot &rough_metal = m.slot(TextureUse::kMetallicRoughness),
                     &occlusion = m.slot(TextureUse::kOcclusion);
   Vec4f texel{1, 1, 1, 1};
@@ -242,10 +236,9 @@ void BakeSource::add_data(Reader& reader, const RenderMaterial& m, SurfaceSample
   out.occlusion = within_unit(1 + (texel.x - 1) * m.occlusion_strength);
 }
 
-SurfaceSample BakeSource::sample(const SurfacePlace& place, double footprint,
-                                 const SampleParts& parts) const {
+BakeSample BakeSource::sample(const SurfacePlace& place, double footprint, const SampleParts& parts) const {
   const RenderMaterial& m = shown_.materials[mesh_.triangle_material[place.triangle]];
-  SurfaceSample out;
+  BakeSample out;
   Reader reader(*this, place, footprint);
   if (parts.colours) add_colours(reader, m, out);
   if (m.unlit) return out;
@@ -254,4 +247,4 @@ SurfaceSample BakeSource::sample(const SurfacePlace& place, double footprint,
   return out;
 }
 
-}  // namespace texmesh::proxies
+}  // namespace texmesh

@@ -6,7 +6,7 @@
 
 int main() {
   std::puts(
-      "// Made by make_studio_table.\n#include <cstdint>\n#include <span>\n\nnamespace texmesh::render {\n"
+      "// Made by make_studio_table.\n#include <cstdint>\n#include <span>\n\nnamespace texmesh {\n"
       "namespace {\n\nconstexpr std::uint32_t kStudioWords[] = {");
   int column = 0;
   const auto put = [&](std::uint32_t word) {
@@ -24,5 +24,5 @@ int main() {
   }
   std::puts(
       "};\n\n}  // namespace\n\nstd::span<const std::uint32_t> studio_table() { return kStudioWords; }\n\n"
-      "}  // namespace texmesh::render");
+      "}  // namespace texmesh");
 }

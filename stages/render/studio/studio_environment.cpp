@@ -5,13 +5,11 @@
 #include "stages/render/environment.h"
 
 namespace texmesh {
-namespace render {
 
 /// The studio's environment as make_studio_table wrote it when the library was built: bits of floats, sides
 /// of levels as numbers, in the order of RenderEnvironment's members without key and background.
 std::span<const std::uint32_t> studio_table();
 
-}  // namespace render
 namespace {
 
 /// Takes the table's words one after the other.
@@ -29,7 +27,7 @@ class StudioWords {
   bool at_end() const { return at_ == words_.size(); }
 
  private:
-  std::span<const std::uint32_t> words_ = render::studio_table();
+  std::span<const std::uint32_t> words_ = studio_table();
   std::size_t at_ = 0;
 };
 

@@ -11,7 +11,7 @@
 #include <set>
 
 #include "delivery/cpp/package/http_store.h"
-#include "delivery/cpp/transfer/package_transport.h"
+#include "delivery/cpp/transfer/transfer.h"
 #include "format/base/errors.h"
 #include "tests/delivery/package/raw_server.h"
 #include "tests/format/container/package_fixture.h"

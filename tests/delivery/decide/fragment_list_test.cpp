@@ -9,7 +9,6 @@
 #include "delivery/cpp/client/delivery_plan.h"
 #include "format/base/errors.h"
 #include "format/rules/allocation.h"
-#include "format/rules/rate_distortion.h"
 #include "format/rules/size_curve.h"
 #include "tests/support/packages.h"
 
@@ -52,7 +51,8 @@ TEST(FragmentList, LeavesToThePreviewWhatNoRungShowsBetter) {
   EXPECT_NEAR(list.offers[0].loss[0], kLarger * curve.coded(0.5) * w[0] / all, 1e-6);
   EXPECT_NEAR(list.offers[0].loss[1], kLarger * curve.coded(0.25) * w[0] / all, 1e-6);
 
-  const TextureBudget budget = texture_for_budget(package, {}, 1 << 20);
+  TextureLoss loss(package, ListOptions{}.displayed_px);
+  const TextureBudget budget = texture_for_budget(loss, {}, 1 << 20);
   EXPECT_EQ(budget.rungs, std::vector<std::int32_t>{0}) << "the upper rung shows no more";
   EXPECT_NEAR(budget.losses[0], kLarger * curve.coded(0.25) * w[0] / all + list.preview_loss[0], 1e-6);
   EXPECT_EQ(budget.flip, combined_flip(package.quality(), budget.losses)) << "S_0 loses nothing";

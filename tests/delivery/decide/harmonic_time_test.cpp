@@ -101,14 +101,7 @@ TEST(HarmonicTime, ATenfoldDropIsMetByTheBottomOfTheLadderAndSkips) {
   const BandwidthTrace stall{{0, 0.3 * limit, 0.6 * limit}, {1e4, 1, 1e4}};
   for (const BandwidthTrace& link : {drop, stall})
     EXPECT_LE(simulate_serial(offers, serial(limit, 1e4), link).late_s, 0.005 * limit);
-  HtcOptions hard = serial(limit, 1e4, Policy::kThesis);
-  hard.hard_limits = true;
-  std::vector<FragmentOffer> limited = offers;
-  for (FragmentOffer& f : limited) f.low_rung = 2;
-  const SimulationResult r = simulate_serial(limited, hard, drop);
-  EXPECT_EQ(r.skipped, 0u);
-  for (const std::int32_t rung : r.rungs) EXPECT_GE(rung, 2);
-  EXPECT_GT(r.late_s, 0.5 * limit);  // what limits cost that are none
+  testing::expect_hard_limits_cost(offers, serial(limit, 1e4, Policy::kThesis), drop, simulate_serial);
 }
 
 TEST(HarmonicTime, RungsThatShowLessThanThePreviewAreNotAskedFor) {

@@ -1,4 +1,6 @@
 #pragma once
+#include <gtest/gtest.h>
+
 #include <cstdint>
 #include <vector>
 
@@ -21,6 +23,19 @@ inline std::vector<FragmentOffer> some_offers(std::size_t n, std::uint64_t seed 
     f.planned_bytes = 800 * size;
   }
   return offers;
+}
+
+/// What limits of quality cost that keep a transfer from the bottom of the ladder and from skips: `simulate`
+/// plays offers with options over a link whose rate drops to a tenth after two fifths of the limit.
+template <class Simulate>
+void expect_hard_limits_cost(std::vector<FragmentOffer> offers, HtcOptions options,
+                             const BandwidthTrace& drop, const Simulate& simulate) {
+  options.hard_limits = true;
+  for (FragmentOffer& f : offers) f.low_rung = 2;
+  const SimulationResult r = simulate(offers, options, drop);
+  EXPECT_EQ(r.skipped, 0u);
+  for (const std::int32_t rung : r.rungs) EXPECT_GE(rung, 2);
+  EXPECT_GT(r.late_s, 0.5 * options.time_limit_s);
 }
 
 }  // namespace texmesh::testing

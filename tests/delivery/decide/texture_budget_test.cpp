@@ -49,17 +49,20 @@ PerGroup bytes_by_group(const TextureBudget& budget) {
   return bytes;
 }
 
-std::uint64_t half_of_all(PackageReader& package) {
-  return texture_for_budget(package, {}, 1 << 20).bytes / 2;
+TextureBudget budget_of(PackageReader& package, const ListOptions& options, std::uint64_t bytes) {
+  TextureLoss loss(package, options.displayed_px);
+  return texture_for_budget(loss, options, bytes);
 }
+
+std::uint64_t half_of_all(PackageReader& package) { return budget_of(package, {}, 1 << 20).bytes / 2; }
 
 TEST(TextureBudget, BytesGoToWhatShows) {
   for (const float exponent : {1.0f, 2.0f}) {
     PackageReader unseen = open_pair(0.05f, exponent);
-    const PerGroup colours = bytes_by_group(texture_for_budget(unseen, {}, half_of_all(unseen)));
+    const PerGroup colours = bytes_by_group(budget_of(unseen, {}, half_of_all(unseen)));
     EXPECT_GT(colours[0], 2 * colours[1]) << exponent;
     PackageReader loud = open_pair(2, exponent);
-    const PerGroup normals = bytes_by_group(texture_for_budget(loud, {}, half_of_all(loud) / 2));
+    const PerGroup normals = bytes_by_group(budget_of(loud, {}, half_of_all(loud) / 2));
     EXPECT_GT(normals[1], normals[0]) << exponent;
   }
 }
@@ -69,7 +72,7 @@ TEST(TextureBudget, MoreBytesNeverLookWorse) {
     PackageReader package = open_pair(0.5f, exponent);
     double before = 1;
     for (const std::uint64_t bytes : {0u, 200u, 500u, 1000u, 2000u, 4000u, 1u << 20}) {
-      const TextureBudget budget = texture_for_budget(package, {}, bytes);
+      const TextureBudget budget = budget_of(package, {}, bytes);
       EXPECT_LE(budget.bytes, bytes);
       EXPECT_LE(budget.flip, before + 1e-12) << bytes;
       before = budget.flip;
@@ -80,13 +83,13 @@ TEST(TextureBudget, MoreBytesNeverLookWorse) {
 
 TEST(TextureBudget, AnExponentWeighsGroupsByTheirSlopes) {
   PackageReader package = open_pair(0.25f, 2);
-  const TextureBudget budget = texture_for_budget(package, {}, half_of_all(package));
+  const TextureBudget budget = budget_of(package, {}, half_of_all(package));
   const PerGroup& w = budget.list.group_weights;
   EXPECT_LE(w[1], w[0]) << "a small part adds little to a sum of squares";
   ListOptions alike;
   const TextureBudget sum = [&] {
     PackageReader linear = open_pair(0.25f, 1);
-    return texture_for_budget(linear, alike, half_of_all(linear));
+    return budget_of(linear, alike, half_of_all(linear));
   }();
   EXPECT_EQ(sum.list.group_weights, (PerGroup{1, 1, 1}));
   EXPECT_LE(budget.flip, picture_flip(package.quality(), alike.displayed_px, 0, sum.losses) + 1e-12)
@@ -97,7 +100,7 @@ TEST(TextureBudget, PictureAddsTheScale) {
   PackageReader package = open_pair(0.5f, 2);
   ListOptions coarse;
   coarse.scale = 5;
-  const TextureBudget budget = texture_for_budget(package, coarse, 1 << 20);
+  const TextureBudget budget = budget_of(package, coarse, 1 << 20);
   const QualityTable& table = package.quality();
   const double texture = texture_flip(table, budget.losses), scale = geometry_flip(table, 1000, 5);
   EXPECT_NEAR(budget.flip * budget.flip, texture * texture + scale * scale, 1e-12);

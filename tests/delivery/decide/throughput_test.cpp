@@ -1,5 +1,5 @@
 // Estimates of throughput from transfers that have ended.
-#include "delivery/cpp/decide/throughput.h"
+#include "delivery/cpp/decide/harmonic_time.h"
 
 #include <gtest/gtest.h>
 

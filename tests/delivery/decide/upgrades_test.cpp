@@ -1,5 +1,5 @@
 // Better rungs after the time limit, in the order of their worth.
-#include "delivery/cpp/decide/fragment_offer.h"
+#include "delivery/cpp/decide/harmonic_time.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "format/base/box.h"
+#include "format/base/vec.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "format/base/sha256_stream.h"
+#include "format/base/sha256.h"
 
 #include <gtest/gtest.h>
 

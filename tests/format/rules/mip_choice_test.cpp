@@ -1,4 +1,4 @@
-#include "format/rules/mip_choice.h"
+#include "format/rules/viewing.h"
 
 #include <gtest/gtest.h>
 

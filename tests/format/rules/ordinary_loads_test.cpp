@@ -1,4 +1,4 @@
-#include "format/rules/ordinary_loads.h"
+#include "format/rules/viewing.h"
 
 #include <gtest/gtest.h>
 

@@ -7,7 +7,6 @@
 
 #include "format/documents/tables.h"
 #include "format/rules/allocation.h"
-#include "format/rules/rate_distortion.h"
 #include "tests/format/documents/tables_fixture.h"
 
 namespace texmesh {

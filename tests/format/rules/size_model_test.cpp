@@ -1,4 +1,4 @@
-#include "format/rules/size_model.h"
+#include "format/rules/size_curve.h"
 
 #include <gtest/gtest.h>
 

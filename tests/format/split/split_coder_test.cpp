@@ -1,4 +1,4 @@
-#include "format/split/split_coder.h"
+#include "format/split/split_element_codec.h"
 
 #include <gtest/gtest.h>
 
@@ -68,7 +68,7 @@ TEST(BitCoder, AnEncoderCanBeUsedAgain) {
 struct Encoding {
   BitEncoder encoder;
   bool bit(BitModel& m, bool v) {
-    encoder.encode(m, v, ValueModels::kLimit);
+    encoder.encode(m, v, ValueModels::kValueLimit);
     return v;
   }
   std::uint32_t raw(std::uint32_t v, int n) {
@@ -78,7 +78,7 @@ struct Encoding {
 };
 struct Decoding {
   BitDecoder decoder;
-  bool bit(BitModel& m, bool) { return decoder.decode(m, ValueModels::kLimit); }
+  bool bit(BitModel& m, bool) { return decoder.decode(m, ValueModels::kValueLimit); }
   std::uint32_t raw(std::uint32_t, int n) { return decoder.decode_raw(n); }
 };
 

@@ -3,8 +3,8 @@
 #include <set>
 #include <vector>
 
-#include "format/split/split_source.h"
 #include "format/split/split_stream.h"
+#include "format/split/split_writer.h"
 
 namespace texmesh::testing {
 

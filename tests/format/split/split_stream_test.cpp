@@ -8,7 +8,6 @@
 #include "format/base/bytes.h"
 #include "format/base/errors.h"
 #include "format/split/split_reader.h"
-#include "format/split/split_source.h"
 #include "format/split/split_writer.h"
 #include "tests/format/split/split_fixture.h"
 

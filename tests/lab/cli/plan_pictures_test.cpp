@@ -4,7 +4,7 @@
 
 #include "format/base/errors.h"
 #include "tools/extract/package_model.h"
-#include "tools/render/plane_pixels.h"
+#include "tools/render/rendered_model.h"
 
 namespace texmesh {
 namespace {

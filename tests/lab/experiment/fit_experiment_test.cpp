@@ -6,7 +6,6 @@
 
 #include "format/base/errors.h"
 #include "pipeline/compile/options.h"
-#include "pipeline/compile/profile.h"
 #include "tests/lab/experiment/simulated_results.h"
 
 namespace texmesh {

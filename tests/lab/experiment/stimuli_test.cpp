@@ -5,7 +5,7 @@
 #include <map>
 #include <set>
 
-#include "format/base/box.h"
+#include "format/base/vec.h"
 
 namespace texmesh {
 namespace {

@@ -145,14 +145,11 @@ TEST(Policies, ATenfoldDropIsMetByTheBottomOfTheLadderAndSkips) {
     EXPECT_LE(simulate_serial_trace(offers, o, drop).late_s, 0.005 * limit) << static_cast<int>(policy);
     EXPECT_LE(simulate_serial_trace(offers, o, stall).late_s, 0.005 * limit) << static_cast<int>(policy);
   }
-  HtcOptions hard = serial(limit, 1e4);
-  hard.hard_limits = true;
-  std::vector<FragmentOffer> limited = offers;
-  for (FragmentOffer& f : limited) f.low_rung = 2;
-  const SimulationResult r = simulate_serial_trace(limited, hard, drop);
-  EXPECT_EQ(r.skipped, 0u);
-  for (const std::int32_t rung : r.rungs) EXPECT_GE(rung, 2);
-  EXPECT_GT(r.late_s, 0.5 * limit);  // what limits cost that are none
+  testing::expect_hard_limits_cost(
+      offers, serial(limit, 1e4), drop,
+      [](const auto& limited, const HtcOptions& hard, const BandwidthTrace& link) {
+        return simulate_serial_trace(limited, hard, link);
+      });
 }
 
 TEST(Policies, RungsThatShowLessThanThePreviewAreNotAskedFor) {

@@ -1,4 +1,4 @@
-#include "pipeline/about/meta.h"
+#include "pipeline/about/source_fields.h"
 
 #include <gtest/gtest.h>
 

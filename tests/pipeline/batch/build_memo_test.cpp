@@ -29,8 +29,8 @@ class Memo : public ::testing::Test {
   }
 
   /// A record whose stamps prove something: as if the files had been old when they were looked at.
-  MemoRecord record() {
-    MemoRecord r;
+  PackageMemo record() {
+    PackageMemo r;
     FileRequest model = write("model.obj", "v 0 0 0");
     model.uri = "";
     r.files = {model, write("model.mtl", "newmtl a"), {"missing.jpg", false, {}, 0, {}, false}};
@@ -47,12 +47,12 @@ class Memo : public ::testing::Test {
     r.stamp = {};
     return r;
   }
-  bool holds(MemoRecord& r) {
+  bool holds(PackageMemo& r) {
     return still_holds(r, folder_ / "model.obj", folder_ / "model.texmesh", refreshed_);
   }
 
   void expect_not_holding_after(const std::function<void()>& change) {
-    MemoRecord r = record();
+    PackageMemo r = record();
     ASSERT_TRUE(holds(r));
     change();
     EXPECT_FALSE(holds(r));
@@ -72,7 +72,7 @@ class Memo : public ::testing::Test {
 };
 
 TEST_F(Memo, GivesBackWhatWasSaved) {
-  MemoRecord r = record();
+  PackageMemo r = record();
   r.request = digest_of("options");
   r.failed = true;
   r.seconds = 2.5;
@@ -86,7 +86,7 @@ TEST_F(Memo, GivesBackWhatWasSaved) {
   }
   const BuildMemo memo(cache(), "/out");
   EXPECT_FALSE(memo.was_damaged());
-  MemoRecord back;
+  PackageMemo back;
   ASSERT_TRUE(memo.find("a.texmesh", back));
   EXPECT_EQ(back.request, r.request);
   EXPECT_EQ(back.failed, r.failed);
@@ -111,7 +111,7 @@ TEST_F(Memo, GivesBackWhatWasSaved) {
 }
 
 TEST_F(Memo, EveryRunReadsWhatEveryOtherHasSaved) {
-  MemoRecord r = record();
+  PackageMemo r = record();
   {
     BuildMemo one(cache(), "/out"), other(cache(), "/out");
     one.set("a.texmesh", r);
@@ -130,17 +130,17 @@ TEST_F(Memo, EveryRunReadsWhatEveryOtherHasSaved) {
 
 TEST_F(Memo, TheLaterRecordCountsWhoeverHasSavedItFirst) {
   for (const bool later_first : {false, true}) {
-    MemoRecord early = record(), late = record();
+    PackageMemo early = record(), late = record();
     early.seconds = 1;
     late.seconds = 2;
     late.looked_at_ns = early.looked_at_ns + 1;
     const std::string out = later_first ? "/one" : "/other";
-    for (const MemoRecord* r : {later_first ? &late : &early, later_first ? &early : &late}) {
+    for (const PackageMemo* r : {later_first ? &late : &early, later_first ? &early : &late}) {
       BuildMemo memo(cache(), out);
       memo.set("a.texmesh", *r);
       ASSERT_TRUE(memo.save());
     }
-    MemoRecord found;
+    PackageMemo found;
     ASSERT_TRUE(BuildMemo(cache(), out).find("a.texmesh", found));
     EXPECT_EQ(found.seconds, 2);
   }
@@ -148,12 +148,12 @@ TEST_F(Memo, TheLaterRecordCountsWhoeverHasSavedItFirst) {
 
 TEST_F(Memo, ManyRunsLeaveFewFilesAndEveryRecord) {
   constexpr int kRuns = 100;
-  const MemoRecord r = record();
+  const PackageMemo r = record();
   std::size_t most = 0;
   for (int i = 0; i < kRuns; ++i) {
     BuildMemo memo(cache(), "/out");
     for (int j = 0; j < i % 7 + 1; ++j) {
-      MemoRecord mine = r;
+      PackageMemo mine = r;
       mine.seconds = i;
       mine.keys = {{"stage " + std::to_string(i % 3), digest_of(std::to_string(i))}};
       mine.looked_at_ns += i;
@@ -167,7 +167,7 @@ TEST_F(Memo, ManyRunsLeaveFewFilesAndEveryRecord) {
   EXPECT_FALSE(memo.was_damaged());
   for (int i = 0; i < kRuns; ++i)
     for (int j = 0; j < i % 7 + 1; ++j) {
-      MemoRecord found;
+      PackageMemo found;
       ASSERT_TRUE(memo.find(std::to_string(i * (j > 0)) + "-" + std::to_string(j), found)) << i << " " << j;
       if (j == 0) EXPECT_EQ(found.seconds, kRuns - 1);
       if (j > 0) {
@@ -184,7 +184,7 @@ TEST_F(Memo, ARunThatSavesNothingWritesNothing) {
 }
 
 TEST_F(Memo, ARunThatWasKilledLosesAtMostItsLastRecord) {
-  const MemoRecord r = record();
+  const PackageMemo r = record();
   std::string open;
   std::size_t one_record = 0;
   {
@@ -204,7 +204,7 @@ TEST_F(Memo, ARunThatWasKilledLosesAtMostItsLastRecord) {
   for (std::size_t bytes = 0; bytes <= good.size(); ++bytes) {
     testing::write_text(open, good.substr(0, bytes));
     const BuildMemo memo(cache(), "/out");
-    MemoRecord found;
+    PackageMemo found;
     ASSERT_FALSE(memo.was_damaged()) << bytes;
     ASSERT_EQ(memo.find("a.texmesh", found), bytes >= one_record) << bytes;
     ASSERT_EQ(memo.find("b.texmesh", found), bytes == good.size()) << bytes;
@@ -212,7 +212,7 @@ TEST_F(Memo, ARunThatWasKilledLosesAtMostItsLastRecord) {
 }
 
 TEST_F(Memo, WithoutACacheNothingIsRemembered) {
-  MemoRecord r = record();
+  PackageMemo r = record();
   BuildMemo memo("", "/out");
   memo.set("a.texmesh", r);
   EXPECT_TRUE(memo.save());
@@ -220,7 +220,7 @@ TEST_F(Memo, WithoutACacheNothingIsRemembered) {
 }
 
 TEST_F(Memo, EveryTruncationAndFlippedByteIsNoticedAndNothingWrongIsBelieved) {
-  MemoRecord r = record();
+  PackageMemo r = record();
   r.keys = {{"import", digest_of("i")}, {"package", digest_of("p")}};
   const StageKeys keys = r.keys;
   {
@@ -255,13 +255,13 @@ TEST_F(Memo, EveryTruncationAndFlippedByteIsNoticedAndNothingWrongIsBelieved) {
 }
 
 TEST_F(Memo, HoldsWhileEveryFileIsAsItWas) {
-  MemoRecord r = record();
+  PackageMemo r = record();
   EXPECT_TRUE(holds(r));
   EXPECT_FALSE(refreshed_);
 }
 
 TEST_F(Memo, NamesLikeAMissingOneAreListedAgainOnlyWhenTheFolderHasChanged) {
-  MemoRecord r = record();
+  PackageMemo r = record();
   r.files.push_back(similar());
   ASSERT_TRUE(holds(r));
   EXPECT_TRUE(refreshed_) << "listed";
@@ -300,7 +300,7 @@ TEST_F(Memo, FilesThatComeAndGoAreSeen) {
 }
 
 TEST_F(Memo, ATouchedFileIsReadAndItsStampRenewed) {
-  MemoRecord r = record();
+  PackageMemo r = record();
   ASSERT_EQ(::utimensat(AT_FDCWD, (folder_ / "model.mtl").c_str(), nullptr, 0), 0);
   EXPECT_TRUE(holds(r));
   EXPECT_TRUE(refreshed_);
@@ -308,14 +308,14 @@ TEST_F(Memo, ATouchedFileIsReadAndItsStampRenewed) {
 }
 
 TEST_F(Memo, AFileChangedJustBeforeItWasLookedAtIsReadAgain) {
-  MemoRecord r = record();
+  PackageMemo r = record();
   r.looked_at_ns = wall_clock_ns();  // the truth: the files are milliseconds old
   EXPECT_TRUE(holds(r));
   EXPECT_TRUE(refreshed_);
 }
 
 TEST_F(Memo, AFailureNeedsNoPackageAndNoFilesProveNothing) {
-  MemoRecord r = record();
+  PackageMemo r = record();
   r.failed = true;
   fs::remove(folder_ / "model.texmesh");
   EXPECT_TRUE(holds(r));

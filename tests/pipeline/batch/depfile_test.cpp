@@ -1,5 +1,5 @@
 // Dependency files that GNU make and Ninja read alike.
-#include "pipeline/batch/write_reports.h"
+#include "pipeline/batch/run.h"
 
 #include <gtest/gtest.h>
 

@@ -10,7 +10,6 @@
 #include "format/base/errors.h"
 #include "pipeline/batch/plan.h"
 #include "pipeline/compile/options.h"
-#include "pipeline/compile/profile.h"
 #include "tests/support/command.h"
 
 namespace texmesh {

@@ -1,5 +1,5 @@
 // What a run tells people and programs: reports against their schemas, progress lines, events.
-#include "pipeline/batch/write_reports.h"
+#include "pipeline/batch/run.h"
 
 #include <gtest/gtest.h>
 

@@ -9,7 +9,6 @@
 
 #include "format/base/errors.h"
 #include "pipeline/cache/cache_files.h"
-#include "pipeline/cache/prune.h"
 #include "tests/pipeline/cache/cache_fixtures.h"
 
 namespace texmesh {
@@ -137,7 +136,7 @@ TEST(DiskStore, AClaimIsForOneAtATimeAndEndsWithItsHolder) {
 /// A record of key_of("[8]") in which `from` stands as `to`, sealed as it must be.
 std::string lying_record(const std::string& from, const std::string& to) {
   std::string body = *unseal(
-      *bytes_of(write_record({key_of("[8]").preimage(), {{"ladder", sha256(*bytes_of("rungs")), 5}}})));
+      *bytes_of(write_entry({key_of("[8]").preimage(), {{"ladder", sha256(*bytes_of("rungs")), 5}}})));
   const auto at = body.find(from);
   EXPECT_NE(at, std::string::npos) << from;
   return seal(body.replace(at, from.size(), to));

@@ -1,4 +1,3 @@
-#include "pipeline/cache/prune.h"
 
 #include <gtest/gtest.h>
 
@@ -28,7 +27,7 @@ TEST(Prune, TheLeastRecentlyUsedGoesFirstRecordsBeforeBlobs) {
   for (int i = 0; i < 4; ++i)
     set_age(folder.path / object_path("ac", key_of(std::to_string(i)).digest()), 100000 * (i + 1));
   const PruneResult r = prune_cache(folder.path.string(), {4000, 0});
-  EXPECT_GE(r.records, 1u);
+  EXPECT_GE(r.entries, 1u);
   EXPECT_LE(r.kept_bytes, 4000u);
   auto store = open_disk_store(folder.path.string());
   EXPECT_TRUE(store->find(key_of("0").digest()));   // the youngest
@@ -46,7 +45,7 @@ TEST(Prune, ByAgeSinceTheLastUse) {
   for (const char* name : {"old", "used"})
     set_age(folder.path / object_path("ac", key_of(name).digest()), 86400 * 40);
   ASSERT_TRUE(open_disk_store(folder.path.string())->find(key_of("used").digest()));  // a use makes it young
-  EXPECT_EQ(prune_cache(folder.path.string(), {0, 86400 * 30}).records, 1u);
+  EXPECT_EQ(prune_cache(folder.path.string(), {0, 86400 * 30}).entries, 1u);
   auto store = open_disk_store(folder.path.string());
   EXPECT_TRUE(store->find(key_of("used").digest()));
   EXPECT_FALSE(store->find(key_of("old").digest()));
@@ -57,12 +56,12 @@ TEST(Prune, NeverWhatARunningBuildHasUsed) {
   auto running = open_disk_store(folder.path.string());
   ASSERT_TRUE(running->put(key_of("mine"), {{"x", bytes_of("mine")}}));
   PruneResult r = prune_cache(folder.path.string(), {1, 0});
-  EXPECT_EQ(r.records, 0u);
+  EXPECT_EQ(r.entries, 0u);
   EXPECT_GE(r.kept_in_use, 1u);
   EXPECT_TRUE(running->find(key_of("mine").digest()));
   running.reset();
   r = prune_cache(folder.path.string(), {1, 0});
-  EXPECT_EQ(r.records, 1u);
+  EXPECT_EQ(r.entries, 1u);
   EXPECT_FALSE(open_disk_store(folder.path.string())->find(key_of("mine").digest()));
 }
 
@@ -76,7 +75,7 @@ TEST(Prune, WhatIsQuarantinedCountsAndGoesBeforeResultsTheOldestFirst) {
   }
   PruneResult r = prune_cache(folder.path.string(), {5000, 0});
   EXPECT_EQ(r.others, 1u);
-  EXPECT_EQ(r.records, 0u);
+  EXPECT_EQ(r.entries, 0u);
   EXPECT_LE(r.kept_bytes, 5000u);
   EXPECT_GE(r.kept_bytes, 3000u);
   EXPECT_FALSE(fs::exists(folder.path / "quarantine/old"));

@@ -1,6 +1,5 @@
 // What is valid and what is not is tested with the schema's examples (schemas_test).
 #include "pipeline/compile/options.h"
-#include "pipeline/compile/profile.h"
 
 #include <gtest/gtest.h>
 

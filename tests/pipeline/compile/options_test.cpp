@@ -9,8 +9,6 @@
 #include <sstream>
 
 #include "format/base/errors.h"
-#include "pipeline/compile/option_fields.h"
-#include "pipeline/compile/profile.h"
 
 namespace texmesh {
 namespace {

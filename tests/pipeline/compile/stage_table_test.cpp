@@ -4,7 +4,7 @@
 
 #include <set>
 
-#include "pipeline/compile/option_fields.h"
+#include "pipeline/compile/options.h"
 
 namespace texmesh {
 namespace {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "pipeline/graph/graph_run.h"
-#include "pipeline/graph/make_stage.h"
+#include "pipeline/graph/stage.h"
 
 namespace texmesh::testing {
 

@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "pipeline/graph/make_stage.h"
+#include "pipeline/graph/stage.h"
 #include "tests/pipeline/graph/fake_graph.h"
 #include "tests/support/memory_store.h"
 

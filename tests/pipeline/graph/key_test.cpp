@@ -1,4 +1,4 @@
-#include "pipeline/graph/key.h"
+#include "pipeline/graph/store.h"
 
 #include <gtest/gtest.h>
 

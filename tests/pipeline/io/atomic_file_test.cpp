@@ -13,7 +13,7 @@
 
 #include "format/base/bytes.h"
 #include "format/base/errors.h"
-#include "pipeline/io/machine/owner_mark.h"
+#include "pipeline/io/machine.h"
 #include "tests/support/command.h"
 
 namespace texmesh {

@@ -1,5 +1,5 @@
 // Bytes that are no UTF-8 on their way through JSON.
-#include "pipeline/io/wire_text.h"
+#include "pipeline/io/uri.h"
 
 #include <gtest/gtest.h>
 

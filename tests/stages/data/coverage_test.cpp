@@ -1,4 +1,4 @@
-#include "stages/data/coverage.h"
+#include "stages/data/fragments.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // Models whose textures use the second set of texture coordinates, or both.
-#include "stages/data/uv_sets.h"
+#include "stages/data/conditioned_mesh.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "stages/fragment_codec/coding_space.h"
+#include "stages/fragment_codec/fragment_codec.h"
 
 #include <gtest/gtest.h>
 

@@ -7,8 +7,8 @@
 #include "stages/base/run_context.h"
 #include "stages/image/decode_jpeg.h"
 #include "stages/jpeg/jpeg.h"
-#include "stages/jpeg/jpeg_bits.h"
 #include "stages/jpeg/jpeg_coder.h"
+#include "stages/jpeg/masked_jpeg.h"
 #include "tests/support/images.h"
 
 namespace texmesh {

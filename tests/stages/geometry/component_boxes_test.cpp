@@ -1,4 +1,4 @@
-#include "stages/geometry/component_boxes.h"
+#include "stages/geometry/mesh_topology.h"
 
 #include <gtest/gtest.h>
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "format/model/model.h"
-#include "stages/data/coverage.h"
+#include "stages/data/fragments.h"
 #include "tests/support/meshes.h"
 
 namespace texmesh::testing {

@@ -1,4 +1,4 @@
-#include "stages/image/check_pixels.h"
+#include "stages/image/pixel_window.h"
 
 #include <gtest/gtest.h>
 

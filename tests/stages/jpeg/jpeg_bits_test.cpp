@@ -1,4 +1,3 @@
-#include "stages/jpeg/jpeg_bits.h"
 
 #include <gtest/gtest.h>
 

@@ -8,7 +8,7 @@
 #include "stages/fragment_codec/fragment_codec.h"
 #include "tests/stages/ladder/mip_chain.h"
 
-namespace texmesh::rungs {
+namespace texmesh {
 namespace {
 
 using testing::Chain;
@@ -141,4 +141,4 @@ TEST(ChooseRungs, WithoutAPreviewThereIsNoChoice) {
 }
 
 }  // namespace
-}  // namespace texmesh::rungs
+}  // namespace texmesh

@@ -64,9 +64,9 @@ inline Ladder encode(const Chain& chain, bool prune, int threads = 1, LadderMode
   return encode_ladder(chain.fragments, chain.pixels, chain.previews(), {}, options, context);
 }
 
-inline rungs::TextureRungs rungs_of(const Chain& chain, const Ladder& ladder) {
-  return rungs::measure_rungs(chain.fragments, chain.pixels, ladder.planes, 0,
-                              chain.previews().planes[0].file, RunContext{});
+inline TextureRungs rungs_of(const Chain& chain, const Ladder& ladder) {
+  return measure_rungs(chain.fragments, chain.pixels, ladder.planes, 0, chain.previews().planes[0].file,
+                       RunContext{});
 }
 
 }  // namespace texmesh::testing

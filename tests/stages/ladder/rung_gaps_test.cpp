@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace texmesh::rungs {
+namespace texmesh {
 namespace {
 
 using Marks = std::vector<std::uint8_t>;
@@ -83,4 +83,4 @@ TEST(RungGaps, ALimitThatIsExceededAlreadyIsNotExceededMore) {
 }
 
 }  // namespace
-}  // namespace texmesh::rungs
+}  // namespace texmesh

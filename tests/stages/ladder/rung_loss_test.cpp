@@ -8,7 +8,7 @@
 
 #include "tests/stages/ladder/mip_chain.h"
 
-namespace texmesh::rungs {
+namespace texmesh {
 namespace {
 
 using testing::Chain;
@@ -130,4 +130,4 @@ TEST(RungLoss, WindowsWeighAsTheSurfaceOfTheirFragments) {
 }
 
 }  // namespace
-}  // namespace texmesh::rungs
+}  // namespace texmesh

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "format/rules/ordinary_loads.h"
+#include "format/rules/viewing.h"
 
-namespace texmesh::rungs {
+namespace texmesh {
 namespace {
 
 constexpr double kGain = 0.05, kLeast = 0.01;
@@ -174,4 +174,4 @@ TEST(RungValue, NothingOfNothing) {
 }
 
 }  // namespace
-}  // namespace texmesh::rungs
+}  // namespace texmesh

@@ -1,4 +1,4 @@
-#include "stages/ladder/source_codec.h"
+#include "stages/ladder/encode_rungs.h"
 
 #include <gtest/gtest.h>
 

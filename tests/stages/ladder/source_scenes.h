@@ -10,8 +10,8 @@
 #include "stages/image/decode_image.h"
 #include "stages/image/decode_jpeg.h"
 #include "stages/jpeg/source_jpeg.h"
+#include "stages/ladder/encode_rungs.h"
 #include "stages/ladder/ladder.h"
-#include "stages/ladder/source_codec.h"
 #include "tests/support/images.h"
 
 namespace texmesh::testing {

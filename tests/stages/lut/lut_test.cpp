@@ -9,7 +9,6 @@
 #include "format/base/archive.h"
 #include "format/base/sha256.h"
 #include "format/rules/allocation.h"
-#include "format/rules/rate_distortion.h"
 #include "stages/fragment_codec/fragment_codec.h"
 #include "stages/jpeg/jpeg.h"
 #include "stages/measure/fragment_meter.h"

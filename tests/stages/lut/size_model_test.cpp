@@ -1,10 +1,10 @@
-#include "stages/lut/size_model.h"
+#include "stages/lut/lut.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "format/rules/size_model.h"
+#include "format/rules/size_curve.h"
 #include "tests/stages/lut/lut_scene.h"
 #include "tests/support/all_rungs.h"
 

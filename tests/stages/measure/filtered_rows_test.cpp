@@ -6,7 +6,7 @@
 
 #include "tests/stages/measure/grainy_picture.h"
 
-namespace texmesh::measure {
+namespace texmesh {
 namespace {
 
 using testing::object_in;
@@ -19,7 +19,8 @@ std::vector<float> values_of(const Picture& picture, const PixelSpans& spans, st
   return out;
 }
 
-float by_definition(const Picture& picture, int x, int y, const Kernel& along_x, const Kernel& along_y) {
+float by_definition(const Picture& picture, int x, int y, const FilterKernel& along_x,
+                    const FilterKernel& along_y) {
   const int side = static_cast<int>(picture.side_px), rx = static_cast<int>(along_x.size() / 2),
             ry = static_cast<int>(along_y.size() / 2);
   float sum = 0;
@@ -37,14 +38,14 @@ float by_definition(const Picture& picture, int x, int y, const Kernel& along_x,
 }
 
 TEST(FilteredRows, AreThoseOfTheWholePictureToTheBit) {
-  Kernel narrow{0.25f, 0.5f, 0.25f}, wide;
+  FilterKernel narrow{0.25f, 0.5f, 0.25f}, wide;
   for (int i = -kFilterReach; i <= kFilterReach; ++i) wide.push_back(0.01f * static_cast<float>(i + 14));
   const std::uint32_t boxes[4][4] = {{30, 41, 25, 60}, {0, 9, 0, 70}, {55, 70, 64, 70}, {0, 0, 0, 0}};
   for (const auto& b : boxes) {
     const Picture picture = object_in(70, b[0], b[1], b[2], b[3]);
     const PixelSpans spans = shown_spans(picture);
-    for (const Kernel* x : {&narrow, &wide})
-      for (const Kernel* y : {&narrow, &wide}) {
+    for (const FilterKernel* x : {&narrow, &wide})
+      for (const FilterKernel* y : {&narrow, &wide}) {
         FilteredRows rows(spans, picture.linear[0].x, *x);
         std::vector<float> got(whole_blocks(spans.side_px));
         std::size_t made = 0;
@@ -72,7 +73,7 @@ TEST(FilteredRows, WiderVectorsChangeNoBit) {
   std::vector<std::vector<float>> values(11, std::vector<float>(64));
   for (auto& row : values)
     for (float& v : row) v = static_cast<float>(random.uniform() * 300 - 100);
-  Kernel kernel;
+  FilterKernel kernel;
   std::vector<const float*> lines;
   for (const auto& row : values) {
     kernel.push_back(static_cast<float>(random.uniform() - 0.5));
@@ -87,4 +88,4 @@ TEST(FilteredRows, WiderVectorsChangeNoBit) {
 }
 
 }  // namespace
-}  // namespace texmesh::measure
+}  // namespace texmesh

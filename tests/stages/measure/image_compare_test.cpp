@@ -1,4 +1,4 @@
-#include "stages/measure/image_compare.h"
+#include "stages/measure/flip.h"
 
 #include <gtest/gtest.h>
 

@@ -4,7 +4,7 @@
 
 #include "tests/stages/measure/grainy_picture.h"
 
-namespace texmesh::measure {
+namespace texmesh {
 namespace {
 
 using testing::object_in;
@@ -32,4 +32,4 @@ TEST(PixelSpans, UnionHoldsBoth) {
 }
 
 }  // namespace
-}  // namespace texmesh::measure
+}  // namespace texmesh

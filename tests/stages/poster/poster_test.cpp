@@ -193,7 +193,7 @@ TEST(Poster, PixelsMustFitThePlanes) {
 
 TEST(PosterCamera, HoldsAllPositionsWithTheMargin) {
   const std::vector<Vec3d> points{{0, 0, 0}, {3, 0, 0}, {0, 1, 2}, {1, 1, -4}};
-  const RenderCamera c = poster::fitted_camera(points, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, 0);
+  const RenderCamera c = fitted_camera(points, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, 0);
   double most = 0;
   for (const Vec3d p : points) {
     const Vec3d d = p - c.eye;

@@ -1,14 +1,14 @@
 #pragma once
 // Small atlases made by hand.
 #include "stages/proxies/atlas_mesh.h"
-#include "stages/render/shown_materials.h"
+#include "stages/render/render_texture.h"
 #include "tests/stages/render/render_fixtures.h"
 
 namespace texmesh::testing {
 
 /// A square of side 2 around the origin that faces +Z, over the whole of a texture.
-inline proxies::AtlasMesh square_atlas(std::uint32_t side_px, std::uint32_t group = 0, float z = 0) {
-  proxies::AtlasMesh out;
+inline AtlasMesh square_atlas(std::uint32_t side_px, std::uint32_t group = 0, float z = 0) {
+  AtlasMesh out;
   const Mesh square = testing::square();
   for (const Vec3f p : square.positions) out.positions.push_back({p.x, p.y, z});
   out.uvs = square.uv0;

@@ -4,7 +4,7 @@
 
 #include "tests/support/meshes.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 namespace {
 
 /// Wedges of their own for all triangles, with the triangles' normals.
@@ -55,4 +55,4 @@ TEST(IsSmooth, TheLargerPartOfTheAreaDecides) {
 }
 
 }  // namespace
-}  // namespace texmesh::proxies
+}  // namespace texmesh

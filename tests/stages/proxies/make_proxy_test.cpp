@@ -4,7 +4,7 @@
 
 #include "tests/support/meshes.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 namespace {
 
 struct Parts {
@@ -83,4 +83,4 @@ TEST(MakeProxy, NothingWhereEvenTheCoarsestDoesNotFit) {
 }
 
 }  // namespace
-}  // namespace texmesh::proxies
+}  // namespace texmesh

@@ -1,10 +1,10 @@
-#include "stages/proxies/picture_losses.h"
+#include "stages/proxies/make_proxy.h"
 
 #include <gtest/gtest.h>
 
 #include "tests/support/meshes.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 namespace {
 
 NestedScales alone(Mesh mesh) {
@@ -79,4 +79,4 @@ TEST_F(Competitors, ManyQuestionsHaveTheAnswersOfOne) {
 }
 
 }  // namespace
-}  // namespace texmesh::proxies
+}  // namespace texmesh

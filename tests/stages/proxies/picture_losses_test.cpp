@@ -1,11 +1,11 @@
-#include "stages/proxies/picture_losses.h"
+#include "stages/proxies/make_proxy.h"
 
 #include <gtest/gtest.h>
 
-#include "stages/proxies/coding/proxy_pictures.h"
+#include "stages/proxies/coding/proxy_glb.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 namespace {
 
 ShownModel plain_model(const Mesh& mesh, Vec4f colour) {
@@ -80,4 +80,4 @@ TEST(ShownProxy, AProxyIsShownAsItsFileSaysIt) {
 }
 
 }  // namespace
-}  // namespace texmesh::proxies
+}  // namespace texmesh

@@ -16,11 +16,11 @@ struct Soup {
   std::vector<Triangle> triangles;
   std::vector<std::uint32_t> group;
 
-  std::vector<proxies::ProxySurface> simplified(const std::vector<std::uint32_t>& counts) const {
-    return proxies::simplify_surface(positions, triangles, group, counts, RunContext{});
+  std::vector<ProxySurface> simplified(const std::vector<std::uint32_t>& counts) const {
+    return simplify_surface(positions, triangles, group, counts, RunContext{});
   }
   /// Cleaned, and otherwise as it is.
-  proxies::ProxySurface surface() const { return simplified({0xffffffffu}).front(); }
+  ProxySurface surface() const { return simplified({0xffffffffu}).front(); }
 };
 
 inline Soup soup_of(const Mesh& m) {

@@ -1,4 +1,4 @@
-#include "stages/quality/framing.h"
+#include "stages/quality/shots.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include "stages/measure/flip.h"
 #include "stages/render/visibility.h"
 
-namespace texmesh::quality {
+namespace texmesh {
 namespace {
 
 ShownRows rows_of(double first, double end) {
@@ -98,4 +98,4 @@ TEST(Bands, ComparedPixelsHaveTheValuesOfTheWholePicture) {
 }
 
 }  // namespace
-}  // namespace texmesh::quality
+}  // namespace texmesh

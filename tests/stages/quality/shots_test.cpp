@@ -4,7 +4,7 @@
 
 #include "tests/support/meshes.h"
 
-namespace texmesh::quality {
+namespace texmesh {
 namespace {
 
 /// Scales of so many triangles.
@@ -36,7 +36,7 @@ TEST(ShownScale, OfOthersIsTheScaleItself) {
 /// A ball, and the same ball of few triangles.
 struct Balls {
   Mesh fine = testing::sphere(32, 48), coarse = testing::sphere(4, 6);
-  Materials materials{RenderMaterial{}};
+  ShotMaterials materials{RenderMaterial{}};
   Studio studio;
   Balls() {
     studio.frame = {{{0, 0, 0}, 1}, 2};
@@ -53,8 +53,8 @@ struct Balls {
 TEST(Shots, ThatAreBeyondTheirLimitsAreNotTakenInFurtherViews) {
   Balls balls;
   const Losses all = balls.take({1, &balls.materials, ViewPart::kAll}),
-               beyond = balls.take({1, &balls.materials, ViewPart::kAll, FlipLimits{0.001, 1}}),
-               within = balls.take({1, &balls.materials, ViewPart::kAll, FlipLimits{1, 1}});
+               beyond = balls.take({1, &balls.materials, ViewPart::kAll, ShotLimits{0.001, 1}}),
+               within = balls.take({1, &balls.materials, ViewPart::kAll, ShotLimits{1, 1}});
   for (std::size_t v = 0; v < 4; ++v) {
     EXPECT_GT(all[v].flip.pixels, 100u) << v;
     EXPECT_EQ(within[v].flip.mean(), all[v].flip.mean()) << v;
@@ -67,11 +67,11 @@ TEST(Shots, LimitsAreOfTheMeanAndOfThe95thPercentile) {
   const Loss loss = balls.take({1, &balls.materials, ViewPart::kAll}).front();
   const double mean = loss.flip.mean(), p95 = loss.flip.percentile(0.95);
   ASSERT_GT(mean, 0);
-  EXPECT_TRUE((FlipLimits{mean, p95}.hold(loss)));
-  EXPECT_FALSE((FlipLimits{0.99 * mean, p95}.hold(loss)));
-  EXPECT_FALSE((FlipLimits{mean, 0.99 * p95}.hold(loss)));
-  EXPECT_TRUE((FlipLimits{0, 0}.hold(Loss{})));  // what shows nothing
+  EXPECT_TRUE((ShotLimits{mean, p95}.hold(loss)));
+  EXPECT_FALSE((ShotLimits{0.99 * mean, p95}.hold(loss)));
+  EXPECT_FALSE((ShotLimits{mean, 0.99 * p95}.hold(loss)));
+  EXPECT_TRUE((ShotLimits{0, 0}.hold(Loss{})));  // what shows nothing
 }
 
 }  // namespace
-}  // namespace texmesh::quality
+}  // namespace texmesh

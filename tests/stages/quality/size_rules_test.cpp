@@ -1,8 +1,8 @@
-#include "stages/quality/size_cells.h"
+#include "stages/quality/table_fit.h"
 
 #include "tests/stages/quality/quality_samples.h"
 
-namespace texmesh::quality {
+namespace texmesh {
 namespace {
 
 /// What fewer_heights() says of the textured sheet when half of the largest height shows so many texels per
@@ -42,4 +42,4 @@ TEST(SizeRules, WithoutMipsOnlyTexelsOfAPixelAre) {
 }
 
 }  // namespace
-}  // namespace texmesh::quality
+}  // namespace texmesh

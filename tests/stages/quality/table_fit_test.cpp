@@ -4,7 +4,7 @@
 
 #include "format/rules/picture_prediction.h"
 
-namespace texmesh::quality {
+namespace texmesh {
 namespace {
 
 GroupCells cells(const std::vector<double>& dssim, double texel_level) {
@@ -115,4 +115,4 @@ TEST(TableFit, EnlargedLossesEndAtOne) {
 }
 
 }  // namespace
-}  // namespace texmesh::quality
+}  // namespace texmesh

@@ -1,4 +1,4 @@
-#include "stages/render/brdf.h"
+#include "stages/render/fragment_shader.h"
 
 #include <gtest/gtest.h>
 
@@ -6,10 +6,14 @@
 
 #include "tests/stages/render/render_fixtures.h"
 
-namespace texmesh::render {
+namespace texmesh {
 namespace {
 
 constexpr double kTurn = 3.14159265358979323846;
+
+Vec3f radiance_towards(const LitSurface& surface, Vec3f to_viewer, const RenderEnvironment& environment) {
+  return radiance_of(surface, lighting_of(surface, to_viewer, environment, nullptr), environment);
+}
 
 Vec3f direction(double polar, double turn) {
   return to_float(Vec3d{std::sin(polar) * std::cos(turn), std::sin(polar) * std::sin(turn), std::cos(polar)});
@@ -58,7 +62,7 @@ TEST(Brdf, NoSurfaceReflectsMoreThanItGets) {
     for (const float roughness : {0.15f, 0.4f, 1.f})
       for (const double angle : {0.1, 0.8, 1.4}) {
         if (metallic == 0 && angle > 1) continue;
-        Surface s;
+        LitSurface s;
         s.metallic = metallic, s.roughness = roughness;
         const double sum = over_hemisphere(
             500, [&](Vec3f l, double) { return reflected_by_brdf(s, l, direction(angle, 0)).x; });
@@ -68,7 +72,7 @@ TEST(Brdf, NoSurfaceReflectsMoreThanItGets) {
 }
 
 TEST(Brdf, LightAndViewerMayChangePlaces) {
-  Surface s;
+  LitSurface s;
   s.metallic = 0.3f, s.roughness = 0.4f, s.base_colour = {0.8f, 0.5f, 0.2f};
   const Vec3f l = direction(0.4, 1), v = direction(1.1, 2.5);
   const Vec3f there = reflected_by_brdf(s, l, v) * (1 / l.z), back = reflected_by_brdf(s, v, l) * (1 / v.z);
@@ -76,7 +80,7 @@ TEST(Brdf, LightAndViewerMayChangePlaces) {
 }
 
 TEST(Brdf, TheDiffusePartIsLambertsWithoutWhatFresnelReflects) {
-  Surface white, black;
+  LitSurface white, black;
   black.base_colour = {};
   const Vec3f l = direction(0.9, 0.4), v = direction(0.5, 2);
   const double difference = static_cast<double>(reflected_by_brdf(white, l, v).x) -
@@ -91,7 +95,7 @@ TEST(Brdf, AWhiteFurnaceReturnsItsLightForAllRoughness) {
   for (const float metallic : {0.f, 1.f})
     for (const float roughness : {kLeastRoughness, 0.3f, 1.f})
       for (const double angle : {0., 0.9, 1.5}) {
-        Surface s;
+        LitSurface s;
         s.metallic = metallic, s.roughness = roughness;
         const Vec3f out = radiance_towards(s, direction(angle, 0.3), even);
         EXPECT_NEAR(out.x, 0.7, 0.002);
@@ -103,7 +107,7 @@ TEST(Brdf, AWhiteFurnaceReturnsItsLightForAllRoughness) {
 TEST(Brdf, SplitSumIsNearTheIntegral) {
   for (const double roughness : {0.3, 0.6, 0.9})
     for (const double angle : {0.3, 0.8, 1.2}) {
-      Surface s;
+      LitSurface s;
       s.metallic = 1, s.roughness = static_cast<float>(roughness);  // F0 = 1: scale + bias
       const double sum = over_hemisphere(
           400, [&](Vec3f l, double) { return reflected_by_brdf(s, l, direction(angle, 0)).x; });
@@ -116,12 +120,12 @@ TEST(Brdf, SplitSumIsNearTheIntegral) {
 }
 
 TEST(Brdf, OcclusionDarkensTheEnvironmentAndNotTheKeyLight) {
-  Surface open, shut;
+  LitSurface open, shut;
   shut.occlusion = 0;
   const Vec3f v = direction(0.3, 1);
   const RenderEnvironment even = testing::even_light({1, 1, 1});
   EXPECT_NEAR(radiance_towards(shut, v, even).x, 0, 1e-4);
-  Surface half;
+  LitSurface half;
   half.occlusion = 0.5f;
   EXPECT_NEAR(radiance_towards(half, v, even).x, 0.5, 0.02);
   const RenderEnvironment key = testing::only_key_light({0, 0, 1}, {1, 1, 1});
@@ -129,14 +133,14 @@ TEST(Brdf, OcclusionDarkensTheEnvironmentAndNotTheKeyLight) {
 }
 
 TEST(Brdf, EmissionIsAdded) {
-  Surface s;
+  LitSurface s;
   s.emission = {0.1f, 0.2f, 0.3f};
   const Vec3f out = radiance_towards(s, {0, 0, 1}, testing::even_light({}));
   EXPECT_EQ(out, s.emission);
 }
 
 TEST(Brdf, LightFromBehindDoesNotCount) {
-  Surface s;
+  LitSurface s;
   EXPECT_EQ(reflected_by_brdf(s, {0, 0, -1}, {0, 0, 1}), (Vec3f{}));
   // A normal turned away from the viewer still gives numbers.
   const Vec3f out = radiance_towards(s, {0, 0, -1}, testing::even_light({1, 1, 1}));
@@ -145,4 +149,4 @@ TEST(Brdf, LightFromBehindDoesNotCount) {
 }
 
 }  // namespace
-}  // namespace texmesh::render
+}  // namespace texmesh

@@ -62,9 +62,9 @@ float level_channel(const RenderEnvironment::Level& level, Vec2f place, float Ve
 
 float specular_channel(const RenderEnvironment& light, Vec3f direction, float roughness,
                        float Vec4f::*channel) {
-  const float at = render::saturated(roughness) * static_cast<float>(light.levels.size() - 1);
+  const float at = saturated(roughness) * static_cast<float>(light.levels.size() - 1);
   const auto sharp = std::min(static_cast<std::size_t>(at), light.levels.size() - 2);
-  const Vec2f place = render::octahedral(direction);
+  const Vec2f place = octahedral(direction);
   const float a = level_channel(light.levels[sharp], place, channel),
               b = level_channel(light.levels[sharp + 1], place, channel);
   return a + (b - a) * (at - static_cast<float>(sharp));
@@ -91,19 +91,17 @@ TEST(Environment, ChannelsSummedAtOnceHaveTheBitsOfEachByItself) {
 
 TEST(Environment, PlacesOfTheOctahedronAreTheirDirections) {
   for (const Vec3f d : directions(1000)) {
-    const Vec2f place = render::octahedral(d);
+    const Vec2f place = octahedral(d);
     EXPECT_LE(std::fabs(place.x), 1.0001f);
     EXPECT_LE(std::fabs(place.y), 1.0001f);
-    EXPECT_NEAR(length(render::octahedral_direction(place) - d), 0, 1e-5);
+    EXPECT_NEAR(length(octahedral_direction(place) - d), 0, 1e-5);
   }
   // A place a little beyond a border is near the one inside of it.
   for (const float t : {-0.8f, -0.1f, 0.3f, 0.9f})
     for (const float side : {-1.f, 1.f}) {
-      const Vec3f in = render::octahedral_direction({side * 0.99f, t}),
-                  out = render::octahedral_direction({side * 1.01f, t});
+      const Vec3f in = octahedral_direction({side * 0.99f, t}), out = octahedral_direction({side * 1.01f, t});
       EXPECT_GT(dot(in, out), 0.998f);
-      EXPECT_GT(dot(render::octahedral_direction({t, side * 0.99f}),
-                    render::octahedral_direction({t, side * 1.01f})),
+      EXPECT_GT(dot(octahedral_direction({t, side * 0.99f}), octahedral_direction({t, side * 1.01f})),
                 0.998f);
     }
 }
@@ -175,14 +173,14 @@ TEST(Environment, HostileRadianceIsCutOff) {
       },
       {}, {});
   for (const Vec3f d : directions(50)) {
-    EXPECT_TRUE(render::is_finite(diffuse_light(light, d)));
+    EXPECT_TRUE(is_finite(diffuse_light(light, d)));
     for (const float roughness : {0.f, 0.3f, 1.f, std::nanf("")}) {
       const Vec3f s = specular_light(light, d, roughness);
-      EXPECT_TRUE(render::is_finite(s));
+      EXPECT_TRUE(is_finite(s));
       EXPECT_GE(s.y, 0);
     }
   }
-  EXPECT_TRUE(render::is_finite(specular_light(light, {}, 0.5f)));
+  EXPECT_TRUE(is_finite(specular_light(light, {}, 0.5f)));
 }
 
 }  // namespace

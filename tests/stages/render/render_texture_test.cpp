@@ -7,7 +7,6 @@
 #include <stdexcept>
 
 #include "format/base/portable_math.h"
-#include "format/base/srgb.h"
 #include "stages/render/render_math.h"
 #include "tests/stages/render/render_fixtures.h"
 
@@ -15,6 +14,11 @@ namespace texmesh {
 namespace {
 
 using testing::texture_of;
+
+Vec4f read_texture(const RenderTexture& texture, const TextureSlot& slot, const TextureFootprint& footprint) {
+  return TextureSite({texture.width_px, texture.height_px}, texture.first_level, slot, footprint)
+      .read(texture);
+}
 
 TextureFootprint point(float u, float v) { return {{u, v}, {}, {}}; }
 

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "format/base/srgb.h"
+#include "format/base/portable_math.h"
 #include "stages/render/shade.h"
 #include "tests/stages/render/render_fixtures.h"
 

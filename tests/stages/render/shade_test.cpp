@@ -6,7 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "format/base/srgb.h"
+#include "format/base/portable_math.h"
 #include "stages/render/render_math.h"
 #include "tests/stages/render/render_fixtures.h"
 

@@ -1,4 +1,4 @@
-#include "stages/render/shown_materials.h"
+#include "stages/render/render_texture.h"
 
 #include <gtest/gtest.h>
 

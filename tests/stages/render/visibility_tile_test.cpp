@@ -7,7 +7,7 @@
 #include "tests/stages/render/render_fixtures.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh::render {
+namespace texmesh {
 namespace {
 
 using testing::front_camera;
@@ -66,4 +66,4 @@ TEST(VisibilityTile, PairsOfSamplesChangeNoBit) {
 }
 
 }  // namespace
-}  // namespace texmesh::render
+}  // namespace texmesh

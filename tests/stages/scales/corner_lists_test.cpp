@@ -1,4 +1,4 @@
-#include "stages/scales/corner_lists.h"
+#include "stages/scales/vertex_split.h"
 
 #include <gtest/gtest.h>
 

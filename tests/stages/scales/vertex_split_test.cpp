@@ -8,10 +8,9 @@
 
 #include "format/base/sha256.h"
 #include "format/split/split_reader.h"
-#include "format/split/split_source.h"
 #include "format/split/split_writer.h"
 #include "stages/condition/condition.h"
-#include "stages/scales/scale_grid.h"
+#include "stages/scales/scale_codecs.h"
 #include "stages/scales/scales.h"
 #include "stages/simplification/simplification.h"
 #include "tests/format/split/split_fixture.h"

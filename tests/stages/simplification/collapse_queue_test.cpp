@@ -1,4 +1,4 @@
-#include "stages/simplification/collapse_queue.h"
+#include "stages/simplification/collapse_engine.h"
 
 #include <gtest/gtest.h>
 

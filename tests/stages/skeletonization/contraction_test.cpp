@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "stages/skeletonization/contraction_parts.h"
-#include "stages/skeletonization/geometry_failure.h"
+#include "stages/skeletonization/wrap.h"
 #include "tests/support/even_sphere.h"
 
 namespace texmesh {

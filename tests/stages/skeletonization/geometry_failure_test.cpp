@@ -1,4 +1,4 @@
-#include "stages/skeletonization/geometry_failure.h"
+#include "stages/skeletonization/wrap.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "stages/skeletonization/local_radius.h"
+#include "stages/skeletonization/curve_skeleton.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-#include "format/base/box.h"
+#include "format/base/vec.h"
 #include "stages/geometry/triangle_tree.h"
 #include "tests/support/meshes.h"
 

@@ -5,7 +5,6 @@
 #include <array>
 #include <map>
 
-#include "stages/skeletonization/geometry_failure.h"
 #include "tests/support/even_sphere.h"
 
 namespace texmesh {

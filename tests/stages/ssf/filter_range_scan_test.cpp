@@ -7,7 +7,7 @@
 #include <numeric>
 
 #include "format/base/errors.h"
-#include "format/base/no_index.h"
+#include "format/base/vec.h"
 #include "stages/data/conditioned_mesh.h"
 #include "tests/stages/ssf/ssf_checks.h"
 #include "tests/support/even_sphere.h"

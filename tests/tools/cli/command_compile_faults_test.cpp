@@ -9,7 +9,7 @@
 #include <set>
 #include <thread>
 
-#include "pipeline/io/machine/owner_mark.h"
+#include "pipeline/io/machine.h"
 #include "tests/faults/shared_counts.h"
 #include "tests/support/sanitizers.h"
 #include "tests/support/small_builds.h"

@@ -5,7 +5,7 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
-#include "format/base/box.h"
+#include "format/base/vec.h"
 #include "pipeline/compile/compile_model.h"
 #include "stages/gltf/check_glb.h"
 #include "stages/image/decode_image.h"

@@ -8,7 +8,6 @@
 #include "stages/jpeg/jpeg.h"
 #include "tests/support/command.h"
 #include "tests/support/packages.h"
-#include "tools/inspect/fragment_files.h"
 #include "tools/inspect/package_tree.h"
 #include "tools/inspect/verify/verify.h"
 

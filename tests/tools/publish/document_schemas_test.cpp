@@ -6,9 +6,11 @@
 
 #include "pipeline/io/record.h"
 #include "tests/support/command.h"
+#include "tools/cli/options/delivery_text.h"
 #include "tools/extract/extract.h"
 #include "tools/inspect/atlas/atlas_report.h"
 #include "tools/inspect/diff/diff.h"
+#include "tools/inspect/dump/dump.h"
 #include "tools/inspect/verify/verify.h"
 #include "tools/publish/export/export.h"
 #include "tools/publish/report/report.h"
@@ -18,8 +20,10 @@ namespace texmesh::testing {
 namespace {
 
 TEST(DocumentSchemas, AreThoseOfTheProgram) {
-  for (const DocumentSchema& schema : {diff_schema(), doctor_schema(), export_schema(), extract_schema(),
-                                       report_schema(), site_schema(), verify_schema()}) {
+  for (const auto of_command :
+       {diff_schema, doctor_schema, dump_scales_schema, export_schema, extract_schema, fetch_schema,
+        plan_schema, report_schema, simulate_schema, site_schema, verify_schema}) {
+    const DocumentSchema schema = of_command();
     const std::string file = std::string(TEXMESH_SOURCE_DIR "/schemas/") + schema.name + ".schema.json";
     if (std::getenv("TEXMESH_WRITE_SCHEMAS")) write_text(file, schema.text);
     EXPECT_EQ(read_text(file), schema.text) << file;

@@ -1,5 +1,5 @@
 // Views of a model on one sheet.
-#include "tools/render/picture_sheet.h"
+#include "tools/render/rendered_model.h"
 
 #include <gtest/gtest.h>
 

@@ -2,35 +2,24 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "format/base/text_bytes.h"
-#include "pipeline/batch/junit.h"
+#include "pipeline/batch/fleet/run_summary.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/table.h"
 #include "tools/cli/options/delivery_text.h"
-#include "tools/publish/report/switch_sizes.h"
+#include "tools/publish/report/report_pictures.h"
 
 namespace texmesh {
 namespace {
 
 /// NaN breaks every limit.
-void add_most(const std::string& what, double value, const std::optional<double>& most,
-              std::vector<GateResult>& out) {
-  if (!most) return;
-  const bool kept = value <= *most;
-  out.push_back(
-      {what,
-       kept ? "" : fmt::format("{}: {}, expected at most {}", what, shortest(value, 6), shortest(*most, 6))});
-}
-
-void add_least(const std::string& what, double value, const std::optional<double>& least,
+void add_limit(const std::string& what, double value, const std::optional<double>& limit, bool is_most,
                std::vector<GateResult>& out) {
-  if (!least) return;
-  const bool kept = value >= *least;
+  if (!limit) return;
+  const bool kept = is_most ? value <= *limit : value >= *limit;
   out.push_back({what, kept ? ""
-                            : fmt::format("{}: {}, expected at least {}", what, shortest(value, 6),
-                                          shortest(*least, 6))});
+                            : fmt::format("{}: {}, expected at {} {}", what, shortest(value, 6),
+                                          is_most ? "most" : "least", shortest(*limit, 6))});
 }
 
 }  // namespace
@@ -76,18 +65,21 @@ std::vector<GateResult> check_switch_sizes(PackageReader& package, double max_fl
 
 std::vector<GateResult> check_atlases(const AtlasDiagnosis& d, const AtlasLimits& limits) {
   std::vector<GateResult> out;
-  add_most("charts", static_cast<double>(d.charts()), limits.max_charts, out);
-  add_most("triangle floor", static_cast<double>(d.triangle_floor()), limits.max_floor_triangles, out);
+  const auto add_most = [&](const std::string& what, double value, const std::optional<double>& most) {
+    add_limit(what, value, most, true, out);
+  };
+  add_most("charts", static_cast<double>(d.charts()), limits.max_charts);
+  add_most("triangle floor", static_cast<double>(d.triangle_floor()), limits.max_floor_triangles);
   for (const NamedAtlas& a : d.atlases) {
     const std::string of = a.name + ": ";
-    add_least(of + "cover", a.cover, limits.min_cover, out);
-    add_most(of + "share of texels in thin charts", a.thin_share, limits.max_thin, out);
-    add_most(of + "overlap", a.overlap, limits.max_overlap, out);
-    add_most(of + "surface without area on the texture", a.flat_surface, limits.max_flat, out);
-    add_most(of + "density spread", a.density_spread(), limits.max_density_spread, out);
-    add_most(of + "stretch of 95 % of the surface", a.stretch.p95, limits.max_stretch, out);
+    add_limit(of + "cover", a.cover, limits.min_cover, false, out);
+    add_most(of + "share of texels in thin charts", a.thin_share, limits.max_thin);
+    add_most(of + "overlap", a.overlap, limits.max_overlap);
+    add_most(of + "surface without area on the texture", a.flat_surface, limits.max_flat);
+    add_most(of + "density spread", a.density_spread(), limits.max_density_spread);
+    add_most(of + "stretch of 95 % of the surface", a.stretch.p95, limits.max_stretch);
     if (a.seam_colours)
-      add_most(of + "colour difference across seams", a.seam_colours->mean, limits.max_seam_difference, out);
+      add_most(of + "colour difference across seams", a.seam_colours->mean, limits.max_seam_difference);
   }
   return out;
 }
@@ -103,8 +95,7 @@ std::string gate_junit(const std::string& suite, const std::string& input,
 
 void write_gate_junit(const std::string& path, const std::string& suite, const std::string& input,
                       const std::vector<GateResult>& results) {
-  const std::string xml = gate_junit(suite, input, results);
-  write_output_file(path, text_bytes(xml));
+  if (!path.empty()) write_output_file(path, text_bytes(gate_junit(suite, input, results)));
 }
 
 std::vector<std::string> gate_failures(const std::vector<GateResult>& results) {
@@ -112,6 +103,12 @@ std::vector<std::string> gate_failures(const std::vector<GateResult>& results) {
   for (const GateResult& r : results)
     if (!r.failure.empty()) out.push_back(r.failure);
   return out;
+}
+
+std::string gate_text(const std::vector<GateResult>& results) {
+  std::string out;
+  for (const std::string& r : gate_failures(results)) out += "not good enough: " + r + "\n";
+  return out.empty() && !results.empty() ? "good enough\n" : out;
 }
 
 }  // namespace texmesh

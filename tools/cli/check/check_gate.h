@@ -1,12 +1,6 @@
 #pragma once
-#include <cstdint>
-#include <limits>
-#include <optional>
-#include <string>
-#include <vector>
 
 #include "delivery/cpp/client/delivery_plan.h"
-#include "stages/base/run_context.h"
 #include "tools/inspect/atlas/atlas_report.h"
 
 namespace texmesh {
@@ -45,10 +39,12 @@ std::vector<GateResult> check_atlases(const AtlasDiagnosis& diagnosis, const Atl
 /// JUnit XML: one test suite of this name ("texmesh check"), a case per result. `input`: what was checked.
 std::string gate_junit(const std::string& suite, const std::string& input,
                        const std::vector<GateResult>& results);
-/// Writes it to a file. Errors as write_output_file().
+/// Writes it to a file; "" = to none. Errors as write_output_file().
 void write_gate_junit(const std::string& path, const std::string& suite, const std::string& input,
                       const std::vector<GateResult>& results);
 /// The sentences of the limits that are not kept.
 std::vector<std::string> gate_failures(const std::vector<GateResult>& results);
+/// The same as lines for people; "good enough" where all of some limits are kept.
+std::string gate_text(const std::vector<GateResult>& results);
 
 }  // namespace texmesh

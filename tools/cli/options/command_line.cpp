@@ -10,7 +10,6 @@
 #include <cstdlib>
 #include <filesystem>
 #include <map>
-#include <optional>
 #include <set>
 #include <sstream>
 
@@ -439,12 +438,6 @@ const char* default_value_name() {
     return "TEXT";
 }
 
-std::string in_braces(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "{" : "|") + word;
-  return text + "}";
-}
-
 }  // namespace
 
 struct CommandLineState {
@@ -454,11 +447,6 @@ struct CommandLineState {
 
 Option& Option::required() {
   option_->required();
-  return *this;
-}
-
-Option& Option::value_name(const std::string& name) {
-  option_->type_name(name);
   return *this;
 }
 
@@ -475,7 +463,7 @@ Option& Option::integer_in(int least, int most) {
 }
 
 Option& Option::number_in(double least, double most) {
-  option_->check(NumberIn(least, most));
+  option_->check([least, most](const std::string& text) { return number_fault(text, least, most); });
   return *this;
 }
 
@@ -484,7 +472,7 @@ Option& Option::one_of(const std::vector<std::string>& words) {
 }
 
 Option& Option::lists_words() {
-  state_->help.choices[option_] = in_braces(state_->help.words[option_]);
+  state_->help.choices[option_] = "{" + in_a_row(state_->help.words[option_], "|") + "}";
   return *this;
 }
 
@@ -558,25 +546,31 @@ Option Command::flag(const std::string& names, std::function<void()> on_given, c
 }
 
 template <class T>
-Option Command::option(const std::string& names, T& value, const std::string& help) {
-  CLI::Option* option = app_->add_option(names, value, help)->type_name(default_value_name<T>());
+Option Command::option(const std::string& names, T& value, const std::string& help,
+                       const std::string& value_name) {
+  CLI::Option* option = app_->add_option(names, value, help);
+  option->type_name(value_name.empty() ? default_value_name<T>() : value_name);
   if (!group_.empty()) option->group(group_);
   return {option, *state_};
 }
-template Option Command::option(const std::string&, int&, const std::string&);
-template Option Command::option(const std::string&, std::uint64_t&, const std::string&);
-template Option Command::option(const std::string&, double&, const std::string&);
-template Option Command::option(const std::string&, std::string&, const std::string&);
-template Option Command::option(const std::string&, std::optional<int>&, const std::string&);
-template Option Command::option(const std::string&, std::optional<double>&, const std::string&);
-template Option Command::option(const std::string&, std::vector<int>&, const std::string&);
-template Option Command::option(const std::string&, std::vector<std::string>&, const std::string&);
+template Option Command::option(const std::string&, int&, const std::string&, const std::string&);
+template Option Command::option(const std::string&, std::uint64_t&, const std::string&, const std::string&);
+template Option Command::option(const std::string&, double&, const std::string&, const std::string&);
+template Option Command::option(const std::string&, std::string&, const std::string&, const std::string&);
+template Option Command::option(const std::string&, std::optional<int>&, const std::string&,
+                                const std::string&);
+template Option Command::option(const std::string&, std::optional<double>&, const std::string&,
+                                const std::string&);
+template Option Command::option(const std::string&, std::vector<int>&, const std::string&,
+                                const std::string&);
+template Option Command::option(const std::string&, std::vector<std::string>&, const std::string&,
+                                const std::string&);
 
 Option Command::option(const std::string& names, std::function<void(const std::string&)> on_given,
-                       const std::string& help) {
+                       const std::string& help, const std::string& value_name) {
   CLI::Option* option = app_->add_option_function<std::string>(names, std::move(on_given), help);
   if (!group_.empty()) option->group(group_);
-  return {option->type_name("TEXT"), *state_};
+  return {option->type_name(value_name), *state_};
 }
 
 void Command::help_option(const std::string& name, const std::string& prefix, const std::string& help) {

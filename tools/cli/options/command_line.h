@@ -3,7 +3,7 @@
 #include <functional>
 #include <iostream>
 #include <memory>
-#include <vector>
+#include <optional>
 
 #include "format/base/fields.h"
 #include "pipeline/io/exit_codes.h"
@@ -25,8 +25,6 @@ class Option {
  public:
   Option(CLI::Option* option, CommandLineState& state) : option_(option), state_(&state) {}
   Option& required();
-  /// What stands for the value in the help: FILE, DIR ... (default: N for integers, X, TEXT).
-  Option& value_name(const std::string& name);
   /// The help tells the value that the variable has now, or `text` instead.
   Option& shows_default(const std::string& text = "");
   Option& integer_in(int least, int most);
@@ -62,6 +60,16 @@ class Command {
   /// commands only --help-all tells.
   void group(const std::string& title, bool rare = false);
   Command add(const std::string& name, const std::string& summary);
+  /// The same with its arguments, which live as long as the program; `run` takes them and gives the exit
+  /// code.
+  template <class Arguments>
+  std::pair<Command, std::remove_const_t<Arguments>&> add(const std::string& name, const std::string& summary,
+                                                          int (*run)(Arguments&)) {
+    auto args = std::make_shared<std::remove_const_t<Arguments>>();
+    Command command = add(name, summary);
+    command.on_run([args, run] { return run(*args); });
+    return {command, *args};
+  }
   void needs_command();
   /// No help and no shell tells of the command.
   void hidden();
@@ -70,29 +78,33 @@ class Command {
   Option flag(const std::string& names, std::function<void()> on_given, const std::string& help);
   /// T: int, std::uint64_t, double, std::string, std::optional of int or double, std::vector of int or
   /// std::string.
-  /// A name without dashes makes an argument.
+  /// A name without dashes makes an argument. `value_name` stands for the value in the help: FILE, DIR ..
+  /// (default: N for integers, X, TEXT).
   template <class T>
-  Option option(const std::string& names, T& value, const std::string& help);
+  Option option(const std::string& names, T& value, const std::string& help,
+                const std::string& value_name = "");
   /// Any text; `on_given` takes it.
   Option option(const std::string& names, std::function<void(const std::string&)> on_given,
-                const std::string& help);
+                const std::string& help, const std::string& value_name = "TEXT");
   /// A value that `parse` reads of text and flag: parse_bytes() and others of units.h. It throws UsageErrors.
   template <class T, class Parsed>
   Option option(const std::string& names, T& value, Parsed (*parse)(const std::string&, const std::string&),
-                const std::string& help) {
+                const std::string& help, const std::string& value_name) {
     const std::string flag = names.substr(names.find("--") == std::string::npos ? 0 : names.find("--"));
     return option(
-        names, [&value, parse, flag](const std::string& text) { value = parse(text, flag); }, help);
+        names, [&value, parse, flag](const std::string& text) { value = parse(text, flag); }, help,
+        value_name);
   }
   /// One of the names of an enum (EnumNames), which the help's text explains.
   template <class Enum>
-  Option choice(const std::string& names, Enum& value, const std::string& help) {
-    const std::vector<std::string> words(EnumNames<Enum>::names.begin(), EnumNames<Enum>::names.end());
-    std::function<void(const std::string&)> take = [&value, words](const std::string& text) {
-      value = static_cast<Enum>(std::find(words.begin(), words.end(), text) - words.begin());
-    };
-    Option made = option(names, std::move(take), help);
-    return made.one_of_explained(words).remembers_default(std::string(enum_name(value)));
+  Option choice(const std::string& names, Enum& value, const std::string& help,
+                const std::string& value_name = "NAME") {
+    return choice_of<Enum>(names, value, help, value_name).remembers_default(std::string(enum_name(value)));
+  }
+  /// The same where nothing is chosen by itself.
+  template <class Enum>
+  Option choice(const std::string& names, std::optional<Enum>& value, const std::string& help) {
+    return choice_of<Enum>(names, value, help, "NAME");
   }
   /// An option that prints a text, and the program does nothing else.
   Option text_option(const std::string& name, std::string (*text)(), const std::string& help);
@@ -109,6 +121,15 @@ class Command {
   void on_run(std::function<int()> run);
 
  private:
+  template <class Enum, class Value>
+  Option choice_of(const std::string& names, Value& value, const std::string& help,
+                   const std::string& value_name) {
+    const std::vector<std::string> words(EnumNames<Enum>::names.begin(), EnumNames<Enum>::names.end());
+    std::function<void(const std::string&)> take = [&value, words](const std::string& text) {
+      value = static_cast<Enum>(std::find(words.begin(), words.end(), text) - words.begin());
+    };
+    return option(names, std::move(take), help, value_name).one_of_explained(words);
+  }
   CLI::App* app_;
   CommandLineState* state_;
   std::string group_;

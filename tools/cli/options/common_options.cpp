@@ -1,10 +1,14 @@
 #include "tools/cli/options/common_options.h"
 
+#include <unistd.h>
+
 #include <cstdlib>
 
 #include "pipeline/batch/fleet/run_summary.h"
+#include "pipeline/cache/disk_store.h"
+#include "pipeline/compile/options.h"
 #include "pipeline/io/file_resolver.h"
-#include "pipeline/io/machine/machine_share.h"
+#include "pipeline/io/machine.h"
 #include "stages/base/run_context.h"
 #include "tools/cli/options/command_line.h"
 
@@ -23,9 +27,27 @@ RunContext context_of(int jobs) {
 void add_cache_options(Command& c, CacheChoice& cache) {
   c.option("--cache", cache.folder,
            "Cache folder (default: TEXMESH_CACHE, else the user's cache folder). A folder that cannot be "
-           "made or written costs a warning, never the build")
-      .value_name("DIR");
+           "made or written costs a warning, never the build",
+           "DIR");
   c.flag("--no-cache", cache.off, "Compute everything and keep nothing");
+}
+
+std::unique_ptr<Store> store_of(const CacheChoice& cache) {
+  if (cache.off) return std::make_unique<NullStore>();
+  return open_disk_store(default_cache_folder(cache.folder));
+}
+
+void apply_profile(const std::string& profile, CompileOptions& options) {
+  if (profile.empty()) return;
+  const std::string file = profile_file(profile);
+  const auto bytes = read_input_file(file, 1 << 20);
+  read_profile(options, std::string(bytes.begin(), bytes.end()), file);
+}
+
+void print_warnings(const Notes& notes) {
+  for (const Note& n : notes)
+    if (n.severity == Severity::kWarning)
+      std::cerr << "warning: " << n.code << (n.place.empty() ? "" : ": " + n.place) << ": " << n.text << '\n';
 }
 
 Option add_package_argument(Command& c, std::string& package, bool urls) {
@@ -38,13 +60,12 @@ Option add_package_argument(Command& c, std::string& package, bool urls) {
 
 void add_shard_options(Command& c, std::string& shard, std::string& costs) {
   c.option("--shard", shard,
-           "Compile only part I of 0 .. N-1, balanced by cost. auto, auto/N = this array task's part")
-      .value_name("I/N");
+           "Compile only part I of 0 .. N-1, balanced by cost. auto, auto/N = this array task's part", "I/N");
   c.option(
        "--costs", costs,
        "Summary of an earlier run: shards are balanced by what models took then (default: by the sizes of "
-       "their files). Every shard needs the same")
-      .value_name("FILE")
+       "their files). Every shard needs the same",
+       "FILE")
       .rare();
 }
 
@@ -60,6 +81,27 @@ std::map<std::string, double> costs_option(const std::string& file) {
   } catch (const FormatError& e) {
     throw InputError(e.file(), e.place(), e.expected(), e.found());
   }
+}
+
+PercentLine::PercentLine(std::string label)
+    : PercentLine(std::move(label), std::cerr, ::isatty(STDERR_FILENO) != 0) {}
+
+PercentLine::PercentLine(std::string label, std::ostream& out, bool is_terminal)
+    : label_(std::move(label)), out_(out), is_terminal_(is_terminal) {}
+
+void PercentLine::show(double fraction) {
+  const int percent = static_cast<int>(100 * std::clamp(fraction, 0.0, 1.0));
+  const std::lock_guard lock(mutex_);
+  if (!is_terminal_ || percent <= percent_) return;
+  percent_ = percent;
+  out_ << "\r\033[K" << label_ << ' ' << percent << " %" << std::flush;
+}
+
+void PercentLine::end() {
+  const std::lock_guard lock(mutex_);
+  if (percent_ >= 0) out_ << "\r\033[K" << std::flush;
+  percent_ = -1;
+  is_terminal_ = false;
 }
 
 }  // namespace texmesh

@@ -1,13 +1,18 @@
 #pragma once
 #include <map>
-#include <string>
+#include <memory>
+#include <mutex>
+#include <ostream>
 
-#include "pipeline/batch/fleet/shards.h"
+#include "format/base/note.h"
+#include "pipeline/batch/plan.h"
 
 namespace texmesh {
 
 class Command;
 class Option;
+class Store;
+struct CompileOptions;
 struct RunContext;
 
 // Options that several commands share.
@@ -22,6 +27,13 @@ struct CacheChoice {
   bool off = false;
 };
 void add_cache_options(Command& command, CacheChoice& cache);
+std::unique_ptr<Store> store_of(const CacheChoice& cache);
+
+/// Options as a profile has them, which is a name or a JSON file; those of `options` for "".
+void apply_profile(const std::string& profile, CompileOptions& options);
+
+/// The warnings among the notes, a line each on standard error.
+void print_warnings(const Notes& notes);
 
 /// A package that the user names: a file, a folder or, where `urls`, a URL.
 Option add_package_argument(Command& command, std::string& package, bool urls);
@@ -32,5 +44,27 @@ void add_shard_options(Command& command, std::string& shard, std::string& costs)
 Shard shard_option(const std::string& text);
 /// What the summary of an earlier run says that models took. InputError for a file that is no summary.
 std::map<std::string, double> costs_option(const std::string& file);
+
+/// "extract 40 %" on a line of a terminal that is drawn over, until the end takes it away. Safe from several
+/// threads.
+class PercentLine {
+ public:
+  /// On standard error, where that is a terminal.
+  explicit PercentLine(std::string label);
+  PercentLine(std::string label, std::ostream& out, bool is_terminal);
+  ~PercentLine() { end(); }
+  PercentLine(const PercentLine&) = delete;
+  PercentLine& operator=(const PercentLine&) = delete;
+  /// 0..1; never goes back.
+  void show(double fraction);
+  void end();
+
+ private:
+  std::string label_;
+  std::ostream& out_;
+  bool is_terminal_;
+  std::mutex mutex_;
+  int percent_ = -1;
+};
 
 }  // namespace texmesh

@@ -1,27 +1,12 @@
 #include "tools/cli/options/delivery_options.h"
 
-#include <algorithm>
-#include <fstream>
-#include <sstream>
-
+#include "pipeline/io/file_resolver.h"
 #include "pipeline/io/table.h"
 
 namespace texmesh {
-namespace {
-
-std::string read_file(const std::string& path) {
-  std::ifstream in(path, std::ios::binary);
-  std::ostringstream text;
-  if (!in || !(text << in.rdbuf())) throw InputError(path, "", "a readable file", "none");
-  return text.str();
-}
-
-}  // namespace
-
 Option add_display_option(Command& c, DeliveryArguments& a) {
-  return c.option("--display", a.request.displayed_px, "Displayed height of the object, device pixels")
+  return c.option("--display", a.request.displayed_px, "Displayed height of the object, device pixels", "PX")
       .number_in(1, 1e6)
-      .value_name("PX")
       .shows_default();
 }
 
@@ -32,8 +17,7 @@ void add_time_option(Command& c, DeliveryArguments& a) {
          a.request.time_limit_s = parse_duration(text, "--time");
          if (!(a.request.time_limit_s > 0)) throw UsageError("--time", "", "a time above 0", text);
        },
-       "Time limit from the first request on: 4, 1.5s, 800ms")
-      .value_name("TIME")
+       "Time limit from the first request on: 4, 1.5s, 800ms", "TIME")
       .shows_default(shortest(a.request.time_limit_s));
 }
 
@@ -43,7 +27,7 @@ Option add_rtt_option(Command& c, DeliveryArguments& a, const std::string& help)
     const bool bare = text.find_first_not_of("0123456789.") == std::string::npos;
     a.request.network.rtt_s = parse_duration(bare ? text + "ms" : text, "--rtt");
   };
-  return c.option("--rtt", take, help).value_name("TIME").shows_default("0");
+  return c.option("--rtt", take, help, "TIME").shows_default("0");
 }
 
 Option add_bandwidth_option(Command& c, DeliveryArguments& a, const std::string& help) {
@@ -51,7 +35,7 @@ Option add_bandwidth_option(Command& c, DeliveryArguments& a, const std::string&
     a.request.network.link = BandwidthTrace::constant(parse_bandwidth(text, "--bandwidth"));
     a.has_link = true;
   };
-  return c.option("--bandwidth", take, help).value_name("RATE");
+  return c.option("--bandwidth", take, help, "RATE");
 }
 
 Option add_scale_option(Command& c, DeliveryArguments& a) {
@@ -60,32 +44,32 @@ Option add_scale_option(Command& c, DeliveryArguments& a) {
 }
 
 Option add_policy_option(Command& c, DeliveryArguments& a) {
-  return enum_option<Policy>(
-             c, "--policy", a.request.htc.policy,
-             "How textures are chosen: guard = the thesis's method around the plan of least loss, with sizes "
-             "within a factor of 1.5 of that plan's share; thesis = chapters 4 and 7 as printed, with --rule "
-             "jnd, one request at a time, hard limits of quality, textures at full size, and the list that "
-             "T_0 beta_0 pays")
+  return c
+      .choice(
+          "--policy", a.request.htc.policy,
+          "How textures are chosen: guard = the thesis's method around the plan of least loss, with sizes "
+          "within a factor of 1.5 of that plan's share; thesis = chapters 4 and 7 as printed, with --rule "
+          "jnd, one request at a time, hard limits of quality, textures at full size, and the list that "
+          "T_0 beta_0 pays")
       .shows_default("guard");
 }
 
 Option add_rule_option(Command& c, DeliveryArguments& a) {
-  return enum_option<StepRule>(
-      c, "--rule", a.rule,
-      "Which scale is enough: flip = by lit pictures, which compile has compared with those of "
-      "the finest scale; jnd = by the just-noticeable difference; error = by an error of one "
-      "pixel; edge = by edges of one pixel. Default: flip, and jnd with --policy thesis");
+  return c.choice("--rule", a.rule,
+                  "Which scale is enough: flip = by lit pictures, which compile has compared with those of "
+                  "the finest scale; jnd = by the just-noticeable difference; error = by an error of one "
+                  "pixel; edge = by edges of one pixel. Default: flip, and jnd with --policy thesis");
 }
 
 void add_memory_option(Command& c, DeliveryArguments& a) {
   c.option(
-       "--memory",
-       [&a](const std::string& text) {
-         a.request.memory_bytes = static_cast<double>(parse_bytes(text, "--memory"));
-       },
-       "GPU memory for mesh and textures, 64MB: coarser scales and mips where more would be taken (default: "
-       "any)")
-      .value_name("SIZE");
+      "--memory",
+      [&a](const std::string& text) {
+        a.request.memory_bytes = static_cast<double>(parse_bytes(text, "--memory"));
+      },
+      "GPU memory for mesh and textures, 64MB: coarser scales and mips where more would be taken "
+      "(default: any)",
+      "SIZE");
 }
 
 void add_package_and_view_options(Command& c, DeliveryArguments& a, bool package_required) {
@@ -102,9 +86,8 @@ void add_package_and_view_options(Command& c, DeliveryArguments& a, bool package
       .number_in(0.01, 179)
       .shows_default()
       .rare();
-  c.option("--viewport", a.camera.viewport_px, "Height of the picture for --distance, device pixels")
+  c.option("--viewport", a.camera.viewport_px, "Height of the picture for --distance, device pixels", "PX")
       .number_in(1, 1e6)
-      .value_name("PX")
       .shows_default()
       .rare();
   add_scale_option(c, a);
@@ -117,11 +100,11 @@ void add_link_options(Command& c, DeliveryArguments& a) {
   c.option(
        "--trace",
        [&a](const std::string& file) {
-         a.request.network.link = read_trace_csv(read_file(file), file);
+         const auto bytes = read_input_file(file, 1u << 30);
+         a.request.network.link = read_trace_csv(std::string(bytes.begin(), bytes.end()), file);
          a.has_link = true;
        },
-       "CSV of the link's throughput: lines of seconds,bytes per second")
-      .value_name("FILE")
+       "CSV of the link's throughput: lines of seconds,bytes per second", "FILE")
       .excludes(bandwidth);
   add_rtt_option(c, a, "Round trip: 40 or 40ms are milliseconds, 0.04s seconds");
   c.option("--connections", a.request.network.connections, "Connections per server")
@@ -133,8 +116,7 @@ void add_link_options(Command& c, DeliveryArguments& a) {
 void add_delivery_options(Command& c, DeliveryArguments& a) {
   add_package_and_view_options(c, a, true);
   add_link_options(c, a);
-  c.option("--mirror", a.mirrors, "A server's own rate, 2Mbit/s; several times for several servers")
-      .value_name("RATE");
+  c.option("--mirror", a.mirrors, "A server's own rate, 2Mbit/s; several times for several servers", "RATE");
   c.group("Method");
   add_policy_option(c, a).rare();
   add_rule_option(c, a).rare();

@@ -1,15 +1,7 @@
 #pragma once
-#include <array>
-#include <functional>
-#include <optional>
-#include <string>
-#include <string_view>
-#include <vector>
 
 #include "delivery/cpp/client/delivery_plan.h"
-#include "format/base/fields.h"
 #include "tools/cli/options/command_line.h"
-#include "tools/cli/options/units.h"
 
 namespace texmesh {
 
@@ -21,18 +13,6 @@ template <>
 struct EnumNames<StepRule> {
   static constexpr std::array<std::string_view, 4> names{"flip", "jnd", "error", "edge"};
 };
-
-/// An option whose words are the names of an enum; `help` explains them. The value, an E or an optional one,
-/// must outlive the command.
-template <class E, class Value>
-Option enum_option(Command& c, const std::string& flag, Value& value, const std::string& help) {
-  const auto& names = EnumNames<E>::names;
-  const std::function<void(const std::string&)> take = [&value, &names](const std::string& word) {
-    for (std::size_t k = 0; k < names.size(); ++k)
-      if (names[k] == word) value = static_cast<E>(k);
-  };
-  return c.option(flag, take, help).one_of_explained({names.begin(), names.end()}).value_name("NAME");
-}
 
 /// What plan, check, simulate and fetch ask about how a package is looked at and over what. Options write
 /// into `request`; delivery_request() adds what several of them say together.

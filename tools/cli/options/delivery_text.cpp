@@ -2,15 +2,87 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "format/base/text_bytes.h"
 #include "pipeline/io/atomic_file.h"
+#include "pipeline/io/markup.h"
 #include "pipeline/io/table.h"
-#include "tools/inspect/simulation_plot.h"
+#include "tools/publish/pages/page.h"
 
 namespace texmesh {
+namespace {
+
+using Points = std::vector<std::pair<double, double>>;
+
+/// One of the plots beneath each other: steps of values over time.
+Plot panel(const std::string& name, double end_s, double limit_s, const char* colour, const Points& steps) {
+  Plot plot;
+  plot.title = plot.y_name = name;
+  plot.x_name = "s";
+  plot.linear_x = true;
+  plot.x_low = 0, plot.x_high = end_s;
+  plot.y_high = 0;
+  for (const auto& [time_s, value] : steps) {
+    plot.y_low = std::min(plot.y_low, value);
+    plot.y_high = std::max(plot.y_high, value);
+  }
+  plot.series.push_back({"", colour, steps});
+  plot.series.back().steps = true;
+  plot.series.push_back({"", "e", {{limit_s, -1e9}, {limit_s, 1e9}}, false, true});
+  return plot;
+}
+
+Plot quality_panel(const SimulationResult& result, const std::vector<double>& qualities, double end_s) {
+  Plot plot = panel("quality of fragments, from request to arrival; dots: skipped", end_s,
+                    result.time_limit_s, "a", {});
+  plot.y_high = 100;
+  PlotSeries skipped{"", "q", {}};
+  skipped.dots = true;
+  for (std::size_t i = 0; i < result.steps.size(); ++i) {
+    const HtcStep& s = result.steps[i];
+    if (s.rung < 0)
+      skipped.points.emplace_back(s.issued_s, 0);
+    else
+      plot.series.push_back({"", "a", {{s.issued_s, qualities[i]}, {s.done_s, qualities[i]}}});
+  }
+  plot.series.push_back(std::move(skipped));
+  return plot;
+}
+
+std::string simulation_svg(const SimulationResult& result, const std::vector<double>& qualities,
+                           const BandwidthTrace& link, const std::string& title) {
+  constexpr int kWidth = 800, kPanel = 390, kTop = 40;
+  double last_s = std::max(std::isfinite(result.end_s) ? result.end_s : 0.0, 1e-3);
+  if (std::isfinite(result.time_limit_s)) last_s = std::max(last_s, result.time_limit_s);
+  const double end_s = 1.02 * last_s, limit_s = result.time_limit_s;
+  Points rate, belief, credit;
+  for (std::size_t i = 0; i < link.time_s.size() && link.time_s[i] < end_s; ++i)
+    rate.emplace_back(link.time_s[i], link.bytes_s[i] / 1e3);
+  for (const HtcStep& s : result.steps) {
+    belief.emplace_back(s.issued_s, s.throughput_bytes_s / 1e3);
+    credit.emplace_back(s.issued_s, 1e3 * s.credit_s);
+  }
+  Plot rates = panel("throughput, kB/s", end_s, limit_s, "a", rate);
+  rates.y_high *= 1.6;  // what bunched completions make the plan believe for a moment would flatten the rest
+  rates.series.front().name = "the link";
+  rates.series.push_back({"what the plan went by", "b", belief});
+  rates.series.back().steps = true;
+  std::string svg = fmt::format(
+      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{1}\" viewBox=\"0 0 {0} {1}\">\n"
+      "<style>{2}</style>\n<rect width=\"100%\" height=\"100%\" fill=\"var(--page)\"/>\n"
+      "<text x=\"20\" y=\"26\">{3}</text>\n",
+      kWidth, kTop + 3 * kPanel, page_style(""), markup_escaped(title));
+  int top = kTop;
+  for (const Plot& plot : {quality_panel(result, qualities, end_s), rates,
+                           panel("credit of the fragment asked for, ms", end_s, limit_s, "c", credit)}) {
+    svg += fmt::format("<g transform=\"translate(20 {})\">\n{}</g>\n", top, plot.svg());
+    top += kPanel;
+  }
+  return svg + "</svg>\n";
+}
+
+}  // namespace
 
 std::string moment(double time_s) {
   constexpr double kNever_s = 1e8;  // no link that a request may ask for takes as long
@@ -22,47 +94,10 @@ std::string gpu_text(const GpuBytes& bytes) {
                      static_cast<double>(bytes.textures) / 1e6, static_cast<double>(bytes.mesh) / 1e6);
 }
 
-nlohmann::ordered_json gpu_json(const GpuBytes& bytes) {
-  return {{"mesh", bytes.mesh}, {"textures", bytes.textures}, {"all", bytes.all()}};
-}
-
-nlohmann::ordered_json server_json(const MirrorShare& share) {
-  nlohmann::ordered_json j{{"requests", share.requests}, {"bytes", share.bytes}, {"bytes_s", share.bytes_s}};
-  if (!share.dropped.empty()) j["dropped"] = share.dropped;
-  return j;
-}
-
 std::string server_text(const std::string& name, const MirrorShare& share) {
   return fmt::format("  {}: {} requests, {} bytes, {:.0f} kB/s{}\n", name, share.requests,
                      grouped(share.bytes), share.bytes_s / 1e3,
                      share.dropped.empty() ? "" : "; dropped: " + share.dropped);
-}
-
-nlohmann::ordered_json simulated_json(const DeliveryPlan& p, double limit_s) {
-  const SimulationResult& r = p.textures;
-  nlohmann::ordered_json j{{"version", 1},
-                           {"scale", p.scale},
-                           {"first_picture_s", p.first_picture_s},
-                           {"mesh_s", p.mesh_s},
-                           {"complete_s", p.complete_s},
-                           {"whole_limit_s", limit_s},
-                           {"whole_deviation_percent", 100 * (limit_s - p.complete_s) / limit_s},
-                           {"whole_late_s", std::max(0.0, p.complete_s - limit_s)},
-                           {"time_limit_s", r.time_limit_s},
-                           {"end_s", r.end_s},
-                           {"deviation_percent", r.deviation_percent},
-                           {"late_s", r.late_s},
-                           {"bytes", r.bytes},
-                           {"fragments", r.rungs.size()},
-                           {"skipped", r.skipped},
-                           {"mean_quality", p.mean_quality},
-                           {"worst_quality", p.worst_quality},
-                           {"texture_flip", p.texture_flip},
-                           {"flip", p.flip},
-                           {"warnings", p.warnings}};
-  if (r.mirrors.size() > 1)
-    for (const MirrorShare& m : r.mirrors) j["servers"].push_back(server_json(m));
-  return j;
 }
 
 std::string simulated_text(const DeliveryPlan& p, double limit_s) {

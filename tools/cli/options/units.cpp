@@ -30,11 +30,11 @@ double parse(const std::string& text, const std::string& flag, const std::map<st
 
 }  // namespace
 
-std::string NumberIn::operator()(const std::string& text) const {
+std::string number_fault(const std::string& text, double least, double most) {
   std::size_t end = 0;
   const double v = leading_number(text, end);
-  if (end > 0 && end == text.size() && v >= least_ && v <= most_) return "";
-  return fmt::format("expected a number from {:g} to {:g}, found {}", least_, most_, text);
+  if (end > 0 && end == text.size() && v >= least && v <= most) return "";
+  return fmt::format("expected a number from {:g} to {:g}, found {}", least, most, text);
 }
 
 std::uint64_t parse_bytes(const std::string& text, const std::string& flag) {

@@ -1,6 +1,5 @@
 #pragma once
 #include <cstdint>
-#include <string>
 
 #include "format/base/errors.h"
 
@@ -21,15 +20,9 @@ auto as_usage(const Run& run) {
   }
 }
 
-/// A check for options: a number from `least` to `most`, and not NaN, which CLI::Range lets pass.
-class NumberIn {
- public:
-  NumberIn(double least, double most) : least_(least), most_(most) {}
-  std::string operator()(const std::string& text) const;  // "" or what is wrong
-
- private:
-  double least_, most_;
-};
+/// "" for the text of a number from `least` to `most`, which NaN is not (CLI::Range lets it pass); else what
+/// is wrong.
+std::string number_fault(const std::string& text, double least, double most);
 
 /// "500MB", "8GiB", "1234". UsageError that names the flag.
 std::uint64_t parse_bytes(const std::string& text, const std::string& flag);

@@ -1,20 +1,16 @@
 // The search behind extract --bytes. Its story:
 // 1. A Reference is made once: the package's best, S_0 with the best texels, in pictures lit as texmesh
-// render
-//    lights them. Everything is judged by FLIP against these pictures.
+// render lights them. Everything is judged by FLIP against these pictures.
 // 2. Candidates are coded meshes and coded images. Each is made when it is first asked for.
-// 3. Small windows of the pictures tell what bytes are worth: S_0 is rendered with one image coded in many
-// ways,
-//    which gives each image a curve of loss against bytes (LossCurves); every coded mesh is rendered with the
-//    best textures. Losses of mesh and textures are added up.
+// 3. Small windows of the pictures tell what bytes are worth. S_0 is rendered with one image coded in many
+// ways, which gives each image a curve of loss against bytes (LossCurves). Every coded mesh is rendered with
+// the best textures. Losses of mesh and textures are added up.
 // 4. From a likely mesh the search walks to neighbours, finer and coarser, while the sum of losses falls.
-// What a
-//    mesh leaves of the bytes is dealt out along the curves, where it takes away most loss.
+// What a mesh leaves of the bytes is dealt out along the curves, where it takes away most loss.
 // 5. The file is written and filled up to at least 98 % of the bytes (Filling).
 // 6. Sums of losses are guesses. In a small file whole pictures decide: files of other likely meshes, other
-// sizes
-//    and codings of the texture that loses most. In a large file textures may be full: then the mesh is
-//    finer.
+// sizes and codings of the texture that loses most. In a large file textures may be full: then the mesh is
+// finer.
 // 7. Last, proxies of the package are tried in its place (offer_proxies()).
 #include "tools/extract/budget/budget_search.h"
 

@@ -1,5 +1,4 @@
 #pragma once
-#include <set>
 
 #include "tools/extract/budget/filling.h"
 

@@ -1,7 +1,6 @@
 #pragma once
-#include <functional>
 
-#include "tools/extract/budget/loss_curves.h"
+#include "tools/extract/budget/candidates.h"
 
 namespace texmesh {
 

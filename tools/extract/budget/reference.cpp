@@ -1,7 +1,7 @@
 #include "tools/extract/budget/reference.h"
 
 #include "stages/base/parallel.h"
-#include "tools/extract/glb/scale_file.h"
+#include "tools/extract/glb/standalone_glb.h"
 
 namespace texmesh {
 namespace {

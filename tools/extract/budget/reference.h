@@ -1,15 +1,11 @@
 #pragma once
-#include <cstdint>
-#include <map>
-#include <memory>
-#include <vector>
 
-#include "format/base/box.h"
-#include "stages/geometry/fit_normals.h"
+#include "format/base/vec.h"
+#include "stages/geometry/scale_frames.h"
 #include "stages/measure/flip.h"
 #include "stages/render/shade.h"
-#include "tools/extract/extract.h"
 #include "tools/extract/glb/texture_source.h"
+#include "tools/render/rendered_model.h"
 
 namespace texmesh {
 

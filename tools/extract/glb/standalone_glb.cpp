@@ -2,9 +2,13 @@
 
 #include <charconv>
 
+#include "format/split/split_element_codec.h"
+#include "format/split/split_reader.h"
 #include "pipeline/about/gltf_about.h"
-#include "stages/gltf/glb_container.h"
+#include "pipeline/import/import.h"
+#include "pipeline/io/file_resolver.h"
 #include "stages/gltf/glb_writer.h"
+#include "stages/image/decode_image.h"
 
 namespace texmesh {
 namespace {
@@ -63,65 +67,45 @@ void require_valid(std::span<const std::uint8_t> glb, const std::string& entry, 
 
 }  // namespace
 
-struct StandaloneGlb::Document {
-  struct View {
-    Json json;  // without buffer, byteOffset, byteLength, except those of a fallback buffer
-    Bytes bytes;
-    bool meshopt = false;
-  };
-  Json root;
-  std::vector<View> views;
-};
-
-StandaloneGlb::StandaloneGlb(const StandaloneGlb& other)
-    : entry_(other.entry_),
-      about_(other.about_),
-      document_(std::make_unique<Document>(*other.document_)),
-      fallback_bytes_(other.fallback_bytes_),
-      level_node_(other.level_node_) {}
-StandaloneGlb::StandaloneGlb(StandaloneGlb&& other) noexcept = default;
-StandaloneGlb& StandaloneGlb::operator=(StandaloneGlb&& other) noexcept = default;
-StandaloneGlb::~StandaloneGlb() = default;
-
 StandaloneGlb::StandaloneGlb(std::span<const std::uint8_t> glb, std::string entry, GlbRules rules)
-    : entry_(std::move(entry)), document_(std::make_unique<Document>()) {
+    : entry_(std::move(entry)) {
   require_valid(glb, entry_, rules);
   GlbParts parts = read_glb(glb, entry_);
   const Bytes& binary = parts.binary;
-  document_->root = std::move(parts.root);
-  if (document_->root.contains("buffers") && document_->root["buffers"].size() > 1)
-    fallback_bytes_ = document_->root["buffers"][1].value("byteLength", std::uint64_t{0});
-  if (!document_->root.contains("bufferViews")) return;
-  for (const Json& json : document_->root["bufferViews"]) {
-    Document::View view{json, {}, json.contains("extensions") && json["extensions"].contains(kMeshopt)};
+  root_ = std::move(parts.root);
+  if (root_.contains("buffers") && root_["buffers"].size() > 1)
+    fallback_bytes_ = root_["buffers"][1].value("byteLength", std::uint64_t{0});
+  if (!root_.contains("bufferViews")) return;
+  for (const Json& json : root_["bufferViews"]) {
+    View view{json, {}, json.contains("extensions") && json["extensions"].contains(kMeshopt)};
     const Json& place = view.meshopt ? json["extensions"][kMeshopt] : json;
     const std::size_t offset = number(place, "byteOffset"), bytes = number(place, "byteLength");
     if (offset > binary.size() || bytes > binary.size() - offset)
       throw FormatError(entry_, "/bufferViews", "views within the binary chunk", "one beyond it");
     view.bytes.assign(binary.begin() + static_cast<std::ptrdiff_t>(offset),
                       binary.begin() + static_cast<std::ptrdiff_t>(offset + bytes));
-    document_->views.push_back(std::move(view));
+    views_.push_back(std::move(view));
   }
 }
 
 std::size_t StandaloneGlb::add_view(Bytes bytes) {
-  document_->views.push_back({Json::object(), std::move(bytes), false});
-  return document_->views.size() - 1;
+  views_.push_back({Json::object(), std::move(bytes), false});
+  return views_.size() - 1;
 }
 
 void StandaloneGlb::use_extension(const std::string& name, bool required) {
   for (const char* list : {"extensionsUsed", "extensionsRequired"}) {
     if (list == std::string("extensionsRequired") && !required) continue;
-    Json names = document_->root.value(list, Json::array());
+    Json names = root_.value(list, Json::array());
     if (std::find(names.begin(), names.end(), Json(name)) == names.end()) names.push_back(name);
-    document_->root[list] = names;
+    root_[list] = names;
   }
 }
 
 std::vector<std::uint32_t> StandaloneGlb::source_images() const {
   std::vector<std::uint32_t> out;
-  if (!document_->root.contains("images")) return out;
-  for (const Json& image : document_->root["images"]) {
+  if (!root_.contains("images")) return out;
+  for (const Json& image : root_["images"]) {
     std::uint32_t number = 0;
     if (source_image_of(image, number)) out.push_back(number);
   }
@@ -130,18 +114,18 @@ std::vector<std::uint32_t> StandaloneGlb::source_images() const {
 
 std::map<std::uint32_t, FileImageData> StandaloneGlb::images() const {
   std::map<std::uint32_t, FileImageData> out;
-  for (const Json& image : document_->root.value("images", Json::array())) {
+  for (const Json& image : root_.value("images", Json::array())) {
     std::uint32_t source = 0;
     if (!source_image_of(image, source) || !image.contains("bufferView")) continue;
     const FileImage format = image.value("mimeType", "") == "image/png" ? FileImage::kPng : FileImage::kJpeg;
-    out[source] = {format, document_->views.at(number(image, "bufferView")).bytes};
+    out[source] = {format, views_.at(number(image, "bufferView")).bytes};
   }
   return out;
 }
 
 MeshCodec StandaloneGlb::codec() const {
   const auto uses = [&](const char* name) {
-    const Json used = document_->root.value("extensionsUsed", Json::array());
+    const Json used = root_.value("extensionsUsed", Json::array());
     return std::find(used.begin(), used.end(), Json(name)) != used.end();
   };
   if (uses(kDraco)) return MeshCodec::kDraco;
@@ -150,10 +134,10 @@ MeshCodec StandaloneGlb::codec() const {
 }
 
 void StandaloneGlb::set_images(const std::map<std::uint32_t, FileImageData>& images) {
-  if (!document_->root.contains("images")) return;
-  std::vector<bool> webp(document_->root["images"].size());
+  if (!root_.contains("images")) return;
+  std::vector<bool> webp(root_["images"].size());
   for (std::size_t k = 0; k < webp.size(); ++k) {
-    Json& image = document_->root["images"][k];
+    Json& image = root_["images"][k];
     std::uint32_t source = 0;
     const auto found = source_image_of(image, source) ? images.find(source) : images.end();
     if (found != images.end()) {
@@ -163,8 +147,8 @@ void StandaloneGlb::set_images(const std::map<std::uint32_t, FileImageData>& ima
     }
     webp[k] = image.value("mimeType", "") == "image/webp";
   }
-  if (document_->root.contains("textures"))
-    for (Json& texture : document_->root["textures"]) {
+  if (root_.contains("textures"))
+    for (Json& texture : root_["textures"]) {
       std::size_t image = number(texture, "source");
       if (texture.contains("extensions") && texture["extensions"].contains(kWebp))
         image = number(texture["extensions"][kWebp], "source");
@@ -177,26 +161,24 @@ void StandaloneGlb::set_images(const std::map<std::uint32_t, FileImageData>& ima
         texture["source"] = image;
       if (texture.contains("extensions") && texture["extensions"].empty()) texture.erase("extensions");
     }
-  forget_extension(document_->root, kWebp);
+  forget_extension(root_, kWebp);
   if (std::find(webp.begin(), webp.end(), true) != webp.end()) use_extension(kWebp, true);
 }
 
-bool StandaloneGlb::has_draco() const { return codec() == MeshCodec::kDraco; }
-
 void StandaloneGlb::recode(const DracoSteps& steps, const NormalSamples* lit_as, const RunContext& context) {
   std::vector<DracoStream> streams;
-  for_each_primitive(document_->root, [&](Json& primitive) {
+  for_each_primitive(root_, [&](Json& primitive) {
     const Json* draco = draco_of(primitive);
     if (!draco) return;
     DracoStream s;
-    s.bytes = document_->views.at(number(*draco, "bufferView")).bytes;
+    s.bytes = views_.at(number(*draco, "bufferView")).bytes;
     for (const auto& [name, id] : (*draco)["attributes"].items()) s.attributes[name] = id.get<int>();
     streams.push_back(std::move(s));
   });
   if (streams.empty()) return;
   recode_draco(streams, steps, lit_as, entry_, context);
   std::size_t next = 0;
-  for_each_primitive(document_->root, [&](Json& primitive) {
+  for_each_primitive(root_, [&](Json& primitive) {
     Json* draco = draco_of(primitive);
     if (!draco) return;
     DracoStream& s = streams[next++];
@@ -204,36 +186,35 @@ void StandaloneGlb::recode(const DracoSteps& steps, const NormalSamples* lit_as,
     (*draco)["bufferView"] = add_view(std::move(s.bytes));
     for (const auto& [name, id] : s.attributes) (*draco)["attributes"][name] = id;
     for (const auto& [name, accessor] : primitive["attributes"].items()) {
-      Json& a = document_->root["accessors"].at(accessor.get<std::size_t>());
+      Json& a = root_["accessors"].at(accessor.get<std::size_t>());
       a["count"] = s.vertices;
       if (name == "POSITION") a["min"] = GlbWriter::shortest(s.low), a["max"] = GlbWriter::shortest(s.high);
     }
-    Json& indices = document_->root["accessors"].at(number(primitive, "indices"));
+    Json& indices = root_["accessors"].at(number(primitive, "indices"));
     indices["count"] = std::size_t{s.triangles} * 3;
     indices["componentType"] = s.vertices > 65535 ? 5125 : 5123;
   });
 }
 
 void StandaloneGlb::begin_levels(double screen_coverage) {
-  const std::size_t scene = number(document_->root, "scene");
-  Json& nodes = document_->root["scenes"].at(scene)["nodes"];
+  const std::size_t scene = number(root_, "scene");
+  Json& nodes = root_["scenes"].at(scene)["nodes"];
   Json parent{{"name", "level 0"}, {"children", nodes}};
   parent["extensions"][kLod]["ids"] = Json::array();
   parent["extras"]["MSFT_screencoverage"] = Json::array({screen_coverage});
-  level_node_ = document_->root["nodes"].size();
-  document_->root["nodes"].push_back(parent);
+  level_node_ = root_["nodes"].size();
+  root_["nodes"].push_back(parent);
   nodes = Json::array({level_node_});
   use_extension(kLod, false);
 }
 
 std::size_t StandaloneGlb::append_meshes(StandaloneGlb& other) {
-  Json& from = other.document_->root;
-  Json& to = document_->root;
-  const std::size_t view = document_->views.size(), accessor = to["accessors"].size(),
-                    mesh = to["meshes"].size();
-  for (Document::View& v : other.document_->views) {
+  Json& from = other.root_;
+  Json& to = root_;
+  const std::size_t view = views_.size(), accessor = to["accessors"].size(), mesh = to["meshes"].size();
+  for (View& v : other.views_) {
     if (v.meshopt) v.json["byteOffset"] = number(v.json, "byteOffset") + fallback_bytes_;
-    document_->views.push_back(std::move(v));
+    views_.push_back(std::move(v));
   }
   fallback_bytes_ += (other.fallback_bytes_ + 3) / 4 * 4;
   for (const char* list : {"accessors", "meshes"})
@@ -251,11 +232,11 @@ std::size_t StandaloneGlb::append_meshes(StandaloneGlb& other) {
 }
 
 void StandaloneGlb::take_meshes(StandaloneGlb other) {
-  Json& root = document_->root;
+  Json& root = root_;
   root["accessors"] = root["meshes"] = Json::array();
   fallback_bytes_ = 0;
   append_meshes(other);
-  const Json& theirs = other.document_->root["nodes"];
+  const Json& theirs = other.root_["nodes"];
   if (theirs.size() > root["nodes"].size())
     throw FormatError(entry_, "/nodes", std::to_string(theirs.size()) + " parts of " + other.entry_,
                       std::to_string(root["nodes"].size()));
@@ -270,58 +251,57 @@ void StandaloneGlb::take_meshes(StandaloneGlb other) {
 
 void StandaloneGlb::add_level(StandaloneGlb coarser, double screen_coverage) {
   for (const char* shared : {"materials", "textures", "samplers"})
-    if (document_->root.value(shared, Json::array()) != coarser.document_->root.value(shared, Json::array()))
+    if (root_.value(shared, Json::array()) != coarser.root_.value(shared, Json::array()))
       throw FormatError(coarser.entry_, std::string("/") + shared, "those of " + entry_, "others");
-  const std::size_t node = document_->root["nodes"].size(), mesh = append_meshes(coarser);
-  for (Json& n : coarser.document_->root["nodes"]) {
+  const std::size_t node = root_["nodes"].size(), mesh = append_meshes(coarser);
+  for (Json& n : coarser.root_["nodes"]) {
     if (n.contains("mesh")) n["mesh"] = number(n, "mesh") + mesh;
     if (n.contains("children"))
       for (Json& child : n["children"]) child = child.get<std::size_t>() + node;
-    document_->root["nodes"].push_back(std::move(n));
+    root_["nodes"].push_back(std::move(n));
   }
   Json children = Json::array();
-  for (const Json& child :
-       coarser.document_->root["scenes"].at(number(coarser.document_->root, "scene"))["nodes"])
+  for (const Json& child : coarser.root_["scenes"].at(number(coarser.root_, "scene"))["nodes"])
     children.push_back(child.get<std::size_t>() + node);
-  Json& ids = document_->root["nodes"][level_node_]["extensions"][kLod]["ids"];
+  Json& ids = root_["nodes"][level_node_]["extensions"][kLod]["ids"];
   Json level{{"name", "level " + std::to_string(ids.size() + 1)}, {"children", children}};
-  ids.push_back(document_->root["nodes"].size());
-  document_->root["nodes"][level_node_]["extras"]["MSFT_screencoverage"].push_back(screen_coverage);
-  document_->root["nodes"].push_back(level);
+  ids.push_back(root_["nodes"].size());
+  root_["nodes"][level_node_]["extras"]["MSFT_screencoverage"].push_back(screen_coverage);
+  root_["nodes"].push_back(level);
 }
 
 void StandaloneGlb::move_to(Vec3d translation, double scale) {
   if (translation == Vec3d{} && scale == 1) return;
-  const std::size_t scene = number(document_->root, "scene");
-  Json& nodes = document_->root["scenes"].at(scene)["nodes"];
+  const std::size_t scene = number(root_, "scene");
+  Json& nodes = root_["scenes"].at(scene)["nodes"];
   const Vec3d to = translation * scale;
   Json parent{{"name", "origin"}, {"translation", {to.x, to.y, to.z}}};
   if (scale != 1) parent["scale"] = {scale, scale, scale};
   parent["children"] = nodes;
-  nodes = Json::array({document_->root["nodes"].size()});
-  document_->root["nodes"].push_back(parent);
+  nodes = Json::array({root_["nodes"].size()});
+  root_["nodes"].push_back(parent);
 }
 
 void StandaloneGlb::set_about(const About& about) { about_ = std::make_shared<const About>(about); }
 
 Bytes StandaloneGlb::finish() const {
-  Json root = document_->root;
+  Json root = root_;
   root.erase("bufferViews");
   root.erase("buffers");
-  std::vector<std::int64_t> place(document_->views.size(), -1);
+  std::vector<std::int64_t> place(views_.size(), -1);
   for_each_key(root, "bufferView", [&](Json& view) { place.at(view.get<std::size_t>()) = 0; });
   Bytes binary;
   Json views = Json::array();
-  for (std::size_t k = 0; k < document_->views.size(); ++k) {
+  for (std::size_t k = 0; k < views_.size(); ++k) {
     if (place[k] < 0) continue;
     place[k] = static_cast<std::int64_t>(views.size());
     pad_to_four(binary, 0);
-    Json json = document_->views[k].json;
-    Json& at = document_->views[k].meshopt ? json["extensions"][kMeshopt] : json;
+    Json json = views_[k].json;
+    Json& at = views_[k].meshopt ? json["extensions"][kMeshopt] : json;
     at["buffer"] = 0;
     at["byteOffset"] = binary.size();
-    at["byteLength"] = document_->views[k].bytes.size();
-    binary.insert(binary.end(), document_->views[k].bytes.begin(), document_->views[k].bytes.end());
+    at["byteLength"] = views_[k].bytes.size();
+    binary.insert(binary.end(), views_[k].bytes.begin(), views_[k].bytes.end());
     views.push_back(std::move(json));
   }
   for_each_key(root, "bufferView",
@@ -335,6 +315,187 @@ Bytes StandaloneGlb::finish() const {
 
   if (about_) write_gltf_about(*about_, root);  // last: values of strangers must not be taken for indices
   return glb_container(root.dump(-1, ' ', false, Json::error_handler_t::replace), binary);
+}
+
+namespace {
+
+StandaloneGlb stored_file(PackageReader& package, int scale) {
+  return {package.scale_glb(scale), mesh_path(scale)};
+}
+
+/// The mesh that the stream has at a scale.
+Mesh mesh_at(SplitStreamReader& reader, int scale, std::span<const std::uint8_t> stream) {
+  const auto& scales = reader.head().scales;
+  const auto found = std::ranges::find(scales, scale, &SplitScale::scale);
+  if (found == scales.end())
+    throw FormatError(kSplitStreamPath, "scales", "scale " + std::to_string(scale), "none");
+  reader.read_to_scale(static_cast<std::size_t>(found - scales.begin()), stream);
+  return split_model(reader.head(), reader.mesh());
+}
+
+void fit_to_finest(const Mesh& finest, Mesh& mesh, const RunContext& context) {
+  if (mesh.normals.empty()) return;
+  std::vector<Vec3d> points;
+  for (const std::uint32_t p : mesh.wedge_position) points.push_back(to_double(mesh.positions[p]));
+  mesh.normals =
+      fit_normals(points, mesh.triangles, std::move(mesh.normals), normal_samples(finest), context);
+}
+
+}  // namespace
+
+StandaloneGlb scale_file(PackageReader& package, int scale, const RunContext& context,
+                         StreamedNormals normals) {
+  const Manifest& m = package.manifest();
+  const ManifestScale& wanted = m.scales[package.scale_index(scale)];
+  const int coarsest = m.scales.back().scale;
+  StandaloneGlb first = stored_file(package, coarsest);
+  if (scale == coarsest) return first;
+  if (wanted.has_glb()) {
+    StandaloneGlb file = stored_file(package, scale);
+    file.set_images(first.images());
+    return file;
+  }
+  const bool fitted = normals == StreamedNormals::kFitted;
+  const Bytes stream = fitted ? package.entry(kSplitStreamPath) : package.split_prefix(scale);
+  SplitStreamReader reader(read_split_head(stream));
+  Mesh mesh = mesh_at(reader, scale, stream);
+  if (fitted) fit_to_finest(mesh_at(reader, 0, stream), mesh, context);
+  ScalesOptions options;
+  options.mesh_codec = first.codec();
+  first.take_meshes({write_streamed_scale(mesh, reader.head(), options), mesh_path(scale)});
+  return first;
+}
+
+Model read_model(StandaloneGlb file, const std::string& entry, const RunContext& context) {
+  std::map<std::uint32_t, FileImageData> images;
+  for (const std::uint32_t i : file.source_images()) {
+    const auto byte = [i](int shift) { return static_cast<std::uint8_t>(i >> shift); };
+    images[i] = {FileImage::kPng, encode_image({1, 1, 3, {byte(0), byte(8), byte(16)}}, {FileImage::kPng})};
+  }
+  file.set_images(images);
+  NoFiles none;
+  return import_package_glb(entry, file.finish(), none, context).model;
+}
+
+std::string image_name(std::uint32_t image) { return std::to_string(image); }
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+constexpr const char* kTransform = "KHR_texture_transform";
+
+/// Calls f with every reference to a texture of a material, extensions' among them.
+template <class F>
+void for_each_reference(Json& value, const F& f) {
+  if (!value.is_object()) return;
+  for (auto& [key, member] : value.items()) {
+    if (key.ends_with("Texture") && member.is_object() && member.contains("index")) f(member);
+    for_each_reference(member, f);
+  }
+}
+
+Json transform_of(const Json& reference) {
+  if (!reference.contains("extensions") || !reference["extensions"].contains(kTransform)) return nullptr;
+  return reference["extensions"][kTransform];
+}
+
+}  // namespace
+
+bool bake_texture_scale(Json& root, Mesh& mesh) {
+  if (!root.contains("materials")) return true;
+  std::vector<Json> found;
+  for (Json& material : root["materials"])
+    for_each_reference(material, [&](Json& reference) { found.push_back(transform_of(reference)); });
+  if (found.empty() || found.front().is_null()) return std::ranges::all_of(found, &Json::is_null);
+  const Json first = found.front();
+  if (std::ranges::any_of(found, [&](const Json& t) { return t != first; }) || first.size() != 1 ||
+      !first.contains("scale") || !mesh.uv1.empty())
+    return false;
+  const Vec2f scale{first["scale"].at(0).get<float>(), first["scale"].at(1).get<float>()};
+  for (Vec2f& uv : mesh.uv0) uv = {uv.x * scale.x, uv.y * scale.y};
+  for (Json& material : root["materials"])
+    for_each_reference(material, [&](Json& reference) {
+      reference["extensions"].erase(kTransform);
+      if (reference["extensions"].empty()) reference.erase("extensions");
+    });
+  return true;
+}
+
+Bytes image_bytes(const GlbParts& parts, const Json& image) {
+  const Json& view = parts.root["bufferViews"].at(image.at("bufferView").get<std::size_t>());
+  const auto first =
+      parts.binary.begin() + static_cast<std::ptrdiff_t>(view.value("byteOffset", std::size_t{0}));
+  return {first, first + view["byteLength"].get<std::ptrdiff_t>()};
+}
+
+std::size_t add_view(GlbParts& to, const Bytes& bytes) {
+  pad_to_four(to.binary, 0);
+  to.root["bufferViews"].push_back(
+      {{"buffer", 0}, {"byteOffset", to.binary.size()}, {"byteLength", bytes.size()}});
+  to.binary.insert(to.binary.end(), bytes.begin(), bytes.end());
+  return to.root["bufferViews"].size() - 1;
+}
+
+namespace {
+
+/// The materials that triangles have, as import counts them.
+std::vector<std::size_t> used_materials(const Json& root) {
+  std::set<std::size_t> used;
+  for (const Json& mesh : root["meshes"])
+    for (const Json& p : mesh["primitives"])
+      if (p.contains("material")) used.insert(p["material"].get<std::size_t>());
+  return {used.begin(), used.end()};
+}
+
+/// The image of `from` as a view of `to`; WebP becomes PNG.
+Json moved_image(Json image, const GlbParts& from, GlbParts& to) {
+  Bytes bytes = image_bytes(from, image);
+  if (image.value("mimeType", "") == "image/webp") {
+    bytes = encode_image(decode_image(probe_image("image", std::move(bytes), {})), {FileImage::kPng});
+    image["mimeType"] = "image/png";
+  }
+  image["bufferView"] = add_view(to, bytes);
+  return image;
+}
+
+}  // namespace
+
+StandaloneGlb plain_file(const StandaloneGlb& file, const std::string& entry, const RunContext& context) {
+  GlbParts from = read_glb(file.finish(), entry);
+  Mesh flat = read_model(file, entry, context).mesh;
+  const bool baked = bake_texture_scale(from.root, flat);
+  ScalesOptions options;
+  options.mesh_codec = MeshCodec::kNone;
+  GlbParts to = read_glb(write_streamed_scale(flat, SplitStreamHead{}, options), entry);
+  const std::vector<std::size_t> materials = used_materials(from.root);
+  for (Json& mesh : to.root["meshes"])
+    for (Json& p : mesh["primitives"])
+      if (!materials.empty()) p["material"] = materials.at(p.value("material", std::size_t{0}));
+  Json root = from.root;
+  for (const char* list : {"meshes", "accessors", "bufferViews"}) root[list] = to.root[list];
+  std::size_t part = 0;  // nodes with meshes, in the order in which import makes parts of them
+  for (Json& node : root["nodes"]) {
+    for (const char* key : {"scale", "rotation", "matrix", "translation"}) node.erase(key);
+    if (node.contains("mesh")) node["mesh"] = to.root["nodes"].at(part++).at("mesh");
+  }
+  for (const char* list : {"images", "textures"})
+    if (!root.contains(list)) root[list] = Json::array();
+  for (Json& image : root["images"]) image = moved_image(image, from, to);
+  root["bufferViews"] = to.root["bufferViews"];
+  for (Json& texture : root["textures"]) {
+    if (!texture.contains("extensions")) continue;
+    texture["source"] = texture["extensions"]["EXT_texture_webp"]["source"];
+    texture.erase("extensions");
+  }
+  for (const char* extension : {"KHR_draco_mesh_compression", "EXT_meshopt_compression",
+                                "KHR_mesh_quantization", "EXT_texture_webp", "EXT_mesh_features"})
+    forget_extension(root, extension);
+  if (baked) forget_extension(root, "KHR_texture_transform");
+  for (const char* list : {"images", "textures"})
+    if (root[list].empty()) root.erase(list);
+  pad_to_four(to.binary, 0);
+  root["buffers"] = Json::array({{{"byteLength", to.binary.size()}}});
+  return {glb_container(root.dump(), to.binary), entry};
 }
 
 }  // namespace texmesh

@@ -1,10 +1,10 @@
 #pragma once
 
-#include "format/documents/about.h"
 #include "stages/gltf/check_glb.h"
 #include "stages/gltf/draco_mesh.h"
+#include "stages/gltf/glb_container.h"
 #include "stages/scales/scales.h"
-#include "tools/extract/glb/image_codecs.h"
+#include "tools/extract/glb/texture_source.h"
 
 namespace texmesh {
 
@@ -15,11 +15,6 @@ class StandaloneGlb {
   /// Checks the whole file first (check_glb.h), by the rules of a package's meshes; those of a standalone
   /// file are a proxy's. `entry` is for messages. FormatError.
   StandaloneGlb(std::span<const std::uint8_t> glb, std::string entry, GlbRules rules = GlbRules::kPackage);
-  StandaloneGlb(const StandaloneGlb& other);
-  StandaloneGlb(StandaloneGlb&& other) noexcept;
-  StandaloneGlb& operator=(const StandaloneGlb&) = delete;
-  StandaloneGlb& operator=(StandaloneGlb&& other) noexcept;
-  ~StandaloneGlb();
 
   /// Source images that the file's images stand for ("texture/<number>"), in the file's order.
   std::vector<std::uint32_t> source_images() const;
@@ -34,7 +29,7 @@ class StandaloneGlb {
   void take_meshes(StandaloneGlb other);
   /// Codes Draco streams anew, see recode_draco(); other codecs stay as they are.
   void recode(const DracoSteps& steps, const NormalSamples* lit_as, const RunContext& context);
-  bool has_draco() const;
+  bool has_draco() const { return codec() == MeshCodec::kDraco; }
 
   /// Makes the nodes of the scene the children of one node, the first level of detail.
   /// Once, before add_level().
@@ -56,16 +51,55 @@ class StandaloneGlb {
   std::vector<std::uint8_t> finish() const;
 
  private:
-  struct Document;
+  struct View {
+    nlohmann::ordered_json json;  // without buffer, byteOffset, byteLength, except those of a fallback buffer
+    std::vector<std::uint8_t> bytes;
+    bool meshopt = false;
+  };
   std::size_t add_view(std::vector<std::uint8_t> bytes);
   /// Appends views, accessors and meshes; gives the index of the first mesh.
   std::size_t append_meshes(StandaloneGlb& other);
   void use_extension(const std::string& name, bool required);
   std::string entry_;
   std::shared_ptr<const About> about_;
-  std::unique_ptr<Document> document_;
+  nlohmann::ordered_json root_;
+  std::vector<View> views_;
   std::uint64_t fallback_bytes_ = 0;
   std::size_t level_node_ = 0;
 };
+
+/// The normals of a scale that the vertex-split stream alone has. kFitted: so that it is lit as S_0 is, which
+/// takes the whole stream. kStreamed: S_0's, as the stream's prefix of the scale has them.
+enum class StreamedNormals : std::uint8_t { kFitted, kStreamed };
+
+/// A scale as one file with the previews in it, wherever the package has the scale. A scale of the stream
+/// gets materials, images and node names of the coarsest scale's GLB, and that file's mesh codec. InputError
+/// for a scale that is not there; FormatError when the package is damaged. Same result for any thread count.
+StandaloneGlb scale_file(PackageReader& package, int scale, const RunContext& context,
+                         StreamedNormals normals = StreamedNormals::kFitted);
+
+/// The mesh and materials of a file. Its images become single texels, all different (import makes equal ones
+/// one), named by image_name() of their source image.
+Model read_model(StandaloneGlb file, const std::string& entry, const RunContext& context);
+
+/// As import names "texture/<image>": without the folder.
+std::string image_name(std::uint32_t image);
+
+/// The bytes of an image that is within a GLB.
+Bytes image_bytes(const GlbParts& parts, const nlohmann::ordered_json& image);
+/// Appends bytes to the binary chunk; gives the index of their view.
+std::size_t add_view(GlbParts& to, const Bytes& bytes);
+
+/// Multiplies the mesh's texture coordinates by the scale that KHR_texture_transform gives all textures of
+/// the materials, and takes the extension out of the document, whose `mesh` this is. False, and nothing
+/// changes, where textures differ, or where there is more than a scale.
+bool bake_texture_scale(nlohmann::ordered_json& root, Mesh& mesh);
+
+/// The same model for programs that know glTF 2.0 and no extension of it that compresses: floats instead of
+/// KHR_draco_mesh_compression, EXT_meshopt_compression and KHR_mesh_quantization, PNG instead of WebP,
+/// no KHR_texture_transform where it is one scale. Parts
+/// and materials stay; tangents go, and the feature ids of merged parts. Of a file without levels of detail
+/// and before move_to(). Same bytes for any thread count.
+StandaloneGlb plain_file(const StandaloneGlb& file, const std::string& entry, const RunContext& context);
 
 }  // namespace texmesh

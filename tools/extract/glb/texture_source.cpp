@@ -1,10 +1,13 @@
 #include "tools/extract/glb/texture_source.h"
 
-#include "delivery/cpp/package/plane_streams.h"
+#include "delivery/cpp/package/package_reader.h"
 #include "stages/fill/fill.h"
 #include "stages/geometry/texel_coverage.h"
-#include "tools/extract/glb/scale_file.h"
-#include "tools/render/plane_pixels.h"
+#include "stages/image/png_writer.h"
+#include "stages/image/webp.h"
+#include "stages/jpeg/jpeg_coder.h"
+#include "tools/extract/glb/standalone_glb.h"
+#include "tools/render/rendered_model.h"
 
 namespace texmesh {
 namespace {
@@ -183,6 +186,15 @@ Pixels with_alpha(const Pixels& colours, const Pixels& alpha) {
   return out;
 }
 
+Pixels with_alpha_of(const PackageImage& image, const Pixels& colours, const Pixels& alpha) {
+  const std::uint32_t width = std::min(colours.width_px, alpha.width_px),
+                      height = std::min(colours.height_px, alpha.height_px);
+  const auto fitted = [&](const Pixels& p, Averaging kind) {
+    return reduced(p, p.width_px, p.height_px, width, height, kind);
+  };
+  return with_alpha(fitted(colours, image.averaging()), fitted(alpha, Averaging::kNumbers));
+}
+
 std::vector<std::uint8_t> shown_texels(const Mesh& mesh, const Model& model, std::uint32_t image,
                                        std::uint32_t width_px, std::uint32_t height_px) {
   TexelCoverage coverage(width_px, height_px, Wrap::kRepeat, Wrap::kRepeat);
@@ -198,6 +210,44 @@ std::vector<std::uint8_t> shown_texels(const Mesh& mesh, const Model& model, std
   const auto twice = [](std::uint32_t side_px) { return 2.0 * side_px; };
   if (!known) coverage.add({Vec2d{0, 0}, Vec2d{twice(width_px), 0}, Vec2d{0, twice(height_px)}});
   return coverage.release_bits();
+}
+
+namespace {
+
+std::vector<std::uint8_t> encode_jpeg_file(const Pixels& pixels, const ImageCoding& coding) {
+  JpegKind kind;
+  kind.channels = pixels.channels;
+  kind.rgb = coding.data && pixels.channels == 3;
+  kind.subsampling = coding.full_chroma ? Subsampling::k444 : Subsampling::k420;
+  kind.file = FileSteps{coding.quality, coding.full_chroma};
+  return JpegCoder(kind).complete({pixels.data.data(), std::size_t{pixels.width_px} * pixels.channels,
+                                   pixels.width_px, pixels.height_px});
+}
+
+std::vector<std::uint8_t> encode_webp_file(const Pixels& pixels, const ImageCoding& coding) {
+  WebpOptions options;
+  options.method = coding.quick ? 3 : 6;
+  options.quality = static_cast<float>(std::clamp(coding.quality, 0.0, 100.0));
+  options.alpha_quality = 90;
+  options.sharp_chroma = true;
+  return encode_webp(pixels, options);
+}
+
+}  // namespace
+
+const char* mime_type_of(FileImage format) {
+  if (format == FileImage::kWebp) return "image/webp";
+  return format == FileImage::kPng ? "image/png" : "image/jpeg";
+}
+
+std::vector<std::uint8_t> encode_image(const Pixels& pixels, const ImageCoding& coding) {
+  if (pixels.width_px == 0 || pixels.height_px == 0 ||
+      pixels.data.size() != std::size_t{pixels.width_px} * pixels.height_px * pixels.channels)
+    throw StageError("extract", "image", "pixels as many as width and height say",
+                     std::to_string(pixels.data.size()));
+  if (coding.format == FileImage::kPng) return write_png(pixels);
+  return coding.format == FileImage::kWebp ? encode_webp_file(pixels, coding)
+                                           : encode_jpeg_file(pixels, coding);
 }
 
 }  // namespace texmesh

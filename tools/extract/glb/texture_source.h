@@ -1,10 +1,9 @@
 #pragma once
-#include <map>
 
-#include "delivery/cpp/package/package_reader.h"
 #include "format/model/model.h"
 #include "stages/image/resize.h"
 #include "stages/jpeg/source_jpeg.h"
+#include "tools/extract/extract.h"
 
 namespace texmesh {
 
@@ -65,10 +64,36 @@ JoinedJpeg joined_plane(PackageReader& package, std::uint32_t plane, std::size_t
 /// Colours and alpha as one image of 4 channels; both of one size.
 Pixels with_alpha(const Pixels& colours, const Pixels& alpha);
 
+/// The planes of an image as one picture, as large as the smaller of the two.
+Pixels with_alpha_of(const PackageImage& image, const Pixels& colours, const Pixels& alpha);
+
 /// The texels of source image `image`, in a size of `width_px` x `height_px`, that a mesh shows with the
 /// model's materials, as TexturePlane::coverage. The model's images are named as read_model() names them. All
 /// texels of an image that no material shows by one of the first two sets of coordinates.
 std::vector<std::uint8_t> shown_texels(const Mesh& mesh, const Model& model, std::uint32_t image,
                                        std::uint32_t width_px, std::uint32_t height_px);
+
+/// An image as a file holds it.
+struct FileImageData {
+  FileImage format = FileImage::kJpeg;
+  std::vector<std::uint8_t> bytes;
+};
+
+/// "image/jpeg", "image/webp", "image/png".
+const char* mime_type_of(FileImage format);
+
+/// How an image of a standalone file is coded.
+struct ImageCoding {
+  FileImage format = FileImage::kJpeg;
+  double quality = 75;  // JPEG 1..100, WebP 0..100; no meaning for PNG
+  bool data = false;    // numbers (normals, roughness ..) instead of colours: JPEGs keep their channels apart
+  bool quick = false;   // WebP: a third of the time for some percent more bytes, for searches
+  bool full_chroma = false;  // JPEG: colours 4:4:4, with tables for textures
+};
+
+/// A complete image file of 1, 3 or 4 channels (grey becomes RGB in a WebP; 4 channels are for PNG and WebP
+/// alone). JPEG: progressive, with Huffman tables of its own, colours 4:2:0 or 4:4:4. WebP: lossy, with alpha
+/// coded nearly without loss. Same bytes for same input. StageError for what the format cannot hold.
+std::vector<std::uint8_t> encode_image(const Pixels& pixels, const ImageCoding& coding);
 
 }  // namespace texmesh

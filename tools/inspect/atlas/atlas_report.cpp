@@ -10,110 +10,9 @@
 #include "stages/base/parallel.h"
 #include "stages/image/decode_image.h"
 #include "tools/inspect/package_mesh.h"
-#include "tools/render/plane_pixels.h"
 #include "tools/render/rendered_model.h"
 
 namespace texmesh {
-
-constexpr Range kShare{0, 1}, kPositive{0, 1e300};
-
-template <>
-struct RecordFields<SurfacePercentiles> {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
-    v("p5", s.p5, kPositive, "");
-    v("p50", s.p50, kPositive, "");
-    v("p95", s.p95, kPositive, "");
-    v("p99", s.p99, kPositive, "");
-  }
-};
-
-template <>
-struct RecordFields<SeamColours> {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
-    v("mean", s.mean, kPositive, "");
-    v("p95", s.p95, kPositive, "");
-    v("inside", s.inside, kPositive, "from the seam to one texel further in, in the mean");
-  }
-};
-
-template <>
-struct RecordFields<NamedAtlas> {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
-    v("image", s.image,
-      "index into the model's images, unused ones left out; of a package's S_0, into that file's");
-    v("name", s.name, "as messages call the texture");
-    v("width_px", s.width_px, Range{1, 4294967295.0}, "");
-    v("height_px", s.height_px, Range{1, 4294967295.0}, "");
-    v("materials", s.materials, "whose base-colour texture (without one, first texture) it is");
-    v("triangles", s.triangles, "");
-    v("charts", s.charts, "");
-    v("small_charts", s.small_charts, "of at most 8 triangles");
-    v("thin_charts", s.thin_charts, "thinner than 8 texels");
-    v("mirrored_charts", s.mirrored_charts, "");
-    v("largest_chart", s.largest_chart, kShare, "share of the charts' texels");
-    v("cover", s.cover, kShare, "texels that the surface shows, of all");
-    v("thin", s.thin_share, kShare, "of the charts' texels, those of thin charts");
-    v("overlap", s.overlap, kShare, "of the shown texels, those that two places show");
-    v("density", s.density, "texels per object unit, over the surface");
-    v("density_spread", s.density_spread(), kPositive, "p95 over p5 of density");
-    v("stretch", s.stretch, "longer over shorter axis of a circle of the surface on the texture");
-    v("flat_triangles", s.flat_triangles, "without area on the texture");
-    v("flat_surface", s.flat_surface, kShare, "their share of the surface");
-    v("folded_triangles", s.folded_triangles, "");
-    v("far_triangles", s.far_triangles, "");
-    v("edges", s.edges, "");
-    v("seam_edges", s.seam_edges, "");
-    v("positions", s.positions, "");
-    v("vertices", s.vertices, "positions with different texture coordinates apart");
-    v("triangle_floor", s.triangle_floor,
-      "fewest triangles of a mesh that keeps every chart beside its neighbours");
-    v("seam_colours", OrNull<SeamColours>{s.seam_colours},
-      "CIE 1976 differences across seams; null = not compared");
-  }
-};
-
-template <>
-struct RecordFields<AtlasAdvice> {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
-    v("code", s.code, FieldRule{.words = "charts|thin|cover|overlap|seams|density|stretch|flat|folded|far"},
-      "");
-    v("atlas", s.atlas, "the texture's name; empty = the model as a whole");
-    v("found", s.found, "");
-    v("remedy", s.remedy, "");
-  }
-};
-
-template <>
-struct RecordFields<AtlasDiagnosis> {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
-    v("version", Constant{1}, "");
-    v("triangles", s.triangles, "");
-    v("untextured_triangles", s.untextured_triangles, "");
-    v("charts", s.charts(), "");
-    v("triangle_floor", s.triangle_floor(), "");
-    v("floor_bytes", s.floor_bytes(), "about what a mesh of so many triangles takes");
-    v("nothing", s.nothing, "why there is no atlas; empty = there is one");
-    v("atlases", s.atlases, "");
-    v("advice", s.advice, "");
-  }
-};
-
-template <>
-struct RecordFields<DoctorReport> {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
-    v("input", s.input, "file name, no folder");
-    RecordFields<AtlasDiagnosis>::fields(s.diagnosis, v);
-    v("good", s.reasons.empty(), "every limit is kept");
-    v("reasons", s.reasons, "the limits that are not");
-  }
-};
-
 namespace {
 
 /// By image, whether some material has it as base colour. Other textures' seams say nothing: normals of two
@@ -152,126 +51,112 @@ constexpr double kJustSeen = 2.3;
 
 std::string percents(double share) { return fixed(100 * share, share < 0.0995 ? 1 : 0) + " %"; }
 
-AtlasAdvice about_charts(const AtlasDiagnosis& d) {
+using AdviceList = std::vector<AtlasAdvice>;
+
+void advise_on_charts(const AtlasDiagnosis& d, AdviceList& out) {
   std::uint64_t small = 0;
   for (const NamedAtlas& a : d.atlases) small += a.small_charts;
-  return {
-      "charts", "",
-      fmt::format(
-          "The texture is cut into {} charts; {} of them have at most {} triangles. A mesh that keeps "
-          "every chart beside its neighbours has at least {} triangles, about {} kB, however small the "
-          "object is shown. In coarser meshes charts are lost, and the texture tears.",
-          grouped(d.charts()), grouped(small), kSmallChart, grouped(d.triangle_floor()),
-          kilobytes(d.floor_bytes())),
-      "Make a new atlas with fewer and larger charts: remove loose specks, close holes and smooth noise first, "
-      "because unwrappers cut at creases; then unwrap the finished mesh and bake the texture onto it."};
+  out.push_back(
+      {"charts", "",
+       fmt::format(
+           "The texture is cut into {} charts; {} of them have at most {} triangles. A mesh that keeps every "
+           "chart beside its neighbours has at least {} triangles, about {} kB, however small the object is "
+           "shown. In coarser meshes charts are lost, and the texture tears.",
+           grouped(d.charts()), grouped(small), kSmallChart, grouped(d.triangle_floor()),
+           kilobytes(d.floor_bytes())),
+       "Make a new atlas with fewer and larger charts: remove loose specks, close holes and smooth noise "
+       "first, because unwrappers cut at creases; then unwrap the finished mesh and bake the texture onto "
+       "it."});
 }
 
-AtlasAdvice about_thin(const AtlasFigures& a, const std::string& name) {
-  return {
-      "thin", name,
-      fmt::format(
-          "{} of the charts' texels lie in {} charts that are thinner than {} texels. Such charts "
-          "mix with their surroundings where the texture is shown smaller, and in every block of a JPEG.",
-          percents(a.thin_share), grouped(a.thin_charts), kThinTexels),
-      "Join thin charts with their neighbours: raise the unwrapper's least chart size, or its limit for the "
-      "angle at which it cuts."};
-}
-
-AtlasAdvice about_cover(const AtlasFigures& a, const std::string& name) {
+void advise_on_packing(const NamedAtlas& a, AdviceList& out) {
+  if (a.thin_share > kMuchThin)
+    out.push_back(
+        {"thin", a.name,
+         fmt::format(
+             "{} of the charts' texels lie in {} charts that are thinner than {} texels. Such charts "
+             "mix with their surroundings where the texture is shown smaller, and in every block of a "
+             "JPEG.",
+             percents(a.thin_share), grouped(a.thin_charts), kThinTexels),
+         "Join thin charts with their neighbours: raise the unwrapper's least chart size, or its limit for "
+         "the angle at which it cuts."});
   const double shrink = std::sqrt(a.cover / kGoodCover);
-  return {
-      "cover", name,
-      fmt::format("Only {} of the texels are shown. The others take memory on every display, and bytes.",
-                  percents(a.cover)),
-      fmt::format("Pack the charts again, 4 texels apart: {:.0f} x {:.0f} px hold what {} x {} px hold now.",
-                  std::ceil(a.width_px * shrink), std::ceil(a.height_px * shrink), a.width_px, a.height_px)};
+  if (a.cover < kLittleCover)
+    out.push_back(
+        {"cover", a.name,
+         fmt::format("Only {} of the texels are shown. The others take memory on every display, and bytes.",
+                     percents(a.cover)),
+         fmt::format(
+             "Pack the charts again, 4 texels apart: {:.0f} x {:.0f} px hold what {} x {} px hold now.",
+             std::ceil(a.width_px * shrink), std::ceil(a.height_px * shrink), a.width_px, a.height_px)});
+  if (a.overlap > kMuchOverlap)
+    out.push_back({"overlap", a.name,
+                   fmt::format("{} of the shown texels are shown at two or more places of the surface. That "
+                               "is right for tiles and for mirrored halves, and wrong for a scan: one place "
+                               "has the other's colours.",
+                               percents(a.overlap)),
+                   "Where the object was scanned, unwrap it again without overlaps and bake the texture "
+                   "again."});
 }
 
-AtlasAdvice about_overlap(const AtlasFigures& a, const std::string& name) {
-  return {
-      "overlap", name,
-      fmt::format("{} of the shown texels are shown at two or more places of the surface. That is right for "
-                  "tiles and for mirrored halves, and wrong for a scan: one place has the other's colours.",
-                  percents(a.overlap)),
-      "Where the object was scanned, unwrap it again without overlaps and bake the texture again."};
-}
-
-AtlasAdvice about_density(const AtlasFigures& a, const std::string& name) {
-  return {"density", name,
-          fmt::format(
-              "The finest twentieth of the surface has {} times as many texels per length as the coarsest "
-              "twentieth. The fine parts cost bytes that nobody sees beside the coarse ones.",
-              shortest(a.density_spread(), 3)),
-          "Scale the charts to one density when packing, or on purpose: more for a face than for a base."};
-}
-
-AtlasAdvice about_stretch(const AtlasFigures& a, const std::string& name) {
-  return {"stretch", name,
-          fmt::format(
-              "On a twentieth of the surface texels are more than {} times as long as wide. Details smear "
-              "along them.",
-              shortest(a.stretch.p95, 2)),
-          "Cut strongly curved charts once more, or let the unwrapper relax them with a limit for stretch."};
-}
-
-AtlasAdvice about_seams(const AtlasFigures& a, const std::string& name) {
-  return {
-      "seams", name,
-      fmt::format(
-          "Colours on both sides of seams differ by {} in the mean and {} along the worst twentieth (CIE "
-          "1976; {} can just be seen), and by {} from one texel to the next. Seams show as lines.",
-          shortest(a.seam_colours->mean, 2), shortest(a.seam_colours->p95, 2), kJustSeen,
-          shortest(a.seam_colours->inside, 2)),
-      "Let the texturing equalise exposures and blend photos across charts, and continue each chart's colours "
-      "some 4 texels beyond its border."};
-}
-
-AtlasAdvice about_flat(const AtlasFigures& a, const std::string& name) {
-  return {
-      "flat", name,
-      fmt::format(
-          "{} triangles, {} of the surface, have no area on the texture: they show single texels or lines.",
-          grouped(a.flat_triangles), percents(a.flat_surface)),
-      "Unwrap these triangles, or remove them when they are slivers of the reconstruction."};
-}
-
-AtlasAdvice about_folded(const AtlasFigures& a, const std::string& name) {
-  return {"folded", name,
-          fmt::format(
-              "{} triangles are folded over inside their charts and show their neighbours' texels mirrored.",
-              grouped(a.folded_triangles)),
-          "Unwrap the charts again with a method that forbids flips."};
-}
-
-AtlasAdvice about_far(const AtlasFigures& a, const std::string& name) {
-  return {"far", name,
-          fmt::format(
-              "{} triangles lie too far out on the texture, or over too many of its tiles, to be measured.",
-              grouped(a.far_triangles)),
-          "Look at their texture coordinates: these are tiles or faults, not an atlas."};
-}
-
-void advise_on(const AtlasFigures& a, const std::string& name, std::vector<AtlasAdvice>& out) {
-  const double broken = kManyBroken * static_cast<double>(a.triangles);
-  if (a.thin_share > kMuchThin) out.push_back(about_thin(a, name));
-  if (a.cover < kLittleCover) out.push_back(about_cover(a, name));
-  if (a.overlap > kMuchOverlap) out.push_back(about_overlap(a, name));
+void advise_on_looks(const NamedAtlas& a, AdviceList& out) {
   if (a.seam_colours && a.seam_colours->mean > kVisibleSeams &&
       a.seam_colours->mean > kBeyondTexture * a.seam_colours->inside)
-    out.push_back(about_seams(a, name));
-  if (a.density_spread() > kWideSpread) out.push_back(about_density(a, name));
-  if (a.stretch.p95 > kMuchStretch) out.push_back(about_stretch(a, name));
-  if (a.flat_surface > kManyBroken) out.push_back(about_flat(a, name));
-  if (static_cast<double>(a.folded_triangles) > broken) out.push_back(about_folded(a, name));
-  if (a.far_triangles > 0) out.push_back(about_far(a, name));
+    out.push_back(
+        {"seams", a.name,
+         fmt::format("Colours on both sides of seams differ by {} in the mean and {} along the worst "
+                     "twentieth (CIE 1976; {} can just be seen), and by {} from one texel to the next. Seams "
+                     "show as lines.",
+                     shortest(a.seam_colours->mean, 2), shortest(a.seam_colours->p95, 2), kJustSeen,
+                     shortest(a.seam_colours->inside, 2)),
+         "Let the texturing equalise exposures and blend photos across charts, and continue each chart's "
+         "colours some 4 texels beyond its border."});
+  if (a.density_spread() > kWideSpread)
+    out.push_back(
+        {"density", a.name,
+         fmt::format("The finest twentieth of the surface has {} times as many texels per length as the "
+                     "coarsest twentieth. The fine parts cost bytes that nobody sees beside the coarse ones.",
+                     shortest(a.density_spread(), 3)),
+         "Scale the charts to one density when packing, or on purpose: more for a face than for a base."});
+  if (a.stretch.p95 > kMuchStretch)
+    out.push_back({"stretch", a.name,
+                   fmt::format("On a twentieth of the surface texels are more than {} times as long as wide. "
+                               "Details smear along them.",
+                               shortest(a.stretch.p95, 2)),
+                   "Cut strongly curved charts once more, or let the unwrapper relax them with a limit for "
+                   "stretch."});
+}
+
+void advise_on_broken(const NamedAtlas& a, AdviceList& out) {
+  if (a.flat_surface > kManyBroken)
+    out.push_back({"flat", a.name,
+                   fmt::format("{} triangles, {} of the surface, have no area on the texture: they show "
+                               "single texels or lines.",
+                               grouped(a.flat_triangles), percents(a.flat_surface)),
+                   "Unwrap these triangles, or remove them when they are slivers of the reconstruction."});
+  if (static_cast<double>(a.folded_triangles) > kManyBroken * static_cast<double>(a.triangles))
+    out.push_back({"folded", a.name,
+                   fmt::format("{} triangles are folded over inside their charts and show their neighbours' "
+                               "texels mirrored.",
+                               grouped(a.folded_triangles)),
+                   "Unwrap the charts again with a method that forbids flips."});
+  if (a.far_triangles > 0)
+    out.push_back({"far", a.name,
+                   fmt::format("{} triangles lie too far out on the texture, or over too many of its tiles, "
+                               "to be measured.",
+                               grouped(a.far_triangles)),
+                   "Look at their texture coordinates: these are tiles or faults, not an atlas."});
 }
 
 /// What costs, the costliest first. Thresholds are where a good photogrammetry atlas is well clear of.
-std::vector<AtlasAdvice> advise(const AtlasDiagnosis& d) {
-  std::vector<AtlasAdvice> out;
-  if (static_cast<double>(d.triangle_floor()) > kManyFloorTriangles) out.push_back(about_charts(d));
-  for (const NamedAtlas& a : d.atlases) advise_on(a, a.name, out);
+AdviceList advise(const AtlasDiagnosis& d) {
+  AdviceList out;
+  if (static_cast<double>(d.triangle_floor()) > kManyFloorTriangles) advise_on_charts(d, out);
+  for (const NamedAtlas& a : d.atlases) {
+    advise_on_packing(a, out);
+    advise_on_looks(a, out);
+    advise_on_broken(a, out);
+  }
   return out;
 }
 
@@ -387,15 +272,9 @@ AtlasSubject atlas_subject(PackageReader& package, const RunContext& context) {
   return out;
 }
 
-std::uint64_t AtlasDiagnosis::charts() const {
+std::uint64_t AtlasDiagnosis::sum(std::uint64_t AtlasFigures::*figure) const {
   std::uint64_t sum = 0;
-  for (const NamedAtlas& a : atlases) sum += a.charts;
-  return sum;
-}
-
-std::uint64_t AtlasDiagnosis::triangle_floor() const {
-  std::uint64_t sum = 0;
-  for (const NamedAtlas& a : atlases) sum += a.triangle_floor;
+  for (const NamedAtlas& a : atlases) sum += a.*figure;
   return sum;
 }
 
@@ -436,10 +315,6 @@ std::string atlas_text(const AtlasDiagnosis& d) {
     out += "- " + (a.atlas.empty() ? "" : a.atlas + ": ") + a.found + "\n  " + a.remedy + "\n";
   return out;
 }
-
-nlohmann::ordered_json doctor_json(const DoctorReport& report) { return to_json(report); }
-
-nlohmann::ordered_json atlas_json(const AtlasDiagnosis& d) { return to_json(d); }
 
 DocumentSchema doctor_schema() {
   return document_schema(

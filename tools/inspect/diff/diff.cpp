@@ -13,91 +13,6 @@
 namespace texmesh {
 namespace {
 
-/// A package of a diff as the JSON names it.
-struct DiffedPackage {
-  std::string name, id;
-  std::uint64_t bytes = 0;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
-    v("name", s.name, "");
-    v("id", s.id, FieldRule{.pattern = "^[0-9a-f]{64}$"}, "");
-    v("bytes", s.bytes, "Of all entries.");
-  }
-};
-
-using TwoSizes = std::array<OrNull<std::uint64_t>, 2>;
-constexpr FieldRule kTwo{.count = Range{2, 2}};
-
-TwoSizes sizes(const std::array<std::uint64_t, 2>& bytes, bool a = true, bool b = true) {
-  TwoSizes out;
-  if (a) out[0].value = bytes[0];
-  if (b) out[1].value = bytes[1];
-  return out;
-}
-
-OrNull<std::string> text_or_null(const std::string& text) {
-  return {text.empty() ? std::nullopt : std::optional(text)};
-}
-
-/// What diff --json prints.
-struct DiffReport {
-  PackageDiff diff;
-  std::array<std::string, 2> names;
-  std::array<DiffedPackage, 2> packages() const {
-    return {{{names[0], diff.ids[0], diff.bytes[0]}, {names[1], diff.ids[1], diff.bytes[1]}}};
-  }
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
-    v("version", Constant{1}, "");
-    v("equal", s.diff.equal(), "The same package id: every byte is the same.");
-    v("packages", s.packages(), kTwo, "");
-    v("recorded", s.diff.differences, "What the packages were made from and with, where it differs.");
-    v("stages", s.diff.stages, "Stages whose entries differ, in the order of the graph.");
-    v("entries", s.diff.entries, "");
-    v("equal_entries", s.diff.equal_entries, "");
-  }
-};
-
-}  // namespace
-
-template <>
-struct RecordFields<Difference> {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
-    v("kind", s.kind, "");
-    v("name", s.name,
-      "Input: the name by which the model refers to it, empty for the model itself. Option: stage.option.");
-    v("values", std::array{text_or_null(s.values[0]), text_or_null(s.values[1])}, kTwo, "");
-    std::optional<TwoSizes> bytes;
-    if (s.kind == DifferenceKind::kInput) bytes = sizes(s.bytes, !s.values[0].empty(), !s.values[1].empty());
-    v("bytes", bytes, kTwo, "");
-  }
-};
-
-template <>
-struct RecordFields<StageDifference> {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
-    v("stage", s.stage, "");
-    v("entries", s.entries, "");
-    v("bytes", sizes(s.bytes), kTwo, "");
-    v("causes", s.causes, "Indices into `recorded`: what can reach this stage.");
-  }
-};
-
-template <>
-struct RecordFields<EntryDifference> {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
-    v("path", s.path, "");
-    v("stage", text_or_null(s.stage), "");
-    v("in", s.present, kTwo, "");
-    v("bytes", sizes(s.bytes, s.present[0], s.present[1]), kTwo, "");
-  }
-};
-
-namespace {
-
 /// Compares two lists of named things and notes what is not the same, in A's order, then B's own.
 class NamedDifferences {
  public:
@@ -153,8 +68,7 @@ std::vector<Difference> differences_of(const std::array<Provenance, 2>& p,
     for (const auto& [name, version] : p[side].stages) stages.add(side, name, std::to_string(version));
     for (const auto& [name, version] : p[side].libraries) libraries.add(side, name, version);
     tool.add(side, "tool", p[side].tool);
-    format.add(side, "package format",
-               std::to_string(p[side].format_major) + "." + std::to_string(p[side].format_minor));
+    format.add(side, "package format", p[side].format.text());
   }
   std::vector<Difference> all;
   for (const NamedDifferences* list : {&inputs, &options, &fields, &stages, &libraries, &tool, &format})
@@ -162,31 +76,16 @@ std::vector<Difference> differences_of(const std::array<Provenance, 2>& p,
   return all;
 }
 
+/// The stage that makes an entry.
 std::string maker(const std::string& path) {
-  switch (parse_entry_path(path).kind) {
-    case EntryKind::kMesh:
-    case EntryKind::kSplitStream:
-      return "scales";
-    case EntryKind::kProxy:
-      return "proxies";
-    case EntryKind::kPoster:
-      return "poster";
-    case EntryKind::kTables:
-    case EntryKind::kThesis:
-      return "lut";
-    case EntryKind::kQuality:
-      return "quality";
-    case EntryKind::kPreview:
-      return "previews";
-    case EntryKind::kTableStreams:
-    case EntryKind::kRung:
-    case EntryKind::kTextures:
-      return "ladder";
-    case EntryKind::kProvenance:
-      return "";
-    default:
-      return "package";
-  }
+  using Kind = EntryKind;
+  static const std::map<Kind, std::string> makers{
+      {Kind::kMesh, "scales"},     {Kind::kSplitStream, "scales"}, {Kind::kProxy, "proxies"},
+      {Kind::kPoster, "poster"},   {Kind::kTables, "lut"},         {Kind::kThesis, "lut"},
+      {Kind::kQuality, "quality"}, {Kind::kPreview, "previews"},   {Kind::kTableStreams, "ladder"},
+      {Kind::kRung, "ladder"},     {Kind::kTextures, "ladder"},    {Kind::kProvenance, ""}};
+  const auto found = makers.find(parse_entry_path(path).kind);
+  return found == makers.end() ? "package" : found->second;
 }
 
 void compare_entries(PackageReader& a, PackageReader& b, PackageDiff& diff) {
@@ -309,10 +208,10 @@ std::string value_of(const Difference& d, int side) {
   return printable(v);
 }
 
-std::string head_text(const PackageDiff& diff, const std::array<std::string, 2>& names) {
+std::string head_text(const PackageDiff& diff) {
   Table table("", {Column::text(""), Column::text("package"), Column::text("id"), {"bytes", kGrouped}});
   for (int side = 0; side < 2; ++side)
-    table.row({side ? "B" : "A", names[side], diff.ids[side].substr(0, 16), diff.bytes[side]});
+    table.row({side ? "B" : "A", diff.names[side], diff.ids[side].substr(0, 16), diff.bytes[side]});
   return table.text("");
 }
 
@@ -370,8 +269,9 @@ std::string contents_text(const PackageDiff& diff) {
 
 }  // namespace
 
-PackageDiff diff_packages(PackageReader& a, PackageReader& b) {
+PackageDiff diff_packages(PackageReader& a, PackageReader& b, const std::array<std::string, 2>& names) {
   PackageDiff diff;
+  diff.names = names;
   diff.ids = {to_hex(a.id()), to_hex(b.id())};
   diff.differences = differences_of(
       {read_provenance(a.entry(a.manifest().provenance)), read_provenance(b.entry(b.manifest().provenance))},
@@ -381,19 +281,15 @@ PackageDiff diff_packages(PackageReader& a, PackageReader& b) {
   return diff;
 }
 
-std::string diff_text(const PackageDiff& diff, const std::array<std::string, 2>& names) {
+std::string diff_text(const PackageDiff& diff) {
   if (diff.equal())
-    return fmt::format("{} and {} are the same package ({})\n", printable(names[0]), printable(names[1]),
-                       diff.ids[0].substr(0, 16));
-  return head_text(diff, names) + "\n" + recorded_text(diff) + "\n" + contents_text(diff);
-}
-
-nlohmann::ordered_json diff_json(const PackageDiff& diff, const std::array<std::string, 2>& names) {
-  return to_json(DiffReport{diff, names});
+    return fmt::format("{} and {} are the same package ({})\n", printable(diff.names[0]),
+                       printable(diff.names[1]), diff.ids[0].substr(0, 16));
+  return head_text(diff) + "\n" + recorded_text(diff) + "\n" + contents_text(diff);
 }
 
 DocumentSchema diff_schema() {
-  Json body = schema_of<DiffReport>();
+  Json body = schema_of<PackageDiff>();
   Json& recorded = body["properties"]["recorded"]["items"];
   recorded["if"] = {{"properties", {{"kind", {{"const", "input"}}}}}};
   recorded["then"] = {{"required", {"bytes"}}};

@@ -1,19 +1,54 @@
 // Of every texture plane: its grid with what each fragment is worth and takes, its rungs, and the tables by
 // which clients choose rungs.
+#include "tools/inspect/dump/dump.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <iterator>
+#include <nlohmann/json.hpp>
 
 #include "format/rules/allocation.h"
 #include "pipeline/io/table.h"
-#include "tools/inspect/dump/dump_parts.h"
-#include "tools/inspect/dump/package_figures.h"
 
 namespace texmesh {
 namespace {
 
-using Json = nlohmann::ordered_json;
+/// The texture quality that the tables ask for at the scale of a row and Gamma.
+struct AllocationFigures {
+  double gamma = 0, quality_min = 0, quality_mean = 0, quality_max = 0;  // quality 0: skipped
+  std::uint64_t bytes = 0;  // of the chosen rungs, table streams not counted
+  // Per fragment: q_i(x, y) (with rd: the quality of the rung), its rung, d_i(x, y)
+  std::vector<float> fragment_quality;
+  std::vector<std::int16_t> fragment_rung;
+  std::vector<std::uint32_t> fragment_bytes;
+};
+/// Without `gamma` (0..1): at the default one, the mean of eta.
+AllocationFigures allocation_figures(const PlaneTables& t, std::size_t row, DumpGamma gamma = {}) {
+  AllocationFigures f;
+  f.gamma = gamma ? *gamma : mean_eta(t, row);
+  f.fragment_quality = quality_of(t, row, f.gamma);
+  f.fragment_rung = rungs_of(t, row, f.gamma);
+  f.fragment_bytes = bytes_of(t, f.fragment_rung);
+  f.bytes = sum_of(f.fragment_bytes);
+  if (t.order.empty()) return f;
+  f.quality_min = 1e9;
+  for (const std::uint16_t i : t.order) {
+    if (t.allocation == 2)  // what was bought, not what was asked for
+      f.fragment_quality[i] =
+          f.fragment_rung[i] == kSkipped ? 0 : t.rung_quality[static_cast<std::size_t>(f.fragment_rung[i])];
+    const double q = static_cast<double>(f.fragment_quality[i]);
+    f.quality_min = std::min(f.quality_min, q);
+    f.quality_max = std::max(f.quality_max, q);
+    f.quality_mean += q;
+  }
+  f.quality_mean /= static_cast<double>(t.order.size());
+  return f;
+}
+
+std::string allocation_name(const PlaneTables& t) {
+  return t.allocation == 0 ? "thesis" : t.allocation == 1 ? "log" : t.allocation == 2 ? "rd" : "vqp";
+}
 
 /// The title line of a texture plane.
 std::string plane_title(const TextureInfo& t, std::size_t plane) {
@@ -60,32 +95,6 @@ Table fragments_table(const TextureInfo& info, const PlaneTables& t, const Plane
       table.rows.back().emplace_back(t.size_bytes[r * t.fragment_count() + i]);
   }
   return table;
-}
-
-Json fragment_json(const PlaneTables& t, const PlaneThesis* thesis, std::size_t i,
-                   const std::vector<float>& eta) {
-  Json bytes = Json::array(), features = Json::array();
-  for (std::size_t r = 0; r < t.rung_count(); ++r) bytes.push_back(t.size_bytes[r * t.fragment_count() + i]);
-  for (std::size_t row = 0; row < t.scale_count(); ++row)
-    features.push_back(t.features[row * t.fragment_count() + i]);
-  Json j{{"fragment", i},
-         {"column", i % t.columns},
-         {"row", i / t.columns},
-         {"covered_texels", t.covered_texels[i]},
-         {"surface_fraction", t.surface_fraction[i]},
-         {"eta", eta[i]},
-         {"features", features},
-         {"bytes", bytes}};
-  if (thesis && i < thesis->vqp.size())
-    j.update(Json{{"vqp", thesis->vqp[i]},
-                  {"z", thesis->z[i]},
-                  {"i", thesis->i[i]},
-                  {"zeta", thesis->zeta[i]},
-                  {"m", thesis->m[i]}});
-  if (thesis && i < thesis->models.size())
-    if (const SizeModel& model = thesis->models[i]; model != SizeModel{})
-      j["size_model"] = {{"a", model.a}, {"b", model.b}, {"correlation", model.correlation}};
-  return j;
 }
 
 Table rungs_table(const TextureInfo& info, const PlaneTables& t) {
@@ -168,19 +177,6 @@ Json allocation_json(const PlaneTables& t, int scale, std::size_t row, DumpGamma
           {"fragment_rung", rungs}, {"fragment_bytes", bytes}};
 }
 
-/// D_i(Gamma) of all scales of the chain.
-Json thesis_json(const PlaneThesis& thesis) {
-  Json scales = Json::array();
-  for (std::size_t s = 0; s < thesis.quality.size(); ++s) {
-    const auto begin = thesis.total_bytes.begin() + static_cast<std::ptrdiff_t>(s * kGammaSteps);
-    scales.push_back({{"scale", s},
-                      {"quality", thesis.quality[s]},
-                      {"total_bytes",
-                       std::vector<std::uint64_t>(begin, begin + static_cast<std::ptrdiff_t>(kGammaSteps))}});
-  }
-  return {{"chain", scales}};
-}
-
 /// The middle one of the fitted models' values.
 double median_of(const std::vector<SizeModel>& models, float SizeModel::*value) {
   std::vector<float> values;
@@ -253,6 +249,29 @@ std::string measured_text(const QualityTable& q) {
 
 }  // namespace
 
+std::vector<RungFigures> rung_figures(const PlaneTables& t) {
+  std::vector<RungFigures> rungs;
+  const std::size_t fragments = t.fragment_count();
+  for (std::size_t r = 0; r < t.rung_count(); ++r) {
+    RungFigures f{t.rung_quality[r], 0, t.table_bytes[r], 0, 0};
+    double texels = 0, dssim = 0;
+    for (const std::uint16_t i : t.order) {
+      const double weight = t.covered_texels[i];
+      f.bytes += t.size_bytes[r * fragments + i];
+      f.mse += weight * static_cast<double>(t.mse[r * fragments + i]);
+      dssim += weight * static_cast<double>(t.dssim[r * fragments + i]);
+      texels += weight;
+    }
+    if (texels > 0) f.mse /= texels, dssim /= texels;
+    f.ssim = 1 - dssim;
+    std::vector<std::int16_t> all(fragments, kSkipped);
+    for (const std::uint16_t i : t.order) all[i] = static_cast<std::int16_t>(r);
+    f.surface_ssim = 1 - surface_dssim(t, all);
+    rungs.push_back(f);
+  }
+  return rungs;
+}
+
 std::string fragments_text(PackageReader& p, DumpGamma) {
   std::string s;
   for (std::size_t k = 0; k < p.textures().size(); ++k) {
@@ -273,7 +292,31 @@ Json fragments_json(PackageReader& p, DumpGamma) {
     const PlaneTables& t = p.tables().planes[k];
     const std::vector<float> eta = eta_of(t, 0);
     Json fragments = Json::array();
-    for (const std::uint16_t i : t.order) fragments.push_back(fragment_json(t, p.plane_thesis(k), i, eta));
+    const PlaneThesis* thesis = p.plane_thesis(k);
+    for (const std::uint16_t i : t.order) {
+      Json bytes = Json::array(), features = Json::array();
+      for (std::size_t r = 0; r < t.rung_count(); ++r)
+        bytes.push_back(t.size_bytes[r * t.fragment_count() + i]);
+      for (std::size_t row = 0; row < t.scale_count(); ++row)
+        features.push_back(t.features[row * t.fragment_count() + i]);
+      Json& j = fragments.emplace_back(Json{{"fragment", i},
+                                            {"column", i % t.columns},
+                                            {"row", i / t.columns},
+                                            {"covered_texels", t.covered_texels[i]},
+                                            {"surface_fraction", t.surface_fraction[i]},
+                                            {"eta", eta[i]},
+                                            {"features", features},
+                                            {"bytes", bytes}});
+      if (thesis && i < thesis->vqp.size())
+        j.update(Json{{"vqp", thesis->vqp[i]},
+                      {"z", thesis->z[i]},
+                      {"i", thesis->i[i]},
+                      {"zeta", thesis->zeta[i]},
+                      {"m", thesis->m[i]}});
+      if (thesis && i < thesis->models.size())
+        if (const SizeModel& model = thesis->models[i]; model != SizeModel{})
+          j["size_model"] = {{"a", model.a}, {"b", model.b}, {"correlation", model.correlation}};
+    }
     planes.push_back({{"plane", k},
                       {"columns", info.columns},
                       {"rows", info.rows},
@@ -349,7 +392,15 @@ Json tables_json(PackageReader& p, DumpGamma gamma) {
                       {"quality_min", t.quality_min},
                       {"quality_max", t.quality_max},
                       {"scales", scales}});
-    if (const PlaneThesis* thesis = p.plane_thesis(k)) planes.back()["thesis"] = thesis_json(*thesis);
+    const PlaneThesis* thesis = p.plane_thesis(k);
+    if (!thesis) continue;
+    Json& chain = planes.back()["thesis"]["chain"] = Json::array();  // D_i(Gamma) of all scales
+    for (std::size_t s = 0; s < thesis->quality.size(); ++s) {
+      const auto begin = thesis->total_bytes.begin() + static_cast<std::ptrdiff_t>(s * kGammaSteps);
+      chain.push_back({{"scale", s},
+                       {"quality", thesis->quality[s]},
+                       {"total_bytes", std::vector<std::uint64_t>(begin, begin + kGammaSteps)}});
+    }
   }
   return {{"tables", planes}, {"measured_quality", Json::parse(write_quality(p.quality()))}};
 }

@@ -1,7 +1,7 @@
 // A painted model as files: a GLB to turn in any viewer, and a PNG of two views.
 
-#include "format/base/box.h"
-#include "format/base/srgb.h"
+#include "format/base/portable_math.h"
+#include "format/base/vec.h"
 #include "format/rules/allocation.h"
 #include "stages/gltf/glb_writer.h"
 #include "stages/image/png_writer.h"
@@ -20,27 +20,17 @@ std::span<const std::uint8_t> bytes_of(const std::vector<T>& v) {
 }
 
 template <class T>
-std::size_t add_attribute(GlbWriter& glb, const std::vector<T>& values, const char* type) {
-  const std::size_t view = glb.add_view(bytes_of(values), 0, kArrayBuffer);
-  return glb.add_accessor(
-      {{"bufferView", view}, {"componentType", kFloat}, {"count", values.size()}, {"type", type}});
-}
-
-std::size_t add_positions(GlbWriter& glb, const std::vector<Vec3f>& points) {
-  const Box3f box = bounding_box(points);
-  const std::size_t view = glb.add_view(bytes_of(points), 0, kArrayBuffer);
-  return glb.add_accessor({{"bufferView", view},
-                           {"componentType", kFloat},
-                           {"count", points.size()},
-                           {"type", "VEC3"},
-                           {"min", GlbWriter::shortest(box.min)},
-                           {"max", GlbWriter::shortest(box.max)}});
-}
-
-std::size_t add_indices(GlbWriter& glb, const std::vector<std::uint32_t>& indices) {
-  const std::size_t view = glb.add_view(bytes_of(indices), 0, kElementBuffer);
-  return glb.add_accessor(
-      {{"bufferView", view}, {"componentType", kUint}, {"count", indices.size()}, {"type", "SCALAR"}});
+std::size_t add_values(GlbWriter& glb, const std::vector<T>& values, const char* type, int component = kFloat,
+                       bool bounded = false) {
+  const std::size_t view =
+      glb.add_view(bytes_of(values), 0, component == kFloat ? kArrayBuffer : kElementBuffer);
+  Json accessor{{"bufferView", view}, {"componentType", component}, {"count", values.size()}, {"type", type}};
+  if constexpr (std::is_same_v<T, Vec3f>) {
+    const Box3f box = bounding_box(values);
+    if (bounded)
+      accessor["min"] = GlbWriter::shortest(box.min), accessor["max"] = GlbWriter::shortest(box.max);
+  }
+  return glb.add_accessor(std::move(accessor));
 }
 
 /// Area-weighted over all triangles of a position: a picture needs shading, not creases.
@@ -89,12 +79,12 @@ void add_material(GlbWriter& glb, const Material& m, bool translucent) {
 void add_surface(GlbWriter& glb, const PaintedModel& model) {
   std::vector<Vec3f> positions;
   for (std::uint32_t p : model.mesh.wedge_position) positions.push_back(model.mesh.positions[p]);
-  Json attributes{{"POSITION", add_positions(glb, positions)},
-                  {"NORMAL", add_attribute(glb, smooth_normals(model.mesh), "VEC3")}};
-  if (!model.mesh.colours.empty()) attributes["COLOR_0"] = add_attribute(glb, model.mesh.colours, "VEC4");
-  if (!model.mesh.uv0.empty()) attributes["TEXCOORD_0"] = add_attribute(glb, model.mesh.uv0, "VEC2");
+  Json attributes{{"POSITION", add_values(glb, positions, "VEC3", kFloat, true)},
+                  {"NORMAL", add_values(glb, smooth_normals(model.mesh), "VEC3")}};
+  if (!model.mesh.colours.empty()) attributes["COLOR_0"] = add_values(glb, model.mesh.colours, "VEC4");
+  if (!model.mesh.uv0.empty()) attributes["TEXCOORD_0"] = add_values(glb, model.mesh.uv0, "VEC2");
   if (!model.mesh.uv1.empty() && !model.mesh.uv0.empty())
-    attributes["TEXCOORD_1"] = add_attribute(glb, model.mesh.uv1, "VEC2");
+    attributes["TEXCOORD_1"] = add_values(glb, model.mesh.uv1, "VEC2");
   Json primitives = Json::array();
   for (std::size_t m = 0; m < model.materials.size(); ++m) {
     std::vector<std::uint32_t> indices;
@@ -104,7 +94,7 @@ void add_surface(GlbWriter& glb, const PaintedModel& model) {
     if (indices.empty()) continue;
     add_material(glb, model.materials[m], model.translucent);
     primitives.push_back({{"attributes", attributes},
-                          {"indices", add_indices(glb, indices)},
+                          {"indices", add_values(glb, indices, "SCALAR", kUint)},
                           {"material", glb.array("materials").size() - 1}});
   }
   glb.array("meshes").push_back({{"primitives", primitives}});
@@ -120,10 +110,11 @@ void add_lines(GlbWriter& glb, const PaintedModel& model) {
       .push_back({{"pbrMetallicRoughness", {{"baseColorFactor", {1, 0, 0, 1}}}},
                   {"extensions", {{"KHR_materials_unlit", Json::object()}}}});
   glb.array("meshes").push_back(
-      {{"primitives", Json::array({{{"attributes", {{"POSITION", add_positions(glb, model.nodes)}}},
-                                    {"indices", add_indices(glb, indices)},
-                                    {"mode", kLines},
-                                    {"material", glb.array("materials").size() - 1}}})}});
+      {{"primitives",
+        Json::array({{{"attributes", {{"POSITION", add_values(glb, model.nodes, "VEC3", kFloat, true)}}},
+                      {"indices", add_values(glb, indices, "SCALAR", kUint)},
+                      {"mode", kLines},
+                      {"material", glb.array("materials").size() - 1}}})}});
   glb.array("nodes").push_back({{"mesh", glb.array("meshes").size() - 1}, {"name", "lines"}});
 }
 

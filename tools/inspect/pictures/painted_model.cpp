@@ -4,13 +4,13 @@
 
 #include <fmt/format.h>
 
-#include "format/base/no_index.h"
-#include "format/base/srgb.h"
+#include "format/base/portable_math.h"
+#include "format/base/vec.h"
 #include "format/rules/allocation.h"
+#include "pipeline/compile/stage_table.h"
 #include "pipeline/io/table.h"
-#include "stages/geometry/component_boxes.h"
+#include "stages/geometry/mesh_topology.h"
 #include "stages/image/decode_image.h"
-#include "stages/ssf/ssf.h"
 #include "tools/inspect/atlas/atlas_report.h"
 #include "tools/inspect/package_mesh.h"
 
@@ -275,16 +275,20 @@ ColourLegend atlas_legend(const AtlasReport& report) {
 
 }  // namespace
 
-Srgb colour_of(double fraction) {
-  const double at = std::clamp(fraction, 0.0, 1.0) * (kScale.size() - 1);
-  const auto low = std::min(static_cast<std::size_t>(at), kScale.size() - 2);
+Srgb colour_on(std::span<const Srgb> scale, double fraction) {
+  const double at = std::clamp(fraction, 0.0, 1.0) * static_cast<double>(scale.size() - 1);
+  const auto low = std::min(static_cast<std::size_t>(at), scale.size() - 2);
   Srgb out{};
   for (std::size_t k = 0; k < 3; ++k) {
-    const double x = kScale[low][k] + (at - static_cast<double>(low)) * (kScale[low + 1][k] - kScale[low][k]);
+    const double x = scale[low][k] + (at - static_cast<double>(low)) * (scale[low + 1][k] - scale[low][k]);
     out[k] = static_cast<std::uint8_t>(x + 0.5);
   }
   return out;
 }
+
+Srgb colour_of(double fraction) { return colour_on(kScale, fraction); }
+
+std::string hex_of(Srgb c) { return fmt::format("#{:02x}{:02x}{:02x}", c[0], c[1], c[2]); }
 
 std::string share_text(double count, double of) { return percent(of > 0 ? count / of : 0) + " %"; }
 
@@ -381,6 +385,44 @@ PaintedModel paint_atlas(const Mesh& mesh, const std::vector<Material>& material
 PaintedModel paint_atlas(PackageReader& package, const RunContext& context) {
   const AtlasSubject subject = atlas_subject(package, context);
   return paint_atlas(subject.mesh, subject.materials, subject.images);
+}
+
+namespace {
+
+/// Of the mesh as the file has it: conditioning may cut it.
+PaintedModel paint_imported_atlas(const ImportedMesh& imported, const std::vector<Material>& materials,
+                                  const std::vector<Image>& images) {
+  std::vector<AtlasImage> sides;
+  for (const Image& image : images) sides.push_back({image.width_px, image.height_px, nullptr});
+  return paint_atlas(imported.mesh, materials, sides);
+}
+
+constexpr PaintedQuantity kQuantities[] = {
+    {"atlas", [] { return painting_stage(inputs(kImportedMesh, kMaterials, kImages), paint_imported_atlas); },
+     paint_atlas},
+    {"fragments",
+     [] {
+       return painting_stage<ConditionedMesh, std::vector<Material>, std::vector<Image>, Fragments>(
+           inputs(kConditionedMesh, kMaterials, kImages, kFragments), paint_fragments);
+     },
+     paint_fragments},
+    {"scales", [] { return painting_stage(inputs(kConditionedMesh, kScaleMap), paint_scales); }, nullptr}};
+
+}  // namespace
+
+std::span<const PaintedQuantity> painted_quantities() { return kQuantities; }
+
+PaintedModel paint_model(const CompileRequest& request, const PaintedQuantity& what, Store& store,
+                         const RunContext& context, const StageObserver& observer, Notes& notes) {
+  return *run_towards(request, what.stage(), kPainted, store, context, observer, notes);
+}
+
+PaintedModel paint_package(const std::string& path, const PaintedQuantity& what, const RunContext& context) {
+  if (!what.of_package)
+    throw InputError(path, "--what " + std::string(what.name),
+                     "the model it was compiled from: a package does not hold this", "a package");
+  PackageReader package(open_store(path));
+  return what.of_package(package, context);
 }
 
 }  // namespace texmesh

@@ -1,17 +1,8 @@
 #pragma once
-#include <array>
-#include <cstdint>
-#include <span>
-#include <string>
-#include <vector>
 
 #include "delivery/cpp/package/package_reader.h"
-#include "format/model/model.h"
-#include "stages/base/run_context.h"
-#include "stages/data/conditioned_mesh.h"
-#include "stages/data/fragments.h"
-#include "stages/data/pixels.h"
-#include "stages/data/scale_map.h"
+#include "pipeline/compile/compile_model.h"
+#include "pipeline/graph/stage.h"
 #include "stages/measure/atlas/atlas_figures.h"
 
 namespace texmesh {
@@ -49,8 +40,13 @@ struct PaintedModel {
   ColourLegend legend;
 };
 
+/// The colour of 0..1 (clipped) on a scale of two or more colours at equal distances.
+Srgb colour_on(std::span<const Srgb> scale, double fraction);
 /// The scale of colours: dark violet for 0, over teal, to yellow for 1; brightness rises all the way.
 Srgb colour_of(double fraction);
+
+/// "#rrggbb"
+std::string hex_of(Srgb colour);
 
 /// The mesh alone, one matt material, colours from a value per position; the legend gets its stops.
 /// StageError where the number of values is another; `what` names them in the message.
@@ -79,5 +75,31 @@ std::vector<std::uint8_t> write_painted_glb(const PaintedModel& model);
 /// the mesh. A bar at the right shows the scale of colours, hi at the top. With shows_layout the first four
 /// textures stand at the right, each within side_px.
 std::vector<std::uint8_t> write_painted_png(const PaintedModel& model, std::uint32_t side_px);
+
+inline constexpr Artefact<PaintedModel> kPainted{"painted"};
+
+/// The stage that paints a quantity from what it reads.
+template <class... Read>
+Stage painting_stage(Inputs<Read...> read, PaintedModel (*paint)(const Read&...)) {
+  return make_stage({kPainted.name, 1, "what a stage computed, to look at"}, read, derived(kPainted),
+                    options(), {},
+                    [paint](const Read&... objects, const RunContext&) { return paint(objects...); });
+}
+
+/// Something that can be painted.
+struct PaintedQuantity {
+  std::string_view name;
+  Stage (*stage)();
+  PaintedModel (*of_package)(PackageReader&, const RunContext&);  // nullptr: a package does not hold this
+};
+/// atlas, fragments, scales.
+std::span<const PaintedQuantity> painted_quantities();
+
+/// Runs the graph over a model up to the stage whose result is painted, and no further; results of a compile
+/// with the same options come from the store. Errors as compile_model.
+PaintedModel paint_model(const CompileRequest& request, const PaintedQuantity& what, Store& store,
+                         const RunContext& context, const StageObserver& observer, Notes& notes);
+/// Of a package. InputError says what to do instead where a package does not hold the quantity.
+PaintedModel paint_package(const std::string& path, const PaintedQuantity& what, const RunContext& context);
 
 }  // namespace texmesh

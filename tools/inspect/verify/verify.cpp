@@ -1,62 +1,270 @@
 #include "tools/inspect/verify/verify.h"
 
+#include <fmt/format.h>
 #include <zlib.h>
-
-#include <algorithm>
 #include <cstdio>
 #include <new>
 #include <nlohmann/json.hpp>
+#include <numeric>
+#include <tuple>
 
 #include "format/base/json_fields.h"
 #include "format/documents/index.h"
-#include "pipeline/io/record.h"
+#include "format/rules/allocation.h"
+#include "pipeline/io/table.h"
+#include "stages/base/parallel.h"
+#include "stages/fragment_codec/fragment_codec.h"
+#include "stages/image/decode_image.h"
+#include "stages/image/jpeg_segments.h"
 #include "stages/jpeg/jpeg.h"
-#include "tools/inspect/fragment_files.h"
+#include "tools/inspect/package_tree.h"
 #include "tools/inspect/provenance.h"
 #include "tools/inspect/verify/verify_checks.h"
 
 namespace texmesh {
-
-template <>
-struct RecordFields<Finding> {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
-    v("check", s.check, FieldRule{.pattern = "^[a-z0-9-]+$"}, "");
-    v("rule", s.rule, FieldRule{.pattern = "^([A-Z][0-9][0-9])?$"},
-      "the rule of format/SPEC.md that is broken");
-    v("entry", s.entry, "");
-    v("field", s.field, "");
-    v("expected", s.expected, "");
-    v("found", s.found, "");
-  }
-};
-
-template <>
-struct RecordFields<VerifiedPackage> {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
-    v("package", s.package, "");
-    v("ok", s.report.findings.empty(), "");
-    v("entries", s.report.entries, "");
-    v("bytes", s.report.bytes, "");
-    v("meshes", s.report.meshes, "");
-    v("previews", s.report.previews, "");
-    v("fragments", s.report.fragments, "");
-    v("content_credential", s.report.content_credential, "there is one; what it says was not checked");
-    v("findings", s.report.findings, "");
-  }
-};
-
 namespace {
 
-/// What verify --json prints.
-struct VerifiedPackages {
-  std::vector<VerifiedPackage> packages;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
-    v("packages", s.packages, "");
+std::string plane_field(std::size_t plane, const std::string& member) {
+  return "plane " + std::to_string(plane) + ", " + member;
+}
+
+std::string shape_text(std::uint32_t width_px, std::uint32_t height_px, std::uint32_t channels) {
+  return fmt::format("{} x {} px, {} channels", width_px, height_px, channels);
+}
+
+std::uint64_t sum(const std::vector<std::uint32_t>& v) {
+  return std::accumulate(v.begin(), v.end(), std::uint64_t{0});
+}
+
+/// Stored fragments are covered, and stand by falling importance. (Readers check that covered ones are
+/// stored.)
+void check_order(std::uint32_t plane, const PlaneTables& t, Findings& findings) {
+  for (const std::uint16_t f : t.order)
+    findings.require(t.covered_texels[f] > 0, {"tables-coverage", "T11"}, kTablesPath,
+                     plane_field(plane, "fragment " + std::to_string(f)), "covered texels, as it is stored",
+                     "none");
+  const std::vector<float> eta = eta_of(t, 0);
+  for (std::size_t k = 1; k < t.order.size(); ++k) {
+    const std::size_t a = t.order[k - 1], b = t.order[k];
+    const bool falling = eta[a] != eta[b] ? eta[a] > eta[b]
+                         : t.surface_fraction[a] != t.surface_fraction[b]
+                             ? t.surface_fraction[a] > t.surface_fraction[b]
+                             : a < b;
+    findings.require(
+        falling, {"tables-order", "T12"}, kTablesPath, plane_field(plane, "order[" + std::to_string(k) + "]"),
+        "falling importance (eta, surface, index)", std::to_string(b) + " after " + std::to_string(a));
   }
+}
+
+void check_fragment(const TextureInfo& texture, const PlaneTables& t, std::uint32_t rung, std::size_t i,
+                    const PlaneStreams& streams, Findings& findings) {
+  const std::string& entry = texture.rungs[rung].path;
+  const std::string field = "fragment " + std::to_string(i);
+  const std::uint64_t stated = t.digest[rung * t.fragment_count() + i],
+                      real = truncated(sha256(streams.stream(i)));
+  if (stated != real) {
+    const auto hex = [](std::uint64_t v) {
+      char text[20];
+      std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(v));
+      return std::string(text);
+    };
+    findings.add({"fragment-digest", "F03"}, entry, field, hex(stated), hex(real));
+  }
+  try {
+    const std::uint64_t texels =
+        static_cast<std::uint64_t>(texture.fragment_width_px) * texture.fragment_height_px;
+    const Pixels pixels = decode_fragment_file(texture.codec, streams.file(i), texels);
+    findings.require(pixels.width_px == texture.fragment_width_px &&
+                         pixels.height_px == texture.fragment_height_px &&
+                         pixels.channels == texture.channels,
+                     {"fragment-decode", "F08"}, entry, field,
+                     shape_text(texture.fragment_width_px, texture.fragment_height_px, texture.channels),
+                     shape_text(pixels.width_px, pixels.height_px, pixels.channels));
+  } catch (const Error& e) {
+    const std::string rule = rule_of(e);
+    findings.add({"fragment-decode", rule.empty() ? "F08" : rule.c_str()}, entry, field, e.expected(),
+                 e.found());
+  }
+}
+
+constexpr std::uint8_t kExif = 0xe1, kProfile = 0xe2, kRestartInterval = 0xdd;
+
+/// What stands in front of a JPEG's first scan.
+struct JpegSegments {
+  bool has_profile = false, has_restarts = false;
+  std::vector<std::uint8_t> frame;  // per component: sampling factors
 };
+
+JpegSegments read_segments(ByteSpan jpeg) {
+  JpegSegments found;
+  for_each_jpeg_segment(jpeg, [&](std::uint8_t marker, ByteSpan body) {
+    found.has_profile |= marker == kExif || marker == kProfile;
+    found.has_restarts |= marker == kRestartInterval;
+    if (is_jpeg_frame(marker))
+      for (std::size_t k = 7; k < body.size(); k += 3) found.frame.push_back(body[k]);
+  });
+  return found;
+}
+
+void check_jpeg_head(const std::string& entry, const std::string& field, std::span<const std::uint8_t> jpeg,
+                     Findings& findings) {
+  findings.require(!read_segments(jpeg).has_profile, {"jpeg-head", "F10"}, entry, field,
+                   "neither EXIF nor a colour profile", "one");
+}
+
+void check_source_rung(const TextureInfo& texture, std::span<const std::span<const std::uint8_t>> tables,
+                       Findings& findings) {
+  const std::string& entry = texture.tables.path;
+  const JpegSegments last = read_segments(tables.back());
+  std::uint32_t h = 1, v = 1;
+  for (const std::uint8_t factors : last.frame) {
+    h = std::max<std::uint32_t>(h, factors >> 4), v = std::max<std::uint32_t>(v, factors & 15);
+    const auto is_factor = [](int f) { return f == 1 || f == 2 || f == 4; };
+    findings.require(is_factor(factors >> 4) && is_factor(factors & 15), {"source-rung", "F13"}, entry, "",
+                     "sampling factors 1, 2 and 4",
+                     std::to_string(factors >> 4) + ", " + std::to_string(factors & 15));
+  }
+  for (std::size_t r = 0; r < tables.size(); ++r)
+    findings.require(read_segments(tables[r]).frame == last.frame, {"source-rung", "F13"}, entry,
+                     "rung " + std::to_string(r), "the components of the last rung", "others");
+  findings.require(!last.has_restarts, {"source-rung", "F12"}, entry, "last rung", "no restart interval",
+                   "one");
+  findings.require(
+      texture.fragment_width_px % (8 * h) == 0 && texture.fragment_height_px % (8 * v) == 0,
+      {"source-rung", "F12"}, entry, "last rung", "fragments of whole MCUs",
+      std::to_string(texture.fragment_width_px) + " x " + std::to_string(texture.fragment_height_px) + " px");
+}
+
+/// textures.json and tables.bin against the manifest and each other: counts, grids, rungs, entry sizes.
+void check_textures(const Manifest& m, const std::vector<TextureInfo>& textures, const PackageTables& tables,
+                    Findings& findings) {
+  findings.require_equal<std::uint64_t>(m.plane_count, textures.size(), {"textures", "R04"}, kTexturesPath,
+                                        "");
+  findings.require_equal<std::uint64_t>(m.plane_count, tables.planes.size(), {"tables", "R04"}, kTablesPath,
+                                        "planes");
+  std::set<std::tuple<std::uint32_t, bool, std::uint32_t>> seen;
+  for (std::size_t k = 0; k < std::min(textures.size(), tables.planes.size()); ++k) {
+    const TextureInfo& info = textures[k];
+    const PlaneTables& t = tables.planes[k];
+    const std::string place = "/" + std::to_string(k);
+    findings.require(seen.insert({info.image, info.role == "alpha", info.mip}).second, {"textures", "X08"},
+                     kTexturesPath, place,
+                     "one plane for the colours and one for the alpha of image " +
+                         std::to_string(info.image) + " at every size",
+                     "another");
+    findings.require(info.columns == t.columns && info.rows == t.rows, {"tables-grid", "R08"}, kTablesPath,
+                     plane_field(k, "grid"), std::to_string(info.columns) + " x " + std::to_string(info.rows),
+                     std::to_string(t.columns) + " x " + std::to_string(t.rows));
+    findings.require_equal<std::uint64_t>(m.scales.size(), t.scale_count(), {"tables-scales", "R11"},
+                                          kTablesPath, plane_field(k, "scales"));
+    findings.require(std::equal(info.rung_quality.begin(), info.rung_quality.end(), t.rung_quality.begin(),
+                                t.rung_quality.end()) &&
+                         info.rungs.size() == info.rung_quality.size(),
+                     {"tables-rungs", "R09"}, kTablesPath, plane_field(k, "rungs"),
+                     std::to_string(info.rung_quality.size()) + " rungs of the qualities in textures.json",
+                     std::to_string(t.rung_quality.size()) + " rungs");
+    const CodecTraits& codec = codec_traits(info.codec);
+    findings.require(codec.incremental == t.incremental, {"tables-codec", "R10"}, kTablesPath,
+                     plane_field(k, "incremental"),
+                     codec.incremental ? "set, for codec " + std::string(codec.id) : "not set",
+                     "the opposite");
+    findings.require(
+        codec.required_feature.empty() ||
+            std::count(m.required_features.begin(), m.required_features.end(), codec.required_feature) > 0,
+        {"textures", "R05"}, kManifestPath, "/requiredFeatures", std::string(codec.required_feature),
+        "codec " + std::string(codec.id) + " without it");
+    findings.require_equal(sum(t.table_bytes), info.tables.bytes, {"tables-size", "R12"}, info.tables.path,
+                           "bytes");
+    for (std::size_t r = 0; r < std::min(info.rungs.size(), t.rung_count()); ++r) {
+      std::uint64_t bytes = 0;
+      for (std::size_t i = 0; i < t.fragment_count(); ++i) bytes += t.size_bytes[r * t.fragment_count() + i];
+      findings.require_equal(bytes, info.rungs[r].bytes, {"tables-size", "R13"}, info.rungs[r].path, "bytes");
+    }
+  }
+}
+
+/// One plane's tables in themselves: order, surface, covered texels.
+void check_plane_tables(const TextureInfo& texture, std::uint32_t plane, const PlaneTables& t,
+                        Findings& findings) {
+  check_order(plane, t, findings);
+  double surface = 0;
+  const std::uint64_t texels =
+      static_cast<std::uint64_t>(texture.fragment_width_px) * texture.fragment_height_px;
+  for (std::size_t i = 0; i < t.fragment_count(); ++i) {
+    surface += static_cast<double>(t.surface_fraction[i]);
+    findings.require(t.covered_texels[i] <= texels, {"tables", "T11"}, kTablesPath,
+                     plane_field(plane, "covered texels of fragment " + std::to_string(i)),
+                     "at most " + std::to_string(texels), std::to_string(t.covered_texels[i]));
+  }
+  findings.require(surface <= 1.001, {"tables", "T11"}, kTablesPath, plane_field(plane, "surface"),
+                   "at most the whole surface, 1", shortest(surface, 6));
+}
+
+void check_preview(const TextureInfo& texture, std::span<const std::uint8_t> jpeg, Findings& findings) {
+  try {
+    check_jpeg_head(texture.preview.path, "", jpeg, findings);
+    const Pixels p = decode_jpeg(jpeg, 1ull << 26);
+    findings.require(p.width_px == texture.preview_width_px && p.height_px == texture.preview_height_px &&
+                         p.channels == texture.channels,
+                     {"preview", "F16"}, texture.preview.path, "",
+                     shape_text(texture.preview_width_px, texture.preview_height_px, texture.channels),
+                     shape_text(p.width_px, p.height_px, p.channels));
+  } catch (const Error& e) {
+    findings.add({"preview", "F16"}, texture.preview.path, e.place(), e.expected(), e.found());
+  }
+}
+
+/// The source image that a plane keeps: of that format and the plane's size, and it decodes.
+void check_source(const TextureInfo& texture, std::vector<std::uint8_t> bytes, Findings& findings) {
+  try {
+    const Image image = probe_image(texture.source.path, std::move(bytes), {});
+    findings.require(image_extension(image.format) == texture.source_extension &&
+                         image.width_px == texture.width_px && image.height_px == texture.height_px &&
+                         image.channels >= texture.channels,
+                     {"source", "O02"}, texture.source.path, "",
+                     texture.source_extension + " of " + std::to_string(texture.width_px) + " x " +
+                         std::to_string(texture.height_px) + " px",
+                     std::string(image_extension(image.format)) + " of " + std::to_string(image.width_px) +
+                         " x " + std::to_string(image.height_px) + " px");
+    decode_image(image);
+  } catch (const Error& e) {
+    findings.add({"source", "O02"}, texture.source.path, e.place(), e.expected(), e.found());
+  }
+}
+
+/// The table streams of all rungs: each as the codec has it, of the size the tables say.
+void check_table_streams(const TextureInfo& texture, const PlaneTables& t, std::span<const std::uint8_t> pack,
+                         Findings& findings) {
+  if (pack.size() != sum(t.table_bytes)) return;  // check_textures says so
+  std::size_t offset = 0;
+  std::vector<std::span<const std::uint8_t>> streams;
+  for (std::size_t r = 0; r < t.rung_count(); ++r) {
+    streams.push_back(pack.subspan(offset, t.table_bytes[r]));
+    check_jpeg_head(texture.tables.path, "rung " + std::to_string(r), streams.back(), findings);
+    findings.require(
+        is_table_stream(texture.codec, static_cast<std::uint32_t>(r), pack.subspan(offset, t.table_bytes[r])),
+        {"table-stream", is_baseline(texture.codec) ? "F05" : "F06"}, texture.tables.path,
+        "rung " + std::to_string(r),
+        "a table stream of " + std::string(codec_traits(texture.codec).id) + " in " +
+            std::to_string(t.table_bytes[r]) + " bytes",
+        "other bytes");
+    offset += t.table_bytes[r];
+  }
+  if (texture.source_rung) check_source_rung(texture, streams, findings);
+}
+
+/// All fragments of the rung that was added to `streams` last: digest, and the decoded image's size and
+/// channels. Returns the number of fragments looked at.
+std::uint64_t check_rung(const TextureInfo& texture, const PlaneTables& t, std::uint32_t rung,
+                         const PlaneStreams& streams, const RunContext& context, Findings& findings) {
+  std::vector<Findings> per_fragment(t.order.size());
+  parallel_for(context, t.order.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k)
+      check_fragment(texture, t, rung, t.order[k], streams, per_fragment[k]);
+  });
+  for (Findings& f : per_fragment) findings.append(std::move(f));
+  return t.order.size();
+}
 
 constexpr std::uint64_t kMostProvenanceBytes = 64u << 20;
 
@@ -91,20 +299,81 @@ class CheckedStore {
   CheckedStore(PackageStore& store, Findings& findings, VerifyReport& report)
       : store_(store), findings_(findings), report_(report) {}
 
-  void list_entries();
-  Bytes read_manifest();
+  void list_entries() {
+    guarded(findings_, "container", "", [&] { listed_ = store_.list(); });
+    for (const ContainerEntry& e : listed_) by_path_[e.path] = &e;
+    if (store_.is_folder() || listed_.empty()) return;
+    findings_.require_equal(std::string(kManifestPath), listed_.front().path, {"bootstrap", "K11"}, "",
+                            "first entry");
+    const std::uint64_t end = listed_.front().offset + listed_.front().bytes;
+    findings_.require(end <= kBootstrapBytes, {"bootstrap", "K12"}, kManifestPath, "end",
+                      "at most byte " + std::to_string(kBootstrapBytes), "byte " + std::to_string(end));
+  }
+  Bytes read_manifest() {
+    Bytes bytes = store_.read_manifest();
+    check_stored(kManifestPath, bytes, 0);
+    return bytes;
+  }
   /// FormatError when the bytes are not there.
-  Bytes read(const EntryRef& ref);
+  Bytes read(const EntryRef& ref) {
+    Bytes bytes = store_.read(ref, 0, ref.bytes);
+    findings_.require_equal(to_hex(ref.digest), to_hex(sha256(bytes)), {"entry-digest", "I08"}, ref.path,
+                            "sha256");
+    check_stored(ref.path, bytes, ref.offset);
+    return bytes;
+  }
   /// The index names exactly what is there, in the order that the format prescribes.
-  void check_entry_set(std::vector<EntryRef> index, const EntryRef& index_entry);
+  void check_entry_set(std::vector<EntryRef> index, const EntryRef& index_entry) {
+    if (listed_.empty()) return;  // "container" says why
+    index.insert(std::ranges::upper_bound(index, index_entry.offset, {}, &EntryRef::offset), index_entry);
+    std::vector<std::string> named{kManifestPath};
+    for (const EntryRef& e : index) named.push_back(e.path);
+    for (const std::string& path : named)
+      findings_.require(contains(path), {"entry-set", "I08"}, path, "",
+                        "an entry of the package, as the index says", "none");
+    std::vector<std::string> sorted = named;
+    std::sort(sorted.begin(), sorted.end());
+    for (const ContainerEntry& e : listed_) {
+      const bool extra = store_.is_folder() && (parse_entry_path(e.path).kind == EntryKind::kFragmentFile ||
+                                                e.path == kFragmentIndexPath);
+      if (e.path == kContentCredentialPath)
+        check_content_credential(e);
+      else if (!extra && !std::binary_search(sorted.begin(), sorted.end(), e.path))
+        findings_.add({"entry-set", "I08"}, e.path, "", "to be named by the index", "not there");
+    }
+    const std::vector<std::string> order = streaming_order(named);
+    for (std::size_t k = 0; k < std::min(order.size(), named.size()); ++k)
+      if (!findings_.require_equal(order[k], named[k], {"entry-order", "E04"}, kIndexPath,
+                                   "entry " + std::to_string(k)))
+        break;
+  }
 
   PackageStore& store() { return store_; }
   const std::vector<ContainerEntry>& listed() const { return listed_; }
   bool contains(const std::string& path) const { return by_path_.contains(path); }
 
  private:
-  void check_content_credential(const ContainerEntry& entry);
-  void check_stored(const std::string& path, const Bytes& bytes, std::uint64_t offset);
+  /// It is the last entry: list() has seen to that.
+  void check_content_credential(const ContainerEntry& entry) {
+    report_.content_credential = true;
+    findings_.require(entry.bytes > 0 && entry.bytes <= kMaxContentCredentialBytes,
+                      {"content-credential", "O07"}, entry.path, "",
+                      "1 to " + std::to_string(kMaxContentCredentialBytes) + " bytes",
+                      std::to_string(entry.bytes));
+  }
+  void check_stored(const std::string& path, const Bytes& bytes, std::uint64_t offset) {
+    ++report_.entries;
+    report_.bytes += bytes.size();
+    const auto it = by_path_.find(path);
+    if (it == by_path_.end()) return;  // check_entry_set says so
+    if (!store_.is_folder())
+      findings_.require_equal(hex8(crc_of(bytes)), hex8(it->second->crc32), {"entry-crc", "K07"}, path,
+                              "CRC-32");
+    if (!store_.is_folder() && path != kManifestPath)
+      findings_.require_equal(it->second->offset, offset, {"entry-set", "I08"}, path, "offset");
+    findings_.require_equal<std::uint64_t>(it->second->bytes, bytes.size(), {"entry-set", "I08"}, path,
+                                           "bytes");
+  }
 
   PackageStore& store_;
   Findings& findings_;
@@ -112,78 +381,6 @@ class CheckedStore {
   std::vector<ContainerEntry> listed_;
   std::map<std::string, const ContainerEntry*> by_path_;
 };
-
-void CheckedStore::list_entries() {
-  guarded(findings_, "container", "", [&] { listed_ = store_.list(); });
-  for (const ContainerEntry& e : listed_) by_path_[e.path] = &e;
-  if (store_.is_folder() || listed_.empty()) return;
-  findings_.require_equal(std::string(kManifestPath), listed_.front().path, {"bootstrap", "K11"}, "",
-                          "first entry");
-  const std::uint64_t end = listed_.front().offset + listed_.front().bytes;
-  findings_.require(end <= kBootstrapBytes, {"bootstrap", "K12"}, kManifestPath, "end",
-                    "at most byte " + std::to_string(kBootstrapBytes), "byte " + std::to_string(end));
-}
-
-Bytes CheckedStore::read_manifest() {
-  Bytes bytes = store_.read_manifest();
-  check_stored(kManifestPath, bytes, 0);
-  return bytes;
-}
-
-Bytes CheckedStore::read(const EntryRef& ref) {
-  Bytes bytes = store_.read(ref, 0, ref.bytes);
-  findings_.require_equal(to_hex(ref.digest), to_hex(sha256(bytes)), {"entry-digest", "I08"}, ref.path,
-                          "sha256");
-  check_stored(ref.path, bytes, ref.offset);
-  return bytes;
-}
-
-void CheckedStore::check_stored(const std::string& path, const Bytes& bytes, std::uint64_t offset) {
-  ++report_.entries;
-  report_.bytes += bytes.size();
-  const auto it = by_path_.find(path);
-  if (it == by_path_.end()) return;  // check_entry_set says so
-  if (!store_.is_folder())
-    findings_.require_equal(hex8(crc_of(bytes)), hex8(it->second->crc32), {"entry-crc", "K07"}, path,
-                            "CRC-32");
-  if (!store_.is_folder() && path != kManifestPath)
-    findings_.require_equal(it->second->offset, offset, {"entry-set", "I08"}, path, "offset");
-  findings_.require_equal<std::uint64_t>(it->second->bytes, bytes.size(), {"entry-set", "I08"}, path,
-                                         "bytes");
-}
-
-/// It is the last entry: list() has seen to that.
-void CheckedStore::check_content_credential(const ContainerEntry& entry) {
-  report_.content_credential = true;
-  findings_.require(
-      entry.bytes > 0 && entry.bytes <= kMaxContentCredentialBytes, {"content-credential", "O07"}, entry.path,
-      "", "1 to " + std::to_string(kMaxContentCredentialBytes) + " bytes", std::to_string(entry.bytes));
-}
-
-void CheckedStore::check_entry_set(std::vector<EntryRef> index, const EntryRef& index_entry) {
-  if (listed_.empty()) return;  // "container" says why
-  index.insert(std::ranges::upper_bound(index, index_entry.offset, {}, &EntryRef::offset), index_entry);
-  std::vector<std::string> named{kManifestPath};
-  for (const EntryRef& e : index) named.push_back(e.path);
-  for (const std::string& path : named)
-    findings_.require(contains(path), {"entry-set", "I08"}, path, "",
-                      "an entry of the package, as the index says", "none");
-  std::vector<std::string> sorted = named;
-  std::sort(sorted.begin(), sorted.end());
-  for (const ContainerEntry& e : listed_) {
-    const bool extra = store_.is_folder() && (parse_entry_path(e.path).kind == EntryKind::kFragmentFile ||
-                                              e.path == kFragmentIndexPath);
-    if (e.path == kContentCredentialPath)
-      check_content_credential(e);
-    else if (!extra && !std::binary_search(sorted.begin(), sorted.end(), e.path))
-      findings_.add({"entry-set", "I08"}, e.path, "", "to be named by the index", "not there");
-  }
-  const std::vector<std::string> order = streaming_order(named);
-  for (std::size_t k = 0; k < std::min(order.size(), named.size()); ++k)
-    if (!findings_.require_equal(order[k], named[k], {"entry-order", "E04"}, kIndexPath,
-                                 "entry " + std::to_string(k)))
-      break;
-}
 
 /// The documents of a package, as far as they could be read.
 struct VerifiedDocuments {
@@ -202,17 +399,132 @@ class EntryVerifier {
       : store_(store), package_(package), context_(context), findings_(findings), report_(report) {}
 
   /// In container order.
-  void check_entry(const EntryRef& e);
+  void check_entry(const EntryRef& e) {
+    const EntryName name = parse_entry_path(e.path);
+    const bool texture = name.kind == EntryKind::kPreview || name.kind == EntryKind::kTableStreams ||
+                         name.kind == EntryKind::kRung;
+    if (name.kind == EntryKind::kMesh) {
+      guarded(findings_, "entry-read", e.path, [&] { check_mesh_entry(e, static_cast<int>(name.number)); });
+    } else if (name.kind == EntryKind::kProxy) {
+      guarded(findings_, "entry-read", e.path, [&] { check_proxy_entry(e, name.number); });
+    } else if (texture) {
+      guarded(findings_, "entry-read", e.path, [&] { check_texture_entry(e, name); });
+    } else if (name.kind == EntryKind::kSplitStream) {
+      guarded(findings_, {"split-stream", "S08"}, e.path,
+              [&] { check_split_stream(package_.manifest, store_.read(e), share_, context_, findings_); });
+    } else if (name.kind == EntryKind::kPoster) {
+      guarded(findings_, {"poster", "O01"}, e.path, [&] { check_poster_entry(e); });
+    } else if (name.kind == EntryKind::kThesis) {
+      findings_.require(package_.manifest.thesis.has_value(), {"entry-set", "E03"}, e.path, "",
+                        "to be named by the manifest", "not there");
+    } else if (name.kind == EntryKind::kSource) {
+      guarded(findings_, {"source", "O02"}, e.path, [&] { check_source_entry(e, name); });
+    } else if (name.kind == EntryKind::kOther || name.kind == EntryKind::kFragmentFile) {
+      findings_.require(package_.manifest.minor > kFormatMinor, {"entry-unknown", "E03"}, e.path, "",
+                        "an entry that format " + std::to_string(kFormatMajor) + "." +
+                            std::to_string(kFormatMinor) + " defines",
+                        "another");
+      guarded(findings_, "entry-read", e.path, [&] { store_.read(e); });
+    }
+  }
   /// Fragment files of `unpack --fragments files`: each is its fragment with the rung's tables in front.
-  void check_extra_files();
+  void check_extra_files() {
+    if (!package_.textures || !package_.tables || !store_.contains(kFragmentIndexPath)) {
+      for (const ContainerEntry& e : store_.listed())
+        if (parse_entry_path(e.path).kind == EntryKind::kFragmentFile)
+          findings_.add("fragment-file", e.path, "",
+                        std::string("a ") + kFragmentIndexPath + " beside fragment files", "none");
+      return;
+    }
+    if (std::find(package_.consistent.begin(), package_.consistent.end(), false) != package_.consistent.end())
+      return;
+    guarded(findings_, "fragment-file", kFragmentIndexPath, [&] {
+      check_fragment_files(store_.store(), store_.listed(), *package_.textures, *package_.tables, findings_);
+    });
+  }
 
  private:
-  void check_mesh_entry(const EntryRef& e, int number);
-  void check_proxy_entry(const EntryRef& e, std::size_t number);
-  void check_texture_entry(const EntryRef& e, const EntryName& name);
-  void check_source_entry(const EntryRef& e, const EntryName& name);
-  void check_poster_entry(const EntryRef& e);
-  void check_rung_entry(const TextureInfo& info, const PlaneTables& t, const EntryName& name, Bytes bytes);
+  void check_mesh_entry(const EntryRef& e, int number) {
+    const Bytes bytes = store_.read(e);
+    const auto scale = std::find_if(package_.manifest.scales.begin(), package_.manifest.scales.end(),
+                                    [&](const ManifestScale& s) { return s.scale == number; });
+    if (!findings_.require(scale != package_.manifest.scales.end() && scale->has_glb(), {"entry-set", "E03"},
+                           e.path, "", "a file of a scale of the manifest", "none"))
+      return;
+    ++report_.meshes;
+    std::vector<Vec3d> positions = check_mesh(package_.manifest, *scale, package_.textures, bytes, findings_);
+    if (!positions.empty()) check_shared(e.path, bytes, share_, findings_);
+    // Meshes stand from coarse to fine; any other order is a finding of "entry-order".
+    if (coarser_ && coarser_->scale > scale->scale)
+      check_nested(*scale, positions, *coarser_, coarser_positions_, findings_);
+    coarser_ = &*scale;
+    coarser_positions_ = std::move(positions);
+  }
+  void check_proxy_entry(const EntryRef& e, std::size_t number) {
+    const Bytes bytes = store_.read(e);
+    const std::vector<ManifestProxy>& proxies = package_.manifest.proxies;
+    if (!findings_.require(number < proxies.size(), "entry-set", e.path, "", "to be named by the manifest",
+                           "not there"))
+      return;
+    ++report_.meshes;
+    check_proxy(package_.manifest, proxies[number], bytes, findings_);
+  }
+  void check_texture_entry(const EntryRef& e, const EntryName& name) {
+    const Bytes bytes = store_.read(e);
+    if (!package_.textures || !package_.tables) return;  // they have their findings
+    const std::size_t plane = name.number;
+    if (!findings_.require(plane < package_.textures->size(), {"entry-set", "E03"}, e.path, "",
+                           "a plane of textures.json", "none"))
+      return;
+    const TextureInfo& info = (*package_.textures)[plane];
+    if (name.kind == EntryKind::kPreview) {
+      ++report_.previews;
+      check_preview(info, bytes, findings_);
+    }
+    if (plane >= package_.consistent.size() || !package_.consistent[plane]) return;
+    const PlaneTables& t = package_.tables->planes[plane];
+    if (name.kind == EntryKind::kTableStreams) {
+      check_table_streams(info, t, bytes, findings_);
+    } else if (name.kind == EntryKind::kRung) {
+      if (!findings_.require(name.rung < t.rung_count(), {"entry-set", "E03"}, e.path, "",
+                             "a rung of textures.json", "none"))
+        return;
+      check_rung_entry(info, t, name, bytes);
+    }
+  }
+  void check_source_entry(const EntryRef& e, const EntryName& name) {
+    Bytes bytes = store_.read(e);
+    if (!package_.textures) return;
+    const bool named = name.number < package_.textures->size() &&
+                       (*package_.textures)[name.number].source_extension == name.extension;
+    if (findings_.require(named, {"entry-set", "E03"}, e.path, "", "to be named by textures.json",
+                          "not there"))
+      check_source((*package_.textures)[name.number], std::move(bytes), findings_);
+  }
+  void check_poster_entry(const EntryRef& e) {
+    const Bytes bytes = store_.read(e);
+    const std::optional<PosterRef>& poster = package_.manifest.poster;
+    if (!findings_.require(poster.has_value(), {"entry-set", "E03"}, e.path, "",
+                           "to be named by the manifest", "not there"))
+      return;
+    const Pixels pixels = decode_jpeg(bytes, std::uint64_t{kMaxPosterSide} * kMaxPosterSide);
+    findings_.require_equal(poster->width_px, pixels.width_px, {"poster", "O01"}, e.path, "width");
+    findings_.require_equal(poster->height_px, pixels.height_px, {"poster", "O01"}, e.path, "height");
+  }
+  void check_rung_entry(const TextureInfo& info, const PlaneTables& t, const EntryName& name, Bytes bytes) {
+    std::uint64_t table_bytes = 0, rung_bytes = 0;
+    for (const std::uint32_t n : t.table_bytes) table_bytes += n;
+    for (std::size_t f = 0; f < t.fragment_count(); ++f)
+      rung_bytes += t.size_bytes[name.rung * t.fragment_count() + f];
+    if (info.tables.bytes != table_bytes || bytes.size() != rung_bytes) return;  // check_textures says so
+    auto streams = streams_.find(name.number);
+    if (streams == streams_.end())
+      streams =
+          streams_.try_emplace(name.number, info.codec, t, store_.store().read(info.tables, 0, table_bytes))
+              .first;
+    streams->second.add_pack(name.rung, std::move(bytes));
+    report_.fragments += check_rung(info, t, name.rung, streams->second, context_, findings_);
+  }
 
   CheckedStore& store_;
   const VerifiedDocuments& package_;
@@ -224,137 +536,6 @@ class EntryVerifier {
   MeshShare share_;
   std::map<std::uint32_t, PlaneStreams> streams_;  // per plane
 };
-
-void EntryVerifier::check_entry(const EntryRef& e) {
-  const EntryName name = parse_entry_path(e.path);
-  const bool texture = name.kind == EntryKind::kPreview || name.kind == EntryKind::kTableStreams ||
-                       name.kind == EntryKind::kRung;
-  if (name.kind == EntryKind::kMesh) {
-    guarded(findings_, "entry-read", e.path, [&] { check_mesh_entry(e, static_cast<int>(name.number)); });
-  } else if (name.kind == EntryKind::kProxy) {
-    guarded(findings_, "entry-read", e.path, [&] { check_proxy_entry(e, name.number); });
-  } else if (texture) {
-    guarded(findings_, "entry-read", e.path, [&] { check_texture_entry(e, name); });
-  } else if (name.kind == EntryKind::kSplitStream) {
-    guarded(findings_, {"split-stream", "S08"}, e.path,
-            [&] { check_split_stream(package_.manifest, store_.read(e), share_, context_, findings_); });
-  } else if (name.kind == EntryKind::kPoster) {
-    guarded(findings_, {"poster", "O01"}, e.path, [&] { check_poster_entry(e); });
-  } else if (name.kind == EntryKind::kThesis) {
-    findings_.require(package_.manifest.thesis.has_value(), {"entry-set", "E03"}, e.path, "",
-                      "to be named by the manifest", "not there");
-  } else if (name.kind == EntryKind::kSource) {
-    guarded(findings_, {"source", "O02"}, e.path, [&] { check_source_entry(e, name); });
-  } else if (name.kind == EntryKind::kOther || name.kind == EntryKind::kFragmentFile) {
-    findings_.require(package_.manifest.minor > kFormatMinor, {"entry-unknown", "E03"}, e.path, "",
-                      "an entry that format " + std::to_string(kFormatMajor) + "." +
-                          std::to_string(kFormatMinor) + " defines",
-                      "another");
-    guarded(findings_, "entry-read", e.path, [&] { store_.read(e); });
-  }
-}
-
-void EntryVerifier::check_mesh_entry(const EntryRef& e, int number) {
-  const Bytes bytes = store_.read(e);
-  const auto scale = std::find_if(package_.manifest.scales.begin(), package_.manifest.scales.end(),
-                                  [&](const ManifestScale& s) { return s.scale == number; });
-  if (!findings_.require(scale != package_.manifest.scales.end() && scale->has_glb(), {"entry-set", "E03"},
-                         e.path, "", "a file of a scale of the manifest", "none"))
-    return;
-  ++report_.meshes;
-  std::vector<Vec3d> positions = check_mesh(package_.manifest, *scale, package_.textures, bytes, findings_);
-  if (!positions.empty()) check_shared(e.path, bytes, share_, findings_);
-  // Meshes stand from coarse to fine; any other order is a finding of "entry-order".
-  if (coarser_ && coarser_->scale > scale->scale)
-    check_nested(*scale, positions, *coarser_, coarser_positions_, findings_);
-  coarser_ = &*scale;
-  coarser_positions_ = std::move(positions);
-}
-
-void EntryVerifier::check_proxy_entry(const EntryRef& e, std::size_t number) {
-  const Bytes bytes = store_.read(e);
-  const std::vector<ManifestProxy>& proxies = package_.manifest.proxies;
-  if (!findings_.require(number < proxies.size(), "entry-set", e.path, "", "to be named by the manifest",
-                         "not there"))
-    return;
-  ++report_.meshes;
-  check_proxy(package_.manifest, proxies[number], bytes, findings_);
-}
-
-void EntryVerifier::check_texture_entry(const EntryRef& e, const EntryName& name) {
-  const Bytes bytes = store_.read(e);
-  if (!package_.textures || !package_.tables) return;  // they have their findings
-  const std::size_t plane = name.number;
-  if (!findings_.require(plane < package_.textures->size(), {"entry-set", "E03"}, e.path, "",
-                         "a plane of textures.json", "none"))
-    return;
-  const TextureInfo& info = (*package_.textures)[plane];
-  if (name.kind == EntryKind::kPreview) {
-    ++report_.previews;
-    check_preview(info, bytes, findings_);
-  }
-  if (plane >= package_.consistent.size() || !package_.consistent[plane]) return;
-  const PlaneTables& t = package_.tables->planes[plane];
-  if (name.kind == EntryKind::kTableStreams) {
-    check_table_streams(info, t, bytes, findings_);
-  } else if (name.kind == EntryKind::kRung) {
-    if (!findings_.require(name.rung < t.rung_count(), {"entry-set", "E03"}, e.path, "",
-                           "a rung of textures.json", "none"))
-      return;
-    check_rung_entry(info, t, name, bytes);
-  }
-}
-
-void EntryVerifier::check_source_entry(const EntryRef& e, const EntryName& name) {
-  Bytes bytes = store_.read(e);
-  if (!package_.textures) return;
-  const bool named = name.number < package_.textures->size() &&
-                     (*package_.textures)[name.number].source_extension == name.extension;
-  if (findings_.require(named, {"entry-set", "E03"}, e.path, "", "to be named by textures.json", "not there"))
-    check_source((*package_.textures)[name.number], std::move(bytes), findings_);
-}
-
-void EntryVerifier::check_poster_entry(const EntryRef& e) {
-  const Bytes bytes = store_.read(e);
-  const std::optional<PosterRef>& poster = package_.manifest.poster;
-  if (!findings_.require(poster.has_value(), {"entry-set", "E03"}, e.path, "", "to be named by the manifest",
-                         "not there"))
-    return;
-  const Pixels pixels = decode_jpeg(bytes, std::uint64_t{kMaxPosterSide} * kMaxPosterSide);
-  findings_.require_equal(poster->width_px, pixels.width_px, {"poster", "O01"}, e.path, "width");
-  findings_.require_equal(poster->height_px, pixels.height_px, {"poster", "O01"}, e.path, "height");
-}
-
-void EntryVerifier::check_rung_entry(const TextureInfo& info, const PlaneTables& t, const EntryName& name,
-                                     Bytes bytes) {
-  std::uint64_t table_bytes = 0, rung_bytes = 0;
-  for (const std::uint32_t n : t.table_bytes) table_bytes += n;
-  for (std::size_t f = 0; f < t.fragment_count(); ++f)
-    rung_bytes += t.size_bytes[name.rung * t.fragment_count() + f];
-  if (info.tables.bytes != table_bytes || bytes.size() != rung_bytes) return;  // check_textures says so
-  auto streams = streams_.find(name.number);
-  if (streams == streams_.end())
-    streams =
-        streams_.try_emplace(name.number, info.codec, t, store_.store().read(info.tables, 0, table_bytes))
-            .first;
-  streams->second.add_pack(name.rung, std::move(bytes));
-  report_.fragments += check_rung(info, t, name.rung, streams->second, context_, findings_);
-}
-
-void EntryVerifier::check_extra_files() {
-  if (!package_.textures || !package_.tables || !store_.contains(kFragmentIndexPath)) {
-    for (const ContainerEntry& e : store_.listed())
-      if (parse_entry_path(e.path).kind == EntryKind::kFragmentFile)
-        findings_.add("fragment-file", e.path, "",
-                      std::string("a ") + kFragmentIndexPath + " beside fragment files", "none");
-    return;
-  }
-  if (std::find(package_.consistent.begin(), package_.consistent.end(), false) != package_.consistent.end())
-    return;
-  guarded(findings_, "fragment-file", kFragmentIndexPath, [&] {
-    check_fragment_files(store_.store(), store_.listed(), *package_.textures, *package_.tables, findings_);
-  });
-}
 
 class Verifier {
  public:
@@ -474,10 +655,6 @@ class Verifier {
 
 VerifyReport verify_package(PackageStore& store, const RunContext& context) {
   return Verifier(store, context).run();
-}
-
-std::string verify_json(const std::vector<VerifiedPackage>& packages) {
-  return to_json_line(VerifiedPackages{packages});
 }
 
 DocumentSchema verify_schema() {

@@ -1,15 +1,24 @@
 #pragma once
-#include <cstdint>
-#include <string>
-#include <vector>
 
 #include "delivery/cpp/package/package_reader.h"
 #include "format/base/finding.h"
+#include "pipeline/io/record.h"
 #include "stages/base/run_context.h"
 
 namespace texmesh {
 
-struct DocumentSchema;  // pipeline/io/record.h
+template <>
+struct RecordFields<Finding> {
+  static void fields(auto& s, auto&& v) {
+    v("check", s.check, FieldRule{.pattern = "^[a-z0-9-]+$"}, "");
+    v("rule", s.rule, FieldRule{.pattern = "^([A-Z][0-9][0-9])?$"},
+      "the rule of format/SPEC.md that is broken");
+    v("entry", s.entry, "");
+    v("field", s.field, "");
+    v("expected", s.expected, "");
+    v("found", s.found, "");
+  }
+};
 
 struct VerifyReport {
   std::vector<Finding> findings;  // in package order; empty = the package is sound
@@ -25,13 +34,26 @@ struct VerifyReport {
 /// cancelled.
 VerifyReport verify_package(PackageStore& store, const RunContext& context);
 
-/// What `verify --json` prints of one package.
 struct VerifiedPackage {
   std::string package;  // as the user named it
   VerifyReport report;
+  static void fields(auto& s, auto&& v) {
+    v("package", s.package, "");
+    v("ok", s.report.findings.empty(), "");
+    v("entries", s.report.entries, "");
+    v("bytes", s.report.bytes, "");
+    v("meshes", s.report.meshes, "");
+    v("previews", s.report.previews, "");
+    v("fragments", s.report.fragments, "");
+    v("content_credential", s.report.content_credential, "there is one; what it says was not checked");
+    v("findings", s.report.findings, "");
+  }
 };
-/// One line of JSON (schemas/verify.v1.schema.json).
-std::string verify_json(const std::vector<VerifiedPackage>& packages);
+/// What `verify --json` prints.
+struct VerifiedPackages {
+  std::vector<VerifiedPackage> packages;
+  static void fields(auto& s, auto&& v) { v("packages", s.packages, ""); }
+};
 DocumentSchema verify_schema();
 
 }  // namespace texmesh

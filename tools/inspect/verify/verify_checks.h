@@ -1,15 +1,10 @@
 #pragma once
-#include <optional>
-#include <span>
-#include <vector>
 
-#include "delivery/cpp/package/plane_streams.h"
+#include "delivery/cpp/package/package_reader.h"
 #include "format/base/finding.h"
-#include "format/base/vec.h"
 #include "format/documents/about.h"
 #include "format/documents/manifest.h"
 #include "format/documents/quality_table.h"
-#include "format/documents/tables.h"
 #include "format/documents/textures.h"
 #include "format/documents/thesis_tables.h"
 #include "stages/base/run_context.h"
@@ -27,14 +22,6 @@ void check_manifest(const Manifest& manifest, Findings& findings);
 
 /// Every place that the manifest names (offset, bytes, digest) is where the index has it.
 void check_references(const Manifest& manifest, const std::vector<EntryRef>& index, Findings& findings);
-
-/// textures.json and tables.bin against the manifest and each other: counts, grids, rungs, entry sizes.
-void check_textures(const Manifest& manifest, const std::vector<TextureInfo>& textures,
-                    const PackageTables& tables, Findings& findings);
-
-/// One plane's tables in themselves: order, surface, covered texels.
-void check_plane_tables(const TextureInfo& texture, std::uint32_t plane, const PlaneTables& tables,
-                        Findings& findings);
 
 /// thesis.bin against what tables.bin says of the scales that are stored: fragments, Q_i, D_i(Gamma).
 void check_thesis(const Manifest& manifest, const PackageTables& tables, const ThesisTables& thesis,
@@ -81,19 +68,5 @@ void check_nested(const ManifestScale& finer, const std::vector<Vec3d>& finer_po
 /// it passes; its groups are of the files' materials. FormatError where it cannot be decoded.
 void check_split_stream(const Manifest& manifest, std::span<const std::uint8_t> bytes, const MeshShare& share,
                         const RunContext& context, Findings& findings);
-
-void check_preview(const TextureInfo& texture, std::span<const std::uint8_t> jpeg, Findings& findings);
-
-/// The source image that a plane keeps: of that format and the plane's size, and it decodes.
-void check_source(const TextureInfo& texture, std::vector<std::uint8_t> bytes, Findings& findings);
-
-/// The table streams of all rungs: each as the codec has it, of the size the tables say.
-void check_table_streams(const TextureInfo& texture, const PlaneTables& tables,
-                         std::span<const std::uint8_t> pack, Findings& findings);
-
-/// All fragments of the rung that was added to `streams` last: digest, and the decoded image's size and
-/// channels. Returns the number of fragments looked at.
-std::uint64_t check_rung(const TextureInfo& texture, const PlaneTables& tables, std::uint32_t rung,
-                         const PlaneStreams& streams, const RunContext& context, Findings& findings);
 
 }  // namespace texmesh

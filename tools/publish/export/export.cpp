@@ -6,52 +6,69 @@
 
 #include "delivery/cpp/decide/texture_loss.h"
 #include "format/base/text_bytes.h"
+#include "format/rules/viewing.h"
 #include "pipeline/io/markup.h"
-#include "pipeline/io/new_folder.h"
-#include "pipeline/io/record.h"
 #include "pipeline/io/table.h"
 #include "pipeline/io/uri.h"
 #include "stages/gltf/check_glb.h"
 #include "tools/extract/extract.h"
-#include "tools/publish/export/oembed.h"
-#include "tools/publish/export/tileset.h"
 #include "tools/publish/pages/page.h"
 #include "tools/publish/view/served_files.h"
 
 namespace texmesh {
 namespace {
 
-struct ListedFile {
-  std::string path;
-  std::optional<std::uint64_t> bytes;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
-    v("path", s.path, FieldRule{.pattern = "."},
-      "Relative to the folder. Without `bytes` a copy of the package, or of the viewer's folder.");
-    v("bytes", s.bytes, "");
-  }
-};
-
-/// export.json.
-struct ExportList {
-  ExportTarget target = ExportTarget::k3dTiles;
-  std::string package, open;
-  std::vector<ListedFile> files;
-  std::vector<std::string> notes;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
-    v("texmeshExport", Constant{1}, "");
-    v("target", s.target, "");
-    v("package", s.package, FieldRule{.pattern = "^[0-9a-f]{64}$"},
-      "Id of the package: SHA-256 of its manifest.");
-    v("open", s.open, FieldRule{.pattern = "."},
-      "The file that the target's viewer opens, relative to the folder.");
-    v("files", s.files, FieldRule{.count = Range{1, 1e6}}, "");
-    v("notes", s.notes, "");
-  }
-};
-
 namespace fs = std::filesystem;
+
+std::string document_text(const Json& json) {
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+constexpr double kHighestPx = 4096, kLowestPx = 32;
+constexpr double kWaitingPx = 1;  // left as soon as something finer is there
+/// Thinner boxes have no inside for a viewer, whose distances to them are those to a plane.
+constexpr double kThinnest = 1e-4;
+
+std::array<double, 3> turned(Vec3d v) { return {v.x, -v.z, v.y}; }
+
+/// The centre, then half of each axis.
+std::vector<double> box_of(const Box3d& bounds) {
+  const std::array<double, 3> centre = turned(bounds.centre());
+  const Vec3d half = bounds.size() * 0.5;
+  const double least = std::max({half.x, half.y, half.z}) * kThinnest;
+  std::vector<double> box(centre.begin(), centre.end());
+  box.insert(box.end(), {std::max(half.x, least), 0.0, 0.0, 0.0, std::max(half.z, least), 0.0, 0.0, 0.0,
+                         std::max(half.y, least)});
+  return box;
+}
+
+double geometric_error(const Tileset& t, const TileLevel& level) {
+  if (level.displayed_px >= kAnyDisplayPx) return 0;
+  return t.metres * std::max(level.error_max, t.screen_error_px / level.displayed_px * t.object_height);
+}
+
+Json tile_json(const Tileset& t, const TileLevel& level) {
+  Json tile{{"boundingVolume", {{"box", box_of(t.bounds)}}},
+            {"geometricError", geometric_error(t, level)},
+            {"refine", "REPLACE"},
+            {"content", {{"uri", level.uri}}}};
+  tile["extras"] = {{"scale", level.scale}, {"errorMax", level.error_max}};
+  if (level.displayed_px < kAnyDisplayPx) tile["extras"]["displayedPx"] = level.displayed_px;
+  return tile;
+}
+
+/// What asset.extras say of the object.
+struct TilesetExtras {
+  const About& about;
+  static void fields(auto& s, auto&& v) {
+    v("title", s.about.title, kMayMiss, "");
+    v("creator", s.about.creator, kMayMiss, "");
+    v("copyright", copyright_line(s.about), kMayMiss, "");
+    v("licence", s.about.licence, kMayMiss, "");
+    v("licenceUrl", s.about.licence_url, kMayMiss, "");
+    v("epsg", s.about.epsg, kMayMiss, "");
+  }
+};
 
 constexpr const char* kListFile = "export.json";
 constexpr std::string_view kListBegin = "{\n  \"texmeshExport\": 1,";
@@ -185,7 +202,7 @@ void export_tiles(PackageReader& package, const ExportOptions& options, const Ru
     tileset.levels.push_back(std::move(wanted[k]));
   }
   made.open = "tileset.json";
-  made.files.push_back(text_file("tileset.json", tileset_json(tileset)));
+  made.files.push_back(text_file("tileset.json", tileset_text(tileset)));
 }
 
 void export_lods(PackageReader& package, const ExportOptions& options, const RunContext& context,
@@ -244,16 +261,61 @@ void export_oembed(PackageReader& package, const std::string& path, const Export
     object.thumbnail_height_px = poster->height_px;
   }
   made.open = "index.html";
-  made.files.push_back(text_file("oembed.json", oembed_json(object)));
+  made.files.push_back(text_file("oembed.json", oembed_answer(object)));
   made.files.push_back(text_file("index.html", oembed_page(object, options.url, viewer)));
   add_poster(package, made);
 }
 
-FolderRule export_folder_rule() {
-  return marked_folder_rule(kListFile, kListBegin, "an empty folder, an earlier export, or nothing yet");
+}  // namespace
+
+std::vector<TileLevel> tile_levels(const Manifest& manifest, double display_px,
+                                   const PlanesOfHeight& planes) {
+  const auto level = [&](int scale, double displayed_px, double texture_px) {
+    const auto found = std::ranges::find(manifest.scales, scale, &ManifestScale::scale);
+    return TileLevel{scale, displayed_px, texture_px, found->error_max, ""};
+  };
+  const int finest = display_px > 0 ? scale_at(manifest.steps, display_px) : 0;
+  std::vector<TileLevel> out{level(finest, kAnyDisplayPx, display_px)};
+  std::vector<std::uint32_t> shown = planes(display_px);
+  for (double px = kHighestPx; px >= kLowestPx; px /= 2) {
+    if (display_px > 0 && px >= display_px) continue;
+    const int scale = scale_at(manifest.steps, px);
+    std::vector<std::uint32_t> these = planes(px);
+    if (scale == out.back().scale && these == shown) continue;
+    out.push_back(level(scale, px, px));
+    shown = std::move(these);
+  }
+  const int coarsest = manifest.scales.back().scale;
+  if (out.back().scale != coarsest) {
+    const auto step = std::ranges::find(manifest.steps, coarsest, &ManifestStep::scale);
+    out.push_back(level(coarsest, step == manifest.steps.end() ? kWaitingPx : step->up_to_px, kLowestPx));
+  }
+  return out;
 }
 
-}  // namespace
+std::string tileset_text(const Tileset& t) {
+  Json tile;
+  for (const TileLevel& level : t.levels) {
+    Json outer = tile_json(t, level);
+    if (!tile.is_null()) outer["children"] = Json::array({std::move(tile)});
+    tile = std::move(outer);
+  }
+  const Json place = turned(t.origin);
+  if (t.origin != Vec3d{})
+    tile["transform"] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, place[0], place[1], place[2], 1};
+  Json asset{{"version", "1.1"}, {"tilesetVersion", t.version}};
+  if (Json about = to_json(TilesetExtras{t.about}); !about.empty()) asset["extras"] = std::move(about);
+  const double whole = std::max(2 * t.metres * t.object_height, tile["geometricError"].get<double>());
+  return document_text({{"asset", std::move(asset)}, {"geometricError", whole}, {"root", std::move(tile)}});
+}
+
+std::string embedded_frame(const EmbeddedObject& o) {
+  return fmt::format(
+      R"(<iframe src="{}" width="{}" height="{}" title="{}" style="border:0;max-width:100%" loading="lazy" allow="fullscreen"></iframe>)",
+      markup_escaped(o.page_url), o.width_px, o.height_px, markup_escaped(o.about.title));
+}
+
+std::string oembed_answer(const EmbeddedObject& object) { return document_text(to_json(object)); }
 
 Export make_export(PackageReader& package, const std::string& path, const ExportOptions& options,
                    const RunContext& context) {
@@ -281,29 +343,25 @@ Export make_export(PackageReader& package, const std::string& path, const Export
   return made;
 }
 
-std::string export_json(const Export& made) {
-  ExportList list{made.target, made.package_id, made.open, {}, made.notes};
-  for (const ExportedFile& f : made.files) list.files.push_back({f.path, f.bytes.size()});
-  for (const ExportedCopy& c : made.copies) list.files.push_back({c.path, {}});
-  return to_json(list).dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
-}
+std::string export_list(const Export& made) { return document_text(to_json(made)); }
 
 DocumentSchema export_schema() {
   return document_schema(
       "export.v1", "texmesh export list, version 1",
       "Output of `texmesh export PKG --to TARGET -o DIR --json`, and export.json in DIR: what was written.",
-      schema_of<ExportList>());
+      schema_of<Export>());
+}
+
+FolderRule export_folder_rule() {
+  return marked_folder_rule(kListFile, kListBegin, "an empty folder, an earlier export, or nothing yet");
 }
 
 void write_export(const Export& made, const std::string& folder) {
   NewFolder out(folder, export_folder_rule());
   for (const ExportedFile& f : made.files) out.add(f.path, f.bytes);
   for (const ExportedCopy& c : made.copies) out.copy(c.path, c.source);
-  const std::string list = export_json(made);
-  out.add(kListFile, text_bytes(list));
+  out.add(kListFile, text_bytes(export_list(made)));
   out.publish();
 }
-
-void check_export_folder(const std::string& folder) { NewFolder(folder, export_folder_rule()); }
 
 }  // namespace texmesh

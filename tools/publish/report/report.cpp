@@ -1,78 +1,18 @@
 // The page in the order of its sections: what holds (switch sizes), the source beside S_0, what bytes buy,
 // where the bytes are, fragments, the step function, proxies, method.
 #include "tools/publish/report/report.h"
+#include "pipeline/io/table.h"
 
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
 
+#include "format/base/portable_math.h"
 #include "pipeline/io/markup.h"
-#include "pipeline/io/record.h"
-#include "pipeline/io/table.h"
-#include "tools/inspect/dump/package_figures.h"
+#include "tools/inspect/dump/dump.h"
 #include "tools/publish/pages/page.h"
-#include "tools/publish/pages/plot.h"
 
 namespace texmesh {
-namespace {
-
-constexpr Range kFlip{0, 1}, kPx{0, 1e9};
-
-/// What a list of views says of its worst.
-template <class V>
-void differences_fields(const ViewDifferences& d, V&& v) {
-  v("flip", d.worst_mean(), kFlip, "mean FLIP of the worst view");
-  v("flip_p95", d.worst_p95(), kFlip, "largest 95th percentile of a view's pixels");
-  v("worst_view", d.worst(), Range{0, 63}, "");
-}
-
-struct ReportedSwitch {
-  SwitchSize size;
-  bool holds = false;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
-    v("scale", s.size.scale, Range{1, 99}, "");
-    v("triangles", s.size.triangles, "");
-    v("up_to_px", s.size.up_to_px, kPx, "");
-    v("rendered_px", s.size.rendered_px, kPx, "less than up_to_px where pictures would be too large");
-    differences_fields(s.size.views, v);
-    v("holds", s.holds, "");
-  }
-};
-
-/// What report --json prints.
-struct ReportDocument {
-  Report report;
-  std::vector<ReportedSwitch> switches;
-  std::vector<std::string> files;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
-    v("version", Constant{1}, "");
-    v("title", s.report.title, "");
-    v("holds", s.report.holds, "every switch size is within both limits; the exit code is 0 then, else 4");
-    v("verdict", s.report.verdict, "one sentence");
-    v("worst_flip", worst_flip(s.report.switches), kFlip, "");
-    v("max_flip", s.report.options.limits.mean, kFlip, "");
-    v("max_flip_p95", s.report.options.limits.p95, kFlip, "");
-    v("views", s.report.options.views, Range{1, 64}, "");
-    v("switch_sizes", s.switches, "");
-    v("source", s.report.source, "with --against: S_0 at the highest rung beside the model file");
-    v("files", s.files, FieldRule{.count = Range{1, 1e6}}, "beneath the folder, index.html first");
-  }
-};
-
-}  // namespace
-
-template <>
-struct RecordFields<SourceComparison> {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
-    v("file", s.file, "");
-    v("displayed_px", s.displayed_px, Range{1, 1e9}, "");
-    differences_fields(s.views, v);
-  }
-};
-
 namespace {
 
 std::string answer(bool holds) {
@@ -279,7 +219,7 @@ Table plane_table(PackageReader& package) {
     std::uint64_t all = t.tables.bytes;
     for (const EntryRef& rung : t.rungs) all += rung.bytes;
     table.row({t.mip == 0 ? std::to_string(p) : fmt::format("{} (mip {} of {})", p, t.mip, t.base), t.role,
-               fmt::format("{} x {}", t.width_px, t.height_px), stored_fragments(package.tables().planes[p]),
+               fmt::format("{} x {}", t.width_px, t.height_px), package.tables().planes[p].order.size(),
                t.rungs.size(), t.rungs.empty() ? "" : format_bytes(t.rungs.front().bytes),
                t.rungs.empty() ? "" : format_bytes(t.rungs.back().bytes), format_bytes(all)});
   }
@@ -448,6 +388,65 @@ std::string method_section(PackageReader& package, const Report& report) {
   return html_section("method", "Method", body);
 }
 
+// What bytes buy at each displayed height: every scale at its rungs, proxies, and the best choice for a
+// budget.
+
+/// The bytes of a choice that gives every plane the same way: 0 = previews, else the rung before it.
+std::uint64_t texture_bytes(PackageReader& package, const std::vector<PlaneChoice>& planes, std::size_t way) {
+  std::uint64_t bytes = 0;
+  if (way == 0) return bytes;
+  for (const PlaneChoice& choice : planes) {
+    const PlaneTables& t = package.tables().planes[choice.plane];
+    const std::size_t rung = std::min(way, t.rung_count()) - 1;
+    for (std::size_t r = t.incremental ? 0 : rung; r <= rung; ++r)
+      for (std::size_t f = 0; f < t.fragment_count(); ++f) bytes += t.size_bytes[r * t.fragment_count() + f];
+  }
+  return bytes;
+}
+
+PerGroup texture_losses(TextureLoss& loss, const std::vector<PlaneChoice>& planes, std::size_t way) {
+  PerGroup losses{};
+  const PerGroup weights = loss.weights(planes);
+  for (const PlaneChoice& choice : planes) {
+    const auto group = static_cast<std::size_t>(loss.group_of(choice.plane));
+    const TextureLoss::Plane& plane = loss.plane(choice.plane);
+    const std::size_t fragments = plane.weights.size();
+    if (fragments == 0 || !(weights[group] > 0)) continue;
+    const std::size_t at = std::min(way, plane.shown.size() / fragments - 1);
+    for (std::size_t f = 0; f < fragments; ++f)
+      losses[group] +=
+          static_cast<double>(plane.weights[f]) * plane.shown[at * fragments + f] / weights[group];
+  }
+  return losses;
+}
+
+std::size_t most_rungs(PackageReader& package) {
+  std::size_t most = 0;
+  for (const PlaneTables& t : package.tables().planes) most = std::max(most, t.rung_count());
+  return most;
+}
+
+/// Of each scale, what is read besides textures.
+std::vector<std::uint64_t> fixed_bytes(PackageReader& package) {
+  std::vector<std::uint64_t> out;
+  for (const ManifestScale& s : package.manifest().scales) {
+    DeliveryRequest request;
+    request.scale = s.scale;
+    const DeliveryPlan plan = plan_budget(package, request, 0);
+    out.push_back(plan.bytes() - plan.texture_bytes);
+  }
+  return out;
+}
+
+std::vector<QualityPoint> proxy_points(const Manifest& m, double displayed_px) {
+  std::vector<QualityPoint> out;
+  const std::uint64_t first = std::min(kStartBytes, m.provenance.offset + m.provenance.bytes);
+  for (std::uint32_t k = 0; k < m.proxies.size(); ++k)
+    out.push_back({m.scales.back().scale, k, first + proxy_bytes_beyond_start(m, k),
+                   proxy_loss(m, k, displayed_px).flip});
+  return out;
+}
+
 constexpr double kSourceHeight = 512;  // px at which the source stands beside S_0
 
 SourceComparison compare_source(PackageReader& package, const PackagePictures& pictures,
@@ -467,6 +466,44 @@ SourceComparison compare_source(PackageReader& package, const PackagePictures& p
 }
 
 }  // namespace
+
+std::vector<QualityCurves> quality_curves(PackageReader& package, int budgets) {
+  const Manifest& m = package.manifest();
+  const std::vector<std::uint64_t> fixed = fixed_bytes(package);
+  std::vector<QualityCurves> out;
+  for (const std::uint32_t displayed_px : package.quality().sizes_px) {
+    QualityCurves& curves = out.emplace_back();
+    curves.displayed_px = displayed_px;
+    TextureLoss loss(package, displayed_px);
+    const std::vector<PlaneChoice> planes = planes_for_display(package, displayed_px);
+    std::uint64_t least = ~0ull, most = 0;
+    for (std::size_t k = 0; k < m.scales.size(); ++k) {
+      std::vector<QualityPoint>& points = curves.scales.emplace_back();
+      for (std::size_t way = 0; way <= most_rungs(package); ++way) {
+        const PerGroup losses = texture_losses(loss, planes, way);
+        points.push_back({m.scales[k].scale,
+                          {},
+                          fixed[k] + texture_bytes(package, planes, way),
+                          picture_flip(package.quality(), displayed_px, m.scales[k].scale, losses)});
+        least = std::min(least, points.back().bytes);
+        most = std::max(most, points.back().bytes);
+      }
+    }
+    curves.proxies = proxy_points(m, displayed_px);
+    if (!curves.proxies.empty()) least = std::min(least, curves.proxies.front().bytes);
+    DeliveryRequest request;
+    request.displayed_px = displayed_px;
+    for (int i = 0; i < budgets; ++i) {
+      const double ratio = static_cast<double>(most) / static_cast<double>(std::max<std::uint64_t>(least, 1));
+      const double bytes =
+          static_cast<double>(least) * portable::pow(ratio, static_cast<double>(i) / (budgets - 1));
+      const DeliveryPlan plan = plan_budget(package, request, static_cast<std::uint64_t>(std::ceil(bytes)));
+      if (curves.budgets.empty() || plan.bytes() > curves.budgets.back().bytes)
+        curves.budgets.push_back({plan.scale, plan.proxy, plan.bytes(), plan.flip});
+    }
+  }
+  return out;
+}
 
 Report make_report(PackageReader& package, const ReportOptions& options, const RunContext& context) {
   Report report;
@@ -492,21 +529,11 @@ Report make_report(PackageReader& package, const ReportOptions& options, const R
   return report;
 }
 
-std::string report_json(const Report& report) {
-  ReportDocument document;
-  document.report = {
-      report.title, report.verdict, report.holds, report.options, report.switches, {}, report.source, {}};
-  for (const SwitchSize& s : report.switches)
-    document.switches.push_back({s, s.holds(report.options.limits)});
-  for (const ReportFile& f : report.files) document.files.push_back(f.path);
-  return to_json_line(document);
-}
-
 DocumentSchema report_schema() {
   return document_schema(
       "report.v1", "texmesh report --json, version 1",
       "What a report says. FLIP is measured by rendering: 0 = equal, 1 = as different as can be.",
-      schema_of<ReportDocument>());
+      schema_of<Report>());
 }
 
 FolderRule report_folder_rule() {
@@ -519,7 +546,5 @@ void write_report(const Report& report, const std::string& folder) {
   for (const ReportFile& f : report.files) out.add(f.path, f.bytes);
   out.publish();
 }
-
-void check_report_folder(const std::string& folder) { NewFolder(folder, report_folder_rule()); }
 
 }  // namespace texmesh

@@ -1,17 +1,12 @@
 #pragma once
-#include <cstdint>
-#include <optional>
-#include <string>
-#include <vector>
 
 #include "delivery/cpp/client/delivery_plan.h"
 #include "pipeline/io/new_folder.h"
 #include "tools/publish/report/report_pictures.h"
-#include "tools/publish/report/switch_sizes.h"
 
 namespace texmesh {
 
-struct DocumentSchema;  // pipeline/io/record.h
+inline constexpr Range kFlipRange{0, 1}, kHeightRange{0, 1e9};
 
 /// What so many bytes look like: predicted FLIP against S_0 with the source's texels.
 struct QualityPoint {
@@ -40,11 +35,38 @@ struct ReportOptions {
   int budgets = 16;     // points of the budget's path
 };
 
+/// What a list of views says of its worst.
+void differences_fields(const ViewDifferences& d, auto&& v) {
+  v("flip", d.worst_mean(), kFlipRange, "mean FLIP of the worst view");
+  v("flip_p95", d.worst_p95(), kFlipRange, "largest 95th percentile of a view's pixels");
+  v("worst_view", d.worst(), Range{0, 63}, "");
+}
+
 /// S_0 at the highest rung beside the model file.
 struct SourceComparison {
   std::string file;  // name without folders
   double displayed_px = 0;
   ViewDifferences views;
+  static void fields(auto& s, auto&& v) {
+    v("file", s.file, "");
+    v("displayed_px", s.displayed_px, Range{1, 1e9}, "");
+    differences_fields(s.views, v);
+  }
+};
+
+/// A switch size and whether it is within the limits.
+struct ReportedSwitch {
+  SwitchSize size;
+  bool holds = false;
+  static void fields(auto& s, auto&& v) {
+    v("scale", s.size.scale, Range{1, 99}, "");
+    v("triangles", s.size.triangles, "");
+    v("up_to_px", s.size.up_to_px, kHeightRange, "");
+    v("rendered_px", s.size.rendered_px, kHeightRange,
+      "less than up_to_px where pictures would be too large");
+    differences_fields(s.size.views, v);
+    v("holds", s.holds, "");
+  }
 };
 
 /// What a report is about, and the report.
@@ -57,6 +79,29 @@ struct Report {
   std::vector<QualityCurves> curves;
   std::optional<SourceComparison> source;
   std::vector<ReportFile> files;  // index.html first
+  std::vector<ReportedSwitch> reported() const {
+    std::vector<ReportedSwitch> out;
+    for (const SwitchSize& s : switches) out.push_back({s, s.holds(options.limits)});
+    return out;
+  }
+  std::vector<std::string> paths() const {
+    std::vector<std::string> out;
+    for (const ReportFile& f : files) out.push_back(f.path);
+    return out;
+  }
+  static void fields(auto& s, auto&& v) {
+    v("version", Constant{1}, "");
+    v("title", s.title, "");
+    v("holds", s.holds, "every switch size is within both limits; the exit code is 0 then, else 4");
+    v("verdict", s.verdict, "one sentence");
+    v("worst_flip", worst_flip(s.switches), kFlipRange, "");
+    v("max_flip", s.options.limits.mean, kFlipRange, "");
+    v("max_flip_p95", s.options.limits.p95, kFlipRange, "");
+    v("views", s.options.views, Range{1, 64}, "");
+    v("switch_sizes", s.reported(), "");
+    v("source", s.source, "with --against: S_0 at the highest rung beside the model file");
+    v("files", s.paths(), FieldRule{.count = Range{1, 1e6}}, "beneath the folder, index.html first");
+  }
 };
 
 /// Renders the switch sizes of a package, reads what its tables say, and writes one static page about it:
@@ -66,8 +111,6 @@ struct Report {
 /// FormatError when the package is damaged, InputError for a model file that cannot be read.
 Report make_report(PackageReader& package, const ReportOptions& options, const RunContext& context);
 
-/// For programs: schemas/report.v1.schema.json.
-std::string report_json(const Report& report);
 DocumentSchema report_schema();
 
 /// The page of a folder that html_page() fills.
@@ -78,7 +121,5 @@ FolderRule report_folder_rule();
 /// Writes the files; the folder appears whole or not at all. An earlier report is replaced. InputError when
 /// the folder holds anything else, or cannot be made.
 void write_report(const Report& report, const std::string& folder);
-/// The same refusals, before the work.
-void check_report_folder(const std::string& folder);
 
 }  // namespace texmesh

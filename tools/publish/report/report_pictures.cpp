@@ -2,27 +2,24 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "format/rules/allocation.h"
 #include "pipeline/io/markup.h"
 #include "stages/image/png_writer.h"
-#include "stages/measure/flip.h"
 #include "stages/render/shade.h"
 
 namespace texmesh {
 namespace {
 
 // Every eighth of the map "magma" (van der Walt and Smith, 2015), the one that FLIP's authors use.
-constexpr std::array<std::array<int, 3>, 9> kStops{{{0, 0, 4},
-                                                    {28, 16, 68},
-                                                    {79, 18, 123},
-                                                    {129, 37, 129},
-                                                    {181, 54, 122},
-                                                    {229, 80, 100},
-                                                    {251, 135, 97},
-                                                    {254, 194, 135},
-                                                    {252, 253, 191}}};
+constexpr std::array<Srgb, 9> kStops{{{0, 0, 4},
+                                      {28, 16, 68},
+                                      {79, 18, 123},
+                                      {129, 37, 129},
+                                      {181, 54, 122},
+                                      {229, 80, 100},
+                                      {251, 135, 97},
+                                      {254, 194, 135},
+                                      {252, 253, 191}}};
 
 constexpr std::uint32_t kMargin = 6;  // px around the object
 constexpr int kMostEnlarged = 6;
@@ -67,31 +64,21 @@ FragmentHeat over_largest(std::string name, std::vector<double> value) {
 
 }  // namespace
 
-Vec3<std::uint8_t> heat_colour(double value) {
-  const double at = std::clamp(value, 0.0, 1.0) * (kStops.size() - 1);
-  const std::size_t stop = std::min(static_cast<std::size_t>(at), kStops.size() - 2);
-  const double part = at - static_cast<double>(stop);
-  const auto channel = [&](std::size_t c) {
-    const double mixed = kStops[stop][c] * (1 - part) + kStops[stop + 1][c] * part;
-    return static_cast<std::uint8_t>(std::lround(mixed));
-  };
-  return {channel(0), channel(1), channel(2)};
-}
+Srgb heat_colour(double value) { return colour_on(kStops, value); }
 
-Pixels heat_picture(const std::vector<float>& values, std::uint32_t side_px, double full) {
+/// A square picture of FLIP values, `side_px` a side, in heat colours: 0 is black, `full` and more is the
+/// last colour.
+static Pixels heat_picture(const std::vector<float>& values, std::uint32_t side_px, double full) {
   Pixels out{side_px, side_px, 3, {}};
   out.data.reserve(values.size() * 3);
   for (const float v : values) {
-    const Vec3<std::uint8_t> c = heat_colour(static_cast<double>(v) / full);
-    out.data.insert(out.data.end(), {c.x, c.y, c.z});
+    const Srgb c = heat_colour(static_cast<double>(v) / full);
+    out.data.insert(out.data.end(), c.begin(), c.end());
   }
   return out;
 }
 
-std::string heat_hex(double value) {
-  const Vec3<std::uint8_t> c = heat_colour(value);
-  return fmt::format("#{:02x}{:02x}{:02x}", c.x, c.y, c.z);
-}
+std::string heat_hex(double value) { return hex_of(heat_colour(value)); }
 
 std::string picture_row(const PictureRow& row, const Picture& reference, const Picture& tested,
                         std::vector<ReportFile>& files) {
@@ -161,6 +148,141 @@ std::string fragment_map(PackageReader& package, std::uint32_t plane, const Frag
           heat.value[f]);
   }
   return out + "</svg>\n";
+}
+
+namespace {
+
+constexpr double kMostSide = 8192;
+constexpr double kPercentile = 0.95;
+
+PackageChoice finest_choice(PackageChoice choice) {
+  choice.scale = 0;
+  return choice;
+}
+
+/// As the quality stage renders: with mips, whatever the sampler says.
+void read_with_mips(RenderedModel& model) {
+  for (RenderMaterial& m : model.materials)
+    for (TextureSlot& slot : m.textures) slot.min_filter = MinFilter::kTrilinear;
+}
+
+/// Side of a picture per px of displayed height.
+double side_per_px(const RenderedModel& model, double object_height) {
+  const RenderCamera c = perspective_camera(camera_of(0, 1, model.bounds.centre, model.bounds.radius));
+  if (!(object_height > 0)) return 1;
+  return 2 * c.tan_half_fov * length(c.eye - model.bounds.centre) / object_height;
+}
+
+float largest(const std::vector<float>& values) {
+  return values.empty() ? 0 : *std::max_element(values.begin(), values.end());
+}
+
+}  // namespace
+
+PackagePictures::PackagePictures(PackageReader& package, const PackageChoice& textures,
+                                 const RunContext& context)
+    : package_(package),
+      context_(context),
+      finest_(package_model(package, finest_choice(textures), context)),
+      environment_(studio_environment()) {
+  context_.progress = nullptr;
+  read_with_mips(finest_);
+}
+
+std::uint32_t PackagePictures::side_for(double displayed_px) const {
+  const double side = displayed_px * side_per_px(finest_, package_.manifest().object_height);
+  return static_cast<std::uint32_t>(std::clamp(std::round(side), 1.0, kMostSide));
+}
+
+double PackagePictures::largest_px() const {
+  return kMostSide / side_per_px(finest_, package_.manifest().object_height);
+}
+
+RenderCamera PackagePictures::camera(Vec3d offset, ViewNumber view) const {
+  return perspective_camera(
+      camera_of(view.index, view.count, finest_.bounds.centre + offset, finest_.bounds.radius));
+}
+
+Picture PackagePictures::picture_of(const RenderedModel& model, Vec3d offset, ViewNumber view,
+                                    std::uint32_t side_px) const {
+  const RenderScene scene = render_scene(model.mesh, model.materials, model.texture_images.size());
+  const std::vector<RenderTexture>& textures = model.textures.empty() ? finest_.textures : model.textures;
+  return shade(scene, look(scene, camera(offset, view), side_px, context_), textures, environment_, context_);
+}
+
+Picture PackagePictures::picture(int scale, ViewNumber view, std::uint32_t side_px) {
+  if (scale != 0 && scale != coarser_number_) {
+    coarser_ = package_scale(package_, scale, finest_, context_);
+    read_with_mips(coarser_);
+    coarser_number_ = scale;
+  }
+  return picture_of(scale == 0 ? finest_ : coarser_, {}, view, side_px);
+}
+
+std::size_t ViewDifferences::worst() const {
+  return static_cast<std::size_t>(std::max_element(mean.begin(), mean.end()) - mean.begin());
+}
+double ViewDifferences::worst_mean() const { return static_cast<double>(largest(mean)); }
+double ViewDifferences::worst_p95() const { return static_cast<double>(largest(p95)); }
+
+/// A scale beside S_0.
+static ViewDifferences compare_scale(PackagePictures& pictures, int scale, int views, double displayed_px) {
+  ViewDifferences out;
+  const std::uint32_t side_px = pictures.side_for(displayed_px);
+  for (int v = 0; v < views; ++v) {
+    const FlipSum flip = compare_flip(prepare_flip(pictures.picture(0, {v, views}, side_px)),
+                                      prepare_flip(pictures.picture(scale, {v, views}, side_px)));
+    out.mean.push_back(static_cast<float>(flip.mean()));
+    out.p95.push_back(static_cast<float>(flip.percentile(kPercentile)));
+  }
+  return out;
+}
+
+std::vector<SwitchSize> measure_switch_sizes(PackageReader& package, PackagePictures& pictures, int views,
+                                             const RunContext& context) {
+  std::vector<SwitchSize> out;
+  const Manifest& m = package.manifest();
+  for (const ManifestStep& step : m.steps) {
+    if (step.scale == 0) continue;
+    context.check_cancelled();
+    SwitchSize size;
+    size.scale = step.scale;
+    size.triangles = m.scales[package.scale_index(step.scale)].triangles;
+    size.up_to_px = step.up_to_px;
+    size.rendered_px = std::min(step.up_to_px, pictures.largest_px());
+    size.views = compare_scale(pictures, step.scale, views, size.rendered_px);
+    out.push_back(std::move(size));
+  }
+  return out;
+}
+
+std::string switch_verdict(const std::vector<SwitchSize>& sizes, const FlipLimits& limits, int views) {
+  if (sizes.empty()) return "No coarser scale stands in for S_0 at any size, so nothing needs to hold.";
+  std::string failing;
+  std::size_t count = 0;
+  double p95 = 0;
+  for (const SwitchSize& s : sizes) {
+    p95 = std::max(p95, s.views.worst_p95());
+    if (s.holds(limits)) continue;
+    failing += fmt::format("{}S_{} at {:.0f} px (mean FLIP {:.3f}, 95th percentile {:.3f})",
+                           failing.empty() ? "" : ", ", s.scale, s.rendered_px, s.views.worst_mean(),
+                           s.views.worst_p95());
+    ++count;
+  }
+  if (count > 0)
+    return fmt::format("{} of {} switch sizes {} not hold in {} views: {}. The limits are {:g} and {:g}.",
+                       count, sizes.size(), count == 1 ? "does" : "do", views, failing, limits.mean,
+                       limits.p95);
+  return fmt::format(
+      "Every switch size holds: in {} views no scale differs from S_0 by more than a mean FLIP of {:.3f} "
+      "(limit {:g}) and a 95th percentile of {:.3f} (limit {:g}).",
+      views, worst_flip(sizes), limits.mean, p95, limits.p95);
+}
+
+double worst_flip(const std::vector<SwitchSize>& sizes) {
+  double worst = 0;
+  for (const SwitchSize& s : sizes) worst = std::max(worst, s.views.worst_mean());
+  return worst;
 }
 
 }  // namespace texmesh

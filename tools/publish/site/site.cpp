@@ -8,52 +8,13 @@
 
 #include "format/base/text_bytes.h"
 #include "pipeline/io/markup.h"
-#include "pipeline/io/new_folder.h"
-#include "pipeline/io/record.h"
 #include "pipeline/io/table.h"
 #include "pipeline/io/uri.h"
 #include "tools/publish/pages/page.h"
 #include "tools/publish/view/served_files.h"
 
 namespace texmesh {
-
-template <>
-struct RecordFields<SiteFault> {
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
-    v("package", s.path, "");
-    v("error", s.message, FieldRule{.pattern = "."}, "");
-  }
-};
-
 namespace {
-
-struct ReportedObject {
-  std::string package, page, title;
-  std::uint64_t bytes = 0;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
-    v("package", s.package, FieldRule{.pattern = "."},
-      "Relative to the folder of packages; an unpacked one ends with a slash.");
-    v("page", s.page, FieldRule{.pattern = "^objects/[A-Za-z0-9._-]+\\.html$"}, "Relative to DIR.");
-    v("title", s.title, "");
-    v("bytes", s.bytes, "Of the whole package.");
-  }
-};
-
-/// What site --json prints.
-struct SiteReport {
-  std::string page;
-  std::vector<ReportedObject> objects;
-  std::vector<SiteFault> faults;
-  template <class S, class V>
-  static void fields(S& s, V&& v) {
-    v("version", Constant{1}, "");
-    v("page", s.page, FieldRule{.pattern = "."}, "Path of index.html.");
-    v("objects", s.objects, "In the order of the page.");
-    v("faults", s.faults, "Packages that could not be read and are not in the site.");
-  }
-};
 
 namespace fs = std::filesystem;
 
@@ -199,18 +160,11 @@ std::string object_page(const SiteObject& o, const SiteOptions& options) {
 
 /// What the viewer offers where its address names no package.
 std::string viewer_list(const Site& site) {
-  nlohmann::ordered_json list = nlohmann::ordered_json::array();
-  for (const SiteObject& o : site.objects) {
-    nlohmann::ordered_json entry{{"url", from_below(o.address)}, {"title", o.title}};
-    if (!o.poster.empty()) entry["poster"] = "../posters/" + o.name + ".jpg";
-    list.push_back(std::move(entry));
-  }
-  return nlohmann::ordered_json{{"packages", list}}.dump(-1, ' ', false,
-                                                         nlohmann::ordered_json::error_handler_t::replace);
-}
-
-FolderRule site_folder_rule() {
-  return marked_folder_rule("index.html", kSiteFirstLine, "an empty folder, an earlier site, or nothing yet");
+  PackageList list;
+  for (const SiteObject& o : site.objects)
+    list.packages.push_back(
+        {from_below(o.address), o.title, o.poster.empty() ? "" : "../posters/" + o.name + ".jpg"});
+  return to_json_line(list);
 }
 
 }  // namespace
@@ -258,17 +212,14 @@ Site read_site(const std::string& packages, const SiteOptions& options) {
   return site;
 }
 
-std::string site_json(const Site& site, const std::string& folder) {
-  SiteReport report{(fs::path(folder) / "index.html").string(), {}, site.faults};
-  for (const SiteObject& o : site.objects)
-    report.objects.push_back({o.path, "objects/" + o.name + ".html", o.title, o.bytes});
-  return to_json_line(report);
-}
-
 DocumentSchema site_schema() {
   return document_schema("site.v1", "texmesh site report, version 1",
                          "Output of `texmesh site PACKAGES -o DIR --json`: what the site shows.",
                          schema_of<SiteReport>());
+}
+
+FolderRule site_folder_rule() {
+  return marked_folder_rule("index.html", kSiteFirstLine, "an empty folder, an earlier site, or nothing yet");
 }
 
 void write_site(const Site& site, const std::string& folder) {
@@ -286,7 +237,5 @@ void write_site(const Site& site, const std::string& folder) {
   out.add("viewer/packages.json", text_bytes(viewer_list(site)));
   out.publish();
 }
-
-void check_site_folder(const std::string& folder) { NewFolder(folder, site_folder_rule()); }
 
 }  // namespace texmesh

@@ -1,13 +1,10 @@
 #pragma once
-#include <cstdint>
-#include <string>
-#include <vector>
 
 #include "format/documents/about.h"
+#include "pipeline/io/new_folder.h"
+#include "pipeline/io/record.h"
 
 namespace texmesh {
-
-struct DocumentSchema;  // pipeline/io/record.h
 
 struct SiteOptions {
   std::string title = "Scans";
@@ -29,11 +26,23 @@ struct SiteObject {
   std::uint64_t start_bytes = 0;  // until there is a picture
   std::uint64_t triangles = 0;
   std::uint32_t texture_px = 0;  // longest side of its textures; 0 = it has none
+  static void fields(auto& s, auto&& v) {
+    v("package", s.path, FieldRule{.pattern = "."},
+      "Relative to the folder of packages; an unpacked one ends with a slash.");
+    v("page", "objects/" + s.name + ".html", FieldRule{.pattern = "^objects/[A-Za-z0-9._-]+\\.html$"},
+      "Relative to DIR.");
+    v("title", s.title, "");
+    v("bytes", s.bytes, "Of the whole package.");
+  }
 };
 
 /// A package that could not be read, and why.
 struct SiteFault {
   std::string path, message;
+  static void fields(auto& s, auto&& v) {
+    v("package", s.path, "");
+    v("error", s.message, FieldRule{.pattern = "."}, "");
+  }
 };
 
 struct Site {
@@ -52,11 +61,21 @@ Site read_site(const std::string& packages, const SiteOptions& options);
 /// servers but packages that stand there. Same packages, same bytes. The folder appears whole or not at all;
 /// an earlier site is replaced. InputError when it holds anything else or cannot be made.
 void write_site(const Site& site, const std::string& folder);
-/// The same refusals, before the work.
-void check_site_folder(const std::string& folder);
+/// The folder that this is: new, empty, or an earlier one.
+FolderRule site_folder_rule();
 
-/// For programs: schemas/site.v1.schema.json.
-std::string site_json(const Site& site, const std::string& folder);
+/// What site --json prints.
+struct SiteReport {
+  std::string page;
+  std::vector<SiteObject> objects;
+  std::vector<SiteFault> faults;
+  static void fields(auto& s, auto&& v) {
+    v("version", Constant{1}, "");
+    v("page", s.page, FieldRule{.pattern = "."}, "Path of index.html.");
+    v("objects", s.objects, "In the order of the page.");
+    v("faults", s.faults, "Packages that could not be read and are not in the site.");
+  }
+};
 DocumentSchema site_schema();
 
 /// A name for the files of the package at `path`, none of `taken` (in lower case), to which it is added.

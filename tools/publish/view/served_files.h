@@ -1,8 +1,6 @@
 #pragma once
-#include <cstdint>
-#include <optional>
-#include <string>
-#include <vector>
+
+#include "pipeline/io/record.h"
 
 namespace texmesh {
 
@@ -60,6 +58,20 @@ class ServedFiles {
  private:
   int viewer_ = -1, root_ = -1;  // folders
   std::string only_;             // the one entry of root_ that is served, "" = every package beneath
+};
+
+/// What the viewer offers to choose from, packages.json: texts are left out where there are none.
+struct PackageList {
+  struct Package {
+    std::string url, title, poster;
+    static void fields(auto& s, auto&& v) {
+      v("url", s.url, "");
+      v("title", s.title, kMayMiss, "");
+      v("poster", s.poster, kMayMiss, "");
+    }
+  };
+  std::vector<Package> packages;
+  static void fields(auto& s, auto&& v) { v("packages", s.packages, ""); }
 };
 
 /// The folder with the built viewer: `wanted` where it is not empty, otherwise viewer/ beside the

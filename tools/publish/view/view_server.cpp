@@ -64,20 +64,6 @@ std::string decoded(const std::string& url) {
   return out;
 }
 
-/// What a list shows of a package.
-struct PackageCard {
-  std::string title;  // "" = none
-  bool poster = false;
-};
-
-/// Of a package among the files, by its decoded path ("/packages/bust.texmesh", "/packages/tree/"). Nothing
-/// for what cannot be read: lists show its name then.
-std::optional<PackageCard> package_card(const ServedFiles& files, const std::string& path) {
-  const std::optional<Manifest> m = manifest_of(files, path);
-  if (!m) return std::nullopt;
-  return PackageCard{m->title, m->poster.has_value()};
-}
-
 /// The package's poster, a JPEG, its digest checked; nothing where there is none.
 std::optional<std::vector<std::uint8_t>> package_poster(const ServedFiles& files, const std::string& path) {
   const std::optional<Manifest> m = manifest_of(files, path);
@@ -90,21 +76,17 @@ std::optional<std::vector<std::uint8_t>> package_poster(const ServedFiles& files
   return bytes;
 }
 
-/// `{"packages":[{"url":"packages/bust.texmesh","title":"A bust","poster":"posters/bust.texmesh"}, ...]}`,
-/// what the viewer offers to choose from, by the names of the files. `title` and `poster` stand where the
-/// package has them.
+/// By the names of the files. Of a package that cannot be read the viewer shows the name.
 std::string package_list(const ServedFiles& files) {
   constexpr std::string_view kPackages = "packages/";
-  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  PackageList list;
   for (const std::string& url : files.packages()) {
-    nlohmann::ordered_json entry{{"url", url}};
-    if (const auto card = package_card(files, "/" + decoded(url))) {
-      if (!card->title.empty()) entry["title"] = card->title;
-      if (card->poster) entry["poster"] = "posters/" + url.substr(kPackages.size());
-    }
-    list.push_back(std::move(entry));
+    const std::optional<Manifest> m = manifest_of(files, "/" + decoded(url));
+    const bool poster = m && m->poster;
+    list.packages.push_back(
+        {url, m ? m->title : "", poster ? "posters/" + url.substr(kPackages.size()) : ""});
   }
-  return nlohmann::ordered_json{{"packages", list}}.dump();
+  return to_json_line(list);
 }
 
 bool parse_number(std::string_view text, std::uint64_t& value) {

@@ -1,7 +1,4 @@
 #pragma once
-#include <functional>
-#include <memory>
-#include <string>
 
 #include "tools/publish/view/served_files.h"
 

@@ -1,4 +1,7 @@
-/** Formats of the encoder, numbered as encoder/encoder.cpp has them. Two channels of a normal stand where `channels` of two_channels.ts says. */
+/**
+ * Formats of the encoder, numbered as encoder/encoder.cpp has them. Two channels of a normal stand where
+ * `channels` of two_channels.ts says.
+ */
 export const blockFormats = ['bc1', 'bc3-normal', 'bc5', 'bc7', 'etc2', 'astc', 'astc-normal'] as const;
 /** A format of blocks. */
 export type BlockFormat = (typeof blockFormats)[number];
@@ -9,7 +12,7 @@ export const blockBytes = (format: BlockFormat): 8 | 16 => (format === 'bc1' || 
 export interface BlockRequest {
   url: string;
   format: BlockFormat;
-  /** Levels that become blocks. One more comes as RGBA where there is one: the caller makes the smallest ones of that. */
+  /** Levels that become blocks. One more may come as RGBA, from which the caller makes the smallest ones. */
   own: number;
   /** Width and height that count; what lies beyond is left out. */
   size: [number, number];

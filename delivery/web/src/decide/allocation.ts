@@ -2,7 +2,8 @@ import { type PlaneTables, fragmentCount } from '../format/tables';
 import { clamp, positive, sumOf } from './numbers';
 import { exp, log } from './portable_math';
 
-// From feature counts to the quality that a fragment is asked to have (thesis 3.2-3.3): format/rules/allocation.cpp, bit for bit.
+// From feature counts to the quality that a fragment is asked to have (thesis 3.2-3.3):
+// format/rules/allocation.cpp, bit for bit.
 
 /** g(Q) = -ln(IJG's scale of the quantisers): grows with quality, by ln 2 where the quantisers halve. */
 export function logQuantiser(quality: number): number {
@@ -12,7 +13,7 @@ export function logQuantiser(quality: number): number {
 
 const qualityOfScale = (scale: number): number => (scale > 1 ? 50 / scale : 100 - 50 * scale);
 
-/** eta_i (3.1) of one scale, by its row: feature counts min-max over covered fragments; 0 for the others. With allocation 3 VQP. [F] */
+/** [F]: eta_i (3.1) of a scale: min-max of counts over covered fragments, else 0; VQP in allocation 3. */
 export function etaOf(t: PlaneTables, row: number): Float32Array {
   if (t.allocation === 3) return t.vqp.slice();
   const covered = positive(t.coveredTexels);
@@ -36,7 +37,8 @@ export function qualityOf(t: PlaneTables, row: number, gamma: number): Float32Ar
   const g = logQuantiser(middle);
   for (let f = 0; f < result.length; ++f) {
     const away = result[f] - gamma;
-    const q = t.allocation % 3 === 0 ? middle + away * t.qualityWidth : qualityOfScale(exp(-(g + away * t.logWidth)));
+    const q = t.allocation % 3 === 0 ? middle + away * t.qualityWidth
+      : qualityOfScale(exp(-(g + away * t.logWidth)));
     result[f] = clamp(Math.fround(q), t.qualityMin, t.qualityMax);
   }
   return result;

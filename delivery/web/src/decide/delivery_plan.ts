@@ -43,7 +43,7 @@ export interface DeliveryPlan extends InTime {
   proxy?: number;
   /** The larger proxy that is shown on the way to the scale. */
   step?: { proxy: number; atS: number };
-  /** On the GPU: buffers, and textures with their mip levels; most bytes. The buffers are kept in main memory, too. */
+  /** On the GPU, at most: buffers, and textures with mip levels. Main memory keeps the buffers, too. */
   gpuBytes: { mesh: number; textures: number };
   /** Besides fragments. */
   fixedBytes: number;
@@ -59,28 +59,34 @@ export function wantedScale(manifest: Manifest, { scale, displayedPx, rule }: De
 }
 
 /** Bytes of the first request; provenance.json is the last entry. */
-const firstBytes = ({ provenance }: Manifest): number => Math.min(startBytes, provenance.offset + provenance.bytes);
+const firstBytes = ({ provenance }: Manifest): number =>
+  Math.min(startBytes, provenance.offset + provenance.bytes);
 
-/** When the first picture is there and, with so many bytes more, the mesh: by the last request, which moved `moved` bytes from `fromS` on. */
+/** When the first picture is there, and the mesh: the last request moved `moved` bytes from `fromS` on. */
 function timesWith(m: Manifest, link: LinkOptions, more: number) {
   const { offset, bytes } = firstPicture(m);
   const firstPictureBytes = beyondStart(offset, offset + bytes);
   const moved = firstPictureBytes + more;
   const fromS = fetchedS(link, 0, firstBytes(m));
   const firstPictureS = fetchedS(link, fromS, firstPictureBytes);
-  return { moved, fromS, firstPictureS, meshS: fetchedS(link, fromS, moved), allBytes: firstBytes(m) + moved };
+  return { moved, fromS, firstPictureS, meshS: fetchedS(link, fromS, moved),
+    allBytes: firstBytes(m) + moved };
 }
 /** The smallest proxy is shown first, whatever it takes. */
-const proxyFits = (m: Manifest, proxy: number, memoryBytes = Infinity): boolean => proxy === 0 || proxyBytes(m.proxies[proxy]) <= memoryBytes;
+const proxyFits = (m: Manifest, proxy: number, memoryBytes = Infinity): boolean =>
+  proxy === 0 || proxyBytes(m.proxies[proxy]) <= memoryBytes;
 
 /** The larger proxy that comes before documents and mesh. */
 function stepOf(m: Manifest, request: DeliveryRequest, firstPictureS: number, manifestS: number) {
-  const { link, displayedPx, scale, rule, textures, beta0BytesS, timeLimitS, memoryBytes = Infinity } = request;
+  const { link, displayedPx, scale, rule, textures, beta0BytesS, timeLimitS, memoryBytes = Infinity } =
+    request;
   if (scale >= 0 || rule !== 'flip' || textures || m.proxies.length === 0) return undefined;
   const bytesS = beta0BytesS > 0 ? beta0BytesS : firstBytes(m) / Math.max(1e-9, manifestS - link.rttS);
   const wanted = scaleWithin(m.scales, selectScale(m, displayedPx, undefined, rule), memoryBytes);
-  const proxy = proxyStep(m, wanted, displayedPx, { bytesS, rttS: link.rttS, leftS: timeLimitS - firstPictureS });
-  return proxy < 0 || !proxyFits(m, proxy, memoryBytes) ? undefined : { proxy, atS: fetchedS(link, firstPictureS, proxyBytesBeyondStart(m, proxy)) };
+  const proxy =
+    proxyStep(m, wanted, displayedPx, { bytesS, rttS: link.rttS, leftS: timeLimitS - firstPictureS });
+  return proxy < 0 || !proxyFits(m, proxy, memoryBytes) ? undefined
+    : { proxy, atS: fetchedS(link, firstPictureS, proxyBytesBeyondStart(m, proxy)) };
 }
 /** When the fixed parts of a scale are there. */
 function timesOf(m: Manifest, request: DeliveryRequest, scale: number) {
@@ -104,7 +110,8 @@ function planOfProxy(m: Manifest, { link, displayedPx }: DeliveryRequest, proxy:
   const { flip } = proxyLoss(m, proxy, displayedPx);
   const none = everyGroup(0);
   return {
-    scale: m.scales[m.scales.length - 1].scale, proxy, planes: [], rungs: [], bytes: 0, loss: 0, endS: 0, late: false,
+    scale: m.scales[m.scales.length - 1].scale, proxy, planes: [], rungs: [], bytes: 0, loss: 0, endS: 0,
+    late: false,
     list: { offers: [], fragments: [], groups: [], groupWeights: everyGroup(1), previewLoss: none },
     flip, textureFlip: flip, fixedBytes: allBytes, firstPictureS, meshS, completeS: meshS,
     gpuBytes: { mesh, textures: proxyBytes(m.proxies[proxy]) - mesh },
@@ -112,8 +119,8 @@ function planOfProxy(m: Manifest, { link, displayedPx }: DeliveryRequest, proxy:
 }
 
 /**
- * Decides as delivery/cpp's plan_delivery over a link of constant rate, to the same bits; undefined when the package
- * has no such scale. The tables of all planes are needed.
+ * Decides as delivery/cpp's plan_delivery over a link of constant rate, to the same bits; undefined when the
+ * package has no such scale. The tables of all planes are needed.
  */
 export function planDelivery(data: PackageData, request: DeliveryRequest): DeliveryPlan | undefined {
   const { manifest } = data;
@@ -135,7 +142,8 @@ export function planDelivery(data: PackageData, request: DeliveryRequest): Deliv
       const { moved, fromS, meshS } = timesOf(manifest, request, scale);
       // Where the first request has brought all, that request shows the throughput.
       const [shown, shownS] = moved > 0 ? [moved, meshS - fromS] : [firstBytes(manifest), fromS];
-      const initialBytesS = request.beta0BytesS > 0 ? request.beta0BytesS : shown / Math.max(1e-9, shownS - link.rttS);
+      const initialBytesS = request.beta0BytesS > 0 ? request.beta0BytesS
+        : shown / Math.max(1e-9, shownS - link.rttS);
       const left = { timeLimitS: timeLimitS - meshS, initialBytesS, rttS: link.rttS };
       return { plan: plan(left), linkBytesS: link.bytesS };
     },
@@ -146,7 +154,8 @@ export function planDelivery(data: PackageData, request: DeliveryRequest): Deliv
   if (!best) return undefined;
   const { allBytes, firstPictureS, meshS, step } = timesOf(manifest, request, best.scale);
   const shown = manifest.scales.find((s) => s.scale === best.scale)!;
-  const textureSum = best.planes.reduce((sum, { plane }) => sum + textureBytes(data.textures[plane].widthPx, data.textures[plane].heightPx), 0);
+  const textureSum = best.planes.reduce((sum, { plane }) =>
+    sum + textureBytes(data.textures[plane].widthPx, data.textures[plane].heightPx), 0);
   let chosen: DeliveryPlan = {
     ...best, step, fixedBytes: allBytes, firstPictureS, meshS, completeS: meshS + best.endS,
     gpuBytes: { mesh: scaleBytes(shown), textures: textureSum },

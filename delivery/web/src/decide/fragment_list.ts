@@ -11,8 +11,8 @@ export interface ListedFragment {
   fragment: number;
 }
 /**
- * The F-list of a package at a scale: the stored fragments of all chosen planes in one list (thesis ch. 4). A fragment's losses are
- * its part of what its group of planes loses in lit pictures, times the group's weight.
+ * The F-list of a package at a scale: the stored fragments of all chosen planes in one list (thesis ch. 4). A
+ * fragment's losses are its part of what its group of planes loses in lit pictures, times the group's weight.
  */
 export interface FragmentList {
   offers: FragmentOffer[];
@@ -35,14 +35,16 @@ export interface ListOptions {
   qualityHigh: number;
   /** What a group's losses weigh beside the others', > 0. */
   groupWeights: PerGroup;
-  /** Chapter 4's list as printed, where the policy is thesis: makes it of a list of all fragments, ordered by feature density alone. */
+  /** Chapter 4's list as printed (policy thesis), of all fragments ordered by feature density alone. */
   printed?: (data: PackageData, list: FragmentList, options: ListOptions) => void;
 }
 /** S_0 at 1000 px, the mean of eta, the qualities of delivery/cpp. */
-export const defaultListOptions: ListOptions = { scale: 0, displayedPx: 1000, gamma: -1, qualityLow: 5, qualityHigh: 97, groupWeights: everyGroup(1) };
+export const defaultListOptions: ListOptions = { scale: 0, displayedPx: 1000, gamma: -1, qualityLow: 5,
+  qualityHigh: 97, groupWeights: everyGroup(1) };
 
 /** `surface`: of the plane's group. */
-function addPlane(loss: TextureLoss, plane: number, surface: number, options: ListOptions, list: FragmentList, previewLoss: number[]): void {
+function addPlane(loss: TextureLoss, plane: number, surface: number, options: ListOptions, list: FragmentList,
+    previewLoss: number[]): void {
   const { data } = loss;
   const t = tablesOf(data, plane);
   const group = groupIndex(data, plane);
@@ -55,7 +57,8 @@ function addPlane(loss: TextureLoss, plane: number, surface: number, options: Li
   // Rungs whose quality is within the limits, as near as there are any.
   const rungs = [...t.rungQuality.keys()];
   const highRung = Math.max(t.rungQuality.filter((q) => q <= options.qualityHigh).length - 1, 0);
-  const lowRung = Math.min(t.rungQuality.filter((q) => q < options.qualityLow).length, rungs.length - 1, highRung);
+  const lowRung = Math.min(t.rungQuality.filter((q) => q < options.qualityLow).length, rungs.length - 1,
+    highRung);
   for (const f of t.order) {
     const bytes = rungs.map((r) => bytesToShow(t, r, f));
     if (!bytes.every((b) => b > 0 && b <= 0xffffffff)) continue;
@@ -69,32 +72,34 @@ function addPlane(loss: TextureLoss, plane: number, surface: number, options: Li
     list.fragments.push({ plane, fragment: f });
     list.groups.push(group);
     const plannedBytes = Math.max(1, interpolatedBytes(t, f, quality[f]));
-    list.offers.push({ bytes, loss: weighted, eta: eta[f] * (printed ? 1 : weighted[0] - Math.min(...weighted)), plannedBytes, lowRung, highRung });
+    list.offers.push({ bytes, loss: weighted,
+      eta: eta[f] * (printed ? 1 : weighted[0] - Math.min(...weighted)), plannedBytes, lowRung, highRung });
   }
 }
 
 /**
- * Ordered by plane and importance; offers carry feature density times what showing the fragment saves in lit pictures. Needs the
- * planes' tables, and those of the full-size planes. `loss` is for the options' displayed height.
+ * Ordered by plane and importance; offers carry feature density times what showing the fragment saves in lit
+ * pictures. Needs the planes' tables, and those of the full-size planes. `loss` is for the options' displayed
+ * height.
  */
-export function fragmentList(
-  data: PackageData,
-  planes: readonly PlaneChoice[],
-  options: Partial<ListOptions> = {},
-  loss = new TextureLoss(data, options.displayedPx ?? defaultListOptions.displayedPx),
-): FragmentList {
+export function fragmentList(data: PackageData, planes: readonly PlaneChoice[],
+    options: Partial<ListOptions> = {},
+    loss = new TextureLoss(data, options.displayedPx ?? defaultListOptions.displayedPx)): FragmentList {
   const all = { ...defaultListOptions, ...options };
   const previewLoss: [number, number, number] = [0, 0, 0];
-  const list: FragmentList = { offers: [], fragments: [], groups: [], groupWeights: all.groupWeights, previewLoss };
+  const list: FragmentList = { offers: [], fragments: [], groups: [], groupWeights: all.groupWeights,
+    previewLoss };
   const weights = loss.weights(planes);
   // A group without any surface loses nothing, whatever its rungs.
-  for (const { plane } of planes) addPlane(loss, plane, weights[groupIndex(data, plane)] || 1, all, list, previewLoss);
+  for (const { plane } of planes)
+    addPlane(loss, plane, weights[groupIndex(data, plane)] || 1, all, list, previewLoss);
   all.printed?.(data, list, all);
   return list;
 }
 
 /** Loss of each group where the offers have these rungs; -1 = skipped. */
-export function lossesOf({ offers, groups, groupWeights, previewLoss }: FragmentList, rungs: ArrayLike<number>): PerGroup {
+export function lossesOf({ offers, groups, groupWeights, previewLoss }: FragmentList,
+    rungs: ArrayLike<number>): PerGroup {
   const weighted = [0, 0, 0];
   offers.forEach(({ loss }, i) => (weighted[groups[i]] += loss[rungs[i] + 1]));
   return previewLoss.map((loss, g) => loss + weighted[g] / groupWeights[g]) as unknown as PerGroup;

@@ -7,8 +7,7 @@ import { exp } from './portable_math';
 // so that the whole ends at the time limit T_0, though throughput moves. Each fragment has its share of the
 // time by the bytes that a plan made before the first request gives it. What one transfer takes less or more
 // than its share is spread over the next ones with weights 1/2, 1/3, .. The same decisions, bit for bit, as
-// delivery/cpp/decide/harmonic_time.h. The plan does no I/O and knows no clock. Its arguments are not
-// checked.
+// delivery/cpp/decide/harmonic_time.h. It does no I/O, knows no clock, checks no argument.
 
 /** One fragment as the plan sees it. */
 export interface FragmentOffer {
@@ -32,10 +31,7 @@ export interface FragmentOffer {
  * nearest 0 comes first.
  */
 export type Policy = 'guard' | 'thesis';
-/**
- * Which end of the list is next: always the finest (loads with guard), by the last throughput against beta_0
- * (as printed), or by the sign of the next credit.
- */
+/** The next end of the list: the finest (guard), by throughput over beta_0 (as printed), or by credit. */
 export type HtcOrder = 'finest' | 'beta0' | 'credit';
 
 /** A decision and what became of it. */
@@ -97,14 +93,9 @@ function lowestShown(f: FragmentOffer, limits: boolean): number {
   return low;
 }
 
-/**
- * The rung from `low` on that costs least (ties: the first), among rungs of at most `mostBytes`; -1: skipping
- * costs least. `cost` is that of a fragment of so many bytes and so much loss.
- */
-function cheapestRung(
-  { bytes, loss, highRung }: FragmentOffer, low: number, skip: boolean, mostBytes: number,
-  cost: (bytes: number, loss: number) => number,
-): number {
+/** The rung from `low` on, of at most `mostBytes`, with the least `cost`; -1: skipping costs least. */
+function cheapestRung({ bytes, loss, highRung }: FragmentOffer, low: number, skip: boolean, mostBytes: number,
+    cost: (bytes: number, loss: number) => number): number {
   let best = skip ? -1 : low;
   let least = skip ? cost(0, loss[0]) : cost(bytes[low], loss[low + 1]);
   for (let r = low; r < bytes.length && !(r > highRung); ++r) {
@@ -126,10 +117,7 @@ export function meanOffer(offers: readonly FragmentOffer[], fromGamma: boolean):
   return offers.reduce((best, _, i) => (away(i) < away(best) ? i : best), 0);
 }
 
-/**
- * Bytes of each offer by the plan of least loss for a budget: all at one price of bytes in units of loss, by
- * bisection on the price's logarithm. `lowest`: rungs by offer.
- */
+/** Bytes by offer in the plan of least loss, by bisection on the price of bytes. `lowest`: rungs. */
 function bytesOfLeastLoss(offers: readonly FragmentOffer[], lowest: number[], budget: number): number[] {
   const bytesAt = (price: number): number[] => {
     const cost = (bytes: number, loss: number): number => loss + price * bytes;
@@ -194,10 +182,7 @@ export class HarmonicTimePlan {
   private nowS_ = 0;
   private lastDoneS_ = 0;
 
-  constructor(
-    private readonly offers_: readonly FragmentOffer[],
-    options: TimePlanOptions,
-  ) {
+  constructor(private readonly offers_: readonly FragmentOffer[], options: TimePlanOptions) {
     this.options_ = completed(options);
     const { policy, timeLimitS, initialBytesS, lowestRung } = this.options_;
     this.remaining_ = [...offers_.keys()].sort((a, b) => offers_[b].eta - offers_[a].eta);
@@ -240,10 +225,7 @@ export class HarmonicTimePlan {
     }
     return undefined;
   }
-  /**
-   * A request has ended, in any order; times must not fall. Not `well`: the request was given up, its time is
-   * spent, its fragment counts as skipped.
-   */
+  /** A request has ended, in any order; times never fall. Not `well`: its fragment counts as skipped. */
   ended(step: HtcStep, nowS: number, well: boolean): void {
     const { latencyS, rttS, rate } = this.options_;
     step.doneS = nowS;
@@ -295,10 +277,7 @@ export class HarmonicTimePlan {
   private creditS_(): number {
     return this.credits_.reduce((sum, c) => sum + c.value / (this.steps.length - c.issued + 2), 0);
   }
-  /**
-   * dT is spread over what is to come, the share 1 / (chi zeta) for each, chi = 2 for the position after the
-   * last issued one.
-   */
+  /** dT is spread: share 1 / (chi zeta) for each, chi = 2 for the position after the last issued one. */
   private spread_(residualS: number): void {
     const left = this.remaining_.length;
     if (left === 0) return;
@@ -311,10 +290,7 @@ export class HarmonicTimePlan {
   private inFlightBytes_(): number {
     return sumOf(this.inFlight_.map((s) => s.bytes));
   }
-  /**
-   * Bytes that can still arrive in time besides those in flight. A request now is answered a round trip
-   * later, whether or not enough is in flight until then.
-   */
+  /** Bytes that can still arrive in time besides those in flight; an answer takes a round trip. */
   private roomBytes_(beta = this.options_.rate.recentBytesS()): number {
     const { timeLimitS, latencyS } = this.options_;
     const leftS = timeLimitS - this.nowS_;

@@ -1,7 +1,7 @@
 import { ln2Hi, ln2Lo, pi, pio2Hi, pio2Lo } from '../format/shared_numbers';
 
-// exp, log, sin, cos, atan2, pow with the same bits as format/base/portable_math.h: plain double arithmetic, where Math's
-// functions differ from engine to engine. About 1e-15 relative.
+// exp, log, sin, cos, pow with the same bits as format/base/portable_math.h: plain double arithmetic, where
+// Math's functions differ from engine to engine. About 1e-15 relative.
 
 const rootOfHalf = 0.7071067811865475244;
 
@@ -15,7 +15,7 @@ function powerOfTwo(k: number): number {
   return power;
 }
 
-/** Nearest whole number, ties to even, of what is far below 2^52: above that there are no fractions to keep. */
+/** Nearest whole number, ties to even, far below 2^52: above that there are no fractions. */
 const nearestInteger = (x: number): number => x + 6755399441055744 - 6755399441055744;
 
 function sinReduced(r: number): number {
@@ -45,15 +45,6 @@ function sinQuadrant(x: number, add: number): number {
     default:
       return -cosReduced(r);
   }
-}
-
-function atanPositive(tangent: number): number {
-  let t = tangent;
-  for (let halvings = 0; halvings < 2; ++halvings) t = t / (1 + Math.sqrt(1 + t * t));
-  const z = t * t;
-  let s = 0;
-  for (let k = 27; k >= 1; k -= 2) s = 1 / k - z * s;
-  return 4 * t * s;
 }
 
 /** e to the power of x. */
@@ -89,16 +80,6 @@ export function sin(x: number): number {
 /** Cosine of |x| <= 1e6. */
 export function cos(x: number): number {
   return sinQuadrant(x, 1);
-}
-
-/** Angle of the point (x, y). */
-export function atan2(y: number, x: number): number {
-  const ax = Math.abs(x);
-  const ay = Math.abs(y);
-  if (ax === 0 && ay === 0) return 0;
-  let a = ay <= ax ? atanPositive(ay / ax) : pi / 2 - atanPositive(ax / ay);
-  if (x < 0) a = pi - a;
-  return y < 0 ? -a : a;
 }
 
 /** base > 0 to a power. */

@@ -6,13 +6,14 @@ import {
 import { clamp } from './numbers';
 import { exp, log, pow } from './portable_math';
 
-// FLIP of lit pictures of a choice against S_0 with the source's texels, read between the samples of a quality table:
-// format/rules/picture_prediction.cpp, bit for bit.
+// FLIP of lit pictures of a choice against S_0 with the source's texels, read between the samples of a
+// quality table: format/rules/picture_prediction.cpp, bit for bit.
 
 const mixed = (a: number, b: number, part: number): number => (1 - part) * a + part * b;
 
 /** Two neighbours on a rising axis around `at`, and the way from the first to the second. */
-function between(axis: readonly number[], at: number, value: (x: number) => number = (x) => x): [first: number, second: number, part: number] {
+function between(axis: readonly number[], at: number,
+    value: (x: number) => number = (x) => x): [first: number, second: number, part: number] {
   let first = 0;
   while (first + 2 < axis.length && axis[first + 1] < at) ++first;
   const second = Math.min(first + 1, axis.length - 1);
@@ -21,7 +22,8 @@ function between(axis: readonly number[], at: number, value: (x: number) => numb
   return [first, second, clamp((value(at) - from) / (value(axis[second]) - from), 0, 1)];
 }
 
-const sizeAt = ({ sizesPx }: QualityTable, displayedPx: number): [number, number, number] => between(sizesPx, Math.max(displayedPx, 1), log);
+const sizeAt = ({ sizesPx }: QualityTable, displayedPx: number): [number, number, number] =>
+  between(sizesPx, Math.max(displayedPx, 1), log);
 
 /** How much more a picture of a fixed number of texels loses than at the nearest height of the table. */
 function beyondSizes({ sizesPx }: QualityTable, displayedPx: number): number {
@@ -34,7 +36,7 @@ function beyondSizes({ sizesPx }: QualityTable, displayedPx: number): number {
 class Curve {
   private readonly logDssim_: number[];
   private readonly logFlip_: number[];
-  /** Loss of mips from the finest sampled level on, and how many levels finer than the planes shown the first is. */
+  /** Loss of mips from the finest sampled level on; how many levels finer than the shown planes it is. */
   private readonly mips_: number[];
   private readonly finer_: number;
   readonly preview: number;
@@ -77,10 +79,10 @@ export function sizesAround(table: QualityTable, displayedPx: number): readonly 
   const [first, second] = sizeAt(table, displayedPx);
   return [table.sizesPx[first] ?? 1, table.sizesPx[second] ?? 1];
 }
-/** How many times twice as large texels are on the screen as those that were sampled at each of sizesAround(). */
+/** How many times twice as large texels are on the screen as the samples of sizesAround(). */
 export type TexelGrowth = readonly [number, number];
 
-/** What textures of one group lose at one displayed height; without samples 1 - SSIM of their texels, and nothing by coarser mips. */
+/** What textures of a group lose at one height; without samples 1 - SSIM, and 0 by coarser mips. */
 export class GroupCurve {
   private readonly curves_: Curve[];
   private readonly part_: number;
@@ -98,7 +100,8 @@ export class GroupCurve {
     const [first, second] = this.curves_;
     if (!first) return Math.min(1, dssim);
     const x = log(dssim);
-    const [a, b] = [first, second].map((curve, i) => curve.at(x) * (growth[i] === 0 ? 1 : pow(growth[i] < 0 ? lossPerHalving : lossPerDoubling, growth[i])));
+    const [a, b] = [first, second].map((curve, i) =>
+      curve.at(x) * (growth[i] === 0 ? 1 : pow(growth[i] < 0 ? lossPerHalving : lossPerDoubling, growth[i])));
     return Math.min(1, mixed(a, b, this.part_));
   }
   /** FLIP where all textures of the group show their previews. */
@@ -106,7 +109,7 @@ export class GroupCurve {
     const [first, second] = this.curves_;
     return first ? mixed(first.preview, second.preview, this.part_) : 1;
   }
-  /** FLIP of the texels that rungs code, halved `mip` times; for full size that of the finest sampled level. */
+  /** FLIP of the texels that rungs code, halved `mip` times; 0: that of the finest sampled level. */
   halved(growth: TexelGrowth, mip: number): number {
     const [first, second] = this.curves_;
     const at = (curve: Curve, level: number): number => {
@@ -121,7 +124,8 @@ export class GroupCurve {
 export function geometryFlip(table: QualityTable, displayedPx: number, scale: number): number {
   const [s, nextScale, scalePart] = between(table.scales, scale);
   const [size, nextSize, sizePart] = sizeAt(table, displayedPx);
-  const at = (i: number): number => mixed(table.geometry[i].flip[s], table.geometry[i].flip[nextScale], scalePart);
+  const at = (i: number): number =>
+    mixed(table.geometry[i].flip[s], table.geometry[i].flip[nextScale], scalePart);
   return mixed(at(size), at(nextSize), sizePart);
 }
 

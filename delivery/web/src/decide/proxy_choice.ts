@@ -3,7 +3,7 @@ import type { Manifest } from '../format/manifest';
 import { ln2, proxyLossPerDoubling, sameFlip, sameFlipP95 } from '../format/shared_numbers';
 import { log, pow } from './portable_math';
 
-// Which proxies are enough, from the numbers of the manifest alone: format/rules/proxy_choice.cpp, bit for bit.
+// Which proxies are enough, from the manifest alone: format/rules/proxy_choice.cpp, bit for bit.
 
 /** FLIP of lit pictures of a proxy against S_0 with the source's textures: mean and 95th percentile. */
 export interface ProxyLoss {
@@ -24,9 +24,11 @@ function lossAt(sizes: readonly number[], losses: readonly number[], displayedPx
 }
 
 /** At a displayed height in px, read between the measured heights. */
-export function proxyLoss({ proxies, proxySizesPx }: Manifest, proxy: number, displayedPx: number): ProxyLoss {
+export function proxyLoss({ proxies, proxySizesPx }: Manifest, proxy: number,
+    displayedPx: number): ProxyLoss {
   const { flip, flipP95 } = proxies[proxy];
-  return { flip: lossAt(proxySizesPx, flip, displayedPx), flipP95: lossAt(proxySizesPx, flipP95, displayedPx) };
+  return { flip: lossAt(proxySizesPx, flip, displayedPx),
+    flipP95: lossAt(proxySizesPx, flipP95, displayedPx) };
 }
 /** The smallest proxy that cannot be told from S_0 at that height; -1 where there is none. */
 export function servingProxy(manifest: Manifest, displayedPx: number): number {
@@ -36,7 +38,8 @@ export function servingProxy(manifest: Manifest, displayedPx: number): number {
   });
 }
 /** Bytes of begin .. end behind those that the first request has brought. */
-export const beyondStart = (begin: number, end: number): number => end - Math.min(end, Math.max(begin, startBytes));
+export const beyondStart = (begin: number, end: number): number =>
+  end - Math.min(end, Math.max(begin, startBytes));
 /** Bytes behind the first picture that are fetched for a proxy. */
 export function proxyBytesBeyondStart({ proxies }: Manifest, proxy: number): number {
   const { offset, bytes } = proxies[proxy].glb;

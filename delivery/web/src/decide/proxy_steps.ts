@@ -13,10 +13,7 @@ export interface StepLink {
   leftS: number;
 }
 
-/**
- * Bytes behind those of the first request that a client of a package with proxies fetches before it can
- * decide about scales and textures.
- */
+/** Bytes behind the first request that a package with proxies needs before scales can be chosen. */
 export function documentBytes({ index, tables, scales }: Manifest): number {
   const { offset, bytes } = scales[scales.length - 1].glb;
   return beyondStart(index.offset, tables.offset + tables.bytes) + beyondStart(offset, offset + bytes);
@@ -26,7 +23,8 @@ export function documentBytes({ index, tables, scales }: Manifest): number {
  * The proxy that lowers the mean FLIP of what is seen in the time left by at least a twentieth, of several
  * the one that lowers it most; -1 where none does. What scales look like is supposed, see SPEC.md, A.6.
  */
-export function proxyStep(m: Manifest, wanted: number, displayedPx: number, { bytesS, rttS, leftS }: StepLink): number {
+export function proxyStep(m: Manifest, wanted: number, displayedPx: number,
+    { bytesS, rttS, leftS }: StepLink): number {
   if (m.proxies.length < 2 || !(leftS > 0) || !(bytesS > 0)) return -1;
   const seconds = (bytes: number): number => rttS + bytes / bytesS;
   const flips = m.proxies.map((_, k) => proxyLoss(m, k, displayedPx).flip);
@@ -49,7 +47,8 @@ export function proxyStep(m: Manifest, wanted: number, displayedPx: number, { by
     let sum = 0;
     for (let i = 0; i < moments; ++i) {
       const t = ((i + 0.5) / moments) * leftS;
-      const scale = t < meshS ? 1 : t >= endS ? last : first * pow(last / first, (t - meshS) / (endS - meshS));
+      const scale = t < meshS ? 1
+        : t >= endS ? last : first * pow(last / first, (t - meshS) / (endS - meshS));
       sum += t < stepS ? flips[0] : Math.min(flips[step], scale);
     }
     return sum / moments;

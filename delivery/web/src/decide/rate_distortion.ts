@@ -3,10 +3,7 @@ import { positive, sumOf } from './numbers';
 
 // How a budget of bytes is best spent: format/rules/allocation.cpp, bit for bit.
 
-/**
- * Weight of a fragment's quality: its surface fraction, with the area per texel capped at the 99th percentile of
- * all covered texels. [F]
- */
+/** [F] Weights of quality: surface fraction, with area per texel capped at its 99th percentile. */
 export function surfaceWeights({ coveredTexels, surfaceFraction }: PlaneTables): Float32Array {
   const area = (f: number): number => surfaceFraction[f] / coveredTexels[f]; // per texel
   const covered = positive(coveredTexels).sort((a, b) => area(a) - area(b));
@@ -39,7 +36,8 @@ export function spendBytes(curves: readonly RdCurve[], budgetBytes: number): num
       bytes.forEach((all, way) => {
         const more = all - bytes[at];
         const slope = (loss[at] - loss[way]) / more;
-        if (more > 0 && (slope > best.slope || (slope === best.slope && more > best.bytes))) best = { slope, curve, way, bytes: more };
+        if (more > 0 && (slope > best.slope || (slope === best.slope && more > best.bytes)))
+          best = { slope, curve, way, bytes: more };
       });
       if (best.way === 0) return;
       steps.push(best);

@@ -30,7 +30,8 @@ export function groupedList(list: FragmentList, bytesEach: number, budget: numbe
   list.offers.forEach(({ plannedBytes, bytes }, i) => {
     const expected = Math.min(Math.max(plannedBytes * factor, bytes[0]), bytes[bytes.length - 1]);
     open += expected;
-    if (open <= bytesEach && list.fragments[i].plane === list.fragments[i - 1]?.plane) return void members.at(-1)!.push(i);
+    if (open <= bytesEach && list.fragments[i].plane === list.fragments[i - 1]?.plane)
+      return void members.at(-1)!.push(i);
     members.push([i]);
     open = expected;
   });
@@ -47,9 +48,10 @@ export function groupedList(list: FragmentList, bytesEach: number, budget: numbe
   return { offers, groups: members.map((group) => group.map((i) => list.fragments[i])) };
 }
 
-/** Bytes per second while bytes were coming: of requests so far, without the time that their answers took to begin. */
+/** Bytes per second while bytes came: of requests so far, without the time before their answers. */
 export function throughputOf(requests: readonly RequestRecord[], rttS: number): number {
-  const begun = requests.filter((r) => r.received > 0).map((r) => ({ ...r, from: Math.min(r.started + rttS, r.firstByte) }));
+  const begun = requests.filter((r) => r.received > 0)
+    .map((r) => ({ ...r, from: Math.min(r.started + rttS, r.firstByte) }));
   let [seconds, bytes, end] = [0, 0, 0];
   for (const { from, ended, received } of begun.sort((a, b) => a.from - b.from)) {
     seconds += Math.max(0, ended - Math.max(from, end));

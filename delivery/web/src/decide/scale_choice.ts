@@ -14,7 +14,7 @@ export interface InTime extends Simulated {
   scale: number;
   planes: PlaneChoice[];
   list: FragmentList;
-  /** Predicted FLIP of the lit picture: 0 = equal to S_0 with the source's texels, 1 = as different as can be. */
+  /** Predicted FLIP of the lit picture: 0 = equal to S_0 with the source's texels, 1 = the most. */
   flip: number;
   /** What it would be of S_0 with these textures. */
   textureFlip: number;
@@ -33,14 +33,16 @@ export interface InTimeRequest {
   memoryBytes?: number;
   /** Ways to store texels, the best first; left out: RGBA. */
   ways?: readonly BytesOf[];
-  /** When a scale's mesh is chosen: the plan of what comes after it (limit <= 0: no time is left), and the link that is supposed. */
+  /** The plan of what comes after a scale's mesh (limit <= 0: no time is left), and its link. */
   afterMesh(scale: number): { plan: TimePlanOptions; linkBytesS: number };
   /** Chooses what bytes are spent on in the place of rate and distortion. */
-  textures?: (loss: TextureLoss, scale: number, bytes: number) => { planes: PlaneChoice[]; list: FragmentList };
+  textures?: (loss: TextureLoss, scale: number,
+    bytes: number) => { planes: PlaneChoice[]; list: FragmentList };
 }
 
 /** Memory for the textures beside a scale. */
-function texturesWithin({ data: { manifest } }: TextureLoss, { memoryBytes = Infinity }: InTimeRequest, scale: number): number {
+function texturesWithin({ data: { manifest } }: TextureLoss, { memoryBytes = Infinity }: InTimeRequest,
+    scale: number): number {
   const mesh = manifest.scales.find((s) => s.scale === scale);
   return memoryBytes - (mesh ? scaleBytes(mesh) : 0);
 }
@@ -55,7 +57,8 @@ function* texturesInTime(loss: TextureLoss, request: InTimeRequest, scale: numbe
     for (spent of budgetSteps(loss, { scale }, Math.floor(bytes))) yield;
     const { planes, list: { groupWeights } } = spent!;
     const within = planesWithin(loss, planes, texturesWithin(loss, request, scale), request.ways);
-    if (within.some(({ plane }, i) => plane !== planes[i].plane)) spent = spendOn(loss, within, { scale, groupWeights }, Math.floor(bytes));
+    if (within.some(({ plane }, i) => plane !== planes[i].plane))
+      spent = spendOn(loss, within, { scale, groupWeights }, Math.floor(bytes));
   }
   const { list, planes } = spent!;
   const played = simulate(list.offers, plan, { bytesS: linkBytesS, rttS, connections: request.connections });
@@ -63,15 +66,17 @@ function* texturesInTime(loss: TextureLoss, request: InTimeRequest, scale: numbe
   const losses = lossesOf(list, played.rungs);
   const { data: { quality }, displayedPx } = loss;
   const flip = pictureFlip(quality, displayedPx, scale, losses);
-  return { scale, planes, list, flip, textureFlip: textureFlip(quality, losses), late: timeLimitS <= 0, ...played };
+  return { scale, planes, list, flip, textureFlip: textureFlip(quality, losses), late: timeLimitS <= 0,
+    ...played };
 }
 
 /**
- * The wanted scale, or a coarser one where a simulation of both shows a better picture in the time or where the wanted mesh
- * comes too late; with the textures that go with it: delivery/cpp/client/delivery_plan.h. A generator, so that a page can breathe between its steps. undefined:
- * the package has no such scale.
+ * The wanted scale, or a coarser one where a simulation of both shows a better picture in the time or where
+ * the wanted mesh comes too late; with the textures that go with it: delivery/cpp/client/delivery_plan.h. A
+ * generator, so that a page can breathe between its steps. undefined: the package has no such scale.
  */
-export function* choiceInTime(data: PackageData, request: InTimeRequest): Generator<void, InTime | undefined> {
+export function* choiceInTime(data: PackageData,
+    request: InTimeRequest): Generator<void, InTime | undefined> {
   const loss = new TextureLoss(data, request.displayedPx);
   let best: InTime | undefined;
   for (const { scale } of data.manifest.scales) {

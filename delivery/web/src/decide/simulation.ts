@@ -2,8 +2,7 @@ import { doneBytes, forEver } from '../format/shared_numbers';
 import { FragmentOffer, HarmonicTimePlan, HtcStep, TimePlanOptions, bytesAtRung } from './harmonic_time';
 import { sumOf } from './numbers';
 
-// delivery/cpp/simulate/network_model.h for one server on a link of constant rate: the same arithmetic, the
-// same bits.
+// delivery/cpp/simulate/simulation.h for one server on a link of constant rate, to the same bits.
 
 /** A link as a plan supposes it. */
 export interface LinkOptions {
@@ -79,8 +78,7 @@ export function fetchedS(link: LinkOptions, fromS: number, bytes: number): numbe
   return model.nowS;
 }
 
-// delivery/cpp/simulate/simulation.h for one server on a link of constant rate: the same arithmetic, the same
-// bits.
+// delivery/cpp/simulate/simulation.h for one server on a link of constant rate, to the same bits.
 
 /** The course of a plan over a link. */
 export interface Simulated {
@@ -93,7 +91,8 @@ export interface Simulated {
   endS: number;
 }
 /** Plays a plan over a link. A limit <= 0 leaves no time: nothing is transferred. */
-export function simulate(offers: readonly FragmentOffer[], options: TimePlanOptions, link: LinkOptions): Simulated {
+export function simulate(offers: readonly FragmentOffer[], options: TimePlanOptions,
+    link: LinkOptions): Simulated {
   const rungs = offers.map(() => -1);
   let endS = 0;
   if (options.timeLimitS > 0) {

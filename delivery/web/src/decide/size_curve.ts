@@ -59,9 +59,10 @@ function axisAt({ rungQuality, knotQuality, knotPosition }: PlaneTables, quality
   return low + (from.at + part * (to.at - from.at)) * (fineness(last) - low);
 }
 
-/** Bytes that a fragment would have at a quality that no rung has; exact at rungs, 0 when it is not stored. */
+/** Bytes of a fragment at a quality between rungs; exact at rungs, 0 when it is not stored. */
 export function interpolatedBytes(t: PlaneTables, fragment: number, quality: number): number {
-  const stored = [...t.rungQuality].map((q, r) => ({ q, bytes: bytesToShow(t, r, fragment) })).filter(({ bytes }) => bytes > 0);
+  const stored = [...t.rungQuality].map((q, r) => ({ q, bytes: bytesToShow(t, r, fragment) }))
+    .filter(({ bytes }) => bytes > 0);
   const exact = stored.find(({ q }) => q === quality);
   if (exact || stored.length === 0) return exact?.bytes ?? 0;
   const x = stored.map(({ q }) => fineness(q));

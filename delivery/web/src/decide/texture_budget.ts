@@ -1,14 +1,12 @@
 import {
   leastWeight, lossUnit, reweightings, worthwhileFinerFlip, worthwhilePart,
 } from '../format/shared_numbers';
-import type { PackageData } from '../format/tables';
 import type { QualityTable } from '../format/quality_table';
 import { FragmentList, ListOptions, fragmentList, lossesOf } from './fragment_list';
-import { sumOf } from './numbers';
 import { pow } from './portable_math';
 import { spendBytes } from './rate_distortion';
-import { bytesAtRung } from './harmonic_time';
-import { PerGroup, PlaneChoice, TextureLoss, everyGroup, pictureFlip, planesForDisplay } from './texture_loss';
+import { PerGroup, PlaneChoice, TextureLoss, everyGroup, pictureFlip,
+  planesForDisplay } from './texture_loss';
 
 // delivery/cpp/decide/texture_budget.cpp, bit for bit.
 
@@ -27,10 +25,12 @@ export interface TextureSpending {
 export type SpendingOptions = Partial<ListOptions> & Pick<ListOptions, 'scale'>;
 
 /** Spends the bytes on these planes. */
-export function spendOn(loss: TextureLoss, planes: PlaneChoice[], options: SpendingOptions, budget: number): TextureSpending {
+export function spendOn(loss: TextureLoss, planes: PlaneChoice[], options: SpendingOptions,
+    budget: number): TextureSpending {
   const { data, displayedPx } = loss;
   const list = fragmentList(data, planes, { ...options, displayedPx }, loss);
-  const curves = list.offers.map((f) => ({ bytes: [0, ...f.bytes], loss: f.loss.map((l) => Math.floor(l * lossUnit)) }));
+  const curves =
+    list.offers.map((f) => ({ bytes: [0, ...f.bytes], loss: f.loss.map((l) => Math.floor(l * lossUnit)) }));
   const rungs = spendBytes(curves, budget).map((way) => way - 1);
   const losses = lossesOf(list, rungs);
   return { planes, list, rungs, losses, flip: pictureFlip(data.quality, displayedPx, options.scale, losses) };
@@ -39,11 +39,18 @@ export function spendOn(loss: TextureLoss, planes: PlaneChoice[], options: Spend
 /** The slopes of the predicted FLIP by the groups' losses. */
 function slopesOf({ exponent }: QualityTable, { flip, losses }: TextureSpending): PerGroup {
   if (!(flip > 0)) return everyGroup(1);
-  return losses.map((loss) => Math.max(leastWeight, pow(Math.max(loss / flip, 1e-9), exponent - 1))) as unknown as PerGroup;
+  return losses.map((loss) =>
+    Math.max(leastWeight, pow(Math.max(loss / flip, 1e-9), exponent - 1))) as unknown as PerGroup;
 }
 
-/** The steps of textureForBudget, so that a page can breathe between them; the last value is the result. */
-export function* budgetSteps(loss: TextureLoss, options: SpendingOptions, bytes: number): Generator<TextureSpending> {
+/**
+ * The best textures for so many bytes of fragments, step by step, so that a page can breathe; the last value
+ * is the result. Planes may be coarser than the display asks for, so that few bytes are not spread over too
+ * many texels, or finer, so that bytes that are left are not lost. Fragments share the bytes by rate and
+ * distortion. What counts is the FLIP that is predicted of the picture. Needs the tables of all planes.
+ */
+export function* budgetSteps(loss: TextureLoss, options: SpendingOptions,
+    bytes: number): Generator<TextureSpending> {
   const { data, displayedPx } = loss;
   const tried = new Set<string>();
   /** undefined: these planes were tried. Levels beyond the ladder's ends stand for the same planes. */
@@ -67,7 +74,7 @@ export function* budgetSteps(loss: TextureLoss, options: SpendingOptions, bytes:
       const to = at.map((level, g) => level + step[g]) as unknown as PerGroup;
       yield best;
       const now = spend(to);
-      // Finer planes take memory: they have to look better, not only as good, but not so much better than each other.
+      // Finer planes take memory: they have to look better, not only as good, but not by so much each.
       const finer = step.includes(-1);
       const least = Math.min(worthwhileFinerFlip, worthwhilePart * withoutFiner);
       if (!now || now.flip >= best.flip || (finer && now.flip >= withoutFiner - least)) continue;
@@ -83,20 +90,4 @@ export function* budgetSteps(loss: TextureLoss, options: SpendingOptions, bytes:
     best = now;
   }
   yield best;
-}
-
-/** The best texture that so many bytes can show. */
-export interface TextureBudget extends TextureSpending {
-  /** Bytes of fragments, at most the budget. */
-  bytes: number;
-}
-
-/**
- * Chooses between the planes for the display and coarser and finer ones, so that few bytes are not spread over texels that they
- * cannot make good, and bytes that are left are not lost; fragments share the bytes by rate and distortion. What counts is the FLIP that is predicted of the picture. Needs
- * the tables of all planes.
- */
-export function textureForBudget(data: PackageData, displayedPx: number, options: SpendingOptions, bytes: number): TextureBudget {
-  const best = [...budgetSteps(new TextureLoss(data, displayedPx), options, bytes)].pop()!;
-  return { ...best, bytes: sumOf(best.list.offers.map((f, i) => bytesAtRung(f, best.rungs[i]))) };
 }

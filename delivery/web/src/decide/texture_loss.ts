@@ -31,7 +31,8 @@ export function tablesOf(data: PackageData, plane: number): PlaneTables {
 }
 
 /** Number of the group of a plane. */
-export const groupIndex = (data: PackageData, plane: number): number => planeGroups.indexOf(groupOf(data.textures[plane].role));
+export const groupIndex = (data: PackageData, plane: number): number =>
+  planeGroups.indexOf(groupOf(data.textures[plane].role));
 
 /** Every texture at full size. */
 export function fullSize(textures: readonly TextureInfo[]): PlaneChoice[] {
@@ -44,7 +45,7 @@ function surfaceOf({ surfaceArea, boundsMin, boundsMax }: Manifest): number {
   return surfaceArea > 0 ? surfaceArea : 2 * (x * y + y * z + z * x);
 }
 
-/** How often the texels of a full-size plane may be halved until one stands for a pixel; below 0 where one covers more. */
+/** How often full-size texels may be halved until one covers a pixel; below 0 where it covers more. */
 function displayLevel(data: PackageData, base: number, displayedPx: number): number {
   const { coveredTexels, surfaceFraction } = tablesOf(data, base);
   const texelsPerArea = sumOf(coveredTexels) / (sumOf(surfaceFraction) * surfaceOf(data.manifest));
@@ -60,22 +61,25 @@ function planeAtLevel({ textures }: PackageData, base: number, level: number): n
 }
 
 /**
- * The smallest mips that still have a texel for every pixel where the object is displayed `displayedPx` high (device
- * px), or by group so many `levels` coarser, or finer where below 0. Needs the tables of the full-size planes.
+ * The smallest mips that still have a texel for every pixel where the object is displayed `displayedPx` high
+ * (device px), or by group so many `levels` coarser, or finer where below 0. Needs the tables of the
+ * full-size planes.
  */
-export function planesForDisplay(data: PackageData, displayedPx: number, levels: PerGroup = everyGroup(0)): PlaneChoice[] {
+export function planesForDisplay(data: PackageData, displayedPx: number,
+    levels: PerGroup = everyGroup(0)): PlaneChoice[] {
   return fullSize(data.textures).map(({ base }) => {
     const level = Math.max(0, displayLevel(data, base, displayedPx)) + levels[groupIndex(data, base)];
     return { base, plane: planeAtLevel(data, base, level) };
   });
 }
 
-/** FLIP of the textures alone: 0 = equal to S_0 with the source's texels. `losses`: of each group by itself, on S_0. */
+/** FLIP of the textures alone, 0 = equal to S_0 with the source's texels. `losses`: by group, on S_0. */
 export function textureFlip(table: QualityTable, losses: PerGroup): number {
   return combinedFlip(table, [0, ...losses]);
 }
 /** FLIP of a scale with textures. */
-export function pictureFlip(table: QualityTable, displayedPx: number, scale: number, losses: PerGroup): number {
+export function pictureFlip(table: QualityTable, displayedPx: number, scale: number,
+    losses: PerGroup): number {
   return combinedFlip(table, [geometryFlip(table, displayedPx, scale), ...losses]);
 }
 
@@ -85,7 +89,7 @@ interface PlaneLoss {
   weights: Float32Array;
   /** Of the stored fragments together. */
   weight: number;
-  /** [(rungs + 1) * F], index way * F + fragment; way 0 shows the preview, others lose by their mip and their rung. */
+  /** [(rungs + 1) * F], index way * F + fragment; way 0 is the preview, others lose by mip and rung. */
   shown: Float64Array;
 }
 
@@ -95,10 +99,7 @@ export class TextureLoss {
   private readonly planes_ = new Map<number, PlaneLoss>();
   private readonly previewMeans_ = new Map<number, number>();
 
-  constructor(
-    readonly data: PackageData,
-    readonly displayedPx: number,
-  ) {
+  constructor(readonly data: PackageData, readonly displayedPx: number) {
     this.curves_ = planeGroups.map((group) => new GroupCurve(data.quality, group, displayedPx));
   }
   plane(plane: number): PlaneLoss {
@@ -106,9 +107,10 @@ export class TextureLoss {
     if (!loss) this.planes_.set(plane, (loss = this.measure_(plane)));
     return loss;
   }
-  /** What a mip loses of the source's texels; 0 for full size. Needs the tables of the full-size plane alone. */
+  /** What a mip loses of the source's texels; 0 for full size. Needs that plane's tables alone. */
   mip(plane: number): number {
-    return this.curves_[groupIndex(this.data, plane)].halved(this.growth_(plane), this.data.textures[plane].mip);
+    return this.curves_[groupIndex(this.data, plane)].halved(this.growth_(plane),
+      this.data.textures[plane].mip);
   }
   private measure_(plane: number): PlaneLoss {
     const t = tablesOf(this.data, plane);
@@ -118,16 +120,18 @@ export class TextureLoss {
     const growth = this.growth_(plane);
     const shown = new Float64Array((t.rungQuality.length + 1) * fragments);
     const mip = this.mip(plane);
-    const withMip = (coded: number): number => (mip > 0 ? combinedFlip(this.data.quality, [coded, mip]) : coded);
+    const withMip = (coded: number): number =>
+      (mip > 0 ? combinedFlip(this.data.quality, [coded, mip]) : coded);
     const mean = this.previewMean_(plane);
     const preview = this.previewLoss_(plane);
     for (const f of t.order) {
       shown[f] = mean > 0 ? Math.min(1, preview * (curve.coded(t.skipDssim[f]) / mean)) : 0;
-      for (let r = 0; r < t.rungQuality.length; ++r) shown[(r + 1) * fragments + f] = withMip(curve.coded(t.dssim[r * fragments + f], growth));
+      for (let r = 0; r < t.rungQuality.length; ++r)
+        shown[(r + 1) * fragments + f] = withMip(curve.coded(t.dssim[r * fragments + f], growth));
     }
     return { weights, weight: sumOf([...t.order].map((f) => weights[f])), shown };
   }
-  /** What skipped fragments are to each other: the mean over the plane's surface of what the group's curve says of their texels. */
+  /** Loss of skipped fragments: the mean over the surface of what the group's curve says of their texels. */
   private previewMean_(plane: number): number {
     let mean = this.previewMeans_.get(plane);
     if (mean !== undefined) return mean;
@@ -184,11 +188,9 @@ export class TextureLoss {
 export interface ShownTexture extends PlaneChoice {
   rungs: ArrayLike<number>;
 }
-/**
- * FLIP that is predicted of a picture that shows this scale and these textures. Needs the tables of their planes, and of the full-size
- * ones.
- */
-export function shownFlip(data: PackageData, displayedPx: number, scale: number, planes: readonly ShownTexture[]): number {
+/** Predicted FLIP of this scale with these textures. Needs their planes' tables and the full-size ones'. */
+export function shownFlip(data: PackageData, displayedPx: number, scale: number,
+    planes: readonly ShownTexture[]): number {
   const loss = new TextureLoss(data, displayedPx);
   const surface = loss.weights(planes);
   const all: [number, number, number] = [0, 0, 0];
@@ -196,7 +198,8 @@ export function shownFlip(data: PackageData, displayedPx: number, scale: number,
     const { weights, shown } = loss.plane(plane);
     const t = tablesOf(data, plane);
     const group = groupIndex(data, plane);
-    for (const f of t.order) all[group] += (weights[f] / (surface[group] || 1)) * shown[((rungs[f] ?? -1) + 1) * fragmentCount(t) + f];
+    for (const f of t.order) all[group] +=
+      (weights[f] / (surface[group] || 1)) * shown[((rungs[f] ?? -1) + 1) * fragmentCount(t) + f];
   }
   return pictureFlip(data.quality, displayedPx, scale, all);
 }

@@ -11,7 +11,8 @@ import { type PlaneChoice, type TextureLoss, fullSize, tablesOf } from './textur
 // Chapter 4 as printed: gamma_for_bytes, thesis_textures and as_printed of delivery/cpp, bit for bit.
 
 /** The Gamma whose list comes to so many bytes, D_i(Gamma) = D_1, by bisection; 0 or 1 where no list does. */
-export function gammaForBytes(data: PackageData, planes: readonly PlaneChoice[], scale: number, bytes: number): number {
+export function gammaForBytes(data: PackageData, planes: readonly PlaneChoice[], scale: number,
+    bytes: number): number {
   const row = data.manifest.scales.findIndex((s) => s.scale === scale);
   const bytesAt = (gamma: number): number => {
     let sum = 0;
@@ -33,18 +34,18 @@ export function gammaForBytes(data: PackageData, planes: readonly PlaneChoice[],
   return high;
 }
 
-/**
- * A list of all fragments as printed: etas count from Gamma, the limits are Q_i - dQ and Q_i + dQ, and F-bar,
- * the fragment nearest to Gamma, is sent at Q_i itself.
- */
-function asPrintedList(data: PackageData, { offers, fragments }: FragmentList, { scale, gamma, qualityLow, qualityHigh }: ListOptions): void {
+/** All fragments as printed: etas from Gamma, limits Q_i - dQ and Q_i + dQ, and F-bar (at Gamma) at Q_i. */
+function asPrintedList(data: PackageData, { offers, fragments }: FragmentList,
+    { scale, gamma, qualityLow, qualityHigh }: ListOptions): void {
   const row = data.manifest.scales.findIndex((s) => s.scale === scale);
   offers.forEach((offer, i) => {
     const { quality: { [row]: middle }, qualityWidth, rungQuality } = tablesOf(data, fragments[i].plane);
-    const [low, high] = [Math.max(qualityLow, middle - qualityWidth), Math.min(qualityHigh, middle + qualityWidth)];
+    const [low, high] = [Math.max(qualityLow, middle - qualityWidth),
+      Math.min(qualityHigh, middle + qualityWidth)];
     offer.eta -= gamma;
     offer.highRung = Math.max(rungQuality.filter((q) => q <= high).length - 1, 0);
-    offer.lowRung = Math.min(rungQuality.filter((q) => q < low).length, rungQuality.length - 1, offer.highRung);
+    offer.lowRung = Math.min(rungQuality.filter((q) => q < low).length, rungQuality.length - 1,
+      offer.highRung);
   });
   if (offers.length === 0) return;
   const nearest = meanOffer(offers, true);
@@ -62,7 +63,8 @@ export interface ThesisTextures {
 /** The textures that so many bytes show of a scale. */
 export function thesisTextures(loss: TextureLoss, scale: number, bytes: number): ThesisTextures {
   const planes = fullSize(loss.data.textures);
-  const options = { scale, displayedPx: loss.displayedPx, printed: asPrintedList, gamma: gammaForBytes(loss.data, planes, scale, bytes) };
+  const options = { scale, displayedPx: loss.displayedPx, printed: asPrintedList,
+    gamma: gammaForBytes(loss.data, planes, scale, bytes) };
   return { planes, options, list: fragmentList(loss.data, planes, options, loss) };
 }
 

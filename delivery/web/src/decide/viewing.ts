@@ -3,8 +3,8 @@ import type { Manifest, ManifestScale, ManifestStep } from '../format/manifest';
 import { apart, belowAny } from '../format/shared_numbers';
 import { cos, pi, sin } from './portable_math';
 
-// From how an object is looked at to the scale that is enough: format/rules/viewing.h. Lengths on screen are device px;
-// "displayed height" is the length on screen of the object's largest extent.
+// From how an object is looked at to the scale that is enough: format/rules/viewing.h. Lengths on screen are
+// device px; "displayed height" is the length on screen of the object's largest extent.
 
 /** A perspective camera: vertical field of view, and the picture's height in device px. */
 export interface CameraView {
@@ -22,16 +22,10 @@ export function displayedHeightPx(objectHeight: number, distance: number, camera
   return (objectHeight / (2 * distance * halfTangent(camera.fovDegrees))) * camera.viewportPx;
 }
 
-/** The distance at which the object is displayed that high; infinite for 0 px, 0 for "any". */
-export function viewingDistance(objectHeight: number, heightPx: number, camera: CameraView): number {
-  if (heightPx >= anyDisplayPx) return 0;
-  if (!(heightPx > 0)) return Infinity;
-  return (objectHeight / (2 * heightPx * halfTangent(camera.fovDegrees))) * camera.viewportPx;
-}
-
 /**
- * The rule that decides about the scale: flip (default) = lit pictures that cannot be told from those of S_0, which is what Manifest.steps
- * holds; jnd = the just-noticeable difference; error = an error of one pixel; edge = the O_V / E_S that matches the displayed height best.
+ * The rule that decides about the scale: flip (default) = lit pictures that cannot be told from those of S_0,
+ * which is what Manifest.steps holds; jnd = the just-noticeable difference; error = an error of one pixel;
+ * edge = the O_V / E_S that matches the displayed height best.
  */
 export type StepRule = 'flip' | 'jnd' | 'error' | 'edge';
 
@@ -67,28 +61,6 @@ export function scaleAt(steps: readonly ManifestStep[], displayedPx: number): nu
   return steps.length === 0 ? 0 : steps[steps.length - 1].scale;
 }
 
-/**
- * How far a scale's surface is from S_0's on screen, px at most; `max` is the largest of some thousand sampled
- * distances, never less than `p95`, which comes from samples of its own.
- */
-export function pixelError(
-  manifest: Manifest,
-  scale: ManifestScale,
-  displayedPx: number,
-): { p95: number; rms: number; max: number } {
-  if (scale.scale === 0 || !(manifest.objectHeight > 0)) return { p95: 0, rms: 0, max: 0 };
-  const pxPerUnit = displayedPx / manifest.objectHeight;
-  const p95 = scale.displayPxError >= anyDisplayPx ? 0 : displayedPx / scale.displayPxError;
-  return { p95, rms: scale.errorRms * pxPerUnit, max: Math.max(p95, scale.errorMax * pxPerUnit) };
-}
-
-/** A rectangle on the screen in px, y downwards. */
-export interface ScreenRect {
-  x0: number;
-  y0: number;
-  x1: number;
-  y1: number;
-}
 /** The shape that the visible part of an object makes (thesis 7.2, Fig. 7.5). */
 export interface VisiblePart {
   /** Both 0: nothing of the object is to be seen. */
@@ -100,17 +72,6 @@ export interface VisiblePart {
 /** The visible part of an object of which nothing is cut off. */
 export const wholeObject: VisiblePart = { widthPx: 0, heightPx: 0, clipped: false };
 
-/** The part of an object's bounding box on the screen that lies within the view. */
-export function clipTo(object: ScreenRect, view: ScreenRect): VisiblePart {
-  const x0 = Math.max(object.x0, view.x0);
-  const x1 = Math.min(object.x1, view.x1);
-  const y0 = Math.max(object.y0, view.y0);
-  const y1 = Math.min(object.y1, view.y1);
-  if (!(x1 > x0) || !(y1 > y0)) return { widthPx: 0, heightPx: 0, clipped: true };
-  const whole = x0 <= object.x0 && x1 >= object.x1 && y0 <= object.y0 && y1 >= object.y1;
-  return { widthPx: x1 - x0, heightPx: y1 - y0, clipped: !whole };
-}
-
 /** By how much a relative distance grows when R can be no more than half the part's shorter side. */
 function growthOfValue(s: ManifestScale, displayedPx: number, part: VisiblePart): number {
   if (!(s.p95 > 0) || s.displayPxError >= anyDisplayPx) return 1;
@@ -119,28 +80,20 @@ function growthOfValue(s: ManifestScale, displayedPx: number, part: VisiblePart)
   return Math.max(1, value / s.p95);
 }
 
-function accepts(
-  scales: readonly ManifestScale[],
-  k: number,
-  displayedPx: number,
-  part: VisiblePart,
-  rule: StepRule,
-): boolean {
+function accepts(scales: readonly ManifestScale[], k: number, displayedPx: number, part: VisiblePart,
+    rule: StepRule): boolean {
   const s = scales[k];
-  if (rule === 'jnd') return Math.max(part.widthPx, part.heightPx) * growthOfValue(s, displayedPx, part) <= s.displayPxJnd;
+  if (rule === 'jnd')
+    return Math.max(part.widthPx, part.heightPx) * growthOfValue(s, displayedPx, part) <= s.displayPxJnd;
   return displayedPx <= limitOf(scales, k, rule);
 }
 
 /**
- * The scale for an object displayed `displayedPx` high (the whole of it, seen or not) of which only a part is visible
- * (Fig. 7.5). Nothing visible: the coarsest scale. Not clipped: by the step function.
+ * The scale for an object displayed `displayedPx` high (the whole of it, seen or not) of which only a part is
+ * visible (Fig. 7.5). Nothing visible: the coarsest scale. Not clipped: by the step function.
  */
-export function selectScale(
-  manifest: Manifest,
-  displayedPx: number,
-  part: VisiblePart = wholeObject,
-  rule: StepRule = 'flip',
-): number {
+export function selectScale(manifest: Manifest, displayedPx: number, part: VisiblePart = wholeObject,
+    rule: StepRule = 'flip'): number {
   const { scales } = manifest;
   if (!part.clipped) return scaleAt(stepFunction(scales, rule), displayedPx);
   if (!(part.widthPx > 0 && part.heightPx > 0)) return scales[scales.length - 1].scale;

@@ -13,18 +13,15 @@ export class OrbitInput {
   private readonly pointers_ = new Map<number, { x: number; y: number }>();
   private readonly ended_ = new AbortController();
 
-  /** `moved` hears of each new orbit; `zooms`: the distance changes, too. The wheel zooms only while the canvas has the focus: a page that scrolls by goes on scrolling. */
-  constructor(
-    private readonly canvas_: HTMLElement,
-    private home_: Orbit,
-    private readonly moved_: () => void,
-    private readonly zooms_ = true,
-  ) {
+  /** `moved` hears of each new orbit. With `zooms`, the wheel zooms while the canvas has the focus. */
+  constructor(private readonly canvas_: HTMLElement, private home_: Orbit,
+      private readonly moved_: () => void, private readonly zooms_ = true) {
     this.orbit = { ...home_ };
     const { signal } = this.ended_;
     canvas_.addEventListener('pointerdown', (e) => this.down_(e), { signal });
     canvas_.addEventListener('pointermove', (e) => this.move_(e), { signal });
-    for (const name of ['pointerup', 'pointercancel'] as const) canvas_.addEventListener(name, (e) => this.pointers_.delete(e.pointerId), { signal });
+    for (const name of ['pointerup', 'pointercancel'] as const)
+      canvas_.addEventListener(name, (e) => this.pointers_.delete(e.pointerId), { signal });
     if (zooms_) canvas_.addEventListener('wheel', (e) => this.wheel_(e), { signal, passive: false });
     canvas_.addEventListener('keydown', (e) => this.key_(e), { signal });
   }
@@ -39,10 +36,12 @@ export class OrbitInput {
   }
   turn(right: number, up: number): void {
     const { thetaDegrees, phiDegrees, distance } = this.orbit;
-    this.set_({ thetaDegrees: (thetaDegrees + right) % 360, phiDegrees: Math.min(179, Math.max(1, phiDegrees - up)), distance });
+    this.set_({ thetaDegrees: (thetaDegrees + right) % 360,
+      phiDegrees: Math.min(179, Math.max(1, phiDegrees - up)), distance });
   }
   zoom(factor: number): void {
-    if (this.zooms_) this.set_({ ...this.orbit, distance: Math.min(distances.most, Math.max(distances.least, this.orbit.distance * factor)) });
+    if (this.zooms_) this.set_({ ...this.orbit,
+      distance: Math.min(distances.most, Math.max(distances.least, this.orbit.distance * factor)) });
   }
   dispose(): void {
     this.ended_.abort();
@@ -66,14 +65,17 @@ export class OrbitInput {
     const other = [...this.pointers_].find(([id]) => id !== e.pointerId)?.[1];
     this.pointers_.set(e.pointerId, now);
     if (other) {
-      const apart = (p: { x: number; y: number }): number => Math.max(1, Math.hypot(p.x - other.x, p.y - other.y));
+      const apart = (p: { x: number; y: number }): number =>
+        Math.max(1, Math.hypot(p.x - other.x, p.y - other.y));
       return this.zoom(apart(before) / apart(now));
     }
     const scale = degreesPerHeight / Math.max(1, this.canvas_.clientHeight);
     this.turn((before.x - now.x) * scale, (now.y - before.y) * scale);
   }
   private wheel_(e: WheelEvent): void {
-    if (this.canvas_.getRootNode() instanceof ShadowRoot ? (this.canvas_.getRootNode() as ShadowRoot).activeElement !== this.canvas_ : document.activeElement !== this.canvas_) return;
+    if (this.canvas_.getRootNode() instanceof ShadowRoot
+        ? (this.canvas_.getRootNode() as ShadowRoot).activeElement !== this.canvas_
+        : document.activeElement !== this.canvas_) return;
     e.preventDefault();
     this.zoom(Math.exp(Math.min(1, Math.max(-1, e.deltaY / 400))));
   }

@@ -8,8 +8,10 @@ import {
 
 /** Looks of the element; applications change them by parts, slots and the custom properties. */
 export const style = `
-:host { display: block; position: relative; width: 300px; height: 300px; contain: content; color-scheme: light dark;
-  --texmesh-text: light-dark(#1c1c1c, #f2f2f2); --texmesh-panel: light-dark(rgb(255 255 255 / .88), rgb(24 24 24 / .88)); --texmesh-accent: light-dark(#0b57a4, #8ec5ff); }
+:host { display: block; position: relative; width: 300px; height: 300px; contain: content;
+  color-scheme: light dark; --texmesh-text: light-dark(#1c1c1c, #f2f2f2);
+  --texmesh-panel: light-dark(rgb(255 255 255 / .88), rgb(24 24 24 / .88));
+  --texmesh-accent: light-dark(#0b57a4, #8ec5ff); }
 :host([hidden]) { display: none; }
 canvas, .poster { position: absolute; inset: 0; width: 100%; height: 100%; }
 canvas { outline-offset: -3px; cursor: grab; touch-action: pan-y; }
@@ -21,14 +23,19 @@ canvas:active { cursor: grabbing; }
 .poster img, ::slotted([slot=poster]) { width: 100%; height: 100%; object-fit: contain; }
 .poster.gone { opacity: 0; }
 .bar { position: absolute; left: 0; top: 0; height: 3px; background: var(--texmesh-accent); }
-.box { position: absolute; left: 0; right: 0; margin: 0 auto; top: 50%; transform: translateY(-50%); width: fit-content; max-width: 94%; max-height: 100%; overflow: auto; box-sizing: border-box; padding: .6em 1em; border: 0; border-radius: .5em;
-  font: inherit; text-align: center; color: var(--texmesh-text); background: var(--texmesh-panel); overflow-wrap: anywhere; }
+.box { position: absolute; left: 0; right: 0; margin: 0 auto; top: 50%; transform: translateY(-50%);
+  width: fit-content; max-width: 94%; max-height: 100%; overflow: auto; box-sizing: border-box;
+  padding: .6em 1em; border: 0; border-radius: .5em; font: inherit; text-align: center;
+  color: var(--texmesh-text); background: var(--texmesh-panel); overflow-wrap: anywhere; }
 .box small { display: block; }
 .box[hidden] { display: none; }
 button { cursor: pointer; min-height: 44px; }
-.box button { font: inherit; color: var(--texmesh-accent); background: none; border: 1px solid; border-radius: .4em; margin-top: .5em; padding: 0 1em; }
-.rights { position: absolute; right: 0; bottom: 0; max-width: 100%; box-sizing: border-box; padding: .15em .5em; font-size: 12px; color: var(--texmesh-text); background: var(--texmesh-panel); }
-.note { position: absolute; left: 0; top: 3px; max-width: 100%; box-sizing: border-box; padding: .15em .5em; font-size: 12px; color: var(--texmesh-text); background: var(--texmesh-panel); }
+.box button { font: inherit; color: var(--texmesh-accent); background: none; border: 1px solid;
+  border-radius: .4em; margin-top: .5em; padding: 0 1em; }
+.rights, .note { position: absolute; max-width: 100%; box-sizing: border-box; padding: .15em .5em;
+  font-size: 12px; color: var(--texmesh-text); background: var(--texmesh-panel); }
+.rights { right: 0; bottom: 0; }
+.note { left: 0; top: 3px; }
 .note[hidden] { display: none; }
 .rights:empty { display: none; }
 .rights a { color: inherit; }
@@ -39,7 +46,8 @@ button { cursor: pointer; min-height: 44px; }
 
 /** The page that all elements share, as far as an element uses it. */
 export interface ElementPage {
-  add(canvas: HTMLCanvasElement, url: string, options: { dress?: (scene: import('three').Scene) => void }): PageModel;
+  add(canvas: HTMLCanvasElement, url: string,
+    options: { dress?: (scene: import('three').Scene) => void }): PageModel;
   regard(model?: PageModel): void;
 }
 /** What an element needs of the script that defines it. */
@@ -58,20 +66,24 @@ const barStep = 20;
 const template = `<style>${style}</style>
 <canvas part="canvas" role="img"></canvas>
 <div class="poster" part="poster"><slot name="poster"></slot></div>
-<slot name="progress-bar"><div class="bar" part="progress" role="progressbar" aria-label="loading" aria-valuemin="0" aria-valuemax="100" hidden></div></slot>
+<slot name="progress-bar"><div class="bar" part="progress" role="progressbar" aria-label="loading"
+  aria-valuemin="0" aria-valuemax="100" hidden></div></slot>
 <button class="box" part="reveal" hidden><span>Show in 3D</span><small></small></button>
 <div class="box" part="error" role="alert" hidden></div>
 <div class="note" part="note" role="status" hidden></div>
 <div class="rights" part="rights"></div>
-<p class="help" id="help">Drag or use the arrow keys to turn the object<span>, plus and minus to come nearer or go away</span>, Home to see it as at first.</p>
+<p class="help" id="help">Drag or use the arrow keys to turn the object<span>, plus and minus to come nearer
+  or go away</span>, Home to see it as at first.</p>
 <slot></slot>`;
 
 /** <texmesh-viewer>; `host` is to be set before the element is defined. */
 export class TexmeshViewer extends HTMLElement {
   static host: ElementHost;
-  static readonly observedAttributes = ['src', 'alt', 'poster', 'camera-controls', 'camera-orbit', 'auto-rotate', 'rotation-per-second', 'disable-zoom', 'reveal', 'bytes', 'touch-action'];
+  static readonly observedAttributes = ['src', 'alt', 'poster', 'camera-controls', 'camera-orbit',
+    'auto-rotate', 'rotation-per-second', 'disable-zoom', 'reveal', 'bytes', 'touch-action'];
   private readonly root_ = this.attachShadow({ mode: 'open' });
-  private readonly parts_: Record<'canvas' | 'poster' | 'bar' | 'reveal' | 'error' | 'note' | 'rights', HTMLElement>;
+  private readonly parts_: Record<'canvas' | 'poster' | 'bar' | 'reveal' | 'error' | 'note' | 'rights',
+    HTMLElement>;
   private model_?: PageModel;
   private input_?: OrbitInput;
   private revealed_ = false;
@@ -82,11 +94,14 @@ export class TexmeshViewer extends HTMLElement {
     super();
     this.root_.innerHTML = template;
     const part = (selector: string): HTMLElement => this.root_.querySelector(selector)!;
-    this.parts_ = { canvas: part('canvas'), poster: part('.poster'), bar: part('.bar'), reveal: part('button.box'), error: part('div.box'), note: part('.note'), rights: part('.rights') };
+    this.parts_ = { canvas: part('canvas'), poster: part('.poster'), bar: part('.bar'),
+      reveal: part('button.box'), error: part('div.box'), note: part('.note'), rights: part('.rights') };
     this.parts_.reveal.onclick = () => this.dismissPoster();
     const { canvas } = this.parts_;
-    for (const name of ['pointerenter', 'focus']) canvas.addEventListener(name, () => this.model_ && TexmeshViewer.host.page().regard(this.model_));
-    for (const name of ['pointerleave', 'blur']) canvas.addEventListener(name, () => this.model_ && TexmeshViewer.host.page().regard(undefined));
+    for (const name of ['pointerenter', 'focus'])
+      canvas.addEventListener(name, () => this.model_ && TexmeshViewer.host.page().regard(this.model_));
+    for (const name of ['pointerleave', 'blur'])
+      canvas.addEventListener(name, () => this.model_ && TexmeshViewer.host.page().regard(undefined));
   }
 
   /** Whether what the time allowed is there. */
@@ -167,7 +182,8 @@ export class TexmeshViewer extends HTMLElement {
     reveal.hidden = !this.waits_;
     if (this.waits_) return;
     try {
-      this.follow_(TexmeshViewer.host.page().add(canvas as HTMLCanvasElement, new URL(this.src, document.baseURI).href, { dress: (scene) => TexmeshViewer.host.dress(scene) }));
+      this.follow_(TexmeshViewer.host.page().add(canvas as HTMLCanvasElement,
+        new URL(this.src, document.baseURI).href, { dress: (scene) => TexmeshViewer.host.dress(scene) }));
     } catch (error) {
       this.fail_(error instanceof Error ? error.message : String(error), false);
     }
@@ -189,11 +205,13 @@ export class TexmeshViewer extends HTMLElement {
   private follow_(model: PageModel): void {
     const { bar, poster } = this.parts_;
     this.model_ = model;
-    const tell = (name: string, detail: object = {}): void => void this.dispatchEvent(new CustomEvent(name, { detail }));
+    const tell = (name: string, detail: object = {}): void =>
+      void this.dispatchEvent(new CustomEvent(name, { detail }));
     model.on('open', () => this.controls_());
     model.on('first-picture', () => {
       // A poster of nothing does not fade: each frame of that would draw the whole page.
-      poster.classList.toggle('fades', (poster.firstElementChild as HTMLSlotElement).assignedElements({ flatten: true }).length > 0);
+      poster.classList.toggle('fades',
+        (poster.firstElementChild as HTMLSlotElement).assignedElements({ flatten: true }).length > 0);
       poster.classList.add('gone');
       tell('poster-dismissed');
       tell('model-visibility', { visible: true });
@@ -214,8 +232,10 @@ export class TexmeshViewer extends HTMLElement {
       void this.showRights_(model.package);
       tell('load', { url: model.url });
     });
-    model.on('context', ({ lost }) => this.note_(lost ? 'The graphics memory was taken away; waiting for it.' : ''));
-    model.on('memory', () => this.note_('There is little graphics memory: a coarser picture is shown.', noteMs));
+    model.on('context',
+      ({ lost }) => this.note_(lost ? 'The graphics memory was taken away; waiting for it.' : ''));
+    model.on('memory',
+      () => this.note_('There is little graphics memory: a coarser picture is shown.', noteMs));
     model.on('error', ({ fatal, message }) => {
       tell('error', { type: 'loadfailure', fatal, message });
       if (fatal) this.fail_(message, true);
@@ -223,7 +243,8 @@ export class TexmeshViewer extends HTMLElement {
   }
   private fail_(message: string, again: boolean): void {
     const { error } = this.parts_;
-    const button = Object.assign(document.createElement('button'), { textContent: 'Try again', hidden: !again });
+    const button =
+      Object.assign(document.createElement('button'), { textContent: 'Try again', hidden: !again });
     button.onclick = () => {
       error.hidden = true;
       this.model_?.retry();
@@ -242,9 +263,11 @@ export class TexmeshViewer extends HTMLElement {
     const about = await pkg?.about().catch(() => undefined);
     if (!about || !this.isConnected || pkg !== this.model_?.package) return;
     const { attribution, creator, licence, licenceUrl } = about;
-    const link = licence && licenceUrl ? Object.assign(document.createElement('a'), { href: licenceUrl, textContent: licence, rel: 'license noopener' }) : (licence ?? '');
+    const link = licence && licenceUrl ? Object.assign(document.createElement('a'),
+      { href: licenceUrl, textContent: licence, rel: 'license noopener' }) : (licence ?? '');
     const by = attribution ?? creator ?? '';
-    this.parts_.rights.replaceChildren(...[by, by && licence ? ' · ' : '', link].filter((part) => part !== ''));
+    this.parts_.rights.replaceChildren(...[by, by && licence ? ' · ' : '', link].filter((part) =>
+      part !== ''));
   }
 
   // ---- the camera
@@ -257,7 +280,8 @@ export class TexmeshViewer extends HTMLElement {
     const orbit = orbitOf(this.getAttribute('camera-orbit'));
     model.frame(orbit);
     if (this.hasAttribute('camera-controls'))
-      this.input_ = new OrbitInput(canvas, orbit, () => this.look_(this.input_!.orbit), !this.hasAttribute('disable-zoom'));
+      this.input_ = new OrbitInput(canvas, orbit, () => this.look_(this.input_!.orbit),
+        !this.hasAttribute('disable-zoom'));
     if (this.rotating_) this.rotate_(); // by the new input
   }
   private look_(orbit: Parameters<typeof frame>[3]): void {
@@ -270,7 +294,8 @@ export class TexmeshViewer extends HTMLElement {
   /** Turns the object while nobody holds it; not for people who want no motion. */
   private rotate_(): void {
     cancelAnimationFrame(this.rotating_);
-    if (!this.model_ || !this.hasAttribute('auto-rotate') || matchMedia('(prefers-reduced-motion: reduce)').matches) return;
+    if (!this.model_ || !this.hasAttribute('auto-rotate') ||
+        matchMedia('(prefers-reduced-motion: reduce)').matches) return;
     const degreesS = degreesOf(this.getAttribute('rotation-per-second'), rotationDegreesS);
     const own = this.input_ ?? { orbit: orbitOf(this.getAttribute('camera-orbit')), isHeld: false };
     let before = performance.now();
@@ -278,7 +303,8 @@ export class TexmeshViewer extends HTMLElement {
       const { model_: model } = this;
       if (!model || model.phase === 'removed') return;
       if (!own.isHeld && model.place.visible) {
-        own.orbit = { ...own.orbit, thetaDegrees: (own.orbit.thetaDegrees + (degreesS * Math.min(100, now - before)) / 1000) % 360 };
+        own.orbit = { ...own.orbit,
+          thetaDegrees: (own.orbit.thetaDegrees + (degreesS * Math.min(100, now - before)) / 1000) % 360 };
         this.look_(own.orbit);
       }
       before = now;

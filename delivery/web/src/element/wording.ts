@@ -10,9 +10,10 @@ export function bytesInWords(n: number): string {
   return `${value < 9.95 ? value.toFixed(1).replace('.0', '') : value.toFixed(0)} ${name}`;
 }
 /** Seconds as people read them. */
-export const secondsInWords = (s: number): string => (s < 1 ? 'under a second' : s < 9.5 ? `about ${Math.round(s)} s` : `about ${Math.round(s / 5) * 5} s`);
+export const secondsInWords = (s: number): string =>
+  (s < 1 ? 'under a second' : s < 9.5 ? `about ${Math.round(s)} s` : `about ${Math.round(s / 5) * 5} s`);
 
-/** What a click costs: bytes of the first picture, of all that may follow (0: nobody has said), and the link's bytes per second (0: nobody knows). */
+/** What a click costs: bytes of the first picture and of all (0: unknown), bytes per second (0: unknown). */
 export function offerInWords(firstBytes: number, allBytes: number, linkBytesS: number): string {
   const wait = linkBytesS > 0 ? `, ${secondsInWords(firstBytes / linkBytesS)}` : '';
   const more = allBytes > firstBytes ? `; up to ${bytesInWords(allBytes)} in all` : '';
@@ -24,7 +25,7 @@ export function degreesOf(said: string | null | undefined, otherwise: number): n
   const found = /^(-?(?:\d+\.?\d*|\.\d+))(deg|rad)$/.exec(said?.trim() ?? '');
   return found ? Number(found[1]) * (found[2] === 'rad' ? 180 / Math.PI : 1) : otherwise;
 }
-/** "28deg 72deg 105%" or parts of it, as model-viewer writes them: round the vertical axis, from the axis, distance. What cannot be read is the default's. */
+/** "28deg 72deg 105%" or parts of it: angles round and from the vertical axis, distance. Else the default. */
 export function orbitOf(text: string | null): Orbit {
   const [theta, phi, distance] = (text ?? '').trim().split(/\s+/).filter(Boolean);
   const share = /^(\d+(?:\.\d+)?)%$/.exec(distance ?? '');
@@ -48,7 +49,8 @@ interface Connection {
   /** Mbit/s */
   downlink?: number;
 }
-const connection = (): Connection => (globalThis.navigator as { connection?: Connection } | undefined)?.connection ?? {};
+const connection = (): Connection =>
+  (globalThis.navigator as { connection?: Connection } | undefined)?.connection ?? {};
 const bytesPerMegabit = 125e3;
 /** Smaller files say how long the way is, not how wide. */
 const tellingBytes = 3e4;
@@ -60,7 +62,8 @@ export const savesData = (): boolean => connection().saveData === true;
 /** Bytes per second of the link: as the browser says, else as the page's own files came; 0: nobody knows. */
 export function linkBytesS(): number {
   const files = performance.getEntriesByType('resource') as PerformanceResourceTiming[];
-  const rates = files.filter((f) => f.transferSize > tellingBytes).map((f) => f.transferSize / Math.max(1e-3, (f.responseEnd - f.responseStart) / 1000));
+  const rates = files.filter((f) => f.transferSize > tellingBytes)
+    .map((f) => f.transferSize / Math.max(1e-3, (f.responseEnd - f.responseStart) / 1000));
   return (connection().downlink ?? 0) * bytesPerMegabit || Math.max(0, ...rates);
 }
 /** Bytes of a file as its server says without sending it; 0: unknown. */

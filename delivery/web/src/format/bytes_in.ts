@@ -1,16 +1,13 @@
 import { FormatError } from './errors';
 import { formatMajor, otherMajor } from './manifest';
 
-/** Reads little-endian numbers from bytes; FormatError names the place where the bytes end too early, which breaks `rule`. */
+/** Little-endian numbers from bytes; FormatError by `rule` names the place where bytes are missing. */
 export class BytesIn {
   private readonly view_: DataView;
   private position_ = 0;
 
-  constructor(
-    private readonly bytes_: Uint8Array,
-    private readonly name_: string,
-    private readonly rule_: string,
-  ) {
+  constructor(private readonly bytes_: Uint8Array, private readonly name_: string,
+      private readonly rule_: string) {
     this.view_ = new DataView(bytes_.buffer, bytes_.byteOffset, bytes_.byteLength);
   }
 
@@ -71,7 +68,7 @@ export class BytesIn {
   }
 }
 
-/** Magic word (another breaks `rule`) and version, with which index.bin and tables.bin begin; gives the minor version. */
+/** Magic word (another breaks `rule`) and version of a binary document; gives the minor version. */
 export function readEntryStart(input: BytesIn, magic: string, rule: string): number {
   input.expect(magic, rule);
   const major = input.u16();

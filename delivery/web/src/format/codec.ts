@@ -22,7 +22,8 @@ const traits: Record<CodecId, CodecTraits> = {
     incremental: true,
   },
   webp: { requiredFeature: 'codec-webp', extension: 'webp', mediaType: 'image/webp', incremental: false },
-  'jpeg-xy': { requiredFeature: 'codec-jpeg-xy', extension: 'jpg', mediaType: 'image/jpeg', incremental: false },
+  'jpeg-xy': { requiredFeature: 'codec-jpeg-xy', extension: 'jpg', mediaType: 'image/jpeg',
+    incremental: false },
 };
 /** Traits of a codec that this reader knows. */
 export function codecTraits(codec: CodecId): CodecTraits {
@@ -42,8 +43,9 @@ function withoutEnd(tables: Uint8Array, rule: string): Uint8Array {
 }
 
 /**
- * The complete image file of one fragment. `tables` is the table stream of the rung, or of the lowest rung for an
- * incremental codec; `streams` is the rung's one stream, or those of the lowest rung up to it. Nothing is decoded.
+ * The complete image file of one fragment. `tables` is the table stream of the rung, or of the lowest rung
+ * for an incremental codec; `streams` is the rung's one stream, or those of the lowest rung up to it. Nothing
+ * is decoded.
  */
 export function joinFragment(codec: CodecId, tables: Uint8Array, streams: readonly Uint8Array[]): Uint8Array {
   const fail = (expected: string, rule?: string): never => {

@@ -7,7 +7,7 @@ export type DocumentDecoder = <K extends keyof Documents>(
   name: K,
   ...args: Parameters<Documents[K]>
 ) => Promise<Awaited<ReturnType<Documents[K]>>>;
-/** Decodes documents on this thread. The functions may be those of the workers' file, which has error classes of its own. */
+/** Decodes documents on this thread. './documents' may be the workers' file with error classes of its own. */
 export const decodeHere = (async (name, ...args: unknown[]) => {
   const documents = await import('./documents');
   try {

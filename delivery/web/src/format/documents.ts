@@ -10,8 +10,8 @@ import { TextureInfo, missingFeature, readTextures } from './textures';
 import * as paths from './entry_paths';
 import * as layout from './layout';
 
-// Documents are decoded and checked against the manifest and against each other, meshes by themselves: in workers, or on this thread
-// where there are none. Digests have been checked before.
+// Documents are decoded and checked against the manifest and against each other, meshes by themselves: in
+// workers, or on this thread where there are none. Digests have been checked before.
 
 export { readIndex } from './index_table';
 export { plainGlb } from './glb';
@@ -19,11 +19,12 @@ export { requireSelfContained } from './glb';
 
 const sum = (values: Uint32Array): number => values.reduce((total, v) => total + v, 0);
 
-function require(good: boolean, rule: string, file: string, place: string, expected: string, found: unknown = ''): asserts good {
+function require(good: boolean, rule: string, file: string, place: string, expected: string,
+    found: unknown = ''): asserts good {
   if (!good) throw new FormatError(file, place, expected, `${found}`, rule);
 }
 
-/** Manifest and package id from manifest.json, or from the first bytes of a container where `container` names one. */
+/** Manifest and package id from manifest.json, or from the start of a container that `container` names. */
 export async function manifest(bytes: Uint8Array, container = ''): Promise<{ parsed: Manifest; id: string }> {
   const json = container ? manifestOfContainer(bytes, container) : bytes;
   return { parsed: readManifest(json), id: toHex(await sha256(json)) };
@@ -46,21 +47,26 @@ export function indexPages(bytes: Uint8Array, m: Manifest): PageRef[] {
   const { index } = m;
   const { bytes: headBytes, pages, minor } = readIndexHead(bytes);
   requireMinor(minor, m, paths.indexPath);
-  require(headBytes === index.headBytes, 'R02', paths.indexPath, 'head', `${index.headBytes} bytes`, headBytes);
-  return pages.map((p) => ({ ...p, minor, rule: 'I04', path: `index of plane ${p.plane}`, offset: index.offset + p.offset }));
+  require(headBytes === index.headBytes, 'R02', paths.indexPath, 'head', `${index.headBytes} bytes`,
+    headBytes);
+  return pages.map((p) => ({ ...p, minor, rule: 'I04', path: `index of plane ${p.plane}`,
+    offset: index.offset + p.offset }));
 }
 
-/** The entries of a page of index.bin by their paths. Entries without a plane must be as the manifest says. */
-export function indexPage(bytes: Uint8Array, { plane, entries: count, minor }: PageRef, m: Manifest): Map<string, EntryRef> {
+/** The entries of a page of index.bin by path. Those without a plane must be as the manifest says. */
+export function indexPage(bytes: Uint8Array, { plane, entries: count, minor }: PageRef,
+    m: Manifest): Map<string, EntryRef> {
   const entries = new Map(parseIndexPage(bytes, plane, count, minor).map((e) => [e.path, e]));
   if (plane >= 0) return entries;
   const refs: (ByteRange & { path: string; sha256?: Uint8Array } | undefined)[] = [
-    m.tables, m.textures, m.quality, m.provenance, m.about, m.stream, m.thesis, m.poster, ...[...m.scales.filter(hasGlb), ...m.proxies].map(({ glb }) => glb),
+    m.tables, m.textures, m.quality, m.provenance, m.about, m.stream, m.thesis, m.poster,
+    ...[...m.scales.filter(hasGlb), ...m.proxies].map(({ glb }) => glb),
   ];
   for (const ref of refs) {
     if (!ref) continue;
     const e = entries.get(ref.path);
-    const same = e && e.offset === ref.offset && e.bytes === ref.bytes && (ref.sha256 ?? e.sha256).every((byte, i) => byte === e.sha256[i]);
+    const same = e && e.offset === ref.offset && e.bytes === ref.bytes &&
+      (ref.sha256 ?? e.sha256).every((byte, i) => byte === e.sha256[i]);
     require(!!same, 'R03', paths.indexPath, ref.path, 'what the manifest says of it');
   }
   return entries;
@@ -94,12 +100,15 @@ export function tableSections(bytes: Uint8Array, m: Manifest): SectionRef[] {
   const { tables: ref, planeCount, scales } = m;
   const head = readTablesHead(bytes);
   requireMinor(head.minor, m, paths.tablesPath);
-  require(head.bytes === ref.headBytes, 'R02', paths.tablesPath, 'head', `${ref.headBytes} bytes`, head.bytes);
-  require(head.planes.length === planeCount, 'R04', paths.tablesPath, '', `${planeCount} planes`, head.planes.length);
+  require(head.bytes === ref.headBytes, 'R02', paths.tablesPath, 'head', `${ref.headBytes} bytes`,
+    head.bytes);
+  require(head.planes.length === planeCount, 'R04', paths.tablesPath, '', `${planeCount} planes`,
+    head.planes.length);
   const last = head.planes[planeCount - 1];
   const end = last ? last.offset + last.bytes : head.bytes;
   require(end === ref.bytes, 'T02', paths.tablesPath, '', `${end} bytes`, ref.bytes);
-  return head.planes.map((s, p) => ({ ...s, rule: 'T02', minor: head.minor, scales: scales.length, path: `texture plane ${p}`, offset: ref.offset + s.offset }));
+  return head.planes.map((s, p) => ({ ...s, rule: 'T02', minor: head.minor, scales: scales.length,
+    path: `texture plane ${p}`, offset: ref.offset + s.offset }));
 }
 
 /** Tables of one plane, and where its fragments are. */
@@ -113,19 +122,15 @@ export interface PlaneDocument {
   offsets: Float64Array;
 }
 
-/** Tables from a section of tables.bin; textures.json and the index must speak of the same fragments and bytes. */
-export function planeTables(
-  bytes: Uint8Array,
-  { minor, scales }: SectionRef,
-  plane: number,
-  info: TextureInfo,
-  entries: Map<string, EntryRef>,
-): PlaneDocument {
+/** Tables from a section of tables.bin, which must agree with textures.json and the index. */
+export function planeTables(bytes: Uint8Array, { minor, scales }: SectionRef, plane: number,
+    info: TextureInfo, entries: Map<string, EntryRef>): PlaneDocument {
   const tables = parseTablesSection(bytes, minor, `plane ${plane}`);
   const requireHere = (good: boolean, rule: string, expected: string): void =>
     require(good, rule, paths.tablesPath, `texture plane ${plane}`, expected);
   const { columns, rows, rungQuality, order, sizeBytes } = tables;
-  const sameRungs = rungQuality.length === info.rungQuality.length && info.rungQuality.every((q, r) => q === rungQuality[r]);
+  const sameRungs = rungQuality.length === info.rungQuality.length &&
+    info.rungQuality.every((q, r) => q === rungQuality[r]);
   requireHere(columns === info.columns && rows === info.rows, 'R08', 'the grid of textures.json');
   requireHere(sameRungs, 'R09', 'the rungs of textures.json');
   requireHere(tables.quality.length === scales, 'R11', `${scales} rows`);

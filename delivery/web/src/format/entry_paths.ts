@@ -28,7 +28,7 @@ export function planeOfPath(path: string): number {
   const match = /^texture\/(0|[1-9]\d*)\/(tables\.pack|r\d\d+(\.pack|\/\d{4,}\.(jpg|webp)))$/.exec(path);
   return match ? Number(match[1]) : -1;
 }
-/** Path of a fragment's file, as texture/3/r07/0123.jpg; only trees made with `unpack --fragments files` have such files. */
+/** Path of a fragment's file, as texture/3/r07/0123.jpg; `unpack --fragments files` makes them. */
 export const fragmentFilePath = (plane: number, rung: number, fragment: number, extension: string): string =>
   `texture/${plane}/r${String(rung).padStart(2, '0')}/${String(fragment).padStart(4, '0')}.${extension}`;
 

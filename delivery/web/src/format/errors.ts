@@ -1,15 +1,11 @@
 /**
- * Every texmesh error carries the file (or URL), the place in the file, what was expected and what was found, and the rule of
- * format/SPEC.md that is broken. Any of these may be empty; the message joins those that are not and ends with the rule: "[K03]".
+ * Every texmesh error carries the file (or URL), the place in the file, what was expected and what was found,
+ * and the rule of format/SPEC.md that is broken. Any of these may be empty; the message joins those that are
+ * not and ends with the rule: "[K03]".
  */
 export class TexmeshError extends Error {
-  constructor(
-    readonly file: string,
-    readonly place: string,
-    readonly expected: string,
-    readonly found = '',
-    readonly rule = '',
-  ) {
+  constructor(readonly file: string, readonly place: string, readonly expected: string, readonly found = '',
+      readonly rule = '') {
     const facts = [expected && `expected ${expected}`, found && `found ${found}`].filter(Boolean).join(', ');
     super([file, place, facts].filter(Boolean).join(': ') + (rule && ` [${rule}]`));
   }

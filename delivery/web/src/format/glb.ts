@@ -7,20 +7,22 @@ import { mostPreviewPx } from './layout';
 interface Embedding {
   buffers?: { uri?: unknown }[];
   images?: { uri?: unknown; bufferView?: number }[];
-  bufferViews?: Record<number, { buffer?: unknown; byteOffset?: number; byteLength?: number; extensions?: unknown } | undefined>;
+  bufferViews?: Record<number, { buffer?: unknown; byteOffset?: number; byteLength?: number;
+    extensions?: unknown } | undefined>;
 }
 
 function require(good: unknown, rule: string, what: string): asserts good {
   if (!good) throw new FormatError('mesh', '', what, '', rule);
 }
 
-/** JSON and bytes of a GLB of at most two chunks. glTF has no further chunks, and loaders differ in what they make of those. */
+/** JSON and bytes of a GLB of at most two chunks: glTF has no others, and loaders differ in those. */
 function partsOfGlb(glb: Uint8Array): { json: Embedding; bytes: Uint8Array } {
   const view = new DataView(glb.buffer, glb.byteOffset, glb.byteLength);
   const at = (i: number): number => (i + 4 <= glb.length ? view.getUint32(i, true) : -1);
   const end = 20 + at(12);
   const endsThere = end === glb.length || (at(end + 4) === 0x004e4942 && end + 8 + at(end) === glb.length);
-  require(at(0) === 0x46546c67 && at(8) === glb.length && at(16) === 0x4e4f534a && endsThere, 'G01', 'a GLB of JSON and bytes');
+  require(at(0) === 0x46546c67 && at(8) === glb.length && at(16) === 0x4e4f534a && endsThere, 'G01',
+    'a GLB of JSON and bytes');
   let json: unknown;
   try {
     json = JSON.parse(new TextDecoder().decode(glb.subarray(20, end)));
@@ -35,19 +37,23 @@ function partsOfGlb(glb: Uint8Array): { json: Embedding; bytes: Uint8Array } {
 const previewUri = /^\.\.\/preview\/\d{3,5}\.jpg$/;
 
 /**
- * Requires a GLB whose data is all in the file: a URI would make pages ask the host of that URI. With `placeholders` its images may be
- * URIs of previews, since nobody asks for them. Pictures in the GLB, which loaders decode, must be no larger than previews. FormatError
- * otherwise.
+ * Requires a GLB whose data is all in the file: a URI would make pages ask the host of that URI. With
+ * `placeholders` its images may be URIs of previews, since nobody asks for them. Pictures in the GLB, which
+ * loaders decode, must be no larger than previews. FormatError otherwise.
  */
-export function requireSelfContained(glb: Uint8Array, placeholders = false, rule = placeholders ? 'G06' : 'G05'): void {
+export function requireSelfContained(glb: Uint8Array, placeholders = false,
+    rule = placeholders ? 'G06' : 'G05'): void {
   const { json, bytes } = partsOfGlb(glb);
   const { buffers = [], images = [] } = json;
-  require(Array.isArray(buffers) && Array.isArray(images) && [...buffers, ...images].every((item) => item), 'G01', 'lists of buffers and images');
+  require(Array.isArray(buffers) && Array.isArray(images) && [...buffers, ...images].every((item) => item),
+    'G01', 'lists of buffers and images');
   const mayName = (uri: unknown): boolean => placeholders && typeof uri === 'string' && previewUri.test(uri);
   const inside = images.filter(({ uri }) => !mayName(uri));
-  require([...buffers, ...inside].every(({ uri }) => uri === undefined), rule, 'buffers and images within the file');
+  require([...buffers, ...inside].every(({ uri }) => uri === undefined), rule,
+    'buffers and images within the file');
   for (const { bufferView = -1 } of inside) {
-    const { buffer, byteOffset: at = 0, byteLength: length = 0, extensions } = json.bufferViews?.[bufferView] ?? {};
+    const { buffer, byteOffset: at = 0, byteLength: length = 0, extensions } =
+      json.bufferViews?.[bufferView] ?? {};
     require(buffer === 0 && !extensions && Number.isInteger(at) && at >= 0, 'G05', 'pictures as they are');
     const [width, height] = imageSize(bytes.subarray(at, at + length));
     require(width > 0 && width <= mostPreviewPx && height > 0 && height <= mostPreviewPx, 'G05', 'previews');
@@ -141,7 +147,8 @@ export function decodeTriangles(coded: Uint8Array, count: number): Uint32Array {
       const of = 2 * ((edge - 1 - (code >> 4)) & 15);
       const way = code & 15;
       [a, b] = [edges[of], edges[of + 1]];
-      c = way === 0 ? next++ : way < 13 ? known(1 + way) : way < 15 ? (last = (last + 2 * way - 27) >>> 0) : far();
+      c = way === 0 ? next++
+        : way < 13 ? known(1 + way) : way < 15 ? (last = (last + 2 * way - 27) >>> 0) : far();
       push(c, way === 0 || way > 12);
     } else {
       const free = code >= 0xfe; // its own code instead of one of the table
@@ -196,32 +203,36 @@ interface Gltf {
 function need(good: unknown, what: string): asserts good {
   require(good, 'G15', what);
 }
-const isSize = (n: unknown): n is number => Number.isInteger(n) && (n as number) >= 0 && (n as number) <= mostBytes;
+const isSize = (n: unknown): n is number =>
+  Number.isInteger(n) && (n as number) >= 0 && (n as number) <= mostBytes;
 
 /** What a buffer view has, decoded. */
-function bytesOfView({ buffer, byteOffset = 0, byteLength, extensions }: View, bytes: Uint8Array): Uint8Array {
+function bytesOfView({ buffer, byteOffset = 0, byteLength, extensions }: View,
+    bytes: Uint8Array): Uint8Array {
   const coded = extensions?.[extension];
   const { byteOffset: at = 0, byteLength: length } = coded ?? { byteOffset, byteLength };
-  need(isSize(at) && isSize(length) && at + length <= bytes.length && (coded || buffer === 0), 'views within the file');
+  need(isSize(at) && isSize(length) && at + length <= bytes.length && (coded || buffer === 0),
+    'views within the file');
   const part = bytes.subarray(at, at + length);
   if (!coded) return part;
   const { count, byteStride: stride, mode, filter = 'NONE' } = coded;
-  need(isSize(count) && isSize(stride) && isSize(count * stride) && count * stride === byteLength && filter === 'NONE', 'coded views without filters');
-  if (mode === 'ATTRIBUTES' && stride > 0 && stride % 4 === 0 && stride <= 256) return decodeAttributes(part, count, stride);
-  need(mode === 'TRIANGLES' && (stride === 2 || stride === 4) && count / 3 <= length, 'attributes or triangles');
+  need(isSize(count) && isSize(stride) && isSize(count * stride) && count * stride === byteLength &&
+    filter === 'NONE', 'coded views without filters');
+  if (mode === 'ATTRIBUTES' && stride > 0 && stride % 4 === 0 && stride <= 256)
+    return decodeAttributes(part, count, stride);
+  need(mode === 'TRIANGLES' && (stride === 2 || stride === 4) && count / 3 <= length,
+    'attributes or triangles');
   const indices = decodeTriangles(part, count);
   return new Uint8Array((stride === 2 ? Uint16Array.from(indices) : indices).buffer);
 }
 
-/**
- * A GLB that any loader reads without a decoder, from one whose views EXT_meshopt_compression codes without filters. All data must be in
- * the file. FormatError otherwise.
- */
+/** A GLB without EXT_meshopt_compression, from one whose data is all in the file. FormatError otherwise. */
 export function plainGlb(glb: Uint8Array): Uint8Array {
   const { json, bytes } = partsOfGlb(glb);
   const gltf = json as Gltf;
   const { bufferViews: views = [], buffers = [], extensionsUsed = [], extensionsRequired = [] } = gltf;
-  need([views, buffers, extensionsUsed, extensionsRequired].every(Array.isArray) && views.every((view) => view), 'lists');
+  need([views, buffers, extensionsUsed, extensionsRequired].every(Array.isArray) &&
+    views.every((view) => view), 'lists');
   const parts: Uint8Array[] = [];
   let end = 0;
   for (const view of views) {
@@ -232,12 +243,14 @@ export function plainGlb(glb: Uint8Array): Uint8Array {
     end += (part.length + 3) & ~3;
     need(end <= mostBytes, 'less data');
   }
-  for (const list of ['extensionsUsed', 'extensionsRequired'] as const) gltf[list] = gltf[list]?.filter((name) => name !== extension);
+  for (const list of ['extensionsUsed', 'extensionsRequired'] as const)
+    gltf[list] = gltf[list]?.filter((name) => name !== extension);
   // The other buffers were stand-ins for coded views. A URI of any buffer stays, and is refused below.
   gltf.buffers = gltf.buffers?.slice(0, 1).map((buffer) => ({ ...(buffer as object), byteLength: end }));
   const text = new TextEncoder().encode(JSON.stringify(gltf));
   const blanks = new Uint8Array(-text.length & 3).fill(32);
-  const heads = [[0x46546c67, 2, 28 + text.length + blanks.length + end, text.length + blanks.length, 0x4e4f534a], [end, 0x004e4942]];
+  const heads = [[0x46546c67, 2, 28 + text.length + blanks.length + end, text.length + blanks.length,
+    0x4e4f534a], [end, 0x004e4942]];
   const [head, binary] = heads.map((words) => new Uint8Array(Uint32Array.from(words).buffer));
   const plain = concat([head, text, blanks, binary, ...parts]);
   requireSelfContained(plain, false, 'G13');

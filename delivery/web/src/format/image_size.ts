@@ -1,6 +1,7 @@
 /**
- * Width and height that a JPEG, PNG or WebP file says it has, before anybody makes room for the picture. 0, 0 where the file is none of
- * these, or where decoders may find another frame than this function, behind markers that have no length.
+ * Width and height that a JPEG, PNG or WebP file says it has, before anybody makes room for the picture. 0, 0
+ * where the file is none of these, or where decoders may find another frame than this function, behind
+ * markers that have no length.
  */
 export function imageSize(b: Uint8Array): [number, number] {
   const at = (i: number): number => b[i] ?? 0;
@@ -12,7 +13,8 @@ export function imageSize(b: Uint8Array): [number, number] {
       const length = be(i + 2);
       if (marker === 0xff) ++i;
       else if (marker < 0xc0 || (marker >= 0xd0 && marker <= 0xd9) || length < 2) break;
-      else if (marker <= 0xcf && marker !== 0xc4 && marker !== 0xc8 && marker !== 0xcc) return [be(i + 7), be(i + 5)];
+      else if (marker <= 0xcf && marker !== 0xc4 && marker !== 0xc8 && marker !== 0xcc)
+        return [be(i + 7), be(i + 5)];
       else i += 2 + length;
     }
   if (be(0) === 0x8950 && be(12) === 0x4948) return [be(16) * 65536 + be(18), be(20) * 65536 + be(22)];

@@ -91,7 +91,8 @@ export function parseIndexPage(bytes: Uint8Array, plane: number, count: number, 
 export async function readIndexPage(head: IndexHead, page: number, bytes: Uint8Array): Promise<EntryRef[]> {
   const p = head.pages[page];
   const place = `page ${page}`;
-  if (bytes.length !== p.bytes) throw new FormatError(file, place, `${p.bytes} bytes`, `${bytes.length}`, 'I03');
+  if (bytes.length !== p.bytes)
+    throw new FormatError(file, place, `${p.bytes} bytes`, `${bytes.length}`, 'I03');
   await requireDigest(bytes, p.sha256, file, place, 'I04');
   return parseIndexPage(bytes, p.plane, p.entries, head.minor);
 }
@@ -102,9 +103,8 @@ export async function readIndex(bytes: Uint8Array): Promise<EntryRef[]> {
   const last = head.pages[head.pages.length - 1];
   if (last.offset + last.bytes !== bytes.length)
     throw new FormatError(file, '', `${last.offset + last.bytes} bytes`, `${bytes.length}`, 'I03');
-  const pages = await Promise.all(
-    head.pages.map((p, i) => readIndexPage(head, i, bytes.subarray(p.offset, p.offset + p.bytes))),
-  );
+  const pages = await Promise.all(head.pages.map((p, i) =>
+    readIndexPage(head, i, bytes.subarray(p.offset, p.offset + p.bytes))));
   const entries = pages.flat().sort((a, b) => a.offset - b.offset);
   checkOrder(entries);
   return entries;

@@ -1,7 +1,7 @@
 import { FormatError } from './errors';
 import { maxJsonInteger } from './shared_numbers';
 
-/** A value in a JSON document: checks type and range before anyone uses the value, and names the place of a wrong one. */
+/** A value in a JSON document, which checks type and range, and names the place of a wrong value. */
 export class JsonAt {
   constructor(
     private readonly value_: unknown,
@@ -26,8 +26,10 @@ export class JsonAt {
   at(name: string | number): JsonAt {
     const v = this.value_ as Record<string | number, unknown>;
     const ofArray = typeof name === 'number';
-    if (typeof v !== 'object' || !v || Array.isArray(v) !== ofArray) this.fail(ofArray ? 'an array' : 'an object', this.shown_());
-    return new JsonAt(Object.hasOwn(v, name) ? v[name] : undefined, this.file_, `${this.path_}/${name}`, this.rule_);
+    if (typeof v !== 'object' || !v || Array.isArray(v) !== ofArray)
+      this.fail(ofArray ? 'an array' : 'an object', this.shown_());
+    return new JsonAt(Object.hasOwn(v, name) ? v[name] : undefined, this.file_, `${this.path_}/${name}`,
+      this.rule_);
   }
   array(least: number, most: number): number {
     if (!Array.isArray(this.value_)) this.fail('an array', this.shown_());
@@ -41,7 +43,8 @@ export class JsonAt {
   }
   number(least: number, most: number): number {
     const v = this.value_;
-    if (typeof v !== 'number' || !(v >= least && v <= most)) this.fail(`a number from ${least} to ${most}`, this.shown_());
+    if (typeof v !== 'number' || !(v >= least && v <= most))
+      this.fail(`a number from ${least} to ${most}`, this.shown_());
     return v;
   }
   integer(least: number, most = maxJsonInteger): number {
@@ -67,14 +70,16 @@ export class JsonAt {
   /** A SHA-256 (or its first bytes) as lower-case hexadecimal digits. */
   digest(bytes = 32): Uint8Array {
     const v = this.text(2 * bytes);
-    if (v.length !== 2 * bytes || /[^0-9a-f]/.test(v)) this.fail(`${2 * bytes} hexadecimal digits`, this.shown_(), 'J07');
+    if (v.length !== 2 * bytes || /[^0-9a-f]/.test(v))
+      this.fail(`${2 * bytes} hexadecimal digits`, this.shown_(), 'J07');
     return Uint8Array.from({ length: bytes }, (_, i) => parseInt(v.slice(2 * i, 2 * i + 2), 16));
   }
 }
 
-/** Bounded JSON: a document of at most so many bytes of UTF-8. FormatError where the document is longer, or no JSON. */
+/** Bounded JSON of at most so many bytes of UTF-8. FormatError where it is longer, or no JSON. */
 export function parseJson(bytes: Uint8Array, file: string, mostBytes: number): JsonAt {
-  if (bytes.length > mostBytes) throw new FormatError(file, '', `at most ${mostBytes} bytes`, `${bytes.length}`, 'L09');
+  if (bytes.length > mostBytes)
+    throw new FormatError(file, '', `at most ${mostBytes} bytes`, `${bytes.length}`, 'L09');
   try {
     const document: unknown = JSON.parse(new TextDecoder('utf-8', { fatal: true }).decode(bytes));
     if (document !== Object(document) || Array.isArray(document)) throw 'no object';

@@ -65,7 +65,7 @@ export interface ManifestScale {
   displayPxEdge: number;
   /** By lit pictures: up to this height no view of the scale can be told from S_0's; 0 = at no height. */
   displayPxFlip: number;
-  /** Why the scale has more vertices than it should, or (of the last scale) why none is coarser; mostly "". */
+  /** Why the scale has too many vertices, or why (the last scale) none is coarser; mostly "". */
   floor: string;
 }
 /** Whether a scale has a file of its own; the others stand in the vertex-split stream alone. */
@@ -118,13 +118,14 @@ export interface Manifest {
   provenance: EntryRef;
   about: EntryRef;
   stream?: StreamRef;
-  /** thesis.bin: see readThesis. */
+  /** thesis.bin, which no load reads. */
   thesis?: EntryRef;
   poster?: PosterRef;
 }
 
 /** What is shown first: the smallest proxy, where there is none the GLB of the coarsest scale. */
-export const firstPicture = ({ proxies, scales }: Manifest): EntryRef => (proxies[0] ?? scales[scales.length - 1]).glb;
+export const firstPicture = ({ proxies, scales }: Manifest): EntryRef =>
+  (proxies[0] ?? scales[scales.length - 1]).glb;
 
 const lengths = ['errorMax', 'errorRms', 'p95', 'p99'] as const;
 const heights = ['displayPxJnd', 'displayPxError', 'displayPxEdge', 'displayPxFlip'] as const;
@@ -160,7 +161,8 @@ function readStream(at: JsonAt): StreamRef {
 function readPoster(at: JsonAt): PosterRef {
   const ref = readRef(at, layout.posterPath);
   at.at('bytes').by('O01').integer(1, 1e6);
-  const [widthPx, heightPx] = ['widthPx', 'heightPx'].map((side) => at.at(side).by('O01').integer(1, maxPosterSide));
+  const [widthPx, heightPx] =
+    ['widthPx', 'heightPx'].map((side) => at.at(side).by('O01').integer(1, maxPosterSide));
   return { ...ref, widthPx, heightPx };
 }
 
@@ -170,7 +172,8 @@ function readVector(at: JsonAt): Vector3 {
 
 /** What a reader says that has found another major version. */
 export const otherMajor = (major: number): string =>
-  `${major}, which ${major < formatMajor ? 'is no longer read: compile the model again' : 'a later reader is for'}`;
+  `${major}, which ${major < formatMajor ? 'is no longer read: compile the model again'
+    : 'a later reader is for'}`;
 
 function readVersion(at: JsonAt): Pick<Manifest, 'version' | 'requiredFeatures'> {
   const format = at.at('format').by('M01');
@@ -197,7 +200,8 @@ function readScales(at: JsonAt): ManifestScale[] {
       return column.at(i);
     };
     const numbers = <K extends string>(names: readonly K[], most: number, rule?: string): Record<K, number> =>
-      Object.fromEntries(names.map((name) => [name, field(name).by(rule).number(0, most)])) as Record<K, number>;
+      Object.fromEntries(names.map((name) => [name, field(name).by(rule).number(0, most)])) as
+        Record<K, number>;
     const scale = scaleAt.integer(0, 99);
     if (i === 0 ? scale !== 0 : scale <= before) scaleAt.fail('0, then rising', scale, 'M10');
     before = scale;
@@ -240,14 +244,16 @@ function readRising(at: JsonAt, most: number, rule: string, read: (item: JsonAt)
 
 /** Proxies from an array for each field, all of one length. */
 function readProxies(at: JsonAt): Pick<Manifest, 'proxySizesPx' | 'proxies'> {
-  const proxySizesPx = readRising(at.at('sizesPx'), maxProxySizes, 'M23', (size) => size.number(1, maxProxySizePx));
+  const proxySizesPx =
+    readRising(at.at('sizesPx'), maxProxySizes, 'M23', (size) => size.number(1, maxProxySizePx));
   const { length: n } = readRising(at.at('bytes'), 8, 'M24', (bytes) => bytes.integer(1));
   const proxies = at.at('bytes').each(n, n, (_, i) => {
     const field = (name: string): JsonAt => {
       at.at(name).array(n, n);
       return at.at(name).at(i);
     };
-    const losses = (name: string): number[] => field(name).each(proxySizesPx.length, proxySizesPx.length, (loss) => loss.number(0, 1));
+    const losses = (name: string): number[] =>
+      field(name).each(proxySizesPx.length, proxySizesPx.length, (loss) => loss.number(0, 1));
     return {
       glb: readRef({ at: field as JsonAt['at'] }, paths.proxyPath(i)),
       triangles: field('triangles').integer(1, 0xffffffff),
@@ -275,8 +281,8 @@ function resolveStreamScales(at: JsonAt, scales: ManifestScale[], stream: Stream
 }
 
 /**
- * Reads manifest.json: strict about fields of this version, ignores unknown fields, refuses an unknown major version and unknown
- * required features. FormatError names the place in the document.
+ * Reads manifest.json: strict about fields of this version, ignores unknown fields, refuses an unknown major
+ * version and unknown required features. FormatError names the place in the document.
  */
 export function readManifest(json: Uint8Array): Manifest {
   const at = parseJson(json, paths.manifestPath, layout.bootstrapBytes);
@@ -321,6 +327,7 @@ export function manifestOfContainer(head: Uint8Array, file: string): Uint8Array 
     throw new FormatError(file, 'byte 0', 'a texmesh package', '', 'K11');
   const bytes = new DataView(head.buffer, head.byteOffset).getUint32(22, true);
   const room = Math.min(head.length, layout.bootstrapBytes) - 64;
-  if (bytes > room) throw new FormatError(file, paths.manifestPath, `at most ${room} bytes`, `${bytes}`, 'K12');
+  if (bytes > room)
+    throw new FormatError(file, paths.manifestPath, `at most ${room} bytes`, `${bytes}`, 'K12');
   return head.subarray(64, 64 + bytes);
 }

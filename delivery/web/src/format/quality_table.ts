@@ -69,7 +69,8 @@ function readFractions(at: JsonAt, count: number): Float32Array {
 }
 
 function readLosses(at: JsonAt, count: number): PictureLosses {
-  const [flip, flipP95, dssim] = ['flip', 'flipP95', 'dssim'].map((name) => readFractions(at.at(name), count));
+  const [flip, flipP95, dssim] =
+    ['flip', 'flipP95', 'dssim'].map((name) => readFractions(at.at(name), count));
   return { flip, flipP95, dssim };
 }
 
@@ -80,9 +81,11 @@ function readTexture(at: JsonAt): TextureLosses {
     if (!(v > before)) one.fail('a rising number above 0', v);
     return (before = v);
   }));
-  const mips = (one: JsonAt, least: number): PictureLosses => readLosses(one, one.at('flip').array(least, 8 + least));
+  const mips = (one: JsonAt, least: number): PictureLosses =>
+    readLosses(one, one.at('flip').array(least, 8 + least));
   const coded = readLosses(at.at('coded'), texelDssim.length);
-  return { texelDssim, coded, preview: readLosses(at.at('preview'), 1), finer: mips(at.at('finer'), 1), coarser: mips(at.at('coarser'), 0) };
+  return { texelDssim, coded, preview: readLosses(at.at('preview'), 1), finer: mips(at.at('finer'), 1),
+    coarser: mips(at.at('coarser'), 0) };
 }
 
 /** Reads quality.json, strictly; FormatError names the place in the document. */

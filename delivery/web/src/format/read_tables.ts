@@ -53,7 +53,8 @@ interface Counts {
 }
 
 const sectionBytes = ({ scales, rungs, knots, listed, size, feature }: Counts): number =>
-  36 + listed * 2 + rungs * 5 + knots * 3 + rungs * listed * (size + 12) + listed * (10 + scales * feature) + scales * 4;
+  36 + listed * 2 + rungs * 5 + knots * 3 + rungs * listed * (size + 12) + listed * (10 + scales * feature) +
+    scales * 4;
 
 function fill<T extends { [i: number]: number; length: number }>(values: T, get: () => number): T {
   for (let i = 0; i < values.length; ++i) values[i] = get();
@@ -75,12 +76,14 @@ function readArrays(input: BytesIn, t: PlaneTables, c: Counts): void {
   t.knotPosition = fill(new Float32Array(c.knots), unit);
   /** Fills what is stored of an array [lines * F]. */
   const listed = <T extends { [i: number]: number; length: number }>(values: T, get: () => number): T => {
-    for (let line = 0; line < values.length; line += f) for (const fragment of t.order) values[line + fragment] = get();
+    for (let line = 0; line < values.length; line += f) for (const fragment of t.order)
+      values[line + fragment] = get();
     return values;
   };
   t.sizeBytes = listed(new Uint32Array(c.rungs * f), () => input.number(c.size));
   t.digest = new Uint8Array(c.rungs * f * 8);
-  for (let r = 0; r < c.rungs; ++r) for (const fragment of t.order) t.digest.set(input.raw(8), 8 * (r * f + fragment));
+  for (let r = 0; r < c.rungs; ++r) for (const fragment of t.order)
+    t.digest.set(input.raw(8), 8 * (r * f + fragment));
   t.mse = listed(new Float32Array(c.rungs * f), half);
   t.dssim = listed(new Float32Array(c.rungs * f), half);
   t.skipDssim = listed(new Float32Array(f), half);
@@ -96,7 +99,8 @@ function emptyTables(): PlaneTables {
   return {
     columns: 0, rows: 0, incremental: false,
     rungQuality: new Uint8Array(0), tableBytes: new Uint32Array(0), sizeBytes: new Uint32Array(0),
-    digest: new Uint8Array(0), mse: none, dssim: none, coveredTexels: new Uint32Array(0), surfaceFraction: none,
+    digest: new Uint8Array(0), mse: none, dssim: none, coveredTexels: new Uint32Array(0),
+    surfaceFraction: none,
     order: new Uint16Array(0), skipDssim: none, knotQuality: new Uint8Array(0), knotPosition: none,
     features: new Uint32Array(0), quality: none, allocation: 1, vqp: none,
     qualityWidth: 60, logWidth: 0.7, qualityMin: 5, qualityMax: 97,
@@ -135,21 +139,24 @@ function checkPlane(t: PlaneTables, place: string): void {
   t.knotQuality.forEach((q, k) => {
     const above = t.rungQuality.findIndex((r) => r >= q);
     const before = k > 0 ? t.knotQuality[k - 1] : 0;
-    require(q > before && above > 0 && t.rungQuality[above] !== q, 'T08', 'knotQuality', 'rising, between rungs', q);
+    require(q > before && above > 0 && t.rungQuality[above] !== q, 'T08', 'knotQuality',
+      'rising, between rungs', q);
     if (before > t.rungQuality[above - 1])
       require(t.knotPosition[k] >= t.knotPosition[k - 1], 'T08', 'knotPosition', 'rising', t.knotPosition[k]);
   });
   within(t.surfaceFraction, 0, 1, 'surfaceFraction');
   within(t.quality, 0, 100, 'quality');
   for (let line = 0; line < t.sizeBytes.length; line += fragmentCount(t))
-    for (const f of t.order) require(t.sizeBytes[line + f] > 0, 'T06', 'sizeBytes', 'bytes at every rung', `none of ${f}`);
+    for (const f of t.order)
+      require(t.sizeBytes[line + f] > 0, 'T06', 'sizeBytes', 'bytes at every rung', `none of ${f}`);
 }
 
 /** Fields in front of a section's arrays. */
 function readStart(input: BytesIn, t: PlaneTables, minor: number): Counts {
   t.columns = input.u32();
   t.rows = input.u32();
-  const c: Counts = { scales: input.u8(), rungs: input.u8(), size: input.u8(), feature: input.u8(), knots: 0, listed: 0 };
+  const c: Counts = { scales: input.u8(), rungs: input.u8(), size: input.u8(), feature: input.u8(), knots: 0,
+    listed: 0 };
   t.allocation = input.u8();
   const flags = input.u8();
   c.knots = input.u8();
@@ -161,7 +168,8 @@ function readStart(input: BytesIn, t: PlaneTables, minor: number): Counts {
   const { columns, rows } = t;
   if (columns === 0 || rows === 0 || columns > maxFragments || rows > Math.floor(maxFragments / columns))
     input.fail('1 to 65535 fragments');
-  const good = c.scales > 0 && c.scales <= maxScaleCount && c.rungs > 0 && c.rungs <= maxPackageRungs && c.listed <= columns * rows;
+  const good = c.scales > 0 && c.scales <= maxScaleCount && c.rungs > 0 && c.rungs <= maxPackageRungs &&
+    c.listed <= columns * rows;
   if (!good) input.fail('counts in their ranges');
   if (t.allocation > 3) input.fail('allocation 0 to 3', t.allocation, 'T13');
   const cells = columns * rows * (5 * c.rungs + c.scales);
@@ -187,10 +195,12 @@ export function parseTablesSection(bytes: Uint8Array, minor: number, place: stri
 }
 
 /** One plane's tables; the section's digest is checked. */
-export async function readTablesSection(head: TablesHead, plane: number, section: Uint8Array): Promise<PlaneTables> {
+export async function readTablesSection(head: TablesHead, plane: number,
+    section: Uint8Array): Promise<PlaneTables> {
   const s = head.planes[plane];
   const place = `plane ${plane}`;
-  if (section.length !== s.bytes) throw new FormatError(file, place, `${s.bytes} bytes`, `${section.length}`, 'T02');
+  if (section.length !== s.bytes)
+    throw new FormatError(file, place, `${s.bytes} bytes`, `${section.length}`, 'T02');
   await requireDigest(section, s.sha256, file, place, 'T02');
   return parseTablesSection(section, head.minor, place);
 }

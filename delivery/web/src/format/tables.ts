@@ -3,9 +3,8 @@ import type { QualityTable } from './quality_table';
 import type { TextureInfo } from './textures';
 
 /**
- * Tables of one texture plane (format/SPEC.md, section 8). F = columns * rows fragments, R rungs of rising quality,
- * N rows of feature scales: those of
- * the manifest, in its order.
+ * Tables of one texture plane (format/SPEC.md, section 8). F = columns * rows fragments, R rungs of rising
+ * quality, N rows of feature scales: those of the manifest, in its order.
  */
 export interface PlaneTables {
   columns: number;
@@ -28,18 +27,18 @@ export interface PlaneTables {
   coveredTexels: Uint32Array;
   /** [F] share of the object's surface. */
   surfaceFraction: Float32Array;
-  /** Every stored fragment once, by falling importance. A fragment is stored at every rung or at none; all else is 0 then. */
+  /** Every stored fragment once, by falling importance. What is not stored has zeros at every rung. */
   order: Uint16Array;
   /** [F] 1 - SSIM when the preview stands for the fragment. */
   skipDssim: Float32Array;
-  /** Qualities between rungs, rising; and the share of the way from rung to rung that bytes have gone at each. */
+  /** Qualities between rungs, rising, and for each the share of the way in bytes from rung to rung. */
   knotQuality: Uint8Array;
   knotPosition: Float32Array;
   /** [N * F] feature points f_i, index row * F + fragment. */
   features: Uint32Array;
   /** [N] quality Q_i. */
   quality: Float32Array;
-  /** 0 thesis (3.2), 1 log-quantiser, 2 rate-distortion within the bytes of 1, 3 thesis with VQP in eta's place. */
+  /** 0 thesis (3.2), 1 log-quantiser, 2 rate-distortion within the bytes of 1, 3 thesis with VQP as eta. */
   allocation: number;
   /** [F] VQP (8.4) where the allocation is 3, else empty. */
   vqp: Float32Array;

@@ -14,7 +14,7 @@ export interface TextureInfo {
   mip: number;
   /** The full-size plane of a mip. */
   base: number;
-  /** base-colour, emissive, normal, occlusion-roughness-metallic, alpha, colour, data, or one of a later version. */
+  /** base-colour, emissive, normal, occlusion-roughness-metallic, alpha, colour, data, or a later one. */
   role: string;
   name: string;
   colourSpace: 'srgb' | 'linear';
@@ -31,9 +31,9 @@ export interface TextureInfo {
   previewHeightPx: number;
   /** IJG quality per rung, strictly rising. */
   rungQuality: number[];
-  /** The last rung holds the coefficients of the source, a JPEG. That rung is shown as any other, and fetched where a load asks for it or refines so far. */
+  /** The last rung has the coefficients of the source, a JPEG. Loads that ask or refine so far fetch it. */
   sourceRung: boolean;
-  /** Ending of the source file among the entries, source/PPP.EXT; "" = none. Loads leave that file alone; PackageReader.entry reads it. */
+  /** Ending of the source file source/PPP.EXT; "" = none. PackageReader.entry reads it, no load does. */
   source: string;
 }
 
@@ -56,7 +56,8 @@ function readGrid(at: JsonAt) {
   grid.rows = at.at('rows').by('X05').integer(1, Math.floor(maxFragments / grid.columns));
   const tiles = (count: number, side: number, whole: number): boolean =>
     count * side >= whole && (count - 1) * side < whole;
-  if (!tiles(grid.columns, grid.fragmentWidthPx, grid.widthPx) || !tiles(grid.rows, grid.fragmentHeightPx, grid.heightPx))
+  if (!tiles(grid.columns, grid.fragmentWidthPx, grid.widthPx) ||
+      !tiles(grid.rows, grid.fragmentHeightPx, grid.heightPx))
     at.fail('columns and rows that cover the plane', '', 'X05');
   grid.gridReason = at.at('gridReason').text(maxTextBytes);
   return grid;
@@ -67,7 +68,8 @@ const sourceEndings = ['jpg', 'png', 'tif', 'webp', 'exr'];
 /** Fields about the source itself. */
 function readSource(at: JsonAt, codec: CodecId, mip: number): { sourceRung: boolean; source: string } {
   const sourceRung = at.has('sourceRung') && at.at('sourceRung').boolean();
-  if (sourceRung && (codec !== 'jpeg' || mip > 0)) at.fail('sourceRung of a full-size plane of codec jpeg', '', 'X11');
+  if (sourceRung && (codec !== 'jpeg' || mip > 0))
+    at.fail('sourceRung of a full-size plane of codec jpeg', '', 'X11');
   if (!at.has('source')) return { sourceRung, source: '' };
   const source = at.at('source').text(100);
   if (!sourceEndings.includes(source)) at.fail('a known source', source, 'X03');
@@ -81,7 +83,8 @@ function readTexture(at: JsonAt): TextureInfo {
   if (colourSpace !== 'srgb' && colourSpace !== 'linear') at.fail('srgb or linear', colourSpace, 'X03');
   const codec = at.at('codec').text(100);
   if (!isCodec(codec)) return at.fail('a known codec', codec, 'X03');
-  if (codec === 'jpeg-xy' && (colourSpace !== 'linear' || at.at('channels').integer(1, 3) !== 3)) at.fail('jpeg-xy for three linear channels alone', codec, 'F24');
+  if (codec === 'jpeg-xy' && (colourSpace !== 'linear' || at.at('channels').integer(1, 3) !== 3))
+    at.fail('jpeg-xy for three linear channels alone', codec, 'F24');
   const mip = at.has('mip') ? at.at('mip').integer(1, maxMip) : 0;
   const rungQuality: number[] = [];
   for (let i = 0, n = at.at('rungQuality').array(1, maxPackageRungs); i < n; ++i) {
@@ -119,9 +122,8 @@ function checkMips(list: JsonAt, textures: TextureInfo[]): void {
     const side = (px: number): number => Math.ceil(px / (1 << t.mip));
     if (t.widthPx !== side(base.widthPx) || t.heightPx !== side(base.heightPx))
       list.at(p).fail('sides of 1 / 2^mip of the full size', '', 'X07');
-    const same = (['image', 'role', 'channels', 'colourSpace', 'previewWidthPx', 'previewHeightPx'] as const).every(
-      (name) => t[name] === base[name],
-    );
+    const same = (['image', 'role', 'channels', 'colourSpace', 'previewWidthPx',
+      'previewHeightPx'] as const).every((name) => t[name] === base[name]);
     if (!same) list.at(p).fail(`what plane ${t.base} has`, '', 'X07');
   }
 }

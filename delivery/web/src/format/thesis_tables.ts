@@ -7,7 +7,10 @@ import type { TextureInfo } from './textures';
 
 export { gammaSteps };
 
-/** What only the thesis's policy reads of a texture plane. F fragments, M scales of the chain by scale number; empty arrays say nothing. */
+/**
+ * What only the thesis's policy reads of a texture plane. F fragments, M scales of the chain by scale number;
+ * empty arrays say nothing.
+ */
 export interface PlaneThesis {
   /** [F], 0..1: the predictors of chapter 8; 0 for fragments that are not stored. */
   z: Float32Array;
@@ -15,7 +18,10 @@ export interface PlaneThesis {
   zeta: Float32Array;
   m: Float32Array;
   vqp: Float32Array;
-  /** [F]: the size model S = A (100 VQP)^(B Q), and the correlation of Q and log S; 0 for fragments without a model. */
+  /**
+   * [F]: the size model S = A (100 VQP)^(B Q), and the correlation of Q and log S; 0 for fragments without a
+   * model.
+   */
   sizeA: Float32Array;
   sizeB: Float32Array;
   sizeCorrelation: Float32Array;
@@ -25,7 +31,10 @@ export interface PlaneThesis {
   totalBytes: Float64Array;
 }
 
-/** Perceptual values of the whole chain of C scales, S_0 first (thesis 7.2). Pairs are those of rows i < j, by i, then j. */
+/**
+ * Perceptual values of the whole chain of C scales, S_0 first (thesis 7.2). Pairs are those of rows i < j, by
+ * i, then j.
+ */
 export interface PerceptualTable {
   /** [C] scale numbers, rising from 0. */
   scale: Uint8Array;
@@ -54,7 +63,8 @@ export interface ThesisTables {
 
 const none = new Float32Array(0);
 const noPlane = (): PlaneThesis => ({
-  z: none, i: none, zeta: none, m: none, vqp: none, sizeA: none, sizeB: none, sizeCorrelation: none, quality: none, totalBytes: new Float64Array(0),
+  z: none, i: none, zeta: none, m: none, vqp: none, sizeA: none, sizeB: none, sizeCorrelation: none,
+  quality: none, totalBytes: new Float64Array(0),
 });
 
 const floats = (input: BytesIn, count: number, least = -1e30, most = 1e30): Float32Array =>
@@ -62,10 +72,12 @@ const floats = (input: BytesIn, count: number, least = -1e30, most = 1e30): Floa
     const value = input.f32();
     return value >= least && value <= most ? value : input.fail(`${least} to ${most}`, value);
   });
-const whole = (input: BytesIn, count: number): Uint32Array => Uint32Array.from({ length: count }, () => input.u32());
+const whole = (input: BytesIn, count: number): Uint32Array =>
+  Uint32Array.from({ length: count }, () => input.u32());
 
 function requireReserved(input: BytesIn, bytes: number, minor: number): void {
-  if (input.raw(bytes).some((b) => b !== 0) && minor <= formatMinor) input.fail('zero bytes', 'others', 'W05');
+  if (input.raw(bytes).some((b) => b !== 0) && minor <= formatMinor)
+    input.fail('zero bytes', 'others', 'W05');
 }
 
 /** F, which must be that of textures.json. */
@@ -91,7 +103,8 @@ function readGamma(input: BytesIn, out: PlaneThesis, minor: number, lastScale: n
   const scales = input.u8();
   const width = input.u8();
   requireReserved(input, 2, minor);
-  if (scales < 1 || scales > mostChainScales || width < 1 || width > 8) input.fail('1 to 100 scales and a width of 1 to 8', `${scales}, ${width}`);
+  if (scales < 1 || scales > mostChainScales || width < 1 || width > 8)
+    input.fail('1 to 100 scales and a width of 1 to 8', `${scales}, ${width}`);
   if (scales <= lastScale) input.fail(`scale ${lastScale}`, `${scales} scales`, 'R16');
   out.quality = floats(input, scales, 0, 100);
   let most = 0;
@@ -112,32 +125,44 @@ function readPerceptual(input: BytesIn, minor: number, manifest: Manifest): Perc
   const rows = input.u8();
   requireReserved(input, 3, minor);
   const pairs = (rows * (rows - 1)) / 2;
-  if (rows < 1 || rows > mostChainScales || input.left < rows * 25 + pairs * 16) input.fail('a table of 1 to 100 scales', rows);
+  if (rows < 1 || rows > mostChainScales || input.left < rows * 25 + pairs * 16)
+    input.fail('a table of 1 to 100 scales', rows);
   const scale = input.raw(rows).slice();
   scale.forEach((s, k) => {
-    if (k === 0 ? s !== 0 : s <= scale[k - 1] || s >= mostChainScales) input.fail('scale numbers rising from 0, below 100', s);
+    if (k === 0 ? s !== 0 : s <= scale[k - 1] || s >= mostChainScales)
+      input.fail('scale numbers rising from 0, below 100', s);
   });
   const [triangles, collapses] = [whole(input, rows), whole(input, rows)];
   if (collapses[0] !== 0) input.fail('no collapse for S_0', collapses[0]);
   const [average, largest, least, deviation] = Array.from({ length: 4 }, () => floats(input, rows, 0));
-  const [p95, chainAverage, chainLargest, chainLeast] = Array.from({ length: 4 }, () => floats(input, pairs, 0));
-  for (const s of manifest.scales) if (!scale.includes(s.scale)) input.fail(`scale ${s.scale}`, 'none', 'R16');
-  return { scale, triangles, collapses, average, largest, least, deviation, p95, chainAverage, chainLargest, chainLeast };
+  const [p95, chainAverage, chainLargest, chainLeast] =
+    Array.from({ length: 4 }, () => floats(input, pairs, 0));
+  for (const s of manifest.scales)
+    if (!scale.includes(s.scale)) input.fail(`scale ${s.scale}`, 'none', 'R16');
+  return {
+    scale, triangles, collapses, average, largest, least, deviation, p95,
+    chainAverage, chainLargest, chainLeast,
+  };
 }
 
 /** thesis.bin (format/SPEC.md, 14.4) of a package with these documents. Throws FormatError. */
-export function parseThesis(bytes: Uint8Array, manifest: Manifest, textures: readonly TextureInfo[]): ThesisTables {
+export function parseThesis(
+  bytes: Uint8Array, manifest: Manifest, textures: readonly TextureInfo[],
+): ThesisTables {
   const input = new BytesIn(bytes, file, 'O04');
   const minor = readEntryStart(input, 'TXTH', 'O04');
-  if (minor !== manifest.version.minor) throw new FormatError(file, 'version', `minor ${manifest.version.minor}`, `${minor}`, 'R01');
+  if (minor !== manifest.version.minor)
+    throw new FormatError(file, 'version', `minor ${manifest.version.minor}`, `${minor}`, 'R01');
   const count = input.u32();
   requireReserved(input, 4, minor);
   if (count > input.left / 12) input.fail('a section count that fits the file', count);
-  const sections = Array.from({ length: count }, () => ({ id: input.u32(), plane: input.u32(), bytes: input.u32() }));
+  const sections = Array.from({ length: count },
+    () => ({ id: input.u32(), plane: input.u32(), bytes: input.u32() }));
   const out: ThesisTables = { planes: textures.map(noPlane) };
   let last = { id: 0, plane: noIndex };
   for (const { id, plane, bytes: size } of sections) {
-    if (id < last.id || (id === last.id && plane <= last.plane) || id === 0) input.fail('sections by id and plane', 'another order');
+    if (id < last.id || (id === last.id && plane <= last.plane) || id === 0)
+      input.fail('sections by id and plane', 'another order');
     last = { id, plane };
     const section = new BytesIn(input.raw(size), `${file}: section ${id} of plane ${plane}`, 'O05');
     if (id > 4) continue;
@@ -148,7 +173,8 @@ export function parseThesis(bytes: Uint8Array, manifest: Manifest, textures: rea
       if (plane >= textures.length) section.fail('a plane', plane, 'R16');
       if (id === 1) readPredictors(section, out.planes[plane], textures[plane]);
       if (id === 2) readModels(section, out.planes[plane], textures[plane]);
-      if (id === 3) readGamma(section, out.planes[plane], minor, manifest.scales[manifest.scales.length - 1].scale);
+      if (id === 3)
+        readGamma(section, out.planes[plane], minor, manifest.scales[manifest.scales.length - 1].scale);
     }
     if (minor <= formatMinor) section.finish();
   }

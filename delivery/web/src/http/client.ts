@@ -29,7 +29,7 @@ export class HttpClient {
     this.limit_ = this.options.connections;
   }
 
-  /** Median time from request to answer over the last requests: servers and busy pages add to the round trip. */
+  /** Median time from request to answer: servers and busy pages add to the round trip. */
   get latencyS(): number {
     const sorted = [...this.waits_].sort((a, b) => a - b);
     return sorted[sorted.length >> 1] ?? this.rttS;
@@ -44,7 +44,8 @@ export class HttpClient {
     else await new Promise<void>((go) => this.waiting_.push(go));
     const abort = new AbortController();
     const cancel = (): void => abort.abort();
-    const answer: Answer = { url, status: 0, problem: '', body: new Uint8Array(0), etag: '', length: -1, complete: false, tooLong: false };
+    const answer: Answer = { url, status: 0, problem: '', body: new Uint8Array(0), etag: '', length: -1,
+      complete: false, tooLong: false };
     const record: RequestRecord = {
       url, offset: range?.offset ?? 0, bytes: range?.bytes ?? -1, received: 0, kind,
       started: nowS(), firstByte: -1, ended: 0, status: 0, ok: false,
@@ -65,15 +66,18 @@ export class HttpClient {
       const headers: Record<string, string> = {};
       if (range) headers.Range = `bytes=${range.offset}-${range.offset + range.bytes - 1}`;
       const cache = reload ? 'reload' : range ? options.rangeCache : 'default';
-      const response = await (options.fetch ?? globalThis.fetch)(url, { headers, signal: abort.signal, cache });
+      const response =
+        await (options.fetch ?? globalThis.fetch)(url, { headers, signal: abort.signal, cache });
       restartStallTimer();
       record.firstByte = nowS();
       const { status, body } = response;
       record.ok = status === (range ? 206 : 200);
       const header = (name: string): string => response.headers.get(name) ?? '';
       const etag = header('etag');
-      const length = status === 200 && /^\d{1,15}$/.test(header('content-length')) ? Number(header('content-length')) : -1;
-      Object.assign(answer, { status, url: response.url || url, etag: etag[0] === '"' ? etag : '', length, range: contentRange(header('content-range')) });
+      const length = status === 200 && /^\d{1,15}$/.test(header('content-length'))
+        ? Number(header('content-length')) : -1;
+      Object.assign(answer, { status, url: response.url || url, etag: etag[0] === '"' ? etag : '', length,
+        range: contentRange(header('content-range')) });
       const reader = record.ok ? body?.getReader() : undefined;
       while (reader && !answer.tooLong) {
         const { done, value } = await reader.read();
@@ -125,7 +129,8 @@ export class HttpClient {
       if (this.waits_.push(wait) > latencySamples) this.waits_.shift();
     }
     if (this.records.push(record) <= 4 && status > 0) {
-      const timing = performance.getEntriesByName?.(absolute(url), 'resource').at(-1) as PerformanceResourceTiming | undefined;
+      const timing = performance.getEntriesByName?.(absolute(url), 'resource')
+        .at(-1) as PerformanceResourceTiming | undefined;
       if (timing && /^h[23]/.test(timing.nextHopProtocol)) this.limit_ = this.options.streams;
     }
     for (const listener of this.listeners) listener(record);

@@ -9,7 +9,7 @@ function mayRetry({ status, complete, tooLong }: Answer): boolean {
   return status === 0 || status === 408 || status === 429 || status >= 500;
 }
 
-/** A function that waits before the next try, longer from try to try; false: enough tries, or another would be no better. */
+/** A function that waits before the next try, ever longer; false: no further try helps. */
 export function retriesOf({ options }: HttpClient, signal?: AbortSignal): (a: Answer) => Promise<boolean> {
   let [left, delayS] = [options.retries, options.retryDelayS];
   return async (a) => {
@@ -51,11 +51,9 @@ export interface Asking {
 export class Mirrors {
   readonly all: Mirror[];
 
-  constructor(
-    urls: readonly string[],
-    readonly client: HttpClient,
-  ) {
-    this.all = urls.map((url) => ({ url, at: url, alive: true, etag: '', total: -1, throughput: transferRate(1e5), owedBytes: 0, lastS: 0 }));
+  constructor(urls: readonly string[], readonly client: HttpClient) {
+    this.all = urls.map((url) => ({ url, at: url, alive: true, etag: '', total: -1,
+      throughput: transferRate(1e5), owedBytes: 0, lastS: 0 }));
   }
   private get alive_(): Mirror[] {
     return this.all.filter((m) => m.alive);
@@ -68,8 +66,9 @@ export class Mirrors {
   }
 
   /**
-   * Asks the mirror that should deliver first, by the throughput and the bytes under way of each; then the next. The failure of the last
-   * mirror is thrown. A last mirror whose bytes are damaged is asked once more: a cache on the way may hold bad bytes.
+   * Asks the mirror that should deliver first, by the throughput and the bytes under way of each; then the
+   * next. The failure of the last mirror is thrown. A last mirror whose bytes are damaged is asked once more:
+   * a cache on the way may hold bad bytes.
    */
   async ask<T>(bytes: number, ask: (m: Mirror, how: Asking) => Promise<T>): Promise<T> {
     for (let reload = false; ; ) {

@@ -31,10 +31,7 @@ function lateness(mostS: number, signal?: AbortSignal): { late: Promise<never>; 
   return { late, clear: () => clear() };
 }
 
-/**
- * A document as `decoder` decodes it; decoded on this thread where the decoder fails or does not answer in time: because there are no
- * workers, or because the workers belong to a load that has ended.
- */
+/** A document by `decoder`, or on this thread where `decoder` fails or does not answer in time. */
 export async function decodeWith<K extends keyof Documents>(
   decoder: DocumentDecoder,
   mostS: number,
@@ -70,11 +67,12 @@ const gapBytes = 4096;
 const noPlane = -1;
 
 /** The head of a document or stream as an entry of its own. */
-const headOf = ({ path, offset, headBytes, headSha256 }: StreamRef): EntryRef => ({ path: `head of ${path}`, offset, bytes: headBytes, sha256: headSha256, rule: 'R02' });
+const headOf = ({ path, offset, headBytes, headSha256 }: StreamRef): EntryRef =>
+  ({ path: `head of ${path}`, offset, bytes: headBytes, sha256: headSha256, rule: 'R02' });
 
 /**
- * The documents of a package, each read when it is first asked for, and never twice. Everything handed out has been checked: entries
- * against their SHA-256, documents against each other.
+ * The documents of a package, each read when it is first asked for, and never twice. Everything handed out
+ * has been checked: entries against their SHA-256, documents against each other.
  */
 export class PackageDocuments {
   private readonly reads_ = new Map<string, Promise<unknown>>();
@@ -127,10 +125,12 @@ export class PackageDocuments {
     this.reads_.set(name, read);
   }
   /** Reads a range of the container within an entry; these parts of the range are held to their digests. */
-  protected readParts_(place: Place, range: ByteRange, how: ReadOptions, ...parts: EntryRef[]): Promise<Uint8Array> {
+  protected readParts_(place: Place, range: ByteRange, how: ReadOptions,
+      ...parts: EntryRef[]): Promise<Uint8Array> {
     const verify = async (got: Uint8Array): Promise<void> => {
       for (const { path, offset, bytes, sha256, rule } of parts)
-        await requireDigest(got.subarray(offset - range.offset).subarray(0, bytes), sha256, this.store.name, path, rule);
+        await requireDigest(got.subarray(offset - range.offset).subarray(0, bytes), sha256, this.store.name,
+          path, rule);
     };
     return this.store.read(place, range, { ...how, verify });
   }
@@ -148,17 +148,16 @@ export class PackageDocuments {
     return this.readParts_(ref, part, how, headOf(ref), part);
   }
   /** Reads and decodes a document once for all who ask. */
-  private document_<K extends 'indexPages' | 'tableSections' | 'textures' | 'quality'>(
-    name: K,
-    signal: AbortSignal | undefined,
-    read: (m: Manifest) => Promise<Uint8Array>,
-  ): Promise<Decoded<K>> {
+  private document_<K extends 'indexPages' | 'tableSections' | 'textures' | 'quality'>(name: K,
+      signal: AbortSignal | undefined, read: (m: Manifest) => Promise<Uint8Array>): Promise<Decoded<K>> {
     const { manifest } = this;
-    const decode = (bytes: Uint8Array) => this.decoded(signal, name, ...([bytes, manifest] as Parameters<Documents[K]>));
+    const decode = (bytes: Uint8Array) =>
+      this.decoded(signal, name, ...([bytes, manifest] as Parameters<Documents[K]>));
     return this.readOnce_(name, () => read(manifest).then(decode), signal);
   }
   /** Decodes or checks by a function of documents.ts. */
-  decoded<K extends keyof Documents>(signal: AbortSignal | undefined, name: K, ...args: Parameters<Documents[K]>): Promise<Decoded<K>> {
+  decoded<K extends keyof Documents>(signal: AbortSignal | undefined, name: K,
+      ...args: Parameters<Documents[K]>): Promise<Decoded<K>> {
     return decodeWith(this.decodeDocument, this.client.options.stallTimeoutS, signal, name, ...args);
   }
 
@@ -175,7 +174,8 @@ export class PackageDocuments {
       const { index } = this.manifest;
       const pages = await this.document_('indexPages', signal, () => this.readPaged_(index, how));
       const page = pages.find((p) => p.plane === plane);
-      return page ? this.decoded(signal, 'indexPage', await this.readChecked(page, how, index), page, this.manifest) : new Map();
+      return page ? this.decoded(signal, 'indexPage', await this.readChecked(page, how, index), page,
+        this.manifest) : new Map();
     };
     return this.readOnce_(`index/${plane}`, read, signal);
   }
@@ -202,20 +202,24 @@ export class PackageDocuments {
 
   /** The texture planes: full-size ones first, then mips. */
   textures(signal?: AbortSignal): Promise<TextureInfo[]> {
-    return this.document_('textures', signal, (m) => this.readChecked(m.textures, { kind: 'textures', signal }));
+    return this.document_('textures', signal,
+      (m) => this.readChecked(m.textures, { kind: 'textures', signal }));
   }
   /** Measured quality of scales and rungs. */
   async quality(signal?: AbortSignal): Promise<QualityTable> {
-    const read = (m: Manifest): Promise<Uint8Array> => this.readChecked(m.quality, { kind: 'quality', signal });
-    const [table, textures] = await Promise.all([this.document_('quality', signal, read), this.textures(signal)]);
+    const read = (m: Manifest): Promise<Uint8Array> =>
+      this.readChecked(m.quality, { kind: 'quality', signal });
+    const [table, textures] =
+      await Promise.all([this.document_('quality', signal, read), this.textures(signal)]);
     requireGroups(table, textures);
     return table;
   }
   /** Provenance: what the package was made from and with, as JSON. */
   async provenance(): Promise<unknown> {
-    return JSON.parse(new TextDecoder().decode(await this.readChecked(this.manifest.provenance, { kind: 'other' })));
+    return JSON.parse(new TextDecoder().decode(await this.readChecked(this.manifest.provenance,
+      { kind: 'other' })));
   }
-  /** What the object is, whose it is, what its coordinates mean: about.json, fetched when it is first asked for. */
+  /** about.json: what the object is, whose it is, what its coordinates mean; fetched when first asked for. */
   about(signal?: AbortSignal): Promise<About> {
     const read = async (): Promise<About> => {
       const bytes = await this.readChecked(this.manifest.about, { kind: 'other', signal });
@@ -224,17 +228,20 @@ export class PackageDocuments {
     return this.readOnce_('about', read, signal);
   }
   /**
-   * Reads what a first plan and its first fragments need by one request, or as much of that as is small: index, textures.json,
-   * quality.json, table streams, tables, and `withMesh` the coarsest mesh. False where not even the documents before the tables are small.
+   * Reads what a first plan and its first fragments need by one request, or as much of that as is small:
+   * index, textures.json, quality.json, table streams, tables, and `withMesh` the coarsest mesh. False where
+   * not even the documents before the tables are small.
    */
   async prefetchDocuments(signal?: AbortSignal, withMesh = false): Promise<boolean> {
     const { index, tables, scales } = this.manifest;
     const { offset, bytes: meshBytes } = scales[scales.length - 1].glb;
-    const ends = [withMesh ? offset + meshBytes : 0, tables.offset + tables.bytes, tables.offset].map((end) => end - index.offset);
+    const ends = [withMesh ? offset + meshBytes : 0, tables.offset + tables.bytes, tables.offset].map((end) =>
+      end - index.offset);
     const bytes = ends.find((n) => n > 0 && n <= wholeDocumentBytes);
     if (!bytes) return false;
     // Whoever takes a document of these bytes holds the document to its digest.
-    const read = (): Promise<Uint8Array> => this.store.read(index, { offset: index.offset, bytes }, { kind: 'tables', signal });
+    const read = (): Promise<Uint8Array> =>
+      this.store.read(index, { offset: index.offset, bytes }, { kind: 'tables', signal });
     if (this.form === 'range') await this.readOnce_(`documents/${bytes}`, read, signal);
     return true;
   }
@@ -245,10 +252,7 @@ export class PackageDocuments {
   async planeTables(plane: number, signal?: AbortSignal): Promise<PlaneTables> {
     return (await this.tables([plane], signal))[plane]!;
   }
-  /**
-   * Tables by plane number: of these planes (and of those read before), or of all. Sections that stand together are
-   * read by one request.
-   */
+  /** Tables by plane: of these planes and those read before, or of all. One request reads neighbours. */
   async tables(planes?: readonly number[], signal?: AbortSignal): Promise<(PlaneTables | undefined)[]> {
     const { tables } = this.manifest;
     const how = { kind: 'tables', signal } as const;
@@ -257,7 +261,8 @@ export class PackageDocuments {
     let last = { offset: 0, bytes: -Infinity };
     const reads = wanted.map((p) => {
       const section = sections[p];
-      if (!section) throw new InputError(this.store.name, `texture plane ${p}`, `one of ${sections.length}`, 'another');
+      if (!section)
+        throw new InputError(this.store.name, `texture plane ${p}`, `one of ${sections.length}`, 'another');
       let run: ByteRange = { offset: section.offset, bytes: section.bytes };
       if (!this.reads_.has(`tables/${p}`)) {
         if (run.offset - last.offset - last.bytes <= gapBytes) {
@@ -267,11 +272,13 @@ export class PackageDocuments {
         last = run;
       }
       const bytes = async (): Promise<Uint8Array> => {
-        await this.readOnce_(`tables/${run.offset}+${run.bytes}`, () => this.store.read(tables, run, how), signal);
+        await this.readOnce_(`tables/${run.offset}+${run.bytes}`, () => this.store.read(tables, run, how),
+          signal);
         return this.readChecked(section, how, tables);
       };
       const read = async (): Promise<void> => {
-        const [got, textures, entries] = await Promise.all([bytes(), this.textures(signal), this.indexPage_(p, signal)]);
+        const [got, textures, entries] =
+          await Promise.all([bytes(), this.textures(signal), this.indexPage_(p, signal)]);
         this.planes_.set(p, await this.decoded(signal, 'planeTables', got, section, p, textures[p], entries));
       };
       return () => this.readOnce_(`tables/${p}`, read, signal);
@@ -285,7 +292,8 @@ export class PackageDocuments {
   }
   /** Data that decisions about textures are made from, with the tables of these planes. */
   async data(planes?: readonly number[], signal?: AbortSignal): Promise<PackageData> {
-    const [textures, tables, quality] = await Promise.all([this.textures(signal), this.tables(planes, signal), this.quality(signal)]);
+    const [textures, tables, quality] =
+      await Promise.all([this.textures(signal), this.tables(planes, signal), this.quality(signal)]);
     return { manifest: this.manifest, textures, tables, quality };
   }
 }

@@ -14,20 +14,18 @@ import type { HttpOptions, OpenedStore, ReadOptions, StoreMode } from './store';
 import { RangeStore } from './range_store';
 
 /**
- * Finds out how the server can be read (SPEC.md, section 19): ranges of the container; the tree beside the container where the server
- * answers 200 to a range; the whole container where there is no tree. Where a server stops answering ranges, the tree, too.
+ * Finds out how the server can be read (SPEC.md, section 19): ranges of the container; the tree beside the
+ * container where the server answers 200 to a range; the whole container where there is no tree. Where a
+ * server stops answering ranges, the tree, too.
  */
-export async function openStore(
-  url: string,
-  mirrors: readonly string[],
-  mode: StoreMode,
-  client: HttpClient,
-  signal?: AbortSignal,
-): Promise<OpenedStore> {
+export async function openStore(url: string, mirrors: readonly string[], mode: StoreMode, client: HttpClient,
+    signal?: AbortSignal): Promise<OpenedStore> {
   const urls = [url, ...mirrors.filter((m) => m !== url)];
   const files = () => import('./without_ranges');
-  if (mode === 'files' || /^[^?#]*\/([?#]|$)/.test(url)) return (await files()).openTree(urls, client, signal);
-  const openTree = async (manifest: Uint8Array, aborted?: AbortSignal) => (await files()).openSameTree(urls, client, manifest, aborted);
+  if (mode === 'files' || /^[^?#]*\/([?#]|$)/.test(url))
+    return (await files()).openTree(urls, client, signal);
+  const openTree = async (manifest: Uint8Array, aborted?: AbortSignal) =>
+    (await files()).openSameTree(urls, client, manifest, aborted);
   const store = new RangeStore(urls, client, mode === 'range' ? undefined : openTree);
   try {
     return { store, manifest: await store.manifest(signal) };
@@ -46,8 +44,8 @@ export async function openStore(
 /** Options of a package's opening. */
 export interface OpenOptions extends Partial<HttpOptions> {
   /**
-   * range: byte ranges of the container, nothing else. files: the tree beside the container. auto: ranges, and the tree
-   * (or at last the whole container) where the server answers 200 to a range.
+   * range: byte ranges of the container, nothing else. files: the tree beside the container. auto: ranges,
+   * and the tree (or at last the whole container) where the server answers 200 to a range.
    */
   mode?: StoreMode;
   /** Further URLs of the same container. */
@@ -58,33 +56,29 @@ export interface OpenOptions extends Partial<HttpOptions> {
 const withoutRanges = () => import('./without_ranges');
 
 /**
- * Reads a package on demand. Opening reads the manifest only; index, textures and tables are read when they are first
- * asked for, and never twice. Everything handed out has been checked: entries against their SHA-256, fragments against
- * the truncated digest in the tables, documents against each other.
+ * Reads a package on demand. Opening reads the manifest only; index, textures and tables are read when they
+ * are first asked for, and never twice. Everything handed out has been checked: entries against their
+ * SHA-256, fragments against the truncated digest in the tables, documents against each other.
  */
 export class PackageReader extends PackageDocuments {
   /** Reads the manifest of a package at a URL; see OpenOptions. */
   static async openUrl<T extends PackageReader>(
-    this: new (...args: ConstructorParameters<typeof PackageReader>) => T,
-    url: string,
-    options: OpenOptions = {},
-    decoder: DocumentDecoder = decodeHere,
-  ): Promise<T> {
+      this: new (...args: ConstructorParameters<typeof PackageReader>) => T, url: string,
+      options: OpenOptions = {}, decoder: DocumentDecoder = decodeHere): Promise<T> {
     const client = new HttpClient(options);
     const { signal, mode = 'auto', mirrors = [] } = options;
     const openedS = nowS();
     const { store, manifest } = await openStore(url, mirrors, mode, client, signal);
     const container = store.form === 'range' ? store.name : '';
-    const { parsed, id } = await decodeWith(decoder, client.options.stallTimeoutS, signal, 'manifest', manifest, container);
+    const { parsed, id } =
+      await decodeWith(decoder, client.options.stallTimeoutS, signal, 'manifest', manifest, container);
     return new this(store, client, url, parsed, id, openedS, decoder);
   }
 
   /** Reads a container that is in memory. */
   static async openBytes<T extends PackageReader>(
-    this: new (...args: ConstructorParameters<typeof PackageReader>) => T,
-    bytes: Uint8Array,
-    name = 'package',
-  ): Promise<T> {
+      this: new (...args: ConstructorParameters<typeof PackageReader>) => T, bytes: Uint8Array,
+      name = 'package'): Promise<T> {
     const store = (await withoutRanges()).openBytes(bytes, name);
     const { parsed, id } = await decodeHere('manifest', await store.manifest());
     return new this(store, new HttpClient(), name, parsed, id, nowS());
@@ -109,17 +103,15 @@ export class PackageReader extends PackageDocuments {
 
   // ---- meshes and previews
 
-  /**
-   * The GLB of a scale as it is stored; no index is needed. Images of all but the coarsest scale's may be relative URIs of previews.
-   * InputError where the scale has no file of its own: see hasGlb.
-   */
+  /** The GLB of a scale as it is stored, without an index. InputError: no file of its own, see hasGlb. */
   async scaleGlb(scale: number, how: Partial<ReadOptions> = {}): Promise<Uint8Array> {
     const s = this.manifest.scales.find((k) => k.scale === scale);
     if (!s) throw new InputError(this.store.name, `scale ${scale}`, 'a scale of the package', 'none');
-    if (!hasGlb(s)) throw new InputError(this.store.name, `scale ${scale}`, 'a scale with a file of its own', 'one of the stream');
+    if (!hasGlb(s)) throw new InputError(this.store.name, `scale ${scale}`, 'a scale with a file of its own',
+      'one of the stream');
     return this.readChecked(s.glb, { kind: 'mesh', once: true, ...how });
   }
-  /** The GLB of a proxy as it is stored; no index is needed. 0 = the smallest. InputError where there is none. */
+  /** The GLB of a proxy as it is stored, without an index. 0 = the smallest. InputError: there is none. */
   async proxyGlb(proxy: number, how: Partial<ReadOptions> = {}): Promise<Uint8Array> {
     const found = this.manifest.proxies[proxy];
     if (!found) throw new InputError(this.store.name, `proxy ${proxy}`, 'a proxy of the package', 'none');
@@ -138,8 +130,10 @@ export class PackageReader extends PackageDocuments {
   async tableStream(plane: number, rung: number, signal?: AbortSignal): Promise<Uint8Array> {
     const { tableBytes } = await this.planeTables(plane, signal);
     const { tableStreams } = this.planeDocument_(plane);
-    const streams = await this.readOnce_(`streams/${plane}`, () => this.readChecked(tableStreams, { kind: 'texture', signal }), signal);
-    if (!(rung in tableBytes)) throw new InputError(this.store.name, `texture plane ${plane}`, `a rung under ${tableBytes.length}`, `${rung}`);
+    const streams = await this.readOnce_(`streams/${plane}`,
+      () => this.readChecked(tableStreams, { kind: 'texture', signal }), signal);
+    if (!(rung in tableBytes)) throw new InputError(this.store.name, `texture plane ${plane}`,
+      `a rung under ${tableBytes.length}`, `${rung}`);
     const begin = tableBytes.subarray(0, rung).reduce((sum, n) => sum + n, 0);
     return streams.subarray(begin, begin + tableBytes[rung]);
   }
@@ -153,7 +147,8 @@ export class PackageReader extends PackageDocuments {
     const { tables: t, offsets } = await this.planeFiles(plane);
     const at = rung * fragmentCount(t) + fragment;
     if (!(rung >= 0 && rung < rungCount(t) && fragment >= 0 && fragment < fragmentCount(t)))
-      throw new InputError(this.store.name, `texture plane ${plane}`, 'a rung and a fragment of it', `${rung}, ${fragment}`);
+      throw new InputError(this.store.name, `texture plane ${plane}`, 'a rung and a fragment of it',
+        `${rung}, ${fragment}`);
     return { offset: offsets[at], bytes: t.sizeBytes[at] };
   }
   /** The first 8 bytes of the SHA-256 of a fragment's stream. */
@@ -172,8 +167,9 @@ export class PackageReader extends PackageDocuments {
     const how = { kind: 'texture', once: this.form !== 'files', signal } as const;
     return this.readChecked({ path, offset: pack.offset + offset, bytes, sha256, rule: 'F03' }, how, pack);
   }
-  /** The image file that any decoder takes: table stream and fragment joined, with the lower rungs' where needed. */
-  async completeFragment(plane: number, rung: number, fragment: number, signal?: AbortSignal): Promise<Uint8Array> {
+  /** The image file that any decoder takes: table stream and fragment, with lower rungs where needed. */
+  async completeFragment(plane: number, rung: number, fragment: number,
+      signal?: AbortSignal): Promise<Uint8Array> {
     const { codec } = (await this.textures(signal))[plane];
     const first = codecTraits(codec).incremental ? 0 : rung;
     const streams: Uint8Array[] = [];
@@ -184,10 +180,12 @@ export class PackageReader extends PackageDocuments {
   /** Files of fragments that `unpack --fragments files` added to a tree; undefined where there are none. */
   async fragmentFiles(signal?: AbortSignal): Promise<FragmentFiles | undefined> {
     if (this.form !== 'files') return undefined;
-    return this.readOnce_('files', async () => (await withoutRanges()).readFragmentList(this.store, signal), signal);
+    return this.readOnce_('files', async () => (await withoutRanges()).readFragmentList(this.store, signal),
+      signal);
   }
   /** A fragment's complete file of such a tree, digest checked. */
-  async fragmentFile(plane: number, rung: number, fragment: number, signal?: AbortSignal): Promise<Uint8Array> {
+  async fragmentFile(plane: number, rung: number, fragment: number,
+      signal?: AbortSignal): Promise<Uint8Array> {
     const { store } = this;
     const { extension } = codecTraits((await this.textures(signal))[plane].codec);
     const path = fragmentFilePath(plane, rung, fragment, extension);
@@ -205,15 +203,16 @@ export class PackageReader extends PackageDocuments {
   async splitStreamHead(signal?: AbortSignal): Promise<Uint8Array | undefined> {
     return (await this.splitStreamStart(0, signal))?.subarray(0, this.manifest.stream!.headBytes);
   }
-  /** The head of the vertex-split stream and so many bytes behind the head (or all there are); the head is checked. */
+  /** The checked head of the vertex-split stream, and so many bytes behind it (or all there are). */
   async splitStreamStart(more: number, signal?: AbortSignal): Promise<Uint8Array | undefined> {
     const { stream: s } = this.manifest;
     return s && this.readWithHead_(s, Math.min(s.bytes, s.headBytes + more), { kind: 'stream', signal });
   }
-  /** Bytes of the vertex-split stream; InputError where there is none. The caller checks blocks by the stream's head. */
+  /** Bytes of the vertex-split stream, not checked; InputError where there is none. */
   async splitStream(offset: number, bytes: number, how: Partial<ReadOptions> = {}): Promise<Uint8Array> {
     const { stream } = this.manifest;
     if (!stream) throw new InputError(this.store.name, '', 'a stream of vertex splits', 'none');
-    return this.store.read(stream, { offset: stream.offset + offset, bytes }, { kind: 'stream', once: true, ...how });
+    return this.store.read(stream, { offset: stream.offset + offset, bytes },
+      { kind: 'stream', once: true, ...how });
   }
 }

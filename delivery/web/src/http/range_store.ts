@@ -17,8 +17,9 @@ function sameOrigin(url: string): boolean {
 class RangesEnded extends InputError {}
 
 /**
- * Reads ranges of a container. Bytes that were read are not asked for again, unless they were read `once`. Where servers stop answering
- * ranges of the same file, the tree beside the container is read, if `openTree` finds the same package there.
+ * Reads ranges of a container. Bytes that were read are not asked for again, unless they were read `once`.
+ * Where servers stop answering ranges of the same file, the tree beside the container is read, if `openTree`
+ * finds the same package there.
  */
 export class RangeStore implements PackageStore {
   /** Error of a server that knows no ranges. */
@@ -28,11 +29,8 @@ export class RangeStore implements PackageStore {
   private parts_: { begin: number; bytes: Uint8Array }[] = []; // the last read first
   private readonly mirrors_: Mirrors;
 
-  constructor(
-    urls: readonly string[],
-    client: HttpClient,
-    private readonly openTree_?: (manifest: Uint8Array, signal?: AbortSignal) => Promise<PackageStore>,
-  ) {
+  constructor(urls: readonly string[], client: HttpClient, private readonly openTree_?: (manifest: Uint8Array,
+      signal?: AbortSignal) => Promise<PackageStore>) {
     this.mirrors_ = new Mirrors(urls, client);
   }
   get form(): PackageForm {
@@ -57,7 +55,8 @@ export class RangeStore implements PackageStore {
       this.tree_ ??= this.openTree_(manifestOfContainer(await this.manifest(), this.name), how.signal);
       this.tree_.then(() => (this.form_ = 'files'), () => (this.tree_ = undefined));
       const tree = await this.tree_.catch((failure: unknown) => {
-        throw failure instanceof FormatError ? failure : error; // replaced; or no tree, or no part that reads trees
+        // replaced; or no tree, or no part that reads trees
+        throw failure instanceof FormatError ? failure : error;
       });
       return tree.read(place, range, how);
     }
@@ -71,16 +70,19 @@ export class RangeStore implements PackageStore {
       try {
         const known = part.bytes.subarray(begin - part.begin, end - part.begin);
         const have = known.length;
-        got = have < bytes ? concat([known, await this.fetch_(begin + have, bytes - have, { ...how, verify: undefined })]) : known;
+        const rest = { ...how, verify: undefined };
+        got = have < bytes ? concat([known, await this.fetch_(begin + have, bytes - have, rest)]) : known;
         await how.verify?.(got);
         if (have === bytes) return got;
       } catch (error) {
         if (!(error instanceof FormatError) || !how.verify) throw error;
-        this.parts_ = this.parts_.filter((p) => p.begin >= end || p.begin + p.bytes.length <= begin); // the remembered bytes may be the bad ones
+        // the remembered bytes may be the bad ones
+        this.parts_ = this.parts_.filter((p) => p.begin >= end || p.begin + p.bytes.length <= begin);
         got = undefined;
       }
     got ??= await this.fetch_(begin, bytes, how);
-    if (!how.once) this.parts_ = [{ begin, bytes: got }, ...this.parts_.filter((p) => p.begin < begin || p.begin + p.bytes.length > end)];
+    if (!how.once) this.parts_ = [{ begin, bytes: got },
+      ...this.parts_.filter((p) => p.begin < begin || p.begin + p.bytes.length > end)];
     return got;
   }
 
@@ -92,12 +94,15 @@ export class RangeStore implements PackageStore {
     });
   }
   /** Fetches from one mirror; a cut transfer goes on where it broke. */
-  private async fetchFrom_(m: Mirror, asking: Asking, offset: number, bytes: number, { kind, signal, onBytes }: ReadOptions): Promise<Uint8Array> {
+  private async fetchFrom_(m: Mirror, asking: Asking, offset: number, bytes: number,
+      { kind, signal, onBytes }: ReadOptions): Promise<Uint8Array> {
     const { client } = this.mirrors_;
     const mayTryAgain = retriesOf(client, signal);
     const chunks: Uint8Array[] = [];
     for (let have = 0; ; ) {
-      this.require_(m, offset === 0 || m.total < 0 || offset + bytes <= m.total, offset, `a file of ${offset + bytes} bytes`, m.total); // before memory is taken
+      // before memory is taken
+      this.require_(m, offset === 0 || m.total < 0 || offset + bytes <= m.total, offset,
+        `a file of ${offset + bytes} bytes`, m.total);
       const before = have;
       const range = { offset: offset + have, bytes: bytes - have };
       const a = await client.get(m.url, {
@@ -105,9 +110,11 @@ export class RangeStore implements PackageStore {
         onBytes: (n) => onBytes?.(before + n),
       });
       m.at = a.url;
-      if (a.status === 200 && m.total < 0) throw (this.noRanges = new InputError(shownUrl(m.url), '', 'a server that answers ranges', 'status 200'));
+      if (a.status === 200 && m.total < 0) throw (this.noRanges = new InputError(shownUrl(m.url), '',
+        'a server that answers ranges', 'status 200'));
       if (a.status === 200 && isSameFile(a, m))
-        throw new RangesEnded(shownUrl(m.url), `byte ${offset}`, 'an answer with status 206', 'status 200: ranges are no longer answered');
+        throw new RangesEnded(shownUrl(m.url), `byte ${offset}`, 'an answer with status 206',
+          'status 200: ranges are no longer answered');
       if (a.status === 200 || a.status === 416) this.requireSame_(m, false, offset, `status ${a.status}`);
       if (a.status === 206) {
         this.checkRange_(m, a, range);
@@ -116,7 +123,8 @@ export class RangeStore implements PackageStore {
         if (a.complete) return concat(chunks);
       }
       if ((asking.othersLeft && have === before) || !(await mayTryAgain(a)))
-        throw new InputError(shownUrl(m.url), `byte ${range.offset}`, 'an answer with status 206', whatCame(a));
+        throw new InputError(shownUrl(m.url), `byte ${range.offset}`, 'an answer with status 206',
+          whatCame(a));
     }
   }
   private require_({ url }: Mirror, good: boolean, offset: number, expected: string, found: unknown): void {
@@ -124,20 +132,24 @@ export class RangeStore implements PackageStore {
   }
 
   private requireSame_(m: Mirror, same: boolean, offset: number, found: string): void {
-    this.require_(m, same, offset, 'the file that reading began with', `${found}: it was replaced, open it anew`);
+    this.require_(m, same, offset, 'the file that reading began with',
+      `${found}: it was replaced, open it anew`);
   }
   /** Requires an answer from the file that reading began with, and with the range that was asked for. */
-  private checkRange_(m: Mirror, { range, etag, url, complete, body }: Answer, { offset, bytes }: { offset: number; bytes: number }): void {
+  private checkRange_(m: Mirror, { range, etag, url, complete, body }: Answer,
+      { offset, bytes }: { offset: number; bytes: number }): void {
     this.requireSame_(m, !m.etag || !etag || etag === m.etag, offset, 'another ETag');
     m.etag ||= etag;
     // Another origin may keep Content-Range to itself; then the length alone is checked.
     if (!range) {
       this.require_(m, !sameOrigin(url), offset, 'a Content-Range', 'none that can be read');
-      return this.require_(m, !complete || offset === 0 || body.length === bytes, offset, `${bytes} bytes`, body.length);
+      return this.require_(m, !complete || offset === 0 || body.length === bytes, offset, `${bytes} bytes`,
+        body.length);
     }
     const [first, last, total] = range;
     this.requireSame_(m, m.total < 0 || total === m.total, offset, `${total} bytes`);
-    this.require_(m, first === offset && last === Math.min(offset + bytes, total) - 1, offset, 'the range that was asked for', `${first}-${last}`);
+    this.require_(m, first === offset && last === Math.min(offset + bytes, total) - 1, offset,
+      'the range that was asked for', `${first}-${last}`);
     m.total = total;
   }
 

@@ -91,7 +91,7 @@ export function contentRange(text: string): Answer['range'] {
   return said && said[0] <= said[1] && said[1] < said[2] ? said : undefined;
 }
 
-/** Whether an answer is about the file of this strong ETag ('' = none) and length (-1 = not known). What cannot be compared counts as same. */
+/** Whether an answer is of the file with this ETag ('' = none) and length (-1 = unknown), if known. */
 export function isSameFile({ etag, range, length }: Answer, known: { etag: string; total: number }): boolean {
   if (etag && known.etag) return etag === known.etag;
   const total = range ? range[2] : length;
@@ -105,7 +105,8 @@ export function shownUrl(url: string): string {
 
 /** Whether an error says that asking later is of no use, either. */
 export function isForGood(error: unknown): boolean {
-  return error instanceof FormatError || (error instanceof InputError && /^status 4(?!08|29)/.test(error.found));
+  return error instanceof FormatError ||
+    (error instanceof InputError && /^status 4(?!08|29)/.test(error.found));
 }
 
 /** An answer's problem or status, for messages. */

@@ -15,8 +15,9 @@ export interface HttpOptions {
   /** Longest time without a byte, or without a worker's answer about a document. */
   stallTimeoutS: number;
   /**
-   * How ranges use the browser's cache. Default no-store: Chromium answers ranges of one URL that may be cached one after
-   * the other, however many were asked for at once; with a round trip for each, a slow link stands idle.
+   * How ranges use the browser's cache. Default no-store: Chromium answers ranges of one URL that may be
+   * cached one after the other, however many were asked for at once; with a round trip for each, a slow link
+   * stands idle.
    */
   rangeCache: RequestCache;
   /** Requests at once while the server speaks HTTP/1.1. */

@@ -1,11 +1,12 @@
 import { leastSeconds, windowSamples } from '../format/shared_numbers';
 
-/** Throughput of a connection, or of several, from transfers that have ended: delivery/cpp/decide/throughput.h. */
+/** Throughput of connections from transfers that have ended: delivery/cpp/decide/harmonic_time.h. */
 export interface TransferRate {
   /**
-   * `seconds`: since the end of the transfer before, latency taken off; less than 1 ns counts as 1 ns. `others`: how many transfers are
-   * still under way, and their bytes. Until more transfers have ended than are under way, beta_0 is the estimate, as far as beta_0 lies
-   * between what the link has given with nothing of the others and with all of the others.
+   * `seconds`: since the end of the transfer before, latency taken off; less than 1 ns counts as 1 ns.
+   * `others`: how many transfers are still under way, and their bytes. Until more transfers have ended than
+   * are under way, beta_0 is the estimate, as far as beta_0 lies between what the link has given with nothing
+   * of the others and with all of the others.
    */
   add(bytes: number, seconds: number, others?: number, othersBytes?: number): void;
   /** Bytes over seconds of at most so many samples (default windowSamples). */
@@ -18,7 +19,8 @@ const none = { allBytes: 0, allSeconds: 0 };
 
 /** `initialBytesS` is beta_0, until there is a sample; > 0. */
 export function transferRate(initialBytesS: number): TransferRate {
-  const ended: { bytes: number; seconds: number; allBytes: number; allSeconds: number }[] = []; // all: up to each
+  // all: up to each
+  const ended: { bytes: number; seconds: number; allBytes: number; allSeconds: number }[] = [];
   let starting = true;
   let startBytesS = initialBytesS;
   return {
@@ -28,7 +30,8 @@ export function transferRate(initialBytesS: number): TransferRate {
       const all = { bytes, seconds, allBytes: allBytes + bytes, allSeconds: allSeconds + seconds };
       ended.push(all);
       starting &&= ended.length <= others;
-      startBytesS = Math.min(Math.max(initialBytesS, all.allBytes / all.allSeconds), (all.allBytes + othersBytes) / all.allSeconds);
+      startBytesS = Math.min(Math.max(initialBytesS, all.allBytes / all.allSeconds),
+        (all.allBytes + othersBytes) / all.allSeconds);
     },
     recentBytesS(samples = windowSamples) {
       if (starting) return startBytesS;

@@ -11,7 +11,8 @@ import type { OpenedStore, PackageStore, Place, ReadOptions } from './store';
 // For servers that know no ranges, and for containers in memory; loaded with the first of them.
 
 /** Gets a whole file; with retries, unless another mirror may have the file. */
-async function getWhole(client: HttpClient, url: string, how: GetOptions, othersLeft: boolean): Promise<Uint8Array> {
+async function getWhole(client: HttpClient, url: string, how: GetOptions,
+    othersLeft: boolean): Promise<Uint8Array> {
   const mayTryAgain = retriesOf(client, how.signal);
   for (;;) {
     const a = await client.get(url, how);
@@ -60,10 +61,12 @@ export class TreeStore implements PackageStore {
     const known = this.files_.get(path);
     if (known)
       return known.catch((error: unknown) => {
-        if (isAbort(error) && !how.signal?.aborted) return this.file_(path, maxBytes, how, reload); // another asker cancelled
+        // another asker cancelled
+        if (isAbort(error) && !how.signal?.aborted) return this.file_(path, maxBytes, how, reload);
         throw error;
       });
-    if (!isValidEntryPath(path)) throw new FormatError(this.name, path, 'a path within the package', '', 'K05');
+    if (!isValidEntryPath(path))
+      throw new FormatError(this.name, path, 'a path within the package', '', 'K05');
     const wanted = this.mirrors_.ask(maxBytes, (m, asking) => {
       this.from_.set(path, m);
       return this.get_(m, path, maxBytes, how, { ...asking, reload });
@@ -73,8 +76,10 @@ export class TreeStore implements PackageStore {
     wanted.catch(() => this.files_.delete(path));
     return wanted;
   }
-  private get_(m: Mirror, path: string, maxBytes: number, { kind, signal, onBytes }: ReadOptions, asking: Asking): Promise<Uint8Array> {
-    return getWhole(this.mirrors_.client, joinUrl(m.url, path), { kind, signal, onBytes, maxBytes, ...asking }, asking.othersLeft);
+  private get_(m: Mirror, path: string, maxBytes: number, { kind, signal, onBytes }: ReadOptions,
+      asking: Asking): Promise<Uint8Array> {
+    return getWhole(this.mirrors_.client, joinUrl(m.url, path),
+      { kind, signal, onBytes, maxBytes, ...asking }, asking.othersLeft);
   }
   extraFile(path: string, maxBytes: number, how: ReadOptions): Promise<Uint8Array | undefined> {
     return this.mirrors_.ask(Math.min(maxBytes, bootstrapBytes), async (m, asking) => {
@@ -84,7 +89,8 @@ export class TreeStore implements PackageStore {
         return got;
       } catch (error) {
         // Extra files need not exist.
-        if (!how.verify && error instanceof InputError && /^status 40[34]$/.test(error.found)) return undefined;
+        if (!how.verify && error instanceof InputError && /^status 40[34]$/.test(error.found))
+          return undefined;
         throw error;
       }
     });
@@ -127,7 +133,7 @@ export function openBytes(bytes: Uint8Array, name: string): PackageStore {
   return new WholeStore(bytes, name);
 }
 
-/** URL of the tree beside a container: https://host/a/NAME.texmesh -> https://host/a/NAME/ ; '' when the URL is not of that form. */
+/** URL of the tree of a container: https://host/a/NAME.texmesh -> https://host/a/NAME/ ; '' else. */
 export function treeUrl(url: string): string {
   const m = /^([^?#]*)\.texmesh([?#].*)?$/.exec(url);
   return m ? `${m[1]}/${m[2] ?? ''}` : '';
@@ -139,26 +145,32 @@ async function opened(store: PackageStore, signal?: AbortSignal): Promise<Opened
 const treesOf = (urls: readonly string[]): string[] => urls.map(treeUrl).filter((root) => root !== '');
 
 /** Opens a tree by its own URL, or by the URL of the container beside the tree. */
-export function openTree(urls: readonly string[], client: HttpClient, signal?: AbortSignal): Promise<OpenedStore> {
+export function openTree(urls: readonly string[], client: HttpClient,
+    signal?: AbortSignal): Promise<OpenedStore> {
   const isTree = urls[0].replace(/[?#].*$/, '').endsWith('/');
   const roots = isTree ? urls : treesOf(urls);
   if (roots.length === 0)
-    throw new InputError(shownUrl(urls[0]), '', 'a URL that ends in .texmesh or /, for mode files', 'another');
+    throw new InputError(shownUrl(urls[0]), '', 'a URL that ends in .texmesh or /, for mode files',
+      'another');
   return opened(new TreeStore(roots, client), signal);
 }
 
 /** Opens the tree beside a container that ranges were read of, whose manifest must have these bytes. */
-export async function openSameTree(urls: readonly string[], client: HttpClient, manifest: Uint8Array, signal?: AbortSignal): Promise<PackageStore> {
+export async function openSameTree(urls: readonly string[], client: HttpClient, manifest: Uint8Array,
+    signal?: AbortSignal): Promise<PackageStore> {
   const roots = treesOf(urls);
-  if (roots.length === 0) throw new InputError(shownUrl(urls[0]), '', 'an answer with status 206', 'status 200: ranges are no longer answered');
+  if (roots.length === 0) throw new InputError(shownUrl(urls[0]), '', 'an answer with status 206',
+    'status 200: ranges are no longer answered');
   const { store, manifest: got } = await opened(new TreeStore(roots, client), signal);
   if (got.length !== manifest.length || got.some((byte, i) => byte !== manifest[i]))
-    throw new FormatError(store.name, 'manifest.json', 'the package that reading began with', 'another: it was replaced, open it anew');
+    throw new FormatError(store.name, 'manifest.json', 'the package that reading began with',
+      'another: it was replaced, open it anew');
   return store;
 }
 
 /** Opens the tree beside a container, or the whole container. */
-export async function openWithoutRanges(urls: readonly string[], client: HttpClient, signal?: AbortSignal): Promise<OpenedStore> {
+export async function openWithoutRanges(urls: readonly string[], client: HttpClient,
+    signal?: AbortSignal): Promise<OpenedStore> {
   const roots = treesOf(urls);
   if (roots.length > 0) {
     try {
@@ -178,9 +190,11 @@ export async function openWithoutRanges(urls: readonly string[], client: HttpCli
 const fragmentFilesPath = 'fragments.json';
 
 /** See PackageReader.fragmentFiles. */
-export async function readFragmentList(store: PackageStore, signal?: AbortSignal): Promise<FragmentFiles | undefined> {
+export async function readFragmentList(store: PackageStore,
+    signal?: AbortSignal): Promise<FragmentFiles | undefined> {
   // A tree without the list has packs.
-  const bytes = await store.extraFile?.(fragmentFilesPath, 256 << 20, { kind: 'index', signal }).catch((error: unknown) => {
+  const bytes = await store.extraFile?.(fragmentFilesPath, 256 << 20, { kind: 'index', signal })
+      .catch((error: unknown) => {
     if (!(error instanceof InputError)) throw error;
     return undefined;
   });

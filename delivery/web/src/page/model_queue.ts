@@ -26,10 +26,12 @@ export interface Situation {
 }
 
 /**
- * The next step, if there is one now: all first pictures of what is seen, then each of these its turn, then first pictures close by, then
- * more of what is seen. What is far from the screen is released first of all, what nobody sees where the memory is full.
+ * The next step, if there is one now: all first pictures of what is seen, then each of these its turn, then
+ * first pictures close by, then more of what is seen. What is far from the screen is released first of all,
+ * what nobody sees where the memory is full.
  */
-export function nextStep({ models, openAtOnce, askedForTurn, refining, memoryShare, isNear: isNearby }: Situation): Step | undefined {
+export function nextStep({ models, openAtOnce, askedForTurn, refining, memoryShare,
+    isNear: isNearby }: Situation): Step | undefined {
   const inOrder = [...models].sort((a, b) => byInterest(a.place, b.place));
   const isNear = (m: PageModel): boolean => m.place.areaPx > 0 && isNearby(m);
   const far = inOrder.find((m) => m.load && !m.place.visible && !isNear(m));
@@ -40,7 +42,8 @@ export function nextStep({ models, openAtOnce, askedForTurn, refining, memorySha
   const toOpen = (m: PageModel): boolean => m.phase === 'waiting' || m.phase === 'released';
   const seen = inOrder.filter((m) => m.place.visible);
   const closed = seen.find(toOpen);
-  if (closed) return opening.filter((m) => m.coming).length < openAtOnce ? { what: 'open', model: closed } : undefined;
+  if (closed)
+    return opening.filter((m) => m.coming).length < openAtOnce ? { what: 'open', model: closed } : undefined;
   if (opening.some((m) => m.place.visible) || inOrder.some((m) => m.phase === 'turn')) return undefined;
   const among = seen.filter((m) => askedForTurn.has(m));
   if (among.length > 0) return { what: 'turn', model: among[0], among };

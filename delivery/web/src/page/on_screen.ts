@@ -1,10 +1,11 @@
-import type { Place } from './schedule';
+import type { PagePlace } from './schedule';
 
-/** Models are prepared when they are so far from the screen, as a share of its height, and released when they are further. */
+/** Models are prepared so far from the screen (by its height), and released when they are further. */
 const nearShare = 1;
 
 /** From the middle of a box to the middle of a screen. */
-const distance = ({ top, left, width, height }: DOMRectReadOnly, screenWidth: number, screenHeight: number): number =>
+const distance = ({ top, left, width, height }: DOMRectReadOnly, screenWidth: number,
+  screenHeight: number): number =>
   Math.hypot(left + width / 2 - screenWidth / 2, top + height / 2 - screenHeight / 2);
 
 /** Follows where canvases lie on the page and how large they are. */
@@ -14,7 +15,7 @@ export class Visibility {
   private readonly sized_: ResizeObserver;
   private readonly nearby_ = new Set<Element>();
   private readonly lookedAt_ = new Set<Element>(); // whether they are seen is known
-  private readonly places_ = new Map<Element, Place>();
+  private readonly places_ = new Map<Element, PagePlace>();
 
   /** `changed` hears of a canvas that has come, gone, or has another size: `resized` then. */
   constructor(private readonly changed_: (canvas: Element, resized: boolean) => void) {
@@ -35,24 +36,23 @@ export class Visibility {
         this.changed_(target, false);
       }
     }, { rootMargin: `${100 * nearShare}% 0%` });
-    this.sized_ = new ResizeObserver((entries) => this.fit_(entries.map(({ target }) => target as HTMLCanvasElement)));
+    this.sized_ =
+      new ResizeObserver((entries) => this.fit_(entries.map(({ target }) => target as HTMLCanvasElement)));
   }
   /** Follows a canvas; its place is kept up to date. */
-  follow(canvas: HTMLCanvasElement, place: Place): void {
+  follow(canvas: HTMLCanvasElement, place: PagePlace): void {
     this.places_.set(canvas, place);
     for (const observer of [this.seen_, this.near_, this.sized_]) observer.observe(canvas);
   }
-  /**
-   * Looks by itself where canvases lie that were followed just now: the observers speak up with the next frame only, and by then bytes can
-   * have been asked for.
-   */
+  /** Looks where new canvases lie: the observers speak up with the next frame only, which is late. */
   glance(): void {
     for (const [canvas, place] of this.places_) {
       if (this.lookedAt_.has(canvas)) continue;
       const rect = canvas.getBoundingClientRect();
       const { innerWidth, innerHeight, devicePixelRatio: ratio = 1 } = globalThis;
       place.areaPx = Math.round(rect.width * ratio) * Math.round(rect.height * ratio);
-      place.visible = place.areaPx > 0 && rect.bottom > 0 && rect.right > 0 && rect.top < innerHeight && rect.left < innerWidth;
+      place.visible = place.areaPx > 0 && rect.bottom > 0 && rect.right > 0 && rect.top < innerHeight &&
+        rect.left < innerWidth;
       place.distancePx = distance(rect, innerWidth, innerHeight);
     }
   }
@@ -73,10 +73,14 @@ export class Visibility {
     this.lookedAt_.clear();
   }
 
-  /** As many pixels as the device shows of the canvases. A size that is read behind one that is written makes the browser lay out all anew. */
+  /**
+   * As many pixels as the device shows of the canvases. A size that is read behind one that is written makes
+   * the browser lay out all anew.
+   */
   private fit_(canvases: readonly HTMLCanvasElement[]): void {
     const ratio = globalThis.devicePixelRatio || 1;
-    const sizes = canvases.map((canvas) => [canvas.clientWidth, canvas.clientHeight].map((px) => Math.round(px * ratio)));
+    const sizes =
+      canvases.map((canvas) => [canvas.clientWidth, canvas.clientHeight].map((px) => Math.round(px * ratio)));
     canvases.forEach((canvas, i) => {
       const [width, height] = sizes[i];
       const place = this.places_.get(canvas);

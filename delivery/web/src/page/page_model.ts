@@ -6,15 +6,19 @@ import type { LoadEvents, LoadOptions, LoadedModel, Turn } from '../scene/api';
 import { displayOf } from '../scene/camera';
 import { Emitter } from '../scene/events';
 import { type Orbit, defaultOrbit, frame } from './framing';
-import type { Place } from './schedule';
+import type { PagePlace } from './schedule';
 
 /** A package that can be shown: TexmeshPackage. */
 export interface ShowablePackage extends PackageReader {
   /** See TexmeshPackage. */
   load(scene: Object3D, options: LoadOptions): LoadedModel;
 }
-/** What a model of a page is doing: it waits to be opened, for its first picture, for its turn; has its turn; is shown; was released because nobody sees it. */
-export type ModelPhase = 'waiting' | 'opening' | 'first-picture' | 'turn' | 'shown' | 'released' | 'failed' | 'removed';
+/**
+ * What a model of a page is doing: it waits to be opened, for its first picture, for its turn; has its turn;
+ * is shown; was released because nobody sees it.
+ */
+export type ModelPhase = 'waiting' | 'opening' | 'first-picture' | 'turn' | 'shown' | 'released' | 'failed'
+  | 'removed';
 
 /** Events of a model of a page. */
 export interface PageModelEvents {
@@ -72,7 +76,7 @@ export interface Host {
 export class PageModel {
   readonly scene = new Scene();
   readonly camera: PerspectiveCamera;
-  readonly place: Place = { visible: false, regarded: false, areaPx: 0, distancePx: 0 };
+  readonly place: PagePlace = { visible: false, regarded: false, areaPx: 0, distancePx: 0 };
   phase: ModelPhase = 'waiting';
   package?: ShowablePackage;
   load?: LoadedModel;
@@ -80,19 +84,15 @@ export class PageModel {
   coming = false;
   /** All that the display can show is there. */
   complete = false;
-  /** Resolves when the first picture is on the canvas; rejects when the package cannot be had or is removed before. */
+  /** Resolves when the first picture is on the canvas; rejects when it fails or is removed before. */
   readonly firstPicture: Promise<void>;
   private readonly events_ = new Emitter<PageModelEvents>();
   private unpainted_ = false; // the first picture waits for a frame
   private abort_ = new AbortController();
   private settle_!: { shown: () => void; failed: (error: unknown) => void };
 
-  constructor(
-    private readonly host_: Host,
-    readonly canvas: HTMLCanvasElement,
-    readonly url: string,
-    private readonly options_: PageModelOptions,
-  ) {
+  constructor(private readonly host_: Host, readonly canvas: HTMLCanvasElement, readonly url: string,
+      private readonly options_: PageModelOptions) {
     this.camera = options_.camera ?? new PerspectiveCamera(32, 1, 0.01, 100);
     const lamp = new DirectionalLight(0xffffff, 2.2);
     lamp.position.set(-0.5, 0.7, 1);
@@ -193,9 +193,6 @@ export class PageModel {
     this.events_.emit('first-picture', { bytes: this.package?.client.received ?? 0 });
     this.settle_.shown();
   }
-  get isBusy(): boolean {
-    return this.phase === 'opening' || this.phase === 'turn';
-  }
 
   /** While the picture is decoded, the link is the next model's. */
   private awaitBytes_(pkg: ShowablePackage, signal: AbortSignal): void {
@@ -204,7 +201,8 @@ export class PageModel {
       this.coming = false;
       this.host_.changed(this);
     };
-    if (pkg.requests.some((r) => r.ok && r.offset <= offset && r.offset + r.received >= offset + bytes)) return came();
+    if (pkg.requests.some((r) => r.ok && r.offset <= offset && r.offset + r.received >= offset + bytes))
+      return came();
     const end = pkg.onRequest(({ kind }) => {
       if (kind !== 'mesh') return;
       end();
@@ -215,7 +213,8 @@ export class PageModel {
   private startLoad_(pkg: ShowablePackage, signal: AbortSignal): void {
     const { host_: host, camera } = this;
     const load = pkg.load(this.scene, {
-      meshes: 'auto', ...this.options_.load, ...host.loadOptions(), camera, signal, time: Infinity, autoRefine: false,
+      meshes: 'auto', ...this.options_.load, ...host.loadOptions(), camera, signal, time: Infinity,
+      autoRefine: false,
       display: () => this.display_(pkg),
       memoryBytes: () => host.memoryBytes(this),
       turn: async (bytes) => {
@@ -234,7 +233,8 @@ export class PageModel {
       host.changed(this);
     });
     load.on('memory', (event) => {
-      this.complete = false; // the coarser planes have a first rung of all fragments, not yet what the display can show
+      // the coarser planes have a first rung of all fragments, not yet what the display can show
+      this.complete = false;
       this.events_.emit('memory', event);
       host.changed(this);
     });
@@ -251,7 +251,8 @@ export class PageModel {
   }
   private display_(pkg: ShowablePackage): ReturnType<typeof displayOf> | number {
     const { canvas, load } = this;
-    return load ? displayOf(pkg.manifest, load.object, this.camera, { x: canvas.width, y: canvas.height }) : Math.max(1, canvas.height);
+    return load ? displayOf(pkg.manifest, load.object, this.camera, { x: canvas.width, y: canvas.height })
+      : Math.max(1, canvas.height);
   }
   private enter_(phase: ModelPhase): void {
     this.phase = phase;
@@ -259,7 +260,8 @@ export class PageModel {
     this.host_.changed(this);
   }
   private say_(error: unknown, fatal: boolean): void {
-    this.events_.emit('error', { fatal, error, message: error instanceof Error ? error.message : String(error) });
+    this.events_.emit('error',
+      { fatal, error, message: error instanceof Error ? error.message : String(error) });
   }
   private fail_(error: unknown): void {
     if (this.phase === 'failed' || this.phase === 'removed') return;

@@ -19,7 +19,7 @@ export interface Gaze {
   x: number;
   /** -1 (bottom) to 1 (top). */
   y: number;
-  /** Device pixels that one degree of the visual field has on this screen. Default 40: 96 to the inch at 60 cm. */
+  /** Device pixels for one degree of the visual field. Default 40: 96 to the inch at 60 cm. */
   pxPerDegree?: number;
 }
 
@@ -33,9 +33,9 @@ export interface GltfLoaderLike {
 
 /** A model's turn at the link. */
 export interface Turn {
-  /** From now on; Infinity: no limit. 0: the first picture stays until refine() or another view asks for more. */
+  /** From now on; Infinity: no limit. 0: the first picture stays until refine() or another view. */
   seconds: number;
-  /** What the link is expected to carry, bytes per second; left out: what the model's own transfers have shown. */
+  /** Expected bytes per second of the link; left out: what the model's own transfers have shown. */
   bytesS?: number;
 }
 
@@ -43,67 +43,66 @@ export interface Turn {
 export interface LoadOptions {
   /** The renderer of the scene: textures are composed in the renderer's context. */
   renderer: WebGLRenderer;
-  /**
-   * Makes a GLTFLoader with whatever decoders the package's meshes need: `() => new GLTFLoader().setDRACOLoader(...)`.
-   * Called once for every mesh.
-   */
+  /** Makes a GLTFLoader with the decoders that the package's meshes need. Called for every mesh. */
   gltfLoader: () => GltfLoaderLike;
   /** Camera that looks at the object; scale and textures follow the camera's view, see LoadedModel.update. */
   camera?: Camera;
   /**
-   * Where somebody looks, asked before every list of fragments (an eye tracker, the pointer): what lies beside counts less, by the acuity
-   * of the eye. Needs a camera. Left out: the whole picture counts alike.
+   * Where somebody looks, asked before every list of fragments (an eye tracker, the pointer): what lies
+   * beside counts less, by the acuity of the eye. Needs a camera. Left out: the whole picture counts alike.
    */
   gaze?: () => Gaze | undefined;
-  /** Displayed height in device px, or a function that gives the height; stands in for the camera. Default 1000. */
+  /** Displayed height in device px, or a function that gives it; replaces the camera. Default 1000. */
   display?: number | Display | (() => number | Display);
   /**
-   * Seconds from the package's opening (the first load) or from load() (further ones) until everything is there.
-   * Infinity: no limit, everything that the display can show. Default 5.
+   * Seconds from the package's opening (the first load) or from load() (further ones) until everything is
+   * there. Infinity: no limit, everything that the display can show. Default 5.
    */
   time?: number;
   /**
-   * Policy that spends the time. guard: what shows most of what the camera sees comes first. thesis: chapters 4
-   * and 7 as printed, with the rule jnd, one request at a time and textures at full size. Default guard.
+   * Policy that spends the time. guard: what shows most of what the camera sees comes first. thesis: chapters
+   * 4 and 7 as printed, with the rule jnd, one request at a time and textures at full size. Default guard.
    */
   policy?: Policy;
   /** First guess of the throughput, bytes per second; left out: the throughput of the first transfers. */
   beta0BytesS?: number;
-  /** The rule that says which scale is enough. Default flip: by lit pictures, which the package's build has compared. */
+  /** The rule that says which scale is enough. Default flip: by lit pictures that the build compared. */
   rule?: StepRule;
   /** This scale (or the nearest one that the package has) instead of the scale for the display. */
   scale?: number;
-  /** This rung of every fragment (the highest one where there are fewer) instead of rungs that fit the time. */
+  /** This rung of every fragment (at most the highest) instead of rungs that fit the time. */
   rung?: number;
   /** Textures have full size, whatever the display can show. */
   fullSize?: boolean;
   /** Meshes: as GLB files, by the vertex-split stream, or by whichever needs fewer bytes. Default auto. */
   meshes?: 'glb' | 'stream' | 'auto';
-  /** The load goes on after the deadline (and when the view changes) until the display can show no more. Default true. */
+  /** Whether the load goes on after the deadline until the display can show no more. Default true. */
   autoRefine?: boolean;
-  /** Refining ends where a fragment's 1 - SSIM is no more than this: higher rungs cannot be told apart. Default 0.003. */
+  /** Refining ends where 1 - SSIM of a fragment is no more than this. Default 0.003: not to be seen. */
   refineTo?: number;
   /** Address of worker.js, where that file does not stand beside the library. */
   workerUrl?: string | URL;
-  /** `handle` of texmesh/worker, for pages that may have no workers: `handle` then works on the main thread. */
+  /** `handle` of texmesh/worker, for pages without workers: it works on the main thread. */
   decode?: DecodeHere;
   /** Workers that decode images. Default: 2 to 4 by the number of cores. */
   workers?: number;
   /**
-   * Asked once the first picture stands; the timed part begins when the answer comes, and lasts as long as the answer says. So several
-   * models of a page have the link one after the other. `bytes` are fetched in any turn, before anything can be chosen. `time` counts where
-   * this is left out.
+   * Asked once the first picture stands; the timed part begins when the answer comes, and lasts as long as
+   * the answer says. So several models of a page have the link one after the other. `bytes` are fetched in
+   * any turn, before anything can be chosen. `time` counts where this is left out.
    */
   turn?: (bytes: number) => Promise<Turn>;
   /**
-   * Bytes that textures and meshes may take on the GPU: textures get coarser mips, meshes coarser scales, until all fits or nothing is
-   * coarser. Left out: no limit but the one that the GPU shows by losing its context, or by refusing storage.
+   * Bytes that textures and meshes may take on the GPU: textures get coarser mips, meshes coarser scales,
+   * until all fits or nothing is coarser. Left out: no limit but the one that the GPU shows by losing its
+   * context, or by refusing storage.
    */
   memoryBytes?: number | (() => number);
   /**
-   * Textures as blocks of 4 x 4 texels: auto = where memoryBytes would take coarser mips otherwise, as BC7 or ASTC, and normals as BC5, ASTC
-   * or BC3, which take a quarter of the memory; always = whatever memory there is, at last as BC1 or ETC2, which take an eighth and look
-   * worse; never. What the GPU has decides. Default auto.
+   * Textures as blocks of 4 x 4 texels: auto = where memoryBytes would take coarser mips otherwise, as BC7 or
+   * ASTC, and normals as BC5, ASTC or BC3, which take a quarter of the memory; always = whatever memory there
+   * is, at last as BC1 or ETC2, which take an eighth and look worse; never. What the GPU has decides. Default
+   * auto.
    */
   compress?: 'auto' | 'always' | 'never';
   /** Address of blocks.js, which makes blocks, where that file does not stand beside the library. */
@@ -113,9 +112,10 @@ export interface LoadOptions {
 }
 
 /** Phases of a load, in their order. */
-export type LoadPhase = 'first-picture' | 'tables' | 'mesh' | 'textures' | 'refining' | 'done' | 'cancelled' | 'failed';
+export type LoadPhase = 'first-picture' | 'tables' | 'mesh' | 'textures' | 'refining' | 'done' | 'cancelled'
+  | 'failed';
 
-/** A decision of the plan for a fragment or some neighbours; sent when it is taken and again when its transfer has ended. */
+/** A decision for a fragment or some neighbours; sent when taken and when its transfer has ended. */
 export interface DecisionEvent {
   /** k = 1 .. n */
   position: number;
@@ -151,7 +151,7 @@ export interface DecisionEvent {
 export interface LoadEvents {
   /** A request of the package has ended. */
   request: RequestRecord & { at: number };
-  /** The smallest proxy (`scale` is -1 then), or the coarsest mesh with its previews (`proxy` is -1), stands in the scene. */
+  /** The smallest proxy (`scale` is -1), or the coarsest mesh with its previews (`proxy` is -1), is shown. */
   'first-picture': { at: number; scale: number; proxy: number; bytes: number };
   /** A proxy stands in the scene: the first one, a larger one on the way to scales, or one that is enough. */
   proxy: { at: number; proxy: number; triangles: number };
@@ -167,10 +167,7 @@ export interface LoadEvents {
   progress: { at: number; phase: LoadPhase; bytes: number; bytesExpected: number };
   /** The timed part is over: limit and actual time, seconds from the same start. */
   deadline: { at: number; limit: number; actual: number; skipped: number };
-  /**
-   * The renderer's context was lost, or is there again. After that, textures begin with their previews and their fragments are fetched
-   * again; event `done` tells when all have come.
-   */
+  /** The context was lost, or is back: fragments are fetched again; `done` tells when all have come. */
   context: { at: number; lost: boolean };
   /** The GPU holds less than it was thought to: a coarser picture is shown from now on, within this limit. */
   memory: { at: number; gpuBytes: number; limitBytes: number };
@@ -236,25 +233,26 @@ export interface LoadedModel {
   readonly state: LoadState;
   /** Resolves when the first picture stands in the scene. */
   readonly firstPicture: Promise<void>;
-  /** Resolves when the timed part is over: every fragment decided, fetched and composed. Rejects when the load fails or is cancelled. */
+  /** Resolves when the timed part is over and all is shown. Rejects when the load fails or is cancelled. */
   readonly done: Promise<void>;
   /** Calls the listener at every such event; gives a function that ends the calls. */
   on<K extends keyof LoadEvents>(name: K, listener: (event: LoadEvents[K]) => void): () => void;
   /**
-   * Follows the view: to be called for every frame, or when the camera moves. Picks the scale (with hysteresis), finer planes, and
-   * fragments to refine first. Cheap when nothing has changed.
+   * Follows the view: to be called for every frame, or when the camera moves. Picks the scale (with
+   * hysteresis), finer planes, and fragments to refine first. Cheap when nothing has changed.
    */
   update(camera?: Camera): void;
-  /** Fetches fragments that the display can show but the time did not allow; resolves when nothing is left to fetch. */
+  /** Fetches fragments that the display can show but the time did not allow; resolves when none is left. */
   refine(): Promise<void>;
   /**
-   * Changes scale and rung that were chosen at loading; fetches at once, or when the timed part is over, and shows lower rungs in place
-   * of higher ones, too. undefined: by the display again. InputError: scale or rung is no whole number from 0 on.
+   * Changes scale and rung that were chosen at loading; fetches at once, or when the timed part is over, and
+   * shows lower rungs in place of higher ones, too. undefined: by the display again. InputError: scale or
+   * rung is no whole number from 0 on.
    */
   setOverride(override: { scale?: number; rung?: number }): void;
   /** Stops all transfers; the picture stays. */
   cancel(): void;
-  /** Stops all transfers, takes the object out of the scene and frees geometries, materials, textures and workers. */
+  /** Stops all transfers, takes the object out of the scene, frees its memory and its workers. */
   dispose(): void;
   /** RGBA bytes of a composed plane, row 0 at the top: read back from the GPU, for tests. */
   readPlane(base: number): Uint8Array;

@@ -6,7 +6,7 @@ import { sampleTriangles } from './scale_parts';
 /** Triangles whose first corners are looked at. */
 const mostPoints = 600;
 
-/** How a camera shows the object in a picture of `size` device px: displayed height, and the visible part of the object (Fig. 7.5). */
+/** How a camera shows the object in a picture of `size` px: displayed height, visible part (Fig. 7.5). */
 export function displayOf(manifest: Manifest, object: Object3D, camera: Camera, size: Vector2Like): Display {
   object.updateWorldMatrix(true, true);
   camera.updateWorldMatrix(true, false);
@@ -43,6 +43,7 @@ export function displayOf(manifest: Manifest, object: Object3D, camera: Camera, 
   const share = Math.min(1, (2 * outside) / all);
   const distance = middle + share * Math.min(0, Math.max(near, height / 50) - middle);
   // The projection tells how much of half the picture a length takes: at the distance 1, or at all.
-  const perLength = (camera.projectionMatrix.elements[5] * size.y) / 2 / (orthographic ? 1 : Math.max(distance, 1e-9 * height));
+  const perLength = (camera.projectionMatrix.elements[5] * size.y) / 2 /
+    (orthographic ? 1 : Math.max(distance, 1e-9 * height));
   return { heightPx: height * Math.abs(perLength), part };
 }

@@ -5,10 +5,7 @@ import type { BlockStorage, Upload } from './blocks/block_storage';
 import { PlaneStorage } from './plane_storage';
 import type { TextureInfo } from '../format/textures';
 
-/**
- * One texture of the model: fragments are uploaded into the texture where they belong. Materials use views of the texture, which
- * share storage on the GPU as long as their samplers are alike.
- */
+/** One texture of the model. Materials use views of it, which share storage if their samplers are alike. */
 export interface PlaneComposer extends ComposedPlane {
   readonly info: TextureInfo;
   /** Where texels are stored as blocks. */
@@ -23,7 +20,7 @@ export interface PlaneComposer extends ComposedPlane {
   view(old: Texture): Texture;
   /** Fills the whole with another texture, scaled bilinearly; blocks are filled by blocks/refill.ts. */
   fill(from: Texture): void;
-  /** Uploads of pixels at a place of level 0 (multiples of 16), and the same in the levels below. Pixels beyond the image are left out. */
+  /** Uploads of pixels at a place of level 0 (multiples of 16) and below. It cuts them at the image's end. */
   uploads(levels: Levels, x: number, y: number): Upload[];
   /** Where a fragment begins. */
   placeOf(fragment: number): [x: number, y: number];
@@ -35,7 +32,8 @@ export interface PlaneComposer extends ComposedPlane {
 }
 
 /** A plane to be composed in the renderer's context. */
-export function planeComposer(renderer: WebGLRenderer, info: TextureInfo, base: number, plane: number, blocks?: BlockStorage): PlaneComposer {
+export function planeComposer(renderer: WebGLRenderer, info: TextureInfo, base: number, plane: number,
+    blocks?: BlockStorage): PlaneComposer {
   const { image, role, widthPx, heightPx, columns, rows, fragmentWidthPx, fragmentHeightPx } = info;
   const rgba = blocks ? undefined : new PlaneStorage(renderer, info);
   const storage = (blocks ?? rgba)!;
@@ -50,8 +48,10 @@ export function planeComposer(renderer: WebGLRenderer, info: TextureInfo, base: 
     view: (old) => storage.view(old, !!composer.filled),
     fill: (from) => rgba?.fillAll(from),
     uploads: (levels, x, y) =>
-      blocks?.uploads(levels, x, y) ?? [{ pixels: levels[0].width * levels[0].height, run: () => rgba!.upload(levels as ImageBitmap[], x, y) }],
-    placeOf: (fragment) => [(fragment % columns) * fragmentWidthPx, Math.floor(fragment / columns) * fragmentHeightPx],
+      blocks?.uploads(levels, x, y) ?? [{ pixels: levels[0].width * levels[0].height,
+        run: () => rgba!.upload(levels as ImageBitmap[], x, y) }],
+    placeOf: (fragment) =>
+      [(fragment % columns) * fragmentWidthPx, Math.floor(fragment / columns) * fragmentHeightPx],
     updateMips: () => storage.updateMips(),
     read: () => storage.read(),
     dispose: () => storage.dispose(),

@@ -4,7 +4,7 @@ import type { Upload } from './blocks/block_storage';
 import type { UploadQueue } from './upload_queue';
 import type { WorkerPool } from '../worker/pool';
 
-// Enlarging for machines whose processor draws for want of a GPU, and for previews of coverage; loaded when needed.
+// Enlarging for machines whose processor draws for want of a GPU, and for previews of coverage.
 
 /** Pixels of a piece of an enlarged preview, which is uploaded in one go; and pieces under way at once. */
 const stripPx = 1 << 18;
@@ -23,11 +23,9 @@ export interface Piece {
 /** Resolves when no piece may come over this fragment any more; rejects where workers cannot draw. */
 export type Clear = (fragment: number) => Promise<unknown>;
 
-/**
- * Enlarges a preview off the main thread, piece by piece: a processor that draws takes seconds for a large texture. Fragments that have
- * come meanwhile need no preview.
- */
-export function enlarge(next: PlaneComposer, image: ImageBitmap | HTMLImageElement, pool: WorkerPool, uploads: UploadQueue): { clear?: Clear; done: Promise<void> } {
+/** Enlarges a preview in workers, piece by piece. Pieces that fragments cover already need none. */
+export function enlarge(next: PlaneComposer, image: ImageBitmap | HTMLImageElement, pool: WorkerPool,
+    uploads: UploadQueue): { clear?: Clear; done: Promise<void> } {
   const underWay = new Map<Piece, Promise<void>>();
   let first: Promise<void> | undefined;
   const done = eachPiece(next, uploads, (piece) => {
@@ -44,7 +42,8 @@ export function enlarge(next: PlaneComposer, image: ImageBitmap | HTMLImageEleme
 }
 
 /** Works on all pieces, a few at once. */
-export async function eachPiece(next: PlaneComposer, uploads: UploadQueue, work: (piece: Piece) => Promise<void>): Promise<void> {
+export async function eachPiece(next: PlaneComposer, uploads: UploadQueue,
+    work: (piece: Piece) => Promise<void>): Promise<void> {
   const running = new Set<Promise<void>>();
   for (const piece of pieces(next)) {
     const done = work(piece).finally(() => running.delete(done));
@@ -69,22 +68,19 @@ function* pieces(next: PlaneComposer): Generator<Piece> {
         to = from + 1;
         if (!lacks(from)) continue;
         while (to - from < most && lacks(to)) ++to;
-        const [x1, y1] = [Math.min(to * width, next.widthPx), Math.min(y + rise, (row + 1) * height, next.heightPx)];
+        const [x1, y1] = [Math.min(to * width, next.widthPx),
+          Math.min(y + rise, (row + 1) * height, next.heightPx)];
         yield { x0: from * width, x1, y0: y, y1, from: row * columns + from, to: row * columns + to };
       }
 }
 
-async function enlargePiece(
-  next: PlaneComposer,
-  image: ImageBitmap | HTMLImageElement,
-  piece: Piece,
-  pool: WorkerPool,
-  uploads: UploadQueue,
-): Promise<void> {
+async function enlargePiece(next: PlaneComposer, image: ImageBitmap | HTMLImageElement, piece: Piece,
+    pool: WorkerPool, uploads: UploadQueue): Promise<void> {
   const picture = await createImageBitmap(image, { premultiplyAlpha: 'none', colorSpaceConversion: 'none' });
   const { widthPx: width, heightPx: height } = next;
   const { x0, x1, y0, y1 } = piece;
-  const blocks = next.blocks && { ...next.blocks.request(x0, y0), size: [x1 - x0, y1 - y0] as [number, number] };
+  const blocks = next.blocks &&
+    { ...next.blocks.request(x0, y0), size: [x1 - x0, y1 - y0] as [number, number] };
   const bitmaps = await pool
     .enlarge({ picture, width, height, ...piece, levels: blocks ? 1 : ownLevels, blocks })
     .finally(() => picture.close()); // workers have a copy of their own

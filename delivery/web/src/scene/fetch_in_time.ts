@@ -16,19 +16,14 @@ export interface PlayedPlanHooks {
 }
 
 /**
- * Plays a plan over the network: fetches the fragments that the plan asks for, and reports to the plan which have come. Ends when every
- * fragment has come or was given up; after `mostS` seconds the rest is given up.
+ * Plays a plan over the network: fetches the fragments that the plan asks for, and reports to the plan which
+ * have come. Ends when every fragment has come or was given up; after `mostS` seconds the rest is given up.
  */
-export async function playPlan(
-  plan: HarmonicTimePlan,
-  { groups }: GroupedList,
-  transfers: Transfers,
-  signal: AbortSignal,
-  mostS: number,
-  hooks: PlayedPlanHooks,
-): Promise<void> {
+export async function playPlan(plan: HarmonicTimePlan, { groups }: GroupedList, transfers: Transfers,
+    signal: AbortSignal, mostS: number, hooks: PlayedPlanHooks): Promise<void> {
   const startS = nowS();
-  const underWay = new Map<number, { step: HtcStep; left: number }>(); // by offer: fragments of it that have not ended
+  // by offer: fragments of it that have not ended
+  const underWay = new Map<number, { step: HtcStep; left: number }>();
   const abort = new AbortController();
   const stop = (): void => abort.abort();
   signal.addEventListener('abort', stop);
@@ -54,7 +49,8 @@ export async function playPlan(
       hooks.lost(wish, error);
       ended(wish, false);
     };
-    if (wishes.length > 0) void transfers.fetch(wishes, { gapBytes: 0, mostBytes: Infinity, signal: abort.signal }, (wish) => ended(wish, true), lost);
+    if (wishes.length > 0) void transfers.fetch(wishes,
+      { gapBytes: 0, mostBytes: Infinity, signal: abort.signal }, (wish) => ended(wish, true), lost);
     if (plan.finished() || (signal.aborted && underWay.size === 0)) end();
   };
   try {
@@ -66,7 +62,7 @@ export async function playPlan(
   }
 }
 
-/** Decoding and uploading take so long after the last byte: 4 ms, or 11 on a machine without a GPU, were measured. */
+/** Decoding and uploading after the last byte: 4 ms, or 11 without a GPU, were measured. */
 export const composeS = 0.015;
 /** Fragments that are later than this share of the limit are given up. */
 const mostLate = 0.01;
@@ -75,10 +71,10 @@ const leastRest = 0.004;
 /** Share of the bytes promised by the throughput that a request may count on. */
 const certain = 0.85;
 
-/** A page that is busy hears of answers late, and asks late: so many seconds more of the link are asked for at once, at most. */
+/** A busy page hears late, and asks late: it asks for at most so many seconds more of the link at once. */
 const mostBusyS = 0.25;
 
-/** Fetches fragments by Harmonic Time Compensation: group by group, so that the last one comes at the limit. */
+/** Fetches fragments by Harmonic Time Compensation, in groups. The last one comes at the limit. */
 export class FetchInTime {
   private plan_?: HarmonicTimePlan;
 
@@ -94,7 +90,7 @@ export class FetchInTime {
   throughputBytesS(): number | undefined {
     return this.plan_?.throughputBytesS();
   }
-  /** A plan has run, and fragments may be asked for one by one: not where rungs come as a whole, nor by the printed policy. */
+  /** A plan has run, and fragments may be asked for one by one: no whole rungs, no printed policy. */
   get hasPlan(): boolean {
     return !!this.plan_ && !this.printed && !this.fetching_.wholeRungs();
   }
@@ -112,9 +108,11 @@ export class FetchInTime {
   async run(fragments: FragmentList, timeLimitS: number): Promise<void> {
     const { load_: load, fetching_: fetching } = this;
     const whole = fetching.wholeRungs();
-    const bytesEach = whole ? Infinity : this.printed ? 0 : groupBytes(load.beta0, load.reader.client.latencyS, timeLimitS);
+    const bytesEach = whole ? Infinity
+      : this.printed ? 0 : groupBytes(load.beta0, load.reader.client.latencyS, timeLimitS);
     const list = groupedList(fragments, bytesEach, load.beta0 * timeLimitS);
-    const plan = (this.plan_ = new HarmonicTimePlan(list.offers, { ...this.planOptions(timeLimitS), tripS: () => this.tripS_() }));
+    const plan = (this.plan_ = new HarmonicTimePlan(list.offers,
+      { ...this.planOptions(timeLimitS), tripS: () => this.tripS_() }));
     const hooks = {
       decided: (step: HtcStep): void => this.decided_(step, list),
       lost: (wish: Wish, error: unknown): void => fetching.lost(wish, error),
@@ -155,9 +153,11 @@ export class FetchInTime {
       if (afterS < leastRest * limitS) return;
       // More requests at once would wait for connections.
       const most = 2 * client.options.connections;
-      const wishes = upgradeWishes(list, certain * plan.throughputBytesS() * afterS, this.fetching_).slice(0, most);
+      const wishes = upgradeWishes(list, certain * plan.throughputBytesS() * afterS, this.fetching_).slice(0,
+        most);
       const late = AbortSignal.timeout(Math.ceil(1000 * (restS + mostLate * limitS)));
-      if (wishes.length === 0 || (await this.fetching_.fetch(wishes, AbortSignal.any?.([late, signal]) ?? late)) === 0) return;
+      if (wishes.length === 0 ||
+          (await this.fetching_.fetch(wishes, AbortSignal.any?.([late, signal]) ?? late)) === 0) return;
     }
   }
 }

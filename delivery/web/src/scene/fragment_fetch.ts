@@ -17,31 +17,37 @@ export interface HeldFragments {
   fates: FragmentFates;
 }
 
-/** Upgrades that save most for these bytes, by plane and importance. Fragments under way count as if they had come. */
-export function upgradeWishes({ offers, fragments }: FragmentList, mostBytes: number, { planes, fates }: HeldFragments): Wish[] {
+/** Upgrades that save most for these bytes. Fragments under way count as if they had come. */
+export function upgradeWishes({ offers, fragments }: FragmentList, mostBytes: number,
+    { planes, fates }: HeldFragments): Wish[] {
   const curves = offers.map(({ bytes, loss }, offer) => {
     const f = fragments[offer];
     let from = bytes.length - 1;
     while (from > planes.rungOf(f) && !fates.isComing(f, from)) --from;
     const may = (rung: number): boolean => rung > from && !fates.isRefused(f, rung);
-    return { bytes: [0, ...bytes.map((b, rung) => (may(rung) ? b : Infinity))], loss: [loss[from + 1], ...loss.slice(1)] };
+    return { bytes: [0, ...bytes.map((b, rung) => (may(rung) ? b : Infinity))],
+      loss: [loss[from + 1], ...loss.slice(1)] };
   });
   const ways = spendBytes(curves, mostBytes);
-  return fragments.map((f, offer): Wish => ({ ...f, offer, rung: ways[offer] - 1 })).filter((w) => w.rung >= 0);
+  return fragments.map((f, offer): Wish => ({ ...f, offer, rung: ways[offer] - 1 }))
+    .filter((w) => w.rung >= 0);
 }
 
 /** Every fragment at this rung (left out: the highest), or at the next rung below that can be had. */
-export function allWishes({ offers, fragments }: FragmentList, only: number | undefined, { planes, fates }: HeldFragments): Wish[] {
+export function allWishes({ offers, fragments }: FragmentList, only: number | undefined,
+    { planes, fates }: HeldFragments): Wish[] {
   const wishes = fragments.map((f, offer): Wish => {
     let rung = Math.min(only ?? Infinity, offers[offer].bytes.length - 1);
     while (fates.isRefused(f, rung)) --rung;
     return { ...f, rung, offer, replaces: only !== undefined };
   });
-  return wishes.filter((w) => w.rung >= 0 && (w.replaces ? planes.rungOf(w) !== w.rung : planes.rungOf(w) < w.rung));
+  return wishes.filter((w) => w.rung >= 0 &&
+    (w.replaces ? planes.rungOf(w) !== w.rung : planes.rungOf(w) < w.rung));
 }
 
-/** Upgrades that save most for these bytes, to where a fragment's 1 - SSIM is no more than `enoughDssim`. The list's offers are cut off there. */
-export function bestWishes(list: FragmentList, mostBytes: number, enoughDssim: number, { tables }: PackageData, held: HeldFragments): Wish[] {
+/** Upgrades that save most for these bytes, until 1 - SSIM is at most `enoughDssim`. Cuts the offers. */
+export function bestWishes(list: FragmentList, mostBytes: number, enoughDssim: number,
+    { tables }: PackageData, held: HeldFragments): Wish[] {
   list.offers.forEach((o, i) => {
     const { plane, fragment } = list.fragments[i];
     const { rungQuality, dssim, columns, rows } = tables[plane]!;
@@ -64,10 +70,7 @@ export class FragmentFetch {
   /** How fragments are listed besides scale and display. */
   listOptions: Partial<ListOptions> = {};
 
-  constructor(
-    private readonly load_: LoadContext,
-    readonly planes: ShownPlanes,
-  ) {
+  constructor(private readonly load_: LoadContext, readonly planes: ShownPlanes) {
     this.transfers = new Transfers(load_.reader, planes.textures, load_.pool, {
       decoded: (wish, levels) => void this.show_(wish, levels),
       lost: (wish, error) => this.lost(wish, error),
@@ -84,17 +87,19 @@ export class FragmentFetch {
     for (; this.pending() > but; await sleepS(0.004)) throwIfAborted(this.load_.signal);
     if (but > 0) return;
     this.planes.finishMips();
-    for (; this.pending() > 0; await sleepS(0.004)) throwIfAborted(this.load_.signal); // of blocks a worker makes them
+    // of blocks a worker makes them
+    for (; this.pending() > 0; await sleepS(0.004)) throwIfAborted(this.load_.signal);
   }
-  /** Whether rungs come as a whole, whichever fragment is asked for: from a tree without files of fragments. */
+  /** Whether rungs come as a whole: from a tree without files of fragments. */
   wholeRungs(): boolean {
     const [first] = this.planes.all();
     return this.load_.reader.form === 'files' && !!first && !this.transfers.filesOf(first.plane).complete;
   }
 
   /**
-   * The list of the fragments of the planes shown, with the bytes that fetching takes. A fragment's losses count by the share that the
-   * camera sees of `surface`, which is in the object or would be, and by `unseen` at least; with a gaze, by the acuity of the eye, too.
+   * The list of the fragments of the planes shown, with the bytes that fetching takes. A fragment's losses
+   * count by the share that the camera sees of `surface`, which is in the object or would be, and by `unseen`
+   * at least; with a gaze, by the acuity of the eye, too.
    */
   async listOf(scale: number, unseen: number, surface: Object3D): Promise<FragmentList> {
     const { planes, transfers, load_: { view, options } } = this;
@@ -105,9 +110,11 @@ export class FragmentFetch {
     for (const { plane } of planes.all()) {
       await nextTurn(); // the page goes on in between
       seen.set(plane, this.shares_(plane, surface));
-      if (gazeWeights) looked.set(plane, gazeWeights(planes.textures[plane], this.lookedAt_(plane, surface), view.camera!, options.renderer, gaze));
+      if (gazeWeights) looked.set(plane, gazeWeights(planes.textures[plane], this.lookedAt_(plane, surface),
+        view.camera!, options.renderer, gaze));
     }
-    const list = fragmentList(planes.data, planes.all(), { scale, displayedPx: view.display.heightPx, ...this.listOptions });
+    const list = fragmentList(planes.data, planes.all(),
+      { scale, displayedPx: view.display.heightPx, ...this.listOptions });
     list.offers.forEach((offer, i) => {
       const { plane, fragment } = list.fragments[i];
       offer.bytes = offer.bytes.map((b, r) => transfers.bytesOf(plane, r, fragment) || b);
@@ -126,7 +133,8 @@ export class FragmentFetch {
   /** `surface` is in the object, or would be. */
   private lookedAt_(plane: number, surface: Object3D): LookedSurface {
     const { object } = this.load_;
-    return { object: surface, shows: this.showsOf_(plane), within: surface === object || surface.parent ? undefined : object };
+    return { object: surface, shows: this.showsOf_(plane),
+      within: surface === object || surface.parent ? undefined : object };
   }
   /** Whether a mesh has the plane's image. */
   private showsOf_(plane: number): (mesh: Mesh) => boolean {
@@ -139,7 +147,8 @@ export class FragmentFetch {
     for (const w of wishes) this.fates.asked(w, w.rung);
     let arrived = 0;
     const lost = (wish: Wish, error: unknown): void => this.lost(wish, error);
-    await this.transfers.fetch(wishes, { gapBytes, mostBytes: requestBytes, signal: until }, () => ++arrived, lost);
+    await this.transfers.fetch(wishes, { gapBytes, mostBytes: requestBytes, signal: until }, () => ++arrived,
+      lost);
     throwIfAborted(this.load_.signal);
     return arrived;
   }
@@ -153,8 +162,10 @@ export class FragmentFetch {
     const { plane, fragment, rung, replaces } = wish;
     const load = this.load_;
     const to = this.planes.showing(wish);
-    const better = (there: number): boolean => rung > there || (!!replaces && load.override.rung !== undefined);
-    const shown = to && !load.signal.aborted && (await this.planes.upload(to, levels, fragment, rung, better));
+    const better = (there: number): boolean =>
+      rung > there || (!!replaces && load.override.rung !== undefined);
+    const shown = to && !load.signal.aborted &&
+      (await this.planes.upload(to, levels, fragment, rung, better));
     levels.forEach((b) => b.close?.());
     this.fates.ended(wish, rung);
     if (shown) load.emit('fragment', { plane, fragment, rung });

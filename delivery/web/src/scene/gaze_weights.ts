@@ -5,9 +5,10 @@ import type { Gaze } from './api';
 import { type LookedSurface, sampleFragments } from './visible_fragments';
 
 /**
- * What somebody resolves so many degrees beside the point that they look at, as a part of what they resolve at that point: 1 in the
- * fovea, the central degree; outside of it the finest detail that is seen grows in proportion to the distance and has doubled 2.3
- * degrees beyond. The same bits as gaze_weight() in lab/transfer/several_objects.h.
+ * What somebody resolves so many degrees beside the point that they look at, as a part of what they resolve
+ * at that point: 1 in the fovea, the central degree; outside of it the finest detail that is seen grows in
+ * proportion to the distance and has doubled 2.3 degrees beyond. The same bits as gaze_weight() in
+ * lab/transfer/several_objects.h.
  */
 export function acuityAt(degrees: number): number {
   return halfAcuityDegrees / (halfAcuityDegrees + Math.max(0, degrees - foveaRadiusDegrees));
@@ -22,16 +23,12 @@ export function gazeWeight(degrees: number): number {
 const usualPxPerDegree = 40;
 
 /**
- * What the losses of each fragment count for somebody who looks at a point of the picture: the mean over the fragment's surface, from a
- * sample of the triangles. Behind the eye a surface counts as farthest away. [fragments]
+ * What the losses of each fragment count for somebody who looks at a point of the picture: the mean over the
+ * fragment's surface, from a sample of the triangles. Behind the eye a surface counts as farthest away.
+ * [fragments]
  */
-export function gazeWeights(
-  plane: TextureInfo,
-  surface: LookedSurface,
-  camera: Camera,
-  renderer: WebGLRenderer,
-  { x, y, pxPerDegree = usualPxPerDegree }: Gaze,
-): Float32Array {
+export function gazeWeights(plane: TextureInfo, surface: LookedSurface, camera: Camera,
+    renderer: WebGLRenderer, { x, y, pxPerDegree = usualPxPerDegree }: Gaze): Float32Array {
   const count = plane.columns * plane.rows;
   const [weights, all] = [new Float32Array(count), new Float32Array(count)];
   const size = renderer.getDrawingBufferSize(new Vector2());

@@ -17,21 +17,24 @@ interface FirstDrawing {
 /** The first picture waits for its programs no longer than this. */
 const mostCompileS = 0.5;
 
-/** Resolves when the GPU has done all its work, or after `mostS`. A question to a GPU without work does not hold the page up. */
+/** Resolves when the GPU has done its work, or after `mostS`. A GPU without work answers at once. */
 export async function gpuIdle(renderer: WebGLRenderer, mostS = 0.5): Promise<void> {
   const gl = renderer.getContext() as WebGL2RenderingContext;
   const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
-  const lives = () => fence !== null && gl.isSync(fence); // not behind a lost context, which may stand again by then
+  // not behind a lost context, which may stand again by then
+  const lives = () => fence !== null && gl.isSync(fence);
   gl.flush();
-  for (const end = nowS() + mostS; lives() && nowS() < end && gl.getSyncParameter(fence!, gl.SYNC_STATUS) !== gl.SIGNALED; ) await sleepS(0.004);
+  for (const end = nowS() + mostS; lives() && nowS() < end &&
+      gl.getSyncParameter(fence!, gl.SYNC_STATUS) !== gl.SIGNALED; ) await sleepS(0.004);
   if (lives()) gl.deleteSync(fence);
 }
 
 /** Programs that were waited for: models of one page share them. */
 const ready = new WeakSet<WebGLProgram>();
 
-/** Waits for each program, then asks the program for its uniforms, in a turn of its own: the first frame would wait for the linker otherwise. */
-async function programsReady(renderer: WebGLRenderer, mostS: number, stopIfCancelled: () => void): Promise<void> {
+/** Waits for each program and asks for its uniforms, in a turn of its own, before the first frame. */
+async function programsReady(renderer: WebGLRenderer, mostS: number,
+    stopIfCancelled: () => void): Promise<void> {
   const end = nowS() + mostS;
   const programs = (renderer.info?.programs ?? []) as (WebGLProgram & { isReady?(): boolean })[];
   for (const program of programs.filter((p) => !ready.has(p))) {
@@ -45,7 +48,7 @@ async function programsReady(renderer: WebGLRenderer, mostS: number, stopIfCance
   }
 }
 
-/** Prepares programs and previews for the first frame, each in a turn of its own: the page goes on while the GPU's process makes them. */
+/** Prepares programs and previews for the first frame, each in a turn of its own: the page goes on. */
 export async function readyToDraw(load: FirstDrawing, scene: Object3D, shape: Object3D): Promise<void> {
   const { signal, options: { renderer } } = load;
   const stopIfCancelled = (): void => throwIfAborted(signal);
@@ -64,7 +67,7 @@ export async function readyToDraw(load: FirstDrawing, scene: Object3D, shape: Ob
   await gpuIdle(renderer, mostCompileS);
 }
 
-/** Whether the processor draws for want of a GPU: the processor takes seconds for what a GPU does at once, and workers take less. */
+/** Whether the processor draws for want of a GPU: it is slow at what a GPU does; workers are faster. */
 export async function isSoftware(renderer: WebGLRenderer): Promise<boolean> {
   await gpuIdle(renderer);
   const gl = renderer.getContext();
@@ -90,18 +93,16 @@ const shareAfter = { lost: 0.5, refused: 0.75 };
 const askAfterS = 0.25;
 const mostIdleS = 1;
 /**
- * A question holds the page up until the GPU has done all that stands before it: half a second to one and a half were measured where the
- * processor draws. A GPU that does nothing says so soon. One that never rests is asked at last.
+ * A question holds the page up until the GPU has done all that stands before it: half a second to one and a
+ * half were measured where the processor draws. A GPU that does nothing says so soon. One that never rests is
+ * asked at last.
  */
 const soonS = 0.03;
 const mostBusyS = 10;
 /** WebGL keeps one flag for each kind of error. */
 const errorKinds = 8;
 
-/**
- * What the GPU of a renderer has shown to hold: a context that is lost with much in it, and storage that is refused, lower the limit for
- * all who draw with the renderer.
- */
+/** What the GPU has shown to hold: a context lost with much in it, and refused storage, lower the limit. */
 export class GpuRoom {
   /** Most bytes that all users together may have; Infinity: nothing has been refused. */
   limitBytes = Infinity;
@@ -127,7 +128,7 @@ export class GpuRoom {
     this.users_.add(user);
     return () => void this.users_.delete(user);
   }
-  /** To be called when something new goes to the GPU: asks the GPU, a little later, whether it has taken all. */
+  /** To be called when something new goes to the GPU: asks the GPU a little later whether it took all. */
   async ask(): Promise<void> {
     if (this.asking_) return;
     this.asking_ = true;
@@ -172,16 +173,22 @@ function texelsOf({ isCompressedTexture, format }: Partial<CompressedTexture>): 
   return format === RGB_S3TC_DXT1_Format || format === RGB_ETC2_Format ? 'block8' : 'block16';
 }
 
-/** Bytes that shapes, and the textures of materials and of composed planes, take on the GPU once they have been drawn. What is shared counts once. */
-export function gpuBytes(shapes: readonly Object3D[], materials: readonly Material[], planes: readonly { textures: readonly Texture[] }[]): number {
+/** Bytes that drawn shapes, materials' textures and planes take on the GPU. Shared ones count once. */
+export function gpuBytes(shapes: readonly Object3D[], materials: readonly Material[],
+    planes: readonly { textures: readonly Texture[] }[]): number {
   const arrays = new Set<{ byteLength: number }>();
   for (const { geometry } of shapes.flatMap(meshesOf))
-    for (const a of [...Object.values(geometry.attributes), geometry.index] as (BufferAttribute | InterleavedBufferAttribute | null)[])
+    for (const a of [...Object.values(geometry.attributes), geometry.index] as (BufferAttribute
+        | InterleavedBufferAttribute | null)[])
       if (a) arrays.add('data' in a ? (a.data.array as Float32Array) : (a.array as Float32Array));
   const pictures = new Map<unknown, number>();
-  for (const texture of [...materials.flatMap((m) => texturesOf(m).map(([, t]) => t)), ...planes.flatMap((p) => [...p.textures])]) {
+  for (const texture of [...materials.flatMap((m) => texturesOf(m).map(([, t]) => t)),
+        ...planes.flatMap((p) => [...p.textures])]) {
     const { width = 0, height = 0 } = (texture.image ?? {}) as Partial<ImageBitmap>;
-    if (width > 0) pictures.set(texture.source, Math.max(pictures.get(texture.source) ?? 0, textureBytes(width, height, (texture.minFilter as number) > LinearFilter ? undefined : 1, texelsOf(texture as Partial<CompressedTexture>))));
+    if (width > 0) pictures.set(texture.source, Math.max(pictures.get(texture.source) ?? 0,
+      textureBytes(width, height, (texture.minFilter as number) > LinearFilter ? undefined : 1,
+        texelsOf(texture as Partial<CompressedTexture>))));
   }
-  return [...arrays].reduce((sum, a) => sum + a.byteLength, 0) + [...pictures.values()].reduce((sum, bytes) => sum + bytes, 0);
+  return [...arrays].reduce((sum, a) => sum + a.byteLength, 0) +
+    [...pictures.values()].reduce((sum, bytes) => sum + bytes, 0);
 }

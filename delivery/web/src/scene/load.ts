@@ -14,7 +14,7 @@ import { ShownScale } from './shown_scale';
 import type { TextureLoad } from './texture_load';
 
 /** What is fetched on the way to scales. */
-interface Way {
+interface OnTheWay {
   /** The larger proxy that is shown meanwhile; -1: none. */
   step: number;
   bytes?: Promise<Uint8Array>;
@@ -25,7 +25,7 @@ interface Way {
 /** Which proxy a load shows: the smallest first, one that is enough, or a larger one on the way to scales. */
 export class ProxyOnTheWay {
   private part_?: Promise<typeof import('./texture_load') | undefined>;
-  private way_?: Promise<Way>;
+  private way_?: Promise<OnTheWay>;
 
   /** `fetchRest` fetches what scales need. */
   constructor(
@@ -34,10 +34,7 @@ export class ProxyOnTheWay {
     private readonly fetchRest_: () => Promise<unknown>,
   ) {}
 
-  /**
-   * Shows the smallest one. What decides about larger ones is loaded meanwhile; and where nobody gives turns, the link goes on with what
-   * comes next while the proxy is decoded.
-   */
+  /** Shows the smallest one. Meanwhile the next parts are loaded, and without turns the link goes on. */
   async showFirst(): Promise<void> {
     const { load_: { reader: { manifest }, view: { display }, options: { turn } }, proxy_: proxy } = this;
     const bytes = proxy.fetch(0);
@@ -53,7 +50,7 @@ export class ProxyOnTheWay {
     const { override: { scale, rung }, options: { rule = 'flip', fullSize } } = this.load_;
     return scale === undefined && rung === undefined && !fullSize && rule === 'flip';
   }
-  /** The smallest proxy that cannot be told from S_0 in this view; -1: none, or scales and textures are chosen by hand. */
+  /** The smallest proxy that is as good as S_0 in this view; -1: none, or somebody chooses by hand. */
   serving(): number {
     const { view, reader } = this.load_;
     return this.free_ && this.proxy_.shown >= 0 ? servingProxy(reader.manifest, view.display.heightPx) : -1;
@@ -70,7 +67,7 @@ export class ProxyOnTheWay {
     }
   }
   /** Fetches what scales need; before that a larger proxy, where one pays on the way to scales. */
-  private async goOn_(): Promise<Way> {
+  private async goOn_(): Promise<OnTheWay> {
     const { load_: load, proxy_: proxy } = this;
     const part = this.free_ && load.options.policy !== 'thesis' ? await this.part_ : undefined;
     const step = part ? part.stepOf(load) : -1;
@@ -83,20 +80,15 @@ export class ProxyOnTheWay {
   async showStep(): Promise<void> {
     const { load_: load, proxy_: proxy } = this;
     const { step, bytes, rest } = await (this.way_ ?? this.goOn_());
-    const shown = bytes && proxy.show(step, bytes).catch((error: unknown) => load.fail(error, 'proxy')); // the smaller one stays
+    // the smaller one stays
+    const shown = bytes && proxy.show(step, bytes).catch((error: unknown) => load.fail(error, 'proxy'));
     await Promise.all([shown, rest]);
   }
 }
 
 /** Loads one package into one scene, from `startS` on; `forget` is called when the load is disposed of. */
-export function loadModel(
-  reader: PackageReader,
-  scene: Object3D,
-  options: LoadOptions,
-  pool: WorkerPool,
-  startS: number,
-  forget: () => void,
-): LoadedModel {
+export function loadModel(reader: PackageReader, scene: Object3D, options: LoadOptions, pool: WorkerPool,
+    startS: number, forget: () => void): LoadedModel {
   const load = new ModelLoad(new LoadContext(reader, options, pool, startS), scene, forget);
   const { context } = load;
   return {
@@ -119,14 +111,19 @@ export function loadModel(
   };
 }
 
-/** Bytes that a turn fetches however short it is: a larger proxy that is enough, or documents, and the coarsest mesh where it is not there yet. */
-function bytesOfAnyTurn({ proxies, scales, index, tables }: Manifest, serving: number, shown: number, withMesh: boolean): number {
+/**
+ * Bytes that a turn fetches however short it is: a larger proxy that is enough, or documents, and the
+ * coarsest mesh where it is not there yet.
+ */
+function bytesOfAnyTurn({ proxies, scales, index, tables }: Manifest, serving: number, shown: number,
+    withMesh: boolean): number {
   if (serving >= 0) return serving > shown ? proxies[serving].glb.bytes : 0;
   return tables.offset + tables.bytes - index.offset + (withMesh ? scales[scales.length - 1].glb.bytes : 0);
 }
 
-/** What three.js keeps of a lost context is dropped while nothing of it can be deleted: a later context would not know it. */
-function forgetGpu(objects: readonly Object3D[], planes: LoadState['planes'], materials: readonly Material[]): void {
+/** three.js drops what it keeps of a lost context, as a later context could not delete it. */
+function forgetGpu(objects: readonly Object3D[], planes: LoadState['planes'],
+    materials: readonly Material[]): void {
   objects.forEach(disposeGeometries);
   for (const texture of planes.flatMap((p) => p.textures)) texture.dispose();
   for (const material of materials) {
@@ -152,11 +149,7 @@ class ModelLoad {
   private readonly endRequests_: () => void;
   private readonly leaveRoom_: () => void;
 
-  constructor(
-    readonly context: LoadContext,
-    scene: Object3D,
-    private readonly forget_: () => void,
-  ) {
+  constructor(readonly context: LoadContext, scene: Object3D, private readonly forget_: () => void) {
     const { reader, options, materials, pool, signal, disposal } = context;
     pool.onUnavailable = (error) => context.fail(error, 'workers');
     this.source_ = new ScaleSource({
@@ -172,8 +165,10 @@ class ModelLoad {
     const whileThere = { signal: disposal };
     options.signal?.addEventListener('abort', () => this.cancel(), whileThere);
     if (options.signal?.aborted) this.cancel();
-    this.leaveRoom_ = context.room.add({ gpuBytes: () => this.state.gpuBytes, refused: () => this.makeAnew_() });
-    for (const name of ['proxy', 'scale', 'plane'] as const) context.events.on(name, () => void context.room.ask());
+    this.leaveRoom_ =
+      context.room.add({ gpuBytes: () => this.state.gpuBytes, refused: () => this.makeAnew_() });
+    for (const name of ['proxy', 'scale', 'plane'] as const)
+      context.events.on(name, () => void context.room.ask());
     const { domElement } = options.renderer;
     domElement?.addEventListener('webglcontextlost', () => this.lose_(), whileThere);
     domElement?.addEventListener('webglcontextrestored', () => this.restore_(), whileThere);
@@ -218,30 +213,38 @@ class ModelLoad {
       } catch (error) {
         context.fail(error, 'proxy'); // scales do, too
       }
-    // On a slow link nothing shares the link with the first picture. The documents are asked for while the GPU prepares for the picture.
+    // On a slow link nothing shares the link with the first picture. The documents are asked for while the
+    // GPU prepares for the picture.
     if (!scales.held) await this.startScales_();
-    this.update(context.view.camera ?? context.options.camera); // by the mesh that is there, not by its bounding box alone
-    context.emit('first-picture', { scale: scales.held ? -1 : scales.shown, proxy: scales.proxy.shown, bytes: client.received });
+    // by the mesh that is there, not by its bounding box alone
+    this.update(context.view.camera ?? context.options.camera);
+    context.emit('first-picture',
+      { scale: scales.held ? -1 : scales.shown, proxy: scales.proxy.shown, bytes: client.received });
   }
   /** Starts with the coarsest scale, which has the materials; resolves when the scale is shown. */
   private startScales_(): Promise<void> {
     const { context } = this;
     const { arrived, shape, shown } = this.scale_.load(context.reader.manifest.scales.at(-1)!.scale);
     this.shape_ = shape;
-    if (!context.options.turn || context.phase !== 'first-picture') void this.openTextures_(arrived); // others wait for their first pictures
+    // others wait for their first pictures
+    if (!context.options.turn || context.phase !== 'first-picture') void this.openTextures_(arrived);
     return shown;
   }
   private openTextures_(arrived?: Promise<void>): Promise<TextureLoad> {
-    arrived?.then(() => this.source_.fetchDocuments()).catch(() => undefined); // whoever takes them asks again
-    this.coming_ ??= Promise.all([import('./texture_load'), this.shape_]).then(([part]) => part.openTextureLoad(this.context, this.scale_, this.source_));
+    // whoever takes them asks again
+    arrived?.then(() => this.source_.fetchDocuments()).catch(() => undefined);
+    this.coming_ ??= Promise.all([import('./texture_load'), this.shape_])
+      .then(([part]) => part.openTextureLoad(this.context, this.scale_, this.source_));
     this.coming_.catch(() => undefined);
     return this.coming_;
   }
   private async showInTime_(): Promise<void> {
     const { context } = this;
-    await context.turn(bytesOfAnyTurn(context.reader.manifest, this.proxies_.serving(), this.scale_.proxy.shown, !this.shape_));
+    await context.turn(bytesOfAnyTurn(context.reader.manifest, this.proxies_.serving(),
+      this.scale_.proxy.shown, !this.shape_));
     // A turn without time leaves what stands: other models' turns would begin later.
-    if ((context.options.turn && context.limitS <= context.elapsedS()) || (await this.proxies_.showServing())) {
+    if ((context.options.turn && context.limitS <= context.elapsedS()) ||
+          (await this.proxies_.showServing())) {
       context.emit('deadline', { limit: context.limitS, actual: context.elapsedS(), skipped: 0 });
       return this.rest_();
     }
@@ -314,7 +317,8 @@ class ModelLoad {
   private followByProxies_(): Promise<void> {
     return (this.leaving_ ??= (async () => {
       let enough = true;
-      while (enough && this.proxies_.serving() > this.scale_.proxy.shown) enough = await this.proxies_.showServing();
+      while (enough && this.proxies_.serving() > this.scale_.proxy.shown)
+        enough = await this.proxies_.showServing();
       if (!enough || this.proxies_.serving() < 0) await this.showTextures_();
     })()
       .catch((error: unknown) => this.context.fail(error, 'scales behind a proxy'))
@@ -365,7 +369,7 @@ class ModelLoad {
     forgetGpu(this.scale_.objects(), this.textures?.planes() ?? [], this.materials);
     this.context.emit('context', { lost: true });
   }
-  /** After a lost context: three.js makes its geometries and pictures anew, but composed textures are gone. */
+  /** After a lost context: three.js makes geometries and pictures anew; composed textures are gone. */
   private restore_(): void {
     this.context.emit('context', { lost: false });
     this.makeAnew_();
@@ -374,10 +378,9 @@ class ModelLoad {
   private makeAnew_(): void {
     const { context } = this;
     if (context.signal.aborted) return;
-    this.restoring_ = this.textures?.restore().then(
-      (coarser) => coarser && context.emit('memory', { gpuBytes: this.state.gpuBytes, limitBytes: context.memoryBytes }),
-      (error) => context.fail(error, 'what the GPU has lost'),
-    );
+    this.restoring_ = this.textures?.restore().then((coarser) => coarser &&
+      context.emit('memory', { gpuBytes: this.state.gpuBytes, limitBytes: context.memoryBytes }),
+      (error) => context.fail(error, 'what the GPU has lost'));
     if (!context.resting) return;
     context.enter('refining');
     this.refineAgain_ ||= context.options.autoRefine ?? true;

@@ -43,12 +43,8 @@ export class LoadContext {
   private readonly abort_ = new AbortController();
   private readonly disposed_ = new AbortController();
 
-  constructor(
-    readonly reader: PackageReader,
-    readonly options: LoadOptions,
-    readonly pool: WorkerPool,
-    private readonly startS_: number,
-  ) {
+  constructor(readonly reader: PackageReader, readonly options: LoadOptions, readonly pool: WorkerPool,
+      private readonly startS_: number) {
     const { time = 5, camera } = options;
     this.room = GpuRoom.of(options.renderer);
     this.object.name = reader.manifest.title || 'texmesh';
@@ -78,7 +74,8 @@ export class LoadContext {
   async turn(bytes: number): Promise<void> {
     const { options: { turn }, signal } = this;
     if (!turn) return;
-    const cancelled = new Promise<never>((_, end) => signal.addEventListener('abort', () => end(abortError()), { once: true }));
+    const cancelled = new Promise<never>((_, end) =>
+      signal.addEventListener('abort', () => end(abortError()), { once: true }));
     const { seconds, bytesS = 0 } = await Promise.race([turn(bytes), cancelled]);
     throwIfAborted(signal);
     this.limitS = this.elapsedS() + seconds;
@@ -97,11 +94,13 @@ export class LoadContext {
   }
   fail(error: unknown, what: string, fatal = false): void {
     if (isAbort(error) || this.disposal.aborted) return;
-    this.emit('error', { fatal, what, message: error instanceof Error ? error.message : String(error), error });
+    this.emit('error',
+      { fatal, what, message: error instanceof Error ? error.message : String(error), error });
   }
   progress(): void {
     const { received } = this.reader.client;
-    this.emit('progress', { phase: this.phase, bytes: received, bytesExpected: Math.max(received, this.expectedBytes) });
+    this.emit('progress',
+      { phase: this.phase, bytes: received, bytesExpected: Math.max(received, this.expectedBytes) });
   }
   enter(next: LoadPhase): void {
     throwIfAborted(this.signal);
@@ -117,12 +116,14 @@ export class LoadContext {
 
   // ---- what is wanted
 
-  /** The override with the nearest scale that the package has. InputError: scale or rung is no whole number from 0 on. */
+  /** The override with the nearest scale of the package. InputError: no whole number from 0 on. */
   snapped({ scale, rung }: Override): Override {
     for (const [name, v] of Object.entries({ scale, rung }))
-      if (v !== undefined && !(Number.isInteger(v) && v >= 0)) throw new InputError('options', name, 'a whole number from 0 on', String(v));
+      if (v !== undefined && !(Number.isInteger(v) && v >= 0))
+        throw new InputError('options', name, 'a whole number from 0 on', String(v));
     const away = (k: number): number => Math.abs(k - scale!);
-    const near = this.reader.manifest.scales.map((s) => s.scale).reduce((best, k) => (away(k) < away(best) ? k : best));
+    const near =
+      this.reader.manifest.scales.map((s) => s.scale).reduce((best, k) => (away(k) < away(best) ? k : best));
     return { scale: scale === undefined ? scale : near, rung };
   }
   /** This camera's view counts from now on; false where the view has not changed. */
@@ -142,7 +143,8 @@ export class LoadContext {
   private displayFrom_(camera?: Camera): Display {
     const { options: { display, renderer }, object } = this;
     const said = typeof display === 'function' ? display() : display;
-    const shown = said ?? (camera ? displayOf(this.reader.manifest, object, camera, renderer.getDrawingBufferSize(new Vector2())) : defaultHeightPx);
+    const shown = said ?? (camera ? displayOf(this.reader.manifest, object, camera,
+      renderer.getDrawingBufferSize(new Vector2())) : defaultHeightPx);
     return typeof shown === 'number' ? { heightPx: shown } : shown;
   }
 }

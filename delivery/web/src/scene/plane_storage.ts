@@ -1,23 +1,20 @@
 import { FramebufferTexture, type Texture, type WebGLRenderer } from 'three';
 import type { TextureInfo } from '../format/textures';
 
-/** Levels that come with every fragment. The further levels, 1/256 of the whole and less, are made of the last of these. */
+/** Levels that come with every fragment. Further levels, 1/256 of the whole, are made of the last one. */
 export const ownLevels = 5;
 
 /** Filters of three.js behind NearestFilter (1003) and LinearFilter (1006) ask for mip levels. */
 const linearFilter = 1006;
 
-/** The storage on the GPU of one texture plane: views for materials share the storage as long as their samplers are alike. */
+/** The storage on the GPU of a plane: views for materials share it where their samplers are alike. */
 export class PlaneStorage {
   private readonly gl_: WebGL2RenderingContext;
   private readonly views_ = new Map<Texture, FramebufferTexture>(); // by the texture that each view is like
   private readonly storages_ = new Map<WebGLTexture, number>(); // how many levels each has
   private stale_ = false; // the smallest levels
 
-  constructor(
-    private readonly renderer_: WebGLRenderer,
-    private readonly info_: TextureInfo,
-  ) {
+  constructor(private readonly renderer_: WebGLRenderer, private readonly info_: TextureInfo) {
     this.gl_ = renderer_.getContext() as WebGL2RenderingContext;
   }
 
@@ -32,12 +29,14 @@ export class PlaneStorage {
     const texture = new FramebufferTexture(widthPx, heightPx);
     const { source } = this.textures[0] ?? texture;
     texture.copy(old as FramebufferTexture);
-    Object.assign(texture, { source, colorSpace: colourSpace === 'srgb' ? 'srgb' : '', flipY: false, generateMipmaps: false });
+    Object.assign(texture,
+      { source, colorSpace: colourSpace === 'srgb' ? 'srgb' : '', flipY: false, generateMipmaps: false });
     const storage = this.storageOf_(texture);
     this.views_.set(old, texture);
     if (this.storages_.has(storage)) return texture;
     const [first] = this.storages_.keys();
-    this.storages_.set(storage, texture.minFilter > linearFilter ? 32 - Math.clz32(Math.max(widthPx, heightPx)) : 1);
+    this.storages_.set(storage,
+      texture.minFilter > linearFilter ? 32 - Math.clz32(Math.max(widthPx, heightPx)) : 1);
     if (first && filled) this.fill_(first, widthPx, heightPx, storage);
     return texture;
   }
@@ -51,19 +50,22 @@ export class PlaneStorage {
     const { gl_: gl, info_: { widthPx, heightPx } } = this;
     for (const [storage, levelCount] of this.storages_) {
       this.renderer_.state.bindTexture(gl.TEXTURE_2D, storage);
-      for (const name of [gl.UNPACK_FLIP_Y_WEBGL, gl.UNPACK_PREMULTIPLY_ALPHA_WEBGL, gl.UNPACK_COLORSPACE_CONVERSION_WEBGL]) gl.pixelStorei(name, 0);
+      for (const name of [gl.UNPACK_FLIP_Y_WEBGL, gl.UNPACK_PREMULTIPLY_ALPHA_WEBGL,
+          gl.UNPACK_COLORSPACE_CONVERSION_WEBGL]) gl.pixelStorei(name, 0);
       levels.slice(0, levelCount).forEach((bitmap, level) => {
         const [left, top] = [x >> level, y >> level];
         const width = Math.min(bitmap.width, (widthPx >> level) - left);
         const height = Math.min(bitmap.height, (heightPx >> level) - top);
-        if (width > 0 && height > 0) gl.texSubImage2D(gl.TEXTURE_2D, level, left, top, width, height, gl.RGBA, gl.UNSIGNED_BYTE, bitmap);
+        if (width > 0 && height > 0)
+          gl.texSubImage2D(gl.TEXTURE_2D, level, left, top, width, height, gl.RGBA, gl.UNSIGNED_BYTE, bitmap);
       });
     }
     this.stale_ = true;
   }
   /** The smallest levels follow the uploads. */
   updateMips(): void {
-    if (this.stale_) this.withBuffers_(() => [...this.storages_.keys()].forEach((storage) => this.halve_(storage, ownLevels - 1)));
+    if (this.stale_) this.withBuffers_(() =>
+      [...this.storages_.keys()].forEach((storage) => this.halve_(storage, ownLevels - 1)));
     this.stale_ = false;
   }
   /** RGBA bytes, row 0 at the top. */
@@ -84,7 +86,8 @@ export class PlaneStorage {
 
   private storageOf_(texture: Texture): WebGLTexture {
     this.renderer_.initTexture(texture);
-    const { __webglTexture: storage } = this.renderer_.properties.get(texture) as { __webglTexture?: WebGLTexture };
+    const { __webglTexture: storage } =
+      this.renderer_.properties.get(texture) as { __webglTexture?: WebGLTexture };
     if (!storage) throw new Error('the renderer gave no texture');
     return storage;
   }
@@ -95,7 +98,8 @@ export class PlaneStorage {
   private withBuffers_(use: () => void): void {
     const { gl_: gl } = this;
     const targets = [gl.READ_FRAMEBUFFER, gl.DRAW_FRAMEBUFFER];
-    const before = [gl.READ_FRAMEBUFFER_BINDING, gl.DRAW_FRAMEBUFFER_BINDING].map((name) => gl.getParameter(name) as WebGLFramebuffer | null);
+    const before = [gl.READ_FRAMEBUFFER_BINDING, gl.DRAW_FRAMEBUFFER_BINDING].map((name) =>
+      gl.getParameter(name) as WebGLFramebuffer | null);
     const scissor = gl.isEnabled(gl.SCISSOR_TEST);
     gl.disable(gl.SCISSOR_TEST);
     const buffers = targets.map(() => gl.createFramebuffer());
@@ -110,17 +114,20 @@ export class PlaneStorage {
     const { gl_: gl } = this;
     gl.framebufferTexture2D(target, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, texture, level);
   }
-  private copy_(from: WebGLTexture, fromLevel: number, width: number, height: number, to: WebGLTexture, level: number): void {
+  private copy_(from: WebGLTexture, fromLevel: number, width: number, height: number, to: WebGLTexture,
+      level: number): void {
     const { gl_: gl, info_: { widthPx, heightPx } } = this;
     this.attach_(gl.READ_FRAMEBUFFER, from, fromLevel);
     this.attach_(gl.DRAW_FRAMEBUFFER, to, level);
-    gl.blitFramebuffer(0, 0, width, height, 0, 0, this.side_(widthPx, level), this.side_(heightPx, level), gl.COLOR_BUFFER_BIT, gl.LINEAR);
+    gl.blitFramebuffer(0, 0, width, height, 0, 0, this.side_(widthPx, level), this.side_(heightPx, level),
+      gl.COLOR_BUFFER_BIT, gl.LINEAR);
   }
   /** Makes the levels behind level `from`, each of the level before. */
   private halve_(storage: WebGLTexture, from: number): void {
     const { widthPx, heightPx } = this.info_;
     for (let level = from + 1; level < this.storages_.get(storage)!; ++level)
-      this.copy_(storage, level - 1, this.side_(widthPx, level - 1), this.side_(heightPx, level - 1), storage, level);
+      this.copy_(storage, level - 1, this.side_(widthPx, level - 1), this.side_(heightPx, level - 1), storage,
+        level);
   }
   private fill_(from: WebGLTexture, width: number, height: number, to: WebGLTexture): void {
     const { gl_: gl } = this;

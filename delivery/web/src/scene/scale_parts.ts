@@ -23,7 +23,8 @@ const imageNumber = (name = ''): number => Number(/^texture\/(\d+)$/.exec(name)?
 /** Number of the source image that a texture of a GLB shows; -1 when it is none of the package's. */
 function imageOfTexture(json: GltfJson, index: number | undefined): number {
   const def = json.textures?.[index ?? -1];
-  const source = def?.source ?? Object.values(def?.extensions ?? {}).find((e) => e.source !== undefined)?.source;
+  const source = def?.source ??
+    Object.values(def?.extensions ?? {}).find((e) => e.source !== undefined)?.source;
   return imageNumber(json.images?.[source ?? -1]?.name);
 }
 
@@ -35,7 +36,8 @@ export interface Slot {
 }
 
 /** A material seen as its textures by the name of their slot. */
-export const texturesIn = (material: Material) => material as unknown as Record<string, Texture | null | undefined>;
+export const texturesIn = (material: Material) =>
+  material as unknown as Record<string, Texture | null | undefined>;
 
 /** Textures of a material by the name of their slot. */
 export function texturesOf(material: Material): [string, Texture][] {
@@ -48,15 +50,9 @@ export function disposeTexture(texture: Texture): void {
   (texture.image as Partial<ImageBitmap> | null | undefined)?.close?.();
 }
 
-/**
- * Parses a scale. Later scales do not decode the previews again: their textures are placeholders, since materials are
- * shared with the first scale.
- */
-export async function parseScale(
-  loader: GltfLoaderLike,
-  glb: Uint8Array,
-  placeholders: boolean,
-): Promise<ParsedGltf> {
+/** Parses a scale. Later scales have placeholders for previews, since materials are shared. */
+export async function parseScale(loader: GltfLoaderLike, glb: Uint8Array,
+    placeholders: boolean): Promise<ParsedGltf> {
   if (placeholders)
     loader.register((parser: { json: GltfJson }) => ({
       name: 'TEXMESH_placeholders',
@@ -81,9 +77,11 @@ export function meshesOf(object: Object3D): Mesh[] {
 }
 
 /** About `most` triangles of a model, by their corners' places in the attributes. */
-export function sampleTriangles(object: Object3D, most: number, use: (mesh: Mesh, corners: [number, number, number]) => void): void {
+export function sampleTriangles(object: Object3D, most: number, use: (mesh: Mesh, corners: [number, number,
+    number]) => void): void {
   const meshes = meshesOf(object);
-  const cornersOf = ({ geometry: { index, attributes } }: Mesh): number => (index ?? attributes.position)?.count ?? 0;
+  const cornersOf = ({ geometry: { index, attributes } }: Mesh): number =>
+    (index ?? attributes.position)?.count ?? 0;
   const step = 3 * Math.ceil(meshes.reduce((sum, mesh) => sum + cornersOf(mesh), 1) / (3 * most));
   for (const mesh of meshes) {
     const corner = (k: number): number => mesh.geometry.index?.getX(k) ?? k;
@@ -100,7 +98,7 @@ export class MaterialSet {
     return [...this.byKey_.values()];
   }
 
-  /** Gives the meshes of a scale the shared materials. `added` hears of every slot with a texture of the package. */
+  /** Gives meshes the shared materials. `added` hears of every slot with a texture of the package. */
   shareMaterials(gltf: ParsedGltf, meshes: readonly Mesh[], added: (slot: Slot) => void): void {
     for (const mesh of meshes) mesh.material = this.shared_(gltf, mesh.material as Material, added);
   }
@@ -120,7 +118,8 @@ export class MaterialSet {
     this.byKey_.set(key, material);
     for (const [name, texture] of texturesOf(material)) {
       const named = imageNumber(texture.name);
-      const image = named < 0 ? imageOfTexture(parser.json, parser.associations.get(texture)?.textures) : named;
+      const image = named < 0 ? imageOfTexture(parser.json, parser.associations.get(texture)?.textures)
+        : named;
       if (image < 0) continue;
       const slot = { material, name, image };
       this.slots.push(slot);
@@ -139,7 +138,8 @@ export class MaterialSet {
 }
 
 /** All materials beneath an object, each once. */
-export const materialsOf = (object: Object3D): Material[] => [...new Set(meshesOf(object).flatMap((mesh) => mesh.material))];
+export const materialsOf = (object: Object3D): Material[] =>
+  [...new Set(meshesOf(object).flatMap((mesh) => mesh.material))];
 
 /** Frees the geometries beneath an object. */
 export function disposeGeometries(object: Object3D): void {

@@ -4,7 +4,8 @@ import { type ManifestScale, hasGlb } from '../format/manifest';
 import type { PackageReader } from '../http/package_reader';
 import type { WorkerPool } from '../worker/pool';
 import type { LoadOptions } from './api';
-import { type MaterialSet, type ParsedGltf, type Slot, disposeGeometries, meshesOf, parseScale } from './scale_parts';
+import { type MaterialSet, type ParsedGltf, type Slot, disposeGeometries, meshesOf,
+  parseScale } from './scale_parts';
 import type { SplitShapes } from './split_shape';
 
 /** A scale on its way. */
@@ -29,10 +30,7 @@ export interface ScaleSourceParts {
   problem: (error: unknown, what: string) => void;
 }
 
-/**
- * The scales of a model as objects, each loaded once: as GLB, or out of the vertex-split stream. A scale that the stream alone has is
- * shown by the next finer GLB where the stream is not read.
- */
+/** The scales of a model as objects: GLBs or splits. Without its stream, the next finer GLB stands in. */
 export class ScaleSource {
   private readonly shapes_ = new Map<number, Object3D>();
   private readonly offGpu_ = new Set<Object3D>(); // scales that were there and are not drawn
@@ -131,7 +129,8 @@ export class ScaleSource {
     const most = this.parts_.options.meshes === 'stream' ? Number.MAX_VALUE : this.glbBytes_(scale);
     return this.streamBytes_(scale) <= most;
   }
-  private async read_(scale: number, arrived: () => void, passed: (scale: number) => void): Promise<Object3D> {
+  private async read_(scale: number, arrived: () => void,
+      passed: (scale: number) => void): Promise<Object3D> {
     const known = this.shapes_.get(scale);
     if (known) return known;
     if (this.first_ && this.usesStream_(scale))
@@ -144,7 +143,8 @@ export class ScaleSource {
       }
     return this.readGlb_(scale, arrived);
   }
-  private readSplits_(scale: number, first: ParsedGltf, arrived: () => void, passed: (scale: number) => void): Promise<Object3D> {
+  private readSplits_(scale: number, first: ParsedGltf, arrived: () => void,
+      passed: (scale: number) => void): Promise<Object3D> {
     const coarsest = this.parts_.reader.manifest.scales.at(-1)!.scale;
     return this.splits_!.load(scale, first, this.parts_.signal, arrived, (s, mesh: Mesh) => {
       if (this.shapes_.has(s) && s !== coarsest) return;

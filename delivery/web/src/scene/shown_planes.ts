@@ -16,11 +16,12 @@ import type { ScaleSource } from './scale_source';
 import { TextureSet } from './texture_set';
 
 /** The planes for the display, or all at full size where options say so. */
-function planesFor({ options, view }: LoadContext, data: PackageData, displayedPx = view.display.heightPx): PlaneChoice[] {
+function planesFor({ options, view }: LoadContext, data: PackageData,
+    displayedPx = view.display.heightPx): PlaneChoice[] {
   return options.fullSize ? fullSize(data.textures) : planesForDisplay(data, displayedPx);
 }
 
-/** Reads the data for decisions about textures: all tables where they are small or a time limit leaves a choice, else those for this display. */
+/** The data for decisions about textures: all tables if small or if time matters, else this display's. */
 export async function readPlaneData(load: LoadContext, scales: ScaleSource): Promise<PackageData> {
   const { reader, pool, signal } = load;
   pool.start();
@@ -38,7 +39,7 @@ export class ShownPlanes {
   private compression_?: Compression;
   private considered_ = false;
   private texelS_ = 0; // seconds that showing planes has taken at most, by their texels
-  /** How texels are stored, from the first planes that are shown on: other texels would have to be fetched again. */
+  /** How texels are stored, for the whole load: other texels would have to be fetched again. */
   private way_?: number;
 
   constructor(
@@ -91,7 +92,8 @@ export class ShownPlanes {
   finishMips(): void {
     this.set_.finishMips();
   }
-  upload(to: PlaneComposer, levels: Levels, fragment: number, rung: number, better: (there: number) => boolean): Promise<boolean> {
+  upload(to: PlaneComposer, levels: Levels, fragment: number, rung: number,
+      better: (there: number) => boolean): Promise<boolean> {
     return this.set_.upload(to, levels, fragment, rung, better);
   }
   dispose(): void {
@@ -104,18 +106,17 @@ export class ShownPlanes {
   forDisplay(): PlaneChoice[] {
     return planesFor(this.load_, this.data);
   }
-  /**
-   * Planes that the GPU can hold: a mip where the plane is too large; without such a mip the picture of the mesh stays. Beside a scale
-   * they fit the memory that there is.
-   */
+  /** Planes that the GPU can hold: a mip of a plane that is too large, or none; within the memory left. */
   fitting(choices: readonly PlaneChoice[], scale: number): PlaneChoice[] {
     const most = this.load_.options.renderer.capabilities.maxTextureSize;
     const fits = (t: TextureInfo): boolean => Math.max(t.widthPx, t.heightPx) <= most;
     return this.withinMemory_(choices, scale).flatMap(({ base, plane }) => {
       // Mips stand in falling order of their size.
-      const taken = fits(this.textures[plane]) ? plane : this.textures.findIndex((t) => t.mip > 0 && t.base === base && fits(t));
+      const taken = fits(this.textures[plane]) ? plane
+        : this.textures.findIndex((t) => t.mip > 0 && t.base === base && fits(t));
       if (taken >= 0) return [{ base, plane: taken }];
-      this.load_.fail(new InputError('GPU', `texture plane ${plane}`, `at most ${most} px`, 'more'), 'textures');
+      this.load_.fail(new InputError('GPU', `texture plane ${plane}`, `at most ${most} px`, 'more'),
+        'textures');
       return [];
     });
   }
@@ -123,7 +124,8 @@ export class ShownPlanes {
     const room = this.room_(scale);
     this.way_ ??= wayWithin(choices, room, this.ways);
     if (room === Infinity) return choices;
-    return planesWithin(new TextureLoss(this.data, this.load_.view.display.heightPx), choices, room, [this.ways[this.way_]]);
+    return planesWithin(new TextureLoss(this.data, this.load_.view.display.heightPx), choices, room,
+      [this.ways[this.way_]]);
   }
   /** Memory for the textures beside a scale. */
   private room_(scale: number): number {
@@ -135,35 +137,43 @@ export class ShownPlanes {
   get ways(): readonly BytesOf[] {
     return this.compression_?.bytes ?? [rgbaBytes(this.textures)];
   }
-  /** Finds out, before planes are chosen beside a scale, whether they may be blocks: where all of them as RGBA take more than there is. */
+  /** Finds out, before planes are chosen, whether they may be blocks: RGBA takes more than there is. */
   async considerCompression(scale: number): Promise<void> {
     const { compress = 'auto' } = this.load_.options;
-    const fits = compress === 'auto' && wayWithin(this.forDisplay(), this.room_(scale), [rgbaBytes(this.textures), () => 0]) === 0;
+    const fits = compress === 'auto' &&
+      wayWithin(this.forDisplay(), this.room_(scale), [rgbaBytes(this.textures), () => 0]) === 0;
     if (this.considered_ || compress === 'never' || fits) return;
     this.considered_ = true;
     try {
-      this.compression_ = await (await import('./blocks/compression')).openCompression(this.load_, this.textures);
+      this.compression_ = await (await import('./blocks/compression')).openCompression(this.load_,
+        this.textures);
     } catch (error) {
       this.load_.fail(error, 'compressed textures'); // RGBA it is
     }
   }
-  /** Planes with more texels where the view has come nearer; never planes with fewer, as the texels are there already. */
+  /** Planes with more texels where the view came nearer. Texels that are there stay. */
   finer(scale: number): PlaneChoice[] {
     const { planes } = this.set_;
-    const wanted = planesFor(this.load_, this.data, this.load_.view.display.heightPx / hysteresis).filter((c) => planes.has(c.base));
-    const larger = (a: number, b: number): number => (this.textures[a].widthPx > this.textures[b].widthPx ? a : b);
+    const wanted = planesFor(this.load_, this.data, this.load_.view.display.heightPx / hysteresis)
+      .filter((c) => planes.has(c.base));
+    const larger = (a: number, b: number): number =>
+      (this.textures[a].widthPx > this.textures[b].widthPx ? a : b);
     const all = wanted.map(({ base, plane }) => ({ base, plane: larger(plane, planes.get(base)!.plane) }));
-    return this.fitting(all, scale).filter((c) => planes.get(c.base)!.widthPx < this.textures[c.plane].widthPx);
+    return this.fitting(all, scale)
+      .filter((c) => planes.get(c.base)!.widthPx < this.textures[c.plane].widthPx);
   }
-  /** Of the textures with finer() planes the one that loses most by the plane that it shows; its finest plane that is likely to show within so many seconds. */
+  /** The texture that loses most by its plane, and its finest plane that shows within so many seconds. */
   nextFiner(scale: number, withinS: number): PlaneChoice | undefined {
     const { textures, set_: { planes }, data, load_ } = this;
     const loss = new TextureLoss(data, load_.view.display.heightPx);
     const next = this.finer(scale).flatMap(({ base, plane }) => {
       const { plane: shown } = planes.get(base)!;
-      const mips = [...textures.keys()].filter((p) => textures[p].mip > 0 && textures[p].base === base); // in falling order of their size
-      const finest = [base, ...mips].find((p) => textures[p].mip >= textures[plane].mip && this.texelsOf_(p) * this.texelS_ <= withinS);
-      return finest !== undefined && textures[finest].mip < textures[shown].mip ? [{ base, plane: finest, loss: loss.mip(shown) }] : [];
+      // in falling order of their size
+      const mips = [...textures.keys()].filter((p) => textures[p].mip > 0 && textures[p].base === base);
+      const finest = [base, ...mips].find((p) => textures[p].mip >= textures[plane].mip &&
+        this.texelsOf_(p) * this.texelS_ <= withinS);
+      return finest !== undefined && textures[finest].mip < textures[shown].mip
+        ? [{ base, plane: finest, loss: loss.mip(shown) }] : [];
     });
     return next.sort((a, b) => b.loss - a.loss)[0];
   }
@@ -179,8 +189,8 @@ export class ShownPlanes {
   // ---- showing
 
   /**
-   * Shows textures by these planes; textures that the first GLB does not have begin with the package's preview. Fragments may come from
-   * then on; `shown` resolves when the scene has changed.
+   * Shows textures by these planes; textures that the first GLB does not have begin with the package's
+   * preview. Fragments may come from then on; `shown` resolves when the scene has changed.
    */
   async show(choices: readonly PlaneChoice[], anew = false): Promise<{ shown: Promise<unknown> }> {
     const { signal } = this.load_;
@@ -196,20 +206,23 @@ export class ShownPlanes {
         const preview = needed ? await this.previewOf_(base) : undefined;
         throwIfAborted(signal); // after the end of the load nobody would dispose of the plane
         const planeShown = (): void => this.load_.emit('plane', { base, plane, widthPx, heightPx });
-        shown.push(this.set_.show(choice, preview).then(planeShown, lostPlane).finally(() => preview?.close()));
+        shown.push(this.set_.show(choice, preview).then(planeShown, lostPlane)
+          .finally(() => preview?.close()));
       } catch (error) {
         lostPlane(error);
       }
       throwIfAborted(signal);
     }
     const texels = choices.reduce((sum, { plane }) => sum + this.texelsOf_(plane), 0);
-    return { shown: Promise.all(shown).then(() => (this.texelS_ = Math.max(this.texelS_, (nowS() - beganS) / texels))) };
+    return { shown: Promise.all(shown)
+      .then(() => (this.texelS_ = Math.max(this.texelS_, (nowS() - beganS) / texels))) };
   }
   private async previewOf_(base: number): Promise<ImageBitmap> {
     const { reader, pool, signal } = this.load_;
     const streams = [await reader.preview(base, signal)];
     const most: [number, number] = [mostPreviewPx, mostPreviewPx];
-    return (await pool.decode({ codec: 'jpeg', tables: new Uint8Array(0), streams, digests: [], complete: true, levels: 1, most }))[0] as ImageBitmap;
+    return (await pool.decode({ codec: 'jpeg', tables: new Uint8Array(0), streams, digests: [],
+      complete: true, levels: 1, most }))[0] as ImageBitmap;
   }
   /** The GPU has lost everything: these planes begin with their previews. */
   async showAnew(choices: readonly PlaneChoice[]): Promise<void> {

@@ -23,11 +23,8 @@ export class ShownScale {
   private retryTimer_: ReturnType<typeof setTimeout> | undefined;
   private retryS_ = retryScaleS.first;
 
-  constructor(
-    private readonly load_: LoadContext,
-    private readonly scene_: Object3D,
-    private readonly source_: ScaleSource,
-  ) {
+  constructor(private readonly load_: LoadContext, private readonly scene_: Object3D,
+      private readonly source_: ScaleSource) {
     this.proxy = new ShownProxy(load_, scene_);
   }
   /** Scales stay out of the scene: a proxy is there. */
@@ -59,7 +56,7 @@ export class ShownScale {
       this.lost(error, scale);
     }
   }
-  /** The shown scale stays. The lost scale, or the scale that is wanted by then, is asked for again a little later. */
+  /** The shown scale stays. A little later, the lost or the then wanted scale is asked for again. */
   lost(error: unknown, scale: number): void {
     this.load_.fail(error, `scale ${scale}`);
     if (this.wanted === scale) this.wanted = this.shown;
@@ -88,7 +85,8 @@ export class ShownScale {
     const shape = this.source_.shape(shown)!;
     if (object.children[0] !== shape) object.clear().add(shape);
     if (!object.parent) this.scene_.add(object);
-    this.load_.emit('scale', { scale: shown, triangles: reader.manifest.scales.find((s) => s.scale === shown)!.triangles });
+    this.load_.emit('scale',
+      { scale: shown, triangles: reader.manifest.scales.find((s) => s.scale === shown)!.triangles });
   }
   /** The object, or the scale that is held back: a proxy says nothing of fragments. */
   surface(): Object3D {
@@ -106,7 +104,8 @@ export class ShownScale {
   /** The scale that the view asks for, by a little more than the last time. */
   private scaleForView_(): number {
     const { override, view: { display } } = this.load_;
-    const at = (factor: number): number => override.scale ?? this.scaleFor!(display.heightPx * factor, display.part);
+    const at = (factor: number): number =>
+      override.scale ?? this.scaleFor!(display.heightPx * factor, display.part);
     if (override.scale !== undefined || at(1 / hysteresis) < this.wanted) return at(1);
     return Math.max(at(hysteresis), this.wanted);
   }

@@ -14,17 +14,12 @@ const leastRequestBytes = 32 << 10;
 
 let streamCount = 0;
 
-/** Reads the head of a package's stream of vertex splits. `added` hears of materials' slots that no GLB had; see ScaleSourceParts for `leadBytes`. */
-export async function openSplitShapes(
-  reader: PackageReader,
-  pool: WorkerPool,
-  materials: MaterialSet,
-  added: (slot: Slot) => void,
-  leadBytes: () => number,
-  signal: AbortSignal,
-): Promise<SplitShapes> {
+/** Reads the stream's head. `added` hears of slots that no GLB had; see ScaleSourceParts for `leadBytes`. */
+export async function openSplitShapes(reader: PackageReader, pool: WorkerPool, materials: MaterialSet,
+    added: (slot: Slot) => void, leadBytes: () => number, signal: AbortSignal): Promise<SplitShapes> {
   const key = ++streamCount;
-  const known = (await reader.splitStreamStart(withHeadBytes, signal))!; // the head, and some bytes that came with it
+  // the head, and some bytes that came with it
+  const known = (await reader.splitStreamStart(withHeadBytes, signal))!;
   const info = await pool.openSplits(key, known.subarray(0, reader.manifest.stream!.headBytes));
   return new SplitShapes(reader, pool, materials, added, leadBytes, key, known, info);
 }
@@ -35,23 +30,17 @@ interface ScaleRun {
   scales: SplitInfo['scales'];
 }
 
-/** The scales of a model out of its vertex-split stream: one set of buffers that is appended to, an index per scale. */
+/** The scales of a vertex-split stream: one set of buffers that grows, and an index for each scale. */
 export class SplitShapes {
   private readonly attributes_ = new Map<string, BufferAttribute>();
   private readonly meshes_ = new Map<number, Mesh>();
   private decoded_: number; // bytes of the stream
   private lastLoad_: Promise<unknown> = Promise.resolve();
 
-  constructor(
-    private readonly reader_: PackageReader,
-    private readonly pool_: WorkerPool,
-    private readonly materials_: MaterialSet,
-    private readonly added_: (slot: Slot) => void,
-    private readonly leadBytes_: () => number,
-    private readonly key_: number,
-    private readonly known_: Uint8Array,
-    private readonly info_: SplitInfo,
-  ) {
+  constructor(private readonly reader_: PackageReader, private readonly pool_: WorkerPool,
+      private readonly materials_: MaterialSet, private readonly added_: (slot: Slot) => void,
+      private readonly leadBytes_: () => number, private readonly key_: number,
+      private readonly known_: Uint8Array, private readonly info_: SplitInfo) {
     this.decoded_ = info_.headBytes;
   }
 
@@ -60,11 +49,9 @@ export class SplitShapes {
     const s = this.info_.scales.find((k) => k.scale === scale);
     return s ? Math.max(0, s.end - Math.max(this.decoded_, this.known_.length)) : Infinity;
   }
-  /**
-   * Fetches and decodes up to a scale. `arrived` is called when all bytes but `leadBytes` are there, once or again; `passed` hears of every scale on the way,
-   * the wanted one included.
-   */
-  load(scale: number, gltf: ParsedGltf, signal: AbortSignal, arrived: () => void, passed: (scale: number, mesh: Mesh) => void): Promise<Mesh> {
+  /** Fetches and decodes up to a scale. `arrived`: all but `leadBytes` are there; `passed`: each scale. */
+  load(scale: number, gltf: ParsedGltf, signal: AbortSignal, arrived: () => void, passed: (scale: number,
+      mesh: Mesh) => void): Promise<Mesh> {
     const mesh = this.lastLoad_.then(() => this.loadNow_(scale, gltf, signal, arrived, passed));
     this.lastLoad_ = mesh.catch(() => undefined);
     return mesh;
@@ -74,20 +61,17 @@ export class SplitShapes {
     this.meshes_.forEach((mesh) => mesh.geometry.dispose());
   }
 
-  private async loadNow_(
-    scale: number,
-    gltf: ParsedGltf,
-    signal: AbortSignal,
-    arrived: () => void,
-    passed: (scale: number, mesh: Mesh) => void,
-  ): Promise<Mesh> {
+  private async loadNow_(scale: number, gltf: ParsedGltf, signal: AbortSignal, arrived: () => void,
+      passed: (scale: number, mesh: Mesh) => void): Promise<Mesh> {
     const runs = this.runsUpTo_(scale);
     const left = runs.map(() => Infinity);
     const come = (run: number, bytes: number): void => {
       left[run] = bytes;
       if (sumOf(left) <= this.leadBytes_()) arrived();
     };
-    const requests = runs.map(({ from, scales }, i) => this.bytes_(from, scales.at(-1)!.end, signal, (bytes) => come(i, bytes))); // all are made at once
+    // all are made at once
+    const requests = runs.map(({ from, scales }, i) =>
+      this.bytes_(from, scales.at(-1)!.end, signal, (bytes) => come(i, bytes)));
     Promise.all(requests).then(arrived, arrived);
     for (const [i, { from, scales }] of runs.entries()) {
       const got = await requests[i];
@@ -111,7 +95,8 @@ export class SplitShapes {
     return runs;
   }
   /** `left` hears of the bytes that are still to come. */
-  private async bytes_(from: number, to: number, signal: AbortSignal, left: (bytes: number) => void): Promise<Uint8Array> {
+  private async bytes_(from: number, to: number, signal: AbortSignal,
+      left: (bytes: number) => void): Promise<Uint8Array> {
     const verify = (got: Uint8Array): Promise<void> => this.pool_.checkSplits(this.key_, from, got);
     const first = this.known_.subarray(from, to);
     const rest = to - from - first.length;
@@ -119,7 +104,8 @@ export class SplitShapes {
     const onBytes = (received: number): void => left(rest - received);
     if (first.length > 0)
       try {
-        const all = rest > 0 ? concat([first, await this.reader_.splitStream(to - rest, rest, { signal, onBytes })]) : first;
+        const all = rest > 0
+          ? concat([first, await this.reader_.splitStream(to - rest, rest, { signal, onBytes })]) : first;
         await verify(all);
         return all;
       } catch (error) {
@@ -129,7 +115,8 @@ export class SplitShapes {
   }
 
   private async add_(scale: number, update: SplitUpdate, gltf: ParsedGltf): Promise<Mesh> {
-    for (const { name, components, values } of update.attributes) this.append_(name, components, values, update);
+    for (const { name, components, values } of update.attributes)
+      this.append_(name, components, values, update);
     const geometry = new BufferGeometry();
     this.attributes_.forEach((attribute, name) => geometry.setAttribute(name, attribute));
     geometry.setIndex(new BufferAttribute(update.index, 1));
@@ -146,7 +133,8 @@ export class SplitShapes {
     let attribute = this.attributes_.get(name);
     if (!attribute || attribute.count < to) {
       const most = this.info_.scales.at(-1)!.wedges;
-      const grown = new BufferAttribute(new Float32Array(components * Math.max(to, Math.min(2 * from, most))), components);
+      const grown = new BufferAttribute(new Float32Array(components * Math.max(to, Math.min(2 * from, most))),
+        components);
       if (attribute) grown.array.set(attribute.array.subarray(0, components * from));
       this.attributes_.set(name, (attribute = grown));
       for (const { geometry } of this.meshes_.values()) {
@@ -157,11 +145,12 @@ export class SplitShapes {
     attribute.array.set(values, components * from);
     attribute.needsUpdate = true;
   }
-  /** The material that a mesh of this geometry gets: the GLB's material with this number, or the GLB's first. */
+  /** The material of a mesh of this geometry: the GLB's with this number, or its first. */
   private async materialOf_(gltf: ParsedGltf, index: number, geometry: BufferGeometry): Promise<Material> {
     const { parser, scene } = gltf;
     const there = index < (parser.json.materials ?? []).length;
-    const chosen = there ? ((await parser.getDependency('material', index)) as Material) : (meshesOf(scene)[0]?.material as Material | undefined);
+    const chosen = there ? ((await parser.getDependency('material', index)) as Material)
+      : (meshesOf(scene)[0]?.material as Material | undefined);
     if (!chosen) throw new FormatError('mesh', '', `material ${index}`, '', 'S23');
     const mesh = new Mesh(geometry, chosen);
     parser.assignFinalMaterial(mesh);

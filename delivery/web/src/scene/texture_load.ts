@@ -25,26 +25,30 @@ import type { ShownScale } from './shown_scale';
 const longestStepS = 60;
 
 /** Throughput that whoever gave the load its turn expects, that options say, or that transfers have shown. */
-export function throughputBytesS({ expectedBytesS, options: { beta0BytesS }, reader: { requests, client } }: LoadContext): number {
+export function throughputBytesS(
+    { expectedBytesS, options: { beta0BytesS }, reader: { requests, client } }: LoadContext): number {
   return expectedBytesS || beta0BytesS || throughputOf(requests, client.latencyS);
 }
 
-const fits = ({ memoryBytes, reader: { manifest } }: LoadContext, proxy: number): boolean => proxyBytes(manifest.proxies[proxy]) <= memoryBytes;
+const fits = ({ memoryBytes, reader: { manifest } }: LoadContext, proxy: number): boolean =>
+  proxyBytes(manifest.proxies[proxy]) <= memoryBytes;
 
 /** The larger proxy that pays on the way to scales; -1: none does. */
 export function stepOf(load: LoadContext): number {
   const { reader: { manifest, client }, view: { display: { heightPx, part } }, memoryBytes } = load;
   const wanted = scaleWithin(manifest.scales, selectScale(manifest, heightPx, part), memoryBytes);
   const leftS = Math.min(load.limitS, longestStepS) - load.elapsedS();
-  const step = proxyStep(manifest, wanted, heightPx, { bytesS: throughputBytesS(load), rttS: client.latencyS, leftS });
+  const step =
+    proxyStep(manifest, wanted, heightPx, { bytesS: throughputBytesS(load), rttS: client.latencyS, leftS });
   return step >= 0 && fits(load, step) ? step : -1;
 }
 
-/** The largest proxy behind `shown` that comes in the time left and looks better than scales do at its end; -1: none does. */
+/** The largest proxy behind `shown` that comes in time and looks better than scales do then; -1: none. */
 function betterThanScales(load: LoadContext, shown: number, flip: number, leftS: number): number {
   const { reader: { manifest, client }, view: { display: { heightPx } }, beta0 } = load;
   const better = (k: number): boolean =>
-    fits(load, k) && client.latencyS + proxyBytesBeyondStart(manifest, k) / beta0 < leftS && proxyLoss(manifest, k, heightPx).flip < flip - worthwhileFlip;
+    fits(load, k) && client.latencyS + proxyBytesBeyondStart(manifest, k) / beta0 < leftS &&
+      proxyLoss(manifest, k, heightPx).flip < flip - worthwhileFlip;
   let k = manifest.proxies.length - 1;
   while (k > shown && !better(k)) --k;
   return k > shown ? k : -1;
@@ -59,9 +63,12 @@ const meshShare = 0.5;
 const longestTimerS = 1e6;
 /** The scale is compared with the proxy in the scene this often, seconds. */
 const lookEachS = 0.1;
-/** In the timed part a surface that the camera does not see is worth this much of a surface that the camera sees. */
+/** In the timed part, an unseen surface is worth this much of a seen one. */
 const unseen = 1e-3;
-/** Share of the time left that showing a plane may take, by what earlier ones took: without a graphics card .1 to .8 s for 4 million texels. */
+/**
+ * Share of the time left that showing a plane may take, by what earlier ones took: without a graphics card .1
+ * to .8 s for 4 million texels.
+ */
 const showShare = 0.6;
 /** 1 - SSIM at which refining ends by default. */
 const defaultRefineTo = 0.003;
@@ -69,15 +76,13 @@ const defaultRefineTo = 0.003;
 const mostFruitlessRounds = 3;
 
 /** Reads the documents that decisions about textures are made from. */
-export async function openTextureLoad(load: LoadContext, scale: ShownScale, source: ScaleSource): Promise<TextureLoad> {
+export async function openTextureLoad(load: LoadContext, scale: ShownScale,
+    source: ScaleSource): Promise<TextureLoad> {
   const data = await readPlaneData(load, source);
   return new TextureLoad(load, scale, source, new FragmentFetch(load, new ShownPlanes(load, data)));
 }
 
-/**
- * The second part of a load: decides which fragments to fetch, fetches them in time, refines. This module is loaded while the
- * first picture comes, so that nobody waits for the module.
- */
+/** The second part of a load, loaded on the way: chooses fragments, fetches them in time, refines. */
 export class TextureLoad {
   private readonly planes_: ShownPlanes;
   private readonly inTime_: FetchInTime;
@@ -85,12 +90,8 @@ export class TextureLoad {
   private lookedS_ = 0; // when the proxy and the scale were compared last
   private fruitlessRounds_ = 0; // rounds of refining that brought nothing, one after the other
 
-  constructor(
-    private readonly load_: LoadContext,
-    private readonly scale_: ShownScale,
-    private readonly source_: ScaleSource,
-    private readonly fetching_: FragmentFetch,
-  ) {
+  constructor(private readonly load_: LoadContext, private readonly scale_: ShownScale,
+      private readonly source_: ScaleSource, private readonly fetching_: FragmentFetch) {
     this.planes_ = fetching_.planes;
     this.inTime_ = new FetchInTime(load_, fetching_);
     scale_.scaleFor = (heightPx, part) => this.scaleFor_(heightPx, part);
@@ -132,16 +133,21 @@ export class TextureLoad {
     // Picture and fragments stand without the mesh, too.
     const meshShown = mesh.shown.catch((error: unknown) => this.scale_.lost(error, scale));
     // Coverage that no material asks for is not fetched.
-    const choices = planes.fitting(chosen, scale).filter(({ base }) => planes.textures[base].role !== 'alpha' || planes.isUsed(base));
-    const [{ shown }] = await Promise.all([planes.show(choices), fetching.transfers.prepare(choices.map((c) => c.plane), signal)]);
+    const choices = planes.fitting(chosen, scale)
+      .filter(({ base }) => planes.textures[base].role !== 'alpha' || planes.isUsed(base));
+    const [{ shown }] = await Promise.all([planes.show(choices),
+      fetching.transfers.prepare(choices.map((c) => c.plane), signal)]);
     this.list_ = await fetching.listOf(scale, unseen, this.scale_.surface());
-    // A mesh that takes less than a round trip leaves the link to the textures. A longer one is waited for; coarser scales show on its way.
-    if (meshBytes > load.beta0 * reader.client.latencyS) await Promise.race([mesh.arrived, this.timer_(meshShare)]);
+    // A mesh that takes less than a round trip leaves the link to the textures. A longer one is waited for;
+    // coarser scales show on its way.
+    if (meshBytes > load.beta0 * reader.client.latencyS)
+      await Promise.race([mesh.arrived, this.timer_(meshShare)]);
     load.enter('textures');
     await this.fetchTimed_(this.list_);
     await shown;
     await fetching.composed();
-    await this.useRest_().catch((error: unknown) => load.fail(error, 'finer planes')); // refining asks for them, too
+    // refining asks for them, too
+    await this.useRest_().catch((error: unknown) => load.fail(error, 'finer planes'));
     throwIfAborted(signal);
     const skipped = this.skippedFragments_();
     await Promise.race([meshShown, this.timer_(1)]);
@@ -152,11 +158,13 @@ export class TextureLoad {
   private async showBetterProxy_(flip: number): Promise<void> {
     const { scale_: { proxy, held }, load_: load } = this;
     const better = held ? betterThanScales(load, proxy.shown, flip, this.inTime_.leftS()) : -1;
-    if (better >= 0) await proxy.show(better).catch((error: unknown) => load.fail(error, 'proxy')); // the smaller one stays
+    // the smaller one stays
+    if (better >= 0) await proxy.show(better).catch((error: unknown) => load.fail(error, 'proxy'));
   }
   /** The scale takes the proxy's place once the scale is predicted to look better. */
   private releaseIfBetter_(): void {
-    const { list_: list, scale_: scale, planes_: planes, load_: { view: { display: { heightPx } }, reader: { manifest } } } = this;
+    const { list_: list, scale_: scale, planes_: planes,
+      load_: { view: { display: { heightPx } }, reader: { manifest } } } = this;
     if (!list || !scale.held || scale.shown < 0) return;
     this.lookedS_ = nowS();
     const losses = lossesOf(list, list.fragments.map((f) => planes.rungOf(f)));
@@ -171,19 +179,19 @@ export class TextureLoad {
     for (const o of list.offers) load.expectedBytes += o.plannedBytes;
     const fragmentsS = this.inTime_.leftS() - composeS;
     const given = load.override.rung !== undefined;
-    if (given || !Number.isFinite(fragmentsS)) while (given === (load.override.rung !== undefined) && (await this.refineSome_(true)));
-    else if (fragmentsS > 0 && !load.pool.isUnavailable && list.offers.length > 0) await this.inTime_.run(list, fragmentsS);
+    if (given || !Number.isFinite(fragmentsS))
+      while (given === (load.override.rung !== undefined) && (await this.refineSome_(true)));
+    else if (fragmentsS > 0 && !load.pool.isUnavailable && list.offers.length > 0)
+      await this.inTime_.run(list, fragmentsS);
   }
-  /**
-   * All that was chosen is there before the time is over, as the link is faster than was to be expected: planes with more texels take the
-   * rest, one after the other, each with fragments of it.
-   */
+  /** All that was chosen came early: planes with more texels take the rest, each with fragments of it. */
   private async useRest_(): Promise<void> {
     const { load_: load, planes_: planes, fetching_: fetching, inTime_: inTime } = this;
     if (load.options.turn || !inTime.hasPlan) return; // other models wait for the link
     for (;;) {
       const scale = Math.max(this.scale_.shown, 0);
-      const finer = planes.nextFiner(scale, showShare * (inTime.leftS() - composeS - load.reader.client.rttS));
+      const finer =
+        planes.nextFiner(scale, showShare * (inTime.leftS() - composeS - load.reader.client.rttS));
       if (!finer) return;
       await this.prepare_([finer]);
       await Promise.race([(await planes.show([finer])).shown, this.timer_(1)]);
@@ -196,7 +204,8 @@ export class TextureLoad {
   /** Number of fragments whose previews are shown. */
   private skippedFragments_(): number {
     const { tables } = this.planes_.data;
-    const skippedOf = ({ plane, rungs }: PlaneComposer): number => tables[plane]!.order.filter((f) => rungs[f] < 0).length;
+    const skippedOf = ({ plane, rungs }: PlaneComposer): number =>
+      tables[plane]!.order.filter((f) => rungs[f] < 0).length;
     return this.planes().reduce((n, p) => n + skippedOf(p), 0);
   }
   /** Resolves after a share of the time left. */
@@ -214,10 +223,12 @@ export class TextureLoad {
     const { override, options, limitS, beta0, reader: { client }, view: { display } } = load;
     const wanted = override.scale ?? this.scaleFor_(display.heightPx, display.part);
     await planes.considerCompression(wanted);
-    if (options.fullSize || !Number.isFinite(limitS) || override.rung !== undefined) return { scale: wanted, planes: planes.forDisplay() };
+    if (options.fullSize || !Number.isFinite(limitS) || override.rung !== undefined)
+      return { scale: wanted, planes: planes.forDisplay() };
     /** Seconds that so many bytes of mesh take when nothing shares the link. */
     const meshS = (bytes: number): number => (bytes > 0 ? bytes / beta0 + client.latencyS : 0);
-    const limitAfterMeshS = (scale: number): number => this.inTime_.leftS() - composeS - meshS(this.source_.bytesOf(scale));
+    const limitAfterMeshS = (scale: number): number =>
+      this.inTime_.leftS() - composeS - meshS(this.source_.bytesOf(scale));
     const { printed } = this.inTime_;
     let listed: Partial<ListOptions> | undefined;
     const spend = printed && ((...of: Parameters<typeof printed.thesisTextures>) => {
@@ -226,7 +237,8 @@ export class TextureLoad {
       return textures;
     });
     const steps = choiceInTime(planes.data, {
-      displayedPx: display.heightPx, wanted, only: override.scale !== undefined || !!printed, textures: spend, connections: client.options.connections,
+      displayedPx: display.heightPx, wanted, only: override.scale !== undefined || !!printed, textures: spend,
+      connections: client.options.connections,
       memoryBytes: load.memoryBytes, ways: planes.ways,
       afterMesh: (scale) => ({ plan: this.inTime_.planOptions(limitAfterMeshS(scale)), linkBytesS: beta0 }),
     });
@@ -243,7 +255,7 @@ export class TextureLoad {
 
   // ---- refining
 
-  /** Fetches what the camera sees and the display can show, until there is nothing left or somebody asks for another turn. */
+  /** Fetches what camera and display can show, until nothing is left or somebody asks for another turn. */
   async refine(again: () => boolean): Promise<void> {
     this.fetching_.fates.allowLostAgain();
     await this.showFinerPlanes_();
@@ -252,8 +264,8 @@ export class TextureLoad {
     this.releaseIfBetter_();
   }
   /**
-   * After the GPU has lost everything, or has refused something: shows previews within the memory that there is now, then fetches the
-   * fragments that were there. True: the picture is coarser than before.
+   * After the GPU has lost everything, or has refused something: shows previews within the memory that there
+   * is now, then fetches the fragments that were there. True: the picture is coarser than before.
    */
   async restore(): Promise<boolean> {
     const { planes_: planes, scale_: scale, fetching_: fetching } = this;
@@ -273,7 +285,8 @@ export class TextureLoad {
       const quality = tables[was]!.rungQuality[Math.max(...rungs)];
       if (!quality) return []; // nothing but the preview was there
       const rung = rungQuality.filter((q) => q < quality).length;
-      return [...order].map((fragment) => ({ plane, fragment, rung: Math.min(rung, rungQuality.length - 1), offer: 0 }));
+      return [...order].map(
+        (fragment) => ({ plane, fragment, rung: Math.min(rung, rungQuality.length - 1), offer: 0 }));
     });
     await fetching.fetch(wishes.filter((w) => w.rung >= 0));
     await fetching.composed();
@@ -300,16 +313,19 @@ export class TextureLoad {
     await this.planes_.readTables(asked);
     await this.fetching_.transfers.prepare(asked, this.load_.signal);
   }
-  /** Fetches some fragments that are still wanted, `all` or those that the camera sees. False: nothing is left, or going on is of no use. */
-  private async refineSome_(all = this.load_.override.rung !== undefined || this.fetching_.wholeRungs()): Promise<boolean> {
+  /** Fetches some wanted fragments, `all` or those that are seen. False: nothing is left, or of use. */
+  private async refineSome_(all = this.load_.override.rung !== undefined ||
+      this.fetching_.wholeRungs()): Promise<boolean> {
     const { load_: load, fetching_: fetching } = this;
     await sleepS(0);
     if (load.pool.isUnavailable) return false;
     if (all) await fetching.composed(); // a fragment must not come behind the one that replaces it
-    const list = await fetching.listOf(Math.max(this.scale_.shown, 0), 0, this.scale_.surface()); // fragments that are not seen are not fetched
+    // fragments that are not seen are not fetched
+    const list = await fetching.listOf(Math.max(this.scale_.shown, 0), 0, this.scale_.surface());
     this.list_ = list;
     const enough = load.options.refineTo ?? defaultRefineTo;
-    const wishes = all ? allWishes(list, load.override.rung, fetching) : bestWishes(list, refineBytes, enough, this.planes_.data, fetching);
+    const wishes = all ? allWishes(list, load.override.rung, fetching)
+      : bestWishes(list, refineBytes, enough, this.planes_.data, fetching);
     const before = fetching.fates.losses;
     const asked = wishes.length > 0;
     if (asked) this.fruitlessRounds_ = (await fetching.fetch(wishes)) > 0 ? 0 : this.fruitlessRounds_ + 1;

@@ -30,18 +30,22 @@ export class TextureSet {
     private readonly blocksOf_: (plane: number) => [Compression, BlockFormat] | undefined = () => undefined,
   ) {
     this.uploads_ = new UploadQueue(renderer_, () => this.planes.forEach((plane) => plane.updateMips()));
-    this.software_ = isSoftware(renderer_); // once, and soon: a GPU that has something to draw keeps the page waiting for its name
+    // once, and soon: a GPU that has something to draw keeps the page waiting for its name
+    this.software_ = isSoftware(renderer_);
   }
 
   /**
-   * Shows a texture by this plane from now on. The plane is filled with the picture shown so far (or the preview) in small steps, then
-   * the materials are changed at once. Resolves when the materials have been changed.
+   * Shows a texture by this plane from now on. The plane is filled with the picture shown so far (or the
+   * preview) in small steps, then the materials are changed at once. Resolves when the materials have been
+   * changed.
    */
   async show({ base, plane }: PlaneChoice, preview?: ImageBitmap): Promise<void> {
     const { planes } = this;
     const before = planes.get(base);
-    const next: PlaneComposer = planeComposer(this.renderer_, this.textures_[plane], base, plane, this.blocksOf_(plane)?.[0].storage({
-      renderer: this.renderer_, pool: this.pool_, uploads: this.uploads_, info: this.textures_[plane], format: this.blocksOf_(plane)![1],
+    const next: PlaneComposer =
+        planeComposer(this.renderer_, this.textures_[plane], base, plane, this.blocksOf_(plane)?.[0].storage({
+      renderer: this.renderer_, pool: this.pool_, uploads: this.uploads_, info: this.textures_[plane],
+      format: this.blocksOf_(plane)![1],
       pending: (by) => (this.pending += by),
       refill: (from) => void this.refill_(next, from, next.blocks?.format).catch(() => undefined),
     }));
@@ -53,7 +57,8 @@ export class TextureSet {
       let enlarges!: (clear?: Clear) => void;
       const enlarged = new Promise<Clear | undefined>((done) => (enlarges = done));
       const ready = this.fill_(next, enlarges, before, shown, preview).finally(enlarges);
-      next.clear = (fragment) => enlarged.then((clear) => clear?.(fragment) ?? ready).catch(() => ready).catch(() => undefined);
+      next.clear = (fragment) =>
+        enlarged.then((clear) => clear?.(fragment) ?? ready).catch(() => ready).catch(() => undefined);
       await ready;
     } catch (error) {
       if (before) planes.set(base, before);
@@ -76,8 +81,9 @@ export class TextureSet {
   showInNewMaterials(): void {
     this.planes.forEach((plane) => plane.filled && this.showInMaterials_(plane));
   }
-  /** Queues a fragment; resolves when the fragment is in its texture (true), or was not better than the rung there by then (false). */
-  async upload(plane: PlaneComposer, levels: Levels, fragment: number, rung: number, better: (there: number) => boolean): Promise<boolean> {
+  /** Queues a fragment; resolves with true when it is shown, with false when its rung is no better. */
+  async upload(plane: PlaneComposer, levels: Levels, fragment: number, rung: number,
+      better: (there: number) => boolean): Promise<boolean> {
     ++this.pending;
     plane.come.add(fragment);
     let shown = false;
@@ -102,12 +108,13 @@ export class TextureSet {
     this.planes.clear();
   }
 
-  /** Slots of materials that show this plane. Coverage has the slots beside its colours, in materials that ask for coverage. */
+  /** Slots of materials that show this plane; coverage stands beside its colours where a material asks. */
   private slotsOf_(base: number): Slot[] {
     const { image, role } = this.textures_[base];
     const slots = this.materials_.slots.filter((s) => s.image === image);
     if (role !== 'alpha') return slots;
-    const covered = slots.filter(({ name, material: m }) => name === 'map' && (m.transparent || m.alphaTest > 0));
+    const covered =
+      slots.filter(({ name, material: m }) => name === 'map' && (m.transparent || m.alphaTest > 0));
     return covered.map((s) => ({ ...s, name: 'alphaMap' }));
   }
   /** Gives materials views of a plane, materials that came meanwhile or with a later scale, too. */
@@ -119,12 +126,14 @@ export class TextureSet {
         if (!shown[slot.name]) slot.material.needsUpdate = true;
         shown[slot.name] = plane.view(old);
       }
-      // A finer scale's material may be a copy of one that shows the plane: it has its textures, not its shader.
-      const asBlocks = plane.blocks && this.blocksOf_(plane.plane)?.[0].readTwoChannels(slot.material, slot.name, plane.blocks.format);
+      // A finer scale's material may copy one that shows the plane: it has its textures, not its shader.
+      const asBlocks = plane.blocks &&
+        this.blocksOf_(plane.plane)?.[0].readTwoChannels(slot.material, slot.name, plane.blocks.format);
       if (!asBlocks && this.isXy_(plane)) this.readTwoChannels_?.(slot.material, slot.name, 'jpeg-xy');
     }
   }
-  private async fill_(next: PlaneComposer, enlarges: (clear?: Clear) => void, before?: PlaneComposer, old?: Texture, preview?: ImageBitmap): Promise<void> {
+  private async fill_(next: PlaneComposer, enlarges: (clear?: Clear) => void, before?: PlaneComposer,
+      old?: Texture, preview?: ImageBitmap): Promise<void> {
     const image = preview ?? (old?.image as ImageBitmap | null | undefined);
     if (before?.filled) await this.scale_(next, before.textures[0], before.blocks?.format);
     else if (image?.width)
@@ -150,13 +159,16 @@ export class TextureSet {
     else next.fill(from);
   }
   private async refill_(next: PlaneComposer, from: Texture, format?: BlockFormat): Promise<void> {
-    await this.blocksOf_(next.plane)?.[0].refill(next, from, format, this.renderer_, this.pool_, this.uploads_);
+    await this.blocksOf_(next.plane)?.[0].refill(next, from, format, this.renderer_, this.pool_,
+      this.uploads_);
   }
-  private async enlarge_(next: PlaneComposer, image: ImageBitmap, enlarges: (clear?: Clear) => void): Promise<void> {
+  private async enlarge_(next: PlaneComposer, image: ImageBitmap,
+      enlarges: (clear?: Clear) => void): Promise<void> {
     const { clear, done } = (await import('./enlarge')).enlarge(next, image, this.pool_, this.uploads_);
     enlarges(clear);
     await done;
   }
 }
 
-const textureAt = ({ material, name }: Slot): Texture => (texturesIn(material)[name] ?? texturesIn(material).map)!;
+const textureAt = ({ material, name }: Slot): Texture =>
+  (texturesIn(material)[name] ?? texturesIn(material).map)!;

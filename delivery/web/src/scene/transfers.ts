@@ -45,7 +45,7 @@ interface Part {
   offset: number;
   bytes: number;
 }
-/** Those who hear when all bytes of a wish are there (before the bytes are checked), and when they cannot be had. */
+/** They hear when all bytes of a wish are there (not yet checked), and when they cannot be had. */
 interface Askers {
   arrived(wish: Wish): void;
   failed(wish: Wish, error: unknown): void;
@@ -58,16 +58,14 @@ export interface GroupOptions {
   signal?: AbortSignal;
 }
 
-/** Files of fragments count as so far from each other, further than any pack is long: requests for files are not joined. */
+/** Distance between files of fragments, more than any pack's length: requests for files are not joined. */
 const fileSpacing = 2 ** 40;
 
-/**
- * Fetches fragments: streams of one rung that stand together by one request, lower rungs of incremental codecs once
- * only, decoding off the main thread.
- */
+/** Fetches fragments: neighbours of a rung by one request, lower rungs once; workers decode. */
 export class Transfers {
   private readonly planes_ = new Map<number, PlaneFiles>();
-  private readonly heldStreams_ = new Map<string, Uint8Array[]>(); // streams of incremental codecs, from rung 0 on
+  // streams of incremental codecs, from rung 0 on
+  private readonly heldStreams_ = new Map<string, Uint8Array[]>();
   /** Requests and fragments being decoded. */
   pending = 0;
 
@@ -96,13 +94,15 @@ export class Transfers {
   }
 
   /**
-   * Fetches wishes. `arrived` is called when all bytes of a wish are there (before the bytes are checked), `failed` when they
-   * cannot be had. Resolves when every wish has arrived or failed.
+   * Fetches wishes. `arrived` is called when all bytes of a wish are there (before the bytes are checked),
+   * `failed` when they cannot be had. Resolves when every wish has arrived or failed.
    */
-  async fetch(wishes: readonly Wish[], options: GroupOptions, arrived: Askers['arrived'], failed: Askers['failed']): Promise<void> {
+  async fetch(wishes: readonly Wish[], options: GroupOptions, arrived: Askers['arrived'],
+      failed: Askers['failed']): Promise<void> {
     ++this.pending; // a wish that has arrived is not decoded before its request has ended
     const parts = wishes.flatMap((wish) => this.partsOf_(wish, arrived, options.signal));
-    await Promise.all(groupsOf(parts, options).map((group) => this.fetchGroup_(group, { arrived, failed }, options.signal)));
+    await Promise.all(groupsOf(parts, options)
+      .map((group) => this.fetchGroup_(group, { arrived, failed }, options.signal)));
     --this.pending;
   }
 
@@ -116,7 +116,8 @@ export class Transfers {
     for (let rung = job.first + streams.length; rung <= wish.rung; ++rung) {
       const at = rung * fragmentCount(tables) + fragment;
       const offset = complete ? fragment * fileSpacing : offsets[at];
-      parts.push({ job, rung, offset, bytes: complete ? this.bytesOf(plane, rung, fragment) : tables.sizeBytes[at] });
+      parts.push({ job, rung, offset,
+        bytes: complete ? this.bytesOf(plane, rung, fragment) : tables.sizeBytes[at] });
     }
     streams.length = wish.rung + 1 - job.first;
     job.missing = parts.length;
@@ -134,17 +135,21 @@ export class Transfers {
     let reported = 0;
     // The plan hears of each fragment when its last byte comes, though the answer ends later.
     const reportArrived = (upTo: number): void => {
-      for (let p; (p = parts[reported]) && endOf(p) - begin <= upTo; ++reported) if (--p.job.missing === 0 && !p.job.failed) arrived(p.job.wish);
+      for (let p; (p = parts[reported]) && endOf(p) - begin <= upTo; ++reported)
+        if (--p.job.missing === 0 && !p.job.failed) arrived(p.job.wish);
     };
     try {
       const got = complete
         ? await this.reader_.fragmentFile(plane, rung, fragment, signal)
-        : await this.reader_.store.read(packs[rung], { offset: packs[rung].offset + begin, bytes: endOf(parts.at(-1)!) - begin }, {
+        : await this.reader_.store.read(packs[rung],
+            { offset: packs[rung].offset + begin, bytes: endOf(parts.at(-1)!) - begin }, {
             kind: 'texture', once: this.reader_.form !== 'files', signal, onBytes: reportArrived,
           });
-      for (const p of parts) p.job.streams[p.rung - p.job.first] = got.subarray(p.offset - begin, endOf(p) - begin);
+      for (const p of parts)
+        p.job.streams[p.rung - p.job.first] = got.subarray(p.offset - begin, endOf(p) - begin);
       reportArrived(Infinity);
-      for (const p of parts) if (p.job.missing === 0 && !p.job.streams.includes(undefined as never)) void this.decode_(p.job, signal);
+      for (const p of parts) if (p.job.missing === 0 && !p.job.streams.includes(undefined as never))
+        void this.decode_(p.job, signal);
     } catch (error) {
       parts.forEach((p, i) => {
         if (p.job.failed) return;
@@ -163,7 +168,8 @@ export class Transfers {
         if (!(error instanceof FormatError) || this.filesOf(plane).complete) throw error;
         // A fragment damaged on the way is asked for once more, by itself, past caches and bad mirrors.
         this.heldStreams_.delete(`${plane}/${fragment}`);
-        for (let r = job.first; r <= rung; ++r) job.streams[r - job.first] = await this.reader_.fragment(plane, r, fragment, signal);
+        for (let r = job.first; r <= rung; ++r)
+          job.streams[r - job.first] = await this.reader_.fragment(plane, r, fragment, signal);
         return this.decodeStreams_(job, signal);
       });
       this.hooks_.decoded(job.wish, levels);
@@ -183,11 +189,12 @@ export class Transfers {
       codec,
       tables: complete ? new Uint8Array(0) : await this.reader_.tableStream(plane, first, signal),
       streams,
-      digests: complete ? [complete[rung].get(fragment)!.sha256] : streams.map((_, i) => digestOf((first + i) * fragmentCount(t) + fragment)),
+      digests: complete ? [complete[rung].get(fragment)!.sha256]
+        : streams.map((_, i) => digestOf((first + i) * fragmentCount(t) + fragment)),
       complete: !!complete,
       levels: blocks ? 1 : ownLevels,
       blocks,
-      // The GPU can hold the plane, so that the plane bounds the picture; the sides of an only fragment may be anything.
+      // The GPU can hold the plane, so the plane bounds the picture; an only fragment may have any sides.
       most: [Math.min(fragmentWidthPx, widthPx + beyondPx), Math.min(fragmentHeightPx, heightPx + beyondPx)],
     });
     if (t.incremental && !complete) this.heldStreams_.set(`${plane}/${fragment}`, streams);
@@ -204,12 +211,14 @@ const endOf = (p: Part): number => p.offset + p.bytes;
 
 /** Parts of one rung that stand together (or nearly) become one range. */
 function groupsOf(parts: readonly Part[], { gapBytes, mostBytes }: GroupOptions): Part[][] {
-  const sorted = [...parts].sort((a, b) => a.job.wish.plane - b.job.wish.plane || a.rung - b.rung || a.offset - b.offset);
+  const sorted =
+    [...parts].sort((a, b) => a.job.wish.plane - b.job.wish.plane || a.rung - b.rung || a.offset - b.offset);
   const groups: Part[][] = [];
   sorted.forEach((p, i) => {
     const before = sorted[i - 1];
     const group = groups[groups.length - 1];
-    const joins = before?.job.wish.plane === p.job.wish.plane && before.rung === p.rung && p.offset - endOf(before) <= gapBytes;
+    const joins = before?.job.wish.plane === p.job.wish.plane && before.rung === p.rung &&
+      p.offset - endOf(before) <= gapBytes;
     if (joins && endOf(p) - group[0].offset <= mostBytes) group.push(p);
     else groups.push([p]);
   });

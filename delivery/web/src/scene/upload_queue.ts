@@ -5,16 +5,13 @@ import { gpuIdle } from './gpu';
 /** Milliseconds and pixels of uploads between two turns of the page. */
 const sliceMs = 4;
 const slicePx = 1 << 19;
-/**
- * The GPU may be so many slices behind: a further upload would wait in the middle of a page's turn. Nobody waits for the GPU longer
- * than longestFenceS.
- */
+/** The GPU may be so many slices behind, and nobody waits for it longer than longestFenceS. */
 const mostBehind = 3;
 const longestFenceS = 0.25;
 /** The smallest mip levels follow this often while fragments come. */
 const mipsEveryMs = 200;
 
-/** Uploads that wait for their turn: a few between two turns of the page, and never more than the GPU has done. */
+/** Uploads that wait for their turn: a few between two turns of the page; the GPU must keep up. */
 export class UploadQueue {
   /** Uploads that still wait are left out from now on. */
   disposed = false;
@@ -30,7 +27,7 @@ export class UploadQueue {
     private readonly updateMips_: () => void,
   ) {}
 
-  /** Puts off `run`, which gives so many pixels to the GPU; resolves when `run` has ended, or was left out. */
+  /** Puts off `run`, which uploads so many pixels; resolves when `run` has ended, or was left out. */
   enqueue(pixels: number, run: () => void): Promise<void> {
     return new Promise((ended) => {
       this.uploads_.push({ pixels, run, ended });

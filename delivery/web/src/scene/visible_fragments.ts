@@ -6,10 +6,12 @@ import { sampleTriangles } from './scale_parts';
 const mostSamples = 6000;
 
 /** The fragment at texture coordinates. */
-function fragmentAt({ columns, rows, widthPx, heightPx, fragmentWidthPx, fragmentHeightPx }: TextureInfo, uv: { x: number; y: number }): number {
+function fragmentAt({ columns, rows, widthPx, heightPx, fragmentWidthPx, fragmentHeightPx }: TextureInfo,
+    uv: { x: number; y: number }): number {
   const cell = (part: number, px: number, whole: number, count: number): number =>
     Math.min(count - 1, Math.floor(((part - Math.floor(part)) * whole) / px));
-  return cell(uv.y, fragmentHeightPx, heightPx, rows) * columns + cell(uv.x, fragmentWidthPx, widthPx, columns);
+  return cell(uv.y, fragmentHeightPx, heightPx, rows) * columns +
+    cell(uv.x, fragmentWidthPx, widthPx, columns);
 }
 
 /** Where a plane is looked at. */
@@ -21,8 +23,9 @@ export interface LookedSurface {
   within?: Object3D;
 }
 
-/** A sample of the triangles that show a plane, in the world, by the fragment in the middle of each. The triangle is another's after `use`. */
-export function sampleFragments(plane: TextureInfo, { object, shows, within }: LookedSurface, use: (fragment: number, at: Triangle, mesh: Mesh, world: Matrix4) => void): void {
+/** A sample of a plane's triangles, in the world, by fragment. `use` may keep no triangle. */
+export function sampleFragments(plane: TextureInfo, { object, shows, within }: LookedSurface,
+    use: (fragment: number, at: Triangle, mesh: Mesh, world: Matrix4) => void): void {
   object.updateWorldMatrix(true, true);
   const [at, uv, middle, world] = [new Triangle(), new Triangle(), new Vector3(), new Matrix4()];
   sampleTriangles(object, mostSamples, (mesh, places) => {
@@ -38,22 +41,21 @@ export function sampleFragments(plane: TextureInfo, { object, shows, within }: L
   });
 }
 
-/**
- * Share of each fragment's surface that the camera sees, from a sample of the triangles. Seen: within the camera's frustum and turned to
- * the camera, by the material's side. [fragments]
- */
+/** [fragments] Share of a surface that the camera sees, from a sample of triangles that face it. */
 export function seenShares(plane: TextureInfo, surface: LookedSurface, camera: Camera): Float32Array {
   const { columns, rows } = plane;
   const seen = new Float32Array(columns * rows);
   const all = new Float32Array(columns * rows);
   const eye = new Vector3().setFromMatrixPosition(camera.matrixWorld);
-  const frustum = new Frustum().setFromProjectionMatrix(new Matrix4().multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse));
+  const frustum = new Frustum().setFromProjectionMatrix(
+    new Matrix4().multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse));
   const middle = new Vector3();
   sampleFragments(plane, surface, (f, at, mesh, world) => {
     const area = at.getArea();
     all[f] += area;
     const sides = [mesh.material].flat().map((m) => m.side);
-    const front = sides.includes(BackSide) === world.determinant() < 0; // mirrored: three.js takes the other side for the front
+    // mirrored: three.js takes the other side for the front
+    const front = sides.includes(BackSide) === world.determinant() < 0;
     const turned = sides.includes(DoubleSide) || at.isFrontFacing(at.getMidpoint(middle).sub(eye)) === front;
     if (turned && [at.a, at.b, at.c].some((p) => frustum.containsPoint(p))) seen[f] += area;
   });

@@ -10,7 +10,8 @@ import type {
   DecodeRequest, EnlargeRequest, SplitInfo, SplitUpdate, WorkerAnswer, WorkerRequest,
 } from './protocol';
 
-const asItIs = { premultiplyAlpha: 'none', colorSpaceConversion: 'none', imageOrientation: 'none' } as ImageBitmapOptions;
+const asItIs =
+  { premultiplyAlpha: 'none', colorSpaceConversion: 'none', imageOrientation: 'none' } as ImageBitmapOptions;
 
 /** A fragment (or preview) as a picture and its halves; digests and size are checked first. */
 async function decodePicture(request: DecodeRequest): Promise<ImageBitmap[]> {
@@ -22,19 +23,21 @@ async function decodePicture(request: DecodeRequest): Promise<ImageBitmap[]> {
     : joinFragment(request.codec, request.tables, request.streams);
   const size = imageSize(file);
   if (!(size[0] > 0 && size[1] > 0 && size[0] <= request.most[0] && size[1] <= request.most[1]))
-    throw new FormatError('fragment', '', `a picture of at most ${request.most.join(' x ')} px`, size.join(' x '), 'F08');
+    throw new FormatError('fragment', '', `a picture of at most ${request.most.join(' x ')} px`,
+      size.join(' x '), 'F08');
   const blob = new Blob([file as BlobPart], { type: codecTraits(request.codec).mediaType });
   const levels = [await createImageBitmap(blob, asItIs)];
   while (levels.length < request.levels) {
     const last = levels[levels.length - 1];
     const [resizeWidth, resizeHeight] = [last.width >> 1, last.height >> 1];
     if (resizeWidth < 1 || resizeHeight < 1) break;
-    levels.push(await createImageBitmap(last, { ...asItIs, resizeWidth, resizeHeight, resizeQuality: 'low' }));
+    levels.push(await createImageBitmap(last,
+      { ...asItIs, resizeWidth, resizeHeight, resizeQuality: 'low' }));
   }
   return levels;
 }
 
-/** A piece of an enlarged picture. Every piece is drawn as a part of the whole, so that pieces meet without a seam. */
+/** A piece of an enlarged picture, drawn as a part of the whole: pieces meet without a seam. */
 function enlargePicture({ picture, width, height, x0, x1, y0, y1, levels }: EnlargeRequest): ImageBitmap[] {
   const out: ImageBitmap[] = [];
   for (let level = 0; level < levels; ++level) {
@@ -64,13 +67,8 @@ function splitInfo(head: SplitStreamHead): SplitInfo {
   return { headBytes: head.bytes, scales };
 }
 
-function gridValues(
-  places: Int32Array,
-  stride: number,
-  grid: SplitGrid,
-  count: number,
-  placeOf: (i: number) => number,
-): Float32Array {
+function gridValues(places: Int32Array, stride: number, grid: SplitGrid, count: number,
+    placeOf: (i: number) => number): Float32Array {
   const step = f(grid.range / f(2 ** grid.bits - 1));
   const out = new Float32Array(count * stride);
   for (let i = 0; i < count; ++i) {
@@ -90,7 +88,7 @@ function normals(codes: Int32Array, from: number, to: number, bits: number): Flo
   return out;
 }
 
-/** Wedges that were added since there were `from` wedges, and the index of all triangles, for append-only buffers. */
+/** Wedges from number `from` on, and the index of all triangles, for append-only buffers. */
 function splitUpdate(reader: SplitStreamReader, from: number): SplitUpdate {
   const { mesh, head } = reader;
   const to = mesh.wedges;
@@ -104,7 +102,8 @@ function splitUpdate(reader: SplitStreamReader, from: number): SplitUpdate {
       kind === 'normal' ? normals(data, from, to, grid.bits)
       : kind === 'colour' ? Float32Array.from(data.subarray(4 * from, 4 * to), (v) => v / most)
       : gridValues(data, 2, grid, to - from, (i) => from + i);
-    attributes.push({ name: names[kind], components: kind === 'normal' ? 3 : kind === 'colour' ? 4 : 2, values });
+    attributes.push({ name: names[kind], components: kind === 'normal' ? 3 : kind === 'colour' ? 4 : 2,
+      values });
   });
   const groupTriangles = new Uint32Array(head.groups.length);
   const visible = new Uint8Array(mesh.faceCount);
@@ -132,8 +131,8 @@ function splitUpdate(reader: SplitStreamReader, from: number): SplitUpdate {
   return { from, to, blocks: reader.nextBlock, attributes, index, draws };
 }
 
-// The work of workers: documents, digests, images, vertex splits. `handle` works on the main thread, too, where no worker can be
-// had.
+// The work of workers: documents, digests, images, vertex splits. `handle` works on the main thread, too,
+// where no worker can be had.
 
 /** Buffers of all typed arrays in a value; several arrays may share one. */
 function buffersOf(value: unknown, found = new Set<ArrayBuffer>()): ArrayBuffer[] {
@@ -152,8 +151,10 @@ function streamOf(key: number): { reader: SplitStreamReader; wedges: number } {
 }
 
 /** What makes blocks is fetched where somebody asks for them: most loads never do. */
-async function inBlocks(picture: ImageBitmap | Pixels, request: BlockRequest): Promise<[BlockLevel[], Transferable[]]> {
-  const levels = await (await import(/* webpackIgnore: true */ /* @vite-ignore */ request.url)).toBlocks(picture, request);
+async function inBlocks(picture: ImageBitmap | Pixels, request: BlockRequest): Promise<[BlockLevel[],
+    Transferable[]]> {
+  const levels =
+    await (await import(/* webpackIgnore: true */ /* @vite-ignore */ request.url)).toBlocks(picture, request);
   return [levels, buffersOf(levels)];
 }
 
@@ -199,6 +200,8 @@ export async function handle(request: WorkerRequest): Promise<[unknown, Transfer
 /** Errors lose their class on the way; their parts do not. */
 export function packError(error: unknown): WorkerAnswer['error'] {
   if (error instanceof TexmeshError)
-    return { name: error.name, message: error.message, parts: [error.file, error.place, error.expected, error.found, error.rule] };
-  return { name: error instanceof Error ? error.name : 'Error', message: String((error as Error)?.message ?? error) };
+    return { name: error.name, message: error.message,
+      parts: [error.file, error.place, error.expected, error.found, error.rule] };
+  return { name: error instanceof Error ? error.name : 'Error',
+    message: String((error as Error)?.message ?? error) };
 }

@@ -23,15 +23,17 @@ let running = 0;
 let turns = 0;
 function postWaitingJobs(): void {
   while (queue.length > 0 && running < mostAtOnce) {
-    // A preview is enlarged when nothing better waits: what comes meanwhile needs none. But its texture shows nothing of that before the
-    // first piece has been made, so every fourth turn belongs to whoever waits longest.
-    const next = ++turns % 4 === 0 ? 0 : Math.max(0, queue.findIndex(({ request }) => request.op !== 'enlarge'));
+    // A preview is enlarged when nothing better waits: what comes meanwhile needs none. But its texture shows
+    // nothing of that before the first piece has been made, so every fourth turn belongs to whoever waits
+    // longest.
+    const next = ++turns % 4 === 0 ? 0
+      : Math.max(0, queue.findIndex(({ request }) => request.op !== 'enlarge'));
     const [job] = queue.splice(next, 1);
     job.pool.post(job);
   }
 }
 
-/** A value whose byte arrays have buffers of their own: a posted array takes its whole buffer along, which may be the whole package. */
+/** A value whose byte arrays have their own buffers: posting takes a whole buffer, maybe the package. */
 function inBuffersOfItsOwn(value: unknown): unknown {
   if (Array.isArray(value)) return value.map(inBuffersOfItsOwn);
   return value instanceof Uint8Array && value.length < value.buffer.byteLength ? value.slice() : value;
@@ -72,7 +74,8 @@ export class WorkerPool {
   /** Grows the pool to so many workers; left out: 2 to 4, by the number of cores. */
   grow(count = Math.min(4, Math.max(2, (globalThis.navigator?.hardwareConcurrency ?? 2) - 1))): void {
     const { helpers_: helpers } = this;
-    for (let i = helpers.length; i < 1 || (!this.onThisThread_ && i < count); ++i) helpers.push(this.onThisThread_ ? this.startHere_() : this.startWorker_(i));
+    for (let i = helpers.length; i < 1 || (!this.onThisThread_ && i < count); ++i)
+      helpers.push(this.onThisThread_ ? this.startHere_() : this.startWorker_(i));
   }
   /** Finds out early whether there is anything that decodes. */
   start(): void {
@@ -112,7 +115,9 @@ export class WorkerPool {
     return this.jobs_.size;
   }
   dispose(): void {
-    if (this.options_.shared) for (const job of queue) if (job.pool === this && job.request.op === 'split-close') this.post(job); // or the worker keeps the stream
+    // or the worker keeps the stream
+    if (this.options_.shared) for (const job of queue)
+      if (job.pool === this && job.request.op === 'split-close') this.post(job);
     this.ended_ = true;
     this.helpers_.forEach((h) => h.terminate());
     queue = queue.filter((job) => job.pool !== this);
@@ -125,7 +130,8 @@ export class WorkerPool {
   }
 
   private ask_<T>(asked: WorkerRequest): Promise<T> {
-    const copied = Object.fromEntries(Object.entries(asked).map(([name, value]) => [name, inBuffersOfItsOwn(value)]));
+    const copied =
+      Object.fromEntries(Object.entries(asked).map(([name, value]) => [name, inBuffersOfItsOwn(value)]));
     return new Promise((done, failed) => {
       if (this.ended_) return failed(abortError());
       const request = { ...copied, id: ++this.lastId_ } as Job['request'];
@@ -136,14 +142,15 @@ export class WorkerPool {
       postWaitingJobs();
     });
   }
-  /** Gives a job whose turn it is to the worker that has least to do; splits are decoded where their stream was opened. */
+  /** Gives a job to the worker that has least to do; splits go where their stream was opened. */
   post(job: Job): void {
     const busy = this.helpers_.map(() => 0);
     for (const { worker = -1 } of this.jobs_.values()) if (worker >= 0) ++busy[worker];
     job.worker = job.request.op.startsWith('split') ? 0 : busy.indexOf(Math.min(...busy));
     ++running;
     try {
-      this.helpers_[job.worker].postMessage(job.request); // copied, not handed over: a worker that breaks gives its requests back
+      // copied, not handed over: a worker that breaks gives its requests back
+      this.helpers_[job.worker].postMessage(job.request);
     } catch (failed) {
       this.answered_({ id: job.request.id, failed }); // a request that cannot be copied takes nobody's turn
     }
@@ -151,7 +158,8 @@ export class WorkerPool {
   private answered_({ id, result, failed, error }: WorkerAnswer): void {
     const job = this.jobs_.get(id);
     if (!job) {
-      if (Array.isArray(result)) for (const b of result as Partial<ImageBitmap>[]) b.close?.(); // nobody waits for them any more
+      // nobody waits for them any more
+      if (Array.isArray(result)) for (const b of result as Partial<ImageBitmap>[]) b.close?.();
       return;
     }
     this.hasAnswered_ ||= !failed;
@@ -159,7 +167,8 @@ export class WorkerPool {
     --running;
     if (failed) job.failed(failed);
     else if (!error) job.done(result);
-    else job.failed(error.parts ? new FormatError(...error.parts) : Object.assign(new Error(error.message), { name: error.name }));
+    else job.failed(error.parts ? new FormatError(...error.parts)
+      : Object.assign(new Error(error.message), { name: error.name }));
     postWaitingJobs();
   }
 
@@ -167,7 +176,8 @@ export class WorkerPool {
 
   private startWorker_(index: number): Helper {
     const { shared, workerUrl } = this.options_;
-    const events: WorkerEvents = { answered: (answer) => this.answered_(answer), broke: () => this.replace_(index) };
+    const events: WorkerEvents = { answered: (answer) => this.answered_(answer),
+      broke: () => this.replace_(index) };
     try {
       return shared?.helper(this.firstShared_ + index, events) ?? startWorker(workerUrl, events);
     } catch {
@@ -189,12 +199,16 @@ export class WorkerPool {
     };
   }
   private missing_(): never {
-    const error = new Error('workers cannot be had here: give `workerUrl`, the address of dist/worker.js, or `decode`, the `handle` of texmesh/worker');
+    const error = new Error('workers cannot be had here: give `workerUrl`, the address of dist/worker.js, ' +
+      'or `decode`, the `handle` of texmesh/worker');
     if (!this.isUnavailable) this.onUnavailable?.(error);
     this.isUnavailable = true;
     throw error;
   }
-  /** Gives the jobs of a worker that broke to another one. Where that one breaks, too, the jobs fail, or there are no workers here at all. */
+  /**
+   * Gives the jobs of a worker that broke to another one. Where that one breaks, too, the jobs fail, or there
+   * are no workers here at all.
+   */
   private replace_(index: number): void {
     if (this.ended_) return;
     const again = this.brokeOnce_.has(index);

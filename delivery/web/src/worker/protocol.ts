@@ -2,7 +2,7 @@ import type { BlockLevel, BlockRequest, Pixels } from '../blocks/formats';
 import type { CodecId } from '../format/codec';
 import type { Documents } from '../format/document_decoder';
 
-/** Decode one fragment (or preview): streams are joined with their tables, digests checked first. Gives Levels. */
+/** Decodes one fragment (or preview): checks digests, joins streams and tables. Gives Levels. */
 export interface DecodeRequest {
   op: 'decode';
   codec: CodecId;
@@ -19,7 +19,7 @@ export interface DecodeRequest {
   /** Levels as blocks, made of the picture alone. */
   blocks?: BlockRequest;
 }
-/** x0 .. x1, y0 .. y1 (multiples of 16, or the end) of a picture enlarged to width x height, bilinearly. Gives Levels. */
+/** x0 .. x1, y0 .. y1 (multiples of 16, or the end) of a picture enlarged bilinearly. Gives Levels. */
 export interface EnlargeRequest {
   op: 'enlarge';
   picture: ImageBitmap;
@@ -72,7 +72,8 @@ export interface DocumentRequest {
   args: unknown[];
 }
 /** Anything that a worker is asked. */
-export type WorkerRequest = DocumentRequest | DecodeRequest | EnlargeRequest | PixelsRequest | SplitOpenRequest | SplitCheckRequest | SplitAddRequest | SplitCloseRequest;
+export type WorkerRequest = DocumentRequest | DecodeRequest | EnlargeRequest | PixelsRequest
+  | SplitOpenRequest | SplitCheckRequest | SplitAddRequest | SplitCloseRequest;
 
 /** Facts about a stream from its head. */
 export interface SplitInfo {

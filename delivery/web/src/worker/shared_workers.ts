@@ -20,7 +20,8 @@ interface Shared {
 /** Starts a worker that tells `events`. Throws where a page may have none. */
 export function startWorker(workerUrl: string | URL | undefined, events: WorkerEvents): Worker {
   // Bundlers see a worker that is written so.
-  const worker = workerUrl ? new Worker(workerUrl, { type: 'module' }) : new Worker(new URL('./worker.js', import.meta.url), { type: 'module' });
+  const worker = workerUrl ? new Worker(workerUrl, { type: 'module' })
+    : new Worker(new URL('./worker.js', import.meta.url), { type: 'module' });
   worker.onmessage = (event: MessageEvent<WorkerAnswer>) => events.answered(event.data);
   worker.onerror = (event) => {
     event.preventDefault();
@@ -37,14 +38,11 @@ export class SharedWorkers {
   private pools_ = 0;
 
   /** `count` >= 1; workers start when a pool first asks for them. */
-  constructor(
-    count: number,
-    private readonly workerUrl_?: string | URL,
-  ) {
+  constructor(count: number, private readonly workerUrl_?: string | URL) {
     this.workers_ = new Array<undefined>(Math.max(1, Math.floor(count))).fill(undefined);
   }
 
-  /** To be called once by each pool: the pool's first worker, so that not all pools begin with the same one. */
+  /** Called once by each pool: its first worker, so that not all pools begin with the same one. */
   nextPool(): number {
     return this.pools_++;
   }

@@ -21,7 +21,8 @@ describe('the scale', () => {
 describe('memory', () => {
   it('is kept by coarser scales and mips, and nothing is worse for more of it', async () => {
     const { data } = await setUp();
-    const at = (memoryBytes?: number) => planDelivery(data, { ...defaultDeliveryRequest(), timeLimitS: 100, memoryBytes })!;
+    const at = (memoryBytes?: number) =>
+      planDelivery(data, { ...defaultDeliveryRequest(), timeLimitS: 100, memoryBytes })!;
     const taken = ({ gpuBytes: { mesh, textures } }: DeliveryPlan): number => mesh + textures;
     const all = at();
     let before = all;
@@ -37,12 +38,15 @@ describe('memory', () => {
 
 describe('a larger proxy on the way', () => {
   const glb = (offset: number, bytes: number) => ({ path: '', offset, bytes, sha256: new Uint8Array(32) });
-  const proxy = (offset: number, bytes: number, flip: number) => ({ glb: glb(offset, bytes), triangles: 1, vertices: 3, texturePx: 0, flip: [flip], flipP95: [1] });
+  const proxy = (offset: number, bytes: number, flip: number) =>
+    ({ glb: glb(offset, bytes), triangles: 1, vertices: 3, texturePx: 0, flip: [flip], flipP95: [1] });
   it('comes where documents take long, delays what follows, and is nobody\'s choice by hand', async () => {
     const { data } = await setUp();
     // Tables behind a megabyte: scales come late.
-    const manifest = { ...data.manifest, proxySizesPx: [1000], proxies: [proxy(3000, 20000, 0.9), proxy(100000, 50000, 0.5)], tables: { ...data.manifest.tables, offset: 1e6 } };
-    const ask = { ...defaultDeliveryRequest(), displayedPx: 1000, timeLimitS: 20, link: { bytesS: 1e5, rttS: 0.04, connections: 6 } };
+    const manifest = { ...data.manifest, proxySizesPx: [1000], proxies: [proxy(3000, 20000, 0.9),
+      proxy(100000, 50000, 0.5)], tables: { ...data.manifest.tables, offset: 1e6 } };
+    const ask = { ...defaultDeliveryRequest(), displayedPx: 1000, timeLimitS: 20,
+      link: { bytesS: 1e5, rttS: 0.04, connections: 6 } };
     const plan = planDelivery({ ...data, manifest } as PackageData, ask)!;
     expect(plan.proxy).toBeUndefined();
     expect(plan.step?.proxy).toBe(1);

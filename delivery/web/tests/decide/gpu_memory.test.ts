@@ -12,7 +12,8 @@ describe('memory on the GPU', () => {
     expect(textureBytes(256, 256)).toBe(4 * (4 ** 9 - 1) / 3);
   });
   it('takes the finest scale that leaves room for textures, the coarsest where none does', () => {
-    const scales = [[0, 4000, 8000], [3, 1000, 2000], [5, 10, 20]].map(([scale, vertices, triangles]) => ({ scale, vertices, triangles })) as never[];
+    const scales = [[0, 4000, 8000], [3, 1000, 2000],
+      [5, 10, 20]].map(([scale, vertices, triangles]) => ({ scale, vertices, triangles })) as never[];
     const bytes = scaleBytes({ vertices: 1000, triangles: 2000 });
     expect(scaleWithin(scales, 0, Infinity)).toBe(0);
     expect(scaleWithin(scales, 0, 2 * bytes)).toBe(3);
@@ -25,14 +26,16 @@ describe('memory on the GPU', () => {
     const loss = new TextureLoss(data, 1000);
     const all = fullSize(data.textures);
     const bytesOf = (planes: { plane: number }[]): number =>
-      planes.reduce((sum, { plane }) => sum + textureBytes(data.textures[plane].widthPx, data.textures[plane].heightPx), 0);
+      planes.reduce((sum, { plane }) =>
+        sum + textureBytes(data.textures[plane].widthPx, data.textures[plane].heightPx), 0);
     const whole = bytesOf(all);
     expect(planesWithin(loss, all, whole)).toEqual(all);
     let before = whole;
     for (const share of [0.9, 0.5, 0.3, 0.1]) {
       const planes = planesWithin(loss, all, share * whole);
       expect(planes.map((p) => p.base)).toEqual(all.map((p) => p.base));
-      const coarsest = planes.every(({ base, plane }) => !data.textures.some((t) => t.base === base && t.mip > data.textures[plane].mip));
+      const coarsest = planes.every(({ base, plane }) =>
+        !data.textures.some((t) => t.base === base && t.mip > data.textures[plane].mip));
       expect(bytesOf(planes) <= share * whole || coarsest).toBe(true);
       expect(bytesOf(planes)).toBeLessThanOrEqual(before);
       before = bytesOf(planes);

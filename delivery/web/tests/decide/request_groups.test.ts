@@ -15,7 +15,8 @@ describe('groups', () => {
   it('one each where requests cost nothing, one per plane where only whole rungs come', async () => {
     const { list } = await setUp();
     expect(groupedList(list, 0, 1e5).offers.length).toBe(list.offers.length);
-    expect(groupedList(list, Infinity, 1e5).offers.length).toBe(new Set(list.fragments.map((f) => f.plane)).size);
+    expect(groupedList(list, Infinity, 1e5).offers.length)
+      .toBe(new Set(list.fragments.map((f) => f.plane)).size);
   });
   it('grow with the round trip, but leave enough decisions', () => {
     expect(groupBytes(250e3, 0.04, 4)).toBeCloseTo(6000);

@@ -7,9 +7,10 @@ afterEach(() => {
 });
 /** Files that came, as [bytes, seconds]. */
 const came = (...files: [number, number][]): void =>
-  void vi.spyOn(performance, 'getEntriesByType').mockReturnValue(files.map(([transferSize, s]) => ({ transferSize, responseStart: 500, responseEnd: 500 + 1000 * s })) as never);
+  void vi.spyOn(performance, 'getEntriesByType').mockReturnValue(files.map(
+    ([transferSize, s]) => ({ transferSize, responseStart: 500, responseEnd: 500 + 1000 * s })) as never);
 
-it('the link is as fast as the browser says, else as the fastest of the page\'s own large files; else nobody knows', () => {
+it('the link is as fast as the browser says, else as the fastest large file of the page', () => {
   vi.stubGlobal('navigator', {});
   came();
   expect([linkBytesS(), savesData()]).toEqual([0, false]);
@@ -19,12 +20,14 @@ it('the link is as fast as the browser says, else as the fastest of the page\'s 
   expect([linkBytesS(), savesData()]).toEqual([250e3, true]);
 });
 it('a file is as large as its server says; unknown where it does not, or cannot be had', async () => {
-  const answer = (status: number, headers: Record<string, string>) => async (_: string, { method }: RequestInit) => {
+  const answer = (status: number, headers: Record<string, string>) =>
+      async (_: string, { method }: RequestInit) => {
     expect(method).toBe('HEAD');
     return new Response(null, { status, headers });
   };
   for (const [server, bytes] of [
-    [answer(200, { 'content-length': '2500000' }), 2500000], [answer(200, {}), 0], [answer(404, { 'content-length': '12' }), 0],
+    [answer(200, { 'content-length': '2500000' }), 2500000], [answer(200, {}), 0],
+    [answer(404, { 'content-length': '12' }), 0],
     [answer(200, { 'content-length': 'many' }), 0], [() => Promise.reject(new TypeError('no network')), 0],
   ] as const) {
     vi.stubGlobal('fetch', server);

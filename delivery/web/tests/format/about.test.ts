@@ -15,19 +15,22 @@ describe('about.json', () => {
   });
 
   it('keeps what it knows and what strangers said', () => {
-    const said = { title: 'A', licence: 'CC0-1.0', unit: { name: 'mm', metres: 0.001 }, source: { format: 'obj', x: '\u0007' }, extras: [1] };
+    const said = { title: 'A', licence: 'CC0-1.0', unit: { name: 'mm', metres: 0.001 },
+      source: { format: 'obj', x: '\u0007' }, extras: [1] };
     expect(readAbout(bytes(JSON.stringify({ ...said, later: 1 })))).toEqual({ ...said, later: 1 });
     expect(readAbout(bytes('{}'))).toEqual({});
   });
 
   it('tells every truncation', async () => {
     const json = bytes(JSON.stringify({ title: 'A', dates: [{ event: 'found', text: '1897' }] }));
-    for (let n = 0; n < json.length; ++n) expect(await problem(() => readAbout(json.slice(0, n)))).toBeInstanceOf(FormatError);
+    for (let n = 0; n < json.length; ++n)
+      expect(await problem(() => readAbout(json.slice(0, n)))).toBeInstanceOf(FormatError);
   });
 
   it('makes links of http and https alone', () => {
     for (const url of ['http://a', 'https://a.b/c?d#e']) expect(isWebUrl(url)).toBe(true);
-    for (const url of ['', 'https://', 'https:///a', 'javascript:alert(1)', 'https://a b', 'ftp://a', 'https://a"b', ' https://a', 'https://a\n']) expect(isWebUrl(url)).toBe(false);
+    for (const url of ['', 'https://', 'https:///a', 'javascript:alert(1)', 'https://a b', 'ftp://a',
+        'https://a"b', ' https://a', 'https://a\n']) expect(isWebUrl(url)).toBe(false);
   });
 
   it('is fetched when it is asked for, once', async () => {

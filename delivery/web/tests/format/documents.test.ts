@@ -1,6 +1,7 @@
 import { describe, expect, it } from 'vitest';
 import {
-  FormatError, PackageReader, readIndex, readManifest, readQuality, readTablesHead, readTablesSection, readTextures,
+  FormatError, PackageReader, readIndex, readManifest, readQuality, readTablesHead, readTablesSection,
+  readTextures,
 } from '../../src/reader';
 import { hasGlb } from '../../src/format/manifest';
 import { golden, goldenNames } from '../support/files';
@@ -18,8 +19,10 @@ async function entryOf(name: string, path: string): Promise<Uint8Array> {
 async function readTables(bytes: Uint8Array): Promise<unknown> {
   const head = readTablesHead(bytes);
   const end = head.planes.at(-1);
-  if (end && end.offset + end.bytes !== bytes.length) throw new FormatError('tables.bin', '', 'another length', '');
-  return Promise.all(head.planes.map((s, p) => readTablesSection(head, p, bytes.subarray(s.offset, s.offset + s.bytes))));
+  if (end && end.offset + end.bytes !== bytes.length)
+    throw new FormatError('tables.bin', '', 'another length', '');
+  return Promise.all(head.planes.map((s, p) =>
+    readTablesSection(head, p, bytes.subarray(s.offset, s.offset + s.bytes))));
 }
 const documents: Record<string, (bytes: Uint8Array) => unknown> = {
   'manifest.json': readManifest,
@@ -37,7 +40,8 @@ describe.each(goldenNames)('%s', (name) => {
     for (let n = 0; n < bytes.length; n += step) {
       const error = await problem(() => documents[path](bytes.slice(0, n)));
       // Blanks may follow a JSON document.
-      if (error === undefined && path === 'manifest.json') expect(new TextDecoder().decode(bytes.slice(n)).trim()).toBe('');
+      if (error === undefined && path === 'manifest.json')
+        expect(new TextDecoder().decode(bytes.slice(n)).trim()).toBe('');
       else expect(error, `${n} bytes`).toBeInstanceOf(FormatError);
     }
   });
@@ -55,7 +59,8 @@ describe.each(goldenNames)('%s', (name) => {
 
 describe('scales that the vertex-split stream alone has', () => {
   /** The golden manifest, whose scale between the finest and the coarsest is a prefix of the stream. */
-  async function manifestWith(change: (scales: Record<string, unknown[]>, stream: { offset: number; bytes: number; headBytes: number }) => void = () => undefined) {
+  async function manifestWith(change: (scales: Record<string, unknown[]>,
+      stream: { offset: number; bytes: number; headBytes: number }) => void = () => undefined) {
     const json = JSON.parse(new TextDecoder().decode(await entryOf('v2.0-scan', 'manifest.json'))) as {
       scales: Record<string, unknown[]>;
       stream: { offset: number; bytes: number; headBytes: number };

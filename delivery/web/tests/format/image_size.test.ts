@@ -20,16 +20,18 @@ describe('pictures', () => {
     expect(imageSize(riff('VP8 ', 26, [0x80, 0, 0x40, 1]))).toEqual([128, 320]);
     expect(imageSize(riff('VP8L', 20, [0x2f, 0x7f, 0xc0, 0x4f, 0]))).toEqual([128, 320]);
     expect(imageSize(riff('VP8X', 24, [0x7f, 0, 0, 0x3f, 1, 0]))).toEqual([128, 320]);
-    const png = (name: string): Uint8Array => Uint8Array.from([0x89, ...new TextEncoder().encode(`PNG\r\n\x1a\n\0\0\0\r${name}`), 0, 0, 1, 64, 0, 1, 0, 2, 8, 6]);
+    const png = (name: string): Uint8Array => Uint8Array.from(
+      [0x89, ...new TextEncoder().encode(`PNG\r\n\x1a\n\0\0\0\r${name}`), 0, 0, 1, 64, 0, 1, 0, 2, 8, 6]);
     expect(imageSize(png('IHDR'))).toEqual([320, 65538]);
     expect(imageSize(png('tEXt'))).toEqual([0, 0]); // no decoder takes what does not begin with it
     for (let n = 0; n < 20; ++n) expect(Math.min(...imageSize(png('IHDR').subarray(0, n)))).toBe(0);
-    // Markers that have no length, behind which decoders find another frame than readers who think that they have one.
+    // Markers without a length: decoders find another frame behind them than readers who read a length.
     const frame = [0xff, 0xc0, 0, 17, 8, 0, 16, 0, 16, 3];
     expect(imageSize(Uint8Array.from([0xff, 0xd8, ...frame]))).toEqual([16, 16]);
     for (const marker of [0x01, 0xd0, 0xd7, 0xd8, 0xd9])
       expect(imageSize(Uint8Array.from([0xff, 0xd8, 0xff, marker, 0, 4, 0, 0, ...frame]))).toEqual([0, 0]);
     expect(imageSize(Uint8Array.from([0xff, 0xd8, 0xff, 0xe0, 0, 1, 0, ...frame]))).toEqual([0, 0]);
-    for (const none of [[], [0xff], [0xff, 0xd8], [0xff, 0xd8, 0xff, 0xe0, 0, 0], [1, 2, 3]]) expect(imageSize(Uint8Array.from(none))).toEqual([0, 0]);
+    for (const none of [[], [0xff], [0xff, 0xd8], [0xff, 0xd8, 0xff, 0xe0, 0, 0], [1, 2, 3]])
+      expect(imageSize(Uint8Array.from(none))).toEqual([0, 0]);
   });
 });

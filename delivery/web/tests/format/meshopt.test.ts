@@ -13,7 +13,8 @@ function random(seed: number): () => number {
     return (state ^ (state >>> 15)) >>> 0;
   };
 }
-const bytesOf = (next: () => number, count: number, most = 256): number[] => Array.from({ length: count }, () => (next() >>> 8) % most);
+const bytesOf = (next: () => number, count: number, most = 256): number[] =>
+  Array.from({ length: count }, () => (next() >>> 8) % most);
 
 /** A stream of attributes with groups of all four kinds, small differences and escapes. */
 function attributeStream(next: () => number, count: number, stride: number): Uint8Array {
@@ -23,7 +24,8 @@ function attributeStream(next: () => number, count: number, stride: number): Uin
     const groups = Math.ceil(Math.min(most, count - first) / 16);
     for (let k = 0; k < stride; ++k) {
       const modes = bytesOf(next, groups, 4);
-      for (let g = 0; g < groups; g += 4) out.push(modes.slice(g, g + 4).reduce((byte, mode, i) => byte | (mode << (2 * i)), 0));
+      for (let g = 0; g < groups; g += 4)
+        out.push(modes.slice(g, g + 4).reduce((byte, mode, i) => byte | (mode << (2 * i)), 0));
       for (const mode of modes) {
         if (mode === 3) out.push(...bytesOf(next, 16));
         else if (mode > 0) {
@@ -57,7 +59,8 @@ function triangleStream(next: () => number, triangles: number): Uint8Array {
       const ways = (next() >>> 8) % 256;
       codes.push(free);
       data.push(ways);
-      for (const far of [free === 0xff, ways >> 4 === 15, (ways & 15) === 15]) if (far) data.push(128 | next() % 128, next() % 128);
+      for (const far of [free === 0xff, ways >> 4 === 15, (ways & 15) === 15]) if (far)
+        data.push(128 | next() % 128, next() % 128);
     }
   }
   return Uint8Array.from([0xe1, ...codes, ...data, ...bytesOf(next, 16, 0xef)]);
@@ -84,7 +87,8 @@ describe('meshopt', () => {
       const stream = triangleStream(next, count / 3);
       const expected = new Uint8Array(4 * count);
       MeshoptDecoder.decodeGltfBuffer(expected, count, 4, stream, 'TRIANGLES', 'NONE');
-      expect(Buffer.compare(new Uint8Array(decodeTriangles(stream, count).buffer), expected), `seed ${seed}`).toBe(0);
+      expect(Buffer.compare(new Uint8Array(decodeTriangles(stream, count).buffer), expected), `seed ${seed}`)
+        .toBe(0);
     }
   });
   it('refuses other versions and streams that end too early', () => {
@@ -94,10 +98,13 @@ describe('meshopt', () => {
     for (const cut of [0, 1, 10, 40, attributes.length / 2])
       expect(() => decodeAttributes(attributes.subarray(0, cut), 100, 8), `${cut}`).toThrow(FormatError);
     expect(() => decodeAttributes(attributes, 10_000_000, 8)).toThrow(FormatError);
-    for (const cut of [0, 1, 16, 40, 60]) expect(() => decodeTriangles(triangles.subarray(0, cut), 150), `${cut}`).toThrow(FormatError);
+    for (const cut of [0, 1, 16, 40, 60])
+      expect(() => decodeTriangles(triangles.subarray(0, cut), 150), `${cut}`).toThrow(FormatError);
     expect(() => decodeTriangles(triangles, 149)).toThrow(FormatError);
     expect(() => decodeTriangles(triangles, 3e9)).toThrow(FormatError);
-    expect(() => decodeAttributes(Uint8Array.from([0xa1, ...attributes.subarray(1)]), 100, 8)).toThrow(FormatError);
-    expect(() => decodeTriangles(Uint8Array.from([0xe0, ...triangles.subarray(1)]), 150)).toThrow(FormatError);
+    expect(() => decodeAttributes(Uint8Array.from([0xa1, ...attributes.subarray(1)]), 100, 8))
+      .toThrow(FormatError);
+    expect(() => decodeTriangles(Uint8Array.from([0xe0, ...triangles.subarray(1)]), 150))
+      .toThrow(FormatError);
   });
 });

@@ -8,12 +8,14 @@ describe('small parts', () => {
     const { textures } = JSON.parse(new TextDecoder().decode(entry));
     const withFirst = (more: object) => {
       const [first, ...others] = textures;
-      return new TextEncoder().encode(JSON.stringify({ textures: [{ ...first, sourceRung: false, ...more }, ...others] }));
+      return new TextEncoder().encode(
+        JSON.stringify({ textures: [{ ...first, sourceRung: false, ...more }, ...others] }));
     };
     expect(readTextures(withFirst({}))[0]).toMatchObject({ sourceRung: false, source: '' });
     expect(readTextures(withFirst({ sourceRung: true }))[0].sourceRung).toBe(true);
     expect(readTextures(withFirst({ source: 'exr', sourceColours: false }))[0].source).toBe('exr');
-    for (const bad of [{ sourceRung: 1 }, { source: 'gif', sourceColours: true }, { source: 'png' }, { sourceRung: true, codec: 'webp' }])
+    for (const bad of [{ sourceRung: 1 }, { source: 'gif', sourceColours: true }, { source: 'png' },
+        { sourceRung: true, codec: 'webp' }])
       expect(() => readTextures(withFirst(bad)), JSON.stringify(bad)).toThrow(FormatError);
     const mip = textures.findIndex((t: { mip?: number }) => (t.mip ?? 0) > 0);
     textures[mip].sourceRung = true;

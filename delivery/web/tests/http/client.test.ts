@@ -25,9 +25,11 @@ describe('the window', () => {
   afterEach(() => vi.restoreAllMocks());
 
   /** Requests under way at once, of 100 that are asked for behind the first. */
-  async function mostAtOnce(protocol: string | undefined, options: { connections?: number; streams?: number } = {}): Promise<number> {
+  async function mostAtOnce(protocol: string | undefined,
+      options: { connections?: number; streams?: number } = {}): Promise<number> {
     const entries = protocol === undefined ? [] : [{ nextHopProtocol: protocol }];
-    const told = vi.spyOn(performance, 'getEntriesByName').mockReturnValue(entries as unknown as PerformanceEntryList);
+    const told =
+      vi.spyOn(performance, 'getEntriesByName').mockReturnValue(entries as unknown as PerformanceEntryList);
     let [now, most] = [0, 0];
     const slow = async (): Promise<Response> => {
       most = Math.max(most, ++now);
@@ -51,10 +53,12 @@ describe('the window', () => {
     for (const protocol of ['http/1.1', '', undefined]) expect(await mostAtOnce(protocol)).toBe(6);
   });
   it('tells of bytes when the cap lets them through, not before', async () => {
-    const client = new HttpClient({ fetch: fakeServer({ '/x': new Uint8Array(4000) }).fetch, capBytesS: 20000 });
+    const client =
+      new HttpClient({ fetch: fakeServer({ '/x': new Uint8Array(4000) }).fetch, capBytesS: 20000 });
     const begin = performance.now();
     const told: [number, number][] = [];
-    await client.get('http://host/x', { maxBytes: 4000, kind: 'other', onBytes: (n) => told.push([n, (performance.now() - begin) / 1000]) });
+    await client.get('http://host/x',
+      { maxBytes: 4000, kind: 'other', onBytes: (n) => told.push([n, (performance.now() - begin) / 1000]) });
     expect(told.at(-1)?.[0]).toBe(4000);
     for (const [bytes, s] of told) expect(s).toBeGreaterThan(bytes / 20000 - 0.005);
   });

@@ -27,7 +27,8 @@ describe('documents', () => {
     expect(new Set(heard)).toEqual(new Set(['document']));
   });
   it('are decoded here where workers cannot, or have ended', async () => {
-    const pools = [new WorkerPool({ decode: () => Promise.reject(new Error('broken')) }), new WorkerPool({ decode: handle }), new WorkerPool()];
+    const pools = [new WorkerPool({ decode: () => Promise.reject(new Error('broken')) }),
+      new WorkerPool({ decode: handle }), new WorkerPool()];
     pools[1].dispose();
     for (const pool of pools) {
       const reader = await openAt(range());
@@ -37,7 +38,8 @@ describe('documents', () => {
   });
   it('are decoded here where workers do not answer, from the manifest on', async () => {
     const silent = new WorkerPool({ decode: () => new Promise(() => undefined) });
-    const reader = await PackageReader.openUrl(url, { fetch: range().fetch, ...quick }, silent.decodeDocument);
+    const reader =
+      await PackageReader.openUrl(url, { fetch: range().fetch, ...quick }, silent.decodeDocument);
     expect((await reader.data()).tables.length).toBe(reader.manifest.planeCount);
     silent.dispose();
   });
@@ -45,13 +47,16 @@ describe('documents', () => {
     const heard: WorkerRequest['op'][] = [];
     const { decodeDocument } = elsewhere(heard);
     const { manifest } = await PackageReader.openBytes(container, 'golden');
-    const bytes = container.slice(manifest.textures.offset, manifest.textures.offset + manifest.textures.bytes);
+    const bytes =
+      container.slice(manifest.textures.offset, manifest.textures.offset + manifest.textures.bytes);
     expect((await decodeDocument('textures', bytes, manifest)).length).toBe(manifest.planeCount);
-    expect(await rejection(decodeDocument('textures', bytes, { ...manifest, planeCount: 99 }))).toBeInstanceOf(FormatError);
+    expect(await rejection(decodeDocument('textures', bytes, { ...manifest, planeCount: 99 })))
+      .toBeInstanceOf(FormatError);
     const damaged = bytes.slice();
     damaged[0] ^= 1;
     const forged = await openAt(range());
-    forged.decodeDocument = (name, ...args) => decodeDocument(name, ...(args.map((a) => (a instanceof Uint8Array ? damaged : a)) as typeof args));
+    forged.decodeDocument = (name, ...args) =>
+      decodeDocument(name, ...(args.map((a) => (a instanceof Uint8Array ? damaged : a)) as typeof args));
     heard.length = 0;
     expect(await rejection(forged.textures())).toBeInstanceOf(FormatError);
     expect(heard).toEqual(['document']);

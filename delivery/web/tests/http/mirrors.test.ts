@@ -45,13 +45,15 @@ describe('mirrors', () => {
     expect(server.log.filter((r) => r.url.startsWith('http://host')).length).toBe(1);
   });
   it('one that knows no ranges is met in the middle', async () => {
-    const server = range(({ url: u, number }) => (u.startsWith('http://host') ? number > 0 && 'refused' : 'whole'));
+    const server =
+      range(({ url: u, number }) => (u.startsWith('http://host') ? number > 0 && 'refused' : 'whole'));
     const error = await rejection(openRetrying(server, { mirrors }).then(readSome));
     expect(error).toBeInstanceOf(InputError);
     expect(error.message).toContain('answers ranges');
   });
   it('a dead one and one without ranges: the whole file of the other', async () => {
-    const server = range(({ url: u, range: r }) => (u.startsWith('http://host') ? 'refused' : r !== undefined && 'whole'));
+    const server =
+      range(({ url: u, range: r }) => (u.startsWith('http://host') ? 'refused' : r !== undefined && 'whole'));
     const reader = await openRetrying(server, { mirrors });
     expect(reader.form).toBe('whole');
     expect(await readSome(reader)).toBe(expected);
@@ -59,6 +61,7 @@ describe('mirrors', () => {
   it('one that has something else instead of the whole file is left alone', async () => {
     const page = new TextEncoder().encode('<html>');
     const server = fakeServer({ '/a/scan.texmesh': page, '/b/scan.texmesh': container }, { ranges: false });
-    expect(await readSome(await openRetrying(server, { mirrors: ['http://other/b/scan.texmesh'] }))).toBe(expected);
+    expect(await readSome(await openRetrying(server, { mirrors: ['http://other/b/scan.texmesh'] })))
+      .toBe(expected);
   });
 });

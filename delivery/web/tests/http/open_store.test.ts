@@ -13,8 +13,10 @@ vi.mock('../../src/http/without_ranges', () => {
 const container = golden('v2.0-scan');
 const url = 'http://host/a/scan.texmesh';
 const open = (fault?: FaultKind, from = 0, ranges = true): Promise<PackageReader> => {
-  const server = fakeServer({ '/a/scan.texmesh': container }, { ranges, fault: ({ number }) => (number >= from && fault) || false });
-  return PackageReader.openUrl(url, { fetch: server.fetch, startBytes: 16384, retryDelayS: 0.001, stallTimeoutS: 0.05 });
+  const server = fakeServer({ '/a/scan.texmesh': container },
+    { ranges, fault: ({ number }) => (number >= from && fault) || false });
+  return PackageReader.openUrl(url,
+    { fetch: server.fetch, startBytes: 16384, retryDelayS: 0.001, stallTimeoutS: 0.05 });
 };
 const rejection = (what: Promise<unknown>): Promise<Error> =>
   what.then(() => { throw new Error('it should have failed'); }, (error: Error) => error);
@@ -28,7 +30,8 @@ describe('without the part for servers without ranges', () => {
     await reader.planeFiles(0);
     expect(asked).toBe(0);
   });
-  const told: [FaultKind, string][] = [['status-500', 'status 500'], ['refused', 'connection refused'], ['stall', 'no byte'], ['whole', 'status 200']];
+  const told: [FaultKind, string][] = [['status-500', 'status 500'], ['refused', 'connection refused'],
+    ['stall', 'no byte'], ['whole', 'status 200']];
   for (const [fault, words] of told)
     for (const from of [0, 1])
       it(`${fault} from request ${from} on is told for what it is`, async () => {
@@ -43,7 +46,8 @@ describe('without the part for servers without ranges', () => {
   });
   it('mirrors are read as long as the first one is well', async () => {
     const server = fakeServer({ '/a/scan.texmesh': container });
-    const reader = await PackageReader.openUrl(url, { fetch: server.fetch, startBytes: 16384, retryDelayS: 0.001, mirrors: ['http://other/a/scan.texmesh'] });
+    const reader = await PackageReader.openUrl(url, { fetch: server.fetch, startBytes: 16384,
+      retryDelayS: 0.001, mirrors: ['http://other/a/scan.texmesh'] });
     expect((await reader.textures()).length).toBe(reader.manifest.planeCount);
   });
 });

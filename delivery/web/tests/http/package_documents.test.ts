@@ -21,7 +21,8 @@ describe('what is read ahead', () => {
   });
   it('holds what came with the manifest to its digests, too', async () => {
     const { manifest } = await PackageReader.openBytes(container, 'golden');
-    const refs = [manifest.index, manifest.tables, manifest.textures, manifest.quality, ...manifest.scales.filter(hasGlb).map((s) => s.glb)];
+    const refs = [manifest.index, manifest.tables, manifest.textures, manifest.quality,
+      ...manifest.scales.filter(hasGlb).map((s) => s.glb)];
     const early = refs.find((r) => r.offset < 16384 && r.bytes > 0)!;
     const server = range();
     const first: typeof fetch = async (input, init) => {
@@ -38,7 +39,8 @@ describe('what is read ahead', () => {
   });
   it('the head of the vertex splits comes from another mirror where it is bad', async () => {
     const { manifest } = await PackageReader.openBytes(container, 'golden');
-    const server = range(({ url: u, range: r }) => u.startsWith('http://host') && r?.[0] === manifest.stream!.offset && 'flip');
+    const server = range(({ url: u, range: r }) => u.startsWith('http://host') &&
+      r?.[0] === manifest.stream!.offset && 'flip');
     const reader = await openAt(server, { mirrors: ['http://other/a/scan.texmesh'] });
     expect((await reader.splitStreamStart(0))!.length).toBe(manifest.stream!.headBytes);
   });
@@ -62,7 +64,8 @@ describe('a failure', () => {
     });
   it('of one asker who cancels is not that of others', async () => {
     let stalls = true;
-    const reader = await openAt(range(({ number }) => number > 0 && stalls && 'stall'), { stallTimeoutS: 30 });
+    const reader =
+      await openAt(range(({ number }) => number > 0 && stalls && 'stall'), { stallTimeoutS: 30 });
     const abort = new AbortController();
     const one = rejection(reader.quality(abort.signal));
     const other = reader.quality();
@@ -74,8 +77,10 @@ describe('a failure', () => {
   });
   it('nor of one who cancels while tables and index come', async () => {
     for (const ask of [
-      (r: PackageReader, s?: AbortSignal) => r.data(undefined, s), (r: PackageReader, s?: AbortSignal) => r.planeFiles(0, s),
-      (r: PackageReader, s?: AbortSignal) => r.quality(s), (r: PackageReader, s?: AbortSignal) => r.tableStream(0, 0, s),
+      (r: PackageReader, s?: AbortSignal) => r.data(undefined, s),
+      (r: PackageReader, s?: AbortSignal) => r.planeFiles(0, s),
+      (r: PackageReader, s?: AbortSignal) => r.quality(s),
+      (r: PackageReader, s?: AbortSignal) => r.tableStream(0, 0, s),
     ]) {
       let stalls = true;
       const server = range(({ number }) => number > 0 && stalls && 'stall');

@@ -66,7 +66,8 @@ describe('files of fragments', async () => {
     expect((await rejection(reader.fragmentFile(0, 99, first))).message).toContain('a file');
   });
   it('are not needed where there is no word of them, which is no mistake of a mirror', async () => {
-    const server = at(({ url: u }) => u.endsWith('fragments.json') && (u.startsWith('http://host') ? 'status-404' : 'status-500'));
+    const server = at(({ url: u }) => u.endsWith('fragments.json') &&
+      (u.startsWith('http://host') ? 'status-404' : 'status-500'));
     const reader = await openRetrying(server, { mirrors, mode: 'files' });
     expect(await reader.fragmentFiles()).toBeUndefined();
     await readSome(reader);
@@ -95,7 +96,8 @@ describe.each(goldenNames)('%s', (name) => {
         for (const e of await reader.index()) await reader.entry(e.path);
       });
       if (error !== undefined) expect(error, `${n} bytes`).toBeInstanceOf(TexmeshError);
-      else expect(n).toBeGreaterThan(0.95 * whole.length); // only the directory is missing, which nobody reads
+      // only the directory is missing, which nobody reads
+      else expect(n).toBeGreaterThan(0.95 * whole.length);
     }
   });
   it('reads every fragment at every rung as a complete image', async () => {
@@ -122,5 +124,6 @@ describe('places that do not exist', async () => {
     expect(await problem(read)).toBeInstanceOf(InputError);
   });
   it('a rung', async () => expect(await problem(() => reader.tableStream(0, 99))).toBeInstanceOf(InputError));
-  it('an entry', async () => expect(await problem(() => reader.entry('nothing.bin'))).toBeInstanceOf(FormatError));
+  it('an entry',
+    async () => expect(await problem(() => reader.entry('nothing.bin'))).toBeInstanceOf(FormatError));
 });

@@ -8,7 +8,8 @@ import { container, files, openRetrying, quick, range, rejection, url } from '..
 
 describe('hostile answers', () => {
   /** Answers of another origin, which keeps Content-Range to itself, read by a page. */
-  async function fromElsewhere(server: FakeServer, body: (read: typeof fetch) => Promise<void>): Promise<void> {
+  async function fromElsewhere(server: FakeServer,
+      body: (read: typeof fetch) => Promise<void>): Promise<void> {
     const before = Object.getOwnPropertyDescriptor(globalThis, 'location');
     Object.defineProperty(globalThis, 'location', { value: new URL('http://host/page'), configurable: true });
     try {
@@ -33,14 +34,16 @@ describe('hostile answers', () => {
       const place = { path: 'mesh/s00.glb', offset: 20000, bytes };
       expect(await rejection(store.read(place, place, { kind: 'mesh' }))).toBeInstanceOf(FormatError);
       // Overlapping what is known, too.
-      expect(await rejection(store.read(place, { offset: 100, bytes }, { kind: 'mesh' }))).toBeInstanceOf(FormatError);
+      expect(await rejection(store.read(place, { offset: 100, bytes }, { kind: 'mesh' })))
+        .toBeInstanceOf(FormatError);
     }
     expect(server.log.length).toBe(1);
   });
   it('nothing is asked for where an entry is empty', async () => {
     const server = range();
     const { store } = await openStore(url, [], 'range', new HttpClient({ fetch: server.fetch, ...quick }));
-    expect((await store.read({ path: 'texture/0/tables.pack', offset: 20000, bytes: 0 }, { offset: 20000, bytes: 0 }, { kind: 'texture' })).length).toBe(0);
+    expect((await store.read({ path: 'texture/0/tables.pack', offset: 20000, bytes: 0 },
+      { offset: 20000, bytes: 0 }, { kind: 'texture' })).length).toBe(0);
     expect(server.log.length).toBe(1);
   });
   it('a redirection to another origin may keep Content-Range to itself', () =>
@@ -159,7 +162,8 @@ describe('trouble', () => {
   });
   it('opening can be cancelled', async () => {
     const abort = new AbortController();
-    const opening = rejection(openRetrying(range(once('stall', 0)), { stallTimeoutS: 30, signal: abort.signal }));
+    const opening =
+      rejection(openRetrying(range(once('stall', 0)), { stallTimeoutS: 30, signal: abort.signal }));
     setTimeout(() => abort.abort(), 20);
     expect((await opening).name).toBe('AbortError');
   });
@@ -168,10 +172,12 @@ describe('trouble', () => {
 it('bytes are told as they come, over a cut and what is known already', async () => {
   for (const offset of [20000, 10000]) {
     const server = fakeServer(files, { fault: ({ number }) => number === 1 && 'cut' });
-    const reader = await PackageReader.openUrl(url, { fetch: server.fetch, startBytes: 16384, retryDelayS: 0.001 });
+    const reader =
+      await PackageReader.openUrl(url, { fetch: server.fetch, startBytes: 16384, retryDelayS: 0.001 });
     const told: number[] = [];
     const range = { offset, bytes: 30000 };
-    const got = await reader.store.read({ path: 'x', ...range }, range, { kind: 'other', onBytes: (n) => void told.push(n) });
+    const got = await reader.store.read({ path: 'x', ...range }, range,
+      { kind: 'other', onBytes: (n) => void told.push(n) });
     expect([...got]).toEqual([...container.subarray(offset, offset + 30000)]);
     expect(server.log.length).toBe(3); // the rest alone
     expect(told).toEqual([...told].sort((a, b) => a - b));
@@ -182,12 +188,14 @@ it('bytes are told as they come, over a cut and what is known already', async ()
 
 it('what was damaged on the way is forgotten, and fetched again once', async () => {
   const server = fakeServer(files, { fault: ({ number }) => number === 1 && 'flip' });
-  const reader = await PackageReader.openUrl(url, { fetch: server.fetch, startBytes: 16384, retryDelayS: 0.001 });
+  const reader =
+    await PackageReader.openUrl(url, { fetch: server.fetch, startBytes: 16384, retryDelayS: 0.001 });
   const range = { offset: 20000, bytes: 5000 };
   const place = { path: 'x', ...range };
   await reader.store.read(place, range, { kind: 'other' }); // nobody checks
   const verify = (got: Uint8Array): Promise<void> =>
-    got.every((b, i) => b === container[20000 + i]) ? Promise.resolve() : Promise.reject(new FormatError('x', '', 'these bytes', 'others'));
+    got.every((b, i) => b === container[20000 + i]) ? Promise.resolve()
+      : Promise.reject(new FormatError('x', '', 'these bytes', 'others'));
   for (let n = 0; n < 2; ++n) await reader.store.read(place, range, { kind: 'other', verify, once: n === 0 });
   expect(server.log.length).toBeLessThanOrEqual(4);
   await reader.store.read(place, { offset: 20000, bytes: 5000 }, { kind: 'other', verify });

@@ -8,7 +8,8 @@ import { container, openAt, openRetrying, range, rejection } from '../support/sc
 describe('hostile answers', () => {
   it('a server that gives its front page for everything has the whole container, too', async () => {
     const page = new TextEncoder().encode('<!doctype html><title>front page</title>'.repeat(20));
-    const files = { '/a/scan.texmesh': container, '/a/scan/manifest.json': page, '/a/scan/fragments.json': page };
+    const files = { '/a/scan.texmesh': container, '/a/scan/manifest.json': page,
+      '/a/scan/fragments.json': page };
     const reader = await openAt(fakeServer(files, { ranges: false }));
     expect(reader.form).toBe('whole');
   });
@@ -23,7 +24,8 @@ describe('a server that stops answering ranges', () => {
   const stopping = async (change?: (files: Record<string, Uint8Array>) => void) => {
     const reader = await PackageReader.openBytes(container, 'golden');
     const entries = [...(await reader.index()), reader.manifest.index];
-    const files = { '/a/scan.texmesh': container, ...treeFiles('/a/scan/', container, await reader.store.manifest(), entries) };
+    const files = { '/a/scan.texmesh': container,
+      ...treeFiles('/a/scan/', container, await reader.store.manifest(), entries) };
     change?.(files);
     return fakeServer(files, { fault: ({ number, range: asked }) => number > 0 && !!asked && 'whole' });
   };
@@ -34,11 +36,14 @@ describe('a server that stops answering ranges', () => {
     expect(reader.form).toBe('files');
   });
   it('is not mixed with another package', async () => {
-    const server = await stopping((files) => (files['/a/scan/manifest.json'] = new Uint8Array([...files['/a/scan/manifest.json'], 32])));
-    expect((await rejection(openRetrying(server).then(readSome))).message).toContain('replaced, open it anew');
+    const server = await stopping(
+      (files) => (files['/a/scan/manifest.json'] = new Uint8Array([...files['/a/scan/manifest.json'], 32])));
+    expect((await rejection(openRetrying(server).then(readSome))).message)
+      .toContain('replaced, open it anew');
   });
   it('is no longer read where ranges are insisted on', async () => {
-    expect((await rejection(openRetrying(await stopping(), { mode: 'range' }).then(readSome))).message).toContain('ranges are no longer answered');
+    expect((await rejection(openRetrying(await stopping(), { mode: 'range' }).then(readSome))).message)
+      .toContain('ranges are no longer answered');
   });
 });
 
@@ -73,7 +78,8 @@ describe('a server without ranges', () => {
   });
   it('a container that is too large is refused', async () => {
     const server = fakeServer({ '/a/scan.texmesh': container }, { ranges: false });
-    expect((await rejection(openRetrying(server, { maxWholeBytes: 1000 }))).message).toContain('at most 1000 bytes');
+    expect((await rejection(openRetrying(server, { maxWholeBytes: 1000 }))).message)
+      .toContain('at most 1000 bytes');
   });
   it('the URL of a tree keeps query and fragment', () => {
     expect(treeUrl('https://h/a/N.texmesh?v=1#x')).toBe('https://h/a/N/?v=1#x');

@@ -1,13 +1,17 @@
 import { expect, it } from 'vitest';
-import { type Place, byInterest, defaultMemoryBytes, leastS, linkBytesS, shareOf, turnS } from '../../src/page/schedule';
+import { type PagePlace, byInterest, defaultMemoryBytes, leastS, linkBytesS, shareOf,
+  turnS } from '../../src/page/schedule';
 import type { RequestRecord } from '../../src/http/requests';
 
-const place = (p: Partial<Place>): Place => ({ visible: true, regarded: false, areaPx: 100, distancePx: 0, ...p });
+const place = (p: Partial<PagePlace>): PagePlace =>
+  ({ visible: true, regarded: false, areaPx: 100, distancePx: 0, ...p });
 const record = (firstByte: number, ended: number, received: number): RequestRecord =>
-  ({ url: '', offset: 0, bytes: received, received, kind: 'texture', started: firstByte - 0.1, firstByte, ended, status: 206, ok: true });
+  ({ url: '', offset: 0, bytes: received, received, kind: 'texture', started: firstByte - 0.1, firstByte,
+    ended, status: 206, ok: true });
 
 it('what the user looks at comes first, then what is seen, by size and by place', () => {
-  const places = [place({ visible: false, areaPx: 900 }), place({ distancePx: 5 }), place({}), place({ areaPx: 200 }), place({ visible: false, regarded: true })];
+  const places = [place({ visible: false, areaPx: 900 }), place({ distancePx: 5 }), place({}),
+    place({ areaPx: 200 }), place({ visible: false, regarded: true })];
   expect([...places].sort(byInterest)).toEqual([4, 3, 2, 1, 0].map((i) => places[i]));
 });
 it('time is shared by area, and what one leaves the others have', () => {
@@ -28,7 +32,8 @@ it('the link is what came while something came, whatever came at once', () => {
   expect(linkBytesS([record(1, 2, 1000)], 2)).toBe(1000);
   expect(linkBytesS([record(1, 2, 1000), record(1.5, 2.5, 500), record(4, 5, 1000)], 5)).toBe(1000);
   expect(linkBytesS([record(1, 5, 400), record(2, 3, 400)], 5)).toBe(200); // one within the other
-  expect(linkBytesS([record(1, 2, 9000), record(20, 21, 1000)], 21)).toBe(1000); // what was long ago does not count
+  // what was long ago does not count
+  expect(linkBytesS([record(1, 2, 9000), record(20, 21, 1000)], 21)).toBe(1000);
   expect(linkBytesS([{ ...record(1, 2, 0), firstByte: -1 }], 2)).toBe(0);
 });
 it('memory is by the device where it says so, else by screen and touch', () => {

@@ -9,7 +9,8 @@ import { golden } from '../support/files';
 const reader = await PackageReader.openBytes(golden('v2.0-scan'), 'golden');
 const { manifest } = reader;
 const size = (width: number, height: number): Vector2 => new Vector2(width, height);
-function lookAt(m: Manifest, heights: number, camera = new PerspectiveCamera(45, 1, 0.001, 100)): PerspectiveCamera {
+function lookAt(m: Manifest, heights: number,
+    camera = new PerspectiveCamera(45, 1, 0.001, 100)): PerspectiveCamera {
   const middle = m.boundsMin.map((least, i) => (least + m.boundsMax[i]) / 2);
   camera.position.set(middle[0], middle[1], middle[2] + heights * m.objectHeight);
   camera.lookAt(middle[0], middle[1], middle[2]);
@@ -21,7 +22,8 @@ describe('the display', () => {
   const object = new Group();
   it('is what the camera makes of the object, in device pixels', () => {
     const whole = displayOf(manifest, object, lookAt(manifest, 3), size(800, 600));
-    const expected = displayedHeightPx(manifest.objectHeight, 3 * manifest.objectHeight, { fovDegrees: 45, viewportPx: 600 });
+    const expected = displayedHeightPx(manifest.objectHeight, 3 * manifest.objectHeight,
+      { fovDegrees: 45, viewportPx: 600 });
     expect(whole.heightPx).toBeCloseTo(expected, 3);
     expect(whole.part?.clipped).toBe(false);
     const twice = displayOf(manifest, object, lookAt(manifest, 3), size(1600, 1200));
@@ -45,7 +47,8 @@ describe('the display', () => {
     expect(selectScale(manifest, gone.heightPx, gone.part)).toBe(manifest.scales.at(-1)!.scale);
   });
   // A ball that touches all sides of the bounds and none of their corners.
-  const centre = manifest.boundsMin.map((least, i) => (least + manifest.boundsMax[i]) / 2) as [number, number, number];
+  const centre = manifest.boundsMin.map((least, i) => (least + manifest.boundsMax[i]) / 2) as [number, number,
+    number];
   const ball = (share = 0.5): Group => {
     const mesh = new Mesh(new SphereGeometry(share, 48, 24), new MeshStandardMaterial());
     mesh.position.set(...centre);
@@ -53,10 +56,12 @@ describe('the display', () => {
     return new Group().add(mesh);
   };
   const middleOf = (heights: number): number =>
-    displayedHeightPx(manifest.objectHeight, heights * manifest.objectHeight, { fovDegrees: 45, viewportPx: 600 });
+    displayedHeightPx(manifest.objectHeight, heights * manifest.objectHeight,
+      { fovDegrees: 45, viewportPx: 600 });
   it('of a whole object is whole, whatever is cut off of the corners of its bounds', () => {
     const camera = lookAt(manifest, 3);
-    for (let heights = 3; displayOf(manifest, object, camera, size(600, 600)).part?.clipped === false; heights *= 0.99) lookAt(manifest, heights, camera);
+    for (let heights = 3; displayOf(manifest, object, camera, size(600, 600)).part?.clipped === false;
+      heights *= 0.99) lookAt(manifest, heights, camera);
     const heights = camera.position.distanceTo(new Vector3(...centre)) / manifest.objectHeight;
     const seen = displayOf(manifest, ball(), camera, size(600, 600));
     expect(seen.part?.clipped).toBe(false);
@@ -84,6 +89,7 @@ describe('the display', () => {
     const camera = new OrthographicCamera(-1, 1, 1, -1, 0, 100);
     camera.position.z = 10;
     camera.updateMatrixWorld();
-    expect(displayOf(manifest, object, camera, size(800, 600)).heightPx).toBeCloseTo(manifest.objectHeight * 300, 3);
+    expect(displayOf(manifest, object, camera, size(800, 600)).heightPx)
+      .toBeCloseTo(manifest.objectHeight * 300, 3);
   });
 });

@@ -12,18 +12,22 @@ interface Asked { x0: number; x1: number; y0: number; y1: number; end(): void; f
 beforeEach(() => vi.stubGlobal('createImageBitmap', async () => ({ close: () => undefined })));
 afterEach(() => void vi.unstubAllGlobals());
 
-function setUp(): { next: PlaneComposer; clear: Clear; asked: Asked[]; written: [number, number][]; done: Promise<void> } {
+function setUp(): { next: PlaneComposer; clear: Clear; asked: Asked[]; written: [number, number][];
+    done: Promise<void> } {
   const asked: Asked[] = [];
   const written: [number, number][] = [];
   const next = {
-    info: { columns: 4, rows: 4, fragmentWidthPx: side, fragmentHeightPx: side }, widthPx: 4 * side, heightPx: 4 * side, come: new Set<number>(),
+    info: { columns: 4, rows: 4, fragmentWidthPx: side, fragmentHeightPx: side }, widthPx: 4 * side,
+    heightPx: 4 * side, come: new Set<number>(),
     placeOf: (f: number) => [(f % 4) * side, Math.floor(f / 4) * side],
     uploads: (_: unknown, x: number, y: number) => [{ pixels: 1, run: () => written.push([x, y]) }],
   } as unknown as PlaneComposer;
   const pool = {
-    enlarge: (piece: Asked) => new Promise((end, fail) => asked.push({ ...piece, end: () => end([]), fail: () => fail(new Error('workers cannot draw')) })),
+    enlarge: (piece: Asked) => new Promise((end, fail) =>
+      asked.push({ ...piece, end: () => end([]), fail: () => fail(new Error('workers cannot draw')) })),
   } as unknown as WorkerPool;
-  const uploads = { disposed: false, enqueue: async (_: number, run: () => void) => run() } as unknown as UploadQueue;
+  const uploads =
+    { disposed: false, enqueue: async (_: number, run: () => void) => run() } as unknown as UploadQueue;
   const { clear, done } = enlarge(next, {} as ImageBitmap, pool, uploads);
   done.catch(() => undefined);
   return { next, clear: clear!, asked, written, done };
@@ -52,7 +56,8 @@ it('a fragment waits for the first piece and for those over it, and is left out 
     await turns();
   }
   await done;
-  expect(asked.reduce((px, { x0, x1, y0, y1 }) => px + (x1 - x0) * (y1 - y0), 0)).toBe(14 * side * side + 256 * side);
+  expect(asked.reduce((px, { x0, x1, y0, y1 }) => px + (x1 - x0) * (y1 - y0), 0))
+    .toBe(14 * side * side + 256 * side);
 });
 it('where workers cannot draw, fragments hear of it', async () => {
   const { clear, asked, done } = setUp();

@@ -18,15 +18,18 @@ describe('the gaze', () => {
   // A square that fills the picture, with a texture of 8 x 8 fragments.
   const square = new Mesh(new PlaneGeometry(2, 2, 64, 64), new MeshStandardMaterial());
   const shown = { object: new Group().add(square), shows: () => true };
-  const plane = { columns: 8, rows: 8, widthPx: 512, heightPx: 512, fragmentWidthPx: 64, fragmentHeightPx: 64 } as TextureInfo;
+  const plane = { columns: 8, rows: 8, widthPx: 512, heightPx: 512, fragmentWidthPx: 64,
+    fragmentHeightPx: 64 } as TextureInfo;
   const camera = new PerspectiveCamera(90, 1, 0.1, 100);
   camera.position.set(0, 0, 1);
   camera.updateMatrixWorld();
-  const renderer = { getDrawingBufferSize: (to: { set(x: number, y: number): unknown }) => to.set(800, 800) } as unknown as WebGLRenderer;
+  const renderer = { getDrawingBufferSize: (to: { set(x: number, y: number): unknown }) =>
+    to.set(800, 800) } as unknown as WebGLRenderer;
   const weightsAt = (x: number, y: number, pxPerDegree?: number): Float32Array =>
     gazeWeights(plane, shown, camera, renderer, { x, y, pxPerDegree });
   /** u, v of the square's texture: three.js has v upwards, the fragments count rows of v from 0. */
-  const fragmentOf = (x: number, y: number): number => Math.floor(((y + 1) / 2) * 8) * 8 + Math.floor(((x + 1) / 2) * 8);
+  const fragmentOf = (x: number, y: number): number =>
+    Math.floor(((y + 1) / 2) * 8) * 8 + Math.floor(((x + 1) / 2) * 8);
 
   it('weighs most what is looked at, and less the farther away it is', () => {
     for (const [x, y] of [[-0.8, 0.6], [0.1, 0.1], [0.9, -0.9]]) {
@@ -37,7 +40,7 @@ describe('the gaze', () => {
     for (let i = 1; i < 8; ++i) expect(row[i]).toBeLessThan(row[i - 1]);
   });
   it('has the weight of the angle that a fragment stands at', () => {
-    // Each fragment is 100 px: the one three to the right of the gaze is about 300 px away, 6 degrees at 50 px a degree.
+    // Each fragment is 100 px: the one three to the right of the gaze is about 300 px, 6 degrees, away.
     const weights = weightsAt(-0.875, 0.125, 50);
     expect(weights[fragmentOf(-0.125, 0.125)]).toBeCloseTo(gazeWeight(6), 2);
   });

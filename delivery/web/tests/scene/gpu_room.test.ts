@@ -16,7 +16,8 @@ function scantRenderer(): { renderer: WebGLRenderer; refuse(): void; lose(): voi
     refused = false;
     return said;
   };
-  const scant = new Proxy(gl, { get: (own, name) => (name === 'getError' ? getError : Reflect.get(own, name)) });
+  const scant =
+    new Proxy(gl, { get: (own, name) => (name === 'getError' ? getError : Reflect.get(own, name)) });
   const domElement = new EventTarget();
   return {
     renderer: Object.assign(renderer, { getContext: () => scant, domElement }) as unknown as WebGLRenderer,
@@ -28,10 +29,12 @@ function scantRenderer(): { renderer: WebGLRenderer; refuse(): void; lose(): voi
 // Previews that are made larger.
 const picture = { width: 16, height: 16, close: () => undefined };
 beforeEach(() => vi.stubGlobal('createImageBitmap', () => Promise.resolve(picture)));
-const decode: typeof decodeNothing = (request) => (request.op === 'enlarge' ? Promise.resolve([[picture], []]) : decodeNothing(request));
+const decode: typeof decodeNothing = (request) =>
+  (request.op === 'enlarge' ? Promise.resolve([[picture], []]) : decodeNothing(request));
 afterEach(() => vi.unstubAllGlobals());
 
-it('a GPU that refuses storage gets a smaller picture, as good as the one before, and is asked again', async () => {
+it('a GPU that refuses storage gets a smaller picture, as good as the one before, and is asked again',
+    async () => {
   const { renderer, refuse } = scantRenderer();
   const l = await loading(url, fakeServer(files), { renderer, decode, autoRefine: false });
   const told: LoadEvents['memory'][] = [];
@@ -48,7 +51,8 @@ it('a GPU that refuses storage gets a smaller picture, as good as the one before
     bytes.push(l.model.state.gpuBytes);
     expect(l.model.state.planes.length).toBe(planes.length);
     // Previews are no picture to stay with: of every texture most fragments are there again.
-    for (const p of l.model.state.planes) expect([...p.rungs].filter((rung) => rung >= 0).length).toBeGreaterThan(0.5 * p.rungs.length);
+    for (const p of l.model.state.planes)
+      expect([...p.rungs].filter((rung) => rung >= 0).length).toBeGreaterThan(0.5 * p.rungs.length);
   }
   expect(l.events.filter((e) => e.name === 'error')).toEqual([]);
   l.dispose();
@@ -66,7 +70,8 @@ it('a GPU that has something to do is asked when it rests', async () => {
     return 0;
   };
   const answers = {
-    fenceSync: () => ({}), isSync: () => true, getSyncParameter: () => (busy ? 'UNSIGNALED' : 'SIGNALED'), getError,
+    fenceSync: () => ({}), isSync: () => true, getSyncParameter: () => (busy ? 'UNSIGNALED' : 'SIGNALED'),
+    getError,
   };
   const working = new Proxy(gl, { get: (own, name) => Reflect.get(name in answers ? answers : own, name) });
   const room = GpuRoom.of(Object.assign(renderer, { getContext: () => working }));

@@ -1,4 +1,5 @@
-import { type BufferGeometry, type EventDispatcher, type Material, type Mesh, PerspectiveCamera, SphereGeometry } from 'three';
+import { type BufferGeometry, type EventDispatcher, type Material, type Mesh, PerspectiveCamera,
+  SphereGeometry } from 'three';
 import { describe, expect, it } from 'vitest';
 import { InputError, PackageReader } from '../../src/reader';
 import { fakeServer } from '../support/fake_server';
@@ -9,10 +10,12 @@ import { container, files, url } from '../support/scan';
 const reader = await PackageReader.openBytes(container, 'golden');
 const planes = await reader.textures();
 const top = planes[0].rungQuality.length - 1;
-const rungsOf = (l: Loading, base = 0): number[] => [...l.model.state.planes.find((p) => p.base === base)!.rungs];
+const rungsOf = (l: Loading, base = 0): number[] =>
+  [...l.model.state.planes.find((p) => p.base === base)!.rungs];
 /** Requests for bytes of these entries. */
 const askedFor = (l: Loading, ...refs: { offset: number; bytes: number }[]): number =>
-  l.pkg.requests.filter((q) => refs.some((r) => q.offset < r.offset + r.bytes && q.offset + q.bytes > r.offset)).length;
+  l.pkg.requests.filter((q) =>
+    refs.some((r) => q.offset < r.offset + r.bytes && q.offset + q.bytes > r.offset)).length;
 const packs = (await reader.planeFiles(0)).packs;
 const within = (range: [number, number] | undefined, e: { offset: number; bytes: number }): boolean =>
   range !== undefined && range[0] < e.offset + e.bytes && range[1] >= e.offset;
@@ -40,10 +43,12 @@ describe('a load', () => {
     l.dispose();
   });
   it('takes the scale that the visible part asks for (Fig. 7.5)', async () => {
-    const narrow = { widthPx: 300, heightPx: 2, clipped: true }; // an error may be no more than half of its 2 px
+    // an error may be no more than half of its 2 px
+    const narrow = { widthPx: 300, heightPx: 2, clipped: true };
     const nothing = { widthPx: 0, heightPx: 0, clipped: true };
     const wanted: number[] = [];
-    for (const display of [{ heightPx: 20 }, { heightPx: 20, part: narrow }, { heightPx: 4000 }, { heightPx: 4000, part: nothing }]) {
+    for (const display of [{ heightPx: 20 }, { heightPx: 20, part: narrow }, { heightPx: 4000 },
+          { heightPx: 4000, part: nothing }]) {
       const l = await loading(url, fakeServer(files), { display, rule: 'jnd' });
       await l.model.done;
       wanted.push(l.model.state.wantedScale);
@@ -61,13 +66,16 @@ describe('a load', () => {
       const camera = new PerspectiveCamera(30, 1, 0.1, 100);
       camera.position.set(0, 0, 5 * side);
       camera.lookAt(0, 0, 0);
-      const gltfLoader = () => ({ register: () => undefined, parseAsync: () => Promise.resolve(fakeGltf(new SphereGeometry(1, 64, 32))) });
-      const l = await loading(url, fakeServer(files), { camera, gltfLoader, time: 4, fullSize: true, autoRefine: false }, { capBytesS: 25000 });
+      const gltfLoader = () => ({ register: () => undefined,
+        parseAsync: () => Promise.resolve(fakeGltf(new SphereGeometry(1, 64, 32))) });
+      const l = await loading(url, fakeServer(files),
+        { camera, gltfLoader, time: 4, fullSize: true, autoRefine: false }, { capBytesS: 25000 });
       await l.model.done;
       // The half of a ball at +z has the texture's left half.
       const middle = (f: number): number => ((f % columns) + 0.5) / columns - 0.5;
       const rungs = rungsOf(l);
-      const [seen, unseen] = [side, -side].map((s) => mean(rungs.filter((_, f) => middle(f) * s < 0 && Math.abs(middle(f)) < 0.4)));
+      const [seen, unseen] = [side, -side].map((s) =>
+        mean(rungs.filter((_, f) => middle(f) * s < 0 && Math.abs(middle(f)) < 0.4)));
       expect(seen).toBeGreaterThan(unseen);
       l.dispose();
     }
@@ -75,7 +83,8 @@ describe('a load', () => {
   it('keeps its scale when the display changes by less than a tenth in the timed part', async () => {
     const step = reader.manifest.steps[0];
     const finer = reader.manifest.steps[1];
-    for (const [from, to, scale] of [[0.98, 1.05, step.scale], [0.98, 1.15, finer.scale], [1.02, 0.95, finer.scale], [1.02, 0.85, step.scale]]) {
+    for (const [from, to, scale] of [[0.98, 1.05, step.scale], [0.98, 1.15, finer.scale],
+          [1.02, 0.95, finer.scale], [1.02, 0.85, step.scale]]) {
       let px = from * step.upToPx;
       const l = await loading(url, fakeServer(files), { time: 3, display: () => px });
       const taken: number[] = [];
@@ -94,13 +103,15 @@ describe('a load', () => {
     }
   });
   it('does not ask again and again for what cannot be had', async () => {
-    const server = fakeServer(files, { fault: ({ range }) => packs.some((p) => within(range, p)) && 'status-404' });
+    const server =
+      fakeServer(files, { fault: ({ range }) => packs.some((p) => within(range, p)) && 'status-404' });
     const l = await loading(url, server, { time: 1 });
     await l.model.done;
     await l.model.refine();
     expect(Math.max(...rungsOf(l))).toBe(-1);
     expect(askedFor(l, ...packs)).toBeLessThan(200); // 47 fragments of three rungs
-    const ranges = l.pkg.requests.filter((q) => packs.some((p) => q.offset >= p.offset && q.offset < p.offset + p.bytes)).map((q) => `${q.offset}+${q.bytes}`);
+    const ranges = l.pkg.requests.filter((q) => packs.some((p) => q.offset >= p.offset &&
+      q.offset < p.offset + p.bytes)).map((q) => `${q.offset}+${q.bytes}`);
     expect(new Set(ranges).size).toBe(ranges.length);
     l.dispose();
   });
@@ -122,7 +133,8 @@ describe('a load', () => {
     });
   it('asks again for what could not be had for a while', async () => {
     let down = true;
-    const server = fakeServer(files, { fault: ({ range }) => down && packs.some((p) => within(range, p)) && 'status-500' });
+    const server = fakeServer(files,
+      { fault: ({ range }) => down && packs.some((p) => within(range, p)) && 'status-500' });
     const l = await loading(url, server, { autoRefine: false });
     await l.model.done;
     expect(Math.max(...rungsOf(l))).toBe(-1);
@@ -175,7 +187,8 @@ describe('a load', () => {
   it('asks for a scale again that could not be had, though nothing moves', async () => {
     const [finest] = reader.manifest.scales;
     let times = 0;
-    const server = fakeServer(files, { fault: ({ range }) => within(range, finest.glb) && ++times === 1 && 'status-404' });
+    const server =
+      fakeServer(files, { fault: ({ range }) => within(range, finest.glb) && ++times === 1 && 'status-404' });
     const l = await loading(url, server);
     await l.model.done;
     await l.model.refine();
@@ -186,7 +199,8 @@ describe('a load', () => {
   });
   it('without workers says so once, and fetches no fragment for nothing', async () => {
     const server = fakeServer(files);
-    const l = await loading(url, server, { decode: undefined, workers: 1 }); // Node.js has no Worker of the web's kind
+    // Node.js has no Worker of the web's kind
+    const l = await loading(url, server, { decode: undefined, workers: 1 });
     await l.model.done;
     await l.model.refine();
     const errors = l.events.flatMap((e) => (e.name === 'error' ? [e.event] : []));
@@ -199,11 +213,13 @@ describe('a load', () => {
 /** Which of these are told that they are disposed of from now on. */
 function watched(all: readonly unknown[]): Set<unknown> {
   const told = new Set<unknown>();
-  for (const one of all) (one as EventDispatcher<{ dispose: object }>).addEventListener('dispose', () => told.add(one));
+  for (const one of all)
+    (one as EventDispatcher<{ dispose: object }>).addEventListener('dispose', () => told.add(one));
   return told;
 }
 
-it('a load that is disposed of frees textures, materials and geometries, and hears of nothing any more', async () => {
+it('a load that is disposed of frees textures, materials and geometries, and hears of nothing any more',
+    async () => {
   const server = fakeServer(files);
   const l = await loading(url, server, { autoRefine: false });
   await l.model.done;
@@ -227,7 +243,8 @@ it('a load that is disposed of frees textures, materials and geometries, and hea
   l.dispose();
 });
 
-it.each(['v2.0-proxies', 'v2.0-scan'])('a turn without time leaves the first picture of %s, until somebody refines', async (name) => {
+it.each(['v2.0-proxies', 'v2.0-scan'])(
+    'a turn without time leaves the first picture of %s, until somebody refines', async (name) => {
   const server = fakeServer({ '/a/scan.texmesh': golden(name) });
   const l = await loading(url, server, { turn: () => Promise.resolve({ seconds: 0 }), autoRefine: false });
   await l.model.done;

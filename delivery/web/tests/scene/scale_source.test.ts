@@ -13,9 +13,11 @@ it('a scale that the stream alone has is the next finer file where the stream is
   const { scales } = reader.manifest;
   const [finest, between, coarsest] = scales.map((s) => s.scale);
   const problems: unknown[] = [];
-  const options = { meshes: 'glb', gltfLoader: () => ({ register: () => undefined, parseAsync: () => Promise.resolve(fakeGltf()) }) };
+  const options = { meshes: 'glb',
+    gltfLoader: () => ({ register: () => undefined, parseAsync: () => Promise.resolve(fakeGltf()) }) };
   const source = new ScaleSource({
-    reader, options: options as unknown as LoadOptions, materials: new MaterialSet(), pool: {} as WorkerPool, signal: new AbortController().signal,
+    reader, options: options as unknown as LoadOptions, materials: new MaterialSet(), pool: {} as WorkerPool,
+    signal: new AbortController().signal,
     added: () => undefined, leadBytes: () => 0, problem: (error) => problems.push(error),
   });
   await source.openStream();
@@ -44,9 +46,11 @@ it('a scale has arrived when no more is missing than comes while a request is on
       await released;
       return got;
     };
-    const options = { meshes: 'glb', gltfLoader: () => ({ register: () => undefined, parseAsync: () => Promise.resolve(fakeGltf()) }) };
+    const options = { meshes: 'glb',
+      gltfLoader: () => ({ register: () => undefined, parseAsync: () => Promise.resolve(fakeGltf()) }) };
     const source = new ScaleSource({
-      reader, options: options as unknown as LoadOptions, materials: new MaterialSet(), pool: {} as WorkerPool, signal: new AbortController().signal,
+      reader, options: options as unknown as LoadOptions, materials: new MaterialSet(),
+      pool: {} as WorkerPool, signal: new AbortController().signal,
       added: () => undefined, leadBytes: () => lead, problem: () => undefined,
     });
     const { arrived, shape } = source.load(scale, () => undefined);

@@ -25,14 +25,16 @@ describe('scales out of the vertex-split stream', () => {
   async function shapes() {
     const fromMemory = await PackageReader.openBytes(golden('v2.0-scan'), 'golden');
     const { signal } = new AbortController();
-    const splits = await openSplitShapes(fromMemory, new WorkerPool({ decode: handle }), new MaterialSet(), () => undefined, () => 0, signal);
+    const splits = await openSplitShapes(fromMemory, new WorkerPool({ decode: handle }), new MaterialSet(),
+      () => undefined, () => 0, signal);
     return { splits, signal };
   }
   it('have the triangles and bounds of the manifest', async () => {
     const { splits, signal } = await shapes();
     const passed = new Map<number, Mesh>();
     let arrived = 0;
-    const finest = await splits.load(0, gltf, signal, () => ++arrived, (scale, mesh) => passed.set(scale, mesh));
+    const finest =
+      await splits.load(0, gltf, signal, () => ++arrived, (scale, mesh) => passed.set(scale, mesh));
     expect(arrived).toBeGreaterThan(0);
     expect([...passed.keys()]).toEqual(manifest.scales.map((s) => s.scale).reverse());
     for (const s of manifest.scales) expect(passed.get(s.scale)!.geometry.index!.count / 3).toBe(s.triangles);
@@ -42,18 +44,22 @@ describe('scales out of the vertex-split stream', () => {
     box.min.toArray().forEach((v, i) => expect(Math.abs(v - manifest.boundsMin[i])).toBeLessThan(slack));
     box.max.toArray().forEach((v, i) => expect(Math.abs(v - manifest.boundsMax[i])).toBeLessThan(slack));
     expect(finest.material as Material).toBe(material);
-    expect(passed.get(manifest.scales[1].scale)!.geometry.getAttribute('position')).toBe(finest.geometry.getAttribute('position'));
+    expect(passed.get(manifest.scales[1].scale)!.geometry.getAttribute('position'))
+      .toBe(finest.geometry.getAttribute('position'));
   });
   it('damaged blocks are fetched again, from another mirror where there is one', async () => {
     for (const mirrors of [[], ['http://other/a.texmesh']]) {
       const { stream } = manifest;
       let damaged = 0;
       const fault: Fault = ({ url, range }) =>
-        url.startsWith('http://host') && range?.[0] === stream!.offset && (mirrors.length > 0 || damaged === 0) && ++damaged > 0 && 'flip-last';
+        url.startsWith('http://host') && range?.[0] === stream!.offset &&
+          (mirrors.length > 0 || damaged === 0) && ++damaged > 0 && 'flip-last';
       const server = fakeServer({ '/a.texmesh': golden('v2.0-scan') }, { fault });
-      const remote = await PackageReader.openUrl('http://host/a.texmesh', { fetch: server.fetch, mirrors, retryDelayS: 0.001 });
+      const remote = await PackageReader.openUrl('http://host/a.texmesh',
+        { fetch: server.fetch, mirrors, retryDelayS: 0.001 });
       const { signal } = new AbortController();
-      const splits = await openSplitShapes(remote, new WorkerPool({ decode: handle }), new MaterialSet(), () => undefined, () => 0, signal);
+      const splits = await openSplitShapes(remote, new WorkerPool({ decode: handle }), new MaterialSet(),
+        () => undefined, () => 0, signal);
       const mesh = await splits.load(0, gltf, signal, () => undefined, () => undefined);
       expect(mesh.geometry.index!.count / 3).toBe(manifest.scales[0].triangles);
       expect(damaged).toBeGreaterThan(0);
@@ -66,7 +72,8 @@ describe('scales out of the vertex-split stream', () => {
     const coarse = await splits.load(scale, gltf, signal, none, none);
     const positions = [...(coarse.geometry.getAttribute('position').array as Float32Array).slice(0, 30)];
     await splits.load(0, gltf, signal, none, none);
-    expect([...(coarse.geometry.getAttribute('position').array as Float32Array).slice(0, 30)]).toEqual(positions);
+    expect([...(coarse.geometry.getAttribute('position').array as Float32Array).slice(0, 30)])
+      .toEqual(positions);
     expect(await splits.load(scale, gltf, signal, none, none)).toBe(coarse);
     expect(splits.bytesOf(0)).toBe(0);
     let disposed = 0;

@@ -17,7 +17,8 @@ it('who gives up an override in the timed part does not ask for everything', asy
 
 it('planes with more texels take the time that is left where all that was chosen has come', async () => {
   const shown: number[][] = [];
-  const l = await loading(url, fakeServer(files), { time: 3, beta0BytesS: 6000, display: 2000, autoRefine: false });
+  const l =
+    await loading(url, fakeServer(files), { time: 3, beta0BytesS: 6000, display: 2000, autoRefine: false });
   l.model.on('plane', ({ base, widthPx }) => (shown[base] ??= []).push(widthPx));
   await l.model.done;
   expect(l.count('deadline')).toBe(1);
@@ -25,7 +26,8 @@ it('planes with more texels take the time that is left where all that was chosen
   for (const px of shown) expect(px).toEqual([...new Set(px)].sort((a, b) => a - b)); // never fewer texels
   const at = (name: string): number[] => l.events.flatMap((e, i) => (e.name === name ? [i] : []));
   expect(Math.max(...at('plane'))).toBeLessThan(at('deadline')[0]);
-  expect(Math.max(...at('fragment'))).toBeGreaterThan(Math.max(...at('plane'))); // of the last plane some came, too
+  // of the last plane some came, too
+  expect(Math.max(...at('fragment'))).toBeGreaterThan(Math.max(...at('plane')));
   expect(l.count('error')).toBe(0);
   l.dispose();
 });

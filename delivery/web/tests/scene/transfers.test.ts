@@ -14,7 +14,8 @@ describe('transfers', () => {
     const before = s.server.log.length;
     const arrived: Wish[] = [];
     const wishes = wishesOf(s.list, 0);
-    await s.transfers.fetch(wishes, { gapBytes: 0, mostBytes: Infinity }, (w) => arrived.push(w), () => undefined);
+    await s.transfers.fetch(wishes, { gapBytes: 0, mostBytes: Infinity }, (w) => arrived.push(w),
+      () => undefined);
     await s.settled();
     expect(arrived.length).toBe(wishes.length);
     expect(s.decoded.length).toBe(wishes.length);
@@ -25,8 +26,10 @@ describe('transfers', () => {
   it('requests are no longer than asked for', async () => {
     const s = await setUp();
     const before = s.server.log.length;
-    await s.transfers.fetch(wishesOf(s.list, 0), { gapBytes: 0, mostBytes: 2000 }, () => undefined, () => undefined);
-    for (const { range } of s.server.log.slice(before)) if (range) expect(range[1] - range[0]).toBeLessThan(5000);
+    await s.transfers.fetch(wishesOf(s.list, 0), { gapBytes: 0, mostBytes: 2000 }, () => undefined,
+      () => undefined);
+    for (const { range } of s.server.log.slice(before)) if (range)
+      expect(range[1] - range[0]).toBeLessThan(5000);
   });
   it('a damaged fragment is asked for once more, by itself', async () => {
     let first = true;
@@ -44,10 +47,12 @@ describe('transfers', () => {
   it('a request that fails for good fails its fragments only', async () => {
     const s = await setUp();
     const [pack] = s.transfers.filesOf(0).packs;
-    const t = await setUp(({ range }) => range !== undefined && range[0] >= pack.offset && range[0] < pack.offset + pack.bytes && 'status-404');
+    const t = await setUp(({ range }) => range !== undefined && range[0] >= pack.offset &&
+      range[0] < pack.offset + pack.bytes && 'status-404');
     const failed: Wish[] = [];
     const wishes = wishesOf(t.list, 0);
-    await t.transfers.fetch(wishes, { gapBytes: 0, mostBytes: Infinity }, () => undefined, (w) => failed.push(w));
+    await t.transfers.fetch(wishes, { gapBytes: 0, mostBytes: Infinity }, () => undefined,
+      (w) => failed.push(w));
     await t.settled();
     expect(failed.length).toBeGreaterThan(0);
     expect(failed.every((w) => w.plane === 0)).toBe(true);
@@ -60,10 +65,13 @@ describe('transfers', () => {
       if (request.op === 'decode') most.push(...request.most);
       return decode(request);
     };
-    const textures = s.data.textures.map((t) => ({ ...t, fragmentWidthPx: 1 << 20, fragmentHeightPx: 1 << 20 }));
-    const transfers = new Transfers(s.reader, textures, new WorkerPool({ decode: watch }), { decoded: () => undefined, lost: () => undefined });
+    const textures =
+      s.data.textures.map((t) => ({ ...t, fragmentWidthPx: 1 << 20, fragmentHeightPx: 1 << 20 }));
+    const transfers = new Transfers(s.reader, textures, new WorkerPool({ decode: watch }),
+      { decoded: () => undefined, lost: () => undefined });
     await transfers.prepare([0]);
-    await transfers.fetch(wishesOf(s.list, 0).slice(0, 1), { gapBytes: 0, mostBytes: Infinity }, () => undefined, () => undefined);
+    await transfers.fetch(wishesOf(s.list, 0).slice(0, 1), { gapBytes: 0, mostBytes: Infinity },
+      () => undefined, () => undefined);
     while (transfers.pending > 0) await new Promise((go) => setTimeout(go, 1));
     expect(most.length).toBe(2);
     expect(Math.max(...most)).toBeLessThan(2048);
@@ -72,9 +80,8 @@ describe('transfers', () => {
     const s = await setUp();
     const abort = new AbortController();
     const failed: Wish[] = [];
-    const done = s.transfers.fetch(
-      wishesOf(s.list, 2), { gapBytes: 0, mostBytes: 3000, signal: abort.signal }, () => undefined, (w) => failed.push(w),
-    );
+    const done = s.transfers.fetch(wishesOf(s.list, 2),
+      { gapBytes: 0, mostBytes: 3000, signal: abort.signal }, () => undefined, (w) => failed.push(w));
     abort.abort();
     await done;
     expect(failed.length).toBe(s.list.offers.length);
@@ -84,15 +91,19 @@ describe('transfers', () => {
 describe('streams of several rungs', () => {
   /** One fragment of two rungs that follow each other; reads end when the test says so. */
   async function twoRungs() {
-    const tables = { columns: 1, rows: 1, incremental: true, rungQuality: Uint8Array.of(20, 80), sizeBytes: Uint32Array.of(100, 50), digest: new Uint8Array(16) };
-    const reads: { onBytes(n: number): void; done(bytes: Uint8Array): void; failed(error: Error): void }[] = [];
+    const tables = { columns: 1, rows: 1, incremental: true, rungQuality: Uint8Array.of(20, 80),
+      sizeBytes: Uint32Array.of(100, 50), digest: new Uint8Array(16) };
+    const reads: { onBytes(n: number): void; done(bytes: Uint8Array): void;
+      failed(error: Error): void }[] = [];
     const store = {
       read: (...args: unknown[]) =>
-        new Promise<Uint8Array>((done, failed) => reads.push({ onBytes: (args.at(-1) as { onBytes(n: number): void }).onBytes, done, failed })),
+        new Promise<Uint8Array>((done, failed) =>
+          reads.push({ onBytes: (args.at(-1) as { onBytes(n: number): void }).onBytes, done, failed })),
     };
     const reader = {
       form: 'range', store,
-      planeFiles: () => Promise.resolve({ tables, offsets: new Float64Array(2), packs: [0, 1].map(() => ({ path: 'pack', offset: 0, bytes: 100 })) }),
+      planeFiles: () => Promise.resolve({ tables, offsets: new Float64Array(2),
+        packs: [0, 1].map(() => ({ path: 'pack', offset: 0, bytes: 100 })) }),
       tableStream: () => Promise.resolve(new Uint8Array(1)),
     } as unknown as PackageReader;
     const asked: number[][] = [];
@@ -101,14 +112,16 @@ describe('streams of several rungs', () => {
       return [[], []];
     };
     const heard: string[] = [];
-    const info = { codec: 'jpeg-progressive', fragmentWidthPx: 16, fragmentHeightPx: 16, widthPx: 16, heightPx: 16 } as unknown as TextureInfo;
+    const info = { codec: 'jpeg-progressive', fragmentWidthPx: 16, fragmentHeightPx: 16, widthPx: 16,
+      heightPx: 16 } as unknown as TextureInfo;
     const transfers = new Transfers(reader, [info], new WorkerPool({ decode }), {
       decoded: () => void heard.push('decoded'),
       lost: () => void heard.push('lost'),
     });
     await transfers.prepare([0]);
     const wish: Wish = { plane: 0, fragment: 0, rung: 1, offer: 0 };
-    const run = transfers.fetch([wish], { gapBytes: 0, mostBytes: Infinity }, () => heard.push('arrived'), () => heard.push('failed'));
+    const run = transfers.fetch([wish], { gapBytes: 0, mostBytes: Infinity }, () => heard.push('arrived'),
+      () => heard.push('failed'));
     return { reads, asked, heard, run, transfers };
   }
   it('are decoded once, when the last request has ended', async () => {

@@ -1,5 +1,5 @@
-// Decoders of the blocks that the encoder writes, from the text of the formats: nothing is shared with the encoder. A mode that the encoder
-// has no use for is an error.
+// Decoders of the blocks that the encoder writes, from the text of the formats: nothing is shared with the
+// encoder. A mode that the encoder has no use for is an error.
 
 /** Sixteen texels, row by row: red, green, blue, alpha. */
 type Texels = number[][];
@@ -9,13 +9,15 @@ const bit = (block: Uint8Array, at: number, count = 1): number => {
   for (let i = count - 1; i >= 0; --i) v = v * 2 + ((block[(at + i) >> 3] >> ((at + i) & 7)) & 1);
   return v;
 };
-const texels = (of: (x: number, y: number) => number[]): Texels => Array.from({ length: 16 }, (_, i) => of(i & 3, i >> 2));
+const texels = (of: (x: number, y: number) => number[]): Texels =>
+  Array.from({ length: 16 }, (_, i) => of(i & 3, i >> 2));
 
 // ---- BC
 
 export function decodeBc1(b: Uint8Array, fourColours = false): Texels {
   const words = [bit(b, 0, 16), bit(b, 16, 16)];
-  const ends = words.map((w) => [w >> 11, (w >> 5) & 63, w & 31].map((v, c) => (c === 1 ? (v << 2) | (v >> 4) : (v << 3) | (v >> 2))));
+  const ends = words.map((w) =>
+    [w >> 11, (w >> 5) & 63, w & 31].map((v, c) => (c === 1 ? (v << 2) | (v >> 4) : (v << 3) | (v >> 2))));
   const mix = (a: number, z: number): number[] => ends[0].map((v, c) => (a * v + z * ends[1][c]) / (a + z));
   const four = fourColours || words[0] > words[1];
   const colours = [ends[0], ends[1], four ? mix(2, 1) : mix(1, 1), four ? mix(1, 2) : [0, 0, 0]];
@@ -44,7 +46,8 @@ export function decodeBc7(b: Uint8Array): Texels {
   if (bit(b, 0, 7) !== 64) throw new Error('not mode 6');
   const ends = [0, 1].map((e) => [0, 1, 2, 3].map((c) => 2 * bit(b, 7 + 14 * c + 7 * e, 7) + bit(b, 63 + e)));
   const code = (i: number): number => (i === 0 ? bit(b, 65, 3) : bit(b, 64 + 4 * i, 4));
-  return texels((x, y) => ends[0].map((v, c) => ((64 - weights4[code(4 * y + x)]) * v + weights4[code(4 * y + x)] * ends[1][c] + 32) >> 6));
+  return texels((x, y) => ends[0].map(
+    (v, c) => ((64 - weights4[code(4 * y + x)]) * v + weights4[code(4 * y + x)] * ends[1][c] + 32) >> 6));
 }
 
 // ---- ETC2
@@ -78,10 +81,12 @@ export function decodeEtc2(bytes: Uint8Array): Texels {
 function planar(at: (high: number, low: number) => number): Texels {
   const six = (v: number): number => (v << 2) | (v >> 4);
   const seven = (v: number): number => (v << 1) | (v >> 6);
-  const o = [six(at(62, 57)), seven(at(56, 56) * 64 + at(54, 49)), six(at(48, 48) * 32 + at(44, 43) * 8 + at(41, 39))];
+  const o = [six(at(62, 57)), seven(at(56, 56) * 64 + at(54, 49)),
+    six(at(48, 48) * 32 + at(44, 43) * 8 + at(41, 39))];
   const h = [six(at(38, 34) * 2 + at(32, 32)), seven(at(31, 25)), six(at(24, 19))];
   const v = [six(at(18, 13)), seven(at(12, 6)), six(at(5, 0))];
-  return texels((x, y) => [...o.map((c, i) => clamp((x * (h[i] - c) + y * (v[i] - c) + 4 * c + 2) >> 2)), 255]);
+  return texels((x, y) =>
+    [...o.map((c, i) => clamp((x * (h[i] - c) + y * (v[i] - c) + 4 * c + 2) >> 2)), 255]);
 }
 
 // ---- ASTC 4 x 4
@@ -102,7 +107,8 @@ function tritsOf(t: number): number[] {
   if (is(t, 4, 2) === 7) [c, v[4], v[3]] = [is(t, 7, 5) * 4 + is(t, 1, 0), 2, 2];
   else if (is(t, 6, 5) === 3) [v[4], v[3]] = [2, is(t, 7, 7)];
   else [v[4], v[3]] = [is(t, 7, 7), is(t, 6, 5)];
-  if (is(c, 1, 0) === 3) [v[2], v[1], v[0]] = [2, is(c, 4, 4), is(c, 3, 3) * 2 + (is(c, 2, 2) & ~is(c, 3, 3) & 1)];
+  if (is(c, 1, 0) === 3)
+    [v[2], v[1], v[0]] = [2, is(c, 4, 4), is(c, 3, 3) * 2 + (is(c, 2, 2) & ~is(c, 3, 3) & 1)];
   else if (is(c, 3, 2) === 3) [v[2], v[1], v[0]] = [2, 2, is(c, 1, 0)];
   else [v[2], v[1], v[0]] = [is(c, 4, 4), is(c, 3, 2), is(c, 1, 1) * 2 + (is(c, 0, 0) & ~is(c, 1, 1) & 1)];
   return v;
@@ -117,7 +123,8 @@ function rgbEnds(b: Uint8Array): number[] {
     at += 6 + width;
   }
   const trits = tritsOf(parts[0] | (parts[1] << 2) | (parts[2] << 4) | (parts[3] << 5) | (parts[4] << 7));
-  return [...bits.map((v, i) => unquantised(v, trits[i])), unquantised(bit(b, at, 6), tritsOf(bit(b, at + 6, 2))[0])];
+  return [...bits.map((v, i) => unquantised(v, trits[i])),
+    unquantised(bit(b, at, 6), tritsOf(bit(b, at + 6, 2))[0])];
 }
 export function decodeAstc(b: Uint8Array): Texels {
   if (bit(b, 0, 12) === 0xdfc) {

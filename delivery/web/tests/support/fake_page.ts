@@ -82,25 +82,32 @@ export interface FakePage {
   observed(): number;
 }
 /** Runs `body` with a page; the browser's classes are as before afterwards. */
-export async function withPage(options: Partial<PageOptions>, body: (page: FakePage) => Promise<void>): Promise<void> {
+export async function withPage(options: Partial<PageOptions>,
+    body: (page: FakePage) => Promise<void>): Promise<void> {
   const fakes: Record<string, unknown> = {
     IntersectionObserver: FakeIntersectionObserver, ResizeObserver: FakeResizeObserver,
-    innerWidth: screen.width, innerHeight: screen.height, requestAnimationFrame: (draw: () => void) => setTimeout(draw, 0), cancelAnimationFrame: clearTimeout,
+    innerWidth: screen.width, innerHeight: screen.height,
+    requestAnimationFrame: (draw: () => void) => setTimeout(draw, 0), cancelAnimationFrame: clearTimeout,
   };
-  const before = Object.keys(fakes).map((name) => [name, Object.getOwnPropertyDescriptor(globalThis, name)] as const);
-  for (const [name, value] of Object.entries(fakes)) Object.defineProperty(globalThis, name, { value, configurable: true, writable: true });
+  const before =
+    Object.keys(fakes).map((name) => [name, Object.getOwnPropertyDescriptor(globalThis, name)] as const);
+  for (const [name, value] of Object.entries(fakes))
+    Object.defineProperty(globalThis, name, { value, configurable: true, writable: true });
   const renderer = Object.assign(fakeRenderer([]), {
-    domElement: { height: 1000, addEventListener: () => undefined }, setViewport: () => undefined, setScissor: () => undefined, setScissorTest: () => undefined, render: () => undefined,
+    domElement: { height: 1000, addEventListener: () => undefined }, setViewport: () => undefined,
+    setScissor: () => undefined, setScissorTest: () => undefined, render: () => undefined,
     setDrawingBufferSize: () => undefined,
   });
   const gltfLoader = () => ({ register: () => undefined, parseAsync: () => Promise.resolve(fakeGltf()) });
   const page = new TexmeshPage({ gltfLoader, renderer: renderer as unknown as WebGLRenderer, ...options });
   const canvas = (top = 0, px = 100): HTMLCanvasElement => {
-    const made = { width: 1, height: 1, clientWidth: px, clientHeight: px, top, pictures: 0, getBoundingClientRect: () => rectOf(made), getContext: () => ({ drawImage: () => ++made.pictures }) };
+    const made = { width: 1, height: 1, clientWidth: px, clientHeight: px, top, pictures: 0,
+      getBoundingClientRect: () => rectOf(made), getContext: () => ({ drawImage: () => ++made.pictures }) };
     return made as unknown as HTMLCanvasElement;
   };
   try {
-    await body({ page, canvas, scrolled: () => observers.forEach((o) => o.look()), observed: () => [...observers].reduce((n, o) => n + o.targets.size, 0) });
+    await body({ page, canvas, scrolled: () => observers.forEach((o) => o.look()),
+      observed: () => [...observers].reduce((n, o) => n + o.targets.size, 0) });
   } finally {
     page.dispose();
     observers.clear();

@@ -3,7 +3,8 @@ export interface Fault {
   /** By number of the request, from 0 on; false: all is well. */
   (request: { number: number; url: string; range?: [number, number] }): FaultKind | false;
 }
-export type FaultKind = 'status-500' | 'status-404' | 'status-416' | 'refused' | 'cut' | 'stall' | 'short' | 'long' | 'whole' | 'whole-other' | 'whole-longer' | 'flip' | 'flip-last' | 'wrong-range' | 'other-etag';
+export type FaultKind = 'status-500' | 'status-404' | 'status-416' | 'refused' | 'cut' | 'stall' | 'short'
+  | 'long' | 'whole' | 'whole-other' | 'whole-longer' | 'flip' | 'flip-last' | 'wrong-range' | 'other-etag';
 
 export interface FakeServer {
   fetch: typeof fetch;
@@ -16,7 +17,8 @@ function abortError(): Error {
   return new DOMException('aborted', 'AbortError');
 }
 
-export function fakeServer(files: Record<string, Uint8Array>, options: { ranges?: boolean; fault?: Fault } = {}): FakeServer {
+export function fakeServer(files: Record<string, Uint8Array>,
+    options: { ranges?: boolean; fault?: Fault } = {}): FakeServer {
   const log: FakeServer['log'] = [];
   const fakeFetch = async (input: RequestInfo | URL, init: RequestInit = {}): Promise<Response> => {
     const url = String(input);
@@ -35,7 +37,8 @@ export function fakeServer(files: Record<string, Uint8Array>, options: { ranges?
     if (!file || kind === 'status-404') return new Response('', { status: 404 });
     const headers = new Headers();
     // The length alone tells a file that is longer now.
-    if (kind !== 'whole-longer') headers.set('ETag', kind === 'other-etag' || kind === 'whole-other' ? '"other"' : `"${file.length}"`);
+    if (kind !== 'whole-longer')
+      headers.set('ETag', kind === 'other-etag' || kind === 'whole-other' ? '"other"' : `"${file.length}"`);
     let body = kind === 'whole-longer' ? new Uint8Array([...file, 0]) : file;
     let status = 200;
     if (range && options.ranges !== false && !kind?.startsWith('whole')) {
@@ -57,12 +60,14 @@ export function fakeServer(files: Record<string, Uint8Array>, options: { ranges?
     headers.set('Content-Length', String(body.length));
     if (kind === 'short') body = body.subarray(0, body.length - 1);
     if (kind === 'long') body = new Uint8Array([...body, 0]);
-    return new Response(stream(body, kind, init.signal ?? undefined, () => (entry.ended = true)), { status, headers });
+    return new Response(stream(body, kind, init.signal ?? undefined, () => (entry.ended = true)),
+      { status, headers });
   };
   return { fetch: fakeFetch as typeof fetch, log };
 }
 
-function stream(body: Uint8Array, kind: FaultKind | undefined, signal: AbortSignal | undefined, ended: () => void) {
+function stream(body: Uint8Array, kind: FaultKind | undefined, signal: AbortSignal | undefined,
+    ended: () => void) {
   let at = 0;
   const stopAt = kind === 'cut' || kind === 'stall' ? body.length >> 1 : Infinity;
   return new ReadableStream<Uint8Array>({
@@ -95,12 +100,8 @@ function stream(body: Uint8Array, kind: FaultKind | undefined, signal: AbortSign
 }
 
 /** The tree beside a container: its entries as files beneath a path. */
-export function treeFiles(
-  path: string,
-  container: Uint8Array,
-  manifest: Uint8Array,
-  entries: readonly { path: string; offset: number; bytes: number }[],
-): Record<string, Uint8Array> {
+export function treeFiles(path: string, container: Uint8Array, manifest: Uint8Array,
+    entries: readonly { path: string; offset: number; bytes: number }[]): Record<string, Uint8Array> {
   const files: Record<string, Uint8Array> = { [`${path}manifest.json`]: manifest };
   for (const e of entries) files[path + e.path] = container.slice(e.offset, e.offset + e.bytes);
   return files;

@@ -9,7 +9,7 @@ const text = new TextEncoder();
 const sha256 = (bytes: Uint8Array): Uint8Array => new Uint8Array(createHash('sha256').update(bytes).digest());
 const hex = (bytes: Uint8Array): string => Buffer.from(bytes).toString('hex');
 
-/** A container whose documents tests change in place: entries keep their sizes, and seal() makes every digest right again. */
+/** A container whose documents tests change in place, with sizes as before; seal() mends the digests. */
 export class Mutant {
   readonly bytes: Uint8Array;
   readonly manifest: Json;
@@ -90,9 +90,11 @@ export class Mutant {
     }
     for (const at of this.records_.values())
       bytes.set(sha256(bytes.subarray(this.number_(at), this.number_(at) + this.number_(at + 8))), at + 16);
-    for (const { record, begin, end } of this.pages_()) bytes.set(sha256(bytes.subarray(begin, end)), record + 12);
+    for (const { record, begin, end } of this.pages_())
+      bytes.set(sha256(bytes.subarray(begin, end)), record + 12);
     for (const name of ['index', 'tables', 'textures', 'quality'])
-      manifest[name].sha256 = hex(sha256(this.entry(`${name}.${name === 'index' || name === 'tables' ? 'bin' : 'json'}`)));
+      manifest[name].sha256 =
+        hex(sha256(this.entry(`${name}.${name === 'index' || name === 'tables' ? 'bin' : 'json'}`)));
     for (const name of ['index', 'tables']) {
       const { offset, headBytes } = manifest[name];
       manifest[name].headSha256 = hex(sha256(bytes.subarray(offset, offset + headBytes)));

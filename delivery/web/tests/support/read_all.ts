@@ -3,7 +3,7 @@ import { SplitStreamReader } from '../../src/format/splits/split_stream';
 import { PackageReader } from '../../src/reader';
 import { readThesis } from '../../src/thesis';
 
-/** Reads all that a client may ever read of a package; gives the mesh that the stream ends with. */
+/** Reads all that a client may read of a package; gives the mesh at the end of the stream. */
 export async function readAll(bytes: Uint8Array): Promise<SplitStreamReader | undefined> {
   const reader = await PackageReader.openBytes(bytes, 'package');
   await reader.find('about.json');
@@ -12,8 +12,10 @@ export async function readAll(bytes: Uint8Array): Promise<SplitStreamReader | un
   await reader.about();
   await readThesis(reader);
   const coarsest = reader.manifest.scales.at(-1)!.scale;
-  for (const { scale, glb } of reader.manifest.scales) if (glb.path.endsWith('.glb')) requireSelfContained(await reader.scaleGlb(scale), scale !== coarsest);
-  for (const [k] of reader.manifest.proxies.entries()) requireSelfContained(await reader.proxyGlb(k), false, 'G13');
+  for (const { scale, glb } of reader.manifest.scales) if (glb.path.endsWith('.glb'))
+    requireSelfContained(await reader.scaleGlb(scale), scale !== coarsest);
+  for (const [k] of reader.manifest.proxies.entries())
+    requireSelfContained(await reader.proxyGlb(k), false, 'G13');
   const textures = await reader.textures();
   for (const [plane, tables] of (await reader.tables()).entries()) {
     if (textures[plane].mip === 0) await reader.preview(plane);

@@ -14,7 +14,8 @@ export const range = (fault?: Fault): FakeServer => fakeServer(files, { fault })
 export const openAt = (server: FakeServer, options: OpenOptions = {}): Promise<PackageReader> =>
   PackageReader.openUrl(url, { fetch: server.fetch, ...quick, ...options });
 /** As openAt, with a retry more. */
-export const openRetrying = (server: FakeServer, options: OpenOptions = {}): Promise<PackageReader> => openAt(server, { retries: 2, ...options });
+export const openRetrying = (server: FakeServer, options: OpenOptions = {}): Promise<PackageReader> =>
+  openAt(server, { retries: 2, ...options });
 
 /** What something fails with that has to fail. */
 export const rejection = (what: Promise<unknown>): Promise<Error> =>

@@ -4,7 +4,10 @@ import ts from 'typescript';
 /** Source files by their path beneath src. */
 export type Sources = Map<string, string>;
 
-/** The rooms that the files of each room may import from, besides their own. Files beneath no room, the entries, may import all. */
+/**
+ * The rooms that the files of each room may import from, besides their own. Files beneath no room, the
+ * entries, may import all.
+ */
 export const roomsBelow: Record<string, readonly string[]> = {
   format: [],
   http: ['format'],
@@ -17,7 +20,8 @@ export const roomsBelow: Record<string, readonly string[]> = {
 };
 
 /** Lines of a function, of a class, of a file, of the median file, and files in a folder. */
-export const most = { functionLines: 80, classLines: 400, fileLines: 700, medianLines: 160, filesInFolder: 24 };
+export const most = { functionLines: 80, classLines: 400, fileLines: 700, medianLines: 160,
+  filesInFolder: 24 };
 
 const roomOf = (file: string): string => (file.includes('/') ? file.slice(0, file.indexOf('/')) : '');
 const linesOf = (text: string): number => text.split('\n').length - 1;
@@ -46,9 +50,12 @@ const specifiersOf = once(readSpecifiers);
 function readSpecifiers(source: ts.SourceFile): string[] {
   const found: string[] = [];
   const visit = (node: ts.Node): void => {
-    if ((ts.isImportDeclaration(node) || ts.isExportDeclaration(node)) && node.moduleSpecifier) found.push((node.moduleSpecifier as ts.StringLiteral).text);
-    if (ts.isCallExpression(node) && node.expression.kind === ts.SyntaxKind.ImportKeyword && ts.isStringLiteral(node.arguments[0])) found.push(node.arguments[0].text);
-    if (ts.isImportTypeNode(node) && ts.isLiteralTypeNode(node.argument)) found.push((node.argument.literal as ts.StringLiteral).text);
+    if ((ts.isImportDeclaration(node) || ts.isExportDeclaration(node)) && node.moduleSpecifier)
+      found.push((node.moduleSpecifier as ts.StringLiteral).text);
+    if (ts.isCallExpression(node) && node.expression.kind === ts.SyntaxKind.ImportKeyword &&
+        ts.isStringLiteral(node.arguments[0])) found.push(node.arguments[0].text);
+    if (ts.isImportTypeNode(node) && ts.isLiteralTypeNode(node.argument))
+      found.push((node.argument.literal as ts.StringLiteral).text);
     ts.forEachChild(node, visit);
   };
   visit(source);
@@ -59,7 +66,8 @@ function readSpecifiers(source: ts.SourceFile): string[] {
 export function importsOf(sources: Sources): Map<string, string[]> {
   return new Map([...sources].map(([file, text]) => {
     const named = specifiersOf(parsed(file, text)).filter((name) => name.startsWith('.'));
-    return [file, named.map((name) => `${normalize(join(dirname(file), name))}.ts`).filter((name) => sources.has(name))];
+    const paths = named.map((name) => `${normalize(join(dirname(file), name))}.ts`);
+    return [file, paths.filter((path) => sources.has(path))];
   }));
 }
 
@@ -93,7 +101,8 @@ const longParts = once((source) => {
   const found: string[] = [];
   const lineOf = (position: number): number => source.getLineAndCharacterOfPosition(position).line;
   const visit = (node: ts.Node): void => {
-    const limit = ts.isClassLike(node) ? most.classLines : ts.isFunctionLike(node) ? most.functionLines : Infinity;
+    const limit = ts.isClassLike(node) ? most.classLines
+      : ts.isFunctionLike(node) ? most.functionLines : Infinity;
     const first = limit < Infinity ? lineOf(node.getStart()) : 0;
     const lines = limit < Infinity ? lineOf(node.end) - first + 1 : 0;
     if (lines > limit) found.push(`${source.fileName}:${first + 1}: ${lines} lines of ${limit}`);
@@ -112,7 +121,8 @@ export function tooLarge(sources: Sources): string[] {
     if (linesOf(text) > most.fileLines) found.push(`${file}: ${linesOf(text)} lines of ${most.fileLines}`);
     folders.set(dirname(file), (folders.get(dirname(file)) ?? 0) + 1);
   }
-  for (const [folder, count] of folders) if (count > most.filesInFolder) found.push(`${folder}: ${count} files of ${most.filesInFolder}`);
+  for (const [folder, count] of folders) if (count > most.filesInFolder)
+    found.push(`${folder}: ${count} files of ${most.filesInFolder}`);
   const median = [...sources.values()].map(linesOf).sort((a, b) => a - b)[sources.size >> 1];
   if (median > most.medianLines) found.push(`median file: ${median} lines of ${most.medianLines}`);
   return found;

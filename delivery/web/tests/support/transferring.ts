@@ -12,20 +12,23 @@ import { golden } from './files';
 export const url = 'http://host/scan.texmesh';
 
 /** The guard over a link of 100 kB/s without latency. */
-export const defaultTimePlan: TimePlanOptions = { policy: 'guard', order: 'credit', timeLimitS: 5, initialBytesS: 1e5, rttS: 0 };
+export const defaultTimePlan: TimePlanOptions = { policy: 'guard', order: 'credit', timeLimitS: 5,
+  initialBytesS: 1e5, rttS: 0 };
 
 /** Instead of a worker: checks digests, decodes nothing. */
 export async function decode(request: WorkerRequest): Promise<[unknown, Transferable[]]> {
   if (request.op !== 'decode') throw new Error('not asked for here');
   for (const [i, digest] of request.digests.entries())
-    if (!samePrefix(await sha256(request.streams[i]), digest)) throw new FormatError('fragment', '', 'a digest', 'another');
+    if (!samePrefix(await sha256(request.streams[i]), digest))
+      throw new FormatError('fragment', '', 'a digest', 'another');
   return [[{ streams: request.streams.length }], []];
 }
 
 /** Transfers whose planes are prepared, and what becomes of wishes. */
 export async function setUp(fault?: Fault) {
   const server = fakeServer({ '/scan.texmesh': golden('v2.0-scan') }, { fault });
-  const reader = await PackageReader.openUrl(url, { fetch: server.fetch, startBytes: 16384, retryDelayS: 0.001, retries: 1 });
+  const reader = await PackageReader.openUrl(url,
+    { fetch: server.fetch, startBytes: 16384, retryDelayS: 0.001, retries: 1 });
   await reader.prefetchDocuments();
   const data = await reader.data();
   const decoded: Wish[] = [];
@@ -43,4 +46,5 @@ export async function setUp(fault?: Fault) {
   return { server, reader, data, transfers, decoded, lost, list, settled };
 }
 export const wishesOf = (list: FragmentList, rung: number): Wish[] =>
-  list.fragments.map((f, offer) => ({ ...f, rung: Math.min(rung, list.offers[offer].bytes.length - 1), offer }));
+  list.fragments.map((f, offer) => ({ ...f, rung: Math.min(rung, list.offers[offer].bytes.length - 1),
+    offer }));

@@ -1,5 +1,6 @@
 /** Workers that do what a test says, instead of the browser's. */
-export async function withWorkers<T extends object>(made: (number: number) => T, body: (all: T[]) => Promise<void>): Promise<void> {
+export async function withWorkers<T extends object>(made: (number: number) => T,
+    body: (all: T[]) => Promise<void>): Promise<void> {
   const all: T[] = [];
   const before = Object.getOwnPropertyDescriptor(globalThis, 'Worker');
   const value = function (): T {

@@ -16,7 +16,8 @@ it('pictures that nobody waits for are closed, and streams are told of their end
     },
   });
   const none = new Uint8Array(0);
-  const decoding = rejection(pool.decode({ codec: 'jpeg', tables: none, streams: [none], digests: [], complete: true, levels: 1, most: [9, 9] }));
+  const decoding = rejection(pool.decode({ codec: 'jpeg', tables: none, streams: [none], digests: [],
+    complete: true, levels: 1, most: [9, 9] }));
   pool.closeSplits(3);
   await Promise.resolve();
   pool.dispose();
@@ -27,7 +28,8 @@ it('pictures that nobody waits for are closed, and streams are told of their end
 });
 
 /** A pool whose jobs end one after the other, in the order in which they have begun. */
-function slowPool(): { begun: string[]; decode: () => Promise<unknown>; enlarge: () => Promise<unknown>; end: (all: Promise<unknown>[]) => Promise<void> } {
+function slowPool(): { begun: string[]; decode: () => Promise<unknown>; enlarge: () => Promise<unknown>;
+    end: (all: Promise<unknown>[]) => Promise<void> } {
   const begun: string[] = [];
   const letGo: (() => void)[] = [];
   const pool = new WorkerPool({
@@ -40,8 +42,10 @@ function slowPool(): { begun: string[]; decode: () => Promise<unknown>; enlarge:
   const none = new Uint8Array(0);
   return {
     begun,
-    decode: () => pool.decode({ codec: 'jpeg', tables: none, streams: [none], digests: [], complete: true, levels: 1, most: [9, 9] }),
-    enlarge: () => pool.enlarge({ picture: {} as ImageBitmap, width: 8, height: 8, x0: 0, x1: 8, y0: 0, y1: 8, levels: 1 }),
+    decode: () => pool.decode({ codec: 'jpeg', tables: none, streams: [none], digests: [], complete: true,
+      levels: 1, most: [9, 9] }),
+    enlarge: () => pool.enlarge({ picture: {} as ImageBitmap, width: 8, height: 8, x0: 0, x1: 8, y0: 0, y1: 8,
+      levels: 1 }),
     end: async (all) => {
       await turns(5);
       for (; letGo.length > 0; await turns(5)) letGo.shift()!();
@@ -54,7 +58,8 @@ function slowPool(): { begun: string[]; decode: () => Promise<unknown>; enlarge:
 it('previews are enlarged when no fragment waits', async () => {
   const { begun, decode, enlarge, end } = slowPool();
   await end([...Array.from({ length: 12 }, enlarge), ...Array.from({ length: 4 }, decode)]);
-  expect(begun.slice(8, 13).filter((op) => op === 'decode').length).toBe(4); // eight were under way; one turn of four is the eldest's
+  // eight were under way; one turn of four is the eldest's
+  expect(begun.slice(8, 13).filter((op) => op === 'decode').length).toBe(4);
 });
 
 it('an enlarged preview does not wait for ever behind fragments', async () => {
@@ -118,7 +123,8 @@ describe('documents', () => {
     const pools = [0, 1, 2].map(() => new WorkerPool({ decode }));
     const ended = [0, 0, 0];
     const jobs = pools.map((pool, p) => Array.from({ length: 10 }, () =>
-      pool.decode({ codec: 'jpeg', tables: none, streams: [], digests: [], complete: true, levels: 1, most: [9, 9] }).then(() => ++ended[p], () => -1)));
+      pool.decode({ codec: 'jpeg', tables: none, streams: [], digests: [], complete: true, levels: 1,
+        most: [9, 9] }).then(() => ++ended[p], () => -1)));
     const settle = (): Promise<void> => new Promise((go) => setTimeout(go, 2));
     await settle();
     expect([now, all, ...pools.map((p) => p.pending())]).toEqual([8, 8, 10, 10, 10]);
@@ -145,7 +151,8 @@ describe('documents', () => {
     });
     const none = new Uint8Array(0);
     for (let i = 0; i < 30; ++i)
-      void pool.decode({ codec: 'jpeg', tables: none, streams: [], digests: [], complete: true, levels: 1, most: [9, 9] }).catch(() => undefined);
+      void pool.decode({ codec: 'jpeg', tables: none, streams: [], digests: [], complete: true, levels: 1,
+        most: [9, 9] }).catch(() => undefined);
     void pool.decodeDocument('textures', none, {} as Manifest).catch(() => undefined);
     await new Promise((go) => setTimeout(go, 5));
     expect(posted.length).toBeLessThan(30);
@@ -159,10 +166,12 @@ it('workers are sent the bytes that they need, not the package that they lie in'
   const pool = new WorkerPool({ decode: async (request) => (sent.push(request), [[], []]) });
   const whole = Uint8Array.from({ length: 1000 }, (_, i) => i & 255);
   const [tables, stream] = [whole.subarray(0, 10), whole.subarray(500, 540)];
-  await pool.decode({ codec: 'jpeg', tables, streams: [stream, whole], digests: [], complete: false, levels: 1, most: [9, 9] });
+  await pool.decode({ codec: 'jpeg', tables, streams: [stream, whole], digests: [], complete: false,
+    levels: 1, most: [9, 9] });
   await pool.addSplits(1, stream);
   const [decode, splits] = sent as [WorkerRequest & { op: 'decode' }, WorkerRequest & { op: 'split-add' }];
-  for (const [found, expected] of [[decode.tables, tables], [decode.streams[0], stream], [splits.blocks, stream]]) {
+  for (const [found, expected] of [[decode.tables, tables], [decode.streams[0], stream],
+        [splits.blocks, stream]]) {
     expect(found).toEqual(expected);
     expect(found.buffer.byteLength).toBe(expected.length);
   }
@@ -183,11 +192,13 @@ describe('workers that break', () => {
       this.onerror!({ preventDefault: () => undefined });
     },
   });
-  const picture = { codec: 'jpeg', tables: new Uint8Array(0), streams: [], digests: [], complete: true, levels: 1, most: [9, 9] } as const;
+  const picture = { codec: 'jpeg', tables: new Uint8Array(0), streams: [], digests: [], complete: true,
+    levels: 1, most: [9, 9] } as const;
   const asked = () => ({ ...picture, streams: [], digests: [], most: [9, 9] as [number, number] });
   it('cost what they had under way, not what waited for its turn', () => withWorkers(worker, async (all) => {
     const pool = new WorkerPool({ workers: 1 });
-    const ends = Array.from({ length: 20 }, () => pool.decode(asked()).then(() => 'done', (error: Error) => error.message));
+    const ends = Array.from({ length: 20 },
+      () => pool.decode(asked()).then(() => 'done', (error: Error) => error.message));
     expect(all[0].posted.length).toBe(8);
     all[0].onmessage!({ data: { id: all[0].posted[0], result: [] } }); // it works
     await turns();
@@ -196,9 +207,11 @@ describe('workers that break', () => {
     await turns();
     // Eight more have their turn, at the third worker.
     expect(all[2].posted.length).toBe(8);
-    for (let n = 0; n < all[2].posted.length; ++n) all[2].onmessage!({ data: { id: all[2].posted[n], result: [] } });
+    for (let n = 0; n < all[2].posted.length; ++n)
+      all[2].onmessage!({ data: { id: all[2].posted[n], result: [] } });
     await turns();
-    for (let n = 0; n < all[2].posted.length; ++n) all[2].onmessage!({ data: { id: all[2].posted[n], result: [] } });
+    for (let n = 0; n < all[2].posted.length; ++n)
+      all[2].onmessage!({ data: { id: all[2].posted[n], result: [] } });
     const said = await Promise.all(ends);
     expect(said.filter((s) => s === 'a worker broke').length).toBe(8);
     expect(said.filter((s) => s === 'done').length).toBe(12);

@@ -31,7 +31,8 @@ describe('shared workers', () => {
       const pools = Array.from({ length: 5 }, () => new WorkerPool({ workers: 3, shared }));
       expect(workers.length).toBe(2);
       const asked = pools.map((pool, i) => pool.openSplits(i, head));
-      for (const worker of workers) worker.posted.forEach(({ key }, at) => worker.answer(at, `stream ${key}`));
+      for (const worker of workers)
+        worker.posted.forEach(({ key }, at) => worker.answer(at, `stream ${key}`));
       expect(await Promise.all(asked)).toEqual(['stream 0', 'stream 1', 'stream 2', 'stream 3', 'stream 4']);
       expect(workers.every((w) => w.posted.length > 1)).toBe(true); // pools begin with different ones
       for (const pool of pools) pool.dispose();
@@ -43,7 +44,8 @@ describe('shared workers', () => {
     withWorkers(() => new Fake(), async (workers) => {
       const shared = new SharedWorkers(1);
       const pool = new WorkerPool({ workers: 1, shared });
-      const lost = rejection(pool.decode({ codec: 'jpeg', tables: head, streams: [head], digests: [], complete: true, levels: 1, most: [1, 1] }));
+      const lost = rejection(pool.decode({ codec: 'jpeg', tables: head, streams: [head], digests: [],
+        complete: true, levels: 1, most: [1, 1] }));
       pool.dispose();
       expect((await lost).name).toBe('AbortError');
       let closed = 0;

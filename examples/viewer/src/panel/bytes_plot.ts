@@ -13,7 +13,8 @@ export function bytesPlot(live: () => Live): SectionPlots {
     open: false,
     plots: [{
       options: {
-        x: { label: '', name: 'for', value: name, ticks: name, splits: kinds, range: [-0.6, kinds.length - 0.4] },
+        x: { label: '', name: 'for', value: name, ticks: name, splits: kinds,
+          range: [-0.6, kinds.length - 0.4] },
         y: [{ label: 'bytes', ticks: format.bytes, min: 0 }],
         curves: [{ label: 'received', colour: 'k1', kind: 'bars', value: format.bytes }],
       },

@@ -18,15 +18,15 @@ export class Controls {
   private readonly rungSelect: HTMLSelectElement;
 
   /** Writes what is chosen into `choices`. */
-  constructor(
-    private readonly choices: Choices,
-    private readonly actions: ControlActions,
-  ) {
+  constructor(private readonly choices: Choices, private readonly actions: ControlActions) {
     const c = choices;
-    const cap = this.select('cap', capsWith(c.capBytesPerSecond).map(([text, v]) => [String(v), text]), String(c.capBytesPerSecond), (v) => { c.capBytesPerSecond = Number(v); });
+    const cap = this.select('cap', capsWith(c.capBytesPerSecond).map(([text, v]) => [String(v), text]),
+      String(c.capBytesPerSecond), (v) => { c.capBytesPerSecond = Number(v); });
     const policy = this.select('policy', kPolicies, c.policy, (v) => { c.policy = v as Choices['policy']; });
-    this.scaleSelect = this.select('scale', [kScaleByDisplay], '', (v) => { c.scale = v === '' ? null : Number(v); });
-    this.rungSelect = this.select('rung', [kRungByPlan], '', (v) => { c.rung = v === '' ? null : Number(v); });
+    this.scaleSelect = this.select('scale', [kScaleByDisplay], '',
+      (v) => { c.scale = v === '' ? null : Number(v); });
+    this.rungSelect = this.select('rung', [kRungByPlan], '',
+      (v) => { c.rung = v === '' ? null : Number(v); });
     this.box = make('section', {}, make('h2', {}, 'Delivery'), make('div', { class: 'controls' },
       make('label', { for: 'time' }, 'Time limit'), this.timeSlider(),
       make('label', { for: 'cap' }, 'Bandwidth'), cap,
@@ -35,14 +35,16 @@ export class Controls {
       make('label', { for: 'scale' }, 'Mesh scale'), this.scaleSelect,
       make('label', { for: 'rung' }, 'Texture'), this.rungSelect,
       make('div', { class: 'buttons' },
-        make('button', { type: 'button', class: 'primary', id: 'reload', onclick: () => actions.reload() }, 'Load again'),
+        make('button', { type: 'button', class: 'primary', id: 'reload', onclick: () => actions.reload() },
+          'Load again'),
         make('button', { type: 'button', id: 'refine', onclick: () => actions.refine() }, 'Refine')),
     ));
   }
 
   /** Offers the scales of a package. */
   offerScales(m: Manifest): void {
-    const scales = m.scales.map((s): Option => [String(s.scale), `S${s.scale} · ${format.count(s.triangles)} triangles`]);
+    const scales =
+      m.scales.map((s): Option => [String(s.scale), `S${s.scale} · ${format.count(s.triangles)} triangles`]);
     this.scaleSelect.replaceChildren(...options([kScaleByDisplay, ...scales]));
     this.scaleSelect.value = this.choices.scale === null ? '' : String(this.choices.scale);
     if (this.scaleSelect.selectedIndex < 0) this.scaleSelect.value = String(m.scales.at(-1)?.scale ?? '');
@@ -53,7 +55,8 @@ export class Controls {
     const qualities = textures.map((t) => t.rungQuality).reduce((a, b) => (b.length > a.length ? b : a), []);
     const rungs = qualities.map((q, r): Option => [String(r), `rung ${r} · quality ${q}`]);
     this.rungSelect.replaceChildren(...options([kRungByPlan, ...rungs]));
-    this.rungSelect.value = this.choices.rung === null ? '' : String(Math.min(this.choices.rung, qualities.length - 1));
+    this.rungSelect.value = this.choices.rung === null ? ''
+      : String(Math.min(this.choices.rung, qualities.length - 1));
   }
 
   private changed(): void {
@@ -66,7 +69,8 @@ export class Controls {
     const last = kTimes.length - 1;
     const nearest = kTimes.findIndex((t) => t >= c.timeS);
     const slider = make('input', {
-      type: 'range', id: 'time', min: '0', max: String(last), step: '1', value: String(nearest < 0 ? last : nearest), 'aria-valuetext': format.seconds(c.timeS),
+      type: 'range', id: 'time', min: '0', max: String(last), step: '1',
+      value: String(nearest < 0 ? last : nearest), 'aria-valuetext': format.seconds(c.timeS),
       oninput: () => {
         c.timeS = kTimes[Number(slider.value)] ?? Infinity;
         said.textContent = format.seconds(c.timeS);
@@ -77,7 +81,8 @@ export class Controls {
     return make('div', { class: 'row' }, slider, said);
   }
 
-  private select(id: string, offered: Option[], value: string, set: (value: string) => void): HTMLSelectElement {
+  private select(id: string, offered: Option[], value: string,
+      set: (value: string) => void): HTMLSelectElement {
     const e = make('select', { id, onchange: () => { set(e.value); this.changed(); } }, ...options(offered));
     e.value = value;
     return e;

@@ -3,7 +3,8 @@ import * as format from '../format';
 import type { Live } from '../live';
 
 const kFigures = [
-  ['scale', 'mesh shown'], ['size', 'displayed height'], ['bytes', 'received'], ['first', 'first picture'], ['time', 'complete after'],
+  ['scale', 'mesh shown'], ['size', 'displayed height'], ['bytes', 'received'], ['first', 'first picture'],
+  ['time', 'complete after'],
   ['flip', 'predicted FLIP'],
 ] as const;
 type Figure = (typeof kFigures)[number][0];
@@ -24,12 +25,15 @@ export class Figures {
   }
 
   show(l: Live): void {
-    const shown = l.proxy >= 0 ? l.manifest?.proxies[l.proxy] : l.manifest?.scales.find((s) => s.scale === l.scale);
+    const shown = l.proxy >= 0 ? l.manifest?.proxies[l.proxy]
+      : l.manifest?.scales.find((s) => s.scale === l.scale);
     this.set('scale', shownName(l), shown ? `${format.short(shown.triangles)} tri` : '');
     this.set('size', l.displayedPx > 0 ? format.px(l.displayedPx) : '–');
-    this.set('bytes', l.bytes > 0 ? format.bytes(l.bytes) : '–', l.packageBytes > 0 ? `of ${format.bytes(l.packageBytes)}` : '');
+    this.set('bytes', l.bytes > 0 ? format.bytes(l.bytes) : '–',
+      l.packageBytes > 0 ? `of ${format.bytes(l.packageBytes)}` : '');
     this.set('first', secondsOrDash(l.firstPictureS));
-    this.set('time', secondsOrDash(l.doneS), Number.isFinite(l.limitS) && Number.isFinite(l.doneS) ? `of ${format.seconds(l.limitS)}` : '');
+    this.set('time', secondsOrDash(l.doneS),
+      Number.isFinite(l.limitS) && Number.isFinite(l.doneS) ? `of ${format.seconds(l.limitS)}` : '');
     this.set('flip', Number.isFinite(l.predictedFlip) ? l.predictedFlip.toFixed(3) : '–');
   }
 

@@ -7,7 +7,9 @@ import { colour, onTheme } from '../theme';
 
 export type ColourBy = 'eta' | 'rung' | 'bytes' | 'skipped';
 
-/** Five stops of a ramp that is even to the eye and to colour-blind people (viridis, Smith and van der Walt). */
+/**
+ * Five stops of a ramp that is even to the eye and to colour-blind people (viridis, Smith and van der Walt).
+ */
 const kRamp: [number, number, number][] = [
   [68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37],
 ];
@@ -20,7 +22,9 @@ export function rampColour(t: number): string {
   return `rgb(${mix(0)} ${mix(1)} ${mix(2)})`;
 }
 
-/** A picture of a texture's fragments, each in the colour of its rung, importance, bytes, or of being skipped. */
+/**
+ * A picture of a texture's fragments, each in the colour of its rung, importance, bytes, or of being skipped.
+ */
 export class FragmentMap {
   readonly box = make('div', { class: 'map' });
   private readonly canvas = make('canvas', { role: 'img', 'aria-label': 'Fragments of the texture' });
@@ -79,11 +83,13 @@ export class FragmentMap {
     const height = Math.round(Math.min(width * (info.heightPx / info.widthPx), width * 1.4));
     this.canvas.style.height = `${height}px`;
     const dense = devicePixelRatio;
-    if (this.canvas.width !== Math.round(width * dense) || this.canvas.height !== Math.round(height * dense)) {
+    if (this.canvas.width !== Math.round(width * dense) ||
+          this.canvas.height !== Math.round(height * dense)) {
       this.canvas.width = Math.round(width * dense);
       this.canvas.height = Math.round(height * dense);
     }
-    const c = this.canvas.getContext('2d', { willReadFrequently: true }); // a few hundred rectangles: not worth the GPU's time
+    // a few hundred rectangles: not worth the GPU's time
+    const c = this.canvas.getContext('2d', { willReadFrequently: true });
     if (!c) return;
     c.clearRect(0, 0, this.canvas.width, this.canvas.height);
     const fill = this.colours(tables);
@@ -122,16 +128,19 @@ export class FragmentMap {
       }
       case 'rung':
         this.ramp(`quality ${t.rungQuality[0] ?? 0}`, `${t.rungQuality[top] ?? 0}`, true);
-        return (f) => (!stored[f] ? null : (rungs?.[f] ?? -1) < 0 ? skipped : rampColour(top === 0 ? 1 : (rungs![f] ?? 0) / top));
+        return (f) => (!stored[f] ? null
+          : (rungs?.[f] ?? -1) < 0 ? skipped : rampColour(top === 0 ? 1 : (rungs![f] ?? 0) / top));
       case 'bytes': {
         let most = 1;
         for (let f = 0; f < fragments; f++) most = Math.max(most, bytesOf(f));
         this.ramp('0', format.bytes(most), true);
-        return (f) => (!stored[f] ? null : bytesOf(f) === 0 ? skipped : rampColour(Math.sqrt(bytesOf(f) / most)));
+        return (f) => (!stored[f] ? null
+          : bytesOf(f) === 0 ? skipped : rampColour(Math.sqrt(bytesOf(f) / most)));
       }
       case 'skipped':
         this.nameColours([['k1', 'here'], ['warm', 'skipped by the plan'], ['skipped', 'not yet']]);
-        return (f) => (!stored[f] ? null : (rungs?.[f] ?? -1) >= 0 ? here : skippedSet?.has(f) ? left : skipped);
+        return (f) => (!stored[f] ? null
+          : (rungs?.[f] ?? -1) >= 0 ? here : skippedSet?.has(f) ? left : skipped);
     }
   }
 
@@ -139,7 +148,8 @@ export class FragmentMap {
     const rung = this.live?.rungs.get(this.plane)?.[f] ?? -1;
     const fragments = t.columns * t.rows;
     let sum = 0;
-    for (let r = t.incremental ? 0 : rung; r >= 0 && r <= rung; r++) sum += t.sizeBytes[r * fragments + f] ?? 0;
+    for (let r = t.incremental ? 0 : rung; r >= 0 && r <= rung; r++)
+      sum += t.sizeBytes[r * fragments + f] ?? 0;
     return sum;
   }
 
@@ -147,13 +157,15 @@ export class FragmentMap {
     if (this.legendHas(`ramp ${low} ${high} ${skip}`)) return;
     const stops = [0, 0.25, 0.5, 0.75, 1].map(rampColour).join(', ');
     const bar = make('span', { class: 'ramp', style: `background: linear-gradient(to right, ${stops})` });
-    this.legend.replaceChildren(low, bar, high, ...(skip ? [make('span', { class: 'skip' }), 'preview'] : []));
+    this.legend.replaceChildren(low, bar, high,
+      ...(skip ? [make('span', { class: 'skip' }), 'preview'] : []));
   }
 
   private nameColours(names: [string, string][]): void {
     if (this.legendHas(`words ${names}`)) return;
     this.legend.replaceChildren(
-      ...names.flatMap(([c, text]) => [make('span', { class: 'skip', style: `background: var(--${c})` }), text]));
+      ...names.flatMap(([c, text]) =>
+        [make('span', { class: 'skip', style: `background: var(--${c})` }), text]));
   }
 
   /** Whether the legend has this text already; notes the text. */
@@ -174,7 +186,8 @@ export class FragmentMap {
     const f = row * info.columns + column;
     const rung = this.live?.rungs.get(this.plane)?.[f] ?? -1;
     const eta = etaOf(tables, this.row())[f] ?? 0;
-    const now = rung < 0 ? 'preview' : `quality ${tables.rungQuality[rung]}, ${format.bytes(this.bytesOf(tables, f))}`;
+    const now = rung < 0 ? 'preview'
+      : `quality ${tables.rungQuality[rung]}, ${format.bytes(this.bytesOf(tables, f))}`;
     this.hint.textContent = (tables.coveredTexels[f] ?? 0) === 0 ? `fragment ${f}: nothing of the object` :
       `fragment ${f}: η ${eta.toFixed(2)}, ${now}`;
   }

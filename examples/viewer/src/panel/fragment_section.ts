@@ -5,7 +5,8 @@ import { FragmentMap } from './fragment_map';
 import type { ColourBy } from './fragment_map';
 import { foldingSection } from './section';
 
-const kColourings: [ColourBy, string][] = [['rung', 'rung'], ['eta', 'η'], ['bytes', 'bytes'], ['skipped', 'skipped']];
+const kColourings: [ColourBy, string][] =
+  [['rung', 'rung'], ['eta', 'η'], ['bytes', 'bytes'], ['skipped', 'skipped']];
 
 /** The map of a texture's fragments, with the choice of the texture and of what colours mean. */
 export class FragmentSection {
@@ -17,19 +18,18 @@ export class FragmentSection {
   private textureChosen = false;
 
   /** Calls `onTexture` when a person has chosen a texture. */
-  constructor(
-    private readonly live: () => Live,
-    onTexture: () => void,
-  ) {
+  constructor(private readonly live: () => Live, onTexture: () => void) {
     for (const [by, text] of kColourings) {
-      const button = make('button', { type: 'button', 'aria-pressed': String(by === this.colourBy), onclick: () => this.choose(by, button) }, text);
+      const button = make('button', { type: 'button', 'aria-pressed': String(by === this.colourBy),
+        onclick: () => this.choose(by, button) }, text);
       this.colourings.append(button);
     }
     this.textureSelect.addEventListener('change', () => {
       this.textureChosen = true;
       onTexture();
     });
-    this.box = foldingSection('Fragments', 'The texture as it is cut; each fragment in the colour of its quality, importance, bytes, or of being left out.', true,
+    this.box = foldingSection('Fragments', 'The texture as it is cut; each fragment in the colour of ' +
+      'its quality, importance, bytes, or of being left out.', true,
       this.textureSelect, this.colourings, this.map.box);
   }
 
@@ -48,7 +48,8 @@ export class FragmentSection {
     this.textureSelect.replaceChildren(...textures.map((t, plane) => {
       const image = t.mip > 0 ? textures[t.base] : t;
       const size = `${t.widthPx} × ${t.heightPx}`;
-      return make('option', { value: String(plane) }, `${image?.role ?? t.role} ${t.image}, ${size}${t.mip ? ` (1/${2 ** t.mip})` : ''}`);
+      return make('option', { value: String(plane) },
+        `${image?.role ?? t.role} ${t.image}, ${size}${t.mip ? ` (1/${2 ** t.mip})` : ''}`);
     }));
   }
 

@@ -11,7 +11,8 @@ export function ladderPlot(tables: () => PlaneTables | undefined): SectionPlots 
     plots: [{
       options: {
         x: { label: 'quality', value: (v) => v.toFixed(0) },
-        y: [{ label: 'bytes', ticks: format.bytes, min: 0 }, { label: 'SSIM', ticks: (v) => v.toFixed(2), max: 1.002, close: true }],
+        y: [{ label: 'bytes', ticks: format.bytes, min: 0 },
+          { label: 'SSIM', ticks: (v) => v.toFixed(2), max: 1.002, close: true }],
         curves: [
           { label: 'bytes', colour: 'k1', value: format.bytes, fill: true },
           { label: 'SSIM', colour: 'k3', side: 1, value: (v) => v.toFixed(4) },

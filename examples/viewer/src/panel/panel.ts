@@ -14,7 +14,10 @@ import { timePlots } from './time_plots';
 
 const kRefreshMs = 150;
 
-/** The panel: figures, controls, plots. `update` may be called at any rate; the panel draws open sections a few times a second. */
+/**
+ * The panel: figures, controls, plots. `update` may be called at any rate; the panel draws open sections a
+ * few times a second.
+ */
 export class Panel {
   private readonly figures = new Figures();
   private readonly controls: Controls;
@@ -32,7 +35,8 @@ export class Panel {
     this.proxies = new ProxySection(now);
     this.fragments = new FragmentSection(now, redraw);
     const scales = new PlotSection(scalePlot(now));
-    const below = [ladderPlot(() => this.live.tables[this.fragments.plane]), timePlots(now), bytesPlot(now)].map((p) => new PlotSection(p));
+    const below = [ladderPlot(() => this.live.tables[this.fragments.plane]), timePlots(now),
+      bytesPlot(now)].map((p) => new PlotSection(p));
     this.plots = [scales, ...below];
     const sections = [scales, this.proxies, this.fragments, ...below].map(({ box }) => box);
     for (const section of sections) section.addEventListener('toggle', redraw);

@@ -33,7 +33,8 @@ export interface PlotOptions {
     range?: [number, number];
   };
   /** `close`: the axis begins near the least value, not at 0. */
-  y: { label: string; ticks: (v: number) => string; log?: boolean; min?: number; max?: number; close?: boolean }[];
+  y: { label: string; ticks: (v: number) => string; log?: boolean; min?: number; max?: number;
+    close?: boolean }[];
   curves: Curve[];
   /** Where the load stands now: a vertical line, and a dot on the first y axis. */
   mark?: () => Mark | null;
@@ -50,10 +51,7 @@ export class Plot {
   private mark: Mark | null | undefined;
   private width = 0;
 
-  constructor(
-    private readonly box: HTMLElement,
-    private readonly options: PlotOptions,
-  ) {
+  constructor(private readonly box: HTMLElement, private readonly options: PlotOptions) {
     box.classList.add('plot');
     new ResizeObserver(() => this.fit()).observe(box);
     onTheme(() => this.rebuild());
@@ -91,14 +89,17 @@ export class Plot {
   }
 }
 
-function equal(a: readonly (readonly (number | null)[])[], b: readonly (readonly (number | null)[])[]): boolean {
-  return a.length === b.length && a.every((row, i) => row.length === b[i]?.length && row.every((v, k) => v === b[i]?.[k]));
+function equal(a: readonly (readonly (number | null)[])[],
+    b: readonly (readonly (number | null)[])[]): boolean {
+  return a.length === b.length &&
+    a.every((row, i) => row.length === b[i]?.length && row.every((v, k) => v === b[i]?.[k]));
 }
 
 function uplotOptions(o: PlotOptions, width: number): uPlot.Options {
   const font = '11px system-ui, sans-serif';
   const [ink, line] = [colour('muted'), colour('line')];
-  const axis = { stroke: ink, font, labelFont: font, ticks: { stroke: line, width: 1, size: 4 }, grid: { stroke: line, width: 1 } };
+  const axis = { stroke: ink, font, labelFont: font, ticks: { stroke: line, width: 1, size: 4 },
+    grid: { stroke: line, width: 1 } };
   const scales: uPlot.Scales = { x: { time: false, distr: o.x.log ? 3 : 1 } };
   if (o.x.range) scales['x']!.range = o.x.range;
   else if (o.x.log) scales['x']!.range = (_u, low, high) => [low, high];
@@ -114,13 +115,15 @@ function uplotOptions(o: PlotOptions, width: number): uPlot.Options {
       distr: y.log ? 3 : 1,
       range: (_u, low, high) => {
         if (y.log) return [Math.max(low, 1e-9) / 1.3, Math.max(high, 1e-9) * 1.3];
-        const bottom = y.min ?? (y.close ? (low ?? 0) - 0.1 * Math.max((high ?? 1) - (low ?? 0), 1e-3) : Math.min(low ?? 0, 0));
+        const bottom = y.min ??
+          (y.close ? (low ?? 0) - 0.1 * Math.max((high ?? 1) - (low ?? 0), 1e-3) : Math.min(low ?? 0, 0));
         const top = y.max ?? (high ?? 1) + 0.06 * Math.max((high ?? 1) - bottom, 1e-9);
         return [bottom, top > bottom ? top : bottom + 1];
       },
     };
     axes.push({
-      ...axis, scale: `y${i}`, side: i === 0 ? 3 : 1, label: y.label, labelSize: 16, space: 26, ...(y.log ? { splits: decades } : {}),
+      ...axis, scale: `y${i}`, side: i === 0 ? 3 : 1, label: y.label, labelSize: 16, space: 26,
+      ...(y.log ? { splits: decades } : {}),
       size: (_u, values) => Math.max(34, 12 + 6.5 * Math.max(0, ...(values ?? []).map((v) => v.length))),
       grid: { show: i === 0, stroke: line, width: 1 },
       values: (_u, splits) => splits.map((v) => (v == null ? '' : y.ticks(v))),
@@ -134,7 +137,8 @@ function uplotOptions(o: PlotOptions, width: number): uPlot.Options {
     axes,
     legend: { show: o.legend ?? true, live: true },
     cursor: { y: false, points: { size: 6 }, drag: { x: false, y: false } },
-    series: [{ label: o.x.name ?? o.x.label, value: (_u, v) => (v == null ? '' : o.x.value(v)) }, ...o.curves.map(series)],
+    series: [{ label: o.x.name ?? o.x.label, value: (_u, v) => (v == null ? '' : o.x.value(v)) },
+      ...o.curves.map(series)],
     hooks: { draw: [(u) => drawMark(u, o)] },
   };
 }

@@ -12,9 +12,12 @@ export class ProxySection {
   private shown = '';
 
   constructor(private readonly live: () => Live) {
-    const heads = ['proxy', 'bytes', 'triangles', 'texture', 'FLIP here'].map((text) => make('th', { scope: 'col' }, text));
-    this.box = foldingSection('Proxies', 'The whole object in one small file each, with an atlas of its own. The smallest is the first picture; a larger one comes on slow links, and one that cannot be told from the source is all that is fetched.',
-      false, make('table', { id: 'proxies' }, make('thead', {}, make('tr', {}, ...heads)), this.rows));
+    const heads = ['proxy', 'bytes', 'triangles', 'texture', 'FLIP here'].map((text) =>
+      make('th', { scope: 'col' }, text));
+    this.box = foldingSection('Proxies', 'The whole object in one small file each, with an atlas of its ' +
+      'own. The smallest is the first picture; a larger one comes on slow links, and one that cannot be ' +
+      'told from the source is all that is fetched.', false,
+      make('table', { id: 'proxies' }, make('thead', {}, make('tr', {}, ...heads)), this.rows));
     this.box.hidden = true;
   }
 
@@ -38,7 +41,9 @@ export class ProxySection {
 export function proxyRows(m: Manifest, displayedPx: number, shown: number): string[][] {
   const serving = displayedPx > 0 ? servingProxy(m, displayedPx) : -1;
   return m.proxies.map((p, k) => [
-    `${k}${k === shown ? ' · shown' : ''}`, format.bytes(p.glb.bytes), format.short(p.triangles), p.texturePx > 0 ? format.px(p.texturePx) : '–',
-    displayedPx > 0 ? `${proxyLoss(m, k, displayedPx).flip.toFixed(3)}${k === serving ? ' · enough' : ''}` : '–',
+    `${k}${k === shown ? ' · shown' : ''}`, format.bytes(p.glb.bytes), format.short(p.triangles),
+    p.texturePx > 0 ? format.px(p.texturePx) : '–',
+    displayedPx > 0 ? `${proxyLoss(m, k, displayedPx).flip.toFixed(3)}${k === serving ? ' · enough' : ''}`
+      : '–',
   ]);
 }

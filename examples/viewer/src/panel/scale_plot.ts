@@ -9,12 +9,15 @@ import type { SectionPlots } from './section';
 export function scalePlot(live: () => Live): SectionPlots {
   return {
     title: 'Scales',
-    note: 'Triangles that are enough at a displayed height: up to there, lit pictures of the scale differed from those of S0 by less than the build allows, in every view that it rendered. The dot is what is shown.',
+    note: 'Triangles that are enough at a displayed height: up to there, lit pictures of the scale ' +
+      'differed from those of S0 by less than the build allows, in every view that it rendered. The dot is ' +
+      'what is shown.',
     open: true,
     plots: [{
       options: {
         height: 170,
-        x: { label: 'displayed height, px', name: 'height', value: format.px, log: true, ticks: format.short },
+        x: { label: 'displayed height, px', name: 'height', value: format.px, log: true,
+          ticks: format.short },
         y: [{ label: 'triangles', ticks: format.short, log: true }],
         curves: [
           { label: 'enough', colour: 'k1', kind: 'band', value: format.short },
@@ -24,7 +27,8 @@ export function scalePlot(live: () => Live): SectionPlots {
         mark: () => {
           const { displayedPx: x, scale, proxy, manifest } = live();
           if (!(x > 0)) return null;
-          const shown = proxy >= 0 ? manifest?.proxies[proxy] : manifest?.scales.find((s) => s.scale === scale);
+          const shown = proxy >= 0 ? manifest?.proxies[proxy]
+            : manifest?.scales.find((s) => s.scale === scale);
           return { x, y: shown?.triangles, label: scale === null ? 'now' : shownName({ scale, proxy }) };
         },
       },

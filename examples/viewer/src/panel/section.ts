@@ -3,8 +3,10 @@ import { Plot } from './plot';
 import type { PlotData, PlotOptions } from './plot';
 
 /** A section of the panel that can be folded. */
-export function foldingSection(title: string, note: string, open: boolean, ...children: Node[]): HTMLDetailsElement {
-  return make('details', { open }, make('summary', {}, title), make('p', { class: 'note' }, note), ...children);
+export function foldingSection(title: string, note: string, open: boolean,
+    ...children: Node[]): HTMLDetailsElement {
+  return make('details', { open }, make('summary', {}, title), make('p', { class: 'note' }, note),
+    ...children);
 }
 
 /** What a section shows: its plots below each other. */

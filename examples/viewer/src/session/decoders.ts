@@ -11,7 +11,9 @@ export function warmDecoders(): void {
   draco.preload();
 }
 
-/** A loader for the meshes of packages, for every mesh codec. `read` sees each mesh before the library does. */
+/**
+ * A loader for the meshes of packages, for every mesh codec. `read` sees each mesh before the library does.
+ */
 export function gltfLoader(read: (gltf: GLTF) => void): GLTFLoader {
   const loader = new GLTFLoader().setDRACOLoader(draco).setMeshoptDecoder(MeshoptDecoder);
   return loader.register(() => ({ name: 'read', afterRoot: async (gltf) => read(gltf) }));

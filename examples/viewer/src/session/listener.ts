@@ -15,7 +15,7 @@ export interface Readers {
 export class Listener {
   readonly live: Live = emptyLive();
 
-  /** `onChange`: something in `live` has changed. After `signal` no event is heard: a newer load has taken over. */
+  /** `onChange`: `live` has changed. After `signal`, which a newer load gives, no event is heard. */
   constructor(
     private readonly stage: Stage,
     private readonly signal: AbortSignal,
@@ -136,7 +136,8 @@ export class Listener {
       else this.forgetProblems();
       this.stage.draw();
     });
-    on('memory', () => this.addProblem(new Error('There is little graphics memory: a coarser picture is shown')));
+    on('memory',
+      () => this.addProblem(new Error('There is little graphics memory: a coarser picture is shown')));
     on('error', (e) => { if (!e.fatal) this.addProblem(e.error); }); // a fatal error rejects `done`
   }
 
@@ -166,7 +167,8 @@ export class Listener {
       for (const f of e.fragments) fragments.add(f);
     } else if (e.done !== undefined) {
       turns.push({
-        at: planBeganS + e.done, plannedS: e.plannedSeconds, actualS: e.actualSeconds ?? 0, creditS: e.creditSeconds,
+        at: planBeganS + e.done, plannedS: e.plannedSeconds, actualS: e.actualSeconds ?? 0,
+        creditS: e.creditSeconds,
         bytesPerSecond: e.bytesPerSecond, bytes: e.bytes, skipped: false,
       });
     }

@@ -5,7 +5,8 @@ import type { Stage } from '../stage/stage';
 import { gltfLoader } from './decoders';
 
 /** Options of every load on a stage. */
-export function stageOptions(stage: Stage, signal: AbortSignal): Pick<LoadOptions, 'renderer' | 'gltfLoader' | 'camera' | 'signal'> {
+export function stageOptions(stage: Stage,
+    signal: AbortSignal): Pick<LoadOptions, 'renderer' | 'gltfLoader' | 'camera' | 'signal'> {
   const loader = (): ReturnType<typeof gltfLoader> => gltfLoader(({ scene }) => {
     // A mesh is seen here before its programs are made; the programs depend on the surroundings.
     if (isMetallic(scene)) stage.reflect();
@@ -21,6 +22,7 @@ export function nearestScale(manifest: Manifest | null, wanted: number | null): 
 }
 
 /** What a person has chosen of scale and rung; undefined: the library chooses. */
-export function chosenDetail(manifest: Manifest | null, choices: Choices): Pick<LoadOptions, 'scale' | 'rung'> {
+export function chosenDetail(manifest: Manifest | null,
+    choices: Choices): Pick<LoadOptions, 'scale' | 'rung'> {
   return { scale: nearestScale(manifest, choices.scale), rung: choices.rung ?? undefined };
 }

@@ -3,7 +3,7 @@ import type { LoadedModel, TexmeshPackage } from 'texmesh';
 import type { Stage } from '../stage/stage';
 import { stageOptions } from './load_options';
 
-/** The original beside the current picture: S_0 with the highest rungs of full-size textures, in the stage's second scene. */
+/** The original, in the stage's second scene: S_0 with the highest rungs of full-size textures. */
 export class Original {
   /** Null before `show`. */
   loaded: { pkg: TexmeshPackage; model: LoadedModel } | null = null;
@@ -26,10 +26,12 @@ export class Original {
     await this.stage.begin();
     if (this.signal.aborted) return pkg.dispose();
     const model = pkg.load(this.stage.original, {
-      ...stageOptions(this.stage, this.signal), time: Infinity, scale: 0, rung: 99, fullSize: true, autoRefine: false,
+      ...stageOptions(this.stage, this.signal), time: Infinity, scale: 0, rung: 99, fullSize: true,
+      autoRefine: false,
     });
     this.loaded = { pkg, model };
-    for (const name of ['first-picture', 'proxy', 'scale', 'fragment', 'done'] as const) model.on(name, () => this.stage.show());
+    for (const name of ['first-picture', 'proxy', 'scale', 'fragment', 'done'] as const)
+      model.on(name, () => this.stage.show());
     try {
       await model.done;
     } catch (error) {

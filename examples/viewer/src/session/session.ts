@@ -7,7 +7,7 @@ import { Listener } from './listener';
 import { chosenDetail, stageOptions } from './load_options';
 import { Original } from './original';
 
-/** One package on the stage: opens the package and loads it as chosen. `live` is what the panel shows of the load. */
+/** One package on the stage: opens and loads it as chosen. `live` is what the panel shows of the load. */
 export class Session {
   /** Something in `live` has changed. */
   onChange: () => void = () => {};
@@ -15,15 +15,13 @@ export class Session {
 
   private pkg: TexmeshPackage | null = null;
   private model: LoadedModel | null = null;
-  // These three are of one load. A load whose signal is aborted has been overtaken by a newer one and says nothing any more.
+  // These three are of one load. A load whose signal is aborted has been overtaken by a newer one and says
+  // nothing any more.
   private abort = new AbortController();
   private listener: Listener;
   private originalLoad: Original;
 
-  constructor(
-    private readonly stage: Stage,
-    private readonly url: string,
-  ) {
+  constructor(private readonly stage: Stage, private readonly url: string) {
     this.listener = this.newListener();
     this.originalLoad = this.newOriginal();
     stage.onFrame = () => {
@@ -54,7 +52,8 @@ export class Session {
       if (first) this.stage.frame(pkg.manifest.boundsMin, pkg.manifest.boundsMax);
       this.listener.hearPackage(pkg);
       const model = this.load(pkg, choices);
-      void model.firstPicture.then(() => this.readAbout(pkg, signal)).catch(() => {}); // `done` says what is wrong with the load
+      // `done` says what is wrong with the load
+      void model.firstPicture.then(() => this.readAbout(pkg, signal)).catch(() => {});
       await model.done;
       if (signal.aborted) return;
       await this.readTables(pkg, signal);
@@ -80,7 +79,7 @@ export class Session {
     }
   }
 
-  /** Loads the original into the stage's second scene, once for each load. Rejects when the package cannot be opened. */
+  /** Loads the original into the stage's second scene, once for each load. May reject. */
   showOriginal(loading: (is: boolean) => void): Promise<void> {
     return this.originalLoad.show(loading);
   }
@@ -100,11 +99,6 @@ export class Session {
   /** Says what went wrong beside what is shown. */
   problem(error: unknown): void {
     this.listener.addProblem(error);
-  }
-
-  /** For tests and the console. */
-  get inner(): { pkg: TexmeshPackage | null; model: LoadedModel | null } {
-    return { pkg: this.pkg, model: this.model };
   }
 
   /** For tests and the console; null: not loaded. */
@@ -130,7 +124,8 @@ export class Session {
   private load(pkg: TexmeshPackage, choices: Choices): LoadedModel {
     const { signal } = this.abort;
     const model = pkg.load(this.stage.current, {
-      ...stageOptions(this.stage, signal), ...chosenDetail(pkg.manifest, choices), time: choices.timeS, policy: choices.policy, meshes: 'auto',
+      ...stageOptions(this.stage, signal), ...chosenDetail(pkg.manifest, choices), time: choices.timeS,
+      policy: choices.policy, meshes: 'auto',
     });
     this.model = model;
     this.listener.hearModel(model, {
@@ -140,7 +135,10 @@ export class Session {
     return model;
   }
 
-  /** The panel's tables: of a plane as soon as it is shown, of all planes when the load's time is over. Nothing is fetched twice. */
+  /**
+   * The panel's tables: of a plane as soon as it is shown, of all planes when the load's time is over.
+   * Nothing is fetched twice.
+   */
   private async readTables(pkg: TexmeshPackage, signal: AbortSignal, planes?: number[]): Promise<void> {
     try {
       const [textures, tables] = [await pkg.textures(signal), await pkg.tables(planes, signal)];

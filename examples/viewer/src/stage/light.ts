@@ -2,8 +2,9 @@ import { CubeUVReflectionMapping, DataTexture, DirectionalLight, HemisphereLight
 import type { Object3D, Scene } from 'three';
 
 /**
- * Radiance of the sky by height of the direction and by roughness, in linear light. Rough surfaces see the hemisphere light: its
- * intensity over pi. Mirrors see more contrast; with the hemisphere light alone a mirror would look like paper.
+ * Radiance of the sky by height of the direction and by roughness, in linear light. Rough surfaces see the
+ * hemisphere light: its intensity over pi. Mirrors see more contrast; with the hemisphere light alone a
+ * mirror would look like paper.
  */
 const kSky = `
 vec3 skyRadiance( const in float up, const in float roughness ) {
@@ -13,7 +14,10 @@ vec3 skyRadiance( const in float up, const in float roughness ) {
 `;
 const kLookUp = /textureCubeUV\( envMap, envMapRotation \* (\w+), ([\w.]+) \)/g;
 
-/** Adds daylight from above and a lamp that the camera carries; gives the lamp. No shadows: textures of scans contain shadows. */
+/**
+ * Adds daylight from above and a lamp that the camera carries; gives the lamp. No shadows: textures of scans
+ * contain shadows.
+ */
 export function light(scene: Scene): DirectionalLight {
   const lamp = new DirectionalLight(0xffffff, 2.2);
   scene.add(new HemisphereLight(0xffffff, 0xd8d4cc, 3), lamp, lamp.target);
@@ -25,21 +29,25 @@ export function isMetallic(root: Object3D): boolean {
   let metallic = false;
   root.traverse((o) => {
     const { material } = o as { material?: unknown };
-    for (const m of [material].flat()) metallic ||= ((m as { metalness?: number } | undefined)?.metalness ?? 0) > 0.5;
+    for (const m of [material].flat())
+      metallic ||= ((m as { metalness?: number } | undefined)?.metalness ?? 0) > 0.5;
   });
   return metallic;
 }
 
 /**
- * Puts a sky as surroundings in the place of the hemisphere light: a metal under that light alone is black. Shaders compute the sky where
- * three.js would look it up in a texture; with look-ups a processor that draws takes twice as long for a frame.
+ * Puts a sky as surroundings in the place of the hemisphere light: a metal under that light alone is black.
+ * Shaders compute the sky where three.js would look it up in a texture; with look-ups a processor that draws
+ * takes twice as long for a frame.
  */
 export function reflectSky(scene: Scene): void {
   if (scene.environment) return;
   const { envmap_physical_pars_fragment: code } = ShaderChunk;
   if (kLookUp.test(code))
-    ShaderChunk.envmap_physical_pars_fragment = kSky + code.replace(kLookUp, 'vec4( skyRadiance( $1.y, $2 ), 1.0 )');
-  const unused = new DataTexture(new Uint8Array(4 * 64), 1, 64); // of the least size that three.js takes for surroundings
+    ShaderChunk.envmap_physical_pars_fragment = kSky +
+      code.replace(kLookUp, 'vec4( skyRadiance( $1.y, $2 ), 1.0 )');
+  // of the least size that three.js takes for surroundings
+  const unused = new DataTexture(new Uint8Array(4 * 64), 1, 64);
   unused.mapping = CubeUVReflectionMapping;
   unused.needsUpdate = true;
   scene.environment = unused;

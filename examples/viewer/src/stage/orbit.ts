@@ -5,7 +5,9 @@ const kFieldOfViewDegrees = 32;
 const kTurnDegrees = 6; // per press of an arrow key
 const kNearer = 0.85; // per press of +
 
-/** A camera that goes round the object by mouse, touch and keyboard. Calls `onMove` when the camera has moved. */
+/**
+ * A camera that goes round the object by mouse, touch and keyboard. Calls `onMove` when the camera has moved.
+ */
 export class Orbit {
   readonly camera = new PerspectiveCamera(kFieldOfViewDegrees, 1, 0.01, 100);
   private readonly controls: OrbitControls;
@@ -43,7 +45,8 @@ export class Orbit {
     const half = MathUtils.degToRad(kFieldOfViewDegrees) / 2;
     const narrow = Math.min(1, this.camera.aspect);
     const distance = radius / Math.sin(Math.atan(Math.tan(half) * narrow));
-    this.camera.position.setFromSpherical(new Spherical(distance, MathUtils.degToRad(72), MathUtils.degToRad(28))).add(centre);
+    this.camera.position.setFromSpherical(new Spherical(distance, MathUtils.degToRad(72),
+      MathUtils.degToRad(28))).add(centre);
     this.camera.near = distance / 500;
     this.camera.far = distance * 20;
     this.camera.updateProjectionMatrix();
@@ -66,7 +69,8 @@ export class Orbit {
   /** Comes nearer by a factor below 1, goes away by one above. */
   zoom(factor: number): void {
     const offset = this.camera.position.clone().sub(this.target);
-    const length = MathUtils.clamp(offset.length() * factor, this.controls.minDistance, this.controls.maxDistance);
+    const length =
+      MathUtils.clamp(offset.length() * factor, this.controls.minDistance, this.controls.maxDistance);
     this.camera.position.copy(this.target).add(offset.setLength(length));
     this.moved();
   }

@@ -28,7 +28,8 @@ export class Pace {
   private waitMs(now: number): number {
     if (this.drawing > 0) return 8;
     // What is late has no time for frames, either.
-    if (now + this.frameMs > this.dueAt && now < this.dueAt + kMostLateMs) return Math.max(8, this.dueAt - now);
+    if (now + this.frameMs > this.dueAt && now < this.dueAt + kMostLateMs)
+      return Math.max(8, this.dueAt - now);
     return this.freeAt + this.frameMs - now;
   }
 

@@ -6,8 +6,8 @@ import { Orbit } from './orbit';
 import { Pace } from './pace';
 
 /**
- * The picture of two scenes: left of a movable border the original, right of it the current one. Draws only when something has
- * changed, and once `begin` has made a renderer.
+ * The picture of two scenes: left of a movable border the original, right of it the current one. Draws only
+ * when something has changed, and once `begin` has made a renderer.
  */
 export class Stage {
   readonly current = new Scene();
@@ -89,19 +89,20 @@ export class Stage {
   }
 
   /**
-   * Asks for a frame of something that has come. The frame is drawn when the GPU has had as much time for other work as the last frame
-   * took. Where the processor draws, a frame takes half a second, and frame upon frame would keep back what is to be shown.
+   * Asks for a frame of something that has come. The frame is drawn when the GPU has had as much time for
+   * other work as the last frame took. Where the processor draws, a frame takes half a second, and frame upon
+   * frame would keep back what is to be shown.
    */
   show(): void {
     this.pace.next(() => this.draw());
   }
 
-  /** Time of performance.now() at which all is to have come: `show` begins no frame that would last until then. */
+  /** Deadline by performance.now(): `show` begins no frame that would last beyond it. */
   set dueAt(ms: number) {
     this.pace.dueAt = ms;
   }
 
-  /** Gives metals a sky to mirror; other materials get as much light as before. Counts for what is loaded from now on. */
+  /** Gives metals that are loaded from now on a sky to mirror; other materials keep their light. */
   reflect(): void {
     for (const scene of [this.current, this.original]) reflectSky(scene);
   }
@@ -154,7 +155,8 @@ export class Stage {
   private fit(): void {
     const r = this.made;
     const ratio = pixelRatio();
-    if (!r || (r.getPixelRatio() === ratio && r.getSize(new Vector2()).equals({ x: this.widthPx, y: this.heightPx }))) return;
+    if (!r || (r.getPixelRatio() === ratio &&
+        r.getSize(new Vector2()).equals({ x: this.widthPx, y: this.heightPx }))) return;
     r.setDrawingBufferSize(this.widthPx, this.heightPx, ratio); // setPixelRatio and setSize would make two
   }
 }

@@ -5,7 +5,6 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/batch/fleet/model_list.h"
 #include "tests/support/command.h"
 #include "tests/support/schema.h"
 

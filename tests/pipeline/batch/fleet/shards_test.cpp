@@ -1,4 +1,4 @@
-#include "pipeline/batch/fleet/shards.h"
+#include "pipeline/batch/plan.h"
 
 #include <gtest/gtest.h>
 

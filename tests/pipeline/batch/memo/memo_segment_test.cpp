@@ -14,8 +14,8 @@ Sha256 sha256_of_text(const std::string& s) {
   return sha256({reinterpret_cast<const std::uint8_t*>(s.data()), s.size()});
 }
 
-MemoRecord record_with(double seconds, int keys) {
-  MemoRecord r;
+PackageMemo record_with(double seconds, int keys) {
+  PackageMemo r;
   r.seconds = seconds;
   r.looked_at_ns = static_cast<std::int64_t>(seconds) + 7;
   r.files = {{"", true, sha256_of_text("model"), 5, {0, 1, 5, 2, 3}}};
@@ -48,7 +48,7 @@ TEST(MemoSegment, BlocksShareTheNamesOfStages) {
     const MemoEntry& e = entries[static_cast<std::size_t>(i)];
     EXPECT_EQ(e.name, memo_name(std::to_string(i)));
     EXPECT_EQ(e.looked_at_ns, i + 7);
-    const auto record = segment->record(e);
+    const auto record = segment->memo(e);
     ASSERT_TRUE(record.has_value());
     EXPECT_EQ(record->seconds, i);
     EXPECT_TRUE(record->keys.empty());
@@ -139,7 +139,7 @@ TEST(MemoSegment, ARecordOfGarbageIsToldOfAndThenNotBelieved) {
     const auto segment =
         MemoSegment::read(folder / "a.open", [&](const MemoEntry& e) { entries.push_back(e); });
     ASSERT_EQ(entries.size(), 1u);
-    EXPECT_FALSE(segment->record(entries[0]).has_value());
+    EXPECT_FALSE(segment->memo(entries[0]).has_value());
     EXPECT_TRUE(segment->keys(entries[0]).empty());
   }
 }

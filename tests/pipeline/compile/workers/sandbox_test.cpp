@@ -19,7 +19,6 @@
 #include <map>
 #include <thread>
 
-#include "pipeline/compile/workers/sandbox.h"
 #include "pipeline/io/atomic_file.h"
 #include "tests/support/command.h"
 #include "tests/support/sanitizers.h"

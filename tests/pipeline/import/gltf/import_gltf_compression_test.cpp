@@ -320,7 +320,7 @@ TEST(ImportGltfMeshopt, FiltersAgreeWithMeshoptimizer) {
   Notes notes;
   const std::string file = "m";
   Lost lost;
-  const gltf::Source source{file, resolver, options, {}, notes, lost};
+  const Source source{file, resolver, options, {}, notes, lost};
   testing::Random random{7};
   float unit[4 * 64];
   for (std::size_t i = 0; i < 64; ++i) {
@@ -332,12 +332,12 @@ TEST(ImportGltfMeshopt, FiltersAgreeWithMeshoptimizer) {
     for (std::size_t k = 0; k < 4; ++k) unit[4 * i + k] /= static_cast<float>(std::sqrt(l));
   }
   Bytes bytes(64 * 8);
-  const auto decoded = [&](gltf::MeshoptFilter filter) {
-    return gltf::decode_meshopt(source, "", encode_vertices(bytes.data(), 64, 8), 64, 8,
-                                gltf::MeshoptMode::kAttributes, filter);
+  const auto decoded = [&](MeshoptFilter filter) {
+    return decode_meshopt(source, "", encode_vertices(bytes.data(), 64, 8), 64, 8, MeshoptMode::kAttributes,
+                          filter);
   };
   meshopt_encodeFilterQuat(bytes.data(), 64, 8, 12, unit);
-  Bytes ours = decoded(gltf::MeshoptFilter::kQuaternion), theirs = bytes;
+  Bytes ours = decoded(MeshoptFilter::kQuaternion), theirs = bytes;
   meshopt_decodeFilterQuat(theirs.data(), 64, 8);
   for (std::size_t i = 0; i < 64 * 4; ++i) {
     std::int16_t a = 0, b = 0;
@@ -346,14 +346,13 @@ TEST(ImportGltfMeshopt, FiltersAgreeWithMeshoptimizer) {
     EXPECT_NEAR(a, b, 1) << i;
   }
   meshopt_encodeFilterExp(bytes.data(), 64, 8, 20, unit);
-  ours = decoded(gltf::MeshoptFilter::kExponential);
+  ours = decoded(MeshoptFilter::kExponential);
   theirs = bytes;
   meshopt_decodeFilterExp(theirs.data(), 64, 8);
   EXPECT_EQ(ours, theirs);
   for (std::uint8_t& b : bytes)
     b = static_cast<std::uint8_t>(random.next());  // anything goes without a crash
-  for (const auto f : {gltf::MeshoptFilter::kOctahedral, gltf::MeshoptFilter::kQuaternion,
-                       gltf::MeshoptFilter::kExponential}) {
+  for (const auto f : {MeshoptFilter::kOctahedral, MeshoptFilter::kQuaternion, MeshoptFilter::kExponential}) {
     EXPECT_EQ(decoded(f).size(), bytes.size());
   }
 }

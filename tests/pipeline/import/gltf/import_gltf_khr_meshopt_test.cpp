@@ -53,14 +53,14 @@ Bytes mixed_stream() {
 }
 
 Bytes decoded(ByteSpan data, std::size_t count, std::size_t stride,
-              gltf::MeshoptFilter filter = gltf::MeshoptFilter::kNone) {
+              MeshoptFilter filter = MeshoptFilter::kNone) {
   MemoryResolver resolver;
   const ImportOptions options;
   Notes notes;
   const std::string file = "m";
   Lost lost;
-  const gltf::Source source{file, resolver, options, {}, notes, lost};
-  return gltf::decode_meshopt(source, "", data, count, stride, gltf::MeshoptMode::kAttributes, filter);
+  const Source source{file, resolver, options, {}, notes, lost};
+  return decode_meshopt(source, "", data, count, stride, MeshoptMode::kAttributes, filter);
 }
 
 TEST(ImportGltfKhrMeshopt, ReadsVersion1OfAttributes) {
@@ -84,7 +84,7 @@ TEST(ImportGltfKhrMeshopt, UndoesTheColourFilter) {
        "efff10000000ffff0000efff00000880333366669999ccccffffffffffff0000"},
   };
   for (const Case& c : cases)
-    EXPECT_EQ(decoded(bytes_of(c.stream), 4, c.stride, gltf::MeshoptFilter::kColour), bytes_of(c.colours))
+    EXPECT_EQ(decoded(bytes_of(c.stream), 4, c.stride, MeshoptFilter::kColour), bytes_of(c.colours))
         << c.stream;
 }
 
@@ -99,7 +99,7 @@ TEST(ImportGltfKhrMeshopt, BrokenStreamsAreRefusedAndNeverMoreThanThat) {
   mode.back() = 3;
   EXPECT_THROW(decoded(mode, kCount, kStride), InputError);
   EXPECT_THROW(decoded(good, kCount + 1000000, kStride), InputError);
-  EXPECT_THROW(decoded(good, kCount, 6, gltf::MeshoptFilter::kColour), InputError);
+  EXPECT_THROW(decoded(good, kCount, 6, MeshoptFilter::kColour), InputError);
   for (std::size_t at = 1; at < good.size(); ++at)
     for (const int bit : {0, 3, 7}) {
       Bytes damaged = good;

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "format/base/errors.h"
-#include "format/base/no_index.h"
+#include "format/base/vec.h"
 #include "pipeline/import/import.h"
 #include "tests/support/images.h"
 #include "tests/support/memory_resolver.h"

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "pipeline/io/wire_text.h"
+#include "pipeline/io/uri.h"
 #include "tests/support/command.h"
 
 namespace texmesh {

@@ -1,4 +1,4 @@
-#include "stages/image/readers_module/readers.h"
+#include "stages/image/readers_module/other_pictures.h"
 
 #include <dlfcn.h>
 #include <gtest/gtest.h>

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "format/base/no_index.h"
+#include "format/base/vec.h"
 #include "tests/support/meshes.h"
 
 namespace texmesh::testing {

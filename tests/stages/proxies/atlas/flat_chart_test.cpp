@@ -1,10 +1,10 @@
-#include "stages/proxies/atlas/flat_chart.h"
+#include "stages/proxies/atlas/chart_parts.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-namespace texmesh::proxies {
+namespace texmesh {
 namespace {
 
 TEST(FlatChart, AxesAreRightHandedForEveryNormal) {
@@ -52,4 +52,4 @@ TEST(FlatChart, SmallestBoxOfATurnedRectangle) {
 }
 
 }  // namespace
-}  // namespace texmesh::proxies
+}  // namespace texmesh

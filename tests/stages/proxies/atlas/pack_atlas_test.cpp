@@ -8,7 +8,7 @@
 
 #include "tests/stages/proxies/proxy_shapes.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 namespace {
 
 using testing::Soup;
@@ -196,4 +196,4 @@ TEST(PackAtlas, IsCancelled) {
 }
 
 }  // namespace
-}  // namespace texmesh::proxies
+}  // namespace texmesh

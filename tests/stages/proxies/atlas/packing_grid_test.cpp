@@ -1,10 +1,10 @@
-#include "stages/proxies/atlas/packing_grid.h"
+#include "stages/proxies/atlas/chart_parts.h"
 
 #include <gtest/gtest.h>
 
 #include "tests/support/meshes.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 namespace {
 
 ChartMask block(std::uint32_t width, std::uint32_t height) {
@@ -87,4 +87,4 @@ TEST(ChartMask, HoldsTheCellsThatTrianglesTouch) {
 }
 
 }  // namespace
-}  // namespace texmesh::proxies
+}  // namespace texmesh

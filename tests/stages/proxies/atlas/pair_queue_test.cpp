@@ -1,10 +1,10 @@
-#include "stages/proxies/atlas/pair_queue.h"
+#include "stages/proxies/atlas/chart_parts.h"
 
 #include <gtest/gtest.h>
 
 #include "tests/support/meshes.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 namespace {
 
 TEST(PairQueue, GivesTheCheapestFirstAndOfEqualOnesTheLowest) {
@@ -43,4 +43,4 @@ TEST(PairQueue, SweepsWhatIsStaleAndLosesNothing) {
 }
 
 }  // namespace
-}  // namespace texmesh::proxies
+}  // namespace texmesh

@@ -7,11 +7,11 @@
 #include <cmath>
 #include <map>
 
-#include "format/base/no_index.h"
-#include "stages/proxies/atlas/flat_chart.h"
+#include "format/base/vec.h"
+#include "stages/proxies/atlas/chart_parts.h"
 #include "tests/stages/proxies/proxy_shapes.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 namespace {
 
 using testing::Soup;
@@ -202,4 +202,4 @@ TEST(SegmentCharts, IsCancelled) {
 }
 
 }  // namespace
-}  // namespace texmesh::proxies
+}  // namespace texmesh

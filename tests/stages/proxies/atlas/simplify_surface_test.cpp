@@ -11,7 +11,7 @@
 #include "stages/geometry/triangle_tree.h"
 #include "tests/stages/proxies/proxy_shapes.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 namespace {
 
 using testing::Soup;
@@ -223,4 +223,4 @@ TEST(SimplifySurface, IsCancelled) {
 }
 
 }  // namespace
-}  // namespace texmesh::proxies
+}  // namespace texmesh

@@ -4,11 +4,11 @@
 
 #include <cmath>
 
-#include "format/base/srgb.h"
+#include "format/base/portable_math.h"
 #include "tests/stages/proxies/atlas_fixtures.h"
 #include "tests/support/even_sphere.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 namespace {
 
 using testing::square_atlas;
@@ -251,4 +251,4 @@ TEST(SampledNormals, HardEdgesHaveNormalsOfTheirOwnOnBothSides) {
 }
 
 }  // namespace
-}  // namespace texmesh::proxies
+}  // namespace texmesh

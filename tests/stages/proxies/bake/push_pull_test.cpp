@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace texmesh::proxies {
+namespace texmesh {
 namespace {
 
 TEST(PushPull, CoveredValuesStayAndOthersLieBetweenThem) {
@@ -30,4 +30,4 @@ TEST(PushPull, NothingCoveredChangesNothing) {
 }
 
 }  // namespace
-}  // namespace texmesh::proxies
+}  // namespace texmesh

@@ -6,11 +6,10 @@
 
 #include "stages/gltf/check_glb.h"
 #include "stages/image/webp.h"
-#include "stages/proxies/coding/proxy_pictures.h"
 #include "tests/stages/proxies/atlas_fixtures.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh::proxies {
+namespace texmesh {
 namespace {
 
 BakedMaps noise_maps(std::uint32_t side_px, bool alpha) {
@@ -191,4 +190,4 @@ TEST(WebpPicture, AlphaComesBack) {
 }
 
 }  // namespace
-}  // namespace texmesh::proxies
+}  // namespace texmesh

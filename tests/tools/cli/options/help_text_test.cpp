@@ -5,7 +5,6 @@
 #include <regex>
 #include <sstream>
 
-#include "pipeline/compile/option_fields.h"
 #include "pipeline/compile/options.h"
 #include "tests/support/command.h"
 

@@ -1,4 +1,4 @@
-#include "tools/cli/options/percent_line.h"
+#include "tools/cli/options/common_options.h"
 
 #include <gtest/gtest.h>
 

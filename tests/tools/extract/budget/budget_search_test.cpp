@@ -4,12 +4,11 @@
 #include <cmath>
 
 #include "stages/condition/condition.h"
-#include "stages/geometry/fit_normals.h"
+#include "stages/geometry/scale_frames.h"
 #include "stages/scales/scales.h"
 #include "tests/support/meshes.h"
 #include "tests/support/packages.h"
 #include "tools/extract/budget/filling.h"
-#include "tools/extract/glb/scale_file.h"
 #include "tools/extract/glb/standalone_glb.h"
 
 namespace texmesh {

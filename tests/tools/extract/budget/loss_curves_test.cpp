@@ -1,5 +1,5 @@
 // What bytes of each texture are worth.
-#include "tools/extract/budget/loss_curves.h"
+#include "tools/extract/budget/candidates.h"
 
 #include <gtest/gtest.h>
 

@@ -5,7 +5,7 @@
 #include <cstdlib>
 
 #include "format/base/errors.h"
-#include "stages/data/coverage.h"
+#include "stages/data/fragments.h"
 #include "stages/image/decode_image.h"
 #include "stages/image/decode_jpeg.h"
 #include "stages/jpeg/jpeg_coder.h"

@@ -1,5 +1,5 @@
 // Files without extensions that compress.
-#include "tools/extract/glb/scale_file.h"
+#include "tools/extract/glb/standalone_glb.h"
 
 #include <gtest/gtest.h>
 
@@ -12,7 +12,7 @@
 #include "tests/support/images.h"
 #include "tests/support/packages.h"
 #include "tools/extract/extract.h"
-#include "tools/extract/proxy/proxy_parts.h"
+#include "tools/extract/proxy/proxy_search.h"
 
 namespace texmesh {
 namespace {

@@ -1,5 +1,5 @@
 // Scales as single files: those that packages store, and those of the vertex-split stream alone.
-#include "tools/extract/glb/scale_file.h"
+#include "tools/extract/glb/standalone_glb.h"
 
 #include <gtest/gtest.h>
 

@@ -7,7 +7,7 @@
 #include "stages/image/decode_image.h"
 #include "stages/image/resize.h"
 #include "stages/measure/flip.h"
-#include "tools/extract/glb/image_codecs.h"
+#include "tools/extract/glb/texture_source.h"
 
 namespace texmesh {
 namespace {

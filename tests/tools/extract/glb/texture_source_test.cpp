@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <bit>
 
-#include "stages/data/coverage.h"
+#include "stages/data/fragments.h"
 #include "tests/support/packages.h"
 
 namespace texmesh {

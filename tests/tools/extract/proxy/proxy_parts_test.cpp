@@ -1,5 +1,5 @@
 // Proxies taken apart: coarser meshes, smaller pictures, maps left out.
-#include "tools/extract/proxy/proxy_parts.h"
+#include "tools/extract/proxy/proxy_search.h"
 
 #include <gtest/gtest.h>
 

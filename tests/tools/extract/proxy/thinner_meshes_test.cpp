@@ -1,5 +1,5 @@
 // A proxy's mesh with fewer triangles, in its own atlas.
-#include "tools/extract/proxy/proxy_parts.h"
+#include "tools/extract/proxy/proxy_search.h"
 
 #include <gtest/gtest.h>
 

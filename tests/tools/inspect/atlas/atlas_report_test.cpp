@@ -90,7 +90,7 @@ TEST(AtlasReport, EveryTriangleAChartIsTooMany) {
 TEST(AtlasReport, ModelsWithoutAnAtlasGetASentence) {
   const AtlasDiagnosis plain = diagnosis_of(model_of(cube(), false));
   EXPECT_EQ(atlas_text(plain), "No material has a texture, so there is no atlas to look at.\n");
-  EXPECT_EQ(atlas_json(plain)["atlases"], Json::array());
+  EXPECT_EQ(to_json(plain)["atlases"], Json::array());
   Mesh mesh = cube();
   mesh.uv0.clear();
   const AtlasDiagnosis bare = diagnosis_of(model_of(mesh));
@@ -107,7 +107,7 @@ TEST(AtlasReport, APackageHasTheFiguresOfItsFinestScale) {
   EXPECT_EQ(subject.images[0].height_px, 48u);
   ASSERT_TRUE(subject.images[0].colours);
   EXPECT_EQ(subject.images[0].colours->width_px, 64u);
-  const Json j = atlas_json(diagnose_atlases(subject, {}));
+  const Json j = to_json(diagnose_atlases(subject, {}));
   EXPECT_EQ(j["triangles"], fine_mesh().triangles.size());
   EXPECT_EQ(j["atlases"][0]["name"], "texture 0 (ball.jpg)");
 }

@@ -1,13 +1,10 @@
 #include <gtest/gtest.h>
 
 #include "format/rules/allocation.h"
-#include "format/rules/rate_distortion.h"
 #include "pipeline/compile/options.h"
-#include "pipeline/compile/profile.h"
 #include "pipeline/io/table.h"
 #include "tests/support/packages.h"
 #include "tools/inspect/dump/dump.h"
-#include "tools/inspect/dump/package_figures.h"
 #include "tools/inspect/provenance.h"
 
 namespace texmesh {

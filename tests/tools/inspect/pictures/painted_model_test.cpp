@@ -10,39 +10,16 @@
 #include "tests/support/command.h"
 #include "tests/support/meshes.h"
 #include "tests/support/packages.h"
+#include "tests/tools/inspect/pictures/painted_pictures.h"
 #include "tools/inspect/package_mesh.h"
-#include "tools/inspect/pictures/painted_quantity.h"
+#include "tools/inspect/pictures/painted_model.h"
 
 namespace texmesh {
 namespace {
 
+using namespace testing;  // NOLINT: of painted pictures
+
 const RunContext kOneThread{};
-
-ConditionedMesh ball() { return condition_mesh(testing::sphere(12, 18), false, {}, kOneThread); }
-
-std::string faults(const Bytes& glb) {
-  Findings findings;
-  check_glb(glb, "painted.glb", findings);
-  std::string text;
-  for (const Finding& f : findings.release()) text += to_string(f) + "\n";
-  return text;
-}
-
-Pixels picture_of(const PaintedModel& view, std::uint32_t side = 64) {
-  return decode_image(probe_image("painted.png", write_painted_png(view, side), {}));
-}
-
-/// How many pixels of the picture have about this colour.
-int count_near(const Pixels& p, Srgb colour, int tolerance = 40) {
-  int count = 0;
-  for (std::uint32_t y = 0; y < p.height_px; ++y)
-    for (std::uint32_t x = 0; x < 2 * p.height_px; ++x) {
-      bool near = true;
-      for (std::size_t k = 0; k < 3; ++k) near = near && std::abs(p.at(x, y)[k] - colour[k]) <= tolerance;
-      count += near;
-    }
-  return count;
-}
 
 ScaleMap map_of(const ConditionedMesh& mesh) {
   ScaleMap map;

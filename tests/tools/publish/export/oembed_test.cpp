@@ -1,4 +1,4 @@
-#include "tools/publish/export/oembed.h"
+#include "tools/publish/export/export.h"
 
 #include <gtest/gtest.h>
 
@@ -27,7 +27,7 @@ EmbeddedObject bust() {
 }
 
 TEST(Oembed, HasWhatTheTypeRichRequires) {
-  const Json j = Json::parse(oembed_json(bust()));
+  const Json j = Json::parse(oembed_answer(bust()));
   EXPECT_EQ(j["type"], "rich");
   EXPECT_EQ(j["version"], "1.0");
   EXPECT_EQ(j["width"], 640);
@@ -47,7 +47,7 @@ TEST(Oembed, WhatIsNotKnownIsLeftOut) {
   EmbeddedObject o = bust();
   o.about = {};
   o.thumbnail_url.clear();
-  const Json j = Json::parse(oembed_json(o));
+  const Json j = Json::parse(oembed_answer(o));
   for (const char* name :
        {"title", "author_name", "license", "license_url", "thumbnail_url", "thumbnail_width"})
     EXPECT_FALSE(j.contains(name)) << name;

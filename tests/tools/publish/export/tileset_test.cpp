@@ -1,4 +1,4 @@
-#include "tools/publish/export/tileset.h"
+#include "tools/publish/export/export.h"
 
 #include <gtest/gtest.h>
 
@@ -72,7 +72,7 @@ Tileset small_tileset() {
 }
 
 TEST(TilesetJson, IsAChainOfTilesThatReplaceEachOther) {
-  const Json j = Json::parse(tileset_json(small_tileset()));
+  const Json j = Json::parse(tileset_text(small_tileset()));
   EXPECT_EQ(j["asset"]["version"], "1.1");
   EXPECT_EQ(j["asset"]["tilesetVersion"], "0123");
   EXPECT_EQ(j["asset"]["extras"]["title"], "</script>\"");
@@ -90,7 +90,7 @@ TEST(TilesetJson, IsAChainOfTilesThatReplaceEachOther) {
 }
 
 TEST(TilesetJson, HasZUpWhereGltfHasYUp) {
-  const Json root = Json::parse(tileset_json(small_tileset()))["root"];
+  const Json root = Json::parse(tileset_text(small_tileset()))["root"];
   // Centre (1, 4, -1), half sides (2, 4, 2), y up.
   EXPECT_EQ(root["boundingVolume"]["box"],
             (Json{1.0, 1.0, 4.0, 2.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 4.0}));
@@ -100,13 +100,13 @@ TEST(TilesetJson, HasZUpWhereGltfHasYUp) {
 TEST(TilesetJson, MeasuredErrorsAreNeverMadeSmaller) {
   Tileset t = small_tileset();
   t.levels[1].error_max = 5;
-  EXPECT_DOUBLE_EQ(Json::parse(tileset_json(t))["root"]["geometricError"], 5);
+  EXPECT_DOUBLE_EQ(Json::parse(tileset_text(t))["root"]["geometricError"], 5);
 }
 
 TEST(TilesetJson, ErrorsAreInTheContentsUnit) {
   Tileset t = small_tileset();
   t.metres = 0.001;
-  const Json j = Json::parse(tileset_json(t));
+  const Json j = Json::parse(tileset_text(t));
   EXPECT_DOUBLE_EQ(j["root"]["geometricError"], 0.0008);
   EXPECT_EQ(j["root"]["extras"]["errorMax"], 0.05);  // as measured
 }
@@ -115,7 +115,7 @@ TEST(TilesetJson, AFlatObjectHasABoxWithAnInside) {
   Tileset t = small_tileset();
   t.origin = {};
   t.bounds = Box3d{{0, 0, 0}, {2, 0, 2}};
-  const Json root = Json::parse(tileset_json(t))["root"];
+  const Json root = Json::parse(tileset_text(t))["root"];
   EXPECT_GT(root["boundingVolume"]["box"][11], 0);
   EXPECT_FALSE(root.contains("transform"));
 }

@@ -1,4 +1,4 @@
-#include "tools/publish/pages/plot.h"
+#include "tools/publish/pages/page.h"
 
 #include <gtest/gtest.h>
 

@@ -138,11 +138,11 @@ TEST(Report, SameBytesForAnyThreadCount) {
   ASSERT_EQ(a.files.size(), b.files.size());
   for (std::size_t i = 0; i < a.files.size(); ++i)
     EXPECT_EQ(a.files[i].bytes, b.files[i].bytes) << a.files[i].path;
-  EXPECT_EQ(report_json(a), report_json(b));
+  EXPECT_EQ(to_json_line(a), to_json_line(b));
 }
 
 TEST(Report, JsonFollowsItsSchema) {
-  const nlohmann::json j = nlohmann::json::parse(report_json(report_of(sample())));
+  const nlohmann::json j = nlohmann::json::parse(to_json_line(report_of(sample())));
   EXPECT_TRUE(follows_schema(j, "report.v1"));
   EXPECT_EQ(j["title"], kHostile);
 }
@@ -158,7 +158,7 @@ TEST(Report, AgainstTheSource) {
   EXPECT_EQ(report.source->file, "bust <b>.glb");
   EXPECT_GT(report.source->views.worst_mean(), 0.1);  // the coarsest file has half of the triangles
   EXPECT_EQ(tag_fault(page_of(report)), "");
-  EXPECT_TRUE(follows_schema(nlohmann::json::parse(report_json(report)), "report.v1"));
+  EXPECT_TRUE(follows_schema(nlohmann::json::parse(to_json_line(report)), "report.v1"));
   options.against = folder / "none.glb";
   EXPECT_THROW(report_of(sample(), options), InputError);
 }
@@ -175,10 +175,10 @@ TEST(Report, TheFolderAppearsWholeAndReplacesReportsOnly) {
 
   std::filesystem::create_directories(folder / "other");
   write_text(folder / "other/index.html", "<!DOCTYPE html>\n<title>somebody's</title>");
-  EXPECT_THROW(check_report_folder(folder / "other"), InputError);
+  EXPECT_THROW(NewFolder(folder / "other", report_folder_rule()), InputError);
   EXPECT_THROW(write_report(report, folder / "other"), InputError);
   EXPECT_EQ(files_beneath(folder / "other").size(), 1u);
-  check_report_folder(folder / "new");
+  NewFolder(folder / "new", report_folder_rule());
   EXPECT_FALSE(std::filesystem::exists(folder / "new"));
 }
 
@@ -186,7 +186,7 @@ TEST(HeatColour, GrowsLighterFromBlack) {
   int before = -1;
   for (int i = 0; i <= 16; ++i) {
     const auto c = heat_colour(i / 16.0);
-    const int light = 2 * c.x + 5 * c.y + c.z;
+    const int light = 2 * c[0] + 5 * c[1] + c[2];
     EXPECT_GT(light, before);
     before = light;
   }

@@ -74,49 +74,41 @@ std::string figures_section(const RunSummary& s) {
   return html_section("figures", "Figures", table.html());
 }
 
-class ModelsSection {
- public:
-  ModelsSection(const RunSummary& s, const std::string& folder, std::size_t posters,
-                const std::function<std::optional<PackageFace>(const ModelSummary&)>& face)
-      : summary_(s), folder_(folder), posters_(posters), face_(face) {}
+using FaceOf = std::function<std::optional<PackageFace>(const ModelSummary&)>;
 
-  std::string html(std::vector<PageFile>& files) {
-    Table table("Every package", {"model", "result", "time", "peak memory", "package"});
-    std::string posters;
-    std::size_t models = 0;
-    for (const ModelSummary& m : summary_.models) {
-      if (!m.ok()) continue;
-      if (models++ < posters_) posters += picture(m, files);
-      if (models > kMostRows) continue;
-      const std::uint64_t memory = m.made ? m.made->peak_memory_bytes : m.peak_memory_bytes;
-      table.row({m.model, enum_name(m.result), m.cost_s() > 0 ? format_seconds(m.cost_s()) : "",
-                 format_bytes(memory), format_bytes(m.bytes)});
-    }
-    if (models == 0) return "";
-    if (!posters.empty()) posters = "<div class=\"row\">\n" + posters + "</div>\n";
-    return html_section("models", fmt::format("{} packages", models),
-                        posters + table.html() + cut_note(models));
+/// A picture with a title; the file is appended.
+std::string picture_of(const ModelSummary& m, const FaceOf& face_of, const std::string& folder,
+                       std::vector<PageFile>& files) {
+  std::optional<PackageFace> face = face_of(m);
+  if (!face) return "<div><p class=\"bad\">" + markup_escaped(m.package) + ": cannot be read</p></div>\n";
+  std::string out = "<div>";
+  if (!face->poster.empty()) {
+    files.push_back({fmt::format("{}/{:05}.jpg", folder, files.size()), std::move(face->poster)});
+    out += "<img loading=\"lazy\" alt=\"\" src=\"" + markup_escaped(files.back().name) + "\">";
   }
+  const std::string name = face->title.empty() ? m.package : face->title;
+  return out + "<p>" + markup_escaped(name) + "<br><span class=\"quiet\">" + format_bytes(m.bytes) +
+         "</span></p></div>\n";
+}
 
- private:
-  std::string picture(const ModelSummary& m, std::vector<PageFile>& files) {
-    std::optional<PackageFace> face = face_(m);
-    if (!face) return "<div><p class=\"bad\">" + markup_escaped(m.package) + ": cannot be read</p></div>\n";
-    std::string out = "<div>";
-    if (!face->poster.empty()) {
-      files.push_back({fmt::format("{}/{:05}.jpg", folder_, files.size()), std::move(face->poster)});
-      out += "<img loading=\"lazy\" alt=\"\" src=\"" + markup_escaped(files.back().name) + "\">";
-    }
-    const std::string name = face->title.empty() ? m.package : face->title;
-    return out + "<p>" + markup_escaped(name) + "<br><span class=\"quiet\">" + format_bytes(m.bytes) +
-           "</span></p></div>\n";
+std::string models_section(const RunSummary& s, const std::string& folder, std::size_t most_posters,
+                           const FaceOf& face_of, std::vector<PageFile>& files) {
+  Table table("Every package", {"model", "result", "time", "peak memory", "package"});
+  std::string posters;
+  std::size_t models = 0;
+  for (const ModelSummary& m : s.models) {
+    if (!m.ok()) continue;
+    if (models++ < most_posters) posters += picture_of(m, face_of, folder, files);
+    if (models > kMostRows) continue;
+    const std::uint64_t memory = m.made ? m.made->peak_memory_bytes : m.peak_memory_bytes;
+    table.row({m.model, enum_name(m.result), m.cost_s() > 0 ? format_seconds(m.cost_s()) : "",
+               format_bytes(memory), format_bytes(m.bytes)});
   }
-
-  const RunSummary& summary_;
-  const std::string& folder_;
-  std::size_t posters_;
-  const std::function<std::optional<PackageFace>(const ModelSummary&)>& face_;
-};
+  if (models == 0) return "";
+  if (!posters.empty()) posters = "<div class=\"row\">\n" + posters + "</div>\n";
+  return html_section("models", fmt::format("{} packages", models),
+                      posters + table.html() + cut_note(models));
+}
 
 }  // namespace
 
@@ -132,7 +124,7 @@ CollectionPage collection_page(const RunSummary& s, const std::string& poster_fo
       good ? "" : " bad", c.compiled, c.unchanged, c.failed, c.cancelled, format_seconds(s.seconds),
       std::max<std::size_t>(s.parts.size(), 1), s.parts.size() > 1 ? "runs" : "run");
   body += failures_section(s) + problems_section(s) + figures_section(s);
-  body += ModelsSection(s, poster_folder, posters, face).html(page.files);
+  body += models_section(s, poster_folder, posters, face, page.files);
   page.html = html_page("Collection", body);
   return page;
 }

@@ -1,9 +1,4 @@
 #pragma once
-#include <cstdint>
-#include <functional>
-#include <optional>
-#include <string>
-#include <vector>
 
 #include "pipeline/batch/fleet/run_summary.h"
 

@@ -4,7 +4,7 @@ import { type SplitLimits, SplitState } from './split_state';
 import * as m from './split_models';
 import { type CodedAttribute, SplitValues } from './split_values';
 
-/** Splits of a point, the parent, which gets a child: parent and child share the corners, and get new faces between them. */
+/** Splits of a point, the parent: its child shares the corners, and new faces stand between the two. */
 class SplitVertices {
   private staysNow_ = 0;
 
@@ -63,7 +63,8 @@ class SplitVertices {
         turned = this.state_.bit(m.turn + (side * m.lefts + left) * m.valences + this.valence_(corners.a[c]));
       } else if (turns === 1) {
         const long = Math.min(run, m.runs) - 1;
-        turned = this.state_.bit(m.turnBack + ((side * m.runs + long) * m.rings + ring) * m.valences + this.valence_(corners.a[c]));
+        turned = this.state_.bit(m.turnBack + ((side * m.runs + long) * m.rings + ring) * m.valences +
+          this.valence_(corners.a[c]));
       } else turned = this.state_.bit(m.turnAgain + side);
       if (turned) {
         moving = !moving;
@@ -85,7 +86,7 @@ class SplitVertices {
     for (let i = 0; i < corners.count; ++i)
       if (!corners.moves[i]) this.state_.wedges.stays.data[corners.wedge[i]] = this.staysNow_;
   }
-  /** Codes the child's wedge at a corner that moves: mostly the wedge that corners of the same wedge got before. */
+  /** Codes the child's wedge at a corner that moves: mostly that of earlier corners of the same wedge. */
   private codeTarget_(i: number): void {
     if (this.staysNow_ !== this.splitNumber_) this.noteStays_();
     const wedge = this.state_.corners.wedge[i];
@@ -169,23 +170,18 @@ class SplitVertices {
     if (beside) child = corners.target[moving];
     else if (this.state_.wedges.mapped.data[corners.wedge[staying]] === this.splitNumber_)
       child = this.state_.wedges.mapTarget.data[corners.wedge[staying]];
-    this.finishFace_(x, usual !== flipped, corners.wedge[corner], child, beside ? mx : sx, seam, corners.face[corner]);
+    this.finishFace_(x, usual !== flipped, corners.wedge[corner], child, beside ? mx : sx, seam,
+      corners.face[corner]);
   }
   private codeExtraFace_(): void {
     const x = this.state_.number(this.state_.mesh.points);
-    if (x === this.state_.parent || x === this.state_.child) this.state_.fail('three points of a face', 'S22');
+    if (x === this.state_.parent || x === this.state_.child)
+      this.state_.fail('three points of a face', 'S22');
     const forward = this.state_.raw(1) !== 0;
     this.finishFace_(x, forward, none, none, none, 1, none);
   }
-  private finishFace_(
-    x: number,
-    forward: boolean,
-    expectedParent: number,
-    expectedChild: number,
-    expectedThird: number,
-    seam: number,
-    beside: number,
-  ): void {
+  private finishFace_(x: number, forward: boolean, expectedParent: number, expectedChild: number,
+      expectedThird: number, seam: number, beside: number): void {
     const v = this.state_.codeWedge(expectedParent, m.cornerExpected + seam, this.state_.parent);
     const u = this.state_.codeWedge(expectedChild, m.cornerExpected + 2 + seam, this.state_.child);
     const w = this.state_.codeWedge(expectedThird, m.cornerExpected + 4 + seam, x);
@@ -258,7 +254,8 @@ class SplitPatches {
     const { corners, fans, mesh } = this.state_;
     this.state_.countWork(mesh.degree.data[point]);
     mesh.gather(point, corners, fans);
-    for (const fan of fans) for (let i = fan.begin; i < fan.end; ++i) if (corners.face[i] === face) return fan;
+    for (const fan of fans) for (let i = fan.begin; i < fan.end; ++i) if (corners.face[i] === face)
+      return fan;
     return this.state_.fail('a face at its own point');
   }
   /** The face behind an open edge, if there is one; false when not. */
@@ -296,7 +293,8 @@ class SplitPatches {
       for (let k = 0; k < 3; ++k) state.guess[k] = places[3 * a + k] + places[3 * b + k] - places[3 * d + k];
       return state.addWedge(this.newPoint_(), true);
     }
-    if (left.point !== b && state.bit(m.thirdLeft + fans)) return state.codeWedge(left.wedge, m.patchExpected + 2, left.point);
+    if (left.point !== b && state.bit(m.thirdLeft + fans))
+      return state.codeWedge(left.wedge, m.patchExpected + 2, left.point);
     if (right.point !== a && right.point !== left.point && state.bit(m.thirdRight))
       return state.codeWedge(right.wedge, m.patchExpected + 3, right.point);
     const p = state.number(state.mesh.points);
@@ -305,7 +303,10 @@ class SplitPatches {
   }
 }
 
-/** The reader's side of format/split/split_codec.h: points are asked in the same order, every decision is read from the stream. */
+/**
+ * The reader's side of format/split/split_codec.h: points are asked in the same order, every decision is read
+ * from the stream.
+ */
 export class SplitCodec {
   private readonly state_: SplitState;
   private readonly vertices_: SplitVertices;
@@ -313,15 +314,8 @@ export class SplitCodec {
   private lastAnswer_ = false;
   private fruitless_ = false; // nobody has split since all points were queued
 
-  constructor(
-    mesh: SplitMesh,
-    attributes: readonly CodedAttribute[],
-    positionBits: number,
-    groups: number,
-    limits: SplitLimits,
-    positions: ValueDecoder,
-    values: readonly ValueDecoder[],
-  ) {
+  constructor(mesh: SplitMesh, attributes: readonly CodedAttribute[], positionBits: number, groups: number,
+      limits: SplitLimits, positions: ValueDecoder, values: readonly ValueDecoder[]) {
     this.state_ = new SplitState(mesh, groups, limits);
     const coded = new SplitValues(this.state_, attributes, positionBits, positions, values);
     this.vertices_ = new SplitVertices(this.state_, coded);
@@ -358,7 +352,8 @@ export class SplitCodec {
     state.countWork(1);
     const asked = asks.data[v];
     const degree = Math.min(state.mesh.degree.data[v], m.degrees - 1);
-    const model = m.ask + ((degree * 4 + (asked & 3)) * 2 + ((asked >> 2) & 1)) * 2 + (this.lastAnswer_ ? 1 : 0);
+    const model = m.ask + ((degree * 4 + (asked & 3)) * 2 + ((asked >> 2) & 1)) * 2 +
+      (this.lastAnswer_ ? 1 : 0);
     this.lastAnswer_ = state.bit(model);
     if (!this.lastAnswer_) {
       if ((asked & 3) < 3) asks.data[v] = asked + 1;

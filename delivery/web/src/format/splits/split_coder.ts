@@ -1,21 +1,19 @@
 import { splitBelow, splitLongest, splitPrior, splitSteps, splitValueLimit } from '../shared_numbers';
 
-// The entropy decoder of mesh/stream.bin: format/split/split_coder.h, with 32-bit numbers.
+// The entropy decoder of mesh/stream.bin: format/split/split_element_codec.h, with 32-bit numbers.
 
 /** Adaptive probabilities that a bit is 1, by index. */
 export class BitModels {
   readonly p: Uint16Array;
   readonly seen: Uint8Array;
-  constructor(
-    count: number,
-    readonly limit: number,
-  ) {
+  constructor(count: number, readonly limit: number) {
     this.p = new Uint16Array(count).fill(0x8000);
     this.seen = new Uint8Array(count);
   }
 }
 
-const weights = /* @__PURE__ */ Uint32Array.from({ length: 256 }, (_, seen) => Math.floor(65535 / (seen + 2)));
+const weights =
+  Uint32Array.from({ length: 256 }, (_, seen) => Math.floor(65535 / (seen + 2)));
 
 /** Decodes bits; behind the end of the bytes are zeros. */
 export class BitDecoder {

@@ -56,7 +56,7 @@ export interface Fan {
 
 const after = [0, 1, 2, 0, 1];
 
-/** A mesh under refinement by vertex splits (format/split/split_mesh.h): points and wedges are only ever appended. */
+/** A mesh that vertex splits refine (format/split/split_mesh.h): points and wedges only grow. */
 export class SplitMesh {
   readonly places = new Growing(768); // 3 per point
   readonly wedgePoint = new Growing();

@@ -2,11 +2,12 @@ import {
   splitDegrees, splitLefts, splitModelLimit, splitRings, splitRuns, splitValences,
 } from '../shared_numbers';
 
-// Places of the probabilities of the connectivity part: the kinds of SplitModels in format/split/split_element_codec.h, and how many contexts
-// each kind has.
+// Places of the probabilities of the connectivity part: the kinds of SplitModels in
+// format/split/split_element_codec.h, and how many contexts each kind has.
 
 export {
-  splitDegrees as degrees, splitLefts as lefts, splitModelLimit as limit, splitRings as rings, splitRuns as runs,
+  splitDegrees as degrees, splitLefts as lefts, splitModelLimit as limit, splitRings as rings,
+  splitRuns as runs,
   splitValences as valences,
 };
 

@@ -5,7 +5,7 @@ import * as m from './split_models';
 
 /** Points that wait to be asked whether they split, in the order in which they joined; each waits once. */
 class SplitQueue {
-  /** By point: how often the point was asked without a split (3: or more often); 4: the point split the last time. */
+  /** By point: how often it was asked without a split (3: or more often); 4: it split the last time. */
   readonly asks = new Growing();
   private readonly queued_ = new Growing(); // by point
   private readonly points_: number[] = [];
@@ -76,7 +76,7 @@ class WedgeNotes {
   }
 }
 
-/** State that splits, patches and values share while a stream is decoded: the mesh, the bits, and the point under way. */
+/** What splits, patches and values share while a stream is decoded: mesh, bits, the present point. */
 export class SplitState {
   /** Corners and fans of the point under way. */
   readonly corners = new Corners();

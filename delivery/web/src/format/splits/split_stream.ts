@@ -130,13 +130,15 @@ function readBlocks(input: BytesIn, count: number, partCount: number): SplitBloc
   for (let i = 0; i < count; ++i) {
     const code = readVarint(input);
     const b: SplitBlock = {
-      isPatch: code % 2 === 1, count: Math.floor(code / 2), offset: 0, parts: [], bytes: 0, digest: new Uint8Array(0),
+      isPatch: code % 2 === 1, count: Math.floor(code / 2), offset: 0, parts: [], bytes: 0,
+      digest: new Uint8Array(0),
     };
     if (b.count === 0 || (!b.isPatch && b.count > mostSplits))
       input.fail(`1 to ${mostSplits} splits`, b.count, 'S07');
     for (let p = 0; p < partCount; ++p) b.parts.push(readVarint(input));
     b.bytes = b.parts.reduce((sum, n) => sum + n, 0);
-    if (b.bytes < Math.floor(b.count / mostPerByte)) input.fail(`a byte for every ${mostPerByte}`, b.bytes, 'S07');
+    if (b.bytes < Math.floor(b.count / mostPerByte))
+      input.fail(`a byte for every ${mostPerByte}`, b.bytes, 'S07');
     b.digest = input.raw(8);
     blocks.push(b);
   }
@@ -192,8 +194,10 @@ export class SplitStreamReader {
       throw new FormatError(file, 'head', `at most ${mostPoints} points and ${mostFaces} faces`, '', 'L09');
     this.mesh = new SplitMesh(attributes.map((a) => a.components));
     this.values_ = attributes.map(() => new ValueDecoder());
-    const coded = attributes.map((a) => ({ normal: a.kind === 'normal', components: a.components, bits: a.grid.bits }));
-    this.codec_ = new SplitCodec(this.mesh, coded, position.bits, groups.length, last, this.positions_, this.values_);
+    const coded =
+      attributes.map((a) => ({ normal: a.kind === 'normal', components: a.components, bits: a.grid.bits }));
+    this.codec_ = new SplitCodec(this.mesh, coded, position.bits, groups.length, last, this.positions_,
+      this.values_);
   }
 
   /** Number of blocks decoded so far. */
@@ -204,7 +208,8 @@ export class SplitStreamReader {
   /** FormatError where whole blocks, from a place of the stream on, have other digests than the head says. */
   async check(from: number, bytes: Uint8Array): Promise<void> {
     for (const [i, { offset, bytes: size, digest }] of this.head.blocks.entries())
-      if (offset >= from && offset + size <= from + bytes.length && !samePrefix(await sha256(bytes.subarray(offset - from, offset - from + size)), digest))
+      if (offset >= from && offset + size <= from + bytes.length &&
+          !samePrefix(await sha256(bytes.subarray(offset - from, offset - from + size)), digest))
         throw new FormatError(file, `block ${i}`, 'the digest of the head', '', 'S09');
   }
   /** Decodes whole blocks that stand one after the other, digests checked. */
@@ -244,6 +249,7 @@ export class SplitStreamReader {
     for (let face = 0; face < faces; ++face) found.triangles += Number(this.mesh.isVisible(face));
     for (const name of ['points', 'wedges', 'faces', 'triangles'] as const)
       if (scale[name] !== found[name])
-        throw new FormatError(file, `scale ${scale.scale}`, `${scale[name]} ${name}`, `${found[name]}`, 'S19');
+        throw new FormatError(file, `scale ${scale.scale}`, `${scale[name]} ${name}`, `${found[name]}`,
+          'S19');
   }
 }

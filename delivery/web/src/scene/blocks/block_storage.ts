@@ -12,7 +12,7 @@ import { threeFormats } from './gpu_formats';
 import { unpacked } from './two_channels';
 
 /** A part of a picture that has, or would have if it were enlarged, a size `of` so many px. */
-export interface Part {
+export interface PicturePart {
   x: number;
   y: number;
   width: number;
@@ -21,13 +21,20 @@ export interface Part {
 }
 
 /** RGBA bytes of a texture's part, row 0 first: blocks cannot be read, so they are drawn. */
-export function readPicture(renderer: WebGLRenderer, texture: Texture, format: BlockFormat | undefined, { x, y, width, height, of }: Part): Uint8Array {
-  const target = new WebGLRenderTarget(width, height, { colorSpace: texture.colorSpace, depthBuffer: false, minFilter: LinearFilter, magFilter: LinearFilter });
+export function readPicture(renderer: WebGLRenderer, texture: Texture, format: BlockFormat | undefined,
+    { x, y, width, height, of }: PicturePart): Uint8Array {
+  const target = new WebGLRenderTarget(width, height,
+    { colorSpace: texture.colorSpace, depthBuffer: false, minFilter: LinearFilter, magFilter: LinearFilter });
   const material = new ShaderMaterial({
     depthTest: false, depthWrite: false, blending: NoBlending, toneMapped: false,
-    uniforms: { map: { value: texture }, place: { value: [x / of[0], y / of[1], width / of[0], height / of[1]] } },
-    vertexShader: 'varying vec2 at; uniform vec4 place; void main() { at = place.xy + uv * place.zw; gl_Position = vec4( position.xy * 2.0, 0.0, 1.0 ); }',
-    fragmentShader: `varying vec2 at; uniform sampler2D map; void main() { vec4 t = textureLod( map, at, 0.0 ); ${format ? unpacked(format) : ''} gl_FragColor = t; }`,
+    uniforms: { map: { value: texture },
+      place: { value: [x / of[0], y / of[1], width / of[0], height / of[1]] } },
+    vertexShader: `varying vec2 at; uniform vec4 place;
+      void main() { at = place.xy + uv * place.zw; gl_Position = vec4( position.xy * 2.0, 0.0, 1.0 ); }`,
+    fragmentShader: `varying vec2 at; uniform sampler2D map;
+      void main() {
+        vec4 t = textureLod( map, at, 0.0 ); ${format ? unpacked(format) : ''} gl_FragColor = t;
+      }`,
   });
   const square = new Mesh(new PlaneGeometry(1, 1), material);
   square.frustumCulled = false;
@@ -71,7 +78,7 @@ function alignedLevels({ fragmentWidthPx: width, fragmentHeightPx: height }: Tex
   return levels;
 }
 
-/** The storage on the GPU of a texture plane as blocks: what PlaneStorage is to RGBA. The smallest levels are made of a copy of the largest of them. */
+/** PlaneStorage of blocks. The smallest levels are made of a copy of the largest one of them. */
 export class BlockStorage {
   /** Levels that fragments bring as blocks. */
   readonly own: number;
@@ -103,20 +110,24 @@ export class BlockStorage {
   /** How a worker makes blocks of a picture whose place is x, y. */
   request(x: number, y: number): BlockRequest {
     const { widthPx, heightPx } = this.info_;
-    return { url: this.host_.blocksUrl, format: this.format, own: this.own, size: [widthPx - x, heightPx - y] };
+    return { url: this.host_.blocksUrl, format: this.format, own: this.own,
+      size: [widthPx - x, heightPx - y] };
   }
   /** See PlaneComposer.view. */
   view(old: Texture, filled: boolean): Texture {
     const known = this.views_.get(old);
     if (known) return known;
     const { widthPx, heightPx, colourSpace } = this.info_;
-    const levelCount = (old.minFilter as number) > linearFilter ? 32 - Math.clz32(Math.max(widthPx, heightPx)) : 1;
-    const mipmaps = Array.from({ length: levelCount }, (_, level) => ({ width: this.side_(widthPx, level), height: this.side_(heightPx, level), data: null as never }));
+    const levelCount = (old.minFilter as number) > linearFilter ? 32 - Math.clz32(Math.max(widthPx, heightPx))
+      : 1;
+    const mipmaps = Array.from({ length: levelCount }, (_, level) => ({ width: this.side_(widthPx, level),
+      height: this.side_(heightPx, level), data: null as never }));
     const texture = new CompressedTexture(mipmaps, widthPx, heightPx, threeFormats[this.format]);
     const { format, type, image, source } = texture;
     const first = this.textures[0];
     texture.copy(old as CompressedTexture);
-    Object.assign(texture, { format, type, mipmaps, source: first?.source ?? source, colorSpace: colourSpace === 'srgb' ? 'srgb' : '', flipY: false, generateMipmaps: false });
+    Object.assign(texture, { format, type, mipmaps, source: first?.source ?? source,
+      colorSpace: colourSpace === 'srgb' ? 'srgb' : '', flipY: false, generateMipmaps: false });
     if (!first) Object.assign(texture, { image });
     texture.source.dataReady = false; // three.js makes the storage, and nothing else
     texture.needsUpdate = true;
@@ -139,7 +150,8 @@ export class BlockStorage {
   }
   /** The smallest levels follow the uploads, when a worker has made them. */
   updateMips(): void {
-    if (!this.stale_ || this.making_ || ![...this.storages_.values()].some((levels) => levels > this.own)) return;
+    if (!this.stale_ || this.making_ || ![...this.storages_.values()].some((levels) => levels > this.own))
+      return;
     this.making_ = this.makeTail_().finally(() => (this.making_ = undefined));
   }
   /** Resolves when the smallest levels have followed. */
@@ -149,7 +161,8 @@ export class BlockStorage {
   /** RGBA bytes, row 0 at the top. */
   read(): Uint8Array {
     const { widthPx, heightPx } = this.info_;
-    return readPicture(this.renderer_, this.textures[0], this.format, { x: 0, y: 0, width: widthPx, height: heightPx, of: [widthPx, heightPx] });
+    return readPicture(this.renderer_, this.textures[0], this.format,
+      { x: 0, y: 0, width: widthPx, height: heightPx, of: [widthPx, heightPx] });
   }
   dispose(): void {
     this.disposed_ = true;
@@ -163,7 +176,8 @@ export class BlockStorage {
   }
   private storageOf_(texture: Texture): WebGLTexture {
     this.renderer_.initTexture(texture);
-    const { __webglTexture: storage } = this.renderer_.properties.get(texture) as { __webglTexture?: WebGLTexture };
+    const { __webglTexture: storage } =
+      this.renderer_.properties.get(texture) as { __webglTexture?: WebGLTexture };
     if (!storage) throw new Error('the renderer gave no texture');
     return storage;
   }
@@ -174,10 +188,12 @@ export class BlockStorage {
     return Array.from({ length: Math.ceil(height / rows) }, (_, i) => {
       const [from, to] = [i * rows, Math.min((i + 1) * rows, height)];
       const bytes = data.subarray((from / 4) * rowBytes, Math.ceil(to / 4) * rowBytes);
-      return { pixels: width * (to - from), run: () => this.write_(level, left, top + from, width, to - from, bytes) };
+      return { pixels: width * (to - from),
+        run: () => this.write_(level, left, top + from, width, to - from, bytes) };
     });
   }
-  private write_(level: number, x: number, y: number, width: number, height: number, bytes: Uint8Array): void {
+  private write_(level: number, x: number, y: number, width: number, height: number,
+      bytes: Uint8Array): void {
     const { gl_: gl } = this;
     for (const [storage, levelCount] of this.storages_) {
       if (level >= levelCount) continue;
@@ -188,22 +204,26 @@ export class BlockStorage {
   }
   private glFormat_(): number {
     const srgb = this.info_.colourSpace === 'srgb';
-    return { bc1: srgb ? 0x8c4c : 0x83f0, 'bc3-normal': 0x83f3, bc5: 0x8dbd, bc7: srgb ? 0x8e8d : 0x8e8c, etc2: srgb ? 0x9275 : 0x9274, astc: srgb ? 0x93d0 : 0x93b0, 'astc-normal': 0x93b0 }[this.format];
+    return { bc1: srgb ? 0x8c4c : 0x83f0, 'bc3-normal': 0x83f3, bc5: 0x8dbd, bc7: srgb ? 0x8e8d : 0x8e8c,
+      etc2: srgb ? 0x9275 : 0x9274, astc: srgb ? 0x93d0 : 0x93b0, 'astc-normal': 0x93b0 }[this.format];
   }
   private keep_({ width, height, data }: BlockLevel, left: number, top: number): void {
     const to = this.tail_;
     const columns = Math.min(width, to.width - left);
     for (let row = 0; row < Math.min(height, to.height - top); ++row)
-      if (columns > 0) to.pixels.set(data.subarray(4 * width * row, 4 * (width * row + columns)), 4 * (to.width * (top + row) + left));
+      if (columns > 0) to.pixels.set(data.subarray(4 * width * row, 4 * (width * row + columns)),
+        4 * (to.width * (top + row) + left));
     this.stale_ = true;
   }
   private async makeTail_(): Promise<void> {
     this.stale_ = false;
     this.host_.pending(1);
     try {
-      const levels = await this.host_.encode({ ...this.tail_, pixels: this.tail_.pixels.slice() }, { ...this.request(0, 0), own: Infinity, size: [Infinity, Infinity] });
+      const levels = await this.host_.encode({ ...this.tail_, pixels: this.tail_.pixels.slice() },
+        { ...this.request(0, 0), own: Infinity, size: [Infinity, Infinity] });
       for (const [i, level] of (levels as BlockLevel[]).entries())
-        for (const upload of this.bands_(level, this.own + i, 0, 0)) if (!this.disposed_) await this.host_.enqueue(upload);
+        for (const upload of this.bands_(level, this.own + i, 0, 0)) if (!this.disposed_)
+          await this.host_.enqueue(upload);
     } catch {
       // The smallest levels stay as they were until the next uploads.
     }

@@ -8,15 +8,17 @@ import { eachPiece, uploadAll } from '../enlarge';
 import type { LoadContext } from '../load_context';
 import type { UploadQueue } from '../upload_queue';
 import { BlockStorage, readPicture } from './block_storage';
-import { type Way, blocksFor, bytesBy, formatsOf } from './gpu_formats';
+import { type BlockChoice, blocksFor, bytesBy, formatsOf } from './gpu_formats';
 import { readTwoChannels } from './two_channels';
 
-/** Fills a plane of blocks with a texture, scaled bilinearly: the GPU draws it piece by piece, workers make the blocks. */
-export async function refill(next: PlaneComposer, from: Texture, format: BlockFormat | undefined, renderer: WebGLRenderer, pool: WorkerPool, uploads: UploadQueue): Promise<void> {
+/** Fills a plane of blocks with a texture: the GPU draws it piece by piece, workers make the blocks. */
+export async function refill(next: PlaneComposer, from: Texture, format: BlockFormat | undefined,
+    renderer: WebGLRenderer, pool: WorkerPool, uploads: UploadQueue): Promise<void> {
   await eachPiece(next, uploads, async ({ x0, x1, y0, y1 }) => {
     const [width, height] = [x1 - x0, y1 - y0];
     let pixels: Uint8Array | undefined;
-    await uploads.enqueue(width * height, () => (pixels = readPicture(renderer, from, format, { x: x0, y: y0, width, height, of: [next.widthPx, next.heightPx] })));
+    await uploads.enqueue(width * height, () => (pixels = readPicture(renderer, from, format,
+      { x: x0, y: y0, width, height, of: [next.widthPx, next.heightPx] })));
     if (!pixels) return; // the load has ended
     const levels = await pool.blocksOf({ pixels, width, height, blocks: next.blocks!.request(x0, y0) });
     await uploadAll(uploads, next.uploads(levels, x0, y0));
@@ -38,7 +40,7 @@ export interface StorageOptions {
 /** Textures as blocks; this module is loaded where a load wants them. */
 export interface Compression {
   /** Ways to store the planes, the best pictures first, and the bytes of each. */
-  ways: Way[];
+  ways: BlockChoice[];
   bytes: BytesOf[];
   storage(of: StorageOptions): BlockStorage;
   refill: typeof refill;
@@ -46,14 +48,19 @@ export interface Compression {
 }
 
 /** undefined: the GPU has no formats, three.js is too old, or a worker cannot make blocks. */
-export async function openCompression({ options, pool }: LoadContext, textures: readonly TextureInfo[]): Promise<Compression | undefined> {
+export async function openCompression({ options, pool }: LoadContext,
+    textures: readonly TextureInfo[]): Promise<Compression | undefined> {
   const { renderer, workerUrl, blocksUrl, compress } = options;
   const formats = formatsOf(renderer);
-  if (formats.size === 0 || !('dataReady' in new Source(null))) return undefined; // before three.js r162 a storage wants its texels at once
-  const url = blocksUrl ? new URL(blocksUrl, location.href) : workerUrl ? new URL('./blocks.js', new URL(workerUrl, location.href)) : new URL('./blocks.js', import.meta.url);
+  // before three.js r162 a storage wants its texels at once
+  if (formats.size === 0 || !('dataReady' in new Source(null))) return undefined;
+  const url = blocksUrl ? new URL(blocksUrl, location.href) : workerUrl
+    ? new URL('./blocks.js', new URL(workerUrl, location.href)) : new URL('./blocks.js', import.meta.url);
   const [format] = formats;
-  await pool.blocksOf({ pixels: new Uint8Array(64), width: 4, height: 4, blocks: { url: url.href, format, own: 1, size: [4, 4] } });
-  const storage = ({ renderer: gpu, pool: workers, uploads, info, format: stored, pending, refill: filled }: StorageOptions): BlockStorage =>
+  await pool.blocksOf({ pixels: new Uint8Array(64), width: 4, height: 4,
+    blocks: { url: url.href, format, own: 1, size: [4, 4] } });
+  const storage = ({ renderer: gpu, pool: workers, uploads, info, format: stored, pending,
+    refill: filled }: StorageOptions): BlockStorage =>
     new BlockStorage(gpu, info, stored, {
       encode: (picture, blocks) => workers.blocksOf({ ...picture, blocks }),
       enqueue: ({ pixels, run }) => uploads.enqueue(pixels, run),
@@ -61,6 +68,6 @@ export async function openCompression({ options, pool }: LoadContext, textures: 
     }, filled);
   const always = compress === 'always';
   const blocks = blocksFor(textures, formats, always);
-  const ways: Way[] = always ? [blocks] : [() => undefined, blocks];
+  const ways: BlockChoice[] = always ? [blocks] : [() => undefined, blocks];
   return { ways, bytes: ways.map((way) => bytesBy(textures, way)), refill, readTwoChannels, storage };
 }

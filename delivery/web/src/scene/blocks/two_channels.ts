@@ -1,17 +1,22 @@
 import { type Material, ShaderChunk } from 'three';
 import type { BlockFormat } from '../../blocks/formats';
 
+/** GLSL: `z` of the normal of unit length whose other channels are `c`. */
+const normalZ = 'vec2 n = 2.0 * c - 1.0; float z = 0.5 + 0.5 * sqrt( max( 0.0, 1.0 - dot( n, n ) ) );';
+
 /** How texels come that need their z made: as blocks, or as fragments of codec jpeg-xy brought them. */
 type Stored = BlockFormat | 'jpeg-xy';
 /** Where the two channels of normals stand. */
-const channels: Partial<Record<Stored, string>> = { 'jpeg-xy': 'rg', bc5: 'rg', 'bc3-normal': 'ag', 'astc-normal': 'ra' };
+const channels: Partial<Record<Stored, string>> = { 'jpeg-xy': 'rg', bc5: 'rg', 'bc3-normal': 'ag',
+  'astc-normal': 'ra' };
 /** Uniform and chunk of three.js by the slot of a material. */
-const chunks: Record<string, 'normal_fragment_maps' | 'clearcoat_normal_fragment_maps'> = { normalMap: 'normal_fragment_maps', clearcoatNormalMap: 'clearcoat_normal_fragment_maps' };
+const chunks: Record<string, 'normal_fragment_maps' | 'clearcoat_normal_fragment_maps'> =
+  { normalMap: 'normal_fragment_maps', clearcoatNormalMap: 'clearcoat_normal_fragment_maps' };
 
 /** The channels that a slot of a material is read from by now. */
 const known = new WeakMap<Material, Record<string, string>>();
 
-/** Normals of a material are made of two channels from now on; z is what makes their length 1. False: the format has three. */
+/** Normals of a material have two channels from now on; their length is 1. False: they have three. */
 export function readTwoChannels(material: Material, slot: string, format: Stored): boolean {
   const [two, chunk] = [channels[format], chunks[slot]];
   if (!two || !chunk) return false;
@@ -23,10 +28,12 @@ export function readTwoChannels(material: Material, slot: string, format: Stored
   const [before, keyBefore] = [material.onBeforeCompile, material.customProgramCacheKey];
   material.onBeforeCompile = function (shader, renderer) {
     before.call(material, shader, renderer);
-    const mapped = ShaderChunk[chunk].replaceAll(new RegExp(`texture2D\\( ${slot}, (\\w+) \\)\\.xyz`, 'g'), `texmeshNormal( texture2D( ${slot}, $1 ).${read[slot]} )`);
-    const made = 'vec3 texmeshNormal( vec2 c ) { vec2 n = 2.0 * c - 1.0; return vec3( c, 0.5 + 0.5 * sqrt( max( 0.0, 1.0 - dot( n, n ) ) ) ); }\n';
+    const mapped = ShaderChunk[chunk].replaceAll(new RegExp(`texture2D\\( ${slot}, (\\w+) \\)\\.xyz`, 'g'),
+      `texmeshNormal( texture2D( ${slot}, $1 ).${read[slot]} )`);
+    const made = `vec3 texmeshNormal( vec2 c ) { ${normalZ} return vec3( c, z ); }\n`;
     const there = shader.fragmentShader.includes('texmeshNormal(');
-    shader.fragmentShader = (there ? '' : made) + shader.fragmentShader.replace(`#include <${chunk}>`, mapped);
+    shader.fragmentShader = (there ? '' : made) +
+      shader.fragmentShader.replace(`#include <${chunk}>`, mapped);
   };
   material.customProgramCacheKey = () => `${keyBefore.call(material)} ${slot} ${read[slot]}`;
   return true;
@@ -35,5 +42,5 @@ export function readTwoChannels(material: Material, slot: string, format: Stored
 /** GLSL that makes a colour `t` of such a texture what RGBA would hold. */
 export function unpacked(format: BlockFormat): string {
   const two = channels[format];
-  return two ? `vec2 c = t.${two}, n = 2.0 * c - 1.0; t = vec4( c, 0.5 + 0.5 * sqrt( max( 0.0, 1.0 - dot( n, n ) ) ), 1.0 );` : '';
+  return two ? `vec2 c = t.${two}; ${normalZ} t = vec4( c, z, 1.0 );` : '';
 }

@@ -1,4 +1,5 @@
-import { MeshStandardMaterial, ShaderChunk, type WebGLProgramParametersWithUniforms, type WebGLRenderer } from 'three';
+import { MeshStandardMaterial, ShaderChunk, type WebGLProgramParametersWithUniforms,
+  type WebGLRenderer } from 'three';
 import { expect, test } from 'vitest';
 import { readTwoChannels } from '../../../src/scene/blocks/two_channels';
 
@@ -27,7 +28,8 @@ test('another storage of the same slot changes the channels, and nothing is patc
   expect(material.version).toBe(version); // the same two channels
   readTwoChannels(material, 'normalMap', 'bc3-normal');
   expect(material.version).toBeGreaterThan(version);
-  expect(shaderOf(material).match(/texmeshNormal\( texture2D\( normalMap, vNormalMapUv \)\.ag \)/g)).toHaveLength(2);
+  expect(shaderOf(material).match(/texmeshNormal\( texture2D\( normalMap, vNormalMapUv \)\.ag \)/g))
+    .toHaveLength(2);
   expect(shaderOf(material).match(/vec3 texmeshNormal\(/g)).toHaveLength(1);
 });
 
