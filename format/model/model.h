@@ -16,6 +16,10 @@ using Triangle = std::array<std::uint32_t, 3>;
 struct Mesh {
   Vec3d origin;                  // add to a position to get the source's coordinates; object units
   std::vector<Vec3f> positions;  // local frame, object units, finite
+  // One for all positions, one per position, or none: the unit in the last place of the coarsest number on a
+  // position's way from the source (a float, an integer of a quantisation, a node's transform), object units.
+  // None: of a float.
+  std::vector<float> rounding;
   std::vector<std::uint32_t> wedge_position;  // per wedge: index into positions
   // Per wedge, each either empty (the mesh has no such attribute) or as long as wedge_position:
   std::vector<Vec2f> uv0, uv1;      // glTF convention, v grows downwards; may lie outside 0..1
@@ -34,8 +38,8 @@ struct Mesh {
   }
   friend bool operator==(const Mesh&, const Mesh&) = default;
   static void archive(auto& s, auto& a) {
-    a(s.origin, s.positions, s.wedge_position, s.uv0, s.uv1, s.normals, s.colours, s.tangents, s.triangles,
-      s.triangle_material, s.triangle_part, s.part_names);
+    a(s.origin, s.positions, s.rounding, s.wedge_position, s.uv0, s.uv1, s.normals, s.colours, s.tangents,
+      s.triangles, s.triangle_material, s.triangle_part, s.part_names);
   }
 };
 

@@ -52,6 +52,7 @@ void drop_unused_vertices(Model& model) {
   keep_marked(mesh.tangents, wedge);
   keep_marked(mesh.wedge_position, wedge);
   keep_marked(mesh.positions, position);
+  if (mesh.rounding.size() > 1) keep_marked(mesh.rounding, position);
   for (std::uint32_t& p : mesh.wedge_position) p = position[p];
   for (Triangle& t : mesh.triangles)
     for (std::uint32_t& w : t) w = wedge[w];

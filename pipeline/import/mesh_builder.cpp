@@ -2,6 +2,7 @@
 
 #include "format/base/portable_math.h"
 #include "format/base/vec.h"
+#include "stages/geometry/mesh_topology.h"
 
 namespace texmesh {
 namespace {
@@ -35,6 +36,13 @@ Vec3d choose_origin(const std::vector<Vec3d>& positions, double largest) {
 
 void set_positions(Mesh& mesh, const std::vector<Vec3d>& positions, double largest) {
   mesh.origin = choose_origin(positions, largest);
+  if (mesh.rounding.empty()) {
+    double magnitude = 0;
+    for (const Vec3d& p : positions)
+      if (usable(p, largest))
+        magnitude = std::max({magnitude, std::fabs(p.x), std::fabs(p.y), std::fabs(p.z)});
+    mesh.rounding = {float_unit(magnitude)};
+  }
   mesh.positions.resize(positions.size());
   const float nan = std::numeric_limits<float>::quiet_NaN();
   for (std::size_t i = 0; i < positions.size(); ++i)

@@ -20,6 +20,7 @@ inline constexpr double kLargestPackedCoordinate = 4 * kLargestCoordinate;
 /// Positions in double precision -> mesh.origin and float positions in a local frame. The origin is 0 unless
 /// the bounding box lies so far from it that float would lose more than 1e-7 of the diagonal; then it is the
 /// box's centre, rounded to a float-exact value. What is no number, or beyond `largest`, becomes NaN.
+/// mesh.rounding, where it is empty, becomes a float's unit in the last place of the largest coordinate.
 void set_positions(Mesh& mesh, const std::vector<Vec3d>& positions, double largest = kLargestCoordinate);
 
 /// sRGB in 0..1 to linear light, 0..1; NaN gives 1.

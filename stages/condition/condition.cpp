@@ -1,6 +1,7 @@
 #include "stages/condition/condition.h"
 
 #include <cassert>
+#include <limits>
 #include <numeric>
 #include <tuple>
 
@@ -365,6 +366,39 @@ Kept drop_slivers(const Mesh& in, const Kept& kept, EdgeTable& edges, ConditionR
   return out;
 }
 
+/// The positions at edges that do not simply join two triangles, with what rounding may have done to them.
+std::vector<RoundedPosition> open_positions(const Mesh& in, const std::vector<std::uint32_t>& weld,
+                                            const Kept& kept, const EdgeTable& edges) {
+  const std::vector<std::uint32_t>& corner = kept.corner;
+  std::vector<float> shortest(in.positions.size(), 0);  // 0: not at such an edge
+  const auto from = [&](std::uint32_t h) { return corner[h]; };
+  const auto to = [&](std::uint32_t h) { return corner[next_corner(h)]; };
+  const auto opposite = [&](std::uint32_t h) { return corner[previous_corner(h)]; };
+  for (std::size_t e = 0; e < edges.edge_count(); ++e) {
+    const auto halves = edges.edge(e);
+    const bool joins =
+        halves.size() == 2 && from(halves[0]) == to(halves[1]) && opposite(halves[0]) != opposite(halves[1]);
+    if (!joins) shortest[from(halves[0])] = shortest[to(halves[0])] = std::numeric_limits<float>::max();
+  }
+  for (std::uint32_t h = 0; h < corner.size(); ++h) {
+    if (shortest[from(h)] == 0 && shortest[to(h)] == 0) continue;
+    const double l = length(to_double(in.positions[to(h)]) - to_double(in.positions[from(h)]));
+    for (const std::uint32_t p : {from(h), to(h)}) shortest[p] = std::min(shortest[p], static_cast<float>(l));
+  }
+  std::vector<float> rounding(in.positions.size(), 0);  // of all positions that are one
+  for (std::size_t p = 0; p < weld.size(); ++p) {
+    if (weld[p] == kNoIndex || shortest[weld[p]] == 0) continue;
+    const Vec3f at = in.positions[p];
+    const float given = in.rounding.size() > 1 ? in.rounding[p] : in.rounding.empty() ? 0 : in.rounding[0];
+    const float own = float_unit(std::max({std::fabs(at.x), std::fabs(at.y), std::fabs(at.z)}));
+    rounding[weld[p]] = std::max({rounding[weld[p]], given, own});
+  }
+  std::vector<RoundedPosition> open;
+  for (std::uint32_t p = 0; p < shortest.size(); ++p)
+    if (shortest[p] > 0) open.push_back({p, rounding[p], shortest[p]});
+  return open;
+}
+
 void count_edges(const EdgeTable& edges, ConditionReport& report) {
   for (std::size_t e = 0; e < edges.edge_count(); ++e) {
     report.boundary_edges += edges.edge(e).size() == 1;
@@ -482,6 +516,10 @@ Notes describe(const ConditionReport& r) {
   if (r.non_finite_triangles)
     add_warning(notes, "non-finite-position", "",
                 count_of(r.non_finite_triangles, "triangle") + " with a corner that is not finite dropped");
+  if (r.rounded_positions)
+    add_info(notes, "rounded-position", "",
+             count_of(r.rounded_positions, "position") +
+                 " at open edges joined with a neighbour that differs by rounding alone");
   if (r.repaired_wedges)
     add_warning(notes, "bad-attribute", "",
                 count_of(r.repaired_wedges, "wedge") +
@@ -520,14 +558,23 @@ ConditionedMesh condition_mesh(const Mesh& mesh, bool normals_by_specification,
   ConditionReport& report = out.report;
 
   const Mesh attributes = clean_attributes(mesh, report.repaired_wedges);
-  const std::vector<std::uint32_t> position_weld =
+  std::vector<std::uint32_t> position_weld =
       weld_positions(mesh.positions, options.weld_distance * diagonal(mesh.positions));
-  const std::vector<std::uint32_t> wedge_weld = weld_wedges(attributes, position_weld);
+  std::vector<std::uint32_t> wedge_weld = weld_wedges(attributes, position_weld);
   context.check_cancelled();
   context.report(0.3);
 
+  const ConditionReport before = report;
   Kept kept = drop_duplicates(mesh, keep_sound_triangles(mesh, position_weld, wedge_weld, report), report);
   EdgeTable edges = group_edges(kept.corner, mesh.positions.size());
+  if (const std::uint64_t joined =
+          weld_rounded(mesh.positions, open_positions(mesh, position_weld, kept, edges), position_weld)) {
+    report = before;
+    report.rounded_positions = joined;
+    wedge_weld = weld_wedges(attributes, position_weld);
+    kept = drop_duplicates(mesh, keep_sound_triangles(mesh, position_weld, wedge_weld, report), report);
+    edges = group_edges(kept.corner, mesh.positions.size());
+  }
   kept = drop_slivers(mesh, kept, edges, report);
   const auto shows = [&](std::size_t i) { return has_area(mesh.positions, kept.positions(i)); };
   bool any = false;

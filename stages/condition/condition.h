@@ -6,7 +6,7 @@
 namespace texmesh {
 
 /// Part of the cache key: raised when equal inputs may give other bytes, as every k...Version is.
-inline constexpr int kConditionVersion = 2;
+inline constexpr int kConditionVersion = 3;
 
 enum class NormalsPolicy : std::uint8_t { kAuto, kKeep, kSmooth };
 template <>
@@ -19,7 +19,8 @@ struct ConditionOptions {
   NormalsPolicy normals = NormalsPolicy::kAuto;
   static void fields(auto& s, auto&& v) {
     v("weld_distance", s.weld_distance, Range{0, 0.001},
-      "positions closer than this fraction of the diagonal become one; 0 = only equal ones");
+      "positions closer than this fraction of the diagonal become one; 0 = equal ones, and those at open "
+      "edges that differ by rounding alone");
     v("normals", s.normals,
       "keep = as in the source; smooth = area-weighted where the source has none; auto = keep for glTF "
       "(flat without normals, as its specification says), smooth for other formats");
@@ -28,6 +29,8 @@ struct ConditionOptions {
 
 /// Cleans a mesh without changing what a viewer sees: every triangle that covers area keeps its three points
 /// and the attributes at its corners.
+/// - Positions at open edges that differ by the rounding of their source (Mesh::rounding) are one, as
+///   weld_rounded() says: chunks with origins or quantisations of their own stay together where they meet.
 /// - Positions, wedges and triangles stand in the order of the input; what a split adds comes last.
 /// - Triangles of opposite orientation on the same three points (two-sided sheets) are both kept and split
 ///   apart. So are triangles on the same three points with different attributes or materials (decals).

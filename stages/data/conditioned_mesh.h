@@ -17,6 +17,8 @@ std::vector<UvSets> uv_sets_of(const std::vector<Material>& materials);
 /// What condition found and changed. For a clean mesh all counts are 0 but the last three.
 struct ConditionReport {
   std::uint64_t welded_positions = 0, welded_wedges = 0, unused_positions = 0;
+  // Of the welded ones: those that differ by the rounding of their source.
+  std::uint64_t rounded_positions = 0;
   // Dropped: two corners are equal, or the triangle has no area and leaves no crack.
   std::uint64_t degenerate_triangles = 0;
   // Kept without an area, since its neighbours would gape without it.
@@ -31,9 +33,10 @@ struct ConditionReport {
   // Edges of one triangle and of more than two, between welded positions, before splits.
   std::uint64_t boundary_edges = 0, non_manifold_edges_found = 0;
   static void archive(auto& s, auto& a) {
-    a(s.welded_positions, s.welded_wedges, s.unused_positions, s.degenerate_triangles, s.slivers_kept,
-      s.duplicate_triangles, s.non_finite_triangles, s.repaired_wedges, s.split_non_manifold_edges,
-      s.split_bow_ties, s.components, s.boundary_edges, s.non_manifold_edges_found);
+    a(s.welded_positions, s.rounded_positions, s.welded_wedges, s.unused_positions, s.degenerate_triangles,
+      s.slivers_kept, s.duplicate_triangles, s.non_finite_triangles, s.repaired_wedges,
+      s.split_non_manifold_edges, s.split_bow_ties, s.components, s.boundary_edges,
+      s.non_manifold_edges_found);
   }
 };
 

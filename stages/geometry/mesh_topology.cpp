@@ -33,28 +33,34 @@ std::vector<std::uint32_t> weld_equal(const std::vector<Vec3f>& positions) {
   return weld;
 }
 
-/// A grid whose cells have the side of the weld distance: what a position can be welded with lies in the 27
-/// cells around it, and at most a handful of kept positions share a cell.
+/// Positions that were welded with one that is now welded itself go with it. Lower indices are right already.
+void follow(std::vector<std::uint32_t>& weld) {
+  for (std::uint32_t& w : weld)
+    if (w != kNoIndex) w = weld[w];
+}
+
+/// Points in cells of a side: all that lie within a side's length of a point in every coordinate stand in the
+/// 27 cells around it. Points are named by their number in `points`, and kept one by one.
 class WeldGrid {
  public:
   using Cell = std::array<std::int64_t, 3>;
-  WeldGrid(const std::vector<Vec3f>& positions, const std::vector<std::uint32_t>& weld, double side)
-      : positions_(positions), side_(side) {
-    for (std::uint32_t i = 0; i < positions.size(); ++i)
-      if (weld[i] == i) cells_.push_back(cell_of(i));
+  WeldGrid(std::vector<Vec3f> points, double side) : points_(std::move(points)), side_(side) {
+    for (std::uint32_t i = 0; i < points_.size(); ++i) cells_.push_back(cell_of(i));
     std::sort(cells_.begin(), cells_.end());
     cells_.erase(std::unique(cells_.begin(), cells_.end()), cells_.end());
     head_.assign(cells_.size(), kNoIndex);
-    next_.assign(positions.size(), kNoIndex);
+    next_.assign(points_.size(), kNoIndex);
   }
 
-  /// The lowest kept position within the side's length of position i.
-  std::uint32_t find(std::uint32_t i) const {
+  /// The lowest kept point j in the cells around point i with near(j); looks at kMostLooks of a row of three
+  /// cells at most, since strangers' points may all be in one.
+  template <class Near>
+  std::uint32_t find(std::uint32_t i, const Near& near) const {
     const Cell at = cell_of(i);
     std::uint32_t best = kNoIndex;
     for (std::int64_t dx = -1; dx <= 1; ++dx)
       for (std::int64_t dy = -1; dy <= 1; ++dy)
-        best = std::min(best, find_in_row({at[0] + dx, at[1] + dy, at[2] - 1}, i));
+        best = std::min(best, find_in_row({at[0] + dx, at[1] + dy, at[2] - 1}, near));
     return best;
   }
 
@@ -66,23 +72,26 @@ class WeldGrid {
   }
 
  private:
+  static constexpr int kMostLooks = 1000;
+
   Cell cell_of(std::uint32_t i) const {
     const auto index = [&](float x) { return static_cast<std::int64_t>(std::floor(x / side_)); };
-    return {index(positions_[i].x), index(positions_[i].y), index(positions_[i].z)};
+    return {index(points_[i].x), index(points_[i].y), index(points_[i].z)};
   }
 
-  std::uint32_t find_in_row(Cell first, std::uint32_t i) const {
+  template <class Near>
+  std::uint32_t find_in_row(Cell first, const Near& near) const {
     std::uint32_t best = kNoIndex;
-    const Vec3d p = to_double(positions_[i]);
+    int looks = 0;
     auto c = static_cast<std::size_t>(std::lower_bound(cells_.begin(), cells_.end(), first) - cells_.begin());
     for (; c < cells_.size() && cells_[c] <= Cell{first[0], first[1], first[2] + 2}; ++c)
-      for (std::uint32_t j = head_[c]; j != kNoIndex; j = next_[j])
-        if (length(to_double(positions_[j]) - p) <= side_) best = std::min(best, j);
+      for (std::uint32_t j = head_[c]; j != kNoIndex && looks < kMostLooks; j = next_[j], ++looks)
+        if (near(j)) best = std::min(best, j);
     return best;
   }
 
-  const std::vector<Vec3f>& positions_;
-  double side_;
+  const std::vector<Vec3f> points_;
+  const double side_;
   std::vector<Cell> cells_;
   std::vector<std::uint32_t> head_, next_;
 };
@@ -172,19 +181,62 @@ std::vector<std::uint32_t> weld_positions(const std::vector<Vec3f>& positions, d
   // Below 2^-40 of the coordinates cell numbers would lose their meaning, and a float holds 2^-24 of its
   // value anyway.
   if (!(distance > extent * 0x1p-40)) return weld;
-  WeldGrid grid(positions, weld, distance);
-  for (std::uint32_t i = 0; i < positions.size(); ++i) {
-    if (weld[i] == kNoIndex) continue;
-    if (weld[i] != i) {
-      weld[i] = weld[weld[i]];
-      continue;
+  std::vector<std::uint32_t> index;
+  std::vector<Vec3f> points;
+  for (std::uint32_t i = 0; i < positions.size(); ++i)
+    if (weld[i] == i) {
+      index.push_back(i);
+      points.push_back(positions[i]);
     }
-    if (const std::uint32_t kept = grid.find(i); kept != kNoIndex)
-      weld[i] = kept;
+  WeldGrid grid(points, distance);
+  for (std::uint32_t n = 0; n < points.size(); ++n) {
+    const auto near = [&](std::uint32_t m) {
+      return length(to_double(points[m]) - to_double(points[n])) <= distance;
+    };
+    if (const std::uint32_t kept = grid.find(n, near); kept != kNoIndex)
+      weld[index[n]] = index[kept];
     else
-      grid.keep(i);
+      grid.keep(n);
   }
+  follow(weld);
   return weld;
+}
+
+float float_unit(double magnitude) {
+  if (!(magnitude > 0) || !std::isfinite(magnitude)) return 0;
+  return std::ldexp(1.0f, std::max(std::ilogb(magnitude) - 23, -149));
+}
+
+std::uint64_t weld_rounded(const std::vector<Vec3f>& positions,
+                           const std::vector<RoundedPosition>& candidates, std::vector<std::uint32_t>& weld) {
+  constexpr double kUnits = 4, kOfEdge = 1 / 16.0;
+  std::vector<Vec3f> points;
+  double coarsest = 0;
+  for (const RoundedPosition& c : candidates) {
+    points.push_back(positions[c.index]);
+    coarsest = std::max(coarsest, double{c.rounding});
+  }
+  if (coarsest == 0) return 0;
+  WeldGrid grid(points, kUnits * coarsest);
+  std::uint64_t joined = 0;
+  for (std::uint32_t n = 0; n < candidates.size(); ++n) {
+    const RoundedPosition& a = candidates[n];
+    const auto near = [&](std::uint32_t m) {
+      const RoundedPosition& b = candidates[m];
+      const Vec3d d = to_double(points[m]) - to_double(points[n]);
+      return std::max({std::fabs(d.x), std::fabs(d.y), std::fabs(d.z)}) <=
+                 kUnits * std::max(a.rounding, b.rounding) &&
+             length(d) <= kOfEdge * std::min(a.shortest_edge, b.shortest_edge);
+    };
+    if (const std::uint32_t kept = grid.find(n, near); kept != kNoIndex) {
+      weld[a.index] = candidates[kept].index;
+      ++joined;
+    } else {
+      grid.keep(n);
+    }
+  }
+  follow(weld);
+  return joined;
 }
 
 std::vector<std::uint32_t> weld_wedges(const Mesh& mesh, const std::vector<std::uint32_t>& position_weld) {

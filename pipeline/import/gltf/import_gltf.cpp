@@ -9,6 +9,7 @@
 #include "pipeline/about/gltf_about.h"
 #include "pipeline/import/gltf/import_gltf_parts.h"
 #include "pipeline/import/text_scan.h"
+#include "stages/geometry/mesh_topology.h"
 
 namespace texmesh {
 namespace {
@@ -43,10 +44,19 @@ Vec3d operator*(const Affine& a, Vec3d p) {
   return r;
 }
 
+/// The largest sum of a row: how far a map without its translation takes a coordinate of 1 at most.
+double growth(const Affine& a) {
+  double most = 0;
+  for (int i = 0; i < 3; ++i)
+    most = std::max(most, std::fabs(a.at(i, 0)) + std::fabs(a.at(i, 1)) + std::fabs(a.at(i, 2)));
+  return most;
+}
+
 /// A node that shows a mesh, with its map to the scene's space.
 struct Instance {
   std::size_t node = 0, mesh = 0;
   Affine to_scene;
+  double rounding = 0;  // that of the translations on the way, as Mesh::rounding
 };
 
 Affine from_matrix(const Source& source, const std::vector<double>& v, const std::string& place) {
@@ -119,6 +129,7 @@ std::vector<Instance> find_instances(const Source& source, const tinygltf::Model
   struct Pending {
     int node;
     Affine to_scene;
+    double rounding = 0;
   };
   std::vector<Pending> stack;
   const std::vector<int> roots = scene_roots(source, model);
@@ -134,9 +145,13 @@ std::vector<Instance> find_instances(const Source& source, const tinygltf::Model
     }
     seen[n] = true;
     const tinygltf::Node& node = model.nodes[n];
-    const Affine to_scene = p.to_scene * local_map(source, node, n);
-    if (node.mesh >= 0) found.push_back({n, static_cast<std::size_t>(node.mesh), to_scene});
-    for (auto c = node.children.rbegin(); c != node.children.rend(); ++c) stack.push_back({*c, to_scene});
+    const Affine local = local_map(source, node, n), to_scene = p.to_scene * local;
+    const double shift =
+        std::max({std::fabs(local.at(0, 3)), std::fabs(local.at(1, 3)), std::fabs(local.at(2, 3))});
+    const double rounding = std::max(p.rounding, growth(p.to_scene) * float_unit(shift));
+    if (node.mesh >= 0) found.push_back({n, static_cast<std::size_t>(node.mesh), to_scene, rounding});
+    for (auto c = node.children.rbegin(); c != node.children.rend(); ++c)
+      stack.push_back({*c, to_scene, rounding});
   }
   return found;
 }
@@ -146,7 +161,7 @@ class Assembler {
  public:
   Assembler(const Source& source, Mesh& mesh, bool with_normals)
       : source_(source), mesh_(mesh), with_normals_(with_normals) {}
-  void add(const Primitive& primitive, const Affine& to_scene, std::uint16_t material, std::uint16_t part);
+  void add(const Primitive& primitive, const Instance& instance, std::uint16_t material, std::uint16_t part);
   void finish();
 
  private:
@@ -218,8 +233,9 @@ void Assembler::add_tangents(const Primitive& primitive, const Affine& to_scene,
   }
 }
 
-void Assembler::add(const Primitive& primitive, const Affine& to_scene, std::uint16_t material,
+void Assembler::add(const Primitive& primitive, const Instance& instance, std::uint16_t material,
                     std::uint16_t part) {
+  const Affine& to_scene = instance.to_scene;
   // glTF: without normals a primitive is flat. Where others have normals that means a wedge per corner.
   const bool flat = with_normals_ && primitive.normals.empty();
   check_room(primitive, flat ? primitive.triangles.size() * 3 : primitive.positions.size());
@@ -227,7 +243,15 @@ void Assembler::add(const Primitive& primitive, const Affine& to_scene, std::uin
   const double sign = normals.determinant < 0 ? -1 : 1;
   const auto first_position = static_cast<std::uint32_t>(positions_.size());
   const auto first_wedge = static_cast<std::uint32_t>(mesh_.wedge_count());
-  for (const Vec3f& p : primitive.positions) positions_.push_back(to_scene * to_double(p));
+  double magnitude = 0;
+  for (const Vec3f& p : primitive.positions) {
+    positions_.push_back(to_scene * to_double(p));
+    for (const float x : {p.x, p.y, p.z})
+      if (std::fabs(x) <= source_.largest_coordinate) magnitude = std::max(magnitude, std::fabs(double{x}));
+  }
+  const double unit =
+      growth(to_scene) * std::max(double{primitive.position_step}, double{float_unit(magnitude)});
+  mesh_.rounding.resize(positions_.size(), static_cast<float>(std::max(instance.rounding, unit)));
   for (std::uint32_t v = 0; v < primitive.positions.size() && !flat; ++v) {
     Vec3d n;
     if (with_normals_) {
@@ -462,7 +486,7 @@ void GltfReader::read() {
     });
     const std::uint16_t part = add_part(instance);
     for (std::size_t p = 0; p < declared.size(); ++p) {
-      assembler.add((*primitives)[p], instance.to_scene, materials.at(declared[p].material), part);
+      assembler.add((*primitives)[p], instance, materials.at(declared[p].material), part);
     }
   }
   assembler.finish();

@@ -245,6 +245,14 @@ const std::uint8_t* AccessorReader::element_at(std::size_t element) const {
   return base_ ? base_ + element * stride_ : nullptr;
 }
 
+float AccessorReader::step() const {
+  if (component_type_ == TINYGLTF_COMPONENT_TYPE_FLOAT) return 0;
+  if (!normalized_) return 1;
+  const bool is_signed =
+      component_type_ == TINYGLTF_COMPONENT_TYPE_BYTE || component_type_ == TINYGLTF_COMPONENT_TYPE_SHORT;
+  return 1.0f / static_cast<float>((std::uint64_t{1} << (8 * component_bytes_ - is_signed)) - 1);
+}
+
 void AccessorReader::read(std::size_t element, float* out) const {
   const std::uint8_t* at = element_at(element);
   for (int i = 0; i < components_; ++i) {

@@ -101,6 +101,8 @@ class AccessorReader {
   std::size_t zeros() const { return base_ ? 0 : count_ - sparse_indices_.size(); }
   int components() const { return components_; }
   int component_type() const { return component_type_; }
+  /// What two neighbouring values of an integer type differ by, as read() gives them; 0 for floats.
+  float step() const;
   /// components() floats; integers as they are, or normalised where the accessor says so.
   void read(std::size_t element, float* out) const;
   /// Integers count as normalised whatever the accessor says.
@@ -138,6 +140,7 @@ struct VertexData {
   std::size_t count = 0;
   ReadFloats position, normal, uv0, uv1, colour, tangent;
   int colour_components = 4;
+  float position_step = 0;             // of a grid that positions were rounded to; 0 = none
   std::vector<std::uint32_t> indices;  // empty with indexed == false
   bool indexed = false;
 };
@@ -152,6 +155,7 @@ VertexData decode_draco(const Source& source, const std::string& place, ByteSpan
 struct Primitive {
   std::vector<Triangle> triangles;
   std::vector<Vec3f> positions, normals;
+  float position_step = 0;  // as in VertexData
   std::vector<Vec2f> uv0, uv1;
   std::vector<Vec4f> colours, tangents;
 };

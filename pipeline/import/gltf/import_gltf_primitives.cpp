@@ -1,4 +1,5 @@
 // The triangles of a primitive and the vertices that they use: from accessors, or from a stream of Draco.
+#include <draco/attributes/attribute_quantization_transform.h>
 #include <draco/compression/decode.h>
 #include <tiny_gltf.h>
 
@@ -102,12 +103,14 @@ void check_header(const Source& source, const std::string& place, ByteSpan data)
   }
 }
 
-std::shared_ptr<const draco::Mesh> decode_mesh(const Source& source, const std::string& place,
-                                               ByteSpan data) {
+std::shared_ptr<draco::Mesh> decode_mesh(const Source& source, const std::string& place, ByteSpan data) {
   draco::DecoderBuffer buffer;
   buffer.Init(reinterpret_cast<const char*>(data.data()), data.size());
+  draco::Decoder decoder;
+  // Their grid is asked for: undo_quantization() does what the decoder leaves out.
+  decoder.SetSkipAttributeTransform(draco::GeometryAttribute::POSITION);
   try {
-    auto mesh = draco::Decoder().DecodeMeshFromBuffer(&buffer);
+    auto mesh = decoder.DecodeMeshFromBuffer(&buffer);
     if (!mesh.ok() || !mesh.value()) source.fail(place, "a Draco mesh", "damaged data");
     return std::move(mesh).value();
   } catch (const std::bad_alloc&) {
@@ -115,6 +118,28 @@ std::shared_ptr<const draco::Mesh> decode_mesh(const Source& source, const std::
   } catch (const std::length_error&) {
     source.fail(place, "a Draco mesh that fits the memory", "a larger one");
   }
+}
+
+/// Makes the positions floats again. The result is the step of the grid that they were rounded to, 0 where
+/// there was none.
+float undo_quantization(draco::Mesh& mesh) {
+  const int id = mesh.GetNamedAttributeId(draco::GeometryAttribute::POSITION);
+  draco::AttributeQuantizationTransform transform;
+  if (id < 0 || !transform.InitFromAttribute(*mesh.attribute(id))) return 0;
+  const draco::PointAttribute& grid = *mesh.attribute(id);
+  auto floats = std::make_unique<draco::PointAttribute>();
+  floats->Init(grid.attribute_type(), grid.num_components(), draco::DT_FLOAT32, false, grid.size());
+  floats->set_unique_id(grid.unique_id());
+  if (!transform.InverseTransformAttribute(grid, floats.get())) return 0;
+  if (grid.is_mapping_identity()) {
+    floats->SetIdentityMapping();
+  } else {
+    floats->SetExplicitMapping(grid.indices_map_size());
+    for (draco::PointIndex p(0); p < static_cast<std::uint32_t>(grid.indices_map_size()); ++p)
+      floats->SetPointMapEntry(p, grid.mapped_index(p));
+  }
+  mesh.SetAttribute(id, std::move(floats));
+  return transform.range() / static_cast<float>((1U << transform.quantization_bits()) - 1);
 }
 
 /// 0 for types that are never normalised.
@@ -176,8 +201,9 @@ VertexData decode_draco(const Source& source, const std::string& place, ByteSpan
                         const GltfJson& attributes,
                         const std::function<bool(const std::string& name)>& normalized) {
   check_header(source, place, data);
-  const std::shared_ptr<const draco::Mesh> mesh = decode_mesh(source, place, data);
+  const std::shared_ptr<draco::Mesh> mesh = decode_mesh(source, place, data);
   VertexData out;
+  out.position_step = undo_quantization(*mesh);
   out.count = mesh->num_points();
   out.indexed = true;
   if (out.count > static_cast<std::size_t>(source.options.max_vertices)) {
@@ -309,6 +335,7 @@ ReadFloats PrimitiveReader::attribute(const std::string& name, VertexData& data,
   if (name == "POSITION") {
     check_zeros(*reader, place);
     data.count = count;
+    data.position_step = reader->step();
     if (model_.accessors[index].minValues.size() != 3 || model_.accessors[index].maxValues.size() != 3) {
       source_.note_once(Severity::kWarning, "accessor-without-bounds", place, "POSITION has no min and max");
     }
@@ -467,6 +494,7 @@ Primitive PrimitiveReader::read() {
   const bool alpha = data.colour_components == 4;
   const auto colour = [alpha](const float* v) { return Vec4f{v[0], v[1], v[2], alpha ? v[3] : 1.0f}; };
   out.positions = gather<Vec3f>(used, data.position, vec3);
+  out.position_step = data.position_step;
   out.normals = gather<Vec3f>(used, data.normal, vec3);
   out.uv0 = gather<Vec2f>(used, data.uv0, vec2);
   out.uv1 = gather<Vec2f>(used, data.uv1, vec2);
