@@ -542,6 +542,12 @@ Notes describe(const ConditionReport& r) {
   return notes;
 }
 
+std::uint64_t count_welded(const std::vector<std::uint32_t>& weld) {
+  std::uint64_t welded = 0;
+  for (std::uint32_t i = 0; i < weld.size(); ++i) welded += weld[i] != kNoIndex && weld[i] != i;
+  return welded;
+}
+
 double diagonal(const std::vector<Vec3f>& positions) {
   Box3f box;
   for (const Vec3f p : positions)
@@ -603,10 +609,8 @@ ConditionedMesh condition_mesh(const Mesh& mesh, bool normals_by_specification,
                              (options.normals == NormalsPolicy::kAuto && !normals_by_specification));
   number_components(out);
 
-  for (std::uint32_t p = 0; p < position_weld.size(); ++p)
-    report.welded_positions += position_weld[p] != kNoIndex && position_weld[p] != p;
-  for (std::uint32_t w = 0; w < wedge_weld.size(); ++w)
-    report.welded_wedges += wedge_weld[w] != kNoIndex && wedge_weld[w] != w;
+  report.welded_positions = count_welded(position_weld);
+  report.welded_wedges = count_welded(wedge_weld);
   const std::size_t used = out.mesh.positions.size() - split.split_from.size();
   report.unused_positions = mesh.positions.size() - report.welded_positions - used;
   out.notes = describe(report);
