@@ -299,8 +299,7 @@ void add_prediction_study(Command& study) {
       "stand for them",
       "MODEL");
   c.option("--views", args.views, "Directions that are rendered").integer_in(1, 64).shows_default();
-  add_jobs_option(c, args.jobs);
-  c.flag("--json", args.json, "Print one JSON object");
+  add_jobs_and_json_options(c, args.jobs, args.json);
   c.examples(
       "  texmesh-lab study prediction turtle.texmesh --against turtle.glb --plans 20 --seed 7\n"
       "  texmesh-lab study prediction turtle.texmesh --against turtle.glb --budget 200kB --budget 1MB");
