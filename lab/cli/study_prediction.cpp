@@ -77,7 +77,7 @@ DeliveryPlan drawn_mix(PackageReader& package, SplitMix& random, DeliveryRequest
   return plan_of(package, request, request.scale, planes, rungs);
 }
 
-std::string name_of(DrawnKind kind) {
+std::string drawn_kind_name(DrawnKind kind) {
   return kind == DrawnKind::kBudget ? "budget" : kind == DrawnKind::kLink ? "link" : "mix";
 }
 
@@ -189,7 +189,7 @@ std::vector<Row> rows_of(const PredictionArguments& args, const std::string& pat
     }
   if (rows.empty())
     for (const DrawnPlan& drawn : draw_plans(package, args.plans, args.seed))
-      rows.push_back(measured(package, pictures, drawn, name_of(drawn.kind)));
+      rows.push_back(measured(package, pictures, drawn, drawn_kind_name(drawn.kind)));
   return rows;
 }
 
