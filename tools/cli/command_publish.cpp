@@ -413,8 +413,7 @@ void add_report_command(Command& app) {
   c.option("--max-flip-p95", args.options.limits.p95, "The same for the 95th percentile of a view's pixels")
       .number_in(0, 1)
       .shows_default();
-  add_jobs_option(c, args.jobs);
-  c.flag("--json", args.json, "Print one JSON object (schemas/report.v1.schema.json)");
+  add_jobs_and_json_options(c, args.jobs, args.json, "schemas/report.v1.schema.json");
   c.examples(
       "  texmesh report bust.texmesh -o report/\n"
       "  texmesh report bust.texmesh -o report/ --against bust.glb\n"
@@ -435,8 +434,7 @@ void add_export_command(Command& app) {
   add_package_argument(c, args.package, true).required();
   add_target_options(c, args);
   add_oembed_options(c, args);
-  add_jobs_option(c, args.jobs);
-  c.flag("--json", args.json, "Print one JSON object (schemas/export.v1.schema.json)");
+  add_jobs_and_json_options(c, args.jobs, args.json, "schemas/export.v1.schema.json");
   c.examples(
       "  texmesh export bust.texmesh --to 3dtiles -o tiles/\n"
       "  texmesh export bust.texmesh --to gltf-lod --bytes 2MB -o bust-lod/\n"

@@ -12,6 +12,7 @@
 #include "format/base/text_bytes.h"
 #include "format/model/material_extensions.h"
 #include "pipeline/import/gltf/import_gltf_parts.h"
+#include "pipeline/import/text_scan.h"
 #include "stages/gltf/glb_container.h"
 
 namespace texmesh {
@@ -23,10 +24,6 @@ std::uint32_t u32(ByteSpan bytes, std::size_t at) {
   std::uint32_t v = 0;
   std::memcpy(&v, bytes.data() + at, sizeof v);
   return v;
-}
-
-std::string_view text_of(ByteSpan bytes) {
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
 }  // namespace

@@ -381,7 +381,6 @@ std::string image_name(std::uint32_t image) { return std::to_string(image); }
 
 namespace {
 
-using Json = nlohmann::ordered_json;
 constexpr const char* kTransform = "KHR_texture_transform";
 
 /// Calls f with every reference to a texture of a material, extensions' among them.
