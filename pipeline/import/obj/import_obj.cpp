@@ -6,7 +6,7 @@
 #include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/named_files.h"
 #include "pipeline/import/obj/obj_material.h"
-#include "pipeline/import/seen_alpha.h"
+#include "pipeline/import/seen_texels.h"
 #include "pipeline/import/text_scan.h"
 
 // OBJ is read here and not by tinyobjloader 2.0rc10, which (measured on Debian 12) turns "nan", "inf" and

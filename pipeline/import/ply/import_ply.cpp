@@ -6,7 +6,7 @@
 #include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/named_files.h"
 #include "pipeline/import/ply/ply_reader.h"
-#include "pipeline/import/seen_alpha.h"
+#include "pipeline/import/seen_texels.h"
 
 // PLY has no specification of names beyond x, y, z. This is what MeshLab, CloudCompare, Metashape, Blender
 // and VTK write, and what is read here:

@@ -4,7 +4,7 @@
 #include "pipeline/import/import_images.h"
 #include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/range/range_scan_document.h"
-#include "pipeline/import/seen_alpha.h"
+#include "pipeline/import/seen_texels.h"
 #include "pipeline/import/text_scan.h"
 #include "stages/image/decode_image.h"
 

@@ -1,4 +1,4 @@
-#include "pipeline/import/seen_alpha.h"
+#include "pipeline/import/seen_texels.h"
 
 #include <cmath>
 
