@@ -58,8 +58,6 @@ struct PlySurface {
   std::string first_long_line;  // where it stands
 };
 
-constexpr std::size_t kMostLostKinds = 100;  // of what is lost
-
 double scale_of_type(PlyType type) {
   switch (type) {
     case PlyType::kFloat:
@@ -230,8 +228,9 @@ class SurfaceReader {
       const bool is_read =
           std::any_of(columns.begin(), columns.end(), is_column) ||
           (colours && std::any_of(colours->column.begin(), colours->column.end(), is_column));
-      if (!is_read && surface_.lost.size() < kMostLostKinds)
-        surface_.lost["values " + quote(element.properties[p].name) + " of " + element.name] += element.count;
+      if (!is_read)
+        count_lost(surface_.lost, "values " + quote(element.properties[p].name) + " of " + element.name,
+                   element.count);
     }
   }
 
@@ -240,8 +239,7 @@ class SurfaceReader {
   }
 
   void skip(const PlyElement& element) {
-    if (surface_.lost.size() < kMostLostKinds)
-      surface_.lost["elements " + quote(element.name)] += element.count;
+    count_lost(surface_.lost, "elements " + quote(element.name), element.count);
     for (std::uint64_t i = 0; i < element.count; ++i) {
       check_cancelled(i);
       rows_.next(row_);
