@@ -35,7 +35,7 @@ Vec3d choose_origin(const std::vector<Vec3d>& positions, double largest) {
 /// The unit of the last decimal, where the coordinates are those of a text with few decimals; 0 where they
 /// are not, and where so few digits are no rounding but the design.
 double decimal_step(const std::vector<Vec3d>& positions, double magnitude) {
-  constexpr int kMostDecimals = 8;
+  constexpr int kLeastDecimals = 3, kMostDecimals = 8;
   constexpr std::size_t kLooks = 4096;
   constexpr double kLeastUnits = 1e4;  // five digits
   const std::size_t stride = positions.size() / kLooks + 1;
@@ -49,7 +49,7 @@ double decimal_step(const std::vector<Vec3d>& positions, double magnitude) {
         ++decimals, unit /= 10, units *= 10;
       if (decimals > kMostDecimals) return 0;
     }
-  return magnitude * units >= kLeastUnits ? unit : 0;
+  return decimals >= kLeastDecimals && magnitude * units >= kLeastUnits ? unit : 0;
 }
 
 }  // namespace

@@ -111,7 +111,7 @@ void add_names(std::vector<Case>& all) {
   with_mtl("mtl-folder", "up from the library", "mats/m.mtl", "..\\t.png", "t.png", "");
   with_mtl("mtl-folder", "two folders down", "a/b/m.mtl", "../t.png", "a/t.png", "");
   for (const std::string written :
-       {"C:\\Users\\x\\Scans\\t.png", "/home/user/t.png", "../t.png", "file:///home/user/t.png",
+       {"C:\\Users\\x\\Scans\\t.png", "/data/x/t.png", "../t.png", "file:///data/x/t.png",
         "\\\\server\\share\\t.png", "http://host/t.png"}) {
     with_mtl("absolute-name", "MTL " + written, "m.mtl", written, "t.png", "outside-name");
     all.push_back({"absolute-name",

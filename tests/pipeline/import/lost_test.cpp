@@ -286,6 +286,8 @@ TEST(ForeignFile, IsNamedWhateverItsNameSays) {
     EXPECT_NE(
         testing::input_error([&] { import("m.gltf", testing::quad().gltf("b.bin"), files); }).find(what),
         std::string::npos);
+    const Bytes scan = bytes_of(R"({"version":1,"type":"cylindrical-range-scan","y_step":1,"grid":"b.bin"})");
+    EXPECT_NE(testing::input_error([&] { import("m.json", scan, files); }).find(what), std::string::npos);
   }
   EXPECT_NE(
       testing::input_error([] { import("m.obj", "v 0 0 0\nv 1 0 0\n"); }).find("point cloud of 2 points"),

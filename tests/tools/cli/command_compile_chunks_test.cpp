@@ -26,6 +26,7 @@ class Chunks : public ::testing::Test {
         run_command({TEXMESH_BINARY, "compile", folder_ / model, "-o", package_, "--no-cache", "--profile",
                      folder_ / "profile.json", "--proxies.mode", "always", "--proxies.sizes", "12000"});
     EXPECT_EQ(made.exit_code, 0) << made.output << made.errors;
+    EXPECT_EQ(made.output.find("rounded-position") != std::string::npos, model != "exact.glb") << made.output;
     const CommandResult dumped = run_command({TEXMESH_BINARY, "dump", package_, "--json"});
     return nlohmann::json::parse(dumped.output);
   }

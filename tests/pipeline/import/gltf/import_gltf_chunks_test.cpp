@@ -70,7 +70,12 @@ TEST(ImportGltfChunksTest, WhatIsNoRoundingStaysApart) {
   EXPECT_EQ(condition_mesh(thin, true, {}, RunContext{}).component_count, 1u);
   thin.rounding = {.012f};
   EXPECT_EQ(condition_mesh(thin, true, {}, RunContext{}).component_count, 2u) << "over four units";
-  // Numbers of few digits are design: sheets of a box that was typed in.
+  // Numbers of few digits or decimals are design.
+  EXPECT_EQ(
+      conditioned("box.obj", testing::bytes_of("v 0 0 0\nv 20000 0 0\nv 0 20000 0\nv 0 0 1\nv 20000 0 1\n"
+                                               "v 0 20000 1\nf 1 2 3\nf 4 5 6\n"))
+          .component_count,
+      2u);
   EXPECT_EQ(conditioned("box.obj", testing::bytes_of("v 0 0 0\nv 2.5 0 0\nv 0 2.5 0\nv 0 0 0.1\nv 2.5 0 0.1\n"
                                                      "v 0 2.5 0.1\nf 1 2 3\nf 4 5 6\n"))
                 .component_count,
