@@ -148,9 +148,11 @@ void Progress::show(std::size_t, const CacheTold& e) {
 }
 
 void Progress::show(std::size_t, const NoteTold& e) {
+  static constexpr const char* kRoundedNote = "rounded-position";  // of condition: the surface has changed
   const bool warns = e.note.severity == Severity::kWarning;
-  const bool lost = e.note.code == kLostNote && mode_ != OutputMode::kQuiet;
-  if (warns || lost || verbose_)
+  const bool always =
+      (e.note.code == kLostNote || e.note.code == kRoundedNote) && mode_ != OutputMode::kQuiet;
+  if (warns || always || verbose_)
     line(fmt::format("{}: {}: {}", e.model, warns ? "warning" : "note", sentence(e.note)));
 }
 

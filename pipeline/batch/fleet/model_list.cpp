@@ -112,9 +112,7 @@ class ListedFiles {
   }
 
   void add_maps(const MtlMaterial& m, const std::string& said_in) {
-    for (const auto* map :
-         {&m.map_kd, &m.map_ka, &m.map_ke, &m.map_d, &m.map_pr, &m.map_pm, &m.bump, &m.norm})
-      if (*map) add({(*map)->file, said_in, false});
+    for_each_map(m, [&](const std::string& file) { add({file, said_in, false}); });
   }
 
   void look_at_ply() {

@@ -6,6 +6,7 @@
 #include "pipeline/import/gltf/import_gltf_parts.h"
 #include "pipeline/import/import_images.h"
 #include "pipeline/import/material_images.h"
+#include "pipeline/import/text_scan.h"
 #include "pipeline/io/uri.h"
 
 namespace texmesh {
@@ -272,12 +273,8 @@ void MaterialReader::read_extensions(const GltfJson& material, const std::string
     const std::string textures = texture_names(value);
     const std::string text =
         name + " is left out" + (textures.empty() ? "" : ", and with it the textures " + textures);
-    const bool is_noted = std::any_of(source_.notes.begin(), source_.notes.end(), [&](const Note& n) {
-      return n.code == "unknown-extension" && n.text == text;
-    });
-    if (!is_noted)
-      source_.notes.push_back(
-          {textures.empty() ? Severity::kInfo : Severity::kWarning, "unknown-extension", place, text});
+    add_once(source_.notes, textures.empty() ? Severity::kInfo : Severity::kWarning, "unknown-extension",
+             place, text);
   }
 }
 
