@@ -353,23 +353,27 @@ void write_gltf_about(const About& about, Ordered& root) {
   root["extensionsUsed"] = used;
 }
 
-About about_within(const About& about, std::uint64_t bytes) {
-  const auto fits = [bytes](const About& candidate) {
-    Ordered root = Ordered::object();
-    write_gltf_about(candidate, root);
-    return root.dump().size() <= bytes;
-  };
-  if (fits(about)) return about;
+std::vector<About> about_choices(const About& about) {
   About fields = about;
   fields.source.clear();
-  if (fits(fields)) return fields;
   About least;
   least.title = about.title;
   least.creator = about.creator;
   least.attribution = about.attribution;
   least.licence = about.licence;
   least.licence_url = about.licence_url;
-  return least;
+  return {about, std::move(fields), std::move(least)};
+}
+
+About about_within(const About& about, std::uint64_t bytes) {
+  std::vector<About> choices = about_choices(about);
+  const auto fits = [bytes](const About& choice) {
+    Ordered root = Ordered::object();
+    write_gltf_about(choice, root);
+    return root.dump().size() <= bytes;
+  };
+  const auto found = std::ranges::find_if(choices, fits);
+  return found == choices.end() ? std::move(choices.back()) : std::move(*found);
 }
 
 }  // namespace texmesh

@@ -114,8 +114,9 @@ void check_for_target(const ExportOptions& o) {
   if (o.plain && (o.target == ExportTarget::kGltfLod || o.target == ExportTarget::kOembed))
     refuse("--plain", "--to 3dtiles or model-viewer");
   if (o.plain && o.bytes > 0) throw UsageError("--plain", "", "no --bytes", std::to_string(o.bytes));
-  if (o.display_px > 0 && o.target == ExportTarget::kOembed)
-    refuse("--display", "a target that holds a model");
+  for (const auto& [option, given] :
+       {std::pair{"--display", o.display_px > 0}, {"--keep-units", o.keep_units}})
+    if (given && o.target == ExportTarget::kOembed) refuse(option, "a target that holds a model");
   if (o.target == ExportTarget::kOembed) {
     if (!is_web_url(o.url))
       throw UsageError("--url", "", "the http or https URL of the folder, for --to oembed", o.url);
@@ -154,6 +155,13 @@ int run_export(const ExportArguments& args) {
   return kExitOk;
 }
 
+/// What extract and export say of lengths.
+void add_keep_units_flag(Command& c, bool& keep_units) {
+  c.flag(
+      "--keep-units", keep_units,
+      "Lengths in the source's unit; default: in metres, as glTF has them, where the package knows the unit");
+}
+
 void add_target_options(Command& c, ExportArguments& args) {
   c.choice("--to", args.options.target,
            "The form: 3dtiles = a tileset of 3D Tiles 1.1 for CesiumJS and its like; gltf-lod = one GLB with "
@@ -179,6 +187,7 @@ void add_target_options(Command& c, ExportArguments& args) {
            "PX")
       .number_in(0.1, 1000)
       .shows_default();
+  add_keep_units_flag(c, args.options.keep_units);
   c.option("--script", args.options.script,
            "model-viewer: URL of its script, as the page names it; default: a version of it from jsDelivr, "
            "with its digest",
@@ -236,7 +245,7 @@ struct ExtractArguments {
   std::optional<int> scale, proxy;
   double display_px = 0;
   int jobs = 0;
-  bool recentre = false, levels = false, plain = false, json = false;
+  bool recentre = false, keep_units = false, levels = false, plain = false, json = false;
 };
 
 std::uint32_t rung_of(const std::string& text, const std::string& flag) {
@@ -271,12 +280,12 @@ std::string output_for(const std::string& output, const AskedBytes& asked) {
 ExtractRequest request_of(const ExtractArguments& a) {
   if (a.plain && a.images == ExtractImages::kWebp)
     throw UsageError("--plain", "", "--image-format jpeg or png", "webp");
-  if (a.proxy) return {ExtractProxy{static_cast<std::uint32_t>(*a.proxy), a.plain}, a.recentre};
+  if (a.proxy) return {ExtractProxy{static_cast<std::uint32_t>(*a.proxy), a.plain}, a.recentre, a.keep_units};
   if (a.bytes.empty()) {
     const auto form = a.plain    ? ExtractScale::Form::kPlain
                       : a.levels ? ExtractScale::Form::kLevels
                                  : ExtractScale::Form::kCoded;
-    return {ExtractScale{a.scale, a.rung, a.display_px, a.images, form}, a.recentre};
+    return {ExtractScale{a.scale, a.rung, a.display_px, a.images, form}, a.recentre, a.keep_units};
   }
   ExtractBudget budget;
   for (const AskedBytes& one : a.bytes) budget.bytes.push_back(one.bytes);
@@ -284,7 +293,7 @@ ExtractRequest request_of(const ExtractArguments& a) {
   if (a.display_px > 0) budget.display_px = a.display_px;
   budget.images = a.images;
   budget.levels = a.levels;
-  return {budget, a.recentre};
+  return {budget, a.recentre, a.keep_units};
 }
 
 void write_extracted(const ExtractArguments& args, Extracted& extracted, const std::string& output) {
@@ -360,8 +369,8 @@ void add_extract_options(Command& c, ExtractArguments& args) {
        "glTF 2.0 alone, such as Debian 12's Blender and F3D")
       .excludes(bytes)
       .excludes(lods);
-  c.flag("--recentre", args.recentre,
-         "Leave the model near 0, in the frame of the package's meshes; default: where the source has it");
+  c.flag("--recentre", args.recentre, "Leave the model near 0; default: where the source has it");
+  add_keep_units_flag(c, args.keep_units);
   add_jobs_option(c, args.jobs);
   c.flag(
       "--json", args.json,
@@ -443,9 +452,8 @@ void add_export_command(Command& app) {
   c.notes(
       "3dtiles: each level is the output of texmesh extract --display for 4096, 2048, ... 32 px. The "
       "coarsest level is outermost. Levels that save less than a quarter of the bytes are left out. A "
-      "viewer whose limit is --screen-error takes the next level at that height. Where the unit is known "
-      "(texmesh dump PKG about) tiles are in metres, else in the "
-      "object's unit. The object stands where its source has it; nothing puts it on the globe.\n"
+      "viewer whose limit is --screen-error takes the next level at that height. The object stands where "
+      "its source has it; nothing puts it on the globe.\n"
       "gltf-lod: all major scales from the finest on; levels share materials and textures.\n"
       "model-viewer: index.html, model.glb and the poster. Draco meshes make the script fetch a decoder from "
       "gstatic.com; with --plain it needs none.\n"

@@ -15,9 +15,6 @@ struct EnumNames<ExtractImages> {
   static constexpr std::array<std::string_view, 4> names{"auto", "jpeg", "webp", "png"};
 };
 
-/// Of a file of so many bytes, one in this many may say what the object is (about_within()).
-inline constexpr std::uint64_t kAboutShare = 20;
-
 /// A scale with whole textures.
 struct ExtractScale {
   /// kCoded: meshes as the package codes them. kPlain: without extensions that compress (plain_file()).
@@ -28,7 +25,6 @@ struct ExtractScale {
   double display_px = 0;           // displayed height, device px; 0 = not said
   ExtractImages images = ExtractImages::kAuto;
   Form form = Form::kCoded;
-  bool metres = false;  // lengths in metres where the object unit is known, by a node that scales
 };
 
 /// The best-looking files of at most so many bytes.
@@ -48,7 +44,8 @@ struct ExtractProxy {
 
 struct ExtractRequest {
   std::variant<ExtractScale, ExtractBudget, ExtractProxy> file;
-  bool recentre = false;  // the frame of the package's meshes instead of the source's coordinates
+  bool recentre = false;    // near 0 instead of the source's coordinates
+  bool keep_units = false;  // lengths in object units, also where their metres are known
 };
 
 inline constexpr double kMostGlbBytes = 4294967295;

@@ -154,6 +154,7 @@ ModelList list_collection(const PlanRequest& request, int shards) {
   ModelList list;
   list.shards = shards;
   list.collections = plan.files;
+  list.stale = plan.stale;
   const ShardSplit split = split_plan(plan, request, shards);
   list.collection = shards > 1 ? split.collection : "";
   for (std::size_t i = 0; i < plan.models.size(); ++i) {

@@ -72,7 +72,7 @@ const MeshCandidate& Candidates::mesh(const MeshKey& key) {
   if (reference_.wishes.levels) file->begin_levels(screen_coverage_of(m, c.scale));
   for (std::size_t l = 1; l < c.levels.size(); ++l)
     file->add_level(*recoded_scale(c.levels[l], key), screen_coverage_of(m, c.levels[l]));
-  if (!reference_.recentre) file->move_to(m.origin);
+  file->place(reference_.place);
   c.file = std::move(file);
   const LitViews windows(*c.lit, reference_.windows, reference_.context);
   c.geometry = reference_.window_meter->difference(windows, reference_.best_textures, reference_.context);

@@ -270,13 +270,18 @@ void StandaloneGlb::add_level(StandaloneGlb coarser, double screen_coverage) {
   root_["nodes"].push_back(level);
 }
 
-void StandaloneGlb::move_to(Vec3d translation, double scale) {
-  if (translation == Vec3d{} && scale == 1) return;
+void StandaloneGlb::place(const OutputTransform& transform) {
+  if (transform.changes_nothing()) return;
   const std::size_t scene = number(root_, "scene");
   Json& nodes = root_["scenes"].at(scene)["nodes"];
-  const Vec3d to = translation * scale;
-  Json parent{{"name", "origin"}, {"translation", {to.x, to.y, to.z}}};
-  if (scale != 1) parent["scale"] = {scale, scale, scale};
+  Json parent{{"name", "origin"}};
+  if (transform.turns()) {
+    parent["matrix"] = transform.matrix();  // exact, which a quaternion of a quarter is not
+  } else {
+    const Vec3d to = transform(Vec3d{});
+    parent["translation"] = {to.x, to.y, to.z};
+    if (transform.scale != 1) parent["scale"] = {transform.scale, transform.scale, transform.scale};
+  }
   parent["children"] = nodes;
   nodes = Json::array({root_["nodes"].size()});
   root_["nodes"].push_back(parent);
@@ -315,6 +320,24 @@ Bytes StandaloneGlb::finish() const {
 
   if (about_) write_gltf_about(*about_, root);  // last: values of strangers must not be taken for indices
   return glb_container(root.dump(-1, ' ', false, Json::error_handler_t::replace), binary);
+}
+
+About reserved_about(const About& about, const OutputTransform& transform, std::uint64_t bytes) {
+  constexpr std::uint64_t kShare = 20;
+  return about_within(transformed_about(about, transform), bytes / kShare);
+}
+
+bool add_words(Bytes& glb, const About& about, std::uint64_t bytes) {
+  for (const About& choice : about_choices(about)) {
+    GlbParts parts = read_glb(glb, "file");
+    write_gltf_about(choice, parts.root);
+    Bytes file = glb_container(parts.root.dump(-1, ' ', false, Json::error_handler_t::replace), parts.binary);
+    if (file.size() < glb.size()) return false;  // it has these words already, and more
+    if (file.size() > bytes) continue;
+    glb = std::move(file);
+    return choice == about;
+  }
+  return false;
 }
 
 namespace {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "format/rules/output_transform.h"
 #include "stages/gltf/check_glb.h"
 #include "stages/gltf/draco_mesh.h"
 #include "stages/gltf/glb_container.h"
@@ -39,10 +40,9 @@ class StandaloneGlb {
   /// level is shown (extras.MSFT_screencoverage).
   void add_level(StandaloneGlb coarser, double screen_coverage);
 
-  /// Makes the nodes of the scene the children of one node that moves them by `translation`, object units,
-  /// and then makes all lengths `scale` times as long. Positions stay as they are. Nothing happens for {0, 0,
-  /// 0} and 1. After all levels of detail.
-  void move_to(Vec3d translation, double scale = 1);
+  /// Makes the nodes of the scene the children of one node that places them. Positions stay as they are.
+  /// Nothing happens where the transform changes nothing. After all levels of detail.
+  void place(const OutputTransform& transform);
 
   /// What finish() writes of the object: asset.copyright, asset.extras, KHR_xmp_json_ld (write_gltf_about()).
   void set_about(const About& about);
@@ -67,6 +67,13 @@ class StandaloneGlb {
   std::uint64_t fallback_bytes_ = 0;
   std::size_t level_node_ = 0;
 };
+
+/// What a file of at most `bytes` says of the object before its picture is chosen: all of it where that takes
+/// a twentieth of the bytes, else less (about_choices()). What is left over after the picture takes the rest
+/// (add_words()).
+About reserved_about(const About& about, const OutputTransform& transform, std::uint64_t bytes);
+/// Puts the most words about the object into a finished file that `bytes` hold. False where some do not fit.
+bool add_words(std::vector<std::uint8_t>& glb, const About& about, std::uint64_t bytes);
 
 /// The normals of a scale that the vertex-split stream alone has. kFitted: so that it is lit as S_0 is, which
 /// takes the whole stream. kStreamed: S_0's, as the stream's prefix of the scale has them.
@@ -99,7 +106,7 @@ bool bake_texture_scale(nlohmann::ordered_json& root, Mesh& mesh);
 /// KHR_draco_mesh_compression, EXT_meshopt_compression and KHR_mesh_quantization, PNG instead of WebP,
 /// no KHR_texture_transform where it is one scale. Parts
 /// and materials stay; tangents go, and the feature ids of merged parts. Of a file without levels of detail
-/// and before move_to(). Same bytes for any thread count.
+/// and before place(). Same bytes for any thread count.
 StandaloneGlb plain_file(const StandaloneGlb& file, const std::string& entry, const RunContext& context);
 
 }  // namespace texmesh

@@ -337,8 +337,7 @@ class ProxySearch {
   void run() {
     const auto count = static_cast<std::uint32_t>(reference_.package.manifest().proxies.size());
     for (std::uint32_t k = 0; k < count; ++k) {
-      Extracted whole =
-          extract_proxy(reference_.package, {k}, reference_.recentre, reference_.context, bytes_);
+      Extracted whole = extract_proxy(reference_.package, {k}, reference_.place, reference_.context, bytes_);
       measure_whole(k, whole);
       if (!is_wanted_kind(k))
         offer_smaller(k, whole);
@@ -501,8 +500,8 @@ class ProxySearch {
   /// the file too large; then it is not looked at.
   bool make(const ProxyParts& parts, const ProxyTrial& trial, Extracted& out) {
     StandaloneGlb draft = coded(parts, trial), whole = draft;
-    if (!reference_.recentre) whole.move_to(reference_.package.manifest().origin);
-    whole.set_about(about_within(reference_.package.about(), bytes_ / kAboutShare));
+    whole.place(reference_.place);
+    whole.set_about(reserved_about(reference_.package.about(), reference_.place, bytes_));
     std::vector<ProxyMap> maps = parts.maps(trial.maps);
     for (ProxyMap& map : maps) map.pixels = smaller_map(map, trial.share);
     std::map<double, Bytes> files;
@@ -532,15 +531,15 @@ class ProxySearch {
 
 }  // namespace
 
-Extracted extract_proxy(PackageReader& package, const ExtractProxy& wishes, bool recentre,
+Extracted extract_proxy(PackageReader& package, const ExtractProxy& wishes, const OutputTransform& place,
                         const RunContext& context, std::uint64_t asked_bytes) {
   const Manifest& m = package.manifest();
   const Bytes glb = package.proxy_glb(wishes.proxy);  // refuses a proxy that is not there
   StandaloneGlb file(glb, proxy_path(wishes.proxy), GlbRules::kStandalone);
   if (wishes.plain) file = plain_file(file, proxy_path(wishes.proxy), context);
-  if (!recentre) file.move_to(m.origin);
-  file.set_about(asked_bytes > 0 ? about_within(package.about(), asked_bytes / kAboutShare)
-                                 : package.about());
+  file.place(place);
+  file.set_about(asked_bytes > 0 ? reserved_about(package.about(), place, asked_bytes)
+                                 : transformed_about(package.about(), place));
   Extracted out;
   out.scale = m.scales.back().scale;
   out.levels = {out.scale};

@@ -21,6 +21,7 @@ struct ExportOptions {
   double display_px = 0;    // nothing finer than this displayed height needs; 0 = the target's own default
   std::uint64_t bytes = 0;  // most bytes of the GLB, of gltf-lod and model-viewer; 0 = no limit
   bool plain = false;       // no extension that compresses; not of gltf-lod
+  bool keep_units = false;  // lengths in object units, also where their metres are known
   double screen_error_px = 16;  // 3dtiles: the error at which its viewer takes the next level
   std::string url;              // oembed: where the folder will stand, ends with a slash
   std::string provider;         // oembed; "" = the host of `url`
