@@ -4,9 +4,9 @@
 #include <fstream>
 #include <unordered_map>
 
-#include "format/base/errors.h"
 #include "format/base/text_bytes.h"
 #include "pipeline/io/atomic_file.h"
+#include "pipeline/io/resolver.h"
 
 namespace texmesh {
 namespace fs = std::filesystem;
