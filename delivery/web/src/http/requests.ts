@@ -64,9 +64,11 @@ export interface Answer {
   url: string;
   /** Strong ETag; '' = none. */
   etag: string;
+  /** Content-Type; '' = not said. */
+  type: string;
   /** Content-Length of a whole file; -1 = not said. */
   length: number;
-  /** Content-Range, when that header may be read: first and last byte, bytes of the file. */
+  /** Content-Range, when that header may be read: first and last byte, bytes of the file (-1 = not said). */
   range?: number[];
   /** The body ended as it should. */
   complete: boolean;
@@ -87,8 +89,9 @@ export interface GetOptions {
 
 /** First and last byte, bytes of the file, from a Content-Range; undefined where the text is none. */
 export function contentRange(text: string): Answer['range'] {
-  const said = /^bytes (\d{1,15})-(\d{1,15})\/(\d{1,16})$/.exec(text)?.slice(1).map(Number);
-  return said && said[0] <= said[1] && said[1] < said[2] ? said : undefined;
+  const said = /^bytes (\d{1,15})-(\d{1,15})\/(\d{1,16}|\*)$/.exec(text)?.slice(1)
+    .map((n) => (n === '*' ? -1 : Number(n)));
+  return said && said[0] <= said[1] && (said[2] < 0 || said[1] < said[2]) ? said : undefined;
 }
 
 /** Whether an answer is of the file with this ETag ('' = none) and length (-1 = unknown), if known. */
@@ -111,5 +114,11 @@ export function isForGood(error: unknown): boolean {
 
 /** An answer's problem or status, for messages. */
 export function whatCame(a: Answer): string {
-  return a.problem || (a.status > 0 ? `status ${a.status}` : 'no answer');
+  return a.problem || (a.status > 0 ? `status ${a.status}${a.type && ` (${a.type})`}` : 'no answer');
+}
+
+/** Refuses a page for people, as of a login or of an unknown address, in the place of a file. */
+export function requireFile(a: Answer): void {
+  if (a.type.startsWith('text/html') && /^\s*</.test(String.fromCharCode(...a.body.subarray(0, 99))))
+    throw new FormatError(shownUrl(a.url), '', 'a file of a package', `a page, ${whatCame(a)}`);
 }

@@ -5,7 +5,7 @@ import { bootstrapBytes } from '../format/layout';
 import { ByteRange, manifestOfContainer } from '../format/manifest';
 import type { HttpClient } from './client';
 import { Asking, Mirror, Mirrors, retriesOf } from './mirrors';
-import { GetOptions, shownUrl, whatCame } from './requests';
+import { GetOptions, requireFile, shownUrl, whatCame } from './requests';
 import type { OpenedStore, PackageStore, Place, ReadOptions } from './store';
 
 // For servers that know no ranges, and for containers in memory; loaded with the first of them.
@@ -16,6 +16,7 @@ async function getWhole(client: HttpClient, url: string, how: GetOptions,
   const mayTryAgain = retriesOf(client, how.signal);
   for (;;) {
     const a = await client.get(url, how);
+    if (a.status === 200 || a.tooLong) requireFile(a);
     if (a.status === 200 && a.complete) return a.body;
     if (a.tooLong) throw new InputError(shownUrl(url), '', `at most ${how.maxBytes} bytes`, 'more');
     if (othersLeft || !(await mayTryAgain(a))) throw new InputError(shownUrl(url), '', 'a file', whatCame(a));
@@ -89,7 +90,7 @@ export class TreeStore implements PackageStore {
         return got;
       } catch (error) {
         // Extra files need not exist.
-        if (!how.verify && error instanceof InputError && /^status 40[34]$/.test(error.found))
+        if (!how.verify && error instanceof InputError && /^status 40[34]\b/.test(error.found))
           return undefined;
         throw error;
       }
