@@ -17,7 +17,7 @@ describe('hostile answers', () => {
     for (const ranges of [true, false]) {
       const error = await rejection(openAt(fakeServer({}, { ranges, fault: () => 'page' })));
       expect(error.message).toContain('a page, status 200 (text/html; charset=utf-8)');
-      expect(error.message).toContain('http://host/a/scan.texmesh');
+      expect(error.message).toContain('http://host/a/scan');
     }
   });
   it('mode files wants a URL that has a tree', async () => {
