@@ -2,6 +2,8 @@
 
 #include <charconv>
 
+#include "format/model/material_extensions.h"
+#include "format/model/tangents.h"
 #include "format/split/split_element_codec.h"
 #include "format/split/split_reader.h"
 #include "pipeline/about/gltf_about.h"
@@ -33,6 +35,20 @@ void for_each_key(Json& json, const char* key, const F& f) {
       else
         for_each_key(*it, key, f);
     }
+}
+
+/// As tangent_texcoord() has it for a Material.
+int tangent_texcoord_of(const Json& material) {
+  const auto set = [](const Json& reference) { return static_cast<int>(number(reference, "texCoord")); };
+  if (material.contains("normalTexture")) return set(material["normalTexture"]);
+  if (!material.contains("extensions")) return -1;
+  for (const auto& [name, extension] : material["extensions"].items()) {
+    const MaterialExtensionKind* kind = find_material_extension(name);
+    if (!kind || !extension.is_object()) continue;
+    for (const auto& [key, reference] : extension.items())
+      if (const ExtensionTextureKind* k = kind->texture(key); k && k->tangent_space) return set(reference);
+  }
+  return -1;
 }
 
 /// "texture/<number>", nothing else.
@@ -120,6 +136,18 @@ std::map<std::uint32_t, FileImageData> StandaloneGlb::images() const {
     const FileImage format = image.value("mimeType", "") == "image/png" ? FileImage::kPng : FileImage::kJpeg;
     out[source] = {format, views_.at(number(image, "bufferView")).bytes};
   }
+  return out;
+}
+
+std::vector<int> StandaloneGlb::tangent_texcoords() const {
+  std::vector<int> out;
+  bool tangents = false;
+  for (const Json& mesh : root_.value("meshes", Json::array()))
+    for (const Json& primitive : mesh.value("primitives", Json::array()))
+      tangents =
+          tangents || (primitive.contains("attributes") && primitive["attributes"].contains("TANGENT"));
+  for (const Json& material : root_.value("materials", Json::array()))
+    out.push_back(tangents ? tangent_texcoord_of(material) : -1);
   return out;
 }
 
@@ -360,6 +388,7 @@ StandaloneGlb scale_file(PackageReader& package, int scale, const RunContext& co
   SplitStreamReader reader(read_split_head(stream));
   Mesh mesh = mesh_at(reader, scale, stream);
   if (fitted) fit_to_finest(mesh_at(reader, 0, stream), mesh, context);
+  make_tangents(mesh, first.tangent_texcoords());
   ScalesOptions options;
   options.mesh_codec = first.codec();
   first.take_meshes({write_streamed_scale(mesh, reader.head(), options), mesh_path(scale)});
