@@ -18,7 +18,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 constexpr const char* kDraco = "KHR_draco_mesh_compression";
 constexpr const char* kMeshopt = "EXT_meshopt_compression";
-constexpr const char* kWebp = "EXT_texture_webp";
+constexpr const char* kTextureExtensions[] = {"EXT_texture_webp", "EXT_texture_avif"};
 constexpr const char* kLod = "MSFT_lod";
 
 std::size_t number(const Json& object, const char* key) {
@@ -35,6 +35,12 @@ void for_each_key(Json& json, const char* key, const F& f) {
       else
         for_each_key(*it, key, f);
     }
+}
+
+/// What a texture with an image of this type needs; null for those of glTF 2.0 itself.
+const char* texture_extension(std::string_view mime_type) {
+  if (mime_type == "image/webp") return kTextureExtensions[0];
+  return mime_type == "image/avif" ? kTextureExtensions[1] : nullptr;
 }
 
 /// As tangent_texcoord() has it for a Material.
@@ -163,8 +169,8 @@ MeshCodec StandaloneGlb::codec() const {
 
 void StandaloneGlb::set_images(const std::map<std::uint32_t, FileImageData>& images) {
   if (!root_.contains("images")) return;
-  std::vector<bool> webp(root_["images"].size());
-  for (std::size_t k = 0; k < webp.size(); ++k) {
+  std::vector<const char*> extension(root_["images"].size());
+  for (std::size_t k = 0; k < extension.size(); ++k) {
     Json& image = root_["images"][k];
     std::uint32_t source = 0;
     const auto found = source_image_of(image, source) ? images.find(source) : images.end();
@@ -173,24 +179,28 @@ void StandaloneGlb::set_images(const std::map<std::uint32_t, FileImageData>& ima
       image["bufferView"] = add_view(found->second.bytes);
       image.erase("uri");
     }
-    webp[k] = image.value("mimeType", "") == "image/webp";
+    extension[k] = texture_extension(image.value("mimeType", ""));
   }
   if (root_.contains("textures"))
     for (Json& texture : root_["textures"]) {
       std::size_t image = number(texture, "source");
-      if (texture.contains("extensions") && texture["extensions"].contains(kWebp))
-        image = number(texture["extensions"][kWebp], "source");
-      if (image >= webp.size()) continue;
+      for (const char* name : kTextureExtensions)
+        if (texture.contains("extensions") && texture["extensions"].contains(name)) {
+          image = number(texture["extensions"][name], "source");
+          texture["extensions"].erase(name);
+        }
+      if (image >= extension.size()) continue;
       texture.erase("source");
-      if (texture.contains("extensions")) texture["extensions"].erase(kWebp);
-      if (webp[image])
-        texture["extensions"][kWebp]["source"] = image;
+      if (extension[image])
+        texture["extensions"][extension[image]]["source"] = image;
       else
         texture["source"] = image;
       if (texture.contains("extensions") && texture["extensions"].empty()) texture.erase("extensions");
     }
-  forget_extension(root_, kWebp);
-  if (std::find(webp.begin(), webp.end(), true) != webp.end()) use_extension(kWebp, true);
+  for (const char* name : kTextureExtensions) {
+    forget_extension(root_, name);
+    if (std::find(extension.begin(), extension.end(), name) != extension.end()) use_extension(name, true);
+  }
 }
 
 void StandaloneGlb::recode(const DracoSteps& steps, const NormalSamples* lit_as, const RunContext& context) {

@@ -26,7 +26,7 @@ class StandaloneGlb {
   /// How the file codes its meshes.
   MeshCodec codec() const;
   /// Replaces the file's images by those of the same source image; images that are not given stay. WebP
-  /// makes EXT_texture_webp a required extension.
+  /// and AVIF make EXT_texture_webp and EXT_texture_avif required extensions.
   void set_images(const std::map<std::uint32_t, FileImageData>& images);
   /// Takes the meshes of another file of the same package, whose node k is this file's node k, for its own.
   void take_meshes(StandaloneGlb other);

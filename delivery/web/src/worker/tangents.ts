@@ -63,7 +63,7 @@ function equalWedges({ positions, normals, uv }: TangentSource): Uint32Array {
   return first;
 }
 
-/** Per corner: the triangle across the edge to the next corner, the first that runs along it the other way. */
+/** Per corner: the triangle across the edge to the next corner, the first that runs along it backwards. */
 function neighbours(vertex: Uint32Array): Int32Array {
   const out = new Int32Array(vertex.length).fill(-1);
   const waiting = new Map<number, { corners: number[]; at: number }>();
