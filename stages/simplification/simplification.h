@@ -25,7 +25,7 @@ struct SimplificationOptions {
   double uv_weight = 0.15;
   // One radian counts as a mean edge; 8 times as much in models with tangents.
   double normal_weight = 0.05;
-  double colour_weight = 0.1;   // a full step counts as a 20th of the diagonal
+  double colour_weight = 0.1;  // a full step counts as a 20th of the diagonal
   double boundary_weight = 3;
   double seam_weight = 1;
   // Bounds the quadric error of every collapse, too. At half of it scans cut into scraps keep no scale but
