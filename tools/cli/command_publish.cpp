@@ -126,11 +126,17 @@ void check_for_target(const ExportOptions& o) {
   if (!o.script.empty() && o.target != ExportTarget::kModelViewer) refuse("--script", "--to model-viewer");
 }
 
+void check_plain(bool plain, ExtractImages images) {
+  if (plain && (images == ExtractImages::kWebp || images == ExtractImages::kAvif))
+    throw UsageError("--plain", "", "--image-format jpeg or png", std::string(enum_name(images)));
+}
+
 ExportOptions export_options_of(const ExportArguments& a) {
   ExportOptions o = a.options;
   o.width_px = static_cast<std::uint32_t>(a.width_px);
   o.height_px = static_cast<std::uint32_t>(a.height_px);
   check_for_target(o);
+  check_plain(o.plain, o.images);
   if (!o.url.empty() && !o.url.ends_with("/")) o.url += "/";
   if (o.target == ExportTarget::kOembed) o.viewer = viewer_folder(a.viewer);
   return o;
@@ -162,6 +168,17 @@ void add_keep_units_flag(Command& c, bool& keep_units) {
       "Lengths in the source's unit; default: in metres, as glTF has them, where the package knows the unit");
 }
 
+void add_image_format_option(Command& c, ExtractImages& images) {
+  c.choice(
+       "--image-format", images,
+       "auto = with --bytes the format that looks better, otherwise jpeg. png is without loss. Images with "
+       "alpha are png where jpeg is asked for. avif looks as good in two thirds of WebP's bytes, but few "
+       "viewers read it: three.js and <model-viewer>, Babylon.js, glTF-Transform; not Blender",
+       "FORMAT")
+      .lists_words()
+      .shows_default();
+}
+
 void add_target_options(Command& c, ExportArguments& args) {
   c.choice("--to", args.options.target,
            "The form: 3dtiles = a tileset of 3D Tiles 1.1 for CesiumJS and its like; gltf-lod = one GLB with "
@@ -181,6 +198,7 @@ void add_target_options(Command& c, ExportArguments& args) {
            "gltf-lod, model-viewer: the best-looking GLB of at most so many bytes: 2MB", "SIZE");
   c.flag("--plain", args.options.plain,
          "3dtiles, model-viewer: meshes as floats, for viewers without a decoder of Draco");
+  add_image_format_option(c, args.options.images);
   c.option("--screen-error", args.options.screen_error_px,
            "3dtiles: the error at which the viewer takes the next level, its maximumScreenSpaceError or "
            "errorTarget, px",
@@ -278,8 +296,7 @@ std::string output_for(const std::string& output, const AskedBytes& asked) {
 }
 
 ExtractRequest request_of(const ExtractArguments& a) {
-  if (a.plain && a.images == ExtractImages::kWebp)
-    throw UsageError("--plain", "", "--image-format jpeg or png", "webp");
+  check_plain(a.plain, a.images);
   if (a.proxy) return {ExtractProxy{static_cast<std::uint32_t>(*a.proxy), a.plain}, a.recentre, a.keep_units};
   if (a.bytes.empty()) {
     const auto form = a.plain    ? ExtractScale::Form::kPlain
@@ -352,13 +369,7 @@ void add_extract_options(Command& c, ExtractArguments& args) {
        "with --bytes files are compared at it (default 512)",
        "PX")
       .number_in(1, 1e6);
-  c.choice(
-       "--image-format", args.images,
-       "auto = with --bytes the format that looks better, otherwise jpeg. png is without loss. Images with "
-       "alpha are png where jpeg is asked for",
-       "FORMAT")
-      .lists_words()
-      .shows_default();
+  add_image_format_option(c, args.images);
   const Option lods = c.flag(
       "--lods", args.levels,
       "All major scales from the chosen one on as levels of detail of one file (MSFT_lod), which share "
@@ -512,7 +523,7 @@ void add_extract_command(Command& app) {
       "extract takes it, and makes it smaller if needed. Many triangles with a small texture nearly always "
       "look better than the reverse.\n"
       "Meshes of scales stay coded by Draco (KHR_draco_mesh_compression), those of whole proxies by meshopt "
-      "(EXT_meshopt_compression). WebP needs EXT_texture_webp. For programs without these use --plain.\n"
+      "(EXT_meshopt_compression). WebP needs EXT_texture_webp, AVIF EXT_texture_avif. For programs without these use --plain.\n"
       "Exit code: 0, 1 when the package is damaged or the GLB cannot be written, 2 usage, 4 when no file "
       "between 98 % and 100 % of --bytes is possible: extract then writes the nearest file. A file that "
       "already holds everything in a package of JPEG sources is no failure.");

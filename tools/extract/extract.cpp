@@ -18,6 +18,7 @@ constexpr double kTopQuality = 97;      // of images coded anew from planes that
 FileImage format_of(const ExtractScale& wishes, bool alpha) {
   if (wishes.images == ExtractImages::kPng) return FileImage::kPng;
   if (wishes.images == ExtractImages::kWebp) return FileImage::kWebp;
+  if (wishes.images == ExtractImages::kAvif) return FileImage::kAvif;
   return alpha ? FileImage::kPng : FileImage::kJpeg;
 }
 

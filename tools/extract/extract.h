@@ -9,10 +9,10 @@ namespace texmesh {
 
 /// What kind of images a standalone file gets. kAuto: for a number of bytes what looks best, otherwise JPEG;
 /// images with alpha become PNG where JPEG would be taken.
-enum class ExtractImages : std::uint8_t { kAuto, kJpeg, kWebp, kPng };
+enum class ExtractImages : std::uint8_t { kAuto, kJpeg, kWebp, kAvif, kPng };
 template <>
 struct EnumNames<ExtractImages> {
-  static constexpr std::array<std::string_view, 4> names{"auto", "jpeg", "webp", "png"};
+  static constexpr std::array<std::string_view, 5> names{"auto", "jpeg", "webp", "avif", "png"};
 };
 
 /// A scale with whole textures.
@@ -50,10 +50,10 @@ struct ExtractRequest {
 
 inline constexpr double kMostGlbBytes = 4294967295;
 
-enum class FileImage : std::uint8_t { kJpeg, kWebp, kPng };
+enum class FileImage : std::uint8_t { kJpeg, kWebp, kAvif, kPng };
 template <>
 struct EnumNames<FileImage> {
-  static constexpr std::array<std::string_view, 3> names{"jpeg", "webp", "png"};
+  static constexpr std::array<std::string_view, 4> names{"jpeg", "webp", "avif", "png"};
 };
 
 struct ExtractedImage {

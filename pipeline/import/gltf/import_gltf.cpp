@@ -348,10 +348,10 @@ class GltfReader {
 };
 
 bool is_supported(const std::string& extension) {
-  static constexpr std::array<std::string_view, 8> kSupported{
+  static constexpr std::array<std::string_view, 9> kSupported{
       "KHR_draco_mesh_compression", "KHR_mesh_quantization", "EXT_meshopt_compression",
       "KHR_meshopt_compression",    "KHR_texture_transform", "EXT_texture_webp",
-      "KHR_texture_basisu",         "KHR_materials_unlit"};
+      "EXT_texture_avif",           "KHR_texture_basisu",    "KHR_materials_unlit"};
   return find_material_extension(extension) ||
          std::find(kSupported.begin(), kSupported.end(), extension) != kSupported.end();
 }

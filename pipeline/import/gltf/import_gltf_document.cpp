@@ -128,7 +128,7 @@ image uri=text bufferView=@bufferViews
 sampler magFilter=9728,9729 minFilter=9728,9729,9984,9985,9986,9987
 sampler wrapS=33071,33648,10497 wrapT=33071,33648,10497
 texture sampler=@samplers source=@images extensions=otherImages
-otherImages EXT_texture_webp=otherImage KHR_texture_basisu=otherImage
+otherImages EXT_texture_webp=otherImage EXT_texture_avif=otherImage KHR_texture_basisu=otherImage
 otherImage source=@images
 material emissiveFactor=number*3 alphaCutoff=number alphaMode="OPAQUE","MASK","BLEND" doubleSided=truth
 material normalTexture=textureInfo occlusionTexture=textureInfo emissiveTexture=textureInfo

@@ -21,10 +21,13 @@ class StandaloneGlb {
   std::vector<std::uint32_t> source_images() const;
   /// Of these the images that are within the file.
   std::map<std::uint32_t, FileImageData> images() const;
+  /// Per material: the set of texture coordinates along which meshes have tangents (make_tangents()); -1 for
+  /// materials without textures in tangent space, and for all where no mesh of the file has tangents.
+  std::vector<int> tangent_texcoords() const;
   /// How the file codes its meshes.
   MeshCodec codec() const;
   /// Replaces the file's images by those of the same source image; images that are not given stay. WebP
-  /// makes EXT_texture_webp a required extension.
+  /// and AVIF make EXT_texture_webp and EXT_texture_avif required extensions.
   void set_images(const std::map<std::uint32_t, FileImageData>& images);
   /// Takes the meshes of another file of the same package, whose node k is this file's node k, for its own.
   void take_meshes(StandaloneGlb other);
@@ -80,7 +83,8 @@ bool add_words(std::vector<std::uint8_t>& glb, const About& about, std::uint64_t
 enum class StreamedNormals : std::uint8_t { kFitted, kStreamed };
 
 /// A scale as one file with the previews in it, wherever the package has the scale. A scale of the stream
-/// gets materials, images and node names of the coarsest scale's GLB, and that file's mesh codec. InputError
+/// gets materials, images and node names of the coarsest scale's GLB, that file's mesh codec, and where it
+/// has tangents those of make_tangents(). InputError
 /// for a scale that is not there; FormatError when the package is damaged. Same result for any thread count.
 StandaloneGlb scale_file(PackageReader& package, int scale, const RunContext& context,
                          StreamedNormals normals = StreamedNormals::kFitted);
@@ -104,9 +108,8 @@ bool bake_texture_scale(nlohmann::ordered_json& root, Mesh& mesh);
 
 /// The same model for programs that know glTF 2.0 and no extension of it that compresses: floats instead of
 /// KHR_draco_mesh_compression, EXT_meshopt_compression and KHR_mesh_quantization, PNG instead of WebP,
-/// no KHR_texture_transform where it is one scale. Parts
-/// and materials stay; tangents go, and the feature ids of merged parts. Of a file without levels of detail
-/// and before place(). Same bytes for any thread count.
+/// no KHR_texture_transform where it is one scale. Parts, materials and tangents stay; the feature ids of
+/// merged parts go. Of a file without levels of detail and before place(). Same bytes for any thread count.
 StandaloneGlb plain_file(const StandaloneGlb& file, const std::string& entry, const RunContext& context);
 
 }  // namespace texmesh

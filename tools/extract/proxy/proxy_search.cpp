@@ -351,12 +351,18 @@ class ProxySearch {
  private:
   bool fits(const Extracted& file) const { return file.glb.size() <= bytes_; }
 
+  /// What pictures become first; PNG is not among the formats of a search.
+  static FileImage format_of(ExtractImages wanted) {
+    if (wanted == ExtractImages::kJpeg) return FileImage::kJpeg;
+    return wanted == ExtractImages::kAvif ? FileImage::kAvif : FileImage::kWebp;
+  }
+
   /// Whether the proxy's own images are of the format that is asked for.
   bool is_wanted_kind(std::uint32_t proxy) const {
     const ExtractImages wanted = reference_.wishes.images;
     if (wanted == ExtractImages::kAuto) return true;
     const GlbParts chunks = read_glb(reference_.package.proxy_glb(proxy), proxy_path(proxy));
-    const char* mime = mime_type_of(wanted == ExtractImages::kWebp ? FileImage::kWebp : FileImage::kJpeg);
+    const char* mime = mime_type_of(format_of(wanted));
     const auto images = chunks.root.value("images", nlohmann::ordered_json::array());
     return std::ranges::all_of(images,
                                [&](const auto& image) { return image.value("mimeType", "") == mime; });
@@ -403,7 +409,7 @@ class ProxySearch {
     if (!parts) return;
     files_.clear();
     ProxyTrial trial;
-    if (reference_.wishes.images == ExtractImages::kJpeg) trial.format = FileImage::kJpeg;
+    trial.format = format_of(reference_.wishes.images);
     const double most = kMostMesh * static_cast<double>(bytes_);
     while (trial.mesh + 1 < parts->mesh_count() &&
            static_cast<double>(coded(*parts, trial).finish().size()) > most)
@@ -486,7 +492,7 @@ class ProxySearch {
       const auto k = static_cast<std::uint32_t>(rows.size());
       const FileImage format = map.pixels.channels < 4                            ? trial.format
                                : reference_.wishes.images == ExtractImages::kJpeg ? FileImage::kPng
-                                                                                  : FileImage::kWebp;
+                                                                                  : trial.format;
       const double q = quality_of(map, quality);
       const bool numbers = map.averaging() != Averaging::kLight;
       out[k] = {format, encode_image(map.pixels, {format, q, numbers, false, true})};

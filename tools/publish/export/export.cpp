@@ -141,11 +141,13 @@ ExtractRequest request_for(const ExportOptions& options, ExtractScale::Form form
     ExtractScale scale;
     scale.display_px = options.display_px;
     scale.form = form;
+    scale.images = options.images;
     return {scale, false, options.keep_units};
   }
   ExtractBudget budget;
   budget.bytes = {options.bytes};
   if (options.display_px > 0) budget.display_px = options.display_px;
+  budget.images = options.images;
   budget.levels = form == ExtractScale::Form::kLevels;
   return {budget, false, options.keep_units};
 }
@@ -187,6 +189,7 @@ void export_tiles(PackageReader& package, const ExportOptions& options, const Ru
   });
   ExtractScale scale;
   scale.form = form_of(options);
+  scale.images = options.images;
   std::vector<TileLevel> wanted = std::move(tileset.levels);
   tileset.levels.clear();
   for (std::size_t k = 0; k < wanted.size(); ++k) {
