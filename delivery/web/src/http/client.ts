@@ -44,8 +44,8 @@ export class HttpClient {
     else await new Promise<void>((go) => this.waiting_.push(go));
     const abort = new AbortController();
     const cancel = (): void => abort.abort();
-    const answer: Answer = { url, status: 0, problem: '', body: new Uint8Array(0), etag: '', type: '', length: -1,
-      complete: false, tooLong: false };
+    const answer: Answer = { url, status: 0, problem: '', body: new Uint8Array(0), etag: '', type: '',
+      length: -1, complete: false, tooLong: false };
     const record: RequestRecord = {
       url, offset: range?.offset ?? 0, bytes: range?.bytes ?? -1, received: 0, kind,
       started: nowS(), firstByte: -1, ended: 0, status: 0, ok: false,

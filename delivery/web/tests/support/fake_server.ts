@@ -51,7 +51,8 @@ export function fakeServer(files: Record<string, Uint8Array>,
       body = file.slice(range[0], last + 1);
       status = 206;
       const shift = kind === 'wrong-range' ? 64 : 0;
-      headers.set('Content-Range', `bytes ${range[0] + shift}-${last + shift}/${kind === 'no-total' ? '*' : file.length}`);
+      const total = kind === 'no-total' ? '*' : file.length;
+      headers.set('Content-Range', `bytes ${range[0] + shift}-${last + shift}/${total}`);
     }
     if (kind === 'flip') {
       body = body.slice();
