@@ -30,7 +30,7 @@ struct SiteObject {
   static void fields(auto& s, auto&& v) {
     v("package", s.path, FieldRule{.pattern = "."},
       "Relative to the folder of packages; an unpacked one ends with a slash.");
-    v("page", "objects/" + s.name + ".html", FieldRule{.pattern = "^objects/.+\\.html$"},
+    v("page", "objects/" + s.name + ".html", FieldRule{.pattern = "^objects(/[^/.][^/]*)+\\.html$"},
       "Relative to DIR; an address has it percent-encoded.");
     v("title", s.title, "");
     v("bytes", s.bytes, "Of the whole package.");
