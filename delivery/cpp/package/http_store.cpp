@@ -235,7 +235,7 @@ class HttpSource final : public ByteSource {
   }
   void check_range(const HttpAnswer& a, std::uint64_t offset, std::uint64_t bytes) {
     const std::string place = "byte " + std::to_string(offset);
-    require_file(a, a.body, name());
+    require_file(a, offset == 0 ? ByteSpan(a.body) : ByteSpan(), name());
     if (!a.first)
       throw FormatError(name(), place, "a Content-Range", "none that can be read: " + describe_answer(a));
     const std::uint64_t total = a.total ? *a.total : *total_;  // the first answer has it

@@ -4,7 +4,7 @@ import { bootstrapBytes } from '../format/layout';
 import { type ByteRange, manifestOfContainer } from '../format/manifest';
 import type { HttpClient } from './client';
 import { Asking, Mirror, Mirrors, retriesOf } from './mirrors';
-import { Answer, isSameFile, requireFile, shownUrl, whatCame } from './requests';
+import { Answer, isSameFile, shownUrl, whatCame } from './requests';
 import type { PackageForm, PackageStore, Place, ReadOptions } from './store';
 
 /** Whether the page's own origin answers at a URL: other origins may keep headers to themselves (CORS). */
@@ -114,10 +114,9 @@ export class RangeStore implements PackageStore {
         'a server that answers ranges', whatCame(a)));
       if (a.status === 200 && isSameFile(a, m))
         throw new RangesEnded(shownUrl(m.url), `byte ${offset}`, 'an answer with status 206',
-          `${whatCame(a)}: ranges are no longer answered`);
+          'status 200: ranges are no longer answered');
       if (a.status === 200 || a.status === 416) this.requireSame_(m, false, offset, `status ${a.status}`);
       if (a.status === 206) {
-        requireFile(a);
         this.checkRange_(m, a, range);
         chunks.push(a.body);
         have += a.body.length;
@@ -150,8 +149,7 @@ export class RangeStore implements PackageStore {
     const [first, last, said] = range;
     const total = said < 0 ? m.total : said;
     this.requireSame_(m, m.total < 0 || total === m.total, offset, `${total} bytes`);
-    const end = total < 0 ? Math.min(offset + bytes, last + 1) : Math.min(offset + bytes, total);
-    this.require_(m, first === offset && last === end - 1, offset,
+    this.require_(m, first === offset && last === Math.min(offset + bytes - 1, total < 0 ? last : total - 1), offset,
       'the range that was asked for', `${first}-${last}`);
     m.total = total;
   }

@@ -89,8 +89,7 @@ export interface GetOptions {
 
 /** First and last byte, bytes of the file, from a Content-Range; undefined where the text is none. */
 export function contentRange(text: string): Answer['range'] {
-  const said = /^bytes (\d{1,15})-(\d{1,15})\/(\d{1,16}|\*)$/.exec(text)?.slice(1)
-    .map((n) => (n === '*' ? -1 : Number(n)));
+  const said = /^bytes (\d{1,15})-(\d{1,15})\/(-?\d{1,16})$/.exec(text.replace('*', '-1'))?.slice(1).map(Number);
   return said && said[0] <= said[1] && (said[2] < 0 || said[1] < said[2]) ? said : undefined;
 }
 
@@ -115,10 +114,4 @@ export function isForGood(error: unknown): boolean {
 /** An answer's problem or status, for messages. */
 export function whatCame(a: Answer): string {
   return a.problem || (a.status > 0 ? `status ${a.status}${a.type && ` (${a.type})`}` : 'no answer');
-}
-
-/** Refuses a page for people, as of a login or of an unknown address, in the place of a file. */
-export function requireFile(a: Answer): void {
-  if (a.type.startsWith('text/html') && /^\s*</.test(String.fromCharCode(...a.body.subarray(0, 99))))
-    throw new FormatError(shownUrl(a.url), '', 'a file of a package', `a page, ${whatCame(a)}`);
 }

@@ -5,7 +5,7 @@ import { bootstrapBytes } from '../format/layout';
 import { ByteRange, manifestOfContainer } from '../format/manifest';
 import type { HttpClient } from './client';
 import { Asking, Mirror, Mirrors, retriesOf } from './mirrors';
-import { GetOptions, requireFile, shownUrl, whatCame } from './requests';
+import { GetOptions, shownUrl, whatCame } from './requests';
 import type { OpenedStore, PackageStore, Place, ReadOptions } from './store';
 
 // For servers that know no ranges, and for containers in memory; loaded with the first of them.
@@ -16,8 +16,9 @@ async function getWhole(client: HttpClient, url: string, how: GetOptions,
   const mayTryAgain = retriesOf(client, how.signal);
   for (;;) {
     const a = await client.get(url, how);
-    if (a.status === 200 || a.tooLong) requireFile(a);
-    if (a.status === 200 && a.complete) return a.body;
+    // A page for people, as of a login, begins with blanks or '<'. Files of packages begin with letters.
+    const page = a.type.includes('html') && a.body[0] < 61;
+    if (a.status === 200 && a.complete && !page) return a.body;
     if (a.tooLong) throw new InputError(shownUrl(url), '', `at most ${how.maxBytes} bytes`, 'more');
     if (othersLeft || !(await mayTryAgain(a))) throw new InputError(shownUrl(url), '', 'a file', whatCame(a));
   }

@@ -30,10 +30,10 @@ interface GltfMaterial {
  * need them where the file has some.
  */
 export function tangentTexcoords({ meshes = [], materials = [] }: GltfJson): number[] {
-  const some = meshes.some((m) => m.primitives?.some((p) => p.attributes?.TANGENT !== undefined));
-  return materials.map(({ normalTexture, extensions }) => {
-    const texture = normalTexture ?? extensions?.KHR_materials_anisotropy?.anisotropyTexture ??
-      extensions?.KHR_materials_clearcoat?.clearcoatNormalTexture;
+  const some = meshes.some((m) => m.primitives?.some((p) => 'TANGENT' in (p.attributes ?? {})));
+  return materials.map(({ normalTexture, extensions: e }) => {
+    const texture = normalTexture ?? e?.KHR_materials_anisotropy?.anisotropyTexture ??
+      e?.KHR_materials_clearcoat?.clearcoatNormalTexture;
     return some && texture ? texture.texCoord ?? 0 : -1;
   });
 }

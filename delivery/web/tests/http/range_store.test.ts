@@ -119,7 +119,6 @@ describe('trouble', () => {
     ['long', 'more'],
     ['wrong-range', 'the range that was asked for'],
     ['whole', 'ranges are no longer answered'],
-    ['page', 'text/html'],
     ['whole-other', 'replaced, open it anew'],
     ['whole-longer', 'replaced, open it anew'],
     ['other-etag', 'replaced, open it anew'],
