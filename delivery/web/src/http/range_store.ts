@@ -146,10 +146,11 @@ export class RangeStore implements PackageStore {
       return this.require_(m, !complete || offset === 0 || body.length === bytes, offset, `${bytes} bytes`,
         body.length);
     }
-    const [first, last, said] = range;
-    const total = said < 0 ? m.total : said;
+    const [first, last] = range;
+    const total = range[2] < 0 ? m.total : range[2];
     this.requireSame_(m, m.total < 0 || total === m.total, offset, `${total} bytes`);
-    this.require_(m, first === offset && last === Math.min(offset + bytes - 1, total < 0 ? last : total - 1), offset,
+    this.require_(m,
+      first === offset && last === Math.min(offset + bytes, total < 0 ? last + 1 : total) - 1, offset,
       'the range that was asked for', `${first}-${last}`);
     m.total = total;
   }

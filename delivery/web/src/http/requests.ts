@@ -89,8 +89,9 @@ export interface GetOptions {
 
 /** First and last byte, bytes of the file, from a Content-Range; undefined where the text is none. */
 export function contentRange(text: string): Answer['range'] {
-  const said = /^bytes (\d{1,15})-(\d{1,15})\/(-?\d{1,16})$/.exec(text.replace('*', '-1'))?.slice(1).map(Number);
-  return said && said[0] <= said[1] && (said[2] < 0 || said[1] < said[2]) ? said : undefined;
+  const said = /^bytes (\d{1,15})-(\d{1,15})\/(-?\d{1,16})$/.exec(text.replace('*', '-1'))?.slice(1)
+    .map(Number);
+  return said && said[0] <= said[1] && (said[1] < said[2] || said[2] < 0) ? said : undefined;
 }
 
 /** Whether an answer is of the file with this ETag ('' = none) and length (-1 = unknown), if known. */

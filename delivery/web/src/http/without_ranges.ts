@@ -17,7 +17,7 @@ async function getWhole(client: HttpClient, url: string, how: GetOptions,
   for (;;) {
     const a = await client.get(url, how);
     // A page for people, as of a login, begins with blanks or '<'. Files of packages begin with letters.
-    const page = a.type.includes('html') && a.body[0] < 61;
+    const page = /html/.test(a.type) && a.body[0] < 61;
     if (a.status === 200 && a.complete && !page) return a.body;
     if (a.tooLong) throw new InputError(shownUrl(url), '', `at most ${how.maxBytes} bytes`, 'more');
     if (othersLeft || !(await mayTryAgain(a))) throw new InputError(shownUrl(url), '', 'a file', whatCame(a));

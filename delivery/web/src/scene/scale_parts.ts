@@ -30,7 +30,7 @@ interface GltfMaterial {
  * need them where the file has some.
  */
 export function tangentTexcoords({ meshes = [], materials = [] }: GltfJson): number[] {
-  const some = meshes.some((m) => m.primitives?.some((p) => 'TANGENT' in (p.attributes ?? {})));
+  const some = meshes.some((m) => m.primitives?.some((p) => p.attributes?.TANGENT! >= 0));
   return materials.map(({ normalTexture, extensions: e }) => {
     const texture = normalTexture ?? e?.KHR_materials_anisotropy?.anisotropyTexture ??
       e?.KHR_materials_clearcoat?.clearcoatNormalTexture;
