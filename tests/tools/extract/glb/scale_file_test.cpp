@@ -75,6 +75,7 @@ const Bytes& sheet_package() {
   return bytes;
 }
 
+PackageReader open(Bytes&& package) = delete;  // the reader keeps no bytes of its own
 PackageReader open(const Bytes& package) { return PackageReader(open_container(memory_source(package))); }
 
 nlohmann::json json_of(const Bytes& glb) {
@@ -132,7 +133,8 @@ TEST(ScaleFile, EveryScaleIsOneFileWithThePreviewsInside) {
 // The stream has none: they are made where the source had some.
 TEST(ScaleFile, ScalesOfTheStreamHaveTangentsWhereTheSourceHadSome) {
   const testing::TemporaryFolder folder;
-  PackageReader mapped = open(compile_sheet(folder, true)), plain = open(sheet_package());
+  const Bytes sheet = compile_sheet(folder, true);
+  PackageReader mapped = open(sheet), plain = open(sheet_package());
   const Manifest m = mapped.manifest();
   ASSERT_GT(m.scales.size(), 2u);
   for (const ManifestScale& s : m.scales)
