@@ -263,7 +263,7 @@ struct ExtractArguments {
   std::optional<int> scale, proxy;
   double display_px = 0;
   int jobs = 0;
-  bool recentre = false, keep_units = false, levels = false, plain = false, json = false;
+  bool recentre = false, keep_units = false, levels = false, plain = false, best = false, json = false;
 };
 
 std::uint32_t rung_of(const std::string& text, const std::string& flag) {
@@ -310,6 +310,7 @@ ExtractRequest request_of(const ExtractArguments& a) {
   if (a.display_px > 0) budget.display_px = a.display_px;
   budget.images = a.images;
   budget.levels = a.levels;
+  budget.effort = a.best ? ExtractEffort::kBest : ExtractEffort::kUsual;
   return {budget, a.recentre, a.keep_units};
 }
 
@@ -369,6 +370,9 @@ void add_extract_options(Command& c, ExtractArguments& args) {
        "with --bytes files are compared at it (default 512)",
        "PX")
       .number_in(1, 1e6);
+  c.flag("--best", args.best,
+         "With --bytes: compare many whole files. It takes several times as long, and the file looks about "
+         "1 % nearer");
   add_image_format_option(c, args.images);
   const Option lods = c.flag(
       "--lods", args.levels,

@@ -27,6 +27,12 @@ struct ExtractScale {
   Form form = Form::kCoded;
 };
 
+/// How long the search for a file of a number of bytes may take.
+enum class ExtractEffort : std::uint8_t {
+  kUsual,  // decides by parts of pictures
+  kBest,   // looks at many whole files: some six times as long, for about a hundredth less difference
+};
+
 /// The best-looking files of at most so many bytes.
 struct ExtractBudget {
   std::vector<std::uint64_t> bytes;  // a file for each; above 0
@@ -34,6 +40,8 @@ struct ExtractBudget {
   double display_px = 512;           // displayed height at which files are compared, device px
   ExtractImages images = ExtractImages::kAuto;
   bool levels = false;  // as ExtractScale::Form::kLevels
+  ExtractEffort effort = ExtractEffort::kUsual;
+  bool best() const { return effort == ExtractEffort::kBest; }
 };
 
 /// A proxy as the package has it.

@@ -118,7 +118,7 @@ Extracted Search::run(const std::function<void(double)>& report) {
   choose_mesh();
   report(0.6);
   FoundFile found = file_of(best_, allocation_of(best_));
-  if (filling_.fits(found.file)) {
+  if (filling_.fits(found.file) && reference_.wishes.best()) {
     if (bytes_ <= kLookAtFilesBelow)
       look_at_files(found);
     else
@@ -158,7 +158,7 @@ void Search::choose_mesh() {
     }
     follow_direction(0, 1);
     follow_direction(0, -1);
-    if (!reference_.wishes.scale) {
+    if (!reference_.wishes.scale && reference_.wishes.best()) {
       follow_direction(-1, -1);
       follow_direction(1, 1);
     }
@@ -169,8 +169,9 @@ void Search::choose_mesh() {
 
 void Search::follow_direction(int scale_step, int coding_step) {
   const MeshKey from = best_;
+  const int most = reference_.wishes.best() ? 2 : 1;
   int worse = 0;
-  for (int k = 1; worse < 2; ++k) {
+  for (int k = 1; worse < most; ++k) {
     const int scale = static_cast<int>(from.scale) + k * scale_step, coding = from.coding + k * coding_step;
     if (scale < 0 || scale >= static_cast<int>(scales().size()) || coding < 0 || coding >= kMeshCodings)
       return;

@@ -428,6 +428,7 @@ class ProxySearch {
       trial = next;
       return true;
     };
+    const bool best = reference_.wishes.best();
     for (bool again = true; again;) {
       again = false;
       for (const ProxyTrial& next : other_maps(*parts, trial)) again |= try_next(next);
@@ -442,10 +443,11 @@ class ProxySearch {
       while (trial.mesh + 1 < parts->mesh_count() && try_with(&ProxyTrial::mesh, trial.mesh + 1))
         again = true;
       while (trial.mesh > 0 && try_with(&ProxyTrial::mesh, trial.mesh - 1)) again = true;
+      if (!best) break;
       for (const int bits : {trial.bits - 1, trial.bits + 1})
         if (bits >= 0 && bits <= kFinestBits) again |= try_with(&ProxyTrial::bits, bits);
     }
-    if (reference_.wishes.images == ExtractImages::kAuto) {
+    if (best && reference_.wishes.images == ExtractImages::kAuto) {
       ProxyTrial jpeg = trial;
       jpeg.format = FileImage::kJpeg;
       try_next(jpeg);
