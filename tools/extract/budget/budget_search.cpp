@@ -5,12 +5,14 @@
 // 3. Small windows of the pictures tell what bytes are worth. S_0 is rendered with one image coded in many
 // ways, which gives each image a curve of loss against bytes (LossCurves). Every coded mesh is rendered with
 // the best textures. Losses of mesh and textures are added up.
-// 4. From a likely mesh the search walks to neighbours, finer and coarser, while the sum of losses falls.
-// What a mesh leaves of the bytes is dealt out along the curves, where it takes away most loss.
+// 4. The mesh: compile has measured what scales lose, so two or three meshes that are made and looked at tell
+// which is best. With --best the search walks from a likely mesh to neighbours, finer and coarser, while the
+// sum of losses falls. What a mesh leaves of the bytes is dealt out along the curves, where it takes away
+// most loss.
 // 5. The file is written and filled up to at least 98 % of the bytes (Filling).
-// 6. Sums of losses are guesses. In a small file whole pictures decide: files of other likely meshes, other
-// sizes and codings of the texture that loses most. In a large file textures may be full: then the mesh is
-// finer.
+// 6. Sums of losses are guesses. With --best whole pictures decide in a small file: files of other likely
+// meshes, other sizes and codings of the texture that loses most. In a large file textures may be full: then
+// the mesh is finer.
 // 7. Last, proxies of the package are tried in its place (offer_proxies()).
 #include "tools/extract/budget/budget_search.h"
 
@@ -119,16 +121,26 @@ Extracted Search::run(const std::function<void(double)>& report) {
   report(0.4);
   choose_mesh();
   report(0.6);
+  FoundFile found = filled_file();
+  if (!reference_.wishes.best() && filling_.fits(found.file) && !filling_.fills(found.file) &&
+      !is_finest(found.key)) {  // other meshes may come nearer to the bytes
+    walk_to_mesh();
+    if (FoundFile other = filled_file(); filling_.fills(other.file)) found = std::move(other);
+  }
+  return finish(found.key, std::move(found.file));
+}
+
+FoundFile Search::filled_file() {
   FoundFile found = file_of(best_, allocation_of(best_));
-  if (filling_.fits(found.file) && reference_.wishes.best()) {
+  if (!filling_.fits(found.file)) return found;
+  if (reference_.wishes.best()) {
     if (bytes_ <= kLookAtFilesBelow)
       look_at_files(found);
     else
       try_smaller_than_stored(found);
   }
-  report(0.7);
-  if (filling_.fits(found.file) && !filling_.fills(found.file)) fill_by_mesh(found);
-  return finish(found.key, std::move(found.file));
+  if (!filling_.fills(found.file)) fill_by_mesh(found);
+  return found;
 }
 
 const MeshFile& Search::mesh(const MeshKey& key) {
