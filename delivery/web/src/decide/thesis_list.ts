@@ -54,7 +54,7 @@ function asPrintedList(data: PackageData, { offers, fragments }: FragmentList,
   offers[nearest].plannedBytes = Math.max(1, interpolatedBytes(t, fragment, t.quality[row]));
 }
 
-/** Chapter 4's textures for so many bytes, by the display's resolution (8.1.1): the list of that D_i(Gamma). */
+/** Chapter 4's textures for so many bytes, of the display's resolution (8.1.1): D_i(Gamma) comes to that. */
 export interface ThesisTextures {
   planes: PlaneChoice[];
   options: Partial<ListOptions>;
