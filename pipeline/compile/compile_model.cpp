@@ -226,7 +226,7 @@ std::string provenance(const ModelSource& source, const CompileOptions& options)
   recorded.package.meta.clear();
   return Json{{"version", 1},
               {"tool", "texmesh " + tool_version()},
-              {"format", {{"major", kFormatMajor}, {"minor", kFormatMinor}}},
+              {"format", {{"major", kFormatMajor}, {"minor", 0}}},  // stage package knows the minor
               {"inputs", to_json(source.inputs())},
               {"options", profile_json(recorded)},
               {"stages", stages},

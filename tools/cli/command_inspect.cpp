@@ -372,8 +372,11 @@ void add_render_options(Command& c, RenderArguments& args) {
            "or a "
            "folder that unpack made")
       .required();
-  c.option("-o,--output", args.output,
-           "The picture to write, x.png; with --what also x.glb, to turn in any viewer", "FILE")
+  c.option(
+       "-o,--output", args.output,
+       "The picture to write, x.png; with --what also x.glb, to turn in any viewer, and of scales x.csv and "
+       "x.ply, the scale map as data",
+       "FILE")
       .required();
   c.option(
        "--views", args.views,

@@ -108,7 +108,7 @@ std::vector<FragmentHeat> fragment_heats(PackageReader& package, std::uint32_t p
   const PlaneTables& t = package.tables().planes.at(plane);
   const std::size_t fragments = t.fragment_count();
   std::vector<double> bytes(fragments, -1), density(fragments, -1);
-  const std::vector<float> eta = eta_of(t, 0);
+  const std::vector<float> eta = density_of(t, 0);
   for (const std::uint16_t f : t.order) {
     const double texels = std::max<double>(t.covered_texels[f], 1);
     if (t.rung_count() > 0) bytes[f] = static_cast<double>(bytes_to_show(t, t.rung_count() - 1, f)) / texels;
