@@ -353,6 +353,8 @@ int run_compile(CompileArguments& args) {
   settings.more_inputs.insert(settings.more_inputs.end(), plan.files.begin(), plan.files.end());
   try {
     return run_batch(plan, settings, std::cout);
+  } catch (const PermissionError&) {
+    throw;
   } catch (const ResourceError& e) {
     std::cerr << "texmesh: " << e.what() << '\n';
     return kExitTryAgain;
@@ -481,8 +483,7 @@ void write_collection_page(const RunSummary& merged, const MergeArguments& args)
                                               [](const ModelSummary& m) { return package_face(m.output); });
   std::error_code error;
   if (!page.files.empty()) fs::create_directories(folder / posters, error);
-  if (error)
-    throw ResourceError((folder / posters).string(), "", "a folder that can be made", error.message());
+  if (error) fail_to_write((folder / posters).string(), "", error.value());
   for (const PageFile& file : page.files) write_file_atomically((folder / file.name).string(), file.bytes);
   write_text_file(args.html, page.html);
 }

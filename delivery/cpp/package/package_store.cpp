@@ -65,7 +65,8 @@ class FolderStore final : public PackageStore {
  public:
   explicit FolderStore(std::string root)
       : root_(std::move(root)), fd_(::open(root_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
-    if (fd_.get() < 0) throw InputError(root_, "", "a readable folder", std::strerror(errno));
+    if (fd_.get() < 0)
+      throw InputError(root_, "", "", std::string("cannot be read: ") + std::strerror(errno));
   }
   std::string name() const override { return root_; }
   bool is_folder() const override { return true; }
@@ -101,7 +102,7 @@ class FolderStore final : public PackageStore {
         throw RuleError("K05", root_, path, "a path of a-z 0-9 . _ -", "another");
       entries.push_back({path, 0, it->file_size(error), 0});
     }
-    if (error) throw InputError(root_, "", "a readable folder", error.message());
+    if (error) throw InputError(root_, "", "", "cannot be read: " + error.message());
     std::ranges::sort(entries, {}, &ContainerEntry::path);
     return entries;
   }
@@ -134,7 +135,7 @@ class FolderStore final : public PackageStore {
     Bytes out(static_cast<std::size_t>(bytes));
     if (read_at(file.get(), offset, out)) return out;
     if (errno == 0) throw RuleError("I08", root_, path, "more bytes", "the file became shorter");
-    throw InputError(root_, path, "readable bytes", std::strerror(errno));
+    throw InputError(root_, path, "", std::string("cannot be read: ") + std::strerror(errno));
   }
 
   std::string root_;
