@@ -8,6 +8,7 @@
 #include "format/base/text_bytes.h"
 #include "format/container/layout.h"
 #include "pipeline/about/source_fields.h"
+#include "pipeline/io/names/closest_word.h"
 #include "pipeline/io/uri.h"
 
 namespace texmesh {
@@ -84,7 +85,13 @@ Json parse_text(const OptionField& field, const std::string& text) {
     Json j = Json::parse(t, nullptr, false);
     return j.is_number() || j.is_boolean() ? j : Json(t);
   };
-  if (field.kind == OptionKind::kText || field.kind == OptionKind::kName) return Json(text);
+  if (field.kind == OptionKind::kText) return Json(text);
+  if (field.kind == OptionKind::kName) {  // Z and z are one axis
+    const std::string_view closest = closest_word(text, field.words);
+    return Json(closest.size() == text.size() && ::strcasecmp(text.c_str(), std::string(closest).c_str()) == 0
+                    ? std::string(closest)
+                    : text);
+  }
   if (field.kind != OptionKind::kIntegers && field.kind != OptionKind::kNumbers) return scalar(text);
   Json list = Json::array();
   std::istringstream in(text);

@@ -125,7 +125,11 @@ void read_meta_file(CompileArguments& args) {
 /// Flags win over everything that a file says.
 void apply_flags(const CompileArguments& args, CompileOptions& options) {
   std::vector<OptionField> fields = list_options(options);
-  for (const auto& [path, text] : args.options) set_option(*find_option(fields, path), text, "--" + path);
+  for (const auto& [path, text] : args.options) {
+    const auto shorter = kShortNames.find(path);
+    set_option(*find_option(fields, path), text,
+               shorter == kShortNames.end() ? "--" + path : shorter->second.name);
+  }
   options.package.meta = merge_meta(options.package.meta, args.meta_text);
   check_options(options, "command line");
 }
@@ -150,6 +154,7 @@ std::string sandbox_line(SandboxMode mode) {
 }
 
 PlanRequest plan_request(const CompileArguments& args) {
+  check_folder_name(args.output, ".texmesh");
   PlanRequest request;
   request.inputs = args.inputs;
   request.output = args.output;

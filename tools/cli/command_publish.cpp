@@ -61,6 +61,7 @@ void announce(const ViewArguments& args, const ServedFiles& files, const std::st
 }
 
 [[noreturn]] int run_view(const ViewArguments& args) {
+  if (!std::filesystem::is_directory(args.package)) PackageReader(open_store(args.package));
   const ServedFiles files(args.package, viewer_folder(args.viewer));
   ViewServer server(files);
   const int port = server.bind(args.host, args.port);
@@ -85,9 +86,12 @@ struct ReportArguments {
 };
 
 int run_report(const ReportArguments& args) {
+  check_folder_name(args.folder);
   NewFolder(args.folder, report_folder_rule());  // not after the work
   PackageReader package(open_store(args.package));
+  PercentLine progress("report");
   const Report report = make_report(package, args.options, context_of(args.jobs));
+  progress.end();
   write_report(report, args.folder);
   if (args.json)
     std::cout << to_json_line(report) << '\n';
@@ -144,6 +148,7 @@ ExportOptions export_options_of(const ExportArguments& a) {
 
 int run_export(const ExportArguments& args) {
   const ExportOptions options = export_options_of(args);
+  check_folder_name(args.folder);
   NewFolder(args.folder, export_folder_rule());  // not after the work
   PackageReader package(open_store(args.package));
   PercentLine progress("export");
@@ -236,6 +241,7 @@ int run_site(SiteArguments& args) {
     throw UsageError("--packages-url", "", "an http or https URL", options.packages_url);
   if (!options.packages_url.empty() && !options.packages_url.ends_with("/")) options.packages_url += "/";
   options.viewer = viewer_folder(args.viewer);
+  check_folder_name(args.folder);
   NewFolder(args.folder, site_folder_rule());  // not after the work
   const Site site = read_site(args.packages, options);
   for (const SiteFault& f : site.faults) std::cerr << "texmesh: " << printable(f.message) << '\n';
@@ -325,7 +331,11 @@ int run_extract(const ExtractArguments& args) {
   for (const AskedBytes& one : args.bytes)
     outputs.push_back(args.bytes.size() > 1 ? output_for(args.output, one) : args.output);
   if (outputs.empty()) outputs.push_back(args.output);
-  for (const std::string& output : outputs) check_output_file(output);  // not after the search
+  for (const std::string& output : outputs) {  // not after the search
+    if (const std::string ending = lower_ending(output); ending != ".glb" && !ending.empty())
+      throw UsageError("--output", "", "the name of a GLB, NAME.glb", output);
+    check_output_file(output);
+  }
   PackageReader package(open_store(args.package));
   PercentLine progress("extract");
   RunContext context = context_of(args.jobs);
