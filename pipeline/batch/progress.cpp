@@ -7,6 +7,7 @@
 #include <ostream>
 
 #include "pipeline/batch/fleet/run_summary.h"
+#include "pipeline/import/import.h"
 #include "pipeline/io/table.h"
 
 namespace texmesh {
@@ -189,7 +190,8 @@ void Progress::show(std::size_t, const CacheTold& e) {
 
 void Progress::show(std::size_t, const NoteTold& e) {
   const bool warns = e.note.severity == Severity::kWarning;
-  if (warns || verbose_ || (is_told_always(e.note) && mode_ != OutputMode::kQuiet))
+  const bool tells = is_told_always(e.note) || e.note.code == kTurnedNote;
+  if (warns || verbose_ || (tells && mode_ != OutputMode::kQuiet))
     line(fmt::format("{}: {}: {}", e.model, warns ? "warning" : "note", note_sentence(e.note)));
 }
 

@@ -29,8 +29,16 @@ void check_meta(const CompileOptions& o, const std::string& source) {
   if (o.package.meta.empty()) return;
   read_meta(o.package.meta, source, "package.meta");
   const std::string up = up_axis_of_meta(o.package.meta);
-  if (o.import.up != UpAxis::kKeep && !up.empty() && up != "y")
+  if (o.import.up > UpAxis::kKeep && !up.empty() && up != "y")
     throw InputError(source, "package.meta/upAxis", "y, as import.up has it, or no upAxis", up);
+}
+
+/// What the curator says of the source's axes wins over the source; in the package y is up then.
+void turn_by_meta(CompileOptions& o) {
+  const std::string up = up_axis_of_meta(o.package.meta);
+  if (o.import.up != UpAxis::kAuto || up.empty()) return;
+  o.import.up = up == "x" ? UpAxis::kX : up == "z" ? UpAxis::kZ : UpAxis::kY;
+  o.package.meta = merge_meta(o.package.meta, R"({"upAxis":"y"})");
 }
 
 template <class T>
@@ -144,6 +152,7 @@ CompileOptions resolve_options(CompileOptions o) {
       is_default("ladder.uncovered", o.ladder.uncovered, LadderOptions{}.uncovered))
     o.ladder.uncovered = Uncovered::kKept;
   if (!o.package.meta.empty()) o.package.meta = read_meta(o.package.meta, "package.meta");
+  turn_by_meta(o);
   const LadderOptions usual;
   if (is_default("ladder.prune", o.ladder.prune, usual.prune))
     o.ladder.prune = is_default("ladder.rungs", o.ladder.rungs, usual.rungs) &&

@@ -695,22 +695,4 @@ int CommandLine::run(int argc, char** argv) {
   return run_and_print_errors([&] { return parse_and_run(argc, argv); });
 }
 
-int run_and_print_errors(const std::function<int()>& run) {
-  try {
-    return run();
-  } catch (const UsageError& e) {
-    std::cerr << "texmesh: " << e.what() << '\n';
-    return kExitUsage;
-  } catch (const Error& e) {
-    std::cerr << "texmesh: " << e.what() << '\n';
-    return kExitModelFailed;
-  } catch (const std::filesystem::filesystem_error& e) {
-    std::cerr << "texmesh: " << e.what() << '\n';
-    return kExitModelFailed;
-  } catch (const std::exception& e) {
-    std::cerr << "texmesh: internal error: " << e.what() << '\n';
-    return kExitInternal;
-  }
-}
-
 }  // namespace texmesh

@@ -16,6 +16,24 @@
 
 namespace texmesh {
 
+int run_and_print_errors(const std::function<int()>& run) {
+  try {
+    return run();
+  } catch (const UsageError& e) {
+    std::cerr << "texmesh: " << e.what() << '\n';
+    return kExitUsage;
+  } catch (const Error& e) {
+    std::cerr << "texmesh: " << e.what() << '\n';
+    return kExitModelFailed;
+  } catch (const std::filesystem::filesystem_error& e) {
+    std::cerr << "texmesh: " << e.what() << '\n';
+    return kExitModelFailed;
+  } catch (const std::exception& e) {
+    std::cerr << "texmesh: internal error: " << e.what() << '\n';
+    return kExitInternal;
+  }
+}
+
 void check_folder_name(const std::string& output, const std::string& or_file) {
   static constexpr std::string_view kFiles[] = {".texmesh", ".glb",  ".gltf", ".obj",  ".ply", ".stl",
                                                 ".fbx",     ".usdz", ".zip",  ".tar",  ".gz",  ".7z",

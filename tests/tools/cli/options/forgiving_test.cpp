@@ -5,7 +5,6 @@
 #include <filesystem>
 
 #include "tests/support/command.h"
-#include "tests/support/command.h"
 #include "tools/cli/options/common_options.h"
 #include "tools/cli/options/units.h"
 
