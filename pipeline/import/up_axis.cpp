@@ -14,7 +14,7 @@ using Axes = std::array<double, 3>;
 
 Axes axes_of(Vec3d v) { return {v.x, v.y, v.z}; }
 
-std::uint64_t hash_of(Vec3f p) {
+std::uint64_t hash_of_point(Vec3f p) {
   std::uint64_t hash = 0;
   for (const float x : {p.x, p.y, p.z}) hash = hash_with(hash, std::bit_cast<std::uint32_t>(x + 0.0f));
   return hash;
@@ -89,7 +89,8 @@ class UpGuess {
     for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t)
       for (std::uint32_t k = 0; k < 3; ++k) {
         const Triangle& corners = mesh_.triangles[t];
-        edges.push_back({hash_of(point(corners, k)) + hash_of(point(corners, (k + 1) % 3)), t, k});
+        edges.push_back(
+            {hash_of_point(point(corners, k)) + hash_of_point(point(corners, (k + 1) % 3)), t, k});
       }
     std::ranges::sort(edges, {}, &Edge::hash);
     double rim = 0;
