@@ -105,7 +105,7 @@ struct ExportArguments {
   std::string package, folder, viewer;
   ExportOptions options;
   int width_px = 640, height_px = 480, jobs = 0;
-  bool json = false;
+  bool json = false, draco = false;
 };
 
 /// Options that mean nothing for the target are a mistake of the user's.
@@ -141,6 +141,14 @@ ExportOptions export_options_of(const ExportArguments& a) {
   o.height_px = static_cast<std::uint32_t>(a.height_px);
   check_for_target(o);
   check_plain(o.plain, o.images);
+  const bool is_page = o.target == ExportTarget::kModelViewer;
+  if (a.draco && (!is_page || o.plain))
+    throw UsageError("--draco", "", is_page ? "no --plain" : "--to model-viewer",
+                     std::string(enum_name(o.target)));
+  // A page of a museum asks no foreign host for a decoder unless somebody wants that.
+  if (is_page && !a.draco && o.bytes == 0 && o.images != ExtractImages::kWebp &&
+      o.images != ExtractImages::kAvif)
+    o.plain = true;
   if (!o.url.empty() && !o.url.ends_with("/")) o.url += "/";
   if (o.target == ExportTarget::kOembed) o.viewer = viewer_folder(a.viewer);
   return o;
@@ -201,8 +209,12 @@ void add_target_options(Command& c, ExportArguments& args) {
       .number_in(1, 1e6);
   c.option("--bytes", args.options.bytes, parse_some_bytes,
            "gltf-lod, model-viewer: the best-looking GLB of at most so many bytes: 2MB", "SIZE");
-  c.flag("--plain", args.options.plain,
-         "3dtiles, model-viewer: meshes as floats, for viewers without a decoder of Draco");
+  c.flag(
+      "--plain", args.options.plain,
+      "3dtiles: meshes as floats, for viewers without a decoder of Draco; model-viewer has them so by itself");
+  c.flag(
+      "--draco", args.draco,
+      "model-viewer: meshes by Draco, some 5 % fewer bytes; its script then fetches a decoder from gstatic.com");
   add_image_format_option(c, args.options.images);
   c.option("--screen-error", args.options.screen_error_px,
            "3dtiles: the error at which the viewer takes the next level, its maximumScreenSpaceError or "
@@ -476,8 +488,9 @@ void add_export_command(Command& app) {
       "viewer whose limit is --screen-error takes the next level at that height. The object stands where "
       "its source has it; nothing puts it on the globe.\n"
       "gltf-lod: all major scales from the finest on; levels share materials and textures.\n"
-      "model-viewer: index.html, model.glb and the poster. Draco meshes make the script fetch a decoder from "
-      "gstatic.com; with --plain it needs none.\n"
+      "model-viewer: index.html, model.glb and the poster, which stands there, too, where the script is blocked. The "
+      "script comes from jsDelivr unless --script names your copy of it; with --draco or --bytes it fetches a "
+      "decoder from gstatic.com.\n"
       "oembed: a copy of the package, the viewer and oembed.json, to be put at --url. If a URL names "
       "the package, the package stays there.\n"
       "export.json in the folder lists what was written. The same package gives the same files.\n"
