@@ -142,7 +142,7 @@ std::size_t prefix_bytes(const std::string& folder) {
 std::vector<std::string> model_paths(const std::string& folder) {
   std::error_code ec;
   fs::recursive_directory_iterator it(folder, ec), end;
-  if (ec) throw InputError(folder, "", "a folder with models", ec.message());
+  if (ec) throw InputError(folder, "", "", "cannot be read: " + ec.message());
   std::vector<std::string> models;
   while (it != end) {
     std::string path = it->path().string();
@@ -151,7 +151,7 @@ std::vector<std::string> model_paths(const std::string& folder) {
     else if (it->is_regular_file(ec) && may_be_model(path))
       models.push_back(path);
     it.increment(ec);  // a folder that is left out without a word is a collection without its models
-    if (ec) throw InputError(path, "", "a folder that can be listed", ec.message());
+    if (ec) throw InputError(path, "", "", "cannot be listed: " + ec.message());
   }
   std::sort(models.begin(), models.end(),
             [same = prefix_bytes(folder)](std::string_view a, std::string_view b) {

@@ -58,8 +58,7 @@ void remove_stale(const std::string& folder, const std::vector<std::string>& pac
   for (const std::string& package : packages) {
     const fs::path path = fs::path(folder) / package;
     std::error_code ec;
-    if (!fs::remove(path, ec) && ec)
-      throw ResourceError(path.string(), "", "a package that can be removed", ec.message());
+    if (!fs::remove(path, ec) && ec) fail_to_write(path.string(), "remove", ec.value());
   }
 }
 

@@ -6,6 +6,7 @@
 #include "pipeline/import/gltf/import_gltf_parts.h"
 #include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/text_scan.h"
+#include "pipeline/import/up_axis.h"
 
 namespace texmesh {
 namespace {
@@ -69,6 +70,30 @@ ImportedModel import_kind(Kind kind, const std::string& file_name, std::span<con
   return import_range_scan(file_name, bytes, resolver, options, context);
 }
 
+/// Adds to what the package says of its source, where there is room.
+void add_to_source(About& about, const char* key, nlohmann::ordered_json value) {
+  auto source = nlohmann::ordered_json::parse(about.source, nullptr, false);
+  if (!source.is_object()) return;
+  source[key] = std::move(value);
+  std::string with_value = source.dump();
+  if (with_value.size() <= kMaxAboutSourceBytes) about.source = std::move(with_value);
+}
+
+/// Where the user has not said which axis is up: the source's word, else a guess. glTF says that y is.
+void turn_by_source(ImportedModel& m) {
+  const bool said = !m.about.up_axis.empty();
+  const bool may_guess = m.format == "obj" || m.format == "ply" || m.format == "stl";
+  const char up = said ? m.about.up_axis[0] : may_guess ? guessed_up(m.model.mesh) : '\0';
+  if (up != 'x' && up != 'z') return;
+  turn_up(m.model.mesh, up);
+  m.about.up_axis = "y";
+  add_info(m.model.notes, kTurnedNote, "",
+           std::string(said ? "the source says that " : "by its flat bottom ") + up +
+               " is up; turned so that y is (--up keep leaves it as it is)");
+  add_to_source(m.about, "turned",
+                {{"up", std::string(1, up)}, {"by", said ? "the source's word" : "a guess"}});
+}
+
 /// One line, and the same for those who get the package.
 void tell_what_is_lost(ImportedModel& imported) {
   if (imported.lost.empty()) return;
@@ -82,11 +107,7 @@ void tell_what_is_lost(ImportedModel& imported) {
   }
   if (told > kMostTold) text += " and " + std::to_string(told - kMostTold) + " more kinds";
   add_info(imported.model.notes, kLostNote, "", text + " of the source are not in the package");
-  auto source = nlohmann::ordered_json::parse(imported.about.source, nullptr, false);
-  if (!source.is_object()) return;
-  source["lost"] = std::move(list);
-  std::string with_list = source.dump();
-  if (with_list.size() <= kMaxAboutSourceBytes) imported.about.source = std::move(with_list);
+  add_to_source(imported.about, "lost", std::move(list));
 }
 
 }  // namespace
@@ -105,8 +126,9 @@ ImportedModel import_model(const std::string& file_name, std::span<const std::ui
   drop_hidden_twins(imported.model, file_name, imported.lost);
   if (imported.about.source.empty()) imported.about.source = "{\"format\":\"" + imported.format + "\"}";
   tell_what_is_lost(imported);
+  if (options.up == UpAxis::kAuto) turn_by_source(imported);
   // The user has said which axis is up, or the model has been turned.
-  if (options.up != UpAxis::kKeep) imported.about.up_axis = "y";
+  if (options.up > UpAxis::kKeep) imported.about.up_axis = "y";
   return imported;
 }
 

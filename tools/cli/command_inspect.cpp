@@ -351,12 +351,14 @@ int run_render(const RenderArguments& args) {
   check_usage(args);
   check_output_file(args.output);  // not after the work
   const RunContext context = context_of(args.jobs);
+  PercentLine progress("render");
   RenderedModel model = model_of(args, context);
   if (args.unlit) make_unlit(model);
   const RenderEnvironment environment =
       environment_of(args.environment == "white" ? RenderLight::kWhite : RenderLight::kStudio, context);
   const PictureSheet sheet =
       render_sheet(model, environment, args.views, static_cast<std::uint32_t>(args.size_px), context);
+  progress.end();
   note_empty_picture(sheet, model);
   write_output_file(args.output, write_png(sheet.pixels));
   if (args.json)

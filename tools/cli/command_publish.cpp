@@ -61,6 +61,7 @@ void announce(const ViewArguments& args, const ServedFiles& files, const std::st
 }
 
 [[noreturn]] int run_view(const ViewArguments& args) {
+  if (!std::filesystem::is_directory(args.package)) PackageReader(open_store(args.package));
   const ServedFiles files(args.package, viewer_folder(args.viewer));
   ViewServer server(files);
   const int port = server.bind(args.host, args.port);
@@ -85,9 +86,12 @@ struct ReportArguments {
 };
 
 int run_report(const ReportArguments& args) {
+  check_folder_name(args.folder);
   NewFolder(args.folder, report_folder_rule());  // not after the work
   PackageReader package(open_store(args.package));
+  PercentLine progress("report");
   const Report report = make_report(package, args.options, context_of(args.jobs));
+  progress.end();
   write_report(report, args.folder);
   if (args.json)
     std::cout << to_json_line(report) << '\n';
@@ -101,7 +105,7 @@ struct ExportArguments {
   std::string package, folder, viewer;
   ExportOptions options;
   int width_px = 640, height_px = 480, jobs = 0;
-  bool json = false;
+  bool json = false, draco = false;
 };
 
 /// Options that mean nothing for the target are a mistake of the user's.
@@ -137,6 +141,14 @@ ExportOptions export_options_of(const ExportArguments& a) {
   o.height_px = static_cast<std::uint32_t>(a.height_px);
   check_for_target(o);
   check_plain(o.plain, o.images);
+  const bool is_page = o.target == ExportTarget::kModelViewer;
+  if (a.draco && (!is_page || o.plain))
+    throw UsageError("--draco", "", is_page ? "no --plain" : "--to model-viewer",
+                     std::string(enum_name(o.target)));
+  // A page of a museum asks no foreign host for a decoder unless somebody wants that.
+  if (is_page && !a.draco && o.bytes == 0 && o.images != ExtractImages::kWebp &&
+      o.images != ExtractImages::kAvif)
+    o.plain = true;
   if (!o.url.empty() && !o.url.ends_with("/")) o.url += "/";
   if (o.target == ExportTarget::kOembed) o.viewer = viewer_folder(a.viewer);
   return o;
@@ -144,6 +156,7 @@ ExportOptions export_options_of(const ExportArguments& a) {
 
 int run_export(const ExportArguments& args) {
   const ExportOptions options = export_options_of(args);
+  check_folder_name(args.folder);
   NewFolder(args.folder, export_folder_rule());  // not after the work
   PackageReader package(open_store(args.package));
   PercentLine progress("export");
@@ -196,8 +209,12 @@ void add_target_options(Command& c, ExportArguments& args) {
       .number_in(1, 1e6);
   c.option("--bytes", args.options.bytes, parse_some_bytes,
            "gltf-lod, model-viewer: the best-looking GLB of at most so many bytes: 2MB", "SIZE");
-  c.flag("--plain", args.options.plain,
-         "3dtiles, model-viewer: meshes as floats, for viewers without a decoder of Draco");
+  c.flag(
+      "--plain", args.options.plain,
+      "3dtiles: meshes as floats, for viewers without a decoder of Draco; model-viewer has them so by itself");
+  c.flag(
+      "--draco", args.draco,
+      "model-viewer: meshes by Draco, some 5 % fewer bytes; its script then fetches a decoder from gstatic.com");
   add_image_format_option(c, args.options.images);
   c.option("--screen-error", args.options.screen_error_px,
            "3dtiles: the error at which the viewer takes the next level, its maximumScreenSpaceError or "
@@ -236,6 +253,7 @@ int run_site(SiteArguments& args) {
     throw UsageError("--packages-url", "", "an http or https URL", options.packages_url);
   if (!options.packages_url.empty() && !options.packages_url.ends_with("/")) options.packages_url += "/";
   options.viewer = viewer_folder(args.viewer);
+  check_folder_name(args.folder);
   NewFolder(args.folder, site_folder_rule());  // not after the work
   const Site site = read_site(args.packages, options);
   for (const SiteFault& f : site.faults) std::cerr << "texmesh: " << printable(f.message) << '\n';
@@ -326,7 +344,11 @@ int run_extract(const ExtractArguments& args) {
   for (const AskedBytes& one : args.bytes)
     outputs.push_back(args.bytes.size() > 1 ? output_for(args.output, one) : args.output);
   if (outputs.empty()) outputs.push_back(args.output);
-  for (const std::string& output : outputs) check_output_file(output);  // not after the search
+  for (const std::string& output : outputs) {  // not after the search
+    if (const std::string ending = lower_ending(output); ending != ".glb" && !ending.empty())
+      throw UsageError("--output", "", "the name of a GLB, NAME.glb", output);
+    check_output_file(output);
+  }
   PackageReader package(open_store(args.package));
   PercentLine progress("extract");
   RunContext context = context_of(args.jobs);
@@ -470,8 +492,9 @@ void add_export_command(Command& app) {
       "viewer whose limit is --screen-error takes the next level at that height. The object stands where "
       "its source has it; nothing puts it on the globe.\n"
       "gltf-lod: all major scales from the finest on; levels share materials and textures.\n"
-      "model-viewer: index.html, model.glb and the poster. Draco meshes make the script fetch a decoder from "
-      "gstatic.com; with --plain it needs none.\n"
+      "model-viewer: index.html, model.glb and the poster, which stands there, too, where the script is blocked. The "
+      "script comes from jsDelivr unless --script names your copy of it; with --draco or --bytes it fetches a "
+      "decoder from gstatic.com.\n"
       "oembed: a copy of the package, the viewer and oembed.json, to be put at --url. If a URL names "
       "the package, the package stays there.\n"
       "export.json in the folder lists what was written. The same package gives the same files.\n"

@@ -242,7 +242,7 @@ TEST_F(ExportCommand, OembedCopiesViewerAndPackage) {
   EXPECT_EQ(j["provider_name"], "Museum");
   EXPECT_EQ(j["provider_url"], "https://a.example");
   EXPECT_NE(j["html"].get<std::string>().find(
-                "https://a.example/x/viewer/index.html?panel=0&amp;pkg=../object.texmesh"),
+                "https://a.example/x/viewer/index.html?panel=none&amp;pkg=../object.texmesh"),
             std::string::npos);
   EXPECT_NE(text("index.html").find("application/json+oembed"), std::string::npos);
 }

@@ -79,18 +79,11 @@ constexpr std::uint32_t kPhoneTexturePx = 4096;
 
 std::string_view export_template(std::string_view name) { return built_in_text(export_page_files(), name); }
 
-/// What the package calls itself, or the name of its file without its ending. Plain text.
-std::string page_title(PackageReader& package) {
-  const std::string title = package_title(package);
-  constexpr std::string_view kEnding = ".texmesh";
-  return title.ends_with(kEnding) ? title.substr(0, title.size() - kEnding.size()) : title;
-}
-
 /// index.html beside model.glb, of `glb_bytes` bytes.
 std::string model_viewer_page(PackageReader& package, const ExportOptions& options, std::uint64_t glb_bytes) {
   const About& about = package.about();
   const auto& poster = package.manifest().poster;
-  const std::string title = page_title(package);
+  const std::string title = package_title(package);
   const std::string script = options.script.empty() ? kModelViewerScript : options.script;
   const std::string integrity =
       options.script.empty()
@@ -101,7 +94,7 @@ std::string model_viewer_page(PackageReader& package, const ExportOptions& optio
                  {"style", page_style(export_template("export.css"))},
                  {"title", markup_escaped(title)},
                  {"alt", markup_escaped(about.description.empty() ? title : about.description)},
-                 {"poster", poster ? " poster=\"poster.jpg\"" : ""},
+                 {"poster", poster ? R"(<img slot="poster" src="poster.jpg" alt="">)" : ""},
                  {"script", markup_escaped(script)},
                  {"integrity", integrity},
                  {"rights", rights_line(about)},
@@ -244,7 +237,7 @@ void export_oembed(PackageReader& package, const std::string& path, const Export
                    Export& made) {
   EmbeddedObject object;
   object.about = package.about();
-  object.about.title = page_title(package);
+  object.about.title = package_title(package);
   std::string from_viewer = path;  // as the viewer's page names the package
   if (!is_web_url(path)) {
     const bool tree = package.store().is_folder();
@@ -252,7 +245,7 @@ void export_oembed(PackageReader& package, const std::string& path, const Export
     from_viewer = tree ? "../object/" : "../object.texmesh";
   }
   made.copies.push_back({"viewer", options.viewer});
-  const std::string viewer = "viewer/index.html?panel=0&pkg=" + percent_encoded(from_viewer);
+  const std::string viewer = "viewer/index.html?panel=none&pkg=" + percent_encoded(from_viewer);
   object.page_url = options.url + viewer;
   object.width_px = options.width_px;
   object.height_px = options.height_px;

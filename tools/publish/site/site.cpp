@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <tuple>
 
 #include "format/base/text_bytes.h"
@@ -43,7 +44,10 @@ void read_object(SiteObject& object) {
   const Manifest& m = package.manifest();
   object.digest = to_hex(package.id()).substr(0, 16);
   object.about = package.about();
-  object.title = m.title.empty() ? fs::path(without_ending(object.path)).filename().string() : m.title;
+  object.title = m.title.empty() ? readable_title(object.path) : m.title;
+  object.names_itself = !m.title.empty();
+  if (object.about.metres_per_unit > 0)
+    object.size = sides_in_words((m.bounds_max - m.bounds_min) * object.about.metres_per_unit);
   object.bytes = bytes_beneath(object.source);
   object.start_bytes = start_bytes(m);
   object.triangles = m.scales.front().triangles;
@@ -166,10 +170,12 @@ std::string facts_html(const SiteObject& o) {
   const auto row = [&](const std::string& name, const std::string& html) {
     out += "<dt>" + markup_escaped(name) + "</dt><dd>" + html + "</dd>\n";
   };
+  // The page's own places, and what is said to programs.
+  static const std::set<std::string_view> for_others{"title", "description", "unit", "up axis"};
   for (const NamedText& line : about_lines(o.about))
-    if (line.name != "title" && line.name != "description") row(line.name, text_html(line));
+    if (!for_others.contains(line.name)) row(line.name, text_html(line));
+  if (!o.size.empty()) row("size", markup_escaped(o.size));
   row("package", markup_escaped(figures_of(o)));
-  row("first picture", "after " + markup_escaped(format_bytes(o.start_bytes)));
   return out;
 }
 
@@ -181,7 +187,8 @@ std::string object_page(const SiteObject& o, const SiteOptions& options) {
   const std::string root = root_of(o);
   // The package's address is encoded twice: the viewer decodes the query before it takes the value for a URL.
   const std::string viewer =
-      root + "viewer/index.html?panel=0&pkg=" + percent_encoded(from_below("../", o.address));
+      root + "viewer/index.html?panel=none&pkg=" + percent_encoded(from_below("../", o.address)) +
+      (o.names_itself ? "" : "&title=" + percent_encoded(o.title));
   return filled(
       site_file("object.html"),
       {{"head", head_html(o.title + " - " + options.title, root, true)},

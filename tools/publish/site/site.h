@@ -20,6 +20,8 @@ struct SiteObject {
   std::string address;  // of the package, from a page in the site's folder
   std::string source;   // file or folder on this machine
   std::string title;
+  bool names_itself = false;  // the title is the package's, not its file's name
+  std::string size;           // sides_in_words(); "" where the unit is not known
   About about;
   std::vector<std::uint8_t> poster;  // JPEG; empty = none
   std::uint32_t poster_width_px = 0, poster_height_px = 0;
