@@ -237,6 +237,9 @@ int run_site(SiteArguments& args) {
   if (!options.packages_url.empty() && !is_web_url(options.packages_url))
     throw UsageError("--packages-url", "", "an http or https URL", options.packages_url);
   if (!options.packages_url.empty() && !options.packages_url.ends_with("/")) options.packages_url += "/";
+  if (!options.url.empty() && !is_web_url(options.url))
+    throw UsageError("--url", "", "an http or https URL", options.url);
+  if (!options.url.empty() && !options.url.ends_with("/")) options.url += "/";
   options.viewer = viewer_folder(args.viewer);
   NewFolder(args.folder, site_folder_rule());  // not after the work
   const Site site = read_site(args.packages, options);
@@ -496,6 +499,14 @@ void add_site_command(Command& app) {
   c.option("--packages-url", args.options.packages_url,
            "URL of a folder on the web that has the same packages as PACKAGES (default: site copies them)",
            "URL");
+  c.option(
+      "--url", args.options.url,
+      "URL where the site will stand: pages then say it to search engines, social networks and citations, "
+      "and have code to embed; sitemap.xml",
+      "URL");
+  c.option("--downloads", args.options.downloads_px,
+           "Each object as GLB and USDZ, too: what extract --recentre --display PX writes", "PX")
+      .number_in(1, 1e6);
   c.option("--viewer", args.viewer, "Folder with the built viewer, instead of the viewer of this build",
            "DIR");
   c.flag("--json", args.json, "Print one JSON object (schemas/site.v1.schema.json)");
