@@ -35,4 +35,4 @@ for (const [name, textures] of [['maps', 3], ['metal', 1], ['webp', 1], ['colour
       await page.close();
       await server.close();
     }
-  });
+  }, {seconds: 180});

@@ -1,11 +1,10 @@
 // Draws a GLB or a USDZ by three.js's loaders alone.
 import * as THREE from 'three';
-import {RoomEnvironment} from 'three/addons/environments/RoomEnvironment.js';
 import {GLTFLoader} from 'three/addons/loaders/GLTFLoader.js';
 import {USDLoader} from 'three/addons/loaders/USDLoader.js';
 
 const kSide = 384;
-const renderer = new THREE.WebGLRenderer({antialias: true});
+const renderer = new THREE.WebGLRenderer({antialias: true, preserveDrawingBuffer: true});
 renderer.setSize(kSide, kSide);
 document.body.append(renderer.domElement);
 
@@ -25,20 +24,19 @@ window.drawn = async (url) => {
   const textures = await pictures(object);
   const scene = new THREE.Scene();
   scene.background = new THREE.Color(0x20c020);
-  scene.environment = new THREE.PMREMGenerator(renderer).fromScene(new RoomEnvironment(), 0.04).texture;
+  const sun = new THREE.DirectionalLight(0xffffff, 3);
+  sun.position.set(1, 2, 3);
+  scene.add(sun, new THREE.HemisphereLight(0xffffff, 0x404040, 1));
   scene.add(object);
   const box = new THREE.Box3().setFromObject(object);
   const [centre, size] = [box.getCenter(new THREE.Vector3()), box.getSize(new THREE.Vector3()).length()];
   const camera = new THREE.PerspectiveCamera(40, 1, size / 100, size * 10);
   camera.position.copy(centre).add(new THREE.Vector3(0.5, 0.4, 1).setLength(size * 1.3));
   camera.lookAt(centre);
-  const target = new THREE.WebGLRenderTarget(kSide, kSide, {samples: 4, colorSpace: THREE.SRGBColorSpace});
-  renderer.setRenderTarget(target);
   renderer.render(scene, camera);
   const pixels = new Uint8Array(4 * kSide * kSide);
-  renderer.readRenderTargetPixels(target, 0, 0, kSide, kSide, pixels);
-  renderer.setRenderTarget(null);
-  renderer.render(scene, camera);
+  const gl = renderer.getContext();
+  gl.readPixels(0, 0, kSide, kSide, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
   return {pixels: Array.from(pixels), textures, size};
 };
 window.ready = true;
