@@ -349,7 +349,7 @@ std::string downloads_html(const SiteObject& o, const std::string& root) {
     if (d.media_type == kUsdzMediaType)
       out += fmt::format(
           R"(</p>
-<p><a rel="ar" href="{0}{1}"><img src="{0}{2}" width="64" height="64" alt="In your room: AR on iPhones"></a>)",
+<p><a rel="ar" href="{0}{1}"><img src="{0}{2}" width="64" height="64" alt="Open in your room"></a> AR on iPhones)",
           root, d.address, o.poster.empty() ? "icon.svg" : o.poster_address);
   return out;
 }
