@@ -27,7 +27,7 @@ std::vector<std::string> stale_packages(const BatchPlan& plan) {
       it.disable_recursion_pending();
     else if (path.ends_with(".texmesh") && it->is_regular_file(ec) && !it->is_symlink(ec)) {
       const auto maker = makers.find(std::string_view(path).substr(prefix));
-      if (maker == makers.end() || (maker->second->unread && !is_range_scan(maker->second->input)))
+      if (maker == makers.end() || (maker->second->unread && !holds_model(maker->second->input)))
         stale.push_back(path.substr(prefix));
     }
   }

@@ -2,6 +2,7 @@
 
 #include "format/base/bounded_json.h"
 #include "format/base/text_bytes.h"
+#include "pipeline/import/archive/archive_about.h"
 #include "pipeline/import/foreign_file.h"
 #include "pipeline/import/gltf/import_gltf_parts.h"
 #include "pipeline/import/mesh_builder.h"
@@ -25,7 +26,8 @@ bool is_binary_stl(std::span<const std::uint8_t> bytes) {
 
 enum class Kind { kGltf, kObj, kPly, kStl, kRange };
 
-constexpr const char* kExpected = "a glTF, GLB, OBJ, PLY or STL model or a range scan (.json, Cyberware)";
+constexpr const char* kExpected =
+    "a glTF, GLB, OBJ, PLY or STL model, a ZIP archive of one, or a range scan (.json, Cyberware)";
 
 Kind kind_of(const std::string& file_name, std::span<const std::uint8_t> bytes) {
   if (starts_with(bytes, "glTF")) return Kind::kGltf;
@@ -110,6 +112,24 @@ void tell_what_is_lost(ImportedModel& imported) {
   add_to_source(imported.about, "lost", std::move(list));
 }
 
+/// The model of a ZIP archive, with what the archive says of it.
+ImportedModel import_archive(const std::string& file_name, ByteSpan bytes, const ImportOptions& options,
+                             const RunContext& context) {
+  const auto most = static_cast<std::uint64_t>(options.max_file_bytes);
+  ArchiveFiles archive(file_name, bytes, most);
+  if (archive.model().empty())
+    throw InputError(file_name, "", "an archive with a .gltf, .glb, .obj, .ply or .stl file",
+                     std::to_string(archive.files().size()) + " files of other kinds");
+  const auto entry = std::ranges::find(archive.files(), archive.model(), &ArchivedFile::name);
+  const std::string name = file_name + "/" + readable_name(archive.model());
+  const Bytes model = archive.unpacked(*entry, most);
+  if (starts_with(model, "PK")) throw InputError(name, "first bytes", kExpected, "another archive");
+  ImportedModel imported = import_model(name, model, archive, options, context);
+  imported.about = merge_about(archive_about(archive, archive.model(), imported.model.notes), imported.about);
+  if (options.up != UpAxis::kKeep) imported.about.up_axis = "y";
+  return imported;
+}
+
 }  // namespace
 
 ImportedModel import_model(const std::string& file_name, std::span<const std::uint8_t> bytes,
@@ -120,6 +140,8 @@ ImportedModel import_model(const std::string& file_name, std::span<const std::ui
         file_name, "",
         "at most " + std::to_string(static_cast<std::uint64_t>(options.max_file_bytes)) + " bytes",
         std::to_string(bytes.size()));
+  if (starts_with(bytes, "PK\3\4") || starts_with(bytes, "PK\5\6"))
+    return import_archive(file_name, bytes, options, context);
   if (starts_with(bytes, "\xef\xbb\xbf")) bytes = bytes.subspan(3);  // of a text: no part of it
   ImportedModel imported =
       import_kind(kind_of(file_name, bytes), file_name, bytes, resolver, options, context);

@@ -311,8 +311,9 @@ constexpr const char* kNotes =
     "Exit code: 0 all well, 1 some model failed, 2 usage, 3 internal, 75 try again.";
 
 void add_compile_options(Command& c, CompileArguments& args) {
-  c.option("INPUT", args.inputs,
-           "Models (.glb .gltf .obj .ply .stl, range-scan .json), folders of models, or collections (.json)")
+  c.option(
+       "INPUT", args.inputs,
+       "Models (.glb .gltf .obj .ply .stl, .zip archives of these, range-scan .json), folders of models, or collections (.json)")
       .required();
   c.option("-o,--output", args.output, "NAME.texmesh for one model, a folder for several models", "OUTPUT")
       .required();

@@ -12,6 +12,7 @@
 #include "tools/cli/options/command_line.h"
 #include "tools/cli/options/common_options.h"
 #include "tools/extract/extract.h"
+#include "tools/extract/usdz/usdz.h"
 #include "tools/publish/export/export.h"
 #include "tools/publish/report/report.h"
 #include "tools/publish/site/site.h"
@@ -193,11 +194,12 @@ void add_image_format_option(Command& c, ExtractImages& images) {
 }
 
 void add_target_options(Command& c, ExportArguments& args) {
-  c.choice("--to", args.options.target,
-           "The form: 3dtiles = a tileset of 3D Tiles 1.1 for CesiumJS and its like; gltf-lod = one GLB with "
-           "levels of detail (MSFT_lod); model-viewer = a page with <model-viewer>; oembed = a frame for "
-           "other pages and the oEmbed answer that tells of it",
-           "TARGET")
+  c.choice(
+       "--to", args.options.target,
+       "The form: 3dtiles = a tileset of 3D Tiles 1.1 for CesiumJS and its like; gltf-lod = one GLB with "
+       "levels of detail (MSFT_lod); model-viewer = a page with <model-viewer>, with USDZ for AR on iPhones; oembed = a frame for "
+       "other pages and the oEmbed answer that tells of it",
+       "TARGET")
       .required();
   c.option("-o,--output", args.folder,
            "The folder to make. An earlier export is replaced; any other folder with files is refused", "DIR")
@@ -252,6 +254,9 @@ int run_site(SiteArguments& args) {
   if (!options.packages_url.empty() && !is_web_url(options.packages_url))
     throw UsageError("--packages-url", "", "an http or https URL", options.packages_url);
   if (!options.packages_url.empty() && !options.packages_url.ends_with("/")) options.packages_url += "/";
+  if (!options.url.empty() && !is_web_url(options.url))
+    throw UsageError("--url", "", "an http or https URL", options.url);
+  if (!options.url.empty() && !options.url.ends_with("/")) options.url += "/";
   options.viewer = viewer_folder(args.viewer);
   check_folder_name(args.folder);
   NewFolder(args.folder, site_folder_rule());  // not after the work
@@ -338,6 +343,8 @@ void write_extracted(const ExtractArguments& args, Extracted& extracted, const s
   std::cout << (args.json ? to_json_line(extracted) + "\n" : extract_text(extracted));
 }
 
+bool is_usdz(const std::string& output) { return lower_ending(output) == ".usdz"; }
+
 int run_extract(const ExtractArguments& args) {
   const ExtractRequest request = request_of(args);
   std::vector<std::string> outputs;
@@ -353,7 +360,8 @@ int run_extract(const ExtractArguments& args) {
   PercentLine progress("extract");
   RunContext context = context_of(args.jobs);
   context.progress = [&](double fraction) { progress.show(fraction); };
-  std::vector<Extracted> files = extract_files(package, request, context);
+  std::vector<Extracted> files = is_usdz(args.output) ? extract_usdz(package, request, context)
+                                                      : extract_files(package, request, context);
   progress.end();
   bool within = true;
   for (std::size_t k = 0; k < files.size(); ++k) {
@@ -365,7 +373,9 @@ int run_extract(const ExtractArguments& args) {
 
 void add_extract_options(Command& c, ExtractArguments& args) {
   add_package_argument(c, args.package, true);
-  c.option("-o,--output", args.output, "The GLB to write", "GLB").required();
+  c.option("-o,--output", args.output, "The GLB to write; a name that ends in .usdz gives USDZ, for iPhones",
+           "FILE")
+      .required();
   const Option bytes =
       c.option("--bytes", args.bytes, asked_bytes,
                "The best-looking file of at most so many bytes, and at least 98 % of them: 500kB, 2MB. "
@@ -516,6 +526,14 @@ void add_site_command(Command& app) {
   c.option("--packages-url", args.options.packages_url,
            "URL of a folder on the web that has the same packages as PACKAGES (default: site copies them)",
            "URL");
+  c.option(
+      "--url", args.options.url,
+      "URL where the site will stand: pages then say it to search engines, social networks and citations, "
+      "and have code to embed; sitemap.xml",
+      "URL");
+  c.option("--downloads", args.options.downloads_px,
+           "Each object as GLB and USDZ, too: what extract --recentre --display PX writes", "PX")
+      .number_in(1, 1e6);
   c.option("--viewer", args.viewer, "Folder with the built viewer, instead of the viewer of this build",
            "DIR");
   c.flag("--json", args.json, "Print one JSON object (schemas/site.v1.schema.json)");
@@ -534,15 +552,16 @@ void add_site_command(Command& app) {
 }
 
 void add_extract_command(Command& app) {
-  auto [c, args] =
-      app.add("extract", "Write one GLB that any viewer opens: a scale with whole textures", run_extract);
+  auto [c, args] = app.add(
+      "extract", "Write one GLB or USDZ that any viewer opens: a scale with whole textures", run_extract);
   add_extract_options(c, args);
   c.examples(
       "  texmesh extract bust.texmesh --bytes 500kB -o bust.glb\n"
       "  texmesh extract bust.texmesh --bytes 50kB,100kB,500kB -o bust.glb\n"
       "  texmesh extract bust.texmesh --scale 0 --rung max --image-format png -o master.glb\n"
       "  texmesh extract https://host/bust.texmesh --display 800 -o bust.glb\n"
-      "  texmesh extract bust.texmesh --lods --bytes 2MB -o bust.glb");
+      "  texmesh extract bust.texmesh --lods --bytes 2MB -o bust.glb\n"
+      "  texmesh extract bust.texmesh --bytes 4MB -o bust.usdz");
   c.notes(
       "--bytes chooses the scale and the size and quality of the textures together. It renders candidates "
       "lit, as texmesh render does, and compares them with the package's best (FLIP). Maps that change the "
@@ -551,6 +570,8 @@ void add_extract_command(Command& app) {
       "look better than the reverse.\n"
       "Meshes of scales stay coded by Draco (KHR_draco_mesh_compression), those of whole proxies by meshopt "
       "(EXT_meshopt_compression). WebP needs EXT_texture_webp, AVIF EXT_texture_avif. For programs without these use --plain.\n"
+      "A USDZ has plain meshes, JPEG and PNG, and materials as UsdPreviewSurface. extract refuses what that cannot "
+      "say. Of --bytes a USDZ keeps the upper bound alone; its difference is that of the GLB it is made of.\n"
       "Exit code: 0, 1 when the package is damaged or the GLB cannot be written, 2 usage, 4 when no file "
       "between 98 % and 100 % of --bytes is possible: extract then writes the nearest file. A file that "
       "already holds everything in a package of JPEG sources is no failure.");

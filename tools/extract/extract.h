@@ -83,8 +83,8 @@ struct ExtractedImage {
 };
 
 struct Extracted {
-  std::vector<std::uint8_t> glb;
-  std::string name;                             // of the GLB; who writes it says so
+  std::vector<std::uint8_t> glb;                // or USDZ, of extract_usdz()
+  std::string name;                             // of the file; who writes it says so
   int scale = 0;                                // the finest in the file; of a proxy the package's coarsest
   std::optional<std::uint32_t> proxy;           // the file is this proxy, or made of it
   std::vector<int> levels;                      // of levels of detail: all, finest first
@@ -112,7 +112,7 @@ struct Extracted {
   }
   static void fields(auto& s, auto&& v) {
     v("version", Constant{1}, "");
-    v("file", s.name, "Name of the GLB, without its folder.");
+    v("file", s.name, "Name of the file, without its folder.");
     v("bytes", s.glb.size(), Range{20, kMostGlbBytes}, "");
     v("scale", s.scale, Range{0, 99},
       "Number of the finest scale in the file; with `proxy` the package's coarsest one.");
