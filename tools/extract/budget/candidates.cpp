@@ -361,15 +361,6 @@ std::vector<ImageTrial> LossCurves::trials_around_first(double bytes) const {
     while (middle < trials.last() && trials.likely(middle, kUsualQuality) > wanted * 1.4) middle += 2;
     const TextureCoding coding = candidates_.codings(i).front();
     trials.add(middle, coding, 20);
-    if (!reference_.wishes.best()) {
-      if (seen_[i].front().loss > kLittle * sum) {
-        trials.add(middle - 2, coding, 40);
-        trials.add(middle, coding, 85);
-      }
-      for (const int step : {middle, middle + 2}) trials.add(step, coding, 50);
-      trials.append_to(out);
-      continue;
-    }
     if (seen_[i].front().loss > kLittle * sum) {
       for (const double quality : {20.0, 45.0, kUsualQuality}) trials.add(middle - 2, coding, quality);
       for (const double quality : {40.0, kUsualQuality, 85.0}) trials.add(middle, coding, quality);
