@@ -3,8 +3,8 @@ import { frame } from '../page/framing';
 import type { PageModel, ShowablePackage } from '../page/page_model';
 import { OrbitInput } from './orbit_input';
 import {
-  bytesAt, degreesOf, linkBytesS, mostBytes, numberOf, offerInWords, orbitOf, savesData, slowHostNote,
-  told, words, wordsFor,
+  bytesAt, degreesOf, linkBytesS, mostBytes, numberOf, offerInWords, orbitOf, savesData,
+  sentenceOf, words, wordsFor,
 } from './wording';
 
 /** Looks of the element; applications change them by parts, slots and the custom properties. */
@@ -178,7 +178,7 @@ export class TexmeshViewer extends HTMLElement {
     reveal.querySelector('small')!.textContent = offerInWords(startBytes, allBytes, linkBytesS());
   }
   private get words_(): typeof words.en {
-    return wordsFor((this.closest('[lang]') as HTMLElement | null)?.lang ?? '');
+    return wordsFor(this.closest<HTMLElement>('[lang]')?.lang);
   }
   private get waits_(): boolean {
     return !this.revealed_ && (this.getAttribute('reveal') === 'manual' || savesData());
@@ -215,8 +215,7 @@ export class TexmeshViewer extends HTMLElement {
     const tell = (name: string, detail: object = {}): void =>
       void this.dispatchEvent(new CustomEvent(name, { detail }));
     model.on('open', ({ package: { form } }) => {
-      const note = slowHostNote(form, model.url);
-      if (note) console.info(`<texmesh-viewer>: ${note}`);
+      if (form === 'whole') void this.tellOwner_(({ slowHostNote }) => slowHostNote(form, model.url));
       this.controls_();
     });
     model.on('first-picture', () => {
@@ -260,9 +259,9 @@ export class TexmeshViewer extends HTMLElement {
   /** A sentence and a way on for visitors; the rest for those who look after the page. */
   private fail_(problem: unknown, again: boolean): void {
     const { error, bar } = this.parts_;
-    const { sentence, details } = told(problem, this.src, document.baseURI);
-    const said = this.words_;
-    console.error(`<texmesh-viewer src="${this.src}">: ${details}`);
+    const said = this.words_, { src } = this;
+    console.error(`<texmesh-viewer src="${src}">:`, problem);
+    void this.tellOwner_(({ causeOf }) => causeOf(problem, src, document.baseURI));
     const button =
       Object.assign(document.createElement('button'), { textContent: said.again, hidden: !again });
     button.onclick = () => {
@@ -270,10 +269,15 @@ export class TexmeshViewer extends HTMLElement {
       this.model_?.retry();
     };
     // What fails before there is a model: the browser has no WebGL.
-    error.replaceChildren(said[again ? sentence : 'no3d'], document.createElement('br'), button);
+    error.replaceChildren(said[again ? sentenceOf(problem) : 'no3d'], document.createElement('br'), button);
     error.hidden = false;
     bar.hidden = true;
     this.note_('');
+  }
+  private async tellOwner_(text: (by: typeof import('./for_owners')) => string): Promise<void> {
+    const by = await import('./for_owners').catch(() => undefined);
+    const line = by ? text(by) : '';
+    if (line) console.info(`<texmesh-viewer>: ${line}`);
   }
   /** A short line for a while, or until the next one. */
   private note_(text: string, ms = Infinity): void {

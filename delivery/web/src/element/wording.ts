@@ -93,7 +93,7 @@ export const words: Record<string, Words> = {
     missing: 'This object is not here any more.',
     unreadable: 'This object cannot be shown.',
     unreachable: 'The object did not come. Please check the connection.',
-    no3d: 'This browser cannot show objects in 3D. Another one may, or a newer version.' },
+    no3d: 'This browser cannot show objects in 3D.' },
   de: { loading: 'Wird geladen …', show: 'In 3D ansehen', again: 'Noch einmal versuchen',
     missing: 'Dieses Objekt ist nicht mehr hier.',
     unreadable: 'Dieses Objekt lässt sich nicht zeigen.',
@@ -103,46 +103,16 @@ export const words: Record<string, Words> = {
     missing: "Cet objet n'est plus ici.",
     unreadable: 'Cet objet ne peut pas être affiché.',
     unreachable: "L'objet n'est pas arrivé. Veuillez vérifier la connexion.",
-    no3d: 'Ce navigateur ne peut pas afficher des objets en 3D ; un autre, ou plus récent, le peut.' },
+    no3d: 'Ce navigateur ne peut pas afficher des objets en 3D.' },
 };
 /** The words for a language such as "de-AT"; English where there are none. */
-export const wordsFor = (language: string): Words =>
-  words[language.toLowerCase().split('-')[0]] ?? words.en;
+export const wordsFor = (language = ''): Words => words[language.toLowerCase().split('-')[0]] ?? words.en;
 
-const slowHosts = new Set<string>();
-/** For the console, once a host: that it sends no parts of files; '' where it does, or was told. */
-export function slowHostNote(form: string, url: string): string {
-  const { origin } = new URL(url);
-  if (form !== 'whole' || slowHosts.has(origin)) return '';
-  slowHosts.add(origin);
-  return `${origin} sends no parts of files (range requests, status 206): the whole package is read before ` +
-    'the first picture. Allow ranges, or put an unpacked package (texmesh unpack) beside it.';
-}
-
-/** A sentence for visitors, and what the host's owner needs to know. */
-export interface Told {
-  sentence: keyof Words;
-  /** For the console: the error, and what most often causes it. */
-  details: string;
-}
-/** `page`: the address of the page, `url` that of the package. */
-export function told(error: unknown, url: string, page: string): Told {
-  const details = error instanceof Error ? error.message : String(error);
-  if (!(error instanceof TexmeshError)) return { sentence: 'unreadable', details };
-  const { found, rule } = error;
-  const with_ = (sentence: keyof Words, why: string): Told =>
-    ({ sentence, details: why ? `${details}\n${why}` : details });
-  const status = Number(/status (\d+)/.exec(found)?.[1] ?? 0);
-  if (status >= 400 && status < 500)
-    return with_('missing', `The server's answer for ${url}: status ${status}.`);
-  if (status < 300 && (/html/.test(found) || rule === 'K11'))
-    return with_('unreadable', 'What the server sent is no texmesh package. A host that answers unknown ' +
-      'addresses with its start page does so where the address is wrong.');
-  if (error instanceof InputError && status === 0)
-    return with_('unreachable', new URL(url, page).origin === new URL(page).origin
-      ? 'The server did not answer.'
-      : `The server did not answer, or it does not let ${new URL(page).origin} read its files: it must ` +
-        'send Access-Control-Allow-Origin (CORS).');
-  return with_(error instanceof InputError ? 'unreachable' : 'unreadable',
-    rule && `${rule} is a rule of texmesh's format/SPEC.md: the file is damaged, or a newer format.`);
+/** The sentence that a visitor reads of an error. */
+export function sentenceOf(error: unknown): keyof Words {
+  if (!(error instanceof TexmeshError)) return 'unreadable';
+  const { found, rule } = error, status = Number(/status (\d+)/.exec(found)?.[1] ?? 0);
+  if (status >= 400 && status < 500) return 'missing';
+  const page = status < 300 && (rule === 'K11' || /html/.test(found));
+  return error instanceof InputError && !page ? 'unreachable' : 'unreadable';
 }
