@@ -57,8 +57,8 @@ struct ImportOptions {
       "ICC profiles and gamma of textures are converted to sRGB: auto = except in glTF, whose specification "
       "says that they are ignored");
     v("up", s.up,
-      "up axis of the source, which is turned to glTF's y up: auto = what the source says, else for OBJ, PLY and STL a "
-      "guess by a flat bottom, which is told; keep = leave coordinates alone");
+      "up axis of the source, turned to y: auto = what the source says, else for OBJ, PLY and STL a guess by a flat "
+      "bottom, which is told; keep = as it is");
   }
 };
 

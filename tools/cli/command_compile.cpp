@@ -328,8 +328,7 @@ void add_compile_options(Command& c, CompileArguments& args) {
        "--profile, flags win over the file",
        "FILE")
       .rare();
-  c.option("--meta", args.meta,
-           "JSON file about the object (schemas/meta.v1.schema.json). The file wins over the model's words",
+  c.option("--meta", args.meta, "JSON about the object (schemas/meta.v1.schema.json); it wins over the model",
            "FILE")
       .everyday(kEverydayTitle);
   c.help_option("--help-stage", "Stage ", "Print the options of one stage (--stages lists the stages)");

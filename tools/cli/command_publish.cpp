@@ -352,7 +352,8 @@ int run_extract(const ExtractArguments& args) {
     outputs.push_back(args.bytes.size() > 1 ? output_for(args.output, one) : args.output);
   if (outputs.empty()) outputs.push_back(args.output);
   for (const std::string& output : outputs) {  // not after the search
-    if (const std::string ending = lower_ending(output); ending != ".glb" && ending != ".usdz" && !ending.empty())
+    if (const std::string ending = lower_ending(output);
+        ending != ".glb" && ending != ".usdz" && !ending.empty())
       throw UsageError("--output", "", "the name of a GLB or a USDZ, NAME.glb or NAME.usdz", output);
     check_output_file(output);
   }

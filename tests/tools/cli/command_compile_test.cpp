@@ -200,7 +200,7 @@ TEST_F(CompileCommand, UsageErrorsExitWithTwo) {
   EXPECT_TRUE(files_beneath(folder_.path().string()).empty());
   EXPECT_EQ(texmesh({"--help"}).exit_code, 0);
   EXPECT_EQ(texmesh({"compile", "--help"}).exit_code, 0);
-  EXPECT_NE(texmesh({"--version"}).output.find("package format 2.0"), std::string::npos);
+  EXPECT_NE(texmesh({"--version"}).output.find("package format 2.1"), std::string::npos);
 }
 
 TEST_F(CompileCommand, MemoryLimitIsAnErrorOfTheModel) {

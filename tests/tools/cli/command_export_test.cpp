@@ -163,7 +163,7 @@ TEST_F(ExportCommand, AllFilesAgreeOnUnitsAndAxes) {
 }
 
 TEST_F(ExportCommand, ModelViewerHasAUsdzForIphones) {
-  ASSERT_EQ(run(kScan, "model-viewer").exit_code, 0);
+  ASSERT_EQ(run(kScan, "model-viewer", {"--draco"}).exit_code, 0);
   const std::string page = text("index.html");
   EXPECT_NE(page.find(" ios-src=\"model.usdz\" ar=\"\""), std::string::npos);
   EXPECT_NE(page.find("href=\"model.usdz\""), std::string::npos);
