@@ -124,9 +124,12 @@ ImportedModel import_archive(const std::string& file_name, ByteSpan bytes, const
   const std::string name = file_name + "/" + readable_name(archive.model());
   const Bytes model = archive.unpacked(*entry, most);
   if (starts_with(model, "PK")) throw InputError(name, "first bytes", kExpected, "another archive");
-  ImportedModel imported = import_model(name, model, archive, options, context);
+  ImportOptions of_model = options;
+  if (options.up == UpAxis::kAuto) of_model.up = UpAxis::kKeep;  // turned when the archive has had its word
+  ImportedModel imported = import_model(name, model, archive, of_model, context);
   imported.about = merge_about(archive_about(archive, archive.model(), imported.model.notes), imported.about);
-  if (options.up != UpAxis::kKeep) imported.about.up_axis = "y";
+  if (options.up == UpAxis::kAuto) turn_by_source(imported);
+  if (options.up > UpAxis::kKeep) imported.about.up_axis = "y";
   return imported;
 }
 
