@@ -6,9 +6,9 @@
 // ways, which gives each image a curve of loss against bytes (LossCurves). Every coded mesh is rendered with
 // the best textures. Losses of mesh and textures are added up.
 // 4. The mesh: compile has measured what scales lose, so two or three meshes that are made and looked at tell
-// which is best. With --best the search walks from a likely mesh to neighbours, finer and coarser, while the
-// sum of losses falls. What a mesh leaves of the bytes is dealt out along the curves, where it takes away
-// most loss.
+// which is likely. From it, with --best from another likely one, the search walks to neighbours, finer and
+// coarser, while the sum of losses falls. What a mesh leaves of the bytes is dealt out along the curves,
+// where it takes away most loss.
 // 5. The file is written and filled up to at least 98 % of the bytes (Filling).
 // 6. Sums of losses are guesses. With --best whole pictures decide in a small file: files of other likely
 // meshes, other sizes and codings of the texture that loses most. In a large file textures may be full: then
@@ -161,10 +161,8 @@ double Search::bytes_left(const MeshFile& mesh) const {
 void Search::choose_mesh() {
   best_ = first_mesh(reference_, bytes_);
   least_ = loss_of(best_);
-  if (reference_.wishes.best())
-    walk_to_mesh();
-  else
-    choose_mesh_by_tables();
+  if (!reference_.wishes.best()) choose_mesh_by_tables();
+  walk_to_mesh();
   if (least_ >= kNothing) best_ = {reference_.wishes.scale ? best_.scale : scales().size() - 1, 0};
 }
 
@@ -238,8 +236,9 @@ void Search::walk_to_mesh() {
 
 void Search::follow_direction(int scale_step, int coding_step) {
   const MeshKey from = best_;
+  const int most = reference_.wishes.best() ? 2 : 1;
   int worse = 0;
-  for (int k = 1; worse < 2; ++k) {
+  for (int k = 1; worse < most; ++k) {
     const int scale = static_cast<int>(from.scale) + k * scale_step, coding = from.coding + k * coding_step;
     if (scale < 0 || scale >= static_cast<int>(scales().size()) || coding < 0 || coding >= kMeshCodings)
       return;
