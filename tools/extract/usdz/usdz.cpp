@@ -422,14 +422,14 @@ class Stage {
                      crate_.array(std::vector<std::int32_t>(piece.corners.size() / 3, 3)));
     crate_.attribute(prim, "faceVertexIndices", "int[]", crate_.array(piece.corners));
     crate_.attribute(prim, "points", "point3f[]", crate_.array(points, 3));
-    if (!mesh.normals.empty())
-      add_primvar(
-          prim, "normals", "normal3f[]",
-          crate_.array(flat(piece,
-                            [&](std::uint32_t w) {
-                              return std::array{mesh.normals[w].x, mesh.normals[w].y, mesh.normals[w].z};
-                            }),
-                       3));
+    const auto of_corners = [&](const auto& v) {
+      return crate_.array(flat(piece,
+                               [&](std::uint32_t w) {
+                                 return std::array{v[w].x, v[w].y, v[w].z};
+                               }),
+                          3);
+    };
+    if (!mesh.normals.empty()) add_primvar(prim, "normals", "normal3f[]", of_corners(mesh.normals));
     const PreviewSurface& surface = materials_[material];
     for (std::size_t k = 0; k < surface.texcoords.size(); ++k) {
       const auto& [set, transform] = surface.texcoords[k];
@@ -439,14 +439,7 @@ class Stage {
           prim, "primvars:" + texcoord_name(k), "texCoord2f[]",
           crate_.array(flat(piece, [&](std::uint32_t w) { return usd_texcoord(transform, uv[w]); }), 2));
     }
-    if (surface.colours)
-      add_primvar(
-          prim, "primvars:displayColor", "color3f[]",
-          crate_.array(flat(piece,
-                            [&](std::uint32_t w) {
-                              return std::array{mesh.colours[w].x, mesh.colours[w].y, mesh.colours[w].z};
-                            }),
-                       3));
+    if (surface.colours) add_primvar(prim, "primvars:displayColor", "color3f[]", of_corners(mesh.colours));
     crate_.set(crate_.attribute(prim, "subdivisionScheme", "token", crate_.token("none")), "variability",
                crate_.uniform());
     if (model_.materials[material].double_sided)
