@@ -22,6 +22,9 @@ class Checks:
         self.follow("quality", q=model.document("quality.json", 4 << 20, "quality.v2"), **self.known)
         self.follow("about", about=model.document("about.json", 262144, "about.v2", ("source",)), m=m)
         model.document("provenance.json", 64 << 20)
+        if "annotations" in m:
+            notes = model.document("annotations.json", 4_000_000, "annotations.v2")
+            self.follow("annotations", notes=notes, m=m)
         if "thesis" in m:
             self.check_thesis(Cursor(model.entry("thesis.bin"), "O04", "thesis.bin"))
         if "poster" in m:

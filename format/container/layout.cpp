@@ -55,6 +55,7 @@ constexpr KindOfEntry kKindsOfEntries[] = {
     {EntryKind::kSplitStream, kSplitStreamPath, kInterleaved},
     {EntryKind::kPoster, kPosterPath, kPosterPlace},
     {EntryKind::kThesis, kThesisPath, kOthers},
+    {EntryKind::kAnnotations, kAnnotationsPath, kOthers},
     {EntryKind::kAbout, kAboutPath, kAboutPlace},
     {EntryKind::kContentCredential, kContentCredentialPath, kBehindAll},
     {EntryKind::kMesh, "mesh/s%02u.glb", kInterleaved},

@@ -43,6 +43,7 @@ inline constexpr const char* kAboutPath = "about.json";
 inline constexpr const char* kSplitStreamPath = "mesh/stream.bin";
 inline constexpr const char* kPosterPath = "poster.jpg";
 inline constexpr const char* kThesisPath = "thesis.bin";
+inline constexpr const char* kAnnotationsPath = "annotations.json";
 
 /// A C2PA manifest store over the container, where there is one: the last entry, named by neither manifest
 /// nor index, because it signs them; and its most bytes.
@@ -90,6 +91,7 @@ enum class EntryKind : std::uint8_t {
   kOther,
   kProvenance,
   kAbout,
+  kAnnotations,
   kContentCredential
 };
 struct EntryName {

@@ -125,6 +125,9 @@ void entry_members(auto& v, auto& m) {
   });
   optional("thesis", m.thesis, ref);
   optional("poster", m.poster, [](auto& inner, auto& poster) { poster_members(inner, poster); });
+  optional("annotations", m.annotations, ref);
+  if (m.annotations)
+    v.by("N05").check("annotations", m.minor >= 1, "version 2.1 or later", "2." + std::to_string(m.minor));
 }
 
 void read_version(const JsonAt& at, Manifest& m) {
@@ -172,6 +175,7 @@ void set_paths(Manifest& m) {
   m.about.path = kAboutPath;
   if (m.thesis) m.thesis->path = kThesisPath;
   if (m.poster) m.poster->path = kPosterPath;
+  if (m.annotations) m.annotations->path = kAnnotationsPath;
 }
 
 /// Scales whose column says the stream's offset are prefixes of it.

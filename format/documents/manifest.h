@@ -90,6 +90,7 @@ struct Manifest {
   std::optional<StreamRef> stream;  // vertex splits
   std::optional<EntryRef> thesis;   // thesis_tables.h
   std::optional<PosterRef> poster;
+  std::optional<EntryRef> annotations;  // annotations.h; from 2.1 on
   friend bool operator==(const Manifest&, const Manifest&) = default;
 };
 

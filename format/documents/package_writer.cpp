@@ -48,8 +48,11 @@ class ManifestFiller {
     for (std::size_t k = 0; k < manifest_.proxies.size(); ++k)
       set(manifest_.proxies[k].glb, proxy_path(static_cast<std::uint32_t>(k)));
     fill_stream();
-    manifest_.thesis.reset();
-    if (by_path_.contains(kThesisPath)) set(manifest_.thesis.emplace(), kThesisPath);
+    for (auto [entry, path] :
+         {std::pair(&manifest_.thesis, kThesisPath), std::pair(&manifest_.annotations, kAnnotationsPath)}) {
+      entry->reset();
+      if (by_path_.contains(path)) set(entry->emplace(), path);
+    }
     if (manifest_.poster) set(*manifest_.poster, kPosterPath);
   }
 

@@ -7,7 +7,9 @@
 
 #include "format/base/text_bytes.h"
 #include "format/container/layout.h"
+#include "pipeline/about/source_annotations.h"
 #include "pipeline/compile/stage_table.h"
+#include "pipeline/import/archive/archive_about.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/file_resolver.h"
 #include "pipeline/io/machine.h"
@@ -216,7 +218,8 @@ class ModelSource {
   std::shared_ptr<ImportedModel> imported_;
 };
 
-/// What made the package, without dates, hosts or paths. What package.meta says stands in about.json.
+/// What made the package, without dates, hosts or paths. What package.meta and
+/// package.annotations say stands in about.json and annotations.json.
 std::string provenance(const ModelSource& source, const CompileOptions& options) {
   Json stages = Json::object(), libraries = Json::object();
   for (const Stage& s : default_stage_table())
@@ -224,14 +227,30 @@ std::string provenance(const ModelSource& source, const CompileOptions& options)
   for (const auto& [name, version] : library_versions()) libraries[name] = version;
   CompileOptions recorded = options;
   recorded.package.meta.clear();
+  Json profile = profile_json(recorded);
+  profile["package"].erase("annotations");
   return Json{{"version", 1},
               {"tool", "texmesh " + tool_version()},
               {"format", {{"major", kFormatMajor}, {"minor", 0}}},  // stage package knows the minor
               {"inputs", to_json(source.inputs())},
-              {"options", profile_json(recorded)},
+              {"options", profile},
               {"stages", stages},
               {"libraries", libraries}}
       .dump();
+}
+
+/// The options with the notes that an archive has beside its model, where the user gives no others.
+CompileOptions with_archived_annotations(CompileOptions options, const std::string& input, Notes& notes) {
+  if (!options.package.annotations.empty()) return options;
+  const auto found = archived_annotations(input);
+  if (!found) return options;
+  const std::string name = fs::path(input).filename().string() + "/" + found->first;
+  try {
+    options.package.annotations = write_annotations(read_source_annotations(found->second, name, notes));
+  } catch (const Error& e) {
+    add_warning(notes, "annotations", name, std::string("the notes are left out: ") + e.what());
+  }
+  return options;
 }
 
 void refuse_warnings(const Notes& notes, const std::string& input) {
@@ -259,10 +278,12 @@ class ModelGraph {
   GraphRun graph_;  // refers to stages_, which therefore stands first
 };
 
-CompileOutcome compile_source(const CompileRequest& request, const CompileOptions& options,
+CompileOutcome compile_source(const CompileRequest& request, const CompileOptions& resolved,
                               ModelSource& source, Store& store, const RunContext& context,
                               const StageObserver& observer) {
   source.open(store, context, true);
+  Notes notes;
+  const CompileOptions options = with_archived_annotations(resolved, request.input, notes);
   ModelGraph graph(source, stage_table(options), options, store, context, observer);
   graph->explain(request.earlier_keys, request.explainer);
   const std::shared_ptr<const Bytes> package = graph->run(kPackage);
@@ -271,6 +292,7 @@ CompileOutcome compile_source(const CompileRequest& request, const CompileOption
   outcome.package_bytes = package->size();
   outcome.package_digest = sha256(*package);
   outcome.notes = graph->notes();
+  outcome.notes.insert(outcome.notes.end(), notes.begin(), notes.end());
   outcome.files = source.files();
   outcome.keys = graph->keys();
   if (request.strict) refuse_warnings(outcome.notes, request.input);
@@ -312,9 +334,11 @@ void run_towards(const CompileRequest& request, Stage last, Store& store, const 
 
 std::vector<StageForecast> forecast_model(const CompileRequest& request, Store& store,
                                           const RunContext& context) {
-  const CompileOptions options = resolve_options(request.options);
+  CompileOptions options = resolve_options(request.options);
   ModelSource source(request);
   source.open(store, context, false);
+  Notes unused;
+  options = with_archived_annotations(std::move(options), request.input, unused);
   ModelGraph graph(source, stage_table(options), options, store, context, {});
   graph->explain(request.earlier_keys, {});
   std::vector<StageForecast> forecasts;

@@ -1,7 +1,9 @@
 #include "pipeline/compile/stage_table.h"
 
+#include "pipeline/import/placed_annotations.h"
 #include "pipeline/io/program.h"
 #include "stages/fill/fill.h"
+#include "stages/geometry/mesh_topology.h"
 #include "stages/previews/previews.h"
 
 namespace texmesh {
@@ -65,14 +67,19 @@ Results<PackageTables, ThesisTables> measure_fragments(const Fragments& fragment
   return {{std::move(made.tables), std::move(made.thesis)}, {}};
 }
 
-Bytes package_all(const NestedScales& scales, const PerceptualValues& perceptual, const Images& images,
-                  const Fragments& fragments, const Ladder& ladder, const Previews& previews,
-                  const PackageTables& tables, const ThesisTables& thesis, const ScaleFiles& files,
-                  const MeasuredQuality& quality, const Poster& poster, const Proxies& proxies,
-                  const About& source, const std::string& provenance, const PackageOptions& options,
-                  double jnd, const RunContext& context) {
-  return assemble_package(scales, perceptual, images, fragments, ladder, previews, tables, thesis, files,
-                          quality, poster, proxies, source, jnd, provenance, options, context);
+Results<Bytes> package_all(const NestedScales& scales, const PerceptualValues& perceptual,
+                           const Images& images, const Fragments& fragments, const Ladder& ladder,
+                           const Previews& previews, const PackageTables& tables, const ThesisTables& thesis,
+                           const ScaleFiles& files, const MeasuredQuality& quality, const Poster& poster,
+                           const Proxies& proxies, const About& source, const std::string& provenance,
+                           const PackageOptions& options, double jnd, UpAxis up, const RunContext& context) {
+  Notes notes;
+  PackageOptions placed = options;
+  placed.annotations = placed_annotations(options.annotations, source, up, scales.mesh.origin,
+                                          to_double(bounding_box(scales.mesh.positions)), notes);
+  return {assemble_package(scales, perceptual, images, fragments, ladder, previews, tables, thesis, files,
+                           quality, poster, proxies, source, jnd, provenance, placed, context),
+          std::move(notes)};
 }
 
 std::vector<StageLibrary> libraries(std::initializer_list<const char*> names) {
@@ -108,7 +115,8 @@ Stage package_stage(const CompileOptions& o) {
   return stage({"package", kPackageVersion, "everything -> the container", .01},
                inputs(kNestedScales, kPerceptualValues, kImages, kFragments, kLadder, kPreviews, kTables,
                       kThesisTables, kScaleFiles, kQuality, kPoster, kProxies, kSourceAbout, kProvenance),
-               outputs(kPackage), read_of(o, o.package, o.perceptual_values.jnd), {}, package_all);
+               outputs(kPackage), read_of(o, o.package, o.perceptual_values.jnd, o.import.up), {},
+               package_all);
 }
 
 }  // namespace

@@ -92,7 +92,7 @@ void turn_by_source(ImportedModel& m) {
   add_info(m.model.notes, kTurnedNote, "",
            std::string(said ? "the source says that " : "by its flat bottom ") + up +
                " is up; turned so that y is (--up keep leaves it as it is)");
-  add_to_source(m.about, "turned",
+  add_to_source(m.about, kTurnedMember,
                 {{"up", std::string(1, up)}, {"by", said ? "the source's word" : "a guess"}});
 }
 

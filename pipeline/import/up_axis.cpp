@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "stages/base/first_use_table.h"
 
@@ -138,20 +139,22 @@ char guessed_up(const Mesh& mesh) { return UpGuess(mesh).best(); }
 
 void turn_up(Mesh& mesh, char up) {
   if (up != 'x' && up != 'z') return;
-  const auto turn = [up](auto& v) {
-    if (up == 'x')
-      v = {-v.y, v.x, v.z};
-    else
-      v = {v.x, v.z, -v.y};
-  };
+  const auto turn = [up](auto& v) { v = turned_up(v, up); };
   for (Vec4f& t : mesh.tangents) {
-    Vec3f v{t.x, t.y, t.z};
-    turn(v);
+    const Vec3f v = turned_up(Vec3f{t.x, t.y, t.z}, up);
     t = {v.x, v.y, v.z, t.w};
   }
   turn(mesh.origin);
   for (Vec3f& p : mesh.positions) turn(p);
   for (Vec3f& n : mesh.normals) turn(n);
+}
+
+char turned_axis(const About& about, UpAxis up) {
+  if (up != UpAxis::kAuto) return up == UpAxis::kKeep ? 'y' : enum_name(up)[0];
+  const auto source = nlohmann::json::parse(about.source, nullptr, false);
+  const std::string axis =
+      source.is_object() && source.contains(kTurnedMember) ? source[kTurnedMember].value("up", "y") : "y";
+  return axis == "x" || axis == "z" ? axis[0] : 'y';
 }
 
 }  // namespace texmesh

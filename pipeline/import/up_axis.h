@@ -1,5 +1,5 @@
 #pragma once
-#include "format/model/model.h"
+#include "pipeline/import/import.h"
 
 namespace texmesh {
 
@@ -13,5 +13,18 @@ char guessed_up(const Mesh& mesh);
 /// Turns the mesh with its origin so that `up`, x, y or z, becomes y: a quarter about the axis that neither
 /// is nor becomes up, as OutputTransform turns.
 void turn_up(Mesh& mesh, char up);
+
+/// The member of About::source that tells of a turn.
+inline constexpr const char* kTurnedMember = "turned";
+
+/// A point or direction, turned so.
+template <class T>
+Vec3<T> turned_up(Vec3<T> v, char up) {
+  return up == 'x' ? Vec3<T>{-v.y, v.x, v.z} : up == 'z' ? Vec3<T>{v.x, v.z, -v.y} : v;
+}
+
+/// The axis of the source that became y: by the user's word, else as import_model() has told it in
+/// About::source. 'y' where nothing was turned.
+char turned_axis(const About& about, UpAxis up);
 
 }  // namespace texmesh

@@ -283,7 +283,7 @@ std::vector<std::uint8_t> assemble_package(const NestedScales& scales, const Per
   manifest.required_features = required_features(ladder);
   std::vector<TextureInfo> textures;
   std::vector<PackageEntry> entries;
-  manifest.minor = needed_minor(tables);
+  manifest.minor = std::max(needed_minor(tables), options.annotations.empty() ? 0 : 1);
   entries.push_back(
       {kTablesPath, write_tables(select_scales(tables, stored_rows(manifest, tables)), manifest.minor)});
   entries.push_back(
@@ -291,6 +291,10 @@ std::vector<std::uint8_t> assemble_package(const NestedScales& scales, const Per
   entries.push_back({kQualityPath, to_bytes(write_quality(quality.table))});
   entries.push_back({kProvenancePath, to_bytes(with_minor(provenance_json, manifest.minor))});
   entries.push_back({kAboutPath, to_bytes(write_about(about))});
+  if (!options.annotations.empty()) {
+    read_annotations(text_bytes(options.annotations));
+    entries.push_back({kAnnotationsPath, to_bytes(options.annotations)});
+  }
   for (const ScaleFile& file : files.files)
     if (!file.glb.empty())
       entries.push_back({mesh_path(file.scale), with_copyright(file.glb, copyright_line(source))});

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "format/documents/about.h"
+#include "format/documents/annotations.h"
 #include "format/documents/tables.h"
 #include "format/documents/thesis_tables.h"
 #include "stages/data/fragments.h"
@@ -16,11 +16,13 @@ namespace texmesh {
 inline constexpr int kPackageVersion = 6;
 
 struct PackageOptions {
-  std::string title, meta;
+  std::string title, meta, annotations;
   static void fields(auto& s, auto&& v) {
     v("title", s.title, "shown by viewers, before any other title");
     v("meta", s.meta, Range{0, static_cast<double>(kMaxAboutBytes)}, ProfileOnly{},
       "about.json without what the source says, as one text; --meta FILE sets it");
+    v("annotations", s.annotations, Range{0, static_cast<double>(kMaxAnnotationsBytes)}, ProfileOnly{},
+      "notes at points of the object, as one text of annotations.json; --annotations FILE sets it");
   }
 };
 
@@ -30,8 +32,9 @@ struct PackageOptions {
 /// every scale of the chain; the perceptual table of thesis.bin is made here. A pure function of its inputs:
 /// nothing runs in parallel here. `source` is what the source says about itself: about.json is that with
 /// options.meta and options.title over it. asset.copyright of the scales' files is the source's own, so that
-/// they stay as they are when options.meta changes. `provenance_json` is made by the pipeline (options, input
-/// digests, stage versions; no dates, hosts or paths).
+/// they stay as they are when options.meta changes. options.annotations are those of the package, placed.
+/// `provenance_json` is made by the pipeline (options, input digests, stage versions; no dates, hosts or
+/// paths).
 std::vector<std::uint8_t> assemble_package(const NestedScales& scales, const PerceptualValues& perceptual,
                                            const std::vector<Image>& images, const Fragments& fragments,
                                            const Ladder& ladder, const Previews& previews,

@@ -9,6 +9,7 @@
 
 #include "format/base/archive.h"
 #include "format/base/errors.h"
+#include "pipeline/about/source_annotations.h"
 #include "pipeline/batch/fleet/run_summary.h"
 #include "pipeline/batch/memo/memo_segment.h"
 #include "pipeline/batch/plan.h"
@@ -104,6 +105,13 @@ bool read_as_collection(ByteSpan input) {
   });
 }
 
+bool read_as_notes(ByteSpan input) {
+  return unless_refused([&] {
+    Notes notes;
+    write_annotations(read_source_annotations(input, "fuzz", notes));
+  });
+}
+
 bool read_as_summary(ByteSpan input) {
   return unless_refused([&] {
     const RunSummary summary = read_summary(input, "fuzz");
@@ -191,6 +199,14 @@ Bytes sealed_again(ByteSpan input) {
   return to_bytes(seal(text_of(input.first(input.size() - kSealBytes))));
 }
 
+std::vector<Bytes> notes_seeds() {
+  return {to_bytes(R"([{"name":"A","content":{"raw":"![a](https://a.b/c)"},"position":[1,2,3],"eye":[0,0,1],"target":[0,0,0]}])"),
+          to_bytes(R"({"models":[{"annotations":[{"titles":{"EN":"A"},"leads":{"EN":"<i>t"},"position":[0,1,2],"direction":[0,0,2]}]}]})"),
+          to_bytes(R"x({"items":[{"type":"Annotation","label":{"en":["A"]},"body":{"value":"<p>t","format":"text/html","language":["de"]},
+            "target":{"selector":[{"value":"POINT Z (1 2 3)"},{"x":1,"y":2,"z":3}]}}]})x")
+};
+}
+
 std::vector<Bytes> collection_seeds() {
   return {
       to_bytes(R"({"version":1,"options":{"ladder":{"rungs":[30,60]}},"about":{"licence":"CC-BY-4.0"},
@@ -238,6 +254,7 @@ void add_batch_targets(std::vector<Target>& list) {
                {"profile", false, read_as_profile,
                 [] { return std::vector<Bytes>{to_bytes(write_profile(CompileOptions{}))}; }, Shape::kJson},
                {"collection", false, read_as_collection, collection_seeds, Shape::kJson},
+               {"notes", false, read_as_notes, notes_seeds, Shape::kJson},
                {"summary", false, read_as_summary, summary_seeds, Shape::kJson},
                {"events", false, read_events, event_seeds}});
 }

@@ -7,7 +7,7 @@
 
 #include "delivery/cpp/package/package_reader.h"
 #include "format/base/errors.h"
-#include "format/documents/about.h"
+#include "format/documents/annotations.h"
 #include "format/documents/index.h"
 #include "format/documents/thesis_tables.h"
 #include "format/rules/allocation.h"
@@ -109,6 +109,12 @@ void read_quality_twice(ByteSpan input) {
 void read_about_twice(ByteSpan input) {
   const std::string json = write_about(read_about(input));
   require(write_about(read_about(as_bytes(json))) == json, "about.json changed by being written twice");
+}
+
+void read_annotations_twice(ByteSpan input) {
+  const std::string json = write_annotations(read_annotations(input));
+  require(write_annotations(read_annotations(as_bytes(json))) == json,
+          "annotations.json changed by being written twice");
 }
 
 void read_package(ByteSpan input) {
@@ -235,6 +241,12 @@ std::vector<Bytes> about_seeds() {
     "coordinateReference":{"text":"t","epsg":4326},"source":{"format":"obj","x":[1.5,null]},"extras":-1e9})")};
 }
 
+std::vector<Bytes> annotation_seeds() {
+  return {to_bytes(R"({"frame":"package","annotations":[{"position":[0,1,2.5],"normal":[0,0,1],
+    "texts":[{"language":"en-GB","title":"A","text":"t"}],"camera":{"position":[0,0,5],"target":[0,1,2],"fovDegrees":30},
+    "images":[{"url":"https://a.b/c"}]}]})")};
+}
+
 std::vector<Bytes> split_seeds() {
   std::vector<Bytes> list;
   for (const std::uint32_t n : {3u, 5u})
@@ -245,21 +257,23 @@ std::vector<Bytes> split_seeds() {
 }  // namespace
 
 void add_format_targets(std::vector<Target>& list) {
-  list.insert(list.end(),
-              {{"container", true, unless_format_error<read_container_again>, containers, Shape::kContainer},
-               {"package", false, unless_format_error<read_package>, packages, Shape::kContainer},
-               {"manifest", true, unless_format_error<read_manifest_twice>, manifests, Shape::kJson},
-               {"textures", false, unless_format_error<read_textures_twice>,
-                [] { return entries(kTexturesPath); }, Shape::kJson},
-               {"quality", false, unless_format_error<read_quality_twice>,
-                [] { return entries(kQualityPath); }, Shape::kJson},
-               {"about", false, unless_format_error<read_about_twice>, about_seeds, Shape::kJson},
-               {"index", true, unless_format_error<read_index_twice>, [] { return entries(kIndexPath); },
-                Shape::kBytes, [](ByteSpan b) { return with_digests(b, 16, 44, 8); }},
-               {"tables", true, unless_format_error<read_tables_twice>, [] { return entries(kTablesPath); },
-                Shape::kBytes, [](ByteSpan b) { return with_digests(b, 16, 36, 0); }},
-               {"thesis", true, unless_format_error<read_thesis_twice>, thesis_seeds},
-               {"stream", true, unless_format_error<read_split_stream>, split_seeds}});
+  list.insert(
+      list.end(),
+      {{"container", true, unless_format_error<read_container_again>, containers, Shape::kContainer},
+       {"package", false, unless_format_error<read_package>, packages, Shape::kContainer},
+       {"manifest", true, unless_format_error<read_manifest_twice>, manifests, Shape::kJson},
+       {"textures", false, unless_format_error<read_textures_twice>, [] { return entries(kTexturesPath); },
+        Shape::kJson},
+       {"quality", false, unless_format_error<read_quality_twice>, [] { return entries(kQualityPath); },
+        Shape::kJson},
+       {"about", false, unless_format_error<read_about_twice>, about_seeds, Shape::kJson},
+       {"annotations", false, unless_format_error<read_annotations_twice>, annotation_seeds, Shape::kJson},
+       {"index", true, unless_format_error<read_index_twice>, [] { return entries(kIndexPath); },
+        Shape::kBytes, [](ByteSpan b) { return with_digests(b, 16, 44, 8); }},
+       {"tables", true, unless_format_error<read_tables_twice>, [] { return entries(kTablesPath); },
+        Shape::kBytes, [](ByteSpan b) { return with_digests(b, 16, 36, 0); }},
+       {"thesis", true, unless_format_error<read_thesis_twice>, thesis_seeds},
+       {"stream", true, unless_format_error<read_split_stream>, split_seeds}});
 }
 
 }  // namespace texmesh::fuzz

@@ -8,7 +8,7 @@ import zlib
 
 DOCUMENTS = {"index": "index.bin", "tables": "tables.bin", "textures": "textures.json", "quality": "quality.json",
              "about": "about.json", "provenance": "provenance.json", "thesis": "thesis.bin", "poster": "poster.jpg",
-             "stream": "mesh/stream.bin"}
+             "stream": "mesh/stream.bin", "annotations": "annotations.json"}
 CREDENTIAL = "META-INF/content_credential.c2pa"
 
 

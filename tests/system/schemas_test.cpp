@@ -7,7 +7,7 @@
 #include <map>
 #include <span>
 
-#include "format/documents/about.h"
+#include "format/documents/annotations.h"
 #include "format/documents/manifest.h"
 #include "format/documents/quality_table.h"
 #include "format/documents/textures.h"
@@ -33,6 +33,7 @@ const std::map<std::string, Reader>& readers() {
   static const std::map<std::string, Reader> map{
       {"manifest.v2", [](const std::string& s) { read_manifest(bytes_of(s)); }},
       {"about.v2", [](const std::string& s) { read_about(bytes_of(s)); }},
+      {"annotations.v2", [](const std::string& s) { read_annotations(bytes_of(s), "a.json"); }},
       {"meta.v1", [](const std::string& s) { read_meta(s, "meta.json", "meta"); }},
       {"textures.v2", [](const std::string& s) { read_textures(bytes_of(s)); }},
       {"quality.v2", [](const std::string& s) { read_quality(bytes_of(s)); }},

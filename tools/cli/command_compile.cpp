@@ -8,6 +8,7 @@
 
 #include "format/base/text_bytes.h"
 #include "format/documents/about.h"
+#include "pipeline/about/source_annotations.h"
 #include "pipeline/about/source_fields.h"
 #include "pipeline/batch/fleet/model_list.h"
 #include "pipeline/batch/plan.h"
@@ -49,7 +50,7 @@ constexpr const char* kEverydayTitle = "What the package holds";
 struct CompileArguments {
   PackageNames names = PackageNames::kStem;
   std::vector<std::string> inputs, layers;
-  std::string output, profile, jnd_profile, meta, shard, costs;
+  std::string output, profile, jnd_profile, meta, annotations, shard, costs;
   std::optional<std::uint64_t> memory_bytes;  // else four fifths of what the process may use
   CacheChoice cache;
   int jobs = 0;
@@ -57,6 +58,7 @@ struct CompileArguments {
   RunSettings run;
   std::map<std::string, std::string> options;  // path -> text
   std::string meta_text;                       // what the file of --meta says
+  std::string annotations_text;                // what the file of --annotations says, as annotations.json
 };
 
 /// The field's own text, what it may be and its default. Names of values and of symbols stay as they are.
@@ -122,6 +124,15 @@ void read_meta_file(CompileArguments& args) {
   args.meta_text = read_meta(std::string(bytes.begin(), bytes.end()), args.meta);
 }
 
+/// What is left out of the file is told at once: it is the same for every model.
+void read_annotations_file(CompileArguments& args) {
+  if (args.annotations.empty()) return;
+  Notes notes;
+  args.annotations_text = write_annotations(read_source_annotations(
+      read_input_file(args.annotations, kMaxNotesFileBytes), args.annotations, notes));
+  for (const Note& note : notes) std::cerr << "texmesh: " << note.place << ": " << note.text << '\n';
+}
+
 /// Flags win over everything that a file says.
 void apply_flags(const CompileArguments& args, CompileOptions& options) {
   std::vector<OptionField> fields = list_options(options);
@@ -131,6 +142,7 @@ void apply_flags(const CompileArguments& args, CompileOptions& options) {
                shorter == kShortNames.end() ? "--" + path : shorter->second.name);
   }
   options.package.meta = merge_meta(options.package.meta, args.meta_text);
+  if (!args.annotations_text.empty()) options.package.annotations = args.annotations_text;
   check_options(options, "command line");
 }
 
@@ -182,7 +194,7 @@ RunSettings run_settings(const CompileArguments& args) {
     if (!std::filesystem::is_directory(folder))
       throw UsageError("--links-within", "", "a folder that is there", folder);
   run.mode = output_mode(args);
-  for (const std::string& file : {args.profile, args.jnd_profile, args.meta})
+  for (const std::string& file : {args.profile, args.jnd_profile, args.meta, args.annotations})
     if (!file.empty()) run.more_inputs.push_back(file);
   return run;
 }
@@ -331,6 +343,12 @@ void add_compile_options(Command& c, CompileArguments& args) {
   c.option("--meta", args.meta, "JSON about the object (schemas/meta.v1.schema.json); it wins over the model",
            "FILE")
       .everyday(kEverydayTitle);
+  c.option(
+       "--annotations", args.annotations,
+       "Notes at points of the object: texmesh's own form (schemas/annotations.v2.schema.json), Sketchfab's, "
+       "Voyager's or W3C's; in the coordinates of the source",
+       "FILE")
+      .rare();
   c.help_option("--help-stage", "Stage ", "Print the options of one stage (--stages lists the stages)");
   add_run_options(c, args);
   add_all_cache_options(c, args);
@@ -342,6 +360,7 @@ int run_compile(CompileArguments& args) {
   RunSettings settings;
   const BatchPlan plan = as_usage([&] {  // nothing has been compiled yet
     read_meta_file(args);
+    read_annotations_file(args);
     if (!args.profile.empty()) args.profile = profile_file(args.profile);
     const PlanRequest request = plan_request(args);
     settings = run_settings(args);

@@ -12,8 +12,9 @@ namespace texmesh {
 namespace {
 
 constexpr double kExtractDisplayPx = 1000;
-constexpr double kDisplayQuality = 90;  // of images that were made smaller
-constexpr double kTopQuality = 97;      // of images coded anew from planes that say no quality
+constexpr double kDisplayQuality = 90;        // of images that were made smaller
+constexpr std::size_t kNotesFrameBytes = 64;  // of names and padding around the notes
+constexpr double kTopQuality = 97;            // of images coded anew from planes that say no quality
 
 FileImage format_of(const ExtractScale& wishes, bool alpha) {
   if (wishes.images == ExtractImages::kPng) return FileImage::kPng;
@@ -157,22 +158,37 @@ std::vector<Extracted> extract_files(PackageReader& package, const ExtractReques
   const About& about = package.about();
   const OutputTransform place =
       output_transform(about, request.recentre ? Vec3d{} : package.manifest().origin, request.keep_units);
+  const std::string notes = placed_notes(package.annotations(), place);
+  // In a file for a number of bytes they may take a twentieth, as the words about the object.
+  const std::uint64_t room = notes.empty() ? 0 : notes.size() + kNotesFrameBytes;
+  const auto holds_notes = [room](std::uint64_t bytes) {
+    return room > 0 && (bytes == 0 || room <= bytes / 20);
+  };
   std::vector<Extracted> out;
   if (const auto* scale = std::get_if<ExtractScale>(&request.file))
     out.push_back(ScaleExtraction(package, *scale, context).run(place));
   else if (const auto* proxy = std::get_if<ExtractProxy>(&request.file))
     out.push_back(extract_proxy(package, *proxy, place, context));
-  else
-    out = extract_within_bytes(package, std::get<ExtractBudget>(request.file), place, context);
+  else {
+    ExtractBudget budget = std::get<ExtractBudget>(request.file);
+    for (std::uint64_t& bytes : budget.bytes)
+      if (holds_notes(bytes)) bytes -= room;
+    out = extract_within_bytes(package, budget, place, context);
+  }
   const About words = transformed_about(about, place);
   const std::string units = units_note(about, place);
-  for (Extracted& file : out) {
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    Extracted& file = out[i];
     if (!units.empty()) file.notes.push_back(units);
-    if (file.asked_bytes == 0) continue;
     const std::size_t before = file.glb.size();
-    if (!add_words(file.glb, words, file.asked_bytes))
+    if (file.asked_bytes > 0 && !add_words(file.glb, words, file.asked_bytes))
       file.notes.emplace_back(
           "the bytes do not hold all that is known of the object; texmesh dump PKG about prints it");
+    if (file.asked_bytes > 0) file.asked_bytes = std::get<ExtractBudget>(request.file).bytes[i];
+    if (holds_notes(file.asked_bytes))
+      add_notes(file.glb, notes);
+    else if (room > 0)
+      file.notes.emplace_back("the bytes do not hold the notes; texmesh dump PKG annotations prints them");
     file.mesh_bytes += file.glb.size() - before;
   }
   return out;

@@ -97,6 +97,7 @@ const std::vector<EntryRef>& PackageReader::index() {
   for (const ManifestProxy& proxy : manifest_.proxies) require_entry(proxy.glb);
   if (manifest_.thesis) require_entry(*manifest_.thesis);
   if (manifest_.poster) require_entry(*manifest_.poster);
+  if (manifest_.annotations) require_entry(*manifest_.annotations);
   if (manifest_.stream) {
     const auto it = std::ranges::find(entries, std::string(kSplitStreamPath), &EntryRef::path);
     if (it == entries.end() || it->offset != manifest_.stream->offset || it->bytes != manifest_.stream->bytes)
@@ -246,6 +247,12 @@ const QualityTable& PackageReader::quality() {
 const About& PackageReader::about() {
   if (!about_) about_ = read_about(entry(manifest_.about));
   return *about_;
+}
+
+const Annotations& PackageReader::annotations() {
+  if (!annotations_)
+    annotations_ = manifest_.annotations ? read_annotations(entry(*manifest_.annotations)) : Annotations{};
+  return *annotations_;
 }
 
 Bytes PackageReader::scale_glb(int scale) {

@@ -2,7 +2,7 @@
 #include <map>
 
 #include "format/container/container.h"
-#include "format/documents/about.h"
+#include "format/documents/annotations.h"
 #include "format/documents/manifest.h"
 #include "format/documents/quality_table.h"
 #include "format/documents/tables.h"
@@ -62,6 +62,8 @@ class PackageReader {
   const PackageTables& tables();                  // one element per texture plane, consistent with textures()
   const QualityTable& quality();                  // of the manifest's scales and the planes' groups
   const About& about();
+  /// The notes of annotations.json; empty where the package has none.
+  const Annotations& annotations();
   /// What the thesis's policy reads of a plane, from thesis.bin; nullptr where the package says nothing of
   /// it.
   const PlaneThesis* plane_thesis(std::size_t plane);
@@ -113,6 +115,7 @@ class PackageReader {
   std::optional<QualityTable> quality_;
   std::optional<ThesisTables> thesis_;
   std::optional<About> about_;
+  std::optional<Annotations> annotations_;
   // [plane][rung][fragment]: running sums of sizes in PlaneTables::order
   std::vector<std::vector<std::vector<std::uint64_t>>> fragment_offsets_;
   std::map<std::uint32_t, Bytes> table_streams_;  // by plane

@@ -1,5 +1,6 @@
 #include "pipeline/import/archive/archive_about.h"
 
+#include "pipeline/about/source_annotations.h"
 #include "pipeline/about/source_fields.h"
 #include "pipeline/import/text_scan.h"
 
@@ -8,13 +9,21 @@ namespace {
 
 constexpr std::uint64_t kMaxTextBytes = 65'536;
 
-/// The text of the file with this last part, in any case, that is least deep; "" without one.
-std::string text_named(ArchiveFiles& archive, std::string_view last) {
+/// The file of at most so many bytes that is least deep of those whose last part, in small letters, is
+/// `wanted`.
+const ArchivedFile* least_deep(const ArchiveFiles& archive, std::uint64_t max_bytes, const auto& wanted) {
   const ArchivedFile* found = nullptr;
   for (const ArchivedFile& f : archive.files())
-    if (lower(f.name.substr(f.name.rfind('/') + 1)) == last && f.bytes <= kMaxTextBytes &&
+    if (wanted(lower(f.name.substr(f.name.rfind('/') + 1))) && f.bytes <= max_bytes &&
         (!found || std::ranges::count(f.name, '/') < std::ranges::count(found->name, '/')))
       found = &f;
+  return found;
+}
+
+/// The text of the file with this last part, in any case, that is least deep; "" without one.
+std::string text_named(ArchiveFiles& archive, std::string_view last) {
+  const ArchivedFile* found =
+      least_deep(archive, kMaxTextBytes, [&](const std::string& name) { return name == last; });
   if (!found) return "";
   const Bytes bytes = archive.unpacked(*found, kMaxTextBytes);
   return utf8_of(text_of(bytes));
@@ -67,6 +76,20 @@ About archive_about(ArchiveFiles& archive, const std::string& model, Notes& note
   for (const char* name : {"coords.txt", "proj.txt"})
     if (about.crs.empty()) read_coordinates(text_named(archive, name), about, notes);
   return about;
+}
+
+std::optional<std::pair<std::string, Bytes>> archived_annotations(const std::string& path) {
+  if (lower_extension(path) != "zip") return {};
+  try {
+    ArchiveFiles archive(open_file_source(path), kAnyArchiveSize);
+    const auto named = [&](const auto& wanted) { return least_deep(archive, kMaxNotesFileBytes, wanted); };
+    const ArchivedFile* found = named([](const std::string& name) { return name == "annotations.json"; });
+    if (!found) found = named([](const std::string& name) { return name.ends_with("svx.json"); });
+    if (!found) return {};
+    return std::pair(readable_name(found->name), archive.unpacked(*found, kMaxNotesFileBytes));
+  } catch (const Error&) {
+    return {};  // the import says what is wrong with the archive
+  }
 }
 
 }  // namespace texmesh

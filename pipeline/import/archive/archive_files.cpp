@@ -213,17 +213,19 @@ std::optional<std::size_t> model_of_archive(const std::vector<ArchivedFile>& fil
 }
 
 bool is_archive_of_model(const std::string& path) {
-  constexpr std::uint64_t kAnySize = std::uint64_t{1} << 62;
   try {
     const auto source = open_file_source(path);
-    return model_of_archive(list_archive(*source, kAnySize), path).has_value();
+    return model_of_archive(list_archive(*source, kAnyArchiveSize), path).has_value();
   } catch (const Error&) {
     return true;  // the build says what is wrong with it
   }
 }
 
 ArchiveFiles::ArchiveFiles(std::string archive, ByteSpan bytes, std::uint64_t max_bytes)
-    : archive_(std::move(archive)), source_(memory_source(bytes, archive_)) {
+    : ArchiveFiles(memory_source(bytes, archive), max_bytes) {}
+
+ArchiveFiles::ArchiveFiles(std::unique_ptr<ByteSource> source, std::uint64_t max_bytes)
+    : archive_(source->name()), source_(std::move(source)) {
   files_ = list_archive(*source_, max_bytes);
   if (const auto k = model_of_archive(files_, archive_)) model_ = files_[*k].name;
   folder_ = model_.substr(0, model_.rfind('/') + 1);

@@ -8,6 +8,8 @@ namespace texmesh {
 
 /// Most files of an archive that texmesh reads.
 inline constexpr std::size_t kMaxArchiveFiles = 20'000;
+/// For list_archive(): files of any size.
+inline constexpr std::uint64_t kAnyArchiveSize = std::uint64_t{1} << 62;
 
 /// A file of a ZIP archive.
 struct ArchivedFile {
@@ -38,6 +40,7 @@ class ArchiveFiles : public Resolver {
  public:
   /// Keeps the bytes' span.
   ArchiveFiles(std::string archive, ByteSpan bytes, std::uint64_t max_bytes);
+  ArchiveFiles(std::unique_ptr<ByteSource> source, std::uint64_t max_bytes);
   /// "" without a model, see model_of_archive().
   const std::string& model() const { return model_; }
   const std::vector<ArchivedFile>& files() const { return files_; }

@@ -378,6 +378,20 @@ bool add_words(Bytes& glb, const About& about, std::uint64_t bytes) {
   return false;
 }
 
+std::string placed_notes(const Annotations& annotations, const OutputTransform& place) {
+  if (annotations.list.empty()) return "";
+  Annotations placed = annotations;
+  const OutputTransform turn{.origin = {}, .up = place.up};
+  transform_annotations(placed, place, turn);
+  return Json::parse(write_annotations(placed))["annotations"].dump();
+}
+
+void add_notes(Bytes& glb, const std::string& notes) {
+  GlbParts parts = read_glb(glb, "file");
+  parts.root["extras"]["texmesh"]["annotations"] = Json::parse(notes);
+  glb = glb_container(parts.root.dump(-1, ' ', false, Json::error_handler_t::replace), parts.binary);
+}
+
 namespace {
 
 StandaloneGlb stored_file(PackageReader& package, int scale) {

@@ -519,6 +519,8 @@ class UsdzFiles {
     const std::uint64_t pictures = before - file.mesh_bytes;
     file.mesh_bytes = file.glb.size() > pictures ? file.glb.size() - pictures : 0;
     file.notes.insert(file.notes.end(), usdz.notes.begin(), usdz.notes.end());
+    if (!package_.annotations().list.empty())
+      file.notes.emplace_back("a USDZ has no notes; texmesh dump PKG annotations prints them");
     return file;
   }
 

@@ -65,7 +65,8 @@ const std::array<Kind, 11>& kinds() {
        {"source images", {EntryKind::kSource}},
        {"the thesis's tables", {EntryKind::kThesis}},
        {"about, provenance and others",
-        {EntryKind::kAbout, EntryKind::kProvenance, EntryKind::kOther, EntryKind::kContentCredential}}}};
+        {EntryKind::kAbout, EntryKind::kAnnotations, EntryKind::kProvenance, EntryKind::kOther,
+         EntryKind::kContentCredential}}}};
   return list;
 }
 
@@ -318,6 +319,7 @@ std::string summary_text(PackageReader& p, DumpGamma) {
   if (m.poster)
     s += fmt::format("poster    {} x {} px, {} kB\n", m.poster->width_px, m.poster->height_px,
                      kilobytes(m.poster->bytes));
+  if (m.annotations) s += fmt::format("notes     {}\n", p.annotations().list.size());
   const std::string stream =
       m.stream ? stream_table(p.split_stream_head()).text() : "vertex-split stream: none\n";
   const std::string textures = p.textures().empty() ? "textures: none\n" : textures_table(p).text();
@@ -518,6 +520,20 @@ std::string about_text(PackageReader& p, DumpGamma) {
          verbatim_text("what the source said", about.source);
 }
 
+std::string annotations_text(PackageReader& p, DumpGamma) {
+  const std::vector<Annotation>& list = p.annotations().list;
+  if (list.empty()) return "notes: none\n";
+  Table table("notes", {"note", Column::text("position"), Column::text("camera"), "images",
+                        Column::text("languages"), Column::text("title")});
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    std::string languages;
+    for (const AnnotationText& t : list[i].texts) languages += (languages.empty() ? "" : ", ") + t.language;
+    table.row({i + 1, vector_text(list[i].position), list[i].camera ? "yes" : "no", list[i].images.size(),
+               languages, list[i].texts.front().title});
+  }
+  return table.text();
+}
+
 AtlasDiagnosis atlas_of(PackageReader& p) { return diagnose_atlases(atlas_subject(p, {}), {}); }
 
 struct PartWriters {
@@ -543,6 +559,11 @@ constexpr PartWriters kWriters[] = {
     {about_text,
      [](PackageReader& p, DumpGamma) {
        return Json{{"about", Json::parse(checked(p, p.manifest().about, read_about))}};
+     }},
+    {annotations_text,
+     [](PackageReader& p, DumpGamma) {
+       const Annotations& all = p.annotations();
+       return all.list.empty() ? Json::object() : Json::parse(write_annotations(all));
      }},
     {provenance_text, [](PackageReader& p, DumpGamma) {
        return Json{{"provenance", Json::parse(checked(p, p.manifest().provenance, read_provenance))}};

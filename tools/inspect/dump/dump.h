@@ -15,14 +15,15 @@ enum class DumpPart : std::uint8_t {
   kAtlas,
   kEntries,
   kAbout,
+  kAnnotations,
   kProvenance,
   kAll
 };
 template <>
 struct EnumNames<DumpPart> {
-  static constexpr std::array<std::string_view, 11> names{"summary", "scales",     "fragments", "ladder",
-                                                          "tables",  "perceptual", "atlas",     "entries",
-                                                          "about",   "provenance", "all"};
+  static constexpr std::array<std::string_view, 12> names{"summary", "scales",      "fragments",  "ladder",
+                                                          "tables",  "perceptual",  "atlas",      "entries",
+                                                          "about",   "annotations", "provenance", "all"};
 };
 
 /// Gamma (0..1) at which the part "tables" shows the allocation, with every fragment's quality and bytes;
@@ -33,7 +34,8 @@ using DumpGamma = std::optional<double>;
 /// units.
 std::string dump_text(PackageReader& package, DumpPart part, DumpGamma gamma = {});
 
-/// The same part as one JSON object, with every figure in full; `all` joins the parts' members. The shape
+/// The same part as one JSON object, with every figure in full; `all` joins the parts' members. A
+/// package without notes has no member "annotations". The shape
 /// of `scales` is fixed: schemas/dump-scales.v1.schema.json.
 nlohmann::ordered_json dump_json(PackageReader& package, DumpPart part, DumpGamma gamma = {});
 DocumentSchema dump_scales_schema();

@@ -414,9 +414,10 @@ class EntryVerifier {
               [&] { check_split_stream(package_.manifest, store_.read(e), share_, context_, findings_); });
     } else if (name.kind == EntryKind::kPoster) {
       guarded(findings_, {"poster", "O01"}, e.path, [&] { check_poster_entry(e); });
-    } else if (name.kind == EntryKind::kThesis) {
-      findings_.require(package_.manifest.thesis.has_value(), {"entry-set", "E03"}, e.path, "",
-                        "to be named by the manifest", "not there");
+    } else if (name.kind == EntryKind::kThesis || name.kind == EntryKind::kAnnotations) {
+      const Manifest& m = package_.manifest;
+      findings_.require((name.kind == EntryKind::kThesis ? m.thesis : m.annotations).has_value(),
+                        {"entry-set", "E03"}, e.path, "", "to be named by the manifest", "not there");
     } else if (name.kind == EntryKind::kSource) {
       guarded(findings_, {"source", "O02"}, e.path, [&] { check_source_entry(e, name); });
     } else if (name.kind == EntryKind::kOther || name.kind == EntryKind::kFragmentFile) {
@@ -614,6 +615,9 @@ class Verifier {
     });
     guarded(findings_, "about", kAboutPath, [&] {
       check_about(package_.manifest, read_about(store_.read(package_.manifest.about)), findings_);
+    });
+    guarded(findings_, "annotations", kAnnotationsPath, [&] {
+      if (package_.manifest.annotations) read_annotations(store_.read(*package_.manifest.annotations));
     });
     guarded(findings_, {"provenance", "O03"}, kProvenancePath, [&] {
       const Bytes bytes = store_.read(package_.manifest.provenance);

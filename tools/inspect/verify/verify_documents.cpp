@@ -152,6 +152,7 @@ void check_references(const Manifest& m, const std::vector<EntryRef>& index, Fin
   }
   if (m.thesis) check(*m.thesis, "/thesis");
   if (m.poster) check(*m.poster, "/poster");
+  if (m.annotations) check(*m.annotations, "/annotations");
   for (std::size_t k = 0; k < m.proxies.size(); ++k) check(m.proxies[k].glb, at("proxies/offset", k));
   for (std::size_t k = 0; k < m.scales.size(); ++k)
     if (m.scales[k].has_glb()) check(m.scales[k].glb, at("scales/offset", k));

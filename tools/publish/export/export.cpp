@@ -13,6 +13,7 @@
 #include "pipeline/io/uri.h"
 #include "stages/gltf/check_glb.h"
 #include "tools/extract/extract.h"
+#include "tools/extract/glb/standalone_glb.h"
 #include "tools/extract/usdz/usdz.h"
 #include "tools/publish/pages/page.h"
 #include "tools/publish/view/served_files.h"
@@ -88,8 +89,31 @@ std::string download_line(const std::string& name, std::uint64_t bytes) {
                      markup_escaped(format_bytes(bytes)));
 }
 
+/// Notes as <model-viewer> shows them: buttons at points of the GLB, which `place` has placed.
+std::string hotspots(PackageReader& package, const OutputTransform& place) {
+  std::string out;
+  const std::string json = placed_notes(package.annotations(), place);
+  if (json.empty()) return out;
+  int number = 0;
+  for (const Json& note : Json::parse(json)) {
+    const auto words = [](const Json& v, const char* unit) {
+      return fmt::format("{0}{3} {1}{3} {2}{3}", v[0].get<double>(), v[1].get<double>(), v[2].get<double>(),
+                         unit);
+    };
+    const std::string normal =
+        note.contains("normal") ? fmt::format(" data-normal=\"{}\"", words(note["normal"], "")) : "";
+    ++number;
+    out += fmt::format(
+        "<button class=\"note\" slot=\"hotspot-{0}\" data-position=\"{1}\"{2} title=\"{3}\" aria-label=\"{0}: {3}\">{0}</button>",
+        number, words(note["position"], "m"), normal,
+        markup_escaped(note["texts"][0]["title"].get<std::string>()));
+  }
+  return out;
+}
+
 /// index.html beside the files that `made` has: model.glb, and model.usdz where there is one.
-std::string model_viewer_page(PackageReader& package, const ExportOptions& options, const Export& made) {
+std::string model_viewer_page(PackageReader& package, const ExportOptions& options, const Export& made,
+                              const OutputTransform& place) {
   std::string downloads, ios;
   for (const ExportedFile& f : made.files) {
     downloads += download_line(f.path, f.bytes.size());
@@ -114,6 +138,8 @@ std::string model_viewer_page(PackageReader& package, const ExportOptions& optio
                  {"integrity", integrity},
                  {"rights", rights_line(about)},
                  {"ios", ios},
+                 {"hotspots", hotspots(package, place)},
+                 {"notes", notes_html(package.annotations())},
                  {"downloads", downloads}});
 }
 
@@ -264,12 +290,16 @@ void add_usdz(PackageReader& package, const ExportOptions& options, const Extrac
 
 void export_model_viewer(PackageReader& package, const ExportOptions& options, const RunContext& context,
                          Export& made) {
-  Extracted extracted = extract_model(package, request_for(options, form_of(options)), context);
+  const ExtractRequest request = request_for(options, form_of(options));
+  const Vec3d origin = request.recentre ? Vec3d{} : package.manifest().origin;
+  const OutputTransform place = output_transform(package.about(), origin, request.keep_units);
+  Extracted extracted = extract_model(package, request, context);
   note_large_textures(extracted, made);
   made.open = "index.html";
   add_usdz(package, options, extracted, context, made);
   add_glb(made, std::move(extracted), kGlbFile);
-  made.files.insert(made.files.begin(), text_file("index.html", model_viewer_page(package, options, made)));
+  made.files.insert(made.files.begin(),
+                    text_file("index.html", model_viewer_page(package, options, made, place)));
   add_poster(package, made);
 }
 

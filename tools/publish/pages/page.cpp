@@ -99,6 +99,23 @@ std::string rights_line(const About& about) {
   return out.empty() ? out : "<p class=\"quiet\">" + out + "</p>\n";
 }
 
+std::string notes_html(const Annotations& annotations) {
+  std::string out;
+  for (std::size_t i = 0; i < annotations.list.size(); ++i) {
+    const Annotation& a = annotations.list[i];
+    out += fmt::format("<li id=\"note-{}\">", i + 1);
+    for (const AnnotationText& t : a.texts) {
+      out += fmt::format("<div lang=\"{}\"><h3>{}</h3>", t.language, markup_escaped(t.title));
+      if (!t.text.empty()) out += "<p>" + markup_escaped(t.text) + "</p>";
+      out += "</div>";
+    }
+    for (const AnnotationImage& image : a.images)
+      out += fmt::format("<p><a href=\"{0}\" rel=\"noopener\">{0}</a></p>", markup_escaped(image.url));
+    out += "</li>\n";
+  }
+  return out.empty() ? "" : "<ol class=\"notes\">\n" + out + "</ol>\n";
+}
+
 namespace {
 
 constexpr double kWidth = 760, kHeight = 356, kLeft = 58, kRight = 16, kTop = 30, kBottom = 46;

@@ -48,6 +48,9 @@ std::string package_title(PackageReader& package);
 /// A paragraph of HTML: whose the object is, and the licence as a link to where it can be read; "" where
 /// nothing is known.
 std::string rights_line(const About& about);
+/// The notes of a package as a numbered list of HTML, every language's text with its tag, images as links; ""
+/// without any. Note k has the id note-k.
+std::string notes_html(const Annotations& annotations);
 
 /// A line or a row of dots of a Plot.
 struct PlotSeries {

@@ -60,6 +60,7 @@ export function indexPage(bytes: Uint8Array, { plane, entries: count, minor }: P
   if (plane >= 0) return entries;
   const refs: (ByteRange & { path: string; sha256?: Uint8Array } | undefined)[] = [
     m.tables, m.textures, m.quality, m.provenance, m.about, m.stream, m.thesis, m.poster,
+    m.annotations,
     ...[...m.scales.filter(hasGlb), ...m.proxies].map(({ glb }) => glb),
   ];
   for (const ref of refs) {

@@ -14,6 +14,8 @@ export const qualityPath = 'quality.json';
 export const provenancePath = 'provenance.json';
 /** What only the thesis's policy reads. */
 export const thesisPath = 'thesis.bin';
+/** Notes at points of the object. */
+export const annotationsPath = 'annotations.json';
 /** What the object is, whose it is, what its coordinates mean. */
 export const aboutPath = 'about.json';
 /** Path of a scale's GLB, as mesh/s07.glb. */

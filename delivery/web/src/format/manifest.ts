@@ -121,6 +121,8 @@ export interface Manifest {
   /** thesis.bin, which no load reads. */
   thesis?: EntryRef;
   poster?: PosterRef;
+  /** annotations.json, which texmesh/notes reads. */
+  annotations?: EntryRef;
 }
 
 /** What is shown first: the smallest proxy, where there is none the GLB of the coarsest scale. */
@@ -316,6 +318,8 @@ export function readManifest(json: Uint8Array): Manifest {
     about: readRef(at.at('about'), paths.aboutPath),
     ...(stream ? { stream } : {}),
     ...(at.has('thesis') ? { thesis: readRef(at.at('thesis'), paths.thesisPath) } : {}),
+    ...(at.has('annotations')
+      ? { annotations: readRef(at.at('annotations'), paths.annotationsPath) } : {}),
     ...(at.has('poster') ? { poster: readPoster(at.at('poster')) } : {}),
   };
 }

@@ -1,6 +1,7 @@
 import { requireSelfContained } from '../../src/format/glb';
 import { SplitStreamReader } from '../../src/format/splits/split_stream';
 import { PackageReader } from '../../src/reader';
+import { readNotes } from '../../src/notes';
 import { readThesis } from '../../src/thesis';
 
 /** Reads all that a client may read of a package; gives the mesh at the end of the stream. */
@@ -11,6 +12,7 @@ export async function readAll(bytes: Uint8Array): Promise<SplitStreamReader | un
   await reader.quality();
   await reader.about();
   await readThesis(reader);
+  await readNotes(reader);
   const coarsest = reader.manifest.scales.at(-1)!.scale;
   for (const { scale, glb } of reader.manifest.scales) if (glb.path.endsWith('.glb'))
     requireSelfContained(await reader.scaleGlb(scale), scale !== coarsest);
