@@ -1,5 +1,5 @@
 // Bundles the library: dist/texmesh.js (everything; three.js stays outside), dist/open.js (to show packages), dist/page.js
-// (many on one page), dist/reader.js (without three.js), dist/thesis.js (chapter 4 as printed, thesis.bin), dist/worker.js, dist/viewer/
+// (many on one page), dist/reader.js (without three.js), dist/thesis.js (chapter 4 as printed, thesis.bin), dist/notes.js (notes and measuring), dist/worker.js, dist/viewer/
 // (an element by one script tag, with three.js inside). Each entry stands alone: the parts that an entry loads by import()
 // belong to that entry.
 //   node build.mjs               builds
@@ -19,14 +19,14 @@ const here = dirname(fileURLToPath(import.meta.url));
 const dist = join(here, 'dist');
 /** Source files of the entries. */
 const entries = {
-  texmesh: 'index', open: 'open', page: 'page', reader: 'reader', thesis: 'thesis', worker: 'worker',
+  texmesh: 'index', open: 'open', page: 'page', reader: 'reader', thesis: 'thesis', notes: 'notes', worker: 'worker',
   blocks: 'blocks',
 };
 /**
  * Gzip bytes of texmesh/open that an application may have to load, three.js and the worker apart: before the first picture; with
  * every part that is ever loaded. Then the same of `texmesh`, and the worker with the decoders.
  */
-const most = { first: 20 * 1024, all: 46 * 1024, texmesh: 36 * 1024, texmeshAll: 54 * 1024, page: 24 * 1024, pageAll: 51 * 1024, viewer: 181 * 1024, worker: 23 * 1024, blocks: 18 * 1024, printed: 2 * 1024 };
+const most = { first: 20 * 1024, all: 46 * 1024, texmesh: 36 * 1024, texmeshAll: 54 * 1024, page: 24 * 1024, pageAll: 51 * 1024, viewer: 181 * 1024, worker: 23 * 1024, blocks: 18 * 1024, printed: 2 * 1024, notes: 9 * 1024 };
 
 /**
  * Workers decode documents. Where there are none, the page itself loads the workers' file, which has mostly come already: nothing is
@@ -136,6 +136,7 @@ if (process.argv.includes('--check-size')) {
   say('the element, three.js inside', await viewerSize(), most.viewer);
   say('worker: the decoders', worker.all, most.worker);
   say('beside these: chapter 4 as printed, for the policy thesis', open.printed, most.printed);
+  say('beside these: notes, measuring', (await sizesOf('notes')).all, most.notes);
   say('beside these: the encoder, where memory asks for compressed textures', blocks.all + open.beside, most.blocks);
   process.exit(good ? 0 : 1);
 }

@@ -5,7 +5,7 @@ import ts from 'typescript';
 
 const types = process.argv[2] ?? 'dist/types';
 const file = (name) => join(types, `${name}.d.ts`);
-const entries = ['index', 'open', 'page', 'reader', 'thesis', 'worker'];
+const entries = ['index', 'open', 'page', 'reader', 'thesis', 'notes', 'worker'];
 const node = ts.ModuleKind.NodeNext;
 const program = ts.createProgram(entries.map(file), { module: node, moduleResolution: ts.ModuleResolutionKind.NodeNext, skipLibCheck: true });
 const checker = program.getTypeChecker();

@@ -29,7 +29,8 @@ export default defineConfig({
   plugins: [dracoDecoder()],
   resolve: {
     // The library beside this example; other applications `npm install texmesh` instead.
-    alias: { texmesh: fileURLToPath(new URL('../../delivery/web/dist/texmesh.js', import.meta.url)) },
+    alias: Object.fromEntries([['texmesh/notes', 'notes.js'], ['texmesh', 'texmesh.js']].map(([name, file]) =>
+      [name, fileURLToPath(new URL(`../../delivery/web/dist/${file}`, import.meta.url))])),
     dedupe: ['three'],
   },
   worker: { format: 'es' },

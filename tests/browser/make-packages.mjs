@@ -30,6 +30,15 @@ const kPackages = {
     scan: ['--triangles', '1500', '--texture', '256', '--charts', '6'], options: ['--rungs', '20,85'],
     meta: {attribution: '<img src=x onerror=alert(1)> Museum of Casts', licence: 'CC-BY-4.0'},
   },
+  // Notes: one in two languages with a camera, one behind the object, with a script in its text.
+  noted: {
+    scan: ['--triangles', '3000', '--texture', '256', '--charts', '8', '--textures'], options: ['--rungs', '20,85'],
+    notes: {annotations: [
+      {position: [0, 0, 0.16], normal: [0, 0, 1], camera: {position: [0, 0, 0.8], target: [0, 0, 0], fovDegrees: 40},
+        texts: [{language: 'en', title: 'The front', text: 'Mended in 1820.'}, {language: 'de', title: 'Die Vorderseite'}]},
+      {position: [0, 0, -0.11], normal: [0, 0, -1], texts: [{language: 'en', title: '<img src=x onerror=alert(1)>', text: '<script>alert(1)</script>'}],
+        images: [{url: 'https://example.org/a.jpg'}]}]},
+  },
   // No texture at all: colours of vertices.
   colours: {scan: ['--triangles', '1500', '--texture', '0', '--charts', '4'], ending: 'ply', options: []},
 };
@@ -68,7 +77,9 @@ export function makePackages() {
     else run(env.makeScan, '-o', scan, ...p.scan);
     const meta = p.meta ? ['--meta', path.join(packages, `${name}.json`)] : [];
     if (p.meta) fs.writeFileSync(meta[1], JSON.stringify(p.meta));
-    run(env.texmesh, 'compile', scan, '-o', file, ...kQuick, ...p.options, ...meta);
+    const notes = p.notes ? ['--annotations', path.join(packages, `${name}-notes.json`)] : [];
+    if (p.notes) fs.writeFileSync(notes[1], JSON.stringify(p.notes));
+    run(env.texmesh, 'compile', scan, '-o', file, ...kQuick, ...p.options, ...meta, ...notes);
     if (p.proxies) addProxies(file, scan, p.proxies);
     if (!p.sheet) fs.rmSync(scan);
     run(env.texmesh, 'unpack', file, '-o', path.join(packages, name), '--force');

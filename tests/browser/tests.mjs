@@ -16,6 +16,7 @@ import './element-tests.mjs';
 import './limits-tests.mjs';
 import './materials-tests.mjs';
 import './memory-tests.mjs';
+import './notes-tests.mjs';
 import './page-tests.mjs';
 import './proxy-tests.mjs';
 import './thesis-tests.mjs';

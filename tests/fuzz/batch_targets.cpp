@@ -200,11 +200,14 @@ Bytes sealed_again(ByteSpan input) {
 }
 
 std::vector<Bytes> notes_seeds() {
-  return {to_bytes(R"([{"name":"A","content":{"raw":"![a](https://a.b/c)"},"position":[1,2,3],"eye":[0,0,1],"target":[0,0,0]}])"),
-          to_bytes(R"({"models":[{"annotations":[{"titles":{"EN":"A"},"leads":{"EN":"<i>t"},"position":[0,1,2],"direction":[0,0,2]}]}]})"),
-          to_bytes(R"x({"items":[{"type":"Annotation","label":{"en":["A"]},"body":{"value":"<p>t","format":"text/html","language":["de"]},
-            "target":{"selector":[{"value":"POINT Z (1 2 3)"},{"x":1,"y":2,"z":3}]}}]})x")
-};
+  return {
+      to_bytes(R"x([{"name":"A","content":{"raw":"![a](https://a.b/c)"},"position":[1,2,3],
+            "eye":[0,0,1],"target":[0,0,0]}])x"),
+      to_bytes(R"({"models":[{"annotations":[{"titles":{"EN":"A"},"leads":{"EN":"<i>t"},"position":[0,1,2],
+            "direction":[0,0,2]}]}]})"),
+      to_bytes(R"x({"items":[{"type":"Annotation","label":{"en":["A"]},
+            "body":{"value":"<p>t","format":"text/html","language":["de"]},
+            "target":{"selector":[{"value":"POINT Z (1 2 3)"},{"x":1,"y":2,"z":3}]}}]})x")};
 }
 
 std::vector<Bytes> collection_seeds() {

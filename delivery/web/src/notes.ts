@@ -1,4 +1,4 @@
-// Notes at points of the object. Apart from the library: nothing of an ordinary load needs it.
+// Notes at points of the object, and measuring. Apart from the library: nothing of an ordinary load needs it.
 
 import { type Annotation, readAnnotations } from './format/annotations';
 import type { PackageDocuments } from './http/package_documents';
@@ -12,3 +12,10 @@ export async function readNotes(documents: PackageDocuments, signal?: AbortSigna
   return readAnnotations(await documents.readChecked(annotations, { kind: 'other', signal }));
 }
 
+export * from './notes/editor';
+export * from './notes/layer';
+export * from './notes/measure';
+export * from './notes/measuring';
+export * from './notes/pick';
+export * from './notes/texts';
+export * from './notes/words';

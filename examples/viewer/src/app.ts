@@ -2,6 +2,7 @@ import { choicesFromAddress } from './choices';
 import { Comparison } from './comparison';
 import { byId } from './dom';
 import { hideMessage, offerPackages, showError } from './message';
+import { Notes } from './notes';
 import { Panel } from './panel/panel';
 import { warmDecoders } from './session/decoders';
 import { Session } from './session/session';
@@ -32,8 +33,10 @@ export function start(query: URLSearchParams): void {
     refine: () => { void session.refine(); },
   }, session.live);
   const soonStatus = atMostEvery(kStatusMs, () => showStatus(session.live, packageUrl));
+  const notes = new Notes(stage, session);
   session.onChange = () => {
     panel.update(session.live);
+    notes.changed();
     soonStatus();
   };
   session.onError = (error) => {

@@ -92,6 +92,7 @@ export class TexmeshViewer extends HTMLElement {
   private revealed_ = false;
   private served_ = { src: '', bytes: 0 }; // what the server has said of the package
   private rotating_ = 0;
+  private ends_?: () => void; // takes away what more_() has added
 
   constructor() {
     super();
@@ -200,7 +201,8 @@ export class TexmeshViewer extends HTMLElement {
     this.rotating_ = 0;
     this.input_?.dispose();
     this.model_?.remove();
-    this.input_ = this.model_ = undefined;
+    this.ends_?.();
+    this.input_ = this.model_ = this.ends_ = undefined;
     const { poster, bar, error, note, rights } = this.parts_;
     poster.classList.remove('gone');
     bar.hidden = error.hidden = note.hidden = true;
@@ -226,6 +228,7 @@ export class TexmeshViewer extends HTMLElement {
       tell('poster-dismissed');
       tell('model-visibility', { visible: true });
       this.rotate_();
+      void this.more_(model);
     });
     model.on('progress', ({ bytes, bytesExpected }) => {
       const totalProgress = bytesExpected > 0 ? Math.min(1, bytes / bytesExpected) : 0;
@@ -285,6 +288,18 @@ export class TexmeshViewer extends HTMLElement {
     note.textContent = text;
     note.hidden = text === '';
     if (ms < Infinity) setTimeout(() => note.textContent === text && (note.hidden = true), ms);
+  }
+  /** Notes, measuring and AR, whose code comes where somebody can use them. */
+  private async more_(model: PageModel): Promise<void> {
+    if (this.ends_ || (!model.package?.manifest.annotations &&
+        !this.matches('[ar],[annotate],[measure]'))) return;
+    this.ends_ = () => undefined;
+    const end = await (await import('../notes/attach')).attach(this, this.root_, model, (orbit) => {
+      cancelAnimationFrame(this.rotating_);
+      if (this.input_) this.input_.orbit = orbit;
+    });
+    if (model === this.model_) this.ends_ = end;
+    else end();
   }
   private async showRights_(pkg?: ShowablePackage): Promise<void> {
     const about = await pkg?.about().catch(() => undefined);

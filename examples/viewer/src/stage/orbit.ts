@@ -56,6 +56,13 @@ export class Orbit {
     this.moved();
   }
 
+  /** Puts the camera at a place that looks at another, round which it then goes. */
+  look(position: readonly number[], target: readonly number[]): void {
+    this.camera.position.fromArray(position as number[]);
+    this.controls.target.fromArray(target as number[]);
+    this.moved();
+  }
+
   /** Turns the camera round the object, degrees. */
   turn(right: number, up: number): void {
     const offset = this.camera.position.clone().sub(this.target);

@@ -67,6 +67,11 @@ export class Stage {
     this.orbit.frame(min, max);
   }
 
+  /** Puts the camera at a place that looks at another. */
+  look(position: readonly number[], target: readonly number[]): void {
+    this.orbit.look(position, target);
+  }
+
   /** Shows the whole object. */
   home(): void {
     this.orbit.home();
