@@ -43,8 +43,8 @@ std::string markup_escaped(std::string_view text) {
   return out;
 }
 
-std::string page_beginning(std::string_view title, std::string_view policy) {
-  std::string out = R"(<html lang="en">
+std::string page_beginning(std::string_view title, std::string_view policy, std::string_view language) {
+  std::string out = "<html lang=\"" + markup_escaped(language) + R"(">
 <head>
 <meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1">

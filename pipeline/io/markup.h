@@ -10,6 +10,6 @@ std::string markup_escaped(std::string_view text);
 
 /// The beginning of a page of HTML behind its first line, up to the title: what else its head holds follows.
 /// `title` is escaped here; `policy` is its Content-Security-Policy, "" for none.
-std::string page_beginning(std::string_view title, std::string_view policy);
+std::string page_beginning(std::string_view title, std::string_view policy, std::string_view language = "en");
 
 }  // namespace texmesh

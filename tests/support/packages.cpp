@@ -298,8 +298,8 @@ void add_proxies(PackageParts& p) {
 Bytes PackageParts::build() const {
   const auto bytes_of = [](const std::string& s) { return Bytes(s.begin(), s.end()); };
   std::vector<PackageEntry> entries;
-  entries.push_back({kTablesPath, write_tables(tables)});
-  if (!thesis.empty()) entries.push_back({kThesisPath, write_thesis(thesis)});
+  entries.push_back({kTablesPath, write_tables(tables, manifest.minor)});
+  if (!thesis.empty()) entries.push_back({kThesisPath, write_thesis(thesis, manifest.minor)});
   entries.push_back({kQualityPath, bytes_of(write_quality(quality))});
   entries.push_back({kProvenancePath, bytes_of(provenance.dump())});
   About said = about;

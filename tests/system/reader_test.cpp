@@ -249,6 +249,7 @@ void read_everything(const std::string& path) {
   package.index();
   package.quality();
   package.about();
+  package.annotations();
   package.plane_thesis(0);
   for (std::uint32_t plane = 0; plane < package.textures().size(); ++plane) {
     const TextureInfo& t = package.textures()[plane];

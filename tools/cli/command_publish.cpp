@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "pipeline/io/atomic_file.h"
+#include "pipeline/io/file_resolver.h"
 #include "pipeline/io/table.h"
 #include "pipeline/io/uri.h"
 #include "tools/cli/commands.h"
@@ -15,7 +16,7 @@
 #include "tools/extract/usdz/usdz.h"
 #include "tools/publish/export/export.h"
 #include "tools/publish/report/report.h"
-#include "tools/publish/site/site.h"
+#include "tools/publish/site/site_words.h"
 #include "tools/publish/view/view_server.h"
 
 namespace texmesh {
@@ -243,8 +244,10 @@ void add_oembed_options(Command& c, ExportArguments& args) {
            "oembed: folder with the built viewer, instead of the viewer of this build", "DIR");
 }
 
+constexpr std::uint64_t kMostSiteTextBytes = 1'000'000;  // of a style sheet, and of words
+
 struct SiteArguments {
-  std::string packages, folder, viewer;
+  std::string packages, folder, viewer, style;
   SiteOptions options;
   bool json = false;
 };
@@ -257,6 +260,13 @@ int run_site(SiteArguments& args) {
   if (!options.url.empty() && !is_web_url(options.url))
     throw UsageError("--url", "", "an http or https URL", options.url);
   if (!options.url.empty() && !options.url.ends_with("/")) options.url += "/";
+  const auto text_of = [](const std::string& file) {
+    const Bytes bytes = file.empty() ? Bytes() : read_input_file(file, kMostSiteTextBytes);
+    return std::string(bytes.begin(), bytes.end());
+  };
+  options.style = text_of(args.style);
+  options.words = text_of(options.words_file);
+  if (!options.words.empty()) SiteWords(options.words, options.words_file);  // wrong words, before the work
   options.viewer = viewer_folder(args.viewer);
   check_folder_name(args.folder);
   NewFolder(args.folder, site_folder_rule());  // not after the work
@@ -532,6 +542,12 @@ void add_site_command(Command& app) {
       "URL where the site will stand: pages then say it to search engines, social networks and citations, "
       "and have code to embed; sitemap.xml",
       "URL");
+  c.option("--style", args.style, "Style sheet of your own, which the pages have behind theirs", "FILE");
+  c.option("--words", args.options.words_file,
+           "Words of the pages in another language, as JSON; names that it has not are English", "FILE");
+  c.text_option(
+      "--print-words", [] { return std::string(english_site_words()); },
+      "Print the English words, to translate");
   c.option("--downloads", args.options.downloads_px,
            "Each object as GLB and USDZ, too: what extract --recentre --display PX writes", "PX")
       .number_in(1, 1e6);

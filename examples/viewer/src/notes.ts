@@ -1,5 +1,5 @@
-// Notes at points of the object, a curator's editor, and measuring: loaded where a package has notes, or when a
-// button asks.
+// Notes at points of the object, a curator's editor, and measuring: loaded where a package has notes, or when
+// a button asks.
 
 import type { NotesLayer } from 'texmesh/notes';
 import { byId } from './dom';

@@ -4,6 +4,8 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "format/container/layout.h"
+#include "format/documents/annotations.h"
 #include "pipeline/io/uri.h"
 #include "tests/support/command.h"
 #include "tests/support/packages.h"
@@ -215,6 +217,68 @@ TEST_F(SiteCommand, OtherFoldersAndEmptyOnesAreRefused) {
   EXPECT_EQ(site().exit_code, 1);
   EXPECT_FALSE(fs::exists(folder_ / "www"));
   EXPECT_EQ(run_command({TEXMESH_BINARY, "site", folder_ / "in"}).exit_code, 2);
+}
+
+TEST_F(SiteCommand, ChoicesAreThoseThatTellObjectsApart) {
+  About about;
+  about.licence = "CC0-1.0";
+  about.creator = "A. Smith; B. <Jones>";
+  about.extras = R"({"keywords":["bust"," marble "],"period":"Roman"})";
+  add("c.texmesh", "Cast", about);
+  ASSERT_EQ(site().exit_code, 0);
+  const std::string index = text("index.html");
+  for (const char* choice :
+       {"<select data-facet=\"licence\">", "<option value=\"CC0-1.0\">CC0-1.0 (1)</option>",
+        "<option value=\"B. &lt;Jones&gt;\">", "<option value=\"marble\">", "<select data-facet=\"period\">"})
+    EXPECT_NE(index.find(choice), std::string::npos) << choice;
+  EXPECT_NE(index.find("&quot;keyword=bust&quot;"), std::string::npos) << "the card says what it has";
+  about.extras = R"({"keywords":{"a":[1]},"period":3})";
+  add("b.texmesh", "Bust", about);
+  add("c.texmesh", "Cast", about);
+  ASSERT_EQ(site().exit_code, 0);
+  EXPECT_EQ(text("index.html").find("<select"), std::string::npos) << "all objects are alike";
+}
+
+TEST_F(SiteCommand, NotesStandOnThePageAsText) {
+  PackageParts parts = make_package_parts();
+  parts.manifest.title = "Noted";
+  parts.manifest.minor = 1;
+  Annotation note;
+  note.texts = {{"en", "A <nose>", "<script>alert(1)</script>"}, {"de", "Nase", ""}};
+  note.images = {{"https://a.b/c.jpg"}};
+  const std::string notes = write_annotations({AnnotationFrame::kPackage, {note}});
+  parts.streams[kAnnotationsPath] = Bytes(notes.begin(), notes.end());
+  const Bytes bytes = parts.build();
+  write_text(folder_ / "in/n.texmesh", std::string(bytes.begin(), bytes.end()));
+  const CommandResult r = site();
+  ASSERT_EQ(r.exit_code, 0) << r.errors;
+  const std::string page = text("objects/n.html");
+  EXPECT_NE(page.find("<li id=\"note-1\"><div lang=\"en\"><h3>A &lt;nose&gt;</h3>"), std::string::npos)
+      << page;
+  EXPECT_NE(page.find("<div lang=\"de\"><h3>Nase</h3></div>"), std::string::npos);
+  EXPECT_EQ(page.find("<script>alert"), std::string::npos);
+  EXPECT_EQ(text("objects/b.html").find("class=\"notes\""), std::string::npos);
+}
+
+TEST_F(SiteCommand, SpeaksTheWordsOfAFileAndWearsTheStyleOfAnother) {
+  write_text(folder_ / "de.json",
+             R"({"language":"de","search":"Suche","object":"Objekt","show":"In 3D <zeigen>"})");
+  write_text(folder_ / "own.css", ":root { --a: #702020; }\n");
+  ASSERT_EQ(site({"--words", folder_ / "de.json", "--style", folder_ / "own.css"}).exit_code, 0);
+  EXPECT_NE(text("index.html").find("<html lang=\"de\">"), std::string::npos);
+  EXPECT_NE(text("index.html").find("1 Objekt"), std::string::npos);
+  EXPECT_NE(text("objects/b.html").find("In 3D &lt;zeigen&gt;"), std::string::npos);
+  EXPECT_NE(text("objects/b.html").find("Whole window"), std::string::npos)
+      << "English where the file is silent";
+  EXPECT_TRUE(text("site.css").ends_with(":root { --a: #702020; }\n"));
+  const std::string english = run_command({TEXMESH_BINARY, "site", "--print-words"}).output;
+  EXPECT_EQ(Json::parse(english)["language"], "en");
+  for (const char* wrong : {R"({"serach":"x"})", R"({"search":3})", "[]", "{", R"({"language":"d\"e"})"}) {
+    write_text(folder_ / "de.json", wrong);
+    const CommandResult refused = site({"--words", folder_ / "de.json"});
+    EXPECT_NE(refused.exit_code, 0) << wrong;
+    EXPECT_NE(refused.errors.find("de.json"), std::string::npos) << refused.errors;
+  }
 }
 
 }  // namespace

@@ -16,6 +16,7 @@
 #include "tools/extract/usdz/usdz.h"
 #include "tools/publish/export/export.h"
 #include "tools/publish/pages/page.h"
+#include "tools/publish/site/site_words.h"
 #include "tools/publish/view/served_files.h"
 
 namespace texmesh {
@@ -47,6 +48,7 @@ void read_object(SiteObject& object) {
   const Manifest& m = package.manifest();
   object.digest = to_hex(package.id()).substr(0, 16);
   object.about = package.about();
+  object.annotations = package.annotations();
   object.title = m.title.empty() ? readable_title(object.path) : m.title;
   object.names_itself = !m.title.empty();
   if (object.about.metres_per_unit > 0)
@@ -108,9 +110,9 @@ constexpr std::size_t kAtOnce = 12;
 
 std::string_view site_file(std::string_view name) { return built_in_text(site_page_files(), name); }
 
-std::string figures_of(const SiteObject& o) {
-  std::string out = format_bytes(o.bytes) + ", " + grouped(o.triangles) + " triangles";
-  if (o.texture_px > 0) out += fmt::format(", textures of {} px", o.texture_px);
+std::string figures_of(const SiteObject& o, const SiteWords& words) {
+  std::string out = format_bytes(o.bytes) + ", " + grouped(o.triangles) + " " + words("triangles");
+  if (o.texture_px > 0) out += ", " + words("textures", {{"px", std::to_string(o.texture_px)}});
   return out;
 }
 
@@ -118,23 +120,26 @@ std::string figures_of(const SiteObject& o) {
 std::string words_of(const SiteObject& o) {
   std::string out = o.title + " " + o.path;
   for (const NamedText& line : about_lines(o.about)) out += " " + line.text;
+  for (const Annotation& note : o.annotations.list)
+    for (const AnnotationText& text : note.texts) out += " " + text.title;
   return out;
 }
 
-std::string poster_html(const SiteObject& o, const std::string& root, bool lazy) {
-  if (o.poster.empty()) return "<span class=\"none\">no picture</span>";
+std::string poster_html(const SiteObject& o, const std::string& root, bool lazy, const SiteWords& words) {
+  if (o.poster.empty()) return "<span class=\"none\">" + words.html("no picture") + "</span>";
   return fmt::format(R"(<img src="{}{}" width="{}" height="{}" alt=""{}>)", root, o.poster_address,
                      o.poster_width_px, o.poster_height_px, lazy ? " loading=\"lazy\"" : "");
 }
 
-std::string card_html(const SiteObject& o, std::size_t place) {
+std::string card_html(const SiteObject& o, std::size_t place, const SiteWords& words) {
   std::string quiet = markup_escaped(o.about.attribution.empty() ? o.about.creator : o.about.attribution);
   if (!o.about.licence.empty()) quiet += (quiet.empty() ? "" : ", ") + markup_escaped(o.about.licence);
   return fmt::format(
-      "<li data-words=\"{}\"><a href=\"objects/{}.html\"><span class=\"poster\">{}</span><strong>{}</strong></a>"
+      "<li data-words=\"{}\" data-facets=\"{}\"><a href=\"objects/{}.html\"><span class=\"poster\">{}</span><strong>{}</strong></a>"
       "<p>{}</p><p>{}</p></li>\n",
-      markup_escaped(words_of(o)), percent_encoded(o.name), poster_html(o, "", place >= kAtOnce),
-      markup_escaped(o.title), quiet, markup_escaped(figures_of(o)));
+      markup_escaped(words_of(o)), markup_escaped(facets_of(o)), percent_encoded(o.name),
+      poster_html(o, "", place >= kAtOnce, words), markup_escaped(o.title), quiet,
+      markup_escaped(figures_of(o, words)));
 }
 
 using OrderedJson = nlohmann::ordered_json;
@@ -222,8 +227,8 @@ OrderedJson schema_org(const SiteObject& o, const SiteOptions& options) {
   return json;
 }
 
-std::string opened_html(const char* heading, const std::string& text) {
-  return fmt::format("<details><summary>{}</summary><pre>{}</pre></details>\n", heading,
+std::string opened_html(const std::string& heading, const std::string& text) {
+  return fmt::format("<details><summary>{}</summary><pre>{}</pre></details>\n", markup_escaped(heading),
                      markup_escaped(text));
 }
 
@@ -274,15 +279,15 @@ std::string record_head(const SiteObject& o, const SiteOptions& options) {
 
 /// Citations and, with the site's address, the frame for pages of others; each behind a heading that opens
 /// it.
-std::string citation_html(const SiteObject& o, const SiteOptions& options) {
-  std::string out = opened_html("Cite: BibTeX", bibtex_entry(o, options)) +
-                    opened_html("Cite: CSL-JSON", csl_item(o, options));
+std::string citation_html(const SiteObject& o, const SiteOptions& options, const SiteWords& words) {
+  std::string out = opened_html(words("cite", {{"form", "BibTeX"}}), bibtex_entry(o, options)) +
+                    opened_html(words("cite", {{"form", "CSL-JSON"}}), csl_item(o, options));
   if (options.url.empty()) return out;
   EmbeddedObject frame;
   frame.about = o.about;
   frame.about.title = o.title;
   frame.page_url = viewer_address(o, options);
-  return out + opened_html("Embed", embedded_frame(frame) + "\n");
+  return out + opened_html(words("embed"), embedded_frame(frame) + "\n");
 }
 
 /// sitemap.xml of a site that knows its address.
@@ -298,11 +303,12 @@ std::string sitemap_text(const Site& site) {
 }
 
 /// The head of a page that stands `root` away from the site's files; `frames`: the page has frames.
-std::string head_html(const std::string& title, const std::string& root, bool frames) {
+std::string head_html(const std::string& title, const std::string& root, bool frames,
+                      const SiteWords& words) {
   const std::string policy = fmt::format(
       "default-src 'none'; script-src 'self' file:; style-src 'self' file:; img-src 'self' file:; {}base-uri 'none'; form-action 'none'",
       frames ? "frame-src 'self' file:; " : "");
-  return page_beginning(title, policy) +
+  return page_beginning(title, policy, words("language")) +
          fmt::format(
              "<link rel=\"icon\" href=\"{0}icon.svg\" type=\"image/svg+xml\">\n"
              "<link rel=\"stylesheet\" href=\"{0}site.css\">\n"
@@ -310,13 +316,16 @@ std::string head_html(const std::string& title, const std::string& root, bool fr
              root);
 }
 
-std::string index_page(const Site& site) {
+std::string index_page(const Site& site, const SiteWords& words) {
   std::string cards;
-  for (std::size_t k = 0; k < site.objects.size(); ++k) cards += card_html(site.objects[k], k);
-  const std::size_t n = site.objects.size();
-  return filled(site_file("index.html"), {{"head", head_html(site.options.title, "", false)},
+  for (std::size_t k = 0; k < site.objects.size(); ++k) cards += card_html(site.objects[k], k, words);
+  return filled(site_file("index.html"), {{"head", head_html(site.options.title, "", false, words)},
                                           {"title", markup_escaped(site.options.title)},
-                                          {"count", fmt::format("{} {}", n, n == 1 ? "object" : "objects")},
+                                          {"skip", words.html("skip")},
+                                          {"search", words.html("search")},
+                                          {"facets", facets_html(site.objects, words)},
+                                          {"of", words.html("of")},
+                                          {"count", markup_escaped(words.objects(site.objects.size()))},
                                           {"cards", cards}});
 }
 
@@ -326,17 +335,17 @@ std::string text_html(const NamedText& line) {
 }
 
 /// Rows of what is known of the object.
-std::string facts_html(const SiteObject& o) {
+std::string facts_html(const SiteObject& o, const SiteWords& words) {
   std::string out;
   const auto row = [&](const std::string& name, const std::string& html) {
-    out += "<dt>" + markup_escaped(name) + "</dt><dd>" + html + "</dd>\n";
+    out += "<dt>" + words.html(name) + "</dt><dd>" + html + "</dd>\n";
   };
   // The page's own places, and what is said to programs.
   static const std::set<std::string_view> for_others{"title", "description", "unit", "up axis"};
   for (const NamedText& line : about_lines(o.about))
     if (!for_others.contains(line.name)) row(line.name, text_html(line));
   if (!o.size.empty()) row("size", markup_escaped(o.size));
-  row("package", markup_escaped(figures_of(o)));
+  row("package", markup_escaped(figures_of(o, words)));
   return out;
 }
 
@@ -346,7 +355,7 @@ std::string from_below(const std::string& root, const std::string& address) {
 
 /// Links behind that of the package. Apple's phones open a USDZ in the room from a link that holds a picture
 /// and nothing else.
-std::string downloads_html(const SiteObject& o, const std::string& root) {
+std::string downloads_html(const SiteObject& o, const std::string& root, const SiteWords& words) {
   std::string out;
   for (const SiteDownload& d : o.downloads)
     out += fmt::format(R"( <a href="{}{}" type="{}" download="">{}, {}</a>)", root, d.address, d.media_type,
@@ -355,12 +364,13 @@ std::string downloads_html(const SiteObject& o, const std::string& root) {
     if (d.media_type == kUsdzMediaType)
       out += fmt::format(
           R"(</p>
-<p><a rel="ar" href="{0}{1}"><img src="{0}{2}" width="64" height="64" alt="Open in your room"></a> AR on iPhones)",
-          root, d.address, o.poster.empty() ? "icon.svg" : o.poster_address);
+<p><a rel="ar" href="{0}{1}"><img src="{0}{2}" width="64" height="64" alt="{3}"></a> {4})",
+          root, d.address, o.poster.empty() ? "icon.svg" : o.poster_address, words.html("room"),
+          words.html("room on"));
   return out;
 }
 
-std::string object_page(const SiteObject& o, const SiteOptions& options) {
+std::string object_page(const SiteObject& o, const SiteOptions& options, const SiteWords& words) {
   const std::string root = root_of(o);
   // The package's address is encoded twice: the viewer decodes the query before it takes the value for a URL.
   const std::string viewer =
@@ -368,21 +378,28 @@ std::string object_page(const SiteObject& o, const SiteOptions& options) {
       (o.names_itself ? "" : "&title=" + percent_encoded(o.title));
   return filled(
       site_file("object.html"),
-      {{"head", head_html(o.title + " - " + options.title, root, true) + record_head(o, options)},
+      {{"head", head_html(o.title + " - " + options.title, root, true, words) + record_head(o, options)},
        {"title", markup_escaped(o.title)},
        {"root", root},
        {"site", markup_escaped(options.title)},
        {"viewer", markup_escaped(viewer)},
-       {"poster", poster_html(o, root, false)},
-       {"bytes", markup_escaped(format_bytes(o.bytes))},
-       {"start", markup_escaped(format_bytes(o.start_bytes))},
+       {"poster", poster_html(o, root, false, words)},
+       {"site label", words.html("site")},
+       {"show", words.html("show")},
+       {"cost",
+        words.html("cost", {{"bytes", format_bytes(o.bytes)}, {"start", format_bytes(o.start_bytes)}})},
+       {"window", words.html("whole window")},
+       {"package word", words.html("package")},
+       {"notes", o.annotations.list.empty()
+                     ? ""
+                     : "<h2>" + words.html("notes") + "</h2>\n" + notes_html(o.annotations)},
        {"description", o.about.description.empty()
                            ? ""
                            : "<p class=\"description\">" + markup_escaped(o.about.description) + "</p>"},
        {"rights", rights_line(o.about)},
-       {"facts", facts_html(o)},
-       {"downloads", downloads_html(o, root)},
-       {"citation", citation_html(o, options)},
+       {"facts", facts_html(o, words)},
+       {"downloads", downloads_html(o, root, words)},
+       {"citation", citation_html(o, options, words)},
        {"package", markup_escaped(from_below(root, o.address))}});
 }
 
@@ -479,14 +496,16 @@ FolderRule site_folder_rule() {
 }
 
 void write_site(const Site& site, const std::string& folder, const RunContext& context) {
+  const SiteWords words =
+      site.options.words.empty() ? SiteWords() : SiteWords(site.options.words, site.options.words_file);
   NewFolder out(folder, site_folder_rule());
-  out.add("index.html", text_bytes(std::string(kSiteFirstLine) + index_page(site)));
-  out.add("site.css", text_bytes(page_style(site_file("site.css"))));
+  out.add("index.html", text_bytes(std::string(kSiteFirstLine) + index_page(site, words)));
+  out.add("site.css", text_bytes(page_style(site_file("site.css")) + site.options.style));
   for (const char* name : {"site.js", "icon.svg"}) out.add(name, text_bytes(site_file(name)));
   if (!site.options.url.empty()) out.add("sitemap.xml", text_bytes(sitemap_text(site)));
   for (SiteObject o : site.objects) {
     if (site.options.downloads_px > 0) add_downloads(o, site.options, out, context);
-    out.add("objects/" + o.name + ".html", text_bytes(object_page(o, site.options)));
+    out.add("objects/" + o.name + ".html", text_bytes(object_page(o, site.options, words)));
     if (!o.poster.empty()) out.add(file_address("posters", o, ".jpg"), o.poster);
     if (site.options.packages_url.empty())
       out.copy(file_address("packages", o, o.path.ends_with("/") ? "" : ".texmesh"), o.source);

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "format/documents/about.h"
+#include "format/documents/annotations.h"
 #include "pipeline/io/new_folder.h"
 #include "pipeline/io/record.h"
 #include "stages/base/run_context.h"
@@ -12,6 +12,9 @@ struct SiteOptions {
   std::string packages_url;  // where the packages stand already, ends with a slash; "" = they are copied
   std::string viewer;        // folder with the built viewer
   std::string url;           // where the site will stand, ends with a slash; "" = not said
+  std::string style;         // CSS of the publisher's own, behind the site's
+  std::string words;         // JSON of words in another language (site_words.h); "" = English
+  std::string words_file;    // what errors call it
   double downloads_px = 0;   // GLB and USDZ of each object for this displayed height; 0 = none
 };
 
@@ -34,6 +37,7 @@ struct SiteObject {
   bool names_itself = false;  // the title is the package's, not its file's name
   std::string size;           // sides_in_words(); "" where the unit is not known
   About about;
+  Annotations annotations;
   std::vector<std::uint8_t> poster;  // JPEG; empty = none
   std::string poster_address;        // from a page in the site's folder
   std::uint32_t poster_width_px = 0, poster_height_px = 0;

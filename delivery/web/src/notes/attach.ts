@@ -3,7 +3,7 @@
 import type { Orbit } from '../page/framing';
 import type { PageModel } from '../page/page_model';
 import type { Point } from '../format/annotations';
-import { readNotes } from '../notes';
+import { readNotes } from './read';
 import { type ArFiles, arButton, arWay } from './ar';
 import { edit } from './editor';
 import { NotesLayer, make } from './layer';

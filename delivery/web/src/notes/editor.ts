@@ -34,7 +34,9 @@ export function edit(layer: NotesLayer): () => void {
       input.value = text[name] ?? '';
       input.addEventListener('input', () => {
         text[name] = within(input.value, most);
-        if (name === 'title') layer.show();
+        if (name === 'text') return;
+        layer.show();
+        card.querySelector('h3')!.textContent = `${layer.notes.indexOf(note) + 1}. ${text.title}`;
       });
       return input;
     };

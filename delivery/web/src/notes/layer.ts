@@ -36,7 +36,9 @@ export const notesStyle = `
 .tm-notes .pin { position: absolute; left: 0; top: 0; margin: -1rem 0 0 -1rem; padding: 0; width: 2rem; height: 2rem;
   border: 2px solid #fff; border-radius: 1rem; background: #0b57a4; color: #fff; font-weight: 600; }
 .tm-notes .pin[aria-expanded=true] { background: #a43d00; }
+.tm-notes .pin:not(.behind) { z-index: 1; }
 .tm-notes .pin.behind { opacity: .3; }
+.tm-notes :is(.card, .list, .line) { z-index: 2; }
 .tm-notes .card { position: absolute; left: .5rem; bottom: 2rem; width: min(22rem, calc(100% - 1rem)); max-height: 55%;
   overflow: auto; box-sizing: border-box; padding: .6rem .8rem; border-radius: .5rem; pointer-events: auto;
   background: var(--texmesh-panel, #fffffff0); overflow-wrap: anywhere; }

@@ -40,9 +40,10 @@ export function lengthInWords({ length, error }: Length, metres = 0, name = 'uni
   const factor = metres > 0 ? metres / size : 1;
   const [value, off] = [length * factor, error * factor];
   // One digit of the error, rounded up, and the length to that digit.
-  const power = off > 0 ? Math.floor(Math.log10(off)) : Math.floor(Math.log10(Math.max(value, 1e-9))) - 5;
+  const inSteps = (power: number): number => Math.ceil((off / 10 ** power) * (1 - 1e-9));
+  let power = Math.floor(Math.log10(off > 0 ? off : Math.max(value, 1e-9) / 1e5));
+  if (inSteps(power) > 9) ++power;
   const digits = Math.min(9, Math.max(0, -power));
-  const step = 10 ** power;
-  const rounded = (Math.ceil((off / step) * (1 - 1e-9)) * step).toFixed(digits);
+  const rounded = (inSteps(power) * 10 ** power).toFixed(digits);
   return `${value.toFixed(digits)} ${unitName} ± ${rounded} ${unitName}`;
 }

@@ -16,7 +16,8 @@ export const roomsBelow: Record<string, readonly string[]> = {
   decide: ['format', 'http'],
   scene: ['format', 'http', 'blocks', 'worker', 'decide'],
   page: ['format', 'http', 'decide', 'scene'],
-  element: ['format', 'page'],
+  notes: ['format', 'http', 'scene', 'page'],
+  element: ['format', 'page', 'notes'],
 };
 
 /** Lines of a function, of a class, of a file, of the median file, and files in a folder. */
