@@ -139,6 +139,7 @@ test('viewer: notes of a package, and measuring by a button', () => withViewer('
   await shot(page, 'viewer-notes');
   await page.keyboard.press('Escape');
   await page.locator('#measure').click();
+  await notes.locator('output').waitFor();
   await page.locator('#view').focus();
   await page.keyboard.press('Enter');
   await page.keyboard.press('ArrowUp');

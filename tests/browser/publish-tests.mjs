@@ -303,7 +303,10 @@ test('site: search and keyboard', async () => {
     await page.reload();
     check(await page.locator('#objects > li:not([hidden])').count() === 1, 'the search is forgotten');
     await page.locator('#search').focus();
-    await page.keyboard.press('Tab');
+    for (const leads of ['SELECT', 'A']) {
+      await page.keyboard.press('Tab');
+      check(await page.evaluate(() => document.activeElement.tagName) === leads, `no ${leads}`);
+    }
     await page.keyboard.press('Enter');
     await page.waitForURL(/objects\/maps\.html$/);
     await page.locator('#show').focus();
@@ -313,6 +316,22 @@ test('site: search and keyboard', async () => {
     check(await page.evaluate(() => document.activeElement.tagName) === 'IFRAME', 'the focus is lost');
   });
 }, {seconds: 90});
+
+test('site: a choice and the search work together', async () => {
+  site();
+  await withPage('out/www/index.html', async (page) => {
+    const shown = () => page.locator('#objects > li:not([hidden]) strong').allTextContents();
+    const all = await shown();
+    await page.locator('[data-facet=licence]').selectOption('CC-BY-4.0');
+    check((await shown()).join() === 'Told', (await shown()).join());
+    check(/^1 of \d+ objects$/.test(await page.locator('#count').textContent()), await page.locator('#count').textContent());
+    await page.locator('#search').fill('maps');
+    check((await shown()).length === 0, 'a choice that the search overrules');
+    await page.locator('[data-facet=licence]').selectOption('');
+    await page.locator('#search').fill('');
+    check((await shown()).length === all.length, 'something stays hidden');
+  });
+});
 
 test('site: without scripts the objects are links to the viewer', async () => {
   site();

@@ -132,7 +132,7 @@ std::string facets_html(const std::vector<SiteObject>& objects, const SiteWords&
       out += fmt::format("<option value=\"{0}\">{0} ({1})</option>", markup_escaped(value), count);
     out += "</select></label>\n";
   }
-  return out.empty() ? "" : "<p class=\"search facets\">\n" + out + "</p>\n";
+  return out.empty() ? "" : "<p class=\"facets\">\n" + out + "</p>\n";
 }
 
 }  // namespace texmesh

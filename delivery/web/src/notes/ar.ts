@@ -47,9 +47,10 @@ export function sceneViewerAddress({ glb = '', title = '' }: ArFiles, back: stri
     `S.browser_fallback_url=${encodeURIComponent(back)};end;`;
 }
 
-const icon = `data:image/svg+xml,${encodeURIComponent('<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 32 32" ' +
-  'fill="none" stroke="#0b57a4" stroke-width="2" stroke-linejoin="round"><path d="M16 8l8 4.5v8L16 25l-8-4.5v-8zM8 12.5' +
-  'l8 4.5 8-4.5M16 17v8M3 9V3h6M29 9V3h-6M3 23v6h6M29 23v6h-6"/></svg>')}`;
+const icon = `data:image/svg+xml,${encodeURIComponent('<svg xmlns="http://www.w3.org/2000/svg" ' +
+  'viewBox="0 0 32 32" fill="none" stroke="#0b57a4" stroke-width="2" stroke-linejoin="round">' +
+  '<path d="M16 8l8 4.5v8L16 25l-8-4.5v-8zM8 12.5l8 4.5 8-4.5M16 17v8' +
+  'M3 9V3h6M29 9V3h-6M3 23v6h6M29 23v6h-6"/></svg>')}`;
 
 /** A link or button that shows the object so; `words` say what it does. */
 export function arButton(way: ArWay, files: ArFiles, words: string): HTMLElement {

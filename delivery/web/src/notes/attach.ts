@@ -11,8 +11,8 @@ import { measure } from './measuring';
 import { apply } from './pick';
 
 const style = `
-.ar { position: absolute; right: .5rem; bottom: 2rem; width: 44px; height: 44px; padding: 6px; box-sizing: border-box;
-  border: 0; border-radius: .5rem; background: #fffffff0; pointer-events: auto; }
+.ar { position: absolute; right: .5rem; bottom: 2rem; width: 44px; height: 44px; padding: 6px;
+  box-sizing: border-box;  border: 0; border-radius: .5rem; background: #fffffff0; pointer-events: auto; }
 .ar img { display: block; width: 100%; height: 100%; }
 .tools { position: absolute; left: .5rem; top: .5rem; }`;
 
@@ -56,8 +56,9 @@ function toggle(tools: HTMLElement, words: string, begin: () => () => void): () 
 }
 
 /**
- * Notes of the package; by the attributes `measure`, `annotate` and `ar` (with `ar-src`, a GLB, and `ios-src`, a
- * USDZ) what they say. `turned` hears of the orbit of each view that notes choose. Gives what takes all away.
+ * Notes of the package; by the attributes `measure`, `annotate` and `ar` (with `ar-src`, a GLB, and
+ * `ios-src`, a USDZ) what they say. `turned` hears of the orbit of each view that notes choose. Gives what
+ * takes all away.
  */
 export async function attach(element: HTMLElement, root: ShadowRoot, model: PageModel,
     turned: (orbit: Orbit) => void): Promise<() => void> {

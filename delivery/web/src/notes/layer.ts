@@ -27,34 +27,41 @@ export interface NotesStage {
 }
 
 export const notesStyle = `
-.tm-notes { position: absolute; inset: 0; overflow: hidden; pointer-events: none; font: 14px/1.4 system-ui, sans-serif;
+.tm-notes { position: absolute; inset: 0; overflow: hidden; pointer-events: none;
+  font: 14px/1.4 system-ui, sans-serif;
   color: var(--texmesh-text, #1c1c1c); }
 .tm-notes :is(button, input, textarea) { font: inherit; color: inherit; }
-.tm-notes button { min-width: 2rem; min-height: 2rem; border: 1px solid; border-radius: .4rem; padding: 0 .6rem;
-  background: var(--texmesh-panel, #fffffff0); cursor: pointer; pointer-events: auto; }
+.tm-notes button { min-width: 2rem; min-height: 2rem; border: 1px solid; border-radius: .4rem;
+  padding: 0 .6rem;  background: var(--texmesh-panel, #fffffff0); cursor: pointer; pointer-events: auto; }
 .tm-notes button:focus-visible { outline: 3px solid #fff; box-shadow: 0 0 0 5px #0b57a4; }
-.tm-notes .pin { position: absolute; left: 0; top: 0; margin: -1rem 0 0 -1rem; padding: 0; width: 2rem; height: 2rem;
+.tm-notes .pin { position: absolute; left: 0; top: 0; margin: -1rem 0 0 -1rem; padding: 0;
+  width: 2rem; height: 2rem;
   border: 2px solid #fff; border-radius: 1rem; background: #0b57a4; color: #fff; font-weight: 600; }
 .tm-notes .pin[aria-expanded=true] { background: #a43d00; }
 .tm-notes .pin:not(.behind) { z-index: 1; }
 .tm-notes .pin.behind { opacity: .3; }
 .tm-notes :is(.card, .list, .line) { z-index: 2; }
-.tm-notes .card { position: absolute; left: .5rem; bottom: 2rem; width: min(22rem, calc(100% - 1rem)); max-height: 55%;
+.tm-notes .card { position: absolute; left: .5rem; bottom: 2rem; width: min(22rem, calc(100% - 1rem));
+  max-height: 55%;
   overflow: auto; box-sizing: border-box; padding: .6rem .8rem; border-radius: .5rem; pointer-events: auto;
   background: var(--texmesh-panel, #fffffff0); overflow-wrap: anywhere; }
 .tm-notes .card h3 { margin: 0 0 .3rem; font-size: 1rem; }
 .tm-notes .card p { margin: .3rem 0; }
-.tm-notes .card :is(input, textarea) { display: block; width: 100%; box-sizing: border-box; background: transparent;
-  border: 1px solid; border-radius: .3rem; padding: .3rem; }
-.tm-notes .list { position: absolute; right: .5rem; top: .5rem; max-width: calc(100% - 1rem); max-height: 80%; overflow: auto;
+.tm-notes .card :is(input, textarea) { display: block; width: 100%; box-sizing: border-box;
+  background: transparent;  border: 1px solid; border-radius: .3rem; padding: .3rem; }
+.tm-notes .list { position: absolute; right: .5rem; top: .5rem; max-width: calc(100% - 1rem); max-height: 80%;
+  overflow: auto;
   pointer-events: auto; text-align: right; }
-.tm-notes .list ol { list-style: none; margin: .3rem 0; padding: .3rem; border-radius: .4rem; text-align: left;
+.tm-notes .list ol { list-style: none; margin: .3rem 0; padding: .3rem; border-radius: .4rem;
+  text-align: left;
   background: var(--texmesh-panel, #fffffff0); }
 .tm-notes .list li button { display: block; width: 100%; text-align: left; border: 0; background: none; }
 .tm-notes svg { position: absolute; inset: 0; width: 100%; height: 100%; overflow: visible; }
-.tm-notes .line { position: absolute; left: 50%; bottom: .5rem; transform: translateX(-50%); max-width: 96%; padding: .2rem .7rem;
+.tm-notes .line { position: absolute; left: 50%; bottom: .5rem; transform: translateX(-50%);
+  max-width: 96%; padding: .2rem .7rem;
   border-radius: .4rem; background: var(--texmesh-panel, #fffffff0); }
-.tm-notes .cross { position: absolute; left: 50%; top: 50%; width: 15px; height: 15px; margin: -8px; border-radius: 9px;
+.tm-notes .cross { position: absolute; left: 50%; top: 50%; width: 15px; height: 15px; margin: -8px;
+  border-radius: 9px;
   border: 1px solid #fff; outline: 1px solid #000; }
 .tm-notes .live { position: absolute; width: 1px; height: 1px; overflow: hidden; clip-path: inset(50%); }
 .tm-notes [hidden] { display: none; }
@@ -95,6 +102,7 @@ export class NotesLayer {
     const style = make('style', {}, notesStyle);
     this.root.append(style, this.pins_, this.list_, this.card, this.live);
     this.root.addEventListener('keydown', (e) => this.key_(e));
+    stage.canvas.addEventListener('keydown', this.escape_);
     this.show();
     const step = (): void => {
       this.frame_ = requestAnimationFrame(step);
@@ -109,6 +117,7 @@ export class NotesLayer {
   }
   dispose(): void {
     cancelAnimationFrame(this.frame_);
+    this.stage.canvas.removeEventListener('keydown', this.escape_);
     this.tour_ = 0;
     this.root.remove();
   }
@@ -166,8 +175,10 @@ export class NotesLayer {
     const buttons = [make('button', {}, words.before, () => this.open((i + notes.length - 1) % notes.length)),
       make('button', {}, words.next, () => this.open((i + 1) % notes.length)),
       make('button', {}, words.close, () => this.close())];
+    const held = [...card.children].indexOf((this.root.getRootNode() as Document).activeElement!);
     card.replaceChildren(make('h3', {}, `${i + 1}. ${title}`), ...(text ? [make('p', {}, text)] : []),
       ...images.flatMap((image) => [image, ' ']), ...buttons.flatMap((button) => [button, ' ']));
+    if (held >= 0) buttons[1].focus(); // what had the focus is gone
     this.edit?.(note, card);
     this.live.textContent = `${i + 1}: ${title}. ${text}`;
     if (looks) this.lookAt_(this.viewOf(note));
@@ -190,8 +201,8 @@ export class NotesLayer {
       fovDegrees: camera.fov };
   }
   /**
-   * From stop to stop. A stop's detail has until the next one to come, and when it is there, the next stop's is
-   * fetched. Resolves when the tour is over or has been ended.
+   * From stop to stop. A stop's detail has until the next one to come, and when it is there, the next
+   * stop's is fetched. Resolves when the tour is over or has been ended.
    */
   async tour(stopS = tourStopS): Promise<void> {
     if (this.tour_) return this.close();
@@ -269,8 +280,11 @@ export class NotesLayer {
     });
     for (const moved of this.followers_) moved();
   }
+  private readonly escape_ = (e: KeyboardEvent): void => {
+    if (e.key === 'Escape' && !this.card.hidden) this.close();
+  };
   private key_(e: KeyboardEvent): void {
-    if (e.key === 'Escape' && !this.card.hidden) return this.close();
+    this.escape_(e);
     const pins = [...this.pins_.children] as HTMLElement[];
     const from = pins.indexOf(e.target as HTMLElement);
     const step = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 }[e.key];

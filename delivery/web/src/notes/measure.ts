@@ -30,8 +30,8 @@ export function lengthOf(points: readonly Point[], manifest: Manifest, scale: nu
 const units: [number, string][] = [[1e3, 'km'], [1, 'm'], [0.01, 'cm'], [0.001, 'mm']];
 
 /**
- * "12.3 cm ± 0.1 cm": as many digits as the error leaves. `metres`: of one object unit; without it, the numbers
- * are of object units, or of `name`.
+ * "12.3 cm ± 0.1 cm": as many digits as the error leaves. `metres`: of one object unit; without it, the
+ * numbers are of object units, or of `name`.
  */
 export function lengthInWords({ length, error }: Length, metres = 0, name = 'units'): string {
   const inMetres = length * metres;

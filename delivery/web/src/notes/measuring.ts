@@ -7,8 +7,8 @@ import { onPlaces } from './placing';
 const svg = 'http://www.w3.org/2000/svg';
 
 /**
- * Measures lines of points on the object until the function that it gives is called. The load is asked for its
- * finest scale.
+ * Measures lines of points on the object until the function that it gives is called. The load is asked for
+ * its finest scale.
  */
 export function measure(layer: NotesLayer, about: About): () => void {
   const { stage, words } = layer;
@@ -17,7 +17,7 @@ export function measure(layer: NotesLayer, about: About): () => void {
   const points: Point[] = [];
   const picture = document.createElementNS(svg, 'svg');
   const line = picture.appendChild(document.createElementNS(svg, 'polyline'));
-  line.setAttribute('style', 'fill:none;stroke:#fff;stroke-width:3;paint-order:stroke;filter:drop-shadow(0 0 1px #000)');
+  line.setAttribute('style', 'fill:none;stroke:#fff;stroke-width:3;filter:drop-shadow(0 0 1px #000)');
   const said = make('output', { 'aria-live': 'polite' }, words.measureHelp);
   const box = make('div', { class: 'line' });
   const draw = (): void => {

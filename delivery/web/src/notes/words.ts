@@ -21,7 +21,8 @@ export interface NoteWords {
 /** Words by language. */
 export const noteWords: Record<string, NoteWords> = {
   en: { notes: 'Notes', tour: 'Tour', stop: 'End the tour', close: 'Close', next: 'Next', before: 'Back',
-    measure: 'Measure', measureHelp: 'Click on points of the object, or press Enter for the one in the middle.',
+    measure: 'Measure',
+    measureHelp: 'Click on points of the object, or press Enter for the one in the middle.',
     clear: 'Clear', add: 'Add notes', addHelp: 'Click where the note belongs, or press Enter for the middle.',
     title: 'Title', text: 'Text', remove: 'Remove', save: 'Save as a file', image: 'Picture',
     ar: 'View in your room' },

@@ -1,10 +1,12 @@
 import { describe, expect, it } from 'vitest';
-import { BoxGeometry, Group, Mesh, PerspectiveCamera } from 'three';
+import {
+  BoxGeometry, BufferGeometry, Float32BufferAttribute, Group, Mesh, PerspectiveCamera,
+} from 'three';
 import { arWay, sceneViewerAddress } from '../../src/notes/ar';
 import type { Manifest } from '../../src/format/manifest';
 import type { Point } from '../../src/format/annotations';
 import {
-  annotationsFile, lengthInWords, lengthOf, meets, pick, placeOf, readAnnotations, textFor,
+  annotationsFile, lengthInWords, lengthOf, nearestOf, pick, placeOf, readAnnotations, textFor,
 } from '../../src/notes';
 import { within } from '../../src/notes/editor';
 
@@ -45,10 +47,17 @@ describe('picking', () => {
     expect(placeOf(object, camera, [0, 0, 6])).toBeUndefined();
   });
   it('takes nothing for a triangle that is none', () => {
-    expect(meets([0, 0, 1], [0, 0, -1], [[0, 0, 0], [0, 0, 0], [1, 0, 0]])).toBe(Infinity);
-    expect(meets([0, 0, 1], [0, 0, -1], [[NaN, 0, 0], [1, 0, 0], [0, 1, 0]])).toBe(Infinity);
-    expect(meets([0.2, 0.2, 1], [0, 0, -1], [[0, 0, 0], [1, 0, 0], [0, 1, 0]])).toBe(1);
-    expect(meets([0.2, 0.2, 1], [0, 0, 1], [[0, 0, 0], [1, 0, 0], [0, 1, 0]])).toBe(Infinity);
+    const of = (from: Point, way: Point, corners: number[]): number => {
+      const geometry = new BufferGeometry();
+      geometry.setAttribute('position', new Float32BufferAttribute(corners, 3));
+      return nearestOf(new Mesh(geometry), from, way).t;
+    };
+    expect(of([0, 0, 1], [0, 0, -1], [0, 0, 0, 0, 0, 0, 1, 0, 0])).toBe(Infinity);
+    expect(of([0, 0, 1], [0, 0, -1], [NaN, 0, 0, 1, 0, 0, 0, 1, 0])).toBe(Infinity);
+    expect(of([0.2, 0.2, 1], [0, 0, -1], [0, 0, 0, 1, 0, 0, 0, 1, 0])).toBe(1);
+    expect(of([0.2, 0.2, 1], [0, 0, -1], [0, 0, 0, 0, 1, 0, 1, 0, 0])).toBe(1);
+    expect(of([0.2, 0.2, 1], [0, 0, 1], [0, 0, 0, 1, 0, 0, 0, 1, 0])).toBe(Infinity);
+    expect(of([0.2, 0.2, 1], [0, 0, -1], [0, 0, 0, 1, 0])).toBe(Infinity);
   });
 });
 
