@@ -82,6 +82,7 @@ int run(int argc, char** argv) {
   if (shape == "owl") {
     options.form = ScanForm::kOwl;
     if (app.count("--holes") == 0) options.holes = 0;
+    if (app.count("--noise") == 0) options.noise = 0.0001;
   }
 
   if (range_scan) {

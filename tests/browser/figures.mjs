@@ -116,7 +116,7 @@ async function proxiesFirst() {
     if (enough >= 0) row(`proxy first, ${name}: shown at the end, for ${displayedPx.toFixed(0)} px`, `proxy ${enough}`, '', true);
     const scale = r.events.find((e) => e.name === 'scale');
     if (scale) row(`proxy first, ${name}: seconds to S_${scale.scale} in its place`, scale.at.toFixed(2), '', true);
-    for (const at of [0.1, 0.3, 1, 4]) {
+    for (const at of [0.1, 0.3, 0.5, 1, 2, 4]) {
       const picture = await pictureAt(page, id, at);
       if (picture) fs.writeFileSync(path.join(pictures, `${name}-${at}s.png`), Buffer.from(picture, 'base64'));
     }
