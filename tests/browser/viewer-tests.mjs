@@ -132,6 +132,7 @@ test('viewer: cap, policy, rung and time by hand, then loaded again', () => with
   await phase(page, 'done');
   const free = await live(page, (x) => x.bytes);
   await page.locator('#cap').selectOption({value: '62500'});
+  await page.locator('#experts > summary').click();
   await page.locator('#policy').selectOption('guard');
   await page.locator('#reload').click();
   await page.waitForFunction(() => Number.isFinite(window.texmeshViewer.session.live.doneS), null, {timeout: 30000});
@@ -168,6 +169,7 @@ test('viewer: keyboard and mouse turn it, overrides change it', () => withViewer
   await page.mouse.move(box.x + 420, box.y + 340, {steps: 4});
   await page.mouse.up();
   check(differs(before, await eye()), 'dragging does nothing');
+  await page.locator('#experts > summary').click();
   await page.locator('#scale').selectOption({index: 1});
   await page.waitForFunction(() => window.texmeshViewer.session.live.scale === 0, null, {timeout: 20000});
   await page.keyboard.press('t');

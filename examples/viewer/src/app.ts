@@ -3,6 +3,7 @@ import { Comparison } from './comparison';
 import { byId } from './dom';
 import { hideMessage, offerPackages, showError } from './message';
 import { Panel } from './panel/panel';
+import { hidePoster } from './poster';
 import { warmDecoders } from './session/decoders';
 import { Session } from './session/session';
 import { Stage } from './stage/stage';
@@ -33,11 +34,13 @@ export function start(query: URLSearchParams): void {
   }, session.live);
   const soonStatus = atMostEvery(kStatusMs, () => showStatus(session.live, packageUrl));
   session.onChange = () => {
+    if (session.live.scale !== null) hidePoster();
     panel.update(session.live);
     soonStatus();
   };
   session.onError = (error) => {
     // What is on the screen stays there: a message in front of it would hide more than it tells.
+    hidePoster();
     if (session.live.scale === null) showError(error, packageUrl);
     else session.problem(error);
   };

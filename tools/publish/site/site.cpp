@@ -132,9 +132,10 @@ std::string card_html(const SiteObject& o, std::size_t place) {
   if (!o.about.licence.empty()) quiet += (quiet.empty() ? "" : ", ") + markup_escaped(o.about.licence);
   return fmt::format(
       "<li data-words=\"{}\"><a href=\"objects/{}.html\"><span class=\"poster\">{}</span><strong>{}</strong></a>"
-      "<p>{}</p><p>{}</p></li>\n",
+      "{}{}</li>\n",
       markup_escaped(words_of(o)), percent_encoded(o.name), poster_html(o, "", place >= kAtOnce),
-      markup_escaped(o.title), quiet, markup_escaped(figures_of(o)));
+      markup_escaped(o.title), quiet.empty() ? "" : "<p>" + quiet + "</p>",
+      o.size.empty() ? "" : "<p>" + markup_escaped(o.size) + "</p>");
 }
 
 using OrderedJson = nlohmann::ordered_json;
@@ -259,7 +260,8 @@ std::string record_head(const SiteObject& o, const SiteOptions& options) {
   std::string json = json_text(schema_org(o, options), -1);
   // Nothing in a text may end the element, or begin a comment.
   for (std::size_t at = 0; (at = json.find('<', at)) != json.npos;) json.replace(at, 1, "\\u003c");
-  const std::string words = o.about.description.substr(0, o.about.description.find('\n'));
+  std::string words = o.about.description.substr(0, o.about.description.find('\n'));
+  if (words.empty()) words = o.title + ", in 3D" + (o.about.creator.empty() ? "" : ", by " + o.about.creator);
   std::string out = meta_html("name", "description", words) + meta_html("property", "og:type", "website") +
                     meta_html("property", "og:title", o.title) +
                     meta_html("property", "og:description", words) +
@@ -310,14 +312,31 @@ std::string head_html(const std::string& title, const std::string& root, bool fr
              root);
 }
 
+/// What search engines and social networks show of the list.
+std::string index_record(const Site& site) {
+  constexpr std::size_t kNamed = 5;
+  std::string words = site.options.title + ", objects in 3D";
+  for (std::size_t k = 0; k < std::min(kNamed, site.objects.size()); ++k)
+    words += (k == 0 ? ": " : ", ") + site.objects[k].title;
+  const std::string& url = site.options.url;
+  const auto shown =
+      std::ranges::find_if(site.objects, [](const SiteObject& o) { return !o.poster.empty(); });
+  return meta_html("name", "description", words) + meta_html("property", "og:type", "website") +
+         meta_html("property", "og:title", site.options.title) + meta_html("property", "og:url", url) +
+         (url.empty() || shown == site.objects.end()
+              ? ""
+              : meta_html("property", "og:image", url + shown->poster_address));
+}
+
 std::string index_page(const Site& site) {
   std::string cards;
   for (std::size_t k = 0; k < site.objects.size(); ++k) cards += card_html(site.objects[k], k);
   const std::size_t n = site.objects.size();
-  return filled(site_file("index.html"), {{"head", head_html(site.options.title, "", false)},
-                                          {"title", markup_escaped(site.options.title)},
-                                          {"count", fmt::format("{} {}", n, n == 1 ? "object" : "objects")},
-                                          {"cards", cards}});
+  return filled(site_file("index.html"),
+                {{"head", head_html(site.options.title, "", false) + index_record(site)},
+                 {"title", markup_escaped(site.options.title)},
+                 {"count", fmt::format("{} {}", n, n == 1 ? "object" : "objects")},
+                 {"cards", cards}});
 }
 
 std::string text_html(const NamedText& line) {
@@ -365,6 +384,7 @@ std::string object_page(const SiteObject& o, const SiteOptions& options) {
   // The package's address is encoded twice: the viewer decodes the query before it takes the value for a URL.
   const std::string viewer =
       root + "viewer/index.html?panel=none&pkg=" + percent_encoded(from_below("../", o.address)) +
+      (o.poster.empty() ? "" : "&poster=" + percent_encoded("../" + o.poster_address)) +
       (o.names_itself ? "" : "&title=" + percent_encoded(o.title));
   return filled(
       site_file("object.html"),

@@ -2,10 +2,11 @@ import { make } from '../dom';
 import * as format from '../format';
 import type { Live } from '../live';
 
+/** What a visitor sees first, what an expert asks for last. */
 const kFigures = [
-  ['scale', 'mesh shown'], ['size', 'displayed height'], ['bytes', 'received'], ['first', 'first picture'],
-  ['time', 'complete after'],
-  ['flip', 'predicted FLIP'],
+  ['first', 'first picture after'], ['time', 'complete after'], ['bytes', 'received'],
+  ['flip', 'difference (FLIP)'],
+  ['scale', 'mesh shown'], ['size', 'height on screen'],
 ] as const;
 type Figure = (typeof kFigures)[number][0];
 
