@@ -145,10 +145,9 @@ void judge_size(const SizeCells& cells, const Height& height, const TextureSampl
   sizes.judge_between(between.geometry, failed, height.between_px);
 }
 
-/// What a height costs beside the others, about: the smallest size of the table is rendered in all views and
-/// knots.
+/// What a height costs beside the others, about: those of the table are rendered with many textures.
 double cost_of(const Height& height) {
-  constexpr double kUnranked = 0.5, kRanks[] = {5, 2.6, 2.2};
+  constexpr double kUnranked = 0.25, kRanks[] = {2.4, 4, 3.2};
   return height.rank ? kRanks[std::min(*height.rank, std::size(kRanks) - 1)] : kUnranked;
 }
 
@@ -157,7 +156,7 @@ std::vector<SizeCells> render_heights(const TextureSampler& sampler, const Quali
                                       const RunContext& context) {
   const std::vector<Height> heights = heights_below(options.largest_px, fewer);
   std::vector<SizeCells> table_cells;
-  constexpr double kBefore = 1;  // looking around, as costs are counted
+  constexpr double kBefore = 0.8;  // looking around, as costs are counted
   double all = kBefore, done = kBefore;
   for (const Height& height : heights) all += cost_of(height);
   RunContext quiet = context;

@@ -28,7 +28,7 @@ export class Figures {
   show(l: Live): void {
     const shown = l.proxy >= 0 ? l.manifest?.proxies[l.proxy]
       : l.manifest?.scales.find((s) => s.scale === l.scale);
-    this.set('scale', shownName(l), shown ? `${format.short(shown.triangles)} tri` : '');
+    this.set('scale', shownName(l), shown ? `${format.short(shown.triangles)} triangles` : '');
     this.set('size', l.displayedPx > 0 ? format.px(l.displayedPx) : '–');
     this.set('bytes', l.bytes > 0 ? format.bytes(l.bytes) : '–',
       l.packageBytes > 0 ? `of ${format.bytes(l.packageBytes)}` : '');
