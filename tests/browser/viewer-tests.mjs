@@ -211,6 +211,8 @@ test('viewer: errors can be read', async () => {
   for (const [name, query, text, options] of [
     ['404', '?pkg=packages/none.texmesh', /no package here/i, {}],
     ['no-package', '?pkg=index.html', /not a package/i, {}],
+    ['visitor-404', '?pkg=packages/none.texmesh&panel=none', /^This object is not here any more\.Try again$/, {}],
+    ['visitor-page', '?pkg=index.html&panel=none', /^This object cannot be shown\.Try again$/, {}],
     ['server-error', '?pkg=packages/maps.texmesh', /could not be loaded/i, {fault: (q) => (q.path.endsWith('.texmesh') ? {status: 500} : undefined)}],
   ]) {
     await withViewer(query, async (page) => {
@@ -221,6 +223,16 @@ test('viewer: errors can be read', async () => {
     }, {quiet: false, ...options});
   }
 }, {seconds: 90});
+
+test('viewer: a poster stands there until the object does, in the grey that goes on', () => withViewer('?pkg=packages/maps.texmesh&time=1&panel=none&poster=packages/maps/poster.jpg', async (page) => {
+  const poster = page.locator('#poster');
+  await poster.waitFor({state: 'visible', timeout: 20000});
+  check(await poster.evaluate((e) => e.complete && e.naturalWidth > 0 || new Promise((go) => { e.onload = () => go(true); e.onerror = () => go(false); })), 'no poster');
+  await phase(page, 'done');
+  check(await poster.evaluate((e) => e.classList.contains('gone')), 'the poster stays');
+  check(await page.locator('#stage').evaluate((e) => getComputedStyle(e).backgroundColor) === 'rgb(124, 124, 124)', 'another grey');
+  await shot(page, 'viewer-posed');
+}));
 
 test('viewer: what goes wrong beside the picture can be read', async () => {
   let lost = 0;
