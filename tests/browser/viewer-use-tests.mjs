@@ -137,7 +137,7 @@ test('viewer: every control can be reached and used by keyboard', () => withView
   await page.waitForFunction((s) => window.texmeshViewer.session.live.scale !== s, scale, {timeout: 15000});
 }), {seconds: 60});
 
-test('viewer: plots say what is under the pointer, and nothing below them moves', () => withViewer('?pkg=packages/large.texmesh&time=2', async (page) => {
+test('viewer: plots say what is under the pointer, and nothing below them moves', () => withViewer('?pkg=packages/large.texmesh&time=6&mbit=4', async (page) => {
   await phase(page, 'done');
   await page.evaluate(() => { for (const d of document.querySelectorAll('details')) d.open = true; });
   await settled(page);
