@@ -11,7 +11,6 @@
 namespace {
 
 using namespace texmesh;  // NOLINT: an example's main file
-using namespace texmesh;  // NOLINT
 
 void write_model(const ScanOptions& options, const std::string& path, const RunContext& context) {
   const Model model = make_scan(options, context);
@@ -47,17 +46,20 @@ int run(int argc, char** argv) {
   std::string out = "scan.glb";
   int many = 0;
   bool range_scan = false;
+  std::string shape = "rock";
   RunContext context;
   context.threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
 
   CLI::App app(
-      "Makes a scan: an organic object with a photo-like texture, the same bytes everywhere for equal "
-      "options.");
+      "Makes a scan: an object with a photo-like texture, the same bytes everywhere for equal options.");
   app.add_option("-o,--out", out, "file (.glb, .obj, .ply; .json with --range-scan) or folder (with --many)")
       ->capture_default_str();
   auto number = [&app](const char* name, int& value, int lo, int hi, const char* help) {
     app.add_option(name, value, help)->check(CLI::Range(lo, hi))->capture_default_str();
   };
+  app.add_option("--shape", shape, "rock, or owl: a painted one, whole and closed")
+      ->check(CLI::IsMember({"rock", "owl"}))
+      ->capture_default_str();
   number("--triangles", options.triangles, 48, 50'000'000, "triangles, about");
   number("--texture", options.texture_px, 0, 16384, "side of the textures in px; 0 = vertex colours instead");
   number("--enlarge", options.enlarge, 1, 16,
@@ -77,6 +79,11 @@ int run(int argc, char** argv) {
   number("--many", many, 0, 1'000'000, "so many different models, into the folder that -o names");
   number("--threads", context.threads, 1, 256, "threads; the bytes do not depend on them");
   CLI11_PARSE(app, argc, argv);
+  if (shape == "owl") {
+    options.form = ScanForm::kOwl;
+    if (app.count("--holes") == 0) options.holes = 0;
+    if (app.count("--noise") == 0) options.noise = 0.0001;
+  }
 
   if (range_scan) {
     if (app.count("-o") == 0) out = "scan.json";

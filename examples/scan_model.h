@@ -1,15 +1,20 @@
 #pragma once
 
+#include <memory>
+
 #include "format/model/model.h"
 #include "stages/base/run_context.h"
 #include "stages/data/pixels.h"
 
 namespace texmesh {
 
-/// A made scan: an organic object with the habits of photogrammetry (irregular triangles, measuring noise,
+/// A made scan: an object with the habits of photogrammetry (irregular triangles, measuring noise,
 /// holes, an atlas of many charts with black gutters, exposure that jumps at seams). The same bytes on every
 /// machine and for any number of threads.
+enum class ScanForm { kRock, kOwl };
+
 struct ScanOptions {
+  ScanForm form = ScanForm::kRock;
   int triangles = 100'000;  // about
   int texture_px = 2048;    // side of the square textures; 0 = no texture, vertex colours instead
   int charts = 60;
@@ -32,16 +37,24 @@ struct ShapeSample {
 /// The made object: its form and its look. Pure functions of the seed.
 class ScanShape {
  public:
-  explicit ScanShape(std::uint32_t seed);
+  virtual ~ScanShape() = default;
   /// Surface point in a unit direction from the middle; the object stands about 0.3 units high around the
-  /// origin.
-  Vec3d point(Vec3d direction) const;
+  /// origin, its up side at +y.
+  virtual Vec3d point(Vec3d direction) const = 0;
+  /// `finest` is the size of the smallest detail to paint, object units: that of a texel.
+  virtual ShapeSample sample(Vec3d position, Vec3d normal, double finest) const = 0;
+};
+
+/// A lump of weathered stone, clay, bronze or wood.
+class RockShape final : public ScanShape {
+ public:
+  explicit RockShape(std::uint32_t seed);
+  Vec3d point(Vec3d direction) const override;
+  ShapeSample sample(Vec3d position, Vec3d normal, double finest) const override;
   /// Range-scan form: distance from the y axis at angle `alpha` and height `t` (0 bottom, 1 top) of
   /// range_height().
   double range_radius(double alpha, double t) const;
   static constexpr double range_height() { return 0.3; }
-  /// `finest` is the size of the smallest detail to paint, object units: that of a texel.
-  ShapeSample sample(Vec3d position, Vec3d normal, double finest) const;
 
  private:
   struct Lobe {
@@ -54,6 +67,9 @@ class ScanShape {
   std::vector<Lobe> lobes_;
   std::array<Vec3d, 4> palette_;
 };
+
+/// An owl of painted and glazed clay on a plinth: whole, closed, with relief.
+std::unique_ptr<ScanShape> make_owl(std::uint32_t seed);
 
 /// A mesh with its atlas.
 struct ScanMesh {

@@ -94,7 +94,7 @@ double spots(Vec3d p, std::uint32_t seed, double density) {
   return std::max(0.0, 1 - length(d) / radius);
 }
 
-ScanShape::ScanShape(std::uint32_t seed) : seed_(seed * 1000003u + 17u) {
+RockShape::RockShape(std::uint32_t seed) : seed_(seed * 1000003u + 17u) {
   twist_ = mix(-0.6, 0.6, hash01(1, 0, 0, seed_));
   bend_ = mix(-0.18, 0.18, hash01(2, 0, 0, seed_));
   stretch_ = mix(1.15, 1.5, hash01(3, 0, 0, seed_));
@@ -106,7 +106,7 @@ ScanShape::ScanShape(std::uint32_t seed) : seed_(seed * 1000003u + 17u) {
   std::copy_n(kPalettes[palette], 4, palette_.begin());
 }
 
-double ScanShape::radius(Vec3d d) const {
+double RockShape::radius(Vec3d d) const {
   double r = 1 + 0.28 * fractal(d * 1.4, seed_ + 10, 3);
   for (const Lobe& lobe : lobes_) r += lobe.size * portable::exp((dot(d, lobe.centre) - 1) * lobe.sharpness);
   r += 0.05 * fractal(d * 4.5, seed_ + 20, 4);
@@ -114,14 +114,14 @@ double ScanShape::radius(Vec3d d) const {
   return r + 0.035 * crest * crest * crest * smoothstep(-0.1, 0.3, noise(d * 2, seed_ + 40));
 }
 
-Vec3d ScanShape::point(Vec3d d) const {
+Vec3d RockShape::point(Vec3d d) const {
   const Vec3d p = d * std::max(0.25, radius(d));
   const double y = p.y * stretch_, angle = twist_ * y;
   const double c = portable::cos(angle), s = portable::sin(angle);
   return Vec3d{c * p.x - s * p.z + bend_ * y * y, y, s * p.x + c * p.z} * kUnit;
 }
 
-double ScanShape::range_radius(double alpha, double t) const {
+double RockShape::range_radius(double alpha, double t) const {
   const Vec3d around{portable::cos(alpha), 2.2 * t, portable::sin(alpha)};
   // A bust's outline: shoulders, neck, head.
   const double outline = 0.10 - 0.055 * smoothstep(0.15, 0.35, t) + 0.035 * smoothstep(0.42, 0.6, t) -
@@ -131,7 +131,7 @@ double ScanShape::range_radius(double alpha, double t) const {
   return outline * std::max(0.3, 1 + relief);
 }
 
-ShapeSample ScanShape::sample(Vec3d position, Vec3d normal, double finest) const {
+ShapeSample RockShape::sample(Vec3d position, Vec3d normal, double finest) const {
   const Vec3d p = position * (1 / kUnit);
   const Vec3d q = p + Vec3d{fractal(p * 1.7, seed_ + 50, 3), fractal(p * 1.7, seed_ + 53, 3),
                             fractal(p * 1.7, seed_ + 56, 3)} *

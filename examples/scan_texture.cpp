@@ -246,7 +246,10 @@ std::vector<std::uint8_t> encode_scan_jpeg(const Pixels& pixels, int quality) {
 
 Model make_scan(const ScanOptions& asked, const RunContext& context) {
   const ScanOptions options = as_painted(asked);
-  const ScanShape shape(static_cast<std::uint32_t>(options.seed));
+  const auto object_seed = static_cast<std::uint32_t>(options.seed);
+  const std::unique_ptr<ScanShape> made =
+      options.form == ScanForm::kOwl ? make_owl(object_seed) : std::make_unique<RockShape>(object_seed);
+  const ScanShape& shape = *made;
   ScanMesh scan = make_scan_mesh(shape, options);
   Model model;
   Material material;
@@ -290,12 +293,12 @@ Model make_scan(const ScanOptions& asked, const RunContext& context) {
 }
 
 MadeRangeScan make_range_scan(const ScanOptions& options, const RunContext& context) {
-  const ScanShape shape(static_cast<std::uint32_t>(options.seed));
+  const RockShape shape(static_cast<std::uint32_t>(options.seed));
   const auto seed = static_cast<std::uint32_t>(options.seed) * 127u + 1u;
   MadeRangeScan scan;
   scan.columns = static_cast<std::uint32_t>(options.range_columns);
   scan.rows = static_cast<std::uint32_t>(options.range_rows);
-  scan.height = ScanShape::range_height();
+  scan.height = RockShape::range_height();
   scan.radius.resize(static_cast<std::size_t>(scan.columns) * scan.rows);
   scan.colour = blank(scan.columns, scan.rows);
   const double deviation = options.noise * 0.35;

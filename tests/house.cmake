@@ -24,6 +24,7 @@ add_test(NAME house_docs COMMAND ${house}/check_docs ${PROJECT_SOURCE_DIR} $<TAR
 add_test(NAME house_docs_self_test COMMAND ${house}/check_docs --self-test)
 add_test(NAME house_bench_run COMMAND ${house}/check_bench_run ${PROJECT_SOURCE_DIR})
 add_test(NAME house_tour_self_test COMMAND ${house}/check_tour --self-test)
+add_test(NAME house_tutorial_self_test COMMAND ${house}/check_tutorial --self-test)
 if(NOT TEXMESH_SANITIZE)  # an instrumented library would ask the same of its user
   add_test(NAME house_install COMMAND ${house}/check_install ${PROJECT_BINARY_DIR} ${CMAKE_CURRENT_SOURCE_DIR}/consumer
     ${CMAKE_CURRENT_BINARY_DIR}/install ${CMAKE_COMMAND} $<TARGET_FILE:make_scan>)
@@ -31,6 +32,8 @@ endif()
 if(NOT TEXMESH_SANITIZE)
   add_test(NAME house_tour COMMAND ${house}/check_tour ${PROJECT_SOURCE_DIR}/README.md $<TARGET_FILE:texmesh>
     $<TARGET_FILE:make_scan> ${CMAKE_CURRENT_BINARY_DIR}/tour)
+  add_test(NAME house_tutorial COMMAND ${house}/check_tutorial ${PROJECT_SOURCE_DIR}/docs/tutorial.md ${PROJECT_BINARY_DIR}
+    ${CMAKE_CURRENT_BINARY_DIR}/tutorial)
 endif()
 if(NOT TEXMESH_SANITIZE)
   add_test(NAME house_supply COMMAND ${house}/check_supply ${PROJECT_BINARY_DIR} ${CMAKE_CURRENT_BINARY_DIR}/supply

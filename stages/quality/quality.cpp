@@ -145,20 +145,35 @@ void judge_size(const SizeCells& cells, const Height& height, const TextureSampl
   sizes.judge_between(between.geometry, failed, height.between_px);
 }
 
+/// What a height costs beside the others, about: those of the table are rendered with many textures.
+double cost_of(const Height& height) {
+  constexpr double kUnranked = 0.25, kRanks[] = {2.4, 4, 3.2};
+  return height.rank ? kRanks[std::min(*height.rank, std::size(kRanks) - 1)] : kUnranked;
+}
+
 std::vector<SizeCells> render_heights(const TextureSampler& sampler, const QualityOptions& options,
                                       std::size_t fewer, Studio& studio, SwitchSizes& sizes,
                                       const RunContext& context) {
   const std::vector<Height> heights = heights_below(options.largest_px, fewer);
   std::vector<SizeCells> table_cells;
+  constexpr double kBefore = 0.8;  // looking around, as costs are counted
+  double all = kBefore, done = kBefore;
+  for (const Height& height : heights) all += cost_of(height);
+  RunContext quiet = context;
+  quiet.progress = nullptr;
   for (std::size_t i = 0; i < heights.size(); ++i) {
     context.check_cancelled();
-    context.report(static_cast<double>(i + 1) / static_cast<double>(heights.size() + 1));
+    const double cost = cost_of(heights[i]);
+    RunContext told = context;
+    told.progress = [&context, all, done, cost](double part) { context.report((done + cost * part) / all); };
+    told.report(0);
     SizeCells cells{heights[i].displayed_px, {}, {}, {}};
     SizeTask task{rendered_scales(sizes.alive(), heights[i], fewer > 0, options), std::nullopt,
                   heights[i].rank};
     if (!task.rank) task.ends_beyond = limits_at(heights[i].displayed_px, options);
-    render_size(sampler, task, studio, cells, context);
-    judge_size(cells, heights[i], sampler, options, studio, sizes, context);
+    render_size(sampler, task, studio, cells, told);
+    judge_size(cells, heights[i], sampler, options, studio, sizes, quiet);
+    done += cost;
     if (heights[i].rank) table_cells.push_back(std::move(cells));
   }
   return table_cells;

@@ -221,6 +221,7 @@ std::vector<Losses> SizePictures::take(const std::vector<Shot>& shots, const Run
     for (std::size_t i = 0; i < shots.size(); ++i)
       if (studio_.views.has(v, shots[i].views) && !ended(shots[i], out[i])) taken.push_back(i);
     if (!taken.empty()) compare_view(v, shots, taken, out, context);
+    context.report(static_cast<double>(v + 1) / static_cast<double>(views));
   }
   return out;
 }

@@ -188,6 +188,7 @@ class SizeShots {
   }
 
   void render(double displayed_px, bool with_ssim) {
+    all_shots_ = scale_shots_.size() + shots_.size();
     if (have_one_reference(sampler_.shown)) {
       shots_.insert(shots_.end(), scale_shots_.begin(), scale_shots_.end());
       to_.insert(to_.end(), scales_.begin(), scales_.end());
@@ -249,8 +250,12 @@ class SizeShots {
       std::size_t end = begin, bytes = 0;
       while (end < shots.size() && bytes <= kTogetherBytes) bytes += make_textures(*shots[end++].materials);
       const auto at = [](std::size_t i) { return static_cast<std::ptrdiff_t>(i); };
-      std::vector<Losses> losses =
-          pictures.take({shots.begin() + at(begin), shots.begin() + at(end)}, context_);
+      RunContext part = context_;
+      part.progress = [this, count = static_cast<double>(end - begin)](double fraction) {
+        context_.report((taken_shots_ + count * fraction) / static_cast<double>(all_shots_));
+      };
+      std::vector<Losses> losses = pictures.take({shots.begin() + at(begin), shots.begin() + at(end)}, part);
+      taken_shots_ += static_cast<double>(end - begin);
       for (std::size_t i = begin; i < end; ++i) *to[i] = std::move(losses[i - begin]);
       for (std::size_t t = source_; t < studio_.textures.size(); ++t) studio_.textures[t] = {};
       begin = end;
@@ -285,6 +290,8 @@ class SizeShots {
   std::vector<std::pair<const Losses*, Losses*>> repeated_;
   std::vector<Shot> shots_, scale_shots_;
   std::vector<Losses*> to_, scales_;
+  std::size_t all_shots_ = 0;
+  double taken_shots_ = 0;
 };
 
 /// The samples that tell how losses add up: parts that lose little and much.

@@ -102,7 +102,7 @@ Row measure(int triangles, int repeats, int threads) {
   ScanOptions scan;
   scan.triangles = triangles;
   scan.charts = 60;
-  const ConditionedMesh mesh = condition_mesh(make_scan_mesh(ScanShape(1), scan).mesh, false, {}, context);
+  const ConditionedMesh mesh = condition_mesh(make_scan_mesh(RockShape(1), scan).mesh, false, {}, context);
   const ScaleMap map = made_scale_map(mesh.mesh.positions.size());
   std::vector<Vec3f> points;
   for (std::uint32_t p : mesh.mesh.wedge_position) points.push_back(mesh.mesh.positions[p]);

@@ -93,7 +93,7 @@ double processor_seconds() {
 ConditionedMesh made_scan(int triangles, const RunContext& context) {
   ScanOptions options;
   options.triangles = triangles;
-  const ScanMesh scan = make_scan_mesh(ScanShape(1), options);
+  const ScanMesh scan = make_scan_mesh(RockShape(1), options);
   return condition_mesh(scan.mesh, true, {}, context);
 }
 

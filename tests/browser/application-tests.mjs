@@ -12,8 +12,18 @@ camera.position.z = 0.8;
 camera.updateMatrixWorld();
 `;
 
+/** What the page `file` prints, as the application's module. */
+function printed(file, block) {
+  const [, example] = block.exec(fs.readFileSync(path.join(env.source, file), 'utf8'));
+  const main = example.replace(/'[^']*\.texmesh'/, "'maps.texmesh'")
+    .replace(/( *)renderer\.setAnimationLoop/, '$1window.model = model;\n$1model.done.then(() => { window.ended = true; });\n$&');
+  check(/maps\.texmesh/.test(main) && /window\.model/.test(main), 'the example is another');
+  return main;
+}
+const readme = () => kBefore + printed('delivery/web/README.md', /```ts\n([^]*?)```/);
+
 /** The application in a folder of its own, and Vite. */
-function application() {
+function application(main = readme()) {
   const root = path.join(env.work, 'application');
   const [web, viewer] = ['delivery/web', 'examples/viewer'].map((f) => path.join(env.work, 'work', f));
   fs.rmSync(root, {recursive: true, force: true});
@@ -22,11 +32,7 @@ function application() {
   fs.cpSync(path.join(viewer, 'node_modules/three'), path.join(root, 'node_modules/three'), {recursive: true});
   fs.cpSync(path.join(root, 'node_modules/three/examples/jsm/libs/draco/gltf'), path.join(root, 'public/draco'), {recursive: true});
   fs.copyFileSync(path.join(packages, 'alone/maps.texmesh'), path.join(root, 'public/maps.texmesh'));
-  const [, example] = /```ts\n([^]*?)```/.exec(fs.readFileSync(path.join(env.source, 'delivery/web/README.md'), 'utf8'));
-  const main = example.replace('https://example.org/turtle.texmesh', 'maps.texmesh')
-    .replace(/( *)renderer\.setAnimationLoop/, '$1window.model = model;\n$1model.done.then(() => { window.ended = true; });\n$&');
-  check(/maps\.texmesh/.test(main) && /window\.model/.test(main), 'the example is another');
-  fs.writeFileSync(path.join(root, 'main.ts'), kBefore + main);
+  fs.writeFileSync(path.join(root, 'main.ts'), main);
   fs.writeFileSync(path.join(root, 'index.html'), kPage);
   fs.writeFileSync(path.join(root, 'package.json'), '{"type": "module", "dependencies": {"texmesh": "*", "three": "*"}}');
   return {root, vite: () => import(path.join(viewer, 'node_modules/vite/dist/node/index.js'))};
@@ -49,6 +55,15 @@ test("an application of Vite, built, at a server without ranges: README's exampl
   const {root, vite} = application();
   await (await vite()).build({root, configFile: false, logLevel: 'error', build: {target: 'es2022'}});
   const [b, server] = [await common(), await serve({'/': path.join(root, 'dist')}, {ranges: false})];
+  try {
+    await isShown(b, `${server.url}/index.html`);
+  } finally { await server.close(); }
+}, {seconds: 90});
+
+test("an application of Vite, built: the tutorial's example", async () => {
+  const {root, vite} = application(printed('docs/tutorial.md', /```js\n([^]*?)```/));
+  await (await vite()).build({root, configFile: false, logLevel: 'error', build: {target: 'es2022'}});
+  const [b, server] = [await common(), await serve({'/': path.join(root, 'dist')})];
   try {
     await isShown(b, `${server.url}/index.html`);
   } finally { await server.close(); }

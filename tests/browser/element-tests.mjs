@@ -1,5 +1,5 @@
 // <texmesh-viewer> as pages use it: what it says before the click, whose the object is, attributes and slots as <model-viewer> has them.
-import {check, near} from './browser.mjs';
+import {check, env, fs, near, path} from './browser.mjs';
 import {test} from './harness.mjs';
 import {covered, html, onPage, settled} from './page-tests.mjs';
 
@@ -14,6 +14,16 @@ const orbit = (page) => element(page).evaluate((e) => {
   return [Math.atan2(x, z), Math.acos(y / away)].map((r) => r * 180 / Math.PI).concat(away);
 });
 const loaded = (page) => page.waitForFunction(() => document.querySelector('texmesh-viewer').loaded, null, {timeout: 30000});
+
+for (const [file, count] of [['README.md', 1], ['docs/tutorial.md', 2]])
+  test(`the element: the page of ${file} shows its objects`, async () => {
+    const [, shown] = /```html\n([^]*?)```/.exec(fs.readFileSync(path.join(env.source, file), 'utf8'));
+    const text = shown.replaceAll('src="viewer/', 'src="/viewer/').replaceAll(/src="packages\/[^"]*"/g, 'src="/packages/maps.texmesh"');
+    await onPage(`<link rel="icon" href="data:,">${text}`, async (page) => {
+      await settled(page, count);
+      check(await covered(page, 0, `printed-${count}`) > 0.02, 'nothing is shown');
+    });
+  });
 
 test('the element: attribution and licence stand beside the object, as text whatever they hold', async () => {
   await onPage(one('alt="a statue"', '', 'told'), async (page) => {

@@ -44,7 +44,7 @@ const server = await serve(roots);
 const link = await startLink({target: server.port});
 
 /** A page behind the link, with decoders, whose camera sees the package's object; the link is slow from then on. */
-async function readyPage(name, {size = 512, slow = kLink, warm = true} = {}) {
+async function readyPage(name, {size = 512, slow = kLink, warm = true, background = 0x808080} = {}) {
   makePackage(name);
   await link.set({bytesPerSecond: 1e12, rttMs: 0, changes: 0});
   const page = await labPage(browser, link.url);
@@ -62,7 +62,7 @@ async function readyPage(name, {size = 512, slow = kLink, warm = true} = {}) {
       await window.lab.finished(id);
       window.lab.dispose(id);
     }
-  }, [`${link.url}/figures/${name}.texmesh`, {size}, warm]);
+  }, [`${link.url}/figures/${name}.texmesh`, {size, background}, warm]);
   await page.waitForTimeout(300);
   await link.set(slow);
   return page;
@@ -98,7 +98,7 @@ const pictureAt = (page, id, at) => lab(page, ([i, seconds]) => {
 /** The first picture of packages with proxies, and what was shown when. TEXMESH_FIGURE_PROXIES names others, by commas. */
 async function proxiesFirst() {
   for (const name of process.env.TEXMESH_FIGURE_PROXIES?.split(',') ?? Object.keys(kProxyScans)) {
-    const page = await readyPage(name);
+    const page = await readyPage(name, {background: 0xffffff});
     const id = await load(page, name, {frames: 1, load: {time: 4, autoRefine: false}});
     const r = await finished(page, id);
     const shown = r.events.find((e) => e.name === 'first-picture');
@@ -116,7 +116,7 @@ async function proxiesFirst() {
     if (enough >= 0) row(`proxy first, ${name}: shown at the end, for ${displayedPx.toFixed(0)} px`, `proxy ${enough}`, '', true);
     const scale = r.events.find((e) => e.name === 'scale');
     if (scale) row(`proxy first, ${name}: seconds to S_${scale.scale} in its place`, scale.at.toFixed(2), '', true);
-    for (const at of [0.1, 0.3, 1, 4]) {
+    for (const at of [0.1, 0.3, 0.5, 1, 2, 4]) {
       const picture = await pictureAt(page, id, at);
       if (picture) fs.writeFileSync(path.join(pictures, `${name}-${at}s.png`), Buffer.from(picture, 'base64'));
     }

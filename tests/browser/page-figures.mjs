@@ -1,7 +1,9 @@
 // Twenty scans in a grid behind 4 Mbit/s and 40 ms: <texmesh-viewer> beside <model-viewer> with GLBs of the same scans. Prints a table and
-// leaves screenshots at .5, 1 and 3 s. TEXMESH_DATA names the folder with the scans; what is compiled of them is kept in TEXMESH_FIGURE_PACKAGES.
+// leaves screenshots at .5, 1 and 3 s. TEXMESH_DATA names the folder with the scans (without it, owls and rocks of make_scan stand for them);
+// what is compiled of them is kept in TEXMESH_FIGURE_PACKAGES.
 // A grid of fewer scans repeats them under other addresses: nothing is fetched once for two elements. Words: the number of
-// runs (default 3), and `texmesh`, `model-viewer` or `memory` (what limits and blocks make of it) for one of them alone.
+// runs (default 3), and `texmesh`, `model-viewer` or `memory` (what limits and blocks make of it) for one of them alone, or `readme`
+// for the first two.
 import {check, env, fs, here, launch, listen, path, pictures, run, serve} from './browser.mjs';
 import {countStorage, onlyFormats} from './gpu-storage.mjs';
 import {startLink} from './link.mjs';
@@ -16,25 +18,30 @@ const kElements = 20;
 const kLink = {bytesPerSecond: 500000, rttMs: 40};
 const kLimitS = 5;
 const runs = Number(process.argv[2] ?? 3);
-const shown = process.argv[3] ? [process.argv[3]] : ['texmesh', 'memory', 'model-viewer'];
+const kShown = ['texmesh', 'memory', 'model-viewer'];
+const shown = !process.argv[3] ? kShown : process.argv[3] === 'readme' ? ['texmesh', 'model-viewer'] : [process.argv[3]];
 const figures = process.env.TEXMESH_FIGURE_PACKAGES ?? path.join(env.work, 'figures');
 fs.mkdirSync(figures, {recursive: true});
 
+if (env.data === '')
+  for (const name of Object.keys(kScans)) delete kScans[name];
+for (let seed = 1; env.data === '' && seed <= 4; ++seed)
+  for (const shape of ['owl', 'rock']) kScans[`${shape}-${seed}`] = `${shape}-${seed}.glb`;
+
 /** Package and GLB of a scan, made where they are missing; false where there is no scan. */
 function made(name) {
-  const [file, folder, scan] = [path.join(figures, `${name}.texmesh`), path.join(figures, `mv-${name}`), path.join(env.data, kScans[name])];
+  const [file, folder, scan] = [path.join(figures, `${name}.texmesh`), path.join(figures, `mv-${name}`), path.join(env.data || figures, kScans[name])];
   if (!fs.existsSync(file)) {
-    if (env.data === '' || !fs.existsSync(scan)) return false;
+    const [shape, seed] = name.split('-');
+    if (env.data === '') run(env.makeScan, '-o', scan, '--shape', shape, '--seed', seed);
+    if (!fs.existsSync(scan)) return false;
     run(env.texmesh, 'compile', scan, '-o', file, '--quiet', '--quality.views', '1');
   }
   if (!fs.existsSync(folder)) run(env.texmesh, 'export', file, '--to', 'model-viewer', '--plain', '-o', folder);
   return true;
 }
 const names = Object.keys(kScans).filter(made);
-if (names.length === 0) {
-  console.log('skipped: TEXMESH_DATA names no folder with the scans of the grid');
-  process.exit(77);
-}
+check(names.length > 0, `${env.data}: none of the scans of the grid is there`);
 
 const html = (script, element) => `<!doctype html><html lang="en"><title>grid</title><link rel="icon" href="data:,">
 <style>body{margin:0}.grid{display:grid;grid-template-columns:repeat(5,1fr);gap:4px}${element}{width:100%;height:200px}</style>

@@ -132,6 +132,7 @@ test('viewer: cap, policy, rung and time by hand, then loaded again', () => with
   await phase(page, 'done');
   const free = await live(page, (x) => x.bytes);
   await page.locator('#cap').selectOption({value: '62500'});
+  await page.locator('#experts > summary').click();
   await page.locator('#policy').selectOption('guard');
   await page.locator('#reload').click();
   await page.waitForFunction(() => Number.isFinite(window.texmeshViewer.session.live.doneS), null, {timeout: 30000});
@@ -168,6 +169,7 @@ test('viewer: keyboard and mouse turn it, overrides change it', () => withViewer
   await page.mouse.move(box.x + 420, box.y + 340, {steps: 4});
   await page.mouse.up();
   check(differs(before, await eye()), 'dragging does nothing');
+  await page.locator('#experts > summary').click();
   await page.locator('#scale').selectOption({index: 1});
   await page.waitForFunction(() => window.texmeshViewer.session.live.scale === 0, null, {timeout: 20000});
   await page.keyboard.press('t');
@@ -209,6 +211,8 @@ test('viewer: errors can be read', async () => {
   for (const [name, query, text, options] of [
     ['404', '?pkg=packages/none.texmesh', /no package here/i, {}],
     ['no-package', '?pkg=index.html', /not a package/i, {}],
+    ['visitor-404', '?pkg=packages/none.texmesh&panel=none', /^This object is not here any more\.Try again$/, {}],
+    ['visitor-page', '?pkg=index.html&panel=none', /^This object cannot be shown\.Try again$/, {}],
     ['server-error', '?pkg=packages/maps.texmesh', /could not be loaded/i, {fault: (q) => (q.path.endsWith('.texmesh') ? {status: 500} : undefined)}],
   ]) {
     await withViewer(query, async (page) => {
@@ -219,6 +223,16 @@ test('viewer: errors can be read', async () => {
     }, {quiet: false, ...options});
   }
 }, {seconds: 90});
+
+test('viewer: a poster stands there until the object does, in the grey that goes on', () => withViewer('?pkg=packages/maps.texmesh&time=1&panel=none&poster=packages/maps/poster.jpg', async (page) => {
+  const poster = page.locator('#poster');
+  await poster.waitFor({state: 'visible', timeout: 20000});
+  check(await poster.evaluate((e) => e.complete && e.naturalWidth > 0 || new Promise((go) => { e.onload = () => go(true); e.onerror = () => go(false); })), 'no poster');
+  await phase(page, 'done');
+  check(await poster.evaluate((e) => e.classList.contains('gone')), 'the poster stays');
+  check(await page.locator('#stage').evaluate((e) => getComputedStyle(e).backgroundColor) === 'rgb(124, 124, 124)', 'another grey');
+  await shot(page, 'viewer-posed');
+}));
 
 test('viewer: what goes wrong beside the picture can be read', async () => {
   let lost = 0;

@@ -112,13 +112,15 @@ test('viewer: every control can be reached and used by keyboard', () => withView
   await page.locator('#split').focus();
   await page.keyboard.press('Enter');
   await originalReady(page);
+  await page.locator('#experts > summary').focus();
+  await page.keyboard.press('Enter');
   await page.locator('#view').focus();
   const reached = [];
-  for (let i = 0; i < 24; i++) {
+  for (let i = 0; i < 25; i++) {
     await page.keyboard.press('Tab');
     reached.push(await page.evaluate(() => { const e = document.activeElement; return e.id || e.getAttribute('aria-label') || e.textContent.trim(); }));
   }
-  const wanted = ['home', 'split', 'theme', 'toggle', 'divider', 'time', 'cap', 'policy', 'scale', 'rung', 'reload', 'refine', 'Scales', 'Fragments', 'Texture', 'rung', 'η', 'bytes', 'skipped', 'Ladder', 'Time', 'Bytes'];
+  const wanted = ['home', 'split', 'theme', 'toggle', 'divider', 'time', 'cap', 'policy', 'scale', 'rung', 'reload', 'refine', 'Scales', 'Fragments', 'Texture', 'rung', 'η', 'bytes', 'skipped', 'Ladder', 'Time', 'Bytes', 'For experts'];
   const missing = wanted.filter((name) => !reached.includes(name));
   check(missing.length === 0, `not reached: ${missing}; reached ${reached}`);
   const theme = () => page.evaluate(() => document.documentElement.dataset.theme);
@@ -135,7 +137,7 @@ test('viewer: every control can be reached and used by keyboard', () => withView
   await page.waitForFunction((s) => window.texmeshViewer.session.live.scale !== s, scale, {timeout: 15000});
 }), {seconds: 60});
 
-test('viewer: plots say what is under the pointer, and nothing below them moves', () => withViewer('?pkg=packages/large.texmesh&time=2', async (page) => {
+test('viewer: plots say what is under the pointer, and nothing below them moves', () => withViewer('?pkg=packages/large.texmesh&time=6&mbit=4', async (page) => {
   await phase(page, 'done');
   await page.evaluate(() => { for (const d of document.querySelectorAll('details')) d.open = true; });
   await settled(page);
@@ -194,6 +196,7 @@ test('viewer: colours come first in the map; the step function has a dot where t
     }
     return rows.length ? rows.reduce((a, v) => a + v, 0) / rows.length : NaN;
   });
+  await page.locator('#experts > summary').click();
   await page.locator('#scale').selectOption({index: 1});
   await page.waitForFunction(() => window.texmeshViewer.session.live.scale === 0, null, {timeout: 15000});
   await settled(page);

@@ -19,6 +19,13 @@
 namespace texmesh {
 namespace {
 
+/// Another answer than the expected one; none at all is what the system says of it.
+[[noreturn]] void fail_answer(const std::string& file, const std::string& place, const std::string& expected,
+                              const HttpAnswer& a) {
+  if (a.status == 0) throw InputError(file, "", "", "cannot be read: " + describe_answer(a));
+  throw InputError(file, place, expected, describe_answer(a));
+}
+
 constexpr int kConnections = 6;  // as browsers have
 constexpr int kStallTries = 2;   // what a try costs that ended with silence
 constexpr double kSlice_s = 0.1;
@@ -226,7 +233,7 @@ class HttpSource final : public ByteSource {
       throw RangesEnded(name(), place, "an answer with status 206",
                         "status 200: ranges are no longer answered");
     if (a.status == 200 || a.status == 416) fail_replaced("status " + std::to_string(a.status));
-    throw InputError(name(), place, "an answer with status 206", describe_answer(a));
+    fail_answer(name(), place, "an answer with status 206", a);
   }
 
   [[noreturn]] void fail_replaced(const std::string& found) const {
@@ -298,8 +305,7 @@ class HttpTree {
           throw FormatError(name(), wanted[i].path,
                             "at most " + std::to_string(wanted[i].max_bytes) + " bytes", "more");
         if (a.body.size() >= kProgressBytes && ranges_) retries[i] = HttpRetries(pool_->options());
-        if (!may_retry(a) || !retries[i].wait(a))
-          throw InputError(name() + wanted[i].path, "", "a file", describe_answer(a));
+        if (!may_retry(a) || !retries[i].wait(a)) fail_answer(name() + wanted[i].path, "", "a file", a);
         start(i, wanted[i]);
       }
     } catch (...) {
@@ -474,7 +480,7 @@ class UrlStore final : public HttpStore {
     if (a.too_long)
       throw FormatError(names, "byte 0", "at most " + std::to_string(kStartBytes) + " bytes", "more");
     if (a.status == 416) throw FormatError(names, "byte 0", "a longer file", "status 416");
-    throw InputError(names, "byte 0", "an answer with status 206", describe_answer(a));
+    fail_answer(names, "byte 0", "an answer with status 206", a);
   }
 
   Bytes open_by(HttpPool::Ended first) {
@@ -559,8 +565,7 @@ class UrlStore final : public HttpStore {
                          "at most " + std::to_string(pool_->options().max_whole_bytes) +
                              " bytes from a server without ranges",
                          "more");
-      if (!may_retry(a) || !retries.wait(a))
-        throw InputError(shown_url(url), "", "an answer with status 200", describe_answer(a));
+      if (!may_retry(a) || !retries.wait(a)) fail_answer(shown_url(url), "", "an answer with status 200", a);
     }
   }
 

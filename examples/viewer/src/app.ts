@@ -4,6 +4,7 @@ import { byId } from './dom';
 import { hideMessage, offerPackages, showError } from './message';
 import { Notes } from './notes';
 import { Panel } from './panel/panel';
+import { hidePoster } from './poster';
 import { warmDecoders } from './session/decoders';
 import { Session } from './session/session';
 import { Stage } from './stage/stage';
@@ -35,12 +36,14 @@ export function start(query: URLSearchParams): void {
   const soonStatus = atMostEvery(kStatusMs, () => showStatus(session.live, packageUrl));
   const notes = new Notes(stage, session);
   session.onChange = () => {
+    if (session.live.scale !== null) hidePoster();
     panel.update(session.live);
     notes.changed();
     soonStatus();
   };
   session.onError = (error) => {
     // What is on the screen stays there: a message in front of it would hide more than it tells.
+    hidePoster();
     if (session.live.scale === null) showError(error, packageUrl);
     else session.problem(error);
   };

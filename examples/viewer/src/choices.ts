@@ -13,12 +13,12 @@ export interface Choices {
 const kMostTimeS = 3600;
 export const kTimes = [0.5, 1, 1.5, 2, 3, 4, 6, 8, 12, 20, 30, 60, Infinity];
 const kCaps: [string, number][] = [
-  ['no cap', Infinity], ['0.5 Mbit/s', 62500], ['1 Mbit/s', 125000], ['2 Mbit/s', 250000],
+  ['as it is', Infinity], ['0.5 Mbit/s', 62500], ['1 Mbit/s', 125000], ['2 Mbit/s', 250000],
   ['5 Mbit/s', 625000], ['10 Mbit/s', 1.25e6],
   ['50 Mbit/s', 6.25e6],
 ];
 export const kPolicies: [Policy, string][] =
-  [['guard', 'harmonic, guarded'], ['thesis', 'as printed (thesis)']];
+  [['guard', 'keeps the time'], ['thesis', 'as printed in the thesis']];
 
 /** The bandwidths to choose from, `bytesPerSecond` among them. */
 export function capsWith(bytesPerSecond: number): [string, number][] {

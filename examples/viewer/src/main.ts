@@ -2,6 +2,7 @@ import './style.css';
 import { byId } from './dom';
 import { graphics } from './stage/gpu';
 import { showError } from './message';
+import { showPoster } from './poster';
 import { startTheme } from './theme';
 
 // This file is small, so that colours and a graphics context are there while the rest comes.
@@ -11,6 +12,7 @@ const address = query.get('pkg') ?? '';
 // No panel where the address says so, and none without a package.
 document.body.classList.toggle('wide', address === '' || ['0', 'none'].includes(query.get('panel') ?? ''));
 document.body.classList.toggle('visitor', query.get('panel') === 'none');
+showPoster(query.get('poster') ?? '');
 
 const app = import('./app');
 app.catch(() => undefined); // `await app` below tells of it

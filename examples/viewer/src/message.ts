@@ -12,11 +12,26 @@ export function hideMessage(): void {
 /** An error in words, with what may be done about it. */
 export function showError(error: unknown, url: string): void {
   const text = error instanceof Error ? error.message : String(error);
+  box().hidden = false;
+  if (document.body.classList.contains('visitor')) {
+    console.error(error);
+    console.info(`${headline(error, text)}. ${advice(error, text, url)}`);
+    box().replaceChildren(make('h2', {}, sentence(error, text)),
+      make('button', { type: 'button', onclick: () => location.reload() }, 'Try again'));
+    return;
+  }
   box().replaceChildren(
     make('h2', {}, headline(error, text)),
     make('p', {}, make('code', {}, text)),
     make('p', {}, advice(error, text, url)));
-  box().hidden = false;
+}
+
+/** What a visitor reads, as the element `<texmesh-viewer>` says it. */
+function sentence(error: unknown, text: string): string {
+  if (error instanceof FormatError) return 'This object cannot be shown.';
+  if (/webgl/i.test(text)) return 'This browser cannot show objects in 3D.';
+  if (/404|not found/i.test(text)) return 'This object is not here any more.';
+  return 'The object did not come. Please check the connection.';
 }
 
 function headline(error: unknown, text: string): string {
@@ -32,6 +47,9 @@ function advice(error: unknown, text: string, url: string): string {
   if (/webgl/i.test(text))
     return 'This browser, or its graphics driver, gives pages no WebGL. Another browser may.';
   if (!URL.canParse(url, document.baseURI)) return 'Look at the address behind ?pkg= in the address bar.';
+  if (/html|K11/.test(text))
+    return 'What the server sent is no package. A host that answers unknown addresses with its start page ' +
+      'does so where the address is wrong.';
   if (error instanceof FormatError)
     return 'The file may be damaged, or is of a later version. texmesh verify says more.';
   if (/404|not found/i.test(text))

@@ -44,6 +44,9 @@ Container split_container(const Source& source, ByteSpan bytes) {
   Container c;
   if (bytes.size() < 4 || text_of(bytes.first(4)) != "glTF") {
     c.json = text_of(bytes);
+    const std::size_t begin = c.json.find_first_not_of(" \t\r\n\xef\xbb\xbf");
+    if (begin == c.json.npos || c.json[begin] != '{')
+      source.fail("byte 0", "a GLB, which begins with glTF, or JSON", "neither");
     return c;
   }
   c.is_glb = true;
@@ -53,7 +56,8 @@ Container split_container(const Source& source, ByteSpan bytes) {
   if (u32(bytes, 4) != 2) source.fail("GLB header", "version 2", std::to_string(u32(bytes, 4)));
   const std::uint32_t length = u32(bytes, 8);
   if (length > bytes.size()) {
-    source.fail("GLB header", "a file of " + std::to_string(length) + " bytes", std::to_string(bytes.size()));
+    source.fail("GLB header", "a file of " + std::to_string(length) + " bytes",
+                std::to_string(bytes.size()) + ": the file is cut off");
   }
   if (length < bytes.size()) {
     add_warning(source.notes, "trailing-bytes", "byte " + std::to_string(length),

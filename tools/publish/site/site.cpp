@@ -136,10 +136,10 @@ std::string card_html(const SiteObject& o, std::size_t place, const SiteWords& w
   if (!o.about.licence.empty()) quiet += (quiet.empty() ? "" : ", ") + markup_escaped(o.about.licence);
   return fmt::format(
       "<li data-words=\"{}\" data-facets=\"{}\"><a href=\"objects/{}.html\"><span class=\"poster\">{}</span><strong>{}</strong></a>"
-      "<p>{}</p><p>{}</p></li>\n",
+      "{}{}</li>\n",
       markup_escaped(words_of(o)), markup_escaped(facets_of(o)), percent_encoded(o.name),
-      poster_html(o, "", place >= kAtOnce, words), markup_escaped(o.title), quiet,
-      markup_escaped(figures_of(o, words)));
+      poster_html(o, "", place >= kAtOnce, words), markup_escaped(o.title),
+      quiet.empty() ? "" : "<p>" + quiet + "</p>", o.size.empty() ? "" : "<p>" + markup_escaped(o.size) + "</p>");
 }
 
 using OrderedJson = nlohmann::ordered_json;
@@ -264,7 +264,8 @@ std::string record_head(const SiteObject& o, const SiteOptions& options) {
   std::string json = json_text(schema_org(o, options), -1);
   // Nothing in a text may end the element, or begin a comment.
   for (std::size_t at = 0; (at = json.find('<', at)) != json.npos;) json.replace(at, 1, "\\u003c");
-  const std::string words = o.about.description.substr(0, o.about.description.find('\n'));
+  std::string words = o.about.description.substr(0, o.about.description.find('\n'));
+  if (words.empty()) words = o.title + ", in 3D" + (o.about.creator.empty() ? "" : ", by " + o.about.creator);
   std::string out = meta_html("name", "description", words) + meta_html("property", "og:type", "website") +
                     meta_html("property", "og:title", o.title) +
                     meta_html("property", "og:description", words) +
@@ -316,10 +317,26 @@ std::string head_html(const std::string& title, const std::string& root, bool fr
              root);
 }
 
+/// What search engines and social networks show of the list.
+std::string index_record(const Site& site) {
+  constexpr std::size_t kNamed = 5;
+  std::string text = site.options.title + ", objects in 3D";
+  for (std::size_t k = 0; k < std::min(kNamed, site.objects.size()); ++k)
+    text += (k == 0 ? ": " : ", ") + site.objects[k].title;
+  const std::string& url = site.options.url;
+  const auto shown =
+      std::ranges::find_if(site.objects, [](const SiteObject& o) { return !o.poster.empty(); });
+  return meta_html("name", "description", text) + meta_html("property", "og:type", "website") +
+         meta_html("property", "og:title", site.options.title) + meta_html("property", "og:url", url) +
+         (url.empty() || shown == site.objects.end()
+              ? ""
+              : meta_html("property", "og:image", url + shown->poster_address));
+}
+
 std::string index_page(const Site& site, const SiteWords& words) {
   std::string cards;
   for (std::size_t k = 0; k < site.objects.size(); ++k) cards += card_html(site.objects[k], k, words);
-  return filled(site_file("index.html"), {{"head", head_html(site.options.title, "", false, words)},
+  return filled(site_file("index.html"), {{"head", head_html(site.options.title, "", false, words) + index_record(site)},
                                           {"title", markup_escaped(site.options.title)},
                                           {"skip", words.html("skip")},
                                           {"search", words.html("search")},
@@ -375,6 +392,7 @@ std::string object_page(const SiteObject& o, const SiteOptions& options, const S
   // The package's address is encoded twice: the viewer decodes the query before it takes the value for a URL.
   const std::string viewer =
       root + "viewer/index.html?panel=none&pkg=" + percent_encoded(from_below("../", o.address)) +
+      (o.poster.empty() ? "" : "&poster=" + percent_encoded("../" + o.poster_address)) +
       (o.names_itself ? "" : "&title=" + percent_encoded(o.title));
   return filled(
       site_file("object.html"),

@@ -3,6 +3,7 @@ import { capsWith, kPolicies, kTimes } from '../choices';
 import type { Choices } from '../choices';
 import { make } from '../dom';
 import * as format from '../format';
+import { foldingSection } from './section';
 
 export interface ControlActions {
   /** The choices have changed. */
@@ -14,6 +15,8 @@ export interface ControlActions {
 /** Where a person chooses how the package is loaded and what is shown of it. */
 export class Controls {
   readonly box: HTMLElement;
+  /** What only experts choose, folded unless the address has chosen some of it. */
+  readonly experts: HTMLDetailsElement;
   private readonly scaleSelect: HTMLSelectElement;
   private readonly rungSelect: HTMLSelectElement;
 
@@ -27,18 +30,21 @@ export class Controls {
       (v) => { c.scale = v === '' ? null : Number(v); });
     this.rungSelect = this.select('rung', [kRungByPlan], '',
       (v) => { c.rung = v === '' ? null : Number(v); });
-    this.box = make('section', {}, make('h2', {}, 'Delivery'), make('div', { class: 'controls' },
-      make('label', { for: 'time' }, 'Time limit'), this.timeSlider(),
-      make('label', { for: 'cap' }, 'Bandwidth'), cap,
-      make('label', { for: 'policy' }, 'Policy'), policy,
-      make('p', { class: 'note' }, 'These three count from the next load on.'),
-      make('label', { for: 'scale' }, 'Mesh scale'), this.scaleSelect,
-      make('label', { for: 'rung' }, 'Texture'), this.rungSelect,
+    this.box = make('section', {}, make('h2', {}, 'How it loads'), make('div', { class: 'controls' },
+      make('label', { for: 'time' }, 'Time'), this.timeSlider(),
+      make('label', { for: 'cap' }, 'Connection'), cap,
+      make('p', { class: 'note' }, 'Both count from the next load on.'),
       make('div', { class: 'buttons' },
         make('button', { type: 'button', class: 'primary', id: 'reload', onclick: () => actions.reload() },
           'Load again'),
-        make('button', { type: 'button', id: 'refine', onclick: () => actions.refine() }, 'Refine')),
+        make('button', { type: 'button', id: 'refine', onclick: () => actions.refine() }, 'Sharpen')),
     ));
+    this.experts = foldingSection('For experts', 'The policy counts from the next load on.',
+      c.policy !== 'guard' || c.scale !== null || c.rung !== null, make('div', { class: 'controls' },
+        make('label', { for: 'policy' }, 'Policy'), policy,
+        make('label', { for: 'scale' }, 'Mesh scale'), this.scaleSelect,
+        make('label', { for: 'rung' }, 'Texture'), this.rungSelect));
+    this.experts.id = 'experts';
   }
 
   /** Offers the scales of a package. */

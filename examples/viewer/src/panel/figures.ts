@@ -2,10 +2,11 @@ import { make } from '../dom';
 import * as format from '../format';
 import type { Live } from '../live';
 
+/** What a visitor sees first, what an expert asks for last. */
 const kFigures = [
-  ['scale', 'mesh shown'], ['size', 'displayed height'], ['bytes', 'received'], ['first', 'first picture'],
-  ['time', 'complete after'],
-  ['flip', 'predicted FLIP'],
+  ['first', 'first picture after'], ['time', 'complete after'], ['bytes', 'received'],
+  ['flip', 'difference (FLIP)'],
+  ['scale', 'mesh shown'], ['size', 'height on screen'],
 ] as const;
 type Figure = (typeof kFigures)[number][0];
 
@@ -27,7 +28,7 @@ export class Figures {
   show(l: Live): void {
     const shown = l.proxy >= 0 ? l.manifest?.proxies[l.proxy]
       : l.manifest?.scales.find((s) => s.scale === l.scale);
-    this.set('scale', shownName(l), shown ? `${format.short(shown.triangles)} tri` : '');
+    this.set('scale', shownName(l), shown ? `${format.short(shown.triangles)} triangles` : '');
     this.set('size', l.displayedPx > 0 ? format.px(l.displayedPx) : '–');
     this.set('bytes', l.bytes > 0 ? format.bytes(l.bytes) : '–',
       l.packageBytes > 0 ? `of ${format.bytes(l.packageBytes)}` : '');

@@ -40,7 +40,7 @@ export class Panel {
     this.plots = [scales, ...below];
     const sections = [scales, this.proxies, this.fragments, ...below].map(({ box }) => box);
     for (const section of sections) section.addEventListener('toggle', redraw);
-    root.replaceChildren(this.figures.box, this.controls.box, ...sections);
+    root.replaceChildren(this.figures.box, this.controls.box, ...sections, this.controls.experts);
   }
 
   update(live: Live): void {

@@ -9,9 +9,8 @@ import type { SectionPlots } from './section';
 export function scalePlot(live: () => Live): SectionPlots {
   return {
     title: 'Scales',
-    note: 'Triangles that are enough at a displayed height: up to there, lit pictures of the scale ' +
-      'differed from those of S0 by less than the build allows, in every view that it rendered. The dot is ' +
-      'what is shown.',
+    note: 'Triangles that are enough at a height on the screen. Up to that height, the mesh looked like ' +
+      'the finest one (S0) in all pictures that the build compared. The dot is what is shown.',
     open: true,
     plots: [{
       options: {
