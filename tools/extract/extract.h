@@ -82,6 +82,19 @@ struct ExtractedImage {
   }
 };
 
+/// Processor time of the whole program that parts of a search took, seconds.
+struct ExtractSpent {
+  double reference_cpu_s = 0, images_cpu_s = 0, mesh_cpu_s = 0, file_cpu_s = 0, proxies_cpu_s = 0;
+  static void fields(auto& s, auto&& v) {
+    v("reference_cpu_s", s.reference_cpu_s, Range{0, 1e9},
+      "The package's best in pictures; of several files that share it, in the first.");
+    v("images_cpu_s", s.images_cpu_s, Range{0, 1e9}, "What every image gives for its bytes.");
+    v("mesh_cpu_s", s.mesh_cpu_s, Range{0, 1e9}, "The choice of the mesh.");
+    v("file_cpu_s", s.file_cpu_s, Range{0, 1e9}, "Filling the bytes, and looking at the file.");
+    v("proxies_cpu_s", s.proxies_cpu_s, Range{0, 1e9}, "Files of proxies.");
+  }
+};
+
 struct Extracted {
   std::vector<std::uint8_t> glb;                // or USDZ, of extract_usdz()
   std::string name;                             // of the file; who writes it says so
@@ -104,6 +117,7 @@ struct Extracted {
   double mesh_difference = -1;  // the same with the best textures instead: what the mesh alone costs
   int views = 0;
   std::uint32_t side_px = 0;
+  ExtractSpent spent;
 
   /// `value`, of a file for a number of bytes.
   template <class T>
@@ -135,6 +149,7 @@ struct Extracted {
       "The same with the best textures instead: what the mesh alone costs.");
     v("views", s.asked(s.views), Range{1, 1000}, "Directions from which it was measured.");
     v("side_px", s.asked(s.side_px), Range{1, 65536}, "Side of those pictures.");
+    v("spent", s.asked(s.spent), "Processor time of the search, seconds; it differs from run to run.");
     v("notes", s.notes, "");
   }
 };

@@ -110,6 +110,11 @@ struct SharedSearch {
 
 }  // namespace
 
+double CpuClock::since_last_s() {
+  const std::clock_t before = std::exchange(last_, std::clock());
+  return static_cast<double>(last_ - before) / CLOCKS_PER_SEC;
+}
+
 Search::Search(const Reference& reference, Candidates& candidates, std::uint64_t bytes)
     : reference_(reference),
       candidates_(candidates),
@@ -119,7 +124,9 @@ Search::Search(const Reference& reference, Candidates& candidates, std::uint64_t
 
 Extracted Search::run(const std::function<void(double)>& report) {
   report(0.4);
+  spent_.images_cpu_s = clock_.since_last_s();
   choose_mesh();
+  spent_.mesh_cpu_s = clock_.since_last_s();
   report(0.6);
   FoundFile found = filled_file();
   if (!reference_.wishes.best() && filling_.fits(found.file) && !filling_.fills(found.file) &&
@@ -127,7 +134,10 @@ Extracted Search::run(const std::function<void(double)>& report) {
     walk_to_mesh();
     if (FoundFile other = filled_file(); filling_.fills(other.file)) found = std::move(other);
   }
-  return finish(found.key, std::move(found.file));
+  Extracted out = finish(found.key, std::move(found.file));
+  spent_.file_cpu_s = clock_.since_last_s();
+  out.spent = spent_;
+  return out;
 }
 
 FoundFile Search::filled_file() {
@@ -483,6 +493,7 @@ std::vector<Extracted> extract_within_bytes(PackageReader& package, const Extrac
   std::ranges::stable_sort(order, {}, [&](std::size_t k) { return bytes[k]; });
   std::vector<Extracted> out(bytes.size());
   std::unique_ptr<SharedSearch> shared;
+  CpuClock clock;
   for (std::size_t i = 0; i < order.size(); ++i) {
     const std::uint64_t wanted = bytes[order[i]];
     const auto report = [&](double part) {
@@ -492,12 +503,18 @@ std::vector<Extracted> extract_within_bytes(PackageReader& package, const Extrac
       shared.reset();  // before the next one needs the memory
       shared = std::make_unique<SharedSearch>(package, wishes, place, wanted, context);
     }
+    const double reference_cpu_s = clock.since_last_s();
     report(0.2);
     Extracted& found = out[order[i]];
     found = Search(shared->reference, shared->candidates, wanted).run(report);
     shared->candidates.forget_lit_meshes();
     report(0.9);
+    ExtractSpent spent = found.spent;
+    spent.reference_cpu_s = reference_cpu_s;
+    clock.since_last_s();
     offer_proxies(shared->reference, wanted, shared->proxies, found);
+    spent.proxies_cpu_s = clock.since_last_s();
+    found.spent = spent;
     report(1);
   }
   return out;

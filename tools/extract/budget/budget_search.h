@@ -1,4 +1,5 @@
 #pragma once
+#include <ctime>
 
 #include "tools/extract/budget/filling.h"
 
@@ -13,6 +14,15 @@ namespace texmesh {
 /// threads.
 std::vector<Extracted> extract_within_bytes(PackageReader& package, const ExtractBudget& wishes,
                                             const OutputTransform& place, const RunContext& context);
+
+/// Processor time of the whole program from one call to the next, seconds.
+class CpuClock {
+ public:
+  double since_last_s();
+
+ private:
+  std::clock_t last_ = std::clock();
+};
 
 /// A file of a mesh with textures as `images` plan them, and its difference in whole pictures, where it has
 /// been looked at.
@@ -87,6 +97,8 @@ class Search {
   const Reference& reference_;
   Candidates& candidates_;
   const std::uint64_t bytes_;
+  CpuClock clock_;
+  ExtractSpent spent_;
   const LossCurves curves_;
   const Filling filling_;
   std::map<MeshKey, MeshFile> meshes_;

@@ -8,6 +8,7 @@ namespace texmesh {
 namespace {
 
 constexpr std::size_t kTrialsAtOnce = 24;  // a megabyte or two each
+constexpr std::size_t kMostScales = 3;     // decoded at a time: tens of megabytes each
 
 /// Bits per coordinate along the longest side of the object, of texture coordinates along the image, of
 /// normals and vertex colours; for pictures 512 px high.
@@ -45,12 +46,26 @@ DracoSteps Candidates::steps_of(const MeshKey& key) const {
   return {reference_.extent / places(c.position), 1 / places(c.uv), c.normal, c.colour, key.extra_bits != 0};
 }
 
-std::unique_ptr<StandaloneGlb> Candidates::recoded_scale(int scale, const MeshKey& key) const {
-  auto file = std::make_unique<StandaloneGlb>(
-      scale_file(reference_.package, scale, reference_.context, StreamedNormals::kStreamed));
+Candidates::ScaleToCode& Candidates::scale_to_code(int scale) {
+  const auto known = std::ranges::find(scales_, scale, &ScaleToCode::scale);
+  if (known != scales_.end()) {
+    scales_.splice(scales_.begin(), scales_, known);
+    return scales_.front();
+  }
+  if (scales_.size() >= kMostScales) scales_.pop_back();
+  StandaloneGlb file =
+      scale_file(reference_.package, scale, reference_.context, StreamedNormals::kStreamed);
+  const bool lit_anew = scale > 0 && !reference_.light.places.empty();
+  DracoRecoder recoder(file.draco_streams(), lit_anew ? &reference_.light : nullptr, mesh_path(scale));
+  return scales_.emplace_front(scale, std::move(file), std::move(recoder));
+}
+
+std::unique_ptr<StandaloneGlb> Candidates::recoded_scale(int scale, const MeshKey& key) {
+  ScaleToCode& from = scale_to_code(scale);
+  auto file = std::make_unique<StandaloneGlb>(from.file);
   const bool lit_anew = scale > 0 && !reference_.light.places.empty();
   if (file->has_draco() && (lit_anew || key.coding + 1 < kMeshCodings || key.extra_bits < 0))
-    file->recode(steps_of(key), lit_anew ? &reference_.light : nullptr, reference_.context);
+    file->set_draco_streams(from.recoder.coded(steps_of(key), reference_.context));
   return file;
 }
 

@@ -116,11 +116,21 @@ struct Reference {
   std::unique_ptr<const LitMeter> window_meter, whole_meter;
 
  private:
+  /// By group of images with equal texels shown, and size.
+  struct KnownTexels {
+    std::mutex mutex;
+    std::map<std::tuple<std::size_t, std::uint32_t, std::uint32_t>, std::vector<std::uint8_t>> bits;
+  };
   std::int32_t shown_texture(const Model& model, const TextureRef& reference, TextureUse use) const;
   void find_textures();
+  bool shows(const TextureRef& ref, std::size_t image) const;
+  double fewest_texels_per_pixel(std::size_t image) const;
   void find_groups();
+  void find_alike();
   void measure_surface(const LitViews& views);
   void read_best_textures(TextureSource& textures);
+  std::vector<std::size_t> alike_;  // by image: the first that the same triangles show in the same way
+  std::unique_ptr<KnownTexels> known_texels_ = std::make_unique<KnownTexels>();
 };
 
 /// A side of a texture made smaller. Of 128 px and more a multiple of 16, so that viewers can halve it

@@ -252,7 +252,7 @@ Json ProxyParts::materials_of(const ProxyMapChoice& choice) const {
 StandaloneGlb ProxyParts::file(const ProxyMapChoice& choice, std::size_t mesh, const DracoSteps& steps,
                                const RunContext& context) const {
   StandaloneGlb coded = uncoded(meshes_.at(mesh), entry_);
-  coded.recode(steps, nullptr, context);
+  coded.set_draco_streams(DracoRecoder(coded.draco_streams(), nullptr, entry_).coded(steps, context));
   GlbParts chunks = read_glb(coded.finish(), entry_);
   Json root = materials_of(choice);
   keep_used(root);
