@@ -33,8 +33,9 @@ constexpr double kSurely = 0.9;  // of a loss that others tell
 constexpr std::uint64_t kLookAtFilesBelow = 200000;
 constexpr double kLikely = 1.2;  // times the least joined loss
 constexpr std::size_t kMostLikely = 4;
+constexpr double kWorthALook = 1.15;  // times the least joined loss that was seen, by tables
 constexpr double kUsualBytes = 3.5, kLeastBytes = 1.5;  // of a coded triangle
-constexpr double kTexelsPerByte = 40;                   // more texels than that are never worth a byte
+constexpr double kTexelsPerByte = 20;                   // more texels than that are never worth a byte
 
 double most_texels(std::uint64_t bytes) {
   return std::max(kTexelsPerByte * static_cast<double>(bytes), 65536.0);
@@ -176,10 +177,9 @@ void Search::choose_mesh() {
   if (least_ >= kNothing) best_ = {reference_.wishes.scale ? best_.scale : scales().size() - 1, 0};
 }
 
-/// Compile has measured what scales lose, and a coding loses and saves about alike on all of them. So one
-/// mesh that is made and looked at tells of all others; the best of these is looked at, too, until it is
-/// known.
-void Search::choose_mesh_by_tables() {
+/// Compile has measured what scales lose, and a coding loses and saves about alike on all of them: so one mesh
+/// that was made and looked at tells what a file of another is likely to lose.
+double Search::likely_loss(const MeshKey& key) const {
   struct Coding {
     double loss;   // joined, beside the finest
     double bytes;  // of kFirstCoding's
@@ -188,35 +188,36 @@ void Search::choose_mesh_by_tables() {
   constexpr Coding kCodings[kMeshCodings] = {{270e-6, 0.81}, {150e-6, 0.88}, {60e-6, 1},
                                              {35e-6, 1.1},   {15e-6, 1.23},  {0, 1.36}};
   constexpr double kFinerScalesTakeLess = 0.35;  // bytes of a triangle ~ triangles to the power of minus this
-  constexpr int kMostMeshes = 4;
   const auto table = [&](std::size_t scale) {
     return joined(picture_flip(reference_.package.quality(), reference_.side_px, scales()[scale].scale, {}));
   };
   const auto triangles = [&](std::size_t scale) { return static_cast<double>(scales()[scale].triangles); };
-  MeshKey known = best_;
-  double known_bytes = static_cast<double>(mesh(known).fixed_bytes) / kCodings[known.coding].bytes;
+  const Coding &of_known = kCodings[known_.coding], &of_key = kCodings[key.coding];
+  const double lost = joined(geometry_.at(known_)) - of_known.loss;
+  const double scale_losses = table(known_.scale) > 0 ? std::max(lost / table(known_.scale), 0.1) : 1;
+  const double bytes =
+      known_bytes_ / of_known.bytes * of_key.bytes *
+      portable::exp((1 - kFinerScalesTakeLess) *
+                    portable::log(triangles(key.scale) / triangles(known_.scale)));
+  const double left = static_cast<double>(bytes_) - bytes;
+  const DealtBytes images = curves_.allocate(left);
+  return images.bytes > left ? kNothing : scale_losses * table(key.scale) + of_key.loss + images.loss;
+}
+
+/// The likeliest mesh is made and looked at until it is known.
+void Search::choose_mesh_by_tables() {
+  constexpr int kMostMeshes = 4;
   for (int tries = 1; tries < kMostMeshes; ++tries) {
-    const double lost = joined(geometry_.at(known)) - kCodings[known.coding].loss;
-    const double scale_losses = table(known.scale) > 0 ? std::max(lost / table(known.scale), 0.1) : 1;
-    MeshKey likely = known;
+    MeshKey likely = known_;
     double least = kNothing;
-    for (std::size_t scale = 0; scale < scales().size(); ++scale) {
-      if (reference_.wishes.scale && scale != known.scale) continue;
-      const double of_scale =
-          known_bytes * portable::exp((1 - kFinerScalesTakeLess) *
-                                      portable::log(triangles(scale) / triangles(known.scale)));
+    for (std::size_t scale = 0; scale < scales().size(); ++scale)
       for (int coding = 0; coding < kMeshCodings; ++coding) {
-        const double left = static_cast<double>(bytes_) - of_scale * kCodings[coding].bytes;
-        const DealtBytes images = curves_.allocate(left);
-        if (images.bytes > left) continue;
-        const double loss = scale_losses * table(scale) + kCodings[coding].loss + images.loss;
+        if (reference_.wishes.scale && scale != known_.scale) continue;
+        const double loss = likely_loss({scale, coding});
         if (loss < least) least = loss, likely = {scale, coding};
       }
-    }
     if (seen_.contains(likely)) return;
     const double found = loss_of(likely);
-    known = likely;
-    known_bytes = static_cast<double>(mesh(likely).fixed_bytes) / kCodings[likely.coding].bytes;
     forget(found < least_ ? best_ : likely);
     if (!(found < least_)) continue;
     least_ = found;
@@ -258,7 +259,9 @@ void Search::follow_direction(int scale_step, int coding_step) {
 
 bool Search::better(const MeshKey& key) {
   if (!seen_.insert(key).second) return key == best_;
-  const double found = too_large(key) || least_loss(key) > least_ ? kNothing : loss_of(key);
+  const bool hopeless = too_large(key) || least_loss(key) > least_ ||
+                        (!reference_.wishes.best() && likely_loss(key) > kWorthALook * least_);
+  const double found = hopeless ? kNothing : loss_of(key);
   forget(found < least_ ? best_ : key);
   if (!(found < least_)) return false;
   least_ = found;
@@ -291,6 +294,8 @@ double Search::least_loss(const MeshKey& key) const {
 double Search::loss_of(const MeshKey& key) {
   seen_.insert(key);
   const double geometry = geometry_[key] = candidates_.mesh(key).geometry;
+  known_ = key;
+  known_bytes_ = static_cast<double>(mesh(key).fixed_bytes);
   const double left = bytes_left(mesh(key));
   const DealtBytes images = curves_.allocate(left);
   if (images.bytes > left) return kNothing;

@@ -76,6 +76,7 @@ class Search {
   bool better(const MeshKey& key);
   bool too_large(const MeshKey& key) const;
   double least_loss(const MeshKey& key) const;
+  double likely_loss(const MeshKey& key) const;
   double loss_of(const MeshKey& key);
 
   void look_at_files(FoundFile& best);
@@ -105,7 +106,8 @@ class Search {
   std::set<MeshKey> seen_;
   std::map<MeshKey, double> geometry_;   // of meshes looked at: MeshCandidate::geometry
   std::map<MeshKey, double> predicted_;  // joined losses of files, of meshes whose files fit
-  MeshKey best_;
+  MeshKey known_, best_;      // the last that was looked at, and the best one
+  double known_bytes_ = 0;
   double least_ = 1e9;
   std::vector<TriedFile> tried_;
 };

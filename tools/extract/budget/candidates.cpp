@@ -239,6 +239,7 @@ constexpr double kFewBytes = 16000;                    // of an image: other cod
 constexpr double kWebpQuality = 65, kWebpShare = 0.4;  // of a JPEG's bytes at the same quality
 constexpr double kMuch = 0.15, kLittle = 0.05;         // of all images' losses
 constexpr int kWeightings = 3;
+constexpr double kShownTexels = 5;  // per pixel: of more the picture shows means
 constexpr double kFarAbove = 4;  // of an image's bytes: stored coefficients would have to lose most of theirs
 
 /// Files that lie on the lower convex border, by rising bytes.
@@ -377,7 +378,10 @@ std::vector<ImageTrial> LossCurves::trials_around_first(double bytes) const {
     const TextureCoding coding = candidates_.codings(i).front();
     trials.add(middle, coding, 20);
     if (seen_[i].front().loss > kLittle * sum) {
-      for (const double quality : {20.0, 45.0, kUsualQuality}) trials.add(middle - 2, coding, quality);
+      const double share = size_step(std::max(middle - 2, 0));
+      const bool finer_is_shown = reference_.texels_per_pixel[i] * share * share < kShownTexels;
+      for (const double quality : {20.0, 45.0, kUsualQuality})
+        if (finer_is_shown || quality == 45) trials.add(middle - 2, coding, quality);
       for (const double quality : {40.0, kUsualQuality, 85.0}) trials.add(middle, coding, quality);
     }
     for (const double quality : {40.0, 75.0}) trials.add(middle + 2, coding, quality);

@@ -11,7 +11,7 @@ constexpr int kViews = 5;
 constexpr std::uint32_t kLeastSide = 4;
 constexpr double kWholeBlocks = 16;
 constexpr int kWindowsPerView = 1;
-constexpr std::uint32_t kWindowPx = 80;
+constexpr std::uint32_t kWindowPx = 64;
 constexpr double kFinestShown = 8;  // texels per pixel: pictures read no finer ones
 constexpr double kSparse = 0.05;    // of the surface has fewer texels per pixel than what counts
 
@@ -312,10 +312,12 @@ void Reference::read_best_textures(TextureSource& textures) {
     textures.set_shown(i, shown_texels(i, images[i].width_px, images[i].height_px));
   for (const PictureTexture& t : shown) {
     const PackageImage& from = images[t.image];
+    Pixels pixels = textures.texels(t.image, from.width_px, from.height_px, {}, 0);
+    const double share = static_cast<double>(pixels.width_px) / from.width_px;
     std::uint32_t skipped = 0;  // levels that no picture reads
-    for (double texels = fewest_texels_per_pixel(t.image); texels > kFinestShown; texels /= 4) ++skipped;
-    best_textures.push_back(render_texture(
-        textures.texels(t.image, from.width_px, from.height_px, {}, 0), t.srgb, skipped, context));
+    for (double texels = fewest_texels_per_pixel(t.image) * share * share; texels > kFinestShown; texels /= 4)
+      ++skipped;
+    best_textures.push_back(render_texture(std::move(pixels), t.srgb, skipped, context));
   }
 }
 

@@ -215,14 +215,24 @@ std::vector<std::uint8_t> shown_texels(const Mesh& mesh, const Model& model, std
 
 namespace {
 
+/// Progressive, or where that has more bytes in one scan: what a scan has beside its coefficients is much of
+/// a small file.
 std::vector<std::uint8_t> encode_jpeg_file(const Pixels& pixels, const ImageCoding& coding) {
-  JpegKind kind;
-  kind.channels = pixels.channels;
-  kind.rgb = coding.data && pixels.channels == 3;
-  kind.subsampling = coding.full_chroma ? Subsampling::k444 : Subsampling::k420;
-  kind.file = FileSteps{coding.quality, coding.full_chroma};
-  return JpegCoder(kind).complete({pixels.data.data(), std::size_t{pixels.width_px} * pixels.channels,
-                                   pixels.width_px, pixels.height_px});
+  constexpr std::size_t kSmallTexels = 65536;
+  const auto file = [&](bool sequential) {
+    JpegKind kind;
+    kind.channels = pixels.channels;
+    kind.rgb = coding.data && pixels.channels == 3;
+    kind.subsampling = coding.full_chroma ? Subsampling::k444 : Subsampling::k420;
+    kind.file = FileSteps{coding.quality, coding.full_chroma, sequential};
+    return JpegCoder(kind).complete({pixels.data.data(), std::size_t{pixels.width_px} * pixels.channels,
+                                     pixels.width_px, pixels.height_px});
+  };
+  const bool small = std::size_t{pixels.width_px} * pixels.height_px <= kSmallTexels;
+  std::vector<std::uint8_t> one_scan = small || coding.quick ? file(true) : std::vector<std::uint8_t>{};
+  if (coding.quick) return one_scan;
+  std::vector<std::uint8_t> progressive = file(false);
+  return small && one_scan.size() < progressive.size() ? one_scan : progressive;
 }
 
 std::vector<std::uint8_t> encode_webp_file(const Pixels& pixels, const ImageCoding& coding) {

@@ -90,7 +90,7 @@ struct ImageCoding {
   FileImage format = FileImage::kJpeg;
   double quality = 75;  // JPEG 1..100, WebP and AVIF 0..100; no meaning for PNG
   bool data = false;    // numbers (normals, roughness ..) instead of colours: JPEGs keep their channels apart
-  bool quick = false;   // WebP, AVIF: less time for some percent more bytes, for searches
+  bool quick = false;   // less time for some percent more bytes, for searches
   bool full_chroma = false;  // JPEG: colours 4:4:4, with tables for textures
 };
 
