@@ -29,6 +29,7 @@ struct ExtractScale {
 
 /// How long the search for a file of a number of bytes may take.
 enum class ExtractEffort : std::uint8_t {
+  kFast,   // decides by the package's tables alone, takes no picture
   kUsual,  // decides by parts of pictures
   kBest,   // looks at many whole files: two to eight times as long, for 0 to 7 % less difference
 };
@@ -41,6 +42,7 @@ struct ExtractBudget {
   ExtractImages images = ExtractImages::kAuto;
   bool levels = false;  // as ExtractScale::Form::kLevels
   ExtractEffort effort = ExtractEffort::kUsual;
+  bool fast() const { return effort == ExtractEffort::kFast; }
   bool best() const { return effort == ExtractEffort::kBest; }
 };
 
@@ -115,7 +117,7 @@ struct Extracted {
   /// directions at `side_px`; -1 for other files.
   double difference = -1;
   double mesh_difference = -1;  // the same with the best textures instead: what the mesh alone costs
-  int views = 0;
+  int views = 0;  // 0 = differences are what the package's tables tell
   std::uint32_t side_px = 0;
   ExtractSpent spent;
 
@@ -147,7 +149,8 @@ struct Extracted {
       "equal.");
     v("mesh_difference", s.asked(s.mesh_difference), Range{0, 1},
       "The same with the best textures instead: what the mesh alone costs.");
-    v("views", s.asked(s.views), Range{1, 1000}, "Directions from which it was measured.");
+    v("views", s.asked(s.views), Range{0, 1000},
+      "Directions from which it was measured; 0 with --fast: the package's tables tell the differences.");
     v("side_px", s.asked(s.side_px), Range{1, 65536}, "Side of those pictures.");
     v("spent", s.asked(s.spent), "Processor time of the search, seconds; it differs from run to run.");
     v("notes", s.notes, "");

@@ -77,6 +77,8 @@ class Search {
   bool too_large(const MeshKey& key) const;
   double least_loss(const MeshKey& key) const;
   double likely_loss(const MeshKey& key) const;
+  double scale_loss(std::size_t scale) const;
+  double table_geometry(const MeshKey& key) const;
   double loss_of(const MeshKey& key);
 
   void look_at_files(FoundFile& best);
@@ -93,7 +95,7 @@ class Search {
   void fill_by_mesh(FoundFile& best);
   /// Of the mesh alone, and of the file.
   std::vector<double> differences_of(const MeshKey& key, const FilledFile& file);
-  Extracted finish(const MeshKey& key, FilledFile file);
+  Extracted finish(FoundFile found);
 
   const Reference& reference_;
   Candidates& candidates_;
@@ -108,6 +110,7 @@ class Search {
   std::map<MeshKey, double> predicted_;  // joined losses of files, of meshes whose files fit
   MeshKey known_, best_;      // the last that was looked at, and the best one
   double known_bytes_ = 0;
+  bool only_likely_ = false;  // meshes that tables make hopeless are not looked at
   double least_ = 1e9;
   std::vector<TriedFile> tried_;
 };

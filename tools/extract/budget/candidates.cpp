@@ -1,5 +1,6 @@
 #include "tools/extract/budget/candidates.h"
 
+#include "delivery/cpp/decide/texture_loss.h"
 #include "format/base/portable_math.h"
 #include "stages/base/parallel.h"
 #include "stages/image/decode_image.h"
@@ -83,12 +84,14 @@ const MeshCandidate& Candidates::mesh(const MeshKey& key) {
   c.levels = reference_.wishes.levels ? levels_of(m, c.scale) : std::vector<int>{c.scale};
   c.triangles = m.scales[key.scale].triangles;
   std::unique_ptr<StandaloneGlb> file = recoded_scale(c.scale, key);
-  c.lit = made_lit_mesh(*file, c.scale);
+  const bool fast = reference_.wishes.fast();
+  if (!fast) c.lit = made_lit_mesh(*file, c.scale);
   if (reference_.wishes.levels) file->begin_levels(screen_coverage_of(m, c.scale));
   for (std::size_t l = 1; l < c.levels.size(); ++l)
     file->add_level(*recoded_scale(c.levels[l], key), screen_coverage_of(m, c.levels[l]));
   file->place(reference_.place);
   c.file = std::move(file);
+  if (fast) return c;
   const LitViews windows(*c.lit, reference_.windows, reference_.context);
   c.geometry = reference_.window_meter->difference(windows, reference_.best_textures, reference_.context);
   return c;
@@ -149,7 +152,8 @@ void Candidates::load_stored(std::size_t image) {
   JoinedJpeg& joined =
       stored_.emplace(image, joined_plane(reference_.package, from.plane, last, reference_.context))
           .first->second;
-  joined.fill_unseen(reference_.shown_texels(image, joined.width_px(), joined.height_px()));
+  if (!reference_.wishes.fast())
+    joined.fill_unseen(reference_.shown_texels(image, joined.width_px(), joined.height_px()));
 }
 
 /// What makes up for averaging and for the interpolation of texels larger than pixels, as far as its bytes
@@ -331,11 +335,77 @@ class LossCurves::Trials {
 LossCurves::LossCurves(const Reference& reference, Candidates& candidates, double wanted)
     : reference_(reference), candidates_(candidates), seen_(reference.images.size()) {
   const double bytes = std::max(wanted, 1.0);
+  if (reference.wishes.fast()) {
+    read_tables();
+    find_curves();
+    return;
+  }
   look_at(first_trials(bytes));
   look_at(trials_around_first(bytes));
   find_curves();
   look_at(trials_around(allocate(bytes), bytes));
   find_curves();
+}
+
+/// Of a size less than its lowest rung: less quality, and behind that half of the sides. `mip_loss`: what the
+/// size itself loses. A package has no rungs there, as its clients take smaller sizes with more.
+void add_below(std::vector<CodedImage>& files, double mip_loss) {
+  // Bytes by quality, of a JPEG's at 50.
+  constexpr std::pair<double, double> kBytes[] = {{1, 0.1},  {20, 0.55}, {40, 0.86}, {65, 1.3},
+                                                  {80, 1.9}, {90, 2.9},  {100, 8}};
+  const auto bytes_at = [&](double quality) {
+    std::size_t k = 1;
+    while (kBytes[k].first < quality) ++k;
+    const auto [low, few] = kBytes[k - 1];
+    const auto [high, many] = kBytes[k];
+    return few + (many - few) * (quality - low) / (high - low);
+  };
+  const CodedImage lowest = files.back();
+  const double coded = std::max(lowest.loss - mip_loss, 4e-6);
+  for (const double quality : {80.0, 65.0, 40.0, 20.0}) {
+    if (quality >= lowest.plan.quality) continue;
+    const double coarser = (100 - quality) / std::max(100 - lowest.plan.quality, 1.0);
+    const double bytes = lowest.bytes * bytes_at(quality) / bytes_at(lowest.plan.quality);
+    const double loss = mip_loss + coded * portable::exp(1.2 * portable::log(coarser));
+    files.push_back({{lowest.plan.coding, lowest.plan.share, quality}, bytes, loss});
+    files.push_back({{lowest.plan.coding, lowest.plan.share / 2, quality}, bytes / 3.5, 2.3 * loss});
+  }
+}
+
+/// What the rungs of all sizes lose and take, as if their fragments were whole images.
+void LossCurves::read_tables() {
+  PackageReader& package = reference_.package;
+  const std::vector<TextureInfo>& textures = package.textures();
+  TextureLoss losses(package, reference_.side_px);
+  const PerGroup weights = losses.weights(full_size(package));
+  for (std::size_t i = 0; i < seen_.size(); ++i) {
+    const std::uint32_t base = reference_.images[i].plane;
+    const auto stored = candidates_.stored_bytes(i);
+    for (std::uint32_t p = 0; p < textures.size(); ++p) {
+      if (p != base && !(textures[p].mip > 0 && textures[p].base == base)) continue;
+      const TextureLoss::Plane& plane = losses.plane(p);
+      const std::size_t fragments = plane.weights.size();
+      const double share = 1.0 / (1u << textures[p].mip);
+      const double group = weights[static_cast<std::size_t>(losses.group_of(p))];
+      double bytes = 0;
+      for (std::size_t r = 0; r < textures[p].rungs.size(); ++r) {
+        const auto of_rung = static_cast<double>(textures[p].rungs[r].bytes);
+        bytes = package.tables().planes[p].incremental ? bytes + of_rung : of_rung;
+        double lost = 0;
+        for (std::size_t f = 0; f < fragments; ++f)
+          lost += static_cast<double>(plane.weights[f]) * plane.shown[(r + 1) * fragments + f];
+        const bool is_stored = stored && p == base && r + 1 == textures[p].rungs.size();
+        const TextureCoding coding =
+            is_stored ? TextureCoding{FileImage::kJpeg, false, true} : candidates_.codings(i).front();
+        const bool is_lossy = coding.format != FileImage::kPng;
+        const double quality = is_stored ? kHighestQuality : package.tables().planes[p].rung_quality[r];
+        if (!is_lossy && r + 1 < textures[p].rungs.size()) continue;
+        seen_[i].push_back({{coding, share, quality}, bytes, joined(group > 0 ? lost / group : 0)});
+        if (r == 0 && !is_stored && is_lossy)
+          add_below(seen_[i], joined(group > 0 ? losses.mip(p) * plane.weight / group : 0));
+      }
+    }
+  }
 }
 
 void LossCurves::look_at(const std::vector<ImageTrial>& trials) {

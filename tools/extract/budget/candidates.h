@@ -152,7 +152,8 @@ struct DealtBytes {
 /// a time. Constant once made.
 class LossCurves {
  public:
-  /// Looks at files around what each image may get of `bytes` for all of them.
+  /// Looks at files around what each image may get of `bytes` for all of them. With ExtractEffort::kFast it
+  /// reads the package's tables instead.
   LossCurves(const Reference& reference, Candidates& candidates, double bytes);
   /// The least loss of at most `bytes`; the smallest files where nothing fits.
   DealtBytes allocate(double bytes) const;
@@ -162,6 +163,7 @@ class LossCurves {
 
  private:
   class Trials;
+  void read_tables();
   void look_at(const std::vector<ImageTrial>& trials);
   void find_curves();
   double likely_bytes(std::size_t image, double bytes) const;

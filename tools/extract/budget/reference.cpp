@@ -1,5 +1,7 @@
 #include "tools/extract/budget/reference.h"
 
+#include "format/base/portable_math.h"
+#include "format/rules/viewing.h"
 #include "stages/base/parallel.h"
 #include "stages/geometry/texel_coverage.h"
 #include "tools/extract/glb/standalone_glb.h"
@@ -195,6 +197,10 @@ Reference::Reference(PackageReader& from, const ExtractBudget& asked, const Outp
       side_px(static_cast<std::uint32_t>(std::clamp(asked.display_px, 64.0, 768.0))),
       images(textures.images()) {
   context.progress = nullptr;
+  if (wishes.fast()) {
+    use_tables();
+    return;
+  }
   source = read_model(scale_file(package, 0, context), mesh_path(0), context);
   const BoundingSphere sphere = sphere_of(source.mesh);
   light = normal_samples(source.mesh);
@@ -212,6 +218,19 @@ Reference::Reference(PackageReader& from, const ExtractBudget& asked, const Outp
   finest_windows = std::make_unique<LitViews>(finest, windows, context);
   window_meter = std::make_unique<LitMeter>(*finest_windows, best_textures, environment, context);
   whole_meter = std::make_unique<LitMeter>(views, best_textures, environment, context);
+}
+
+/// What the package says of S_0 without it.
+void Reference::use_tables() {
+  const Manifest& m = package.manifest();
+  const Vec3d size = m.bounds_max - m.bounds_min;
+  extent = std::max({size.x, size.y, size.z, 1e-30});
+  for (const PackageImage& image : images) {
+    const double level =
+        display_level(package.tables().planes[image.plane], m.surface_area, m.object_height, side_px);
+    texels_per_pixel.push_back(portable::exp(2 * level * portable::log(2)));
+    groups.push_back(0);
+  }
 }
 
 std::int32_t Reference::shown_texture(const Model& model, const TextureRef& reference, TextureUse use) const {
@@ -324,6 +343,7 @@ void Reference::read_best_textures(TextureSource& textures) {
 /// Which texels are shown takes a walk over all triangles: once a size for the images of an atlas.
 std::vector<std::uint8_t> Reference::shown_texels(std::size_t image, std::uint32_t width_px,
                                                   std::uint32_t height_px) const {
+  if (wishes.fast()) return {};
   const std::lock_guard lock(known_texels_->mutex);
   std::vector<std::uint8_t>& bits = known_texels_->bits[{alike_[image], width_px, height_px}];
   if (bits.empty())
