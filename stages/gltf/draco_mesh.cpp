@@ -213,15 +213,19 @@ std::unique_ptr<draco::Mesh> decoded_stream(std::span<const std::uint8_t> bytes,
   return mesh;
 }
 
+}  // namespace
+
 /// One primitive while it is coded anew.
-struct Work {
+struct DracoWork {
   std::unique_ptr<draco::Mesh> mesh;
   std::map<std::string, int> ids;  // glTF attribute -> index in the mesh
 };
 
-Extent extent_of(const std::vector<Work>& all, const std::string& prefix) {
+namespace {
+
+Extent extent_of(const std::vector<DracoWork>& all, const std::string& prefix) {
   Extent out;
-  for (const Work& w : all)
+  for (const DracoWork& w : all)
     for (const auto& [name, id] : w.ids)
       if (name.starts_with(prefix)) out.add(*w.mesh->attribute(id));
   return out;
@@ -250,12 +254,12 @@ void set_values(draco::PointAttribute& attribute, std::span<const Vec3f> values)
 }
 
 /// Fits the normals of all primitives together. Those without normals are only shapes.
-void light_as(std::vector<Work>& all, const NormalSamples& samples, const std::string& entry,
+void light_as(std::vector<DracoWork>& all, const NormalSamples& samples, const std::string& entry,
               const RunContext& context) {
   std::vector<Vec3d> points;
   std::vector<Triangle> triangles;
   std::vector<Vec3f> normals;
-  for (const Work& w : all) {
+  for (const DracoWork& w : all) {
     const auto first = static_cast<std::uint32_t>(points.size());
     const auto normal = w.ids.find("NORMAL"), position = w.ids.find("POSITION");
     if (position == w.ids.end()) throw FormatError(entry, "POSITION", "an attribute", "none");
@@ -277,7 +281,7 @@ void light_as(std::vector<Work>& all, const NormalSamples& samples, const std::s
       throw FormatError(entry, "POSITION", "finite numbers", "others");
   normals = fit_normals(points, triangles, std::move(normals), samples, context);
   std::size_t first = 0;
-  for (Work& w : all) {
+  for (DracoWork& w : all) {
     const auto normal = w.ids.find("NORMAL");
     draco::PointAttribute* attribute = normal == w.ids.end() ? nullptr : w.mesh->attribute(normal->second);
     if (attribute && attribute->data_type() == draco::DT_FLOAT32 && attribute->num_components() == 3)
@@ -286,7 +290,7 @@ void light_as(std::vector<Work>& all, const NormalSamples& samples, const std::s
   }
 }
 
-DracoStream recoded(Work& work, const Extent& positions, const Extent& uvs, const DracoSteps& steps) {
+DracoStream recoded(DracoWork& work, const Extent& positions, const Extent& uvs, const DracoSteps& steps) {
   CodedAttributes attributes;
   for (const auto& [name, id] : work.ids) {
     draco::PointAttribute& values = *work.mesh->attribute(id);
@@ -348,29 +352,40 @@ DracoStream DracoMesh::encode(int speed) {
   return out;
 }
 
-void recode_draco(std::vector<DracoStream>& primitives, const DracoSteps& steps, const NormalSamples* lit_as,
-                  const std::string& entry, const RunContext& context) {
-  std::vector<Work> work;
-  std::size_t before = 0;
-  for (const DracoStream& p : primitives) {
-    Work& w = work.emplace_back();
-    w.mesh = decoded_stream(p.bytes, entry);
-    before += p.bytes.size();
+DracoRecoder::DracoRecoder(std::vector<DracoStream> primitives, const NormalSamples* lit_as,
+                           std::string entry)
+    : primitives_(std::move(primitives)), lit_as_(lit_as), entry_(std::move(entry)) {}
+
+DracoRecoder::~DracoRecoder() = default;
+DracoRecoder::DracoRecoder(DracoRecoder&&) noexcept = default;
+
+void DracoRecoder::decode(const RunContext& context) {
+  for (const DracoStream& p : primitives_) {
+    DracoWork& w = work_.emplace_back();
+    w.mesh = decoded_stream(p.bytes, entry_);
     for (const auto& [name, unique] : p.attributes) {
       const int id = w.mesh->GetAttributeIdByUniqueId(static_cast<std::uint32_t>(unique));
-      if (id < 0) throw FormatError(entry, name, "an attribute of the Draco stream", "none of that id");
+      if (id < 0) throw FormatError(entry_, name, "an attribute of the Draco stream", "none of that id");
       w.ids[name] = id;
     }
   }
-  if (lit_as) light_as(work, *lit_as, entry, context);
-  const Extent positions = extent_of(work, "POSITION"), uvs = extent_of(work, "TEXCOORD_");
+  if (lit_as_) light_as(work_, *lit_as_, entry_, context);
+}
+
+std::vector<DracoStream> DracoRecoder::coded(const DracoSteps& steps, const RunContext& context) {
+  if (work_.empty()) decode(context);
+  const Extent positions = extent_of(work_, "POSITION"), uvs = extent_of(work_, "TEXCOORD_");
   std::vector<DracoStream> out;
-  std::size_t after = 0;
-  for (Work& w : work) {
-    out.push_back(recoded(w, positions, uvs, steps));
+  std::size_t before = 0, after = 0;
+  bool has_colours = false;
+  for (std::size_t k = 0; k < work_.size(); ++k) {
+    out.push_back(recoded(work_[k], positions, uvs, steps));
+    before += primitives_[k].bytes.size();
     after += out.back().bytes.size();
+    has_colours |= work_[k].ids.lower_bound("COLOR_") != work_[k].ids.lower_bound("COLOR`");
   }
-  if (lit_as || after < before) primitives = std::move(out);
+  if (has_colours) work_.clear();  // they are coarser now
+  return lit_as_ || after < before ? out : primitives_;
 }
 
 }  // namespace texmesh

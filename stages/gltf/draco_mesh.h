@@ -76,12 +76,27 @@ struct DracoSteps {
   bool exact = false;
 };
 
-/// Codes the primitives of one file anew on coarser grids that all of them share, so that borders between
-/// primitives stay closed. When one stream does not get smaller, all streams of the file stay as they are
-/// (one grid for all). With `lit_as`, normals are fitted to `lit_as`, and the new streams are used however
-/// many bytes they have. FormatError when a stream does not decode; StageError when Draco refuses.
-void recode_draco(std::vector<DracoStream>& primitives, const DracoSteps& steps, const NormalSamples* lit_as,
-                  const std::string& entry, const RunContext& context);
+struct DracoWork;
+
+/// The primitives of one file, to be coded anew on coarser grids that all of them share, so that borders
+/// between primitives stay closed. They are decoded once for several codings.
+class DracoRecoder {
+ public:
+  /// With `lit_as`, which must outlive this, normals are fitted to it.
+  DracoRecoder(std::vector<DracoStream> primitives, const NormalSamples* lit_as, std::string entry);
+  ~DracoRecoder();
+  DracoRecoder(DracoRecoder&&) noexcept;
+  /// When one stream does not get smaller, all streams stay as they are (one grid for all), unless normals
+  /// were fitted. FormatError when a stream does not decode; StageError when Draco refuses.
+  std::vector<DracoStream> coded(const DracoSteps& steps, const RunContext& context);
+
+ private:
+  void decode(const RunContext& context);
+  std::vector<DracoStream> primitives_;
+  const NormalSamples* lit_as_;
+  std::string entry_;
+  std::vector<DracoWork> work_;  // empty: to be decoded
+};
 
 /// Gives values of an attribute that are equal bit for bit one index, and points that have all of their
 /// values in common one index; both are numbered in the order in which they first stand. So does Draco

@@ -381,7 +381,7 @@ struct JpegCoder::State : Compressor {
       info.comp_info[0].h_samp_factor = info.comp_info[0].v_samp_factor = factor;
     }
     if (kind.file) {
-      jpeg_simple_progression(&info);
+      if (!kind.file->sequential) jpeg_simple_progression(&info);
     } else if (kind.progressive) {
       info.scan_info = scans.data();
       info.num_scans = static_cast<int>(scans.size());

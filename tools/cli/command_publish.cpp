@@ -296,7 +296,7 @@ struct ExtractArguments {
   std::optional<int> scale, proxy;
   double display_px = 0;
   int jobs = 0;
-  bool recentre = false, keep_units = false, levels = false, plain = false, best = false, json = false;
+  bool recentre = false, keep_units = false, levels = false, plain = false, best = false, fast = false, json = false;
 };
 
 std::uint32_t rung_of(const std::string& text, const std::string& flag) {
@@ -343,7 +343,9 @@ ExtractRequest request_of(const ExtractArguments& a) {
   if (a.display_px > 0) budget.display_px = a.display_px;
   budget.images = a.images;
   budget.levels = a.levels;
-  budget.effort = a.best ? ExtractEffort::kBest : ExtractEffort::kUsual;
+  budget.effort = a.best   ? ExtractEffort::kBest
+                  : a.fast ? ExtractEffort::kFast
+                           : ExtractEffort::kUsual;
   return {budget, a.recentre, a.keep_units};
 }
 
@@ -413,9 +415,13 @@ void add_extract_options(Command& c, ExtractArguments& args) {
        "with --bytes files are compared at it (default 512)",
        "PX")
       .number_in(1, 1e6);
-  c.flag("--best", args.best,
-         "With --bytes: compare many whole files. It takes two to eight times as long, and the file looks up "
-         "to 7 % nearer");
+  const Option best = c.flag("--best", args.best,
+                             "With --bytes: compare many whole files. It takes three to eight times as long, "
+                             "and the file looks up to 7 % nearer");
+  c.flag("--fast", args.fast,
+         "With --bytes: decide by the package's tables and take no picture, for servers that make files on "
+         "request. Bytes may be left over")
+      .excludes(best);
   add_image_format_option(c, args.images);
   const Option lods = c.flag(
       "--lods", args.levels,

@@ -29,6 +29,7 @@ struct ExtractScale {
 
 /// How long the search for a file of a number of bytes may take.
 enum class ExtractEffort : std::uint8_t {
+  kFast,   // decides by the package's tables alone, takes no picture
   kUsual,  // decides by parts of pictures
   kBest,   // looks at many whole files: two to eight times as long, for 0 to 7 % less difference
 };
@@ -41,6 +42,7 @@ struct ExtractBudget {
   ExtractImages images = ExtractImages::kAuto;
   bool levels = false;  // as ExtractScale::Form::kLevels
   ExtractEffort effort = ExtractEffort::kUsual;
+  bool fast() const { return effort == ExtractEffort::kFast; }
   bool best() const { return effort == ExtractEffort::kBest; }
 };
 
@@ -82,6 +84,19 @@ struct ExtractedImage {
   }
 };
 
+/// Processor time of the whole program that parts of a search took, seconds.
+struct ExtractSpent {
+  double reference_cpu_s = 0, images_cpu_s = 0, mesh_cpu_s = 0, file_cpu_s = 0, proxies_cpu_s = 0;
+  static void fields(auto& s, auto&& v) {
+    v("reference_cpu_s", s.reference_cpu_s, Range{0, 1e9},
+      "The package's best in pictures; of several files that share it, in the first.");
+    v("images_cpu_s", s.images_cpu_s, Range{0, 1e9}, "What every image gives for its bytes.");
+    v("mesh_cpu_s", s.mesh_cpu_s, Range{0, 1e9}, "The choice of the mesh.");
+    v("file_cpu_s", s.file_cpu_s, Range{0, 1e9}, "Filling the bytes, and looking at the file.");
+    v("proxies_cpu_s", s.proxies_cpu_s, Range{0, 1e9}, "Files of proxies.");
+  }
+};
+
 struct Extracted {
   std::vector<std::uint8_t> glb;                // or USDZ, of extract_usdz()
   std::string name;                             // of the file; who writes it says so
@@ -102,8 +117,9 @@ struct Extracted {
   /// directions at `side_px`; -1 for other files.
   double difference = -1;
   double mesh_difference = -1;  // the same with the best textures instead: what the mesh alone costs
-  int views = 0;
+  int views = 0;  // 0 = differences are what the package's tables tell
   std::uint32_t side_px = 0;
+  ExtractSpent spent;
 
   /// `value`, of a file for a number of bytes.
   template <class T>
@@ -133,8 +149,10 @@ struct Extracted {
       "equal.");
     v("mesh_difference", s.asked(s.mesh_difference), Range{0, 1},
       "The same with the best textures instead: what the mesh alone costs.");
-    v("views", s.asked(s.views), Range{1, 1000}, "Directions from which it was measured.");
+    v("views", s.asked(s.views), Range{0, 1000},
+      "Directions from which it was measured; 0 with --fast: the package's tables tell the differences.");
     v("side_px", s.asked(s.side_px), Range{1, 65536}, "Side of those pictures.");
+    v("spent", s.asked(s.spent), "Processor time of the search, seconds; it differs from run to run.");
     v("notes", s.notes, "");
   }
 };

@@ -51,17 +51,25 @@ TEST(DracoMesh, HasEveryAttributeAndWhatADecoderCounts) {
 }
 
 TEST(DracoMesh, IsCodedAnewOnACoarserGridWhereThatIsSmaller) {
-  std::vector<DracoStream> coarser{sheet(14)}, finer{sheet(8)};
-  const std::size_t before = coarser[0].bytes.size(), few = finer[0].bytes.size();
-  recode_draco(coarser, {0.01, 0.01, 6, 6}, nullptr, "mesh", {});
-  EXPECT_LT(coarser[0].bytes.size(), before);
-  EXPECT_EQ(coarser[0].triangles, 2 * (kSide - 1) * (kSide - 1));
-  EXPECT_NEAR(coarser[0].high.x, point(kSide - 1).x, 0.01);
-  recode_draco(finer, {1e-6, 1e-6, 10, 8}, nullptr, "mesh", {});
-  EXPECT_EQ(finer[0].bytes.size(), few) << "more bytes are not taken";
-  std::vector<DracoStream> damaged{sheet(14)};
-  damaged[0].bytes.resize(20);
-  EXPECT_THROW(recode_draco(damaged, {0.01, 0.01, 6, 6}, nullptr, "mesh", {}), FormatError);
+  const auto coded = [](const DracoStream& stream, const DracoSteps& steps) {
+    return DracoRecoder({stream}, nullptr, "mesh").coded(steps, {}).front();
+  };
+  const DracoStream fine = sheet(14), coarse = sheet(8);
+  const DracoStream coarser = coded(fine, {0.01, 0.01, 6, 6});
+  EXPECT_LT(coarser.bytes.size(), fine.bytes.size());
+  EXPECT_EQ(coarser.triangles, 2 * (kSide - 1) * (kSide - 1));
+  EXPECT_NEAR(coarser.high.x, point(kSide - 1).x, 0.01);
+  EXPECT_EQ(coded(coarse, {1e-6, 1e-6, 10, 8}).bytes, coarse.bytes) << "more bytes are not taken";
+  DracoStream damaged = fine;
+  damaged.bytes.resize(20);
+  EXPECT_THROW(coded(damaged, {0.01, 0.01, 6, 6}), FormatError);
+}
+
+TEST(DracoMesh, EveryCodingStartsFromTheSameValues) {
+  const DracoSteps first{0.1, 0.1, 4, 2}, second{0.01, 0.01, 6, 6};
+  DracoRecoder once({sheet(14)}, nullptr, "mesh"), twice({sheet(14)}, nullptr, "mesh");
+  once.coded(first, {});
+  EXPECT_EQ(once.coded(second, {}).front().bytes, twice.coded(second, {}).front().bytes);
 }
 
 }  // namespace

@@ -117,11 +117,12 @@ class ExtractKinds : public ::testing::TestWithParam<Kind> {
     NullStore store;
     compile_model(request, store, {}, {});
   }
-  Extracted extract(std::uint64_t bytes, int threads = 2) {
+  Extracted extract(std::uint64_t bytes, int threads = 2, ExtractEffort effort = ExtractEffort::kUsual) {
     PackageReader package(open_store(folder_ / "a.texmesh"));
     ExtractBudget budget;
     budget.bytes = {bytes};
     budget.display_px = 64;  // small pictures, quick tests
+    budget.effort = effort;
     RunContext context;
     context.threads = threads;
     const Extracted e = extract_model(package, {budget}, context);
@@ -151,6 +152,19 @@ TEST_P(ExtractKinds, AnyNumberOfBytesIsReachedAndDifferencesAreSeen) {
   }
   const std::uint64_t bytes = least.glb.size() * 5 / 4;
   EXPECT_EQ(extract(bytes, 1).glb, extract(bytes, 8).glb);
+}
+
+TEST_P(ExtractKinds, TablesAloneGiveAFileThatFits) {
+  const std::uint64_t least = extract(1).glb.size();
+  double before = 1;
+  for (const std::uint64_t bytes : {2 * least, 8 * least, std::uint64_t{100'000'000}}) {
+    const Extracted fast = extract(bytes, 1, ExtractEffort::kFast);
+    EXPECT_LE(fast.glb.size(), bytes) << GetParam().name;
+    EXPECT_EQ(fast.views, 0) << "no picture was taken";
+    EXPECT_LE(fast.difference, before) << GetParam().name << " " << bytes;
+    before = fast.difference;
+    EXPECT_EQ(fast.glb, extract(bytes, 8, ExtractEffort::kFast).glb);
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Kinds, ExtractKinds, ::testing::ValuesIn(kKinds), [](const auto& kind) {

@@ -128,13 +128,13 @@ PercentLine::PercentLine(std::string label)
 
 PercentLine::PercentLine(std::string label, std::ostream& out, bool is_terminal,
                          std::chrono::milliseconds patience)
-    : label_(std::move(label)), out_(out), is_terminal_(is_terminal) {
+    : label_(std::move(label)), out_(out), is_terminal_(is_terminal), patience_(patience) {
   if (!is_terminal) return;
-  clock_ = std::jthread([this, patience, start = std::chrono::steady_clock::now()](std::stop_token stop) {
+  clock_ = std::jthread([this, patience](std::stop_token stop) {
     std::unique_lock lock(mutex_);
     while (!ended_.wait_for(lock, stop, patience, [&] { return stop.stop_requested(); })) {
       if (percent_ >= 0) return;
-      const auto taken = std::chrono::steady_clock::now() - start;
+      const auto taken = std::chrono::steady_clock::now() - start_;
       out_ << "\r\033[K" << label_ << ' ' << std::chrono::duration_cast<std::chrono::seconds>(taken).count()
            << " s" << std::flush;
       drawn_ = true;
@@ -148,7 +148,12 @@ void PercentLine::show(double fraction) {
   if (!is_terminal_ || percent <= percent_) return;
   percent_ = percent;
   drawn_ = true;
-  out_ << "\r\033[K" << label_ << ' ' << percent << " %" << std::flush;
+  out_ << "\r\033[K" << label_ << ' ' << percent << " %";
+  // What is left takes as long a part as what was done has taken.
+  const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start_;
+  if (taken >= patience_ && percent > 0)
+    out_ << ", " << static_cast<int>(std::ceil(taken.count() * (100 - percent) / percent)) << " s left";
+  out_ << std::flush;
 }
 
 void PercentLine::end() {

@@ -56,8 +56,8 @@ Shard shard_option(const std::string& text);
 /// What the summary of an earlier run says that models took. InputError for a file that is no summary.
 std::map<std::string, double> costs_option(const std::string& file);
 
-/// "extract 40 %" on a line of a terminal that is drawn over, until the end takes it away; "report 12 s"
-/// while nobody says how far the work is. Safe from several threads.
+/// "extract 40 %, 3 s left" on a line of a terminal that is drawn over, until the end takes it away; "report
+/// 12 s" while nobody says how far the work is. Safe from several threads.
 class PercentLine {
  public:
   /// On standard error, where that is a terminal.
@@ -76,6 +76,8 @@ class PercentLine {
   std::string label_;
   std::ostream& out_;
   bool is_terminal_;
+  std::chrono::milliseconds patience_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   std::mutex mutex_;
   int percent_ = -1;
   bool drawn_ = false;

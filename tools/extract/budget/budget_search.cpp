@@ -33,11 +33,22 @@ constexpr double kSurely = 0.9;  // of a loss that others tell
 constexpr std::uint64_t kLookAtFilesBelow = 200000;
 constexpr double kLikely = 1.2;  // times the least joined loss
 constexpr std::size_t kMostLikely = 4;
+constexpr double kWorthALook = 1.15;  // times the least joined loss that was seen, by tables
 constexpr double kUsualBytes = 3.5, kLeastBytes = 1.5;  // of a coded triangle
-constexpr double kTexelsPerByte = 40;                   // more texels than that are never worth a byte
+constexpr double kTableBytes = 3;                       // the same, before one is coded
+constexpr double kTexelsPerByte = 20, kFastTexelsPerByte = 10;  // more texels are never worth a byte
 
-double most_texels(std::uint64_t bytes) {
-  return std::max(kTexelsPerByte * static_cast<double>(bytes), 65536.0);
+/// Means of turtle, saxophone, helmet and bust at several scales.
+struct LikelyCoding {
+  double loss;   // joined, beside the finest
+  double bytes;  // of kFirstCoding's
+};
+constexpr LikelyCoding kCodings[kMeshCodings] = {{270e-6, 0.81}, {150e-6, 0.88}, {60e-6, 1},
+                                                 {35e-6, 1.1},   {15e-6, 1.23},  {0, 1.36}};
+
+double most_texels(const ExtractBudget& wishes, std::uint64_t bytes) {
+  const double a_byte = wishes.fast() ? kFastTexelsPerByte : kTexelsPerByte;
+  return std::max(a_byte * static_cast<double>(bytes), 65536.0);
 }
 
 /// S_0 as it is stored.
@@ -99,7 +110,7 @@ std::optional<DealtBytes> with_largest_loss_resized(DealtBytes images, int steps
 struct SharedSearch {
   SharedSearch(PackageReader& package, const ExtractBudget& wishes, const OutputTransform& place,
                std::uint64_t bytes, const RunContext& context)
-      : textures(package, most_texels(bytes), context),
+      : textures(package, most_texels(wishes, bytes), context, wishes.fast()),
         reference(package, wishes, place, textures, context),
         candidates(reference, textures, wishes.bytes.size() > 1) {}
   TextureSource textures;
@@ -110,6 +121,11 @@ struct SharedSearch {
 
 }  // namespace
 
+double CpuClock::since_last_s() {
+  const std::clock_t before = std::exchange(last_, std::clock());
+  return static_cast<double>(last_ - before) / CLOCKS_PER_SEC;
+}
+
 Search::Search(const Reference& reference, Candidates& candidates, std::uint64_t bytes)
     : reference_(reference),
       candidates_(candidates),
@@ -119,20 +135,27 @@ Search::Search(const Reference& reference, Candidates& candidates, std::uint64_t
 
 Extracted Search::run(const std::function<void(double)>& report) {
   report(0.4);
+  spent_.images_cpu_s = clock_.since_last_s();
   choose_mesh();
+  spent_.mesh_cpu_s = clock_.since_last_s();
   report(0.6);
   FoundFile found = filled_file();
-  if (!reference_.wishes.best() && filling_.fits(found.file) && !filling_.fills(found.file) &&
-      !is_finest(found.key)) {  // other meshes may come nearer to the bytes
+  if (reference_.wishes.effort == ExtractEffort::kUsual && filling_.fits(found.file) &&
+      !filling_.fills(found.file) && !is_finest(found.key)) {  // other meshes may come nearer to the bytes
+    only_likely_ = false;
+    seen_.clear();
     walk_to_mesh();
     if (FoundFile other = filled_file(); filling_.fills(other.file)) found = std::move(other);
   }
-  return finish(found.key, std::move(found.file));
+  Extracted out = finish(std::move(found));
+  spent_.file_cpu_s = clock_.since_last_s();
+  out.spent = spent_;
+  return out;
 }
 
 FoundFile Search::filled_file() {
   FoundFile found = file_of(best_, allocation_of(best_));
-  if (!filling_.fits(found.file)) return found;
+  if (!filling_.fits(found.file) || reference_.wishes.fast()) return found;
   if (reference_.wishes.best()) {
     if (bytes_ <= kLookAtFilesBelow)
       look_at_files(found);
@@ -159,54 +182,55 @@ double Search::bytes_left(const MeshFile& mesh) const {
 }
 
 void Search::choose_mesh() {
-  best_ = first_mesh(reference_, bytes_);
-  least_ = loss_of(best_);
+  only_likely_ = !reference_.wishes.best();
+  best_ = known_ = first_mesh(reference_, bytes_);
+  if (reference_.wishes.fast()) {
+    geometry_[known_] = table_geometry(known_);
+    known_bytes_ = kTableBytes * static_cast<double>(scales()[known_.scale].triangles);
+  } else {
+    least_ = loss_of(best_);
+  }
   if (!reference_.wishes.best()) choose_mesh_by_tables();
-  walk_to_mesh();
+  if (!reference_.wishes.fast()) walk_to_mesh();
   if (least_ >= kNothing) best_ = {reference_.wishes.scale ? best_.scale : scales().size() - 1, 0};
 }
 
-/// Compile has measured what scales lose, and a coding loses and saves about alike on all of them. So one
-/// mesh that is made and looked at tells of all others; the best of these is looked at, too, until it is
-/// known.
-void Search::choose_mesh_by_tables() {
-  struct Coding {
-    double loss;   // joined, beside the finest
-    double bytes;  // of kFirstCoding's
-  };
-  // Means of turtle, saxophone, helmet and bust at several scales.
-  constexpr Coding kCodings[kMeshCodings] = {{270e-6, 0.81}, {150e-6, 0.88}, {60e-6, 1},
-                                             {35e-6, 1.1},   {15e-6, 1.23},  {0, 1.36}};
+/// By the package's quality table, joined.
+double Search::scale_loss(std::size_t scale) const {
+  return joined(picture_flip(reference_.package.quality(), reference_.side_px, scales()[scale].scale, {}));
+}
+
+/// Compile has measured what scales lose, and a coding loses and saves about alike on all of them: so one mesh
+/// that was made and looked at tells what a file of another is likely to lose.
+double Search::likely_loss(const MeshKey& key) const {
   constexpr double kFinerScalesTakeLess = 0.35;  // bytes of a triangle ~ triangles to the power of minus this
-  constexpr int kMostMeshes = 4;
-  const auto table = [&](std::size_t scale) {
-    return joined(picture_flip(reference_.package.quality(), reference_.side_px, scales()[scale].scale, {}));
-  };
   const auto triangles = [&](std::size_t scale) { return static_cast<double>(scales()[scale].triangles); };
-  MeshKey known = best_;
-  double known_bytes = static_cast<double>(mesh(known).fixed_bytes) / kCodings[known.coding].bytes;
-  for (int tries = 1; tries < kMostMeshes; ++tries) {
-    const double lost = joined(geometry_.at(known)) - kCodings[known.coding].loss;
-    const double scale_losses = table(known.scale) > 0 ? std::max(lost / table(known.scale), 0.1) : 1;
-    MeshKey likely = known;
+  const LikelyCoding &of_known = kCodings[known_.coding], &of_key = kCodings[key.coding];
+  const double lost = joined(geometry_.at(known_)) - of_known.loss, of_scale = scale_loss(known_.scale);
+  const double scale_losses = of_scale > 0 ? std::max(lost / of_scale, 0.1) : 1;
+  const double bytes =
+      known_bytes_ / of_known.bytes * of_key.bytes *
+      portable::exp((1 - kFinerScalesTakeLess) *
+                    portable::log(triangles(key.scale) / triangles(known_.scale)));
+  const double left = static_cast<double>(bytes_) - bytes;
+  const DealtBytes images = curves_.allocate(left);
+  return images.bytes > left ? kNothing : scale_losses * scale_loss(key.scale) + of_key.loss + images.loss;
+}
+
+/// The likeliest mesh is made and looked at until it is known.
+void Search::choose_mesh_by_tables() {
+  const int most = reference_.wishes.fast() ? 2 : 3;
+  for (int tries = 0; tries < most; ++tries) {
+    MeshKey likely = known_;
     double least = kNothing;
-    for (std::size_t scale = 0; scale < scales().size(); ++scale) {
-      if (reference_.wishes.scale && scale != known.scale) continue;
-      const double of_scale =
-          known_bytes * portable::exp((1 - kFinerScalesTakeLess) *
-                                      portable::log(triangles(scale) / triangles(known.scale)));
+    for (std::size_t scale = 0; scale < scales().size(); ++scale)
       for (int coding = 0; coding < kMeshCodings; ++coding) {
-        const double left = static_cast<double>(bytes_) - of_scale * kCodings[coding].bytes;
-        const DealtBytes images = curves_.allocate(left);
-        if (images.bytes > left) continue;
-        const double loss = scale_losses * table(scale) + kCodings[coding].loss + images.loss;
+        if (reference_.wishes.scale && scale != known_.scale) continue;
+        const double loss = likely_loss({scale, coding});
         if (loss < least) least = loss, likely = {scale, coding};
       }
-    }
     if (seen_.contains(likely)) return;
     const double found = loss_of(likely);
-    known = likely;
-    known_bytes = static_cast<double>(mesh(likely).fixed_bytes) / kCodings[likely.coding].bytes;
     forget(found < least_ ? best_ : likely);
     if (!(found < least_)) continue;
     least_ = found;
@@ -248,7 +272,9 @@ void Search::follow_direction(int scale_step, int coding_step) {
 
 bool Search::better(const MeshKey& key) {
   if (!seen_.insert(key).second) return key == best_;
-  const double found = too_large(key) || least_loss(key) > least_ ? kNothing : loss_of(key);
+  const bool hopeless = too_large(key) || least_loss(key) > least_ ||
+                        (only_likely_ && likely_loss(key) > kWorthALook * least_);
+  const double found = hopeless ? kNothing : loss_of(key);
   forget(found < least_ ? best_ : key);
   if (!(found < least_)) return false;
   least_ = found;
@@ -277,10 +303,18 @@ double Search::least_loss(const MeshKey& key) const {
   return least;
 }
 
+/// What pictures would tell, FLIP.
+double Search::table_geometry(const MeshKey& key) const {
+  return std::sqrt(scale_loss(key.scale) + kCodings[key.coding].loss);
+}
+
 /// What a file of this mesh is expected to lose.
 double Search::loss_of(const MeshKey& key) {
   seen_.insert(key);
-  const double geometry = geometry_[key] = candidates_.mesh(key).geometry;
+  const double geometry = geometry_[key] =
+      reference_.wishes.fast() ? table_geometry(key) : candidates_.mesh(key).geometry;
+  known_ = key;
+  known_bytes_ = static_cast<double>(mesh(key).fixed_bytes);
   const double left = bytes_left(mesh(key));
   const DealtBytes images = curves_.allocate(left);
   if (images.bytes > left) return kNothing;
@@ -455,22 +489,31 @@ void Search::fill_by_mesh(FoundFile& best) {
   }
 }
 
-Extracted Search::finish(const MeshKey& key, FilledFile file) {
+Extracted Search::finish(FoundFile found) {
+  const MeshKey& key = found.key;
+  FilledFile& file = found.file;
   const MeshCandidate& mesh = candidates_.mesh(key);
+  const bool fast = reference_.wishes.fast();
   Extracted out;
   out.scale = mesh.scale;
   out.levels = mesh.levels;
   out.triangles = mesh.triangles;
-  out.within = filling_.fills(file) || (filling_.fits(file) && file.has_sources && is_finest(key));
+  out.within =
+      filling_.fills(file) || (filling_.fits(file) && (fast || (file.has_sources && is_finest(key))));
   out.views = static_cast<int>(reference_.cameras.size());
   out.side_px = reference_.side_px;
   out.asked_bytes = bytes_;
   out.images = file.rows;
   out.mesh_bytes = file.glb.size();
   for (const ExtractedImage& i : file.rows) out.mesh_bytes -= i.bytes;
-  const std::vector<double> differences = differences_of(key, file);
-  out.mesh_difference = differences[0];
-  out.difference = differences[1];
+  if (fast) {
+    out.mesh_difference = table_geometry(key);
+    out.difference = std::min(1.0, std::sqrt(joined(out.mesh_difference) + found.images.loss));
+  } else {
+    const std::vector<double> differences = differences_of(key, file);
+    out.mesh_difference = differences[0];
+    out.difference = differences[1];
+  }
   out.glb = std::move(file.glb);
   return out;
 }
@@ -483,21 +526,28 @@ std::vector<Extracted> extract_within_bytes(PackageReader& package, const Extrac
   std::ranges::stable_sort(order, {}, [&](std::size_t k) { return bytes[k]; });
   std::vector<Extracted> out(bytes.size());
   std::unique_ptr<SharedSearch> shared;
+  CpuClock clock;
   for (std::size_t i = 0; i < order.size(); ++i) {
     const std::uint64_t wanted = bytes[order[i]];
     const auto report = [&](double part) {
       context.report((static_cast<double>(i) + part) / static_cast<double>(order.size()));
     };
-    if (!shared || !shared->textures.serves(most_texels(wanted))) {
+    if (!shared || !shared->textures.serves(most_texels(wishes, wanted))) {
       shared.reset();  // before the next one needs the memory
       shared = std::make_unique<SharedSearch>(package, wishes, place, wanted, context);
     }
+    const double reference_cpu_s = clock.since_last_s();
     report(0.2);
     Extracted& found = out[order[i]];
     found = Search(shared->reference, shared->candidates, wanted).run(report);
     shared->candidates.forget_lit_meshes();
     report(0.9);
+    ExtractSpent spent = found.spent;
+    spent.reference_cpu_s = reference_cpu_s;
+    clock.since_last_s();
     offer_proxies(shared->reference, wanted, shared->proxies, found);
+    spent.proxies_cpu_s = clock.since_last_s();
+    found.spent = spent;
     report(1);
   }
   return out;

@@ -1,4 +1,5 @@
 #pragma once
+#include <ctime>
 
 #include "tools/extract/budget/filling.h"
 
@@ -13,6 +14,15 @@ namespace texmesh {
 /// threads.
 std::vector<Extracted> extract_within_bytes(PackageReader& package, const ExtractBudget& wishes,
                                             const OutputTransform& place, const RunContext& context);
+
+/// Processor time of the whole program from one call to the next, seconds.
+class CpuClock {
+ public:
+  double since_last_s();
+
+ private:
+  std::clock_t last_ = std::clock();
+};
 
 /// A file of a mesh with textures as `images` plan them, and its difference in whole pictures, where it has
 /// been looked at.
@@ -66,6 +76,9 @@ class Search {
   bool better(const MeshKey& key);
   bool too_large(const MeshKey& key) const;
   double least_loss(const MeshKey& key) const;
+  double likely_loss(const MeshKey& key) const;
+  double scale_loss(std::size_t scale) const;
+  double table_geometry(const MeshKey& key) const;
   double loss_of(const MeshKey& key);
 
   void look_at_files(FoundFile& best);
@@ -82,18 +95,22 @@ class Search {
   void fill_by_mesh(FoundFile& best);
   /// Of the mesh alone, and of the file.
   std::vector<double> differences_of(const MeshKey& key, const FilledFile& file);
-  Extracted finish(const MeshKey& key, FilledFile file);
+  Extracted finish(FoundFile found);
 
   const Reference& reference_;
   Candidates& candidates_;
   const std::uint64_t bytes_;
+  CpuClock clock_;
+  ExtractSpent spent_;
   const LossCurves curves_;
   const Filling filling_;
   std::map<MeshKey, MeshFile> meshes_;
   std::set<MeshKey> seen_;
   std::map<MeshKey, double> geometry_;   // of meshes looked at: MeshCandidate::geometry
   std::map<MeshKey, double> predicted_;  // joined losses of files, of meshes whose files fit
-  MeshKey best_;
+  MeshKey known_, best_;      // the last that was looked at, and the best one
+  double known_bytes_ = 0;
+  bool only_likely_ = false;  // meshes that tables make hopeless are not looked at
   double least_ = 1e9;
   std::vector<TriedFile> tried_;
 };

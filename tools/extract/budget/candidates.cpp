@@ -1,5 +1,6 @@
 #include "tools/extract/budget/candidates.h"
 
+#include "delivery/cpp/decide/texture_loss.h"
 #include "format/base/portable_math.h"
 #include "stages/base/parallel.h"
 #include "stages/image/decode_image.h"
@@ -8,6 +9,7 @@ namespace texmesh {
 namespace {
 
 constexpr std::size_t kTrialsAtOnce = 24;  // a megabyte or two each
+constexpr std::size_t kMostScales = 3;     // decoded at a time: tens of megabytes each
 
 /// Bits per coordinate along the longest side of the object, of texture coordinates along the image, of
 /// normals and vertex colours; for pictures 512 px high.
@@ -45,12 +47,26 @@ DracoSteps Candidates::steps_of(const MeshKey& key) const {
   return {reference_.extent / places(c.position), 1 / places(c.uv), c.normal, c.colour, key.extra_bits != 0};
 }
 
-std::unique_ptr<StandaloneGlb> Candidates::recoded_scale(int scale, const MeshKey& key) const {
-  auto file = std::make_unique<StandaloneGlb>(
-      scale_file(reference_.package, scale, reference_.context, StreamedNormals::kStreamed));
+Candidates::ScaleToCode& Candidates::scale_to_code(int scale) {
+  const auto known = std::ranges::find(scales_, scale, &ScaleToCode::scale);
+  if (known != scales_.end()) {
+    scales_.splice(scales_.begin(), scales_, known);
+    return scales_.front();
+  }
+  if (scales_.size() >= kMostScales) scales_.pop_back();
+  StandaloneGlb file =
+      scale_file(reference_.package, scale, reference_.context, StreamedNormals::kStreamed);
+  const bool lit_anew = scale > 0 && !reference_.light.places.empty();
+  DracoRecoder recoder(file.draco_streams(), lit_anew ? &reference_.light : nullptr, mesh_path(scale));
+  return scales_.emplace_front(scale, std::move(file), std::move(recoder));
+}
+
+std::unique_ptr<StandaloneGlb> Candidates::recoded_scale(int scale, const MeshKey& key) {
+  ScaleToCode& from = scale_to_code(scale);
+  auto file = std::make_unique<StandaloneGlb>(from.file);
   const bool lit_anew = scale > 0 && !reference_.light.places.empty();
   if (file->has_draco() && (lit_anew || key.coding + 1 < kMeshCodings || key.extra_bits < 0))
-    file->recode(steps_of(key), lit_anew ? &reference_.light : nullptr, reference_.context);
+    file->set_draco_streams(from.recoder.coded(steps_of(key), reference_.context));
   return file;
 }
 
@@ -68,12 +84,14 @@ const MeshCandidate& Candidates::mesh(const MeshKey& key) {
   c.levels = reference_.wishes.levels ? levels_of(m, c.scale) : std::vector<int>{c.scale};
   c.triangles = m.scales[key.scale].triangles;
   std::unique_ptr<StandaloneGlb> file = recoded_scale(c.scale, key);
-  c.lit = made_lit_mesh(*file, c.scale);
+  const bool fast = reference_.wishes.fast();
+  if (!fast) c.lit = made_lit_mesh(*file, c.scale);
   if (reference_.wishes.levels) file->begin_levels(screen_coverage_of(m, c.scale));
   for (std::size_t l = 1; l < c.levels.size(); ++l)
     file->add_level(*recoded_scale(c.levels[l], key), screen_coverage_of(m, c.levels[l]));
   file->place(reference_.place);
   c.file = std::move(file);
+  if (fast) return c;
   const LitViews windows(*c.lit, reference_.windows, reference_.context);
   c.geometry = reference_.window_meter->difference(windows, reference_.best_textures, reference_.context);
   return c;
@@ -134,7 +152,8 @@ void Candidates::load_stored(std::size_t image) {
   JoinedJpeg& joined =
       stored_.emplace(image, joined_plane(reference_.package, from.plane, last, reference_.context))
           .first->second;
-  joined.fill_unseen(reference_.shown_texels(image, joined.width_px(), joined.height_px()));
+  if (!reference_.wishes.fast())
+    joined.fill_unseen(reference_.shown_texels(image, joined.width_px(), joined.height_px()));
 }
 
 /// What makes up for averaging and for the interpolation of texels larger than pixels, as far as its bytes
@@ -224,6 +243,7 @@ constexpr double kFewBytes = 16000;                    // of an image: other cod
 constexpr double kWebpQuality = 65, kWebpShare = 0.4;  // of a JPEG's bytes at the same quality
 constexpr double kMuch = 0.15, kLittle = 0.05;         // of all images' losses
 constexpr int kWeightings = 3;
+constexpr double kShownTexels = 5;  // per pixel: of more the picture shows means
 constexpr double kFarAbove = 4;  // of an image's bytes: stored coefficients would have to lose most of theirs
 
 /// Files that lie on the lower convex border, by rising bytes.
@@ -315,11 +335,77 @@ class LossCurves::Trials {
 LossCurves::LossCurves(const Reference& reference, Candidates& candidates, double wanted)
     : reference_(reference), candidates_(candidates), seen_(reference.images.size()) {
   const double bytes = std::max(wanted, 1.0);
+  if (reference.wishes.fast()) {
+    read_tables();
+    find_curves();
+    return;
+  }
   look_at(first_trials(bytes));
   look_at(trials_around_first(bytes));
   find_curves();
   look_at(trials_around(allocate(bytes), bytes));
   find_curves();
+}
+
+/// Of a size less than its lowest rung: less quality, and behind that half of the sides. `mip_loss`: what the
+/// size itself loses. A package has no rungs there, as its clients take smaller sizes with more.
+void add_below(std::vector<CodedImage>& files, double mip_loss) {
+  // Bytes by quality, of a JPEG's at 50.
+  constexpr std::pair<double, double> kBytes[] = {{1, 0.1},  {20, 0.55}, {40, 0.86}, {65, 1.3},
+                                                  {80, 1.9}, {90, 2.9},  {100, 8}};
+  const auto bytes_at = [&](double quality) {
+    std::size_t k = 1;
+    while (kBytes[k].first < quality) ++k;
+    const auto [low, few] = kBytes[k - 1];
+    const auto [high, many] = kBytes[k];
+    return few + (many - few) * (quality - low) / (high - low);
+  };
+  const CodedImage lowest = files.back();
+  const double coded = std::max(lowest.loss - mip_loss, 4e-6);
+  for (const double quality : {80.0, 65.0, 40.0, 20.0}) {
+    if (quality >= lowest.plan.quality) continue;
+    const double coarser = (100 - quality) / std::max(100 - lowest.plan.quality, 1.0);
+    const double bytes = lowest.bytes * bytes_at(quality) / bytes_at(lowest.plan.quality);
+    const double loss = mip_loss + coded * portable::exp(1.2 * portable::log(coarser));
+    files.push_back({{lowest.plan.coding, lowest.plan.share, quality}, bytes, loss});
+    files.push_back({{lowest.plan.coding, lowest.plan.share / 2, quality}, bytes / 3.5, 2.3 * loss});
+  }
+}
+
+/// What the rungs of all sizes lose and take, as if their fragments were whole images.
+void LossCurves::read_tables() {
+  PackageReader& package = reference_.package;
+  const std::vector<TextureInfo>& textures = package.textures();
+  TextureLoss losses(package, reference_.side_px);
+  const PerGroup weights = losses.weights(full_size(package));
+  for (std::size_t i = 0; i < seen_.size(); ++i) {
+    const std::uint32_t base = reference_.images[i].plane;
+    const auto stored = candidates_.stored_bytes(i);
+    for (std::uint32_t p = 0; p < textures.size(); ++p) {
+      if (p != base && !(textures[p].mip > 0 && textures[p].base == base)) continue;
+      const TextureLoss::Plane& plane = losses.plane(p);
+      const std::size_t fragments = plane.weights.size();
+      const double share = 1.0 / (1u << textures[p].mip);
+      const double group = weights[static_cast<std::size_t>(losses.group_of(p))];
+      double bytes = 0;
+      for (std::size_t r = 0; r < textures[p].rungs.size(); ++r) {
+        const auto of_rung = static_cast<double>(textures[p].rungs[r].bytes);
+        bytes = package.tables().planes[p].incremental ? bytes + of_rung : of_rung;
+        double lost = 0;
+        for (std::size_t f = 0; f < fragments; ++f)
+          lost += static_cast<double>(plane.weights[f]) * plane.shown[(r + 1) * fragments + f];
+        const bool is_stored = stored && p == base && r + 1 == textures[p].rungs.size();
+        const TextureCoding coding =
+            is_stored ? TextureCoding{FileImage::kJpeg, false, true} : candidates_.codings(i).front();
+        const bool is_lossy = coding.format != FileImage::kPng;
+        const double quality = is_stored ? kHighestQuality : package.tables().planes[p].rung_quality[r];
+        if (!is_lossy && r + 1 < textures[p].rungs.size()) continue;
+        seen_[i].push_back({{coding, share, quality}, bytes, joined(group > 0 ? lost / group : 0)});
+        if (r == 0 && !is_stored && is_lossy)
+          add_below(seen_[i], joined(group > 0 ? losses.mip(p) * plane.weight / group : 0));
+      }
+    }
+  }
 }
 
 void LossCurves::look_at(const std::vector<ImageTrial>& trials) {
@@ -362,7 +448,10 @@ std::vector<ImageTrial> LossCurves::trials_around_first(double bytes) const {
     const TextureCoding coding = candidates_.codings(i).front();
     trials.add(middle, coding, 20);
     if (seen_[i].front().loss > kLittle * sum) {
-      for (const double quality : {20.0, 45.0, kUsualQuality}) trials.add(middle - 2, coding, quality);
+      const double share = size_step(std::max(middle - 2, 0));
+      const bool finer_is_shown = reference_.texels_per_pixel[i] * share * share < kShownTexels;
+      for (const double quality : {20.0, 45.0, kUsualQuality})
+        if (finer_is_shown || quality == 45) trials.add(middle - 2, coding, quality);
       for (const double quality : {40.0, kUsualQuality, 85.0}) trials.add(middle, coding, quality);
     }
     for (const double quality : {40.0, 75.0}) trials.add(middle + 2, coding, quality);

@@ -1,5 +1,6 @@
 #pragma once
 #include <compare>
+#include <list>
 
 #include "tools/extract/budget/reference.h"
 #include "tools/extract/glb/standalone_glb.h"
@@ -117,7 +118,14 @@ class Candidates {
 
  private:
   DracoSteps steps_of(const MeshKey& key) const;
-  std::unique_ptr<StandaloneGlb> recoded_scale(int scale, const MeshKey& key) const;
+  /// A scale as the package has it, on its way into codings.
+  struct ScaleToCode {
+    int scale = 0;
+    StandaloneGlb file;
+    DracoRecoder recoder;
+  };
+  ScaleToCode& scale_to_code(int scale);
+  std::unique_ptr<StandaloneGlb> recoded_scale(int scale, const MeshKey& key);
   std::unique_ptr<const LitMesh> made_lit_mesh(const StandaloneGlb& file, int scale) const;
   float sharpening(std::size_t image, double share) const;
   const Pixels& texels_of_step(std::size_t image, int step);
@@ -125,6 +133,7 @@ class Candidates {
   const Reference& reference_;
   TextureSource& textures_;
   bool for_several_;
+  std::list<ScaleToCode> scales_;  // the last first
   std::map<MeshKey, MeshCandidate> meshes_;
   std::map<std::pair<std::size_t, int>, Pixels> by_step_;
   std::map<std::size_t, JoinedJpeg> stored_;
@@ -143,7 +152,8 @@ struct DealtBytes {
 /// a time. Constant once made.
 class LossCurves {
  public:
-  /// Looks at files around what each image may get of `bytes` for all of them.
+  /// Looks at files around what each image may get of `bytes` for all of them. With ExtractEffort::kFast it
+  /// reads the package's tables instead.
   LossCurves(const Reference& reference, Candidates& candidates, double bytes);
   /// The least loss of at most `bytes`; the smallest files where nothing fits.
   DealtBytes allocate(double bytes) const;
@@ -153,6 +163,7 @@ class LossCurves {
 
  private:
   class Trials;
+  void read_tables();
   void look_at(const std::vector<ImageTrial>& trials);
   void find_curves();
   double likely_bytes(std::size_t image, double bytes) const;

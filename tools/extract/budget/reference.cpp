@@ -1,6 +1,9 @@
 #include "tools/extract/budget/reference.h"
 
+#include "format/base/portable_math.h"
+#include "format/rules/viewing.h"
 #include "stages/base/parallel.h"
+#include "stages/geometry/texel_coverage.h"
 #include "tools/extract/glb/standalone_glb.h"
 
 namespace texmesh {
@@ -10,8 +13,9 @@ constexpr int kViews = 5;
 constexpr std::uint32_t kLeastSide = 4;
 constexpr double kWholeBlocks = 16;
 constexpr int kWindowsPerView = 1;
-constexpr std::uint32_t kWindowPx = 80;
-constexpr double kFinestShown = 12;  // texels per pixel: pictures hardly read finer ones
+constexpr std::uint32_t kWindowPx = 64;
+constexpr double kFinestShown = 8;  // texels per pixel: pictures read no finer ones
+constexpr double kSparse = 0.05;    // of the surface has fewer texels per pixel than what counts
 
 RunContext serial(const RunContext& context) {
   RunContext one = context;
@@ -50,6 +54,20 @@ Materials with_textures(Materials materials, const std::vector<std::int32_t>& pl
 double longest_side(const Mesh& mesh) {
   const double side = to_double(bounding_box(mesh.positions)).longest_side();
   return side > 0 ? side : 1;
+}
+
+double area_of(const Mesh& mesh, std::size_t triangle) {
+  const Triangle& t = mesh.triangles[triangle];
+  const auto at = [&](std::size_t k) { return to_double(mesh.positions[t[k]]); };
+  return length(cross(at(1) - at(0), at(2) - at(0))) / 2;
+}
+
+double texels_of(const Mesh& mesh, std::size_t triangle, int texcoord, const TexelMap& map) {
+  const std::vector<Vec2f>& uv = texcoord == 0 ? mesh.uv0 : mesh.uv1;
+  if (uv.empty() || texcoord > 1) return 0;
+  const Triangle& t = mesh.triangles[triangle];
+  const Vec2d a = map(uv[t[0]]), b = map(uv[t[1]]), c = map(uv[t[2]]);
+  return std::abs((b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x)) / 2;
 }
 
 BoundingSphere sphere_of(const Mesh& mesh) {
@@ -179,6 +197,10 @@ Reference::Reference(PackageReader& from, const ExtractBudget& asked, const Outp
       side_px(static_cast<std::uint32_t>(std::clamp(asked.display_px, 64.0, 768.0))),
       images(textures.images()) {
   context.progress = nullptr;
+  if (wishes.fast()) {
+    use_tables();
+    return;
+  }
   source = read_model(scale_file(package, 0, context), mesh_path(0), context);
   const BoundingSphere sphere = sphere_of(source.mesh);
   light = normal_samples(source.mesh);
@@ -186,6 +208,7 @@ Reference::Reference(PackageReader& from, const ExtractBudget& asked, const Outp
   cameras = cameras_around(sphere, kViews, side_px);
   find_textures();
   find_groups();
+  find_alike();
   finest = lit_mesh(source);
   const LitViews views(finest, cameras, context);
   measure_surface(views);
@@ -195,6 +218,19 @@ Reference::Reference(PackageReader& from, const ExtractBudget& asked, const Outp
   finest_windows = std::make_unique<LitViews>(finest, windows, context);
   window_meter = std::make_unique<LitMeter>(*finest_windows, best_textures, environment, context);
   whole_meter = std::make_unique<LitMeter>(views, best_textures, environment, context);
+}
+
+/// What the package says of S_0 without it.
+void Reference::use_tables() {
+  const Manifest& m = package.manifest();
+  const Vec3d size = m.bounds_max - m.bounds_min;
+  extent = std::max({size.x, size.y, size.z, 1e-30});
+  for (const PackageImage& image : images) {
+    const double level =
+        display_level(package.tables().planes[image.plane], m.surface_area, m.object_height, side_px);
+    texels_per_pixel.push_back(portable::exp(2 * level * portable::log(2)));
+    groups.push_back(0);
+  }
 }
 
 std::int32_t Reference::shown_texture(const Model& model, const TextureRef& reference, TextureUse use) const {
@@ -233,13 +269,18 @@ void Reference::find_groups() {
   }
 }
 
+/// Where a sampler asks for no smaller copies, what is seen is noise that differs with the size of a texture:
+/// pictures read such copies.
 LitMesh Reference::lit_mesh(Model& model) const {
   LitMesh out;
   out.texture_count = shown.size();
-  for (const Material& m : model.materials)
+  for (const Material& m : model.materials) {
     out.materials.push_back(render_material(m, [&](const TextureRef& reference, TextureUse use) {
       return shown_texture(model, reference, use);
     }));
+    for (TextureSlot& slot : out.materials.back().textures)
+      if (slot.min_filter == MinFilter::kLinear) slot.min_filter = MinFilter::kTrilinear;
+  }
   out.mesh = std::move(model.mesh);
   return out;
 }
@@ -258,22 +299,75 @@ void Reference::measure_surface(const LitViews& views) {
   }
 }
 
+/// Texels per pixel of an image at full size where the surface faces a camera: nearly all of the surface has
+/// as many or more.
+double Reference::fewest_texels_per_pixel(std::size_t image) const {
+  const RenderCamera& camera = cameras.front().camera;
+  const Vec3d centre = to_double(bounding_box(finest.mesh.positions)).centre();
+  const double pixel = 2 * camera.tan_half_fov / side_px * length(camera.eye - centre);
+  std::vector<std::pair<double, double>> parts;  // texels per pixel, area
+  double total = 0;
+  for (std::size_t m = 0; m < source.materials.size(); ++m)
+    for_each_texture(source.materials[m], [&](const TextureRef& ref) {
+      if (!shows(ref, image)) return;
+      const TexelMap map(ref.transform, images[image].width_px, images[image].height_px);
+      for (std::size_t t = 0; t < finest.mesh.triangles.size(); ++t) {
+        if (finest.mesh.triangle_material[t] != m) continue;
+        const double area = area_of(finest.mesh, t);
+        if (!(area > 0)) continue;
+        parts.emplace_back(texels_of(finest.mesh, t, ref.texcoord, map) / area * pixel * pixel, area);
+        total += area;
+      }
+    });
+  std::ranges::sort(parts);
+  double below = 0;
+  for (const auto& [texels, area] : parts)
+    if ((below += area) >= kSparse * total) return texels;
+  return texels_per_pixel[image];
+}
+
 void Reference::read_best_textures(TextureSource& textures) {
   for (std::size_t i = 0; i < images.size() && wishes.images != ExtractImages::kPng; ++i)
     textures.set_shown(i, shown_texels(i, images[i].width_px, images[i].height_px));
   for (const PictureTexture& t : shown) {
     const PackageImage& from = images[t.image];
-    double share = 1;  // halves, not sharpened: the source's own smaller copies
-    while (texels_per_pixel[t.image] * share * share > kFinestShown) share /= 2;
-    best_textures.push_back(render_texture(
-        textures.texels(t.image, side_of(from.width_px, share), side_of(from.height_px, share), {}, 0),
-        t.srgb, 0, context));
+    Pixels pixels = textures.texels(t.image, from.width_px, from.height_px, {}, 0);
+    const double share = static_cast<double>(pixels.width_px) / from.width_px;
+    std::uint32_t skipped = 0;  // levels that no picture reads
+    for (double texels = fewest_texels_per_pixel(t.image) * share * share; texels > kFinestShown; texels /= 4)
+      ++skipped;
+    best_textures.push_back(render_texture(std::move(pixels), t.srgb, skipped, context));
   }
 }
 
+/// Which texels are shown takes a walk over all triangles: once a size for the images of an atlas.
 std::vector<std::uint8_t> Reference::shown_texels(std::size_t image, std::uint32_t width_px,
                                                   std::uint32_t height_px) const {
-  return texmesh::shown_texels(finest.mesh, source, images[image].image, width_px, height_px);
+  if (wishes.fast()) return {};
+  const std::lock_guard lock(known_texels_->mutex);
+  std::vector<std::uint8_t>& bits = known_texels_->bits[{alike_[image], width_px, height_px}];
+  if (bits.empty())
+    bits = texmesh::shown_texels(finest.mesh, source, images[image].image, width_px, height_px);
+  return bits;
+}
+
+bool Reference::shows(const TextureRef& ref, std::size_t image) const {
+  return ref.used() &&
+         source.images.at(static_cast<std::size_t>(ref.image)).name == image_name(images[image].image);
+}
+
+void Reference::find_alike() {
+  using Way = std::pair<std::size_t, TextureRef>;  // a material, and its reference without the image
+  std::vector<std::vector<Way>> ways(images.size());
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    for (std::size_t m = 0; m < source.materials.size(); ++m)
+      for_each_texture(source.materials[m], [&](const TextureRef& ref) {
+        if (!shows(ref, i)) return;
+        Way way{m, {0, ref.texcoord, ref.wrap_s, ref.wrap_t, false, {}, ref.transform}};
+        if (std::ranges::find(ways[i], way) == ways[i].end()) ways[i].push_back(std::move(way));
+      });
+    alike_.push_back(static_cast<std::size_t>(std::ranges::find(ways, ways[i]) - ways.begin()));
+  }
 }
 
 std::uint32_t side_of(std::uint32_t full, double share) {

@@ -81,7 +81,8 @@ struct PictureTexture {
 };
 
 /// What all files of a search are compared with: the package's best in lit pictures. It does not change once
-/// it is made, and does not depend on the number of bytes.
+/// it is made, and does not depend on the number of bytes. With ExtractEffort::kFast it has no picture: no
+/// meshes, cameras, views and meters, and every texel counts as shown.
 struct Reference {
   /// Reads the package's best from `textures`, which learns which of its texels are shown. StageError for S_0
   /// without an extent.
@@ -116,11 +117,22 @@ struct Reference {
   std::unique_ptr<const LitMeter> window_meter, whole_meter;
 
  private:
+  /// By group of images with equal texels shown, and size.
+  struct KnownTexels {
+    std::mutex mutex;
+    std::map<std::tuple<std::size_t, std::uint32_t, std::uint32_t>, std::vector<std::uint8_t>> bits;
+  };
   std::int32_t shown_texture(const Model& model, const TextureRef& reference, TextureUse use) const;
+  void use_tables();
   void find_textures();
+  bool shows(const TextureRef& ref, std::size_t image) const;
+  double fewest_texels_per_pixel(std::size_t image) const;
   void find_groups();
+  void find_alike();
   void measure_surface(const LitViews& views);
   void read_best_textures(TextureSource& textures);
+  std::vector<std::size_t> alike_;  // by image: the first that the same triangles show in the same way
+  std::unique_ptr<KnownTexels> known_texels_ = std::make_unique<KnownTexels>();
 };
 
 /// A side of a texture made smaller. Of 128 px and more a multiple of 16, so that viewers can halve it

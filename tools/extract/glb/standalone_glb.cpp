@@ -67,16 +67,17 @@ bool source_image_of(const Json& image, std::uint32_t& number) {
   return end.ec == std::errc() && end.ptr == name.data() + name.size();
 }
 
-template <class F>
-void for_each_primitive(Json& root, const F& f) {
+void for_each_primitive(auto& root, const auto& f) {
   if (!root.contains("meshes")) return;
-  for (Json& mesh : root["meshes"])
-    for (Json& primitive : mesh["primitives"]) f(primitive);
+  for (auto& mesh : root.at("meshes"))
+    for (auto& primitive : mesh.at("primitives")) f(primitive);
 }
 
-Json* draco_of(Json& primitive) {
-  if (!primitive.contains("extensions") || !primitive["extensions"].contains(kDraco)) return nullptr;
-  return &primitive["extensions"][kDraco];
+/// Json* or const Json*, as the primitive is.
+auto* draco_of(auto& primitive) {
+  const auto extensions = primitive.find("extensions");
+  const bool has = extensions != primitive.end() && extensions->contains(kDraco);
+  return has ? &extensions->at(kDraco) : nullptr;
 }
 
 void require_valid(std::span<const std::uint8_t> glb, const std::string& entry, GlbRules rules) {
@@ -203,23 +204,24 @@ void StandaloneGlb::set_images(const std::map<std::uint32_t, FileImageData>& ima
   }
 }
 
-void StandaloneGlb::recode(const DracoSteps& steps, const NormalSamples* lit_as, const RunContext& context) {
+std::vector<DracoStream> StandaloneGlb::draco_streams() const {
   std::vector<DracoStream> streams;
-  for_each_primitive(root_, [&](Json& primitive) {
+  for_each_primitive(root_, [&](const Json& primitive) {
     const Json* draco = draco_of(primitive);
     if (!draco) return;
-    DracoStream s;
+    DracoStream& s = streams.emplace_back();
     s.bytes = views_.at(number(*draco, "bufferView")).bytes;
-    for (const auto& [name, id] : (*draco)["attributes"].items()) s.attributes[name] = id.get<int>();
-    streams.push_back(std::move(s));
+    for (const auto& [name, id] : draco->at("attributes").items()) s.attributes[name] = id.get<int>();
   });
-  if (streams.empty()) return;
-  recode_draco(streams, steps, lit_as, entry_, context);
+  return streams;
+}
+
+void StandaloneGlb::set_draco_streams(std::vector<DracoStream> streams) {
   std::size_t next = 0;
   for_each_primitive(root_, [&](Json& primitive) {
     Json* draco = draco_of(primitive);
     if (!draco) return;
-    DracoStream& s = streams[next++];
+    DracoStream& s = streams.at(next++);
     if (s.vertices == 0) return;  // kept as it was
     (*draco)["bufferView"] = add_view(std::move(s.bytes));
     for (const auto& [name, id] : s.attributes) (*draco)["attributes"][name] = id;

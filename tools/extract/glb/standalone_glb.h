@@ -32,8 +32,10 @@ class StandaloneGlb {
   void set_images(const std::map<std::uint32_t, FileImageData>& images);
   /// Takes the meshes of another file of the same package, whose node k is this file's node k, for its own.
   void take_meshes(StandaloneGlb other);
-  /// Codes Draco streams anew, see recode_draco(); other codecs stay as they are.
-  void recode(const DracoSteps& steps, const NormalSamples* lit_as, const RunContext& context);
+  /// The Draco streams of the meshes; none of other codecs.
+  std::vector<DracoStream> draco_streams() const;
+  /// Takes as many streams for its own; those without vertices are the file's.
+  void set_draco_streams(std::vector<DracoStream> streams);
   bool has_draco() const { return codec() == MeshCodec::kDraco; }
 
   /// Makes the nodes of the scene the children of one node, the first level of detail.

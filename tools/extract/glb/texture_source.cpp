@@ -1,6 +1,7 @@
 #include "tools/extract/glb/texture_source.h"
 
 #include "delivery/cpp/package/package_reader.h"
+#include "format/rules/viewing.h"
 #include "stages/fill/fill.h"
 #include "stages/geometry/texel_coverage.h"
 #include "stages/image/avif.h"
@@ -81,8 +82,9 @@ std::vector<PackageImage> package_images(PackageReader& package) {
   return out;
 }
 
-TextureSource::TextureSource(PackageReader& package, double most_texels, const RunContext& context)
-    : package_(package), context_(context), images_(package_images(package)) {
+TextureSource::TextureSource(PackageReader& package, double most_texels, const RunContext& context,
+                             bool from_mips)
+    : package_(package), context_(context), images_(package_images(package)), from_mips_(from_mips) {
   context_.progress = nullptr;
   first_level_ = halvings(most_texels);
 }
@@ -98,26 +100,28 @@ void TextureSource::set_shown(std::size_t index, std::vector<std::uint8_t> cover
 std::uint32_t TextureSource::halvings(double most_texels) const {
   double texels = 0;
   for (const PackageImage& i : images_)
-    if (i.colours) texels += static_cast<double>(i.width_px) * i.height_px;
+    if (i.colours || from_mips_) texels += static_cast<double>(i.width_px) * i.height_px;
   std::uint32_t times = 0;
   for (; texels > most_texels && times < 20; texels /= 4) ++times;
   return times;
 }
 
 double TextureSource::largest_share(std::size_t index) {
-  return images_[index].colours ? 1.0 / static_cast<double>(1u << first_level_) : 1.0;
+  return images_[index].colours || from_mips_ ? 1.0 / static_cast<double>(1u << first_level_) : 1.0;
 }
 
 const std::vector<Pixels>& TextureSource::levels(std::uint32_t plane, bool colours, Averaging kind) {
   std::vector<Pixels>& levels = planes_[plane];
   if (!levels.empty()) return levels;
-  Pixels full = read_plane(package_, plane, kBestRung, context_);
+  const std::uint32_t skip = colours || from_mips_ ? first_level_ : 0;
+  const TextureInfo& info = package_.textures()[plane];
+  const std::uint32_t read = from_mips_ ? plane_at_level(package_.textures(), plane, skip) : plane;
+  Pixels full = read_plane(package_, read, kBestRung, context_);
   if (const auto shown = shown_.find(plane); shown != shown_.end())
     fill_uncovered(full, shown->second, context_, PartBlocks::kSmooth);
-  const std::uint32_t skip = colours ? first_level_ : 0;
   if (skip > 0)
-    full = reduced(full, full.width_px, full.height_px, half_of(full.width_px, skip),
-                   half_of(full.height_px, skip), kind);
+    full = reduced(full, full.width_px, full.height_px, half_of(info.width_px, skip),
+                   half_of(info.height_px, skip), kind);
   levels.push_back(std::move(full));
   while (levels.back().width_px > 8 && levels.back().height_px > 8) {
     const Pixels& last = levels.back();
@@ -215,14 +219,24 @@ std::vector<std::uint8_t> shown_texels(const Mesh& mesh, const Model& model, std
 
 namespace {
 
+/// Progressive, or where that has more bytes in one scan: what a scan has beside its coefficients is much of
+/// a small file.
 std::vector<std::uint8_t> encode_jpeg_file(const Pixels& pixels, const ImageCoding& coding) {
-  JpegKind kind;
-  kind.channels = pixels.channels;
-  kind.rgb = coding.data && pixels.channels == 3;
-  kind.subsampling = coding.full_chroma ? Subsampling::k444 : Subsampling::k420;
-  kind.file = FileSteps{coding.quality, coding.full_chroma};
-  return JpegCoder(kind).complete({pixels.data.data(), std::size_t{pixels.width_px} * pixels.channels,
-                                   pixels.width_px, pixels.height_px});
+  constexpr std::size_t kSmallTexels = 65536;
+  const auto file = [&](bool sequential) {
+    JpegKind kind;
+    kind.channels = pixels.channels;
+    kind.rgb = coding.data && pixels.channels == 3;
+    kind.subsampling = coding.full_chroma ? Subsampling::k444 : Subsampling::k420;
+    kind.file = FileSteps{coding.quality, coding.full_chroma, sequential};
+    return JpegCoder(kind).complete({pixels.data.data(), std::size_t{pixels.width_px} * pixels.channels,
+                                     pixels.width_px, pixels.height_px});
+  };
+  const bool small = std::size_t{pixels.width_px} * pixels.height_px <= kSmallTexels;
+  std::vector<std::uint8_t> one_scan = small || coding.quick ? file(true) : std::vector<std::uint8_t>{};
+  if (coding.quick) return one_scan;
+  std::vector<std::uint8_t> progressive = file(false);
+  return small && one_scan.size() < progressive.size() ? one_scan : progressive;
 }
 
 std::vector<std::uint8_t> encode_webp_file(const Pixels& pixels, const ImageCoding& coding) {

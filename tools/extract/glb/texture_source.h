@@ -27,7 +27,10 @@ std::vector<PackageImage> package_images(PackageReader& package);
 /// the size that `most_texels` (over all colour images) allows.
 class TextureSource {
  public:
-  TextureSource(PackageReader& package, double most_texels, const RunContext& context);
+  /// `from_mips`: images that are cut down are read from the package's own smaller planes, which takes less
+  /// time and shows a little of their coding; numbers are cut down as colours are.
+  TextureSource(PackageReader& package, double most_texels, const RunContext& context,
+                bool from_mips = false);
   const std::vector<PackageImage>& images() const { return images_; }
   /// An image with these sides, of 1, 3 or, where the image has alpha, 4 channels. Sides are at least 1 and
   /// at most the image's; where memory is bounded, larger sides are cut down, see largest_share(). `coverage`
@@ -52,6 +55,7 @@ class TextureSource {
   PackageReader& package_;
   RunContext context_;
   std::vector<PackageImage> images_;
+  bool from_mips_;
   std::uint32_t first_level_ = 0;                             // of colour planes: how often sides are halved
   std::map<std::uint32_t, std::vector<std::uint8_t>> shown_;  // by plane
   std::map<std::uint32_t, std::vector<Pixels>> planes_;       // by plane: halves, halves of them ..
@@ -90,7 +94,7 @@ struct ImageCoding {
   FileImage format = FileImage::kJpeg;
   double quality = 75;  // JPEG 1..100, WebP and AVIF 0..100; no meaning for PNG
   bool data = false;    // numbers (normals, roughness ..) instead of colours: JPEGs keep their channels apart
-  bool quick = false;   // WebP, AVIF: less time for some percent more bytes, for searches
+  bool quick = false;   // less time for some percent more bytes, for searches
   bool full_chroma = false;  // JPEG: colours 4:4:4, with tables for textures
 };
 

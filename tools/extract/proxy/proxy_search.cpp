@@ -1,6 +1,7 @@
 #include "tools/extract/proxy/proxy_search.h"
 
 #include "format/base/portable_math.h"
+#include "format/rules/proxy_choice.h"
 #include "pipeline/about/gltf_about.h"
 #include "pipeline/io/file_resolver.h"
 #include "stages/condition/condition.h"
@@ -252,7 +253,7 @@ Json ProxyParts::materials_of(const ProxyMapChoice& choice) const {
 StandaloneGlb ProxyParts::file(const ProxyMapChoice& choice, std::size_t mesh, const DracoSteps& steps,
                                const RunContext& context) const {
   StandaloneGlb coded = uncoded(meshes_.at(mesh), entry_);
-  coded.recode(steps, nullptr, context);
+  coded.set_draco_streams(DracoRecoder(coded.draco_streams(), nullptr, entry_).coded(steps, context));
   GlbParts chunks = read_glb(coded.finish(), entry_);
   Json root = materials_of(choice);
   keep_used(root);
@@ -341,6 +342,13 @@ class ProxySearch {
       Extracted whole = extract_proxy(reference_.package, {k}, reference_.place, reference_.context, bytes_);
       if (!reference_.wishes.best() && kFarBelow * whole.glb.size() < bytes_) continue;
       measure_whole(k, whole);
+      if (reference_.wishes.fast()) {
+        if (fits(whole) && is_wanted_kind(k))
+          offer(std::move(whole));
+        else if (!fits(best_))
+          offer_smaller(k, whole);
+        continue;
+      }
       if (!is_wanted_kind(k))
         offer_smaller(k, whole);
       else if (fits(whole) || !(whole.difference < best_.difference || !fits(best_)))
@@ -371,6 +379,8 @@ class ProxySearch {
   }
 
   void measure_whole(std::uint32_t proxy, Extracted& file) {
+    if (reference_.wishes.fast())
+      return set_difference(proxy_loss(reference_.package.manifest(), proxy, reference_.side_px).flip, file);
     if (const auto known = whole_.find(proxy); known != whole_.end())
       return set_difference(known->second, file);
     measure(reference_.package.proxy_glb(proxy), file);
@@ -422,6 +432,7 @@ class ProxySearch {
     Extracted file = whole;
     while (!make(*parts, trial, file, best) && trial.share * kShareStep > kLeastProxyShare)
       trial.share *= kShareStep;
+    if (reference_.wishes.fast()) return offer(std::move(file));
     std::vector<ProxyTrial> seen{trial};
     const auto try_next = [&](const ProxyTrial& next) {
       if (std::ranges::find(seen, next) != seen.end()) return false;
@@ -535,7 +546,7 @@ class ProxySearch {
     out.triangles = parts.triangles(trial.mesh);
     for (const ExtractedImage& i : out.images) out.mesh_bytes -= i.bytes;
     if (!fits(out)) return false;
-    measure(draft.finish(), out, in_whole);
+    if (!reference_.wishes.fast()) measure(draft.finish(), out, in_whole);
     return best >= kPoorQuality;
   }
 

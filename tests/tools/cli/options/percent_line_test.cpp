@@ -31,6 +31,15 @@ TEST(PercentLine, SecondsStandThereWhileNobodySaysHowFarItIs) {
   EXPECT_EQ(out.str(), drawn) << "it has ended";
 }
 
+TEST(PercentLine, TellsTheTimeThatIsLeftWhereItTakesLong) {
+  std::ostringstream out;
+  PercentLine line("extract", out, true, std::chrono::milliseconds(1));
+  line.show(0);
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  line.show(0.5);
+  EXPECT_TRUE(out.str().ends_with("extract 50 %, 1 s left")) << out.str();
+}
+
 TEST(PercentLine, NothingStandsInALog) {
   std::ostringstream out;
   PercentLine line("extract", out, false);

@@ -52,7 +52,7 @@ Bytes stored_scale() {
 
 Mesh recoded(const Bytes& glb, const DracoSteps& steps, const NormalSamples* lit_as, std::size_t& bytes) {
   StandaloneGlb file(glb, "s00.glb");
-  file.recode(steps, lit_as, {});
+  file.set_draco_streams(DracoRecoder(file.draco_streams(), lit_as, "s00.glb").coded(steps, {}));
   bytes = file.finish().size();
   return read_model(file, "s00.glb", {}).mesh;
 }
