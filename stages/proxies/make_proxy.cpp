@@ -3,6 +3,7 @@
 #include "format/base/portable_math.h"
 #include "stages/geometry/mesh_topology.h"
 #include "stages/image/webp.h"
+#include "stages/proxies/simplify_surface.h"
 
 namespace texmesh {
 namespace {

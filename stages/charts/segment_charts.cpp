@@ -6,9 +6,9 @@
 #include <numeric>
 
 #include "format/base/portable_math.h"
+#include "stages/charts/chart_parts.h"
+#include "stages/charts/charts.h"
 #include "stages/geometry/mesh_topology.h"
-#include "stages/proxies/atlas/chart_parts.h"
-#include "stages/proxies/atlas_mesh.h"
 
 namespace texmesh {
 namespace {
