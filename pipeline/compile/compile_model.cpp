@@ -219,16 +219,18 @@ class ModelSource {
 /// What made the package, without dates, hosts or paths. What package.meta says stands in about.json.
 std::string provenance(const ModelSource& source, const CompileOptions& options) {
   Json stages = Json::object(), libraries = Json::object();
-  for (const Stage& s : default_stage_table())
+  for (const Stage& s : stage_table(options))
     if (s.stored) stages[s.name] = s.version;
   for (const auto& [name, version] : library_versions()) libraries[name] = version;
   CompileOptions recorded = options;
   recorded.package.meta.clear();
+  Json profile = profile_json(recorded);
+  if (options.atlas.mode == AtlasMode::kKeep) profile.erase("atlas");  // as before there was such a stage
   return Json{{"version", 1},
               {"tool", "texmesh " + tool_version()},
               {"format", {{"major", kFormatMajor}, {"minor", kFormatMinor}}},
               {"inputs", to_json(source.inputs())},
-              {"options", profile_json(recorded)},
+              {"options", std::move(profile)},
               {"stages", stages},
               {"libraries", libraries}}
       .dump();

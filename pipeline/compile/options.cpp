@@ -133,7 +133,7 @@ CompileOptions resolve_options(CompileOptions o) {
       is_default("fragmentation.min_fragment_px", o.fragmentation.min_fragment_px,
                  FragmentationOptions{}.min_fragment_px))
     o.fragmentation.min_fragment_px = static_cast<int>(kLeastProgressiveSide);
-  if (o.fragmentation.fill == Fill::kNone &&
+  if ((o.fragmentation.fill == Fill::kNone || o.atlas.mode == AtlasMode::kRebuild) &&
       is_default("ladder.uncovered", o.ladder.uncovered, LadderOptions{}.uncovered))
     o.ladder.uncovered = Uncovered::kKept;
   if (!o.package.meta.empty()) o.package.meta = read_meta(o.package.meta, "package.meta");

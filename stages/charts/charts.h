@@ -50,11 +50,17 @@ struct SurfaceCharts {
   std::vector<Vec2d> size;
 };
 
+/// What flattening may do to a chart.
+struct ChartLimits {
+  double stretch = 1.25;  // L2 of Sander et al. 2001: the root of the mean squared stretch, 1 for a plane
+  double ratio = 3;       // of a triangle's singular values, and of one to the chart's mean
+};
+
 /// Cuts a surface into charts by merging triangles from the bottom up, and flattens each chart along its mean
 /// normal, or so that angles stay. A chart is a disk of one group, which may be cut; no triangle flips, no
-/// two overlap; singular values of the flattening are within 3 x of each other. Same bytes everywhere. Throws
-/// Cancelled.
-SurfaceCharts segment_charts(const ProxySurface& surface, const RunContext& context);
+/// two overlap; the flattening keeps the limits. Same bytes everywhere. Throws Cancelled.
+SurfaceCharts segment_charts(const ProxySurface& surface, const RunContext& context,
+                             const ChartLimits& limits = {});
 
 /// Packs charts into a texture of width_px x height_px (1..16384 each) with texels of one size as far as
 /// whole texels allow. nullopt when there are more charts than a texture of this size can hold: a larger
