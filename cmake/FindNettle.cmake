@@ -1,10 +1,3 @@
 # Nettle as Debian's nettle-dev installs it (it has no CMake files).
-find_path(Nettle_INCLUDE_DIR nettle/sha2.h)
-find_library(Nettle_LIBRARY nettle)
-include(FindPackageHandleStandardArgs)
-find_package_handle_standard_args(Nettle REQUIRED_VARS Nettle_LIBRARY Nettle_INCLUDE_DIR)
-if(Nettle_FOUND AND NOT TARGET Nettle::nettle)
-  add_library(Nettle::nettle INTERFACE IMPORTED)
-  target_include_directories(Nettle::nettle SYSTEM INTERFACE ${Nettle_INCLUDE_DIR})
-  target_link_libraries(Nettle::nettle INTERFACE ${Nettle_LIBRARY})
-endif()
+include(FindLibraries)
+texmesh_find_libraries(Nettle nettle nettle/sha2.h nettle)

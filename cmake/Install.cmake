@@ -26,7 +26,7 @@ function(texmesh_install_headers layer)
 endfunction()
 
 texmesh_install_component(texmeshDelivery "format;delivery")
-install(FILES cmake/FindNettle.cmake DESTINATION ${texmesh_cmake_dir})
+install(FILES cmake/FindLibraries.cmake cmake/FindNettle.cmake DESTINATION ${texmesh_cmake_dir})
 # Of the split stream the mesh and its reader; coders are nobody's business but the reader's.
 texmesh_install_headers(format "(base|model|container|documents|rules)/.*" "split/(look_ahead|split_(mesh|stream|reader))\\.h")
 texmesh_install_headers(delivery/cpp ".*")

@@ -78,17 +78,6 @@ constexpr std::array kKinds{
 
 std::span<const MaterialExtensionKind> material_extensions() { return kKinds; }
 
-bool needs_tangents(const Material& material) {
-  if (material.normal_texture.used()) return true;
-  for (const MaterialExtension& e : material.extensions) {
-    const MaterialExtensionKind* kind = find_material_extension(e.name);
-    for (const ExtensionTexture& t : e.textures)
-      if (const ExtensionTextureKind* k = kind ? kind->texture(t.key) : nullptr; k && k->tangent_space)
-        return true;
-  }
-  return false;
-}
-
 const MaterialExtensionKind* find_material_extension(std::string_view name) {
   for (const MaterialExtensionKind& kind : kKinds)
     if (kind.name == name) return &kind;

@@ -86,8 +86,7 @@ void add_fit_experiment(Command& experiment) {
   c.option("--draws", args.draws, "Draws of the bootstrap").integer_in(40, 20000).shows_default();
   c.option("--seed", args.seed, "Of the draws").shows_default();
   c.flag("--skip", args.skip, "Leave out files that cannot be read, and say which");
-  add_jobs_option(c, args.jobs);
-  c.flag("--json", args.json, "Print one JSON object (lab/schemas/experiment-fit.v1.schema.json)");
+  add_jobs_and_json_options(c, args.jobs, args.json, "lab/schemas/experiment-fit.v1.schema.json");
   c.examples(
       "  texmesh-lab experiment fit results/*.json -o jnd-profile.json\n"
       "  texmesh-lab experiment fit results/*.json --design judges/ --page fit.html -o jnd-profile.json\n"

@@ -111,7 +111,7 @@ std::string text_of(const std::string& file) {
   return text;
 }
 
-ExperimentOptions options_of(const MakeArguments& args) {
+ExperimentOptions experiment_options(const MakeArguments& args) {
   ExperimentOptions options = args.options;
   options.kind = kind_of(args);
   options.levels = levels_of(args, options.kind);
@@ -159,7 +159,7 @@ void print_experiment(const MakeArguments& args, const Experiment& experiment) {
 }
 
 int run_make(const MakeArguments& args) {
-  const ExperimentOptions options = options_of(args);
+  const ExperimentOptions options = experiment_options(args);
   check_experiment_folder(args.folder);  // not after the work
   const RunContext context = context_of(args.jobs);
   std::optional<PackageReader> package;

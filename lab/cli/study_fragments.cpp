@@ -195,8 +195,7 @@ void add_fragments_study(Command& study) {
       "--decode", args.decode,
       "Time decoding, too, in CPU time of one thread: one file against all fragments, each made a whole file again");
   c.option("--csv", args.csv, "Write the figures, in bytes, to this file as well", "FILE");
-  add_jobs_option(c, args.jobs);
-  c.flag("--json", args.json, "Print one JSON object");
+  add_jobs_and_json_options(c, args.jobs, args.json);
   c.examples(
       "  texmesh-lab study fragments atlas.jpg\n"
       "  texmesh-lab study fragments *.jpg --grids 4,8,16 --qualities 20,60,90 --csv figures.csv");

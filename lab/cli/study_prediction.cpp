@@ -77,7 +77,7 @@ DeliveryPlan drawn_mix(PackageReader& package, SplitMix& random, DeliveryRequest
   return plan_of(package, request, request.scale, planes, rungs);
 }
 
-std::string name_of(DrawnKind kind) {
+std::string drawn_kind_name(DrawnKind kind) {
   return kind == DrawnKind::kBudget ? "budget" : kind == DrawnKind::kLink ? "link" : "mix";
 }
 
@@ -189,7 +189,7 @@ std::vector<Row> rows_of(const PredictionArguments& args, const std::string& pat
     }
   if (rows.empty())
     for (const DrawnPlan& drawn : draw_plans(package, args.plans, args.seed))
-      rows.push_back(measured(package, pictures, drawn, name_of(drawn.kind)));
+      rows.push_back(measured(package, pictures, drawn, drawn_kind_name(drawn.kind)));
   return rows;
 }
 
@@ -299,8 +299,7 @@ void add_prediction_study(Command& study) {
       "stand for them",
       "MODEL");
   c.option("--views", args.views, "Directions that are rendered").integer_in(1, 64).shows_default();
-  add_jobs_option(c, args.jobs);
-  c.flag("--json", args.json, "Print one JSON object");
+  add_jobs_and_json_options(c, args.jobs, args.json);
   c.examples(
       "  texmesh-lab study prediction turtle.texmesh --against turtle.glb --plans 20 --seed 7\n"
       "  texmesh-lab study prediction turtle.texmesh --against turtle.glb --budget 200kB --budget 1MB");

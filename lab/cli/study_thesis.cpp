@@ -59,8 +59,7 @@ void add_thesis_study(Command& study) {
   c.option("-o,--output", args.folder,
            "Write a page with plots and pictures into this folder, which is new or has an earlier page",
            "DIR");
-  add_jobs_option(c, args.jobs);
-  c.flag("--json", args.json, "Print one JSON object");
+  add_jobs_and_json_options(c, args.jobs, args.json);
   c.examples(
       "  texmesh-lab study thesis --table 4.2\n"
       "  texmesh-lab study thesis -o thesis/\n"

@@ -7,7 +7,7 @@
 namespace texmesh {
 namespace {
 
-using Json = nlohmann::json;
+using GltfJson = nlohmann::json;
 using Ordered = nlohmann::ordered_json;
 
 constexpr std::size_t kMaxTexts = 64;
@@ -19,11 +19,11 @@ constexpr const char* kXmpRights = "http://ns.adobe.com/xap/1.0/rights/";
 const std::map<std::string, std::string> kPrefixes{
     {kDublinCore, "dc"}, {kXmpBasic, "xmp"}, {kXmpRights, "xmpRights"}};
 
-void collect_texts(const Json& value, std::vector<std::string>& texts);
+void collect_texts(const GltfJson& value, std::vector<std::string>& texts);
 
 /// rdf:_1, rdf:_2 ... in this order; of an rdf:Alt the one language to show.
-void collect_members(const Json& object, std::vector<std::string>& texts) {
-  std::vector<const Json*> members;
+void collect_members(const GltfJson& object, std::vector<std::string>& texts) {
+  std::vector<const GltfJson*> members;
   for (std::size_t i = 1; i <= kMaxTexts; ++i) {
     const auto it = object.find("rdf:_" + std::to_string(i));
     if (it == object.end()) break;
@@ -31,27 +31,27 @@ void collect_members(const Json& object, std::vector<std::string>& texts) {
   }
   const auto type = object.find("@type");
   if (type == object.end() || *type != "rdf:Alt") {
-    for (const Json* member : members) collect_texts(*member, texts);
+    for (const GltfJson* member : members) collect_texts(*member, texts);
     return;
   }
-  const auto rank = [](const Json& member) {
+  const auto rank = [](const GltfJson& member) {
     const auto language = member.is_object() ? member.find("@language") : member.end();
     if (language == member.end() || !language->is_string() || *language == "x-default") return 0;
     return language->get_ref<const std::string&>().starts_with("en") ? 1 : 2;
   };
-  const Json* best = nullptr;
-  for (const Json* member : members)
+  const GltfJson* best = nullptr;
+  for (const GltfJson* member : members)
     if (!best || rank(*member) < rank(*best)) best = member;
   if (best) collect_texts(*best, texts);
 }
 
 /// The texts of a value, whatever it is wrapped in.
-void collect_texts(const Json& value, std::vector<std::string>& texts) {
+void collect_texts(const GltfJson& value, std::vector<std::string>& texts) {
   if (texts.size() == kMaxTexts) return;
   if (value.is_string()) texts.push_back(value.get<std::string>());
   if (value.is_number()) texts.push_back(value.dump());
   if (value.is_array())
-    for (const Json& element : value) collect_texts(element, texts);
+    for (const GltfJson& element : value) collect_texts(element, texts);
   if (!value.is_object()) return;
   for (const char* key : {"@value", "@list", "@set", "@id"})
     if (const auto it = value.find(key); it != value.end()) return collect_texts(*it, texts);
@@ -61,7 +61,7 @@ void collect_texts(const Json& value, std::vector<std::string>& texts) {
 /// A packet with the prefixes of its @context.
 class Packet {
  public:
-  explicit Packet(const Json& json) : json_(json) {
+  explicit Packet(const GltfJson& json) : json_(json) {
     prefixes_ = kPrefixes;
     const auto context = json.find("@context");
     if (context == json.end() || !context->is_object()) return;
@@ -80,7 +80,7 @@ class Packet {
   }
 
  private:
-  const Json& json_;
+  const GltfJson& json_;
   std::map<std::string, std::string> prefixes_;
 };
 
@@ -129,25 +129,25 @@ constexpr std::size_t kRoomForCuts = 4096;  // of About::source, for the list of
 constexpr int kMaxKeptDepth = 48;           // of a value; about.json has 64 levels in all
 
 /// What stands at a JSON pointer of names; null where nothing does.
-const Json* find(const Json& document, const std::string& pointer) {
-  const Json::json_pointer place(pointer);
+const GltfJson* find(const GltfJson& document, const std::string& pointer) {
+  const GltfJson::json_pointer place(pointer);
   return document.contains(place) ? &document.at(place) : nullptr;
 }
 
 /// The number of the packet that an object refers to.
-std::optional<std::size_t> packet_number(const Json* object) {
-  const Json* packet = object ? find(*object, "/extensions/KHR_xmp_json_ld/packet") : nullptr;
+std::optional<std::size_t> packet_number(const GltfJson* object) {
+  const GltfJson* packet = object ? find(*object, "/extensions/KHR_xmp_json_ld/packet") : nullptr;
   return packet && packet->is_number_unsigned() ? std::optional(packet->get<std::size_t>()) : std::nullopt;
 }
 
-std::string text_of(const Json* value) {
+std::string text_of(const GltfJson* value) {
   return value && value->is_string() ? value->get<std::string>() : std::string();
 }
 
-int depth_of(const Json& value) {
+int depth_of(const GltfJson& value) {
   int deepest = 0;
   if (value.is_structured())
-    for (const Json& child : value) deepest = std::max(deepest, depth_of(child));
+    for (const GltfJson& child : value) deepest = std::max(deepest, depth_of(child));
   return deepest + 1;
 }
 
@@ -156,10 +156,10 @@ class KeptSource {
  public:
   explicit KeptSource(const std::string& format) { source_["format"] = format; }
 
-  void keep(const char* name, const Json& value, const std::string& pointer) {
+  void keep(const char* name, const GltfJson& value, const std::string& pointer) {
     if (fits(value, pointer)) source_[name] = Ordered(value);
   }
-  void keep_in_list(const char* name, const char* key, const Json& value, const std::string& pointer,
+  void keep_in_list(const char* name, const char* key, const GltfJson& value, const std::string& pointer,
                     const std::string& path) {
     if (fits(value, pointer)) source_[name].push_back({{"path", path}, {key, Ordered(value)}});
   }
@@ -174,7 +174,7 @@ class KeptSource {
   }
 
  private:
-  bool fits(const Json& value, const std::string& pointer) {
+  bool fits(const GltfJson& value, const std::string& pointer) {
     const std::size_t bytes = value.dump().size(), with_names = bytes + pointer.size() + 64;
     if (with_names <= room_ && depth_of(value) <= kMaxKeptDepth) {
       room_ -= with_names;
@@ -193,10 +193,10 @@ class KeptSource {
 
 /// Calls f(object, JSON pointer) for the root and every element of the arrays that a model is made of.
 template <class F>
-void for_each_object(const Json& document, const F& f) {
+void for_each_object(const GltfJson& document, const F& f) {
   f(document, std::string());
   for (const char* name : kArrays) {
-    const Json* list = find(document, "/" + std::string(name));
+    const GltfJson* list = find(document, "/" + std::string(name));
     if (!list || !list->is_array()) continue;
     for (std::size_t i = 0; i < list->size(); ++i)
       f((*list)[i], "/" + std::string(name) + "/" + std::to_string(i));
@@ -204,7 +204,7 @@ void for_each_object(const Json& document, const F& f) {
 }
 
 /// Names that say what a coordinate is do not count: glTF has metres and y up.
-void apply_extras(About& about, const Json* extras, const std::string& place, Notes& notes) {
+void apply_extras(About& about, const GltfJson* extras, const std::string& place, Notes& notes) {
   if (!extras || !extras->is_object()) return;
   for (const auto& [name, value] : extras->items()) {
     if (!value.is_string() && !value.is_number_unsigned()) continue;
@@ -212,17 +212,17 @@ void apply_extras(About& about, const Json* extras, const std::string& place, No
   }
 }
 
-std::string keep_source(const Json& document, const std::string& format, Notes& notes) {
+std::string keep_source(const GltfJson& document, const std::string& format, Notes& notes) {
   KeptSource kept(format);
-  if (const Json* asset = find(document, "/asset")) kept.keep("asset", *asset, "/asset");
-  if (const Json* packets = find(document, kPackets); packets && packets->is_array() && !packets->empty())
+  if (const GltfJson* asset = find(document, "/asset")) kept.keep("asset", *asset, "/asset");
+  if (const GltfJson* packets = find(document, kPackets); packets && packets->is_array() && !packets->empty())
     kept.keep("xmpPackets", *packets, kPackets);
-  for_each_object(document, [&](const Json& object, const std::string& path) {
+  for_each_object(document, [&](const GltfJson& object, const std::string& path) {
     if (const auto packet = packet_number(&object))
       kept.keep_in_list("xmp", "packet", *packet, path + "/extensions/KHR_xmp_json_ld", path);
   });
-  for_each_object(document, [&](const Json& object, const std::string& path) {
-    if (const Json* extras = find(object, "/extras"))
+  for_each_object(document, [&](const GltfJson& object, const std::string& path) {
+    if (const GltfJson* extras = find(object, "/extras"))
       kept.keep_in_list("extras", "value", *extras, path + "/extras", path);
   });
   return kept.finish(notes);
@@ -249,7 +249,7 @@ void write_coordinates(const About& about, Ordered& root) {
 
 }  // namespace
 
-void apply_xmp(About& about, const Json& json, const std::string& place, Notes& notes) {
+void apply_xmp(About& about, const GltfJson& json, const std::string& place, Notes& notes) {
   if (!json.is_object()) return;
   const Packet packet(json);
   for (const char* name : {"title", "creator", "description"})
@@ -267,7 +267,7 @@ nlohmann::ordered_json xmp_packet(const About& about, nlohmann::ordered_json pac
   if (!packet.is_object()) packet = Ordered::object();
   About said;
   Notes ignored;
-  const Json before(packet);
+  const GltfJson before(packet);
   apply_xmp(said, before, "", ignored);
   const Packet names(before);
   const auto set = [&](const char* name_space, const char* name, const std::string& text,
@@ -300,19 +300,20 @@ nlohmann::ordered_json xmp_packet(const About& about, nlohmann::ordered_json pac
   return packet;
 }
 
-About about_from_gltf(const Json& document, const std::string& format, Notes& notes) {
+About about_from_gltf(const GltfJson& document, const std::string& format, Notes& notes) {
   About about;
-  const Json* asset = find(document, "/asset");
-  const Json *scenes = find(document, "/scenes"), *number = find(document, "/scene");
+  const GltfJson* asset = find(document, "/asset");
+  const GltfJson *scenes = find(document, "/scenes"), *number = find(document, "/scene");
   const std::size_t shown = number && number->is_number_unsigned() ? number->get<std::size_t>() : 0;
-  const Json* scene = scenes && scenes->is_array() && shown < scenes->size() ? &(*scenes)[shown] : nullptr;
+  const GltfJson* scene =
+      scenes && scenes->is_array() && shown < scenes->size() ? &(*scenes)[shown] : nullptr;
   if (asset) {
     about.attribution = clean_about_text(text_of(find(*asset, "/copyright")), kMaxAboutTextBytes);
     apply_extras(about, find(*asset, "/extras"), "/asset/extras", notes);
   }
   apply_extras(about, find(document, "/extras"), "/extras", notes);
   if (scene) apply_extras(about, find(*scene, "/extras"), "/scenes/extras", notes);
-  const Json* packets = find(document, kPackets);
+  const GltfJson* packets = find(document, kPackets);
   const auto packet = packet_number(asset) ? packet_number(asset) : packet_number(scene);
   if (packets && packets->is_array() && packet && *packet < packets->size())
     apply_xmp(about, (*packets)[*packet], "KHR_xmp_json_ld", notes);
@@ -333,7 +334,7 @@ void write_gltf_about(const About& about, Ordered& root) {
 
   Ordered packets = source.value("xmpPackets", Ordered::array());
   if (!packets.is_array()) packets = Ordered::array();
-  const Json from_unordered(from);
+  const GltfJson from_unordered(from);
   std::size_t shown = packet_number(&from_unordered).value_or(packets.size());
   const Ordered before = shown < packets.size() ? packets[shown] : Ordered::object();
   const Ordered after = xmp_packet(about, before);
@@ -352,23 +353,27 @@ void write_gltf_about(const About& about, Ordered& root) {
   root["extensionsUsed"] = used;
 }
 
-About about_within(const About& about, std::uint64_t bytes) {
-  const auto fits = [bytes](const About& candidate) {
-    Ordered root = Ordered::object();
-    write_gltf_about(candidate, root);
-    return root.dump().size() <= bytes;
-  };
-  if (fits(about)) return about;
+std::vector<About> about_choices(const About& about) {
   About fields = about;
   fields.source.clear();
-  if (fits(fields)) return fields;
   About least;
   least.title = about.title;
   least.creator = about.creator;
   least.attribution = about.attribution;
   least.licence = about.licence;
   least.licence_url = about.licence_url;
-  return least;
+  return {about, std::move(fields), std::move(least)};
+}
+
+About about_within(const About& about, std::uint64_t bytes) {
+  std::vector<About> choices = about_choices(about);
+  const auto fits = [bytes](const About& choice) {
+    Ordered root = Ordered::object();
+    write_gltf_about(choice, root);
+    return root.dump().size() <= bytes;
+  };
+  const auto found = std::ranges::find_if(choices, fits);
+  return found == choices.end() ? std::move(choices.back()) : std::move(*found);
 }
 
 }  // namespace texmesh

@@ -18,8 +18,10 @@ About about_from_gltf(const nlohmann::json& document, const std::string& format,
 /// glTF's.
 void write_gltf_about(const About& about, nlohmann::ordered_json& root);
 
-/// As much of `about` as write_gltf_about() puts into `bytes` bytes of JSON: all, else without what the
-/// source said verbatim, else title, creator, attribution and licence alone.
+/// What a file may say of the object, most first: all, without what the source said verbatim, and title,
+/// creator, attribution and licence alone.
+std::vector<About> about_choices(const About& about);
+/// The first of these that write_gltf_about() puts into `bytes` bytes of JSON, else the last.
 About about_within(const About& about, std::uint64_t bytes);
 
 /// Enters what an XMP packet (JSON-LD, as KHR_xmp_json_ld holds it) says with Dublin Core, XMP Basic and XMP

@@ -163,12 +163,21 @@ JobSelection::JobSelection(const BatchPlan& plan, const RunSettings& settings)
       memo_(settings.cache.folder, plan.outputs),
       tool_seed_(program_build()) {}
 
-const Sha256& JobSelection::request_of(const std::shared_ptr<const std::string>& profile) {
-  const auto [it, fresh] = requests_.try_emplace(profile.get());
+std::vector<std::string> JobSelection::links_of(const PlannedModel& model) const {
+  std::vector<std::string> folders = settings_.links_within;
+  const std::string own = (fs::path(model.input).parent_path() / "").string();  // always allowed
+  for (const std::string& folder : plan_.folders)
+    if (model.input.starts_with(folder) && folder != own) folders.push_back(folder.empty() ? "." : folder);
+  return folders;
+}
+
+const Sha256& JobSelection::request_of(const PlannedModel& model) {
+  const std::vector<std::string> links = links_of(model);
+  const auto [it, fresh] = requests_.try_emplace({model.profile.get(), links});
   if (fresh) {
     Key key("compile", 1);
-    key.add("tool", tool_seed_).add("profile", *profile).add("strict", settings_.strict ? "1" : "0");
-    for (const std::string& folder : settings_.links_within) key.add("links within " + folder, "1");
+    key.add("tool", tool_seed_).add("profile", *model.profile).add("strict", settings_.strict ? "1" : "0");
+    for (const std::string& folder : links) key.add("links within " + folder, "1");
     it->second = key.digest();
   }
   return it->second;
@@ -181,7 +190,7 @@ void JobSelection::select(std::vector<WorkerReport>& reports) {
     PackageMemo memo;
     const bool remembered = memo_.find(package, memo);
     bool refreshed = false;
-    if (remembered && memo.request == request_of(m.profile) && !(memo.failed && settings_.retry_failed) &&
+    if (remembered && memo.request == request_of(m) && !(memo.failed && settings_.retry_failed) &&
         still_holds(memo, m.input, m.output, refreshed)) {
       if (refreshed && !settings_.dry_run) {
         memo.keys = memo_.keys(package);
@@ -217,9 +226,7 @@ void JobSelection::add_job(std::size_t i, bool remembered) {
   job.strict = settings_.strict;
   job.explain = settings_.explain;
   job.forecast = settings_.dry_run;
-  job.links_within = settings_.links_within;
-  for (const std::string& folder : plan_.folders)
-    if (m.input.starts_with(folder)) job.links_within.push_back(folder.empty() ? "." : folder);
+  job.links_within = links_of(m);
   if (remembered) {
     for (FileRequest& f : memo.files)
       if (f.found && f.stamp.is_settled(memo.looked_at_ns)) job.known.push_back(std::move(f));
@@ -251,7 +258,7 @@ void JobSelection::remember(std::size_t job, const WorkerReport& report) {
   if (report.more->files.empty() || (!report.ok() && !is_lasting(report))) return;
   const PlannedModel& m = plan_.models[i];
   PackageMemo memo;
-  memo.request = request_of(m.profile);
+  memo.request = request_of(m);
   memo.failed = !report.ok();
   memo.files = report.more->files;
   memo.peak_memory_bytes = report.peak_memory_bytes;

@@ -75,7 +75,9 @@ class JobSelection {
   bool save_memo() { return memo_.save(); }
 
  private:
-  const Sha256& request_of(const std::shared_ptr<const std::string>& profile);
+  /// Folders within which links of the model are followed, beside its own.
+  std::vector<std::string> links_of(const PlannedModel& model) const;
+  const Sha256& request_of(const PlannedModel& model);
   void recall(const PackageMemo& memo, WorkerReport& report);
   void add_job(std::size_t i, bool remembered);
 
@@ -85,7 +87,7 @@ class JobSelection {
   std::map<std::size_t, PackageMemo> memos_;  // of an earlier run, for the models that run again
   std::vector<WorkerJob> jobs_;
   std::vector<std::size_t> model_of_job_;
-  std::map<const std::string*, Sha256> requests_;
+  std::map<std::pair<const std::string*, std::vector<std::string>>, Sha256> requests_;
   std::string tool_seed_;
   bool has_recalled_failure_ = false;
 };

@@ -10,6 +10,7 @@
 
 #include "format/base/text_bytes.h"
 #include "pipeline/about/source_fields.h"
+#include "pipeline/batch/stale_packages.h"
 #include "pipeline/compile/options.h"
 #include "pipeline/io/file_resolver.h"
 #include "pipeline/io/uri.h"
@@ -161,31 +162,47 @@ std::vector<std::string> model_paths(const std::string& folder) {
   return models;
 }
 
-/// The outputs that more than one of the models have; the views point into the models.
+/// What names of one file give on every system.
+std::string output_key(const std::string& output) {
+  if (std::ranges::any_of(output, [](char c) { return static_cast<unsigned char>(c) >= 0x80; }))
+    return name_key(output);
+  std::string key = output;  // in the place of a library's work for each of 100,000 names
+  for (char& c : key) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  return key;
+}
+
+/// The keys of outputs that more than one of the models have.
 /// 8 bytes a model: a map of the outputs of 100,000 models took a sixth of a run that does nothing.
-template <class Model>
-std::set<std::string_view> repeated_outputs(const std::vector<Model>& models) {
-  const std::hash<std::string_view> hash;
+std::set<std::string> repeated_outputs(const std::vector<PlannedModel>& models) {
+  const std::hash<std::string> hash;
   std::vector<std::size_t> hashes;
   hashes.reserve(models.size());
-  for (const Model& m : models) hashes.push_back(hash(m.output));
+  for (const PlannedModel& m : models) hashes.push_back(hash(output_key(m.output)));
   std::sort(hashes.begin(), hashes.end());
   std::set<std::size_t> shared;
   for (auto at = hashes.begin(); (at = std::adjacent_find(at, hashes.end())) != hashes.end(); ++at)
     shared.insert(*at);
-  std::set<std::string_view> seen, repeated;
+  std::set<std::string> seen, repeated;
   if (shared.empty()) return repeated;
-  for (const Model& m : models)
-    if (shared.contains(hash(m.output)) && !seen.insert(m.output).second) repeated.insert(m.output);
+  for (const PlannedModel& m : models)
+    if (std::string key = output_key(m.output); shared.contains(hash(key)) && !seen.insert(key).second)
+      repeated.insert(std::move(key));
   return repeated;
 }
 
 constexpr std::size_t kMaxFileBytes = 256u << 20, kMaxModels = 1'000'000, kMaxPathBytes = 1000;
 
+/// The package of a model at a path within its folder.
+std::string package_of(const std::string& relative, PackageNames names) {
+  return names == PackageNames::kFull ? relative + ".texmesh"
+                                      : fs::path(relative).replace_extension(".texmesh").string();
+}
+
 class CollectionReader {
  public:
-  CollectionReader(const std::string& file, const CompileOptions& base, const FolderLister& list_folder)
-      : file_(file), list_folder_(list_folder), options_(base) {}
+  CollectionReader(const std::string& file, const CompileOptions& base, const FolderLister& list_folder,
+                   PackageNames names)
+      : file_(file), list_folder_(list_folder), names_(names), options_(base) {}
 
   std::vector<CollectionModel> read(const Json& root) {
     check_members(root, "", {"$schema", "version", "options", "about", "patterns", "models", "folders"});
@@ -302,31 +319,27 @@ class CollectionReader {
       const std::string folder = with_slashes(folders[i].get<std::string>());
       if (!list_folder_) continue;
       const std::vector<std::string> found = list_folder_(folder);
-      std::map<std::string, std::pair<int, int>> sharing;  // files, those that are no .json
-      const auto package_of = [](const std::string& relative) {
-        return fs::path(relative).replace_extension(".texmesh").string();
-      };
-      for (const std::string& relative : found) {
-        auto& [files, others] = sharing[package_of(relative)];
-        ++files, others += has_json_ending(relative) ? 0 : 1;
-      }
       for (const std::string& relative : found) {
         const std::string input = (fs::path(folder) / relative).string();
         if (!listed.insert(fs::path(input).lexically_normal().string()).second) continue;
-        const std::string package = package_of(relative);
-        const bool unread = has_json_ending(relative);
-        const auto [files, others] = sharing[package];
-        const bool longer = unread ? files > 1 : others > 1;
-        add(models, {input, longer ? relative + ".texmesh" : package, options_for(input), unread}, place);
+        add(models, {input, package_of(relative, names_), options_for(input), has_json_ending(relative)},
+            place);
       }
     }
   }
 
   void add(std::vector<CollectionModel>& models, CollectionModel model, const std::string& place) {
     if (models.size() >= kMaxModels) fail(place, "at most " + std::to_string(kMaxModels) + " models", "more");
-    if (!model.unread && !outputs_.insert(fs::path(model.output).lexically_normal().string()).second)
-      fail(place, "an output of its own for " + model.input, model.output + ", as another model");
+    if (!model.unread) take_output(model, place, "give one of them an output in /models, or --names full");
     models.push_back(std::move(model));
+  }
+
+  void take_output(const CollectionModel& model, const std::string& place, const std::string& hint) {
+    const auto [taken, fresh] =
+        outputs_.emplace(output_key(fs::path(model.output).lexically_normal().string()), model.input);
+    if (!fresh)
+      fail(place, "an output of its own for " + model.input + " (" + hint + ")",
+           model.output + ", which is that of " + taken->second);
   }
 
   CollectionModel read_model(const Json& json, const std::string& place) {
@@ -335,14 +348,13 @@ class CollectionReader {
     CollectionModel m;
     m.input = path_at(json, "input", place);
     m.output = json.contains("output") ? path_at(json, "output", place)
-                                       : fs::path(m.input).filename().replace_extension(".texmesh").string();
+                                       : package_of(fs::path(m.input).filename().string(), names_);
     const fs::path output(m.output);
     bool beneath = output.is_relative() && output.extension() == ".texmesh";
     for (const fs::path& part : output) beneath = beneath && part != "..";
     if (!beneath)
       fail(place + "/output", "a path beneath the output folder that ends with .texmesh", m.output);
-    if (!outputs_.insert(output.lexically_normal().string()).second)
-      fail(place + "/output", "an output of its own", m.output + ", as another model");
+    take_output(m, place + "/output", "names that differ only in case count as one");
     m.options = options_for(m.input);
     if (json.contains("options") || json.contains("about")) {
       CompileOptions with_changes = *m.options;
@@ -359,10 +371,11 @@ class CollectionReader {
   };
   const std::string& file_;
   const FolderLister& list_folder_;
+  const PackageNames names_;
   CompileOptions options_;
   std::vector<Pattern> patterns_;
   std::map<std::vector<bool>, std::shared_ptr<const CompileOptions>> shared_;
-  std::set<std::string> outputs_;
+  std::map<std::string, std::string> outputs_;  // by output_key(): the model's input
 };
 
 bool is_collection(const std::string& input) {
@@ -398,13 +411,21 @@ void add_collection(const std::string& file, const PlanRequest& request, const C
   const fs::path folder = fs::path(file).parent_path();
   const auto list = [&](const std::string& name) { return list_models((folder / name).string()); };
   for (const CollectionModel& m :
-       read_collection(std::string(bytes.begin(), bytes.end()), file, base, list)) {
+       read_collection(std::string(bytes.begin(), bytes.end()), file, base, list, request.names)) {
     const std::string input = (folder / m.input).string();
-    plan.models.push_back(
-        {input, (fs::path(request.output) / m.output).string(), false, m.unread, profiles.of(m.options)});
+    plan.models.push_back({input, (fs::path(request.output) / m.output).string(), false, m.unread,
+                           profiles.of(m.options), nullptr});
   }
   plan.files.push_back(file);
   plan.folders.push_back((folder / "").string());
+}
+
+[[noreturn]] void refuse_package(const std::string& input, const std::string& output,
+                                 const std::string& other) {
+  throw InputError(
+      input, "",
+      "a package of its own (--names full names packages by format, too; a collection.json names each)",
+      output + ", which is that of " + other);
 }
 
 /// Unread files that `chosen` names leave the plan where they are no models.
@@ -413,22 +434,53 @@ void read_unread(BatchPlan& plan, const Chosen& chosen) {
   for (PlannedModel& m : plan.models) {
     if (!m.unread || !chosen(m)) continue;
     m.unread = false;
-    if (!is_range_scan(m.input)) m.input.clear();
+    if (!is_range_scan(m.input))
+      m.input.clear();
+    else if (m.meets)
+      refuse_package(m.input, fs::path(m.input).filename().replace_extension(".texmesh").string(), *m.meets);
   }
   std::erase_if(plan.models, [](const PlannedModel& m) { return m.input.empty(); });
 }
 
-void refuse_shared_outputs(BatchPlan& plan) {
-  const auto shared = repeated_outputs(plan.models);
-  if (shared.empty()) return;
-  // The few that must be opened by every shard, such as a meta.json in each of two folders.
-  read_unread(plan, [&](const PlannedModel& m) { return shared.contains(m.output); });
-  const auto repeated = repeated_outputs(plan.models);
-  std::map<std::string_view, std::string_view> input_of;
+/// The model with a package that others would have, too: by the package's key.
+using Meetings = std::map<std::string, const PlannedModel*>;
+
+/// Files that may be no models make way for those that are: a.json beside a.glb. Only the shard that has the
+/// file opens it.
+void set_unread_aside(BatchPlan& plan, const std::set<std::string>& shared) {
+  Meetings read;
   for (const PlannedModel& m : plan.models)
-    if (repeated.contains(m.output) && !input_of.emplace(m.output, m.input).second)
-      throw InputError(m.input, "", "a package of its own",
-                       m.output + ", which is that of " + std::string(input_of[m.output]));
+    if (std::string key = output_key(m.output); !m.unread && shared.contains(key))
+      read.emplace(std::move(key), &m);
+  for (PlannedModel& m : plan.models) {
+    const auto met = m.unread ? read.find(output_key(m.output)) : read.end();
+    if (met == read.end()) continue;
+    m.meets = std::make_shared<const std::string>(met->second->input);
+    m.output.insert(m.output.rfind('.'), fs::path(m.input).extension().string());
+  }
+}
+
+void refuse_shared_outputs(BatchPlan& plan) {
+  auto shared = repeated_outputs(plan.models);
+  if (shared.empty()) return;
+  set_unread_aside(plan, shared);
+  // The few that must be opened by every shard, such as a meta.json in each of two folders.
+  shared = repeated_outputs(plan.models);
+  read_unread(plan, [&](const PlannedModel& m) { return shared.contains(output_key(m.output)); });
+  shared = repeated_outputs(plan.models);
+  Meetings first_of;
+  for (const PlannedModel& m : plan.models) {
+    std::string key = output_key(m.output);
+    if (!shared.contains(key)) continue;
+    const auto [it, fresh] = first_of.emplace(std::move(key), &m);
+    const PlannedModel& other = *it->second;
+    if (!fresh && m.output == other.output) refuse_package(m.input, m.output, other.input);
+    if (!fresh)
+      throw InputError(
+          m.input, "",
+          "a package whose name differs from others not only in case (a collection.json names each)",
+          m.output + " beside " + other.output + ", that of " + other.input);
+  }
 }
 
 /// Costs are whole microseconds: sums of them do not depend on their order.
@@ -524,7 +576,8 @@ std::vector<std::string> list_models(const std::string& folder) {
   return models;
 }
 
-std::vector<ModelPath> find_models(const std::vector<std::string>& inputs, const std::string& output) {
+std::vector<ModelPath> find_models(const std::vector<std::string>& inputs, const std::string& output,
+                                   PackageNames names) {
   std::vector<Found> found;
   bool any_folder = false;
   for (const std::string& input : inputs) {
@@ -549,29 +602,21 @@ std::vector<ModelPath> find_models(const std::vector<std::string>& inputs, const
   models.reserve(found.size());
   for (Found& f : found) {
     const std::size_t slash = f.path.rfind('/') + 1, dot = f.path.rfind('.');
-    const bool extension = dot != std::string::npos && dot > std::max(slash, f.relative);
+    const bool cut =
+        names == PackageNames::kStem && dot != std::string::npos && dot > std::max(slash, f.relative);
     const std::string_view relative = std::string_view(f.path).substr(f.relative);
     std::string package = prefix;
     package.reserve(prefix.size() + relative.size() + 8);  // of 100,000, what growing leaves free counts
-    package.append(relative.substr(0, extension ? dot - f.relative : relative.npos)).append(".texmesh");
+    package.append(relative.substr(0, cut ? dot - f.relative : relative.npos)).append(".texmesh");
     models.push_back({std::move(f.path), std::move(package), f.unread});
   }
-  std::map<std::string_view, int> others;  // by shared package: its files that are not unread
-  const auto shared = repeated_outputs(models);
-  for (const ModelPath& m : models)
-    if (shared.contains(m.output)) others[m.output] += m.unread ? 0 : 1;
-  std::vector<std::size_t> longer;
-  for (const ModelPath& m : models)
-    if (const auto it = others.find(m.output); it != others.end() && (m.unread || it->second > 1))
-      longer.push_back(static_cast<std::size_t>(&m - models.data()));
-  for (const std::size_t i : longer)
-    models[i].output = prefix + models[i].input.substr(found[i].relative) + ".texmesh";
   return models;
 }
 
 std::vector<CollectionModel> read_collection(const std::string& json, const std::string& file_name,
-                                             const CompileOptions& base, const FolderLister& list_folder) {
-  return CollectionReader(file_name, base, list_folder)
+                                             const CompileOptions& base, const FolderLister& list_folder,
+                                             PackageNames names) {
+  return CollectionReader(file_name, base, list_folder, names)
       .read(parse_document(text_bytes(json), kMaxFileBytes, 16, file_name));
 }
 
@@ -603,15 +648,18 @@ BatchPlan plan_collection(const PlanRequest& request) {
     throw InputError(request.output, "", "a folder for the packages of a collection",
                      "the name of one package");
   if (!others.empty()) {
-    std::vector<ModelPath> found = find_models(others, request.output);
+    std::vector<ModelPath> found = find_models(others, request.output, request.names);
     plan.models.reserve(plan.models.size() + found.size());
     const bool alone = request.inputs.size() == 1 && names_package;
     for (ModelPath& m : found)
-      plan.models.push_back({std::move(m.input), std::move(m.output), alone, m.unread, profiles.of(base)});
+      plan.models.push_back(
+          {std::move(m.input), std::move(m.output), alone, m.unread, profiles.of(base), nullptr});
   }
   refuse_shared_outputs(plan);
   plan.output_prefix = (fs::path(request.output) / "").string();
   plan.outputs = fs::absolute(request.output).lexically_normal().string();
+  if (std::ranges::all_of(others, [](const std::string& input) { return fs::is_directory(input); }))
+    plan.stale = stale_packages(plan);
   return plan;
 }
 

@@ -50,6 +50,14 @@ double guessed_seconds(std::uint64_t model_bytes);
 
 struct CompileOptions;
 
+/// What packages of folders are called that no collection names: bust.texmesh or bust.glb.texmesh of
+/// bust.glb.
+enum class PackageNames : std::uint8_t { kStem, kFull };
+template <>
+struct EnumNames<PackageNames> {
+  static constexpr std::array<std::string_view, 2> names{"stem", "full"};
+};
+
 /// A model to compile and where its package goes.
 struct ModelPath {
   std::string input, output;
@@ -58,11 +66,12 @@ struct ModelPath {
 
 /// The models that `inputs` name: files as they are; of a folder every .glb .gltf .obj .ply .stl and .json
 /// beneath it, sorted by path. One input file with an `output` that ends in .texmesh gives that package;
-/// otherwise `output` is a folder, and a model's package stands in it under the same relative path. Two
-/// models that would share a package (a.glb beside a.obj) keep their extension in its name (a.glb.texmesh);
-/// a .json keeps it beside any other, which does not keep it for the .json. What a .json holds does not
-/// count: a shard of a run opens its own ones only. InputError for what is not there.
-std::vector<ModelPath> find_models(const std::vector<std::string>& inputs, const std::string& output);
+/// otherwise `output` is a folder, and a model's package stands in it under the same relative path with the
+/// ending .texmesh: in the place of the model's own, or with `names` kFull behind it (a.glb.texmesh). So no
+/// other model changes a package's name. What a .json holds does not count: a shard of a run opens its own
+/// ones only. InputError for what is not there.
+std::vector<ModelPath> find_models(const std::vector<std::string>& inputs, const std::string& output,
+                                   PackageNames names = PackageNames::kStem);
 
 /// The files beneath a folder that find_models finds there: paths relative to it, sorted. InputError when the
 /// folder is not there or holds no model.
@@ -96,8 +105,8 @@ using FolderLister = std::function<std::vector<std::string>(const std::string& f
 /// once, as listed. Patterns are matched against the input as the collection writes it; `*` and `?` match
 /// "/" as well.
 std::vector<CollectionModel> read_collection(const std::string& json, const std::string& file_name,
-                                             const CompileOptions& base,
-                                             const FolderLister& list_folder = {});
+                                             const CompileOptions& base, const FolderLister& list_folder = {},
+                                             PackageNames names = PackageNames::kStem);
 
 /// One model of a run.
 struct PlannedModel {
@@ -105,6 +114,8 @@ struct PlannedModel {
   bool alone = false;                          // the one model of a package that the command line names
   bool unread = false;                         // as in ModelPath
   std::shared_ptr<const std::string> profile;  // JSON of every option; models with equal options share it
+  std::shared_ptr<const std::string> meets =
+      nullptr;  // of an unread file: the model whose package it would share
   /// As messages and reports call it.
   std::string_view name() const { return std::string_view(input).substr(alone ? input.rfind('/') + 1 : 0); }
 };
@@ -114,7 +125,8 @@ struct PlanRequest {
   std::string output;                                // package or folder
   std::shared_ptr<const CompileOptions> base;        // of the profile, not resolved; null = defaults
   std::function<void(CompileOptions&)> apply_flags;  // the command line's options, which win over everything
-  Shard shard;                                       // this run's part
+  PackageNames names = PackageNames::kStem;
+  Shard shard;                            // this run's part
   std::map<std::string, double> costs_s;  // by package within the output folder: what models took before
 };
 
@@ -125,6 +137,9 @@ struct BatchPlan {
       folders;          // that the command line or a collection stands for, with a slash at the end
   std::string outputs;  // absolute path of the output folder, or of the package where there can be one only
   std::string output_prefix;  // what the models' outputs begin with: the output folder and a slash
+  /// Packages in the output folder that no model of the folders and collections makes: paths within it,
+  /// sorted. Empty where a single file is named: then its siblings are no business of the run's.
+  std::vector<std::string> stale;
   Shard shard;
   std::size_t models_in_collection = 0;  // of all shards: their unread ones count
   std::string collection;                // collection_digest() where there are several shards, else ""
@@ -132,7 +147,8 @@ struct BatchPlan {
 
 /// Finds the models and their options. Several shards are balanced by `costs_s`, and by the sizes of the
 /// models' files where a model is not among them: runs that see the same files and costs split the models
-/// alike, and open only their own. InputError for what makes no sense, before anything is compiled.
+/// alike, and open only their own. InputError for what makes no sense, before anything is compiled; so for
+/// two models of one package, and of packages whose names differ only in case or composition (name_key()).
 BatchPlan plan_batch(const PlanRequest& request);
 
 /// The same before it is split on shards: what names alone tell, unread files with it.

@@ -148,9 +148,11 @@ void Progress::show(std::size_t, const CacheTold& e) {
 }
 
 void Progress::show(std::size_t, const NoteTold& e) {
+  static constexpr const char* kRoundedNote = "rounded-position";  // of condition: the surface has changed
   const bool warns = e.note.severity == Severity::kWarning;
-  const bool lost = e.note.code == kLostNote && mode_ != OutputMode::kQuiet;
-  if (warns || lost || verbose_)
+  const bool always =
+      (e.note.code == kLostNote || e.note.code == kRoundedNote) && mode_ != OutputMode::kQuiet;
+  if (warns || always || verbose_)
     line(fmt::format("{}: {}: {}", e.model, warns ? "warning" : "note", sentence(e.note)));
 }
 
@@ -183,7 +185,14 @@ void Progress::finished(std::size_t model, const WorkerReport& r, const std::str
   redraw(true);
 }
 
-void Progress::summary(const std::vector<WorkerReport>& reports, double seconds) {
+void Progress::tell_stale(const std::vector<std::string>& stale, const char* what) {
+  constexpr std::size_t kMost = 10;
+  for (std::size_t k = 0; k < std::min(stale.size(), kMost); ++k) line(fmt::format("{}: {}", stale[k], what));
+  if (stale.size() > kMost) line(fmt::format("and {} more packages", stale.size() - kMost));
+}
+
+void Progress::summary(const std::vector<WorkerReport>& reports, double seconds,
+                       const std::vector<std::string>& stale, bool removed) {
   auto count = [&](ModelResult r) {
     return std::count_if(reports.begin(), reports.end(),
                          [r](const WorkerReport& x) { return x.result == r; });
@@ -194,11 +203,14 @@ void Progress::summary(const std::vector<WorkerReport>& reports, double seconds)
   if (mode_ == OutputMode::kTerminal) out_ << "\r\033[K" << std::flush;
   if (mode_ == OutputMode::kJson) {
     const auto number = [](std::ptrdiff_t n) { return static_cast<std::uint64_t>(n); };
-    write_event(
-        RunFinished{number(models), number(ok), number(same), number(failed), number(cancelled), seconds});
+    write_event(RunFinished{number(models), number(ok), number(same), number(failed), number(cancelled),
+                            seconds, stale});
     out_ << std::flush;
     return;
   }
+  if (removed && mode_ != OutputMode::kQuiet)
+    tell_stale(stale, "removed, since no model makes this package any more");
+  if (!removed) tell_stale(stale, "no model makes this package any more (--remove-stale removes it)");
   for (const auto& [text, times] : cache_events_)
     if (times > 1) line(fmt::format("cache: {} more times: {}", times - 1, text));
   const auto recalled =
@@ -212,8 +224,10 @@ void Progress::summary(const std::vector<WorkerReport>& reports, double seconds)
   out_ << std::flush;
 }
 
-void Progress::forecast_summary(std::size_t to_look_at, std::size_t models) {
+void Progress::forecast_summary(std::size_t to_look_at, std::size_t models,
+                                const std::vector<std::string>& stale) {
   if (mode_ == OutputMode::kJson || mode_ == OutputMode::kQuiet) return;
+  tell_stale(stale, "no model makes this package any more");
   line(recalled_text(static_cast<std::ptrdiff_t>(models - to_look_at), models) + ". Nothing was written.");
 }
 

@@ -29,8 +29,10 @@ class Progress {
   /// Something about the cache that no single model has met.
   void cache_event(const std::string& code, const std::string& text);
   void finished(std::size_t model, const WorkerReport& report, const std::string& output);
-  void summary(const std::vector<WorkerReport>& reports, double seconds);
-  void forecast_summary(std::size_t to_look_at, std::size_t models);
+  /// `stale`: packages that no model makes any more, paths within the output folder.
+  void summary(const std::vector<WorkerReport>& reports, double seconds,
+               const std::vector<std::string>& stale, bool removed);
+  void forecast_summary(std::size_t to_look_at, std::size_t models, const std::vector<std::string>& stale);
 
  private:
   struct Running {
@@ -44,6 +46,7 @@ class Progress {
   void show(std::size_t model, const StageProgress& e);
   void show(std::size_t model, const StageFinished& e);
   void show(std::size_t model, const StageExplained& e);
+  void tell_stale(const std::vector<std::string>& stale, const char* what);
   void show(std::size_t model, const CacheTold& e);
   void show(std::size_t model, const NoteTold& e);
   void show(std::size_t model, const ErrorTold& e);

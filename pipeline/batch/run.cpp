@@ -3,11 +3,11 @@
 
 #include <filesystem>
 #include <ostream>
-#include <set>
 
 #include "pipeline/batch/build_memo.h"
 #include "pipeline/batch/fleet/run_summary.h"
 #include "pipeline/batch/run.h"
+#include "pipeline/batch/stale_packages.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/resolver.h"
@@ -46,6 +46,8 @@ class Batch {
     make_folders();
     remove_leftovers();
     compile();
+    if (plan_.shard.index == 0 && !was_cancelled())
+      list_stale(plan_.outputs, settings_.remove_stale ? std::vector<std::string>() : plan_.stale);
     const bool all_written = write_reports(plan_, settings_, reports_, seconds_);
     if (wrote_ && !was_cancelled() && !settings_.cache.folder.empty())
       prune_now_and_then(settings_.cache.folder, settings_.cache_limits);
@@ -74,6 +76,11 @@ class Batch {
           std::string_view(m.output).substr(0, slash == std::string::npos ? 0 : slash + (slash == 0)));
     }
     for (const std::string_view folder : folders) remove_stale_temporaries(std::string(folder), ".texmesh");
+  }
+
+  /// Shards see the same folder; one of them speaks.
+  std::vector<std::string> told_stale() const {
+    return plan_.shard.index == 0 ? plan_.stale : std::vector<std::string>();
   }
 
   void begin_progress() {
@@ -129,7 +136,8 @@ class Batch {
       progress_.cache_event("cache-not-written", "what this run found out cannot be kept in " +
                                                      settings_.cache.folder + ": the next one looks again");
     seconds_ = seconds_since(start_);
-    progress_.summary(reports_, seconds_);
+    if (settings_.remove_stale && !was_cancelled()) remove_stale(plan_.outputs, told_stale());
+    progress_.summary(reports_, seconds_, told_stale(), settings_.remove_stale);
   }
 
   int forecast() {
@@ -139,7 +147,7 @@ class Batch {
     };
     const auto reports = run_workers(selection_.jobs(), settings_.pool, on_event, {});
     for (std::size_t job = 0; job < reports.size(); ++job) reports_[selection_.model_of(job)] = reports[job];
-    progress_.forecast_summary(selection_.jobs().size(), plan_.models.size());
+    progress_.forecast_summary(selection_.jobs().size(), plan_.models.size(), told_stale());
     return exit_code(true);
   }
 

@@ -12,7 +12,7 @@ struct RunSettings {
   CacheLimits cache_limits;
   OutputMode mode = OutputMode::kPlain;
   bool verbose = false, strict = false, explain = false, dry_run = false, retry_failed = false,
-       statistics = false;
+       statistics = false, remove_stale = false;
   std::string depfile, summary, junit, trace;  // files to write, "" = none
   std::vector<std::string> links_within;       // CompileRequest::links_within, beside the folders of the plan
   std::vector<std::string> more_inputs;  // read for the whole run (a profile): dependencies of every package
@@ -22,7 +22,8 @@ struct RunSettings {
 /// exit code of the command. A model is up to date, without a child process, when neither options nor tool
 /// nor any file that it was made from nor its package has changed since the last run with this cache; one
 /// that failed then is not tried again until one of them changes (`retry_failed` tries it). A cache folder
-/// that cannot be made costs one warning.
+/// that cannot be made costs one warning. Packages of the plan that are stale are told at the end, or removed
+/// (`remove_stale`); of several shards the first does so.
 int run_batch(const BatchPlan& plan, const RunSettings& settings, std::ostream& out);
 
 /// InputError for a report that cannot be written, or paths that a dependency file cannot hold: before

@@ -82,7 +82,7 @@ std::vector<StageLibrary> libraries(std::initializer_list<const char*> names) {
 }
 
 /// Those that decode images and fragments of every kind.
-constexpr std::initializer_list<const char*> kImageLibraries{"libjpeg-turbo", "libpng", "libwebp",
+constexpr std::initializer_list<const char*> kImageLibraries{"libavif", "libjpeg-turbo", "libpng", "libwebp",
                                                              "openimageio"};
 
 /// make_stage() for a plain function, which has no state of its own: options that are not declared cannot

@@ -1,9 +1,11 @@
 #include "pipeline/import/mesh_builder.h"
 
+#include <bit>
 #include <limits>
 #include <numeric>
 
 #include "pipeline/io/table.h"
+#include "stages/base/first_use_table.h"
 
 namespace texmesh {
 namespace {
@@ -234,27 +236,35 @@ void check_limits(const Model& model, const std::string& file_name, const Import
   check("images", model.images.size(), options.max_images);
 }
 
-void drop_non_finite_triangles(Model& model, const std::string& file_name) {
-  Mesh& mesh = model.mesh;
+template <class F>
+void keep_triangles(Mesh& mesh, F&& keeps) {
   std::size_t kept = 0;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    bool good = true;
-    for (std::uint32_t w : mesh.triangles[t]) good = good && finite(mesh.positions[mesh.wedge_position[w]]);
-    if (!good) continue;
+    if (!keeps(t)) continue;
     mesh.triangles[kept] = mesh.triangles[t];
     mesh.triangle_material[kept] = mesh.triangle_material[t];
     mesh.triangle_part[kept] = mesh.triangle_part[t];
     ++kept;
   }
-  const std::size_t dropped = mesh.triangles.size() - kept;
+  mesh.triangles.resize(kept);
+  mesh.triangle_material.resize(kept);
+  mesh.triangle_part.resize(kept);
+}
+
+void drop_non_finite_triangles(Model& model, const std::string& file_name) {
+  Mesh& mesh = model.mesh;
+  std::vector<bool> good(mesh.triangles.size(), true);
+  for (std::size_t t = 0; t < good.size(); ++t)
+    for (std::uint32_t w : mesh.triangles[t])
+      if (!finite(mesh.positions[mesh.wedge_position[w]])) good[t] = false;
+  const auto kept = static_cast<std::size_t>(std::count(good.begin(), good.end(), true));
+  const std::size_t dropped = good.size() - kept;
   if (dropped && kept == 0)
     throw InputError(file_name, "positions", "some finite ones",
                      "NaN, infinity or more than " + shortest(kLargestCoordinate) + " in every triangle");
   if (kept == 0) throw InputError(file_name, "triangles", "at least one", "none");
   if (!dropped) return;
-  mesh.triangles.resize(kept);
-  mesh.triangle_material.resize(kept);
-  mesh.triangle_part.resize(kept);
+  keep_triangles(mesh, [&](std::size_t t) { return good[t]; });
   add_warning(model.notes, "non-finite-position", file_name,
               count_of(dropped, "triangle", "triangles") +
                   " left out because of positions that are NaN, infinite or beyond " +
@@ -354,6 +364,103 @@ void finish_model(Model& model, const std::string& file_name, const ImportOption
   repair_tangents(model);
   bring_uvs_near(model);
   if (options.up == UpAxis::kZ) turn_z_up(model.mesh);
+}
+
+namespace {
+
+/// Finds triangles on the three points of another one, turned round.
+class Twins {
+ public:
+  explicit Twins(const Model& model) : model_(model), mesh_(model.mesh) {}
+
+  /// Triangles that another one before them hides from both sides.
+  std::vector<bool> hidden() {
+    std::vector<std::uint64_t> keys;  // hash, number
+    for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t)
+      if (material_of(t).alpha_mode != AlphaMode::kBlend) keys.push_back(hash_of(t) << 32 | t);
+    std::sort(keys.begin(), keys.end());
+    std::vector<bool> hidden(mesh_.triangles.size());
+    for (std::size_t i = 1; i < keys.size(); ++i)
+      for (std::size_t j = i; j-- > 0 && i - j <= kMostLooks && keys[j] >> 32 == keys[i] >> 32;) {
+        const auto later = static_cast<std::uint32_t>(keys[i]), earlier = static_cast<std::uint32_t>(keys[j]);
+        if (hidden[earlier] || !hides(earlier, later)) continue;
+        hidden[later] = true;
+        break;
+      }
+    return hidden;
+  }
+
+  /// Of them those that look otherwise than the one that hides them.
+  std::uint64_t others() const { return others_; }
+
+ private:
+  static constexpr std::size_t kMostLooks = 32;
+
+  Vec3f point(std::uint32_t t, std::size_t k) const {
+    return mesh_.positions[mesh_.wedge_position[mesh_.triangles[t][k]]];
+  }
+  const Material& material_of(std::uint32_t t) const { return model_.materials[mesh_.triangle_material[t]]; }
+
+  std::uint64_t hash_of(std::uint32_t t) const {
+    std::uint64_t sum = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec3f p = point(t, k) + Vec3f{0, 0, 0};  // -0 becomes 0
+      std::uint64_t hash = 0;
+      for (const float x : {p.x, p.y, p.z}) hash = hash_with(hash, std::bit_cast<std::uint32_t>(x));
+      sum += hash;
+    }
+    return sum >> 32;
+  }
+
+  bool hides(std::uint32_t earlier, std::uint32_t later) {
+    const Material &a = material_of(earlier), &b = material_of(later);
+    if (!a.double_sided) return false;
+    for (std::size_t k = 0; k < 3; ++k) {  // the corner of `later` that is the first of `earlier`
+      const std::size_t after = (k + 1) % 3, before = (k + 2) % 3;
+      if (!(point(later, k) == point(earlier, 0) && point(later, before) == point(earlier, 1) &&
+            point(later, after) == point(earlier, 2)))
+        continue;
+      const bool same_look = &a == &b && same_uvs(earlier, later, {k, before, after});
+      if (a.alpha_mode == AlphaMode::kOpaque ? b.alpha_mode != AlphaMode::kOpaque : !same_look) return false;
+      others_ += !same_look;
+      return true;
+    }
+    return false;
+  }
+
+  bool same_uvs(std::uint32_t a, std::uint32_t b, std::array<std::size_t, 3> corner_of_b) const {
+    for (const auto* uvs : {&mesh_.uv0, &mesh_.uv1})
+      for (std::size_t k = 0; k < 3 && !uvs->empty(); ++k)
+        if (!((*uvs)[mesh_.triangles[a][k]] == (*uvs)[mesh_.triangles[b][corner_of_b[k]]])) return false;
+    return true;
+  }
+
+  const Model& model_;
+  const Mesh& mesh_;
+  std::uint64_t others_ = 0;
+};
+
+}  // namespace
+
+void drop_hidden_twins(Model& model, const std::string& file_name, Lost& lost) {
+  const auto shows_both_sides = [](const Material& m) {
+    return m.double_sided && m.alpha_mode != AlphaMode::kBlend;
+  };
+  if (std::none_of(model.materials.begin(), model.materials.end(), shows_both_sides)) return;
+  Twins twins(model);
+  const std::vector<bool> hidden = twins.hidden();
+  const auto dropped = static_cast<std::size_t>(std::count(hidden.begin(), hidden.end(), true));
+  if (dropped == 0) return;
+  if (twins.others() > 0)
+    lost["triangles with another look behind one that shows both sides"] = twins.others();
+  add_info(model.notes, "hidden-twin", "",
+           count_of(dropped, "triangle", "triangles") +
+               " left out that are another one turned round, whose material shows both sides");
+  keep_triangles(model.mesh, [&](std::size_t t) { return !hidden[t]; });
+  drop_unused_vertices(model);
+  drop_unused_materials(model);
+  drop_unused_parts(model.mesh);
+  drop_unused_images(model, file_name);
 }
 
 }  // namespace texmesh

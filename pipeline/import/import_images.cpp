@@ -91,6 +91,11 @@ void note_conversion(Model& model, const Image& image, const std::string& kind,
                 what + " with an ICC profile that is ignored: its values are taken as sRGB");
 }
 
+void note_missing(Model& model, const std::string& place, const std::string& texture) {
+  add_once(model.notes, Severity::kWarning, "missing-texture", place,
+           "texture " + texture + "; the material stays without it");
+}
+
 }  // namespace
 
 std::int32_t add_image_bytes(Model& model, std::string name, std::vector<std::uint8_t> bytes,
@@ -98,13 +103,19 @@ std::int32_t add_image_bytes(Model& model, std::string name, std::vector<std::ui
                              const ImportOptions& options) {
   ImageLimits limits;
   limits.max_pixels = static_cast<std::uint64_t>(options.max_image_pixels);
-  const std::string foreign = foreign_file(bytes);
+  const std::string foreign = bytes.empty()               ? "an empty file"
+                              : sniff_image_format(bytes) ? ""
+                                                          : foreign_file(bytes);
+  if (!foreign.empty()) {
+    note_missing(model, place, quote(name) + " is " + foreign);
+    return -1;
+  }
   const auto placed = [&](auto&& read) {
     try {
       return read();
     } catch (const InputError& e) {
       throw InputError(file_name, place + " (" + name + ")" + (e.place().empty() ? "" : ": " + e.place()),
-                       e.expected(), foreign.empty() ? e.found() : foreign);
+                       e.expected(), e.found());
     }
   };
   const bool ktx2 = is_ktx2(bytes);
@@ -138,11 +149,10 @@ std::int32_t add_image(Model& model, const NameInModel& name, Resolver& resolver
   NamedFile file =
       find_file(name, resolver, static_cast<std::uint64_t>(options.max_file_bytes), model.notes, place);
   if (file.bytes) return add_image_bytes(model, file.name, std::move(*file.bytes), file_name, place, options);
-  const std::string text =
-      "texture " + quote(name.text) + " not found: " + file.looked_for + "; the material stays without it";
-  const bool is_noted =
-      std::any_of(model.notes.begin(), model.notes.end(), [&text](const Note& n) { return n.text == text; });
-  if (!is_noted) add_warning(model.notes, "missing-texture", place, text);
+  const bool tiles = lower(name.text).find("udim>") != name.text.npos;
+  note_missing(model, place,
+               quote(name.text) + " not found: " + file.looked_for +
+                   (tiles ? "; UDIM tiles are read where an MTL names them" : ""));
   return -1;
 }
 

@@ -10,8 +10,9 @@
 namespace texmesh {
 
 /// The image that a material names (find_file()): probed and appended to model.images (one entry per
-/// content), index returned; -1 and a warning "missing-texture" that says where it was looked for when it is
-/// not there. Content that no allow-listed reader takes throws InputError. A KTX2 becomes a PNG with a note
+/// content), index returned. -1 and a warning "missing-texture" where it is not there, which says where it
+/// was looked for, and where a Git LFS pointer, an HTML page, an archive or the like (foreign_file()) is in
+/// its place. Content that no allow-listed reader takes throws InputError. A KTX2 becomes a PNG with a note
 /// (stages/image/ktx2/read_ktx2.h). Notes say what becomes of colour profiles, CMYK and EXIF orientation.
 std::int32_t add_image(Model& model, const NameInModel& name, Resolver& resolver,
                        const std::string& file_name, const std::string& place, const ImportOptions& options);

@@ -4,6 +4,7 @@
 #include "format/base/text_bytes.h"
 #include "pipeline/import/foreign_file.h"
 #include "pipeline/import/gltf/import_gltf_parts.h"
+#include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/text_scan.h"
 
 namespace texmesh {
@@ -98,8 +99,10 @@ ImportedModel import_model(const std::string& file_name, std::span<const std::ui
         file_name, "",
         "at most " + std::to_string(static_cast<std::uint64_t>(options.max_file_bytes)) + " bytes",
         std::to_string(bytes.size()));
+  if (starts_with(bytes, "\xef\xbb\xbf")) bytes = bytes.subspan(3);  // of a text: no part of it
   ImportedModel imported =
       import_kind(kind_of(file_name, bytes), file_name, bytes, resolver, options, context);
+  drop_hidden_twins(imported.model, file_name, imported.lost);
   if (imported.about.source.empty()) imported.about.source = "{\"format\":\"" + imported.format + "\"}";
   tell_what_is_lost(imported);
   // The user has said which axis is up, or the model has been turned.

@@ -32,6 +32,26 @@ Vec3d choose_origin(const std::vector<Vec3d>& positions, double largest) {
   return {float_exact(centre.x), float_exact(centre.y), float_exact(centre.z)};
 }
 
+/// The unit of the last decimal, where the coordinates are those of a text with few decimals; 0 where they
+/// are not, and where so few digits are no rounding but the design.
+double decimal_step(const std::vector<Vec3d>& positions, double magnitude) {
+  constexpr int kLeastDecimals = 3, kMostDecimals = 8;
+  constexpr std::size_t kLooks = 4096;
+  constexpr double kLeastUnits = 1e4;  // five digits
+  const std::size_t stride = positions.size() / kLooks + 1;
+  double unit = 1, units = 1;
+  int decimals = 0;
+  for (std::size_t i = 0; i < positions.size(); i += stride)
+    for (int k = 0; k < 3; ++k) {
+      const double x = positions[i][k];
+      if (!(std::fabs(x) <= magnitude)) continue;
+      while (decimals <= kMostDecimals && std::fabs(x * units - std::round(x * units)) > 1e-3)
+        ++decimals, unit /= 10, units *= 10;
+      if (decimals > kMostDecimals) return 0;
+    }
+  return decimals >= kLeastDecimals && magnitude * units >= kLeastUnits ? unit : 0;
+}
+
 }  // namespace
 
 void set_positions(Mesh& mesh, const std::vector<Vec3d>& positions, double largest) {
@@ -41,7 +61,9 @@ void set_positions(Mesh& mesh, const std::vector<Vec3d>& positions, double large
     for (const Vec3d& p : positions)
       if (usable(p, largest))
         magnitude = std::max({magnitude, std::fabs(p.x), std::fabs(p.y), std::fabs(p.z)});
-    mesh.rounding = {float_unit(magnitude)};
+    // Numbers that were rounded to a decimal differ by one unit at most: half is four halves too many.
+    mesh.rounding = {
+        std::max(float_unit(magnitude), static_cast<float>(decimal_step(positions, magnitude) / 2))};
   }
   mesh.positions.resize(positions.size());
   const float nan = std::numeric_limits<float>::quiet_NaN();
@@ -166,6 +188,11 @@ float linear_from_srgb(double srgb) {
   if (!(srgb > 0)) return srgb <= 0 ? 0.0f : 1.0f;
   if (srgb >= 1) return 1;
   return static_cast<float>(light_of_srgb(srgb));
+}
+
+void count_lost(Lost& lost, const std::string& what, std::uint64_t count) {
+  constexpr std::size_t kMostKinds = 32;
+  lost[lost.size() < kMostKinds || lost.contains(what) ? what : "others"] += count;
 }
 
 Material scan_material(std::string name) {

@@ -20,7 +20,8 @@ inline constexpr double kLargestPackedCoordinate = 4 * kLargestCoordinate;
 /// Positions in double precision -> mesh.origin and float positions in a local frame. The origin is 0 unless
 /// the bounding box lies so far from it that float would lose more than 1e-7 of the diagonal; then it is the
 /// box's centre, rounded to a float-exact value. What is no number, or beyond `largest`, becomes NaN.
-/// mesh.rounding, where it is empty, becomes a float's unit in the last place of the largest coordinate.
+/// mesh.rounding, where it is empty, becomes a float's unit in the last place of the largest coordinate, or
+/// half a unit of the last decimal where the coordinates have few (text), if that is more.
 void set_positions(Mesh& mesh, const std::vector<Vec3d>& positions, double largest = kLargestCoordinate);
 
 /// sRGB in 0..1 to linear light, 0..1; NaN gives 1.
@@ -82,9 +83,18 @@ void triangulate_polygon(std::span<const Vec3d> points, std::vector<std::array<s
                          std::uint64_t& work);
 inline constexpr std::uint64_t kMaxEarWork = 400'000'000;  // about two seconds
 
+/// Counts what is left out. Strangers' files may have any number of kinds: those after the 32nd are "others".
+void count_lost(Lost& lost, const std::string& what, std::uint64_t count = 1);
+
 /// Last step of every reader: drops triangles that refer to non-finite positions or UVs (warnings
 /// "non-finite-position", "non-finite-uv": such UVs become 0), unused images and materials; sets part names;
 /// checks the limits; throws InputError when no triangle is left.
 void finish_model(Model& model, const std::string& file_name, const ImportOptions& options);
+
+/// Leaves out triangles that nobody sees: those on the three points of an earlier one, turned round, whose
+/// material shows both sides and hides them (opaque, or cut-out by the same texels). Which of the two shows
+/// would depend on the order in which they are drawn, and no package keeps that. After materials and alpha
+/// modes are known. `lost` counts those that look otherwise than the one before them.
+void drop_hidden_twins(Model& model, const std::string& file_name, Lost& lost);
 
 }  // namespace texmesh

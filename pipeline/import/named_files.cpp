@@ -135,9 +135,7 @@ class Finder {
   }
 
   void warn(const char* code, const std::string& what) {
-    const std::string text = quote(name_.text) + what;
-    const auto same = [&](const Note& n) { return n.code == code && n.text == text; };
-    if (std::none_of(notes_.begin(), notes_.end(), same)) add_warning(notes_, code, place_, text);
+    add_once(notes_, Severity::kWarning, code, place_, quote(name_.text) + what);
   }
 
   const NameInModel& name_;

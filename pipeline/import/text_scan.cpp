@@ -158,4 +158,10 @@ std::string quote(std::string_view s) {
   return out + (s.size() > 60 ? "...\"" : "\"");
 }
 
+void add_once(Notes& notes, Severity severity, const char* code, const std::string& place,
+              const std::string& text) {
+  const auto same = [&](const Note& n) { return n.code == code && n.text == text; };
+  if (std::none_of(notes.begin(), notes.end(), same)) notes.push_back({severity, code, place, text});
+}
+
 }  // namespace texmesh

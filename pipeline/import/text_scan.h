@@ -72,4 +72,8 @@ class LineReader {
 /// A text shortened for a message, with control characters replaced.
 std::string quote(std::string_view s);
 
+/// Adds a note, unless one of this code says the same already.
+void add_once(Notes& notes, Severity severity, const char* code, const std::string& place,
+              const std::string& text);
+
 }  // namespace texmesh

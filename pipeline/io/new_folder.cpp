@@ -82,6 +82,17 @@ void NewFolder::copy_file(const fs::path& file, const fs::path& source) {
   if (d.get() < 0 || ::fdatasync(d.get()) != 0) fail_output(file, "a writable file");
 }
 
+bool NewFolder::replace_without_exchange() {
+  if (errno != EXDEV && errno != EINVAL && errno != ENOSYS && errno != ENOTSUP) return false;
+  const fs::path aside = tree_.string() + "-old";
+  std::error_code ec;
+  fs::rename(target_, aside, ec);
+  if (ec) fs::remove_all(target_, ec);  // overlayfs moves no folder of a layer beneath it
+  if (::rename(tree_.c_str(), target_.c_str()) != 0) return false;
+  fs::remove_all(aside, ec);
+  return true;
+}
+
 void NewFolder::publish() {
   for (const auto& e : fs::recursive_directory_iterator(tree_))
     if (e.is_directory()) sync_new_folder(e.path());
@@ -91,7 +102,8 @@ void NewFolder::publish() {
   if (fs::exists(target_) && !fs::is_empty(target_)) {
     // Both names stay whole at any moment: the old tree moves into the temporary name, which
     // the destructor removes.
-    if (::renameat2(AT_FDCWD, tree_.c_str(), AT_FDCWD, target_.c_str(), RENAME_EXCHANGE) != 0)
+    if (::renameat2(AT_FDCWD, tree_.c_str(), AT_FDCWD, target_.c_str(), RENAME_EXCHANGE) != 0 &&
+        !replace_without_exchange())
       fail_output(target_, "a folder that can be replaced");
   } else {
     if (::rename(tree_.c_str(), target_.c_str()) != 0) fail_output(target_, "a folder that can be made");

@@ -35,11 +35,14 @@ class NewFolder {
   /// A file that stands on this machine, or all files beneath a folder but hidden ones; symbolic links are
   /// left out. `path` as of add(). InputError where one cannot be read.
   void copy(const std::string& path, const std::filesystem::path& source);
-  /// Files and folders are on the disk before the name is taken. What is replaced goes away in one step.
+  /// Files and folders are on the disk before the name is taken. What is replaced goes away in one step, but
+  /// on file systems that cannot exchange two folders (NFS, FUSE, overlayfs), where there is none for a
+  /// moment.
   void publish();
 
  private:
   void check_target() const;
+  bool replace_without_exchange();
   void copy_file(const std::filesystem::path& file, const std::filesystem::path& source);
 
   std::filesystem::path target_, tree_;

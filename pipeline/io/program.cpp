@@ -16,6 +16,7 @@
 #include <filesystem>
 
 #include "pipeline/io/file_stamp.h"
+#include "stages/image/avif.h"
 
 namespace texmesh {
 namespace {
@@ -81,6 +82,7 @@ const std::map<std::string, std::string>& library_versions() {
   static const std::map<std::string, std::string> versions{
       {"cgal", CGAL_VERSION_STR},
       {"draco", draco::kDracoVersion},
+      {"libavif", avif_version()},
       {"libjpeg-turbo", TEXMESH_TEXT(LIBJPEG_TURBO_VERSION)},
       {"libpng", PNG_LIBPNG_VER_STRING},
       {"libwebp", webp_version()},

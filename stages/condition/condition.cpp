@@ -366,6 +366,15 @@ Kept drop_slivers(const Mesh& in, const Kept& kept, EdgeTable& edges, ConditionR
   return out;
 }
 
+void require_area(const Mesh& mesh, const Kept& kept) {
+  bool any = false;
+  for (std::size_t i = 0; i < kept.source.size() && !any; ++i)
+    any = has_area(mesh.positions, kept.positions(i));
+  if (!any)
+    throw StageError("condition", "triangles", "at least one with three finite corners and an area",
+                     "none of " + std::to_string(mesh.triangles.size()));
+}
+
 /// The positions at edges that do not simply join two triangles, with what rounding may have done to them.
 std::vector<RoundedPosition> open_positions(const Mesh& in, const std::vector<std::uint32_t>& weld,
                                             const Kept& kept, const EdgeTable& edges) {
@@ -573,21 +582,18 @@ ConditionedMesh condition_mesh(const Mesh& mesh, bool normals_by_specification,
   const ConditionReport before = report;
   Kept kept = drop_duplicates(mesh, keep_sound_triangles(mesh, position_weld, wedge_weld, report), report);
   EdgeTable edges = group_edges(kept.corner, mesh.positions.size());
+  const std::vector<std::uint32_t> exact = position_weld;
   if (const std::uint64_t joined =
           weld_rounded(mesh.positions, open_positions(mesh, position_weld, kept, edges), position_weld)) {
     report = before;
     report.rounded_positions = joined;
     wedge_weld = weld_wedges(attributes, position_weld);
+    weld_rounded_wedges(attributes, exact, position_weld, wedge_weld);
     kept = drop_duplicates(mesh, keep_sound_triangles(mesh, position_weld, wedge_weld, report), report);
     edges = group_edges(kept.corner, mesh.positions.size());
   }
   kept = drop_slivers(mesh, kept, edges, report);
-  const auto shows = [&](std::size_t i) { return has_area(mesh.positions, kept.positions(i)); };
-  bool any = false;
-  for (std::size_t i = 0; i < kept.source.size() && !any; ++i) any = shows(i);
-  if (!any)
-    throw StageError("condition", "triangles", "at least one with three finite corners and an area",
-                     "none of " + std::to_string(mesh.triangles.size()));
+  require_area(mesh, kept);
   context.check_cancelled();
   context.report(0.6);
 

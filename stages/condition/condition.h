@@ -31,6 +31,7 @@ struct ConditionOptions {
 /// and the attributes at its corners.
 /// - Positions at open edges that differ by the rounding of their source (Mesh::rounding) are one, as
 ///   weld_rounded() says: chunks with origins or quantisations of their own stay together where they meet.
+///   So are their wedges, as weld_rounded_wedges() says.
 /// - Positions, wedges and triangles stand in the order of the input; what a split adds comes last.
 /// - Triangles of opposite orientation on the same three points (two-sided sheets) are both kept and split
 ///   apart. So are triangles on the same three points with different attributes or materials (decals).

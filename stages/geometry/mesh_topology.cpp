@@ -266,4 +266,52 @@ std::vector<std::uint32_t> weld_wedges(const Mesh& mesh, const std::vector<std::
   return weld;
 }
 
+namespace {
+
+/// Whether rounding may have parted two wedges of one point.
+bool near(const Mesh& mesh, std::uint32_t a, std::uint32_t b) {
+  constexpr float kTexture = 0x1p-12f, kDirection = 1 / 64.0f, kColour = 1 / 128.0f;
+  const auto apart = [&](const auto& values, float most) {
+    if (values.empty()) return false;
+    const auto d = values[a] - values[b];
+    return dot(d, d) > most * most;
+  };
+  const auto apart4 = [&](const std::vector<Vec4f>& values, float most) {
+    if (values.empty()) return false;
+    const Vec4f &u = values[a], &v = values[b];
+    return std::max({std::fabs(u.x - v.x), std::fabs(u.y - v.y), std::fabs(u.z - v.z),
+                     std::fabs(u.w - v.w)}) > most;
+  };
+  return !apart(mesh.uv0, kTexture) && !apart(mesh.uv1, kTexture) && !apart(mesh.normals, kDirection) &&
+         !apart4(mesh.colours, kColour) && !apart4(mesh.tangents, kDirection);
+}
+
+}  // namespace
+
+void weld_rounded_wedges(const Mesh& mesh, const std::vector<std::uint32_t>& exact,
+                         const std::vector<std::uint32_t>& position_weld,
+                         std::vector<std::uint32_t>& wedge_weld) {
+  constexpr std::size_t kMostKept = 32;  // of one position
+  std::vector<bool> joined(position_weld.size());
+  for (std::size_t p = 0; p < exact.size(); ++p)
+    if (exact[p] != position_weld[p]) joined[position_weld[p]] = true;
+  const auto position = [&](std::uint32_t w) { return position_weld[mesh.wedge_position[w]]; };
+  std::vector<std::uint32_t> wedges;
+  for (std::uint32_t w = 0; w < wedge_weld.size(); ++w)
+    if (wedge_weld[w] == w && joined[position(w)]) wedges.push_back(w);
+  std::sort(wedges.begin(), wedges.end(), [&](std::uint32_t a, std::uint32_t b) {
+    return std::pair(position(a), a) < std::pair(position(b), b);
+  });
+  std::vector<std::uint32_t> kept;
+  for (const std::uint32_t w : wedges) {
+    if (!kept.empty() && position(kept[0]) != position(w)) kept.clear();
+    const auto found = std::find_if(kept.begin(), kept.end(), [&](auto k) { return near(mesh, k, w); });
+    if (found != kept.end())
+      wedge_weld[w] = *found;
+    else if (kept.size() < kMostKept)
+      kept.push_back(w);
+  }
+  follow(wedge_weld);
+}
+
 }  // namespace texmesh

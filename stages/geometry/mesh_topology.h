@@ -77,6 +77,14 @@ std::uint64_t weld_rounded(const std::vector<Vec3f>& positions,
 /// kNoIndex where the position has none. Only wedge_position and the attributes of `mesh` are read.
 std::vector<std::uint32_t> weld_wedges(const Mesh& mesh, const std::vector<std::uint32_t>& position_weld);
 
+/// At positions that weld_rounded() has joined (`exact`: the weld before it), joins wedges whose attributes
+/// differ by what rounding makes of them, too, so that such a border is no seam: normals and tangents by at
+/// most 1/64, colours by 1/128, texture coordinates by 2^-12. Greedily by index, each with the lowest one
+/// kept; changes `wedge_weld`. O(n log n).
+void weld_rounded_wedges(const Mesh& mesh, const std::vector<std::uint32_t>& exact,
+                         const std::vector<std::uint32_t>& position_weld,
+                         std::vector<std::uint32_t>& wedge_weld);
+
 /// The box of every connected component, by the components' numbers. `component`: per position.
 inline std::vector<Box3f> component_boxes(const std::vector<std::uint32_t>& component,
                                           const std::vector<Vec3f>& positions) {

@@ -9,7 +9,7 @@
 
 #include "format/container/layout.h"
 #include "stages/gltf/glb_document.h"
-#include "stages/image/decode_image.h"
+#include "stages/image/avif.h"
 #include "stages/jpeg/jpeg.h"
 
 namespace texmesh {
@@ -344,22 +344,35 @@ void check_glb_image(GlbDocument& d, std::size_t i, GlbFacts& facts) {
   const std::string type = json.value("mimeType", std::string());
   const auto shown = sniff_image_format(bytes);
   const bool jpeg = shown == ImageFormat::kJpeg, png = shown == ImageFormat::kPng;
-  const bool webp = d.standalone() && shown == ImageFormat::kWebp;
-  if (!(jpeg && type == "image/jpeg") && !(png && type == "image/png") && !(webp && type == "image/webp"))
+  const bool webp = d.standalone() && shown == ImageFormat::kWebp, avif = d.standalone() && is_avif(bytes);
+  if (!(jpeg && type == "image/jpeg") && !(png && type == "image/png") && !(webp && type == "image/webp") &&
+      !(avif && type == "image/avif"))
     d.fail("glb-image", place + "/mimeType", jpeg ? "image/jpeg" : png ? "image/png" : "a JPEG or PNG", type);
-  const Pixels pixels = jpeg ? decode_jpeg(bytes, kMaxPreviewPixels)
-                             : decode_image(probe_image(place, bytes, {16384, kMaxPreviewPixels}));
+  const ImageLimits limits{16384, kMaxPreviewPixels};
+  if (avif) {
+    const AvifPicture picture = decode_avif(place, bytes, limits);
+    facts.largest_image_px = std::max({facts.largest_image_px, picture.width_px, picture.height_px});
+    return;
+  }
+  const Pixels pixels =
+      jpeg ? decode_jpeg(bytes, kMaxPreviewPixels) : decode_image(probe_image(place, bytes, limits));
   facts.largest_image_px = std::max({facts.largest_image_px, pixels.width_px, pixels.height_px});
 }
 
 void check_glb_texture(GlbDocument& d, std::size_t i) {
   const Json& json = d.root()["textures"][i];
   const std::string place = GlbDocument::element("textures", i);
-  if (d.standalone() && json.contains("extensions") && json["extensions"].contains("EXT_texture_webp"))
-    d.index(json["extensions"]["EXT_texture_webp"], "source", d.array(d.root(), "images", "").size(),
-            place + "/extensions/EXT_texture_webp");
+  const std::size_t images = d.array(d.root(), "images", "").size();
+  const auto has = [&](const char* name) {
+    return d.standalone() && json.contains("extensions") && json["extensions"].contains(name);
+  };
+  const char* extension = has("EXT_texture_webp")   ? "EXT_texture_webp"
+                          : has("EXT_texture_avif") ? "EXT_texture_avif"
+                                                    : nullptr;
+  if (extension)
+    d.index(json["extensions"][extension], "source", images, place + "/extensions/" + extension);
   else
-    d.index(json, "source", d.array(d.root(), "images", "").size(), place);
+    d.index(json, "source", images, place);
   if (json.contains("sampler")) d.index(json, "sampler", d.array(d.root(), "samplers", "").size(), place);
 }
 

@@ -22,7 +22,7 @@ struct GlbFacts {
 
 /// Whose rules a file keeps: meshes of a package, whose images may be previews by their relative URIs
 /// ("../preview/003.jpg"), or files that `texmesh extract` writes, which also may have
-/// WebP images (EXT_texture_webp) and levels of detail (MSFT_lod).
+/// WebP and AVIF images (EXT_texture_webp, EXT_texture_avif) and levels of detail (MSFT_lod).
 enum class GlbRules : std::uint8_t { kPackage, kStandalone };
 
 /// Checks that a GLB is structurally valid glTF 2.0 that stands alone, or with the previews: header and

@@ -166,7 +166,7 @@ bool GlbDocument::load_json() {
     const std::string text = name.is_string() ? name.get<std::string>() : name.dump();
     const bool known =
         std::find(kReadExtensions.begin(), kReadExtensions.end(), text) != kReadExtensions.end();
-    if (!known && !(standalone_ && text == "EXT_texture_webp"))
+    if (!known && !(standalone_ && (text == "EXT_texture_webp" || text == "EXT_texture_avif")))
       fail("glb-json", "/extensionsRequired", "extensions of the package format", text);
     if (!uses_extension(text))
       findings_.add("glb-json", entry_, "/extensionsUsed", "to name " + text, "nothing");

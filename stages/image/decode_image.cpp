@@ -171,7 +171,7 @@ Image probe_image(std::string name, Bytes bytes, const ImageLimits& limits) {
   if (!format)
     throw InputError(
         name, "first bytes",
-        "JPEG, PNG, TIFF, WebP or EXR (of models KTX2, BMP, TGA, GIF, DDS, JPEG 2000 and HDR, too)",
+        "JPEG, PNG, TIFF, WebP or EXR (of models AVIF, KTX2, BMP, TGA, GIF, DDS, JPEG 2000 and HDR, too)",
         first_bytes(bytes));
   const ImageHeader header = read_header(name, *format, bytes, limits);
   check_image_size(name, header.width_px, header.height_px, limits);

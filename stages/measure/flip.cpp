@@ -311,7 +311,7 @@ class Windowed {
   std::size_t made_ = 0;
 };
 
-float luma_of(Vec3f c) {
+float linear_luma(Vec3f c) {
   return 0.2126f * srgb_curve()(c.x) + 0.7152f * srgb_curve()(c.y) + 0.0722f * srgb_curve()(c.z);
 }
 
@@ -395,14 +395,14 @@ LumaPicture prepare_luma(const Picture& picture, const PixelSpans& spans) {
   if (picture.linear.empty()) return out;
   out.spans = spans;
   for (SpanImage* image : {&out.luma, &out.mean, &out.square_mean}) image->values.resize(out.spans.count);
-  out.luma.plain = luma_of(picture.linear[0]);
+  out.luma.plain = linear_luma(picture.linear[0]);
   Windowed mean(out.spans, out.luma.plain), square_mean(out.spans, out.luma.plain * out.luma.plain);
   std::vector<float> squares(picture.side_px);
   const auto values_of = [&](std::size_t y) {
     const PixelSpans::Row& row = out.spans.rows[y];
     float* const luma = out.luma.values.data() + row.offset;
     for (std::size_t x = row.first; x < row.last; ++x)
-      luma[x - row.first] = luma_of(picture.linear[y * picture.side_px + x]);
+      luma[x - row.first] = linear_luma(picture.linear[y * picture.side_px + x]);
     return luma;
   };
   const auto squares_of = [&](std::size_t y) {

@@ -542,8 +542,8 @@ std::vector<std::uint8_t> write_streamed_scale(const Mesh& mesh, const SplitStre
                      {},
                      {!mesh.uv0.empty(), !mesh.uv1.empty()},
                      needs_fine_colours(mesh.colours),
-                     std::vector<bool>(materials + std::size_t{1}, false),
-                     {mesh.normals, {}}};
+                     std::vector<bool>(materials + std::size_t{1}, true),
+                     {mesh.normals, mesh.tangents}};
   constexpr int kShortBits = 16;
   const bool draco = options.mesh_codec == MeshCodec::kDraco;
   if (draco || (options.mesh_codec != MeshCodec::kNone && head.position.bits <= kShortBits))

@@ -67,8 +67,8 @@ struct ScalesOptions {
 /// - Normals and tangents of coarse scales are fitted: see stages/geometry/scale_frames.h. Those of the
 /// stream
 ///   are S_0's.
-/// - Tangents of the source are kept where a normal map needs them; none are made, since glTF says how a
-///   viewer makes them (MikkTSpace).
+/// - Tangents of the source are kept where a normal map needs them. A source without them gets none: viewers
+///   then shade by the triangles' own. The stream has none: readers make them (make_tangents()).
 /// - draco = KHR_draco_mesh_compression; quantized = KHR_mesh_quantization; meshopt = the same under
 ///   EXT_meshopt_compression; none = plain floats.
 /// - The stream (format/split/split_stream.h) holds the same scales on the same grid, or on one of 24 bits
@@ -81,8 +81,8 @@ ScaleFiles write_scales(const NestedScales& scales, const PerceptualValues& perc
                         const RunContext& context);
 
 /// A mesh that lies on the grids of a stream's head (split_model), as the GLB that write_scales() would have
-/// written, but without images and with nameless materials: as many as its triangles count. Throws StageError
-/// when nothing is left on the grid.
+/// written, with the tangents that the mesh has, but without images and with nameless materials: as many as
+/// its triangles count. Throws StageError when nothing is left on the grid.
 std::vector<std::uint8_t> write_streamed_scale(const Mesh& mesh, const SplitStreamHead& head,
                                                const ScalesOptions& options);
 

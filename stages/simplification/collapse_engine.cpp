@@ -17,6 +17,10 @@ constexpr std::uint32_t kMostCorners = 256;
 // A full step of a colour channel counts as much as a shift by a twentieth of the diagonal.
 constexpr double kColourLength = 0.05;
 constexpr double kTint = 0.5;  // of the colours' weight where there is a texture
+// Normals that turn a normal map weigh more than its shape tells. Mean lit FLIP at 1/2 to 1/20 of the
+// triangles against 1: a bust -9 %, a statue of folds -4 %, a flight helmet -6 %; 20 and 40 are worse for the
+// helmet.
+constexpr double kFrameWeight = 8;
 // Where charts are folded to slivers the gradient of the texture runs away; its square must not.
 constexpr double kSteepest = 64;
 
@@ -490,7 +494,8 @@ void CollapseCost::fill_attributes(const Mesh& input, const SimplificationOption
   std::vector<double> texture;
   if (texture_channels_ > 0) texture = texture_lengths(mesh_, input);
   const double texture_factor = std::sqrt(options.uv_weight);
-  const double normal_length = std::sqrt(options.normal_weight) * mean_edge(mesh_);
+  const double frames = input.tangents.empty() ? 1 : kFrameWeight;
+  const double normal_length = std::sqrt(options.normal_weight * frames) * mean_edge(mesh_);
   // Beside a texture, which has the photograph, colours are tints.
   const double alpha_length = std::sqrt(options.colour_weight) * kColourLength;
   const double colour_length = alpha_length * (texture_channels_ > 0 ? std::sqrt(kTint) : 1);

@@ -7,6 +7,7 @@
 #include "format/base/errors.h"
 #include "format/model/codec.h"
 #include "stages/fragment_codec/fragment_codec.h"
+#include "stages/image/avif.h"
 #include "stages/image/decode_image.h"
 #include "stages/image/decode_jpeg.h"
 #include "stages/image/image_metadata.h"
@@ -236,6 +237,15 @@ std::vector<Bytes> picture_seeds() {
   return list;
 }
 
+std::vector<Bytes> avif_seeds() {
+  std::vector<Bytes> list;
+  for (const int channels : {1, 3, 4})
+    list.push_back(encode_avif(
+        {9, 7, static_cast<std::uint32_t>(channels), texmesh::testing::test_picture(9, 7, channels)},
+        {.quality = 40, .data = channels == 3}));
+  return list;
+}
+
 std::vector<Bytes> ktx2_seeds() {
   using namespace texmesh::testing;  // NOLINT: fixtures
   std::vector<Bytes> list;
@@ -387,6 +397,15 @@ void add_image_targets(std::vector<Target>& list) {
         Shape::kBytes,
         nullptr,
         {"KTXorientation", "KTXswizzle", "rgb1", "rrr1", "rrrg", "ru"}},
+       {"avif",
+        false,
+        read_other_picture,
+        avif_seeds,
+        Shape::kBytes,
+        nullptr,
+        {"ftyp", "avif", "avis", "mif1", "meta", "pitm", "iloc", "iinf", "infe",
+         "av01", "iprp", "ipco", "ipma", "av1C", "ispe", "pixi", "auxC", "irot",
+         "imir", "clap", "grid", "colr", "nclx", "prof", "mdat", "idat"}},
        {"picture",
         false,
         read_other_picture,

@@ -48,6 +48,7 @@ const std::map<std::string, ShortName> kShortNames{{"package.title", {"--title",
 constexpr const char* kEverydayTitle = "What the package holds";
 
 struct CompileArguments {
+  PackageNames names = PackageNames::kStem;
   std::vector<std::string> inputs, layers;
   std::string output, profile, jnd_profile, meta, shard, costs;
   std::optional<std::uint64_t> memory_bytes;  // else four fifths of what the process may use
@@ -157,6 +158,7 @@ PlanRequest plan_request(const CompileArguments& args) {
   request.apply_flags = [&args](CompileOptions& options) { apply_flags(args, options); };
   CompileOptions check = *request.base;  // wrong flags are an error even where there is nothing to compile
   apply_flags(args, check);
+  request.names = args.names;
   request.shard = shard_option(args.shard);
   request.costs_s = costs_option(args.costs);
   return request;
@@ -179,6 +181,17 @@ RunSettings run_settings(const CompileArguments& args) {
   for (const std::string& file : {args.profile, args.jnd_profile, args.meta})
     if (!file.empty()) run.more_inputs.push_back(file);
   return run;
+}
+
+Option add_names_option(Command& c, PackageNames& names) {
+  return c
+      .choice(
+          "--names", names,
+          "What packages of a folder's models are called: stem = bust.texmesh, full = bust.glb.texmesh of bust.glb. "
+          "Two models of one name are refused",
+          "NAMES")
+      .lists_words()
+      .shows_default();
 }
 
 void add_run_options(Command& c, CompileArguments& args) {
@@ -214,6 +227,7 @@ void add_run_options(Command& c, CompileArguments& args) {
        "may be given several times. Links within the folder that INPUT names are always followed",
        "DIR")
       .rare();
+  add_names_option(c, args.names).rare();
   add_shard_options(c, args.shard, args.costs);
   Option keep_going =
       c.flag("--keep-going", args.keep_going, "Compile the other models after a failure (default)").rare();
@@ -221,6 +235,8 @@ void add_run_options(Command& c, CompileArguments& args) {
       .excludes(keep_going);
   c.flag("--retry-failed", run.retry_failed,
          "Try models again that failed before, though nothing has changed since");
+  c.flag("--remove-stale", run.remove_stale,
+         "Remove packages of the output folder that no model makes any more; without it compile names them");
   c.flag("--strict", run.strict, "Treat warnings as errors");
 }
 
@@ -419,6 +435,7 @@ int verify(const CacheArguments& args) {
 namespace fs = std::filesystem;
 
 struct ListArguments {
+  PackageNames names = PackageNames::kStem;
   std::vector<std::string> inputs;
   std::string output, costs;
   int shards = 1;
@@ -429,6 +446,7 @@ int run_list(const ListArguments& args) {
   PlanRequest request;
   request.inputs = args.inputs;
   request.output = args.output;
+  request.names = args.names;
   request.costs_s = costs_option(args.costs);
   const ModelList list = list_collection(request, args.shards);
   if (args.json) {
@@ -440,6 +458,8 @@ int run_list(const ListArguments& args) {
     if (args.shards > 1) std::cout << "  shard " << m.shard;
     std::cout << '\n';
   }
+  for (const std::string& package : list.stale)
+    std::cout << package << ": no model makes this package any more (compile --remove-stale removes it)\n";
   return kExitOk;
 }
 
@@ -538,6 +558,7 @@ void add_list_command(Command& app) {
   c.option("--shards", args->shards, "Say of every model which of so many shards compile --shard gives it to")
       .integer_in(1, 1'000'000);
   c.option("--costs", args->costs, "As for compile --shard", "FILE");
+  add_names_option(c, args->names);
   c.flag("--json", args->json, "Print JSON (schemas/list.v1.schema.json)");
   c.examples(
       "  texmesh list scans/ -o packages/                      what compile would make\n"

@@ -522,8 +522,7 @@ void add_doctor_command(Command& app) {
   c.option("INPUT", args.input,
            "A model that compile takes, or a package: a .texmesh file or a folder that unpack made")
       .required();
-  add_jobs_option(c, args.jobs);
-  c.flag("--json", args.json, "Print one JSON object (schemas/doctor.v1.schema.json)");
+  add_jobs_and_json_options(c, args.jobs, args.json, "schemas/doctor.v1.schema.json");
   c.option("--junit", args.junit, "Write a test case for every limit as JUnit XML", "FILE");
   add_limits(c, args.limits);
   c.examples(

@@ -114,8 +114,9 @@ void check_for_target(const ExportOptions& o) {
   if (o.plain && (o.target == ExportTarget::kGltfLod || o.target == ExportTarget::kOembed))
     refuse("--plain", "--to 3dtiles or model-viewer");
   if (o.plain && o.bytes > 0) throw UsageError("--plain", "", "no --bytes", std::to_string(o.bytes));
-  if (o.display_px > 0 && o.target == ExportTarget::kOembed)
-    refuse("--display", "a target that holds a model");
+  for (const auto& [option, given] :
+       {std::pair{"--display", o.display_px > 0}, {"--keep-units", o.keep_units}})
+    if (given && o.target == ExportTarget::kOembed) refuse(option, "a target that holds a model");
   if (o.target == ExportTarget::kOembed) {
     if (!is_web_url(o.url))
       throw UsageError("--url", "", "the http or https URL of the folder, for --to oembed", o.url);
@@ -125,11 +126,17 @@ void check_for_target(const ExportOptions& o) {
   if (!o.script.empty() && o.target != ExportTarget::kModelViewer) refuse("--script", "--to model-viewer");
 }
 
+void check_plain(bool plain, ExtractImages images) {
+  if (plain && (images == ExtractImages::kWebp || images == ExtractImages::kAvif))
+    throw UsageError("--plain", "", "--image-format jpeg or png", std::string(enum_name(images)));
+}
+
 ExportOptions export_options_of(const ExportArguments& a) {
   ExportOptions o = a.options;
   o.width_px = static_cast<std::uint32_t>(a.width_px);
   o.height_px = static_cast<std::uint32_t>(a.height_px);
   check_for_target(o);
+  check_plain(o.plain, o.images);
   if (!o.url.empty() && !o.url.ends_with("/")) o.url += "/";
   if (o.target == ExportTarget::kOembed) o.viewer = viewer_folder(a.viewer);
   return o;
@@ -154,6 +161,24 @@ int run_export(const ExportArguments& args) {
   return kExitOk;
 }
 
+/// What extract and export say of lengths.
+void add_keep_units_flag(Command& c, bool& keep_units) {
+  c.flag(
+      "--keep-units", keep_units,
+      "Lengths in the source's unit; default: in metres, as glTF has them, where the package knows the unit");
+}
+
+void add_image_format_option(Command& c, ExtractImages& images) {
+  c.choice(
+       "--image-format", images,
+       "auto = with --bytes the format that looks better, otherwise jpeg. png is without loss. Images with "
+       "alpha are png where jpeg is asked for. avif looks as good in two thirds of WebP's bytes, but few "
+       "viewers read it: three.js and <model-viewer>, Babylon.js, glTF-Transform; not Blender",
+       "FORMAT")
+      .lists_words()
+      .shows_default();
+}
+
 void add_target_options(Command& c, ExportArguments& args) {
   c.choice("--to", args.options.target,
            "The form: 3dtiles = a tileset of 3D Tiles 1.1 for CesiumJS and its like; gltf-lod = one GLB with "
@@ -173,12 +198,14 @@ void add_target_options(Command& c, ExportArguments& args) {
            "gltf-lod, model-viewer: the best-looking GLB of at most so many bytes: 2MB", "SIZE");
   c.flag("--plain", args.options.plain,
          "3dtiles, model-viewer: meshes as floats, for viewers without a decoder of Draco");
+  add_image_format_option(c, args.options.images);
   c.option("--screen-error", args.options.screen_error_px,
            "3dtiles: the error at which the viewer takes the next level, its maximumScreenSpaceError or "
            "errorTarget, px",
            "PX")
       .number_in(0.1, 1000)
       .shows_default();
+  add_keep_units_flag(c, args.options.keep_units);
   c.option("--script", args.options.script,
            "model-viewer: URL of its script, as the page names it; default: a version of it from jsDelivr, "
            "with its digest",
@@ -236,7 +263,7 @@ struct ExtractArguments {
   std::optional<int> scale, proxy;
   double display_px = 0;
   int jobs = 0;
-  bool recentre = false, levels = false, plain = false, json = false;
+  bool recentre = false, keep_units = false, levels = false, plain = false, json = false;
 };
 
 std::uint32_t rung_of(const std::string& text, const std::string& flag) {
@@ -269,14 +296,13 @@ std::string output_for(const std::string& output, const AskedBytes& asked) {
 }
 
 ExtractRequest request_of(const ExtractArguments& a) {
-  if (a.plain && a.images == ExtractImages::kWebp)
-    throw UsageError("--plain", "", "--image-format jpeg or png", "webp");
-  if (a.proxy) return {ExtractProxy{static_cast<std::uint32_t>(*a.proxy), a.plain}, a.recentre};
+  check_plain(a.plain, a.images);
+  if (a.proxy) return {ExtractProxy{static_cast<std::uint32_t>(*a.proxy), a.plain}, a.recentre, a.keep_units};
   if (a.bytes.empty()) {
     const auto form = a.plain    ? ExtractScale::Form::kPlain
                       : a.levels ? ExtractScale::Form::kLevels
                                  : ExtractScale::Form::kCoded;
-    return {ExtractScale{a.scale, a.rung, a.display_px, a.images, form}, a.recentre};
+    return {ExtractScale{a.scale, a.rung, a.display_px, a.images, form}, a.recentre, a.keep_units};
   }
   ExtractBudget budget;
   for (const AskedBytes& one : a.bytes) budget.bytes.push_back(one.bytes);
@@ -284,7 +310,7 @@ ExtractRequest request_of(const ExtractArguments& a) {
   if (a.display_px > 0) budget.display_px = a.display_px;
   budget.images = a.images;
   budget.levels = a.levels;
-  return {budget, a.recentre};
+  return {budget, a.recentre, a.keep_units};
 }
 
 void write_extracted(const ExtractArguments& args, Extracted& extracted, const std::string& output) {
@@ -343,13 +369,7 @@ void add_extract_options(Command& c, ExtractArguments& args) {
        "with --bytes files are compared at it (default 512)",
        "PX")
       .number_in(1, 1e6);
-  c.choice(
-       "--image-format", args.images,
-       "auto = with --bytes the format that looks better, otherwise jpeg. png is without loss. Images with "
-       "alpha are png where jpeg is asked for",
-       "FORMAT")
-      .lists_words()
-      .shows_default();
+  add_image_format_option(c, args.images);
   const Option lods = c.flag(
       "--lods", args.levels,
       "All major scales from the chosen one on as levels of detail of one file (MSFT_lod), which share "
@@ -360,8 +380,8 @@ void add_extract_options(Command& c, ExtractArguments& args) {
        "glTF 2.0 alone, such as Debian 12's Blender and F3D")
       .excludes(bytes)
       .excludes(lods);
-  c.flag("--recentre", args.recentre,
-         "Leave the model near 0, in the frame of the package's meshes; default: where the source has it");
+  c.flag("--recentre", args.recentre, "Leave the model near 0; default: where the source has it");
+  add_keep_units_flag(c, args.keep_units);
   add_jobs_option(c, args.jobs);
   c.flag(
       "--json", args.json,
@@ -413,8 +433,7 @@ void add_report_command(Command& app) {
   c.option("--max-flip-p95", args.options.limits.p95, "The same for the 95th percentile of a view's pixels")
       .number_in(0, 1)
       .shows_default();
-  add_jobs_option(c, args.jobs);
-  c.flag("--json", args.json, "Print one JSON object (schemas/report.v1.schema.json)");
+  add_jobs_and_json_options(c, args.jobs, args.json, "schemas/report.v1.schema.json");
   c.examples(
       "  texmesh report bust.texmesh -o report/\n"
       "  texmesh report bust.texmesh -o report/ --against bust.glb\n"
@@ -435,8 +454,7 @@ void add_export_command(Command& app) {
   add_package_argument(c, args.package, true).required();
   add_target_options(c, args);
   add_oembed_options(c, args);
-  add_jobs_option(c, args.jobs);
-  c.flag("--json", args.json, "Print one JSON object (schemas/export.v1.schema.json)");
+  add_jobs_and_json_options(c, args.jobs, args.json, "schemas/export.v1.schema.json");
   c.examples(
       "  texmesh export bust.texmesh --to 3dtiles -o tiles/\n"
       "  texmesh export bust.texmesh --to gltf-lod --bytes 2MB -o bust-lod/\n"
@@ -445,9 +463,8 @@ void add_export_command(Command& app) {
   c.notes(
       "3dtiles: each level is the output of texmesh extract --display for 4096, 2048, ... 32 px. The "
       "coarsest level is outermost. Levels that save less than a quarter of the bytes are left out. A "
-      "viewer whose limit is --screen-error takes the next level at that height. Where the unit is known "
-      "(texmesh dump PKG about) tiles are in metres, else in the "
-      "object's unit. The object stands where its source has it; nothing puts it on the globe.\n"
+      "viewer whose limit is --screen-error takes the next level at that height. The object stands where "
+      "its source has it; nothing puts it on the globe.\n"
       "gltf-lod: all major scales from the finest on; levels share materials and textures.\n"
       "model-viewer: index.html, model.glb and the poster. Draco meshes make the script fetch a decoder from "
       "gstatic.com; with --plain it needs none.\n"
@@ -506,7 +523,7 @@ void add_extract_command(Command& app) {
       "extract takes it, and makes it smaller if needed. Many triangles with a small texture nearly always "
       "look better than the reverse.\n"
       "Meshes of scales stay coded by Draco (KHR_draco_mesh_compression), those of whole proxies by meshopt "
-      "(EXT_meshopt_compression). WebP needs EXT_texture_webp. For programs without these use --plain.\n"
+      "(EXT_meshopt_compression). WebP needs EXT_texture_webp, AVIF EXT_texture_avif. For programs without these use --plain.\n"
       "Exit code: 0, 1 when the package is damaged or the GLB cannot be written, 2 usage, 4 when no file "
       "between 98 % and 100 % of --bytes is possible: extract then writes the nearest file. A file that "
       "already holds everything in a package of JPEG sources is no failure.");

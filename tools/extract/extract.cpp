@@ -18,6 +18,7 @@ constexpr double kTopQuality = 97;      // of images coded anew from planes that
 FileImage format_of(const ExtractScale& wishes, bool alpha) {
   if (wishes.images == ExtractImages::kPng) return FileImage::kPng;
   if (wishes.images == ExtractImages::kWebp) return FileImage::kWebp;
+  if (wishes.images == ExtractImages::kAvif) return FileImage::kAvif;
   return alpha ? FileImage::kPng : FileImage::kJpeg;
 }
 
@@ -27,7 +28,7 @@ class ScaleExtraction {
   ScaleExtraction(PackageReader& package, const ExtractScale& wishes, const RunContext& context)
       : package_(package), wishes_(wishes), context_(context), manifest_(package.manifest()) {}
 
-  Extracted run(bool recentre) {
+  Extracted run(const OutputTransform& place) {
     const bool has_levels = wishes_.form == ExtractScale::Form::kLevels;
     Extracted out;
     out.scale = wanted_scale();
@@ -40,10 +41,7 @@ class ScaleExtraction {
       file.add_level(scale_file(package_, out.levels[l], context_),
                      screen_coverage_of(manifest_, out.levels[l]));
     if (wishes_.form == ExtractScale::Form::kPlain) file = plain_file(file, mesh_path(out.scale), context_);
-    About about = package_.about();
-    const double unit = wishes_.metres && about.metres_per_unit > 0 ? about.metres_per_unit : 1;
-    if (unit != 1) about.unit = "m", about.metres_per_unit = 1;
-    file.move_to(recentre ? Vec3d{} : manifest_.origin, unit);
+    file.place(place);
     const std::map<std::uint32_t, std::uint32_t> planes = shown_planes();
     const std::vector<std::uint32_t> used = file.source_images();
     std::map<std::uint32_t, FileImageData> images;
@@ -53,7 +51,7 @@ class ScaleExtraction {
       context_.report(static_cast<double>(images.size()) / static_cast<double>(used.size() + 1));
     }
     file.set_images(images);
-    file.set_about(about);
+    file.set_about(transformed_about(package_.about(), place));
     out.glb = file.finish();
     out.mesh_bytes = out.glb.size();
     for (const ExtractedImage& i : out.images) out.mesh_bytes -= i.bytes;
@@ -156,18 +154,27 @@ class ScaleExtraction {
 
 std::vector<Extracted> extract_files(PackageReader& package, const ExtractRequest& request,
                                      const RunContext& context) {
+  const About& about = package.about();
+  const OutputTransform place =
+      output_transform(about, request.recentre ? Vec3d{} : package.manifest().origin, request.keep_units);
   std::vector<Extracted> out;
   if (const auto* scale = std::get_if<ExtractScale>(&request.file))
-    out.push_back(ScaleExtraction(package, *scale, context).run(request.recentre));
+    out.push_back(ScaleExtraction(package, *scale, context).run(place));
   else if (const auto* proxy = std::get_if<ExtractProxy>(&request.file))
-    out.push_back(extract_proxy(package, *proxy, request.recentre, context));
+    out.push_back(extract_proxy(package, *proxy, place, context));
   else
-    out = extract_within_bytes(package, std::get<ExtractBudget>(request.file), request.recentre, context);
-  for (Extracted& file : out)
-    if (file.asked_bytes > 0 &&
-        about_within(package.about(), file.asked_bytes / kAboutShare) != package.about())
+    out = extract_within_bytes(package, std::get<ExtractBudget>(request.file), place, context);
+  const About words = transformed_about(about, place);
+  const std::string units = units_note(about, place);
+  for (Extracted& file : out) {
+    if (!units.empty()) file.notes.push_back(units);
+    if (file.asked_bytes == 0) continue;
+    const std::size_t before = file.glb.size();
+    if (!add_words(file.glb, words, file.asked_bytes))
       file.notes.emplace_back(
-          "the file is too small for all that is known of the object; see dump PKG about");
+          "the bytes do not hold all that is known of the object; texmesh dump PKG about prints it");
+    file.mesh_bytes += file.glb.size() - before;
+  }
   return out;
 }
 

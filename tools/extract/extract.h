@@ -9,14 +9,11 @@ namespace texmesh {
 
 /// What kind of images a standalone file gets. kAuto: for a number of bytes what looks best, otherwise JPEG;
 /// images with alpha become PNG where JPEG would be taken.
-enum class ExtractImages : std::uint8_t { kAuto, kJpeg, kWebp, kPng };
+enum class ExtractImages : std::uint8_t { kAuto, kJpeg, kWebp, kAvif, kPng };
 template <>
 struct EnumNames<ExtractImages> {
-  static constexpr std::array<std::string_view, 4> names{"auto", "jpeg", "webp", "png"};
+  static constexpr std::array<std::string_view, 5> names{"auto", "jpeg", "webp", "avif", "png"};
 };
-
-/// Of a file of so many bytes, one in this many may say what the object is (about_within()).
-inline constexpr std::uint64_t kAboutShare = 20;
 
 /// A scale with whole textures.
 struct ExtractScale {
@@ -28,7 +25,6 @@ struct ExtractScale {
   double display_px = 0;           // displayed height, device px; 0 = not said
   ExtractImages images = ExtractImages::kAuto;
   Form form = Form::kCoded;
-  bool metres = false;  // lengths in metres where the object unit is known, by a node that scales
 };
 
 /// The best-looking files of at most so many bytes.
@@ -48,15 +44,16 @@ struct ExtractProxy {
 
 struct ExtractRequest {
   std::variant<ExtractScale, ExtractBudget, ExtractProxy> file;
-  bool recentre = false;  // the frame of the package's meshes instead of the source's coordinates
+  bool recentre = false;    // near 0 instead of the source's coordinates
+  bool keep_units = false;  // lengths in object units, also where their metres are known
 };
 
 inline constexpr double kMostGlbBytes = 4294967295;
 
-enum class FileImage : std::uint8_t { kJpeg, kWebp, kPng };
+enum class FileImage : std::uint8_t { kJpeg, kWebp, kAvif, kPng };
 template <>
 struct EnumNames<FileImage> {
-  static constexpr std::array<std::string_view, 3> names{"jpeg", "webp", "png"};
+  static constexpr std::array<std::string_view, 4> names{"jpeg", "webp", "avif", "png"};
 };
 
 struct ExtractedImage {

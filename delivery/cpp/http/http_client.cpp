@@ -23,7 +23,6 @@ struct Transfer {
   HttpAnswer answer;
   std::uint64_t max_bytes = 0;
   std::optional<HttpRange> range;
-  std::optional<std::uint64_t> length;  // Content-Length
   const HttpOptions* options = nullptr;
   std::optional<Clock::time_point> sent, error_page;  // the request; the first byte of an answer of no use
   Clock::time_point moved{};                          // when a byte came last, or the request was sent
@@ -52,7 +51,8 @@ std::optional<std::uint64_t> number(std::string_view& text) {
   return n;
 }
 
-/// "bytes 0-99/1234"; anything else leaves the answer without a range.
+/// "bytes 0-99/1234", or with "*" for a total that the server does not know; anything else leaves the answer
+/// without a range.
 void read_content_range(std::string_view value, HttpAnswer& answer) {
   if (!value.starts_with("bytes ")) return;
   value.remove_prefix(6);
@@ -62,11 +62,20 @@ void read_content_range(std::string_view value, HttpAnswer& answer) {
   const auto last = number(value);
   if (!last || !value.starts_with('/')) return;
   value.remove_prefix(1);
-  const auto total = number(value);
-  if (!total || !value.empty() || *last < *first || *last >= *total) return;
+  const bool unknown = value == "*";
+  const auto total = unknown ? std::nullopt : number(value);
+  if (*last < *first || (!unknown && (!total || !value.empty() || *last >= *total))) return;
   answer.first = first;
   answer.last = last;
   answer.total = total;
+}
+
+/// What a message may show of a header's value.
+std::string printable_part(std::string_view value) {
+  std::string out(value.substr(0, 100));
+  std::ranges::replace_if(
+      out, [](char c) { return c < ' ' || c > '~'; }, '?');
+  return out;
 }
 
 std::size_t receive_header(char* data, std::size_t size, std::size_t count, void* user) {
@@ -74,13 +83,17 @@ std::size_t receive_header(char* data, std::size_t size, std::size_t count, void
   const std::string_view line(data, size * count);
   std::string_view value;
   if (line.starts_with("HTTP/")) {  // of another answer after a redirect
-    transfer.answer.etag.clear();
-    transfer.length = std::nullopt;
-    transfer.answer.first = transfer.answer.last = transfer.answer.total = std::nullopt;
+    HttpAnswer& a = transfer.answer;
+    for (std::string* said : {&a.etag, &a.type, &a.encoding}) said->clear();
+    a.length = a.first = a.last = a.total = std::nullopt;
   } else if (starts_with_name(line, "content-range", value)) {
     read_content_range(value, transfer.answer);
   } else if (starts_with_name(line, "content-length", value)) {
-    transfer.length = number(value);
+    transfer.answer.length = number(value);
+  } else if (starts_with_name(line, "content-type", value)) {
+    transfer.answer.type = printable_part(value);
+  } else if (starts_with_name(line, "content-encoding", value)) {
+    transfer.answer.encoding = printable_part(value);
   } else if (starts_with_name(line, "etag", value) && value.starts_with('"')) {
     transfer.answer.etag = std::string(value.substr(0, 200));
   } else if (starts_with_name(line, "retry-after", value)) {
@@ -164,9 +177,12 @@ curl_slist* prepare(Transfer& transfer, const std::string& url) {
   ::curl_easy_setopt(h, CURLOPT_NOPROGRESS, 0L);
   ::curl_easy_setopt(h, CURLOPT_XFERINFOFUNCTION, look);
   ::curl_easy_setopt(h, CURLOPT_XFERINFODATA, &transfer);
-  // Ranges are of the bytes as stored.
-  curl_slist* headers = ::curl_slist_append(nullptr, "Accept-Encoding: identity");
-  if (range) {
+  curl_slist* headers = nullptr;
+  if (!range) {
+    ::curl_easy_setopt(h, CURLOPT_ACCEPT_ENCODING,
+                       "identity");  // and what is compressed all the same is decoded
+  } else {
+    headers = ::curl_slist_append(nullptr, "Accept-Encoding: identity");  // ranges are of the bytes as stored
     const std::string asked = "Range: bytes=" + std::to_string(range->first) + "-" +
                               std::to_string(range->first + range->bytes - 1);
     headers = ::curl_slist_append(headers, asked.c_str());
@@ -179,7 +195,12 @@ void conclude(Transfer& transfer, CURLcode rc) {
   HttpAnswer& answer = transfer.answer;
   ::curl_easy_getinfo(transfer.handle, CURLINFO_RESPONSE_CODE, &answer.status);
   answer.complete = rc == CURLE_OK;
-  if (answer.status == 200) answer.total = transfer.length;
+  if (answer.status == 200 && !is_compressed(answer)) answer.total = answer.length;
+  long redirects = 0;
+  const char* url = nullptr;
+  ::curl_easy_getinfo(transfer.handle, CURLINFO_REDIRECT_COUNT, &redirects);
+  if (redirects > 0 && ::curl_easy_getinfo(transfer.handle, CURLINFO_EFFECTIVE_URL, &url) == CURLE_OK && url)
+    answer.redirected_to = shown_url(url);
   curl_off_t sent_us = 0, first_us = 0, total_us = 0;
   ::curl_easy_getinfo(transfer.handle, CURLINFO_PRETRANSFER_TIME_T, &sent_us);
   ::curl_easy_getinfo(transfer.handle, CURLINFO_STARTTRANSFER_TIME_T, &first_us);
@@ -217,9 +238,23 @@ bool may_retry(const HttpAnswer& a) {
 }
 
 std::string describe_answer(const HttpAnswer& a) {
-  if (a.status != 0 && a.status != 200 && a.status != 206) return "status " + std::to_string(a.status);
-  if (!a.problem.empty()) return a.problem;
-  return a.status == 0 ? "no answer" : "status " + std::to_string(a.status);
+  if (a.status == 0) return a.problem.empty() ? "no answer" : a.problem;
+  std::string what;
+  const auto add = [&](const std::string& text) { what += (what.empty() ? "" : ", ") + text; };
+  if (!a.type.empty()) add(a.type);
+  if (!a.encoding.empty()) add(a.encoding);
+  if (a.length) add(std::to_string(*a.length) + " bytes");
+  if (!a.redirected_to.empty()) add("redirected to " + a.redirected_to);
+  const std::string status = "status " + std::to_string(a.status) + (what.empty() ? "" : " (" + what + ")");
+  const bool is_file = a.status == 200 || a.status == 206;
+  return is_file && !a.problem.empty() ? a.problem + ", " + status : status;
+}
+
+bool is_compressed(const HttpAnswer& a) { return !a.encoding.empty() && a.encoding != "identity"; }
+
+bool is_page(const HttpAnswer& a, ByteSpan begin) {
+  const auto first = std::ranges::find_if(begin, [](std::uint8_t c) { return c > ' '; });
+  return a.type.starts_with("text/html") && first != begin.end() && *first == '<';
 }
 
 struct HttpPool::State {

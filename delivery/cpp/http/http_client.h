@@ -30,7 +30,10 @@ struct HttpAnswer {
   std::string problem;
   Bytes body;
   std::string etag;                                 // strong ones only
+  std::string type, encoding;                       // Content-Type, Content-Encoding; "" = not said
+  std::string redirected_to;                        // where the answer came from, if not from the URL asked
   std::optional<std::uint64_t> first, last, total;  // of Content-Range; total of a 200: Content-Length
+  std::optional<std::uint64_t> length;              // Content-Length
   bool complete = false;                            // the body ended as the server said it would
   bool too_long = false;     // more than asked for, or a whole file, was coming: the transfer was ended
   bool timed_out = false;    // silent, or slower than the options allow
@@ -43,8 +46,15 @@ struct HttpAnswer {
 bool is_same_file(const HttpAnswer& answer, const std::string& etag, std::uint64_t total);
 /// Whether the request is worth another try.
 bool may_retry(const HttpAnswer& answer);
-/// The answer in a few words, for messages.
+/// The answer in a few words, for messages: "status 200 (text/html, 1734 bytes, redirected to
+/// https://a.example/login)".
 std::string describe_answer(const HttpAnswer& answer);
+/// Whether the server compressed the bytes of the file, though nobody asked for that: then ranges are of
+/// other bytes.
+bool is_compressed(const HttpAnswer& answer);
+/// Whether what came is a page for people, such as that of a login, in the place of a file. `begin`: its
+/// first bytes.
+bool is_page(const HttpAnswer& answer, ByteSpan begin);
 
 /// Bytes first .. first + bytes - 1.
 struct HttpRange {

@@ -57,6 +57,17 @@ class RangesEnded : public InputError {
   using InputError::InputError;
 };
 
+/// Throws where what came is not the file's bytes but a page for people, or bytes that a server has
+/// compressed.
+void require_file(const HttpAnswer& a, ByteSpan body, const std::string& url) {
+  if (is_page(a, body))
+    throw FormatError(url, "", "a file of a package",
+                      "a page, as of a login or of an unknown address: " + describe_answer(a));
+  if (a.status == 206 && is_compressed(a))
+    throw FormatError(url, "", "the bytes of the file as it is stored",
+                      describe_answer(a) + ": the server must not compress files of packages");
+}
+
 /// Reads ranges of a container from the first server that delivers them.
 class HttpSource final : public ByteSource {
  public:
@@ -67,7 +78,7 @@ class HttpSource final : public ByteSource {
     const std::uint64_t bytes = std::min(kStartBytes, *total_);
     if (first.complete && first.body.size() != bytes)
       throw FormatError(name(), "byte 0", std::to_string(bytes) + " bytes",
-                        std::to_string(first.body.size()));
+                        std::to_string(first.body.size()) + ", " + describe_answer(first));
     store(0, std::move(first.body));
   }
   std::string name() const override { return shown_url(urls_.front()); }
@@ -199,7 +210,8 @@ class HttpSource final : public ByteSource {
       if (a.body.size() >= kProgressBytes) p.retries.emplace(pool_->options());
       if (p.got.size() == p.bytes) return true;
       if (a.complete)
-        throw FormatError(name(), place, std::to_string(p.bytes) + " bytes", std::to_string(p.got.size()));
+        throw FormatError(name(), place, std::to_string(p.bytes) + " bytes",
+                          std::to_string(p.got.size()) + ", " + describe_answer(a));
     }
     if (a.too_long && a.status == 206)
       throw FormatError(name(), place, std::to_string(p.bytes) + " bytes", "more");
@@ -223,13 +235,16 @@ class HttpSource final : public ByteSource {
   }
   void check_range(const HttpAnswer& a, std::uint64_t offset, std::uint64_t bytes) {
     const std::string place = "byte " + std::to_string(offset);
-    if (!a.first) throw FormatError(name(), place, "a Content-Range", "none that can be read");
-    if (total_ && *a.total != *total_) fail_replaced(std::to_string(*a.total) + " bytes");
+    require_file(a, offset == 0 ? ByteSpan(a.body) : ByteSpan(), name());
+    if (!a.first)
+      throw FormatError(name(), place, "a Content-Range", "none that can be read: " + describe_answer(a));
+    const std::uint64_t total = a.total ? *a.total : *total_;  // the first answer has it
+    if (total_ && total != *total_) fail_replaced(std::to_string(total) + " bytes");
     if (total_ && !is_same_file(a, etag_, *total_)) fail_replaced("ETag " + a.etag);
-    if (*a.first != offset || *a.last != std::min(offset + bytes, *a.total) - 1)
+    if (*a.first != offset || *a.last != std::min(offset + bytes, total) - 1)
       throw FormatError(name(), place, "the range that was asked for",
                         std::to_string(*a.first) + "-" + std::to_string(*a.last));
-    total_ = a.total;
+    total_ = total;
     if (etag_.empty()) etag_ = a.etag;
   }
 
@@ -274,6 +289,7 @@ class HttpTree {
       while (auto ended = pool_->wait(kRequestWait_s)) {
         const auto i = ended->number;
         HttpAnswer& a = ended->answer;
+        require_file(a, wanted[i].got.empty() ? a.body : wanted[i].got, name() + wanted[i].path);
         if (accept(wanted[i], a)) {
           store(wanted[i].path, std::move(wanted[i].got));
           continue;
@@ -382,7 +398,7 @@ class UrlStore final : public HttpStore {
                         "an entry of " + std::to_string(entry.bytes) + " bytes");
     const Bytes& whole = tree_->file(entry.path, entry.bytes);
     if (whole.size() != entry.bytes)
-      throw FormatError(name(), entry.path, std::to_string(entry.bytes) + " bytes",
+      throw FormatError(name() + entry.path, "", std::to_string(entry.bytes) + " bytes",
                         std::to_string(whole.size()));
     const auto from = whole.begin() + static_cast<std::ptrdiff_t>(offset);
     return {from, from + static_cast<std::ptrdiff_t>(bytes)};
@@ -464,16 +480,20 @@ class UrlStore final : public HttpStore {
   Bytes open_by(HttpPool::Ended first) {
     const std::string& url = urls_[first.number];
     if (is_tree(url)) {
+      require_file(first.answer, first.answer.body, shown_url(url) + kManifestPath);
       if (first.answer.too_long)
         throw FormatError(shown_url(url), kManifestPath,
                           "at most " + std::to_string(kBootstrapBytes) + " bytes", "more");
       return open_tree(url, std::move(first.answer));
     }
-    if (first.answer.status == 206) return open_ranges(first.number, std::move(first.answer));
+    if (first.answer.status == 206 && (first.answer.total || !first.answer.first))
+      return open_ranges(first.number, std::move(first.answer));
+    // Ranges of a file whose length the server does not tell are as good as none.
     if (const std::string root = tree_beside(url); !root.empty()) {
       pool_->start(0, root + kManifestPath, HttpRange{0, kBootstrapBytes, true}, kBootstrapBytes);
       const auto ended = pool_->wait(kRequestWait_s);
-      if (ended && ended->answer.complete && (ended->answer.status == 200 || ended->answer.status == 206))
+      const bool is_file = ended && ended->answer.complete && !is_page(ended->answer, ended->answer.body);
+      if (is_file && (ended->answer.status == 200 || ended->answer.status == 206))
         return open_tree(root, std::move(ended->answer));
     }
     container_ = open_container(memory_source(whole_file(url), shown_url(url)));
@@ -485,7 +505,11 @@ class UrlStore final : public HttpStore {
   Bytes open_tree(const std::string& root, HttpAnswer manifest) {
     place_.url = root;
     place_.ranges = manifest.status == 206;
-    if (place_.ranges && (!manifest.first || *manifest.first != 0 || *manifest.last + 1 != *manifest.total))
+    require_file(manifest, manifest.body, shown_url(root) + kManifestPath);
+    const bool whole =
+        manifest.first && *manifest.first == 0 &&
+        (manifest.total ? *manifest.last + 1 == *manifest.total : *manifest.last + 1 < kBootstrapBytes);
+    if (place_.ranges && !whole)
       throw FormatError(shown_url(root), kManifestPath, "the range that was asked for", "another");
     tree_ = std::make_unique<HttpTree>(root, pool_, place_.ranges);
     tree_->store(kManifestPath, manifest.body);
@@ -499,6 +523,7 @@ class UrlStore final : public HttpStore {
     pool_->start(0, root + kManifestPath, std::nullopt, kBootstrapBytes);
     auto ended = pool_->wait(kRequestWait_s);
     if (!ended || !ended->answer.complete || ended->answer.status != 200) return false;
+    if (is_page(ended->answer, ended->answer.body)) return false;
     if (ended->answer.body != known)
       throw FormatError(shown_url(root), kManifestPath, "the package that reading began with",
                         "another: it was replaced, read it anew");
@@ -524,6 +549,7 @@ class UrlStore final : public HttpStore {
       auto ended = pool_->wait(kRequestWait_s);
       HttpAnswer a = ended ? std::move(ended->answer) : HttpAnswer{};
       if (a.status == 200 && a.complete) {
+        require_file(a, a.body, shown_url(url));
         // The answer before was broken off, and says nothing of the link.
         place_.bytes_s = static_cast<double>(a.body.size()) / std::max(1e-6, a.received_s);
         return std::move(a.body);

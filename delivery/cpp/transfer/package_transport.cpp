@@ -198,9 +198,10 @@ class HttpTransport final : public Transport {
     return false;
   }
   static bool is_another(Mirror& mirror, const HttpAnswer& a) {
-    if (!is_same_file(a, mirror.etag, mirror.total) || (mirror.total > 0 && mirror.total != *a.total))
+    if (!is_same_file(a, mirror.etag, mirror.total) ||
+        (mirror.total > 0 && a.total && mirror.total != *a.total))
       return true;
-    mirror.total = *a.total;
+    if (a.total) mirror.total = *a.total;
     if (mirror.etag.empty()) mirror.etag = a.etag;
     return false;
   }

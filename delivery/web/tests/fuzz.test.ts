@@ -91,7 +91,7 @@ const readers: Reader[] = [
   { name: 'about', inputs: entries(/^about\.json$/), targets: ['about'], read: readAbout },
   {
     name: 'thesis', inputs: entries(/^thesis\.bin$/), targets: ['thesis'],
-    read: (b) => parseThesis(b, first.manifest, first.textures),
+    read: (b) => parseThesis(b, packages[0].manifest, packages[0].textures),
   },
   {
     name: 'index', inputs: indexes, targets: ['index'],

@@ -112,9 +112,7 @@ class ListedFiles {
   }
 
   void add_maps(const MtlMaterial& m, const std::string& said_in) {
-    for (const auto* map :
-         {&m.map_kd, &m.map_ka, &m.map_ke, &m.map_d, &m.map_pr, &m.map_pm, &m.bump, &m.norm})
-      if (*map) add({(*map)->file, said_in, false});
+    for_each_map(m, [&](const std::string& file) { add({file, said_in, false}); });
   }
 
   void look_at_ply() {
@@ -156,6 +154,7 @@ ModelList list_collection(const PlanRequest& request, int shards) {
   ModelList list;
   list.shards = shards;
   list.collections = plan.files;
+  list.stale = plan.stale;
   const ShardSplit split = split_plan(plan, request, shards);
   list.collection = shards > 1 ? split.collection : "";
   for (std::size_t i = 0; i < plan.models.size(); ++i) {

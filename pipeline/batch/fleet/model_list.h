@@ -26,12 +26,14 @@ struct ModelList {
   int shards = 1;
   std::string collection;                // collection_digest() where there are several shards
   std::vector<std::string> collections;  // files that were read to find the models
+  std::vector<std::string> stale;        // BatchPlan::stale
   static void fields(auto& s, auto&& v) {
     v("version", Constant{1}, "");
     v("shards", s.shards, Range{1, 1'000'000}, "");
     v("collection", s.collection, FieldRule{.pattern = "^[0-9a-f]{64}$", .may_miss = true},
       "where there are several shards: as in the shards' summaries");
     v("collections", s.collections, "collection files that were read");
+    v("stale", s.stale, kMayMiss, "packages in the output folder that no model makes: paths within it");
     v("models", s.models, "");
   }
 };

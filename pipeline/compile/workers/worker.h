@@ -227,6 +227,7 @@ struct ModelFinished {
 struct RunFinished {
   std::uint64_t models = 0, compiled = 0, unchanged = 0, failed = 0, cancelled = 0;
   double seconds = 0;
+  std::vector<std::string> stale;
   static void fields(auto& s, auto&& v) {
     v("event", Constant{"summary"}, "");
     v("models", s.models, "");
@@ -235,6 +236,7 @@ struct RunFinished {
     v("failed", s.failed, "");
     v("cancelled", s.cancelled, "");
     v("seconds", s.seconds, kSeconds, "");
+    v("stale", s.stale, kMayMiss, "packages in the output folder that no model makes: paths within it");
   }
 };
 

@@ -17,7 +17,6 @@ namespace {
 constexpr std::size_t kMaxParts = 65535;          // Mesh::triangle_part is 16 bits wide
 constexpr std::size_t kMaxGltfMaterials = 65535;  // and so is triangle_material
 constexpr const char* kVariants = "KHR_materials_variants";
-constexpr std::size_t kMostKinds = 100;  // of what is lost
 
 /// Affine map, row-major 3 x 4, in double precision: georeferenced scenes place small meshes
 /// with large translations.
@@ -349,10 +348,10 @@ class GltfReader {
 };
 
 bool is_supported(const std::string& extension) {
-  static constexpr std::array<std::string_view, 8> kSupported{
+  static constexpr std::array<std::string_view, 9> kSupported{
       "KHR_draco_mesh_compression", "KHR_mesh_quantization", "EXT_meshopt_compression",
       "KHR_meshopt_compression",    "KHR_texture_transform", "EXT_texture_webp",
-      "KHR_texture_basisu",         "KHR_materials_unlit"};
+      "EXT_texture_avif",           "KHR_texture_basisu",    "KHR_materials_unlit"};
   return find_material_extension(extension) ||
          std::find(kSupported.begin(), kSupported.end(), extension) != kSupported.end();
 }
@@ -378,7 +377,7 @@ void GltfReader::check_document() const {
                    images[i].contains("uri") ? "both" : "neither");
   each_unknown("extensionsUsed", [&](const std::string& place, const std::string& name) {
     add_info(source_.notes, "unknown-extension", place, name + " is left out");
-    if (name != kVariants) ++source_.lost["extension " + quote(name)];
+    if (name != kVariants) count_lost(source_.lost, "extension " + quote(name));
   });
 }
 
@@ -388,8 +387,8 @@ void GltfReader::count_attributes(const tinygltf::Primitive& primitive) const {
                                                "TEXCOORD_0", "TEXCOORD_1", "COLOR_0"};
   for (const auto& [name, accessor] : primitive.attributes)
     if (std::find(std::begin(kRead), std::end(kRead), name) == std::end(kRead) &&
-        !name.starts_with("JOINTS") && !name.starts_with("WEIGHTS") && source_.lost.size() < kMostKinds)
-      ++source_.lost["attributes " + quote(name)];
+        !name.starts_with("JOINTS") && !name.starts_with("WEIGHTS"))
+      count_lost(source_.lost, "attributes " + quote(name));
 }
 
 void GltfReader::note_what_is_left_out() const {

@@ -12,6 +12,7 @@
 #include "format/base/text_bytes.h"
 #include "format/model/material_extensions.h"
 #include "pipeline/import/gltf/import_gltf_parts.h"
+#include "pipeline/import/text_scan.h"
 #include "stages/gltf/glb_container.h"
 
 namespace texmesh {
@@ -23,10 +24,6 @@ std::uint32_t u32(ByteSpan bytes, std::size_t at) {
   std::uint32_t v = 0;
   std::memcpy(&v, bytes.data() + at, sizeof v);
   return v;
-}
-
-std::string_view text_of(ByteSpan bytes) {
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
 }  // namespace
@@ -131,7 +128,7 @@ image uri=text bufferView=@bufferViews
 sampler magFilter=9728,9729 minFilter=9728,9729,9984,9985,9986,9987
 sampler wrapS=33071,33648,10497 wrapT=33071,33648,10497
 texture sampler=@samplers source=@images extensions=otherImages
-otherImages EXT_texture_webp=otherImage KHR_texture_basisu=otherImage
+otherImages EXT_texture_webp=otherImage EXT_texture_avif=otherImage KHR_texture_basisu=otherImage
 otherImage source=@images
 material emissiveFactor=number*3 alphaCutoff=number alphaMode="OPAQUE","MASK","BLEND" doubleSided=truth
 material normalTexture=textureInfo occlusionTexture=textureInfo emissiveTexture=textureInfo

@@ -6,6 +6,7 @@
 #include "pipeline/import/gltf/import_gltf_parts.h"
 #include "pipeline/import/import_images.h"
 #include "pipeline/import/material_images.h"
+#include "pipeline/import/text_scan.h"
 #include "pipeline/io/uri.h"
 
 namespace texmesh {
@@ -132,8 +133,8 @@ std::int32_t MaterialReader::ktx2_image(std::size_t index, bool has_other, const
   }
 }
 
-/// The KTX2 image where there is one, else (or when its file is missing or cannot be read) the WebP one, else
-/// the plain one.
+/// The KTX2 image where there is one, else (or when its file is missing or cannot be read) the AVIF one, the
+/// WebP one, the plain one.
 std::int32_t MaterialReader::image_of_texture(std::size_t index) {
   const GltfJson& texture = document_["textures"][index];
   const std::string place = "/textures/" + std::to_string(index);
@@ -141,13 +142,15 @@ std::int32_t MaterialReader::image_of_texture(std::size_t index) {
     const GltfJson* e = extension(texture, name);
     return e ? member(*e, "source") : nullptr;
   };
-  const GltfJson *ktx2 = source_of("KHR_texture_basisu"), *webp = source_of("EXT_texture_webp");
+  const GltfJson *ktx2 = source_of("KHR_texture_basisu"), *avif = source_of("EXT_texture_avif"),
+                 *webp = source_of("EXT_texture_webp");
   const int source = structure_.textures[index].source;
   std::int32_t found = -1;
-  if (ktx2) found = ktx2_image(ktx2->get<std::size_t>(), webp || source >= 0, place);
+  if (ktx2) found = ktx2_image(ktx2->get<std::size_t>(), avif || webp || source >= 0, place);
+  if (found < 0 && avif) found = image(avif->get<std::size_t>());
   if (found < 0 && webp) found = image(webp->get<std::size_t>());
   if (found < 0 && source >= 0) found = image(static_cast<std::size_t>(source));
-  if (found < 0 && source < 0 && !webp && !ktx2) {
+  if (found < 0 && source < 0 && !webp && !avif && !ktx2) {
     source_.note_once(Severity::kWarning, "missing-texture", place,
                       "a texture without an image of a kind that texmesh reads is left out");
   }
@@ -272,12 +275,8 @@ void MaterialReader::read_extensions(const GltfJson& material, const std::string
     const std::string textures = texture_names(value);
     const std::string text =
         name + " is left out" + (textures.empty() ? "" : ", and with it the textures " + textures);
-    const bool is_noted = std::any_of(source_.notes.begin(), source_.notes.end(), [&](const Note& n) {
-      return n.code == "unknown-extension" && n.text == text;
-    });
-    if (!is_noted)
-      source_.notes.push_back(
-          {textures.empty() ? Severity::kInfo : Severity::kWarning, "unknown-extension", place, text});
+    add_once(source_.notes, textures.empty() ? Severity::kInfo : Severity::kWarning, "unknown-extension",
+             place, text);
   }
 }
 

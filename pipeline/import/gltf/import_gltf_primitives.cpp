@@ -129,7 +129,6 @@ float undo_quantization(draco::Mesh& mesh) {
   const draco::PointAttribute& grid = *mesh.attribute(id);
   auto floats = std::make_unique<draco::PointAttribute>();
   floats->Init(grid.attribute_type(), grid.num_components(), draco::DT_FLOAT32, false, grid.size());
-  floats->set_unique_id(grid.unique_id());
   if (!transform.InverseTransformAttribute(grid, floats.get())) return 0;
   if (grid.is_mapping_identity()) {
     floats->SetIdentityMapping();
@@ -138,7 +137,9 @@ float undo_quantization(draco::Mesh& mesh) {
     for (draco::PointIndex p(0); p < static_cast<std::uint32_t>(grid.indices_map_size()); ++p)
       floats->SetPointMapEntry(p, grid.mapped_index(p));
   }
+  const std::uint32_t unique_id = grid.unique_id();
   mesh.SetAttribute(id, std::move(floats));
+  mesh.attribute(id)->set_unique_id(unique_id);  // SetAttribute gives it `id`
   return transform.range() / static_cast<float>((1U << transform.quantization_bits()) - 1);
 }
 

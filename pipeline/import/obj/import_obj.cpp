@@ -6,7 +6,7 @@
 #include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/named_files.h"
 #include "pipeline/import/obj/obj_material.h"
-#include "pipeline/import/seen_alpha.h"
+#include "pipeline/import/seen_texels.h"
 #include "pipeline/import/text_scan.h"
 
 // OBJ is read here and not by tinyobjloader 2.0rc10, which (measured on Debian 12) turns "nan", "inf" and
@@ -41,6 +41,7 @@ struct ObjData {
   std::vector<ObjFace> faces;
   std::vector<std::string> materials, parts;  // by first use; materials[0] is "" (before any usemtl)
   std::vector<std::uint16_t> tiles;  // per material: the UDIM tile that it stands for, 0 = none; or empty
+  std::vector<std::size_t> with_bump_map;  // materials that name one and no normal map
   struct Library {
     std::string name;
     std::size_t line;
@@ -50,7 +51,7 @@ struct ObjData {
   std::vector<Vec3f> zbrush_colours;                    // one per position, 0..255, where their number fits
   std::uint64_t small_faces = 0, lines_and_points = 0;  // left out
   std::uint64_t zero_indices = 0;                       // of normals and texture coordinates: there is none
-  std::map<std::string, std::uint64_t> unread;          // statements, by their first word
+  Lost unread;                                          // statements, by their first word
   bool parts_full = false;                              // the last part stands for all further ones
   std::uint16_t tile(std::size_t material) const {
     return tiles.empty() ? std::uint16_t{0} : tiles[material];
@@ -63,7 +64,7 @@ struct ObjData {
 
 constexpr std::int64_t kMaxIndex = 2'000'000'000;
 constexpr std::size_t kMaxNames = 65535;  // parts, materials
-constexpr std::size_t kMaxStatementBytes = 24, kMaxWords = 32;
+constexpr std::size_t kMaxStatementBytes = 24;
 
 /// Names to numbers by first use.
 class NameTable {
@@ -126,13 +127,8 @@ class ObjReader {
     if (word.empty() || (word[0] != '#' && read_statement(word, rest))) return;
     if (word[0] == '#') return word == "#MRGB" ? zbrush_colours(trim(rest)) : void();
     const std::string small = lower(word);
-    if (small == word || !read_statement(small, rest)) count_unread(small);
-  }
-
-  void count_unread(const std::string& word) {
-    const std::string short_word = word.substr(0, kMaxStatementBytes);
-    const bool room = data_.unread.size() < kMaxWords || data_.unread.contains(short_word);
-    ++data_.unread[room ? short_word : "others"];
+    if (small == word || !read_statement(small, rest))
+      count_lost(data_.unread, small.substr(0, kMaxStatementBytes));
   }
 
   /// False for a statement that is not known.
@@ -339,6 +335,16 @@ struct LoadedLibrary {
   }
 };
 
+struct FoundMaterial {
+  const MtlMaterial* material = nullptr;  // nullptr = in no library
+  const LoadedLibrary* library = nullptr;
+};
+FoundMaterial find_material(const std::vector<LoadedLibrary>& libraries, const std::string& name) {
+  for (const LoadedLibrary& library : libraries)
+    if (const MtlMaterial* material = library.find(name)) return {material, &library};
+  return {};
+}
+
 class LibraryLoader {
  public:
   LibraryLoader(Model& model, Resolver& resolver, const ImportOptions& options)
@@ -403,11 +409,8 @@ std::uint16_t tile_of(const ObjData& data, std::size_t face) {
 void split_into_tiles(ObjData& data, const std::vector<LoadedLibrary>& libraries) {
   std::vector<bool> tiled(data.materials.size());
   for (std::size_t m = 0; m < data.materials.size(); ++m)
-    for (const LoadedLibrary& library : libraries)
-      if (const MtlMaterial* material = library.find(data.materials[m])) {
-        tiled[m] = has_tiles(*material);
-        break;
-      }
+    if (const MtlMaterial* material = find_material(libraries, data.materials[m]).material)
+      tiled[m] = has_tiles(*material);
   if (std::find(tiled.begin(), tiled.end(), true) == tiled.end()) return;
   data.tiles.resize(data.materials.size());
   std::map<std::pair<std::uint16_t, std::uint16_t>, std::uint16_t> made;
@@ -428,10 +431,9 @@ void split_into_tiles(ObjData& data, const std::vector<LoadedLibrary>& libraries
 Material make_material(const std::string& name, std::uint16_t tile,
                        const std::vector<LoadedLibrary>& libraries, bool any_library, const std::string& file,
                        Model& model, Resolver& resolver, const ImportOptions& options) {
-  for (const LoadedLibrary& library : libraries)
-    if (const MtlMaterial* material = library.find(name))
-      return material_from_mtl(tile == 0 ? *material : of_tile(*material, tile), library.file, library.name,
-                               model, resolver, options);
+  if (const auto [material, library] = find_material(libraries, name); material)
+    return material_from_mtl(tile == 0 ? *material : of_tile(*material, tile), library->file, library->name,
+                             model, resolver, options);
   if (!libraries.empty())
     add_warning(model.notes, "missing-material", file,
                 "material " + quote(name) + " is in no material library");
@@ -464,6 +466,8 @@ void add_obj_materials(ObjData& data, const std::string& file, Model& model, Res
     model.materials.push_back(named ? make_material(data.materials[i], data.tile(i), libraries,
                                                     !data.libraries.empty(), file, model, resolver, options)
                                     : scan_material(i == 0 ? "untextured" : data.materials[i]));
+    const MtlMaterial* material = find_material(libraries, data.materials[i]).material;
+    if (named && material && !material->norm && material->bump) data.with_bump_map.push_back(i);
   }
 }
 
@@ -626,6 +630,7 @@ ImportedModel import_obj(const std::string& file_name, std::span<const std::uint
   out.model.mesh.part_names = data.parts;
   out.normals_by_specification = out.model.mesh.normals.empty() && is_all_flat(data);
   add_notes(data, out.model, out.lost);
+  judge_bump_maps(out.model, data.with_bump_map, context);
   finish_model(out.model, file_name, options);
   judge_alpha(out.model, context);
   return out;

@@ -10,7 +10,7 @@
 namespace texmesh {
 namespace {
 
-constexpr std::size_t kMaxObjMaterials = 65000, kMaxUnread = 32, kMaxWordBytes = 24;
+constexpr std::size_t kMaxObjMaterials = 65000, kMaxWordBytes = 24;
 
 // Numbers at the front of `rest`, at most `most`; `rest` moves past them. The last token is never taken: a
 // file may be named "1".
@@ -134,15 +134,16 @@ class MtlReader {
         "", "ka", "ks", "ns", "ni", "tf", "illum", "km", "ps", "sharpness", "pc", "pcr", "aniso", "anisor"};
     static const std::set<std::string> left_out{"map_ks",   "map_ns", "map_ps", "disp",
                                                 "map_disp", "decal",  "refl",   "map_refl"};
-    if (const auto it = colours.find(word); it != colours.end()) m.*it->second = colour(rest);
-    if (const auto it = numbers.find(word); it != numbers.end()) m.*it->second = number(rest);
-    if (const auto it = textures.find(word); it != textures.end())
-      m.*it->second = read_texture(rest, lines_.number());
-    const bool is_read = colours.contains(word) || numbers.contains(word) || textures.contains(word);
-    if (!is_read && !of_other_lights.contains(word) && !left_out.contains(word) &&
-        file_.unread.size() < kMaxUnread)
-      ++file_.unread[word.substr(0, kMaxWordBytes)];
-    if (left_out.contains(word)) m.left_out.push_back(word + " line " + std::to_string(lines_.number()));
+    if (const auto c = colours.find(word); c != colours.end())
+      m.*c->second = colour(rest);
+    else if (const auto n = numbers.find(word); n != numbers.end())
+      m.*n->second = number(rest);
+    else if (const auto t = textures.find(word); t != textures.end())
+      m.*t->second = read_texture(rest, lines_.number());
+    else if (left_out.contains(word))
+      m.left_out.push_back(word + " line " + std::to_string(lines_.number()));
+    else if (!of_other_lights.contains(word))
+      count_lost(file_.unread, word.substr(0, kMaxWordBytes));
   }
 
   const std::string& name_;
@@ -151,31 +152,6 @@ class MtlReader {
   MtlFile file_;
   bool warned_ = false;
 };
-
-// ---- what the pictures show
-
-// Visits up to about 256 x 256 texels spread over the picture.
-template <class F>
-void sample(const Pixels& pixels, F&& f) {
-  const std::uint32_t step_x = std::max(1u, pixels.width_px / 256),
-                      step_y = std::max(1u, pixels.height_px / 256);
-  for (std::uint32_t y = 0; y < pixels.height_px; y += step_y)
-    for (std::uint32_t x = 0; x < pixels.width_px; x += step_x) f(pixels.at(x, y));
-}
-
-// Tangent-space normals point outwards: z (blue) is high nearly everywhere, x and y average to the middle.
-bool looks_like_normal_map(const Image& image) {
-  if (image.channels < 3) return false;
-  const Pixels pixels = decode_image(image);
-  std::uint64_t n = 0, blue = 0, sum[3] = {0, 0, 0};
-  sample(pixels, [&](const std::uint8_t* p) {
-    ++n;
-    for (int c = 0; c < 3; ++c) sum[c] += p[c];
-    blue += p[2] >= 128 && p[2] >= p[0] && p[2] >= p[1];
-  });
-  const auto near_middle = [n](std::uint64_t s) { return s >= 88 * n && s <= 168 * n; };
-  return blue * 10 >= n * 8 && near_middle(sum[0]) && near_middle(sum[1]) && sum[2] >= 160 * n;
-}
 
 // ---- to glTF
 
@@ -207,10 +183,6 @@ struct Converter {
     ref.transform = transform_of(*t);
     if (t->clamp) ref.wrap_s = ref.wrap_t = Wrap::kClamp;
     return ref;
-  }
-
-  const Image& image_of(const TextureRef& ref) const {
-    return model.images[static_cast<std::size_t>(ref.image)];
   }
 
   void base_colour(Material& out) const {
@@ -279,14 +251,11 @@ struct Converter {
     if (!source) return;
     const TextureRef ref = texture(source);
     if (!ref.used()) return;
-    const Image& image = image_of(ref);
-    if (mtl.norm ? image.channels >= 3 : looks_like_normal_map(image)) {
-      out.normal_texture = ref;
-      out.normal_scale = static_cast<float>(source->bump);
-    } else {
-      add_info(model.notes, "height-map", mtl_name + " " + place(*source),
-               source->file + " is no normal map; height maps are not shown");
-    }
+    if (model.images[static_cast<std::size_t>(ref.image)].channels < 3)
+      return add_info(model.notes, "height-map", mtl_name + " " + place(*source),
+                      source->file + " is no normal map; height maps are not shown");
+    out.normal_texture = ref;
+    out.normal_scale = static_cast<float>(source->bump);
   }
 
   void emission(Material& out) const {
@@ -296,17 +265,6 @@ struct Converter {
     if (out.emissive_texture.used() && out.emissive == Vec3f{}) out.emissive = {1, 1, 1};
   }
 };
-
-}  // namespace
-
-namespace {
-
-template <class M, class F>
-void for_each_map(M& material, F&& f) {
-  for (auto* map : {&material.map_kd, &material.map_ka, &material.map_ke, &material.map_d, &material.map_pr,
-                    &material.map_pm, &material.bump, &material.norm})
-    if (*map) f((*map)->file);
-}
 
 constexpr std::string_view kTileMark = "<udim>";
 

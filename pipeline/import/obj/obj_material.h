@@ -31,9 +31,17 @@ struct MtlMaterial {
 
 struct MtlFile {
   std::vector<MtlMaterial> materials;
-  bool by_meshlab = false;                      // its Tr is an opacity
-  std::map<std::string, std::uint64_t> unread;  // statements, by their first word
+  bool by_meshlab = false;  // its Tr is an opacity
+  Lost unread;              // statements, by their first word
 };
+
+/// f(the name of a map), for all that a material has.
+template <class M, class F>
+void for_each_map(M& material, F&& f) {
+  for (auto* map : {&material.map_kd, &material.map_ka, &material.map_ke, &material.map_d, &material.map_pr,
+                    &material.map_pm, &material.bump, &material.norm})
+    if (*map) f((*map)->file);
+}
 
 /// Whether a map is named after UDIM tiles: "scan.<UDIM>.png".
 bool has_tiles(const MtlMaterial& material);

@@ -6,7 +6,7 @@
 #include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/named_files.h"
 #include "pipeline/import/ply/ply_reader.h"
-#include "pipeline/import/seen_alpha.h"
+#include "pipeline/import/seen_texels.h"
 
 // PLY has no specification of names beyond x, y, z. This is what MeshLab, CloudCompare, Metashape, Blender
 // and VTK write, and what is read here:
@@ -57,8 +57,6 @@ struct PlySurface {
   std::uint64_t long_lines = 0, odd_texcoords = 0;
   std::string first_long_line;  // where it stands
 };
-
-constexpr std::size_t kMostLostKinds = 100;  // of what is lost
 
 double scale_of_type(PlyType type) {
   switch (type) {
@@ -230,8 +228,9 @@ class SurfaceReader {
       const bool is_read =
           std::any_of(columns.begin(), columns.end(), is_column) ||
           (colours && std::any_of(colours->column.begin(), colours->column.end(), is_column));
-      if (!is_read && surface_.lost.size() < kMostLostKinds)
-        surface_.lost["values " + quote(element.properties[p].name) + " of " + element.name] += element.count;
+      if (!is_read)
+        count_lost(surface_.lost, "values " + quote(element.properties[p].name) + " of " + element.name,
+                   element.count);
     }
   }
 
@@ -240,8 +239,7 @@ class SurfaceReader {
   }
 
   void skip(const PlyElement& element) {
-    if (surface_.lost.size() < kMostLostKinds)
-      surface_.lost["elements " + quote(element.name)] += element.count;
+    count_lost(surface_.lost, "elements " + quote(element.name), element.count);
     for (std::uint64_t i = 0; i < element.count; ++i) {
       check_cancelled(i);
       rows_.next(row_);

@@ -1,10 +1,11 @@
 
 #include "format/base/portable_math.h"
 #include "format/base/text_bytes.h"
+#include "pipeline/import/foreign_file.h"
 #include "pipeline/import/import_images.h"
 #include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/range/range_scan_document.h"
-#include "pipeline/import/seen_alpha.h"
+#include "pipeline/import/seen_texels.h"
 #include "pipeline/import/text_scan.h"
 #include "stages/image/decode_image.h"
 
@@ -99,6 +100,8 @@ RangeScan scan_from_json(const std::string& file, const RangeScanDescription& d,
   NamedFile grid = find_file({d.grid, "", false}, resolver,
                              static_cast<std::uint64_t>(options.max_file_bytes), notes, "/grid");
   if (!grid.bytes) throw InputError(file, "/grid", "the file " + quote(d.grid), "none: " + grid.looked_for);
+  if (const std::string foreign = foreign_file(*grid.bytes); !foreign.empty())
+    throw InputError(file, "/grid", "a picture or a table of radii", quote(grid.name) + " is " + foreign);
   const Values values = read_values(grid.name, std::move(*grid.bytes), options);
   RangeScan scan;
   scan.columns = values.columns;

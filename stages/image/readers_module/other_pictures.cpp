@@ -1,6 +1,7 @@
 #include <cstdio>
 #include <type_traits>
 
+#include "stages/image/avif.h"
 #include "stages/image/png_writer.h"
 #include "stages/image/readers_module/other_pictures.h"
 
@@ -95,6 +96,8 @@ PictureSize size_of(const std::string& name, OtherPicture kind, ByteSpan bytes) 
       return size_of_jpeg2000(name, bytes);
     case OtherPicture::kHdr:
       return size_of_hdr(name, bytes);
+    case OtherPicture::kAvif:
+      break;  // decode_avif() checks it
   }
   return {};
 }
@@ -175,13 +178,17 @@ std::optional<OtherPicture> sniff_other_picture(const std::string& name, ByteSpa
   if (has(bytes, 0, "\0\0\0\x0cjP  \r\n\x87\n"sv) || has(bytes, 0, "\xff\x4f\xff\x51"sv))
     return OtherPicture::kJpeg2000;
   if (has(bytes, 0, "#?RADIANCE"sv) || has(bytes, 0, "#?RGBE"sv)) return OtherPicture::kHdr;
+  if (is_avif(bytes)) return OtherPicture::kAvif;
   if (is_tga(name, bytes)) return OtherPicture::kTga;
   return std::nullopt;
 }
 
-ConvertedPicture convert_other_picture(const std::string& name, OtherPicture kind, ByteSpan bytes,
-                                       const ImageLimits& limits) {
-  const PictureSize size = size_of(name, kind, bytes);
+namespace {
+
+/// By OpenImageIO; `size` becomes the picture's.
+PictureSamples read_by_module(const std::string& name, OtherPicture kind, ByteSpan bytes,
+                              const ImageLimits& limits, PictureSize& size) {
+  size = size_of(name, kind, bytes);
   check_image_size(name, size.width_px, size.height_px, limits);
   // No packer of these kinds shrinks a picture with any noise further.
   const std::uint64_t most_shrunk = kind == OtherPicture::kJpeg2000 ? 20000 : 3000;
@@ -189,8 +196,26 @@ ConvertedPicture convert_other_picture(const std::string& name, OtherPicture kin
     throw InputError(name, "image header",
                      "a size that its " + std::to_string(bytes.size()) + " bytes can hold",
                      std::to_string(size.width_px) + " x " + std::to_string(size.height_px));
-  PictureSamples picture = module_readers(name, other_picture_name(kind), "libopenimageio2.4")
-                               .read_picture(name, kind, bytes, size);
+  return module_readers(name, other_picture_name(kind), "libopenimageio2.4")
+      .read_picture(name, kind, bytes, size);
+}
+
+PictureSamples read_avif(const std::string& name, ByteSpan bytes, const ImageLimits& limits,
+                         PictureSize& size) {
+  AvifPicture picture = decode_avif(name, bytes, limits);
+  size = {picture.width_px, picture.height_px};
+  PictureSamples out{picture.channels, picture.more_pictures, picture.profile, {}};
+  std::visit([&](auto& samples) { out.samples = std::move(samples); }, picture.samples);
+  return out;
+}
+
+}  // namespace
+
+ConvertedPicture convert_other_picture(const std::string& name, OtherPicture kind, ByteSpan bytes,
+                                       const ImageLimits& limits) {
+  PictureSize size;
+  PictureSamples picture = kind == OtherPicture::kAvif ? read_avif(name, bytes, limits, size)
+                                                       : read_by_module(name, kind, bytes, limits, size);
   ConvertedPicture out;
   out.more_pictures = picture.more_pictures;
   out.profile = picture.profile;

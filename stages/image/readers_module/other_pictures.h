@@ -7,11 +7,11 @@
 
 namespace texmesh {
 
-enum class OtherPicture : std::uint8_t { kBmp, kTga, kGif, kDds, kJpeg2000, kHdr };
+enum class OtherPicture : std::uint8_t { kBmp, kTga, kGif, kDds, kJpeg2000, kHdr, kAvif };
 
-/// "BMP", "TGA", "GIF", "DDS", "JPEG 2000", "Radiance HDR".
+/// "BMP", "TGA", "GIF", "DDS", "JPEG 2000", "Radiance HDR", "AVIF".
 constexpr const char* other_picture_name(OtherPicture kind) {
-  constexpr const char* kNames[] = {"BMP", "TGA", "GIF", "DDS", "JPEG 2000", "Radiance HDR"};
+  constexpr const char* kNames[] = {"BMP", "TGA", "GIF", "DDS", "JPEG 2000", "Radiance HDR", "AVIF"};
   return kNames[static_cast<std::size_t>(kind)];
 }
 
@@ -29,12 +29,12 @@ struct ConvertedPicture {
   bool profile = false;        // of colours, which is left out
 };
 
-/// The texels by OpenImageIO, top row first: those of an HDR are light, as in an EXR, all others values as
-/// they stand. Alpha that is 0 everywhere, or opaque, is left out: BMP and TGA have a fourth byte that says
-/// nothing. Of a DDS the largest level, and normals of two channels (BC5) with their third. Size and number
-/// of tiles are checked against the limits and against the bytes before a reader takes memory for them.
-/// InputError for damaged files, cubes, volumes, and an HDR that is turned; and where the module cannot be
-/// loaded.
+/// The texels by OpenImageIO, of an AVIF by libavif, top row first: those of an HDR are light, as in an EXR,
+/// all others values as they stand. Alpha that is 0 everywhere, or opaque, is left out: BMP and TGA have a
+/// fourth byte that says nothing. Of a DDS the largest level, and normals of two channels (BC5) with their
+/// third. Size and number of tiles are checked against the limits and against the bytes before a reader takes
+/// memory for them. InputError for damaged files, cubes, volumes, and an HDR that is turned; and where the
+/// module cannot be loaded.
 ConvertedPicture convert_other_picture(const std::string& name, OtherPicture kind, ByteSpan bytes,
                                        const ImageLimits& limits);
 

@@ -2,6 +2,7 @@
 #include "delivery/cpp/package/http_store.h"
 
 #include <gtest/gtest.h>
+#include <zlib.h>
 
 #include <algorithm>
 #include <map>
@@ -115,6 +116,114 @@ TEST(HttpStore, SilentServersAreGivenUp) {
   });
   EXPECT_THROW(PackageReader(open_url(stalls.url("/a.texmesh"), once)), InputError);
   EXPECT_THROW(PackageReader(open_url("http://127.0.0.1:1/a.texmesh", once)), InputError);
+}
+
+/// What opening and reading all of a package says of a server that answers so; "" where all is well.
+std::string said_of(const std::function<std::string(const Request&)>& handler, const std::string& path) {
+  RawServer server([&](const Request& r) { return Reply{handler(r), true}; });
+  try {
+    PackageReader reader(open_url(server.url(path), quick()));
+    read_all(reader);
+  } catch (const Error& e) {
+    EXPECT_NE(std::string(e.what()).find(server.url("/")), std::string::npos) << e.what();
+    return e.what();
+  }
+  return "";
+}
+
+void expect_said(const std::string& text, const std::vector<std::string>& parts) {
+  for (const std::string& part : parts)
+    EXPECT_NE(text.find(part), std::string::npos) << part << " in: " << text;
+}
+
+TEST(HttpStore, APageInThePlaceOfAFileIsCalledOne) {
+  const std::string page = "\n<!doctype html><title>Sign in</title>" + std::string(100, ' ');
+  const std::string type = "Content-Type: text/html; charset=utf-8\r\n";
+  for (const char* path : {"/a.texmesh", "/a/"}) {
+    expect_said(said_of([&](const Request&) { return answer(200, type, page); }, path),
+                {"a page", "status 200", "text/html; charset=utf-8", std::to_string(page.size()) + " bytes"});
+    expect_said(said_of([&](const Request& r) { return ranged(page, r, type); }, path),
+                {"a page", "status 206"});
+    expect_said(said_of(
+                    [&](const Request& r) {
+                      return r.path == "/login" ? answer(200, type, page)
+                                                : answer(302, "Location: /login\r\n", "");
+                    },
+                    path),
+                {"a page", "redirected to http://127.0.0.1:", "/login"});
+    expect_said(said_of([&](const Request&) { return answer(404, type, page); }, path),
+                {"status 404", "text/html"});
+  }
+}
+
+TEST(HttpStore, AServerThatGivesItsFrontPageForEverythingHasTheWholeFile) {
+  const std::string front = answer(200, "Content-Type: text/html\r\n", "<html>" + std::string(1000, 'x'));
+  EXPECT_EQ(
+      said_of([&](const Request& r) { return r.path == "/a.texmesh" ? answer(200, "", package()) : front; },
+              "/a.texmesh"),
+      "");
+}
+
+TEST(HttpStore, APageThatComesLaterIsNoPartOfTheFile) {
+  const std::string type = "Content-Type: text/html\r\n", page = "<html>" + std::string(1000, 'x');
+  for (const int status : {200, 206})
+    expect_said(said_of(
+                    [&](const Request& r) {
+                      if (r.number == 0) return ranged(package(), r);
+                      return status == 200 ? answer(200, type, page)
+                                           : answer(206, type + "Content-Range: bytes 0-1005/1006\r\n", page);
+                    },
+                    "/a.texmesh"),
+                {status == 200 ? "status 200" : "it was replaced"});
+}
+
+std::string gzipped(const std::string& text) {
+  z_stream z{};
+  deflateInit2(&z, 6, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY);
+  std::string out(deflateBound(&z, text.size()) + 64, 0);
+  std::string in = text;
+  z.next_in = reinterpret_cast<Bytef*>(in.data());
+  z.avail_in = static_cast<uInt>(in.size());
+  z.next_out = reinterpret_cast<Bytef*>(out.data());
+  z.avail_out = static_cast<uInt>(out.size());
+  deflate(&z, Z_FINISH);
+  out.resize(z.total_out);
+  deflateEnd(&z);
+  return out;
+}
+
+TEST(HttpStore, AServerThatCompressesIsReadWholeOrSaysSo) {
+  const std::string gzip = "Content-Encoding: gzip\r\nContent-Type: application/octet-stream\r\n";
+  EXPECT_EQ(said_of(
+                [&](const Request& r) {
+                  return r.path == "/a.texmesh" ? answer(200, gzip, gzipped(package())) : answer(404, "", "");
+                },
+                "/a.texmesh"),
+            "");
+  expect_said(said_of([&](const Request& r) { return ranged(gzipped(package()), r, gzip); }, "/a.texmesh"),
+              {"status 206", "gzip", "must not compress"});
+}
+
+TEST(HttpStore, ALengthThatTheServerDoesNotTellIsLegal) {
+  const auto without_total = [&](const std::string& file, const Request& r) {
+    std::string text = ranged(file, r);
+    const std::string total = "/" + std::to_string(file.size()) + "\r\n";
+    return text.replace(text.find(total), total.size(), "/*\r\n");
+  };
+  EXPECT_EQ(said_of(
+                [&](const Request& r) {
+                  if (r.path != "/a.texmesh") return answer(404, "", "");
+                  return r.ranged ? without_total(package(), r) : answer(200, "", package());
+                },
+                "/a.texmesh"),
+            "");
+  EXPECT_EQ(said_of(
+                [&](const Request& r) {
+                  return r.number == 0 ? ranged(package(), r) : without_total(package(), r);
+                },
+                "/a.texmesh"),
+            "")
+      << "later answers need not tell it again";
 }
 
 TEST(HttpStore, LiesAboutRangesAreFound) {

@@ -66,28 +66,70 @@ TEST(FindModels, FoldersKeepTheirTreeAndSkipWhatIsNoModel) {
   for (const ModelPath& p : m) EXPECT_EQ(p.unread, p.input.ends_with(".json")) << p.input;
 }
 
-TEST(FindModels, ModelsThatWouldShareAPackageKeepTheirExtension) {
-  const TemporaryFolder folder;
-  for (const char* f : {"site.glb", "site.obj", "yurt.glb"}) write_text(folder / f, "x");
-  const auto m = find_models({folder.path().string()}, "out");
-  ASSERT_EQ(m.size(), 3u);
-  EXPECT_EQ(m[0].output, "out/site.glb.texmesh");
-  EXPECT_EQ(m[1].output, "out/site.obj.texmesh");
-  EXPECT_EQ(m[2].output, "out/yurt.texmesh");
+std::map<std::string, std::string> outputs_of(const TemporaryFolder& folder, PackageNames names) {
+  std::map<std::string, std::string> outputs;
+  for (const ModelPath& m : find_models({folder.path().string()}, "out", names))
+    outputs[fs::path(m.input).filename()] = m.output;
+  return outputs;
 }
 
-TEST(FindModels, OfAJsonAndAnotherOnlyTheJsonKeepsItsExtension) {
+TEST(FindModels, NoOtherModelChangesAName) {
+  const std::vector<std::string> files{"site.glb", "site.obj", "yurt.json", "yurt.ply", "a.b.stl"};
+  for (const PackageNames names : {PackageNames::kStem, PackageNames::kFull}) {
+    const TemporaryFolder all;
+    for (const std::string& file : files) write_text(all / file, "\"cylindrical-range-scan\"");
+    const auto outputs = outputs_of(all, names);
+    for (const std::string& file : files) {
+      const TemporaryFolder alone;
+      write_text(alone / file, "\"cylindrical-range-scan\"");
+      EXPECT_EQ(outputs_of(alone, names), (std::map<std::string, std::string>{{file, outputs.at(file)}}));
+    }
+    EXPECT_EQ(outputs.at("a.b.stl"),
+              names == PackageNames::kStem ? "out/a.b.texmesh" : "out/a.b.stl.texmesh");
+  }
+}
+
+/// What plan_batch() says of a folder with these files; "" where it takes it.
+std::string refusal_of(const std::vector<std::string>& files, PackageNames names = PackageNames::kStem) {
   const TemporaryFolder folder;
-  for (const char* f : {"site.json", "site.obj", "yurt.json", "yurt.obj", "yurt.ply"})
-    write_text(folder / f, "x");
-  std::map<std::string, std::string> outputs;
-  for (const ModelPath& m : find_models({folder.path().string()}, "out"))
-    outputs[fs::path(m.input).filename()] = m.output;
-  EXPECT_EQ(outputs, (std::map<std::string, std::string>{{"site.json", "out/site.json.texmesh"},
-                                                         {"site.obj", "out/site.texmesh"},
-                                                         {"yurt.json", "out/yurt.json.texmesh"},
-                                                         {"yurt.obj", "out/yurt.obj.texmesh"},
-                                                         {"yurt.ply", "out/yurt.ply.texmesh"}}));
+  for (const std::string& file : files) {
+    fs::create_directories(fs::path(folder / file).parent_path());
+    write_text(folder / file, file.starts_with("scan") ? "\"cylindrical-range-scan\"" : "{}");
+  }
+  PlanRequest request;
+  request.inputs = {folder.path().string()};
+  request.output = folder / "out";
+  request.names = names;
+  try {
+    plan_batch(request);
+  } catch (const InputError& e) {
+    return e.what();
+  }
+  return "";
+}
+
+TEST(FindModels, TwoModelsOfOneNameAreRefusedAndBothNamed) {
+  for (const auto& [a, b] :
+       {std::pair{"site.glb", "site.obj"}, {"scan.json", "scan.ply"}, {"d/x.glb", "d/x.STL"}}) {
+    const std::string said = refusal_of({a, b, "other.glb"});
+    EXPECT_NE(said.find(a), std::string::npos) << said;
+    EXPECT_NE(said.find(b), std::string::npos) << said;
+    EXPECT_NE(said.find("--names full"), std::string::npos) << said;
+    EXPECT_EQ(refusal_of({a, b, "other.glb"}, PackageNames::kFull), "");
+  }
+}
+
+TEST(FindModels, NamesThatOneFileSystemTakesForOneAreRefused) {
+  for (const auto& [a, b] :
+       {std::pair{"Bust.glb", "bust.glb"}, {"\u00fc.glb", "\u00dc.obj"}, {"\u00fc.glb", "u\u0308.glb"}})
+    for (const PackageNames names : {PackageNames::kStem, PackageNames::kFull}) {
+      const bool meets = names == PackageNames::kStem || std::string(b).ends_with(".glb");
+      EXPECT_EQ(refusal_of({a, b}, names) != "", meets) << a << " " << b;
+    }
+}
+
+TEST(FindModels, AJsonThatIsNoModelIsNobodysNeighbour) {
+  EXPECT_EQ(refusal_of({"site.json", "site.obj", "d/site.obj"}), "");
 }
 
 TEST(FindModels, AFolderWithoutModelsIsRefused) {

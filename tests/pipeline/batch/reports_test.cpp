@@ -117,7 +117,7 @@ std::string told(OutputMode mode, bool verbose, bool explain) {
       1, told_by_child(R"({"event":"error","kind":"input","file":"b.obj","place":"","expected":"faces",
                         "found":"none","message":"b.obj: no faces"})"));
   progress.finished(1, b, "b.texmesh");
-  progress.summary({a, b, c}, 1.5);
+  progress.summary({a, b, c}, 1.5, {}, false);
   return out.str();
 }
 

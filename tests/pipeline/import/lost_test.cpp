@@ -276,16 +276,18 @@ TEST(ForeignFile, IsNamedWhateverItsNameSays) {
     MemoryResolver files;
     files.files["c.png"] = bytes_of(content);
     files.files["a.mtl"] = bytes_of("newmtl m\nmap_Kd c.png\n");
-    EXPECT_NE(testing::input_error([&] { import("m.obj", bytes_of(kTextured), files); }).find(what),
-              std::string::npos);
-    files.files["a.mtl"] = bytes_of(content);
-    const ImportedModel m = import("m.obj", bytes_of(kTextured), files);
-    ASSERT_EQ(testing::count_notes(m.model, "missing-mtl"), 1);
-    EXPECT_NE(m.model.notes[0].text.find(what), std::string::npos);
+    for (const char* code : {"missing-texture", "missing-mtl"}) {
+      const ImportedModel m = import("m.obj", bytes_of(kTextured), files);
+      ASSERT_EQ(testing::count_notes(m.model, code), 1);
+      EXPECT_NE(m.model.notes[0].text.find(what), std::string::npos);
+      files.files["a.mtl"] = bytes_of(content);
+    }
     files.files["b.bin"] = bytes_of(content);
     EXPECT_NE(
         testing::input_error([&] { import("m.gltf", testing::quad().gltf("b.bin"), files); }).find(what),
         std::string::npos);
+    const Bytes scan = bytes_of(R"({"version":1,"type":"cylindrical-range-scan","y_step":1,"grid":"b.bin"})");
+    EXPECT_NE(testing::input_error([&] { import("m.json", scan, files); }).find(what), std::string::npos);
   }
   EXPECT_NE(
       testing::input_error([] { import("m.obj", "v 0 0 0\nv 1 0 0\n"); }).find("point cloud of 2 points"),

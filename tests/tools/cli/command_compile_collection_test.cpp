@@ -87,6 +87,34 @@ TEST_F(Collection, AnUnchangedOneRunsNothingAndSaysSoInOneLine) {
             "3 of 3 models are up to date: no input, option or tool has changed. Nothing was written.\n");
 }
 
+TEST_F(Collection, APackageWithoutItsModelIsToldUntilItIsRemoved) {
+  ASSERT_NO_FATAL_FAILURE(add_three());
+  ASSERT_EQ(compile().exit_code, 0);
+  EXPECT_FALSE(fs::exists(folder_ / "out/.texmesh-stale"));
+  fs::remove(folder_ / "in/b.obj");
+  const auto told = [](const CommandResult& r) {
+    return r.output.find("b.texmesh: no model makes") != std::string::npos;
+  };
+  EXPECT_TRUE(told(compile({"--dry-run"})));
+  EXPECT_FALSE(fs::exists(folder_ / "out/.texmesh-stale")) << "a dry run writes nothing";
+  EXPECT_TRUE(told(compile()));
+  EXPECT_TRUE(told(compile({"--quiet"}))) << "as long as it is there";
+  EXPECT_EQ(read_text(folder_ / "out/.texmesh-stale"), "b.texmesh\n");
+  EXPECT_EQ(events().back()["stale"], Json::array({"b.texmesh"}));
+  const std::vector<std::string> list{TEXMESH_BINARY, "list", folder_ / "in", "-o", folder_ / "out"};
+  EXPECT_TRUE(told(run_command(list)));
+  EXPECT_FALSE(told(run_command({TEXMESH_BINARY, "compile", folder_ / "in/a.obj", "-o", folder_ / "out",
+                                 "--cache", folder_ / "cache", "--profile", folder_ / "profile.json"})))
+      << "a file's siblings are no business of its run";
+  EXPECT_TRUE(fs::exists(folder_ / "out/b.texmesh"));
+  const CommandResult removed = compile({"--remove-stale"});
+  EXPECT_NE(removed.output.find("b.texmesh: removed"), std::string::npos) << removed.output;
+  EXPECT_FALSE(fs::exists(folder_ / "out/b.texmesh"));
+  EXPECT_TRUE(fs::exists(folder_ / "out/a.texmesh"));
+  EXPECT_FALSE(fs::exists(folder_ / "out/.texmesh-stale"));
+  EXPECT_FALSE(told(compile()));
+}
+
 TEST_F(Collection, AnotherTextureRunsThatModelsTextureStagesOnly) {
   ASSERT_NO_FATAL_FAILURE(add_three());
   ASSERT_EQ(compile().exit_code, 0);

@@ -72,8 +72,12 @@ TEST_F(Names, LinksAreFollowedWithinTheFolderThatWasNamed) {
   EXPECT_NE(compile(scans("a.obj"), more).find("up to date"), std::string::npos);
   EXPECT_NE(compile(scans("a.obj"), required).find("missing-texture"), std::string::npos)
       << "not what was found with the option";
-  fs::remove_all(folder_ / "out");
-  EXPECT_EQ(compile(folder_ / "repository", required).find("warning"), std::string::npos);
+  write_text(folder_ / "repository/c.json",
+             R"({"version":1,"models":[{"input":"scans/a.obj","output":"a.texmesh"}]})");
+  const std::string whole = compile(folder_ / "repository/c.json", required);
+  EXPECT_EQ(whole.find("warning"), std::string::npos) << whole;
+  EXPECT_EQ(whole.find("up to date"), std::string::npos) << "the folder that was named decides";
+  EXPECT_NE(compile(folder_ / "repository/c.json", required).find("up to date"), std::string::npos);
 }
 
 TEST_F(Names, ALinkToAFolderThatIsNotThereIsAUsageError) {

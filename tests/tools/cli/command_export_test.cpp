@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "format/rules/output_transform.h"
 #include "stages/gltf/check_glb.h"
 #include "tests/support/command.h"
 #include "tests/support/packages.h"
@@ -116,6 +117,49 @@ TEST_F(ExportCommand, TilesAreInMetresWhereTheUnitIsKnown) {
   EXPECT_NEAR(root["transform"][14].get<double>(), 0.2, 1e-12);
   EXPECT_NEAR(facts_of(text("level-0.glb")).bounds_max.x, 0.001 * high.x, 1e-6);
   EXPECT_EQ(text("level-0.glb").find("\"mm\""), std::string::npos) << "the file says it is in metres";
+}
+
+// A file of each kind has the object at the same place, as large and the same way up.
+TEST_F(ExportCommand, AllFilesAgreeOnUnitsAndAxes) {
+  const auto box_of = [&](const std::string& glb) {
+    const GlbFacts facts = facts_of(glb);
+    return Box3d{facts.bounds_min, facts.bounds_max};
+  };
+  PackageParts parts = make_package_parts();
+  parts.manifest.origin = {100, 200, 300};
+  using Case = std::pair<double, const char*>;
+  for (const auto& [metres, up] :
+       {Case{0, ""}, {0, "z"}, {1, "x"}, {0.001, "y"}, {0.001, "z"}, {0.3048, "x"}}) {
+    SCOPED_TRACE(std::to_string(metres) + up);
+    parts.about.unit = metres > 0 ? "unit" : "";
+    parts.about.metres_per_unit = metres;
+    parts.about.up_axis = up;
+    const std::string package = written(parts);
+    const auto extracted = [&](std::vector<std::string> more) {
+      more.insert(more.begin(), {TEXMESH_BINARY, "extract", package, "-o", folder_ / "one.glb"});
+      const CommandResult r = run_command(more);
+      EXPECT_TRUE(r.exit_code == 0 || r.exit_code == 4) << r.errors;
+      EXPECT_EQ(r.output.find("unit of length is not known") != std::string::npos, metres == 0) << r.output;
+      return box_of(read_text(folder_ / "one.glb"));
+    };
+    const auto expect_alike = [&](const Box3d& a, const Box3d& b, const std::string& what) {
+      EXPECT_LT(length(a.min - b.min) + length(a.max - b.max), 1e-3 * a.diagonal()) << what;
+    };
+    const Box3d truth = output_transform(parts.about, parts.manifest.origin,
+                                         false)(Box3d{parts.manifest.bounds_min, parts.manifest.bounds_max});
+    expect_alike(truth, extracted({"--scale", "0"}), "a scale");
+    expect_alike(truth, extracted({"--scale", "0", "--plain"}), "plain");
+    const Box3d kept = extracted({"--scale", "0", "--keep-units"});
+    EXPECT_NEAR(kept.diagonal() * (metres > 0 ? metres : 1), truth.diagonal(), 1e-3 * truth.diagonal());
+    ASSERT_EQ(run(package, "model-viewer").exit_code, 0);
+    EXPECT_NEAR(box_of(text("model.glb")).diagonal(), truth.diagonal(), 0.05 * truth.diagonal());
+    ASSERT_EQ(run(package, "3dtiles").exit_code, 0);
+    Box3d tile = box_of(text("level-0.glb"));
+    const Json root = Json::parse(text("tileset.json"))["root"];
+    const Vec3d to{root["transform"][12], root["transform"][14], -root["transform"][13].get<double>()};
+    tile.min = tile.min + to, tile.max = tile.max + to;
+    expect_alike(truth, tile, "tiles");
+  }
 }
 
 TEST_F(ExportCommand, LevelsOfDetailShareTheirTextures) {

@@ -179,7 +179,7 @@ TEST(ExtractMesh, ALittleLeanerThanStoredItKeepsItsNormals) {
   compile_model(request, store, {}, {});
   PackageReader package(open_store(folder / "a.texmesh"));
   TextureSource textures(package, 1e7, {});
-  const Reference reference(package, {}, false, textures, {});
+  const Reference reference(package, {}, {}, textures, {});
   Candidates candidates(reference, textures);
   const Filling filling(reference, candidates, 100'000);
   const MeshCandidate &stored = candidates.mesh({0, kMeshCodings - 1, 0}),

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "pipeline/import/import.h"
+#include "pipeline/io/file_resolver.h"
 #include "stages/gltf/check_glb.h"
 #include "stages/image/decode_image.h"
 #include "tests/support/packages.h"
@@ -107,8 +109,8 @@ TEST(ExtractModel, TheBestRungAsPngIsThePlanePutTogetherAgain) {
 }
 
 TEST(ExtractModel, EveryKindOfRequestGivesAValidFile) {
-  for (const ExtractImages images :
-       {ExtractImages::kAuto, ExtractImages::kJpeg, ExtractImages::kWebp, ExtractImages::kPng})
+  for (const ExtractImages images : {ExtractImages::kAuto, ExtractImages::kJpeg, ExtractImages::kWebp,
+                                     ExtractImages::kAvif, ExtractImages::kPng})
     for (const bool lods : {false, true})
       for (const double display : {0.0, 50.0, 5000.0}) {
         ExtractScale r;
@@ -118,10 +120,9 @@ TEST(ExtractModel, EveryKindOfRequestGivesAValidFile) {
         const Extracted e = extract({r});
         expect_valid(e.glb, std::to_string(static_cast<int>(images)) + " " + std::to_string(display));
         const nlohmann::json root = json_of(e.glb);
-        const bool webp = images == ExtractImages::kWebp;
-        EXPECT_EQ(root.value("extensionsRequired", nlohmann::json::array()).dump().find("EXT_texture_webp") !=
-                      std::string::npos,
-                  webp);
+        const std::string required = root.value("extensionsRequired", nlohmann::json::array()).dump();
+        EXPECT_EQ(required.find("EXT_texture_webp") != std::string::npos, images == ExtractImages::kWebp);
+        EXPECT_EQ(required.find("EXT_texture_avif") != std::string::npos, images == ExtractImages::kAvif);
         EXPECT_EQ(e.scale, display == 50 ? 5 : 0);
         EXPECT_EQ(e.levels.size(), lods && e.scale == 0 ? 2u : 1u);
       }
@@ -246,6 +247,20 @@ TEST(ExtractModel, DamageIsAnErrorWhereverItIs) {
         EXPECT_FALSE(std::string(e.what()).empty());
       }
     }
+}
+
+TEST(ExtractModel, AvifFillsTheBytesAndIsReadAgain) {
+  ExtractBudget r = budget({6000});
+  r.images = ExtractImages::kAvif;
+  const Extracted e = extract({r});
+  expect_valid(e.glb, "avif");
+  EXPECT_LE(e.glb.size(), 6000u);
+  ASSERT_FALSE(e.images.empty());
+  for (const ExtractedImage& i : e.images) EXPECT_EQ(i.format, FileImage::kAvif);
+  NoFiles none;
+  const Model model = import_package_glb("x.glb", e.glb, none, {}).model;
+  ASSERT_EQ(model.images.size(), e.images.size());
+  EXPECT_EQ(model.images[0].width_px, e.images[0].width_px);
 }
 
 TEST(ExtractModel, ReportsAreJson) {

@@ -19,8 +19,8 @@ struct GateResult {
 
 /// The limits of a plan, and its time limit.
 std::vector<GateResult> check_plan(const DeliveryPlan& plan, const Gate& gate, double time_limit_s);
-/// FLIP, measured by rendering, of each scale at its switch size (tools/publish/report/switch_sizes.h). Reads
-/// the whole package.
+/// FLIP, measured by rendering, of each scale at its switch size (tools/publish/report/report_pictures.h).
+/// Reads the whole package.
 std::vector<GateResult> check_switch_sizes(PackageReader& package, double max_flip, int views,
                                            const RunContext& context);
 

@@ -18,6 +18,11 @@ Option add_jobs_option(Command& c, int& jobs) {
   return c.option("-j,--jobs", jobs, "Processors to use; 0 = all (default)").integer_in(0, 1024);
 }
 
+void add_jobs_and_json_options(Command& c, int& jobs, bool& json, const std::string& schema) {
+  add_jobs_option(c, jobs);
+  c.flag("--json", json, "Print one JSON object" + (schema.empty() ? "" : " (" + schema + ")"));
+}
+
 RunContext context_of(int jobs) {
   RunContext context;
   context.threads = jobs > 0 ? jobs : machine_share().processors;

@@ -3,6 +3,7 @@
 #include <memory>
 #include <mutex>
 #include <ostream>
+#include <string>
 
 #include "format/base/note.h"
 #include "pipeline/batch/plan.h"
@@ -19,6 +20,9 @@ struct RunContext;
 
 /// --jobs; 0, the default, stands for every processor.
 Option add_jobs_option(Command& command, int& jobs);
+/// --jobs, and --json for one JSON object; `schema` names its schema, as "schemas/diff.v1.schema.json", or is
+/// empty.
+void add_jobs_and_json_options(Command& command, int& jobs, bool& json, const std::string& schema = {});
 RunContext context_of(int jobs);
 
 /// Where stages' results are kept: --cache and --no-cache, as compile understands them.

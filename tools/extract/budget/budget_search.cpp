@@ -93,10 +93,10 @@ std::optional<DealtBytes> with_largest_loss_resized(DealtBytes images, int steps
 
 /// What searches for several numbers of bytes share.
 struct SharedSearch {
-  SharedSearch(PackageReader& package, const ExtractBudget& wishes, bool recentre, std::uint64_t bytes,
-               const RunContext& context)
+  SharedSearch(PackageReader& package, const ExtractBudget& wishes, const OutputTransform& place,
+               std::uint64_t bytes, const RunContext& context)
       : textures(package, most_texels(bytes), context),
-        reference(package, wishes, recentre, textures, context),
+        reference(package, wishes, place, textures, context),
         candidates(reference, textures, wishes.bytes.size() > 1) {}
   TextureSource textures;
   const Reference reference;
@@ -408,7 +408,7 @@ Extracted Search::finish(const MeshKey& key, FilledFile file) {
 }
 
 std::vector<Extracted> extract_within_bytes(PackageReader& package, const ExtractBudget& wishes,
-                                            bool recentre, const RunContext& context) {
+                                            const OutputTransform& place, const RunContext& context) {
   const std::vector<std::uint64_t>& bytes = wishes.bytes;
   std::vector<std::size_t> order(bytes.size());  // rising: neighbours share most
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -422,7 +422,7 @@ std::vector<Extracted> extract_within_bytes(PackageReader& package, const Extrac
     };
     if (!shared || !shared->textures.serves(most_texels(wanted))) {
       shared.reset();  // before the next one needs the memory
-      shared = std::make_unique<SharedSearch>(package, wishes, recentre, wanted, context);
+      shared = std::make_unique<SharedSearch>(package, wishes, place, wanted, context);
     }
     report(0.2);
     Extracted& found = out[order[i]];

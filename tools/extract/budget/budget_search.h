@@ -12,7 +12,7 @@ namespace texmesh {
 /// that its number alone gives. InputError for a scale that is not there. Same bytes for any number of
 /// threads.
 std::vector<Extracted> extract_within_bytes(PackageReader& package, const ExtractBudget& wishes,
-                                            bool recentre, const RunContext& context);
+                                            const OutputTransform& place, const RunContext& context);
 
 /// A file of a mesh with textures as `images` plan them, and its difference in whole pictures, where it has
 /// been looked at.

@@ -72,7 +72,7 @@ const MeshCandidate& Candidates::mesh(const MeshKey& key) {
   if (reference_.wishes.levels) file->begin_levels(screen_coverage_of(m, c.scale));
   for (std::size_t l = 1; l < c.levels.size(); ++l)
     file->add_level(*recoded_scale(c.levels[l], key), screen_coverage_of(m, c.levels[l]));
-  if (!reference_.recentre) file->move_to(m.origin);
+  file->place(reference_.place);
   c.file = std::move(file);
   const LitViews windows(*c.lit, reference_.windows, reference_.context);
   c.geometry = reference_.window_meter->difference(windows, reference_.best_textures, reference_.context);
@@ -109,6 +109,7 @@ std::vector<TextureCoding> Candidates::codings(std::size_t image) const {
   const ExtractImages wanted = reference_.wishes.images;
   const bool alpha = reference_.images[image].alpha_plane.has_value();  // which no JPEG holds
   if (wanted == ExtractImages::kPng || (alpha && wanted == ExtractImages::kJpeg)) return {{FileImage::kPng}};
+  if (wanted == ExtractImages::kAvif) return {{FileImage::kAvif}};
   if (wanted == ExtractImages::kWebp || alpha) return {{FileImage::kWebp}};
   std::vector<TextureCoding> out{{FileImage::kJpeg, true}};
   if (reference_.images[image].colours) out.push_back({FileImage::kJpeg, false});
@@ -171,8 +172,7 @@ OtherTextures Candidates::shown_by(std::size_t image, const FileImageData& file,
   OtherTextures out;
   for (std::size_t t = 0; t < reference_.shown.size(); ++t)
     if (reference_.shown[t].image == image)
-      out[t] = render_texture(decode_image(probe_image("texture", file.bytes, {})), reference_.shown[t].srgb,
-                              0, context);
+      out[t] = render_texture(decode_file_image(file), reference_.shown[t].srgb, 0, context);
   return out;
 }
 

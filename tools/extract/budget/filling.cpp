@@ -61,7 +61,7 @@ std::vector<std::uint8_t> MeshFile::with(const std::map<std::uint32_t, FileImage
 
 MeshFile Filling::mesh_file(const MeshCandidate& mesh) const {
   auto file = std::make_shared<StandaloneGlb>(*mesh.file);
-  file->set_about(about_within(reference_.package.about(), bytes_ / kAboutShare));
+  file->set_about(reserved_about(reference_.package.about(), reference_.place, bytes_));
   MeshFile out{std::move(file)};
   out.fixed_bytes = out.with({}).size();
   return out;

@@ -170,11 +170,11 @@ std::vector<double> LitMeter::differences(const LitViews& views, const std::vect
   return sums;
 }
 
-Reference::Reference(PackageReader& from, const ExtractBudget& asked, bool keep_near_0,
+Reference::Reference(PackageReader& from, const ExtractBudget& asked, const OutputTransform& placed,
                      TextureSource& textures, const RunContext& run)
     : package(from),
       wishes(asked),
-      recentre(keep_near_0),
+      place(placed),
       context(run),
       side_px(static_cast<std::uint32_t>(std::clamp(asked.display_px, 64.0, 768.0))),
       images(textures.images()) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "format/base/vec.h"
+#include "format/rules/output_transform.h"
 #include "stages/geometry/scale_frames.h"
 #include "stages/measure/flip.h"
 #include "stages/render/shade.h"
@@ -84,8 +85,8 @@ struct PictureTexture {
 struct Reference {
   /// Reads the package's best from `textures`, which learns which of its texels are shown. StageError for S_0
   /// without an extent.
-  Reference(PackageReader& package, const ExtractBudget& wishes, bool recentre, TextureSource& textures,
-            const RunContext& context);
+  Reference(PackageReader& package, const ExtractBudget& wishes, const OutputTransform& place,
+            TextureSource& textures, const RunContext& context);
   Reference(const Reference&) = delete;  // meters and views point into it
   Reference& operator=(const Reference&) = delete;
 
@@ -97,7 +98,7 @@ struct Reference {
 
   PackageReader& package;
   const ExtractBudget wishes;  // but for its numbers of bytes
-  const bool recentre;
+  const OutputTransform place;
   RunContext context;                        // without progress
   std::uint32_t side_px = 0;                 // of the pictures
   std::vector<PackageImage> images;          // all of the package

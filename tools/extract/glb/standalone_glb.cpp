@@ -2,6 +2,8 @@
 
 #include <charconv>
 
+#include "format/model/material_extensions.h"
+#include "format/model/tangents.h"
 #include "format/split/split_element_codec.h"
 #include "format/split/split_reader.h"
 #include "pipeline/about/gltf_about.h"
@@ -16,7 +18,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 constexpr const char* kDraco = "KHR_draco_mesh_compression";
 constexpr const char* kMeshopt = "EXT_meshopt_compression";
-constexpr const char* kWebp = "EXT_texture_webp";
+constexpr const char* kTextureExtensions[] = {"EXT_texture_webp", "EXT_texture_avif"};
 constexpr const char* kLod = "MSFT_lod";
 
 std::size_t number(const Json& object, const char* key) {
@@ -33,6 +35,26 @@ void for_each_key(Json& json, const char* key, const F& f) {
       else
         for_each_key(*it, key, f);
     }
+}
+
+/// What a texture with an image of this type needs; null for those of glTF 2.0 itself.
+const char* texture_extension(std::string_view mime_type) {
+  if (mime_type == "image/webp") return kTextureExtensions[0];
+  return mime_type == "image/avif" ? kTextureExtensions[1] : nullptr;
+}
+
+/// As tangent_texcoord() has it for a Material.
+int tangent_texcoord_of(const Json& material) {
+  const auto set = [](const Json& reference) { return static_cast<int>(number(reference, "texCoord")); };
+  if (material.contains("normalTexture")) return set(material["normalTexture"]);
+  if (!material.contains("extensions")) return -1;
+  for (const auto& [name, extension] : material["extensions"].items()) {
+    const MaterialExtensionKind* kind = find_material_extension(name);
+    if (!kind || !extension.is_object()) continue;
+    for (const auto& [key, reference] : extension.items())
+      if (const ExtensionTextureKind* k = kind->texture(key); k && k->tangent_space) return set(reference);
+  }
+  return -1;
 }
 
 /// "texture/<number>", nothing else.
@@ -123,6 +145,18 @@ std::map<std::uint32_t, FileImageData> StandaloneGlb::images() const {
   return out;
 }
 
+std::vector<int> StandaloneGlb::tangent_texcoords() const {
+  std::vector<int> out;
+  bool tangents = false;
+  for (const Json& mesh : root_.value("meshes", Json::array()))
+    for (const Json& primitive : mesh.value("primitives", Json::array()))
+      tangents =
+          tangents || (primitive.contains("attributes") && primitive["attributes"].contains("TANGENT"));
+  for (const Json& material : root_.value("materials", Json::array()))
+    out.push_back(tangents ? tangent_texcoord_of(material) : -1);
+  return out;
+}
+
 MeshCodec StandaloneGlb::codec() const {
   const auto uses = [&](const char* name) {
     const Json used = root_.value("extensionsUsed", Json::array());
@@ -135,8 +169,8 @@ MeshCodec StandaloneGlb::codec() const {
 
 void StandaloneGlb::set_images(const std::map<std::uint32_t, FileImageData>& images) {
   if (!root_.contains("images")) return;
-  std::vector<bool> webp(root_["images"].size());
-  for (std::size_t k = 0; k < webp.size(); ++k) {
+  std::vector<const char*> extension(root_["images"].size());
+  for (std::size_t k = 0; k < extension.size(); ++k) {
     Json& image = root_["images"][k];
     std::uint32_t source = 0;
     const auto found = source_image_of(image, source) ? images.find(source) : images.end();
@@ -145,24 +179,28 @@ void StandaloneGlb::set_images(const std::map<std::uint32_t, FileImageData>& ima
       image["bufferView"] = add_view(found->second.bytes);
       image.erase("uri");
     }
-    webp[k] = image.value("mimeType", "") == "image/webp";
+    extension[k] = texture_extension(image.value("mimeType", ""));
   }
   if (root_.contains("textures"))
     for (Json& texture : root_["textures"]) {
       std::size_t image = number(texture, "source");
-      if (texture.contains("extensions") && texture["extensions"].contains(kWebp))
-        image = number(texture["extensions"][kWebp], "source");
-      if (image >= webp.size()) continue;
+      for (const char* name : kTextureExtensions)
+        if (texture.contains("extensions") && texture["extensions"].contains(name)) {
+          image = number(texture["extensions"][name], "source");
+          texture["extensions"].erase(name);
+        }
+      if (image >= extension.size()) continue;
       texture.erase("source");
-      if (texture.contains("extensions")) texture["extensions"].erase(kWebp);
-      if (webp[image])
-        texture["extensions"][kWebp]["source"] = image;
+      if (extension[image])
+        texture["extensions"][extension[image]]["source"] = image;
       else
         texture["source"] = image;
       if (texture.contains("extensions") && texture["extensions"].empty()) texture.erase("extensions");
     }
-  forget_extension(root_, kWebp);
-  if (std::find(webp.begin(), webp.end(), true) != webp.end()) use_extension(kWebp, true);
+  for (const char* name : kTextureExtensions) {
+    forget_extension(root_, name);
+    if (std::find(extension.begin(), extension.end(), name) != extension.end()) use_extension(name, true);
+  }
 }
 
 void StandaloneGlb::recode(const DracoSteps& steps, const NormalSamples* lit_as, const RunContext& context) {
@@ -270,13 +308,18 @@ void StandaloneGlb::add_level(StandaloneGlb coarser, double screen_coverage) {
   root_["nodes"].push_back(level);
 }
 
-void StandaloneGlb::move_to(Vec3d translation, double scale) {
-  if (translation == Vec3d{} && scale == 1) return;
+void StandaloneGlb::place(const OutputTransform& transform) {
+  if (transform.changes_nothing()) return;
   const std::size_t scene = number(root_, "scene");
   Json& nodes = root_["scenes"].at(scene)["nodes"];
-  const Vec3d to = translation * scale;
-  Json parent{{"name", "origin"}, {"translation", {to.x, to.y, to.z}}};
-  if (scale != 1) parent["scale"] = {scale, scale, scale};
+  Json parent{{"name", "origin"}};
+  if (transform.turns()) {
+    parent["matrix"] = transform.matrix();  // exact, which a quaternion of a quarter is not
+  } else {
+    const Vec3d to = transform(Vec3d{});
+    parent["translation"] = {to.x, to.y, to.z};
+    if (transform.scale != 1) parent["scale"] = {transform.scale, transform.scale, transform.scale};
+  }
   parent["children"] = nodes;
   nodes = Json::array({root_["nodes"].size()});
   root_["nodes"].push_back(parent);
@@ -315,6 +358,24 @@ Bytes StandaloneGlb::finish() const {
 
   if (about_) write_gltf_about(*about_, root);  // last: values of strangers must not be taken for indices
   return glb_container(root.dump(-1, ' ', false, Json::error_handler_t::replace), binary);
+}
+
+About reserved_about(const About& about, const OutputTransform& transform, std::uint64_t bytes) {
+  constexpr std::uint64_t kShare = 20;
+  return about_within(transformed_about(about, transform), bytes / kShare);
+}
+
+bool add_words(Bytes& glb, const About& about, std::uint64_t bytes) {
+  for (const About& choice : about_choices(about)) {
+    GlbParts parts = read_glb(glb, "file");
+    write_gltf_about(choice, parts.root);
+    Bytes file = glb_container(parts.root.dump(-1, ' ', false, Json::error_handler_t::replace), parts.binary);
+    if (file.size() < glb.size()) return false;  // it has these words already, and more
+    if (file.size() > bytes) continue;
+    glb = std::move(file);
+    return choice == about;
+  }
+  return false;
 }
 
 namespace {
@@ -360,6 +421,7 @@ StandaloneGlb scale_file(PackageReader& package, int scale, const RunContext& co
   SplitStreamReader reader(read_split_head(stream));
   Mesh mesh = mesh_at(reader, scale, stream);
   if (fitted) fit_to_finest(mesh_at(reader, 0, stream), mesh, context);
+  make_tangents(mesh, first.tangent_texcoords());
   ScalesOptions options;
   options.mesh_codec = first.codec();
   first.take_meshes({write_streamed_scale(mesh, reader.head(), options), mesh_path(scale)});
@@ -381,7 +443,6 @@ std::string image_name(std::uint32_t image) { return std::to_string(image); }
 
 namespace {
 
-using Json = nlohmann::ordered_json;
 constexpr const char* kTransform = "KHR_texture_transform";
 
 /// Calls f with every reference to a texture of a material, extensions' among them.

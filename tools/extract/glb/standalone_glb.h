@@ -1,5 +1,6 @@
 #pragma once
 
+#include "format/rules/output_transform.h"
 #include "stages/gltf/check_glb.h"
 #include "stages/gltf/draco_mesh.h"
 #include "stages/gltf/glb_container.h"
@@ -20,10 +21,13 @@ class StandaloneGlb {
   std::vector<std::uint32_t> source_images() const;
   /// Of these the images that are within the file.
   std::map<std::uint32_t, FileImageData> images() const;
+  /// Per material: the set of texture coordinates along which meshes have tangents (make_tangents()); -1 for
+  /// materials without textures in tangent space, and for all where no mesh of the file has tangents.
+  std::vector<int> tangent_texcoords() const;
   /// How the file codes its meshes.
   MeshCodec codec() const;
   /// Replaces the file's images by those of the same source image; images that are not given stay. WebP
-  /// makes EXT_texture_webp a required extension.
+  /// and AVIF make EXT_texture_webp and EXT_texture_avif required extensions.
   void set_images(const std::map<std::uint32_t, FileImageData>& images);
   /// Takes the meshes of another file of the same package, whose node k is this file's node k, for its own.
   void take_meshes(StandaloneGlb other);
@@ -39,10 +43,9 @@ class StandaloneGlb {
   /// level is shown (extras.MSFT_screencoverage).
   void add_level(StandaloneGlb coarser, double screen_coverage);
 
-  /// Makes the nodes of the scene the children of one node that moves them by `translation`, object units,
-  /// and then makes all lengths `scale` times as long. Positions stay as they are. Nothing happens for {0, 0,
-  /// 0} and 1. After all levels of detail.
-  void move_to(Vec3d translation, double scale = 1);
+  /// Makes the nodes of the scene the children of one node that places them. Positions stay as they are.
+  /// Nothing happens where the transform changes nothing. After all levels of detail.
+  void place(const OutputTransform& transform);
 
   /// What finish() writes of the object: asset.copyright, asset.extras, KHR_xmp_json_ld (write_gltf_about()).
   void set_about(const About& about);
@@ -68,12 +71,20 @@ class StandaloneGlb {
   std::size_t level_node_ = 0;
 };
 
+/// What a file of at most `bytes` says of the object before its picture is chosen: all of it where that takes
+/// a twentieth of the bytes, else less (about_choices()). What is left over after the picture takes the rest
+/// (add_words()).
+About reserved_about(const About& about, const OutputTransform& transform, std::uint64_t bytes);
+/// Puts the most words about the object into a finished file that `bytes` hold. False where some do not fit.
+bool add_words(std::vector<std::uint8_t>& glb, const About& about, std::uint64_t bytes);
+
 /// The normals of a scale that the vertex-split stream alone has. kFitted: so that it is lit as S_0 is, which
 /// takes the whole stream. kStreamed: S_0's, as the stream's prefix of the scale has them.
 enum class StreamedNormals : std::uint8_t { kFitted, kStreamed };
 
 /// A scale as one file with the previews in it, wherever the package has the scale. A scale of the stream
-/// gets materials, images and node names of the coarsest scale's GLB, and that file's mesh codec. InputError
+/// gets materials, images and node names of the coarsest scale's GLB, that file's mesh codec, and where it
+/// has tangents those of make_tangents(). InputError
 /// for a scale that is not there; FormatError when the package is damaged. Same result for any thread count.
 StandaloneGlb scale_file(PackageReader& package, int scale, const RunContext& context,
                          StreamedNormals normals = StreamedNormals::kFitted);
@@ -97,9 +108,8 @@ bool bake_texture_scale(nlohmann::ordered_json& root, Mesh& mesh);
 
 /// The same model for programs that know glTF 2.0 and no extension of it that compresses: floats instead of
 /// KHR_draco_mesh_compression, EXT_meshopt_compression and KHR_mesh_quantization, PNG instead of WebP,
-/// no KHR_texture_transform where it is one scale. Parts
-/// and materials stay; tangents go, and the feature ids of merged parts. Of a file without levels of detail
-/// and before move_to(). Same bytes for any thread count.
+/// no KHR_texture_transform where it is one scale. Parts, materials and tangents stay; the feature ids of
+/// merged parts go. Of a file without levels of detail and before place(). Same bytes for any thread count.
 StandaloneGlb plain_file(const StandaloneGlb& file, const std::string& entry, const RunContext& context);
 
 }  // namespace texmesh

@@ -3,6 +3,7 @@
 #include "delivery/cpp/package/package_reader.h"
 #include "stages/fill/fill.h"
 #include "stages/geometry/texel_coverage.h"
+#include "stages/image/avif.h"
 #include "stages/image/png_writer.h"
 #include "stages/image/webp.h"
 #include "stages/jpeg/jpeg_coder.h"
@@ -237,7 +238,14 @@ std::vector<std::uint8_t> encode_webp_file(const Pixels& pixels, const ImageCodi
 
 const char* mime_type_of(FileImage format) {
   if (format == FileImage::kWebp) return "image/webp";
+  if (format == FileImage::kAvif) return "image/avif";
   return format == FileImage::kPng ? "image/png" : "image/jpeg";
+}
+
+Pixels decode_file_image(const FileImageData& file) {
+  if (file.format != FileImage::kAvif) return decode_image(probe_image("texture", file.bytes, {}));
+  AvifPicture picture = decode_avif("texture", file.bytes, {});
+  return {picture.width_px, picture.height_px, picture.channels, std::get<Bytes>(std::move(picture.samples))};
 }
 
 std::vector<std::uint8_t> encode_image(const Pixels& pixels, const ImageCoding& coding) {
@@ -246,6 +254,8 @@ std::vector<std::uint8_t> encode_image(const Pixels& pixels, const ImageCoding& 
     throw StageError("extract", "image", "pixels as many as width and height say",
                      std::to_string(pixels.data.size()));
   if (coding.format == FileImage::kPng) return write_png(pixels);
+  if (coding.format == FileImage::kAvif)
+    return encode_avif(pixels, {coding.quality, coding.data, coding.quick});
   return coding.format == FileImage::kWebp ? encode_webp_file(pixels, coding)
                                            : encode_jpeg_file(pixels, coding);
 }

@@ -79,21 +79,25 @@ struct FileImageData {
   std::vector<std::uint8_t> bytes;
 };
 
-/// "image/jpeg", "image/webp", "image/png".
+/// "image/jpeg", "image/webp", "image/avif", "image/png".
 const char* mime_type_of(FileImage format);
+
+/// The texels of a file of encode_image().
+Pixels decode_file_image(const FileImageData& file);
 
 /// How an image of a standalone file is coded.
 struct ImageCoding {
   FileImage format = FileImage::kJpeg;
-  double quality = 75;  // JPEG 1..100, WebP 0..100; no meaning for PNG
+  double quality = 75;  // JPEG 1..100, WebP and AVIF 0..100; no meaning for PNG
   bool data = false;    // numbers (normals, roughness ..) instead of colours: JPEGs keep their channels apart
-  bool quick = false;   // WebP: a third of the time for some percent more bytes, for searches
+  bool quick = false;   // WebP, AVIF: less time for some percent more bytes, for searches
   bool full_chroma = false;  // JPEG: colours 4:4:4, with tables for textures
 };
 
-/// A complete image file of 1, 3 or 4 channels (grey becomes RGB in a WebP; 4 channels are for PNG and WebP
-/// alone). JPEG: progressive, with Huffman tables of its own, colours 4:2:0 or 4:4:4. WebP: lossy, with alpha
-/// coded nearly without loss. Same bytes for same input. StageError for what the format cannot hold.
+/// A complete image file of 1, 3 or 4 channels (grey becomes RGB in a WebP; 4 channels are not for
+/// JPEG). JPEG: progressive, with Huffman tables of its own, colours 4:2:0 or 4:4:4. WebP: lossy, with alpha
+/// coded nearly without loss; AVIF likewise, 4:4:4. Same bytes for same input. StageError for what the format
+/// cannot hold.
 std::vector<std::uint8_t> encode_image(const Pixels& pixels, const ImageCoding& coding);
 
 }  // namespace texmesh

@@ -337,8 +337,7 @@ class ProxySearch {
   void run() {
     const auto count = static_cast<std::uint32_t>(reference_.package.manifest().proxies.size());
     for (std::uint32_t k = 0; k < count; ++k) {
-      Extracted whole =
-          extract_proxy(reference_.package, {k}, reference_.recentre, reference_.context, bytes_);
+      Extracted whole = extract_proxy(reference_.package, {k}, reference_.place, reference_.context, bytes_);
       measure_whole(k, whole);
       if (!is_wanted_kind(k))
         offer_smaller(k, whole);
@@ -352,12 +351,18 @@ class ProxySearch {
  private:
   bool fits(const Extracted& file) const { return file.glb.size() <= bytes_; }
 
+  /// What pictures become first; PNG is not among the formats of a search.
+  static FileImage format_of(ExtractImages wanted) {
+    if (wanted == ExtractImages::kJpeg) return FileImage::kJpeg;
+    return wanted == ExtractImages::kAvif ? FileImage::kAvif : FileImage::kWebp;
+  }
+
   /// Whether the proxy's own images are of the format that is asked for.
   bool is_wanted_kind(std::uint32_t proxy) const {
     const ExtractImages wanted = reference_.wishes.images;
     if (wanted == ExtractImages::kAuto) return true;
     const GlbParts chunks = read_glb(reference_.package.proxy_glb(proxy), proxy_path(proxy));
-    const char* mime = mime_type_of(wanted == ExtractImages::kWebp ? FileImage::kWebp : FileImage::kJpeg);
+    const char* mime = mime_type_of(format_of(wanted));
     const auto images = chunks.root.value("images", nlohmann::ordered_json::array());
     return std::ranges::all_of(images,
                                [&](const auto& image) { return image.value("mimeType", "") == mime; });
@@ -404,7 +409,7 @@ class ProxySearch {
     if (!parts) return;
     files_.clear();
     ProxyTrial trial;
-    if (reference_.wishes.images == ExtractImages::kJpeg) trial.format = FileImage::kJpeg;
+    trial.format = format_of(reference_.wishes.images);
     const double most = kMostMesh * static_cast<double>(bytes_);
     while (trial.mesh + 1 < parts->mesh_count() &&
            static_cast<double>(coded(*parts, trial).finish().size()) > most)
@@ -487,7 +492,7 @@ class ProxySearch {
       const auto k = static_cast<std::uint32_t>(rows.size());
       const FileImage format = map.pixels.channels < 4                            ? trial.format
                                : reference_.wishes.images == ExtractImages::kJpeg ? FileImage::kPng
-                                                                                  : FileImage::kWebp;
+                                                                                  : trial.format;
       const double q = quality_of(map, quality);
       const bool numbers = map.averaging() != Averaging::kLight;
       out[k] = {format, encode_image(map.pixels, {format, q, numbers, false, true})};
@@ -501,8 +506,8 @@ class ProxySearch {
   /// the file too large; then it is not looked at.
   bool make(const ProxyParts& parts, const ProxyTrial& trial, Extracted& out) {
     StandaloneGlb draft = coded(parts, trial), whole = draft;
-    if (!reference_.recentre) whole.move_to(reference_.package.manifest().origin);
-    whole.set_about(about_within(reference_.package.about(), bytes_ / kAboutShare));
+    whole.place(reference_.place);
+    whole.set_about(reserved_about(reference_.package.about(), reference_.place, bytes_));
     std::vector<ProxyMap> maps = parts.maps(trial.maps);
     for (ProxyMap& map : maps) map.pixels = smaller_map(map, trial.share);
     std::map<double, Bytes> files;
@@ -532,15 +537,15 @@ class ProxySearch {
 
 }  // namespace
 
-Extracted extract_proxy(PackageReader& package, const ExtractProxy& wishes, bool recentre,
+Extracted extract_proxy(PackageReader& package, const ExtractProxy& wishes, const OutputTransform& place,
                         const RunContext& context, std::uint64_t asked_bytes) {
   const Manifest& m = package.manifest();
   const Bytes glb = package.proxy_glb(wishes.proxy);  // refuses a proxy that is not there
   StandaloneGlb file(glb, proxy_path(wishes.proxy), GlbRules::kStandalone);
   if (wishes.plain) file = plain_file(file, proxy_path(wishes.proxy), context);
-  if (!recentre) file.move_to(m.origin);
-  file.set_about(asked_bytes > 0 ? about_within(package.about(), asked_bytes / kAboutShare)
-                                 : package.about());
+  file.place(place);
+  file.set_about(asked_bytes > 0 ? reserved_about(package.about(), place, asked_bytes)
+                                 : transformed_about(package.about(), place));
   Extracted out;
   out.scale = m.scales.back().scale;
   out.levels = {out.scale};

@@ -66,7 +66,7 @@ class ProxyParts {
 /// A proxy as the package has it, moved and described as it is wished. `asked_bytes`: what is known of the
 /// object is cut to what a file of so many bytes may say; 0 = nothing is cut. InputError for a proxy that is
 /// not there.
-Extracted extract_proxy(PackageReader& package, const ExtractProxy& wishes, bool recentre,
+Extracted extract_proxy(PackageReader& package, const ExtractProxy& wishes, const OutputTransform& place,
                         const RunContext& context, std::uint64_t asked_bytes = 0);
 
 /// Replaces `found`, a file of a scale for so many bytes, by one of a proxy where that one's whole lit

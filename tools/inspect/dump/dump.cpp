@@ -290,7 +290,7 @@ std::vector<KindBytes> kinds_of(PackageReader& p) {
   return bytes_by_kind(p.manifest(), p.store().read_manifest().size(), p.index());
 }
 
-std::uint64_t sum_of(const std::vector<KindBytes>& kinds) {
+std::uint64_t bytes_of_kinds(const std::vector<KindBytes>& kinds) {
   std::uint64_t sum = 0;
   for (const KindBytes& k : kinds) sum += k.bytes;
   return sum;
@@ -307,8 +307,8 @@ std::string summary_text(PackageReader& p, DumpGamma) {
   const Manifest& m = p.manifest();
   const Provenance provenance = read_provenance(p.entry(m.provenance));
   const std::vector<KindBytes> kinds = kinds_of(p);
-  Table bytes = kinds_table(kinds, sum_of(kinds));
-  bytes.row({"all", p.index().size() + 2, sum_of(kinds), 1.0});
+  Table bytes = kinds_table(kinds, bytes_of_kinds(kinds));
+  bytes.row({"all", p.index().size() + 2, bytes_of_kinds(kinds), 1.0});
   std::string s = about_head(p.about());
   s += fmt::format("package   {}\nformat    {}.{}, made by {}\n", to_hex(p.id()), m.major, m.minor,
                    printable(provenance.tool));
@@ -350,7 +350,7 @@ Json summary_json(PackageReader& p, DumpGamma) {
         {"title", m.title},
         {"tool", read_provenance(p.entry(m.provenance)).tool},
         {"entries", p.index().size() + 2},
-        {"entry_bytes", sum_of(kinds)}}},
+        {"entry_bytes", bytes_of_kinds(kinds)}}},
       {"object",
        {{"origin", numbers(m.origin)},
         {"bounds_min", numbers(m.bounds_min)},
@@ -366,7 +366,7 @@ Json summary_json(PackageReader& p, DumpGamma) {
       {"proxies", proxies},
       {"poster", m.poster ? picture : Json()},
       {"textures", textures_table(p).json()},
-      {"bytes", kinds_table(kinds, sum_of(kinds)).json()},
+      {"bytes", kinds_table(kinds, bytes_of_kinds(kinds)).json()},
       {"start",
        {{"bytes", start_bytes(m)},
         {"shows", first_picture(m).path},

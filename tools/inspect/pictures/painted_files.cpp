@@ -206,7 +206,7 @@ Picture render(const Mesh& mesh, const std::vector<Material>& materials,
                {});
 }
 
-void paste(const Picture& picture, std::uint32_t left, Pixels& out) {
+void paste_square(const Picture& picture, std::uint32_t left, Pixels& out) {
   const Pixels from = encode_srgb(picture);
   for (std::uint32_t y = 0; y < from.height_px; ++y)
     std::copy_n(from.at(0, y), std::size_t{3} * from.width_px,
@@ -291,7 +291,7 @@ std::vector<std::uint8_t> write_painted_png(const PaintedModel& model, std::uint
       for (std::size_t i = 0; i < over.covered.size(); ++i)
         if (over.covered[i]) picture.linear[i] = over.linear[i];
     }
-    paste(picture, k * side_px, out);
+    paste_square(picture, k * side_px, out);
   }
   for (std::uint32_t k = 0; k < layouts; ++k) paste_layout(model.textures[k], (2 + k) * side_px, out);
   if (model.legend.coloured) paste_bar(out);

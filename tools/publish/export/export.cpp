@@ -6,6 +6,7 @@
 
 #include "delivery/cpp/decide/texture_loss.h"
 #include "format/base/text_bytes.h"
+#include "format/rules/output_transform.h"
 #include "format/rules/viewing.h"
 #include "pipeline/io/markup.h"
 #include "pipeline/io/table.h"
@@ -140,13 +141,15 @@ ExtractRequest request_for(const ExportOptions& options, ExtractScale::Form form
     ExtractScale scale;
     scale.display_px = options.display_px;
     scale.form = form;
-    return {scale};
+    scale.images = options.images;
+    return {scale, false, options.keep_units};
   }
   ExtractBudget budget;
   budget.bytes = {options.bytes};
   if (options.display_px > 0) budget.display_px = options.display_px;
+  budget.images = options.images;
   budget.levels = form == ExtractScale::Form::kLevels;
-  return {budget};
+  return {budget, false, options.keep_units};
 }
 
 ExtractScale::Form form_of(const ExportOptions& options) {
@@ -154,7 +157,8 @@ ExtractScale::Form form_of(const ExportOptions& options) {
 }
 
 void add_glb(Export& made, Extracted extracted, const std::string& path) {
-  for (const std::string& note : extracted.notes) made.notes.push_back(note);
+  for (const std::string& note : extracted.notes)
+    if (std::ranges::find(made.notes, note) == made.notes.end()) made.notes.push_back(note);
   if (!extracted.within) made.notes.push_back("no GLB comes within 2 % below the bytes asked for");
   made.files.push_back({path, std::move(extracted.glb)});
 }
@@ -171,8 +175,9 @@ void export_tiles(PackageReader& package, const ExportOptions& options, const Ru
   const Manifest& m = package.manifest();
   Tileset tileset;
   tileset.about = package.about();
-  if (tileset.about.metres_per_unit > 0) tileset.metres = tileset.about.metres_per_unit;
-  tileset.origin = m.origin * tileset.metres;
+  const OutputTransform place = output_transform(package.about(), m.origin, options.keep_units);
+  tileset.metres = place.scale;
+  tileset.origin = place(Vec3d{});
   tileset.object_height = m.object_height;
   tileset.screen_error_px = options.screen_error_px;
   tileset.version = made.package_id.substr(0, 16);
@@ -184,13 +189,13 @@ void export_tiles(PackageReader& package, const ExportOptions& options, const Ru
   });
   ExtractScale scale;
   scale.form = form_of(options);
-  scale.metres = true;
+  scale.images = options.images;
   std::vector<TileLevel> wanted = std::move(tileset.levels);
   tileset.levels.clear();
   for (std::size_t k = 0; k < wanted.size(); ++k) {
     scale.scale = wanted[k].scale;
     scale.display_px = wanted[k].texture_px;
-    Extracted extracted = extract_model(package, {scale, true}, context);
+    Extracted extracted = extract_model(package, {scale, true, options.keep_units}, context);
     context.report(static_cast<double>(k + 1) / static_cast<double>(wanted.size()));
     if (k > 0 && static_cast<double>(extracted.glb.size()) >
                      kWorthwhile * static_cast<double>(made.files.back().bytes.size()))

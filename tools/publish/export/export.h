@@ -5,6 +5,7 @@
 #include "pipeline/io/new_folder.h"
 #include "pipeline/io/record.h"
 #include "stages/base/run_context.h"
+#include "tools/extract/extract.h"
 
 namespace texmesh {
 
@@ -21,9 +22,11 @@ struct ExportOptions {
   double display_px = 0;    // nothing finer than this displayed height needs; 0 = the target's own default
   std::uint64_t bytes = 0;  // most bytes of the GLB, of gltf-lod and model-viewer; 0 = no limit
   bool plain = false;       // no extension that compresses; not of gltf-lod
-  double screen_error_px = 16;  // 3dtiles: the error at which its viewer takes the next level
-  std::string url;              // oembed: where the folder will stand, ends with a slash
-  std::string provider;         // oembed; "" = the host of `url`
+  ExtractImages images = ExtractImages::kAuto;  // of the GLBs; not of oembed
+  bool keep_units = false;                      // lengths in object units, also where their metres are known
+  double screen_error_px = 16;                  // 3dtiles: the error at which its viewer takes the next level
+  std::string url;                              // oembed: where the folder will stand, ends with a slash
+  std::string provider;                         // oembed; "" = the host of `url`
   std::uint32_t width_px = 640, height_px = 480;  // oembed: of the frame
   std::string script;                             // model-viewer: URL of the script; "" = kModelViewerScript
   std::string viewer;                             // oembed: folder with the built viewer

@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "format/base/text_bytes.h"
+#include "pipeline/batch/stale_packages.h"
 #include "pipeline/io/markup.h"
 #include "pipeline/io/table.h"
 #include "pipeline/io/uri.h"
@@ -17,8 +18,6 @@ namespace texmesh {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr std::size_t kMostNameBytes = 100;
 
 std::string in_lower_case(std::string text) {
   for (char& c : text)
@@ -42,6 +41,7 @@ std::string without_ending(std::string path) {
 void read_object(SiteObject& object) {
   PackageReader package(open_store(object.source));
   const Manifest& m = package.manifest();
+  object.digest = to_hex(package.id()).substr(0, 16);
   object.about = package.about();
   object.title = m.title.empty() ? fs::path(without_ending(object.path)).filename().string() : m.title;
   object.bytes = bytes_beneath(object.source);
@@ -55,9 +55,42 @@ void read_object(SiteObject& object) {
   object.poster_height_px = m.poster->height_px;
 }
 
+/// A part of a path as a file name of every system: not hidden, not too long, and without letters that some
+/// file systems refuse. Different parts have different names, which no other part changes.
+std::string file_name_of(const std::string& part) {
+  constexpr std::size_t kMostBytes = 180;
+  std::string name;
+  if (part.empty()) return "=";
+  for (const char c : part) {
+    const auto byte = static_cast<unsigned char>(c);
+    const bool plain = byte >= 0x80 || (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || c == '-' ||
+                       c == '_' || c == ' ' || (c == '.' && !name.empty());
+    name += plain ? std::string(1, c) : fmt::format("={:02X}", byte);
+  }
+  if (name.ends_with(' ') || name.ends_with('.')) name += "=";  // Windows leaves them out
+  if (name.size() <= kMostBytes) return name;
+  const std::string digest = to_hex(sha256(text_bytes(part))).substr(0, 16);
+  std::size_t kept = kMostBytes - digest.size() - 1;
+  while (kept > 0 && (static_cast<unsigned char>(name[kept]) & 0xc0) == 0x80) --kept;  // whole letters
+  return name.substr(0, kept) + "=" + digest;
+}
+
+/// The file of a package, or of its picture, by what it holds: a server may let browsers keep it for ever.
+std::string file_address(const char* folder, const SiteObject& o, std::string_view ending) {
+  return fmt::format("{}/{}.{}{}", folder, o.name, o.digest, ending);
+}
+
 std::string address_of(const SiteObject& object, const SiteOptions& options) {
   if (!options.packages_url.empty()) return options.packages_url + percent_encoded(object.path);
-  return "packages/" + object.name + (object.path.ends_with("/") ? "/" : ".texmesh");
+  return percent_encoded(file_address("packages", object, object.path.ends_with("/") ? "/" : ".texmesh"));
+}
+
+/// The way from an object's page to the site's files.
+std::string root_of(const SiteObject& o) {
+  std::string root = "../";
+  for (const char c : o.name)
+    if (c == '/') root += "../";
+  return root;
 }
 
 constexpr std::string_view kSiteFirstLine = "<!DOCTYPE html><!-- texmesh site 1 -->\n";
@@ -79,9 +112,13 @@ std::string words_of(const SiteObject& o) {
   return out;
 }
 
-std::string poster_html(const SiteObject& o, const char* root, bool lazy) {
+std::string poster_address(const SiteObject& o) {
+  return percent_encoded(file_address("posters", o, ".jpg"));
+}
+
+std::string poster_html(const SiteObject& o, const std::string& root, bool lazy) {
   if (o.poster.empty()) return "<span class=\"none\">no picture</span>";
-  return fmt::format(R"(<img src="{}posters/{}.jpg" width="{}" height="{}" alt=""{}>)", root, o.name,
+  return fmt::format(R"(<img src="{}{}" width="{}" height="{}" alt=""{}>)", root, poster_address(o),
                      o.poster_width_px, o.poster_height_px, lazy ? " loading=\"lazy\"" : "");
 }
 
@@ -91,8 +128,8 @@ std::string card_html(const SiteObject& o, std::size_t place) {
   return fmt::format(
       "<li data-words=\"{}\"><a href=\"objects/{}.html\"><span class=\"poster\">{}</span><strong>{}</strong></a>"
       "<p>{}</p><p>{}</p></li>\n",
-      markup_escaped(words_of(o)), o.name, poster_html(o, "", place >= kAtOnce), markup_escaped(o.title),
-      quiet, markup_escaped(figures_of(o)));
+      markup_escaped(words_of(o)), percent_encoded(o.name), poster_html(o, "", place >= kAtOnce),
+      markup_escaped(o.title), quiet, markup_escaped(figures_of(o)));
 }
 
 /// The head of a page that stands `root` away from the site's files; `frames`: the page has frames.
@@ -136,18 +173,23 @@ std::string facts_html(const SiteObject& o) {
   return out;
 }
 
-/// Addresses of an object's page lead out of objects/, those of the viewer out of viewer/.
-std::string from_below(const std::string& address) { return is_web_url(address) ? address : "../" + address; }
+std::string from_below(const std::string& root, const std::string& address) {
+  return is_web_url(address) ? address : root + address;
+}
 
 std::string object_page(const SiteObject& o, const SiteOptions& options) {
-  const std::string viewer = "../viewer/index.html?panel=0&pkg=" + percent_encoded(from_below(o.address));
+  const std::string root = root_of(o);
+  // The package's address is encoded twice: the viewer decodes the query before it takes the value for a URL.
+  const std::string viewer =
+      root + "viewer/index.html?panel=0&pkg=" + percent_encoded(from_below("../", o.address));
   return filled(
       site_file("object.html"),
-      {{"head", head_html(o.title + " - " + options.title, "../", true)},
+      {{"head", head_html(o.title + " - " + options.title, root, true)},
        {"title", markup_escaped(o.title)},
+       {"root", root},
        {"site", markup_escaped(options.title)},
        {"viewer", markup_escaped(viewer)},
-       {"poster", poster_html(o, "../", false)},
+       {"poster", poster_html(o, root, false)},
        {"bytes", markup_escaped(format_bytes(o.bytes))},
        {"start", markup_escaped(format_bytes(o.start_bytes))},
        {"description", o.about.description.empty()
@@ -155,7 +197,7 @@ std::string object_page(const SiteObject& o, const SiteOptions& options) {
                            : "<p class=\"description\">" + markup_escaped(o.about.description) + "</p>"},
        {"rights", rights_line(o.about)},
        {"facts", facts_html(o)},
-       {"package", markup_escaped(from_below(o.address))}});
+       {"package", markup_escaped(from_below(root, o.address))}});
 }
 
 /// What the viewer offers where its address names no package.
@@ -163,36 +205,45 @@ std::string viewer_list(const Site& site) {
   PackageList list;
   for (const SiteObject& o : site.objects)
     list.packages.push_back(
-        {from_below(o.address), o.title, o.poster.empty() ? "" : "../posters/" + o.name + ".jpg"});
+        {from_below("../", o.address), o.title, o.poster.empty() ? "" : "../" + poster_address(o)});
   return to_json_line(list);
 }
 
 }  // namespace
 
-std::string object_name(const std::string& path, std::vector<std::string>& taken) {
+std::string object_name(const std::string& path) {
+  const std::string key = name_key(without_ending(path));
   std::string name;
-  for (const char c : without_ending(path)) {
-    const bool plain = (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
-                       c == '-' || c == '_' || c == '.';
-    if (plain || name.empty() || name.back() != '-') name += plain ? c : '-';
+  for (std::size_t begin = 0; begin <= key.size();) {
+    const std::size_t end = std::min(key.find('/', begin), key.size());
+    name += (begin > 0 ? "/" : "") + file_name_of(key.substr(begin, end - begin));
+    begin = end + 1;
   }
-  name.resize(std::min(name.size(), kMostNameBytes));
-  // A name that begins with a dot is hidden on servers.
-  if (name.empty() || name.front() == '.' || std::ranges::find(taken, in_lower_case(name)) != taken.end()) {
-    constexpr std::size_t kDigits = 10;
-    name = "p" + name + "-" + to_hex(sha256(text_bytes(path))).substr(0, kDigits);
-  }
-  taken.push_back(in_lower_case(name));
   return name;
 }
 
 Site read_site(const std::string& packages, const SiteOptions& options) {
   Site site{options, {}, {}};
   const PackageFolder folder = find_packages(packages);
-  std::vector<std::string> taken;
+  const std::set<std::string> stale = listed_stale(folder.path);
+  std::map<std::string, std::string> taken;  // path of the package, by the name of its pages
   for (const std::string& path : folder.packages) {
     SiteObject object;
     object.path = path;
+    object.name = object_name(path);
+    if (stale.contains(path)) {
+      site.faults.push_back(
+          {path,
+           path + ": left out: no model makes this package any more (compile --remove-stale removes it)"});
+      continue;
+    }
+    if (const auto [other, fresh] = taken.emplace(object.name, path); !fresh) {
+      site.faults.push_back(
+          {path, path +
+                     ": expected a name that no other package has, also where case does not count, found " +
+                     other->second + " beside it"});
+      continue;
+    }
     object.source = (fs::path(folder.path) / path).string();
     try {
       read_object(object);
@@ -203,7 +254,6 @@ Site read_site(const std::string& packages, const SiteOptions& options) {
       site.faults.push_back({path, error.what()});
       continue;
     }
-    object.name = object_name(path, taken);
     object.address = address_of(object, options);
     site.objects.push_back(std::move(object));
   }
@@ -229,9 +279,9 @@ void write_site(const Site& site, const std::string& folder) {
   for (const char* name : {"site.js", "icon.svg"}) out.add(name, text_bytes(site_file(name)));
   for (const SiteObject& o : site.objects) {
     out.add("objects/" + o.name + ".html", text_bytes(object_page(o, site.options)));
-    if (!o.poster.empty()) out.add("posters/" + o.name + ".jpg", o.poster);
+    if (!o.poster.empty()) out.add(file_address("posters", o, ".jpg"), o.poster);
     if (site.options.packages_url.empty())
-      out.copy(o.address.ends_with("/") ? o.address.substr(0, o.address.size() - 1) : o.address, o.source);
+      out.copy(file_address("packages", o, o.path.ends_with("/") ? "" : ".texmesh"), o.source);
   }
   out.copy("viewer", site.options.viewer);
   out.add("viewer/packages.json", text_bytes(viewer_list(site)));

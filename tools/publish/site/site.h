@@ -15,7 +15,8 @@ struct SiteOptions {
 /// A package of a site.
 struct SiteObject {
   std::string path;     // relative to the folder of packages; of an unpacked one with a slash behind
-  std::string name;     // of its files in the site: letters, digits, "-", "_", "."; no two alike in any case
+  std::string name;     // object_name()
+  std::string digest;   // of what it holds: 16 digits of the package's id
   std::string address;  // of the package, from a page in the site's folder
   std::string source;   // file or folder on this machine
   std::string title;
@@ -29,8 +30,8 @@ struct SiteObject {
   static void fields(auto& s, auto&& v) {
     v("package", s.path, FieldRule{.pattern = "."},
       "Relative to the folder of packages; an unpacked one ends with a slash.");
-    v("page", "objects/" + s.name + ".html", FieldRule{.pattern = "^objects/[A-Za-z0-9._-]+\\.html$"},
-      "Relative to DIR.");
+    v("page", "objects/" + s.name + ".html", FieldRule{.pattern = "^objects(/[^/.][^/]*)+\\.html$"},
+      "Relative to DIR; an address has it percent-encoded.");
     v("title", s.title, "");
     v("bytes", s.bytes, "Of the whole package.");
   }
@@ -78,7 +79,9 @@ struct SiteReport {
 };
 DocumentSchema site_schema();
 
-/// A name for the files of the package at `path`, none of `taken` (in lower case), to which it is added.
-std::string object_name(const std::string& path, std::vector<std::string>& taken);
+/// What the pages and files of the package at `path` are called in the site: its path without the ending, in
+/// name_key()'s letters, part by part as a file name that every system takes. It depends on the path alone;
+/// paths with different keys have different names. UTF-8; addresses have it percent-encoded.
+std::string object_name(const std::string& path);
 
 }  // namespace texmesh

@@ -44,8 +44,8 @@ export class HttpClient {
     else await new Promise<void>((go) => this.waiting_.push(go));
     const abort = new AbortController();
     const cancel = (): void => abort.abort();
-    const answer: Answer = { url, status: 0, problem: '', body: new Uint8Array(0), etag: '', length: -1,
-      complete: false, tooLong: false };
+    const answer: Answer = { url, status: 0, problem: '', body: new Uint8Array(0), etag: '', type: '',
+      length: -1, complete: false, tooLong: false };
     const record: RequestRecord = {
       url, offset: range?.offset ?? 0, bytes: range?.bytes ?? -1, received: 0, kind,
       started: nowS(), firstByte: -1, ended: 0, status: 0, ok: false,
@@ -77,7 +77,7 @@ export class HttpClient {
       const length = status === 200 && /^\d{1,15}$/.test(header('content-length'))
         ? Number(header('content-length')) : -1;
       Object.assign(answer, { status, url: response.url || url, etag: etag[0] === '"' ? etag : '', length,
-        range: contentRange(header('content-range')) });
+        type: header('content-type'), range: contentRange(header('content-range')) });
       const reader = record.ok ? body?.getReader() : undefined;
       while (reader && !answer.tooLong) {
         const { done, value } = await reader.read();

@@ -111,7 +111,7 @@ export class RangeStore implements PackageStore {
       });
       m.at = a.url;
       if (a.status === 200 && m.total < 0) throw (this.noRanges = new InputError(shownUrl(m.url), '',
-        'a server that answers ranges', 'status 200'));
+        'a server that answers ranges', whatCame(a)));
       if (a.status === 200 && isSameFile(a, m))
         throw new RangesEnded(shownUrl(m.url), `byte ${offset}`, 'an answer with status 206',
           'status 200: ranges are no longer answered');
@@ -146,9 +146,11 @@ export class RangeStore implements PackageStore {
       return this.require_(m, !complete || offset === 0 || body.length === bytes, offset, `${bytes} bytes`,
         body.length);
     }
-    const [first, last, total] = range;
+    const [first, last] = range;
+    const total = range[2] < 0 ? m.total : range[2];
     this.requireSame_(m, m.total < 0 || total === m.total, offset, `${total} bytes`);
-    this.require_(m, first === offset && last === Math.min(offset + bytes, total) - 1, offset,
+    this.require_(m,
+      first === offset && last === Math.min(offset + bytes, total < 0 ? last + 1 : total) - 1, offset,
       'the range that was asked for', `${first}-${last}`);
     m.total = total;
   }

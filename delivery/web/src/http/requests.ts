@@ -64,9 +64,11 @@ export interface Answer {
   url: string;
   /** Strong ETag; '' = none. */
   etag: string;
+  /** Content-Type; '' = not said. */
+  type: string;
   /** Content-Length of a whole file; -1 = not said. */
   length: number;
-  /** Content-Range, when that header may be read: first and last byte, bytes of the file. */
+  /** Content-Range, when that header may be read: first and last byte, bytes of the file (-1 = not said). */
   range?: number[];
   /** The body ended as it should. */
   complete: boolean;
@@ -87,8 +89,9 @@ export interface GetOptions {
 
 /** First and last byte, bytes of the file, from a Content-Range; undefined where the text is none. */
 export function contentRange(text: string): Answer['range'] {
-  const said = /^bytes (\d{1,15})-(\d{1,15})\/(\d{1,16})$/.exec(text)?.slice(1).map(Number);
-  return said && said[0] <= said[1] && said[1] < said[2] ? said : undefined;
+  const said = /^bytes (\d{1,15})-(\d{1,15})\/(-?\d{1,16})$/.exec(text.replace('*', '-1'))?.slice(1)
+    .map(Number);
+  return said && said[0] <= said[1] && (said[1] < said[2] || said[2] < 0) ? said : undefined;
 }
 
 /** Whether an answer is of the file with this ETag ('' = none) and length (-1 = unknown), if known. */
@@ -111,5 +114,5 @@ export function isForGood(error: unknown): boolean {
 
 /** An answer's problem or status, for messages. */
 export function whatCame(a: Answer): string {
-  return a.problem || (a.status > 0 ? `status ${a.status}` : 'no answer');
+  return a.problem || (a.status > 0 ? `status ${a.status}${a.type && ` (${a.type})`}` : 'no answer');
 }

@@ -16,7 +16,9 @@ async function getWhole(client: HttpClient, url: string, how: GetOptions,
   const mayTryAgain = retriesOf(client, how.signal);
   for (;;) {
     const a = await client.get(url, how);
-    if (a.status === 200 && a.complete) return a.body;
+    // A page for people, as of a login, begins with blanks or '<'. Files of packages begin with letters.
+    const page = /html/.test(a.type) && a.body[0] < 61;
+    if (a.status === 200 && a.complete && !page) return a.body;
     if (a.tooLong) throw new InputError(shownUrl(url), '', `at most ${how.maxBytes} bytes`, 'more');
     if (othersLeft || !(await mayTryAgain(a))) throw new InputError(shownUrl(url), '', 'a file', whatCame(a));
   }
@@ -89,7 +91,7 @@ export class TreeStore implements PackageStore {
         return got;
       } catch (error) {
         // Extra files need not exist.
-        if (!how.verify && error instanceof InputError && /^status 40[34]$/.test(error.found))
+        if (!how.verify && error instanceof InputError && /^status 40[34]\b/.test(error.found))
           return undefined;
         throw error;
       }

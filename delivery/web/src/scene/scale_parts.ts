@@ -14,7 +14,28 @@ export interface ParsedGltf {
 interface GltfJson {
   images?: { name?: string }[];
   textures?: { source?: number; sampler?: number; extensions?: Record<string, { source?: number }> }[];
-  materials?: unknown[];
+  materials?: GltfMaterial[];
+  meshes?: { primitives?: { attributes?: Record<string, number> }[] }[];
+}
+interface GltfMaterial {
+  normalTexture?: { texCoord?: number };
+  extensions?: {
+    KHR_materials_clearcoat?: { clearcoatNormalTexture?: { texCoord?: number } };
+    KHR_materials_anisotropy?: { anisotropyTexture?: { texCoord?: number } };
+  };
+}
+
+/**
+ * By material: the texture coordinates along which scales of the stream need tangents (G12); -1 = none. They
+ * need them where the file has some.
+ */
+export function tangentTexcoords({ meshes = [], materials = [] }: GltfJson): number[] {
+  const some = meshes.some((m) => m.primitives?.some((p) => p.attributes?.TANGENT! >= 0));
+  return materials.map(({ normalTexture, extensions: e }) => {
+    const texture = normalTexture ?? e?.KHR_materials_anisotropy?.anisotropyTexture ??
+      e?.KHR_materials_clearcoat?.clearcoatNormalTexture;
+    return some && texture ? texture.texCoord ?? 0 : -1;
+  });
 }
 
 /** Number of the package's image of that name; -1: none. */

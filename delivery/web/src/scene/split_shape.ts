@@ -5,7 +5,8 @@ import { FormatError } from '../format/errors';
 import type { PackageReader } from '../http/package_reader';
 import type { WorkerPool } from '../worker/pool';
 import type { SplitInfo, SplitUpdate } from '../worker/protocol';
-import { type MaterialSet, type ParsedGltf, type Slot, meshesOf } from './scale_parts';
+import type { MadeTangents } from '../worker/tangents';
+import { type MaterialSet, type ParsedGltf, type Slot, meshesOf, tangentTexcoords } from './scale_parts';
 
 /** Bytes behind the head that the request for the head brings along. */
 const withHeadBytes = 12 << 10;
@@ -76,7 +77,8 @@ export class SplitShapes {
     for (const [i, { from, scales }] of runs.entries()) {
       const got = await requests[i];
       for (const { scale: passing, end } of scales) {
-        const update = await this.pool_.addSplits(this.key_, got.subarray(this.decoded_ - from, end - from));
+        const update = await this.pool_.addSplits(this.key_, got.subarray(this.decoded_ - from, end - from),
+          tangentTexcoords(gltf.parser.json));
         this.decoded_ = end;
         passed(passing, await this.add_(passing, update, gltf));
       }
@@ -119,6 +121,7 @@ export class SplitShapes {
       this.append_(name, components, values, update);
     const geometry = new BufferGeometry();
     this.attributes_.forEach((attribute, name) => geometry.setAttribute(name, attribute));
+    if (update.tangents) this.setTangents_(geometry, update.tangents, update.to);
     geometry.setIndex(new BufferAttribute(update.index, 1));
     const chosen: Material[] = [];
     for (const { material, start, count } of update.draws)
@@ -128,6 +131,18 @@ export class SplitShapes {
     this.meshes_.set(scale, mesh);
     return mesh;
   }
+  /** Tangents of this scale alone. Where wedges were added for them its other buffers are its own, too. */
+  private setTangents_(geometry: BufferGeometry, { values, added }: MadeTangents, wedges: number): void {
+    if (added.length > 0)
+      for (const [name, { array, itemSize }] of this.attributes_) {
+        const own = new Float32Array(itemSize * (wedges + added.length));
+        own.set(array.subarray(0, itemSize * wedges) as Float32Array);
+        added.forEach((w, i) =>
+          own.set(array.subarray(itemSize * w, itemSize * (w + 1)) as Float32Array, itemSize * (wedges + i)));
+        geometry.setAttribute(name, new BufferAttribute(own, itemSize));
+      }
+    geometry.setAttribute('tangent', new BufferAttribute(values, 4, true));
+  }
   /** Appends values to a buffer; a buffer that is too small is replaced by a larger one. */
   private append_(name: string, components: number, values: Float32Array, { from, to }: SplitUpdate): void {
     let attribute = this.attributes_.get(name);
@@ -135,9 +150,11 @@ export class SplitShapes {
       const most = this.info_.scales.at(-1)!.wedges;
       const grown = new BufferAttribute(new Float32Array(components * Math.max(to, Math.min(2 * from, most))),
         components);
-      if (attribute) grown.array.set(attribute.array.subarray(0, components * from));
+      const before = attribute;
+      if (before) grown.array.set(before.array.subarray(0, components * from));
       this.attributes_.set(name, (attribute = grown));
       for (const { geometry } of this.meshes_.values()) {
+        if (geometry.getAttribute(name) !== before) continue;
         geometry.dispose(); // three.js frees the buffers of attributes that a geometry still has, no others
         geometry.setAttribute(name, grown);
       }

@@ -9,6 +9,7 @@ import { octahedralVector } from '../format/splits/split_values';
 import type {
   DecodeRequest, EnlargeRequest, SplitInfo, SplitUpdate, WorkerAnswer, WorkerRequest,
 } from './protocol';
+import { makeTangents } from './tangents';
 
 const asItIs =
   { premultiplyAlpha: 'none', colorSpaceConversion: 'none', imageOrientation: 'none' } as ImageBitmapOptions;
@@ -88,10 +89,8 @@ function normals(codes: Int32Array, from: number, to: number, bits: number): Flo
   return out;
 }
 
-/** Wedges from number `from` on, and the index of all triangles, for append-only buffers. */
-function splitUpdate(reader: SplitStreamReader, from: number): SplitUpdate {
-  const { mesh, head } = reader;
-  const to = mesh.wedges;
+/** The values of some wedges. */
+function wedgeValues({ mesh, head }: SplitStreamReader, from: number, to: number): SplitUpdate['attributes'] {
   const points = mesh.wedgePoint.data;
   const positions = gridValues(mesh.places.data, 3, head.position, to - from, (i) => points[from + i]);
   const attributes = [{ name: 'position', components: 3, values: positions }];
@@ -105,6 +104,29 @@ function splitUpdate(reader: SplitStreamReader, from: number): SplitUpdate {
     attributes.push({ name: names[kind], components: kind === 'normal' ? 3 : kind === 'colour' ? 4 : 2,
       values });
   });
+  return attributes;
+}
+
+/** Adds tangents to an update, those of one set of texture coordinates. */
+function addTangents(update: SplitUpdate, reader: SplitStreamReader, texcoords: number[]): void {
+  const set = texcoords.find((texcoord) => texcoord >= 0);
+  if (set === undefined) return;
+  const all = wedgeValues(reader, 0, update.to);
+  const valuesOf = (name: string): Float32Array | undefined => all.find((a) => a.name === name)?.values;
+  const [positions, normal, uv] = ['position', 'normal', set === 1 ? 'uv1' : 'uv'].map(valuesOf);
+  if (!positions || !normal || !uv) return;
+  const wanted = update.draws.filter(({ material }) => texcoords[material] === set);
+  const index = Uint32Array.from(wanted.flatMap(({ start, count }) =>
+    [...update.index.subarray(start, start + count)]));
+  update.tangents = makeTangents({ positions, normals: normal, uv, index });
+  let at = 0;
+  for (const { start, count } of wanted) update.index.set(index.subarray(at, (at += count)), start);
+}
+
+/** Wedges from number `from` on, and the index of all triangles, for append-only buffers. */
+function splitUpdate(reader: SplitStreamReader, from: number, tangents: number[]): SplitUpdate {
+  const { mesh, head } = reader;
+  const to = mesh.wedges;
   const groupTriangles = new Uint32Array(head.groups.length);
   const visible = new Uint8Array(mesh.faceCount);
   for (let face = 0; face < visible.length; ++face)
@@ -128,7 +150,10 @@ function splitUpdate(reader: SplitStreamReader, from: number): SplitUpdate {
     else if (count > 0) draws.push({ material, start, count });
     start += count;
   }
-  return { from, to, blocks: reader.nextBlock, attributes, index, draws };
+  const attributes = wedgeValues(reader, from, to);
+  const update: SplitUpdate = { from, to, blocks: reader.nextBlock, attributes, index, draws };
+  addTangents(update, reader, tangents);
+  return update;
 }
 
 // The work of workers: documents, digests, images, vertex splits. `handle` works on the main thread, too,
@@ -186,10 +211,9 @@ export async function handle(request: WorkerRequest): Promise<[unknown, Transfer
     case 'split-add': {
       const stream = streamOf(request.key);
       await stream.reader.addBlocks(request.blocks);
-      const update = splitUpdate(stream.reader, stream.wedges);
+      const update = splitUpdate(stream.reader, stream.wedges, request.tangents);
       stream.wedges = update.to;
-      const arrays = [update.index, ...update.attributes.map((a) => a.values)];
-      return [update, arrays.map((a) => a.buffer as ArrayBuffer)];
+      return [update, buffersOf(update)];
     }
     case 'split-close':
       streams.delete(request.key);

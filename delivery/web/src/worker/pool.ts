@@ -104,8 +104,8 @@ export class WorkerPool {
   checkSplits(key: number, from: number, blocks: Uint8Array): Promise<void> {
     return this.ask_({ op: 'split-check', key, from, blocks });
   }
-  addSplits(key: number, blocks: Uint8Array): Promise<SplitUpdate> {
-    return this.ask_({ op: 'split-add', key, blocks });
+  addSplits(key: number, blocks: Uint8Array, tangents: number[] = []): Promise<SplitUpdate> {
+    return this.ask_({ op: 'split-add', key, blocks, tangents });
   }
   closeSplits(key: number): void {
     this.ask_({ op: 'split-close', key }).catch(() => undefined);

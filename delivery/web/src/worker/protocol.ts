@@ -1,6 +1,7 @@
 import type { BlockLevel, BlockRequest, Pixels } from '../blocks/formats';
 import type { CodecId } from '../format/codec';
 import type { Documents } from '../format/document_decoder';
+import type { MadeTangents } from './tangents';
 
 /** Decodes one fragment (or preview): checks digests, joins streams and tables. Gives Levels. */
 export interface DecodeRequest {
@@ -51,6 +52,8 @@ export interface SplitAddRequest {
   op: 'split-add';
   key: number;
   blocks: Uint8Array;
+  /** By material: the texture coordinates (0 or 1) that tangents are made along; -1 or nothing = none. */
+  tangents: number[];
 }
 /** Check the digests of the whole blocks among bytes of a stream. */
 export interface SplitCheckRequest {
@@ -96,6 +99,8 @@ export interface SplitUpdate {
   index: Uint32Array;
   /** Parts of the index that are drawn by one material each. */
   draws: { material: number; start: number; count: number }[];
+  /** Of all wedges and of some that this index alone has, from number `to` on. */
+  tangents?: MadeTangents;
 }
 
 /** A worker's answer. */

@@ -31,7 +31,7 @@ describe('without the part for servers without ranges', () => {
     expect(asked).toBe(0);
   });
   const told: [FaultKind, string][] = [['status-500', 'status 500'], ['refused', 'connection refused'],
-    ['stall', 'no byte'], ['whole', 'status 200']];
+    ['stall', 'no byte'], ['whole', 'status 200'], ['page', 'status 200']];
   for (const [fault, words] of told)
     for (const from of [0, 1])
       it(`${fault} from request ${from} on is told for what it is`, async () => {

@@ -112,7 +112,7 @@ describe('a server with ranges', () => {
 });
 
 describe('trouble', () => {
-  const survived: FaultKind[] = ['status-500', 'refused', 'cut', 'stall', 'short', 'flip'];
+  const survived: FaultKind[] = ['status-500', 'refused', 'cut', 'stall', 'short', 'flip', 'no-total'];
   const fatal: [FaultKind, string][] = [
     ['status-404', 'status 404'],
     ['status-416', 'replaced, open it anew'],
@@ -129,6 +129,9 @@ describe('trouble', () => {
         const server = range(once(kind, at));
         expect(await readSome(await openRetrying(server))).toBe(expected);
       });
+  it('a length that no answer tells is legal', async () => {
+    expect(await readSome(await openRetrying(range(() => 'no-total')))).toBe(expected);
+  });
   it('a cut transfer goes on where it broke', async () => {
     const server = range(once('cut', 0));
     await openRetrying(server);

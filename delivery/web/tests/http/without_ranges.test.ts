@@ -13,6 +13,13 @@ describe('hostile answers', () => {
     const reader = await openAt(fakeServer(files, { ranges: false }));
     expect(reader.form).toBe('whole');
   });
+  it('a page in the place of the package is called one', async () => {
+    for (const ranges of [true, false]) {
+      const error = await rejection(openAt(fakeServer({}, { ranges, fault: () => 'page' })));
+      expect(error.message).toContain('status 200 (text/html; charset=utf-8)');
+      expect(error.message).toContain('http://host/a/scan');
+    }
+  });
   it('mode files wants a URL that has a tree', async () => {
     const opening = PackageReader.openUrl('http://host/a/scan.zip', { fetch: range().fetch, mode: 'files' });
     expect(await rejection(opening)).toBeInstanceOf(InputError);

@@ -47,6 +47,25 @@ describe('scales out of the vertex-split stream', () => {
     expect(passed.get(manifest.scales[1].scale)!.geometry.getAttribute('position'))
       .toBe(finest.geometry.getAttribute('position'));
   });
+  it('have tangents of their own where the file has some', async () => {
+    const { splits, signal } = await shapes();
+    const json = { materials: [{ normalTexture: {} }],
+      meshes: [{ primitives: [{ attributes: { TANGENT: 1 } }] }] };
+    const passed: Mesh[] = [];
+    await splits.load(0, { ...gltf, parser: { ...gltf.parser, json } }, signal, () => undefined,
+      (_, mesh) => passed.push(mesh));
+    for (const { geometry } of passed) {
+      const tangents = geometry.getAttribute('tangent');
+      const index = geometry.index!;
+      expect(Math.max(...index.array)).toBeLessThan(tangents.count);
+      expect(geometry.getAttribute('position').count).toBeGreaterThanOrEqual(tangents.count);
+      for (let i = 0; i < index.count; ++i)
+        expect(Math.abs(tangents.getW(index.getX(i)))).toBe(1);
+    }
+    const without = await shapes();
+    const plain = await without.splits.load(0, gltf, signal, () => undefined, () => undefined);
+    expect(plain.geometry.hasAttribute('tangent')).toBe(false);
+  });
   it('damaged blocks are fetched again, from another mirror where there is one', async () => {
     for (const mirrors of [[], ['http://other/a.texmesh']]) {
       const { stream } = manifest;

@@ -4,7 +4,8 @@ export interface Fault {
   (request: { number: number; url: string; range?: [number, number] }): FaultKind | false;
 }
 export type FaultKind = 'status-500' | 'status-404' | 'status-416' | 'refused' | 'cut' | 'stall' | 'short'
-  | 'long' | 'whole' | 'whole-other' | 'whole-longer' | 'flip' | 'flip-last' | 'wrong-range' | 'other-etag';
+  | 'long' | 'whole' | 'whole-other' | 'whole-longer' | 'flip' | 'flip-last' | 'wrong-range' | 'other-etag'
+  | 'page' | 'no-total';
 
 export interface FakeServer {
   fetch: typeof fetch;
@@ -32,6 +33,9 @@ export function fakeServer(files: Record<string, Uint8Array>,
     const kind = options.fault?.({ number, url, range }) || undefined;
     const file = files[new URL(url).pathname];
     if (kind === 'refused') throw new TypeError('connection refused');
+    if (kind === 'page')
+      return new Response('<!doctype html><title>Sign in</title>',
+        { headers: { 'Content-Type': 'text/html; charset=utf-8' } });
     if (kind === 'status-500') return new Response('', { status: 500 });
     if (kind === 'status-416') return new Response('', { status: 416 });
     if (!file || kind === 'status-404') return new Response('', { status: 404 });
@@ -47,7 +51,8 @@ export function fakeServer(files: Record<string, Uint8Array>,
       body = file.slice(range[0], last + 1);
       status = 206;
       const shift = kind === 'wrong-range' ? 64 : 0;
-      headers.set('Content-Range', `bytes ${range[0] + shift}-${last + shift}/${file.length}`);
+      const total = kind === 'no-total' ? '*' : file.length;
+      headers.set('Content-Range', `bytes ${range[0] + shift}-${last + shift}/${total}`);
     }
     if (kind === 'flip') {
       body = body.slice();

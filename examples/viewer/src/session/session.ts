@@ -101,6 +101,11 @@ export class Session {
     this.listener.addProblem(error);
   }
 
+  /** For tests and the console. */
+  get inner(): { pkg: TexmeshPackage | null; model: LoadedModel | null } {
+    return { pkg: this.pkg, model: this.model };
+  }
+
   /** For tests and the console; null: not loaded. */
   get original(): Original['loaded'] {
     return this.originalLoad.loaded;

@@ -1,163 +1,55 @@
-// Tilers, LOD tools and photogrammetry write one surface as many chunks, each rounded in its own way.
-// Whatever the way, the chunks that meet are one surface again.
-#include <draco/compression/encode.h>
-#include <draco/mesh/triangle_soup_mesh_builder.h>
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <map>
-
+// Whatever the way in which chunks were rounded, those that meet are one surface again.
 #include "pipeline/import/import.h"
 #include "stages/condition/condition.h"
-#include "tests/support/even_sphere.h"
-#include "tests/support/gltf_builder.h"
+#include "tests/support/chunks.h"
 #include "tests/support/hostile_meshes.h"
+#include "tests/support/memory_resolver.h"
 
 namespace texmesh {
 namespace {
 
-using nlohmann::json;
-using testing::GltfBuilder;
+using testing::ChunkKind;
 using testing::Random;
 
-enum class Kind : std::uint8_t { kFloat, kNested, kInt16, kUint16, kInt8, kDraco };
-
-/// A turn, a scale and a shift of a chunk's own; the columns of its matrix.
-struct Placement {
-  Vec3d x, y, z, shift;
-  Vec3d undo(const Vec3d& p) const {
-    const Vec3d d = p - shift;
-    return {dot(d, x) / dot(x, x), dot(d, y) / dot(y, y), dot(d, z) / dot(z, z)};
-  }
-  json matrix() const {
-    return {x.x, x.y, x.z, 0, y.x, y.y, y.z, 0, z.x, z.y, z.z, 0, shift.x, shift.y, shift.z, 1};
-  }
-};
-
-Placement random_placement(Random& random, double far) {
-  const auto number = [&] { return 2 * random.uniform() - 1; };
-  const Vec3d x = normalized(Vec3d{number(), number(), number() + 2}),
-              y = normalized(cross(x, {number() + 2, number(), number()}));
-  const auto single = [](const Vec3d& v) { return to_double(to_float(v)); };  // as exporters store them
-  const double scale = std::exp(4 * number());
-  return {single(x * scale), single(y * scale), single(cross(x, y) * scale),
-          single(Vec3d{number(), number(), number()} * far)};
+ConditionedMesh conditioned(const std::string& name, const Bytes& bytes) {
+  testing::MemoryResolver files;
+  const ImportedModel m = import_model(name, bytes, files, {}, {});
+  return condition_mesh(m.model.mesh, m.normals_by_specification, {}, RunContext{});
 }
 
-struct Chunk {
-  std::vector<Vec3d> points;  // in the chunk's own space
-  std::vector<std::uint32_t> indices;
-};
-
-int draco_view(GltfBuilder& b, const Chunk& chunk, int bits, int& id) {
-  draco::TriangleSoupMeshBuilder soup;
-  soup.Start(static_cast<int>(chunk.indices.size() / 3));
-  id = soup.AddAttribute(draco::GeometryAttribute::POSITION, 3, draco::DT_FLOAT32);
-  for (std::uint32_t t = 0; 3 * t < chunk.indices.size(); ++t) {
-    Vec3f p[3];
-    for (std::size_t k = 0; k < 3; ++k) p[k] = to_float(chunk.points[chunk.indices[3 * t + k]]);
-    soup.SetAttributeValuesForFace(id, draco::FaceIndex(t), &p[0], &p[1], &p[2]);
-  }
-  draco::Encoder encoder;
-  encoder.SetAttributeQuantization(draco::GeometryAttribute::POSITION, bits);
-  draco::EncoderBuffer out;
-  EXPECT_TRUE(encoder.EncodeMeshToBuffer(*soup.Finalize(), &out).ok());
-  return b.view_of(std::vector<std::uint8_t>(out.data(), out.data() + out.size()));
-}
-
-/// Whole numbers of 0 .. `most` per axis over the chunk's box, and the node that undoes them.
-template <class T>
-int grid_accessor(GltfBuilder& b, const Chunk& chunk, bool normalized, json& node) {
-  const double most = std::numeric_limits<T>::max();
-  Vec3d low = chunk.points[0], high = low;
-  for (const Vec3d& p : chunk.points)
-    for (int i = 0; i < 3; ++i) low[i] = std::min(low[i], p[i]), high[i] = std::max(high[i], p[i]);
-  const double side = std::max({high.x - low.x, high.y - low.y, high.z - low.z});
-  std::vector<T> values;
-  for (const Vec3d& p : chunk.points) {
-    for (int i = 0; i < 3; ++i) values.push_back(static_cast<T>(std::lround((p[i] - low[i]) / side * most)));
-    values.push_back(0);  // a multiple of 4 bytes
-  }
-  const double unit = normalized ? side : side / most;
-  node["translation"] = {static_cast<float>(low.x), static_cast<float>(low.y), static_cast<float>(low.z)};
-  node["scale"] = {static_cast<float>(unit), static_cast<float>(unit), static_cast<float>(unit)};
-  return b.accessor(b.view_of(values, 4 * static_cast<int>(sizeof(T))), "VEC3",
-                    GltfBuilder::component_type<T>(), chunk.points.size(),
-                    {{"normalized", normalized}, {"min", {0, 0, 0}}, {"max", {most, most, most}}});
-}
-
-void add_chunk(GltfBuilder& b, const Chunk& chunk, const Placement& placement, Kind kind, Random& random) {
-  json node = json::object(), extensions;
-  const int indices = b.attribute<std::uint32_t>(chunk.indices, "SCALAR");
-  int position = -1;
-  if (kind == Kind::kInt16) {
-    position = grid_accessor<std::int16_t>(b, chunk, true, node);
-  } else if (kind == Kind::kUint16) {
-    position = grid_accessor<std::uint16_t>(b, chunk, false, node);
-  } else if (kind == Kind::kInt8) {
-    position = grid_accessor<std::int8_t>(b, chunk, true, node);
-  } else if (kind == Kind::kDraco) {
-    int id = 0;
-    const int view = draco_view(b, chunk, 11 + static_cast<int>(random.next() % 6), id);
-    extensions = {{"KHR_draco_mesh_compression", {{"bufferView", view}, {"attributes", {{"POSITION", id}}}}}};
-    position = b.accessor(-1, "VEC3", 5126, chunk.points.size(), {{"min", {0, 0, 0}}, {"max", {1, 1, 1}}});
-  } else {
-    std::vector<float> values;
-    for (const Vec3d& p : chunk.points)
-      for (int i = 0; i < 3; ++i) values.push_back(static_cast<float>(p[i]));
-    position = b.attribute<float>(values, "VEC3");
-  }
-  json more = {{"indices", indices}};
-  if (!extensions.is_null()) more["extensions"] = extensions;
-  node["mesh"] = b.mesh({{"POSITION", position}}, more);
-  const int child = b.node(node);
-  b.json["scenes"][0]["nodes"].push_back(b.node({{"matrix", placement.matrix()}, {"children", {child}}}));
-}
-
-/// Cuts the surface by the direction of its triangles' centres into `parts` wedges around an axis.
-Model chunks_of(const Mesh& whole, std::uint32_t parts, Kind kind, Random& random) {
-  GltfBuilder b;
-  b.json["extensionsUsed"] = {"KHR_draco_mesh_compression", "KHR_mesh_quantization"};
-  for (std::uint32_t part = 0; part < parts; ++part) {
-    const Placement placement = random_placement(random, kind == Kind::kNested ? 5000 : 10);
-    Chunk chunk;
-    std::map<std::uint32_t, std::uint32_t> number;
-    for (std::uint32_t t = 0; t < whole.triangles.size(); ++t) {
-      Vec3d centre;
-      for (int k = 0; k < 3; ++k) centre = centre + to_double(whole.positions[whole.position_of(t, k)]);
-      const double turn = (std::atan2(centre.y, centre.x) / 6.2831853 + .5) * parts;
-      if (std::min(static_cast<std::uint32_t>(turn), parts - 1) != part) continue;
-      for (int k = 0; k < 3; ++k) {
-        const std::uint32_t p = whole.position_of(t, k);
-        const auto [at, added] = number.try_emplace(p, static_cast<std::uint32_t>(number.size()));
-        if (added) chunk.points.push_back(placement.undo(to_double(whole.positions[p])));
-        chunk.indices.push_back(at->second);
-      }
-    }
-    if (!chunk.indices.empty()) add_chunk(b, chunk, placement, kind, random);
-  }
-  testing::MemoryResolver resolver;
-  return import_gltf("chunks.glb", b.glb(), resolver, {}, {}).model;
+void expect_as(const Mesh& whole, const ConditionedMesh& c) {
+  EXPECT_EQ(c.report.boundary_edges, 0u);
+  EXPECT_EQ(c.component_count, 1u);
+  EXPECT_EQ(c.mesh.triangles.size(), whole.triangles.size());
+  EXPECT_EQ(c.mesh.positions.size(), whole.positions.size());
+  EXPECT_GT(c.report.rounded_positions, 0u);
+  if (!whole.normals.empty()) EXPECT_EQ(c.mesh.wedge_count(), whole.wedge_count()) << "borders are no seams";
 }
 
 TEST(ImportGltfChunksTest, ChunksThatMeetAreOneSurfaceAgain) {
   Random random{7};
-  for (const Kind kind :
-       {Kind::kFloat, Kind::kNested, Kind::kInt16, Kind::kUint16, Kind::kInt8, Kind::kDraco})
+  for (const ChunkKind kind : {ChunkKind::kFloat, ChunkKind::kNested, ChunkKind::kInt16, ChunkKind::kUint16,
+                               ChunkKind::kInt8, ChunkKind::kDraco})
     for (int level = 2; level <= 4; ++level)
-      for (const std::uint32_t parts : {2, 7, 16}) {
-        if (kind == Kind::kInt8 && level > 3) continue;  // the grid is as coarse as the triangles
-        SCOPED_TRACE(::testing::Message()
-                     << "kind " << static_cast<int>(kind) << " level " << level << " parts " << parts);
-        const Mesh whole = testing::even_sphere(level, .1);
-        const Model model = chunks_of(whole, parts, kind, random);
-        const ConditionedMesh c = condition_mesh(model.mesh, true, {}, RunContext{});
-        EXPECT_EQ(c.report.boundary_edges, 0u);
-        EXPECT_EQ(c.component_count, 1u);
-        EXPECT_EQ(c.mesh.triangles.size(), whole.triangles.size());
-        EXPECT_EQ(c.mesh.positions.size(), whole.positions.size());
-        EXPECT_GT(c.report.rounded_positions, 0u);
-      }
+      for (const std::uint32_t parts : {2, 7, 16})
+        for (const bool textured : {false, true}) {
+          if (kind == ChunkKind::kInt8 && level > 2) continue;  // a step is over 1/16 of an edge
+          SCOPED_TRACE(::testing::Message() << "kind " << static_cast<int>(kind) << " level " << level
+                                            << " parts " << parts << " textured " << textured);
+          const Mesh whole = textured ? testing::textured_sphere(level, .1) : testing::even_sphere(level, .1);
+          expect_as(whole, conditioned("chunks.glb", testing::chunks_glb(whole, parts, kind, random)));
+        }
+}
+
+TEST(ImportGltfChunksTest, ChunksOfATextThatMeetAreOneSurfaceAgain) {
+  Random random{8};
+  for (const int decimals : {4, 5, 6, 7})
+    for (const std::uint32_t parts : {2, 7, 16}) {
+      SCOPED_TRACE(::testing::Message() << decimals << " decimals, parts " << parts);
+      const Mesh whole = testing::textured_sphere(3, .1);
+      expect_as(whole, conditioned("chunks.obj",
+                                   testing::bytes_of(testing::chunks_obj(whole, parts, decimals, random))));
+    }
 }
 
 // What lies close together by design stays apart: thin sheets with open edges, and detail that is finer than
@@ -178,6 +70,36 @@ TEST(ImportGltfChunksTest, WhatIsNoRoundingStaysApart) {
   EXPECT_EQ(condition_mesh(thin, true, {}, RunContext{}).component_count, 1u);
   thin.rounding = {.012f};
   EXPECT_EQ(condition_mesh(thin, true, {}, RunContext{}).component_count, 2u) << "over four units";
+  // Numbers of few digits or decimals are design.
+  EXPECT_EQ(
+      conditioned("box.obj", testing::bytes_of("v 0 0 0\nv 20000 0 0\nv 0 20000 0\nv 0 0 1\nv 20000 0 1\n"
+                                               "v 0 20000 1\nf 1 2 3\nf 4 5 6\n"))
+          .component_count,
+      2u);
+  EXPECT_EQ(conditioned("box.obj", testing::bytes_of("v 0 0 0\nv 2.5 0 0\nv 0 2.5 0\nv 0 0 0.1\nv 2.5 0 0.1\n"
+                                                     "v 0 2.5 0.1\nf 1 2 3\nf 4 5 6\n"))
+                .component_count,
+            2u);
+}
+
+// At a border that is joined, a seam of the picture or a crease stays one.
+TEST(ImportGltfChunksTest, SeamsAndCreasesAtBordersStay) {
+  const auto halves = [](Vec2f uv, Vec3f normal) {
+    Mesh m = testing::bare_mesh({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1e-7f, 0}, {1, 1, 0}, {1e-7f, 1, 0}},
+                                {{0, 1, 2}, {3, 4, 5}});
+    m.rounding = {1e-7f};
+    m.uv0 = {{0, 0}, {1, 0}, {0, 1}, uv, {1, 1}, {uv.y, uv.x}};
+    m.normals = {{0, 0, 1}, {0, 0, 1}, {0, 0, 1}, normal, {0, 0, 1}, normal};
+    const ConditionedMesh c = condition_mesh(m, true, {}, RunContext{});
+    EXPECT_EQ(c.mesh.positions.size(), 4u);
+    return c.mesh.wedge_count();
+  };
+  const Vec3f up{0, 0, 1};
+  EXPECT_EQ(halves({1, 0}, up), 4u);
+  EXPECT_EQ(halves({1 - 0x1p-13f, 0}, up), 4u);
+  EXPECT_EQ(halves({1 - 0x1p-11f, 0}, up), 6u);
+  EXPECT_EQ(halves({1, 0}, {0, .01f, 1}), 4u);
+  EXPECT_EQ(halves({1, 0}, {0, .03f, 1}), 6u);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "pipeline/about/gltf_about.h"
 #include "stages/condition/condition.h"
 #include "stages/geometry/scale_frames.h"
 #include "stages/scales/scales.h"
@@ -66,12 +67,12 @@ double farthest(const Mesh& mesh, const Mesh& from) {
   return out;
 }
 
-TEST(MoveTo, ANodeHoldsTheWholeSceneAtADouble) {
+TEST(Place, ANodeHoldsTheWholeSceneAtADouble) {
   const Bytes glb = stored_scale();
   const Mesh stored = read_model({glb, "s00.glb"}, "s00.glb", {}).mesh;
   const Vec3d to{4.5e6 + 1.0 / 3, -0.1, 16.9};
   StandaloneGlb file(glb, "s00.glb");
-  file.move_to(to);
+  file.place({to});
   const Mesh moved = read_model(file, "s00.glb", {}).mesh;
   ASSERT_EQ(moved.positions.size(), stored.positions.size());
   EXPECT_EQ(moved.part_names, stored.part_names);
@@ -80,8 +81,35 @@ TEST(MoveTo, ANodeHoldsTheWholeSceneAtADouble) {
               1e-6);
   StandaloneGlb unmoved(glb, "s00.glb");
   const Bytes before = unmoved.finish();
-  unmoved.move_to({});
+  unmoved.place({});
   EXPECT_EQ(unmoved.finish(), before);
+}
+
+TEST(Words, AllThatTheBytesHoldAreThereAndTheAnswerIsTrue) {
+  About about;
+  about.title = "Bust";
+  about.creator = "A. Smith";
+  about.description = std::string(90, 'd');
+  about.source = R"({"asset":{"extras":{"credit":")" + std::string(300, 'c') + R"("}}})";
+  StandaloneGlb without(stored_scale(), "s00.glb");
+  without.set_about(about_within(about, 1));
+  const Bytes least = without.finish();
+  Bytes all = least;
+  ASSERT_TRUE(add_words(all, about, least.size() + 100000));
+  EXPECT_FALSE(add_words(all, about, least.size())) << "nothing is taken away";
+  for (std::uint64_t bytes = least.size() - 9; bytes < all.size() + 9; bytes += 7) {
+    Bytes file = least;
+    const bool told = add_words(file, about, bytes);
+    EXPECT_LE(file.size(), std::max<std::uint64_t>(bytes, least.size()));
+    EXPECT_EQ(told, bytes >= all.size());
+    EXPECT_EQ(told, file == all);
+    const std::string text(file.begin(), file.end());
+    EXPECT_NE(text.find("A. Smith"), std::string::npos);
+    EXPECT_EQ(told, text.find("credit") != std::string::npos);
+    Findings findings;
+    check_glb(file, "file", findings, GlbRules::kStandalone);
+    EXPECT_TRUE(findings.list().empty());
+  }
 }
 
 TEST(Recode, LeanerStepsAreSmallerAndKeepTheirBound) {
@@ -132,7 +160,7 @@ TEST(Candidates, ForgottenOnesAreMadeAgainAlike) {
   ExtractBudget wishes;
   wishes.display_px = 64;  // small pictures, quick tests
   TextureSource textures(package, 1e6, {});
-  const Reference reference(package, wishes, false, textures, {});
+  const Reference reference(package, wishes, {}, textures, {});
   Candidates candidates(reference, textures);
   const Filling filling(reference, candidates, 20000);
   const std::uint64_t bytes = filling.mesh_file(candidates.mesh({1, 1})).fixed_bytes;

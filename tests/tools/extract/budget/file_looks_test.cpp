@@ -38,7 +38,7 @@ class Looks : public ::testing::Test {
   static constexpr MeshKey kMesh{0, 1, 0};
   PackageReader package_{open_store(kGolden)};
   TextureSource textures_{package_, 40.0 * kBytes, {}};
-  const Reference reference_{package_, small_request(), false, textures_, {}};
+  const Reference reference_{package_, small_request(), {}, textures_, {}};
   Candidates candidates_{reference_, textures_};
   Search search_{reference_, candidates_, kBytes};
 };

@@ -19,7 +19,7 @@ const std::string kGolden = std::string(TEXMESH_SOURCE_DIR) + "/tests/golden/v2.
 TEST(LossCurves, MoreBytesLoseLess) {
   PackageReader package(open_store(kGolden));
   TextureSource textures(package, 2.4e6, {});
-  const Reference reference(package, small_pictures(), false, textures, {});
+  const Reference reference(package, small_pictures(), {}, textures, {});
   ASSERT_GT(reference.images.size(), 0u);
   Candidates candidates(reference, textures);
   const LossCurves curves(reference, candidates, 40000);
@@ -41,7 +41,7 @@ TEST(LossCurves, MoreBytesLoseLess) {
 TEST(LossCurves, NeighboursAreTheFilesOfACurveInTurn) {
   PackageReader package(open_store(kGolden));
   TextureSource textures(package, 2.4e6, {});
-  const Reference reference(package, small_pictures(), false, textures, {});
+  const Reference reference(package, small_pictures(), {}, textures, {});
   Candidates candidates(reference, textures);
   const LossCurves curves(reference, candidates, 40000);
   CodedImage at = curves.allocate(0).images[0];
@@ -63,7 +63,7 @@ TEST(LossCurves, NeighboursAreTheFilesOfACurveInTurn) {
 TEST(LossCurves, ImagesOfOneMaterialAreOneGroup) {
   PackageReader package(open_store(kGolden));
   TextureSource textures(package, 2.4e6, {});
-  const Reference reference(package, small_pictures(), false, textures, {});
+  const Reference reference(package, small_pictures(), {}, textures, {});
   ASSERT_EQ(reference.groups.size(), reference.images.size());
   for (const PictureTexture& t : reference.shown)
     EXPECT_EQ(reference.groups[t.image], reference.groups[reference.shown[0].image]);

@@ -19,8 +19,9 @@ namespace {
 
 constexpr int kSide = 28;
 
-/// A bumpy sheet in two parts with one picture, as a package of several scales.
-Bytes compile_sheet(const testing::TemporaryFolder& folder) {
+/// A bumpy sheet in two parts with one picture, as a package of several scales. `mapped`: the picture is a
+/// normal map, too, and the sheet has tangents.
+Bytes compile_sheet(const testing::TemporaryFolder& folder, bool mapped) {
   testing::GltfBuilder b;
   std::vector<float> positions, normals, uvs;
   std::vector<std::uint16_t> halves[2];
@@ -44,9 +45,15 @@ Bytes compile_sheet(const testing::TemporaryFolder& folder) {
   const int image = b.push("images", {{"bufferView", b.view_of(png)}, {"mimeType", "image/png"}});
   b.push("textures", {{"source", image}});
   b.push("materials", {{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}});
+  nlohmann::json attributes = {{"POSITION", at}, {"NORMAL", n}, {"TEXCOORD_0", uv}};
+  if (mapped) {
+    std::vector<float> tangents;
+    for (std::size_t i = 0; i < uvs.size() / 2; ++i) tangents.insert(tangents.end(), {1, 0, 0, -1});
+    attributes["TANGENT"] = b.attribute(tangents, "VEC4");
+    b.json["materials"][0]["normalTexture"] = {{"index", 0}};
+  }
   for (int half = 0; half < 2; ++half) {
-    b.mesh({{"POSITION", at}, {"NORMAL", n}, {"TEXCOORD_0", uv}},
-           {{"indices", b.attribute(halves[half], "SCALAR")}, {"material", 0}});
+    b.mesh(attributes, {{"indices", b.attribute(halves[half], "SCALAR")}, {"material", 0}});
     b.node({{"mesh", half}, {"name", half == 0 ? "right" : "left"}});
   }
   const Bytes glb = b.glb();
@@ -64,10 +71,11 @@ Bytes compile_sheet(const testing::TemporaryFolder& folder) {
 
 const Bytes& sheet_package() {
   static const testing::TemporaryFolder folder;
-  static const Bytes bytes = compile_sheet(folder);
+  static const Bytes bytes = compile_sheet(folder, false);
   return bytes;
 }
 
+PackageReader open(Bytes&& package) = delete;  // the reader keeps no bytes of its own
 PackageReader open(const Bytes& package) { return PackageReader(open_container(memory_source(package))); }
 
 nlohmann::json json_of(const Bytes& glb) {
@@ -120,6 +128,31 @@ TEST(ScaleFile, EveryScaleIsOneFileWithThePreviewsInside) {
                                 before));
     }
   EXPECT_THROW(scale_file(package, 98, {}), InputError);
+}
+
+// The stream has none: they are made where the source had some.
+TEST(ScaleFile, ScalesOfTheStreamHaveTangentsWhereTheSourceHadSome) {
+  const testing::TemporaryFolder folder;
+  const Bytes sheet = compile_sheet(folder, true);
+  PackageReader mapped = open(sheet), plain = open(sheet_package());
+  const Manifest m = mapped.manifest();
+  ASSERT_GT(m.scales.size(), 2u);
+  for (const ManifestScale& s : m.scales)
+    for (const StreamedNormals normals : {StreamedNormals::kFitted, StreamedNormals::kStreamed}) {
+      const Mesh mesh = read_model(scale_file(mapped, s.scale, {}, normals), "x", {}).mesh;
+      ASSERT_EQ(mesh.tangents.size(), mesh.wedge_count()) << s.scale;
+      std::size_t along = 0;  // few triangles are folded
+      for (std::size_t w = 0; w < mesh.wedge_count(); ++w) {
+        const Vec4f t = mesh.tangents[w];
+        along += t.w == -1 && t.x > 0.7f;
+        EXPECT_NEAR(dot(mesh.normals[w], Vec3f{t.x, t.y, t.z}), 0, 0.03);
+      }
+      EXPECT_GE(along * 10, mesh.wedge_count() * 9) << s.scale;
+    }
+  for (const ManifestScale& s : plain.manifest().scales)
+    EXPECT_TRUE(read_model(scale_file(plain, s.scale, {}), "x", {}).mesh.tangents.empty());
+  const StandaloneGlb streamed = scale_file(mapped, m.scales[1].scale, {});
+  EXPECT_FALSE(read_model(plain_file(streamed, "x", {}), "x", {}).mesh.tangents.empty());
 }
 
 TEST(ScaleFile, IsTheSameForAnyThreadCount) {

@@ -2,7 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
+
 #include "format/base/errors.h"
+#include "pipeline/batch/stale_packages.h"
+#include "pipeline/io/uri.h"
 #include "tests/support/command.h"
 #include "tests/support/packages.h"
 
@@ -11,46 +15,112 @@ namespace {
 
 using testing::TemporaryFolder;
 
-std::string name_of(const std::string& path, std::vector<std::string> taken = {}) {
-  return object_name(path, taken);
+TEST(ObjectName, IsThePathInLettersThatEverySystemTakes) {
+  EXPECT_EQ(object_name("bust.texmesh"), "bust");
+  EXPECT_EQ(object_name("casts/Bust_2.v1/"), "casts/bust_2.v1");
+  EXPECT_EQ(object_name("a  <b>.texmesh"), "a  =3Cb=3E");
+  EXPECT_EQ(object_name("Zo\u00e9 \u96d5.texmesh"), "zo\u00e9 \u96d5");
+  EXPECT_EQ(object_name(".hidden.texmesh"), "=2Ehidden");
+  EXPECT_EQ(object_name(".texmesh"), "=");
 }
 
-TEST(ObjectName, KeepsWhatEveryServerTakes) {
-  EXPECT_EQ(name_of("bust.texmesh"), "bust");
-  EXPECT_EQ(name_of("casts/Bust_2.v1/"), "casts-Bust_2.v1");
-  EXPECT_EQ(name_of("a  <b>.texmesh"), "a-b-");
-}
-
-TEST(ObjectName, IsNeverEmptyHiddenOrLong) {
-  for (const char* path : {".texmesh", "\xff.texmesh", "..texmesh", ".hidden.texmesh"}) {
-    const std::string name = name_of(path);
-    EXPECT_FALSE(name.empty());
-    EXPECT_NE(name.front(), '.');
+/// Names of all kinds that people give: blanks, dots, signs, letters of many scripts, long ones.
+std::vector<std::string> all_names() {
+  std::vector<std::string> names{"a b",      "a-b",          "a_b",
+                                 "a=20b",    "a%20b",        "a..b",
+                                 "a.",       "a ",           ".a",
+                                 "..",       "...",          "=",
+                                 "==",       "=3D",          "-",
+                                 "--",       "a#b",          "a?b",
+                                 "a&b",      "a\"b",         "a:b",
+                                 "a\\b",     "con",          "\u00fc",
+                                 "u\u0308x", "\u96d5\u523b", "\u0441\u043a\u0430\u043d",
+                                 "\xff",     "\xfe",         "a+b",
+                                 "a@b",      "a~1",          "a\tb",
+                                 "x.y.z",    "index",        "0"};
+  for (const std::size_t length : {179u, 180u, 181u, 200u, 2000u}) {
+    names.push_back(std::string(length, 'x'));
+    names.push_back(std::string(length, 'x') + "y");
+    std::string umlauts;
+    while (umlauts.size() < length) umlauts += "\u00e4";
+    if (length % 2 == 0) names.push_back(umlauts);
   }
-  EXPECT_LE(name_of(std::string(3000, 'x') + ".texmesh").size(), 112u);
+  std::vector<std::string> all = names;
+  for (const std::string& folder : names)
+    for (const std::string& name : {names[0], names[5], names.back()}) all.push_back(folder + "/" + name);
+  return all;
 }
 
-TEST(ObjectName, NoTwoAreAlikeInAnyCase) {
-  std::vector<std::string> taken;
-  const std::string first = object_name("a b.texmesh", taken), second = object_name("A-B.texmesh", taken);
-  EXPECT_EQ(first, "a-b");
-  EXPECT_NE(second, "A-B");
-  EXPECT_EQ(taken.size(), 2u);
-  EXPECT_EQ(name_of("A-B.texmesh", {"a-b"}), second) << "by the path alone";
+TEST(ObjectName, DifferentPathsHaveDifferentNamesThatEveryFileSystemTells) {
+  std::map<std::string, std::string> path_of;
+  for (const std::string& path : all_names()) {
+    const std::string name = object_name(path + ".texmesh");
+    const auto [other, fresh] = path_of.emplace(name_key(name), path);
+    EXPECT_TRUE(fresh) << path << " and " << other->second;
+    EXPECT_TRUE(is_utf8(name)) << path;
+    for (std::size_t begin = 0, end = 0; begin <= name.size(); begin = end + 1) {
+      end = std::min(name.find('/', begin), name.size());
+      const std::string part = name.substr(begin, end - begin);
+      EXPECT_FALSE(part.empty()) << path;
+      EXPECT_LE(part.size(), 200u) << path;
+      EXPECT_NE(part.front(), '.') << path;
+      EXPECT_EQ(part.find_first_of("<>:\"|?*\\\t"), part.npos) << path;
+      EXPECT_TRUE(part.back() != '.' && part.back() != ' ') << path;
+    }
+  }
+}
+
+TEST(ObjectName, CaseAndCompositionDoNotCount) {
+  EXPECT_EQ(object_name("\u00dcber/Bust.texmesh"), object_name("u\u0308ber/bUST.texmesh"));
+}
+
+/// Writes a package of this title under a name.
+std::size_t add_package(const TemporaryFolder& folder, const std::string& file, const std::string& title) {
+  testing::PackageParts parts = testing::make_package_parts();
+  parts.manifest.title = title;
+  const Bytes bytes = parts.build();
+  testing::write_text(folder / file, std::string(bytes.begin(), bytes.end()));
+  return bytes.size();
+}
+
+TEST(Site, AnAddressDependsOnNoOtherPackage) {
+  TemporaryFolder one, many;
+  add_package(one, "\u96d5.texmesh", "");
+  for (const char* name : {"-", "\u523b", "\u96d5", "a"})
+    add_package(many, std::string(name) + ".texmesh", "");
+  const Site few = read_site(one.path().string(), {}), all = read_site(many.path().string(), {});
+  const auto found = std::ranges::find(all.objects, "\u96d5", &SiteObject::name);
+  ASSERT_NE(found, all.objects.end());
+  EXPECT_EQ(found->address, few.objects.at(0).address);
+  EXPECT_EQ(all.objects.size(), 4u);
+}
+
+TEST(Site, ContentHasAnAddressOfItsOwn) {
+  TemporaryFolder folder;
+  add_package(folder, "a.texmesh", "first");
+  const std::string before = read_site(folder.path().string(), {}).objects.at(0).address;
+  add_package(folder, "a.texmesh", "second");
+  const std::string after = read_site(folder.path().string(), {}).objects.at(0).address;
+  EXPECT_NE(before, after);
+  EXPECT_TRUE(after.starts_with("packages/a.") && after.ends_with(".texmesh")) << after;
+}
+
+TEST(Site, LeavesOutWhatNoModelMakesAndNamesThatMeet) {
+  TemporaryFolder folder;
+  for (const char* name : {"a", "A", "b", "c"}) add_package(folder, std::string(name) + ".texmesh", "");
+  testing::write_text(folder / kStaleList, "b.texmesh\n");
+  const Site site = read_site(folder.path().string(), {});
+  EXPECT_EQ(site.objects.size(), 2u);
+  ASSERT_EQ(site.faults.size(), 2u);
+  EXPECT_NE(site.faults[0].message.find("A.texmesh"), std::string::npos) << site.faults[0].message;
+  EXPECT_NE(site.faults[1].message.find("no model makes"), std::string::npos) << site.faults[1].message;
 }
 
 TEST(Site, HasFiguresOfEveryPackageByTitle) {
   TemporaryFolder folder;
-  const auto add = [&](const std::string& file, const std::string& title) {
-    testing::PackageParts parts = testing::make_package_parts();
-    parts.manifest.title = title;
-    const Bytes bytes = parts.build();
-    testing::write_text(folder / file, std::string(bytes.begin(), bytes.end()));
-    return bytes.size();
-  };
-  add("1.texmesh", "zebra");
-  const std::size_t bytes = add("2.texmesh", "Ape");
-  add("3.texmesh", "");
+  add_package(folder, "1.texmesh", "zebra");
+  const std::size_t bytes = add_package(folder, "2.texmesh", "Ape");
+  add_package(folder, "3.texmesh", "");
   const Site site = read_site(folder.path().string(), {});
   ASSERT_EQ(site.objects.size(), 3u);
   EXPECT_EQ(site.objects[0].title, "3");  // the file's name
@@ -59,7 +129,7 @@ TEST(Site, HasFiguresOfEveryPackageByTitle) {
   EXPECT_EQ(site.objects[1].bytes, bytes);
   EXPECT_EQ(site.objects[1].texture_px, 64u);
   EXPECT_GT(site.objects[1].start_bytes, 0u);
-  EXPECT_EQ(site.objects[1].address, "packages/2.texmesh");
+  EXPECT_EQ(site.objects[1].address, "packages/2." + site.objects[1].digest + ".texmesh");
 }
 
 TEST(Site, AFolderWithoutPackagesIsRefused) {

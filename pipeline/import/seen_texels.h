@@ -10,4 +10,9 @@ namespace texmesh {
 /// a warning. After finish_model().
 void judge_alpha(Model& model, const RunContext& context);
 
+/// `materials`: those whose normal texture is what an MTL calls a bump map, which may be either. Where the
+/// texels that triangles show are no normals, the texture is a height map and is left out, with a note.
+/// Before finish_model(), which drops pictures that nothing uses.
+void judge_bump_maps(Model& model, const std::vector<std::size_t>& materials, const RunContext& context);
+
 }  // namespace texmesh
