@@ -64,7 +64,7 @@ class Checks:
     def check_thesis(self, c):
         model = self.model
         known = dict(self.known, tables=model.tables, planes=len(model.textures))
-        known["later"] = model.manifest.version.minor > 0
+        known["later"] = model.manifest.version.minor > 1
         for kind, plane, size in self.follow("thesis", c, **known).sections.tolist():
             body = Cursor(c.raw(size), "O05", f"section {kind} of plane {plane}")
             if kind in (1, 2, 3, 4):

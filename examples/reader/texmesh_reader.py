@@ -58,7 +58,7 @@ def read_pages(data, m, name, rules):
         page = Cursor(c.raw(size), rules[2], f"page {record} of {name}")
         require(sha(page.data) == digest.hex(), rules[1], f"digest of {page.what}")
         yield record, page
-        if m.version.minor == 0:
+        if m.version.minor <= 1:
             page.finish()
     c.finish()
 
@@ -130,7 +130,7 @@ class Model:
 
     def read_tables(self, data):
         """Per plane a record of arrays, as section 8 names them."""
-        m, later = self.manifest, self.manifest.version.minor > 0
+        m, later = self.manifest, self.manifest.version.minor > 1
         sections = zip(read_pages(data, m, "tables", ("T02", "T02", "T03")), self.textures)
         return [RULES.follow("section", section, m=m, t=t, later=later) for (_, section), t in sections]
 

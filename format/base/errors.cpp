@@ -17,7 +17,7 @@ std::string joined(std::string_view file, std::string_view place, std::string_vi
   add(": ", "", file);
   add(": ", "", place);
   add(": ", "expected ", expected);
-  add(expected.empty() ? ": " : ", ", "found ", found);
+  add(expected.empty() ? ": " : ", ", expected.empty() ? "" : "found ", found);
   return s;
 }
 

@@ -18,7 +18,8 @@ class FileSource final : public ByteSource {
   explicit FileSource(std::string path) : path_(std::move(path)) {
     // Non-blocking, so that a FIFO does not hang us before fstat can tell.
     fd_.reset(::open(path_.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
-    if (fd_.get() < 0) throw InputError(path_, "", "a readable file", std::strerror(errno));
+    if (fd_.get() < 0)
+      throw InputError(path_, "", "", std::string("cannot be read: ") + std::strerror(errno));
     struct stat st {};
     if (::fstat(fd_.get(), &st) != 0 || !S_ISREG(st.st_mode))
       throw InputError(path_, "", "a regular file", "something else");
@@ -35,7 +36,8 @@ class FileSource final : public ByteSource {
     if (errno == 0)
       throw RuleError("K01", path_, "byte " + std::to_string(offset), "more bytes",
                       "the file became shorter");
-    throw InputError(path_, "byte " + std::to_string(offset), "readable bytes", std::strerror(errno));
+    throw InputError(path_, "byte " + std::to_string(offset), "",
+                     std::string("cannot be read: ") + std::strerror(errno));
   }
 
  private:

@@ -6,8 +6,9 @@ namespace texmesh {
 
 /// Major version of packages that this library writes and reads (SPEC.md, Version history).
 inline constexpr int kFormatMajor = 2;
-/// Minor version of packages that this library writes. It reads packages of later minor versions, too.
-inline constexpr int kFormatMinor = 0;
+/// Latest minor version that this library knows. It reads packages of later ones, too, and writes the least
+/// that a package needs: needed_minor().
+inline constexpr int kFormatMinor = 1;
 
 /// What a reader says it has found instead of kFormatMajor.
 inline std::string describe_other_major(int major) {
@@ -16,10 +17,10 @@ inline std::string describe_other_major(int major) {
 }
 
 /// Magic word and version, with which index.bin, tables.bin and thesis.bin begin.
-inline void write_entry_start(BytesOut& out, std::string_view magic) {
+inline void write_entry_start(BytesOut& out, std::string_view magic, int minor) {
   out.text(magic);
   out.u16(kFormatMajor);
-  out.u16(kFormatMinor);
+  out.u16(static_cast<std::uint64_t>(minor));
 }
 /// The minor version. RuleError for another magic word (`magic_rule`) or major version (W03).
 inline int read_entry_start(BytesIn& in, std::string_view magic, const char* magic_rule) {

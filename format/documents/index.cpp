@@ -109,7 +109,7 @@ std::vector<EntryRef> read_records(const IndexHead& head, const IndexPage& p, By
 
 }  // namespace
 
-std::vector<std::uint8_t> write_index(const std::vector<EntryRef>& entries) {
+std::vector<std::uint8_t> write_index(const std::vector<EntryRef>& entries, int minor) {
   for (const EntryRef& e : entries) check_entry(e);
   check_entry_order(entries);
   // Page 0 is always there; planes follow by number.
@@ -118,7 +118,7 @@ std::vector<std::uint8_t> write_index(const std::vector<EntryRef>& entries) {
   for (const EntryRef& e : entries) (plane_of(e) == kNoPlane ? general : planes[plane_of(e)]).push_back(e);
 
   BytesOut head, pages;
-  write_entry_start(head, kIndexMagic);
+  write_entry_start(head, kIndexMagic, minor);
   head.u32(planes.size() + 1);
   head.u32(entries.size());
   const auto add_page = [&](std::uint32_t plane, const std::vector<EntryRef>& page_entries) {

@@ -58,7 +58,7 @@ struct IndexHead {
   std::vector<IndexPage> pages;
 };
 /// `entries` in container order. FormatError when paths are invalid or repeated, or offsets do not rise.
-std::vector<std::uint8_t> write_index(const std::vector<EntryRef>& entries);
+std::vector<std::uint8_t> write_index(const std::vector<EntryRef>& entries, int minor = 0);
 /// `bytes` may stop after the head.
 IndexHead read_index_head(std::span<const std::uint8_t> bytes);
 /// One page's bytes, digest checked; entries in container order.

@@ -71,7 +71,7 @@ struct ManifestStep {
 
 /// manifest.json (SPEC.md, section Manifest; schemas/manifest.v2.schema.json).
 struct Manifest {
-  int major = kFormatMajor, minor = kFormatMinor;
+  int major = kFormatMajor, minor = 0;
   std::vector<std::string> required_features;  // a reader must know every one of them
   std::string title;                           // option; "" by default
   Vec3d origin;                                // local frame -> source coordinates

@@ -146,11 +146,11 @@ std::vector<std::uint8_t> write_package(Manifest manifest, std::vector<TextureIn
   for (;;) {
     place_entries(refs, slot);
     if (index.empty()) {  // its size does not depend on the offsets in it
-      index = write_index(without_index());
+      index = write_index(without_index(), manifest.minor);
       index_ref->bytes = index.size();
       place_entries(refs, slot);
     }
-    index = write_index(without_index());
+    index = write_index(without_index(), manifest.minor);
     index_ref->digest = sha256(index);
     ManifestFiller(manifest, data).fill(refs);
     text = write_manifest(manifest);

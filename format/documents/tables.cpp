@@ -143,6 +143,7 @@ void check_plane(const PlaneTables& t, float rounding, const std::string& place)
   require_range(t.surface_fraction, 0, 1 + rounding, place + "/surface_fraction");
   require_range(t.quality, 0, 100, place + "/quality");
   require_range(t.vqp, 0, 1, place + "/vqp");
+  require_range({t.density_weight}, 0, t.allocation == kByVqp ? 1 : 0, place + "/density_weight");
   for (const std::uint32_t f : t.features)
     if (f >= kFeatureLimit) fail_tables("T03", place + "/features", "less than 2^24", std::to_string(f));
   check_fragment_order(t, place);
@@ -166,13 +167,14 @@ constexpr std::uint8_t kIncremental = 1;  // flag
 /// What a section's first fields say of the rest.
 struct SectionCounts {
   std::uint64_t scales = 0, rungs = 0, knots = 0, listed = 0;
-  bool vqp = false;
+  bool vqp = false, density = false;
   int size_width = 1, feature_width = 1;
   std::uint64_t bytes() const {
     const auto size_bytes = static_cast<std::uint64_t>(size_width),
                feature_bytes = static_cast<std::uint64_t>(feature_width);
     return kSectionFixed + listed * 2 + rungs * 5 + knots * 3 + rungs * listed * (size_bytes + 8 + 2 + 2) +
-           listed * (2 + 4 + 4) + scales * listed * feature_bytes + scales * 4 + (vqp ? listed * 2 : 0);
+           listed * (2 + 4 + 4) + scales * listed * feature_bytes + scales * 4 + (vqp ? listed * 2 : 0) +
+           (density ? 4 : 0);
   }
 };
 
@@ -182,7 +184,9 @@ void for_each_listed(const PlaneTables& t, std::uint64_t lines, auto put) {
     for (const std::uint16_t f : t.order) put(static_cast<std::size_t>(line * t.fragment_count() + f));
 }
 
-Bytes write_section(const PlaneTables& t) {
+bool has_density(const PlaneTables& t, int minor) { return t.allocation == kByVqp && minor >= 1; }
+
+Bytes write_section(const PlaneTables& t, int minor) {
   std::vector<std::uint32_t> features;
   for_each_listed(t, t.scale_count(), [&](std::size_t k) { features.push_back(t.features[k]); });
   const int size_width = width_of(t.size_bytes), feature_width = width_of(features);
@@ -217,6 +221,7 @@ Bytes write_section(const PlaneTables& t) {
   for (const auto v : features) out.number(v, feature_width);
   for (const auto v : t.quality) out.f32(v);
   if (t.allocation == kByVqp) for_each_listed(t, 1, [&](std::size_t k) { out.u16(to_unit16(t.vqp[k])); });
+  if (has_density(t, minor)) out.f32(t.density_weight);
   return out.finish();
 }
 
@@ -269,6 +274,7 @@ void read_arrays(BytesIn& in, PlaneTables& t, const SectionCounts& counts) {
               [&] { return static_cast<std::uint32_t>(in.number(counts.feature_width)); });
   fill(t.quality, counts.scales, [&] { return in.f32(); });
   if (counts.vqp) fill_listed(t.vqp, 1, [&] { return from_unit16(in.u16()); });
+  if (counts.density) t.density_weight = in.f32();
 }
 
 /// The fields in front of a section's arrays. All counts are small afterwards, so that no product of them
@@ -282,6 +288,7 @@ SectionCounts read_section_start(BytesIn& in, PlaneTables& t, int minor) {
   counts.size_width = in.u8(), counts.feature_width = in.u8();
   t.allocation = in.u8();
   counts.vqp = t.allocation == kByVqp;
+  counts.density = has_density(t, minor);
   const std::uint8_t flags = in.u8();
   counts.knots = in.u8();
   if (const auto reserved = in.u8(); (flags > kIncremental || reserved != 0) && minor <= kFormatMinor)
@@ -344,16 +351,23 @@ PackageTables select_scales(const PackageTables& tables, const std::vector<std::
   return out;
 }
 
-std::vector<std::uint8_t> write_tables(const PackageTables& tables) {
+int needed_minor(const PackageTables& tables) {
+  return std::ranges::any_of(tables.planes, [](const PlaneTables& t) { return t.density_weight > 0; }) ? 1
+                                                                                                       : 0;
+}
+
+std::vector<std::uint8_t> write_tables(const PackageTables& tables, int minor) {
+  require_tables(minor >= needed_minor(tables), "W01", "", "a minor version that has density_weight",
+                 std::to_string(minor));
   BytesOut head, sections;
-  write_entry_start(head, kTablesMagic);
+  write_entry_start(head, kTablesMagic, minor);
   head.u32(tables.planes.size());
   head.u32(0);
   std::uint64_t cells = 0;
   for (std::size_t p = 0; p < tables.planes.size(); ++p) {
     check_plane(tables.planes[p], kRounding, plane_place(p));
     add_cells(tables.planes[p], cells);
-    const Bytes section = write_section(tables.planes[p]);
+    const Bytes section = write_section(tables.planes[p], minor);
     head.u32(section.size());
     head.raw(sha256(section));
     sections.raw(section);

@@ -41,8 +41,9 @@ struct PlaneTables {
   // place (8.3); with the widths and clip used:
   std::uint8_t allocation = 1;
   float quality_width = 60, log_width = 0.7f, quality_min = 5, quality_max = 97;
-  // [F], 0..1, stored as multiples of 1 / 65535: p of (8.4) where the allocation is 3, else empty
+  // [F], 0..1, stored as multiples of 1 / 65535: p of (8.4) at S_0 where the allocation is 3, else empty
   std::vector<float> vqp;
+  float density_weight = 0;  // 0..1: what part of p is eta; above 0 with allocation 3 alone, from 2.1 on
 
   std::size_t fragment_count() const { return static_cast<std::size_t>(columns) * rows; }
   std::size_t rung_count() const { return rung_quality.size(); }
@@ -50,7 +51,8 @@ struct PlaneTables {
   static void archive(auto& s, auto& a) {
     a(s.columns, s.rows, s.incremental, s.rung_quality, s.table_bytes, s.order, s.size_bytes, s.digest, s.mse,
       s.dssim, s.skip_dssim, s.covered_texels, s.surface_fraction, s.knot_quality, s.knot_position,
-      s.features, s.quality, s.allocation, s.quality_width, s.log_width, s.quality_min, s.quality_max, s.vqp);
+      s.features, s.quality, s.allocation, s.quality_width, s.log_width, s.quality_min, s.quality_max, s.vqp,
+      s.density_weight);
   }
 };
 
@@ -62,10 +64,14 @@ struct PackageTables {
 /// The tables with the rows of these scales only, in this order; `rows` are indices of rows that are there.
 PackageTables select_scales(const PackageTables& tables, const std::vector<std::size_t>& rows);
 
-/// tables.bin, see SPEC.md. The reader checks magic, version, every count against the bytes, and every
-/// value's range, and throws FormatError. write(read(x)) == x; values that the file stores in 16 bits are
-/// rounded by the writer, and values of fragments that are not stored left out.
-std::vector<std::uint8_t> write_tables(const PackageTables& tables);
+/// The least minor version that packages with these tables can have: 2.1 has density_weight.
+int needed_minor(const PackageTables& tables);
+
+/// tables.bin of a package of that minor version, needed_minor() or later, see SPEC.md. The reader checks
+/// magic, version, every count against the bytes, and every value's range, and throws FormatError.
+/// write(read(x)) == x; values that the file stores in 16 bits are rounded by the writer, and values of
+/// fragments that are not stored left out.
+std::vector<std::uint8_t> write_tables(const PackageTables& tables, int minor = 0);
 PackageTables read_tables(std::span<const std::uint8_t> bytes);
 /// The head alone tells where each plane's section stands, so that a client can read one plane by a range.
 struct TablesSection {

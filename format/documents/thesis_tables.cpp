@@ -210,7 +210,7 @@ PerceptualTable read_perceptual_section(BytesIn& in, bool reserved_is_zero) {
   return t;
 }
 
-std::vector<std::uint8_t> write_thesis(const ThesisTables& tables) {
+std::vector<std::uint8_t> write_thesis(const ThesisTables& tables, int minor) {
   std::vector<ThesisSection> sections;
   for (std::uint32_t p = 0; p < tables.planes.size(); ++p) {
     const PlaneThesis& t = tables.planes[p];
@@ -223,7 +223,7 @@ std::vector<std::uint8_t> write_thesis(const ThesisTables& tables) {
     sections.push_back({kPerceptualTableId, kWholePackage, write_perceptual_section(tables.perceptual)});
   std::ranges::sort(sections, {}, [](const ThesisSection& s) { return std::tuple(s.id, s.plane); });
   BytesOut head, data;
-  write_entry_start(head, kThesisMagic);
+  write_entry_start(head, kThesisMagic, minor);
   head.u32(sections.size());
   head.u32(0);
   for (const ThesisSection& s : sections) {

@@ -80,10 +80,10 @@ struct ThesisTables {
   static void archive(auto& s, auto& a) { a(s.planes, s.perceptual); }
 };
 
-/// thesis.bin (SPEC.md). Planes at the end without any section do not come back, what the file stores in 16
-/// bits is rounded by the writer; else write(read(x)) == x. FormatError for counts, sizes and values that
-/// break a rule; sections of unknown ids are skipped.
-std::vector<std::uint8_t> write_thesis(const ThesisTables& tables);
+/// thesis.bin of a package of that minor version (SPEC.md). Planes at the end without any section do not come
+/// back, what the file stores in 16 bits is rounded by the writer; else write(read(x)) == x. FormatError for
+/// counts, sizes and values that break a rule; sections of unknown ids are skipped.
+std::vector<std::uint8_t> write_thesis(const ThesisTables& tables, int minor = 0);
 struct ThesisFile {
   int minor = 0;
   ThesisTables tables;

@@ -55,8 +55,7 @@ void add_steps(const RdCurve& curve, std::uint32_t index, std::vector<Step>& ste
 
 double log_quantiser(double quality) { return -portable::log(ijg_scale(quality)); }
 
-std::vector<float> eta_of(const PlaneTables& tables, std::size_t row) {
-  if (tables.allocation == kByVqp) return tables.vqp;
+std::vector<float> density_of(const PlaneTables& tables, std::size_t row) {
   const std::size_t n = tables.fragment_count();
   const std::uint32_t* features = tables.features.data() + row * n;
   std::uint32_t lo = 0xffffffffu, hi = 0;
@@ -70,6 +69,18 @@ std::vector<float> eta_of(const PlaneTables& tables, std::size_t row) {
   for (std::size_t f = 0; f < n; ++f)
     if (tables.covered_texels[f] > 0)
       eta[f] = static_cast<float>(static_cast<double>(features[f] - lo) / static_cast<double>(hi - lo));
+  return eta;
+}
+
+std::vector<float> eta_of(const PlaneTables& tables, std::size_t row) {
+  std::vector<float> eta = density_of(tables, row);
+  if (tables.allocation != kByVqp) return eta;
+  const std::vector<float> finest = density_of(tables, 0);
+  for (std::size_t f = 0; f < eta.size(); ++f) {
+    const double moved = static_cast<double>(tables.density_weight) *
+                         (static_cast<double>(eta[f]) - static_cast<double>(finest[f]));
+    eta[f] = static_cast<float>(std::clamp(static_cast<double>(tables.vqp[f]) + moved, 0.0, 1.0));
+  }
   return eta;
 }
 

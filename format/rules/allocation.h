@@ -7,7 +7,10 @@ namespace texmesh {
 /// those below it, too. 0 when it is not stored there.
 std::uint64_t bytes_to_show(const PlaneTables& tables, std::size_t rung, std::size_t fragment);
 /// eta_i (3.1) of one scale, by its row in the tables: feature counts min-max over covered fragments; 0 for
-/// the others. With allocation 3 VQP (8.4) at every scale, since 8.3 assigns quality by it.
+/// the others.
+std::vector<float> density_of(const PlaneTables& tables, std::size_t row);
+/// What quality goes by in the place of eta_i: density_of(), and with allocation 3 VQP (8.4), since 8.3
+/// assigns quality by it: that of S_0, which is row 0, with the density of the scale in the place of S_0's.
 std::vector<float> eta_of(const PlaneTables& tables, std::size_t row);
 /// q_i(x, y): the quality that the tables' allocation asks for (3.2, or its log-quantiser form), clipped.
 /// Gamma in 0..1; the default Gamma is the mean of eta over covered fragments. With allocation 2 these are

@@ -34,10 +34,21 @@ double edge_limit_of_first(std::span<const ManifestScale> scales) {
   return scales[1].display_px_edge * std::sqrt(std::max(ratio, 1.0));
 }
 
+/// A tier is shown from the distance of its first scale on, which is the one behind the major scale before.
+double distance_limit(std::span<const ManifestScale> scales, std::size_t k) {
+  if (!scales[k].major) return 0;
+  std::size_t before = k - 1;
+  while (before > 0 && !scales[before].major) --before;
+  double px = kFirstDistancePx;
+  for (int i = scales[before].scale; i > 0; --i) px /= kDistanceStep;
+  return px;
+}
+
 double limit_of(std::span<const ManifestScale> scales, std::size_t k, StepRule rule) {
   if (rule == StepRule::kJnd) return scales[k].display_px_jnd;
   if (rule == StepRule::kError) return scales[k].display_px_error;
   if (rule == StepRule::kFlip) return scales[k].display_px_flip;
+  if (rule == StepRule::kDistance) return distance_limit(scales, k);
   return k == 1 ? edge_limit_of_first(scales) : edge_limit(scales, k);
 }
 
@@ -55,7 +66,8 @@ bool accepts(std::span<const ManifestScale> scales, std::size_t k, double displa
   if (rule == StepRule::kJnd)
     return std::max(part.width_px, part.height_px) * growth_of_value(s, displayed_px, part) <=
            s.display_px_jnd;
-  return displayed_px <= limit_of(scales, k, rule);
+  const double growth = rule == StepRule::kDistance ? growth_of_value(s, displayed_px, part) : 1;
+  return displayed_px * growth <= limit_of(scales, k, rule);
 }
 
 }  // namespace

@@ -22,8 +22,15 @@ double viewing_distance(double object_height, double height_px, const Camera& ca
 
 /// What decides about the scale: kFlip = lit pictures that cannot be told from S_0's, the default, which is
 /// what Manifest::steps holds; kJnd = the just-noticeable difference; kError = an error of one pixel (95th
-/// percentile); kEdge = the O_V / E_S that matches the displayed height best (thesis 7.6).
-enum class StepRule { kFlip, kJnd, kError, kEdge };
+/// percentile); kEdge = the O_V / E_S that matches the displayed height best (thesis 7.6); kDistance = the
+/// mapping of scale over distance (7.5, Fig. 7.13): S_i belongs to distance i, in whose place the major scale
+/// of its tier is shown. S_0 is shown where the object is nearer than 1.
+enum class StepRule { kFlip, kJnd, kError, kEdge, kDistance };
+/// The thesis says no more of its units than that there are 20. Here the object is displayed kFirstDistancePx
+/// high at distance 1, as the picture is on two of the four monitors of Table 7.3, and by kDistanceStep less
+/// at every further one: 32 px at 20. By equal steps of the distance itself scales beyond S_5 change within
+/// 20 %.
+inline constexpr double kFirstDistancePx = 1024, kDistanceStep = 1.2;
 /// The step function displayed height -> scale by one rule, coarse to fine; the last step is S_0's, up to
 /// kAnyDisplayPx. A scale that accepts no more than a coarser one gives no step. `scales` as in a
 /// manifest, S_0 first.
@@ -66,8 +73,9 @@ double fovea_radius_px(double eye_distance_px, double degrees = kFoveaDegrees);
 /// The scale for an object displayed `displayed_px` high (the whole of it, seen or not) of which only a part
 /// is visible. The part is a shape of its own: no point of it is farther from its skeleton than half its
 /// shorter side, so a distance between surfaces weighs more, relative to that, than on the whole object; and
-/// the height that the JND goes by is the part's. The other rules know nothing of shapes and stay as they
-/// are. Nothing visible: the coarsest scale. Not clipped: scale_at(step_function(...)).
+/// the height that the JND goes by is the part's. By kDistance the object comes nearer as much as the
+/// distance weighs more. The other rules know nothing of shapes and stay as they are. Nothing visible: the
+/// coarsest scale. Not clipped: scale_at(step_function(...)).
 int select_scale(const Manifest& manifest, double displayed_px, const VisiblePart& part,
                  StepRule rule = StepRule::kFlip);
 

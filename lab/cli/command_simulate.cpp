@@ -483,8 +483,8 @@ void add_method_options(Command& c, SimulateArguments& a) {
        "htca = the thesis's method; guard = htca around the plan of least loss, with sizes within a factor of 1.5 "
        "of that plan's share; price = one price of bytes, which rises when the transfer is late; proportional = "
        "planned sizes scaled by the time left; static = planned sizes, always; thesis = chapters 4 and 7 as "
-       "printed: htca with --rule jnd, --order beta0, --window 1 and --hard-limits, textures at full size, the "
-       "list that T_0 beta_0 pays")
+       "printed: htca with --rule distance, --order beta0, --window 1, --hard-limits and the list that T_0 beta_0 "
+       "pays")
       .shows_default("guard");
   c.choice("--order", a.order,
            "Next fragment: credit = by the sign of the credit; beta0 = by the throughput, as first "

@@ -27,6 +27,8 @@ PaintedModel paint_skeleton(const ConditionedMesh& mesh, const Skeleton& skeleto
 /// R(v), the distance to the skeleton. StageError where the skeleton is of another mesh.
 PaintedModel paint_radius(const ConditionedMesh& mesh, const Skeleton& skeleton);
 /// At which error a vertex was removed; logarithmic.
+/// |R_R - R_C| / R_C of the collapse that removed a vertex; 0 where none did.
+PaintedModel paint_perceptual(const NestedScales& scales, const Skeleton& skeleton);
 PaintedModel paint_collapse_error(const NestedScales& scales);
 
 }  // namespace texmesh

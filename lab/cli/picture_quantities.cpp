@@ -28,6 +28,8 @@ void add_remarks(const Notes& notes, ColourLegend& legend) {
 constexpr PaintedQuantity kLaboratoryQuantities[] = {
     {"skeleton", [] { return painting_stage(inputs(kConditionedMesh, kSkeleton), paint_skeleton); }, nullptr},
     {"R", [] { return painting_stage(inputs(kConditionedMesh, kSkeleton), paint_radius); }, nullptr},
+    {"perceptual", [] { return painting_stage(inputs(kNestedScales, kSkeleton), paint_perceptual); },
+     nullptr},
     {"collapse-error", [] { return painting_stage(inputs(kNestedScales), paint_collapse_error); }, nullptr}};
 
 }  // namespace
@@ -60,6 +62,17 @@ PaintedModel paint_skeleton(const ConditionedMesh& mesh, const Skeleton& skeleto
       fmt::format("{} nodes, {} segments", skeleton.nodes.size(), skeleton.segments.size()));
   add_remarks(skeleton.notes, view.legend);
   return view;
+}
+
+PaintedModel paint_perceptual(const NestedScales& scales, const Skeleton& skeleton) {
+  std::vector<double> value(scales.mesh.positions.size(), 0);
+  for (const Collapse& c : scales.collapses)
+    value.at(c.from) = std::abs(double{skeleton.distance.at(c.from)} - skeleton.distance.at(c.to)) /
+                       double{skeleton.radius.at(c.to)};
+  ColourLegend legend{"perceptual: |R_R - R_C| / R_C of the collapse that removed a vertex (7.2)"};
+  legend.hi = std::max(rank(value, 0.99), 1e-6);
+  legend.remarks.push_back("colours end at the 99th percentile; vertices that are left have 0");
+  return paint_values(scales.mesh, value, std::move(legend), "collapses");
 }
 
 PaintedModel paint_collapse_error(const NestedScales& scales) {
@@ -95,13 +108,15 @@ void add_picture_command(Command& app) {
   auto args = std::make_shared<Painting>();
   Command c = app.add("picture", "Picture what a stage of the method computed, with a legend of its colours");
   c.option("INPUT", args->input, "A model; the stages that are needed run, through the cache").required();
-  c.option("--what", args->what,
-           "skeleton: the curve skeleton inside the shape. R: the distance to the skeleton, which errors are "
-           "measured against. collapse-error: at which error a vertex was removed",
-           "QUANTITY")
+  c.option(
+       "--what", args->what,
+       "skeleton: the curve skeleton inside the shape. R: the distance to the skeleton, which errors are "
+       "measured against. collapse-error: at which error a vertex was removed. perceptual: the perceptual value of that collapse",
+       "QUANTITY")
       .required()
-      .one_of_explained({"skeleton", "R", "collapse-error"});
-  c.option("-o,--output", args->output, "x.glb to turn in any viewer, or x.png for two views side by side",
+      .one_of_explained({"skeleton", "R", "collapse-error", "perceptual"});
+  c.option("-o,--output", args->output,
+           "x.glb to turn in any viewer, x.png for two views side by side, x.csv or x.ply for the values",
            "FILE")
       .required();
   c.option("--size", args->size_px, "Side of one view of a PNG, px").integer_in(64, 4096).shows_default();

@@ -36,19 +36,18 @@ Exhibit figure_8_2(const PatternPlane& all, const RunContext& context) {
                           static_cast<double>(p.zeta[f]), static_cast<double>(p.m[f]),
                           static_cast<double>(p.vqp[f])});
   const auto above = [&](char more, char less) { return p.vqp[pattern_of(more)] > p.vqp[pattern_of(less)]; };
-  struct Order {
-    char more, less;
-  };
-  constexpr Order kOrders[] = {{'j', 'i'}, {'p', 'n'}, {'s', 'l'}, {'s', 'n'}, {'s', 'p'}, {'s', 'q'}};
-  std::size_t holds = 0;
+  // The last three: 44, 34, 27 and 26 % of Fig. 8.5 follow this order.
+  constexpr std::string_view kOrders[] = {"ji", "pn", "sl", "sn", "sp", "sq", "xq", "qj", "jc"};
+  std::size_t holds = 0, unguided = 0;
   Table orders{"What the thesis says of its patterns, of ours with the same letters",
                {{"more than", 0}, {"ZIM", 3}, {"ZIM", 3}, {"holds", 0}},
                {}};
-  for (const Order& o : kOrders) {
-    holds += above(o.more, o.less);
+  for (const std::string_view& o : kOrders) {
+    holds += above(o[0], o[1]);
+    unguided += &o >= std::end(kOrders) - 3 && above(o[0], o[1]);
     orders.rows.push_back(
-        {fmt::format("({}) above ({})", o.more, o.less), static_cast<double>(p.vqp[pattern_of(o.more)]),
-         static_cast<double>(p.vqp[pattern_of(o.less)]), std::string(above(o.more, o.less) ? "yes" : "no")});
+        {fmt::format("({}) above ({})", o[0], o[1]), static_cast<double>(p.vqp[pattern_of(o[0])]),
+         static_cast<double>(p.vqp[pattern_of(o[1])]), std::string(above(o[0], o[1]) ? "yes" : "no")});
   }
   const Pixels& sheet = all.pixels[0];
   return {
@@ -56,16 +55,21 @@ Exhibit figure_8_2(const PatternPlane& all, const RunContext& context) {
       "Fig. 8.2: 24 patterns and their predictors",
       "darker patterns mask better, so (i) is below (j) and (n) below (p); sharp edges on a bright ground, (s), are above "
       "(l), (n), (p) and (q)",
-      "patterns of 64 x 64 px made by code; equal weights of Z, I and M, each scaled over the 24",
+      "patterns of 64 x 64 px made by code; equal weights of Z, I and M, each scaled over the 24. Code draws for the "
+      "first six orders, so that the last three decide. Confirmed: all orders hold. Not confirmed: none of these three "
+      "does",
       {orders, table},
       {},
       {{"fig-8-2.png", "the patterns, (a) to (f) in the first row", sheet.width_px, sheet.height_px,
         write_png(sheet)}},
-      holds == std::size(kOrders) ? Verdict::kConfirmed : Verdict::kInPart,
+      holds == std::size(kOrders) ? Verdict::kConfirmed
+      : unguided == 0             ? Verdict::kNotConfirmed
+                                  : Verdict::kInPart,
       fmt::format(
-          "{} of {} orders hold. The printed values stand in a picture that is not available; the orders that the "
+          "{} of {} orders hold, {} of them among the last three. The printed values stand in a picture that is not "
+          "available; the orders that the "
           "text names are compared.",
-          holds, std::size(kOrders))};
+          holds, std::size(kOrders), unguided)};
 }
 
 Exhibit figure_8_3(const PatternPlane& all, const RunContext& context) {

@@ -4,6 +4,7 @@
 
 #include "format/base/text_bytes.h"
 #include "pipeline/about/code_tables.h"
+#include "pipeline/io/names/closest_word.h"
 #include "pipeline/io/record.h"
 #include "pipeline/io/uri.h"
 
@@ -280,9 +281,10 @@ class MetaReader {
     const Licence licence = read_licence(json["licence"].get<std::string>());
     if (licence.kind == Licence::Kind::kOther)
       fail("/licence", "an SPDX licence expression or an http or https URL",
-           licence.wrong.empty() || licence.wrong == licence.text
-               ? "\"" + licence.text + "\""
-               : "\"" + licence.wrong + "\" in \"" + licence.text + "\"");
+           (licence.wrong.empty() || licence.wrong == licence.text
+                ? "\"" + licence.text + "\""
+                : "\"" + licence.wrong + "\" in \"" + licence.text + "\"") +
+               meant_instead(licence.text, {kSpdxLicences, kSpdxLicenceCount}));
     json["licence"] = licence.text;
     if (!json.contains("licenceUrl") && !licence.url.empty()) json["licenceUrl"] = licence.url;
   }

@@ -40,7 +40,7 @@ bool is_lasting(const WorkerReport& r) {
 
 BuildMemo::BuildMemo(const std::string& cache_folder, const std::string& outputs) {
   if (cache_folder.empty()) return;
-  Key name("memo", 3);
+  Key name("memo", 4);
   name.add("outputs", outputs);
   folder_ = cache_folder + "/memo/" + to_hex(name.digest()).substr(0, 32);
   writer_ = std::make_unique<MemoSegmentWriter>(folder_);
@@ -211,6 +211,7 @@ void JobSelection::recall(const PackageMemo& memo, WorkerReport& r) {
   r.bytes = memo.package_bytes;
   if (!memo.failed) r.made_s = memo.seconds, r.made_memory_bytes = memo.peak_memory_bytes;
   if (!settings_.depfile.empty()) r.more->files = memo.files;
+  if (!memo.told.empty()) r.more->told = memo.told;
   if (const auto& e = memo.error; memo.failed && e.size() == 6)
     r.more->error = {e[0], e[1], e[2], e[3], e[4], e[5]};
 }
@@ -259,7 +260,9 @@ void JobSelection::remember(std::size_t job, const WorkerReport& report) {
   const PlannedModel& m = plan_.models[i];
   PackageMemo memo;
   memo.request = request_of(m);
+  memo.input_name = fs::path(m.input).filename().string();
   memo.failed = !report.ok();
+  memo.told = report.more->told;
   memo.files = report.more->files;
   memo.peak_memory_bytes = report.peak_memory_bytes;
   memo.seconds = report.seconds;

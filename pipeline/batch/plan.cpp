@@ -12,6 +12,7 @@
 #include "pipeline/about/source_fields.h"
 #include "pipeline/batch/stale_packages.h"
 #include "pipeline/compile/options.h"
+#include "pipeline/import/archive/archive_files.h"
 #include "pipeline/io/file_resolver.h"
 #include "pipeline/io/uri.h"
 
@@ -116,7 +117,7 @@ namespace fs = std::filesystem;
 
 bool may_be_model(const std::string& path) {
   const std::string e = lower_ending(path);
-  return e == ".glb" || e == ".gltf" || e == ".obj" || e == ".ply" || e == ".stl" || e == ".json";
+  return e == ".glb" || e == ".gltf" || e == ".obj" || e == ".ply" || e == ".stl" || is_told_by_content(path);
 }
 
 // Texts, not fs::path: taking a thousand paths apart again and again took a sixth of a run that does nothing.
@@ -142,7 +143,7 @@ std::size_t prefix_bytes(const std::string& folder) {
 std::vector<std::string> model_paths(const std::string& folder) {
   std::error_code ec;
   fs::recursive_directory_iterator it(folder, ec), end;
-  if (ec) throw InputError(folder, "", "a folder with models", ec.message());
+  if (ec) throw InputError(folder, "", "", "cannot be read: " + ec.message());
   std::vector<std::string> models;
   while (it != end) {
     std::string path = it->path().string();
@@ -151,13 +152,13 @@ std::vector<std::string> model_paths(const std::string& folder) {
     else if (it->is_regular_file(ec) && may_be_model(path))
       models.push_back(path);
     it.increment(ec);  // a folder that is left out without a word is a collection without its models
-    if (ec) throw InputError(path, "", "a folder that can be listed", ec.message());
+    if (ec) throw InputError(path, "", "", "cannot be listed: " + ec.message());
   }
   std::sort(models.begin(), models.end(),
             [same = prefix_bytes(folder)](std::string_view a, std::string_view b) {
               return path_less(a.substr(same), b.substr(same));
             });
-  if (std::ranges::all_of(models, has_json_ending) && std::ranges::none_of(models, is_range_scan))
+  if (std::ranges::all_of(models, is_told_by_content) && std::ranges::none_of(models, holds_model))
     throw InputError(folder, "", "a folder with models", "none");
   return models;
 }
@@ -322,7 +323,7 @@ class CollectionReader {
       for (const std::string& relative : found) {
         const std::string input = (fs::path(folder) / relative).string();
         if (!listed.insert(fs::path(input).lexically_normal().string()).second) continue;
-        add(models, {input, package_of(relative, names_), options_for(input), has_json_ending(relative)},
+        add(models, {input, package_of(relative, names_), options_for(input), is_told_by_content(relative)},
             place);
       }
     }
@@ -379,7 +380,7 @@ class CollectionReader {
 };
 
 bool is_collection(const std::string& input) {
-  return fs::path(input).extension() == ".json" && fs::is_regular_file(input) && !is_range_scan(input);
+  return fs::path(input).extension() == ".json" && fs::is_regular_file(input) && !holds_model(input);
 }
 
 /// Resolved options after the command line's flags, as text; one text for all models that share an object.
@@ -434,7 +435,7 @@ void read_unread(BatchPlan& plan, const Chosen& chosen) {
   for (PlannedModel& m : plan.models) {
     if (!m.unread || !chosen(m)) continue;
     m.unread = false;
-    if (!is_range_scan(m.input))
+    if (!holds_model(m.input))
       m.input.clear();
     else if (m.meets)
       refuse_package(m.input, fs::path(m.input).filename().replace_extension(".texmesh").string(), *m.meets);
@@ -558,11 +559,15 @@ double guessed_seconds(std::uint64_t model_bytes) {
   return kBaseSeconds + kSecondsPerByte * static_cast<double>(model_bytes);
 }
 
-bool has_json_ending(const std::string& path) { return lower_ending(path) == ".json"; }
+bool is_told_by_content(const std::string& path) {
+  const std::string ending = lower_ending(path);
+  return ending == ".json" || ending == ".zip";
+}
 
-bool is_range_scan(const std::string& path) {
+bool holds_model(const std::string& path) {
   std::error_code ec;
   if (!std::filesystem::is_regular_file(path, ec)) return false;  // to open a FIFO is to wait
+  if (lower_ending(path) == ".zip") return is_archive_of_model(path);
   std::ifstream in(path, std::ios::binary);
   std::string head(4096, '\0');
   in.read(head.data(), static_cast<std::streamsize>(head.size()));
@@ -584,7 +589,7 @@ std::vector<ModelPath> find_models(const std::vector<std::string>& inputs, const
     if (fs::is_directory(input)) {
       any_folder = true;
       for (std::string& path : model_paths(input)) {
-        const bool unread = has_json_ending(path);
+        const bool unread = is_told_by_content(path);
         found.push_back({std::move(path), prefix_bytes(input), unread});
       }
     } else {

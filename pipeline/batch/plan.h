@@ -61,15 +61,15 @@ struct EnumNames<PackageNames> {
 /// A model to compile and where its package goes.
 struct ModelPath {
   std::string input, output;
-  bool unread = false;  // a .json of a folder: a model only where is_range_scan() says so
+  bool unread = false;  // a .json or .zip of a folder: a model only where holds_model() says so
 };
 
-/// The models that `inputs` name: files as they are; of a folder every .glb .gltf .obj .ply .stl and .json
-/// beneath it, sorted by path. One input file with an `output` that ends in .texmesh gives that package;
-/// otherwise `output` is a folder, and a model's package stands in it under the same relative path with the
-/// ending .texmesh: in the place of the model's own, or with `names` kFull behind it (a.glb.texmesh). So no
-/// other model changes a package's name. What a .json holds does not count: a shard of a run opens its own
-/// ones only. InputError for what is not there.
+/// The models that `inputs` name: files as they are; of a folder every .glb .gltf .obj .ply .stl .zip and
+/// .json beneath it, sorted by path. One input file with an `output` that ends in .texmesh gives that
+/// package; otherwise `output` is a folder, and a model's package stands in it under the same relative path
+/// with the ending .texmesh: in the place of the model's own, or with `names` kFull behind it
+/// (a.glb.texmesh). So no other model changes a package's name. What a .json holds does not count: a shard of
+/// a run opens its own ones only. InputError for what is not there.
 std::vector<ModelPath> find_models(const std::vector<std::string>& inputs, const std::string& output,
                                    PackageNames names = PackageNames::kStem);
 
@@ -78,10 +78,11 @@ std::vector<ModelPath> find_models(const std::vector<std::string>& inputs, const
 std::vector<std::string> list_models(const std::string& folder);
 
 /// By its name: only what it holds tells whether it is a model.
-bool has_json_ending(const std::string& path);
+bool is_told_by_content(const std::string& path);
 
-/// A JSON file that says within its first bytes that it is a range scan; other JSON files are collections.
-bool is_range_scan(const std::string& path);
+/// A JSON file that says within its first bytes that it is a range scan (others are collections), or a ZIP
+/// archive that names a model, or cannot be listed.
+bool holds_model(const std::string& path);
 
 /// One model of a collection.
 struct CollectionModel {

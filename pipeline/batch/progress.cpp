@@ -6,15 +6,12 @@
 
 #include <ostream>
 
+#include "pipeline/batch/fleet/run_summary.h"
 #include "pipeline/import/import.h"
 #include "pipeline/io/table.h"
 
 namespace texmesh {
 namespace {
-
-std::string sentence(const Note& note) {
-  return note.code + (note.place.empty() ? "" : " at " + note.place) + ": " + note.text;
-}
 
 /// Columns of the terminal behind standard output; 80 where nobody knows.
 std::size_t terminal_columns() {
@@ -82,12 +79,30 @@ void Progress::recalled(std::size_t model, const WorkerReport& r, const std::str
     else
       line("error: " + e.message + " (nothing has changed since; --retry-failed tries again)");
   }
+  tell_again(model, r.more->told);
   const bool alone = models_.size() == 1;
   ++finished_count_;
   if (mode_ == OutputMode::kJson || (r.ok() && mode_ != OutputMode::kQuiet && (verbose_ || alone))) {
     --finished_count_;
     finished(model, r, output);
   }
+}
+
+/// What the run that made the package has warned of: it still holds.
+void Progress::tell_again(std::size_t model, const Notes& notes) {
+  constexpr std::size_t kMost = 10;  // models
+  if (notes.empty()) return;
+  if (mode_ == OutputMode::kJson) {
+    for (const Note& n : notes) write_event(NoteTold{name_of(model), n});
+    return;
+  }
+  if (++told_again_ > kMost && !verbose_) return;
+  const auto warnings = std::ranges::count(notes, Severity::kWarning, &Note::severity);
+  if (mode_ == OutputMode::kQuiet && warnings == 0) return;
+  for (std::size_t i = 0; i < (verbose_ ? notes.size() : 1); ++i)
+    line(fmt::format("{}: {}, still: {}{}", models_[model].name, warnings > 0 ? "warning" : "note",
+                     note_sentence(notes[i]),
+                     !verbose_ && notes.size() > 1 ? fmt::format(" (and {} more)", notes.size() - 1) : ""));
 }
 
 template <class Event>
@@ -139,8 +154,34 @@ void Progress::show(std::size_t model, const StageFinished& e) {
     line(fmt::format("{}: {} from the cache", e.model, e.stage));
 }
 
-void Progress::show(std::size_t, const StageExplained& e) {
-  if (explain_) line(fmt::format("{}: {:<18} {}", e.model, e.stage, verdict(e.explanation)));
+void Progress::show(std::size_t model, const StageExplained& e) {
+  if (!explain_) return foresee(model, e);
+  line(fmt::format("{}: {:<18} {}", e.model, e.stage, verdict(e.explanation)));
+}
+
+/// One line a model: why its first stages would run. What comes after them depends on what becomes of them.
+void Progress::foresee(std::size_t model, const StageExplained& e) {
+  constexpr std::size_t kMost = 2;
+  Forecast& f = forecasts_[model];
+  if (e.explanation.verdict == StageVerdict::kHit) ++f.hits;
+  if (e.explanation.verdict == StageVerdict::kUnknown) ++f.waiting;
+  if (e.explanation.verdict != StageVerdict::kRuns) return;
+  if (const std::string why = verdict(e.explanation); f.running++ < kMost && why != f.last_why) {
+    f.text += (f.text.empty() ? "" : "; ") + e.stage + " " + why;
+    f.last_why = why;
+  }
+}
+
+void Progress::foreseen(std::size_t model) {
+  const auto it = forecasts_.find(model);
+  if (it == forecasts_.end()) return;
+  const Forecast& f = it->second;
+  if (f.running == 0)
+    line(fmt::format("{}: every stage from the cache", name_of(model)));
+  else
+    line(fmt::format("{}: {} ({} of {} stages from the cache, {} depend on what becomes of these)",
+                     name_of(model), f.text, f.hits, f.hits + f.running + f.waiting, f.waiting));
+  forecasts_.erase(it);
 }
 
 void Progress::show(std::size_t, const CacheTold& e) {
@@ -148,12 +189,10 @@ void Progress::show(std::size_t, const CacheTold& e) {
 }
 
 void Progress::show(std::size_t, const NoteTold& e) {
-  static constexpr const char* kRoundedNote = "rounded-position";  // of condition: the surface has changed
   const bool warns = e.note.severity == Severity::kWarning;
-  const bool always =
-      (e.note.code == kLostNote || e.note.code == kRoundedNote) && mode_ != OutputMode::kQuiet;
-  if (warns || always || verbose_)
-    line(fmt::format("{}: {}: {}", e.model, warns ? "warning" : "note", sentence(e.note)));
+  const bool tells = is_told_always(e.note) || e.note.code == kTurnedNote;
+  if (warns || verbose_ || (tells && mode_ != OutputMode::kQuiet))
+    line(fmt::format("{}: {}: {}", e.model, warns ? "warning" : "note", note_sentence(e.note)));
 }
 
 void Progress::show(std::size_t, const ErrorTold& e) { line("error: " + e.error.message); }
@@ -200,11 +239,13 @@ void Progress::summary(const std::vector<WorkerReport>& reports, double seconds,
   const auto ok = count(ModelResult::kOk), same = count(ModelResult::kUnchanged),
              cancelled = count(ModelResult::kCancelled);
   const auto models = static_cast<std::ptrdiff_t>(reports.size()), failed = models - ok - same - cancelled;
+  const auto warned =
+      std::ranges::count_if(reports, [](const WorkerReport& r) { return !r.more->told.empty(); });
   if (mode_ == OutputMode::kTerminal) out_ << "\r\033[K" << std::flush;
   if (mode_ == OutputMode::kJson) {
     const auto number = [](std::ptrdiff_t n) { return static_cast<std::uint64_t>(n); };
     write_event(RunFinished{number(models), number(ok), number(same), number(failed), number(cancelled),
-                            seconds, stale});
+                            number(warned), seconds, stale});
     out_ << std::flush;
     return;
   }
@@ -219,16 +260,20 @@ void Progress::summary(const std::vector<WorkerReport>& reports, double seconds,
   if (explain_ && recalled > 0 && mode_ != OutputMode::kQuiet)
     out_ << recalled_text(recalled, reports.size()) << '\n';
   if (!says_all && (models >= 2 || cancelled > 0) && (mode_ != OutputMode::kQuiet || failed + cancelled > 0))
-    out_ << fmt::format("{} compiled, {} up to date, {} failed{} in {}\n", ok, same, failed,
-                        cancelled ? fmt::format(", {} cancelled", cancelled) : "", format_seconds(seconds));
+    out_ << fmt::format("{} compiled, {} up to date, {} failed{} in {}{}\n", ok, same, failed,
+                        cancelled ? fmt::format(", {} cancelled", cancelled) : "", format_seconds(seconds),
+                        warned ? fmt::format("; {} with warnings", warned) : "");
   out_ << std::flush;
 }
 
 void Progress::forecast_summary(std::size_t to_look_at, std::size_t models,
                                 const std::vector<std::string>& stale) {
   if (mode_ == OutputMode::kJson || mode_ == OutputMode::kQuiet) return;
+  if (to_look_at == 0)
+    line(recalled_text(static_cast<std::ptrdiff_t>(models), models) + ". Nothing was written.");
+  else
+    line(fmt::format("{} would run, {} up to date. Nothing was written.", to_look_at, models - to_look_at));
   tell_stale(stale, "no model makes this package any more");
-  line(recalled_text(static_cast<std::ptrdiff_t>(models - to_look_at), models) + ". Nothing was written.");
 }
 
 std::string Progress::recalled_text(std::ptrdiff_t recalled, std::size_t models) const {

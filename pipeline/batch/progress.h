@@ -18,7 +18,8 @@ struct ProgressModel {
 /// in every mode.
 class Progress {
  public:
-  /// `explain`: say of every stage why it runs.
+  /// `explain`: say of every stage why it runs. Otherwise what stages tell of that becomes a line a model,
+  /// by foreseen().
   Progress(std::ostream& out, OutputMode mode, bool verbose, bool explain);
 
   void begin(std::vector<ProgressModel> models);
@@ -33,6 +34,8 @@ class Progress {
   void summary(const std::vector<WorkerReport>& reports, double seconds,
                const std::vector<std::string>& stale, bool removed);
   void forecast_summary(std::size_t to_look_at, std::size_t models, const std::vector<std::string>& stale);
+  /// A forecast has told all of the model's stages.
+  void foreseen(std::size_t model);
 
  private:
   struct Running {
@@ -41,6 +44,12 @@ class Progress {
     double fraction = 0;                    // of its weight: stages that are done
     std::map<std::string, double> partial;  // and of stages that are not: how far they are
   };
+  struct Forecast {
+    std::size_t hits = 0, running = 0, waiting = 0;  // stages
+    std::string text, last_why;
+  };
+  void foresee(std::size_t model, const StageExplained& e);
+  void tell_again(std::size_t model, const Notes& notes);
   // Of one event, for people.
   void show(std::size_t model, const StageStarted& e);
   void show(std::size_t model, const StageProgress& e);
@@ -68,7 +77,8 @@ class Progress {
   std::vector<ProgressModel> models_;
   std::map<std::string, double> shares_;  // of a model's time, by stage
   std::map<std::size_t, Running> running_;
-  std::size_t finished_count_ = 0;
+  std::size_t finished_count_ = 0, told_again_ = 0;
+  std::map<std::size_t, Forecast> forecasts_;
   std::map<std::string, std::size_t> cache_events_;  // by text: the same one from many models is told once
   double done_weight_ = 0, total_weight_ = 0;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now(), drawn_;

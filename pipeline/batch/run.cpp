@@ -22,13 +22,6 @@ double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-/// A disk that is full now, a server that does not answer now: nothing is wrong with the path.
-bool is_of_the_moment(const std::error_code& ec) {
-  return ec == std::errc::no_space_on_device || ec == std::errc::io_error ||
-         ec == std::errc::too_many_files_open || ec == std::errc::not_enough_memory || ec.value() == EDQUOT ||
-         ec.value() == ESTALE;
-}
-
 class Batch {
  public:
   /// `cache_problem`: why there is no cache folder though one was asked for.
@@ -37,7 +30,7 @@ class Batch {
         settings_(settings),
         selection_(plan, settings),
         reports_(plan.models.size()),
-        progress_(out, settings.mode, settings.verbose, settings.explain || settings.dry_run),
+        progress_(out, settings.mode, settings.verbose, settings.explain),
         cache_problem_(std::move(cache_problem)) {}
 
   int run() {
@@ -62,8 +55,7 @@ class Batch {
       if (folder.empty() || !made.insert(folder).second) continue;
       std::error_code ec;
       fs::create_directories(folder, ec);
-      if (is_of_the_moment(ec)) throw ResourceError(folder, "", "an output folder", ec.message());
-      if (ec) throw InputError(folder, "", "an output folder", ec.message());
+      if (ec) fail_to_write(folder, "", ec.value());
     }
   }
 
@@ -145,9 +137,12 @@ class Batch {
     const auto on_event = [&](std::size_t job, WorkerEvent event) {
       progress_.event(selection_.model_of(job), std::move(event));
     };
-    const auto reports = run_workers(selection_.jobs(), settings_.pool, on_event, {});
-    for (std::size_t job = 0; job < reports.size(); ++job) reports_[selection_.model_of(job)] = reports[job];
     progress_.forecast_summary(selection_.jobs().size(), plan_.models.size(), told_stale());
+    const auto on_finish = [&](std::size_t job, const WorkerReport&) {
+      progress_.foreseen(selection_.model_of(job));
+    };
+    const auto reports = run_workers(selection_.jobs(), settings_.pool, on_event, on_finish);
+    for (std::size_t job = 0; job < reports.size(); ++job) reports_[selection_.model_of(job)] = reports[job];
     return exit_code(true);
   }
 

@@ -27,7 +27,7 @@ std::vector<std::string> stale_packages(const BatchPlan& plan) {
       it.disable_recursion_pending();
     else if (path.ends_with(".texmesh") && it->is_regular_file(ec) && !it->is_symlink(ec)) {
       const auto maker = makers.find(std::string_view(path).substr(prefix));
-      if (maker == makers.end() || (maker->second->unread && !is_range_scan(maker->second->input)))
+      if (maker == makers.end() || (maker->second->unread && !holds_model(maker->second->input)))
         stale.push_back(path.substr(prefix));
     }
   }
@@ -58,8 +58,7 @@ void remove_stale(const std::string& folder, const std::vector<std::string>& pac
   for (const std::string& package : packages) {
     const fs::path path = fs::path(folder) / package;
     std::error_code ec;
-    if (!fs::remove(path, ec) && ec)
-      throw ResourceError(path.string(), "", "a package that can be removed", ec.message());
+    if (!fs::remove(path, ec) && ec) fail_to_write(path.string(), "remove", ec.value());
   }
 }
 

@@ -228,7 +228,7 @@ std::string provenance(const ModelSource& source, const CompileOptions& options)
   if (options.atlas.mode == AtlasMode::kKeep) profile.erase("atlas");  // as before there was such a stage
   return Json{{"version", 1},
               {"tool", "texmesh " + tool_version()},
-              {"format", {{"major", kFormatMajor}, {"minor", kFormatMinor}}},
+              {"format", {{"major", kFormatMajor}, {"minor", 0}}},  // stage package knows the minor
               {"inputs", to_json(source.inputs())},
               {"options", std::move(profile)},
               {"stages", stages},

@@ -8,6 +8,7 @@
 #include "format/base/text_bytes.h"
 #include "format/container/layout.h"
 #include "pipeline/about/source_fields.h"
+#include "pipeline/io/names/closest_word.h"
 #include "pipeline/io/uri.h"
 
 namespace texmesh {
@@ -28,8 +29,16 @@ void check_meta(const CompileOptions& o, const std::string& source) {
   if (o.package.meta.empty()) return;
   read_meta(o.package.meta, source, "package.meta");
   const std::string up = up_axis_of_meta(o.package.meta);
-  if (o.import.up != UpAxis::kKeep && !up.empty() && up != "y")
+  if (o.import.up > UpAxis::kKeep && !up.empty() && up != "y")
     throw InputError(source, "package.meta/upAxis", "y, as import.up has it, or no upAxis", up);
+}
+
+/// What the curator says of the source's axes wins over the source; in the package y is up then.
+void turn_by_meta(CompileOptions& o) {
+  const std::string up = up_axis_of_meta(o.package.meta);
+  if (o.import.up != UpAxis::kAuto || up.empty()) return;
+  o.import.up = up == "x" ? UpAxis::kX : up == "z" ? UpAxis::kZ : UpAxis::kY;
+  o.package.meta = merge_meta(o.package.meta, R"({"upAxis":"y"})");
 }
 
 template <class T>
@@ -84,7 +93,13 @@ Json parse_text(const OptionField& field, const std::string& text) {
     Json j = Json::parse(t, nullptr, false);
     return j.is_number() || j.is_boolean() ? j : Json(t);
   };
-  if (field.kind == OptionKind::kText || field.kind == OptionKind::kName) return Json(text);
+  if (field.kind == OptionKind::kText) return Json(text);
+  if (field.kind == OptionKind::kName) {  // Z and z are one axis
+    const std::string_view closest = closest_word(text, field.words);
+    return Json(closest.size() == text.size() && ::strcasecmp(text.c_str(), std::string(closest).c_str()) == 0
+                    ? std::string(closest)
+                    : text);
+  }
   if (field.kind != OptionKind::kIntegers && field.kind != OptionKind::kNumbers) return scalar(text);
   Json list = Json::array();
   std::istringstream in(text);
@@ -146,6 +161,7 @@ CompileOptions resolve_options(CompileOptions o) {
       o.proxies.mode = ProxyMode::kAlways;
   }
   if (!o.package.meta.empty()) o.package.meta = read_meta(o.package.meta, "package.meta");
+  turn_by_meta(o);
   const LadderOptions usual;
   if (is_default("ladder.prune", o.ladder.prune, usual.prune))
     o.ladder.prune = is_default("ladder.rungs", o.ladder.rungs, usual.rungs) &&

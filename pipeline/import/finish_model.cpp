@@ -4,6 +4,7 @@
 #include <limits>
 #include <numeric>
 
+#include "pipeline/import/up_axis.h"
 #include "pipeline/io/table.h"
 #include "stages/base/first_use_table.h"
 
@@ -338,14 +339,6 @@ void repair_tangents(Model& model) {
   }
 }
 
-void turn_z_up(Mesh& mesh) {
-  auto turn = [](auto& v) { v = {v.x, v.z, -v.y}; };
-  for (Vec4f& t : mesh.tangents) t = {t.x, t.z, -t.y, t.w};
-  turn(mesh.origin);
-  for (Vec3f& p : mesh.positions) turn(p);
-  for (Vec3f& n : mesh.normals) turn(n);
-}
-
 }  // namespace
 
 void finish_model(Model& model, const std::string& file_name, const ImportOptions& options) {
@@ -363,7 +356,7 @@ void finish_model(Model& model, const std::string& file_name, const ImportOption
   drop_unused_images(model, file_name);
   repair_tangents(model);
   bring_uvs_near(model);
-  if (options.up == UpAxis::kZ) turn_z_up(model.mesh);
+  if (options.up > UpAxis::kKeep) turn_up(model.mesh, enum_name(options.up)[0]);
 }
 
 namespace {

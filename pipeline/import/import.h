@@ -16,17 +16,17 @@
 
 namespace texmesh {
 
-inline constexpr int kImportVersion = 10;
+inline constexpr int kImportVersion = 11;
 
 enum class KdPolicy : std::uint8_t { kIgnore, kMultiply };
 template <>
 struct EnumNames<KdPolicy> {
   static constexpr std::array<std::string_view, 2> names{"ignore", "multiply"};
 };
-enum class UpAxis : std::uint8_t { kKeep, kY, kZ };
+enum class UpAxis : std::uint8_t { kAuto, kKeep, kX, kY, kZ };
 template <>
 struct EnumNames<UpAxis> {
-  static constexpr std::array<std::string_view, 3> names{"keep", "y", "z"};
+  static constexpr std::array<std::string_view, 5> names{"auto", "keep", "x", "y", "z"};
 };
 
 enum class ProfilePolicy : std::uint8_t { kAuto, kHonour, kIgnore };
@@ -42,7 +42,7 @@ struct ImportOptions {
   double max_file_bytes = 8e9;  // of one file
   double max_image_pixels = 4e8;
   KdPolicy obj_kd = KdPolicy::kIgnore;
-  UpAxis up = UpAxis::kKeep;
+  UpAxis up = UpAxis::kAuto;
   ProfilePolicy colour_profiles = ProfilePolicy::kAuto;
   template <class S, class V>
   static void fields(S& s, V&& v) {
@@ -56,7 +56,9 @@ struct ImportOptions {
     v("colour_profiles", s.colour_profiles,
       "ICC profiles and gamma of textures are converted to sRGB: auto = except in glTF, whose specification "
       "says that they are ignored");
-    v("up", s.up, "up axis of the source: keep and y leave coordinates alone, z turns them to glTF's y up");
+    v("up", s.up,
+      "up axis of the source, turned to y: auto = what the source says, else for OBJ, PLY and STL a guess by a flat "
+      "bottom, which is told; keep = as it is");
   }
 };
 
@@ -64,6 +66,9 @@ struct ImportOptions {
 using Lost = std::map<std::string, std::uint64_t>;
 /// The code of the note that says so: one a model, shown without --verbose.
 inline constexpr const char* kLostNote = "left-out";
+
+/// The code of the note that says why the model was turned, shown without --verbose.
+inline constexpr const char* kTurnedNote = "turned-up";
 
 struct ImportedModel {
   Model model;

@@ -2,10 +2,12 @@
 
 #include "format/base/bounded_json.h"
 #include "format/base/text_bytes.h"
+#include "pipeline/import/archive/archive_about.h"
 #include "pipeline/import/foreign_file.h"
 #include "pipeline/import/gltf/import_gltf_parts.h"
 #include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/text_scan.h"
+#include "pipeline/import/up_axis.h"
 
 namespace texmesh {
 namespace {
@@ -24,7 +26,8 @@ bool is_binary_stl(std::span<const std::uint8_t> bytes) {
 
 enum class Kind { kGltf, kObj, kPly, kStl, kRange };
 
-constexpr const char* kExpected = "a glTF, GLB, OBJ, PLY or STL model or a range scan (.json, Cyberware)";
+constexpr const char* kExpected =
+    "a glTF, GLB, OBJ, PLY or STL model, a ZIP archive of one, or a range scan (.json, Cyberware)";
 
 Kind kind_of(const std::string& file_name, std::span<const std::uint8_t> bytes) {
   if (starts_with(bytes, "glTF")) return Kind::kGltf;
@@ -69,6 +72,30 @@ ImportedModel import_kind(Kind kind, const std::string& file_name, std::span<con
   return import_range_scan(file_name, bytes, resolver, options, context);
 }
 
+/// Adds to what the package says of its source, where there is room.
+void add_to_source(About& about, const char* key, nlohmann::ordered_json value) {
+  auto source = nlohmann::ordered_json::parse(about.source, nullptr, false);
+  if (!source.is_object()) return;
+  source[key] = std::move(value);
+  std::string with_value = source.dump();
+  if (with_value.size() <= kMaxAboutSourceBytes) about.source = std::move(with_value);
+}
+
+/// Where the user has not said which axis is up: the source's word, else a guess. glTF says that y is.
+void turn_by_source(ImportedModel& m) {
+  const bool said = !m.about.up_axis.empty();
+  const bool may_guess = m.format == "obj" || m.format == "ply" || m.format == "stl";
+  const char up = said ? m.about.up_axis[0] : may_guess ? guessed_up(m.model.mesh) : '\0';
+  if (up != 'x' && up != 'z') return;
+  turn_up(m.model.mesh, up);
+  m.about.up_axis = "y";
+  add_info(m.model.notes, kTurnedNote, "",
+           std::string(said ? "the source says that " : "by its flat bottom ") + up +
+               " is up; turned so that y is (--up keep leaves it as it is)");
+  add_to_source(m.about, "turned",
+                {{"up", std::string(1, up)}, {"by", said ? "the source's word" : "a guess"}});
+}
+
 /// One line, and the same for those who get the package.
 void tell_what_is_lost(ImportedModel& imported) {
   if (imported.lost.empty()) return;
@@ -82,11 +109,28 @@ void tell_what_is_lost(ImportedModel& imported) {
   }
   if (told > kMostTold) text += " and " + std::to_string(told - kMostTold) + " more kinds";
   add_info(imported.model.notes, kLostNote, "", text + " of the source are not in the package");
-  auto source = nlohmann::ordered_json::parse(imported.about.source, nullptr, false);
-  if (!source.is_object()) return;
-  source["lost"] = std::move(list);
-  std::string with_list = source.dump();
-  if (with_list.size() <= kMaxAboutSourceBytes) imported.about.source = std::move(with_list);
+  add_to_source(imported.about, "lost", std::move(list));
+}
+
+/// The model of a ZIP archive, with what the archive says of it.
+ImportedModel import_archive(const std::string& file_name, ByteSpan bytes, const ImportOptions& options,
+                             const RunContext& context) {
+  const auto most = static_cast<std::uint64_t>(options.max_file_bytes);
+  ArchiveFiles archive(file_name, bytes, most);
+  if (archive.model().empty())
+    throw InputError(file_name, "", "an archive with a .gltf, .glb, .obj, .ply or .stl file",
+                     std::to_string(archive.files().size()) + " files of other kinds");
+  const auto entry = std::ranges::find(archive.files(), archive.model(), &ArchivedFile::name);
+  const std::string name = file_name + "/" + readable_name(archive.model());
+  const Bytes model = archive.unpacked(*entry, most);
+  if (starts_with(model, "PK")) throw InputError(name, "first bytes", kExpected, "another archive");
+  ImportOptions of_model = options;
+  if (options.up == UpAxis::kAuto) of_model.up = UpAxis::kKeep;  // turned when the archive has had its word
+  ImportedModel imported = import_model(name, model, archive, of_model, context);
+  imported.about = merge_about(archive_about(archive, archive.model(), imported.model.notes), imported.about);
+  if (options.up == UpAxis::kAuto) turn_by_source(imported);
+  if (options.up > UpAxis::kKeep) imported.about.up_axis = "y";
+  return imported;
 }
 
 }  // namespace
@@ -99,14 +143,17 @@ ImportedModel import_model(const std::string& file_name, std::span<const std::ui
         file_name, "",
         "at most " + std::to_string(static_cast<std::uint64_t>(options.max_file_bytes)) + " bytes",
         std::to_string(bytes.size()));
+  if (starts_with(bytes, "PK\3\4") || starts_with(bytes, "PK\5\6"))
+    return import_archive(file_name, bytes, options, context);
   if (starts_with(bytes, "\xef\xbb\xbf")) bytes = bytes.subspan(3);  // of a text: no part of it
   ImportedModel imported =
       import_kind(kind_of(file_name, bytes), file_name, bytes, resolver, options, context);
   drop_hidden_twins(imported.model, file_name, imported.lost);
   if (imported.about.source.empty()) imported.about.source = "{\"format\":\"" + imported.format + "\"}";
   tell_what_is_lost(imported);
+  if (options.up == UpAxis::kAuto) turn_by_source(imported);
   // The user has said which axis is up, or the model has been turned.
-  if (options.up != UpAxis::kKeep) imported.about.up_axis = "y";
+  if (options.up > UpAxis::kKeep) imported.about.up_axis = "y";
   return imported;
 }
 

@@ -15,9 +15,7 @@ namespace {
 
 constexpr std::string_view kTemporaryMark = ".tmp-";
 
-[[noreturn]] void fail(const std::string& path, const char* step) {
-  throw ResourceError(path, "", "a writable file", std::string(step) + ": " + std::strerror(errno));
-}
+[[noreturn]] void fail(const std::string& path, const char* step) { fail_to_write(path, step, errno); }
 
 std::string own_temporary(const std::string& path) {
   static std::atomic<std::size_t> counter{0};
@@ -92,6 +90,24 @@ void write_file_atomically(const std::string& path, ByteSpan bytes, const std::s
   if (!sync_folder(folder_of_file(path))) fail(path, "fsync of the folder");
 }
 
+void fail_to_write(const std::string& path, const std::string& step, int error) {
+  std::string found = "cannot be written: " + (step.empty() ? "" : step + ": ") + std::strerror(error);
+  switch (error) {
+    case EACCES:
+    case EPERM:
+    case EROFS:
+    case ENOENT:
+    case ENOTDIR:
+    case EISDIR:
+    case EEXIST:
+    case ELOOP:
+    case ENAMETOOLONG:
+      throw PermissionError(path, "", "", std::move(found));
+    default:  // a disk that is full now, a server that does not answer now: nothing is wrong with the path
+      throw ResourceError(path, "", "", std::move(found));
+  }
+}
+
 bool is_special_file(const std::string& path) {
   // /dev/stdout is a link to what may be a regular file, which somebody else holds open.
   for (const char* folder : {"/dev/", "/proc/"})
@@ -108,8 +124,7 @@ void check_output_file(const std::string& path) {
   if (is_special_file(path) || std::filesystem::is_symlink(file, error)) return;
   if (std::filesystem::is_directory(file, error))
     throw InputError(path, "", "a file that can be written", "a folder");
-  if (::access(folder_of_file(path).c_str(), W_OK) != 0)
-    throw InputError(path, "", "a file that can be written", std::strerror(errno));
+  if (::access(folder_of_file(path).c_str(), W_OK) != 0) fail_to_write(path, "", errno);
 }
 
 void write_output_file(const std::string& path, ByteSpan bytes, const std::string& temporary) {

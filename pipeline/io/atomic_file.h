@@ -7,10 +7,14 @@ namespace texmesh {
 
 /// Writes `bytes` under `path` so that the path holds either what it held before or all of the new bytes,
 /// whatever happens: temporary sibling, write, fdatasync, rename, fsync of the folder. On any failure the
-/// temporary is removed and ResourceError{path, "", "a writable file", reason} is thrown. `temporary` may
+/// temporary is removed and fail_to_write() tells. `temporary` may
 /// name the sibling (a parent process that wants to remove it if this one is killed; should somebody else be
 /// writing a file of that name, another one is taken); "" makes a name of its own.
 void write_file_atomically(const std::string& path, ByteSpan bytes, const std::string& temporary = "");
+
+/// Throws PermissionError where this path cannot be written by this user, else ResourceError. `step`: the
+/// call that failed with `error`, "" where it goes without saying.
+[[noreturn]] void fail_to_write(const std::string& path, const std::string& step, int error);
 
 /// A device, a pipe, a socket, a link to one, or a name beneath /dev or /proc: it is written into, never
 /// replaced by a file.

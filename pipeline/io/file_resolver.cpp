@@ -17,10 +17,12 @@ constexpr const char* kRegularFile = "a regular file";
 std::string message(int error) { return std::generic_category().message(error); }
 
 /// What says nothing about the file is an error of the machine.
-[[noreturn]] void fail_to_read(const std::string& name, const std::string& place, const char* expected,
-                               int error) {
+[[noreturn]] void fail_to_read(const std::string& name, const std::string& place, int error) {
+  std::string found = "cannot be read: " + message(error);
   switch (error) {
-    case EACCES:  // another moment or another user may read it: not the model is wrong
+    case EACCES:
+    case EPERM:
+      throw PermissionError(name, place, "", std::move(found));
     case EIO:
     case EMFILE:
     case ENFILE:
@@ -28,9 +30,9 @@ std::string message(int error) { return std::generic_category().message(error); 
     case ESTALE:
     case ETIMEDOUT:
     case EAGAIN:
-      throw ResourceError(name, place, expected, message(error));
+      throw ResourceError(name, place, "", std::move(found));
     default:
-      throw InputError(name, place, expected, message(error));
+      throw InputError(name, place, "", std::move(found));
   }
 }
 
@@ -95,7 +97,7 @@ const char* kind_of(mode_t mode) {
 /// The stamp is taken before the first byte is read: a change while reading gives another one later.
 FileStamp checked_stamp(int fd, const std::string& name, const std::string& expected) {
   struct stat s {};
-  if (::fstat(fd, &s) != 0) fail_to_read(name, "", "a readable file", errno);
+  if (::fstat(fd, &s) != 0) fail_to_read(name, "", errno);
   if (!S_ISREG(s.st_mode)) throw FileRefused(name, "", expected, kind_of(s.st_mode));
   return stamp_of(s);
 }
@@ -116,7 +118,7 @@ Bytes read_all(int fd, std::uint64_t max_bytes, const std::string& name, const s
     if (size > max_bytes) throw too_long(size);
     if (size == bytes.size()) bytes.resize(size + (std::size_t{1} << 16));
     const ssize_t got = retry_on_signal([&] { return ::read(fd, bytes.data() + size, bytes.size() - size); });
-    if (got < 0) fail_to_read(name, "byte " + std::to_string(size), "readable bytes", errno);
+    if (got < 0) fail_to_read(name, "byte " + std::to_string(size), errno);
     size += static_cast<std::size_t>(got);
     if (got == 0) {
       bytes.resize(size);
@@ -168,7 +170,7 @@ int FileResolver::open_link(const std::string& uri) {
     if (name.empty() || name == "." || name == ".." || name.starts_with("../") || folder.get() < 0) continue;
     const int fd = open_beneath(folder.get(), name);
     if (fd >= 0) return fd;
-    if (errno != ELOOP && errno != EXDEV && errno != ENOENT) fail_to_read(uri, "", "a readable file", errno);
+    if (errno != ELOOP && errno != EXDEV && errno != ENOENT) fail_to_read(uri, "", errno);
   }
   throw FileRefused(uri, "", kRegularFile,
                     "a symbolic link that leads out of the folder that was named (--links-within DIR allows "
@@ -195,7 +197,7 @@ int FileResolver::open_regular(const std::string& uri) {
     case ENXIO:
       throw FileRefused(uri, "", kRegularFile, "a socket");
     default:
-      fail_to_read(uri, "", "a readable file", errno);
+      fail_to_read(uri, "", errno);
   }
 }
 
@@ -255,12 +257,12 @@ Bytes read_input_file(const std::filesystem::path& path, std::uint64_t max_bytes
   if (fd.get() < 0 && errno == ENOENT) {
     const std::filesystem::path folder = path.parent_path();
     const SimilarNames similar = similar_names(folder.string(), path.filename().string());
-    throw InputError(name, "", "a readable file",
-                     similar.names.empty()
-                         ? message(ENOENT)
-                         : "only " + similar.names[0] + ", whose name differs in case or composition");
+    if (!similar.names.empty())
+      throw InputError(name, "", "a readable file",
+                       "only " + similar.names[0] + ", whose name differs in case or composition");
+    errno = ENOENT;
   }
-  if (fd.get() < 0) fail_to_read(name, "", "a readable file", errno);
+  if (fd.get() < 0) fail_to_read(name, "", errno);
   FileStamp own;
   return read_all(fd.get(), max_bytes, name, "a regular file", stamp ? *stamp : own);
 }

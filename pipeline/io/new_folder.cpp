@@ -11,18 +11,18 @@ namespace texmesh {
 namespace fs = std::filesystem;
 namespace {
 
-[[noreturn]] void fail_output(const fs::path& path, const char* expected) {
-  throw InputError(path.string(), "", expected, std::strerror(errno));
+[[noreturn]] void fail_output(const fs::path& path, const char* step) {
+  throw InputError(path.string(), "", "", std::string("cannot be ") + step + ": " + std::strerror(errno));
 }
 
 void sync_new_folder(const fs::path& folder) {
-  if (!sync_folder(folder.string())) fail_output(folder, "a folder that can be synced");
+  if (!sync_folder(folder.string())) fail_output(folder, "synced");
 }
 
 void write_new_file(const fs::path& path, ByteSpan bytes) {
   const Descriptor d{::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644)};
-  if (d.get() < 0) fail_output(path, "a new file");
-  if (!write_all(d.get(), bytes) || ::fdatasync(d.get()) != 0) fail_output(path, "a writable file");
+  if (d.get() < 0) fail_output(path, "made");
+  if (!write_all(d.get(), bytes) || ::fdatasync(d.get()) != 0) fail_output(path, "written");
 }
 
 }  // namespace
@@ -44,7 +44,7 @@ NewFolder::NewFolder(const std::string& folder, FolderRule rule) : rule_(std::mo
   check_target();
   std::string name =
       (target_.parent_path() / ("." + target_.filename().string() + ".texmesh.tmpXXXXXX")).string();
-  if (!::mkdtemp(name.data())) fail_output(target_.parent_path(), "a writable folder");
+  if (!::mkdtemp(name.data())) fail_output(target_.parent_path(), "written");
   tree_ = name;
 }
 
@@ -68,7 +68,7 @@ void NewFolder::copy(const std::string& path, const fs::path& source) {
     if (hidden && it->is_directory(ec)) it.disable_recursion_pending();
     if (!hidden && fs::is_regular_file(it->symlink_status())) files.push_back(it->path());
   }
-  if (ec) throw InputError(source.string(), "", "a folder that can be read", ec.message());
+  if (ec) throw InputError(source.string(), "", "", "cannot be read: " + ec.message());
   for (const fs::path& file : files) copy_file(tree_ / path / file.lexically_relative(source), file);
 }
 
@@ -76,10 +76,10 @@ void NewFolder::copy_file(const fs::path& file, const fs::path& source) {
   if (folders_.insert(file.parent_path()).second) fs::create_directories(file.parent_path());
   std::error_code ec;
   fs::copy_file(source, file, ec);
-  if (ec) throw InputError(source.string(), "", "a file that can be copied", ec.message());
+  if (ec) throw InputError(source.string(), "", "", "cannot be copied: " + ec.message());
   fs::permissions(file, fs::perms{0644});
   const Descriptor d{::open(file.c_str(), O_RDONLY | O_CLOEXEC)};
-  if (d.get() < 0 || ::fdatasync(d.get()) != 0) fail_output(file, "a writable file");
+  if (d.get() < 0 || ::fdatasync(d.get()) != 0) fail_output(file, "written");
 }
 
 bool NewFolder::replace_without_exchange() {

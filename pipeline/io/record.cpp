@@ -13,7 +13,11 @@ namespace {
 /// Of a document that is shown in a message.
 constexpr std::size_t kMostShownBytes = 80;
 
-std::string number_text(double value) { return Json(value).dump(); }
+/// Whole numbers without ".0".
+std::string number_text(double value) {
+  const std::string text = Json(value).dump();
+  return text.ends_with(".0") ? text.substr(0, text.size() - 2) : text;
+}
 
 std::string range_text(const char* kind, const Range& r) {
   return std::string(kind) + " in " + number_text(r.lo) + " .. " + number_text(r.hi);

@@ -52,4 +52,9 @@ struct ResourceError : InputError {
   using InputError::InputError;
 };
 
+/// What this user may not do here. Another moment does not help, another user or another place may.
+struct PermissionError : ResourceError {
+  using ResourceError::ResourceError;
+};
+
 }  // namespace texmesh

@@ -53,7 +53,7 @@ struct PerceptualValues {
 ///   pairs in a whole fragment).
 /// Where a fragment is covered in part only its covered texels count, and pairs of them: what fills the rest
 /// is never seen. Grey planes count as three equal channels. vqp (8.4) is the weighted mean of eta,
-/// z, i and m, each min-max over the covered fragments of the plane (0 where all are equal).
+/// z, i and m, each min-max over the covered fragments of the plane (0 where all are equal); eta is S_0's.
 struct PlanePredictors {
   std::vector<float> z, i, zeta, m, vqp;
   static void archive(auto& s, auto& a) { a(s.z, s.i, s.zeta, s.m, s.vqp); }
@@ -61,7 +61,8 @@ struct PlanePredictors {
 
 struct Predictors {
   std::vector<PlanePredictors> planes;
-  static void archive(auto& s, auto& a) { a(s.planes); }
+  double density_weight = 0;  // 0..1: what part of vqp is eta
+  static void archive(auto& s, auto& a) { a(s.planes, s.density_weight); }
 };
 
 /// What lit pictures say about the kept scales and their textures.

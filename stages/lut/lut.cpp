@@ -1,5 +1,7 @@
 #include "stages/lut/lut.h"
 
+#include <numeric>
+
 #include "format/base/number16.h"
 #include "format/base/portable_math.h"
 #include "format/rules/allocation.h"
@@ -70,8 +72,23 @@ double least_quality(TextureRole role, const LutOptions& options) {
   return std::min(std::max(own, options.quality_min), options.quality_max);
 }
 
+/// Q_i
+float default_quality(const TexturePlane& plane, std::uint32_t scale, std::uint32_t scales,
+                      const LutOptions& options) {
+  const double range = options.quality_coarse - options.quality_fine;
+  if (options.default_quality == DefaultQuality::kDistance)
+    return static_cast<float>(options.quality_fine + range * scale / std::max(scales, 1u));
+  const auto features = [&](std::uint32_t row) {
+    const auto begin = plane.features.begin() + static_cast<std::ptrdiff_t>(row * plane.fragment_count());
+    return std::accumulate(begin, begin + static_cast<std::ptrdiff_t>(plane.fragment_count()), 0.0);
+  };
+  const double finest = features(0);
+  const double share = finest > 0 ? std::min(features(scale) / finest, 1.0) : scale == 0 ? 1 : 0;
+  return static_cast<float>(options.quality_coarse - range * share);
+}
+
 /// Everything that is copied or follows from the options.
-PlaneTables start_plane(const TexturePlane& plane, const PlanePredictors& predictors,
+PlaneTables start_plane(const TexturePlane& plane, const PlanePredictors& predictors, double density_weight,
                         const PlaneLadder& ladder, std::uint32_t scales, const LutOptions& options) {
   PlaneTables out;
   out.columns = plane.columns;
@@ -93,15 +110,16 @@ PlaneTables start_plane(const TexturePlane& plane, const PlanePredictors& predic
   out.surface_fraction = plane.surface_fraction;
   out.features = plane.features;
   for (std::uint32_t s = 0; s <= scales; ++s)
-    out.quality.push_back(static_cast<float>(
-        options.quality_fine + (options.quality_coarse - options.quality_fine) * s / std::max(scales, 1u)));
+    out.quality.push_back(default_quality(plane, s, scales, options));
   out.allocation = static_cast<std::uint8_t>(options.allocate);
   out.quality_width = static_cast<float>(options.quality_width);
   out.log_width = static_cast<float>(options.log_width);
   out.quality_min = static_cast<float>(least_quality(plane.role, options));
   out.quality_max = static_cast<float>(options.quality_max);
-  if (options.allocate == Allocation::kVqp)  // as the file stores it, so that every reader decides the same
+  if (options.allocate == Allocation::kVqp) {  // as the file stores it, so that every reader decides the same
     for (const float p : predictors.vqp) out.vqp.push_back(from_unit16(to_unit16(p)));
+    out.density_weight = static_cast<float>(density_weight);
+  }
   return out;
 }
 
@@ -170,8 +188,8 @@ LutTables build_tables(const Fragments& fragments, const std::vector<Pixels>& pi
   }
   std::vector<std::pair<std::size_t, std::size_t>> tasks;  // plane, fragment
   for (std::size_t p = 0; p < fragments.planes.size(); ++p) {
-    tables.push_back(start_plane(fragments.planes[p], predictors.planes[p], ladder.planes[p],
-                                 static_cast<std::uint32_t>(fragments.scales), options));
+    tables.push_back(start_plane(fragments.planes[p], predictors.planes[p], predictors.density_weight,
+                                 ladder.planes[p], static_cast<std::uint32_t>(fragments.scales), options));
     tables[p].order = importance_order(fragments.planes[p], tables[p].vqp);
     for (std::uint16_t f : tables[p].order) tasks.emplace_back(p, f);
   }

@@ -10,7 +10,7 @@
 
 namespace texmesh {
 
-inline constexpr int kLutVersion = 9;
+inline constexpr int kLutVersion = 10;
 
 enum class Allocation : std::uint8_t { kThesis, kLog, kRd, kVqp };
 template <>
@@ -18,9 +18,19 @@ struct EnumNames<Allocation> {
   static constexpr std::array<std::string_view, 4> names{"thesis", "log", "rd", "vqp"};
 };
 
+/// What gives a scale its default quality Q_i, between quality_coarse and quality_fine. kDistance: the
+/// viewing distance (8.3), which is the scale's number where scales are mapped over distance (7.5).
+/// kFeatures: the number of its feature points (chapter 4) over S_0's.
+enum class DefaultQuality : std::uint8_t { kDistance, kFeatures };
+template <>
+struct EnumNames<DefaultQuality> {
+  static constexpr std::array<std::string_view, 2> names{"distance", "features"};
+};
+
 struct LutOptions {
   Allocation allocate = Allocation::kLog;
-  double quality_fine = 80, quality_coarse = 40;  // Q_i falls linearly from S_0 to S_max
+  DefaultQuality default_quality = DefaultQuality::kDistance;
+  double quality_fine = 80, quality_coarse = 40;  // Q_i of S_0, and what it falls to
   double quality_width = 60;                      // dQ of (3.2)
   double log_width = 0.42;                        // dg of the log-quantiser form
   double quality_min = 5, quality_max = 97;       // q_i is clipped to them
@@ -31,9 +41,12 @@ struct LutOptions {
       "the place of feature density; log = the same in the "
       "logarithm of the quantiser; rd = the bytes of log, spent where they save most visible error (1 - "
       "SSIM x surface)");
+    v("default_quality", s.default_quality, ProfileOnly{},
+      "what gives Q_i between quality_coarse and quality_fine: distance = the scale's number, which is its "
+      "distance (7.5, 8.3); features = its number of feature points over S_0's (chapter 4)");
     v("quality_fine", s.quality_fine, Range{1, 100}, ProfileOnly{}, "Q_i asked for at S_0");
     v("quality_coarse", s.quality_coarse, Range{1, 100}, ProfileOnly{},
-      "Q_i asked for at the coarsest scale");
+      "Q_i asked for at the coarsest scale, and where no feature points are left");
     v("quality_width", s.quality_width, Range{0, 100}, ProfileOnly{},
       "dQ: how far feature density moves the quality");
     v("log_width", s.log_width, Range{0, 4}, ProfileOnly{},

@@ -1,5 +1,6 @@
 #include "stages/package/package.h"
 
+#include <nlohmann/json.hpp>
 #include <set>
 
 #include "format/base/text_bytes.h"
@@ -258,6 +259,14 @@ About describe_object(const About& source, const PackageOptions& options) {
   return merge_about(source, over);
 }
 
+/// provenance.json tells the package's version.
+std::string with_minor(const std::string& provenance_json, int minor) {
+  if (minor == 0) return provenance_json;
+  auto json = nlohmann::ordered_json::parse(provenance_json);
+  json["format"]["minor"] = minor;
+  return json.dump();
+}
+
 }  // namespace
 
 std::vector<std::uint8_t> assemble_package(const NestedScales& scales, const PerceptualValues& perceptual,
@@ -274,10 +283,13 @@ std::vector<std::uint8_t> assemble_package(const NestedScales& scales, const Per
   manifest.required_features = required_features(ladder);
   std::vector<TextureInfo> textures;
   std::vector<PackageEntry> entries;
-  entries.push_back({kTablesPath, write_tables(select_scales(tables, stored_rows(manifest, tables)))});
-  entries.push_back({kThesisPath, write_thesis({thesis.planes, describe_perceptual(scales, perceptual)})});
+  manifest.minor = needed_minor(tables);
+  entries.push_back(
+      {kTablesPath, write_tables(select_scales(tables, stored_rows(manifest, tables)), manifest.minor)});
+  entries.push_back(
+      {kThesisPath, write_thesis({thesis.planes, describe_perceptual(scales, perceptual)}, manifest.minor)});
   entries.push_back({kQualityPath, to_bytes(write_quality(quality.table))});
-  entries.push_back({kProvenancePath, to_bytes(provenance_json)});
+  entries.push_back({kProvenancePath, to_bytes(with_minor(provenance_json, manifest.minor))});
   entries.push_back({kAboutPath, to_bytes(write_about(about))});
   for (const ScaleFile& file : files.files)
     if (!file.glb.empty())

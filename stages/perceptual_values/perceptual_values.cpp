@@ -274,10 +274,10 @@ void find_displayed_heights(const NestedScales& scales, const std::vector<double
   }
 }
 
-/// 7.5 and 7.6 as printed: a tier, from behind one major scale to the next, is shown as its last scale at
+/// A tier, from behind one major scale to the next, is shown as its last scale at
 /// every size at which O_V / E_S matches one of the tier best. S_0's tier is all that cannot be told from
 /// S_0.
-void step_by_majors(double jnd, const std::vector<float>& value, PerceptualValues& out) {
+void step_by_tiers(double jnd, const std::vector<float>& value, PerceptualValues& out) {
   const std::size_t n = out.major.size();
   std::size_t begin = 0;  // the major scale before, or S_0
   for (std::size_t k = 1; k < n; ++k) {
@@ -309,8 +309,13 @@ std::vector<float> cumulative_table(const std::vector<CollapseStatistics>& step,
   return chained_values(values);
 }
 
-std::vector<float> value_table(const PerceptualValues& values, PerceptualStatistic statistic) {
+std::vector<float> value_table(const PerceptualValues& values, PerceptualStatistic statistic,
+                               ChainRule chain) {
   if (statistic == PerceptualStatistic::kP95) return values.p95;
+  if (chain == ChainRule::kSurvivor)
+    return statistic == PerceptualStatistic::kAverage        ? values.chain_average
+           : statistic == PerceptualStatistic::kConservative ? values.chain_largest
+                                                             : values.chain_least;
   return cumulative_table(values.step, statistic);
 }
 
@@ -328,11 +333,11 @@ PerceptualValues measure_perceptual_values(const NestedScales& scales, const Ske
     chain->assign(n * n, 0);
   const std::vector<double> error =
       compare_scales(scales, skeleton, static_cast<std::size_t>(options.samples), context, out);
-  const std::vector<float> value = value_table(out, options.statistic);
+  const std::vector<float> value = value_table(out, options.statistic, options.chain);
   out.major = major_rows(value, n, options.jnd);
   choose_kept(scales, options.kept_scales, out);
   find_displayed_heights(scales, error, options, value, context, out);
-  if (options.steps == StepsBy::kMajors) step_by_majors(options.jnd, value, out);
+  if (options.steps == StepsBy::kTiers) step_by_tiers(options.jnd, value, out);
   return out;
 }
 

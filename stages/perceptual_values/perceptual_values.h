@@ -1,6 +1,6 @@
 #pragma once
 
-#include "format/documents/thesis_tables.h"
+#include "format/rules/jnd_choice.h"
 #include "stages/data/nested_scales.h"
 #include "stages/data/perceptual_values.h"
 #include "stages/data/scale_map.h"
@@ -8,15 +8,18 @@
 
 namespace texmesh {
 
-inline constexpr int kPerceptualValuesVersion = 8;
+inline constexpr int kPerceptualValuesVersion = 9;
 
-/// What makes the step function of the JND. kScales: every kept scale, by its distance from S_0. kMajors: as
-/// printed (7.5, 7.6): the displayed size chooses a scale by O_V / E_S, the JND, whatever the distance, puts
-/// its tier's major scale in its place.
-enum class StepsBy : std::uint8_t { kScales, kMajors };
+/// What makes the step function of the JND. kScales: every kept scale, by its distance from S_0. kTiers: the
+/// displayed size chooses a scale by O_V / E_S (7.6); its tier's major scale is shown in its place.
+enum class StepsBy : std::uint8_t { kScales, kTiers };
+template <>
+struct EnumNames<ChainRule> {
+  static constexpr std::array<std::string_view, 2> names{"root-of-squares", "survivor"};
+};
 template <>
 struct EnumNames<StepsBy> {
-  static constexpr std::array<std::string_view, 2> names{"scales", "majors"};
+  static constexpr std::array<std::string_view, 2> names{"scales", "tiers"};
 };
 
 /// Displayed height in px at which judges' JND holds by default: the thesis's stimuli stood side by side on
@@ -28,6 +31,7 @@ struct PerceptualValuesOptions {
   double jnd_reference_px = kJndReferencePx;
   double jnd_distance_exponent = 1;  // what is just noticeable at D px: jnd (jnd_reference_px / D)^exponent
   PerceptualStatistic statistic = PerceptualStatistic::kP95;
+  ChainRule chain = ChainRule::kRootOfSquares;
   StepsBy steps = StepsBy::kScales;
   int samples = 4000;          // the percentiles' ranks are within 0.5 % then
   int kept_scales = 8;         // beside S_0 and the major ones
@@ -43,8 +47,11 @@ struct PerceptualValuesOptions {
     v("statistic", s.statistic, ProfileOnly{},
       "what decides about major scales: p95 of the relative distance, or the thesis's average, "
       "conservative (largest) and aggressive (smallest) change of the skeleton distance");
+    v("chain", s.chain, ProfileOnly{},
+      "what becomes of the collapses of several scale changes, for the thesis's statistics: root-of-squares "
+      "= of the changes between; survivor = each removed vertex against the one that is left, as 7.2 prints");
     v("steps", s.steps, ProfileOnly{},
-      "what makes the JND's step function: scales = each kept scale, by jnd and jnd_reference_px; majors = the "
+      "what makes the JND's step function: scales = each kept scale, by jnd and jnd_reference_px; tiers = the "
       "major scales, each for the sizes at which O_V / E_S asks for a scale of its tier");
     v("samples", s.samples, Range{100, 1000000}, ProfileOnly{},
       "most points compared per pair of scales: one for every fourth triangle of the finer one, at least 250");
@@ -65,8 +72,9 @@ inline constexpr float kAnyHeightPx = 1e9f;
 std::vector<float> cumulative_table(const std::vector<CollapseStatistics>& step,
                                     PerceptualStatistic strategy);
 
-/// The table of n x n values that `statistic` decides by.
-std::vector<float> value_table(const PerceptualValues& values, PerceptualStatistic statistic);
+/// The table of n x n values that `statistic` decides by; `chain` is for the thesis's strategies.
+std::vector<float> value_table(const PerceptualValues& values, PerceptualStatistic statistic,
+                               ChainRule chain = ChainRule::kRootOfSquares);
 
 /// Throws StageError when the skeleton is of another mesh. Same bytes for any thread count.
 PerceptualValues measure_perceptual_values(const NestedScales& scales, const Skeleton& skeleton,

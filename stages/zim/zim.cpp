@@ -155,6 +155,7 @@ Predictors predict_quality(const Fragments& fragments, const std::vector<Pixels>
   check(fragments, pixels, options);
   Predictors out;
   out.planes.resize(fragments.planes.size());
+  out.density_weight = options.weight_eta / sum_of_weights(options);
   for (std::size_t p = 0; p < out.planes.size(); ++p) {
     const TexturePlane& plane = fragments.planes[p];
     PlanePredictors& predictors = out.planes[p];

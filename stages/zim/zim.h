@@ -7,7 +7,7 @@
 
 namespace texmesh {
 
-inline constexpr int kZimVersion = 2;
+inline constexpr int kZimVersion = 3;
 
 struct ZimOptions {
   int difference = 24;  // neighbours that differ by this in any channel count as different

@@ -319,7 +319,7 @@ test('site: without scripts the objects are links to the viewer', async () => {
   await withPage('out/www/index.html', async (page) => {
     check(await page.locator('.search').isHidden(), 'a search that does nothing');
     await page.locator('#objects a').first().click();
-    check(/viewer\/index\.html\?panel=0&pkg=/.test(await page.locator('#show').getAttribute('href')), 'no link to the viewer');
+    check(/viewer\/index\.html\?panel=none&pkg=/.test(await page.locator('#show').getAttribute('href')), 'no link to the viewer');
   }, {script: false});
 });
 

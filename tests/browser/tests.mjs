@@ -19,6 +19,7 @@ import './memory-tests.mjs';
 import './page-tests.mjs';
 import './proxy-tests.mjs';
 import './thesis-tests.mjs';
+import './usdz-tests.mjs';
 import './render-tests.mjs';
 import './size-tests.mjs';
 import './viewer-tests.mjs';

@@ -90,7 +90,10 @@ inline Json by_predictors(PlaneTables t) {
   t.allocation = kByVqp;
   for (std::size_t f = 0; f < t.fragment_count(); ++f)
     t.vqp.push_back(t.covered_texels[f] > 0 ? static_cast<float>(f * 7 % 11) / 16 : 0);
+  t.density_weight = 0.25f;
   return {{"vqp", t.vqp},
+          {"density_weight", t.density_weight},
+          {"eta", eta_of(t, t.scale_count() - 1)},
           {"gamma", mean_eta(t, 0)},
           {"quality", quality_of(t, 0, mean_eta(t, 0))},
           {"rungs", rungs_of(t, 0, mean_eta(t, 0))}};

@@ -36,7 +36,8 @@ inline const std::vector<std::string> kPolicies{"htc", "guard", "price", "propor
 inline const std::map<StepRule, const char*> kRules{{StepRule::kFlip, "flip"},
                                                     {StepRule::kJnd, "jnd"},
                                                     {StepRule::kError, "error"},
-                                                    {StepRule::kEdge, "edge"}};
+                                                    {StepRule::kEdge, "edge"},
+                                                    {StepRule::kDistance, "distance"}};
 
 inline Json throughput_json(const std::string& estimator, int samples, double initial_bytes_s) {
   return {{"estimator", estimator},

@@ -1,12 +1,13 @@
-// Models that are no glTF: OBJ with MTL, PLY, STL, range scans.
+// Models that are no glTF: OBJ with MTL, PLY, STL, range scans; archives of models.
 #include <algorithm>
 
 #include "format/base/errors.h"
 #include "pipeline/import/named_files.h"
-#include "pipeline/io/resolver.h"
+#include "pipeline/io/file_resolver.h"
 #include "pipeline/io/uri.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/fuzz/reader_limits.h"
+#include "tests/support/zip_writer.h"
 
 namespace texmesh::fuzz {
 namespace {
@@ -50,6 +51,11 @@ bool read_mtl(ByteSpan input) {
 bool read_ply(ByteSpan input) {
   MemoryFiles files;
   return unless_input_error([&] { import_ply("fuzz", input, files, reader_limits(), {}); });
+}
+
+bool read_archive(ByteSpan input) {
+  NoFiles none;
+  return unless_input_error([&] { import_model("fuzz.zip", input, none, reader_limits(), {}); });
 }
 
 bool read_stl(ByteSpan input) {
@@ -140,6 +146,15 @@ std::vector<Bytes> ply_seeds() {
       "ply\nformat ascii 1.0\nelement vertex 4\nproperty double x\nproperty double y\nproperty double z\n"
       "element tristrips 1\nproperty list int int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n1 1 0\n6 0 1 2 3 -1 0\n"));
   return list;
+}
+
+std::vector<Bytes> archive_seeds() {
+  const std::string obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+  return {
+      testing::zip_of({{"a.obj", obj, false}}),
+      testing::zip_of({{"odm_textured_model_geo.obj", obj},
+                       {"coords.txt", "WGS84 UTM 32N\n", false},
+                       {"license.txt", "* title:\tA\n* license type:\tCC0-1.0 (https://a.b/)\n", false}})};
 }
 
 std::vector<Bytes> stl_seeds() {
@@ -236,6 +251,8 @@ constexpr std::string_view kRangeWords[] = {"\"y_top\":",
                                             "65535\n",
                                             "1e300",
                                             "99999"};
+constexpr std::string_view kArchiveWords[] = {"PK\3\4", "PK\1\2", "PK\5\6", "PK\6\6",
+                                              "PK\6\7", "../",    ".obj"};
 constexpr std::string_view kCyberwareWords[] = {
     "NLG=",        "NLT=",           "LGINCR=", "LTINCR=",           "LGSHIFT=", "RSHIFT=",
     "LGMIN=",      "LGMAX=",         "SCALE=",  "SPACE=CYLINDRICAL", "DATA=\n",  "THETA_RIGHTHAND=FALSE",
@@ -254,6 +271,7 @@ void add_scan_targets(std::vector<Target>& list) {
                            text_target("mtl", read_mtl, mtl_seeds, kMtlWords),
                            text_target("ply", read_ply, ply_seeds, kPlyWords),
                            text_target("name", read_name, name_seeds, kNameWords),
+                           text_target("archive", read_archive, archive_seeds, kArchiveWords),
                            text_target("stl", read_stl, stl_seeds, kStlWords),
                            text_target("range", read_range, range_seeds, kRangeWords),
                            text_target("cyberware", read_cyberware, cyberware_seeds, kCyberwareWords)});

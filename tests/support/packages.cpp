@@ -134,7 +134,7 @@ json make_provenance() {
   const std::string digest(64, '5');
   return {{"version", 1},
           {"tool", "texmesh test"},
-          {"format", {{"major", kFormatMajor}, {"minor", kFormatMinor}}},
+          {"format", {{"major", kFormatMajor}, {"minor", 0}}},
           {"inputs", {{{"role", "model"}, {"sha256", digest}, {"bytes", 4321}}}},
           {"options",
            {{"version", 1}, {"package", {{"title", "Two spheres"}}}, {"ladder", {{"rungs", {20, 70}}}}}},

@@ -126,7 +126,11 @@ void read_meta_file(CompileArguments& args) {
 /// Flags win over everything that a file says.
 void apply_flags(const CompileArguments& args, CompileOptions& options) {
   std::vector<OptionField> fields = list_options(options);
-  for (const auto& [path, text] : args.options) set_option(*find_option(fields, path), text, "--" + path);
+  for (const auto& [path, text] : args.options) {
+    const auto shorter = kShortNames.find(path);
+    set_option(*find_option(fields, path), text,
+               shorter == kShortNames.end() ? "--" + path : shorter->second.name);
+  }
   options.package.meta = merge_meta(options.package.meta, args.meta_text);
   check_options(options, "command line");
 }
@@ -151,6 +155,7 @@ std::string sandbox_line(SandboxMode mode) {
 }
 
 PlanRequest plan_request(const CompileArguments& args) {
+  check_folder_name(args.output, ".texmesh");
   PlanRequest request;
   request.inputs = args.inputs;
   request.output = args.output;
@@ -307,8 +312,9 @@ constexpr const char* kNotes =
     "Exit code: 0 all well, 1 some model failed, 2 usage, 3 internal, 75 try again.";
 
 void add_compile_options(Command& c, CompileArguments& args) {
-  c.option("INPUT", args.inputs,
-           "Models (.glb .gltf .obj .ply .stl, range-scan .json), folders of models, or collections (.json)")
+  c.option(
+       "INPUT", args.inputs,
+       "Models (.glb .gltf .obj .ply .stl, .zip archives of these, range-scan .json), folders of models, or collections (.json)")
       .required();
   c.option("-o,--output", args.output, "NAME.texmesh for one model, a folder for several models", "OUTPUT")
       .required();
@@ -323,8 +329,7 @@ void add_compile_options(Command& c, CompileArguments& args) {
        "--profile, flags win over the file",
        "FILE")
       .rare();
-  c.option("--meta", args.meta,
-           "JSON file about the object (schemas/meta.v1.schema.json). The file wins over the model's words",
+  c.option("--meta", args.meta, "JSON about the object (schemas/meta.v1.schema.json); it wins over the model",
            "FILE")
       .everyday(kEverydayTitle);
   c.help_option("--help-stage", "Stage ", "Print the options of one stage (--stages lists the stages)");
@@ -354,6 +359,8 @@ int run_compile(CompileArguments& args) {
   settings.more_inputs.insert(settings.more_inputs.end(), plan.files.begin(), plan.files.end());
   try {
     return run_batch(plan, settings, std::cout);
+  } catch (const PermissionError&) {
+    throw;
   } catch (const ResourceError& e) {
     std::cerr << "texmesh: " << e.what() << '\n';
     return kExitTryAgain;
@@ -482,8 +489,7 @@ void write_collection_page(const RunSummary& merged, const MergeArguments& args)
                                               [](const ModelSummary& m) { return package_face(m.output); });
   std::error_code error;
   if (!page.files.empty()) fs::create_directories(folder / posters, error);
-  if (error)
-    throw ResourceError((folder / posters).string(), "", "a folder that can be made", error.message());
+  if (error) fail_to_write((folder / posters).string(), "", error.value());
   for (const PageFile& file : page.files) write_file_atomically((folder / file.name).string(), file.bytes);
   write_text_file(args.html, page.html);
 }

@@ -452,6 +452,7 @@ void add_fetch_options(Command& c, FetchArguments& args) {
   c.flag("--json", d.json, "Print one JSON object (schemas/fetch.v1.schema.json)");
   add_rtt_option(c, d, "Round trip, 40 are milliseconds; 0 = as the first answer shows it").rare();
   add_policy_option(c, d).rare();
+  add_jnd_option(c, d).rare();
   c.option("--connections", d.request.network.connections, "Connections per server")
       .integer_in(1, 64)
       .shows_default()

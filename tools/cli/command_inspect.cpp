@@ -351,12 +351,14 @@ int run_render(const RenderArguments& args) {
   check_usage(args);
   check_output_file(args.output);  // not after the work
   const RunContext context = context_of(args.jobs);
+  PercentLine progress("render");
   RenderedModel model = model_of(args, context);
   if (args.unlit) make_unlit(model);
   const RenderEnvironment environment =
       environment_of(args.environment == "white" ? RenderLight::kWhite : RenderLight::kStudio, context);
   const PictureSheet sheet =
       render_sheet(model, environment, args.views, static_cast<std::uint32_t>(args.size_px), context);
+  progress.end();
   note_empty_picture(sheet, model);
   write_output_file(args.output, write_png(sheet.pixels));
   if (args.json)
@@ -372,8 +374,11 @@ void add_render_options(Command& c, RenderArguments& args) {
            "or a "
            "folder that unpack made")
       .required();
-  c.option("-o,--output", args.output,
-           "The picture to write, x.png; with --what also x.glb, to turn in any viewer", "FILE")
+  c.option(
+       "-o,--output", args.output,
+       "The picture to write, x.png; with --what also x.glb, to turn in any viewer, and of scales x.csv and "
+       "x.ply, the scale map as data",
+       "FILE")
       .required();
   c.option(
        "--views", args.views,

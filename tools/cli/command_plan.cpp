@@ -175,6 +175,7 @@ int run_check(const CheckArguments& args) {
   const FragmentList list = list_of(package, request, plan);
   std::vector<GateResult> results = check_plan(plan, args.gate, request.time_limit_s);
   if (args.gate.max_flip < 1 && !args.predicted_only) {
+    const PercentLine progress("check");
     const auto sizes = check_switch_sizes(package, args.gate.max_flip, args.views, context_of(0));
     results.insert(results.end(), sizes.begin(), sizes.end());
   }

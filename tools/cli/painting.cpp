@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "format/base/text_bytes.h"
 #include "pipeline/cache/disk_store.h"
 #include "pipeline/compile/options.h"
 #include "pipeline/io/atomic_file.h"
@@ -97,13 +98,18 @@ void add_painting_options(Command& c, Painting& painting) {
 
 int run_painting(const Painting& p, std::span<const PaintedQuantity> quantities) {
   const bool png = ends_with_either(p.output, ".png", ".PNG");
-  if (!png && !ends_with_either(p.output, ".glb", ".GLB"))
-    throw UsageError("--output", "", "a name that ends in .glb (to turn it in any viewer) or .png", p.output);
+  const bool csv = ends_with_either(p.output, ".csv", ".CSV"),
+             ply = ends_with_either(p.output, ".ply", ".PLY");
+  if (!png && !csv && !ply && !ends_with_either(p.output, ".glb", ".GLB"))
+    throw UsageError("--output", "",
+                     "a name that ends in .glb (to turn it in any viewer), .png, .csv or .ply", p.output);
   Notes notes;
   const auto what = std::ranges::find(quantities, std::string_view(p.what), &PaintedQuantity::name);
   const PaintedModel model = paint(p, *what, notes);
-  write_output_file(p.output, png ? write_painted_png(model, static_cast<std::uint32_t>(p.size_px))
-                                  : write_painted_glb(model));
+  write_output_file(p.output, csv   ? text_bytes(write_painted_csv(model, p.what))
+                              : ply ? text_bytes(write_painted_ply(model, p.what))
+                              : png ? write_painted_png(model, static_cast<std::uint32_t>(p.size_px))
+                                    : write_painted_glb(model));
   if (p.json)
     std::cout << to_json_line(PaintedDocument{p, model.legend, notes}) << '\n';
   else

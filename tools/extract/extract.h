@@ -27,6 +27,12 @@ struct ExtractScale {
   Form form = Form::kCoded;
 };
 
+/// How long the search for a file of a number of bytes may take.
+enum class ExtractEffort : std::uint8_t {
+  kUsual,  // decides by parts of pictures
+  kBest,   // looks at many whole files: two to eight times as long, for 0 to 7 % less difference
+};
+
 /// The best-looking files of at most so many bytes.
 struct ExtractBudget {
   std::vector<std::uint64_t> bytes;  // a file for each; above 0
@@ -34,6 +40,8 @@ struct ExtractBudget {
   double display_px = 512;           // displayed height at which files are compared, device px
   ExtractImages images = ExtractImages::kAuto;
   bool levels = false;  // as ExtractScale::Form::kLevels
+  ExtractEffort effort = ExtractEffort::kUsual;
+  bool best() const { return effort == ExtractEffort::kBest; }
 };
 
 /// A proxy as the package has it.
@@ -75,8 +83,8 @@ struct ExtractedImage {
 };
 
 struct Extracted {
-  std::vector<std::uint8_t> glb;
-  std::string name;                             // of the GLB; who writes it says so
+  std::vector<std::uint8_t> glb;                // or USDZ, of extract_usdz()
+  std::string name;                             // of the file; who writes it says so
   int scale = 0;                                // the finest in the file; of a proxy the package's coarsest
   std::optional<std::uint32_t> proxy;           // the file is this proxy, or made of it
   std::vector<int> levels;                      // of levels of detail: all, finest first
@@ -104,7 +112,7 @@ struct Extracted {
   }
   static void fields(auto& s, auto&& v) {
     v("version", Constant{1}, "");
-    v("file", s.name, "Name of the GLB, without its folder.");
+    v("file", s.name, "Name of the file, without its folder.");
     v("bytes", s.glb.size(), Range{20, kMostGlbBytes}, "");
     v("scale", s.scale, Range{0, 99},
       "Number of the finest scale in the file; with `proxy` the package's coarsest one.");

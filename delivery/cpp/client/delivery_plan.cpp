@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "format/rules/jnd_choice.h"
+
 namespace texmesh {
 namespace {
 
@@ -191,15 +193,31 @@ void take_better(DeliveryPlan plan, std::uint64_t bytes, std::optional<DeliveryP
     best = std::move(plan);
 }
 
+/// The coarsest scale of the package that nobody with the request's JND can tell from that one.
+int coarsest_alike_scale(PackageReader& package, int scale, const DeliveryRequest& request) {
+  const PerceptualTable* t = package.perceptual_table();
+  if (t == nullptr)
+    throw InputError("", "jnd", "a package with perceptual values, in thesis.bin", "one without");
+  const std::vector<float> value = request.htc.policy == Policy::kThesis
+                                       ? pair_values(*t, PerceptualStatistic::kAverage, ChainRule::kSurvivor)
+                                       : pair_values(*t, PerceptualStatistic::kP95);
+  const auto row = static_cast<std::size_t>(std::ranges::find(t->scale, scale) - t->scale.begin());
+  const std::size_t most = refine_to(value, t->scale.size(), t->scale.size() - 1, row, request.jnd);
+  for (const ManifestScale& s : package.manifest().scales)
+    if (s.scale <= t->scale[most]) scale = std::max(scale, s.scale);
+  return scale;
+}
+
 }  // namespace
 
 int wanted_scale(PackageReader& package, const DeliveryRequest& request) {
   if (request.scale >= 0) return request.scale;
-  return scale_at(step_function(package.manifest().scales, request.rule), request.displayed_px);
+  const int wanted = scale_at(step_function(package.manifest().scales, request.rule), request.displayed_px);
+  return request.jnd > 0 ? coarsest_alike_scale(package, wanted, request) : wanted;
 }
 
 DeliveryRequest as_printed(DeliveryRequest request) {
-  request.rule = StepRule::kJnd;
+  request.rule = StepRule::kDistance;
   request.htc.policy = Policy::kThesis;
   request.htc.window = 1;
   request.htc.hard_limits = true;
@@ -216,7 +234,7 @@ HtcOptions request_htc(const DeliveryRequest& request, double left_s, double sho
 }
 
 ThesisTextures thesis_textures(TextureLoss& loss, const ListOptions& options, double bytes) {
-  ThesisTextures out{full_size(loss.package()), options, {}};
+  ThesisTextures out{planes_for_display(loss.package(), options.displayed_px), options, {}};
   out.options.thesis = true;
   out.options.gamma = gamma_for_bytes(loss.package(), out.planes, options.scale, bytes);
   out.list = fragment_list(loss, out.planes, out.options);

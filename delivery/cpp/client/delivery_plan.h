@@ -23,11 +23,14 @@ struct DeliveryRequest {
   /// GPU memory for mesh and textures, see texture_budget.h. What is least takes its place where nothing
   /// fits.
   double memory_bytes = std::numeric_limits<double>::infinity();
+  /// Above 0: the viewer's own JND. Instead of the rule's scale comes the coarsest one that this viewer
+  /// cannot tell from it, see refine_to(): by p95, and by the average of 7.2's chains with Policy::kThesis.
+  double jnd = 0;
   bool proxy_steps = true;  // a larger proxy may be shown on the way, see format/rules/proxy_choice.h
 };
 
-/// The request with chapters 4 and 7 as printed: Policy::kThesis, the JND's rule, one request at a time, hard
-/// limits.
+/// The request with chapters 4 and 7 as printed: Policy::kThesis, StepRule::kDistance, one request at a
+/// time, hard limits.
 DeliveryRequest as_printed(DeliveryRequest request);
 /// The request's policy for the textures: `left_s` seconds are left for them. `shown_bytes_s`, what transfers
 /// before them have shown, is the first guess of the throughput unless the request has one.
@@ -73,10 +76,10 @@ struct DeliveryPlan {
 /// scale, and not the former where it asks for another rule than kFlip.
 /// On a slow link a larger proxy may come before documents and mesh, where proxy_step() says so. A scale and
 /// mips of the textures keep within DeliveryRequest::memory_bytes.
-/// With Policy::kThesis it is as printed: the rule's scale and no other, all textures at full size, the list
-/// whose D_i(Gamma) is T_0 beta_0. Deterministic.
+/// With Policy::kThesis it is as printed: the rule's scale and no other, textures by the display's
+/// resolution (8.1.1), the list whose D_i(Gamma) is T_0 beta_0. Deterministic.
 DeliveryPlan plan_delivery(PackageReader& package, const DeliveryRequest& request);
-/// Chapter 4's textures for so many bytes: all at full size, and the list whose D_i(Gamma) comes to that.
+/// Chapter 4's textures for so many bytes: planes_for_display(), and the list whose D_i(Gamma) comes to that.
 /// `options.scale` and `options.displayed_px` count.
 struct ThesisTextures {
   std::vector<PlaneChoice> planes;

@@ -25,6 +25,22 @@ void require_range(const std::string& file, const EntryRef& entry, std::uint64_t
                     "an entry of " + std::to_string(entry.bytes) + " bytes");
 }
 
+/// What stands in the place of a package, where its first bytes tell.
+const char* kind_of_content(const Bytes& head) {
+  const std::string_view text(reinterpret_cast<const char*>(head.data()), head.size());
+  const std::string_view words = text.substr(std::min(text.size(), text.find_first_not_of(" \t\r\n")));
+  if (head.empty()) return "an empty file";
+  if (text.starts_with("glTF") || text.starts_with("ply\n") || text.starts_with("ply\r"))
+    return "a model: texmesh compile makes a package of it";
+  if (text.find("\nv ") != text.npos && text.find("\nv ", text.find("\nv ") + 1) != text.npos)
+    return "a model (OBJ): texmesh compile makes a package of it";
+  if (words.starts_with("<")) return "a page of HTML or XML, as servers send in the place of a file";
+  if (words.starts_with("{"))
+    return text.find("\"asset\"") != text.npos ? "a model (glTF): texmesh compile makes a package of it"
+                                               : "JSON";
+  return text.starts_with("PK") ? "another ZIP archive" : "something else";
+}
+
 class ContainerStore final : public PackageStore {
  public:
   explicit ContainerStore(std::unique_ptr<ByteSource> source) : source_(std::move(source)) {}
@@ -39,7 +55,7 @@ class ContainerStore final : public PackageStore {
     const bool starts =
         head.size() >= kManifestOffset && std::equal(kStart, kStart + 10, head.begin()) &&
         std::equal(kManifestPath, kManifestPath + std::strlen(kManifestPath), head.begin() + 30);
-    if (!starts) throw RuleError("K11", name(), "byte 0", "a texmesh package", "something else");
+    if (!starts) throw RuleError("K11", name(), "byte 0", "a texmesh package", kind_of_content(head));
     std::uint64_t bytes = 0;
     for (int i = 3; i >= 0; --i) bytes = bytes << 8 | head[static_cast<std::size_t>(22 + i)];
     if (bytes > head.size() - kManifestOffset)
@@ -65,7 +81,8 @@ class FolderStore final : public PackageStore {
  public:
   explicit FolderStore(std::string root)
       : root_(std::move(root)), fd_(::open(root_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
-    if (fd_.get() < 0) throw InputError(root_, "", "a readable folder", std::strerror(errno));
+    if (fd_.get() < 0)
+      throw InputError(root_, "", "", std::string("cannot be read: ") + std::strerror(errno));
   }
   std::string name() const override { return root_; }
   bool is_folder() const override { return true; }
@@ -101,7 +118,7 @@ class FolderStore final : public PackageStore {
         throw RuleError("K05", root_, path, "a path of a-z 0-9 . _ -", "another");
       entries.push_back({path, 0, it->file_size(error), 0});
     }
-    if (error) throw InputError(root_, "", "a readable folder", error.message());
+    if (error) throw InputError(root_, "", "", "cannot be read: " + error.message());
     std::ranges::sort(entries, {}, &ContainerEntry::path);
     return entries;
   }
@@ -134,7 +151,7 @@ class FolderStore final : public PackageStore {
     Bytes out(static_cast<std::size_t>(bytes));
     if (read_at(file.get(), offset, out)) return out;
     if (errno == 0) throw RuleError("I08", root_, path, "more bytes", "the file became shorter");
-    throw InputError(root_, path, "readable bytes", std::strerror(errno));
+    throw InputError(root_, path, "", std::string("cannot be read: ") + std::strerror(errno));
   }
 
   std::string root_;

@@ -14,7 +14,7 @@ export type * from './scene/api';
 /** Names that options may have; the library chooses options that are left out. */
 const names = {
   policy: ['guard', 'thesis'],
-  rule: ['flip', 'jnd', 'error', 'edge'],
+  rule: ['flip', 'jnd', 'error', 'edge', 'distance'],
   meshes: ['glb', 'stream', 'auto'],
 } as const;
 
@@ -50,7 +50,7 @@ export class TexmeshPackage extends PackageReader {
     this.pool = pool; // until a load has the pool: options may be refused
     this.decodeDocument = pool.decodeDocument;
     const forget = (): void => void this.loads_.delete(load);
-    const { rule = options.policy === 'thesis' ? 'jnd' : undefined } = options;
+    const { rule = options.policy === 'thesis' ? 'distance' : undefined } = options;
     const load = loadModel(this, scene, { ...options, rule }, pool, this.loaded_ ? nowS() : this.openedS,
       forget);
     this.pool = undefined;

@@ -176,8 +176,9 @@ function checkTables(table: t.PlaneTables, v: Json): void {
   for (const [fragment, quality, bytes] of v.knots.fragment_quality_bytes)
     expectBits([t.interpolatedBytes(bent, fragment, quality)], [bytes],
       `bytes of ${fragment} at ${quality}, knots`);
-  const { vqp, gamma, quality } = v.by_predictors;
-  const predicted = { ...table, allocation: 3, vqp: Float32Array.from(vqp) };
+  const { vqp, density_weight: densityWeight, eta, gamma, quality } = v.by_predictors;
+  const predicted = { ...table, allocation: 3, vqp: Float32Array.from(vqp), densityWeight };
+  expectBits(t.etaOf(predicted, table.quality.length - 1), eta, 'VQP of the coarsest scale');
   expectBits([t.meanEta(predicted, 0)], [gamma], 'mean of VQP');
   expectBits(t.qualityOf(predicted, 0, gamma), quality, 'quality by VQP');
 }

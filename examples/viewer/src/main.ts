@@ -9,7 +9,8 @@ startTheme();
 const query = new URLSearchParams(location.search);
 const address = query.get('pkg') ?? '';
 // No panel where the address says so, and none without a package.
-document.body.classList.toggle('wide', address === '' || query.get('panel') === '0');
+document.body.classList.toggle('wide', address === '' || ['0', 'none'].includes(query.get('panel') ?? ''));
+document.body.classList.toggle('visitor', query.get('panel') === 'none');
 
 const app = import('./app');
 app.catch(() => undefined); // `await app` below tells of it

@@ -13,7 +13,7 @@ const kPhases: Record<string, string> = {
 
 /** Writes what stands over and under the picture: title, progress, status, problems. */
 export function showStatus(live: Live, packageUrl: string): void {
-  showTitle(live, live.title || shortName(packageUrl));
+  showTitle(live, live.title || nameInAddress() || shortName(packageUrl));
   const phase = kPhases[live.phase] ?? live.phase;
   const busy = !['done', 'failed', 'cancelled'].includes(live.phase);
   showProgress(shareLoaded(live), busy);
@@ -26,10 +26,13 @@ export function showStatus(live: Live, packageUrl: string): void {
       : ''].filter(Boolean).join(' · ');
 }
 
-/** A package's name by its URL. */
+const nameInAddress = (): string => new URLSearchParams(location.search).get('title') ?? '';
+
+/** A package's name by its URL, as people would write it. */
 function shortName(url: string): string {
-  return readable(url.split(/[?#]/)[0] ?? '').replace(/\/$/, '').split('/').pop()?.replace(/\.texmesh$/,
-    '') || 'texmesh';
+  const name = readable(url.split(/[?#]/)[0] ?? '').replace(/\/$/, '').split('/').pop() ?? '';
+  const words = name.replace(/\.texmesh$/, '').replace(/[-_\s]+/g, ' ').trim();
+  return words.charAt(0).toUpperCase() + words.slice(1) || 'texmesh';
 }
 
 /** Attribution, and licence as a link. Written once: a link under the pointer must stay. */
@@ -48,14 +51,16 @@ function showRights(about: About | null): void {
   line.hidden = by === '' && licence === '';
 }
 
-function showTitle({ manifest, textures: planes, packageBytes, about }: Live, name: string): void {
+function showTitle({ manifest, textures: planes, packageBytes, about, phase }: Live, name: string): void {
   byId('name').textContent = name;
   if (!manifest) return;
+  const done = phase === 'done';
   const finest = manifest.scales[0];
   const textures = planes.filter((p) => p.mip === 0).length;
   byId('subtitle').textContent = [
     finest ? `${format.count(finest.triangles)} triangles` : '',
-    textures ? `${textures} ${textures === 1 ? 'texture' : 'textures'}` : 'no texture',
+    // How many there are is known when their tables are.
+    textures ? `${textures} ${textures === 1 ? 'texture' : 'textures'}` : done ? 'no texture' : '',
     format.bytes(packageBytes)].filter(Boolean).join(' · ');
   showRights(about);
   document.title = `${name} · texmesh`;

@@ -159,7 +159,7 @@ ModelList list_collection(const PlanRequest& request, int shards) {
   list.collection = shards > 1 ? split.collection : "";
   for (std::size_t i = 0; i < plan.models.size(); ++i) {
     const PlannedModel& m = plan.models[i];
-    if (m.unread && !is_range_scan(m.input)) continue;
+    if (m.unread && !holds_model(m.input)) continue;
     ListedModel listed{m.input,
                        m.output,
                        split.packages[i],

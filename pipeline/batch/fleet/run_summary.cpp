@@ -154,12 +154,17 @@ void JunitReport::add(const JunitCase& c) {
         fmt::format("<failure{} message=\"{}\"/>\n",
                     c.failure_type.empty() ? "" : fmt::format(" type=\"{}\"", markup_escaped(c.failure_type)),
                     markup_escaped(c.failure));
+  if (!c.output.empty()) body += "<system-out>" + markup_escaped(c.output) + "</system-out>\n";
   text_ += fmt::format("<testcase classname=\"{}\" name=\"{}\"{}", markup_escaped(c.class_name),
                        markup_escaped(c.name), time_attribute(c.seconds));
   text_ += body.empty() ? "/>\n" : ">" + body + "</testcase>\n";
 }
 
 std::string JunitReport::finish() { return std::exchange(text_, {}) + "</testsuite>\n</testsuites>\n"; }
+
+std::string note_sentence(const Note& note) {
+  return note.code + (note.place.empty() ? "" : " at " + note.place) + ": " + note.text;
+}
 
 SummaryCounts count_results(const std::vector<ModelSummary>& models) {
   SummaryCounts c;
@@ -183,7 +188,8 @@ RunSummary summarize_run(const BatchPlan& plan, const std::vector<WorkerReport>&
     const WorkerReport& r = reports[i];
     std::optional<EarlierCost> made;
     if (r.made_s > 0) made = EarlierCost{r.made_s, r.made_memory_bytes};
-    s.models.push_back({r, std::string(m.name()), m.output, package_within(plan, m), made, r.more->error});
+    s.models.push_back(
+        {r, std::string(m.name()), m.output, package_within(plan, m), made, r.more->error, r.more->told});
   }
   s.counts = count_results(s.models);
   return s;
@@ -223,6 +229,7 @@ std::string write_junit(const RunSummary& s) {
                   {},
                   m.result == ModelResult::kCancelled ? "not reached" : ""};
     if (!m.ok()) one.failure = m.error.message, one.failure_type = m.error.kind;
+    for (const Note& n : m.warnings) one.output += note_sentence(n) + "\n";
     report.add(one);
   }
   return report.finish();
@@ -263,7 +270,8 @@ SummaryFile open_summary(const std::string& file) {
     return {file, {}, "half-written", e.what()};
   } catch (const InputError& e) {
     // A file that is not there is as good as one that was never finished.
-    const bool there = !e.expected().starts_with("a readable") && !e.expected().starts_with("a regular");
+    const bool there = !e.expected().empty() && !e.expected().starts_with("a readable") &&
+                       !e.expected().starts_with("a regular");
     return {file, {}, there ? "foreign" : "half-written", e.what()};
   }
 }

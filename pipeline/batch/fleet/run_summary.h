@@ -13,6 +13,7 @@ struct JunitCase {
   std::vector<std::pair<std::string, std::string>> properties;
   std::string failure, failure_type;  // the case failed where there is a text
   std::string skipped;                // it was not reached where there is one
+  std::string output = {};            // what it said; "" = nothing
 };
 
 struct JunitSuite {
@@ -48,6 +49,7 @@ struct ModelSummary : ModelNumbers {
   std::string model, output, package;  // package: the output's path within the output folder
   std::optional<EarlierCost> made;     // where this run did not make it, and it is known
   ModelError error;                    // of empty texts when nothing went wrong
+  Notes warnings;                      // of this run or of the run that made the package
 
   /// Seconds of the run that made the package, 0 where nobody knows.
   double cost_s() const { return made ? made->seconds : result == ModelResult::kOk ? seconds : 0; }
@@ -58,8 +60,13 @@ struct ModelSummary : ModelNumbers {
     ModelNumbers::fields(s, v);
     v("made", s.made, "what the model took when its package was made, where this run did not make it");
     v("error", s.error, kMayMiss, "");
+    v("warnings", s.warnings, kMayMiss,
+      "warnings and what the package lacks, also of a model that is up to date; the first 20");
   }
 };
+
+/// "missing-texture at mesh.mtl:3: scan.jpg is not there".
+std::string note_sentence(const Note& note);
 
 /// A summary that merging could not use, or not as it stands.
 struct SummaryProblem {

@@ -71,7 +71,7 @@ StageKeys unpack_keys(ByteSpan bytes, const StageNames& stages) {
   return keys;
 }
 
-constexpr std::array<std::uint8_t, 8> kMagic{'T', 'X', 'M', 'E', 'M', 'O', 0, 3};
+constexpr std::array<std::uint8_t, 8> kMagic{'T', 'X', 'M', 'E', 'M', 'O', 0, 4};
 constexpr std::size_t kMostBlockBytes = 8u << 20, kFullBlockBytes = 1u << 20;
 constexpr std::string_view kOpenEnding = ".open", kFinishedEnding = ".seg";
 
@@ -127,6 +127,7 @@ bool still_holds(PackageMemo& memo, const std::string& input, const std::string&
   refreshed = false;
   const std::int64_t now_ns = wall_clock_ns();
   const std::string_view folder = std::string_view(input).substr(0, input.rfind('/') + 1);
+  if (std::string_view(input).substr(folder.size()) != memo.input_name) return false;
   for (FileRequest& f : memo.files) {
     const std::string path = f.uri.empty() ? input : std::string(folder) + f.uri;
     const bool same = f.similar ? same_names(std::string(folder), memo.looked_at_ns, f, refreshed)

@@ -2,6 +2,7 @@
 // What runs have found out about each package, and the files that hold it: blocks of memos, each file
 // appended by one process.
 
+#include "format/base/note.h"
 #include "pipeline/graph/store.h"
 #include "pipeline/io/file_stamp.h"
 
@@ -11,6 +12,8 @@ namespace texmesh {
 /// nothing has changed.
 struct PackageMemo {
   Sha256 request{};  // of everything but files: options, strictness, tool
+  std::string
+      input_name;  // the model's, without its folder: the name says how to read it, and errors tell it
   bool failed = false;
   std::int64_t looked_at_ns = 0;  // when the stamps were true
   std::vector<FileRequest> files;
@@ -20,17 +23,18 @@ struct PackageMemo {
   double seconds = 0;
   StageKeys keys;
   std::vector<std::string> error;  // kind, file, place, expected, found, message; empty unless failed
+  Notes told;                      // WorkerDetails::told
   /// Keys go apart: a model that is up to date needs none of them.
   static void archive(auto& s, auto& a) {
     a(s.request, s.package_digest, s.failed, s.looked_at_ns, s.files, s.package_stamp, s.package_bytes,
-      s.peak_memory_bytes, s.seconds, s.error);
+      s.peak_memory_bytes, s.seconds, s.error, s.input_name, s.told);
   }
 };
 
-/// Whether every file is as the memo says: the model at `input`, what it refers to beneath its folder, and,
-/// unless the memo is of a failure, the package at `output`. A file whose stamp proves nothing (changed
-/// just before it was looked at, or touched since) is read and compared by digest; the memo's stamps are
-/// then brought up to date and `refreshed` set.
+/// Whether every file is as the memo says: the model at `input` under the same name, what it refers to
+/// beneath its folder, and, unless the memo is of a failure, the package at `output`. A file whose stamp
+/// proves nothing (changed just before it was looked at, or touched since) is read and compared by digest;
+/// the memo's stamps are then brought up to date and `refreshed` set.
 bool still_holds(PackageMemo& memo, const std::string& input, const std::string& output, bool& refreshed);
 
 /// The names of stages, which the memos of a file share: a memo's keys name them by number.

@@ -95,7 +95,7 @@ struct ModelError {
   std::string kind, file, place, expected, found, message;
   friend bool operator==(const ModelError&, const ModelError&) = default;
   static void fields(auto& s, auto&& v) {
-    v("kind", s.kind, FieldRule{.words = "input|format|stage|resource|internal"}, "");
+    v("kind", s.kind, FieldRule{.words = "input|format|stage|resource|permission|internal"}, "");
     v("file", s.file, "");
     v("place", s.place, "");
     v("expected", s.expected, "");
@@ -225,7 +225,7 @@ struct ModelFinished {
 };
 
 struct RunFinished {
-  std::uint64_t models = 0, compiled = 0, unchanged = 0, failed = 0, cancelled = 0;
+  std::uint64_t models = 0, compiled = 0, unchanged = 0, failed = 0, cancelled = 0, warned = 0;
   double seconds = 0;
   std::vector<std::string> stale;
   static void fields(auto& s, auto&& v) {
@@ -235,6 +235,7 @@ struct RunFinished {
     v("unchanged", s.unchanged, "");
     v("failed", s.failed, "");
     v("cancelled", s.cancelled, "");
+    v("warned", s.warned, kMayMiss, "models with a warning that holds");
     v("seconds", s.seconds, kSeconds, "");
     v("stale", s.stale, kMayMiss, "packages in the output folder that no model makes: paths within it");
   }
@@ -314,6 +315,10 @@ class PointerOnDemand {
   std::unique_ptr<T> value_;
 };
 
+/// A warning, or a note of something that the package lacks: told in every run while it holds.
+bool is_told_always(const Note& note);
+inline constexpr std::size_t kMostToldNotes = 20;
+
 /// What only a model that ran, or that failed, has.
 struct WorkerDetails {
   ModelError error;                // of empty texts when nothing went wrong
@@ -321,6 +326,7 @@ struct WorkerDetails {
   StageKeys keys;
   std::vector<int> layers_left_out;  // numbers in CacheSettings::layers of those that did not work
   std::vector<StageSpan> spans;
+  Notes told;  // is_told_always(), at most kMostToldNotes and one that counts the others
 };
 
 /// What became of a model. A run that does nothing holds one of each model of the collection.

@@ -214,6 +214,8 @@ int worker_main() {
   try {
     enter_sandbox_of(task, events);
     return compile(task, events);
+  } catch (const PermissionError& e) {
+    return report_error(events, "permission", e);
   } catch (const ResourceError& e) {
     return report_error(events, "resource", e);
   } catch (const InputError& e) {

@@ -13,6 +13,7 @@
 #include "format/base/text_bytes.h"
 #include "pipeline/cache/cache_layer.h"
 #include "pipeline/compile/workers/worker.h"
+#include "pipeline/import/import.h"
 #include "pipeline/io/atomic_file.h"
 #include "pipeline/io/exit_codes.h"
 #include "pipeline/io/program.h"
@@ -150,6 +151,14 @@ void read_events(Worker& worker, WorkerReport& report, double now_s, const Event
     std::optional<WorkerEvent> event = read_event(line);
     if (event && apply_event(*event, now_s, report) && sink) sink(worker.job, std::move(*event));
   }
+}
+
+/// Of a model with a thousand warnings the first say enough.
+void keep_note(const Note& note, Notes& told) {
+  if (told.size() < kMostToldNotes)
+    told.push_back(note);
+  else if (told.size() == kMostToldNotes)
+    told.push_back({Severity::kWarning, "more", "", "there are more than these"});
 }
 
 /// Ends the spans of stages that will not end any more. Returns them as the place of an error: "running ssf,
@@ -413,6 +422,11 @@ std::optional<std::variant<E...>> event_of(const Json& json, const std::variant<
 
 }  // namespace
 
+bool is_told_always(const Note& note) {
+  static constexpr const char* kRoundedNote = "rounded-position";  // of condition: the surface has changed
+  return note.severity == Severity::kWarning || note.code == kLostNote || note.code == kRoundedNote;
+}
+
 bool apply_event(const WorkerEvent& event, double now_s, WorkerReport& report) {
   if (const auto* left_out = std::get_if<LayerLeftOut>(&event)) {
     report.more->layers_left_out.push_back(left_out->layer);
@@ -432,6 +446,8 @@ bool apply_event(const WorkerEvent& event, double now_s, WorkerReport& report) {
   if (const auto* started = std::get_if<StageStarted>(&event)) apply_stage(*started, now_s, report);
   if (const auto* finished = std::get_if<StageFinished>(&event)) apply_stage(*finished, now_s, report);
   if (const auto* error = std::get_if<ErrorTold>(&event)) report.more->error = error->error;
+  if (const auto* told = std::get_if<NoteTold>(&event); told && is_told_always(told->note))
+    keep_note(told->note, report.more->told);
   return true;
 }
 

@@ -147,10 +147,10 @@ TEST(FragmentList, GammaIsThatOfTheListThatComesToTheBytes) {
   EXPECT_THROW(gamma_for_bytes(package, planes, 1, middle), InputError) << "no scale";
 }
 
-TEST(FragmentList, ThePolicyTakesTheRulesScaleAtFullSizeAndTheListThatTimePays) {
+TEST(FragmentList, ThePolicyTakesTheRulesScaleAndTheListThatTimePays) {
   PackageReader package = open_with({0.5f, 0.5f, 0.5f, 0});
   DeliveryRequest request = as_printed({});
-  EXPECT_EQ(request.rule, StepRule::kJnd);
+  EXPECT_EQ(request.rule, StepRule::kDistance);
   EXPECT_EQ(request.htc.window, 1);
   EXPECT_TRUE(request.htc.hard_limits);
   request.network.link = BandwidthTrace::constant(1e6);

@@ -296,5 +296,27 @@ TEST(Tables, PredictorsStandBehindTheRestWhereQualityGoesByThem) {
   EXPECT_THROW(write_tables({{t}}), FormatError) << "nobody reads them";
 }
 
+TEST(Tables, TheWeightOfDensityNeedsVersion21) {
+  PlaneTables t = make_tables(3, 2, 2, 2);
+  t.allocation = kByVqp;
+  t.vqp = {0, 1, 0.25f, 0.5f, 0.75f, 0};
+  EXPECT_EQ(needed_minor({{t}}), 0);
+  const std::size_t without = write_tables({{t}}).size();
+  t.density_weight = 0.25f;
+  EXPECT_EQ(needed_minor({{t}}), 1);
+  EXPECT_THROW(write_tables({{t}}), FormatError) << "2.0 does not know it";
+  const Bytes bytes = write_tables({{t}}, 1);
+  EXPECT_EQ(bytes.size(), without + 4);
+  EXPECT_EQ(read_tables_head(bytes).minor, 1);
+  EXPECT_EQ(read_tables(bytes).planes[0].density_weight, 0.25f);
+  EXPECT_EQ(write_tables(read_tables(bytes), 1), bytes);
+  t.density_weight = 1.5f;
+  EXPECT_THROW(write_tables({{t}}, 1), FormatError);
+  t.density_weight = 0.25f;
+  t.allocation = 0;
+  t.vqp.clear();
+  EXPECT_THROW(write_tables({{t}}, 1), FormatError) << "nobody reads it";
+}
+
 }  // namespace
 }  // namespace texmesh

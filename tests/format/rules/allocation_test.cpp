@@ -87,5 +87,19 @@ TEST(Allocation, PredictorsTakeEtasPlace) {
   EXPECT_FLOAT_EQ(quality_of(t, 1, 0.5)[0], 25);
 }
 
+TEST(Allocation, DensityOfTheScaleTakesThatOfTheFinestsPlaceInVqp) {
+  PlaneTables t = allocation_case(kByVqp);
+  t.features = {7, 7, 7, 0, 10, 20, 40, 1000};  // at S_0 every vertex is a feature, as in range scans
+  t.vqp = {0.25f, 0.5f, 0.5f, 0};
+  t.density_weight = 0.25f;
+  EXPECT_EQ(eta_of(t, 0), t.vqp);
+  EXPECT_EQ(eta_of(t, 1), (std::vector<float>{0.25f, 0.5f + 0.25f / 3, 0.75f, 0}));
+  std::swap_ranges(t.features.begin(), t.features.begin() + 4, t.features.begin() + 4);
+  EXPECT_EQ(eta_of(t, 0), t.vqp);
+  EXPECT_EQ(eta_of(t, 1)[2], 0.25f) << "less than at S_0";
+  t.density_weight = 1;
+  EXPECT_EQ(eta_of(t, 1)[2], 0) << "within 0 .. 1";
+}
+
 }  // namespace
 }  // namespace texmesh

@@ -45,6 +45,28 @@ TEST(Viewing, DistanceAndHeightAreInverse) {
   EXPECT_THROW(viewing_distance(2, 10, {std::nan(""), 1000}), FormatError);
 }
 
+/// Fig. 7.13: the nutcracker's major scales are 4, 9, 11, 17 and 20.
+TEST(Viewing, EveryDistanceShowsTheMajorScaleOfItsScalesTier) {
+  std::vector<ManifestScale> scales;
+  for (const int scale : {0, 4, 6, 9, 11, 17, 20}) {
+    ManifestScale& s = scales.emplace_back();
+    s.scale = scale;
+    s.major = scale != 0 && scale != 6;
+  }
+  const std::vector<ManifestStep> steps = step_function(scales, StepRule::kDistance);
+  ASSERT_EQ(steps.size(), 6u);
+  for (std::size_t k = 1; k < steps.size(); ++k) EXPECT_GE(steps[k].up_to_px, 1.1999 * steps[k - 1].up_to_px);
+  const auto at_distance = [&](double distance) {
+    return scale_at(steps, 1024.01 / std::pow(1.2, distance - 1));
+  };
+  for (int i = 1; i <= 20; ++i)
+    EXPECT_EQ(at_distance(i + 0.01), i <= 4 ? 4 : i <= 9 ? 9 : i <= 11 ? 11 : i <= 17 ? 17 : 20) << i;
+  EXPECT_EQ(at_distance(100), 20);
+  EXPECT_EQ(at_distance(0.9), 0);
+  scales.resize(1);
+  EXPECT_EQ(step_function(scales, StepRule::kDistance), (std::vector<ManifestStep>{{kAnyDisplayPx, 0}}));
+}
+
 TEST(Viewing, StepFunctionsOfEveryRule) {
   const Manifest m = make_manifest();
   const auto steps = [&](StepRule rule) {

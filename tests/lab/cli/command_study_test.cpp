@@ -174,7 +174,7 @@ TEST_F(StudyCommand, OutputsThatCannotBeWrittenAreToldBeforeTheStudy) {
     const CommandResult result = texmesh(arguments);
     EXPECT_EQ(result.exit_code, 1);
     EXPECT_TRUE(result.output.empty()) << result.output;
-    EXPECT_NE(result.errors.find("a file that can be written"), std::string::npos) << result.errors;
+    EXPECT_NE(result.errors.find(": cannot be written: "), std::string::npos) << result.errors;
   }
 }
 

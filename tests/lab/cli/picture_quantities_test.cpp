@@ -78,6 +78,19 @@ TEST(PictureQuantities, RadiusNamesItsRangeAndFloor) {
   EXPECT_EQ(faults(write_painted_glb(view)), "");
 }
 
+TEST(PictureQuantities, EveryCollapseHasItsPerceptualValue) {
+  NestedScales scales;
+  scales.mesh = testing::sphere(8, 12);
+  scales.collapses = {{3, 5, 0}, {4, 4, 0}};  // the second one vanishes with its component
+  Skeleton skeleton;
+  skeleton.distance.assign(scales.mesh.positions.size(), 1);
+  skeleton.radius.assign(scales.mesh.positions.size(), 2);
+  skeleton.distance[3] = 1.5f;
+  const PaintedModel view = paint_perceptual(scales, skeleton);
+  for (std::size_t p = 0; p < view.points.size(); ++p)
+    EXPECT_EQ(view.points[p].value, p == 3 ? 0.25 : 0) << p;
+}
+
 TEST(PictureQuantities, CollapseErrorIsLogarithmicAndSurvivorsHaveTheHighestColour) {
   NestedScales scales;
   scales.mesh = testing::sphere(8, 12);

@@ -31,6 +31,22 @@ TEST(PerceptualExhibits, Table71HasPrintedAndMeasuredSteps) {
   EXPECT_EQ(number_at(e, 0, 3, 4), 0.0468);
 }
 
+/// The rules stand in made_by, before the numbers.
+TEST(PerceptualExhibits, VerdictsFollowTheirRules) {
+  const std::vector<Exhibit> scales = scale_exhibits({});
+  const Exhibit &steps = exhibit_of(perceptions(), "7.1"), &head = exhibit_of(scales, "2.1");
+  int rising = 0, beyond = 0;
+  for (std::size_t k = 0; k < 5; ++k) {
+    rising += k > 0 && number_at(steps, 0, k, 5) >= number_at(steps, 0, k - 1, 5);
+    beyond += number_at(steps, 0, k, 5) >= 0.1;
+  }
+  EXPECT_EQ(steps.verdict == Verdict::kNotConfirmed, beyond > 0 || rising < 2) << steps.finding;
+  double furthest = 0;
+  for (std::size_t k = 0; k < head.tables[0].rows.size(); ++k)
+    furthest = std::max(furthest, std::abs(number_at(head, 0, k, 3) - number_at(head, 0, k, 4)));
+  EXPECT_EQ(head.verdict == Verdict::kNotConfirmed, furthest > 25) << head.finding;
+}
+
 TEST(PerceptualExhibits, Table72RulesWorkedByHand) {
   const Exhibit& e = exhibit_of(perceptions(), "7.2");
   // From Table 7.1: sqrt(.0410^2 + .0412^2) = .0581; .0410 + .0412 = .0822; over all five .1116 and .2446.

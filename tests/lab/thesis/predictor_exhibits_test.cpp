@@ -30,7 +30,16 @@ TEST(PredictorExhibits, Fig82FollowsTheFormulas) {
   EXPECT_NEAR(number_at(e, 1, pattern_of('a'), 1), 0, 1e-6);  // plain: no deviation, no gradient
   EXPECT_NEAR(number_at(e, 1, pattern_of('a'), 2), 0.15, 0.005);
   EXPECT_EQ(number_at(e, 1, pattern_of('a'), 3), 0);
-  EXPECT_EQ(e.verdict, Verdict::kConfirmed) << exhibit_text(e);
+  std::vector<bool> holds;
+  for (std::size_t k = 0; k < 9; ++k) {
+    holds.push_back(number_at(e, 0, k, 1) > number_at(e, 0, k, 2));
+    if (k < 6) EXPECT_TRUE(holds[k]) << "code draws for it: " << k;
+  }
+  const bool all = holds[6] && holds[7] && holds[8], none = !holds[6] && !holds[7] && !holds[8];
+  EXPECT_EQ(e.verdict, all    ? Verdict::kConfirmed
+                       : none ? Verdict::kNotConfirmed
+                              : Verdict::kInPart)
+      << exhibit_text(e);
 }
 
 TEST(PredictorExhibits, Fig83MarksWhatZetaCounts) {

@@ -31,6 +31,7 @@ class Memo : public ::testing::Test {
   /// A record whose stamps prove something: as if the files had been old when they were looked at.
   PackageMemo record() {
     PackageMemo r;
+    r.input_name = "model.obj";
     FileRequest model = write("model.obj", "v 0 0 0");
     model.uri = "";
     r.files = {model, write("model.mtl", "newmtl a"), {"missing.jpg", false, {}, 0, {}, false}};

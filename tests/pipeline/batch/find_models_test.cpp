@@ -36,7 +36,7 @@ TEST(FindModels, WaitsForNoPipeAndEntersNoHiddenFolder) {
   write_text(folder / "a.glb", "x");
   ASSERT_EQ(::mkfifo((folder / "x.json").c_str(), 0600), 0);
   EXPECT_EQ(list_models(folder.path().string()), std::vector<std::string>{"a.glb"});
-  EXPECT_FALSE(is_range_scan(folder / "x.json"));
+  EXPECT_FALSE(holds_model(folder / "x.json"));
 }
 
 TEST(FindModels, AFolderThatCannotBeListedIsAnError) {

@@ -49,6 +49,14 @@ TEST(ImportModel, WhatTheSourceSaysOfItself) {
   EXPECT_EQ(obj.about.up_axis, "z");
   EXPECT_EQ(count_notes(obj.model, "unknown-licence"), 1);
   EXPECT_EQ(imported("a.obj", "# up: z\n" + shape, UpAxis::kZ).about.up_axis, "y") << "the model was turned";
+  const ImportedModel turned = imported("a.obj", "# up: z\n" + shape, UpAxis::kAuto);
+  EXPECT_EQ(turned.about.up_axis, "y");
+  EXPECT_EQ(count_notes(turned.model, kTurnedNote), 1);
+  EXPECT_EQ(turned.about.source,
+            R"({"format":"obj","comments":["up: z"],"turned":{"up":"z","by":"the source's word"}})");
+  EXPECT_EQ(turned.model.mesh.positions, imported("a.obj", shape, UpAxis::kZ).model.mesh.positions);
+  EXPECT_EQ(imported("a.obj", "# up: y\n" + shape, UpAxis::kAuto).model.mesh.positions,
+            imported("a.obj", shape).model.mesh.positions);
   EXPECT_EQ(imported("a.obj", shape, UpAxis::kY).about.up_axis, "y") << "the user says so";
   const About silent = imported("a.obj", shape).about;
   EXPECT_EQ(silent.source, R"({"format":"obj"})");

@@ -298,6 +298,22 @@ TEST(Lut, EmptyAndUnfitInput) {
   EXPECT_NO_THROW(write_tables(none));
 }
 
+TEST(Lut, DefaultQualityFollowsTheNumberOfFeaturePoints) {
+  Scene s = make_scene();
+  LutOptions options;
+  options.default_quality = DefaultQuality::kFeatures;
+  TexturePlane& plane = s.fragments.planes[0];
+  const std::size_t n = plane.fragment_count();
+  for (std::size_t k = 0; k < plane.features.size(); ++k)  // a quarter of S_0's, then none
+    plane.features[k] = k < n ? 8 : k < 2 * n ? 2 : 0;
+  const std::vector<float> quality = build(s, options).planes[0].quality;
+  ASSERT_EQ(quality.size(), 3u);
+  EXPECT_EQ(quality, (std::vector<float>{80, 50, 40}));
+  std::ranges::fill(plane.features, 0);
+  EXPECT_EQ(build(s, options).planes[0].quality, (std::vector<float>{80, 40, 40})) << "no feature points";
+  EXPECT_EQ(build(s).planes[0].quality, (std::vector<float>{80, 60, 40})) << "by distance";
+}
+
 TEST(Lut, PredictorsAssignQualityAsTheFileStoresThem) {
   const Scene s = make_scene();
   LutOptions options;
@@ -306,11 +322,13 @@ TEST(Lut, PredictorsAssignQualityAsTheFileStoresThem) {
   ASSERT_EQ(t.vqp.size(), t.fragment_count());
   for (std::size_t f = 0; f < t.fragment_count(); ++f)
     EXPECT_NEAR(t.vqp[f], s.predictors.planes[0].vqp[f], 1.0 / 65535);
+  EXPECT_EQ(t.density_weight, 0.25f);
   const double gamma = mean_eta(t, 1);
-  const std::vector<float> q = quality_of(t, 1, gamma);
+  const std::vector<float> q = quality_of(t, 1, gamma), vqp = eta_of(t, 1);
   for (const std::uint16_t f : t.order)
-    EXPECT_FLOAT_EQ(q[f], std::clamp(static_cast<float>(60 + (t.vqp[f] - gamma) * 60), 5.0f, 97.0f));
-  EXPECT_EQ(read_tables(write_tables({{t}})).planes[0].vqp, t.vqp);
+    EXPECT_FLOAT_EQ(q[f], std::clamp(static_cast<float>(60 + (vqp[f] - gamma) * 60), 5.0f, 97.0f));
+  EXPECT_NE(vqp, t.vqp) << "the density of the scale, not that of S_0";
+  EXPECT_EQ(read_tables(write_tables({{t}}, 1)).planes[0].vqp, t.vqp);
   EXPECT_TRUE(build(s).planes[0].vqp.empty());
 }
 

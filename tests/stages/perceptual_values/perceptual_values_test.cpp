@@ -348,12 +348,30 @@ TEST(PerceptualValues, DistancesAgreeWithPlainSearches) {
   }
 }
 
-/// 7.5 and 7.6: every size shows a major scale, that of the tier of the scale that O_V / E_S asks for.
-TEST(PerceptualValues, MajorsMakeTheStepFunctionWhateverTheDistance) {
+/// 7.2: each removed vertex against the one that is left, where the values of the changes only add up.
+TEST(PerceptualValues, TheChainRuleDecidesAboutMajorScales) {
+  const NestedScales scales = make_scales(testing::bumpy_sphere(32, 48, 0.15f), 12);
+  const Skeleton skeleton = centre_skeleton(scales.mesh);
+  PerceptualValuesOptions options{.jnd = 0.05, .statistic = PerceptualStatistic::kAverage};
+  options.kept_scales = 0;
+  const PerceptualValues root = measure_perceptual_values(scales, skeleton, options, kOneThread);
+  options.chain = ChainRule::kSurvivor;
+  const PerceptualValues chain = measure_perceptual_values(scales, skeleton, options, kOneThread);
+  EXPECT_EQ(value_table(chain, PerceptualStatistic::kAverage, ChainRule::kSurvivor), chain.chain_average);
+  EXPECT_EQ(chain.major, major_rows(chain.chain_average, chain.major.size(), options.jnd));
+  EXPECT_NE(chain.major, root.major);
+  EXPECT_EQ(chain.chain_average, root.chain_average);
+  options.statistic = PerceptualStatistic::kP95;
+  const PerceptualValues p95 = measure_perceptual_values(scales, skeleton, options, kOneThread);
+  EXPECT_EQ(p95.major, major_rows(p95.p95, p95.major.size(), options.jnd)) << "p95 knows no chain";
+}
+
+/// 7.6: every size shows a major scale, that of the tier of the scale that O_V / E_S asks for.
+TEST(PerceptualValues, TiersMakeTheStepFunctionWhateverTheDistance) {
   const NestedScales scales = make_scales(testing::bumpy_sphere(32, 48, 0.15f), 12);
   const Skeleton skeleton = centre_skeleton(scales.mesh);
   PerceptualValuesOptions options{.jnd = 0.02, .statistic = PerceptualStatistic::kConservative};
-  options.steps = StepsBy::kMajors;
+  options.steps = StepsBy::kTiers;
   options.kept_scales = 0;
   const PerceptualValues v = measure_perceptual_values(scales, skeleton, options, kOneThread);
   const std::size_t n = v.major.size();

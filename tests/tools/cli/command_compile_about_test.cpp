@@ -57,6 +57,19 @@ TEST_F(CompileAbout, ALicenceOrCodeThatDoesNotExistIsAUsageErrorThatNamesTheFiel
   EXPECT_EQ(compile({"--up", "z", "--meta", meta(R"({"upAxis":"z"})")}).exit_code, 2);
 }
 
+TEST_F(CompileAbout, TheCuratorsUpAxisTurnsTheObjectAsTheFlagDoes) {
+  const std::string up_is_z = meta(R"({"upAxis":"z"})");
+  ASSERT_EQ(compile({"--meta", up_is_z}).exit_code, 0);
+  EXPECT_EQ(about()["upAxis"], "y") << "that of the package's coordinates";
+  const std::string by_word = testing::read_text(folder_ / "tent.texmesh");
+  ASSERT_EQ(compile({"--up", "Z"}).exit_code, 0);
+  EXPECT_EQ(about()["upAxis"], "y");
+  ASSERT_EQ(compile({"--up", "z", "--meta", meta(R"({"upAxis":"y"})")}).exit_code, 0);
+  EXPECT_EQ(testing::read_text(folder_ / "tent.texmesh"), by_word);
+  ASSERT_EQ(compile({"--up", "keep", "--meta", meta(R"({"upAxis":"z"})")}).exit_code, 0);
+  EXPECT_EQ(about()["upAxis"], "z") << "refused";
+}
+
 TEST_F(CompileAbout, TheCuratorsWordsStandOverTheModels) {
   ASSERT_EQ(compile().exit_code, 0);
   EXPECT_EQ(about()["creator"], "A. Smith");

@@ -162,6 +162,18 @@ TEST_F(ExportCommand, AllFilesAgreeOnUnitsAndAxes) {
   }
 }
 
+TEST_F(ExportCommand, ModelViewerHasAUsdzForIphones) {
+  ASSERT_EQ(run(kScan, "model-viewer", {"--draco"}).exit_code, 0);
+  const std::string page = text("index.html");
+  EXPECT_NE(page.find(" ios-src=\"model.usdz\" ar=\"\""), std::string::npos);
+  EXPECT_NE(page.find("href=\"model.usdz\""), std::string::npos);
+  ASSERT_EQ(run_command({TEXMESH_BINARY, "extract", kScan, "--display", "1000", "-o", folder_ / "a.USDZ"})
+                .exit_code,
+            0);
+  EXPECT_EQ(text("model.usdz"), read_text(folder_ / "a.USDZ"));
+  EXPECT_EQ(run_command({TEXMESH_BINARY, "extract", kScan, "--lods", "-o", folder_ / "b.usdz"}).exit_code, 1);
+}
+
 TEST_F(ExportCommand, LevelsOfDetailShareTheirTextures) {
   ASSERT_EQ(run(kScan, "gltf-lod").exit_code, 0);
   const std::string glb = text("model.glb");
@@ -242,7 +254,7 @@ TEST_F(ExportCommand, OembedCopiesViewerAndPackage) {
   EXPECT_EQ(j["provider_name"], "Museum");
   EXPECT_EQ(j["provider_url"], "https://a.example");
   EXPECT_NE(j["html"].get<std::string>().find(
-                "https://a.example/x/viewer/index.html?panel=0&amp;pkg=../object.texmesh"),
+                "https://a.example/x/viewer/index.html?panel=none&amp;pkg=../object.texmesh"),
             std::string::npos);
   EXPECT_NE(text("index.html").find("application/json+oembed"), std::string::npos);
 }

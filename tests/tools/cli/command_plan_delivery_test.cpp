@@ -38,7 +38,7 @@ TEST(CliSimulate, ValuesThatMakeNoSenseAreUsage) {
                                                 {"--time", "nan"},
                                                 {"--time", "-3"},
                                                 {"--time", "1e12"},
-                                                {"--bandwidth", "2Mbps"},
+                                                {"--bandwidth", "2Mbpx"},
                                                 {"--bandwidth", "1e17B/s"},
                                                 {"--rtt", "-5"},
                                                 {"--mirror", "fast"},

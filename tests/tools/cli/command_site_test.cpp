@@ -141,6 +141,55 @@ TEST_F(SiteCommand, HostileTextAndNamesStayText) {
   EXPECT_EQ(text("index.html").find("<b>"), std::string::npos);
 }
 
+/// What the page tells programs: its one element of JSON-LD.
+Json linked_data(const std::string& html) {
+  const std::string begin = "<script type=\"application/ld+json\">";
+  const std::size_t at = html.find(begin) + begin.size();
+  return Json::parse(html.substr(at, html.find("</script>", at) - at));
+}
+
+TEST_F(SiteCommand, WithItsAddressItTellsEnginesNetworksAndCitations) {
+  About about;
+  about.description = "A cast </script><script>alert(1)</script>";
+  about.creator = "N. & M. {x}";
+  about.licence = "CC-BY-4.0";
+  about.licence_url = "https://creativecommons.org/licenses/by/4.0/";
+  about.dates = {{"created", "1923-05"}};
+  add("c.texmesh", "50 % \"bust\"", about);
+  ASSERT_EQ(site({"--url", "no"}).exit_code, 2);
+  ASSERT_EQ(
+      site({"--url", "https://museum.example/casts", "--downloads", "64", "--title", "Casts"}).exit_code, 0);
+  const std::string html = text("objects/c.html");
+  EXPECT_EQ(tag_fault(html), "");
+  EXPECT_EQ(html.find("<script>"), std::string::npos);
+  const Json j = linked_data(html);
+  EXPECT_EQ(j["@type"], "3DModel");
+  EXPECT_EQ(j["description"], about.description);
+  EXPECT_EQ(j["license"], about.licence_url);
+  EXPECT_EQ(j["url"], "https://museum.example/casts/objects/c.html");
+  ASSERT_EQ(j["encoding"].size(), 3u);
+  for (const Json& e : j["encoding"]) {
+    const std::string url = e["contentUrl"];
+    EXPECT_TRUE(exists(url.substr(std::string("https://museum.example/casts/").size()))) << url;
+  }
+  for (const char* part : {"@misc{c,", "author = {{N. \\&amp; M. \\{x\\}}}", "title = {{50 \\% ",
+                           "year = {1923}", "og:title", "rel=\"canonical\"", "&lt;iframe src=", "rel=\"ar\""})
+    EXPECT_NE(html.find(part), std::string::npos) << part;
+  EXPECT_EQ(broken_links(folder_ / "www", "objects/c.html"), std::vector<std::string>{});
+  const std::string map = text("sitemap.xml");
+  EXPECT_NE(map.find("<loc>https://museum.example/casts/objects/c.html</loc>"), std::string::npos);
+}
+
+TEST_F(SiteCommand, WithoutItsAddressNothingIsSaidThatNeedsOne) {
+  ASSERT_EQ(site().exit_code, 0);
+  EXPECT_FALSE(exists("sitemap.xml"));
+  EXPECT_FALSE(exists("downloads"));
+  const std::string html = text("objects/b.html");
+  EXPECT_FALSE(linked_data(html).contains("url"));
+  for (const char* part : {"canonical", "og:image", "&lt;iframe", "rel=\"ar\""})
+    EXPECT_EQ(html.find(part), std::string::npos) << part;
+}
+
 TEST_F(SiteCommand, LinksAndHiddenFilesAreNotFollowed) {
   write_text(folder_ / "secret.texmesh", read_text(folder_ / "in/b.texmesh"));
   fs::create_symlink(folder_ / "secret.texmesh", folder_ / "in/link.texmesh");

@@ -210,7 +210,7 @@ TEST_F(CliView, SaysWhatIsMissing) {
     EXPECT_NE(r.errors.find(with), std::string::npos) << r.errors;
   };
   const std::string viewer = folder_ / "viewer";
-  fails({folder_ / "none", "--viewer", viewer}, "a package, or a folder of packages");
+  fails({folder_ / "none", "--viewer", viewer}, "none: cannot be read: No such file or directory");
   fails({viewer, "--viewer", viewer}, "no package in it");
   fails({folder_ / "all/fifo.texmesh", "--viewer", viewer}, "a regular file");
   fails({kGolden, "--viewer", folder_ / "all"}, "--target viewer");

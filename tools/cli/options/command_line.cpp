@@ -13,6 +13,8 @@
 #include <set>
 #include <sstream>
 
+#include "pipeline/io/names/closest_word.h"
+
 namespace texmesh {
 namespace {
 
@@ -426,6 +428,42 @@ std::string manual_page(const CLI::App& program, const HelpNotes& notes) {
   return out;
 }
 
+/// What was written and belongs to no option or argument, up to a "=".
+std::string first_unknown(const CLI::App& app, bool option) {
+  for (const std::string& word : app.remaining())
+    if (word.starts_with("-") == option) return word.substr(0, word.find('='));
+  return "";
+}
+
+std::string with_suggestion(const std::string& written, const Words& words) {
+  return written + meant_instead(written, std::vector<std::string_view>(words.begin(), words.end()));
+}
+
+/// What a word that means nothing here may have been meant for; "" where CLI11 says enough.
+std::string refusal(const CLI::App& program, const CLI::ParseError& e) {
+  const CLI::App* app = &program;
+  std::string path = program.get_name();
+  for (; !app->get_subcommands().empty(); path += " " + app->get_name()) app = app->get_subcommands().back();
+  const bool any_option = !first_unknown(*app, true).empty();
+  if (e.get_name() == "RequiredError" && app->get_require_subcommand_min() > 0 && !any_option) {
+    Words names;
+    for (const CLI::App* c : app->get_subcommands(std::function<bool(const CLI::App*)>()))
+      if (!c->get_group().empty()) names.push_back(c->get_name());
+    const std::string written = first_unknown(*app, false);
+    return path +
+           (written.empty() ? ": a command is missing"
+                            : ": there is no command " + with_suggestion(written, names)) +
+           " (" + path + " --help lists the commands)";
+  }
+  if (e.get_name() != "ExtrasError" && !any_option) return "";
+  if (!any_option) return path + ": expected no further argument, found " + first_unknown(*app, false);
+  Words names;
+  for (const CLI::Option* o : app->get_options())
+    for (const std::string& name : option_words(*o)) names.push_back(name);
+  return path + ": there is no option " + with_suggestion(first_unknown(*app, true), names) + " (" + path +
+         " --help lists the options)";
+}
+
 template <class T>
 const char* default_value_name() {
   if constexpr (std::is_same_v<T, std::vector<int>>)
@@ -482,7 +520,7 @@ Option& Option::remembers_default(const std::string& text) {
 }
 
 Option& Option::one_of_explained(const std::vector<std::string>& words) {
-  option_->check(CLI::IsMember(words).description(""));
+  option_->check(CLI::IsMember(words, CLI::ignore_case).description(""));
   return offers(words);
 }
 
@@ -645,31 +683,16 @@ int CommandLine::parse_and_run(int argc, char** argv) {
   try {
     app_->parse(argc, argv);
   } catch (const CLI::ParseError& e) {
-    return app_->exit(e) == 0 ? kExitOk : kExitUsage;
+    const std::string text = refusal(*app_, e);
+    if (text.empty()) return app_->exit(e) == 0 ? kExitOk : kExitUsage;
+    std::cerr << text << '\n';
+    return kExitUsage;
   }
   return state_->exit_code;
 }
 
 int CommandLine::run(int argc, char** argv) {
   return run_and_print_errors([&] { return parse_and_run(argc, argv); });
-}
-
-int run_and_print_errors(const std::function<int()>& run) {
-  try {
-    return run();
-  } catch (const UsageError& e) {
-    std::cerr << "texmesh: " << e.what() << '\n';
-    return kExitUsage;
-  } catch (const Error& e) {
-    std::cerr << "texmesh: " << e.what() << '\n';
-    return kExitModelFailed;
-  } catch (const std::filesystem::filesystem_error& e) {
-    std::cerr << "texmesh: " << e.what() << '\n';
-    return kExitModelFailed;
-  } catch (const std::exception& e) {
-    std::cerr << "texmesh: internal error: " << e.what() << '\n';
-    return kExitInternal;
-  }
 }
 
 }  // namespace texmesh

@@ -3,16 +3,51 @@
 #include <unistd.h>
 
 #include <cstdlib>
+#include <filesystem>
 
 #include "pipeline/batch/fleet/run_summary.h"
 #include "pipeline/cache/disk_store.h"
 #include "pipeline/compile/options.h"
 #include "pipeline/io/file_resolver.h"
 #include "pipeline/io/machine.h"
+#include "pipeline/io/names/closest_word.h"
 #include "stages/base/run_context.h"
 #include "tools/cli/options/command_line.h"
 
 namespace texmesh {
+
+int run_and_print_errors(const std::function<int()>& run) {
+  try {
+    return run();
+  } catch (const UsageError& e) {
+    std::cerr << "texmesh: " << e.what() << '\n';
+    return kExitUsage;
+  } catch (const Error& e) {
+    std::cerr << "texmesh: " << e.what() << '\n';
+    return kExitModelFailed;
+  } catch (const std::filesystem::filesystem_error& e) {
+    std::cerr << "texmesh: " << e.what() << '\n';
+    return kExitModelFailed;
+  } catch (const std::exception& e) {
+    std::cerr << "texmesh: internal error: " << e.what() << '\n';
+    return kExitInternal;
+  }
+}
+
+void check_folder_name(const std::string& output, const std::string& or_file) {
+  static constexpr std::string_view kFiles[] = {".texmesh", ".glb",  ".gltf", ".obj",  ".ply", ".stl",
+                                                ".fbx",     ".usdz", ".zip",  ".tar",  ".gz",  ".7z",
+                                                ".json",    ".html", ".htm",  ".jpeg", ".jpg", ".png"};
+  const std::string ending = lower_ending(output);
+  if (output.ends_with("/") || ending == or_file || std::filesystem::is_directory(output)) return;
+  const bool nearly = ending.size() > 4 && closest_word(ending, kFiles) == kFiles[0];
+  if (nearly || std::ranges::find(kFiles, ending) != std::end(kFiles))
+    throw UsageError(
+        "--output", "",
+        (or_file.empty() ? "the name of a folder" : "NAME" + or_file + ", or the name of a folder") +
+            std::string(" (with / at the end it may have any name)"),
+        output);
+}
 
 Option add_jobs_option(Command& c, int& jobs) {
   return c.option("-j,--jobs", jobs, "Processors to use; 0 = all (default)").integer_in(0, 1024);
@@ -89,24 +124,38 @@ std::map<std::string, double> costs_option(const std::string& file) {
 }
 
 PercentLine::PercentLine(std::string label)
-    : PercentLine(std::move(label), std::cerr, ::isatty(STDERR_FILENO) != 0) {}
+    : PercentLine(std::move(label), std::cerr, ::isatty(STDERR_FILENO) == 1) {}
 
-PercentLine::PercentLine(std::string label, std::ostream& out, bool is_terminal)
-    : label_(std::move(label)), out_(out), is_terminal_(is_terminal) {}
+PercentLine::PercentLine(std::string label, std::ostream& out, bool is_terminal,
+                         std::chrono::milliseconds patience)
+    : label_(std::move(label)), out_(out), is_terminal_(is_terminal) {
+  if (!is_terminal) return;
+  clock_ = std::jthread([this, patience, start = std::chrono::steady_clock::now()](std::stop_token stop) {
+    std::unique_lock lock(mutex_);
+    while (!ended_.wait_for(lock, stop, patience, [&] { return stop.stop_requested(); })) {
+      if (percent_ >= 0) return;
+      const auto taken = std::chrono::steady_clock::now() - start;
+      out_ << "\r\033[K" << label_ << ' ' << std::chrono::duration_cast<std::chrono::seconds>(taken).count()
+           << " s" << std::flush;
+      drawn_ = true;
+    }
+  });
+}
 
 void PercentLine::show(double fraction) {
   const int percent = static_cast<int>(100 * std::clamp(fraction, 0.0, 1.0));
   const std::lock_guard lock(mutex_);
   if (!is_terminal_ || percent <= percent_) return;
   percent_ = percent;
+  drawn_ = true;
   out_ << "\r\033[K" << label_ << ' ' << percent << " %" << std::flush;
 }
 
 void PercentLine::end() {
+  clock_ = {};
   const std::lock_guard lock(mutex_);
-  if (percent_ >= 0) out_ << "\r\033[K" << std::flush;
-  percent_ = -1;
-  is_terminal_ = false;
+  if (drawn_) out_ << "\r\033[K" << std::flush;
+  drawn_ = is_terminal_ = false;
 }
 
 }  // namespace texmesh

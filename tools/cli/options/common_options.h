@@ -1,9 +1,12 @@
 #pragma once
+#include <chrono>
+#include <condition_variable>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <ostream>
 #include <string>
+#include <thread>
 
 #include "format/base/note.h"
 #include "pipeline/batch/plan.h"
@@ -17,6 +20,10 @@ struct CompileOptions;
 struct RunContext;
 
 // Options that several commands share.
+
+/// UsageError where `output`, the name of a folder that is to be made, ends as the name of a file does, or
+/// nearly as `or_file`, which it may have. A folder that is there, or a "/" at the end, has any name.
+void check_folder_name(const std::string& output, const std::string& or_file = "");
 
 /// --jobs; 0, the default, stands for every processor.
 Option add_jobs_option(Command& command, int& jobs);
@@ -49,13 +56,15 @@ Shard shard_option(const std::string& text);
 /// What the summary of an earlier run says that models took. InputError for a file that is no summary.
 std::map<std::string, double> costs_option(const std::string& file);
 
-/// "extract 40 %" on a line of a terminal that is drawn over, until the end takes it away. Safe from several
-/// threads.
+/// "extract 40 %" on a line of a terminal that is drawn over, until the end takes it away; "report 12 s"
+/// while nobody says how far the work is. Safe from several threads.
 class PercentLine {
  public:
   /// On standard error, where that is a terminal.
   explicit PercentLine(std::string label);
-  PercentLine(std::string label, std::ostream& out, bool is_terminal);
+  /// `patience`: the time until seconds are shown, and between them.
+  PercentLine(std::string label, std::ostream& out, bool is_terminal,
+              std::chrono::milliseconds patience = std::chrono::seconds(2));
   ~PercentLine() { end(); }
   PercentLine(const PercentLine&) = delete;
   PercentLine& operator=(const PercentLine&) = delete;
@@ -69,6 +78,9 @@ class PercentLine {
   bool is_terminal_;
   std::mutex mutex_;
   int percent_ = -1;
+  bool drawn_ = false;
+  std::condition_variable_any ended_;
+  std::jthread clock_;
 };
 
 }  // namespace texmesh

@@ -49,16 +49,25 @@ Option add_policy_option(Command& c, DeliveryArguments& a) {
           "--policy", a.request.htc.policy,
           "How textures are chosen: guard = the thesis's method around the plan of least loss, with sizes "
           "within a factor of 1.5 of that plan's share; thesis = chapters 4 and 7 as printed, with --rule "
-          "jnd, one request at a time, hard limits of quality, textures at full size, and the list that "
-          "T_0 beta_0 pays")
+          "distance, one request at a time, hard limits of quality, and the list that T_0 beta_0 pays")
       .shows_default("guard");
 }
 
 Option add_rule_option(Command& c, DeliveryArguments& a) {
-  return c.choice("--rule", a.rule,
-                  "Which scale is enough: flip = by lit pictures, which compile has compared with those of "
-                  "the finest scale; jnd = by the just-noticeable difference; error = by an error of one "
-                  "pixel; edge = by edges of one pixel. Default: flip, and jnd with --policy thesis");
+  return c.choice(
+      "--rule", a.rule,
+      "Which scale is enough: flip = by lit pictures, which compile has compared with those of "
+      "the finest scale; jnd = by the just-noticeable difference; error = by an error of one "
+      "pixel; edge = by edges of one pixel; distance = a major scale for each distance, as the thesis prints "
+      "it (7.5). Default: flip, and distance with --policy thesis");
+}
+
+Option add_jnd_option(Command& c, DeliveryArguments& a) {
+  return c
+      .option("--jnd", a.request.jnd,
+              "The viewer's own just-noticeable difference: the coarsest scale that this viewer cannot tell "
+              "from the one that --rule names")
+      .number_in(0.001, 1);
 }
 
 void add_memory_option(Command& c, DeliveryArguments& a) {
@@ -120,6 +129,7 @@ void add_delivery_options(Command& c, DeliveryArguments& a) {
   c.group("Method");
   add_policy_option(c, a).rare();
   add_rule_option(c, a).rare();
+  add_jnd_option(c, a).rare();
   c.group("");
 }
 

@@ -11,7 +11,7 @@ struct EnumNames<Policy> {
 };
 template <>
 struct EnumNames<StepRule> {
-  static constexpr std::array<std::string_view, 4> names{"flip", "jnd", "error", "edge"};
+  static constexpr std::array<std::string_view, 5> names{"flip", "jnd", "error", "edge", "distance"};
 };
 
 /// What plan, check, simulate and fetch ask about how a package is looked at and over what. Options write
@@ -39,6 +39,7 @@ Option add_bandwidth_option(Command& command, DeliveryArguments& args, const std
 Option add_scale_option(Command& command, DeliveryArguments& args);
 Option add_policy_option(Command& command, DeliveryArguments& args);
 Option add_rule_option(Command& command, DeliveryArguments& args);
+Option add_jnd_option(Command& command, DeliveryArguments& args);
 void add_memory_option(Command& command, DeliveryArguments& args);
 
 /// UsageError names the flag.

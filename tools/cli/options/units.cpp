@@ -22,7 +22,8 @@ double parse(const std::string& text, const std::string& flag, const std::map<st
              const char* expected, double most) {
   std::size_t end = 0;
   const double v = leading_number(text, end);
-  const auto unit = units.find(text.substr(end));
+  const std::size_t begin = std::min(text.find_first_not_of(' ', end), text.size());
+  const auto unit = units.find(text.substr(end == 0 ? 0 : begin));
   if (end == 0 || unit == units.end() || !(v >= 0 && v * unit->second <= most))
     throw UsageError(flag, "", expected, text);
   return v * unit->second;
@@ -38,10 +39,27 @@ std::string number_fault(const std::string& text, double least, double most) {
 }
 
 std::uint64_t parse_bytes(const std::string& text, const std::string& flag) {
-  static const std::map<std::string, double> kUnits{
-      {"", 1},      {"B", 1},      {"kB", 1e3},        {"MB", 1e6},           {"GB", 1e9},
-      {"TB", 1e12}, {"KiB", 1024}, {"MiB", 1048576.0}, {"GiB", 1073741824.0}, {"TiB", 1099511627776.0}};
-  return static_cast<std::uint64_t>(parse(text, flag, kUnits, "a size such as 500MB or 8GiB", kMostBytes));
+  static const std::map<std::string, double> kUnits{{"", 1},
+                                                    {"b", 1},
+                                                    {"k", 1e3},
+                                                    {"kb", 1e3},
+                                                    {"m", 1e6},
+                                                    {"mb", 1e6},
+                                                    {"g", 1e9},
+                                                    {"gb", 1e9},
+                                                    {"t", 1e12},
+                                                    {"tb", 1e12},
+                                                    {"kib", 1024},
+                                                    {"mib", 1048576.0},
+                                                    {"gib", 1073741824.0},
+                                                    {"tib", 1099511627776.0}};
+  std::string lower = text;  // nobody means bits by the size of a file
+  for (char& c : lower) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  try {
+    return static_cast<std::uint64_t>(parse(lower, flag, kUnits, "", kMostBytes));
+  } catch (const UsageError&) {
+    throw UsageError(flag, "", "a size such as 500kB, 500MB or 8GiB", text);
+  }
 }
 
 std::uint64_t parse_some_bytes(const std::string& text, const std::string& flag) {
@@ -63,8 +81,10 @@ double parse_duration(const std::string& text, const std::string& flag) {
 
 double parse_bandwidth(const std::string& text, const std::string& flag) {
   static const std::map<std::string, double> kUnits{
-      {"B/s", 1},         {"kB/s", 1e3},      {"MB/s", 1e6},       {"GB/s", 1e9},       {"KiB/s", 1024},
-      {"MiB/s", 1048576}, {"bit/s", 1 / 8.0}, {"kbit/s", 1e3 / 8}, {"Mbit/s", 1e6 / 8}, {"Gbit/s", 1e9 / 8}};
+      {"B/s", 1},         {"kB/s", 1e3},       {"MB/s", 1e6},       {"GB/s", 1e9},      {"KiB/s", 1024},
+      {"kbit", 1e3 / 8},  {"Mbit", 1e6 / 8},   {"Gbit", 1e9 / 8},   {"kbps", 1e3 / 8},  {"Mbps", 1e6 / 8},
+      {"Gbps", 1e9 / 8},  {"kb/s", 1e3 / 8},   {"Mb/s", 1e6 / 8},   {"Gb/s", 1e9 / 8},  {"MiB/s", 1048576},
+      {"bit/s", 1 / 8.0}, {"kbit/s", 1e3 / 8}, {"Mbit/s", 1e6 / 8}, {"Gbit/s", 1e9 / 8}};
   const double v =
       parse(text, flag, kUnits, "a rate such as 2Mbit/s or 41.68kB/s, at most 1e12 B/s", kMostRate);
   if (!(v > 0)) throw UsageError(flag, "", "a rate above 0", text);

@@ -5,17 +5,21 @@
 // 3. Small windows of the pictures tell what bytes are worth. S_0 is rendered with one image coded in many
 // ways, which gives each image a curve of loss against bytes (LossCurves). Every coded mesh is rendered with
 // the best textures. Losses of mesh and textures are added up.
-// 4. From a likely mesh the search walks to neighbours, finer and coarser, while the sum of losses falls.
-// What a mesh leaves of the bytes is dealt out along the curves, where it takes away most loss.
+// 4. The mesh: compile has measured what scales lose, so two or three meshes that are made and looked at tell
+// which is likely. From it, with --best from another likely one, the search walks to neighbours, finer and
+// coarser, while the sum of losses falls. What a mesh leaves of the bytes is dealt out along the curves,
+// where it takes away most loss.
 // 5. The file is written and filled up to at least 98 % of the bytes (Filling).
-// 6. Sums of losses are guesses. In a small file whole pictures decide: files of other likely meshes, other
-// sizes and codings of the texture that loses most. In a large file textures may be full: then the mesh is
-// finer.
+// 6. Sums of losses are guesses. With --best whole pictures decide in a small file: files of other likely
+// meshes, other sizes and codings of the texture that loses most. In a large file textures may be full: then
+// the mesh is finer.
 // 7. Last, proxies of the package are tried in its place (offer_proxies()).
 #include "tools/extract/budget/budget_search.h"
 
 #include <numeric>
 
+#include "delivery/cpp/decide/texture_loss.h"
+#include "format/base/portable_math.h"
 #include "tools/extract/proxy/proxy_search.h"
 
 namespace texmesh {
@@ -117,16 +121,26 @@ Extracted Search::run(const std::function<void(double)>& report) {
   report(0.4);
   choose_mesh();
   report(0.6);
+  FoundFile found = filled_file();
+  if (!reference_.wishes.best() && filling_.fits(found.file) && !filling_.fills(found.file) &&
+      !is_finest(found.key)) {  // other meshes may come nearer to the bytes
+    walk_to_mesh();
+    if (FoundFile other = filled_file(); filling_.fills(other.file)) found = std::move(other);
+  }
+  return finish(found.key, std::move(found.file));
+}
+
+FoundFile Search::filled_file() {
   FoundFile found = file_of(best_, allocation_of(best_));
-  if (filling_.fits(found.file)) {
+  if (!filling_.fits(found.file)) return found;
+  if (reference_.wishes.best()) {
     if (bytes_ <= kLookAtFilesBelow)
       look_at_files(found);
     else
       try_smaller_than_stored(found);
   }
-  report(0.7);
-  if (filling_.fits(found.file) && !filling_.fills(found.file)) fill_by_mesh(found);
-  return finish(found.key, std::move(found.file));
+  if (!filling_.fills(found.file)) fill_by_mesh(found);
+  return found;
 }
 
 const MeshFile& Search::mesh(const MeshKey& key) {
@@ -144,12 +158,66 @@ double Search::bytes_left(const MeshFile& mesh) const {
   return static_cast<double>(bytes_) - static_cast<double>(mesh.fixed_bytes);
 }
 
-/// From a likely mesh to its neighbours: finer, coarser, coded finer and leaner, and a finer one
-/// coded leaner or the other way round, as long as the picture gets better; one that does not is
-/// passed over once.
 void Search::choose_mesh() {
   best_ = first_mesh(reference_, bytes_);
   least_ = loss_of(best_);
+  if (!reference_.wishes.best()) choose_mesh_by_tables();
+  walk_to_mesh();
+  if (least_ >= kNothing) best_ = {reference_.wishes.scale ? best_.scale : scales().size() - 1, 0};
+}
+
+/// Compile has measured what scales lose, and a coding loses and saves about alike on all of them. So one
+/// mesh that is made and looked at tells of all others; the best of these is looked at, too, until it is
+/// known.
+void Search::choose_mesh_by_tables() {
+  struct Coding {
+    double loss;   // joined, beside the finest
+    double bytes;  // of kFirstCoding's
+  };
+  // Means of turtle, saxophone, helmet and bust at several scales.
+  constexpr Coding kCodings[kMeshCodings] = {{270e-6, 0.81}, {150e-6, 0.88}, {60e-6, 1},
+                                             {35e-6, 1.1},   {15e-6, 1.23},  {0, 1.36}};
+  constexpr double kFinerScalesTakeLess = 0.35;  // bytes of a triangle ~ triangles to the power of minus this
+  constexpr int kMostMeshes = 4;
+  const auto table = [&](std::size_t scale) {
+    return joined(picture_flip(reference_.package.quality(), reference_.side_px, scales()[scale].scale, {}));
+  };
+  const auto triangles = [&](std::size_t scale) { return static_cast<double>(scales()[scale].triangles); };
+  MeshKey known = best_;
+  double known_bytes = static_cast<double>(mesh(known).fixed_bytes) / kCodings[known.coding].bytes;
+  for (int tries = 1; tries < kMostMeshes; ++tries) {
+    const double lost = joined(geometry_.at(known)) - kCodings[known.coding].loss;
+    const double scale_losses = table(known.scale) > 0 ? std::max(lost / table(known.scale), 0.1) : 1;
+    MeshKey likely = known;
+    double least = kNothing;
+    for (std::size_t scale = 0; scale < scales().size(); ++scale) {
+      if (reference_.wishes.scale && scale != known.scale) continue;
+      const double of_scale =
+          known_bytes * portable::exp((1 - kFinerScalesTakeLess) *
+                                      portable::log(triangles(scale) / triangles(known.scale)));
+      for (int coding = 0; coding < kMeshCodings; ++coding) {
+        const double left = static_cast<double>(bytes_) - of_scale * kCodings[coding].bytes;
+        const DealtBytes images = curves_.allocate(left);
+        if (images.bytes > left) continue;
+        const double loss = scale_losses * table(scale) + kCodings[coding].loss + images.loss;
+        if (loss < least) least = loss, likely = {scale, coding};
+      }
+    }
+    if (seen_.contains(likely)) return;
+    const double found = loss_of(likely);
+    known = likely;
+    known_bytes = static_cast<double>(mesh(likely).fixed_bytes) / kCodings[likely.coding].bytes;
+    forget(found < least_ ? best_ : likely);
+    if (!(found < least_)) continue;
+    least_ = found;
+    best_ = likely;
+  }
+}
+
+/// From a likely mesh to its neighbours: finer, coarser, coded finer and leaner, and a finer one
+/// coded leaner or the other way round, as long as the picture gets better; one that does not is
+/// passed over once.
+void Search::walk_to_mesh() {
   for (bool again = true; again;) {
     const MeshKey before = best_;
     if (!reference_.wishes.scale) {
@@ -164,13 +232,13 @@ void Search::choose_mesh() {
     }
     again = before != best_;
   }
-  if (least_ >= kNothing) best_ = {reference_.wishes.scale ? best_.scale : scales().size() - 1, 0};
 }
 
 void Search::follow_direction(int scale_step, int coding_step) {
   const MeshKey from = best_;
+  const int most = reference_.wishes.best() ? 2 : 1;
   int worse = 0;
-  for (int k = 1; worse < 2; ++k) {
+  for (int k = 1; worse < most; ++k) {
     const int scale = static_cast<int>(from.scale) + k * scale_step, coding = from.coding + k * coding_step;
     if (scale < 0 || scale >= static_cast<int>(scales().size()) || coding < 0 || coding >= kMeshCodings)
       return;

@@ -58,7 +58,10 @@ class Search {
   double bytes_left(const MeshFile& mesh) const;
   DealtBytes allocation_of(const MeshKey& key) { return curves_.allocate(bytes_left(mesh(key))); }
 
+  FoundFile filled_file();
   void choose_mesh();
+  void choose_mesh_by_tables();
+  void walk_to_mesh();
   void follow_direction(int scale_step, int coding_step);
   bool better(const MeshKey& key);
   bool too_large(const MeshKey& key) const;

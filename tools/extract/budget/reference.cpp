@@ -187,17 +187,14 @@ Reference::Reference(PackageReader& from, const ExtractBudget& asked, const Outp
   find_textures();
   find_groups();
   finest = lit_mesh(source);
-  {
-    const LitViews views(finest, cameras, context);
-    measure_surface(views);
-    windows = side_px < 2 * kWindowPx ? cameras : windows_of(views, kWindowsPerView, kWindowPx);
-  }
+  const LitViews views(finest, cameras, context);
+  measure_surface(views);
+  windows = side_px < 2 * kWindowPx ? cameras : windows_of(views, kWindowsPerView, kWindowPx);
   read_best_textures(textures);
   environment = studio_environment();
   finest_windows = std::make_unique<LitViews>(finest, windows, context);
   window_meter = std::make_unique<LitMeter>(*finest_windows, best_textures, environment, context);
-  whole_meter =
-      std::make_unique<LitMeter>(LitViews(finest, cameras, context), best_textures, environment, context);
+  whole_meter = std::make_unique<LitMeter>(views, best_textures, environment, context);
 }
 
 std::int32_t Reference::shown_texture(const Model& model, const TextureRef& reference, TextureUse use) const {

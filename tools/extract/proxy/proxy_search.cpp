@@ -316,6 +316,7 @@ constexpr double kPoorQuality = 15;  // pictures get smaller before they get wor
 constexpr double kNormalQualityAbove = 10, kDataQualityBelow = 5;  // as the stage codes them
 constexpr int kQualityTries = 10;
 constexpr double kNearlyAll = 0.99;
+constexpr std::uint64_t kFarBelow = 4;  // times as many bytes look better without a proxy
 
 /// A way to make a file of a proxy.
 struct ProxyTrial {
@@ -338,6 +339,7 @@ class ProxySearch {
     const auto count = static_cast<std::uint32_t>(reference_.package.manifest().proxies.size());
     for (std::uint32_t k = 0; k < count; ++k) {
       Extracted whole = extract_proxy(reference_.package, {k}, reference_.place, reference_.context, bytes_);
+      if (!reference_.wishes.best() && kFarBelow * whole.glb.size() < bytes_) continue;
       measure_whole(k, whole);
       if (!is_wanted_kind(k))
         offer_smaller(k, whole);
@@ -381,13 +383,15 @@ class ProxySearch {
     file.side_px = reference_.side_px;
   }
 
-  void measure(const Bytes& glb, Extracted& file) {
+  /// In windows, or in whole pictures.
+  void measure(const Bytes& glb, Extracted& file, bool whole = true) {
     NoFiles none;
     RenderedModel model =
         rendered_model(import_package_glb("proxy.glb", glb, none, reference_.context), reference_.context);
     const LitMesh mesh{std::move(model.mesh), std::move(model.materials), model.textures.size()};
-    const LitViews views(mesh, reference_.cameras, reference_.context);
-    set_difference(reference_.whole_meter->difference(views, model.textures, reference_.context), file);
+    const LitViews views(mesh, whole ? reference_.cameras : reference_.windows, reference_.context);
+    const LitMeter& meter = whole ? *reference_.whole_meter : *reference_.window_meter;
+    set_difference(meter.difference(views, model.textures, reference_.context), file);
   }
 
   bool better(const Extracted& a, const Extracted& b) const {
@@ -414,15 +418,16 @@ class ProxySearch {
     while (trial.mesh + 1 < parts->mesh_count() &&
            static_cast<double>(coded(*parts, trial).finish().size()) > most)
       ++trial.mesh;
+    const bool best = reference_.wishes.best();
     Extracted file = whole;
-    while (!make(*parts, trial, file) && trial.share * kShareStep > kLeastProxyShare)
+    while (!make(*parts, trial, file, best) && trial.share * kShareStep > kLeastProxyShare)
       trial.share *= kShareStep;
     std::vector<ProxyTrial> seen{trial};
     const auto try_next = [&](const ProxyTrial& next) {
       if (std::ranges::find(seen, next) != seen.end()) return false;
       seen.push_back(next);
       Extracted other = whole;
-      make(*parts, next, other);
+      make(*parts, next, other, best);
       if (!better(other, file)) return false;
       file = std::move(other);
       trial = next;
@@ -442,13 +447,19 @@ class ProxySearch {
       while (trial.mesh + 1 < parts->mesh_count() && try_with(&ProxyTrial::mesh, trial.mesh + 1))
         again = true;
       while (trial.mesh > 0 && try_with(&ProxyTrial::mesh, trial.mesh - 1)) again = true;
+      if (!best) break;
       for (const int bits : {trial.bits - 1, trial.bits + 1})
         if (bits >= 0 && bits <= kFinestBits) again |= try_with(&ProxyTrial::bits, bits);
     }
-    if (reference_.wishes.images == ExtractImages::kAuto) {
+    if (best && reference_.wishes.images == ExtractImages::kAuto) {
       ProxyTrial jpeg = trial;
       jpeg.format = FileImage::kJpeg;
       try_next(jpeg);
+    }
+    if (!best && fits(file)) {
+      Extracted looked_at = file;
+      make(*parts, trial, looked_at, true);
+      file = std::move(looked_at);
     }
     offer(std::move(file));
   }
@@ -504,7 +515,7 @@ class ProxySearch {
 
   /// The file that fills the bytes by its quality, and what it looks like. False where the quality is poor or
   /// the file too large; then it is not looked at.
-  bool make(const ProxyParts& parts, const ProxyTrial& trial, Extracted& out) {
+  bool make(const ProxyParts& parts, const ProxyTrial& trial, Extracted& out, bool in_whole) {
     StandaloneGlb draft = coded(parts, trial), whole = draft;
     whole.place(reference_.place);
     whole.set_about(reserved_about(reference_.package.about(), reference_.place, bytes_));
@@ -524,7 +535,7 @@ class ProxySearch {
     out.triangles = parts.triangles(trial.mesh);
     for (const ExtractedImage& i : out.images) out.mesh_bytes -= i.bytes;
     if (!fits(out)) return false;
-    measure(draft.finish(), out);
+    measure(draft.finish(), out, in_whole);
     return best >= kPoorQuality;
   }
 

@@ -166,7 +166,7 @@ Table steps_table(const std::vector<ManifestStep>& steps) {
 std::string steps_text(const Manifest& m) {
   const auto rule = [&](StepRule r) { return step_function(m.scales, r); };
   const std::vector<std::vector<ManifestStep>> rules{m.steps, rule(StepRule::kJnd), rule(StepRule::kError),
-                                                     rule(StepRule::kEdge)};
+                                                     rule(StepRule::kEdge), rule(StepRule::kDistance)};
   Table table(
       fmt::format(
           "step function: displayed height in px up to which a scale is shown, and the distance in object "
@@ -174,7 +174,7 @@ std::string steps_text(const Manifest& m) {
           "(by lit pictures), then\nby single rules",
           Camera{}.fov_degrees, Camera{}.viewport_px),
       {{"show", kScaleName}});
-  for (const char* name : {"px", "JND px", "1 px error px", "O_V/E_S px"}) {
+  for (const char* name : {"px", "JND px", "1 px error px", "O_V/E_S px", "7.5 px"}) {
     table.column(name);
     table.column({"distance", shortest_form(3)});
   }
@@ -343,34 +343,36 @@ Json summary_json(PackageReader& p, DumpGamma) {
   }
   const PosterRef poster = m.poster.value_or(PosterRef{});
   const Json picture{{"width_px", poster.width_px}, {"height_px", poster.height_px}, {"bytes", poster.bytes}};
-  return {
-      {"package",
-       {{"id", to_hex(p.id())},
-        {"version", {{"major", m.major}, {"minor", m.minor}}},
-        {"title", m.title},
-        {"tool", read_provenance(p.entry(m.provenance)).tool},
-        {"entries", p.index().size() + 2},
-        {"entry_bytes", bytes_of_kinds(kinds)}}},
-      {"object",
-       {{"origin", numbers(m.origin)},
-        {"bounds_min", numbers(m.bounds_min)},
-        {"bounds_max", numbers(m.bounds_max)},
-        {"height", m.object_height},
-        {"surface_area", m.surface_area},
-        {"jnd", m.jnd}}},
-      {"steps", steps_table(m.steps).json()},
-      {"step_rules",
-       {{"jnd", rule(StepRule::kJnd)}, {"error", rule(StepRule::kError)}, {"edge", rule(StepRule::kEdge)}}},
-      {"camera", {{"fov_degrees", Camera{}.fov_degrees}, {"viewport_px", Camera{}.viewport_px}}},
-      {"stream", m.stream ? stream_table(p.split_stream_head()).json() : Json::array()},
-      {"proxies", proxies},
-      {"poster", m.poster ? picture : Json()},
-      {"textures", textures_table(p).json()},
-      {"bytes", kinds_table(kinds, bytes_of_kinds(kinds)).json()},
-      {"start",
-       {{"bytes", start_bytes(m)},
-        {"shows", first_picture(m).path},
-        {"in_one_request", start_bytes(m) <= kStartBytes}}}};
+  return {{"package",
+           {{"id", to_hex(p.id())},
+            {"version", {{"major", m.major}, {"minor", m.minor}}},
+            {"title", m.title},
+            {"tool", read_provenance(p.entry(m.provenance)).tool},
+            {"entries", p.index().size() + 2},
+            {"entry_bytes", bytes_of_kinds(kinds)}}},
+          {"object",
+           {{"origin", numbers(m.origin)},
+            {"bounds_min", numbers(m.bounds_min)},
+            {"bounds_max", numbers(m.bounds_max)},
+            {"height", m.object_height},
+            {"surface_area", m.surface_area},
+            {"jnd", m.jnd}}},
+          {"steps", steps_table(m.steps).json()},
+          {"step_rules",
+           {{"jnd", rule(StepRule::kJnd)},
+            {"error", rule(StepRule::kError)},
+            {"edge", rule(StepRule::kEdge)},
+            {"distance", rule(StepRule::kDistance)}}},
+          {"camera", {{"fov_degrees", Camera{}.fov_degrees}, {"viewport_px", Camera{}.viewport_px}}},
+          {"stream", m.stream ? stream_table(p.split_stream_head()).json() : Json::array()},
+          {"proxies", proxies},
+          {"poster", m.poster ? picture : Json()},
+          {"textures", textures_table(p).json()},
+          {"bytes", kinds_table(kinds, bytes_of_kinds(kinds)).json()},
+          {"start",
+           {{"bytes", start_bytes(m)},
+            {"shows", first_picture(m).path},
+            {"in_one_request", start_bytes(m) <= kStartBytes}}}};
 }
 
 /// A way to compare scales, and its values for all pairs.

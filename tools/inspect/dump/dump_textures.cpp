@@ -277,7 +277,7 @@ std::string fragments_text(PackageReader& p, DumpGamma) {
   for (std::size_t k = 0; k < p.textures().size(); ++k) {
     const TextureInfo& info = p.textures()[k];
     const PlaneTables& t = p.tables().planes[k];
-    const std::vector<float> eta = eta_of(t, 0);
+    const std::vector<float> eta = density_of(t, 0);
     s += plane_title(info, k) + "grid: " + printable(info.grid_reason) +
          "\neta of S_0 in tenths, . = not stored\n" + eta_map(t, eta) +
          fragments_table(info, t, p.plane_thesis(k), eta).text() + "\n";
@@ -290,7 +290,7 @@ Json fragments_json(PackageReader& p, DumpGamma) {
   for (std::size_t k = 0; k < p.textures().size(); ++k) {
     const TextureInfo& info = p.textures()[k];
     const PlaneTables& t = p.tables().planes[k];
-    const std::vector<float> eta = eta_of(t, 0);
+    const std::vector<float> eta = density_of(t, 0);
     Json fragments = Json::array();
     const PlaneThesis* thesis = p.plane_thesis(k);
     for (const std::uint16_t i : t.order) {

@@ -1,5 +1,7 @@
 // A painted model as files: a GLB to turn in any viewer, and a PNG of two views.
 
+#include <fmt/format.h>
+
 #include "format/base/portable_math.h"
 #include "format/base/vec.h"
 #include "format/rules/allocation.h"
@@ -256,6 +258,11 @@ void paste_layout(const Pixels& texture, std::uint32_t left, Pixels& out) {
     }
 }
 
+void require_points(const PaintedModel& model, const std::string& what) {
+  if (model.points.empty())
+    throw InputError("", what, "a quantity of vertices, for .csv and .ply", "one of textures");
+}
+
 }  // namespace
 
 std::vector<std::uint8_t> write_painted_glb(const PaintedModel& model) {
@@ -267,6 +274,27 @@ std::vector<std::uint8_t> write_painted_glb(const PaintedModel& model) {
   add_surface(glb, model);
   add_lines(glb, model);
   return glb.finish();
+}
+
+std::string write_painted_csv(const PaintedModel& model, const std::string& what) {
+  require_points(model, what);
+  std::string out = what + ",tx,ty,gx,gy,gz\n";
+  for (const PaintedPoint& p : model.points)
+    fmt::format_to(std::back_inserter(out), "{},{},{},{},{},{}\n", p.value, p.texture.x, p.texture.y, p.at.x,
+                   p.at.y, p.at.z);
+  return out;
+}
+
+std::string write_painted_ply(const PaintedModel& model, const std::string& what) {
+  require_points(model, what);
+  std::string out = fmt::format(
+      "ply\nformat ascii 1.0\nelement vertex {}\nproperty double x\nproperty double y\nproperty double z\n"
+      "property float s\nproperty float t\nproperty double {}\nend_header\n",
+      model.points.size(), what);
+  for (const PaintedPoint& p : model.points)
+    fmt::format_to(std::back_inserter(out), "{} {} {} {} {} {}\n", p.at.x, p.at.y, p.at.z, p.texture.x,
+                   p.texture.y, p.value);
+  return out;
 }
 
 std::vector<std::uint8_t> write_painted_png(const PaintedModel& model, std::uint32_t side_px) {

@@ -307,6 +307,11 @@ PaintedModel paint_values(const Mesh& source, const std::vector<double>& value, 
   for (std::size_t w = 0; w < source.wedge_count(); ++w)
     view.mesh.colours[w] = linear_colour(colour_of(fraction_of(legend, value[source.wedge_position[w]])));
   view.legend = std::move(legend);
+  view.points.resize(value.size());
+  for (std::size_t p = 0; p < value.size(); ++p)
+    view.points[p] = {value[p], {}, to_double(source.positions[p]) + source.origin};
+  for (std::size_t w = source.uv0.size(); w-- > 0;)  // of several corners the first one's
+    view.points[source.wedge_position[w]].texture = source.uv0[w];
   return view;
 }
 
@@ -315,17 +320,18 @@ PaintedModel paint_scales(const ConditionedMesh& mesh, const ScaleMap& scale_map
     fail_values(mesh.mesh.positions.size(), scale_map.persistence.size(), "scale map");
   ColourLegend legend{"scales: highest scale at which a vertex is still a feature"};
   legend.hi = static_cast<double>(scale_map.scales);
-  for (const double share_of : {0.5, 1.0}) {
-    const int scale = std::max(1, static_cast<int>(share_of * scale_map.scales));
-    const auto count = std::count_if(scale_map.persistence.begin(), scale_map.persistence.end(),
-                                     [&](int p) { return p >= scale; });
+  for (std::size_t scale = 0; scale < scale_map.sigma.size(); ++scale) {
+    const auto count =
+        std::ranges::count_if(scale_map.persistence, [&](std::size_t p) { return p >= scale; });
     legend.remarks.push_back(fmt::format(
-        "{} of the vertices persist to scale {} or beyond (sigma {})",
-        share_text(static_cast<double>(count), static_cast<double>(scale_map.persistence.size())), scale,
-        shortest(static_cast<double>(scale_map.sigma.at(static_cast<std::size_t>(scale))))));
+        "S_{}: sigma {:.6g}, {} features, {} crossings, {:.4g} of the signal's range", scale,
+        scale_map.sigma[scale], count, scale_map.crossings_at[scale], scale_map.convergence[scale]));
   }
   legend.remarks.push_back("features of a scale keep a distance; each is painted to the half of it");
-  return paint_values(mesh.mesh, spread_features(mesh, scale_map), std::move(legend), "scale map");
+  PaintedModel view =
+      paint_values(mesh.mesh, spread_features(mesh, scale_map), std::move(legend), "scale map");
+  for (std::size_t p = 0; p < view.points.size(); ++p) view.points[p].value = scale_map.persistence[p];
+  return view;
 }
 
 PaintedModel paint_fragments(const ConditionedMesh& mesh, const std::vector<Material>& materials,

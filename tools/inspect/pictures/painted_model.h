@@ -27,6 +27,14 @@ struct ColourLegend {
   std::vector<std::string> remarks = {};      // sentences without a final full stop
 };
 
+/// A vertex as data: the value that is painted there (NaN = none), where it is in the texture, 0 without
+/// coordinates, and where it is in the source.
+struct PaintedPoint {
+  double value = 0;
+  Vec2f texture;
+  Vec3d at;
+};
+
 /// A mesh whose colours (or painted textures) show something, and lines beside it. Pictures are a
 /// function of it.
 struct PaintedModel {
@@ -37,6 +45,7 @@ struct PaintedModel {
   bool translucent = false;         // lines inside the mesh must be seen through it
   std::vector<Vec3f> nodes;
   std::vector<std::array<std::uint32_t, 2>> lines;  // both ends equal = a point
+  std::vector<PaintedPoint> points;                 // per position; empty where textures are painted
   ColourLegend legend;
 };
 
@@ -75,6 +84,12 @@ std::vector<std::uint8_t> write_painted_glb(const PaintedModel& model);
 /// the mesh. A bar at the right shows the scale of colours, hi at the top. With shows_layout the first four
 /// textures stand at the right, each within side_px.
 std::vector<std::uint8_t> write_painted_png(const PaintedModel& model, std::uint32_t side_px);
+
+/// The points as lines of value,tx,ty,gx,gy,gz under a line of these names (the scale map of the thesis's
+/// chapter 3, where scales are painted), or as vertices of an ASCII PLY. `what` is the value's name.
+/// InputError where there are none.
+std::string write_painted_csv(const PaintedModel& model, const std::string& what);
+std::string write_painted_ply(const PaintedModel& model, const std::string& what);
 
 inline constexpr Artefact<PaintedModel> kPainted{"painted"};
 

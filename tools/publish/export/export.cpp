@@ -13,6 +13,7 @@
 #include "pipeline/io/uri.h"
 #include "stages/gltf/check_glb.h"
 #include "tools/extract/extract.h"
+#include "tools/extract/usdz/usdz.h"
 #include "tools/publish/pages/page.h"
 #include "tools/publish/view/served_files.h"
 
@@ -79,18 +80,25 @@ constexpr std::uint32_t kPhoneTexturePx = 4096;
 
 std::string_view export_template(std::string_view name) { return built_in_text(export_page_files(), name); }
 
-/// What the package calls itself, or the name of its file without its ending. Plain text.
-std::string page_title(PackageReader& package) {
-  const std::string title = package_title(package);
-  constexpr std::string_view kEnding = ".texmesh";
-  return title.ends_with(kEnding) ? title.substr(0, title.size() - kEnding.size()) : title;
+constexpr const char* kGlbFile = "model.glb";
+constexpr const char* kUsdzFile = "model.usdz";
+
+std::string download_line(const std::string& name, std::uint64_t bytes) {
+  return fmt::format("<p class=\"quiet\"><a href=\"{0}\" download=\"\">{0}</a>, {1}</p>\n", name,
+                     markup_escaped(format_bytes(bytes)));
 }
 
-/// index.html beside model.glb, of `glb_bytes` bytes.
-std::string model_viewer_page(PackageReader& package, const ExportOptions& options, std::uint64_t glb_bytes) {
+/// index.html beside the files that `made` has: model.glb, and model.usdz where there is one.
+std::string model_viewer_page(PackageReader& package, const ExportOptions& options, const Export& made) {
+  std::string downloads, ios;
+  for (const ExportedFile& f : made.files) {
+    downloads += download_line(f.path, f.bytes.size());
+    if (f.path != kUsdzFile) continue;
+    ios = fmt::format(R"( ios-src="{}")", kUsdzFile);
+  }
   const About& about = package.about();
   const auto& poster = package.manifest().poster;
-  const std::string title = page_title(package);
+  const std::string title = package_title(package);
   const std::string script = options.script.empty() ? kModelViewerScript : options.script;
   const std::string integrity =
       options.script.empty()
@@ -101,11 +109,12 @@ std::string model_viewer_page(PackageReader& package, const ExportOptions& optio
                  {"style", page_style(export_template("export.css"))},
                  {"title", markup_escaped(title)},
                  {"alt", markup_escaped(about.description.empty() ? title : about.description)},
-                 {"poster", poster ? " poster=\"poster.jpg\"" : ""},
+                 {"poster", poster ? R"(<img slot="poster" src="poster.jpg" alt="">)" : ""},
                  {"script", markup_escaped(script)},
                  {"integrity", integrity},
                  {"rights", rights_line(about)},
-                 {"bytes", markup_escaped(format_bytes(glb_bytes))}});
+                 {"ios", ios},
+                 {"downloads", downloads}});
 }
 
 /// index.html that frames `viewer`, an address relative to it, and says where oembed.json stands: `url`.
@@ -230,13 +239,37 @@ void add_poster(PackageReader& package, Export& made) {
     made.files.push_back({"poster.jpg", package.entry(*poster)});
 }
 
+/// The USDZ that iPhones show: of the GLB's content, or for its number of bytes. A note where the object
+/// cannot be one.
+void add_usdz(PackageReader& package, const ExportOptions& options, const Extracted& extracted,
+              const RunContext& context, Export& made) {
+  try {
+    if (options.bytes > 0) {
+      ExportOptions wishes = options;
+      wishes.images = options.images == ExtractImages::kPng ? ExtractImages::kPng : ExtractImages::kJpeg;
+      const auto usdz = extract_usdz(package, request_for(wishes, ExtractScale::Form::kCoded), context);
+      if (!usdz.front().within) made.notes.emplace_back("no USDZ comes below the bytes asked for");
+      made.files.push_back({kUsdzFile, usdz.front().glb});
+      return;
+    }
+    const About about =
+        transformed_about(package.about(), output_transform(package.about(), {}, options.keep_units));
+    Usdz usdz = usdz_of(extracted, about, package.store().name(), context);
+    made.notes.insert(made.notes.end(), usdz.notes.begin(), usdz.notes.end());
+    made.files.push_back({kUsdzFile, std::move(usdz.file)});
+  } catch (const InputError& e) {
+    made.notes.push_back("no " + std::string(kUsdzFile) + ": a USDZ cannot say " + e.found());
+  }
+}
+
 void export_model_viewer(PackageReader& package, const ExportOptions& options, const RunContext& context,
                          Export& made) {
   Extracted extracted = extract_model(package, request_for(options, form_of(options)), context);
   note_large_textures(extracted, made);
   made.open = "index.html";
-  made.files.push_back(text_file("index.html", model_viewer_page(package, options, extracted.glb.size())));
-  add_glb(made, std::move(extracted), "model.glb");
+  add_usdz(package, options, extracted, context, made);
+  add_glb(made, std::move(extracted), kGlbFile);
+  made.files.insert(made.files.begin(), text_file("index.html", model_viewer_page(package, options, made)));
   add_poster(package, made);
 }
 
@@ -244,7 +277,7 @@ void export_oembed(PackageReader& package, const std::string& path, const Export
                    Export& made) {
   EmbeddedObject object;
   object.about = package.about();
-  object.about.title = page_title(package);
+  object.about.title = package_title(package);
   std::string from_viewer = path;  // as the viewer's page names the package
   if (!is_web_url(path)) {
     const bool tree = package.store().is_folder();
@@ -252,7 +285,7 @@ void export_oembed(PackageReader& package, const std::string& path, const Export
     from_viewer = tree ? "../object/" : "../object.texmesh";
   }
   made.copies.push_back({"viewer", options.viewer});
-  const std::string viewer = "viewer/index.html?panel=0&pkg=" + percent_encoded(from_viewer);
+  const std::string viewer = "viewer/index.html?panel=none&pkg=" + percent_encoded(from_viewer);
   object.page_url = options.url + viewer;
   object.width_px = options.width_px;
   object.height_px = options.height_px;

@@ -54,9 +54,37 @@ std::string last_name(const std::string& path) {
   return (p.has_filename() ? p : p.parent_path()).filename().string();
 }
 
+std::string readable_title(const std::string& path) {
+  constexpr std::string_view kEnding = ".texmesh";
+  std::string name = last_name(path);
+  if (name.ends_with(kEnding)) name.resize(name.size() - kEnding.size());
+  std::string title;
+  for (const char c : name)
+    if (c != '_' && c != '-' && c != ' ')
+      title += c;
+    else if (!title.empty() && !title.ends_with(' '))
+      title += ' ';
+  if (title.ends_with(' ')) title.pop_back();
+  if (title.empty()) return name;
+  if (title[0] >= 'a' && title[0] <= 'z') title[0] = static_cast<char>(title[0] - 'a' + 'A');
+  return title;
+}
+
+std::string sides_in_words(Vec3d sides_m) {
+  const double most = std::max({sides_m.x, sides_m.y, sides_m.z});
+  const auto& [per_metre, unit] = most >= 1      ? std::pair{1.0, "m"}
+                                  : most >= 0.01 ? std::pair{100.0, "cm"}
+                                                 : std::pair{1000.0, "mm"};
+  const auto text = [factor = per_metre](double side_m) {
+    const double side = side_m * factor;
+    return side < 9.95 ? fmt::format("{:.2g}", side) : fmt::format("{:.0f}", side);
+  };
+  return text(sides_m.x) + " x " + text(sides_m.y) + " x " + text(sides_m.z) + " " + unit;
+}
+
 std::string package_title(PackageReader& package) {
   const std::string& title = package.manifest().title;
-  return title.empty() ? last_name(package.store().name()) : title;
+  return title.empty() ? readable_title(package.store().name()) : title;
 }
 
 std::string rights_line(const About& about) {

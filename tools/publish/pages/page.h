@@ -38,6 +38,11 @@ inline constexpr std::string_view kReportFirstLine = "<!DOCTYPE html><!-- texmes
 
 /// The last part of a path, also where a slash stands behind it.
 std::string last_name(const std::string& path);
+/// The name of a file or an unpacked package as people would write it: without path, ending, _ and -, with a
+/// capital letter. "apple_food-01.texmesh": "Apple food 01".
+std::string readable_title(const std::string& path);
+/// Lengths of the sides in metres, centimetres or millimetres, by the longest: "12 x 8.5 x 30 cm".
+std::string sides_in_words(Vec3d sides_m);
 /// Title of a page about the package: what the package calls itself, or its file. Plain text.
 std::string package_title(PackageReader& package);
 /// A paragraph of HTML: whose the object is, and the licence as a link to where it can be read; "" where

@@ -77,6 +77,7 @@ std::string switch_figure(PackagePictures& pictures, const SwitchSize& s, Report
 std::string header_section(PackageReader& package, Report& report) {
   const Manifest& m = package.manifest();
   const Vec3d size = m.bounds_max - m.bounds_min;
+  const double unit_m = package.about().metres_per_unit;
   std::uint64_t bytes = 0;
   for (const EntryRef& e : package.index()) bytes = std::max(bytes, e.offset + e.bytes);
   std::string out = "<header>\n<div>\n<h1>" + markup_escaped(report.title) + "</h1>\n";
@@ -84,9 +85,10 @@ std::string header_section(PackageReader& package, Report& report) {
                      markup_escaped(report.verdict));
   out += fmt::format(
       "<p class=\"quiet\">A texmesh package of {}: {} scales, S_0 with {} triangles, {} texture planes; "
-      "{:.4g} x {:.4g} x {:.4g} object units.</p>\n",
-      format_bytes(bytes), m.scales.size(), thin_grouped(m.scales.front().triangles), m.plane_count, size.x,
-      size.y, size.z);
+      "{}.</p>\n",
+      format_bytes(bytes), m.scales.size(), thin_grouped(m.scales.front().triangles), m.plane_count,
+      unit_m > 0 ? sides_in_words(size * unit_m)
+                 : fmt::format("{:.4g} x {:.4g} x {:.4g} object units", size.x, size.y, size.z));
   out += rights_line(package.about());
   out += "<nav aria-label=\"Sections\"><ul>";
   for (const auto& [id, name] : {std::pair{"switches", "Switch sizes"},
@@ -167,7 +169,8 @@ std::string curve_figure(const QualityCurves& curves) {
   };
   for (std::size_t k = 0; k < curves.scales.size(); ++k)
     plot.series.push_back({k == 0 ? "each scale at its rungs" : "", "q", points_of(curves.scales[k])});
-  if (!curves.proxies.empty()) plot.series.push_back({"proxies", "b", points_of(curves.proxies), true});
+  if (!curves.proxies.empty())
+    plot.series.push_back({"proxies", "b", points_of(curves.proxies), true, false, true});
   plot.series.push_back({"the best choice for a budget", "a", points_of(curves.budgets), true});
   plot.x_low = std::max(plot.x_low * 0.9, 1.0), plot.x_high = std::max(plot.x_high * 1.1, plot.x_low * 1.5);
   return fmt::format("<figure>\n<figcaption><h3>Displayed {:.0f} px high</h3></figcaption>\n",
@@ -248,6 +251,7 @@ std::string step_plot(const Manifest& m) {
     line.steps = true, line.strong = false, line.dashed = rule.rule != StepRule::kFlip;
     double from = plot.x_low;
     for (const ManifestStep& step : step_function(m.scales, rule.rule)) {
+      if (from >= plot.x_high) break;  // beyond the border
       line.points.emplace_back(std::min(from, plot.x_high), step.scale);
       from = std::max(step.up_to_px, plot.x_low);
     }

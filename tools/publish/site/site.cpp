@@ -4,13 +4,17 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <tuple>
 
 #include "format/base/text_bytes.h"
+#include "format/rules/output_transform.h"
 #include "pipeline/batch/stale_packages.h"
 #include "pipeline/io/markup.h"
 #include "pipeline/io/table.h"
 #include "pipeline/io/uri.h"
+#include "tools/extract/usdz/usdz.h"
+#include "tools/publish/export/export.h"
 #include "tools/publish/pages/page.h"
 #include "tools/publish/view/served_files.h"
 
@@ -43,7 +47,10 @@ void read_object(SiteObject& object) {
   const Manifest& m = package.manifest();
   object.digest = to_hex(package.id()).substr(0, 16);
   object.about = package.about();
-  object.title = m.title.empty() ? fs::path(without_ending(object.path)).filename().string() : m.title;
+  object.title = m.title.empty() ? readable_title(object.path) : m.title;
+  object.names_itself = !m.title.empty();
+  if (object.about.metres_per_unit > 0)
+    object.size = sides_in_words((m.bounds_max - m.bounds_min) * object.about.metres_per_unit);
   object.bytes = bytes_beneath(object.source);
   object.start_bytes = start_bytes(m);
   object.triangles = m.scales.front().triangles;
@@ -93,6 +100,8 @@ std::string root_of(const SiteObject& o) {
   return root;
 }
 
+constexpr const char* kGlbMediaType = "model/gltf-binary";
+constexpr const char* kUsdzMediaType = "model/vnd.usdz+zip";
 constexpr std::string_view kSiteFirstLine = "<!DOCTYPE html><!-- texmesh site 1 -->\n";
 /// Posters that are fetched with the page; those further down come when somebody looks.
 constexpr std::size_t kAtOnce = 12;
@@ -112,13 +121,9 @@ std::string words_of(const SiteObject& o) {
   return out;
 }
 
-std::string poster_address(const SiteObject& o) {
-  return percent_encoded(file_address("posters", o, ".jpg"));
-}
-
 std::string poster_html(const SiteObject& o, const std::string& root, bool lazy) {
   if (o.poster.empty()) return "<span class=\"none\">no picture</span>";
-  return fmt::format(R"(<img src="{}{}" width="{}" height="{}" alt=""{}>)", root, poster_address(o),
+  return fmt::format(R"(<img src="{}{}" width="{}" height="{}" alt=""{}>)", root, o.poster_address,
                      o.poster_width_px, o.poster_height_px, lazy ? " loading=\"lazy\"" : "");
 }
 
@@ -130,6 +135,166 @@ std::string card_html(const SiteObject& o, std::size_t place) {
       "<p>{}</p><p>{}</p></li>\n",
       markup_escaped(words_of(o)), percent_encoded(o.name), poster_html(o, "", place >= kAtOnce),
       markup_escaped(o.title), quiet, markup_escaped(figures_of(o)));
+}
+
+using OrderedJson = nlohmann::ordered_json;
+
+std::string json_text(const OrderedJson& json, int indent) {
+  return json.dump(indent, ' ', false, OrderedJson::error_handler_t::replace);
+}
+
+/// Of the first date that begins with one; "" without.
+std::string year_of(const About& about) {
+  for (const NamedText& date : about.dates)
+    if (date.text.size() >= 4 && date.text.find_first_not_of("0123456789") >= 4)
+      return date.text.substr(0, 4);
+  return "";
+}
+
+std::string in_tex(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    if (c == '\\')
+      out += "\\textbackslash{}";
+    else if (c == '~' || c == '^')
+      out += std::string("\\") + c + "{}";
+    else if (std::string_view("{}%&#_$").find(c) != std::string_view::npos)
+      out += std::string("\\") + c;
+    else
+      out += c == '\n' ? ' ' : c;
+  }
+  return out;
+}
+
+/// Letters and digits of the package's path.
+std::string citation_key(const SiteObject& o) {
+  std::string key;
+  for (const char c : o.name)
+    if ((c >= 'a' && c <= 'z') || (c >= '0' && c <= '9')) key += c;
+  return key.empty() ? o.digest : key;
+}
+
+std::string address_within(const std::string& address, const SiteOptions& options) {
+  return is_web_url(address) ? address : options.url + address;
+}
+
+/// Address of an object's page.
+std::string page_address(const SiteObject& object, const SiteOptions& options) {
+  return options.url + "objects/" + percent_encoded(object.name) + ".html";
+}
+
+std::string viewer_address(const SiteObject& o, const SiteOptions& options) {
+  const std::string package = is_web_url(o.address) ? o.address : "../" + o.address;
+  return options.url + "viewer/index.html?panel=0&pkg=" + percent_encoded(package);
+}
+
+std::string meta_html(const char* kind, const char* name, const std::string& content) {
+  if (content.empty()) return "";
+  return fmt::format("<meta {}=\"{}\" content=\"{}\">\n", kind, name, markup_escaped(content));
+}
+
+/// What schema.org calls it.
+OrderedJson schema_org(const SiteObject& o, const SiteOptions& options) {
+  const About& a = o.about;
+  OrderedJson json{{"@context", "https://schema.org"}, {"@type", "3DModel"}, {"name", o.title}};
+  const auto add = [&](const char* key, const OrderedJson& value, bool known) {
+    if (known) json[key] = value;
+  };
+  add("description", a.description, !a.description.empty());
+  add("creator", {{"@type", "Person"}, {"name", a.creator}}, !a.creator.empty());
+  add("creditText", a.attribution, !a.attribution.empty());
+  add("license", a.licence_url.empty() ? a.licence : a.licence_url,
+      !a.licence.empty() || !a.licence_url.empty());
+  add("isBasedOn", a.source_url, !a.source_url.empty());
+  for (const NamedText& i : a.identifiers)
+    json["identifier"].push_back({{"@type", "PropertyValue"}, {"propertyID", i.name}, {"value", i.text}});
+  if (options.url.empty()) return json;
+  json["url"] = page_address(o, options);
+  if (!o.poster.empty()) json["image"] = options.url + o.poster_address;
+  json["encoding"] = OrderedJson::array();
+  const auto encoding = [&](const std::string& address, const char* type) {
+    json["encoding"].push_back({{"@type", "MediaObject"},
+                                {"contentUrl", address_within(address, options)},
+                                {"encodingFormat", type}});
+  };
+  encoding(o.address, kContainerMediaType);
+  for (const SiteDownload& d : o.downloads) encoding(d.address, d.media_type);
+  return json;
+}
+
+std::string opened_html(const char* heading, const std::string& text) {
+  return fmt::format("<details><summary>{}</summary><pre>{}</pre></details>\n", heading,
+                     markup_escaped(text));
+}
+
+/// BibTeX's @misc: characters that TeX takes for its own stand for themselves.
+std::string bibtex_entry(const SiteObject& o, const SiteOptions& options) {
+  std::string out = "@misc{" + citation_key(o);
+  const auto add = [&](const char* key, const std::string& value) {
+    if (!value.empty()) out += fmt::format(",\n  {} = {{{}}}", key, value);
+  };
+  add("title", "{" + in_tex(o.title) + "}");
+  if (!o.about.creator.empty()) add("author", "{" + in_tex(o.about.creator) + "}");
+  add("year", year_of(o.about));
+  add("howpublished", "3D model, " + in_tex(options.title));
+  if (!options.url.empty()) add("url", page_address(o, options));
+  if (!o.about.licence.empty()) add("note", "Licence: " + in_tex(o.about.licence));
+  return out + "\n}\n";
+}
+
+/// One item of the Citation Style Language as JSON.
+std::string csl_item(const SiteObject& o, const SiteOptions& options) {
+  OrderedJson item{{"id", citation_key(o)}, {"type", "graphic"}, {"genre", "3D model"}, {"title", o.title}};
+  if (!o.about.creator.empty()) item["author"] = {{{"literal", o.about.creator}}};
+  if (const std::string year = year_of(o.about); !year.empty())
+    item["issued"] = {{"date-parts", {{std::stoi(year)}}}};
+  item["publisher"] = options.title;
+  if (!options.url.empty()) item["URL"] = page_address(o, options);
+  if (!o.about.licence.empty()) item["note"] = "Licence: " + o.about.licence;
+  return json_text(item, 2) + "\n";
+}
+
+/// For the head: description, OpenGraph, and schema.org's 3DModel as JSON-LD.
+std::string record_head(const SiteObject& o, const SiteOptions& options) {
+  std::string json = json_text(schema_org(o, options), -1);
+  // Nothing in a text may end the element, or begin a comment.
+  for (std::size_t at = 0; (at = json.find('<', at)) != json.npos;) json.replace(at, 1, "\\u003c");
+  const std::string words = o.about.description.substr(0, o.about.description.find('\n'));
+  std::string out = meta_html("name", "description", words) + meta_html("property", "og:type", "website") +
+                    meta_html("property", "og:title", o.title) +
+                    meta_html("property", "og:description", words) +
+                    meta_html("property", "og:site_name", options.title);
+  if (!options.url.empty()) {
+    out += fmt::format("<link rel=\"canonical\" href=\"{}\">\n", markup_escaped(page_address(o, options)));
+    out += meta_html("property", "og:url", page_address(o, options));
+    if (!o.poster.empty()) out += meta_html("property", "og:image", options.url + o.poster_address);
+  }
+  return out + "<script type=\"application/ld+json\">" + json + "</script>\n";
+}
+
+/// Citations and, with the site's address, the frame for pages of others; each behind a heading that opens
+/// it.
+std::string citation_html(const SiteObject& o, const SiteOptions& options) {
+  std::string out = opened_html("Cite: BibTeX", bibtex_entry(o, options)) +
+                    opened_html("Cite: CSL-JSON", csl_item(o, options));
+  if (options.url.empty()) return out;
+  EmbeddedObject frame;
+  frame.about = o.about;
+  frame.about.title = o.title;
+  frame.page_url = viewer_address(o, options);
+  return out + opened_html("Embed", embedded_frame(frame) + "\n");
+}
+
+/// sitemap.xml of a site that knows its address.
+std::string sitemap_text(const Site& site) {
+  std::string out =
+      "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<urlset xmlns=\"http://www.sitemaps.org/schemas/sitemap/0.9\">\n";
+  const auto add = [&](const std::string& address) {
+    out += "<url><loc>" + markup_escaped(address) + "</loc></url>\n";
+  };
+  add(site.options.url);
+  for (const SiteObject& o : site.objects) add(page_address(o, site.options));
+  return out + "</urlset>\n";
 }
 
 /// The head of a page that stands `root` away from the site's files; `frames`: the page has frames.
@@ -166,10 +331,12 @@ std::string facts_html(const SiteObject& o) {
   const auto row = [&](const std::string& name, const std::string& html) {
     out += "<dt>" + markup_escaped(name) + "</dt><dd>" + html + "</dd>\n";
   };
+  // The page's own places, and what is said to programs.
+  static const std::set<std::string_view> for_others{"title", "description", "unit", "up axis"};
   for (const NamedText& line : about_lines(o.about))
-    if (line.name != "title" && line.name != "description") row(line.name, text_html(line));
+    if (!for_others.contains(line.name)) row(line.name, text_html(line));
+  if (!o.size.empty()) row("size", markup_escaped(o.size));
   row("package", markup_escaped(figures_of(o)));
-  row("first picture", "after " + markup_escaped(format_bytes(o.start_bytes)));
   return out;
 }
 
@@ -177,14 +344,31 @@ std::string from_below(const std::string& root, const std::string& address) {
   return is_web_url(address) ? address : root + address;
 }
 
+/// Links behind that of the package. Apple's phones open a USDZ in the room from a link that holds a picture
+/// and nothing else.
+std::string downloads_html(const SiteObject& o, const std::string& root) {
+  std::string out;
+  for (const SiteDownload& d : o.downloads)
+    out += fmt::format(R"( <a href="{}{}" type="{}" download="">{}, {}</a>)", root, d.address, d.media_type,
+                       d.name, markup_escaped(format_bytes(d.bytes)));
+  for (const SiteDownload& d : o.downloads)
+    if (d.media_type == kUsdzMediaType)
+      out += fmt::format(
+          R"(</p>
+<p><a rel="ar" href="{0}{1}"><img src="{0}{2}" width="64" height="64" alt="Open in your room"></a> AR on iPhones)",
+          root, d.address, o.poster.empty() ? "icon.svg" : o.poster_address);
+  return out;
+}
+
 std::string object_page(const SiteObject& o, const SiteOptions& options) {
   const std::string root = root_of(o);
   // The package's address is encoded twice: the viewer decodes the query before it takes the value for a URL.
   const std::string viewer =
-      root + "viewer/index.html?panel=0&pkg=" + percent_encoded(from_below("../", o.address));
+      root + "viewer/index.html?panel=none&pkg=" + percent_encoded(from_below("../", o.address)) +
+      (o.names_itself ? "" : "&title=" + percent_encoded(o.title));
   return filled(
       site_file("object.html"),
-      {{"head", head_html(o.title + " - " + options.title, root, true)},
+      {{"head", head_html(o.title + " - " + options.title, root, true) + record_head(o, options)},
        {"title", markup_escaped(o.title)},
        {"root", root},
        {"site", markup_escaped(options.title)},
@@ -197,7 +381,28 @@ std::string object_page(const SiteObject& o, const SiteOptions& options) {
                            : "<p class=\"description\">" + markup_escaped(o.about.description) + "</p>"},
        {"rights", rights_line(o.about)},
        {"facts", facts_html(o)},
+       {"downloads", downloads_html(o, root)},
+       {"citation", citation_html(o, options)},
        {"package", markup_escaped(from_below(root, o.address))}});
+}
+
+/// Writes the files of an object for other programs.
+void add_downloads(SiteObject& o, const SiteOptions& options, NewFolder& out, const RunContext& context) {
+  PackageReader package(open_store(o.source));
+  ExtractScale scale;
+  scale.display_px = options.downloads_px;
+  const Extracted glb = extract_model(package, {scale, true}, context);
+  const auto add = [&](const char* name, const char* media_type, const char* ending, const Bytes& bytes) {
+    const std::string path = file_address("downloads", o, ending);
+    out.add(path, bytes);
+    o.downloads.push_back({name, media_type, percent_encoded(path), bytes.size()});
+  };
+  add("GLB", kGlbMediaType, ".glb", glb.glb);
+  try {
+    const About about = transformed_about(o.about, output_transform(o.about, {}, false));
+    add("USDZ", kUsdzMediaType, ".usdz", usdz_of(glb, about, o.path, context).file);
+  } catch (const InputError&) {  // what no USDZ can say; the GLB has it
+  }
 }
 
 /// What the viewer offers where its address names no package.
@@ -205,7 +410,7 @@ std::string viewer_list(const Site& site) {
   PackageList list;
   for (const SiteObject& o : site.objects)
     list.packages.push_back(
-        {from_below("../", o.address), o.title, o.poster.empty() ? "" : "../" + poster_address(o)});
+        {from_below("../", o.address), o.title, o.poster.empty() ? "" : "../" + o.poster_address});
   return to_json_line(list);
 }
 
@@ -255,6 +460,7 @@ Site read_site(const std::string& packages, const SiteOptions& options) {
       continue;
     }
     object.address = address_of(object, options);
+    object.poster_address = percent_encoded(file_address("posters", object, ".jpg"));
     site.objects.push_back(std::move(object));
   }
   std::ranges::sort(site.objects, {},
@@ -272,12 +478,14 @@ FolderRule site_folder_rule() {
   return marked_folder_rule("index.html", kSiteFirstLine, "an empty folder, an earlier site, or nothing yet");
 }
 
-void write_site(const Site& site, const std::string& folder) {
+void write_site(const Site& site, const std::string& folder, const RunContext& context) {
   NewFolder out(folder, site_folder_rule());
   out.add("index.html", text_bytes(std::string(kSiteFirstLine) + index_page(site)));
   out.add("site.css", text_bytes(page_style(site_file("site.css"))));
   for (const char* name : {"site.js", "icon.svg"}) out.add(name, text_bytes(site_file(name)));
-  for (const SiteObject& o : site.objects) {
+  if (!site.options.url.empty()) out.add("sitemap.xml", text_bytes(sitemap_text(site)));
+  for (SiteObject o : site.objects) {
+    if (site.options.downloads_px > 0) add_downloads(o, site.options, out, context);
     out.add("objects/" + o.name + ".html", text_bytes(object_page(o, site.options)));
     if (!o.poster.empty()) out.add(file_address("posters", o, ".jpg"), o.poster);
     if (site.options.packages_url.empty())

@@ -3,6 +3,7 @@
 #include "format/documents/about.h"
 #include "pipeline/io/new_folder.h"
 #include "pipeline/io/record.h"
+#include "stages/base/run_context.h"
 
 namespace texmesh {
 
@@ -10,6 +11,16 @@ struct SiteOptions {
   std::string title = "Scans";
   std::string packages_url;  // where the packages stand already, ends with a slash; "" = they are copied
   std::string viewer;        // folder with the built viewer
+  std::string url;           // where the site will stand, ends with a slash; "" = not said
+  double downloads_px = 0;   // GLB and USDZ of each object for this displayed height; 0 = none
+};
+
+/// A file for other programs that a site has beside a package.
+struct SiteDownload {
+  const char* name;  // for people: "GLB"
+  const char* media_type;
+  std::string address;  // from a page in the site's folder
+  std::uint64_t bytes = 0;
 };
 
 /// A package of a site.
@@ -20,11 +31,15 @@ struct SiteObject {
   std::string address;  // of the package, from a page in the site's folder
   std::string source;   // file or folder on this machine
   std::string title;
+  bool names_itself = false;  // the title is the package's, not its file's name
+  std::string size;           // sides_in_words(); "" where the unit is not known
   About about;
   std::vector<std::uint8_t> poster;  // JPEG; empty = none
+  std::string poster_address;        // from a page in the site's folder
   std::uint32_t poster_width_px = 0, poster_height_px = 0;
-  std::uint64_t bytes = 0;        // of the whole package
-  std::uint64_t start_bytes = 0;  // until there is a picture
+  std::vector<SiteDownload> downloads;  // write_site() makes them
+  std::uint64_t bytes = 0;              // of the whole package
+  std::uint64_t start_bytes = 0;        // until there is a picture
   std::uint64_t triangles = 0;
   std::uint32_t texture_px = 0;  // longest side of its textures; 0 = it has none
   static void fields(auto& s, auto&& v) {
@@ -58,10 +73,12 @@ struct Site {
 Site read_site(const std::string& packages, const SiteOptions& options);
 
 /// Writes a static site: index.html with posters and search, objects/NAME.html, viewer/, posters/ and, unless
-/// they stand elsewhere, packages/. Texts of packages stand in it as text only. It asks nothing of other
-/// servers but packages that stand there. Same packages, same bytes. The folder appears whole or not at all;
-/// an earlier site is replaced. InputError when it holds anything else or cannot be made.
-void write_site(const Site& site, const std::string& folder);
+/// they stand elsewhere, packages/; with an address sitemap.xml, and where asked for downloads/ with GLBs and
+/// USDZs (an object that no USDZ can say has none). Texts of packages stand in it as text only. It asks
+/// nothing of other servers but packages that stand there. Same packages, same bytes. The folder appears
+/// whole or not at all; an earlier site is replaced. InputError when it holds anything else or cannot be
+/// made.
+void write_site(const Site& site, const std::string& folder, const RunContext& context = {});
 /// The folder that this is: new, empty, or an earlier one.
 FolderRule site_folder_rule();
 

@@ -109,7 +109,7 @@ std::optional<ServedFile> open_beneath(int root, const std::vector<std::string>&
 
 int open_folder_or_throw(const std::string& path) {
   const int fd = ::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (fd < 0) throw InputError(path, "", "a readable folder", std::strerror(errno));
+  if (fd < 0) throw InputError(path, "", "", std::string("cannot be read: ") + std::strerror(errno));
   return fd;
 }
 
@@ -156,7 +156,7 @@ std::size_t ServedFile::read(std::uint64_t offset, char* to, std::size_t size) c
 PackageFolder find_packages(const std::string& package) {
   std::error_code error;
   const fs::path path = fs::canonical(package, error);
-  if (error) throw InputError(package, "", "a package, or a folder of packages", error.message());
+  if (error) throw InputError(package, "", "", "cannot be read: " + error.message());
   const bool folder = fs::is_directory(path);
   const bool tree = folder && fs::is_regular_file(path / kManifestPath);
   if (!folder && !fs::is_regular_file(path))

@@ -226,8 +226,8 @@ int ViewServer::bind(const std::string& host, int port) {
   });
   const int bound = port == 0 ? server.bind_to_any_port(host) : server.bind_to_port(host, port) ? port : -1;
   if (bound < 0)
-    throw InputError(host + ":" + std::to_string(port), "", "an address and port that can be listened on",
-                     "none, or in use");
+    throw InputError(host + ":" + std::to_string(port), "", "",
+                     "cannot be listened on: the port is in use, or the address is not this machine's");
   return bound;
 }
 

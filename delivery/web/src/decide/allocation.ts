@@ -13,9 +13,8 @@ export function logQuantiser(quality: number): number {
 
 const qualityOfScale = (scale: number): number => (scale > 1 ? 50 / scale : 100 - 50 * scale);
 
-/** [F]: eta_i (3.1) of a scale: min-max of counts over covered fragments, else 0; VQP in allocation 3. */
-export function etaOf(t: PlaneTables, row: number): Float32Array {
-  if (t.allocation === 3) return t.vqp.slice();
+/** [F]: eta_i (3.1) of a scale: min-max of counts over covered fragments, else 0. */
+function densityOf(t: PlaneTables, row: number): Float32Array {
   const covered = positive(t.coveredTexels);
   const features = (f: number): number => t.features[row * fragmentCount(t) + f];
   const rising = covered.map(features).sort((a, b) => a - b);
@@ -23,6 +22,14 @@ export function etaOf(t: PlaneTables, row: number): Float32Array {
   const eta = new Float32Array(fragmentCount(t));
   if (high > low) for (const f of covered) eta[f] = (features(f) - low) / (high - low);
   return eta;
+}
+
+/** [F]: eta_i (3.1) of a scale; in allocation 3 its VQP. */
+export function etaOf(t: PlaneTables, row: number): Float32Array {
+  const eta = densityOf(t, row);
+  if (t.allocation !== 3) return eta;
+  const finest = densityOf(t, 0);
+  return eta.map((own, f) => clamp(t.vqp[f] + t.densityWeight * (own - finest[f]), 0, 1));
 }
 
 /** The default Gamma: mean of eta over covered fragments. */

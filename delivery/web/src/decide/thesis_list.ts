@@ -6,7 +6,7 @@ import type { DeliveryRequest } from './delivery_plan';
 import { type FragmentList, type ListOptions, fragmentList } from './fragment_list';
 import { type PlanLimits, type TimePlanOptions, meanOffer } from './harmonic_time';
 import { interpolatedBytes } from './size_curve';
-import { type PlaneChoice, type TextureLoss, fullSize, tablesOf } from './texture_loss';
+import { type PlaneChoice, type TextureLoss, planesForDisplay, tablesOf } from './texture_loss';
 
 // Chapter 4 as printed: gamma_for_bytes, thesis_textures and as_printed of delivery/cpp, bit for bit.
 
@@ -54,7 +54,7 @@ function asPrintedList(data: PackageData, { offers, fragments }: FragmentList,
   offers[nearest].plannedBytes = Math.max(1, interpolatedBytes(t, fragment, t.quality[row]));
 }
 
-/** Chapter 4's textures for so many bytes: all at full size, and the list whose D_i(Gamma) comes to that. */
+/** Chapter 4's textures for so many bytes, of the display's resolution (8.1.1): D_i(Gamma) comes to that. */
 export interface ThesisTextures {
   planes: PlaneChoice[];
   options: Partial<ListOptions>;
@@ -62,7 +62,7 @@ export interface ThesisTextures {
 }
 /** The textures that so many bytes show of a scale. */
 export function thesisTextures(loss: TextureLoss, scale: number, bytes: number): ThesisTextures {
-  const planes = fullSize(loss.data.textures);
+  const planes = planesForDisplay(loss.data, loss.displayedPx);
   const options = { scale, displayedPx: loss.displayedPx, printed: asPrintedList,
     gamma: gammaForBytes(loss.data, planes, scale, bytes) };
   return { planes, options, list: fragmentList(loss.data, planes, options, loss) };
@@ -81,6 +81,6 @@ export function printedPlan(options: PlanLimits): TimePlanOptions {
   };
 }
 
-/** The request with the policy thesis; the just-noticeable difference says which scale is enough. */
+/** The request with the policy thesis; its distance says which scale is enough. */
 export const asPrinted = (request: DeliveryRequest): DeliveryRequest =>
-  ({ ...request, rule: 'jnd', textures: thesisTextures, plan: printedPlan });
+  ({ ...request, rule: 'distance', textures: thesisTextures, plan: printedPlan });

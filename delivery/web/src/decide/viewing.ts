@@ -1,6 +1,6 @@
 import { anyDisplayPx } from '../format/layout';
 import type { Manifest, ManifestScale, ManifestStep } from '../format/manifest';
-import { apart, belowAny } from '../format/shared_numbers';
+import { apart, belowAny, distanceStep, firstDistancePx } from '../format/shared_numbers';
 import { cos, pi, sin } from './portable_math';
 
 // From how an object is looked at to the scale that is enough: format/rules/viewing.h. Lengths on screen are
@@ -25,9 +25,10 @@ export function displayedHeightPx(objectHeight: number, distance: number, camera
 /**
  * The rule that decides about the scale: flip (default) = lit pictures that cannot be told from those of S_0,
  * which is what Manifest.steps holds; jnd = the just-noticeable difference; error = an error of one pixel;
- * edge = the O_V / E_S that matches the displayed height best.
+ * edge = the O_V / E_S that matches the displayed height best; distance = the major scale of each distance
+ * (7.5).
  */
-export type StepRule = 'flip' | 'jnd' | 'error' | 'edge';
+export type StepRule = 'flip' | 'jnd' | 'error' | 'edge' | 'distance';
 
 function edgeLimit(scales: readonly ManifestScale[], k: number): number {
   if (k > 1) return Math.sqrt(scales[k].displayPxEdge * scales[k - 1].displayPxEdge);
@@ -38,6 +39,11 @@ function edgeLimit(scales: readonly ManifestScale[], k: number): number {
 
 function limitOf(scales: readonly ManifestScale[], k: number, rule: StepRule): number {
   if (rule === 'edge') return edgeLimit(scales, k);
+  if (rule === 'distance') {
+    let px = scales[k].major ? firstDistancePx : 0;
+    for (let i = scales.slice(1, k).filter((s) => s.major).at(-1)?.scale ?? 0; i > 0; --i) px /= distanceStep;
+    return px;
+  }
   const { displayPxJnd, displayPxError, displayPxFlip } = scales[k];
   return rule === 'jnd' ? displayPxJnd : rule === 'error' ? displayPxError : displayPxFlip;
 }
@@ -85,7 +91,8 @@ function accepts(scales: readonly ManifestScale[], k: number, displayedPx: numbe
   const s = scales[k];
   if (rule === 'jnd')
     return Math.max(part.widthPx, part.heightPx) * growthOfValue(s, displayedPx, part) <= s.displayPxJnd;
-  return displayedPx <= limitOf(scales, k, rule);
+  const growth = rule === 'distance' ? growthOfValue(s, displayedPx, part) : 1;
+  return displayedPx * growth <= limitOf(scales, k, rule);
 }
 
 /**

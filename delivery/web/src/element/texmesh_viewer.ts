@@ -4,6 +4,7 @@ import type { PageModel, ShowablePackage } from '../page/page_model';
 import { OrbitInput } from './orbit_input';
 import {
   bytesAt, degreesOf, linkBytesS, mostBytes, numberOf, offerInWords, orbitOf, savesData,
+  sentenceOf, words, wordsFor,
 } from './wording';
 
 /** Looks of the element; applications change them by parts, slots and the custom properties. */
@@ -22,7 +23,7 @@ canvas:active { cursor: grabbing; }
 .poster.fades { transition: opacity .15s; }
 .poster img, ::slotted([slot=poster]) { width: 100%; height: 100%; object-fit: contain; }
 .poster.gone { opacity: 0; }
-.bar { position: absolute; left: 0; top: 0; height: 3px; background: var(--texmesh-accent); }
+.bar { position: absolute; left: 0; top: 0; height: 3px; min-width: 10%; background: var(--texmesh-accent); }
 .box { position: absolute; left: 0; right: 0; margin: 0 auto; top: 50%; transform: translateY(-50%);
   width: fit-content; max-width: 94%; max-height: 100%; overflow: auto; box-sizing: border-box;
   padding: .6em 1em; border: 0; border-radius: .5em; font: inherit; text-align: center;
@@ -68,7 +69,7 @@ const template = `<style>${style}</style>
 <div class="poster" part="poster"><slot name="poster"></slot></div>
 <slot name="progress-bar"><div class="bar" part="progress" role="progressbar" aria-label="loading"
   aria-valuemin="0" aria-valuemax="100" hidden></div></slot>
-<button class="box" part="reveal" hidden><span>Show in 3D</span><small></small></button>
+<button class="box" part="reveal" hidden><span></span><small></small></button>
 <div class="box" part="error" role="alert" hidden></div>
 <div class="note" part="note" role="status" hidden></div>
 <div class="rights" part="rights"></div>
@@ -79,6 +80,8 @@ const template = `<style>${style}</style>
 /** <texmesh-viewer>; `host` is to be set before the element is defined. */
 export class TexmeshViewer extends HTMLElement {
   static host: ElementHost;
+  /** What the element says, by language; the page's `lang` chooses. */
+  static readonly words = words;
   static readonly observedAttributes = ['src', 'alt', 'poster', 'camera-controls', 'camera-orbit',
     'auto-rotate', 'rotation-per-second', 'disable-zoom', 'reveal', 'bytes', 'touch-action'];
   private readonly root_ = this.attachShadow({ mode: 'open' });
@@ -171,7 +174,11 @@ export class TexmeshViewer extends HTMLElement {
       });
     }
     const allBytes = said || (this.served_.src === src ? this.served_.bytes : 0);
+    reveal.querySelector('span')!.textContent = this.words_.show;
     reveal.querySelector('small')!.textContent = offerInWords(startBytes, allBytes, linkBytesS());
+  }
+  private get words_(): typeof words.en {
+    return wordsFor(this.closest<HTMLElement>('[lang]')?.lang);
   }
   private get waits_(): boolean {
     return !this.revealed_ && (this.getAttribute('reveal') === 'manual' || savesData());
@@ -185,7 +192,7 @@ export class TexmeshViewer extends HTMLElement {
       this.follow_(TexmeshViewer.host.page().add(canvas as HTMLCanvasElement,
         new URL(this.src, document.baseURI).href, { dress: (scene) => TexmeshViewer.host.dress(scene) }));
     } catch (error) {
-      this.fail_(error instanceof Error ? error.message : String(error), false);
+      this.fail_(error, false);
     }
   }
   private stop_(): void {
@@ -207,11 +214,14 @@ export class TexmeshViewer extends HTMLElement {
     this.model_ = model;
     const tell = (name: string, detail: object = {}): void =>
       void this.dispatchEvent(new CustomEvent(name, { detail }));
-    model.on('open', () => this.controls_());
+    model.on('open', ({ package: { form } }) => {
+      if (form === 'whole') void this.tellOwner_(({ slowHostNote }) => slowHostNote(form, model.url));
+      this.controls_();
+    });
     model.on('first-picture', () => {
       // A poster of nothing does not fade: each frame of that would draw the whole page.
-      poster.classList.toggle('fades',
-        (poster.firstElementChild as HTMLSlotElement).assignedElements({ flatten: true }).length > 0);
+      poster.classList.toggle('fades', this.hasPoster_);
+      if (!this.hasPoster_) this.note_('');
       poster.classList.add('gone');
       tell('poster-dismissed');
       tell('model-visibility', { visible: true });
@@ -236,21 +246,38 @@ export class TexmeshViewer extends HTMLElement {
       ({ lost }) => this.note_(lost ? 'The graphics memory was taken away; waiting for it.' : ''));
     model.on('memory',
       () => this.note_('There is little graphics memory: a coarser picture is shown.', noteMs));
-    model.on('error', ({ fatal, message }) => {
+    model.on('error', ({ fatal, error, message }) => {
       tell('error', { type: 'loadfailure', fatal, message });
-      if (fatal) this.fail_(message, true);
+      if (fatal) this.fail_(error, true);
     });
+    this.note_(this.hasPoster_ ? '' : this.words_.loading);
   }
-  private fail_(message: string, again: boolean): void {
-    const { error } = this.parts_;
+  private get hasPoster_(): boolean {
+    const slot = this.parts_.poster.firstElementChild as HTMLSlotElement;
+    return slot.assignedElements({ flatten: true }).length > 0;
+  }
+  /** A sentence and a way on for visitors; the rest for those who look after the page. */
+  private fail_(problem: unknown, again: boolean): void {
+    const { error, bar } = this.parts_;
+    const said = this.words_, { src } = this;
+    console.error(`<texmesh-viewer src="${src}">:`, problem);
+    void this.tellOwner_(({ causeOf }) => causeOf(problem, src, document.baseURI));
     const button =
-      Object.assign(document.createElement('button'), { textContent: 'Try again', hidden: !again });
+      Object.assign(document.createElement('button'), { textContent: said.again, hidden: !again });
     button.onclick = () => {
       error.hidden = true;
       this.model_?.retry();
     };
-    error.replaceChildren(message, document.createElement('br'), button);
+    // What fails before there is a model: the browser has no WebGL.
+    error.replaceChildren(said[again ? sentenceOf(problem) : 'no3d'], document.createElement('br'), button);
     error.hidden = false;
+    bar.hidden = true;
+    this.note_('');
+  }
+  private async tellOwner_(text: (by: typeof import('./for_owners')) => string): Promise<void> {
+    const by = await import('./for_owners').catch(() => undefined);
+    const line = by ? text(by) : '';
+    if (line) console.info(`<texmesh-viewer>: ${line}`);
   }
   /** A short line for a while, or until the next one. */
   private note_(text: string, ms = Infinity): void {

@@ -1,5 +1,6 @@
 // What the element says to people, and what its attributes mean.
 
+import { InputError, TexmeshError } from '../format/errors';
 import { type Orbit, defaultOrbit } from '../page/framing';
 
 /** Bytes as people read them. */
@@ -70,4 +71,48 @@ export function linkBytesS(): number {
 export async function bytesAt(url: string): Promise<number> {
   const answer = await fetch(url, { method: 'HEAD' }).catch(() => undefined);
   return answer?.ok ? numberOf(answer.headers.get('content-length'), 0, 0, mostBytes) : 0;
+}
+
+// What the element says to visitors, in the language of the page.
+
+/** The element's sentences; `TexmeshViewer.words` has them by language, and an application may add others. */
+export interface Words {
+  loading: string;
+  show: string;
+  again: string;
+  /** Nothing stands at the address, or not for everybody. */
+  missing: string;
+  /** What stands there is no package, or a damaged one. */
+  unreadable: string;
+  /** No answer, or not the one that was asked for. */
+  unreachable: string;
+  no3d: string;
+}
+export const words: Record<string, Words> = {
+  en: { loading: 'Loading …', show: 'Show in 3D', again: 'Try again',
+    missing: 'This object is not here any more.',
+    unreadable: 'This object cannot be shown.',
+    unreachable: 'The object did not come. Please check the connection.',
+    no3d: 'This browser cannot show objects in 3D.' },
+  de: { loading: 'Wird geladen …', show: 'In 3D ansehen', again: 'Noch einmal versuchen',
+    missing: 'Dieses Objekt ist nicht mehr hier.',
+    unreadable: 'Dieses Objekt lässt sich nicht zeigen.',
+    unreachable: 'Das Objekt ist nicht angekommen. Bitte prüfen Sie die Verbindung.',
+    no3d: 'Dieser Browser kann keine Objekte in 3D zeigen, ein anderer oder neuerer vielleicht.' },
+  fr: { loading: 'Chargement …', show: 'Voir en 3D', again: 'Réessayer',
+    missing: "Cet objet n'est plus ici.",
+    unreadable: 'Cet objet ne peut pas être affiché.',
+    unreachable: "L'objet n'est pas arrivé. Veuillez vérifier la connexion.",
+    no3d: 'Ce navigateur ne peut pas afficher des objets en 3D.' },
+};
+/** The words for a language such as "de-AT"; English where there are none. */
+export const wordsFor = (language = ''): Words => words[language.toLowerCase().split('-')[0]] ?? words.en;
+
+/** The sentence that a visitor reads of an error. */
+export function sentenceOf(error: unknown): keyof Words {
+  if (!(error instanceof TexmeshError)) return 'unreadable';
+  const { found, rule } = error, status = Number(/status (\d+)/.exec(found)?.[1] ?? 0);
+  if (status >= 400 && status < 500) return 'missing';
+  const page = status < 300 && (rule === 'K11' || /html/.test(found));
+  return error instanceof InputError && !page ? 'unreachable' : 'unreadable';
 }

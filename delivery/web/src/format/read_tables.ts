@@ -50,6 +50,7 @@ interface Counts {
   listed: number;
   size: number;
   feature: number;
+  density: number;
 }
 
 const sectionBytes = ({ scales, rungs, knots, listed, size, feature }: Counts): number =>
@@ -91,7 +92,10 @@ function readArrays(input: BytesIn, t: PlaneTables, c: Counts): void {
   t.surfaceFraction = listed(new Float32Array(f), () => input.f32());
   t.features = listed(new Uint32Array(c.scales * f), () => input.number(c.feature));
   t.quality = fill(new Float32Array(c.scales), () => input.f32());
-  if (t.allocation === byVqp) t.vqp = listed(new Float32Array(f), () => input.u16() / 65535);
+  if (t.allocation === byVqp) {
+    t.vqp = listed(new Float32Array(f), () => input.u16() / 65535);
+    if (c.density > 0) t.densityWeight = input.f32();
+  }
 }
 
 function emptyTables(): PlaneTables {
@@ -102,7 +106,7 @@ function emptyTables(): PlaneTables {
     digest: new Uint8Array(0), mse: none, dssim: none, coveredTexels: new Uint32Array(0),
     surfaceFraction: none,
     order: new Uint16Array(0), skipDssim: none, knotQuality: new Uint8Array(0), knotPosition: none,
-    features: new Uint32Array(0), quality: none, allocation: 1, vqp: none,
+    features: new Uint32Array(0), quality: none, allocation: 1, vqp: none, densityWeight: 0,
     qualityWidth: 60, logWidth: 0.7, qualityMin: 5, qualityMax: 97,
   };
 }
@@ -145,6 +149,7 @@ function checkPlane(t: PlaneTables, place: string): void {
       require(t.knotPosition[k] >= t.knotPosition[k - 1], 'T08', 'knotPosition', 'rising', t.knotPosition[k]);
   });
   within(t.surfaceFraction, 0, 1, 'surfaceFraction');
+  within([t.densityWeight], 0, 1, 'densityWeight');
   within(t.quality, 0, 100, 'quality');
   for (let line = 0; line < t.sizeBytes.length; line += fragmentCount(t))
     for (const f of t.order)
@@ -156,8 +161,9 @@ function readStart(input: BytesIn, t: PlaneTables, minor: number): Counts {
   t.columns = input.u32();
   t.rows = input.u32();
   const c: Counts = { scales: input.u8(), rungs: input.u8(), size: input.u8(), feature: input.u8(), knots: 0,
-    listed: 0 };
+    listed: 0, density: 0 };
   t.allocation = input.u8();
+  if (t.allocation === byVqp && minor > 0) c.density = 4;
   const flags = input.u8();
   c.knots = input.u8();
   const reserved = input.u8();
@@ -184,7 +190,7 @@ export function parseTablesSection(bytes: Uint8Array, minor: number, place: stri
   const input = new BytesIn(bytes, `${file}: ${place}`, 'T03');
   const t = emptyTables();
   const counts = readStart(input, t, minor);
-  const expected = sectionBytes(counts) + (t.allocation === byVqp ? 2 * counts.listed : 0);
+  const expected = sectionBytes(counts) + (t.allocation === byVqp ? 2 * counts.listed + counts.density : 0);
   if (bytes.length < expected) input.fail(`${expected} bytes`, bytes.length);
   readArrays(input, t, counts);
   if (minor <= formatMinor) input.finish();

@@ -2,8 +2,8 @@
 
 /** Major version of packages that this library writes and reads (SPEC.md, Version history). */
 export const formatMajor = 2;
-/** Minor version of packages that this library writes. */
-export const formatMinor = 0;
+/** Latest minor version that this library knows. */
+export const formatMinor = 1;
 /**
  * The manifest with its ZIP header fits in this many bytes, whatever the model: one request bootstraps a
  * client.
@@ -94,6 +94,9 @@ export const paying = 0.95; // of the mean without a step
 export const belowAny = 999000000;
 /** Keeps steps apart in the manifest's six digits. */
 export const apart = 1.0001;
+/** The thesis says no more of its units than that there are 20. */
+export const firstDistancePx = 1024;
+export const distanceStep = 1.2;
 export const lumaQuantisers = [
   16, 11, 10, 16, 24, 40, 51, 61, 12, 12, 14, 19, 26, 58, 60, 55, 14, 13, 16, 24, 40, 57, 69, 56, 14, 17, 22,
   29, 51, 87, 80, 62, 18, 22, 37, 56, 68, 109, 103, 77, 24, 35, 55, 64, 81, 104, 113, 92, 49, 64, 78, 87, 103,

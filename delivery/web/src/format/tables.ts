@@ -40,8 +40,9 @@ export interface PlaneTables {
   quality: Float32Array;
   /** 0 thesis (3.2), 1 log-quantiser, 2 rate-distortion within the bytes of 1, 3 thesis with VQP as eta. */
   allocation: number;
-  /** [F] VQP (8.4) where the allocation is 3, else empty. */
+  /** [F] VQP (8.4) at S_0 where the allocation is 3, else empty; and what part of it is eta. */
   vqp: Float32Array;
+  densityWeight: number;
   qualityWidth: number;
   logWidth: number;
   qualityMin: number;

@@ -61,7 +61,7 @@ export interface LoadOptions {
   time?: number;
   /**
    * Policy that spends the time. guard: what shows most of what the camera sees comes first. thesis: chapters
-   * 4 and 7 as printed, with the rule jnd, one request at a time and textures at full size. Default guard.
+   * 4 and 7 as printed, with the rule distance, one request at a time. Default guard.
    */
   policy?: Policy;
   /** First guess of the throughput, bytes per second; left out: the throughput of the first transfers. */

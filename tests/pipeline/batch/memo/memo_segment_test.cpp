@@ -83,7 +83,7 @@ TEST(MemoSegment, AFileThatIsNoSegmentIsDamagedAndAMissingOneIsNone) {
 /// A finished file with one block, whose digest is right.
 std::string with_block(const std::vector<std::uint8_t>& payload, const std::string& body = "") {
   const Sha256 digest = sha256(payload);
-  std::string file("TXMEMO\0\3", 8);
+  std::string file("TXMEMO\0\4", 8);
   for (int i = 0; i < 8; ++i) file += static_cast<char>(payload.size() >> 8 * i);
   file.append(digest.begin(), digest.end());
   return file.append(payload.begin(), payload.end()) + body;

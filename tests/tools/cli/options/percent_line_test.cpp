@@ -19,6 +19,18 @@ TEST(PercentLine, RisesAndIsTakenAway) {
   EXPECT_EQ(out.str(), "\r\033[Kextract 0 %\r\033[Kextract 40 %\r\033[Kextract 100 %\r\033[K");
 }
 
+TEST(PercentLine, SecondsStandThereWhileNobodySaysHowFarItIs) {
+  std::ostringstream out;
+  PercentLine line("report", out, true, std::chrono::milliseconds(1));
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  line.end();
+  const std::string drawn = out.str();
+  EXPECT_TRUE(drawn.starts_with("\r\033[Kreport 0 s")) << drawn;
+  EXPECT_TRUE(drawn.ends_with("\r\033[K")) << drawn;
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  EXPECT_EQ(out.str(), drawn) << "it has ended";
+}
+
 TEST(PercentLine, NothingStandsInALog) {
   std::ostringstream out;
   PercentLine line("extract", out, false);

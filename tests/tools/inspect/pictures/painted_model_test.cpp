@@ -1,7 +1,9 @@
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 
 #include "format/base/errors.h"
 #include "stages/gltf/check_glb.h"
@@ -25,6 +27,8 @@ ScaleMap map_of(const ConditionedMesh& mesh) {
   ScaleMap map;
   map.scales = 8;
   map.sigma.assign(9, 0.001f);
+  map.convergence.assign(9, 1);
+  map.crossings_at.assign(9, 3);
   for (Vec3f p : mesh.mesh.positions) map.persistence.push_back(p.y > 0.3f ? 8 : 0);
   return map;
 }
@@ -59,6 +63,36 @@ TEST(PaintedModel, ScalesPaintEveryVertex) {
   EXPECT_EQ(picture.height_px, 64u);
   EXPECT_GT(count_near(picture, colour_of(1)), 50);
   EXPECT_THROW(paint_scales(mesh, {}), StageError);
+}
+
+TEST(PaintedModel, TheScaleMapIsDataToo) {
+  ConditionedMesh mesh = ball();
+  mesh.mesh.origin = {100, 0, 0};
+  const ScaleMap map = map_of(mesh);
+  const PaintedModel view = paint_scales(mesh, map);
+  std::istringstream csv(write_painted_csv(view, "scale")), ply(write_painted_ply(view, "scale"));
+  std::string line;
+  std::getline(csv, line);
+  EXPECT_EQ(line, "scale,tx,ty,gx,gy,gz");
+  while (std::getline(ply, line) && line != "end_header") {
+    if (line.starts_with("element"))
+      EXPECT_EQ(line, fmt::format("element vertex {}", map.persistence.size()));
+  }
+  for (std::size_t p = 0; p < map.persistence.size(); ++p) {
+    const Vec3d at = to_double(mesh.mesh.positions[p]) + mesh.mesh.origin;
+    const PaintedPoint& point = view.points[p];
+    std::getline(csv, line);
+    EXPECT_EQ(line, fmt::format("{},{},{},{},{},{}", map.persistence[p], point.texture.x, point.texture.y,
+                                at.x, at.y, at.z));
+    std::getline(ply, line);
+    EXPECT_EQ(line, fmt::format("{} {} {} {} {} {}", at.x, at.y, at.z, point.texture.x, point.texture.y,
+                                map.persistence[p]));
+  }
+  EXPECT_FALSE(std::getline(csv, line)) << line;
+  EXPECT_FALSE(std::getline(ply, line)) << line;
+  ASSERT_EQ(view.legend.remarks.size(), 10u) << "a line for each scale";
+  EXPECT_TRUE(view.legend.remarks[8].starts_with("S_8: sigma 0.001, ")) << view.legend.remarks[8];
+  EXPECT_THROW(write_painted_csv({}, "atlas"), InputError) << "textures have no values of vertices";
 }
 
 TEST(PaintedModel, FeaturesArePaintedToHalfTheDistanceThatTheyKeep) {

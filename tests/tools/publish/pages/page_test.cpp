@@ -33,5 +33,19 @@ TEST(Filled, NeverLooksIntoAValue) { EXPECT_EQ(filled("{{x}}", {{"x", "{{y}}{{x}
 
 TEST(Filled, ANameWithoutAValueIsAMistakeOfOurs) { EXPECT_THROW(filled("{{z}}", {}), std::logic_error); }
 
+TEST(ReadableTitle, IsWhatPeopleWouldWrite) {
+  EXPECT_EQ(readable_title("packages/apple_food-01.texmesh"), "Apple food 01");
+  EXPECT_EQ(readable_title("a/Schildkr\xc3\xb6te gro\xc3\x9f.texmesh/"), "Schildkr\xc3\xb6te gro\xc3\x9f");
+  EXPECT_EQ(readable_title("__v1.2__"), "V1.2");
+  EXPECT_EQ(readable_title("-.texmesh"), "-") << "better than nothing";
+}
+
+TEST(SidesInWords, UseTheUnitOfTheLongest) {
+  EXPECT_EQ(sides_in_words({1.23, 0.5, 12.34}), "1.2 x 0.5 x 12 m");
+  EXPECT_EQ(sides_in_words({0.123, 0.085, 0.3}), "12 x 8.5 x 30 cm");
+  EXPECT_EQ(sides_in_words({0.001, 0.0099, 0}), "1 x 9.9 x 0 mm");
+  EXPECT_EQ(sides_in_words({12345, 1, 1}), "12345 x 1 x 1 m");
+}
+
 }  // namespace
 }  // namespace texmesh::testing

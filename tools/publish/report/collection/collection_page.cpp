@@ -34,6 +34,18 @@ std::string failures_section(const RunSummary& s) {
                       table.html() + cut_note(failures));
 }
 
+std::string warnings_section(const RunSummary& s) {
+  Table table("What packages lack, or what was mended", {Column::text("model"), Column::text("warning")});
+  std::size_t warned = 0;
+  for (const ModelSummary& m : s.models) {
+    if (!m.ok() || m.warnings.empty()) continue;
+    if (++warned > kMostRows) continue;
+    for (const Note& n : m.warnings) table.row({m.model, note_sentence(n)});
+  }
+  if (warned == 0) return "";
+  return html_section("warnings", fmt::format("{} with warnings", warned), table.html() + cut_note(warned));
+}
+
 std::string problems_section(const RunSummary& s) {
   if (s.problems.empty()) return "";
   Table table("Reports of shards that are not as they should be",
@@ -116,14 +128,16 @@ CollectionPage collection_page(const RunSummary& s, const std::string& poster_fo
                                const std::function<std::optional<PackageFace>(const ModelSummary&)>& face) {
   CollectionPage page;
   const SummaryCounts c = count_results(s.models);
+  const auto warned =
+      std::ranges::count_if(s.models, [](const ModelSummary& m) { return !m.warnings.empty(); });
   const bool good = c.failed + c.cancelled == 0 && s.problems.empty();
   std::string body = "<h1>Collection</h1>\n";
   body += fmt::format(
-      "<p class=\"verdict{}\">{} compiled, {} up to date, {} failed, {} not reached; {} of processes' "
-      "time in {} {}.</p>\n",
-      good ? "" : " bad", c.compiled, c.unchanged, c.failed, c.cancelled, format_seconds(s.seconds),
+      "<p class=\"verdict{}\">{} compiled, {} up to date, {} failed, {} not reached, {} with warnings; {} of "
+      "processes' time in {} {}.</p>\n",
+      good ? "" : " bad", c.compiled, c.unchanged, c.failed, c.cancelled, warned, format_seconds(s.seconds),
       std::max<std::size_t>(s.parts.size(), 1), s.parts.size() > 1 ? "runs" : "run");
-  body += failures_section(s) + problems_section(s) + figures_section(s);
+  body += failures_section(s) + warnings_section(s) + problems_section(s) + figures_section(s);
   body += models_section(s, poster_folder, posters, face, page.files);
   page.html = html_page("Collection", body);
   return page;

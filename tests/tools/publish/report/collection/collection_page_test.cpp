@@ -44,6 +44,17 @@ TEST(CollectionPage, FailuresComeFirstInTheWordsOfTheErrors) {
   EXPECT_EQ(testing::tag_fault(html), "");
 }
 
+TEST(CollectionPage, WarningsOfPackagesThatAreThereStandInASectionOfTheirOwn) {
+  RunSummary s;
+  s.models = {model("plain", ModelResult::kUnchanged), model("grey", ModelResult::kUnchanged)};
+  EXPECT_EQ(collection_page(s, "posters", 10, no_face).html.find("id=\"warnings\""), std::string::npos);
+  add_warning(s.models[1].warnings, "missing-texture", "grey.mtl:3", "<scan.jpg> is not there");
+  const std::string html = collection_page(s, "posters", 10, no_face).html;
+  EXPECT_NE(html.find("1 with warnings"), std::string::npos);
+  EXPECT_NE(html.find("missing-texture at grey.mtl:3: &lt;scan.jpg&gt; is not there"), std::string::npos);
+  EXPECT_EQ(testing::tag_fault(html), "");
+}
+
 TEST(CollectionPage, PostersStandBesideThePageForTheFirstModels) {
   RunSummary s;
   for (const char* name : {"a", "b", "c"}) s.models.push_back(model(name, ModelResult::kUnchanged));

@@ -1,0 +1,29 @@
+// What the console says to those who look after a page; loaded with the first of it.
+
+import { InputError, TexmeshError } from '../format/errors';
+
+const slowHosts = new Set<string>();
+/** Once a host: that it sends no parts of files; '' where it does, or was told. */
+export function slowHostNote(form: string, url: string): string {
+  const { origin } = new URL(url);
+  if (form !== 'whole' || slowHosts.has(origin)) return '';
+  slowHosts.add(origin);
+  return `${origin} sends no parts of files (range requests, status 206): the whole package is read before ` +
+    'the first picture. Allow ranges, or put an unpacked package (texmesh unpack) beside it.';
+}
+
+/** What most often causes an error, '' where nobody knows; `page`, `url`: addresses of page and package. */
+export function causeOf(error: unknown, url: string, page: string): string {
+  if (!(error instanceof TexmeshError)) return '';
+  const { found, rule } = error, status = Number(/status (\d+)/.exec(found)?.[1] ?? 0);
+  if (status >= 400) return `The server's answer for ${url}: status ${status}.`;
+  if (/html/.test(found) || rule === 'K11')
+    return 'What the server sent is no texmesh package. A host that answers unknown addresses with its ' +
+      'start page does so where the address is wrong.';
+  const { origin } = new URL(page);
+  if (error instanceof InputError && status === 0)
+    return new URL(url, page).origin === origin ? 'The server did not answer.'
+      : `The server did not answer, or it does not let ${origin} read its files: it must send ` +
+        'Access-Control-Allow-Origin (CORS).';
+  return rule && `${rule} is a rule of texmesh's format/SPEC.md: the file is damaged, or a newer format.`;
+}

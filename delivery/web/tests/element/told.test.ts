@@ -1,0 +1,49 @@
+import { expect, it } from 'vitest';
+import { causeOf, slowHostNote } from '../../src/element/for_owners';
+import { type Words, sentenceOf, words, wordsFor } from '../../src/element/wording';
+import { FormatError, InputError } from '../../src/format/errors';
+
+const page = 'https://museum.example/objects/17.html';
+const own = 'https://museum.example/turtle.texmesh', foreign = 'https://files.example/turtle.texmesh';
+
+it('every language has every sentence', () => {
+  const keys = Object.keys(words.en).sort();
+  for (const language of Object.values(words)) {
+    expect(Object.keys(language).sort()).toEqual(keys);
+    for (const sentence of Object.values(language)) expect(sentence).not.toBe('');
+  }
+});
+it('the language of the page decides', () => {
+  expect(wordsFor('de-AT')).toBe(words.de);
+  expect(wordsFor('FR')).toBe(words.fr);
+  expect(wordsFor()).toBe(words.en);
+  for (const other of ['', 'xx', 'english']) expect(wordsFor(other)).toBe(words.en);
+});
+
+const asked = (url: string, found: string): InputError =>
+  new InputError(url, 'byte 0', 'an answer with status 206', found);
+const noPackage = new FormatError(own, 'byte 0', 'a texmesh package', 'status 200 (text/html)', 'K11');
+const cases: [string, unknown, string, keyof Words, RegExp][] = [
+  ['a file that is not there', asked(own, 'status 404'), own, 'missing', /status 404/],
+  ['a file for others', asked(own, 'status 403 (text/html)'), own, 'missing', /status 403/],
+  ['a server that fails', asked(own, 'status 503'), own, 'unreachable', /503/],
+  ['no answer', asked(own, 'Failed to fetch'), own, 'unreachable', /did not answer\.$/],
+  ['no answer from elsewhere', asked(foreign, 'Failed to fetch'), foreign, 'unreachable',
+    /https:\/\/museum\.example.*Access-Control-Allow-Origin \(CORS\)/],
+  ['a start page in its place', noPackage, own, 'unreadable', /start page/],
+  ['damage', new FormatError(own, 'mesh', '3 bytes', '2', 'I08'), own, 'unreadable', /I08 is a rule of/],
+  ['a mistake of ours', new TypeError('x is undefined'), own, 'unreadable', /^$/],
+  ['no error at all', 'gone', own, 'unreadable', /^$/],
+];
+it.each(cases)('%s: visitors get a sentence, the console the rest', (_, error, url, sentence, details) => {
+  expect(sentenceOf(error)).toBe(sentence);
+  expect(causeOf(error, url, page)).toMatch(details);
+});
+
+it('a host that costs speed is named once', () => {
+  expect(slowHostNote('range', own)).toBe('');
+  expect(slowHostNote('whole', own)).toMatch(/museum\.example sends no parts/);
+  expect(slowHostNote('whole', own)).toBe('');
+  expect(slowHostNote('files', foreign)).toBe('');
+  expect(slowHostNote('whole', foreign)).toMatch(/files\.example/);
+});

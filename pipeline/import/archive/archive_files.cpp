@@ -1,0 +1,282 @@
+#include "pipeline/import/archive/archive_files.h"
+
+#include <zlib.h>
+
+#include <set>
+
+#include "pipeline/import/text_scan.h"
+
+namespace texmesh {
+namespace {
+
+constexpr std::uint32_t kLocalMark = 0x04034b50, kCentralMark = 0x02014b50;
+constexpr std::size_t kEndBytes = 22, kEnd64Bytes = 56, kLocator64Bytes = 20, kCentralBytes = 46,
+                      kLocalBytes = 30, kMaxComment = 65'535;
+constexpr std::uint16_t kStored = 0, kDeflated = 8;
+/// Deflate turns no byte into more.
+constexpr std::uint64_t kMostPacking = 1032;
+constexpr std::uint64_t kMaxDirectoryBytes = std::uint64_t{64} << 20;
+
+/// Where the directory stands, and how many files it lists.
+struct DirectoryPlace {
+  std::uint64_t offset = 0, bytes = 0, count = 0;
+};
+
+[[noreturn]] void refuse_archive(ByteSource& archive, const std::string& place, const std::string& expected,
+                                 const std::string& found) {
+  throw InputError(archive.name(), place, expected, found);
+}
+
+Bytes part_of(ByteSource& archive, std::uint64_t offset, std::uint64_t bytes, const std::string& place) {
+  const std::uint64_t size = archive.size();
+  if (offset > size || bytes > size - offset)
+    refuse_archive(archive, place, "a whole ZIP archive", "one that is cut, or whose directory is wrong");
+  return archive.read(offset, bytes);
+}
+
+DirectoryPlace find_directory(ByteSource& archive) {
+  const std::string place = "end of the archive";
+  const std::uint64_t size = archive.size(),
+                      tail_bytes = std::min<std::uint64_t>(size, kEndBytes + kMaxComment);
+  const Bytes tail = part_of(archive, size - tail_bytes, tail_bytes, place);
+  for (std::size_t at = tail.size() < kEndBytes ? 0 : tail.size() - kEndBytes + 1; at-- > 0;) {
+    if (text_of(ByteSpan(tail).subspan(at, 4)) != std::string_view("PK\5\6")) continue;
+    BytesIn end(ByteSpan(tail).subspan(at + 4), archive.name());
+    const std::uint16_t disk = end.u16(), directory_disk = end.u16(), here = end.u16(), count = end.u16();
+    DirectoryPlace out;
+    out.bytes = end.u32();
+    out.offset = end.u32();
+    out.count = count;
+    if (end.u16() > end.left()) continue;  // these four bytes stand in a comment
+    if (disk != 0 || directory_disk != 0 || here != count)
+      refuse_archive(archive, place, "an archive of one file", "one of several");
+    const std::uint64_t end_at = size - tail_bytes + at;
+    if (out.offset != 0xffffffff && out.bytes != 0xffffffff && count != 0xffff) return out;
+    const Bytes locator =
+        part_of(archive, end_at < kLocator64Bytes ? size : end_at - kLocator64Bytes, kLocator64Bytes, place);
+    if (text_of(ByteSpan(locator).first(4)) != std::string_view("PK\6\7")) return out;
+    BytesIn to(ByteSpan(locator).subspan(8), archive.name());
+    const Bytes record = part_of(archive, to.u64(), kEnd64Bytes, place);
+    BytesIn end64(ByteSpan(record).subspan(32), archive.name());
+    out.count = end64.u64();
+    out.bytes = end64.u64();
+    out.offset = end64.u64();
+    return out;
+  }
+  refuse_archive(archive, place, "a whole ZIP archive", "no directory: the archive is cut");
+}
+
+/// Sizes and the place of a file of 4 GiB and more.
+void read_zip64(BytesIn extra, ArchivedFile& file) {
+  while (extra.left() >= 4) {
+    const std::uint16_t id = extra.u16(), bytes = extra.u16();
+    if (bytes > extra.left()) return;
+    BytesIn field(extra.raw(bytes), "");
+    if (id != 1) continue;
+    for (std::uint64_t* number : {&file.bytes, &file.packed_bytes, &file.header})
+      if (*number == 0xffffffff && field.left() >= 8) *number = field.u64();
+  }
+}
+
+bool leaves_archive(const std::string& name) {
+  if (name.empty() || name.front() == '/' || (name.size() > 1 && name[1] == ':')) return true;
+  for (std::size_t at = 0; at <= name.size();) {
+    const std::size_t end = std::min(name.find('/', at), name.size());
+    if (name.substr(at, end - at) == "..") return true;
+    at = end + 1;
+  }
+  return name.find('\0') != name.npos;
+}
+
+std::string archived_name(const std::string& name) { return name.substr(name.rfind('/') + 1); }
+
+bool is_addition_of_macos(const std::string& name) {
+  return name.starts_with("__MACOSX/") || archived_name(name) == ".DS_Store";
+}
+
+/// The next file of the directory; one without a name is none to read.
+ArchivedFile next_file(ByteSource& archive, BytesIn& in) {
+  if (in.left() < kCentralBytes || in.u32() != kCentralMark)
+    refuse_archive(archive, "directory", "an entry for each file", "other bytes");
+  in.raw(4);
+  const std::uint16_t flags = in.u16();
+  ArchivedFile file;
+  file.method = in.u16();
+  in.raw(4);
+  file.crc32 = in.u32();
+  file.packed_bytes = in.u32();
+  file.bytes = in.u32();
+  const std::uint16_t name = in.u16(), extra = in.u16(), comment = in.u16();
+  in.raw(4);
+  const std::uint32_t attributes = in.u32();
+  file.header = in.u32();
+  if (std::uint64_t{name} + extra + comment > in.left())
+    refuse_archive(archive, "directory", "an entry for each file", "one that is cut");
+  file.name = utf8_of(in.text(name));
+  read_zip64(BytesIn(in.raw(extra), ""), file);
+  in.raw(comment);
+  std::ranges::replace(file.name, '\\', '/');
+  if (leaves_archive(file.name))
+    refuse_archive(archive, "directory", "names within the archive", readable_name(file.name));
+  constexpr std::uint16_t kEncrypted = 1 | 1 << 6 | 1 << 13;
+  if (flags & kEncrypted)
+    refuse_archive(archive, readable_name(file.name), "an archive without a password", "an encrypted file");
+  constexpr std::uint32_t kTypeMask = 0170000, kLink = 0120000;
+  const bool link = (attributes >> 16 & kTypeMask) == kLink;
+  if (link || file.name.ends_with('/') || is_addition_of_macos(file.name)) file.name.clear();
+  return file;
+}
+
+void check_sizes(ByteSource& archive, const ArchivedFile& file, std::uint64_t& left) {
+  if (file.bytes / kMostPacking > file.packed_bytes)
+    refuse_archive(archive, readable_name(file.name), "a size that its packed bytes can give",
+                   std::to_string(file.bytes) + " bytes of " + std::to_string(file.packed_bytes));
+  if (file.bytes > left)
+    refuse_archive(archive, readable_name(file.name),
+                   "files within the limit of import.max_file_bytes together", "more bytes");
+  left -= file.bytes;
+}
+
+/// Nothing where the packed bytes are no stream of so many bytes.
+Bytes inflated(Bytes packed, std::uint64_t bytes) {
+  constexpr std::size_t kStep = std::size_t{1} << 30;  // zlib counts in 32 bits
+  z_stream stream{};
+  if (inflateInit2(&stream, -MAX_WBITS) != Z_OK) throw std::bad_alloc();
+  Bytes out(bytes);
+  std::uint8_t none = 0;
+  int state = Z_OK;
+  for (std::size_t from = 0, to = 0; state == Z_OK;) {
+    stream.next_in = packed.data() + from;
+    stream.avail_in = static_cast<uInt>(std::min(packed.size() - from, kStep));
+    stream.next_out = to < out.size() ? out.data() + to : &none;
+    stream.avail_out = static_cast<uInt>(std::min(out.size() - to, kStep));
+    const uInt in_before = stream.avail_in, out_before = stream.avail_out;
+    state = inflate(&stream, Z_NO_FLUSH);
+    from += in_before - stream.avail_in;
+    to += out_before - stream.avail_out;
+    if (state == Z_STREAM_END && to != out.size()) state = Z_DATA_ERROR;
+  }
+  inflateEnd(&stream);
+  if (state != Z_STREAM_END) out.clear();
+  return out;
+}
+
+}  // namespace
+
+std::vector<ArchivedFile> list_archive(ByteSource& archive, std::uint64_t max_bytes) {
+  const DirectoryPlace place = find_directory(archive);
+  if (place.count > kMaxArchiveFiles)
+    refuse_archive(archive, "directory", "at most " + std::to_string(kMaxArchiveFiles) + " files",
+                   std::to_string(place.count));
+  if (place.bytes > kMaxDirectoryBytes)
+    refuse_archive(archive, "directory", "at most " + std::to_string(kMaxDirectoryBytes) + " bytes",
+                   std::to_string(place.bytes));
+  const Bytes directory = part_of(archive, place.offset, place.bytes, "directory");
+  BytesIn in(directory, archive.name());
+  std::vector<ArchivedFile> out;
+  std::set<std::string> names;
+  std::set<std::uint64_t> headers;
+  std::uint64_t left = max_bytes;
+  for (std::uint64_t k = 0; k < place.count; ++k) {
+    ArchivedFile file = next_file(archive, in);
+    if (file.name.empty()) continue;
+    check_sizes(archive, file, left);
+    if (!names.insert(file.name).second || !headers.insert(file.header).second)
+      refuse_archive(archive, readable_name(file.name), "every file once", "twice");
+    out.push_back(std::move(file));
+  }
+  return out;
+}
+
+std::optional<std::size_t> model_of_archive(const std::vector<ArchivedFile>& files,
+                                            const std::string& archive) {
+  constexpr std::string_view kEndings[] = {".gltf", ".glb", ".obj", ".ply", ".stl"};
+  using Rank = std::tuple<bool, std::ptrdiff_t, std::ptrdiff_t, bool>;  // the least is the one
+  std::optional<std::size_t> best;
+  std::optional<Rank> least;
+  bool several = false;
+  for (std::size_t k = 0; k < files.size(); ++k) {
+    const std::string name = lower(files[k].name);
+    const auto* ending = std::ranges::find(kEndings, lower_ending(name));
+    if (ending == std::end(kEndings)) continue;
+    const Rank rank{archived_name(name) != "scene.gltf", ending - kEndings, std::ranges::count(name, '/'),
+                    name.find("odm_textured_model_geo.") == name.npos};
+    several = least == rank || (several && least < rank);
+    if (least && *least <= rank) continue;
+    least = rank;
+    best = k;
+  }
+  if (several)
+    throw InputError(archive, "", "one model; unpack the archive to choose",
+                     "several beside each other, " + readable_name(files[*best].name) + " among them");
+  return best;
+}
+
+bool is_archive_of_model(const std::string& path) {
+  constexpr std::uint64_t kAnySize = std::uint64_t{1} << 62;
+  try {
+    const auto source = open_file_source(path);
+    return model_of_archive(list_archive(*source, kAnySize), path).has_value();
+  } catch (const Error&) {
+    return true;  // the build says what is wrong with it
+  }
+}
+
+ArchiveFiles::ArchiveFiles(std::string archive, ByteSpan bytes, std::uint64_t max_bytes)
+    : archive_(std::move(archive)), source_(memory_source(bytes, archive_)) {
+  files_ = list_archive(*source_, max_bytes);
+  if (const auto k = model_of_archive(files_, archive_)) model_ = files_[*k].name;
+  folder_ = model_.substr(0, model_.rfind('/') + 1);
+}
+
+Bytes ArchiveFiles::unpacked(const ArchivedFile& file, std::uint64_t max_bytes) {
+  const std::string place = readable_name(file.name);
+  if (file.bytes > max_bytes)
+    throw InputError(archive_, place, "at most " + std::to_string(max_bytes) + " bytes",
+                     std::to_string(file.bytes));
+  const Bytes head = part_of(*source_, file.header, kLocalBytes, place);
+  BytesIn in(head, archive_);
+  if (in.u32() != kLocalMark)
+    refuse_archive(*source_, place, "the file where the directory says", "other bytes");
+  in.raw(22);
+  const std::uint64_t name = in.u16(), extra = in.u16();
+  Bytes packed = part_of(*source_, file.header + kLocalBytes + name + extra, file.packed_bytes, place);
+  Bytes out;
+  if (file.method == kStored)
+    out = std::move(packed);
+  else if (file.method == kDeflated)
+    out = inflated(std::move(packed), file.bytes);
+  else
+    refuse_archive(*source_, place, "a file that is stored or deflated",
+                   "packing of kind " + std::to_string(file.method));
+  const auto step = [](uLong crc, ByteSpan bytes) { return crc32_z(crc, bytes.data(), bytes.size()); };
+  if (out.size() != file.bytes || (out.empty() ? 0 : step(0, out)) != file.crc32)
+    refuse_archive(*source_, place, "the bytes that its size and CRC-32 say",
+                   "others: the archive is damaged");
+  return out;
+}
+
+std::optional<Bytes> ArchiveFiles::read(const std::string& uri, std::uint64_t max_bytes) {
+  const auto exact = std::ranges::find(files_, folder_ + uri, &ArchivedFile::name);
+  if (exact != files_.end()) return unpacked(*exact, max_bytes);
+  const ArchivedFile* only = nullptr;
+  for (const ArchivedFile& f : files_) {
+    if (archived_name(f.name) != archived_name(uri)) continue;
+    if (only) return std::nullopt;
+    only = &f;
+  }
+  return only ? std::optional(unpacked(*only, max_bytes)) : std::nullopt;
+}
+
+std::vector<std::string> ArchiveFiles::similar(const std::string& uri) {
+  std::vector<std::string> out;
+  const std::string key = name_key(uri);
+  for (const ArchivedFile& f : files_)
+    if (f.name.starts_with(folder_) && f.name != folder_ + uri &&
+        name_key(f.name.substr(folder_.size())) == key)
+      out.push_back(f.name.substr(folder_.size()));
+  std::ranges::sort(out);
+  return out;
+}
+
+}  // namespace texmesh

@@ -1,0 +1,75 @@
+// What people write in the place of what texmesh takes: it is understood where it can mean one thing only,
+// else the message says what may have been meant.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "tests/support/command.h"
+#include "tools/cli/options/common_options.h"
+#include "tools/cli/options/units.h"
+
+namespace texmesh {
+namespace {
+
+using testing::CommandResult;
+
+void expect_told(const std::vector<std::string>& words, int exit_code, const std::string& text) {
+  std::vector<std::string> line{TEXMESH_BINARY};
+  line.insert(line.end(), words.begin(), words.end());
+  const CommandResult r = testing::run_command(line);
+  EXPECT_EQ(r.exit_code, exit_code) << text;
+  EXPECT_NE((r.output + r.errors).find(text), std::string::npos) << r.output << r.errors;
+}
+
+TEST(Forgiving, AWordThatMeansNothingIsNamedWithOneThatDoes) {
+  expect_told({"complie", "a.glb"}, 2, "texmesh: there is no command complie; did you mean compile?");
+  expect_told({"qqq"}, 2, "texmesh: there is no command qqq (texmesh --help lists");
+  expect_told({}, 2, "texmesh: a command is missing");
+  expect_told({"cache", "stats"}, 2, "texmesh cache: there is no command stats; did you mean stat?");
+  expect_told({"compile", "a.obj", "-o", "b", "--tilte=x"}, 2,
+              "texmesh compile: there is no option --tilte; did you mean --title?");
+  expect_told({"compile", "a.obj", "-o", "b", "--up", "W"}, 2, "--up: expected one of");
+  expect_told({"compile", "a.obj", "-o", "b", "--rungs", "10,120"}, 2,
+              "--rungs: /1: expected an integer in 1 .. 100");
+}
+
+TEST(Forgiving, SizesAndRatesAreReadAsPeopleWriteThem) {
+  for (const char* text : {"500kB", "500kb", "500KB", "500k", "500 kB", "0.5 MB", "500000"})
+    EXPECT_EQ(parse_bytes(text, "--bytes"), 500'000u) << text;
+  EXPECT_EQ(parse_bytes("2mib", "--bytes"), 2u << 20);
+  for (const char* text : {"2Mbit/s", "2Mbps", "2Mbit", "2 Mb/s", "250kB/s"})
+    EXPECT_EQ(parse_bandwidth(text, "--bandwidth"), 250'000) << text;
+  for (const char* text : {"", "kB", "500 kBB", "-1kB", "5 0kB", "nan", "1e30"})
+    EXPECT_THROW(parse_bytes(text, "--bytes"), UsageError) << text;
+  for (const char* text : {"2mbps", "2MBPS", "0Mbps", "Mbps"})  // bits or bytes, milli or mega: nobody knows
+    EXPECT_THROW(parse_bandwidth(text, "--bandwidth"), UsageError) << text;
+}
+
+TEST(Forgiving, AFolderIsNotMadeUnderTheNameOfAFile) {
+  const testing::TemporaryFolder folder;
+  for (const char* name : {"x.zip", "x.GLB", "x.texmsh", "x.tex-mesh", "a/b.html"})
+    EXPECT_THROW(check_folder_name(name, ".texmesh"), UsageError) << name;
+  EXPECT_THROW(check_folder_name("x.texmesh"), UsageError);
+  for (const char* name : {"x", "x.texmesh", "x.v2", "scans.2026", "x.zip/", "", "."})
+    EXPECT_NO_THROW(check_folder_name(name, ".texmesh")) << name;
+  std::filesystem::create_directory(folder / "x.zip");
+  EXPECT_NO_THROW(check_folder_name(folder / "x.zip", ".texmesh")) << "it is there";
+}
+
+TEST(Forgiving, WhatIsNoPackageIsCalledWhatItIs) {
+  const testing::TemporaryFolder folder;
+  const auto dumped = [&](const std::string& content, const std::string& told) {
+    testing::write_text(folder / "x.texmesh", content);
+    for (const char* command : {"dump", "view"}) expect_told({command, folder / "x.texmesh"}, 1, told);
+  };
+  for (const char* model : {"glTF\2", "ply\nformat ascii 1.0\n", "# a scan\nv 0 0 0\nv 1 0 0\nf 1 2 3\n",
+                            "{\"asset\":{\"version\":\"2.0\"}}"})
+    dumped(model, "texmesh compile makes a package of it");
+  dumped("<!doctype html><title>Log in</title>", "a page of HTML");
+  dumped("PK\3\4 other", "another ZIP archive");
+  dumped("", "an empty file");
+  dumped("garbage", "something else");
+}
+
+}  // namespace
+}  // namespace texmesh
