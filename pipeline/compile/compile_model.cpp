@@ -222,18 +222,19 @@ class ModelSource {
 /// package.annotations say stands in about.json and annotations.json.
 std::string provenance(const ModelSource& source, const CompileOptions& options) {
   Json stages = Json::object(), libraries = Json::object();
-  for (const Stage& s : default_stage_table())
+  for (const Stage& s : stage_table(options))
     if (s.stored) stages[s.name] = s.version;
   for (const auto& [name, version] : library_versions()) libraries[name] = version;
   CompileOptions recorded = options;
   recorded.package.meta.clear();
   Json profile = profile_json(recorded);
   profile["package"].erase("annotations");
+  if (options.atlas.mode == AtlasMode::kKeep) profile.erase("atlas");  // as before there was such a stage
   return Json{{"version", 1},
               {"tool", "texmesh " + tool_version()},
               {"format", {{"major", kFormatMajor}, {"minor", 0}}},  // stage package knows the minor
               {"inputs", to_json(source.inputs())},
-              {"options", profile},
+              {"options", std::move(profile)},
               {"stages", stages},
               {"libraries", libraries}}
       .dump();

@@ -141,6 +141,8 @@ bool is_same_object(const T& candidate, const void* part, const std::type_info& 
 }  // namespace
 
 CompileOptions resolve_options(CompileOptions o) {
+  // Of 12 scales of a saxophone and a site with new charts 11 come 2 to 6 % nearer to S_0 than at 1.
+  constexpr double kSeamWeightOfNewCharts = 0.1;
   const auto is_default = [&](const char* path, const auto& value, const auto& fallback) {
     return value == fallback && !o.set_by_user.contains(path);
   };
@@ -148,9 +150,16 @@ CompileOptions resolve_options(CompileOptions o) {
       is_default("fragmentation.min_fragment_px", o.fragmentation.min_fragment_px,
                  FragmentationOptions{}.min_fragment_px))
     o.fragmentation.min_fragment_px = static_cast<int>(kLeastProgressiveSide);
-  if (o.fragmentation.fill == Fill::kNone &&
+  if ((o.fragmentation.fill == Fill::kNone || o.atlas.mode == AtlasMode::kRebuild) &&
       is_default("ladder.uncovered", o.ladder.uncovered, LadderOptions{}.uncovered))
     o.ladder.uncovered = Uncovered::kKept;
+  if (o.atlas.mode == AtlasMode::kRebuild) {
+    if (is_default("simplification.seam_weight", o.simplification.seam_weight,
+                   SimplificationOptions{}.seam_weight))
+      o.simplification.seam_weight = kSeamWeightOfNewCharts;
+    if (is_default("proxies.mode", o.proxies.mode, ProxiesOptions{}.mode))
+      o.proxies.mode = ProxyMode::kAlways;
+  }
   if (!o.package.meta.empty()) o.package.meta = read_meta(o.package.meta, "package.meta");
   turn_by_meta(o);
   const LadderOptions usual;

@@ -4,6 +4,7 @@
 
 #include "pipeline/graph/stage.h"
 #include "pipeline/import/import.h"
+#include "stages/atlas/atlas.h"
 #include "stages/condition/condition.h"
 #include "stages/fragmentation/fragmentation.h"
 #include "stages/ladder/ladder.h"
@@ -27,6 +28,7 @@ namespace texmesh {
 struct CompileOptions {
   ImportOptions import;
   ConditionOptions condition;
+  AtlasOptions atlas;
   SkeletonizationOptions skeletonization;
   SsfOptions ssf;
   SimplificationOptions simplification;
@@ -49,6 +51,7 @@ struct CompileOptions {
   static void sections(auto& s, auto&& f) {
     f("import", s.import);
     f("condition", s.condition);
+    f("atlas", s.atlas);
     f("skeletonization", s.skeletonization);
     f("ssf", s.ssf);
     f("simplification", s.simplification);
@@ -67,7 +70,10 @@ struct CompileOptions {
 
 /// The options that the stages use. Defaults that depend on other options get their values here:
 /// - fragmentation.min_fragment_px is kLeastProgressiveSide with ladder.mode progressive.
-/// - ladder.uncovered is kept with fragmentation.fill none: the source's own texels stay, at any cost.
+/// - ladder.uncovered is kept with fragmentation.fill none: the source's own texels stay, at any cost. So it
+///   is with atlas.mode rebuild, whose gutters are small: what lies in them shows in coarser mips.
+/// - simplification.seam_weight is .1 with atlas.mode rebuild, whose few seams lie where nobody made them.
+/// - proxies.mode is always with atlas.mode rebuild: scales that win take tables beside their own bytes.
 /// - package.meta gets its canonical text.
 /// - ladder.prune is false where rungs of any role are given: every rung that is asked for is stored.
 /// A field that the user has set stays as it is, and so does a field that differs from its default. Resolved

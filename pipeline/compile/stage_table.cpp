@@ -111,18 +111,53 @@ Stage scale_space_stage(const CompileOptions& o) {
                filter_scales);
 }
 
+/// What the stages after the atlas read.
+struct Shown {
+  Artefact<ConditionedMesh> mesh = kConditionedMesh;
+  Artefact<Materials> materials = kMaterials;
+  Artefact<Images> images = kImages;
+};
+Shown shown_with(const CompileOptions& o) {
+  if (o.atlas.mode == AtlasMode::kKeep) return {};
+  return {kChartedMesh, kChartedMaterials, kChartedImages};
+}
+
+Results<ConditionedMesh, Materials, Images> chart_import(const ConditionedMesh& mesh,
+                                                         const Materials& materials, const Images& images,
+                                                         const AtlasOptions& options,
+                                                         const RunContext& context) {
+  ChartedModel m = chart_model(mesh, materials, images, options, context);
+  return {{std::move(m.mesh), std::move(m.materials), std::move(m.images)}, std::move(m.notes)};
+}
+
+Stage atlas_stage(const CompileOptions& o) {
+  return stage({"atlas", kAtlasVersion, "mesh, images -> few large charts with the source's texels", .1},
+               inputs(kConditionedMesh, kMaterials, kImages),
+               outputs(kChartedMesh, kChartedMaterials, kChartedImages), read_of(o, o.atlas), kImageLibraries,
+               chart_import);
+}
+
+/// The stages with that of the atlas behind condition, unless the source's is kept.
+std::vector<Stage> with_atlas(std::vector<Stage> table, const CompileOptions& o) {
+  if (o.atlas.mode != AtlasMode::kKeep)
+    table.insert(std::ranges::find(table, "skeletonization", &Stage::name), atlas_stage(o));
+  return table;
+}
+
 Stage package_stage(const CompileOptions& o) {
-  return stage({"package", kPackageVersion, "everything -> the container", .01},
-               inputs(kNestedScales, kPerceptualValues, kImages, kFragments, kLadder, kPreviews, kTables,
-                      kThesisTables, kScaleFiles, kQuality, kPoster, kProxies, kSourceAbout, kProvenance),
-               outputs(kPackage), read_of(o, o.package, o.perceptual_values.jnd, o.import.up), {},
-               package_all);
+  return stage(
+      {"package", kPackageVersion, "everything -> the container", .01},
+      inputs(kNestedScales, kPerceptualValues, shown_with(o).images, kFragments, kLadder, kPreviews, kTables,
+             kThesisTables, kScaleFiles, kQuality, kPoster, kProxies, kSourceAbout, kProvenance),
+      outputs(kPackage), read_of(o, o.package, o.perceptual_values.jnd, o.import.up), {},
+      package_all);
 }
 
 }  // namespace
 
 std::vector<Stage> stage_table(const CompileOptions& o) {
-  return {
+  const Shown shown = shown_with(o);
+  std::vector<Stage> table{
       stage({"import", kImportVersion, "file -> mesh, materials, images, what it says of itself", .02},
             inputs(kSource), outputs(kImportedMesh, kMaterials, kImages, kSourceAbout), read_of(o, o.import),
             {"draco", "libpng", "libzstd", "meshoptimizer", "openimageio", "tinygltf", "zlib"},
@@ -136,7 +171,7 @@ std::vector<Stage> stage_table(const CompileOptions& o) {
       scale_space_stage(o),
       stage({"simplification", kSimplificationVersion, "mesh, scale map -> collapse sequence, nested scales",
              .01},
-            inputs(kConditionedMesh, kScaleMap), outputs(kNestedScales), read_of(o, o.simplification), {},
+            inputs(shown.mesh, kScaleMap), outputs(kNestedScales), read_of(o, o.simplification), {},
             simplify),
       stage({"perceptual_values", kPerceptualValuesVersion,
              "scales, R -> perceptual values, major scales, step function", .025},
@@ -144,10 +179,10 @@ std::vector<Stage> stage_table(const CompileOptions& o) {
             measure_perceptual_values),
       stage({"fragmentation", kFragmentationVersion, "images, mesh -> grids, coverage, feature counts, eta",
              .015},
-            inputs(kConditionedMesh, kMaterials, kImages, kScaleMap), outputs(kFragments),
+            inputs(shown.mesh, shown.materials, shown.images, kScaleMap), outputs(kFragments),
             read_of(o, o.fragmentation), {"openimageio"}, fragment_textures),
       stage({"fill", kFillVersion, "images, coverage -> filled texels (derived, never stored)", .03},
-            inputs(kFragments, kImages), derived(kFilledPlanes),
+            inputs(kFragments, shown.images), derived(kFilledPlanes),
             read_of(o, o.fragmentation.fill, o.ladder.mode, o.ladder.uncovered),
             {"libjpeg-turbo", "libpng", "openimageio"}, fill_fragments),
       stage({"zim", kZimVersion, "fragments -> predictors Z, I, M, VQP", .015},  //
@@ -156,28 +191,29 @@ std::vector<Stage> stage_table(const CompileOptions& o) {
             inputs(kFragments, kFilledPlanes), outputs(kPreviews),
             read_of(o, o.ladder.preview_quality, o.ladder.subsampling), {"libjpeg-turbo"}, preview_fragments),
       stage({"ladder", kLadderVersion, "fragments, previews -> rungs of streams in the chosen codec", .08},
-            inputs(kFragments, kFilledPlanes, kPreviews, kImages), outputs(kLadder), read_of(o, o.ladder),
-            {"libjpeg-turbo", "libwebp"}, encode_ladder),
+            inputs(kFragments, kFilledPlanes, kPreviews, shown.images), outputs(kLadder),
+            read_of(o, o.ladder), {"libjpeg-turbo", "libwebp"}, encode_ladder),
       stage({"lut", kLutVersion, "fragments, predictors, ladder, previews -> quality and size tables", .05},
             inputs(kFragments, kFilledPlanes, kPredictors, kLadder, kPreviews),
             outputs(kTables, kThesisTables), read_of(o, o.lut), {"libjpeg-turbo", "libwebp"},
             measure_fragments),
       stage({"scales", kScalesVersion, "kept scales -> GLB files, vertex splits", .03},
-            inputs(kNestedScales, kPerceptualValues, kMaterials, kImages, kFragments, kPreviews),
+            inputs(kNestedScales, kPerceptualValues, shown.materials, shown.images, kFragments, kPreviews),
             outputs(kScaleFiles), read_of(o, o.scales), {"draco", "libjpeg-turbo", "meshoptimizer", "zlib"},
             write_scales),
       stage({"quality", kQualityVersion, "scales, rungs -> losses of lit pictures, switch sizes", .54},
-            inputs(kNestedScales, kPerceptualValues, kMaterials, kImages, kFragments, kFilledPlanes, kLadder,
-                   kPreviews, kTables),
+            inputs(kNestedScales, kPerceptualValues, shown.materials, shown.images, kFragments, kFilledPlanes,
+                   kLadder, kPreviews, kTables),
             outputs(kQuality), read_of(o, o.quality), kImageLibraries, measure_quality),
       stage({"poster", kPosterVersion, "S_0 with the source's texels -> a picture of the object", .02},
-            inputs(kNestedScales, kMaterials, kFragments, kFilledPlanes), outputs(kPoster),
+            inputs(kNestedScales, shown.materials, kFragments, kFilledPlanes), outputs(kPoster),
             read_of(o, o.poster), {"libjpeg-turbo"}, make_poster),
       stage({"proxies", kProxiesVersion, "S_0 -> small GLBs with atlases and textures of their own", .075},
-            inputs(kNestedScales, kMaterials, kImages, kFragments, kFilledPlanes), outputs(kProxies),
-            read_of(o, o.proxies), {"draco", "libwebp", "meshoptimizer"}, make_proxies),
+            inputs(kNestedScales, shown.materials, shown.images, kFragments, kFilledPlanes),
+            outputs(kProxies), read_of(o, o.proxies), {"draco", "libwebp", "meshoptimizer"}, make_proxies),
       package_stage(o),
   };
+  return with_atlas(std::move(table), o);
 }
 
 const std::vector<Stage>& default_stage_table() {

@@ -29,6 +29,10 @@ inline constexpr Artefact<std::vector<Material>> kMaterials{"import.materials"};
 inline constexpr Artefact<std::vector<Image>> kImages{"import.images"};
 inline constexpr Artefact<About> kSourceAbout{"import.about"};
 inline constexpr Artefact<ConditionedMesh> kConditionedMesh{"condition"};
+// What is shown: the source's, or the atlas stage's, see stage_table().
+inline constexpr Artefact<ConditionedMesh> kChartedMesh{"atlas.mesh"};
+inline constexpr Artefact<std::vector<Material>> kChartedMaterials{"atlas.materials"};
+inline constexpr Artefact<std::vector<Image>> kChartedImages{"atlas.images"};
 inline constexpr Artefact<Skeleton> kSkeleton{"skeletonization"};
 inline constexpr Artefact<ScaleMap> kScaleMap{"ssf"};
 inline constexpr Artefact<NestedScales> kNestedScales{"simplification"};
@@ -47,7 +51,8 @@ inline constexpr Artefact<Proxies> kProxies{"proxies"};
 inline constexpr Artefact<Bytes> kPackage{"package"};
 
 /// The whole graph with these options, which must be resolved (resolve_options), in an order in which every
-/// input stands before its use. stage_table.cpp is the one place where the graph can be read.
+/// input stands before its use. stage_table.cpp is the one place where the graph can be read. With atlas.mode
+/// keep there is no stage of that name, and the later ones read what import and condition made.
 std::vector<Stage> stage_table(const CompileOptions& options);
 
 /// The graph with default options: for those who ask for names, versions and inputs.

@@ -3,6 +3,7 @@
 #include "format/base/portable_math.h"
 #include "stages/geometry/mesh_topology.h"
 #include "stages/image/webp.h"
+#include "stages/proxies/simplify_surface.h"
 
 namespace texmesh {
 namespace {
@@ -149,7 +150,6 @@ RenderMaterial proxy_material(const MaterialGroup& group, const ProxyPictures& p
 
 // Draco's meshes of the scans that docs/figures.md lists, within 20 %.
 constexpr double kBytesPerWedge = 4, kBytesPerTriangle = 0.6;
-constexpr double kBitsPerTexel = 1.2;  // of a JPEG of middle quality, the texels of the whole image
 constexpr double kFrameBytes = 2500, kPictureBytes = 600;    // of a file without mesh and texels
 constexpr std::array<double, 3> kMeshShares{0.6, 0.4, 0.8};  // likely winners first
 constexpr double kFarOff = 1.5;  // times the proxy's FLIP: no other scale makes up for it
@@ -171,7 +171,7 @@ std::size_t kept_from(const RenderTexture& texture, std::size_t dropped) {
 }
 
 /// How many of their finest levels textures are shown without, so that the others cost no more.
-std::size_t affordable(const std::vector<RenderTexture>& textures, double bytes) {
+std::size_t affordable(const std::vector<RenderTexture>& textures, double bytes, double bits_per_texel) {
   for (std::size_t dropped = 0;; ++dropped) {
     double texels = 0;
     bool coarser = false;
@@ -180,7 +180,7 @@ std::size_t affordable(const std::vector<RenderTexture>& textures, double bytes)
       texels += static_cast<double>(level.width_px) * level.height_px;
       coarser = coarser || dropped + 1 < t.levels.size();
     }
-    if (texels * kBitsPerTexel / 8 <= bytes || !coarser) return dropped;
+    if (texels * bits_per_texel / 8 <= bytes || !coarser) return dropped;
   }
 }
 
@@ -374,16 +374,33 @@ CompetingScales::CompetingScales(const NestedScales& scales, const ShownMaterial
   for (std::size_t k = 0; k < scales.scales.size(); ++k) mesh_bytes_.push_back(mesh_bytes(scales, k, used));
 }
 
+RivalPrices CompetingScales::prices_in_plans() const {
+  // Of plans of 200 to 500 kB of four scans. At 512 px they lose more by coding than pictures of half the
+  // size show.
+  constexpr double kMesh = 1.2, kMeshWithNormals = 1.5, kBitsPerTexel = 5, kLoss = 1.4;
+  constexpr double kTableBytes = 15000, kTableBytesOfTexture = 6000;
+  RivalPrices out;
+  out.mesh = scales_.mesh.normals.empty() ? kMesh : kMeshWithNormals;
+  out.bits_per_texel = kBitsPerTexel;
+  out.loss = kLoss;
+  out.besides = kTableBytes + kTableBytesOfTexture * static_cast<double>(shown_.textures.size()) +
+                out.mesh * mesh_bytes_.back();
+  return out;
+}
+
 /// The likeliest winners first.
-std::vector<CompetingScales::Competitor> CompetingScales::competitors(std::uint64_t bytes) const {
-  const double all = std::max(0.0, static_cast<double>(bytes) - kFrameBytes -
+std::vector<CompetingScales::Competitor> CompetingScales::competitors(std::uint64_t bytes,
+                                                                      const RivalPrices& prices) const {
+  const double all = std::max(0.0, static_cast<double>(bytes) - prices.besides - kFrameBytes -
                                        kPictureBytes * static_cast<double>(shown_.textures.size()));
   std::vector<Competitor> out;
   for (const double share : kMeshShares) {
-    const auto found = std::ranges::find_if(mesh_bytes_, [&](double mesh) { return mesh <= share * all; });
+    const auto found =
+        std::ranges::find_if(mesh_bytes_, [&](double mesh) { return prices.mesh * mesh <= share * all; });
     const auto index = static_cast<std::size_t>(found - mesh_bytes_.begin());
     if (found != mesh_bytes_.end() && std::ranges::find(out, index, &Competitor::scale) == out.end())
-      out.push_back({index, affordable(shown_.textures, all - mesh_bytes_[index])});
+      out.push_back({index, affordable(shown_.textures, all - prices.mesh * mesh_bytes_[index],
+                                       prices.bits_per_texel)});
   }
   return out;
 }
@@ -399,18 +416,20 @@ double CompetingScales::flip_of(const Competitor& competitor, double flip, const
   return out;
 }
 
-bool CompetingScales::win(std::uint64_t bytes, double flip, const RunContext& context) {
-  for (const Competitor& competitor : competitors(bytes)) {
-    const double its_flip = flip_of(competitor, flip, context);
+bool CompetingScales::win(std::uint64_t bytes, double flip, const RivalPrices& prices,
+                          const RunContext& context) {
+  for (const Competitor& competitor : competitors(bytes, prices)) {
+    const double its_flip = prices.loss * flip_of(competitor, flip, context);
     if (its_flip <= flip) return true;
     if (its_flip > kFarOff * flip) return false;
   }
   return false;
 }
 
-bool CompetingScales::likeliest_wins(std::uint64_t bytes, double flip, const RunContext& context) {
-  const std::vector<Competitor> all = competitors(bytes);
-  return !all.empty() && flip_of(all.front(), flip, context) <= flip;
+bool CompetingScales::likeliest_wins(std::uint64_t bytes, double flip, const RivalPrices& prices,
+                                     const RunContext& context) {
+  const std::vector<Competitor> all = competitors(bytes, prices);
+  return !all.empty() && prices.loss * flip_of(all.front(), flip, context) <= flip;
 }
 
 }  // namespace texmesh

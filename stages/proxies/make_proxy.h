@@ -40,25 +40,36 @@ FlipSum picture_loss(const ReferenceViews& reference, const RenderScene& scene,
                      const std::vector<RenderTexture>& textures, const RunContext& context,
                      double hopeless = 1);
 
+/// What bytes buy of nested scales and of textures without losses of coding.
+struct RivalPrices {
+  double mesh = 1;              // times an estimate of Draco's meshes
+  double bits_per_texel = 1.2;  // of a JPEG of middle quality, the texels of the whole image
+  double besides = 0;           // bytes of what else is fetched
+  double loss = 1;              // by coding, times FLIP
+};
+
 /// Nested scales with textures that a proxy's bytes buy. Bytes are estimated, and textures are those of the
-/// mip that fits, without losses of coding: such a scale is a little better than the real one. Losses are
-/// mean FLIP beside `views`.
+/// mip that fits, without losses of coding. By the default prices such a scale is better than the real one.
+/// Losses are mean FLIP beside `views`.
 class CompetingScales {
  public:
   /// All must outlive it.
   CompetingScales(const NestedScales& scales, const ShownMaterials& shown, const ReferenceViews& views);
 
   /// Whether one of them loses at most as much as a proxy of so many bytes.
-  bool win(std::uint64_t bytes, double flip, const RunContext& context);
+  bool win(std::uint64_t bytes, double flip, const RivalPrices& prices, const RunContext& context);
   /// Whether the likeliest one does; the others are not looked at.
-  bool likeliest_wins(std::uint64_t bytes, double flip, const RunContext& context);
+  bool likeliest_wins(std::uint64_t bytes, double flip, const RivalPrices& prices, const RunContext& context);
+  /// What plans of a package with proxies pay for a scale that looks like those: besides mesh and textures
+  /// they take tables and the coarsest scale's mesh, with which materials come.
+  RivalPrices prices_in_plans() const;
 
  private:
   struct Competitor {
     std::size_t scale = 0, dropped_levels = 0;  // of the textures
     auto operator<=>(const Competitor&) const = default;
   };
-  std::vector<Competitor> competitors(std::uint64_t bytes) const;
+  std::vector<Competitor> competitors(std::uint64_t bytes, const RivalPrices& prices) const;
   double flip_of(const Competitor& competitor, double flip, const RunContext& context);
 
   const NestedScales& scales_;

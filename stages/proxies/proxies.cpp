@@ -10,8 +10,9 @@ constexpr std::uint32_t kLeastTriangles = 60;
 constexpr double kLeastBytesPerTriangle = 4;
 constexpr double kFirstMeshShare = 0.7, kMeshShare = 0.65, kLargeMeshShare = 0.55;
 constexpr int kFineFrom = 100000, kNormalMapPaysFrom = 100000;  // bytes
-constexpr int kFirstBits = 10, kBits = 11, kFineBits = 12;      // of positions
-constexpr double kOverAsked = 1.02, kMostOfSource = 0.15;
+constexpr int kOneFormFrom = 200000;  // bytes: a normal map that pays is not questioned again
+constexpr int kFirstBits = 10, kBits = 11, kFineBits = 12;  // of positions
+constexpr double kOverAsked = 1.02, kMostOfSource = 0.35;
 // Of the first size: what Draco, which scales are coded by, needs for the same picture.
 constexpr double kFirstShare = 0.55;
 // What proxies of up to 40,000 triangles and pictures of 512 px need of S_0: at 500,000 the collapses took
@@ -63,6 +64,10 @@ void note_none(Notes& notes, int bytes, const std::string& why) {
   add_info(notes, "no-proxy", "", "there is no proxy of " + std::to_string(bytes) + " bytes: " + why);
 }
 
+constexpr const char* kScaleWins = "a scale with the source's atlas looks better for the same bytes";
+constexpr const char* kWholeTakesFewer = "the whole object takes fewer";
+constexpr const char* kOfSource = "proxies take at most 35 % of the source";
+
 std::uint32_t most_triangles(const Mesh& mesh, int most_bytes) {
   return static_cast<std::uint32_t>(
       std::min<double>(most_bytes / kLeastBytesPerTriangle, static_cast<double>(mesh.triangles.size())));
@@ -81,26 +86,23 @@ double source_bytes(const NestedScales& scales, const std::vector<Image>& images
 }
 
 /// Sizes that are worth a try, rising. The others have a note.
-std::vector<int> sizes_to_try(const NestedScales& scales, const std::vector<Image>& images,
-                              const ProxiesOptions& options, Notes& notes) {
+std::vector<int> sizes_to_try(const NestedScales& scales, const ProxiesOptions& options, Notes& notes) {
   if (options.mode == ProxyMode::kAlways) return options.sizes;
   std::vector<int> out;
-  double left = kMostOfSource * source_bytes(scales, images);
   for (const int bytes : options.sizes) {
-    if (whole_mesh_is_small(scales, static_cast<std::uint64_t>(bytes))) {
+    if (whole_mesh_is_small(scales, static_cast<std::uint64_t>(bytes)))
       note_none(notes, bytes, "S_0's mesh takes few of them, so the source's atlas can stay");
-    } else if (kOverAsked * bytes > left) {
-      note_none(notes, bytes, "proxies take at most 15 % of the source");
-    } else {
-      left -= kOverAsked * bytes;
+    else
       out.push_back(bytes);
-    }
   }
   return out;
 }
 
-constexpr const char* kScaleWins = "a scale with the source's atlas looks better for the same bytes";
-constexpr const char* kWholeTakesFewer = "the whole object takes fewer";
+/// What the sizes that stay may take.
+double most_bytes(const NestedScales& scales, const std::vector<Image>& images, ProxyMode mode) {
+  return mode == ProxyMode::kAlways ? std::numeric_limits<double>::infinity()
+                                    : kMostOfSource * source_bytes(scales, images);
+}
 
 /// What every size is made of, and how the model looks. Constant once made.
 struct ProxySubject {
@@ -109,26 +111,31 @@ struct ProxySubject {
   const MaterialGroups& groups;
   const BakeSource& source;
   ProxyMode mode;
-  bool mapped;  // a source material has a normal map
-  bool varied;  // occlusion, roughness or metal need a map
-  bool smooth;  // S_0 shows no facets
+  double most_bytes;  // of all proxies
+  bool mapped;        // a source material has a normal map
+  bool varied;        // occlusion, roughness or metal need a map
+  bool smooth;        // S_0 shows no facets
 };
 
 ProxySubject subject_of(const Mesh& mesh, const ShownMaterials& shown, const MaterialGroups& groups,
-                        const BakeSource& source, ProxyMode mode) {
+                        const BakeSource& source, ProxyMode mode, double most_bytes) {
   const bool mapped = std::ranges::any_of(shown.materials, [](const RenderMaterial& m) {
     return !m.unlit && m.slot(TextureUse::kNormal).texture >= 0;
   });
-  return {mesh, shown, groups, source, mode, mapped, data_varies(shown.materials), is_smooth(mesh)};
+  return {mesh,           shown, groups, source, mode, most_bytes, mapped, data_varies(shown.materials),
+          is_smooth(mesh)};
 }
 
 /// What the sizes so far tell the next one.
 struct Learned {
   ProxyCosts costs;
   bool flat = false;                // the last proxy needs no normals
+  bool normal_map = false;          // the last proxy has one
   double last_bytes = 0;            // of the last size that was made, in bytes of Draco
   double last_flip = 0;             // its loss
+  double all_bytes = 0;             // of those that stay
   bool smallest_loses = false;      // to a scale of as many bytes
+  RivalPrices prices;               // of scales
   bool holds_whole_object = false;  // the last proxy is all that larger ones could be
 };
 
@@ -170,6 +177,7 @@ Candidate best_of(const ProxySubject& subject, const ReferenceViews& views, Coar
                   int bytes, bool first, Learned& learned, const RunContext& context) {
   Candidate best;
   ProxyForm form = first_form(bytes, first, subject.varied);
+  const bool as_before = bytes >= kOneFormFrom && learned.normal_map;
   const auto bake = [&] {
     return bake_proxy(subject.source, subject.groups, surfaces, learned.costs, bytes, form, context);
   };
@@ -180,13 +188,16 @@ Candidate best_of(const ProxySubject& subject, const ReferenceViews& views, Coar
   auto baked = bake();
   if (!baked) return best;
   if (form.maps.normal) try_form(*baked);
-  form.maps.normal = false;
-  try_form(*baked);
-  form.normals = false;
-  if (may_be_flat(subject, *baked, bytes, first, learned.flat)) try_form(*baked);
+  if (!as_before) {
+    form.maps.normal = false;
+    try_form(*baked);
+    form.normals = false;
+    if (may_be_flat(subject, *baked, bytes, first, learned.flat)) try_form(*baked);
+  }
   if (best.made)
     if (const auto bits = texel_bits_of(*best.made)) learned.costs.texel_bits = *bits;
   learned.flat = best.made && !best.form.normals;
+  learned.normal_map = best.made && best.form.maps.normal;
   if (first && learned.flat)
     if (auto again = bake()) try_form(*again);
   return best;
@@ -198,7 +209,7 @@ bool cannot_win(CompetingScales& scales, int bytes, const Learned& learned, cons
   constexpr double kMostPower = 0.75;
   if (!(learned.last_bytes > 0)) return false;
   const double best = learned.last_flip * portable::pow(learned.last_bytes / bytes, kMostPower);
-  return scales.likeliest_wins(static_cast<std::uint64_t>(bytes), best, context);
+  return scales.likeliest_wins(static_cast<std::uint64_t>(bytes), best, learned.prices, context);
 }
 
 /// A proxy that stays, with its loss at the middle height.
@@ -222,6 +233,7 @@ std::vector<KeptProxy> kept_proxies(const ProxySubject& subject, const NestedSca
   const auto add = [&](int bytes) -> const char* {
     const bool first = kept.empty();
     if (learned.holds_whole_object) return kWholeTakesFewer;
+    if (learned.all_bytes + kOverAsked * bytes > subject.most_bytes) return kOfSource;
     if (!first && scales_compete && cannot_win(competitors, bytes, learned, inner)) return kScaleWins;
     Candidate best = best_of(subject, views, surfaces, bytes, first, learned, inner);
     if (!best.made) return "mesh and pictures do not fit";
@@ -231,9 +243,12 @@ std::vector<KeptProxy> kept_proxies(const ProxySubject& subject, const NestedSca
     const double flip = best.flip.mean(), share = first ? kFirstShare : 1;
     learned.last_bytes = share * bytes, learned.last_flip = flip;
     const auto rival_bytes = static_cast<std::uint64_t>(share * static_cast<double>(size));
-    const bool loses = scales_compete && competitors.win(rival_bytes, flip, inner);
+    const bool loses = scales_compete && competitors.win(rival_bytes, flip, learned.prices, inner);
     if (loses && !first) return kScaleWins;
     if (first) learned.smallest_loses = loses;
+    // Where the smallest one loses, larger ones must be worth its bytes, too.
+    if (first && !loses) learned.prices = competitors.prices_in_plans();
+    learned.all_bytes += static_cast<double>(size);
     kept.push_back({std::move(*best.made), best.flip});
     return nullptr;
   };
@@ -277,7 +292,7 @@ Proxies make_proxies(const NestedScales& scales, const std::vector<Material>& ma
   Proxies out;
   if (options.mode == ProxyMode::kNone) return out;
   if (scales.scales.empty()) throw StageError("proxies", "scales", "S_0", "none");
-  const std::vector<int> sizes = sizes_to_try(scales, images, options, out.notes);
+  const std::vector<int> sizes = sizes_to_try(scales, options, out.notes);
   if (sizes.empty()) return out;
   RunContext inner = context;
   inner.progress = nullptr;
@@ -291,7 +306,8 @@ Proxies make_proxies(const NestedScales& scales, const std::vector<Material>& ma
     for (const int bytes : sizes) note_none(out.notes, bytes, "the object has no extent");
     return out;
   }
-  const ProxySubject subject = subject_of(mesh, shown, groups, source, options.mode);
+  const ProxySubject subject =
+      subject_of(mesh, shown, groups, source, options.mode, most_bytes(scales, images, options.mode));
   out.proxies =
       measured_proxies(subject, kept_proxies(subject, scales, sizes, out.notes, inner, context), inner);
   return out;

@@ -7,7 +7,7 @@
 
 namespace texmesh {
 
-inline constexpr int kProxiesVersion = 10;
+inline constexpr int kProxiesVersion = 11;
 
 /// kAuto: only those that beat what the source's atlas gives for the same bytes.
 enum class ProxyMode : std::uint8_t { kNone, kAuto, kAlways };
@@ -18,7 +18,7 @@ struct EnumNames<ProxyMode> {
 
 struct ProxiesOptions {
   ProxyMode mode = ProxyMode::kAuto;
-  std::vector<int> sizes{36000, 50000, 150000};
+  std::vector<int> sizes{36000, 50000, 150000, 250000, 450000};
   static void fields(auto& s, auto&& v) {
     v("mode", s.mode,
       "whether coarse meshes with atlases of their own are baked: auto = where they beat the scales with the "
@@ -46,9 +46,11 @@ struct ProxiesOptions {
 ///   heights, where the height is that of the bounding box's longest side; four views, at the largest two.
 /// - Automatic choice: a size at which a scale with the source's atlas looks better is left out, each size by
 ///   itself. The smallest one is compared with scales of 55 % of its bytes, in which Draco codes as much, and
-///   it stays where a larger one does, which clients cannot show at once. A size is not tried at all where
-///   the likeliest scale is farther ahead of the last size than proxies come by their bytes. All of them take
-///   at most 15 % of the source: of its images' files and of S_0's mesh, coded.
+///   it stays where a larger one does, which clients cannot show at once. Where it wins, larger ones are
+///   compared with what plans pay for such scales: tables, the coarsest mesh, texels as their coding
+///   leaves them. A size is not tried at all where the likeliest scale is farther ahead of the last size than
+///   proxies come by their bytes. All of them take at most 35 % of the source: of its images' files and of
+///   S_0's mesh, coded.
 /// Sizes that get no proxy have a note that says why; no model fails because of its proxies. `pixels` are
 /// fill_planes()'s. Same bytes for any thread count and machine.
 Proxies make_proxies(const NestedScales& scales, const std::vector<Material>& materials,

@@ -38,6 +38,7 @@ struct ShortName {
 const std::map<std::string, ShortName> kShortNames{{"package.title", {"--title", true}},
                                                    {"import.up", {"--up", true}},
                                                    {"proxies.mode", {"--proxies", false}},
+                                                   {"atlas.mode", {"--atlas", false}},
                                                    {"ladder.rungs", {"--rungs", true}},
                                                    {"ladder.mode", {"--ladder", true}},
                                                    {"ladder.keep_source", {"--keep-source", true}},

@@ -3,8 +3,9 @@
 #include <compare>
 #include <memory>
 
+#include "stages/charts/charts.h"
+#include "stages/charts/texture_frame.h"
 #include "stages/geometry/triangle_tree.h"
-#include "stages/proxies/atlas_mesh.h"
 #include "stages/render/render_texture.h"
 
 namespace texmesh {
@@ -24,13 +25,6 @@ struct MaterialGroups {
   bool mip_levels = true;  // whether viewers read textures with them
 };
 MaterialGroups find_groups(const Mesh& mesh, const std::vector<RenderMaterial>& materials);
-
-/// The directions of a triangle's texture axes across a normal, as renderers derive them from the texture
-/// coordinates (Schueler 2013): the longer one is unit, none is where the coordinates have no area.
-struct TextureFrame {
-  Vec3d along_u, along_v;
-};
-TextureFrame texture_frame(const std::array<Vec3d, 3>& corner, const std::array<Vec2d, 3>& uv, Vec3d normal);
 
 /// What of a sample is asked for; the rest stays as it is made.
 struct SampleParts {

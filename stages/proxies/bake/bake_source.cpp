@@ -34,25 +34,6 @@ bool read_alike(const TextureSlot& a, const TextureSlot& b) {
   return a.texture == b.texture && placed_alike(a, b);
 }
 
-/// Tangent and bitangent that the wedges carry; false when a corner has none.
-bool vertex_frame(const Mesh& mesh, const SurfacePlace& place, Vec3f face, Vec3f frame[2]) {
-  if (mesh.tangents.empty()) return false;
-  const Triangle& corner = mesh.triangles[place.triangle];
-  frame[0] = frame[1] = {};
-  for (std::size_t k = 0; k < 3; ++k) {
-    const Vec4f tangent = mesh.tangents[corner[k]];
-    const Vec3f direction = normalized(Vec3f{tangent.x, tangent.y, tangent.z});
-    if (!(dot(direction, direction) > 0.5f)) return false;
-    const Vec3f normal = mesh.normals.empty() ? face : mesh.normals[corner[k]];
-    const auto weight = static_cast<float>(place.weight[k]);
-    frame[0] = frame[0] + direction * weight;
-    frame[1] = frame[1] + normalized(cross(normal, direction) * tangent.w) * weight;
-  }
-  frame[0] = normalized(frame[0]);
-  frame[1] = normalized(frame[1]);
-  return true;
-}
-
 }  // namespace
 
 MaterialGroup group_of(const RenderMaterial& material) {
@@ -75,16 +56,6 @@ MaterialGroups find_groups(const Mesh& mesh, const std::vector<RenderMaterial>& 
         std::lower_bound(out.groups.begin(), out.groups.end(), of_material[m]) - out.groups.begin());
   for (const std::uint16_t m : mesh.triangle_material) out.triangle_group.push_back(index[m]);
   return out;
-}
-
-TextureFrame texture_frame(const std::array<Vec3d, 3>& corner, const std::array<Vec2d, 3>& uv, Vec3d normal) {
-  const Vec3d edge1 = corner[1] - corner[0], edge2 = corner[2] - corner[0];
-  const Vec2d along1 = uv[1] - uv[0], along2 = uv[2] - uv[0];
-  const Vec3d u = cross(normal, edge1 * along2.x - edge2 * along1.x);
-  const Vec3d v = cross(normal, edge2 * along1.y - edge1 * along2.y);
-  const double square = std::max(dot(u, u), dot(v, v));
-  const double scale = square > 0 && std::isfinite(square) ? 1 / std::sqrt(square) : 0;
-  return {u * scale, v * scale};
 }
 
 BakeSource::BakeSource(const Mesh& mesh, const ShownMaterials& shown, const MaterialGroups& groups)
@@ -179,19 +150,20 @@ Vec3f BakeSource::mapped_normal(Reader& reader, const RenderMaterial& material) 
       mesh_.normals.empty() ? face : unit_or(mean_of(mesh_.normals, corner, place.weight), face);
   const TextureSlot& slot = material.slot(TextureUse::kNormal);
   if (slot.texture < 0) return normal;
-  Vec3f frame[2];
-  if (!vertex_frame(mesh_, place, face, frame)) {
+  TextureFrame frame;
+  if (const auto carried = vertex_frame(mesh_, place.triangle, place.weight)) {
+    frame = *carried;
+  } else {
     const std::vector<Vec2f>& uv = slot.uv_set == 1 ? mesh_.uv1 : mesh_.uv0;
     const UvMatrix matrix = uv_matrix(slot.transform);
     std::array<Vec2d, 3> at;
     for (std::size_t k = 0; k < 3; ++k) at[k] = to_double(matrix.direction(uv[corner[k]]));
-    const TextureFrame derived = texture_frame(corners, at, to_double(normal));
-    frame[0] = to_float(derived.along_u), frame[1] = to_float(derived.along_v);
+    frame = texture_frame(corners, at, to_double(normal));
   }
   const Vec4f texel = reader.read(slot);
   const float scale = material.normal_scale;
-  return unit_or(frame[0] * ((texel.x * 2 - 1) * scale) + frame[1] * ((texel.y * 2 - 1) * scale) +
-                     normal * (texel.z * 2 - 1),
+  return unit_or(to_float(frame.along_u) * ((texel.x * 2 - 1) * scale) +
+                     to_float(frame.along_v) * ((texel.y * 2 - 1) * scale) + normal * (texel.z * 2 - 1),
                  normal);
 }
 

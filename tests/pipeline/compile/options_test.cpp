@@ -93,6 +93,20 @@ TEST(Options, ADefaultFollowsFromOtherOptionsAndWhatTheUserSetsDoesNot) {
   EXPECT_EQ(resolve_options(o).ladder.uncovered, Uncovered::kFree);
 }
 
+TEST(Options, NewChartsHaveDefaultsOfTheirOwn) {
+  CompileOptions o;
+  EXPECT_EQ(resolve_options(o).simplification.seam_weight, 1);
+  EXPECT_EQ(resolve_options(o).proxies.mode, ProxyMode::kAuto);
+  o.atlas.mode = AtlasMode::kRebuild;
+  EXPECT_EQ(resolve_options(o).simplification.seam_weight, 0.1);
+  EXPECT_EQ(resolve_options(o).proxies.mode, ProxyMode::kAlways);
+  EXPECT_EQ(resolve_options(o).ladder.uncovered, Uncovered::kKept);
+  EXPECT_EQ(write_profile(resolve_options(resolve_options(o))), write_profile(resolve_options(o)));
+  read_profile(o, R"({"version":1,"simplification":{"seam_weight":1},"proxies":{"mode":"auto"}})", "p");
+  EXPECT_EQ(resolve_options(o).simplification.seam_weight, 1);  // the defaults' values, but chosen
+  EXPECT_EQ(resolve_options(o).proxies.mode, ProxyMode::kAuto);
+}
+
 TEST(Options, RungsThatAreGivenAreAllStored) {
   EXPECT_TRUE(resolve_options({}).ladder.prune);
   for (const char* name :

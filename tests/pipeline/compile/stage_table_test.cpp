@@ -10,16 +10,20 @@ namespace texmesh {
 namespace {
 
 TEST(StageTable, EveryInputIsMadeBeforeItIsUsedAndEveryOptionIsRead) {
-  std::set<std::string> made{"source", "provenance"}, read;
-  for (const Stage& s : default_stage_table()) {
-    for (const ArtefactName& input : s.inputs)
-      EXPECT_TRUE(made.contains(input.name)) << s.name << " reads " << input.name;
-    for (const StageOutput& output : s.outputs) EXPECT_TRUE(made.insert(output.name).second) << output.name;
-    for (const StageOption& option : s.options)
-      for (const auto& [path, text] : option.fields) read.insert(path);
-    EXPECT_GE(s.version, 1);
-  }
+  std::set<std::string> read;
   CompileOptions o;
+  for (const AtlasMode mode : {AtlasMode::kKeep, AtlasMode::kRebuild}) {
+    o.atlas.mode = mode;
+    std::set<std::string> made{"source", "provenance"};
+    for (const Stage& s : stage_table(o)) {
+      for (const ArtefactName& input : s.inputs)
+        EXPECT_TRUE(made.contains(input.name)) << s.name << " reads " << input.name;
+      for (const StageOutput& output : s.outputs) EXPECT_TRUE(made.insert(output.name).second) << output.name;
+      for (const StageOption& option : s.options)
+        for (const auto& [path, text] : option.fields) read.insert(path);
+      EXPECT_GE(s.version, 1);
+    }
+  }
   for (const OptionField& f : list_options(o))
     EXPECT_TRUE(read.contains(f.path())) << f.path() << " is in no key";
 }
@@ -32,6 +36,23 @@ TEST(StageTable, EveryStageSaysItsShareOfTheTime) {
     all += s.time_share;
   }
   EXPECT_NEAR(all, 1, 1e-9);
+}
+
+/// Without an atlas of its own a package has the bytes that it had before there was such a stage.
+TEST(StageTable, TheAtlasIsAStageWhereItIsNotKept) {
+  const auto has_atlas = [](const std::vector<Stage>& table) {
+    return std::ranges::find(table, "atlas", &Stage::name) != table.end();
+  };
+  EXPECT_FALSE(has_atlas(default_stage_table()));
+  CompileOptions o;
+  o.atlas.mode = AtlasMode::kRebuild;
+  EXPECT_TRUE(has_atlas(stage_table(o)));
+  for (const Stage& s : stage_table(o)) {
+    const auto reads = [&](const char* name) {
+      return std::ranges::find(s.inputs, name, &ArtefactName::name) != s.inputs.end();
+    };
+    if (s.name != "atlas") EXPECT_FALSE(reads("import.images") || reads("import.materials")) << s.name;
+  }
 }
 
 TEST(StageTable, AnOptionHasTheNameOfThePlaceWhereItStands) {

@@ -1,6 +1,6 @@
 #pragma once
 // Small atlases made by hand.
-#include "stages/proxies/atlas_mesh.h"
+#include "stages/charts/charts.h"
 #include "stages/render/render_texture.h"
 #include "tests/stages/render/render_fixtures.h"
 

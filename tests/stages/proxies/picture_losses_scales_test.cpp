@@ -50,27 +50,40 @@ struct Competitors : ::testing::Test {
   CompetingScales competitors{scales, shown, views};
 };
 
-TEST_F(Competitors, WinWithoutAnyLossWhereTheWholeMeshFits) { EXPECT_TRUE(competitors.win(30000, 0, {})); }
+TEST_F(Competitors, WinWithoutAnyLossWhereTheWholeMeshFits) {
+  EXPECT_TRUE(competitors.win(30000, 0, {}, {}));
+}
 
 TEST_F(Competitors, NeverWinWhereTheirPicturesAreFartherOff) {
-  EXPECT_FALSE(competitors.win(30000, -1e-9, {}));
+  EXPECT_FALSE(competitors.win(30000, -1e-9, {}, {}));
 }
 
 TEST_F(Competitors, NeverWinWhereNoScaleFits) {
-  EXPECT_FALSE(competitors.win(4000, 1, {}));
-  EXPECT_FALSE(competitors.win(0, 1, {}));
+  EXPECT_FALSE(competitors.win(4000, 1, {}, {}));
+  EXPECT_FALSE(competitors.win(0, 1, {}, {}));
 }
 
 TEST_F(Competitors, TheLikeliestSpeaksForAll) {
-  EXPECT_TRUE(competitors.likeliest_wins(30000, 0, {}));
-  EXPECT_FALSE(competitors.likeliest_wins(30000, -1e-9, {}));
-  EXPECT_FALSE(competitors.likeliest_wins(4000, 1, {}));
+  EXPECT_TRUE(competitors.likeliest_wins(30000, 0, {}, {}));
+  EXPECT_FALSE(competitors.likeliest_wins(30000, -1e-9, {}, {}));
+  EXPECT_FALSE(competitors.likeliest_wins(4000, 1, {}, {}));
+}
+
+/// The bytes that hold the whole mesh by the estimate do not pay for it in a plan.
+TEST_F(Competitors, PayMoreInPlans) {
+  const RivalPrices plans = competitors.prices_in_plans();
+  EXPECT_GT(plans.mesh, 1);
+  EXPECT_GT(plans.besides, 15000);
+  EXPECT_FALSE(competitors.win(30000, 0, plans, {}));
+  EXPECT_TRUE(competitors.win(60000, 0, plans, {}));
+  const auto least = static_cast<std::uint64_t>(plans.besides + 3000);
+  EXPECT_FALSE(competitors.win(least, 1, plans, {})) << "nothing is left for a mesh";
 }
 
 /// What was compared with one proxy is known for the next, and half of the views are not taken for all.
 TEST_F(Competitors, ManyQuestionsHaveTheAnswersOfOne) {
   NestedScales coarse = alone(testing::sphere(6, 9));  // stands for S_0 and does not look like it
-  const auto asked = [&](CompetingScales& of, double flip) { return of.win(30000, flip, {}); };
+  const auto asked = [&](CompetingScales& of, double flip) { return of.win(30000, flip, {}, {}); };
   CompetingScales all(coarse, shown, views);
   for (const double flip : {1e-4, 0.02, 0.05, 0.1, 0.5, 1e-4}) {
     CompetingScales one(coarse, shown, views);

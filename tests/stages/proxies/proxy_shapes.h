@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "stages/proxies/atlas_mesh.h"
+#include "stages/proxies/simplify_surface.h"
 #include "tests/support/hostile_meshes.h"
 #include "tests/support/meshes.h"
 

@@ -1,4 +1,4 @@
-#include "stages/proxies/atlas_mesh.h"
+#include "stages/charts/charts.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 #pragma once
-// Inside proxies only: pairs of vertices, or of charts, in the order in which they become one; a chart's
+// Inside the room only: pairs of vertices, or of charts, in the order in which they become one; a chart's
 // triangles laid into a plane; which cells of a texture a chart touches, and which are taken.
 #include <array>
 #include <optional>

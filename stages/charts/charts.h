@@ -1,5 +1,5 @@
 #pragma once
-// Inside the room only: a coarse surface of a model, cut into charts, which are packed into an atlas.
+// A surface cut into charts, which are packed into an atlas.
 #include <optional>
 #include <span>
 
@@ -35,24 +35,6 @@ struct AtlasMesh {
   friend bool operator==(const AtlasMesh&, const AtlasMesh&) = default;
 };
 
-/// Coarse surfaces of a triangle soup, by collapses of edges to the place of least quadric error (Garland and
-/// Heckbert 1997). Topology may change: there is no link condition, and what is too small to be seen
-/// vanishes.
-///
-/// `positions`: finite or not, object units; equal ones are welded. `triangles`: three position indices each;
-/// those with equal, non-finite or missing corners are dropped. `group`: per triangle, or empty for one
-/// group; outlines of groups are held as borders are. `triangle_counts`: how many triangles to have at most,
-/// in falling order, each >= 1.
-///
-/// Returns one surface per count, from one run. A surface has no triangle only when the soup has none with an
-/// area. Same bytes on every machine, for any number of threads. Time O(n log n), memory about 200 bytes per
-/// triangle. Throws Cancelled.
-std::vector<ProxySurface> simplify_surface(std::span<const Vec3f> positions,
-                                           std::span<const Triangle> triangles,
-                                           std::span<const std::uint32_t> group,
-                                           std::span<const std::uint32_t> triangle_counts,
-                                           const RunContext& context);
-
 /// A surface cut into charts, each flattened without overlap.
 struct SurfaceCharts {
   std::vector<std::uint32_t> chart_of;  // per triangle; charts are numbered by their lowest triangle
@@ -68,11 +50,17 @@ struct SurfaceCharts {
   std::vector<Vec2d> size;
 };
 
+/// What flattening may do to a chart.
+struct ChartLimits {
+  double stretch = 1.25;  // L2 of Sander et al. 2001: the root of the mean squared stretch, 1 for a plane
+  double ratio = 3;       // of a triangle's singular values, and of one to the chart's mean
+};
+
 /// Cuts a surface into charts by merging triangles from the bottom up, and flattens each chart along its mean
 /// normal, or so that angles stay. A chart is a disk of one group, which may be cut; no triangle flips, no
-/// two overlap; singular values of the flattening are within 3 x of each other. Same bytes everywhere. Throws
-/// Cancelled.
-SurfaceCharts segment_charts(const ProxySurface& surface, const RunContext& context);
+/// two overlap; the flattening keeps the limits. Same bytes everywhere. Throws Cancelled.
+SurfaceCharts segment_charts(const ProxySurface& surface, const RunContext& context,
+                             const ChartLimits& limits = {});
 
 /// Packs charts into a texture of width_px x height_px (1..16384 each) with texels of one size as far as
 /// whole texels allow. nullopt when there are more charts than a texture of this size can hold: a larger

@@ -1,4 +1,4 @@
-#include "stages/proxies/atlas_mesh.h"
+#include "stages/charts/charts.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <map>
 
 #include "format/base/vec.h"
-#include "stages/proxies/atlas/chart_parts.h"
+#include "stages/charts/chart_parts.h"
 #include "tests/stages/proxies/proxy_shapes.h"
 
 namespace texmesh {

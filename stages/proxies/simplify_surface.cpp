@@ -2,11 +2,11 @@
 // for. SurfaceCollapse joins the two ends of an edge, cheapest first, on CornerRings, which know the
 // triangles at a vertex. Where nothing goes any more the guards of shape are loosened, and at last the
 // smallest triangles are dropped, so that every count is reached.
-#include "stages/proxies/atlas_mesh.h"
+#include "stages/proxies/simplify_surface.h"
 
+#include "stages/charts/chart_parts.h"
 #include "stages/geometry/mesh_topology.h"
 #include "stages/geometry/quadric.h"
-#include "stages/proxies/atlas/chart_parts.h"
 
 namespace texmesh {
 namespace {

@@ -4,8 +4,8 @@
 #include <bit>
 #include <numeric>
 
-#include "stages/proxies/atlas/chart_parts.h"
-#include "stages/proxies/atlas_mesh.h"
+#include "stages/charts/chart_parts.h"
+#include "stages/charts/charts.h"
 
 namespace texmesh {
 namespace {

@@ -1,4 +1,4 @@
-#include "stages/proxies/atlas_mesh.h"
+#include "stages/proxies/simplify_surface.h"
 
 #include <gtest/gtest.h>
 

@@ -6,9 +6,9 @@
 #include <numeric>
 
 #include "format/base/portable_math.h"
+#include "stages/charts/chart_parts.h"
+#include "stages/charts/charts.h"
 #include "stages/geometry/mesh_topology.h"
-#include "stages/proxies/atlas/chart_parts.h"
-#include "stages/proxies/atlas_mesh.h"
 
 namespace texmesh {
 namespace {
@@ -61,20 +61,16 @@ std::vector<Vec2d> conformal_map(std::span<const Triangle> triangles, std::span<
   return places;
 }
 
-// L2 of Sander et al. 2001: the root of the mean squared stretch, 1 for a plane.
-constexpr double kMostStretch = 1.25;
 // A projection that stretches no more than this is kept, which saves the solver's time.
 constexpr double kProjectionStretch = 1.02;
-// Of a triangle's singular values and of one to the chart's mean.
-constexpr double kMostRatio = 3;
 
 /// Lays disks of triangles into planes, and keeps the places of those that became charts. A chart's area in
 /// its plane is its area on the surface.
 class ChartLayout {
  public:
   /// Every triangle lies in its own plane at first.
-  explicit ChartLayout(const ProxySurface& surface)
-      : surface_(surface), number_of_(3 * surface.triangles.size(), kNoIndex) {
+  ChartLayout(const ProxySurface& surface, const ChartLimits& limits)
+      : surface_(surface), limits_(limits), number_of_(3 * surface.triangles.size(), kNoIndex) {
     for (std::uint32_t t = 0; t < surface.triangles.size(); ++t) {
       own_.emplace_back(
           std::array{corner_position(3 * t), corner_position(3 * t + 1), corner_position(3 * t + 2)});
@@ -91,10 +87,10 @@ class ChartLayout {
                 const std::vector<std::uint32_t>& vertices, Vec3d area_normal) {
     project(triangles, area_normal);
     if (is_sound(triangles, border, vertices, kProjectionStretch)) return true;
-    if (unfold(triangles, border, vertices) && is_sound(triangles, border, vertices, kMostStretch))
+    if (unfold(triangles, border, vertices) && is_sound(triangles, border, vertices, limits_.stretch))
       return true;
     project(triangles, area_normal);
-    return is_sound(triangles, border, vertices, kMostStretch);
+    return is_sound(triangles, border, vertices, limits_.stretch);
   }
 
   /// The places of the disk just tried become the chart's.
@@ -156,7 +152,8 @@ class ChartLayout {
     double area = 0, flat_area = 0, stretch = 0, least2 = 1e300, largest2 = 0;
     for (const std::uint32_t t : triangles) {
       const FlatStretch s = flat_stretch(own_[t], &tried_[3 * std::size_t{t}]);
-      if (!(s.area > 0) || !(s.least2 > 0) || s.largest2 > kMostRatio * kMostRatio * s.least2) return false;
+      if (!(s.area > 0) || !(s.least2 > 0) || s.largest2 > limits_.ratio * limits_.ratio * s.least2)
+        return false;
       area += own_[t].area();
       flat_area += s.area;
       stretch += own_[t].area() * (1 / s.least2 + 1 / s.largest2) / 2;
@@ -165,7 +162,8 @@ class ChartLayout {
     }
     const double scale2 = area / flat_area;  // to the chart's area
     if (!(stretch <= most_stretch * most_stretch * area * scale2)) return false;
-    if (least2 * scale2 * kMostRatio * kMostRatio < 1 || largest2 * scale2 > kMostRatio * kMostRatio)
+    if (least2 * scale2 * limits_.ratio * limits_.ratio < 1 ||
+        largest2 * scale2 > limits_.ratio * limits_.ratio)
       return false;
     if (!border_is_simple(border, vertices, tried_)) return false;
     const double scale = std::sqrt(scale2);
@@ -189,6 +187,7 @@ class ChartLayout {
   }
 
   const ProxySurface& surface_;
+  const ChartLimits limits_;
   std::vector<OwnPlane> own_;             // per triangle
   std::vector<Vec2d> places_, tried_;     // per corner
   std::vector<std::uint32_t> number_of_;  // per vertex: its number in the disk that is tried
@@ -220,8 +219,8 @@ constexpr double kMuchLarger = 1.25;
 /// long as the result is a chart that segment_charts promises.
 class ChartMerge {
  public:
-  explicit ChartMerge(const ProxySurface& surface)
-      : surface_(surface), queue_(surface.triangles.size()), layout_(surface) {
+  ChartMerge(const ProxySurface& surface, const ChartLimits& limits)
+      : surface_(surface), queue_(surface.triangles.size()), layout_(surface, limits) {
     measure_triangles();
     find_opposites();
     start_charts();
@@ -505,8 +504,9 @@ std::vector<Vec2d> convex_hull(std::vector<Vec2d> points) {
 
 }  // namespace
 
-SurfaceCharts segment_charts(const ProxySurface& surface, const RunContext& context) {
-  ChartMerge merge(surface);
+SurfaceCharts segment_charts(const ProxySurface& surface, const RunContext& context,
+                             const ChartLimits& limits) {
+  ChartMerge merge(surface, limits);
   merge.run(context);
   std::vector<std::uint32_t> chart_of(surface.triangles.size());
   for (std::uint32_t c = 0; c < merge.charts().size(); ++c)

@@ -1,4 +1,4 @@
-#include "stages/proxies/atlas/chart_parts.h"
+#include "stages/charts/chart_parts.h"
 
 #include <gtest/gtest.h>
 

@@ -1,0 +1,243 @@
+#include "stages/atlas/atlas.h"
+
+#include <gtest/gtest.h>
+
+#include "stages/base/run_context.h"
+#include "stages/charts/texture_frame.h"
+#include "stages/condition/condition.h"
+#include "stages/geometry/mesh_topology.h"
+#include "stages/image/decode_image.h"
+#include "stages/image/png_writer.h"
+#include "tests/support/hostile_meshes.h"
+#include "tests/support/meshes.h"
+
+namespace texmesh {
+namespace {
+
+using Pixel = std::array<std::uint8_t, 3>;
+
+Image image_of(std::uint32_t side_px, auto&& texel) {
+  Pixels pixels{side_px, side_px, 3, {}};
+  for (std::uint32_t y = 0; y < side_px; ++y)
+    for (std::uint32_t x = 0; x < side_px; ++x)
+      for (const std::uint8_t c : Pixel(texel(x, y))) pixels.data.push_back(c);
+  return {"a.png", ImageFormat::kPng, side_px, side_px, 3, 8, false, false, write_png(pixels)};
+}
+
+/// Red is u, green is v.
+Image places(std::uint32_t side_px) {
+  return image_of(side_px, [=](std::uint32_t x, std::uint32_t y) {
+    return Pixel{static_cast<std::uint8_t>((x + 0.5) * 255 / side_px),
+                 static_cast<std::uint8_t>((y + 0.5) * 255 / side_px), 0};
+  });
+}
+
+/// Every triangle in a cell of its own.
+Mesh scattered(const Mesh& from) {
+  Mesh out = from;
+  const auto columns = static_cast<std::uint32_t>(std::ceil(std::sqrt(double(from.triangles.size()))));
+  out.wedge_position.clear(), out.uv0.clear(), out.normals.clear();
+  for (std::uint32_t t = 0; t < from.triangles.size(); ++t)
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      const std::uint32_t wedge = from.triangles[t][k];
+      const float x = k == 1 ? 0.8f : 0.2f, y = k == 2 ? 0.8f : 0.2f;
+      out.triangles[t][k] = static_cast<std::uint32_t>(out.wedge_position.size());
+      out.wedge_position.push_back(from.wedge_position[wedge]);
+      if (!from.normals.empty()) out.normals.push_back(from.normals[wedge]);
+      out.uv0.push_back(
+          {(float(t % columns) + x) / float(columns), (float(t / columns) + y) / float(columns)});
+    }
+  return out;
+}
+
+/// Numbers: no curve of sRGB between the texels and what is compared.
+Material data_material(std::int32_t image) {
+  Material out;
+  out.metallic_roughness_texture.image = image;
+  return out;
+}
+
+struct Charted {
+  ConditionedMesh source;
+  ChartedModel made;
+};
+Charted charted(const Mesh& mesh, const std::vector<Material>& materials, const std::vector<Image>& images,
+                AtlasMode mode = AtlasMode::kRebuild, int threads = 1) {
+  RunContext context;
+  context.threads = threads;
+  Charted out;
+  out.source = condition_mesh(mesh, false, {}, context);
+  AtlasOptions options;
+  options.mode = mode;
+  out.made = chart_model(out.source, materials, images, options, context);
+  return out;
+}
+
+Vec2f middle(const Mesh& mesh, const Triangle& t) {
+  return (mesh.uv0[t[0]] + mesh.uv0[t[1]] + mesh.uv0[t[2]]) * (1 / 3.f);
+}
+
+/// Triangle by triangle the source's surface, with coordinates in the texture and materials that are there.
+void expect_same_surface(const Charted& c) {
+  const Mesh &before = c.source.mesh, &after = c.made.mesh.mesh;
+  ASSERT_EQ(after.triangles.size(), before.triangles.size());
+  EXPECT_EQ(after.positions, before.positions);
+  EXPECT_EQ(after.triangle_part, before.triangle_part);
+  for (std::uint32_t t = 0; t < before.triangles.size(); ++t) {
+    ASSERT_LT(after.triangle_material[t], c.made.materials.size());
+    for (int k = 0; k < 3; ++k) {
+      ASSERT_EQ(after.position_of(t, k), before.position_of(t, k));
+      const std::uint32_t old = before.triangles[t][std::size_t(k)], now = after.triangles[t][std::size_t(k)];
+      if (!before.normals.empty()) ASSERT_EQ(after.normals[now], before.normals[old]);
+      if (!before.colours.empty()) ASSERT_EQ(after.colours[now], before.colours[old]);
+      ASSERT_TRUE(after.uv0[now].x >= 0 && after.uv0[now].x <= 1);
+      ASSERT_TRUE(after.uv0[now].y >= 0 && after.uv0[now].y <= 1);
+    }
+  }
+  for (Material m : c.made.materials)
+    for_each_texture(m, [&](const TextureRef& r) { EXPECT_LT(r.image, std::int32_t(c.made.images.size())); });
+  for (const Image& image : c.made.images) EXPECT_LE(image.width_px, 8192u);
+}
+
+TEST(Atlas, ScatteredTrianglesBecomeFewCharts) {
+  const Charted c = charted(scattered(testing::bumpy_sphere(20, 30)), {data_material(0)}, {places(512)});
+  expect_same_surface(c);
+  ASSERT_EQ(c.made.images.size(), 1u);
+  const Mesh& mesh = c.made.mesh.mesh;
+  EXPECT_LT(double(mesh.wedge_count()), 1.5 * double(mesh.positions.size()));
+  EXPECT_GT(double(c.source.mesh.wedge_count()), 5 * double(mesh.positions.size()));
+}
+
+TEST(Atlas, TexelsAreThoseOfTheSameTriangle) {
+  const Charted c = charted(scattered(testing::bumpy_sphere(10, 14)), {data_material(0)}, {places(512)});
+  const Pixels texels = decode_image(c.made.images.at(0));
+  for (std::uint32_t t = 0; t < c.source.mesh.triangles.size(); ++t) {
+    const Vec2f from = middle(c.source.mesh, c.source.mesh.triangles[t]),
+                at = middle(c.made.mesh.mesh, c.made.mesh.mesh.triangles[t]);
+    const std::uint8_t* texel = texels.at(static_cast<std::uint32_t>(at.x * float(texels.width_px)),
+                                          static_cast<std::uint32_t>(at.y * float(texels.height_px)));
+    EXPECT_NEAR(texel[0], from.x * 255, 2) << t;
+    EXPECT_NEAR(texel[1], from.y * 255, 2) << t;
+  }
+}
+
+TEST(Atlas, NormalsPointWhereTheyDid) {
+  Material material;
+  material.normal_texture.image = 0;
+  const Vec3d tilted = normalized(Vec3d{0.5, 0.2, 0.9});
+  const auto code = [](double x) { return static_cast<std::uint8_t>(std::lround((x / 2 + 0.5) * 255)); };
+  const Image map = image_of(256, [&](std::uint32_t, std::uint32_t) {
+    return Pixel{code(tilted.x), code(tilted.y), code(tilted.z)};
+  });
+  const Charted c = charted(scattered(testing::bumpy_sphere(8, 10)), {material}, {map});
+  const Pixels texels = decode_image(c.made.images.at(0));
+  const auto shown = [](const Mesh& mesh, std::uint32_t t, Vec3d value) {
+    const std::array<Vec3d, 3> corner = corner_points(mesh, mesh.triangles[t]);
+    std::array<Vec2d, 3> uv;
+    Vec3d normal;
+    for (std::size_t k = 0; k < 3; ++k) {
+      uv[k] = to_double(mesh.uv0[mesh.triangles[t][k]]);
+      normal = normal + to_double(mesh.normals[mesh.triangles[t][k]]);
+    }
+    normal = normalized(normal);
+    const TextureFrame frame = texture_frame(corner, uv, normal);
+    return normalized(frame.along_u * value.x + frame.along_v * value.y + normal * value.z);
+  };
+  for (std::uint32_t t = 0; t < c.source.mesh.triangles.size(); ++t) {
+    const Vec2f at = middle(c.made.mesh.mesh, c.made.mesh.mesh.triangles[t]);
+    const std::uint8_t* texel = texels.at(static_cast<std::uint32_t>(at.x * float(texels.width_px)),
+                                          static_cast<std::uint32_t>(at.y * float(texels.height_px)));
+    const Vec3d value{texel[0] / 127.5 - 1, texel[1] / 127.5 - 1, texel[2] / 127.5 - 1};
+    EXPECT_GT(dot(shown(c.source.mesh, t, tilted), shown(c.made.mesh.mesh, t, value)), 0.995) << t;
+  }
+}
+
+TEST(Atlas, MaterialsThatDifferInImagesAloneBecomeOne) {
+  Mesh mesh = scattered(testing::cube());
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) mesh.triangle_material[t] = std::uint16_t(t % 3);
+  std::vector<Material> materials{data_material(0), data_material(1), data_material(1)};
+  materials[1].name = "another name";
+  const auto same = charted(mesh, materials, {places(128), places(256)});
+  expect_same_surface(same);
+  EXPECT_EQ(same.made.materials.size(), 1u);
+  materials[2].roughness = 0.5f;
+  const auto apart = charted(mesh, materials, {places(128), places(256)});
+  expect_same_surface(apart);
+  EXPECT_EQ(apart.made.materials.size(), 2u);
+  materials[2] = {};
+  const auto plain = charted(mesh, materials, {places(128), places(256)});
+  expect_same_surface(plain);
+  EXPECT_EQ(plain.made.materials.size(), 2u);
+  EXPECT_EQ(plain.made.images.size(), 1u);
+}
+
+TEST(Atlas, KeepsWhatItCannotOrNeedNotRebuild) {
+  const Mesh mesh = scattered(testing::cube());
+  const auto is_kept = [](const Charted& c) {
+    return c.made.mesh.mesh == c.source.mesh && c.made.images.size() == 1 && c.made.images[0].name == "a.png";
+  };
+  EXPECT_TRUE(is_kept(charted(mesh, {data_material(0)}, {places(64)}, AtlasMode::kKeep)));
+  EXPECT_TRUE(is_kept(charted(mesh, {data_material(0)}, {places(64)}, AtlasMode::kAuto)));
+  EXPECT_TRUE(is_kept(charted(mesh, {Material{}}, {places(64)})));
+  Material nearest = data_material(0);
+  nearest.metallic_roughness_texture.nearest = true;
+  EXPECT_TRUE(is_kept(charted(mesh, {nearest}, {places(64)})));
+  Mesh bare = mesh;
+  bare.uv0.clear();
+  EXPECT_TRUE(is_kept(charted(bare, {data_material(0)}, {places(64)})));
+  EXPECT_FALSE(is_kept(charted(mesh, {data_material(0)}, {places(64)})));
+}
+
+TEST(Atlas, AutoRebuildsManyCharts) {
+  const auto c =
+      charted(scattered(testing::bumpy_sphere(20, 30)), {data_material(0)}, {places(256)}, AtlasMode::kAuto);
+  EXPECT_NE(c.made.images.at(0).name, "a.png");
+}
+
+TEST(Atlas, SameBytesForAnyThreadCount) {
+  const Mesh mesh = scattered(testing::bumpy_sphere(12, 18));
+  const auto one = charted(mesh, {data_material(0)}, {places(256)}),
+             many = charted(mesh, {data_material(0)}, {places(256)}, AtlasMode::kRebuild, 8);
+  EXPECT_EQ(one.made.mesh.mesh, many.made.mesh.mesh);
+  EXPECT_EQ(one.made.materials, many.made.materials);
+  EXPECT_EQ(one.made.images, many.made.images);
+}
+
+TEST(Atlas, StrangeModelsAreRebuiltOrKept) {
+  testing::Random random{1};
+  const auto with_uv = [](Mesh mesh, float scale) {
+    mesh.uv0.clear();
+    for (const std::uint32_t p : mesh.wedge_position) {
+      const Vec3f at = mesh.positions[p];
+      mesh.uv0.push_back({at.x * scale, at.y * scale});
+    }
+    return mesh;
+  };
+  Mesh far = testing::sheet(6);
+  for (Vec3f& p : far.positions) p = p + Vec3f{1e7f, 1e7f, -1e7f};
+  Mesh huge = testing::bumpy_sphere(6, 8);
+  for (Vec3f& p : huge.positions) p = p * 1e7f;
+  Mesh one = testing::sheet(1);
+  one.triangles.resize(1), one.triangle_material.resize(1), one.triangle_part.resize(1);
+  const std::vector<Mesh> meshes{with_uv(testing::cube(), 20),           // tiles
+                                 with_uv(testing::sphere(8, 12), 0.5f),  // two sides share texels
+                                 with_uv(testing::sheet(4), 0),          // no area in the texture
+                                 far,
+                                 huge,
+                                 one,
+                                 with_uv(testing::sliver_sheet(6), 1),
+                                 with_uv(testing::dust(60, 0.01f), 1),
+                                 with_uv(testing::random_soup(random, 30, 80), 1)};
+  for (std::size_t i = 0; i < meshes.size(); ++i)
+    for (const std::uint32_t side_px : {1u, 33u}) {
+      SCOPED_TRACE(i);
+      const Charted c = charted(meshes[i], {data_material(0)}, {places(side_px)});
+      if (c.made.images.at(0).name == "a.png")
+        EXPECT_EQ(c.made.mesh.mesh, c.source.mesh);
+      else
+        expect_same_surface(c);
+    }
+}
+
+}  // namespace
+}  // namespace texmesh
