@@ -44,6 +44,14 @@ std::string verdict(const StageExplanation& e) {
   return text;
 }
 
+/// The error as all other lines name the model: with its folder.
+std::string error_line(std::string_view model, const std::string& message) {
+  const std::size_t slash = model.rfind('/');
+  const std::string_view file = slash == model.npos ? model : model.substr(slash + 1);
+  const bool names_it = message.starts_with(std::string(file) + ":") && slash != model.npos;
+  return "error: " + (names_it ? std::string(model.substr(0, slash + 1)) : "") + message;
+}
+
 }  // namespace
 
 std::string format_seconds(double seconds) {
@@ -77,7 +85,8 @@ void Progress::recalled(std::size_t model, const WorkerReport& r, const std::str
     if (mode_ == OutputMode::kJson)
       write_event(ErrorTold{name_of(model), e});
     else
-      line("error: " + e.message + " (nothing has changed since; --retry-failed tries again)");
+      line(error_line(models_[model].name, e.message) +
+           " (nothing has changed since; --retry-failed tries again)");
   }
   tell_again(model, r.more->told);
   const bool alone = models_.size() == 1;
@@ -195,7 +204,9 @@ void Progress::show(std::size_t, const NoteTold& e) {
     line(fmt::format("{}: {}: {}", e.model, warns ? "warning" : "note", note_sentence(e.note)));
 }
 
-void Progress::show(std::size_t, const ErrorTold& e) { line("error: " + e.error.message); }
+void Progress::show(std::size_t model, const ErrorTold& e) {
+  line(error_line(models_[model].name, e.error.message));
+}
 
 void Progress::cache_event(const std::string& code, const std::string& text) {
   if (mode_ != OutputMode::kJson) return line("cache: " + text);

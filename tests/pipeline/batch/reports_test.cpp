@@ -121,6 +121,24 @@ std::string told(OutputMode mode, bool verbose, bool explain) {
   return out.str();
 }
 
+TEST(Progress, ErrorsNameTheModelWithItsFolder) {
+  std::ostringstream out;
+  Progress progress(out, OutputMode::kPlain, false, false);
+  progress.begin({{"in/b.obj", 1}});
+  progress.started(0, "b.texmesh");
+  for (const char* message : {"b.obj: no faces", "b.objx: no", "other.mtl: no line"})
+    progress.event(0, told_by_child(Json{
+                          {"event", "error"},
+                          {"kind", "input"},
+                          {"file", ""},
+                          {"place", ""},
+                          {"expected", ""},
+                          {"found", ""},
+                          {"message",
+                           message}}.dump()));
+  EXPECT_EQ(out.str(), "error: in/b.obj: no faces\nerror: b.objx: no\nerror: other.mtl: no line\n");
+}
+
 TEST(Progress, PlainLinesAreLinesWithoutControlCharacters) {
   const std::string text = told(OutputMode::kPlain, false, false);
   for (const char ch : text) EXPECT_TRUE(ch == '\n' || static_cast<unsigned char>(ch) >= 0x20) << text;
