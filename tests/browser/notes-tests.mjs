@@ -2,7 +2,7 @@
 import {check, env, fs, near, path, pictures, run} from './browser.mjs';
 import {test} from './harness.mjs';
 import {html, onPage, settled} from './page-tests.mjs';
-import {phase, shot, withViewer} from './viewer-tests.mjs';
+import {axe, phase, shot, withViewer} from './viewer-tests.mjs';
 
 const noted = (attributes = '', style = '') => html(`<texmesh-viewer src="/packages/noted.texmesh" alt="a statue" camera-controls ${attributes}></texmesh-viewer>`,
   `.grid{grid-template-columns:1fr}texmesh-viewer{height:600px}${style}`).replace('<title>', '<meta name="viewport" content="width=device-width"><title>');
@@ -137,6 +137,9 @@ test('viewer: notes of a package, and measuring by a button', () => withViewer('
   await notes.locator('.pin').first().click();
   check(/The front/.test(await notes.locator('.card').textContent()), await notes.locator('.card').textContent());
   await shot(page, 'viewer-notes');
+  await page.evaluate(axe);
+  const {violations} = await page.evaluate(() => window.axe.run('.tm-notes', {resultTypes: ['violations']}));
+  check(violations.length === 0, JSON.stringify(violations.map((v) => [v.id, v.nodes.map((n) => n.html)])));
   await page.keyboard.press('Escape');
   await page.locator('#measure').click();
   await notes.locator('output').waitFor();

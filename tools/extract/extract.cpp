@@ -12,9 +12,10 @@ namespace texmesh {
 namespace {
 
 constexpr double kExtractDisplayPx = 1000;
-constexpr double kDisplayQuality = 90;        // of images that were made smaller
-constexpr std::size_t kNotesFrameBytes = 64;  // of names and padding around the notes
-constexpr double kTopQuality = 97;            // of images coded anew from planes that say no quality
+constexpr double kDisplayQuality = 90;  // of images that were made smaller
+constexpr double kTopQuality = 97;      // of images coded anew from planes that say no quality
+/// Names and padding around the notes in a file.
+constexpr std::size_t kNotesFrameBytes = 64;
 
 FileImage format_of(const ExtractScale& wishes, bool alpha) {
   if (wishes.images == ExtractImages::kPng) return FileImage::kPng;

@@ -108,5 +108,22 @@ TEST(TurnUp, StandsUprightAfterIt) {
   EXPECT_EQ(kept.positions, before);
 }
 
+TEST(TurnedAxis, IsTheUsersOrTheOneThatImportTells) {
+  About about;
+  EXPECT_EQ(turned_axis(about, UpAxis::kAuto), 'y');
+  EXPECT_EQ(turned_axis(about, UpAxis::kZ), 'z');
+  about.source = R"({"format":"obj","turned":{"up":"x","by":"a guess"}})";
+  EXPECT_EQ(turned_axis(about, UpAxis::kAuto), 'x');
+  EXPECT_EQ(turned_axis(about, UpAxis::kKeep), 'y');
+  for (const char* other :
+       {R"({"turned":{"up":"w"}})", R"({"turned":{"up":""}})", R"({"turned":{}})", "[]", "{"}) {
+    about.source = other;
+    EXPECT_EQ(turned_axis(about, UpAxis::kAuto), 'y') << other;
+  }
+  EXPECT_EQ(turned_up(Vec3d{1, 2, 3}, 'z'), (Vec3d{1, 3, -2}));
+  EXPECT_EQ(turned_up(Vec3d{1, 2, 3}, 'x'), (Vec3d{-2, 1, 3}));
+  EXPECT_EQ(turned_up(Vec3d{1, 2, 3}, 'y'), (Vec3d{1, 2, 3}));
+}
+
 }  // namespace
 }  // namespace texmesh

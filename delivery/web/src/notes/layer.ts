@@ -26,6 +26,7 @@ export interface NotesStage {
   look(position: Point, target: Point): void;
 }
 
+/** Looks of the layer; the custom properties of the element give the colours. */
 export const notesStyle = `
 .tm-notes { position: absolute; inset: 0; overflow: hidden; pointer-events: none;
   font: 14px/1.4 system-ui, sans-serif;
