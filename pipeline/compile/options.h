@@ -73,7 +73,7 @@ struct CompileOptions {
 /// - ladder.uncovered is kept with fragmentation.fill none: the source's own texels stay, at any cost. So it
 ///   is with atlas.mode rebuild, whose gutters are small: what lies in them shows in coarser mips.
 /// - simplification.seam_weight is .1 with atlas.mode rebuild, whose few seams lie where nobody made them.
-/// - proxies.mode is always with atlas.mode rebuild: scales that win take tables beside their own bytes.
+/// - proxies.mode is always with atlas.mode rebuild, whose scales auto takes for better than they are.
 /// - package.meta gets its canonical text.
 /// - ladder.prune is false where rungs of any role are given: every rung that is asked for is stored.
 /// A field that the user has set stays as it is, and so does a field that differs from its default. Resolved

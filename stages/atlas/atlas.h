@@ -6,7 +6,7 @@ namespace texmesh {
 
 inline constexpr int kAtlasVersion = 1;
 
-/// Whose charts the package has: the source's, new ones, or whichever shows more a byte.
+/// Whose charts the package has: the source's, new ones, or new ones where the source has very many.
 enum class AtlasMode : std::uint8_t { kKeep, kRebuild, kAuto };
 template <>
 struct EnumNames<AtlasMode> {
