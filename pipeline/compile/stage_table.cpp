@@ -149,8 +149,7 @@ Stage package_stage(const CompileOptions& o) {
       {"package", kPackageVersion, "everything -> the container", .01},
       inputs(kNestedScales, kPerceptualValues, shown_with(o).images, kFragments, kLadder, kPreviews, kTables,
              kThesisTables, kScaleFiles, kQuality, kPoster, kProxies, kSourceAbout, kProvenance),
-      outputs(kPackage), read_of(o, o.package, o.perceptual_values.jnd, o.import.up), {},
-      package_all);
+      outputs(kPackage), read_of(o, o.package, o.perceptual_values.jnd, o.import.up), {}, package_all);
 }
 
 }  // namespace

@@ -40,8 +40,8 @@ struct JpegKind {
   /// little that x and y do not say.
   bool coarse_last = false;
   bool progressive = false;  // deep successive approximation, see progressive_scans() in the .cpp
-  /// For complete() alone: libjpeg's usual progressive scans, or one scan, one pair of Huffman tables for all channels of
-  /// `rgb`, and these steps instead of those of `quality`.
+  /// For complete() alone: libjpeg's usual progressive scans, or one scan, one pair of Huffman tables for all
+  /// channels of `rgb`, and these steps instead of those of `quality`.
   std::optional<FileSteps> file{};
 };
 

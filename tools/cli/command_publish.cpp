@@ -296,7 +296,8 @@ struct ExtractArguments {
   std::optional<int> scale, proxy;
   double display_px = 0;
   int jobs = 0;
-  bool recentre = false, keep_units = false, levels = false, plain = false, best = false, fast = false, json = false;
+  bool recentre = false, keep_units = false, levels = false, plain = false, best = false, fast = false,
+       json = false;
 };
 
 std::uint32_t rung_of(const std::string& text, const std::string& flag) {
@@ -343,9 +344,7 @@ ExtractRequest request_of(const ExtractArguments& a) {
   if (a.display_px > 0) budget.display_px = a.display_px;
   budget.images = a.images;
   budget.levels = a.levels;
-  budget.effort = a.best   ? ExtractEffort::kBest
-                  : a.fast ? ExtractEffort::kFast
-                           : ExtractEffort::kUsual;
+  budget.effort = a.best ? ExtractEffort::kBest : a.fast ? ExtractEffort::kFast : ExtractEffort::kUsual;
   return {budget, a.recentre, a.keep_units};
 }
 

@@ -117,7 +117,7 @@ struct Extracted {
   /// directions at `side_px`; -1 for other files.
   double difference = -1;
   double mesh_difference = -1;  // the same with the best textures instead: what the mesh alone costs
-  int views = 0;  // 0 = differences are what the package's tables tell
+  int views = 0;                // 0 = differences are what the package's tables tell
   std::uint32_t side_px = 0;
   ExtractSpent spent;
 

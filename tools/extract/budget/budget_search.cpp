@@ -34,8 +34,8 @@ constexpr std::uint64_t kLookAtFilesBelow = 200000;
 constexpr double kLikely = 1.2;  // times the least joined loss
 constexpr std::size_t kMostLikely = 4;
 constexpr double kWorthALook = 1.15;  // times the least joined loss that was seen, by tables
-constexpr double kUsualBytes = 3.5, kLeastBytes = 1.5;  // of a coded triangle
-constexpr double kTableBytes = 3;                       // the same, before one is coded
+constexpr double kUsualBytes = 3.5, kLeastBytes = 1.5;          // of a coded triangle
+constexpr double kTableBytes = 3;                               // the same, before one is coded
 constexpr double kTexelsPerByte = 20, kFastTexelsPerByte = 10;  // more texels are never worth a byte
 
 /// Means of turtle, saxophone, helmet and bust at several scales.
@@ -43,8 +43,8 @@ struct LikelyCoding {
   double loss;   // joined, beside the finest
   double bytes;  // of kFirstCoding's
 };
-constexpr LikelyCoding kCodings[kMeshCodings] = {{270e-6, 0.81}, {150e-6, 0.88}, {60e-6, 1},
-                                                 {35e-6, 1.1},   {15e-6, 1.23},  {0, 1.36}};
+constexpr LikelyCoding kLikelyCodings[kMeshCodings] = {{270e-6, 0.81}, {150e-6, 0.88}, {60e-6, 1},
+                                                       {35e-6, 1.1},   {15e-6, 1.23},  {0, 1.36}};
 
 double most_texels(const ExtractBudget& wishes, std::uint64_t bytes) {
   const double a_byte = wishes.fast() ? kFastTexelsPerByte : kTexelsPerByte;
@@ -200,18 +200,17 @@ double Search::scale_loss(std::size_t scale) const {
   return joined(picture_flip(reference_.package.quality(), reference_.side_px, scales()[scale].scale, {}));
 }
 
-/// Compile has measured what scales lose, and a coding loses and saves about alike on all of them: so one mesh
-/// that was made and looked at tells what a file of another is likely to lose.
+/// Compile has measured what scales lose, and a coding loses and saves about alike on all of them: so one
+/// mesh that was made and looked at tells what a file of another is likely to lose.
 double Search::likely_loss(const MeshKey& key) const {
   constexpr double kFinerScalesTakeLess = 0.35;  // bytes of a triangle ~ triangles to the power of minus this
   const auto triangles = [&](std::size_t scale) { return static_cast<double>(scales()[scale].triangles); };
-  const LikelyCoding &of_known = kCodings[known_.coding], &of_key = kCodings[key.coding];
+  const LikelyCoding &of_known = kLikelyCodings[known_.coding], &of_key = kLikelyCodings[key.coding];
   const double lost = joined(geometry_.at(known_)) - of_known.loss, of_scale = scale_loss(known_.scale);
   const double scale_losses = of_scale > 0 ? std::max(lost / of_scale, 0.1) : 1;
-  const double bytes =
-      known_bytes_ / of_known.bytes * of_key.bytes *
-      portable::exp((1 - kFinerScalesTakeLess) *
-                    portable::log(triangles(key.scale) / triangles(known_.scale)));
+  const double bytes = known_bytes_ / of_known.bytes * of_key.bytes *
+                       portable::exp((1 - kFinerScalesTakeLess) *
+                                     portable::log(triangles(key.scale) / triangles(known_.scale)));
   const double left = static_cast<double>(bytes_) - bytes;
   const DealtBytes images = curves_.allocate(left);
   return images.bytes > left ? kNothing : scale_losses * scale_loss(key.scale) + of_key.loss + images.loss;
@@ -272,8 +271,8 @@ void Search::follow_direction(int scale_step, int coding_step) {
 
 bool Search::better(const MeshKey& key) {
   if (!seen_.insert(key).second) return key == best_;
-  const bool hopeless = too_large(key) || least_loss(key) > least_ ||
-                        (only_likely_ && likely_loss(key) > kWorthALook * least_);
+  const bool hopeless =
+      too_large(key) || least_loss(key) > least_ || (only_likely_ && likely_loss(key) > kWorthALook * least_);
   const double found = hopeless ? kNothing : loss_of(key);
   forget(found < least_ ? best_ : key);
   if (!(found < least_)) return false;
@@ -305,7 +304,7 @@ double Search::least_loss(const MeshKey& key) const {
 
 /// What pictures would tell, FLIP.
 double Search::table_geometry(const MeshKey& key) const {
-  return std::sqrt(scale_loss(key.scale) + kCodings[key.coding].loss);
+  return std::sqrt(scale_loss(key.scale) + kLikelyCodings[key.coding].loss);
 }
 
 /// What a file of this mesh is expected to lose.

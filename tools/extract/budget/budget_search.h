@@ -108,7 +108,7 @@ class Search {
   std::set<MeshKey> seen_;
   std::map<MeshKey, double> geometry_;   // of meshes looked at: MeshCandidate::geometry
   std::map<MeshKey, double> predicted_;  // joined losses of files, of meshes whose files fit
-  MeshKey known_, best_;      // the last that was looked at, and the best one
+  MeshKey known_, best_;                 // the last that was looked at, and the best one
   double known_bytes_ = 0;
   bool only_likely_ = false;  // meshes that tables make hopeless are not looked at
   double least_ = 1e9;

@@ -54,8 +54,7 @@ Candidates::ScaleToCode& Candidates::scale_to_code(int scale) {
     return scales_.front();
   }
   if (scales_.size() >= kMostScales) scales_.pop_back();
-  StandaloneGlb file =
-      scale_file(reference_.package, scale, reference_.context, StreamedNormals::kStreamed);
+  StandaloneGlb file = scale_file(reference_.package, scale, reference_.context, StreamedNormals::kStreamed);
   const bool lit_anew = scale > 0 && !reference_.light.places.empty();
   DracoRecoder recoder(file.draco_streams(), lit_anew ? &reference_.light : nullptr, mesh_path(scale));
   return scales_.emplace_front(scale, std::move(file), std::move(recoder));

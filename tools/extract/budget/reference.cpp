@@ -62,7 +62,7 @@ double area_of(const Mesh& mesh, std::size_t triangle) {
   return length(cross(at(1) - at(0), at(2) - at(0))) / 2;
 }
 
-double texels_of(const Mesh& mesh, std::size_t triangle, int texcoord, const TexelMap& map) {
+double texels_on(const Mesh& mesh, std::size_t triangle, int texcoord, const TexelMap& map) {
   const std::vector<Vec2f>& uv = texcoord == 0 ? mesh.uv0 : mesh.uv1;
   if (uv.empty() || texcoord > 1) return 0;
   const Triangle& t = mesh.triangles[triangle];
@@ -315,7 +315,7 @@ double Reference::fewest_texels_per_pixel(std::size_t image) const {
         if (finest.mesh.triangle_material[t] != m) continue;
         const double area = area_of(finest.mesh, t);
         if (!(area > 0)) continue;
-        parts.emplace_back(texels_of(finest.mesh, t, ref.texcoord, map) / area * pixel * pixel, area);
+        parts.emplace_back(texels_on(finest.mesh, t, ref.texcoord, map) / area * pixel * pixel, area);
         total += area;
       }
     });

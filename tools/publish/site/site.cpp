@@ -139,7 +139,8 @@ std::string card_html(const SiteObject& o, std::size_t place, const SiteWords& w
       "{}{}</li>\n",
       markup_escaped(words_of(o)), markup_escaped(facets_of(o)), percent_encoded(o.name),
       poster_html(o, "", place >= kAtOnce, words), markup_escaped(o.title),
-      quiet.empty() ? "" : "<p>" + quiet + "</p>", o.size.empty() ? "" : "<p>" + markup_escaped(o.size) + "</p>");
+      quiet.empty() ? "" : "<p>" + quiet + "</p>",
+      o.size.empty() ? "" : "<p>" + markup_escaped(o.size) + "</p>");
 }
 
 using OrderedJson = nlohmann::ordered_json;
@@ -336,14 +337,15 @@ std::string index_record(const Site& site) {
 std::string index_page(const Site& site, const SiteWords& words) {
   std::string cards;
   for (std::size_t k = 0; k < site.objects.size(); ++k) cards += card_html(site.objects[k], k, words);
-  return filled(site_file("index.html"), {{"head", head_html(site.options.title, "", false, words) + index_record(site)},
-                                          {"title", markup_escaped(site.options.title)},
-                                          {"skip", words.html("skip")},
-                                          {"search", words.html("search")},
-                                          {"facets", facets_html(site.objects, words)},
-                                          {"of", words.html("of")},
-                                          {"count", markup_escaped(words.objects(site.objects.size()))},
-                                          {"cards", cards}});
+  return filled(site_file("index.html"),
+                {{"head", head_html(site.options.title, "", false, words) + index_record(site)},
+                 {"title", markup_escaped(site.options.title)},
+                 {"skip", words.html("skip")},
+                 {"search", words.html("search")},
+                 {"facets", facets_html(site.objects, words)},
+                 {"of", words.html("of")},
+                 {"count", markup_escaped(words.objects(site.objects.size()))},
+                 {"cards", cards}});
 }
 
 std::string text_html(const NamedText& line) {
