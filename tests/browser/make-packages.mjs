@@ -8,8 +8,9 @@ const kQuick = ['--no-cache', '--quiet', '--quality.views', '1', '--quality.larg
 const kPackages = {
   // Three materials' maps, every fragment small.
   maps: {scan: ['--triangles', '3000', '--texture', '256', '--charts', '8', '--textures'], options: ['--rungs', '20,50,85']},
-  // Enough bytes for a link of 2 Mbit/s to have something to do.
-  large: {scan: ['--triangles', '30000', '--texture', '2048', '--charts', '30'], options: ['--rungs', '10,20,35,50,70,85,95']},
+  // Enough bytes for a link of 2 Mbit/s to have something to do. Larger proxies would stand for scales up to some hundred pixels.
+  large: {scan: ['--triangles', '30000', '--texture', '2048', '--charts', '30'],
+    options: ['--rungs', '10,20,35,50,70,85,95', '--proxies.sizes', '36000,50000']},
   progressive: {scan: ['--triangles', '2000', '--texture', '512', '--charts', '8'], options: ['--ladder', 'progressive']},
   // Sources stay in the package, too.
   kept: {scan: ['--triangles', '1500', '--texture', '256', '--charts', '6', '--textures'], options: ['--rungs', '20,85', '--keep-source']},
