@@ -333,6 +333,7 @@ ExtractRequest request_of(const ExtractArguments& a) {
   check_plain(a.plain, a.images);
   if (a.proxy) return {ExtractProxy{static_cast<std::uint32_t>(*a.proxy), a.plain}, a.recentre, a.keep_units};
   if (a.bytes.empty()) {
+    if (a.best || a.fast) throw UsageError(a.best ? "--best" : "--fast", "", "--bytes beside it", "none");
     const auto form = a.plain    ? ExtractScale::Form::kPlain
                       : a.levels ? ExtractScale::Form::kLevels
                                  : ExtractScale::Form::kCoded;

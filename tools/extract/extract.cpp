@@ -226,10 +226,10 @@ std::string extract_text(const Extracted& e) {
   }
   if (e.asked_bytes > 0)
     text += fmt::format(
-        "difference to the package's best (FLIP of lit pictures, {} of {} px): {:.4f}; of the mesh alone "
+        "difference to the package's best (FLIP of lit pictures{} of {} px): {:.4f}; of the mesh alone "
         "{:.4f}\n",
-        e.views > 0 ? fmt::format("{} views", e.views) : "told by the package's tables,", e.side_px,
-        e.difference, e.mesh_difference);
+        e.views > 0 ? fmt::format(", {} views", e.views) : ", as tables tell it,", e.side_px, e.difference,
+        e.mesh_difference);
   if (!e.within)
     text += fmt::format(
         "{} bytes cannot be reached within 2 %: this is the nearest file that the package gives\n",
