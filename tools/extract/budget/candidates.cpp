@@ -151,8 +151,7 @@ void Candidates::load_stored(std::size_t image) {
   JoinedJpeg& joined =
       stored_.emplace(image, joined_plane(reference_.package, from.plane, last, reference_.context))
           .first->second;
-  if (!reference_.wishes.fast())
-    joined.fill_unseen(reference_.shown_texels(image, joined.width_px(), joined.height_px()));
+  joined.fill_unseen(reference_.shown_texels(image, joined.width_px(), joined.height_px()));
 }
 
 /// What makes up for averaging and for the interpolation of texels larger than pixels, as far as its bytes
@@ -346,32 +345,60 @@ LossCurves::LossCurves(const Reference& reference, Candidates& candidates, doubl
   find_curves();
 }
 
-/// Of a size less than its lowest rung: less quality, and behind that half of the sides. `mip_loss`: what the
-/// size itself loses. A package has no rungs there, as its clients take smaller sizes with more.
-void add_below(std::vector<CodedImage>& files, double mip_loss) {
-  // Bytes by quality, of a JPEG's at 50.
-  constexpr std::pair<double, double> kBytes[] = {{1, 0.1},  {20, 0.55}, {40, 0.86}, {65, 1.3},
-                                                  {80, 1.9}, {90, 2.9},  {100, 8}};
-  const auto bytes_at = [&](double quality) {
-    std::size_t k = 1;
-    while (kBytes[k].first < quality) ++k;
-    const auto [low, few] = kBytes[k - 1];
-    const auto [high, many] = kBytes[k];
-    return few + (many - few) * (quality - low) / (high - low);
-  };
-  const CodedImage lowest = files.back();
-  const double coded = std::max(lowest.loss - mip_loss, 4e-6);
-  for (const double quality : {80.0, 65.0, 40.0, 20.0}) {
-    if (quality >= lowest.plan.quality) continue;
-    const double coarser = (100 - quality) / std::max(100 - lowest.plan.quality, 1.0);
-    const double bytes = lowest.bytes * bytes_at(quality) / bytes_at(lowest.plan.quality);
-    const double loss = mip_loss + coded * portable::exp(1.2 * portable::log(coarser));
-    files.push_back({{lowest.plan.coding, lowest.plan.share, quality}, bytes, loss});
-    files.push_back({{lowest.plan.coding, lowest.plan.share / 2, quality}, bytes / 3.5, 2.3 * loss});
-  }
+/// A rung of one size of an image as if its fragments were a whole image.
+struct RungFile {
+  CodedImage file;
+  double mip_loss = 0;       // joined, what the size itself loses
+  double lower_quality = 0;  // of the rung below it
+  double coded() const { return std::max(file.loss - mip_loss, 4e-6); }
+};
+
+/// Joined loss by coding grows about as (100 - quality) to this power (turtle, yurt, an owl: 1.1 to 2.2).
+constexpr double kLossPower = 1.42;
+constexpr double kLeastLossy = 93;  // what rungs of more quality lose tells little of lower ones
+
+double lossiness(double quality) {
+  return portable::exp(kLossPower * portable::log(std::max(100 - quality, 1.0)));
 }
 
-/// What the rungs of all sizes lose and take, as if their fragments were whole images.
+/// Bytes of a JPEG by quality, those at 50 about 1.
+double relative_bytes(double quality) {
+  constexpr std::pair<double, double> kBytes[] = {{1, 0.1},  {20, 0.55}, {40, 0.86}, {65, 1.3},
+                                                  {80, 1.9}, {90, 2.9},  {100, 8}};
+  std::size_t k = 1;
+  while (kBytes[k].first < quality) ++k;
+  const auto [low, few] = kBytes[k - 1];
+  const auto [high, many] = kBytes[k];
+  return few + (many - few) * (quality - low) / (high - low);
+}
+
+/// Qualities between the rungs of an image and below them, of the smallest size half of the sides, too: a
+/// package has few rungs, as its clients take smaller sizes with more quality.
+std::vector<CodedImage> with_qualities_between(const std::vector<RungFile>& rungs) {
+  double known = 0, smallest = 1;  // what coding loses of this image, by its lossiness
+  for (const RungFile& r : rungs) {
+    smallest = std::min(smallest, r.file.plan.share);
+    if (r.file.plan.quality <= kLeastLossy)
+      known = std::max(known, r.coded() / lossiness(r.file.plan.quality));
+  }
+  std::vector<CodedImage> out;
+  for (const RungFile& r : rungs) {
+    const ImagePlan& plan = r.file.plan;
+    out.push_back(r.file);
+    if (plan.coding.stored || plan.coding.format == FileImage::kPng) continue;
+    for (const double quality : {85.0, 75.0, 65.0, 50.0, 35.0, 20.0}) {
+      if (quality >= plan.quality || quality <= r.lower_quality) continue;
+      const double rate = known > 0 ? known : r.coded() / lossiness(plan.quality);
+      const double bytes = r.file.bytes * relative_bytes(quality) / relative_bytes(plan.quality);
+      const double loss = r.mip_loss + rate * lossiness(quality);
+      out.push_back({{plan.coding, plan.share, quality}, bytes, loss});
+      if (r.lower_quality == 0 && plan.share == smallest)
+        out.push_back({{plan.coding, plan.share / 2, quality}, bytes / 3.5, loss + 8 * r.mip_loss});
+    }
+  }
+  return out;
+}
+
 void LossCurves::read_tables() {
   PackageReader& package = reference_.package;
   const std::vector<TextureInfo>& textures = package.textures();
@@ -380,30 +407,31 @@ void LossCurves::read_tables() {
   for (std::size_t i = 0; i < seen_.size(); ++i) {
     const std::uint32_t base = reference_.images[i].plane;
     const auto stored = candidates_.stored_bytes(i);
+    std::vector<RungFile> rungs;
     for (std::uint32_t p = 0; p < textures.size(); ++p) {
       if (p != base && !(textures[p].mip > 0 && textures[p].base == base)) continue;
       const TextureLoss::Plane& plane = losses.plane(p);
       const std::size_t fragments = plane.weights.size();
-      const double share = 1.0 / (1u << textures[p].mip);
-      const double group = weights[static_cast<std::size_t>(losses.group_of(p))];
-      double bytes = 0;
+      const double group = std::max(weights[static_cast<std::size_t>(losses.group_of(p))], 1e-30);
+      double bytes = 0, lower_quality = 0;
       for (std::size_t r = 0; r < textures[p].rungs.size(); ++r) {
         const auto of_rung = static_cast<double>(textures[p].rungs[r].bytes);
         bytes = package.tables().planes[p].incremental ? bytes + of_rung : of_rung;
         double lost = 0;
         for (std::size_t f = 0; f < fragments; ++f)
           lost += static_cast<double>(plane.weights[f]) * plane.shown[(r + 1) * fragments + f];
-        const bool is_stored = stored && p == base && r + 1 == textures[p].rungs.size();
+        const bool last = r + 1 == textures[p].rungs.size(), is_stored = stored && p == base && last;
         const TextureCoding coding =
             is_stored ? TextureCoding{FileImage::kJpeg, false, true} : candidates_.codings(i).front();
-        const bool is_lossy = coding.format != FileImage::kPng;
+        if (coding.format == FileImage::kPng && !last) continue;
         const double quality = is_stored ? kHighestQuality : package.tables().planes[p].rung_quality[r];
-        if (!is_lossy && r + 1 < textures[p].rungs.size()) continue;
-        seen_[i].push_back({{coding, share, quality}, bytes, joined(group > 0 ? lost / group : 0)});
-        if (r == 0 && !is_stored && is_lossy)
-          add_below(seen_[i], joined(group > 0 ? losses.mip(p) * plane.weight / group : 0));
+        rungs.push_back({{{coding, 1.0 / (1u << textures[p].mip), quality}, bytes, joined(lost / group)},
+                         joined(losses.mip(p) * plane.weight / group),
+                         lower_quality});
+        lower_quality = quality;
       }
     }
+    seen_[i] = with_qualities_between(rungs);
   }
 }
 

@@ -220,9 +220,14 @@ Reference::Reference(PackageReader& from, const ExtractBudget& asked, const Outp
   whole_meter = std::make_unique<LitMeter>(views, best_textures, environment, context);
 }
 
-/// What the package says of S_0 without it.
+/// What the package says of S_0 without it. The coarsest scale, which takes the least time, shows about the
+/// same texels.
 void Reference::use_tables() {
   const Manifest& m = package.manifest();
+  const int coarsest = m.scales.back().scale;
+  source = read_model(scale_file(package, coarsest, context), mesh_path(coarsest), context);
+  find_alike();
+  finest.mesh = std::move(source.mesh);
   const Vec3d size = m.bounds_max - m.bounds_min;
   extent = std::max({size.x, size.y, size.z, 1e-30});
   for (const PackageImage& image : images) {
@@ -343,7 +348,6 @@ void Reference::read_best_textures(TextureSource& textures) {
 /// Which texels are shown takes a walk over all triangles: once a size for the images of an atlas.
 std::vector<std::uint8_t> Reference::shown_texels(std::size_t image, std::uint32_t width_px,
                                                   std::uint32_t height_px) const {
-  if (wishes.fast()) return {};
   const std::lock_guard lock(known_texels_->mutex);
   std::vector<std::uint8_t>& bits = known_texels_->bits[{alike_[image], width_px, height_px}];
   if (bits.empty())

@@ -82,7 +82,7 @@ struct PictureTexture {
 
 /// What all files of a search are compared with: the package's best in lit pictures. It does not change once
 /// it is made, and does not depend on the number of bytes. With ExtractEffort::kFast it has no picture: no
-/// meshes, cameras, views and meters, and every texel counts as shown.
+/// cameras, views and meters, and texels count as shown that the coarsest scale shows.
 struct Reference {
   /// Reads the package's best from `textures`, which learns which of its texels are shown. StageError for S_0
   /// without an extent.
