@@ -28,7 +28,7 @@ target_compile_definitions(texmesh_fuzz PRIVATE TEXMESH_VERSION="${PROJECT_VERSI
 target_compile_options(texmesh_fuzz PRIVATE -fPIE -O2 -ffunction-sections -fdata-sections)
 set_target_properties(texmesh_fuzz PROPERTIES POSITION_INDEPENDENT_CODE OFF)
 target_link_libraries(texmesh_fuzz PUBLIC texmesh_format Nettle::nettle ZLIB::ZLIB nlohmann_json::nlohmann_json CURL::libcurl
-  TBB::tbb Eigen3::Eigen WebP::webp zstd::libzstd_shared Utf8proc::utf8proc draco::draco meshoptimizer::meshoptimizer JPEG::JPEG PNG::PNG fmt::fmt OpenImageIO::OpenImageIO
+  TBB::tbb Eigen3::Eigen WebP::webp avif zstd::libzstd_shared Utf8proc::utf8proc draco::draco meshoptimizer::meshoptimizer JPEG::JPEG PNG::PNG fmt::fmt OpenImageIO::OpenImageIO
   ${CMAKE_DL_LIBS})
 texmesh_precompile(texmesh_fuzz <filesystem> <sstream> ${texmesh_json_header})
 texmesh_unity(texmesh_fuzz)

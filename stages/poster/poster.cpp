@@ -40,9 +40,10 @@ constexpr double kStrays = 0.005;  // share of positions that may be strays, on 
 struct Direction {
   double azimuth_degrees, elevation_degrees, weight;
 };
-// Front and right first, as photographs of catalogues; the others must show much more to be taken.
-constexpr std::array<Direction, 8> kDirections{{{30, 15, 1},
-                                                {-30, 15, 1},
+// First the one that viewers begin with (delivery/web/src/page/framing.ts); the others must show much more to
+// be taken.
+constexpr std::array<Direction, 8> kDirections{{{28, 18, 1},
+                                                {-28, 18, 0.9},
                                                 {30, 40, 0.7},
                                                 {-30, 40, 0.7},
                                                 {30, 75, 0.35},
@@ -110,7 +111,9 @@ Poster make_poster(const NestedScales& scales, const std::vector<Material>& mate
   };
   const RenderScene scene = scene_of(scales.scales.front());
   const RenderCamera camera = poster_camera(scene, scene_of(coarse_scale(scales)), inner);
-  const RenderEnvironment environment = studio_environment();
+  const RenderEnvironment environment = daylight_environment(
+      to_float(camera.x), to_float(camera.y), to_float(camera.z),
+      std::any_of(materials.begin(), materials.end(), [](const Material& m) { return m.metallic > 0.5f; }));
   for (std::uint32_t side_px = wanted_px;; side_px /= 2) {
     context.check_cancelled();
     const Picture picture =

@@ -8,7 +8,7 @@
 
 namespace texmesh {
 
-inline constexpr int kPosterVersion = 3;
+inline constexpr int kPosterVersion = 4;
 
 struct PosterOptions {
   int size_px = 512;
@@ -20,10 +20,10 @@ struct PosterOptions {
   }
 };
 
-/// A picture of S_0 with the source's texels by the reference renderer (stages/render), in the studio's light
-/// and on its grey.
-/// - View: of a few directions the one that shows the largest area. Directions near the front, a little from
-///   above, count more than those from high above, from behind and from below.
+/// A picture of S_0 with the source's texels by the reference renderer (stages/render), in the light that
+/// viewers have, on grey.
+/// - View: the direction that viewers begin with, or one that shows much more of the object's area. Directions
+///   near the front, a little from above, count more than those from high above, from behind and from below.
 /// - Frame: a square. The object touches a margin of 4 % on two opposite sides at least. Where strays make
 ///   the object tiny, the picture shows the place in which nearly all positions lie.
 /// - File: 4:2:0, the highest quality (IJG) that fits `max_bytes`. Where not even quality 1 fits, the sides

@@ -175,6 +175,19 @@ constexpr SoftBox kBoxes[] = {{{0.62f, 0.72f, 0.55f}, 26, {4.6f, 4.5f, 4.35f}},
 constexpr Vec3f kZenith{0.33f, 0.35f, 0.39f}, kHorizon{0.45f, 0.44f, 0.43f}, kGround{0.255f, 0.235f, 0.205f};
 constexpr float kLog2E = 1.44269504f;
 
+// Daylight: what a hemisphere light of three.js with intensity 3 from #ffffff above and #d8d4cc below gives,
+// divided by pi.
+constexpr Vec3f kPaperAbove{0.955f, 0.955f, 0.955f}, kPaperBelow{0.653f, 0.627f, 0.577f};
+constexpr std::uint32_t kSkySide = 32, kSkyLevels = 8;
+
+/// As daylight.ts has it: rough surfaces see the hemisphere, mirrors a sky with more contrast.
+Vec3f sky_radiance(float up, float roughness) {
+  const float t = saturated((up + 0.6f) / 1.5f);
+  const float mirrored = 0.3f + 1.4f * (t * t * (3 - 2 * t));
+  const Vec3f paper = kPaperBelow + (kPaperAbove - kPaperBelow) * (0.5f + 0.5f * up);
+  return Vec3f{mirrored, mirrored, mirrored} * (1 - roughness) + paper * roughness;
+}
+
 float lobe(Vec3f direction, Vec3f axis, float sharpness) {
   return exp2_of(kLog2E * sharpness * (dot(direction, normalized(axis)) - 1));
 }
@@ -221,6 +234,22 @@ Vec3f studio_radiance(Vec3f direction) {
   Vec3f sum = kGround + (above - kGround) * sky;
   for (const SoftBox& box : kBoxes) sum = sum + box.peak * lobe(direction, box.direction, box.sharpness);
   return sum;
+}
+
+RenderEnvironment daylight_environment(Vec3f x, Vec3f y, Vec3f z, bool metallic) {
+  RenderEnvironment out{};
+  // A hemisphere's irradiance is linear in the height of the normal: bands 0 and 1 hold it.
+  const std::array<float, kHarmonics> basis = harmonics_of(Vec3f{0, 1, 0});
+  out.irradiance[0] = padded((kPaperAbove + kPaperBelow) * (0.5f / basis[0]));
+  out.irradiance[1] = padded((kPaperAbove - kPaperBelow) * (0.5f / basis[1]));
+  for (std::uint32_t i = 0; i < kSkyLevels; ++i) {
+    const float roughness = static_cast<float>(i) / (kSkyLevels - 1);
+    out.levels.push_back(make_level(kSkySide, {}, [&](Vec3f direction) {
+      return metallic ? sky_radiance(direction.y, roughness) : Vec3f{0, 0, 0};
+    }));
+  }
+  out.key = {normalized(x * -0.5f + y * 0.7f + z), Vec3f{2.2f, 2.2f, 2.2f}};
+  return out;
 }
 
 KeyLight studio_key_light() { return {normalized(Vec3f{0.62f, 0.72f, 0.55f}), Vec3f{1.02f, 1.0f, 0.96f}}; }

@@ -46,6 +46,12 @@ RenderEnvironment prepare_environment(const Radiance& radiance, const KeyLight& 
 /// studio_radiance with studio_key_light, prepared when the library was built.
 RenderEnvironment studio_environment();
 
+/// The light in which viewers show objects (delivery/web/src/page/daylight.ts): daylight from above and a
+/// lamp that the camera carries; `x`, `y`, `z` are its axes, unit, +z from the object to the camera. Metals
+/// mirror a sky; without `metallic` surfaces shine under the lamp alone. A pure function with the same bits
+/// on every machine.
+RenderEnvironment daylight_environment(Vec3f x, Vec3f y, Vec3f z, bool metallic);
+
 /// Irradiance / pi on a surface with that unit normal; >= 0.
 Vec3f diffuse_light(const RenderEnvironment& environment, Vec3f normal);
 /// The mean radiance that a lobe of that roughness (0..1) around the unit direction sees.

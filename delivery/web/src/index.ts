@@ -4,4 +4,5 @@
 
 export * from './decisions';
 export { TexmeshPackage, open } from './open';
+export { daylight, isMetallic, reflectSky } from './page/daylight';
 export type * from './scene/api';

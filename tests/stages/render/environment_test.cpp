@@ -166,6 +166,29 @@ TEST(Environment, TheStudioIsNeutralAndLightsAWhiteBodyWithoutBurningIt) {
   }
 }
 
+// Values of three.js: a hemisphere light of intensity 3 from #ffffff above and #d8d4cc below.
+TEST(Environment, DaylightIsTheLightOfViewers) {
+  const Vec3f x{1, 0, 0}, y{0, 1, 0}, z{0, 0, 1};
+  const auto srgb = [](double code) { return std::pow((code / 255 + 0.055) / 1.055, 2.4); };
+  for (const bool metallic : {false, true}) {
+    const RenderEnvironment light = daylight_environment(x, y, z, metallic);
+    for (const Vec3f n : directions(50))
+      for (int c = 0; c < 3; ++c) {
+        const double below = srgb(std::array{0xd8, 0xd4, 0xcc}[static_cast<std::size_t>(c)]);
+        const double up = 0.5 + 0.5 * static_cast<double>(n.y);
+        EXPECT_NEAR(diffuse_light(light, n)[c], 3 / 3.14159265 * (below + (1 - below) * up), 4e-3);
+        // Rough metals see what plaster sees, mirrors more contrast.
+        const auto mirrored = static_cast<double>(specular_light(light, n, 1)[c]);
+        EXPECT_NEAR(mirrored, metallic ? diffuse_light(light, n)[c] : 0, 8e-3) << "read between texels";
+      }
+    EXPECT_EQ(specular_light(light, y, 0).x > specular_light(light, y, 1).x, metallic);
+    EXPECT_NEAR(dot(light.key.towards, normalized(Vec3f{-0.5f, 0.7f, 1})), 1, 1e-6);
+  }
+  // The camera carries the lamp.
+  EXPECT_NEAR(dot(daylight_environment(z, y, x * -1, false).key.towards, normalized(Vec3f{-1, 0.7f, -0.5f})),
+              1, 1e-6);
+}
+
 TEST(Environment, HostileRadianceIsCutOff) {
   const RenderEnvironment light = prepare_environment(
       [](Vec3f d) {

@@ -261,15 +261,17 @@ std::string csl_item(const SiteObject& o, const SiteOptions& options) {
 }
 
 /// For the head: description, OpenGraph, and schema.org's 3DModel as JSON-LD.
-std::string record_head(const SiteObject& o, const SiteOptions& options) {
+std::string record_head(const SiteObject& o, const SiteOptions& options, const SiteWords& words) {
   std::string json = json_text(schema_org(o, options), -1);
   // Nothing in a text may end the element, or begin a comment.
   for (std::size_t at = 0; (at = json.find('<', at)) != json.npos;) json.replace(at, 1, "\\u003c");
-  std::string words = o.about.description.substr(0, o.about.description.find('\n'));
-  if (words.empty()) words = o.title + ", in 3D" + (o.about.creator.empty() ? "" : ", by " + o.about.creator);
-  std::string out = meta_html("name", "description", words) + meta_html("property", "og:type", "website") +
+  std::string text = o.about.description.substr(0, o.about.description.find('\n'));
+  if (text.empty())
+    text =
+        words(o.about.creator.empty() ? "one" : "one by", {{"title", o.title}, {"creator", o.about.creator}});
+  std::string out = meta_html("name", "description", text) + meta_html("property", "og:type", "website") +
                     meta_html("property", "og:title", o.title) +
-                    meta_html("property", "og:description", words) +
+                    meta_html("property", "og:description", text) +
                     meta_html("property", "og:site_name", options.title);
   if (!options.url.empty()) {
     out += fmt::format("<link rel=\"canonical\" href=\"{}\">\n", markup_escaped(page_address(o, options)));
@@ -319,9 +321,9 @@ std::string head_html(const std::string& title, const std::string& root, bool fr
 }
 
 /// What search engines and social networks show of the list.
-std::string index_record(const Site& site) {
+std::string index_record(const Site& site, const SiteWords& words) {
   constexpr std::size_t kNamed = 5;
-  std::string text = site.options.title + ", objects in 3D";
+  std::string text = words("list", {{"title", site.options.title}});
   for (std::size_t k = 0; k < std::min(kNamed, site.objects.size()); ++k)
     text += (k == 0 ? ": " : ", ") + site.objects[k].title;
   const std::string& url = site.options.url;
@@ -338,7 +340,7 @@ std::string index_page(const Site& site, const SiteWords& words) {
   std::string cards;
   for (std::size_t k = 0; k < site.objects.size(); ++k) cards += card_html(site.objects[k], k, words);
   return filled(site_file("index.html"),
-                {{"head", head_html(site.options.title, "", false, words) + index_record(site)},
+                {{"head", head_html(site.options.title, "", false, words) + index_record(site, words)},
                  {"title", markup_escaped(site.options.title)},
                  {"skip", words.html("skip")},
                  {"search", words.html("search")},
@@ -398,7 +400,8 @@ std::string object_page(const SiteObject& o, const SiteOptions& options, const S
       (o.names_itself ? "" : "&title=" + percent_encoded(o.title));
   return filled(
       site_file("object.html"),
-      {{"head", head_html(o.title + " - " + options.title, root, true, words) + record_head(o, options)},
+      {{"head",
+        head_html(o.title + " - " + options.title, root, true, words) + record_head(o, options, words)},
        {"title", markup_escaped(o.title)},
        {"root", root},
        {"site", markup_escaped(options.title)},

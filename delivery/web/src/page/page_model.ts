@@ -1,10 +1,11 @@
-import { DirectionalLight, HemisphereLight, type Object3D, PerspectiveCamera, Scene } from 'three';
+import { type Object3D, PerspectiveCamera, Scene } from 'three';
 import { isAbort } from '../format/errors';
 import { firstPicture } from '../format/manifest';
 import type { OpenOptions, PackageReader } from '../http/package_reader';
 import type { LoadEvents, LoadOptions, LoadedModel, Turn } from '../scene/api';
 import { displayOf } from '../scene/camera';
 import { Emitter } from '../scene/events';
+import { daylight } from './daylight';
 import { type Orbit, defaultOrbit, frame } from './framing';
 import type { PagePlace } from './schedule';
 
@@ -94,10 +95,9 @@ export class PageModel {
   constructor(private readonly host_: Host, readonly canvas: HTMLCanvasElement, readonly url: string,
       private readonly options_: PageModelOptions) {
     this.camera = options_.camera ?? new PerspectiveCamera(32, 1, 0.01, 100);
-    const lamp = new DirectionalLight(0xffffff, 2.2);
-    lamp.position.set(-0.5, 0.7, 1);
+    const lamp = daylight(this.scene);
     this.camera.add(lamp, lamp.target);
-    this.scene.add(new HemisphereLight(0xffffff, 0xd8d4cc, 3), this.camera);
+    this.scene.add(this.camera);
     this.firstPicture = new Promise((shown, failed) => (this.settle_ = { shown, failed }));
     this.firstPicture.catch(() => undefined);
   }

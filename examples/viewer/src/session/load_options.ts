@@ -1,6 +1,5 @@
-import type { LoadOptions, Manifest } from 'texmesh';
+import { type LoadOptions, type Manifest, isMetallic } from 'texmesh';
 import type { Choices } from '../choices';
-import { isMetallic } from '../stage/light';
 import type { Stage } from '../stage/stage';
 import { gltfLoader } from './decoders';
 

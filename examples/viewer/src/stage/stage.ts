@@ -1,7 +1,7 @@
 import { NeutralToneMapping, Scene, SRGBColorSpace, Vector2, Vector3, WebGLRenderer } from 'three';
 import type { DirectionalLight, PerspectiveCamera } from 'three';
+import { daylight, reflectSky } from 'texmesh';
 import { graphics, idle, pixelRatio, turn } from './gpu';
-import { light, reflectSky } from './light';
 import { Orbit } from './orbit';
 import { Pace } from './pace';
 
@@ -26,7 +26,7 @@ export class Stage {
   private readonly pace = new Pace();
 
   constructor(private readonly canvas: HTMLCanvasElement) {
-    this.lamps = [this.current, this.original].map(light);
+    this.lamps = [this.current, this.original].map(daylight);
     this.orbit = new Orbit(canvas, () => this.draw());
     new ResizeObserver(() => this.resize()).observe(canvas.parentElement ?? canvas);
     canvas.addEventListener('webglcontextrestored', () => this.draw());

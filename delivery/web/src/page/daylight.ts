@@ -15,11 +15,13 @@ vec3 skyRadiance( const in float up, const in float roughness ) {
 const kLookUp = /textureCubeUV\( envMap, envMapRotation \* (\w+), ([\w.]+) \)/g;
 
 /**
- * Adds daylight from above and a lamp that the camera carries; gives the lamp. No shadows: textures of scans
- * contain shadows.
+ * Adds daylight from above and a lamp that the camera is to carry; gives the lamp, whose place is the
+ * camera's frame's. No shadows: textures of scans contain shadows. Posters are drawn in the same light
+ * (stages/render: daylight_environment).
  */
-export function light(scene: Scene): DirectionalLight {
+export function daylight(scene: Scene): DirectionalLight {
   const lamp = new DirectionalLight(0xffffff, 2.2);
+  lamp.position.set(-0.5, 0.7, 1);
   scene.add(new HemisphereLight(0xffffff, 0xd8d4cc, 3), lamp, lamp.target);
   return lamp;
 }
