@@ -22,7 +22,8 @@ struct PosterOptions {
 
 /// A picture of S_0 with the source's texels by the reference renderer (stages/render), in the light that
 /// viewers have, on grey.
-/// - View: the direction that viewers begin with, or one that shows much more of the object's area. Directions
+/// - View: the direction that viewers begin with, or one that shows much more of the object's area.
+/// Directions
 ///   near the front, a little from above, count more than those from high above, from behind and from below.
 /// - Frame: a square. The object touches a margin of 4 % on two opposite sides at least. Where strays make
 ///   the object tiny, the picture shows the place in which nearly all positions lie.

@@ -7,12 +7,11 @@ import type { Object3D, Scene } from 'three';
  * mirror would look like paper.
  */
 const kSky = `
-vec3 skyRadiance( const in float up, const in float roughness ) {
-  vec3 paper = mix( vec3( 0.653, 0.627, 0.577 ), vec3( 0.955 ), 0.5 + 0.5 * up );
-  return mix( vec3( mix( 0.3, 1.7, smoothstep( -0.6, 0.9, up ) ) ), paper, roughness );
-}
+vec3 sky(float up,float roughness){
+return mix(vec3(mix(.3,1.7,smoothstep(-.6,.9,up))),
+mix(vec3(.653,.627,.577),vec3(.955),.5+.5*up),roughness);}
 `;
-const kLookUp = /textureCubeUV\( envMap, envMapRotation \* (\w+), ([\w.]+) \)/g;
+const kLookUp = /textureCubeUV\( envMap, .+? \* (\w+), (.+?) \)/g;
 
 /**
  * Adds daylight from above and a lamp that the camera is to carry; gives the lamp, whose place is the
@@ -30,9 +29,8 @@ export function daylight(scene: Scene): DirectionalLight {
 export function isMetallic(root: Object3D): boolean {
   let metallic = false;
   root.traverse((o) => {
-    const { material } = o as { material?: unknown };
-    for (const m of [material].flat())
-      metallic ||= ((m as { metalness?: number } | undefined)?.metalness ?? 0) > 0.5;
+    const { material = [] } = o as { material?: unknown };
+    for (const m of [material].flat() as { metalness: number }[]) metallic ||= m.metalness > 0.5;
   });
   return metallic;
 }
@@ -46,12 +44,11 @@ export function reflectSky(scene: Scene): void {
   if (scene.environment) return;
   const { envmap_physical_pars_fragment: code } = ShaderChunk;
   if (kLookUp.test(code))
-    ShaderChunk.envmap_physical_pars_fragment = kSky +
-      code.replace(kLookUp, 'vec4( skyRadiance( $1.y, $2 ), 1.0 )');
+    ShaderChunk.envmap_physical_pars_fragment = kSky + code.replace(kLookUp, 'vec4(sky($1.y,$2),1)');
   // of the least size that three.js takes for surroundings
   const unused = new DataTexture(new Uint8Array(4 * 64), 1, 64);
   unused.mapping = CubeUVReflectionMapping;
   unused.needsUpdate = true;
   scene.environment = unused;
-  for (const o of [...scene.children]) if (o instanceof HemisphereLight) scene.remove(o);
+  for (const o of scene.children) if (o instanceof HemisphereLight) o.visible = false;
 }
