@@ -59,7 +59,9 @@ class Chunks : public ::testing::Test {
         run_command({TEXMESH_BINARY, "compile", folder_ / model, "-o", package_, "--no-cache", "--profile",
                      folder_ / "profile.json", "--proxies.mode", "always", "--proxies.sizes", "12000"});
     EXPECT_EQ(made.exit_code, 0) << made.output << made.errors;
-    EXPECT_EQ(made.output.find("rounded-position") != std::string::npos, model != "whole.glb" && model != "exact.glb") << made.output;
+    EXPECT_EQ(made.output.find("rounded-position") != std::string::npos,
+              model != "whole.glb" && model != "exact.glb")
+        << made.output;
     const CommandResult dumped = run_command({TEXMESH_BINARY, "dump", package_, "--json"});
     return nlohmann::json::parse(dumped.output);
   }
@@ -94,7 +96,8 @@ TEST_F(Chunks, NoScaleAndNoProxyGapes) {
   write_text(folder_ / "m.mtl", "newmtl m\nmap_Kd t.png\n");
   write("t.png", picture);
   std::map<std::size_t, double> triangles, far;  // of the scales of the whole
-  for (const std::string model : {"whole.glb", "exact.glb", "float.glb", "int16.glb", "draco.glb", "text.obj"}) {
+  for (const std::string model :
+       {"whole.glb", "exact.glb", "float.glb", "int16.glb", "draco.glb", "text.obj"}) {
     SCOPED_TRACE(model);
     const nlohmann::json dump = compile(model);
     ASSERT_GE(dump["stream"].size(), 3u);
