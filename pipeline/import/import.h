@@ -16,7 +16,7 @@
 
 namespace texmesh {
 
-inline constexpr int kImportVersion = 11;
+inline constexpr int kImportVersion = 12;
 
 enum class KdPolicy : std::uint8_t { kIgnore, kMultiply };
 template <>

@@ -149,10 +149,7 @@ std::int32_t add_image(Model& model, const NameInModel& name, Resolver& resolver
   NamedFile file =
       find_file(name, resolver, static_cast<std::uint64_t>(options.max_file_bytes), model.notes, place);
   if (file.bytes) return add_image_bytes(model, file.name, std::move(*file.bytes), file_name, place, options);
-  const bool tiles = lower(name.text).find("udim>") != name.text.npos;
-  note_missing(model, place,
-               quote(name.text) + " not found: " + file.looked_for +
-                   (tiles ? "; UDIM tiles are read where an MTL names them" : ""));
+  note_missing(model, place, quote(name.text) + " not found: " + file.looked_for);
   return -1;
 }
 

@@ -1,6 +1,7 @@
 #include "pipeline/import/material_images.h"
 
 #include "format/base/portable_math.h"
+#include "pipeline/import/seen_texels.h"
 #include "stages/base/float_math.h"
 #include "stages/image/png_writer.h"
 
@@ -159,19 +160,23 @@ MetallicRoughnessImages convert_specular_glossiness(Model& model, const Specular
   return out;
 }
 
-SpecularGlossiness mean_of_specular(const Model& model, std::int32_t image,
-                                    const SpecularGlossiness& factors) {
-  const Pixels pixels = decode_image(model.images.at(static_cast<std::size_t>(image)), FloatEncoding::kSrgb);
-  const std::size_t count = std::size_t{pixels.width_px} * pixels.height_px;
-  double sum[4] = {0, 0, 0, 0};
-  for (std::size_t i = 0; i < count; ++i) {
+SpecularGlossiness mean_of_specular(const Model& model, const TextureRef& texture, std::size_t material,
+                                    const SpecularGlossiness& factors, const RunContext& context) {
+  const Pixels pixels =
+      decode_image(model.images.at(static_cast<std::size_t>(texture.image)), FloatEncoding::kSrgb);
+  const std::vector<bool> seen =
+      seen_texels(model, material, texture, pixels.width_px, pixels.height_px, context);
+  double sum[4] = {0, 0, 0, 0}, count = 0;
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    if (!seen[i]) continue;
     const Texel t = texel_of(&pixels.data[i * pixels.channels], pixels.channels);
     for (int k = 0; k < 3; ++k) sum[k] += static_cast<double>(t.light[k]);
     sum[3] += static_cast<double>(t.alpha);
+    ++count;
   }
   SpecularGlossiness out = factors;
-  for (int k = 0; k < 3; ++k) out.specular[k] *= static_cast<float>(sum[k] / static_cast<double>(count));
-  out.glossiness *= static_cast<float>(sum[3] / static_cast<double>(count));
+  for (int k = 0; k < 3; ++k) out.specular[k] *= static_cast<float>(sum[k] / count);
+  out.glossiness *= static_cast<float>(sum[3] / count);
   return out;
 }
 

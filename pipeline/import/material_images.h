@@ -5,6 +5,7 @@
 
 #include "format/base/vec.h"
 #include "format/model/model.h"
+#include "stages/base/run_context.h"
 #include "stages/image/decode_image.h"
 
 namespace texmesh {
@@ -62,9 +63,9 @@ struct MetallicRoughnessImages {
 /// texel. InputError when one does not decode.
 MetallicRoughnessImages convert_specular_glossiness(Model& model, const SpecularGlossinessImages& images,
                                                     const SpecularGlossiness& factors);
-/// Mean of an image's texels, times the factors: what stands for a texture that lies elsewhere than the
-/// diffuse one. InputError when the image does not decode.
-SpecularGlossiness mean_of_specular(const Model& model, std::int32_t image,
-                                    const SpecularGlossiness& factors);
+/// Mean of the texels that triangles of `material` show, times the factors: what stands for a texture that
+/// lies elsewhere than the diffuse one. InputError when the image does not decode.
+SpecularGlossiness mean_of_specular(const Model& model, const TextureRef& texture, std::size_t material,
+                                    const SpecularGlossiness& factors, const RunContext& context);
 
 }  // namespace texmesh

@@ -63,6 +63,24 @@ class SeenTexels {
   bool all_ = false;
 };
 
+const std::vector<Vec2f>& uvs_of(const Model& model, const TextureRef& reference) {
+  return reference.texcoord == 0 ? model.mesh.uv0 : model.mesh.uv1;
+}
+
+SeenTexels texels_of(const Model& model, const std::vector<std::uint32_t>& triangles,
+                     const TextureRef& reference, std::uint32_t width_px, std::uint32_t height_px,
+                     const RunContext& context) {
+  const std::vector<Vec2f>& uvs = uvs_of(model, reference);
+  const TexelMap place(reference.transform, width_px, height_px);
+  SeenTexels seen(width_px, height_px, reference);
+  for (std::size_t k = 0; k < triangles.size() && !seen.all(); ++k) {
+    if (k % 65536 == 0) context.check_cancelled();
+    const Triangle& t = model.mesh.triangles[triangles[k]];
+    seen.add({place(uvs[t[0]]), place(uvs[t[1]]), place(uvs[t[2]])});
+  }
+  return seen;
+}
+
 bool is_opaque(const Pixels& pixels) {
   for (std::size_t i = pixels.channels - 1; i < pixels.data.size(); i += pixels.channels)
     if (pixels.data[i] < 250) return false;
@@ -77,12 +95,9 @@ void for_each_seen(const Model& model, const std::vector<std::size_t>& asked, Te
   std::vector<std::vector<std::size_t>> materials_of(model.images.size());
   std::vector<std::vector<std::uint32_t>> triangles_of(model.materials.size());
   std::vector<bool> is_asked(model.materials.size());
-  const auto uvs_of = [&](const TextureRef& reference) -> const std::vector<Vec2f>& {
-    return reference.texcoord == 0 ? model.mesh.uv0 : model.mesh.uv1;
-  };
   for (const std::size_t m : asked) {
     const TextureRef& reference = model.materials[m].*texture;
-    if (!reference.used() || uvs_of(reference).empty()) continue;
+    if (!reference.used() || uvs_of(model, reference).empty()) continue;
     materials_of[static_cast<std::size_t>(reference.image)].push_back(m);
     is_asked[m] = true;
   }
@@ -93,15 +108,8 @@ void for_each_seen(const Model& model, const std::vector<std::size_t>& asked, Te
     const Pixels pixels = decode_image(model.images[i]);
     if (!counts(pixels)) continue;
     for (const std::size_t m : materials_of[i]) {
-      const TextureRef& reference = model.materials[m].*texture;
-      const std::vector<Vec2f>& uvs = uvs_of(reference);
-      const TexelMap texels_of(reference.transform, pixels.width_px, pixels.height_px);
-      SeenTexels seen(pixels.width_px, pixels.height_px, reference);
-      for (std::size_t k = 0; k < triangles_of[m].size() && !seen.all(); ++k) {
-        if (k % 65536 == 0) context.check_cancelled();
-        const Triangle& t = model.mesh.triangles[triangles_of[m][k]];
-        seen.add({texels_of(uvs[t[0]]), texels_of(uvs[t[1]]), texels_of(uvs[t[2]])});
-      }
+      const SeenTexels seen = texels_of(model, triangles_of[m], model.materials[m].*texture, pixels.width_px,
+                                        pixels.height_px, context);
       judge(m, pixels, seen);
     }
   }
@@ -123,6 +131,18 @@ bool shows_normals(const Pixels& pixels, const SeenTexels& seen) {
 }
 
 }  // namespace
+
+std::vector<bool> seen_texels(const Model& model, std::size_t material, const TextureRef& texture,
+                              std::uint32_t width_px, std::uint32_t height_px, const RunContext& context) {
+  std::vector<std::uint32_t> triangles;
+  for (std::uint32_t t = 0; t < model.mesh.triangles.size() && !uvs_of(model, texture).empty(); ++t)
+    if (model.mesh.triangle_material[t] == material) triangles.push_back(t);
+  const SeenTexels seen = texels_of(model, triangles, texture, width_px, height_px, context);
+  std::vector<bool> out(std::size_t{width_px} * height_px);
+  for (std::size_t i = 0; i < out.size(); ++i) out[i] = seen.at(i);
+  if (std::find(out.begin(), out.end(), true) == out.end()) out.assign(out.size(), true);
+  return out;
+}
 
 void judge_alpha(Model& model, const RunContext& context) {
   std::vector<std::size_t> asked;

@@ -15,4 +15,9 @@ void judge_alpha(Model& model, const RunContext& context);
 /// Before finish_model(), which drops pictures that nothing uses.
 void judge_bump_maps(Model& model, const std::vector<std::size_t>& materials, const RunContext& context);
 
+/// Which texels of a picture of this size triangles of the material show, row by row. All of them where none
+/// can be told: no triangle shows one, or the mesh has no such coordinates.
+std::vector<bool> seen_texels(const Model& model, std::size_t material, const TextureRef& texture,
+                              std::uint32_t width_px, std::uint32_t height_px, const RunContext& context);
+
 }  // namespace texmesh

@@ -434,21 +434,20 @@ void CollapseCost::add_shape() {
   }
 }
 
-/// Planes that stand on open borders, on borders of materials and parts, and on seams of the texture.
+/// Planes that stand on open borders, on borders of materials, and on seams of the texture.
 void CollapseCost::add_lines(const Mesh& input, const SimplificationOptions& options) {
   CollapseRing ring(mesh_);
-  constexpr std::uint64_t kUnseen = ~std::uint64_t{0};
+  constexpr std::uint32_t kUnseen = kNoIndex;
   struct Uses {
-    std::uint64_t first = kUnseen;
+    std::uint32_t first = kUnseen;
     bool mixed = false;
   };
-  std::vector<Uses> uses;  // per neighbour: material and part of the faces at the edge
+  std::vector<Uses> uses;  // per neighbour: materials of the faces at the edge
   for (std::uint32_t u = 0; u < mesh_.point_count(); ++u) {
     ring.gather(u);
     uses.assign(ring.neighbours().size(), {});
     for (const CollapseRing::Corner& corner : ring.corners()) {
-      const std::uint32_t t = mesh_.face_source(corner.face);
-      const std::uint64_t use = std::uint64_t{input.triangle_material[t]} << 16 | input.triangle_part[t];
+      const std::uint32_t use = input.triangle_material[mesh_.face_source(corner.face)];
       for (std::uint32_t slot : {corner.a, corner.b}) {
         uses[slot].mixed = uses[slot].mixed || (uses[slot].first != kUnseen && uses[slot].first != use);
         uses[slot].first = use;

@@ -93,11 +93,10 @@ void CollapseMesh::add_faces(const Mesh& mesh, const std::vector<std::uint32_t>&
 void CollapseMesh::number_wedges(const Mesh& mesh) {
   input_wedges_ = static_cast<std::uint32_t>(mesh.wedge_count());
   std::vector<std::uint32_t> first(input_wedges_, kNoIndex), group(input_wedges_, 0);
-  // Wedges that more than one material or part uses.
+  // Wedges that more than one material uses.
   std::map<std::array<std::uint32_t, 2>, std::uint32_t> others;
   for (std::size_t f = 0; f < faces_.size(); ++f) {
-    const std::size_t t = face_source_[f];
-    const std::uint32_t use = std::uint32_t{mesh.triangle_material[t]} << 16 | mesh.triangle_part[t];
+    const std::uint32_t use = mesh.triangle_material[face_source_[f]];
     for (std::uint32_t& wedge : faces_[f].wedge) {
       const std::uint32_t real = wedge;
       std::uint32_t id = kNoIndex;

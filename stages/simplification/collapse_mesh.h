@@ -7,9 +7,9 @@ namespace texmesh {
 
 /// The triangle mesh that simplification works on. Its vertices are *points*: groups of twin positions, so
 /// that the position-welded surface is what keeps its topology. Its wedges are the mesh's, split further by
-/// material and part, so that a border of materials behaves like a seam. Points, wedges and triangles are
-/// numbered along a space-filling curve: on a million triangles the collapse loop runs more than twice as
-/// fast than in file order.
+/// material, so that a border of materials behaves like a seam. Parts of one material that share wedges are
+/// one surface to it. Points, wedges and triangles are numbered along a space-filling curve: on a million
+/// triangles the collapse loop runs more than twice as fast than in file order.
 class CollapseMesh {
  public:
   struct Face {

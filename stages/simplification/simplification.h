@@ -6,7 +6,7 @@
 
 namespace texmesh {
 
-inline constexpr int kSimplificationVersion = 11;
+inline constexpr int kSimplificationVersion = 12;
 
 enum class CollapseOrder : std::uint8_t { kTexmesh, kThesis };
 template <>
@@ -71,7 +71,8 @@ struct SimplificationOptions {
 ///   in every set of texture coordinates that its material uses. The set of the base colour has the quadric
 ///   and max_shift.
 /// - Order thesis removes down to the scale map's numbers, whatever the error and the shift of the texture.
-/// - Border vertices move along the border only, seams along the seam, twins together.
+/// - Border vertices move along the border only, seams along the seam, twins together. Borders of materials
+///   are seams; where parts of one material share wedges, what shows is one surface and nothing is held.
 /// About 5 us per removed vertex on one core. StageError when the scale map is of another mesh.
 /// Deterministic: among equals the place along a space-filling curve decides.
 NestedScales simplify(const ConditionedMesh& mesh, const ScaleMap& scale_map,

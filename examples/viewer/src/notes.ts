@@ -51,7 +51,7 @@ export class Notes {
     this.ends.clear();
     if (before) return;
     const { edit, measure } = await import('texmesh/notes');
-    this.ends.set(name, name === 'measure' ? measure(layer, await pkg.about()) : edit(layer));
+    this.ends.set(name, name === 'measure' ? measure(layer, pkg, await pkg.about()) : edit(layer));
     byId(name).setAttribute('aria-pressed', 'true');
   }
 }

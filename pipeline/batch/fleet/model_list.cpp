@@ -12,6 +12,7 @@
 #include "pipeline/import/ply/ply_reader.h"
 #include "pipeline/import/range/range_scan_document.h"
 #include "pipeline/import/text_scan.h"
+#include "pipeline/import/udim.h"
 #include "pipeline/io/file_resolver.h"
 #include "pipeline/io/uri.h"
 
@@ -64,8 +65,12 @@ class ListedFiles {
   }
 
  private:
-  /// The file's name beneath the model's folder, "" where there is none.
+  /// The file's name beneath the model's folder, "" where there is none. Adds its other tiles, too.
   std::string add(const NameInModel& name) {
+    constexpr std::uint16_t kEnd = kFirstTile + 10 * kTilesInARow;
+    if (tile_mark(name.text) != TileMark::kNone)
+      for (std::uint16_t tile = kFirstTile; tile < kEnd; ++tile)
+        if (NameInModel of = name; (of.text = name_of_tile(name.text, tile)) != name.text) add(of);
     const NamedFile file = find_file(name, files_, kMostJsonBytes, notes_, "");
     if (!file.bytes) return "";
     found_.insert((folder_ / file.name).lexically_normal().string());
@@ -105,14 +110,9 @@ class ListedFiles {
     const std::string name = add({written, "", false});
     if (name.empty()) return false;
     const MtlFile library = read_mtl(name, bytes_at((folder_ / name).string(), 0, kMostJsonBytes), notes_);
-    for (const MtlMaterial& m : library.materials) add_maps(m, name);
     for (const MtlMaterial& m : library.materials)
-      for (std::uint16_t tile = 1001; has_tiles(m) && tile < 1100; ++tile) add_maps(of_tile(m, tile), name);
+      for_each_map(m, [&](const std::string& file) { add({file, name, false}); });
     return true;
-  }
-
-  void add_maps(const MtlMaterial& m, const std::string& said_in) {
-    for_each_map(m, [&](const std::string& file) { add({file, said_in, false}); });
   }
 
   void look_at_ply() {

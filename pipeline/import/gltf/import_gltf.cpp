@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "format/model/material_extensions.h"
 #include "pipeline/about/gltf_about.h"
@@ -334,7 +335,7 @@ class GltfReader {
   void check_document() const;
   void note_what_is_left_out() const;
   void count_attributes(const tinygltf::Primitive& primitive) const;
-  std::map<int, std::uint16_t> read_used_materials(const std::vector<Instance>& instances);
+  std::vector<int> used_materials(const std::vector<Instance>& instances) const;
   std::uint16_t add_part(const Instance& instance);
   void drop_textures_without_uv();
 
@@ -417,20 +418,15 @@ void GltfReader::note_what_is_left_out() const {
 }
 
 /// In the order of the file, -1 (glTF's default material) first.
-std::map<int, std::uint16_t> GltfReader::read_used_materials(const std::vector<Instance>& instances) {
-  std::map<int, std::uint16_t> index;
+std::vector<int> GltfReader::used_materials(const std::vector<Instance>& instances) const {
+  std::set<int> used;
   for (const Instance& i : instances) {
-    for (const tinygltf::Primitive& p : structure_.meshes[i.mesh].primitives) index[p.material] = 0;
+    for (const tinygltf::Primitive& p : structure_.meshes[i.mesh].primitives) used.insert(p.material);
   }
-  if (index.size() > kMaxGltfMaterials) {
-    source_.fail("/materials", "at most " + std::to_string(kMaxGltfMaterials), std::to_string(index.size()));
+  if (used.size() > kMaxGltfMaterials) {
+    source_.fail("/materials", "at most " + std::to_string(kMaxGltfMaterials), std::to_string(used.size()));
   }
-  std::vector<int> used;
-  for (const auto& [material, unset] : index) used.push_back(material);
-  const std::vector<std::uint16_t> read =
-      read_materials(source_, document_, structure_, buffers_, used, model_);
-  for (std::size_t i = 0; i < used.size(); ++i) index[used[i]] = read[i];
-  return index;
+  return {used.begin(), used.end()};
 }
 
 std::uint16_t GltfReader::add_part(const Instance& instance) {
@@ -468,7 +464,11 @@ void GltfReader::read() {
     for (const tinygltf::Primitive& p : structure_.meshes[i.mesh].primitives)
       with_normals |= p.attributes.count("NORMAL") != 0;
   }
-  const std::map<int, std::uint16_t> materials = read_used_materials(instances);
+  const std::vector<int> materials = used_materials(instances);
+  const auto number_of = [&](int material) {
+    return static_cast<std::uint16_t>(std::lower_bound(materials.begin(), materials.end(), material) -
+                                      materials.begin());
+  };
   PrimitiveCache cache(instances);
   Assembler assembler(source_, model_.mesh, with_normals);
   for (std::size_t i = 0; i < instances.size(); ++i) {
@@ -485,10 +485,11 @@ void GltfReader::read() {
     });
     const std::uint16_t part = add_part(instance);
     for (std::size_t p = 0; p < declared.size(); ++p) {
-      assembler.add((*primitives)[p], instance, materials.at(declared[p].material), part);
+      assembler.add((*primitives)[p], instance, number_of(declared[p].material), part);
     }
   }
   assembler.finish();
+  read_materials(source_, document_, structure_, buffers_, materials, model_);
   drop_textures_without_uv();
 }
 

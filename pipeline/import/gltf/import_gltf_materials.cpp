@@ -4,9 +4,10 @@
 
 #include "format/model/material_extensions.h"
 #include "pipeline/import/gltf/import_gltf_parts.h"
-#include "pipeline/import/import_images.h"
 #include "pipeline/import/material_images.h"
+#include "pipeline/import/seen_texels.h"
 #include "pipeline/import/text_scan.h"
+#include "pipeline/import/udim.h"
 #include "pipeline/io/uri.h"
 
 namespace texmesh {
@@ -59,10 +60,16 @@ Minification minification_of(int filter) {
 class MaterialReader {
  public:
   MaterialReader(const Source& source, const GltfJson& document, const tinygltf::Model& structure,
-                 Buffers& buffers, Model& model)
-      : source_(source), document_(document), structure_(structure), buffers_(buffers), model_(model) {
+                 Buffers& buffers, Model& model, TiledImages& tiled)
+      : source_(source),
+        document_(document),
+        structure_(structure),
+        buffers_(buffers),
+        model_(model),
+        tiled_(tiled) {
     if (const GltfJson* images = member(document_, "images")) image_of_.assign(images->size(), kNotRead);
   }
+  /// The next material of the model, which the mesh knows already.
   Material read(std::size_t index);
 
  private:
@@ -81,6 +88,7 @@ class MaterialReader {
   const tinygltf::Model& structure_;
   Buffers& buffers_;
   Model& model_;
+  TiledImages& tiled_;
   std::vector<std::int32_t> image_of_;  // per glTF image: index in model_.images, -1 missing, kNotRead
 };
 
@@ -105,8 +113,8 @@ std::int32_t MaterialReader::read_image(std::size_t index) {
                            source_.file, place, source_.options);
   }
   try {
-    return add_image(model_, {uri, "", true}, source_.resolver, source_.file, place + "/uri",
-                     source_.options);
+    return tiled_.add_image(model_, {uri, "", true}, source_.resolver, source_.file, place + "/uri",
+                            source_.options);
   } catch (const ResourceError&) {
     throw;
   } catch (const InputError& e) {
@@ -210,7 +218,7 @@ void MaterialReader::read_specular_glossiness(const GltfJson& e, const std::stri
   if (diffuse.used() && specular.used() && !same_place(diffuse, specular)) {
     source_.note_once(Severity::kWarning, "specular-glossiness-mean", place,
                       "specularGlossinessTexture lies elsewhere than diffuseTexture; its mean is taken");
-    factors = mean_of_specular(model_, specular.image, factors);
+    factors = mean_of_specular(model_, specular, model_.materials.size(), factors, source_.context);
     specular = {};
   }
   out.base_colour_texture = out.metallic_roughness_texture = {};
@@ -316,17 +324,15 @@ Material MaterialReader::read(std::size_t index) {
 
 }  // namespace
 
-std::vector<std::uint16_t> read_materials(const Source& source, const GltfJson& document,
-                                          const tinygltf::Model& structure, Buffers& buffers,
-                                          const std::vector<int>& used, Model& model) {
-  MaterialReader reader(source, document, structure, buffers, model);
-  std::vector<std::uint16_t> indices;
+void read_materials(const Source& source, const GltfJson& document, const tinygltf::Model& structure,
+                    Buffers& buffers, const std::vector<int>& used, Model& model) {
+  TiledImages tiled;
+  MaterialReader reader(source, document, structure, buffers, model, tiled);
   for (const int m : used) {
     source.context.check_cancelled();
-    indices.push_back(static_cast<std::uint16_t>(model.materials.size()));
     model.materials.push_back(m < 0 ? Material{} : reader.read(static_cast<std::size_t>(m)));
   }
-  return indices;
+  tiled.split(model, source.resolver, source.file, source.options);
 }
 
 }  // namespace texmesh

@@ -165,10 +165,10 @@ Primitive read_primitive(const Source& source, const GltfJson& document, const t
 
 // import_gltf_materials.cpp
 
-/// Appends the glTF materials that `used` names (and glTF's default material for -1) to `model`, with their
-/// images. The result gives, per entry of `used`, the index in model.materials.
-std::vector<std::uint16_t> read_materials(const Source& source, const GltfJson& document,
-                                          const tinygltf::Model& structure, Buffers& buffers,
-                                          const std::vector<int>& used, Model& model);
+/// Appends the glTF materials that `used` names (glTF's default material for -1) to `model`, in order, with
+/// their images. The mesh is there already: its triangles' materials are places in `used`, until materials of
+/// several tiles become several (TiledImages).
+void read_materials(const Source& source, const GltfJson& document, const tinygltf::Model& structure,
+                    Buffers& buffers, const std::vector<int>& used, Model& model);
 
 }  // namespace texmesh

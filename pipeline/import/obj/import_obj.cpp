@@ -8,6 +8,7 @@
 #include "pipeline/import/obj/obj_material.h"
 #include "pipeline/import/seen_texels.h"
 #include "pipeline/import/text_scan.h"
+#include "pipeline/import/udim.h"
 
 // OBJ is read here and not by tinyobjloader 2.0rc10, which (measured on Debian 12) turns "nan", "inf" and
 // words into 0 without a word, wraps the index 99999999999 onto another vertex, gives a polygon of 300
@@ -51,8 +52,11 @@ struct ObjData {
   std::vector<Vec3f> zbrush_colours;                    // one per position, 0..255, where their number fits
   std::uint64_t small_faces = 0, lines_and_points = 0;  // left out
   std::uint64_t zero_indices = 0;                       // of normals and texture coordinates: there is none
-  Lost unread;                                          // statements, by their first word
-  bool parts_full = false;                              // the last part stands for all further ones
+  std::uint64_t far_indices = 0;   // of normals and texture coordinates that are not there
+  std::uint64_t broken_faces = 0;  // left out: a vertex of theirs is not there
+  std::uint32_t broken_line = 0;   // of the first one
+  Lost unread;                     // statements, by their first word
+  bool parts_full = false;         // the last part stands for all further ones
   std::uint16_t tile(std::size_t material) const {
     return tiles.empty() ? std::uint16_t{0} : tiles[material];
   }
@@ -63,7 +67,8 @@ struct ObjData {
 };
 
 constexpr std::int64_t kMaxIndex = 2'000'000'000;
-constexpr std::size_t kMaxNames = 65535;  // parts, materials
+constexpr std::uint32_t kNowhere = kNoIndex - 1;  // an index that can mean nothing
+constexpr std::size_t kMaxNames = 65535;          // parts, materials
 constexpr std::size_t kMaxStatementBytes = 24;
 
 /// Names to numbers by first use.
@@ -100,7 +105,7 @@ class ObjReader {
       if (!line.empty() && line.back() == '\\') line = continued(line);
       statement(line);
     }
-    check_references();
+    drop_broken_references();
     if (data_.colours.empty() && data_.zbrush_colours.size() == data_.positions.size())
       data_.colours.swap(data_.zbrush_colours);
     return std::move(data_);
@@ -216,15 +221,13 @@ class ObjReader {
     data_.normals.push_back(to_float(Vec3d{x[0], x[1], x[2]}));
   }
 
-  // 1 is the first, -1 the latest; 0 is none. Indices may run ahead of their vertices: check_references() has
-  // the last word.
+  // 1 is the first, -1 the latest. Indices may run ahead of what they mean: drop_broken_references() has the
+  // last word, and on those that can mean nothing, too.
   std::uint32_t index(std::string_view token, std::size_t count) const {
     std::int64_t i = 0;
     if (!parse_integer(token, i)) fail("a face corner such as 3, 3/1 or 3/1/2", quote(token));
     if (i < 0) i += static_cast<std::int64_t>(count) + 1;
-    if (i < 1 || i > kMaxIndex)
-      fail("an index from 1 or from -" + std::to_string(count) + " to -1", quote(token));
-    return static_cast<std::uint32_t>(i - 1);
+    return i < 1 || i > kMaxIndex ? kNowhere : static_cast<std::uint32_t>(i - 1);
   }
 
   /// Cinema 4D writes 0 for "none".
@@ -283,19 +286,37 @@ class ObjReader {
                                     data_.parts, data_.parts_full);
   }
 
-  void check_references() const {
-    auto check = [this](std::uint32_t i, std::size_t count, const char* what, std::size_t f) {
-      if (i != kNoIndex && i >= count)
-        throw InputError(file_, "line " + std::to_string(data_.faces[f].line),
-                         std::string(what) + " index up to " + std::to_string(count),
-                         std::to_string(std::uint64_t{i} + 1));
+  /// Faces with a vertex that is not there go; a corner whose texture coordinate or normal is not there goes
+  /// without.
+  void drop_broken_references() {
+    const auto keep = [this](std::uint32_t& i, std::size_t count) {
+      if (i == kNoIndex || i < count) return;
+      i = kNoIndex;
+      ++data_.far_indices;
     };
-    for (std::size_t f = 0; f < data_.faces.size(); ++f)
-      for (const ObjCorner& r : data_.corners_of(f)) {
-        check(r.position, data_.positions.size(), "a vertex", f);
-        check(r.uv, data_.uvs.size(), "a texture coordinate", f);
-        check(r.normal, data_.normals.size(), "a normal", f);
+    for (ObjCorner& r : data_.corners) keep(r.uv, data_.uvs.size()), keep(r.normal, data_.normals.size());
+    const auto is_there = [this](const ObjCorner& r) { return r.position < data_.positions.size(); };
+    std::size_t kept = 0;
+    std::uint64_t corners = 0;
+    for (std::size_t f = 0; f < data_.faces.size(); ++f) {
+      const std::span<const ObjCorner> of = data_.corners_of(f);
+      if (!std::all_of(of.begin(), of.end(), is_there)) {
+        if (data_.broken_faces++ == 0) data_.broken_line = data_.faces[f].line;
+        continue;
       }
+      ObjFace face = data_.faces[f];
+      face.begin = corners;
+      for (const ObjCorner& r : of) data_.corners[corners++] = r;
+      if (!data_.flat.empty()) data_.flat[kept] = f < data_.flat.size() && data_.flat[f];
+      data_.faces[kept++] = face;
+    }
+    if (data_.broken_faces == 0) return;
+    if (kept == 0)
+      throw InputError(file_, "line " + std::to_string(data_.broken_line),
+                       "a face of the " + std::to_string(data_.positions.size()) + " vertices", "none");
+    data_.faces.resize(kept);
+    data_.corners.resize(corners);
+    if (!data_.flat.empty()) data_.flat.resize(kept);
   }
 
   const std::string& file_;
@@ -390,27 +411,34 @@ class LibraryLoader {
   std::vector<LoadedLibrary> loaded_;
 };
 
-constexpr std::uint16_t kFirstTile = 1001, kTilesInARow = 10, kLastTile = 9999;
-
-/// The UDIM tile that a face lies in: 1001 + u + 10 v, from whole numbers of repeats, v upwards.
+/// The UDIM tile that a face lies in.
 std::uint16_t tile_of(const ObjData& data, std::size_t face) {
   Vec2d sum;
   const std::span<const ObjCorner> corners = data.corners_of(face);
   for (const ObjCorner& r : corners)
-    if (r.uv != kNoIndex) sum = sum + Vec2d{data.uvs[r.uv].x, 1 - static_cast<double>(data.uvs[r.uv].y)};
-  const double u = std::floor(sum.x / static_cast<double>(corners.size())),
-               v = std::floor(sum.y / static_cast<double>(corners.size()));
-  const double tile = kFirstTile + u + kTilesInARow * v;
-  return u >= 0 && u < kTilesInARow && v >= 0 && tile <= kLastTile ? static_cast<std::uint16_t>(tile)
-                                                                   : kFirstTile;
+    if (r.uv != kNoIndex) sum = sum + to_double(data.uvs[r.uv]);
+  return tile_at(sum * (1 / static_cast<double>(corners.size())));
 }
 
-/// Faces of a material whose maps are named after tiles ("scan.<UDIM>.png") come to have one of each tile.
-void split_into_tiles(ObjData& data, const std::vector<LoadedLibrary>& libraries) {
+/// Per material: whether its maps are named after tiles.
+std::vector<bool> find_tiled(const ObjData& data, const std::vector<LoadedLibrary>& libraries,
+                             Resolver& resolver, const ImportOptions& options) {
   std::vector<bool> tiled(data.materials.size());
+  std::vector<std::set<std::uint16_t>> tiles(data.materials.size());
+  for (std::size_t f = 0; f < data.faces.size(); ++f) tiles[data.faces[f].material].insert(tile_of(data, f));
   for (std::size_t m = 0; m < data.materials.size(); ++m)
-    if (const MtlMaterial* material = find_material(libraries, data.materials[m]).material)
-      tiled[m] = has_tiles(*material);
+    if (const auto [material, library] = find_material(libraries, data.materials[m]); material)
+      for_each_map(*material, [&, from = library](const std::string& file) {
+        const TileMark mark = tile_mark(file);
+        tiled[m] = tiled[m] || mark == TileMark::kWord ||
+                   (mark == TileMark::kNumber &&
+                    other_tile_is_there({file, from->name, false}, tiles[m], resolver, options));
+      });
+  return tiled;
+}
+
+/// Faces of a material whose maps are named after tiles come to have one of each tile.
+void split_into_tiles(ObjData& data, const std::vector<bool>& tiled) {
   if (std::find(tiled.begin(), tiled.end(), true) == tiled.end()) return;
   data.tiles.resize(data.materials.size());
   std::map<std::pair<std::uint16_t, std::uint16_t>, std::uint16_t> made;
@@ -457,7 +485,7 @@ void add_obj_materials(ObjData& data, const std::string& file, Model& model, Res
   for (const LoadedLibrary& library : libraries)
     for (const auto& [word, count] : library.file.unread)
       lost["statements " + quote(word) + " of materials"] += count;
-  split_into_tiles(data, libraries);
+  split_into_tiles(data, find_tiled(data, libraries, resolver, options));
   std::vector<std::uint8_t> used(data.materials.size(), 0);
   for (const ObjFace& f : data.faces) used[f.material] = 1;
   for (std::size_t i = 0; i < data.materials.size(); ++i) {
@@ -598,6 +626,16 @@ void add_notes(const ObjData& data, Model& model, Lost& lost) {
     add_warning(model.notes, "index-0", "",
                 "0 stands for the normal or texture coordinate of a corner, " +
                     std::to_string(data.zero_indices) + " times; such corners go without");
+  if (data.far_indices)
+    add_warning(model.notes, "index-beyond", "",
+                std::to_string(data.far_indices) +
+                    " corners name a normal or texture coordinate that is not there; they go without");
+  if (data.broken_faces) {
+    lost["faces with missing vertices"] = data.broken_faces;
+    add_warning(model.notes, "broken-face", "line " + std::to_string(data.broken_line),
+                std::to_string(data.broken_faces) +
+                    " faces name a vertex that is not there and are left out; this is the first one");
+  }
   for (const auto& [word, count] : data.unread) lost["statements " + quote(word)] += count;
   if (data.lines_and_points) lost["line and point elements"] = data.lines_and_points;
   if (!data.zbrush_colours.empty()) lost["colours of ZBrush"] = data.zbrush_colours.size();

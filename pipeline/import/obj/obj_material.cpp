@@ -6,6 +6,7 @@
 #include "pipeline/import/material_images.h"
 #include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/text_scan.h"
+#include "pipeline/import/udim.h"
 
 namespace texmesh {
 namespace {
@@ -266,22 +267,10 @@ struct Converter {
   }
 };
 
-constexpr std::string_view kTileMark = "<udim>";
-
 }  // namespace
 
-bool has_tiles(const MtlMaterial& material) {
-  bool any = false;
-  for_each_map(material,
-               [&](const std::string& file) { any = any || lower(file).find(kTileMark) != file.npos; });
-  return any;
-}
-
 MtlMaterial of_tile(MtlMaterial material, std::uint16_t tile) {
-  for_each_map(material, [&](std::string& file) {
-    if (const std::size_t at = lower(file).find(kTileMark); at != file.npos)
-      file.replace(at, kTileMark.size(), std::to_string(tile));
-  });
+  for_each_map(material, [&](std::string& file) { file = name_of_tile(std::move(file), tile); });
   material.name += "." + std::to_string(tile);
   return material;
 }

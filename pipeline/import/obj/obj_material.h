@@ -43,8 +43,6 @@ void for_each_map(M& material, F&& f) {
     if (*map) f((*map)->file);
 }
 
-/// Whether a map is named after UDIM tiles: "scan.<UDIM>.png".
-bool has_tiles(const MtlMaterial& material);
 /// The material with the maps of one tile.
 MtlMaterial of_tile(MtlMaterial material, std::uint16_t tile);
 

@@ -2,11 +2,11 @@
 #include <span>
 
 #include "pipeline/about/source_fields.h"
-#include "pipeline/import/import_images.h"
 #include "pipeline/import/mesh_builder.h"
 #include "pipeline/import/named_files.h"
 #include "pipeline/import/ply/ply_reader.h"
 #include "pipeline/import/seen_texels.h"
+#include "pipeline/import/udim.h"
 
 // PLY has no specification of names beyond x, y, z. This is what MeshLab, CloudCompare, Metashape, Blender
 // and VTK write, and what is read here:
@@ -39,7 +39,7 @@ struct PlyVertices {
 /// Faces as they stand in the file; corners of face f are begin[f] .. begin[f + 1].
 struct PlyFaces {
   std::vector<std::size_t> begin{0};
-  std::vector<std::uint32_t> index;
+  std::vector<std::uint32_t> index;   // of vertices; some may not be there
   std::vector<Vec2f> uv;              // per corner, or empty
   std::vector<std::uint8_t> has_uv;   // per face, or empty
   std::vector<Vec4f> colours;         // per corner, or empty
@@ -49,7 +49,7 @@ struct PlyFaces {
 
 struct PlySurface {
   PlyVertices vertices;
-  PlyFaces faces;                     // every index below the number of vertices
+  PlyFaces faces;
   std::vector<std::string> comments;  // of the header, in order
   std::int32_t artec_textures = 0;    // that multi_texture_face names
   Lost lost;
@@ -123,8 +123,8 @@ struct ArtecTexturing {
   std::vector<std::uint32_t> corners;  // indices into uv
 };
 
-/// Reads the elements vertex, face, tristrips and those of Artec. InputError for a file without faces, for
-/// indices that are no vertices, and for more than the options allow.
+/// Reads the elements vertex, face, tristrips and those of Artec. InputError for a file without faces
+/// and for more than the options allow.
 class SurfaceReader {
  public:
   SurfaceReader(const std::string& file, std::span<const std::uint8_t> bytes, const ImportOptions& options,
@@ -143,7 +143,7 @@ class SurfaceReader {
       throw InputError(file_, "", "faces",
                        std::string(is_splats_ ? "none (Gaussian splats: " : "none (a point cloud of ") +
                            std::to_string(surface_.vertices.positions.size()) + " points)");
-    check_indices();
+    check_face_count();
     surface_.comments = std::move(header_.comments);
     return std::move(surface_);
   }
@@ -286,19 +286,13 @@ class SurfaceReader {
 
   static Vec2f flipped(double u, double v) { return {static_cast<float>(u), static_cast<float>(1 - v)}; }
 
-  std::uint32_t index_of(double value) const {
-    if (!(value >= 0) || value > 4294967294.0 || value != std::floor(value))
-      throw InputError(file_, rows_.place(), "a vertex index", std::to_string(value));
-    return static_cast<std::uint32_t>(value);
+  /// kNoIndex for what can be no index.
+  static std::uint32_t index_of(double value) {
+    const bool good = value >= 0 && value <= 4294967294.0 && value == std::floor(value);
+    return good ? static_cast<std::uint32_t>(value) : kNoIndex;
   }
 
-  void add_index(double value) {
-    surface_.faces.index.push_back(index_of(value));
-    if (surface_.faces.index.back() > largest_index_) {
-      largest_index_ = surface_.faces.index.back();
-      largest_index_place_ = rows_.place();
-    }
-  }
+  void add_index(double value) { surface_.faces.index.push_back(index_of(value)); }
 
   void read_faces(const PlyElement& element) {
     const int corners = find_list(element, {"vertex_indices", "vertex_index"});
@@ -378,11 +372,7 @@ class SurfaceReader {
     }
   }
 
-  void check_indices() const {
-    if (!surface_.faces.index.empty() && largest_index_ >= surface_.vertices.positions.size())
-      throw InputError(file_, largest_index_place_,
-                       "a vertex index below " + std::to_string(surface_.vertices.positions.size()),
-                       std::to_string(largest_index_));
+  void check_face_count() const {
     if (surface_.faces.count() > static_cast<std::size_t>(options_.max_triangles))
       throw InputError(file_, "element face", "at most " + std::to_string(options_.max_triangles),
                        std::to_string(surface_.faces.count()));
@@ -397,8 +387,6 @@ class SurfaceReader {
   PlySurface surface_;
   ArtecTexturing artec_;
   bool is_splats_ = false;
-  std::uint32_t largest_index_ = 0;
-  std::string largest_index_place_;
 };
 
 /// Makes a model of a file's vertices and faces.
@@ -412,10 +400,11 @@ class PlyModel {
         options_(options),
         context_(context) {}
 
-  Model build() {
+  Model build(Lost& lost) {
     add_materials();
     build_mesh();
-    add_notes();
+    tiled_.split(model_, resolver_, file_, options_);
+    add_notes(lost);
     finish_model(model_, file_, options_);
     judge_alpha(model_, context_);
     return std::move(model_);
@@ -439,7 +428,7 @@ class PlyModel {
       material.name = name;
       if (has_uv())
         material.base_colour_texture.image =
-            add_image(model_, {name, "", false}, resolver_, file_, "comment TextureFile", options_);
+            tiled_.add_image(model_, {name, "", false}, resolver_, file_, "comment TextureFile", options_);
       model_.materials.push_back(std::move(material));
     }
     if (model_.materials.size() == 1) add_artec_materials(plain);
@@ -512,13 +501,28 @@ class PlyModel {
     for (std::size_t f = 0; f < surface_.faces.count(); ++f) {
       if (f % 65536 == 0) context_.check_cancelled();
       const std::uint16_t material = material_of(f);
+      if (!has_all_vertices(f)) {
+        if (broken_faces_++ == 0) first_broken_face_ = f;
+        continue;
+      }
       corners.clear();
       for (std::size_t k = surface_.faces.begin[f]; k < surface_.faces.begin[f + 1]; ++k)
         corners.push_back(corner(f, k, textured(material)));
       builder.add_face(corners, material, 0);
       if (corners.size() < 3) ++small_faces_;
     }
+    if (broken_faces_ == surface_.faces.count())
+      throw InputError(file_, "element face",
+                       "a face of the " + std::to_string(surface_.vertices.positions.size()) + " vertices",
+                       "none");
     model_.mesh = builder.finish();
+  }
+
+  bool has_all_vertices(std::size_t face) const {
+    const PlyFaces& faces = surface_.faces;
+    for (std::size_t k = faces.begin[face]; k < faces.begin[face + 1]; ++k)
+      if (faces.index[k] >= surface_.vertices.positions.size()) return false;
+    return true;
   }
 
   Corner corner(std::size_t face, std::size_t k, bool is_textured) const {
@@ -540,7 +544,7 @@ class PlyModel {
     return c;
   }
 
-  void add_notes() {
+  void add_notes(Lost& lost) {
     if (surface_.long_lines)
       add_warning(model_.notes, "over-long-lines", surface_.first_long_line,
                   std::to_string(surface_.long_lines) +
@@ -549,6 +553,13 @@ class PlyModel {
       add_warning(model_.notes, "odd-texcoord-list", "element face",
                   std::to_string(surface_.odd_texcoords) +
                       " faces whose texcoord list does not hold two numbers per corner");
+    if (broken_faces_) {
+      lost["faces with missing vertices"] = broken_faces_;
+      add_warning(model_.notes, "broken-face", "element face",
+                  std::to_string(broken_faces_) +
+                      " faces name a vertex that is not there and are left out; face " +
+                      std::to_string(first_broken_face_) + " is the first one");
+    }
     if (small_faces_)
       add_warning(model_.notes, "face-without-area", "element face",
                   std::to_string(small_faces_) + " faces of fewer than three corners left out");
@@ -560,7 +571,9 @@ class PlyModel {
   const ImportOptions& options_;
   const RunContext& context_;
   Model model_;
-  std::uint64_t small_faces_ = 0;
+  TiledImages tiled_;
+  std::uint64_t small_faces_ = 0, broken_faces_ = 0;
+  std::size_t first_broken_face_ = 0;
 };
 
 }  // namespace
@@ -574,7 +587,7 @@ ImportedModel import_ply(const std::string& file_name, std::span<const std::uint
   out.lost = std::move(surface.lost);
   for (std::string& comment : surface.comments) comment = source_text(comment, file_name, notes);
   out.about = about_from_comments(surface.comments, out.format, notes);
-  out.model = PlyModel(file_name, std::move(surface), resolver, options, context).build();
+  out.model = PlyModel(file_name, std::move(surface), resolver, options, context).build(out.lost);
   out.model.notes.insert(out.model.notes.end(), notes.begin(), notes.end());
   return out;
 }

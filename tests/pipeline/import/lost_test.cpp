@@ -184,7 +184,6 @@ TEST(Obj, IndexZeroOfNormalsAndTextureCoordinatesIsNone) {
     EXPECT_EQ(testing::count_notes(m.model, "index-0"), 1) << face;
   }
   EXPECT_THROW(import("n.obj", kVertices + "f 0 1 2\n"), InputError);
-  EXPECT_THROW(import("n.obj", kVertices + "vn 0 0 1\nf 1//2 2//1 3//1\n"), InputError);
 }
 
 TEST(Obj, UdimTilesAreMaterials) {

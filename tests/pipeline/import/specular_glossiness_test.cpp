@@ -65,8 +65,9 @@ TEST(SpecularGlossiness, ImagesOfTwoSizesBecomeOneOfTheLarger) {
 
 TEST(SpecularGlossiness, MeansOfATexture) {
   Model model;
-  const SpecularGlossiness mean =
-      mean_of_specular(model, add_image(model, 3, {255, 0, 255, 51}), {{1, 1, 1}, {0.5f, 1, 1}, 0.5f});
+  TextureRef texture;
+  texture.image = add_image(model, 3, {255, 0, 255, 51});
+  const SpecularGlossiness mean = mean_of_specular(model, texture, 0, {{1, 1, 1}, {0.5f, 1, 1}, 0.5f}, {});
   EXPECT_NEAR(mean.specular.x, 0.5, 1e-6);
   EXPECT_NEAR(mean.specular.y, 0, 1e-6);
   EXPECT_NEAR(mean.specular.z, 1, 1e-6);

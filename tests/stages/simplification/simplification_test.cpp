@@ -61,6 +61,23 @@ TEST(Simplification, KeepsEveryPropertyOnClosedSurfaces) {
   EXPECT_EQ(count_edges(scales, scales.scales.back()).border, 0u);
 }
 
+TEST(Simplification, PartsOfOneMaterialThatShareWedgesAreOneSurface) {
+  Mesh m = bumpy_sphere(24, 32);
+  const NestedScales whole = run(condition(m));
+  for (std::size_t t = 0; t < m.triangles.size(); ++t)
+    m.triangle_part[t] = static_cast<std::uint16_t>(t * 5 / m.triangles.size());
+  m.part_names = {"a", "b", "c", "d", "e"};
+  const NestedScales parts = run(condition(m));
+  expect_sound(parts);
+  ASSERT_EQ(parts.scales.size(), whole.scales.size());
+  for (std::size_t i = 0; i < whole.scales.size(); ++i) {
+    EXPECT_EQ(parts.scales[i].triangles, whole.scales[i].triangles);
+    EXPECT_EQ(parts.scales[i].triangle_source, whole.scales[i].triangle_source);
+  }
+  for (std::size_t t = 0; t < m.triangles.size(); ++t) m.triangle_material[t] = m.triangle_part[t];
+  EXPECT_NE(run(condition(m)).scales.back().triangles, whole.scales.back().triangles);
+}
+
 TEST(Simplification, KeepsBordersOfSheets) {
   const NestedScales scales = run(condition(sheet(24)));
   expect_sound(scales);

@@ -80,7 +80,7 @@ export async function attach(element: HTMLElement, root: ShadowRoot, model: Page
   layer.root.append(make('style', {}, style), tools);
   const ends = [() => layer.dispose()];
   if (element.hasAttribute('measure'))
-    ends.push(toggle(tools, layer.words.measure, () => measure(layer, about)));
+    ends.push(toggle(tools, layer.words.measure, () => measure(layer, pkg, about)));
   if (element.hasAttribute('annotate')) ends.push(toggle(tools, layer.words.add, () => edit(layer)));
   const address = (name: string): string | undefined => {
     const said = element.getAttribute(name);

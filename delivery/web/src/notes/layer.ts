@@ -4,6 +4,7 @@ import type { Object3D, PerspectiveCamera } from 'three';
 import type { Annotation, Point } from '../format/annotations';
 import type { Manifest } from '../format/manifest';
 import type { LoadedModel } from '../scene/api';
+import { DepthPicture } from './depth';
 import { apply, placeOf, unit } from './pick';
 import { textFor } from './texts';
 import { noteWordsFor, type NoteWords } from './words';
@@ -92,6 +93,8 @@ export class NotesLayer {
   private readonly all_ = make('ol', { hidden: '' });
   private frame_ = 0;
   private seen_ = '';
+  private hidesAnew_ = false; // the camera has moved since it was told which points are hidden
+  private hidesAfter_ = 0; // ms; a look at all triangles takes no more than a twentieth of the time
   private open_ = -1;
   private tour_ = 0; // 0: there is none; else its number
   private readonly followers_ = new Set<() => void>();
@@ -109,10 +112,13 @@ export class NotesLayer {
       this.frame_ = requestAnimationFrame(step);
       const { camera, canvas } = this.stage;
       const now = `${camera.matrixWorld.elements}${camera.projectionMatrix.elements}${canvas.clientWidth}x${
-        canvas.clientHeight}`;
-      if (now === this.seen_) return;
-      this.seen_ = now;
-      this.place_();
+        canvas.clientHeight}S${this.stage.load()?.state.scale}`;
+      if (now !== this.seen_) {
+        this.seen_ = now;
+        this.place_();
+        this.hidesAnew_ = true;
+      }
+      if (this.hidesAnew_ && performance.now() >= this.hidesAfter_) this.hide_();
     };
     this.frame_ = requestAnimationFrame(step);
   }
@@ -268,18 +274,24 @@ export class NotesLayer {
       this.seen_ = '';
       return;
     }
-    const eye = apply(object.matrixWorld.clone().invert(), this.stage.camera.position.toArray());
     this.notes.forEach((note, i) => {
       const pin = this.pins_.children[i] as HTMLElement;
       const at = this.pxOf(note.position);
       pin.hidden = !at;
       if (!at) return;
       pin.style.transform = `translate(${at.x.toFixed(1)}px, ${at.y.toFixed(1)}px)`;
-      const out = this.outwards_(note);
-      const towards = out.reduce((sum, x, k) => sum + x * (eye[k] - note.position[k]), 0);
-      pin.classList.toggle('behind', towards < 0);
     });
     for (const moved of this.followers_) moved();
+  }
+  /** Points behind something of the object are pale; the scale shown may lie a little off the surface. */
+  private hide_(): void {
+    const begin = performance.now(), { camera, manifest } = this.stage, object = this.object_;
+    if (!object) return;
+    this.hidesAnew_ = false;
+    const depth = new DepthPicture(object, camera), off = 0.02 * manifest.objectHeight;
+    this.notes.forEach(({ position }, i) =>
+      this.pins_.children[i].classList.toggle('behind', depth.hides(position, off)));
+    this.hidesAfter_ = performance.now() + 20 * (performance.now() - begin);
   }
   private readonly escape_ = (e: KeyboardEvent): void => {
     if (e.key === 'Escape' && !this.card.hidden) this.close();

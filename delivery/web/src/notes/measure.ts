@@ -4,8 +4,19 @@ import type { Point } from '../format/annotations';
 import type { Manifest } from '../format/manifest';
 import { distance } from './pick';
 
-/** The least bits of positions that a package keeps of the largest extent (ScalesOptions). */
-const positionBits = 16;
+/** Of the largest extent, where the package does not say it; what ScalesOptions ask for. */
+const usualBits = 16;
+const leastBits = 6; // no coder takes fewer
+
+/** The least bits that positions have of the largest extent, as the package's provenance says. */
+export function positionBits(provenance: unknown): number {
+  const scales = (provenance as { options?: { scales?: Record<string, unknown> } } | null)?.options?.scales;
+  for (const name of ['position_bits', 'least_position_bits']) {
+    const bits = scales?.[name];
+    if (typeof bits === 'number' && bits >= 1) return Math.min(Math.max(bits, leastBits), 24);
+  }
+  return usualBits;
+}
 
 /** A length in object units. */
 export interface Length {
@@ -18,10 +29,11 @@ export interface Length {
  * The length of a line of points that were picked on a scale. Each point may lie off the source's surface by
  * the scale's largest distance from S_0, and by half a step of the grid along each axis.
  */
-export function lengthOf(points: readonly Point[], manifest: Manifest, scale: number): Length {
+export function lengthOf(points: readonly Point[], manifest: Manifest, scale: number,
+    bits = usualBits): Length {
   const { objectHeight, scales } = manifest;
   const shown = scales.find((s) => s.scale === scale) ?? scales[scales.length - 1];
-  const grid = (Math.sqrt(3) / 2) * (objectHeight / (2 ** positionBits - 1));
+  const grid = (Math.sqrt(3) / 2) * (objectHeight / (2 ** bits - 1));
   const pieces = points.slice(1).map((p, i) => distance(points[i], p));
   return { length: pieces.reduce((sum, piece) => sum + piece, 0),
     error: 2 * pieces.length * (shown.errorMax + grid) };

@@ -6,8 +6,10 @@ import { arWay, sceneViewerAddress } from '../../src/notes/ar';
 import type { Manifest } from '../../src/format/manifest';
 import type { Point } from '../../src/format/annotations';
 import {
-  annotationsFile, lengthInWords, lengthOf, nearestOf, pick, placeOf, readAnnotations, textFor,
+  annotationsFile, lengthInWords, lengthOf, nearestOf, pick, placeOf, positionBits,
+  readAnnotations, textFor,
 } from '../../src/notes';
+import { DepthPicture } from '../../src/notes/depth';
 import { within } from '../../src/notes/editor';
 
 const near = (found: Point | undefined, expected: Point): void =>
@@ -61,6 +63,50 @@ describe('picking', () => {
   });
 });
 
+describe('what hides a point', () => {
+  const camera = new PerspectiveCamera(90, 1, 0.1, 100);
+  camera.position.set(0, 0, 5);
+  camera.lookAt(0, 0, 0);
+  camera.updateMatrixWorld();
+  const object = new Group(), wall = new Mesh(new BoxGeometry(2, 2, 0.2));
+  wall.position.set(0, 0, 2);
+  object.add(new Mesh(new BoxGeometry(2, 2, 2)), wall);
+  const hides = (point: Point, off = 0.01): boolean => new DepthPicture(object, camera).hides(point, off);
+
+  it('is whatever stands before it, and not its own surface', () => {
+    expect(hides([0, 0, 1])).toBe(true); // faces the camera, behind the wall
+    expect(hides([0, 0, 2.1])).toBe(false);
+    expect(hides([0.5, 0.5, 2.095])).toBe(false);
+    expect(hides([0.5, 0.5, 2.05])).toBe(true);
+    expect(hides([0.5, 0.5, 2.05], 0.1)).toBe(false);
+    expect(hides([0, 0, -1])).toBe(true);
+    expect(hides([3, 0, -1])).toBe(false);
+    expect(hides([0, 0, 6])).toBe(false); // behind the camera
+  });
+  it('is nothing where the object is not shown, or lies about the camera', () => {
+    wall.visible = false;
+    expect(hides([0, 0, 1])).toBe(false);
+    wall.visible = true;
+    wall.scale.z = 100; // its sides reach from before the camera to behind it
+    expect(hides([0, 0, 1])).toBe(false);
+    wall.scale.z = 1;
+  });
+  it('moves with the object', () => {
+    object.rotation.y = Math.PI; // the wall is behind now
+    expect(hides([0, 0, -1])).toBe(false);
+    expect(hides([0, 0, 1])).toBe(true);
+    object.rotation.y = 0;
+  });
+  it('takes nothing for a triangle that is none', () => {
+    const odd = new BufferGeometry();
+    odd.setAttribute('position', new Float32BufferAttribute([NaN, 0, 4, 1, 0, 4, 0, 1, 4, 0, 0, 4], 3));
+    const broken = new Mesh(odd);
+    object.add(broken);
+    expect(hides([0, 0, 2.1])).toBe(false);
+    object.remove(broken);
+  });
+});
+
 describe('measuring', () => {
   const scales = [{ scale: 0, errorMax: 0 }, { scale: 3, errorMax: 10 }];
   const manifest = { objectHeight: 65535, scales } as Manifest;
@@ -74,6 +120,16 @@ describe('measuring', () => {
     expect(lengthOf([[0, 0, 0]], manifest, 0)).toEqual({ length: 0, error: 0 });
     // without a scale, as of a proxy: the coarsest
     expect(lengthOf([[0, 0, 0], [3, 4, 0]], manifest, -1).error).toBeCloseTo(2 * (10 + grid));
+  });
+  it('takes the grid from what the package says of its making', () => {
+    const of = (scales: object): number => positionBits({ options: { scales } });
+    expect(of({ position_bits: 0, least_position_bits: 12 })).toBe(12);
+    expect(of({ position_bits: 14, least_position_bits: 16 })).toBe(14);
+    expect(of({ position_bits: 2 })).toBe(6);
+    for (const odd of [undefined, null, {}, { options: 1 }, { options: { scales: { position_bits: '9' } } }])
+      expect(positionBits(odd)).toBe(16);
+    expect(lengthOf([[0, 0, 0], [3, 4, 0]], manifest, 0, 12).error)
+      .toBeCloseTo(Math.sqrt(3) * 65535 / 4095);
   });
   it.each([
     [123.4567, 0.04, 0.001, '12.346 cm ± 0.004 cm'],
