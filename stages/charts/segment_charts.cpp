@@ -61,10 +61,10 @@ std::vector<Vec2d> conformal_map(std::span<const Triangle> triangles, std::span<
   return places;
 }
 
-// A projection that stretches no more than this is kept, which saves the solver's time.
+// A projection that stretches no more than this is kept: the solver would hardly make it better.
 constexpr double kProjectionStretch = 1.02;
 
-/// Lays disks of triangles into planes, and keeps the places of those that became charts. A chart's area in
+/// Lays disks of triangles into planes, and keeps the places of charts. A chart's area in
 /// its plane is its area on the surface.
 class ChartLayout {
  public:
@@ -79,22 +79,25 @@ class ChartLayout {
     tried_ = places_;
   }
 
-  /// Looks for places of a disk: along its mean normal where that hardly stretches, else those that keep its
-  /// angles. False when a triangle would flip, two would overlap, or the stretch is too large.
+  /// Whether there are places for a disk: along its mean normal, else those that keep its angles. False when
+  /// a triangle would flip, two would overlap, or the stretch is too large.
   /// `vertices`: per corner 3 t + k of the surface, a number below 3 times the triangles; corners of the disk
   /// with one number have one place.
-  bool try_disk(std::span<const std::uint32_t> triangles, std::span<const std::uint32_t> border,
-                const std::vector<std::uint32_t>& vertices, Vec3d area_normal) {
-    project(triangles, area_normal);
-    if (is_sound(triangles, border, vertices, kProjectionStretch)) return true;
-    if (unfold(triangles, border, vertices) && is_sound(triangles, border, vertices, limits_.stretch))
-      return true;
-    project(triangles, area_normal);
-    return is_sound(triangles, border, vertices, limits_.stretch);
+  bool can_lay(std::span<const std::uint32_t> triangles, std::span<const std::uint32_t> border,
+               const std::vector<std::uint32_t>& vertices, Vec3d area_normal) {
+    const double most_stretch = std::max(kProjectionStretch, limits_.stretch);
+    return try_projection(triangles, border, vertices, area_normal, most_stretch) ||
+           try_unfolding(triangles, border, vertices);
   }
 
-  /// The places of the disk just tried become the chart's.
-  void keep_tried(std::span<const std::uint32_t> triangles) {
+  /// Chooses the places of a disk that can_lay(): along its mean normal where that hardly stretches, else
+  /// those that keep its angles, else along the normal as well.
+  void lay(std::span<const std::uint32_t> triangles, std::span<const std::uint32_t> border,
+           const std::vector<std::uint32_t>& vertices, Vec3d area_normal) {
+    if (!try_projection(triangles, border, vertices, area_normal, kProjectionStretch) &&
+        !try_unfolding(triangles, border, vertices) &&
+        !try_projection(triangles, border, vertices, area_normal, limits_.stretch))
+      return;
     for (const std::uint32_t t : triangles)
       for (std::size_t c = 3 * std::size_t{t}; c < 3 * std::size_t{t} + 3; ++c) places_[c] = tried_[c];
   }
@@ -103,6 +106,16 @@ class ChartLayout {
   const std::vector<Vec2d>& places() const { return places_; }
 
  private:
+  bool try_projection(std::span<const std::uint32_t> triangles, std::span<const std::uint32_t> border,
+                      const std::vector<std::uint32_t>& vertices, Vec3d area_normal, double most_stretch) {
+    project(triangles, area_normal);
+    return is_sound(triangles, border, vertices, most_stretch);
+  }
+  bool try_unfolding(std::span<const std::uint32_t> triangles, std::span<const std::uint32_t> border,
+                     const std::vector<std::uint32_t>& vertices) {
+    return unfold(triangles, border, vertices) && is_sound(triangles, border, vertices, limits_.stretch);
+  }
+
   void project(std::span<const std::uint32_t> triangles, Vec3d area_normal) {
     const PlaneAxes axes(normalized(area_normal));
     for (const std::uint32_t t : triangles)
@@ -231,6 +244,9 @@ class ChartMerge {
       if (steps % 1024 == 0) context.check_cancelled();
       if (const QueuedPair pair = queue_.pop(); queue_.is_fresh(pair)) try_merge(pair.a, pair.b);
     }
+    // While they grow, charts need to know only that there are places: the solver is dear.
+    for (const GrowingChart& c : charts_)
+      if (c.triangles.size() > 1) layout_.lay(c.triangles, c.border, vertices_, c.area_normal);
   }
 
   const std::vector<GrowingChart>& charts() const { return charts_; }
@@ -384,13 +400,12 @@ class ChartMerge {
     for (const std::uint32_t t : from.triangles)
       before.insert(before.end(), &vertices_[3 * t], &vertices_[3 * t] + 3);
     glue(path, from.triangles);
-    if (!layout_.try_disk(triangles, border, vertices_, into.area_normal + from.area_normal)) {
+    if (!layout_.can_lay(triangles, border, vertices_, into.area_normal + from.area_normal)) {
       for (std::size_t i = 0; i < before.size(); ++i)
         vertices_[3 * from.triangles[i / 3] + i % 3] = before[i];
       into.refusals.push_back({from.triangles.front(), triangles.size()});
       return false;
     }
-    layout_.keep_tried(triangles);
     into.border = std::move(border);
     into.area_normal = into.area_normal + from.area_normal;
     into.area += from.area;

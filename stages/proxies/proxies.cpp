@@ -10,9 +10,11 @@ constexpr std::uint32_t kLeastTriangles = 60;
 constexpr double kLeastBytesPerTriangle = 4;
 constexpr double kFirstMeshShare = 0.7, kMeshShare = 0.65, kLargeMeshShare = 0.55;
 constexpr int kFineFrom = 100000, kNormalMapPaysFrom = 100000;  // bytes
-constexpr int kOneFormFrom = 200000;  // bytes: a normal map that pays is not questioned again
+constexpr int kOneFormFrom = 200000;  // bytes: what is known of a normal map is not questioned again
 constexpr int kFirstBits = 10, kBits = 11, kFineBits = 12;  // of positions
 constexpr double kOverAsked = 1.02, kMostOfSource = 0.35;
+// Of the smallest size: what is loaded soon needs no other first picture.
+constexpr double kMostOfSmallSource = 0.15;
 // Of the first size: what Draco, which scales are coded by, needs for the same picture.
 constexpr double kFirstShare = 0.55;
 // What proxies of up to 40,000 triangles and pictures of 512 px need of S_0: at 500,000 the collapses took
@@ -67,6 +69,7 @@ void note_none(Notes& notes, int bytes, const std::string& why) {
 constexpr const char* kScaleWins = "a scale with the source's atlas looks better for the same bytes";
 constexpr const char* kWholeTakesFewer = "the whole object takes fewer";
 constexpr const char* kOfSource = "proxies take at most 35 % of the source";
+constexpr const char* kSmallSource = "the smallest proxy would take more than 15 % of the source";
 
 std::uint32_t most_triangles(const Mesh& mesh, int most_bytes) {
   return static_cast<std::uint32_t>(
@@ -86,11 +89,16 @@ double source_bytes(const NestedScales& scales, const std::vector<Image>& images
 }
 
 /// Sizes that are worth a try, rising. The others have a note.
-std::vector<int> sizes_to_try(const NestedScales& scales, const ProxiesOptions& options, Notes& notes) {
+std::vector<int> sizes_to_try(const NestedScales& scales, const std::vector<Image>& images,
+                              const ProxiesOptions& options, Notes& notes) {
   if (options.mode == ProxyMode::kAlways) return options.sizes;
   std::vector<int> out;
+  const bool is_small =
+      kOverAsked * options.sizes.front() > kMostOfSmallSource * source_bytes(scales, images);
   for (const int bytes : options.sizes) {
-    if (whole_mesh_is_small(scales, static_cast<std::uint64_t>(bytes)))
+    if (is_small)
+      note_none(notes, bytes, kSmallSource);
+    else if (whole_mesh_is_small(scales, static_cast<std::uint64_t>(bytes)))
       note_none(notes, bytes, "S_0's mesh takes few of them, so the source's atlas can stay");
     else
       out.push_back(bytes);
@@ -126,11 +134,19 @@ ProxySubject subject_of(const Mesh& mesh, const ShownMaterials& shown, const Mat
           is_smooth(mesh)};
 }
 
+/// What the last size that has tried one tells of a normal map's bytes.
+enum class NormalMap : std::uint8_t { kMayPay, kPays, kLoses };
+NormalMap worth_of_map(bool stays, double with_map, double best) {
+  constexpr double kClearly = 0.99;
+  return stays ? NormalMap::kPays : best < kClearly * with_map ? NormalMap::kLoses : NormalMap::kMayPay;
+}
+
 /// What the sizes so far tell the next one.
 struct Learned {
   ProxyCosts costs;
-  bool flat = false;                // the last proxy needs no normals
-  bool normal_map = false;          // the last proxy has one
+  bool flat = false;  // the last proxy needs no normals
+  NormalMap normal_map = NormalMap::kMayPay;
+  int picture_quality = 0;          // of the last proxy, 0 = not known
   double last_bytes = 0;            // of the last size that was made, in bytes of Draco
   double last_flip = 0;             // its loss
   double all_bytes = 0;             // of those that stay
@@ -177,18 +193,24 @@ Candidate best_of(const ProxySubject& subject, const ReferenceViews& views, Coar
                   int bytes, bool first, Learned& learned, const RunContext& context) {
   Candidate best;
   ProxyForm form = first_form(bytes, first, subject.varied);
-  const bool as_before = bytes >= kOneFormFrom && learned.normal_map;
+  const NormalMap known = bytes >= kOneFormFrom ? learned.normal_map : NormalMap::kMayPay;
   const auto bake = [&] {
-    return bake_proxy(subject.source, subject.groups, surfaces, learned.costs, bytes, form, context);
+    auto made = bake_proxy(subject.source, subject.groups, surfaces, learned.costs, bytes, form, context);
+    if (made) made->pictures.last_quality = learned.picture_quality;
+    return made;
   };
   const auto try_form = [&](BakedProxy& baked) {
     compete(subject, views, baked, static_cast<std::uint64_t>(bytes), form, best, context);
   };
-  form.maps.normal = subject.mapped && bytes >= kNormalMapPaysFrom;
+  form.maps.normal = subject.mapped && bytes >= kNormalMapPaysFrom && known != NormalMap::kLoses;
   auto baked = bake();
   if (!baked) return best;
-  if (form.maps.normal) try_form(*baked);
-  if (!as_before) {
+  double with_map = 0;
+  if (form.maps.normal) {
+    try_form(*baked);
+    with_map = best.flip.mean();
+  }
+  if (!form.maps.normal || known != NormalMap::kPays) {
     form.maps.normal = false;
     try_form(*baked);
     form.normals = false;
@@ -197,7 +219,10 @@ Candidate best_of(const ProxySubject& subject, const ReferenceViews& views, Coar
   if (best.made)
     if (const auto bits = texel_bits_of(*best.made)) learned.costs.texel_bits = *bits;
   learned.flat = best.made && !best.form.normals;
-  learned.normal_map = best.made && best.form.maps.normal;
+  if (best.made) {
+    learned.picture_quality = best.made->quality;
+    if (with_map > 0) learned.normal_map = worth_of_map(best.form.maps.normal, with_map, best.flip.mean());
+  }
   if (first && learned.flat)
     if (auto again = bake()) try_form(*again);
   return best;
@@ -292,7 +317,7 @@ Proxies make_proxies(const NestedScales& scales, const std::vector<Material>& ma
   Proxies out;
   if (options.mode == ProxyMode::kNone) return out;
   if (scales.scales.empty()) throw StageError("proxies", "scales", "S_0", "none");
-  const std::vector<int> sizes = sizes_to_try(scales, options, out.notes);
+  const std::vector<int> sizes = sizes_to_try(scales, images, options, out.notes);
   if (sizes.empty()) return out;
   RunContext inner = context;
   inner.progress = nullptr;

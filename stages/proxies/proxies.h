@@ -50,7 +50,9 @@ struct ProxiesOptions {
 ///   compared with what plans pay for such scales: tables, the coarsest mesh, texels as their coding
 ///   leaves them. A size is not tried at all where the likeliest scale is farther ahead of the last size than
 ///   proxies come by their bytes. All of them take at most 35 % of the source: of its images' files and of
-///   S_0's mesh, coded.
+///   S_0's mesh, coded. A source of which the smallest size is more than 15 % gets none: it is loaded soon.
+/// - A normal map of 200 kB and more is not tried where it clearly lost at the size below, and nothing else
+///   is where it won.
 /// Sizes that get no proxy have a note that says why; no model fails because of its proxies. `pixels` are
 /// fill_planes()'s. Same bytes for any thread count and machine.
 Proxies make_proxies(const NestedScales& scales, const std::vector<Material>& materials,

@@ -355,6 +355,14 @@ TEST(Proxies, TheyTakeLittleOfASmallSource) {
   }
 }
 
+TEST(Proxies, ASourceThatIsLoadedSoonHasNone) {
+  const ProxyModel model = with_source(noisy(testing::bumpy_sphere(80, 160)), 60000);
+  const Proxies made = proxies_of(model, {ProxyMode::kAuto, {25000, 30000}});
+  EXPECT_TRUE(made.proxies.empty());
+  EXPECT_EQ(notes_saying(made, "more than 15 % of the source"), 2u);
+  EXPECT_EQ(proxies_of(model, {ProxyMode::kAlways, {25000, 30000}}).proxies.size(), 2u);
+}
+
 TEST(Proxies, TheFirstDefaultSizeFitsTheFirstRequest) {
   const ProxiesOptions options;
   constexpr int kFirstRequest = 45056, kManifest = 8000;
