@@ -12,6 +12,7 @@ inline constexpr std::uint64_t kMaxAnnotationsBytes = 4'000'000;
 inline constexpr std::size_t kMaxAnnotations = 1'000, kMaxAnnotationLanguages = 32, kMaxAnnotationImages = 8,
                              kMaxLanguageTagBytes = 35, kMaxAnnotationTitleBytes = 200,
                              kMaxAnnotationTextBytes = 10'000;
+inline constexpr std::string_view kUnknownLanguage = "und";
 inline constexpr double kMaxAnnotationCoordinate = 1e30;
 inline constexpr double kLeastFovDegrees = 1, kMostFovDegrees = 170, kDefaultFovDegrees = 45;
 

@@ -1,17 +1,21 @@
 #include "pipeline/about/source_annotations.h"
 
 #include <charconv>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "format/base/bounded_json.h"
+#include "format/base/portable_math.h"
 #include "format/base/text_bytes.h"
 #include "pipeline/about/source_fields.h"
+#include "pipeline/io/file_resolver.h"
 #include "pipeline/io/record.h"
 
 namespace texmesh {
 namespace {
 
-constexpr const char* kNoLanguage = "und";
+const std::string kNoLanguage(kUnknownLanguage);
 constexpr std::size_t kShortTitleBytes = 80;  // of a title that a note's text has to give
 
 /// The member of an object, or null.
@@ -153,28 +157,132 @@ void read_sketchfab(const Json& list, Collector& to) {
   }
 }
 
-/// "titles": {"EN": ...}, "leads", or "title", "lead"; in the model's own coordinates.
+/// Titles and texts of Voyager: "titles": {"EN": ...}, "leads", or "title", "lead".
+void read_voyager_texts(const Json& item, Annotation& note, Collector& to) {
+  for (const auto& [name, list, part] : {std::tuple("title", "titles", &AnnotationText::title),
+                                         std::tuple("lead", "leads", &AnnotationText::text)}) {
+    const Json& languages = member(item, list);
+    for (const auto& [tag, value] : languages.items())
+      if (value.is_string()) {
+        std::string language = tag;
+        std::ranges::transform(language, language.begin(),
+                               [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+        to.text(note, language).*part = without_tags(value.get<std::string>());
+      }
+    if (const std::string only = text_member(item, name); !only.empty() && languages.empty())
+      to.text(note, kNoLanguage).*part = without_tags(only);
+  }
+}
+
+/// Where Voyager puts a model into its scene. Notes are of the model, views of the scene.
+class VoyagerPlace {
+ public:
+  VoyagerPlace(const Json& document, const Json& model) {
+    const Json& scenes = member(document, "scenes");
+    const double of_scene = metres_of(
+                     text_member(scenes.is_array() && !scenes.empty() ? scenes[0] : Json(), "units")),
+                 of_model = metres_of(text_member(model, "units"));
+    if (of_scene > 0 && of_model > 0) scale_ = of_model / of_scene;
+    shift_ = point_of(member(model, "translation")).value_or(Vec3d{});
+    const Json& q = member(model, "rotation");
+    if (!q.is_array() || q.size() != 4 || !q[3].is_number()) return;
+    const auto axis = point_of(q[0], q[1], q[2]);
+    const double w = q[3].get<double>(), square = axis ? dot(*axis, *axis) + w * w : 0;
+    if (!(square > 1e-12 && square < 1e12)) return;
+    axis_ = *axis * (1 / std::sqrt(square)), w_ = w / std::sqrt(square);
+  }
+  /// A point of the scene in the coordinates of the model's file.
+  Vec3d in_model(Vec3d p) const {
+    const Vec3d v = p - shift_, t = cross(axis_, v) * -2;  // turned back: by the conjugate
+    return (v + t * w_ - cross(axis_, t)) * (1 / scale_);
+  }
+
+ private:
+  static double metres_of(const std::string& unit) {
+    static const std::map<std::string, double> kMetres{{"mm", .001},  {"cm", .01},     {"m", 1},
+                                                       {"km", 1000},  {"in", .0254},   {"ft", .3048},
+                                                       {"yd", .9144}, {"mi", 1609.344}};
+    const auto at = kMetres.find(unit);
+    return at == kMetres.end() ? 0 : at->second;
+  }
+  Vec3d shift_, axis_;
+  double w_ = 1, scale_ = 1;
+};
+
+/// The views that a setup of Voyager has stored: values of "navigation/orbit" (degrees about x, y, z) and
+/// "navigation/offset" in each state. The camera looks along its -z from where the offset leads it.
+std::map<std::string, AnnotationCamera> voyager_views(const Json& setup) {
+  std::map<std::string, AnnotationCamera> views;
+  const Json& snapshots = member(setup, "snapshots");
+  std::size_t orbit = 0, offset = 0, number = 0;
+  for (const Json& target : member(snapshots, "targets")) {
+    const std::string name = target.is_string() ? target.get<std::string>() : "";
+    ++number;  // 1 is the first
+    if (name.ends_with("navigation/orbit")) orbit = number;
+    if (name.ends_with("navigation/offset")) offset = number;
+  }
+  for (const Json& state : member(snapshots, "states")) {
+    const Json& values = member(state, "values");
+    if (orbit == 0 || offset == 0 || !values.is_array() || values.size() < std::max(orbit, offset)) continue;
+    const auto turn = point_of(values[orbit - 1]), away = point_of(values[offset - 1]);
+    if (!turn || !away || !(away->z > 0)) continue;
+    const auto turned = [&](Vec3d p) {
+      for (int axis = 0; axis < 3; ++axis) {
+        const double angle = std::fmod((*turn)[axis], 360) * (portable::kPi / 180), c = portable::cos(angle),
+                     s = portable::sin(angle);
+        const int i = (axis + 1) % 3, j = (axis + 2) % 3;
+        const double x = p[i], y = p[j];
+        p[i] = c * x - s * y, p[j] = s * x + c * y;
+      }
+      return p;
+    };
+    views[text_member(state, "id")] = {turned(*away), turned({away->x, away->y, 0}), kDefaultFovDegrees};
+  }
+  return views;
+}
+
+/// Notes of models, in each model's own coordinates, with their views; and stops of tours whose view no note
+/// has, at what they look at.
 void read_voyager(const Json& document, Collector& to) {
-  for (const Json& model : member(document, "models"))
+  const Json& setups = member(document, "setups");
+  const Json& setup = setups.is_array() && !setups.empty() ? setups[0] : setups;
+  std::map<std::string, AnnotationCamera> views = voyager_views(setup);
+  const auto view = [&](const std::string& id, const VoyagerPlace& place) -> std::optional<AnnotationCamera> {
+    const auto at = views.find(id);
+    if (at == views.end()) return {};
+    AnnotationCamera camera = at->second;
+    for (Vec3d* p : {&camera.position, &camera.target}) {
+      *p = place.in_model(*p);
+      if (!(length(*p) <= kMaxAnnotationCoordinate)) return {};
+    }
+    return camera;
+  };
+  const Json& models = member(document, "models");
+  std::set<std::string> seen;
+  for (const Json& model : models) {
+    const VoyagerPlace place(document, model);
     for (const Json& item : member(model, "annotations")) {
       Annotation note;
-      for (const auto& [name, list, title] : {std::tuple("title", "titles", &AnnotationText::title),
-                                              std::tuple("lead", "leads", &AnnotationText::text)}) {
-        const Json& languages = member(item, list);
-        for (const auto& [tag, value] : languages.items())
-          if (value.is_string()) {
-            std::string language = tag;
-            std::ranges::transform(language, language.begin(),
-                                   [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-            to.text(note, language).*title = without_tags(value.get<std::string>());
-          }
-        if (const std::string only = text_member(item, name); !only.empty() && languages.empty())
-          to.text(note, kNoLanguage).*title = without_tags(only);
-      }
+      read_voyager_texts(item, note, to);
       to.add_image(note, text_member(item, "imageUri"));
       if (const auto direction = point_of(member(item, "direction")); direction && length(*direction) > 0)
         note.normal = normalized(*direction);
+      const std::string id = text_member(item, "viewId");
+      note.camera = view(id, place);
+      seen.insert(id);
       to.add(point_of(member(item, "position")), std::move(note));
+    }
+  }
+  if (models.empty()) return;
+  const VoyagerPlace place(document, models[0]);
+  for (const Json& tour : member(setup, "tours"))
+    for (const Json& step : member(tour, "steps")) {
+      Annotation note;
+      const std::string id = text_member(step, "id");
+      note.camera = view(id, place);
+      if (!note.camera || !seen.insert(id).second) continue;
+      read_voyager_texts(step, note, to);
+      to.add(note.camera->target, std::move(note));
     }
 }
 
@@ -291,6 +399,10 @@ Annotations read_source_annotations(std::span<const std::uint8_t> bytes, const s
   else
     read_web_annotations(json, collector);
   return collector.release(notes);
+}
+
+std::string read_notes_file(const std::string& path, Notes& notes) {
+  return write_annotations(read_source_annotations(read_input_file(path, kMaxNotesFileBytes), path, notes));
 }
 
 }  // namespace texmesh

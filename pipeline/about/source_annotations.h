@@ -17,4 +17,7 @@ inline constexpr std::uint64_t kMaxNotesFileBytes = 16'000'000;
 Annotations read_source_annotations(std::span<const std::uint8_t> json, const std::string& file,
                                     Notes& notes);
 
+/// The notes of a file, as annotations.json has them.
+std::string read_notes_file(const std::string& path, Notes& notes);
+
 }  // namespace texmesh

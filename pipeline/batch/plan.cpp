@@ -9,6 +9,7 @@
 #include <queue>
 
 #include "format/base/text_bytes.h"
+#include "pipeline/about/source_annotations.h"
 #include "pipeline/about/source_fields.h"
 #include "pipeline/batch/stale_packages.h"
 #include "pipeline/compile/options.h"
@@ -202,8 +203,8 @@ std::string package_of(const std::string& relative, PackageNames names) {
 class CollectionReader {
  public:
   CollectionReader(const std::string& file, const CompileOptions& base, const FolderLister& list_folder,
-                   PackageNames names)
-      : file_(file), list_folder_(list_folder), names_(names), options_(base) {}
+                   PackageNames names, const NotesReader& read_notes)
+      : file_(file), list_folder_(list_folder), read_notes_(read_notes), names_(names), options_(base) {}
 
   std::vector<CollectionModel> read(const Json& root) {
     check_members(root, "", {"$schema", "version", "options", "about", "patterns", "models", "folders"});
@@ -344,7 +345,7 @@ class CollectionReader {
   }
 
   CollectionModel read_model(const Json& json, const std::string& place) {
-    check_members(json, place, {"input", "output", "options", "about"});
+    check_members(json, place, {"input", "output", "options", "about", "annotations"});
     if (!json.contains("input")) fail(place + "/input", "a path", "nothing");
     CollectionModel m;
     m.input = path_at(json, "input", place);
@@ -357,9 +358,12 @@ class CollectionReader {
       fail(place + "/output", "a path beneath the output folder that ends with .texmesh", m.output);
     take_output(m, place + "/output", "names that differ only in case count as one");
     m.options = options_for(m.input);
-    if (json.contains("options") || json.contains("about")) {
+    if (json.contains("options") || json.contains("about") || json.contains("annotations")) {
       CompileOptions with_changes = *m.options;
       apply_members(with_changes, json, place);
+      if (const std::string file = json.contains("annotations") ? path_at(json, "annotations", place) : "";
+          !file.empty() && read_notes_)
+        with_changes.package.annotations = read_notes_(file);
       m.options = std::make_shared<const CompileOptions>(std::move(with_changes));
     }
     return m;
@@ -372,6 +376,7 @@ class CollectionReader {
   };
   const std::string& file_;
   const FolderLister& list_folder_;
+  const NotesReader& read_notes_;
   const PackageNames names_;
   CompileOptions options_;
   std::vector<Pattern> patterns_;
@@ -411,13 +416,17 @@ void add_collection(const std::string& file, const PlanRequest& request, const C
   const auto bytes = read_input_file(file, kMaxFileBytes);
   const fs::path folder = fs::path(file).parent_path();
   const auto list = [&](const std::string& name) { return list_models((folder / name).string()); };
-  for (const CollectionModel& m :
-       read_collection(std::string(bytes.begin(), bytes.end()), file, base, list, request.names)) {
+  plan.files.push_back(file);
+  const auto read_notes = [&](const std::string& name) {
+    plan.files.push_back((folder / name).string());
+    return read_notes_file(plan.files.back(), plan.notes);
+  };
+  for (const CollectionModel& m : read_collection(std::string(bytes.begin(), bytes.end()), file, base, list,
+                                                  request.names, read_notes)) {
     const std::string input = (folder / m.input).string();
     plan.models.push_back({input, (fs::path(request.output) / m.output).string(), false, m.unread,
                            profiles.of(m.options), nullptr});
   }
-  plan.files.push_back(file);
   plan.folders.push_back((folder / "").string());
 }
 
@@ -620,8 +629,8 @@ std::vector<ModelPath> find_models(const std::vector<std::string>& inputs, const
 
 std::vector<CollectionModel> read_collection(const std::string& json, const std::string& file_name,
                                              const CompileOptions& base, const FolderLister& list_folder,
-                                             PackageNames names) {
-  return CollectionReader(file_name, base, list_folder, names)
+                                             PackageNames names, const NotesReader& read_notes) {
+  return CollectionReader(file_name, base, list_folder, names, read_notes)
       .read(parse_document(text_bytes(json), kMaxFileBytes, 16, file_name));
 }
 

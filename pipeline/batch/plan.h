@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "format/base/fields.h"
+#include "format/base/note.h"
 
 namespace texmesh {
 
@@ -99,6 +100,10 @@ struct CollectionModel {
 /// sorted. The reader itself looks at no folder.
 using FolderLister = std::function<std::vector<std::string>(const std::string& folder)>;
 
+/// The text of annotations.json that a file of notes gives; its name is as the collection has it. Without a
+/// reader models have none.
+using NotesReader = std::function<std::string(const std::string& name)>;
+
 /// Reads a collection (schemas/collection.v1.schema.json): models, folders of models, and their options.
 /// Strict: unknown fields, wrong types, options out of range, outputs that leave the output folder and
 /// outputs named twice throw InputError{file_name, JSON pointer, ...}. `base` holds the options that the
@@ -107,7 +112,8 @@ using FolderLister = std::function<std::vector<std::string>(const std::string& f
 /// "/" as well.
 std::vector<CollectionModel> read_collection(const std::string& json, const std::string& file_name,
                                              const CompileOptions& base, const FolderLister& list_folder = {},
-                                             PackageNames names = PackageNames::kStem);
+                                             PackageNames names = PackageNames::kStem,
+                                             const NotesReader& read_notes = {});
 
 /// One model of a run.
 struct PlannedModel {
@@ -133,7 +139,8 @@ struct PlanRequest {
 
 struct BatchPlan {
   std::vector<PlannedModel> models;
-  std::vector<std::string> files;  // collections that were read: a make-style rule depends on them
+  std::vector<std::string> files;  // collections, and notes they name: a make-style rule depends on them
+  Notes notes;                     // of what is left out of these notes
   std::vector<std::string>
       folders;          // that the command line or a collection stands for, with a slash at the end
   std::string outputs;  // absolute path of the output folder, or of the package where there can be one only

@@ -45,16 +45,23 @@ test('notes: a tour goes from stop to stop, and fetches nothing of a package wit
   const stops = await page.evaluate(() => {
     const root = document.querySelector('texmesh-viewer').shadowRoot, seen = [];
     const card = root.querySelector('.card');
+    // Views that the load is asked for beside the one that is seen.
+    const {load, camera} = root.host.model, {update} = load, ahead = [];
+    load.update = function (view, ...rest) {
+      if (view !== camera) ahead.push([seen.length, view.position.clone().normalize().dot(camera.position.clone().normalize())]);
+      return update.call(this, view, ...rest);
+    };
     new MutationObserver(() => { const title = card.querySelector('h3')?.textContent; if (title && seen.at(-1) !== title) seen.push(title); }).observe(card, {childList: true});
     return new Promise((resolve) => {
       root.querySelector('.list button:nth-of-type(2)').click();
       const at = performance.now();
-      const look = () => (seen.length === 2 ? resolve({seen, s: (performance.now() - at) / 1000}) : setTimeout(look, 50));
+      const look = () => (seen.length === 2 ? resolve({seen, ahead, s: (performance.now() - at) / 1000}) : setTimeout(look, 50));
       look();
     });
   });
   check(/^1/.test(stops.seen[0]) && /^2/.test(stops.seen[1]), JSON.stringify(stops));
   check(stops.s > 7 && stops.s < 11, `${stops.s} s for a stop of 8`);
+  check(stops.ahead.some(([stop, cosine]) => stop === 1 && cosine < 0.9), `the next stop is not fetched ahead: ${JSON.stringify(stops.ahead)}`);
 }), {seconds: 60});
 
 test('notes: a curator places one by Enter, writes, and saves a file that the compiler takes', () => onPage(noted('annotate'), async (page) => {

@@ -125,13 +125,16 @@ void read_meta_file(CompileArguments& args) {
   args.meta_text = read_meta(std::string(bytes.begin(), bytes.end()), args.meta);
 }
 
+void tell_of_notes(const Notes& notes) {
+  for (const Note& note : notes) std::cerr << "texmesh: " << note.place << ": " << note.text << '\n';
+}
+
 /// What is left out of the file is told at once: it is the same for every model.
 void read_annotations_file(CompileArguments& args) {
   if (args.annotations.empty()) return;
   Notes notes;
-  args.annotations_text = write_annotations(read_source_annotations(
-      read_input_file(args.annotations, kMaxNotesFileBytes), args.annotations, notes));
-  for (const Note& note : notes) std::cerr << "texmesh: " << note.place << ": " << note.text << '\n';
+  args.annotations_text = read_notes_file(args.annotations, notes);
+  tell_of_notes(notes);
 }
 
 /// Flags win over everything that a file says.
@@ -369,6 +372,7 @@ int run_compile(CompileArguments& args) {
     if (!settings.depfile.empty() && models.models.size() != 1)
       throw InputError("--depfile", "", "one model", std::to_string(models.models.size()) + " models");
     check_reports(models, settings);
+    tell_of_notes(models.notes);
     return models;
   });
   if (plan.shard.count > 1 && settings.mode != OutputMode::kJson && settings.mode != OutputMode::kQuiet)

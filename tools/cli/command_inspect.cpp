@@ -82,6 +82,7 @@ void print_verified(const std::string& path, const VerifyReport& r, bool quiet) 
                     : std::to_string(r.findings.size()) + (r.findings.size() == 1 ? " finding" : " findings"))
             << " (" << r.entries << " entries, " << grouped(r.bytes) << " bytes, " << r.meshes << " meshes, "
             << r.previews << " previews, " << r.fragments << " fragments"
+            << (r.notes ? "; notes: " + notes_words(*r.notes) : "")
             << (r.content_credential ? "; the content credential was not checked" : "") << ")\n";
 }
 
@@ -140,26 +141,30 @@ struct DoctorArguments {
   bool json = false;
 };
 
-AtlasDiagnosis diagnose_input(const std::string& path, const RunContext& context) {
+AtlasDiagnosis diagnose_input(const std::string& path, std::optional<NotesCount>& notes,
+                              const RunContext& context) {
   if (!is_package(path)) {
     const auto subject = atlas_subject(path, context);
     print_warnings(subject.notes);
     return diagnose_atlases(subject, context);
   }
   PackageReader package(open_store(path));
+  if (package.manifest().annotations) notes = count_notes(package.annotations(), package.manifest());
   return diagnose_atlases(atlas_subject(package, context), context);
 }
 
 int run_doctor(const DoctorArguments& args) {
-  const AtlasDiagnosis diagnosis = diagnose_input(args.input, context_of(args.jobs));
+  std::optional<NotesCount> notes;
+  const AtlasDiagnosis diagnosis = diagnose_input(args.input, notes, context_of(args.jobs));
   const std::vector<GateResult> results = check_atlases(diagnosis, args.limits);
   write_gate_junit(args.junit, "texmesh doctor", args.input, results);
   const std::vector<std::string> reasons = gate_failures(results);
   const std::string name = std::filesystem::path(args.input).filename().string();
   if (args.json) {
-    std::cout << to_json_line(DoctorReport{name, diagnosis, reasons}) << '\n';
+    std::cout << to_json_line(DoctorReport{name, diagnosis, reasons, notes}) << '\n';
   } else {
     std::cout << printable(name) << "\n" << atlas_text(diagnosis) << gate_text(results);
+    if (notes) std::cout << "notes: " << notes_words(*notes) << "\n";
   }
   return reasons.empty() ? kExitOk : kExitDifferent;
 }

@@ -32,7 +32,7 @@ struct ModelList {
     v("shards", s.shards, Range{1, 1'000'000}, "");
     v("collection", s.collection, FieldRule{.pattern = "^[0-9a-f]{64}$", .may_miss = true},
       "where there are several shards: as in the shards' summaries");
-    v("collections", s.collections, "collection files that were read");
+    v("collections", s.collections, "collection files that were read, and the files of notes that they name");
     v("stale", s.stale, kMayMiss, "packages in the output folder that no model makes: paths within it");
     v("models", s.models, "");
   }

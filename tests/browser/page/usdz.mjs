@@ -1,7 +1,9 @@
-// Draws a GLB or a USDZ by three.js's loaders alone.
+// Draws a GLB or a USDZ by three.js's loaders, or a USDZ by tinyusdz.
 import * as THREE from 'three';
 import {GLTFLoader} from 'three/addons/loaders/GLTFLoader.js';
 import {USDLoader} from 'three/addons/loaders/USDLoader.js';
+import {TinyUSDZLoader} from 'tinyusdz/TinyUSDZLoader.js';
+import {TinyUSDZLoaderUtils} from 'tinyusdz/TinyUSDZLoaderUtils.js';
 
 const kSide = 384;
 const renderer = new THREE.WebGLRenderer({antialias: true, preserveDrawingBuffer: true});
@@ -16,11 +18,37 @@ const pictures = async (object) => {
   return all.length;
 };
 
+const loaders = {
+  glb: async (url) => (await new GLTFLoader().loadAsync(url)).scene,
+  usd: async (url) => {
+    const object = await new USDLoader().loadAsync(url);
+    // three.js 0.187 takes the scale 2 that makes a vector of a normal map's texel for the map's strength.
+    object.traverse(({material}) => material?.normalScale?.multiplyScalar(0.5));
+    return object;
+  },
+  tiny: async (url) => {
+    const loader = new TinyUSDZLoader(), base = TinyUSDZLoaderUtils.createDefaultMaterial();
+    await loader.init();
+    const scene = await loader.loadAsync(url);
+    const object = TinyUSDZLoaderUtils.buildThreeNode(scene.getDefaultRootNode(), base, scene, {overrideMaterial: false});
+    // Its textures come later, and 0.9.0-rc10 multiplies them by the surface's usual values, reads colours as light, clamps,
+    // and makes tangents of its own, which the GLB has not.
+    await new Promise((f) => setTimeout(f, 3000));
+    object.traverse(({geometry, material: m}) => {
+      if (!m) return;
+      geometry.deleteAttribute('tangent');
+      if (m.map) m.color.set(1, 1, 1), (m.map.colorSpace = THREE.SRGBColorSpace);
+      if (m.roughnessMap) m.roughness = 1;
+      for (const t of Object.values(m)) if (t?.isTexture) t.wrapS = t.wrapT = THREE.RepeatWrapping, (t.needsUpdate = true);
+      m.needsUpdate = true;
+    });
+    return object;
+  },
+};
+
 /** The picture's bytes, and what was loaded. */
-window.drawn = async (url) => {
-  const object = url.endsWith('.glb') ? (await new GLTFLoader().loadAsync(url)).scene : await new USDLoader().loadAsync(url);
-  // three.js 0.187 takes the scale 2 that makes a vector of a normal map's texel for the map's strength.
-  if (url.endsWith('.usdz')) object.traverse(({material}) => material?.normalScale?.multiplyScalar(0.5));
+window.drawn = async (url, reader) => {
+  const object = await loaders[reader](url);
   const textures = await pictures(object);
   const scene = new THREE.Scene();
   scene.background = new THREE.Color(0x20c020);

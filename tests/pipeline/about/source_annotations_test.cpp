@@ -69,6 +69,32 @@ TEST(SourceAnnotations, VoyagersDocumentHasItsLanguages) {
   ASSERT_EQ(r.notes.size(), 1u) << "an image beside the document has no URL";
 }
 
+TEST(SourceAnnotations, VoyagersViewsAndToursComeInTheModelsCoordinates) {
+  const std::string setup = R"("scenes":[{"units":"cm"}],"setups":[{"tours":[{"title":"T","steps":[
+      {"id":"one","title":"Seen already"},{"id":"two","titles":{"EN":"Behind"}},{"id":"none","title":"No view"}]}],
+      "snapshots":{"targets":["setups/0/reader/enabled","setups/0/navigation/orbit","setups/0/navigation/offset"],"states":[
+      {"id":"one","values":[true,[-90,0,0],[0,0,100]]},{"id":"two","values":[true,[0,90,0],[10,20,50]]},
+      {"id":"odd","values":[true,[0,1e300,0],[0,0,1]]},{"id":"none","values":[true]}]}}])";
+  const std::string note = R"("annotations":[{"title":"Top","position":[1,2,3],"viewId":"one"}])";
+  const Read plain = read("{" + setup + R"(,"models":[{)" + note + "}]}");
+  ASSERT_EQ(plain.all.list.size(), 2u);
+  const auto expect_near = [](const Vec3d& found, const Vec3d& expected) {
+    for (int i = 0; i < 3; ++i) EXPECT_NEAR(found[i], expected[i], 1e-9);
+  };
+  expect_near(plain.all.list[0].camera.value().position, {0, 100, 0});  // from above
+  expect_near(plain.all.list[0].camera->target, {0, 0, 0});
+  EXPECT_EQ(plain.all.list[1].texts[0], (AnnotationText{"en", "Behind", ""}));
+  expect_near(plain.all.list[1].camera.value().position, {50, 20, -10});  // from +x
+  expect_near(plain.all.list[1].position, {0, 20, -10});
+  // Millimetres in a scene of centimetres, turned by 90 degrees about y, then shifted.
+  const Read placed =
+      read("{" + setup + R"(,"models":[{"units":"mm","translation":[0,5,0],"rotation":[0,0.5,0,0.5],)" +
+           note + "}]}");
+  expect_near(placed.all.list[0].position, {1, 2, 3});
+  expect_near(placed.all.list[0].camera.value().position, {0, 950, 0});
+  expect_near(placed.all.list[1].camera.value().position, {100, 150, 500});
+}
+
 TEST(SourceAnnotations, WebAnnotationsPointByTheirSelectors) {
   const Read r = read(R"x({"type":"AnnotationPage","items":[
       {"type":"Annotation","motivation":["painting"],"body":{"type":"Model"},"target":{"selector":{"type":"PointSelector","x":9,"y":9,"z":9}}},

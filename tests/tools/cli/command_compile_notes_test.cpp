@@ -2,7 +2,9 @@
 // verify, extract, export.
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <nlohmann/json.hpp>
+#include <thread>
 
 #include "format/base/text_bytes.h"
 #include "stages/gltf/glb_container.h"
@@ -80,6 +82,85 @@ TEST_F(CompileNotes, PointsOutsideAreToldAndTooManyRefused) {
   EXPECT_EQ(refused.exit_code, 2);
   EXPECT_NE(refused.errors.find("at most 1000 notes"), std::string::npos) << refused.errors;
   EXPECT_EQ(compile({"--annotations", folder_ / "none.json"}).exit_code, 2);
+}
+
+TEST_F(CompileNotes, VerifyDumpAndDoctorSayWhatCanBeTold) {
+  const auto said = [&](const std::string& command) {
+    const CommandResult r = run_command({TEXMESH_BINARY, command, package_});
+    EXPECT_EQ(r.exit_code, 0) << r.errors;
+    return r.output;
+  };
+  ASSERT_EQ(compile({"--up", "keep", "--annotations", folder_ / "own.json"}).exit_code, 0);
+  EXPECT_NE(said("verify").find("; notes: 2, 1 outside the object)"), std::string::npos) << said("verify");
+  EXPECT_NE(said("dump").find("notes     2, 1 outside the object\n"), std::string::npos);
+  EXPECT_NE(said("doctor").find("notes: 2, 1 outside the object\n"), std::string::npos);
+  ASSERT_EQ(compile({"--up", "keep", "--annotations", folder_ / "notes.json"}).exit_code, 0);
+  const CommandResult r = run_command({TEXMESH_BINARY, "verify", package_, "--json"});
+  EXPECT_EQ(Json::parse(r.output)["packages"][0]["notes"],
+            (Json{{"count", 1}, {"outside", 1}, {"without_language", 1}}))
+      << r.output;
+  ASSERT_EQ(compile({"--up", "keep"}).exit_code, 0);
+  EXPECT_EQ(said("verify").find("notes"), std::string::npos);
+}
+
+TEST_F(CompileNotes, ACollectionNamesThemForEachModel) {
+  write_text(folder_ / "hut.obj", kTent);
+  write_text(folder_ / "collection.json",
+             R"({"version":1,"options":{"import":{"up":"keep"}},"models":[
+               {"input":"tent.obj","annotations":"own.json"},{"input":"hut.obj"}]})");
+  const std::string out = folder_ / "out";
+  const CommandResult made = run_command({TEXMESH_BINARY, "compile", folder_ / "collection.json", "-o", out,
+                                          "--no-cache", "--profile", folder_ / "profile.json"});
+  ASSERT_EQ(made.exit_code, 0) << made.errors;
+  package_ = out + "/tent.texmesh";
+  EXPECT_EQ(notes().size(), 2u);
+  package_ = out + "/hut.texmesh";
+  EXPECT_EQ(notes().size(), 0u);
+  const CommandResult list =
+      run_command({TEXMESH_BINARY, "list", folder_ / "collection.json", "-o", out, "--json"});
+  EXPECT_NE(list.output.find("own.json"), std::string::npos) << list.output << list.errors;
+  write_text(folder_ / "collection.json",
+             R"({"version":1,"models":[{"input":"tent.obj","annotations":"../none.json"}]})");
+  EXPECT_EQ(run_command({TEXMESH_BINARY, "compile", folder_ / "collection.json", "-o", out}).exit_code, 2);
+}
+
+/// While it is compiled the archive becomes another one again and again, whole or cut; each package is one
+/// state's, notes and all, or there is none.
+TEST_F(CompileNotes, AnArchiveThatChangesGivesOneStateOrAnError) {
+  const auto zip = [](const std::string& notes) {
+    const Bytes bytes = zip_of({{"tent/tent.obj", kTent}, {"tent/annotations.json", notes}});
+    return std::string(bytes.begin(), bytes.end());
+  };
+  const std::array<std::string, 2> states{zip(kNotes), zip(kOwnNotes)};
+  std::array<std::string, 2> packages;
+  for (std::size_t i = 0; i < 2; ++i) {
+    write_text(folder_ / "tent.zip", states[i]);
+    ASSERT_EQ(compile({"--up", "keep"}, "tent.zip").exit_code, 0);
+    packages[i] = read_text(package_);
+  }
+  std::atomic<bool> over = false;
+  std::thread writer([&] {
+    for (std::size_t i = 0; !over; ++i)
+      write_text(folder_ / "tent.zip",
+                 states[i % 2].substr(0, i % 3 == 0 ? i % states[0].size() : states[0].npos));
+  });
+  int made = 0;
+  for (int i = 0; i < 20; ++i) {
+    std::filesystem::remove(package_);
+    const CommandResult r = compile({"--up", "keep"}, "tent.zip");
+    if (r.exit_code != 0) {
+      EXPECT_FALSE(std::filesystem::exists(package_));
+      continue;
+    }
+    ++made;
+    const std::string package = read_text(package_);
+    EXPECT_TRUE(package == packages[0] || package == packages[1]) << r.output << r.errors;
+  }
+  over = true;
+  writer.join();
+  write_text(folder_ / "tent.zip", states[0]);
+  ASSERT_EQ(compile({"--up", "keep"}, "tent.zip").exit_code, 0);
+  EXPECT_EQ(read_text(package_), packages[0]) << "after " << made << " packages";
 }
 
 TEST_F(CompileNotes, AnArchiveBringsItsNotes) {

@@ -398,9 +398,31 @@ class Stage {
     return false;
   }
 
-  /// A primvar of one value a vertex.
-  void add_primvar(Node prim, const std::string& name, const char* type, CrateWriter::Value value) {
-    crate_.set(crate_.attribute(prim, name, type, value), "interpolation", crate_.token("vertex"));
+  /// A primvar of one value a vertex, or what else `interpolation` says.
+  void add_primvar(Node prim, const std::string& name, const char* type, CrateWriter::Value value,
+                   const char* interpolation = "vertex") {
+    crate_.set(crate_.attribute(prim, name, type, value), "interpolation", crate_.token(interpolation));
+  }
+
+  /// glTF shows a mesh without normals flat, readers of USD smooth it: it gets the normals of its faces, each
+  /// once.
+  void add_face_normals(Node prim, const MeshPiece& piece) {
+    std::vector<float> normals;
+    std::vector<std::int32_t> indices;
+    std::map<std::array<float, 3>, std::int32_t> number;
+    const Mesh& mesh = model_.mesh;
+    for (std::size_t i = 0; i < piece.corners.size(); i += 3) {
+      const auto corner = [&](std::size_t k) {
+        const auto c = static_cast<std::size_t>(piece.corners[i + k]);
+        return to_double(mesh.positions[mesh.wedge_position[piece.wedges[c]]]);
+      };
+      const Vec3f n = to_float(normalized(cross(corner(1) - corner(0), corner(2) - corner(0))));
+      const auto [at, is_new] = number.try_emplace({n.x, n.y, n.z}, static_cast<std::int32_t>(number.size()));
+      if (is_new) normals.insert(normals.end(), {n.x, n.y, n.z});
+      indices.insert(indices.end(), 3, at->second);
+    }
+    add_primvar(prim, "primvars:normals", "normal3f[]", crate_.array(normals, 3), "faceVarying");
+    crate_.attribute(prim, "primvars:normals:indices", "int[]", crate_.array(indices));
   }
 
   void add_mesh(const MeshPiece& piece, const std::string& name, std::size_t material) {
@@ -429,7 +451,10 @@ class Stage {
                                }),
                           3);
     };
-    if (!mesh.normals.empty()) add_primvar(prim, "normals", "normal3f[]", of_corners(mesh.normals));
+    if (!mesh.normals.empty())
+      add_primvar(prim, "normals", "normal3f[]", of_corners(mesh.normals));
+    else if (!model_.materials[material].unlit)
+      add_face_normals(prim, piece);
     const PreviewSurface& surface = materials_[material];
     for (std::size_t k = 0; k < surface.texcoords.size(); ++k) {
       const auto& [set, transform] = surface.texcoords[k];

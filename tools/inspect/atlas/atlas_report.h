@@ -4,6 +4,7 @@
 #include "pipeline/import/import.h"
 #include "pipeline/io/record.h"
 #include "stages/measure/atlas/atlas_figures.h"
+#include "tools/inspect/notes_count.h"
 
 namespace texmesh {
 
@@ -141,11 +142,13 @@ struct DoctorReport {
   std::string input;  // file name, no folder
   AtlasDiagnosis diagnosis;
   std::vector<std::string> reasons;  // the limits that are not kept
+  std::optional<NotesCount> notes;
   static void fields(auto& s, auto&& v) {
     v("input", s.input, "file name, no folder");
     AtlasDiagnosis::fields(s.diagnosis, v);
     v("good", s.reasons.empty(), "every limit is kept");
     v("reasons", s.reasons, "the limits that are not");
+    v("notes", s.notes, "where a package has notes at points");
   }
 };
 DocumentSchema doctor_schema();

@@ -319,7 +319,7 @@ std::string summary_text(PackageReader& p, DumpGamma) {
   if (m.poster)
     s += fmt::format("poster    {} x {} px, {} kB\n", m.poster->width_px, m.poster->height_px,
                      kilobytes(m.poster->bytes));
-  if (m.annotations) s += fmt::format("notes     {}\n", p.annotations().list.size());
+  if (m.annotations) s += fmt::format("notes     {}\n", notes_words(count_notes(p.annotations(), m)));
   const std::string stream =
       m.stream ? stream_table(p.split_stream_head()).text() : "vertex-split stream: none\n";
   const std::string textures = p.textures().empty() ? "textures: none\n" : textures_table(p).text();

@@ -617,7 +617,9 @@ class Verifier {
       check_about(package_.manifest, read_about(store_.read(package_.manifest.about)), findings_);
     });
     guarded(findings_, "annotations", kAnnotationsPath, [&] {
-      if (package_.manifest.annotations) read_annotations(store_.read(*package_.manifest.annotations));
+      if (package_.manifest.annotations)
+        report_.notes =
+            count_notes(read_annotations(store_.read(*package_.manifest.annotations)), package_.manifest);
     });
     guarded(findings_, {"provenance", "O03"}, kProvenancePath, [&] {
       const Bytes bytes = store_.read(package_.manifest.provenance);

@@ -4,6 +4,7 @@
 #include "format/base/finding.h"
 #include "pipeline/io/record.h"
 #include "stages/base/run_context.h"
+#include "tools/inspect/notes_count.h"
 
 namespace texmesh {
 
@@ -24,6 +25,7 @@ struct VerifyReport {
   std::vector<Finding> findings;  // in package order; empty = the package is sound
   std::uint64_t entries = 0, bytes = 0, meshes = 0, previews = 0, fragments = 0;  // what was looked at
   bool content_credential = false;  // there is one; what it says is not checked
+  std::optional<NotesCount> notes;
 };
 
 /// Looks at every byte of a package and collects everything that is not as format/SPEC.md says:
@@ -46,6 +48,7 @@ struct VerifiedPackage {
     v("previews", s.report.previews, "");
     v("fragments", s.report.fragments, "");
     v("content_credential", s.report.content_credential, "there is one; what it says was not checked");
+    v("notes", s.report.notes, "where the package has notes at points");
     v("findings", s.report.findings, "");
   }
 };

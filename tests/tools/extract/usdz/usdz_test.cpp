@@ -23,12 +23,12 @@ Bytes made_image(const char* type, int channels) {
 struct Square {
   Json material = Json::object();
   std::vector<std::pair<std::string, Bytes>> images;  // media type, file
-  bool colours = false;
+  bool colours = false, normals = true;
   int cells = 8;
 
   Extracted extracted() const {
     GltfBuilder b;
-    std::vector<float> positions, uvs, colour;
+    std::vector<float> positions, uvs, colour, normal;
     std::vector<std::uint16_t> indices;
     for (int y = 0; y <= cells; ++y)
       for (int x = 0; x <= cells; ++x) {
@@ -37,6 +37,8 @@ struct Square {
         positions.insert(positions.end(), {u, v, u * v});
         uvs.insert(uvs.end(), {u, v});
         colour.insert(colour.end(), {u, 0.5f, v});
+        const Vec3f n = to_float(normalized(Vec3d{-v, -u, 1}));
+        normal.insert(normal.end(), {n.x, n.y, n.z});
       }
     for (int y = 0; y < cells; ++y)
       for (int x = 0; x < cells; ++x) {
@@ -45,6 +47,7 @@ struct Square {
       }
     Json attributes{{"POSITION", b.attribute(positions, "VEC3", {{"min", {0, 0, 0}}, {"max", {1, 1, 1}}})},
                     {"TEXCOORD_0", b.attribute(uvs, "VEC2")}};
+    if (normals) attributes["NORMAL"] = b.attribute(normal, "VEC3");
     if (colours) attributes["COLOR_0"] = b.attribute(colour, "VEC3");
     for (const auto& [type, bytes] : images)
       b.push("textures",
@@ -127,6 +130,17 @@ TEST(Usdz, SaysMaterialsUnitAndRights) {
   EXPECT_TRUE(has(text, {reinterpret_cast<const char*>(&metres), sizeof metres}));
   EXPECT_FALSE(has(text, "displayColor"));
   EXPECT_FALSE(has(text, "inputs:clearcoat"));
+}
+
+TEST(Usdz, AMeshWithoutNormalsHasThoseOfItsFaces) {
+  Square s;
+  EXPECT_FALSE(has(usdz_text(s), "primvars:normals"));
+  s.normals = false;
+  const std::string text = usdz_text(s);
+  for (const char* part : {"primvars:normals", "primvars:normals:indices", "faceVarying"})
+    EXPECT_TRUE(has(text, part)) << part;
+  s.material = {{"extensions", {{"KHR_materials_unlit", Json::object()}}}};
+  EXPECT_FALSE(has(usdz_text(s), "primvars:normals")) << "no light falls on it";
 }
 
 TEST(Usdz, TextureTransformsGoIntoTheCoordinates) {
