@@ -8,7 +8,7 @@
 
 namespace texmesh {
 
-inline constexpr int kPosterVersion = 3;
+inline constexpr int kPosterVersion = 4;
 
 struct PosterOptions {
   int size_px = 512;

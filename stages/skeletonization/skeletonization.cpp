@@ -62,8 +62,8 @@ struct WrapSize {
 /// A mesh of 6,400 triangles has edges of about alpha, and a wrap of shorter ones shows no more of it.
 /// Smaller models come in thousands, so below that the wrap gets coarser faster than the mesh.
 WrapSize wrap_size(const SkeletonizationOptions& options, std::size_t triangles) {
-  constexpr std::size_t kLeastFaces = 600;
-  constexpr double kLeastDivisor = 16, kDivisor = 80, kTriangles = 6400, kCubeOfOneFace = 1.2e7;
+  constexpr std::size_t kLeastFaces = 1000;
+  constexpr double kLeastDivisor = 24, kDivisor = 80, kTriangles = 6400, kCubeOfOneFace = 8e6;
   const auto count = static_cast<double>(triangles), part = count / kTriangles;
   const double divisor = std::max(kLeastDivisor, kDivisor * part * std::sqrt(part));
   const double faces = std::min<double>(options.max_wrap_faces, count * count * count / kCubeOfOneFace);

@@ -5,7 +5,7 @@
 
 namespace texmesh {
 
-inline constexpr int kSkeletonizationVersion = 9;
+inline constexpr int kSkeletonizationVersion = 8;
 
 struct SkeletonizationOptions {
   // At 40 a turtle has no hind legs, at 60 the skeleton of a saxophone's neck cuts its corner.
@@ -40,8 +40,8 @@ struct SkeletonizationOptions {
 /// The skeleton of any conditioned mesh (open, several components, one triangle): an alpha wrap, its mean
 /// curvature flow skeleton, and distances to it that the local thickness corrects where a curve is no
 /// skeleton (local_radius.h). Meshes of more than 100,000 triangles are clustered to that first. Of few
-/// triangles n alpha_divisor is at most 80 (n / 6400)^1.5, or 16 (the default is whole from 6,400 on), and
-/// the wrap has at most n^3 / 12,000,000 faces, or 600. No mesh makes it fail. Every fallback
+/// triangles n alpha_divisor is at most 80 (n / 6400)^1.5, or 24 (the default is whole from 6,400 on), and
+/// the wrap has at most n^3 / 8,000,000 faces, or 1,000. No mesh makes it fail. Every fallback
 /// gives a warning:
 /// - "skeleton-coarser-wrap": a wrap that takes more than max_wrap_steps, or looks at 50 times as many
 ///   triangles (thousands of needles around one point), is tried with twice and four times its alpha.
