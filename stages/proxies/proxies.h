@@ -7,7 +7,7 @@
 
 namespace texmesh {
 
-inline constexpr int kProxiesVersion = 11;
+inline constexpr int kProxiesVersion = 12;
 
 /// kAuto: only those that beat what the source's atlas gives for the same bytes.
 enum class ProxyMode : std::uint8_t { kNone, kAuto, kAlways };

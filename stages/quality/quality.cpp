@@ -310,7 +310,8 @@ MeasuredQuality measure_quality(const NestedScales& scales, const PerceptualValu
                 "no picture shows anything of the object; its scales count as equal");
   studio.frame = seen.frame;
   studio.rows = seen.rows;
-  studio.pixels_of_unit = static_cast<double>(seen.pixels) / (options.views * kLookedAtPx * kLookedAtPx);
+  const double looked_at = looked_at_px(scales.scales[0].triangles.size());
+  studio.pixels_of_unit = static_cast<double>(seen.pixels) / (options.views * looked_at * looked_at);
   studio.environment = studio_environment();
   for (std::size_t t = 0; t < shown.textures.size(); ++t)
     studio.textures.push_back(source_texture(
@@ -321,6 +322,7 @@ MeasuredQuality measure_quality(const NestedScales& scales, const PerceptualValu
   SwitchSizes switch_sizes(kept.numbers.size(), options);
   const std::size_t fewer =
       fewer_heights(sampler, scales.scales[0].triangles.size(), studio.frame.extent, options);
+  studio.few = fewer > 0;
   const std::vector<SizeCells> cells = render_heights(sampler, options, fewer, studio, switch_sizes, context);
   result.table.views = static_cast<std::uint32_t>(options.views);
   result.table.scales = kept.numbers;

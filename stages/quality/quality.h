@@ -10,7 +10,7 @@
 
 namespace texmesh {
 
-inline constexpr int kQualityVersion = 20;
+inline constexpr int kQualityVersion = 21;
 
 struct QualityOptions {
   int views = 4;
@@ -62,7 +62,8 @@ struct QualityOptions {
 ///   our own. S_0 has kAnyDisplayPx.
 /// - Views: all at heights up to a quarter of the largest, which the table's least size is; `large_views` of
 ///   them for scales at larger heights, for coarser mips and for samples of everything together; every second
-///   one of these for textures at larger sizes. 0.9 of both thresholds count where fewer than 12 views speak,
+///   one of these for textures at larger sizes. Textures of a model of few texels and triangles are shown in
+///   `large_views` at the least size, too. 0.9 of both thresholds count where fewer than 12 views speak,
 ///   0.8 where fewer than 6 do: the worst of 12 is up to 1.24 times the worse of two. Losses of fewer views
 ///   than at the size below are corrected by what these views were among all there.
 /// - Geometry: at the least size all scales are rendered; at the half those that still pass, every second

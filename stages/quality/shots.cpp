@@ -93,14 +93,15 @@ Seen look_around(const RenderScene& scene, const PictureFrame& frame, const Text
                  double largest_px, const RunContext& context) {
   Seen seen;
   WantedMips levels(sizes.size());
+  const double height_px = looked_at_px(scene.triangles->size());
   for (int v = 0; v < views; ++v) {
     context.check_cancelled();
-    const PicturePlace place = place_picture(frame, v, views, kLookedAtPx);
+    const PicturePlace place = place_picture(frame, v, views, height_px);
     const Visibility view = look(scene, place.camera, place.side_px, context);
     seen.rows.push_back(shown_rows(view));
     for (const std::uint32_t pixels : seen.rows.back().pixels) seen.pixels += pixels;
     seen.of += static_cast<std::uint64_t>(place.side_px) * place.side_px;
-    levels.add(scene, view, sizes, largest_px / kLookedAtPx);
+    levels.add(scene, view, sizes, largest_px / height_px);
   }
   seen.first_levels = levels.first_levels();
   return seen;
@@ -295,6 +296,11 @@ PicturePlace place_picture(const PictureFrame& frame, int view, int views, doubl
   // A little more is seen than the frame, so that the height is exact.
   out.camera.tan_half_fov *= out.side_px / std::clamp(side, 0.5, kLargestSide);
   return out;
+}
+
+double looked_at_px(std::size_t triangles) {
+  constexpr std::size_t kFewTriangles = 5000;
+  return triangles <= kFewTriangles ? 96 : 192;
 }
 
 Coverage frame_object(const RenderScene& scene, const TextureSizes& sizes, double extent, int views,

@@ -52,12 +52,13 @@ PicturePlace place_picture(const PictureFrame& frame, int view, int views, doubl
 
 using TextureSizes = std::vector<Vec2<std::uint32_t>>;  // per shown texture, px
 
-inline constexpr double kLookedAtPx = 192;  // displayed height at which the coverage is looked at
+/// The displayed height at which the coverage of a model of so many triangles is looked at, px.
+double looked_at_px(std::size_t triangles);
 
 /// What the views show of S_0.
 struct Coverage {
   PictureFrame frame;
-  std::uint64_t pixels = 0;                 // of all views, at kLookedAtPx
+  std::uint64_t pixels = 0;                 // of all views, at looked_at_px()
   std::vector<ShownRows> rows;              // by view
   std::vector<std::uint32_t> first_levels;  // per shown texture, the finest mip that pictures ask for
 };
@@ -75,6 +76,7 @@ struct Studio {
   ViewChoice views;
   std::vector<ShownRows> rows;  // by view
   double pixels_of_unit = 0;    // that views show on average at a displayed height of 1 px
+  bool few = false;             // texels and triangles, so that fewer pictures tell as much
   RenderEnvironment environment;
   std::vector<RenderScene> scenes;      // per kept scale, S_0 first
   std::vector<RenderTexture> textures;  // the source's, then coded ones for the time that they are needed

@@ -336,7 +336,9 @@ double interpolated(const std::vector<std::optional<double>>& values, std::size_
   return (1 - part) * *values[below] + part * *values[above];
 }
 
-ViewPart coded_views(std::size_t rank) { return rank == 0 ? ViewPart::kAll : ViewPart::kLargest; }
+ViewPart coded_views(std::size_t rank, bool few) {
+  return rank > 0 ? ViewPart::kLargest : few ? ViewPart::kLarge : ViewPart::kAll;
+}
 /// Of what is compared with coded planes.
 ViewPart other_views(std::size_t rank) { return rank == 0 ? ViewPart::kLarge : ViewPart::kLargest; }
 
@@ -344,7 +346,7 @@ ViewPart other_views(std::size_t rank) { return rank == 0 ? ViewPart::kLarge : V
 using TogetherTextures = std::array<Replaced, 3>;
 
 TogetherTextures add_group(const TextureSampler& sampler, std::size_t rank, const Display& display,
-                           const PlanesOfGroup& planes, GroupCells& group, SizeShots& shots) {
+                           const PlanesOfGroup& planes, bool few, GroupCells& group, SizeShots& shots) {
   group.knots = sample_knots(sampler.data, planes, sampler.rung_samples, display);
   group.texel_level = texel_level(sampler.data, planes, display);
   const std::size_t knots = group.knots.size();
@@ -356,14 +358,14 @@ TogetherTextures add_group(const TextureSampler& sampler, std::size_t rank, cons
   for (std::size_t k = 0; k < knots; ++k) {
     if (!is_sampled(sampler, group.knots, k, rank)) continue;
     coded = shots.coded(group, k);
-    shots.take(0, coded, group.coded[k], coded_views(rank));
+    shots.take(0, coded, group.coded[k], coded_views(rank, few));
   }
   group.preview.resize(1);
   const Replaced preview = shots.previews(planes);
-  shots.take(0, preview, group.preview[0], coded_views(rank));
+  shots.take(0, preview, group.preview[0], coded_views(rank, few));
   const MipSamples mips = mip_samples(sampler, rank, display, planes);
   for (std::size_t l = 0; l < mips.finer; ++l)
-    shots.take(0, shots.mips(group, -static_cast<int>(l)), group.finer[l], coded_views(rank));
+    shots.take(0, shots.mips(group, -static_cast<int>(l)), group.finer[l], coded_views(rank, few));
   for (std::size_t l = 0; l < mips.coarser; ++l)
     shots.take(0, shots.mips(group, static_cast<int>(l) + 1), group.coarser[l], other_views(rank));
   const bool coarsest = mips.coarser == kCoarserLevels;
@@ -376,7 +378,8 @@ void add_textures(const TextureSampler& sampler, std::size_t rank, const Studio&
   cells.groups.resize(sampler.groups.size());
   std::vector<TogetherTextures> textures;
   for (std::size_t g = 0; g < cells.groups.size(); ++g)
-    textures.push_back(add_group(sampler, rank, display, sampler.groups[g], cells.groups[g], shots));
+    textures.push_back(
+        add_group(sampler, rank, display, sampler.groups[g], studio.few, cells.groups[g], shots));
   const std::vector<TogetherSample> samples = together_samples(studio.scenes.size(), rank);
   cells.together.resize(samples.size());  // shots hold places in it
   for (std::size_t i = 0; i < samples.size(); ++i) {
