@@ -8,6 +8,8 @@ import { type PlanLimits, type TimePlanOptions, meanOffer } from './harmonic_tim
 import { interpolatedBytes } from './size_curve';
 import { type PlaneChoice, type TextureLoss, planesForDisplay, tablesOf } from './texture_loss';
 
+export { coarsestAlike } from './own_jnd';
+
 // Chapter 4 as printed: gamma_for_bytes, thesis_textures and as_printed of delivery/cpp, bit for bit.
 
 /** The Gamma whose list comes to so many bytes, D_i(Gamma) = D_1, by bisection; 0 or 1 where no list does. */

@@ -1,5 +1,5 @@
-import { FormatError } from './errors';
-import { formatMajor, otherMajor } from './manifest';
+import { FormatError, otherMajor } from './errors';
+import { formatMajor } from './shared_numbers';
 
 /** Little-endian numbers from bytes; FormatError by `rule` names the place where bytes are missing. */
 export class BytesIn {

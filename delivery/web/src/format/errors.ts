@@ -1,3 +1,5 @@
+import { formatMajor } from './shared_numbers';
+
 /**
  * Every texmesh error carries the file (or URL), the place in the file, what was expected and what was found,
  * and the rule of format/SPEC.md that is broken. Any of these may be empty; the message joins those that are
@@ -33,3 +35,8 @@ export function isAbort(error: unknown): boolean {
 export function throwIfAborted(signal?: AbortSignal): void {
   if (signal?.aborted) throw abortError();
 }
+
+/** What a reader says that has found another major version. */
+export const otherMajor = (major: number): string =>
+  `${major}, which ${major < formatMajor ? 'is no longer read: compile the model again'
+    : 'a later reader is for'}`;

@@ -1,5 +1,5 @@
 import * as paths from './entry_paths';
-import { FormatError } from './errors';
+import { FormatError, otherMajor } from './errors';
 import { JsonAt, parseJson } from './json_fields';
 import * as layout from './layout';
 import {
@@ -171,11 +171,6 @@ function readPoster(at: JsonAt): PosterRef {
 function readVector(at: JsonAt): Vector3 {
   return at.each(3, 3, (c) => c.number(-largest, largest)) as Vector3;
 }
-
-/** What a reader says that has found another major version. */
-export const otherMajor = (major: number): string =>
-  `${major}, which ${major < formatMajor ? 'is no longer read: compile the model again'
-    : 'a later reader is for'}`;
 
 function readVersion(at: JsonAt): Pick<Manifest, 'version' | 'requiredFeatures'> {
   const format = at.at('format').by('M01');

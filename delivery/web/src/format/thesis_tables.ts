@@ -1,8 +1,8 @@
 import { BytesIn, readEntryStart } from './bytes_in';
 import { thesisPath as file } from './entry_paths';
 import { FormatError } from './errors';
-import { formatMinor, type Manifest } from './manifest';
-import { gammaSteps, mostChainScales, mostTotalBytes, noIndex } from './shared_numbers';
+import type { Manifest } from './manifest';
+import { formatMinor, gammaSteps, mostChainScales, mostTotalBytes, noIndex } from './shared_numbers';
 import type { TextureInfo } from './textures';
 
 export { gammaSteps };

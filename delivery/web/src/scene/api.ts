@@ -68,6 +68,11 @@ export interface LoadOptions {
   beta0BytesS?: number;
   /** The rule that says which scale is enough. Default flip: by lit pictures that the build compared. */
   rule?: StepRule;
+  /**
+   * The viewer's own just-noticeable difference, above 0 and at most 1: the load stops at the coarsest scale
+   * that cannot be told from the rule's. It fetches thesis.bin for it. Left out: the rule alone decides.
+   */
+  jnd?: number;
   /** This scale (or the nearest one that the package has) instead of the scale for the display. */
   scale?: number;
   /** This rung of every fragment (at most the highest) instead of rungs that fit the time. */

@@ -87,6 +87,7 @@ export class TextureLoad {
   private readonly planes_: ShownPlanes;
   private readonly inTime_: FetchInTime;
   private list_?: FragmentList;
+  private alike_?: (scale: number) => number; // by the viewer's own JND
   private lookedS_ = 0; // when the proxy and the scale were compared last
   private fruitlessRounds_ = 0; // rounds of refining that brought nothing, one after the other
 
@@ -125,6 +126,8 @@ export class TextureLoad {
     const { reader, options, signal } = load;
     load.beta0 = throughputBytesS(load);
     if (options.policy === 'thesis') this.inTime_.printed = await import('../decide/thesis_list');
+    if (options.jnd !== undefined)
+      this.alike_ = await (await import('../decide/thesis_list')).coarsestAlike(load);
     const { scale, planes: chosen, flip } = await this.choice_();
     if (flip !== undefined) await this.showBetterProxy_(flip);
     if (scale !== this.scale_.shown) load.enter('mesh');
@@ -215,7 +218,8 @@ export class TextureLoad {
   /** The scale that is enough at a displayed height. */
   private scaleFor_(heightPx: number, part: VisiblePart | undefined): number {
     const { options: { rule }, memoryBytes, reader: { manifest } } = this.load_;
-    return scaleWithin(manifest.scales, selectScale(manifest, heightPx, part, rule), memoryBytes);
+    const scale = selectScale(manifest, heightPx, part, rule);
+    return scaleWithin(manifest.scales, this.alike_?.(scale) ?? scale, memoryBytes);
   }
   /** Scale and planes for the display, or those that look best in the time. */
   private async choice_(): Promise<{ scale: number; planes: PlaneChoice[]; flip?: number }> {
