@@ -48,7 +48,7 @@ TEST(Scales, VeryManyPartsBecomeOneNode) {
   for (std::size_t t = 0; t < m.triangles.size(); ++t)
     m.triangle_part[t] = static_cast<std::uint16_t>(t % 257);
   for (int i = 0; i < 257; ++i) m.part_names.push_back("part " + std::to_string(i));
-  const Case c(m, 1, 1);
+  const Case c(m, 1, 4);
   std::vector<std::size_t> want(257), got;
   for (std::uint16_t part : c.scales.mesh.triangle_part) ++want[part];
   for (MeshCodec codec : kCodecs) {
