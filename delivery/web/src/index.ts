@@ -4,5 +4,6 @@
 
 export * from './decisions';
 export { TexmeshPackage, open } from './open';
-export { daylight, isMetallic, reflectSky } from './page/daylight';
+export { daylight, isMetallic } from './page/daylight';
+export { reflectSky } from './page/sky';
 export type * from './scene/api';

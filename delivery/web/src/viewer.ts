@@ -6,7 +6,7 @@ import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
 import { MeshoptDecoder } from 'three/addons/libs/meshopt_decoder.module.js';
 import { TexmeshViewer } from './element/texmesh_viewer';
 import { TexmeshPage } from './page';
-import { isMetallic, reflectSky } from './page/daylight';
+import { isMetallic } from './page/daylight';
 
 let shared: TexmeshPage | undefined;
 const draco = new DRACOLoader().setDecoderPath(new URL('./draco/', import.meta.url).href).setWorkerLimit(1);
@@ -19,10 +19,12 @@ export function texmeshPage(): TexmeshPage {
   }));
 }
 
-/** Metals get a sky to mirror: under lamps alone they are black. */
-function dress(scene: Scene): void {
-  if (isMetallic(scene)) reflectSky(scene);
+/** Metals get a sky to mirror, whose code comes when it is needed: under lamps alone they are black. */
+async function dress(scene: Scene): Promise<void> {
+  if (!isMetallic(scene)) return;
+  (await import('./page/sky')).reflectSky(scene);
+  for (const model of texmeshPage().models) if (model.scene === scene) model.moved();
 }
 
-TexmeshViewer.host = { page: texmeshPage, dress };
+TexmeshViewer.host = { page: texmeshPage, dress: (scene) => void dress(scene) };
 if (!customElements.get('texmesh-viewer')) customElements.define('texmesh-viewer', TexmeshViewer);

@@ -1,17 +1,5 @@
-import { CubeUVReflectionMapping, DataTexture, DirectionalLight, HemisphereLight, ShaderChunk } from 'three';
+import { DirectionalLight, HemisphereLight } from 'three';
 import type { Object3D, Scene } from 'three';
-
-/**
- * Radiance of the sky by height of the direction and by roughness, in linear light. Rough surfaces see the
- * hemisphere light: its intensity over pi. Mirrors see more contrast; with the hemisphere light alone a
- * mirror would look like paper.
- */
-const kSky = `
-vec3 sky(float up,float roughness){
-return mix(vec3(mix(.3,1.7,smoothstep(-.6,.9,up))),
-mix(vec3(.653,.627,.577),vec3(.955),.5+.5*up),roughness);}
-`;
-const kLookUp = /textureCubeUV\( envMap, .+? \* (\w+), (.+?) \)/g;
 
 /**
  * Adds daylight from above and a lamp that the camera is to carry; gives the lamp, whose place is the
@@ -33,22 +21,4 @@ export function isMetallic(root: Object3D): boolean {
     for (const m of [material].flat() as { metalness: number }[]) metallic ||= m.metalness > 0.5;
   });
   return metallic;
-}
-
-/**
- * Puts a sky as surroundings in the place of the hemisphere light: a metal under that light alone is black.
- * Shaders compute the sky where three.js would look it up in a texture; with look-ups a processor that draws
- * takes twice as long for a frame.
- */
-export function reflectSky(scene: Scene): void {
-  if (scene.environment) return;
-  const { envmap_physical_pars_fragment: code } = ShaderChunk;
-  if (kLookUp.test(code))
-    ShaderChunk.envmap_physical_pars_fragment = kSky + code.replace(kLookUp, 'vec4(sky($1.y,$2),1)');
-  // of the least size that three.js takes for surroundings
-  const unused = new DataTexture(new Uint8Array(4 * 64), 1, 64);
-  unused.mapping = CubeUVReflectionMapping;
-  unused.needsUpdate = true;
-  scene.environment = unused;
-  for (const o of scene.children) if (o instanceof HemisphereLight) o.visible = false;
 }
