@@ -1,10 +1,12 @@
 """What a checker looks at beside what reading a package shows: every entry, GLBs, heads of JPEGs, thesis.bin."""
 import collections
 import json
+import re
 import struct
 
 from formal_rules import Cursor, Record, Refused, parse_json, require
 
+VIEWERS = re.compile(r"gltf/(index\.bin|s(?P<scale>\d\d)\.glb|(?P<plane>\d{3,})-r(?P<rung>\d\d+)\.jpg)")
 FORMATS = {"jpg": "JPEG", "png": "PNG", "tif": "TIFF", "webp": "WEBP"}  # of sources; Pillow does not read EXR
 
 
@@ -100,6 +102,15 @@ class Checks:
         for k, (g, pictures) in glbs.items():
             shared = dict(first=glbs[0][0], previews=previews, **self.known)
             self.follow("scale", g=g, k=k, pictures=pictures, **shared)
+        for path in (p for p in model.index if p.startswith("gltf/")):
+            kind = VIEWERS.fullmatch(path)
+            if kind and kind["scale"]:
+                g, scale = self.glb(path)[0], int(kind["scale"])
+                self.follow("gltf scale", g=g, scale=scale, index=model.index, first=glbs[0][0], **self.known)
+            elif kind and kind["plane"]:
+                plane = self.follow("gltf picture", plane=int(kind["plane"]), rung=int(kind["rung"]), **self.known).t
+                sides = plane.widthPx, plane.heightPx, plane.channels
+                self.decode_image(model.entry(path), *sides, "H04", path, ["JPEG"])
         return len(glbs[0][0].get("materials", ()))
 
     def check_stream(self, splits, materials):

@@ -49,11 +49,13 @@ def list_container(name):
     RULES.follow("container", paths=list(entries), entries=entries, here=here, directory=last.at)
     return entries
 
-def read_pages(data, m, name, rules):
+def read_pages(data, m, name, rules, ref=None):
     """(record, cursor) of each page of the index or section of the tables, to be read to its end."""
     c = Cursor(data, rules[0], name)
     head = RULES.follow(name, c, m=m)
-    require((c.at, sha(data[: c.at])) == (m[name].headBytes, m[name].headSha256), "R02", f"the head of {name}")
+    told = m[ref or name]
+    good = "headBytes" not in told or (c.at, sha(data[: c.at])) == (told.headBytes, told.headSha256)
+    require(good, "R02", f"the head of {name}")
     for *record, size, digest in head.pages:
         page = Cursor(c.raw(size), rules[2], f"page {record} of {name}")
         require(sha(page.data) == digest.hex(), rules[1], f"digest of {page.what}")
@@ -62,10 +64,10 @@ def read_pages(data, m, name, rules):
             page.finish()
     c.finish()
 
-def read_index(data, m):
+def read_index(data, m, ref="index"):
     """{path: [offset, bytes, SHA-256]}"""
     index = {}
-    for (plane, entries), page in read_pages(data, m, "index", ("I03", "I04", "I04")):
+    for (plane, entries), page in read_pages(data, m, "index", ("I03", "I04", "I04"), ref):
         end = 0
         for _ in range(entries):
             r = RULES.follow("index record", page, plane=plane, index=index, end=end)
@@ -103,7 +105,13 @@ class Model:
         RULES.follow("manifest", m=m)
         data = self.read("index.bin")
         require((len(data), sha(data)) == (m.index.bytes, m.index.sha256), "R03", "index.bin")
-        self.index = read_index(data, m)
+        self.index, viewers = read_index(data, m), {}
+        if "gltf" in m:
+            data = self.read("gltf/index.bin")
+            require((len(data), sha(data)) == (m.gltf.bytes, m.gltf.sha256), "R03", "gltf/index.bin")
+            viewers = read_index(data, m, "gltf")
+        RULES.follow("gltf index", m=m, index=self.index, viewers=viewers)
+        self.index |= viewers | ({"gltf/index.bin": [m.gltf.offset, m.gltf.bytes, m.gltf.sha256]} if "gltf" in m else {})
         RULES.follow("references", m=m, index=self.index, entries=self.entries, is_tree=self.is_tree)
         self.textures = self.document("textures.json", 32 << 20, "textures.v2").textures
         names = dict(m=m, index=self.index, textures=self.textures, names=list(self.entries), is_tree=self.is_tree)

@@ -33,6 +33,7 @@ enum Place : int {
   kInterleaved,
   kOthers,
   kLast,
+  kGltfFiles,  // clients of a package do not read them
   kBehindAll
 };
 
@@ -58,6 +59,9 @@ constexpr KindOfEntry kKindsOfEntries[] = {
     {EntryKind::kAnnotations, kAnnotationsPath, kOthers},
     {EntryKind::kAbout, kAboutPath, kAboutPlace},
     {EntryKind::kContentCredential, kContentCredentialPath, kBehindAll},
+    {EntryKind::kGltfIndex, kGltfIndexPath, kGltfFiles},
+    {EntryKind::kGltfScale, "gltf/s%02u.glb", kGltfFiles},
+    {EntryKind::kGltfImage, "gltf/%03u-r%02u.jpg", kGltfFiles},
     {EntryKind::kMesh, "mesh/s%02u.glb", kInterleaved},
     {EntryKind::kProxy, "proxies/%02u.glb", kProxies},
     {EntryKind::kPreview, "preview/%03u.jpg", kPreviews},
@@ -137,13 +141,21 @@ std::string fragment_file_path(std::uint32_t plane, std::uint32_t rung, std::uin
   return spell(EntryKind::kFragmentFile, plane, rung, fragment).append(extension);
 }
 
+std::string gltf_scale_path(int scale) {
+  return spell(EntryKind::kGltfScale, static_cast<std::uint32_t>(scale));
+}
+std::string gltf_image_path(std::uint32_t plane, std::uint32_t rung) {
+  return spell(EntryKind::kGltfImage, plane, rung);
+}
+
 EntryName parse_entry_path(const std::string& path) {
   for (const KindOfEntry& kind : kKindsOfEntries) {
     EntryName name{kind.kind};
     if (!is_of_kind(path, kind, name)) continue;
     std::string canonical = spell(kind.kind, name.number, name.rung, name.fragment);
     if (!kind.extensions.empty()) canonical += name.extension;
-    const bool fits = kind.kind != EntryKind::kMesh || name.number <= kMostScaleInPath;
+    const bool mesh = kind.kind == EntryKind::kMesh || kind.kind == EntryKind::kGltfScale;
+    const bool fits = !mesh || name.number <= kMostScaleInPath;
     return canonical == path && fits ? name : EntryName{};
   }
   return {};
@@ -183,9 +195,9 @@ std::vector<std::string> streaming_order(std::vector<std::string> paths) {
     const Place place = place_of(name, facts);
     const std::uint64_t step = place == kInterleaved ? step_of(name) : 0;
     // Scales count down from coarse to fine; planes count up.
-    const std::uint64_t rank = is_mesh(name)      ? 0xffffffffu - mesh_rank(name)
-                               : place == kOthers ? 0
-                                                  : name.number;
+    const std::uint64_t rank = is_mesh(name)                             ? 0xffffffffu - mesh_rank(name)
+                               : place == kOthers || place == kGltfFiles ? 0
+                                                                         : name.number;
     keys.emplace_back(place, step, rank, std::move(path));
   }
   std::ranges::sort(keys);

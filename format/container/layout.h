@@ -44,6 +44,8 @@ inline constexpr const char* kSplitStreamPath = "mesh/stream.bin";
 inline constexpr const char* kPosterPath = "poster.jpg";
 inline constexpr const char* kThesisPath = "thesis.bin";
 inline constexpr const char* kAnnotationsPath = "annotations.json";
+/// The index of the files for viewers of glTF, which index.bin does not name (SPEC.md, section 21).
+inline constexpr const char* kGltfIndexPath = "gltf/index.bin";
 
 /// A C2PA manifest store over the container, where there is one: the last entry, named by neither manifest
 /// nor index, because it signs them; and its most bytes.
@@ -71,6 +73,10 @@ std::string source_path(std::uint32_t plane, std::string_view extension);
 std::string fragment_file_path(std::uint32_t plane, std::uint32_t rung, std::uint32_t fragment,
                                std::string_view extension = "jpg");
 
+/// A scale of the stream as a GLB, and a whole plane at the quality of a rung: files for viewers of glTF.
+std::string gltf_scale_path(int scale);                                // gltf/s07.glb
+std::string gltf_image_path(std::uint32_t plane, std::uint32_t rung);  // gltf/003-r01.jpg
+
 /// What a path stands for; kOther for paths that this version does not define.
 enum class EntryKind : std::uint8_t {
   kManifest,
@@ -92,6 +98,9 @@ enum class EntryKind : std::uint8_t {
   kProvenance,
   kAbout,
   kAnnotations,
+  kGltfIndex,
+  kGltfScale,
+  kGltfImage,
   kContentCredential
 };
 struct EntryName {
@@ -103,10 +112,13 @@ struct EntryName {
 };
 /// Only canonical spellings count: mesh/s7.glb is kOther.
 EntryName parse_entry_path(const std::string& path);
+/// A file for viewers of glTF, the index of these among them.
+inline bool is_gltf_file(const std::string& path) { return path.starts_with("gltf/"); }
 
 /// The one order that SPEC.md prescribes for a set of entries: the first picture (the smallest proxy, else
 /// the coarsest GLB), what a first plan needs, then the other meshes (the stream, GLBs from coarse to fine)
-/// between texture rungs from low to high, provenance last. Depends on the set only, not on its order.
+/// between texture rungs from low to high, provenance, and files for viewers of glTF last. Depends on the set
+/// only, not on its order.
 std::vector<std::string> streaming_order(std::vector<std::string> paths);
 
 }  // namespace texmesh

@@ -169,4 +169,12 @@ std::vector<EntryRef> read_index(std::span<const std::uint8_t> bytes) {
   return entries;
 }
 
+std::vector<EntryRef> read_gltf_index(std::span<const std::uint8_t> bytes) {
+  std::vector<EntryRef> entries = under_rule("H02", [&] { return read_index(bytes); });
+  for (const EntryRef& e : entries)
+    if (!is_gltf_file(e.path) || e.path == kGltfIndexPath)
+      throw RuleError("H02", kGltfIndexPath, "entry " + e.path, "another file under gltf/", "another");
+  return entries;
+}
+
 }  // namespace texmesh

@@ -66,5 +66,7 @@ std::vector<EntryRef> read_index_page(const IndexHead& head, std::size_t page,
                                       std::span<const std::uint8_t> bytes);
 /// All pages, every digest checked, merged into container order.
 std::vector<EntryRef> read_index(std::span<const std::uint8_t> bytes);
+/// The same of gltf/index.bin, which has files for viewers of glTF alone.
+std::vector<EntryRef> read_gltf_index(std::span<const std::uint8_t> bytes);
 
 }  // namespace texmesh

@@ -128,6 +128,8 @@ void entry_members(auto& v, auto& m) {
   optional("annotations", m.annotations, ref);
   if (m.annotations)
     v.by("N05").check("annotations", m.minor >= 1, "version 2.1 or later", "2." + std::to_string(m.minor));
+  optional("gltf", m.gltf, ref);
+  if (m.gltf) v.by("H01").check("gltf", m.minor >= 1, "version 2.1 or later", "2." + std::to_string(m.minor));
 }
 
 void read_version(const JsonAt& at, Manifest& m) {
@@ -176,6 +178,7 @@ void set_paths(Manifest& m) {
   if (m.thesis) m.thesis->path = kThesisPath;
   if (m.poster) m.poster->path = kPosterPath;
   if (m.annotations) m.annotations->path = kAnnotationsPath;
+  if (m.gltf) m.gltf->path = kGltfIndexPath;
 }
 
 /// Scales whose column says the stream's offset are prefixes of it.

@@ -91,6 +91,7 @@ struct Manifest {
   std::optional<EntryRef> thesis;   // thesis_tables.h
   std::optional<PosterRef> poster;
   std::optional<EntryRef> annotations;  // annotations.h; from 2.1 on
+  std::optional<EntryRef> gltf;         // index of the files for viewers of glTF; from 2.1 on
   friend bool operator==(const Manifest&, const Manifest&) = default;
 };
 

@@ -49,7 +49,8 @@ class ManifestFiller {
       set(manifest_.proxies[k].glb, proxy_path(static_cast<std::uint32_t>(k)));
     fill_stream();
     for (auto [entry, path] :
-         {std::pair(&manifest_.thesis, kThesisPath), std::pair(&manifest_.annotations, kAnnotationsPath)}) {
+         {std::pair(&manifest_.thesis, kThesisPath), std::pair(&manifest_.annotations, kAnnotationsPath),
+          std::pair(&manifest_.gltf, kGltfIndexPath)}) {
       entry->reset();
       if (by_path_.contains(path)) set(entry->emplace(), path);
     }
@@ -91,7 +92,7 @@ void check_entries(const Manifest& manifest, const std::vector<TextureInfo>& tex
     const EntryName name = parse_entry_path(e.path);
     const EntryKind kind = name.kind;
     if (kind == EntryKind::kManifest || kind == EntryKind::kIndex || kind == EntryKind::kTextures ||
-        kind == EntryKind::kContentCredential)
+        kind == EntryKind::kGltfIndex || kind == EntryKind::kContentCredential)
       fail_package("entry " + e.path, "an entry that write_package does not make itself", e.path);
     if (kind == EntryKind::kProxy && name.number >= manifest.proxies.size())
       fail_package("manifest", "figures of " + e.path, "none");
@@ -116,15 +117,26 @@ void check_entries(const Manifest& manifest, const std::vector<TextureInfo>& tex
     fail_package("manifest", "scales, and as many planes as textures", std::to_string(manifest.plane_count));
 }
 
+/// What an index names: all but itself, and either the files for viewers of glTF or the others.
+std::vector<EntryRef> named_by(const std::string& index, const std::vector<EntryRef>& refs) {
+  std::vector<EntryRef> named;
+  std::ranges::copy_if(refs, std::back_inserter(named), [&](const EntryRef& ref) {
+    return ref.path != index && is_gltf_file(ref.path) == is_gltf_file(index);
+  });
+  return named;
+}
+
 }  // namespace
 
 std::vector<std::uint8_t> write_package(Manifest manifest, std::vector<TextureInfo> textures,
                                         const std::vector<PackageEntry>& entries) {
   check_entries(manifest, textures, entries);
   const Bytes textures_json = to_bytes(write_textures(textures));
-  Bytes index;
+  Bytes index, gltf_index;
   std::map<std::string, const Bytes*> data{{kTexturesPath, &textures_json}, {kIndexPath, &index}};
   for (const PackageEntry& e : entries) data[e.path] = &e.bytes;
+  if (std::ranges::any_of(entries, [](const PackageEntry& e) { return is_gltf_file(e.path); }))
+    data[kGltfIndexPath] = &gltf_index;
   std::vector<std::string> paths;
   for (const auto& [path, unused] : data) paths.push_back(path);
 
@@ -132,13 +144,16 @@ std::vector<std::uint8_t> write_package(Manifest manifest, std::vector<TextureIn
   for (const std::string& path : streaming_order(paths))
     refs.push_back({path, 64, data.at(path)->size(), {}});
   for (EntryRef& ref : refs)
-    if (ref.path != kIndexPath) ref.digest = sha256(*data.at(ref.path));
-  const auto index_ref = std::ranges::find(refs, std::string(kIndexPath), &EntryRef::path);
-  const auto without_index = [&] {
-    std::vector<EntryRef> others;
-    for (const EntryRef& ref : refs)
-      if (ref.path != kIndexPath) others.push_back(ref);
-    return others;
+    if (ref.path != kIndexPath && ref.path != kGltfIndexPath) ref.digest = sha256(*data.at(ref.path));
+  const auto write_indices = [&] {
+    for (EntryRef& ref : refs) {
+      const bool of_gltf = ref.path == kGltfIndexPath;
+      if (!of_gltf && ref.path != kIndexPath) continue;
+      Bytes& bytes = of_gltf ? gltf_index : index;
+      bytes = write_index(named_by(ref.path, refs), manifest.minor);
+      ref.bytes = bytes.size();
+      ref.digest = sha256(bytes);
+    }
   };
 
   // The manifest holds offsets that depend on its own length. Its slot grows until the text that its size
@@ -148,13 +163,11 @@ std::vector<std::uint8_t> write_package(Manifest manifest, std::vector<TextureIn
   std::string text;
   for (;;) {
     place_entries(refs, slot);
-    if (index.empty()) {  // its size does not depend on the offsets in it
-      index = write_index(without_index(), manifest.minor);
-      index_ref->bytes = index.size();
+    if (index.empty()) {  // sizes of indices do not depend on the offsets in them
+      write_indices();
       place_entries(refs, slot);
     }
-    index = write_index(without_index(), manifest.minor);
-    index_ref->digest = sha256(index);
+    write_indices();
     ManifestFiller(manifest, data).fill(refs);
     text = write_manifest(manifest);
     if (text.size() <= slot) break;

@@ -115,7 +115,7 @@ SystemFigures figures_of(const MethodArguments& args, const System& system) {
   PlanPictures pictures(package, against, args.views, context_of(args.jobs));
   SystemFigures out;
   out.name = system.name;
-  for (const EntryRef& e : package.index()) out.package_bytes += e.bytes;
+  for (const EntryRef& e : package.entries()) out.package_bytes += e.bytes;
   for (const ManifestScale& s : package.manifest().scales) out.scales.push_back(s.scale);
   out.steps = step_function(package.manifest().scales, system.printed ? StepRule::kJnd : StepRule::kFlip);
   for (const int px : args.displays_px)

@@ -37,7 +37,7 @@ double log_between(SplitMix& random, double low, double high) {
 
 double all_bytes(PackageReader& package) {
   double all = kLeastDrawnBytes;
-  for (const EntryRef& e : package.index()) all += static_cast<double>(e.bytes);
+  for (const EntryRef& e : package.entries()) all += static_cast<double>(e.bytes);
   return std::min(all, kMostDrawnBytes);
 }
 

@@ -70,15 +70,16 @@ Results<PackageTables, ThesisTables> measure_fragments(const Fragments& fragment
 Results<Bytes> package_all(const NestedScales& scales, const PerceptualValues& perceptual,
                            const Images& images, const Fragments& fragments, const Ladder& ladder,
                            const Previews& previews, const PackageTables& tables, const ThesisTables& thesis,
-                           const ScaleFiles& files, const MeasuredQuality& quality, const Poster& poster,
-                           const Proxies& proxies, const About& source, const std::string& provenance,
-                           const PackageOptions& options, double jnd, UpAxis up, const RunContext& context) {
+                           const ScaleFiles& files, const GltfScales& gltf, const MeasuredQuality& quality,
+                           const Poster& poster, const Proxies& proxies, const About& source,
+                           const std::string& provenance, const PackageOptions& options, double jnd,
+                           UpAxis up, const RunContext& context) {
   Notes notes;
   PackageOptions placed = options;
   placed.annotations = placed_annotations(options.annotations, source, up, scales.mesh.origin,
                                           to_double(bounding_box(scales.mesh.positions)), notes);
   return {assemble_package(scales, perceptual, images, fragments, ladder, previews, tables, thesis, files,
-                           quality, poster, proxies, source, jnd, provenance, placed, context),
+                           gltf, quality, poster, proxies, source, jnd, provenance, placed, context),
           std::move(notes)};
 }
 
@@ -144,11 +145,29 @@ std::vector<Stage> with_atlas(std::vector<Stage> table, const CompileOptions& o)
   return table;
 }
 
+Stage scales_stage(const CompileOptions& o) {
+  const Shown shown = shown_with(o);
+  return stage({"scales", kScalesVersion, "kept scales -> GLB files, vertex splits", .03},
+               inputs(kNestedScales, kPerceptualValues, shown.materials, shown.images, kFragments, kPreviews),
+               outputs(kScaleFiles), read_of(o, o.scales),
+               {"draco", "libjpeg-turbo", "meshoptimizer", "zlib"}, write_scales);
+}
+
+Stage gltf_scales_stage(const CompileOptions& o) {
+  const Shown shown = shown_with(o);
+  return stage(
+      {"gltf_scales", kGltfScalesVersion, "scales of the step function -> GLBs for viewers of glTF", .02},
+      inputs(kNestedScales, kPerceptualValues, shown.materials, shown.images, kFragments, kFilledPlanes,
+             kPreviews, kTables, kScaleFiles, kQuality),
+      outputs(kGltfScales), read_of(o, o.scales), {"draco", "libjpeg-turbo", "meshoptimizer", "zlib"},
+      write_gltf_scales);
+}
+
 Stage package_stage(const CompileOptions& o) {
   return stage(
       {"package", kPackageVersion, "everything -> the container", .01},
       inputs(kNestedScales, kPerceptualValues, shown_with(o).images, kFragments, kLadder, kPreviews, kTables,
-             kThesisTables, kScaleFiles, kQuality, kPoster, kProxies, kSourceAbout, kProvenance),
+             kThesisTables, kScaleFiles, kGltfScales, kQuality, kPoster, kProxies, kSourceAbout, kProvenance),
       outputs(kPackage), read_of(o, o.package, o.perceptual_values.jnd, o.import.up), {}, package_all);
 }
 
@@ -196,14 +215,12 @@ std::vector<Stage> stage_table(const CompileOptions& o) {
             inputs(kFragments, kFilledPlanes, kPredictors, kLadder, kPreviews),
             outputs(kTables, kThesisTables), read_of(o, o.lut), {"libjpeg-turbo", "libwebp"},
             measure_fragments),
-      stage({"scales", kScalesVersion, "kept scales -> GLB files, vertex splits", .03},
-            inputs(kNestedScales, kPerceptualValues, shown.materials, shown.images, kFragments, kPreviews),
-            outputs(kScaleFiles), read_of(o, o.scales), {"draco", "libjpeg-turbo", "meshoptimizer", "zlib"},
-            write_scales),
-      stage({"quality", kQualityVersion, "scales, rungs -> losses of lit pictures, switch sizes", .54},
+      scales_stage(o),
+      stage({"quality", kQualityVersion, "scales, rungs -> losses of lit pictures, switch sizes", .52},
             inputs(kNestedScales, kPerceptualValues, shown.materials, shown.images, kFragments, kFilledPlanes,
                    kLadder, kPreviews, kTables),
             outputs(kQuality), read_of(o, o.quality), kImageLibraries, measure_quality),
+      gltf_scales_stage(o),
       stage({"poster", kPosterVersion, "S_0 with the source's texels -> a picture of the object", .02},
             inputs(kNestedScales, shown.materials, kFragments, kFilledPlanes), outputs(kPoster),
             read_of(o, o.poster), {"libjpeg-turbo"}, make_poster),

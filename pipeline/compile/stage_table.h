@@ -46,6 +46,7 @@ inline constexpr Artefact<PackageTables> kTables{"lut.tables"};
 inline constexpr Artefact<ThesisTables> kThesisTables{"lut.thesis"};
 inline constexpr Artefact<ScaleFiles> kScaleFiles{"scales"};
 inline constexpr Artefact<MeasuredQuality> kQuality{"quality"};
+inline constexpr Artefact<GltfScales> kGltfScales{"gltf_scales"};
 inline constexpr Artefact<Poster> kPoster{"poster"};
 inline constexpr Artefact<Proxies> kProxies{"proxies"};
 inline constexpr Artefact<Bytes> kPackage{"package"};

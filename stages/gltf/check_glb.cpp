@@ -314,12 +314,14 @@ void check_texture_infos(GlbDocument& d, const Json& object, std::size_t texture
   }
 }
 
-/// The path of a preview from the folder of the meshes.
-bool is_preview_uri(const Json& uri) {
+/// The path of a preview from the folder of the meshes, or that of an image beside a GLB for viewers.
+bool is_package_uri(const Json& uri, const std::string& entry) {
   constexpr std::string_view kUp = "../";
-  if (!uri.is_string() || !uri.get_ref<const std::string&>().starts_with(kUp)) return false;
-  const EntryName name = parse_entry_path(uri.get_ref<const std::string&>().substr(kUp.size()));
-  return name.kind == EntryKind::kPreview;
+  if (!uri.is_string()) return false;
+  const std::string& text = uri.get_ref<const std::string&>();
+  if (text.starts_with(kUp)) return parse_entry_path(text.substr(kUp.size())).kind == EntryKind::kPreview;
+  return parse_entry_path(entry).kind == EntryKind::kGltfScale &&
+         parse_entry_path("gltf/" + text).kind == EntryKind::kGltfImage;
 }
 
 /// Decodes image `i` and adds its name to `facts`.
@@ -330,8 +332,8 @@ void check_glb_image(GlbDocument& d, std::size_t i, GlbFacts& facts) {
   facts.image_uris.emplace_back();
   facts.image_digests.emplace_back();
   if (!d.standalone() && json.contains("uri")) {
-    const bool preview = is_preview_uri(json["uri"]) && !json.contains("bufferView");
-    if (!preview || json.value("mimeType", std::string()) != "image/jpeg")
+    const bool named = is_package_uri(json["uri"], d.entry()) && !json.contains("bufferView");
+    if (!named || json.value("mimeType", std::string()) != "image/jpeg")
       d.fail({"glb-image", "G06"}, place + "/uri", "a preview as image/jpeg, ../preview/PPP.jpg",
              json["uri"].dump().substr(0, 80));
     facts.image_uris.back() = json["uri"].get<std::string>();

@@ -273,17 +273,18 @@ std::vector<std::uint8_t> assemble_package(const NestedScales& scales, const Per
                                            const std::vector<Image>& images, const Fragments& fragments,
                                            const Ladder& ladder, const Previews& previews,
                                            const PackageTables& tables, const ThesisTables& thesis,
-                                           const ScaleFiles& files, const MeasuredQuality& quality,
-                                           const Poster& poster, const Proxies& proxies, const About& source,
-                                           double jnd, const std::string& provenance_json,
-                                           const PackageOptions& options, const RunContext& context) {
+                                           const ScaleFiles& files, const GltfScales& gltf,
+                                           const MeasuredQuality& quality, const Poster& poster,
+                                           const Proxies& proxies, const About& source, double jnd,
+                                           const std::string& provenance_json, const PackageOptions& options,
+                                           const RunContext& context) {
   check_inputs(scales, perceptual, images, fragments, ladder, previews, tables, files);
   const About about = describe_object(source, options);
   Manifest manifest = describe_model(scales, perceptual, files, fragments, quality, jnd, about.title);
   manifest.required_features = required_features(ladder);
   std::vector<TextureInfo> textures;
   std::vector<PackageEntry> entries;
-  manifest.minor = std::max(needed_minor(tables), options.annotations.empty() ? 0 : 1);
+  manifest.minor = std::max(needed_minor(tables), options.annotations.empty() && gltf.files.empty() ? 0 : 1);
   entries.push_back(
       {kTablesPath, write_tables(select_scales(tables, stored_rows(manifest, tables)), manifest.minor)});
   entries.push_back(
@@ -298,6 +299,10 @@ std::vector<std::uint8_t> assemble_package(const NestedScales& scales, const Per
   for (const ScaleFile& file : files.files)
     if (!file.glb.empty())
       entries.push_back({mesh_path(file.scale), with_copyright(file.glb, copyright_line(source))});
+  for (const GltfScales::File& file : gltf.files)
+    entries.push_back({file.path, parse_entry_path(file.path).kind == EntryKind::kGltfScale
+                                      ? with_copyright(file.bytes, copyright_line(source))
+                                      : file.bytes});
   if (!poster.file.empty()) {
     manifest.poster = PosterRef{{}, poster.width_px, poster.height_px};
     entries.push_back({kPosterPath, poster.file});

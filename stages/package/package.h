@@ -4,6 +4,7 @@
 #include "format/documents/tables.h"
 #include "format/documents/thesis_tables.h"
 #include "stages/data/fragments.h"
+#include "stages/data/gltf_scales.h"
 #include "stages/data/ladder.h"
 #include "stages/data/nested_scales.h"
 #include "stages/data/perceptual_values.h"
@@ -13,7 +14,7 @@
 
 namespace texmesh {
 
-inline constexpr int kPackageVersion = 6;
+inline constexpr int kPackageVersion = 7;
 
 struct PackageOptions {
   std::string title, meta, annotations;
@@ -35,13 +36,11 @@ struct PackageOptions {
 /// they stay as they are when options.meta changes. options.annotations are those of the package, placed.
 /// `provenance_json` is made by the pipeline (options, input digests, stage versions; no dates, hosts or
 /// paths).
-std::vector<std::uint8_t> assemble_package(const NestedScales& scales, const PerceptualValues& perceptual,
-                                           const std::vector<Image>& images, const Fragments& fragments,
-                                           const Ladder& ladder, const Previews& previews,
-                                           const PackageTables& tables, const ThesisTables& thesis,
-                                           const ScaleFiles& files, const MeasuredQuality& quality,
-                                           const Poster& poster, const Proxies& proxies, const About& source,
-                                           double jnd, const std::string& provenance_json,
-                                           const PackageOptions& options, const RunContext& context);
+std::vector<std::uint8_t> assemble_package(
+    const NestedScales& scales, const PerceptualValues& perceptual, const std::vector<Image>& images,
+    const Fragments& fragments, const Ladder& ladder, const Previews& previews, const PackageTables& tables,
+    const ThesisTables& thesis, const ScaleFiles& files, const GltfScales& gltf,
+    const MeasuredQuality& quality, const Poster& poster, const Proxies& proxies, const About& source,
+    double jnd, const std::string& provenance_json, const PackageOptions& options, const RunContext& context);
 
 }  // namespace texmesh

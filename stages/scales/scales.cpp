@@ -1,23 +1,25 @@
 #include "format/container/layout.h"
+#include "format/rules/viewing.h"
+#include "format/rules/whole_textures.h"
 #include "stages/base/parallel.h"
+#include "stages/geometry/mesh_topology.h"
 #include "stages/image/png_writer.h"
 #include "stages/jpeg/jpeg.h"
+#include "stages/jpeg/jpeg_coder.h"
 #include "stages/scales/vertex_split.h"
 
 namespace texmesh {
 namespace {
 
-/// One preview image of a GLB, made once for all scales.
-struct PreviewImage {
+/// One image of a GLB, made once for all scales.
+struct GlbImage {
   std::uint32_t image = 0;  // source image: named "texture/<image>"
   std::uint32_t plane = 0;  // whose preview it is, preview/PPP.jpg; a PNG is no entry
   const char* mime_type = "";
   std::vector<std::uint8_t> bytes;
+  std::string uri;  // "" = embedded
 };
-
-/// kEmbedded: within the file. kRelative: previews by their place in the package's tree, ../preview/PPP.jpg;
-/// what is no entry of the package is embedded.
-enum class PreviewForm : std::uint8_t { kEmbedded, kRelative };
+using GlbImages = std::vector<GlbImage>;
 
 using Json = GlbWriter::Json;
 constexpr std::uint64_t kMaxPreviewPixels = 1u << 24;
@@ -42,14 +44,13 @@ float unit(float x) { return std::clamp(x, 0.0f, 1.0f); }
 /// Hands out texture and sampler indices, equal ones once.
 class TextureTable {
  public:
-  TextureTable(GlbWriter& writer, const std::vector<PreviewImage>& previews, PreviewForm form,
-               std::array<bool, 2> has_uv)
+  TextureTable(GlbWriter& writer, const GlbImages& images, std::array<bool, 2> has_uv)
       : writer_(writer), has_uv_(has_uv) {
-    for (const PreviewImage& p : previews) {
+    for (const GlbImage& p : images) {
       image_of_[p.image] = writer_.array("images").size();
       Json image{{"name", "texture/" + std::to_string(p.image)}, {"mimeType", p.mime_type}};
-      if (form == PreviewForm::kRelative && p.mime_type == std::string_view("image/jpeg"))
-        image["uri"] = "../" + preview_path(p.plane);
+      if (!p.uri.empty())
+        image["uri"] = p.uri;
       else
         image["bufferView"] = writer_.add_view(p.bytes);
       writer_.array("images").push_back(std::move(image));
@@ -164,12 +165,12 @@ Json material_json(const Material& m, TextureTable& textures, GlbWriter& writer)
 
 /// Per source image that has planes: the colour plane's preview, or a PNG with alpha where an alpha plane
 /// stands beside it.
-std::vector<PreviewImage> preview_images(const Fragments& fragments, const Previews& previews) {
-  std::vector<PreviewImage> out;
+GlbImages preview_images(const Fragments& fragments, const Previews& previews) {
+  GlbImages out;
   for (std::size_t i = 0; i < fragments.planes.size(); ++i) {
     const TexturePlane& plane = fragments.planes[i];
     if (plane.role == TextureRole::kAlpha || plane.mip > 0) continue;
-    PreviewImage image{plane.image, static_cast<std::uint32_t>(i), "image/jpeg", previews.planes.at(i).file};
+    GlbImage image{plane.image, static_cast<std::uint32_t>(i), "image/jpeg", previews.planes.at(i).file, {}};
     for (std::size_t j = 0; j < fragments.planes.size(); ++j) {
       if (fragments.planes[j].image != plane.image || fragments.planes[j].role != TextureRole::kAlpha ||
           fragments.planes[j].mip > 0)
@@ -183,12 +184,18 @@ std::vector<PreviewImage> preview_images(const Fragments& fragments, const Previ
   return out;
 }
 
+/// Previews by their place in the package's tree; what is no entry of the package stays within the file.
+GlbImages named_previews(GlbImages images) {
+  for (GlbImage& i : images)
+    if (i.mime_type == std::string_view("image/jpeg")) i.uri = "../" + preview_path(i.plane);
+  return images;
+}
+
 /// Materials, textures, samplers and images of the document. Textures whose texture coordinates or previews
 /// do not exist are left out. Factors are clipped to the ranges of glTF.
-void write_materials(GlbWriter& writer, const std::vector<Material>& materials,
-                     const std::vector<PreviewImage>& previews, PreviewForm form, bool has_uv0,
-                     bool has_uv1) {
-  TextureTable textures(writer, previews, form, {has_uv0, has_uv1});
+void write_materials(GlbWriter& writer, const std::vector<Material>& materials, const GlbImages& images,
+                     bool has_uv0, bool has_uv1) {
+  TextureTable textures(writer, images, {has_uv0, has_uv1});
   for (const Material& m : materials) writer.array("materials").push_back(material_json(m, textures, writer));
 }
 
@@ -342,8 +349,7 @@ Json node_json(const ScaleCoding& coding, std::uint16_t part) {
 }
 
 ScaleFile write_scale(const ScaleCoding& coding, const NestedScale& scale,
-                      const std::vector<Material>& materials, const std::vector<PreviewImage>& previews,
-                      PreviewForm form) {
+                      const std::vector<Material>& materials, const GlbImages& images) {
   ScaleFile file;
   file.scale = scale.scale;
   GlbWriter writer;
@@ -378,7 +384,7 @@ ScaleFile write_scale(const ScaleCoding& coding, const NestedScale& scale,
   if (file.triangles == 0)
     throw StageError("scales", "scale " + std::to_string(scale.scale), "a triangle with area on the grid",
                      std::to_string(coding.position.bits) + " bits per coordinate collapse all");
-  write_materials(writer, materials, previews, form, coding.write_uv[0], coding.write_uv[1]);
+  write_materials(writer, materials, images, coding.write_uv[0], coding.write_uv[1]);
   file.glb = writer.finish();
   return file;
 }
@@ -471,6 +477,86 @@ void note_grid(const ScaleCoding& coding, std::size_t triangles, std::size_t wri
                        " bits per coordinate, show nothing and were left out"});
 }
 
+/// As the manifest's will be.
+std::vector<ManifestStep> steps_of(const MeasuredQuality& quality) {
+  std::vector<ManifestScale> scales(quality.table.scales.size());
+  for (std::size_t k = 0; k < scales.size(); ++k) {
+    scales[k].scale = quality.table.scales[k];
+    scales[k].display_px_flip = static_cast<double>(quality.display_px_flip.at(k));
+  }
+  return step_function(scales, StepRule::kFlip);
+}
+
+/// A scale of the stream that has a GLB beside it.
+struct GlbBeside {
+  const NestedScale* scale = nullptr;
+  double up_to_px = 0;  // 0: it has no step
+  GlbImages images;
+  std::uint32_t texture_px = 0;  // longest side of what it shows
+};
+
+std::vector<GlbBeside> scales_beside(const NestedScales& scales, const ScaleFiles& files,
+                                     const std::vector<ManifestStep>& steps, ScaleGlbs which) {
+  std::vector<GlbBeside> wanted;
+  if (which == ScaleGlbs::kEnds || files.stream.empty()) return wanted;
+  for (const ScaleFile& file : files.files) {
+    const auto step = std::ranges::find(steps, file.scale, &ManifestStep::scale);
+    if (!file.glb.empty() || (which == ScaleGlbs::kSteps && step == steps.end())) continue;
+    wanted.push_back({&*std::ranges::find(scales.scales, file.scale, &NestedScale::scale),
+                      step == steps.end() ? 0 : step->up_to_px,
+                      {},
+                      0});
+  }
+  return wanted;
+}
+
+void choose_textures(const TexturedObject& object, const Fragments& fragments, GlbBeside& glb,
+                     std::map<std::string, WholeTexture>& pictures) {
+  for (const WholeTexture& t : least_textures(object, glb.scale->scale, glb.up_to_px, kGltfFlip)) {
+    if (t.rung == WholeTexture::kPreview) continue;
+    const std::string path = gltf_image_path(t.plane, t.rung);
+    std::ranges::find(glb.images, t.base, &GlbImage::plane)->uri = path.substr(path.rfind('/') + 1);
+    pictures[path] = t;
+    const TexturePlane& plane = fragments.planes[t.plane];
+    glb.texture_px = std::max({glb.texture_px, plane.width_px, plane.height_px});
+  }
+}
+
+/// Octahedral; at up to 1,024 px. Beside other losses 9 bits of normals are not seen.
+constexpr int kNormalBitsBeside = 9;
+
+/// Grids as fine as a fourth of a pixel and of a texel: the file serves up to its switch size.
+void coarsen_grids(ScaleCoding& coding, const GlbBeside& glb) {
+  static constexpr int kLeastBits = 8;
+  const auto at_most = [](QuantisationGrid& grid, double cells) {
+    const int bits = std::max(kLeastBits, static_cast<int>(std::ceil(std::log2(std::max(cells, 1.0)))));
+    if (grid.bits > 0) grid.bits = std::min(grid.bits, bits);
+  };
+  at_most(coding.position, 4 * glb.up_to_px);
+  if (coding.options.mesh_codec == MeshCodec::kDraco)
+    for (QuantisationGrid& uv : coding.uv) at_most(uv, 4.0 * glb.texture_px * static_cast<double>(uv.range));
+}
+
+/// What rules of format/rules read of the planes.
+std::vector<TextureInfo> describe_planes(const Fragments& fragments) {
+  std::vector<TextureInfo> out(fragments.planes.size());
+  for (std::size_t p = 0; p < out.size(); ++p) {
+    const TexturePlane& plane = fragments.planes[p];
+    out[p].image = plane.image, out[p].mip = plane.mip, out[p].base = plane.base;
+    out[p].role = enum_name(plane.role);
+  }
+  return out;
+}
+
+Bytes whole_plane(const TexturePlane& plane, const Pixels& pixels, int quality) {
+  JpegKind kind;
+  kind.channels = pixels.channels;
+  kind.rgb = !is_colour(plane.role) && pixels.channels == 3;
+  kind.file = FileSteps{static_cast<double>(quality), false, false};
+  return JpegCoder(kind).complete({pixels.data.data(), std::size_t{pixels.width_px} * pixels.channels,
+                                   pixels.width_px, pixels.height_px});
+}
+
 }  // namespace
 
 bool ScaleCoding::writes_tangents(const ScalePrimitive& primitive) const {
@@ -484,7 +570,7 @@ ScaleFiles write_scales(const NestedScales& scales, const PerceptualValues& perc
                         const Fragments& fragments, const Previews& previews, const ScalesOptions& options,
                         const RunContext& context) {
   const ScaleCoding coding = make_coding(scales.mesh, materials, images, options);
-  const std::vector<PreviewImage> preview_files = preview_images(fragments, previews);
+  const GlbImages embedded = preview_images(fragments, previews), named = named_previews(embedded);
   std::vector<std::size_t> kept;
   for (std::size_t k = 0; k < scales.scales.size(); ++k)
     if (k == 0 || (k < perceptual.kept.size() && perceptual.kept[k])) kept.push_back(k);
@@ -497,8 +583,8 @@ ScaleFiles write_scales(const NestedScales& scales, const PerceptualValues& perc
   const auto write_file = [&](std::size_t i) {
     ScaleCoding lit = coding;
     lit.frames = scale_frames(scales, kept[i], context);
-    const PreviewForm form = i + 1 == kept.size() ? PreviewForm::kEmbedded : PreviewForm::kRelative;
-    result.files[i] = write_scale(lit, scales.scales[kept[i]], materials, preview_files, form);
+    result.files[i] =
+        write_scale(lit, scales.scales[kept[i]], materials, i + 1 == kept.size() ? embedded : named);
   };
   const std::size_t tasks = 1 + (options.stream ? std::min<std::size_t>(kept.size(), 2) : kept.size());
   std::atomic<std::size_t> made = 0;
@@ -529,6 +615,56 @@ ScaleFiles write_scales(const NestedScales& scales, const PerceptualValues& perc
   return result;
 }
 
+GltfScales write_gltf_scales(const NestedScales& scales, const PerceptualValues& perceptual,
+                             const std::vector<Material>& materials, const std::vector<Image>& images,
+                             const Fragments& fragments, const std::vector<Pixels>& filled,
+                             const Previews& previews, const PackageTables& tables, const ScaleFiles& files,
+                             const MeasuredQuality& quality, const ScalesOptions& options,
+                             const RunContext& context) {
+  std::vector<GlbBeside> wanted = scales_beside(scales, files, steps_of(quality), options.glb);
+  if (wanted.empty()) return {};
+  const ScaleCoding coding = make_coding(scales.mesh, materials, images, options);
+  const std::vector<TextureInfo> textures = describe_planes(fragments);
+  const TexturedObject object{quality.table, textures, tables.planes,
+                              surface_area(scales.mesh, scales.scales.front().triangles),
+                              static_cast<double>(perceptual.object_height)};
+  const GlbImages shown = named_previews(preview_images(fragments, previews));
+  std::map<std::string, WholeTexture> pictures;
+  for (GlbBeside& glb : wanted) {
+    glb.images = shown;
+    for (const PlanePreview& p : previews.planes)
+      glb.texture_px = std::max({glb.texture_px, p.width_px, p.height_px});
+    if (glb.up_to_px > 0 && !textures.empty()) choose_textures(object, fragments, glb, pictures);
+  }
+  GltfScales out;
+  for (const auto& [path, unused] : pictures) out.files.push_back({path, {}});
+  for (const GlbBeside& glb : wanted) out.files.push_back({gltf_scale_path(glb.scale->scale), {}});
+  parallel_each(context, out.files.size(), 1, [&](std::size_t k) {
+    GltfScales::File& file = out.files[k];
+    if (k < pictures.size()) {
+      const WholeTexture& t = pictures.at(file.path);
+      file.bytes = whole_plane(fragments.planes[t.plane], filled.at(t.plane),
+                               tables.planes[t.plane].rung_quality[t.rung]);
+      return;
+    }
+    const GlbBeside& glb = wanted[k - pictures.size()];
+    ScalesOptions enough = options;
+    if (glb.up_to_px > 0) enough.normal_bits = std::min(options.normal_bits, kNormalBitsBeside);
+    ScaleCoding lit{coding.mesh,
+                    enough,
+                    coding.position,
+                    {coding.uv[0], coding.uv[1]},
+                    {coding.write_uv[0], coding.write_uv[1]},
+                    coding.fine_colours,
+                    coding.tangents,
+                    {}};
+    if (glb.up_to_px > 0) coarsen_grids(lit, glb);
+    lit.frames = scale_frames(scales, static_cast<std::size_t>(glb.scale - scales.scales.data()), context);
+    file.bytes = write_scale(lit, *glb.scale, materials, glb.images).glb;
+  });
+  return out;
+}
+
 std::vector<std::uint8_t> write_streamed_scale(const Mesh& mesh, const SplitStreamHead& head,
                                                const ScalesOptions& options) {
   const auto grid = [](const SplitGrid& g) {
@@ -555,9 +691,7 @@ std::vector<std::uint8_t> write_streamed_scale(const Mesh& mesh, const SplitStre
   NestedScale scale;
   scale.triangles = mesh.triangles;
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) scale.triangle_source.push_back(t);
-  return write_scale(coding, scale, std::vector<Material>(materials + std::size_t{1}), {},
-                     PreviewForm::kEmbedded)
-      .glb;
+  return write_scale(coding, scale, std::vector<Material>(materials + std::size_t{1}), {}).glb;
 }
 
 }  // namespace texmesh

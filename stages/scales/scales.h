@@ -1,19 +1,30 @@
 #pragma once
+#include "format/documents/tables.h"
 #include "format/split/split_stream.h"
 #include "stages/data/fragments.h"
+#include "stages/data/gltf_scales.h"
 #include "stages/data/nested_scales.h"
 #include "stages/data/perceptual_values.h"
+#include "stages/data/pixels.h"
 #include "stages/data/previews.h"
 #include "stages/data/stage.h"
 
 namespace texmesh {
 
 inline constexpr int kScalesVersion = 10;
+inline constexpr int kGltfScalesVersion = 3;
 
 enum class MeshCodec : std::uint8_t { kDraco, kMeshopt, kQuantized, kNone };
 template <>
 struct EnumNames<MeshCodec> {
   static constexpr std::array<std::string_view, 4> names{"draco", "meshopt", "quantized", "none"};
+};
+
+/// Which scales are GLBs: those of the step function, both ends, or all that are kept. The ends always are.
+enum class ScaleGlbs : std::uint8_t { kSteps, kEnds, kAll };
+template <>
+struct EnumNames<ScaleGlbs> {
+  static constexpr std::array<std::string_view, 3> names{"steps", "ends", "all"};
 };
 
 struct ScalesOptions {
@@ -31,6 +42,7 @@ struct ScalesOptions {
   int normal_bits = 11;
   int tangent_bits = 8;
   bool stream = true;  // the vertex-split stream beside the files
+  ScaleGlbs glb = ScaleGlbs::kSteps;
   static void fields(auto& s, auto&& v) {
     v("mesh_codec", s.mesh_codec, "how the scales' GLB files store their meshes");
     v("position_bits", s.position_bits, Range{0, 24},
@@ -43,11 +55,14 @@ struct ScalesOptions {
       "fewest bits per position coordinate where they follow from the edge lengths");
     v("least_uv_bits", s.least_uv_bits, Range{1, 24}, ProfileOnly{},
       "fewest bits per texture coordinate where they follow from the textures");
-    v("normal_bits", s.normal_bits, Range{4, 16},
+    v("normal_bits", s.normal_bits, Range{4, 16}, ProfileOnly{},
       "bits per normal component; quantized and meshopt: 8 or 16");
     v("tangent_bits", s.tangent_bits, Range{4, 16}, ProfileOnly{},
       "bits per tangent component; quantized and meshopt: 8 or 16");
-    v("stream", s.stream, "also write all scales as one stream of vertex splits");
+    v("stream", s.stream,
+      "clients refine the mesh by a stream of vertex splits; false: every scale is a GLB instead, and each "
+      "finer one is fetched anew");
+    v("glb", s.glb, "scales that stand in GLBs beside the stream, for viewers of glTF");
   }
 };
 
@@ -79,6 +94,23 @@ ScaleFiles write_scales(const NestedScales& scales, const PerceptualValues& perc
                         const std::vector<Material>& materials, const std::vector<Image>& images,
                         const Fragments& fragments, const Previews& previews, const ScalesOptions& options,
                         const RunContext& context);
+
+/// GLBs of the scales between S_0 and the coarsest that `options.glb` names, for viewers that know glTF and
+/// nothing of packages; none where there is no stream, because all scales are GLBs then.
+/// - Meshes are as write_scales() would have written them, but on grids of a fourth of a pixel at the switch
+///   size and of a fourth of a texel, and with normals of 9 bits at most, where a scale has a step.
+/// - A scale of the step function has textures that hold at its switch size: the least for which the quality
+///   table says a FLIP of kGltfFlip (format/rules/whole_textures.h). Other scales have previews.
+/// - Textures are previews or JPEGs of planes, each once however many GLBs show it: "../preview/PPP.jpg" and
+///   "PPP-rRR.jpg". An image with alpha is embedded, as in other GLBs.
+/// Same bytes for any thread count.
+inline constexpr double kGltfFlip = 0.08;
+GltfScales write_gltf_scales(const NestedScales& scales, const PerceptualValues& perceptual,
+                             const std::vector<Material>& materials, const std::vector<Image>& images,
+                             const Fragments& fragments, const std::vector<Pixels>& filled,
+                             const Previews& previews, const PackageTables& tables, const ScaleFiles& files,
+                             const MeasuredQuality& quality, const ScalesOptions& options,
+                             const RunContext& context);
 
 /// A mesh that lies on the grids of a stream's head (split_model), as the GLB that write_scales() would have
 /// written, with the tangents that the mesh has, but without images and with nameless materials: as many as

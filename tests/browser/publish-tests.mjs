@@ -131,6 +131,31 @@ test('export: levels of detail in three.js', async () => {
   });
 }, {seconds: 90});
 
+for (const [name, least] of [['maps', 2], ['printed', 4]]) {
+  test(`unpack: GLBs of the scales of ${name} open in three.js by their URLs`, async () => {
+    fs.mkdirSync(published, {recursive: true});
+    const package_ = path.join(packages, `${name}.texmesh`), tree = path.join(published, `tree-${name}`);
+    fs.rmSync(tree, {recursive: true, force: true});
+    run(env.texmesh, 'unpack', package_, '-o', tree);
+    const {scales} = JSON.parse(run(env.texmesh, 'dump', package_, 'scales', '--json'));
+    const files = fs.readdirSync(path.join(tree, 'gltf')).filter((f) => f.endsWith('.glb')).map((f) => `gltf/${f}`);
+    const ends = [scales[0], scales.at(-1)].map(({scale}) => `mesh/s${String(scale).padStart(2, '0')}.glb`);
+    check(files.length + ends.length >= least, `${files} beside ${ends}`);
+    await withPage('tiles.html', async (page, base) => {
+      await page.waitForFunction('window.ready');
+      const images = JSON.parse(fs.readFileSync(path.join(tree, 'textures.json'), 'utf8')).textures.filter((t) => !t.mip).length;
+      for (const file of [...files, ...ends]) {
+        const r = await page.evaluate((u) => window.door.glb(u), `${base}/out/tree-${name}/${file}`);
+        const {triangles} = scales.find(({scale}) => scale === Number(/\d+/.exec(file)[0]));
+        check(r.triangles <= triangles && r.triangles > 0.95 * triangles, `${file}: ${r.triangles} triangles, the scale has ${triangles}`);
+        check(r.images === images, `${file}: ${r.images} images of ${images}`);
+        check(r.covered > 10000, `${file}: nothing is drawn`);
+        await shot(page, `tree-${name}-${path.basename(file, '.glb')}`);
+      }
+    });
+  }, {seconds: 90});
+}
+
 test('export: levels of detail in Babylon.js, the coarsest first', async () => {
   const folder = exported('maps', 'gltf-lod');
   const {scales} = JSON.parse(run(env.texmesh, 'dump', path.join(packages, 'maps.texmesh'), 'scales', '--json'));

@@ -8,7 +8,7 @@ import zlib
 
 DOCUMENTS = {"index": "index.bin", "tables": "tables.bin", "textures": "textures.json", "quality": "quality.json",
              "about": "about.json", "provenance": "provenance.json", "thesis": "thesis.bin", "poster": "poster.jpg",
-             "stream": "mesh/stream.bin", "annotations": "annotations.json"}
+             "stream": "mesh/stream.bin", "annotations": "annotations.json", "gltf": "gltf/index.bin"}
 CREDENTIAL = "META-INF/content_credential.c2pa"
 
 
@@ -111,9 +111,9 @@ class Parts:
     def store(self, path, document):
         self.entries[path] = dump(document)
 
-    def write_index(self, places):
+    def write_index(self, places, own="index.bin"):
         records = [[places[p], len(d), hashlib.sha256(d).digest(), p] for p, d in self.entries.items()
-                   if p not in ("manifest.json", "index.bin", CREDENTIAL)]
+                   if p not in ("manifest.json", own, CREDENTIAL) and p.startswith("gltf/") == own.startswith("gltf/")]
         pages = {0xFFFFFFFF: []}
         records = self.edit_index(records)
         for plane in sorted({plane_of(r[3]) for r in records} - {0xFFFFFFFF}):
@@ -189,7 +189,8 @@ class Parts:
                 for path, data in self.entries.items():
                     places[path] = layout.place(path)
                     layout.add(path, data)
-                self.entries["index.bin"] = self.write_index(places)
+                for own in {"index.bin", "gltf/index.bin"} & set(self.entries):
+                    self.entries[own] = self.write_index(places, own)
             self.refer(places)
             manifest = copy.deepcopy(self.manifest)
             self.edit_manifest(manifest)

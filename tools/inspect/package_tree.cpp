@@ -145,7 +145,7 @@ class NewTree {
 /// Everything behind the manifest that belongs into the container, in order: what the index names, and
 /// itself.
 std::vector<EntryRef> container_order(PackageReader& package) {
-  std::vector<EntryRef> entries = package.index();
+  std::vector<EntryRef> entries = package.entries();
   entries.push_back(package.manifest().index);
   std::sort(entries.begin(), entries.end(),
             [](const EntryRef& a, const EntryRef& b) { return a.offset < b.offset; });
@@ -215,7 +215,7 @@ class TreeFiles {
 
   void check_names() {
     std::set<std::string> named{kManifestPath, kIndexPath, kFragmentIndexPath, kContentCredentialPath};
-    for (const EntryRef& e : package_.index()) named.insert(e.path);
+    for (const EntryRef& e : package_.entries()) named.insert(e.path);
     for (const auto& [path, bytes] : sizes_)
       if (!named.count(path) && parse_entry_path(path).kind != EntryKind::kFragmentFile)
         throw FormatError(path, "", "a file that the package's index names", "another");

@@ -108,6 +108,16 @@ const std::vector<EntryRef>& PackageReader::index() {
   return *index_;
 }
 
+std::vector<EntryRef> PackageReader::entries() {
+  std::vector<EntryRef> all = index();
+  if (!manifest_.gltf) return all;
+  const std::vector<EntryRef> gltf = read_gltf_index(entry(*manifest_.gltf));
+  all.push_back(*manifest_.gltf);
+  all.insert(all.end(), gltf.begin(), gltf.end());
+  std::ranges::sort(all, {}, &EntryRef::offset);
+  return all;
+}
+
 const EntryRef& PackageReader::find(const std::string& path) {
   const auto it = std::ranges::find(index(), path, &EntryRef::path);
   if (it == index_->end()) refuse("R07", "entry " + path, "an entry of the index", "none");

@@ -55,8 +55,10 @@ class PackageReader {
   /// Package id: SHA-256 of the bytes of manifest.json.
   const Sha256& id() const { return id_; }
 
-  /// Every entry but manifest.json and index.bin, in container order.
+  /// Every entry that clients read, but manifest.json and index.bin, in container order.
   const std::vector<EntryRef>& index();
+  /// The same with the files for viewers of glTF, whose index is read anew.
+  std::vector<EntryRef> entries();
   const EntryRef& find(const std::string& path);  // FormatError when the index has no such entry
   const std::vector<TextureInfo>& textures();     // refs resolved
   const PackageTables& tables();                  // one element per texture plane, consistent with textures()

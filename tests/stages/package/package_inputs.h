@@ -33,6 +33,7 @@ struct Inputs {
   PackageTables tables;
   ThesisTables thesis;
   ScaleFiles files;
+  GltfScales gltf;
   MeasuredQuality quality;
   PackageOptions options;
 
@@ -108,7 +109,8 @@ struct Inputs {
 
   Bytes assemble() const {
     return assemble_package(scales, perceptual, images, fragments, ladder, previews, tables, thesis, files,
-                            quality, poster, proxies, about, 0.1, "{\"texmesh\":\"test\"}", options, {});
+                            gltf, quality, poster, proxies, about, 0.1, "{\"texmesh\":\"test\"}", options,
+                            {});
   }
 };
 

@@ -49,6 +49,30 @@ TEST(Package, EveryReferenceLeadsToItsBytes) {
   }
 }
 
+TEST(Package, FilesForViewersOfGltfStandLastInAnIndexOfTheirOwn) {
+  Inputs inputs(2);
+  const Bytes without = inputs.assemble();
+  inputs.gltf.files = {{gltf_image_path(1, 0), fake_jpeg(700, 'x')},
+                       {gltf_scale_path(4), glb_container(R"({"asset":{}})", {})}};
+  const Bytes package = inputs.assemble();
+  const Manifest before = manifest_of(without), m = manifest_of(package);
+  EXPECT_EQ(std::pair(before.minor, m.minor), std::pair(0, 1));
+  EXPECT_FALSE(before.gltf);
+  ASSERT_TRUE(m.gltf);
+  EXPECT_EQ(m.index.bytes, before.index.bytes);
+  std::vector<std::string> last;
+  for (const auto& e : read_container(*memory_source(package)))
+    if (e.offset > m.provenance.offset) last.push_back(e.path);
+  EXPECT_EQ(last, (std::vector<std::string>{"gltf/001-r00.jpg", "gltf/index.bin", "gltf/s04.glb"}));
+  const std::vector<EntryRef> files = read_gltf_index(part(package, *m.gltf));
+  ASSERT_EQ(files.size(), 2u);
+  for (std::size_t k = 0; k < files.size(); ++k) {
+    EXPECT_EQ(files[k].path, inputs.gltf.files[k].path);
+    EXPECT_EQ(part(package, files[k]), inputs.gltf.files[k].bytes);
+    EXPECT_EQ(sha256(part(package, files[k])), files[k].digest);
+  }
+}
+
 TEST(Package, OrderIsStreamingOrder) {
   std::vector<std::string> paths;
   for (const auto& e : read_container(*memory_source(Inputs(2).assemble()))) paths.push_back(e.path);

@@ -78,6 +78,9 @@ struct Case {
     context.threads = threads;
     return write_scales(scales, perceptual, materials, images, fragments, previews, options, context);
   }
+  ScaleFiles write_streamed() const {
+    return write_scales(scales, perceptual, materials, images, fragments, previews, {}, kOneThread);
+  }
 };
 
 struct Glb {

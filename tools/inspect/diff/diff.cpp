@@ -80,17 +80,19 @@ std::vector<Difference> differences_of(const std::array<Provenance, 2>& p,
 std::string maker(const std::string& path) {
   using Kind = EntryKind;
   static const std::map<Kind, std::string> makers{
-      {Kind::kMesh, "scales"},     {Kind::kSplitStream, "scales"}, {Kind::kProxy, "proxies"},
-      {Kind::kPoster, "poster"},   {Kind::kTables, "lut"},         {Kind::kThesis, "lut"},
-      {Kind::kQuality, "quality"}, {Kind::kPreview, "previews"},   {Kind::kTableStreams, "ladder"},
-      {Kind::kRung, "ladder"},     {Kind::kTextures, "ladder"},    {Kind::kProvenance, ""}};
+      {Kind::kMesh, "scales"},           {Kind::kSplitStream, "scales"},   {Kind::kProxy, "proxies"},
+      {Kind::kPoster, "poster"},         {Kind::kTables, "lut"},           {Kind::kThesis, "lut"},
+      {Kind::kQuality, "quality"},       {Kind::kPreview, "previews"},     {Kind::kTableStreams, "ladder"},
+      {Kind::kRung, "ladder"},           {Kind::kTextures, "ladder"},      {Kind::kProvenance, ""},
+      {Kind::kGltfScale, "gltf_scales"}, {Kind::kGltfImage, "gltf_scales"}};
   const auto found = makers.find(parse_entry_path(path).kind);
   return found == makers.end() ? "package" : found->second;
 }
 
 void compare_entries(PackageReader& a, PackageReader& b, PackageDiff& diff) {
+  const std::vector<EntryRef> of_a = a.entries(), of_b = b.entries();
   std::map<std::string, const EntryRef*> others;
-  for (const EntryRef& e : b.index()) {
+  for (const EntryRef& e : of_b) {
     others.emplace(e.path, &e);
     diff.bytes[1] += e.bytes;
   }
@@ -99,7 +101,7 @@ void compare_entries(PackageReader& a, PackageReader& b, PackageDiff& diff) {
                             "package",
                             {true, true},
                             {a.store().read_manifest().size(), b.store().read_manifest().size()}});
-  for (const EntryRef& e : a.index()) {
+  for (const EntryRef& e : of_a) {
     diff.bytes[0] += e.bytes;
     const auto it = others.find(e.path);
     const EntryRef* other = it == others.end() ? nullptr : it->second;
@@ -110,7 +112,7 @@ void compare_entries(PackageReader& a, PackageReader& b, PackageDiff& diff) {
       diff.entries.push_back(
           {e.path, maker(e.path), {true, other != nullptr}, {e.bytes, other ? other->bytes : 0}});
   }
-  for (const EntryRef& e : b.index())
+  for (const EntryRef& e : of_b)
     if (others.contains(e.path)) diff.entries.push_back({e.path, maker(e.path), {false, true}, {0, e.bytes}});
 }
 

@@ -52,8 +52,8 @@ struct Kind {
   std::vector<EntryKind> kinds;
 };
 
-const std::array<Kind, 11>& kinds() {
-  static const std::array<Kind, 11> list{
+const std::array<Kind, 12>& kinds() {
+  static const std::array<Kind, 12> list{
       {{"manifest and index", {EntryKind::kManifest, EntryKind::kIndex}},
        {"tables", {EntryKind::kTables, EntryKind::kTextures, EntryKind::kQuality}},
        {"meshes", {EntryKind::kMesh}},
@@ -64,6 +64,7 @@ const std::array<Kind, 11>& kinds() {
        {"textures", {EntryKind::kTableStreams, EntryKind::kRung}},
        {"source images", {EntryKind::kSource}},
        {"the thesis's tables", {EntryKind::kThesis}},
+       {"for viewers of glTF", {EntryKind::kGltfIndex, EntryKind::kGltfScale, EntryKind::kGltfImage}},
        {"about, provenance and others",
         {EntryKind::kAbout, EntryKind::kAnnotations, EntryKind::kProvenance, EntryKind::kOther,
          EntryKind::kContentCredential}}}};
@@ -288,7 +289,7 @@ std::string about_head(const About& about) {
 }
 
 std::vector<KindBytes> kinds_of(PackageReader& p) {
-  return bytes_by_kind(p.manifest(), p.store().read_manifest().size(), p.index());
+  return bytes_by_kind(p.manifest(), p.store().read_manifest().size(), p.entries());
 }
 
 std::uint64_t bytes_of_kinds(const std::vector<KindBytes>& kinds) {
@@ -309,7 +310,7 @@ std::string summary_text(PackageReader& p, DumpGamma) {
   const Provenance provenance = read_provenance(p.entry(m.provenance));
   const std::vector<KindBytes> kinds = kinds_of(p);
   Table bytes = kinds_table(kinds, bytes_of_kinds(kinds));
-  bytes.row({"all", p.index().size() + 2, bytes_of_kinds(kinds), 1.0});
+  bytes.row({"all", p.entries().size() + 2, bytes_of_kinds(kinds), 1.0});
   std::string s = about_head(p.about());
   s += fmt::format("package   {}\nformat    {}.{}, made by {}\n", to_hex(p.id()), m.major, m.minor,
                    printable(provenance.tool));
@@ -350,7 +351,7 @@ Json summary_json(PackageReader& p, DumpGamma) {
             {"version", {{"major", m.major}, {"minor", m.minor}}},
             {"title", m.title},
             {"tool", read_provenance(p.entry(m.provenance)).tool},
-            {"entries", p.index().size() + 2},
+            {"entries", p.entries().size() + 2},
             {"entry_bytes", bytes_of_kinds(kinds)}}},
           {"object",
            {{"origin", numbers(m.origin)},
@@ -473,7 +474,7 @@ Table entries_table(PackageReader& p) {
                    Column::text("path", "path")});
   for (const ContainerEntry& e : p.store().list())
     if (e.path == kManifestPath) table.row({e.offset, e.bytes, to_hex(p.id()), e.path});
-  std::vector<EntryRef> entries = p.index();
+  std::vector<EntryRef> entries = p.entries();
   const EntryRef& index = p.manifest().index;
   entries.insert(std::ranges::upper_bound(entries, index.offset, {}, &EntryRef::offset), index);
   for (const EntryRef& e : entries) table.row({e.offset, e.bytes, to_hex(e.digest), e.path});

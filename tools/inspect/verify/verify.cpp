@@ -418,6 +418,8 @@ class EntryVerifier {
       const Manifest& m = package_.manifest;
       findings_.require((name.kind == EntryKind::kThesis ? m.thesis : m.annotations).has_value(),
                         {"entry-set", "E03"}, e.path, "", "to be named by the manifest", "not there");
+    } else if (name.kind != EntryKind::kOther && is_gltf_file(e.path)) {
+      guarded(findings_, {"gltf", "H04"}, e.path, [&] { check_gltf_entry(e, name.kind); });
     } else if (name.kind == EntryKind::kSource) {
       guarded(findings_, {"source", "O02"}, e.path, [&] { check_source_entry(e, name); });
     } else if (name.kind == EntryKind::kOther || name.kind == EntryKind::kFragmentFile) {
@@ -460,6 +462,15 @@ class EntryVerifier {
       check_nested(*scale, positions, *coarser_, coarser_positions_, findings_);
     coarser_ = &*scale;
     coarser_positions_ = std::move(positions);
+  }
+  void check_gltf_entry(const EntryRef& e, EntryKind kind) {
+    if (kind == EntryKind::kGltfIndex) return;  // read already
+    const Bytes bytes = store_.read(e);
+    if (!package_.textures) return;
+    if (kind == EntryKind::kGltfImage) return check_gltf_image(*package_.textures, e.path, bytes, findings_);
+    ++report_.meshes;
+    if (check_gltf_scale(package_.manifest, package_.index, *package_.textures, e, bytes, findings_))
+      check_shared(e.path, bytes, share_, findings_);
   }
   void check_proxy_entry(const EntryRef& e, std::size_t number) {
     const Bytes bytes = store_.read(e);
@@ -550,6 +561,7 @@ class Verifier {
       findings_.require(store_.listed().empty() || store_.contains(path), {"entry-set", "E01"}, path, "",
                         "an entry of the package", "none");
     if (read_bootstrap() && read_index_entry()) {
+      add_gltf_files();
       store_.check_entry_set(package_.index, package_.manifest.index);
       check_manifest(package_.manifest, findings_);
       check_references(package_.manifest, package_.index, findings_);
@@ -574,6 +586,21 @@ class Verifier {
       check_minor(head.minor, kIndexPath);
       check_head(package_.manifest.index, bytes, head.bytes, "/index");
     });
+  }
+
+  void add_gltf_files() {
+    for (const EntryRef& e : package_.index)
+      findings_.require(!is_gltf_file(e.path), {"index", "H02"}, e.path, "",
+                        std::string("to be named by ") + kGltfIndexPath, "by index.bin");
+    if (!package_.manifest.gltf) return;
+    const EntryRef& gltf = *package_.manifest.gltf;
+    package_.index.push_back(gltf);
+    guarded(findings_, {"index", "H02"}, kGltfIndexPath, [&] {
+      const Bytes bytes = store_.read(gltf);
+      check_minor(read_index_head(bytes).minor, kGltfIndexPath);
+      for (const EntryRef& e : read_gltf_index(bytes)) package_.index.push_back(e);
+    });
+    std::ranges::sort(package_.index, {}, &EntryRef::offset);
   }
 
   void check_minor(int minor, const char* entry) {

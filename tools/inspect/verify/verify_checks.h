@@ -42,6 +42,14 @@ std::vector<Vec3d> check_mesh(const Manifest& manifest, const ManifestScale& sca
                               const std::optional<std::vector<TextureInfo>>& textures,
                               std::span<const std::uint8_t> glb, Findings& findings);
 
+/// Files for viewers of glTF (SPEC.md, section 21): a scale of the stream as a GLB, whose images are among
+/// `index`; a whole plane. True for a GLB that can be read.
+bool check_gltf_scale(const Manifest& manifest, const std::vector<EntryRef>& index,
+                      const std::vector<TextureInfo>& textures, const EntryRef& entry,
+                      std::span<const std::uint8_t> glb, Findings& findings);
+void check_gltf_image(const std::vector<TextureInfo>& textures, const std::string& entry,
+                      std::span<const std::uint8_t> jpeg, Findings& findings);
+
 /// What the GLBs of a package have in common, as JSON texts.
 struct MeshShare {
   std::string materials, names;  // materials, textures and samplers; names of nodes

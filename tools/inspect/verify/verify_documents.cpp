@@ -11,6 +11,7 @@
 #include "pipeline/io/table.h"
 #include "stages/data/ladder.h"
 #include "stages/gltf/check_glb.h"
+#include "stages/jpeg/jpeg.h"
 #include "tools/inspect/provenance.h"
 #include "tools/inspect/verify/verify_checks.h"
 
@@ -371,6 +372,54 @@ std::vector<Vec3d> check_mesh(const Manifest& m, const ManifestScale& scale,
     check_previews_of(m, scale, *textures, facts, findings);
   }
   return std::move(facts.positions);
+}
+
+bool check_gltf_scale(const Manifest& m, const std::vector<EntryRef>& index,
+                      const std::vector<TextureInfo>& textures, const EntryRef& entry,
+                      std::span<const std::uint8_t> glb, Findings& findings) {
+  const auto number = static_cast<int>(parse_entry_path(entry.path).number);
+  const auto scale = std::ranges::find(m.scales, number, &ManifestScale::scale);
+  if (!findings.require(scale != m.scales.end() && !scale->has_glb(), {"gltf", "H03"}, entry.path, "",
+                        "a scale that the stream alone has", "another"))
+    return false;
+  const std::size_t before = findings.list().size();
+  const GlbFacts facts = check_glb(glb, entry.path, findings);
+  findings.name_rule(before, "G01");
+  if (findings.list().size() != before) return false;
+  findings.require(facts.triangles <= scale->triangles, {"gltf", "H03"}, entry.path, "triangles",
+                   "at most " + std::to_string(scale->triangles), std::to_string(facts.triangles));
+  check_bounds(m, facts, entry.path, "G02", findings);
+  ManifestScale named = *scale;
+  named.glb = entry;
+  check_image_names(named, textures, facts, findings);
+  for (std::size_t k = 0; k < facts.image_uris.size(); ++k) {
+    const std::string& uri = facts.image_uris[k];
+    if (uri.empty()) continue;
+    const std::string path = uri.starts_with("../") ? uri.substr(3) : "gltf/" + uri;
+    const std::uint32_t plane = parse_entry_path(path).number;
+    findings.require(std::ranges::find(index, path, &EntryRef::path) != index.end() &&
+                         plane < textures.size() &&
+                         facts.image_names[k] == "texture/" + std::to_string(textures[plane].image),
+                     {"gltf", "H04"}, entry.path, "/images/" + std::to_string(k) + "/uri",
+                     "a picture of " + facts.image_names[k] + " in the package", uri);
+  }
+  return true;
+}
+
+void check_gltf_image(const std::vector<TextureInfo>& textures, const std::string& entry,
+                      std::span<const std::uint8_t> jpeg, Findings& findings) {
+  const EntryName name = parse_entry_path(entry);
+  if (!findings.require(
+          name.number < textures.size() && name.rung < textures[name.number].rung_quality.size(),
+          {"gltf", "H04"}, entry, "", "a plane and a rung of textures.json", "none"))
+    return;
+  const TextureInfo& t = textures[name.number];
+  const Pixels p = decode_jpeg(jpeg, std::uint64_t{t.width_px} * t.height_px);
+  const auto shape = [](std::uint32_t width, std::uint32_t height, std::uint32_t channels) {
+    return std::to_string(width) + " x " + std::to_string(height) + " x " + std::to_string(channels);
+  };
+  findings.require_equal(shape(t.width_px, t.height_px, t.channels),
+                         shape(p.width_px, p.height_px, p.channels), {"gltf", "H04"}, entry, "shape");
 }
 
 /// Where a mesh lists names of parts, feature ids of all its primitives count them.

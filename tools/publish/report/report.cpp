@@ -79,7 +79,7 @@ std::string header_section(PackageReader& package, Report& report) {
   const Vec3d size = m.bounds_max - m.bounds_min;
   const double unit_m = package.about().metres_per_unit;
   std::uint64_t bytes = 0;
-  for (const EntryRef& e : package.index()) bytes = std::max(bytes, e.offset + e.bytes);
+  for (const EntryRef& e : package.entries()) bytes = std::max(bytes, e.offset + e.bytes);
   std::string out = "<header>\n<div>\n<h1>" + markup_escaped(report.title) + "</h1>\n";
   out += fmt::format("<p class=\"verdict{}\">{}</p>\n", report.holds ? "" : " bad",
                      markup_escaped(report.verdict));
@@ -273,7 +273,7 @@ std::string curve_section(PackageReader& package, const Report& report) {
 
 std::string bytes_section(PackageReader& package) {
   const std::vector<KindBytes> kinds =
-      bytes_by_kind(package.manifest(), package.store().read_manifest().size(), package.index());
+      bytes_by_kind(package.manifest(), package.store().read_manifest().size(), package.entries());
   double sum = 0;
   for (const KindBytes& k : kinds) sum += static_cast<double>(k.bytes);
   Table table("Bytes of the package's entries.",

@@ -22,7 +22,8 @@ export async function coarsestAlike(
   if (!(jnd > 0 && jnd <= 1)) throw new InputError('options', 'jnd', '0 < jnd <= 1', String(jnd));
   const table = (await readThesis(reader, signal))?.perceptual;
   if (!table) throw new InputError('options', 'jnd', 'a package with perceptual values', 'one without');
-  const { scale: chain } = table, n = chain.length, values = policy === 'thesis' ? table.chainAverage : table.p95;
+  const { scale: chain } = table, n = chain.length;
+  const values = policy === 'thesis' ? table.chainAverage : table.p95;
   const kept = reader.manifest.scales.map((s) => s.scale);
   return (wanted) => {
     const row = chain.indexOf(wanted), pairs = row * (2 * n - row - 1) / 2 - row - 1; // of (row, 0)

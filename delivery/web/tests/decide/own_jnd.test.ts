@@ -24,7 +24,8 @@ describe('a JND of the viewer', () => {
           expect(alike(wanted), `${printed} ${jnd} ${wanted}`).toBe(Math.max(wanted, expected));
         }
       }
-    const nothing = await coarsestAlike({ reader, options: { jnd: 1e-9 } }), all = await coarsestAlike({ reader, options: { jnd: 1 } });
+    const nothing = await coarsestAlike({ reader, options: { jnd: 1e-9 } });
+    const all = await coarsestAlike({ reader, options: { jnd: 1 } });
     expect(scales.map(nothing)).toEqual(scales);
     expect(all(0)).toBe(scales.at(-1));
   });
@@ -33,7 +34,8 @@ describe('a JND of the viewer', () => {
     const { thesis, ...manifest } = reader.manifest;
     expect(thesis).toBeDefined();
     const without = { manifest } as unknown as PackageReader;
-    await expect(coarsestAlike({ reader: without, options: { jnd: 0.1 } })).rejects.toThrow(/perceptual values/);
+    await expect(coarsestAlike({ reader: without, options: { jnd: 0.1 } }))
+      .rejects.toThrow(/perceptual values/);
     for (const jnd of [0, -1, 1.1, NaN])
       await expect(coarsestAlike({ reader, options: { jnd } })).rejects.toThrow(/jnd/);
   });

@@ -1,0 +1,17 @@
+#pragma once
+#include "format/base/bytes.h"
+
+namespace texmesh {
+
+/// Files for viewers that know glTF and nothing of packages: entries of the package, by their paths.
+struct GltfScales {
+  struct File {
+    std::string path;
+    Bytes bytes;
+    static void archive(auto& s, auto& a) { a(s.path, s.bytes); }
+  };
+  std::vector<File> files;
+  static void archive(auto& s, auto& a) { a(s.files); }
+};
+
+}  // namespace texmesh
