@@ -1,9 +1,16 @@
 // USDZ in readers of others, three.js's and tinyusdz, beside the GLB of the same content.
-import {check, common, env, fs, here, listen, packages, path, pictures, run, serve} from './browser.mjs';
+import {PNG, check, common, env, fs, here, listen, packages, path, pictures, run, serve} from './browser.mjs';
 import {test} from './harness.mjs';
 
 const folder = path.join(env.work, 'usdz');
 const roots = {'/tinyusdz/': path.join(here, 'node_modules/tinyusdz'), '/out/': folder, '/three-usd/': path.join(here, 'node_modules/three-usd'), '/': path.join(here, 'page')};
+
+/** Rows as WebGL reads them, from the bottom. */
+function save(pixels, file) {
+  const side = Math.sqrt(pixels.length / 4), png = new PNG({width: side, height: side});
+  for (let y = 0; y < side; ++y) png.data.set(pixels.slice(4 * side * (side - 1 - y), 4 * side * (side - y)), 4 * side * y);
+  fs.writeFileSync(file, PNG.sync.write(png));
+}
 
 // Colours of vertices are left out: three.js's reader shows none. `metal` has no normals: glTF shows it flat, and a USDZ says that in
 // more bytes.
@@ -25,7 +32,7 @@ for (const [name, textures, most] of [['maps', 3, 1.15], ['webp', 1, 1.15], ['me
       const shots = ['glb', 'usd', 'tiny'].map((reader) => path.join(pictures, `usdz-${name}-${reader}.png`));
       for (const [k, reader] of ['glb', 'usd', 'tiny'].entries()) {
         drawn.push(await page.evaluate(([u, r]) => window.drawn(u, r), [`${server.url}/out/${files[Math.min(k, 1)]}`, reader]));
-        await page.locator('canvas').screenshot({path: shots[k]});
+        save(drawn[k].pixels, shots[k]);
       }
       const [glb, usd, tiny] = drawn;
       const none = glb.pixels.reduce((sum, v, i) => sum + Math.abs(v - [32, 192, 32, 255][i % 4]), 0) / glb.pixels.length;
