@@ -45,7 +45,7 @@ if(TEXMESH_COMPILER)
   texmesh_install_headers(pipeline "import/import\\.h" "compile/(compile_model|options)\\.h" "batch/(plan|progress|run)\\.h"
     "cache/(disk_store|cache_layer)\\.h" "io/(file_resolver|file_stamp|new_folder|record|resolver|uri)\\.h" "compile/workers/(sandbox|worker)\\.h"
     "graph/(graph_run|stage|store)\\.h")
-  texmesh_install_headers(tools "inspect/(dump/dump|verify/verify|diff/diff)\\.h" "extract/extract\\.h" "publish/export/export\\.h"
+  texmesh_install_headers(tools "inspect/(dump/dump|verify/verify|diff/diff|notes_count)\\.h" "extract/extract\\.h" "publish/export/export\\.h"
     "publish/site/site\\.h")
   install(FILES cmake/FindUtf8proc.cmake cmake/FindWebP.cmake DESTINATION ${texmesh_cmake_dir})
   install(TARGETS texmesh EXPORT texmeshTool RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT tool)

@@ -326,9 +326,10 @@ double finest_part_edge(const Mesh& mesh, double whole) {
   return finest;
 }
 
-std::size_t collapsed_triangles(const Mesh& mesh, const QuantisationGrid& grid) {
+std::size_t collapsed_triangles(const Mesh& mesh, const std::vector<Triangle>& triangles,
+                                const QuantisationGrid& grid) {
   std::size_t count = 0;
-  for (const Triangle& t : mesh.triangles) {
+  for (const Triangle& t : triangles) {
     const Vec3f a = grid.place(mesh.positions[mesh.wedge_position[t[0]]]);
     const Vec3f b = grid.place(mesh.positions[mesh.wedge_position[t[1]]]);
     const Vec3f c = grid.place(mesh.positions[mesh.wedge_position[t[2]]]);
@@ -388,7 +389,9 @@ QuantisationGrid position_grid(const Mesh& mesh, const ScalesOptions& options, i
   if (const double part = finest_part_edge(mesh, box.diagonal()); part > 0 && grid.bits <= max_bits)
     grid.bits = std::max(grid.bits, std::min(max_bits, bits_for(grid.range, part / 8 * 2 / std::sqrt(3.0))));
   if (grid.bits <= max_bits) grid.bits = std::max(grid.bits, std::min(max_bits, options.least_position_bits));
-  while (grid.bits < max_bits && collapsed_triangles(mesh, grid) * 1000 > mesh.triangles.size()) ++grid.bits;
+  while (grid.bits < max_bits &&
+         collapsed_triangles(mesh, mesh.triangles, grid) * 1000 > mesh.triangles.size())
+    ++grid.bits;
   if (grid.bits > max_bits) grid.bits = 0;
   return grid;
 }
@@ -413,6 +416,20 @@ QuantisationGrid uv_grid(const std::vector<Vec2f>& uv, double largest_texture_px
   if (bits_for(grid.range, 0.5 / texels) > max_bits) return grid;
   grid.bits = std::min(max_bits, std::max(options.least_uv_bits, bits_for(grid.range, 0.25 / texels)));
   return grid;
+}
+
+void coarsen(QuantisationGrid& grid, double cells) {
+  constexpr int kLeastBits = 8;
+  const int bits = std::max(kLeastBits, static_cast<int>(std::ceil(std::log2(std::max(cells, 1.0)))));
+  if (grid.bits > 0) grid.bits = std::min(grid.bits, bits);
+}
+
+void coarsen_positions(QuantisationGrid& grid, double cells, const Mesh& mesh,
+                       const std::vector<Triangle>& triangles) {
+  const int finest = grid.bits;
+  coarsen(grid, cells);
+  while (grid.bits < finest && collapsed_triangles(mesh, triangles, grid) * 10 > triangles.size())
+    ++grid.bits;
 }
 
 double largest_rounding(const Mesh& mesh, const QuantisationGrid& grid) {

@@ -31,6 +31,13 @@ QuantisationGrid position_grid(const Mesh& mesh, const ScalesOptions& options, i
 QuantisationGrid uv_grid(const std::vector<Vec2f>& uv, double largest_texture_px,
                          const ScalesOptions& options, int max_bits);
 
+/// Makes a grid coarser: as few bits as hold so many cells along an axis, at least 8.
+void coarsen(QuantisationGrid& grid, double cells);
+/// The same for the positions of these triangles, of which a tenth at most may lose their area: beside strays
+/// the object is a speck.
+void coarsen_positions(QuantisationGrid& grid, double cells, const Mesh& mesh,
+                       const std::vector<Triangle>& triangles);
+
 /// How far rounding moves a position at most, along an axis.
 double largest_rounding(const Mesh& mesh, const QuantisationGrid& grid);
 

@@ -527,14 +527,9 @@ constexpr int kNormalBitsBeside = 9;
 
 /// Grids as fine as a fourth of a pixel and of a texel: the file serves up to its switch size.
 void coarsen_grids(ScaleCoding& coding, const GlbBeside& glb) {
-  static constexpr int kLeastBits = 8;
-  const auto at_most = [](QuantisationGrid& grid, double cells) {
-    const int bits = std::max(kLeastBits, static_cast<int>(std::ceil(std::log2(std::max(cells, 1.0)))));
-    if (grid.bits > 0) grid.bits = std::min(grid.bits, bits);
-  };
-  at_most(coding.position, 4 * glb.up_to_px);
+  coarsen_positions(coding.position, 4 * glb.up_to_px, coding.mesh, glb.scale->triangles);
   if (coding.options.mesh_codec == MeshCodec::kDraco)
-    for (QuantisationGrid& uv : coding.uv) at_most(uv, 4.0 * glb.texture_px * static_cast<double>(uv.range));
+    for (QuantisationGrid& uv : coding.uv) coarsen(uv, 4.0 * glb.texture_px * static_cast<double>(uv.range));
 }
 
 /// What rules of format/rules read of the planes.

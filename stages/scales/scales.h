@@ -12,7 +12,7 @@
 namespace texmesh {
 
 inline constexpr int kScalesVersion = 10;
-inline constexpr int kGltfScalesVersion = 3;
+inline constexpr int kGltfScalesVersion = 4;
 
 enum class MeshCodec : std::uint8_t { kDraco, kMeshopt, kQuantized, kNone };
 template <>
@@ -98,7 +98,8 @@ ScaleFiles write_scales(const NestedScales& scales, const PerceptualValues& perc
 /// GLBs of the scales between S_0 and the coarsest that `options.glb` names, for viewers that know glTF and
 /// nothing of packages; none where there is no stream, because all scales are GLBs then.
 /// - Meshes are as write_scales() would have written them, but on grids of a fourth of a pixel at the switch
-///   size and of a fourth of a texel, and with normals of 9 bits at most, where a scale has a step.
+///   size and of a fourth of a texel, and with normals of 9 bits at most, where a scale has a step; finer
+///   where over a tenth of the triangles would lose their area.
 /// - A scale of the step function has textures that hold at its switch size: the least for which the quality
 ///   table says a FLIP of kGltfFlip (format/rules/whole_textures.h). Other scales have previews.
 /// - Textures are previews or JPEGs of planes, each once however many GLBs show it: "../preview/PPP.jpg" and

@@ -97,7 +97,7 @@ TEST_F(CompileCommand, SameBytesThroughTheCacheAndNothingRunsTwice) {
   };
   const CommandResult first = run();
   EXPECT_EQ(read_text(out), package_);
-  EXPECT_EQ(stages(first, "ran").size(), 17u) << first.output;
+  EXPECT_EQ(stages(first, "ran").size(), 18u) << first.output;
   const auto written = fs::last_write_time(out);
   const CommandResult second = run();
   EXPECT_EQ(second.exit_code, 0);
