@@ -1,5 +1,5 @@
 // texmesh-lab simulate: every policy, order and estimator over a model of a network, with test packets,
-// several objects or lost packets; and chapter 4's own experiments, Table 4.2 and Theorem 4.1.
+// several objects or lost packets; and Theorem 4.1.
 #include <fmt/format.h>
 
 #include <charconv>
@@ -60,7 +60,7 @@ struct SimulateArguments : DeliveryArguments {
   ProbeOptions probe;
   std::vector<std::string> beside;
   bool no_repeat = false, theorem = false, csv = false;
-  std::string table, plot, picture;
+  std::string plot, picture;
   int seeds = 20;
 };
 
@@ -81,26 +81,6 @@ HtcOptions chapter_options(const SimulateArguments& a) {
   HtcOptions o = options_of({.order = a.order.value_or(HtcOrder::kCredit)});
   o.hard_limits = true;
   return o;
-}
-
-void print_table_4_2(const SimulateArguments& a) {
-  Table table{"",
-              {{"beta_0", 0, "beta0", "kB/s"},
-               {"T_0", 2, "t0_s", "s"},
-               {"deviation", 3, "deviation_percent", "%"},
-               {"worst", 3, "worst_percent", "%"},
-               {"by time", 3, "trace_deviation_percent", "%"},
-               {"worst", 3, "trace_worst_percent", "%"},
-               {"static", 1, "static_percent", "%"}}};
-  for (const Table42Row& r : table_4_2(chapter_options(a), a.seeds))
-    table.row({r.beta0_kb_s, r.t0_s, r.deviation_percent, r.worst_percent, r.trace_deviation_percent,
-               r.trace_worst_percent, r.static_percent});
-  print_table(
-      a, table, {{"version", 1}, {"table", "4.2"}},
-      fmt::format(
-          "256 fragments, 418 kB, link 41.68 kB/s in the mean; deviation from T_0: mean and largest |.| of {} "
-          "runs,\nwith a throughput of its own for each fragment (cv 0.2), and over traces by time (cv 0.3)\n",
-          a.seeds));
 }
 
 /// What of the theorem holds over all runs.
@@ -443,13 +423,12 @@ DeliveryRequest lab_request(const SimulateArguments& a) {
 }
 
 int run_simulate(const SimulateArguments& a) {
-  const bool chapter = !a.table.empty() || a.theorem;
-  if (chapter != a.package.empty())
-    throw UsageError("PACKAGE", "", "a package, or --table, or --theorem",
-                     chapter ? a.package : "none of them");
-  if (!a.table.empty()) print_table_4_2(a);
-  if (a.theorem) print_theorem(a);
-  if (chapter) return kExitOk;
+  if (a.theorem != a.package.empty())
+    throw UsageError("PACKAGE", "", "a package, or --theorem", a.theorem ? a.package : "none of them");
+  if (a.theorem) {
+    print_theorem(a);
+    return kExitOk;
+  }
   if (!a.beside.empty() && a.probe.mode != ProbeMode::kOff)
     throw UsageError("--beside", "", "no --probe with it", std::string(enum_name(a.probe.mode)));
   const DeliveryRequest request = lab_request(a);
@@ -561,17 +540,15 @@ void add_play_options(Command& c, SimulateArguments& a) {
            "With --no-repeat: a PNG of the mesh as it should be, with lost points at the mean of their "
            "neighbours, and by their texture coordinates",
            "FILE");
-  Option table = c.option("--table", a.table, "4.2: the experiment of Table 4.2 instead of a package", "4.2")
-                     .one_of_explained({"4.2"});
-  c.flag("--theorem", a.theorem, "What Theorem 4.1 says and what holds, over random links").excludes(table);
-  c.option("--seeds", a.seeds, "Runs per row of the table").integer_in(1, 10000).shows_default();
+  c.flag("--theorem", a.theorem, "What Theorem 4.1 says and what holds, over random links");
+  c.option("--seeds", a.seeds, "Of --theorem: 50 runs each").integer_in(1, 10000).shows_default();
 }
 
 }  // namespace
 
 void add_lab_simulate_command(Command& app) {
-  auto [c, args] = app.add(
-      "simulate", "Play any policy over a model of a network, and chapter 4's experiments", run_simulate);
+  auto [c, args] =
+      app.add("simulate", "Play any policy over a model of a network, and Theorem 4.1", run_simulate);
   args.probe.packet_bytes = 8000, args.probe.threshold_bytes_s = 125e3;
   add_package_and_view_options(c, args, false);
   c.option("--plot", args.plot, "Write an SVG: quality and time by fragment, throughput, credit", "FILE");
@@ -587,10 +564,10 @@ void add_lab_simulate_command(Command& app) {
       "  texmesh-lab simulate bust.texmesh --bandwidth 2Mbit/s --mirror 1Mbit/s --mirror 1Mbit/s,dead=2s\n"
       "  texmesh-lab simulate bust.texmesh --display 600 --beside vase.texmesh,200 --time 3 --bandwidth 4Mbit/s\n"
       "  texmesh-lab simulate bust.texmesh --bandwidth 2Mbit/s --loss 0.05 --no-repeat --picture lost.png\n"
-      "  texmesh-lab simulate --table 4.2 --json");
+      "  texmesh-lab simulate --theorem --json");
   c.notes(
-      "The deviation is a share of the time limit. It is positive when the transfer ended early. --table and "
-      "--theorem play the method itself and take --order, --seeds and the form of the output only.\n"
+      "The deviation is a share of the time limit. It is positive when the transfer ended early. --theorem "
+      "plays the method itself and takes --order, --seeds and the form of the output only.\n"
       "Exit code: 0, 1 when the package or the trace cannot be read, 2 usage.");
 }
 

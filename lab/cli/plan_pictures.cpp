@@ -1,8 +1,8 @@
 #include "lab/cli/plan_pictures.h"
 
 #include "delivery/cpp/package/package_reader.h"
+#include "lab/study/allocation_study.h"
 #include "stages/image/decode_image.h"
-#include "stages/measure/fragment_meter.h"
 #include "tools/extract/glb/standalone_glb.h"
 #include "tools/extract/package_model.h"
 
@@ -31,24 +31,6 @@ std::vector<RenderTexture> source_textures(const std::string& source, const std:
   return out;
 }
 
-/// The preview of a full-size plane at the size of `info`.
-Pixels enlarged_preview(PackageReader& package, std::uint32_t base, const TextureInfo& info) {
-  const Pixels preview =
-      decode_image(probe_image(package.textures().at(base).preview.path, package.preview(base), {}));
-  SamplePatch patch{{0, 0, preview.width_px, preview.height_px}, Samples(info.channels)};
-  for (std::size_t c = 0; c < info.channels; ++c)
-    for (std::size_t i = 0; i < std::size_t{preview.width_px} * preview.height_px; ++i)
-      patch.samples[c].push_back(
-          preview.data[i * preview.channels + std::min<std::size_t>(c, preview.channels - 1)]);
-  const Samples large = scaled_up(patch, bilinear_places(0, info.width_px, info.width_px, preview.width_px),
-                                  bilinear_places(0, info.height_px, info.height_px, preview.height_px));
-  Pixels out{info.width_px, info.height_px, info.channels, {}};
-  out.data.resize(std::size_t{out.width_px} * out.height_px * out.channels);
-  for (std::size_t c = 0; c < info.channels; ++c)
-    for (std::size_t i = 0; i < large[c].size(); ++i) out.data[i * info.channels + c] = large[c][i];
-  return out;
-}
-
 }  // namespace
 
 Pixels read_shown_plane(PackageReader& package, std::uint32_t base, std::uint32_t plane,
@@ -57,7 +39,9 @@ Pixels read_shown_plane(PackageReader& package, std::uint32_t base, std::uint32_
   const PlaneTables& tables = package.tables().planes.at(plane);
   if (rungs.size() != tables.fragment_count())
     throw std::invalid_argument("read_shown_plane: a rung for each fragment");
-  Pixels out = enlarged_preview(package, base, info);
+  const Pixels preview =
+      decode_image(probe_image(package.textures().at(base).preview.path, package.preview(base), {}));
+  Pixels out = enlarged_preview(preview, info.width_px, info.height_px, info.channels);
   PlaneStreams streams(info.codec, tables, package.entry(info.tables));
   for (std::uint32_t r = 0; r < tables.rung_count(); ++r) {
     std::vector<std::uint16_t> shown;

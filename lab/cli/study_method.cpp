@@ -48,7 +48,7 @@ struct MethodRow {
   std::uint32_t triangles = 0;
   std::uint64_t bytes = 0, texture_bytes = 0;
   double predicted_flip = 0;
-  RenderedFlip rendered;       // without a proxy
+  RenderedFlip rendered;
   double end_s = 0;            // over the link at its mean
   double bursty_late_s = 0;    // over bursty links, mean of the runs: how late
   double bursty_missed_s = 0;  // how far from the limit, either way
@@ -102,9 +102,8 @@ MethodRow method_row(PackageReader& package, PlanPictures& pictures, const Deliv
   row.texture_bytes = plan.texture_bytes;
   row.predicted_flip = plan.flip;
   row.end_s = plan.complete_s;
-  if (!plan.proxy)
-    row.rendered =
-        pictures.measure(shown_by(package, plan, list_of(package, request, plan)), request.displayed_px);
+  row.rendered =
+      pictures.measure(shown_by(package, plan, list_of(package, request, plan)), request.displayed_px);
   play_bursts(package, request, request.network.link.at(0), row);
   return row;
 }
@@ -117,7 +116,8 @@ SystemFigures figures_of(const MethodArguments& args, const System& system) {
   out.name = system.name;
   for (const EntryRef& e : package.entries()) out.package_bytes += e.bytes;
   for (const ManifestScale& s : package.manifest().scales) out.scales.push_back(s.scale);
-  out.steps = step_function(package.manifest().scales, system.printed ? StepRule::kJnd : StepRule::kFlip);
+  out.steps =
+      step_function(package.manifest().scales, system.printed ? StepRule::kDistance : StepRule::kFlip);
   for (const int px : args.displays_px)
     out.rows.push_back(method_row(package, pictures, method_request(args, system, px)));
   return out;
@@ -149,14 +149,10 @@ Table method_table(const std::vector<const SystemFigures*>& systems) {
   for (std::size_t k = 0; k < systems[0]->rows.size(); ++k)
     for (const SystemFigures* s : systems) {
       const MethodRow& r = s->rows[k];
-      const auto rendered = [&](double value) { return r.proxy ? Cell() : Cell(value); };
-      Cell flip = rendered(r.rendered.whole);
-      if (r.proxy) flip.shown = fixed(r.predicted_flip, 4) + " predicted";
       table.row({r.displayed_px, s->name,
                  Cell(r.scale, r.proxy ? fmt::format("proxy {}", *r.proxy) : fmt::format("S_{}", r.scale)),
-                 r.proxy, r.triangles, r.bytes, r.texture_bytes, r.predicted_flip, flip,
-                 rendered(r.rendered.geometry), rendered(r.rendered.textures), r.end_s, r.bursty_late_s,
-                 r.bursty_missed_s});
+                 r.proxy, r.triangles, r.bytes, r.texture_bytes, r.predicted_flip, r.rendered.whole,
+                 r.rendered.geometry, r.rendered.textures, r.end_s, r.bursty_late_s, r.bursty_missed_s});
     }
   return table;
 }
@@ -236,7 +232,7 @@ void add_method_study(Command& study) {
   c.notes(
       "thesis: the package of --profile thesis, read with --policy thesis. texmesh: defaults on both sides. FLIP "
       "is of lit pictures against S_0 with the source's texels, 0 = equal: of what is shown, of the scale with "
-      "the source's texels, of S_0 with the textures. Of a proxy the package's own figure stands.\n"
+      "the source's texels, of S_0 with the textures. Of a proxy, which has textures of its own, the last is the first.\n"
       "\"end s\" is over the link as told. Bursts: ten links of that mean whose rate varies by half of it "
       "(correlation 0.9 between tenths of a second); how late the last fragment is, and how far from the limit.\n"
       "Exit code: 0, 1 when a file cannot be read or compiled, 2 usage, 3 internal error.");

@@ -53,16 +53,11 @@ Choices study_model(const QualityArguments& args) {
 }
 
 /// Uniform and what is compared with it, side by side, the source last.
-std::vector<std::uint8_t> side_by_side(const Choices& choices) {
-  std::vector<const Pixels*> pictures;
-  for (std::size_t k = 1; k < choices.size(); ++k) pictures.push_back(&choices[k].picture);
-  pictures.push_back(&choices[0].picture);
-  const std::uint32_t side = pictures[0]->width_px;
-  Pixels out{side * static_cast<std::uint32_t>(pictures.size()), side, 3, {}};
-  for (std::uint32_t y = 0; y < side; ++y)
-    for (const Pixels* p : pictures)
-      out.data.insert(out.data.end(), p->at(0, y), p->at(0, y) + std::size_t{side} * 3);
-  return write_png(out);
+std::vector<std::uint8_t> picture_of(const Choices& choices) {
+  std::vector<const StudiedChoice*> shown;
+  for (std::size_t k = 1; k < choices.size(); ++k) shown.push_back(&choices[k]);
+  shown.push_back(&choices[0]);
+  return write_png(side_by_side(shown));
 }
 
 Table quality_table(const Choices& choices) {
@@ -93,7 +88,7 @@ int study_quality_of(const QualityArguments& args) {
                      std::to_string(args.options.picture_view));
   if (!args.output.empty()) check_output_file(args.output);
   const Choices choices = study_model(args);
-  if (!args.output.empty()) write_output_file(args.output, side_by_side(choices));
+  if (!args.output.empty()) write_output_file(args.output, picture_of(choices));
   const Table table = quality_table(choices);
   std::cout << (args.json ? Json{{"quality", table.json()}}.dump() + "\n" : table.text());
   return kExitOk;

@@ -10,6 +10,7 @@
 #include "stages/fragment_codec/fragment_codec.h"
 #include "stages/jpeg/jpeg.h"
 #include "stages/measure/flip.h"
+#include "stages/measure/fragment_meter.h"
 #include "stages/render/shade.h"
 
 namespace texmesh {
@@ -56,41 +57,28 @@ RenderTexture texture_of(const Pixels& pixels, const TexturePlane& plane, const 
   return render_texture(std::move(whole), true, first_level, context);
 }
 
-/// Bilinear, texel centres at halves.
-std::uint8_t preview_value(const Pixels& preview, const TexturePlane& plane, std::uint32_t x, std::uint32_t y,
-                           std::uint32_t channel) {
-  const double u =
-      std::clamp((x + 0.5) * preview.width_px / plane.width_px - 0.5, 0.0, preview.width_px - 1.0);
-  const double v =
-      std::clamp((y + 0.5) * preview.height_px / plane.height_px - 0.5, 0.0, preview.height_px - 1.0);
-  const auto a = static_cast<std::uint32_t>(u), b = static_cast<std::uint32_t>(v);
-  const std::uint32_t c = std::min(a + 1, preview.width_px - 1), d = std::min(b + 1, preview.height_px - 1);
-  const double s = u - a, t = v - b;
-  const double upper = preview.at(a, b)[channel] * (1 - s) + preview.at(c, b)[channel] * s;
-  const double lower = preview.at(a, d)[channel] * (1 - s) + preview.at(c, d)[channel] * s;
-  return static_cast<std::uint8_t>(upper * (1 - t) + lower * t + 0.5);
-}
-
 /// A plane as a client puts it together from the chosen rungs.
 Pixels compose(const TexturePlane& plane, const Pixels& source, const PlaneLadder& ladder,
                const PlanePreview& preview_file, const std::vector<std::int16_t>& rungs,
                const RunContext& context) {
   Pixels out = source;  // fragments without coverage keep the source's pixels: nobody sees them
-  const Pixels preview = decode_jpeg(preview_file.file, kMaxPreviewPixels);
+  const Pixels preview = enlarged_preview(decode_jpeg(preview_file.file, kMaxPreviewPixels), plane.width_px,
+                                          plane.height_px, out.channels);
   parallel_for(context, plane.fragment_count(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t f = begin; f < end; ++f) {
       if (plane.covered_texels[f] == 0) continue;
       const auto [left, top, w, h] = padded_fragment_rectangle(plane, f);
-      Pixels block;
-      if (rungs[f] != kSkipped)
-        block = decode_fragment(ladder, static_cast<std::size_t>(rungs[f]), f, std::uint64_t{w} * h);
+      const bool skipped = rungs[f] == kSkipped;
+      const Pixels block =
+          skipped ? Pixels{}
+                  : decode_fragment(ladder, static_cast<std::size_t>(rungs[f]), f, std::uint64_t{w} * h);
       for (std::uint32_t y = 0; y < h; ++y)
         for (std::uint32_t x = 0; x < w; ++x)
-          for (std::uint32_t c = 0; c < out.channels; ++c)
-            out.data[(std::size_t{top + y} * out.width_px + left + x) * out.channels + c] =
-                block.data.empty()
-                    ? preview_value(preview, plane, left + x, top + y, std::min(c, preview.channels - 1))
-                    : block.at(x, y)[c];
+          std::copy_n(skipped ? preview.at(std::min(left + x, preview.width_px - 1),
+                                           std::min(top + y, preview.height_px - 1))
+                              : block.at(x, y),
+                      out.channels,
+                      &out.data[(std::size_t{top + y} * out.width_px + left + x) * out.channels]);
     }
   });
   return out;
@@ -195,29 +183,6 @@ Rungs bought_rungs(const std::vector<const PlaneTables*>& tables, std::uint64_t 
   return out;
 }
 
-void describe(const std::vector<const PlaneTables*>& tables, const Rungs& rungs, StudiedChoice& out) {
-  out.bytes = bytes_of(tables, rungs);
-  double loss = 0, weight = 0;
-  for (std::size_t p = 0; p < tables.size(); ++p) {
-    const PlaneTables& t = *tables[p];
-    for (const std::uint16_t f : t.order) {
-      ++out.fragments;
-      if (rungs[p][f] == kSkipped) {
-        ++out.skipped;
-        continue;
-      }
-      const int q = t.rung_quality[static_cast<std::size_t>(rungs[p][f])];
-      out.lowest_quality = out.lowest_quality == 0 ? q : std::min(out.lowest_quality, q);
-      out.highest_quality = std::max(out.highest_quality, q);
-    }
-    double w = 0;
-    for (const float v : surface_weights(t)) w += static_cast<double>(v);
-    loss += w * surface_dssim(t, rungs[p]);
-    weight += w;
-  }
-  out.surface_ssim = weight > 0 ? 1 - loss / weight : 1;
-}
-
 /// White where nothing is.
 Pixels picture_of(const Picture& picture) {
   Pixels out = encode_srgb(picture);
@@ -313,6 +278,49 @@ void measure_views(const RenderScene& scene, const std::vector<Visibility>& view
 
 }  // namespace
 
+StudiedChoice described(const std::vector<const PlaneTables*>& tables, const Rungs& rungs) {
+  StudiedChoice out;
+  out.bytes = bytes_of(tables, rungs);
+  double loss = 0, weight = 0;
+  for (std::size_t p = 0; p < tables.size(); ++p) {
+    const PlaneTables& t = *tables[p];
+    for (const std::uint16_t f : t.order) {
+      ++out.fragments;
+      if (rungs[p][f] == kSkipped) {
+        ++out.skipped;
+        continue;
+      }
+      const int q = t.rung_quality[static_cast<std::size_t>(rungs[p][f])];
+      out.lowest_quality = out.lowest_quality == 0 ? q : std::min(out.lowest_quality, q);
+      out.highest_quality = std::max(out.highest_quality, q);
+      out.mean_quality += q;
+    }
+    double w = 0;
+    for (const float v : surface_weights(t)) w += static_cast<double>(v);
+    loss += w * surface_dssim(t, rungs[p]);
+    weight += w;
+  }
+  out.surface_ssim = weight > 0 ? 1 - loss / weight : 1;
+  if (out.fragments > out.skipped) out.mean_quality /= static_cast<double>(out.fragments - out.skipped);
+  return out;
+}
+
+Pixels enlarged_preview(const Pixels& preview, std::uint32_t width_px, std::uint32_t height_px,
+                        std::uint32_t channels) {
+  SamplePatch patch{{0, 0, preview.width_px, preview.height_px}, Samples(channels)};
+  for (std::size_t c = 0; c < channels; ++c)
+    for (std::size_t i = 0; i < std::size_t{preview.width_px} * preview.height_px; ++i)
+      patch.samples[c].push_back(
+          preview.data[i * preview.channels + std::min<std::size_t>(c, preview.channels - 1)]);
+  const Samples large = scaled_up(patch, bilinear_places(0, width_px, width_px, preview.width_px),
+                                  bilinear_places(0, height_px, height_px, preview.height_px));
+  Pixels out{width_px, height_px, channels, {}};
+  out.data.resize(std::size_t{out.width_px} * out.height_px * out.channels);
+  for (std::size_t c = 0; c < channels; ++c)
+    for (std::size_t i = 0; i < large[c].size(); ++i) out.data[i * channels + c] = large[c][i];
+  return out;
+}
+
 std::vector<StudiedChoice> study_allocation(
     const ConditionedMesh& mesh, const std::vector<Material>& materials, const Fragments& fragments,
     const std::vector<Pixels>& pixels, const Ladder& ladder, const Previews& previews,
@@ -330,12 +338,21 @@ std::vector<StudiedChoice> study_allocation(
   std::vector<StudiedChoice> out;
   for (const Chosen& choice : choices) {
     StudiedChoice& result = out.emplace_back();
+    if (!choice.rungs.empty()) result = described(shown_tables, choice.rungs);
     result.name = choice.name;
-    if (!choice.rungs.empty()) describe(shown_tables, choice.rungs, result);
     measure_views(scene, views, textures_of({shown, fragments, pixels, ladder, previews}, choice, inner),
                   options.picture_view, original, result, inner);
     context.report(static_cast<double>(out.size()) / static_cast<double>(choices.size()));
   }
+  return out;
+}
+
+Pixels side_by_side(const std::vector<const StudiedChoice*>& choices) {
+  const std::uint32_t side = choices.at(0)->picture.width_px;
+  Pixels out{side * static_cast<std::uint32_t>(choices.size()), side, 3, {}};
+  for (std::uint32_t y = 0; y < side; ++y)
+    for (const StudiedChoice* c : choices)
+      out.data.insert(out.data.end(), c->picture.at(0, y), c->picture.at(0, y) + std::size_t{side} * 3);
   return out;
 }
 

@@ -23,10 +23,12 @@ struct StudiedChoice {
   std::string name;         // "source", "uniform", "variable (3.2)", "variable (log)", "rate-distortion"
   std::uint64_t bytes = 0;  // of the fragments' streams of all base-colour planes
   std::size_t fragments = 0, skipped = 0;
-  int lowest_quality = 0, highest_quality = 0;  // of fragments that are not skipped
-  double surface_ssim = 1;                      // 1 - surface-weighted (1 - SSIM), from the tables
-  double ssim = 1, difference = 0;              // SSIM of luma, FLIP: of the lit views, means over pixels
-  Pixels picture;                               // sRGB, size_px x size_px
+  // Of fragments that are not skipped:
+  int lowest_quality = 0, highest_quality = 0;
+  double mean_quality = 0;
+  double surface_ssim = 1;          // 1 - surface-weighted (1 - SSIM), from the tables
+  double ssim = 1, difference = 0;  // SSIM of luma, FLIP: of the lit views, means over pixels
+  Pixels picture;                   // sRGB, size_px x size_px
 };
 
 /// Renders S_0 with each choice's textures. `tables`, `ladder`, `previews` and `pixels` are those of
@@ -40,5 +42,16 @@ std::vector<StudiedChoice> study_allocation(const ConditionedMesh& mesh,
                                             const Ladder& ladder, const Previews& previews,
                                             const PackageTables& tables,
                                             const AllocationStudyOptions& options, const RunContext& context);
+
+/// What these rungs, [plane][fragment], come to by the planes' tables: no name, and nothing rendered.
+StudiedChoice described(const std::vector<const PlaneTables*>& tables,
+                        const std::vector<std::vector<std::int16_t>>& rungs);
+
+/// A preview as it stands for a plane of this size: bilinear, grey in each of several channels.
+Pixels enlarged_preview(const Pixels& preview, std::uint32_t width_px, std::uint32_t height_px,
+                        std::uint32_t channels);
+
+/// The pictures of some choices of one study, from left to right.
+Pixels side_by_side(const std::vector<const StudiedChoice*>& choices);
 
 }  // namespace texmesh

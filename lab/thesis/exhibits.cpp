@@ -13,12 +13,12 @@ namespace texmesh {
 
 std::span<const ExhibitGroup> exhibit_groups() {
   static const std::vector<ExhibitGroup> kGroups{
-      {{"2.1", "fig-6.2"}, scale_exhibits},
+      {{"2.1", "fig-2.2", "fig-6.2"}, scale_exhibits},
       {{"3.1", "fig-3.5"}, fragment_exhibits},
       {{"fig-3.9"}, quality_exhibits},
-      {{"4.1", "4.2", "fig-4.6", "fig-4.7"}, transfer_exhibits},
+      {{"4.1", "4.2", "fig-4.5", "fig-4.6", "fig-4.7"}, transfer_exhibits},
       {{"7.1", "7.2", "7.3"}, perceptual_exhibits},
-      {{"fig-8.2", "fig-8.3", "fig-8.5"}, predictor_exhibits},
+      {{"fig-8.2", "fig-8.3", "fig-8.4", "fig-8.5"}, predictor_exhibits},
   };
   return kGroups;
 }
@@ -32,6 +32,21 @@ std::vector<Exhibit> make_exhibits(const std::vector<std::string>& ids, const Ru
       if (wanted(e.id)) out.push_back(std::move(e));
   }
   return out;
+}
+
+void add_columns(Table& table, int digits, std::initializer_list<const char*> names) {
+  for (const char* name : names) table.column({name, digits});
+}
+
+Plot empty_plot(std::string title, std::string x_name, std::string y_name, double x_low, double x_high,
+                bool linear_x) {
+  return {std::move(title), std::move(x_name), std::move(y_name), x_low, x_high, 0, 0, linear_x, {}};
+}
+
+void add_line(PlotSeries line, Plot& plot) {
+  for (const auto& [at, value] : line.points)
+    plot.y_low = std::min(plot.y_low, value), plot.y_high = std::max(plot.y_high, value);
+  plot.series.push_back(std::move(line));
 }
 
 namespace {

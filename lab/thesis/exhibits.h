@@ -29,11 +29,20 @@ struct Exhibit {
   std::string claim;          // what the thesis prints or says
   std::string made_by;        // what was run on which data
   std::vector<Table> tables;  // the first column names the row
-  std::vector<Plot> plots;
-  std::vector<ExhibitPicture> pictures;
   Verdict verdict = Verdict::kNotComparable;
-  std::string finding;  // what came out, with figures
+  std::string finding = {};  // what came out, with figures
+  std::vector<Plot> plots = {};
+  std::vector<ExhibitPicture> pictures = {};
 };
+
+/// Columns of numbers that show so many digits behind the point.
+void add_columns(Table& table, int digits, std::initializer_list<const char*> names);
+inline constexpr const char* kLineColours[] = {"a", "b", "c", "d", "e"};
+/// A plot without lines.
+Plot empty_plot(std::string title, std::string x_name, std::string y_name, double x_low, double x_high,
+                bool linear_x);
+/// The vertical axis reaches what the line shows.
+void add_line(PlotSeries line, Plot& plot);
 
 /// The page: summary of verdicts, then an exhibit a section.
 std::string exhibits_html(const std::vector<Exhibit>& exhibits);
@@ -45,12 +54,12 @@ std::string exhibit_text(const Exhibit& exhibit);
 // Every exhibit is made from models, pictures and links that are made by code, by the stages and the delivery
 // themselves. Same result for any thread count and on any machine.
 
-std::vector<Exhibit> scale_exhibits(const RunContext& context);       // Table 2.1, Fig. 6.2
+std::vector<Exhibit> scale_exhibits(const RunContext& context);       // Table 2.1, Figs. 2.2, 6.2
 std::vector<Exhibit> fragment_exhibits(const RunContext& context);    // Table 3.1, Figs. 3.5 to 3.8
 std::vector<Exhibit> quality_exhibits(const RunContext& context);     // Fig. 3.9
-std::vector<Exhibit> transfer_exhibits(const RunContext& context);    // Tables 4.1, 4.2, Figs. 4.3, 4.6, 4.7
+std::vector<Exhibit> transfer_exhibits(const RunContext& context);    // Tables 4.1, 4.2, Figs. 4.3 to 4.7
 std::vector<Exhibit> perceptual_exhibits(const RunContext& context);  // Tables 7.1, 7.2, 7.3
-std::vector<Exhibit> predictor_exhibits(const RunContext& context);   // Figs. 8.2, 8.3, 8.5
+std::vector<Exhibit> predictor_exhibits(const RunContext& context);   // Figs. 8.2 to 8.5
 
 /// Exhibits that are made together.
 struct ExhibitGroup {

@@ -50,19 +50,11 @@ double ratio(std::uint64_t part, std::uint64_t whole) {
 }
 
 Exhibit table_3_1(const RunContext& context) {
-  Table table{"One file against fragments of 16 x 16 px, KB",
-              {{"texture", 0},
-               {"px", 0},
-               {"quality", 0},
-               {"file, printed", 0},
-               {"ours", 0},
-               {"sum, printed", 0},
-               {"ours", 0},
-               {"ours, shared tables", 0},
-               {"sum / file, printed", 2},
-               {"ours", 2},
-               {"ours, shared tables", 2}},
-              {}};
+  Table table{"One file against fragments of 16 x 16 px, KB", {}};
+  add_columns(
+      table, 0,
+      {"texture", "px", "quality", "file, printed", "ours", "sum, printed", "ours", "ours, shared tables"});
+  add_columns(table, 2, {"sum / file, printed", "ours", "ours, shared tables"});
   double least = 1e9, most = 0, most_shared = 0;
   for (const PrintedTexture& p : kTable31) {
     const Pixels pixels = made_texture(p.side_px, contrast_of(p.name), 21, context);
@@ -70,9 +62,9 @@ Exhibit table_3_1(const RunContext& context) {
         cut_texture(pixels, {static_cast<int>(p.side_px) / kTinyFragmentPx}, {p.quality}, context).front();
     const double complete = ratio(r.sum_standard, r.file_standard),
                  shared = ratio(r.sum_shared, r.file_standard);
-    table.rows.push_back({std::string(p.name), static_cast<double>(p.side_px), static_cast<double>(p.quality),
-                          p.file_kb, in_kb(r.file_standard), p.sum_kb, in_kb(r.sum_standard),
-                          in_kb(r.sum_shared), p.sum_kb / p.file_kb, complete, shared});
+    table.rows.push_back({std::string(p.name), p.side_px, p.quality, p.file_kb, in_kb(r.file_standard),
+                          p.sum_kb, in_kb(r.sum_standard), in_kb(r.sum_shared), p.sum_kb / p.file_kb,
+                          complete, shared});
     least = std::min(least, complete), most = std::max(most, complete),
     most_shared = std::max(most_shared, shared);
   }
@@ -83,8 +75,6 @@ Exhibit table_3_1(const RunContext& context) {
       "pictures made by code, baseline JPEGs of libjpeg-turbo; a complete file for each fragment, and abbreviated "
       "streams behind one shared table stream, as packages hold them",
       {table},
-      {},
-      {},
       least > 1 ? Verdict::kNotConfirmed : Verdict::kInPart,
       fmt::format(
           "the sum of complete files is {:.1f} to {:.1f} times the one file: each has 0.6 kB of tables and "
@@ -123,31 +113,15 @@ std::vector<CutImage> cut_images(const RunContext& context) {
   return out;
 }
 
-constexpr const char* kSideColours[] = {"a", "b", "c", "d", "e"};
-
 std::vector<Plot> cut_plots(const std::vector<CutImage>& images) {
-  Plot grids{"Figs. 3.5, 3.6: sum of the fragments over one file, quality 100",
-             "fragments in a row",
-             "sum / file",
-             1,
-             kMostFragmentRow,
-             1,
-             0,
-             false,
-             {}};
-  Plot qualities{"Figs. 3.7, 3.8: sum over one file, fragments of 128 px (of 4,096 px: 256 px)",
-                 "JPEG quality",
-                 "sum / file",
-                 0,
-                 100,
-                 1,
-                 0,
-                 true,
-                 {}};
+  Plot grids = empty_plot("Figs. 3.5, 3.6: sum of the fragments over one file, quality 100",
+                          "fragments in a row", "sum / file", 1, kMostFragmentRow, false);
+  Plot qualities = empty_plot("Figs. 3.7, 3.8: sum over one file, fragments of 128 px (of 4,096 px: 256 px)",
+                              "JPEG quality", "sum / file", 0, 100, true);
   for (std::size_t k = 0; k < images.size(); ++k) {
     const std::string side = fmt::format("{} px", images[k].side_px);
-    PlotSeries complete{side + ", complete files", kSideColours[k], {}, false, false, false, false};
-    PlotSeries shared{side + ", shared tables", kSideColours[k], {}, false, true, false, false};
+    PlotSeries complete{side + ", complete files", kLineColours[k], {}};
+    PlotSeries shared{side + ", shared tables", kLineColours[k], {}, false, true};
     PlotSeries by_quality = complete, shared_by_quality = shared;
     for (const FragmentStudyRow& r : images[k].by_grid) {
       complete.points.emplace_back(r.grid, ratio(r.sum_standard, r.file_standard));
@@ -157,36 +131,26 @@ std::vector<Plot> cut_plots(const std::vector<CutImage>& images) {
       by_quality.points.emplace_back(r.quality, ratio(r.sum_standard, r.file_standard));
       shared_by_quality.points.emplace_back(r.quality, ratio(r.sum_shared, r.file_standard));
     }
-    const auto add = [](PlotSeries line, Plot& plot) {
-      for (const auto& [at, value] : line.points) plot.y_high = std::max(plot.y_high, value);
-      plot.series.push_back(std::move(line));
-    };
-    add(std::move(complete), grids), add(std::move(shared), grids);
-    add(std::move(by_quality), qualities), add(std::move(shared_by_quality), qualities);
+    add_line(std::move(complete), grids), add_line(std::move(shared), grids);
+    add_line(std::move(by_quality), qualities), add_line(std::move(shared_by_quality), qualities);
   }
   return {grids, qualities};
 }
 
 Exhibit figures_3_5(const RunContext& context) {
   const std::vector<CutImage> images = cut_images(context);
-  Table table{"Sum of the fragments over one file with standard tables",
-              {{"image, px", 0},
-               {"fragments", 0},
-               {"fragment px", 0},
-               {"quality", 0},
-               {"file KB", 1},
-               {"complete files", 3},
-               {"shared tables", 3}},
-              {}};
+  Table table{"Sum of the fragments over one file with standard tables", {}};
+  add_columns(table, 0, {"image, px", "fragments", "fragment px", "quality"});
+  add_columns(table, 1, {"file KB"});
+  add_columns(table, 3, {"complete files", "shared tables"});
   std::size_t rows = 0, smaller = 0, shared_smaller = 0;
   double most = 0, most_shared = 0;
   for (const CutImage& image : images)
     for (const FragmentStudyRow& r : image.rows()) {
       const double complete = ratio(r.sum_standard, r.file_standard),
                    shared = ratio(r.sum_shared, r.file_standard);
-      table.rows.push_back({fmt::format("{}", image.side_px), static_cast<double>(r.columns * r.rows),
-                            static_cast<double>(r.fragment_width_px), static_cast<double>(r.quality),
-                            in_kb(r.file_standard), complete, shared});
+      table.rows.push_back({fmt::format("{}", image.side_px), r.columns * r.rows, r.fragment_width_px,
+                            r.quality, in_kb(r.file_standard), complete, shared});
       if (r.grid == 1 || r.fragment_width_px < 128) continue;
       ++rows, smaller += complete <= 1, shared_smaller += shared <= 1;
       most = std::max(most, complete), most_shared = std::max(most_shared, shared);
@@ -197,10 +161,9 @@ Exhibit figures_3_5(const RunContext& context) {
       "with at most 16 x 16 fragments of 128 x 128 px and more the sum is no larger than the one file, at every quality",
       "pictures made by code, 256 to 4,096 px, baseline JPEGs 4:2:0, of quality 100 with the channels apart",
       {table},
-      cut_plots(images),
-      {},
       Verdict::kInPart,
-      ""};
+      "",
+      cut_plots(images)};
   e.finding = fmt::format(
       "of {} rows with fragments of 128 px and more the sum of complete files is no larger in {} (at most "
       "{:.2f} times the file), with shared tables in {} (at most {:.3f} times). So the claim holds for "
@@ -242,16 +205,6 @@ std::vector<StudiedChoice> study_head(const RunContext& context) {
                           context);
 }
 
-ExhibitPicture side_by_side(const std::vector<const StudiedChoice*>& choices) {
-  const std::uint32_t side = choices[0]->picture.width_px;
-  Pixels out{side * static_cast<std::uint32_t>(choices.size()), side, 3, {}};
-  for (std::uint32_t y = 0; y < side; ++y)
-    for (const StudiedChoice* c : choices)
-      out.data.insert(out.data.end(), c->picture.at(0, y), c->picture.at(0, y) + std::size_t{side} * 3);
-  return {"fig-3-9.png", "uniform quality, variable quality (3.2), the source", out.width_px, out.height_px,
-          write_png(out)};
-}
-
 const StudiedChoice& choice_named(const std::vector<StudiedChoice>& choices, const std::string& name) {
   return *std::ranges::find(choices, name, &StudiedChoice::name);
 }
@@ -260,23 +213,20 @@ const StudiedChoice& choice_named(const std::vector<StudiedChoice>& choices, con
 
 std::vector<Exhibit> quality_exhibits(const RunContext& context) {
   const std::vector<StudiedChoice> choices = study_head(context);
-  Table table{"The same bytes, shared in different ways",
-              {{"choice", 0},
-               {"KB", 1},
-               {"lowest quality", 0},
-               {"highest", 0},
-               {"surface SSIM", 4},
-               {"rendered SSIM", 4},
-               {"rendered difference", 4}},
-              {}};
+  Table table{"The same bytes, shared in different ways", {}};
+  add_columns(table, 0, {"choice"});
+  add_columns(table, 1, {"KB"});
+  add_columns(table, 0, {"lowest quality", "highest"});
+  add_columns(table, 4, {"surface SSIM", "rendered SSIM", "rendered difference"});
   for (const StudiedChoice& c : choices)
     if (c.fragments > 0)
-      table.rows.push_back({c.name, static_cast<double>(c.bytes) / 1e3, static_cast<double>(c.lowest_quality),
-                            static_cast<double>(c.highest_quality), c.surface_ssim, c.ssim, c.difference});
+      table.rows.push_back({c.name, static_cast<double>(c.bytes) / 1e3, c.lowest_quality, c.highest_quality,
+                            c.surface_ssim, c.ssim, c.difference});
   const StudiedChoice &uniform = choice_named(choices, "uniform"),
                       &variable = choice_named(choices, "variable (3.2)"),
                       &best = choice_named(choices, "rate-distortion");
   const bool better = variable.ssim > uniform.ssim;
+  const Pixels shown = side_by_side({&uniform, &variable, &choice_named(choices, "source")});
   return {
       {"fig-3.9",
        "Fig. 3.9: variable against uniform quality",
@@ -286,13 +236,14 @@ std::vector<Exhibit> quality_exhibits(const RunContext& context) {
            "quality 11",
            kScanTexturePx),
        {table},
-       {},
-       {side_by_side({&uniform, &variable, &choice_named(choices, "source")})},
        better ? Verdict::kConfirmed : Verdict::kNotConfirmed,
        fmt::format(
            "rendered SSIM is {:.4f} with variable and {:.4f} with uniform quality, and {:.4f} where rate and "
            "distortion share the bytes. Feature density of the mesh does not tell which texels show the error.",
-           variable.ssim, uniform.ssim, best.ssim)}};
+           variable.ssim, uniform.ssim, best.ssim),
+       {},
+       {{"fig-3-9.png", "uniform quality, variable quality (3.2), the source", shown.width_px,
+         shown.height_px, write_png(shown)}}}};
 }
 
 }  // namespace texmesh

@@ -10,6 +10,8 @@
 #include "stages/base/parallel.h"
 #include "stages/condition/condition.h"
 #include "stages/image/png_writer.h"
+#include "stages/ladder/ladder.h"
+#include "stages/previews/previews.h"
 #include "stages/simplification/simplification.h"
 #include "stages/ssf/ssf.h"
 
@@ -105,10 +107,18 @@ PatternPlane pattern_plane(const std::vector<std::size_t>& patterns, std::uint32
       for (std::uint32_t c = 0; c < 3; ++c)
         pixels.data.push_back(pattern_value(patterns[y / kPatternPx * columns + x / kPatternPx],
                                             x % kPatternPx, y % kPatternPx, c));
-  PatternPlane out;
-  out.fragments.planes.push_back(std::move(plane));
-  out.pixels.push_back(std::move(pixels));
-  return out;
+  return {{0, {std::move(plane)}, {}}, {std::move(pixels)}};
+}
+
+LutTables plane_tables(const PatternPlane& plane, const std::vector<int>& rungs, const RunContext& context) {
+  LadderOptions options;
+  options.rungs = rungs;
+  options.prune = false;
+  const Previews previews = make_previews(plane.fragments, plane.pixels, {}, context);
+  const Ladder ladder = encode_ladder(plane.fragments, plane.pixels, previews, {}, options, context);
+  return build_tables(plane.fragments, plane.pixels,
+                      predict_quality(plane.fragments, plane.pixels, kTexturePredictors, context), ladder,
+                      previews, {}, context);
 }
 
 namespace {
@@ -244,13 +254,13 @@ Model make_scan_model(MadeShape shape, std::uint32_t columns, std::uint32_t rows
   return import_range_scan("scan.json", Bytes(text.begin(), text.end()), files, {}, context).model;
 }
 
-RangeGrid made_ring(MadeShape shape, std::uint32_t samples) {
+RangeGrid made_ring(MadeShape shape, std::uint32_t samples, double height) {
   RangeGrid ring;
   ring.columns = samples, ring.rows = 1;
   ring.alpha_step_rad = static_cast<float>(2 * portable::kPi / samples);
   ring.y_step = 1;
   for (std::uint32_t k = 0; k < samples; ++k) {
-    ring.radius.push_back(static_cast<float>(made_radius(shape, 2 * portable::kPi * k / samples, 0.46)));
+    ring.radius.push_back(static_cast<float>(made_radius(shape, 2 * portable::kPi * k / samples, height)));
     ring.position.push_back(k);
   }
   return ring;

@@ -6,6 +6,8 @@
 #include "stages/data/nested_scales.h"
 #include "stages/data/pixels.h"
 #include "stages/data/scale_map.h"
+#include "stages/lut/lut.h"
+#include "stages/zim/zim.h"
 
 namespace texmesh {
 
@@ -24,6 +26,10 @@ struct PatternPlane {
   std::vector<Pixels> pixels;
 };
 PatternPlane pattern_plane(const std::vector<std::size_t>& patterns, std::uint32_t columns);
+/// Z, I and M alone: such planes lie on no mesh.
+inline constexpr ZimOptions kTexturePredictors{.weight_eta = 0};
+/// The tables of such a plane that is encoded at these qualities.
+LutTables plane_tables(const PatternPlane& plane, const std::vector<int>& rungs, const RunContext& context);
 
 // Stand-ins for the thesis's models, whose data are not available: cylindrical range scans made by code.
 
@@ -34,8 +40,8 @@ double made_radius(MadeShape shape, double alpha, double height);
 /// scans makes it. A full turn: columns x rows vertices and 2 columns (rows - 1) faces.
 Model make_scan_model(MadeShape shape, std::uint32_t columns, std::uint32_t rows, std::uint32_t texture_px,
                       const RunContext& context);
-/// One row of samples around the shape, at the height of a head's nose or a nutcracker's belt.
-RangeGrid made_ring(MadeShape shape, std::uint32_t samples);
+/// One row of samples around the shape; without a height, at that of a head's nose or a nutcracker's belt.
+RangeGrid made_ring(MadeShape shape, std::uint32_t samples, double height = 0.46);
 
 /// The thesis's chain of scales: filtered by r(alpha, y), removed by the scale map, merged into the closest
 /// neighbour.

@@ -94,7 +94,6 @@ std::vector<Table42Row> table_4_2(const HtcOptions& base, int seeds, Table42Rung
       row.trace_deviation_percent += t / seeds;
       row.worst_percent = std::max(row.worst_percent, d);
       row.trace_worst_percent = std::max(row.trace_worst_percent, t);
-      row.mean_loss += by_sample.loss / seeds;
       row.surplus_percent += by_sample.deviation_percent / seeds;
       row.lambda_s += lambda_of(by_sample) / seeds;
     }

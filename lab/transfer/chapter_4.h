@@ -40,7 +40,6 @@ struct Table42Row {
   double deviation_percent = 0;
   double worst_percent = 0;                                     // its largest
   double trace_deviation_percent = 0, trace_worst_percent = 0;  // traces by time: cv 0.3, 0.1 s, rho 0.9
-  double mean_loss = 0;
   double surplus_percent = 0;  // Pi, with its sign, of the limit: mean over the seeds
   double lambda_s = 0;         // Lambda: mean of dT_k of all fragments but the last, mean over the seeds
 };

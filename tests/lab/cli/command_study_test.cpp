@@ -213,7 +213,12 @@ TEST_F(StudyCommand, TheThesisStandsBesideTheDefaultsInOneTable) {
   for (const Json& system : study) {
     ASSERT_EQ(system["rows"].size(), 1u);
     EXPECT_GT(system["rows"][0]["bytes"], 0);
+    EXPECT_EQ(system["steps"].back()["scale"], 0);
   }
+  // As printed, the scale goes by the distance, of which 1 is 1,024 px.
+  const Json& steps = study[1]["steps"];
+  ASSERT_GE(steps.size(), 2u);
+  EXPECT_LE(steps[steps.size() - 2]["up_to_px"], 1024);
   EXPECT_EQ(texmesh({"study", "method", "scan.glb", "--thesis", package}).exit_code, 2);
 }
 

@@ -15,7 +15,12 @@ inline const Exhibit& exhibit_of(const std::vector<Exhibit>& exhibits, const std
 }
 /// A number of an exhibit's table.
 inline double number_at(const Exhibit& e, std::size_t table, std::size_t row, std::size_t column) {
-  return std::get<double>(e.tables.at(table).rows.at(row).at(column).value);
+  return std::visit(
+      [](const auto& value) -> double {
+        if constexpr (std::is_arithmetic_v<std::decay_t<decltype(value)>>) return static_cast<double>(value);
+        throw std::bad_variant_access();
+      },
+      e.tables.at(table).rows.at(row).at(column).value);
 }
 /// Every row has the table's columns, and every text is there.
 inline void expect_sound(const std::vector<Exhibit>& exhibits) {

@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "lab/thesis/exhibits.h"
 #include "lab/thesis/made_models.h"
 #include "tests/lab/thesis/exhibit_rows.h"
@@ -65,8 +67,26 @@ TEST(PredictorExhibits, Fig85SpendsTheSameBytes) {
     least = std::min(least, number_at(e, 0, f, 3)), most = std::max(most, number_at(e, 0, f, 3));
   }
   EXPECT_NEAR(most - least, 18, 1) << "the printed span";
-  EXPECT_EQ(number_at(e, 1, 0, 2), 825.45);
-  EXPECT_GT(number_at(e, 1, 1, 4), 0.9) << "correlation of (x)";
+}
+
+TEST(PredictorExhibits, Fig84BytesGrowWithQualityAndTheModelIsAnExponential) {
+  const Exhibit& e = exhibit_of(predictors_shown(), "fig-8.4");
+  EXPECT_EQ(number_at(e, 0, 0, 2), 825.45);
+  double least = 1;
+  for (std::size_t row = 1; row < 5; ++row) least = std::min(least, number_at(e, 0, row, 4));
+  const double first = number_at(e, 0, 1, 4);
+  EXPECT_EQ(e.verdict, least >= 0.95  ? Verdict::kConfirmed
+                       : first >= 0.9 ? Verdict::kInPart
+                                      : Verdict::kNotConfirmed);
+  ASSERT_EQ(e.tables[1].rows.size(), 11u);
+  for (std::size_t f = 0; f < 4; ++f)
+    for (std::size_t row = 1; row < 11; ++row)
+      EXPECT_GT(number_at(e, 1, row, 1 + 2 * f), number_at(e, 1, row - 1, 1 + 2 * f)) << row;
+  // Steps of 10 in quality multiply the model's bytes by one and the same factor, (100 p)^(B / 10).
+  const double factor = number_at(e, 1, 2, 2) / number_at(e, 1, 1, 2);
+  EXPECT_NEAR(number_at(e, 1, 9, 2) / number_at(e, 1, 8, 2), factor, 1e-9);
+  EXPECT_NEAR(std::log(factor), number_at(e, 0, 1, 3) * std::log(100 * number_at(e, 0, 1, 1)) / 10, 1e-6);
+  EXPECT_EQ(e.plots[0].series.size(), 8u);
 }
 
 }  // namespace

@@ -34,6 +34,19 @@ TEST(ScaleExhibits, Table21CountsVerticesAndFaces) {
   }
 }
 
+TEST(ScaleExhibits, Fig22CrossingsFallAsSigmaGrows) {
+  const std::vector<Exhibit> made = scale_exhibits({});
+  const Exhibit& e = exhibit_of(made, "fig-2.2");
+  ASSERT_EQ(e.tables[0].rows.size(), 5u);
+  for (std::size_t k = 1; k < 5; ++k) {
+    EXPECT_LE(number_at(e, 0, k, 1), number_at(e, 0, k - 1, 1));
+    EXPECT_GT(number_at(e, 0, k, 3), number_at(e, 0, k - 1, 3)) << "sigma";
+    EXPECT_LT(number_at(e, 0, k, 4), number_at(e, 0, k - 1, 4)) << "range";
+    EXPECT_EQ(static_cast<int>(number_at(e, 0, k, 1)) % 2, 0) << "signs change in pairs around a ring";
+  }
+  EXPECT_EQ(e.verdict, number_at(e, 0, 4, 1) <= 2 ? Verdict::kConfirmed : Verdict::kInPart) << e.finding;
+}
+
 TEST(ScaleExhibits, Fig62CurvesFall) {
   const std::vector<Exhibit> made = scale_exhibits({});
   const Exhibit& e = exhibit_of(made, "fig-6.2");

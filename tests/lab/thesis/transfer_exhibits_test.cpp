@@ -42,7 +42,7 @@ TEST(TransferExhibits, Table42HasTwelveRowsWithLimitsWorkedByHand) {
 TEST(TransferExhibits, Table42OrderOfTheCreditHoldsAndThePrintedOrderFails) {
   const Exhibit& e = exhibit_of(transfers(), "4.2");
   // The second table: beta_0, printed, then mean and largest of credit 26, printed order 26, credit 10,
-  // printed 10.
+  // printed 10, credit 26 by time.
   for (std::size_t k = 0; k < 12; ++k) {
     EXPECT_LT(number_at(e, 1, k, 2), 0.2) << k;
     EXPECT_LE(number_at(e, 1, k, 2), number_at(e, 1, k, 3)) << "mean and largest";
@@ -53,8 +53,28 @@ TEST(TransferExhibits, Table42OrderOfTheCreditHoldsAndThePrintedOrderFails) {
   EXPECT_NEAR(number_at(e, 1, 1, 4), 8.5, 0.1);
   EXPECT_NEAR(number_at(e, 1, 2, 4), 4.7, 0.1);
   for (std::size_t k = 3; k < 12; ++k) EXPECT_LT(number_at(e, 1, k, 4), 1) << "29 to 53";
+  EXPECT_NEAR(number_at(e, 1, 0, 10), 4.3, 0.05) << "over traces by time";
+  EXPECT_NEAR(number_at(e, 1, 0, 11), 7.3, 0.05);
   EXPECT_EQ(e.verdict, Verdict::kInPart);
   EXPECT_NE(e.finding.find("beta_0 = 20, 23, 26"), std::string::npos) << e.finding;
+}
+
+TEST(TransferExhibits, Fig45QualityFollowsTheLinkWithinItsLimits) {
+  const Exhibit& e = exhibit_of(transfers(), "fig-4.5");
+  ASSERT_EQ(e.tables[0].rows.size(), 3u);
+  for (std::size_t column = 2; column < 5; ++column) EXPECT_EQ(number_at(e, 0, 0, column), 80);
+  const double estimated_kb = number_at(e, 0, 0, 1), beta0[] = {0, 32, 50};
+  for (std::size_t row = 1; row < 3; ++row) {
+    EXPECT_GE(number_at(e, 0, row, 3), 40);
+    EXPECT_LE(number_at(e, 0, row, 4), 100);
+    EXPECT_LT(std::abs(number_at(e, 0, row, 6)), 1) << "in time";
+    // The link carries 41.68 KB/s in the mean, so bytes go by that over beta_0.
+    EXPECT_NEAR(number_at(e, 0, row, 1) / estimated_kb, 41.68 / beta0[row], 0.05);
+  }
+  EXPECT_GT(number_at(e, 0, 1, 2), 80);
+  EXPECT_LT(number_at(e, 0, 2, 2), 80);
+  EXPECT_GT(number_at(e, 0, 1, 5), number_at(e, 0, 0, 5));
+  EXPECT_LT(number_at(e, 0, 2, 5), number_at(e, 0, 0, 5));
 }
 
 TEST(TransferExhibits, NetworksAreJudgedByTheirRuns) {
