@@ -66,7 +66,8 @@ ImagePointer planes_of(const Pixels& pixels, const AvifOptions& options) {
 }
 
 struct Decoder {
-  avifDecoder* const avif = avifDecoderCreate();
+  const std::unique_ptr<avifDecoder, void (*)(avifDecoder*)> owner{avifDecoderCreate(), avifDecoderDestroy};
+  avifDecoder* const avif = owner.get();
   const std::string& name;
   Decoder(const std::string& file, ByteSpan bytes, const ImageLimits& limits) : name(file) {
     if (!avif) throw InputError(name, "image header", "memory for an AVIF decoder", "none");
@@ -79,9 +80,6 @@ struct Decoder {
     check("image header", avifDecoderSetIOMemory(avif, bytes.data(), bytes.size()));
     check("image header", avifDecoderParse(avif));
   }
-  ~Decoder() { avifDecoderDestroy(avif); }
-  Decoder(const Decoder&) = delete;
-  Decoder& operator=(const Decoder&) = delete;
   void check(const char* place, avifResult result) const {
     if (result != AVIF_RESULT_OK) throw InputError(name, place, "a whole AVIF", avifResultToString(result));
   }
