@@ -9,8 +9,7 @@
 #include "tests/delivery/by_credit.h"
 #include "tests/delivery/vector_decisions.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::vectors_decisions_test {
 
 Json upgrades() {
   Json cases = Json::array();
@@ -184,5 +183,4 @@ TEST(Vectors, PortableMath) {
                [](Json& c) { return c["name"] != "acuity" && c["name"] != "gaze_weight"; });
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::vectors_decisions_test

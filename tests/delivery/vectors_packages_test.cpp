@@ -1,8 +1,7 @@
 #include "tests/delivery/by_credit.h"
 #include "tests/delivery/vector_packages.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::vectors_packages_test {
 
 /// The thesis's order is its own where it is asked for as printed.
 bool of_clients(VectorOptions& o) { return o.policy == "thesis" || by_credit(o); }
@@ -17,5 +16,4 @@ TEST(Vectors, Packages) {
   });
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::vectors_packages_test

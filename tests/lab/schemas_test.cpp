@@ -6,8 +6,7 @@
 #include "lab/experiment/design.h"
 #include "tests/support/schema.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::schemas_test {
 
 std::span<const std::uint8_t> bytes_of(const std::string& s) {
   return {reinterpret_cast<const std::uint8_t*>(s.data()), s.size()};
@@ -28,5 +27,4 @@ TEST(LabSchemas, AgreeWithExamplesAndReaders) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::schemas_test

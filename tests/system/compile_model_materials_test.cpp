@@ -15,8 +15,7 @@
 #include "tests/support/wide_jpeg.h"
 #include "tools/inspect/verify/verify.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::compile_model_materials_test {
 
 using Json = nlohmann::json;
 using testing::GltfBuilder;
@@ -280,5 +279,4 @@ std::string test_name(const ::testing::TestParamInfo<Kind>& kind) {
 }
 INSTANTIATE_TEST_SUITE_P(All, Materials, ::testing::ValuesIn(kKinds), test_name);
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::compile_model_materials_test

@@ -10,8 +10,7 @@
 #include "tests/support/memory_store.h"
 #include "tools/inspect/provenance.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::compile_model_options_test {
 
 /// A tent of two triangles in an OBJ file, and the cheapest options.
 class CompiledOptions : public ::testing::Test {
@@ -46,5 +45,4 @@ TEST_F(CompiledOptions, ProvenanceHoldsTheResolvedValueAndTheUsersOwn) {
   EXPECT_EQ(recorded("ladder", "uncovered"), "\"kept\"");
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::compile_model_options_test

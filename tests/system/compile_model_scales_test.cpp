@@ -15,8 +15,7 @@
 #include "tests/support/images.h"
 #include "tools/extract/glb/standalone_glb.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::compile_model_scales_test {
 
 using Json = nlohmann::json;
 
@@ -315,5 +314,4 @@ TEST_F(SourceToScales, TangentsSurviveInEveryFile) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::compile_model_scales_test

@@ -11,8 +11,7 @@
 #include "tests/support/command.h"
 #include "tools/inspect/verify/verify.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::damage_test {
 
 namespace fs = std::filesystem;
 using testing::TemporaryFolder;
@@ -167,5 +166,4 @@ TEST(Damage, InATreeFilesThatAreNoEntriesMayChangeButVerifySaysSo) {
   EXPECT_GT(loose, 3u);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::damage_test

@@ -7,8 +7,7 @@
 #include "tests/fuzz/mutate.h"
 #include "tests/support/sanitizers.h"
 
-namespace texmesh::fuzz {
-namespace {
+namespace texmesh::fuzz::fuzz_replay_test {
 
 constexpr double kMostSeconds = testing::sanitizers_take(1.0);
 
@@ -48,5 +47,4 @@ TEST_P(FuzzReplay, MutationsGiveAnAnswerOrAnError) {
 INSTANTIATE_TEST_SUITE_P(Targets, FuzzReplay, ::testing::ValuesIn(targets()),
                          [](const auto& test) { return std::string(test.param.name); });
 
-}  // namespace
-}  // namespace texmesh::fuzz
+}  // namespace texmesh::fuzz::fuzz_replay_test

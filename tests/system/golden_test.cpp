@@ -14,8 +14,7 @@
 #include "tools/inspect/dump/dump.h"
 #include "tools/inspect/verify/verify.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::golden_test {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
@@ -146,5 +145,4 @@ TEST(GoldenPackages, TheMajorVersionHasOne) {
   })) << "run tests/golden/make, see its README.md";
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::golden_test

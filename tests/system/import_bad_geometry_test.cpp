@@ -16,8 +16,7 @@
 #include "tools/extract/glb/standalone_glb.h"
 #include "tools/inspect/verify/verify.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::import_bad_geometry_test {
 
 struct EdgeCounts {
   std::size_t border = 0, non_manifold = 0;
@@ -190,5 +189,4 @@ TEST_F(BadGeometry, SheetsThatLieOnThemselves) {
   EXPECT_GE(scales_, 1u);
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::import_bad_geometry_test

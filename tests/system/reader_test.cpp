@@ -16,8 +16,7 @@
 #include "tests/support/command.h"
 #include "tools/inspect/verify/verify.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::reader_test {
 
 namespace fs = std::filesystem;
 using testing::CommandResult;
@@ -342,5 +341,4 @@ TEST_F(SecondReader, ReadsTheTreeAsWell) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::reader_test

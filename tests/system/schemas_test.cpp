@@ -20,8 +20,7 @@
 #include "tools/inspect/package_tree.h"
 #include "tools/inspect/provenance.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::schemas_test {
 
 std::span<const std::uint8_t> bytes_of(const std::string& s) {
   return {reinterpret_cast<const std::uint8_t*>(s.data()), s.size()};
@@ -117,5 +116,4 @@ TEST(Collection, NamesThePlaceOfAFault) {
   EXPECT_NE(place_of(std::string(100000, '[')), "no error");
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::schemas_test

@@ -11,8 +11,7 @@
 #include "pipeline/io/file_resolver.h"
 #include "tests/stages/simplification/simplification_checks.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::simplification_real_test {
 namespace fs = std::filesystem;
 
 fs::path data_folder() {
@@ -39,5 +38,4 @@ TEST(SimplificationOfRealScans, FlightHelmet) { expect_no_cracks("flight_helmet/
 TEST(SimplificationOfRealScans, Saxophone) { expect_no_cracks("saxophone/saxophone.glb", 0.12); }
 TEST(SimplificationOfRealScans, Yurt) { expect_no_cracks("yurt/yurt.glb", 0.1); }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::simplification_real_test

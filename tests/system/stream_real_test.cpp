@@ -17,8 +17,7 @@
 #include "tests/format/split/split_fixture.h"
 #include "tests/stages/simplification/simplification_checks.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::stream_real_test {
 namespace fs = std::filesystem;
 
 fs::path data_folder() {
@@ -110,5 +109,4 @@ TEST(StreamOfRealScans, Yurt) { expect_stream("yurt/yurt.glb", false); }
 TEST(StreamOfRealScans, FlightHelmet) { expect_stream("flight_helmet/FlightHelmet.gltf", true); }
 TEST(StreamOfRealScans, Saxophone) { expect_stream("saxophone/saxophone.glb", true); }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::stream_real_test

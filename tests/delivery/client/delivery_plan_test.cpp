@@ -9,8 +9,7 @@
 #include "format/rules/proxy_choice.h"
 #include "tests/format/container/package_fixture.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::delivery_plan_test {
 
 constexpr std::uint64_t kMeshBytes = 100'000, kSmallBytes = 20'000, kLargeBytes = 60'000;
 
@@ -188,5 +187,4 @@ TEST(DeliveryPlan, MemoryIsKept) {
   EXPECT_EQ(plan_delivery(package, none).scale, package.manifest().scales.back().scale);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::delivery_plan_test

@@ -16,8 +16,7 @@
 #include "tests/delivery/package/raw_server.h"
 #include "tests/format/container/package_fixture.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::texture_loader_test {
 
 using namespace testing;  // NOLINT: server and package of the tests
 
@@ -369,5 +368,4 @@ TEST(TextureLoader, MirrorsMustBeUrls) {
   EXPECT_THROW(open_transport(std::vector<std::string>{"/tmp/a.texmesh"}), InputError);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::texture_loader_test

@@ -12,8 +12,7 @@
 #include "format/rules/size_curve.h"
 #include "tests/support/packages.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::fragment_list_test {
 
 /// What texels lose more at 1000 px than at the table's 256 px: their plane has no mips.
 const double kLarger = std::pow(GroupCurve::kLossPerDoubling, std::log2(1000.0 / 256));
@@ -166,5 +165,4 @@ TEST(FragmentList, ThePolicyTakesTheRulesScaleAndTheListThatTimePays) {
   EXPECT_GT(planned_bytes_of(list_of(package, request, plan)), 0);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::fragment_list_test

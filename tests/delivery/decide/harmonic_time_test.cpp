@@ -13,8 +13,7 @@
 #include "delivery/cpp/simulate/simulation.h"
 #include "tests/delivery/decide/some_offers.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::harmonic_time_test {
 
 using testing::some_offers;
 
@@ -238,5 +237,4 @@ TEST(HarmonicTime, AsPrintedTheTimesAreThoseOfTheBytesAtBeta0) {
   EXPECT_NEAR(third->theta_s, 1 + credit, 1e-12);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::harmonic_time_test

@@ -5,8 +5,7 @@
 #include "format/container/layout.h"
 #include "tests/support/packages.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::texture_budget_test {
 
 PictureLosses losses(std::vector<float> flip) { return {flip, flip, flip}; }
 
@@ -106,5 +105,4 @@ TEST(TextureBudget, PictureAddsTheScale) {
   EXPECT_NEAR(budget.flip * budget.flip, texture * texture + scale * scale, 1e-12);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::texture_budget_test

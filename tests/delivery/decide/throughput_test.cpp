@@ -5,8 +5,7 @@
 
 #include <cmath>
 
-namespace texmesh {
-namespace {
+namespace texmesh::throughput_test {
 
 Throughput of(std::initializer_list<std::pair<double, double>> samples) {
   Throughput t(1000);
@@ -51,5 +50,4 @@ TEST(Throughput, TheMeanOfATimeCutsTransfersWhereItBegins) {
   EXPECT_GE(t.mean_bytes_s(1e-300), 0);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::throughput_test

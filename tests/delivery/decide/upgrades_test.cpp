@@ -5,8 +5,7 @@
 
 #include "tests/delivery/decide/some_offers.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::upgrades_test {
 
 using testing::some_offers;
 
@@ -28,5 +27,4 @@ TEST(Upgrades, GoByGainPerByteAndEndAtTheTop) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::upgrades_test

@@ -12,8 +12,7 @@
 #include "tests/delivery/package/raw_server.h"
 #include "tests/format/container/package_fixture.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::http_store_test {
 
 using namespace testing;        // the server
 const std::string& package() {  // its start is not all of the first picture
@@ -505,5 +504,4 @@ TEST(HttpStore, UrlsAreKnownAndPasswordsNotShown) {
   EXPECT_THROW(open_url("ftp://a/b"), InputError);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::http_store_test

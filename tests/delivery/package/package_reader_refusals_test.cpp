@@ -11,8 +11,7 @@
 #include "tests/format/split/split_fixture.h"
 #include "tests/support/packages.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::package_reader_refusals_test {
 
 using testing::PackageParts;
 using testing::PackagePatcher;
@@ -151,5 +150,4 @@ TEST(Refusals, TheUnchangedPackageIsRead) {
   EXPECT_NO_THROW(read_documents(testing::make_package(2)));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::package_reader_refusals_test

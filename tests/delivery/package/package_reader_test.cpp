@@ -13,8 +13,7 @@
 #include "format/base/errors.h"
 #include "tests/format/container/package_fixture.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::package_reader_test {
 
 namespace fs = std::filesystem;
 using testing::fake_fragment;
@@ -316,5 +315,4 @@ TEST(SelectScale, FollowsTheStepFunction) {
   EXPECT_EQ(select_scale(m, 1e12), 0);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::package_reader_test

@@ -8,8 +8,7 @@
 #include "format/base/errors.h"
 #include "tests/delivery/made_links.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::network_model_test {
 
 NetworkOptions link(double bytes_s) {
   NetworkOptions o;
@@ -144,5 +143,4 @@ TEST(BandwidthTrace, CsvIsReadOrItsLineIsNamed) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::network_model_test

@@ -11,8 +11,7 @@
 #include "delivery/cpp/simulate/simulation.h"
 #include "tests/delivery/made_links.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::transfer_test {
 
 HtcOptions options(double time_limit_s = 4) {
   HtcOptions o;
@@ -339,5 +338,4 @@ TEST(Transfer, AMirrorThatLacksAnEntryIsNotAskedForItAgain) {
   for (const MirrorShare& m : end.mirrors) EXPECT_EQ(m.dropped, "");
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::transfer_test

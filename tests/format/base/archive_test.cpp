@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace texmesh {
-namespace {
+namespace texmesh::archive_test {
 
 struct Inner {
   std::uint32_t a = 0;
@@ -61,5 +60,4 @@ TEST(Archive, DecodedAgain) {
   EXPECT_TRUE(again.flag);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::archive_test

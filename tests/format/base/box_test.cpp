@@ -4,8 +4,7 @@
 
 #include <vector>
 
-namespace texmesh {
-namespace {
+namespace texmesh::box_test {
 
 TEST(Box3, IsEmptyUntilItHoldsAPoint) {
   Box3d box;
@@ -43,5 +42,4 @@ TEST(BoundingSphere, StandsAroundTheMiddleOfTheBox) {
   EXPECT_EQ(sphere.radius, length(Vec3d{1, 0.25, 0}));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::box_test

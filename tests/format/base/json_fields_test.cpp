@@ -5,8 +5,7 @@
 
 #include "format/base/errors.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::json_fields_test {
 
 nlohmann::json parse(const std::string& text) {
   return parse_json(std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()), "x.json",
@@ -36,5 +35,4 @@ TEST(ParseJson, ManySmallObjectsTakeLinearTime) {  // in square time this would 
   EXPECT_EQ(parse(text + "]}")["all"].size(), 500'000u);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::json_fields_test

@@ -6,8 +6,7 @@
 #include <cmath>
 #include <limits>
 
-namespace texmesh {
-namespace {
+namespace texmesh::number16_test {
 
 TEST(Half, RoundsToNearestEven) {
   for (std::uint32_t code = 0; code <= kLargestHalf; ++code) {
@@ -25,5 +24,4 @@ TEST(Half, RoundsToNearestEven) {
   EXPECT_EQ(from_half(kLargestHalf), 65504.0f);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::number16_test

@@ -4,8 +4,7 @@
 
 #include <cmath>
 
-namespace texmesh {
-namespace {
+namespace texmesh::portable_math_test {
 
 TEST(PortableMath, AgreesWithLibmToTheLastFewBits) {
   for (int i = -2000; i <= 2000; ++i) {
@@ -34,5 +33,4 @@ TEST(PortableMath, Limits) {
   EXPECT_EQ(portable::atan2(0, 0), 0);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::portable_math_test

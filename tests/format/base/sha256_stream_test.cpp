@@ -7,8 +7,7 @@
 #include <string_view>
 #include <vector>
 
-namespace texmesh {
-namespace {
+namespace texmesh::sha256_stream_test {
 
 std::vector<std::uint8_t> made_bytes(std::size_t size) {
   std::vector<std::uint8_t> out;
@@ -45,5 +44,4 @@ TEST(Sha256, PiecesOfAnySize) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::sha256_stream_test

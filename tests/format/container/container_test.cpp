@@ -12,8 +12,7 @@
 #include <fstream>
 #include <map>
 
-namespace texmesh {
-namespace {
+namespace texmesh::container_test {
 
 Bytes write(const std::vector<std::pair<std::string, Bytes>>& files) {
   Bytes out;
@@ -297,5 +296,4 @@ TEST(Container, FileSourceRefusesWhatIsNoFile) {
   std::filesystem::remove(fifo);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::container_test

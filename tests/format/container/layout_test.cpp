@@ -8,8 +8,7 @@
 
 #include "format/container/container.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::layout_test {
 
 TEST(Layout, PathsParseOnlyInTheirCanonicalSpelling) {
   EXPECT_EQ(parse_entry_path(mesh_path(7)).kind, EntryKind::kMesh);
@@ -84,5 +83,4 @@ TEST(Layout, StreamingOrder) {
                                 "provenance.json"}));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::layout_test

@@ -7,8 +7,7 @@
 #include "format/base/errors.h"
 #include "tests/format/documents/manifest_fixture.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::about_test {
 
 using testing::as_bytes;
 
@@ -127,5 +126,4 @@ TEST(AboutDocument, CopyrightLineNamesTheLicenceOnce) {
   EXPECT_EQ(copyright_line(a), "A. Smith; B. Jones");
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::about_test

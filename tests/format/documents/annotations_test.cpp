@@ -5,8 +5,7 @@
 #include "format/base/errors.h"
 #include "tests/format/documents/manifest_fixture.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::annotations_test {
 
 using testing::as_bytes;
 
@@ -101,5 +100,4 @@ TEST(AnnotationsDocument, PointsFarOutsideTheBoxAreNamed) {
   EXPECT_EQ(annotations_outside(all, box), std::vector<std::size_t>{2});
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::annotations_test

@@ -8,8 +8,7 @@
 #include "format/container/container.h"
 #include "tests/format/documents/manifest_fixture.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::index_test {
 
 using testing::as_bytes;
 using testing::make_manifest;
@@ -87,5 +86,4 @@ TEST(Index, WriterRefusesBadEntries) {
   refused([](Entries& e) { e[0].bytes = 1u << 30; });
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::index_test

@@ -9,8 +9,7 @@
 #include "format/container/layout.h"
 #include "tests/format/documents/manifest_fixture.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::manifest_test {
 
 using testing::as_bytes;
 using testing::make_manifest;
@@ -307,5 +306,4 @@ TEST(Manifest, TheStartEndsWithTheCoarsestGlb) {
   EXPECT_EQ(start_bytes(m), m.scales[4].glb.offset + m.scales[4].glb.bytes);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::manifest_test

@@ -7,8 +7,7 @@
 #include "format/base/errors.h"
 #include "format/documents/thesis_tables.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::perceptual_table_test {
 
 /// Scales 0, 2 and 5: pairs (0, 2), (0, 5), (2, 5).
 PerceptualTable three_scales() {
@@ -90,5 +89,4 @@ TEST(PerceptualTable, ATableOfAPlaneIsRefused) {
   EXPECT_THROW(read_thesis(file), FormatError);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::perceptual_table_test

@@ -10,8 +10,7 @@
 #include "format/base/errors.h"
 #include "tests/format/documents/tables_fixture.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::quality_table_test {
 
 PictureLosses losses(std::vector<float> flip) { return {flip, flip, flip}; }
 
@@ -96,5 +95,4 @@ TEST(Quality, FloatsSurviveTheirDecimalForm) {
   EXPECT_EQ(read_quality(bytes_of(write_quality(t))), t);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::quality_table_test

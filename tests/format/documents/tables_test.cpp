@@ -10,8 +10,7 @@
 #include "format/base/errors.h"
 #include "tests/format/documents/tables_fixture.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::tables_test {
 
 using testing::make_tables;
 PackageTables small() { return {{make_tables(3, 2, 2, 2), make_tables(1, 1, 1, 1)}}; }
@@ -318,5 +317,4 @@ TEST(Tables, TheWeightOfDensityNeedsVersion21) {
   EXPECT_THROW(write_tables({{t}}, 1), FormatError) << "nobody reads it";
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::tables_test

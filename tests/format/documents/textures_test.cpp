@@ -10,8 +10,7 @@
 #include "format/container/container.h"
 #include "tests/format/documents/manifest_fixture.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::textures_test {
 
 using testing::as_bytes;
 using testing::make_manifest;
@@ -155,5 +154,4 @@ TEST(Textures, RulesAreChecked) {
   refused("name", [](Json& j) { j["name"] = "a\x1b[2J"; });
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::textures_test

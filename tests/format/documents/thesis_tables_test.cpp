@@ -7,8 +7,7 @@
 #include "format/base/bytes.h"
 #include "format/base/errors.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::thesis_tables_test {
 
 /// Planes 0 and 2, of two fragments and three scales; nothing is said of plane 1.
 ThesisTables small_thesis() {
@@ -154,5 +153,4 @@ TEST(ThesisTables, WidthsHoldTheLargestSize) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::thesis_tables_test

@@ -4,8 +4,7 @@
 
 #include <algorithm>
 
-namespace texmesh {
-namespace {
+namespace texmesh::tangents_test {
 
 constexpr std::uint32_t kColumns = 5, kRows = 3;
 
@@ -147,5 +146,4 @@ TEST(Tangents, ManyTrianglesAtAnEdgeTakeNoLonger) {
   EXPECT_EQ(fan.tangents.size(), fan.wedge_count());
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::tangents_test

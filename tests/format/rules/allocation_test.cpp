@@ -11,8 +11,7 @@
 #include "format/base/bytes.h"
 #include "tests/format/documents/tables_fixture.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::allocation_test {
 
 using testing::make_tables;
 PlaneTables allocation_case(std::uint8_t allocation) {
@@ -101,5 +100,4 @@ TEST(Allocation, DensityOfTheScaleTakesThatOfTheFinestsPlaceInVqp) {
   EXPECT_EQ(eta_of(t, 1)[2], 0) << "within 0 .. 1";
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::allocation_test

@@ -4,8 +4,7 @@
 
 #include <cmath>
 
-namespace texmesh {
-namespace {
+namespace texmesh::jnd_choice_test {
 
 /// The thesis's Table 7.1, averages, and Table 7.2.
 const std::vector<float> kTable71{0, 0.0410f, 0.0412f, 0.0478f, 0.0468f, 0.0678f};
@@ -76,5 +75,4 @@ TEST(JndChoice, StatisticsAndChainsComeFromTheirOwnArrays) {
             (std::vector<float>{10, 11, 12}));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::jnd_choice_test

@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace texmesh {
-namespace {
+namespace texmesh::mip_choice_test {
 
 TEST(MipChoice, LevelOfADisplay) {
   PlaneTables t;
@@ -31,5 +30,4 @@ TEST(MipChoice, PlaneWithTheLargestMipWithinALevel) {
   EXPECT_EQ(plane_at_level(textures, 1, 50), 1u) << "a texture without mips";
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::mip_choice_test

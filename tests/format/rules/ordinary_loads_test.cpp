@@ -5,8 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace texmesh {
-namespace {
+namespace texmesh::ordinary_loads_test {
 
 TEST(OrdinaryLoads, SpanLinksDisplaysAndTimesOnLogarithmicScales) {
   const auto loads = ordinary_loads();
@@ -39,5 +38,4 @@ TEST(OrdinaryLoads, FewerAreTheFirstOfMore) {
   EXPECT_NE(more[3].bytes_s, more[4].bytes_s);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::ordinary_loads_test

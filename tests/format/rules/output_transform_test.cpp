@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace texmesh {
-namespace {
+namespace texmesh::output_transform_test {
 
 About about_of(const std::string& unit, double metres, const std::string& up) {
   About about;
@@ -72,5 +71,4 @@ TEST(OutputTransform, SaysWhatAUserMustKnow) {
   EXPECT_NE(note(about_of("mm", 0.001, ""), true).find("in mm"), std::string::npos);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::output_transform_test

@@ -4,8 +4,7 @@
 
 #include <cmath>
 
-namespace texmesh {
-namespace {
+namespace texmesh::picture_prediction_test {
 
 PictureLosses losses(std::vector<float> flip) { return {flip, flip, flip}; }
 
@@ -185,5 +184,4 @@ TEST(CombinedFlip, AddsUpByTheExponent) {
   EXPECT_NEAR(combined_flip(make_table(3), std::vector<double>{0.25}), 0.25, 1e-12);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::picture_prediction_test

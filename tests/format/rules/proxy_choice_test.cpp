@@ -4,8 +4,7 @@
 
 #include <cmath>
 
-namespace texmesh {
-namespace {
+namespace texmesh::proxy_choice_test {
 
 /// A rough and a good proxy, measured at 128 and 512 px.
 Manifest two_proxies() {
@@ -61,5 +60,4 @@ TEST(ProxyChoice, BytesBehindTheFirstRequest) {
   EXPECT_EQ(proxy_bytes_beyond_start(m, 1), 28224 + 50000 - kStartBytes);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::proxy_choice_test

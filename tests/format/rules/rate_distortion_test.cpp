@@ -9,8 +9,7 @@
 #include "format/rules/allocation.h"
 #include "tests/format/documents/tables_fixture.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::rate_distortion_test {
 
 using testing::make_tables;
 
@@ -193,5 +192,4 @@ TEST(RungsOf, FollowTheAllocation) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::rate_distortion_test

@@ -10,8 +10,7 @@
 #include "format/documents/tables.h"
 #include "tests/format/documents/tables_fixture.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::size_curve_test {
 
 using testing::make_tables;
 
@@ -84,5 +83,4 @@ TEST(InterpolatedBytes, KnotsBendTheWayBetweenRungs) {
   EXPECT_LT(interpolated_bytes(t, 0, 12), interpolated_bytes(t, 0, 13));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::size_curve_test

@@ -4,8 +4,7 @@
 
 #include <cmath>
 
-namespace texmesh {
-namespace {
+namespace texmesh::size_model_test {
 
 /// The thesis's texture (x): A = 825.45, B = .34.
 const SizeModel kTextureX{825.45f, 0.34f, 0.98f};
@@ -30,5 +29,4 @@ TEST(SizeModelRule, WithoutAModelThereIsNothing) {
   EXPECT_EQ(modelled_quality({100, 0, 0}, 0.5, 1000), 0);  // bytes that do not grow tell no quality
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::size_model_test

@@ -3,8 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace texmesh {
-namespace {
+namespace texmesh::split_mix_test {
 
 TEST(SplitMix, GivesThePublishedNumbers) {
   SplitMix random(1234567);  // the values that implementations are compared by
@@ -25,5 +24,4 @@ TEST(SplitMix, UnitsAreEvenBetween0And1) {
   EXPECT_NEAR(sum / 100000, 0.5, 0.01);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::split_mix_test

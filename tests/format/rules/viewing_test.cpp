@@ -7,8 +7,7 @@
 
 #include "format/base/errors.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::viewing_test {
 
 /// Scales 0, 3, 7, 9; heights up to which the coarser three are enough by JND, error, edges and lit pictures.
 Manifest make_manifest() {
@@ -177,5 +176,4 @@ TEST(Viewing, ASmallerPartNeverAllowsMoreErrorRelativeToIt) {
   EXPECT_EQ(last, 0);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::viewing_test

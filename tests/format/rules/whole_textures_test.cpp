@@ -4,8 +4,7 @@
 
 #include "format/rules/picture_prediction.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::whole_textures_test {
 
 PictureLosses same(std::vector<float> flip) { return {flip, flip, flip}; }
 
@@ -87,5 +86,4 @@ TEST_F(WholeTextures, OfAnObjectWithoutTexturesThereAreNone) {
   EXPECT_TRUE(least(256, 0.06).empty());
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::whole_textures_test

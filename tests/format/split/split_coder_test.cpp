@@ -4,8 +4,7 @@
 
 #include <cmath>
 
-namespace texmesh {
-namespace {
+namespace texmesh::split_coder_test {
 
 struct Random {
   std::uint64_t state;
@@ -120,5 +119,4 @@ TEST(ResidualCodec, AnyBytesDecodeToResidualsOfBoundedLength) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::split_coder_test

@@ -11,8 +11,7 @@
 #include "format/split/split_writer.h"
 #include "tests/format/split/split_fixture.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::split_stream_test {
 
 using testing::corners_of;
 using testing::split_fixture;
@@ -320,5 +319,4 @@ TEST(SplitStream, OctahedralCodesAreTheNearest) {
   EXPECT_EQ(octahedral_code({0, 0, 0}, 10), octahedral_code({0, 0, 1}, 10));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::split_stream_test

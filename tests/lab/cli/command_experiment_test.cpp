@@ -10,8 +10,7 @@
 #include "tests/support/schema.h"
 #include "tests/support/small_builds.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::command_experiment_test {
 
 using Json = nlohmann::json;
 
@@ -182,5 +181,4 @@ TEST_F(ExperimentCommand, AnswersAreComparedWithTheDesign) {
   EXPECT_NE(r.errors.find("the given design"), std::string::npos) << r.errors;
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::command_experiment_test

@@ -9,8 +9,7 @@
 #include "tests/support/command.h"
 #include "tests/support/schema.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::command_simulate_test {
 
 using Json = nlohmann::json;
 const std::string kGolden = std::string(TEXMESH_SOURCE_DIR) + "/tests/golden/v2.0-scan.texmesh";
@@ -156,5 +155,4 @@ TEST(Lab, ShellsKnowItsCommands) {
   EXPECT_NE(lab({"--help"}).output.find("experiment"), std::string::npos);
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::command_simulate_test

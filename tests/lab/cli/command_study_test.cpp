@@ -8,8 +8,7 @@
 #include "tests/support/command.h"
 #include "tests/support/images.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::command_study_test {
 
 using Json = nlohmann::json;
 
@@ -222,5 +221,4 @@ TEST_F(StudyCommand, TheThesisStandsBesideTheDefaultsInOneTable) {
   EXPECT_EQ(texmesh({"study", "method", "scan.glb", "--thesis", package}).exit_code, 2);
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::command_study_test

@@ -14,8 +14,7 @@
 #include "stages/image/decode_image.h"
 #include "tests/tools/inspect/pictures/painted_pictures.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::picture_quantities_test {
 
 using nlohmann::json;
 using namespace testing;  // NOLINT: of painted pictures
@@ -109,5 +108,4 @@ TEST(PictureQuantities, CollapseErrorIsLogarithmicAndSurvivorsHaveTheHighestColo
   EXPECT_EQ(faults(write_painted_glb(paint_collapse_error(scales))), "");
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::picture_quantities_test

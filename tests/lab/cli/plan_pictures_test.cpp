@@ -6,8 +6,7 @@
 #include "tools/extract/package_model.h"
 #include "tools/render/rendered_model.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::plan_pictures_test {
 
 PackageReader open_scan() {
   return PackageReader(open_store(std::string(TEXMESH_SOURCE_DIR) + "/tests/golden/v2.0-scan.texmesh"));
@@ -109,5 +108,4 @@ TEST(PlanPictures, AScaleMayHaveLostTheLastTriangleOfATexture) {
   EXPECT_GT(fewer, 0) << "no package tries it";
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::plan_pictures_test

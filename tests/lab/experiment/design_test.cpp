@@ -9,8 +9,7 @@
 
 #include "format/base/errors.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::design_test {
 
 ExperimentDesign planned(std::uint64_t seed = 1, int repeats = 6, int catches = 6) {
   ExperimentDesign d;
@@ -128,5 +127,4 @@ TEST(Design, IsReadAgainAndKnowsWhenItWasChanged) {
   EXPECT_NE(place(std::string(100000, '[')), "none");
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::design_test

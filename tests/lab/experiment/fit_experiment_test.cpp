@@ -8,8 +8,7 @@
 #include "pipeline/compile/options.h"
 #include "tests/lab/experiment/simulated_results.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::fit_experiment_test {
 
 using testing::simulated_design;
 using testing::simulated_results;
@@ -178,5 +177,4 @@ TEST(FitExperiment, NamesOfFilesAndJudgesStayText) {
   EXPECT_NE(fit_page(fitted(results)).find("&lt;b&gt;"), std::string::npos);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::fit_experiment_test

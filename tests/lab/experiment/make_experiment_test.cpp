@@ -11,8 +11,7 @@
 #include "stages/image/decode_image.h"
 #include "stages/image/png_writer.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::make_experiment_test {
 
 namespace fs = std::filesystem;
 
@@ -151,5 +150,4 @@ TEST(PaddedPng, IsAsLongAsAskedAndShowsTheSame) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::make_experiment_test

@@ -7,8 +7,7 @@
 #include "format/base/errors.h"
 #include "tests/lab/experiment/simulated_results.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::results_test {
 
 using nlohmann::json;
 
@@ -132,5 +131,4 @@ TEST(Results, WhatIsNoDocument) {
   EXPECT_NE(refused(R"({"version":1,"version":1})"), "none");
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::results_test

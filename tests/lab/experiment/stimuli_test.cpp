@@ -7,8 +7,7 @@
 
 #include "format/base/vec.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::stimuli_test {
 
 Vec3d sides(const Mesh& mesh) {
   const auto s = bounding_box(mesh.positions).size();
@@ -108,5 +107,4 @@ TEST(Stimuli, TheSeedDecides) {
             shape_mesh(draw_shapes(StimulusKind::kQuadrics, 2, 6)[1], 0).positions);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::stimuli_test

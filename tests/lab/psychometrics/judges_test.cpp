@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace texmesh {
-namespace {
+namespace texmesh::judges_test {
 
 TEST(Judges, BinomialTails) {
   EXPECT_DOUBLE_EQ(binomial_at_most(0, 3, 0.5), 0.125);
@@ -39,5 +38,4 @@ TEST(Judges, TooFew) {
   EXPECT_EQ(screen_judge({0, 0, 0, 0}), JudgeVerdict::kTooFew);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::judges_test

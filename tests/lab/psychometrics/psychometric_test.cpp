@@ -7,8 +7,7 @@
 
 #include "format/rules/split_mix.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::psychometric_test {
 
 using Counts = std::vector<LevelCount>;
 
@@ -119,5 +118,4 @@ TEST(Psychometric, TheLineIsThatOfThePrintedFigure) {
   EXPECT_TRUE(std::isnan(fit_line(Counts{{0.1, 10, 9}}).threshold));  // one level makes no line
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::psychometric_test

@@ -7,8 +7,7 @@
 
 #include "format/rules/split_mix.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::threshold_study_test {
 
 const std::vector<double> kSizes{64, 128, 256};
 const RunContext kOneThread{1, {}, nullptr}, kEightThreads{8, {}, nullptr};
@@ -111,5 +110,4 @@ TEST(ThresholdStudy, Refuses) {
   EXPECT_THROW(study_thresholds({}, kSizes, 100, 7, kOneThread), std::invalid_argument);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::threshold_study_test

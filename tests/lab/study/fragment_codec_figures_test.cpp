@@ -19,8 +19,7 @@
 #include "tests/support/made_texture.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::fragment_codec_figures_test {
 
 using testing::made_texture, testing::make_scene, testing::Scene, testing::texture_hash, testing::threads;
 
@@ -145,5 +144,4 @@ TEST(TextureFigures, AllocationsAgainstOneQualityEverywhereAtEqualLossOfTheSurfa
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::fragment_codec_figures_test

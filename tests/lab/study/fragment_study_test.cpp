@@ -8,8 +8,7 @@
 #include "stages/jpeg/jpeg_coder.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::fragment_study_test {
 
 Pixels picture(std::uint32_t width, std::uint32_t height, std::uint32_t channels) {
   testing::Random random{77};
@@ -164,5 +163,4 @@ TEST(FragmentStudy, ADecodeIsTimedByTheClockThatIsGiven) {
   EXPECT_EQ(now, 24) << "two looks at the clock, three times each, of two ways and two rows";
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::fragment_study_test

@@ -7,8 +7,7 @@
 
 #include "tests/tools/publish/pages/html_check.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::exhibit_page_test {
 
 Exhibit small_exhibit() {
   Exhibit e{"9.9", "Table 9.9: <b> & so on", "printed", "made", {}, Verdict::kNotConfirmed, "no <more>"};
@@ -77,5 +76,4 @@ TEST(Exhibits, EveryIdStandsOnceAndTablesOfTheThesisAreThere) {
   EXPECT_TRUE(make_exhibits({"no such id"}, {}).empty());
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::exhibit_page_test

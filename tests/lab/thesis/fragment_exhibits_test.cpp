@@ -3,8 +3,7 @@
 #include "lab/thesis/exhibits.h"
 #include "tests/lab/thesis/exhibit_rows.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::fragment_exhibits_test {
 
 using namespace testing;  // NOLINT: fixtures
 
@@ -42,5 +41,4 @@ TEST(FragmentExhibits, TablesOfSizes) {
           << "a row stands there twice: " << k;
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::fragment_exhibits_test

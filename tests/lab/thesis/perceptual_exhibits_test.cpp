@@ -5,8 +5,7 @@
 #include "lab/thesis/exhibits.h"
 #include "tests/lab/thesis/exhibit_rows.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::perceptual_exhibits_test {
 
 using namespace testing;  // NOLINT: fixtures
 
@@ -81,5 +80,4 @@ TEST(PerceptualExhibits, AreTheSameForAnyThreads) {
     EXPECT_EQ(exhibit_text(again[k]), exhibit_text(perceptions()[k]));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::perceptual_exhibits_test

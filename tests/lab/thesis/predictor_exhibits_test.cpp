@@ -6,8 +6,7 @@
 #include "lab/thesis/made_models.h"
 #include "tests/lab/thesis/exhibit_rows.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::predictor_exhibits_test {
 
 using namespace testing;  // NOLINT: fixtures
 
@@ -89,5 +88,4 @@ TEST(PredictorExhibits, Fig84BytesGrowWithQualityAndTheModelIsAnExponential) {
   EXPECT_EQ(e.plots[0].series.size(), 8u);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::predictor_exhibits_test

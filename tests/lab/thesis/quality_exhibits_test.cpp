@@ -3,8 +3,7 @@
 #include "lab/thesis/exhibits.h"
 #include "tests/lab/thesis/exhibit_rows.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::quality_exhibits_test {
 
 using namespace testing;  // NOLINT: fixtures
 
@@ -24,5 +23,4 @@ TEST(QualityExhibits, Fig39ComparesEqualBytes) {
   EXPECT_EQ(e.pictures[0].width_px, 3 * e.pictures[0].height_px);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::quality_exhibits_test

@@ -4,8 +4,7 @@
 #include "lab/thesis/made_models.h"
 #include "tests/lab/thesis/exhibit_rows.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::scale_exhibits_test {
 
 using namespace testing;  // NOLINT: fixtures
 
@@ -63,5 +62,4 @@ TEST(ScaleExhibits, Fig62CurvesFall) {
   EXPECT_EQ(e.verdict, Verdict::kConfirmed) << e.finding;
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::scale_exhibits_test

@@ -5,8 +5,7 @@
 #include "lab/thesis/exhibits.h"
 #include "tests/lab/thesis/exhibit_rows.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::transfer_exhibits_test {
 
 using namespace testing;  // NOLINT: fixtures
 
@@ -92,5 +91,4 @@ TEST(TransferExhibits, NetworksAreJudgedByTheirRuns) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::transfer_exhibits_test

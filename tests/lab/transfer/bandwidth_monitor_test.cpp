@@ -6,8 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
-namespace texmesh {
-namespace {
+namespace texmesh::bandwidth_monitor_test {
 
 TEST(BandwidthMonitor, FixedPacketsGoOutAtRegularIntervals) {
   BandwidthMonitor m({ProbeMode::kFixed, 1000, 0.5, 1e5});
@@ -65,5 +64,4 @@ TEST(BandwidthMonitor, WhatComesWithinARoundTripIsNoInfiniteRate) {
   EXPECT_NEAR(m.samples()[0].bytes_s, 1000 / 0.002, 1e-6);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::bandwidth_monitor_test

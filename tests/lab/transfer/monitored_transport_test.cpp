@@ -8,8 +8,7 @@
 #include "lab/transfer/chapter_4.h"
 #include "lab/transfer/policies.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::monitored_transport_test {
 
 NetworkOptions link(double bytes_s) {
   NetworkOptions n;
@@ -61,5 +60,4 @@ TEST(MonitoredTransport, SendsNothingWhileOffAndEndsWithDeadServers) {
   EXPECT_LE(probes.samples.size() + 1, probes.packets);  // the last one never came
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::monitored_transport_test

@@ -9,8 +9,7 @@
 #include "format/split/split_writer.h"
 #include "tests/format/split/split_fixture.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::packet_loss_test {
 
 struct Stream {
   Bytes bytes = write_split_stream(testing::split_fixture(17).source);
@@ -94,5 +93,4 @@ TEST(PacketLoss, AStreamThatEndsIsRefused) {
   EXPECT_ANY_THROW(mesh_with_losses(s.head, cut, s.last, {}, SplitFill::kTexture));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::packet_loss_test

@@ -11,8 +11,7 @@
 #include "lab/transfer/chapter_4.h"
 #include "tests/delivery/decide/some_offers.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::policies_test {
 
 using testing::some_offers;
 
@@ -281,5 +280,4 @@ TEST(Table42, ThePublishedOrderMissesTheFirstRows) {
   for (std::size_t i = 5; i < rows.size(); ++i) EXPECT_LE(rows[i].deviation_percent, 0.5) << i;
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::policies_test

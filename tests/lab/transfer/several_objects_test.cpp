@@ -9,8 +9,7 @@
 
 #include "tests/format/container/package_fixture.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::several_objects_test {
 
 /// Packages with meshes of 100 kB.
 struct Objects {
@@ -88,5 +87,4 @@ TEST(SeveralObjects, NoLinkAndNoObject) {
   EXPECT_EQ(again.textures.rungs, same.textures.rungs);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::several_objects_test

@@ -5,8 +5,7 @@
 #include "tests/delivery/vector_decisions.h"
 #include "tests/delivery/vector_packages.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::vectors_test {
 
 LabOptions lab_options(const VectorOptions& o) {
   const auto at = [](const std::string& name, const std::vector<std::string>& names) {
@@ -63,5 +62,4 @@ TEST(Vectors, Packages) {
               packages(every_policy));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::vectors_test

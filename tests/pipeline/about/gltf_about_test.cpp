@@ -4,8 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-namespace texmesh {
-namespace {
+namespace texmesh::gltf_about_test {
 
 using nlohmann::json;
 using nlohmann::ordered_json;
@@ -156,5 +155,4 @@ TEST(GltfAbout, ASmallFileKeepsWhoseItIs) {
   EXPECT_EQ(least.attribution, a.attribution);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::gltf_about_test

@@ -7,8 +7,7 @@
 
 #include "pipeline/about/code_tables.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::licence_test {
 
 using Kind = Licence::Kind;
 
@@ -88,5 +87,4 @@ TEST(CodeTables, AreSortedAndWithoutGapsInTheirOrder) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::licence_test

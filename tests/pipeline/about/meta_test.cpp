@@ -4,8 +4,7 @@
 
 #include "format/base/errors.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::meta_test {
 
 std::string place_of(const std::string& json) {
   try {
@@ -57,5 +56,4 @@ TEST(Meta, MergesFieldByField) {
   EXPECT_EQ(up_axis_of_meta("{}"), "");
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::meta_test

@@ -5,8 +5,7 @@
 #include "format/base/errors.h"
 #include "format/base/text_bytes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::source_annotations_test {
 
 struct Read {
   Annotations all;
@@ -128,5 +127,4 @@ TEST(SourceAnnotations, LanguagesThatAreNoTagsAreNotKnown) {
   EXPECT_EQ(r.all.list[0].texts[0].language, "und");
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::source_annotations_test

@@ -4,8 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-namespace texmesh {
-namespace {
+namespace texmesh::source_fields_test {
 
 TEST(SourceFields, CommentsOfTheListGiveFieldsAndOthersAreIgnored) {
   Notes notes;
@@ -89,5 +88,4 @@ TEST(SourceFields, UnitsByName) {
   EXPECT_FALSE(find_unit("", a));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::source_fields_test

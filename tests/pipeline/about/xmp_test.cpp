@@ -4,8 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-namespace texmesh {
-namespace {
+namespace texmesh::xmp_test {
 
 using nlohmann::json;
 using nlohmann::ordered_json;
@@ -85,5 +84,4 @@ TEST(Xmp, WhatThePacketHasBesideStays) {
   EXPECT_EQ(about_of(after.dump()).title, "New");
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::xmp_test

@@ -9,8 +9,7 @@
 #include "pipeline/io/names/similar_names.h"
 #include "tests/support/command.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::build_memo_test {
 namespace fs = std::filesystem;
 using testing::TemporaryFolder;
 
@@ -324,5 +323,4 @@ TEST_F(Memo, AFailureNeedsNoPackageAndNoFilesProveNothing) {
   EXPECT_FALSE(holds(r));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::build_memo_test

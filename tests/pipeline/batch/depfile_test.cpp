@@ -6,8 +6,7 @@
 #include "format/base/errors.h"
 #include "tests/support/command.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::depfile_test {
 
 TEST(Depfile, EscapesWhatBothKnow) {
   EXPECT_EQ(write_depfile("o.texmesh", {"a b#c:d$e.obj"}),
@@ -38,5 +37,4 @@ TEST(Depfile, MakeSeesEveryDependency) {
   EXPECT_EQ(make("-q").exit_code, 1);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::depfile_test

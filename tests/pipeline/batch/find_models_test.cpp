@@ -9,8 +9,7 @@
 #include "format/base/errors.h"
 #include "tests/support/command.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::find_models_test {
 namespace fs = std::filesystem;
 using testing::TemporaryFolder;
 using testing::write_text;
@@ -139,5 +138,4 @@ TEST(FindModels, AFolderWithoutModelsIsRefused) {
   EXPECT_THROW(find_models({folder.path().string()}, "out"), InputError);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::find_models_test

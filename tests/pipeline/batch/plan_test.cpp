@@ -12,8 +12,7 @@
 #include "pipeline/compile/options.h"
 #include "tests/support/command.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::plan_test {
 namespace fs = std::filesystem;
 using testing::TemporaryFolder;
 
@@ -267,5 +266,4 @@ TEST_F(Plan, EqualProfilesAreOneText) {
   EXPECT_EQ(texts.size(), 1u);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::plan_test

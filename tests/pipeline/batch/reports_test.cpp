@@ -14,8 +14,7 @@
 #include "pipeline/batch/progress.h"
 #include "tests/support/schema.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::reports_test {
 using Json = nlohmann::json;
 
 struct FakeRun {
@@ -218,5 +217,4 @@ TEST(Progress, EventsFollowTheirSchema) {
   EXPECT_TRUE(testing::follows_schema(Json::parse(out.str()), "event.v1")) << out.str();
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::reports_test

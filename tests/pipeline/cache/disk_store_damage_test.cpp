@@ -11,8 +11,7 @@
 #include "tests/pipeline/cache/cache_fixtures.h"
 #include "tests/support/command.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::disk_store_damage_test {
 namespace fs = std::filesystem;
 using Fate = QuarantineResult::Fate;
 
@@ -98,5 +97,4 @@ TEST_F(SharedBlob, WhoeverOnlyLooksTellsOfADamagedFileOnce) {
   EXPECT_EQ(read_text(path().string()), "runGs");
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::disk_store_damage_test

@@ -11,8 +11,7 @@
 #include "pipeline/cache/cache_files.h"
 #include "tests/pipeline/cache/cache_fixtures.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::disk_store_test {
 namespace fs = std::filesystem;
 using namespace testing;  // NOLINT: fixtures
 
@@ -204,5 +203,4 @@ TEST(DiskStore, LookingWritesNothing) {
   EXPECT_EQ(fs::last_write_time(record), time);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::disk_store_test

@@ -17,8 +17,7 @@
 #include "tests/pipeline/cache/cache_fixtures.h"
 #include "tests/support/small_builds.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::http_layer_faults_test {
 
 enum class Fault {
   kDies,      // and everybody who asks from then on is hung up on
@@ -249,5 +248,4 @@ TEST_F(ServerFaults, AtEveryAnswerCostTimeAndNothingElse) {
   EXPECT_LT(lost, points) << "some faults, such as a bit of an answer without a body, cost nothing";
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::http_layer_faults_test

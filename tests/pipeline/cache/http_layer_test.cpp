@@ -13,8 +13,7 @@
 #include "pipeline/cache/disk_store.h"
 #include "tests/support/command.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::http_layer_test {
 
 using testing::TemporaryFolder;
 
@@ -274,5 +273,4 @@ TEST(HttpLayer, OnlyHttp) {
   EXPECT_THROW(open_layer("ftp://host/cache"), InputError);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::http_layer_test

@@ -10,8 +10,7 @@
 #include "pipeline/cache/disk_store.h"
 #include "tests/pipeline/cache/cache_fixtures.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::layered_store_test {
 namespace fs = std::filesystem;
 using namespace testing;  // NOLINT: fixtures
 
@@ -78,5 +77,4 @@ TEST(LayeredStore, WhatIsRejectedIsNotBroughtAgain) {
   EXPECT_EQ(*store->load(store->find(key_of("a").digest())->front()), *bytes_of("result"));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::layered_store_test

@@ -10,8 +10,7 @@
 #include "pipeline/cache/disk_store.h"
 #include "tests/pipeline/cache/cache_fixtures.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::prune_test {
 namespace fs = std::filesystem;
 using namespace testing;  // NOLINT: fixtures
 
@@ -134,5 +133,4 @@ TEST(VerifyCache, FindsEveryFlippedBit) {
     EXPECT_EQ(store->find(key_of(std::to_string(i)).digest()).has_value(), i % 2 == 1);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::prune_test

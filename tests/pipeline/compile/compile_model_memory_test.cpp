@@ -7,8 +7,7 @@
 #include "tests/support/command.h"
 #include "tests/support/memory_store.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::compile_model_memory_test {
 
 /// A tent of two triangles in an OBJ file, and the cheapest options.
 class ModelMemory : public ::testing::Test {
@@ -54,5 +53,4 @@ TEST_F(ModelMemory, AStoreThatKeepsNothingChangesNoByte) {
   EXPECT_EQ(package, compiled(all));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::compile_model_memory_test

@@ -10,8 +10,7 @@
 #include "tests/support/images.h"
 #include "tests/support/memory_store.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::compile_model_reruns_test {
 
 using Ran = std::set<std::string>;
 
@@ -74,5 +73,4 @@ TEST_F(Reruns, AnotherPreviewQualityRunsWhatShowsOrMeasuresPreviews) {
     EXPECT_FALSE(ran.contains(stage)) << stage;
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::compile_model_reruns_test

@@ -5,8 +5,7 @@
 
 #include "format/base/errors.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::jnd_profile_test {
 
 void read(CompileOptions& options, const std::string& json) {
   read_jnd_profile(options, {reinterpret_cast<const std::uint8_t*>(json.data()), json.size()}, "jnd.json");
@@ -61,5 +60,4 @@ TEST(JndProfile, ErrorsNameThePlaceAndChangeNothing) {
   EXPECT_NE(place(std::string(5000, '[')), "none");
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::jnd_profile_test

@@ -10,8 +10,7 @@
 
 #include "format/base/errors.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::options_test {
 
 OptionField& field(std::vector<OptionField>& fields, const std::string& path) {
   OptionField* found = find_option(fields, path);
@@ -173,5 +172,4 @@ TEST(Options, DeepJsonIsRefusedBeforeItIsParsed) {
   EXPECT_THROW(read_profile(o, std::string(100000, '['), "deep"), InputError);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::options_test

@@ -6,8 +6,7 @@
 
 #include "pipeline/compile/options.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::stage_table_test {
 
 TEST(StageTable, EveryInputIsMadeBeforeItIsUsedAndEveryOptionIsRead) {
   std::set<std::string> read;
@@ -92,5 +91,4 @@ TEST(StageTable, AStageInTheMiddleNeedsOnlyWhatStandsBeforeIt) {
   EXPECT_EQ(names, (std::vector<std::string>{"import", "condition", "ssf"}));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::stage_table_test

@@ -7,8 +7,7 @@
 #include "tests/pipeline/graph/fake_graph.h"
 #include "tests/support/memory_store.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::explanation_test {
 
 using namespace testing;  // NOLINT: the fake graph
 
@@ -75,5 +74,4 @@ TEST(Explanation, AForecastRunsNothing) {
   for (const auto& [name, e] : forecast({})) EXPECT_EQ(e.verdict, Verdict::kHit) << name;
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::explanation_test

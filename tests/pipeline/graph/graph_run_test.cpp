@@ -14,8 +14,7 @@
 #include "tests/pipeline/graph/fake_graph.h"
 #include "tests/support/memory_store.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::graph_run_test {
 
 using namespace testing;  // NOLINT: the fake graph
 
@@ -365,5 +364,4 @@ TEST(GraphRun, OfAThousandModelsOnlyWhatDependsOnAChangeRuns) {
   EXPECT_EQ(collection.ran.size(), static_cast<std::size_t>(kModels + kSensitive));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::graph_run_test

@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace texmesh {
-namespace {
+namespace texmesh::key_test {
 
 Key key_of(const std::string& option) { return Key("ladder", 3).add("option ladder.rungs", option); }
 
@@ -19,5 +18,4 @@ TEST(Key, DependsOnEveryPartAndOnItsLimits) {
             Key("s", 1).add("c", "d").add("a", "b").digest());
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::key_test

@@ -6,8 +6,7 @@
 
 #include "format/base/bytes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::count_triangles_test {
 
 Bytes bytes_of(const std::string& text, std::size_t more = 0) {
   Bytes out(text.begin(), text.end());
@@ -73,5 +72,4 @@ TEST(CountTriangles, WhatIsBrokenOrBoastsSaysNothing) {
   EXPECT_EQ(count_triangles("", {}), 0u);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::count_triangles_test

@@ -11,8 +11,7 @@
 #include "tests/pipeline/import/obj/obj_cases.h"
 #include "tests/support/chunks.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::field_test {
 
 using testing::kVertices;
 using testing::MemoryResolver;
@@ -510,5 +509,4 @@ TEST(Field, GlossThatNobodySeesCountsNot) {
   EXPECT_EQ(colour.width_px, 8u);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::field_test

@@ -13,8 +13,7 @@
 #include "tests/support/memory_resolver.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::finish_model_test {
 
 using testing::bytes_of;
 using testing::count_notes;
@@ -188,5 +187,4 @@ TEST(FinishModel, TangentsAreMadeSoundAndKeptOnlyWhereTheyCount) {
   EXPECT_EQ(finished(m, {.up = UpAxis::kZ}).mesh.tangents[2], (Vec4f{0, 0, -1, -1}));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::finish_model_test

@@ -12,8 +12,7 @@
 #include "stages/image/decode_image.h"
 #include "tests/support/memory_resolver.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::import_data_test {
 
 using testing::count_notes;
 
@@ -130,5 +129,4 @@ TEST(ImportDataPairs, ObjAndPlyOfFranAgree) {
     }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::import_data_test

@@ -13,8 +13,7 @@
 #include "tests/support/memory_resolver.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::import_images_test {
 
 using testing::bytes_of;
 using testing::count_notes;
@@ -130,5 +129,4 @@ TEST(AddImage, NotesSayThatTheFirstOfMorePicturesIsRead) {
   EXPECT_EQ(count_notes(m, "more-pictures"), 1);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::import_images_test

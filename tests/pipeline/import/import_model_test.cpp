@@ -10,8 +10,7 @@
 #include "tests/support/memory_resolver.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::import_model_test {
 
 using testing::bytes_of;
 using testing::count_notes;
@@ -95,5 +94,4 @@ TEST(ImportModel, AGltfKeepsItsExtrasAndItsCopyright) {
       << about.source;
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::import_model_test

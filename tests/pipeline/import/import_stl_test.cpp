@@ -7,8 +7,7 @@
 #include "pipeline/import/import.h"
 #include "tests/support/memory_resolver.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::import_stl_test {
 
 using testing::bytes_of;
 using testing::count_notes;
@@ -135,5 +134,4 @@ TEST(ImportStl, NanPositions) {
   EXPECT_THROW(import(binary_stl(triangles)), InputError);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::import_stl_test

@@ -5,8 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace texmesh {
-namespace {
+namespace texmesh::local_frame_test {
 
 TEST(SetPositions, NearModelsKeepTheirCoordinatesAndFarOnesGetAnOrigin) {
   Mesh mesh;
@@ -25,5 +24,4 @@ TEST(SetPositions, NearModelsKeepTheirCoordinatesAndFarOnesGetAnOrigin) {
   EXPECT_TRUE(mesh.positions.empty());
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::local_frame_test

@@ -9,8 +9,7 @@
 #include "tests/pipeline/import/gltf/textured_gltf.h"
 #include "tests/pipeline/import/obj/obj_cases.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::lost_test {
 
 using testing::bytes_of;
 using testing::kTextured;
@@ -354,5 +353,4 @@ TEST(SeenAlpha, OnlyTexelsThatFacesShowDecideInEveryFormat) {
     EXPECT_EQ(testing::count_notes(model, "alpha-hides-all"), 1) << format;
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::lost_test

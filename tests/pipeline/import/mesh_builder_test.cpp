@@ -5,8 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace texmesh {
-namespace {
+namespace texmesh::mesh_builder_test {
 
 TEST(LinearFromSrgb, EndsAndMiddle) {
   EXPECT_EQ(linear_from_srgb(0), 0);
@@ -17,5 +16,4 @@ TEST(LinearFromSrgb, EndsAndMiddle) {
   EXPECT_NEAR(linear_from_srgb(0.5), 0.2140411, 1e-6);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::mesh_builder_test

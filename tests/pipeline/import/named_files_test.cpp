@@ -9,8 +9,7 @@
 #include "tests/support/images.h"
 #include "tests/support/memory_resolver.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::named_files_test {
 
 using testing::bytes_of;
 using testing::MemoryResolver;
@@ -278,5 +277,4 @@ TEST(NamedFiles, HostileNamesCostLittleAndRefuseNothing) {
   expect_in_every_format(cases);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::named_files_test

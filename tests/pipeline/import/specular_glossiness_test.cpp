@@ -7,8 +7,7 @@
 #include "stages/image/decode_image.h"
 #include "stages/image/png_writer.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::specular_glossiness_test {
 
 std::int32_t add_image(Model& model, std::uint32_t side_px, std::array<std::uint8_t, 4> texel) {
   Pixels pixels{side_px, side_px, 4, {}};
@@ -74,5 +73,4 @@ TEST(SpecularGlossiness, MeansOfATexture) {
   EXPECT_NEAR(mean.glossiness, 0.1, 1e-6);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::specular_glossiness_test

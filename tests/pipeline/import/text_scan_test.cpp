@@ -5,8 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace texmesh {
-namespace {
+namespace texmesh::text_scan_test {
 
 TEST(TextScan, Numbers) {
   double x = 0;
@@ -31,5 +30,4 @@ TEST(TextScan, Numbers) {
     EXPECT_FALSE(parse_number(text, x)) << text;
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::text_scan_test

@@ -4,8 +4,7 @@
 
 #include <cmath>
 
-namespace texmesh {
-namespace {
+namespace texmesh::up_axis_test {
 
 struct Ring {
   float height, radius;
@@ -125,5 +124,4 @@ TEST(TurnedAxis, IsTheUsersOrTheOneThatImportTells) {
   EXPECT_EQ(turned_up(Vec3d{1, 2, 3}, 'y'), (Vec3d{1, 2, 3}));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::up_axis_test

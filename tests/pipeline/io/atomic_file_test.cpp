@@ -16,8 +16,7 @@
 #include "pipeline/io/machine.h"
 #include "tests/support/command.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::atomic_file_test {
 namespace fs = std::filesystem;
 using testing::TemporaryFolder;
 
@@ -121,5 +120,4 @@ TEST(Temporaries, ANameThatSomebodyHasIsLeftToThem) {
   EXPECT_EQ(testing::read_text(temporary), "another writer's");
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::atomic_file_test

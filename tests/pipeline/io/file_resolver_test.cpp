@@ -9,8 +9,7 @@
 
 #include <fstream>
 
-namespace texmesh {
-namespace {
+namespace texmesh::file_resolver_test {
 
 namespace fs = std::filesystem;
 
@@ -235,5 +234,4 @@ TEST(ReadInputFile, FollowsLinksAndRefusesTheRest) {
   fs::remove_all(root);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::file_resolver_test

@@ -3,8 +3,7 @@
 #include <gtest/gtest.h>
 #include <sys/sysmacros.h>
 
-namespace texmesh {
-namespace {
+namespace texmesh::file_stamp_test {
 
 struct stat status_on(dev_t device) {
   struct stat s {};
@@ -33,5 +32,4 @@ TEST(FileStamp, ProvesNothingOfAFileChangedJustBeforeItWasLookedAt) {
   EXPECT_TRUE(stamp.is_settled(stamp.changed_ns + FileStamp::kSettleNs + 1));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::file_stamp_test

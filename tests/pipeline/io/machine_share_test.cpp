@@ -7,8 +7,7 @@
 
 #include "tests/support/command.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::machine_share_test {
 
 constexpr std::uint64_t kGiB = 1ull << 30;
 
@@ -100,5 +99,4 @@ TEST(ThisMachine, HasAProcessorAndMemory) {
   EXPECT_GT(share.memory_bytes, 1u << 20);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::machine_share_test

@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace texmesh {
-namespace {
+namespace texmesh::markup_test {
 
 TEST(Markup, WhatHasAMeaningThereIsEscaped) {
   EXPECT_EQ(markup_escaped("a<b>&\"c\"'d'"), "a&lt;b&gt;&amp;&quot;c&quot;&#39;d&#39;");
@@ -29,5 +28,4 @@ TEST(Markup, PageBeginsWithItsTitleEscapedAndItsPolicy) {
   EXPECT_EQ(page_beginning("a", "").find("Content-Security-Policy"), std::string::npos);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::markup_test

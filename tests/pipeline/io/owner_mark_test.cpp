@@ -6,8 +6,7 @@
 
 #include "pipeline/io/file_stamp.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::owner_mark_test {
 
 constexpr std::int64_t kHour_ns = 3'600'000'000'000, kDay_ns = 24 * kHour_ns;
 
@@ -63,5 +62,4 @@ TEST(OwnerMark, OtherTextsAreNone) {
   EXPECT_TRUE(is_owner_mark("a-0123456789ab-1"));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::owner_mark_test

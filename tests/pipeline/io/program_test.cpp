@@ -7,8 +7,7 @@
 
 #include "format/base/errors.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::program_test {
 
 TEST(Program, ABuildHasOneName) {
   EXPECT_FALSE(program_build().empty());
@@ -21,5 +20,4 @@ TEST(Program, OneThatServesNoWorkersNeedsTexmeshBesideIt) {
   EXPECT_EQ(worker_executable(), std::filesystem::read_symlink("/proc/self/exe").string());
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::program_test

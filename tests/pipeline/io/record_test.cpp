@@ -6,19 +6,18 @@
 
 #include "format/base/errors.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::record_test {
 
 enum class Fruit : std::uint8_t { kApple, kPear };
 
-}  // namespace
+}  // namespace texmesh::record_test
 
 template <>
-struct EnumNames<Fruit> {
+struct texmesh::EnumNames<texmesh::record_test::Fruit> {
   static constexpr std::array<std::string_view, 2> names{"apple", "pear"};
 };
 
-namespace {
+namespace texmesh::record_test {
 
 struct Inner {
   int count = 0;
@@ -146,5 +145,4 @@ TEST(Record, NotesHaveOneForm) {
   EXPECT_EQ(from_json<Note>(to_json(note), "f"), note);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::record_test

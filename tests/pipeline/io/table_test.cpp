@@ -4,8 +4,7 @@
 
 #include "pipeline/io/table.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::table_test {
 
 TEST(Table, TextAlignsNumbersRightAndTextLeft) {
   Table t("", {Column::text("name"), {"kB", 1}});
@@ -122,5 +121,4 @@ TEST(Printable, ReplacesWhatATerminalMustNotSee) {
   EXPECT_EQ(printable("\xc0\xaf"), "??");       // overlong
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::table_test

@@ -4,8 +4,7 @@
 
 #include "format/base/errors.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::uri_test {
 
 std::string data(std::string_view uri, std::uint64_t max_bytes = 100) {
   const auto bytes = decode_data_uri(uri, max_bytes, "m.gltf", "/buffers/0/uri");
@@ -64,5 +63,4 @@ TEST(UrlOrigin, IsSchemeHostAndPort) {
   EXPECT_EQ(url_origin("answers.php"), "");
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::uri_test

@@ -5,8 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
-namespace texmesh {
-namespace {
+namespace texmesh::wire_text_test {
 
 TEST(WireText, Utf8StaysAsItIs) {
   for (const std::string s : {"", "a.glb", "b\\c d.obj", "Löwe.glb", "\xe2\x82\xac", "\xf0\x9f\x97\xbf"}) {
@@ -36,5 +35,4 @@ TEST(WireText, WhatNobodyWroteIsTakenAsItStands) {
   EXPECT_EQ(from_wire("\x01"), "");
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::wire_text_test

@@ -11,8 +11,7 @@
 #include "tests/support/hostile_meshes.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::atlas_test {
 
 using Pixel = std::array<std::uint8_t, 3>;
 
@@ -239,5 +238,4 @@ TEST(Atlas, StrangeModelsAreRebuiltOrKept) {
     }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::atlas_test

@@ -4,8 +4,7 @@
 
 #include <vector>
 
-namespace texmesh {
-namespace {
+namespace texmesh::first_use_table_test {
 
 /// Numbers of values, by a hash that the test chooses.
 std::vector<std::uint32_t> numbers_of(const std::vector<int>& values, std::size_t expected,
@@ -47,5 +46,4 @@ TEST(FirstUseTable, GrowsAndFindsWhatItHad) {
   for (std::size_t i = 0; i < values.size(); ++i) EXPECT_EQ(numbers[i], i % 20'000) << i;
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::first_use_table_test

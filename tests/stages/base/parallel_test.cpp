@@ -8,8 +8,7 @@
 
 #include "format/base/errors.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::parallel_test {
 
 RunContext threads(int count) {
   RunContext context;
@@ -58,5 +57,4 @@ TEST(Parallel, CancellationEndsTheLoop) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::parallel_test

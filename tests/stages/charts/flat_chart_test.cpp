@@ -4,8 +4,7 @@
 
 #include <cmath>
 
-namespace texmesh {
-namespace {
+namespace texmesh::flat_chart_test {
 
 TEST(FlatChart, AxesAreRightHandedForEveryNormal) {
   for (const Vec3d n : {Vec3d{1, 0, 0}, Vec3d{0, -1, 0}, Vec3d{0, 0, 1}, normalized(Vec3d{1, -2, 3})}) {
@@ -51,5 +50,4 @@ TEST(FlatChart, SmallestBoxOfATurnedRectangle) {
   EXPECT_EQ(smallest_box_side({}), (Vec2d{1, 0}));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::flat_chart_test

@@ -8,8 +8,7 @@
 
 #include "tests/stages/proxies/proxy_shapes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::pack_atlas_test {
 
 using testing::Soup;
 using testing::soup_of;
@@ -195,5 +194,4 @@ TEST(PackAtlas, IsCancelled) {
   EXPECT_THROW(pack_atlas(s, charts, 64, 64, 1, context), Cancelled);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::pack_atlas_test

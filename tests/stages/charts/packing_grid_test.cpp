@@ -4,8 +4,7 @@
 
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::packing_grid_test {
 
 ChartMask block(std::uint32_t width, std::uint32_t height) {
   ChartMask m{width, height, {}};
@@ -86,5 +85,4 @@ TEST(ChartMask, HoldsTheCellsThatTrianglesTouch) {
   EXPECT_EQ(mask_of({{sliver}}, 4, 1).cell_count(), 4u);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::packing_grid_test

@@ -4,8 +4,7 @@
 
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::pair_queue_test {
 
 TEST(PairQueue, GivesTheCheapestFirstAndOfEqualOnesTheLowest) {
   constexpr std::uint32_t kMembers = 300;
@@ -42,5 +41,4 @@ TEST(PairQueue, SweepsWhatIsStaleAndLosesNothing) {
   EXPECT_LT(popped, 5000u);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::pair_queue_test

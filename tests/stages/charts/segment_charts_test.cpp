@@ -11,8 +11,7 @@
 #include "stages/charts/chart_parts.h"
 #include "tests/stages/proxies/proxy_shapes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::segment_charts_test {
 
 using testing::Soup;
 using testing::soup_of;
@@ -201,5 +200,4 @@ TEST(SegmentCharts, IsCancelled) {
   EXPECT_THROW(segment_charts(soup_of(testing::cube()).surface(), context), Cancelled);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::segment_charts_test

@@ -10,8 +10,7 @@
 #include "stages/base/run_context.h"
 #include "tests/support/hostile_meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::condition_test {
 
 using testing::Random;
 
@@ -339,5 +338,4 @@ TEST(Condition, ComponentsCountSurfacesThatTouchAsOne) {
   expect_manifold(touching);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::condition_test

@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace texmesh {
-namespace {
+namespace texmesh::coverage_test {
 
 TEST(CoverageMask, RowsStartAtWholeBytesAndTheirFirstTexelIsTheHighestBit) {
   EXPECT_EQ(coverage_stride_bytes(0), 0u);
@@ -27,5 +26,4 @@ TEST(CoverageMask, RowsStartAtWholeBytesAndTheirFirstTexelIsTheHighestBit) {
   EXPECT_TRUE(CoverageMask().empty());
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::coverage_test

@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace texmesh {
-namespace {
+namespace texmesh::fragments_test {
 
 TEST(FragmentRectangle, IsClippedToThePlaneUnlessPadded) {
   TexturePlane plane;
@@ -22,5 +21,4 @@ TEST(FragmentRectangle, IsClippedToThePlaneUnlessPadded) {
   EXPECT_EQ(fragment_rectangle(plane, 8).bottom_px(), plane.height_px);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::fragments_test

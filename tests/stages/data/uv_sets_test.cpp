@@ -7,8 +7,7 @@
 
 #include "tests/stages/simplification/simplification_checks.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::uv_sets_test {
 
 using namespace testing;  // NOLINT: fixtures and checks
 
@@ -87,5 +86,4 @@ TEST(UvSets, TextureTrianglesOfBothSetsKeepTheirSide) {
   EXPECT_LT(both.scales.back().triangles.size(), both.scales[0].triangles.size() / 8);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::uv_sets_test

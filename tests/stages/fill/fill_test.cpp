@@ -12,8 +12,7 @@
 #include "tests/support/coverage_bits.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::fill_test {
 
 using testing::coverage_where;
 using testing::Random;
@@ -327,5 +326,4 @@ TEST(Fill, PlanesThatDoNotFitEachOtherAreRefused) {
   refused([](P p) { p[2].image = 1; });
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::fill_test

@@ -8,8 +8,7 @@
 #include "stages/data/pixels.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::coding_space_test {
 
 using testing::Random;
 
@@ -146,5 +145,4 @@ TEST(CodingSpace, SameForAnyNumberOfThreads) {
     EXPECT_EQ(space_of(pixels, DataKind::kVectors, 1), space_of(pixels, DataKind::kVectors, 8));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::coding_space_test

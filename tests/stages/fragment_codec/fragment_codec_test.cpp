@@ -13,8 +13,7 @@
 #include "tests/support/all_rungs.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::fragment_codec_test {
 
 using Streams = std::vector<Bytes>;
 
@@ -374,5 +373,4 @@ TEST(LadderModes, WhatAModeCannotCodeIsBaselineWithANote) {
   EXPECT_TRUE(colour.notes.empty());
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::fragment_codec_test

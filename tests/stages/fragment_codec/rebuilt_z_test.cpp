@@ -6,8 +6,7 @@
 
 #include "stages/jpeg/jpeg.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::rebuilt_z_test {
 
 /// All x and y, with that z.
 Pixels all_pairs(std::uint8_t z) {
@@ -90,5 +89,4 @@ TEST(RebuiltZ, TheCodecsFilesAreJpegsWithoutZ) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::rebuilt_z_test

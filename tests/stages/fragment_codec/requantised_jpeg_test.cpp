@@ -11,8 +11,7 @@
 #include "stages/jpeg/masked_jpeg.h"
 #include "tests/support/images.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::requantised_jpeg_test {
 
 constexpr std::uint32_t kSide = 128;
 
@@ -110,5 +109,4 @@ TEST(RequantisedJpeg, EstimatedBitsAreNearTheStreams) {
     EXPECT_NEAR(bits[k] / bits[0], bytes[k] / bytes[0], 0.08 * bytes[k] / bytes[0]);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::requantised_jpeg_test

@@ -10,8 +10,7 @@
 #include "tests/stages/geometry/texel_triangles.h"
 #include "tests/support/coverage_bits.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::fragment_grid_test {
 
 using namespace testing;  // NOLINT: fixtures
 
@@ -160,5 +159,4 @@ TEST(AreaSpreader, MoreTilesOrCellsThanTheCapAreNotClipped) {
             std::vector<double>(4096, 1.0 / 4096));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::fragment_grid_test

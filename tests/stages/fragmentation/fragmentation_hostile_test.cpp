@@ -10,8 +10,7 @@
 #include "tests/stages/fragmentation/fragmentation_inputs.h"
 #include "tests/stages/geometry/texel_triangles.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::fragmentation_hostile_test {
 
 using namespace testing;  // NOLINT: fixtures
 
@@ -91,5 +90,4 @@ TEST(Fragmentation, SameResultForAnyNumberOfThreads) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::fragmentation_hostile_test

@@ -11,8 +11,7 @@
 #include "tests/stages/fragmentation/fragmentation_inputs.h"
 #include "tests/stages/geometry/texel_triangles.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::fragmentation_mips_test {
 
 using namespace testing;  // NOLINT: fixtures
 
@@ -85,5 +84,4 @@ TEST(Fragmentation, MipsCoverWhatSamplingThemTouches) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::fragmentation_mips_test

@@ -10,8 +10,7 @@
 #include "tests/stages/fragmentation/fragmentation_inputs.h"
 #include "tests/stages/geometry/texel_triangles.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::fragmentation_test {
 
 using namespace testing;  // NOLINT: fixtures
 
@@ -237,5 +236,4 @@ TEST(Fragmentation, AMaterialThatSamplesAnImageTwiceHasItsSurfaceOnce) {
   for (const TexturePlane& p : out.planes) EXPECT_NEAR(total(p.surface_fraction), 1, 1e-5);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::fragmentation_test

@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace texmesh {
-namespace {
+namespace texmesh::component_boxes_test {
 
 TEST(ComponentBoxes, HoldThePositionsOfTheirComponent) {
   const std::vector<Box3f> boxes = component_boxes({2, 0, 2}, {{1, 2, 3}, {-1, 0, 1}, {3, 0, 3}});
@@ -14,5 +13,4 @@ TEST(ComponentBoxes, HoldThePositionsOfTheirComponent) {
   EXPECT_EQ(boxes[2].max, (Vec3f{3, 2, 3}));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::component_boxes_test

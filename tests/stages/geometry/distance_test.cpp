@@ -11,8 +11,7 @@
 #include "stages/simplification/simplification.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::distance_test {
 
 double by_trying_all(const Mesh& mesh, Vec3d p) {
   double best = std::numeric_limits<double>::infinity();
@@ -100,5 +99,4 @@ TEST(ScaleWalk, GuessesBoundTheDistanceAndMostAreIt) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::distance_test

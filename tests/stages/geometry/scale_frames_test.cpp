@@ -7,8 +7,7 @@
 #include "stages/geometry/triangle_tree.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::scale_frames_test {
 
 /// A wavy sheet, and as scale 1 every fourth of its points: a wave is about four edges of the scale long.
 struct Nest {
@@ -152,5 +151,4 @@ TEST(ScaleFrames, ALitScaleIsTheExtractedOneWithItsFrames) {
     EXPECT_EQ(lit.normals[lit.triangles[t][0]], frames.normals[nest.scales.scales[1].triangles[t][0]]);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::scale_frames_test

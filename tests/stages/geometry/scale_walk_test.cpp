@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace texmesh {
-namespace {
+namespace texmesh::scale_walk_test {
 
 std::vector<std::array<std::uint32_t, 2>> at(const Spokes& spokes, std::uint32_t place) {
   std::vector<std::array<std::uint32_t, 2>> out;
@@ -31,5 +30,4 @@ TEST(Spokes, NoTrianglesLeaveEveryPlaceEmpty) {
   EXPECT_TRUE(spokes.at(1).empty());
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::scale_walk_test

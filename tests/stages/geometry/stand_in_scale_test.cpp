@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace texmesh {
-namespace {
+namespace texmesh::stand_in_scale_test {
 
 NestedScales scales_of(const std::vector<std::pair<std::size_t, float>>& triangles_and_errors) {
   NestedScales out;
@@ -31,5 +30,4 @@ TEST(StandInScale, IsFinerWhereNoneIsNear) {
   EXPECT_EQ(stand_in_scale(s, 10, 1), 2u);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::stand_in_scale_test

@@ -7,8 +7,7 @@
 
 #include "tests/stages/geometry/texel_triangles.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::texel_coverage_test {
 
 using namespace testing;  // NOLINT: fixtures
 
@@ -110,5 +109,4 @@ TEST(TexelMap, AppliesScaleThenRotationThenOffset) {
   EXPECT_NEAR(p.y, -7.5, 1e-4);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::texel_coverage_test

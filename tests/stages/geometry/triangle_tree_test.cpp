@@ -7,8 +7,7 @@
 #include "tests/support/even_sphere.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::triangle_tree_test {
 
 struct Soup {
   std::vector<Vec3d> points;
@@ -116,5 +115,4 @@ TEST(TriangleTree, TheNearestPointLooksTheSameWay) {
   EXPECT_FALSE(tree.nearest_facing({3, 0, 0}, {{1, 0, 0}, 0})) << "none looks there";
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::triangle_tree_test

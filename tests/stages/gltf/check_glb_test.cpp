@@ -10,8 +10,7 @@
 #include "tests/support/meshes.h"
 #include "tests/support/packages.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::check_glb_test {
 
 using nlohmann::json;
 
@@ -308,5 +307,4 @@ TEST(CheckGlb, Meshopt) {
   EXPECT_TRUE(finds(g.glb(), "glb-decode", at + "/filter"));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::check_glb_test

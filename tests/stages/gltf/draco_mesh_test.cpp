@@ -7,8 +7,7 @@
 
 #include "format/base/errors.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::draco_mesh_test {
 
 constexpr std::uint32_t kSide = 20;  // vertices of a wavy sheet
 
@@ -72,5 +71,4 @@ TEST(DracoMesh, EveryCodingStartsFromTheSameValues) {
   EXPECT_EQ(once.coded(second, {}).front().bytes, twice.coded(second, {}).front().bytes);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::draco_mesh_test

@@ -6,8 +6,7 @@
 #include <cstring>
 #include <random>
 
-namespace texmesh {
-namespace {
+namespace texmesh::draco_points_test {
 
 template <class Element>
 void add_attribute(draco::Mesh& mesh, int components, draco::DataType type,
@@ -82,5 +81,4 @@ TEST(DracoPoints, OfASmallMeshAreMergedToo) {
   expect_as_draco(2, 1, false);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::draco_points_test

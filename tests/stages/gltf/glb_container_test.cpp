@@ -5,8 +5,7 @@
 
 #include <string>
 
-namespace texmesh {
-namespace {
+namespace texmesh::glb_container_test {
 
 TEST(GlbContainer, BothChunksArePadded) {
   const Bytes glb = glb_container("{\"a\":1}", Bytes{1, 2, 3, 4, 5});
@@ -47,5 +46,4 @@ TEST(GlbContainer, FourGigabytesAreRefused) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::glb_container_test

@@ -6,8 +6,7 @@
 
 #include "format/base/errors.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::glb_copyright_test {
 
 TEST(GlbCopyright, OnlyTheAssetChanges) {
   const Bytes binary{1, 2, 3, 4, 5};
@@ -34,5 +33,4 @@ TEST(GlbCopyright, EveryTruncationIsTold) {
   EXPECT_THROW(with_copyright(glb_container("[]", {}), "A"), FormatError);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::glb_copyright_test

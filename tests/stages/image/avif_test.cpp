@@ -8,8 +8,7 @@
 #include "stages/image/readers_module/other_pictures.h"
 #include "tests/support/images.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::avif_test {
 
 Pixels picture(std::uint32_t width, std::uint32_t height, std::uint32_t channels) {
   return {
@@ -150,5 +149,4 @@ TEST(Avif, BecomesAPngWhenItIsImported) {
   EXPECT_FALSE(sniff_other_picture("x.avif", Bytes{0, 0, 0, 28, 'f', 't', 'y', 'p', 'h', 'e', 'i', 'c'}));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::avif_test

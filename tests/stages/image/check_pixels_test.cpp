@@ -4,8 +4,7 @@
 
 #include "format/base/errors.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::check_pixels_test {
 
 TEST(CheckPixels, OfEveryPlaneWholeFragmentsOfItsChannels) {
   TexturePlane plane;
@@ -33,5 +32,4 @@ TEST(CheckPixels, OfEveryPlaneWholeFragmentsOfItsChannels) {
   refused([](Pixels& p) { p.data.pop_back(); });
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::check_pixels_test

@@ -12,8 +12,7 @@
 #include "stages/image/decode_image.h"
 #include "tests/support/images.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::colour_profile_test {
 
 void put16(Bytes& out, std::uint32_t x) {
   out.push_back(static_cast<std::uint8_t>(x >> 8));
@@ -387,5 +386,4 @@ TEST(DecodeImage, ColoursGoByTheProfileWhereItIsToBeHonoured) {
             decode_image(probe_image("u.jpg", testing::jpeg_bytes(16, 8, 3), {})).data);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::colour_profile_test

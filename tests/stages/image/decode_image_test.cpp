@@ -11,8 +11,7 @@
 #include "tests/stages/image/image_files.h"
 #include "tests/stages/image/tiff_files.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::decode_image_test {
 
 using namespace testing;  // NOLINT: fixtures
 
@@ -221,5 +220,4 @@ TEST(DecodeImage, AnImageThatChangedAfterImportIsRefused) {
   EXPECT_THROW(decode_image(image), InputError);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::decode_image_test

@@ -8,8 +8,7 @@
 #include "tests/stages/image/image_files.h"
 #include "tests/stages/ladder/source_scenes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::decode_jpeg_test {
 
 using namespace testing;  // NOLINT: fixtures
 
@@ -87,5 +86,4 @@ TEST(DecodeJpeg, ASoundFileHasNoDamage) {
   EXPECT_EQ(damage, "");
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::decode_jpeg_test

@@ -10,8 +10,7 @@
 
 #include "tests/stages/image/image_files.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::decode_png_test {
 
 using namespace testing;  // NOLINT: fixtures
 
@@ -142,5 +141,4 @@ TEST(DecodePng, InterlacedPngIsThePlainOne) {
                  InputError);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::decode_png_test

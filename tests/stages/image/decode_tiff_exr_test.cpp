@@ -13,8 +13,7 @@
 #include "tests/stages/image/image_files.h"
 #include "tests/stages/image/tiff_files.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::decode_tiff_exr_test {
 
 using namespace testing;  // NOLINT: fixtures
 
@@ -137,5 +136,4 @@ TEST(DecodeTiffExr, WhatLibrariesTookTooMuchForIsRefusedFirst) {
     EXPECT_NE(refusal(file).find("a size that its"), std::string::npos) << refusal(file);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::decode_tiff_exr_test

@@ -4,8 +4,7 @@
 
 #include "tests/stages/image/image_files.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::decode_webp_test {
 
 using namespace testing;  // NOLINT: fixtures
 
@@ -69,5 +68,4 @@ TEST(EncodeWebp, OptionsCountAndWhatPackagesHoldComesBack) {
   EXPECT_EQ(Bytes(two.begin() + 2, two.end()), plain);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::decode_webp_test

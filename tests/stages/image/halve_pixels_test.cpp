@@ -8,8 +8,7 @@
 #include "format/base/errors.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::halve_pixels_test {
 
 Pixels noise(std::uint32_t w, std::uint32_t h, std::uint32_t channels, std::uint64_t seed = 3) {
   Pixels out{w, h, channels, {}};
@@ -127,5 +126,4 @@ TEST(HalvePixels, WhatIsNotThereIsRefused) {
   EXPECT_THROW(halved(shorter, 8, 8, Averaging::kLight), StageError);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::halve_pixels_test

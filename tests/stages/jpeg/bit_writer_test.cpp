@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace texmesh {
-namespace {
+namespace texmesh::bit_writer_test {
 
 TEST(BitWriter, FirstBitHighestAndTheLastByteFilledWithOnes) {
   Bytes out{7};
@@ -35,5 +34,4 @@ TEST(BitWriter, NothingOfNothing) {
   EXPECT_EQ(out, (Bytes{1, 2}));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::bit_writer_test

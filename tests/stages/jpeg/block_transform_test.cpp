@@ -6,8 +6,7 @@
 
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::block_transform_test {
 
 using testing::Random;
 
@@ -58,5 +57,4 @@ TEST(BlockTransform, FinestStepsStayInTheRangeOfBaselineJpeg) {
   for (const float s : finest_steps(block_dct(checks))) EXPECT_LE(std::fabs(s), 1023);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::block_transform_test

@@ -6,8 +6,7 @@
 
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::huffman_table_test {
 
 using testing::Random;
 
@@ -40,5 +39,4 @@ TEST(HuffmanTable, EverySymbolHasACodeOfAtMost16Bits) {
   EXPECT_EQ(table.bits[1], 1);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::huffman_table_test

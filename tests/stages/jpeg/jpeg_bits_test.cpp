@@ -7,8 +7,7 @@
 #include "stages/jpeg/masked_jpeg.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::jpeg_bits_test {
 
 constexpr std::uint32_t kSide = 256;
 const std::vector<int> kQualities{5, 20, 50, 57, 75, 80, 90, 97};
@@ -119,5 +118,4 @@ TEST(JpegBits, SameForAnyNumberOfThreads) {
   EXPECT_EQ(jpeg_bits({}, tiles, kQualities, one), jpeg_bits({}, tiles, kQualities, eight));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::jpeg_bits_test

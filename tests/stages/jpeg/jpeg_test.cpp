@@ -10,8 +10,7 @@
 #include "format/base/errors.h"
 #include "tests/support/made_texture.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::jpeg_test {
 
 using testing::made_texture;
 
@@ -99,5 +98,4 @@ TEST(Jpeg, LumaIsTheGreyOfTheColours) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::jpeg_test

@@ -14,8 +14,7 @@
 #include "tests/support/all_rungs.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::masked_jpeg_test {
 
 using testing::Random;
 
@@ -388,5 +387,4 @@ TEST(MaskedLadder, IsTheSameForAnyThreadCount) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::masked_jpeg_test

@@ -4,8 +4,7 @@
 
 #include "stages/jpeg/jpeg_coder.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::source_jpeg_test {
 
 TEST(SourceJpeg, IjgTablesHaveTheirOwnQuality) {
   for (int quality = 1; quality <= 100; ++quality) {
@@ -51,5 +50,4 @@ TEST(SourceJpeg, HeadsAreWhole) {
   EXPECT_EQ(tables, 2u);  // the chroma's stands once
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::source_jpeg_test

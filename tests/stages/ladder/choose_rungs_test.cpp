@@ -8,8 +8,7 @@
 #include "stages/fragment_codec/fragment_codec.h"
 #include "tests/stages/ladder/mip_chain.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::choose_rungs_test {
 
 using testing::Chain;
 using testing::encode;
@@ -140,5 +139,4 @@ TEST(ChooseRungs, WithoutAPreviewThereIsNoChoice) {
   EXPECT_EQ(encode_ladder(chain.fragments, chain.pixels, {}, {}, options, RunContext{}).planes.size(), 2u);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::choose_rungs_test

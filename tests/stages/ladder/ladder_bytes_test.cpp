@@ -6,8 +6,7 @@
 #include "tests/stages/ladder/source_scenes.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::ladder_bytes_test {
 
 using namespace testing;  // NOLINT: fixtures
 
@@ -79,5 +78,4 @@ TEST(LadderBytes, AllRungsOfAJpegTakeAtMostNineteenTenthsOfIt) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::ladder_bytes_test

@@ -12,8 +12,7 @@
 #include "tests/support/all_rungs.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::ladder_test {
 
 using testing::Random;
 
@@ -321,5 +320,4 @@ TEST(Ladder, EveryTruncationIsRefused) {
     EXPECT_THROW(decode_jpeg(std::span(complete).first(n), 1 << 20), FormatError) << n;
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::ladder_test

@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace texmesh {
-namespace {
+namespace texmesh::rung_gaps_test {
 
 using Marks = std::vector<std::uint8_t>;
 
@@ -82,5 +81,4 @@ TEST(RungGaps, ALimitThatIsExceededAlreadyIsNotExceededMore) {
   EXPECT_EQ(keep[4], 1);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::rung_gaps_test

@@ -8,8 +8,7 @@
 
 #include "tests/stages/ladder/mip_chain.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::rung_loss_test {
 
 using testing::Chain;
 using testing::encode;
@@ -129,5 +128,4 @@ TEST(RungLoss, WindowsWeighAsTheSurfaceOfTheirFragments) {
   for (const double loss : losses(kOther)) EXPECT_LT(loss, 0.01);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::rung_loss_test

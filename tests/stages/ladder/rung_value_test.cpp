@@ -7,8 +7,7 @@
 
 #include "format/rules/viewing.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::rung_value_test {
 
 constexpr double kGain = 0.05, kLeast = 0.01;
 
@@ -173,5 +172,4 @@ TEST(RungValue, NothingOfNothing) {
   EXPECT_EQ(kept(texture({{1000, 0.1}})), (Rungs{0}));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::rung_value_test

@@ -15,8 +15,7 @@
 #include "tests/support/all_rungs.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::size_knots_test {
 
 constexpr std::uint32_t kSide = 256, kFragment = 64;
 
@@ -131,5 +130,4 @@ TEST(SizeKnots, SameForAnyNumberOfThreads) {
   EXPECT_EQ(one.position, eight.position);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::size_knots_test

@@ -3,8 +3,7 @@
 
 #include "tests/stages/ladder/source_scenes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::source_codec_refusals_test {
 
 using namespace testing;  // NOLINT: fixtures
 
@@ -87,5 +86,4 @@ TEST(SourceCodec, FlippedBytesNeverCrash) {
   EXPECT_GT(refused, 0u);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::source_codec_refusals_test

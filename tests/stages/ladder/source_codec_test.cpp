@@ -5,8 +5,7 @@
 #include "tests/stages/ladder/source_scenes.h"
 #include "tests/support/wide_jpeg.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::source_codec_test {
 
 using namespace testing;  // NOLINT: fixtures
 
@@ -267,5 +266,4 @@ TEST(SourceCodec, ThreadsMakeNoDifference) {
   EXPECT_EQ(one.planes[0].knots.position, eight.planes[0].knots.position);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::source_codec_test

@@ -15,8 +15,7 @@
 #include "tests/stages/lut/lut_scene.h"
 #include "tests/support/all_rungs.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::lut_test {
 
 using namespace testing;  // NOLINT: fixtures
 
@@ -332,5 +331,4 @@ TEST(Lut, PredictorsAssignQualityAsTheFileStoresThem) {
   EXPECT_TRUE(build(s).planes[0].vqp.empty());
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::lut_test

@@ -8,8 +8,7 @@
 #include "tests/stages/lut/lut_scene.h"
 #include "tests/support/all_rungs.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::size_model_test {
 
 using namespace testing;  // NOLINT: fixtures
 
@@ -78,5 +77,4 @@ TEST(SizeModel, StandsInTheTablesOfEveryFragment) {
   for (const SizeModel& model : thesis_of(make_scene(one)).models) EXPECT_EQ(model, SizeModel{});
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::size_model_test

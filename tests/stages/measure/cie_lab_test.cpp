@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace texmesh {
-namespace {
+namespace texmesh::cie_lab_test {
 
 TEST(CieLab, WhiteAndBlackAreTheEndsOfLightness) {
   const Vec3f white = hunt_lab(kWhiteXyz, lab_root), black = hunt_lab({0, 0, 0}, lab_root);
@@ -40,5 +39,4 @@ TEST(RemappedDifference, SmallDifferencesGetNearlyAllOfTheRange) {
   EXPECT_EQ(remapped_difference(11.0, 10.0), 1) << "beyond the largest";
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::cie_lab_test

@@ -7,8 +7,7 @@
 
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::distortion_test {
 
 using testing::Random;
 
@@ -56,5 +55,4 @@ TEST(Distortion, AgainstTheFormulaInOneWindow) {
   EXPECT_NEAR(meter.against(b).dssim, 1 - ssim, 1e-12);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::distortion_test

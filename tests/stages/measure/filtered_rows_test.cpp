@@ -6,8 +6,7 @@
 
 #include "tests/stages/measure/grainy_picture.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::filtered_rows_test {
 
 using testing::object_in;
 
@@ -87,5 +86,4 @@ TEST(FilteredRows, WiderVectorsChangeNoBit) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::filtered_rows_test

@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace texmesh {
-namespace {
+namespace texmesh::flip_test {
 
 /// A striped object, `left` px from the side of a grey picture.
 Picture striped(std::uint32_t side, std::uint32_t left, float value) {
@@ -61,5 +60,4 @@ TEST(Flip, NothingCoveredIsNoDifference) {
   EXPECT_EQ(compare(empty, striped(64, 20, 0.5f)).pixels, 20u * 34);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::flip_test

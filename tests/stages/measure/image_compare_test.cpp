@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace texmesh {
-namespace {
+namespace texmesh::image_compare_test {
 
 Picture grey(float level, std::uint32_t side = 32) {
   return {side, std::vector<Vec3f>(side * side, {level, level, level}),
@@ -35,5 +34,4 @@ TEST(ImageCompare, OnlyCoveredPixelsCount) {
   EXPECT_EQ(compare_luma(prepare_luma(a), prepare_luma(b)).pixels, 2u);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::image_compare_test

@@ -4,8 +4,7 @@
 
 #include "tests/stages/measure/grainy_picture.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::pixel_spans_test {
 
 using testing::object_in;
 
@@ -31,5 +30,4 @@ TEST(PixelSpans, UnionHoldsBoth) {
   EXPECT_EQ(both.count, count);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::pixel_spans_test

@@ -6,8 +6,7 @@
 #include "format/base/errors.h"
 #include "stages/jpeg/jpeg.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::scale_samples_test {
 
 TEST(ScaleSamples, PlacesAreCentresOfTexelsAndStopAtTheEnds) {
   // Four texels over two: their centres lie at -1/4, 1/4, 3/4 and 5/4 of the coarse ones.
@@ -46,5 +45,4 @@ TEST(ScaleSamples, APreviewShowsLumaOfColoursAndEveryChannelOfData) {
   EXPECT_THROW(preview_samples(plane, Bytes(file.begin(), file.end() - 2)), FormatError);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::scale_samples_test

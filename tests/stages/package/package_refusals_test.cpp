@@ -3,8 +3,7 @@
 
 #include "tests/stages/package/package_inputs.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::package_refusals_test {
 
 using namespace testing;  // NOLINT: fixtures
 
@@ -66,5 +65,4 @@ TEST(Package, WriterRefusesMissingAndForeignEntries) {
   EXPECT_THROW(write_package(m, textures, more), FormatError);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::package_refusals_test

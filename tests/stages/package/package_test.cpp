@@ -4,8 +4,7 @@
 
 #include "tests/stages/package/package_inputs.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::package_test {
 
 using namespace testing;  // NOLINT: fixtures
 
@@ -297,5 +296,4 @@ TEST(Package, SourcesStandBehindTheRungsAndRungsOfSourcesAreNamed) {
   EXPECT_TRUE(std::ranges::any_of(page, [](const EntryRef& e) { return e.path == "source/000.tif"; }));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::package_test

@@ -12,8 +12,7 @@
 #include "stages/simplification/simplification.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::perceptual_values_test {
 
 const RunContext kOneThread{};
 
@@ -395,5 +394,4 @@ TEST(PerceptualValues, TiersMakeTheStepFunctionWhateverTheDistance) {
   EXPECT_EQ(blind.display_px_jnd.back(), kAnyHeightPx);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::perceptual_values_test

@@ -11,8 +11,7 @@
 #include "stages/render/environment.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::poster_test {
 
 NestedScales scales_of(Mesh mesh) {
   NestedScales out;
@@ -205,5 +204,4 @@ TEST(PosterCamera, HoldsAllPositionsWithTheMargin) {
   EXPECT_NEAR(most, 0.92, 1e-9);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::poster_test

@@ -9,8 +9,7 @@
 #include "stages/jpeg/jpeg.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::previews_test {
 
 using testing::Random;
 
@@ -137,5 +136,4 @@ TEST(Previews, SameBytesForAnyNumberOfThreadsAndPixelsThatDoNotFitAreRefused) {
   EXPECT_TRUE(make_previews({}, {}, {}, {}).planes.empty());
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::previews_test

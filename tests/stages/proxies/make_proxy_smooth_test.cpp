@@ -4,8 +4,7 @@
 
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::make_proxy_smooth_test {
 
 /// Wedges of their own for all triangles, with the triangles' normals.
 Mesh faceted(const Mesh& m) {
@@ -54,5 +53,4 @@ TEST(IsSmooth, TheLargerPartOfTheAreaDecides) {
   EXPECT_TRUE(is_smooth(add(2.0f)));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::make_proxy_smooth_test

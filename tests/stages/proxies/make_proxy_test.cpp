@@ -4,8 +4,7 @@
 
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::make_proxy_test {
 
 struct Parts {
   Mesh mesh;
@@ -82,5 +81,4 @@ TEST(MakeProxy, NothingWhereEvenTheCoarsestDoesNotFit) {
   EXPECT_FALSE(make(w, 1500, {}));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::make_proxy_test

@@ -4,8 +4,7 @@
 
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::picture_losses_scales_test {
 
 NestedScales alone(Mesh mesh) {
   NestedScales out;
@@ -91,5 +90,4 @@ TEST_F(Competitors, ManyQuestionsHaveTheAnswersOfOne) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::picture_losses_scales_test

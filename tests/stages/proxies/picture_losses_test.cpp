@@ -5,8 +5,7 @@
 #include "stages/proxies/coding/proxy_glb.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::picture_losses_test {
 
 ShownModel plain_model(const Mesh& mesh, Vec4f colour) {
   ShownModel out{mesh, {}};
@@ -79,5 +78,4 @@ TEST(ShownProxy, AProxyIsShownAsItsFileSaysIt) {
   EXPECT_GE(mapped.shown.materials[0].slot(TextureUse::kNormal).texture, 0);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::picture_losses_test

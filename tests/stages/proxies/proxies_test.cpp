@@ -10,8 +10,7 @@
 #include "tests/support/hostile_meshes.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::proxies_test {
 
 NestedScales only_scale(Mesh mesh) {
   NestedScales out;
@@ -409,5 +408,4 @@ TEST(Proxies, VertexColoursBecomeTexels) {
   EXPECT_LT(made.proxies[0].losses[1].flip_mean, 0.05) << "the colours are there";
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::proxies_test

@@ -11,8 +11,7 @@
 #include "stages/geometry/triangle_tree.h"
 #include "tests/stages/proxies/proxy_shapes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::simplify_surface_test {
 
 using testing::Soup;
 using testing::soup_of;
@@ -222,5 +221,4 @@ TEST(SimplifySurface, IsCancelled) {
   EXPECT_THROW(simplify_surface(soup.positions, soup.triangles, soup.group, counts, context), Cancelled);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::simplify_surface_test

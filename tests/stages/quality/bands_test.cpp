@@ -7,8 +7,7 @@
 #include "stages/measure/flip.h"
 #include "stages/render/visibility.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::bands_test {
 
 ShownRows rows_of(double first, double end) {
   ShownRows out{first, end, std::vector<std::uint32_t>(100)};
@@ -97,5 +96,4 @@ TEST(Bands, ComparedPixelsHaveTheValuesOfTheWholePicture) {
     EXPECT_EQ(part[i], bands.compared[i / kSide] ? whole[i] : 0) << i;
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::bands_test

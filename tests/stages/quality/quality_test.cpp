@@ -4,8 +4,7 @@
 
 #include "tests/stages/quality/quality_samples.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::quality_test {
 
 using namespace testing;  // NOLINT: fixtures
 
@@ -237,5 +236,4 @@ TEST(Quality, OneRungOneViewAndTexturesOfOnePixelDo) {
   EXPECT_FALSE(write_quality(t).empty());
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::quality_test

@@ -3,8 +3,7 @@
 
 #include "tests/stages/quality/quality_samples.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::quality_unseen_test {
 
 using namespace testing;  // NOLINT: fixtures
 
@@ -99,5 +98,4 @@ TEST(Quality, NothingToLookAtIsAnError) {
   EXPECT_THROW(measure(s), StageError);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::quality_unseen_test

@@ -4,8 +4,7 @@
 
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::shots_test {
 
 /// Scales of so many triangles.
 struct Scenes {
@@ -73,5 +72,4 @@ TEST(Shots, LimitsAreOfTheMeanAndOfThe95thPercentile) {
   EXPECT_TRUE((ShotLimits{0, 0}.hold(Loss{})));  // what shows nothing
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::shots_test

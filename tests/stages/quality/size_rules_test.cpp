@@ -2,8 +2,7 @@
 
 #include "tests/stages/quality/quality_samples.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::size_rules_test {
 
 /// What fewer_heights() says of the textured sheet when half of the largest height shows so many texels per
 /// pixel along a line, as a logarithm of base 2.
@@ -41,5 +40,4 @@ TEST(SizeRules, WithoutMipsOnlyTexelsOfAPixelAre) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::size_rules_test

@@ -4,8 +4,7 @@
 
 #include "format/rules/picture_prediction.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::table_fit_test {
 
 GroupCells cells(const std::vector<double>& dssim, double texel_level) {
   GroupCells out;
@@ -114,5 +113,4 @@ TEST(TableFit, EnlargedLossesEndAtOne) {
   EXPECT_EQ(table.groups[0].sizes[2].coded.flip[0], 1);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::table_fit_test

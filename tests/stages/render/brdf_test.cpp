@@ -6,8 +6,7 @@
 
 #include "tests/stages/render/render_fixtures.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::brdf_test {
 
 constexpr double kTurn = 3.14159265358979323846;
 
@@ -148,5 +147,4 @@ TEST(Brdf, LightFromBehindDoesNotCount) {
   EXPECT_GE(out.x, 0);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::brdf_test

@@ -7,8 +7,7 @@
 #include "stages/render/render_math.h"
 #include "tests/stages/render/render_fixtures.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::environment_test {
 
 // Directions spread over the sphere.
 std::vector<Vec3f> directions(int count) {
@@ -206,5 +205,4 @@ TEST(Environment, HostileRadianceIsCutOff) {
   EXPECT_TRUE(is_finite(specular_light(light, {}, 0.5f)));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::environment_test

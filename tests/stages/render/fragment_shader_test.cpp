@@ -8,8 +8,7 @@
 
 #include "tests/stages/render/render_fixtures.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::fragment_shader_test {
 
 using testing::at;
 using testing::front_camera;
@@ -174,5 +173,4 @@ TEST(FragmentShader, TinyAndHugeObjectsLookTheSame) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::fragment_shader_test

@@ -5,8 +5,7 @@
 #include <cmath>
 #include <limits>
 
-namespace texmesh {
-namespace {
+namespace texmesh::render_camera_test {
 
 void expect_frame(const RenderCamera& c) {
   for (const Vec3d& v : {c.x, c.y, c.z}) EXPECT_NEAR(length(v), 1, 1e-12);
@@ -50,5 +49,4 @@ TEST(RenderCamera, AnUpThatDoesNotServeIsReplaced) {
   expect_frame(look_at_camera({1, 1, 1}, {1, 1, 1}, {0, 1, 0}, 40, 0.1));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::render_camera_test

@@ -5,8 +5,7 @@
 #include <cmath>
 #include <limits>
 
-namespace texmesh {
-namespace {
+namespace texmesh::render_material_test {
 
 std::int32_t no_texture(const TextureRef&, TextureUse) { return -1; }
 
@@ -96,5 +95,4 @@ TEST(RenderMaterial, HostileNumbersBecomeThoseOfTheSpecification) {
   EXPECT_TRUE(m.slot(TextureUse::kBaseColour).transform.is_identity());
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::render_material_test

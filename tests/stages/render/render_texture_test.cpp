@@ -10,8 +10,7 @@
 #include "stages/render/render_math.h"
 #include "tests/stages/render/render_fixtures.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::render_texture_test {
 
 using testing::texture_of;
 
@@ -258,5 +257,4 @@ TEST(RenderTexture, APartOfAMipIsTheMipOfThePart) {
   EXPECT_EQ(coarser_level(right, false, 9, {}).width_px, 1u);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::render_texture_test

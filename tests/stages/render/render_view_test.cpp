@@ -4,8 +4,7 @@
 #include "stages/render/shade.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::render_view_test {
 
 RenderMaterial unlit() {
   RenderMaterial out;
@@ -73,5 +72,4 @@ TEST(RenderView, FinePatternsAreFilteredNotAliased) {
   for (std::size_t i = 12; i < 36; ++i) EXPECT_NEAR(picture.linear[i * 48 + 24].x, grey, 0.01);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::render_view_test

@@ -7,8 +7,7 @@
 #include "stages/render/shade.h"
 #include "tests/stages/render/render_fixtures.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::shade_layers_test {
 
 using testing::at;
 using testing::even_light;
@@ -111,5 +110,4 @@ TEST(ShadeLayers, OneVisibilityServesTexturesOfAnyAlpha) {
   EXPECT_NEAR(code(at(shade(scene.scene(), seen, {even(0)}, light, {}), 4, 3).x), shown(0.2f), kCode);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::shade_layers_test

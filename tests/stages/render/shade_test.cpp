@@ -10,8 +10,7 @@
 #include "stages/render/render_math.h"
 #include "tests/stages/render/render_fixtures.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::shade_test {
 
 using testing::at;
 using testing::even_light;
@@ -289,5 +288,4 @@ TEST(Shade, SameBitsForAnyNumberOfThreads) {
   EXPECT_EQ(one.covered, many.covered);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::shade_test

@@ -7,8 +7,7 @@
 #include "stages/render/shade.h"
 #include "tests/stages/render/render_fixtures.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::shade_variants_test {
 
 using testing::front_camera;
 using testing::plain;
@@ -118,5 +117,4 @@ TEST(ShadeVariants, OtherLengthsAreRefused) {
   EXPECT_EQ(shade_variants(shown, seen, {}, {}, studio_environment(), {}).count(), 0u);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::shade_variants_test

@@ -4,8 +4,7 @@
 
 #include "tests/stages/render/render_fixtures.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::shown_materials_test {
 
 TexturePlane plane_of_size(std::uint32_t side_px, std::uint32_t mip, TextureRole role) {
   TexturePlane plane;
@@ -80,5 +79,4 @@ TEST(ShownMaterials, PixelsThatDoNotFitTheirPlanesAreRefused) {
   EXPECT_THROW(shown.of(64), StageError);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::shown_materials_test

@@ -10,8 +10,7 @@
 
 #include "tests/stages/render/render_fixtures.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::visibility_test {
 
 using testing::front_camera;
 using testing::joined;
@@ -271,5 +270,4 @@ TEST(Visibility, WhatCannotBeShownIsRefused) {
   EXPECT_THROW(scene.seen(front_camera(), 8), std::invalid_argument);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::visibility_test

@@ -7,8 +7,7 @@
 #include "tests/stages/render/render_fixtures.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::visibility_tile_test {
 
 using testing::front_camera;
 using testing::plain;
@@ -65,5 +64,4 @@ TEST(VisibilityTile, PairsOfSamplesChangeNoBit) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::visibility_tile_test

@@ -9,8 +9,7 @@
 
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::corner_lists_test {
 
 /// A fan of faces (0, i + 1, i + 2) around the point 0.
 std::vector<ReplayFace> fan(std::uint32_t faces) {
@@ -75,5 +74,4 @@ TEST(CornerLists, AreThoseOfPlainListsWhateverIsAddedAndDies) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::corner_lists_test

@@ -3,8 +3,7 @@
 #include "stages/gltf/check_glb.h"
 #include "tests/stages/scales/scales_checks.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::gltf_scales_test {
 
 using namespace testing;  // NOLINT: fixtures and checks
 
@@ -108,5 +107,4 @@ TEST_F(GltfScalesOf, SameBytesForAnyThreadCount) {
   for (std::size_t k = 0; k < one.files.size(); ++k) EXPECT_EQ(one.files[k].bytes, many.files[k].bytes);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::gltf_scales_test

@@ -2,8 +2,7 @@
 #include "pipeline/import/import_images.h"
 #include "tests/stages/scales/scales_checks.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::scale_grid_test {
 
 using namespace testing;  // NOLINT: fixtures and checks
 
@@ -122,5 +121,4 @@ TEST(Scales, TrianglesThatTheGridCollapsesAreDropped) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::scale_grid_test

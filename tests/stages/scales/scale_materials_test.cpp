@@ -4,8 +4,7 @@
 #include "stages/image/png_writer.h"
 #include "tests/stages/scales/scales_checks.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::scale_materials_test {
 
 using namespace testing;  // NOLINT: fixtures and checks
 
@@ -194,5 +193,4 @@ TEST(Scales, TheCoarsestScaleHasThePreviewsAndTheOthersNameThem) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::scale_materials_test

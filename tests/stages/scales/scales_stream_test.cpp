@@ -16,8 +16,7 @@
 #include "stages/simplification/simplification.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::scales_stream_test {
 
 using Json = nlohmann::json;
 /// One corner as a file's reader and a stream's reader get it: to the bit but for normals.
@@ -289,5 +288,4 @@ TEST(ScalesStream, OneScaleNeedsNone) {
   EXPECT_TRUE(files.stream.empty());
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::scales_stream_test

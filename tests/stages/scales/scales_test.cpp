@@ -2,8 +2,7 @@
 #include "pipeline/import/import_images.h"
 #include "tests/stages/scales/scales_checks.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::scales_test {
 
 using namespace testing;  // NOLINT: fixtures and checks
 
@@ -163,5 +162,4 @@ TEST(Scales, ProgressRisesWithWhatIsMade) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::scales_test

@@ -16,8 +16,7 @@
 #include "tests/format/split/split_fixture.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::vertex_split_test {
 
 using testing::bumpy_sphere;
 using testing::Corners;
@@ -278,5 +277,4 @@ TEST(VertexSplit, RefusesScalesOfOtherCollapses) {
   EXPECT_THROW(make_vertex_splits(scales, kept, coding_of(scales.mesh), kOneThread), StageError);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::vertex_split_test

@@ -5,8 +5,7 @@
 #include <utility>
 #include <vector>
 
-namespace texmesh {
-namespace {
+namespace texmesh::collapse_queue_test {
 
 TEST(Removable, TellsPointsFromComponents) {
   const Removable point = Removable::point(7), component = Removable::component(7);
@@ -43,5 +42,4 @@ TEST(CollapseQueue, PointsAndComponentsComeOutByKeyThenByIndex) {
                      {false, 0}, {true, 2}, {false, 2}, {true, 0}, {false, 1}}));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::collapse_queue_test

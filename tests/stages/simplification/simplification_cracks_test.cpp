@@ -7,8 +7,7 @@
 #include "stages/simplification/simplification.h"
 #include "tests/stages/simplification/simplification_checks.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::simplification_cracks_test {
 
 using namespace testing;  // NOLINT: fixtures and checks
 
@@ -109,5 +108,4 @@ TEST(SimplificationCracks, AllAtOnce) {
                  0.95, "all");
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::simplification_cracks_test

@@ -11,8 +11,7 @@
 #include "tests/stages/simplification/simplification_checks.h"
 #include "tests/support/hostile_meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::simplification_hostile_test {
 
 using namespace testing;  // NOLINT: fixtures and checks
 
@@ -296,5 +295,4 @@ TEST(Simplification, AlphaGuidesTheCollapse) {
   EXPECT_GT(right_share(0.1), 1.2 * right_share(0));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::simplification_hostile_test

@@ -14,8 +14,7 @@
 #include "tests/support/hostile_meshes.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::simplification_test {
 
 using namespace testing;  // NOLINT: fixtures and checks
 
@@ -382,5 +381,4 @@ TEST(Simplification, TheThesisKnowsNoBoundOfTheError) {
   EXPECT_GT(bounded.scales.back().error_max, 0.0001f * 3);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::simplification_test

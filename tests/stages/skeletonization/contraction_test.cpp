@@ -6,8 +6,7 @@
 #include "stages/skeletonization/wrap.h"
 #include "tests/support/even_sphere.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::contraction_test {
 
 TriangleSoup ball() {
   const Mesh mesh = testing::even_sphere(4, 0);
@@ -53,5 +52,4 @@ TEST(InsideTest, TellsTheInsideOfABall) {
   EXPECT_FALSE(inside.is_inside(soup.points[5]));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::contraction_test

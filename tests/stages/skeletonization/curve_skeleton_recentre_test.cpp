@@ -6,8 +6,7 @@
 #include <cmath>
 #include <vector>
 
-namespace texmesh {
-namespace {
+namespace texmesh::curve_skeleton_recentre_test {
 
 /// Nodes at x = 0 .. count - 1, of height y.
 CurveSkeleton line(int count, double y) {
@@ -84,5 +83,4 @@ TEST(Recentre, WithoutPolesNothingMoves) {
   EXPECT_EQ(same.nodes[0], (Vec3d{1, 0, 0}));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::curve_skeleton_recentre_test

@@ -7,8 +7,7 @@
 #include "format/base/errors.h"
 #include "stages/base/run_context.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::geometry_failure_test {
 
 template <class Thrown>
 bool falls_back_on(Thrown thrown) {
@@ -33,5 +32,4 @@ TEST(TryGeometry, LetsMistakesAndLimitsOfTheMachinePass) {
   EXPECT_THROW(falls_back_on(std::bad_alloc()), std::bad_alloc);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::geometry_failure_test

@@ -11,8 +11,7 @@
 #include "stages/geometry/triangle_tree.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::local_radius_test {
 
 using testing::Random;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -295,5 +294,4 @@ TEST(LocalRadius, SameBitsForAnyNumberOfThreads) {
             limit_by_thickness({soup}, soup.points, distance, {.offset = 0.001}, many).radius);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::local_radius_test

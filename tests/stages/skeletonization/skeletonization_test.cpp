@@ -17,8 +17,7 @@
 #include "tests/support/hostile_meshes.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::skeletonization_test {
 
 using testing::bare_mesh;
 using testing::Random;
@@ -350,5 +349,4 @@ TEST(SegmentTree, AgreesWithTryingAll) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::skeletonization_test

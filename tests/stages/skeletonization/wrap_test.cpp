@@ -7,8 +7,7 @@
 
 #include "tests/support/even_sphere.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::wrap_test {
 
 /// Balls of radius 1 with their centres at these places.
 TriangleSoup balls(const std::vector<Vec3d>& centres) {
@@ -59,5 +58,4 @@ TEST(Decimate, StaysClosedWithFewerFaces) {
   EXPECT_GE(fewer.triangles.size(), 90u);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::wrap_test

@@ -13,8 +13,7 @@
 #include "tests/support/even_sphere.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::filter_range_scan_test {
 
 using namespace testing;  // NOLINT: fixtures
 
@@ -292,5 +291,4 @@ TEST(RangeScan, SpacingByRowIsThatOfTheRowsRadius) {
       << "the wide one's relief is six times as long";
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::filter_range_scan_test

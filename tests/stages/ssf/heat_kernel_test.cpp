@@ -11,8 +11,7 @@
 #include "tests/support/even_sphere.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::heat_kernel_test {
 
 using namespace testing;  // NOLINT: fixtures
 
@@ -99,5 +98,4 @@ TEST(HeatKernel, AFewFastVerticesDoNotSetThePaceOfAll) {
   EXPECT_EQ(small.rate, before.rate) << "less than one vertex is none";
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::heat_kernel_test

@@ -12,8 +12,7 @@
 #include "tests/support/meshes.h"
 #include "tests/support/pyramid_accuracy.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::heat_levels_test {
 
 SurfaceComponent surface_of(const Mesh& m) {
   return largest_surface(condition_mesh(m, true, {}, RunContext{}));
@@ -82,5 +81,4 @@ TEST(HeatLevels, CellsShareOutTheWholeSurface) {
   for (std::uint32_t corner : coarse.corners) EXPECT_LT(corner, coarse.points.size());
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::heat_levels_test

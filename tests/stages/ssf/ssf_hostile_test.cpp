@@ -10,8 +10,7 @@
 #include "tests/support/even_sphere.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::ssf_hostile_test {
 
 using testing::even_sphere;
 
@@ -117,5 +116,4 @@ TEST(SsfHostile, RoundingFarFromTheOriginIsNoRelief) {
                 0.1 * static_cast<double>(at_least(near, i)));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::ssf_hostile_test

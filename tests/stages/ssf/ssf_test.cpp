@@ -11,8 +11,7 @@
 #include "tests/support/even_sphere.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::ssf_test {
 
 using namespace testing;  // NOLINT: fixtures
 
@@ -224,5 +223,4 @@ TEST(SsfOfTheRadius, RefusesTheSkeletonOfAnotherMesh) {
   EXPECT_THROW(filter_skeleton_distance(mesh, {}, {}, RunContext{}), StageError);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::ssf_test

@@ -7,8 +7,7 @@
 #include "stages/base/run_context.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::zim_test {
 
 using testing::Random;
 
@@ -196,5 +195,4 @@ TEST(Zim, SameResultForAnyNumberOfThreadsAndBadInputIsRefused) {
   EXPECT_TRUE(predict_quality({}, {}, {}, {}).planes.empty());
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::zim_test

@@ -11,8 +11,7 @@
 #include "pipeline/cache/cache_files.h"
 #include "tests/support/small_builds.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::command_cache_layers_test {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
@@ -173,5 +172,4 @@ TEST_F(BadCache, ACancelledBuildDoesNotStayToPrune) {
   EXPECT_FALSE(fs::exists(fs::path(folder_ / "cache") / "pruned"));
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::command_cache_layers_test

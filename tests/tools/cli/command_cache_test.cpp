@@ -9,8 +9,7 @@
 #include "pipeline/cache/disk_store.h"
 #include "tests/support/small_builds.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::command_cache_test {
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 using Counts = std::map<std::string, std::size_t>;  // by stage
@@ -248,5 +247,4 @@ TEST_F(SharedCache, EveryFlippedBitIsFoundReportedAndMadeGood) {
   EXPECT_GE(flipped, full_sweeps() ? 1000u : 50u);
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::command_cache_test

@@ -10,8 +10,7 @@
 #include "tests/support/schema.h"
 #include "tests/support/small_builds.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::command_compile_about_test {
 
 using Json = nlohmann::json;
 
@@ -136,5 +135,4 @@ TEST_F(CompileAbout, AFileThatIsHandedOutSaysWhoseItIs) {
   EXPECT_EQ(about("again.texmesh")["creator"], "A. Smith");
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::command_compile_about_test

@@ -9,8 +9,7 @@
 #include "tests/support/memory_resolver.h"
 #include "tests/support/small_builds.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::command_compile_chunks_test {
 
 /// Edges of one triangle, between points that are not at the very same place.
 std::size_t open_edges(const Mesh& mesh) {
@@ -121,5 +120,4 @@ TEST_F(Chunks, NoScaleAndNoProxyGapes) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::command_compile_chunks_test

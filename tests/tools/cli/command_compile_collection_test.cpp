@@ -12,8 +12,7 @@
 #include "tests/support/schema.h"
 #include "tests/support/small_builds.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::command_compile_collection_test {
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 using Stages = std::set<std::string>;
@@ -428,5 +427,4 @@ TEST_F(Collection, AnInterruptedRunLeavesNothingAndTheNextOneContinues) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::command_compile_collection_test

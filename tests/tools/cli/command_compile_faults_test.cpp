@@ -14,8 +14,7 @@
 #include "tests/support/sanitizers.h"
 #include "tests/support/small_builds.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::command_compile_faults_test {
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
@@ -378,5 +377,4 @@ TEST_F(Faults, LocksThatAreGrantedToAllCostNoPackage) {
   expect_next_build_to_be_whole(site, "locks granted to all");
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::command_compile_faults_test

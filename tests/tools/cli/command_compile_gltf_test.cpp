@@ -3,8 +3,7 @@
 #include "tests/support/images.h"
 #include "tests/support/small_builds.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::command_compile_gltf_test {
 
 using Json = nlohmann::json;
 
@@ -82,5 +81,4 @@ TEST_F(CompileGltf, WithoutThemAPackageIsOfTheEarlierVersion) {
   EXPECT_EQ(json_of({"dump", compile("all")})["package"]["version"]["minor"], 1);
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::command_compile_gltf_test

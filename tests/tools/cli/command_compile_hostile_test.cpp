@@ -11,8 +11,7 @@
 #include "tests/support/command.h"
 #include "tests/support/sanitizers.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::command_compile_hostile_test {
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
@@ -330,5 +329,4 @@ TEST_F(Hostile, AFarAwayOriginKeepsMillimetres) {
       << d.output;
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::command_compile_hostile_test

@@ -4,8 +4,7 @@
 #include "pipeline/compile/workers/sandbox.h"
 #include "tests/support/small_builds.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::command_compile_names_test {
 namespace fs = std::filesystem;
 
 class Names : public ::testing::Test {
@@ -103,5 +102,4 @@ TEST_F(Names, AModelThatIsNotThereButForItsCaseIsNamed) {
       << r.output << r.errors;
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::command_compile_names_test

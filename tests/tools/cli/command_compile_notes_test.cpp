@@ -11,8 +11,7 @@
 #include "tests/support/small_builds.h"
 #include "tests/support/zip_writer.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::command_compile_notes_test {
 
 using Json = nlohmann::json;
 
@@ -217,5 +216,4 @@ TEST_F(CompileNotes, ScriptStaysText) {
   EXPECT_NE(html.find("&lt;script&gt;alert(1)"), std::string::npos);
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::command_compile_notes_test

@@ -12,8 +12,7 @@
 #include "tests/support/meshes.h"
 #include "tests/support/small_builds.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::command_compile_proxies_test {
 
 using Json = nlohmann::json;
 
@@ -216,5 +215,4 @@ INSTANTIATE_TEST_SUITE_P(
         BadInput{"OneTriangle", one_triangle}, BadInput{"ManyMaterials", many_materials}),
     [](const auto& one) { return std::string(one.param.name); });
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::command_compile_proxies_test

@@ -8,8 +8,7 @@
 
 #include "tests/support/command.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::command_compile_real_scans_test {
 namespace fs = std::filesystem;
 
 fs::path data_folder() {
@@ -44,5 +43,4 @@ TEST(RealScans, CompileAndVerify) {
   EXPECT_GT(compiled, 0);
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::command_compile_real_scans_test

@@ -12,8 +12,7 @@
 #include "tests/support/command.h"
 #include "tests/support/sanitizers.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::command_compile_test {
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
@@ -287,5 +286,4 @@ TEST_F(CompileCommand, AnUnusableCacheIsAWarningWithItsName) {
   EXPECT_TRUE(std::filesystem::exists(folder_ / "x.texmesh"));
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::command_compile_test

@@ -8,8 +8,7 @@
 
 #include "tests/support/command.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::command_diff_test {
 
 using Json = nlohmann::json;
 namespace fs = std::filesystem;
@@ -123,5 +122,4 @@ TEST_F(CliDiff, WhatCannotBeReadIsAnError) {
   EXPECT_EQ(texmesh({"diff", *shared_ / "a.texmesh"}).exit_code, 2);
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::command_diff_test

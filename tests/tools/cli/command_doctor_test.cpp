@@ -6,8 +6,7 @@
 #include "tests/support/command.h"
 #include "tests/support/schema.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::command_doctor_test {
 
 using Json = nlohmann::json;
 const std::string kPackage = std::string(TEXMESH_SOURCE_DIR) + "/tests/golden/v2.0-scan.texmesh";
@@ -91,5 +90,4 @@ TEST_F(DoctorCommand, NotANumberAsATextureCoordinateIsSaid) {
       << r.errors;
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::command_doctor_test

@@ -9,8 +9,7 @@
 #include "tests/support/command.h"
 #include "tests/support/schema.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::command_dump_test {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
@@ -175,5 +174,4 @@ TEST_F(CliInspect, HelpTeaches) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::command_dump_test

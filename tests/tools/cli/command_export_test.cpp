@@ -12,8 +12,7 @@
 #include "tests/support/small_builds.h"
 #include "tests/tools/publish/pages/html_check.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::command_export_test {
 
 using Json = nlohmann::json;
 
@@ -290,5 +289,4 @@ TEST_F(ExportCommand, DamageAndOtherFoldersAreExitCode1NonsenseIs2) {
   EXPECT_EQ(text("mine.txt"), "x");
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::command_export_test

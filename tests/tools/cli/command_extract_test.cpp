@@ -8,8 +8,7 @@
 #include "stages/gltf/check_glb.h"
 #include "tests/support/command.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::command_extract_test {
 
 using Json = nlohmann::json;
 const std::string kGolden = std::string(TEXMESH_SOURCE_DIR) + "/tests/golden/v2.0-scan.texmesh";
@@ -103,5 +102,4 @@ TEST(CliExtract, FaultsLeaveNoFile) {
   EXPECT_EQ(files_beneath(folder.path().string()), std::vector<std::string>{"damaged.texmesh"});
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::command_extract_test

@@ -12,8 +12,7 @@
 #include "tests/support/command.h"
 #include "tests/support/schema.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::command_plan_delivery_test {
 
 using Json = nlohmann::json;
 const std::string kGolden = std::string(TEXMESH_SOURCE_DIR) + "/tests/golden/v2.0-scan.texmesh";
@@ -279,5 +278,4 @@ TEST(CliCheck, GatesByItsLimitsAndSaysWhy) {
     EXPECT_NE(r.output.find(reason), std::string::npos) << r.output;
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::command_plan_delivery_test

@@ -11,8 +11,7 @@
 #include "tests/support/command.h"
 #include "tests/support/schema.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::command_plan_delivery_thesis_test {
 
 using Json = nlohmann::json;
 
@@ -151,5 +150,4 @@ TEST_F(ThesisProfile, NamesThatAreNotInstalledAreUsage) {
   EXPECT_EQ(texmesh({"plan", package, "--bandwidth", "1MB/s", "--policy", "printed"}).exit_code, 2);
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::command_plan_delivery_thesis_test

@@ -8,8 +8,7 @@
 #include "tests/support/command.h"
 #include "tests/support/gltf_builder.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::command_render_test {
 
 using Json = nlohmann::json;
 const std::string kPackage = std::string(TEXMESH_SOURCE_DIR) + "/tests/golden/v2.0-scan.texmesh";
@@ -178,5 +177,4 @@ TEST_F(RenderCommand, AnEmptyPictureSaysWhy) {
   EXPECT_EQ(json["notes"].back()["code"], "empty-picture");
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::command_render_test

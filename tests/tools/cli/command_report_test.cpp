@@ -8,8 +8,7 @@
 #include "tests/support/packages.h"
 #include "tests/support/schema.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::command_report_test {
 
 using Json = nlohmann::json;
 
@@ -61,5 +60,4 @@ TEST_F(ReportCommand, OtherFoldersAndInputsAreRefusedAtOnce) {
   EXPECT_FALSE(std::filesystem::exists(folder_ / "r"));
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::command_report_test

@@ -13,8 +13,7 @@
 #include "tests/support/small_builds.h"
 #include "tests/tools/publish/pages/html_check.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::command_site_test {
 
 using Json = nlohmann::json;
 namespace fs = std::filesystem;
@@ -281,5 +280,4 @@ TEST_F(SiteCommand, SpeaksTheWordsOfAFileAndWearsTheStyleOfAnother) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::command_site_test

@@ -11,8 +11,7 @@
 #include "tests/support/schema.h"
 #include "tests/support/small_builds.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::command_summary_test {
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
 
@@ -110,5 +109,4 @@ TEST_F(Fleet, TheSandboxChangesNoByteAndSaysWhatHolds) {
   EXPECT_EQ(compile({"--sandbox", "some"}).exit_code, 2);
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::command_summary_test

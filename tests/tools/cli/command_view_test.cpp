@@ -14,8 +14,7 @@
 #include "tests/support/command.h"
 #include "tools/publish/view/view_server.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::command_view_test {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::json;
@@ -246,5 +245,4 @@ TEST(PercentEncoded, LeavesNothingThatAUrlCouldMisread) {
   EXPECT_EQ(percent_encoded("a b/%?#&+\xc3\xa4.texmesh"), "a%20b/%25%3F%23%26%2B%C3%A4.texmesh");
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::command_view_test

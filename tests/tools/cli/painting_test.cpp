@@ -5,8 +5,7 @@
 
 #include "tests/support/command.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::painting_test {
 
 using Json = nlohmann::json;
 
@@ -109,5 +108,4 @@ TEST_F(RenderWhat, ExitCodes) {
   EXPECT_TRUE(read_text(out).empty());  // no failure left anything behind
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::painting_test

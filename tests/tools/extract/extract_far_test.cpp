@@ -15,8 +15,7 @@
 #include "tools/inspect/package_mesh.h"
 #include "tools/inspect/verify/verify.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::extract_far_test {
 
 constexpr int kCells = 6;
 constexpr std::uint64_t kTriangles = 2 * kCells * kCells;
@@ -84,5 +83,4 @@ TEST_P(ExtractFar, EveryTriangleIsExtracted) {
 const float kAt = static_cast<float>(kLargestCoordinate);  // rounded down, so not beyond
 INSTANTIATE_TEST_SUITE_P(Bounds, ExtractFar, ::testing::Values(kAt, std::nextafter(kAt, 0.0f)));
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::extract_far_test

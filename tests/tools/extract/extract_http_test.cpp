@@ -8,8 +8,7 @@
 #include "tests/support/packages.h"
 #include "tools/extract/extract.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::extract_http_test {
 
 TEST(HttpExtract, GivesTheSameBytesAsTheFile) {
   testing::PackageParts parts = testing::make_package_parts();
@@ -39,5 +38,4 @@ TEST(HttpExtract, GivesTheSameBytesAsTheFile) {
   EXPECT_EQ(over_http, extract_model(reader, {budget}, {}).glb);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::extract_http_test

@@ -13,8 +13,7 @@
 #include "tools/extract/budget/filling.h"
 #include "tools/extract/extract.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::extract_kinds_test {
 
 using Json = nlohmann::json;
 using testing::GltfBuilder;
@@ -204,5 +203,4 @@ TEST(ExtractMesh, ALittleLeanerThanStoredItKeepsItsNormals) {
   EXPECT_LT(leaner.geometry, 0.5 * next.geometry);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::extract_kinds_test

@@ -14,8 +14,7 @@
 #include "tests/support/images.h"
 #include "tools/extract/extract.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::extract_source_test {
 
 using Json = nlohmann::json;
 using testing::GltfBuilder;
@@ -181,5 +180,4 @@ TEST_F(SourceToExtract, WithBytesEnoughTheMapsAreTheSourcesOwn) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::extract_source_test

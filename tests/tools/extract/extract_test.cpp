@@ -11,8 +11,7 @@
 #include "tests/support/packages.h"
 #include "tools/extract/extract.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::extract_test {
 
 using testing::make_package_parts;
 
@@ -316,5 +315,4 @@ TEST(ExtractFiles, ProgressRisesToOne) {
   EXPECT_EQ(seen.back(), 1);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::extract_test

@@ -5,8 +5,7 @@
 
 #include "tests/support/packages.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::package_model_test {
 
 RenderedModel model_of(const Bytes& package, const PackageChoice& choice, int threads = 1) {
   PackageReader reader(open_container(memory_source(package)));
@@ -71,5 +70,4 @@ TEST(PackageModel, WhatIsNotThereIsNamed) {
   EXPECT_THROW(model_of(small_package(), {0, PackageTextures::kRung, 2}), InputError);
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::package_model_test

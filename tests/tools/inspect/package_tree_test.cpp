@@ -11,8 +11,7 @@
 #include "tools/inspect/package_tree.h"
 #include "tools/inspect/verify/verify.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::package_tree_test {
 
 namespace fs = std::filesystem;
 
@@ -234,5 +233,4 @@ TEST_F(Tree, ContainersWithPathsThatEscapeAreRefused) {
   expect_names({"a.texmesh"});
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::package_tree_test

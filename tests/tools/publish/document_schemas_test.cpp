@@ -16,8 +16,7 @@
 #include "tools/publish/report/report.h"
 #include "tools/publish/site/site.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::document_schemas_test {
 
 TEST(DocumentSchemas, AreThoseOfTheProgram) {
   for (const auto of_command :
@@ -30,5 +29,4 @@ TEST(DocumentSchemas, AreThoseOfTheProgram) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::document_schemas_test

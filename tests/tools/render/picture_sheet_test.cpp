@@ -8,8 +8,7 @@
 #include "stages/render/shade.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::picture_sheet_test {
 
 RenderedModel ball() {
   Material grey;
@@ -77,5 +76,4 @@ TEST(PictureSheet, RefusesWhatNoSheetCanHold) {
   EXPECT_THROW(sheet_of(4, kMaxSheetSide / 2 + 1), std::invalid_argument);
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::picture_sheet_test

@@ -9,8 +9,7 @@
 #include "tests/support/images.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::rendered_model_test {
 
 Image png_image(int side, int channels) {
   Image image;
@@ -155,5 +154,4 @@ TEST(RenderedModel, AnImageThatDoesNotDecodeIsTheModelsFault) {
   EXPECT_THROW(rendered_model(sphere_model({a}, {broken}), {}), InputError);
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::rendered_model_test

@@ -8,8 +8,7 @@
 #include "tests/support/command.h"
 #include "tests/support/schema.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::model_list_test {
 namespace fs = std::filesystem;
 
 class ModelFiles : public ::testing::Test {
@@ -112,5 +111,4 @@ TEST_F(ModelFiles, AListTellsWhatTheRunOfEachShardCompiles) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::model_list_test

@@ -11,8 +11,7 @@
 #include "tests/support/command.h"
 #include "tests/support/schema.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::run_summary_test {
 using Json = nlohmann::json;
 using testing::TemporaryFolder;
 
@@ -219,5 +218,4 @@ TEST(MergeSummaries, TheExitCodeSaysWhetherTryingAgainIsOfUse) {
   EXPECT_EQ(graver_exit_code(0, 0), 0);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::run_summary_test

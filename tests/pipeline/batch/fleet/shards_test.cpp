@@ -9,8 +9,7 @@
 
 #include "format/base/errors.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::shards_test {
 
 using Variables = std::map<std::string, std::string>;
 
@@ -129,5 +128,4 @@ TEST(Shards, ModelsWithoutACostAreSpread) {
   EXPECT_EQ(shards, (std::vector<int>{0, 1, 2, 3}));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::shards_test

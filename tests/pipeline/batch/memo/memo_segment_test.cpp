@@ -5,8 +5,7 @@
 #include "format/base/archive.h"
 #include "tests/support/command.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::memo_segment_test {
 
 using testing::TemporaryFolder;
 
@@ -144,5 +143,4 @@ TEST(MemoSegment, ARecordOfGarbageIsToldOfAndThenNotBelieved) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::memo_segment_test

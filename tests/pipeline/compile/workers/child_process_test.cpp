@@ -4,8 +4,7 @@
 
 #include <cstdlib>
 
-namespace texmesh {
-namespace {
+namespace texmesh::child_process_test {
 
 using Strings = std::vector<std::string>;
 
@@ -34,5 +33,4 @@ TEST(ChildProcess, WhatTheUserHasSetOfMemoryStays) {
             Strings{"GLIBC_TUNABLES=glibc.malloc.arena_max=1"});
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::child_process_test

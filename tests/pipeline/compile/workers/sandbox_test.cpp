@@ -23,8 +23,7 @@
 #include "tests/support/command.h"
 #include "tests/support/sanitizers.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::sandbox_test {
 namespace fs = std::filesystem;
 
 /// A server that listens on a port of its own; connecting to it needs no accept.
@@ -219,5 +218,4 @@ TEST(SandboxSupport, IsDescribedWithWhatIsMissing) {
   EXPECT_FALSE((SandboxSupport{7, false}.complete()));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::sandbox_test

@@ -8,8 +8,7 @@
 #include "pipeline/compile/workers/worker.h"
 #include "tests/support/command.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::worker_pool_test {
 
 namespace fs = std::filesystem;
 
@@ -51,5 +50,4 @@ TEST(WorkerPool, WorkersKeepTheUsersSettingOfMemory) {
   EXPECT_EQ(tunables_of_workers({"GLIBC_TUNABLES=" + users}), std::vector<std::string>(3, users));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::worker_pool_test

@@ -7,8 +7,7 @@
 #include "tests/support/images.h"
 #include "tests/support/zip_writer.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::archive_test {
 
 using testing::zip_of;
 using testing::ZipFile;
@@ -135,5 +134,4 @@ TEST(Archive, EveryCutAndEveryChangedByteIsRefusedOrReads) {
     }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::archive_test

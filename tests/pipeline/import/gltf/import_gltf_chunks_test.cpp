@@ -5,8 +5,7 @@
 #include "tests/support/hostile_meshes.h"
 #include "tests/support/memory_resolver.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::import_gltf_chunks_test {
 
 using testing::ChunkKind;
 using testing::Random;
@@ -102,5 +101,4 @@ TEST(ImportGltfChunksTest, SeamsAndCreasesAtBordersStay) {
   EXPECT_EQ(halves({1, 0}, {0, .03f, 1}), 6u);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::import_gltf_chunks_test

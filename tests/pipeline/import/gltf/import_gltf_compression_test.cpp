@@ -10,8 +10,7 @@
 #include "tests/support/gltf_builder.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::import_gltf_compression_test {
 
 using nlohmann::json;
 using testing::GltfBuilder;
@@ -396,5 +395,4 @@ TEST(ImportGltfMeshopt, SurvivesEveryFlippedByte) {
   EXPECT_GT(refused, 20u);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::import_gltf_compression_test

@@ -5,8 +5,7 @@
 
 #include "tests/pipeline/import/gltf/hostile_gltf.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::import_gltf_damage_test {
 
 using testing::GltfBuilder;
 using testing::quad;
@@ -70,5 +69,4 @@ TEST(HostileGltf, SurvivesEveryFlippedByte) {
   EXPECT_GT(refused, good.size());  // all of the JSON's brackets, names and numbers
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::import_gltf_damage_test

@@ -10,8 +10,7 @@
 #include "pipeline/import/import.h"
 #include "pipeline/io/file_resolver.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::import_gltf_data_test {
 
 namespace fs = std::filesystem;
 
@@ -66,5 +65,4 @@ INSTANTIATE_TEST_SUITE_P(
       return name;
     });
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::import_gltf_data_test

@@ -6,8 +6,7 @@
 
 #include "tests/pipeline/import/gltf/hostile_gltf.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::import_gltf_hostile_test {
 
 using nlohmann::json;
 
@@ -313,5 +312,4 @@ TEST(HostileGltf, MessagesStayShort) {
   EXPECT_LT(refusal(quad().gltf("http:" + std::string(1'000'000, 'x'))).size(), 400u);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::import_gltf_hostile_test

@@ -5,8 +5,7 @@
 #include "tests/support/images.h"
 #include "tests/support/ktx2_writer.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::import_gltf_images_test {
 
 using namespace testing;  // NOLINT: fixtures
 
@@ -153,5 +152,4 @@ TEST(ImportGltfImages, RefusesImagesOfForeignContent) {
   refused("a.png", {'G', 'I', 'F', '8', '9', 'a'});
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::import_gltf_images_test

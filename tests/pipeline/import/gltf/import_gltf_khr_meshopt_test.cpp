@@ -10,8 +10,7 @@
 #include "tests/support/gltf_builder.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::import_gltf_khr_meshopt_test {
 
 using nlohmann::json;
 using testing::GltfBuilder;
@@ -147,5 +146,4 @@ TEST(ImportGltfKhrMeshopt, IsReadWhereverExtIs) {
   EXPECT_THROW(import(b), InputError);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::import_gltf_khr_meshopt_test

@@ -7,8 +7,7 @@
 #include "stages/image/decode_image.h"
 #include "tests/pipeline/import/gltf/textured_gltf.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::import_gltf_materials_test {
 
 using namespace testing;  // NOLINT: fixtures
 
@@ -260,5 +259,4 @@ TEST(ImportGltfMaterials, TangentsFollowTheNodes) {
   EXPECT_TRUE(import(b).mesh.tangents.empty()) << "glTF: ignored without normals";
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::import_gltf_materials_test

@@ -5,8 +5,7 @@
 
 #include "tests/support/gltf_builder.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::import_gltf_test {
 
 using nlohmann::json;
 using testing::GltfBuilder;
@@ -390,5 +389,4 @@ TEST(ImportGltf, WorksOnTheSameBytesAtAnyNumberOfThreads) {
             import_gltf("m", bytes, resolver, {}, eight).model);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::import_gltf_test

@@ -9,8 +9,7 @@
 #include "tests/pipeline/import/obj/obj_cases.h"
 #include "tests/support/sanitizers.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::import_obj_test {
 
 using namespace testing;  // NOLINT: fixtures
 
@@ -235,5 +234,4 @@ TEST(ImportObj, LargeFilesTakeLinearTime) {
   EXPECT_LT(seconds, testing::sanitizers_take(20));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::import_obj_test

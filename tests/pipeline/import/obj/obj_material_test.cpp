@@ -6,8 +6,7 @@
 #include "stages/image/decode_image.h"
 #include "tests/pipeline/import/obj/obj_cases.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::obj_material_test {
 
 using namespace testing;  // NOLINT: fixtures
 
@@ -146,5 +145,4 @@ TEST(ObjMaterial, EmissionAndPbr) {
   EXPECT_EQ(count_notes(plain.model, "odd-material"), 1);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::obj_material_test

@@ -9,8 +9,7 @@
 #include "tests/support/images.h"
 #include "tests/support/memory_resolver.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::import_ply_test {
 
 using testing::bytes_of;
 using testing::count_notes;
@@ -325,5 +324,4 @@ TEST(ImportPly, SomeNanPositionsAreAWarningAllAreAnError) {
   EXPECT_THROW(import(text), InputError);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::import_ply_test

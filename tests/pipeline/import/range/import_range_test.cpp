@@ -9,8 +9,7 @@
 #include "tests/support/images.h"
 #include "tests/support/memory_resolver.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::import_range_test {
 
 using testing::bytes_of;
 using testing::count_notes;
@@ -281,5 +280,4 @@ TEST(ImportRange, TheSameBytesEveryTime) {
   EXPECT_EQ(import(description(), resolver).model, import(description(), resolver).model);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::import_range_test

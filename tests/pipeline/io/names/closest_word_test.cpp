@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace texmesh {
-namespace {
+namespace texmesh::closest_word_test {
 
 constexpr std::string_view kWords[] = {"compile", "dump", "CC-BY-4.0", "CC0-1.0", "--title", "x"};
 
@@ -31,5 +30,4 @@ TEST(ClosestWord, TheSuggestionIsASentenceOrNothing) {
   EXPECT_EQ(meant_instead("report", kWords), "");
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::closest_word_test

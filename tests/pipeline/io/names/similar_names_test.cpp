@@ -6,8 +6,7 @@
 #include "pipeline/io/uri.h"
 #include "tests/support/command.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::similar_names_test {
 
 TEST(NameKey, IsEqualForNamesThatDifferInCaseCompositionOrEncodingAlone) {
   const std::vector<std::vector<std::string>> equal{
@@ -56,5 +55,4 @@ TEST(SimilarNames, ListsOnlyWhereAPartIsNotThere) {
   EXPECT_EQ(similar_names(folder / "none", "a").names, Names{});
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::similar_names_test

@@ -6,8 +6,7 @@
 #include "tests/stages/image/image_files.h"
 #include "tests/support/ktx2_writer.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::read_ktx2_test {
 
 using namespace testing;  // NOLINT: fixtures
 
@@ -198,5 +197,4 @@ TEST(ReadKtx2, FlippedBytesAreRefusedOrRead) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::read_ktx2_test

@@ -9,8 +9,7 @@
 
 #include "tests/stages/image/image_files.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::other_pictures_test {
 
 using namespace testing;  // NOLINT: fixtures
 
@@ -216,5 +215,4 @@ TEST(OtherPictures, SizesThatTheBytesCannotHoldAreRefused) {
     refused("a.hdr", hdr(line));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::other_pictures_test

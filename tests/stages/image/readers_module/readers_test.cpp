@@ -5,8 +5,7 @@
 
 #include "format/base/errors.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::readers_test {
 
 TEST(ReadersModule, TheModuleIsFoundByItsNameAndShowsOneSymbol) {
   void* const module = ::dlopen("texmesh_readers.so", RTLD_NOW | RTLD_LOCAL);
@@ -30,5 +29,4 @@ TEST(ReadersModule, ItsErrorsAreThoseOfTheProgram) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::readers_test

@@ -5,8 +5,7 @@
 #include "tests/stages/image/image_files.h"
 #include "tests/support/wide_jpeg.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::wide_jpeg_test {
 
 using namespace testing;  // NOLINT: fixtures
 
@@ -105,5 +104,4 @@ TEST(WideJpeg, FourComponentsAreRefused) {
   EXPECT_NE(error.find("1 or 3 components of 12 bits"), std::string::npos) << error;
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::wide_jpeg_test

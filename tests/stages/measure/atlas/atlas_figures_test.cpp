@@ -9,8 +9,7 @@
 #include "format/base/vec.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::atlas_figures_test {
 
 /// Unit squares side by side along x, two triangles each, in rectangles of a texture: (u0, v0) at the left
 /// lower corner.
@@ -332,5 +331,4 @@ TEST(AtlasFigures, ASheetIsFilledExactlyOnce) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::atlas_figures_test

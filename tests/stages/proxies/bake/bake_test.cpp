@@ -8,8 +8,7 @@
 #include "tests/stages/proxies/atlas_fixtures.h"
 #include "tests/support/even_sphere.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::bake_test {
 
 using testing::square_atlas;
 using testing::texture_of;
@@ -250,5 +249,4 @@ TEST(SampledNormals, HardEdgesHaveNormalsOfTheirOwnOnBothSides) {
   EXPECT_EQ(sampled_normals(atlas, bake_source, CreaseUse::kWhereChartsEnd, {}).mesh, atlas);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::bake_test

@@ -2,8 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace texmesh {
-namespace {
+namespace texmesh::push_pull_test {
 
 TEST(PushPull, CoveredValuesStayAndOthersLieBetweenThem) {
   constexpr std::uint32_t kWidth = 13, kHeight = 7;
@@ -29,5 +28,4 @@ TEST(PushPull, NothingCoveredChangesNothing) {
   for (const Vec3f v : values) EXPECT_EQ(v, (Vec3f{1, 2, 3}));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::push_pull_test

@@ -9,8 +9,7 @@
 #include "tests/stages/proxies/atlas_fixtures.h"
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::proxy_glb_test {
 
 BakedMaps noise_maps(std::uint32_t side_px, bool alpha) {
   testing::Random random{11};
@@ -189,5 +188,4 @@ TEST(WebpPicture, AlphaComesBack) {
   EXPECT_NEAR(back.data[0], 200, 12);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::proxy_glb_test

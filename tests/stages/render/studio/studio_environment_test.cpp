@@ -2,8 +2,7 @@
 
 #include "stages/render/environment.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::studio_environment_test {
 
 TEST(StudioEnvironment, IsWhatManyThreadsPrepare) {
   const RenderEnvironment built_in = studio_environment(),
@@ -19,5 +18,4 @@ TEST(StudioEnvironment, IsWhatManyThreadsPrepare) {
   EXPECT_EQ(built_in.background, prepared.background);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::studio_environment_test

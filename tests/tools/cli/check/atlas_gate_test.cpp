@@ -4,8 +4,7 @@
 
 #include <limits>
 
-namespace texmesh {
-namespace {
+namespace texmesh::atlas_gate_test {
 
 AtlasDiagnosis two_textures() {
   AtlasDiagnosis d;
@@ -60,5 +59,4 @@ TEST(AtlasGate, NoAtlasAndNoSeamsKeepEveryLimit) {
   EXPECT_TRUE(check_atlases(d, limits).empty());
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::atlas_gate_test

@@ -6,8 +6,7 @@
 
 #include "tests/support/packages.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::check_gate_test {
 
 std::size_t failures(const std::vector<GateResult>& results) {
   return static_cast<std::size_t>(
@@ -41,5 +40,4 @@ TEST(CheckGate, JunitHasACaseForEach) {
   EXPECT_NE(xml.find("<failure message=\"3 &lt; 4\"/>"), std::string::npos) << xml;
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::check_gate_test

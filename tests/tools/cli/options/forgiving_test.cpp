@@ -8,8 +8,7 @@
 #include "tools/cli/options/common_options.h"
 #include "tools/cli/options/units.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::forgiving_test {
 
 using testing::CommandResult;
 
@@ -71,5 +70,4 @@ TEST(Forgiving, WhatIsNoPackageIsCalledWhatItIs) {
   dumped("garbage", "something else");
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::forgiving_test

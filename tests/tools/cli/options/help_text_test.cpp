@@ -8,8 +8,7 @@
 #include "pipeline/compile/options.h"
 #include "tests/support/command.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::help_text_test {
 
 constexpr std::size_t kTwoScreens = 96, kWidth = 100;
 
@@ -120,5 +119,4 @@ TEST(CommandHelp, RareOptionsAreInTheFullHelpAndWork) {
   EXPECT_EQ(r.exit_code, 0) << r.errors;
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::help_text_test

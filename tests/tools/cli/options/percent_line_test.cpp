@@ -4,8 +4,7 @@
 
 #include <sstream>
 
-namespace texmesh {
-namespace {
+namespace texmesh::percent_line_test {
 
 TEST(PercentLine, RisesAndIsTakenAway) {
   std::ostringstream out;
@@ -48,5 +47,4 @@ TEST(PercentLine, NothingStandsInALog) {
   EXPECT_EQ(out.str(), "");
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::percent_line_test

@@ -9,8 +9,7 @@
 #include "pipeline/compile/stage_table.h"
 #include "tests/support/command.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::shell_text_test {
 
 std::string told(const std::string& form) {
   const CommandResult r = run_command({TEXMESH_BINARY, "completion", form});
@@ -141,5 +140,4 @@ TEST(ShellText, TheVersionNamesEveryLibraryThatChangesBytes) {
   EXPECT_NE(text.find("GPL-3.0-or-later"), std::string::npos);
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::shell_text_test

@@ -9,8 +9,7 @@
 #include "pipeline/io/exit_codes.h"
 #include "tools/cli/options/units.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::told_errors_test {
 
 struct Told {
   int exit_code = 0;
@@ -44,5 +43,4 @@ TEST(ToldErrors, EachKindHasItsCodeAndSaysWhatItFound) {
   EXPECT_NE(internal.text.find("internal error: two and two"), std::string::npos);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::told_errors_test

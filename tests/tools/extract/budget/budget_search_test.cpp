@@ -12,8 +12,7 @@
 #include "tools/extract/budget/filling.h"
 #include "tools/extract/glb/standalone_glb.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::budget_search_test {
 
 const std::string kGolden = std::string(TEXMESH_SOURCE_DIR) + "/tests/golden/v2.0-scan.texmesh";
 
@@ -221,5 +220,4 @@ TEST(FitNormals, SamplesOfTheOtherSideDoNotCount) {
   EXPECT_GT(fit_normals(points, triangles, up, samples, {})[0].y, 0.3f);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::budget_search_test

@@ -5,8 +5,7 @@
 
 #include "tests/support/packages.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::file_looks_test {
 
 const std::string kGolden = std::string(TEXMESH_SOURCE_DIR) + "/tests/golden/v2.0-scan.texmesh";
 constexpr std::uint64_t kBytes = 30000;
@@ -103,5 +102,4 @@ TEST_F(Looks, ATextureThatTakesTooMuchGivesBytesToTheOneThatLosesMost) {
   EXPECT_LT(best.images.images[other].bytes, bytes);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::file_looks_test

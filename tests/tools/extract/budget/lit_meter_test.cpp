@@ -5,8 +5,7 @@
 
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::lit_meter_test {
 
 constexpr std::uint32_t kSide = 96;
 
@@ -67,5 +66,4 @@ TEST(Windows, ShowThePartOfThePictureThatTheyStandFor) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::lit_meter_test

@@ -5,8 +5,7 @@
 
 #include "tests/support/packages.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::loss_curves_test {
 
 ExtractBudget small_pictures() {
   ExtractBudget out;
@@ -69,5 +68,4 @@ TEST(LossCurves, ImagesOfOneMaterialAreOneGroup) {
     EXPECT_EQ(reference.groups[t.image], reference.groups[reference.shown[0].image]);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::loss_curves_test

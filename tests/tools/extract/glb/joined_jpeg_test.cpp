@@ -12,8 +12,7 @@
 #include "tests/support/packages.h"
 #include "tools/extract/glb/texture_source.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::joined_jpeg_test {
 
 constexpr std::uint32_t kWidth = 64, kHeight = 48, kFragment = 32;  // of the package made by code
 
@@ -171,5 +170,4 @@ TEST(JoinedJpeg, PartsOfOtherImagesAreRefused) {
   EXPECT_THROW(joined_plane(package, 0, 1, {}), FormatError);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::joined_jpeg_test

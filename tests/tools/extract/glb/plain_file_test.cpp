@@ -14,8 +14,7 @@
 #include "tools/extract/extract.h"
 #include "tools/extract/proxy/proxy_search.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::plain_file_test {
 
 nlohmann::json json_of(const Bytes& glb) {
   const std::size_t bytes = glb[12] | glb[13] << 8 | glb[14] << 16;
@@ -85,5 +84,4 @@ TEST(PlainFile, ScalesAndProxiesOfAPackageArePlainWhereItIsAsked) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::plain_file_test

@@ -14,8 +14,7 @@
 #include "tests/support/images.h"
 #include "tools/inspect/verify/verify.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::scale_file_test {
 
 constexpr int kSide = 28;
 
@@ -178,5 +177,4 @@ TEST(ScaleFile, ADamagedStreamIsFound) {
   EXPECT_THROW(package.split_prefix(0), InputError);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::scale_file_test

@@ -9,8 +9,7 @@
 #include "stages/measure/flip.h"
 #include "tools/extract/glb/texture_source.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::standalone_glb_test {
 
 Pixels pattern(std::uint32_t width, std::uint32_t height, std::uint32_t channels) {
   Pixels p{width, height, channels, {}};
@@ -159,5 +158,4 @@ TEST(Flip, SeesTexture) {
             flip_of(reference, prepare_flip(picture(48, 0.4f, 0.15f))));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::standalone_glb_test

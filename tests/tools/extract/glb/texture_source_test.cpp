@@ -9,8 +9,7 @@
 #include "stages/data/fragments.h"
 #include "tests/support/packages.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::texture_source_test {
 
 const std::string kGolden = std::string(TEXMESH_SOURCE_DIR) + "/tests/golden/v2.0-scan.texmesh";
 constexpr std::uint32_t kTimes = 8;
@@ -52,5 +51,4 @@ TEST(TextureSource, OfAnImageThatNoMaterialHasAllIsShown) {
   EXPECT_EQ(shown, std::size_t{kWidth} * kHeight);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::texture_source_test

@@ -12,8 +12,7 @@
 #include "tests/support/gltf_builder.h"
 #include "tests/support/images.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::proxy_parts_test {
 
 using Use = ProxyMap::Use;
 using testing::GltfBuilder;
@@ -172,5 +171,4 @@ TEST(ProxyParts, WhatCannotBeTakenApartIsLeft) {
   EXPECT_THROW(ProxyParts::read(broken, "proxy", {}), FormatError);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::proxy_parts_test

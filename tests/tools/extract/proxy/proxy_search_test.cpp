@@ -9,8 +9,7 @@
 #include "tests/support/packages.h"
 #include "tools/extract/extract.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::proxy_search_test {
 
 /// A sphere; S_5 and the smaller proxy are half of it.
 Bytes package_bytes(bool with_proxies) {
@@ -83,5 +82,4 @@ TEST(ProxySearch, FilesAreWhereTheSourceIsAndTheSameForAnyThreads) {
   EXPECT_NEAR(check_glb(one.glb, "x.glb", findings, GlbRules::kStandalone).bounds_min.x, 9, 1e-2);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::proxy_search_test

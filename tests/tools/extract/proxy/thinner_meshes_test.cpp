@@ -8,8 +8,7 @@
 
 #include "tests/support/meshes.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::thinner_meshes_test {
 
 using Corner = std::array<float, 5>;
 
@@ -54,5 +53,4 @@ TEST(ThinnerMeshes, AMeshWithoutAreaIsLeft) {
   EXPECT_EQ(thinner_meshes(flat, {}), std::vector<Mesh>{flat});
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::thinner_meshes_test

@@ -8,8 +8,7 @@
 #include "tests/support/gltf_builder.h"
 #include "tests/support/images.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::usdz_test {
 
 using Json = nlohmann::json;
 using testing::GltfBuilder;
@@ -183,5 +182,4 @@ TEST(Usdz, WebpBecomesJpegAndIsTold) {
   EXPECT_TRUE(has(usdz.notes[0], "WebP"));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::usdz_test

@@ -8,8 +8,7 @@
 #include "tests/support/meshes.h"
 #include "tests/support/packages.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::atlas_report_test {
 
 using Json = nlohmann::ordered_json;
 
@@ -112,5 +111,4 @@ TEST(AtlasReport, APackageHasTheFiguresOfItsFinestScale) {
   EXPECT_EQ(j["atlases"][0]["name"], "texture 0 (ball.jpg)");
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::atlas_report_test

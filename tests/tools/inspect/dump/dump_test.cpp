@@ -7,8 +7,7 @@
 #include "tools/inspect/dump/dump.h"
 #include "tools/inspect/provenance.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::dump_test {
 
 using Json = nlohmann::ordered_json;
 
@@ -205,5 +204,4 @@ TEST(OptionChanges, AreThoseThatDifferFromTheDefaults) {
   EXPECT_EQ(changes[1].fallback, "");
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::dump_test

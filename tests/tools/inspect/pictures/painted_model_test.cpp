@@ -16,8 +16,7 @@
 #include "tools/inspect/package_mesh.h"
 #include "tools/inspect/pictures/painted_model.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::painted_model_test {
 
 using namespace testing;  // NOLINT: of painted pictures
 
@@ -172,5 +171,4 @@ TEST(PaintedModel, APackageShowsItsFragmentsAndNamesTheAlternative) {
   }
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::painted_model_test

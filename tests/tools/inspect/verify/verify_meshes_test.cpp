@@ -8,8 +8,7 @@
 #include "tests/support/images.h"
 #include "tests/tools/inspect/verify/verify_support.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::verify_meshes_test {
 
 // Meshes
 
@@ -102,5 +101,4 @@ TEST(VerifyMeshes, Fragments) {
                            "fragment-decode", rung_path(0, 0)));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::verify_meshes_test

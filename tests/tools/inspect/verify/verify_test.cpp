@@ -8,8 +8,7 @@
 #include "tests/support/images.h"
 #include "tests/tools/inspect/verify/verify_support.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::verify_test {
 
 TEST(Verify, ASoundPackageHasNoFindings) {
   const Bytes package = make_package_parts().build();
@@ -367,5 +366,4 @@ TEST(Verify, About) {
                   .findings.empty());
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::verify_test

@@ -6,8 +6,7 @@
 
 #include "tests/tools/publish/pages/html_check.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::oembed_test {
 
 using Json = nlohmann::json;
 
@@ -53,5 +52,4 @@ TEST(Oembed, WhatIsNotKnownIsLeftOut) {
     EXPECT_FALSE(j.contains(name)) << name;
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::oembed_test

@@ -4,8 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-namespace texmesh {
-namespace {
+namespace texmesh::tileset_test {
 
 using Json = nlohmann::json;
 
@@ -120,5 +119,4 @@ TEST(TilesetJson, AFlatObjectHasABoxWithAnInside) {
   EXPECT_FALSE(root.contains("transform"));
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::tileset_test

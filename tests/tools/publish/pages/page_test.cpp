@@ -6,8 +6,7 @@
 
 #include "tests/tools/publish/pages/html_check.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::page_test {
 
 TEST(Html, APageIsWellFormedWhateverItsTitle) {
   const std::string page =
@@ -47,5 +46,4 @@ TEST(SidesInWords, UseTheUnitOfTheLongest) {
   EXPECT_EQ(sides_in_words({12345, 1, 1}), "12345 x 1 x 1 m");
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::page_test

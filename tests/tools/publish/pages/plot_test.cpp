@@ -4,8 +4,7 @@
 
 #include "tests/tools/publish/pages/html_check.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::plot_test {
 
 Plot sample() {
   Plot plot;
@@ -54,5 +53,4 @@ TEST(Plot, ALinearAxisMayGoBelowZero) {
   EXPECT_NE(svg.find("M58.0 310.0L401.0 240.0L744.0 30.0"), std::string::npos) << svg;
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::plot_test

@@ -17,8 +17,7 @@
 #include "tools/publish/pages/page.h"
 #include "tools/publish/report/report_pictures.h"
 
-namespace texmesh::testing {
-namespace {
+namespace texmesh::testing::report_test {
 
 constexpr const char* kHostile = "<img src=//x onerror=alert(1)> & \"x\" 'y'";
 
@@ -194,5 +193,4 @@ TEST(HeatColour, GrowsLighterFromBlack) {
   EXPECT_EQ(heat_hex(2), "#fcfdbf");
 }
 
-}  // namespace
-}  // namespace texmesh::testing
+}  // namespace texmesh::testing::report_test

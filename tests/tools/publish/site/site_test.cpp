@@ -10,8 +10,7 @@
 #include "tests/support/command.h"
 #include "tests/support/packages.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::site_test {
 
 using testing::TemporaryFolder;
 
@@ -138,5 +137,4 @@ TEST(Site, AFolderWithoutPackagesIsRefused) {
   EXPECT_THROW(read_site(folder / "none", {}), InputError);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::site_test

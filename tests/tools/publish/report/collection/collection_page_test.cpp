@@ -4,8 +4,7 @@
 
 #include "tests/tools/publish/pages/html_check.h"
 
-namespace texmesh {
-namespace {
+namespace texmesh::collection_page_test {
 
 ModelSummary model(const std::string& name, ModelResult result, const std::string& message = "") {
   ModelSummary m;
@@ -79,5 +78,4 @@ TEST(CollectionPage, WhatIsNoPackageHasNoFace) {
   EXPECT_EQ(golden->poster.empty(), false);
 }
 
-}  // namespace
-}  // namespace texmesh
+}  // namespace texmesh::collection_page_test
