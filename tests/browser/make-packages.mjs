@@ -1,4 +1,5 @@
 // Small packages for the tests, made by make_scan and texmesh; kept while both programs are older than they are.
+import {fileURLToPath} from 'node:url';
 import {env, fs, packages, path, run} from './browser.mjs';
 import {sheetGlb} from './sheet.mjs';
 
@@ -93,3 +94,5 @@ export function makePackages() {
     fs.copyFileSync(file, path.join(packages, 'alone', `${name}.texmesh`));
   }
 }
+
+if (process.argv[1] === fileURLToPath(import.meta.url)) makePackages();

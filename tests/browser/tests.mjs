@@ -8,10 +8,8 @@ import {makePackages} from './make-packages.mjs';
 import {nginxMissing, startNginx} from './nginx.mjs';
 import {comparePlane, kEverything, kTop, kTopQuality, loaded, rightFrom, throttled} from './loads.mjs';
 import {starvation} from './starved.mjs';
-import './application-tests.mjs';
 import './block-tests.mjs';
 import './display-tests.mjs';
-import './publish-tests.mjs';
 import './element-tests.mjs';
 import './limits-tests.mjs';
 import './materials-tests.mjs';
@@ -20,15 +18,12 @@ import './notes-tests.mjs';
 import './page-tests.mjs';
 import './proxy-tests.mjs';
 import './thesis-tests.mjs';
-import './usdz-tests.mjs';
 import './render-tests.mjs';
 import './size-tests.mjs';
 import './viewer-tests.mjs';
 import './viewer-use-tests.mjs';
 import './versions-tests.mjs';
 import './worker-tests.mjs';
-
-if (process.env.TEXMESH_LAB_BINARY) await import('./experiment-tests.mjs');
 
 /** Of the limit, besides the time without a processor: figures.mjs measures what a quiet machine keeps. */
 const kLate = 1.06;
