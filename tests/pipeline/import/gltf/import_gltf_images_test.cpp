@@ -12,7 +12,7 @@ using namespace testing;  // NOLINT: fixtures
 TEST(ImportGltfImages, ReadsImagesFromBufferViewsAndDataUris) {
   GltfBuilder b = textured(base_colour());
   b.json["images"] = {{{"bufferView", b.view_of(png())}, {"mimeType", "image/png"}, {"name", "skin/colour"}}};
-  Model m = import(b);
+  Model m = import_built(b);
   ASSERT_EQ(m.images.size(), 1u);
   EXPECT_EQ(m.images[0].bytes, png());
   EXPECT_EQ(m.images[0].name, "colour");
@@ -20,7 +20,7 @@ TEST(ImportGltfImages, ReadsImagesFromBufferViewsAndDataUris) {
       {{"uri",
         "data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGA"
         "WjR9awAAAABJRU5ErkJggg=="}}};
-  m = import(b);
+  m = import_built(b);
   ASSERT_EQ(m.images.size(), 1u);
   EXPECT_EQ(m.images[0].bytes, png());
 }
@@ -33,12 +33,12 @@ TEST(ImportGltfImages, PrefersWebpAndFallsBackWhenItIsMissing) {
   MemoryResolver resolver;
   resolver.files["a.png"] = png();
   resolver.files["b.webp"] = webp();
-  Model m = import(b, resolver);
+  Model m = import_built(b, resolver);
   ASSERT_EQ(m.images.size(), 1u);
   EXPECT_EQ(m.images[0].format, ImageFormat::kWebp);
   EXPECT_EQ(resolver.asked, (std::vector<std::string>{"b.webp"}));
   resolver.files.erase("b.webp");
-  m = import(b, resolver);
+  m = import_built(b, resolver);
   ASSERT_EQ(m.images.size(), 1u);
   EXPECT_EQ(m.images[0].format, ImageFormat::kPng);
 }
@@ -51,7 +51,7 @@ TEST(ImportGltfImages, AvifGoesOnAsAPngOfTheSameTexels) {
   b.json["textures"][0]["extensions"] = {{"EXT_texture_avif", {{"source", 1}}}};
   b.json["textures"][0].erase("source");
   b.json["extensionsUsed"] = b.json["extensionsRequired"] = {"EXT_texture_avif"};
-  const Model m = import(b);
+  const Model m = import_built(b);
   ASSERT_EQ(m.images.size(), 1u);
   EXPECT_EQ(m.images[0].format, ImageFormat::kPng);
   const Pixels read = decode_image(m.images[0]);
@@ -76,7 +76,7 @@ TEST(ImportGltfImages, ReadsPlainAndPackedKtx2) {
     GltfBuilder b = with_ktx2(testing::ktx2_bytes(parts));
     for (const bool fallback : {true, false}) {
       if (!fallback) b.json["textures"][0].erase("source");
-      const Model m = import(b);
+      const Model m = import_built(b);
       ASSERT_EQ(m.images.size(), 1u);
       EXPECT_EQ(m.images[0].format, ImageFormat::kPng);
       EXPECT_EQ(decode_image(m.images[0]).data, texels);
@@ -91,26 +91,26 @@ TEST(ImportGltfImages, BasisIsRefusedUnlessThereIsAnotherImage) {
   testing::Ktx2Parts basis = testing::ktx2_parts(2, 2, 3, Bytes(12));
   basis.vk_format = 0, basis.model = 166;
   GltfBuilder b = with_ktx2(testing::ktx2_bytes(basis));
-  const Model m = import(b);
+  const Model m = import_built(b);
   ASSERT_EQ(m.images.size(), 1u);
   EXPECT_EQ(m.images[0].bytes, png());
   ASSERT_TRUE(has_note(m, "ktx2-left-out", Severity::kWarning));
   EXPECT_NE(m.notes.front().text.find("Basis Universal"), std::string::npos) << m.notes.front().text;
   b.json["textures"][0].erase("source");
   try {
-    import(b);
+    import_built(b);
     FAIL() << "no refusal";
   } catch (const InputError& e) {
     EXPECT_NE(std::string(e.what()).find("Basis Universal cannot be read"), std::string::npos) << e.what();
     EXPECT_NE(std::string(e.what()).find("/images/1"), std::string::npos) << e.what();
   }
   b.json["textures"][0]["extensions"]["KHR_texture_basisu"]["source"] = 2;
-  EXPECT_THROW(import(b), InputError) << "no such image";
+  EXPECT_THROW(import_built(b), InputError) << "no such image";
 }
 
 TEST(ImportGltfImages, AMissingImageIsAWarning) {
   MemoryResolver empty;
-  const Model m = import(textured(base_colour()), empty);
+  const Model m = import_built(textured(base_colour()), empty);
   EXPECT_TRUE(has_note(m, "missing-texture", Severity::kWarning));
   EXPECT_FALSE(m.materials.at(0).base_colour_texture.used());
   EXPECT_TRUE(m.images.empty());
@@ -119,7 +119,7 @@ TEST(ImportGltfImages, AMissingImageIsAWarning) {
 TEST(ImportGltfImages, ATextureOfAnotherKindOnlyIsAWarning) {
   GltfBuilder b = textured(base_colour());
   b.json["textures"][0] = {{"extensions", {{"MSFT_texture_dds", {{"source", 0}}}}}};
-  const Model m = import(b);
+  const Model m = import_built(b);
   EXPECT_TRUE(has_note(m, "missing-texture", Severity::kWarning));
   EXPECT_FALSE(m.materials.at(0).base_colour_texture.used());
 }
@@ -131,7 +131,7 @@ TEST(ImportGltfImages, NeverOpensImagesOfUnusedMaterials) {
   b.json["images"].push_back({{"uri", "unused.png"}});
   MemoryResolver resolver;
   resolver.files["a.png"] = png();
-  EXPECT_EQ(import(b, resolver).materials.size(), 1u);
+  EXPECT_EQ(import_built(b, resolver).materials.size(), 1u);
   EXPECT_EQ(resolver.asked, (std::vector<std::string>{"a.png"}));
 }
 
@@ -142,7 +142,7 @@ TEST(ImportGltfImages, RefusesImagesOfForeignContent) {
     MemoryResolver resolver;
     resolver.files[uri] = std::move(bytes);
     try {
-      import(b, resolver);
+      import_built(b, resolver);
       ADD_FAILURE() << uri;
     } catch (const InputError& e) {
       EXPECT_EQ(e.file(), "m.glb") << e.what();

@@ -29,7 +29,7 @@ TEST(ImportGltfMaterials, ReadsEveryProperty) {
                             {"extensions", {{"KHR_materials_unlit", json::object()}}}});
   b.json["textures"][0]["sampler"] = 0;
   b.json["samplers"] = {{{"wrapS", 33071}, {"wrapT", 33648}, {"magFilter", 9728}}};
-  const Model m = import(b);
+  const Model m = import_built(b);
   const Material& r = m.materials.at(0);
   EXPECT_EQ(r.name, "skin");
   EXPECT_EQ(r.base_colour, (Vec4f{0.5f, 0.25f, 0.125f, 0.75f}));
@@ -66,19 +66,19 @@ TEST(ImportGltfMaterials, KeepsEveryMinificationFilter) {
     GltfBuilder b = textured(base_colour());
     b.json["textures"][0]["sampler"] = 0;
     b.json["samplers"] = {{{"minFilter", code}}};
-    const TextureRef t = import(b).materials.at(0).base_colour_texture;
+    const TextureRef t = import_built(b).materials.at(0).base_colour_texture;
     EXPECT_EQ(t.minification, kind) << code;
     EXPECT_FALSE(t.nearest);
   }
   GltfBuilder wrong = textured(base_colour());
   wrong.json["samplers"] = {{{"minFilter", 9730}}};
-  EXPECT_THROW(import(wrong), InputError);
+  EXPECT_THROW(import_built(wrong), InputError);
 }
 
 TEST(ImportGltfMaterials, KeepsTextureTransforms) {
   const json transform = {{"offset", {0.25, 0.5}}, {"scale", {2, 3}}, {"rotation", 1.5}, {"texCoord", 1}};
-  const Model m =
-      import(textured(base_colour({{"index", 0}, {"extensions", {{"KHR_texture_transform", transform}}}})));
+  const Model m = import_built(
+      textured(base_colour({{"index", 0}, {"extensions", {{"KHR_texture_transform", transform}}}})));
   const TextureRef& t = m.materials.at(0).base_colour_texture;
   EXPECT_EQ(t.transform.offset, (Vec2f{0.25f, 0.5f}));
   EXPECT_EQ(t.transform.scale, (Vec2f{2, 3}));
@@ -91,7 +91,7 @@ TEST(ImportGltfMaterials, HugeNumbersStayFinite) {
   json material = base_colour({{"index", 0}, {"extensions", {{"KHR_texture_transform", transform}}}});
   material["alphaCutoff"] = 1e300;
   material["normalTexture"] = {{"index", 0}, {"scale", -1e300}};
-  const Material r = import(textured(material)).materials.at(0);
+  const Material r = import_built(textured(material)).materials.at(0);
   for (const float v : {r.alpha_cutoff, r.normal_scale, r.base_colour_texture.transform.offset.x,
                         r.base_colour_texture.transform.offset.y, r.base_colour_texture.transform.rotation}) {
     EXPECT_LT(std::fabs(v), 1e31f);
@@ -106,7 +106,7 @@ TEST(ImportGltfMaterials, SpecularGlossinessBecomesMetallicRoughness) {
     GltfBuilder b = textured(material);
     b.json["textures"].push_back({{"source", 1}});
     b.json["images"].push_back({{"uri", "metal.png"}});
-    return import(b);
+    return import_built(b);
   };
   const Model metal = read();  // no diffuse light: a metal
   EXPECT_TRUE(has_note(metal, "specular-glossiness", Severity::kInfo));
@@ -136,14 +136,14 @@ TEST(ImportGltfMaterials, SpecularGlossinessBecomesMetallicRoughness) {
 
 TEST(ImportGltfMaterials, TexturesThatNoUvReachesAreLeftOut) {
   GltfBuilder far = textured(base_colour({{"index", 0}, {"texCoord", 2}}));
-  Model m = import(far);
+  Model m = import_built(far);
   EXPECT_TRUE(has_note(m, "unsupported-texcoord", Severity::kWarning));
   EXPECT_FALSE(m.materials.at(0).base_colour_texture.used());
 
   GltfBuilder none = textured(base_colour());
   none.json["meshes"][0]["primitives"][0]["attributes"].erase("TEXCOORD_0");
   none.json["meshes"][0]["primitives"][0]["attributes"].erase("TEXCOORD_1");
-  m = import(none);
+  m = import_built(none);
   EXPECT_TRUE(has_note(m, "texture-without-uv", Severity::kWarning));
   EXPECT_TRUE(m.images.empty());
 }
@@ -181,7 +181,7 @@ TEST(ImportGltfMaterials, EveryTextureOfEveryExtensionIsRead) {
     b.json["extensionsUsed"].push_back(name);
     b.json["extensionsRequired"].push_back(name);
   }
-  const Model m = import(b, resolver);
+  const Model m = import_built(b, resolver);
   EXPECT_TRUE(m.notes.empty());
   const Material& r = m.materials.at(0);
   std::vector<MaterialExtensionKind> carried;
@@ -219,7 +219,7 @@ TEST(ImportGltfMaterials, ExtensionsOfTheWrongKindAreRefused) {
     json material = base_colour();
     material["extensions"][extension] = std::move(value);
     try {
-      import(textured(material));
+      import_built(textured(material));
       ADD_FAILURE() << place;
     } catch (const InputError& e) {
       EXPECT_EQ(e.place(), "/materials/0/extensions/" + std::string(extension) + place) << e.what();
@@ -237,7 +237,7 @@ TEST(ImportGltfMaterials, NotesWhatIsLostWithAnUnknownExtensionOnce) {
   GltfBuilder b = textured(material);
   b.json["materials"].push_back(b.json["materials"][0]);
   b.json["extensionsUsed"] = {"EXT_plush"};
-  const Model m = import(b);
+  const Model m = import_built(b);
   ASSERT_EQ(m.notes.size(), 2u);
   EXPECT_EQ(m.notes[1].text, "EXT_plush is left out, and with it the textures fibreTexture");
   EXPECT_EQ(m.notes[1].severity, Severity::kWarning);
@@ -249,14 +249,14 @@ TEST(ImportGltfMaterials, TangentsFollowTheNodes) {
   json& attributes = b.json["meshes"][0]["primitives"][0]["attributes"];
   attributes["NORMAL"] = b.attribute<float>({0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1}, "VEC3");
   attributes["TANGENT"] = b.attribute<float>({1, 0, 0, 1, 1, 0, 0, 1, 1, 0, 0, -1, 1, 0, 0, 1}, "VEC4");
-  EXPECT_EQ(import(b).mesh.tangents,
+  EXPECT_EQ(import_built(b).mesh.tangents,
             (std::vector<Vec4f>{{1, 0, 0, 1}, {1, 0, 0, 1}, {1, 0, 0, -1}, {1, 0, 0, 1}}));
   b.json["nodes"][0]["scale"] = {-2, 3, 1};  // a mirror
-  EXPECT_EQ(import(b).mesh.tangents[0], (Vec4f{-1, 0, 0, -1}));
+  EXPECT_EQ(import_built(b).mesh.tangents[0], (Vec4f{-1, 0, 0, -1}));
   b.json["nodes"].push_back({{"mesh", 0}});
-  EXPECT_EQ(import(b).mesh.tangents.size(), 8u);
+  EXPECT_EQ(import_built(b).mesh.tangents.size(), 8u);
   attributes.erase("NORMAL");
-  EXPECT_TRUE(import(b).mesh.tangents.empty()) << "glTF: ignored without normals";
+  EXPECT_TRUE(import_built(b).mesh.tangents.empty()) << "glTF: ignored without normals";
 }
 
 }  // namespace texmesh::import_gltf_materials_test

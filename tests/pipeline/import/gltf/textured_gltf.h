@@ -30,13 +30,13 @@ inline json base_colour(json info = {{"index", 0}}) {
   return {{"pbrMetallicRoughness", {{"baseColorTexture", std::move(info)}}}};
 }
 
-inline Model import(const GltfBuilder& b, MemoryResolver& resolver) {
+inline Model import_built(const GltfBuilder& b, MemoryResolver& resolver) {
   return import_gltf("m.glb", b.glb(), resolver, {}, {}).model;
 }
-inline Model import(const GltfBuilder& b) {
+inline Model import_built(const GltfBuilder& b) {
   MemoryResolver resolver;
   resolver.files["a.png"] = png();
-  return import(b, resolver);
+  return import_built(b, resolver);
 }
 
 }  // namespace texmesh::testing

@@ -14,7 +14,7 @@ namespace texmesh::import_obj_test {
 using namespace testing;  // NOLINT: fixtures
 
 TEST(ImportObj, QuadWithTextureCoordinates) {
-  const Model m = import(kVertices + "f 1/1 2/2 3/3 4/4\n");
+  const Model m = import_text(kVertices + "f 1/1 2/2 3/3 4/4\n");
   EXPECT_EQ(m.mesh.positions.size(), 4u);
   EXPECT_EQ(m.mesh.triangles.size(), 2u);
   EXPECT_EQ(m.mesh.uv0[0], (Vec2f{0, 1})) << "v grows downwards in glTF";
@@ -23,24 +23,24 @@ TEST(ImportObj, QuadWithTextureCoordinates) {
 }
 
 TEST(ImportObj, NegativeIndicesAndMixedCorners) {
-  EXPECT_EQ(import(kVertices + "f -4/-4 -3/-3 -2/-2 -1/-1\n").mesh,
-            import(kVertices + "f 1/1 2/2 3/3 4/4\n").mesh);
-  const Model m = import(kVertices + "vn 0 0 2\nf 1//1 2//-1 3//1\nf 1/1/1 3/3/1 4/4/1\nf 1 2 4\n");
+  EXPECT_EQ(import_text(kVertices + "f -4/-4 -3/-3 -2/-2 -1/-1\n").mesh,
+            import_text(kVertices + "f 1/1 2/2 3/3 4/4\n").mesh);
+  const Model m = import_text(kVertices + "vn 0 0 2\nf 1//1 2//-1 3//1\nf 1/1/1 3/3/1 4/4/1\nf 1 2 4\n");
   EXPECT_EQ(m.mesh.triangles.size(), 3u);
   EXPECT_EQ(m.mesh.normals[0], (Vec3f{0, 0, 1}));
-  EXPECT_EQ(import("f 1 2 3\nv 0 0 0\nv 1 0 0\nv 0 1 0\n").mesh.triangles.size(), 1u)
+  EXPECT_EQ(import_text("f 1 2 3\nv 0 0 0\nv 1 0 0\nv 0 1 0\n").mesh.triangles.size(), 1u)
       << "faces before their vertices";
 }
 
 TEST(ImportObj, CommentsContinuationsAndLineEnds) {
-  const Mesh expected = import(kVertices + "f 1 2 3\n").mesh;
-  EXPECT_EQ(import("\xef\xbb\xbf# c\r\n" + kVertices + "  f 1 2 \\\n 3 # a comment\n").mesh, expected);
+  const Mesh expected = import_text(kVertices + "f 1 2 3\n").mesh;
+  EXPECT_EQ(import_text("\xef\xbb\xbf# c\r\n" + kVertices + "  f 1 2 \\\n 3 # a comment\n").mesh, expected);
   std::string mac = kVertices + "f 1 2 3\n";
   for (char& c : mac) c = c == '\n' ? '\r' : c;
-  EXPECT_EQ(import(mac).mesh, expected);
-  EXPECT_EQ(import(kVertices + "s off\ncstype bezier\nl 1 2\np 1\nf 1 2 3\n").mesh, expected);
-  EXPECT_EQ(count_notes(import(kVertices + "l 1 2\np 1\nf 1 2 3\n"), "lines-and-points"), 1);
-  EXPECT_EQ(count_notes(import(kVertices + "f 1 2\nf 1 2 3\n"), "face-without-area"), 1);
+  EXPECT_EQ(import_text(mac).mesh, expected);
+  EXPECT_EQ(import_text(kVertices + "s off\ncstype bezier\nl 1 2\np 1\nf 1 2 3\n").mesh, expected);
+  EXPECT_EQ(count_notes(import_text(kVertices + "l 1 2\np 1\nf 1 2 3\n"), "lines-and-points"), 1);
+  EXPECT_EQ(count_notes(import_text(kVertices + "f 1 2\nf 1 2 3\n"), "face-without-area"), 1);
 }
 
 TEST(ImportObj, ConcavePolygonsStayInsideThemselves) {
@@ -51,7 +51,7 @@ TEST(ImportObj, ConcavePolygonsStayInsideThemselves) {
     for (int i = 0; i < 6; ++i) text += "v " + std::to_string(xs[i]) + " " + std::to_string(ys[i]) + " 3\n";
     text += "f";
     for (int i = 0; i < 6; ++i) text += " " + std::to_string((start + i) % 6 + 1);
-    const Mesh mesh = import(text + "\n").mesh;
+    const Mesh mesh = import_text(text + "\n").mesh;
     EXPECT_EQ(mesh.triangles.size(), 4u);
     double area = 0;
     for (const Triangle& t : mesh.triangles) {
@@ -64,7 +64,7 @@ TEST(ImportObj, ConcavePolygonsStayInsideThemselves) {
     EXPECT_NEAR(area, 3, 1e-6);
   }
   // An arrow head: only one diagonal of the quad lies inside.
-  const Mesh arrow = import("v 0 0 0\nv 2 -1 0\nv 0.5 0 0\nv 2 1 0\nf 1 2 3 4\n").mesh;
+  const Mesh arrow = import_text("v 0 0 0\nv 2 -1 0\nv 0.5 0 0\nv 2 1 0\nf 1 2 3 4\n").mesh;
   for (const Triangle& t : arrow.triangles)
     EXPECT_GT(
         cross(arrow.positions[t[1]] - arrow.positions[t[0]], arrow.positions[t[2]] - arrow.positions[t[0]]).z,
@@ -78,41 +78,42 @@ TEST(ImportObj, PolygonsOfManyCorners) {
     text += "v " + std::to_string(r * std::cos(a)) + " " + std::to_string(r * std::sin(a)) + " 0\n";
     face += " " + std::to_string(i + 1);
   }
-  EXPECT_EQ(import(text + face + "\n").mesh.triangles.size(), 4998u);
+  EXPECT_EQ(import_text(text + face + "\n").mesh.triangles.size(), 4998u);
 }
 
 TEST(ImportObj, AFileWhoseOnlyFaceHasNoVerticesIsRefusedWithItsLine) {
   for (const char* f : {"1 2 5", "1 2 0", "1 2 -5", "1 2 99999999999", "1 2 2147483648",
                         "1 2 -9223372036854775808", "1 2 x", "1 2 3/x", "1 2 /3", "1 2 1.5"}) {
-    const std::string error = input_error([&] { import(kVertices + "f " + f + "\n"); });
+    const std::string error = input_error([&] { import_text(kVertices + "f " + f + "\n"); });
     EXPECT_NE(error.find("a.obj: line 9"), std::string::npos) << f << ": " << error;
   }
 }
 
 TEST(ImportObj, NumbersThatAreNoneAreErrorsAndNanIsNot) {
   for (const char* v : {"v 1 2", "v 1 two 3", "v", "vt", "vt x", "vn 1 2", "v 1,5 2 3"})
-    EXPECT_NE(input_error([&] { import(kVertices + v + "\nf 1 2 3\n"); }).find("line 9"), std::string::npos)
+    EXPECT_NE(input_error([&] { import_text(kVertices + v + "\nf 1 2 3\n"); }).find("line 9"),
+              std::string::npos)
         << v;
   for (const char* v : {"nan 0 0", "0 -nan(ind) 0", "0 0 1.#QNAN", "inf 0 0", "1e999 0 0"}) {
-    const Model m = import(kVertices + "v " + v + "\nf 1 2 3\nf 1 2 5\n");
+    const Model m = import_text(kVertices + "v " + v + "\nf 1 2 3\nf 1 2 5\n");
     EXPECT_EQ(m.mesh.triangles.size(), 1u) << v;
     EXPECT_EQ(count_notes(m, "non-finite-position"), 1) << v;
   }
-  EXPECT_THROW(import("v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), InputError);
-  const Model uv = import(kVertices + "vt nan 3\nf 1/5 2/2 3/3\n");
+  EXPECT_THROW(import_text("v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), InputError);
+  const Model uv = import_text(kVertices + "vt nan 3\nf 1/5 2/2 3/3\n");
   EXPECT_EQ(count_notes(uv, "non-finite-uv"), 1);
   EXPECT_EQ(uv.mesh.uv0[0], (Vec2f{0, 0}));
 }
 
 TEST(ImportObj, EmptyAndFaceless) {
-  EXPECT_THROW(import(""), InputError);
-  EXPECT_THROW(import("hello\n"), InputError);
-  EXPECT_THROW(import(kVertices), InputError);
-  EXPECT_THROW(import(std::string("\0\1\2\3", 4)), InputError);
+  EXPECT_THROW(import_text(""), InputError);
+  EXPECT_THROW(import_text("hello\n"), InputError);
+  EXPECT_THROW(import_text(kVertices), InputError);
+  EXPECT_THROW(import_text(std::string("\0\1\2\3", 4)), InputError);
 }
 
 TEST(ImportObj, FarAwayScansKeepTheirMillimetres) {
-  const Model m = import(
+  const Model m = import_text(
       "v 5000000.001 4000000.002 100.003\nv 5000001.001 4000000.002 100.003\nv 5000000.001 4000001.002 "
       "100.003\nf 1 2 3\n");
   EXPECT_NE(m.mesh.origin.x, 0);
@@ -123,8 +124,8 @@ TEST(ImportObj, FarAwayScansKeepTheirMillimetres) {
 }
 
 TEST(ImportObj, PartsAndMaterials) {
-  const Model m =
-      import(kVertices + "o one\nusemtl red wood\nf 1 2 3\ng two\nusemtl b\nf 1 3 4\no three\nf 2 3 4\n");
+  const Model m = import_text(
+      kVertices + "o one\nusemtl red wood\nf 1 2 3\ng two\nusemtl b\nf 1 3 4\no three\nf 2 3 4\n");
   EXPECT_EQ(m.mesh.part_names, (std::vector<std::string>{"one", "one/two", "three"}));
   EXPECT_EQ(m.mesh.triangle_part, (std::vector<std::uint16_t>{0, 1, 2}));
   EXPECT_EQ(m.mesh.triangle_material, (std::vector<std::uint16_t>{0, 1, 1}));
@@ -136,34 +137,36 @@ TEST(ImportObj, ForeignContentIsRefusedAndForeignNamesAreNoted) {
   MemoryResolver resolver;
   resolver.files["a.mtl"] = bytes_of("newmtl m\nmap_Kd t.jpg\n");
   resolver.files["t.jpg"] = testing::png_bytes(8, 8, 3);
-  const Model m = import(kTextured, resolver);
+  const Model m = import_text(kTextured, resolver);
   EXPECT_EQ(m.images[0].format, ImageFormat::kPng);
   EXPECT_EQ(count_notes(m, "image-extension"), 1);
   resolver.files["t.jpg"] = bytes_of("P6\n1 1\n255\nabc");
-  EXPECT_NE(input_error([&] { import(kTextured, resolver); }).find("t.jpg"), std::string::npos);
+  EXPECT_NE(input_error([&] { import_text(kTextured, resolver); }).find("t.jpg"), std::string::npos);
 }
 
 TEST(ImportObj, VertexColours) {
   const std::string colours = "v 0 0 0 1 0 0.5\nv 1 0 0 1 0 0.5\nv 0 1 0\n";
-  Model m = import(colours + "f 1 2 3\n");
+  Model m = import_text(colours + "f 1 2 3\n");
   ASSERT_EQ(m.mesh.colours.size(), 3u);
   EXPECT_NEAR(m.mesh.colours[0].z, 0.21404, 1e-4);
   EXPECT_EQ(m.mesh.colours[2], (Vec4f{1, 1, 1, 1}));
-  m = import("v 0 0 0 255 0 128\nv 1 0 0 0 0 0\nv 0 1 0 0 0 0\nf 1 2 3\n");
+  m = import_text("v 0 0 0 255 0 128\nv 1 0 0 0 0 0\nv 0 1 0 0 0 0\nf 1 2 3\n");
   EXPECT_NEAR(m.mesh.colours[0].z, 0.21586, 1e-4) << "0..255";
-  EXPECT_TRUE(import("v 0 0 0 1\nv 1 0 0 1\nv 0 1 0 1\nf 1 2 3\n").mesh.colours.empty()) << "w is no colour";
+  EXPECT_TRUE(import_text("v 0 0 0 1\nv 1 0 0 1\nv 0 1 0 1\nf 1 2 3\n").mesh.colours.empty())
+      << "w is no colour";
   MemoryResolver resolver;
   resolver.files["a.mtl"] = bytes_of("newmtl m\nmap_Kd c.png\nnewmtl k\nKd 0.8 0.8 0.8\n");
   resolver.files["c.png"] = testing::png_bytes(8, 8, 3);
-  m = import("mtllib a.mtl\n" + colours + "vt 0 0\nusemtl m\nf 1/1 2/1 3/1\n", resolver);
+  m = import_text("mtllib a.mtl\n" + colours + "vt 0 0\nusemtl m\nf 1/1 2/1 3/1\n", resolver);
   EXPECT_TRUE(m.mesh.colours.empty());
   EXPECT_EQ(count_notes(m, "colours-beside-texture"), 1);
-  m = import("mtllib a.mtl\n" + colours + "usemtl k\nf 1 2 3\n", resolver);
+  m = import_text("mtllib a.mtl\n" + colours + "usemtl k\nf 1 2 3\n", resolver);
   EXPECT_EQ(m.materials[0].base_colour, (Vec4f{1, 1, 1, 1})) << "the colours are the colour";
 }
 
 TEST(ImportObj, HugeUvRangesStay) {
-  const Model m = import("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt -721.25 1553.5\nvt 0 0\nvt 1 0\nf 1/1 2/2 3/3\n");
+  const Model m =
+      import_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt -721.25 1553.5\nvt 0 0\nvt 1 0\nf 1/1 2/2 3/3\n");
   EXPECT_EQ(m.mesh.uv0[0], (Vec2f{-721.25f, -1552.5f}));
 }
 
@@ -171,10 +174,10 @@ TEST(ImportObj, Limits) {
   MemoryResolver resolver;
   ImportOptions options;
   options.max_vertices = 3;
-  EXPECT_THROW(import(kVertices + "f 1 2 3\n", resolver, options), InputError);
+  EXPECT_THROW(import_text(kVertices + "f 1 2 3\n", resolver, options), InputError);
   options = {};
   options.max_triangles = 1;
-  EXPECT_THROW(import(kVertices + "f 1 2 3 4\n", resolver, options), InputError);
+  EXPECT_THROW(import_text(kVertices + "f 1 2 3 4\n", resolver, options), InputError);
   options = {};
   options.max_images = 0;
   EXPECT_THROW(MtlCase("map_Kd c.png\n", options), InputError);
@@ -186,19 +189,19 @@ TEST(ImportObj, TruncatedAtAnyLengthNeverHarms) {
   resolver.files["c.png"] = testing::png_bytes(4, 4, 3);
   const Bytes mtl = resolver.files["a.mtl"];
   for (std::size_t n = 0; n < kTextured.size(); ++n) try {
-      EXPECT_LE(import(kTextured.substr(0, n), resolver).mesh.triangles.size(), 2u);
+      EXPECT_LE(import_text(kTextured.substr(0, n), resolver).mesh.triangles.size(), 2u);
     } catch (const InputError&) {
     }
   for (std::size_t n = 0; n < mtl.size(); ++n) {
     resolver.files["a.mtl"] = {mtl.begin(), mtl.begin() + static_cast<std::ptrdiff_t>(n)};
-    EXPECT_EQ(import(kTextured, resolver).mesh.triangles.size(), 2u);
+    EXPECT_EQ(import_text(kTextured, resolver).mesh.triangles.size(), 2u);
   }
   for (std::size_t i = 0; i < kTextured.size(); ++i)
     for (int bit : {0, 2, 4, 7}) {
       std::string text = kTextured;
       text[i] = static_cast<char>(text[i] ^ 1 << bit);
       try {
-        import(text, resolver);
+        import_text(text, resolver);
       } catch (const InputError&) {
       }
     }
@@ -228,7 +231,7 @@ TEST(ImportObj, LargeFilesTakeLinearTime) {
       }
     }
   const auto start = std::chrono::steady_clock::now();
-  EXPECT_EQ(import(text).mesh.triangles.size(), 2u * n * n);
+  EXPECT_EQ(import_text(text).mesh.triangles.size(), 2u * n * n);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   RecordProperty("seconds", std::to_string(seconds));
   EXPECT_LT(seconds, testing::sanitizers_take(20));

@@ -8,12 +8,12 @@
 
 namespace texmesh::testing {
 
-inline Model import(const std::string& text, Resolver& resolver, const ImportOptions& options = {}) {
+inline Model import_text(const std::string& text, Resolver& resolver, const ImportOptions& options = {}) {
   return import_obj("a.obj", bytes_of(text), resolver, options, {}).model;
 }
-inline Model import(const std::string& text) {
+inline Model import_text(const std::string& text) {
   MemoryResolver resolver;
-  return import(text, resolver);
+  return import_text(text, resolver);
 }
 
 inline const std::string kVertices = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
@@ -50,7 +50,7 @@ struct MtlCase {
     }();
     resolver.files["glass.png"] = filled_png(4, {9, 9, 9, 100});
     resolver.files["opaque.png"] = filled_png(4, {9, 9, 9, 255});
-    model = import(kTextured, resolver, options);
+    model = import_text(kTextured, resolver, options);
   }
   const Material& material() const { return model.materials.at(0); }
   std::string image_name() const {

@@ -11,7 +11,7 @@ namespace texmesh::obj_material_test {
 using namespace testing;  // NOLINT: fixtures
 
 TEST(ObjMaterial, MissingMtlAndMissingTextureAreWarnings) {
-  Model m = import(kTextured);
+  Model m = import_text(kTextured);
   EXPECT_EQ(count_notes(m, "missing-mtl"), 1);
   EXPECT_EQ(m.materials[0].name, "m");
   EXPECT_FALSE(m.materials[0].base_colour_texture.used());
@@ -24,14 +24,16 @@ TEST(ObjMaterial, MissingMtlAndMissingTextureAreWarnings) {
 TEST(ObjMaterial, LibrariesWithBlanksAndSeveralInOneLine) {
   MemoryResolver resolver;
   resolver.files["my scan.mtl"] = bytes_of("newmtl m\nKd 1 0 0\n");
-  EXPECT_EQ(
-      import("mtllib my scan.mtl\n" + kVertices + "usemtl m\nf 1 2 3\n", resolver).materials[0].base_colour.y,
-      0);
+  EXPECT_EQ(import_text("mtllib my scan.mtl\n" + kVertices + "usemtl m\nf 1 2 3\n", resolver)
+                .materials[0]
+                .base_colour.y,
+            0);
   resolver.files = {{"x.mtl", bytes_of("newmtl other\n")}, {"y.mtl", bytes_of("newmtl m\nKd 0 1 0\n")}};
-  EXPECT_EQ(
-      import("mtllib x.mtl y.mtl\n" + kVertices + "usemtl m\nf 1 2 3\n", resolver).materials[0].base_colour.x,
-      0);
-  const Model half = import("mtllib x.mtl gone.mtl\n" + kVertices + "usemtl m\nf 1 2 3\n", resolver);
+  EXPECT_EQ(import_text("mtllib x.mtl y.mtl\n" + kVertices + "usemtl m\nf 1 2 3\n", resolver)
+                .materials[0]
+                .base_colour.x,
+            0);
+  const Model half = import_text("mtllib x.mtl gone.mtl\n" + kVertices + "usemtl m\nf 1 2 3\n", resolver);
   EXPECT_EQ(count_notes(half, "missing-mtl"), 1);
   EXPECT_EQ(count_notes(half, "missing-material"), 1);
 }
