@@ -1,5 +1,6 @@
-// The program of a room's tests: `stages_ssf_tests` runs all, `stages_ssf_tests stages/ssf/ssf_test.cpp` those of one source. These
-// are reported under the name that ctest has for the source. GoogleTest's options hold, too.
+// The program of a room's tests: `stages_ssf_tests` runs all, `stages_ssf_tests stages/ssf/ssf_test.cpp`
+// those of one source. These are reported under the name that ctest has for the source. GoogleTest's options
+// hold, too.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -16,7 +17,8 @@ std::string tests_of(const std::string& source) {
     const testing::TestSuite& suite = *all.GetTestSuite(s);
     for (int t = 0; t < suite.total_test_count(); ++t) {
       const testing::TestInfo& test = *suite.GetTestInfo(t);
-      if (std::string(test.file()).ends_with("tests/" + source)) filter += std::string(suite.name()) + "." + test.name() + ":";
+      if (std::string(test.file()).ends_with("tests/" + source))
+        filter += std::string(suite.name()) + "." + test.name() + ":";
     }
   }
   return filter;

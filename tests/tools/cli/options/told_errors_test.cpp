@@ -17,9 +17,9 @@ struct Told {
 };
 
 Told told_of(const std::function<int()>& run) {
-  testing::internal::CaptureStderr();
+  ::testing::internal::CaptureStderr();
   const int code = run_and_print_errors(run);
-  return {code, testing::internal::GetCapturedStderr()};
+  return {code, ::testing::internal::GetCapturedStderr()};
 }
 
 TEST(ToldErrors, WhatIsGivenIsTheExitCode) {
